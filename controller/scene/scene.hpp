@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "controller/scene/volume_image.hpp"
+
+namespace kerf {
+
+/// Position in mm and orientation as a quaternion x, y, z, w of unit length.
+struct Pose {
+  std::array<double, 3> position_mm{0, 0, 0};
+  std::array<double, 4> orientation{0, 0, 0, 1};
+};
+
+struct Material {
+  std::string name;
+  double iso = 0.5;                              ///< density, 0..1
+  double machinability = 1.0;                    ///< relative removal rate
+  std::array<double, 3> colour{0.9, 0.87, 0.8};  ///< linear RGB, 0..1
+};
+
+/// One [[volume]] after loading, windowing and cropping. `pose` takes volume-frame mm (voxel
+/// (0,0,0) at the origin, axes along the voxel axes) to world.
+struct SceneVolume {
+  std::string name;
+  std::string file;
+  VolumeImage image;
+  Pose pose;
+  Density iso = 32768;
+  bool solid = true;
+};
+
+/// Offset of a tool voxel from the tool centre in half pitches, so that even and odd grids are both
+/// exact: position = offset * pitch / 2.
+using ToolOffset = std::array<std::int16_t, 3>;
+
+/// One [[tool]]: voxel-offset list in the tool frame (tip at the centre of the cutting head, shaft
+/// along +y). `round` tools feel and cut the same in every orientation.
+struct SceneTool {
+  std::string name;
+  std::string shape;
+  double pitch_mm = 0.125;
+  double radius_mm = 1.0;
+  double length_mm = 2.0;
+  bool round = false;
+  std::array<std::int32_t, 3> size_vox{};
+  std::vector<ToolOffset> offsets;
+};
+
+enum class NumericKind : std::uint8_t { fixed, float32, float64 };
+enum class GradientKind : std::uint8_t { central, sobel5, farid };
+enum class CutModel : std::uint8_t { none, overlap, overlap_exact };
+
+/// A scene after loading: everything the controller needs, in double, checked. Load time only.
+struct Scene {
+  std::string path;
+  std::vector<SceneVolume> volumes;
+  std::vector<SceneTool> tools;
+  std::size_t active_tool = 0;
+  std::vector<Material> materials;
+
+  struct Device {
+    std::string personality = "omni";
+    double workspace_scale = 1.0;                       ///< x_scene = scale * x_device
+    std::array<double, 3> offset_mm{0, 0, 0};           ///< scene point under the device origin
+    std::optional<std::array<double, 3>> torque_scale;  ///< N mm per DAC count; none: motors off
+    std::array<double, 3> dock_rad{0.0, 0.23, -0.37};   ///< joint angles in the inkwell
+  } device;
+  struct Force {
+    double p0_n_per_mm2 = 0.06;
+  } force;
+  struct Cut {
+    CutModel model = CutModel::overlap;
+    double rate_per_s = 20.0;  ///< k; 1/T is the paper's own step
+    double p1_n_per_mm2 = 0.06;
+  } cut;
+  struct Limits {
+    double force_n = 3.3;
+    double continuous_force_n = 0.88;  ///< RMS budget
+    double slew_n_per_ms = 0.5;
+    double speed_mm_per_s = 10000.0;
+  } limits;
+  struct Servo {
+    int rate_hz = 1000;
+    NumericKind numeric = NumericKind::fixed;
+    GradientKind kernel = GradientKind::farid;
+  } servo;
+  std::string hand_script;  ///< [hand] script, for the demo; empty: none
+};
+
+}  // namespace kerf

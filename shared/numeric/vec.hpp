@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "shared/numeric/fixed.hpp"
+#include "shared/numeric/scalar.hpp"
+
+namespace kerf {
+
+/// Three numbers in one space. Vectors of different spaces do not mix; a named transform converts.
+template <class S, class Space>
+struct Vec {
+  S x{}, y{}, z{};
+
+  friend constexpr Vec operator+(Vec a, Vec b) noexcept {
+    return {a.x + b.x, a.y + b.y, a.z + b.z};
+  }
+  friend constexpr Vec operator-(Vec a, Vec b) noexcept {
+    return {a.x - b.x, a.y - b.y, a.z - b.z};
+  }
+  friend constexpr Vec operator-(Vec a) noexcept { return {-a.x, -a.y, -a.z}; }
+  friend constexpr Vec operator*(Vec a, S s) noexcept { return {a.x * s, a.y * s, a.z * s}; }
+  friend constexpr Vec operator*(S s, Vec a) noexcept { return a * s; }
+  friend constexpr bool operator==(Vec, Vec) noexcept = default;
+};
+
+struct WorldSpace;   ///< mm in the scene; x right, y up, z to the user
+struct DeviceSpace;  ///< mm at the device port: world scaled by 1 / workspace_scale
+struct VoxelSpace;   ///< voxel edges of one volume; (0, 0, 0) is the centre of the first voxel
+struct JointSpace;   ///< radians, or N mm, of the three actuated joints
+
+template <class S>
+using WorldVec = Vec<S, WorldSpace>;
+template <class S>
+using DeviceVec = Vec<S, DeviceSpace>;
+template <class S>
+using VoxelVec = Vec<S, VoxelSpace>;
+template <class S>
+using JointVec = Vec<S, JointSpace>;
+
+/// The same three numbers read in another space: only for transforms, which say why.
+template <class ToSpace, class S, class Space>
+[[nodiscard]] constexpr Vec<S, ToSpace> relabel(Vec<S, Space> v) noexcept {
+  return {v.x, v.y, v.z};
+}
+
+template <class To, class S, class Space>
+[[nodiscard]] constexpr Vec<To, Space> convert(Vec<S, Space> v) noexcept {
+  return {To(static_cast<double>(v.x)), To(static_cast<double>(v.y)), To(static_cast<double>(v.z))};
+}
+
+template <class S, class Space>
+[[nodiscard]] constexpr S dot(Vec<S, Space> a, Vec<S, Space> b) noexcept {
+  return a.x * b.x + a.y * b.y + a.z * b.z;
+}
+/// One rounding for the three products: |a_i b_i| < 2^60 is enough room.
+template <int F, class Space>
+[[nodiscard]] constexpr Fixed<F> dot(Vec<Fixed<F>, Space> a, Vec<Fixed<F>, Space> b) noexcept {
+  const std::int64_t sum = saturating_add(saturating_add(std::int64_t{a.x.raw()} * b.x.raw() / 2,
+                                                         std::int64_t{a.y.raw()} * b.y.raw() / 2),
+                                          std::int64_t{a.z.raw()} * b.z.raw() / 2);
+  return Fixed<F>::from_wide(sum / 2, 2 * F - 2);
+}
+
+/// Euclidean length, saturating.
+template <int F, class Space>
+[[nodiscard]] constexpr Fixed<F> norm(Vec<Fixed<F>, Space> v) noexcept {
+  const auto square = [](Fixed<F> c) {
+    const std::int64_t raw = c.raw();
+    return static_cast<std::uint64_t>(raw * raw);
+  };
+  // 3 * 2^62 < 2^64; the root keeps F fraction bits.
+  const std::uint32_t root = integer_sqrt(square(v.x) + square(v.y) + square(v.z));
+  return Fixed<F>::from_raw(saturate_i32(root));
+}
+template <std::floating_point S, class Space>
+[[nodiscard]] inline S norm(Vec<S, Space> v) noexcept {
+  return square_root(dot(v, v));
+}
+
+/// Row-major 3x3 matrix that takes a vector of `From` to one of `To`.
+template <class S, class To, class From>
+struct Transform {
+  std::array<std::array<S, 3>, 3> row{};
+};
+
+/// Matrix times vector; the vector keeps its number format.
+template <class V, class S, class To, class From>
+[[nodiscard]] constexpr Vec<V, To> operator*(const Transform<S, To, From>& m,
+                                             Vec<V, From> v) noexcept {
+  const auto component = [&](int i) {
+    const auto& r = m.row[static_cast<std::size_t>(i)];
+    return multiply<V>(r[0], v.x) + multiply<V>(r[1], v.y) + multiply<V>(r[2], v.z);
+  };
+  return {component(0), component(1), component(2)};
+}
+
+template <class S, class To, class From>
+[[nodiscard]] constexpr Transform<S, From, To> transposed(
+    const Transform<S, To, From>& m) noexcept {
+  Transform<S, From, To> t;
+  for (std::size_t i = 0; i < 3; ++i) {
+    for (std::size_t j = 0; j < 3; ++j) t.row[j][i] = m.row[i][j];
+  }
+  return t;
+}
+
+}  // namespace kerf
