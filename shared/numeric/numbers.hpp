@@ -11,6 +11,7 @@ namespace kerf {
 /// in the loop by default, `DoubleNumbers` is the truth in tests.
 ///
 ///   Real      mm, N, voxels             Unit      sines, rotation entries, |x| <= 1
+///   Angle     radians, |x| < 8          Ratio     voxels per mm, |x| < 128
 ///   Step      voxels per tool pitch     Gradient  stored density gradient, density steps per voxel
 ///   Weight    trilinear weight, 0..kWeightOne    Sample  interpolated value, 8 kept bits in fixed
 ///   Sum       exact sums, never saturate: wide enough, order does not matter in fixed
@@ -20,6 +21,8 @@ struct FixedNumbers {
   static constexpr bool kIsFixed = true;
   using Real = Q16;
   using Unit = Q30;
+  using Angle = Fixed<28>;
+  using Ratio = Fixed<24>;
   using Step = std::int32_t;      // Q11.20
   using Gradient = std::int16_t;  // L1 norm of each kernel <= 0.5, so it cannot overflow
   using Weight = std::int32_t;    // Q0.15, stored as u16 where memory counts
@@ -37,6 +40,8 @@ struct FloatingNumbers {
   static constexpr bool kIsFixed = false;
   using Real = S;
   using Unit = S;
+  using Angle = S;
+  using Ratio = S;
   using Step = S;
   using Gradient = S;
   using Weight = S;
