@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+
+namespace kerf {
+
+enum class CommandKind : std::uint32_t {
+  select_tool = 1,  ///< argument: index into the scene's tools
+  hold = 2,         ///< argument: 1 stops cutting and force, 0 goes on
+};
+
+/// One wish of a reader to the controller: a fixed-size message over the socket, validated outside
+/// the servo, applied by the servo at a tick boundary, logged as an input.
+struct Command {
+  CommandKind kind = CommandKind::hold;
+  std::uint32_t index = 0;  ///< set by the server: 1, 2, ... in order of acceptance
+  std::uint32_t argument = 0;
+  std::uint32_t reserved0 = 0;
+  double value[4] = {};  ///< for kinds that carry numbers; finite
+  std::uint64_t reserved1[2] = {};
+};
+static_assert(sizeof(Command) == 64);
+
+enum class ReplyStatus : std::uint32_t {
+  accepted = 0,  ///< queued; applied within `kCommandSlots` ticks
+  busy = 1,      ///< queue full: try again
+  refused = 2,   ///< unknown kind, argument out of range or value not finite
+};
+
+struct Reply {
+  ReplyStatus status = ReplyStatus::refused;
+  std::uint32_t index = 0;  ///< `Command::index`, as TickRecord::last_command will show it
+};
+static_assert(sizeof(Reply) == 8);
+
+inline constexpr std::uint32_t kCommandSlots = 64;
+
+/// What the scene lets a command name; checked before the queue.
+struct CommandLimits {
+  std::uint32_t tools = 1;
+};
+
+/// True where `command` may go to the servo.
+[[nodiscard]] bool is_valid(const Command& command, const CommandLimits& limits) noexcept;
+
+}  // namespace kerf

@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "shared/segment/command.hpp"
+#include "shared/segment/reader.hpp"
+#include "shared/segment/writer.hpp"
+
+namespace kerf {
+
+/// `$XDG_RUNTIME_DIR/kerf`, else `/tmp/kerf-$UID`: made with mode 0700 where it is missing. Throws
+/// `SegmentError` where it belongs to somebody else, is a link or is open to others.
+[[nodiscard]] std::string segment_folder();
+
+/// Path of the socket of controller `name`: 1..64 of letters, digits, '.', '_', '-', and no leading
+/// dot. Throws `SegmentError` for another name.
+[[nodiscard]] std::string segment_socket(std::string_view name);
+
+/// Hands the segment of one controller to readers, and their commands to its servo.
+///
+/// Owns a thread of normal priority that serves a SOCK_SEQPACKET socket: peers of this user (or
+/// root) get HELLO and the memfd, read-only; their commands are checked and queued. At most
+/// `kMaxPeers` at a time. The writer outlives the server.
+class SegmentServer {
+ public:
+  static constexpr std::size_t kMaxPeers = 32;
+
+  /// Throws `SegmentError` where another live controller has the name; the socket of a dead one is
+  /// replaced.
+  SegmentServer(std::string_view name, const SegmentWriter& writer, CommandLimits limits = {});
+  ~SegmentServer();
+  SegmentServer(const SegmentServer&) = delete;
+  SegmentServer& operator=(const SegmentServer&) = delete;
+
+  /// Servo thread. Wait-free, no system call; take at most one per tick.
+  [[nodiscard]] std::optional<Command> take_command() noexcept;
+
+  [[nodiscard]] const std::string& socket_path() const noexcept;
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+/// A reader's end of the socket. One thread.
+class SegmentConnection {
+ public:
+  SegmentConnection(int socket, SegmentReader reader) noexcept;  ///< takes `socket` over
+  SegmentConnection(SegmentConnection&& other) noexcept;
+  SegmentConnection& operator=(SegmentConnection&& other) noexcept;
+  ~SegmentConnection();
+
+  [[nodiscard]] const SegmentReader& reader() const noexcept { return reader_; }
+
+  /// False once the controller has gone; the segment stays readable. Never waits.
+  [[nodiscard]] bool alive() const noexcept;
+
+  /// Waits at most 2 s for the answer of the server's thread (not of the servo). Throws
+  /// `SegmentError` where the controller has gone or does not answer.
+  Reply send(const Command& command);
+
+ private:
+  int socket_ = -1;
+  SegmentReader reader_;
+};
+
+/// Connects to controller `name` and maps its segment. Throws `SegmentError` where there is none.
+[[nodiscard]] SegmentConnection connect_segment(std::string_view name);
+
+}  // namespace kerf

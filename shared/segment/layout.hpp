@@ -1,0 +1,184 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+namespace kerf {
+
+/// The shared segment byte by byte: what the controller writes and every reader maps.
+///
+///     0                  SegmentHeader, one page; each hot word on its own 64-byte line
+///     off_volume_table   one VolumeDescriptor per volume
+///     off_scene          canonical scene, JSON text
+///     off_state          ring of TickRecord, slot = index mod state_slots
+///     off_dirty          ring of DirtyRecord, slot = index mod dirty_slots
+///     per volume         u64 version per brick | 512 densities per brick | labels (optional)
+///
+/// Little-endian, natural alignment, offsets instead of pointers. `layout_table.hpp` repeats every
+/// field as (name, offset, type); the table is checked against these structs and hashed into
+/// `kAbiHash`, so a program of another layout refuses the segment instead of misreading it.
+
+using Tick = std::uint64_t;  ///< count of servo steps; 0 is the state before the first one
+
+inline constexpr std::uint64_t kSegmentMagic = [] {
+  std::uint64_t magic = 0;
+  for (std::size_t i = 8; i-- > 0;) magic = magic << 8 | static_cast<unsigned char>("KERFSHM1"[i]);
+  return magic;
+}();
+inline constexpr std::uint32_t kLayoutMajor = 1;
+inline constexpr std::uint32_t kLayoutMinor = 0;
+inline constexpr std::uint32_t kMaxSegmentVolumes = 8;
+inline constexpr std::uint32_t kStateSlots = 4096;  // 4.1 s at 1 kHz: as long as a reader may stop
+inline constexpr std::uint32_t kDirtySlots = 4096;
+inline constexpr std::uint64_t kMaxSceneBytes = std::uint64_t{1} << 26;  // a reader copies it whole
+inline constexpr std::uint32_t kMaxBricks = 1U << 21;  // of one volume: 1024^3 voxels, 2 GiB
+
+/// Where the run stands. Anything from `clean_end` on is final.
+enum class Lifecycle : std::uint32_t { init = 0, run = 1, hold = 2, clean_end = 3, fault = 4 };
+
+/// A version word, of a brick or of the whole publication: odd while tick `t` is being written,
+/// even when it is complete. 0 means "never seen", so tick 0 is published as 2.
+[[nodiscard]] constexpr std::uint64_t stable_version(Tick tick) noexcept {
+  return 2 * tick + 2;
+}
+[[nodiscard]] constexpr std::uint64_t writing_version(Tick tick) noexcept {
+  return 2 * tick + 1;
+}
+[[nodiscard]] constexpr Tick tick_of_version(std::uint64_t version) noexcept {
+  return version < 2 ? 0 : version / 2 - 1;
+}
+
+/// Page 0. Everything before `state_head` is written once, before the magic.
+struct SegmentHeader {
+  std::uint64_t magic;  ///< stored last (release), read first (acquire)
+  std::uint32_t layout_major;
+  std::uint32_t layout_minor;
+  std::uint64_t abi_hash;
+  std::uint64_t session_id;  ///< random; a restarted controller has another
+  std::uint64_t total_bytes;
+  std::uint64_t config_hash;
+  std::uint64_t start_ns;  ///< CLOCK_MONOTONIC when the segment was made
+  std::uint32_t tick_ns;
+  std::uint32_t volume_count;
+  std::uint64_t off_state;
+  std::uint64_t off_dirty;
+  std::uint64_t off_volume_table;
+  std::uint32_t state_slots;  ///< power of two
+  std::uint32_t dirty_slots;  ///< power of two
+  std::uint32_t state_record_bytes;
+  std::uint32_t dirty_record_bytes;
+  std::uint64_t off_scene;
+  std::uint64_t scene_bytes;
+  std::uint64_t reserved0;
+  char build_id[64];  ///< for messages only, zero-terminated
+  std::uint64_t reserved1[8];
+  std::uint64_t state_head;  ///< tick records published so far
+  std::uint64_t pad_state[7];
+  std::uint64_t dirty_head;  ///< dirty records published so far
+  std::uint64_t pad_dirty[7];
+  std::uint64_t epoch;  ///< version word of the whole publication
+  std::uint64_t pad_epoch[7];
+  std::uint64_t heartbeat_ns;  ///< CLOCK_MONOTONIC of the last finished tick
+  std::uint32_t lifecycle;
+  std::uint32_t pad_life;
+  std::uint64_t pad_page[454];
+};
+inline constexpr std::size_t kStaticHeaderBytes = offsetof(SegmentHeader, state_head);
+
+/// One volume. `origin_mm` is the world position of the centre of voxel (0, 0, 0).
+struct VolumeDescriptor {
+  std::uint16_t nx, ny, nz;
+  std::uint8_t log2_brick;
+  std::uint8_t bits_per_voxel;
+  std::uint32_t bricks_x, bricks_y, bricks_z;
+  std::uint32_t brick_count;
+  double spacing_mm[3];
+  double origin_mm[3];
+  std::uint64_t off_versions;
+  std::uint64_t off_bricks;
+  std::uint64_t initial_hash;  ///< `density_hash` of the first content
+  std::uint32_t material;
+  std::uint32_t iso;
+  float orientation[4];      ///< quaternion x, y, z, w: voxel axes to world
+  std::uint64_t off_labels;  ///< 0: none; else u8 per voxel, linear, x fastest, never changes
+};
+
+/// What one servo tick read, felt and sent. World mm for the tip; forces in N at the device port.
+struct TickRecord {
+  std::uint64_t seq;  ///< filled by the writer: 2 * index + 1 while writing, + 2 when valid
+  std::uint64_t tick;
+  std::uint64_t start_ns;  ///< CLOCK_MONOTONIC
+  std::int32_t period_error_ns;
+  std::uint32_t execution_ns;
+  std::uint32_t flags;  ///< kFlag... below
+  std::uint32_t missed_deadlines;
+  std::int32_t encoder_counts[6];  ///< unwrapped: joints 0..2, gimbal 3..5
+  double position_mm[3];
+  float orientation[4];  ///< quaternion x, y, z, w: tool to world
+  float velocity_mm_per_s[3];
+  float commanded_force_n[3];
+  float contact_force_n[3];
+  float modification_force_n[3];
+  float proxy_offset_mm[3];
+  std::int16_t dac_counts[4];
+  std::uint32_t removed;  ///< density units taken away in this tick
+  double port_energy_j;
+  double damping_energy_j;
+  double cutting_work_j;
+  std::uint64_t volume_hash;  ///< chained over ticks
+  std::uint64_t output_hash;
+  std::uint16_t dirty_lo[3];
+  std::uint16_t dirty_hi[3];
+  std::uint32_t sub_steps;
+  std::uint32_t dirty_volumes;  ///< bit v: volume v changed in this tick
+  std::uint32_t last_command;   ///< Command::index of the last one applied; 0: none yet
+  float torque_n_mm[3];
+  float spindle_ratio;
+  std::int32_t raw[12];      ///< as they came: kRaw... below
+  std::int64_t energies[6];  ///< Q31.32 J, by source, in the order of the servo's ledger
+  float spindle_load;
+  std::uint32_t active_tool;
+  std::uint32_t fault;
+  std::uint32_t stale;
+  float penetration_mm;
+  std::uint32_t reserved0;
+  std::uint32_t crc32c;  ///< filled by the writer, over bytes 8..375
+  std::uint32_t reserved1;
+};
+
+inline constexpr std::uint32_t kFlagButton1 = 1U << 0;
+inline constexpr std::uint32_t kFlagButton2 = 1U << 1;
+inline constexpr std::uint32_t kFlagContact = 1U << 2;
+inline constexpr std::uint32_t kFlagSaturated = 1U << 3;  ///< a number met the end of its range
+inline constexpr std::uint32_t kFlagClamped = 1U << 4;    ///< force or slew limit was active
+inline constexpr std::uint32_t kFlagStaleInput = 1U << 5;
+inline constexpr std::uint32_t kFlagDeviceFault = 1U << 6;
+inline constexpr std::uint32_t kFlagMotorsOn = 1U << 7;
+inline constexpr std::uint32_t kFlagDocked = 1U << 8;
+inline constexpr std::uint32_t kFlagArmed = 1U << 9;
+
+inline constexpr std::size_t kRawEncoder = 0;  ///< first of 3
+inline constexpr std::size_t kRawPot = 3;      ///< first of 6
+inline constexpr std::size_t kRawStatus = 9;
+inline constexpr std::size_t kRawDeviceCounter = 10;
+
+/// Why a box of voxels changed.
+enum class DirtyCause : std::uint16_t { milling = 0, load = 1, reset = 2 };
+
+/// One changed box. A hint and a history: volume correctness never depends on it.
+struct DirtyRecord {
+  std::uint64_t seq;
+  std::uint64_t tick;
+  std::uint64_t time_ns;  ///< CLOCK_MONOTONIC of the tick before: the servo asks no clock for this
+  std::uint16_t lo[3];
+  std::uint16_t hi[3];  ///< half-open
+  std::uint32_t removed;
+  std::uint16_t volume;
+  std::uint16_t cause;
+  std::uint32_t bricks;    ///< bricks the box touches
+  std::uint64_t box_hash;  ///< `box_hash` of the densities in the box; 0 where it is too large
+  std::uint64_t reserved0;
+};
+
+}  // namespace kerf

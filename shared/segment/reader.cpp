@@ -1,0 +1,208 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "shared/segment/reader.hpp"
+
+#include <algorithm>
+#include <atomic>
+#include <cerrno>
+#include <cstring>
+#include <utility>
+
+#include <fcntl.h>
+#include <sys/mman.h>
+#include <sys/stat.h>
+
+#include "shared/segment/hash.hpp"
+#include "shared/segment/shared_words.hpp"
+
+namespace kerf {
+namespace {
+
+namespace words = shared_words;
+
+constexpr int kMaxTries = 64;  // copies of one brick or record before the old one is kept
+constexpr int kMaxPasses = 4;  // over the versions in one update; 2 are the most ever seen needed
+
+using Brick = std::array<Density, kBrickVoxels>;
+
+/// The version under which `brick` came whole, or 0.
+[[nodiscard]] std::uint64_t read_brick(std::byte* version, std::byte* content,
+                                       Brick& brick) noexcept {
+  for (int i = 0; i < kMaxTries; ++i) {
+    const std::uint64_t seen = words::word(version).load(std::memory_order_acquire);
+    if (seen % 2 != 0) continue;
+    words::load(brick.data(), content, sizeof brick);
+    if (words::unchanged(version, seen)) return seen;
+  }
+  return 0;
+}
+
+void place_brick(const Brick& brick, const VoxelBox& box, const VoxelGrid& grid,
+                 std::span<Density> linear) noexcept {
+  const auto row_voxels = static_cast<std::size_t>(box.hi.x - box.lo.x);
+  for (std::int32_t z = box.lo.z; z < box.hi.z; ++z) {
+    for (std::int32_t y = box.lo.y; y < box.hi.y; ++y) {
+      copy_row(linear.data() + grid.index(box.lo.x, y, z),
+               brick.data() + brick_row(y - box.lo.y, z - box.lo.z) * kBrickEdge, row_voxels);
+    }
+  }
+}
+
+}  // namespace
+
+SegmentReader SegmentReader::map(int fd) {
+  const int seals = fcntl(fd, F_GET_SEALS);
+  if (seals < 0 || (seals & F_SEAL_SHRINK) == 0) {
+    throw SegmentError(
+        "segment: descriptor " + std::to_string(fd) +
+        " is not sealed against shrinking; expected the memory of a kerf-controller");
+  }
+  struct stat status {};
+  if (fstat(fd, &status) != 0 || status.st_size < static_cast<off_t>(sizeof(SegmentHeader))) {
+    throw SegmentError("segment: size = " + std::to_string(status.st_size) +
+                       "; expected at least one page of header");
+  }
+  const auto bytes = static_cast<std::size_t>(status.st_size);
+  void* const at = mmap(nullptr, bytes, PROT_READ, MAP_SHARED, fd, 0);
+  if (at == MAP_FAILED) {
+    throw SegmentError("segment: mmap of " + std::to_string(bytes >> 20) +
+                       " MiB: " + system_message(errno) + "; free memory");
+  }
+  // Owns the mapping from here, so a refusal unmaps it.
+  SegmentReader reader({static_cast<std::byte*>(at), bytes}, {});
+  reader.info_ = parse_segment(reader.bytes_);
+  return reader;
+}
+
+SegmentReader::SegmentReader(std::span<std::byte> bytes, SegmentInfo info) noexcept
+    : bytes_(bytes), info_(std::move(info)) {}
+
+SegmentReader::SegmentReader(SegmentReader&& other) noexcept
+    : bytes_(std::exchange(other.bytes_, {})), info_(std::move(other.info_)) {}
+
+SegmentReader& SegmentReader::operator=(SegmentReader&& other) noexcept {
+  std::swap(bytes_, other.bytes_);
+  std::swap(info_, other.info_);
+  return *this;
+}
+
+SegmentReader::~SegmentReader() {
+  if (!bytes_.empty()) munmap(bytes_.data(), bytes_.size());
+}
+
+std::uint64_t SegmentReader::state_head() const noexcept {
+  return words::word(bytes_.data() + offsetof(SegmentHeader, state_head))
+      .load(std::memory_order_acquire);
+}
+
+std::uint64_t SegmentReader::dirty_head() const noexcept {
+  return words::word(bytes_.data() + offsetof(SegmentHeader, dirty_head))
+      .load(std::memory_order_acquire);
+}
+
+std::uint64_t SegmentReader::heartbeat_ns() const noexcept {
+  return words::word(bytes_.data() + offsetof(SegmentHeader, heartbeat_ns))
+      .load(std::memory_order_relaxed);
+}
+
+Lifecycle SegmentReader::lifecycle() const noexcept {
+  const auto value = words::word<std::uint32_t>(bytes_.data() + offsetof(SegmentHeader, lifecycle))
+                         .load(std::memory_order_acquire);
+  return value <= static_cast<std::uint32_t>(Lifecycle::fault) ? static_cast<Lifecycle>(value)
+                                                               : Lifecycle::fault;
+}
+
+template <class Record>
+ReadState SegmentReader::record_at(std::uint64_t offset, std::uint32_t slots, std::uint64_t head,
+                                   std::uint64_t index, Record& out) const noexcept {
+  if (index >= head) return ReadState::not_yet;
+  if (head - index > slots) return ReadState::overrun;
+  std::byte* const slot = bytes_.data() + offset + (index & (slots - 1)) * sizeof(Record);
+  const std::uint64_t expected = 2 * index + 2;
+  for (int i = 0; i < kMaxTries; ++i) {
+    const std::uint64_t seen = words::word(slot).load(std::memory_order_acquire);
+    if (seen > expected) return ReadState::overrun;
+    if (seen != expected) continue;
+    Record copy;
+    words::load(&copy, slot, sizeof copy);
+    if (!words::unchanged(slot, seen)) continue;
+    out = copy;
+    return ReadState::ok;
+  }
+  return ReadState::busy;
+}
+
+ReadState SegmentReader::state_at(std::uint64_t index, TickRecord& out) const noexcept {
+  TickRecord record;
+  const ReadState state =
+      record_at(info_.off_state, info_.state_slots, state_head(), index, record);
+  if (state != ReadState::ok) return state;
+  if (tick_record_crc(record) != record.crc32c) return ReadState::busy;
+  out = record;
+  return ReadState::ok;
+}
+
+ReadState SegmentReader::dirty_at(std::uint64_t index, DirtyRecord& out) const noexcept {
+  return record_at(info_.off_dirty, info_.dirty_slots, dirty_head(), index, out);
+}
+
+std::optional<TickRecord> SegmentReader::latest() const noexcept {
+  TickRecord record;
+  for (int i = 0; i < kMaxTries; ++i) {
+    const std::uint64_t head = state_head();
+    if (head == 0) return std::nullopt;
+    if (state_at(head - 1, record) == ReadState::ok) return record;
+  }
+  return std::nullopt;
+}
+
+std::span<const Label> SegmentReader::labels(std::size_t volume) const noexcept {
+  if (volume >= info_.volumes.size() || !info_.volumes[volume].has_labels) return {};
+  const SegmentVolumeInfo& info = info_.volumes[volume];
+  return {reinterpret_cast<const Label*>(bytes_.data() + info.off_labels), info.grid.voxel_count()};
+}
+
+bool SegmentReader::copy_changed(const SegmentVolumeInfo& volume, VolumeSnapshot& snapshot) const {
+  std::byte* const versions = bytes_.data() + volume.off_versions;
+  std::byte* const content = bytes_.data() + volume.off_bricks;
+  bool all = true;
+  Brick brick;
+  for (std::uint32_t id = 0; id < snapshot.versions.size(); ++id) {
+    std::byte* const version = versions + std::size_t{id} * sizeof(std::uint64_t);
+    if (words::word(version).load(words::kDataLoad) == snapshot.versions[id]) continue;
+    const std::uint64_t whole =
+        read_brick(version, content + std::size_t{id} * sizeof brick, brick);
+    if (whole == 0) {
+      all = false;
+      continue;
+    }
+    if (whole == snapshot.versions[id]) continue;
+    place_brick(brick, volume.bricks.voxels(id), volume.grid, snapshot.density);
+    snapshot.versions[id] = whole;
+    snapshot.changed.push_back(id);
+  }
+  return all;
+}
+
+void SegmentReader::update(std::size_t volume, VolumeSnapshot& snapshot) const {
+  const SegmentVolumeInfo& info = info_.volumes.at(volume);
+  snapshot.changed.clear();
+  snapshot.consistent = false;
+  if (snapshot.session_id != info_.session_id || snapshot.versions.size() != info.bricks.count() ||
+      snapshot.density.size() != info.grid.voxel_count()) {
+    snapshot.session_id = info_.session_id;
+    snapshot.versions.assign(info.bricks.count(), 0);
+    snapshot.density.assign(info.grid.voxel_count(), 0);
+  }
+  std::byte* const epoch = bytes_.data() + offsetof(SegmentHeader, epoch);
+  for (int pass = 0; pass < kMaxPasses && !snapshot.consistent; ++pass) {
+    const std::uint64_t before = words::word(epoch).load(std::memory_order_acquire);
+    const bool all = copy_changed(info, snapshot);
+    snapshot.consistent = all && before % 2 == 0 && words::unchanged(epoch, before);
+    if (snapshot.consistent) snapshot.tick = tick_of_version(before);
+  }
+  std::sort(snapshot.changed.begin(), snapshot.changed.end());
+  snapshot.changed.erase(std::unique(snapshot.changed.begin(), snapshot.changed.end()),
+                         snapshot.changed.end());
+}
+
+}  // namespace kerf

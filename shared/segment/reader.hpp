@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "shared/segment/brick_grid.hpp"
+#include "shared/segment/layout.hpp"
+#include "shared/segment/segment_error.hpp"
+
+namespace kerf {
+
+/// Private, checked copy of one volume descriptor.
+struct SegmentVolumeInfo {
+  VoxelGrid grid;
+  BrickGrid bricks;
+  std::array<double, 3> spacing_mm{1, 1, 1};
+  std::array<double, 3> origin_mm{0, 0, 0};  ///< world position of the centre of voxel (0, 0, 0)
+  std::array<float, 4> orientation{0, 0, 0, 1};
+  std::uint32_t material = 0;
+  std::uint32_t iso = 0;
+  bool has_labels = false;
+  std::uint64_t initial_hash = 0;
+  std::uint64_t off_versions = 0, off_bricks = 0, off_labels = 0;
+};
+
+/// Private, checked copy of everything in the segment that never changes.
+struct SegmentInfo {
+  std::uint64_t session_id = 0;
+  std::uint64_t config_hash = 0;
+  std::uint64_t start_ns = 0;
+  std::uint64_t total_bytes = 0;
+  std::uint32_t tick_ns = 0;
+  std::string build_id;
+  std::string scene_json;
+  std::vector<SegmentVolumeInfo> volumes;
+  std::uint64_t off_state = 0, off_dirty = 0;
+  std::uint32_t state_slots = 0, dirty_slots = 0;
+};
+
+/// Throws `SegmentError`, naming both versions or both hashes, where the other side was built from
+/// another layout.
+void require_same_layout(std::uint32_t major, std::uint32_t minor, std::uint64_t abi_hash);
+
+/// Checks `segment`, which may be hostile, and copies its static part. Reads each byte once, never
+/// trusts a sum of offsets, allocates at most what lies in the segment. Throws `SegmentError`.
+[[nodiscard]] SegmentInfo parse_segment(std::span<std::byte> segment);
+
+/// What a reader holds of one volume between frames.
+struct VolumeSnapshot {
+  std::uint64_t session_id = 0;         ///< another segment's snapshot starts anew
+  std::vector<Density> density;         ///< linear, x fastest
+  std::vector<std::uint64_t> versions;  ///< per brick, as seen; 0: never
+  std::vector<std::uint32_t> changed;   ///< brick ids changed by the last `update`, ascending
+  Tick tick = 0;                        ///< where consistent: `density` is exactly this tick's
+  bool consistent = false;
+};
+
+enum class ReadState : std::uint8_t {
+  ok,
+  not_yet,  ///< the index is not published
+  overrun,  ///< the slot holds a later record: the reader was too slow
+  busy,     ///< never came whole within the tries; the writer may have died in it
+};
+
+/// A read-only view of a segment. Never waits and never writes; each call has a bounded number of
+/// tries, so a dead or hostile writer costs time once, not for ever. One thread per reader; several
+/// readers may map one segment.
+class SegmentReader {
+ public:
+  /// Maps `fd` (not taken over). Throws `SegmentError` where it is not sealed against shrinking, or
+  /// where the header does not hold; an ABI mismatch names both hashes, another version both.
+  [[nodiscard]] static SegmentReader map(int fd);
+
+  SegmentReader(SegmentReader&&) noexcept;
+  SegmentReader& operator=(SegmentReader&&) noexcept;
+  ~SegmentReader();
+
+  [[nodiscard]] const SegmentInfo& info() const noexcept { return info_; }
+
+  /// The newest tick record that came whole; none before the first one.
+  [[nodiscard]] std::optional<TickRecord> latest() const noexcept;
+
+  /// Records published so far: indices state_head() - state_slots .. state_head() - 1 are readable.
+  [[nodiscard]] std::uint64_t state_head() const noexcept;
+  [[nodiscard]] std::uint64_t dirty_head() const noexcept;
+  /// `out` changes only where the answer is `ok`.
+  [[nodiscard]] ReadState state_at(std::uint64_t index, TickRecord& out) const noexcept;
+  [[nodiscard]] ReadState dirty_at(std::uint64_t index, DirtyRecord& out) const noexcept;
+
+  /// Labels of a volume, x fastest; empty where it has none. Lives as long as the reader.
+  [[nodiscard]] std::span<const Label> labels(std::size_t volume) const noexcept;
+
+  [[nodiscard]] std::uint64_t heartbeat_ns() const noexcept;
+  [[nodiscard]] Lifecycle lifecycle() const noexcept;
+
+  /// Copies the bricks whose version differs from `snapshot`; a fresh snapshot gets everything. At
+  /// most 4 passes over the versions and 64 tries a brick; a brick that stays busy keeps its old
+  /// copy. Where it ends `consistent`, the density is exactly the volume of `tick`.
+  void update(std::size_t volume, VolumeSnapshot& snapshot) const;
+
+ private:
+  SegmentReader(std::span<std::byte> bytes, SegmentInfo info) noexcept;
+  template <class Record>
+  [[nodiscard]] ReadState record_at(std::uint64_t offset, std::uint32_t slots, std::uint64_t head,
+                                    std::uint64_t index, Record& out) const noexcept;
+  [[nodiscard]] bool copy_changed(const SegmentVolumeInfo& volume, VolumeSnapshot& snapshot) const;
+
+  std::span<std::byte> bytes_;  // mapped PROT_READ
+  SegmentInfo info_;
+};
+
+}  // namespace kerf

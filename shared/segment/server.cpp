@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cerrno>
+#include <csignal>
+#include <cstring>
+#include <thread>
+#include <vector>
+
+#include <fcntl.h>
+#include <poll.h>
+#include <pthread.h>
+#include <sched.h>
+#include <sys/eventfd.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include "shared/segment/hand_over.hpp"
+#include "shared/segment/hand_over_wire.hpp"
+#include "shared/segment/layout_table.hpp"
+#include "shared/segment/spsc_queue.hpp"
+
+namespace kerf {
+namespace {
+
+[[nodiscard]] OwnedFd listen_at(const std::string& path) {
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  std::copy(path.begin(), path.end(), address.sun_path);
+  OwnedFd listener(socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+  unlink(path.c_str());  // of a dead controller: the name lock is ours
+  if (listener.get() < 0 ||
+      bind(listener.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0 ||
+      listen(listener.get(), SOMAXCONN) != 0) {
+    throw SegmentError(path + ": " + system_message(errno) + "; make the folder writable");
+  }
+  return listener;
+}
+
+/// The memfd opened again, read-only: what a reader gets, so that it cannot even try to write.
+[[nodiscard]] OwnedFd reopen_read_only(int memfd) {
+  const std::string path = "/proc/self/fd/" + std::to_string(memfd);
+  OwnedFd fd(open(path.c_str(), O_RDONLY | O_CLOEXEC));
+  if (fd.get() < 0) {
+    throw SegmentError(path + ": " + system_message(errno) + "; mount /proc");
+  }
+  return fd;
+}
+
+[[nodiscard]] bool may_connect(int peer) noexcept {
+  ucred credentials{};
+  socklen_t length = sizeof credentials;
+  return getsockopt(peer, SOL_SOCKET, SO_PEERCRED, &credentials, &length) == 0 &&
+         (credentials.uid == geteuid() || credentials.uid == 0);
+}
+
+[[nodiscard]] bool send_hello(int peer, const Hello& hello, int segment) noexcept {
+  Hello message = hello;
+  iovec part{&message, sizeof message};
+  alignas(cmsghdr) char control[CMSG_SPACE(sizeof(int))] = {};
+  msghdr header{};
+  header.msg_iov = &part;
+  header.msg_iovlen = 1;
+  header.msg_control = control;
+  header.msg_controllen = sizeof control;
+  cmsghdr* const rights = CMSG_FIRSTHDR(&header);
+  rights->cmsg_level = SOL_SOCKET;
+  rights->cmsg_type = SCM_RIGHTS;
+  rights->cmsg_len = CMSG_LEN(sizeof(int));
+  std::memcpy(CMSG_DATA(rights), &segment, sizeof segment);
+  return sendmsg(peer, &header, MSG_NOSIGNAL | MSG_DONTWAIT) == sizeof message;
+}
+
+}  // namespace
+
+struct SegmentServer::State {
+  State(std::string_view name, const SegmentWriter& writer, CommandLimits command_limits)
+      : path(segment_socket(name)),
+        lock(name),
+        listener(listen_at(path)),
+        segment(reopen_read_only(writer.fd())),
+        stop(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)),
+        hello{kSegmentMagic, kLayoutMajor, kLayoutMinor, kAbiHash, writer.session_id()},
+        limits(command_limits),
+        thread([this] { serve(); }) {}
+
+  ~State() {
+    eventfd_write(stop.get(), 1);
+    thread.join();
+    unlink(path.c_str());
+  }
+  State(const State&) = delete;
+  State& operator=(const State&) = delete;
+
+  void serve() noexcept {
+    sigset_t all;
+    sigfillset(&all);
+    pthread_sigmask(SIG_BLOCK, &all, nullptr);  // signals go to the main thread
+    const sched_param normal{};
+    pthread_setschedparam(pthread_self(), SCHED_OTHER, &normal);
+    std::vector<pollfd> polled;
+    polled.reserve(2 + kMaxPeers);
+    peers.reserve(kMaxPeers);
+    for (;;) {
+      polled.assign({{stop.get(), POLLIN, 0}, {listener.get(), POLLIN, 0}});
+      for (const OwnedFd& peer : peers) polled.push_back({peer.get(), POLLIN, 0});
+      if (poll(polled.data(), polled.size(), -1) < 0) continue;
+      if (polled[0].revents != 0) return;
+      std::size_t kept = 0;
+      for (std::size_t i = 0; i < peers.size(); ++i) {
+        const bool stays = polled[i + 2].revents == 0 || answer(peers[i].get());
+        if (stays) std::swap(peers[kept++], peers[i]);
+      }
+      peers.resize(kept);
+      if (polled[1].revents != 0) admit();
+    }
+  }
+
+  void admit() {
+    OwnedFd peer(accept4(listener.get(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK));
+    if (peer.get() < 0 || peers.size() >= kMaxPeers || !may_connect(peer.get())) return;
+    if (send_hello(peer.get(), hello, segment.get())) peers.push_back(std::move(peer));
+  }
+
+  /// One message of one peer; false where the peer has gone or does not take its answer.
+  bool answer(int peer) noexcept {
+    Command command;
+    const ssize_t length = recv(peer, &command, sizeof command, MSG_DONTWAIT | MSG_TRUNC);
+    if (length < 0) return errno == EAGAIN || errno == EINTR;
+    if (length == 0) return false;
+    Reply reply;
+    if (length == static_cast<ssize_t>(sizeof command) && is_valid(command, limits)) {
+      command.index = accepted + 1;
+      const bool queued = commands.push(command);
+      if (queued) reply.index = ++accepted;
+      reply.status = queued ? ReplyStatus::accepted : ReplyStatus::busy;
+    }
+    return send(peer, &reply, sizeof reply, MSG_NOSIGNAL | MSG_DONTWAIT) == sizeof reply;
+  }
+
+  SpscQueue<Command, kCommandSlots> commands;  // first: it is aligned to cache lines
+  std::string path;
+  NameLock lock;
+  OwnedFd listener;
+  OwnedFd segment;
+  OwnedFd stop;
+  Hello hello;
+  CommandLimits limits;
+  std::vector<OwnedFd> peers;
+  std::uint32_t accepted = 0;
+  std::thread thread;  // last: everything it uses is ready before it starts
+};
+
+SegmentServer::SegmentServer(std::string_view name, const SegmentWriter& writer,
+                             CommandLimits limits)
+    : state_(std::make_unique<State>(name, writer, limits)) {}
+SegmentServer::~SegmentServer() = default;
+
+std::optional<Command> SegmentServer::take_command() noexcept {
+  return state_->commands.take();
+}
+const std::string& SegmentServer::socket_path() const noexcept {
+  return state_->path;
+}
+
+}  // namespace kerf

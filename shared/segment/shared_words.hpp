@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+
+namespace kerf {
+
+/// The one protocol by which data crosses the segment: a seqlock in the form with fences (Boehm).
+///
+///     writer   version = odd (relaxed); fence(release); words (relaxed); version = even (release)
+///     reader   v = version (acquire); words (relaxed); fence(acquire); version (relaxed) == v?
+///
+/// Every shared word goes through `atomic_ref`, so there is no data race to begin with; the fences
+/// order data against version. ThreadSanitizer knows no fences: under KERF_TSAN each data word is a
+/// release store or an acquire load instead, which orders the same.
+namespace shared_words {
+
+static_assert(std::atomic_ref<std::uint64_t>::is_always_lock_free);
+static_assert(std::atomic_ref<std::uint32_t>::is_always_lock_free);
+
+#ifdef KERF_TSAN
+inline constexpr std::memory_order kDataStore = std::memory_order_release;
+inline constexpr std::memory_order kDataLoad = std::memory_order_acquire;
+inline void fence(std::memory_order) noexcept {}
+#else
+inline constexpr std::memory_order kDataStore = std::memory_order_relaxed;
+inline constexpr std::memory_order kDataLoad = std::memory_order_relaxed;
+inline void fence(std::memory_order order) noexcept {
+  std::atomic_thread_fence(order);
+}
+#endif
+
+/// The word at `at`, which is aligned and lies in the segment.
+template <class Word = std::uint64_t>
+[[nodiscard]] inline std::atomic_ref<Word> word(std::byte* at) noexcept {
+  return std::atomic_ref<Word>(*reinterpret_cast<Word*>(at));
+}
+
+/// Writer: from here until `close` the data under `version` is in motion.
+inline void open(std::byte* version, std::uint64_t odd) noexcept {
+  word(version).store(odd, std::memory_order_relaxed);
+  fence(std::memory_order_release);
+}
+inline void close(std::byte* version, std::uint64_t even) noexcept {
+  word(version).store(even, std::memory_order_release);
+}
+
+/// Writer: copies `bytes` (a multiple of 8) into the segment.
+inline void store(std::byte* to, const void* from, std::size_t bytes) noexcept {
+  const auto* source = static_cast<const std::byte*>(from);
+  for (std::size_t i = 0; i < bytes; i += 8) {
+    std::uint64_t value = 0;
+    std::memcpy(&value, source + i, 8);
+    word(to + i).store(value, kDataStore);
+  }
+}
+
+/// Reader: copies `bytes` (a multiple of 8) out of the segment; whole only if `unchanged` says so.
+inline void load(void* to, std::byte* from, std::size_t bytes) noexcept {
+  auto* target = static_cast<std::byte*>(to);
+  for (std::size_t i = 0; i < bytes; i += 8) {
+    const std::uint64_t value = word(from + i).load(kDataLoad);
+    std::memcpy(target + i, &value, 8);
+  }
+}
+
+/// Reader: true where nothing was written under `version` since it was loaded (acquire) as `seen`.
+[[nodiscard]] inline bool unchanged(std::byte* version, std::uint64_t seen) noexcept {
+  fence(std::memory_order_acquire);
+  return word(version).load(std::memory_order_relaxed) == seen;
+}
+
+}  // namespace shared_words
+}  // namespace kerf

@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "shared/segment/brick_grid.hpp"
+#include "shared/segment/layout.hpp"
+#include "shared/segment/segment_error.hpp"
+
+namespace kerf {
+
+/// Bricks copied into the mirror per tick, over all volumes: 64^3 voxels, 512 KiB. A 16^3 tool
+/// touches 27; what is beyond waits for the next ticks, so a whole-volume reset cannot cost a
+/// deadline.
+inline constexpr std::uint32_t kMaxBricksPerTick = 512;
+
+struct SegmentVolumeSpec {
+  VoxelGrid grid;  ///< each edge 1..65535
+  std::array<double, 3> spacing_mm{1, 1, 1};
+  std::array<double, 3> origin_mm{0, 0, 0};  ///< world position of the centre of voxel (0, 0, 0)
+  std::array<float, 4> orientation{0, 0, 0, 1};
+  std::uint32_t material = 0;
+  std::uint32_t iso = 32768;
+  std::span<const Density> density;  ///< copied by `create`
+  std::span<const Label> labels;     ///< empty, or one per voxel; copied by `create`
+};
+
+struct SegmentSpec {
+  std::vector<SegmentVolumeSpec> volumes;  ///< 1..8
+  std::string scene_json;
+  std::uint64_t config_hash = 0;
+  std::uint32_t tick_ns = 1'000'000;
+  std::string build_id;        ///< cut to 63 characters
+  bool mirror_updates = true;  ///< false: nothing is cut, so no dirty ring and no brick updates
+};
+
+/// The one writer of a segment: a sealed memfd, mapped, populated, the volumes in it as tick 0.
+///
+/// `create` and the destructor run outside the servo. The members marked *servo* are called by one
+/// thread: wait-free, no system call, no allocation; they write the segment and never read it. The
+/// order in a tick is begin_tick, publish_box (0 or more), publish_state, end_tick.
+class SegmentWriter {
+ public:
+  /// Throws `SegmentError` where a volume is empty, too large or does not match its spans, or where
+  /// the memory is not to be had.
+  [[nodiscard]] static SegmentWriter create(const SegmentSpec& spec);
+
+  SegmentWriter(SegmentWriter&&) noexcept;
+  SegmentWriter& operator=(SegmentWriter&&) noexcept;
+  ~SegmentWriter();
+
+  /// The sealed memfd, for `SegmentServer`; owned by the writer.
+  [[nodiscard]] int fd() const noexcept;
+  [[nodiscard]] std::uint64_t session_id() const noexcept;
+  [[nodiscard]] std::uint64_t total_bytes() const noexcept;
+  /// False where the lock limit is below `total_bytes()`: a page fault can then hit the servo.
+  [[nodiscard]] bool locked() const noexcept;
+
+  /// *Servo.* Ticks grow and start at 1; a tick that does not grow counts as the last one plus 1.
+  void begin_tick(Tick tick) noexcept;
+
+  /// *Servo.* `linear` is the whole volume, x fastest; it is read in `end_tick`, and in later ones
+  /// while bricks wait, so it outlives the writer. Records the box in the dirty ring.
+  void publish_box(std::size_t volume, std::span<const Density> linear, const VoxelBox& changed,
+                   std::uint32_t removed, DirtyCause cause = DirtyCause::milling) noexcept;
+
+  /// *Servo.* Appends to the state ring; `seq` and `crc32c` are filled in.
+  void publish_state(const TickRecord& record) noexcept;
+
+  /// *Servo.* Copies the changed bricks, each once, and closes the tick. While bricks wait, the
+  /// epoch stays odd: readers then know that the mirror is not yet the volume of one tick.
+  void end_tick(std::uint64_t now_ns) noexcept;
+
+  /// Any one thread at a time.
+  void set_lifecycle(Lifecycle lifecycle) noexcept;
+
+  /// *Servo.* Bricks that wait for later ticks.
+  [[nodiscard]] std::uint32_t waiting_bricks() const noexcept;
+
+ private:
+  struct State;
+  explicit SegmentWriter(std::unique_ptr<State> state) noexcept;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace kerf

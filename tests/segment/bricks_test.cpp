@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <map>
+#include <set>
+
+#include <doctest/doctest.h>
+#include <rapidcheck.h>
+
+#include "shared/segment/dirty_bricks.hpp"
+
+using namespace kerf;
+
+TEST_CASE("bricks tile every volume: each voxel lies in exactly one") {
+  for (const std::int32_t n : {1, 7, 8, 9, 161}) {
+    CAPTURE(n);
+    const BrickGrid bricks = BrickGrid::of({n, 9, 8});
+    std::size_t voxels = 0;
+    for (std::uint32_t id = 0; id < bricks.count(); ++id) {
+      CHECK(bricks.id(bricks.brick(id)) == id);
+      const VoxelIndex extent = bricks.voxels(id).extent();
+      CHECK(extent.x >= 1);
+      CHECK(extent.x <= kBrickEdge);
+      voxels += static_cast<std::size_t>(extent.x * extent.y * extent.z);
+    }
+    CHECK(voxels == bricks.grid.voxel_count());
+  }
+}
+
+TEST_CASE("the bricks of a box are those that share a voxel with it") {
+  CHECK(rc::check([] {
+    const auto edge = [] { return *rc::gen::inRange(1, 40); };
+    const BrickGrid bricks = BrickGrid::of({edge(), edge(), edge()});
+    const auto at = [] { return *rc::gen::inRange(-5, 45); };
+    const VoxelBox box{{at(), at(), at()}, {at(), at(), at()}};
+    const VoxelBox touched = bricks.bricks_of(box);
+    for (std::uint32_t id = 0; id < bricks.count(); ++id) {
+      const VoxelIndex b = bricks.brick(id);
+      const bool listed = !touched.empty() && b.x >= touched.lo.x && b.x < touched.hi.x &&
+                          b.y >= touched.lo.y && b.y < touched.hi.y && b.z >= touched.lo.z &&
+                          b.z < touched.hi.z;
+      RC_ASSERT(listed == !bricks.voxels(id).clipped(box).empty());
+    }
+  }));
+}
+
+TEST_CASE("marked bricks are taken once each, within the budget, whatever the order of calls") {
+  CHECK(rc::check([] {
+    const auto edge = [] { return *rc::gen::inRange(1, 80); };
+    const BrickGrid bricks = BrickGrid::of({edge(), edge(), edge()});
+    DirtyBricks dirty(bricks);
+    std::set<std::uint32_t> expected;
+    const int steps = *rc::gen::inRange(1, 20);
+    for (int step = 0; step < steps; ++step) {
+      const auto at = [] { return *rc::gen::inRange(0, 80); };
+      const VoxelBox voxels{{at(), at(), at()}, {at(), at(), at()}};
+      dirty.mark(voxels);
+      const VoxelBox box = bricks.bricks_of(voxels);
+      for (std::int32_t z = box.lo.z; z < box.hi.z; ++z) {
+        for (std::int32_t y = box.lo.y; y < box.hi.y; ++y) {
+          for (std::int32_t x = box.lo.x; x < box.hi.x; ++x) expected.insert(bricks.id({x, y, z}));
+        }
+      }
+      RC_ASSERT(dirty.waiting() == expected.size());
+      const auto budget = *rc::gen::inRange<std::uint32_t>(0, 50);
+      const std::uint32_t taken = dirty.take(
+          budget, [&](std::uint32_t id, const VoxelBox&) { RC_ASSERT(expected.erase(id) == 1); });
+      RC_ASSERT(taken <= budget);
+      RC_ASSERT(taken == budget || expected.empty());
+    }
+    while (dirty.waiting() != 0) {
+      dirty.take(7, [&](std::uint32_t id, const VoxelBox&) { RC_ASSERT(expected.erase(id) == 1); });
+    }
+    RC_ASSERT(expected.empty());
+  }));
+}
+
+TEST_CASE("no brick starves while others change in every tick") {
+  const BrickGrid bricks = BrickGrid::of({8 * 256, 8, 8});
+  DirtyBricks dirty(bricks);
+  dirty.mark({{8 * 255, 0, 0}, {8 * 256, 8, 8}});
+  bool reached = false;
+  for (int tick = 0; tick < 4 && !reached; ++tick) {
+    dirty.mark({{0, 0, 0}, {8 * 255, 8, 8}});
+    dirty.take(64, [&](std::uint32_t id, const VoxelBox&) { reached |= id == 255; });
+  }
+  CHECK(reached);
+}

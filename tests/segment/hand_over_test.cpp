@@ -1,0 +1,241 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "shared/segment/hand_over.hpp"
+
+#include <array>
+#include <csignal>
+#include <cstring>
+#include <filesystem>
+#include <limits>
+
+#include <doctest/doctest.h>
+#include <fcntl.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/un.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "shared/segment/hash.hpp"
+#include "tests/segment/segment_support.hpp"
+#include "tests/segment/test_folder.hpp"
+
+using namespace kerf;
+using namespace kerf::test;
+
+namespace {
+
+/// Runs `body` in a forked process; its result is the exit status.
+template <class Body>
+pid_t in_child(Body body) {
+  const pid_t child = fork();
+  REQUIRE(child >= 0);
+  if (child == 0) {
+    int status = 99;
+    try {
+      status = body();
+    } catch (...) {
+      status = 98;
+    }
+    _exit(status);
+  }
+  return child;
+}
+
+int status_of(pid_t child) {
+  int status = 0;
+  REQUIRE(waitpid(child, &status, 0) == child);
+  return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+}
+
+Command select(std::uint32_t tool) {
+  Command command;
+  command.kind = CommandKind::select_tool;
+  command.argument = tool;
+  return command;
+}
+
+}  // namespace
+
+TEST_CASE("another process gets the whole volume through the socket, and cannot write it") {
+  const TestFolder folder;
+  NoiseVolume volume({40, 33, 17});
+  const std::uint64_t expected = density_hash(volume.density);
+  std::array<int, 2> ready{};
+  REQUIRE(pipe(ready.data()) == 0);
+  const pid_t child = in_child([&] {
+    char go = 0;
+    if (read(ready[0], &go, 1) != 1) return 1;
+    const SegmentConnection connection = connect_segment("demo");
+    VolumeSnapshot snapshot;
+    connection.reader().update(0, snapshot);
+    if (density_hash(snapshot.density) != expected) return 2;
+    return connection.alive() ? 0 : 3;
+  });
+  const SegmentWriter writer = SegmentWriter::create(spec_of(volume));
+  const SegmentServer server("demo", writer);
+  REQUIRE(write(ready[1], "g", 1) == 1);
+  CHECK(status_of(child) == 0);
+  close(ready[0]);
+  close(ready[1]);
+}
+
+TEST_CASE("the descriptor that a reader gets is read-only") {
+  const TestFolder folder;
+  const NoiseVolume volume({8, 8, 8});
+  const SegmentWriter writer = SegmentWriter::create(spec_of(volume));
+  const SegmentServer server("demo", writer);
+  const int link = socket(AF_UNIX, SOCK_SEQPACKET, 0);
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  std::copy(server.socket_path().begin(), server.socket_path().end(), address.sun_path);
+  REQUIRE(connect(link, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0);
+  char message[64];
+  iovec part{message, sizeof message};
+  alignas(cmsghdr) char control[CMSG_SPACE(sizeof(int))];
+  msghdr header{};
+  header.msg_iov = &part;
+  header.msg_iovlen = 1;
+  header.msg_control = control;
+  header.msg_controllen = sizeof control;
+  REQUIRE(recvmsg(link, &header, 0) == 32);
+  REQUIRE(CMSG_FIRSTHDR(&header) != nullptr);
+  int fd = -1;
+  std::memcpy(&fd, CMSG_DATA(CMSG_FIRSTHDR(&header)), sizeof fd);
+  CHECK((fcntl(fd, F_GETFL) & O_ACCMODE) == O_RDONLY);
+  close(fd);
+  close(link);
+}
+
+TEST_CASE("a second controller of the same name is refused in one line, another name is not") {
+  const TestFolder folder;
+  const NoiseVolume volume({8, 8, 8});
+  const SegmentWriter writer = SegmentWriter::create(spec_of(volume));
+  {
+    const SegmentServer first("demo", writer);
+    std::string error;
+    try {
+      const SegmentServer second("demo", writer);
+    } catch (const SegmentError& refusal) {
+      error = refusal.what();
+    }
+    CHECK(error == "--name demo: in use by process " + std::to_string(getpid()) +
+                       "; stop it or choose another name");
+    CHECK_NOTHROW(SegmentServer("other", writer));
+    CHECK_NOTHROW(static_cast<void>(connect_segment("demo")));
+  }
+  CHECK_NOTHROW(SegmentServer("demo", writer));
+  CHECK(std::filesystem::is_empty(segment_folder()));
+}
+
+TEST_CASE("the socket that a killed controller left is replaced") {
+  const TestFolder folder;
+  const NoiseVolume volume({8, 8, 8});
+  std::array<int, 2> ready{};
+  REQUIRE(pipe(ready.data()) == 0);
+  const pid_t child = in_child([&] {
+    const SegmentWriter writer = SegmentWriter::create(spec_of(volume));
+    const SegmentServer server("demo", writer);
+    if (write(ready[1], "g", 1) != 1) return 1;
+    for (;;) pause();
+  });
+  char go = 0;
+  REQUIRE(read(ready[0], &go, 1) == 1);
+  const SegmentConnection connection = connect_segment("demo");
+  CHECK(connection.alive());
+  kill(child, SIGKILL);
+  status_of(child);
+  CHECK(!connection.alive());
+  CHECK_THROWS_AS(static_cast<void>(connect_segment("demo")), SegmentError);
+  VolumeSnapshot snapshot;
+  connection.reader().update(0, snapshot);
+  CHECK(snapshot.density == volume.density);  // the segment outlives its writer
+
+  const SegmentWriter writer = SegmentWriter::create(spec_of(volume));
+  const SegmentServer server("demo", writer);
+  CHECK(connect_segment("demo").reader().info().session_id == writer.session_id());
+  CHECK(writer.session_id() != connection.reader().info().session_id);
+  close(ready[0]);
+  close(ready[1]);
+}
+
+TEST_CASE("commands arrive in order; the 65th that nobody takes gets BUSY, later ones do not") {
+  const TestFolder folder;
+  const NoiseVolume volume({8, 8, 8});
+  const SegmentWriter writer = SegmentWriter::create(spec_of(volume));
+  SegmentServer server("demo", writer, CommandLimits{.tools = 100});
+  SegmentConnection connection = connect_segment("demo");
+  CHECK(!server.take_command());
+  for (std::uint32_t i = 0; i < kCommandSlots; ++i) {
+    const Reply reply = connection.send(select(i));
+    CHECK(reply.status == ReplyStatus::accepted);
+    CHECK(reply.index == i + 1);
+  }
+  CHECK(connection.send(select(99)).status == ReplyStatus::busy);
+  const auto first = server.take_command();
+  REQUIRE(first);
+  CHECK(first->argument == 0);
+  CHECK(first->index == 1);
+  CHECK(connection.send(select(98)).index == kCommandSlots + 1);
+  for (std::uint32_t i = 1; i < kCommandSlots; ++i) {
+    const auto command = server.take_command();
+    REQUIRE(command);
+    CHECK(command->argument == i);
+  }
+  REQUIRE(server.take_command());
+  CHECK(!server.take_command());
+}
+
+TEST_CASE("commands outside the limits are refused before they reach the servo") {
+  const TestFolder folder;
+  const NoiseVolume volume({8, 8, 8});
+  const SegmentWriter writer = SegmentWriter::create(spec_of(volume));
+  SegmentServer server("demo", writer, CommandLimits{.tools = 2});
+  SegmentConnection connection = connect_segment("demo");
+  CHECK(connection.send(select(2)).status == ReplyStatus::refused);
+  Command hold;
+  hold.argument = 2;
+  CHECK(connection.send(hold).status == ReplyStatus::refused);
+  hold.argument = 1;
+  hold.value[2] = std::numeric_limits<double>::quiet_NaN();
+  CHECK(connection.send(hold).status == ReplyStatus::refused);
+  Command unknown;
+  unknown.kind = static_cast<CommandKind>(77);
+  CHECK(connection.send(unknown).status == ReplyStatus::refused);
+  CHECK(!server.take_command());
+  hold.value[2] = 0;
+  CHECK(connection.send(hold).status == ReplyStatus::accepted);
+  CHECK(server.take_command()->kind == CommandKind::hold);
+}
+
+TEST_CASE("one reader too many is refused and the others stay") {
+  const TestFolder folder;
+  const NoiseVolume volume({8, 8, 8});
+  const SegmentWriter writer = SegmentWriter::create(spec_of(volume));
+  const SegmentServer server("demo", writer);
+  std::vector<SegmentConnection> readers;
+  for (std::size_t i = 0; i < SegmentServer::kMaxPeers; ++i) {
+    readers.push_back(connect_segment("demo"));
+  }
+  CHECK_THROWS_WITH_AS(static_cast<void>(connect_segment("demo")), doctest::Contains("refused"),
+                       SegmentError);
+  for (const SegmentConnection& reader : readers) CHECK(reader.alive());
+}
+
+TEST_CASE("names that would leave the folder and folders open to others are refused") {
+  const TestFolder folder;
+  for (const char* const name : {"", "..", ".x", "a/b", "a b", "x\n"}) {
+    CAPTURE(name);
+    CHECK_THROWS_AS(static_cast<void>(segment_socket(name)), SegmentError);
+  }
+  CHECK_THROWS_AS(static_cast<void>(segment_socket(std::string(65, 'a'))), SegmentError);
+  CHECK(segment_socket("demo-2.a_b") == folder.path().string() + "/kerf/demo-2.a_b.sock");
+  REQUIRE(chmod(segment_folder().c_str(), 0777) == 0);
+  CHECK_THROWS_WITH_AS(static_cast<void>(segment_folder()),
+                       doctest::Contains("not a folder of yours alone"), SegmentError);
+}
+
+TEST_CASE("connecting where nobody listens says what to start") {
+  const TestFolder folder;
+  CHECK_THROWS_WITH_AS(static_cast<void>(connect_segment("demo")),
+                       doctest::Contains("start kerf-controller"), SegmentError);
+}
