@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "controller/kernel/gradient.hpp"
+#include "controller/kernel/tool_offset.hpp"
 #include "controller/scene/volume_image.hpp"
 
 namespace kerf {
@@ -35,10 +37,6 @@ struct SceneVolume {
   bool solid = true;
 };
 
-/// Offset of a tool voxel from the tool centre in half pitches, so that even and odd grids are both
-/// exact: position = offset * pitch / 2.
-using ToolOffset = std::array<std::int16_t, 3>;
-
 /// One [[tool]]: voxel-offset list in the tool frame (tip at the centre of the cutting head, shaft
 /// along +y). `round` tools feel and cut the same in every orientation.
 struct SceneTool {
@@ -53,7 +51,6 @@ struct SceneTool {
 };
 
 enum class NumericKind : std::uint8_t { fixed, float32, float64 };
-enum class GradientKind : std::uint8_t { central, sobel5, farid };
 enum class CutModel : std::uint8_t { none, overlap, overlap_exact };
 
 /// A scene after loading: everything the controller needs, in double, checked. Load time only.
@@ -88,7 +85,7 @@ struct Scene {
   struct Servo {
     int rate_hz = 1000;
     NumericKind numeric = NumericKind::fixed;
-    GradientKind kernel = GradientKind::farid;
+    GradientKernel kernel = GradientKernel::farid;
   } servo;
   std::string hand_script;  ///< [hand] script, for the demo; empty: none
 };

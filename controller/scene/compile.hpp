@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+
+#include "controller/scene/scene.hpp"
+#include "controller/servo/servo.hpp"
+
+namespace kerf {
+
+/// The scene compiler: turns a checked scene into plan and memory of the servo step, in the numbers
+/// that the scene asks for.
+///
+/// Takes the volumes' densities and the tools' offsets over (they are empty in the scene
+/// afterwards) and computes the gradient field of each solid volume. Nothing is allocated after
+/// this. Throws SceneError for a scene that the loop cannot hold: no solid volume, a voxel or a
+/// step outside the number formats.
+[[nodiscard]] std::unique_ptr<Servo> compile(Scene& scene);
+
+}  // namespace kerf

@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+namespace kerf::phantom {
+
+struct Point {
+  double x, y, z;  ///< mm from the middle of the box: mesial, buccal, occlusal
+};
+
+/// Implicit fields of the phantom's boundaries, mm, negative inside. Each is zero on its boundary
+/// and changes by at most `kSteepest` per mm; `distance` turns one into a distance near the
+/// boundary. The dentin's field encloses the pulp, the outer field everything.
+[[nodiscard]] double outer_field(Point p) noexcept;
+[[nodiscard]] double dentin_field(Point p) noexcept;
+[[nodiscard]] double pulp_field(Point p) noexcept;
+
+inline constexpr double kSteepest = 2.5;
+
+using Field = double (*)(Point) noexcept;
+
+/// field / |gradient|: the distance to the boundary to first order. `value` is `field(p)`.
+[[nodiscard]] double distance(Field field, Point p, double value) noexcept;
+
+}  // namespace kerf::phantom

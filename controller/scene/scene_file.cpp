@@ -1,0 +1,195 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "controller/scene/scene_file.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <iterator>
+#include <span>
+#include <utility>
+
+#include "controller/scene/scene_objects.hpp"
+#include "controller/scene/scene_table.hpp"
+#include "controller/scene/scene_text.hpp"
+#include "controller/scene/scene_words.hpp"
+
+namespace kerf {
+namespace {
+
+using Keys = std::string_view[];
+
+// Ranges are wide enough for any tooth, bone and device, narrow enough that a slip of the unit
+// shows.
+constexpr Range kWorldMm{-kLargestWorldMm, kLargestWorldMm};
+constexpr Range kWorkspaceScale{kMinWorkspaceScale, kMaxWorkspaceScale};
+constexpr Range kTorqueScale{-10, 10};  // N mm per count; the sign is the motor's
+constexpr Range kAngleRad{-3.15, 3.15};
+constexpr Range kPressureNPerMm2{0, 1000};
+constexpr Range kCutRatePerS{0, 100000};
+constexpr Range kForceN{0.01, 3.3};       // what the Omni can give
+constexpr Range kSlewNPerMs{0.001, 0.5};  // a jump that the hand does not take for a blow
+constexpr Range kSpeedMmPerS{1, 10000};   // faster is a fault of the sensor
+constexpr Range kRateHz{kMinRateHz, kMaxRateHz};
+
+constexpr Keys kRootKeys = {"volume", "tool",  "device", "force",   "cut",
+                            "limits", "servo", "hand",   "material"};
+constexpr Keys kDeviceKeys = {"personality", "workspace_scale", "offset_mm", "torque_scale",
+                              "dock_rad"};
+constexpr Keys kForceKeys = {"model", "p0_n_per_mm2"};
+constexpr Keys kCutKeys = {"model", "rate_per_s", "p1_n_per_mm2"};
+constexpr Keys kLimitKeys = {"force_n", "continuous_force_n", "slew_n_per_ms", "speed_mm_per_s"};
+constexpr Keys kServoKeys = {"rate_hz", "numeric", "kernel"};
+constexpr Keys kHandKeys = {"script"};
+
+constexpr Keys kPersonalities = {"omni"};
+constexpr Keys kForceModels = {kPaperForce};
+constexpr Keys kCutRateWords = {"1/T"};
+
+template <class Enum>
+void read_choice(const SceneTable& table, std::string_view key,
+                 std::span<const std::string_view> words, Enum& into) {
+  if (const auto index = table.choice(key, words)) into = static_cast<Enum>(*index);
+}
+
+void read_device_table(const SceneTable& table, SceneSpec& scene) {
+  Scene::Device& device = scene.device;
+  if (const auto index = table.choice("personality", kPersonalities)) {
+    device.personality = kPersonalities[*index];
+  }
+  device.workspace_scale =
+      table.number("workspace_scale", kWorkspaceScale).value_or(device.workspace_scale);
+  scene.offset_given = table.has("offset_mm");
+  device.offset_mm = table.numbers<3>("offset_mm", kWorldMm).value_or(device.offset_mm);
+  device.torque_scale = table.numbers<3>("torque_scale", kTorqueScale);
+  if (device.torque_scale) {
+    for (const double scale : *device.torque_scale) {
+      if (std::abs(scale) < 1e-3) {
+        refuse(table.place("torque_scale"),
+               " is below 0.001 N mm per count; leave the key out to keep the motors off");
+      }
+    }
+  }
+  device.dock_rad = table.numbers<3>("dock_rad", kAngleRad).value_or(device.dock_rad);
+}
+
+void read_cut_table(const SceneTable& table, SceneSpec& scene) {
+  read_choice(table, "model", kCutModelWords, scene.cut.model);
+  if (table.is_text("rate_per_s")) {
+    static_cast<void>(table.choice("rate_per_s", kCutRateWords));
+    scene.cut_in_one_tick = true;
+  } else {
+    scene.cut.rate_per_s = table.number("rate_per_s", kCutRatePerS).value_or(scene.cut.rate_per_s);
+  }
+  scene.cut.p1_n_per_mm2 =
+      table.number("p1_n_per_mm2", kPressureNPerMm2).value_or(scene.cut.p1_n_per_mm2);
+}
+
+void read_limits_table(const SceneTable& table, Scene::Limits& limits) {
+  limits.force_n = table.number("force_n", kForceN).value_or(limits.force_n);
+  limits.slew_n_per_ms = table.number("slew_n_per_ms", kSlewNPerMs).value_or(limits.slew_n_per_ms);
+  limits.speed_mm_per_s =
+      table.number("speed_mm_per_s", kSpeedMmPerS).value_or(limits.speed_mm_per_s);
+  limits.continuous_force_n = table.number("continuous_force_n", {kForceN.lo, limits.force_n})
+                                  .value_or(std::min(limits.continuous_force_n, limits.force_n));
+}
+
+void read_servo_table(const SceneTable& table, Scene::Servo& servo) {
+  servo.rate_hz = table.whole("rate_hz", kRateHz).value_or(servo.rate_hz);
+  read_choice(table, "numeric", kNumericWords, servo.numeric);
+  read_choice(table, "kernel", kGradientWords, servo.kernel);
+}
+
+/// Names tell volumes and tools apart in pictures and reports.
+template <class Spec>
+void refuse_second(const SceneTable& table, const std::string& name,
+                   const std::vector<Spec>& earlier) {
+  if (std::none_of(earlier.begin(), earlier.end(),
+                   [&](const Spec& other) { return other.name == name; })) {
+    return;
+  }
+  refuse(table.place(), " is the second named \"" + name + "\"; write another name = \"..\"");
+}
+
+SceneSpec read_scene(const toml::table& parsed, const std::filesystem::path& path) {
+  SceneSpec scene;
+  scene.path = path;
+  scene.materials = default_materials();
+  const SceneTable root(parsed, "", path.string(), kRootKeys);
+
+  for (const SceneTable& table : root.tables("volume", kVolumeKeys, kMaxVolumes)) {
+    VolumeSpec volume = read_volume_table(table);
+    refuse_second(table, volume.name, scene.volumes);
+    scene.volumes.push_back(std::move(volume));
+  }
+  if (scene.volumes.empty()) {
+    refuse(path.string(), ": no [[volume]]; write one with file = \"phantom\" or a path");
+  }
+  if (std::none_of(scene.volumes.begin(), scene.volumes.end(),
+                   [](const VolumeSpec& volume) { return volume.solid; })) {
+    refuse(path.string(), ": no [[volume]] is solid; set solid = true for what is to be felt");
+  }
+  for (const SceneTable& table : root.tables("tool", kToolKeys, kMaxTools)) {
+    ToolSpec tool = read_tool_table(table);
+    refuse_second(table, tool.name, scene.tools);
+    scene.tools.push_back(std::move(tool));
+  }
+  if (scene.tools.empty()) {
+    refuse(path.string(), ": no [[tool]]; write one with shape = \"ball\" and size_vox = 16");
+  }
+
+  for (const SceneTable& table : root.tables("material", kMaterialKeys, kMaxMaterials)) {
+    read_material_table(table, scene.materials);
+  }
+  if (const auto table = root.table("device", kDeviceKeys)) read_device_table(*table, scene);
+  if (const auto table = root.table("force", kForceKeys)) {
+    static_cast<void>(table->choice("model", kForceModels));
+    scene.force.p0_n_per_mm2 =
+        table->number("p0_n_per_mm2", kPressureNPerMm2).value_or(scene.force.p0_n_per_mm2);
+  }
+  if (const auto table = root.table("cut", kCutKeys)) read_cut_table(*table, scene);
+  if (const auto table = root.table("limits", kLimitKeys)) read_limits_table(*table, scene.limits);
+  if (const auto table = root.table("servo", kServoKeys)) read_servo_table(*table, scene.servo);
+  if (const auto table = root.table("hand", kHandKeys)) {
+    if (const auto script = table->text("script")) {
+      scene.hand_script = (path.parent_path() / *script).string();
+    }
+  }
+  return scene;
+}
+
+}  // namespace
+
+std::vector<Material> default_materials() {
+  // Density at half-way to the next softer tissue; removal relative to enamel by hardness.
+  return {{.name = "none", .iso = 0.0, .machinability = 0.0, .colour = {0.0, 0.0, 0.0}},
+          {.name = "enamel", .iso = 0.81, .machinability = 1.0, .colour = {0.91, 0.88, 0.80}},
+          {.name = "dentin", .iso = 0.45, .machinability = 3.0, .colour = {0.80, 0.66, 0.42}},
+          {.name = "pulp", .iso = 0.14, .machinability = 10.0, .colour = {0.70, 0.25, 0.22}}};
+}
+
+SceneSpec parse_scene(std::string_view text, const std::filesystem::path& path) {
+  const toml::parse_result parsed = toml::parse(text, path.string());
+  if (parsed) return read_scene(parsed.table(), path);
+  const toml::parse_error& error = parsed.error();
+  const auto at = error.source().begin;
+  refuse(path.string() + ":" + std::to_string(at.line) + ":" + std::to_string(at.column),
+         ": " + std::string(error.description()) + "; correct the TOML syntax here");
+}
+
+SceneSpec parse_scene_file(const std::filesystem::path& path) {
+  constexpr std::uintmax_t kLargestFile = std::uintmax_t{1} << 20;
+  std::error_code fault;
+  if (!std::filesystem::is_regular_file(path, fault)) {
+    refuse(path.string(), ": no such scene file; name one, for example scenes/phantom.toml");
+  }
+  const std::uintmax_t size = std::filesystem::file_size(path, fault);
+  if (fault || size > kLargestFile) {
+    refuse(path.string(), ": not a scene file, it is larger than 1 MiB; name a scene file");
+  }
+  std::ifstream file(path, std::ios::binary);
+  const std::string text{std::istreambuf_iterator<char>(file), {}};
+  if (!file) refuse(path.string(), ": cannot be read; check its permissions");
+  return parse_scene(text, path);
+}
+
+}  // namespace kerf

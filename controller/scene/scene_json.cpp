@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "controller/scene/scene_json.hpp"
+
+#include <array>
+#include <utility>
+
+#include <nlohmann/json.hpp>
+
+#include "controller/scene/scene_words.hpp"
+#include "controller/scene/tool_shapes.hpp"
+
+namespace kerf {
+namespace {
+
+using nlohmann::json;
+
+constexpr std::uint64_t kFnvBasis = 0xcbf29ce484222325;
+constexpr std::uint64_t kFnvPrime = 0x100000001b3;
+
+std::uint64_t fnv1a_byte(std::uint64_t hash, std::uint8_t byte) {
+  return (hash ^ byte) * kFnvPrime;
+}
+
+std::string content_hash(const VolumeImage& image) {
+  std::uint64_t hash = kFnvBasis;
+  for (const Density density : image.density) {  // low byte first, whatever the machine
+    hash = fnv1a_byte(hash, static_cast<std::uint8_t>(density & 0xff));
+    hash = fnv1a_byte(hash, static_cast<std::uint8_t>(density >> 8));
+  }
+  for (const Label label : image.labels) hash = fnv1a_byte(hash, label);
+  std::string digits(16, '0');
+  for (std::size_t i = digits.size(); i-- > 0; hash >>= 4)
+    digits[i] = "0123456789abcdef"[hash & 15];
+  return digits;
+}
+
+json volume_json(const SceneVolume& volume) {
+  const VoxelGrid& grid = volume.image.grid;
+  return {{"name", volume.name},
+          {"file", volume.file},
+          {"iso", volume.iso},
+          {"solid", volume.solid},
+          {"spacing_mm", volume.image.spacing_mm},
+          {"grid", {grid.nx, grid.ny, grid.nz}},
+          {"pose",
+           {{"position_mm", volume.pose.position_mm}, {"orientation", volume.pose.orientation}}},
+          {"density_hash", content_hash(volume.image)}};
+}
+
+json tool_json(const SceneTool& tool) {
+  json offsets = json::array();
+  for (const ToolOffset& offset : tool.offsets) {
+    for (const std::int16_t component : offset) offsets.push_back(component);
+  }
+  return {{"name", tool.name},
+          {"shape", tool.shape},
+          {"pitch_mm", tool.pitch_mm},
+          {"radius_mm", tool.radius_mm},
+          {"length_mm", tool.length_mm},
+          {"round", tool.round},
+          {"size_vox", tool.size_vox},
+          {"profile", tool_profile(tool)},
+          {"offsets_half_pitch", std::move(offsets)}};
+}
+
+json material_json(const Material& material) {
+  return {{"name", material.name},
+          {"iso", material.iso},
+          {"machinability", material.machinability},
+          {"colour", material.colour}};
+}
+
+json device_json(const Scene::Device& device) {
+  json object = {{"personality", device.personality},
+                 {"workspace_scale", device.workspace_scale},
+                 {"offset_mm", device.offset_mm},
+                 {"dock_rad", device.dock_rad}};
+  if (device.torque_scale) object["torque_scale"] = *device.torque_scale;
+  return object;
+}
+
+}  // namespace
+
+std::string canonical_json(const Scene& scene) {
+  json volumes = json::array();
+  for (const SceneVolume& volume : scene.volumes) volumes.push_back(volume_json(volume));
+  json tools = json::array();
+  for (const SceneTool& tool : scene.tools) tools.push_back(tool_json(tool));
+  json materials = json::array();
+  for (const Material& material : scene.materials) materials.push_back(material_json(material));
+
+  const json root = {
+      {"volumes", std::move(volumes)},
+      {"tools", std::move(tools)},
+      {"active_tool", scene.active_tool},
+      {"materials", std::move(materials)},
+      {"device", device_json(scene.device)},
+      {"force", {{"model", kPaperForce}, {"p0_n_per_mm2", scene.force.p0_n_per_mm2}}},
+      {"cut",
+       {{"model", word_of(scene.cut.model)},
+        {"rate_per_s", scene.cut.rate_per_s},
+        {"p1_n_per_mm2", scene.cut.p1_n_per_mm2}}},
+      {"limits",
+       {{"force_n", scene.limits.force_n},
+        {"continuous_force_n", scene.limits.continuous_force_n},
+        {"slew_n_per_ms", scene.limits.slew_n_per_ms},
+        {"speed_mm_per_s", scene.limits.speed_mm_per_s}}},
+      {"servo",
+       {{"rate_hz", scene.servo.rate_hz},
+        {"numeric", word_of(scene.servo.numeric)},
+        {"kernel", word_of(scene.servo.kernel)}}}};
+  // A path need not be UTF-8; what is not, is replaced.
+  return root.dump(-1, ' ', false, json::error_handler_t::replace);
+}
+
+std::uint64_t fnv1a(std::string_view bytes) {
+  std::uint64_t hash = kFnvBasis;
+  for (const char byte : bytes) hash = fnv1a_byte(hash, static_cast<std::uint8_t>(byte));
+  return hash;
+}
+
+std::uint64_t config_hash(const Scene& scene) {
+  return fnv1a(canonical_json(scene));
+}
+
+}  // namespace kerf

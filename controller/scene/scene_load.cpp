@@ -1,0 +1,250 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "controller/scene/scene_load.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <string>
+#include <utility>
+
+#include "controller/scene/phantom.hpp"
+#include "controller/scene/scene_error.hpp"
+#include "controller/scene/scene_file.hpp"
+#include "controller/scene/scene_place.hpp"
+#include "controller/scene/scene_text.hpp"
+#include "controller/scene/tool_shapes.hpp"
+#include "controller/scene/volume_crop.hpp"
+#include "controller/scene/volume_density.hpp"
+#include "controller/scene/volume_io.hpp"
+#include "controller/scene/volume_limits.hpp"
+
+namespace kerf {
+namespace {
+
+constexpr double kPhantomVoxelMm = 0.125;  // of the default grid; other grids keep the tooth's size
+
+/// The voxel edge that a tool's size in mm was written for, before --volume replaced the volume.
+double written_voxel_mm(const VolumeSpec& volume) {
+  if (volume.spacing_mm) {
+    return *std::min_element(volume.spacing_mm->begin(), volume.spacing_mm->end());
+  }
+  if (!volume.phantom_size) return kPhantomVoxelMm;
+  return kPhantomVoxelMm * PhantomSpec{}.grid.nx / volume.phantom_size->nx;
+}
+
+bool is_phantom(const VolumeSpec& volume) {
+  return volume.file == kPhantomFile;
+}
+
+void check_overrides(const SceneOverrides& overrides) {
+  if (overrides.rate_hz && (*overrides.rate_hz < kMinRateHz || *overrides.rate_hz > kMaxRateHz)) {
+    refuse("--rate " + std::to_string(*overrides.rate_hz), " is out of range; use " +
+                                                               std::to_string(kMinRateHz) + " to " +
+                                                               std::to_string(kMaxRateHz));
+  }
+  if (overrides.window && !((*overrides.window)[0] < (*overrides.window)[1])) {
+    refuse("--window", " is empty; write low,high with low < high");
+  }
+  if (overrides.spacing_mm) check_spacing("--spacing", *overrides.spacing_mm);
+}
+
+void apply_overrides(const SceneOverrides& overrides, SceneSpec& scene) {
+  check_overrides(overrides);
+  VolumeSpec& first = scene.volumes.front();
+  if (overrides.volume_file) {
+    VolumeSpec replaced;
+    replaced.where = "--volume";
+    replaced.file = overrides.volume_file->string();
+    replaced.name = overrides.volume_file->stem().string();
+    replaced.crop = first.crop;
+    replaced.position_mm = first.position_mm;
+    replaced.orientation = first.orientation;
+    first = replaced;
+    scene.offset_given = false;
+  }
+  if (is_phantom(first) && (overrides.spacing_mm || overrides.window)) {
+    refuse(overrides.spacing_mm ? "--spacing" : "--window",
+           ": the phantom has its own; leave the option out, or give a --volume");
+  }
+  if (overrides.spacing_mm) first.spacing_mm = overrides.spacing_mm;
+  if (overrides.window) first.window = overrides.window;
+  if (overrides.phantom_size) {
+    for (VolumeSpec& volume : scene.volumes) {
+      if (is_phantom(volume)) volume.phantom_size = overrides.phantom_size;
+    }
+  }
+  scene.servo.rate_hz = overrides.rate_hz.value_or(scene.servo.rate_hz);
+  scene.servo.numeric = overrides.numeric.value_or(scene.servo.numeric);
+  if (scene.cut_in_one_tick) scene.cut.rate_per_s = scene.servo.rate_hz;
+}
+
+VolumeImage load_image(const VolumeSpec& spec, const std::filesystem::path& folder) {
+  if (is_phantom(spec)) {
+    return make_phantom({.grid = spec.phantom_size.value_or(PhantomSpec{}.grid)});
+  }
+  const std::filesystem::path path = folder / spec.file;
+  const SourceVolume source = read_volume(path, {.spacing_mm = spec.spacing_mm});
+  const Window window =
+      spec.window ? Window{(*spec.window)[0], (*spec.window)[1]} : range_window(source);
+  VolumeImage image = apply_window(source, window);
+  read_labels_beside(path, image);
+  return image;
+}
+
+void check_labels(const VolumeImage& image, std::size_t materials) {
+  const auto highest = std::max_element(image.labels.begin(), image.labels.end());
+  if (highest == image.labels.end() || *highest < materials) return;
+  throw SceneError("label " + std::to_string(*highest) + " stands for no material, the last is " +
+                   std::to_string(materials - 1) + "; add a [[material]] for it");
+}
+
+SceneVolume load_volume(const VolumeSpec& spec, const std::filesystem::path& folder,
+                        std::size_t materials) {
+  SceneVolume volume;
+  volume.name = spec.name;
+  volume.file = spec.file;
+  volume.solid = spec.solid;
+  try {
+    volume.image = load_image(spec, folder);
+    check_labels(volume.image, materials);
+    volume.iso = spec.iso ? static_cast<Density>(std::lround(*spec.iso * kDensityMax))
+                          : otsu_threshold(volume.image);
+    if (spec.crop) volume.image = crop_to_solid(volume.image, volume.iso);
+  } catch (const SceneError& error) {
+    refuse(spec.where, std::string(": ") + error.what());
+  }
+  volume.pose = place_volume(volume.image,
+                             spec.orientation ? rotation_of(*spec.orientation) : kSourceStanding,
+                             spec.position_mm);
+  const WorldBox box = world_box(volume);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const double reach_mm = std::max(-box.lo_mm[axis], box.hi_mm[axis]);
+    if (reach_mm <= kLargestWorldMm) continue;
+    refuse(spec.where, ": the volume reaches " + number_text(reach_mm) +
+                           " mm from the origin; keep it within " + number_text(kLargestWorldMm) +
+                           ", check position_mm and spacing_mm");
+  }
+  return volume;
+}
+
+/// What the tools are measured against: the volumes that can be touched.
+struct TouchedVolumes {
+  double voxel_mm = std::numeric_limits<double>::infinity();  ///< smallest edge
+  double side_mm = 0;                                         ///< longest side of a box
+};
+
+TouchedVolumes touched_volumes(const std::vector<SceneVolume>& volumes) {
+  TouchedVolumes touched;
+  for (const SceneVolume& volume : volumes) {
+    if (!volume.solid) continue;
+    const VolumeImage& image = volume.image;
+    const std::array<std::int32_t, 3> extent = {image.grid.nx, image.grid.ny, image.grid.nz};
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      touched.voxel_mm = std::min(touched.voxel_mm, image.spacing_mm[axis]);
+      touched.side_mm = std::max(touched.side_mm, image.spacing_mm[axis] * extent[axis]);
+    }
+  }
+  return touched;
+}
+
+SceneTool load_tool(const ToolSpec& spec, const TouchedVolumes& touched) {
+  ToolSize size = spec.size;
+  if (!spec.pitch_given) size.pitch_mm = touched.voxel_mm;
+  if (size.pitch_mm > touched.voxel_mm * (1 + 1e-9)) {
+    refuse(spec.pitch_place, " is above the smallest voxel edge and leaves gaps; use at most " +
+                                 number_text(touched.voxel_mm));
+  }
+  if (!size.size_vox && size.radius_mm < touched.voxel_mm / 2) {
+    refuse(spec.size_place, " is below half a voxel (" + number_text(touched.voxel_mm / 2) +
+                                "); use a larger radius or a finer volume");
+  }
+  const double side_vox = tool_side_vox(spec.shape, size);
+  if (side_vox > kMaxToolSide) {
+    refuse(spec.size_place, " makes a tool of " + number_text(side_vox) +
+                                " samples along a side, above the limit of " +
+                                std::to_string(kMaxToolSide) +
+                                "; use a smaller tool or a coarser pitch");
+  }
+  SceneTool tool = make_tool(spec.name, spec.shape, size);
+  const double side_mm = std::max(2 * tool.radius_mm, tool.length_mm);
+  if (side_mm > touched.side_mm) {
+    refuse(spec.size_place, " makes a tool of " + number_text(side_mm) +
+                                " mm, larger than the volume (" + number_text(touched.side_mm) +
+                                " mm); use a smaller tool");
+  }
+  return tool;
+}
+
+/// Fits a scene to the volume of --volume; what is done is told in the header.
+void fit_to_volume(double written_mm, SceneSpec& spec, Scene& scene) {
+  const double grown = touched_volumes(scene.volumes).voxel_mm / written_mm;
+  for (ToolSpec& tool : spec.tools) {
+    tool.size.radius_mm *= grown;
+    tool.size.pitch_mm *= grown;
+    if (tool.size.length_mm) *tool.size.length_mm *= grown;
+  }
+  const WorldBox box = world_box(scene.volumes.front());
+  double scale = kMinWorkspaceScale;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    scale = std::max(scale, (box.hi_mm[axis] - box.lo_mm[axis]) / kWorkspaceMm[axis]);
+  }
+  if (scale > kMaxWorkspaceScale) {
+    refuse("--volume", ": the box needs a workspace scale of " + number_text(scale) +
+                           ", above the limit of " + number_text(kMaxWorkspaceScale) +
+                           "; check --spacing");
+  }
+  scene.device.workspace_scale = scale;
+}
+
+}  // namespace
+
+Scene load_scene(const std::filesystem::path& path, const SceneOverrides& overrides) {
+  SceneSpec spec = parse_scene_file(path);
+  const double written_mm = written_voxel_mm(spec.volumes.front());
+  apply_overrides(overrides, spec);
+
+  Scene scene;
+  scene.path = path.string();
+  scene.materials = spec.materials;
+  scene.device = spec.device;
+  scene.force = spec.force;
+  scene.cut = spec.cut;
+  scene.limits = spec.limits;
+  scene.servo = spec.servo;
+  scene.hand_script = spec.hand_script;
+  for (std::size_t i = 0; i < spec.volumes.size(); ++i) {
+    const bool from_command_line = i == 0 && overrides.volume_file;
+    scene.volumes.push_back(load_volume(
+        spec.volumes[i], from_command_line ? "" : path.parent_path(), scene.materials.size()));
+  }
+  if (overrides.volume_file) fit_to_volume(written_mm, spec, scene);
+  const TouchedVolumes touched = touched_volumes(scene.volumes);
+  for (const ToolSpec& tool : spec.tools) scene.tools.push_back(load_tool(tool, touched));
+
+  if (overrides.volume_file) {
+    const double scale = scene.device.workspace_scale;
+    const double weaker =
+        kReferenceRadiusMm / (scale * scale * scene.tools[scene.active_tool].radius_mm);
+    scene.force.p0_n_per_mm2 *= weaker;
+    scene.cut.p1_n_per_mm2 *= weaker;
+  }
+  if (!spec.offset_given) {
+    scene.device.offset_mm = first_surface_from_above(*std::find_if(
+        scene.volumes.begin(), scene.volumes.end(), [](const SceneVolume& v) { return v.solid; }));
+  }
+  return scene;
+}
+
+double device_stiffness_n_per_mm(const Scene& scene) {
+  const double scale = scene.device.workspace_scale;
+  return scale * scale * 2 * std::numbers::pi * scene.tools[scene.active_tool].radius_mm *
+         scene.force.p0_n_per_mm2;
+}
+
+double hand_unit_mm(const Scene& scene) {
+  return scene.tools[scene.active_tool].radius_mm / scene.device.workspace_scale /
+         kReferenceRadiusMm;
+}
+
+}  // namespace kerf

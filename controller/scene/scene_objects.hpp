@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "controller/scene/scene_file.hpp"
+#include "controller/scene/scene_table.hpp"
+
+namespace kerf {
+
+// What stands in a scene several times: [[volume]], [[tool]] and [[material]]. Used by the parser
+// of scene files alone; each function checks one table and throws SceneError.
+
+inline constexpr std::string_view kVolumeKeys[] = {"name", "file", "size", "spacing_mm", "window",
+                                                   "iso",  "crop", "pose", "solid"};
+inline constexpr std::string_view kToolKeys[] = {"name",     "shape",     "radius_mm",
+                                                 "size_vox", "length_mm", "pitch_mm"};
+inline constexpr std::string_view kMaterialKeys[] = {"name", "iso", "machinability", "colour"};
+
+[[nodiscard]] VolumeSpec read_volume_table(const SceneTable& table);
+[[nodiscard]] ToolSpec read_tool_table(const SceneTable& table);
+/// A known name changes that material, a new one is added.
+void read_material_table(const SceneTable& table, std::vector<Material>& materials);
+
+}  // namespace kerf

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <string_view>
+
+#include "controller/scene/scene.hpp"
+
+namespace kerf {
+
+// The words of a scene for the values of an enumeration, in its order: one list for reading a scene
+// and for writing its JSON.
+inline constexpr std::array<std::string_view, 3> kCutModelWords = {"none", "overlap",
+                                                                   "overlap_exact"};
+inline constexpr std::array<std::string_view, 3> kNumericWords = {"fixed", "float", "double"};
+inline constexpr std::array<std::string_view, 3> kGradientWords = {"central", "sobel5", "farid"};
+
+inline constexpr std::string_view kPaperForce = "paper";  ///< the only force model so far
+
+[[nodiscard]] constexpr std::string_view word_of(CutModel model) {
+  return kCutModelWords.at(static_cast<std::size_t>(model));
+}
+[[nodiscard]] constexpr std::string_view word_of(NumericKind numeric) {
+  return kNumericWords.at(static_cast<std::size_t>(numeric));
+}
+[[nodiscard]] constexpr std::string_view word_of(GradientKernel kernel) {
+  return kGradientWords.at(static_cast<std::size_t>(kernel));
+}
+static_assert(word_of(CutModel::overlap_exact) == "overlap_exact");
+static_assert(word_of(NumericKind::float64) == "double");
+static_assert(word_of(GradientKernel::farid) == "farid");
+
+}  // namespace kerf

@@ -1,0 +1,219 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "controller/volume_tool/volume_commands.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <exception>
+#include <iomanip>
+#include <ostream>
+#include <sstream>
+#include <string>
+#include <string_view>
+
+#include <CLI/CLI.hpp>
+
+#include "controller/scene/phantom.hpp"
+#include "controller/scene/scene_error.hpp"
+#include "controller/scene/volume_crop.hpp"
+#include "controller/scene/volume_density.hpp"
+#include "controller/scene/volume_io.hpp"
+#include "controller/scene/volume_resample.hpp"
+#include "controller/scene/volume_write.hpp"
+#include "controller/volume_tool/volume_info.hpp"
+
+namespace kerf {
+namespace {
+
+/// The whole of `text` as a number, or SceneError that names the option.
+double number(const std::string& option, std::string_view text) {
+  double value = 0;
+  const auto result = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (result.ec != std::errc{} || result.ptr != text.data() + text.size() ||
+      !std::isfinite(value)) {
+    throw SceneError(option + ": '" + std::string(text) + "' is not a number; see --help");
+  }
+  return value;
+}
+
+std::vector<double> numbers(const std::string& option, const std::string& text, char separator) {
+  std::vector<double> values;
+  std::istringstream parts(text + separator);
+  for (std::string part; std::getline(parts, part, separator);) {
+    values.push_back(number(option, part));
+  }
+  return values;
+}
+
+std::array<double, 3> spacing_from(const std::string& text) {
+  const std::vector<double> s = numbers("--spacing", text, ',');
+  if (s.size() == 1) return {s[0], s[0], s[0]};
+  if (s.size() == 3) return {s[0], s[1], s[2]};
+  throw SceneError("--spacing: " + text + " has " + std::to_string(s.size()) +
+                   " numbers; give one, or three as x,y,z (mm)");
+}
+
+Window window_from(const std::string& text) {
+  const std::vector<double> w = numbers("--window", text, ',');
+  if (w.size() != 2) {
+    throw SceneError("--window: " + text + " is not a range; give lo,hi in values of the file");
+  }
+  return {w[0], w[1]};
+}
+
+VoxelGrid grid_from(const std::string& text) {
+  const std::vector<double> n = numbers("--size", text, 'x');
+  const auto whole = [](double v) { return v >= 1.0 && v <= 1e6 && v == std::floor(v); };
+  if (n.size() != 3 || !std::all_of(n.begin(), n.end(), whole)) {
+    throw SceneError("--size: " + text + " is not a size; give three counts such as 256x256x161");
+  }
+  return {static_cast<std::int32_t>(n[0]), static_cast<std::int32_t>(n[1]),
+          static_cast<std::int32_t>(n[2])};
+}
+
+/// What the commands that read a volume have in common.
+struct Source {
+  std::string file, spacing, window;
+
+  void add_to(CLI::App& command, bool with_spacing) {
+    command.add_option("file", file, "volume file, or folder with a DICOM series")
+        ->required()
+        ->type_name("FILE");
+    if (with_spacing) {
+      command.add_option("--spacing", spacing, "mm per voxel, in place of the file's")
+          ->type_name("A[,B,C]");
+    }
+    command.add_option("--window", window, "values that become density 0 and 1 (default: all)")
+        ->type_name("LO,HI");
+  }
+  [[nodiscard]] SourceVolume read(bool allow_missing_spacing = false) const {
+    ReadOptions options;
+    options.allow_missing_spacing = allow_missing_spacing;
+    if (!spacing.empty()) options.spacing_mm = spacing_from(spacing);
+    return read_volume(file, options);
+  }
+  [[nodiscard]] Window window_for(const SourceVolume& source) const {
+    return window.empty() ? range_window(source) : window_from(window);
+  }
+  [[nodiscard]] VolumeImage image() const {
+    const SourceVolume source = read();
+    VolumeImage image = apply_window(source, window_for(source));
+    read_labels_beside(file, image);
+    return image;
+  }
+};
+
+struct Target {
+  std::string file;
+  bool raw = false;
+
+  void add_to(CLI::App& command) {
+    command.add_option("--out", file, "file to write")->required()->type_name("OUT.nrrd");
+    command.add_flag("--raw", raw, "write without compression");
+  }
+  void write(const VolumeImage& image, std::ostream& out) const {
+    write_volume(image, file, raw ? VolumeEncoding::raw : VolumeEncoding::gzip);
+    out << file << ": " << image.grid.nx << " x " << image.grid.ny << " x " << image.grid.nz
+        << " voxels of " << image.spacing_mm[0] << " x " << image.spacing_mm[1] << " x "
+        << image.spacing_mm[2] << " mm" << (image.labels.empty() ? "" : ", with labels") << '\n';
+  }
+};
+
+struct Commands {
+  Source source;
+  Target target;
+  std::string report, resample_spacing, size = "256x256x161";
+  double iso = -1.0;
+  std::int32_t guard = kGuardVoxels;
+  CLI::App* info = nullptr;
+  CLI::App* import = nullptr;
+  CLI::App* crop = nullptr;
+  CLI::App* resample = nullptr;
+  CLI::App* phantom = nullptr;
+
+  void add_to(CLI::App& app) {
+    info = app.add_subcommand("info", "print size, spacing, values and what is solid");
+    source.add_to(*info, true);
+    info->add_option("--report", report, "write the same figures as JSON")->type_name("FILE");
+
+    import = app.add_subcommand("import", "convert any readable volume to a .nrrd of densities");
+    source.add_to(*import, true);
+    target.add_to(*import);
+
+    crop = app.add_subcommand("crop", "cut to the tightest box around what is solid, plus a guard");
+    source.add_to(*crop, true);
+    target.add_to(*crop);
+    crop->add_option("--iso", iso, "density from which a voxel is solid (default: Otsu)")
+        ->check(CLI::Range(0.0, 1.0));
+    crop->add_option("--guard", guard, "voxels kept around it")
+        ->capture_default_str()
+        ->check(CLI::Range(0, 64));
+
+    resample = app.add_subcommand("resample", "change the voxel size");
+    source.add_to(*resample, false);
+    target.add_to(*resample);
+    resample->add_option("--spacing", resample_spacing, "new mm per voxel")
+        ->required()
+        ->type_name("A[,B,C]");
+
+    phantom = app.add_subcommand("phantom", "make the procedural molar");
+    phantom->add_option("--size", size, "voxels; its size in mm stays")
+        ->capture_default_str()
+        ->type_name("NXxNYxNZ");
+    target.add_to(*phantom);
+  }
+
+  void run(std::ostream& out) const {
+    if (info->parsed()) {
+      const SourceVolume volume = source.read(true);
+      const VolumeInfo figures = describe(source.file, volume, source.window_for(volume));
+      print(figures, out);
+      if (!report.empty()) write_report(figures, report);
+    } else if (import->parsed()) {
+      target.write(source.image(), out);
+    } else if (crop->parsed()) {
+      const VolumeImage image = source.image();
+      const Density threshold =
+          iso < 0.0 ? otsu_threshold(image) : static_cast<Density>(std::lround(iso * kDensityMax));
+      target.write(crop_to_solid(image, threshold, guard), out);
+    } else if (resample->parsed()) {
+      target.write(kerf::resample(source.image(), spacing_from(resample_spacing)), out);
+    } else {
+      PhantomSpec spec;
+      spec.grid = grid_from(size);
+      target.write(make_phantom(spec), out);
+    }
+  }
+};
+
+/// CLI11 breaks some of its messages into lines.
+std::string one_line(std::string text) {
+  std::replace(text.begin(), text.end(), '\n', ' ');
+  return text;
+}
+
+}  // namespace
+
+int run_volume_tool(int argc, const char* const* argv, std::ostream& out, std::ostream& err) {
+  CLI::App app("Inspect, import, crop and resample volumes; make the molar phantom.",
+               "kerf-volume");
+  app.set_version_flag("--version", KERF_VERSION);
+  app.require_subcommand(0, 1);
+  Commands commands;
+  commands.add_to(app);
+  try {
+    app.parse(argc, argv);
+    if (app.get_subcommands().empty()) throw CLI::RequiredError("a command");
+    commands.run(out);
+    return 0;
+  } catch (const CLI::Success& request) {  // --help, --version
+    return app.exit(request, out, err);
+  } catch (const CLI::ParseError& error) {
+    err << "kerf-volume: " << one_line(error.what()) << "; see --help\n";
+  } catch (const std::exception& error) {
+    err << "kerf-volume: " << one_line(error.what()) << '\n';
+  }
+  return 2;
+}
+
+}  // namespace kerf

@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "controller/volume_tool/volume_info.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <iomanip>
+#include <ostream>
+
+#include <nlohmann/json.hpp>
+
+#include "controller/scene/new_file.hpp"
+
+namespace kerf {
+namespace {
+
+/// One character per bin, taller with the logarithm of the count.
+std::string bars(const VolumeInfo& info) {
+  constexpr std::array<const char*, 9> kBars{" ", "▁", "▂", "▃", "▄", "▅", "▆", "▇", "█"};
+  const double most =
+      static_cast<double>(*std::max_element(info.histogram.begin(), info.histogram.end()));
+  std::string line;
+  for (const std::uint64_t count : info.histogram) {
+    const double height = std::log1p(static_cast<double>(count)) / std::log1p(most);
+    line += kBars[static_cast<std::size_t>(std::ceil(height * (kBars.size() - 1)))];
+  }
+  return line;
+}
+
+}  // namespace
+
+VolumeInfo describe(const std::string& file, const SourceVolume& volume, Window window) {
+  const VolumeImage image = apply_window(volume, window);
+  VolumeInfo info;
+  info.file = file;
+  info.grid = volume.grid;
+  info.spacing_mm = volume.spacing_mm;
+  info.has_spacing = volume.has_spacing;
+  info.origin_mm = volume.origin_mm;
+  info.direction = volume.direction;
+  info.min = volume.min;
+  info.max = volume.max;
+  info.window = window;
+  info.otsu = otsu_threshold(image);
+  info.otsu_value = window.lo + (window.hi - window.lo) * info.otsu / kDensityMax;
+  info.solid = solid_box(image, info.otsu);
+  const auto solid = std::count_if(image.density.begin(), image.density.end(),
+                                   [&](Density d) { return d >= info.otsu; });
+  info.solid_ratio = static_cast<double>(solid) / static_cast<double>(image.density.size());
+  for (const Density d : image.density) {
+    ++info.histogram[std::size_t{d} * VolumeInfo::kHistogramBins >> 16];
+  }
+  return info;
+}
+
+void print(const VolumeInfo& info, std::ostream& out) {
+  const auto& s = info.spacing_mm;
+  const auto& o = info.origin_mm;
+  const auto& d = info.direction;
+  out << "file       " << info.file << "\nsize       " << info.grid.nx << " x " << info.grid.ny
+      << " x " << info.grid.nz << " voxels\nspacing    ";
+  if (info.has_spacing) {
+    out << s[0] << " x " << s[1] << " x " << s[2] << " mm\nextent     " << s[0] * info.grid.nx
+        << " x " << s[1] * info.grid.ny << " x " << s[2] * info.grid.nz << " mm\n";
+  } else {
+    out << "not in the file; give it with --spacing or spacing_mm\n";
+  }
+  out << "origin     " << o[0] << " " << o[1] << " " << o[2] << " mm\ndirection  (" << d[0] << " "
+      << d[3] << " " << d[6] << ") (" << d[1] << " " << d[4] << " " << d[7] << ") (" << d[2] << " "
+      << d[5] << " " << d[8] << ")\nvalues     " << info.min << " .. " << info.max
+      << "\nwindow     " << info.window.lo << " .. " << info.window.hi << "\notsu       "
+      << info.otsu_value << " (density " << info.otsu / kDensityMax << ")\nsolid box  ("
+      << info.solid.lo.x << ", " << info.solid.lo.y << ", " << info.solid.lo.z << ") .. ("
+      << info.solid.hi.x - 1 << ", " << info.solid.hi.y - 1 << ", " << info.solid.hi.z - 1 << "), "
+      << 100.0 * info.solid_ratio << " % of the voxels are solid\nhistogram  |" << bars(info)
+      << "| (log)\n";
+}
+
+void write_report(const VolumeInfo& info, const std::filesystem::path& path) {
+  const auto corner = [](VoxelIndex v) { return nlohmann::json{v.x, v.y, v.z}; };
+  nlohmann::json report{
+      {"file", info.file},
+      {"size_vox", {info.grid.nx, info.grid.ny, info.grid.nz}},
+      {"has_spacing", info.has_spacing},
+      {"spacing_mm", info.spacing_mm},
+      {"origin_mm", info.origin_mm},
+      {"direction", info.direction},
+      {"min", info.min},
+      {"max", info.max},
+      {"window", {info.window.lo, info.window.hi}},
+      {"otsu_value", info.otsu_value},
+      {"otsu_density", info.otsu / kDensityMax},
+      {"solid_box", {{"lo", corner(info.solid.lo)}, {"hi", corner(info.solid.hi)}}},
+      {"solid_ratio", info.solid_ratio},
+      {"histogram", info.histogram}};
+  const std::string text = report.dump(2) + "\n";
+  NewFile file(path);
+  file.write(text.data(), text.size());
+  file.close();
+  file.commit();
+}
+
+}  // namespace kerf

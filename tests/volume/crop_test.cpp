@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <doctest/doctest.h>
+#include <rapidcheck.h>
+
+#include "controller/scene/scene_error.hpp"
+#include "controller/scene/volume_crop.hpp"
+#include "controller/scene/volume_density.hpp"
+#include "tests/volume/volume_files.hpp"
+
+using namespace kerf;
+using namespace kerf::test;
+
+namespace {
+
+/// Every voxel holds its own index + 1, as density and (low byte) as label.
+VolumeImage numbered(VoxelGrid grid) {
+  VolumeImage image = air(grid);
+  for (std::size_t i = 0; i < image.density.size(); ++i) {
+    image.density[i] = static_cast<Density>(i + 1);
+    image.labels.push_back(static_cast<Label>(i + 1));
+  }
+  return image;
+}
+
+std::array<double, 3> place(const VolumeImage& v, int i, int j, int k) {
+  std::array<double, 3> p = v.origin_mm;
+  const std::array<double, 3> step{i * v.spacing_mm[0], j * v.spacing_mm[1], k * v.spacing_mm[2]};
+  for (std::size_t r = 0; r < 3; ++r) {
+    for (std::size_t c = 0; c < 3; ++c) p[r] += v.direction[3 * r + c] * step[c];
+  }
+  return p;
+}
+
+}  // namespace
+
+TEST_CASE("a crop keeps every voxel's density, label and place; outside the source is air") {
+  CHECK(rc::check("crop", [] {
+    const VoxelGrid grid{6, 5, 4};
+    VolumeImage image = numbered(grid);
+    image.spacing_mm = {0.5, 0.25, 2};
+    image.origin_mm = {10, 20, 30};
+    image.direction = {0, -1, 0, 1, 0, 0, 0, 0, 1};
+    const auto edge = [] { return *rc::gen::inRange(-4, 9); };
+    const VoxelIndex lo{edge(), edge(), edge()};
+    const auto size = [] { return *rc::gen::inRange(1, 8); };
+    const VoxelBox box{lo, {lo.x + size(), lo.y + size(), lo.z + size()}};
+    const VolumeImage part = crop(image, box);
+    RC_ASSERT(part.grid == (VoxelGrid{box.extent().x, box.extent().y, box.extent().z}));
+    for (std::int32_t z = 0; z < part.grid.nz; ++z) {
+      for (std::int32_t y = 0; y < part.grid.ny; ++y) {
+        for (std::int32_t x = 0; x < part.grid.nx; ++x) {
+          const VoxelIndex from{x + lo.x, y + lo.y, z + lo.z};
+          const std::size_t at = part.grid.index(x, y, z);
+          const bool inside = grid.contains(from);
+          const std::size_t source = inside ? grid.index(from.x, from.y, from.z) : 0;
+          RC_ASSERT(part.density[at] == (inside ? image.density[source] : 0));
+          RC_ASSERT(part.labels[at] == (inside ? image.labels[source] : 0));
+          RC_ASSERT(place(part, x, y, z) == place(image, from.x, from.y, from.z));
+        }
+      }
+    }
+  }));
+}
+
+TEST_CASE("cropping to what is solid leaves three voxels of guard on every side") {
+  VolumeImage image = air({20, 20, 20});
+  image.density[image.grid.index(8, 9, 10)] = 1000;
+  image.density[image.grid.index(11, 9, 10)] = 1000;
+  const VolumeImage part = crop_to_solid(image, 1000);
+  CHECK(part.grid == VoxelGrid{10, 7, 7});
+  CHECK(solid_box(part, 1000) == VoxelBox{{3, 3, 3}, {7, 4, 4}});
+  CHECK(part.origin_mm == std::array<double, 3>{5, 6, 7});
+}
+
+TEST_CASE("the guard exists even where the solid touches the border of the file") {
+  VolumeImage image = air({4, 4, 4});
+  std::fill(image.density.begin(), image.density.end(), Density{9});
+  const VolumeImage part = crop_to_solid(image, 9);
+  CHECK(part.grid == VoxelGrid{10, 10, 10});
+  CHECK(solid_box(part, 9) == VoxelBox{{3, 3, 3}, {7, 7, 7}});
+  CHECK(part.density[0] == 0);
+  CHECK(part.origin_mm == std::array<double, 3>{-3, -3, -3});
+}
+
+TEST_CASE("what lies below iso in the guard is kept as it is") {
+  VolumeImage image = air({9, 9, 9});
+  std::fill(image.density.begin(), image.density.end(), Density{100});
+  image.density[image.grid.index(4, 4, 4)] = 1000;
+  const VolumeImage part = crop_to_solid(image, 500, 2);
+  CHECK(part.grid == VoxelGrid{5, 5, 5});
+  CHECK(part.density[0] == 100);
+}
+
+TEST_CASE("nothing solid, an empty box and a box above the limit are refused in one line") {
+  const VolumeImage image = air({4, 4, 4});
+  try {
+    static_cast<void>(crop_to_solid(image, 32768));
+    FAIL("accepted");
+  } catch (const SceneError& error) {
+    CHECK(is_one_line(error.what()));
+    CHECK(std::string(error.what()).find("nothing solid") != std::string::npos);
+  }
+  CHECK_THROWS_AS(static_cast<void>(crop(image, VoxelBox{{2, 0, 0}, {2, 4, 4}})), SceneError);
+  CHECK_THROWS_AS(static_cast<void>(crop(image, VoxelBox{{0, 0, 0}, {2000, 4, 4}})), SceneError);
+}

@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <functional>
+#include <utility>
+
+#include <doctest/doctest.h>
+
+#include "tests/volume/volume_files.hpp"
+
+using namespace kerf;
+using namespace kerf::test;
+
+namespace {
+
+/// Slice k of a 3 x 4 x 5 series with the values 12 k .. 12 k + 11, 2 mm apart.
+DicomSpec slice(int k) {
+  DicomSpec spec;
+  spec.instance = k + 1;
+  spec.position_mm = {-10, 20, 100.0 + 2 * k};
+  for (int i = 0; i < 12; ++i) spec.values.push_back(static_cast<std::int16_t>(12 * k + i));
+  return spec;
+}
+
+/// Writes five slices, in an order of names that is not their order in space.
+void write_series(const TempFolder& folder, const std::function<void(DicomSpec&, int)>& change) {
+  for (int k = 0; k < 5; ++k) {
+    DicomSpec spec = slice(k);
+    change(spec, k);
+    folder.write("image" + std::to_string((k * 3) % 5) + ".dcm", dicom(spec));
+  }
+}
+
+}  // namespace
+
+TEST_CASE("a DICOM series is put together by position, with spacing and rescaling") {
+  const TempFolder folder;
+  write_series(folder, [](DicomSpec& spec, int) {
+    spec.slope = 2;
+    spec.intercept = -1000;
+  });
+  folder.write("notes.txt", "not an image");
+  const SourceVolume v = read_volume(folder.path());
+  CHECK(v.grid == kSmall);
+  CHECK(v.spacing_mm == std::array<double, 3>{0.25, 0.5, 2});
+  CHECK(v.origin_mm == std::array<double, 3>{-10, 20, 100});
+  CHECK(v.direction == std::array<double, 9>{1, 0, 0, 0, 1, 0, 0, 0, 1});
+  for (std::size_t i = 0; i < 60; ++i) CHECK(v.values[i] == 2.0F * static_cast<float>(i) - 1000.0F);
+}
+
+TEST_CASE("a turned DICOM series keeps right-handed axes") {
+  const TempFolder folder;
+  // Coronal: rows run along +x, columns down along -z, so slices follow +y.
+  write_series(folder, [](DicomSpec& spec, int k) {
+    spec.orientation = "1\\0\\0\\0\\0\\-1";
+    spec.position_mm = {0, 3.0 * k, 50};
+  });
+  const SourceVolume v = read_volume(folder.path());
+  CHECK(v.spacing_mm[2] == doctest::Approx(3.0));
+  CHECK(v.direction == std::array<double, 9>{1, 0, 0, 0, 0, 1, 0, -1, 0});
+  CHECK(v.values == counting<float>());
+}
+
+TEST_CASE("a DICOM folder that is not one even stack is refused in one line") {
+  const TempFolder folder;
+  const auto refused = [&](const std::string& what) {
+    const std::string message = refusal(folder.path());
+    CAPTURE(message);
+    CHECK(is_one_line(message));
+    CHECK(message.find(what) != std::string::npos);
+  };
+  SUBCASE("no series") {
+    refused("no DICOM series");
+  }
+  SUBCASE("two series") {
+    write_series(folder, [](DicomSpec& spec, int k) {
+      if (k == 4) spec.series += ".2";
+    });
+    refused("2 DICOM series");
+  }
+  SUBCASE("a slice is missing") {
+    write_series(folder, [](DicomSpec& spec, int k) {
+      if (k == 4) spec.position_mm[2] += 2;
+    });
+    refused("add the missing slices");
+  }
+  SUBCASE("two slices in one place") {
+    write_series(folder, [](DicomSpec& spec, int) { spec.position_mm[2] = 100; });
+    refused("not a voxel size");
+  }
+  SUBCASE("a tilted gantry") {
+    write_series(folder, [](DicomSpec& spec, int k) { spec.position_mm[1] += 0.5 * k; });
+    refused("not at right angles");
+  }
+  SUBCASE("slices of different sizes") {
+    write_series(folder, [](DicomSpec& spec, int k) {
+      if (k == 2) std::swap(spec.rows, spec.columns);
+    });
+    refused("differs");
+  }
+  SUBCASE("no spacing") {
+    write_series(folder, [](DicomSpec& spec, int) { spec.pixel_spacing.clear(); });
+    refused("spacing is not in the file");
+  }
+  SUBCASE("one slice") {
+    folder.write("only.dcm", dicom(slice(0)));
+    refused("one slice");
+  }
+  SUBCASE("a slice is cut off") {
+    write_series(folder, [](DicomSpec&, int) {});
+    const auto path = folder / "image0.dcm";
+    const std::string whole = read_bytes(path);
+    folder.write("image0.dcm", whole.substr(0, whole.size() - 10));
+    refused("image0.dcm");
+  }
+}

@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cstdlib>
+#include <optional>
+
+#include <doctest/doctest.h>
+
+#include "controller/scene/volume_crop.hpp"
+#include "controller/scene/volume_density.hpp"
+#include "tests/volume/volume_files.hpp"
+
+using namespace kerf;
+
+namespace {
+
+/// The file below $KERF_DATA; none, with a message, where it is not there.
+std::optional<std::filesystem::path> data(const std::string& name) {
+  const char* folder = std::getenv("KERF_DATA");
+  if (folder != nullptr && std::filesystem::exists(std::filesystem::path(folder) / name)) {
+    return std::filesystem::path(folder) / name;
+  }
+  MESSAGE("skipped: " << name << " is not there (KERF_DATA names the folder)");
+  return std::nullopt;
+}
+
+double in_values(Density d, Window window) {
+  return window.lo + (window.hi - window.lo) * d / kDensityMax;
+}
+
+}  // namespace
+
+TEST_CASE("the 16-bit CT tooth: big-endian, detached, and Otsu parts dentin from air") {
+  const auto path = data("ge_tooth_16bit/tooth.nhdr");
+  if (!path) return;
+  const SourceVolume v = read_volume(*path);
+  CHECK(v.grid == VoxelGrid{103, 94, 161});
+  CHECK(v.min == 0);
+  CHECK(v.max == 1300);
+  CHECK(v.spacing_mm == std::array<double, 3>{1, 1, 1});
+  const Window window = range_window(v);
+  const VolumeImage image = apply_window(v, window);
+  const Density otsu = otsu_threshold(image);
+  CHECK(in_values(otsu, window) > 500);  // air 391, dentin 835
+  CHECK(in_values(otsu, window) < 750);
+  // 390 092 voxels at >= 620, as counted independently; the box is that of the same count.
+  const auto iso = static_cast<Density>(620.0 / 1300 * kDensityMax + 0.5);
+  std::size_t solid = 0;
+  for (const Density d : image.density) solid += d >= iso;
+  CHECK(solid == 390092);
+  CHECK(solid_box(image, iso) == VoxelBox{{7, 8, 4}, {96, 86, 160}});
+  const VolumeImage part = crop_to_solid(image, iso);
+  CHECK(part.grid == VoxelGrid{89 + 6, 78 + 6, 156 + 6});
+}
+
+TEST_CASE("the same tooth takes a spacing from the options") {
+  const auto path = data("ge_tooth_16bit/tooth.nhdr");
+  if (!path) return;
+  ReadOptions options;
+  options.spacing_mm = {0.125, 0.125, 0.125};
+  CHECK(read_volume(*path, options).spacing_mm == *options.spacing_mm);
+}
+
+TEST_CASE("the 8-bit CT tooth: MetaImage") {
+  const auto path = data("ge_tooth_8bit/tooth.mhd");
+  if (!path) return;
+  const SourceVolume v = read_volume(*path);
+  CHECK(v.grid == VoxelGrid{140, 120, 161});
+  CHECK(v.min == 0);
+  CHECK(v.max == 255);
+}
+
+TEST_CASE("the CT of spine and pelvis: NIfTI in HU; bone from a window that begins at 0 HU") {
+  const auto path = data("ct_spine_pelvis/example_ct.nii.gz");
+  if (!path) return;
+  const SourceVolume v = read_volume(*path);
+  CHECK(v.grid == VoxelGrid{122, 101, 112});
+  CHECK(v.min == -1207);
+  CHECK(v.max == 3382);
+  for (const double s : v.spacing_mm) CHECK(s == doctest::Approx(3.0));
+  const auto threshold_hu = [&](Window window) {
+    return in_values(otsu_threshold(apply_window(v, window)), window);
+  };
+  CHECK(threshold_hu(range_window(v)) < -300);  // air from skin
+  const double bone = threshold_hu({0, 1500});
+  CHECK(bone > 120);  // soft tissue ends
+  CHECK(bone < 400);
+}
+
+TEST_CASE("the tar of slices of the hand is refused with the kinds that are read") {
+  const auto path = data("ct_hand/hand_lowres.tar");
+  if (!path) return;
+  CHECK(kerf::test::refusal(*path).find("not a kind of volume") != std::string::npos);
+}

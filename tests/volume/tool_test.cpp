@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fstream>
+#include <sstream>
+
+#include <doctest/doctest.h>
+#include <nlohmann/json.hpp>
+
+#include "controller/scene/phantom.hpp"
+#include "controller/scene/volume_density.hpp"
+#include "controller/volume_tool/volume_commands.hpp"
+#include "tests/volume/volume_files.hpp"
+
+using namespace kerf;
+using namespace kerf::test;
+
+namespace {
+
+struct Outcome {
+  int code = 0;
+  std::string out, err;
+};
+
+Outcome run(const std::vector<std::string>& arguments) {
+  std::vector<const char*> argv{"kerf-volume"};
+  for (const std::string& a : arguments) argv.push_back(a.c_str());
+  std::ostringstream out;
+  std::ostringstream err;
+  Outcome outcome;
+  outcome.code = run_volume_tool(static_cast<int>(argv.size()), argv.data(), out, err);
+  outcome.out = out.str();
+  outcome.err = err.str();
+  return outcome;
+}
+
+std::string blob_file(const TempFolder& folder) {
+  VolumeImage image = air({12, 12, 12});
+  std::vector<std::uint8_t> values(12 * 12 * 12, 10);
+  for (const int x : {5, 6, 7}) values[image.grid.index(x, 5, 5)] = 210;
+  return folder
+      .write("blob.nrrd",
+             nrrd("uint8", "spacings: 0.5 0.5 1\n", "raw", "12 12 12") + "\n" + bytes_of(values))
+      .string();
+}
+
+}  // namespace
+
+TEST_CASE("help and version are answers, not errors") {
+  CHECK(run({"--help"}).code == 0);
+  CHECK(run({"--help"}).out.find("resample") != std::string::npos);
+  CHECK(run({"info", "--help"}).out.find("--report") != std::string::npos);
+  CHECK(run({"--version"}).out == KERF_VERSION "\n");
+  CHECK(run({"--version"}).code == 0);
+}
+
+TEST_CASE("info tells size, spacing, values and what is solid, the same in its report") {
+  const TempFolder folder;
+  const std::string report = (folder / "r.json").string();
+  const Outcome result = run({"info", blob_file(folder), "--report", report});
+  REQUIRE(result.code == 0);
+  CHECK(result.out.find("12 x 12 x 12 voxels") != std::string::npos);
+  CHECK(result.out.find("0.5 x 0.5 x 1 mm") != std::string::npos);
+  CHECK(result.out.find("10 .. 210") != std::string::npos);
+  CHECK(result.out.find("(5, 5, 5) .. (7, 5, 5)") != std::string::npos);
+  const auto json = nlohmann::json::parse(read_bytes(report));
+  CHECK(json["size_vox"] == nlohmann::json{12, 12, 12});
+  CHECK(json["spacing_mm"] == nlohmann::json{0.5, 0.5, 1.0});
+  CHECK(json["solid_box"]["hi"] == nlohmann::json{8, 6, 6});
+  CHECK(json["solid_ratio"].get<double>() == doctest::Approx(3.0 / 1728));
+  CHECK(json["otsu_value"].get<double>() == doctest::Approx(110).epsilon(0.02));
+  std::uint64_t voxels = 0;
+  for (const auto& count : json["histogram"]) voxels += count.get<std::uint64_t>();
+  CHECK(voxels == 1728);
+}
+
+TEST_CASE("import, crop and resample do what the library does") {
+  const TempFolder folder;
+  const std::string out = (folder / "out.nrrd").string();
+  REQUIRE(run({"import", blob_file(folder), "--out", out, "--spacing", "2", "--window", "-90,210"})
+              .code == 0);
+  const SourceVolume imported = read_volume(out);
+  CHECK(imported.spacing_mm == std::array<double, 3>{2, 2, 2});
+  CHECK(imported.min == std::lround(100.0 / 300 * 65535));
+
+  REQUIRE(run({"crop", blob_file(folder), "--out", out, "--guard", "1", "--raw"}).code == 0);
+  CHECK(read_volume(out).grid == VoxelGrid{5, 3, 3});
+  REQUIRE(run({"crop", blob_file(folder), "--out", out, "--iso", "0"}).code == 0);
+  CHECK(read_volume(out).grid == VoxelGrid{18, 18, 18});
+
+  REQUIRE(run({"resample", blob_file(folder), "--out", out, "--spacing", "1,1,0.5"}).code == 0);
+  CHECK(read_volume(out).grid == VoxelGrid{6, 6, 24});
+}
+
+TEST_CASE("the phantom and its labels survive phantom, crop and resample") {
+  const TempFolder folder;
+  const std::string tooth = (folder / "tooth.nrrd").string();
+  const std::string part = (folder / "part.nrrd").string();
+  REQUIRE(run({"phantom", "--size", "64x64x40", "--out", tooth}).code == 0);
+  VolumeImage image = apply_window(read_volume(tooth), {0, kDensityMax});
+  read_labels_beside(tooth, image);
+  const VolumeImage made = make_phantom({.grid = {64, 64, 40}});
+  CHECK(image.density == made.density);
+  CHECK(image.labels == made.labels);
+  REQUIRE(run({"crop", tooth, "--out", part}).code == 0);
+  REQUIRE(run({"resample", part, "--out", part, "--spacing", "0.25"}).code == 0);
+  VolumeImage fine = apply_window(read_volume(part), {0, kDensityMax});
+  read_labels_beside(part, fine);
+  CHECK(fine.labels.size() == fine.density.size());
+}
+
+TEST_CASE("bad input is one line on the error stream and exit code 2") {
+  const TempFolder folder;
+  const std::string blob = blob_file(folder);
+  const std::string out = (folder / "out.nrrd").string();
+  const std::vector<std::vector<std::string>> wrong{
+      {},
+      {"melt"},
+      {"info"},
+      {"info", "nothing.nrrd"},
+      {"info", blob, "--window", "1"},
+      {"info", blob, "--window", "5,x"},
+      {"info", blob, "--window", "5,5"},
+      {"info", blob, "--report", (folder / "none/r.json").string()},
+      {"import", blob},
+      {"import", blob, "--out", out, "--spacing", "1,2"},
+      {"import", blob, "--out", out, "--spacing", "0"},
+      {"import", blob, "--out", out, "--spacing", "1e-"},
+      {"import", blob, "--out", (folder / "out.mha").string()},
+      {"crop", blob, "--out", out, "--iso", "2"},
+      {"crop", blob, "--out", out, "--guard", "-1"},
+      {"resample", blob, "--out", out},
+      {"resample", blob, "--out", out, "--spacing", "0.0001"},
+      {"phantom", "--out", out, "--size", "10x10"},
+      {"phantom", "--out", out, "--size", "0x10x10"},
+      {"phantom", "--out", out, "--size", "4000x10x10"},
+      {"phantom", "--out", out, "--colour"}};
+  for (const auto& arguments : wrong) {
+    const Outcome result = run(arguments);
+    CAPTURE(result.err);
+    CHECK(result.code == 2);
+    CHECK(result.out.find("voxels of") == std::string::npos);
+    CHECK(result.err.rfind("kerf-volume: ", 0) == 0);
+    CHECK(std::count(result.err.begin(), result.err.end(), '\n') == 1);
+    CHECK_FALSE(std::filesystem::exists(out));
+  }
+}

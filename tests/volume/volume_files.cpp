@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/volume/volume_files.hpp"
+
+#include <cstdlib>
+#include <fstream>
+#include <iterator>
+#include <sstream>
+#include <stdexcept>
+
+#include <zlib.h>
+
+#include "controller/scene/scene_error.hpp"
+
+namespace kerf::test {
+namespace fs = std::filesystem;
+
+TempFolder::TempFolder() {
+  std::string name = (fs::temp_directory_path() / "kerf-volume-XXXXXX").string();
+  if (mkdtemp(name.data()) == nullptr) throw std::runtime_error("no temporary folder");
+  path_ = name;
+}
+
+TempFolder::~TempFolder() {
+  std::error_code ignored;
+  fs::remove_all(path_, ignored);
+}
+
+fs::path TempFolder::write(const std::string& name, const std::string& bytes) const {
+  fs::create_directories((path_ / name).parent_path());
+  std::ofstream(path_ / name, std::ios::binary) << bytes;
+  return path_ / name;
+}
+
+std::string read_bytes(const fs::path& path) {
+  std::ifstream in(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+std::string gzipped(const std::string& bytes) {
+  z_stream stream{};
+  deflateInit2(&stream, Z_BEST_SPEED, Z_DEFLATED, 15 + 16, 8, Z_DEFAULT_STRATEGY);
+  std::string in = bytes;
+  std::string out(deflateBound(&stream, in.size()), '\0');
+  stream.next_in = reinterpret_cast<Bytef*>(in.data());
+  stream.avail_in = static_cast<uInt>(in.size());
+  stream.next_out = reinterpret_cast<Bytef*>(out.data());
+  stream.avail_out = static_cast<uInt>(out.size());
+  deflate(&stream, Z_FINISH);
+  out.resize(stream.total_out);
+  deflateEnd(&stream);
+  return out;
+}
+
+std::string nrrd(const std::string& type, const std::string& more, const std::string& encoding,
+                 const std::string& sizes) {
+  return "NRRD0004\n# by hand\ntype: " + type + "\ndimension: 3\nsizes: " + sizes +
+         "\nencoding: " + encoding + "\n" + more;
+}
+
+std::string meta(const std::string& type, const std::string& more, const std::string& data_file) {
+  return "ObjectType = Image\nNDims = 3\nDimSize = 3 4 5\nElementType = " + type + "\n" + more +
+         "ElementDataFile = " + data_file + "\n";
+}
+
+std::string nifti(const NiftiSpec& spec) {
+  std::string header(352, '\0');
+  const auto put = [&](std::size_t offset, auto value) {
+    const std::string raw = bytes_of(value, spec.order);
+    std::copy(raw.begin(), raw.end(), header.begin() + static_cast<std::ptrdiff_t>(offset));
+  };
+  put(0, std::int32_t{348});
+  put(40, static_cast<std::int16_t>(spec.dim.size()));
+  for (std::size_t i = 0; i < 7; ++i) {
+    put(42 + 2 * i, i < spec.dim.size() ? spec.dim[i] : std::int16_t{1});
+  }
+  put(70, spec.datatype);
+  put(72, spec.bits);
+  put(76, 1.0F);
+  for (std::size_t i = 0; i < 3; ++i) put(80 + 4 * i, spec.pixdim[i]);
+  put(108, 352.0F);
+  header[123] = 2;  // mm
+  header.replace(344, 3, "n+1");
+  return header;
+}
+
+namespace {
+
+std::string element(std::uint16_t group, std::uint16_t number, const std::string& type,
+                    std::string value) {
+  const bool binary = type == "OB" || type == "OW" || type == "US" || type == "UL";
+  if (value.size() % 2 == 1) value += type == "UI" || binary ? '\0' : ' ';
+  std::string bytes = bytes_of(group) + bytes_of(number) + type;
+  if (type == "OB" || type == "OW") {
+    bytes += std::string(2, '\0') + bytes_of(static_cast<std::uint32_t>(value.size()));
+  } else {
+    bytes += bytes_of(static_cast<std::uint16_t>(value.size()));
+  }
+  return bytes + value;
+}
+
+std::string text(double value) {
+  std::ostringstream out;
+  out << value;
+  return out.str();
+}
+
+}  // namespace
+
+std::string dicom(const DicomSpec& spec) {
+  const std::string ct = "1.2.840.10008.5.1.4.1.1.2";
+  const std::string instance = spec.series + ".7." + std::to_string(spec.instance);
+  const auto u16 = [](int value) { return bytes_of(static_cast<std::uint16_t>(value)); };
+  std::string meta = element(0x0002, 0x0001, "OB", std::string("\0\1", 2)) +
+                     element(0x0002, 0x0002, "UI", ct) + element(0x0002, 0x0003, "UI", instance) +
+                     element(0x0002, 0x0010, "UI", "1.2.840.10008.1.2.1");
+  meta = element(0x0002, 0x0000, "UL", bytes_of(static_cast<std::uint32_t>(meta.size()))) + meta;
+  std::string data =
+      element(0x0008, 0x0016, "UI", ct) + element(0x0008, 0x0018, "UI", instance) +
+      element(0x0008, 0x0060, "CS", "CT") + element(0x0020, 0x000D, "UI", "1.2.826.0.1.9") +
+      element(0x0020, 0x000E, "UI", spec.series) +
+      element(0x0020, 0x0013, "IS", std::to_string(spec.instance)) +
+      element(0x0020, 0x0032, "DS",
+              text(spec.position_mm[0]) + "\\" + text(spec.position_mm[1]) + "\\" +
+                  text(spec.position_mm[2])) +
+      element(0x0020, 0x0037, "DS", spec.orientation) + element(0x0028, 0x0002, "US", u16(1)) +
+      element(0x0028, 0x0004, "CS", "MONOCHROME2") + element(0x0028, 0x0010, "US", u16(spec.rows)) +
+      element(0x0028, 0x0011, "US", u16(spec.columns));
+  if (!spec.pixel_spacing.empty()) data += element(0x0028, 0x0030, "DS", spec.pixel_spacing);
+  data += element(0x0028, 0x0100, "US", u16(16)) + element(0x0028, 0x0101, "US", u16(16)) +
+          element(0x0028, 0x0102, "US", u16(15)) + element(0x0028, 0x0103, "US", u16(1)) +
+          element(0x0028, 0x1052, "DS", text(spec.intercept)) +
+          element(0x0028, 0x1053, "DS", text(spec.slope)) +
+          element(0x7FE0, 0x0010, "OW", bytes_of(spec.values));
+  return std::string(128, '\0') + "DICM" + meta + data;
+}
+
+std::string refusal(const fs::path& path, const ReadOptions& options) {
+  try {
+    static_cast<void>(read_volume(path, options));
+  } catch (const SceneError& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+bool is_one_line(const std::string& message) {
+  return message.find('\n') == std::string::npos && message.find(": ") != std::string::npos &&
+         message.find("; ") != std::string::npos;
+}
+
+VolumeImage air(VoxelGrid grid) {
+  VolumeImage image;
+  image.grid = grid;
+  image.density.assign(grid.voxel_count(), 0);
+  return image;
+}
+
+}  // namespace kerf::test

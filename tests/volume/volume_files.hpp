@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <type_traits>
+#include <vector>
+
+#include "controller/scene/volume_image.hpp"
+#include "controller/scene/volume_io.hpp"
+
+/// Small volume files written by hand, byte by byte, so that the readers are checked against the
+/// formats' descriptions and not against another writer of the same library.
+namespace kerf::test {
+
+/// A fresh folder that goes away with the object.
+class TempFolder {
+ public:
+  TempFolder();
+  ~TempFolder();
+  TempFolder(const TempFolder&) = delete;
+  TempFolder& operator=(const TempFolder&) = delete;
+
+  [[nodiscard]] std::filesystem::path operator/(const std::string& name) const {
+    return path_ / name;
+  }
+  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+  /// Writes `bytes` to `name` and gives its path.
+  std::filesystem::path write(const std::string& name, const std::string& bytes) const;
+
+ private:
+  std::filesystem::path path_;
+};
+
+[[nodiscard]] std::string read_bytes(const std::filesystem::path& path);
+[[nodiscard]] std::string gzipped(const std::string& bytes);
+
+/// The bytes of one number in either byte order.
+template <class T>
+std::string bytes_of(T value, std::endian order = std::endian::little) {
+  auto raw = std::bit_cast<std::array<char, sizeof(T)>>(value);
+  if (order == std::endian::big) std::reverse(raw.begin(), raw.end());
+  return {raw.data(), raw.size()};
+}
+template <class T>
+std::string bytes_of(const std::vector<T>& values, std::endian order = std::endian::little) {
+  std::string bytes;
+  for (const T value : values) bytes += bytes_of(value, order);
+  return bytes;
+}
+
+/// 3 x 4 x 5 voxels with the values 0, 1, 2 .. 59.
+inline constexpr VoxelGrid kSmall{3, 4, 5};
+template <class T>
+std::vector<T> counting(std::size_t count = 60) {
+  std::vector<T> values;
+  for (std::size_t i = 0; i < count; ++i) values.push_back(static_cast<T>(i));
+  return values;
+}
+
+/// A NRRD header of 3 x 4 x 5 voxels without spacing; `more` adds whole lines.
+[[nodiscard]] std::string nrrd(const std::string& type, const std::string& more,
+                               const std::string& encoding = "raw",
+                               const std::string& sizes = "3 4 5");
+inline const std::string kSpacings = "spacings: 1 2 3\n";
+
+/// A MetaImage header of 3 x 4 x 5 voxels; `more` adds whole lines before `ElementDataFile`.
+[[nodiscard]] std::string meta(const std::string& type, const std::string& more,
+                               const std::string& data_file = "LOCAL");
+inline const std::string kElementSpacing = "ElementSpacing = 1 2 3\n";
+
+struct NiftiSpec {
+  std::vector<std::int16_t> dim{3, 4, 5};
+  std::array<float, 3> pixdim{1, 2, 3};
+  std::int16_t datatype = 16, bits = 32;  ///< float32
+  std::endian order = std::endian::little;
+};
+/// A NIfTI-1 header for a single file, with the 4 bytes that end it.
+[[nodiscard]] std::string nifti(const NiftiSpec& spec);
+
+struct DicomSpec {
+  int rows = 4, columns = 3;
+  std::array<double, 3> position_mm{0, 0, 0};
+  std::string orientation = "1\\0\\0\\0\\1\\0";
+  std::string pixel_spacing = "0.5\\0.25";  ///< between rows, between columns; empty: left out
+  std::string series = "1.2.826.0.1.3680043.2.1125.1";
+  int instance = 1;
+  double slope = 1, intercept = 0;
+  std::vector<std::int16_t> values;
+};
+/// One CT slice, explicit little-endian.
+[[nodiscard]] std::string dicom(const DicomSpec& spec);
+
+/// The message of the SceneError that reading throws; "no error" without one.
+[[nodiscard]] std::string refusal(const std::filesystem::path& path,
+                                  const ReadOptions& options = {});
+
+/// What may stand for a one-line message: `place: value; way out`.
+[[nodiscard]] bool is_one_line(const std::string& message);
+
+/// An image of `grid`, all air.
+[[nodiscard]] VolumeImage air(VoxelGrid grid);
+
+}  // namespace kerf::test
