@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+namespace kerf {
+
+/// The narrow place where a bus ends and a driver begins: whole packets in, whole packets out.
+///
+/// What stands behind it (a socket to an emulator, later FireWire, USB, HID) is invisible to the
+/// driver. Servo thread only; never blocks, never allocates, never throws.
+class PacketPort {
+ public:
+  virtual ~PacketPort() = default;
+
+  /// Takes the oldest waiting packet and returns its size; 0 when none waits. A packet longer than
+  /// `out` is cut to it and its full size returned.
+  [[nodiscard]] virtual std::size_t receive(std::span<std::uint8_t> out) noexcept = 0;
+
+  /// False when the packet could not be sent now; the next tick sends a newer one.
+  virtual bool send(std::span<const std::uint8_t> packet) noexcept = 0;
+
+  /// True once the other end is gone for good.
+  [[nodiscard]] virtual bool closed() const noexcept = 0;
+
+  /// Waits at most `milliseconds` for a packet, for lock-step runs and for calibration. Not real
+  /// time.
+  [[nodiscard]] virtual bool wait(int milliseconds) noexcept = 0;
+};
+
+}  // namespace kerf

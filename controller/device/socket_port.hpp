@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+
+#include "controller/device/packet_port.hpp"
+
+namespace kerf {
+
+/// A packet port over a Unix SEQPACKET socket: one datagram is one packet of the bus.
+class SocketPort final : public PacketPort {
+ public:
+  /// Connects, trying again for `patience_ms` while nobody listens. Throws std::runtime_error with
+  /// one line when nobody does.
+  SocketPort(const std::filesystem::path& path, int patience_ms);
+  ~SocketPort() override;
+  SocketPort(const SocketPort&) = delete;
+  SocketPort& operator=(const SocketPort&) = delete;
+
+  [[nodiscard]] std::size_t receive(std::span<std::uint8_t> out) noexcept override;
+  bool send(std::span<const std::uint8_t> packet) noexcept override;
+  [[nodiscard]] bool closed() const noexcept override { return closed_; }
+  [[nodiscard]] bool wait(int milliseconds) noexcept override;
+
+ private:
+  int fd_ = -1;
+  bool closed_ = false;
+};
+
+}  // namespace kerf

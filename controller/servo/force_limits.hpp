@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <concepts>
+#include <cstdint>
+
+#include "shared/numeric/numbers.hpp"
+#include "shared/numeric/vec.hpp"
+
+namespace kerf {
+
+/// Limits at the device port; the plan holds them in the loop's numbers.
+template <class N>
+struct ForceLimits {
+  typename N::Real peak_n;             ///< |F| never above it
+  typename N::Real continuous_n;       ///< RMS that the motors bear for ever
+  typename N::Real slew_n_per_tick;    ///< |dF| per tick while force builds up or turns
+  typename N::Ratio thermal_per_tick;  ///< T / thermal time constant
+};
+
+/// RMS budget: a first-order model of the winding's heat, in N^2.
+template <class N>
+struct ThermalState {
+  typename N::Energy heat_n2{};
+};
+
+/// Shortens `v` to at most `length`, keeping its direction. A shorter vector is returned as it is.
+template <std::floating_point S, class Space>
+[[nodiscard]] inline Vec<S, Space> clamped(Vec<S, Space> v, S length) noexcept {
+  const S current = norm(v);
+  return current <= length ? v : v * (length / current);
+}
+/// Fixed: `norm` rounds down and so do the products here, so the result is never longer.
+template <int F, class Space>
+[[nodiscard]] constexpr Vec<Fixed<F>, Space> clamped(Vec<Fixed<F>, Space> v,
+                                                     Fixed<F> length) noexcept {
+  const Fixed<F> current = norm(v);
+  if (current < length) return v;
+  const std::int64_t above = std::int64_t{current.raw()} + 1;
+  const auto shortened = [&](Fixed<F> component) {
+    return Fixed<F>::from_raw(saturate_i32(std::int64_t{component.raw()} * length.raw() / above));
+  };
+  return {shortened(v.x), shortened(v.y), shortened(v.z)};
+}
+
+/// Largest force that the motors may give now: the peak while cool, falling to the continuous force
+/// as the budget is used up, so that a held peak settles at the continuous RMS.
+template <class N>
+[[nodiscard]] constexpr typename N::Real thermal_limit(const ForceLimits<N>& limits,
+                                                       const ThermalState<N>& state) noexcept {
+  using Real = typename N::Real;
+  const Real budget = limits.continuous_n * limits.continuous_n;
+  Real heat;
+  if constexpr (N::kIsFixed) {
+    heat = Real::from_wide(state.heat_n2, 32);
+  } else {
+    heat = state.heat_n2;
+  }
+  // The last quarter of the budget is the band in which the limit falls.
+  const Real band = budget / Real(4);
+  const Real left = std::clamp((budget - heat) / band, Real(0), Real(1));
+  return limits.continuous_n + (limits.peak_n - limits.continuous_n) * left;
+}
+
+template <class N>
+constexpr void heat_up(const ForceLimits<N>& limits, ThermalState<N>& state,
+                       DeviceVec<typename N::Real> force_n) noexcept {
+  if constexpr (N::kIsFixed) {
+    const std::int64_t length = norm(force_n).raw();
+    const std::int64_t rise = length * length - state.heat_n2;  // |F| < 2^15 N: below 2^62
+    state.heat_n2 += (rise >> 16) * limits.thermal_per_tick.raw() >> 8;
+  } else {
+    state.heat_n2 += (dot(force_n, force_n) - state.heat_n2) * limits.thermal_per_tick;
+  }
+}
+
+/// Clamp (peak and thermal), then slew from the force of the last tick.
+template <class N>
+[[nodiscard]] constexpr DeviceVec<typename N::Real> limited_force(
+    const ForceLimits<N>& limits, ThermalState<N>& thermal, DeviceVec<typename N::Real> wanted_n,
+    DeviceVec<typename N::Real> last_n) noexcept {
+  const auto bounded = clamped(wanted_n, std::min(limits.peak_n, thermal_limit(limits, thermal)));
+  // The second clamp takes off what rounding of the slew steps may have added up.
+  const auto sent =
+      clamped(last_n + clamped(bounded - last_n, limits.slew_n_per_tick), limits.peak_n);
+  heat_up(limits, thermal, sent);
+  return sent;
+}
+
+}  // namespace kerf

@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "shared/volume/voxel_grid.hpp"
+
+namespace kerf {
+
+inline constexpr std::size_t kMaxVolumes = 8;
+inline constexpr double kContactThresholdN = 0.01;  ///< a tick with more force is a contact tick
+
+/// Where the safety of the loop stands. Motors are on in `ramping` and `active` only.
+enum class Phase : std::uint8_t {
+  calibrating,  ///< never docked yet: the joint angles are unknown
+  docked,       ///< in the inkwell, calibrated
+  ramping,      ///< left the inkwell: force fades in
+  active,
+  fault  ///< latched; the next docking clears it
+};
+
+/// Why the force went to zero. Values go into logs: append only.
+enum class Fault : std::uint32_t {
+  none = 0,
+  stale_input = 1,  ///< no report for 20 ms
+  not_finite = 2,   ///< NaN after kinematics for more than 2 ms
+  overspeed = 3     ///< tip faster than the limit
+};
+
+[[nodiscard]] constexpr const char* fault_name(Fault fault) noexcept {
+  switch (fault) {
+    case Fault::none:
+      return "none";
+    case Fault::stale_input:
+      return "stale_input";
+    case Fault::not_finite:
+      return "not_finite";
+    case Fault::overspeed:
+      return "overspeed";
+  }
+  return "unknown";
+}
+
+/// Everything one tick decided: motor counts for the device, the rest for the eyes and the log.
+///
+/// Physical values are converted from the loop's numbers exactly; nothing here flows back.
+struct ServoOutput {
+  std::array<std::int16_t, 3> motor_counts{};  ///< signed DAC counts, 0 = no torque
+  bool motors_on = false;
+  Phase phase = Phase::calibrating;
+  Fault fault = Fault::none;
+  bool armed = false;      ///< calibrated and out of the inkwell at least once: ticks count
+  bool stale = false;      ///< no fresh report in this tick
+  bool saturated = false;  ///< force, slew, thermal or DAC limit was active
+  bool contact = false;    ///< commanded force above 0.01 N
+
+  std::array<std::int32_t, 6> joint_counts{};  ///< unwrapped since docking; gimbal in mrad
+  std::array<double, 3> position_mm{};         ///< tip in the scene
+  std::array<double, 9> rotation{};            ///< world from tool, row-major
+  std::array<double, 3> velocity_mm_per_s{};   ///< device port, mean over 8 ticks
+  std::array<double, 3> force_n{};             ///< sent to the hand, device port
+  std::array<double, 3> contact_n{};           ///< part of it before limits, device port
+  std::array<double, 3> modification_n{};
+  std::array<double, 3> torque_n_mm{};  ///< motor torques
+  double absorbed_mj = 0;               ///< SUM -F_sent . dx since arming; + = taken from the hand
+
+  std::uint32_t active_tool = 0;
+  std::uint64_t removed_steps = 0;  ///< density steps removed in this tick, all volumes
+  std::array<std::uint64_t, kMaxVolumes> removed_by_volume{};
+  std::array<VoxelBox, kMaxVolumes> changed{};  ///< voxels that changed, by volume
+  std::uint64_t output_hash = 0;                ///< chain over all ticks
+};
+
+}  // namespace kerf

@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "controller/kernel/gradient.hpp"
+#include "controller/kernel/milling.hpp"
+#include "controller/kernel/tool_offset.hpp"
+#include "controller/servo/force_limits.hpp"
+#include "controller/servo/kinematics/omni.hpp"
+#include "controller/servo/servo_output.hpp"
+#include "controller/servo/sum_to_force.hpp"
+#include "controller/servo/supervisor.hpp"
+#include "shared/volume/voxel_grid.hpp"
+
+namespace kerf {
+
+inline constexpr std::size_t kMaxTools = 16;
+
+/// A solid volume as the loop sees it; constant during a run.
+template <class N>
+struct VolumePlan {
+  std::size_t scene_index = 0;  ///< place in the scene and in the segment
+  VoxelGrid grid;
+  Density iso = 0;
+  WorldVec<typename N::Real> position_mm;  ///< world place of voxel (0, 0, 0)
+  Transform<typename N::Ratio, VoxelSpace, WorldSpace> voxel_from_world;  ///< voxels per mm
+  /// Takes a unit normal of the world to mm per voxel along each voxel axis, over the largest
+  /// spacing, so that its entries stay within 1.
+  Transform<typename N::Unit, VoxelSpace, WorldSpace> normal_from_world;
+  typename N::Real largest_spacing_mm{};
+};
+
+/// What one tool needs in one volume.
+template <class N>
+struct ToolInVolume {
+  /// Voxels per pitch along the world's axes; times the tool's rotation it is the sample step.
+  Transform<typename N::Ratio, VoxelSpace, WorldSpace> voxel_from_pitch;
+  std::array<std::array<typename N::Step, 3>, 3> unrotated_step{};  ///< for round tools
+  typename N::Step overlap_ratio{};                                 ///< a^3 / V_voxel
+  SumToForce<N> contact;       ///< F_c = -p0 a^3 grad: haptics-science 1.1, times workspace scale
+  SumToForce<N> modification;  ///< F_m = -p1 V_voxel SUM r grad, times workspace scale
+};
+
+template <class N>
+struct ToolPlan {
+  std::span<const ToolOffset> offsets;
+  bool round = false;
+  std::array<ToolInVolume<N>, kMaxVolumes> in_volume{};  ///< by index of the plan's volumes
+};
+
+/// Everything constant of the servo step: the compiled scene. Owns nothing.
+template <class N>
+struct ServoPlan {
+  std::size_t volume_count = 0;
+  std::array<VolumePlan<N>, kMaxVolumes> volumes{};
+  std::size_t tool_count = 0;
+  std::array<ToolPlan<N>, kMaxTools> tools{};
+
+  GradientKernel kernel = GradientKernel::farid;
+  bool cutting = false;
+  RemovalRate<N> removal_rate;
+
+  OmniJoints<N> dock;                  ///< joint angles in the inkwell
+  typename N::Real workspace_scale{};  ///< x_scene = scale * x_device + offset
+  WorldVec<typename N::Real> offset_mm;
+  bool motors_configured = false;
+  std::array<typename N::Real, 3> counts_per_n_mm{};  ///< DAC counts per motor torque, signed
+
+  ForceLimits<N> limits;
+  SafetyTiming timing;
+  typename N::Real speed_limit_mm_per_tick{};
+  std::int32_t rate_hz = 1000;
+};
+
+}  // namespace kerf

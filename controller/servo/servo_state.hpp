@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "controller/kernel/gradient.hpp"
+#include "controller/kernel/milling.hpp"
+#include "controller/servo/force_limits.hpp"
+#include "controller/servo/hash_chain.hpp"
+#include "controller/servo/kinematics/omni.hpp"
+#include "controller/servo/servo_output.hpp"
+#include "controller/servo/supervisor.hpp"
+
+namespace kerf {
+
+/// The part of a volume that changes; memory belongs to the compiled scene.
+template <class N>
+struct VolumeState {
+  std::span<Density> density;
+  std::span<Gradient<N>> gradient;
+  std::span<RemovalCarry<N>> carry;  ///< fractions of density steps still owed
+};
+
+/// Joint counters since the last docking.
+struct EncoderState {
+  std::array<std::int16_t, 3> last{};
+  std::array<std::int32_t, 3> unwrapped{};  ///< counts since the inkwell, beyond 16 bits
+};
+
+/// Sliding sum over the last 20 gimbal readings: the pots' low bits are noise.
+struct GimbalFilter {
+  static constexpr std::size_t kSamples = 20;
+  std::array<std::array<std::uint16_t, 6>, kSamples> ring{};
+  std::array<std::uint32_t, 6> sum{};
+  std::size_t next = 0;
+};
+
+/// Everything that one tick hands to the next. A run is a function of plan, first state, reports
+/// and commands; nothing else is remembered anywhere.
+template <class N>
+struct ServoState {
+  using Real = typename N::Real;
+  static constexpr std::size_t kVelocityWindow = 8;
+
+  std::array<VolumeState<N>, kMaxVolumes> volumes{};
+  OverlapBox<N> overlap;  ///< scratch of one tick, as is the next
+  GradientScratch* gradient_scratch = nullptr;
+
+  Supervisor supervisor;
+  EncoderState encoders;
+  GimbalFilter gimbal;
+  std::uint32_t active_tool = 0;
+  bool hold = false;  ///< asked by command: force 0, nothing is cut
+
+  OmniPose<N> arm;         ///< of the last good report
+  DeviceVec<Real> tip_mm;  ///< device port
+  Rotation<N> rotation = identity_rotation<N>();
+  bool tip_known = false;  ///< false before the first report after docking
+  std::array<DeviceVec<Real>, kVelocityWindow> tip_history{};
+  std::size_t tip_history_next = 0;
+
+  DeviceVec<Real> contact_n;     ///< felt in the last tick, before limits
+  DeviceVec<Real> force_n;       ///< sent in the last tick
+  DeviceVec<Real> held_force_n;  ///< sent with the last good report: faded when reports stop
+  ThermalState<N> thermal;
+  typename N::Energy absorbed_mj{};
+  std::uint64_t output_hash = kHashSeed;
+};
+
+}  // namespace kerf

@@ -1,0 +1,273 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "controller/servo/servo_step.hpp"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+
+#include "controller/kernel/penetration.hpp"
+#include "controller/servo/device_pose.hpp"
+#include "controller/servo/hash_chain.hpp"
+#include "controller/servo/tool_forces.hpp"
+#include "shared/wire/omni_constants.hpp"
+
+namespace kerf {
+namespace {
+
+template <class S>
+constexpr double as_double(S value) noexcept {
+  return static_cast<double>(value);
+}
+
+template <class S, class Space>
+constexpr std::array<double, 3> as_doubles(Vec<S, Space> v) noexcept {
+  return {as_double(v.x), as_double(v.y), as_double(v.z)};
+}
+
+template <class N>
+constexpr double energy_mj(typename N::Energy energy) noexcept {
+  if constexpr (N::kIsFixed) {
+    return static_cast<double>(energy) / 4294967296.0;  // 32 fraction bits
+  } else {
+    return static_cast<double>(energy);
+  }
+}
+
+/// Adds -F . dx to a ledger: work that the hand put in. Exact in fixed: Q16 * Q16.
+template <class N>
+void absorb(typename N::Energy& ledger, DeviceVec<typename N::Real> force_n,
+            DeviceVec<typename N::Real> moved_mm) noexcept {
+  if constexpr (N::kIsFixed) {
+    const auto term = [](Q16 f, Q16 d) { return -(std::int64_t{f.raw()} * d.raw()); };
+    ledger = saturating_add(ledger, term(force_n.x, moved_mm.x));
+    ledger = saturating_add(ledger, term(force_n.y, moved_mm.y));
+    ledger = saturating_add(ledger, term(force_n.z, moved_mm.z));
+  } else {
+    ledger -= dot(force_n, moved_mm);
+  }
+}
+
+template <class N>
+bool pose_is_finite(const DevicePose<N>& pose) noexcept {
+  return is_finite(pose.tip_mm.x) && is_finite(pose.tip_mm.y) && is_finite(pose.tip_mm.z);
+}
+
+/// Takes the new tip over, keeps the energy ledger and the velocity window. Returns true when the
+/// tip moved faster than the limit since the last report, `gap` ticks ago.
+template <class N>
+bool move_tip(const ServoPlan<N>& plan, ServoState<N>& state, const DevicePose<N>& pose,
+              std::uint32_t gap) noexcept {
+  using Real = typename N::Real;
+  if (!state.tip_known) {
+    state.tip_mm = pose.tip_mm;
+    state.tip_history.fill(pose.tip_mm);
+  }
+  const auto moved_mm = pose.tip_mm - state.tip_mm;
+  const auto ticks = Real(static_cast<double>(std::clamp<std::uint32_t>(gap, 1, 1000)));
+  const bool overspeed = norm(moved_mm) > plan.speed_limit_mm_per_tick * ticks;
+  absorb<N>(state.absorbed_mj, state.force_n, moved_mm);
+  state.tip_mm = pose.tip_mm;
+  state.rotation = pose.rotation;
+  state.tip_known = true;
+  return overspeed;
+}
+
+/// Mean velocity at the device port over the window, mm/s.
+template <class N>
+std::array<double, 3> advance_velocity(const ServoPlan<N>& plan, ServoState<N>& state) noexcept {
+  auto& oldest = state.tip_history[state.tip_history_next];
+  const auto moved_mm = as_doubles(state.tip_mm - oldest);
+  oldest = state.tip_mm;
+  state.tip_history_next = (state.tip_history_next + 1) % ServoState<N>::kVelocityWindow;
+  const double per_s = double(plan.rate_hz) / double(ServoState<N>::kVelocityWindow);
+  return {moved_mm[0] * per_s, moved_mm[1] * per_s, moved_mm[2] * per_s};
+}
+
+/// Motor counts of a torque, all three scaled down together where one would leave the converter's
+/// range, so that the direction of the force stays.
+template <class N>
+std::array<std::int16_t, 3> motor_counts(const ServoPlan<N>& plan,
+                                         JointVec<typename N::Real> torque_n_mm) noexcept {
+  using Real = typename N::Real;
+  std::array<Real, 3> counts{torque_n_mm.x * plan.counts_per_n_mm[0],
+                             torque_n_mm.y * plan.counts_per_n_mm[1],
+                             torque_n_mm.z * plan.counts_per_n_mm[2]};
+  constexpr auto kEnd = static_cast<double>(-omni::kMotorCountMin);
+  Real largest(kEnd);
+  for (const Real c : counts) largest = std::max(largest, c < Real(0) ? -c : c);
+  const Real share = Real(kEnd) / largest;
+  std::array<std::int16_t, 3> rounded{};
+  for (std::size_t i = 0; i < 3; ++i) {
+    if constexpr (N::kIsFixed) {
+      rounded[i] =
+          static_cast<std::int16_t>(round_shift((counts[i] * share).raw(), Real::kFractionBits));
+    } else {
+      // Half up, as in fixed: the offset keeps the argument of the cast positive.
+      constexpr Real kOffset = 4096;
+      rounded[i] = static_cast<std::int16_t>(
+          static_cast<std::int32_t>(counts[i] * share + kOffset + Real(0.5)) - 4096);
+    }
+  }
+  return rounded;
+}
+
+template <class N>
+std::uint64_t hash_of(std::uint64_t hash, const ServoOutput& out,
+                      DeviceVec<typename N::Real> force_n) noexcept {
+  const auto word = [](auto value) {
+    if constexpr (N::kIsFixed) {
+      return static_cast<std::uint64_t>(static_cast<std::uint32_t>(value.raw()));
+    } else {
+      return std::bit_cast<std::uint64_t>(static_cast<double>(value));
+    }
+  };
+  for (const std::int16_t m : out.motor_counts) {
+    hash = hash_word(hash, static_cast<std::uint16_t>(m));
+  }
+  hash = hash_word(hash, word(force_n.x));
+  hash = hash_word(hash, word(force_n.y));
+  hash = hash_word(hash, word(force_n.z));
+  hash = hash_word(hash, out.removed_steps);
+  return hash_word(hash, static_cast<std::uint64_t>(out.phase) << 1 | (out.motors_on ? 1U : 0U));
+}
+
+}  // namespace
+
+template <class N>
+ServoOutput servo_step(const ServoPlan<N>& plan, ServoState<N>& state,
+                       const DeviceReport& report) noexcept {
+  using Real = typename N::Real;
+  ServoOutput out;
+  Supervisor& supervisor = state.supervisor;
+
+  // Where the device is, and whether that can be trusted.
+  if (report.fresh) {
+    follow_encoders(report, state.encoders);
+    follow_gimbal(report, state.gimbal);
+  }
+  const DevicePose<N> pose = device_pose(plan, state.encoders, state.gimbal);
+  SafetyInputs seen{.fresh = report.fresh,
+                    .docked = report.docked,
+                    .finite = pose_is_finite(pose),
+                    .overspeed = false};
+  const bool usable = seen.fresh && seen.finite;
+  if (usable) {
+    state.arm = pose.arm;
+    seen.overspeed = move_tip(plan, state, pose, supervisor.stale_ticks + 1) && !report.docked;
+  }
+  const auto velocity_mm_per_s = advance_velocity(plan, state);
+  supervise(plan.timing, seen, supervisor);
+
+  // What the tool feels and cuts there. Without a usable pose the last force is held and faded.
+  const WorldVec<Real> tip_mm =
+      relabel<WorldSpace>(state.tip_mm * plan.workspace_scale) + plan.offset_mm;
+  DeviceVec<Real> wanted_n;
+  state.contact_n = {};
+  if (supervisor.motors_on() && usable && !state.hold) {
+    const ToolForces<N> forces = feel_and_cut(plan, state, tip_mm, state.rotation, true);
+    state.contact_n = forces.contact_n;
+    wanted_n = forces.contact_n + forces.modification_n;
+    if (supervisor.phase == Phase::ramping) {
+      wanted_n = wanted_n *
+                 (Real(double(supervisor.fade_ticks)) / Real(double(plan.timing.fade_in_ticks)));
+    }
+    out.contact_n = as_doubles(forces.contact_n);
+    out.modification_n = as_doubles(forces.modification_n);
+    for (std::size_t v = 0; v < kMaxVolumes; ++v) {
+      out.removed_by_volume[v] = forces.removed[v].density_steps;
+      out.removed_steps += forces.removed[v].density_steps;
+      out.changed[v] = forces.removed[v].changed;
+    }
+  } else if (supervisor.motors_on() && !usable) {
+    wanted_n =
+        state.held_force_n * (Real(double(stale_share(plan.timing, supervisor.stale_ticks))) /
+                              Real(double(plan.timing.zero_ticks - plan.timing.hold_ticks)));
+  }
+
+  // What the hand gets. Switching off is exempt from the slew limit.
+  if (supervisor.motors_on() && plan.motors_configured) {
+    const DeviceVec<Real> sent_n =
+        limited_force(plan.limits, state.thermal, wanted_n, state.force_n);
+    out.saturated = !(sent_n == wanted_n);
+    state.force_n = sent_n;
+  } else {
+    heat_up(plan.limits, state.thermal, {});
+    state.force_n = {};
+  }
+  if (usable) state.held_force_n = state.force_n;
+  const JointVec<Real> torque_n_mm = omni_torque<N>(state.arm, state.force_n);
+  out.motors_on = supervisor.motors_on() && plan.motors_configured;
+  if (out.motors_on) out.motor_counts = motor_counts(plan, torque_n_mm);
+
+  out.phase = supervisor.phase;
+  out.fault = supervisor.fault;
+  out.armed = supervisor.armed;
+  out.stale = !report.fresh;
+  out.contact = norm(state.force_n) > Real(kContactThresholdN);
+  for (std::size_t i = 0; i < 3; ++i) out.joint_counts[i] = state.encoders.unwrapped[i];
+  out.position_mm = as_doubles(tip_mm);
+  for (std::size_t i = 0; i < 9; ++i) out.rotation[i] = as_double(state.rotation.row[i / 3][i % 3]);
+  out.velocity_mm_per_s = velocity_mm_per_s;
+  out.force_n = as_doubles(state.force_n);
+  out.torque_n_mm = {as_double(torque_n_mm.x), as_double(torque_n_mm.y), as_double(torque_n_mm.z)};
+  out.absorbed_mj = energy_mj<N>(state.absorbed_mj);
+  out.active_tool = state.active_tool;
+  state.output_hash = hash_of<N>(state.output_hash, out, state.force_n);
+  out.output_hash = state.output_hash;
+  return out;
+}
+
+template <class N>
+double penetration_mm(const ServoPlan<N>& plan, const ServoState<N>& state) noexcept {
+  using Real = typename N::Real;
+  const Real length = norm(state.contact_n);
+  if (!(length > Real(0))) return 0;
+  using Unit = typename N::Unit;
+  const WorldVec<Unit> normal{Unit(state.contact_n.x / length), Unit(state.contact_n.y / length),
+                              Unit(state.contact_n.z / length)};
+  const WorldVec<Real> tip_mm =
+      relabel<WorldSpace>(state.tip_mm * plan.workspace_scale) + plan.offset_mm;
+  const ToolPlan<N>& tool = plan.tools[state.active_tool];
+  double deepest_mm = 0;
+  for (std::size_t v = 0; v < plan.volume_count; ++v) {
+    const VolumePlan<N>& volume = plan.volumes[v];
+    const ToolPose<N> pose = tool_pose(volume, tool, tool.in_volume[v], tip_mm, state.rotation);
+    const Real extent = penetration_extent<N>(volume.grid, state.volumes[v].density, tool.offsets,
+                                              pose, volume.iso, volume.normal_from_world * normal);
+    deepest_mm = std::max(deepest_mm, as_double(extent * volume.largest_spacing_mm));
+  }
+  return deepest_mm;
+}
+
+template <class N>
+void apply_command(const ServoPlan<N>& plan, ServoState<N>& state,
+                   const ServoCommand& command) noexcept {
+  switch (command.kind) {
+    case ServoCommand::Kind::none:
+      return;
+    case ServoCommand::Kind::select_tool:
+      if (command.argument < plan.tool_count) state.active_tool = command.argument;
+      return;
+    case ServoCommand::Kind::fade_in:
+      restart_fade(state.supervisor);
+      return;
+    case ServoCommand::Kind::hold:
+      state.hold = command.argument != 0;
+      return;
+  }
+}
+
+// The three bundles, compiled once.
+#define KERF_INSTANTIATE(N)                                                              \
+  template ServoOutput servo_step<N>(const ServoPlan<N>&, ServoState<N>&,                \
+                                     const DeviceReport&) noexcept;                      \
+  template double penetration_mm<N>(const ServoPlan<N>&, const ServoState<N>&) noexcept; \
+  template void apply_command<N>(const ServoPlan<N>&, ServoState<N>&, const ServoCommand&) noexcept;
+KERF_INSTANTIATE(FixedNumbers)
+KERF_INSTANTIATE(FloatNumbers)
+KERF_INSTANTIATE(DoubleNumbers)
+#undef KERF_INSTANTIATE
+
+}  // namespace kerf

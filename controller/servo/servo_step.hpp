@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "controller/servo/device_report.hpp"
+#include "controller/servo/servo_output.hpp"
+#include "controller/servo/servo_plan.hpp"
+#include "controller/servo/servo_state.hpp"
+
+namespace kerf {
+
+/// All physics of one tick, a pure function of its arguments: no clock, device, allocation, lock,
+/// system call or exception, and no loop without a bound known at load.
+///
+/// sanitise report -> kinematics -> safety -> contact force from the volumes as they are -> cut
+/// because of that force -> limits -> joint torques. A report that is missing, or a pose that is
+/// not finite, holds the last force and then fades it; nothing is felt or cut meanwhile.
+template <class N>
+[[nodiscard]] ServoOutput servo_step(const ServoPlan<N>& plan, ServoState<N>& state,
+                                     const DeviceReport& report) noexcept;
+
+/// How far the active tool reaches into the solid along the contact force of the last tick, in mm;
+/// 0 without contact. For the eyes only, so the shell asks for it after the hand has its force.
+template <class N>
+[[nodiscard]] double penetration_mm(const ServoPlan<N>& plan, const ServoState<N>& state) noexcept;
+
+/// Applies a command between two ticks; an index out of range changes nothing.
+template <class N>
+void apply_command(const ServoPlan<N>& plan, ServoState<N>& state,
+                   const ServoCommand& command) noexcept;
+
+}  // namespace kerf

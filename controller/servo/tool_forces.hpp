@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "controller/kernel/contact.hpp"
+#include "controller/kernel/gradient.hpp"
+#include "controller/kernel/milling.hpp"
+#include "controller/kernel/overlap.hpp"
+#include "controller/kernel/tool_pose.hpp"
+#include "controller/servo/servo_plan.hpp"
+#include "controller/servo/servo_state.hpp"
+
+namespace kerf {
+
+/// The two forces of the paper at the device port, before any limit, and what was cut because of
+/// this tick's pose.
+template <class N>
+struct ToolForces {
+  DeviceVec<typename N::Real> contact_n;
+  DeviceVec<typename N::Real> modification_n;
+  std::array<Removed, kMaxVolumes> removed{};  ///< by volume of the scene
+};
+
+/// Samples of the active tool in one volume. A round tool has the same samples in every
+/// orientation, so it stays unrotated.
+template <class N>
+[[nodiscard]] ToolPose<N> tool_pose(const VolumePlan<N>& volume, const ToolPlan<N>& tool,
+                                    const ToolInVolume<N>& in_volume,
+                                    WorldVec<typename N::Real> tip_mm,
+                                    const Rotation<N>& rotation) noexcept {
+  ToolPose<N> pose;
+  pose.centre_vox = volume.voxel_from_world * (tip_mm - volume.position_mm);
+  pose.step = in_volume.unrotated_step;
+  if (tool.round) return pose;
+  for (std::size_t i = 0; i < 3; ++i) {
+    for (std::size_t j = 0; j < 3; ++j) {
+      const auto& a = in_volume.voxel_from_pitch.row[i];
+      if constexpr (N::kIsFixed) {
+        std::int64_t sum = 0;  // Q24 * Q30 = Q54, three terms below 2^61.6
+        for (std::size_t k = 0; k < 3; ++k) {
+          sum += std::int64_t{a[k].raw()} * rotation.row[k][j].raw();
+        }
+        pose.step[i][j] = saturate_i32(round_shift(sum, 54 - 20));
+      } else {
+        pose.step[i][j] =
+            a[0] * rotation.row[0][j] + a[1] * rotation.row[1][j] + a[2] * rotation.row[2][j];
+      }
+    }
+  }
+  return pose;
+}
+
+/// Contact force of the active tool in all solid volumes as they are; then, where the plan cuts and
+/// `may_cut`, the modification force from the same densities, and only then the removal.
+template <class N>
+[[nodiscard]] ToolForces<N> feel_and_cut(const ServoPlan<N>& plan, ServoState<N>& state,
+                                         WorldVec<typename N::Real> tip_mm,
+                                         const Rotation<N>& rotation, bool may_cut) noexcept {
+  const ToolPlan<N>& tool = plan.tools[state.active_tool];
+  ToolForces<N> forces;
+  for (std::size_t v = 0; v < plan.volume_count; ++v) {
+    const VolumePlan<N>& volume = plan.volumes[v];
+    VolumeState<N>& memory = state.volumes[v];
+    const ToolInVolume<N>& in_volume = tool.in_volume[v];
+    const ToolPose<N> pose = tool_pose(volume, tool, in_volume, tip_mm, rotation);
+
+    const std::span<const Gradient<N>> gradient = memory.gradient;
+    forces.contact_n = forces.contact_n -
+                       force_of_sum<N>(in_volume.contact,
+                                       contact_sum<N>(volume.grid, gradient, tool.offsets, pose));
+    if (!plan.cutting || !may_cut) continue;
+
+    const VoxelBox touched =
+        overlap<N>(volume.grid, tool.offsets, pose, in_volume.overlap_ratio, state.overlap);
+    if (touched.empty()) continue;
+    forces.modification_n =
+        forces.modification_n -
+        force_of_sum<N>(in_volume.modification,
+                        modification_sum<N>(volume.grid, gradient, memory.density, state.overlap));
+    const Removed removed =
+        remove<N>(volume.grid, memory.density, state.overlap, plan.removal_rate, memory.carry);
+    refresh_gradients<N>(plan.kernel, volume.grid, memory.density, removed.changed, memory.gradient,
+                         *state.gradient_scratch);
+    forces.removed[volume.scene_index] = removed;
+  }
+  return forces;
+}
+
+}  // namespace kerf

@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "controller/shell/controller_options.hpp"
+
+#include <array>
+#include <iostream>
+#include <map>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+
+namespace kerf {
+namespace {
+
+constexpr const char* kAbout =
+    "The servo of kerf: reads the device, feels and mills the scene, commands the force.\n";
+constexpr const char* kExitCodes =
+    "\nExit codes: 0 fine, 1 ran and met a fault, 2 bad input or set-up.\n"
+    "Try it without hardware: ./kerf demo";
+
+/// One, or three numbers: one stands for all three.
+std::array<double, 3> three_of(const std::vector<double>& values) {
+  if (values.size() == 1) return {values[0], values[0], values[0]};
+  return {values[0], values[1], values[2]};
+}
+
+}  // namespace
+
+std::optional<int> parse_options(int argc, const char* const* argv, ControllerOptions& options) {
+  CLI::App app{kAbout, "kerf-controller"};
+  app.footer(kExitCodes);
+  app.set_version_flag("--version", std::string("kerf-controller ") + KERF_VERSION);
+  app.get_formatter()->column_width(34);
+
+  std::string volume;
+  std::vector<double> spacing_mm;
+  std::vector<double> window;
+  int rate_hz = 0;
+  std::string numeric;
+  const std::map<std::string, NumericKind> numerics{{"fixed", NumericKind::fixed},
+                                                    {"float", NumericKind::float32},
+                                                    {"double", NumericKind::float64}};
+
+  app.add_option("--scene", options.scene, "scene file (TOML)")->required()->type_name("FILE");
+  auto* volume_option =
+      app.add_option("--volume", volume,
+                     "replace the first volume: NRRD, MetaImage, NIfTI, DICOM folder")
+          ->type_name("FILE");
+  auto* spacing_option = app.add_option("--spacing", spacing_mm,
+                                        "voxel size of that volume in mm: one number or three")
+                             ->delimiter(',')
+                             ->expected(1, 3)
+                             ->check(CLI::PositiveNumber)
+                             ->type_name("A[,B,C]");
+  auto* window_option =
+      app.add_option("--window", window, "source values shown as air and as densest")
+          ->delimiter(',')
+          ->expected(2)
+          ->type_name("LO,HI");
+  app.add_option("--device", options.device, "device personality")
+      ->check(CLI::IsMember({"omni"}))
+      ->capture_default_str();
+  app.add_option("--port", options.port, "where the device is: socket:PATH of kerf-emulator")
+      ->type_name("PORT");
+  app.add_option("--seconds", options.seconds,
+                 "end after this much servo time, counted from arming")
+      ->check(CLI::PositiveNumber)
+      ->type_name("S");
+  auto* rate_option = app.add_option("--rate", rate_hz, "servo rate, instead of the scene's")
+                          ->check(CLI::Range(250, 8000))
+                          ->type_name("HZ");
+  auto* numeric_option =
+      app.add_option("--numeric", numeric, "numbers of the loop, instead of the scene's")
+          ->check(CLI::IsMember({"fixed", "float", "double"}));
+  app.add_option("--name", options.name, "name under which readers find the segment")
+      ->capture_default_str();
+  app.add_flag("--virtual", options.virtual_time,
+               "lock-step with the device, no clock: the same input gives the same bits");
+  app.add_flag("--strict", options.real_time.strict,
+               "refuse to start without every real-time right");
+  app.add_option("--cpu", options.real_time.cpu, "core of the servo thread (default: the last)")
+      ->check(CLI::NonNegativeNumber)
+      ->type_name("N");
+  app.add_option("--priority", options.real_time.priority, "SCHED_FIFO priority")
+      ->check(CLI::Range(1, 99))
+      ->capture_default_str();
+  app.add_option("--spin-us", options.real_time.spin_us,
+                 "spin this long before each deadline instead of sleeping to it")
+      ->check(CLI::Range(0, 900))
+      ->capture_default_str();
+  app.add_flag("--check", options.check, "load and check the scene, print what it means, and end");
+  app.add_flag("--progress", options.progress, "show a progress bar on a terminal");
+  app.add_option("--report", options.report, "write the figures of the run as JSON")
+      ->type_name("FILE");
+  app.add_option("--final", options.final_volume, "write the volume as it is at the end (.nrrd)")
+      ->type_name("FILE");
+  app.add_option("--emulator-args", options.emulator_args,
+                 "write hand_unit_mm, hand_script and rate_hz once the scene is loaded")
+      ->type_name("FILE");
+
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::Success& success) {  // --help, --version
+    return app.exit(success);
+  } catch (const CLI::ParseError& error) {
+    std::cerr << "kerf-controller: " << error.what() << "; see kerf-controller --help\n";
+    return 2;
+  }
+  const auto refuse = [](const std::string& line) {
+    std::cerr << "kerf-controller: " << line << '\n';
+    return 2;
+  };
+  if (*spacing_option && spacing_mm.size() == 2) {
+    return refuse("--spacing has 2 numbers; give one for all axes, or three");
+  }
+  if (!options.check && !options.port.starts_with("socket:")) {
+    return refuse("--port '" + options.port +
+                  "' is not known; use socket:PATH, where kerf-emulator listens");
+  }
+  if (*volume_option) options.overrides.volume_file = volume;
+  if (*spacing_option) options.overrides.spacing_mm = three_of(spacing_mm);
+  if (*window_option) options.overrides.window = std::array{window[0], window[1]};
+  if (*rate_option) options.overrides.rate_hz = rate_hz;
+  if (*numeric_option) options.overrides.numeric = numerics.at(numeric);
+  return std::nullopt;
+}
+
+}  // namespace kerf

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "controller/scene/scene_load.hpp"
+#include "controller/shell/real_time.hpp"
+
+namespace kerf {
+
+/// The command line of kerf-controller.
+struct ControllerOptions {
+  std::string scene;
+  SceneOverrides overrides;
+  std::string device = "omni";
+  std::string port;               ///< socket:PATH
+  std::optional<double> seconds;  ///< servo time after arming; none: until stopped
+  std::string name = "kerf";
+  bool virtual_time = false;
+  bool check = false;
+  bool progress = false;
+  RealTimeOptions real_time;
+  std::string report;         ///< JSON, empty: none
+  std::string final_volume;   ///< .nrrd of the first volume at the end, empty: none
+  std::string emulator_args;  ///< file for the demo script, empty: none
+};
+
+/// Parses; prints help or version, or one line for an error, and then returns the exit code.
+[[nodiscard]] std::optional<int> parse_options(int argc, const char* const* argv,
+                                               ControllerOptions& options);
+
+}  // namespace kerf

@@ -1,0 +1,267 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "controller/shell/controller_run.hpp"
+
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include <spdlog/sinks/stdout_color_sinks.h>
+#include <spdlog/spdlog.h>
+
+#include "controller/device/omni_driver.hpp"
+#include "controller/device/socket_port.hpp"
+#include "controller/scene/compile.hpp"
+#include "controller/scene/scene_json.hpp"
+#include "controller/scene/scene_load.hpp"
+#include "controller/scene/volume_write.hpp"
+#include "controller/shell/motor_guard.hpp"
+#include "controller/shell/progress_bar.hpp"
+#include "controller/shell/publisher.hpp"
+#include "controller/shell/run_report.hpp"
+#include "controller/shell/servo_loop.hpp"
+#include "controller/shell/watchdog.hpp"
+#include "shared/segment/hash.hpp"
+
+namespace kerf {
+namespace {
+
+constexpr int kPortPatienceMs = 5000;
+constexpr double kArmingPatienceS = 60;
+constexpr std::chrono::milliseconds kWatchPeriod{5};
+
+const char* name_of(NumericKind kind) {
+  switch (kind) {
+    case NumericKind::fixed:
+      return "fixed";
+    case NumericKind::float32:
+      return "float";
+    case NumericKind::float64:
+      break;
+  }
+  return "double";
+}
+
+const char* text_of(EndReason end) {
+  switch (end) {
+    case EndReason::ticks_done:
+      return "finished";
+    case EndReason::stopped:
+      return "stopped";
+    case EndReason::device_gone:
+      return "the device went away";
+    case EndReason::never_armed:
+      break;
+  }
+  return "the stylus was never docked";
+}
+
+/// What the demo script hands to the emulator.
+std::string hand_lines(const Scene& scene) {
+  char unit[64];
+  std::snprintf(unit, sizeof unit, "%.9g", hand_unit_mm(scene));
+  return "hand_unit_mm=" + std::string(unit) + "\nhand_script=" + scene.hand_script +
+         "\nrate_hz=" + std::to_string(scene.servo.rate_hz) + "\n";
+}
+
+SegmentWriter publish_scene(const Scene& scene, const std::string& json, std::uint64_t hash) {
+  SegmentSpec spec;
+  spec.scene_json = json;
+  spec.config_hash = hash;
+  spec.tick_ns = static_cast<std::uint32_t>(1'000'000'000 / scene.servo.rate_hz);
+  spec.build_id = std::string("kerf-controller ") + KERF_VERSION;
+  spec.mirror_updates = scene.cut.model != CutModel::none;
+  for (const SceneVolume& volume : scene.volumes) {
+    SegmentVolumeSpec& v = spec.volumes.emplace_back();
+    v.grid = volume.image.grid;
+    v.spacing_mm = volume.image.spacing_mm;
+    v.origin_mm = volume.pose.position_mm;
+    for (std::size_t i = 0; i < 4; ++i) {
+      v.orientation[i] = static_cast<float>(volume.pose.orientation[i]);
+    }
+    v.iso = volume.iso;
+    v.density = volume.image.density;
+    v.labels = volume.image.labels;
+  }
+  return SegmentWriter::create(spec);
+}
+
+/// Warns of each missing right, or refuses under --strict.
+void accept_rights(const std::vector<MissingRight>& missing, bool strict) {
+  for (const MissingRight& right : missing) {
+    if (strict) {
+      throw std::runtime_error("--strict: no " + right.what + "; without it " + right.effect);
+    }
+    spdlog::warn("no {}: {}", right.what, right.effect);
+  }
+}
+
+double removed_mm3(const Scene& scene, const RunRecord& record) {
+  double mm3 = 0;
+  for (std::size_t v = 0; v < scene.volumes.size(); ++v) {
+    const auto& h = scene.volumes[v].image.spacing_mm;
+    mm3 += static_cast<double>(record.removed_steps[v]) / kDensityMax * h[0] * h[1] * h[2];
+  }
+  return mm3;
+}
+
+std::uint64_t hash_of_volumes(const Scene& scene, const Servo& servo) {
+  std::uint64_t hash = kHashSeed;
+  for (std::size_t v = 0; v < scene.volumes.size(); ++v) {
+    hash = hash_word(hash, density_hash(servo.density(v)));
+  }
+  return hash;
+}
+
+/// The volumes as they are now: the first as `path`, others beside it under their names.
+void write_final(const Scene& scene, const Servo& servo, const std::filesystem::path& path) {
+  for (std::size_t v = 0; v < scene.volumes.size(); ++v) {
+    if (v > 0 && !scene.volumes[v].solid) continue;
+    VolumeImage image = scene.volumes[v].image;
+    const auto density = servo.density(v);
+    image.density.assign(density.begin(), density.end());
+    auto target = path;
+    if (v > 0) {
+      target.replace_filename(path.stem().string() + "-" + scene.volumes[v].name +
+                              path.extension().string());
+    }
+    write_volume(image, target);
+  }
+}
+
+/// Main thread while the servo runs: watchdog and progress.
+std::uint64_t watch(const OmniDriver& device, LoopSignals& signals, const std::atomic<bool>& ended,
+                    const ControllerOptions& options, int rate_hz) {
+  Watchdog watchdog(device, signals);
+  const ProgressBar bar(options.progress);
+  for (int round = 0; !ended.load(); ++round) {
+    if (!options.virtual_time) watchdog.look(monotonic_ns());
+    if (round % 20 == 0) {
+      const double done_s = static_cast<double>(signals.armed_ticks.load()) / rate_hz;
+      char text[64];
+      std::snprintf(text, sizeof text, "%.1f s", done_s);
+      bar.show(options.seconds ? done_s / *options.seconds : 0,
+               done_s > 0 ? text : "waiting for the stylus in the inkwell");
+    }
+    std::this_thread::sleep_for(kWatchPeriod);
+  }
+  return watchdog.trips();
+}
+
+int check_scene(const Scene& scene) {
+  std::printf("scene=%s\n", scene.path.c_str());
+  for (const SceneVolume& v : scene.volumes) {
+    const auto& g = v.image.grid;
+    const auto& h = v.image.spacing_mm;
+    std::printf("volume=%s %dx%dx%d spacing_mm=%g,%g,%g iso=%.4f solid=%d\n", v.name.c_str(), g.nx,
+                g.ny, g.nz, h[0], h[1], h[2], v.iso / kDensityMax, v.solid ? 1 : 0);
+  }
+  for (const SceneTool& t : scene.tools) {
+    std::printf("tool=%s %s samples=%zu pitch_mm=%g radius_mm=%g\n", t.name.c_str(),
+                t.shape.c_str(), t.offsets.size(), t.pitch_mm, t.radius_mm);
+  }
+  const auto& o = scene.device.offset_mm;
+  std::printf("workspace_scale=%g\noffset_mm=%g,%g,%g\n", scene.device.workspace_scale, o[0], o[1],
+              o[2]);
+  std::printf("p0_n_per_mm2=%g\nstiffness_at_device_n_per_mm=%g\n", scene.force.p0_n_per_mm2,
+              device_stiffness_n_per_mm(scene));
+  std::fputs(hand_lines(scene).c_str(), stdout);
+  return 0;
+}
+
+}  // namespace
+
+int run_controller(const ControllerOptions& options) {
+  const std::int64_t began_ns = monotonic_ns();
+  spdlog::set_default_logger(spdlog::stderr_color_mt("kerf-controller"));
+  spdlog::set_pattern("kerf-controller: %^%l%$: %v");
+
+  Scene scene = load_scene(options.scene, options.overrides);
+  if (options.check) return check_scene(scene);
+  if (!options.emulator_args.empty()) write_whole(options.emulator_args, hand_lines(scene));
+
+  RunReport report;
+  report.scene = options.scene;
+  report.device = options.device;
+  report.numeric = name_of(scene.servo.numeric);
+  report.rate_hz = scene.servo.rate_hz;
+  report.virtual_time = options.virtual_time;
+  report.config_hash = config_hash(scene);
+#ifdef KERF_SANITIZED
+  report.allocations_counted = false;
+#endif
+
+  SegmentWriter segment = publish_scene(scene, canonical_json(scene), report.config_hash);
+  SegmentServer server(options.name, segment,
+                       {.tools = static_cast<std::uint32_t>(scene.tools.size())});
+  const std::unique_ptr<Servo> servo = compile(scene);
+  if (!scene.device.torque_scale) {
+    spdlog::warn("device.torque_scale is not set: the motors stay off; measure it for your device");
+  }
+  SocketPort port(options.port.substr(std::string("socket:").size()), kPortPatienceMs);
+  OmniDriver device(port);
+  if (!options.virtual_time) {
+    report.missing_rights = lock_memory();
+    accept_rights(report.missing_rights, options.real_time.strict);
+  }
+
+  LoopLimits limits;
+  const double rate_hz = scene.servo.rate_hz;
+  if (options.seconds) {
+    limits.armed_ticks = static_cast<std::uint64_t>(std::llround(*options.seconds * rate_hz));
+  }
+  limits.gone_ticks = static_cast<std::uint64_t>(2 * rate_hz);
+  limits.arming_ticks = static_cast<std::uint64_t>(kArmingPatienceS * rate_hz);
+
+  LoopSignals signals;
+  std::atomic<bool> ended{false};
+  EndReason end = EndReason::stopped;
+  std::string refused;
+  {
+    const MotorGuard guard(device, signals.stop);
+    segment.set_lifecycle(Lifecycle::run);
+    std::thread servo_thread([&] {
+      try {
+        if (!options.virtual_time) {
+          const auto missing = become_real_time(options.real_time);
+          accept_rights(missing, options.real_time.strict);
+          report.missing_rights.insert(report.missing_rights.end(), missing.begin(), missing.end());
+        }
+        Publisher eyes(segment, *servo);
+        RealTimeTicks real_time(1'000'000'000 / scene.servo.rate_hz,
+                                options.real_time.spin_us * 1000);
+        LockStepTicks lock_step(device);
+        TickSource& clock = options.virtual_time ? static_cast<TickSource&>(lock_step) : real_time;
+        report.load_s = static_cast<double>(monotonic_ns() - began_ns) / 1e9;
+        end = run_servo(clock, device, *servo, eyes, server, limits, signals, report.record);
+      } catch (const std::exception& error) {
+        refused = error.what();
+      }
+      ended = true;
+    });
+    report.watchdog_trips = watch(device, signals, ended, options, scene.servo.rate_hz);
+    servo_thread.join();
+  }
+  if (!refused.empty()) throw std::runtime_error(refused);
+
+  const bool clean = end == EndReason::ticks_done || end == EndReason::stopped;
+  segment.set_lifecycle(clean ? Lifecycle::clean_end : Lifecycle::fault);
+  report.end = text_of(end);
+  report.removed_mm3 = removed_mm3(scene, report.record);
+  report.lost_packets = device.lost();
+  report.refused_packets = device.refused();
+  report.volume_hash = hash_of_volumes(scene, *servo);
+  std::fputs(summary(report).c_str(), stdout);
+  if (!options.final_volume.empty()) write_final(scene, *servo, options.final_volume);
+  if (!options.report.empty()) write_whole(options.report, report_json(report));
+  const bool faulty = report.record.event_count > report.watchdog_trips;
+  return clean && !faulty ? 0 : 1;
+}
+
+}  // namespace kerf

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cstdio>
+#include <string>
+
+#include <unistd.h>
+
+namespace kerf {
+
+/// A line that grows on a terminal, and nothing anywhere else.
+class ProgressBar {
+ public:
+  explicit ProgressBar(bool wanted) noexcept : shown_(wanted && isatty(STDERR_FILENO) == 1) {}
+  ~ProgressBar() {
+    if (shown_) std::fputs("\r\033[K", stderr);
+  }
+  ProgressBar(const ProgressBar&) = delete;
+  ProgressBar& operator=(const ProgressBar&) = delete;
+
+  /// `share` 0..1, or negative while waiting; `text` says what for.
+  void show(double share, const std::string& text) const {
+    if (!shown_) return;
+    constexpr int kWidth = 40;
+    const int full = static_cast<int>(std::clamp(share, 0.0, 1.0) * kWidth);
+    std::fprintf(stderr, "\r\033[K[%s%s] %s",
+                 std::string(static_cast<std::size_t>(full), '#').c_str(),
+                 std::string(static_cast<std::size_t>(kWidth - full), '.').c_str(), text.c_str());
+    std::fflush(stderr);
+  }
+
+ private:
+  bool shown_;
+};
+
+}  // namespace kerf

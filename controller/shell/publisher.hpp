@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+
+#include "controller/servo/device_report.hpp"
+#include "controller/servo/hash_chain.hpp"
+#include "controller/servo/servo.hpp"
+#include "controller/servo/servo_output.hpp"
+#include "shared/segment/layout.hpp"
+#include "shared/segment/writer.hpp"
+
+namespace kerf {
+
+/// What the shell knows of a tick and the servo step must not: times and losses.
+struct TickTiming {
+  std::int64_t start_ns = 0;
+  std::int64_t late_ns = 0;
+  std::int64_t compute_ns = 0;
+  std::uint64_t missed_deadlines = 0;
+};
+
+/// Shows each tick to the readers of the segment, after the device has its command.
+///
+/// Servo thread only; wait-free, no system call, no allocation.
+class Publisher {
+ public:
+  Publisher(SegmentWriter& segment, const Servo& servo) noexcept
+      : segment_(segment), servo_(servo) {}
+
+  void publish(Tick tick, const DeviceReport& report, const ServoOutput& output,
+               std::uint32_t last_command, const TickTiming& timing) noexcept;
+
+ private:
+  void publish_volumes(const ServoOutput& output, TickRecord& record) noexcept;
+
+  SegmentWriter& segment_;
+  const Servo& servo_;
+  std::uint64_t volume_hash_ = kHashSeed;  ///< chain over the changed boxes
+};
+
+}  // namespace kerf

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace kerf {
+
+struct RealTimeOptions {
+  int priority = 80;         ///< SCHED_FIFO
+  int cpu = -1;              ///< core of the servo thread; -1: the last one
+  std::int64_t spin_us = 0;  ///< spinning before each deadline
+  bool strict = false;       ///< a missing right refuses instead of warning
+};
+
+/// A right that the system did not give, and what that costs.
+struct MissingRight {
+  std::string what;
+  std::string effect;
+};
+
+/// Locks all memory of the process, present and future, and touches nothing else. Main thread,
+/// before the servo thread starts. Empty when all went well.
+[[nodiscard]] std::vector<MissingRight> lock_memory();
+
+/// Gives the calling thread its priority and its core, and touches its stack so that no page of it
+/// faults later.
+[[nodiscard]] std::vector<MissingRight> become_real_time(const RealTimeOptions& options);
+
+/// Page faults of the calling thread since it began.
+struct ThreadFaults {
+  std::int64_t minor = 0, major = 0;
+};
+[[nodiscard]] ThreadFaults thread_faults() noexcept;
+
+}  // namespace kerf

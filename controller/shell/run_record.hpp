@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+
+#include "controller/servo/servo_output.hpp"
+#include "controller/shell/histogram.hpp"
+#include "controller/shell/real_time.hpp"
+
+namespace kerf {
+
+/// A fault as it latched, or an event of the shell.
+struct FaultEvent {
+  std::uint64_t tick = 0;
+  const char* name = "";
+};
+
+/// Statistics of a run. Fixed memory: the servo thread writes it, others read it after the end.
+struct RunRecord {
+  std::uint64_t ticks = 0;  ///< servo steps after arming; the counters below count these
+  std::uint64_t overruns = 0;
+  std::uint64_t stale_ticks = 0;
+  std::uint64_t contact_ticks = 0;
+  Histogram wake, compute, publish;
+  double peak_force_n = 0;
+  std::array<std::uint64_t, kMaxVolumes> removed_steps{};  ///< by volume
+  double absorbed_mj = 0;
+  std::uint64_t output_hash = 0;
+  std::uint64_t allocations = 0;
+  ThreadFaults faults_of_pages;
+
+  static constexpr std::size_t kMaxEvents = 64;
+  std::array<FaultEvent, kMaxEvents> events{};
+  std::size_t event_count = 0;  ///< may exceed kMaxEvents: the first ones are kept
+
+  void add_event(std::uint64_t tick, const char* name) noexcept {
+    if (event_count < kMaxEvents) events[event_count] = {tick, name};
+    ++event_count;
+  }
+};
+
+}  // namespace kerf

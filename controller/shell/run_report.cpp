@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "controller/shell/run_report.hpp"
+
+#include <algorithm>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <stdexcept>
+
+#include <nlohmann/json.hpp>
+#include <unistd.h>
+
+namespace kerf {
+namespace {
+
+std::string hex(std::uint64_t value) {
+  char text[17];
+  std::snprintf(text, sizeof text, "%016llx", static_cast<unsigned long long>(value));
+  return text;
+}
+
+nlohmann::ordered_json percentiles(const Histogram& histogram) {
+  return {{"p50", histogram.percentile_us(0.5)},
+          {"p99", histogram.percentile_us(0.99)},
+          {"p999", histogram.percentile_us(0.999)},
+          {"max", histogram.max_us()}};
+}
+
+std::string line(const char* name, const Histogram& histogram) {
+  char text[128];
+  std::snprintf(text, sizeof text, "  %-10s %9.1f %9.1f %9.1f %9.1f\n", name,
+                histogram.percentile_us(0.5), histogram.percentile_us(0.99),
+                histogram.percentile_us(0.999), histogram.max_us());
+  return text;
+}
+
+template <class... Values>
+std::string format(const char* pattern, Values... values) {
+  char text[512];
+  std::snprintf(text, sizeof text, pattern, values...);
+  return text;
+}
+
+}  // namespace
+
+std::string report_json(const RunReport& report) {
+  const RunRecord& r = report.record;
+  nlohmann::ordered_json events = nlohmann::ordered_json::array();
+  for (std::size_t i = 0; i < std::min(r.event_count, RunRecord::kMaxEvents); ++i) {
+    events.push_back({{"tick", r.events[i].tick}, {"name", r.events[i].name}});
+  }
+  nlohmann::ordered_json missing = nlohmann::ordered_json::array();
+  for (const MissingRight& right : report.missing_rights) {
+    missing.push_back({{"what", right.what}, {"effect", right.effect}});
+  }
+  const nlohmann::ordered_json json{
+      {"program", "kerf-controller"},
+      {"version", KERF_VERSION},
+      {"scene", report.scene},
+      {"config_hash", hex(report.config_hash)},
+      {"device", report.device},
+      {"numeric", report.numeric},
+      {"rate_hz", report.rate_hz},
+      {"virtual", report.virtual_time},
+      {"end", report.end},
+      {"ticks", r.ticks},
+      {"overruns", r.overruns},
+      {"stale_ticks", r.stale_ticks},
+      {"wake_us", percentiles(r.wake)},
+      {"compute_us", percentiles(r.compute)},
+      {"publish_us", percentiles(r.publish)},
+      {"allocations", r.allocations},
+      {"allocations_counted", report.allocations_counted},
+      {"minor_faults", r.faults_of_pages.minor},
+      {"major_faults", r.faults_of_pages.major},
+      {"contact_ticks", r.contact_ticks},
+      {"peak_force_n", r.peak_force_n},
+      {"removed_mm3", report.removed_mm3},
+      {"energy_j", r.absorbed_mj / 1000.0},
+      {"faults", events},
+      {"fault_count", r.event_count},
+      {"watchdog_trips", report.watchdog_trips},
+      {"lost_packets", report.lost_packets},
+      {"refused_packets", report.refused_packets},
+      {"missing_rights", missing},
+      {"load_s", report.load_s},
+      {"volume_hash", hex(report.volume_hash)},
+      {"output_hash", hex(r.output_hash)},
+  };
+  return json.dump(2) + "\n";
+}
+
+std::string summary(const RunReport& report) {
+  const RunRecord& r = report.record;
+  std::string text;
+  text += format("kerf: %s, %llu ticks at %d Hz (%s, %s numbers)\n\n", report.end.c_str(),
+                 static_cast<unsigned long long>(r.ticks), report.rate_hz,
+                 report.virtual_time ? "virtual time" : "real time", report.numeric.c_str());
+  text += "  us              p50       p99     p99.9       max\n";
+  if (!report.virtual_time) text += line("wake-up", r.wake);
+  text += line("compute", r.compute);
+  text += line("publish", r.publish);
+  text += format("\n  contact    %llu ticks, peak force %.3f N, work of the hand %.3f mJ\n",
+                 static_cast<unsigned long long>(r.contact_ticks), r.peak_force_n, r.absorbed_mj);
+  text += format("  removed    %.3f mm3\n", report.removed_mm3);
+  text += format("  losses     %llu stale ticks, %llu overruns, %llu packets lost\n",
+                 static_cast<unsigned long long>(r.stale_ticks),
+                 static_cast<unsigned long long>(r.overruns),
+                 static_cast<unsigned long long>(report.lost_packets));
+  text += format("  loop       %llu allocations%s, %lld minor and %lld major page faults\n",
+                 static_cast<unsigned long long>(r.allocations),
+                 report.allocations_counted ? "" : " (not counted under sanitizers)",
+                 static_cast<long long>(r.faults_of_pages.minor),
+                 static_cast<long long>(r.faults_of_pages.major));
+  text += format("  hashes     volume %s, output %s\n", hex(report.volume_hash).c_str(),
+                 hex(r.output_hash).c_str());
+  for (std::size_t i = 0; i < std::min(r.event_count, RunRecord::kMaxEvents); ++i) {
+    text += format("  fault      %s at tick %llu\n", r.events[i].name,
+                   static_cast<unsigned long long>(r.events[i].tick));
+  }
+  return text;
+}
+
+void write_whole(const std::string& path, const std::string& text) {
+  const std::string temporary = path + ".partial";
+  const auto fail = [&]() {
+    const std::string reason = std::strerror(errno);
+    std::remove(temporary.c_str());
+    throw std::runtime_error(path + ": not written (" + reason +
+                             "); name a folder with room where you may write");
+  };
+  std::FILE* file = std::fopen(temporary.c_str(), "wb");
+  if (file == nullptr) fail();
+  const bool written = std::fwrite(text.data(), 1, text.size(), file) == text.size();
+  const bool stored = written && std::fflush(file) == 0 && fsync(fileno(file)) == 0;
+  if (std::fclose(file) != 0 || !stored) fail();
+  if (std::rename(temporary.c_str(), path.c_str()) != 0) fail();
+}
+
+}  // namespace kerf

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "controller/shell/real_time.hpp"
+#include "controller/shell/run_record.hpp"
+
+namespace kerf {
+
+/// Everything a run is reported with.
+struct RunReport {
+  RunRecord record;
+  std::string end;  ///< why the run ended
+  std::string scene;
+  std::string device;
+  std::string numeric;
+  int rate_hz = 1000;
+  bool virtual_time = false;
+  bool allocations_counted = true;
+  std::vector<MissingRight> missing_rights;
+  double removed_mm3 = 0;
+  std::uint64_t lost_packets = 0;
+  std::uint64_t refused_packets = 0;
+  std::uint64_t watchdog_trips = 0;
+  std::uint64_t volume_hash = 0;
+  std::uint64_t config_hash = 0;
+  double load_s = 0;  ///< from start to the first servo tick
+};
+
+/// JSON text with the keys of the design page; ends with a newline.
+[[nodiscard]] std::string report_json(const RunReport& report);
+
+/// The same figures for a person, on one screen.
+[[nodiscard]] std::string summary(const RunReport& report);
+
+/// Writes `text` whole or not at all: a temporary file beside `path`, then a rename. Throws
+/// std::runtime_error with one line.
+void write_whole(const std::string& path, const std::string& text);
+
+}  // namespace kerf

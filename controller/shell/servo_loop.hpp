@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+
+#include "controller/device/omni_driver.hpp"
+#include "controller/servo/servo.hpp"
+#include "controller/shell/publisher.hpp"
+#include "controller/shell/run_record.hpp"
+#include "controller/shell/tick_source.hpp"
+#include "shared/segment/hand_over.hpp"
+
+namespace kerf {
+
+/// Why the loop ended.
+enum class EndReason : std::uint8_t { ticks_done, stopped, device_gone, never_armed };
+
+struct LoopLimits {
+  std::uint64_t armed_ticks = UINT64_MAX;   ///< servo steps after arming
+  std::uint64_t gone_ticks = 2000;          ///< without a report: 2 s
+  std::uint64_t arming_ticks = UINT64_MAX;  ///< patience for the first docking
+};
+
+/// What the loop shares with other threads.
+struct LoopSignals {
+  std::atomic<bool> stop{false};              ///< asked by a signal or an error
+  std::atomic<bool> stalled{false};           ///< the watchdog switched the motors off
+  std::atomic<std::uint64_t> heartbeat{0};    ///< ticks so far: the watchdog's pulse
+  std::atomic<std::uint64_t> armed_ticks{0};  ///< for the progress bar
+};
+
+/// The loop around the servo step: time, device, step, device, eyes, statistics. Runs on the
+/// calling thread until a limit is met or somebody asks to stop; the motors are off when it
+/// returns.
+EndReason run_servo(TickSource& clock, OmniDriver& device, Servo& servo, Publisher& eyes,
+                    SegmentServer& commands, const LoopLimits& limits, LoopSignals& signals,
+                    RunRecord& record) noexcept;
+
+}  // namespace kerf

@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+
+#include "controller/device/omni_driver.hpp"
+#include "controller/shell/clock.hpp"
+
+namespace kerf {
+
+/// What starts a tick: the clock, or in lock-step the device's next report.
+class TickSource {
+ public:
+  virtual ~TickSource() = default;
+  /// Waits for the next tick and returns how late it starts, in ns.
+  virtual std::int64_t wait_next() noexcept = 0;
+  /// Deadlines that were skipped because a tick ran over.
+  [[nodiscard]] virtual std::uint64_t overruns() const noexcept = 0;
+};
+
+/// Real time: absolute deadlines.
+class RealTimeTicks final : public TickSource {
+ public:
+  RealTimeTicks(std::int64_t period_ns, std::int64_t spin_ns) noexcept
+      : clock_(period_ns, spin_ns) {}
+  std::int64_t wait_next() noexcept override { return clock_.wait_next(); }
+  [[nodiscard]] std::uint64_t overruns() const noexcept override { return clock_.overruns(); }
+
+ private:
+  DeadlineClock clock_;
+};
+
+/// Virtual time: one tick per report, as fast as both ends go. A device that is silent for two
+/// seconds of real time lets ticks pass without a report until it speaks again.
+class LockStepTicks final : public TickSource {
+ public:
+  explicit LockStepTicks(OmniDriver& device) noexcept : device_(device) {}
+  std::int64_t wait_next() noexcept override {
+    silent_ = !device_.wait(silent_ ? 0 : kPatienceMs);
+    return 0;
+  }
+  [[nodiscard]] std::uint64_t overruns() const noexcept override { return 0; }
+
+ private:
+  static constexpr int kPatienceMs = 2000;
+  OmniDriver& device_;
+  bool silent_ = false;
+};
+
+}  // namespace kerf

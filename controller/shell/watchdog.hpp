@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+
+#include "controller/device/omni_driver.hpp"
+#include "controller/shell/servo_loop.hpp"
+
+namespace kerf {
+
+/// Looks from another thread whether the servo still ticks. When it has stood still for 20 ms the
+/// motors go off, once per stall; the loop fades the force in again when it comes back.
+class Watchdog {
+ public:
+  static constexpr std::int64_t kPatienceNs = 20'000'000;
+
+  Watchdog(const OmniDriver& device, LoopSignals& signals) noexcept
+      : device_(device), signals_(signals) {}
+
+  /// Call every few milliseconds.
+  void look(std::int64_t now_ns) noexcept {
+    const std::uint64_t heartbeat = signals_.heartbeat.load(std::memory_order_relaxed);
+    if (heartbeat != last_heartbeat_ || heartbeat == 0) {
+      last_heartbeat_ = heartbeat;
+      last_change_ns_ = now_ns;
+      tripped_ = false;
+      return;
+    }
+    if (tripped_ || now_ns - last_change_ns_ < kPatienceNs) return;
+    device_.release();
+    tripped_ = true;
+    ++trips_;
+    signals_.stalled.store(true, std::memory_order_relaxed);
+  }
+
+  [[nodiscard]] std::uint64_t trips() const noexcept { return trips_; }
+
+ private:
+  const OmniDriver& device_;
+  LoopSignals& signals_;
+  std::uint64_t last_heartbeat_ = 0;
+  std::int64_t last_change_ns_ = 0;
+  bool tripped_ = false;
+  std::uint64_t trips_ = 0;
+};
+
+}  // namespace kerf

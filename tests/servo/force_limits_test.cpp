@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "controller/servo/force_limits.hpp"
+
+#include <cmath>
+
+#include <doctest/doctest.h>
+#include <rapidcheck.h>
+
+using kerf::DeviceVec;
+using kerf::DoubleNumbers;
+using kerf::FixedNumbers;
+using kerf::FloatNumbers;
+
+namespace {
+
+template <class N>
+kerf::ForceLimits<N> omni_limits() {
+  using Real = typename N::Real;
+  return {Real(3.3), Real(0.88), Real(0.5), typename N::Ratio(1.0 / 10000)};
+}
+
+template <class V>
+double length(V v) {
+  return std::sqrt(double(v.x) * double(v.x) + double(v.y) * double(v.y) +
+                   double(v.z) * double(v.z));
+}
+
+}  // namespace
+
+TEST_CASE_TEMPLATE("a clamped force keeps its direction", N, FixedNumbers, FloatNumbers,
+                   DoubleNumbers) {
+  using Real = typename N::Real;
+  const auto v = kerf::clamped(DeviceVec<Real>{Real(30.0), Real(-40.0), Real(0.0)}, Real(3.3));
+  CHECK(length(v) == doctest::Approx(3.3).epsilon(1e-4));
+  CHECK(double(v.x) / double(v.y) == doctest::Approx(-0.75).epsilon(1e-4));
+}
+
+TEST_CASE("whatever is wanted, peak and slew hold, also from the ends of the number range") {
+  CHECK(rc::check([](std::int32_t x, std::int32_t y, std::int32_t z) {
+    using kerf::Q16;
+    kerf::ThermalState<FixedNumbers> thermal;
+    DeviceVec<Q16> sent{};
+    for (int tick = 0; tick < 50; ++tick) {
+      const auto next = kerf::limited_force<FixedNumbers>(
+          omni_limits<FixedNumbers>(), thermal,
+          {Q16::from_raw(x), Q16::from_raw(y), Q16::from_raw(z)}, sent);
+      RC_ASSERT(length(next) <= double(Q16(3.3)));
+      RC_ASSERT(length(next - sent) <= 0.5 + 4e-5);  // two steps of rounding
+      sent = next;
+    }
+  }));
+}
+
+TEST_CASE_TEMPLATE("a peak held for long settles at the continuous force", N, FixedNumbers,
+                   FloatNumbers, DoubleNumbers) {
+  using Real = typename N::Real;
+  kerf::ThermalState<N> thermal;
+  DeviceVec<Real> sent{};
+  double peak_n = 0;
+  for (int tick = 0; tick < 60'000; ++tick) {
+    sent =
+        kerf::limited_force<N>(omni_limits<N>(), thermal, {Real(0.0), Real(3.3), Real(0.0)}, sent);
+    peak_n = std::max(peak_n, length(sent));
+  }
+  CHECK(peak_n == doctest::Approx(3.3).epsilon(1e-3));
+  CHECK(length(sent) == doctest::Approx(0.88).epsilon(0.02));
+}
+
+TEST_CASE("one more peak is there after a rest") {
+  using kerf::Q16;
+  kerf::ThermalState<FixedNumbers> thermal;
+  DeviceVec<Q16> sent{};
+  const DeviceVec<Q16> push{Q16(0), Q16(3.3), Q16(0)};
+  for (int tick = 0; tick < 20'000; ++tick) {
+    sent = kerf::limited_force<FixedNumbers>(omni_limits<FixedNumbers>(), thermal, push, sent);
+  }
+  for (int tick = 0; tick < 30'000; ++tick) {
+    sent = kerf::limited_force<FixedNumbers>(omni_limits<FixedNumbers>(), thermal, {}, sent);
+  }
+  for (int tick = 0; tick < 20; ++tick) {
+    sent = kerf::limited_force<FixedNumbers>(omni_limits<FixedNumbers>(), thermal, push, sent);
+  }
+  CHECK(length(sent) == doctest::Approx(3.3).epsilon(1e-3));
+}

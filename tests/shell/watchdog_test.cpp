@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "controller/shell/watchdog.hpp"
+
+#include <doctest/doctest.h>
+
+#include "shared/wire/omni_packet.hpp"
+
+namespace {
+
+class CountingPort final : public kerf::PacketPort {
+ public:
+  std::size_t receive(std::span<std::uint8_t>) noexcept override { return 0; }
+  bool send(std::span<const std::uint8_t> packet) noexcept override {
+    const auto command = kerf::decode_command(packet);
+    neutral += command && *command == kerf::OmniCommand{} ? 1 : 0;
+    return true;
+  }
+  bool closed() const noexcept override { return false; }
+  bool wait(int) noexcept override { return false; }
+  int neutral = 0;
+};
+
+constexpr std::int64_t kMs = 1'000'000;
+
+}  // namespace
+
+TEST_CASE("a servo that stands still for 20 ms loses its motors, once per stall") {
+  CountingPort port;
+  const kerf::OmniDriver driver(port);
+  kerf::LoopSignals signals;
+  kerf::Watchdog watchdog(driver, signals);
+  std::int64_t now = 0;
+  watchdog.look(now += 1000 * kMs);  // not started yet: nothing to watch
+  CHECK(port.neutral == 0);
+
+  signals.heartbeat = 1;
+  watchdog.look(now += 5 * kMs);
+  for (int ms = 5; ms < 20; ms += 5) {
+    watchdog.look(now += 5 * kMs);
+    CHECK(port.neutral == 0);
+  }
+  watchdog.look(now += 5 * kMs);
+  watchdog.look(now += 5 * kMs);
+  CHECK(port.neutral == 1);
+  CHECK(signals.stalled);
+  CHECK(watchdog.trips() == 1);
+
+  signals.heartbeat = 2;
+  watchdog.look(now += 5 * kMs);
+  watchdog.look(now += 25 * kMs);
+  CHECK(watchdog.trips() == 2);
+}
