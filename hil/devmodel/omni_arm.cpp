@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "hil/devmodel/omni_arm.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace kerf {
+namespace {
+
+constexpr double kTurretLimitRad = 0.98;
+constexpr double kThighMinRad = 0.0;
+constexpr double kThighMaxRad = 1.75;
+constexpr double kElbowMinRad = -0.81;
+constexpr double kElbowMaxRad = 1.25;
+
+/// Three linear equations by Cramer's rule.
+template <class To, class From>
+Vec<double, From> solve(const Transform<double, To, From>& m, Vec<double, To> rhs) noexcept {
+  const auto& a = m.row;
+  const auto determinant = [](double a0, double a1, double a2, double b0, double b1, double b2,
+                              double c0, double c1, double c2) {
+    return a0 * (b1 * c2 - b2 * c1) - a1 * (b0 * c2 - b2 * c0) + a2 * (b0 * c1 - b1 * c0);
+  };
+  const double whole =
+      determinant(a[0][0], a[0][1], a[0][2], a[1][0], a[1][1], a[1][2], a[2][0], a[2][1], a[2][2]);
+  return {determinant(rhs.x, a[0][1], a[0][2], rhs.y, a[1][1], a[1][2], rhs.z, a[2][1], a[2][2]) /
+              whole,
+          determinant(a[0][0], rhs.x, a[0][2], a[1][0], rhs.y, a[1][2], a[2][0], rhs.z, a[2][2]) /
+              whole,
+          determinant(a[0][0], a[0][1], rhs.x, a[1][0], a[1][1], rhs.y, a[2][0], a[2][1], rhs.z) /
+              whole};
+}
+
+}  // namespace
+
+DeviceVec<double> OmniArm::tip_mm(JointVec<double> q) const noexcept {
+  const double reach = links_.upper_mm * std::cos(q.y) + links_.forearm_mm * std::sin(q.z);
+  const double rise = links_.upper_mm * std::sin(q.y) - links_.forearm_mm * std::cos(q.z);
+  return {-std::sin(q.x) * reach, rise + links_.origin_height_mm,
+          std::cos(q.x) * reach - links_.origin_depth_mm};
+}
+
+JointVec<double> OmniArm::joints_rad(DeviceVec<double> tip_mm) const noexcept {
+  const double forward = tip_mm.z + links_.origin_depth_mm;
+  const double reach = std::sqrt(tip_mm.x * tip_mm.x + forward * forward);
+  const double rise = tip_mm.y - links_.origin_height_mm;
+  const double a = links_.upper_mm;
+  const double b = links_.forearm_mm;
+  // The bend is the angle from the forearm's direction up to the thigh's (cosine rule).
+  const double cos_bend = (reach * reach + rise * rise - a * a - b * b) / (2 * a * b);
+  const double bend = std::acos(std::clamp(cos_bend, -1.0, 1.0));
+  const double thigh =
+      std::atan2(rise, reach) + std::atan2(b * std::sin(bend), a + b * std::cos(bend));
+  return {std::atan2(-tip_mm.x, forward), thigh, thigh - bend + omni::kPi / 2};
+}
+
+OmniArm::Jacobian OmniArm::jacobian(JointVec<double> q) const noexcept {
+  const double s1 = std::sin(q.x);
+  const double c1 = std::cos(q.x);
+  // How reach and rise follow the thigh and the forearm.
+  const double reach = links_.upper_mm * std::cos(q.y) + links_.forearm_mm * std::sin(q.z);
+  const double reach_by_thigh = -links_.upper_mm * std::sin(q.y);
+  const double reach_by_forearm = links_.forearm_mm * std::cos(q.z);
+  const double rise_by_thigh = links_.upper_mm * std::cos(q.y);
+  const double rise_by_forearm = links_.forearm_mm * std::sin(q.z);
+  return {{{{-c1 * reach, -s1 * reach_by_thigh, -s1 * reach_by_forearm},
+            {0.0, rise_by_thigh, rise_by_forearm},
+            {-s1 * reach, c1 * reach_by_thigh, c1 * reach_by_forearm}}}};
+}
+
+DeviceVec<double> OmniArm::tip_force_n(JointVec<double> q,
+                                       JointVec<double> torque_nmm) const noexcept {
+  return solve(transposed(jacobian(q)), torque_nmm);
+}
+
+JointVec<double> OmniArm::joint_rates(JointVec<double> q,
+                                      DeviceVec<double> velocity) const noexcept {
+  return solve(jacobian(q), velocity);
+}
+
+bool OmniArm::within_limits(JointVec<double> q) noexcept {
+  const double elbow = q.z - q.y;
+  return std::abs(q.x) <= kTurretLimitRad && q.y >= kThighMinRad && q.y <= kThighMaxRad &&
+         elbow >= kElbowMinRad && elbow <= kElbowMaxRad;
+}
+
+bool OmniArm::stop_at_limits(JointVec<double>& q, DeviceVec<double>& tip_mm,
+                             DeviceVec<double>& velocity) const noexcept {
+  if (within_limits(q)) return false;
+  // A stop acts on one angle: a combination of the joints.
+  struct Stop {
+    JointVec<double> angle_of;
+    int side;  // -1 below its range, +1 above, 0 inside
+  };
+  const auto clamp = [](double& angle, double low, double high) {
+    const int side = angle < low ? -1 : angle > high ? 1 : 0;
+    angle = std::clamp(angle, low, high);
+    return side;
+  };
+  double elbow = q.z - q.y;
+  const std::array<Stop, 3> stops{{{{1, 0, 0}, clamp(q.x, -kTurretLimitRad, kTurretLimitRad)},
+                                   {{0, 1, 0}, clamp(q.y, kThighMinRad, kThighMaxRad)},
+                                   {{0, -1, 1}, clamp(elbow, kElbowMinRad, kElbowMaxRad)}}};
+  q.z = q.y + elbow;
+  tip_mm = this->tip_mm(q);
+  for (const Stop& stop : stops) {
+    if (stop.side == 0) continue;
+    // The stop pushes the tip along the gradient of its angle; without friction, without bounce.
+    const DeviceVec<double> gradient = tip_force_n(q, stop.angle_of);
+    const double rate = dot(gradient, velocity);
+    if (rate * stop.side > 0) velocity = velocity - gradient * (rate / dot(gradient, gradient));
+  }
+  return true;
+}
+
+}  // namespace kerf

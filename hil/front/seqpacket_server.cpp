@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "hil/front/seqpacket_server.hpp"
+
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <utility>
+
+#include <poll.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include "hil/hil_error.hpp"
+
+namespace kerf {
+namespace {
+
+constexpr int kStopCheckMs = 100;        // how long a stop request may wait
+constexpr const char* kUnborn = ".new";  // name until the socket listens
+
+sockaddr_un address_of(const std::string& path) {
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  std::memcpy(address.sun_path, path.c_str(), path.size() + 1);
+  return address;
+}
+
+template <class Call>
+int with_address(const sockaddr_un& address, Call&& call) {
+  // The sockets API takes every address as a sockaddr.
+  return call(reinterpret_cast<const sockaddr*>(&address), socklen_t{sizeof address});
+}
+
+/// Whether somebody listens at `path`. Asks with another socket type, so the answer is a refusal
+/// either way and the listener notices nothing.
+bool is_live(const std::string& path) {
+  const int fd = socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+  if (fd < 0) return true;  // not proven stale: leave it alone
+  const int result = with_address(
+      address_of(path), [fd](const sockaddr* a, socklen_t size) { return connect(fd, a, size); });
+  const bool refused = result != 0 && errno == ECONNREFUSED;
+  close(fd);
+  return !refused;
+}
+
+void check_path(const std::string& path) {
+  const std::size_t longest = sizeof(sockaddr_un::sun_path) - 1 - std::strlen(kUnborn);
+  if (path.empty() || path.size() > longest) {
+    throw HilError("--socket: " + path + " has " + std::to_string(path.size()) +
+                   " bytes; use 1 to " + std::to_string(longest));
+  }
+  struct stat file {};
+  if (lstat(path.c_str(), &file) != 0) return;
+  if (!S_ISSOCK(file.st_mode)) {
+    throw HilError("--socket: " + path + " is a file of another kind; choose another path");
+  }
+  if (is_live(path)) {
+    throw HilError("--socket: " + path +
+                   " is in use by another emulator; end it or choose another path");
+  }
+}
+
+}  // namespace
+
+SeqpacketLink::SeqpacketLink(SeqpacketLink&& other) noexcept
+    : fd_(std::exchange(other.fd_, -1)), closed_(other.closed_) {}
+
+SeqpacketLink::~SeqpacketLink() {
+  if (fd_ >= 0) close(fd_);
+}
+
+std::span<const std::uint8_t> SeqpacketLink::take(std::span<std::uint8_t> buffer) noexcept {
+  const ssize_t size = recv(fd_, buffer.data(), buffer.size(), MSG_DONTWAIT);
+  if (size > 0) return buffer.first(static_cast<std::size_t>(size));
+  if (size == 0 || (errno != EAGAIN && errno != EINTR)) closed_ = true;
+  return {};
+}
+
+std::span<const std::uint8_t> SeqpacketLink::wait(std::span<std::uint8_t> buffer,
+                                                  int timeout_ms) noexcept {
+  pollfd ready{fd_, POLLIN, 0};
+  return poll(&ready, 1, timeout_ms) > 0 ? take(buffer) : std::span<const std::uint8_t>{};
+}
+
+SeqpacketLink::Sent SeqpacketLink::send(std::span<const std::uint8_t> packet) noexcept {
+  const ssize_t sent = ::send(fd_, packet.data(), packet.size(), MSG_DONTWAIT | MSG_NOSIGNAL);
+  if (sent >= 0) return Sent::yes;
+  if (errno == EAGAIN || errno == EINTR) return Sent::full;
+  closed_ = true;
+  return Sent::closed;
+}
+
+SeqpacketServer::SeqpacketServer(std::string path) : path_(std::move(path)) {
+  check_path(path_);
+  const std::string unborn = path_ + kUnborn;
+  unlink(unborn.c_str());
+  fd_ = socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0);
+  const sockaddr_un address = address_of(unborn);
+  const auto bind_here = [this](const sockaddr* a, socklen_t size) { return bind(fd_, a, size); };
+  // One waits while one is served.
+  const bool ready = fd_ >= 0 && with_address(address, bind_here) == 0 && listen(fd_, 1) == 0 &&
+                     std::rename(unborn.c_str(), path_.c_str()) == 0;
+  if (ready) return;
+  const int error = errno;
+  if (fd_ >= 0) close(fd_);
+  unlink(unborn.c_str());
+  throw HilError("--socket: " + path_ + ": " + std::strerror(error) +
+                 "; choose a path in a folder that you may write");
+}
+
+SeqpacketServer::~SeqpacketServer() {
+  close(fd_);
+  unlink(path_.c_str());
+}
+
+std::optional<SeqpacketLink> SeqpacketServer::accept(const std::atomic<bool>& stop) {
+  pollfd waiting{fd_, POLLIN, 0};
+  while (!stop.load(std::memory_order_relaxed)) {
+    if (poll(&waiting, 1, kStopCheckMs) <= 0) continue;
+    const int client = accept4(fd_, nullptr, nullptr, SOCK_CLOEXEC);
+    if (client >= 0) return SeqpacketLink(client);
+  }
+  return std::nullopt;
+}
+
+}  // namespace kerf

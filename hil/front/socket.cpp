@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "hil/front/socket.hpp"
+
+#include <array>
+
+#include <time.h>
+
+namespace kerf {
+namespace {
+
+constexpr std::int64_t kNsPerSecond = 1'000'000'000;
+constexpr std::int64_t kNsPerCycle = 125'000;
+constexpr std::int64_t kMaxBehindNs = 100'000'000;  // beyond this the past is not made up for
+constexpr int kStopCheckMs = 100;
+constexpr int kMaxTakenPerPeriod = 64;  // a flooding host cannot hold the device
+// One byte more than any command, so that a longer packet is seen to be wrong.
+using Buffer = std::array<std::uint8_t, 65>;
+
+std::int64_t now_ns() noexcept {
+  timespec now{};
+  clock_gettime(CLOCK_MONOTONIC, &now);
+  return now.tv_sec * kNsPerSecond + now.tv_nsec;
+}
+
+void sleep_until(std::int64_t deadline_ns) noexcept {
+  const timespec deadline{deadline_ns / kNsPerSecond, deadline_ns % kNsPerSecond};
+  clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &deadline, nullptr);
+}
+
+void send(SeqpacketLink& client, PacketDevice& device, FrontStats& stats) noexcept {
+  const auto packet = device.next_packet();
+  if (packet.empty()) return;
+  const SeqpacketLink::Sent sent = client.send(packet);
+  if (sent == SeqpacketLink::Sent::yes) ++stats.sent;
+  if (sent == SeqpacketLink::Sent::full) ++stats.dropped;
+}
+
+bool goes_on(const SeqpacketLink& client, const ServeLimits& limits, const FrontStats& stats) {
+  return !client.closed() && !limits.stop.load(std::memory_order_relaxed) &&
+         (limits.cycles == 0 || stats.cycles < limits.cycles);
+}
+
+}  // namespace
+
+void serve_real_time(SeqpacketLink& client, PacketDevice& device, int packet_cycles,
+                     const ServeLimits& limits, FrontStats& stats) {
+  Buffer buffer;
+  std::int64_t deadline_ns = now_ns();
+  while (goes_on(client, limits, stats)) {
+    deadline_ns += packet_cycles * kNsPerCycle;
+    sleep_until(deadline_ns);
+    const std::int64_t late_ns = now_ns() - deadline_ns;
+    stats.wake.record(late_ns);
+    if (late_ns > kMaxBehindNs) {
+      ++stats.resyncs;
+      deadline_ns += late_ns;
+    }
+    for (int taken = 0; taken < kMaxTakenPerPeriod; ++taken) {
+      const auto packet = client.take(buffer);
+      if (packet.empty()) break;
+      device.receive(packet);
+    }
+    device.advance(packet_cycles);
+    stats.cycles += packet_cycles;
+    send(client, device, stats);
+  }
+}
+
+void serve_lockstep(SeqpacketLink& client, PacketDevice& device, int tick_cycles,
+                    const ServeLimits& limits, FrontStats& stats) {
+  Buffer buffer;
+  send(client, device, stats);
+  while (goes_on(client, limits, stats)) {
+    const auto packet = client.wait(buffer, kStopCheckMs);
+    if (packet.empty()) continue;
+    device.receive(packet);
+    device.advance(tick_cycles);
+    stats.cycles += tick_cycles;
+    send(client, device, stats);
+  }
+}
+
+}  // namespace kerf

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "hil/run_report.hpp"
+
+#include <array>
+#include <cstdio>
+#include <fstream>
+
+#include <nlohmann/json.hpp>
+
+#include "hil/hil_error.hpp"
+
+namespace kerf {
+namespace {
+
+double seconds_of(std::int64_t cycles) {
+  return static_cast<double>(cycles) / omni::kBusCyclesPerSecond;
+}
+
+std::string hex(std::uint64_t value) {
+  std::array<char, 17> text{};
+  std::snprintf(text.data(), text.size(), "%016llx", static_cast<unsigned long long>(value));
+  return text.data();
+}
+
+}  // namespace
+
+void write_run_report(const std::string& file, const Emulator& emulator, const FrontStats& front) {
+  const EmulatorStats& stats = emulator.stats();
+  const DeviceVec<double> tip = emulator.model().tip_mm();
+  nlohmann::ordered_json report;
+  report["personality"] = "omni";
+  report["seconds"] = seconds_of(stats.cycles);
+  report["packets_sent"] = front.sent;
+  report["packets_dropped"] = front.dropped;
+  report["packets_withheld"] = stats.withheld;
+  report["commands_received"] = stats.commands;
+  report["commands_refused"] = stats.refused;
+  report["resyncs"] = front.resyncs;
+  report["wake_us"] = {{"p50", front.wake.percentile_us(0.5)},
+                       {"p99", front.wake.percentile_us(0.99)},
+                       {"max", front.wake.max_us()}};
+  report["peak_motor_force_n"] = stats.peak_motor_force_n;
+  report["docked"] = emulator.model().docked();
+  if (stats.undocked_at) {
+    report["undocked_at_s"] = seconds_of(*stats.undocked_at);
+  } else {
+    report["undocked_at_s"] = nullptr;
+  }
+  report["final_tip_mm"] = {tip.x, tip.y, tip.z};
+  report["report_hash"] = hex(stats.report_hash);
+
+  const std::string partial = file + ".partial";
+  std::ofstream out(partial);
+  out << report.dump(2) << '\n';
+  out.close();
+  if (!out || std::rename(partial.c_str(), file.c_str()) != 0) {
+    std::remove(partial.c_str());
+    throw HilError("--report: " + file +
+                   " cannot be written; choose a folder with room and rights");
+  }
+}
+
+}  // namespace kerf

@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+
+#include "hil/emulator.hpp"
+#include "hil/front/socket.hpp"
+
+namespace kerf {
+
+/// Writes what a run has shown as JSON: under another name first, then renamed, so the file is
+/// whole or absent. Times in s from the first client on, device time. Throws `HilError`.
+void write_run_report(const std::string& file, const Emulator& emulator, const FrontStats& front);
+
+}  // namespace kerf

@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "hil/emulator.hpp"
+
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include <doctest/doctest.h>
+
+#include "hil/hand_script_file.hpp"
+
+namespace {
+
+using kerf::DeviceVec;
+using kerf::Emulator;
+using kerf::OmniCommand;
+using kerf::OmniParams;
+
+constexpr int kTickCycles = 8;  // 1 kHz
+constexpr int kTicksPerSecond = 1000;
+
+kerf::HandScript cut_cavity() {
+  return kerf::read_hand_script(KERF_HANDS "/cut_cavity.toml");
+}
+
+void tell(Emulator& emulator, const OmniCommand& command) {
+  emulator.receive(kerf::encode(command));
+}
+
+/// A host that calibrates at once and then pushes with a slowly turning force.
+OmniCommand turning_force(int tick) {
+  const double angle = 0.01 * tick;
+  const auto count = [&](double phase) {
+    return static_cast<std::int16_t>(std::lround(200 * std::sin(angle + phase)));
+  };
+  return {{count(0), count(1), count(2)}, true, OmniCommand::Light::steady};
+}
+
+std::vector<std::uint8_t> twenty_seconds(const OmniParams& params) {
+  Emulator emulator(params, cut_cavity());
+  std::vector<std::uint8_t> stream;
+  for (int tick = 0; tick < 20 * kTicksPerSecond; ++tick) {
+    const auto packet = emulator.next_packet();
+    stream.insert(stream.end(), packet.begin(), packet.end());
+    tell(emulator, turning_force(tick));
+    emulator.advance(kTickCycles);
+  }
+  return stream;
+}
+
+/// Seconds of device time after which the stylus is out of the inkwell.
+double undocked_after(const std::optional<OmniCommand>& command) {
+  Emulator emulator({}, cut_cavity());
+  if (command) tell(emulator, *command);
+  emulator.advance(4 * kerf::omni::kBusCyclesPerSecond);
+  REQUIRE(emulator.stats().undocked_at);
+  return static_cast<double>(*emulator.stats().undocked_at) / kerf::omni::kBusCyclesPerSecond;
+}
+
+}  // namespace
+
+TEST_CASE("twenty seconds of a script are the same bytes every time, and others by another seed") {
+  OmniParams params;
+  params.pot_noise = true;
+  const auto first = twenty_seconds(params);
+  CHECK(first.size() == 20'000 * kerf::omni::kReportBytes);
+  CHECK(first == twenty_seconds(params));
+  params.seed = 2;
+  CHECK(first != twenty_seconds(params));
+}
+
+TEST_CASE("the hand waits for a calibrated host 0.2 s, for any other 2 s") {
+  using Light = OmniCommand::Light;
+  CHECK(undocked_after(OmniCommand{{}, false, Light::steady}) ==
+        doctest::Approx(0.2).epsilon(1e-2));
+  CHECK(undocked_after(OmniCommand{{}, true, Light::off}) == doctest::Approx(0.2).epsilon(1e-2));
+  CHECK(undocked_after(OmniCommand{{}, false, Light::slow_flash}) ==
+        doctest::Approx(2.0).epsilon(1e-3));
+  CHECK(undocked_after(std::nullopt) == doctest::Approx(2.0).epsilon(1e-3));
+}
+
+TEST_CASE("without a hand the stylus stays in the inkwell") {
+  Emulator emulator({}, std::nullopt);
+  emulator.advance(5 * kerf::omni::kBusCyclesPerSecond);
+  CHECK_FALSE(emulator.stats().undocked_at);
+  CHECK(kerf::decode_report(emulator.next_packet())->docked);
+}
+
+TEST_CASE("the tip follows the script to the surface within friction and inertia") {
+  Emulator emulator({}, cut_cavity());
+  tell(emulator, {{}, true, OmniCommand::Light::steady});
+  emulator.advance(static_cast<int>((0.2 + 1.2) * kerf::omni::kBusCyclesPerSecond));
+  CHECK(norm(emulator.model().tip_mm() - DeviceVec<double>{0, 4, 0}) < 1.5);
+  emulator.advance(8 * kerf::omni::kBusCyclesPerSecond);
+  // One round later it comes up again: the target is 3 mm over the surface.
+  CHECK(norm(emulator.model().tip_mm() - DeviceVec<double>{0, 3, 0}) < 1.5);
+}
+
+TEST_CASE("a packet that is no command changes nothing but a count") {
+  Emulator emulator({}, std::nullopt);
+  tell(emulator, {{500, 500, 500}, true, OmniCommand::Light::steady});
+  const std::array<std::uint8_t, 16> wrong{};
+  emulator.receive(wrong);
+  emulator.receive({});
+  emulator.advance(1);
+  CHECK(emulator.stats().commands == 1);
+  CHECK(emulator.stats().refused == 2);
+  CHECK(emulator.model().motors_on());
+  CHECK(emulator.stats().peak_motor_force_n > 0);
+}
+
+TEST_CASE("a lost packet leaves a gap in the counter, a silent device says nothing") {
+  Emulator emulator({}, std::nullopt, {.drop_every = 5, .silent_after = 80});
+  std::uint32_t last = 0;
+  int gaps = 0;
+  for (int packet = 1; packet <= 20; ++packet) {
+    emulator.advance(4);
+    const auto bytes = emulator.next_packet();
+    if (bytes.empty()) {
+      CHECK(packet % 5 == 0);
+      continue;
+    }
+    const auto report = kerf::decode_report(bytes);
+    REQUIRE(report);
+    if (report->counter - last == 2) ++gaps;
+    last = report->counter;
+  }
+  CHECK(gaps == 3);  // 5, 10, 15; after 20 nothing was sent yet
+  for (int packet = 0; packet < 10; ++packet) {
+    emulator.advance(4);
+    CHECK(emulator.next_packet().empty());
+  }
+  CHECK(emulator.stats().reports == 16);
+  CHECK(emulator.stats().withheld == 14);
+}

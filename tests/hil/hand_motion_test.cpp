@@ -1,0 +1,154 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "hil/devmodel/hand_motion.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include <doctest/doctest.h>
+
+#include "hil/devmodel/omni_arm.hpp"
+#include "hil/hand_script_file.hpp"
+
+namespace {
+
+using kerf::DeviceVec;
+using kerf::HandGoal;
+using kerf::HandMotion;
+
+constexpr int kSecond = kerf::omni::kBusCyclesPerSecond;
+constexpr int kPreludeCycles = kSecond * 12 / 10;  // inkwell to start
+const DeviceVec<double> kDock{0, -70, -86};
+
+HandMotion motion_of(const std::string& script) {
+  HandMotion motion(kerf::parse_hand_script(script, "test"), kDock);
+  motion.leave();
+  return motion;
+}
+
+HandGoal after(HandMotion& motion, int cycles) {
+  HandGoal goal;
+  for (int i = 0; i < cycles; ++i) goal = motion.next();
+  return goal;
+}
+
+double distance(DeviceVec<double> a, DeviceVec<double> b) {
+  return norm(a - b);
+}
+
+}  // namespace
+
+TEST_CASE("the hand rests in the inkwell until it leaves, then is at the start after 1.2 s") {
+  HandMotion motion(kerf::parse_hand_script("start_mm = [1, 4, 2]\n[[step]]\nhold = 1", "test"),
+                    kDock);
+  CHECK(after(motion, 100).in_inkwell);
+  motion.leave();
+  const auto first = motion.next();
+  CHECK_FALSE(first.in_inkwell);
+  CHECK(distance(first.target_mm, kDock) < 0.01);
+  CHECK(distance(after(motion, kPreludeCycles - 1).target_mm, {1, 4, 2}) < 1e-12);
+}
+
+TEST_CASE("a smooth move is half way at half time, a linear one everywhere in proportion") {
+  auto motion = motion_of(
+      "start_mm = [0, 4, 0]\n"
+      "[[step]]\nmove_mm = [0, 0, 8]\nseconds = 1\n"
+      "[[step]]\nmove_mm = [8, 0, 8]\nseconds = 1\nease = 'linear'");
+  after(motion, kPreludeCycles);
+  CHECK(distance(after(motion, kSecond / 4).target_mm,
+                 {0, 4 * (1 - 0.103515625), 8 * 0.103515625}) < 1e-9);
+  CHECK(distance(after(motion, kSecond / 4).target_mm, {0, 2, 4}) < 1e-9);
+  after(motion, kSecond / 2);
+  CHECK(distance(after(motion, kSecond / 4).target_mm, {2, 0, 8}) < 1e-9);
+}
+
+TEST_CASE("patterns stay in their size, end where they began, and sink as told") {
+  auto motion = motion_of(
+      "start_mm = [0, 4, 0]\n"
+      "[[step]]\ncircle_mm = 2\nturns = 3\nseconds = 1\nsink_mm = 1\n"
+      "[[step]]\nzigzag_mm = [3, 4]\nturns = 5\nseconds = 1\nsink_mm = 0.5\n"
+      "[[step]]\nhold = 1");
+  after(motion, kPreludeCycles);
+  double circle_mm = 0;
+  HandGoal goal;
+  for (int i = 0; i < kSecond; ++i) {
+    goal = motion.next();
+    circle_mm = std::max(circle_mm, std::hypot(goal.target_mm.x, goal.target_mm.z));
+  }
+  CHECK(circle_mm == doctest::Approx(2.0));
+  CHECK(distance(goal.target_mm, {0, 3, 0}) < 1e-9);
+  double width = 0;
+  double depth = 0;
+  for (int i = 0; i < kSecond; ++i) {
+    goal = motion.next();
+    width = std::max(width, std::abs(goal.target_mm.x));
+    depth = std::max(depth, std::abs(goal.target_mm.z));
+  }
+  CHECK(width == doctest::Approx(1.5).epsilon(1e-4));
+  CHECK(depth == doctest::Approx(2.0).epsilon(1e-4));
+  CHECK(distance(goal.target_mm, {0, 2.5, 0}) < 1e-9);
+  CHECK(distance(after(motion, 10 * kSecond).target_mm, {0, 2.5, 0}) < 1e-9);
+}
+
+TEST_CASE("the unit scales every length of the script and none of the way out") {
+  kerf::HandScript script = kerf::parse_hand_script(
+      "start_mm = [1, 2, 0]\n[[step]]\nmove_mm = [0, -1, 0]\nseconds = 1", "test");
+  script.unit_mm = 3;
+  HandMotion motion(script, kDock);
+  motion.leave();
+  CHECK(distance(after(motion, kSecond / 4).target_mm, kDock + DeviceVec<double>{0, 25, 0}) < 1e-9);
+  CHECK(distance(after(motion, kPreludeCycles - kSecond / 4).target_mm, {3, 6, 0}) < 1e-9);
+  CHECK(distance(after(motion, kSecond).target_mm, {0, -3, 0}) < 1e-9);
+}
+
+TEST_CASE("the repeated block comes again to the cycle, and the orientation is kept") {
+  auto motion = motion_of(
+      "[[step]]\nmove_mm = [0, 3, 0]\nseconds = 0.5\norientation_deg = [0, 30, 0]\n"
+      "[[step]]\nrepeat = true\nmove_mm = [2, 3, 0]\nseconds = 0.25\nbutton = 2\n"
+      "[[step]]\nmove_mm = [0, 3, 0]\nseconds = 0.25");
+  after(motion, kPreludeCycles + kSecond / 4);
+  CHECK(motion.next().orientation_rad[1] > 0);
+  after(motion, kSecond / 4 - 1);
+  for (int round = 0; round < 100; ++round) {
+    const auto out = after(motion, kSecond / 4);
+    CHECK(distance(out.target_mm, {2, 3, 0}) < 1e-9);
+    CHECK(out.button2);
+    CHECK(out.orientation_rad[1] == doctest::Approx(kerf::omni::kPi / 6));
+    const auto back = after(motion, kSecond / 4);
+    CHECK(distance(back.target_mm, {0, 3, 0}) < 1e-9);
+    CHECK_FALSE(back.button2);
+  }
+}
+
+TEST_CASE("every script of the project stays in the arm's reach and moves without jumps") {
+  const kerf::OmniArm arm;
+  const auto dock = arm.tip_mm({0.0, 0.23, -0.37});
+  for (const std::string name : {"approach", "touch", "slide", "cut_cavity", "jerk"}) {
+    CAPTURE(name);
+    HandMotion motion(kerf::read_hand_script(KERF_HANDS "/" + name + ".toml"), dock);
+    motion.leave();
+    auto last = dock;
+    double fastest = 0;
+    double lowest_on_the_way = 25;
+    double lowest = 25;
+    double highest = 0;
+    bool reachable = true;
+    for (int i = 0; i < 25 * kSecond; ++i) {
+      const auto target = motion.next().target_mm;
+      reachable &= kerf::OmniArm::within_limits(arm.joints_rad(target));
+      fastest = std::max(fastest, norm(target - last) * kSecond);
+      last = target;
+      const bool on_the_way = i < kPreludeCycles;
+      if (on_the_way && target.z > -25) lowest_on_the_way = std::min(lowest_on_the_way, target.y);
+      if (!on_the_way) lowest = std::min(lowest, target.y);
+      if (!on_the_way) highest = std::max(highest, target.y);
+    }
+    CHECK(reachable);
+    CHECK(lowest_on_the_way > 3);  // comes from above, clear of the surface
+    CHECK(highest < 21);
+    CHECK(lowest > -4);
+    CHECK((lowest < 1) == (name != "approach"));  // where a ball of radius 1 touches
+    CHECK(fastest < (name == "jerk" ? 1100 : 500));
+    if (name == "jerk") CHECK(fastest > 800);
+  }
+}

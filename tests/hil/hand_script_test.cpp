@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <array>
+#include <filesystem>
+#include <fstream>
+#include <string>
+
+#include <doctest/doctest.h>
+#include <unistd.h>
+
+#include "hil/hand_script_file.hpp"
+#include "hil/hil_error.hpp"
+
+namespace {
+
+using kerf::HandStep;
+
+std::string error_of(const std::string& text) {
+  try {
+    (void)kerf::parse_hand_script(text, "hand.toml");
+  } catch (const kerf::HilError& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+bool starts_with(const std::string& text, const std::string& start) {
+  return text.compare(0, start.size(), start) == 0;
+}
+
+}  // namespace
+
+TEST_CASE("a script reads as it is written") {
+  const auto script = kerf::parse_hand_script(
+      "unit_mm = 0.5\n"
+      "start_mm = [1, 6.5, -2]\n"
+      "[[step]]\nmove_mm = [0, -1, 0]\nseconds = 0.25\nease = 'linear'\nbutton = 1\n"
+      "[[step]]\nhold = 2\norientation_deg = [0, 90, 0]\n"
+      "[[step]]\nrepeat = true\ncircle_mm = 2\nturns = 2.5\nseconds = 3\nsink_mm = -1\n"
+      "[[step]]\nzigzag_mm = [3, 4]\n",
+      "hand.toml");
+  CHECK(script.unit_mm == 0.5);
+  CHECK(script.start == std::array<double, 3>{1, 6.5, -2});
+  REQUIRE(script.steps.size() == 4);
+  CHECK(script.steps[0].kind == HandStep::Kind::move);
+  CHECK(script.steps[0].to == std::array<double, 3>{0, -1, 0});
+  CHECK(script.steps[0].ease == HandStep::Ease::linear);
+  CHECK(script.steps[0].button == 1);
+  CHECK(script.steps[1].kind == HandStep::Kind::hold);
+  CHECK(script.steps[1].seconds == 2);
+  REQUIRE(script.steps[1].orientation_rad);
+  CHECK((*script.steps[1].orientation_rad)[1] == doctest::Approx(1.5707963));
+  CHECK(script.steps[2].kind == HandStep::Kind::circle);
+  CHECK(script.steps[2].size[0] == 2);
+  CHECK(script.steps[2].turns == 2.5);
+  CHECK(script.steps[2].sink == -1);
+  CHECK(script.steps[3].size[1] == 4);
+  CHECK(script.repeat_from == 2u);
+}
+
+TEST_CASE("errors name the file, the line and the way out, in one line") {
+  struct Bad {
+    const char* text;
+    const char* start;
+  };
+  for (const auto& [text, start] : {
+           Bad{"speed = 3\n[[step]]\nhold = 1", "hand.toml:1: speed: unknown key"},
+           Bad{"[[step]]\nhold = 1\nsecond = 2", "hand.toml:3: step.second: unknown key"},
+           Bad{"[[step]]\nhold = 'long'", "hand.toml:2: step.hold: not a number"},
+           Bad{"[[step]]\n\nhold = 0", "hand.toml:3: step.hold = 0 is out of range"},
+           Bad{"[[step]]\nhold = nan", "hand.toml:2: step.hold = nan is out of range"},
+           Bad{"[[step]]\nmove_mm = [1, 2]", "hand.toml:2: step.move_mm: not a list"},
+           Bad{"[[step]]\nmove_mm = [1, 2, 2000]", "hand.toml:2: step.move_mm = 2000 is out"},
+           Bad{"[[step]]\nmove_mm = [1, 2, inf]", "hand.toml:2: step.move_mm = inf is out"},
+           Bad{"[[step]]\nhold = 1\nease = 'bouncy'", "hand.toml:3: step.ease: unknown value"},
+           Bad{"[[step]]\nhold = 1\nbutton = 3", "hand.toml:3: step.button = 3 is out of range"},
+           Bad{"[[step]]\nhold = 1\nrepeat = 1", "hand.toml:3: step.repeat: not a truth value"},
+           Bad{"[[step]]\nseconds = 1", "hand.toml:1: step: has 0 motions"},
+           Bad{"[[step]]\nhold = 1\ncircle_mm = 2", "hand.toml:1: step: has 2 motions"},
+           Bad{"[[step]]\nhold = 1\nturns = 2", "hand.toml:1: step: turns or sink_mm"},
+           Bad{"unit_mm = 0\n[[step]]\nhold = 1", "hand.toml:1: unit_mm = 0 is out of range"},
+           Bad{"unit_mm = 1", "hand.toml: no steps"},
+           Bad{"step = 3", "hand.toml: no steps"},
+           Bad{"[[step]]\nhold = = 1", "hand.toml:2: "},
+           Bad{"[[step]]\nhold=1\nrepeat=true\n[[step]]\nhold=1\nrepeat=true",
+               "hand.toml:4: step: a second repeat"},
+       }) {
+    const std::string error = error_of(text);
+    CAPTURE(text);
+    CAPTURE(error);
+    CHECK(starts_with(error, start));
+    CHECK(error.find('\n') == std::string::npos);
+    CHECK(error.find("; ") != std::string::npos);
+  }
+}
+
+TEST_CASE("a missing file, a folder and an endless file are refused") {
+  CHECK_THROWS_AS((void)kerf::read_hand_script("/nowhere/hand.toml"), kerf::HilError);
+  CHECK_THROWS_AS((void)kerf::read_hand_script("/dev/zero"), kerf::HilError);
+  const auto folder = std::filesystem::temp_directory_path();
+  CHECK_THROWS_AS((void)kerf::read_hand_script(folder), kerf::HilError);
+  const auto big = folder / ("kerf-big-hand-" + std::to_string(::getpid()) + ".toml");
+  std::ofstream(big) << std::string((1 << 20) + 1, '#');
+  CHECK_THROWS_WITH_AS((void)kerf::read_hand_script(big),
+                       (big.string() + ": more than 1 MiB; use a shorter script").c_str(),
+                       kerf::HilError);
+  std::filesystem::remove(big);
+}

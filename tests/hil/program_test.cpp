@@ -1,0 +1,155 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "hil/program.hpp"
+
+#include <atomic>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <doctest/doctest.h>
+
+#include "tests/hil/fake_host.hpp"
+
+namespace {
+
+using kerf::OmniCommand;
+using kerf::test::FakeHost;
+using kerf::test::SocketPath;
+
+struct Outcome {
+  int exit_code = -1;
+  std::string out;
+  std::string err;
+};
+
+Outcome run(std::vector<std::string> arguments, const std::atomic<bool>& stop) {
+  arguments.insert(arguments.begin(), "kerf-emulator");
+  std::vector<const char*> argv;
+  for (const auto& argument : arguments) argv.push_back(argument.c_str());
+  std::ostringstream out;
+  std::ostringstream err;
+  Outcome outcome;
+  outcome.exit_code =
+      kerf::run_emulator(static_cast<int>(argv.size()), argv.data(), stop, out, err);
+  outcome.out = out.str();
+  outcome.err = err.str();
+  return outcome;
+}
+
+Outcome run(const std::vector<std::string>& arguments) {
+  const std::atomic<bool> stop{false};
+  return run(arguments, stop);
+}
+
+std::string text_of(const std::string& file) {
+  std::ifstream in(file);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+}  // namespace
+
+TEST_CASE("bad input is one line that names place, value and way out, and exit code 2") {
+  const std::string socket = SocketPath("unused").text();
+  struct Bad {
+    std::vector<std::string> arguments;
+    std::string place;
+  };
+  for (const auto& [arguments, place] : {
+           Bad{{}, "--socket"},
+           Bad{{"--socket", socket, "--wrong"}, "--wrong"},
+           Bad{{"--socket", socket, "--personality", "falcon"}, "--personality: falcon"},
+           Bad{{"--socket", socket, "--front", "pigeon"}, "--front: pigeon"},
+           Bad{{"--socket", socket, "--rate", "3000"}, "--rate: 3000"},
+           Bad{{"--socket", socket, "--rate", "0"}, "--rate: 0"},
+           Bad{{"--socket", socket, "--seconds", "-1"}, "--seconds"},
+           Bad{{"--socket", socket, "--unit-mm", "nan"}, "--unit-mm"},
+           Bad{{"--socket", socket, "--unit-mm", "big"}, "--unit-mm"},
+           Bad{{"--socket", socket, "--priority", "100"}, "--priority"},
+           Bad{{"--socket", socket, "--hand", "/nowhere.toml"}, "/nowhere.toml"},
+           Bad{{"--socket", socket, "--lockstep", "--drop-every", "3"}, "--lockstep"},
+           Bad{{"--socket", "/nowhere/socket"}, "--socket: /nowhere/socket"},
+       }) {
+    CAPTURE(place);
+    const Outcome outcome = run(arguments);
+    CAPTURE(outcome.err);
+    CHECK(outcome.exit_code == 2);
+    CHECK(outcome.err.find("kerf-emulator: ") == 0);
+    CHECK(outcome.err.find(place) != std::string::npos);
+    CHECK(outcome.err.find(';') != std::string::npos);
+    CHECK(outcome.err.find('\n') == outcome.err.size() - 1);
+    CHECK_FALSE(std::filesystem::exists(socket));
+  }
+}
+
+TEST_CASE("help and version print and end well") {
+  CHECK(run({"--help"}).exit_code == 0);
+  CHECK(run({"--help"}).out.find("--lockstep") != std::string::npos);
+  CHECK(run({"--version"}).exit_code == 0);
+  CHECK(run({"--version"}).out == "kerf-emulator " KERF_VERSION "\n");
+}
+
+TEST_CASE("a lock-step run ends with its client and leaves the same report twice") {
+  const SocketPath path("program");
+  const SocketPath report("program-report.json");
+  std::vector<std::string> reports;
+  for (int round = 0; round < 2; ++round) {
+    Outcome outcome;
+    std::thread emulator([&] {
+      outcome = run({"--socket", path.text(), "--hand", KERF_HANDS "/slide.toml", "--lockstep",
+                     "--unit-mm", "2", "--report", report.text()});
+    });
+    FakeHost host(path.text());
+    for (int tick = 0; tick < 3000 && host.receive(); ++tick) {
+      host.send({{}, true, OmniCommand::Light::steady});
+    }
+    CHECK(host.receive().has_value());
+    host.leave();
+    emulator.join();
+    CHECK(outcome.exit_code == 0);
+    CHECK(outcome.err == "");
+    CHECK_FALSE(std::filesystem::exists(path.text()));
+    reports.push_back(text_of(report.text()));
+  }
+  CHECK(reports[0].find("\"packets_sent\": 3001") != std::string::npos);
+  CHECK(reports[0].find("\"undocked_at_s\": 0.2") != std::string::npos);
+  CHECK(reports[0] == reports[1]);
+}
+
+TEST_CASE("a real-time run ends after its seconds, and a stop request ends a waiting one") {
+  const SocketPath path("seconds");
+  const SocketPath report("seconds-report.json");
+  Outcome outcome;
+  std::thread emulator([&] {
+    outcome = run({"--socket", path.text(), "--seconds", "0.2", "--priority", "0", "--stay",
+                   "--drop-every", "10", "--report", report.text()});
+  });
+  FakeHost host(path.text());
+  int received = 0;
+  while (host.receive()) ++received;
+  CHECK(host.ended());
+  emulator.join();
+  CHECK(outcome.exit_code == 0);
+  CHECK(received <= 360);  // 2 kHz, each tenth lost
+  CHECK(received >= 100);  // more would be luck on a machine under load
+  CHECK(text_of(report.text()).find("\"packets_withheld\": 40") != std::string::npos);
+
+  std::atomic<bool> stop{false};
+  std::thread waiting([&] { outcome = run({"--socket", path.text(), "--priority", "0"}, stop); });
+  while (!std::filesystem::exists(path.text())) std::this_thread::yield();
+  stop = true;
+  waiting.join();
+  CHECK(outcome.exit_code == 0);
+  CHECK_FALSE(std::filesystem::exists(path.text()));
+}
+
+TEST_CASE("a report that cannot be written is exit code 2") {
+  const SocketPath path("no-report");
+  std::atomic<bool> stop{true};
+  const Outcome outcome =
+      run({"--socket", path.text(), "--priority", "0", "--report", "/nowhere/report.json"}, stop);
+  CHECK(outcome.exit_code == 2);
+  CHECK(outcome.err.find("--report: /nowhere/report.json") != std::string::npos);
+}
