@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace kerf {
+
+/// A curve of at most `max_points` points that keeps every peak: of each stretch of samples the
+/// smallest and the largest, in the order in which they came. As long as all samples fit, all stay.
+class Envelope {
+ public:
+  struct Point {
+    double x = 0, y = 0;
+    friend bool operator==(const Point&, const Point&) noexcept = default;
+  };
+
+  /// `samples`: how many `add` calls follow.
+  Envelope(std::uint64_t samples, std::size_t max_points)
+      : stretch_(samples <= max_points ? 1 : (samples + max_points / 2 - 1) / (max_points / 2)) {}
+
+  void add(double x, double y) {
+    if (seen_ == 0) low_ = high_ = {x, y};
+    if (y < low_.y) low_ = {x, y};
+    if (y > high_.y) high_ = {x, y};
+    if (++seen_ == stretch_) close_stretch();
+  }
+
+  /// After the last `add`.
+  [[nodiscard]] const std::vector<Point>& points() {
+    close_stretch();
+    return points_;
+  }
+
+ private:
+  void close_stretch() {
+    if (seen_ == 0) return;
+    const bool low_first = low_.x <= high_.x;
+    points_.push_back(low_first ? low_ : high_);
+    if (!(low_ == high_)) points_.push_back(low_first ? high_ : low_);
+    seen_ = 0;
+  }
+
+  std::uint64_t stretch_;
+  std::uint64_t seen_ = 0;
+  Point low_, high_;
+  std::vector<Point> points_;
+};
+
+}  // namespace kerf

@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+
+namespace kerf {
+
+struct RecorderOptions {
+  std::string name = "kerf";
+  std::filesystem::path out;
+  double wait_s = 10;  ///< for the controller to appear
+  bool strict = false;
+  std::filesystem::path report;  ///< empty: none
+};
+
+/// Exit code where the command line already decided (help, version, bad options), else none.
+[[nodiscard]] std::optional<int> parse_options(int argc, char** argv, RecorderOptions& options);
+
+/// Records the controller `options.name` into the folder `options.out` until it ends or `stop`:
+/// ticks.npy, scene.json, manifest.json. Returns the exit code: 0, or 1 under `strict` where ticks
+/// were lost. Bad input and a full disk throw.
+[[nodiscard]] int record_session(const RecorderOptions& options, const std::atomic<bool>& stop);
+
+}  // namespace kerf

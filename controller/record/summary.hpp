@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+
+namespace kerf {
+
+/// The figures of one recording.
+struct RecordSummary {
+  std::uint64_t rows = 0;
+  std::uint64_t first_tick = 0;
+  std::uint64_t last_tick = 0;
+  double seconds = 0;
+  std::uint64_t lost_ticks = 0;  ///< from the sequence numbers of the rows
+  std::uint64_t contact_ticks = 0;
+  std::uint64_t stale_ticks = 0;
+  std::uint64_t faults = 0;  ///< times that the fault code became another one than 0
+  std::uint32_t missed_deadlines = 0;
+  double peak_force_n = 0;
+  double deepest_mm = 0;
+  double removed_mm3 = 0;
+  std::string end_reason;
+};
+
+/// Reads all of the recording in `folder`. Throws `RecordError`.
+[[nodiscard]] RecordSummary summarise(const std::filesystem::path& folder);
+
+/// Two columns for people.
+[[nodiscard]] std::string to_text(const RecordSummary& summary);
+
+/// The same figures as JSON.
+[[nodiscard]] std::string to_json(const RecordSummary& summary);
+
+}  // namespace kerf

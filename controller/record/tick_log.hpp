@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "shared/segment/layout.hpp"
+
+namespace kerf {
+
+/// The log of a run: an NPY file of `TickRecord` rows behind a header of fixed size, so that it can
+/// be appended to and opens in NumPy as it is (`np.load(path, mmap_mode="r")["position_mm"]`).
+///
+/// The column table is generated from `layout_table.hpp`. The row count in the header follows at
+/// every `sync`; rows behind it are whole all the same.
+inline constexpr std::size_t kTickLogHeaderBytes = 4096;
+
+/// The header of a log of `rows` rows: exactly `kTickLogHeaderBytes`.
+[[nodiscard]] std::string tick_log_header(std::uint64_t rows);
+
+/// Writes one log. Not thread-safe. Failures are a `RecordError`; the file then holds whole rows.
+class TickLogWriter {
+ public:
+  /// Refuses a path that exists: a recording is never overwritten.
+  explicit TickLogWriter(std::filesystem::path path);
+  ~TickLogWriter();
+  TickLogWriter(const TickLogWriter&) = delete;
+  TickLogWriter& operator=(const TickLogWriter&) = delete;
+
+  /// Buffers a row; at most `kBufferRows` wait for `flush`.
+  void append(const TickRecord& record);
+  void flush();
+  /// Rows to the disk, then the header that counts them, then the header to the disk.
+  void sync();
+
+  [[nodiscard]] std::uint64_t rows() const noexcept { return written_ + buffer_.size(); }
+
+ private:
+  [[noreturn]] void fail(int error);
+  void write_header();
+
+  static constexpr std::size_t kBufferRows = 64;
+  std::filesystem::path path_;
+  int fd_ = -1;
+  std::uint64_t written_ = 0;
+  std::vector<TickRecord> buffer_;
+};
+
+/// Reads one log, row by row: as long as it may be, it needs no memory.
+class TickLogReader {
+ public:
+  /// Throws `RecordError` where the file is none of this layout or is cut inside a row it counts.
+  explicit TickLogReader(std::filesystem::path path);
+
+  /// Whole rows in the file, those behind the header's count included.
+  [[nodiscard]] std::uint64_t rows() const noexcept { return rows_; }
+
+  /// Calls `visit` for each row in order. Throws `RecordError` at a row whose checksum is wrong.
+  void for_each(const std::function<void(const TickRecord&)>& visit);
+
+ private:
+  std::filesystem::path path_;
+  std::ifstream file_;
+  std::uint64_t rows_ = 0;
+};
+
+}  // namespace kerf

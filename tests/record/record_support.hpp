@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <string>
+
+#include <doctest/doctest.h>
+
+#include "shared/segment/hand_over.hpp"
+#include "tests/segment/segment_support.hpp"
+#include "tests/segment/test_folder.hpp"
+
+namespace kerf::test {
+
+[[nodiscard]] inline std::string file_text(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::ostringstream text;
+  text << file.rdbuf();
+  return text.str();
+}
+
+/// What a call threw, or "".
+template <class Call>
+[[nodiscard]] std::string error_of(Call call) {
+  try {
+    call();
+  } catch (const std::exception& error) {
+    return error.what();
+  }
+  return "";
+}
+
+/// A tick of a made-up run: a slow press with a spike, cutting for the second half.
+[[nodiscard]] inline TickRecord made_up_tick(Tick tick, Tick ticks) {
+  TickRecord record{};
+  record.tick = tick;
+  const double phase = static_cast<double>(tick) / static_cast<double>(ticks);
+  const float press = static_cast<float>(2.0 * phase * (1.0 - phase) * 4.0);
+  record.contact_force_n[1] = press;
+  record.modification_force_n[0] = phase > 0.5 ? 0.3F : 0.0F;
+  record.commanded_force_n[1] = tick == ticks / 4 ? 3.0F : press;
+  record.penetration_mm = press / 4;
+  record.removed = phase > 0.5 ? 65535 : 0;
+  record.dirty_volumes = phase > 0.5 ? 1 : 0;
+  record.flags = press > 0.01F ? kFlagContact : 0;
+  return record;
+}
+
+inline void publish_tick(SegmentWriter& writer, const TickRecord& record) {
+  writer.begin_tick(record.tick);
+  writer.publish_state(record);
+  writer.end_tick(record.tick * 1'000'000);
+}
+
+}  // namespace kerf::test

@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "controller/record/tick_log.hpp"
+
+#include <csignal>
+#include <cstring>
+
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "controller/record/record_error.hpp"
+#include "shared/segment/hash.hpp"
+#include "tests/record/record_support.hpp"
+
+using namespace kerf;
+using namespace kerf::test;
+
+namespace {
+
+TickRecord row(std::uint64_t index) {
+  TickRecord record = made_up_tick(index + 1, 1000);
+  record.seq = 2 * index + 2;
+  record.crc32c = tick_record_crc(record);
+  return record;
+}
+
+void write_rows(const std::filesystem::path& path, std::uint64_t rows) {
+  TickLogWriter log(path);
+  for (std::uint64_t i = 0; i < rows; ++i) log.append(row(i));
+  log.sync();
+}
+
+}  // namespace
+
+TEST_CASE("the log header is a NPY 1.0 header of fixed size that names each column") {
+  const std::string header = tick_log_header(1234);
+  REQUIRE(header.size() == kTickLogHeaderBytes);
+  CHECK(kTickLogHeaderBytes % 64 == 0);
+  CHECK(header.substr(0, 8) == std::string("\x93NUMPY\x01\x00", 8));
+  CHECK(static_cast<unsigned char>(header[8]) + 256 * static_cast<unsigned char>(header[9]) ==
+        kTickLogHeaderBytes - 10);
+  CHECK(header.back() == '\n');
+  for (const char* const part :
+       {"('seq', '<u8'), ", "('encoder_counts', '<i4', (6,)), ", "('position_mm', '<f8', (3,)), ",
+        "('dac_counts', '<i2', (4,)), ", "('dirty_lo', '<u2', (3,)), ", "'shape': (1234,)",
+        "('penetration_mm', '<f4'), ", "'fortran_order': False"}) {
+    CAPTURE(part);
+    CHECK(header.find(part) != std::string::npos);
+  }
+  CHECK(tick_log_header(~std::uint64_t{0}).size() == kTickLogHeaderBytes);
+}
+
+TEST_CASE("rows come back as they were written, and lie behind the header byte for byte") {
+  const TestFolder folder;
+  write_rows(folder / "ticks.npy", 1500);
+  TickLogReader reader(folder / "ticks.npy");
+  REQUIRE(reader.rows() == 1500);
+  std::uint64_t index = 0;
+  reader.for_each([&](const TickRecord& record) {
+    const TickRecord expected = row(index++);
+    CHECK(std::memcmp(&record, &expected, sizeof record) == 0);
+  });
+  CHECK(index == 1500);
+  CHECK(file_text(folder / "ticks.npy").size() == kTickLogHeaderBytes + 1500 * 384);
+}
+
+TEST_CASE(
+    "rows behind the count of the header are read too: a killed recorder loses none of them") {
+  const TestFolder folder;
+  TickLogWriter log(folder / "ticks.npy");
+  for (std::uint64_t i = 0; i < 10; ++i) log.append(row(i));
+  log.sync();
+  for (std::uint64_t i = 10; i < 15; ++i) log.append(row(i));
+  log.flush();
+  CHECK(file_text(folder / "ticks.npy").substr(0, kTickLogHeaderBytes) == tick_log_header(10));
+  CHECK(TickLogReader(folder / "ticks.npy").rows() == 15);
+}
+
+TEST_CASE("a recording is never overwritten") {
+  const TestFolder folder;
+  write_rows(folder / "ticks.npy", 3);
+  CHECK(error_of([&] { TickLogWriter again(folder / "ticks.npy"); }).find("holds a recording") !=
+        std::string::npos);
+  CHECK(TickLogReader(folder / "ticks.npy").rows() == 3);
+}
+
+TEST_CASE("a log that is cut, changed, foreign or missing is refused in one line") {
+  const TestFolder folder;
+  const std::filesystem::path path = folder / "ticks.npy";
+  const auto read = [&] { TickLogReader(path).for_each([](const TickRecord&) {}); };
+  CHECK(error_of(read).find("cannot be read") != std::string::npos);
+  write_rows(path, 100);
+  CHECK(error_of(read).empty());
+  std::filesystem::resize_file(path, kTickLogHeaderBytes + 99 * 384 + 383);
+  CHECK(error_of(read).find("99 rows of 100") != std::string::npos);
+  std::filesystem::remove(path);
+  write_rows(path, 100);
+  {
+    std::fstream file(path, std::ios::binary | std::ios::in | std::ios::out);
+    file.seekp(kTickLogHeaderBytes + 42 * 384 + 70);
+    file.put('!');
+  }
+  CHECK(error_of(read).find("row 42 has a wrong checksum") != std::string::npos);
+  for (const char* const text : {"", "hello", "\x93NUMPY"}) {
+    std::ofstream(path, std::ios::trunc) << text;
+    CHECK(error_of(read).find("not a tick log") != std::string::npos);
+  }
+}
+
+TEST_CASE("a full disk is one line, and the rows that fit stay readable") {
+  const TestFolder folder;
+  const pid_t child = fork();
+  REQUIRE(child >= 0);
+  if (child == 0) {
+    std::signal(SIGXFSZ, SIG_IGN);
+    const rlimit limit{100'000, 100'000};  // ends inside a row
+    setrlimit(RLIMIT_FSIZE, &limit);
+    try {
+      write_rows(folder / "ticks.npy", 1000);
+    } catch (const RecordError& error) {
+      _exit(std::string(error.what()).find("make room") != std::string::npos ? 0 : 1);
+    }
+    _exit(2);
+  }
+  int status = 0;
+  REQUIRE(waitpid(child, &status, 0) == child);
+  CHECK(status == 0);
+  TickLogReader log(folder / "ticks.npy");
+  CHECK(log.rows() > 100);
+  CHECK(file_text(folder / "ticks.npy").substr(0, kTickLogHeaderBytes) ==
+        tick_log_header(log.rows()));
+  CHECK(error_of([&] { log.for_each([](const TickRecord&) {}); }).empty());
+}

@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cstdlib>
+
+#include <nlohmann/json.hpp>
+
+#include "controller/record/export_csv.hpp"
+#include "controller/record/manifest.hpp"
+#include "controller/record/plot.hpp"
+#include "controller/record/summary.hpp"
+#include "tests/record/record_support.hpp"
+
+using namespace kerf;
+using namespace kerf::test;
+
+namespace {
+
+/// Records `ticks` made-up ticks into `folder`; voxels of 0.5 mm.
+void record(const std::filesystem::path& folder, Tick ticks) {
+  const NoiseVolume volume({8, 8, 8});
+  SegmentSpec spec = spec_of(volume);
+  spec.volumes[0].spacing_mm = {0.5, 0.5, 0.5};
+  SegmentWriter writer = SegmentWriter::create(spec);
+  const SegmentReader reader = SegmentReader::map(writer.fd());
+  std::filesystem::create_directories(folder);
+  TickLogWriter log(folder / kTickLogName);
+  Recorder recorder(reader, log);
+  for (Tick tick = 1; tick <= ticks; ++tick) {
+    publish_tick(writer, made_up_tick(tick, ticks));
+    if (tick % 1000 == 0) recorder.poll();
+  }
+  recorder.drain();
+  log.sync();
+  write_manifest(folder, reader.info(), recorder, log.rows(), "clean end");
+}
+
+}  // namespace
+
+TEST_CASE("the summary counts what was recorded") {
+  const TestFolder folder;
+  record(folder / "log", 1000);
+  const RecordSummary summary = summarise(folder / "log");
+  CHECK(summary.rows == 1000);
+  CHECK(summary.first_tick == 1);
+  CHECK(summary.last_tick == 1000);
+  CHECK(summary.seconds == doctest::Approx(1.0));
+  CHECK(summary.lost_ticks == 0);
+  CHECK(summary.peak_force_n == doctest::Approx(3.0));
+  CHECK(summary.removed_mm3 == doctest::Approx(500 * 0.125));  // 500 ticks, one full voxel each
+  CHECK(summary.contact_ticks > 900);
+  CHECK(summary.end_reason == "clean end");
+  CHECK(to_text(summary).find("rows              1000\n") != std::string::npos);
+  CHECK(nlohmann::json::parse(to_json(summary))["last_tick"] == 1000);
+}
+
+TEST_CASE("a gap in the sequence shows in the summary without the manifest's help") {
+  const TestFolder folder;
+  record(folder / "log", 100);
+  TickLogReader all(folder / "log/ticks.npy");
+  std::filesystem::create_directories(folder / "cut");
+  std::filesystem::copy(folder / "log/manifest.json", folder / "cut/manifest.json");
+  TickLogWriter log(folder / "cut/ticks.npy");
+  all.for_each([&](const TickRecord& row) {
+    if (row.tick < 40 || row.tick >= 47) log.append(row);
+  });
+  log.sync();
+  CHECK(summarise(folder / "cut").lost_ticks == 7);
+}
+
+TEST_CASE("the CSV has a line per tick and reads back to the same numbers") {
+  const TestFolder folder;
+  record(folder / "log", 50);
+  export_csv(folder / "log", folder / "ticks.csv");
+  std::istringstream text(file_text(folder / "ticks.csv"));
+  std::vector<std::string> names;
+  std::string line;
+  REQUIRE(std::getline(text, line));
+  std::istringstream head(line);
+  for (std::string name; std::getline(head, name, ',');) names.push_back(name);
+  const auto column = std::find(names.begin(), names.end(), "contact_force_n_1");
+  REQUIRE(column != names.end());
+  Tick tick = 0;
+  while (std::getline(text, line)) {
+    ++tick;
+    std::vector<std::string> cells;
+    std::istringstream row(line);
+    for (std::string cell; std::getline(row, cell, ',');) cells.push_back(cell);
+    REQUIRE(cells.size() == names.size());
+    CHECK(cells[1] == std::to_string(tick));
+    CHECK(std::stof(cells[static_cast<std::size_t>(column - names.begin())]) ==
+          made_up_tick(tick, 50).contact_force_n[1]);
+  }
+  CHECK(tick == 50);
+}
+
+TEST_CASE("views of a folder that is no recording are refused and leave no file") {
+  const TestFolder folder;
+  std::filesystem::create_directories(folder / "empty");
+  CHECK(error_of([&] { static_cast<void>(summarise(folder / "empty")); }).find("manifest.json") !=
+        std::string::npos);
+  CHECK(error_of([&] { export_csv(folder / "empty", folder / "x.csv"); }).find("ticks.npy") !=
+        std::string::npos);
+  CHECK(!std::filesystem::exists(folder / "x.csv"));
+  for (const char* const text : {"", "{}", R"({"tick_ns":0,"end_reason":"","volumes":[]})", "[1"}) {
+    std::ofstream(folder / "empty/manifest.json", std::ios::trunc) << text;
+    CHECK(error_of([&] {
+            static_cast<void>(read_manifest(folder / "empty"));
+          }).find("record it again") != std::string::npos);
+  }
+}
+
+TEST_CASE("the plot is an SVG with both panels and every curve") {
+  if (std::system("gnuplot --version >/dev/null 2>&1") != 0) {
+    MESSAGE("skipped: gnuplot is not installed");
+    return;
+  }
+  const TestFolder folder;
+  record(folder / "log", 10'000);
+  plot_forces(folder / "log", folder / "forces.svg");
+  const std::string svg = file_text(folder / "forces.svg");
+  for (const std::string part : {"</svg>", "force (N)", "penetration (mm)", "removed (mm³)",
+                                 "time (s)", ">contact<", ">modification<", ">commanded<"}) {
+    CAPTURE(part);
+    CHECK(svg.find(part) != std::string::npos);
+  }
+  CHECK(svg.size() < 1'000'000);
+}
