@@ -1,0 +1,180 @@
+// SPDX-License-Identifier: Apache-2.0
+#version 450 core
+// Iso-surface of one volume by ray casting: colour and true depth.
+//
+// A ray is parametrised by its distance `t` along the view axis, so t is the eye distance of the
+// paper's equation (1). Samples stand at whole multiples of the step whatever was skipped before:
+// skipping changes the time, never the picture.
+
+in vec2 v_ndc;
+layout(location = 0) out vec4 o_colour;
+
+uniform sampler3D u_density;       // 0..1, inside a shell of air one voxel thick
+uniform usampler3D u_label;        // the same extent; 0 = none
+uniform usampler3D u_active_cell;  // 1 where a sample may reach iso
+uniform sampler2D u_entry_mm;      // where the ray meets the first active cell
+uniform sampler2D u_palette;       // linear colour: row 0 by density, row 1 by label
+
+uniform mat4 u_texture_from_eye;   // mm to texture coordinates
+uniform vec3 u_texels;             // extent of u_density
+uniform vec2 u_half_size_at_1mm;   // half the picture, 1 mm from the eye
+uniform vec3 u_up_eye;             // world up
+uniform float u_near_mm;
+uniform float u_far_mm;
+uniform float u_iso;
+uniform float u_step_vox;          // along the ray
+uniform bool u_has_labels;
+
+vec3 lit(vec3 albedo, vec3 normal, vec3 to_eye, vec3 up_eye, float openness);
+vec3 srgb(vec3 linear);
+float window_depth(float eye_mm, float near_mm, float far_mm);
+
+const float kCellVox = 8.0;
+const int kRefinements = 3;
+
+float density_at(vec3 texture_point) { return texture(u_density, texture_point).r; }
+
+// Distance along the ray to the end of the box lo..hi, for a ray that is inside or before it.
+float exit_of(vec3 origin, vec3 inverse_direction, vec3 lo, vec3 hi) {
+  vec3 far = max((lo - origin) * inverse_direction, (hi - origin) * inverse_direction);
+  return min(min(far.x, far.y), far.z);
+}
+
+// Regula falsi (Illinois) between a sample below iso and one at or above it.
+float refined_mm(vec3 origin, vec3 direction, float below_mm, float above_mm, float above) {
+  float below = density_at(origin + below_mm * direction) - u_iso;
+  above -= u_iso;
+  if (below >= 0.0) return below_mm;  // the eye itself is inside
+  float t = above_mm;
+  for (int i = 0; i < kRefinements; ++i) {
+    t = mix(below_mm, above_mm, below / (below - above));
+    float value = density_at(origin + t * direction) - u_iso;
+    if (value < 0.0) {
+      below_mm = t;
+      below = value;
+      above *= 0.5;
+    } else {
+      above_mm = t;
+      above = value;
+      below *= 0.5;
+    }
+  }
+  return t;
+}
+
+// Direction of the density gradient, from the eight corners of a cube: differences along one
+// axis, means along the others, which calms the steps that voxels and cuts leave in the density. Far
+// corners leave the two voxels over which a border is antialiased, and draw terraces.
+vec3 gradient_at(vec3 p) {
+  const float kReachVox = 1.0;
+  vec3 d = kReachVox / u_texels;
+  vec3 sum = vec3(0.0);
+  for (int corner = 0; corner < 8; ++corner) {
+    vec3 side = vec3((corner & 1) * 2 - 1, (corner & 2) - 1, (corner & 4) / 2 - 1);
+    sum += side * density_at(p + side * d);
+  }
+  return sum;
+}
+
+// Colour of the labels around, blended so that their borders are smooth, times the share (alpha) of
+// voxels that have one.
+vec4 label_colour_at(vec3 texture_point) {
+  vec3 texel = texture_point * u_texels - 0.5;
+  ivec3 low = ivec3(floor(texel));
+  vec3 share = texel - vec3(low);
+  vec4 sum = vec4(0.0);
+  for (int corner = 0; corner < 8; ++corner) {
+    ivec3 side = ivec3(corner & 1, corner >> 1 & 1, corner >> 2);
+    uint label = texelFetch(u_label, low + side, 0).r;
+    vec3 weight = mix(1.0 - share, share, vec3(side));
+    float w = label != 0u ? weight.x * weight.y * weight.z : 0.0;
+    sum += w * vec4(texelFetch(u_palette, ivec2(label, 1), 0).rgb, 1.0);
+  }
+  return sum;
+}
+
+// Below the surface, because the surface itself is half air. Soft tissue that lies on the surface,
+// too thin for iso, coats it until it is milled away: pulp on the walls of its chamber.
+vec3 material_at(vec3 p, vec3 inward_texture) {
+  const float kDepthVox = 1.25;
+  const float kFullDepthVox = 2.5;  // past the two voxels over which a border is antialiased
+  const float kCoatDensity = 0.14;
+  vec3 below = p + kDepthVox * inward_texture;
+  vec3 above = p - kDepthVox * inward_texture;
+  if (u_has_labels) {
+    vec4 labelled = label_colour_at(below);
+    if (density_at(above) > kCoatDensity) {
+      vec4 coat = label_colour_at(above);
+      labelled = mix(labelled, coat, coat.a);
+    }
+    if (labelled.a > 0.0) return labelled.rgb / labelled.a;
+  }
+  float density = max(density_at(below), density_at(p + kFullDepthVox * inward_texture));
+  return texture(u_palette, vec2(density, 0.25)).rgb;
+}
+
+// 1 in the open, less where the neighbourhood along the normal is solid: cavities read as such.
+float openness_at(vec3 p, vec3 inward_texture) {
+  const vec3 kReachVox = vec3(2.5, 6.0, 12.0);
+  const vec3 kWeight = vec3(0.30, 0.30, 0.25);
+  vec3 solid = vec3(density_at(p - kReachVox.x * inward_texture),
+                    density_at(p - kReachVox.y * inward_texture),
+                    density_at(p - kReachVox.z * inward_texture));
+  return 1.0 - dot(clamp(solid / u_iso, 0.0, 1.0), kWeight);
+}
+
+void main() {
+  float entry_mm = max(texelFetch(u_entry_mm, ivec2(gl_FragCoord.xy), 0).r, u_near_mm);
+
+  vec3 eye_direction = vec3(v_ndc * u_half_size_at_1mm, -1.0);
+  vec3 origin = u_texture_from_eye[3].xyz;
+  vec3 direction = mat3(u_texture_from_eye) * eye_direction;
+  vec3 inverse_direction = 1.0 / direction;
+  float end_mm = min(exit_of(origin, inverse_direction, vec3(0.0), vec3(1.0)), u_far_mm);
+  float step_mm = u_step_vox / length(direction * u_texels);
+
+  // Cell coordinates: voxel v has texel coordinate v + 1.5 and cell coordinate (v + 1) / 8.
+  vec3 cells_per_texture = u_texels / kCellVox;
+  vec3 cell_origin = origin * cells_per_texture - 0.5 / kCellVox;
+  vec3 cell_direction = direction * cells_per_texture;
+  vec3 inverse_cell_direction = 1.0 / cell_direction;
+
+  float k = floor(entry_mm / step_mm);
+  float hit_density = -1.0;
+  while (k * step_mm < end_mm && hit_density < 0.0) {
+    float t = k * step_mm;
+    vec3 cell = floor(cell_origin + t * cell_direction);
+    float exit_mm = exit_of(cell_origin, inverse_cell_direction, cell, cell + 1.0);
+    float k_exit = max(k + 1.0, ceil(exit_mm / step_mm));
+    if (texelFetch(u_active_cell, ivec3(cell), 0).r == 0u) {
+      k = k_exit;
+    } else {
+      while (k < k_exit) {
+        float density = density_at(origin + k * step_mm * direction);
+        if (density >= u_iso) {
+          hit_density = density;
+          break;
+        }
+        k += 1.0;
+      }
+    }
+  }
+  if (hit_density < 0.0) discard;
+
+  float below_mm = max((k - 1.0) * step_mm, u_near_mm);
+  float above_mm = max(k * step_mm, u_near_mm);
+  float t = refined_mm(origin, direction, below_mm, above_mm, hit_density);
+  vec3 p = origin + t * direction;
+
+  vec3 to_eye = -normalize(eye_direction);
+  // A gradient in texture coordinates goes to the eye's millimetres by the transposed Jacobian.
+  vec3 slope = transpose(mat3(u_texture_from_eye)) * (gradient_at(p) * u_texels);
+  vec3 normal = dot(slope, slope) > 0.0 ? -normalize(slope) : to_eye;
+  if (dot(normal, to_eye) < 0.0) normal = normalize(normal - 1.02 * dot(normal, to_eye) * to_eye);
+  vec3 inward = mat3(u_texture_from_eye) * -normal;
+  inward /= length(inward * u_texels);  // one voxel edge
+
+  vec3 colour = lit(material_at(p, inward), normal, to_eye, u_up_eye, openness_at(p, inward));
+  o_colour = vec4(srgb(colour), 1.0);
+  gl_FragDepth = window_depth(t, u_near_mm, u_far_mm);
+}

@@ -1,0 +1,222 @@
+// SPDX-License-Identifier: Apache-2.0
+// The iso renderer against spheres, whose depth is known.
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <random>
+
+#include <doctest/doctest.h>
+#include <glm/gtc/matrix_transform.hpp>
+
+#include "tests/visualizer/gl_fixture.hpp"
+#include "visualizer/error.hpp"
+
+using namespace kerf;
+using namespace kerf::test;
+
+namespace {
+
+constexpr PictureSize kSize{96, 96};
+
+SceneView scene_of(std::initializer_list<const TestVolume*> volumes) {
+  SceneView scene;
+  for (const TestVolume* volume : volumes) scene.volumes.push_back(volume->view);
+  return scene;
+}
+
+/// Distance along the view axis at which the ray of a pixel enters a sphere.
+std::optional<double> sphere_mm(const PixelRay& ray, glm::dvec3 centre_mm, double radius_mm) {
+  const glm::dvec3 from = ray.origin_mm - centre_mm;
+  const double a = glm::dot(ray.direction, ray.direction);
+  const double b = glm::dot(from, ray.direction);
+  const double c = glm::dot(from, from) - radius_mm * radius_mm;
+  if (b * b < a * c) return std::nullopt;
+  return (-b - std::sqrt(b * b - a * c)) / a;
+}
+
+struct DepthError {
+  double rms_mm = 0.0;
+  int hits = 0;
+  int missed = 0;  ///< well inside the disc, and not drawn
+};
+
+/// Compares all pixels with a sphere; the outermost millimetres, where depth has no slope, only
+/// count as hit or not.
+DepthError compare_with_sphere(const Drawn& drawn, const View& view, glm::dvec3 centre_mm,
+                               double radius_mm) {
+  DepthError error;
+  for (int y = 0; y < kSize.height; ++y) {
+    for (int x = 0; x < kSize.width; ++x) {
+      const PixelRay ray = pixel_ray(view, kSize, x, y);
+      if (!sphere_mm(ray, centre_mm, 0.97 * radius_mm)) continue;
+      const float depth = drawn.depth[static_cast<std::size_t>(y * kSize.width + x)];
+      if (depth >= 1.0F) {
+        ++error.missed;
+        continue;
+      }
+      const double off =
+          eye_distance_mm(static_cast<double>(depth), view) - *sphere_mm(ray, centre_mm, radius_mm);
+      error.rms_mm += off * off;
+      ++error.hits;
+    }
+  }
+  error.rms_mm = std::sqrt(error.rms_mm / std::max(error.hits, 1));
+  return error;
+}
+
+}  // namespace
+
+TEST_CASE("the depth of a ball is that of the sphere, to a tenth of a voxel") {
+  if (!have_gl()) return;
+  const VoxelGrid grid{40, 40, 40};
+  const TestVolume volume(grid, centred(grid, glm::dvec3(0.25)), ball({}, 4.0, 0.5));
+  const VolumeContent content = volume.content();
+  IsoRenderer renderer(scene_of({&volume}), {&content, 1});
+  const View view = look_at({9, 14, 17}, {}, 15, 35);
+  const Drawn drawn = draw(renderer, view, RenderTarget(kSize));
+  const DepthError error = compare_with_sphere(drawn, view, {}, 4.0);
+  CHECK(error.missed == 0);
+  CHECK(error.hits > 1500);
+  CHECK(error.rms_mm < 0.1 * 0.25);
+}
+
+TEST_CASE("unequal voxel edges and a turned volume give the same sphere") {
+  if (!have_gl()) return;
+  const VoxelGrid grid{50, 36, 24};
+  const glm::dmat4 turned = glm::rotate(glm::translate(glm::dmat4(1.0), glm::dvec3(1, -2, 0.5)),
+                                        0.7, glm::normalize(glm::dvec3(1, 2, 3))) *
+                            centred(grid, {0.2, 0.3, 0.5});
+  const TestVolume volume(grid, turned, ball({1, -2, 0.5}, 4.0, 0.6));
+  const VolumeContent content = volume.content();
+  IsoRenderer renderer(scene_of({&volume}), {&content, 1});
+  const View view = look_at({-15, 3, 14}, {1, -2, 0.5}, 12, 34);
+  const Drawn drawn = draw(renderer, view, RenderTarget(kSize));
+  const DepthError error = compare_with_sphere(drawn, view, {1, -2, 0.5}, 4.0);
+  CHECK(error.missed == 0);
+  CHECK(error.rms_mm < 0.1 * 0.3);
+}
+
+TEST_CASE("skipping empty cells changes no pixel") {
+  if (!have_gl()) return;
+  const VoxelGrid grid{61, 44, 37};
+  std::mt19937 random(7);  // a heap of balls: silhouettes, gaps and self-occlusion
+  std::uniform_real_distribution<double> place(-4.0, 4.0);
+  std::vector<glm::dvec3> centres(25);
+  for (glm::dvec3& centre : centres) {
+    for (int axis = 0; axis < 3; ++axis) centre[axis] = place(random);
+  }
+  const TestVolume volume(grid, centred(grid, glm::dvec3(0.2)), [&](glm::dvec3 at) {
+    double most = 0.0;
+    for (const glm::dvec3& centre : centres) most = std::max(most, ball(centre, 0.7, 0.4)(at));
+    return most;
+  });
+  const VolumeContent content = volume.content();
+  const SceneView scene = scene_of({&volume});
+  const RenderTarget target(kSize);
+  IsoRenderer skipping(scene, {&content, 1});
+  IsoRenderer plain(scene, {&content, 1}, {.skip_empty = false});
+  // From outside, from the middle of the heap, and with the far plane inside the box.
+  for (const View& view :
+       {look_at({14, 9, 20}, {}, 10, 40), look_at({0.1, 0.2, 0.3}, {5, 2, 1}, 0.05, 30),
+        look_at({-9, 9, 9}, {}, 5, 15)}) {
+    const Drawn a = draw(skipping, view, target);
+    const Drawn b = draw(plain, view, target);
+    CHECK(a.rgb == b.rgb);
+    CHECK(a.depth == b.depth);
+    CHECK(*std::min_element(a.depth.begin(), a.depth.end()) < 1.0F);
+  }
+}
+
+TEST_CASE("after random cuts, uploading the changed bricks equals a fresh upload pixel by pixel") {
+  if (!have_gl()) return;
+  const VoxelGrid grid{43, 37, 50};
+  TestVolume volume(grid, centred(grid, glm::dvec3(0.25)), ball({}, 4.4, 0.5));
+  const SceneView scene = scene_of({&volume});
+  VolumeContent content = volume.content();
+  IsoRenderer edited(scene, {&content, 1});
+  const RenderTarget target(kSize);
+  const View view = look_at({9, 14, 17}, {}, 15, 35);
+  std::mt19937 random(11);
+  const auto pick = [&](int n) { return std::uniform_int_distribution<int>(0, n - 1)(random); };
+  std::size_t differing = 0;
+  for (int cut = 0; cut < 12; ++cut) {
+    const VoxelIndex at{pick(grid.nx), pick(grid.ny), pick(grid.nz)};
+    const int reach = 2 + pick(6);
+    const VoxelBox box =
+        VoxelBox{at, {at.x + 1, at.y + 1, at.z + 1}}.grown(reach).clipped(grid.box());
+    for (int z = box.lo.z; z < box.hi.z; ++z) {
+      for (int y = box.lo.y; y < box.hi.y; ++y) {
+        for (int x = box.lo.x; x < box.hi.x; ++x) {
+          // Grows back in every third cut: cells become active again too.
+          volume.density[grid.index(x, y, z)] = cut % 3 == 2 ? 60000 : 0;
+        }
+      }
+    }
+    std::vector<std::uint32_t> changed;
+    const VoxelBox bricks = volume.view.bricks.bricks_of(box);
+    for (int z = bricks.lo.z; z < bricks.hi.z; ++z) {
+      for (int y = bricks.lo.y; y < bricks.hi.y; ++y) {
+        for (int x = bricks.lo.x; x < bricks.hi.x; ++x) {
+          changed.push_back(volume.view.bricks.id({x, y, z}));
+        }
+      }
+    }
+    edited.update(0, volume.density, changed);
+    content = volume.content();
+    IsoRenderer fresh(scene, {&content, 1});
+    const Drawn a = draw(edited, view, target);
+    const Drawn b = draw(fresh, view, target);
+    differing += a.rgb != b.rgb || a.depth != b.depth ? 1 : 0;
+  }
+  CHECK(differing == 0);
+}
+
+TEST_CASE("with the eye inside the volume's box the hollow around it is seen whole") {
+  if (!have_gl()) return;
+  const VoxelGrid grid{48, 48, 48};
+  // Solid with a ball-shaped hollow in the middle.
+  const auto hollow = ball({}, 3.0, 0.5);
+  const TestVolume volume(grid, centred(grid, glm::dvec3(0.25)),
+                          [&](glm::dvec3 at) { return 1.0 - std::clamp(hollow(at), 0.0, 1.0); });
+  const VolumeContent content = volume.content();
+  IsoRenderer renderer(scene_of({&volume}), {&content, 1});
+  const View view = look_at({0.2, 0.1, 0}, {1, 2, 3}, 0.05, 20);
+  const Drawn drawn = draw(renderer, view, RenderTarget(kSize));
+  double worst_mm = 0.0;
+  for (int y = 0; y < kSize.height; ++y) {
+    for (int x = 0; x < kSize.width; ++x) {
+      const PixelRay ray = pixel_ray(view, kSize, x, y);
+      const float depth = drawn.depth[static_cast<std::size_t>(y * kSize.width + x)];
+      const glm::dvec3 at =
+          ray.origin_mm + eye_distance_mm(static_cast<double>(depth), view) * ray.direction;
+      worst_mm = std::max(worst_mm, std::abs(glm::length(at) - 3.0));
+    }
+  }
+  CHECK(worst_mm < 0.25 * 0.25);
+}
+
+TEST_CASE("a volume that is solid up to its border is closed there") {
+  if (!have_gl()) return;
+  const VoxelGrid grid{16, 16, 16};
+  const TestVolume volume(grid, centred(grid, glm::dvec3(0.5)), [](glm::dvec3) { return 1.0; });
+  const VolumeContent content = volume.content();
+  IsoRenderer renderer(scene_of({&volume}), {&content, 1});
+  const View view = look_at({0, 0, 30}, {}, 10, 50);
+  const Drawn drawn = draw(renderer, view, RenderTarget(kSize));
+  const float depth =
+      drawn.depth[static_cast<std::size_t>(kSize.height / 2 * kSize.width + kSize.width / 2)];
+  // Half density half a voxel beyond the last centre: z = 7.5 * 0.5 + 0.25.
+  CHECK(eye_distance_mm(static_cast<double>(depth), view) == doctest::Approx(26.0).epsilon(0.001));
+}
+
+TEST_CASE("a volume beyond the driver's limit is refused, and the limit is named") {
+  if (!have_gl()) return;
+  const VoxelGrid grid{31, 8, 8};
+  const TestVolume volume(grid, glm::dmat4(1.0), [](glm::dvec3) { return 0.0; });
+  CHECK_NOTHROW(VolumeOnGpu(volume.view, volume.content(), 33, true));
+  CHECK_THROWS_WITH_AS(
+      VolumeOnGpu(volume.view, volume.content(), 32, true),
+      "volume test: 31x8x8 voxels, and this OpenGL driver takes 30 a side; crop or "
+      "resample it",
+      VisualizerError);
+}

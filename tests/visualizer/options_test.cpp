@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "visualizer/options.hpp"
+
+#include <initializer_list>
+#include <string>
+#include <vector>
+
+#include <doctest/doctest.h>
+#include <rapidcheck.h>
+
+#include "visualizer/error.hpp"
+
+using namespace kerf;
+
+namespace {
+
+std::optional<VisualizerOptions> parse(std::initializer_list<const char*> arguments) {
+  std::vector<const char*> argv{"kerf-visualizer"};
+  argv.insert(argv.end(), arguments);
+  return parse_options(static_cast<int>(argv.size()), argv.data());
+}
+
+}  // namespace
+
+TEST_CASE("the command line of the demo is understood") {
+  const auto options =
+      parse({"--name", "demo", "--headless", "--frames", "12", "--every-ticks", "800", "--out", "o",
+             "--size", "640x480", "--report", "r.json", "--cpu", "0,1"});
+  REQUIRE(options);
+  CHECK(options->name == "demo");
+  CHECK(options->headless);
+  CHECK(options->frames == 12);
+  CHECK(options->every_ticks == 800);
+  CHECK(options->size == PictureSize{640, 480});
+  CHECK(options->report == "r.json");
+  CHECK(options->cpus == std::vector<int>{0, 1});
+}
+
+TEST_CASE("a size that is none is refused with the limits") {
+  for (const char* text : {"", "x", "640", "640x", "x480", "0x10", "640x480x2", "-1x5", "8193x1",
+                           "64 x64", "99999999999x1"}) {
+    CAPTURE(text);
+    CHECK_THROWS_AS(parse({"--size", text}), VisualizerError);
+  }
+  CHECK(parse_size("1x8192") == PictureSize{1, 8192});
+  CHECK(rc::check([](const std::string& text) {
+    try {
+      const PictureSize size = parse_size(text);
+      RC_ASSERT(text == std::to_string(size.width) + "x" + std::to_string(size.height));
+    } catch (const VisualizerError&) {
+    }
+  }));
+}
+
+TEST_CASE("an unknown renderer is refused and the known ones are named") {
+  CHECK_THROWS_WITH_AS(parse({"--renderer", "voxels"}), "--renderer: voxels is unknown; known: iso",
+                       VisualizerError);
+}
+
+TEST_CASE("every mistake on the command line is one line") {
+  for (const auto& arguments :
+       std::initializer_list<std::initializer_list<const char*>>{{"--frames", "0"},
+                                                                 {"--frames", "many"},
+                                                                 {"--wait", "-1"},
+                                                                 {"--nonsense"},
+                                                                 {"--cpu", "a"},
+                                                                 {"--every-ticks", "0"},
+                                                                 {"stray"},
+                                                                 {"--seconds"}}) {
+    try {
+      static_cast<void>(parse(arguments));
+      FAIL("accepted");
+    } catch (const VisualizerError& problem) {
+      CHECK(std::string(problem.what()).find('\n') == std::string::npos);
+    }
+  }
+}

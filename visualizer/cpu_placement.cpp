@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "visualizer/cpu_placement.hpp"
+
+#include <cstdlib>
+#include <string>
+
+#include <sched.h>
+
+#include "visualizer/error.hpp"
+
+namespace kerf {
+
+std::vector<int> place_process(std::span<const int> cpus) {
+  std::vector<int> taken(cpus.begin(), cpus.end());
+  if (taken.empty()) {
+    cpu_set_t allowed;
+    CPU_ZERO(&allowed);
+    if (sched_getaffinity(0, sizeof(allowed), &allowed) != 0) return taken;
+    for (int cpu = 0; cpu < CPU_SETSIZE; ++cpu) {
+      if (CPU_ISSET(static_cast<std::size_t>(cpu), &allowed)) taken.push_back(cpu);
+    }
+    if (taken.size() > 1) taken.pop_back();
+  }
+  cpu_set_t wanted;
+  CPU_ZERO(&wanted);
+  std::string names;
+  for (const int cpu : taken) {
+    CPU_SET(static_cast<std::size_t>(cpu), &wanted);
+    names += (names.empty() ? "" : ",") + std::to_string(cpu);
+  }
+  if (sched_setaffinity(0, sizeof(wanted), &wanted) != 0) {
+    throw VisualizerError("--cpu: " + names + " is not to be had here; leave the option out");
+  }
+  constexpr int kKeepWhatTheUserSet = 0;
+  setenv("LP_NUM_THREADS", std::to_string(taken.size()).c_str(), kKeepWhatTheUserSet);
+  return taken;
+}
+
+}  // namespace kerf

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace kerf {
+
+/// Wall and processor time of one stretch of work. Processor time is summed over all threads of the
+/// process: the steady figure where a software GL draws on several cores that others use too.
+class Stopwatch {
+ public:
+  Stopwatch();
+  [[nodiscard]] double wall_ms() const;
+  [[nodiscard]] double cpu_ms() const;
+
+ private:
+  std::chrono::steady_clock::time_point wall_;
+  std::int64_t cpu_ns_;
+};
+
+/// Nearest-rank percentile, `share` in 0..1; 0 for nothing.
+[[nodiscard]] double percentile(std::vector<double> values, double share);
+
+/// What a run measured; times in ms, per drawn frame.
+struct FrameReport {
+  std::string renderer{};
+  std::string gl_renderer{};
+  std::string context{};
+  int width = 0;
+  int height = 0;
+  std::uint64_t bricks_uploaded = 0;
+  double attach_ms = 0.0;     ///< from asking for the controller to its first complete volumes
+  double late_join_ms = 0.0;  ///< from there to the first picture: textures, shaders, drawing
+  bool clean_end = false;
+  std::vector<double> cpu_ms{};
+  std::vector<double> wall_ms{};
+
+  /// As JSON, whole or not at all; throws VisualizerError.
+  void write(const std::filesystem::path& file) const;
+};
+
+}  // namespace kerf

@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "visualizer/gl/context.hpp"
+
+#include <array>
+#include <string_view>
+#include <utility>
+
+#include <epoxy/egl.h>
+#include <epoxy/gl.h>
+
+#include "visualizer/error.hpp"
+#include "visualizer/gl/window.hpp"
+
+namespace kerf {
+
+const char* to_string(ContextKind kind) noexcept {
+  switch (kind) {
+    case ContextKind::egl_surfaceless:
+      return "EGL surfaceless";
+    case ContextKind::egl_device:
+      return "EGL device";
+    case ContextKind::window:
+      return "window";
+  }
+  return "?";
+}
+
+GlDriver query_gl_driver() {
+  const auto text = [](GLenum name) {
+    const GLubyte* const found = glGetString(name);
+    return std::string(found != nullptr ? reinterpret_cast<const char*>(found) : "");
+  };
+  GlDriver driver{.renderer = text(GL_RENDERER), .version = text(GL_VERSION)};
+  for (const std::string_view known : {"llvmpipe", "softpipe", "swrast", "SWR"}) {
+    driver.software = driver.software || driver.renderer.find(known) != std::string::npos;
+  }
+  glGetIntegerv(GL_MAX_3D_TEXTURE_SIZE, &driver.max_texture_size_3d);
+  return driver;
+}
+
+namespace {
+
+/// A context on a display of EGL, without a surface.
+class EglContext final : public GlContext {
+ public:
+  /// Null where the platform gives no 4.5 core context.
+  static std::unique_ptr<EglContext> make(EGLenum platform, void* native, ContextKind kind);
+  ~EglContext() override;
+
+  [[nodiscard]] ContextKind kind() const noexcept override { return kind_; }
+  void make_current() const { eglMakeCurrent(display_, EGL_NO_SURFACE, EGL_NO_SURFACE, context_); }
+
+ private:
+  EglContext(EGLDisplay display, ContextKind kind) : display_(display), kind_(kind) {}
+  bool create();
+
+  EGLDisplay display_;
+  EGLContext context_ = EGL_NO_CONTEXT;
+  ContextKind kind_;
+};
+
+bool has_extension(const char* list, std::string_view name) {
+  return list != nullptr && std::string_view(list).find(name) != std::string_view::npos;
+}
+
+std::unique_ptr<EglContext> EglContext::make(EGLenum platform, void* native, ContextKind kind) {
+  const EGLDisplay display = eglGetPlatformDisplayEXT(platform, native, nullptr);
+  if (display == EGL_NO_DISPLAY) return nullptr;
+  std::unique_ptr<EglContext> made(new EglContext(display, kind));
+  return made->create() ? std::move(made) : nullptr;
+}
+
+EglContext::~EglContext() {
+  if (context_ == EGL_NO_CONTEXT) return;
+  eglMakeCurrent(display_, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
+  eglDestroyContext(display_, context_);
+  // The display stays: the whole process shares it, and the next context takes it again.
+}
+
+bool EglContext::create() {
+  EGLint major = 0;
+  EGLint minor = 0;
+  if (eglInitialize(display_, &major, &minor) != EGL_TRUE) return false;
+  const char* const extensions = eglQueryString(display_, EGL_EXTENSIONS);
+  if (!has_extension(extensions, "EGL_KHR_surfaceless_context")) return false;
+  if (eglBindAPI(EGL_OPENGL_API) != EGL_TRUE) return false;
+  // Any surface type: nothing is ever drawn to one. The default asks for windows.
+  constexpr std::array<EGLint, 5> kConfig{EGL_SURFACE_TYPE, 0, EGL_RENDERABLE_TYPE, EGL_OPENGL_BIT,
+                                          EGL_NONE};
+  EGLConfig config = nullptr;
+  EGLint found = 0;
+  if (eglChooseConfig(display_, kConfig.data(), &config, 1, &found) != EGL_TRUE || found == 0) {
+    return false;
+  }
+  constexpr std::array<EGLint, 7> kContext{EGL_CONTEXT_MAJOR_VERSION,
+                                           4,
+                                           EGL_CONTEXT_MINOR_VERSION,
+                                           5,
+                                           EGL_CONTEXT_OPENGL_PROFILE_MASK,
+                                           EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT,
+                                           EGL_NONE};
+  context_ = eglCreateContext(display_, config, EGL_NO_CONTEXT, kContext.data());
+  if (context_ == EGL_NO_CONTEXT) return false;
+  return eglMakeCurrent(display_, EGL_NO_SURFACE, EGL_NO_SURFACE, context_) == EGL_TRUE;
+}
+
+bool is_software_device(EGLDeviceEXT device) {
+  return has_extension(eglQueryDeviceStringEXT(device, EGL_EXTENSIONS), "EGL_MESA_device_software");
+}
+
+std::string g_first_error;
+
+void GLAPIENTRY on_gl_message(GLenum, GLenum type, GLuint, GLenum, GLsizei length,
+                              const GLchar* text, const void*) {
+  if (type != GL_DEBUG_TYPE_ERROR || !g_first_error.empty()) return;
+  g_first_error.assign(text, static_cast<std::size_t>(length));
+}
+
+/// The best of what EGL offers, current; null where it offers nothing.
+std::unique_ptr<EglContext> best_egl_context() {
+  const char* const client = eglQueryString(EGL_NO_DISPLAY, EGL_EXTENSIONS);
+  std::unique_ptr<EglContext> best;
+  if (has_extension(client, "EGL_MESA_platform_surfaceless")) {
+    best = EglContext::make(EGL_PLATFORM_SURFACELESS_MESA, EGL_DEFAULT_DISPLAY,
+                            ContextKind::egl_surfaceless);
+    if (best != nullptr && !query_gl_driver().software) return best;
+  }
+  if (!has_extension(client, "EGL_EXT_platform_device")) return best;
+  constexpr EGLint kMaxDevices = 16;
+  std::array<EGLDeviceEXT, kMaxDevices> devices{};
+  EGLint count = 0;
+  if (eglQueryDevicesEXT(kMaxDevices, devices.data(), &count) != EGL_TRUE) return best;
+  for (EGLint i = 0; i < count; ++i) {
+    const EGLDeviceEXT device = devices[static_cast<std::size_t>(i)];
+    if (best != nullptr && is_software_device(device)) continue;  // no better than what is there
+    auto other = EglContext::make(EGL_PLATFORM_DEVICE_EXT, device, ContextKind::egl_device);
+    if (other == nullptr) continue;
+    const bool software = query_gl_driver().software;
+    if (best == nullptr || !software) best = std::move(other);
+    if (!software) break;
+  }
+  if (best != nullptr) best->make_current();
+  return best;
+}
+
+}  // namespace
+
+std::unique_ptr<GlContext> make_headless_context() {
+  if (auto egl = best_egl_context()) return egl;
+  if (Window::has_screen()) {
+    return std::make_unique<Window>(PictureSize{1, 1}, Window::Visibility::hidden);
+  }
+  throw VisualizerError(
+      "OpenGL: no 4.5 core context on EGL surfaceless or EGL device, and no screen; install a "
+      "driver (Debian: libegl1 libgl1-mesa-dri)");
+}
+
+void enable_gl_debug() {
+  glEnable(GL_DEBUG_OUTPUT);
+  glEnable(GL_DEBUG_OUTPUT_SYNCHRONOUS);
+  glDebugMessageCallback(on_gl_message, nullptr);
+}
+
+void throw_on_gl_error() {
+  if (g_first_error.empty()) return;
+  throw VisualizerError("OpenGL: " + std::exchange(g_first_error, {}));
+}
+
+}  // namespace kerf

@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <utility>
+
+#include <epoxy/gl.h>
+
+namespace kerf {
+
+/// Owns one GL object. Make and destroy it while its context is current; 0 means none.
+template <void (*Create)(GLuint*), void (*Destroy)(const GLuint*)>
+class GlName {
+ public:
+  GlName() = default;
+  [[nodiscard]] static GlName create() {
+    GlName name;
+    Create(&name.id_);
+    return name;
+  }
+  GlName(GlName&& other) noexcept : id_(std::exchange(other.id_, 0)) {}
+  GlName& operator=(GlName&& other) noexcept {
+    std::swap(id_, other.id_);
+    return *this;
+  }
+  GlName(const GlName&) = delete;
+  GlName& operator=(const GlName&) = delete;
+  ~GlName() {
+    if (id_ != 0) Destroy(&id_);
+  }
+
+  [[nodiscard]] GLuint id() const noexcept { return id_; }
+
+ private:
+  GLuint id_ = 0;
+};
+
+// The GL loader's functions are pointers filled at run time, so they are named through these.
+namespace gl_calls {
+template <GLenum Target>
+void create_texture(GLuint* id) {
+  glCreateTextures(Target, 1, id);
+}
+inline void destroy_texture(const GLuint* id) {
+  glDeleteTextures(1, id);
+}
+inline void create_buffer(GLuint* id) {
+  glCreateBuffers(1, id);
+}
+inline void destroy_buffer(const GLuint* id) {
+  glDeleteBuffers(1, id);
+}
+inline void create_vertex_array(GLuint* id) {
+  glCreateVertexArrays(1, id);
+}
+inline void destroy_vertex_array(const GLuint* id) {
+  glDeleteVertexArrays(1, id);
+}
+inline void create_framebuffer(GLuint* id) {
+  glCreateFramebuffers(1, id);
+}
+inline void destroy_framebuffer(const GLuint* id) {
+  glDeleteFramebuffers(1, id);
+}
+inline void create_program(GLuint* id) {
+  *id = glCreateProgram();
+}
+inline void destroy_program(const GLuint* id) {
+  glDeleteProgram(*id);
+}
+}  // namespace gl_calls
+
+template <GLenum Target>
+using GlTexture = GlName<gl_calls::create_texture<Target>, gl_calls::destroy_texture>;
+using GlTexture2D = GlTexture<GL_TEXTURE_2D>;
+using GlTexture3D = GlTexture<GL_TEXTURE_3D>;
+using GlBuffer = GlName<gl_calls::create_buffer, gl_calls::destroy_buffer>;
+using GlVertexArray = GlName<gl_calls::create_vertex_array, gl_calls::destroy_vertex_array>;
+using GlFramebuffer = GlName<gl_calls::create_framebuffer, gl_calls::destroy_framebuffer>;
+using GlProgramName = GlName<gl_calls::create_program, gl_calls::destroy_program>;
+
+}  // namespace kerf

@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "visualizer/gl/program.hpp"
+
+#include <array>
+
+#include <glm/gtc/type_ptr.hpp>
+
+#include "visualizer/error.hpp"
+#include "visualizer/gl/shader_texts.hpp"
+
+namespace kerf {
+
+namespace {
+
+std::string first_line(std::string_view text) {
+  return std::string(text.substr(0, text.find('\n')));
+}
+
+std::string_view shader_text(std::string_view file) {
+  for (const ShaderText& shader : shader_texts()) {
+    if (shader.file == file) return shader.text;
+  }
+  throw VisualizerError("shaders/" + std::string(file) + ": not part of this build");
+}
+
+void attach_stage(GLuint program, std::string_view file) {
+  const std::string_view text = shader_text(file);
+  const GLuint shader =
+      glCreateShader(file.ends_with(".vert") ? GL_VERTEX_SHADER : GL_FRAGMENT_SHADER);
+  const char* const begin = text.data();
+  const auto length = static_cast<GLint>(text.size());
+  glShaderSource(shader, 1, &begin, &length);
+  glCompileShader(shader);
+  GLint compiled = GL_FALSE;
+  glGetShaderiv(shader, GL_COMPILE_STATUS, &compiled);
+  std::array<char, 512> log{};
+  if (compiled != GL_TRUE) {
+    glGetShaderInfoLog(shader, static_cast<GLsizei>(log.size()), nullptr, log.data());
+  }
+  glAttachShader(program, shader);
+  glDeleteShader(shader);  // lives on with the program
+  if (compiled != GL_TRUE) {
+    throw VisualizerError("shaders/" + std::string(file) + ": " + first_line(log.data()) +
+                          "; this OpenGL driver refuses it, try another one");
+  }
+}
+
+}  // namespace
+
+GlProgram::GlProgram(std::initializer_list<std::string_view> files)
+    : name_(GlProgramName::create()) {
+  std::string all;
+  for (const std::string_view file : files) {
+    attach_stage(name_.id(), file);
+    all += (all.empty() ? "" : " + ") + std::string(file);
+  }
+  glLinkProgram(name_.id());
+  GLint linked = GL_FALSE;
+  glGetProgramiv(name_.id(), GL_LINK_STATUS, &linked);
+  if (linked == GL_TRUE) return;
+  std::array<char, 512> log{};
+  glGetProgramInfoLog(name_.id(), static_cast<GLsizei>(log.size()), nullptr, log.data());
+  throw VisualizerError("shaders/" + all + ": " + first_line(log.data()) +
+                        "; this OpenGL driver refuses it, try another one");
+}
+
+GLint GlProgram::location(std::string_view uniform) const {
+  const std::string key(uniform);
+  const auto known = locations_.find(key);
+  if (known != locations_.end()) return known->second;
+  return locations_.emplace(key, glGetUniformLocation(name_.id(), key.c_str())).first->second;
+}
+
+void GlProgram::set(std::string_view uniform, float value) const {
+  glProgramUniform1f(name_.id(), location(uniform), value);
+}
+void GlProgram::set(std::string_view uniform, int value) const {
+  glProgramUniform1i(name_.id(), location(uniform), value);
+}
+void GlProgram::set(std::string_view uniform, glm::vec2 value) const {
+  glProgramUniform2f(name_.id(), location(uniform), value.x, value.y);
+}
+void GlProgram::set(std::string_view uniform, glm::vec3 value) const {
+  glProgramUniform3f(name_.id(), location(uniform), value.x, value.y, value.z);
+}
+void GlProgram::set(std::string_view uniform, glm::vec4 value) const {
+  glProgramUniform4f(name_.id(), location(uniform), value.x, value.y, value.z, value.w);
+}
+void GlProgram::set(std::string_view uniform, const glm::mat3& value) const {
+  glProgramUniformMatrix3fv(name_.id(), location(uniform), 1, GL_FALSE, glm::value_ptr(value));
+}
+void GlProgram::set(std::string_view uniform, const glm::mat4& value) const {
+  glProgramUniformMatrix4fv(name_.id(), location(uniform), 1, GL_FALSE, glm::value_ptr(value));
+}
+
+}  // namespace kerf

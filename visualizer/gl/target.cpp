@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "visualizer/gl/target.hpp"
+
+#include <algorithm>
+
+namespace kerf {
+
+namespace {
+
+/// GL's first row is the lowest one.
+template <class T>
+void flip_rows(std::vector<T>& picture, std::size_t row, std::size_t rows) {
+  for (std::size_t y = 0; y < rows / 2; ++y) {
+    const auto upper = picture.begin() + static_cast<std::ptrdiff_t>(y * row);
+    const auto lower = picture.begin() + static_cast<std::ptrdiff_t>((rows - 1 - y) * row);
+    std::swap_ranges(upper, upper + static_cast<std::ptrdiff_t>(row), lower);
+  }
+}
+
+}  // namespace
+
+RenderTarget::RenderTarget(PictureSize size) : size_(size) {
+  glTextureStorage2D(colour_.id(), 1, GL_RGBA8, size.width, size.height);
+  glTextureParameteri(colour_.id(), GL_TEXTURE_MIN_FILTER, GL_LINEAR);
+  glTextureParameteri(colour_.id(), GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
+  glTextureParameteri(colour_.id(), GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
+  glTextureStorage2D(depth_.id(), 1, GL_DEPTH_COMPONENT32F, size.width, size.height);
+  glNamedFramebufferTexture(framebuffer_.id(), GL_COLOR_ATTACHMENT0, colour_.id(), 0);
+  glNamedFramebufferTexture(framebuffer_.id(), GL_DEPTH_ATTACHMENT, depth_.id(), 0);
+}
+
+void RenderTarget::bind() const {
+  glBindFramebuffer(GL_FRAMEBUFFER, framebuffer_.id());
+  glViewport(0, 0, size_.width, size_.height);
+}
+
+std::vector<std::uint8_t> RenderTarget::read_rgb() const {
+  const auto row = static_cast<std::size_t>(size_.width) * 3;
+  const auto rows = static_cast<std::size_t>(size_.height);
+  std::vector<std::uint8_t> rgb(row * rows);
+  glBindFramebuffer(GL_READ_FRAMEBUFFER, framebuffer_.id());
+  glPixelStorei(GL_PACK_ALIGNMENT, 1);
+  glReadPixels(0, 0, size_.width, size_.height, GL_RGB, GL_UNSIGNED_BYTE, rgb.data());
+  flip_rows(rgb, row, rows);
+  return rgb;
+}
+
+std::vector<float> RenderTarget::read_depth() const {
+  const auto row = static_cast<std::size_t>(size_.width);
+  const auto rows = static_cast<std::size_t>(size_.height);
+  std::vector<float> depth(row * rows);
+  glBindFramebuffer(GL_READ_FRAMEBUFFER, framebuffer_.id());
+  glPixelStorei(GL_PACK_ALIGNMENT, 1);
+  glReadPixels(0, 0, size_.width, size_.height, GL_DEPTH_COMPONENT, GL_FLOAT, depth.data());
+  flip_rows(depth, row, rows);
+  return depth;
+}
+
+}  // namespace kerf

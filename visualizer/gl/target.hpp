@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "visualizer/gl/names.hpp"
+
+namespace kerf {
+
+/// Width and height of a picture in pixels, each 1..kMaxSide.
+struct PictureSize {
+  static constexpr int kMaxSide = 8192;  ///< a 32-bit colour picture of 256 MiB
+  int width = 512;
+  int height = 512;
+  friend constexpr bool operator==(PictureSize, PictureSize) noexcept = default;
+};
+
+/// A picture off the screen: RGBA8 colour and 32-bit float depth.
+class RenderTarget {
+ public:
+  explicit RenderTarget(PictureSize size);
+
+  [[nodiscard]] PictureSize size() const noexcept { return size_; }
+  [[nodiscard]] GLuint colour_texture() const noexcept { return colour_.id(); }
+  [[nodiscard]] GLuint framebuffer() const noexcept { return framebuffer_.id(); }
+
+  /// Makes it the place to draw, with its whole size as the viewport.
+  void bind() const;
+  /// RGB, 3 bytes per pixel, first row at the top. Waits until the picture is complete.
+  [[nodiscard]] std::vector<std::uint8_t> read_rgb() const;
+  /// Window depth 0..1, first row at the top.
+  [[nodiscard]] std::vector<float> read_depth() const;
+
+ private:
+  PictureSize size_;
+  GlTexture2D colour_ = GlTexture2D::create();
+  GlTexture2D depth_ = GlTexture2D::create();
+  GlFramebuffer framebuffer_ = GlFramebuffer::create();
+};
+
+}  // namespace kerf

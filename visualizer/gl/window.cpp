@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "visualizer/gl/window.hpp"
+
+#include <epoxy/gl.h>
+// After the GL loader.
+#include <cstdlib>
+#include <utility>
+
+#include <GLFW/glfw3.h>
+
+#include "visualizer/error.hpp"
+
+namespace kerf {
+
+namespace {
+
+[[noreturn]] void fail(const char* what) {
+  const char* reason = nullptr;
+  glfwGetError(&reason);
+  throw VisualizerError(std::string("window: ") + what + " (" +
+                        (reason != nullptr ? reason : "no reason given") +
+                        "); use --headless --out DIR for pictures without a screen");
+}
+
+Window& window_of(GLFWwindow* handle) {
+  return *static_cast<Window*>(glfwGetWindowUserPointer(handle));
+}
+
+bool is_down(GLFWwindow* handle, int button) {
+  return glfwGetMouseButton(handle, button) == GLFW_PRESS;
+}
+
+}  // namespace
+
+bool Window::has_screen() {
+  const auto is_set = [](const char* name) {
+    const char* const value = std::getenv(name);
+    return value != nullptr && *value != '\0';
+  };
+  return is_set("DISPLAY") || is_set("WAYLAND_DISPLAY");
+}
+
+Window::Window(PictureSize size, Visibility visibility) {
+  if (glfwInit() != GLFW_TRUE) fail("the screen cannot be opened");
+  glfwWindowHint(GLFW_CONTEXT_VERSION_MAJOR, 4);
+  glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, 5);
+  glfwWindowHint(GLFW_OPENGL_PROFILE, GLFW_OPENGL_CORE_PROFILE);
+  glfwWindowHint(GLFW_DEPTH_BITS, 0);
+  glfwWindowHint(GLFW_VISIBLE, visibility == Visibility::shown ? GLFW_TRUE : GLFW_FALSE);
+  handle_ = glfwCreateWindow(size.width, size.height, "kerf", nullptr, nullptr);
+  if (handle_ == nullptr) {
+    try {
+      fail("no OpenGL 4.5 core context");
+    } catch (...) {
+      glfwTerminate();
+      throw;
+    }
+  }
+  glfwSetWindowUserPointer(handle_, this);
+  glfwSetKeyCallback(handle_, on_key);
+  glfwSetCursorPosCallback(handle_, on_cursor);
+  glfwSetScrollCallback(handle_, on_scroll);
+  glfwMakeContextCurrent(handle_);
+  glfwSwapInterval(1);
+}
+
+Window::~Window() {
+  glfwDestroyWindow(handle_);
+  glfwTerminate();
+}
+
+PictureSize Window::size() const {
+  PictureSize size;
+  glfwGetFramebufferSize(handle_, &size.width, &size.height);
+  return size;
+}
+
+void Window::set_title(const std::string& title) {
+  glfwSetWindowTitle(handle_, title.c_str());
+}
+
+void Window::present(const RenderTarget& target) {
+  const PictureSize size = target.size();
+  glBlitNamedFramebuffer(target.framebuffer(), 0, 0, 0, size.width, size.height, 0, 0, size.width,
+                         size.height, GL_COLOR_BUFFER_BIT, GL_NEAREST);
+  glfwSwapBuffers(handle_);
+}
+
+WindowInput Window::poll() {
+  glfwPollEvents();
+  input_.close = glfwWindowShouldClose(handle_) == GLFW_TRUE;
+  return std::exchange(input_, {});
+}
+
+void Window::on_key(GLFWwindow* handle, int key, int /*scancode*/, int action, int /*mods*/) {
+  if (action != GLFW_PRESS) return;
+  std::vector<char>& keys = window_of(handle).input_.keys;
+  if (key >= GLFW_KEY_A && key <= GLFW_KEY_Z) {
+    keys.push_back(static_cast<char>('a' + (key - GLFW_KEY_A)));
+  } else if (key >= GLFW_KEY_0 && key <= GLFW_KEY_9) {
+    keys.push_back(static_cast<char>('0' + (key - GLFW_KEY_0)));
+  }
+}
+
+void Window::on_cursor(GLFWwindow* handle, double x, double y) {
+  Window& window = window_of(handle);
+  const double right = x - std::exchange(window.cursor_x_, x);
+  const double up = std::exchange(window.cursor_y_, y) - y;
+  int width = 0;
+  int height = 0;
+  glfwGetWindowSize(handle, &width, &height);
+  if (height <= 0) return;
+  const bool left = is_down(handle, GLFW_MOUSE_BUTTON_LEFT);
+  const bool shift = glfwGetKey(handle, GLFW_KEY_LEFT_SHIFT) == GLFW_PRESS ||
+                     glfwGetKey(handle, GLFW_KEY_RIGHT_SHIFT) == GLFW_PRESS;
+  WindowInput& input = window.input_;
+  if (is_down(handle, GLFW_MOUSE_BUTTON_MIDDLE) || (left && shift)) {
+    input.move_right += right / height;
+    input.move_up += up / height;
+  } else if (left) {
+    input.turn_right += right / height;
+    input.turn_up += up / height;
+  }
+}
+
+void Window::on_scroll(GLFWwindow* handle, double /*x*/, double y) {
+  window_of(handle).input_.wheel += y;
+}
+
+}  // namespace kerf

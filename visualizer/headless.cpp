@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cstdio>
+#include <thread>
+
+#include "visualizer/cpu_placement.hpp"
+#include "visualizer/file_out.hpp"
+#include "visualizer/frame_report.hpp"
+#include "visualizer/frame_schedule.hpp"
+#include "visualizer/gl/context.hpp"
+#include "visualizer/picture.hpp"
+#include "visualizer/run.hpp"
+#include "visualizer/stop_signal.hpp"
+
+namespace kerf {
+
+namespace {
+
+constexpr auto kIdle = std::chrono::milliseconds(2);  // two ticks: a picture is at most that late
+constexpr double kMsPerS = 1e3;
+
+std::uint64_t ticks_between(const VisualizerOptions& options, std::uint32_t tick_ns) {
+  if (options.every_ticks) return *options.every_ticks;
+  constexpr double kNsPerS = 1e9;
+  const double seconds = options.seconds ? *options.seconds / options.frames : 1.0;
+  return std::max(std::uint64_t{1}, static_cast<std::uint64_t>(seconds * kNsPerS / tick_ns));
+}
+
+std::filesystem::path frame_file(const std::filesystem::path& folder, std::uint32_t number) {
+  std::array<char, 32> name{};
+  std::snprintf(name.data(), name.size(), "frame-%04u.png", number);
+  return folder / name.data();
+}
+
+/// Draws the session as it is and measures that.
+class FrameTaker {
+ public:
+  FrameTaker(Picture& picture, PictureSize size, FrameReport& report)
+      : picture_(picture), target_(size), report_(report) {}
+
+  void draw(const Session& session) {
+    OverlayFigures figures = overlay_figures(session);
+    if (!report_.wall_ms.empty()) figures.frame_rate_hz = kMsPerS / report_.wall_ms.back();
+    const Stopwatch watch;
+    picture_.draw(session, figures, target_);
+    glFinish();
+    report_.wall_ms.push_back(watch.wall_ms());
+    report_.cpu_ms.push_back(watch.cpu_ms());
+  }
+  void write(const std::filesystem::path& file) const {
+    write_png(file, target_.size(), target_.read_rgb());
+  }
+
+ private:
+  Picture& picture_;
+  RenderTarget target_;
+  FrameReport& report_;
+};
+
+}  // namespace
+
+int run_headless(const VisualizerOptions& options) {
+  place_process(options.cpus);
+  make_folder(options.out);
+  const auto context = make_headless_context();
+  const GlDriver driver = query_gl_driver();
+  FrameReport report{.renderer = options.renderer,
+                     .gl_renderer = driver.renderer,
+                     .context = to_string(context->kind()),
+                     .width = options.size.width,
+                     .height = options.size.height};
+
+  Session session = Session::attach(options.name, std::chrono::duration<double>(options.wait_s));
+  report.attach_ms = session.attach_ms();
+  const Stopwatch since_attached;
+  const double aspect = static_cast<double>(options.size.width) / options.size.height;
+  Picture picture(session, options.renderer, aspect);
+  FrameTaker taker(picture, options.size, report);
+  taker.draw(session);  // not kept: the driver compiles shaders at their first use
+  report.late_join_ms = since_attached.wall_ms();
+  report.cpu_ms.clear();
+  report.wall_ms.clear();
+
+  FrameSchedule schedule(options.frames, ticks_between(options, session.tick_ns()));
+  bool over = false;
+  while (!over && !schedule.complete()) {
+    over = session.ended() || stop_requested() ||
+           (options.seconds && since_attached.wall_ms() >= *options.seconds * kMsPerS);
+    session.poll();
+    picture.update(session);
+    const auto ticks = session.ticks_since_armed();
+    if (over ? schedule.final_due(ticks) : schedule.due(ticks)) taker.draw(session);
+    while (over ? schedule.final_due(ticks) : schedule.due(ticks)) {
+      taker.write(frame_file(options.out, schedule.take(ticks)));
+      if (!over) break;  // late pictures show the present, each its own
+    }
+    if (!over) std::this_thread::sleep_for(kIdle);
+  }
+
+  report.bricks_uploaded = picture.bricks_uploaded();
+  report.clean_end = session.ended_cleanly();
+  if (options.report) report.write(*options.report);
+  std::printf("%u pictures in %s, %.1f cpu ms each (%s)\n", schedule.taken(),
+              options.out.string().c_str(), percentile(report.cpu_ms, 0.5),
+              driver.renderer.c_str());
+  const bool lost = session.ended() && !session.ended_cleanly();
+  if (lost) std::fprintf(stderr, "kerf-visualizer: the controller went away without a clean end\n");
+  return lost ? 1 : 0;
+}
+
+}  // namespace kerf

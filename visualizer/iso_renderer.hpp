@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "visualizer/gl/program.hpp"
+#include "visualizer/renderer.hpp"
+
+namespace kerf {
+
+/// Iso-surfaces by ray casting in a fragment shader.
+///
+/// Per volume two passes. The first draws the faces between active and empty macrocells and keeps,
+/// per pixel, where its ray first meets an active cell; the second casts the ray from there. So
+/// pixels beside the volume cost nothing, and rays begin at most a cell before the surface.
+class IsoRenderer final : public Renderer {
+ public:
+  struct Options {
+    bool skip_empty = true;  ///< false: sample every ray from end to end, for comparison
+    float step_vox = 0.75F;  ///< a wall of one voxel, antialiased over two, is never stepped over
+  };
+
+  IsoRenderer(const SceneView& scene, std::span<const VolumeContent> contents)
+      : IsoRenderer(scene, contents, Options{}) {}
+  IsoRenderer(const SceneView& scene, std::span<const VolumeContent> contents, Options options);
+
+  void update(std::size_t volume, std::span<const Density> density,
+              std::span<const std::uint32_t> changed) override;
+  void draw(const View& view, const RenderTarget& target) override;
+
+ private:
+  /// Where the rays enter the active cells of the volume being drawn.
+  struct EntryBuffer {
+    explicit EntryBuffer(PictureSize size);
+    PictureSize size;
+    GlTexture2D entry_mm = GlTexture2D::create();
+    GlTexture2D depth = GlTexture2D::create();
+    GlFramebuffer framebuffer = GlFramebuffer::create();
+  };
+
+  void draw_entries(const VolumeOnGpu& volume, const View& view);
+  void cast_rays(const VolumeOnGpu& volume, const View& view, const RenderTarget& target);
+
+  Options options_;
+  GlProgram entry_program_{"cell_faces.vert", "cell_faces.frag"};
+  GlProgram cast_program_{"screen.vert", "iso.frag", "lighting.frag"};
+  GlVertexArray no_vertices_ = GlVertexArray::create();
+  GlTexture2D palette_ = GlTexture2D::create();
+  std::vector<VolumeOnGpu> volumes_;
+  std::optional<EntryBuffer> entries_;
+};
+
+}  // namespace kerf

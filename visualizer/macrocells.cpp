@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "visualizer/macrocells.hpp"
+
+#include <algorithm>
+
+namespace kerf {
+
+Macrocells::Macrocells(VoxelGrid volume, std::span<const Density> density, Density iso)
+    : volume_(volume),
+      grid_{volume.nx / kEdge + 1, volume.ny / kEdge + 1, volume.nz / kEdge + 1},
+      iso_(iso),
+      maxima_(grid_.voxel_count()),
+      active_(grid_.voxel_count()) {
+  for (std::int32_t z = 0; z < grid_.nz; ++z) {
+    for (std::int32_t y = 0; y < grid_.ny; ++y) {
+      for (std::int32_t x = 0; x < grid_.nx; ++x) update_cell({x, y, z}, density);
+    }
+  }
+}
+
+bool Macrocells::update_cell(VoxelIndex cell, std::span<const Density> density) {
+  const VoxelIndex lo{cell.x * kEdge - 1, cell.y * kEdge - 1, cell.z * kEdge - 1};
+  const VoxelBox box =
+      VoxelBox{lo, {lo.x + kEdge + 1, lo.y + kEdge + 1, lo.z + kEdge + 1}}.clipped(volume_.box());
+  Density highest = 0;
+  for (std::int32_t z = box.lo.z; z < box.hi.z; ++z) {
+    for (std::int32_t y = box.lo.y; y < box.hi.y; ++y) {
+      const auto row = density.subspan(volume_.index(box.lo.x, y, z),
+                                       static_cast<std::size_t>(box.hi.x - box.lo.x));
+      for (const Density d : row) highest = std::max(highest, d);
+    }
+  }
+  const std::size_t at = grid_.index(cell.x, cell.y, cell.z);
+  const std::uint8_t before = active_[at];
+  maxima_[at] = highest;
+  active_[at] = highest >= iso_ ? 1 : 0;
+  return active_[at] != before;
+}
+
+bool Macrocells::update_brick(VoxelIndex at, std::span<const Density> density) {
+  const VoxelBox touched = VoxelBox{at, {at.x + 2, at.y + 2, at.z + 2}}.clipped(grid_.box());
+  bool flipped = false;
+  for (std::int32_t z = touched.lo.z; z < touched.hi.z; ++z) {
+    for (std::int32_t y = touched.lo.y; y < touched.hi.y; ++y) {
+      for (std::int32_t x = touched.lo.x; x < touched.hi.x; ++x) {
+        flipped = update_cell({x, y, z}, density) || flipped;
+      }
+    }
+  }
+  return flipped;
+}
+
+std::vector<std::array<std::uint16_t, 4>> Macrocells::boundary_faces() const {
+  constexpr std::array<VoxelIndex, 6> kNeighbour{
+      {{-1, 0, 0}, {1, 0, 0}, {0, -1, 0}, {0, 1, 0}, {0, 0, -1}, {0, 0, 1}}};
+  const auto is_active = [this](VoxelIndex c) {
+    return grid_.contains(c) && active_[grid_.index(c.x, c.y, c.z)] != 0;
+  };
+  std::vector<std::array<std::uint16_t, 4>> faces;
+  for (std::int32_t z = 0; z < grid_.nz; ++z) {
+    for (std::int32_t y = 0; y < grid_.ny; ++y) {
+      for (std::int32_t x = 0; x < grid_.nx; ++x) {
+        if (!is_active({x, y, z})) continue;
+        for (std::size_t face = 0; face < kNeighbour.size(); ++face) {
+          const VoxelIndex n = kNeighbour[face];
+          if (is_active({x + n.x, y + n.y, z + n.z})) continue;
+          faces.push_back({static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y),
+                           static_cast<std::uint16_t>(z), static_cast<std::uint16_t>(face)});
+        }
+      }
+    }
+  }
+  return faces;
+}
+
+}  // namespace kerf

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "shared/volume/voxel_grid.hpp"
+
+namespace kerf {
+
+/// The highest density in each cell of 8^3 voxel edges, so that rays pass over cells that cannot
+/// hold the iso-surface.
+///
+/// Air surrounds the volume: its surface is closed at the border too. Cell (i, j, k) spans voxel
+/// coordinates 8i-1 to 8i+7 on each axis and its maximum covers both ends, so it bounds every
+/// trilinear sample in the cell. A changed brick (voxels 8b to 8b+7) touches cells b and b+1.
+class Macrocells {
+ public:
+  static constexpr std::int32_t kEdge = 8;
+
+  Macrocells(VoxelGrid volume, std::span<const Density> density, Density iso);
+
+  /// Recomputes the cells that brick `at` (in bricks, not voxels) touches. Returns whether a cell
+  /// became active or inactive.
+  bool update_brick(VoxelIndex at, std::span<const Density> density);
+
+  [[nodiscard]] const VoxelGrid& grid() const noexcept { return grid_; }
+  [[nodiscard]] std::span<const Density> maxima() const noexcept { return maxima_; }
+  /// 1 where a sample may reach iso.
+  [[nodiscard]] std::span<const std::uint8_t> active() const noexcept { return active_; }
+
+  /// Faces between an active cell and an inactive one or the outside, `{x, y, z, face}` with face
+  /// 2*axis + (1 when on the high side): where a ray enters or leaves what it must sample.
+  [[nodiscard]] std::vector<std::array<std::uint16_t, 4>> boundary_faces() const;
+
+ private:
+  bool update_cell(VoxelIndex cell, std::span<const Density> density);
+
+  VoxelGrid volume_;
+  VoxelGrid grid_;
+  Density iso_;
+  std::vector<Density> maxima_;
+  std::vector<std::uint8_t> active_;
+};
+
+}  // namespace kerf

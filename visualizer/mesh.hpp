@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include <glm/glm.hpp>
+
+namespace kerf {
+
+/// Triangles with a normal per vertex; counter-clockwise from the outside.
+struct Mesh {
+  struct Vertex {
+    glm::vec3 position;
+    glm::vec3 normal;
+  };
+  std::vector<Vertex> vertices;
+  std::vector<std::uint32_t> triangles;  ///< three indices each
+
+  void append(const Mesh& other);
+};
+
+/// A profile point: height on the axis (y) and distance from it.
+using ProfilePoint = std::array<double, 2>;
+
+/// The closed body that `profile` (from low to high y) sweeps about the y axis; flat lids close an
+/// end that is not on the axis. Edges sharper than 40 degrees stay sharp. Empty for fewer than two
+/// points.
+[[nodiscard]] Mesh lathe(std::span<const ProfilePoint> profile);
+
+/// A bur: the head from its profile (mm) and a shank along +y, thinner than the head.
+[[nodiscard]] Mesh tool_mesh(std::span<const ProfilePoint> profile_mm);
+
+/// Cylinder of radius 1 from y = 0 to 1, and cone of base radius 1 from y = 0 to its tip at 1.
+[[nodiscard]] Mesh unit_cylinder();
+[[nodiscard]] Mesh unit_cone();
+
+}  // namespace kerf

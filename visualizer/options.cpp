@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "visualizer/options.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <iostream>
+#include <string_view>
+
+#include <CLI/CLI.hpp>
+
+#include "visualizer/error.hpp"
+#include "visualizer/renderer.hpp"
+
+namespace kerf {
+
+namespace {
+
+constexpr const char* kKeys =
+    "In the window: drag turns, shift or middle drag moves, the wheel zooms, 1..9 take a tool,\n"
+    "r first view, s screenshot, h keys, q quit.\n"
+    "Exit codes: 0 fine, 1 the controller did not end cleanly, 2 bad input or set-up.";
+
+/// CLI11 explains over several lines; a user wants one.
+std::string one_line(std::string text) {
+  std::replace(text.begin(), text.end(), '\n', ' ');
+  return text;
+}
+
+}  // namespace
+
+PictureSize parse_size(const std::string& text) {
+  const std::string_view all = text;
+  const std::size_t cross = all.find('x');
+  const auto side = [](std::string_view digits, int& value) {
+    const auto [end, error] = std::from_chars(digits.begin(), digits.end(), value);
+    return error == std::errc() && end == digits.end() && value >= 1 &&
+           value <= PictureSize::kMaxSide;
+  };
+  PictureSize size;
+  if (cross == std::string_view::npos || !side(all.substr(0, cross), size.width) ||
+      !side(all.substr(cross + 1), size.height)) {
+    throw VisualizerError("--size: " + text +
+                          " is no size; give WIDTHxHEIGHT in pixels, each 1 to " +
+                          std::to_string(PictureSize::kMaxSide) + ", for example 640x480");
+  }
+  return size;
+}
+
+std::optional<VisualizerOptions> parse_options(int argc, const char* const* argv) {
+  VisualizerOptions options;
+  std::string size = "800x600";
+  CLI::App app("Shows what a kerf-controller feels and mills, in a window or as PNG pictures.",
+               "kerf-visualizer");
+  app.footer(kKeys);
+  app.set_version_flag("--version", std::string("kerf-visualizer " KERF_VERSION));
+  app.add_option("--name", options.name, "the controller's name")->capture_default_str();
+  app.add_option("--renderer", options.renderer, "how volumes are drawn: iso")
+      ->capture_default_str();
+  app.add_option("--size", size, "width and height in pixels")->capture_default_str();
+  app.add_flag("--headless", options.headless, "no window: pictures into --out");
+  app.add_option("--frames", options.frames, "headless: number of pictures")
+      ->check(CLI::Range(1, 9999))
+      ->capture_default_str();
+  app.add_option("--every-ticks", options.every_ticks,
+                 "headless: servo ticks between pictures (default: one second)")
+      ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1} << 40));
+  app.add_option("--out", options.out, "folder for pictures and screenshots")
+      ->capture_default_str();
+  app.add_option("--seconds", options.seconds, "end after this time")->check(CLI::Range(0.0, 1e6));
+  app.add_option("--wait", options.wait_s, "seconds to wait for the controller")
+      ->check(CLI::Range(0.0, 1e6))
+      ->capture_default_str();
+  app.add_option("--cpu", options.cpus, "cores to run on, e.g. 0,1 (default: all but the last)")
+      ->delimiter(',')
+      ->check(CLI::Range(0, 1023));
+  app.add_option("--report", options.report, "write times and counts to this JSON file");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::Success& asked) {  // --help, --version
+    app.exit(asked, std::cout, std::cerr);
+    return std::nullopt;
+  } catch (const CLI::ParseError& problem) {
+    throw VisualizerError(one_line(problem.what()) + "; see --help");
+  }
+  options.size = parse_size(size);
+  check_renderer(options.renderer);
+  return options;
+}
+
+}  // namespace kerf

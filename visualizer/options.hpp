@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "visualizer/gl/target.hpp"
+
+namespace kerf {
+
+/// The command line of kerf-visualizer.
+struct VisualizerOptions {
+  std::string name = "kerf";  ///< of the controller
+  std::string renderer = "iso";
+  PictureSize size{800, 600};
+  bool headless = false;
+  std::uint32_t frames = 10;                 ///< headless: this many pictures
+  std::optional<std::uint64_t> every_ticks;  ///< headless: default once a second of servo time
+  std::filesystem::path out = ".";           ///< pictures, screenshots
+  std::optional<double> seconds;             ///< ends after this time; default: with the controller
+  double wait_s = 10.0;                      ///< for the controller to appear
+  std::vector<int> cpus;                     ///< empty: all but the last one
+  std::optional<std::filesystem::path> report;
+};
+
+/// "WxH"; throws VisualizerError.
+[[nodiscard]] PictureSize parse_size(const std::string& text);
+
+/// Throws VisualizerError for a value that cannot be used, and nothing else: `--help` and
+/// `--version` print and give no options.
+[[nodiscard]] std::optional<VisualizerOptions> parse_options(int argc, const char* const* argv);
+
+}  // namespace kerf

@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "visualizer/overlay.hpp"
+
+#include <algorithm>
+#include <array>
+#include <string_view>
+
+#include <backends/imgui_impl_opengl3.h>
+#include <imgui.h>
+
+#include "visualizer/error.hpp"
+
+namespace kerf {
+
+namespace {
+
+// Okabe and Ito's colours: told apart with any kind of colour vision.
+const ImVec4 kCalm{0.34F, 0.71F, 0.91F, 1.0F};
+const ImVec4 kStrong{0.90F, 0.62F, 0.00F, 1.0F};
+const ImVec4 kLimit{0.84F, 0.37F, 0.00F, 1.0F};
+const ImVec4 kLabel{0.66F, 0.69F, 0.73F, 1.0F};
+const ImVec4 kValue{0.95F, 0.96F, 0.97F, 1.0F};
+constexpr ImGuiWindowFlags kStill =
+    ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoInputs | ImGuiWindowFlags_AlwaysAutoResize |
+    ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_NoFocusOnAppearing | ImGuiWindowFlags_NoNav;
+
+constexpr auto kKeys = std::to_array<std::array<const char*, 2>>({
+    {"drag", "turn"},
+    {"shift or middle drag", "move"},
+    {"wheel", "nearer, farther"},
+    {"1 .. 9", "take this tool"},
+    {"r", "first view again"},
+    {"s", "screenshot"},
+    {"h", "these keys"},
+    {"q", "quit"},
+});
+
+void row(const char* label, const char* format, double value) {
+  ImGui::TableNextRow();
+  ImGui::TableNextColumn();
+  ImGui::TextColored(kLabel, "%s", label);
+  ImGui::TableNextColumn();
+  ImGui::TextColored(kValue, format, value);
+}
+
+void row(const char* label, const std::string& value) {
+  ImGui::TableNextRow();
+  ImGui::TableNextColumn();
+  ImGui::TextColored(kLabel, "%s", label);
+  ImGui::TableNextColumn();
+  ImGui::TextColored(kValue, "%s", value.c_str());
+}
+
+void force_bar(const OverlayFigures& figures) {
+  const auto share =
+      static_cast<float>(std::clamp(figures.force_n / figures.full_force_n, 0.0, 1.0));
+  constexpr float kStrongFrom = 0.5F;
+  constexpr float kLimitFrom = 0.9F;
+  const ImVec4& colour = share < kStrongFrom ? kCalm : share < kLimitFrom ? kStrong : kLimit;
+  ImGui::PushStyleColor(ImGuiCol_PlotHistogram, colour);
+  ImGui::ProgressBar(share, ImVec2(170.0F, 7.0F), "");
+  ImGui::PopStyleColor();
+}
+
+void panel(const OverlayFigures& figures) {
+  ImGui::SetNextWindowPos(ImVec2(12.0F, 12.0F));
+  ImGui::Begin("figures", nullptr, kStill);
+  if (ImGui::BeginTable("force", 2)) {
+    row("force", "%.2f N", figures.force_n);
+    ImGui::EndTable();
+  }
+  force_bar(figures);
+  if (ImGui::BeginTable("rows", 2)) {
+    if (!figures.tool.empty()) row("tool", figures.tool);
+    row(figures.removed_is_partial ? "removed since joining" : "removed", "%.2f mm3",
+        figures.removed_mm3);
+    if (figures.tick_rate_hz) row("servo", "%.0f Hz", *figures.tick_rate_hz);
+    if (figures.frame_rate_hz) row("picture", "%.0f /s", *figures.frame_rate_hz);
+    if (figures.data_age_ms) row("data age", "%.1f ms", *figures.data_age_ms);
+    ImGui::EndTable();
+  }
+  ImGui::End();
+}
+
+void banner(const std::string& text, ImVec2 size) {
+  ImGui::SetNextWindowPos(ImVec2(0.5F * size.x, size.y - 14.0F), 0, ImVec2(0.5F, 1.0F));
+  ImGui::PushStyleColor(ImGuiCol_WindowBg, ImVec4(0.45F, 0.20F, 0.0F, 0.92F));
+  ImGui::Begin("banner", nullptr, kStill);
+  ImGui::TextColored(kValue, "%s", text.c_str());
+  ImGui::End();
+  ImGui::PopStyleColor();
+}
+
+void key_help(ImVec2 size) {
+  ImGui::SetNextWindowPos(ImVec2(size.x - 12.0F, 12.0F), 0, ImVec2(1.0F, 0.0F));
+  ImGui::Begin("keys", nullptr, kStill);
+  if (ImGui::BeginTable("keys", 2)) {
+    for (const auto& [key, meaning] : kKeys) row(key, std::string(meaning));
+    ImGui::EndTable();
+  }
+  ImGui::End();
+}
+
+}  // namespace
+
+Overlay::Overlay() {
+  ImGui::CreateContext();
+  ImGuiIO& io = ImGui::GetIO();
+  io.IniFilename = nullptr;  // leaves no file behind
+  ImGuiStyle& style = ImGui::GetStyle();
+  ImGui::StyleColorsDark(&style);
+  style.WindowRounding = 5.0F;
+  style.FrameRounding = 3.0F;
+  style.WindowBorderSize = 0.0F;
+  style.WindowPadding = ImVec2(11.0F, 9.0F);
+  style.CellPadding = ImVec2(4.0F, 1.5F);
+  style.Colors[ImGuiCol_WindowBg] = ImVec4(0.04F, 0.05F, 0.06F, 0.72F);
+  style.Colors[ImGuiCol_FrameBg] = ImVec4(1.0F, 1.0F, 1.0F, 0.12F);
+  if (!ImGui_ImplOpenGL3_Init("#version 450 core")) {
+    ImGui::DestroyContext();
+    throw VisualizerError("overlay: Dear ImGui finds no OpenGL functions; install libgl1");
+  }
+}
+
+Overlay::~Overlay() {
+  ImGui_ImplOpenGL3_Shutdown();
+  ImGui::DestroyContext();
+}
+
+void Overlay::draw(const OverlayFigures& figures, const RenderTarget& target) {
+  target.bind();
+  ImGuiIO& io = ImGui::GetIO();
+  io.DisplaySize =
+      ImVec2(static_cast<float>(target.size().width), static_cast<float>(target.size().height));
+  ImGui_ImplOpenGL3_NewFrame();
+  // ImGui learns the size of what a panel holds by laying it out: the second time is right.
+  for (int pass = 0; pass < 2; ++pass) {
+    ImGui::NewFrame();
+    panel(figures);
+    if (!figures.banner.empty()) banner(figures.banner, io.DisplaySize);
+    if (figures.help) key_help(io.DisplaySize);
+    ImGui::Render();
+  }
+  ImGui_ImplOpenGL3_RenderDrawData(ImGui::GetDrawData());
+}
+
+}  // namespace kerf

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <span>
+#include <vector>
+
+#include <glm/glm.hpp>
+
+#include "visualizer/scene_view.hpp"
+
+namespace kerf {
+
+inline constexpr int kPaletteWidth = 256;
+
+/// Linear colours in two rows: by density (entry i is density i/255; adjoining materials blend over
+/// a narrow band, so that their border is smooth on a cut), then by label. Material 0 is "none" and
+/// colours nothing; without others everything is ivory.
+[[nodiscard]] std::array<std::array<glm::vec4, kPaletteWidth>, 2> make_palette(
+    std::span<const MaterialView> materials);
+
+}  // namespace kerf

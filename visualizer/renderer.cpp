@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "visualizer/renderer.hpp"
+
+#include <algorithm>
+#include <array>
+#include <string>
+
+#include "visualizer/error.hpp"
+#include "visualizer/iso_renderer.hpp"
+
+namespace kerf {
+
+namespace {
+
+using Make = std::unique_ptr<Renderer> (*)(const SceneView&, std::span<const VolumeContent>);
+
+struct Kind {
+  std::string_view name;
+  Make make;
+};
+
+constexpr auto kKinds = std::to_array<Kind>({
+    {"iso",
+     [](const SceneView& scene, std::span<const VolumeContent> contents)
+         -> std::unique_ptr<Renderer> { return std::make_unique<IsoRenderer>(scene, contents); }},
+});
+
+const Kind& find_kind(std::string_view name) {
+  const auto found = std::find_if(kKinds.begin(), kKinds.end(),
+                                  [&](const Kind& kind) { return kind.name == name; });
+  if (found != kKinds.end()) return *found;
+  std::string known;
+  for (const Kind& kind : kKinds) known += (known.empty() ? "" : ", ") + std::string(kind.name);
+  throw VisualizerError("--renderer: " + std::string(name) + " is unknown; known: " + known);
+}
+
+}  // namespace
+
+std::unique_ptr<Renderer> make_renderer(std::string_view kind, const SceneView& scene,
+                                        std::span<const VolumeContent> contents) {
+  return find_kind(kind).make(scene, contents);
+}
+
+void check_renderer(std::string_view kind) {
+  static_cast<void>(find_kind(kind));
+}
+
+}  // namespace kerf

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string_view>
+
+#include "visualizer/camera.hpp"
+#include "visualizer/gl/target.hpp"
+#include "visualizer/scene_view.hpp"
+#include "visualizer/volume_on_gpu.hpp"
+
+namespace kerf {
+
+/// Draws the volumes of one session. Every renderer writes colour and true depth (equation (1)), so
+/// several volumes, the tool and other meshes hide one another as they should.
+///
+/// Lives and is called on the thread whose GL context is current.
+class Renderer {
+ public:
+  virtual ~Renderer() = default;
+
+  /// Brick ids `changed` of a volume differ from what was drawn last; `density` is all of it.
+  virtual void update(std::size_t volume, std::span<const Density> density,
+                      std::span<const std::uint32_t> changed) = 0;
+  /// Draws over what is in `target`, under its depth test.
+  virtual void draw(const View& view, const RenderTarget& target) = 0;
+};
+
+/// `kind` as on the command line; throws VisualizerError for an unknown one and names the known.
+[[nodiscard]] std::unique_ptr<Renderer> make_renderer(std::string_view kind, const SceneView& scene,
+                                                      std::span<const VolumeContent> contents);
+
+/// Throws as `make_renderer` does; needs no GL context.
+void check_renderer(std::string_view kind);
+
+}  // namespace kerf

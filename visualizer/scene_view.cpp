@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "visualizer/scene_view.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include <glm/gtc/matrix_transform.hpp>
+#include <glm/gtc/quaternion.hpp>
+#include <nlohmann/json.hpp>
+
+#include "visualizer/error.hpp"
+
+namespace kerf {
+
+namespace {
+
+using nlohmann::json;
+
+constexpr std::size_t kMaxProfilePoints = 4096;  // a mesh of some 10^5 triangles
+
+ToolView tool_view(const json& text) {
+  ToolView tool;
+  tool.name = text.at("name").get<std::string>();
+  for (const json& point : text.at("profile")) {
+    const auto at = point.get<std::array<double, 2>>();
+    if (!std::isfinite(at[0]) || !std::isfinite(at[1]) || at[1] < 0.0) {
+      throw VisualizerError("segment scene: tool " + tool.name +
+                            " has a profile point that is no height and radius; restart the "
+                            "controller");
+    }
+    tool.profile_mm.push_back(at);
+  }
+  if (tool.profile_mm.size() > kMaxProfilePoints) {
+    throw VisualizerError("segment scene: tool " + tool.name + " has " +
+                          std::to_string(tool.profile_mm.size()) + " profile points; at most " +
+                          std::to_string(kMaxProfilePoints));
+  }
+  return tool;
+}
+
+MaterialView material_view(const json& text) {
+  const auto colour = text.at("colour").get<std::array<double, 3>>();
+  return {.name = text.at("name").get<std::string>(),
+          .iso = text.at("iso").get<double>(),
+          .colour = {colour[0], colour[1], colour[2]}};
+}
+
+VolumeView volume_view(const SegmentVolumeInfo& info) {
+  const auto& q = info.orientation;
+  const auto& o = info.origin_mm;
+  const auto& s = info.spacing_mm;
+  VolumeView volume;
+  volume.bricks = info.bricks;
+  volume.world_from_voxel =
+      glm::scale(rigid({o[0], o[1], o[2]}, {q[0], q[1], q[2], q[3]}), glm::dvec3(s[0], s[1], s[2]));
+  // Iso 0 would make the air around a volume solid.
+  volume.iso = static_cast<Density>(std::clamp<std::uint32_t>(info.iso, 1, 65535));
+  return volume;
+}
+
+}  // namespace
+
+glm::dmat4 rigid(const glm::dvec3& position_mm, const glm::dvec4& q) {
+  const glm::dquat rotation(q.w, q.x, q.y, q.z);
+  const double length = glm::length(rotation);
+  glm::dmat4 pose = length > 0.0 ? glm::mat4_cast(rotation / length) : glm::dmat4(1.0);
+  pose[3] = glm::dvec4(position_mm, 1.0);
+  return pose;
+}
+
+BoxCorners VolumeView::corners() const {
+  const VoxelGrid& n = bricks.grid;
+  BoxCorners corners;
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    const glm::dvec4 voxel((i & 1) != 0 ? n.nx - 0.5 : -0.5, (i & 2) != 0 ? n.ny - 0.5 : -0.5,
+                           (i & 4) != 0 ? n.nz - 0.5 : -0.5, 1.0);
+    corners[i] = glm::dvec3(world_from_voxel * voxel);
+  }
+  return corners;
+}
+
+const VolumeView& SceneView::main_volume() const {
+  const auto solid = std::find_if(volumes.begin(), volumes.end(),
+                                  [](const VolumeView& volume) { return volume.solid; });
+  return solid != volumes.end() ? *solid : volumes.front();
+}
+
+SceneView scene_view(const SegmentInfo& segment) {
+  SceneView scene;
+  for (const SegmentVolumeInfo& info : segment.volumes) scene.volumes.push_back(volume_view(info));
+  try {
+    const json text = json::parse(segment.scene_json);
+    const json& volumes = text.at("volumes");
+    for (std::size_t i = 0; i < scene.volumes.size() && i < volumes.size(); ++i) {
+      scene.volumes[i].name = volumes[i].at("name").get<std::string>();
+      scene.volumes[i].solid = volumes[i].at("solid").get<bool>();
+    }
+    for (const json& tool : text.at("tools")) scene.tools.push_back(tool_view(tool));
+    for (const json& one : text.at("materials")) scene.materials.push_back(material_view(one));
+  } catch (const json::exception& problem) {
+    throw VisualizerError("segment scene: " + std::string(problem.what()) +
+                          "; start controller and visualizer of one version");
+  }
+  return scene;
+}
+
+}  // namespace kerf

@@ -1,0 +1,148 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "visualizer/session.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <thread>
+
+namespace kerf {
+
+namespace {
+
+constexpr auto kAttachPause = std::chrono::milliseconds(20);
+constexpr std::uint64_t kRateSpan = 500;  // ticks; half a second at 1 kHz
+
+double now_ns() {
+  using std::chrono::nanoseconds;
+  // The steady clock is CLOCK_MONOTONIC, the one that the segment's times come from.
+  return std::chrono::duration<double, std::nano>(
+             std::chrono::steady_clock::now().time_since_epoch())
+      .count();
+}
+
+double voxel_mm3(const VolumeView& volume) {
+  return std::abs(glm::determinant(glm::dmat3(volume.world_from_voxel)));
+}
+
+}  // namespace
+
+Session::Session(std::string_view name)
+    : connection_(connect_segment(name)),
+      scene_(scene_view(connection_.reader().info())),
+      snapshots_(scene_.volumes.size()) {
+  poll();
+  attach_ms_ = began_.wall_ms();
+}
+
+Session Session::attach(std::string_view name, std::chrono::duration<double> wait) {
+  const auto start = std::chrono::steady_clock::now();
+  while (true) {
+    try {
+      return Session(name);
+    } catch (const SegmentError&) {
+      if (std::chrono::steady_clock::now() - start >= wait) throw;
+    }
+    std::this_thread::sleep_for(kAttachPause);
+  }
+}
+
+void Session::poll() {
+  read_states();
+  read_removals();
+  for (std::size_t v = 0; v < snapshots_.size(); ++v) {
+    connection_.reader().update(v, snapshots_[v]);
+  }
+}
+
+void Session::read_states() {
+  const SegmentReader& reader = connection_.reader();
+  const std::uint64_t head = reader.state_head();
+  const std::uint64_t slots = reader.info().state_slots;
+  if (!armed_) {
+    if (head - next_state_ > slots) next_state_ = head - slots;
+    TickRecord record;
+    for (; next_state_ < head && !armed_; ++next_state_) {
+      if (reader.state_at(next_state_, record) != ReadState::ok) continue;
+      if ((record.flags & kFlagArmed) != 0) armed_ = record.tick;
+    }
+  }
+  if (auto newest = reader.latest()) latest_ = newest;
+}
+
+void Session::read_removals() {
+  const SegmentReader& reader = connection_.reader();
+  const std::uint64_t head = reader.dirty_head();
+  const std::uint64_t slots = reader.info().dirty_slots;
+  if (head - next_removal_ > slots) {
+    next_removal_ = head - slots;
+    joined_late_ = true;
+  }
+  DirtyRecord record;
+  for (; next_removal_ < head; ++next_removal_) {
+    if (reader.dirty_at(next_removal_, record) != ReadState::ok) {
+      joined_late_ = true;  // overrun while reading: something is not counted
+      continue;
+    }
+    if (record.volume >= scene_.volumes.size()) continue;
+    removed_mm3_ += record.removed / kDensityMax * voxel_mm3(scene_.volumes[record.volume]);
+  }
+}
+
+std::vector<VolumeContent> Session::contents() const {
+  std::vector<VolumeContent> contents;
+  for (std::size_t v = 0; v < snapshots_.size(); ++v) {
+    contents.push_back({snapshots_[v].density, connection_.reader().labels(v)});
+  }
+  return contents;
+}
+
+const VolumeSnapshot& Session::snapshot(std::size_t volume) const {
+  return snapshots_[volume];
+}
+
+std::optional<std::uint64_t> Session::ticks_since_armed() const noexcept {
+  if (!armed_ || !latest_ || latest_->tick < *armed_) return std::nullopt;
+  return latest_->tick - *armed_;
+}
+
+std::optional<double> Session::tick_rate_hz() const {
+  const SegmentReader& reader = connection_.reader();
+  const std::uint64_t head = reader.state_head();
+  TickRecord earlier;
+  if (!latest_ || head <= kRateSpan) return std::nullopt;
+  if (reader.state_at(head - 1 - kRateSpan, earlier) != ReadState::ok) return std::nullopt;
+  if (latest_->start_ns <= earlier.start_ns) return std::nullopt;
+  constexpr double kNsPerS = 1e9;
+  return static_cast<double>(latest_->tick - earlier.tick) * kNsPerS /
+         static_cast<double>(latest_->start_ns - earlier.start_ns);
+}
+
+std::optional<double> Session::data_age_ms() const {
+  const std::uint64_t heartbeat_ns = connection_.reader().heartbeat_ns();
+  if (heartbeat_ns == 0) return std::nullopt;
+  constexpr double kNsPerMs = 1e6;
+  return std::max(0.0, (now_ns() - static_cast<double>(heartbeat_ns)) / kNsPerMs);
+}
+
+std::uint32_t Session::tick_ns() const noexcept {
+  return connection_.reader().info().tick_ns;
+}
+
+bool Session::ended() const noexcept {
+  return connection_.reader().lifecycle() >= Lifecycle::clean_end || !connection_.alive();
+}
+
+bool Session::ended_cleanly() const noexcept {
+  return connection_.reader().lifecycle() == Lifecycle::clean_end;
+}
+
+bool Session::select_tool(std::uint32_t index) {
+  try {
+    const Command command{.kind = CommandKind::select_tool, .index = 0, .argument = index};
+    return connection_.send(command).status == ReplyStatus::accepted;
+  } catch (const SegmentError&) {
+    return false;  // it has gone; the picture says so
+  }
+}
+
+}  // namespace kerf

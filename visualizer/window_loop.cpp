@@ -1,0 +1,192 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <array>
+#include <chrono>
+#include <cstdio>
+#include <deque>
+#include <limits>
+#include <optional>
+#include <thread>
+#include <utility>
+
+#include "visualizer/cpu_placement.hpp"
+#include "visualizer/error.hpp"
+#include "visualizer/file_out.hpp"
+#include "visualizer/frame_report.hpp"
+#include "visualizer/gl/window.hpp"
+#include "visualizer/picture.hpp"
+#include "visualizer/run.hpp"
+#include "visualizer/stop_signal.hpp"
+
+namespace kerf {
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr auto kFrame = std::chrono::microseconds(16'667);  // no faster than screens refresh
+constexpr auto kReattachPause = std::chrono::milliseconds(500);
+constexpr auto kRateSpan = std::chrono::seconds(1);
+
+/// Frames begun in the last second.
+class FrameRate {
+ public:
+  void count(Clock::time_point now) {
+    frames_.push_back(now);
+    while (now - frames_.front() > kRateSpan) frames_.pop_front();
+  }
+  [[nodiscard]] std::optional<double> hz() const {
+    if (frames_.size() < 2) return std::nullopt;
+    const std::chrono::duration<double> span = frames_.back() - frames_.front();
+    return static_cast<double>(frames_.size() - 1) / span.count();
+  }
+
+ private:
+  std::deque<Clock::time_point> frames_;
+};
+
+std::filesystem::path unused_screenshot(const std::filesystem::path& folder) {
+  for (int i = 1;; ++i) {
+    std::array<char, 32> name{};
+    std::snprintf(name.data(), name.size(), "kerf-%04d.png", i);
+    if (!std::filesystem::exists(folder / name.data())) return folder / name.data();
+  }
+}
+
+/// A full disk must not end a session at the screen.
+void take_screenshot(const std::filesystem::path& folder, const RenderTarget& target) {
+  try {
+    make_folder(folder);
+    const std::filesystem::path file = unused_screenshot(folder);
+    write_png(file, target.size(), target.read_rgb());
+    std::printf("screenshot: %s\n", file.string().c_str());
+  } catch (const VisualizerError& problem) {
+    std::fprintf(stderr, "kerf-visualizer: %s\n", problem.what());
+  }
+}
+
+/// What keys and drags change.
+struct Controls {
+  bool help = false;
+  bool screenshot = false;
+
+  /// True when the user wants to leave.
+  bool apply(const WindowInput& input, Session& session, Picture& picture, double aspect) {
+    picture.camera().orbit(input.turn_right, input.turn_up);
+    picture.camera().pan(input.move_right, input.move_up);
+    if (input.wheel != 0.0) picture.camera().zoom(input.wheel);
+    bool quit = input.close;
+    for (const char key : input.keys) {
+      if (key == 'q') quit = true;
+      if (key == 'r') picture.reset_camera(aspect);
+      if (key == 's') screenshot = true;
+      if (key == 'h') help = !help;
+      const int tool = key - '1';
+      if (tool >= 0 && tool < static_cast<int>(session.scene().tools.size())) {
+        session.select_tool(static_cast<std::uint32_t>(tool));
+      }
+    }
+    return quit;
+  }
+};
+
+/// The session on the screen and its picture; a controller that was restarted under the same name
+/// takes the place of the one that ended.
+class Followed {
+ public:
+  Followed(const VisualizerOptions& options, Session first, double aspect)
+      : options_(options),
+        session_(std::move(first)),
+        picture_(std::in_place, session_, options.renderer, aspect) {}
+
+  [[nodiscard]] Session& session() noexcept { return session_; }
+  [[nodiscard]] Picture& picture() noexcept { return *picture_; }
+  [[nodiscard]] std::uint64_t bricks_uploaded() const {
+    return earlier_bricks_ + picture_->bricks_uploaded();
+  }
+
+  void update(double aspect) {
+    if (session_.ended() && Clock::now() >= next_attach_) attach_again(aspect);
+    session_.poll();
+    picture_->update(session_);
+  }
+
+ private:
+  void attach_again(double aspect) {
+    next_attach_ = Clock::now() + kReattachPause;
+    try {
+      session_ = Session(options_.name);
+    } catch (const SegmentError&) {
+      return;  // not there yet
+    }
+    earlier_bricks_ += picture_->bricks_uploaded();
+    picture_.reset();  // before the new one: one overlay at a time
+    picture_.emplace(session_, options_.renderer, aspect);
+  }
+
+  const VisualizerOptions& options_;
+  Session session_;
+  std::optional<Picture> picture_;
+  std::uint64_t earlier_bricks_ = 0;
+  Clock::time_point next_attach_{};
+};
+
+void draw_measured(Followed& followed, const OverlayFigures& figures, const RenderTarget& target,
+                   FrameReport& report) {
+  const Stopwatch watch;
+  followed.picture().draw(followed.session(), figures, target);
+  glFinish();
+  report.wall_ms.push_back(watch.wall_ms());
+  report.cpu_ms.push_back(watch.cpu_ms());
+}
+
+}  // namespace
+
+int run_window(const VisualizerOptions& options) {
+  place_process(options.cpus);
+  Session first = Session::attach(options.name, std::chrono::duration<double>(options.wait_s));
+  FrameReport report{.renderer = options.renderer};
+  report.attach_ms = first.attach_ms();
+  const Stopwatch since_attached;
+  Window window(options.size, Window::Visibility::shown);
+  window.set_title("kerf: " + options.name);
+  const GlDriver driver = query_gl_driver();
+  report.gl_renderer = driver.renderer;
+  report.context = to_string(window.kind());
+
+  double aspect = static_cast<double>(options.size.width) / options.size.height;
+  Followed followed(options, std::move(first), aspect);
+  std::optional<RenderTarget> target;
+  FrameRate rate;
+  Controls controls;
+  constexpr double kMsPerS = 1e3;
+  const double end_ms = options.seconds.value_or(std::numeric_limits<double>::infinity()) * kMsPerS;
+  while (!stop_requested() && since_attached.wall_ms() < end_ms) {
+    const auto begin = Clock::now();
+    const PictureSize size = window.size();
+    const bool visible = size.width > 0 && size.height > 0;
+    if (visible) aspect = static_cast<double>(size.width) / size.height;
+    if (controls.apply(window.poll(), followed.session(), followed.picture(), aspect)) break;
+    followed.update(aspect);
+    if (visible) {
+      if (!target || target->size() != size) target.emplace(size);
+      rate.count(begin);
+      OverlayFigures figures = overlay_figures(followed.session());
+      figures.frame_rate_hz = rate.hz();
+      figures.help = controls.help;
+      draw_measured(followed, figures, *target, report);
+      if (report.wall_ms.size() == 1) report.late_join_ms = since_attached.wall_ms();
+      if (controls.screenshot) take_screenshot(options.out, *target);
+      controls.screenshot = false;
+      window.present(*target);
+      report.width = size.width;
+      report.height = size.height;
+    }
+    std::this_thread::sleep_until(begin + kFrame);
+  }
+  report.bricks_uploaded = followed.bricks_uploaded();
+  report.clean_end = followed.session().ended_cleanly();
+  if (options.report) report.write(*options.report);
+  return 0;
+}
+
+}  // namespace kerf
