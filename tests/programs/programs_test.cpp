@@ -1,0 +1,206 @@
+// SPDX-License-Identifier: Apache-2.0
+// The programs together, as a user starts them: emulator and controller as processes.
+#include <optional>
+
+#include <doctest/doctest.h>
+#include <nlohmann/json.hpp>
+
+#include "shared/segment/hand_over.hpp"
+#include "shared/segment/hash.hpp"
+#include "tests/programs/process.hpp"
+
+using kerf::test::eventually;
+using kerf::test::Process;
+using kerf::test::TemporaryFolder;
+using kerf::test::text_of;
+using namespace std::chrono_literals;
+
+namespace {
+
+const std::string kBin = KERF_TEST_BIN;
+const std::string kScenes = KERF_TEST_SCENES;
+
+std::string unique_name() {
+  static int count = 0;
+  return "test-" + std::to_string(getpid()) + "-" + std::to_string(++count);
+}
+
+/// Emulator and controller on a private socket.
+struct Pair {
+  TemporaryFolder folder;
+  std::string name = unique_name();
+  std::optional<Process> emulator;
+  std::optional<Process> controller;
+
+  void start(const std::string& hand, std::vector<std::string> controller_options,
+             std::vector<std::string> emulator_options = {}) {
+    const std::string socket = (folder / "port").string();
+    std::vector<std::string> device{kBin + "/kerf-emulator",
+                                    "--personality",
+                                    "omni",
+                                    "--front",
+                                    "socket",
+                                    "--socket",
+                                    socket,
+                                    "--hand",
+                                    kScenes + "/hands/" + hand};
+    device.insert(device.end(), emulator_options.begin(), emulator_options.end());
+    emulator.emplace(device, folder / "emulator.log");
+    std::vector<std::string> servo{kBin + "/kerf-controller",
+                                   "--scene",
+                                   kScenes + "/phantom.toml",
+                                   "--port",
+                                   "socket:" + socket,
+                                   "--name",
+                                   name,
+                                   "--report",
+                                   (folder / "report.json").string()};
+    servo.insert(servo.end(), controller_options.begin(), controller_options.end());
+    controller.emplace(servo, folder / "controller.log");
+  }
+  [[nodiscard]] nlohmann::json report() const {
+    return nlohmann::json::parse(text_of(folder / "report.json"));
+  }
+};
+
+/// Runs one program to its end and expects one line and exit code 2.
+std::string refused(const std::vector<std::string>& arguments) {
+  const TemporaryFolder folder;
+  Process process(arguments, folder / "log");
+  CHECK(process.wait() == 2);
+  std::string line = process.output();
+  CAPTURE(line);
+  CHECK(std::count(line.begin(), line.end(), '\n') == 1);
+  return line;
+}
+
+}  // namespace
+
+TEST_CASE("virtual time: the same demo twice gives the same volume and output hashes") {
+  nlohmann::json reports[2];
+  for (auto& report : reports) {
+    Pair pair;
+    pair.start("cut_cavity.toml", {"--virtual", "--seconds", "4"}, {"--lockstep"});
+    REQUIRE(pair.controller->wait() == 0);
+    report = pair.report();
+  }
+  CHECK(reports[0]["ticks"] == 4000);
+  CHECK(reports[0]["contact_ticks"] > 100);
+  CHECK(reports[0]["removed_mm3"] > 0);
+  CHECK(reports[0]["allocations"] == 0);
+  CHECK(reports[0]["volume_hash"] == reports[1]["volume_hash"]);
+  CHECK(reports[0]["output_hash"] == reports[1]["output_hash"]);
+}
+
+TEST_CASE("kill -9 of the emulator: fault in the report, exit 1 after two seconds") {
+  Pair pair;
+  pair.start("touch.toml", {"--seconds", "60"});
+  REQUIRE(eventually(
+      [&] {
+        try {
+          const auto connection = kerf::connect_segment(pair.name);
+          const auto latest = connection.reader().latest();
+          return latest && (latest->flags & kerf::kFlagMotorsOn) != 0;
+        } catch (const kerf::SegmentError&) {
+          return false;
+        }
+      },
+      20s));
+  const auto connection = kerf::connect_segment(pair.name);
+  pair.emulator->signal(SIGKILL);
+  const auto killed = std::chrono::steady_clock::now();
+  CHECK(pair.controller->wait() == 1);
+  const auto ended = std::chrono::steady_clock::now() - killed;
+  CHECK(ended > 1500ms);
+  CHECK(ended < 10s);
+  const auto report = pair.report();
+  REQUIRE(report["faults"].size() >= 2);
+  CHECK(report["faults"][0]["name"] == "stale_input");
+  CHECK(report["faults"].back()["name"] == "device_gone");
+
+  // The segment outlives the controller: in it, from 20 silent ticks on there is no force.
+  const kerf::SegmentReader& reader = connection.reader();
+  const std::uint64_t head = reader.state_head();
+  int silent = 0;
+  for (std::uint64_t i = head > 3000 ? head - 3000 : 0; i < head; ++i) {
+    kerf::TickRecord record{};
+    REQUIRE(reader.state_at(i, record) == kerf::ReadState::ok);
+    silent = record.stale != 0 ? silent + 1 : 0;
+    if (silent < 20) continue;
+    REQUIRE(record.commanded_force_n[0] == 0);
+    REQUIRE(record.commanded_force_n[1] == 0);
+    REQUIRE(record.commanded_force_n[2] == 0);
+    REQUIRE((record.flags & kerf::kFlagMotorsOn) == 0);
+  }
+  CHECK(silent > 1900);
+  CHECK_FALSE(connection.alive());
+}
+
+TEST_CASE("SIGTERM ends in order: exit 0, a report, no socket left") {
+  Pair pair;
+  pair.start("touch.toml", {});
+  REQUIRE(
+      eventually([&] { return std::filesystem::exists(kerf::segment_socket(pair.name)); }, 20s));
+  std::this_thread::sleep_for(500ms);
+  pair.controller->signal(SIGTERM);
+  CHECK(pair.controller->wait() == 0);
+  CHECK(pair.report()["end"] == "stopped");
+  CHECK_FALSE(std::filesystem::exists(kerf::segment_socket(pair.name)));
+}
+
+TEST_CASE("a second controller of the same name is refused in one line") {
+  Pair pair;
+  pair.start("touch.toml", {});
+  REQUIRE(
+      eventually([&] { return std::filesystem::exists(kerf::segment_socket(pair.name)); }, 20s));
+  const std::string line =
+      refused({kBin + "/kerf-controller", "--scene", kScenes + "/phantom.toml", "--port",
+               "socket:" + (pair.folder / "none").string(), "--name", pair.name});
+  CHECK(line.find(pair.name) != std::string::npos);
+}
+
+TEST_CASE("a reader that joins in the middle of milling sees the controller's own volume") {
+  Pair pair;
+  pair.start("cut_cavity.toml", {"--virtual", "--seconds", "6"}, {"--lockstep"});
+  std::optional<kerf::SegmentConnection> connection;
+  REQUIRE(eventually(
+      [&] {
+        try {
+          connection.emplace(kerf::connect_segment(pair.name));
+          return connection->reader().dirty_head() > 200;
+        } catch (const kerf::SegmentError&) {
+          return false;
+        }
+      },
+      20s));
+  kerf::VolumeSnapshot snapshot;
+  connection->reader().update(0, snapshot);
+  CHECK(pair.controller->wait() == 0);
+  connection->reader().update(0, snapshot);
+  // The report chains the hashes of all volumes; with one volume it is one link.
+  std::uint64_t hash = 0xcbf29ce484222325;
+  hash = (hash ^ kerf::density_hash(snapshot.density)) * 0x100000001b3;
+  char text[17];
+  std::snprintf(text, sizeof text, "%016llx", static_cast<unsigned long long>(hash));
+  CHECK(pair.report()["volume_hash"] == text);
+}
+
+TEST_CASE("bad arguments are one line and exit 2") {
+  const std::string controller = kBin + "/kerf-controller";
+  const std::string scene = kScenes + "/phantom.toml";
+  CHECK(refused({controller}).find("--scene") != std::string::npos);
+  CHECK(refused({controller, "--scene", "missing.toml", "--check"}).find("missing.toml") !=
+        std::string::npos);
+  CHECK(refused({controller, "--scene", scene, "--port", "usb"}).find("socket:PATH") !=
+        std::string::npos);
+  CHECK(
+      refused({controller, "--scene", scene, "--device", "nonsense", "--check"}).find("nonsense") !=
+      std::string::npos);
+  CHECK(refused({controller, "--scene", scene, "--rate", "20000", "--check"}).find("20000") !=
+        std::string::npos);
+  CHECK(refused({controller, "--scene", scene, "--volume", "missing.nrrd", "--check"})
+            .find("missing.nrrd") != std::string::npos);
+  CHECK(refused({kBin + "/kerf-emulator", "--personality", "nonsense", "--front", "socket",
+                 "--socket", "/nonexistent/socket"})
+            .find("nonsense") != std::string::npos);
+}
