@@ -13,11 +13,11 @@ namespace {
 constexpr double kHalfHeightRad = 14.0 * std::numbers::pi / 180.0;  // a portrait lens: little warp
 // Over the front right shoulder: the crown, where the bur works, and the side are both in view.
 constexpr double kHomeYawRad = 25.0 * std::numbers::pi / 180.0;
-constexpr double kHomePitchRad = 48.0 * std::numbers::pi / 180.0;
+constexpr double kHomePitchRad = 54.0 * std::numbers::pi / 180.0;
 constexpr double kMaxPitchRad = 89.0 * std::numbers::pi / 180.0;  // `up` keeps a meaning
 constexpr double kDragRad = std::numbers::pi;                     // a full drag is half a turn
 constexpr double kZoomStep = 0.9;
-constexpr double kMargin = 0.90;   // what is in a box seldom reaches its corners
+constexpr double kMargin = 0.80;   // what is in a box seldom reaches its corners
 constexpr double kNearest = 0.02;  // distance limits and near plane, in radii
 constexpr double kFarthest = 20.0;
 constexpr double kNearPlane = 0.01;

@@ -37,7 +37,7 @@ set terminal svg size 960,640 dynamic font 'Helvetica,13' background rgb 'white'
 set grid back linecolor rgb '#dddddd' linetype 1 linewidth 0.5
 set border 3 linecolor rgb '#555555'
 set tics nomirror out textcolor rgb '#333333'
-set lmargin at screen 0.09
+set lmargin at screen 0.10
 set rmargin at screen 0.91
 set multiplot
 )";

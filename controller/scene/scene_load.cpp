@@ -176,6 +176,15 @@ SceneTool load_tool(const ToolSpec& spec, const TouchedVolumes& touched) {
   return tool;
 }
 
+/// Moves the materials' densities so that what began at the surface `from` begins at `to`; air and
+/// full density stay where they are.
+void move_materials(double from, double to, std::vector<Material>& materials) {
+  for (Material& material : materials) {
+    material.iso = material.iso < from ? material.iso * to / from
+                                       : 1 - (1 - material.iso) * (1 - to) / (1 - from);
+  }
+}
+
 /// Fits a scene to the volume of --volume; what is done is told in the header.
 void fit_to_volume(double written_mm, SceneSpec& spec, Scene& scene) {
   const double grown = touched_volumes(scene.volumes).voxel_mm / written_mm;
@@ -202,6 +211,7 @@ void fit_to_volume(double written_mm, SceneSpec& spec, Scene& scene) {
 Scene load_scene(const std::filesystem::path& path, const SceneOverrides& overrides) {
   SceneSpec spec = parse_scene_file(path);
   const double written_mm = written_voxel_mm(spec.volumes.front());
+  const std::optional<double> written_iso = spec.volumes.front().iso;
   apply_overrides(overrides, spec);
 
   Scene scene;
@@ -218,7 +228,12 @@ Scene load_scene(const std::filesystem::path& path, const SceneOverrides& overri
     scene.volumes.push_back(load_volume(
         spec.volumes[i], from_command_line ? "" : path.parent_path(), scene.materials.size()));
   }
-  if (overrides.volume_file) fit_to_volume(written_mm, spec, scene);
+  if (overrides.volume_file) {
+    fit_to_volume(written_mm, spec, scene);
+    if (written_iso && *written_iso > 0 && *written_iso < 1) {
+      move_materials(*written_iso, scene.volumes.front().iso / kDensityMax, scene.materials);
+    }
+  }
   const TouchedVolumes touched = touched_volumes(scene.volumes);
   for (const ToolSpec& tool : spec.tools) scene.tools.push_back(load_tool(tool, touched));
 

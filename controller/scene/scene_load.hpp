@@ -38,6 +38,9 @@ inline constexpr std::array<double, 3> kWorkspaceMm = {100.0, 80.0, 60.0};
 ///   pose and crop as in the scene;
 /// - tools keep their size in voxels: lengths are scaled by the new over the old voxel edge (old:
 ///   the scene's spacing_mm, or that of the phantom);
+/// - the materials' densities move with the surface: what begins at the scene's iso begins at the
+/// new
+///   one;
 /// - workspace_scale s is such that its box, after cropping and in world axes, fits kWorkspaceMm;
 ///   the offset is found as above;
 /// - p0 and p1 are multiplied by kReferenceRadiusMm / (s^2 R), R the radius of the active tool: the
