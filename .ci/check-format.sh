@@ -1,0 +1,25 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+# Every source file: clang-format 14 has nothing to change, the licence comes first, a header guards
+# itself.
+set -euo pipefail
+cd "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/.."
+
+mapfile -t sources < <(find shared controller visualizer hil tests -name '*.[ch]pp' | sort)
+status=0
+for file in "${sources[@]}"; do
+  if ! clang-format-14 --dry-run -Werror "$file" 2>/dev/null; then
+    echo "$file: not formatted; run clang-format-14 -i $file"
+    status=1
+  fi
+  read -r first <"$file" || true
+  if [[ $first != '// SPDX-License-Identifier: Apache-2.0' ]]; then
+    echo "$file:1: no SPDX line; begin with // SPDX-License-Identifier: Apache-2.0"
+    status=1
+  fi
+  if [[ $file == *.hpp ]] && ! grep -q '^#pragma once$' "$file"; then
+    echo "$file: no #pragma once; put it below the SPDX line"
+    status=1
+  fi
+done
+exit "$status"

@@ -1,0 +1,165 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+# ./kerf itself, with stand-ins for the programs: exit codes, what is kept, and that no process and
+# no temporary file survives any way out. Builds nothing; takes some seconds.
+set -euo pipefail
+root=$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/..
+lab=$(mktemp -d)
+trap 'rm -rf "$lab"' EXIT
+mkdir "$lab/bin" "$lab/tmp"
+export KERF_BIN=$lab/bin TMPDIR=$lab/tmp LAB=$lab
+unset DISPLAY WAYLAND_DISPLAY
+
+# The stand-in: notes its process and its arguments, does what a demo needs of it, and ends with
+# the exit code FAIL_<name> where that is set. The file `segment` lives as long as the controller.
+cat >"$lab/stand-in" <<'PROGRAM'
+#!/usr/bin/env bash
+name=${0##*/kerf-}
+echo $$ >>"$LAB/pids"
+echo "$name $*" >>"$LAB/calls"
+fail=FAIL_$name code=0
+if [[ -n ${!fail:-} ]]; then code=${!fail}; fi
+if ((code == 2)); then
+  echo "kerf-$name: place: value; way out" >&2
+  exit 2
+fi
+declare -A option=()
+while (($#)); do
+  if [[ $1 == --* && ${2:---} != --* ]]; then
+    option[$1]=$2
+    shift
+  fi
+  shift
+done
+out=${option[--out]:-$LAB}
+case $name in
+  controller)
+    trap 'stop=1' TERM
+    touch "$LAB/segment"
+    printf 'hand_unit_mm=2\nhand_script=hand.toml\nrate_hz=500\n' >"${option[--emulator-args]}"
+    for ((i = 0; i < 10 * option[--seconds] && !stop; ++i)); do sleep 0.03; done
+    echo '{}' >"${option[--report]}"
+    touch "${option[--final]}"
+    rm "$LAB/segment"
+    ;;
+  emulator)
+    exec perl -MIO::Socket::UNIX -e '
+      $socket = IO::Socket::UNIX->new(Local => shift, Listen => 1) or die;
+      select undef, undef, undef, 0.05 while -e "$ENV{LAB}/segment"' "${option[--socket]}"
+    ;;
+  visualizer | recorder)
+    trap 'exit 0' TERM
+    while [[ -e $LAB/segment ]]; do sleep 0.05; done
+    if [[ $name == recorder ]]; then mkdir -p "$out"; else touch "$out/frame-0001.png"; fi
+    ;;
+  record) touch "$out" ;;
+esac
+exit "$code"
+PROGRAM
+chmod +x "$lab/stand-in"
+for name in controller emulator visualizer recorder record; do
+  ln -s ../stand-in "$lab/bin/kerf-$name"
+done
+
+checks=0 failures=0
+# expect TEXT CONDITION...: one check; CONDITION is a command.
+expect() {
+  checks=$((checks + 1))
+  if ! "${@:2}"; then
+    failures=$((failures + 1))
+    echo "check-kerf: failed: $1 (${*:2})"
+    sed 's/^/  | /' "$lab/said"
+  fi
+}
+
+# kerf_gives CODE ARG...: ./kerf ARG... exits with CODE; what it said lies in $lab/said.
+kerf_gives() {
+  local code=0
+  rm -f "$lab/pids" "$lab/calls" "$lab/segment"
+  "$root/kerf" "${@:2}" >"$lab/said" 2>&1 || code=$?
+  [[ $code == "$1" ]]
+}
+says() { grep -q -- "$1" "$lab/said"; }
+called() { grep -q -- "$1" "$lab/calls"; }
+kept() { [[ $(cd "$lab" && find out -mindepth 1 | sort | tr '\n' ' ') == "$1" ]]; }
+nothing_survives() {
+  local pid
+  [[ -z $(ls -A "$lab/tmp") ]] || return 1
+  while read -r pid; do
+    if grep -qs '^State:[[:space:]]*[^[:space:]ZX]' "/proc/$pid/status"; then return 1; fi
+  done <"$lab/pids"
+}
+# interrupted SIGNAL: a demo that is hit in its middle ends within three seconds.
+interrupted() {
+  rm -f "$lab/pids" "$lab/calls" "$lab/segment"
+  set -m  # else a background process ignores SIGINT
+  "$root/kerf" demo --seconds 60 --out "$lab/out" >"$lab/said" 2>&1 &
+  set +m
+  local demo=$! code=0 began=$SECONDS
+  until [[ -e $lab/calls ]] && called '^emulator'; do sleep 0.05; done
+  sleep 0.2
+  kill "-$1" "$demo"
+  wait "$demo" 2>/dev/null || code=$?
+  sleep 0.3
+  ((code == $2 && SECONDS - began <= 3))
+}
+with() {
+  local -x "$1"
+  "${@:2}"
+}
+all='out/final.nrrd out/forces.svg out/frame-0001.png out/log out/report.json '
+
+expect 'a demo runs' kerf_gives 0 demo --seconds 1
+expect 'the hand is the one that the scene names' called '^emulator.*--hand hand.toml --unit-mm 2'
+expect 'the frames are spread over the run' called '^visualizer.*--every-ticks 41 '
+expect 'a demo leaves nothing behind' nothing_survives
+expect 'a demo keeps its results' kerf_gives 0 demo --seconds 1 --out "$lab/out" --virtual
+expect 'all of them' kept "$all"
+expect 'lock-step reaches the controller' called '^controller.*--virtual'
+expect 'lock-step reaches the emulator' called '^emulator.*--lockstep'
+expect 'the second demo replaces the first' kerf_gives 0 demo --seconds 1 --out "$lab/out"
+expect 'and leaves nothing else' kept "$all"
+
+expect 'a failed check is told' \
+  with FAIL_controller=1 kerf_gives 1 demo --seconds 1 --out "$lab/out"
+expect 'and its results are kept' kept "$all"
+expect 'a crash is a failed check' with FAIL_controller=139 kerf_gives 1 demo --seconds 1
+expect 'a failing picture is told' with FAIL_visualizer=2 kerf_gives 1 demo --seconds 1
+expect 'with its reason' says '^kerf-visualizer: place: value; way out'
+expect 'a failing log is told' with FAIL_recorder=1 kerf_gives 1 demo --seconds 1
+expect 'a bad scene is bad input' with FAIL_controller=2 kerf_gives 2 demo --out "$lab/new"
+expect 'which makes no folder' test ! -e "$lab/new"
+expect 'a bad hand is bad input' with FAIL_emulator=2 kerf_gives 2 demo --out "$lab/new"
+expect 'with its reason' says '^kerf-emulator: place: value; way out'
+expect 'which makes no folder either' test ! -e "$lab/new"
+expect 'a failure leaves nothing behind' nothing_survives
+
+expect 'a stopped demo ends with 130' interrupted INT 130
+expect 'its results so far are kept' kept "$all"
+expect 'nothing survives a stop' nothing_survives
+expect 'a terminated demo ends with 143' interrupted TERM 143
+expect 'nothing survives a termination' nothing_survives
+expect 'no process survives a kill' interrupted KILL 137
+rm -rf "$lab"/tmp/*
+expect 'none at all' nothing_survives
+expect 'the next demo clears up after it' kerf_gives 0 demo --seconds 1 --out "$lab/out"
+expect 'completely' kept "$all"
+
+touch "$lab/out/mine.txt"
+expect 'a folder with other files is refused' kerf_gives 2 demo --out "$lab/out"
+expect 'by the name of the first' says 'holds mine.txt'
+expect 'a file is no folder' kerf_gives 2 demo --out "$lab/out/mine.txt"
+expect 'a place that cannot be is refused' kerf_gives 2 demo --out /dev/null/x
+expect 'a size is two numbers' kerf_gives 2 demo --size big
+expect 'seconds are positive' kerf_gives 2 demo --seconds 0.0
+expect 'a value may not lack' kerf_gives 2 demo --seconds
+expect 'an unknown option is named' kerf_gives 2 demo --fast
+expect 'and told' says '--fast'
+expect 'an unknown program is refused' kerf_gives 2 polish
+expect 'and the known ones are listed' says 'controller emulator record recorder visualizer'
+expect 'a program runs by its short name' kerf_gives 0 record plot --out "$lab/plot.svg"
+expect 'with its arguments' called "^record plot --out $lab/plot.svg"
+expect 'help is fine' kerf_gives 0 --help
+
+echo "check-kerf: $checks checks, $failures failed"
+((failures == 0))
