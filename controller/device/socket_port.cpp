@@ -68,7 +68,10 @@ bool SocketPort::send(std::span<const std::uint8_t> packet) noexcept {
 
 bool SocketPort::wait(int milliseconds) noexcept {
   pollfd watched{fd_, POLLIN, 0};
-  return !closed_ && poll(&watched, 1, milliseconds) > 0;
+  int ready = -1;
+  while (!closed_ && (ready = poll(&watched, 1, milliseconds)) < 0 && errno == EINTR) {
+  }
+  return ready > 0;
 }
 
 }  // namespace kerf

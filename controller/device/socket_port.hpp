@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <atomic>
 #include <filesystem>
 
 #include "controller/device/packet_port.hpp"
@@ -19,12 +20,14 @@ class SocketPort final : public PacketPort {
 
   [[nodiscard]] std::size_t receive(std::span<std::uint8_t> out) noexcept override;
   bool send(std::span<const std::uint8_t> packet) noexcept override;
-  [[nodiscard]] bool closed() const noexcept override { return closed_; }
+  [[nodiscard]] bool closed() const noexcept override {
+    return closed_.load(std::memory_order_relaxed);
+  }
   [[nodiscard]] bool wait(int milliseconds) noexcept override;
 
  private:
   int fd_ = -1;
-  bool closed_ = false;
+  std::atomic<bool> closed_{false};  ///< written by whoever meets the end first
 };
 
 }  // namespace kerf

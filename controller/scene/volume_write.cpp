@@ -12,8 +12,8 @@
 #define ZLIB_CONST  // its input is const then
 #include <zlib.h>
 
-#include "controller/scene/new_file.hpp"
 #include "controller/scene/scene_error.hpp"
+#include "shared/posix/new_file.hpp"
 
 namespace kerf {
 namespace fs = std::filesystem;

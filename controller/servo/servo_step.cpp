@@ -85,32 +85,52 @@ std::array<double, 3> advance_velocity(const ServoPlan<N>& plan, ServoState<N>& 
   return {moved_mm[0] * per_s, moved_mm[1] * per_s, moved_mm[2] * per_s};
 }
 
-/// Motor counts of a torque, all three scaled down together where one would leave the converter's
-/// range, so that the direction of the force stays.
+/// What the converters give: signed counts, and the share of the force that they can carry.
 template <class N>
-std::array<std::int16_t, 3> motor_counts(const ServoPlan<N>& plan,
-                                         JointVec<typename N::Real> torque_n_mm) noexcept {
-  using Real = typename N::Real;
-  std::array<Real, 3> counts{torque_n_mm.x * plan.counts_per_n_mm[0],
-                             torque_n_mm.y * plan.counts_per_n_mm[1],
-                             torque_n_mm.z * plan.counts_per_n_mm[2]};
-  constexpr auto kEnd = static_cast<double>(-omni::kMotorCountMin);
-  Real largest(kEnd);
-  for (const Real c : counts) largest = std::max(largest, c < Real(0) ? -c : c);
-  const Real share = Real(kEnd) / largest;
-  std::array<std::int16_t, 3> rounded{};
-  for (std::size_t i = 0; i < 3; ++i) {
-    if constexpr (N::kIsFixed) {
-      rounded[i] =
-          static_cast<std::int16_t>(round_shift((counts[i] * share).raw(), Real::kFractionBits));
-    } else {
+struct MotorCommand {
+  std::array<std::int16_t, 3> counts{};
+  typename N::Unit share{};  ///< 1, or less where a motor is at the end of its range
+};
+
+/// All three counts are scaled down together where one would leave the range, so that the direction
+/// of the force stays. Products are not rounded before that.
+template <class N>
+MotorCommand<N> motor_command(const ServoPlan<N>& plan,
+                              JointVec<typename N::Real> torque_n_mm) noexcept {
+  constexpr std::int64_t kEnd = -omni::kMotorCountMin;
+  const std::array<typename N::Real, 3> torque{torque_n_mm.x, torque_n_mm.y, torque_n_mm.z};
+  MotorCommand<N> command;
+  if constexpr (N::kIsFixed) {
+    constexpr int kBits = 32;  // Q16 * Q16
+    std::array<std::int64_t, 3> wide{};
+    std::int64_t largest = kEnd << kBits;
+    for (std::size_t i = 0; i < 3; ++i) {
+      wide[i] = std::int64_t{torque[i].raw()} * plan.counts_per_n_mm[i].raw();
+      largest = std::max(largest, wide[i] < 0 ? -wide[i] : wide[i]);
+    }
+    // kEnd / largest with 30 fraction bits. No product exceeds kEnd with 12 + 30 fraction bits.
+    const std::int64_t share = (kEnd << (30 + 20)) / (largest >> (kBits - 20));
+    command.share = N::Unit::from_raw(static_cast<std::int32_t>(share));
+    for (std::size_t i = 0; i < 3; ++i) {
+      command.counts[i] = static_cast<std::int16_t>(round_shift((wide[i] >> 20) * share, 12 + 30));
+    }
+  } else {
+    using Real = typename N::Real;
+    std::array<Real, 3> wide{};
+    Real largest(kEnd);
+    for (std::size_t i = 0; i < 3; ++i) {
+      wide[i] = torque[i] * plan.counts_per_n_mm[i];
+      largest = std::max(largest, wide[i] < 0 ? -wide[i] : wide[i]);
+    }
+    command.share = Real(kEnd) / largest;
+    for (std::size_t i = 0; i < 3; ++i) {
       // Half up, as in fixed: the offset keeps the argument of the cast positive.
-      constexpr Real kOffset = 4096;
-      rounded[i] = static_cast<std::int16_t>(
-          static_cast<std::int32_t>(counts[i] * share + kOffset + Real(0.5)) - 4096);
+      constexpr int kOffset = 4096;
+      command.counts[i] = static_cast<std::int16_t>(
+          static_cast<int>(wide[i] * command.share + Real(kOffset) + Real(0.5)) - kOffset);
     }
   }
-  return rounded;
+  return command;
 }
 
 template <class N>
@@ -143,13 +163,15 @@ ServoOutput servo_step(const ServoPlan<N>& plan, ServoState<N>& state,
   Supervisor& supervisor = state.supervisor;
 
   // Where the device is, and whether that can be trusted.
+  bool calibrated = false;
   if (report.fresh) {
-    follow_encoders(report, state.encoders);
+    calibrated = follow_encoders(report, plan.timing.dock_ticks, state.encoders);
     follow_gimbal(report, state.gimbal);
   }
   const DevicePose<N> pose = device_pose(plan, state.encoders, state.gimbal);
   SafetyInputs seen{.fresh = report.fresh,
                     .docked = report.docked,
+                    .calibrated = calibrated,
                     .finite = pose_is_finite(pose),
                     .overspeed = false};
   const bool usable = seen.fresh && seen.finite;
@@ -166,7 +188,7 @@ ServoOutput servo_step(const ServoPlan<N>& plan, ServoState<N>& state,
   DeviceVec<Real> wanted_n;
   state.contact_n = {};
   if (supervisor.motors_on() && usable && !state.hold) {
-    const ToolForces<N> forces = feel_and_cut(plan, state, tip_mm, state.rotation, true);
+    const ToolForces<N> forces = feel_and_cut(plan, state, tip_mm, state.rotation);
     state.contact_n = forces.contact_n;
     wanted_n = forces.contact_n + forces.modification_n;
     if (supervisor.phase == Phase::ramping) {
@@ -187,26 +209,36 @@ ServoOutput servo_step(const ServoPlan<N>& plan, ServoState<N>& state,
   }
 
   // What the hand gets. Switching off is exempt from the slew limit.
-  if (supervisor.motors_on() && plan.motors_configured) {
+  if (supervisor.motors_on() &&
+      !(is_finite(wanted_n.x) && is_finite(wanted_n.y) && is_finite(wanted_n.z))) {
+    latch(Fault::not_finite, supervisor);
+  }
+  out.motors_on = supervisor.motors_on() && plan.motors_configured;
+  JointVec<Real> torque_n_mm;
+  if (out.motors_on) {
     const DeviceVec<Real> sent_n =
         limited_force(plan.limits, state.thermal, wanted_n, state.force_n);
-    out.saturated = !(sent_n == wanted_n);
-    state.force_n = sent_n;
+    const MotorCommand<N> motors = motor_command(plan, omni_torque<N>(state.arm, sent_n));
+    out.motor_counts = motors.counts;
+    state.force_n = {multiply<Real>(motors.share, sent_n.x), multiply<Real>(motors.share, sent_n.y),
+                     multiply<Real>(motors.share, sent_n.z)};
+    out.saturated = !(state.force_n == wanted_n);
+    torque_n_mm = omni_torque<N>(state.arm, state.force_n);
   } else {
     heat_up(plan.limits, state.thermal, {});
     state.force_n = {};
   }
   if (usable) state.held_force_n = state.force_n;
-  const JointVec<Real> torque_n_mm = omni_torque<N>(state.arm, state.force_n);
-  out.motors_on = supervisor.motors_on() && plan.motors_configured;
-  if (out.motors_on) out.motor_counts = motor_counts(plan, torque_n_mm);
 
   out.phase = supervisor.phase;
   out.fault = supervisor.fault;
   out.armed = supervisor.armed;
   out.stale = !report.fresh;
   out.contact = norm(state.force_n) > Real(kContactThresholdN);
-  for (std::size_t i = 0; i < 3; ++i) out.joint_counts[i] = state.encoders.unwrapped[i];
+  for (std::size_t i = 0; i < 3; ++i) {
+    out.joint_counts[i] = state.encoders.unwrapped[i];
+    out.gimbal_rad[i] = as_double(pose.gimbal[i]);
+  }
   out.position_mm = as_doubles(tip_mm);
   for (std::size_t i = 0; i < 9; ++i) out.rotation[i] = as_double(state.rotation.row[i / 3][i % 3]);
   out.velocity_mm_per_s = velocity_mm_per_s;
@@ -252,6 +284,8 @@ void apply_command(const ServoPlan<N>& plan, ServoState<N>& state,
       return;
     case ServoCommand::Kind::fade_in:
       restart_fade(state.supervisor);
+      state.force_n = {};  // the motors were off meanwhile
+      state.held_force_n = {};
       return;
     case ServoCommand::Kind::hold:
       state.hold = command.argument != 0;

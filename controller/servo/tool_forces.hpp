@@ -53,12 +53,12 @@ template <class N>
   return pose;
 }
 
-/// Contact force of the active tool in all solid volumes as they are; then, where the plan cuts and
-/// `may_cut`, the modification force from the same densities, and only then the removal.
+/// Contact force of the active tool in all solid volumes as they are; then, where the plan cuts,
+/// the modification force from the same densities, and only then the removal.
 template <class N>
 [[nodiscard]] ToolForces<N> feel_and_cut(const ServoPlan<N>& plan, ServoState<N>& state,
                                          WorldVec<typename N::Real> tip_mm,
-                                         const Rotation<N>& rotation, bool may_cut) noexcept {
+                                         const Rotation<N>& rotation) noexcept {
   const ToolPlan<N>& tool = plan.tools[state.active_tool];
   ToolForces<N> forces;
   for (std::size_t v = 0; v < plan.volume_count; ++v) {
@@ -71,7 +71,7 @@ template <class N>
     forces.contact_n = forces.contact_n -
                        force_of_sum<N>(in_volume.contact,
                                        contact_sum<N>(volume.grid, gradient, tool.offsets, pose));
-    if (!plan.cutting || !may_cut) continue;
+    if (!plan.cutting) continue;
 
     const VoxelBox touched =
         overlap<N>(volume.grid, tool.offsets, pose, in_volume.overlap_ratio, state.overlap);

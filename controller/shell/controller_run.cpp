@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "controller/shell/controller_run.hpp"
 
+#include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
@@ -20,13 +22,18 @@
 #include "controller/scene/compile.hpp"
 #include "controller/scene/scene_json.hpp"
 #include "controller/scene/scene_load.hpp"
+#include "controller/scene/scene_words.hpp"
 #include "controller/scene/volume_write.hpp"
 #include "controller/shell/motor_guard.hpp"
 #include "controller/shell/progress_bar.hpp"
 #include "controller/shell/publisher.hpp"
 #include "controller/shell/run_report.hpp"
 #include "controller/shell/servo_loop.hpp"
+#include "controller/shell/stop_signals.hpp"
 #include "controller/shell/watchdog.hpp"
+#include "shared/posix/cores.hpp"
+#include "shared/posix/memory.hpp"
+#include "shared/posix/new_file.hpp"
 #include "shared/segment/hash.hpp"
 
 namespace kerf {
@@ -35,18 +42,6 @@ namespace {
 constexpr int kPortPatienceMs = 5000;
 constexpr double kArmingPatienceS = 60;
 constexpr std::chrono::milliseconds kWatchPeriod{5};
-
-const char* name_of(NumericKind kind) {
-  switch (kind) {
-    case NumericKind::fixed:
-      return "fixed";
-    case NumericKind::float32:
-      return "float";
-    case NumericKind::float64:
-      break;
-  }
-  return "double";
-}
 
 const char* text_of(EndReason end) {
   switch (end) {
@@ -135,23 +130,48 @@ void write_final(const Scene& scene, const Servo& servo, const std::filesystem::
   }
 }
 
-/// Main thread while the servo runs: watchdog and progress.
-std::uint64_t watch(const OmniDriver& device, LoopSignals& signals, const std::atomic<bool>& ended,
-                    const ControllerOptions& options, int rate_hz) {
-  Watchdog watchdog(device, signals);
-  const ProgressBar bar(options.progress);
-  for (int round = 0; !ended.load(); ++round) {
-    if (!options.virtual_time) watchdog.look(monotonic_ns());
-    if (round % 20 == 0) {
-      const double done_s = static_cast<double>(signals.armed_ticks.load()) / rate_hz;
-      char text[64];
-      std::snprintf(text, sizeof text, "%.1f s", done_s);
-      bar.show(options.seconds ? done_s / *options.seconds : 0,
-               done_s > 0 ? text : "waiting for the stylus in the inkwell");
-    }
-    std::this_thread::sleep_for(kWatchPeriod);
+/// Bytes that a run needs beyond the loaded scene, or a refusal: locked memory that is not there
+/// would end the program without a word.
+void check_memory(const Scene& scene) {
+  const bool fixed = scene.servo.numeric == NumericKind::fixed;
+  const std::uint64_t gradient_bytes = 3 * (fixed ? 2 : 8);
+  std::uint64_t bytes = 0;
+  for (const SceneVolume& volume : scene.volumes) {
+    const std::uint64_t voxels = volume.image.grid.voxel_count();
+    bytes += voxels * (sizeof(Density) + (volume.solid ? gradient_bytes : 0));
   }
-  return watchdog.trips();
+  const auto free_bytes = available_memory();
+  if (free_bytes && bytes > *free_bytes) {
+    throw std::runtime_error(scene.path + ": needs " + std::to_string(bytes >> 20) + " MiB, and " +
+                             std::to_string(*free_bytes >> 20) +
+                             " MiB are free; crop or resample the volume with kerf-volume");
+  }
+}
+
+/// Main thread while the servo runs: draws the progress bar.
+void show_progress(const LoopSignals& signals, const std::atomic<bool>& ended,
+                   const ControllerOptions& options, int rate_hz) {
+  const ProgressBar bar(options.progress);
+  while (!ended.load()) {
+    const double done_s = static_cast<double>(signals.armed_ticks.load()) / rate_hz;
+    char text[64];
+    std::snprintf(text, sizeof text, "%.1f s", done_s);
+    bar.show(options.seconds ? done_s / *options.seconds : 0,
+             done_s > 0 ? text : "waiting for the stylus in the inkwell");
+    for (int i = 0; i < 10 && !ended.load(); ++i) std::this_thread::sleep_for(kWatchPeriod);
+  }
+}
+
+/// A thread of its own above the servo, so that neither a slow terminal nor the servo itself can
+/// keep it from looking.
+std::jthread start_watchdog(Watchdog& watchdog, int servo_priority) {
+  return std::jthread([&watchdog, servo_priority](const std::stop_token& stop) {
+    static_cast<void>(set_fifo(std::min(servo_priority + 1, 99)));  // without the right: as it is
+    while (!stop.stop_requested()) {
+      watchdog.look(monotonic_ns());
+      std::this_thread::sleep_for(kWatchPeriod);
+    }
+  });
 }
 
 int check_scene(const Scene& scene) {
@@ -181,23 +201,32 @@ int run_controller(const ControllerOptions& options) {
   const std::int64_t began_ns = monotonic_ns();
   spdlog::set_default_logger(spdlog::stderr_color_mt("kerf-controller"));
   spdlog::set_pattern("kerf-controller: %^%l%$: %v");
+  std::atomic<bool>& stop = catch_stop_signals();
 
   Scene scene = load_scene(options.scene, options.overrides);
   if (options.check) return check_scene(scene);
-  if (!options.emulator_args.empty()) write_whole(options.emulator_args, hand_lines(scene));
+  const double rate_hz = scene.servo.rate_hz;
+  if (static_cast<double>(options.real_time.spin_us) * rate_hz > 0.9e6) {
+    throw std::runtime_error("--spin-us " + std::to_string(options.real_time.spin_us) +
+                             " is more than 90 % of a tick at " +
+                             std::to_string(scene.servo.rate_hz) + " Hz; spin less");
+  }
+  check_memory(scene);
+  if (!options.emulator_args.empty()) write_new_file(options.emulator_args, hand_lines(scene));
 
   RunReport report;
   report.scene = options.scene;
   report.device = options.device;
-  report.numeric = name_of(scene.servo.numeric);
+  report.numeric = word_of(scene.servo.numeric);
   report.rate_hz = scene.servo.rate_hz;
   report.virtual_time = options.virtual_time;
-  report.config_hash = config_hash(scene);
+  const std::string json = canonical_json(scene);
+  report.config_hash = fnv1a(json);
 #ifdef KERF_SANITIZED
   report.allocations_counted = false;
 #endif
 
-  SegmentWriter segment = publish_scene(scene, canonical_json(scene), report.config_hash);
+  SegmentWriter segment = publish_scene(scene, json, report.config_hash);
   SegmentServer server(options.name, segment,
                        {.tools = static_cast<std::uint32_t>(scene.tools.size())});
   const std::unique_ptr<Servo> servo = compile(scene);
@@ -208,25 +237,29 @@ int run_controller(const ControllerOptions& options) {
   OmniDriver device(port);
   if (!options.virtual_time) {
     report.missing_rights = lock_memory();
+    if (!segment.locked() && report.missing_rights.empty()) {
+      report.missing_rights.push_back({"locked segment", "page faults may delay a tick"});
+    }
     accept_rights(report.missing_rights, options.real_time.strict);
   }
 
   LoopLimits limits;
-  const double rate_hz = scene.servo.rate_hz;
   if (options.seconds) {
     limits.armed_ticks = static_cast<std::uint64_t>(std::llround(*options.seconds * rate_hz));
   }
   limits.gone_ticks = static_cast<std::uint64_t>(2 * rate_hz);
   limits.arming_ticks = static_cast<std::uint64_t>(kArmingPatienceS * rate_hz);
 
-  LoopSignals signals;
+  LoopSignals signals{stop};
+  Watchdog watchdog(device, signals);
   std::atomic<bool> ended{false};
   EndReason end = EndReason::stopped;
   std::string refused;
   {
-    const MotorGuard guard(device, signals.stop);
+    MotorGuard guard(device);
     segment.set_lifecycle(Lifecycle::run);
-    std::thread servo_thread([&] {
+    const std::jthread servo_thread([&] {
+      guard.guard_stack();
       try {
         if (!options.virtual_time) {
           const auto missing = become_real_time(options.real_time);
@@ -234,7 +267,7 @@ int run_controller(const ControllerOptions& options) {
           report.missing_rights.insert(report.missing_rights.end(), missing.begin(), missing.end());
         }
         Publisher eyes(segment, *servo);
-        RealTimeTicks real_time(1'000'000'000 / scene.servo.rate_hz,
+        RealTimeTicks real_time(kNsPerSecond / scene.servo.rate_hz,
                                 options.real_time.spin_us * 1000);
         LockStepTicks lock_step(device);
         TickSource& clock = options.virtual_time ? static_cast<TickSource&>(lock_step) : real_time;
@@ -245,10 +278,14 @@ int run_controller(const ControllerOptions& options) {
       }
       ended = true;
     });
-    report.watchdog_trips = watch(device, signals, ended, options, scene.servo.rate_hz);
-    servo_thread.join();
+    std::jthread watching;
+    if (!options.virtual_time) {
+      watching = start_watchdog(watchdog, options.real_time.priority);
+    }
+    show_progress(signals, ended, options, scene.servo.rate_hz);
   }
   if (!refused.empty()) throw std::runtime_error(refused);
+  if (!options.virtual_time) unlock_memory();
 
   const bool clean = end == EndReason::ticks_done || end == EndReason::stopped;
   segment.set_lifecycle(clean ? Lifecycle::clean_end : Lifecycle::fault);
@@ -256,12 +293,12 @@ int run_controller(const ControllerOptions& options) {
   report.removed_mm3 = removed_mm3(scene, report.record);
   report.lost_packets = device.lost();
   report.refused_packets = device.refused();
+  report.watchdog_trips = watchdog.trips();
   report.volume_hash = hash_of_volumes(scene, *servo);
   std::fputs(summary(report).c_str(), stdout);
+  if (!options.report.empty()) write_new_file(options.report, report_json(report));
   if (!options.final_volume.empty()) write_final(scene, *servo, options.final_volume);
-  if (!options.report.empty()) write_whole(options.report, report_json(report));
-  const bool faulty = report.record.event_count > report.watchdog_trips;
-  return clean && !faulty ? 0 : 1;
+  return clean && report.record.fault_count == 0 ? 0 : 1;
 }
 
 }  // namespace kerf

@@ -5,11 +5,10 @@
 #include <cerrno>
 #include <cstring>
 
-#include <pthread.h>
-#include <sched.h>
 #include <sys/mman.h>
 #include <sys/resource.h>
-#include <unistd.h>
+
+#include "shared/posix/cores.hpp"
 
 namespace kerf {
 namespace {
@@ -31,25 +30,22 @@ std::vector<MissingRight> lock_memory() {
 
 std::vector<MissingRight> become_real_time(const RealTimeOptions& options) {
   std::vector<MissingRight> missing;
-  const long cores = sysconf(_SC_NPROCESSORS_ONLN);
-  const int cpu = options.cpu >= 0 ? options.cpu : static_cast<int>(cores) - 1;
-  cpu_set_t set;
-  CPU_ZERO(&set);
-  if (cpu < CPU_SETSIZE) CPU_SET(static_cast<std::size_t>(cpu), &set);
-  if (const int error = pthread_setaffinity_np(pthread_self(), sizeof set, &set); error != 0) {
-    missing.push_back({"core " + std::to_string(cpu) + " (" + std::strerror(error) + ")",
+  const int core = options.cpu >= 0 ? options.cpu : allowed_cores().back();
+  if (const int error = pin_to_core(core); error != 0) {
+    missing.push_back({"core " + std::to_string(core) + " (" + std::strerror(error) + ")",
                        "the servo may move between cores"});
   }
-  sched_param parameters{};
-  parameters.sched_priority = options.priority;
-  if (const int error = pthread_setschedparam(pthread_self(), SCHED_FIFO, &parameters);
-      error != 0) {
+  if (const int error = set_fifo(options.priority); error != 0) {
     missing.push_back({"SCHED_FIFO " + std::to_string(options.priority) + " (" +
                            std::strerror(error) + "; raise RLIMIT_RTPRIO or grant CAP_SYS_NICE)",
                        "other programs may delay ticks by tens of milliseconds"});
   }
   touch_stack();
   return missing;
+}
+
+void unlock_memory() noexcept {
+  munlockall();
 }
 
 ThreadFaults thread_faults() noexcept {

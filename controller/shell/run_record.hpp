@@ -35,10 +35,15 @@ struct RunRecord {
   static constexpr std::size_t kMaxEvents = 64;
   std::array<FaultEvent, kMaxEvents> events{};
   std::size_t event_count = 0;  ///< may exceed kMaxEvents: the first ones are kept
+  std::size_t fault_count = 0;  ///< events that make the run a failure
 
   void add_event(std::uint64_t tick, const char* name) noexcept {
     if (event_count < kMaxEvents) events[event_count] = {tick, name};
     ++event_count;
+  }
+  void add_fault(std::uint64_t tick, const char* name) noexcept {
+    add_event(tick, name);
+    ++fault_count;
   }
 };
 

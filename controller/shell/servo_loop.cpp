@@ -71,7 +71,11 @@ EndReason run_servo(TickSource& clock, OmniDriver& device, Servo& servo, Publish
     const std::int64_t ready_ns = monotonic_ns();
     timing.compute_ns = ready_ns - in_hand_ns;
     timing.missed_deadlines = clock.overruns();
-    device.command(output);  // the hand first,
+    if (signals.stalled.load(std::memory_order_relaxed)) {
+      device.release();  // this tick was the stall: its force is late, the next one fades in
+    } else {
+      device.command(output);  // the hand first,
+    }
     const std::int64_t sent_ns = monotonic_ns();
     eyes.publish(tick, report, output, last_command, timing);  // then the eyes
     const std::int64_t published_ns = monotonic_ns();
@@ -79,7 +83,7 @@ EndReason run_servo(TickSource& clock, OmniDriver& device, Servo& servo, Publish
     signals.heartbeat.store(tick, std::memory_order_relaxed);
     silent_ticks = report.fresh ? 0 : silent_ticks + 1;
     if (output.fault != last_fault) {
-      if (output.fault != Fault::none) record.add_event(record.ticks, fault_name(output.fault));
+      if (output.fault != Fault::none) record.add_fault(record.ticks, fault_name(output.fault));
       last_fault = output.fault;
     }
     if (output.armed) {
@@ -97,7 +101,7 @@ EndReason run_servo(TickSource& clock, OmniDriver& device, Servo& servo, Publish
       break;
     }
     if (silent_ticks >= limits.gone_ticks) {
-      record.add_event(record.ticks, "device_gone");
+      record.add_fault(record.ticks, "device_gone");
       end = EndReason::device_gone;
       break;
     }

@@ -3,13 +3,22 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <stdexcept>
+#include <string_view>
 
 namespace kerf {
 
+/// A file that cannot be written; the message is one line: path, reason, way out.
+class FileError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
 /// A file that appears whole or not at all: written under a temporary name in the same folder, and
 /// renamed by `commit`. Without it the destructor removes it, and what was there before stays.
+/// A path that is there and is no regular file (a pipe, /dev/null) is written to as it stands.
 ///
-/// Every failure (no folder, no right, disk full) is a SceneError that names the final path.
+/// Every failure (no folder, no right, disk full) is a FileError that names the final path.
 class NewFile {
  public:
   explicit NewFile(const std::filesystem::path& path);
@@ -18,7 +27,7 @@ class NewFile {
   NewFile& operator=(const NewFile&) = delete;
 
   void write(const void* data, std::size_t size);
-  /// Ends writing. Some file systems report a full disk only here.
+  /// Ends writing, on the disk. Some file systems report a full disk only here.
   void close();
   /// After `close`.
   void commit();
@@ -27,9 +36,12 @@ class NewFile {
   [[noreturn]] void fail(int error) const;
 
   std::filesystem::path path_;
-  std::filesystem::path temporary_;
+  std::filesystem::path temporary_;  ///< empty: `path_` is written directly
   int fd_ = -1;
   bool committed_ = false;
 };
+
+/// All of `bytes` as one new file.
+void write_new_file(const std::filesystem::path& path, std::string_view bytes);
 
 }  // namespace kerf
