@@ -24,6 +24,14 @@ std::string hex(std::uint64_t value) {
 
 }  // namespace
 
+void check_report(const std::string& file) {
+  try {
+    check_new_file(file);
+  } catch (const FileError& error) {
+    throw HilError(std::string("--report: ") + error.what());
+  }
+}
+
 void write_run_report(const std::string& file, const Emulator& emulator, const FrontStats& front) {
   const EmulatorStats& stats = emulator.stats();
   const DeviceVec<double> tip = emulator.model().tip_mm();

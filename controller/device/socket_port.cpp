@@ -14,7 +14,8 @@
 
 namespace kerf {
 
-SocketPort::SocketPort(const std::filesystem::path& path, int patience_ms) {
+SocketPort::SocketPort(const std::filesystem::path& path, int patience_ms,
+                       const std::atomic<bool>& stop) {
   sockaddr_un address{};
   address.sun_family = AF_UNIX;
   const std::string text = path.string();
@@ -36,7 +37,7 @@ SocketPort::SocketPort(const std::filesystem::path& path, int patience_ms) {
     const int error = errno;
     if (fd_ >= 0) close(fd_);
     fd_ = -1;
-    if (std::chrono::steady_clock::now() >= give_up) {
+    if (stop || std::chrono::steady_clock::now() >= give_up) {
       throw std::runtime_error("--port socket:" + text + ": no device answers (" +
                                std::strerror(error) +
                                "); start kerf-emulator --front socket --socket " + text);

@@ -11,9 +11,9 @@ namespace kerf {
 /// A packet port over a Unix SEQPACKET socket: one datagram is one packet of the bus.
 class SocketPort final : public PacketPort {
  public:
-  /// Connects, trying again for `patience_ms` while nobody listens. Throws std::runtime_error with
-  /// one line when nobody does.
-  SocketPort(const std::filesystem::path& path, int patience_ms);
+  /// Connects, trying again for `patience_ms` while nobody listens, or until `stop`. Throws
+  /// std::runtime_error with one line when nobody does.
+  SocketPort(const std::filesystem::path& path, int patience_ms, const std::atomic<bool>& stop);
   ~SocketPort() override;
   SocketPort(const SocketPort&) = delete;
   SocketPort& operator=(const SocketPort&) = delete;

@@ -47,7 +47,7 @@ std::optional<int> parse_options(int argc, const char* const* argv, ControllerOp
                                         "voxel size of that volume in mm: one number or three")
                              ->delimiter(',')
                              ->expected(1, 3)
-                             ->check(CLI::PositiveNumber)
+
                              ->type_name("A[,B,C]");
   auto* window_option =
       app.add_option("--window", window, "source values shown as air and as densest")
@@ -111,6 +111,12 @@ std::optional<int> parse_options(int argc, const char* const* argv, ControllerOp
   };
   if (*spacing_option && spacing_mm.size() == 2) {
     return refuse("--spacing has 2 numbers; give one for all axes, or three");
+  }
+  for (const double edge_mm : spacing_mm) {
+    if (!(edge_mm > 0)) return refuse("--spacing: a voxel edge is above 0 mm, for example 0.125");
+  }
+  if (!options.check && options.port.empty()) {
+    return refuse("--port is missing; give socket:PATH, where kerf-emulator listens");
   }
   if (!options.check && !options.port.starts_with("socket:")) {
     return refuse("--port '" + options.port +

@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <thread>
@@ -41,6 +42,7 @@ namespace {
 
 constexpr int kPortPatienceMs = 5000;
 constexpr double kArmingPatienceS = 60;
+constexpr double kStableNPerMm = 0.7;  // CHAI3D's cap for the Omni; the design's for couplings
 constexpr std::chrono::milliseconds kWatchPeriod{5};
 
 const char* text_of(EndReason end) {
@@ -212,6 +214,15 @@ int run_controller(const ControllerOptions& options) {
                              std::to_string(scene.servo.rate_hz) + " Hz; spin less");
   }
   check_memory(scene);
+  if (!options.report.empty()) check_new_file(options.report);
+  if (!options.final_volume.empty()) check_volume_path(options.final_volume);
+  if (const double stiffness = device_stiffness_n_per_mm(scene); stiffness > kStableNPerMm) {
+    spdlog::warn(
+        "first contact is {:.3g} N/mm stiff at the device, and {} is what an Omni bears: expect it "
+        "to "
+        "tremble; lower force.p0_n_per_mm2",
+        stiffness, kStableNPerMm);
+  }
   if (!options.emulator_args.empty()) write_new_file(options.emulator_args, hand_lines(scene));
 
   RunReport report;
@@ -233,8 +244,14 @@ int run_controller(const ControllerOptions& options) {
   if (!scene.device.torque_scale) {
     spdlog::warn("device.torque_scale is not set: the motors stay off; measure it for your device");
   }
-  SocketPort port(options.port.substr(std::string("socket:").size()), kPortPatienceMs);
-  OmniDriver device(port);
+  std::optional<SocketPort> port;
+  try {
+    port.emplace(options.port.substr(std::string("socket:").size()), kPortPatienceMs, stop);
+  } catch (const std::runtime_error&) {
+    if (stop) return 1;  // asked to end before there was a device: nothing to tell
+    throw;
+  }
+  OmniDriver device(*port);
   if (!options.virtual_time) {
     report.missing_rights = lock_memory();
     if (!segment.locked() && report.missing_rights.empty()) {

@@ -14,13 +14,14 @@ namespace kerf {
 
 /// A fault as it latched, or an event of the shell.
 struct FaultEvent {
-  std::uint64_t tick = 0;
+  std::uint64_t tick = 0;  ///< as in the segment and in the log
   const char* name = "";
 };
 
 /// Statistics of a run. Fixed memory: the servo thread writes it, others read it after the end.
 struct RunRecord {
-  std::uint64_t ticks = 0;  ///< servo steps after arming; the counters below count these
+  std::uint64_t ticks = 0;          ///< servo steps after arming; the counters below count these
+  std::uint64_t armed_at_tick = 0;  ///< tick of the segment and of the log that was the first
   std::uint64_t overruns = 0;
   std::uint64_t stale_ticks = 0;
   std::uint64_t contact_ticks = 0;

@@ -60,6 +60,7 @@ std::string report_json(const RunReport& report) {
       {"virtual", report.virtual_time},
       {"end", report.end},
       {"ticks", r.ticks},
+      {"armed_at_tick", r.armed_at_tick},
       {"overruns", r.overruns},
       {"stale_ticks", r.stale_ticks},
       {"wake_us", percentiles(r.wake)},

@@ -64,7 +64,7 @@ EndReason run_servo(TickSource& clock, OmniDriver& device, Servo& servo, Publish
     }
     if (signals.stalled.exchange(false, std::memory_order_relaxed)) {
       servo.apply({.kind = ServoCommand::Kind::fade_in});
-      record.add_event(record.ticks, "watchdog");
+      record.add_event(tick, "watchdog");
     }
     const std::int64_t in_hand_ns = monotonic_ns();
     const ServoOutput output = servo.step(report);  // all physics, all limits
@@ -83,11 +83,12 @@ EndReason run_servo(TickSource& clock, OmniDriver& device, Servo& servo, Publish
     signals.heartbeat.store(tick, std::memory_order_relaxed);
     silent_ticks = report.fresh ? 0 : silent_ticks + 1;
     if (output.fault != last_fault) {
-      if (output.fault != Fault::none) record.add_fault(record.ticks, fault_name(output.fault));
+      if (output.fault != Fault::none) record.add_fault(tick, fault_name(output.fault));
       last_fault = output.fault;
     }
     if (output.armed) {
       if (record.ticks == 0) {  // figures of a run begin with arming
+        record.armed_at_tick = tick;
         overruns_before = clock.overruns();
         faults_before = thread_faults();
         allocations_before = CountedAllocations::total();
@@ -101,7 +102,7 @@ EndReason run_servo(TickSource& clock, OmniDriver& device, Servo& servo, Publish
       break;
     }
     if (silent_ticks >= limits.gone_ticks) {
-      record.add_fault(record.ticks, "device_gone");
+      record.add_fault(tick, "device_gone");
       end = EndReason::device_gone;
       break;
     }

@@ -56,6 +56,10 @@ void NewFile::fail(int error) const {
                   std::generic_category().message(error) + "); make room or choose another place");
 }
 
+void check_new_file(const std::filesystem::path& path) {
+  const NewFile never_committed(path);
+}
+
 void write_new_file(const std::filesystem::path& path, std::string_view bytes) {
   NewFile file(path);
   file.write(bytes.data(), bytes.size());

@@ -41,6 +41,9 @@ class NewFile {
   bool committed_ = false;
 };
 
+/// Throws now what a NewFile at `path` would throw later; leaves nothing behind. For long runs.
+void check_new_file(const std::filesystem::path& path);
+
 /// All of `bytes` as one new file.
 void write_new_file(const std::filesystem::path& path, std::string_view bytes);
 

@@ -163,14 +163,17 @@ TEST_CASE("SIGINT and SIGTERM end in order: exit 0, a report, no socket left") {
   }
 }
 
-TEST_CASE("a volume that cannot be written is one line and exit 2; the report is there") {
-  Pair pair;
-  pair.start("touch.toml", {"--virtual", "--seconds", "0.1", "--final", "/nonexistent/f.nrrd"},
-             {"--lockstep"});
-  CHECK(pair.controller->wait() == 2);
-  CHECK(pair.controller->output().find("/nonexistent/f.nrrd: cannot be written") !=
-        std::string::npos);
-  CHECK(pair.report()["ticks"] == 100);
+TEST_CASE("results that cannot be written are refused before the hand is moved") {
+  for (const std::string option : {"--final", "--emulator-args"}) {
+    Pair pair;
+    pair.start("touch.toml", {"--virtual", "--seconds", "0.1", option, "/nonexistent/f.nrrd"},
+               {"--lockstep"});
+    CHECK(pair.controller->wait() == 2);
+    const std::string line = pair.controller->output();
+    CHECK(line.find("/nonexistent/f.nrrd: cannot be written") != std::string::npos);
+    CHECK(std::count(line.begin(), line.end(), '\n') == 1);
+    CHECK_FALSE(std::filesystem::exists(pair.folder / "report.json"));
+  }
 }
 
 TEST_CASE("readers that come, die and come again do not change what the servo computes") {
@@ -189,7 +192,8 @@ TEST_CASE("readers that come, die and come again do not change what the servo co
             {kBin + "/kerf-visualizer", "--name", pair.name, "--headless", "--frames", "100",
              "--size", "160x120", "--out", (pair.folder / "frames").string()},
             pair.folder / "viewer.log");
-        std::this_thread::sleep_for(300ms);  // then killed by its destructor
+        std::this_thread::sleep_for(300ms);
+        viewer.signal(SIGKILL);
       }
     }
     REQUIRE(pair.controller->wait() == 0);
