@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cstring>
 #include <stdexcept>
+#include <system_error>
 #include <thread>
 
 #include <poll.h>
@@ -39,7 +40,7 @@ SocketPort::SocketPort(const std::filesystem::path& path, int patience_ms,
     fd_ = -1;
     if (stop || std::chrono::steady_clock::now() >= give_up) {
       throw std::runtime_error("--port socket:" + text + ": no device answers (" +
-                               std::strerror(error) +
+                               std::generic_category().message(error) +
                                "); start kerf-emulator --front socket --socket " + text);
     }
     std::this_thread::sleep_for(std::chrono::milliseconds(10));

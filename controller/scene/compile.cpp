@@ -117,9 +117,13 @@ class CompiledScene final : public Servo {
   void apply(const ServoCommand& command) noexcept override {
     apply_command(plan_, state_, command);
   }
-  double penetration_mm() const noexcept override { return kerf::penetration_mm(plan_, state_); }
-  VoxelGrid grid(std::size_t scene_index) const noexcept override { return grids_[scene_index]; }
-  std::span<const Density> density(std::size_t scene_index) const noexcept override {
+  [[nodiscard]] double penetration_mm() const noexcept override {
+    return kerf::penetration_mm(plan_, state_);
+  }
+  [[nodiscard]] VoxelGrid grid(std::size_t scene_index) const noexcept override {
+    return grids_[scene_index];
+  }
+  [[nodiscard]] std::span<const Density> density(std::size_t scene_index) const noexcept override {
     return densities_[scene_index];
   }
 

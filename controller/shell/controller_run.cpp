@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <exception>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -136,7 +137,7 @@ void write_final(const Scene& scene, const Servo& servo, const std::filesystem::
 /// would end the program without a word.
 void check_memory(const Scene& scene) {
   const bool fixed = scene.servo.numeric == NumericKind::fixed;
-  const std::uint64_t gradient_bytes = 3 * (fixed ? 2 : 8);
+  const std::uint64_t gradient_bytes = fixed ? 6 : 24;
   std::uint64_t bytes = 0;
   for (const SceneVolume& volume : scene.volumes) {
     const std::uint64_t voxels = volume.image.grid.voxel_count();
@@ -197,6 +198,107 @@ int check_scene(const Scene& scene) {
   return 0;
 }
 
+/// Everything that can be known to go wrong, before the hand is moved.
+void check_run(const ControllerOptions& options, const Scene& scene) {
+  if (static_cast<double>(options.real_time.spin_us) * scene.servo.rate_hz > 0.9e6) {
+    throw std::runtime_error("--spin-us " + std::to_string(options.real_time.spin_us) +
+                             " is more than 90 % of a tick at " +
+                             std::to_string(scene.servo.rate_hz) + " Hz; spin less");
+  }
+  check_memory(scene);
+  if (!options.report.empty()) check_new_file(options.report);
+  if (!options.final_volume.empty()) check_volume_path(options.final_volume);
+  if (const double stiffness = device_stiffness_n_per_mm(scene); stiffness > kStableNPerMm) {
+    spdlog::warn("first contact is {:.3g} N/mm stiff at the device, an Omni bears {}: it will {}",
+                 stiffness, kStableNPerMm, "tremble; lower force.p0_n_per_mm2");
+  }
+  if (!scene.device.torque_scale) {
+    spdlog::warn("device.torque_scale is not set: the motors stay off; measure it for your device");
+  }
+}
+
+RunReport new_report(const ControllerOptions& options, const Scene& scene, std::uint64_t hash) {
+  RunReport report;
+  report.scene = options.scene;
+  report.device = options.device;
+  report.numeric = word_of(scene.servo.numeric);
+  report.rate_hz = scene.servo.rate_hz;
+  report.virtual_time = options.virtual_time;
+  report.config_hash = hash;
+#ifdef KERF_SANITIZED
+  report.allocations_counted = false;
+#endif
+  return report;
+}
+
+LoopLimits limits_of(const ControllerOptions& options, double rate_hz) {
+  LoopLimits limits;
+  if (options.seconds) {
+    limits.armed_ticks = static_cast<std::uint64_t>(std::llround(*options.seconds * rate_hz));
+  }
+  limits.gone_ticks = static_cast<std::uint64_t>(2 * rate_hz);
+  limits.arming_ticks = static_cast<std::uint64_t>(kArmingPatienceS * rate_hz);
+  return limits;
+}
+
+/// What the threads of a run share.
+struct Run {
+  const ControllerOptions& options;
+  int rate_hz;
+  SegmentWriter& segment;
+  SegmentServer& server;
+  Servo& servo;
+  OmniDriver& device;
+  std::atomic<bool>& stop;
+  RunReport& report;
+};
+
+/// The servo thread from its first to its last tick. Throws where --strict misses a right.
+EndReason serve(const Run& run, LoopSignals& signals) {
+  const ControllerOptions& options = run.options;
+  if (!options.virtual_time) {
+    const auto missing = become_real_time(options.real_time);
+    accept_rights(missing, options.real_time.strict);
+    auto& all = run.report.missing_rights;
+    all.insert(all.end(), missing.begin(), missing.end());
+  }
+  Publisher eyes(run.segment, run.servo);
+  RealTimeTicks real_time(kNsPerSecond / run.rate_hz, options.real_time.spin_us * 1000);
+  LockStepTicks lock_step(run.device);
+  TickSource& clock = options.virtual_time ? static_cast<TickSource&>(lock_step) : real_time;
+  return run_servo(clock, run.device, run.servo, eyes, run.server, limits_of(options, run.rate_hz),
+                   signals, run.report.record);
+}
+
+/// Servo, watchdog and progress until the run is over; the motors are off afterwards.
+EndReason run_threads(const Run& run) {
+  LoopSignals signals{run.stop};
+  Watchdog watchdog(run.device, signals);
+  std::atomic<bool> ended{false};
+  EndReason end = EndReason::stopped;
+  std::exception_ptr failure;
+  {
+    MotorGuard guard(run.device);
+    const std::jthread servo_thread([&] {
+      guard.guard_stack();
+      try {
+        end = serve(run, signals);
+      } catch (...) {
+        failure = std::current_exception();
+      }
+      ended = true;
+    });
+    std::jthread watching;
+    if (!run.options.virtual_time) {
+      watching = start_watchdog(watchdog, run.options.real_time.priority);
+    }
+    show_progress(signals, ended, run.options, run.rate_hz);
+  }
+  run.report.watchdog_trips = watchdog.trips();
+  if (failure) std::rethrow_exception(failure);
+  return end;
+}
+
 }  // namespace
 
 int run_controller(const ControllerOptions& options) {
@@ -207,43 +309,15 @@ int run_controller(const ControllerOptions& options) {
 
   Scene scene = load_scene(options.scene, options.overrides);
   if (options.check) return check_scene(scene);
-  const double rate_hz = scene.servo.rate_hz;
-  if (static_cast<double>(options.real_time.spin_us) * rate_hz > 0.9e6) {
-    throw std::runtime_error("--spin-us " + std::to_string(options.real_time.spin_us) +
-                             " is more than 90 % of a tick at " +
-                             std::to_string(scene.servo.rate_hz) + " Hz; spin less");
-  }
-  check_memory(scene);
-  if (!options.report.empty()) check_new_file(options.report);
-  if (!options.final_volume.empty()) check_volume_path(options.final_volume);
-  if (const double stiffness = device_stiffness_n_per_mm(scene); stiffness > kStableNPerMm) {
-    spdlog::warn(
-        "first contact is {:.3g} N/mm stiff at the device, and {} is what an Omni bears: expect it "
-        "to "
-        "tremble; lower force.p0_n_per_mm2",
-        stiffness, kStableNPerMm);
-  }
+  check_run(options, scene);
   if (!options.emulator_args.empty()) write_new_file(options.emulator_args, hand_lines(scene));
 
-  RunReport report;
-  report.scene = options.scene;
-  report.device = options.device;
-  report.numeric = word_of(scene.servo.numeric);
-  report.rate_hz = scene.servo.rate_hz;
-  report.virtual_time = options.virtual_time;
   const std::string json = canonical_json(scene);
-  report.config_hash = fnv1a(json);
-#ifdef KERF_SANITIZED
-  report.allocations_counted = false;
-#endif
-
+  RunReport report = new_report(options, scene, fnv1a(json));
   SegmentWriter segment = publish_scene(scene, json, report.config_hash);
   SegmentServer server(options.name, segment,
                        {.tools = static_cast<std::uint32_t>(scene.tools.size())});
   const std::unique_ptr<Servo> servo = compile(scene);
-  if (!scene.device.torque_scale) {
-    spdlog::warn("device.torque_scale is not set: the motors stay off; measure it for your device");
-  }
   std::optional<SocketPort> port;
   try {
     port.emplace(options.port.substr(std::string("socket:").size()), kPortPatienceMs, stop);
@@ -260,48 +334,10 @@ int run_controller(const ControllerOptions& options) {
     accept_rights(report.missing_rights, options.real_time.strict);
   }
 
-  LoopLimits limits;
-  if (options.seconds) {
-    limits.armed_ticks = static_cast<std::uint64_t>(std::llround(*options.seconds * rate_hz));
-  }
-  limits.gone_ticks = static_cast<std::uint64_t>(2 * rate_hz);
-  limits.arming_ticks = static_cast<std::uint64_t>(kArmingPatienceS * rate_hz);
-
-  LoopSignals signals{stop};
-  Watchdog watchdog(device, signals);
-  std::atomic<bool> ended{false};
-  EndReason end = EndReason::stopped;
-  std::string refused;
-  {
-    MotorGuard guard(device);
-    segment.set_lifecycle(Lifecycle::run);
-    const std::jthread servo_thread([&] {
-      guard.guard_stack();
-      try {
-        if (!options.virtual_time) {
-          const auto missing = become_real_time(options.real_time);
-          accept_rights(missing, options.real_time.strict);
-          report.missing_rights.insert(report.missing_rights.end(), missing.begin(), missing.end());
-        }
-        Publisher eyes(segment, *servo);
-        RealTimeTicks real_time(kNsPerSecond / scene.servo.rate_hz,
-                                options.real_time.spin_us * 1000);
-        LockStepTicks lock_step(device);
-        TickSource& clock = options.virtual_time ? static_cast<TickSource&>(lock_step) : real_time;
-        report.load_s = static_cast<double>(monotonic_ns() - began_ns) / 1e9;
-        end = run_servo(clock, device, *servo, eyes, server, limits, signals, report.record);
-      } catch (const std::exception& error) {
-        refused = error.what();
-      }
-      ended = true;
-    });
-    std::jthread watching;
-    if (!options.virtual_time) {
-      watching = start_watchdog(watchdog, options.real_time.priority);
-    }
-    show_progress(signals, ended, options, scene.servo.rate_hz);
-  }
-  if (!refused.empty()) throw std::runtime_error(refused);
+  segment.set_lifecycle(Lifecycle::run);
+  report.load_s = static_cast<double>(monotonic_ns() - began_ns) / 1e9;
+  const EndReason end =
+      run_threads({options, scene.servo.rate_hz, segment, server, *servo, device, stop, report});
   if (!options.virtual_time) unlock_memory();
 
   const bool clean = end == EndReason::ticks_done || end == EndReason::stopped;
@@ -310,7 +346,6 @@ int run_controller(const ControllerOptions& options) {
   report.removed_mm3 = removed_mm3(scene, report.record);
   report.lost_packets = device.lost();
   report.refused_packets = device.refused();
-  report.watchdog_trips = watchdog.trips();
   report.volume_hash = hash_of_volumes(scene, *servo);
   std::fputs(summary(report).c_str(), stdout);
   if (!options.report.empty()) write_new_file(options.report, report_json(report));

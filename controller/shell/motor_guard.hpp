@@ -25,7 +25,7 @@ class MotorGuard {
   void guard_stack() noexcept;
 
  private:
-  static constexpr std::size_t kStackBytes = 64 * 1024;
+  static constexpr std::size_t kStackBytes = 65536;
   OmniDriver& device_;
   alignas(16) std::array<std::byte, kStackBytes> stack_{};
 };
