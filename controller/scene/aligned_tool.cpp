@@ -1,0 +1,198 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "controller/scene/aligned_tool.hpp"
+
+#include <algorithm>
+#include <cstdlib>
+#include <limits>
+#include <map>
+#include <set>
+
+#include "controller/kernel/gradient.hpp"
+
+namespace kerf {
+namespace {
+
+static_assert([] {
+  const GradientTaps farid = taps(GradientKernel::farid);
+  for (std::size_t i = 0; i < 5; ++i) {
+    if (farid.slope[i] != kAlignedSlopeFactor * kAlignedSlope[i]) return false;
+    if (farid.smooth[i] != kAlignedSmooth[i]) return false;
+  }
+  return farid.shift == 21;
+}());
+
+struct Extent {
+  ToolOffset low{}, high{};
+};
+
+Extent extent_of(std::span<const ToolOffset> offsets) {
+  Extent extent{offsets.front(), offsets.front()};
+  for (const ToolOffset& offset : offsets) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      extent.low[axis] = std::min(extent.low[axis], offset[axis]);
+      extent.high[axis] = std::max(extent.high[axis], offset[axis]);
+    }
+  }
+  return extent;
+}
+
+/// One table over the box as a stream, in the order of the axes that take the slope.
+using Table = std::vector<std::int32_t>;
+
+/// out[i + k stride] += taps[k] in[i]: the convolution along one axis.
+Table convolved(const Table& in, std::size_t stride, const std::array<std::int32_t, 5>& taps) {
+  Table out(in.size());
+  for (std::size_t i = 0; i + 4 * stride < in.size(); ++i) {
+    if (in[i] == 0) continue;
+    for (std::size_t k = 0; k < 5; ++k) out[i + k * stride] += taps[k] * in[i];
+  }
+  return out;
+}
+
+/// Runs of `lanes` entries that cover all that is not zero in any of the tables.
+std::vector<AlignedChunk> cover(std::span<const Table> tables, std::size_t lanes) {
+  std::vector<AlignedChunk> chunks;
+  const std::size_t size = tables.front().size();
+  for (std::size_t at = 0; at < size;) {
+    const bool empty =
+        std::all_of(tables.begin(), tables.end(), [&](const Table& t) { return t[at] == 0; });
+    if (!empty) chunks.push_back({static_cast<std::int32_t>(at), 0});
+    at += empty ? 1 : lanes;
+  }
+  return chunks;
+}
+
+/// Largest table that fuses the axes, bytes: it must leave the second-level cache to the box.
+constexpr std::size_t kMaxFusedBytes = 512 * 1024;
+
+}  // namespace
+
+bool can_align(std::span<const ToolOffset> offsets) {
+  if (offsets.empty()) return false;
+  const Extent extent = extent_of(offsets);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    if (extent.high[axis] - extent.low[axis] > 2 * (kMaxAlignedEdge - 1)) return false;
+  }
+  for (const ToolOffset& offset : offsets) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      if ((offset[axis] - extent.low[axis]) % 2 != 0) return false;
+    }
+  }
+  return std::set<ToolOffset>(offsets.begin(), offsets.end()).size() == offsets.size();
+}
+
+AlignedTool::AlignedTool(std::span<const ToolOffset> offsets, const AlignedKernels& kernels) {
+  const Extent extent = extent_of(offsets);
+  const auto length = [&](std::size_t axis) {
+    return (extent.high[axis] - extent.low[axis]) / 2 + 1;
+  };
+  table_.size = {length(0), length(1), length(2)};
+  table_.box = {table_.size.x + kAlignedBoxMargin, table_.size.y + kAlignedBoxMargin,
+                table_.size.z + kAlignedBoxMargin};
+  table_.low = extent.low;
+  table_.lanes = kernels.lanes;
+  table_.row_lanes = (table_.box.x + 31) / 32 * 32;
+
+  const auto lanes = static_cast<std::size_t>(kernels.lanes);
+  const VoxelGrid box{table_.box.x, table_.box.y, table_.box.z};
+  const auto words = static_cast<std::size_t>(table_.row_lanes / 32);
+  const auto mask_rows = static_cast<std::size_t>(table_.size.y + 2);
+  mask_.resize(mask_rows * static_cast<std::size_t>(table_.size.z + 2) * 2 * words);
+  Table mask(box.voxel_count() + lanes);
+  for (const ToolOffset& offset : offsets) {
+    std::array<std::int32_t, 3> at{};
+    for (std::size_t axis = 0; axis < 3; ++axis) at[axis] = (offset[axis] - extent.low[axis]) / 2;
+    mask[box.index(at[0], at[1], at[2])] = 1;
+    const auto row =
+        static_cast<std::size_t>(at[2] + 1) * mask_rows + static_cast<std::size_t>(at[1] + 1);
+    for (std::size_t moved = 0; moved < 2; ++moved) {
+      const std::size_t lane = static_cast<std::size_t>(at[0]) + 2 + moved;
+      mask_[(2 * row + moved) * words + lane / 32] |= std::uint32_t{1} << (lane % 32);
+    }
+  }
+
+  const auto pitch = static_cast<std::size_t>(table_.box.x);
+  const std::size_t plane = pitch * static_cast<std::size_t>(table_.box.y);
+  std::array<Table, 3> tables;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const auto along = [&](std::size_t a) { return a == axis ? kAlignedSlope : kAlignedSmooth; };
+    tables[axis] =
+        convolved(convolved(convolved(mask, 1, along(0)), pitch, along(1)), plane, along(2));
+  }
+
+  std::size_t apart = 0;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    chunks_[axis] = cover(std::span(tables).subspan(axis, 1), lanes);
+    apart += chunks_[axis].size();
+  }
+  std::vector<AlignedChunk> joined = cover(tables, lanes);
+  // Fused, a density is loaded once for three axes; that pays while the joined list is little
+  // longer than the three (a cube's slopes lie on different faces).
+  table_.fused = kernels.can_fuse && 30 * joined.size() <= 11 * apart &&
+                 joined.size() * 6 * lanes * sizeof(std::int16_t) <= kMaxFusedBytes;
+  if (table_.fused) chunks_ = {std::move(joined), {}, {}};
+
+  std::int32_t largest = 1;  // of all halves
+  std::vector<std::int16_t> stored;
+  std::map<std::vector<std::int16_t>, std::int32_t> known;  // equal runs are kept once
+  const std::size_t axes = table_.fused ? 3 : 1;
+  for (std::size_t list = 0; list < 3; ++list) {
+    for (AlignedChunk& chunk : chunks_[list]) {
+      std::vector<std::int16_t> run;
+      for (std::size_t axis = list; axis < list + axes; ++axis) {
+        std::vector<std::int16_t> high;
+        for (std::size_t lane = 0; lane < lanes; ++lane) {
+          const auto at = static_cast<std::size_t>(chunk.box_at) + lane;
+          const std::int32_t entry = at < tables[axis].size() ? tables[axis][at] : 0;
+          const std::int32_t up = (entry + 256) >> 9;
+          const std::int32_t rest = entry - 512 * up;
+          largest = std::max({largest, std::abs(up), std::abs(rest)});
+          run.push_back(static_cast<std::int16_t>(rest));
+          high.push_back(static_cast<std::int16_t>(up));
+        }
+        run.insert(run.end(), high.begin(), high.end());
+      }
+      const auto [place, is_new] = known.try_emplace(run, static_cast<std::int32_t>(stored.size()));
+      chunk.vector = place->second;
+      if (is_new) stored.insert(stored.end(), run.begin(), run.end());
+    }
+    table_.chunks[list] = chunks_[list].data();
+    table_.chunk_count[list] = static_cast<std::int32_t>(chunks_[list].size());
+  }
+  vectors_.resize((stored.size() + 31) / 32);
+  for (std::size_t i = 0; i < stored.size(); ++i) vectors_[i / 32].entry[i % 32] = stored[i];
+  table_.vectors = vectors_.empty() ? nullptr : vectors_.front().entry.data();
+  table_.mask = mask_.data();
+  // Each chunk adds two products of a half and a density of at most 2^15 to a 32-bit sum.
+  table_.flush = std::numeric_limits<std::int32_t>::max() / (2 * largest * 32768);
+}
+
+std::size_t AlignedTool::bytes() const noexcept {
+  std::size_t chunks = 0;
+  for (const auto& list : chunks_) chunks += list.size();
+  return chunks * sizeof(AlignedChunk) + vectors_.size() * sizeof(CacheLine) +
+         mask_.size() * sizeof(mask_[0]);
+}
+
+void AlignedMemory::hold(VoxelIndex tool_size) {
+  const AlignedScratchSize need = aligned_scratch_size(tool_size);
+  const auto grow = [](auto& memory, std::size_t size) {
+    if (memory.size() < size) memory.resize(size);
+  };
+  grow(box_, need.box);
+  grow(ratio_, need.ratio);
+  grow(filter_, need.filter);
+  grow(inside_, need.inside);
+  grow(live_, need.live);
+}
+
+AlignedScratch AlignedMemory::view() noexcept {
+  return {box_.data(), ratio_.data(), filter_.data(), inside_.data(), live_.data()};
+}
+
+std::size_t AlignedMemory::bytes() const noexcept {
+  return (box_.size() + ratio_.size() + inside_.size()) * sizeof(std::int16_t) +
+         filter_.size() * sizeof(std::int32_t) + live_.size();
+}
+
+}  // namespace kerf

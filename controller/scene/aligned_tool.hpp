@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "controller/kernel/aligned_kernels.hpp"
+#include "controller/kernel/aligned_table.hpp"
+#include "controller/kernel/tool_offset.hpp"
+
+namespace kerf {
+
+/// True when the plan `aligned` can hold these samples: on one lattice of whole pitches, no two at
+/// the same place, at most kMaxAlignedEdge along each axis, at least one.
+[[nodiscard]] bool can_align(std::span<const ToolOffset> offsets);
+
+/// Owner of one tool's table for the plan `aligned`. Load time; moving it keeps the table valid.
+class AlignedTool {
+ public:
+  /// Requires `can_align(offsets)`.
+  AlignedTool(std::span<const ToolOffset> offsets, const AlignedKernels& kernels);
+
+  [[nodiscard]] const AlignedTable& table() const noexcept { return table_; }
+  [[nodiscard]] std::size_t bytes() const noexcept;
+
+ private:
+  struct alignas(64) CacheLine {
+    std::array<std::int16_t, 32> entry{};
+  };
+
+  AlignedTable table_;
+  std::array<std::vector<AlignedChunk>, 3> chunks_;
+  std::vector<CacheLine> vectors_;
+  std::vector<std::uint32_t> mask_;
+};
+
+/// Owner of the working memory that all tools share. Load time.
+class AlignedMemory {
+ public:
+  void hold(VoxelIndex tool_size);
+  [[nodiscard]] AlignedScratch view() noexcept;
+  [[nodiscard]] std::size_t bytes() const noexcept;
+
+ private:
+  std::vector<std::int16_t> box_, ratio_, inside_;
+  std::vector<std::int32_t> filter_;
+  std::vector<std::uint8_t> live_;
+};
+
+}  // namespace kerf
