@@ -21,9 +21,13 @@ inline constexpr std::int32_t kAlignedSlopeFactor = 7;
 
 /// Voxels of a tool along one axis, at most.
 inline constexpr std::int32_t kMaxAlignedEdge = 64;
-/// Samples of a tool that cuts, at most: keeps the modification sum, up to 2^47.83 a sample, within
-/// 63 bits.
-inline constexpr std::size_t kMaxAlignedCutSamples = 32768;
+/// The exact gradient of a voxel, times 2^21 / 7, is at most this: half the slope taps' sum times
+/// the smooth taps' squared, times full density.
+inline constexpr std::int64_t kMaxExactGradient = std::int64_t{7} * 129 * 129 * 65535;
+/// Samples of a tool that cuts, at most: the modification sum, 2^15 exact gradients a sample, stays
+/// below 2^62. A ball of 32 voxels has 17 256.
+inline constexpr std::size_t kMaxAlignedCutSamples = 18'000;
+static_assert(kMaxAlignedCutSamples <= (std::uint64_t{1} << 62) / 32768 / kMaxExactGradient);
 
 /// Voxels of the box around a tool beyond the tool: two of gradient at each end, one of the cell.
 inline constexpr std::int32_t kAlignedBoxMargin = 5;
