@@ -84,10 +84,10 @@ struct Simd {
   }
 
   /// density[begin + i] -= loss_i, as a whole vector: the entries that lose nothing, beyond the
-  /// tool's box or in the next row, are written back as they are. Near the ends of the volume's
-  /// memory one by one.
-  static void subtract_at(std::uint16_t* density, std::ptrdiff_t begin, std::ptrdiff_t count,
-                          V loss, std::uint32_t lost) noexcept {
+  /// tool's box or in the next row, are written back as they are. The box cannot tell them, so its
+  /// `rho` is of no use. Near the ends of the volume's memory one by one.
+  static void write_loss(std::uint16_t* density, std::ptrdiff_t begin, std::ptrdiff_t count,
+                         V /*rho*/, V loss, std::uint32_t lost) noexcept {
     if (begin >= 0 && begin + kLanes <= count) {
       store(density + begin, sub16(load(density + begin), loss));
       return;

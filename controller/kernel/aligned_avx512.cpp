@@ -65,11 +65,10 @@ struct Simd {
   }
   static std::int64_t sum64(V a) noexcept { return _mm512_reduce_add_epi64(a); }
 
-  /// density[begin + i] -= loss_i where bit i of `lost` is set; touches no other memory.
-  static void subtract_at(std::uint16_t* density, std::ptrdiff_t begin, std::ptrdiff_t /*count*/,
-                          V loss, std::uint32_t lost) noexcept {
-    std::uint16_t* row = density + begin;
-    _mm512_mask_storeu_epi16(row, lost, sub16(_mm512_maskz_loadu_epi16(lost, row), loss));
+  /// density[begin + i] = rho_i - loss_i where bit i of `lost` is set; touches no other memory.
+  static void write_loss(std::uint16_t* density, std::ptrdiff_t begin, std::ptrdiff_t /*count*/,
+                         V rho, V loss, std::uint32_t lost) noexcept {
+    _mm512_mask_storeu_epi16(density + begin, lost, sub16(rho, loss));
   }
 };
 

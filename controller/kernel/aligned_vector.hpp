@@ -26,46 +26,74 @@ constexpr std::int16_t kAir = -32768;  ///< density 0 after re-centring
 #define KERF_UNROLL _Pragma("GCC unroll 32")
 #endif
 
-// Box rows are stored as whole vectors, in order: the next row overwrites what spills.
-void copy_box(const AlignedTable& tool, const VoxelGrid& grid, const Density* density,
-              VoxelIndex origin, const AlignedScratch& scratch) noexcept {
+/// `count` densities of a row, re-centred, as whole vectors.
+[[gnu::always_inline]] inline void copy_row(const Density* row, std::int32_t count,
+                                            std::int16_t* out) noexcept {
+  const V flip = Simd::set16(kAir);
+  for (std::int32_t x = 0; x < count; x += kLanes) {
+    Simd::store(out + x, Simd::bit_xor(Simd::load(row + x), flip));
+  }
+}
+
+/// A box that sticks out of the volume, or whose last vectors would leave the volume's memory.
+void copy_clipped_box(const AlignedTable& tool, const VoxelGrid& grid, const Density* density,
+                      VoxelIndex origin, const AlignedScratch& scratch,
+                      std::int32_t padded) noexcept {
   const V flip = Simd::set16(kAir);
   const std::int32_t width = tool.box.x;
   const std::int32_t from = origin.x < 0 ? -origin.x : 0;
   const std::int32_t to = grid.nx - origin.x < width ? grid.nx - origin.x : width;
-  const bool whole = from == 0 && to == width;
-  const std::int32_t padded = (width + kLanes - 1) / kLanes * kLanes;
-  if (!whole) {
-    for (std::int32_t x = 0; x < padded; ++x) {
-      scratch.inside[x] = static_cast<std::int16_t>(x >= from && x < to ? -1 : 0);
-    }
+  for (std::int32_t x = 0; x < padded; ++x) {
+    scratch.inside[x] = static_cast<std::int16_t>(x >= from && x < to ? -1 : 0);
   }
   const std::ptrdiff_t pitch = grid.nx, plane = pitch * grid.ny, count = plane * grid.nz;
   std::int16_t* out = scratch.box;
   for (std::int32_t z = origin.z; z < origin.z + tool.box.z; ++z) {
     for (std::int32_t y = origin.y; y < origin.y + tool.box.y; ++y, out += width) {
-      if (y < 0 || z < 0 || y >= grid.ny || z >= grid.nz || from >= to) {
+      if (y < 0 || z < 0 || y >= grid.ny || z >= grid.nz) {
         for (std::int32_t x = 0; x < padded; x += kLanes) Simd::store(out + x, flip);
         continue;
       }
       const std::ptrdiff_t begin = z * plane + y * pitch + origin.x;
       if (begin < 0 || begin + padded > count) {  // whole vectors would leave the volume's memory
         for (std::int32_t x = 0; x < width; ++x) {
-          out[x] =
-              x >= from && x < to ? static_cast<std::int16_t>(density[begin + x] ^ 0x8000) : kAir;
+          out[x] = scratch.inside[x] != 0 ? static_cast<std::int16_t>(density[begin + x] ^ 0x8000)
+                                          : kAir;
         }
         continue;
       }
-      const Density* row = density + begin;
-      if (whole) {
-        for (std::int32_t x = 0; x < padded; x += kLanes) {
-          Simd::store(out + x, Simd::bit_xor(Simd::load(row + x), flip));
-        }
-      } else {
-        for (std::int32_t x = 0; x < padded; x += kLanes) {
-          const V kept = Simd::bit_and(Simd::load(row + x), Simd::load(scratch.inside + x));
-          Simd::store(out + x, Simd::bit_xor(kept, flip));
-        }
+      for (std::int32_t x = 0; x < padded; x += kLanes) {
+        const V kept =
+            Simd::bit_and(Simd::load(density + begin + x), Simd::load(scratch.inside + x));
+        Simd::store(out + x, Simd::bit_xor(kept, flip));
+      }
+    }
+  }
+}
+
+// Box rows are stored as whole vectors, in order: the next row overwrites what spills.
+void copy_box(const AlignedTable& tool, const VoxelGrid& grid, const Density* density,
+              VoxelIndex origin, const AlignedScratch& scratch) noexcept {
+  const std::int32_t width = tool.box.x;
+  const std::int32_t padded = (width + kLanes - 1) / kLanes * kLanes;
+  const std::ptrdiff_t pitch = grid.nx, plane = pitch * grid.ny, count = plane * grid.nz;
+  const VoxelIndex end{origin.x + width, origin.y + tool.box.y, origin.z + tool.box.z};
+  const std::ptrdiff_t last_row = (end.z - 1) * plane + (end.y - 1) * pitch + origin.x;
+  if (origin.x < 0 || origin.y < 0 || origin.z < 0 || end.x > grid.nx || end.y > grid.ny ||
+      end.z > grid.nz || last_row + padded > count) {
+    copy_clipped_box(tool, grid, density, origin, scratch, padded);
+    return;
+  }
+  std::int16_t* out = scratch.box;
+  for (std::int32_t z = origin.z; z < end.z; ++z) {
+    const Density* row = density + z * plane + origin.y * pitch + origin.x;
+    if (padded == 32) {  // tools up to 27 voxels: no loop within a row
+      for (std::int32_t y = 0; y < tool.box.y; ++y, row += pitch, out += width) {
+        copy_row(row, 32, out);
+      }
+    } else {
+      for (std::int32_t y = 0; y < tool.box.y; ++y, row += pitch, out += width) {
+        copy_row(row, padded, out);
       }
     }
   }
@@ -345,32 +373,38 @@ AlignedCut cut(const AlignedTable& tool, const AlignedRate& rate, const VoxelGri
   AlignedCut cut{0, {tool.box.x, tool.box.y, tool.box.z}, {-1, -1, -1}};
   const V air = Simd::set16(kAir), mantissa = Simd::set16(rate.mantissa);
   const std::ptrdiff_t pitch = grid.nx, plane = pitch * grid.ny, count = plane * grid.nz;
+  const std::ptrdiff_t ratio_pitch = tool.row_lanes + kRatioRowPad;
   for (std::int32_t x = 0; x < tool.row_lanes; x += kLanes) {  // a lane never leaves its vector
     V owed = Simd::load(carry + x), steps = Simd::zero();
     std::uint32_t changed = 0;
-    for (std::int32_t z = 2; z <= tool.size.z + 2; ++z) {
-      for (std::int32_t y = 2; y <= tool.size.y + 2; ++y) {
-        const std::int32_t row = (z - 2) * (tool.size.y + 1) + y - 2;
-        if (scratch.live[row] == 0) continue;
-        const V ratio = Simd::sub16(Simd::zero(), Simd::load(scratch.ratio + kRatioRowPad + x +
-                                                             static_cast<std::ptrdiff_t>(row) *
-                                                                 (tool.row_lanes + kRatioRowPad)));
-        const std::int16_t* box =
-            scratch.box + (static_cast<std::ptrdiff_t>(z) * tool.box.y + y) * tool.box.x + x;
+    for (std::int32_t z = 0; z <= tool.size.z; ++z) {
+      const std::uint8_t* live = scratch.live + z * (tool.size.y + 1);
+      const std::int16_t* ratio = scratch.ratio + kRatioRowPad + x +
+                                  static_cast<std::ptrdiff_t>(z) * (tool.size.y + 1) * ratio_pitch;
+      const std::int16_t* box =
+          scratch.box + (static_cast<std::ptrdiff_t>(z + 2) * tool.box.y + 2) * tool.box.x + x;
+      std::ptrdiff_t begin = (origin.z + z + 2) * plane + (origin.y + 2) * pitch + origin.x + x;
+      std::int32_t first = tool.box.y, last = -1;
+      for (std::int32_t y = 0; y <= tool.size.y;
+           ++y, ratio += ratio_pitch, box += tool.box.x, begin += pitch) {
+        if (live[y] == 0) continue;
         const V rho = Simd::bit_xor(Simd::load(box), air);
-        const V loss = taken(rho, ratio, mantissa, rate.exponent, owed);
+        const V loss =
+            taken(rho, Simd::sub16(Simd::zero(), Simd::load(ratio)), mantissa, rate.exponent, owed);
         const std::uint32_t lost = Simd::not_zero16(loss);
         if (lost == 0) continue;
         steps = Simd::add32(steps, Simd::add32(Simd::unpack_low(loss, Simd::zero()),
                                                Simd::unpack_high(loss, Simd::zero())));
         changed |= lost;
-        cut.lo.y = y < cut.lo.y ? y : cut.lo.y;
-        cut.hi.y = y > cut.hi.y ? y : cut.hi.y;
-        cut.lo.z = z < cut.lo.z ? z : cut.lo.z;
-        cut.hi.z = z > cut.hi.z ? z : cut.hi.z;
-        const std::ptrdiff_t begin = (origin.z + z) * plane + (origin.y + y) * pitch + origin.x + x;
-        Simd::subtract_at(density, begin, count, loss, lost);
+        first = last < 0 ? y : first;
+        last = y;
+        Simd::write_loss(density, begin, count, rho, loss, lost);
       }
+      if (last < 0) continue;
+      cut.lo.y = first + 2 < cut.lo.y ? first + 2 : cut.lo.y;
+      cut.hi.y = last + 2 > cut.hi.y ? last + 2 : cut.hi.y;
+      cut.lo.z = z + 2 < cut.lo.z ? z + 2 : cut.lo.z;
+      cut.hi.z = z + 2 > cut.hi.z ? z + 2 : cut.hi.z;
     }
     Simd::store(carry + x, owed);
     cut.density_steps += static_cast<std::uint64_t>(Simd::sum64(Simd::widened(steps)));
