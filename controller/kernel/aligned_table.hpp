@@ -62,7 +62,8 @@ struct AlignedTable {
   const std::uint32_t* mask = nullptr;
 };
 
-/// Working memory of one tick, shared by all tools and volumes; any contents.
+/// Working memory of one tick, shared by all tools and volumes; any contents. Ratios, filter and
+/// live rows may be missing where nothing is milled.
 struct AlignedScratch {
   std::int16_t* box = nullptr;     ///< density - 32768 around the tool, as one stream
   std::int16_t* ratio = nullptr;   ///< minus the overlap ratio (2^15 = 1), rows of row_lanes + pad

@@ -174,15 +174,16 @@ std::size_t AlignedTool::bytes() const noexcept {
          mask_.size() * sizeof(mask_[0]);
 }
 
-void AlignedMemory::hold(VoxelIndex tool_size) {
+void AlignedMemory::hold(VoxelIndex tool_size, bool mills) {
   const AlignedScratchSize need = aligned_scratch_size(tool_size);
   const auto grow = [](auto& memory, std::size_t size) {
     if (memory.size() < size) memory.resize(size);
   };
   grow(box_, need.box);
+  grow(inside_, need.inside);
+  if (!mills) return;
   grow(ratio_, need.ratio);
   grow(filter_, need.filter);
-  grow(inside_, need.inside);
   grow(live_, need.live);
 }
 

@@ -40,7 +40,8 @@ class AlignedTool {
 /// Owner of the working memory that all tools share. Load time.
 class AlignedMemory {
  public:
-  void hold(VoxelIndex tool_size);
+  /// Makes room for a tool; the arrays of milling exist only where some tool `mills`.
+  void hold(VoxelIndex tool_size, bool mills);
   [[nodiscard]] AlignedScratch view() noexcept;
   [[nodiscard]] std::size_t bytes() const noexcept;
 

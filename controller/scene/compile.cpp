@@ -238,7 +238,7 @@ class CompiledScene final : public Servo {
                           can_align(offsets);
     if (!possible) return nullptr;
     aligned_.push_back(std::make_unique<AlignedTool>(offsets, *plan_.aligned_kernels));
-    aligned_memory_.hold(aligned_.back()->table().size);
+    aligned_memory_.hold(aligned_.back()->table().size, plan_.cutting);
     return &aligned_.back()->table();
   }
 

@@ -135,7 +135,7 @@ class AlignedRig {
  public:
   AlignedRig(std::span<const ToolOffset> offsets, const AlignedKernels& kernels)
       : kernels_(&kernels), tool_(offsets, kernels) {
-    memory_.hold(tool_.table().size);
+    memory_.hold(tool_.table().size, true);
   }
   [[nodiscard]] const AlignedTable& table() const { return tool_.table(); }
   [[nodiscard]] const AlignedKernels& kernels() const { return *kernels_; }
