@@ -4,10 +4,12 @@
 #include <cstdlib>
 #include <random>
 #include <string>
+#include <utility>
 
 #include <doctest/doctest.h>
 
 #include "tests/kernel/aligned_support.hpp"
+#include "tests/kernel/hash.hpp"
 
 using namespace kerf;
 using namespace kerf::test;
@@ -212,6 +214,33 @@ TEST_CASE("far outside nothing is felt, cut or read") {
       const auto out = rig.run(volume, pose_of(at), removal_rate<FixedNumbers>(1.0, false), carry);
       CHECK(out == AlignedOutcome{{}, {}, {}, volume.density, carry});
     }
+  }
+}
+
+TEST_CASE("a scripted groove ends in the known hash on every instruction set") {
+  const auto tool = paper_ball(12);
+  const auto rate = removal_rate<FixedNumbers>(0.125, false);
+  for (AlignedRig& rig : rigs_for(tool)) {
+    std::uint32_t noise = 1;
+    TestVolume volume = made_of({70, 26, 24}, [&](auto, auto, std::int32_t z) {
+      noise = noise * 1664525u + 1013904223u;
+      return static_cast<Density>(z < 14 ? 60000 + (noise >> 20) : noise >> 26);
+    });
+    std::vector<std::uint16_t> carry(static_cast<std::size_t>(rig.table().row_lanes));
+    Hash hash;
+    for (int tick = 0; tick < 150; ++tick) {  // in at one face, along, out at the other
+      const auto pose =
+          pose_at<FixedNumbers>({tick * 0.5625 - 6, 10 + tick * 0.03125, 16 - tick * 0.0625});
+      AlignedOutcome out = rig.run(volume, pose, rate, carry);
+      hash.add(out.contact);
+      hash.add(out.modification);
+      hash.add(out.removed.density_steps);
+      volume.density = std::move(out.density);
+      carry = std::move(out.carry);
+    }
+    for (const Density rho : volume.density) hash.add(std::uint64_t{rho});
+    CAPTURE(std::string(rig.kernels().name));
+    CHECK(hash.hex() == "c1b5f1c5503a56eb");
   }
 }
 
