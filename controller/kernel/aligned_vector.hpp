@@ -201,10 +201,11 @@ struct TapPairs {
 }
 
 /// Overlap ratios of plane z, negative, 0 where the density is 0. Sets the range of live rows.
-[[gnu::always_inline]] inline void overlap_plane(const AlignedTable& tool, const V (&weight)[8],
+[[gnu::always_inline]] inline void overlap_plane(const AlignedTable& tool, std::int32_t row_lanes,
+                                                 const V (&weight)[8],
                                                  const AlignedScratch& scratch, std::int32_t z,
                                                  std::int32_t& first, std::int32_t& last) noexcept {
-  const std::int32_t words = tool.row_lanes / 32;
+  const std::int32_t words = row_lanes / 32;
   const std::int32_t mask_rows = tool.size.y + 2;
   const V air = Simd::set16(kAir);
   first = tool.size.y + 1;
@@ -212,7 +213,7 @@ struct TapPairs {
   for (std::int32_t y = 0; y <= tool.size.y; ++y) {
     const std::int32_t row = z * (tool.size.y + 1) + y;
     std::int16_t* ratio = scratch.ratio + kRatioRowPad +
-                          static_cast<std::ptrdiff_t>(row) * (tool.row_lanes + kRatioRowPad);
+                          static_cast<std::ptrdiff_t>(row) * (row_lanes + kRatioRowPad);
     const std::int16_t* density =
         scratch.box + (static_cast<std::ptrdiff_t>(z + 2) * tool.box.y + y + 2) * tool.box.x;
     const std::uint32_t* bits[4];  // the rows that a corner y, z reaches
@@ -221,7 +222,7 @@ struct TapPairs {
       bits[c] = tool.mask + static_cast<std::ptrdiff_t>(from) * 2 * words;
     }
     std::uint32_t any = 0;
-    for (std::int32_t j = 0; j < tool.row_lanes / kLanes; ++j) {
+    for (std::int32_t j = 0; j < row_lanes / kLanes; ++j) {
       V sum = Simd::zero();
       KERF_UNROLL
       for (int c = 0; c < 4; ++c) {
@@ -232,7 +233,7 @@ struct TapPairs {
       any |= Simd::not_zero16(sum);
       Simd::store(ratio + j * kLanes, Simd::sub16(Simd::zero(), sum));
     }
-    for (std::int32_t x = 0; x < kRatioRowPad; ++x) ratio[tool.row_lanes + x] = 0;
+    for (std::int32_t x = 0; x < kRatioRowPad; ++x) ratio[row_lanes + x] = 0;
     scratch.live[row] = any != 0;
     if (any == 0) continue;
     if (last < 0) first = y;
@@ -241,19 +242,18 @@ struct TapPairs {
 }
 
 /// Rows y first .. last + 4 of the five planes at z, filtered along z: smooth, then slope.
-[[gnu::always_inline]] inline void filter_z(const AlignedTable& tool, const AlignedScratch& scratch,
-                                            std::int32_t z, std::int32_t first,
-                                            std::int32_t last) noexcept {
+[[gnu::always_inline]] inline void filter_z(const AlignedTable& tool, std::int32_t row_lanes,
+                                            const AlignedScratch& scratch, std::int32_t z,
+                                            std::int32_t first, std::int32_t last) noexcept {
   const TapPairs smooth(5, 32, 55, 32, 5), slope(-2, -5, 0, 5, 2);
   const std::ptrdiff_t pitch = tool.box.x, plane = pitch * tool.box.y;
-  std::int32_t* const slopes =
-      scratch.filter + static_cast<std::ptrdiff_t>(tool.box.y) * tool.row_lanes;
+  std::int32_t* const slopes = scratch.filter + static_cast<std::ptrdiff_t>(tool.box.y) * row_lanes;
   for (std::int32_t y = first; y <= last + 4; ++y) {
-    for (std::int32_t x = 0; x < tool.row_lanes; x += kLanes) {
+    for (std::int32_t x = 0; x < row_lanes; x += kLanes) {
       const std::int16_t* d = scratch.box + z * plane + y * pitch + x;
       const V a = Simd::load(d), b = Simd::load(d + plane), c = Simd::load(d + 2 * plane),
               e = Simd::load(d + 3 * plane), f = Simd::load(d + 4 * plane);
-      const std::ptrdiff_t at = static_cast<std::ptrdiff_t>(y) * tool.row_lanes + x;
+      const std::ptrdiff_t at = static_cast<std::ptrdiff_t>(y) * row_lanes + x;
       const V p = Simd::unpack_low(a, b), q = Simd::unpack_low(c, e),
               r = Simd::unpack_low(f, Simd::zero());
       Simd::store(scratch.filter + at, smooth(p, q, r));
@@ -280,12 +280,12 @@ struct VectorSum {
 /// One row's part of the modification sum. The x filter is applied to the ratios, not to the data:
 /// the dot product is the same, the ratios have 16 bits, and one filter serves all axes. Unpacking
 /// mixes the order of entries, on both sides alike.
-[[gnu::always_inline]] inline void press_row(const AlignedTable& tool, const std::int16_t* ratio,
+[[gnu::always_inline]] inline void press_row(std::int32_t row_lanes, const std::int16_t* ratio,
                                              const std::int32_t* smooth_z,
                                              const std::int32_t* slope_z, VectorSum& sum) noexcept {
   const TapPairs smooth(5, 32, 55, 32, 5), slope_back(2, 5, 0, -5, -2);
   const V five = Simd::set32(5), middle = Simd::set32(55);
-  const std::int32_t pitch = tool.row_lanes;
+  const std::int32_t pitch = row_lanes;
   const auto smooth_y = [&](const std::int32_t* p) __attribute__((always_inline)) {
     const V a = Simd::load(p), b = Simd::load(p + pitch), c = Simd::load(p + 2 * pitch),
             d = Simd::load(p + 3 * pitch), e = Simd::load(p + 4 * pitch);
@@ -299,7 +299,7 @@ struct VectorSum {
     return Simd::add32(Simd::shift_left32<1>(Simd::sub32(e, a)),
                        Simd::multiply32(Simd::sub32(d, b), five));
   };
-  for (std::int32_t x = 0; x < tool.row_lanes; x += kLanes) {
+  for (std::int32_t x = 0; x < row_lanes; x += kLanes) {
     const V a = Simd::load(ratio + x - 2), b = Simd::load(ratio + x - 1), c = Simd::load(ratio + x),
             d = Simd::load(ratio + x + 1), e = Simd::load(ratio + x + 2);
     const V first[2] = {Simd::unpack_low(a, b), Simd::unpack_high(a, b)};
@@ -317,32 +317,44 @@ struct VectorSum {
   }
 }
 
-void press(const AlignedTable& tool, const std::int32_t (&weights)[8],
-           const AlignedScratch& scratch, std::int64_t (&sum)[3]) noexcept {
+// The table is a copy, so that no store through a pointer can be thought to change it.
+[[gnu::always_inline]] inline void press_rows(AlignedTable tool, std::int32_t row_lanes,
+                                              const std::int32_t (&weights)[8],
+                                              AlignedScratch scratch,
+                                              std::int64_t (&sum)[3]) noexcept {
   V weight[8];
   for (int c = 0; c < 8; ++c) weight[c] = Simd::set16(weights[c]);
   for (std::int32_t x = 0; x < kRatioRowPad; ++x) scratch.ratio[x] = 0;
   const std::int32_t* const slopes =
-      scratch.filter + static_cast<std::ptrdiff_t>(tool.box.y) * tool.row_lanes;
+      scratch.filter + static_cast<std::ptrdiff_t>(tool.box.y) * row_lanes;
   VectorSum total;
   for (std::int32_t z = 0; z <= tool.size.z; ++z) {
     std::int32_t first, last;
-    overlap_plane(tool, weight, scratch, z, first, last);
+    overlap_plane(tool, row_lanes, weight, scratch, z, first, last);
     if (last < 0) continue;
-    filter_z(tool, scratch, z, first, last);
+    filter_z(tool, row_lanes, scratch, z, first, last);
     for (std::int32_t y = first; y <= last; ++y) {
       const std::int32_t row = z * (tool.size.y + 1) + y;
       if (scratch.live[row] == 0) continue;
-      const std::ptrdiff_t at = static_cast<std::ptrdiff_t>(y) * tool.row_lanes;
-      press_row(tool,
+      const std::ptrdiff_t at = static_cast<std::ptrdiff_t>(y) * row_lanes;
+      press_row(row_lanes,
                 scratch.ratio + kRatioRowPad +
-                    static_cast<std::ptrdiff_t>(row) * (tool.row_lanes + kRatioRowPad),
+                    static_cast<std::ptrdiff_t>(row) * (row_lanes + kRatioRowPad),
                 scratch.filter + at, slopes + at, total);
     }
   }
   sum[0] = -Simd::sum64(total.x);  // the stored ratios are negative
   sum[1] = -Simd::sum64(total.y);
   sum[2] = -Simd::sum64(total.z);
+}
+
+void press(const AlignedTable& tool, const std::int32_t (&weights)[8],
+           const AlignedScratch& scratch, std::int64_t (&sum)[3]) noexcept {
+  if (tool.row_lanes == 32) {  // tools up to 27 voxels: no loop within a row
+    press_rows(tool, 32, weights, scratch, sum);
+  } else {
+    press_rows(tool, tool.row_lanes, weights, scratch, sum);
+  }
 }
 
 /// What leaves each voxel of a vector: (rho * (r m >> 15) * 2^-exponent + owed) >> 16 with 32-bit
@@ -367,14 +379,16 @@ void press(const AlignedTable& tool, const std::int32_t (&weights)[8],
   return Simd::add_carry(high, sum, low);
 }
 
-AlignedCut cut(const AlignedTable& tool, const AlignedRate& rate, const VoxelGrid& grid,
-               Density* density, VoxelIndex origin, const AlignedScratch& scratch,
-               std::uint16_t* carry) noexcept {
+[[gnu::always_inline]] inline AlignedCut cut_rows(AlignedTable tool, std::int32_t row_lanes,
+                                                  AlignedRate rate, VoxelGrid grid,
+                                                  Density* density, VoxelIndex origin,
+                                                  AlignedScratch scratch,
+                                                  std::uint16_t* carry) noexcept {
   AlignedCut cut{0, {tool.box.x, tool.box.y, tool.box.z}, {-1, -1, -1}};
   const V air = Simd::set16(kAir), mantissa = Simd::set16(rate.mantissa);
   const std::ptrdiff_t pitch = grid.nx, plane = pitch * grid.ny, count = plane * grid.nz;
-  const std::ptrdiff_t ratio_pitch = tool.row_lanes + kRatioRowPad;
-  for (std::int32_t x = 0; x < tool.row_lanes; x += kLanes) {  // a lane never leaves its vector
+  const std::ptrdiff_t ratio_pitch = row_lanes + kRatioRowPad;
+  for (std::int32_t x = 0; x < row_lanes; x += kLanes) {  // a lane never leaves its vector
     V owed = Simd::load(carry + x), steps = Simd::zero();
     std::uint32_t changed = 0;
     for (std::int32_t z = 0; z <= tool.size.z; ++z) {
@@ -414,6 +428,13 @@ AlignedCut cut(const AlignedTable& tool, const AlignedRate& rate, const VoxelGri
     cut.hi.x = high > cut.hi.x ? high : cut.hi.x;
   }
   return cut;
+}
+
+AlignedCut cut(const AlignedTable& tool, const AlignedRate& rate, const VoxelGrid& grid,
+               Density* density, VoxelIndex origin, const AlignedScratch& scratch,
+               std::uint16_t* carry) noexcept {
+  if (tool.row_lanes == 32) return cut_rows(tool, 32, rate, grid, density, origin, scratch, carry);
+  return cut_rows(tool, tool.row_lanes, rate, grid, density, origin, scratch, carry);
 }
 
 }  // namespace
