@@ -24,8 +24,8 @@ struct Choice {
 }  // namespace
 
 const AlignedKernels* const* aligned_kernels() noexcept {
-  static const Choice choice;
-  return choice.sets;
+  static const Choice kChoice;
+  return kChoice.sets;
 }
 
 }  // namespace kerf

@@ -122,7 +122,7 @@ void press(const AlignedTable& tool, const std::int32_t (&weight)[8], const Alig
     for (std::int32_t y = 0; y <= tool.size.y; ++y) {
       const std::int16_t* density =
           scratch.box + (static_cast<std::ptrdiff_t>(z + 2) * tool.box.y + y + 2) * tool.box.x;
-      *live = overlap_row(tool, weight, y, z, density, ratio);
+      *live = overlap_row(tool, weight, y, z, density, ratio) ? 1 : 0;
       for (std::int32_t x = 0; x < kRatioRowPad; ++x) ratio[tool.row_lanes + x] = 0;
       if (*live != 0) {
         const std::ptrdiff_t at = static_cast<std::ptrdiff_t>(y) * tool.row_lanes;

@@ -78,11 +78,11 @@ struct AlignedScratchSize {
 };
 
 [[nodiscard]] constexpr AlignedScratchSize aligned_scratch_size(VoxelIndex tool_size) noexcept {
-  const auto edge = [](std::int32_t n) { return static_cast<std::size_t>(n + kAlignedBoxMargin); };
+  const auto edge = [](std::int32_t n) { return static_cast<std::size_t>(n) + kAlignedBoxMargin; };
   constexpr std::size_t kWidestVector = 32;
   const std::size_t row = (edge(tool_size.x) + 31) / 32 * 32;
   const std::size_t rows =
-      static_cast<std::size_t>(tool_size.y + 1) * static_cast<std::size_t>(tool_size.z + 1);
+      (static_cast<std::size_t>(tool_size.y) + 1) * (static_cast<std::size_t>(tool_size.z) + 1);
   // Rows are read and written as whole vectors, so each array ends with room for one more.
   return {.box = edge(tool_size.x) * edge(tool_size.y) * edge(tool_size.z) + row + kWidestVector,
           .ratio = kRatioRowPad + rows * (row + kRatioRowPad) + kWidestVector,

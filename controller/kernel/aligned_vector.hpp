@@ -99,14 +99,14 @@ void copy_box(const AlignedTable& tool, const VoxelGrid& grid, const Density* de
   }
 }
 
-/// Sums of `kCorners` corners and `kAxes` axes over one list of chunks: corner k at `corner[k]`.
+/// Sums of `Corners` corners and `Axes` axes over one list of chunks: corner k at `corner[k]`.
 /// 32-bit sums of the low and high table halves, widened before they can overflow.
-template <int kAxes, int kCorners>
+template <int Axes, int Corners>
 [[gnu::always_inline]] inline void correlate_list(const AlignedTable& tool, std::int32_t list,
                                                   const std::int16_t* box,
-                                                  const std::ptrdiff_t (&corner)[kCorners],
-                                                  std::int64_t (&sum)[kAxes][kCorners]) noexcept {
-  constexpr int kSums = kAxes * kCorners;
+                                                  const std::ptrdiff_t (&corner)[Corners],
+                                                  std::int64_t (&sum)[Axes][Corners]) noexcept {
+  constexpr int kSums = Axes * Corners;
   V wide[kSums];
   for (int i = 0; i < kSums; ++i) wide[i] = Simd::zero();
   const AlignedChunk* chunk = tool.chunks[list];
@@ -119,16 +119,16 @@ template <int kAxes, int kCorners>
     for (; chunk != stop; ++chunk) {
       const std::int16_t* entry = tool.vectors + chunk->vector;
       const std::int16_t* place = box + chunk->box_at;
-      V table[2 * kAxes];
+      V table[2 * Axes];
       KERF_UNROLL
-      for (int i = 0; i < 2 * kAxes; ++i) table[i] = Simd::load(entry + i * kLanes);
+      for (int i = 0; i < 2 * Axes; ++i) table[i] = Simd::load(entry + std::ptrdiff_t{i} * kLanes);
       KERF_UNROLL
-      for (int c = 0; c < kCorners; ++c) {
+      for (int c = 0; c < Corners; ++c) {
         const V density = Simd::load(place + corner[c]);
         KERF_UNROLL
-        for (int a = 0; a < kAxes; ++a) {
-          Simd::multiply_add(low[a * kCorners + c], table[2 * a], density);
-          Simd::multiply_add(high[a * kCorners + c], table[2 * a + 1], density);
+        for (int a = 0; a < Axes; ++a) {
+          Simd::multiply_add(low[a * Corners + c], table[2 * a], density);
+          Simd::multiply_add(high[a * Corners + c], table[2 * a + 1], density);
         }
       }
     }
@@ -138,8 +138,8 @@ template <int kAxes, int kCorners>
           wide[i], Simd::add64(Simd::widened(low[i]), Simd::times512(Simd::widened(high[i]))));
     }
   }
-  for (int a = 0; a < kAxes; ++a) {
-    for (int c = 0; c < kCorners; ++c) sum[a][c] = Simd::sum64(wide[a * kCorners + c]);
+  for (int a = 0; a < Axes; ++a) {
+    for (int c = 0; c < Corners; ++c) sum[a][c] = Simd::sum64(wide[a * Corners + c]);
   }
 }
 
@@ -195,7 +195,7 @@ struct TapPairs {
 
 /// Bits of mask words that meet vector `j` of a row.
 [[gnu::always_inline]] inline std::uint32_t mask_bits(const std::uint32_t* words,
-                                                      std::int32_t j) noexcept {
+                                                      std::ptrdiff_t j) noexcept {
   if constexpr (kLanes == 32) return words[j];
   return words[j / 2] >> (16 * (j & 1)) & 0xffff;
 }
@@ -222,10 +222,10 @@ struct TapPairs {
       bits[c] = tool.mask + static_cast<std::ptrdiff_t>(from) * 2 * words;
     }
     std::uint32_t any = 0;
-    for (std::int32_t j = 0; j < row_lanes / kLanes; ++j) {
+    for (std::ptrdiff_t j = 0; j < row_lanes / kLanes; ++j) {
       V sum = Simd::zero();
       KERF_UNROLL
-      for (int c = 0; c < 4; ++c) {
+      for (std::size_t c = 0; c < 4; ++c) {
         sum = Simd::add_where(sum, mask_bits(bits[c], j), weight[2 * c]);
         sum = Simd::add_where(sum, mask_bits(bits[c] + words, j), weight[2 * c + 1]);
       }
@@ -234,7 +234,7 @@ struct TapPairs {
       Simd::store(ratio + j * kLanes, Simd::sub16(Simd::zero(), sum));
     }
     for (std::int32_t x = 0; x < kRatioRowPad; ++x) ratio[row_lanes + x] = 0;
-    scratch.live[row] = any != 0;
+    scratch.live[row] = any != 0 ? 1 : 0;
     if (any == 0) continue;
     if (last < 0) first = y;
     last = y;
@@ -285,7 +285,7 @@ struct VectorSum {
                                              const std::int32_t* slope_z, VectorSum& sum) noexcept {
   const TapPairs smooth(5, 32, 55, 32, 5), slope_back(2, 5, 0, -5, -2);
   const V five = Simd::set32(5), middle = Simd::set32(55);
-  const std::int32_t pitch = row_lanes;
+  const std::ptrdiff_t pitch = row_lanes;
   const auto smooth_y = [&](const std::int32_t* p) __attribute__((always_inline)) {
     const V a = Simd::load(p), b = Simd::load(p + pitch), c = Simd::load(p + 2 * pitch),
             d = Simd::load(p + 3 * pitch), e = Simd::load(p + 4 * pitch);
@@ -329,7 +329,7 @@ struct VectorSum {
       scratch.filter + static_cast<std::ptrdiff_t>(tool.box.y) * row_lanes;
   VectorSum total;
   for (std::int32_t z = 0; z <= tool.size.z; ++z) {
-    std::int32_t first, last;
+    std::int32_t first = 0, last = -1;
     overlap_plane(tool, row_lanes, weight, scratch, z, first, last);
     if (last < 0) continue;
     filter_z(tool, row_lanes, scratch, z, first, last);
@@ -392,7 +392,7 @@ void press(const AlignedTable& tool, const std::int32_t (&weights)[8],
     V owed = Simd::load(carry + x), steps = Simd::zero();
     std::uint32_t changed = 0;
     for (std::int32_t z = 0; z <= tool.size.z; ++z) {
-      const std::uint8_t* live = scratch.live + z * (tool.size.y + 1);
+      const std::uint8_t* live = scratch.live + std::ptrdiff_t{z} * (tool.size.y + 1);
       const std::int16_t* ratio = scratch.ratio + kRatioRowPad + x +
                                   static_cast<std::ptrdiff_t>(z) * (tool.size.y + 1) * ratio_pitch;
       const std::int16_t* box =

@@ -36,7 +36,6 @@ Extent extent_of(std::span<const ToolOffset> offsets) {
   return extent;
 }
 
-/// One table over the box as a stream, in the order of the axes that take the slope.
 using Table = std::vector<std::int32_t>;
 
 /// out[i + k stride] += taps[k] in[i]: the convolution along one axis.
@@ -63,7 +62,7 @@ std::vector<AlignedChunk> cover(std::span<const Table> tables, std::size_t lanes
 }
 
 /// Largest table that fuses the axes, bytes: it must leave the second-level cache to the box.
-constexpr std::size_t kMaxFusedBytes = 512 * 1024;
+constexpr std::size_t kMaxFusedBytes = std::size_t{512} * 1024;
 
 }  // namespace
 
@@ -93,23 +92,15 @@ AlignedTool::AlignedTool(std::span<const ToolOffset> offsets, const AlignedKerne
   table_.lanes = kernels.lanes;
   table_.row_lanes = (table_.box.x + 31) / 32 * 32;
 
-  const auto lanes = static_cast<std::size_t>(kernels.lanes);
   const VoxelGrid box{table_.box.x, table_.box.y, table_.box.z};
-  const auto words = static_cast<std::size_t>(table_.row_lanes / 32);
-  const auto mask_rows = static_cast<std::size_t>(table_.size.y + 2);
-  mask_.resize(mask_rows * static_cast<std::size_t>(table_.size.z + 2) * 2 * words);
-  Table mask(box.voxel_count() + lanes);
+  std::vector<VoxelIndex> voxels;
+  Table mask(box.voxel_count() + static_cast<std::size_t>(kernels.lanes));
   for (const ToolOffset& offset : offsets) {
-    std::array<std::int32_t, 3> at{};
-    for (std::size_t axis = 0; axis < 3; ++axis) at[axis] = (offset[axis] - extent.low[axis]) / 2;
-    mask[box.index(at[0], at[1], at[2])] = 1;
-    const auto row =
-        static_cast<std::size_t>(at[2] + 1) * mask_rows + static_cast<std::size_t>(at[1] + 1);
-    for (std::size_t moved = 0; moved < 2; ++moved) {
-      const std::size_t lane = static_cast<std::size_t>(at[0]) + 2 + moved;
-      mask_[(2 * row + moved) * words + lane / 32] |= std::uint32_t{1} << (lane % 32);
-    }
+    voxels.push_back({(offset[0] - extent.low[0]) / 2, (offset[1] - extent.low[1]) / 2,
+                      (offset[2] - extent.low[2]) / 2});
+    mask[box.index(voxels.back().x, voxels.back().y, voxels.back().z)] = 1;
   }
+  keep_mask(voxels);
 
   const auto pitch = static_cast<std::size_t>(table_.box.x);
   const std::size_t plane = pitch * static_cast<std::size_t>(table_.box.y);
@@ -119,30 +110,56 @@ AlignedTool::AlignedTool(std::span<const ToolOffset> offsets, const AlignedKerne
     tables[axis] =
         convolved(convolved(convolved(mask, 1, along(0)), pitch, along(1)), plane, along(2));
   }
+  choose_chunks(tables, kernels);
+  keep_runs(tables);
+}
 
+/// Tool voxels as bits, each row at both places that the cell's corners give it.
+void AlignedTool::keep_mask(std::span<const VoxelIndex> voxels) {
+  const auto words = static_cast<std::size_t>(table_.row_lanes) / 32;
+  const auto rows = static_cast<std::size_t>(table_.size.y) + 2;
+  mask_.resize(rows * (static_cast<std::size_t>(table_.size.z) + 2) * 2 * words);
+  for (const VoxelIndex& v : voxels) {
+    const std::size_t row =
+        (static_cast<std::size_t>(v.z) + 1) * rows + static_cast<std::size_t>(v.y) + 1;
+    for (std::size_t moved = 0; moved < 2; ++moved) {
+      const std::size_t lane = static_cast<std::size_t>(v.x) + 2 + moved;
+      mask_[(2 * row + moved) * words + lane / 32] |= std::uint32_t{1} << (lane % 32);
+    }
+  }
+  table_.mask = mask_.data();
+}
+
+/// One list for each axis, or one for all three.
+///
+/// Fused, a density is loaded once for three axes; that pays while the joined list is little longer
+/// than the three (a cube's slopes lie on different faces).
+void AlignedTool::choose_chunks(std::span<const Table> tables, const AlignedKernels& kernels) {
+  const auto lanes = static_cast<std::size_t>(kernels.lanes);
   std::size_t apart = 0;
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    chunks_[axis] = cover(std::span(tables).subspan(axis, 1), lanes);
+    chunks_[axis] = cover(tables.subspan(axis, 1), lanes);
     apart += chunks_[axis].size();
   }
   std::vector<AlignedChunk> joined = cover(tables, lanes);
-  // Fused, a density is loaded once for three axes; that pays while the joined list is little
-  // longer than the three (a cube's slopes lie on different faces).
   table_.fused = kernels.can_fuse && 30 * joined.size() <= 11 * apart &&
                  joined.size() * 6 * lanes * sizeof(std::int16_t) <= kMaxFusedBytes;
   if (table_.fused) chunks_ = {std::move(joined), {}, {}};
+}
 
+/// Each chunk's run of table entries as low and high halves; equal runs are kept once.
+void AlignedTool::keep_runs(std::span<const Table> tables) {
   std::int32_t largest = 1;  // of all halves
   std::vector<std::int16_t> stored;
-  std::map<std::vector<std::int16_t>, std::int32_t> known;  // equal runs are kept once
+  std::map<std::vector<std::int16_t>, std::int32_t> known;
   const std::size_t axes = table_.fused ? 3 : 1;
   for (std::size_t list = 0; list < 3; ++list) {
     for (AlignedChunk& chunk : chunks_[list]) {
       std::vector<std::int16_t> run;
+      const auto from = static_cast<std::size_t>(chunk.box_at);
       for (std::size_t axis = list; axis < list + axes; ++axis) {
         std::vector<std::int16_t> high;
-        for (std::size_t lane = 0; lane < lanes; ++lane) {
-          const auto at = static_cast<std::size_t>(chunk.box_at) + lane;
+        for (std::size_t at = from; at < from + static_cast<std::size_t>(table_.lanes); ++at) {
           const std::int32_t entry = at < tables[axis].size() ? tables[axis][at] : 0;
           const std::int32_t up = (entry + 256) >> 9;
           const std::int32_t rest = entry - 512 * up;
@@ -161,8 +178,7 @@ AlignedTool::AlignedTool(std::span<const ToolOffset> offsets, const AlignedKerne
   }
   vectors_.resize((stored.size() + 31) / 32);
   for (std::size_t i = 0; i < stored.size(); ++i) vectors_[i / 32].entry[i % 32] = stored[i];
-  table_.vectors = vectors_.empty() ? nullptr : vectors_.front().entry.data();
-  table_.mask = mask_.data();
+  table_.vectors = vectors_.front().entry.data();
   // Each chunk adds two products of a half and a density of at most 2^15 to a 32-bit sum.
   table_.flush = std::numeric_limits<std::int32_t>::max() / (2 * largest * 32768);
 }

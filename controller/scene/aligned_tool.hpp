@@ -27,9 +27,15 @@ class AlignedTool {
   [[nodiscard]] std::size_t bytes() const noexcept;
 
  private:
+  /// Over the box as one stream, for the axis that takes the slope.
+  using Table = std::vector<std::int32_t>;
   struct alignas(64) CacheLine {
     std::array<std::int16_t, 32> entry{};
   };
+
+  void keep_mask(std::span<const VoxelIndex> voxels);
+  void choose_chunks(std::span<const Table> tables, const AlignedKernels& kernels);
+  void keep_runs(std::span<const Table> tables);
 
   AlignedTable table_;
   std::array<std::vector<AlignedChunk>, 3> chunks_;

@@ -147,7 +147,7 @@ class Bench {
       GradientScratch gradient_scratch;
       refresh_gradients<Numbers>(GradientKernel::farid, kGrid, volume, kGrid.box(), field,
                                  gradient_scratch);
-      std::vector<Numbers::Weight> memory(40 * 40 * 40);
+      std::vector<Numbers::Weight> memory(std::size_t{40} * 40 * 40);
       std::vector<RemovalCarry<Numbers>> carry(64);
       OverlapBox<Numbers> box{memory, {}, 0};
       row("fixed", "reference", kGatherBytes * kGrid.voxel_count(), [&](int i) {

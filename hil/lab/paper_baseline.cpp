@@ -16,7 +16,7 @@ struct Taps {
 };
 
 const Taps& farid_taps() {
-  static const Taps table = [] {
+  static const Taps kTable = [] {
     const GradientTaps tap = taps(GradientKernel::farid);
     const auto scale = static_cast<float>(std::ldexp(1.0, -tap.shift));
     Taps t;
@@ -28,7 +28,7 @@ const Taps& farid_taps() {
     }
     return t;
   }();
-  return table;
+  return kTable;
 }
 
 /// floor without a call: plain x86-64 has no instruction for it.
@@ -67,8 +67,8 @@ void PaperVolume::refresh(const VoxelBox& box) {
         for (std::int32_t k = reach.lo.z; k < reach.hi.z; ++k) {
           for (std::int32_t j = reach.lo.y; j < reach.hi.y; ++j) {
             const PaperVoxel* row = &voxels_[grid_.index(reach.lo.x, j, k)];
-            auto i =
-                static_cast<std::size_t>(((k - z + 2) * 5 + j - y + 2) * 5 + reach.lo.x - x + 2);
+            const std::int32_t first = ((k - z + 2) * 5 + j - y + 2) * 5 + reach.lo.x - x + 2;
+            auto i = static_cast<std::size_t>(first);
             for (std::int32_t n = reach.lo.x; n < reach.hi.x; ++n, ++row, ++i) {
               gx += tap.x[i] * row->density;
               gy += tap.y[i] * row->density;
