@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <span>
 
+#include "controller/kernel/aligned_corner.hpp"
 #include "controller/kernel/aligned_kernels.hpp"
 #include "controller/kernel/milling.hpp"
 #include "controller/kernel/tool_pose.hpp"
@@ -51,7 +52,7 @@ class AlignedTick {
     const auto blended = [&](const std::int64_t(&axis)[8]) {
       std::array<std::int64_t, 8> corner{};
       for (std::size_t c = 0; c < 8; ++c) {
-        corner[c] = round_shift(kAlignedSlopeFactor * axis[c], 21 - 8);
+        corner[c] = kept_bits(table_.taps, axis[c]);
       }
       return trilinear<FixedNumbers, std::int64_t>(corner, weight_);
     };

@@ -41,10 +41,6 @@ struct Simd {
   static V sub32(V a, V b) noexcept { return _mm256_sub_epi32(a, b); }
   static V add64(V a, V b) noexcept { return _mm256_add_epi64(a, b); }
   static V times512(V a) noexcept { return _mm256_slli_epi64(a, 9); }
-  template <int Bits>
-  static V shift_left32(V a) noexcept {
-    return _mm256_slli_epi32(a, Bits);
-  }
   static V shift_left16(V a, int n) noexcept { return _mm256_sll_epi16(a, _mm_cvtsi32_si128(n)); }
   static V shift_right16(V a, int n) noexcept { return _mm256_srl_epi16(a, _mm_cvtsi32_si128(n)); }
   static V bit_and(V a, V b) noexcept { return _mm256_and_si256(a, b); }

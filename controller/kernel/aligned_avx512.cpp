@@ -35,10 +35,6 @@ struct Simd {
   static V sub32(V a, V b) noexcept { return _mm512_sub_epi32(a, b); }
   static V add64(V a, V b) noexcept { return _mm512_add_epi64(a, b); }
   static V times512(V a) noexcept { return _mm512_slli_epi64(a, 9); }
-  template <unsigned Bits>
-  static V shift_left32(V a) noexcept {
-    return _mm512_slli_epi32(a, Bits);
-  }
   static V shift_left16(V a, int n) noexcept { return _mm512_sll_epi16(a, _mm_cvtsi32_si128(n)); }
   static V shift_right16(V a, int n) noexcept { return _mm512_srl_epi16(a, _mm_cvtsi32_si128(n)); }
   static V bit_and(V a, V b) noexcept { return _mm512_and_si512(a, b); }

@@ -32,7 +32,7 @@ struct AlignedKernels {
   /// Copies the box at `origin`; densities outside the volume are 0.
   void (*copy_box)(const AlignedTable&, const VoxelGrid&, const Density*, VoxelIndex origin,
                    const AlignedScratch&) noexcept;
-  /// Exact sums by axis and corner 4 k + 2 j + i, times 2^21 / 7.
+  /// Exact sums by axis and corner 4 k + 2 j + i.
   void (*correlate)(const AlignedTable&, const std::int16_t* box,
                     std::int64_t (&sum)[3][8]) noexcept;
   /// Overlap ratios of all rows where there is density, and the exact modification sum.

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <span>
 
+#include "controller/kernel/aligned_corner.hpp"
 #include "controller/kernel/aligned_table.hpp"
 #include "controller/kernel/gradient.hpp"
 #include "controller/kernel/overlap.hpp"
@@ -17,9 +18,10 @@ namespace kerf {
 // The plan `aligned` by its definition, without tables: what every fast path must equal bit for
 // bit. Overlap and removal are those of overlap.hpp and milling.hpp. Fixed point only.
 
-/// The exact gradient of a voxel, inside or outside the volume, times 2^21 / 7 (farid taps, density
-/// outside is 0). At most 116487 * 65535 = 2^32.9.
-[[nodiscard]] constexpr SumVec<FixedNumbers> gradient_exact(const VoxelGrid& grid,
+/// The exact tap sum of a voxel, inside or outside the volume (density outside is 0): its gradient
+/// times 2^shift / factor. At most kMaxExactGradient.
+[[nodiscard]] constexpr SumVec<FixedNumbers> gradient_exact(const AlignedTaps& taps,
+                                                            const VoxelGrid& grid,
                                                             std::span<const Density> density,
                                                             VoxelIndex at) noexcept {
   SumVec<FixedNumbers> sum{};
@@ -33,9 +35,9 @@ namespace kerf {
         const auto b = static_cast<std::size_t>(j);
         const auto c = static_cast<std::size_t>(k);
         const std::int64_t rho = density[grid.index(v.x, v.y, v.z)];
-        sum.x += rho * kAlignedSlope[a] * kAlignedSmooth[b] * kAlignedSmooth[c];
-        sum.y += rho * kAlignedSmooth[a] * kAlignedSlope[b] * kAlignedSmooth[c];
-        sum.z += rho * kAlignedSmooth[a] * kAlignedSmooth[b] * kAlignedSlope[c];
+        sum.x += rho * taps.slope[a] * taps.smooth[b] * taps.smooth[c];
+        sum.y += rho * taps.smooth[a] * taps.slope[b] * taps.smooth[c];
+        sum.z += rho * taps.smooth[a] * taps.smooth[b] * taps.slope[c];
       }
     }
   }
@@ -49,7 +51,7 @@ namespace kerf {
 /// `gradient_exact` or a cache of it.
 template <class GradientAt>
 [[nodiscard]] constexpr SumVec<FixedNumbers> aligned_contact_sum(
-    GradientAt&& gradient_at, std::span<const ToolOffset> offsets,
+    const AlignedTaps& taps, GradientAt&& gradient_at, std::span<const ToolOffset> offsets,
     const ToolPose<FixedNumbers>& pose) noexcept {
   using Corners = std::array<std::int64_t, 8>;
   if (offsets.empty()) return {};
@@ -67,14 +69,14 @@ template <class GradientAt>
   }
   const auto weight = cell_at<FixedNumbers>(sample_position(pose, offsets.front())).weight;
   const auto blended = [&](Corners& corners) {
-    for (std::int64_t& sum : corners) sum = round_shift(kAlignedSlopeFactor * sum, 21 - 8);
+    for (std::int64_t& sum : corners) sum = kept_bits(taps, sum);
     return trilinear<FixedNumbers, std::int64_t>(corners, weight);
   };
   return {blended(x), blended(y), blended(z)};
 }
 
 /// SUM over voxels j with r_j > 0 and density > 0 of r_j times the exact gradient, in density steps
-/// per voxel times 2^15 * 2^21 / 7. The density is that from before the removal.
+/// per voxel times 2^15 * 2^shift / factor. The density is that from before the removal.
 template <class GradientAt>
 [[nodiscard]] constexpr SumVec<FixedNumbers> aligned_modification_sum(
     GradientAt&& gradient_at, const VoxelGrid& grid, std::span<const Density> density,

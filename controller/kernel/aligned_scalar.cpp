@@ -79,8 +79,8 @@ void filter_z(const AlignedTable& tool, const AlignedScratch& scratch, std::int3
       std::int32_t s = 0, t = 0;
       for (std::size_t k = 0; k < 5; ++k) {
         const std::int32_t value = d[static_cast<std::ptrdiff_t>(k) * plane + x];
-        s += kAlignedSmooth[k] * value;
-        t += kAlignedSlope[k] * value;
+        s += tool.taps.smooth[k] * value;
+        t += tool.taps.slope[k] * value;
       }
       smooth[x] = s;
       slope[x] = t;
@@ -97,11 +97,11 @@ void press_row(const AlignedTable& tool, const std::int16_t* ratio, const std::i
     std::int32_t along = 0, across = 0, smooth = 0, slope = 0, deep = 0;
     for (std::size_t k = 0; k < 5; ++k) {
       const auto step = static_cast<std::ptrdiff_t>(k);
-      along += kAlignedSmooth[k] * ratio[x + step - 2];
-      across -= kAlignedSlope[k] * ratio[x + step - 2];
-      smooth += kAlignedSmooth[k] * smooth_z[step * tool.row_lanes + x];
-      slope += kAlignedSlope[k] * smooth_z[step * tool.row_lanes + x];
-      deep += kAlignedSmooth[k] * slope_z[step * tool.row_lanes + x];
+      along += tool.taps.smooth[k] * ratio[x + step - 2];
+      across -= tool.taps.slope[k] * ratio[x + step - 2];
+      smooth += tool.taps.smooth[k] * smooth_z[step * tool.row_lanes + x];
+      slope += tool.taps.slope[k] * smooth_z[step * tool.row_lanes + x];
+      deep += tool.taps.smooth[k] * slope_z[step * tool.row_lanes + x];
     }
     sum[0] -= std::int64_t{smooth} * across;
     sum[1] -= std::int64_t{slope} * along;

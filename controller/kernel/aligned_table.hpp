@@ -14,15 +14,24 @@ namespace kerf {
 // then a correlation of the density with a fixed table, S' = tool mask convolved with the gradient
 // taps, at the eight corners of one cell. Nothing but the density is stored, nothing is refreshed.
 
-/// The slope taps of GradientKernel::farid over 7: the 7 is applied once, to the finished sum.
-inline constexpr std::array<std::int32_t, 5> kAlignedSlope{-2, -5, 0, 5, 2};
-inline constexpr std::array<std::int32_t, 5> kAlignedSmooth{5, 32, 55, 32, 5};
-inline constexpr std::int32_t kAlignedSlopeFactor = 7;
+/// Gradient taps whose slopes have no common factor: it is applied once, to the finished sum, which
+/// is then divided by 2^shift. Exact sums below are before both.
+struct AlignedTaps {
+  std::int32_t smooth[5];
+  std::int32_t slope[5];
+  std::int32_t factor;
+  std::int32_t shift;
+};
+inline constexpr AlignedTaps kAlignedFarid{{5, 32, 55, 32, 5}, {-2, -5, 0, 5, 2}, 7, 21};
+inline constexpr AlignedTaps kAlignedSobel5{{1, 4, 6, 4, 1}, {-1, -2, 0, 2, 1}, 1, 11};
+
+/// Fraction bits that contact sums keep.
+inline constexpr int kAlignedKeptBits = 8;
 
 /// Voxels of a tool along one axis, at most.
 inline constexpr std::int32_t kMaxAlignedEdge = 64;
-/// The exact gradient of a voxel, times 2^21 / 7, is at most this: half the slope taps' sum times
-/// the smooth taps' squared, times full density.
+/// The exact gradient of a voxel, times 2^21 / 7, is at most this for farid, less for sobel5: half
+/// the slope taps' sum times the smooth taps' squared, times full density.
 inline constexpr std::int64_t kMaxExactGradient = std::int64_t{7} * 129 * 129 * 65535;
 /// Samples of a tool that cuts, at most: the modification sum, 2^15 exact gradients a sample, stays
 /// below 2^62. A ball of 32 voxels has 17 256.
@@ -50,10 +59,11 @@ struct AlignedTable {
   VoxelIndex size;                    ///< voxels of the tool
   VoxelIndex box;                     ///< size + kAlignedBoxMargin: pitch and plane of the stream
   std::array<std::int16_t, 3> low{};  ///< lowest offset of a sample, half pitches
-  std::int32_t lanes = 0;             ///< 16-bit entries in a vector
-  std::int32_t row_lanes = 0;         ///< box.x rounded up to 32: entries in a row of ratios
-  std::int32_t flush = 0;             ///< chunks that 32-bit sums can take: at most 2^31 - 1
-  bool fused = false;                 ///< one list serves the three axes; it is the first
+  AlignedTaps taps{};
+  std::int32_t lanes = 0;      ///< 16-bit entries in a vector
+  std::int32_t row_lanes = 0;  ///< box.x rounded up to 32: entries in a row of ratios
+  std::int32_t flush = 0;      ///< chunks that 32-bit sums can take: at most 2^31 - 1
+  bool fused = false;          ///< one list serves the three axes; it is the first
   const AlignedChunk* chunks[3] = {};
   std::int32_t chunk_count[3] = {};
   const std::int16_t* vectors = nullptr;

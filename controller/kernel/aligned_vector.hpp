@@ -178,11 +178,13 @@ void correlate(const AlignedTable& tool, const std::int16_t* box,
   }
 }
 
-/// Five rows' worth of taps as pairs for multiply_add.
+/// Five taps as pairs for multiply_add.
 struct TapPairs {
   V ab, cd, e;
-  TapPairs(int a, int b, int c, int d, int last) noexcept
-      : ab(Simd::pair16(a, b)), cd(Simd::pair16(c, d)), e(Simd::pair16(last, 0)) {}
+  TapPairs(const std::int32_t (&tap)[5], int sign) noexcept
+      : ab(Simd::pair16(sign * tap[0], sign * tap[1])),
+        cd(Simd::pair16(sign * tap[2], sign * tap[3])),
+        e(Simd::pair16(sign * tap[4], 0)) {}
 
   [[gnu::always_inline]] V operator()(V p, V q, V r) const noexcept {
     V sum = Simd::zero();
@@ -245,7 +247,7 @@ struct TapPairs {
 [[gnu::always_inline]] inline void filter_z(const AlignedTable& tool, std::int32_t row_lanes,
                                             const AlignedScratch& scratch, std::int32_t z,
                                             std::int32_t first, std::int32_t last) noexcept {
-  const TapPairs smooth(5, 32, 55, 32, 5), slope(-2, -5, 0, 5, 2);
+  const TapPairs smooth(tool.taps.smooth, 1), slope(tool.taps.slope, 1);
   const std::ptrdiff_t pitch = tool.box.x, plane = pitch * tool.box.y;
   std::int32_t* const slopes = scratch.filter + static_cast<std::ptrdiff_t>(tool.box.y) * row_lanes;
   for (std::int32_t y = first; y <= last + 4; ++y) {
@@ -280,24 +282,27 @@ struct VectorSum {
 /// One row's part of the modification sum. The x filter is applied to the ratios, not to the data:
 /// the dot product is the same, the ratios have 16 bits, and one filter serves all axes. Unpacking
 /// mixes the order of entries, on both sides alike.
-[[gnu::always_inline]] inline void press_row(std::int32_t row_lanes, const std::int16_t* ratio,
+[[gnu::always_inline]] inline void press_row(const AlignedTaps& taps, std::int32_t row_lanes,
+                                             const std::int16_t* ratio,
                                              const std::int32_t* smooth_z,
                                              const std::int32_t* slope_z, VectorSum& sum) noexcept {
-  const TapPairs smooth(5, 32, 55, 32, 5), slope_back(2, 5, 0, -5, -2);
-  const V five = Simd::set32(5), middle = Simd::set32(55);
+  const TapPairs smooth(taps.smooth, 1), slope_back(taps.slope, -1);
+  const V outer = Simd::set32(taps.smooth[4]), inner = Simd::set32(taps.smooth[3]),
+          middle = Simd::set32(taps.smooth[2]);
+  const V steep_outer = Simd::set32(taps.slope[4]), steep_inner = Simd::set32(taps.slope[3]);
   const std::ptrdiff_t pitch = row_lanes;
   const auto smooth_y = [&](const std::int32_t* p) __attribute__((always_inline)) {
     const V a = Simd::load(p), b = Simd::load(p + pitch), c = Simd::load(p + 2 * pitch),
             d = Simd::load(p + 3 * pitch), e = Simd::load(p + 4 * pitch);
-    return Simd::add32(Simd::add32(Simd::multiply32(Simd::add32(a, e), five),
-                                   Simd::shift_left32<5>(Simd::add32(b, d))),
+    return Simd::add32(Simd::add32(Simd::multiply32(Simd::add32(a, e), outer),
+                                   Simd::multiply32(Simd::add32(b, d), inner)),
                        Simd::multiply32(c, middle));
   };
   const auto slope_y = [&](const std::int32_t* p) __attribute__((always_inline)) {
     const V a = Simd::load(p), b = Simd::load(p + pitch), d = Simd::load(p + 3 * pitch),
             e = Simd::load(p + 4 * pitch);
-    return Simd::add32(Simd::shift_left32<1>(Simd::sub32(e, a)),
-                       Simd::multiply32(Simd::sub32(d, b), five));
+    return Simd::add32(Simd::multiply32(Simd::sub32(e, a), steep_outer),
+                       Simd::multiply32(Simd::sub32(d, b), steep_inner));
   };
   for (std::int32_t x = 0; x < row_lanes; x += kLanes) {
     const V a = Simd::load(ratio + x - 2), b = Simd::load(ratio + x - 1), c = Simd::load(ratio + x),
@@ -337,7 +342,7 @@ struct VectorSum {
       const std::int32_t row = z * (tool.size.y + 1) + y;
       if (scratch.live[row] == 0) continue;
       const std::ptrdiff_t at = static_cast<std::ptrdiff_t>(y) * row_lanes;
-      press_row(row_lanes,
+      press_row(tool.taps, row_lanes,
                 scratch.ratio + kRatioRowPad +
                     static_cast<std::ptrdiff_t>(row) * (row_lanes + kRatioRowPad),
                 scratch.filter + at, slopes + at, total);

@@ -12,14 +12,16 @@
 namespace kerf {
 namespace {
 
-static_assert([] {
-  const GradientTaps farid = taps(GradientKernel::farid);
+constexpr bool are_taps_of(const AlignedTaps& aligned, GradientKernel kernel) {
+  const GradientTaps stored = taps(kernel);
   for (std::size_t i = 0; i < 5; ++i) {
-    if (farid.slope[i] != kAlignedSlopeFactor * kAlignedSlope[i]) return false;
-    if (farid.smooth[i] != kAlignedSmooth[i]) return false;
+    if (stored.slope[i] != aligned.factor * aligned.slope[i]) return false;
+    if (stored.smooth[i] != aligned.smooth[i]) return false;
   }
-  return farid.shift == 21;
-}());
+  return stored.shift == aligned.shift;
+}
+static_assert(are_taps_of(kAlignedFarid, GradientKernel::farid));
+static_assert(are_taps_of(kAlignedSobel5, GradientKernel::sobel5));
 
 struct Extent {
   ToolOffset low{}, high{};
@@ -39,7 +41,7 @@ Extent extent_of(std::span<const ToolOffset> offsets) {
 using Table = std::vector<std::int32_t>;
 
 /// out[i + k stride] += taps[k] in[i]: the convolution along one axis.
-Table convolved(const Table& in, std::size_t stride, const std::array<std::int32_t, 5>& taps) {
+Table convolved(const Table& in, std::size_t stride, const std::int32_t (&taps)[5]) {
   Table out(in.size());
   for (std::size_t i = 0; i + 4 * stride < in.size(); ++i) {
     if (in[i] == 0) continue;
@@ -80,7 +82,21 @@ bool can_align(std::span<const ToolOffset> offsets) {
   return std::set<ToolOffset>(offsets.begin(), offsets.end()).size() == offsets.size();
 }
 
-AlignedTool::AlignedTool(std::span<const ToolOffset> offsets, const AlignedKernels& kernels) {
+const AlignedTaps* aligned_taps(GradientKernel kernel) {
+  switch (kernel) {
+    case GradientKernel::farid:
+      return &kAlignedFarid;
+    case GradientKernel::sobel5:
+      return &kAlignedSobel5;
+    case GradientKernel::central:
+      break;
+  }
+  return nullptr;
+}
+
+AlignedTool::AlignedTool(std::span<const ToolOffset> offsets, const AlignedTaps& taps,
+                         const AlignedKernels& kernels) {
+  table_.taps = taps;
   const Extent extent = extent_of(offsets);
   const auto length = [&](std::size_t axis) {
     return (extent.high[axis] - extent.low[axis]) / 2 + 1;
@@ -106,7 +122,9 @@ AlignedTool::AlignedTool(std::span<const ToolOffset> offsets, const AlignedKerne
   const std::size_t plane = pitch * static_cast<std::size_t>(table_.box.y);
   std::array<Table, 3> tables;
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    const auto along = [&](std::size_t a) { return a == axis ? kAlignedSlope : kAlignedSmooth; };
+    const auto along = [&](std::size_t a) -> const auto& {
+      return a == axis ? taps.slope : taps.smooth;
+    };
     tables[axis] =
         convolved(convolved(convolved(mask, 1, along(0)), pitch, along(1)), plane, along(2));
   }

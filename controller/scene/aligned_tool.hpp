@@ -9,6 +9,7 @@
 
 #include "controller/kernel/aligned_kernels.hpp"
 #include "controller/kernel/aligned_table.hpp"
+#include "controller/kernel/gradient.hpp"
 #include "controller/kernel/tool_offset.hpp"
 
 namespace kerf {
@@ -17,11 +18,15 @@ namespace kerf {
 /// the same place, at most kMaxAlignedEdge along each axis, at least one.
 [[nodiscard]] bool can_align(std::span<const ToolOffset> offsets);
 
+/// The taps of a gradient kernel as the plan takes them; nullptr for `central`, which it does not.
+[[nodiscard]] const AlignedTaps* aligned_taps(GradientKernel kernel);
+
 /// Owner of one tool's table for the plan `aligned`. Load time; moving it keeps the table valid.
 class AlignedTool {
  public:
   /// Requires `can_align(offsets)`.
-  AlignedTool(std::span<const ToolOffset> offsets, const AlignedKernels& kernels);
+  AlignedTool(std::span<const ToolOffset> offsets, const AlignedTaps& taps,
+              const AlignedKernels& kernels);
 
   [[nodiscard]] const AlignedTable& table() const noexcept { return table_; }
   [[nodiscard]] std::size_t bytes() const noexcept;

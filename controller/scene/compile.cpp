@@ -74,10 +74,11 @@ SumUnit gathered_sum(double terms) {
 
 /// Contact sums of the plan `aligned` have 8 kept bits, its modification sums exact gradients.
 SumUnit aligned_contact_unit(double samples) {
-  return {std::ldexp(1.0, -8), std::ldexp(std::max(samples, 1.0), 23)};
+  return {std::ldexp(1.0, -kAlignedKeptBits),
+          std::ldexp(std::max(samples, 1.0), 15 + kAlignedKeptBits)};
 }
-SumUnit aligned_modification_unit(double samples) {
-  return {std::ldexp(kAlignedSlopeFactor, -21 - 15),
+SumUnit aligned_modification_unit(const AlignedTaps& taps, double samples) {
+  return {std::ldexp(taps.factor, -taps.shift - 15),
           std::ldexp(samples * static_cast<double>(kMaxExactGradient), 15)};
 }
 
@@ -228,8 +229,8 @@ class CompiledScene final : public Servo {
   /// The tool's table for the plan `aligned`, made once where some volume can use it; else nullptr.
   const AlignedTable* aligned_table(const Scene& scene, const SceneTool& tool,
                                     std::span<const ToolOffset> offsets) {
-    const bool possible = N::kIsFixed && tool.round &&
-                          scene.servo.kernel == GradientKernel::farid &&
+    const AlignedTaps* const taps = aligned_taps(scene.servo.kernel);
+    const bool possible = N::kIsFixed && tool.round && taps != nullptr &&
                           (!plan_.cutting || offsets.size() <= kMaxAlignedCutSamples) &&
                           std::any_of(scene.volumes.begin(), scene.volumes.end(),
                                       [&](const SceneVolume& volume) {
@@ -237,7 +238,7 @@ class CompiledScene final : public Servo {
                                       }) &&
                           can_align(offsets);
     if (!possible) return nullptr;
-    aligned_.push_back(std::make_unique<AlignedTool>(offsets, *plan_.aligned_kernels));
+    aligned_.push_back(std::make_unique<AlignedTool>(offsets, *taps, *plan_.aligned_kernels));
     aligned_memory_.hold(aligned_.back()->table().size, plan_.cutting);
     return &aligned_.back()->table();
   }
@@ -277,9 +278,10 @@ class CompiledScene final : public Servo {
         newtons(scene.force.p0_n_per_mm2 * a * a * a),
         in.aligned != nullptr ? aligned_contact_unit(samples) : gathered_sum(samples));
     // Each voxel counts at most once, and the tool touches at most eight voxels per sample.
-    in.modification = sum_to_force<N>(
-        newtons(scene.cut.p1_n_per_mm2 * voxel_mm3),
-        in.aligned != nullptr ? aligned_modification_unit(samples) : gathered_sum(8 * samples));
+    in.modification =
+        sum_to_force<N>(newtons(scene.cut.p1_n_per_mm2 * voxel_mm3),
+                        in.aligned != nullptr ? aligned_modification_unit(in.aligned->taps, samples)
+                                              : gathered_sum(8 * samples));
     return in;
   }
 

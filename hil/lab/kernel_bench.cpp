@@ -191,7 +191,7 @@ class Bench {
   void each_set(bool mills, Run&& run) {
     if (!ticks_->can_align) return;
     for (auto set = aligned_kernels(); *set != nullptr; ++set) {
-      const AlignedTool tool(ticks_->tool, **set);
+      const AlignedTool tool(ticks_->tool, kAlignedFarid, **set);
       AlignedMemory memory;
       memory.hold(tool.table().size, mills);
       run(**set, tool.table(), memory.view(), tool.bytes() + memory.bytes());

@@ -79,13 +79,13 @@ inline TestVolume hard_volume(VoxelGrid grid, int fill, std::uint32_t seed) {
 /// `gradient_exact` of every voxel, and of those outside that the volume reaches.
 class ExactField {
  public:
-  explicit ExactField(const TestVolume& volume)
+  ExactField(const AlignedTaps& taps, const TestVolume& volume)
       : grid_{volume.grid.nx + 4, volume.grid.ny + 4, volume.grid.nz + 4} {
     values_.reserve(grid_.voxel_count());
     for (std::int32_t z = -2; z < volume.grid.nz + 2; ++z) {
       for (std::int32_t y = -2; y < volume.grid.ny + 2; ++y) {
         for (std::int32_t x = -2; x < volume.grid.nx + 2; ++x) {
-          values_.push_back(gradient_exact(volume.grid, volume.density, {x, y, z}));
+          values_.push_back(gradient_exact(taps, volume.grid, volume.density, {x, y, z}));
         }
       }
     }
@@ -116,14 +116,15 @@ struct AlignedOutcome {
 };
 
 /// By the definitions.
-inline AlignedOutcome outcome_by_definition(const TestVolume& volume, const ExactField& field,
+inline AlignedOutcome outcome_by_definition(const AlignedTaps& taps, const TestVolume& volume,
+                                            const ExactField& field,
                                             std::span<const ToolOffset> tool,
                                             const ToolPose<FixedNumbers>& pose,
                                             const RemovalRate<FixedNumbers>& rate,
                                             const std::vector<std::uint16_t>& carry,
                                             OverlapBox<FixedNumbers>& scratch) {
   AlignedOutcome out{{}, {}, {}, volume.density, carry};
-  out.contact = aligned_contact_sum(field, tool, pose);
+  out.contact = aligned_contact_sum(taps, field, tool, pose);
   overlap<FixedNumbers>(volume.grid, tool, pose, FixedNumbers::kStepOne, scratch);
   out.modification = aligned_modification_sum(field, volume.grid, volume.density, scratch);
   out.removed = remove<FixedNumbers>(volume.grid, out.density, scratch, rate, out.carry);
@@ -133,8 +134,9 @@ inline AlignedOutcome outcome_by_definition(const TestVolume& volume, const Exac
 /// One tool with the memory to run it on one instruction set.
 class AlignedRig {
  public:
-  AlignedRig(std::span<const ToolOffset> offsets, const AlignedKernels& kernels)
-      : kernels_(&kernels), tool_(offsets, kernels) {
+  AlignedRig(std::span<const ToolOffset> offsets, const AlignedTaps& taps,
+             const AlignedKernels& kernels)
+      : kernels_(&kernels), tool_(offsets, taps, kernels) {
     memory_.hold(tool_.table().size, true);
   }
   [[nodiscard]] const AlignedTable& table() const { return tool_.table(); }
@@ -166,9 +168,11 @@ class AlignedRig {
 };
 
 /// A rig for each instruction set of this machine.
-inline std::vector<AlignedRig> rigs_for(std::span<const ToolOffset> offsets) {
+inline std::vector<AlignedRig> rigs_for(std::span<const ToolOffset> offsets,
+                                        const AlignedTaps& taps = kAlignedFarid) {
   std::vector<AlignedRig> rigs;
-  for (auto set = aligned_kernels(); *set != nullptr; ++set) rigs.emplace_back(offsets, **set);
+  for (auto set = aligned_kernels(); *set != nullptr; ++set)
+    rigs.emplace_back(offsets, taps, **set);
   return rigs;
 }
 

@@ -70,7 +70,8 @@ std::vector<std::int32_t> low_halves(std::span<const ToolOffset> offsets, std::s
       std::int32_t tap = 1;
       std::array<std::int32_t, 3> at{};
       for (std::size_t axis = 0; axis < 3; ++axis) {
-        tap *= axis == slope_axis ? kAlignedSlope[step[axis]] : kAlignedSmooth[step[axis]];
+        tap *=
+            axis == slope_axis ? kAlignedFarid.slope[step[axis]] : kAlignedFarid.smooth[step[axis]];
         at[axis] = (offset[axis] - table.low[axis]) / 2 + static_cast<std::int32_t>(step[axis]);
       }
       sum[box.index(at[0], at[1], at[2])] += tap;
@@ -94,8 +95,9 @@ TEST_CASE("every instruction set gives the bits of the definition, wherever the 
                                     {"ragged 28 x 7 x 33", ragged_tool(28, 7, 33, 6), 20}}};
   for (const Named& tool : tools) {
     std::mt19937 random(7);
-    std::vector<AlignedRig> rigs = rigs_for(tool.offsets);
-    const VoxelIndex size = rigs.front().table().size;
+    std::array rigs_of{rigs_for(tool.offsets, kAlignedFarid),
+                       rigs_for(tool.offsets, kAlignedSobel5)};
+    const VoxelIndex size = rigs_of[0].front().table().size;
     const int widest = std::max({size.x, size.y, size.z});
     Cutter<FixedNumbers> cutter(static_cast<std::size_t>(widest + 1));
     int felt = 0, cut_away = 0;
@@ -104,15 +106,18 @@ TEST_CASE("every instruction set gives the bits of the definition, wherever the 
       const VoxelGrid grid = fill % 4 == 3 ? VoxelGrid{size.x + 3, size.y + 9, size.z + 2}
                                            : VoxelGrid{size.x + 37, size.y + 8, size.z + 9};
       const TestVolume volume = hard_volume(grid, fill, static_cast<std::uint32_t>(fill));
-      const ExactField field(volume);
+      // The second gradient kernel on every third volume.
+      std::vector<AlignedRig>& rigs = rigs_of[fill % 3 == 0 ? 1 : 0];
+      const AlignedTaps& taps = rigs.front().table().taps;
+      const ExactField field(taps, volume);
       for (int i = 0; i < cases(tool.cases); ++i) {
         const auto pose = random_pose(grid, widest, i, random);
         const auto rate = random_rate(i, random);
         std::vector<std::uint16_t> carry(static_cast<std::size_t>(rigs.front().table().row_lanes) +
                                          3);
         for (auto& owed : carry) owed = static_cast<std::uint16_t>(random());
-        const AlignedOutcome truth =
-            outcome_by_definition(volume, field, tool.offsets, pose, rate, carry, cutter.overlap);
+        const AlignedOutcome truth = outcome_by_definition(taps, volume, field, tool.offsets, pose,
+                                                           rate, carry, cutter.overlap);
         felt += truth.contact == SumVec<FixedNumbers>{} ? 0 : 1;
         cut_away += truth.removed.density_steps != 0 ? 1 : 0;
         for (AlignedRig& rig : rigs) {
@@ -134,11 +139,14 @@ TEST_CASE("every instruction set gives the bits of the definition, wherever the 
 TEST_CASE("contact by the table equals the definition without any cache") {
   const TestVolume volume = random_volume({20, 17, 15}, 9);
   const auto tool = paper_ball(6);
-  const auto exact = [&](VoxelIndex v) { return gradient_exact(volume.grid, volume.density, v); };
+  const auto exact = [&](VoxelIndex v) {
+    return gradient_exact(kAlignedFarid, volume.grid, volume.density, v);
+  };
   for (AlignedRig& rig : rigs_for(tool)) {
     for (const auto& at : {std::array{10.3, 8.7, 7.2}, {1.6, 8.1, 7.9}, {18.2, 15.9, 13.1}}) {
       const auto pose = pose_at<FixedNumbers>(at);
-      CHECK(rig.run(volume, pose, {}, {}).contact == aligned_contact_sum(exact, tool, pose));
+      CHECK(rig.run(volume, pose, {}, {}).contact ==
+            aligned_contact_sum(kAlignedFarid, exact, tool, pose));
     }
   }
 }
@@ -149,11 +157,11 @@ TEST_CASE("large tools feel the same on every instruction set") {
     std::vector<AlignedRig> rigs = rigs_for(tool);
     for (const int fill : {3, 4}) {
       const TestVolume volume = hard_volume({size + 12, size + 6, size + 5}, fill, 3);
-      const ExactField field(volume);
+      const ExactField field(kAlignedFarid, volume);
       std::mt19937 random(1);
       for (int i = 0; i < (size == 32 ? 20 : 4); ++i) {
         const auto pose = random_pose(volume.grid, size, i, random);
-        const auto truth = aligned_contact_sum(field, tool, pose);
+        const auto truth = aligned_contact_sum(kAlignedFarid, field, tool, pose);
         for (AlignedRig& rig : rigs) {
           const auto out = rig.run(volume, pose, {}, {});
           CHECK(out.contact == truth);
@@ -177,9 +185,9 @@ TEST_CASE("sums are widened before the worst volume overflows them, and without 
       for (std::size_t i = 0; i < low.size(); ++i) {
         volume.density[i] = (low[i] > 0) == positive ? 65535 : 0;
       }
-      const ExactField field(volume);
+      const ExactField field(kAlignedFarid, volume);
       const auto pose = pose_at<FixedNumbers>({9.5, 9.5, 9.5});
-      const auto truth = aligned_contact_sum(field, cube, pose);
+      const auto truth = aligned_contact_sum(kAlignedFarid, field, cube, pose);
       for (AlignedRig& rig : rigs) {
         CHECK(rig.run(volume, pose, {}, {}).contact == truth);
         AlignedTable endless = rig.table();

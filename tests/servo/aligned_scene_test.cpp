@@ -60,11 +60,12 @@ Scene cutting_scene() {
 }  // namespace
 
 TEST_CASE("both forces of the first cutting tick are double's within 1.7e-4 of full scale") {
-  for (const auto model : {CutModel::overlap, CutModel::overlap_exact}) {
+  for (const auto kernel : {GradientKernel::farid, GradientKernel::sobel5}) {
     for (const double y : {0.9, 0.6, 0.2}) {
       Pair pair([&] {
         Scene scene = cutting_scene();
-        scene.cut.model = model;
+        scene.servo.kernel = kernel;
+        if (y < 0.5) scene.cut.model = CutModel::overlap_exact;
         return scene;
       });
       pair.step(0.11, y, -0.07);
