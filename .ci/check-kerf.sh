@@ -124,7 +124,7 @@ expect 'a failed check is told' \
   with FAIL_controller=1 kerf_gives 1 demo --seconds 1 --out "$lab/out"
 expect 'and its results are kept' kept "$all"
 expect 'a crash is a failed check' with FAIL_controller=139 kerf_gives 1 demo --seconds 1
-expect 'a failing picture is told' with FAIL_visualizer=2 kerf_gives 1 demo --seconds 1
+expect 'a failing picture is told' with FAIL_visualizer=2 kerf_gives 2 demo --seconds 1
 expect 'with its reason' says '^kerf-visualizer: place: value; way out'
 expect 'a failing log is told' with FAIL_recorder=1 kerf_gives 1 demo --seconds 1
 expect 'a bad scene is bad input' with FAIL_controller=2 kerf_gives 2 demo --out "$lab/new"

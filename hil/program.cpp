@@ -120,6 +120,7 @@ Emulator make_emulator(const Options& o) {
 }
 
 void serve(const Options& o, const std::atomic<bool>& stop, std::ostream& out, std::ostream& err) {
+  if (!o.report.empty()) check_report(o.report);
   Emulator emulator = make_emulator(o);
   FrontStats stats;
   {

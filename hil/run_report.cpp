@@ -3,11 +3,11 @@
 
 #include <array>
 #include <cstdio>
-#include <fstream>
 
 #include <nlohmann/json.hpp>
 
 #include "hil/hil_error.hpp"
+#include "shared/posix/new_file.hpp"
 
 namespace kerf {
 namespace {
@@ -23,6 +23,14 @@ std::string hex(std::uint64_t value) {
 }
 
 }  // namespace
+
+void check_report(const std::string& file) {
+  try {
+    check_new_file(file);
+  } catch (const FileError& error) {
+    throw HilError(std::string("--report: ") + error.what());
+  }
+}
 
 void write_run_report(const std::string& file, const Emulator& emulator, const FrontStats& front) {
   const EmulatorStats& stats = emulator.stats();
@@ -49,14 +57,10 @@ void write_run_report(const std::string& file, const Emulator& emulator, const F
   report["final_tip_mm"] = {tip.x, tip.y, tip.z};
   report["report_hash"] = hex(stats.report_hash);
 
-  const std::string partial = file + ".partial";
-  std::ofstream out(partial);
-  out << report.dump(2) << '\n';
-  out.close();
-  if (!out || std::rename(partial.c_str(), file.c_str()) != 0) {
-    std::remove(partial.c_str());
-    throw HilError("--report: " + file +
-                   " cannot be written; choose a folder with room and rights");
+  try {
+    write_new_file(file, report.dump(2) + "\n");
+  } catch (const FileError& error) {
+    throw HilError(std::string("--report: ") + error.what());
   }
 }
 

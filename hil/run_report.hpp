@@ -8,6 +8,9 @@
 
 namespace kerf {
 
+/// Throws `HilError` now where the report could not be written after the run.
+void check_report(const std::string& file);
+
 /// Writes what a run has shown as JSON: under another name first, then renamed, so the file is
 /// whole or absent. Times in s from the first client on, device time. Throws `HilError`.
 void write_run_report(const std::string& file, const Emulator& emulator, const FrontStats& front);

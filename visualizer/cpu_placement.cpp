@@ -6,6 +6,7 @@
 
 #include <sched.h>
 
+#include "shared/posix/cores.hpp"
 #include "visualizer/error.hpp"
 
 namespace kerf {
@@ -13,12 +14,7 @@ namespace kerf {
 std::vector<int> place_process(std::span<const int> cpus) {
   std::vector<int> taken(cpus.begin(), cpus.end());
   if (taken.empty()) {
-    cpu_set_t allowed;
-    CPU_ZERO(&allowed);
-    if (sched_getaffinity(0, sizeof(allowed), &allowed) != 0) return taken;
-    for (int cpu = 0; cpu < CPU_SETSIZE; ++cpu) {
-      if (CPU_ISSET(static_cast<std::size_t>(cpu), &allowed)) taken.push_back(cpu);
-    }
+    taken = allowed_cores();
     if (taken.size() > 1) taken.pop_back();
   }
   cpu_set_t wanted;

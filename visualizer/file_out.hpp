@@ -9,8 +9,7 @@
 
 namespace kerf {
 
-/// Writes a whole file or none: under a temporary name first, then renamed over `path`. Throws
-/// VisualizerError with the system's reason (disk full, no permission).
+/// Writes a whole file or none. Throws FileError with the system's reason.
 void write_file(const std::filesystem::path& path, std::span<const std::uint8_t> bytes);
 
 /// `rgb` as in RenderTarget::read_rgb, 8-bit sRGB PNG, through `write_file`.

@@ -95,9 +95,14 @@ void Picture::draw_tool(const TickRecord& record, const View& view, const Render
                   target);
   }
   const glm::dvec3 force_n = vec3(record.commanded_force_n);
-  if (glm::length(force_n) < kLeastArrowN) return;
-  painter_.draw_arrow(tip_mm, force_n * (kArrowRadiiPerN * radius_mm_),
-                      kArrowThickness * radius_mm_, kForce, view, target);
+  const double strength_n = glm::length(force_n);
+  if (strength_n < kLeastArrowN) return;
+  // From the surface of the head outwards: inside it a small force would not be seen.
+  const double head_mm =
+      record.active_tool < tools_.size() ? scene_.tools[record.active_tool].radius_mm : 0.0;
+  painter_.draw_arrow(tip_mm + force_n * (head_mm / strength_n),
+                      force_n * (kArrowRadiiPerN * radius_mm_), kArrowThickness * radius_mm_,
+                      kForce, view, target);
 }
 
 OverlayFigures overlay_figures(const Session& session) {

@@ -28,6 +28,7 @@ ToolView tool_view(const json& text) {
                             " has a profile point that is no height and radius; restart the "
                             "controller");
     }
+    tool.radius_mm = std::max(tool.radius_mm, at[1]);
     tool.profile_mm.push_back(at);
   }
   if (tool.profile_mm.size() > kMaxProfilePoints) {

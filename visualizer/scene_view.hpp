@@ -30,6 +30,7 @@ struct VolumeView {
 struct ToolView {
   std::string name;
   std::vector<std::array<double, 2>> profile_mm;  ///< (y, radius), from the tip upwards
+  double radius_mm = 0.0;                         ///< of the cutting head: the profile's widest
 };
 
 /// A material shows from density `iso` (0..1) upwards, or by its label, which is its index; index 0

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <thread>
 
+#include "visualizer/stop_signal.hpp"
+
 namespace kerf {
 
 namespace {
@@ -39,8 +41,8 @@ Session Session::attach(std::string_view name, std::chrono::duration<double> wai
   while (true) {
     try {
       return Session(name);
-    } catch (const SegmentError&) {
-      if (std::chrono::steady_clock::now() - start >= wait) throw;
+    } catch (const SegmentAbsent&) {
+      if (stop_requested() || std::chrono::steady_clock::now() - start >= wait) throw;
     }
     std::this_thread::sleep_for(kAttachPause);
   }

@@ -61,13 +61,15 @@ DeviceReport OmniDriver::read() noexcept {
 }
 
 void OmniDriver::command(const ServoOutput& output) noexcept {
-  const OmniCommand command{
-      .motor = output.motor_counts, .motors_on = output.motors_on, .light = light_of(output.phase)};
+  const bool on = output.motors_on && !released_.load(std::memory_order_relaxed);
+  const OmniCommand command{.motor = on ? output.motor_counts : std::array<std::int16_t, 3>{},
+                            .motors_on = on,
+                            .light = light_of(output.phase)};
   port_.send(encode(command));
 }
 
-void OmniDriver::release() const noexcept {
-  port_.send(encode(OmniCommand{}));
+bool OmniDriver::release() const noexcept {
+  return port_.send(encode(OmniCommand{}));
 }
 
 }  // namespace kerf

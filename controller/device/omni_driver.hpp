@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 
 #include "controller/device/packet_port.hpp"
@@ -11,7 +12,7 @@ namespace kerf {
 
 /// The Omni behind a packet port: reports in, motor counts out.
 ///
-/// Servo thread only, except `release`. Calibration, limits and the decision whether motors may be
+/// Servo thread only, except where said. Calibration, limits and the decision whether motors may be
 /// on belong to the servo step; the driver translates and counts losses by the device's own packet
 /// counter.
 class OmniDriver {
@@ -26,10 +27,15 @@ class OmniDriver {
   /// while waiting for the stylus, fast flash in a fault.
   void command(const ServoOutput& output) noexcept;
 
-  /// Motors off, whatever the state. Any thread, any time: sends one packet and keeps nothing.
-  void release() const noexcept;
+  /// Motors off now: one packet. False when it could not be sent. Any thread, any signal handler.
+  bool release() const noexcept;
 
-  [[nodiscard]] bool gone() const noexcept { return port_.closed(); }
+  /// Motors off, and off they stay: every later command is neutral too. As `release`.
+  bool release_for_good() noexcept {
+    released_.store(true);
+    return release();
+  }
+
   [[nodiscard]] bool wait(int milliseconds) noexcept { return port_.wait(milliseconds); }
   /// Packets that the device numbered and we never saw; and packets that were not reports.
   [[nodiscard]] std::uint64_t lost() const noexcept { return lost_; }
@@ -39,6 +45,7 @@ class OmniDriver {
   static constexpr int kMaxDrain = 64;  // 8 ms of an 8 kHz stream
 
   PacketPort& port_;
+  std::atomic<bool> released_{false};
   DeviceReport last_;
   bool seen_ = false;
   std::uint64_t lost_ = 0;

@@ -10,7 +10,8 @@ namespace kerf {
 /// The narrow place where a bus ends and a driver begins: whole packets in, whole packets out.
 ///
 /// What stands behind it (a socket to an emulator, later FireWire, USB, HID) is invisible to the
-/// driver. Servo thread only; never blocks, never allocates, never throws.
+/// driver. Never blocks, never allocates, never throws. Servo thread only, but for `send` and
+/// `closed`, which any thread and any signal handler may call.
 class PacketPort {
  public:
   virtual ~PacketPort() = default;

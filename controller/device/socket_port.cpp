@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cstring>
 #include <stdexcept>
+#include <system_error>
 #include <thread>
 
 #include <poll.h>
@@ -14,7 +15,8 @@
 
 namespace kerf {
 
-SocketPort::SocketPort(const std::filesystem::path& path, int patience_ms) {
+SocketPort::SocketPort(const std::filesystem::path& path, int patience_ms,
+                       const std::atomic<bool>& stop) {
   sockaddr_un address{};
   address.sun_family = AF_UNIX;
   const std::string text = path.string();
@@ -36,9 +38,9 @@ SocketPort::SocketPort(const std::filesystem::path& path, int patience_ms) {
     const int error = errno;
     if (fd_ >= 0) close(fd_);
     fd_ = -1;
-    if (std::chrono::steady_clock::now() >= give_up) {
+    if (stop || std::chrono::steady_clock::now() >= give_up) {
       throw std::runtime_error("--port socket:" + text + ": no device answers (" +
-                               std::strerror(error) +
+                               std::generic_category().message(error) +
                                "); start kerf-emulator --front socket --socket " + text);
     }
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
@@ -68,7 +70,10 @@ bool SocketPort::send(std::span<const std::uint8_t> packet) noexcept {
 
 bool SocketPort::wait(int milliseconds) noexcept {
   pollfd watched{fd_, POLLIN, 0};
-  return !closed_ && poll(&watched, 1, milliseconds) > 0;
+  int ready = -1;
+  while (!closed_ && (ready = poll(&watched, 1, milliseconds)) < 0 && errno == EINTR) {
+  }
+  return ready > 0;
 }
 
 }  // namespace kerf

@@ -8,7 +8,7 @@
 
 #include "controller/record/manifest.hpp"
 #include "controller/record/tick_log.hpp"
-#include "controller/scene/new_file.hpp"
+#include "shared/posix/new_file.hpp"
 #include "shared/segment/layout_table.hpp"
 
 namespace kerf {

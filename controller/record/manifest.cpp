@@ -9,7 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "controller/record/record_error.hpp"
-#include "controller/scene/new_file.hpp"
+#include "shared/posix/new_file.hpp"
 #include "shared/segment/layout_table.hpp"
 
 namespace kerf {

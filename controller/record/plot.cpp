@@ -90,6 +90,7 @@ struct Curve {
     if (first_tick == 0) first_tick = record.tick;
     end_s = static_cast<double>(record.tick - first_tick) * manifest.tick_ns * 1e-9;
     removed += removed_mm3(record, manifest.voxel_mm3);
+    if (record.stale != 0) return;  // nothing was felt in it; the curves go on to the next tick
     const std::array<double, 5> values{
         magnitude(record.contact_force_n), magnitude(record.modification_force_n),
         magnitude(record.commanded_force_n), double{record.penetration_mm}, removed};

@@ -29,7 +29,7 @@ constexpr auto kConnectPeriod = std::chrono::milliseconds(50);
   for (;;) {
     try {
       return connect_segment(options.name);
-    } catch (const SegmentError&) {
+    } catch (const SegmentAbsent&) {
       if (stop || Clock::now() >= deadline) throw;
     }
     std::this_thread::sleep_for(kConnectPeriod);

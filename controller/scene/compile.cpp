@@ -141,9 +141,13 @@ class CompiledScene final : public Servo {
   void apply(const ServoCommand& command) noexcept override {
     apply_command(plan_, state_, command);
   }
-  double penetration_mm() const noexcept override { return kerf::penetration_mm(plan_, state_); }
-  VoxelGrid grid(std::size_t scene_index) const noexcept override { return grids_[scene_index]; }
-  std::span<const Density> density(std::size_t scene_index) const noexcept override {
+  [[nodiscard]] double penetration_mm() const noexcept override {
+    return kerf::penetration_mm(plan_, state_);
+  }
+  [[nodiscard]] VoxelGrid grid(std::size_t scene_index) const noexcept override {
+    return grids_[scene_index];
+  }
+  [[nodiscard]] std::span<const Density> density(std::size_t scene_index) const noexcept override {
     return densities_[scene_index];
   }
 
@@ -181,8 +185,10 @@ class CompiledScene final : public Servo {
     plan_.speed_limit_mm_per_tick = Real(scene.limits.speed_mm_per_s / rate_hz);
     plan_.timing = {.hold_ticks = ticks(5),
                     .zero_ticks = ticks(20),
-                    .not_finite_ticks = ticks(2),
-                    .fade_in_ticks = ticks(100)};
+                    // Below 500 Hz a tick is longer than the 2 ms: the first bad one trips.
+                    .not_finite_ticks = static_cast<std::uint32_t>(2 * rate_hz / 1000),
+                    .fade_in_ticks = ticks(100),
+                    .dock_ticks = ticks(50)};
   }
 
   void plan_volumes(const Scene& scene) {
@@ -192,6 +198,7 @@ class CompiledScene final : public Servo {
       const Matrix rotation = matrix_of(volume.pose.orientation);
       const auto& h = volume.image.spacing_mm;
       const double largest = std::max({h[0], h[1], h[2]});
+      check_spacing(scene, volume);
       VolumePlan<N>& plan = plan_.volumes[plan_.volume_count++];
       plan.scene_index = i;
       plan.grid = volume.image.grid;
@@ -207,6 +214,18 @@ class CompiledScene final : public Servo {
       throw SceneError(scene.path +
                        ": no [[volume]] is solid; set solid = true for the one to touch");
     }
+  }
+
+  /// Voxels per mm must fit the loop's number for it.
+  static void check_spacing(const Scene& scene, const SceneVolume& volume) {
+    constexpr double kSmallestMm = 0.008;  // Ratio ends at 128
+    const auto& h = volume.image.spacing_mm;
+    const double smallest = std::min({h[0], h[1], h[2]});
+    if (!N::kIsFixed || smallest >= kSmallestMm) return;
+    throw SceneError(scene.path + ": volume " + volume.name + ": spacing_mm " +
+                     std::to_string(smallest) +
+                     " is below the 0.008 of fixed-point numbers; resample it, or set "
+                     "servo.numeric = \"double\"");
   }
 
   void plan_tools(Scene& scene) {

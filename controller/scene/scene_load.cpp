@@ -169,8 +169,9 @@ SceneTool load_tool(const ToolSpec& spec, const TouchedVolumes& touched) {
   SceneTool tool = make_tool(spec.name, spec.shape, size);
   const double side_mm = std::max(2 * tool.radius_mm, tool.length_mm);
   if (side_mm > touched.side_mm) {
-    refuse(spec.size_place, " makes a tool of " + number_text(side_mm) +
-                                " mm, larger than the volume (" + number_text(touched.side_mm) +
+    refuse(spec.size_place, " makes a tool of " + number_text(side_mm) + " mm" +
+                                (tool.length_mm > 2 * tool.radius_mm ? " (its length)" : "") +
+                                ", larger than the volume (" + number_text(touched.side_mm) +
                                 " mm); use a smaller tool");
   }
   return tool;
@@ -235,7 +236,14 @@ Scene load_scene(const std::filesystem::path& path, const SceneOverrides& overri
     }
   }
   const TouchedVolumes touched = touched_volumes(scene.volumes);
-  for (const ToolSpec& tool : spec.tools) scene.tools.push_back(load_tool(tool, touched));
+  for (const ToolSpec& tool : spec.tools) {
+    try {
+      scene.tools.push_back(load_tool(tool, touched));
+    } catch (const SceneError&) {
+      // A spare tool of the scene that does not fit a volume of --volume is nobody's mistake.
+      if (!overrides.volume_file || scene.tools.empty()) throw;
+    }
+  }
 
   if (overrides.volume_file) {
     const double scale = scene.device.workspace_scale;

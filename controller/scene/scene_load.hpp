@@ -41,6 +41,7 @@ inline constexpr std::array<double, 3> kWorkspaceMm = {100.0, 80.0, 60.0};
 /// - the materials' densities move with the surface: what begins at the scene's iso begins at the
 /// new
 ///   one;
+/// - spare tools (all but the first) that do not fit the volume are left out;
 /// - workspace_scale s is such that its box, after cropping and in world axes, fits kWorkspaceMm;
 ///   the offset is found as above;
 /// - p0 and p1 are multiplied by kReferenceRadiusMm / (s^2 R), R the radius of the active tool: the

@@ -12,8 +12,8 @@
 #define ZLIB_CONST  // its input is const then
 #include <zlib.h>
 
-#include "controller/scene/new_file.hpp"
 #include "controller/scene/scene_error.hpp"
+#include "shared/posix/new_file.hpp"
 
 namespace kerf {
 namespace fs = std::filesystem;
@@ -104,14 +104,27 @@ void write_voxels(NewFile& file, const VolumeImage& image, const std::vector<T>&
 
 }  // namespace
 
+namespace {
+
+void check_extension(const fs::path& path) {
+  if (path.extension() != ".nrrd") {
+    throw SceneError(path.string() + ": kerf writes .nrrd only; give a name that ends in .nrrd");
+  }
+}
+
+}  // namespace
+
 fs::path labels_path(const fs::path& volume_path) {
   return volume_path.parent_path() / (volume_path.stem().string() + "-labels.nrrd");
 }
 
+void check_volume_path(const fs::path& path) {
+  check_extension(path);
+  check_new_file(path);
+}
+
 void write_volume(const VolumeImage& image, const fs::path& path, VolumeEncoding encoding) {
-  if (path.extension() != ".nrrd") {
-    throw SceneError(path.string() + ": kerf writes .nrrd only; give a name that ends in .nrrd");
-  }
+  check_extension(path);
   const fs::path labels = labels_path(path);
   NewFile density_file(path);
   write_voxels(density_file, image, image.density, "uint16", encoding);

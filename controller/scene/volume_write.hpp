@@ -21,4 +21,7 @@ enum class VolumeEncoding : std::uint8_t { gzip, raw };
 void write_volume(const VolumeImage& image, const std::filesystem::path& path,
                   VolumeEncoding encoding = VolumeEncoding::gzip);
 
+/// Throws now what `write_volume` would throw for this path later. For long runs.
+void check_volume_path(const std::filesystem::path& path);
+
 }  // namespace kerf

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 
 #include "controller/servo/device_report.hpp"
 #include "controller/servo/kinematics/omni.hpp"
@@ -18,17 +20,28 @@ struct DevicePose {
   OmniPose<N> arm;
   DeviceVec<typename N::Real> tip_mm;
   Rotation<N> rotation;
+  std::array<typename N::Angle, 3> gimbal{};  ///< yaw, pitch, roll
 };
 
-/// Follows the encoders over the wrap at 16 bits. In the inkwell the counters start again from 0:
-/// that is the calibration.
-inline void follow_encoders(const DeviceReport& report, EncoderState& encoders) noexcept {
+inline constexpr std::int32_t kRestCounts = 2;  ///< steps of an encoder that jitters at an edge
+
+/// Follows the encoders over the wrap at 16 bits. After `dock_ticks` at rest in the inkwell the
+/// counters start again from 0: that is the calibration. Returns whether it holds in this report.
+inline bool follow_encoders(const DeviceReport& report, std::uint32_t dock_ticks,
+                            EncoderState& encoders) noexcept {
+  bool at_rest = report.docked;
   for (std::size_t i = 0; i < 3; ++i) {
     const auto step = static_cast<std::int16_t>(report.encoder[i] - encoders.last[i]);
-    encoders.unwrapped[i] =
-        report.docked ? 0 : saturate_i32(std::int64_t{encoders.unwrapped[i]} + step);
+    constexpr std::int64_t kEnd = std::numeric_limits<std::int32_t>::max();  // either sign fits
+    encoders.unwrapped[i] = static_cast<std::int32_t>(
+        std::clamp(std::int64_t{encoders.unwrapped[i]} + step, -kEnd, kEnd));
     encoders.last[i] = report.encoder[i];
+    at_rest = at_rest && step >= -kRestCounts && step <= kRestCounts;
   }
+  encoders.rest_ticks = at_rest ? std::min(encoders.rest_ticks + 1, dock_ticks) : 0;
+  const bool calibrated = encoders.rest_ticks >= dock_ticks;
+  if (calibrated) encoders.unwrapped = {};
+  return calibrated;
 }
 
 inline void follow_gimbal(const DeviceReport& report, GimbalFilter& filter) noexcept {
@@ -56,7 +69,8 @@ template <class N>
   DevicePose<N> pose;
   pose.arm = omni_pose(joints);
   pose.tip_mm = omni_tip<N>(pose.arm);
-  pose.rotation = omni_orientation<N>(joints, omni_gimbal<N>(a, b));
+  pose.gimbal = omni_gimbal<N>(a, b);
+  pose.rotation = omni_orientation<N>(joints, pose.gimbal);
   return pose;
 }
 

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstdint>
-#include <span>
 
 namespace kerf {
 
@@ -11,13 +10,6 @@ inline constexpr std::uint64_t kHashSeed = 0xcbf29ce484222325;  // FNV-1a offset
 /// FNV-1a over whole words: the same on every machine, whatever its byte order.
 [[nodiscard]] constexpr std::uint64_t hash_word(std::uint64_t hash, std::uint64_t word) noexcept {
   return (hash ^ word) * 0x100000001b3;
-}
-
-template <class T>
-[[nodiscard]] constexpr std::uint64_t hash_values(std::uint64_t hash,
-                                                  std::span<const T> values) noexcept {
-  for (const T value : values) hash = hash_word(hash, static_cast<std::uint64_t>(value));
-  return hash;
 }
 
 }  // namespace kerf

@@ -56,7 +56,8 @@ struct ServoOutput {
   bool saturated = false;  ///< force, slew, thermal or DAC limit was active
   bool contact = false;    ///< commanded force above 0.01 N
 
-  std::array<std::int32_t, 6> joint_counts{};  ///< unwrapped since docking; gimbal in mrad
+  std::array<std::int32_t, 3> joint_counts{};  ///< unwrapped since docking
+  std::array<double, 3> gimbal_rad{};          ///< yaw, pitch, roll
   std::array<double, 3> position_mm{};         ///< tip in the scene
   std::array<double, 9> rotation{};            ///< world from tool, row-major
   std::array<double, 3> velocity_mm_per_s{};   ///< device port, mean over 8 ticks

@@ -29,6 +29,7 @@ struct VolumeState {
 struct EncoderState {
   std::array<std::int16_t, 3> last{};
   std::array<std::int32_t, 3> unwrapped{};  ///< counts since the inkwell, beyond 16 bits
+  std::uint32_t rest_ticks = 0;             ///< reports in a row: docked, and no joint turning
 };
 
 /// Sliding sum over the last 20 gimbal readings: the pots' low bits are noise.
@@ -60,7 +61,7 @@ struct ServoState {
   OmniPose<N> arm;         ///< of the last good report
   DeviceVec<Real> tip_mm;  ///< device port
   Rotation<N> rotation = identity_rotation<N>();
-  bool tip_known = false;  ///< false before the first report after docking
+  bool tip_known = false;  ///< false before the first report
   std::array<DeviceVec<Real>, kVelocityWindow> tip_history{};
   std::size_t tip_history_next = 0;
 

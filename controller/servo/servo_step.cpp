@@ -49,9 +49,9 @@ void absorb(typename N::Energy& ledger, DeviceVec<typename N::Real> force_n,
   }
 }
 
-template <class N>
-bool pose_is_finite(const DevicePose<N>& pose) noexcept {
-  return is_finite(pose.tip_mm.x) && is_finite(pose.tip_mm.y) && is_finite(pose.tip_mm.z);
+template <class S, class Space>
+bool all_finite(Vec<S, Space> v) noexcept {
+  return is_finite(v.x) && is_finite(v.y) && is_finite(v.z);
 }
 
 /// Takes the new tip over, keeps the energy ledger and the velocity window. Returns true when the
@@ -85,32 +85,52 @@ std::array<double, 3> advance_velocity(const ServoPlan<N>& plan, ServoState<N>& 
   return {moved_mm[0] * per_s, moved_mm[1] * per_s, moved_mm[2] * per_s};
 }
 
-/// Motor counts of a torque, all three scaled down together where one would leave the converter's
-/// range, so that the direction of the force stays.
+/// What the converters give: signed counts, and the share of the force that they can carry.
 template <class N>
-std::array<std::int16_t, 3> motor_counts(const ServoPlan<N>& plan,
-                                         JointVec<typename N::Real> torque_n_mm) noexcept {
-  using Real = typename N::Real;
-  std::array<Real, 3> counts{torque_n_mm.x * plan.counts_per_n_mm[0],
-                             torque_n_mm.y * plan.counts_per_n_mm[1],
-                             torque_n_mm.z * plan.counts_per_n_mm[2]};
-  constexpr auto kEnd = static_cast<double>(-omni::kMotorCountMin);
-  Real largest(kEnd);
-  for (const Real c : counts) largest = std::max(largest, c < Real(0) ? -c : c);
-  const Real share = Real(kEnd) / largest;
-  std::array<std::int16_t, 3> rounded{};
-  for (std::size_t i = 0; i < 3; ++i) {
-    if constexpr (N::kIsFixed) {
-      rounded[i] =
-          static_cast<std::int16_t>(round_shift((counts[i] * share).raw(), Real::kFractionBits));
-    } else {
+struct MotorCommand {
+  std::array<std::int16_t, 3> counts{};
+  typename N::Unit share{};  ///< 1, or less where a motor is at the end of its range
+};
+
+/// All three counts are scaled down together where one would leave the range, so that the direction
+/// of the force stays. Products are not rounded before that.
+template <class N>
+MotorCommand<N> motor_command(const ServoPlan<N>& plan,
+                              JointVec<typename N::Real> torque_n_mm) noexcept {
+  constexpr std::int64_t kEnd = -omni::kMotorCountMin;
+  const std::array<typename N::Real, 3> torque{torque_n_mm.x, torque_n_mm.y, torque_n_mm.z};
+  MotorCommand<N> command;
+  if constexpr (N::kIsFixed) {
+    constexpr int kBits = 32;  // Q16 * Q16
+    std::array<std::int64_t, 3> wide{};
+    std::int64_t largest = kEnd << kBits;
+    for (std::size_t i = 0; i < 3; ++i) {
+      wide[i] = std::int64_t{torque[i].raw()} * plan.counts_per_n_mm[i].raw();
+      largest = std::max(largest, wide[i] < 0 ? -wide[i] : wide[i]);
+    }
+    // kEnd / largest with 30 fraction bits. No product exceeds kEnd with 12 + 30 fraction bits.
+    const std::int64_t share = (kEnd << (30 + 20)) / (largest >> (kBits - 20));
+    command.share = N::Unit::from_raw(static_cast<std::int32_t>(share));
+    for (std::size_t i = 0; i < 3; ++i) {
+      command.counts[i] = static_cast<std::int16_t>(round_shift((wide[i] >> 20) * share, 12 + 30));
+    }
+  } else {
+    using Real = typename N::Real;
+    std::array<Real, 3> wide{};
+    Real largest(kEnd);
+    for (std::size_t i = 0; i < 3; ++i) {
+      wide[i] = torque[i] * plan.counts_per_n_mm[i];
+      largest = std::max(largest, wide[i] < 0 ? -wide[i] : wide[i]);
+    }
+    command.share = Real(kEnd) / largest;
+    for (std::size_t i = 0; i < 3; ++i) {
       // Half up, as in fixed: the offset keeps the argument of the cast positive.
-      constexpr Real kOffset = 4096;
-      rounded[i] = static_cast<std::int16_t>(
-          static_cast<std::int32_t>(counts[i] * share + kOffset + Real(0.5)) - 4096);
+      constexpr int kOffset = 4096;
+      command.counts[i] = static_cast<std::int16_t>(
+          static_cast<int>(wide[i] * command.share + Real(kOffset) + Real(0.5)) - kOffset);
     }
   }
-  return rounded;
+  return command;
 }
 
 template <class N>
@@ -133,89 +153,130 @@ std::uint64_t hash_of(std::uint64_t hash, const ServoOutput& out,
   return hash_word(hash, static_cast<std::uint64_t>(out.phase) << 1 | (out.motors_on ? 1U : 0U));
 }
 
+/// What the device told in this tick.
+template <class N>
+struct Sensed {
+  DevicePose<N> pose;
+  bool usable = false;  ///< a fresh report with a finite pose
+  WorldVec<typename N::Real> tip_mm;
+  std::array<double, 3> velocity_mm_per_s{};
+};
+
+/// Where the device is and whether that can be trusted; decides about the motors.
+template <class N>
+Sensed<N> sense(const ServoPlan<N>& plan, ServoState<N>& state,
+                const DeviceReport& report) noexcept {
+  SafetyInputs seen{.fresh = report.fresh, .docked = report.docked};
+  if (report.fresh) {
+    seen.calibrated = follow_encoders(report, plan.timing.dock_ticks, state.encoders);
+    follow_gimbal(report, state.gimbal);
+  }
+  Sensed<N> sensed;
+  sensed.pose = device_pose(plan, state.encoders, state.gimbal);
+  seen.finite = all_finite(sensed.pose.tip_mm);
+  sensed.usable = seen.fresh && seen.finite;
+  if (sensed.usable) {
+    state.arm = sensed.pose.arm;
+    const std::uint32_t gap = state.supervisor.stale_ticks + 1;
+    seen.overspeed = move_tip(plan, state, sensed.pose, gap) && !report.docked;
+  }
+  sensed.velocity_mm_per_s = advance_velocity(plan, state);
+  sensed.tip_mm = relabel<WorldSpace>(state.tip_mm * plan.workspace_scale) + plan.offset_mm;
+  supervise(plan.timing, seen, state.supervisor);
+  return sensed;
+}
+
+/// The force that the tool feels and the removal it makes there. Without a usable pose the force of
+/// the last good report is held and then faded, and nothing is cut.
+template <class N>
+DeviceVec<typename N::Real> wanted_force(const ServoPlan<N>& plan, ServoState<N>& state,
+                                         const Sensed<N>& sensed, ServoOutput& out) noexcept {
+  using Real = typename N::Real;
+  const Supervisor& supervisor = state.supervisor;
+  const SafetyTiming& timing = plan.timing;
+  const auto share = [](std::uint32_t part, std::uint32_t whole) {
+    return Real(double(part)) / Real(double(whole));
+  };
+  state.contact_n = {};
+  if (!supervisor.motors_on() || (sensed.usable && state.hold)) return {};
+  if (!sensed.usable) {
+    return state.held_force_n * share(stale_share(timing, supervisor.stale_ticks),
+                                      timing.zero_ticks - timing.hold_ticks);
+  }
+  const ToolForces<N> forces = feel_and_cut(plan, state, sensed.tip_mm, state.rotation);
+  state.contact_n = forces.contact_n;
+  out.contact_n = as_doubles(forces.contact_n);
+  out.modification_n = as_doubles(forces.modification_n);
+  for (std::size_t v = 0; v < kMaxVolumes; ++v) {
+    out.removed_by_volume[v] = forces.removed[v].density_steps;
+    out.removed_steps += forces.removed[v].density_steps;
+    out.changed[v] = forces.removed[v].changed;
+  }
+  const DeviceVec<Real> felt_n = forces.contact_n + forces.modification_n;
+  if (supervisor.phase != Phase::ramping) return felt_n;
+  return felt_n * share(supervisor.fade_ticks, timing.fade_in_ticks);
+}
+
+/// Limits the force and turns it into motor counts. Switching off is exempt from the slew limit.
+template <class N>
+void drive(const ServoPlan<N>& plan, ServoState<N>& state, DeviceVec<typename N::Real> wanted_n,
+           ServoOutput& out) noexcept {
+  using Real = typename N::Real;
+  if (state.supervisor.motors_on() && !all_finite(wanted_n)) {
+    latch(Fault::not_finite, state.supervisor);
+  }
+  out.motors_on = state.supervisor.motors_on() && plan.motors_configured;
+  if (!out.motors_on) {
+    heat_up(plan.limits, state.thermal, {});
+    state.force_n = {};
+    return;
+  }
+  const DeviceVec<Real> limited_n =
+      limited_force(plan.limits, state.thermal, wanted_n, state.force_n);
+  const MotorCommand<N> motors = motor_command(plan, omni_torque<N>(state.arm, limited_n));
+  out.motor_counts = motors.counts;
+  state.force_n = {multiply<Real>(motors.share, limited_n.x),
+                   multiply<Real>(motors.share, limited_n.y),
+                   multiply<Real>(motors.share, limited_n.z)};
+  out.saturated = !(state.force_n == wanted_n);
+  const JointVec<Real> torque_n_mm = omni_torque<N>(state.arm, state.force_n);
+  out.torque_n_mm = {as_double(torque_n_mm.x), as_double(torque_n_mm.y), as_double(torque_n_mm.z)};
+}
+
+/// The rest of the output, for the eyes and the log.
+template <class N>
+void tell(ServoState<N>& state, const Sensed<N>& sensed, bool fresh, ServoOutput& out) noexcept {
+  using Real = typename N::Real;
+  out.phase = state.supervisor.phase;
+  out.fault = state.supervisor.fault;
+  out.armed = state.supervisor.armed;
+  out.stale = !fresh;
+  out.contact = norm(state.force_n) > Real(kContactThresholdN);
+  for (std::size_t i = 0; i < 3; ++i) {
+    out.joint_counts[i] = state.encoders.unwrapped[i];
+    out.gimbal_rad[i] = as_double(sensed.pose.gimbal[i]);
+  }
+  out.position_mm = as_doubles(sensed.tip_mm);
+  for (std::size_t i = 0; i < 9; ++i) out.rotation[i] = as_double(state.rotation.row[i / 3][i % 3]);
+  out.velocity_mm_per_s = sensed.velocity_mm_per_s;
+  out.force_n = as_doubles(state.force_n);
+  out.absorbed_mj = energy_mj<N>(state.absorbed_mj);
+  out.active_tool = state.active_tool;
+  state.output_hash = hash_of<N>(state.output_hash, out, state.force_n);
+  out.output_hash = state.output_hash;
+}
+
 }  // namespace
 
 template <class N>
 ServoOutput servo_step(const ServoPlan<N>& plan, ServoState<N>& state,
                        const DeviceReport& report) noexcept {
-  using Real = typename N::Real;
   ServoOutput out;
-  Supervisor& supervisor = state.supervisor;
-
-  // Where the device is, and whether that can be trusted.
-  if (report.fresh) {
-    follow_encoders(report, state.encoders);
-    follow_gimbal(report, state.gimbal);
-  }
-  const DevicePose<N> pose = device_pose(plan, state.encoders, state.gimbal);
-  SafetyInputs seen{.fresh = report.fresh,
-                    .docked = report.docked,
-                    .finite = pose_is_finite(pose),
-                    .overspeed = false};
-  const bool usable = seen.fresh && seen.finite;
-  if (usable) {
-    state.arm = pose.arm;
-    seen.overspeed = move_tip(plan, state, pose, supervisor.stale_ticks + 1) && !report.docked;
-  }
-  const auto velocity_mm_per_s = advance_velocity(plan, state);
-  supervise(plan.timing, seen, supervisor);
-
-  // What the tool feels and cuts there. Without a usable pose the last force is held and faded.
-  const WorldVec<Real> tip_mm =
-      relabel<WorldSpace>(state.tip_mm * plan.workspace_scale) + plan.offset_mm;
-  DeviceVec<Real> wanted_n;
-  state.contact_n = {};
-  if (supervisor.motors_on() && usable && !state.hold) {
-    const ToolForces<N> forces = feel_and_cut(plan, state, tip_mm, state.rotation, true);
-    state.contact_n = forces.contact_n;
-    wanted_n = forces.contact_n + forces.modification_n;
-    if (supervisor.phase == Phase::ramping) {
-      wanted_n = wanted_n *
-                 (Real(double(supervisor.fade_ticks)) / Real(double(plan.timing.fade_in_ticks)));
-    }
-    out.contact_n = as_doubles(forces.contact_n);
-    out.modification_n = as_doubles(forces.modification_n);
-    for (std::size_t v = 0; v < kMaxVolumes; ++v) {
-      out.removed_by_volume[v] = forces.removed[v].density_steps;
-      out.removed_steps += forces.removed[v].density_steps;
-      out.changed[v] = forces.removed[v].changed;
-    }
-  } else if (supervisor.motors_on() && !usable) {
-    wanted_n =
-        state.held_force_n * (Real(double(stale_share(plan.timing, supervisor.stale_ticks))) /
-                              Real(double(plan.timing.zero_ticks - plan.timing.hold_ticks)));
-  }
-
-  // What the hand gets. Switching off is exempt from the slew limit.
-  if (supervisor.motors_on() && plan.motors_configured) {
-    const DeviceVec<Real> sent_n =
-        limited_force(plan.limits, state.thermal, wanted_n, state.force_n);
-    out.saturated = !(sent_n == wanted_n);
-    state.force_n = sent_n;
-  } else {
-    heat_up(plan.limits, state.thermal, {});
-    state.force_n = {};
-  }
-  if (usable) state.held_force_n = state.force_n;
-  const JointVec<Real> torque_n_mm = omni_torque<N>(state.arm, state.force_n);
-  out.motors_on = supervisor.motors_on() && plan.motors_configured;
-  if (out.motors_on) out.motor_counts = motor_counts(plan, torque_n_mm);
-
-  out.phase = supervisor.phase;
-  out.fault = supervisor.fault;
-  out.armed = supervisor.armed;
-  out.stale = !report.fresh;
-  out.contact = norm(state.force_n) > Real(kContactThresholdN);
-  for (std::size_t i = 0; i < 3; ++i) out.joint_counts[i] = state.encoders.unwrapped[i];
-  out.position_mm = as_doubles(tip_mm);
-  for (std::size_t i = 0; i < 9; ++i) out.rotation[i] = as_double(state.rotation.row[i / 3][i % 3]);
-  out.velocity_mm_per_s = velocity_mm_per_s;
-  out.force_n = as_doubles(state.force_n);
-  out.torque_n_mm = {as_double(torque_n_mm.x), as_double(torque_n_mm.y), as_double(torque_n_mm.z)};
-  out.absorbed_mj = energy_mj<N>(state.absorbed_mj);
-  out.active_tool = state.active_tool;
-  state.output_hash = hash_of<N>(state.output_hash, out, state.force_n);
-  out.output_hash = state.output_hash;
+  const Sensed<N> sensed = sense(plan, state, report);
+  const auto wanted_n = wanted_force(plan, state, sensed, out);
+  drive(plan, state, wanted_n, out);
+  if (sensed.usable) state.held_force_n = state.force_n;
+  tell(state, sensed, report.fresh, out);
   return out;
 }
 
@@ -252,6 +313,8 @@ void apply_command(const ServoPlan<N>& plan, ServoState<N>& state,
       return;
     case ServoCommand::Kind::fade_in:
       restart_fade(state.supervisor);
+      state.force_n = {};  // the motors were off meanwhile
+      state.held_force_n = {};
       return;
     case ServoCommand::Kind::hold:
       state.hold = command.argument != 0;

@@ -13,22 +13,27 @@ struct SafetyTiming {
   std::uint32_t zero_ticks = 20;       ///< then the force falls to zero by here (20 ms)
   std::uint32_t not_finite_ticks = 2;  ///< NaN for longer: motors off
   std::uint32_t fade_in_ticks = 100;   ///< after arming
+  std::uint32_t dock_ticks = 50;       ///< at rest in the inkwell this long: calibrated (50 ms)
 };
 
 /// What the supervisor saw in this tick.
 struct SafetyInputs {
   bool fresh = false;
-  bool docked = false;
+  bool docked = false;      ///< the device says so in this report
+  bool calibrated = false;  ///< and has rested there for `dock_ticks`
   bool finite = true;
   bool overspeed = false;
 };
 
 /// State machine in front of the motors. Motors are on only while it says so; a fault latches until
-/// the stylus is docked again.
+/// the stylus has been at rest in the inkwell again.
 ///
-///   calibrating --docked--> docked --left inkwell--> ramping --fade in--> active
-///                             ^------------ docked ------------'            |
-///                             '-- docked -- fault <------ any fault --------'
+///   calibrating --rest--> docked --left inkwell--> ramping --fade in--> active
+///                           ^------------ docked ------------'            |
+///                           '--- rest -- fault <------- any fault --------'
+///
+/// The docked bit alone switches the motors off, but only rest calibrates and clears: one corrupt
+/// packet must neither move the tip nor forgive a fault.
 struct Supervisor {
   Phase phase = Phase::calibrating;
   Fault fault = Fault::none;
@@ -50,13 +55,13 @@ constexpr void supervise(const SafetyTiming& timing, const SafetyInputs& in,
       in.finite ? 0 : s.not_finite_ticks + (s.not_finite_ticks < UINT32_MAX ? 1U : 0U);
 
   if (in.fresh && in.docked) {
-    s.phase = Phase::docked;
-    s.fault = Fault::none;
-    s.fade_ticks = 0;
+    if (in.calibrated) s.fault = Fault::none;
+    if (in.calibrated || s.motors_on()) s.phase = Phase::docked;
     return;
   }
   if (s.phase == Phase::docked && in.fresh) {
     s.phase = Phase::ramping;
+    s.fade_ticks = 0;
     s.armed = true;
   }
   if (!s.motors_on()) return;
@@ -73,6 +78,12 @@ constexpr void supervise(const SafetyTiming& timing, const SafetyInputs& in,
     return;
   }
   if (s.phase == Phase::ramping && ++s.fade_ticks >= timing.fade_in_ticks) s.phase = Phase::active;
+}
+
+/// Latches a fault that shows only after the force was computed.
+constexpr void latch(Fault fault, Supervisor& s) noexcept {
+  s.fault = fault;
+  s.phase = Phase::fault;
 }
 
 /// Fades the force in again, where it was in.

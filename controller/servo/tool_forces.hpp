@@ -55,10 +55,10 @@ template <class N>
 }
 
 /// One volume by the plan `aligned`: contact, then the modification force and the removal where
-/// `cuts`. Stored gradients exist only for other tools; they follow the cut.
+/// the plan cuts. Stored gradients exist only for other tools; they follow the cut.
 inline void feel_and_cut_aligned(const ServoPlan<FixedNumbers>& plan,
                                  ServoState<FixedNumbers>& state, std::size_t v,
-                                 const ToolPose<FixedNumbers>& pose, bool cuts,
+                                 const ToolPose<FixedNumbers>& pose,
                                  ToolForces<FixedNumbers>& forces) noexcept {
   const VolumePlan<FixedNumbers>& volume = plan.volumes[v];
   VolumeState<FixedNumbers>& memory = state.volumes[v];
@@ -67,7 +67,7 @@ inline void feel_and_cut_aligned(const ServoPlan<FixedNumbers>& plan,
                          volume.grid, memory.density, pose);
   forces.contact_n =
       forces.contact_n - force_of_sum<FixedNumbers>(in_volume.contact, tick.contact());
-  if (!cuts) return;
+  if (!plan.cutting) return;
 
   const AlignedTick::Milled milled = tick.mill(plan.removal_rate, memory.carry);
   forces.modification_n = forces.modification_n -
@@ -80,12 +80,12 @@ inline void feel_and_cut_aligned(const ServoPlan<FixedNumbers>& plan,
   forces.removed[volume.scene_index] = milled.removed;
 }
 
-/// Contact force of the active tool in all solid volumes as they are; then, where the plan cuts and
-/// `may_cut`, the modification force from the same densities, and only then the removal.
+/// Contact force of the active tool in all solid volumes as they are; then, where the plan cuts,
+/// the modification force from the same densities, and only then the removal.
 template <class N>
 [[nodiscard]] ToolForces<N> feel_and_cut(const ServoPlan<N>& plan, ServoState<N>& state,
                                          WorldVec<typename N::Real> tip_mm,
-                                         const Rotation<N>& rotation, bool may_cut) noexcept {
+                                         const Rotation<N>& rotation) noexcept {
   const ToolPlan<N>& tool = plan.tools[state.active_tool];
   ToolForces<N> forces;
   for (std::size_t v = 0; v < plan.volume_count; ++v) {
@@ -93,10 +93,9 @@ template <class N>
     VolumeState<N>& memory = state.volumes[v];
     const ToolInVolume<N>& in_volume = tool.in_volume[v];
     const ToolPose<N> pose = tool_pose(volume, tool, in_volume, tip_mm, rotation);
-    const bool cuts = plan.cutting && may_cut;
     if constexpr (N::kIsFixed) {
       if (in_volume.aligned != nullptr) {
-        feel_and_cut_aligned(plan, state, v, pose, cuts, forces);
+        feel_and_cut_aligned(plan, state, v, pose, forces);
         continue;
       }
     }
@@ -105,7 +104,7 @@ template <class N>
     forces.contact_n = forces.contact_n -
                        force_of_sum<N>(in_volume.contact,
                                        contact_sum<N>(volume.grid, gradient, tool.offsets, pose));
-    if (!cuts) continue;
+    if (!plan.cutting) continue;
 
     const VoxelBox touched =
         overlap<N>(volume.grid, tool.offsets, pose, in_volume.overlap_ratio, state.overlap);

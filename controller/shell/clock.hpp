@@ -2,15 +2,10 @@
 #pragma once
 
 #include <cstdint>
-#include <ctime>
+
+#include "shared/posix/monotonic_clock.hpp"
 
 namespace kerf {
-
-[[nodiscard]] inline std::int64_t monotonic_ns() noexcept {
-  timespec now{};
-  clock_gettime(CLOCK_MONOTONIC, &now);
-  return std::int64_t{now.tv_sec} * 1'000'000'000 + now.tv_nsec;
-}
 
 /// Absolute deadlines on CLOCK_MONOTONIC: lateness never adds up. A deadline that has passed when
 /// its turn comes is skipped and counted, never caught up in a burst.
@@ -31,10 +26,7 @@ class DeadlineClock {
       overruns_ += static_cast<std::uint64_t>(missed);
       deadline_ns_ += missed * period_ns_;
     }
-    const std::int64_t wake = deadline_ns_ - spin_ns_;
-    const timespec until{wake / 1'000'000'000, wake % 1'000'000'000};
-    while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, nullptr) != 0) {
-    }
+    sleep_until_ns(deadline_ns_ - spin_ns_);
     do now = monotonic_ns();
     while (now < deadline_ns_);
     return now - deadline_ns_;

@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "controller/shell/controller_options.hpp"
 
+#include <algorithm>
 #include <array>
 #include <iostream>
-#include <map>
 #include <vector>
 
 #include <CLI/CLI.hpp>
+
+#include "controller/scene/scene_words.hpp"
 
 namespace kerf {
 namespace {
@@ -36,10 +38,6 @@ std::optional<int> parse_options(int argc, const char* const* argv, ControllerOp
   std::vector<double> window;
   int rate_hz = 0;
   std::string numeric;
-  const std::map<std::string, NumericKind> numerics{{"fixed", NumericKind::fixed},
-                                                    {"float", NumericKind::float32},
-                                                    {"double", NumericKind::float64}};
-
   app.add_option("--scene", options.scene, "scene file (TOML)")->required()->type_name("FILE");
   auto* volume_option =
       app.add_option("--volume", volume,
@@ -49,7 +47,7 @@ std::optional<int> parse_options(int argc, const char* const* argv, ControllerOp
                                         "voxel size of that volume in mm: one number or three")
                              ->delimiter(',')
                              ->expected(1, 3)
-                             ->check(CLI::PositiveNumber)
+
                              ->type_name("A[,B,C]");
   auto* window_option =
       app.add_option("--window", window, "source values shown as air and as densest")
@@ -61,16 +59,18 @@ std::optional<int> parse_options(int argc, const char* const* argv, ControllerOp
       ->capture_default_str();
   app.add_option("--port", options.port, "where the device is: socket:PATH of kerf-emulator")
       ->type_name("PORT");
+  constexpr double kLongestS = 1e7;  // 115 days
   app.add_option("--seconds", options.seconds,
                  "end after this much servo time, counted from arming")
-      ->check(CLI::PositiveNumber)
+      ->check(CLI::Range(0.01, kLongestS))
       ->type_name("S");
   auto* rate_option = app.add_option("--rate", rate_hz, "servo rate, instead of the scene's")
                           ->check(CLI::Range(250, 8000))
                           ->type_name("HZ");
   auto* numeric_option =
       app.add_option("--numeric", numeric, "numbers of the loop, instead of the scene's")
-          ->check(CLI::IsMember({"fixed", "float", "double"}));
+          ->check(
+              CLI::IsMember(std::vector<std::string>(kNumericWords.begin(), kNumericWords.end())));
   app.add_option("--name", options.name, "name under which readers find the segment")
       ->capture_default_str();
   app.add_flag("--virtual", options.virtual_time,
@@ -112,6 +112,12 @@ std::optional<int> parse_options(int argc, const char* const* argv, ControllerOp
   if (*spacing_option && spacing_mm.size() == 2) {
     return refuse("--spacing has 2 numbers; give one for all axes, or three");
   }
+  for (const double edge_mm : spacing_mm) {
+    if (!(edge_mm > 0)) return refuse("--spacing: a voxel edge is above 0 mm, for example 0.125");
+  }
+  if (!options.check && options.port.empty()) {
+    return refuse("--port is missing; give socket:PATH, where kerf-emulator listens");
+  }
   if (!options.check && !options.port.starts_with("socket:")) {
     return refuse("--port '" + options.port +
                   "' is not known; use socket:PATH, where kerf-emulator listens");
@@ -120,7 +126,9 @@ std::optional<int> parse_options(int argc, const char* const* argv, ControllerOp
   if (*spacing_option) options.overrides.spacing_mm = three_of(spacing_mm);
   if (*window_option) options.overrides.window = std::array{window[0], window[1]};
   if (*rate_option) options.overrides.rate_hz = rate_hz;
-  if (*numeric_option) options.overrides.numeric = numerics.at(numeric);
+  if (*numeric_option)
+    options.overrides.numeric =
+        static_cast<NumericKind>(std::ranges::find(kNumericWords, numeric) - kNumericWords.begin());
   return std::nullopt;
 }
 

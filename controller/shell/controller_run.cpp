@@ -1,11 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "controller/shell/controller_run.hpp"
 
+#include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <exception>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <thread>
@@ -20,13 +24,18 @@
 #include "controller/scene/compile.hpp"
 #include "controller/scene/scene_json.hpp"
 #include "controller/scene/scene_load.hpp"
+#include "controller/scene/scene_words.hpp"
 #include "controller/scene/volume_write.hpp"
 #include "controller/shell/motor_guard.hpp"
 #include "controller/shell/progress_bar.hpp"
 #include "controller/shell/publisher.hpp"
 #include "controller/shell/run_report.hpp"
 #include "controller/shell/servo_loop.hpp"
+#include "controller/shell/stop_signals.hpp"
 #include "controller/shell/watchdog.hpp"
+#include "shared/posix/cores.hpp"
+#include "shared/posix/memory.hpp"
+#include "shared/posix/new_file.hpp"
 #include "shared/segment/hash.hpp"
 
 namespace kerf {
@@ -34,19 +43,8 @@ namespace {
 
 constexpr int kPortPatienceMs = 5000;
 constexpr double kArmingPatienceS = 60;
+constexpr double kStableNPerMm = 0.7;  // CHAI3D's cap for the Omni; the design's for couplings
 constexpr std::chrono::milliseconds kWatchPeriod{5};
-
-const char* name_of(NumericKind kind) {
-  switch (kind) {
-    case NumericKind::fixed:
-      return "fixed";
-    case NumericKind::float32:
-      return "float";
-    case NumericKind::float64:
-      break;
-  }
-  return "double";
-}
 
 const char* text_of(EndReason end) {
   switch (end) {
@@ -135,23 +133,48 @@ void write_final(const Scene& scene, const Servo& servo, const std::filesystem::
   }
 }
 
-/// Main thread while the servo runs: watchdog and progress.
-std::uint64_t watch(const OmniDriver& device, LoopSignals& signals, const std::atomic<bool>& ended,
-                    const ControllerOptions& options, int rate_hz) {
-  Watchdog watchdog(device, signals);
-  const ProgressBar bar(options.progress);
-  for (int round = 0; !ended.load(); ++round) {
-    if (!options.virtual_time) watchdog.look(monotonic_ns());
-    if (round % 20 == 0) {
-      const double done_s = static_cast<double>(signals.armed_ticks.load()) / rate_hz;
-      char text[64];
-      std::snprintf(text, sizeof text, "%.1f s", done_s);
-      bar.show(options.seconds ? done_s / *options.seconds : 0,
-               done_s > 0 ? text : "waiting for the stylus in the inkwell");
-    }
-    std::this_thread::sleep_for(kWatchPeriod);
+/// Bytes that a run needs beyond the loaded scene, or a refusal: locked memory that is not there
+/// would end the program without a word.
+void check_memory(const Scene& scene) {
+  const bool fixed = scene.servo.numeric == NumericKind::fixed;
+  const std::uint64_t gradient_bytes = fixed ? 6 : 24;
+  std::uint64_t bytes = 0;
+  for (const SceneVolume& volume : scene.volumes) {
+    const std::uint64_t voxels = volume.image.grid.voxel_count();
+    bytes += voxels * (sizeof(Density) + (volume.solid ? gradient_bytes : 0));
   }
-  return watchdog.trips();
+  const auto free_bytes = available_memory();
+  if (free_bytes && bytes > *free_bytes) {
+    throw std::runtime_error(scene.path + ": needs " + std::to_string(bytes >> 20) + " MiB, and " +
+                             std::to_string(*free_bytes >> 20) +
+                             " MiB are free; crop or resample the volume with kerf-volume");
+  }
+}
+
+/// Main thread while the servo runs: draws the progress bar.
+void show_progress(const LoopSignals& signals, const std::atomic<bool>& ended,
+                   const ControllerOptions& options, int rate_hz) {
+  const ProgressBar bar(options.progress);
+  while (!ended.load()) {
+    const double done_s = static_cast<double>(signals.armed_ticks.load()) / rate_hz;
+    char text[64];
+    std::snprintf(text, sizeof text, "%.1f s", done_s);
+    bar.show(options.seconds ? done_s / *options.seconds : 0,
+             done_s > 0 ? text : "waiting for the stylus in the inkwell");
+    for (int i = 0; i < 10 && !ended.load(); ++i) std::this_thread::sleep_for(kWatchPeriod);
+  }
+}
+
+/// A thread of its own above the servo, so that neither a slow terminal nor the servo itself can
+/// keep it from looking.
+std::jthread start_watchdog(Watchdog& watchdog, int servo_priority) {
+  return std::jthread([&watchdog, servo_priority](const std::stop_token& stop) {
+    static_cast<void>(set_fifo(std::min(servo_priority + 1, 99)));  // without the right: as it is
+    while (!stop.stop_requested()) {
+      watchdog.look(monotonic_ns());
+      std::this_thread::sleep_for(kWatchPeriod);
+    }
+  });
 }
 
 int check_scene(const Scene& scene) {
@@ -175,80 +198,147 @@ int check_scene(const Scene& scene) {
   return 0;
 }
 
+/// Everything that can be known to go wrong, before the hand is moved.
+void check_run(const ControllerOptions& options, const Scene& scene) {
+  if (static_cast<double>(options.real_time.spin_us) * scene.servo.rate_hz > 0.9e6) {
+    throw std::runtime_error("--spin-us " + std::to_string(options.real_time.spin_us) +
+                             " is more than 90 % of a tick at " +
+                             std::to_string(scene.servo.rate_hz) + " Hz; spin less");
+  }
+  check_memory(scene);
+  if (!options.report.empty()) check_new_file(options.report);
+  if (!options.final_volume.empty()) check_volume_path(options.final_volume);
+  if (const double stiffness = device_stiffness_n_per_mm(scene); stiffness > kStableNPerMm) {
+    spdlog::warn("first contact is {:.3g} N/mm stiff at the device, an Omni bears {}: it will {}",
+                 stiffness, kStableNPerMm, "tremble; lower force.p0_n_per_mm2");
+  }
+  if (!scene.device.torque_scale) {
+    spdlog::warn("device.torque_scale is not set: the motors stay off; measure it for your device");
+  }
+}
+
+RunReport new_report(const ControllerOptions& options, const Scene& scene, std::uint64_t hash) {
+  RunReport report;
+  report.scene = options.scene;
+  report.device = options.device;
+  report.numeric = word_of(scene.servo.numeric);
+  report.rate_hz = scene.servo.rate_hz;
+  report.virtual_time = options.virtual_time;
+  report.config_hash = hash;
+#ifdef KERF_SANITIZED
+  report.allocations_counted = false;
+#endif
+  return report;
+}
+
+LoopLimits limits_of(const ControllerOptions& options, double rate_hz) {
+  LoopLimits limits;
+  if (options.seconds) {
+    limits.armed_ticks = static_cast<std::uint64_t>(std::llround(*options.seconds * rate_hz));
+  }
+  limits.gone_ticks = static_cast<std::uint64_t>(2 * rate_hz);
+  limits.arming_ticks = static_cast<std::uint64_t>(kArmingPatienceS * rate_hz);
+  return limits;
+}
+
+/// What the threads of a run share.
+struct Run {
+  const ControllerOptions& options;
+  int rate_hz;
+  SegmentWriter& segment;
+  SegmentServer& server;
+  Servo& servo;
+  OmniDriver& device;
+  std::atomic<bool>& stop;
+  RunReport& report;
+};
+
+/// The servo thread from its first to its last tick. Throws where --strict misses a right.
+EndReason serve(const Run& run, LoopSignals& signals) {
+  const ControllerOptions& options = run.options;
+  if (!options.virtual_time) {
+    const auto missing = become_real_time(options.real_time);
+    accept_rights(missing, options.real_time.strict);
+    auto& all = run.report.missing_rights;
+    all.insert(all.end(), missing.begin(), missing.end());
+  }
+  Publisher eyes(run.segment, run.servo);
+  RealTimeTicks real_time(kNsPerSecond / run.rate_hz, options.real_time.spin_us * 1000);
+  LockStepTicks lock_step(run.device);
+  TickSource& clock = options.virtual_time ? static_cast<TickSource&>(lock_step) : real_time;
+  return run_servo(clock, run.device, run.servo, eyes, run.server, limits_of(options, run.rate_hz),
+                   signals, run.report.record);
+}
+
+/// Servo, watchdog and progress until the run is over; the motors are off afterwards.
+EndReason run_threads(const Run& run) {
+  LoopSignals signals{run.stop};
+  Watchdog watchdog(run.device, signals);
+  std::atomic<bool> ended{false};
+  EndReason end = EndReason::stopped;
+  std::exception_ptr failure;
+  {
+    MotorGuard guard(run.device);
+    const std::jthread servo_thread([&] {
+      guard.guard_stack();
+      try {
+        end = serve(run, signals);
+      } catch (...) {
+        failure = std::current_exception();
+      }
+      ended = true;
+    });
+    std::jthread watching;
+    if (!run.options.virtual_time) {
+      watching = start_watchdog(watchdog, run.options.real_time.priority);
+    }
+    show_progress(signals, ended, run.options, run.rate_hz);
+  }
+  run.report.watchdog_trips = watchdog.trips();
+  if (failure) std::rethrow_exception(failure);
+  return end;
+}
+
 }  // namespace
 
 int run_controller(const ControllerOptions& options) {
   const std::int64_t began_ns = monotonic_ns();
   spdlog::set_default_logger(spdlog::stderr_color_mt("kerf-controller"));
   spdlog::set_pattern("kerf-controller: %^%l%$: %v");
+  std::atomic<bool>& stop = catch_stop_signals();
 
   Scene scene = load_scene(options.scene, options.overrides);
   if (options.check) return check_scene(scene);
-  if (!options.emulator_args.empty()) write_whole(options.emulator_args, hand_lines(scene));
+  check_run(options, scene);
+  if (!options.emulator_args.empty()) write_new_file(options.emulator_args, hand_lines(scene));
 
-  RunReport report;
-  report.scene = options.scene;
-  report.device = options.device;
-  report.numeric = name_of(scene.servo.numeric);
-  report.rate_hz = scene.servo.rate_hz;
-  report.virtual_time = options.virtual_time;
-  report.config_hash = config_hash(scene);
-#ifdef KERF_SANITIZED
-  report.allocations_counted = false;
-#endif
-
-  SegmentWriter segment = publish_scene(scene, canonical_json(scene), report.config_hash);
+  const std::string json = canonical_json(scene);
+  RunReport report = new_report(options, scene, fnv1a(json));
+  SegmentWriter segment = publish_scene(scene, json, report.config_hash);
   SegmentServer server(options.name, segment,
                        {.tools = static_cast<std::uint32_t>(scene.tools.size())});
   const std::unique_ptr<Servo> servo = compile(scene);
-  if (!scene.device.torque_scale) {
-    spdlog::warn("device.torque_scale is not set: the motors stay off; measure it for your device");
+  std::optional<SocketPort> port;
+  try {
+    port.emplace(options.port.substr(std::string("socket:").size()), kPortPatienceMs, stop);
+  } catch (const std::runtime_error&) {
+    if (stop) return 1;  // asked to end before there was a device: nothing to tell
+    throw;
   }
-  SocketPort port(options.port.substr(std::string("socket:").size()), kPortPatienceMs);
-  OmniDriver device(port);
+  OmniDriver device(*port);
   if (!options.virtual_time) {
     report.missing_rights = lock_memory();
+    if (!segment.locked() && report.missing_rights.empty()) {
+      report.missing_rights.push_back({"locked segment", "page faults may delay a tick"});
+    }
     accept_rights(report.missing_rights, options.real_time.strict);
   }
 
-  LoopLimits limits;
-  const double rate_hz = scene.servo.rate_hz;
-  if (options.seconds) {
-    limits.armed_ticks = static_cast<std::uint64_t>(std::llround(*options.seconds * rate_hz));
-  }
-  limits.gone_ticks = static_cast<std::uint64_t>(2 * rate_hz);
-  limits.arming_ticks = static_cast<std::uint64_t>(kArmingPatienceS * rate_hz);
-
-  LoopSignals signals;
-  std::atomic<bool> ended{false};
-  EndReason end = EndReason::stopped;
-  std::string refused;
-  {
-    const MotorGuard guard(device, signals.stop);
-    segment.set_lifecycle(Lifecycle::run);
-    std::thread servo_thread([&] {
-      try {
-        if (!options.virtual_time) {
-          const auto missing = become_real_time(options.real_time);
-          accept_rights(missing, options.real_time.strict);
-          report.missing_rights.insert(report.missing_rights.end(), missing.begin(), missing.end());
-        }
-        Publisher eyes(segment, *servo);
-        RealTimeTicks real_time(1'000'000'000 / scene.servo.rate_hz,
-                                options.real_time.spin_us * 1000);
-        LockStepTicks lock_step(device);
-        TickSource& clock = options.virtual_time ? static_cast<TickSource&>(lock_step) : real_time;
-        report.load_s = static_cast<double>(monotonic_ns() - began_ns) / 1e9;
-        end = run_servo(clock, device, *servo, eyes, server, limits, signals, report.record);
-      } catch (const std::exception& error) {
-        refused = error.what();
-      }
-      ended = true;
-    });
-    report.watchdog_trips = watch(device, signals, ended, options, scene.servo.rate_hz);
-    servo_thread.join();
-  }
-  if (!refused.empty()) throw std::runtime_error(refused);
+  segment.set_lifecycle(Lifecycle::run);
+  report.load_s = static_cast<double>(monotonic_ns() - began_ns) / 1e9;
+  const EndReason end =
+      run_threads({options, scene.servo.rate_hz, segment, server, *servo, device, stop, report});
+  if (!options.virtual_time) unlock_memory();
 
   const bool clean = end == EndReason::ticks_done || end == EndReason::stopped;
   segment.set_lifecycle(clean ? Lifecycle::clean_end : Lifecycle::fault);
@@ -258,10 +348,9 @@ int run_controller(const ControllerOptions& options) {
   report.refused_packets = device.refused();
   report.volume_hash = hash_of_volumes(scene, *servo);
   std::fputs(summary(report).c_str(), stdout);
+  if (!options.report.empty()) write_new_file(options.report, report_json(report));
   if (!options.final_volume.empty()) write_final(scene, *servo, options.final_volume);
-  if (!options.report.empty()) write_whole(options.report, report_json(report));
-  const bool faulty = report.record.event_count > report.watchdog_trips;
-  return clean && !faulty ? 0 : 1;
+  return clean && report.record.fault_count == 0 ? 0 : 1;
 }
 
 }  // namespace kerf

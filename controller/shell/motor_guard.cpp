@@ -1,51 +1,55 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "controller/shell/motor_guard.hpp"
 
+#include <atomic>
+#include <chrono>
 #include <csignal>
+#include <thread>
 
 namespace kerf {
 namespace {
 
-// A signal handler can reach nothing but globals.
-std::atomic<const OmniDriver*> guarded{nullptr};
-std::atomic<std::atomic<bool>*> stop_flag{nullptr};
-static_assert(std::atomic<const OmniDriver*>::is_always_lock_free);
+std::atomic<OmniDriver*> guarded{nullptr};  // a signal handler can reach nothing but globals
+static_assert(std::atomic<OmniDriver*>::is_always_lock_free);
 
-constexpr int kOrderly[] = {SIGINT, SIGTERM, SIGHUP};
-constexpr int kCrashes[] = {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGQUIT};
-
-void on_orderly(int) {
-  if (auto* stop = stop_flag.load()) stop->store(true);
-}
+constexpr int kCrashes[] = {SIGSEGV, SIGBUS,  SIGFPE,  SIGILL,  SIGABRT, SIGQUIT,
+                            SIGSYS,  SIGTRAP, SIGXCPU, SIGALRM, SIGUSR1, SIGUSR2};
 
 void on_crash(int signal) {
-  if (const OmniDriver* device = guarded.load()) device->release();  // one send(): signal-safe
+  if (OmniDriver* device = guarded.load()) {
+    static_cast<void>(device->release_for_good());  // one send(): signal-safe
+  }
   std::raise(signal);  // the handler was reset on entry: this ends the program
 }
 
-void handle(int signal, void (*handler)(int), int flags) noexcept {
+void handle_crashes(void (*handler)(int)) noexcept {
   struct sigaction action {};
   action.sa_handler = handler;
-  action.sa_flags = flags;
-  sigaction(signal, &action, nullptr);
+  action.sa_flags = static_cast<int>(SA_RESETHAND | SA_ONSTACK);
+  for (const int signal : kCrashes) sigaction(signal, &action, nullptr);
 }
 
 }  // namespace
 
-MotorGuard::MotorGuard(const OmniDriver& device, std::atomic<bool>& stop) noexcept
-    : device_(device) {
+MotorGuard::MotorGuard(OmniDriver& device) noexcept : device_(device) {
   guarded = &device;
-  stop_flag = &stop;
-  for (const int signal : kOrderly) handle(signal, on_orderly, SA_RESTART);
-  for (const int signal : kCrashes) handle(signal, on_crash, static_cast<int>(SA_RESETHAND));
+  handle_crashes(on_crash);
 }
 
 MotorGuard::~MotorGuard() {
-  device_.release();
-  for (const int signal : kOrderly) handle(signal, SIG_DFL, 0);
-  for (const int signal : kCrashes) handle(signal, SIG_DFL, 0);
+  // The device may be slow to take packets; it gets 20 ms to hear this one.
+  for (int tries = 0; !device_.release_for_good() && tries < 20; ++tries) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  handle_crashes(SIG_DFL);
   guarded = nullptr;
-  stop_flag = nullptr;
+}
+
+void MotorGuard::guard_stack() noexcept {
+  stack_t stack{};
+  stack.ss_sp = stack_.data();
+  stack.ss_size = stack_.size();
+  sigaltstack(&stack, nullptr);
 }
 
 }  // namespace kerf

@@ -1,27 +1,33 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <atomic>
+#include <array>
+#include <cstddef>
 
 #include "controller/device/omni_driver.hpp"
 
 namespace kerf {
 
 /// Motors off on every way out while one of these lives: its own end (return or exception), and the
-/// signals that end a program at once (segmentation fault, abort, ...), after which the signal
-/// takes its usual course. SIGINT, SIGTERM and SIGHUP only set `stop`, so that the loop ends in
-/// order.
+/// signals that end a program at once (segmentation fault, stack overflow, abort, ...), after which
+/// the signal takes its usual course. SIGKILL cannot be caught: there the device must notice.
 ///
-/// One at a time per process; main thread.
+/// One at a time per process; the servo thread calls `guard_stack` once.
 class MotorGuard {
  public:
-  MotorGuard(const OmniDriver& device, std::atomic<bool>& stop) noexcept;
+  explicit MotorGuard(OmniDriver& device) noexcept;
   ~MotorGuard();
   MotorGuard(const MotorGuard&) = delete;
   MotorGuard& operator=(const MotorGuard&) = delete;
 
+  /// Gives the calling thread a stack for the handlers, so that they run after a stack overflow
+  /// too.
+  void guard_stack() noexcept;
+
  private:
-  const OmniDriver& device_;
+  static constexpr std::size_t kStackBytes = 65536;
+  OmniDriver& device_;
+  alignas(16) std::array<std::byte, kStackBytes> stack_{};
 };
 
 }  // namespace kerf

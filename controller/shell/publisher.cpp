@@ -5,8 +5,8 @@
 #include <cmath>
 #include <cstddef>
 
+#include "controller/scene/scene_place.hpp"
 #include "shared/numeric/fixed.hpp"
-#include "shared/segment/hash.hpp"
 
 namespace kerf {
 namespace {
@@ -17,31 +17,6 @@ std::array<float, 3> floats(const std::array<double, 3>& v) noexcept {
 
 void put(float (&out)[3], const std::array<double, 3>& v) noexcept {
   std::ranges::copy(floats(v), out);
-}
-
-/// Unit quaternion x, y, z, w of a rotation matrix, from its largest component (Shepperd).
-std::array<float, 4> quaternion_of(const std::array<double, 9>& m) noexcept {
-  const std::array<double, 4> squares{1 + m[0] - m[4] - m[8], 1 - m[0] + m[4] - m[8],
-                                      1 - m[0] - m[4] + m[8], 1 + m[0] + m[4] + m[8]};
-  std::array<double, 4> q{};
-  switch (std::ranges::max_element(squares) - squares.begin()) {
-    case 0:
-      q = {squares[0], m[1] + m[3], m[2] + m[6], m[7] - m[5]};
-      break;
-    case 1:
-      q = {m[1] + m[3], squares[1], m[5] + m[7], m[2] - m[6]};
-      break;
-    case 2:
-      q = {m[2] + m[6], m[5] + m[7], squares[2], m[3] - m[1]};
-      break;
-    default:
-      q = {m[7] - m[5], m[2] - m[6], m[3] - m[1], squares[3]};
-      break;
-  }
-  const double length = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
-  std::array<float, 4> unit{};
-  for (std::size_t i = 0; i < 4; ++i) unit[i] = static_cast<float>(q[i] / length);
-  return unit;
 }
 
 std::uint32_t flags_of(const DeviceReport& report, const ServoOutput& output) noexcept {
@@ -80,8 +55,9 @@ void Publisher::publish_volumes(const ServoOutput& output, TickRecord& record) n
     const VoxelBox& box = output.changed[v];
     if (box.empty()) continue;
     const std::span<const Density> density = servo_.density(v);
-    segment_.publish_box(v, density, box, static_cast<std::uint32_t>(output.removed_by_volume[v]));
-    volume_hash_ = hash_word(volume_hash_, box_hash(density, servo_.grid(v), box));
+    const std::uint64_t hash = segment_.publish_box(
+        v, density, box, static_cast<std::uint32_t>(output.removed_by_volume[v]));
+    removal_hash_ = hash_word(removal_hash_, hash);
     record.dirty_volumes |= 1U << v;
     if (first_box.empty()) first_box = box;
   }
@@ -105,8 +81,13 @@ void Publisher::publish(Tick tick, const DeviceReport& report, const ServoOutput
   record.flags = flags_of(report, output);
   record.missed_deadlines = static_cast<std::uint32_t>(timing.missed_deadlines);
   std::ranges::copy(output.joint_counts, record.encoder_counts);
+  for (std::size_t i = 0; i < 3; ++i) {
+    record.encoder_counts[3 + i] =
+        static_cast<std::int32_t>(std::lround(output.gimbal_rad[i] * 1000));
+  }
   std::ranges::copy(output.position_mm, record.position_mm);
-  std::ranges::copy(quaternion_of(output.rotation), record.orientation);
+  std::ranges::transform(quaternion_of(output.rotation), record.orientation,
+                         [](double q) { return static_cast<float>(q); });
   put(record.velocity_mm_per_s, output.velocity_mm_per_s);
   put(record.commanded_force_n, output.force_n);
   put(record.contact_force_n, output.contact_n);
@@ -116,7 +97,7 @@ void Publisher::publish(Tick tick, const DeviceReport& report, const ServoOutput
   record.removed = static_cast<std::uint32_t>(output.removed_steps);
   record.port_energy_j = output.absorbed_mj / 1000.0;
   record.energies[0] = std::llround(output.absorbed_mj / 1000.0 * 4294967296.0);
-  record.volume_hash = volume_hash_;
+  record.volume_hash = removal_hash_;
   record.output_hash = output.output_hash;
   record.sub_steps = 1;
   record.last_command = last_command;

@@ -38,7 +38,7 @@ class Publisher {
 
   SegmentWriter& segment_;
   const Servo& servo_;
-  std::uint64_t volume_hash_ = kHashSeed;  ///< chain over the changed boxes
+  std::uint64_t removal_hash_ = kHashSeed;  ///< chain over the changed boxes
 };
 
 }  // namespace kerf

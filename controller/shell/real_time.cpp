@@ -3,20 +3,19 @@
 
 #include <array>
 #include <cerrno>
-#include <cstring>
+#include <system_error>
 
-#include <pthread.h>
-#include <sched.h>
 #include <sys/mman.h>
 #include <sys/resource.h>
-#include <unistd.h>
+
+#include "shared/posix/cores.hpp"
 
 namespace kerf {
 namespace {
 
 /// The servo's frames stay far below this; 256 KiB of the stack are touched in advance.
 void touch_stack() noexcept {
-  std::array<volatile std::uint8_t, 256 * 1024> frame;
+  std::array<volatile std::uint8_t, 262144> frame;
   for (std::size_t i = 0; i < frame.size(); i += 1024) frame[i] = 0;
 }
 
@@ -24,32 +23,31 @@ void touch_stack() noexcept {
 
 std::vector<MissingRight> lock_memory() {
   if (mlockall(MCL_CURRENT | MCL_FUTURE) == 0) return {};
-  return {{std::string("locked memory (") + std::strerror(errno) +
+  return {{std::string("locked memory (") + std::generic_category().message(errno) +
                "; raise RLIMIT_MEMLOCK or grant CAP_IPC_LOCK)",
            "page faults may delay a tick by milliseconds"}};
 }
 
 std::vector<MissingRight> become_real_time(const RealTimeOptions& options) {
   std::vector<MissingRight> missing;
-  const long cores = sysconf(_SC_NPROCESSORS_ONLN);
-  const int cpu = options.cpu >= 0 ? options.cpu : static_cast<int>(cores) - 1;
-  cpu_set_t set;
-  CPU_ZERO(&set);
-  if (cpu < CPU_SETSIZE) CPU_SET(static_cast<std::size_t>(cpu), &set);
-  if (const int error = pthread_setaffinity_np(pthread_self(), sizeof set, &set); error != 0) {
-    missing.push_back({"core " + std::to_string(cpu) + " (" + std::strerror(error) + ")",
-                       "the servo may move between cores"});
+  const int core = options.cpu >= 0 ? options.cpu : allowed_cores().back();
+  if (const int error = pin_to_core(core); error != 0) {
+    missing.push_back(
+        {"core " + std::to_string(core) + " (" + std::generic_category().message(error) + ")",
+         "the servo may move between cores"});
   }
-  sched_param parameters{};
-  parameters.sched_priority = options.priority;
-  if (const int error = pthread_setschedparam(pthread_self(), SCHED_FIFO, &parameters);
-      error != 0) {
+  if (const int error = set_fifo(options.priority); error != 0) {
     missing.push_back({"SCHED_FIFO " + std::to_string(options.priority) + " (" +
-                           std::strerror(error) + "; raise RLIMIT_RTPRIO or grant CAP_SYS_NICE)",
+                           std::generic_category().message(error) +
+                           "; raise RLIMIT_RTPRIO or grant CAP_SYS_NICE)",
                        "other programs may delay ticks by tens of milliseconds"});
   }
   touch_stack();
   return missing;
+}
+
+void unlock_memory() noexcept {
+  munlockall();
 }
 
 ThreadFaults thread_faults() noexcept {

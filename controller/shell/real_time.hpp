@@ -24,6 +24,9 @@ struct MissingRight {
 /// before the servo thread starts. Empty when all went well.
 [[nodiscard]] std::vector<MissingRight> lock_memory();
 
+/// Takes that back, so that what follows a run needs no locked memory.
+void unlock_memory() noexcept;
+
 /// Gives the calling thread its priority and its core, and touches its stack so that no page of it
 /// faults later.
 [[nodiscard]] std::vector<MissingRight> become_real_time(const RealTimeOptions& options);

@@ -14,13 +14,14 @@ namespace kerf {
 
 /// A fault as it latched, or an event of the shell.
 struct FaultEvent {
-  std::uint64_t tick = 0;
+  std::uint64_t tick = 0;  ///< as in the segment and in the log
   const char* name = "";
 };
 
 /// Statistics of a run. Fixed memory: the servo thread writes it, others read it after the end.
 struct RunRecord {
-  std::uint64_t ticks = 0;  ///< servo steps after arming; the counters below count these
+  std::uint64_t ticks = 0;          ///< servo steps after arming; the counters below count these
+  std::uint64_t armed_at_tick = 0;  ///< tick of the segment and of the log that was the first
   std::uint64_t overruns = 0;
   std::uint64_t stale_ticks = 0;
   std::uint64_t contact_ticks = 0;
@@ -35,10 +36,15 @@ struct RunRecord {
   static constexpr std::size_t kMaxEvents = 64;
   std::array<FaultEvent, kMaxEvents> events{};
   std::size_t event_count = 0;  ///< may exceed kMaxEvents: the first ones are kept
+  std::size_t fault_count = 0;  ///< events that make the run a failure
 
   void add_event(std::uint64_t tick, const char* name) noexcept {
     if (event_count < kMaxEvents) events[event_count] = {tick, name};
     ++event_count;
+  }
+  void add_fault(std::uint64_t tick, const char* name) noexcept {
+    add_event(tick, name);
+    ++fault_count;
   }
 };
 

@@ -2,13 +2,9 @@
 #include "controller/shell/run_report.hpp"
 
 #include <algorithm>
-#include <cerrno>
 #include <cstdio>
-#include <cstring>
-#include <stdexcept>
 
 #include <nlohmann/json.hpp>
-#include <unistd.h>
 
 namespace kerf {
 namespace {
@@ -64,6 +60,7 @@ std::string report_json(const RunReport& report) {
       {"virtual", report.virtual_time},
       {"end", report.end},
       {"ticks", r.ticks},
+      {"armed_at_tick", r.armed_at_tick},
       {"overruns", r.overruns},
       {"stale_ticks", r.stale_ticks},
       {"wake_us", percentiles(r.wake)},
@@ -78,7 +75,8 @@ std::string report_json(const RunReport& report) {
       {"removed_mm3", report.removed_mm3},
       {"energy_j", r.absorbed_mj / 1000.0},
       {"faults", events},
-      {"fault_count", r.event_count},
+      {"fault_count", r.fault_count},
+      {"event_count", r.event_count},
       {"watchdog_trips", report.watchdog_trips},
       {"lost_packets", report.lost_packets},
       {"refused_packets", report.refused_packets},
@@ -119,22 +117,6 @@ std::string summary(const RunReport& report) {
                    static_cast<unsigned long long>(r.events[i].tick));
   }
   return text;
-}
-
-void write_whole(const std::string& path, const std::string& text) {
-  const std::string temporary = path + ".partial";
-  const auto fail = [&]() {
-    const std::string reason = std::strerror(errno);
-    std::remove(temporary.c_str());
-    throw std::runtime_error(path + ": not written (" + reason +
-                             "); name a folder with room where you may write");
-  };
-  std::FILE* file = std::fopen(temporary.c_str(), "wb");
-  if (file == nullptr) fail();
-  const bool written = std::fwrite(text.data(), 1, text.size(), file) == text.size();
-  const bool stored = written && std::fflush(file) == 0 && fsync(fileno(file)) == 0;
-  if (std::fclose(file) != 0 || !stored) fail();
-  if (std::rename(temporary.c_str(), path.c_str()) != 0) fail();
 }
 
 }  // namespace kerf

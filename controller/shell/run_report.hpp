@@ -36,8 +36,4 @@ struct RunReport {
 /// The same figures for a person, on one screen.
 [[nodiscard]] std::string summary(const RunReport& report);
 
-/// Writes `text` whole or not at all: a temporary file beside `path`, then a rename. Throws
-/// std::runtime_error with one line.
-void write_whole(const std::string& path, const std::string& text);
-
 }  // namespace kerf

@@ -24,20 +24,58 @@ ServoCommand servo_command(const Command& command) noexcept {
   return {};
 }
 
-/// Counts one armed tick.
-void count(RunRecord& record, const ServoOutput& output, const TickTiming& timing) noexcept {
-  ++record.ticks;
-  record.stale_ticks += output.stale ? 1 : 0;
-  record.contact_ticks += output.contact ? 1 : 0;
-  record.peak_force_n = std::max(record.peak_force_n, length(output.force_n));
-  for (std::size_t v = 0; v < kMaxVolumes; ++v) {
-    record.removed_steps[v] += output.removed_by_volume[v];
+/// Statistics of the armed ticks; what was counted before arming is taken off.
+class Bookkeeper {
+ public:
+  Bookkeeper(RunRecord& record, const TickSource& clock) noexcept
+      : record_(record), clock_(clock) {}
+
+  void count(Tick tick, const ServoOutput& output, const TickTiming& timing,
+             std::int64_t publish_ns) noexcept {
+    if (output.fault != last_fault_ && output.fault != Fault::none) {
+      record_.add_fault(tick, fault_name(output.fault));
+    }
+    last_fault_ = output.fault;
+    if (!output.armed) return;
+    if (record_.ticks == 0) {
+      record_.armed_at_tick = tick;
+      start();
+    }
+    ++record_.ticks;
+    record_.stale_ticks += output.stale ? 1 : 0;
+    record_.contact_ticks += output.contact ? 1 : 0;
+    record_.peak_force_n = std::max(record_.peak_force_n, length(output.force_n));
+    for (std::size_t v = 0; v < kMaxVolumes; ++v) {
+      record_.removed_steps[v] += output.removed_by_volume[v];
+    }
+    record_.absorbed_mj = output.absorbed_mj;
+    record_.output_hash = output.output_hash;
+    record_.wake.record(timing.late_ns);
+    record_.compute.record(timing.compute_ns);
+    record_.publish.record(publish_ns);
   }
-  record.absorbed_mj = output.absorbed_mj;
-  record.output_hash = output.output_hash;
-  record.wake.record(timing.late_ns);
-  record.compute.record(timing.compute_ns);
-}
+
+  void start() noexcept {
+    overruns_ = clock_.overruns();
+    faults_ = thread_faults();
+    allocations_ = CountedAllocations::total();
+  }
+
+  void finish() noexcept {
+    const ThreadFaults faults = thread_faults();
+    record_.faults_of_pages = {faults.minor - faults_.minor, faults.major - faults_.major};
+    record_.allocations = CountedAllocations::total() - allocations_;
+    record_.overruns = clock_.overruns() - overruns_;
+  }
+
+ private:
+  RunRecord& record_;
+  const TickSource& clock_;
+  Fault last_fault_ = Fault::none;
+  std::uint64_t overruns_ = 0;
+  std::uint64_t allocations_ = 0;
+  ThreadFaults faults_;
+};
 
 }  // namespace
 
@@ -45,13 +83,11 @@ EndReason run_servo(TickSource& clock, OmniDriver& device, Servo& servo, Publish
                     SegmentServer& commands, const LoopLimits& limits, LoopSignals& signals,
                     RunRecord& record) noexcept {
   EndReason end = EndReason::stopped;
-  Fault last_fault = Fault::none;
   std::uint32_t last_command = 0;
   std::uint64_t silent_ticks = 0;
-  std::uint64_t overruns_before = 0;
-  ThreadFaults faults_before = thread_faults();
   const CountedAllocations counted;
-  std::uint64_t allocations_before = CountedAllocations::total();
+  Bookkeeper books(record, clock);
+  books.start();
 
   for (Tick tick = 1; !signals.stop.load(std::memory_order_relaxed); ++tick) {
     TickTiming timing;
@@ -64,40 +100,30 @@ EndReason run_servo(TickSource& clock, OmniDriver& device, Servo& servo, Publish
     }
     if (signals.stalled.exchange(false, std::memory_order_relaxed)) {
       servo.apply({.kind = ServoCommand::Kind::fade_in});
-      record.add_event(record.ticks, "watchdog");
+      record.add_event(tick, "watchdog");
     }
     const std::int64_t in_hand_ns = monotonic_ns();
     const ServoOutput output = servo.step(report);  // all physics, all limits
-    const std::int64_t ready_ns = monotonic_ns();
-    timing.compute_ns = ready_ns - in_hand_ns;
+    timing.compute_ns = monotonic_ns() - in_hand_ns;
     timing.missed_deadlines = clock.overruns();
-    device.command(output);  // the hand first,
+    if (signals.stalled.load(std::memory_order_relaxed)) {
+      device.release();  // this tick was the stall: its force is late, the next one fades in
+    } else {
+      device.command(output);  // the hand first,
+    }
     const std::int64_t sent_ns = monotonic_ns();
     eyes.publish(tick, report, output, last_command, timing);  // then the eyes
-    const std::int64_t published_ns = monotonic_ns();
+    books.count(tick, output, timing, monotonic_ns() - sent_ns);
 
     signals.heartbeat.store(tick, std::memory_order_relaxed);
+    signals.armed_ticks.store(record.ticks, std::memory_order_relaxed);
     silent_ticks = report.fresh ? 0 : silent_ticks + 1;
-    if (output.fault != last_fault) {
-      if (output.fault != Fault::none) record.add_event(record.ticks, fault_name(output.fault));
-      last_fault = output.fault;
-    }
-    if (output.armed) {
-      if (record.ticks == 0) {  // figures of a run begin with arming
-        overruns_before = clock.overruns();
-        faults_before = thread_faults();
-        allocations_before = CountedAllocations::total();
-      }
-      count(record, output, timing);
-      record.publish.record(published_ns - sent_ns);
-      signals.armed_ticks.store(record.ticks, std::memory_order_relaxed);
-    }
     if (record.ticks >= limits.armed_ticks) {
       end = EndReason::ticks_done;
       break;
     }
     if (silent_ticks >= limits.gone_ticks) {
-      record.add_event(record.ticks, "device_gone");
+      record.add_fault(tick, "device_gone");
       end = EndReason::device_gone;
       break;
     }
@@ -107,10 +133,7 @@ EndReason run_servo(TickSource& clock, OmniDriver& device, Servo& servo, Publish
     }
   }
   device.release();  // motors off on the way out
-  const ThreadFaults faults = thread_faults();
-  record.faults_of_pages = {faults.minor - faults_before.minor, faults.major - faults_before.major};
-  record.allocations = CountedAllocations::total() - allocations_before;
-  record.overruns = clock.overruns() - overruns_before;
+  books.finish();
   return end;
 }
 

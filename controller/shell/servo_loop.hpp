@@ -24,7 +24,7 @@ struct LoopLimits {
 
 /// What the loop shares with other threads.
 struct LoopSignals {
-  std::atomic<bool> stop{false};              ///< asked by a signal or an error
+  std::atomic<bool>& stop;                    ///< asked by a signal
   std::atomic<bool> stalled{false};           ///< the watchdog switched the motors off
   std::atomic<std::uint64_t> heartbeat{0};    ///< ticks so far: the watchdog's pulse
   std::atomic<std::uint64_t> armed_ticks{0};  ///< for the progress bar

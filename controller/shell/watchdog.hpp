@@ -27,7 +27,7 @@ class Watchdog {
       return;
     }
     if (tripped_ || now_ns - last_change_ns_ < kPatienceNs) return;
-    device_.release();
+    static_cast<void>(device_.release());
     tripped_ = true;
     ++trips_;
     signals_.stalled.store(true, std::memory_order_relaxed);

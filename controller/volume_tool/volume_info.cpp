@@ -8,7 +8,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "controller/scene/new_file.hpp"
+#include "shared/posix/new_file.hpp"
 
 namespace kerf {
 namespace {

@@ -3,29 +3,17 @@
 
 #include <array>
 
-#include <time.h>
+#include "shared/posix/monotonic_clock.hpp"
 
 namespace kerf {
 namespace {
 
-constexpr std::int64_t kNsPerSecond = 1'000'000'000;
 constexpr std::int64_t kNsPerCycle = 125'000;
 constexpr std::int64_t kMaxBehindNs = 100'000'000;  // beyond this the past is not made up for
 constexpr int kStopCheckMs = 100;
 constexpr int kMaxTakenPerPeriod = 64;  // a flooding host cannot hold the device
 // One byte more than any command, so that a longer packet is seen to be wrong.
 using Buffer = std::array<std::uint8_t, 65>;
-
-std::int64_t now_ns() noexcept {
-  timespec now{};
-  clock_gettime(CLOCK_MONOTONIC, &now);
-  return now.tv_sec * kNsPerSecond + now.tv_nsec;
-}
-
-void sleep_until(std::int64_t deadline_ns) noexcept {
-  const timespec deadline{deadline_ns / kNsPerSecond, deadline_ns % kNsPerSecond};
-  clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &deadline, nullptr);
-}
 
 void send(SeqpacketLink& client, PacketDevice& device, FrontStats& stats) noexcept {
   const auto packet = device.next_packet();
@@ -45,11 +33,11 @@ bool goes_on(const SeqpacketLink& client, const ServeLimits& limits, const Front
 void serve_real_time(SeqpacketLink& client, PacketDevice& device, int packet_cycles,
                      const ServeLimits& limits, FrontStats& stats) {
   Buffer buffer;
-  std::int64_t deadline_ns = now_ns();
+  std::int64_t deadline_ns = monotonic_ns();
   while (goes_on(client, limits, stats)) {
     deadline_ns += packet_cycles * kNsPerCycle;
-    sleep_until(deadline_ns);
-    const std::int64_t late_ns = now_ns() - deadline_ns;
+    sleep_until_ns(deadline_ns);
+    const std::int64_t late_ns = monotonic_ns() - deadline_ns;
     stats.wake.record(late_ns);
     if (late_ns > kMaxBehindNs) {
       ++stats.resyncs;

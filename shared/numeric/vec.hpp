@@ -46,11 +46,6 @@ template <class ToSpace, class S, class Space>
   return {v.x, v.y, v.z};
 }
 
-template <class To, class S, class Space>
-[[nodiscard]] constexpr Vec<To, Space> convert(Vec<S, Space> v) noexcept {
-  return {To(static_cast<double>(v.x)), To(static_cast<double>(v.y)), To(static_cast<double>(v.z))};
-}
-
 template <class S, class Space>
 [[nodiscard]] constexpr S dot(Vec<S, Space> a, Vec<S, Space> b) noexcept {
   return a.x * b.x + a.y * b.y + a.z * b.z;

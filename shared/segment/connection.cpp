@@ -94,8 +94,8 @@ SegmentConnection connect_segment(std::string_view name) {
   OwnedFd link(socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0));
   if (link.get() < 0 ||
       connect(link.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
-    throw SegmentError("--name " + std::string(name) + ": " + system_message(errno) + " (" + path +
-                       "); start kerf-controller with this name first");
+    throw SegmentAbsent("--name " + std::string(name) + ": " + system_message(errno) + " (" + path +
+                        "); start kerf-controller with this name first");
   }
   setsockopt(link.get(), SOL_SOCKET, SO_RCVTIMEO, &kAnswerTimeout, sizeof kAnswerTimeout);
   setsockopt(link.get(), SOL_SOCKET, SO_SNDTIMEO, &kAnswerTimeout, sizeof kAnswerTimeout);

@@ -113,7 +113,7 @@ struct TickRecord {
   std::uint32_t execution_ns;
   std::uint32_t flags;  ///< kFlag... below
   std::uint32_t missed_deadlines;
-  std::int32_t encoder_counts[6];  ///< unwrapped: joints 0..2, gimbal 3..5
+  std::int32_t encoder_counts[6];  ///< joints 0..2: unwrapped since docking; gimbal 3..5: mrad
   double position_mm[3];
   float orientation[4];  ///< quaternion x, y, z, w: tool to world
   float velocity_mm_per_s[3];

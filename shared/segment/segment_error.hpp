@@ -13,6 +13,12 @@ class SegmentError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+/// No controller of that name answers (yet): worth trying again, unlike every other SegmentError.
+class SegmentAbsent : public SegmentError {
+ public:
+  using SegmentError::SegmentError;
+};
+
 /// The text of an `errno`; unlike strerror, for any thread.
 [[nodiscard]] inline std::string system_message(int error) {
   return std::generic_category().message(error);

@@ -61,13 +61,6 @@ void SegmentMemory::seal() {
   }
 }
 
-std::uint64_t monotonic_ns() noexcept {
-  timespec now{};
-  clock_gettime(CLOCK_MONOTONIC, &now);
-  return static_cast<std::uint64_t>(now.tv_sec) * 1'000'000'000 +
-         static_cast<std::uint64_t>(now.tv_nsec);
-}
-
 std::uint64_t random_session_id() {
   std::uint64_t id = 0;
   while (id == 0) {

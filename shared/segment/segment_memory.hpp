@@ -30,9 +30,6 @@ class SegmentMemory {
   std::span<std::byte> bytes_;
 };
 
-/// CLOCK_MONOTONIC.
-[[nodiscard]] std::uint64_t monotonic_ns() noexcept;
-
 /// Random, never 0.
 [[nodiscard]] std::uint64_t random_session_id();
 

@@ -95,6 +95,7 @@ struct SegmentServer::State {
   void serve() noexcept {
     sigset_t all;
     sigfillset(&all);
+    for (const int fault : {SIGSEGV, SIGBUS, SIGFPE, SIGILL}) sigdelset(&all, fault);
     pthread_sigmask(SIG_BLOCK, &all, nullptr);  // signals go to the main thread
     const sched_param normal{};
     pthread_setschedparam(pthread_self(), SCHED_OTHER, &normal);
@@ -118,6 +119,9 @@ struct SegmentServer::State {
 
   void admit() {
     OwnedFd peer(accept4(listener.get(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK));
+    if (peer.get() < 0 && (errno == EMFILE || errno == ENFILE)) {
+      usleep(10'000);  // the caller still waits in the queue: do not spin until a file is free
+    }
     if (peer.get() < 0 || peers.size() >= kMaxPeers || !may_connect(peer.get())) return;
     if (send_hello(peer.get(), hello, segment.get())) peers.push_back(std::move(peer));
   }

@@ -8,6 +8,7 @@
 #include <cstring>
 #include <utility>
 
+#include "shared/posix/monotonic_clock.hpp"
 #include "shared/segment/dirty_bricks.hpp"
 #include "shared/segment/hash.hpp"
 #include "shared/segment/segment_memory.hpp"
@@ -97,7 +98,7 @@ SegmentWriter SegmentWriter::create(const SegmentSpec& spec) {
       .volumes = {},
       .ticks = {},
       .boxes = {},
-      .last_end_ns = monotonic_ns(),
+      .last_end_ns = static_cast<std::uint64_t>(monotonic_ns()),
       .mirror_updates = spec.mirror_updates,
   });
   std::byte* const base = state->memory.bytes().data();
@@ -165,16 +166,16 @@ void SegmentWriter::begin_tick(Tick tick) noexcept {
   state_->tick = std::max(tick, state_->tick + 1);
 }
 
-void SegmentWriter::publish_box(std::size_t volume, std::span<const Density> linear,
-                                const VoxelBox& changed, std::uint32_t removed,
-                                DirtyCause cause) noexcept {
+std::uint64_t SegmentWriter::publish_box(std::size_t volume, std::span<const Density> linear,
+                                         const VoxelBox& changed, std::uint32_t removed,
+                                         DirtyCause cause) noexcept {
   State& state = *state_;
   assert(volume < state.volumes.size() && state.mirror_updates);
-  if (volume >= state.volumes.size() || !state.mirror_updates) return;
+  if (volume >= state.volumes.size() || !state.mirror_updates) return 0;
   MirroredVolume& mirrored = state.volumes[volume];
   assert(linear.size() == mirrored.bricks.grid.voxel_count());
   const VoxelBox box = changed.clipped(mirrored.bricks.grid.box());
-  if (box.empty() || linear.size() != mirrored.bricks.grid.voxel_count()) return;
+  if (box.empty() || linear.size() != mirrored.bricks.grid.voxel_count()) return 0;
   mirrored.linear = linear;
   const VoxelBox touched = mirrored.bricks.bricks_of(box);
   mirrored.dirty.mark(box);
@@ -199,6 +200,7 @@ void SegmentWriter::publish_box(std::size_t volume, std::span<const Density> lin
     record.box_hash = box_hash(linear, mirrored.bricks.grid, box);
   }
   state.boxes.push(record);
+  return record.box_hash;
 }
 
 void SegmentWriter::publish_state(const TickRecord& record) noexcept {

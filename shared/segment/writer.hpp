@@ -66,8 +66,10 @@ class SegmentWriter {
 
   /// *Servo.* `linear` is the whole volume, x fastest; it is read in `end_tick`, and in later ones
   /// while bricks wait, so it outlives the writer. Records the box in the dirty ring.
-  void publish_box(std::size_t volume, std::span<const Density> linear, const VoxelBox& changed,
-                   std::uint32_t removed, DirtyCause cause = DirtyCause::milling) noexcept;
+  /// Returns the hash of the densities in the box, as the record has it; 0 where it is too large.
+  std::uint64_t publish_box(std::size_t volume, std::span<const Density> linear,
+                            const VoxelBox& changed, std::uint32_t removed,
+                            DirtyCause cause = DirtyCause::milling) noexcept;
 
   /// *Servo.* Appends to the state ring; `seq` and `crc32c` are filled in.
   void publish_state(const TickRecord& record) noexcept;

@@ -13,6 +13,8 @@
 
 namespace {
 
+const std::atomic<bool> kGoOn{false};
+
 /// A listening SEQPACKET socket in a folder of its own.
 struct Listener {
   Listener() {
@@ -38,7 +40,7 @@ struct Listener {
 
 TEST_CASE("packets keep their borders both ways, and the end shows") {
   const Listener listener;
-  kerf::SocketPort port(listener.path, 0);
+  kerf::SocketPort port(listener.path, 0, kGoOn);
   const int peer = accept(listener.fd, nullptr, nullptr);
   REQUIRE(peer >= 0);
 
@@ -64,7 +66,7 @@ TEST_CASE("packets keep their borders both ways, and the end shows") {
 
 TEST_CASE("a packet longer than the buffer shows its full size") {
   const Listener listener;
-  kerf::SocketPort port(listener.path, 0);
+  kerf::SocketPort port(listener.path, 0, kGoOn);
   const int peer = accept(listener.fd, nullptr, nullptr);
   REQUIRE(send(peer, "0123456789", 10, 0) == 10);
   std::array<std::uint8_t, 4> buffer{};
@@ -74,7 +76,7 @@ TEST_CASE("a packet longer than the buffer shows its full size") {
 
 TEST_CASE("nobody listening is one line that names the way out") {
   try {
-    const kerf::SocketPort port("/nonexistent/port", 0);
+    const kerf::SocketPort port("/nonexistent/port", 0, kGoOn);
     FAIL("connected to nothing");
   } catch (const std::runtime_error& error) {
     const std::string line = error.what();
@@ -82,6 +84,6 @@ TEST_CASE("nobody listening is one line that names the way out") {
     CHECK(line.find("kerf-emulator") != std::string::npos);
     CHECK(line.find('\n') == std::string::npos);
   }
-  CHECK_THROWS_WITH_AS(kerf::SocketPort(std::string(200, 'x'), 0),
+  CHECK_THROWS_WITH_AS(kerf::SocketPort(std::string(200, 'x'), 0, kGoOn),
                        doctest::Contains("use a shorter one"), std::runtime_error);
 }

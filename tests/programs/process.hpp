@@ -46,7 +46,7 @@ inline std::string text_of(const std::filesystem::path& path) {
   return text.str();
 }
 
-/// A program of kerf running beside the test; killed with its owner.
+/// A program of kerf running beside the test; ends with its owner.
 class Process {
  public:
   Process(const std::vector<std::string>& arguments, std::filesystem::path output)
@@ -64,11 +64,16 @@ class Process {
     posix_spawn_file_actions_destroy(&files);
     if (error != 0) throw std::runtime_error("cannot start " + arguments[0]);
   }
+  /// Asked to end first, so that programs leave no sockets behind.
   ~Process() {
-    if (pid_ > 0) {
-      ::kill(pid_, SIGKILL);
-      waitpid(pid_, nullptr, 0);
+    if (pid_ < 0) return;
+    ::kill(pid_, SIGTERM);
+    for (int tries = 0; tries < 200; ++tries) {
+      if (waitpid(pid_, nullptr, WNOHANG) == pid_) return;
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
     }
+    ::kill(pid_, SIGKILL);
+    waitpid(pid_, nullptr, 0);
   }
   Process(const Process&) = delete;
   Process& operator=(const Process&) = delete;

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include <doctest/doctest.h>
 
+#include "controller/scene/scene_error.hpp"
 #include "controller/shell/allocation_counter.hpp"
 #include "tests/servo/support.hpp"
 
@@ -204,6 +206,89 @@ TEST_CASE("reports stop: the force holds 5 ms, is zero at 20 ms, motors off, fau
   CHECK(length(settled(*servo, arm, 0, 0.3, 0).force_n) > 0.1);
 }
 
+TEST_CASE("one packet with the docked bit neither moves the tip nor forgives a fault") {
+  Scene scene = half_space_scene();
+  const auto servo = kerf::compile(scene);
+  FakeArm arm;
+  arm_at(*servo, arm, 0, 5, 0);
+  const ServoOutput before = settled(*servo, arm, 0, 0.3, 0);
+  auto glitch = arm.at(0, 0.3, 0);
+  glitch.docked = true;
+  CHECK_FALSE(servo->step(glitch).motors_on);
+  const ServoOutput after = servo->step(arm.at(0, 0.3, 0));
+  CHECK(after.position_mm == before.position_mm);
+  CHECK(length(after.force_n) < 0.1 * length(before.force_n));  // fades in again
+  for (int ms = 0; ms < 30; ++ms) static_cast<void>(servo->step({}));
+  glitch = arm.at(0, 0.3, 0);
+  glitch.docked = true;
+  CHECK(servo->step(glitch).fault == Fault::stale_input);
+  CHECK_FALSE(servo->step(arm.at(0, 0.3, 0)).motors_on);
+}
+
+TEST_CASE("a stylus that moves while the docked bit is set is not calibrated") {
+  Scene scene = half_space_scene();
+  const auto servo = kerf::compile(scene);
+  FakeArm arm;
+  for (int tick = 0; tick < 100; ++tick) {
+    auto report = arm.at(0, -30 + tick * 0.5, 0);
+    report.docked = true;
+    CHECK(servo->step(report).phase == Phase::calibrating);
+  }
+}
+
+TEST_CASE("after a stall the force starts again from nothing") {
+  Scene scene = half_space_scene();
+  scene.force.p0_n_per_mm2 = 50;
+  const auto servo = kerf::compile(scene);
+  FakeArm arm;
+  arm_at(*servo, arm, 0, 5, 0);
+  REQUIRE(length(settled(*servo, arm, 0, 0.3, 0).force_n) > 3);
+  servo->apply({.kind = kerf::ServoCommand::Kind::fade_in});
+  double last_n = 0;
+  for (int tick = 0; tick < 20; ++tick) {
+    const double force_n = length(servo->step(arm.at(0, 0.3, 0)).force_n);
+    CHECK(force_n <= last_n + 0.5 + 1e-4);
+    last_n = force_n;
+  }
+}
+
+TEST_CASE("a force beyond the motors keeps its direction, and what was sent is what is told") {
+  Scene scene = half_space_scene();
+  scene.force.p0_n_per_mm2 = 50;
+  scene.device.torque_scale = std::array{0.01, 0.01, 0.01};  // the range ends at 20 N mm
+  const auto servo = kerf::compile(scene);
+  FakeArm arm;
+  arm_at(*servo, arm, 0, 5, 0);
+  const ServoOutput out = settled(*servo, arm, 0.2, 0.3, 0.2);
+  CHECK(out.saturated);
+  CHECK(length(out.force_n) < 1);
+  int largest = 0;
+  for (std::size_t i = 0; i < 3; ++i) {
+    largest = std::max(largest, std::abs(int{out.motor_counts[i]}));
+    CHECK(out.motor_counts[i] * 0.01 == doctest::Approx(out.torque_n_mm[i]).epsilon(0.01));
+  }
+  CHECK(largest == 2047);
+}
+
+TEST_CASE("a force that is not finite ends the motors at once") {
+  Scene scene = half_space_scene();
+  scene.servo.numeric = NumericKind::float64;
+  scene.force.p0_n_per_mm2 = std::numeric_limits<double>::quiet_NaN();
+  const auto servo = kerf::compile(scene);
+  FakeArm arm;
+  arm_at(*servo, arm, 0, 5, 0);
+  const ServoOutput out = settled(*servo, arm, 0, 0.3, 0);
+  CHECK(out.fault == Fault::not_finite);
+  CHECK_FALSE(out.motors_on);
+  CHECK(out.motor_counts == std::array<std::int16_t, 3>{});
+}
+
+TEST_CASE("voxels too fine for fixed point are refused, not felt wrongly") {
+  Scene scene = half_space_scene(16);
+  scene.volumes[0].image.spacing_mm = {0.004, 0.004, 0.004};
+  CHECK_THROWS_WITH_AS(kerf::compile(scene), doctest::Contains("resample"), kerf::SceneError);
+}
+
 TEST_CASE("faster than 10 m/s: motors off in the same tick") {
   Scene scene = half_space_scene();
   const auto servo = kerf::compile(scene);
@@ -296,6 +381,9 @@ TEST_CASE("ten seconds of cutting never touch the heap") {
   const auto servo = kerf::compile(scene);
   FakeArm arm;
   arm_at(*servo, arm, 0, 5, 0);
+#ifdef KERF_SANITIZED
+  MESSAGE("skipped under sanitizers: the allocation counter");
+#endif
   const std::uint64_t before = kerf::CountedAllocations::total();
   double sum_n = 0;
   {

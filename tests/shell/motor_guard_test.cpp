@@ -11,6 +11,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "controller/shell/stop_signals.hpp"
 #include "shared/wire/omni_packet.hpp"
 
 namespace {
@@ -41,9 +42,10 @@ kerf::OmniCommand last_command_of(WayOut way_out) {
     close(ends[0]);
     PairPort port(ends[1]);
     kerf::OmniDriver driver(port);
-    std::atomic<bool> stop{false};
+    std::atomic<bool>& stop = kerf::catch_stop_signals();
     try {
-      const kerf::MotorGuard guard(driver, stop);
+      kerf::MotorGuard guard(driver);
+      guard.guard_stack();
       kerf::ServoOutput output;
       output.motor_counts = {500, 500, 500};
       output.motors_on = true;
@@ -76,14 +78,14 @@ TEST_CASE("motors are off after return, exception, signal and crash") {
   const kerf::OmniCommand neutral{};
   CHECK(last_command_of([](auto&) {}) == neutral);
   CHECK(last_command_of([](auto&) { throw std::runtime_error("edge"); }) == neutral);
-  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGTSTP}) {
     CHECK(last_command_of([signal](std::atomic<bool>& stop) {
             std::raise(signal);
             if (!stop) _exit(3);  // without the guard's packet the check fails
           }) == neutral);
   }
 #ifndef KERF_SANITIZED  // sanitizers take these signals for themselves
-  for (const int signal : {SIGSEGV, SIGABRT, SIGFPE}) {
+  for (const int signal : {SIGSEGV, SIGABRT, SIGFPE, SIGUSR1, SIGSYS}) {
     CHECK(last_command_of([signal](auto&) { std::raise(signal); }) == neutral);
   }
 #endif

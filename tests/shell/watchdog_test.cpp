@@ -26,8 +26,9 @@ constexpr std::int64_t kMs = 1'000'000;
 
 TEST_CASE("a servo that stands still for 20 ms loses its motors, once per stall") {
   CountingPort port;
-  const kerf::OmniDriver driver(port);
-  kerf::LoopSignals signals;
+  kerf::OmniDriver driver(port);
+  std::atomic<bool> stop{false};
+  kerf::LoopSignals signals{stop};
   kerf::Watchdog watchdog(driver, signals);
   std::int64_t now = 0;
   watchdog.look(now += 1000 * kMs);  // not started yet: nothing to watch

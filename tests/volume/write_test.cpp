@@ -6,10 +6,10 @@
 #include <rapidcheck.h>
 #include <sys/resource.h>
 
-#include "controller/scene/new_file.hpp"
 #include "controller/scene/scene_error.hpp"
 #include "controller/scene/volume_density.hpp"
 #include "controller/scene/volume_write.hpp"
+#include "shared/posix/new_file.hpp"
 #include "tests/volume/volume_files.hpp"
 
 using namespace kerf;
@@ -129,7 +129,7 @@ TEST_CASE("a full disk leaves the old volume as it was and nothing else") {
     try {
       write_volume(large, path, encoding);
       FAIL("written");
-    } catch (const SceneError& error) {
+    } catch (const FileError& error) {
       CHECK(is_one_line(error.what()));
       CHECK(std::string(error.what()).find("cannot be written") != std::string::npos);
     }
@@ -141,7 +141,7 @@ TEST_CASE("a full disk leaves the old volume as it was and nothing else") {
 TEST_CASE("a folder that is not there and a name of another kind are refused") {
   const TempFolder folder;
   CHECK_THROWS_WITH_AS(write_volume(noise(kSmall), folder / "none/a.nrrd"),
-                       doctest::Contains("cannot be written"), SceneError);
+                       doctest::Contains("cannot be written"), FileError);
   CHECK_THROWS_WITH_AS(write_volume(noise(kSmall), folder / "a.nii"),
                        doctest::Contains(".nrrd only"), SceneError);
   CHECK(files_in(folder) == 0);
