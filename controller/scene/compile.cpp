@@ -7,10 +7,14 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "controller/kernel/aligned_kernels.hpp"
+#include "controller/scene/aligned_tool.hpp"
 #include "controller/scene/scene_error.hpp"
 #include "controller/scene/scene_place.hpp"
 #include "controller/servo/servo_step.hpp"
@@ -57,21 +61,40 @@ typename N::Step step_of(double voxels) {
   }
 }
 
-/// Newtons per unit of the exact sum, as the loop's numbers hold it. `terms` bounds the number of
-/// weights of one in the sum.
+/// What an exact integer sum holds.
+struct SumUnit {
+  double steps;    ///< density steps per voxel edge in one unit
+  double largest;  ///< bound of the sum, in units
+};
+
+/// Sums of stored gradients times weights of 2^15; `terms` bounds the number of full weights.
+SumUnit gathered_sum(double terms) {
+  return {std::ldexp(1.0, -15), std::ldexp(std::max(terms, 1.0), 30)};
+}
+
+/// Contact sums of the plan `aligned` have 8 kept bits, its modification sums exact gradients.
+SumUnit aligned_contact_unit(double samples) {
+  return {std::ldexp(1.0, -kAlignedKeptBits),
+          std::ldexp(std::max(samples, 1.0), 15 + kAlignedKeptBits)};
+}
+SumUnit aligned_modification_unit(const AlignedTaps& taps, double samples) {
+  return {std::ldexp(taps.factor, -taps.shift - 15),
+          std::ldexp(samples * static_cast<double>(kMaxExactGradient), 15)};
+}
+
+/// Newtons per unit of an exact sum, as the loop's numbers hold it.
 template <class N>
-SumToForce<N> sum_to_force(const Matrix& newtons_per_step, double terms) {
+SumToForce<N> sum_to_force(const Matrix& newtons_per_step, const SumUnit& sum) {
   SumToForce<N> map;
   if constexpr (N::kIsFixed) {
-    // Largest sum: `terms` weights of 2^15 on gradients of 2^15; 38 bits of it are kept.
-    const int sum_bits = static_cast<int>(std::ceil(std::log2(std::max(terms, 1.0)))) + 30;
-    map.pre_shift = std::max(0, sum_bits - 38);
+    // 38 bits of the largest sum are kept.
+    map.pre_shift = std::max(0, static_cast<int>(std::ceil(std::log2(sum.largest))) - 38);
     double largest = 0;
     for (const auto& row : newtons_per_step) {
       for (const double value : row) largest = std::max(largest, std::abs(value));
     }
     // The kept sum times `scaled` is the force in steps of 2^-16 N.
-    const double unit = std::ldexp(1.0, map.pre_shift - 15 + 16);
+    const double unit = std::ldexp(sum.steps, map.pre_shift + 16);
     constexpr double kMantissaMax = 4194303;  // 22 bits
     constexpr int kMaxShift = 61;
     map.post_shift =
@@ -103,6 +126,7 @@ class CompiledScene final : public Servo {
     plan_device(scene);
     plan_limits(scene);
     plan_.kernel = scene.servo.kernel;
+    plan_.aligned_kernels = *aligned_kernels();
     plan_.cutting = scene.cut.model != CutModel::none;
     plan_.removal_rate = removal_rate<N>(scene.cut.rate_per_s / scene.servo.rate_hz,
                                          scene.cut.model == CutModel::overlap_exact);
@@ -211,17 +235,43 @@ class CompiledScene final : public Servo {
       offsets_.push_back(std::move(tool.offsets));
       plan_.tools[t].offsets = offsets_.back();
       plan_.tools[t].round = tool.round;
+      const AlignedTable* const table = aligned_table(scene, tool, offsets_.back());
       for (std::size_t v = 0; v < plan_.volume_count; ++v) {
         plan_.tools[t].in_volume[v] =
             tool_in_volume(scene, tool, scene.volumes[plan_.volumes[v].scene_index],
-                           static_cast<double>(offsets_.back().size()));
+                           static_cast<double>(offsets_.back().size()), table);
       }
     }
     state_.active_tool = static_cast<std::uint32_t>(scene.active_tool);
   }
 
+  /// The tool's table for the plan `aligned`, made once where some volume can use it; else nullptr.
+  const AlignedTable* aligned_table(const Scene& scene, const SceneTool& tool,
+                                    std::span<const ToolOffset> offsets) {
+    const AlignedTaps* const taps = aligned_taps(scene.servo.kernel);
+    const bool possible = N::kIsFixed && tool.round && taps != nullptr &&
+                          (!plan_.cutting || offsets.size() <= kMaxAlignedCutSamples) &&
+                          std::any_of(scene.volumes.begin(), scene.volumes.end(),
+                                      [&](const SceneVolume& volume) {
+                                        return volume.solid && same_lattice(tool, volume);
+                                      }) &&
+                          can_align(offsets);
+    if (!possible) return nullptr;
+    aligned_.push_back(std::make_unique<AlignedTool>(offsets, *taps, *plan_.aligned_kernels));
+    aligned_memory_.hold(aligned_.back()->table().size, plan_.cutting);
+    return &aligned_.back()->table();
+  }
+
+  /// Tool pitch and voxel are the same to the loop's last bit.
+  static bool same_lattice(const SceneTool& tool, const SceneVolume& volume) {
+    const auto& h = volume.image.spacing_mm;
+    return std::all_of(h.begin(), h.end(),
+                       [&](double mm) { return step_of<N>(tool.pitch_mm / mm) == N::kStepOne; });
+  }
+
   static ToolInVolume<N> tool_in_volume(const Scene& scene, const SceneTool& tool,
-                                        const SceneVolume& volume, double samples) {
+                                        const SceneVolume& volume, double samples,
+                                        const AlignedTable* table) {
     const auto& h = volume.image.spacing_mm;
     const double a = tool.pitch_mm;
     const double voxel_mm3 = h[0] * h[1] * h[2];
@@ -242,9 +292,15 @@ class CompiledScene final : public Servo {
       }
       return m;
     };
-    in.contact = sum_to_force<N>(newtons(scene.force.p0_n_per_mm2 * a * a * a), samples);
+    if (table != nullptr && same_lattice(tool, volume)) in.aligned = table;
+    in.contact = sum_to_force<N>(
+        newtons(scene.force.p0_n_per_mm2 * a * a * a),
+        in.aligned != nullptr ? aligned_contact_unit(samples) : gathered_sum(samples));
     // Each voxel counts at most once, and the tool touches at most eight voxels per sample.
-    in.modification = sum_to_force<N>(newtons(scene.cut.p1_n_per_mm2 * voxel_mm3), 8 * samples);
+    in.modification =
+        sum_to_force<N>(newtons(scene.cut.p1_n_per_mm2 * voxel_mm3),
+                        in.aligned != nullptr ? aligned_modification_unit(in.aligned->taps, samples)
+                                              : gathered_sum(8 * samples));
     return in;
   }
 
@@ -259,23 +315,33 @@ class CompiledScene final : public Servo {
     std::size_t overlap_voxels = 0;
     for (std::size_t v = 0; v < plan_.volume_count; ++v) {
       const SceneVolume& volume = scene.volumes[plan_.volumes[v].scene_index];
-      std::size_t width = 0;
-      for (const SceneTool& tool : scene.tools) {
+      std::size_t lanes = 0;
+      bool gathered = false;  // by any tool
+      for (std::size_t t = 0; t < scene.tools.size(); ++t) {
+        if (const AlignedTable* const table = plan_.tools[t].in_volume[v].aligned) {
+          lanes = std::max(lanes, static_cast<std::size_t>(table->row_lanes));
+          continue;
+        }
+        const SceneTool& tool = scene.tools[t];
         const auto& h = volume.image.spacing_mm;
-        width = std::max(width, overlap_width(tool.size_vox, tool.pitch_mm, h[0]));
+        gathered = true;
+        lanes = std::max(lanes, removal_lanes(overlap_width(tool.size_vox, tool.pitch_mm, h[0])));
         overlap_voxels =
             std::max(overlap_voxels, overlap_capacity(tool.size_vox, tool.pitch_mm, h));
       }
-      gradients_[v].resize(volume.image.grid.voxel_count());
-      if (plan_.cutting) carries_[v].resize(removal_lanes(width));
       auto& density = densities_[plan_.volumes[v].scene_index];
+      if (plan_.cutting) carries_[v].resize(lanes);
+      if (gathered) {
+        gradients_[v].resize(volume.image.grid.voxel_count());
+        refresh_gradients<N>(plan_.kernel, plan_.volumes[v].grid, density,
+                             plan_.volumes[v].grid.box(), gradients_[v], gradient_scratch_);
+      }
       state_.volumes[v] = {density, gradients_[v], carries_[v]};
-      refresh_gradients<N>(plan_.kernel, plan_.volumes[v].grid, density,
-                           plan_.volumes[v].grid.box(), gradients_[v], gradient_scratch_);
     }
     if (plan_.cutting) overlap_.resize(overlap_voxels);
     state_.overlap.memory = overlap_;
     state_.gradient_scratch = &gradient_scratch_;
+    state_.aligned_scratch = aligned_memory_.view();
   }
 
   ServoPlan<N> plan_;
@@ -287,6 +353,8 @@ class CompiledScene final : public Servo {
   std::vector<std::vector<RemovalCarry<N>>> carries_;
   std::vector<typename N::Weight> overlap_;
   GradientScratch gradient_scratch_;
+  std::vector<std::unique_ptr<AlignedTool>> aligned_;
+  AlignedMemory aligned_memory_;
 };
 
 }  // namespace

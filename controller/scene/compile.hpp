@@ -12,9 +12,10 @@ namespace kerf {
 /// that the scene asks for.
 ///
 /// Takes the volumes' densities and the tools' offsets over (they are empty in the scene
-/// afterwards) and computes the gradient field of each solid volume. Nothing is allocated after
-/// this. Throws SceneError for a scene that the loop cannot hold: no solid volume, a voxel or a
-/// step outside the number formats.
+/// afterwards). A tool that the plan `aligned` can hold gets its tables; a solid volume gets a
+/// gradient field if any other tool may touch it. Nothing is allocated after this. Throws
+/// SceneError for a scene that the loop cannot hold: no solid volume, a voxel or a step outside the
+/// number formats.
 [[nodiscard]] std::unique_ptr<Servo> compile(Scene& scene);
 
 }  // namespace kerf

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <span>
 
+#include "controller/kernel/aligned_kernels.hpp"
 #include "controller/kernel/gradient.hpp"
 #include "controller/kernel/milling.hpp"
 #include "controller/kernel/tool_offset.hpp"
@@ -41,6 +42,9 @@ struct ToolInVolume {
   Transform<typename N::Ratio, VoxelSpace, WorldSpace> voxel_from_pitch;
   std::array<std::array<typename N::Step, 3>, 3> unrotated_step{};  ///< for round tools
   typename N::Step overlap_ratio{};                                 ///< a^3 / V_voxel
+  /// Plan `aligned` where set: no gradients are stored for it, and the two maps below take its
+  /// sums. Else plan `gather`. Fixed point only.
+  const AlignedTable* aligned = nullptr;
   SumToForce<N> contact;       ///< F_c = -p0 a^3 grad: haptics-science 1.1, times workspace scale
   SumToForce<N> modification;  ///< F_m = -p1 V_voxel SUM r grad, times workspace scale
 };
@@ -61,6 +65,7 @@ struct ServoPlan {
   std::array<ToolPlan<N>, kMaxTools> tools{};
 
   GradientKernel kernel = GradientKernel::farid;
+  const AlignedKernels* aligned_kernels = nullptr;  ///< what this machine runs the plan with
   bool cutting = false;
   RemovalRate<N> removal_rate;
 

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <span>
 
+#include "controller/kernel/aligned_table.hpp"
 #include "controller/kernel/gradient.hpp"
 #include "controller/kernel/milling.hpp"
 #include "controller/servo/force_limits.hpp"
@@ -20,7 +21,7 @@ namespace kerf {
 template <class N>
 struct VolumeState {
   std::span<Density> density;
-  std::span<Gradient<N>> gradient;
+  std::span<Gradient<N>> gradient;   ///< empty where every tool is aligned
   std::span<RemovalCarry<N>> carry;  ///< fractions of density steps still owed
 };
 
@@ -49,6 +50,7 @@ struct ServoState {
   std::array<VolumeState<N>, kMaxVolumes> volumes{};
   OverlapBox<N> overlap;  ///< scratch of one tick, as is the next
   GradientScratch* gradient_scratch = nullptr;
+  AlignedScratch aligned_scratch;
 
   Supervisor supervisor;
   EncoderState encoders;

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "controller/kernel/aligned.hpp"
 #include "controller/kernel/contact.hpp"
 #include "controller/kernel/gradient.hpp"
 #include "controller/kernel/milling.hpp"
@@ -53,6 +54,32 @@ template <class N>
   return pose;
 }
 
+/// One volume by the plan `aligned`: contact, then the modification force and the removal where
+/// the plan cuts. Stored gradients exist only for other tools; they follow the cut.
+inline void feel_and_cut_aligned(const ServoPlan<FixedNumbers>& plan,
+                                 ServoState<FixedNumbers>& state, std::size_t v,
+                                 const ToolPose<FixedNumbers>& pose,
+                                 ToolForces<FixedNumbers>& forces) noexcept {
+  const VolumePlan<FixedNumbers>& volume = plan.volumes[v];
+  VolumeState<FixedNumbers>& memory = state.volumes[v];
+  const ToolInVolume<FixedNumbers>& in_volume = plan.tools[state.active_tool].in_volume[v];
+  const AlignedTick tick(*plan.aligned_kernels, *in_volume.aligned, state.aligned_scratch,
+                         volume.grid, memory.density, pose);
+  forces.contact_n =
+      forces.contact_n - force_of_sum<FixedNumbers>(in_volume.contact, tick.contact());
+  if (!plan.cutting) return;
+
+  const AlignedTick::Milled milled = tick.mill(plan.removal_rate, memory.carry);
+  forces.modification_n = forces.modification_n -
+                          force_of_sum<FixedNumbers>(in_volume.modification, milled.modification);
+  if (!memory.gradient.empty()) {
+    refresh_gradients<FixedNumbers>(plan.kernel, volume.grid, memory.density,
+                                    milled.removed.changed, memory.gradient,
+                                    *state.gradient_scratch);
+  }
+  forces.removed[volume.scene_index] = milled.removed;
+}
+
 /// Contact force of the active tool in all solid volumes as they are; then, where the plan cuts,
 /// the modification force from the same densities, and only then the removal.
 template <class N>
@@ -66,6 +93,12 @@ template <class N>
     VolumeState<N>& memory = state.volumes[v];
     const ToolInVolume<N>& in_volume = tool.in_volume[v];
     const ToolPose<N> pose = tool_pose(volume, tool, in_volume, tip_mm, rotation);
+    if constexpr (N::kIsFixed) {
+      if (in_volume.aligned != nullptr) {
+        feel_and_cut_aligned(plan, state, v, pose, forces);
+        continue;
+      }
+    }
 
     const std::span<const Gradient<N>> gradient = memory.gradient;
     forces.contact_n = forces.contact_n -

@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "controller/kernel/aligned_corner.hpp"
+#include "controller/kernel/aligned_kernels.hpp"
+#include "controller/kernel/milling.hpp"
+#include "controller/kernel/tool_pose.hpp"
+#include "controller/kernel/trilinear.hpp"
+
+namespace kerf {
+
+/// One tick of the plan `aligned` on one volume: `contact` first, then `mill` of the same place.
+///
+/// Gives the bits of aligned_reference.hpp, overlap.hpp and milling.hpp, whatever the kernels. Work
+/// is bounded by the tool's box and does not depend on pose or content. Servo thread; no heap.
+class AlignedTick {
+ public:
+  /// `table` was made for `kernels`; `scratch` has at least the table's sizes. The tool must be
+  /// unrotated: only `pose.centre_vox` is used.
+  AlignedTick(const AlignedKernels& kernels, const AlignedTable& table,
+              const AlignedScratch& scratch, const VoxelGrid& grid, std::span<Density> density,
+              const ToolPose<FixedNumbers>& pose) noexcept
+      : kernels_(kernels), table_(table), scratch_(scratch), grid_(grid), density_(density) {
+    const auto lowest = [](Q16 centre, std::int16_t low) {
+      constexpr std::int64_t kLimit = std::int64_t{kPositionLimitVox} << Q16::kFractionBits;
+      const std::int64_t place = centre.raw() + low * (std::int64_t{1} << 15);
+      return Q16::from_raw(static_cast<std::int32_t>(std::clamp(place, -kLimit, kLimit)));
+    };
+    const Cell<FixedNumbers> cell = cell_at<FixedNumbers>(
+        {lowest(pose.centre_vox.x, table.low[0]), lowest(pose.centre_vox.y, table.low[1]),
+         lowest(pose.centre_vox.z, table.low[2])});
+    weight_ = cell.weight;
+    origin_ = {cell.low.x - kGradientReach, cell.low.y - kGradientReach,
+               cell.low.z - kGradientReach};
+    const VoxelBox box{origin_,
+                       {origin_.x + table.box.x, origin_.y + table.box.y, origin_.z + table.box.z}};
+    outside_ = box.clipped(grid.box()).empty();
+    if (!outside_) kernels.copy_box(table, grid, density.data(), origin_, scratch);
+  }
+
+  /// `aligned_contact_sum`: in density steps per voxel times 2^8.
+  [[nodiscard]] SumVec<FixedNumbers> contact() const noexcept {
+    if (outside_) return {};
+    std::int64_t sum[3][8];
+    kernels_.correlate(table_, scratch_.box, sum);
+    const auto blended = [&](const std::int64_t(&axis)[8]) {
+      std::array<std::int64_t, 8> corner{};
+      for (std::size_t c = 0; c < 8; ++c) {
+        corner[c] = kept_bits(table_.taps, axis[c]);
+      }
+      return trilinear<FixedNumbers, std::int64_t>(corner, weight_);
+    };
+    return {blended(sum[0]), blended(sum[1]), blended(sum[2])};
+  }
+
+  struct Milled {
+    SumVec<FixedNumbers> modification;  ///< `aligned_modification_sum`
+    Removed removed;
+  };
+
+  /// The modification sum, then the removal. `carry` has at least `table.row_lanes` entries; with
+  /// fewer nothing is cut or felt.
+  [[nodiscard]] Milled mill(const RemovalRate<FixedNumbers>& rate,
+                            std::span<std::uint16_t> carry) const noexcept {
+    Milled milled;
+    if (outside_ || carry.size() < static_cast<std::size_t>(table_.row_lanes)) return milled;
+    const TrilinearWeights<FixedNumbers> corner = trilinear_weights<FixedNumbers>(weight_);
+    std::int32_t weights[8];
+    std::copy(corner.begin(), corner.end(), weights);
+    std::int64_t sum[3];
+    kernels_.press(table_, weights, scratch_, sum);
+    milled.modification = {sum[0], sum[1], sum[2]};
+    if (rate.mantissa == 0) return milled;
+    if (rate.bent) bend_ratios(rate);
+    const AlignedCut cut =
+        kernels_.cut(table_, {static_cast<std::uint16_t>(rate.mantissa), rate.exponent}, grid_,
+                     density_.data(), origin_, scratch_, carry.data());
+    milled.removed.density_steps = cut.density_steps;
+    if (cut.density_steps != 0) {
+      milled.removed.changed = {
+          {origin_.x + cut.lo.x, origin_.y + cut.lo.y, origin_.z + cut.lo.z},
+          {origin_.x + cut.hi.x + 1, origin_.y + cut.hi.y + 1, origin_.z + cut.hi.z + 1}};
+    }
+    return milled;
+  }
+
+ private:
+  /// The exact form of the removal rate, entry by entry: it is a table look-up.
+  void bend_ratios(const RemovalRate<FixedNumbers>& rate) const noexcept {
+    std::int16_t* ratio = scratch_.ratio + kRatioRowPad;
+    const std::int32_t rows = (table_.size.y + 1) * (table_.size.z + 1);
+    for (std::int32_t row = 0; row < rows; ++row, ratio += table_.row_lanes + kRatioRowPad) {
+      if (scratch_.live[row] == 0) continue;
+      for (std::int32_t x = 2; x <= table_.size.x + 2; ++x) {
+        ratio[x] = static_cast<std::int16_t>(-bent_ratio(rate, std::int32_t{-ratio[x]}));
+      }
+    }
+  }
+
+  const AlignedKernels& kernels_;
+  const AlignedTable& table_;
+  const AlignedScratch& scratch_;
+  const VoxelGrid& grid_;
+  std::span<Density> density_;
+  VoxelIndex origin_;  ///< low corner of the box
+  VoxelVec<FixedNumbers::Weight> weight_;
+  bool outside_ = false;
+};
+
+}  // namespace kerf

@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: Apache-2.0
+// AVX2: 16 densities at a time.
+#include <cstddef>
+#include <cstdint>
+
+#include <immintrin.h>
+
+namespace kerf {
+namespace {
+
+struct Simd {
+  using V = __m256i;
+  static constexpr int kLanes = 16;
+
+  static V load(const void* p) noexcept {
+    return _mm256_loadu_si256(static_cast<const __m256i*>(p));
+  }
+  static void store(void* p, V a) noexcept { _mm256_storeu_si256(static_cast<__m256i*>(p), a); }
+  static V zero() noexcept { return _mm256_setzero_si256(); }
+  static V set16(int a) noexcept { return _mm256_set1_epi16(static_cast<short>(a)); }
+  static V set32(int a) noexcept { return _mm256_set1_epi32(a); }
+  static V pair16(int a, int b) noexcept { return set32((a & 0xffff) | b * 65536); }
+
+  /// sum += a0 b0 + a1 b1 in each 32 bits. As text: around the intrinsics, g++ 12 spills a sum,
+  /// and its way through memory then sets the pace of the loop.
+  static void multiply_add(V& sum, V a, V b) noexcept {
+    V product;
+    __asm__("vpmaddwd %3, %2, %1\n\tvpaddd %1, %0, %0"
+            : "+x"(sum), "=&x"(product)
+            : "x"(a), "x"(b));
+  }
+  static V multiply_even(V a, V b) noexcept { return _mm256_mul_epi32(a, b); }
+  static V odd32(V a) noexcept { return _mm256_srli_epi64(a, 32); }
+  static V multiply32(V a, V b) noexcept { return _mm256_mullo_epi32(a, b); }
+  static V multiply_high(V a, V b) noexcept { return _mm256_mulhi_epu16(a, b); }
+  static V multiply_low(V a, V b) noexcept { return _mm256_mullo_epi16(a, b); }
+
+  static V add16(V a, V b) noexcept { return _mm256_add_epi16(a, b); }
+  static V sub16(V a, V b) noexcept { return _mm256_sub_epi16(a, b); }
+  static V add32(V a, V b) noexcept { return _mm256_add_epi32(a, b); }
+  static V sub32(V a, V b) noexcept { return _mm256_sub_epi32(a, b); }
+  static V add64(V a, V b) noexcept { return _mm256_add_epi64(a, b); }
+  static V times512(V a) noexcept { return _mm256_slli_epi64(a, 9); }
+  static V shift_left16(V a, int n) noexcept { return _mm256_sll_epi16(a, _mm_cvtsi32_si128(n)); }
+  static V shift_right16(V a, int n) noexcept { return _mm256_srl_epi16(a, _mm_cvtsi32_si128(n)); }
+  static V bit_and(V a, V b) noexcept { return _mm256_and_si256(a, b); }
+  static V bit_or(V a, V b) noexcept { return _mm256_or_si256(a, b); }
+  static V bit_xor(V a, V b) noexcept { return _mm256_xor_si256(a, b); }
+  static V unpack_low(V a, V b) noexcept { return _mm256_unpacklo_epi16(a, b); }
+  static V unpack_high(V a, V b) noexcept { return _mm256_unpackhi_epi16(a, b); }
+
+  static V add_where(V sum, std::uint32_t bits, V w) noexcept {
+    const V own = _mm256_setr_epi16(1, 2, 4, 8, 16, 32, 64, 128, 256, 512, 1024, 2048, 4096, 8192,
+                                    16384, -32768);
+    const V chosen = _mm256_cmpeq_epi16(bit_and(set16(static_cast<int>(bits)), own), own);
+    return add16(sum, bit_and(w, chosen));
+  }
+  static V zero_where_equal(V kept, V a, V b) noexcept {
+    return _mm256_andnot_si256(_mm256_cmpeq_epi16(a, b), kept);
+  }
+  static std::uint32_t not_zero16(V a) noexcept {
+    const V empty = _mm256_cmpeq_epi16(a, zero());
+    const V bytes = _mm256_permute4x64_epi64(_mm256_packs_epi16(empty, zero()), 0xd8);
+    return ~static_cast<std::uint32_t>(_mm256_movemask_epi8(bytes)) & 0xffff;
+  }
+  /// `high` plus the carry out of `part` + something = `sum`.
+  static V add_carry(V high, V sum, V part) noexcept {
+    const V no_carry = _mm256_cmpeq_epi16(_mm256_max_epu16(sum, part), sum);
+    return add16(high, _mm256_andnot_si256(no_carry, set16(1)));
+  }
+  /// Sums of entries i and i + 4 as 64 bits.
+  static V widened(V a) noexcept {
+    return add64(_mm256_cvtepi32_epi64(_mm256_castsi256_si128(a)),
+                 _mm256_cvtepi32_epi64(_mm256_extracti128_si256(a, 1)));
+  }
+  static std::int64_t sum64(V a) noexcept {
+    alignas(32) std::int64_t part[4];
+    store(part, a);
+    return part[0] + part[1] + part[2] + part[3];
+  }
+
+  /// density[begin + i] -= loss_i, as a whole vector: the entries that lose nothing, beyond the
+  /// tool's box or in the next row, are written back as they are. The box cannot tell them, so its
+  /// `rho` is of no use. Near the ends of the volume's memory one by one.
+  static void write_loss(std::uint16_t* density, std::ptrdiff_t begin, std::ptrdiff_t count,
+                         V /*rho*/, V loss, std::uint32_t lost) noexcept {
+    if (begin >= 0 && begin + kLanes <= count) {
+      store(density + begin, sub16(load(density + begin), loss));
+      return;
+    }
+    alignas(32) std::uint16_t entry[kLanes];
+    store(entry, loss);
+    for (; lost != 0; lost &= lost - 1) {
+      const int i = __builtin_ctz(lost);
+      density[begin + i] = static_cast<std::uint16_t>(density[begin + i] - entry[i]);
+    }
+  }
+};
+
+}  // namespace
+}  // namespace kerf
+
+#include "controller/kernel/aligned_vector.hpp"
+
+namespace kerf {
+
+const AlignedKernels kAlignedAvx2{"avx2", Simd::kLanes, false, copy_box, correlate, press, cut};
+
+}  // namespace kerf

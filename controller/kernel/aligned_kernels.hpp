@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "controller/kernel/aligned_table.hpp"
+#include "shared/volume/voxel_grid.hpp"
+
+namespace kerf {
+
+/// The part of a removal rate that a kernel needs: mantissa 2^-(15 + exponent).
+struct AlignedRate {
+  std::uint16_t mantissa;
+  std::int32_t exponent;  ///< 0..32
+};
+
+/// What one cut took; `lo` and `hi` (last one included) are box entries, meaningless when 0 steps.
+struct AlignedCut {
+  std::uint64_t density_steps;
+  VoxelIndex lo, hi;
+};
+
+/// The four stages of a tick for one instruction set. All sets give the same bits.
+///
+/// Plain pointers and plain structs: these functions are compiled with instructions that other
+/// machines lack, so nothing that the linker could share with other files may be inlined here.
+struct AlignedKernels {
+  const char* name;
+  std::int32_t lanes;  ///< the width that tables are made for
+  bool can_fuse;       ///< has registers for three axes at a time
+  /// Copies the box at `origin`; densities outside the volume are 0.
+  void (*copy_box)(const AlignedTable&, const VoxelGrid&, const Density*, VoxelIndex origin,
+                   const AlignedScratch&) noexcept;
+  /// Exact sums by axis and corner 4 k + 2 j + i.
+  void (*correlate)(const AlignedTable&, const std::int16_t* box,
+                    std::int64_t (&sum)[3][8]) noexcept;
+  /// Overlap ratios of all rows where there is density, and the exact modification sum.
+  void (*press)(const AlignedTable&, const std::int32_t (&weight)[8], const AlignedScratch&,
+                std::int64_t (&sum)[3]) noexcept;
+  /// Takes from the volume what the ratios say; `carry` has row_lanes entries.
+  AlignedCut (*cut)(const AlignedTable&, const AlignedRate&, const VoxelGrid&, Density*,
+                    VoxelIndex origin, const AlignedScratch&, std::uint16_t* carry) noexcept;
+};
+
+extern const AlignedKernels kAlignedScalar;
+#if defined(KERF_X86_KERNELS)
+extern const AlignedKernels kAlignedAvx2;
+extern const AlignedKernels kAlignedAvx512;
+#endif
+
+/// Kernels that this machine can run, the fastest first; ends with nullptr, holds at least one.
+/// Load time.
+[[nodiscard]] const AlignedKernels* const* aligned_kernels() noexcept;
+
+}  // namespace kerf

@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "controller/kernel/aligned_corner.hpp"
+#include "controller/kernel/aligned_table.hpp"
+#include "controller/kernel/gradient.hpp"
+#include "controller/kernel/overlap.hpp"
+#include "controller/kernel/tool_pose.hpp"
+#include "controller/kernel/trilinear.hpp"
+
+namespace kerf {
+
+// The plan `aligned` by its definition, without tables: what every fast path must equal bit for
+// bit. Overlap and removal are those of overlap.hpp and milling.hpp. Fixed point only.
+
+/// The exact tap sum of a voxel, inside or outside the volume (density outside is 0): its gradient
+/// times 2^shift / factor. At most kMaxExactGradient.
+[[nodiscard]] constexpr SumVec<FixedNumbers> gradient_exact(const AlignedTaps& taps,
+                                                            const VoxelGrid& grid,
+                                                            std::span<const Density> density,
+                                                            VoxelIndex at) noexcept {
+  SumVec<FixedNumbers> sum{};
+  for (std::int32_t k = 0; k < 5; ++k) {
+    for (std::int32_t j = 0; j < 5; ++j) {
+      for (std::int32_t i = 0; i < 5; ++i) {
+        const VoxelIndex v{at.x + i - kGradientReach, at.y + j - kGradientReach,
+                           at.z + k - kGradientReach};
+        if (!grid.contains(v)) continue;
+        const auto a = static_cast<std::size_t>(i);
+        const auto b = static_cast<std::size_t>(j);
+        const auto c = static_cast<std::size_t>(k);
+        const std::int64_t rho = density[grid.index(v.x, v.y, v.z)];
+        sum.x += rho * taps.slope[a] * taps.smooth[b] * taps.smooth[c];
+        sum.y += rho * taps.smooth[a] * taps.slope[b] * taps.smooth[c];
+        sum.z += rho * taps.smooth[a] * taps.smooth[b] * taps.slope[c];
+      }
+    }
+  }
+  return sum;
+}
+
+/// SUM over samples of the interpolated gradient, in density steps per voxel times 2^8.
+///
+/// For each corner of the common cell the exact gradients of all samples are added up; 8 bits are
+/// kept of that sum (one rounding, half up), and three lerps blend the corners. `gradient_at` is
+/// `gradient_exact` or a cache of it.
+template <class GradientAt>
+[[nodiscard]] constexpr SumVec<FixedNumbers> aligned_contact_sum(
+    const AlignedTaps& taps, GradientAt&& gradient_at, std::span<const ToolOffset> offsets,
+    const ToolPose<FixedNumbers>& pose) noexcept {
+  using Corners = std::array<std::int64_t, 8>;
+  if (offsets.empty()) return {};
+  Corners x{}, y{}, z{};
+  for (const ToolOffset& offset : offsets) {
+    const VoxelIndex low = cell_at<FixedNumbers>(sample_position(pose, offset)).low;
+    for (std::size_t c = 0; c < 8; ++c) {
+      const auto bit = [&](std::size_t axis) { return static_cast<std::int32_t>(c >> axis & 1); };
+      const SumVec<FixedNumbers> g =
+          gradient_at(VoxelIndex{low.x + bit(0), low.y + bit(1), low.z + bit(2)});
+      x[c] += g.x;
+      y[c] += g.y;
+      z[c] += g.z;
+    }
+  }
+  const auto weight = cell_at<FixedNumbers>(sample_position(pose, offsets.front())).weight;
+  const auto blended = [&](Corners& corners) {
+    for (std::int64_t& sum : corners) sum = kept_bits(taps, sum);
+    return trilinear<FixedNumbers, std::int64_t>(corners, weight);
+  };
+  return {blended(x), blended(y), blended(z)};
+}
+
+/// SUM over voxels j with r_j > 0 and density > 0 of r_j times the exact gradient, in density steps
+/// per voxel times 2^15 * 2^shift / factor. The density is that from before the removal.
+template <class GradientAt>
+[[nodiscard]] constexpr SumVec<FixedNumbers> aligned_modification_sum(
+    GradientAt&& gradient_at, const VoxelGrid& grid, std::span<const Density> density,
+    const OverlapBox<FixedNumbers>& overlap) noexcept {
+  SumVec<FixedNumbers> sum{};
+  const VoxelBox box = overlap.box.clipped(grid.box());
+  for (std::int32_t z = box.lo.z; z < box.hi.z; ++z) {
+    for (std::int32_t y = box.lo.y; y < box.hi.y; ++y) {
+      for (std::int32_t x = box.lo.x; x < box.hi.x; ++x) {
+        const std::int64_t ratio = overlap.memory[overlap.at({x, y, z})];
+        if (ratio == 0 || density[grid.index(x, y, z)] == 0) continue;
+        sum = sum + ratio * gradient_at(VoxelIndex{x, y, z});
+      }
+    }
+  }
+  return sum;
+}
+
+}  // namespace kerf

@@ -1,0 +1,179 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <random>
+#include <span>
+#include <vector>
+
+#include "controller/kernel/aligned.hpp"
+#include "controller/kernel/aligned_reference.hpp"
+#include "controller/scene/aligned_tool.hpp"
+#include "tests/kernel/support.hpp"
+
+/// Volumes, tools and the two ways to compute one tick of the plan `aligned`.
+namespace kerf::test {
+
+/// Every voxel of a box.
+inline std::vector<ToolOffset> box_tool(int nx, int ny, int nz) {
+  std::vector<ToolOffset> offsets;
+  for (int z = 1 - nz; z < nz; z += 2) {
+    for (int y = 1 - ny; y < ny; y += 2) {
+      for (int x = 1 - nx; x < nx; x += 2) {
+        offsets.push_back({static_cast<std::int16_t>(x), static_cast<std::int16_t>(y),
+                           static_cast<std::int16_t>(z)});
+      }
+    }
+  }
+  return offsets;
+}
+
+/// About half the voxels of a box: full of holes, and not centred.
+inline std::vector<ToolOffset> ragged_tool(int nx, int ny, int nz, std::uint32_t seed) {
+  std::mt19937 random(seed);
+  std::vector<ToolOffset> offsets;
+  for (const ToolOffset& offset : box_tool(nx, ny, nz)) {
+    if ((random() & 1) != 0) offsets.push_back(offset);
+  }
+  return offsets;
+}
+
+inline constexpr int kFills = 12;
+
+/// Densities that hurt: empty, full, the finest patterns, single voxels, noise of several kinds.
+inline TestVolume hard_volume(VoxelGrid grid, int fill, std::uint32_t seed) {
+  std::mt19937 random(seed);
+  return made_of(grid, [&](std::int32_t x, std::int32_t y, std::int32_t z) -> Density {
+    const auto noise = static_cast<Density>(random() >> 16);
+    switch (fill) {
+      case 0:
+        return 0;
+      case 1:
+        return 65535;
+      case 2:
+        return (x + y + z) % 2 != 0 ? 65535 : 0;
+      case 3:
+        return noise;
+      case 4:
+        return noise > 32767 ? 65535 : 0;
+      case 5:
+        return x / 2 % 2 != 0 ? 65535 : 0;
+      case 6:
+        return z < grid.nz / 2 ? 65535 : 0;
+      case 7:
+        return noise % 5 == 0 ? noise : Density{0};
+      case 8:
+        return static_cast<Density>(x * 65535 / (grid.nx - 1));
+      case 9:
+        return x == grid.nx / 2 && y == grid.ny / 2 && z == grid.nz / 2 ? 65535 : 0;
+      case 10:
+        return 1;
+      default:
+        return y / 4 % 2 != 0 ? 65535 : 0;
+    }
+  });
+}
+
+/// `gradient_exact` of every voxel, and of those outside that the volume reaches.
+class ExactField {
+ public:
+  ExactField(const AlignedTaps& taps, const TestVolume& volume)
+      : grid_{volume.grid.nx + 4, volume.grid.ny + 4, volume.grid.nz + 4} {
+    values_.reserve(grid_.voxel_count());
+    for (std::int32_t z = -2; z < volume.grid.nz + 2; ++z) {
+      for (std::int32_t y = -2; y < volume.grid.ny + 2; ++y) {
+        for (std::int32_t x = -2; x < volume.grid.nx + 2; ++x) {
+          values_.push_back(gradient_exact(taps, volume.grid, volume.density, {x, y, z}));
+        }
+      }
+    }
+  }
+  SumVec<FixedNumbers> operator()(VoxelIndex v) const {
+    const VoxelIndex at{v.x + 2, v.y + 2, v.z + 2};
+    return grid_.contains(at) ? values_[grid_.index(at.x, at.y, at.z)] : SumVec<FixedNumbers>{};
+  }
+
+ private:
+  VoxelGrid grid_;
+  std::vector<SumVec<FixedNumbers>> values_;
+};
+
+/// All that one tick gives and changes.
+struct AlignedOutcome {
+  SumVec<FixedNumbers> contact, modification;
+  Removed removed;
+  std::vector<Density> density;
+  std::vector<std::uint16_t> carry;
+
+  friend bool operator==(const AlignedOutcome& a, const AlignedOutcome& b) {
+    return a.contact == b.contact && a.modification == b.modification &&
+           a.removed.density_steps == b.removed.density_steps &&
+           (a.removed.changed == b.removed.changed || a.removed.density_steps == 0) &&
+           a.density == b.density && a.carry == b.carry;
+  }
+};
+
+/// By the definitions.
+inline AlignedOutcome outcome_by_definition(const AlignedTaps& taps, const TestVolume& volume,
+                                            const ExactField& field,
+                                            std::span<const ToolOffset> tool,
+                                            const ToolPose<FixedNumbers>& pose,
+                                            const RemovalRate<FixedNumbers>& rate,
+                                            const std::vector<std::uint16_t>& carry,
+                                            OverlapBox<FixedNumbers>& scratch) {
+  AlignedOutcome out{{}, {}, {}, volume.density, carry};
+  out.contact = aligned_contact_sum(taps, field, tool, pose);
+  overlap<FixedNumbers>(volume.grid, tool, pose, FixedNumbers::kStepOne, scratch);
+  out.modification = aligned_modification_sum(field, volume.grid, volume.density, scratch);
+  out.removed = remove<FixedNumbers>(volume.grid, out.density, scratch, rate, out.carry);
+  return out;
+}
+
+/// One tool with the memory to run it on one instruction set.
+class AlignedRig {
+ public:
+  AlignedRig(std::span<const ToolOffset> offsets, const AlignedTaps& taps,
+             const AlignedKernels& kernels)
+      : kernels_(&kernels), tool_(offsets, taps, kernels) {
+    memory_.hold(tool_.table().size, true);
+  }
+  [[nodiscard]] const AlignedTable& table() const { return tool_.table(); }
+  [[nodiscard]] const AlignedKernels& kernels() const { return *kernels_; }
+
+  /// The same tick with a table that may differ from the rig's.
+  AlignedOutcome run(const TestVolume& volume, const ToolPose<FixedNumbers>& pose,
+                     const RemovalRate<FixedNumbers>& rate, const std::vector<std::uint16_t>& carry,
+                     const AlignedTable& table) {
+    AlignedOutcome out{{}, {}, {}, volume.density, carry};
+    const AlignedScratch scratch = memory_.view();
+    const AlignedTick tick(*kernels_, table, scratch, volume.grid, out.density, pose);
+    out.contact = tick.contact();
+    const AlignedTick::Milled milled = tick.mill(rate, out.carry);
+    out.modification = milled.modification;
+    out.removed = milled.removed;
+    return out;
+  }
+  AlignedOutcome run(const TestVolume& volume, const ToolPose<FixedNumbers>& pose,
+                     const RemovalRate<FixedNumbers>& rate,
+                     const std::vector<std::uint16_t>& carry) {
+    return run(volume, pose, rate, carry, table());
+  }
+
+ private:
+  const AlignedKernels* kernels_;
+  AlignedTool tool_;
+  AlignedMemory memory_;
+};
+
+/// A rig for each instruction set of this machine.
+inline std::vector<AlignedRig> rigs_for(std::span<const ToolOffset> offsets,
+                                        const AlignedTaps& taps = kAlignedFarid) {
+  std::vector<AlignedRig> rigs;
+  for (auto set = aligned_kernels(); *set != nullptr; ++set)
+    rigs.emplace_back(offsets, taps, **set);
+  return rigs;
+}
+
+}  // namespace kerf::test

@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: Apache-2.0
+// The plan `aligned` inside the servo step: the forces of double, whatever plan each tool has.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <numbers>
+
+#include <doctest/doctest.h>
+
+#include "tests/servo/support.hpp"
+
+using namespace kerf;
+using namespace kerf::test;
+
+namespace {
+
+constexpr double kFullScaleN = 0.06 * std::numbers::pi;  // the peak of p0 pi R^2
+
+double worst_difference_n(const std::array<double, 3>& a, const std::array<double, 3>& b) {
+  double worst = 0;
+  for (std::size_t axis = 0; axis < 3; ++axis) worst = std::max(worst, std::abs(a[axis] - b[axis]));
+  return worst;
+}
+
+/// The same scene in fixed point and in double, stepped by the same hand.
+class Pair {
+ public:
+  explicit Pair(const std::function<Scene()>& make) {
+    Scene first = make(), second = make();
+    second.servo.numeric = NumericKind::float64;
+    fixed_ = compile(first);
+    exact_ = compile(second);
+    arm_at(*fixed_, fixed_arm_, 0, 5, 0);
+    arm_at(*exact_, exact_arm_, 0, 5, 0);
+  }
+  void step(double x, double y, double z) {
+    fixed = fixed_->step(fixed_arm_.at(x, y, z));
+    exact = exact_->step(exact_arm_.at(x, y, z));
+  }
+  void select(std::uint32_t tool) {
+    fixed_->apply({ServoCommand::Kind::select_tool, tool});
+    exact_->apply({ServoCommand::Kind::select_tool, tool});
+  }
+  ServoOutput fixed, exact;
+
+ private:
+  std::unique_ptr<Servo> fixed_, exact_;
+  FakeArm fixed_arm_, exact_arm_;
+};
+
+Scene cutting_scene() {
+  Scene scene = half_space_scene();
+  scene.cut.model = CutModel::overlap;
+  return scene;
+}
+
+}  // namespace
+
+TEST_CASE("both forces of the first cutting tick are double's within 1.7e-4 of full scale") {
+  for (const auto kernel : {GradientKernel::farid, GradientKernel::sobel5}) {
+    for (const double y : {0.9, 0.6, 0.2}) {
+      Pair pair([&] {
+        Scene scene = cutting_scene();
+        scene.servo.kernel = kernel;
+        if (y < 0.5) scene.cut.model = CutModel::overlap_exact;
+        return scene;
+      });
+      pair.step(0.11, y, -0.07);
+      CAPTURE(y);
+      CHECK(pair.exact.contact_n[1] > 0.01);
+      CHECK(pair.exact.modification_n[1] > 0.005);
+      CHECK(worst_difference_n(pair.fixed.contact_n, pair.exact.contact_n) < 1.7e-4 * kFullScaleN);
+      CHECK(worst_difference_n(pair.fixed.modification_n, pair.exact.modification_n) <
+            1.7e-4 * kFullScaleN);
+      CHECK(double(pair.fixed.removed_steps) ==
+            doctest::Approx(double(pair.exact.removed_steps)).epsilon(1e-3));
+      CHECK(pair.fixed.changed[0] == pair.exact.changed[0]);
+    }
+  }
+}
+
+TEST_CASE("tools of both plans feel what the other has cut") {
+  Pair pair([] {
+    Scene scene = cutting_scene();
+    scene.tools.push_back(ball(20, kVoxelMm / 2));  // finer than the volume: stored gradients
+    return scene;
+  });
+  double deepest_n = 0;
+  for (int i = 0; i < 400; ++i) {
+    if (i % 50 == 0) pair.select(static_cast<std::uint32_t>(i / 50 % 2));
+    pair.step(0.6 * std::sin(i * 0.05), 0.55, 0.3 * std::cos(i * 0.05));
+    deepest_n = std::max(deepest_n, std::abs(pair.exact.contact_n[1]));
+    // Removal rounds to whole steps, and its carry moves fractions between voxels.
+    REQUIRE(worst_difference_n(pair.fixed.contact_n, pair.exact.contact_n) < 4e-4 * kFullScaleN);
+  }
+  CHECK(deepest_n > 0.1 * kFullScaleN);
+}
+
+TEST_CASE("two volumes of different spacing each get their own plan") {
+  Pair pair([] {
+    Scene scene = cutting_scene();
+    scene.volumes.push_back(
+        volume_of(40, 0.2, [](double x, double y, double) { return std::max(y, x); }));
+    return scene;
+  });
+  for (int i = 0; i < 50; ++i) {
+    pair.step(0.2, 0.6, 0.01 * i);
+    REQUIRE(worst_difference_n(pair.fixed.contact_n, pair.exact.contact_n) < 4e-4 * kFullScaleN);
+    REQUIRE(worst_difference_n(pair.fixed.modification_n, pair.exact.modification_n) <
+            4e-4 * kFullScaleN);
+  }
+  CHECK(pair.exact.contact_n[1] > 0.01);
+}
