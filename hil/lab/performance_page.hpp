@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "hil/lab/kernel_bench.hpp"
+
+namespace kerf {
+
+/// `docs/performance.md`: the figures of one run with the machine, the compiler, the day and the
+/// command that made them. Markdown.
+[[nodiscard]] std::string performance_page(const std::vector<KernelRow>& rows);
+
+}  // namespace kerf
