@@ -202,6 +202,25 @@ TEST_CASE("readers that come, die and come again do not change what the servo co
   CHECK(hashes[0] == hashes[1]);
 }
 
+TEST_CASE("a reader changes the tool: the servo takes it at a tick and says which command it was") {
+  Pair pair;
+  pair.start("touch.toml", {});
+  REQUIRE(pair.ticks_within(20s));
+  auto connection = kerf::connect_segment(pair.name);
+  const kerf::Reply taken =
+      connection.send({.kind = kerf::CommandKind::select_tool, .argument = 2});
+  CHECK(taken.status == kerf::ReplyStatus::accepted);
+  CHECK(eventually(
+      [&] {
+        const auto latest = connection.reader().latest();
+        return latest && latest->active_tool == 2 && latest->last_command == taken.index;
+      },
+      5s));
+  const kerf::Reply refused =
+      connection.send({.kind = kerf::CommandKind::select_tool, .argument = 1000});
+  CHECK(refused.status == kerf::ReplyStatus::refused);
+}
+
 TEST_CASE("a second controller of the same name is refused in one line") {
   Pair pair;
   pair.start("touch.toml", {});
