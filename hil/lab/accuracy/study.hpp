@@ -23,7 +23,8 @@ struct Figure {
 /// A knob in one position, all others where the servo has them.
 struct Entry {
   std::string knob, value;
-  bool standard;  ///< what the servo runs without the plan `aligned`: one measurement, in each knob
+  bool standard =
+      false;  ///< what the servo runs without the plan `aligned`: one measurement, in each knob
   TickTimes times;
   std::vector<Figure> figures;
 
