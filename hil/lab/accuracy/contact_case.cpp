@@ -16,25 +16,25 @@ Point ideal_force(const Shape& shape, Point centre_mm, double radius_mm) {
   return sum * (-4.0 / kPoints);  // 4 pi R^2 of surface over pi R^2
 }
 
-std::vector<Contact> contacts_on(const Shape& shape, std::size_t count, double radius_mm,
-                                 double reach_mm, std::size_t first) {
+std::optional<Contact> contact_on(const Shape& shape, Point start_mm, double depth_mm,
+                                  double radius_mm) {
   constexpr int kSteps = 30;
   constexpr double kArrivedMm = 1e-6;
+  Point centre = start_mm;
+  const auto off_mm = [&] { return shape.distance_mm(centre) - (radius_mm - depth_mm); };
+  for (int step = 0; step < kSteps; ++step) centre = centre - off_mm() * shape.normal(centre);
+  if (!(std::abs(off_mm()) < kArrivedMm)) return std::nullopt;
+  return Contact{centre, depth_mm, shape.normal(centre), ideal_force(shape, centre, radius_mm)};
+}
+
+std::vector<Contact> contacts_on(const Shape& shape, std::size_t count, double radius_mm,
+                                 double reach_mm) {
   std::vector<Contact> contacts;
-  for (std::size_t i = first; contacts.size() < count; ++i) {
+  for (std::size_t i = 0; contacts.size() < count; ++i) {
     const double share = (static_cast<double>(contacts.size()) + 0.5) / static_cast<double>(count);
-    const double depth_mm = radius_mm * share;
-    Point centre = spread_place(i) * reach_mm;
-    // Along the normal to where the face is so far off; a place between two faces may not get
-    // there.
-    for (int step = 0; step < kSteps; ++step) {
-      const double off_mm = shape.distance_mm(centre) - (radius_mm - depth_mm);
-      centre = centre - off_mm * shape.normal(centre);
-    }
-    const double off_mm = shape.distance_mm(centre) - (radius_mm - depth_mm);
-    if (!(std::abs(off_mm) < kArrivedMm)) continue;
-    contacts.push_back(
-        {centre, depth_mm, shape.normal(centre), ideal_force(shape, centre, radius_mm)});
+    const auto contact =
+        contact_on(shape, spread_place(i) * reach_mm, share * radius_mm, radius_mm);
+    if (contact) contacts.push_back(*contact);
   }
   return contacts;
 }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <vector>
 
 #include "hil/lab/accuracy/analytic_shapes.hpp"
@@ -21,11 +22,15 @@ struct Contact {
 /// points; within 1e-4.
 [[nodiscard]] Point ideal_force(const Shape& shape, Point centre_mm, double radius_mm);
 
+/// The contact of a given depth that is reached from `start_mm` along the normals; nothing where
+/// there is none, as between two faces.
+[[nodiscard]] std::optional<Contact> contact_on(const Shape& shape, Point start_mm, double depth_mm,
+                                                double radius_mm);
+
 /// `count` contacts spread over the shape's faces within `reach_mm` of (0, 0, 0) and evenly over
-/// depths up to one radius. `first`: where in the even cover to begin.
+/// depths up to one radius.
 [[nodiscard]] std::vector<Contact> contacts_on(const Shape& shape, std::size_t count,
-                                               double radius_mm, double reach_mm,
-                                               std::size_t first = 0);
+                                               double radius_mm, double reach_mm);
 
 /// One shape in voxels and where the tool touches it.
 struct ContactCase {

@@ -137,7 +137,22 @@ void draw_labels(std::ostream& script, const std::vector<Mark>& marks, const Axi
   }
 }
 
-void draw(std::ostream& script, const Panel& panel, const std::vector<Entry>& entries, bool first) {
+/// One line above the panels; drawn with the next plot. (gnuplot's own key gets no wider than a
+/// panel.)
+void draw_legend(std::ostream& script) {
+  constexpr double kLeft = 0.08, kStep = 0.115, kUp = 0.97;
+  double x = kLeft;
+  for (const KnobColour& colour : kColours) {
+    script << "set label '" << colour.knob << "' at screen " << x << ", screen " << kUp
+           << " left point pointtype 7 linecolor rgb '" << colour.rgb << "' offset 1,0\n";
+    x += kStep;
+  }
+  script << "set arrow from screen " << x << ", screen " << kUp << " to screen " << x + 0.025
+         << ", screen " << kUp << " nohead linecolor rgb '#999999' linewidth 2\n"
+         << "set label 'front' at screen " << x + 0.035 << ", screen " << kUp << " left\n";
+}
+
+void draw(std::ostream& script, const Panel& panel, const std::vector<Entry>& entries) {
   const std::vector<Mark> marks = marks_of(panel, entries);
   if (marks.empty()) return;
   const auto by_error = [](const Mark& a, const Mark& b) { return a.error < b.error; };
@@ -155,22 +170,14 @@ void draw(std::ostream& script, const Panel& panel, const std::vector<Entry>& en
   }
   script << "EOD\n";
   draw_labels(script, marks, x, y);
-  script
-      << "set lmargin at screen " << panel.left << "\nset rmargin at screen "
-      << panel.left + kPanelWidth << "\nset bmargin at screen " << panel.bottom
-      << "\nset tmargin at screen " << panel.bottom + kPanelHeight << "\nset title '" << panel.title
-      << "'\nset xrange " << x.range() << "\nset yrange " << y.range() << "\nset xtics "
-      << x.ticks() << "\nset ytics " << y.ticks() << "\n"
-      << (first
-              ? "set key at screen 0.5, 0.985 center horizontal maxrows 1 Left reverse samplen 1\n"
-              : "unset key\n")
-      << "plot $front with steps linecolor rgb '#999999' linewidth 2 title 'front', \\\n"
-         "  $marks with points pointtype 7 pointsize 0.9 linecolor rgb variable notitle";
-  for (const KnobColour& colour : kColours) {
-    script << ", \\\n  keyentry with points pointtype 7 linecolor rgb '" << colour.rgb
-           << "' title '" << colour.knob << "'";
-  }
-  script << "\nunset label\n";
+  script << "set lmargin at screen " << panel.left << "\nset rmargin at screen "
+         << panel.left + kPanelWidth << "\nset bmargin at screen " << panel.bottom
+         << "\nset tmargin at screen " << panel.bottom + kPanelHeight << "\nset title '"
+         << panel.title << "'\nset xrange " << x.range() << "\nset yrange " << y.range()
+         << "\nset xtics " << x.ticks() << "\nset ytics " << y.ticks() << "\n"
+         << "plot $front with steps linecolor rgb '#999999' linewidth 2, \\\n"
+            "  $marks with points pointtype 7 pointsize 0.9 linecolor rgb variable\n"
+            "unset label\nunset arrow\n";
 }
 
 }  // namespace
@@ -185,13 +192,11 @@ set grid back linecolor rgb '#dddddd' linetype 1 linewidth 0.5
 set border 3 linecolor rgb '#555555'
 set tics nomirror out textcolor rgb '#333333'
 set xlabel 'time of a tick, p50 (us)'
+unset key
 set multiplot
 )";
-  bool first = true;
-  for (const Panel& panel : kPanels) {
-    draw(script, panel, entries, first);
-    first = false;
-  }
+  draw_legend(script);
+  for (const Panel& panel : kPanels) draw(script, panel, entries);
   script << "unset multiplot\n";
   return script.str();
 }

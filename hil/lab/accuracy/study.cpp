@@ -72,8 +72,11 @@ class Subjects {
   explicit Subjects(const Plan& plan) : plan_(plan) {
     for (std::size_t i = 0; i < plan.contacts; ++i) {
       const Shape tilted = plane(spread_direction(i, plan.contacts), spread_place(i).x * kVoxelMm);
-      auto contacts = contacts_on(tilted, 1, kToolMm, kVoxelMm, i);
-      planes_.push_back({tilted, at_depth(tilted, contacts.front(), i)});
+      // Each plane has one contact: they share the depths among them.
+      const double share =
+          (static_cast<double>(i * 37 % plan.contacts) + 0.5) / static_cast<double>(plan.contacts);
+      const auto contact = contact_on(tilted, spread_place(i) * kVoxelMm, share * kToolMm, kToolMm);
+      if (contact) planes_.push_back({tilted, {*contact}});
     }
     for (const Shape& solid : solids()) {
       solids_.push_back({solid, contacts_on(solid, plan.contacts, kToolMm, kReachMm)});
@@ -102,18 +105,6 @@ class Subjects {
     std::vector<Contact> contacts;
   };
   static constexpr double kReachMm = 2;
-
-  /// The planes share the depths among them: each has one contact only.
-  [[nodiscard]] std::vector<Contact> at_depth(const Shape& shape, Contact contact,
-                                              std::size_t i) const {
-    const double share =
-        (static_cast<double>(i * 37 % plan_.contacts) + 0.5) / static_cast<double>(plan_.contacts);
-    const double depth_mm = share * kToolMm;
-    contact.centre_mm = contact.centre_mm + (contact.depth_mm - depth_mm) * contact.normal;
-    contact.depth_mm = depth_mm;
-    contact.force = ideal_force(shape, contact.centre_mm, kToolMm);
-    return {contact};
-  }
 
   const Plan& plan_;
   std::vector<Touched> planes_, solids_;
