@@ -1,21 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-// The accuracy study measures what it says: known figures come out, and the same ones every time.
+// The accuracy study measures what it says: figures that are known from elsewhere come out.
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
-#include <string>
+#include <type_traits>
 #include <vector>
 
 #include <doctest/doctest.h>
 
 #include "hil/lab/accuracy/contact_errors.hpp"
-#include "hil/lab/accuracy/export.hpp"
-#include "hil/lab/accuracy/label_places.hpp"
-#include "hil/lab/accuracy/page.hpp"
-#include "hil/lab/accuracy/plot.hpp"
 #include "hil/lab/accuracy/spline.hpp"
-#include "hil/lab/accuracy/study.hpp"
 
 using namespace kerf;
 using namespace kerf::accuracy;
@@ -60,35 +55,6 @@ double loop_work(const ContactChoice& choice) {
   }
   std::nth_element(works.begin(), works.begin() + 20, works.end());
   return works[20];
-}
-
-Plan small() {
-  return {.effort = {.sample_loop_steps = 50, .tool_loop_steps = 8, .line_steps = 4, .normals = 50},
-          .contacts = 4,
-          .walks = 1,
-          .side_mm = 5,
-          .ticks = 3};
-}
-
-/// A whole study of a few contacts; made once.
-const std::vector<Entry>& small_study() {
-  static const std::vector<Entry> entries = study(small(), [](double, const std::string&) {});
-  return entries;
-}
-
-const Entry& entry(const std::string& knob, const std::string& value) {
-  const auto& entries = small_study();
-  const auto found = std::find_if(entries.begin(), entries.end(), [&](const Entry& e) {
-    return e.knob == knob && e.value == value;
-  });
-  REQUIRE(found != entries.end());
-  return *found;
-}
-
-std::size_t count_of(const std::string& what, const std::string& text) {
-  std::size_t count = 0;
-  for (auto at = text.find(what); at != std::string::npos; at = text.find(what, at + 1)) ++count;
-  return count;
 }
 
 }  // namespace
@@ -227,86 +193,4 @@ TEST_CASE_TEMPLATE("spline weights add up to one, slopes to zero, and reproduce 
     CHECK(place == doctest::Approx(at));
     CHECK(slope == doctest::Approx(1));
   }
-}
-
-TEST_CASE("a study gives the same figures every time, whatever the times") {
-  const auto untimed = [](std::vector<Entry> entries) {
-    for (Entry& e : entries) e.times = {};
-    return csv(entries);
-  };
-  const std::string first = untimed(small_study());
-  CHECK(count_of("\n", first) > 500);
-  CHECK(first == untimed(study(small(), [](double, const std::string&) {})));
-}
-
-TEST_CASE("the standard is one measurement that every knob shows") {
-  const Entry& q15 = entry("arithmetic", "Q15");
-  for (const auto& [knob, value] : {std::array{"pitch", "1"},
-                                    {"kernel", "farid"},
-                                    {"storage", "int16 gradients"},
-                                    {"interpolation", "trilinear"},
-                                    {"voxel", "0.125 mm"}}) {
-    const Entry& same = entry(knob, value);
-    CHECK(same.standard);
-    CHECK(same.times.p50_ns == q15.times.p50_ns);
-    CHECK(*same.find("force_vs_theory_rms") == *q15.find("force_vs_theory_rms"));
-  }
-  CHECK_FALSE(entry("storage", "aligned").standard);
-}
-
-TEST_CASE("all is the worst of the shapes, and times grow to their largest") {
-  for (const Entry& e : small_study()) {
-    double worst = 0;
-    for (const char* shape : {"plane", "ball", "torus", "plate", "crease", "layered ball"}) {
-      REQUIRE(e.find("force_vs_theory_max", shape) != nullptr);
-      worst = std::max(worst, *e.find("force_vs_theory_max", shape));
-    }
-    CHECK(*e.find("force_vs_theory_max") == worst);
-    CHECK(e.times.p50_ns > 0);
-    CHECK(e.times.p50_ns <= e.times.p99_ns);
-    CHECK(e.times.p99_ns <= e.times.max_ns);
-  }
-}
-
-TEST_CASE(
-    "the page tells its command, has a row for each choice and no empty figure in a sentence") {
-  const std::string text = page(small_study(), "accuracy.svg");
-  CHECK(text.find("./kerf lab accuracy --page docs/accuracy.md") != std::string::npos);
-  CHECK(text.find("](accuracy.svg)") != std::string::npos);
-  for (const Entry& e : small_study()) {
-    const std::string name = e.standard ? "**" + e.value + "**" : e.value;
-    CHECK(text.find("\n| " + name + " | ") != std::string::npos);
-  }
-  for (const char* gap : {"  us", " at  ", "rms ()", " is  ", "nan", "inf"}) {
-    CHECK(text.find(gap) == std::string::npos);
-  }
-}
-
-TEST_CASE("the plot's front holds the fastest choice and none that is slower and worse") {
-  const std::string script = plot_script(small_study());
-  CHECK(count_of("$front << EOD", script) == 4);
-  CHECK(count_of("set label 'aligned'", script) >= 2);
-  std::size_t at = script.find("$front << EOD\n");
-  at = script.find('\n', at) + 1;
-  double last_us = 0, last_error = 1e9;
-  while (script.compare(at, 3, "EOD") != 0) {
-    std::size_t used = 0;
-    const double us = std::stod(script.substr(at), &used);
-    const double error = std::stod(script.substr(at + used));
-    CHECK(us > last_us);
-    CHECK(error < last_error);
-    last_us = us;
-    last_error = error;
-    at = script.find('\n', at) + 1;
-  }
-  CHECK(last_us > 0);
-}
-
-TEST_CASE("labels cover neither each other nor marks, and stay in the panel") {
-  LabelPlaces places(200, 60);
-  places.keep_mark_free(100, 30);
-  CHECK(places.place("first", 100, 30)->align == std::string("left"));
-  CHECK(places.place("second", 100, 30)->align == std::string("right"));
-  CHECK(places.place("third", 100, 30)->y > 30);
-  CHECK_FALSE(places.place(std::string(40, 'x'), 100, 30));  // wider than the panel
 }

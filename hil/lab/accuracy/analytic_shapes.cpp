@@ -13,6 +13,10 @@ Point unit(Point v) {
   return v * (1 / norm(v));
 }
 
+std::int32_t middle_of(std::int32_t n) {
+  return n / 2;
+}
+
 }  // namespace
 
 Point Shape::normal(Point at) const {
@@ -70,12 +74,14 @@ Shape layered_ball(Point centre, double radius_mm, double enamel_mm) {
 }
 
 VoxelVec<double> AnalyticVolume::voxel_from_mm(Point at) const noexcept {
-  const auto along = [&](double mm, std::int32_t n) { return mm / voxel_mm + n / 2; };
+  const auto along = [&](double mm, std::int32_t n) { return mm / voxel_mm + middle_of(n); };
   return {along(at.x, grid.nx), along(at.y, grid.ny), along(at.z, grid.nz)};
 }
 
 Point AnalyticVolume::mm_from_voxel(VoxelVec<double> at) const noexcept {
-  const auto along = [&](double voxel, std::int32_t n) { return (voxel - n / 2) * voxel_mm; };
+  const auto along = [&](double voxel, std::int32_t n) {
+    return (voxel - middle_of(n)) * voxel_mm;
+  };
   return {along(at.x, grid.nx), along(at.y, grid.ny), along(at.z, grid.nz)};
 }
 

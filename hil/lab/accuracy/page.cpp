@@ -87,6 +87,7 @@ std::string shapes_of(const Entry& standard) {
   const std::vector<PageColumn> columns{kTheory,     kTheoryMax, kDirection, kDirectionMax,
                                         kSampleLoop, kToolLoop,  kStep};
   std::vector<std::string> titles;
+  titles.reserve(columns.size());
   for (const PageColumn& column : columns) titles.emplace_back(column.title);
   std::string text = "## The shapes\n\nThe standard on each shape.\n\n" + head_of("shape", titles);
   for (const char* shape : {"plane", "ball", "torus", "plate", "crease", "layered ball", "all"}) {

@@ -122,6 +122,7 @@ void draw_labels(std::ostream& script, const std::vector<Mark>& marks, const Axi
     before = &mark;
   }
   std::vector<const Mark*> order;
+  order.reserve(marks.size());
   for (const Mark& mark : marks) order.push_back(&mark);
   const auto rank = [](const Mark* mark) {
     return mark->front ? 0 : mark->knob == kColours.front().knob ? 1 : 2;
@@ -144,7 +145,7 @@ void draw_legend(std::ostream& script) {
   double x = kLeft;
   for (const KnobColour& colour : kColours) {
     script << "set label '" << colour.knob << "' at screen " << x << ", screen " << kUp
-           << " left point pointtype 7 linecolor rgb '" << colour.rgb << "' offset 1,0\n";
+           << " left point pointtype 7 linecolor rgb '" << colour.rgb << "' offset 1,-0.2\n";
     x += kStep;
   }
   script << "set arrow from screen " << x << ", screen " << kUp << " to screen " << x + 0.025

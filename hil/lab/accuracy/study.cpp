@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "hil/lab/accuracy/study.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <memory>
 #include <optional>
 #include <utility>
+
+#include "hil/lab/accuracy/subjects.hpp"
 
 namespace kerf::accuracy {
 namespace {
@@ -16,8 +17,6 @@ struct Variant {
   ContactChoice choice;
   bool against_double = false;
 };
-
-constexpr double kVoxelMm = 0.125;
 
 /// Each knob from coarse to fine. The voxel comes last: each of its positions has its own volumes.
 std::vector<Variant> variants() {
@@ -51,64 +50,6 @@ std::vector<Variant> variants() {
       {"voxel", "0.0625 mm", {.voxel_mm = kVoxelMm / 2}},
   };
 }
-
-/// A shape of the study: one volume, or one for each tilt of the plane.
-struct Subject {
-  std::string name;
-  std::vector<ContactCase> cases;
-};
-
-/// Off the lattice, so that no voxel is a special one.
-constexpr Point kCentre{0.37 * kVoxelMm, 0.11 * kVoxelMm, -0.23 * kVoxelMm};
-
-std::vector<Shape> solids() {
-  return {ball(kCentre, 10 * kVoxelMm), torus({1, 2, 3}, 2.0, 0.8),
-          thin_plate({2, -1, 3}, 2 * kVoxelMm), crease(), layered_ball(kCentre, 1.5, 0.4)};
-}
-
-/// Contacts are the same in mm, whatever the voxels, so they are found once.
-class Subjects {
- public:
-  explicit Subjects(const Plan& plan) : plan_(plan) {
-    for (std::size_t i = 0; i < plan.contacts; ++i) {
-      const Shape tilted = plane(spread_direction(i, plan.contacts), spread_place(i).x * kVoxelMm);
-      // Each plane has one contact: they share the depths among them.
-      const double share =
-          (static_cast<double>(i * 37 % plan.contacts) + 0.5) / static_cast<double>(plan.contacts);
-      const auto contact = contact_on(tilted, spread_place(i) * kVoxelMm, share * kToolMm, kToolMm);
-      if (contact) planes_.push_back({tilted, {*contact}});
-    }
-    for (const Shape& solid : solids()) {
-      solids_.push_back({solid, contacts_on(solid, plan.contacts, kToolMm, kReachMm)});
-    }
-  }
-
-  [[nodiscard]] std::vector<Subject> at(double voxel_mm) const {
-    constexpr double kTiltSideMm = 5;  // room for the tool and its ways
-    std::vector<Subject> subjects{{"plane", {}}};
-    for (std::size_t i = 0; i < planes_.size(); ++i) {
-      subjects.front().cases.push_back({planes_[i].shape,
-                                        volume_of(planes_[i].shape, kTiltSideMm, voxel_mm),
-                                        planes_[i].contacts, i < plan_.walks ? std::size_t{1} : 0});
-    }
-    for (const Touched& solid : solids_) {
-      subjects.push_back({solid.shape.name,
-                          {{solid.shape, volume_of(solid.shape, plan_.side_mm, voxel_mm),
-                            solid.contacts, std::min(plan_.walks, solid.contacts.size())}}});
-    }
-    return subjects;
-  }
-
- private:
-  struct Touched {
-    Shape shape;
-    std::vector<Contact> contacts;
-  };
-  static constexpr double kReachMm = 2;
-
-  const Plan& plan_;
-  std::vector<Touched> planes_, solids_;
-};
 
 class FigureList {
  public:
@@ -218,7 +159,7 @@ const double* Entry::find(std::string_view metric, std::string_view shape) const
 std::vector<Entry> study(const Plan& plan,
                          const std::function<void(double share, const std::string& what)>& told) {
   told(0, "contacts");
-  const Subjects all_subjects(plan);
+  const Subjects touched(plan.contacts, plan.walks);
   const std::vector<Variant> list = variants();
   std::optional<double> voxel_mm;
   std::vector<Subject> subjects;
@@ -234,7 +175,7 @@ std::vector<Entry> study(const Plan& plan,
     } else {
       if (voxel_mm != variant.choice.voxel_mm) {
         subjects = {};  // one set in memory at a time
-        subjects = all_subjects.at(variant.choice.voxel_mm);
+        subjects = touched.in_voxels(variant.choice.voxel_mm, plan.side_mm);
         voxel_mm = variant.choice.voxel_mm;
       }
       entry = measured(variant, subjects, plan);

@@ -41,8 +41,6 @@ struct Plan {
   int ticks = 1000;            ///< timed
 };
 
-inline constexpr double kToolMm = 0.625;  ///< radius of the ball tool: 5 voxels of 0.125 mm
-
 /// `told` hears how far it is (0..1) and what is measured now.
 [[nodiscard]] std::vector<Entry> study(
     const Plan& plan, const std::function<void(double share, const std::string& what)>& told);

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <span>
+
+#include "controller/kernel/tool_pose.hpp"
+#include "hil/lab/accuracy/contact_method.hpp"
+
+// What the contact methods share.
+namespace kerf::accuracy {
+
+using Voxels = VoxelVec<double>;
+using Offsets = std::span<const ToolOffset>;
+
+inline constexpr std::array<ToolOffset, 1> kOneSample{};
+
+/// Unturned.
+template <class N>
+ToolPose<N> pose_at(Voxels centre, double pitch_vox) {
+  using Real = typename N::Real;
+  ToolPose<N> pose;
+  pose.centre_vox = {Real(centre.x), Real(centre.y), Real(centre.z)};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const double step = pitch_vox * double(N::kStepOne);
+    if constexpr (N::kIsFixed) {
+      pose.step[axis][axis] = static_cast<typename N::Step>(std::lround(step));
+    } else {
+      pose.step[axis][axis] = static_cast<typename N::Step>(step);
+    }
+  }
+  return pose;
+}
+
+/// `unit`: what one density step per voxel is in the sum.
+template <class N>
+Voxels full_densities(SumVec<N> sum, double unit) {
+  const double scale = 1 / (unit * kDensityMax);
+  return {double(sum.x) * scale, double(sum.y) * scale, double(sum.z) * scale};
+}
+
+}  // namespace kerf::accuracy
