@@ -62,7 +62,8 @@ class Aligned final : public ContactMethod {
 
  private:
   [[nodiscard]] Voxels sum(const AlignedTool& tool, Voxels centre) const {
-    const AlignedTick tick(kernels_, tool.table(), memory_.view(), grid_, density_,
+    const AlignedScratch scratch = memory_.view();  // the tick keeps a reference
+    const AlignedTick tick(kernels_, tool.table(), scratch, grid_, density_,
                            pose_at<FixedNumbers>(centre, 1));
     return full_densities<FixedNumbers>(tick.contact(), 1 << kAlignedKeptBits);
   }
