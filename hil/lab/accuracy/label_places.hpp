@@ -31,7 +31,7 @@ class LabelPlaces {
 
   /// Nothing where there is no room.
   [[nodiscard]] std::optional<LabelPlace> place(const std::string& text, double x, double y) {
-    constexpr double kLetter = 7, kHalfLine = 7, kAway = 9, kAbove = 14;
+    constexpr double kLetter = 7.8, kHalfLine = 7, kAway = 9, kAbove = 14;
     const double wide = kLetter * static_cast<double>(text.size());
     for (const double up : {0.0, kAbove, -kAbove}) {
       for (const LabelPlace& at :
