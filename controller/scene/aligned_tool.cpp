@@ -225,9 +225,18 @@ AlignedScratch AlignedMemory::view() noexcept {
   return {box_.data(), ratio_.data(), filter_.data(), inside_.data(), live_.data()};
 }
 
-std::size_t AlignedMemory::bytes() const noexcept {
-  return (box_.size() + ratio_.size() + inside_.size()) * sizeof(std::int16_t) +
-         filter_.size() * sizeof(std::int32_t) + live_.size();
+std::vector<ArrayBytes> AlignedMemory::arrays() const {
+  const auto named = [](const char* name, const auto& memory) {
+    return ArrayBytes{name, memory.size() * sizeof(memory[0])};
+  };
+  return {named("box", box_), named("box mask", inside_), named("overlap ratios", ratio_),
+          named("filtered rows", filter_), named("live rows", live_)};
+}
+
+std::size_t AlignedMemory::bytes() const {
+  std::size_t sum = 0;
+  for (const ArrayBytes& array : arrays()) sum += array.bytes;
+  return sum;
 }
 
 }  // namespace kerf

@@ -11,6 +11,7 @@
 #include "controller/kernel/aligned_table.hpp"
 #include "controller/kernel/gradient.hpp"
 #include "controller/kernel/tool_offset.hpp"
+#include "controller/scene/scene_costs.hpp"
 
 namespace kerf {
 
@@ -54,7 +55,8 @@ class AlignedMemory {
   /// Makes room for a tool; the arrays of milling exist only where some tool `mills`.
   void hold(VoxelIndex tool_size, bool mills);
   [[nodiscard]] AlignedScratch view() noexcept;
-  [[nodiscard]] std::size_t bytes() const noexcept;
+  [[nodiscard]] std::vector<ArrayBytes> arrays() const;
+  [[nodiscard]] std::size_t bytes() const;
 
  private:
   std::vector<std::int16_t> box_, ratio_, inside_;

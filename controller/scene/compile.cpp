@@ -10,19 +10,21 @@
 #include "controller/kernel/aligned_kernels.hpp"
 #include "controller/scene/aligned_tool.hpp"
 #include "controller/scene/plan_choice.hpp"
+#include "controller/scene/plan_cost.hpp"
 #include "controller/scene/plan_device.hpp"
 #include "controller/scene/plan_tools.hpp"
 #include "controller/scene/plan_volumes.hpp"
 #include "controller/scene/servo_memory.hpp"
+#include "controller/scene/stage_timing.hpp"
 #include "controller/servo/servo_step.hpp"
 
 namespace kerf {
 namespace {
 
 template <class N>
-class CompiledScene final : public Servo {
+class SceneIn final : public CompiledScene {
  public:
-  explicit CompiledScene(Scene& scene) : memory_(scene.cut.model != CutModel::none) {
+  explicit SceneIn(const Scene& scene) : memory_(scene) {
     plan_device(scene.device, plan_);
     plan_limits(scene, plan_);
     plan_.kernel = scene.servo.kernel;
@@ -31,9 +33,18 @@ class CompiledScene final : public Servo {
     plan_.removal_rate = removal_rate<N>(scene.cut.rate_per_s / scene.servo.rate_hz,
                                          scene.cut.model == CutModel::overlap_exact);
     plan_volumes(scene, plan_);
-    plan_tools(scene);
+    for (const SceneTool& tool : scene.tools) plan_tool_everywhere(scene, tool);
+    state_.active_tool = static_cast<std::uint32_t>(scene.active_tool);
     for (const SceneVolume& volume : scene.volumes) grids_.push_back(volume.image.grid);
-    memory_.take(scene, plan_, state_);
+    costs_.arrays = memory_.arrays();
+  }
+
+  void take(Scene& scene) override { memory_.take(scene, plan_, state_); }
+  [[nodiscard]] const SceneCosts& costs() const noexcept override { return costs_; }
+  [[nodiscard]] std::vector<double> time_stages(std::size_t tick) override {
+    const std::size_t stages = costs_.ticks[tick].cost.stages.size();
+    return kerf::time_stages(plan_, state_, tick / plan_.volume_count, tick % plan_.volume_count,
+                             stages);
   }
 
   ServoOutput step(const DeviceReport& report) noexcept override {
@@ -53,52 +64,63 @@ class CompiledScene final : public Servo {
   }
 
  private:
-  void plan_tools(Scene& scene) {
-    plan_.tool_count = scene.tools.size();
-    for (std::size_t t = 0; t < scene.tools.size(); ++t) {
-      SceneTool& tool = scene.tools[t];
-      plan_.tools[t].round = tool.round;
-      const AlignedTable* table = nullptr;  // made once, where some volume can use it
-      for (std::size_t v = 0; v < plan_.volume_count; ++v) {
-        const SceneVolume& volume = scene.volumes[plan_.volumes[v].scene_index];
-        const PlanChoice choice = choose_plan(scene, tool, volume);
-        const bool aligned = choice.plan == Plan::aligned;
-        if (aligned && table == nullptr) table = &add_table(scene, tool);
-        plan_.tools[t].in_volume[v] = plan_tool<N>(scene, tool, volume, aligned ? table : nullptr);
-        memory_.hold(tool, volume, v, choice.plan, table);
+  void plan_tool_everywhere(const Scene& scene, const SceneTool& tool) {
+    ToolPlan<N>& plan = plan_.tools[plan_.tool_count++];
+    plan.round = tool.round;
+    plan.turns = tool.turns;
+    plan.offsets = memory_.hold_samples(tool);
+    const AlignedTable* table = nullptr;  // of the last volume that could use one
+    LatticeTurn turn{};
+    for (std::size_t v = 0; v < plan_.volume_count; ++v) {
+      const std::size_t scene_index = plan_.volumes[v].scene_index;
+      const SceneVolume& volume = scene.volumes[scene_index];
+      const PlanChoice choice = choose_plan(scene, tool, volume);
+      PlanCost cost;
+      switch (choice.plan) {
+        case Plan::aligned:
+          if (table == nullptr || turn != choice.turn) {
+            turn = choice.turn;
+            table = &memory_.hold_table(tool, turn, scene.servo.kernel, *plan_.aligned_kernels);
+          }
+          memory_.hold_aligned(v, *table);
+          plan.in_volume[v] = plan_tool<N>(scene, tool, volume, table);
+          cost = aligned_cost(*table, *plan_.aligned_kernels, plan_.cutting);
+          break;
+        case Plan::gather:
+          memory_.hold_gather(tool, volume, v);
+          plan.in_volume[v] = plan_tool<N>(scene, tool, volume, nullptr);
+          cost = gather_cost(scene.servo.numeric, tool, volume, plan_.cutting);
+          break;
       }
-      offsets_.push_back(std::move(tool.offsets));
-      plan_.tools[t].offsets = offsets_.back();
+      costs_.ticks.push_back({plan_.tool_count - 1, scene_index, choice, std::move(cost)});
     }
-    state_.active_tool = static_cast<std::uint32_t>(scene.active_tool);
-  }
-
-  const AlignedTable& add_table(const Scene& scene, const SceneTool& tool) {
-    tables_.push_back(std::make_unique<AlignedTool>(tool.offsets, *aligned_taps(scene.servo.kernel),
-                                                    *plan_.aligned_kernels));
-    return tables_.back()->table();
   }
 
   ServoPlan<N> plan_;
   ServoState<N> state_;
   std::vector<VoxelGrid> grids_;  ///< by volume of the scene
-  std::vector<std::vector<ToolOffset>> offsets_;
-  std::vector<std::unique_ptr<AlignedTool>> tables_;
   ServoMemory<N> memory_;
+  SceneCosts costs_;
 };
 
 }  // namespace
 
-std::unique_ptr<Servo> compile(Scene& scene) {
+std::unique_ptr<CompiledScene> plan_scene(const Scene& scene) {
   switch (scene.servo.numeric) {
     case NumericKind::fixed:
-      return std::make_unique<CompiledScene<FixedNumbers>>(scene);
+      return std::make_unique<SceneIn<FixedNumbers>>(scene);
     case NumericKind::float32:
-      return std::make_unique<CompiledScene<FloatNumbers>>(scene);
+      return std::make_unique<SceneIn<FloatNumbers>>(scene);
     case NumericKind::float64:
       break;
   }
-  return std::make_unique<CompiledScene<DoubleNumbers>>(scene);
+  return std::make_unique<SceneIn<DoubleNumbers>>(scene);
+}
+
+std::unique_ptr<CompiledScene> compile(Scene& scene) {
+  auto compiled = plan_scene(scene);
+  compiled->take(scene);
+  return compiled;
 }
 
 }  // namespace kerf

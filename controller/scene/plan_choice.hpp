@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <string>
 
+#include "controller/scene/lattice.hpp"
 #include "controller/scene/scene.hpp"
 
 namespace kerf {
@@ -20,7 +21,8 @@ enum class Plan : std::uint8_t {
 
 struct PlanChoice {
   Plan plan = Plan::gather;
-  std::string why;  ///< one reason for a person
+  std::string why;   ///< one reason for a person
+  LatticeTurn turn;  ///< of the plan `aligned`: the tool's axes in the volume
 };
 
 /// The plan of `tool` in `volume`; the scene alone decides, never the machine. Load time.

@@ -4,6 +4,7 @@
 #include <cstddef>
 
 #include "controller/scene/force_maps.hpp"
+#include "controller/scene/lattice.hpp"
 #include "controller/scene/matrices.hpp"
 #include "controller/scene/scene.hpp"
 #include "controller/servo/servo_plan.hpp"
@@ -24,7 +25,10 @@ template <class N>
   in.aligned = table;
   in.voxel_from_pitch = rounded<typename N::Ratio, VoxelSpace, WorldSpace>(
       into_volume(rotation, {a / h[0], a / h[1], a / h[2]}));
-  for (std::size_t i = 0; i < 3; ++i) in.unrotated_step[i][i] = step_of<N>(a / h[i]);
+  const Matrix unturned = unturned_steps(tool, volume);
+  for (std::size_t i = 0; i < 3; ++i) {
+    for (std::size_t j = 0; j < 3; ++j) in.unturned_step[i][j] = step_of<N>(unturned[i][j]);
+  }
   in.overlap_ratio = step_of<N>(a * a * a / voxel_mm3);
 
   // World gradient per mm of density over its maximum: rotation * (1 / spacing) / 65535.

@@ -12,8 +12,9 @@
 #include <vector>
 
 #include "controller/scene/aligned_tool.hpp"
-#include "controller/scene/plan_choice.hpp"
+#include "controller/scene/lattice.hpp"
 #include "controller/scene/scene.hpp"
+#include "controller/scene/scene_costs.hpp"
 #include "controller/servo/servo_plan.hpp"
 #include "controller/servo/servo_state.hpp"
 
@@ -34,24 +35,46 @@ class PlannedArray {
   std::vector<T> memory_;
 };
 
-/// Owner of all arrays that a compiled scene steps on: first their sizes, by what the tools need,
-/// then their memory. Only what some tool needs exists. Load time.
+/// Owner of all arrays that a compiled scene steps on. First the `hold` functions, one a plan, say
+/// what a tool needs; then `take` makes the memory. What nobody needs does not exist. Load time.
 template <class N>
 class ServoMemory {
  public:
-  explicit ServoMemory(bool cutting) : cutting_(cutting) {}
-
-  /// A tool will touch volume `v` of the plan by `plan`; `table` is set for the plan `aligned`.
-  void hold(const SceneTool& tool, const SceneVolume& volume, std::size_t v, Plan plan,
-            const AlignedTable* table) {
-    switch (plan) {
-      case Plan::aligned:
-        hold_aligned(v, *table);
-        break;
-      case Plan::gather:
-        hold_gather(tool, volume, v);
-        break;
+  explicit ServoMemory(const Scene& scene) : cutting_(scene.cut.model != CutModel::none) {
+    for (const SceneVolume& volume : scene.volumes) {
+      volumes_.push_back({volume.name, volume.image.density.size() * sizeof(Density),
+                          volume.image.labels.size() * sizeof(Label)});
+      if (volume.solid) solid_names_.push_back(volume.name);
     }
+  }
+
+  /// The samples of the next tool; they stay where they are.
+  std::span<const ToolOffset> hold_samples(const SceneTool& tool) {
+    return samples_.emplace_back(tool.name, tool.offsets).second;
+  }
+
+  /// A table of the plan `aligned`; it stays where it is.
+  const AlignedTable& hold_table(const SceneTool& tool, const LatticeTurn& turn,
+                                 GradientKernel kernel, const AlignedKernels& kernels) {
+    tables_.emplace_back(tool.name, std::make_unique<AlignedTool>(turned(tool.offsets, turn),
+                                                                  *aligned_taps(kernel), kernels));
+    return tables_.back().second->table();
+  }
+
+  /// What a tool needs in volume `v` of the plan, in the plan `aligned`.
+  void hold_aligned(std::size_t v, const AlignedTable& table) {
+    aligned_.hold(table.size, cutting_);
+    if (cutting_) carries_[v].need(static_cast<std::size_t>(table.row_lanes));
+  }
+
+  /// The same in the plan `gather`.
+  void hold_gather(const SceneTool& tool, const SceneVolume& volume, std::size_t v) {
+    const auto& h = volume.image.spacing_mm;
+    gradients_[v].need(volume.image.grid.voxel_count());
+    if (!cutting_) return;
+    refresh_.need(1);
+    carries_[v].need(removal_lanes(overlap_width(tool.size_vox, tool.pitch_mm, h[0])));
+    overlap_.need(overlap_capacity(tool.size_vox, tool.pitch_mm, h));
   }
 
   /// Takes the volumes' densities over and allocates the rest; points `state` at it.
@@ -59,7 +82,7 @@ class ServoMemory {
     for (SceneVolume& volume : scene.volumes) {
       densities_.push_back(std::move(volume.image.density));
     }
-    auto refresh = std::make_unique<GradientScratch>();
+    const auto scratch = std::make_unique<GradientScratch>();
     for (std::size_t v = 0; v < plan.volume_count; ++v) {
       const VolumePlan<N>& volume = plan.volumes[v];
       std::vector<Density>& density = densities_[volume.scene_index];
@@ -67,7 +90,7 @@ class ServoMemory {
       carries_[v].allocate();
       if (gradients_[v].bytes() != 0) {
         refresh_gradients<N>(plan.kernel, volume.grid, density, volume.grid.box(),
-                             gradients_[v].span(), *refresh);
+                             gradients_[v].span(), *scratch);
       }
       state.volumes[v] = {density, gradients_[v].span(), carries_[v].span()};
     }
@@ -82,23 +105,42 @@ class ServoMemory {
     return densities_[scene_index];
   }
 
- private:
-  void hold_aligned(std::size_t v, const AlignedTable& table) {
-    aligned_.hold(table.size, cutting_);
-    if (cutting_) carries_[v].need(static_cast<std::size_t>(table.row_lanes));
+  /// All of it by name, before and after `take`.
+  [[nodiscard]] std::vector<ArrayBytes> arrays() const {
+    std::vector<ArrayBytes> list;
+    const auto add = [&](const std::string& name, std::size_t bytes) {
+      if (bytes != 0) list.push_back({name, bytes});
+    };
+    for (const VolumeBytes& volume : volumes_) {
+      add("density of " + volume.name, volume.density);
+      add("labels of " + volume.name, volume.labels);
+    }
+    for (std::size_t v = 0; v < solid_names_.size(); ++v) {
+      add("gradient of " + solid_names_[v], gradients_[v].bytes());
+      add("carry of " + solid_names_[v], carries_[v].bytes());
+    }
+    for (const auto& [name, samples] : samples_) {
+      add("samples of " + name, samples.size() * sizeof(ToolOffset));
+    }
+    for (const auto& [name, table] : tables_) add("table of " + name, table->bytes());
+    add("overlap box", overlap_.bytes());
+    add("refresh planes", refresh_.bytes());
+    for (const ArrayBytes& array : aligned_.arrays()) add(array.name, array.bytes);
+    return list;
   }
 
-  void hold_gather(const SceneTool& tool, const SceneVolume& volume, std::size_t v) {
-    const auto& h = volume.image.spacing_mm;
-    gradients_[v].need(volume.image.grid.voxel_count());
-    if (!cutting_) return;
-    refresh_.need(1);
-    carries_[v].need(removal_lanes(overlap_width(tool.size_vox, tool.pitch_mm, h[0])));
-    overlap_.need(overlap_capacity(tool.size_vox, tool.pitch_mm, h));
-  }
+ private:
+  struct VolumeBytes {
+    std::string name;
+    std::size_t density, labels;
+  };
 
   bool cutting_;
-  std::vector<std::vector<Density>> densities_;                   ///< by volume of the scene
+  std::vector<VolumeBytes> volumes_;  ///< by volume of the scene, as the densities
+  std::vector<std::string> solid_names_;
+  std::vector<std::vector<Density>> densities_;
+  std::vector<std::pair<std::string, std::vector<ToolOffset>>> samples_;
+  std::vector<std::pair<std::string, std::unique_ptr<AlignedTool>>> tables_;
   std::array<PlannedArray<Gradient<N>>, kMaxVolumes> gradients_;  ///< by volume of the plan
   std::array<PlannedArray<RemovalCarry<N>>, kMaxVolumes> carries_;
   PlannedArray<typename N::Weight> overlap_;

@@ -12,14 +12,12 @@
 #include "controller/kernel/tool_offset.hpp"
 #include "controller/servo/force_limits.hpp"
 #include "controller/servo/kinematics/omni.hpp"
-#include "controller/servo/servo_output.hpp"
+#include "controller/servo/servo_limits.hpp"
 #include "controller/servo/sum_to_force.hpp"
 #include "controller/servo/supervisor.hpp"
 #include "shared/volume/voxel_grid.hpp"
 
 namespace kerf {
-
-inline constexpr std::size_t kMaxTools = 16;
 
 /// A solid volume as the loop sees it; constant during a run.
 template <class N>
@@ -40,8 +38,9 @@ template <class N>
 struct ToolInVolume {
   /// Voxels per pitch along the world's axes; times the tool's rotation it is the sample step.
   Transform<typename N::Ratio, VoxelSpace, WorldSpace> voxel_from_pitch;
-  std::array<std::array<typename N::Step, 3>, 3> unrotated_step{};  ///< for round tools
-  typename N::Step overlap_ratio{};                                 ///< a^3 / V_voxel
+  std::array<std::array<typename N::Step, 3>, 3>
+      unturned_step{};               ///< of a tool that keeps its axes
+  typename N::Step overlap_ratio{};  ///< a^3 / V_voxel
   /// Plan `aligned` where set: no gradients are stored for it, and the two maps below take its
   /// sums. Else plan `gather`. Fixed point only.
   const AlignedTable* aligned = nullptr;
@@ -52,7 +51,9 @@ struct ToolInVolume {
 template <class N>
 struct ToolPlan {
   std::span<const ToolOffset> offsets;
+  /// A round tool has the same samples in every orientation: they keep the volume's axes.
   bool round = false;
+  bool turns = true;  ///< with the stylus; else the tool keeps the world's axes
   std::array<ToolInVolume<N>, kMaxVolumes> in_volume{};  ///< by index of the plan's volumes
 };
 

@@ -25,8 +25,8 @@ struct ToolForces {
   std::array<Removed, kMaxVolumes> removed{};  ///< by volume of the scene
 };
 
-/// Samples of the active tool in one volume. A round tool has the same samples in every
-/// orientation, so it stays unrotated.
+/// Samples of the active tool in one volume. A tool that is round, or that does not turn, has the
+/// same samples whatever the stylus does.
 template <class N>
 [[nodiscard]] ToolPose<N> tool_pose(const VolumePlan<N>& volume, const ToolPlan<N>& tool,
                                     const ToolInVolume<N>& in_volume,
@@ -34,8 +34,8 @@ template <class N>
                                     const Rotation<N>& rotation) noexcept {
   ToolPose<N> pose;
   pose.centre_vox = volume.voxel_from_world * (tip_mm - volume.position_mm);
-  pose.step = in_volume.unrotated_step;
-  if (tool.round) return pose;
+  pose.step = in_volume.unturned_step;
+  if (tool.round || !tool.turns) return pose;
   for (std::size_t i = 0; i < 3; ++i) {
     for (std::size_t j = 0; j < 3; ++j) {
       const auto& a = in_volume.voxel_from_pitch.row[i];

@@ -317,7 +317,7 @@ int run_controller(const ControllerOptions& options) {
   SegmentWriter segment = publish_scene(scene, json, report.config_hash);
   SegmentServer server(options.name, segment,
                        {.tools = static_cast<std::uint32_t>(scene.tools.size())});
-  const std::unique_ptr<Servo> servo = compile(scene);
+  const std::unique_ptr<CompiledScene> servo = compile(scene);
   std::optional<SocketPort> port;
   try {
     port.emplace(options.port.substr(std::string("socket:").size()), kPortPatienceMs, stop);

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+
+#include "controller/kernel/aligned_kernels.hpp"
+#include "controller/kernel/aligned_table.hpp"
+#include "controller/scene/scene.hpp"
+#include "controller/scene/scene_costs.hpp"
+
+namespace kerf {
+
+// One function a plan: its stages and the operations of each.
+
+/// copy     voxels of the box around the tool
+/// contact  multiply-adds of the correlation: table entries x 2 halves x 8 corners, chunk by chunk
+/// mill     multiply-adds of masks, filters and products, and removals; rows as whole vectors of 32
+/// Reached in every tick in which the box meets the volume; `mill` where no row of it is air.
+[[nodiscard]] PlanCost aligned_cost(const AlignedTable& table, const AlignedKernels& kernels,
+                                    bool cuts);
+
+/// contact       corners of the samples' cells: 8 a sample
+/// overlap       corners, and voxels of the box that the tool covers
+/// modification  voxels of that box
+/// removal       voxels of that box
+/// refresh       voxels of the box grown by the gradient's reach
+/// The box is bounded for every orientation that the tool can take.
+[[nodiscard]] PlanCost gather_cost(NumericKind numeric, const SceneTool& tool,
+                                   const SceneVolume& volume, bool cuts);
+
+/// Voxels of the largest box that the cells of the tool's samples can span, grown by `margin`
+/// voxels along each axis (both ends together), and at most those of the volume.
+///
+/// A tool of s samples a side spans E_i = SUM_j |R_ij| (s_j - 1) pitches along axis i. Each column
+/// of a rotation has |R_1j| + |R_2j| + |R_3j| <= sqrt(3), so SUM_i E_i <= sqrt(3) SUM_j (s_j - 1),
+/// and a product of three is at most the cube of their mean. Without turning E_i is known.
+[[nodiscard]] std::uint64_t covered_voxels(const SceneTool& tool, const SceneVolume& volume,
+                                           int margin);
+
+}  // namespace kerf
