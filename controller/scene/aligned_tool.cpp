@@ -227,7 +227,7 @@ AlignedScratch AlignedMemory::view() noexcept {
 
 std::vector<ArrayBytes> AlignedMemory::arrays() const {
   const auto named = [](const char* name, const auto& memory) {
-    return ArrayBytes{name, memory.size() * sizeof(memory[0])};
+    return ArrayBytes{name, memory.size() * sizeof(memory[0]), true};
   };
   return {named("box", box_), named("box mask", inside_), named("overlap ratios", ratio_),
           named("filtered rows", filter_), named("live rows", live_)};

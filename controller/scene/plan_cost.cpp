@@ -2,9 +2,9 @@
 #include "controller/scene/plan_cost.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <numbers>
+#include <span>
 #include <string>
 
 #include "controller/kernel/gradient.hpp"
@@ -36,6 +36,22 @@ std::uint64_t mill_operations(const AlignedTable& table) {
   return ratios * (kMasks + kTapsX + kTapsY + kProducts + kRemovals) + filtered * kTapsZ;
 }
 
+/// Mean of the spans along three axes at right angles, in pitches, in any orientation.
+double largest_mean_span(std::span<const ToolOffset> offsets) {
+  double across = 0, around = 0;   // largest distances from the axis and the centre, squared
+  std::int16_t low = 0, high = 0;  // along the axis; the centre counts too
+  for (const ToolOffset& offset : offsets) {
+    const double x = offset[0], y = offset[1], z = offset[2];  // half pitches
+    across = std::max(across, x * x + z * z);
+    around = std::max(around, x * x + y * y + z * z);
+    low = std::min(low, offset[1]);
+    high = std::max(high, offset[1]);
+  }
+  const double cylinder =
+      std::numbers::sqrt3 * (high - low) / 2.0 + std::sqrt(6.0) * std::sqrt(across);
+  return std::min(cylinder, 3 * std::sqrt(around)) / 3;
+}
+
 }  // namespace
 
 PlanCost aligned_cost(const AlignedTable& table, const AlignedKernels& kernels, bool cuts) {
@@ -49,11 +65,13 @@ PlanCost aligned_cost(const AlignedTable& table, const AlignedKernels& kernels, 
 PlanCost gather_cost(NumericKind numeric, const SceneTool& tool, const SceneVolume& volume,
                      bool cuts) {
   constexpr int kCellMargin = 3;  // floors at both ends, and the far corners of the last cells
-  const std::uint64_t corners = 8 * tool.offsets.size();
-  PlanCost cost{"gather/" + std::string(word_of(numeric)), {{"contact", corners}}};
+  constexpr std::uint64_t kPlace = 9, kCorners = 8;  // multiply-adds: three a component; one each
+  constexpr std::uint64_t kSpread = 2 * kPlace + 2 * kCorners;
+  const std::uint64_t samples = tool.offsets.size();
+  PlanCost cost{"gather/" + std::string(word_of(numeric)), {{"contact", kCorners * samples}}};
   if (!cuts) return cost;
   const std::uint64_t covered = covered_voxels(tool, volume, kCellMargin);
-  cost.stages.push_back({"overlap", corners + covered});
+  cost.stages.push_back({"overlap", kSpread * samples + covered});
   cost.stages.push_back({"modification", covered});
   cost.stages.push_back({"removal", covered});
   cost.stages.push_back(
@@ -63,18 +81,16 @@ PlanCost gather_cost(NumericKind numeric, const SceneTool& tool, const SceneVolu
 
 std::uint64_t covered_voxels(const SceneTool& tool, const SceneVolume& volume, int margin) {
   const auto& h = volume.image.spacing_mm;
-  std::array<double, 3> span{};  // pitches less one along each axis of the tool
-  for (std::size_t i = 0; i < 3; ++i) span[i] = tool.size_vox[i] - 1;
   double voxels = 1;
   if (tool.round || !tool.turns) {
     const Matrix steps = unturned_steps(tool, volume);
     for (const auto& row : steps) {
       double edge = margin;
-      for (std::size_t j = 0; j < 3; ++j) edge += std::abs(row[j]) * span[j];
+      for (std::size_t j = 0; j < 3; ++j) edge += std::abs(row[j]) * (tool.size_vox[j] - 1);
       voxels *= std::floor(edge + 1e-6);  // rounding of the steps must not lose a voxel
     }
   } else {
-    double mean = std::numbers::sqrt3 * (span[0] + span[1] + span[2]) / 3;
+    double mean = largest_mean_span(tool.offsets);
     for (const double mm : h) mean += margin * mm / tool.pitch_mm / 3;
     for (const double mm : h) voxels *= mean * tool.pitch_mm / mm;
   }

@@ -12,6 +12,9 @@ namespace kerf {
 
 // One function a plan: its stages and the operations of each.
 
+/// Goes up when what counts as an operation changes: prices that were measured before are void.
+inline constexpr int kCountsRevision = 1;
+
 /// copy     voxels of the box around the tool
 /// contact  multiply-adds of the correlation: table entries x 2 halves x 8 corners, chunk by chunk
 /// mill     multiply-adds of masks, filters and products, and removals; rows as whole vectors of 32
@@ -20,7 +23,8 @@ namespace kerf {
                                     bool cuts);
 
 /// contact       corners of the samples' cells: 8 a sample
-/// overlap       corners, and voxels of the box that the tool covers
+/// overlap       multiply-adds of a sample's place (twice), its weights and its sums, 34 a sample;
+///               and voxels of the box that the tool covers
 /// modification  voxels of that box
 /// removal       voxels of that box
 /// refresh       voxels of the box grown by the gradient's reach
@@ -31,9 +35,11 @@ namespace kerf {
 /// Voxels of the largest box that the cells of the tool's samples can span, grown by `margin`
 /// voxels along each axis (both ends together), and at most those of the volume.
 ///
-/// A tool of s samples a side spans E_i = SUM_j |R_ij| (s_j - 1) pitches along axis i. Each column
-/// of a rotation has |R_1j| + |R_2j| + |R_3j| <= sqrt(3), so SUM_i E_i <= sqrt(3) SUM_j (s_j - 1),
-/// and a product of three is at most the cube of their mean. Without turning E_i is known.
+/// The samples lie in a cylinder around the tool's y axis, of length L and diameter d, and in a
+/// sphere of diameter D. With the axis along the unit vector n the cylinder spans
+/// E_i = L |n_i| + d sqrt(1 - n_i^2) along axis i; by Cauchy and Schwarz SUM_i E_i is at most
+/// sqrt(3) L + sqrt(6) d, and 3 D. A product of three is at most the cube of their mean. Without
+/// turning E_i is known.
 [[nodiscard]] std::uint64_t covered_voxels(const SceneTool& tool, const SceneVolume& volume,
                                            int margin);
 

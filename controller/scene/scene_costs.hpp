@@ -32,7 +32,8 @@ struct TickCost {
 /// An array of a compiled scene.
 struct ArrayBytes {
   std::string name;
-  std::uint64_t bytes;
+  std::uint64_t bytes = 0;
+  bool taken = false;  ///< in memory already when the scene is planned
 };
 
 /// What a scene costs: known before its memory is taken.

@@ -105,27 +105,27 @@ class ServoMemory {
     return densities_[scene_index];
   }
 
-  /// All of it by name, before and after `take`.
+  /// All of it by name, as it is before `take`.
   [[nodiscard]] std::vector<ArrayBytes> arrays() const {
     std::vector<ArrayBytes> list;
-    const auto add = [&](const std::string& name, std::size_t bytes) {
-      if (bytes != 0) list.push_back({name, bytes});
+    const auto add = [&](const std::string& name, std::size_t bytes, bool taken) {
+      if (bytes != 0) list.push_back({name, bytes, taken});
     };
     for (const VolumeBytes& volume : volumes_) {
-      add("density of " + volume.name, volume.density);
-      add("labels of " + volume.name, volume.labels);
+      add("density of " + volume.name, volume.density, true);
+      add("labels of " + volume.name, volume.labels, true);
     }
     for (std::size_t v = 0; v < solid_names_.size(); ++v) {
-      add("gradient of " + solid_names_[v], gradients_[v].bytes());
-      add("carry of " + solid_names_[v], carries_[v].bytes());
+      add("gradient of " + solid_names_[v], gradients_[v].bytes(), false);
+      add("carry of " + solid_names_[v], carries_[v].bytes(), false);
     }
     for (const auto& [name, samples] : samples_) {
-      add("samples of " + name, samples.size() * sizeof(ToolOffset));
+      add("samples of " + name, samples.size() * sizeof(ToolOffset), true);
     }
-    for (const auto& [name, table] : tables_) add("table of " + name, table->bytes());
-    add("overlap box", overlap_.bytes());
-    add("refresh planes", refresh_.bytes());
-    for (const ArrayBytes& array : aligned_.arrays()) add(array.name, array.bytes);
+    for (const auto& [name, table] : tables_) add("table of " + name, table->bytes(), true);
+    add("overlap box", overlap_.bytes(), false);
+    add("refresh planes", refresh_.bytes(), false);
+    for (const ArrayBytes& array : aligned_.arrays()) add(array.name, array.bytes, array.taken);
     return list;
   }
 
