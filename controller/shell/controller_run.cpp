@@ -197,44 +197,19 @@ int check_scene(const Scene& scene) {
   return 0;
 }
 
-/// `--explain`: plans, operations, time and memory of the scene on this machine.
+/// `--explain`: what the scene costs on this machine; it is not run.
 int explain_scene(const ControllerOptions& options, Scene& scene, CompiledScene& servo) {
   const int core = options.real_time.cpu >= 0 ? options.real_time.cpu : allowed_cores().back();
   static_cast<void>(pin_to_core(core));  // where it may not, times are less even
   const Calibration calibration = calibration_of_machine(calibration_path(), options.calibrate);
-  const SceneCosts& costs = servo.costs();
-  Explanation told{.scene = scene.path,
-                   .numeric = std::string(word_of(scene.servo.numeric)),
-                   .cut = std::string(word_of(scene.cut.model)),
-                   .machine = calibration.machine,
-                   .rate_hz = scene.servo.rate_hz,
-                   .budget_us = work_budget_us(scene),
-                   .ticks = {},
-                   .arrays = costs.arrays};
-  const auto segment = plan_segment(segment_spec(scene, canonical_json(scene), 0));
-  for (ArrayBytes& array : segment_arrays(segment, scene)) told.arrays.push_back(std::move(array));
-  check_memory(scene, costs, 0);
+  const SegmentPlan segment = plan_segment(segment_spec(scene, canonical_json(scene), 0));
+  check_memory(scene, servo.costs(), 0);
   servo.take(scene);
-  for (std::size_t i = 0; i < costs.ticks.size(); ++i) {
-    const TickCost& tick = costs.ticks[i];
-    ExplainedTick& out =
-        told.ticks.emplace_back(ExplainedTick{.tool = scene.tools[tick.tool].name,
-                                              .volume = scene.volumes[tick.volume].name,
-                                              .way = tick.cost.way,
-                                              .why = tick.choice.why,
-                                              .stages = {},
-                                              .work_us = work_us(tick.cost)});
-    const std::vector<double> measured_us = servo.time_stages(i);
-    for (std::size_t s = 0; s < measured_us.size(); ++s) {
-      const StageCost& stage = tick.cost.stages[s];
-      out.stages.push_back({stage, calibration.stage_us(tick.cost, stage), measured_us[s]});
-    }
-  }
+  const Explanation told = explain(scene, servo, segment, calibration);
   std::fputs(explanation_text(told).c_str(), stdout);
   if (!options.report.empty()) write_new_file(options.report, explanation_json(told));
-  if (const std::string refusal = over_budget(scene, costs); !refusal.empty()) {
-    throw std::runtime_error(refusal);
-  }
+  const std::string refusal = over_budget(scene, servo.costs());
+  if (!refusal.empty()) throw std::runtime_error(refusal);
   return 0;
 }
 

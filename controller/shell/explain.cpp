@@ -8,6 +8,9 @@
 
 #include <nlohmann/json.hpp>
 
+#include "controller/scene/scene_words.hpp"
+#include "controller/scene/work_budget.hpp"
+
 namespace kerf {
 namespace {
 
@@ -101,6 +104,35 @@ std::vector<ArrayBytes> segment_arrays(const SegmentPlan& plan, const Scene& sce
     arrays.push_back({"segment: " + parts[i].second, end - parts[i].first, false});
   }
   return arrays;
+}
+
+Explanation explain(const Scene& scene, CompiledScene& servo, const SegmentPlan& segment,
+                    const Calibration& calibration) {
+  const SceneCosts& costs = servo.costs();
+  Explanation told{.scene = scene.path,
+                   .numeric = std::string(word_of(scene.servo.numeric)),
+                   .cut = std::string(word_of(scene.cut.model)),
+                   .machine = calibration.machine,
+                   .rate_hz = scene.servo.rate_hz,
+                   .budget_us = work_budget_us(scene),
+                   .ticks = {},
+                   .arrays = costs.arrays};
+  for (ArrayBytes& array : segment_arrays(segment, scene)) told.arrays.push_back(std::move(array));
+  for (std::size_t i = 0; i < costs.ticks.size(); ++i) {
+    const TickCost& tick = costs.ticks[i];
+    ExplainedTick& out = told.ticks.emplace_back();
+    out.tool = scene.tools[tick.tool].name;
+    out.volume = scene.volumes[tick.volume].name;
+    out.way = tick.cost.way;
+    out.why = tick.choice.why;
+    out.work_us = work_us(tick.cost);
+    const std::vector<double> measured_us = servo.time_stages(i);
+    for (std::size_t s = 0; s < measured_us.size(); ++s) {
+      const StageCost& stage = tick.cost.stages[s];
+      out.stages.push_back({stage, calibration.stage_us(tick.cost, stage), measured_us[s]});
+    }
+  }
+  return told;
 }
 
 std::string explanation_text(const Explanation& e) {

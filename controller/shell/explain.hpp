@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "controller/scene/compile.hpp"
 #include "controller/scene/scene.hpp"
 #include "controller/scene/scene_costs.hpp"
 #include "controller/shell/calibration.hpp"
@@ -37,6 +38,10 @@ struct Explanation {
 
 /// The parts of a segment as its layout places them, each up to where the next one begins.
 [[nodiscard]] std::vector<ArrayBytes> segment_arrays(const SegmentPlan& plan, const Scene& scene);
+
+/// Times every tool in every volume of a scene that `servo` has taken; see `time_stages`.
+[[nodiscard]] Explanation explain(const Scene& scene, CompiledScene& servo,
+                                  const SegmentPlan& segment, const Calibration& calibration);
 
 /// For a person.
 [[nodiscard]] std::string explanation_text(const Explanation& explanation);
