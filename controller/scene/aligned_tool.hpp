@@ -19,8 +19,8 @@ namespace kerf {
 /// the same place, at most kMaxAlignedEdge along each axis, at least one.
 [[nodiscard]] bool can_align(std::span<const ToolOffset> offsets);
 
-/// The taps of a gradient kernel as the plan takes them; nullptr for `central`, which it does not.
-[[nodiscard]] const AlignedTaps* aligned_taps(GradientKernel kernel);
+/// The taps of a gradient kernel as exact sums take them.
+[[nodiscard]] const AlignedTaps& aligned_taps(GradientKernel kernel);
 
 /// Owner of one tool's table for the plan `aligned`. Load time; moving it keeps the table valid.
 class AlignedTool {

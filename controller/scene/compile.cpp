@@ -28,7 +28,8 @@ class SceneIn final : public CompiledScene {
     plan_device(scene.device, plan_);
     plan_limits(scene, plan_);
     plan_.kernel = scene.servo.kernel;
-    plan_.aligned_kernels = *aligned_kernels();
+    plan_.taps = &aligned_taps(scene.servo.kernel);
+    plan_.kernels = *aligned_kernels();
     plan_.cutting = scene.cut.model != CutModel::none;
     plan_.removal_rate = removal_rate<N>(scene.cut.rate_per_s / scene.servo.rate_hz,
                                          scene.cut.model == CutModel::overlap_exact);
@@ -80,18 +81,27 @@ class SceneIn final : public CompiledScene {
         case Plan::aligned:
           if (table == nullptr || turn != choice.turn) {
             turn = choice.turn;
-            table = &memory_.hold_table(tool, turn, scene.servo.kernel, *plan_.aligned_kernels);
+            table = &memory_.hold_table(tool, turn, scene.servo.kernel, *plan_.kernels);
           }
           memory_.hold_aligned(v, *table);
-          plan.in_volume[v] = plan_tool<N>(scene, tool, volume, table);
-          cost = aligned_cost(*table, *plan_.aligned_kernels, plan_.cutting);
+          cost = aligned_cost(*table, *plan_.kernels, plan_.cutting);
           break;
         case Plan::gather:
           memory_.hold_gather(tool, volume, v);
-          plan.in_volume[v] = plan_tool<N>(scene, tool, volume, nullptr);
-          cost = gather_cost(scene.servo.numeric, tool, volume, plan_.cutting);
+          cost = gather_cost(scene.servo.numeric, *plan_.kernels, tool, volume, plan_.cutting);
+          break;
+        case Plan::splat:
+          memory_.hold_splat(tool, volume, v);
+          cost = splat_cost(*plan_.kernels, tool, volume);
           break;
       }
+      if constexpr (N::kIsFixed) {
+        if (choice.plan != Plan::aligned && plan.samples.count == 0) {
+          plan.samples = memory_.hold_sample_table(tool);
+        }
+      }
+      plan.in_volume[v] = plan_tool<N>(scene, tool, volume, choice.plan,
+                                       choice.plan == Plan::aligned ? table : nullptr);
       costs_.ticks.push_back({plan_.tool_count - 1, scene_index, choice, std::move(cost)});
     }
   }

@@ -7,6 +7,7 @@
 #include <cstdint>
 
 #include "controller/kernel/aligned_table.hpp"
+#include "controller/kernel/wide_sum.hpp"
 #include "controller/scene/matrices.hpp"
 #include "controller/servo/sum_to_force.hpp"
 
@@ -23,14 +24,16 @@ struct SumUnit {
   return {std::ldexp(1.0, -15), std::ldexp(std::max(terms, 1.0), 30)};
 }
 
-/// Contact sums of the plan `aligned` have 8 kept bits, its modification sums exact gradients.
+/// Contact sums of the plan `aligned` have 8 kept bits.
 [[nodiscard]] inline SumUnit aligned_contact_unit(double samples) {
   return {std::ldexp(1.0, -kAlignedKeptBits),
           std::ldexp(std::max(samples, 1.0), 15 + kAlignedKeptBits)};
 }
-[[nodiscard]] inline SumUnit aligned_modification_unit(const AlignedTaps& taps, double samples) {
-  return {std::ldexp(taps.factor, -taps.shift - 15),
-          std::ldexp(samples * static_cast<double>(kMaxExactGradient), 15)};
+/// Sums of exact gradients times weights of 2^15, as far as `sum_shift` keeps them.
+[[nodiscard]] inline SumUnit exact_sum_unit(const AlignedTaps& taps, std::size_t samples) {
+  const int bits = 15 - sum_shift(samples);
+  return {std::ldexp(taps.factor, -taps.shift - bits),
+          std::ldexp(static_cast<double>(samples) * static_cast<double>(kMaxExactGradient), bits)};
 }
 
 /// Newtons per unit of an exact sum, as the loop's numbers hold it.

@@ -14,6 +14,9 @@
 namespace kerf {
 namespace {
 
+constexpr int kCellMargin = 3;  ///< floors at both ends, and the far corners of the last cells
+constexpr std::uint64_t kPlace = 9, kCorners = 8;  ///< multiply-adds: three a component; one each
+
 std::uint64_t count(std::int32_t n) {
   return static_cast<std::uint64_t>(n);
 }
@@ -62,13 +65,25 @@ PlanCost aligned_cost(const AlignedTable& table, const AlignedKernels& kernels, 
   return cost;
 }
 
-PlanCost gather_cost(NumericKind numeric, const SceneTool& tool, const SceneVolume& volume,
-                     bool cuts) {
-  constexpr int kCellMargin = 3;  // floors at both ends, and the far corners of the last cells
-  constexpr std::uint64_t kPlace = 9, kCorners = 8;  // multiply-adds: three a component; one each
+PlanCost splat_cost(const AlignedKernels& kernels, const SceneTool& tool,
+                    const SceneVolume& volume) {
+  const std::uint64_t samples = tool.offsets.size();
+  const std::uint64_t box = covered_voxels(tool, volume, kCellMargin + 2 * kGradientReach);
+  return {std::string("splat/") + kernels.name,
+          {{"place", kPlace * samples},
+           {"copy", box},
+           {"splat", kCorners * samples},
+           {"press", box},
+           {"cut", covered_voxels(tool, volume, kCellMargin)}}};
+}
+
+PlanCost gather_cost(NumericKind numeric, const AlignedKernels& kernels, const SceneTool& tool,
+                     const SceneVolume& volume, bool cuts) {
   constexpr std::uint64_t kSpread = 2 * kPlace + 2 * kCorners;
   const std::uint64_t samples = tool.offsets.size();
-  PlanCost cost{"gather/" + std::string(word_of(numeric)), {{"contact", kCorners * samples}}};
+  PlanCost cost{
+      "gather/" + std::string(numeric == NumericKind::fixed ? kernels.name : word_of(numeric)),
+      {{"contact", kCorners * samples}}};
   if (!cuts) return cost;
   const std::uint64_t covered = covered_voxels(tool, volume, kCellMargin);
   cost.stages.push_back({"overlap", kSpread * samples + covered});

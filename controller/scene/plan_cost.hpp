@@ -13,7 +13,7 @@ namespace kerf {
 // One function a plan: its stages and the operations of each.
 
 /// Goes up when what counts as an operation changes: prices that were measured before are void.
-inline constexpr int kCountsRevision = 1;
+inline constexpr int kCountsRevision = 2;
 
 /// copy     voxels of the box around the tool
 /// contact  multiply-adds of the correlation: table entries x 2 halves x 8 corners, chunk by chunk
@@ -22,15 +22,24 @@ inline constexpr int kCountsRevision = 1;
 [[nodiscard]] PlanCost aligned_cost(const AlignedTable& table, const AlignedKernels& kernels,
                                     bool cuts);
 
+/// place  multiply-adds of the samples' places, 9 a sample
+/// copy   voxels of the box around the tool
+/// splat  corners of the samples' cells: 8 a sample
+/// press  voxels of that box, each filtered along three axes
+/// cut    voxels that the tool covers
+/// The boxes are bounded for every orientation that the tool can take.
+[[nodiscard]] PlanCost splat_cost(const AlignedKernels& kernels, const SceneTool& tool,
+                                  const SceneVolume& volume);
+
 /// contact       corners of the samples' cells: 8 a sample
 /// overlap       multiply-adds of a sample's place (twice), its weights and its sums, 34 a sample;
 ///               and voxels of the box that the tool covers
 /// modification  voxels of that box
 /// removal       voxels of that box
 /// refresh       voxels of the box grown by the gradient's reach
-/// The box is bounded for every orientation that the tool can take.
-[[nodiscard]] PlanCost gather_cost(NumericKind numeric, const SceneTool& tool,
-                                   const SceneVolume& volume, bool cuts);
+/// The box is bounded likewise. Fixed point gathers only where nothing is cut.
+[[nodiscard]] PlanCost gather_cost(NumericKind numeric, const AlignedKernels& kernels,
+                                   const SceneTool& tool, const SceneVolume& volume, bool cuts);
 
 /// Voxels of the largest box that the cells of the tool's samples can span, grown by `margin`
 /// voxels along each axis (both ends together), and at most those of the volume.

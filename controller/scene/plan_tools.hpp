@@ -3,6 +3,7 @@
 
 #include <cstddef>
 
+#include "controller/scene/aligned_tool.hpp"
 #include "controller/scene/force_maps.hpp"
 #include "controller/scene/lattice.hpp"
 #include "controller/scene/matrices.hpp"
@@ -11,17 +12,19 @@
 
 namespace kerf {
 
-/// Steps and forces of one tool in one volume; `table` is the tool's for the plan `aligned`, or
-/// nullptr for the plan `gather`.
+/// Steps and forces of one tool in one volume; `table` is the tool's for the plan `aligned`.
 template <class N>
 [[nodiscard]] ToolInVolume<N> plan_tool(const Scene& scene, const SceneTool& tool,
-                                        const SceneVolume& volume, const AlignedTable* table) {
+                                        const SceneVolume& volume, Plan plan,
+                                        const AlignedTable* table) {
   const auto& h = volume.image.spacing_mm;
   const double a = tool.pitch_mm;
   const double voxel_mm3 = h[0] * h[1] * h[2];
-  const auto samples = static_cast<double>(tool.offsets.size());
+  const std::size_t samples = tool.offsets.size();
+  const auto terms = static_cast<double>(samples);
   const Matrix rotation = matrix_of(volume.pose.orientation);
   ToolInVolume<N> in;
+  in.plan = plan;
   in.aligned = table;
   in.voxel_from_pitch = rounded<typename N::Ratio, VoxelSpace, WorldSpace>(
       into_volume(rotation, {a / h[0], a / h[1], a / h[2]}));
@@ -41,14 +44,15 @@ template <class N>
     }
     return m;
   };
-  in.contact =
-      sum_to_force<N>(newtons(scene.force.p0_n_per_mm2 * a * a * a),
-                      table != nullptr ? aligned_contact_unit(samples) : gathered_sum(samples));
+  const SumUnit exact = exact_sum_unit(aligned_taps(scene.servo.kernel), samples);
+  SumUnit contact = gathered_sum(terms);
   // Each voxel counts at most once, and the tool touches at most eight voxels per sample.
-  in.modification =
-      sum_to_force<N>(newtons(scene.cut.p1_n_per_mm2 * voxel_mm3),
-                      table != nullptr ? aligned_modification_unit(table->taps, samples)
-                                       : gathered_sum(8 * samples));
+  SumUnit modification = gathered_sum(8 * terms);
+  if (plan == Plan::aligned) contact = aligned_contact_unit(terms);
+  if (plan == Plan::splat) contact = exact;
+  if (plan != Plan::gather) modification = exact;
+  in.contact = sum_to_force<N>(newtons(scene.force.p0_n_per_mm2 * a * a * a), contact);
+  in.modification = sum_to_force<N>(newtons(scene.cut.p1_n_per_mm2 * voxel_mm3), modification);
   return in;
 }
 

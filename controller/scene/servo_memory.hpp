@@ -13,6 +13,7 @@
 
 #include "controller/scene/aligned_tool.hpp"
 #include "controller/scene/lattice.hpp"
+#include "controller/scene/sample_tool.hpp"
 #include "controller/scene/scene.hpp"
 #include "controller/scene/scene_costs.hpp"
 #include "controller/servo/servo_plan.hpp"
@@ -57,24 +58,41 @@ class ServoMemory {
   const AlignedTable& hold_table(const SceneTool& tool, const LatticeTurn& turn,
                                  GradientKernel kernel, const AlignedKernels& kernels) {
     tables_.emplace_back(tool.name, std::make_unique<AlignedTool>(turned(tool.offsets, turn),
-                                                                  *aligned_taps(kernel), kernels));
+                                                                  aligned_taps(kernel), kernels));
     return tables_.back().second->table();
   }
 
   /// What a tool needs in volume `v` of the plan, in the plan `aligned`.
   void hold_aligned(std::size_t v, const AlignedTable& table) {
-    aligned_.hold(table.size, cutting_);
+    scratch_.tick().hold(table.size, cutting_);
     if (cutting_) carries_[v].need(static_cast<std::size_t>(table.row_lanes));
   }
 
   /// The same in the plan `gather`.
   void hold_gather(const SceneTool& tool, const SceneVolume& volume, std::size_t v) {
     const auto& h = volume.image.spacing_mm;
-    gradients_[v].need(volume.image.grid.voxel_count());
+    gradients_[v].need(volume.image.grid.voxel_count() + kFieldPad);
     if (!cutting_) return;
     refresh_.need(1);
     carries_[v].need(removal_lanes(overlap_width(tool.size_vox, tool.pitch_mm, h[0])));
     overlap_.need(overlap_capacity(tool.size_vox, tool.pitch_mm, h));
+  }
+
+  /// The same in the plan `splat`.
+  void hold_splat(const SceneTool& tool, const SceneVolume& volume, std::size_t v) {
+    std::array<std::size_t, 3> width{};
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      width[axis] = overlap_width(tool.size_vox, tool.pitch_mm, volume.image.spacing_mm[axis]);
+    }
+    scratch_.hold(width, tool.offsets.size());
+    carries_[v].need(splat_lanes(width[0]));
+  }
+
+  /// A tool's samples for the plans that take any pose in fixed point; they stay where they are.
+  SampleTable hold_sample_table(const SceneTool& tool) {
+    const auto order = cutting_ ? SampleOrder::scattered : SampleOrder::as_given;
+    sample_tables_.emplace_back(tool.name, SampleTool(tool.offsets, order));
+    return sample_tables_.back().second.table();
   }
 
   /// Takes the volumes' densities over and allocates the rest; points `state` at it.
@@ -98,7 +116,7 @@ class ServoMemory {
     refresh_.allocate();
     state.overlap.memory = overlap_.span();
     state.gradient_scratch = refresh_.span().data();
-    state.aligned_scratch = aligned_.view();
+    state.splat = scratch_.view();
   }
 
   [[nodiscard]] std::span<const Density> density(std::size_t scene_index) const noexcept {
@@ -125,7 +143,10 @@ class ServoMemory {
     for (const auto& [name, table] : tables_) add("table of " + name, table->bytes(), true);
     add("overlap box", overlap_.bytes(), false);
     add("refresh planes", refresh_.bytes(), false);
-    for (const ArrayBytes& array : aligned_.arrays()) add(array.name, array.bytes, array.taken);
+    for (const auto& [name, table] : sample_tables_) {
+      add("ordered samples of " + name, table.bytes(), true);
+    }
+    for (const ArrayBytes& array : scratch_.arrays()) add(array.name, array.bytes, array.taken);
     return list;
   }
 
@@ -141,11 +162,12 @@ class ServoMemory {
   std::vector<std::vector<Density>> densities_;
   std::vector<std::pair<std::string, std::vector<ToolOffset>>> samples_;
   std::vector<std::pair<std::string, std::unique_ptr<AlignedTool>>> tables_;
+  std::vector<std::pair<std::string, SampleTool>> sample_tables_;
   std::array<PlannedArray<Gradient<N>>, kMaxVolumes> gradients_;  ///< by volume of the plan
   std::array<PlannedArray<RemovalCarry<N>>, kMaxVolumes> carries_;
   PlannedArray<typename N::Weight> overlap_;
   PlannedArray<GradientScratch> refresh_;
-  AlignedMemory aligned_;
+  SplatMemory scratch_;
 };
 
 }  // namespace kerf

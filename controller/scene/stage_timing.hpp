@@ -11,6 +11,8 @@
 
 #include "controller/kernel/aligned.hpp"
 #include "controller/kernel/contact.hpp"
+#include "controller/kernel/gather.hpp"
+#include "controller/kernel/splat.hpp"
 #include "controller/scene/plan_choice.hpp"
 #include "controller/servo/tool_forces.hpp"
 
@@ -123,14 +125,28 @@ template <class N>
     pose.centre_vox = {Real(place.x + 0.002 * i), Real(place.y + 0.3), Real(place.z + 0.4)};
     laps.begin();
     if constexpr (N::kIsFixed) {
-      if (in_volume.aligned != nullptr) {
-        const AlignedTick tick(*plan.aligned_kernels, *in_volume.aligned, state.aligned_scratch,
-                               volume.grid, memory.density, pose);
+      if (in_volume.plan == Plan::aligned) {
+        const AlignedTick tick(*plan.kernels, *in_volume.aligned, state.splat.tick, volume.grid,
+                               memory.density, pose);
         laps.end_stage(0);
         laps.end_stage(tick.contact().x);
         if (plan.cutting) laps.end_stage(tick.mill(rate, memory.carry).modification.x);
         continue;
       }
+      if (in_volume.plan == Plan::splat) {
+        const SplatTick tick(*plan.kernels, tool.samples, *plan.taps, state.splat, volume.grid,
+                             memory.density, pose);
+        laps.end_stage(tick.box().row_lanes);
+        tick.copy();
+        laps.end_stage(0);
+        tick.splat();
+        laps.end_stage(0);
+        laps.end_stage(tick.press(in_volume.overlap_ratio).contact.x);
+        laps.end_stage(tick.cut(rate, memory.carry).changed.hi.x);
+        continue;
+      }
+      laps.end_stage(gathered_contact(*plan.kernels, tool.samples, volume.grid, gradient, pose).x);
+      continue;
     }
     laps.end_stage(
         static_cast<std::int64_t>(contact_sum<N>(volume.grid, gradient, tool.offsets, pose).x));

@@ -16,18 +16,25 @@ struct Price {
 };
 
 constexpr std::array kPrices{
-    Price{"aligned/avx512", "copy", 0.08},      Price{"aligned/avx512", "contact", 0.005},
-    Price{"aligned/avx512", "mill", 0.01},      Price{"aligned/avx2", "copy", 0.08},
-    Price{"aligned/avx2", "contact", 0.011},    Price{"aligned/avx2", "mill", 0.021},
-    Price{"aligned/scalar", "copy", 1.0},       Price{"aligned/scalar", "contact", 0.042},
-    Price{"aligned/scalar", "mill", 0.22},      Price{"gather/fixed", "contact", 1.9},
-    Price{"gather/fixed", "overlap", 0.95},     Price{"gather/fixed", "modification", 0.85},
-    Price{"gather/fixed", "removal", 2.2},      Price{"gather/fixed", "refresh", 9.3},
-    Price{"gather/float", "contact", 1.4},      Price{"gather/float", "overlap", 0.8},
-    Price{"gather/float", "modification", 0.6}, Price{"gather/float", "removal", 2.2},
-    Price{"gather/float", "refresh", 8.0},      Price{"gather/double", "contact", 1.9},
-    Price{"gather/double", "overlap", 0.95},    Price{"gather/double", "modification", 0.6},
-    Price{"gather/double", "removal", 2.2},     Price{"gather/double", "refresh", 8.0},
+    Price{"aligned/avx512", "copy", 0.08},       Price{"aligned/avx512", "contact", 0.005},
+    Price{"aligned/avx512", "mill", 0.01},       Price{"aligned/avx2", "copy", 0.08},
+    Price{"aligned/avx2", "contact", 0.011},     Price{"aligned/avx2", "mill", 0.021},
+    Price{"aligned/scalar", "copy", 1.0},        Price{"aligned/scalar", "contact", 0.042},
+    Price{"aligned/scalar", "mill", 0.22},       Price{"gather/avx512", "contact", 0.25},
+    Price{"gather/avx2", "contact", 0.35},       Price{"gather/scalar", "contact", 3.5},
+    Price{"splat/avx512", "place", 0.05},        Price{"splat/avx512", "copy", 0.09},
+    Price{"splat/avx512", "splat", 0.2},         Price{"splat/avx512", "press", 0.8},
+    Price{"splat/avx512", "cut", 0.2},           Price{"splat/avx2", "place", 0.06},
+    Price{"splat/avx2", "copy", 0.12},           Price{"splat/avx2", "splat", 0.22},
+    Price{"splat/avx2", "press", 1.2},           Price{"splat/avx2", "cut", 0.25},
+    Price{"splat/scalar", "place", 0.2},         Price{"splat/scalar", "copy", 1.2},
+    Price{"splat/scalar", "splat", 0.5},         Price{"splat/scalar", "press", 8},
+    Price{"splat/scalar", "cut", 2.5},           Price{"gather/float", "contact", 1.4},
+    Price{"gather/float", "overlap", 0.8},       Price{"gather/float", "modification", 0.6},
+    Price{"gather/float", "removal", 2.2},       Price{"gather/float", "refresh", 8.0},
+    Price{"gather/double", "contact", 1.9},      Price{"gather/double", "overlap", 0.95},
+    Price{"gather/double", "modification", 0.6}, Price{"gather/double", "removal", 2.2},
+    Price{"gather/double", "refresh", 8.0},
 };
 
 }  // namespace

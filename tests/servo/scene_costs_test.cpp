@@ -12,8 +12,10 @@
 
 #include "controller/kernel/contact.hpp"
 #include "controller/kernel/overlap.hpp"
+#include "controller/kernel/splat.hpp"
 #include "controller/scene/aligned_tool.hpp"
 #include "controller/scene/plan_cost.hpp"
+#include "controller/scene/sample_tool.hpp"
 #include "controller/scene/stage_timing.hpp"
 #include "controller/scene/tool_shapes.hpp"
 #include "controller/scene/work_budget.hpp"
@@ -143,8 +145,39 @@ TEST_CASE("the corners that a contact visits are the products of its sum") {
     Counted::products = 0;
     static_cast<void>(contact_sum<CountingNumbers>(
         block.image.grid, std::span<const Gradient<CountingNumbers>>(field), tool.offsets, pose));
-    CHECK(3 * operations(gather_cost(NumericKind::fixed, tool, block, false), "contact") ==
+    CHECK(3 * operations(gather_cost(NumericKind::fixed, kAlignedScalar, tool, block, false),
+                         "contact") ==
           Counted::products);
+  }
+}
+
+TEST_CASE("a splatting tick copies no more voxels than it is said to, in any pose") {
+  SceneVolume block = full_block(64);
+  std::srand(4);
+  for (const SceneTool& tool : {shape("cylinder", 0.5, 4), shape("wheel", 1, 0.5)}) {
+    const SampleTool samples(tool.offsets, SampleOrder::scattered);
+    SplatMemory memory;
+    const std::size_t width = overlap_width(tool.size_vox, kVoxelMm, kVoxelMm);
+    memory.hold({width, width, width}, tool.offsets.size());
+    const SplatScratch scratch = memory.view();
+    const PlanCost cost = splat_cost(kAlignedScalar, tool, block);
+    CHECK(operations(cost, "place") == 9 * tool.offsets.size());
+    CHECK(operations(cost, "splat") == 8 * tool.offsets.size());
+    std::int64_t most = 0;
+    for (int i = 0; i < 2000; ++i) {
+      ToolPose<FixedNumbers> pose;
+      pose.centre_vox = {Q16(32 + i % 7 * 0.13), Q16(31 + i % 11 * 0.09), Q16(32.0)};
+      const Matrix turn = random_turn();
+      for (std::size_t a = 0; a < 3; ++a) {
+        for (std::size_t b = 0; b < 3; ++b) pose.step[a][b] = step_of<FixedNumbers>(turn[a][b]);
+      }
+      const SplatTick tick(kAlignedScalar, samples.table(), kAlignedFarid, scratch,
+                           block.image.grid, block.image.density, pose);
+      const VoxelIndex box = tick.box().box;
+      most = std::max(most, std::int64_t{box.x} * box.y * box.z);
+    }
+    CHECK(most <= static_cast<std::int64_t>(operations(cost, "copy")));
+    CHECK(static_cast<double>(most) > 0.7 * static_cast<double>(operations(cost, "copy")));
   }
 }
 
@@ -204,7 +237,7 @@ TEST_CASE("a scene above the budget is refused on one line, and fits at a lower 
   scene.servo.rate_hz = 8000;
   const std::string line = over_budget(scene, plan_scene(scene)->costs());
   CHECK(line.find("scenes/x.toml: tool stub: up to ") == 0);
-  CHECK(line.find("plan gather/fixed") != std::string::npos);
+  CHECK(line.find("plan splat/") != std::string::npos);
   CHECK(line.find("; use a smaller tool, a lower rate") != std::string::npos);
   CHECK(line.find('\n') == std::string::npos);
   scene.tools.pop_back();
@@ -227,15 +260,22 @@ TEST_CASE("a scene holds the arrays that it names, and no others") {
                                 "filtered rows", "live rows"});
   Scene odd = touch;
   odd.tools = {shape("cone", 0.6, 2)};
-  CHECK(arrays_of(odd) == Names{"density of test", "gradient of test", "samples of cone"});
+  CHECK(arrays_of(odd) ==
+        Names{"density of test", "gradient of test", "samples of cone", "ordered samples of cone"});
   Scene odd_cut = odd;
   odd_cut.cut.model = CutModel::overlap;
   odd_cut.volumes[0].image.labels.assign(odd_cut.volumes[0].image.density.size(), 1);
-  CHECK(arrays_of(odd_cut) == Names{"density of test", "labels of test", "gradient of test",
-                                    "carry of test", "samples of cone", "overlap box",
-                                    "refresh planes"});
+  CHECK(arrays_of(odd_cut) == Names{"density of test", "labels of test", "carry of test",
+                                    "samples of cone", "ordered samples of cone", "box", "box mask",
+                                    "overlap ratios", "filtered rows", "live rows", "sample places",
+                                    "overlap sums", "rest rows", "live rest rows"});
+  Scene floating = odd_cut;
+  floating.servo.numeric = NumericKind::float64;
+  CHECK(arrays_of(floating) == Names{"density of test", "labels of test", "gradient of test",
+                                     "carry of test", "samples of cone", "overlap box",
+                                     "refresh planes"});
   odd_cut.tools[0].turns = false;
-  Names unturned = arrays_of(odd_cut);
-  CHECK(unturned.count("gradient of test") == 0);
+  const Names unturned = arrays_of(odd_cut);
+  CHECK(unturned.count("ordered samples of cone") == 0);
   CHECK(unturned.count("table of cone") == 1);
 }
