@@ -36,7 +36,7 @@
 #include "shared/posix/cores.hpp"
 #include "shared/posix/memory.hpp"
 #include "shared/posix/new_file.hpp"
-#include "shared/segment/hash.hpp"
+#include "shared/volume/density_hash.hpp"
 
 namespace kerf {
 namespace {
