@@ -13,7 +13,6 @@
 #include <utility>
 #include <vector>
 
-#include "controller/kernel/aligned_kernels.hpp"
 #include "controller/scene/aligned_tool.hpp"
 #include "controller/scene/scene_error.hpp"
 #include "controller/scene/scene_place.hpp"
@@ -82,13 +81,19 @@ SumUnit aligned_modification_unit(const AlignedTaps& taps, double samples) {
           std::ldexp(samples * static_cast<double>(kMaxExactGradient), 15)};
 }
 
+/// Smallest n with 2^n >= x; exact, unlike a logarithm, whose last bit differs between machines.
+int bits_of(double x) {
+  const int floor = std::ilogb(x);
+  return std::ldexp(1.0, floor) < x ? floor + 1 : floor;
+}
+
 /// Newtons per unit of an exact sum, as the loop's numbers hold it.
 template <class N>
 SumToForce<N> sum_to_force(const Matrix& newtons_per_step, const SumUnit& sum) {
   SumToForce<N> map;
   if constexpr (N::kIsFixed) {
     // 38 bits of the largest sum are kept.
-    map.pre_shift = std::max(0, static_cast<int>(std::ceil(std::log2(sum.largest))) - 38);
+    map.pre_shift = std::max(0, bits_of(sum.largest) - 38);
     double largest = 0;
     for (const auto& row : newtons_per_step) {
       for (const double value : row) largest = std::max(largest, std::abs(value));
@@ -98,10 +103,7 @@ SumToForce<N> sum_to_force(const Matrix& newtons_per_step, const SumUnit& sum) {
     constexpr double kMantissaMax = 4194303;  // 22 bits
     constexpr int kMaxShift = 61;
     map.post_shift =
-        largest == 0
-            ? 0
-            : std::clamp(static_cast<int>(std::floor(std::log2(kMantissaMax / (largest * unit)))),
-                         0, kMaxShift);
+        largest == 0 ? 0 : std::clamp(std::ilogb(kMantissaMax / (largest * unit)), 0, kMaxShift);
     for (std::size_t i = 0; i < 3; ++i) {
       for (std::size_t j = 0; j < 3; ++j) {
         map.mantissa[i][j] = static_cast<std::int32_t>(
@@ -122,11 +124,11 @@ SumToForce<N> sum_to_force(const Matrix& newtons_per_step, const SumUnit& sum) {
 template <class N>
 class CompiledScene final : public Servo {
  public:
-  explicit CompiledScene(Scene& scene) {
+  CompiledScene(Scene& scene, const AlignedKernels& kernels) {
     plan_device(scene);
     plan_limits(scene);
     plan_.kernel = scene.servo.kernel;
-    plan_.aligned_kernels = *aligned_kernels();
+    plan_.aligned_kernels = &kernels;
     plan_.cutting = scene.cut.model != CutModel::none;
     plan_.removal_rate = removal_rate<N>(scene.cut.rate_per_s / scene.servo.rate_hz,
                                          scene.cut.model == CutModel::overlap_exact);
@@ -359,16 +361,16 @@ class CompiledScene final : public Servo {
 
 }  // namespace
 
-std::unique_ptr<Servo> compile(Scene& scene) {
+std::unique_ptr<Servo> compile(Scene& scene, const AlignedKernels& kernels) {
   switch (scene.servo.numeric) {
     case NumericKind::fixed:
-      return std::make_unique<CompiledScene<FixedNumbers>>(scene);
+      return std::make_unique<CompiledScene<FixedNumbers>>(scene, kernels);
     case NumericKind::float32:
-      return std::make_unique<CompiledScene<FloatNumbers>>(scene);
+      return std::make_unique<CompiledScene<FloatNumbers>>(scene, kernels);
     case NumericKind::float64:
       break;
   }
-  return std::make_unique<CompiledScene<DoubleNumbers>>(scene);
+  return std::make_unique<CompiledScene<DoubleNumbers>>(scene, kernels);
 }
 
 }  // namespace kerf

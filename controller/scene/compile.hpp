@@ -3,6 +3,7 @@
 
 #include <memory>
 
+#include "controller/kernel/aligned_kernels.hpp"
 #include "controller/scene/scene.hpp"
 #include "controller/servo/servo.hpp"
 
@@ -16,6 +17,9 @@ namespace kerf {
 /// gradient field if any other tool may touch it. Nothing is allocated after this. Throws
 /// SceneError for a scene that the loop cannot hold: no solid volume, a voxel or a step outside the
 /// number formats.
-[[nodiscard]] std::unique_ptr<Servo> compile(Scene& scene);
+///
+/// `kernels` run the plan `aligned`: the fastest of this machine unless a test asks for others.
+[[nodiscard]] std::unique_ptr<Servo> compile(Scene& scene,
+                                             const AlignedKernels& kernels = **aligned_kernels());
 
 }  // namespace kerf
