@@ -5,6 +5,8 @@
 
 #include <immintrin.h>
 
+#include "controller/kernel/aligned_whole_write.hpp"
+
 namespace kerf {
 namespace {
 
@@ -81,21 +83,10 @@ struct Simd {
     return part[0] + part[1] + part[2] + part[3];
   }
 
-  /// density[begin + i] -= loss_i, as a whole vector: the entries that lose nothing, beyond the
-  /// tool's box or in the next row, are written back as they are. The box cannot tell them, so its
-  /// `rho` is of no use. Near the ends of the volume's memory one by one.
+  /// `rho` is of no use: the box cannot tell the entries beyond it.
   static void write_loss(std::uint16_t* density, std::ptrdiff_t begin, std::ptrdiff_t count,
                          V /*rho*/, V loss, std::uint32_t lost) noexcept {
-    if (begin >= 0 && begin + kLanes <= count) {
-      store(density + begin, sub16(load(density + begin), loss));
-      return;
-    }
-    alignas(32) std::uint16_t entry[kLanes];
-    store(entry, loss);
-    for (; lost != 0; lost &= lost - 1) {
-      const int i = __builtin_ctz(lost);
-      density[begin + i] = static_cast<std::uint16_t>(density[begin + i] - entry[i]);
-    }
+    write_whole<Simd>(density, begin, count, loss, lost);
   }
 
   /// out[i][e] = in[e][i].

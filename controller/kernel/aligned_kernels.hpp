@@ -64,6 +64,8 @@ extern const AlignedKernels kAlignedScalar;
 #if defined(KERF_X86_KERNELS)
 extern const AlignedKernels kAlignedAvx2;
 extern const AlignedKernels kAlignedAvx512;
+#elif defined(KERF_NEON_KERNELS)
+extern const AlignedKernels kAlignedNeon;
 #endif
 
 /// Kernels that this machine can run, the fastest first; ends with nullptr, holds at least one.

@@ -6,8 +6,8 @@
 
 #include "controller/kernel/aligned_kernels.hpp"
 
-// The vector kernels of the plan `aligned`, one text for AVX2 and AVX-512. Included only by their
-// two translation units, each of which defines `Simd`: a vector type V and its operations. All of
+// The vector kernels of the plan `aligned`, one text for AVX2, AVX-512 and NEON. Included only by
+// their translation units, each of which defines `Simd`: a vector type V and its operations. All of
 // it has internal linkage, for the reason told at AlignedKernels.
 
 namespace kerf {
@@ -166,7 +166,7 @@ void correlate(const AlignedTable& tool, const std::int16_t* box,
       correlate_list<1, 8>(tool, a, box, corner, part);
       for (int c = 0; c < 8; ++c) sum[a][c] = part[0][c];
     }
-  } else {  // 16 registers
+  } else {  // 16 registers, or as many sums in flight as NEON needs
     const std::ptrdiff_t corner[4] = {0, pitch, plane, plane + pitch};
     for (int a = 0; a < 3; ++a) {
       for (int half = 0; half < 2; ++half) {
@@ -198,8 +198,8 @@ struct TapPairs {
 /// Bits of mask words that meet vector `j` of a row.
 [[gnu::always_inline]] inline std::uint32_t mask_bits(const std::uint32_t* words,
                                                       std::ptrdiff_t j) noexcept {
-  if constexpr (kLanes == 32) return words[j];
-  return words[j / 2] >> (16 * (j & 1)) & 0xffff;
+  constexpr std::ptrdiff_t kPerWord = 32 / kLanes;
+  return words[j / kPerWord] >> (kLanes * (j % kPerWord)) & ~std::uint32_t{0} >> (32 - kLanes);
 }
 
 /// Overlap ratios of plane z, negative, 0 where the density is 0. Sets the range of live rows.

@@ -7,7 +7,6 @@
 #include <utility>
 #include <vector>
 
-#include "controller/kernel/aligned_kernels.hpp"
 #include "controller/scene/aligned_tool.hpp"
 #include "controller/scene/plan_choice.hpp"
 #include "controller/scene/plan_cost.hpp"
@@ -24,12 +23,12 @@ namespace {
 template <class N>
 class SceneIn final : public CompiledScene {
  public:
-  explicit SceneIn(const Scene& scene) : memory_(scene) {
+  SceneIn(const Scene& scene, const AlignedKernels& kernels) : memory_(scene) {
     plan_device(scene.device, plan_);
     plan_limits(scene, plan_);
     plan_.kernel = scene.servo.kernel;
     plan_.taps = &aligned_taps(scene.servo.kernel);
-    plan_.kernels = *aligned_kernels();
+    plan_.kernels = &kernels;
     plan_.cutting = scene.cut.model != CutModel::none;
     plan_.removal_rate = removal_rate<N>(scene.cut.rate_per_s / scene.servo.rate_hz,
                                          scene.cut.model == CutModel::overlap_exact);
@@ -115,20 +114,20 @@ class SceneIn final : public CompiledScene {
 
 }  // namespace
 
-std::unique_ptr<CompiledScene> plan_scene(const Scene& scene) {
+std::unique_ptr<CompiledScene> plan_scene(const Scene& scene, const AlignedKernels& kernels) {
   switch (scene.servo.numeric) {
     case NumericKind::fixed:
-      return std::make_unique<SceneIn<FixedNumbers>>(scene);
+      return std::make_unique<SceneIn<FixedNumbers>>(scene, kernels);
     case NumericKind::float32:
-      return std::make_unique<SceneIn<FloatNumbers>>(scene);
+      return std::make_unique<SceneIn<FloatNumbers>>(scene, kernels);
     case NumericKind::float64:
       break;
   }
-  return std::make_unique<SceneIn<DoubleNumbers>>(scene);
+  return std::make_unique<SceneIn<DoubleNumbers>>(scene, kernels);
 }
 
-std::unique_ptr<CompiledScene> compile(Scene& scene) {
-  auto compiled = plan_scene(scene);
+std::unique_ptr<CompiledScene> compile(Scene& scene, const AlignedKernels& kernels) {
+  auto compiled = plan_scene(scene, kernels);
   compiled->take(scene);
   return compiled;
 }

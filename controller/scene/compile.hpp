@@ -4,6 +4,7 @@
 #include <memory>
 #include <vector>
 
+#include "controller/kernel/aligned_kernels.hpp"
 #include "controller/scene/scene.hpp"
 #include "controller/scene/scene_costs.hpp"
 #include "controller/servo/servo.hpp"
@@ -31,9 +32,13 @@ class CompiledScene : public Servo {
 /// Plans, tables and costs of a checked scene; no array of the size of a volume is made. Throws
 /// SceneError for a scene that the loop cannot hold: no solid volume, a voxel or a step outside the
 /// number formats.
-[[nodiscard]] std::unique_ptr<CompiledScene> plan_scene(const Scene& scene);
+///
+/// `kernels` run the loop: the fastest of this machine unless a test asks for others.
+[[nodiscard]] std::unique_ptr<CompiledScene> plan_scene(
+    const Scene& scene, const AlignedKernels& kernels = **aligned_kernels());
 
 /// `plan_scene` and `take` in one.
-[[nodiscard]] std::unique_ptr<CompiledScene> compile(Scene& scene);
+[[nodiscard]] std::unique_ptr<CompiledScene> compile(
+    Scene& scene, const AlignedKernels& kernels = **aligned_kernels());
 
 }  // namespace kerf

@@ -39,8 +39,8 @@
 #include "shared/posix/cores.hpp"
 #include "shared/posix/memory.hpp"
 #include "shared/posix/new_file.hpp"
-#include "shared/segment/hash.hpp"
 #include "shared/segment/segment_plan.hpp"
+#include "shared/volume/density_hash.hpp"
 
 namespace kerf {
 namespace {

@@ -14,6 +14,7 @@
 #include "shared/segment/segment_memory.hpp"
 #include "shared/segment/segment_plan.hpp"
 #include "shared/segment/shared_words.hpp"
+#include "shared/volume/density_hash.hpp"
 
 namespace kerf {
 namespace {

@@ -10,7 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "shared/segment/hand_over.hpp"
-#include "shared/segment/hash.hpp"
+#include "shared/volume/density_hash.hpp"
 #include "tests/programs/process.hpp"
 
 using kerf::test::eventually;
