@@ -2,27 +2,17 @@
 #include "controller/record/plot.hpp"
 
 #include <array>
-#include <cerrno>
 #include <cmath>
-#include <cstring>
-#include <fstream>
 #include <sstream>
 #include <string>
-#include <system_error>
 #include <vector>
 
-#include <fcntl.h>
-#include <spawn.h>
-#include <sys/wait.h>
-#include <unistd.h>
-
 #include "controller/record/envelope.hpp"
+#include "controller/record/gnuplot.hpp"
 #include "controller/record/manifest.hpp"
 #include "controller/record/record_error.hpp"
 #include "controller/record/tick_figures.hpp"
 #include "controller/record/tick_log.hpp"
-
-extern char** environ;  // NOLINT(readability-identifier-naming): POSIX
 
 namespace kerf {
 namespace {
@@ -111,80 +101,10 @@ struct Curve {
   return script.str();
 }
 
-/// Exit code of `gnuplot script`, its picture in `drawn` and its messages in `log`; throws where
-/// there is no gnuplot.
-[[nodiscard]] int run_gnuplot(const std::filesystem::path& script,
-                              const std::filesystem::path& drawn,
-                              const std::filesystem::path& log) {
-  posix_spawn_file_actions_t actions;
-  posix_spawn_file_actions_init(&actions);
-  const auto redirect = [&actions](int fd, const std::filesystem::path& path) {
-    posix_spawn_file_actions_addopen(&actions, fd, path.c_str(), O_WRONLY | O_CREAT, 0600);
-  };
-  redirect(STDOUT_FILENO, drawn);
-  redirect(STDERR_FILENO, log);
-  std::string program = "gnuplot";
-  std::string argument = script.string();
-  std::array<char*, 3> arguments{program.data(), argument.data(), nullptr};
-  pid_t child = 0;
-  const int error =
-      posix_spawnp(&child, program.c_str(), &actions, nullptr, arguments.data(), environ);
-  posix_spawn_file_actions_destroy(&actions);
-  if (error != 0) {
-    throw RecordError("gnuplot: " + std::generic_category().message(error) +
-                      "; apt-get install gnuplot-nox");
-  }
-  int status = 0;
-  while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
-  }
-  return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
-}
-
-/// A private folder that goes with its owner.
-class ScratchFolder {
- public:
-  ScratchFolder() : path_((std::filesystem::temp_directory_path() / "kerf-plot-XXXXXX").string()) {
-    if (mkdtemp(path_.data()) == nullptr) {
-      throw RecordError(path_ + ": " + std::generic_category().message(errno) +
-                        "; set TMPDIR to a folder that can be written");
-    }
-  }
-  ~ScratchFolder() {
-    std::error_code ignored;
-    std::filesystem::remove_all(path_, ignored);
-  }
-  ScratchFolder(const ScratchFolder&) = delete;
-  ScratchFolder& operator=(const ScratchFolder&) = delete;
-  [[nodiscard]] std::filesystem::path path() const { return path_; }
-
- private:
-  std::string path_;
-};
-
-[[nodiscard]] std::string text_of(const std::filesystem::path& path) {
-  std::ifstream file(path);
-  std::ostringstream text;
-  text << file.rdbuf();
-  return text.str();
-}
-
 }  // namespace
 
 void plot_forces(const std::filesystem::path& folder, const std::filesystem::path& svg) {
-  const ScratchFolder scratch;
-  const std::filesystem::path drawn = scratch.path() / "plot.svg";
-  const std::filesystem::path script = scratch.path() / "plot.gp";
-  const std::filesystem::path log = scratch.path() / "plot.log";
-  write_whole(script, gnuplot_script(folder));
-  const int code = run_gnuplot(script, drawn, log);
-  const std::string picture = text_of(drawn);
-  if (code != 0 || picture.find("</svg>") == std::string::npos) {
-    std::string message = text_of(log);
-    for (char& c : message) c = c == '\n' ? ' ' : c;
-    throw RecordError("gnuplot: exit " + std::to_string(code) + " " + message +
-                      "; try another version");
-  }
-  write_whole(svg, picture);
+  write_whole(svg, gnuplot_svg(gnuplot_script(folder)));
 }
 
 }  // namespace kerf

@@ -1,30 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "hil/lab/performance_page.hpp"
 
-#include <chrono>
 #include <cstdio>
-#include <fstream>
+
+#include "hil/lab/lab_run.hpp"
 
 namespace kerf {
 namespace {
-
-std::string processor() {
-  std::ifstream table("/proc/cpuinfo");
-  for (std::string line; std::getline(table, line);) {
-    const auto colon = line.find(": ");
-    if (line.starts_with("model name") && colon != std::string::npos) return line.substr(colon + 2);
-  }
-  return "a processor that does not tell its name";
-}
-
-std::string today() {
-  using namespace std::chrono;
-  const year_month_day day{floor<days>(system_clock::now())};
-  char text[32];
-  std::snprintf(text, sizeof text, "%04d-%02u-%02u", static_cast<int>(day.year()),
-                static_cast<unsigned>(day.month()), static_cast<unsigned>(day.day()));
-  return text;
-}
 
 constexpr const char* kAbout = R"(# Performance
 
@@ -68,8 +50,7 @@ std::string table_of(const std::vector<KernelRow>& rows) {
 
 std::string performance_page(const std::vector<KernelRow>& rows,
                              const std::vector<KernelRow>& layout) {
-  return kAbout + today() + ", " + processor() + ", compiler " + __VERSION__ + ".\n\n" +
-         table_of(rows) + kAboutLayout + table_of(layout);
+  return kAbout + lab_provenance() + "\n\n" + table_of(rows) + kAboutLayout + table_of(layout);
 }
 
 }  // namespace kerf

@@ -2,7 +2,6 @@
 #include "hil/lab/program.hpp"
 
 #include <cstdio>
-#include <optional>
 #include <ostream>
 #include <string>
 #include <vector>
@@ -11,25 +10,16 @@
 #include <nlohmann/json.hpp>
 
 #include "hil/hil_error.hpp"
+#include "hil/lab/accuracy/command.hpp"
 #include "hil/lab/kernel_bench.hpp"
+#include "hil/lab/lab_run.hpp"
 #include "hil/lab/layout_bench.hpp"
 #include "hil/lab/performance_page.hpp"
-#include "shared/posix/cores.hpp"
-#include "shared/posix/new_file.hpp"
 
 namespace kerf {
 namespace {
 
 constexpr const char* kExitCodes = "Exit codes: 0 fine, 2 bad input or set-up.";
-
-/// Every figure of one run comes from one core.
-int pin(int core) {
-  if (core < 0) core = allowed_cores().back();
-  if (pin_to_core(core) != 0) {
-    throw HilError("--cpu " + std::to_string(core) + ": not a core that this process may use");
-  }
-  return core;
-}
 
 std::string line_of(const KernelRow& row) {
   char text[160];
@@ -63,36 +53,6 @@ std::string json_of(const std::vector<KernelRow>& rows, const std::vector<Kernel
   return report.dump(2) + "\n";
 }
 
-/// A file that is opened before the measurement, so that a wrong name costs nothing.
-class Output {
- public:
-  Output(const char* option, const std::string& path) : option_(option) {
-    if (path.empty()) return;
-    guarded([&] { file_.emplace(path); });
-  }
-  void write(const std::string& text) {
-    if (!file_) return;
-    guarded([&] {
-      file_->write(text.data(), text.size());
-      file_->close();
-      file_->commit();
-    });
-  }
-
- private:
-  template <class Work>
-  void guarded(const Work& work) {
-    try {
-      work();
-    } catch (const FileError& error) {
-      throw HilError(std::string(option_) + " " + error.what());
-    }
-  }
-
-  const char* option_;
-  std::optional<NewFile> file_;
-};
-
 }  // namespace
 
 int run_lab(int argc, const char* const* argv, std::ostream& out, std::ostream& err) {
@@ -110,15 +70,20 @@ int run_lab(int argc, const char* const* argv, std::ostream& out, std::ostream& 
   bench->add_option("--cpu", core, "core to run on (default: the last)")
       ->check(CLI::NonNegativeNumber);
   bench->footer(kExitCodes);
+  accuracy::Command accuracy(app);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     return app.exit(error, out, err) == 0 ? 0 : 2;
   }
   try {
-    Output as_json("--report", report);
-    Output as_page("--page", page);
-    core = pin(core);
+    if (accuracy.chosen()) {
+      accuracy.run(out);
+      return 0;
+    }
+    LabOutput as_json("--report", report);
+    LabOutput as_page("--page", page);
+    core = pin_lab(core);
     out << "ns a tick on core " << core << "; 256 x 256 x 161 voxels; ratio to the paper's form\n"
         << "tick                     number way               p50        p99    ratio        "
            "bytes\n";

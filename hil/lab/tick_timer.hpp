@@ -10,7 +10,7 @@ namespace kerf {
 
 /// Durations of single ticks, in ns.
 struct TickTimes {
-  double p50_ns = 0, p99_ns = 0;
+  double p50_ns = 0, p99_ns = 0, max_ns = 0;
 };
 
 /// Runs `tick(i)` for i = 0 .. ticks - 1 and times each by itself, after `before()`, which is not
@@ -33,7 +33,7 @@ template <class Before, class Tick>
   const auto at = [&](double share) {
     return ns[static_cast<std::size_t>(share * static_cast<double>(ns.size() - 1))];
   };
-  return {at(0.5), at(0.99)};
+  return {at(0.5), at(0.99), ns.back()};
 }
 
 }  // namespace kerf

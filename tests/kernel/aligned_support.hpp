@@ -147,7 +147,8 @@ inline AlignedOutcome outcome_by_definition(const AlignedTaps& taps, const TestV
   AlignedOutcome out{{}, {}, {}, volume.density, carry};
   out.contact = aligned_contact_sum(taps, field, tool, pose);
   overlap<FixedNumbers>(volume.grid, tool, pose, FixedNumbers::kStepOne, scratch);
-  out.modification = aligned_modification_sum(field, volume.grid, volume.density, scratch, tool.size());
+  out.modification =
+      aligned_modification_sum(field, volume.grid, volume.density, scratch, tool.size());
   out.removed = remove<FixedNumbers>(volume.grid, out.density, scratch, rate, out.carry);
   return out;
 }

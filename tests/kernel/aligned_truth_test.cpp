@@ -74,8 +74,8 @@ TEST_CASE("contact and modification sums are double's within 1.7e-4 of full scal
     }
     overlap<FixedNumbers>(volume.grid, tool, pose, FixedNumbers::kStepOne, fixed.overlap);
     overlap<DoubleNumbers>(volume.grid, tool, truth_pose, 1.0, wide.overlap);
-    const auto cut = aligned_modification_sum(exact, volume.grid, volume.density, fixed.overlap,
-                                              tool.size());
+    const auto cut =
+        aligned_modification_sum(exact, volume.grid, volume.density, fixed.overlap, tool.size());
     const auto cut_truth =
         modification_sum<DoubleNumbers>(volume.grid, field, volume.density, wide.overlap);
     const double unit = kGradientUnit / FixedNumbers::kWeightOne;

@@ -52,7 +52,8 @@ TEST_CASE("a modification force of stored gradients at the ends of their range i
                                                   {kLowest, kSteepest, kLowest});
   const FullCover full(grid);
   const TestVolume volume = filled(grid, 65535);
-  const auto sum = modification_sum<FixedNumbers>(grid, field, volume.density, full.overlap);
+  const auto sum =
+      modification_sum<FixedNumbers>(grid, field, volume.density, full.overlap, kNarrowSumSamples);
   CHECK(sum.x == std::int64_t{64 * 64 * 64} * 32768 * kLowest);
   CHECK(sum.y == std::int64_t{64 * 64 * 64} * 32768 * kSteepest);
 }
@@ -98,15 +99,30 @@ TEST_CASE("a contact of the largest tool on the steepest gradient is exact in th
 
 TEST_CASE("a modification force of the largest cutting tool is exact in the plan aligned") {
   const VoxelGrid grid{30, 30, 20};
-  REQUIRE(grid.voxel_count() == kMaxAlignedCutSamples);
+  REQUIRE(grid.voxel_count() == kNarrowSumSamples);
   const FullCover full(grid);
   const TestVolume volume = filled(grid, 65535);
   const auto steepest = [](VoxelIndex) {
     return SumVec<FixedNumbers>{kMaxExactGradient, -kMaxExactGradient, 1};
   };
-  const auto sum = aligned_modification_sum(steepest, grid, volume.density, full.overlap);
-  const auto bound = static_cast<std::int64_t>(kMaxAlignedCutSamples) * 32768 * kMaxExactGradient;
+  const auto sum =
+      aligned_modification_sum(steepest, grid, volume.density, full.overlap, kNarrowSumSamples);
+  const auto bound = static_cast<std::int64_t>(kNarrowSumSamples) * 32768 * kMaxExactGradient;
   CHECK(sum.x == bound);
   CHECK(sum.y == -bound);
-  CHECK(sum.z == static_cast<std::int64_t>(kMaxAlignedCutSamples) * 32768);
+  CHECK(sum.z == static_cast<std::int64_t>(kNarrowSumSamples) * 32768);
+}
+
+TEST_CASE("a modification force of a larger tool is exact over 2^16, beyond 63 bits") {
+  const VoxelGrid grid{40, 40, 40};
+  const FullCover full(grid);
+  const TestVolume volume = filled(grid, 65535);
+  const auto steepest = [](VoxelIndex v) {
+    return SumVec<FixedNumbers>{kMaxExactGradient, -kMaxExactGradient, v.x == 0 ? 1 : 0};
+  };
+  const auto sum = aligned_modification_sum(steepest, grid, volume.density, full.overlap,
+                                            grid.voxel_count());
+  CHECK(sum.x == std::int64_t{64'000} * kMaxExactGradient / 2);  // 32768 / 2^16
+  CHECK(sum.y == -(std::int64_t{64'000} * kMaxExactGradient / 2));
+  CHECK(sum.z == 1600 / 2);
 }

@@ -51,6 +51,17 @@ TEST_CASE("a core that does not exist is refused, and no report is left behind")
   CHECK_FALSE(std::filesystem::exists(file.string() + ".part"));
 }
 
+TEST_CASE("accuracy refuses a file or a core that cannot be, before anything is measured") {
+  for (const char* option : {"--report", "--csv", "--plot", "--page"}) {
+    const Answer answer = lab({"accuracy", option, "/nonexistent/a.md"});
+    CHECK(answer.code == 2);
+    CHECK(answer.complained.find("/nonexistent/a.md: cannot be written") != std::string::npos);
+  }
+  const Answer answer = lab({"accuracy", "--cpu", "1000"});
+  CHECK(answer.code == 2);
+  CHECK(answer.complained.find("--cpu 1000") != std::string::npos);
+}
+
 TEST_CASE("the page says where its figures come from, and holds one line for each") {
   const kerf::KernelRow row{.name = "contact/ball16/any",
                             .numeric = "fixed",

@@ -1,0 +1,12 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+
+namespace kerf {
+
+/// The picture that gnuplot draws on its standard output for a script with `set terminal svg`.
+/// Throws `RecordError` where there is no gnuplot, no folder for its files, or no whole picture.
+[[nodiscard]] std::string gnuplot_svg(const std::string& script);
+
+}  // namespace kerf

@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+
+#include "shared/numeric/vec.hpp"
+#include "shared/volume/voxel_grid.hpp"
+
+namespace kerf::accuracy {
+
+/// The uniform B-spline of `Degree` along one axis: the weights of the Degree + 1 voxels from `low`
+/// at one place, and their derivatives. Degree 0 is the nearest voxel, 1 is linear; from 2 on the
+/// blend is smooth (Degree - 1 times differentiable), and blurs by a variance of
+/// (Degree + 1) / 12 voxel^2. In double: a reference, not a fast path.
+template <int Degree>
+struct SplineAxis {
+  std::int32_t low;
+  std::array<double, Degree + 1> value, slope;
+};
+
+template <int Degree>
+[[nodiscard]] SplineAxis<Degree> spline_axis(double at) {
+  static_assert(Degree >= 0 && Degree <= 3);
+  // Even degrees are centred on a voxel, odd ones between two.
+  const double middle = std::floor(Degree % 2 == 0 ? at + 0.5 : at);
+  const double t = at - middle;
+  const std::int32_t low = static_cast<std::int32_t>(middle) - Degree / 2;
+  if constexpr (Degree == 0) {
+    return {low, {1}, {0}};
+  } else if constexpr (Degree == 1) {
+    return {low, {1 - t, t}, {-1, 1}};
+  } else if constexpr (Degree == 2) {
+    const double a = 0.5 - t, b = 0.5 + t;
+    return {low, {a * a / 2, 0.75 - t * t, b * b / 2}, {-a, -2 * t, b}};
+  } else {
+    const double s = 1 - t;
+    return {low,
+            {s * s * s / 6, (3 * t * t * t - 6 * t * t + 4) / 6,
+             (3 * s * s * s - 6 * s * s + 4) / 6, t * t * t / 6},
+            {-s * s / 2, (3 * t * t - 4 * t) / 2, (4 * s - 3 * s * s) / 2, t * t / 2}};
+  }
+}
+
+/// The tensor product of three axes: calls `tap(voxel index, x, y, z)` for each voxel around `at`
+/// with its entries in the three axes. Nothing where one of them would be outside the volume.
+template <int Degree>
+struct SplineCell {
+  SplineAxis<Degree> x, y, z;
+
+  explicit SplineCell(VoxelVec<double> at)
+      : x(spline_axis<Degree>(at.x)), y(spline_axis<Degree>(at.y)), z(spline_axis<Degree>(at.z)) {}
+
+  template <class Tap>
+  void each(const VoxelGrid& grid, Tap&& tap) const {
+    if (!grid.contains({x.low, y.low, z.low}) ||
+        !grid.contains({x.low + Degree, y.low + Degree, z.low + Degree})) {
+      return;
+    }
+    for (std::size_t k = 0; k <= Degree; ++k) {
+      for (std::size_t j = 0; j <= Degree; ++j) {
+        const std::size_t row = grid.index(x.low, y.low + static_cast<std::int32_t>(j),
+                                           z.low + static_cast<std::int32_t>(k));
+        for (std::size_t i = 0; i <= Degree; ++i) tap(row + i, i, j, k);
+      }
+    }
+  }
+};
+
+}  // namespace kerf::accuracy
