@@ -52,8 +52,7 @@ TEST_CASE("a modification force of stored gradients at the ends of their range i
                                                   {kLowest, kSteepest, kLowest});
   const FullCover full(grid);
   const TestVolume volume = filled(grid, 65535);
-  const auto sum =
-      modification_sum<FixedNumbers>(grid, field, volume.density, full.overlap, kNarrowSumSamples);
+  const auto sum = modification_sum<FixedNumbers>(grid, field, volume.density, full.overlap);
   CHECK(sum.x == std::int64_t{64 * 64 * 64} * 32768 * kLowest);
   CHECK(sum.y == std::int64_t{64 * 64 * 64} * 32768 * kSteepest);
 }
@@ -120,8 +119,8 @@ TEST_CASE("a modification force of a larger tool is exact over 2^16, beyond 63 b
   const auto steepest = [](VoxelIndex v) {
     return SumVec<FixedNumbers>{kMaxExactGradient, -kMaxExactGradient, v.x == 0 ? 1 : 0};
   };
-  const auto sum = aligned_modification_sum(steepest, grid, volume.density, full.overlap,
-                                            grid.voxel_count());
+  const auto sum =
+      aligned_modification_sum(steepest, grid, volume.density, full.overlap, grid.voxel_count());
   CHECK(sum.x == std::int64_t{64'000} * kMaxExactGradient / 2);  // 32768 / 2^16
   CHECK(sum.y == -(std::int64_t{64'000} * kMaxExactGradient / 2));
   CHECK(sum.z == 1600 / 2);

@@ -177,8 +177,8 @@ class Aligned final : public ContactMethod {
       : grid_(volume.grid),
         density_(volume.density),
         kernels_(**aligned_kernels()),
-        tool_(tool.offsets, *aligned_taps(choice.kernel), kernels_),
-        one_(kOneSample, *aligned_taps(choice.kernel), kernels_) {
+        tool_(tool.offsets, aligned_taps(choice.kernel), kernels_),
+        one_(kOneSample, aligned_taps(choice.kernel), kernels_) {
     memory_.hold(tool_.table().size, false);
   }
 
