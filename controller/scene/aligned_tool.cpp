@@ -17,8 +17,9 @@ constexpr bool are_taps_of(const AlignedTaps& aligned, GradientKernel kernel) {
   const GradientTaps stored = taps(kernel);
   for (std::size_t i = 0; i < 125; ++i) {
     const std::size_t a = i % 5, b = i / 5 % 5, c = i / 25;
-    const std::int64_t here = std::int64_t{aligned.factor} * aligned.slope[a] * aligned.smooth[b] *
-                              aligned.smooth[c] << (32 - aligned.shift);
+    const std::int64_t here =
+        std::int64_t{aligned.factor} * aligned.slope[a] * aligned.smooth[b] * aligned.smooth[c]
+        << (32 - aligned.shift);
     const std::int64_t there = std::int64_t{stored.slope[a]} * stored.smooth[b] * stored.smooth[c]
                                << (32 - stored.shift);
     if (here != there) return false;
@@ -106,8 +107,7 @@ AlignedTool::AlignedTool(std::span<const ToolOffset> offsets, const AlignedTaps&
   const auto length = [&](std::size_t axis) {
     return (extent.high[axis] - extent.low[axis]) / 2 + 1;
   };
-  static_cast<TickBox&>(table_) = 
-      tick_box({length(0), length(1), length(2)}, taps, offsets.size());
+  static_cast<TickBox&>(table_) = tick_box({length(0), length(1), length(2)}, taps, offsets.size());
   table_.low = extent.low;
   table_.lanes = kernels.lanes;
 
