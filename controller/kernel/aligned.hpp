@@ -15,6 +15,44 @@
 
 namespace kerf {
 
+namespace detail {
+
+/// The exact form of the removal rate, entry by entry: it is a table look-up.
+inline void bend_ratios(const TickBox& box, const AlignedScratch& scratch,
+                        const RemovalRate<FixedNumbers>& rate) noexcept {
+  std::int16_t* ratio = scratch.ratio + kRatioRowPad;
+  const std::int32_t rows = (box.size.y + 1) * (box.size.z + 1);
+  for (std::int32_t row = 0; row < rows; ++row, ratio += box.row_lanes + kRatioRowPad) {
+    if (scratch.live[row] == 0) continue;
+    for (std::int32_t x = 2; x <= box.size.x + 2; ++x) {
+      ratio[x] = static_cast<std::int16_t>(-bent_ratio(rate, std::int32_t{-ratio[x]}));
+    }
+  }
+}
+
+}  // namespace detail
+
+/// Takes from the volume what the ratios in the scratch say: `remove`. `carry` has at least
+/// row_lanes entries.
+[[nodiscard]] inline Removed cut_box(const AlignedKernels& kernels, const TickBox& box,
+                                     const AlignedScratch& scratch, const VoxelGrid& grid,
+                                     std::span<Density> density, VoxelIndex origin,
+                                     const RemovalRate<FixedNumbers>& rate,
+                                     std::span<std::uint16_t> carry) noexcept {
+  Removed removed;
+  if (rate.mantissa == 0) return removed;
+  if (rate.bent) detail::bend_ratios(box, scratch, rate);
+  const AlignedCut cut =
+      kernels.cut(box, {static_cast<std::uint16_t>(rate.mantissa), rate.exponent}, grid,
+                  density.data(), origin, scratch, carry.data());
+  removed.density_steps = cut.density_steps;
+  if (cut.density_steps != 0) {
+    removed.changed = {{origin.x + cut.lo.x, origin.y + cut.lo.y, origin.z + cut.lo.z},
+                       {origin.x + cut.hi.x + 1, origin.y + cut.hi.y + 1, origin.z + cut.hi.z + 1}};
+  }
+  return removed;
+}
+
 /// One tick of the plan `aligned` on one volume: `contact` first, then `mill` of the same place.
 ///
 /// Gives the bits of aligned_reference.hpp, overlap.hpp and milling.hpp, whatever the kernels. Work
@@ -76,33 +114,11 @@ class AlignedTick {
     std::int64_t sum[3];
     kernels_.press(table_, weights, scratch_, sum);
     milled.modification = {sum[0], sum[1], sum[2]};
-    if (rate.mantissa == 0) return milled;
-    if (rate.bent) bend_ratios(rate);
-    const AlignedCut cut =
-        kernels_.cut(table_, {static_cast<std::uint16_t>(rate.mantissa), rate.exponent}, grid_,
-                     density_.data(), origin_, scratch_, carry.data());
-    milled.removed.density_steps = cut.density_steps;
-    if (cut.density_steps != 0) {
-      milled.removed.changed = {
-          {origin_.x + cut.lo.x, origin_.y + cut.lo.y, origin_.z + cut.lo.z},
-          {origin_.x + cut.hi.x + 1, origin_.y + cut.hi.y + 1, origin_.z + cut.hi.z + 1}};
-    }
+    milled.removed = cut_box(kernels_, table_, scratch_, grid_, density_, origin_, rate, carry);
     return milled;
   }
 
  private:
-  /// The exact form of the removal rate, entry by entry: it is a table look-up.
-  void bend_ratios(const RemovalRate<FixedNumbers>& rate) const noexcept {
-    std::int16_t* ratio = scratch_.ratio + kRatioRowPad;
-    const std::int32_t rows = (table_.size.y + 1) * (table_.size.z + 1);
-    for (std::int32_t row = 0; row < rows; ++row, ratio += table_.row_lanes + kRatioRowPad) {
-      if (scratch_.live[row] == 0) continue;
-      for (std::int32_t x = 2; x <= table_.size.x + 2; ++x) {
-        ratio[x] = static_cast<std::int16_t>(-bent_ratio(rate, std::int32_t{-ratio[x]}));
-      }
-    }
-  }
-
   const AlignedKernels& kernels_;
   const AlignedTable& table_;
   const AlignedScratch& scratch_;

@@ -5,6 +5,8 @@
 
 #include <immintrin.h>
 
+#include "controller/kernel/aligned_whole_write.hpp"
+
 namespace kerf {
 namespace {
 
@@ -43,6 +45,8 @@ struct Simd {
   static V times512(V a) noexcept { return _mm256_slli_epi64(a, 9); }
   static V shift_left16(V a, int n) noexcept { return _mm256_sll_epi16(a, _mm_cvtsi32_si128(n)); }
   static V shift_right16(V a, int n) noexcept { return _mm256_srl_epi16(a, _mm_cvtsi32_si128(n)); }
+  /// 32-bit entries by 2^16, towards minus infinity.
+  static V halved32(V a) noexcept { return _mm256_srai_epi32(a, 16); }
   static V bit_and(V a, V b) noexcept { return _mm256_and_si256(a, b); }
   static V bit_or(V a, V b) noexcept { return _mm256_or_si256(a, b); }
   static V bit_xor(V a, V b) noexcept { return _mm256_xor_si256(a, b); }
@@ -79,21 +83,49 @@ struct Simd {
     return part[0] + part[1] + part[2] + part[3];
   }
 
-  /// density[begin + i] -= loss_i, as a whole vector: the entries that lose nothing, beyond the
-  /// tool's box or in the next row, are written back as they are. The box cannot tell them, so its
-  /// `rho` is of no use. Near the ends of the volume's memory one by one.
+  /// `rho` is of no use: the box cannot tell the entries beyond it.
   static void write_loss(std::uint16_t* density, std::ptrdiff_t begin, std::ptrdiff_t count,
                          V /*rho*/, V loss, std::uint32_t lost) noexcept {
-    if (begin >= 0 && begin + kLanes <= count) {
-      store(density + begin, sub16(load(density + begin), loss));
-      return;
+    write_whole<Simd>(density, begin, count, loss, lost);
+  }
+
+  /// out[i][e] = in[e][i].
+  static void transpose4(const std::uint32_t (&in)[4][16], std::uint32_t (*out)[4]) noexcept {
+    for (int from = 0; from < 16; from += 8) {
+      const V a = load(in[0] + from), b = load(in[1] + from), c = load(in[2] + from),
+              d = load(in[3] + from);
+      const V ab_low = _mm256_unpacklo_epi32(a, b), ab_high = _mm256_unpackhi_epi32(a, b);
+      const V cd_low = _mm256_unpacklo_epi32(c, d), cd_high = _mm256_unpackhi_epi32(c, d);
+      const V row[4] = {
+          _mm256_unpacklo_epi64(ab_low, cd_low), _mm256_unpackhi_epi64(ab_low, cd_low),
+          _mm256_unpacklo_epi64(ab_high, cd_high), _mm256_unpackhi_epi64(ab_high, cd_high)};
+      for (int k = 0; k < 4; ++k) {  // row[k] holds entries k and k + 4
+        store4(out[from + k], _mm256_castsi256_si128(row[k]));
+        store4(out[from + k + 4], _mm256_extracti128_si256(row[k], 1));
+      }
     }
-    alignas(32) std::uint16_t entry[kLanes];
-    store(entry, loss);
-    for (; lost != 0; lost &= lost - 1) {
-      const int i = __builtin_ctz(lost);
-      density[begin + i] = static_cast<std::uint16_t>(density[begin + i] - entry[i]);
-    }
+  }
+  static void store4(void* p, __m128i a) noexcept { _mm_storeu_si128(static_cast<__m128i*>(p), a); }
+  static __m128i load4(const void* p) noexcept {
+    return _mm_loadu_si128(static_cast<const __m128i*>(p));
+  }
+
+  /// Adds one cell's gradients times their weights: two edges of two voxels in each half as x, y,
+  /// z, 0. Reads four bytes beyond each second voxel.
+  static void add_cell(V& sum, const std::int16_t* g, std::ptrdiff_t row, std::ptrdiff_t plane,
+                       const std::uint32_t (&weight)[4]) noexcept {
+    const V by_axis = _mm256_broadcastsi128_si256(
+        _mm_setr_epi8(0, 1, 6, 7, 2, 3, 8, 9, 4, 5, 10, 11, -1, -1, -1, -1));
+    const V near_edges = _mm256_setr_epi32(0, 0, 0, 0, 1, 1, 1, 1);
+    const V far_edges = _mm256_setr_epi32(2, 2, 2, 2, 3, 3, 3, 3);
+    const V weights = _mm256_broadcastsi128_si256(load4(weight));
+    const V near = _mm256_inserti128_si256(_mm256_castsi128_si256(load4(g)), load4(g + row), 1);
+    const V far = _mm256_inserti128_si256(_mm256_castsi128_si256(load4(g + plane)),
+                                          load4(g + plane + row), 1);
+    multiply_add(sum, _mm256_shuffle_epi8(near, by_axis),
+                 _mm256_permutevar8x32_epi32(weights, near_edges));
+    multiply_add(sum, _mm256_shuffle_epi8(far, by_axis),
+                 _mm256_permutevar8x32_epi32(weights, far_edges));
   }
 };
 
@@ -101,9 +133,12 @@ struct Simd {
 }  // namespace kerf
 
 #include "controller/kernel/aligned_vector.hpp"
+#include "controller/kernel/gather_vector.hpp"
+#include "controller/kernel/splat_loops.hpp"
 
 namespace kerf {
 
-const AlignedKernels kAlignedAvx2{"avx2", Simd::kLanes, false, copy_box, correlate, press, cut};
+const AlignedKernels kAlignedAvx2{"avx2", Simd::kLanes, false, copy_box, correlate, press,
+                                  cut,    gather,       place, splat,    press_sums};
 
 }  // namespace kerf

@@ -4,28 +4,32 @@
 namespace kerf {
 namespace {
 
-struct Choice {
-  const AlignedKernels* sets[4] = {};
-
-  Choice() noexcept {
-    std::size_t count = 0;
+// The fastest first; what a machine can run is a tail of this list.
+constexpr const AlignedKernels* kSets[] = {
 #if defined(KERF_X86_KERNELS)
-    if (__builtin_cpu_supports("avx512f") != 0 && __builtin_cpu_supports("avx512bw") != 0 &&
-        __builtin_cpu_supports("avx512vl") != 0 && __builtin_cpu_supports("avx512dq") != 0 &&
-        __builtin_cpu_supports("avx512vnni") != 0) {
-      sets[count++] = &kAlignedAvx512;
-    }
-    if (__builtin_cpu_supports("avx2") != 0) sets[count++] = &kAlignedAvx2;
+    &kAlignedAvx512, &kAlignedAvx2,
+#elif defined(KERF_NEON_KERNELS)
+    &kAlignedNeon,
 #endif
-    sets[count] = &kAlignedScalar;
-  }
-};
+    &kAlignedScalar, nullptr};
+
+std::size_t sets_beyond_this_machine() noexcept {
+#if defined(KERF_X86_KERNELS)
+  if (__builtin_cpu_supports("avx2") == 0) return 2;
+  const bool has_avx512 =
+      __builtin_cpu_supports("avx512f") != 0 && __builtin_cpu_supports("avx512bw") != 0 &&
+      __builtin_cpu_supports("avx512vl") != 0 && __builtin_cpu_supports("avx512dq") != 0 &&
+      __builtin_cpu_supports("avx512vnni") != 0;
+  return has_avx512 ? 0 : 1;
+#else
+  return 0;  // NEON is part of every aarch64
+#endif
+}
 
 }  // namespace
 
 const AlignedKernels* const* aligned_kernels() noexcept {
-  static const Choice kChoice;
-  return kChoice.sets;
+  return kSets + sets_beyond_this_machine();
 }
 
 }  // namespace kerf

@@ -5,6 +5,8 @@
 #include <cstdint>
 
 #include "controller/kernel/aligned_table.hpp"
+#include "controller/kernel/sample_table.hpp"
+#include "controller/kernel/splat_table.hpp"
 #include "shared/volume/voxel_grid.hpp"
 
 namespace kerf {
@@ -30,7 +32,7 @@ struct AlignedKernels {
   std::int32_t lanes;  ///< the width that tables are made for
   bool can_fuse;       ///< has registers for three axes at a time
   /// Copies the box at `origin`; densities outside the volume are 0.
-  void (*copy_box)(const AlignedTable&, const VoxelGrid&, const Density*, VoxelIndex origin,
+  void (*copy_box)(const TickBox&, const VoxelGrid&, const Density*, VoxelIndex origin,
                    const AlignedScratch&) noexcept;
   /// Exact sums by axis and corner 4 k + 2 j + i.
   void (*correlate)(const AlignedTable&, const std::int16_t* box,
@@ -39,14 +41,31 @@ struct AlignedKernels {
   void (*press)(const AlignedTable&, const std::int32_t (&weight)[8], const AlignedScratch&,
                 std::int64_t (&sum)[3]) noexcept;
   /// Takes from the volume what the ratios say; `carry` has row_lanes entries.
-  AlignedCut (*cut)(const AlignedTable&, const AlignedRate&, const VoxelGrid&, Density*,
+  AlignedCut (*cut)(const TickBox&, const AlignedRate&, const VoxelGrid&, Density*,
                     VoxelIndex origin, const AlignedScratch&, std::uint16_t* carry) noexcept;
+  /// Contact of the plan `gather`: `contact_sum` over a field of three 16-bit parts a voxel, which
+  /// goes on for kFieldPad voxels.
+  void (*gather)(const SampleTable&, const SamplePose&, const VoxelGrid&, const std::int16_t* field,
+                 std::int64_t (&sum)[3]) noexcept;
+  /// Plan `splat`: places of the samples, then their sums, then both sums of gradients; the ratios
+  /// are left for `cut`.
+  void (*place)(const SampleTable&, const SamplePose&, const SplatScratch&, VoxelIndex& lowest,
+                VoxelIndex& highest) noexcept;
+  void (*splat)(const SampleTable&, const TickBox&, VoxelIndex origin,
+                const SplatScratch&) noexcept;
+  void (*press_sums)(const TickBox&, std::int32_t volume_ratio, const SplatScratch&,
+                     std::int64_t (&contact)[3], std::int64_t (&modification)[3]) noexcept;
 };
+
+/// Gradients beyond the last voxel of a field.
+inline constexpr std::size_t kFieldPad = 1;
 
 extern const AlignedKernels kAlignedScalar;
 #if defined(KERF_X86_KERNELS)
 extern const AlignedKernels kAlignedAvx2;
 extern const AlignedKernels kAlignedAvx512;
+#elif defined(KERF_NEON_KERNELS)
+extern const AlignedKernels kAlignedNeon;
 #endif
 
 /// Kernels that this machine can run, the fastest first; ends with nullptr, holds at least one.

@@ -75,24 +75,40 @@ template <class GradientAt>
   return {blended(x), blended(y), blended(z)};
 }
 
+/// Three sums of many exact gradients, each over 2^shift.
+struct WideSumVec {
+  WideSum x, y, z;
+
+  constexpr void add(const SumVec<FixedNumbers>& term, int shift) noexcept {
+    x.add(term.x, shift);
+    y.add(term.y, shift);
+    z.add(term.z, shift);
+  }
+  [[nodiscard]] constexpr SumVec<FixedNumbers> over(int shift) const noexcept {
+    return {x.over(shift), y.over(shift), z.over(shift)};
+  }
+};
+
 /// SUM over voxels j with r_j > 0 and density > 0 of r_j times the exact gradient, in density steps
-/// per voxel times 2^15 * 2^shift / factor. The density is that from before the removal.
+/// per voxel times 2^(15 - sum_shift) * 2^shift / factor; `samples` are those of the tool. The
+/// density is that from before the removal.
 template <class GradientAt>
 [[nodiscard]] constexpr SumVec<FixedNumbers> aligned_modification_sum(
     GradientAt&& gradient_at, const VoxelGrid& grid, std::span<const Density> density,
-    const OverlapBox<FixedNumbers>& overlap) noexcept {
-  SumVec<FixedNumbers> sum{};
+    const OverlapBox<FixedNumbers>& overlap, std::size_t samples) noexcept {
+  const int shift = sum_shift(samples);
+  WideSumVec sum;
   const VoxelBox box = overlap.box.clipped(grid.box());
   for (std::int32_t z = box.lo.z; z < box.hi.z; ++z) {
     for (std::int32_t y = box.lo.y; y < box.hi.y; ++y) {
       for (std::int32_t x = box.lo.x; x < box.hi.x; ++x) {
         const std::int64_t ratio = overlap.memory[overlap.at({x, y, z})];
         if (ratio == 0 || density[grid.index(x, y, z)] == 0) continue;
-        sum = sum + ratio * gradient_at(VoxelIndex{x, y, z});
+        sum.add(ratio * gradient_at(VoxelIndex{x, y, z}), shift);
       }
     }
   }
-  return sum;
+  return sum.over(shift);
 }
 
 }  // namespace kerf

@@ -11,8 +11,8 @@ namespace {
 constexpr std::int32_t kLanes = 16;
 constexpr std::int16_t kAir = -32768;  ///< density 0 after re-centring
 
-void copy_box(const AlignedTable& tool, const VoxelGrid& grid, const Density* density,
-              VoxelIndex origin, const AlignedScratch& scratch) noexcept {
+void copy_box(const TickBox& tool, const VoxelGrid& grid, const Density* density, VoxelIndex origin,
+              const AlignedScratch& scratch) noexcept {
   std::int16_t* out = scratch.box;
   for (std::int32_t z = origin.z; z < origin.z + tool.box.z; ++z) {
     for (std::int32_t y = origin.y; y < origin.y + tool.box.y; ++y, out += tool.box.x) {
@@ -69,11 +69,12 @@ bool overlap_row(const AlignedTable& tool, const std::int32_t (&weight)[8], std:
 }
 
 /// Rows of the five planes from z on, filtered along z: smooth, then slope.
-void filter_z(const AlignedTable& tool, const AlignedScratch& scratch, std::int32_t z) noexcept {
+void filter_z(const TickBox& tool, std::int32_t row_lanes, const AlignedScratch& scratch,
+              std::int32_t z, std::int32_t first, std::int32_t last) noexcept {
   const std::ptrdiff_t pitch = tool.box.x, plane = pitch * tool.box.y;
-  std::int32_t* smooth = scratch.filter;
-  std::int32_t* slope = scratch.filter + static_cast<std::ptrdiff_t>(tool.box.y) * tool.row_lanes;
-  for (std::int32_t y = 0; y < tool.box.y; ++y) {
+  for (std::int32_t y = first; y <= last + 4; ++y) {
+    std::int32_t* smooth = scratch.filter + std::ptrdiff_t{y} * row_lanes;
+    std::int32_t* slope = smooth + std::ptrdiff_t{tool.box.y} * row_lanes;
     const std::int16_t* d = scratch.box + z * plane + y * pitch;
     for (std::int32_t x = 0; x < tool.box.x; ++x) {
       std::int32_t s = 0, t = 0;
@@ -85,27 +86,38 @@ void filter_z(const AlignedTable& tool, const AlignedScratch& scratch, std::int3
       smooth[x] = s;
       slope[x] = t;
     }
-    smooth += tool.row_lanes;
-    slope += tool.row_lanes;
   }
 }
 
-/// One row's part of the modification sum; the x filter works on the ratios, as in the vector form.
-void press_row(const AlignedTable& tool, const std::int16_t* ratio, const std::int32_t* smooth_z,
-               const std::int32_t* slope_z, std::int64_t (&sum)[3]) noexcept {
-  for (std::int32_t x = 0; x < tool.box.x; ++x) {
+/// Sums of the rows of a plane by axis, minus sign pending: the stored ratios are negative.
+struct RowSums {
+  std::int64_t x = 0, y = 0, z = 0;
+
+  void settle(WideSum (&sum)[3], int shift) noexcept {
+    sum[0].add(-x, shift);
+    sum[1].add(-y, shift);
+    sum[2].add(-z, shift);
+    x = y = z = 0;
+  }
+};
+
+/// One row's part of a sum of gradients; the x filter works on the ratios, as in the vector form.
+void press_row(const TickBox& box, std::int32_t row_lanes, const std::int16_t* ratio,
+               const std::int32_t* smooth_z, const std::int32_t* slope_z, RowSums& sum) noexcept {
+  const AlignedTaps& taps = box.taps;
+  for (std::int32_t x = 0; x < box.box.x; ++x) {
     std::int32_t along = 0, across = 0, smooth = 0, slope = 0, deep = 0;
     for (std::size_t k = 0; k < 5; ++k) {
       const auto step = static_cast<std::ptrdiff_t>(k);
-      along += tool.taps.smooth[k] * ratio[x + step - 2];
-      across -= tool.taps.slope[k] * ratio[x + step - 2];
-      smooth += tool.taps.smooth[k] * smooth_z[step * tool.row_lanes + x];
-      slope += tool.taps.slope[k] * smooth_z[step * tool.row_lanes + x];
-      deep += tool.taps.smooth[k] * slope_z[step * tool.row_lanes + x];
+      along += taps.smooth[k] * ratio[x + step - 2];
+      across -= taps.slope[k] * ratio[x + step - 2];
+      smooth += taps.smooth[k] * smooth_z[step * row_lanes + x];
+      slope += taps.slope[k] * smooth_z[step * row_lanes + x];
+      deep += taps.smooth[k] * slope_z[step * row_lanes + x];
     }
-    sum[0] -= std::int64_t{smooth} * across;
-    sum[1] -= std::int64_t{slope} * along;
-    sum[2] -= std::int64_t{deep} * along;
+    sum.x += std::int64_t{smooth} * across;
+    sum.y += std::int64_t{slope} * along;
+    sum.z += std::int64_t{deep} * along;
   }
 }
 
@@ -113,12 +125,13 @@ void press(const AlignedTable& tool, const std::int32_t (&weight)[8], const Alig
            std::int64_t (&sum)[3]) noexcept {
   const std::int32_t* const slopes =
       scratch.filter + static_cast<std::ptrdiff_t>(tool.box.y) * tool.row_lanes;
-  sum[0] = sum[1] = sum[2] = 0;
+  RowSums plane;
+  WideSum total[3];
   for (std::int32_t x = 0; x < kRatioRowPad; ++x) scratch.ratio[x] = 0;
   std::int16_t* ratio = scratch.ratio + kRatioRowPad;
   std::uint8_t* live = scratch.live;
   for (std::int32_t z = 0; z <= tool.size.z; ++z) {
-    filter_z(tool, scratch, z);
+    filter_z(tool, tool.row_lanes, scratch, z, 0, tool.size.y);
     for (std::int32_t y = 0; y <= tool.size.y; ++y) {
       const std::int16_t* density =
           scratch.box + (static_cast<std::ptrdiff_t>(z + 2) * tool.box.y + y + 2) * tool.box.x;
@@ -126,15 +139,17 @@ void press(const AlignedTable& tool, const std::int32_t (&weight)[8], const Alig
       for (std::int32_t x = 0; x < kRatioRowPad; ++x) ratio[tool.row_lanes + x] = 0;
       if (*live != 0) {
         const std::ptrdiff_t at = static_cast<std::ptrdiff_t>(y) * tool.row_lanes;
-        press_row(tool, ratio, scratch.filter + at, slopes + at, sum);
+        press_row(tool, tool.row_lanes, ratio, scratch.filter + at, slopes + at, plane);
       }
       ratio += tool.row_lanes + kRatioRowPad;
       ++live;
     }
+    plane.settle(total, tool.sum_shift);
   }
+  for (int axis = 0; axis < 3; ++axis) sum[axis] = total[axis].over(tool.sum_shift);
 }
 
-AlignedCut cut(const AlignedTable& tool, const AlignedRate& rate, const VoxelGrid& grid,
+AlignedCut cut(const TickBox& tool, const AlignedRate& rate, const VoxelGrid& grid,
                Density* density, VoxelIndex origin, const AlignedScratch& scratch,
                std::uint16_t* carry) noexcept {
   AlignedCut cut{0, {tool.box.x, tool.box.y, tool.box.z}, {-1, -1, -1}};
@@ -170,7 +185,14 @@ AlignedCut cut(const AlignedTable& tool, const AlignedRate& rate, const VoxelGri
 }
 
 }  // namespace
+}  // namespace kerf
 
-const AlignedKernels kAlignedScalar{"scalar", kLanes, false, copy_box, correlate, press, cut};
+#include "controller/kernel/gather_loops.hpp"
+#include "controller/kernel/splat_loops.hpp"
+
+namespace kerf {
+
+const AlignedKernels kAlignedScalar{"scalar", kLanes, false, copy_box, correlate, press,
+                                    cut,      gather, place, splat,    press_sums};
 
 }  // namespace kerf

@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "shared/volume/voxel_grid.hpp"
+#include "controller/kernel/tick_box.hpp"
 
 namespace kerf {
 
@@ -14,16 +14,11 @@ namespace kerf {
 // then a correlation of the density with a fixed table, S' = tool mask convolved with the gradient
 // taps, at the eight corners of one cell. Nothing but the density is stored, nothing is refreshed.
 
-/// Gradient taps whose slopes have no common factor: it is applied once, to the finished sum, which
-/// is then divided by 2^shift. Exact sums below are before both.
-struct AlignedTaps {
-  std::int32_t smooth[5];
-  std::int32_t slope[5];
-  std::int32_t factor;
-  std::int32_t shift;
-};
 inline constexpr AlignedTaps kAlignedFarid{{5, 32, 55, 32, 5}, {-2, -5, 0, 5, 2}, 7, 21};
 inline constexpr AlignedTaps kAlignedSobel5{{1, 4, 6, 4, 1}, {-1, -2, 0, 2, 1}, 1, 11};
+
+/// The central difference, scaled as sobel5.
+inline constexpr AlignedTaps kAlignedCentral{{0, 0, 32, 0, 0}, {0, -1, 0, 1, 0}, 1, 11};
 
 /// Fraction bits that contact sums keep.
 inline constexpr int kAlignedKeptBits = 8;
@@ -33,16 +28,8 @@ inline constexpr std::int32_t kMaxAlignedEdge = 64;
 /// The exact gradient of a voxel, times 2^21 / 7, is at most this for farid, less for sobel5: half
 /// the slope taps' sum times the smooth taps' squared, times full density.
 inline constexpr std::int64_t kMaxExactGradient = std::int64_t{7} * 129 * 129 * 65535;
-/// Samples of a tool that cuts, at most: the modification sum, 2^15 exact gradients a sample, stays
-/// below 2^62. A ball of 32 voxels has 17 256.
-inline constexpr std::size_t kMaxAlignedCutSamples = 18'000;
-static_assert(kMaxAlignedCutSamples <= (std::uint64_t{1} << 62) / 32768 / kMaxExactGradient);
-
-/// Voxels of the box around a tool beyond the tool: two of gradient at each end, one of the cell.
-inline constexpr std::int32_t kAlignedBoxMargin = 5;
-
-/// Entries before each row of overlap ratios: zeros that the x filter may read.
-inline constexpr std::int32_t kRatioRowPad = 8;
+static_assert(kNarrowSumSamples <= (std::uint64_t{1} << 62) / 32768 / kMaxExactGradient);
+static_assert(kMaxPlaneVoxels <= (std::uint64_t{1} << 63) / 32768 / kMaxExactGradient);
 
 /// A run of table entries that meets the box at `box_at` and the seven other corners' offsets.
 struct AlignedChunk {
@@ -55,15 +42,11 @@ struct AlignedChunk {
 ///
 /// A table entry has up to 18 bits and is kept as 512 hi + lo, both in 16 bits. A run is `lanes`
 /// entries lo, then `lanes` entries hi; with `fused` axes x, y, z follow each other in one run.
-struct AlignedTable {
-  VoxelIndex size;                    ///< voxels of the tool
-  VoxelIndex box;                     ///< size + kAlignedBoxMargin: pitch and plane of the stream
+struct AlignedTable : TickBox {
   std::array<std::int16_t, 3> low{};  ///< lowest offset of a sample, half pitches
-  AlignedTaps taps{};
-  std::int32_t lanes = 0;      ///< 16-bit entries in a vector
-  std::int32_t row_lanes = 0;  ///< box.x rounded up to 32: entries in a row of ratios
-  std::int32_t flush = 0;      ///< chunks that 32-bit sums can take: at most 2^31 - 1
-  bool fused = false;          ///< one list serves the three axes; it is the first
+  std::int32_t lanes = 0;             ///< 16-bit entries in a vector
+  std::int32_t flush = 0;             ///< chunks that 32-bit sums can take: at most 2^31 - 1
+  bool fused = false;                 ///< one list serves the three axes; it is the first
   const AlignedChunk* chunks[3] = {};
   std::int32_t chunk_count[3] = {};
   const std::int16_t* vectors = nullptr;

@@ -6,8 +6,8 @@
 
 #include "controller/kernel/aligned_kernels.hpp"
 
-// The vector kernels of the plan `aligned`, one text for AVX2 and AVX-512. Included only by their
-// two translation units, each of which defines `Simd`: a vector type V and its operations. All of
+// The vector kernels of the plan `aligned`, one text for AVX2, AVX-512 and NEON. Included only by
+// their translation units, each of which defines `Simd`: a vector type V and its operations. All of
 // it has internal linkage, for the reason told at AlignedKernels.
 
 namespace kerf {
@@ -36,7 +36,7 @@ constexpr std::int16_t kAir = -32768;  ///< density 0 after re-centring
 }
 
 /// A box that sticks out of the volume, or whose last vectors would leave the volume's memory.
-void copy_clipped_box(const AlignedTable& tool, const VoxelGrid& grid, const Density* density,
+void copy_clipped_box(const TickBox& tool, const VoxelGrid& grid, const Density* density,
                       VoxelIndex origin, const AlignedScratch& scratch,
                       std::int32_t padded) noexcept {
   const V flip = Simd::set16(kAir);
@@ -72,8 +72,8 @@ void copy_clipped_box(const AlignedTable& tool, const VoxelGrid& grid, const Den
 }
 
 // Box rows are stored as whole vectors, in order: the next row overwrites what spills.
-void copy_box(const AlignedTable& tool, const VoxelGrid& grid, const Density* density,
-              VoxelIndex origin, const AlignedScratch& scratch) noexcept {
+void copy_box(const TickBox& tool, const VoxelGrid& grid, const Density* density, VoxelIndex origin,
+              const AlignedScratch& scratch) noexcept {
   const std::int32_t width = tool.box.x;
   const std::int32_t padded = (width + kLanes - 1) / kLanes * kLanes;
   const std::ptrdiff_t pitch = grid.nx, plane = pitch * grid.ny, count = plane * grid.nz;
@@ -166,7 +166,7 @@ void correlate(const AlignedTable& tool, const std::int16_t* box,
       correlate_list<1, 8>(tool, a, box, corner, part);
       for (int c = 0; c < 8; ++c) sum[a][c] = part[0][c];
     }
-  } else {  // 16 registers
+  } else {  // 16 registers, or as many sums in flight as NEON needs
     const std::ptrdiff_t corner[4] = {0, pitch, plane, plane + pitch};
     for (int a = 0; a < 3; ++a) {
       for (int half = 0; half < 2; ++half) {
@@ -198,8 +198,8 @@ struct TapPairs {
 /// Bits of mask words that meet vector `j` of a row.
 [[gnu::always_inline]] inline std::uint32_t mask_bits(const std::uint32_t* words,
                                                       std::ptrdiff_t j) noexcept {
-  if constexpr (kLanes == 32) return words[j];
-  return words[j / 2] >> (16 * (j & 1)) & 0xffff;
+  constexpr std::ptrdiff_t kPerWord = 32 / kLanes;
+  return words[j / kPerWord] >> (kLanes * (j % kPerWord)) & ~std::uint32_t{0} >> (32 - kLanes);
 }
 
 /// Overlap ratios of plane z, negative, 0 where the density is 0. Sets the range of live rows.
@@ -244,7 +244,7 @@ struct TapPairs {
 }
 
 /// Rows y first .. last + 4 of the five planes at z, filtered along z: smooth, then slope.
-[[gnu::always_inline]] inline void filter_z(const AlignedTable& tool, std::int32_t row_lanes,
+[[gnu::always_inline]] inline void filter_z(const TickBox& tool, std::int32_t row_lanes,
                                             const AlignedScratch& scratch, std::int32_t z,
                                             std::int32_t first, std::int32_t last) noexcept {
   const TapPairs smooth(tool.taps.smooth, 1), slope(tool.taps.slope, 1);
@@ -268,8 +268,17 @@ struct TapPairs {
   }
 }
 
-struct VectorSum {
+/// Sums of rows by axis, minus sign pending: the stored ratios are negative.
+struct RowSums {
   V x = Simd::zero(), y = Simd::zero(), z = Simd::zero();
+
+  /// Hands the rows so far over, at most those of a plane.
+  [[gnu::always_inline]] void settle(WideSum (&sum)[3], int shift) noexcept {
+    sum[0].add(-Simd::sum64(x), shift);
+    sum[1].add(-Simd::sum64(y), shift);
+    sum[2].add(-Simd::sum64(z), shift);
+    x = y = z = Simd::zero();
+  }
 };
 
 /// sum += a b for 32-bit entries, exact.
@@ -282,10 +291,11 @@ struct VectorSum {
 /// One row's part of the modification sum. The x filter is applied to the ratios, not to the data:
 /// the dot product is the same, the ratios have 16 bits, and one filter serves all axes. Unpacking
 /// mixes the order of entries, on both sides alike.
-[[gnu::always_inline]] inline void press_row(const AlignedTaps& taps, std::int32_t row_lanes,
+[[gnu::always_inline]] inline void press_row(const TickBox& box, std::int32_t row_lanes,
                                              const std::int16_t* ratio,
                                              const std::int32_t* smooth_z,
-                                             const std::int32_t* slope_z, VectorSum& sum) noexcept {
+                                             const std::int32_t* slope_z, RowSums& sum) noexcept {
+  const AlignedTaps& taps = box.taps;
   const TapPairs smooth(taps.smooth, 1), slope_back(taps.slope, -1);
   const V outer = Simd::set32(taps.smooth[4]), inner = Simd::set32(taps.smooth[3]),
           middle = Simd::set32(taps.smooth[2]);
@@ -332,7 +342,8 @@ struct VectorSum {
   for (std::int32_t x = 0; x < kRatioRowPad; ++x) scratch.ratio[x] = 0;
   const std::int32_t* const slopes =
       scratch.filter + static_cast<std::ptrdiff_t>(tool.box.y) * row_lanes;
-  VectorSum total;
+  RowSums plane;
+  WideSum total[3];
   for (std::int32_t z = 0; z <= tool.size.z; ++z) {
     std::int32_t first = 0, last = -1;
     overlap_plane(tool, row_lanes, weight, scratch, z, first, last);
@@ -342,15 +353,14 @@ struct VectorSum {
       const std::int32_t row = z * (tool.size.y + 1) + y;
       if (scratch.live[row] == 0) continue;
       const std::ptrdiff_t at = static_cast<std::ptrdiff_t>(y) * row_lanes;
-      press_row(tool.taps, row_lanes,
+      press_row(tool, row_lanes,
                 scratch.ratio + kRatioRowPad +
                     static_cast<std::ptrdiff_t>(row) * (row_lanes + kRatioRowPad),
-                scratch.filter + at, slopes + at, total);
+                scratch.filter + at, slopes + at, plane);
     }
+    plane.settle(total, tool.sum_shift);
   }
-  sum[0] = -Simd::sum64(total.x);  // the stored ratios are negative
-  sum[1] = -Simd::sum64(total.y);
-  sum[2] = -Simd::sum64(total.z);
+  for (int axis = 0; axis < 3; ++axis) sum[axis] = total[axis].over(tool.sum_shift);
 }
 
 void press(const AlignedTable& tool, const std::int32_t (&weights)[8],
@@ -384,7 +394,7 @@ void press(const AlignedTable& tool, const std::int32_t (&weights)[8],
   return Simd::add_carry(high, sum, low);
 }
 
-[[gnu::always_inline]] inline AlignedCut cut_rows(AlignedTable tool, std::int32_t row_lanes,
+[[gnu::always_inline]] inline AlignedCut cut_rows(TickBox tool, std::int32_t row_lanes,
                                                   AlignedRate rate, VoxelGrid grid,
                                                   Density* density, VoxelIndex origin,
                                                   AlignedScratch scratch,
@@ -435,7 +445,7 @@ void press(const AlignedTable& tool, const std::int32_t (&weights)[8],
   return cut;
 }
 
-AlignedCut cut(const AlignedTable& tool, const AlignedRate& rate, const VoxelGrid& grid,
+AlignedCut cut(const TickBox& tool, const AlignedRate& rate, const VoxelGrid& grid,
                Density* density, VoxelIndex origin, const AlignedScratch& scratch,
                std::uint16_t* carry) noexcept {
   if (tool.row_lanes == 32) return cut_rows(tool, 32, rate, grid, density, origin, scratch, carry);

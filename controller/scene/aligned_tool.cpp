@@ -12,16 +12,23 @@
 namespace kerf {
 namespace {
 
+/// Each product of three taps over 2^shift is that of the stored gradients.
 constexpr bool are_taps_of(const AlignedTaps& aligned, GradientKernel kernel) {
   const GradientTaps stored = taps(kernel);
-  for (std::size_t i = 0; i < 5; ++i) {
-    if (stored.slope[i] != aligned.factor * aligned.slope[i]) return false;
-    if (stored.smooth[i] != aligned.smooth[i]) return false;
+  for (std::size_t i = 0; i < 125; ++i) {
+    const std::size_t a = i % 5, b = i / 5 % 5, c = i / 25;
+    const std::int64_t here =
+        std::int64_t{aligned.factor} * aligned.slope[a] * aligned.smooth[b] * aligned.smooth[c]
+        << (32 - aligned.shift);
+    const std::int64_t there = std::int64_t{stored.slope[a]} * stored.smooth[b] * stored.smooth[c]
+                               << (32 - stored.shift);
+    if (here != there) return false;
   }
-  return stored.shift == aligned.shift;
+  return true;
 }
 static_assert(are_taps_of(kAlignedFarid, GradientKernel::farid));
 static_assert(are_taps_of(kAlignedSobel5, GradientKernel::sobel5));
+static_assert(are_taps_of(kAlignedCentral, GradientKernel::central));
 
 struct Extent {
   ToolOffset low{}, high{};
@@ -82,31 +89,27 @@ bool can_align(std::span<const ToolOffset> offsets) {
   return std::set<ToolOffset>(offsets.begin(), offsets.end()).size() == offsets.size();
 }
 
-const AlignedTaps* aligned_taps(GradientKernel kernel) {
+const AlignedTaps& aligned_taps(GradientKernel kernel) {
   switch (kernel) {
-    case GradientKernel::farid:
-      return &kAlignedFarid;
     case GradientKernel::sobel5:
-      return &kAlignedSobel5;
+      return kAlignedSobel5;
     case GradientKernel::central:
+      return kAlignedCentral;
+    case GradientKernel::farid:
       break;
   }
-  return nullptr;
+  return kAlignedFarid;
 }
 
 AlignedTool::AlignedTool(std::span<const ToolOffset> offsets, const AlignedTaps& taps,
                          const AlignedKernels& kernels) {
-  table_.taps = taps;
   const Extent extent = extent_of(offsets);
   const auto length = [&](std::size_t axis) {
     return (extent.high[axis] - extent.low[axis]) / 2 + 1;
   };
-  table_.size = {length(0), length(1), length(2)};
-  table_.box = {table_.size.x + kAlignedBoxMargin, table_.size.y + kAlignedBoxMargin,
-                table_.size.z + kAlignedBoxMargin};
+  static_cast<TickBox&>(table_) = tick_box({length(0), length(1), length(2)}, taps, offsets.size());
   table_.low = extent.low;
   table_.lanes = kernels.lanes;
-  table_.row_lanes = (table_.box.x + 31) / 32 * 32;
 
   const VoxelGrid box{table_.box.x, table_.box.y, table_.box.z};
   std::vector<VoxelIndex> voxels;
@@ -225,9 +228,18 @@ AlignedScratch AlignedMemory::view() noexcept {
   return {box_.data(), ratio_.data(), filter_.data(), inside_.data(), live_.data()};
 }
 
-std::size_t AlignedMemory::bytes() const noexcept {
-  return (box_.size() + ratio_.size() + inside_.size()) * sizeof(std::int16_t) +
-         filter_.size() * sizeof(std::int32_t) + live_.size();
+std::vector<ArrayBytes> AlignedMemory::arrays() const {
+  const auto named = [](const char* name, const auto& memory) {
+    return ArrayBytes{name, memory.size() * sizeof(memory[0]), true};
+  };
+  return {named("box", box_), named("box mask", inside_), named("overlap ratios", ratio_),
+          named("filtered rows", filter_), named("live rows", live_)};
+}
+
+std::size_t AlignedMemory::bytes() const {
+  std::size_t sum = 0;
+  for (const ArrayBytes& array : arrays()) sum += array.bytes;
+  return sum;
 }
 
 }  // namespace kerf

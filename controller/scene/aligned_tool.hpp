@@ -11,6 +11,7 @@
 #include "controller/kernel/aligned_table.hpp"
 #include "controller/kernel/gradient.hpp"
 #include "controller/kernel/tool_offset.hpp"
+#include "controller/scene/scene_costs.hpp"
 
 namespace kerf {
 
@@ -18,8 +19,8 @@ namespace kerf {
 /// the same place, at most kMaxAlignedEdge along each axis, at least one.
 [[nodiscard]] bool can_align(std::span<const ToolOffset> offsets);
 
-/// The taps of a gradient kernel as the plan takes them; nullptr for `central`, which it does not.
-[[nodiscard]] const AlignedTaps* aligned_taps(GradientKernel kernel);
+/// The taps of a gradient kernel as exact sums take them.
+[[nodiscard]] const AlignedTaps& aligned_taps(GradientKernel kernel);
 
 /// Owner of one tool's table for the plan `aligned`. Load time; moving it keeps the table valid.
 class AlignedTool {
@@ -54,7 +55,8 @@ class AlignedMemory {
   /// Makes room for a tool; the arrays of milling exist only where some tool `mills`.
   void hold(VoxelIndex tool_size, bool mills);
   [[nodiscard]] AlignedScratch view() noexcept;
-  [[nodiscard]] std::size_t bytes() const noexcept;
+  [[nodiscard]] std::vector<ArrayBytes> arrays() const;
+  [[nodiscard]] std::size_t bytes() const;
 
  private:
   std::vector<std::int16_t> box_, ratio_, inside_;

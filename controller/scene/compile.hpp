@@ -2,20 +2,43 @@
 #pragma once
 
 #include <memory>
+#include <vector>
 
+#include "controller/kernel/aligned_kernels.hpp"
 #include "controller/scene/scene.hpp"
+#include "controller/scene/scene_costs.hpp"
 #include "controller/servo/servo.hpp"
 
 namespace kerf {
 
-/// The scene compiler: turns a checked scene into plan and memory of the servo step, in the numbers
-/// that the scene asks for.
+/// A scene turned into plan and memory of the servo step, in the numbers that the scene asks for.
 ///
-/// Takes the volumes' densities and the tools' offsets over (they are empty in the scene
-/// afterwards). A tool that the plan `aligned` can hold gets its tables; a solid volume gets a
-/// gradient field if any other tool may touch it. Nothing is allocated after this. Throws
+/// Each tool has one plan in each solid volume (`choose_plan`). The costs are known at once; the
+/// memory exists after `take`, and nothing is allocated after that.
+class CompiledScene : public Servo {
+ public:
+  [[nodiscard]] virtual const SceneCosts& costs() const noexcept = 0;
+
+  /// Takes the volumes' densities over (they are empty in the scene afterwards) and allocates the
+  /// rest. Once, before the first step; `scene` is the one that was compiled.
+  virtual void take(Scene& scene) = 0;
+
+  /// Median of each stage of `costs().ticks[tick]` on the volume as it is, in us, with a tool that
+  /// is inside the densest part and turned as unfavourably as it can be. Cuts where the scene cuts:
+  /// only for a servo that will not be stepped. After `take`; takes about 250 ticks.
+  [[nodiscard]] virtual std::vector<double> time_stages(std::size_t tick) = 0;
+};
+
+/// Plans, tables and costs of a checked scene; no array of the size of a volume is made. Throws
 /// SceneError for a scene that the loop cannot hold: no solid volume, a voxel or a step outside the
 /// number formats.
-[[nodiscard]] std::unique_ptr<Servo> compile(Scene& scene);
+///
+/// `kernels` run the loop: the fastest of this machine unless a test asks for others.
+[[nodiscard]] std::unique_ptr<CompiledScene> plan_scene(
+    const Scene& scene, const AlignedKernels& kernels = **aligned_kernels());
+
+/// `plan_scene` and `take` in one.
+[[nodiscard]] std::unique_ptr<CompiledScene> compile(
+    Scene& scene, const AlignedKernels& kernels = **aligned_kernels());
 
 }  // namespace kerf

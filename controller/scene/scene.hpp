@@ -46,6 +46,7 @@ struct SceneTool {
   double radius_mm = 1.0;
   double length_mm = 2.0;
   bool round = false;
+  bool turns = true;  ///< with the stylus; else it keeps the world's axes
   std::array<std::int32_t, 3> size_vox{};
   std::vector<ToolOffset> offsets;
 };

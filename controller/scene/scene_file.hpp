@@ -10,6 +10,7 @@
 
 #include "controller/scene/scene.hpp"
 #include "controller/scene/tool_shapes.hpp"
+#include "controller/servo/servo_limits.hpp"
 
 namespace kerf {
 
@@ -17,8 +18,6 @@ inline constexpr double kMinWorkspaceScale = 0.01, kMaxWorkspaceScale = 100;
 inline constexpr double kLargestWorldMm = 10000;  ///< a third of the range of the loop's numbers
 inline constexpr int kMinRateHz = 250;            // slower than the hand can be held stable
 inline constexpr int kMaxRateHz = 8000;           // one tick per cycle of the FireWire bus
-inline constexpr std::size_t kMaxVolumes = 16;    // each has a descriptor in the segment
-inline constexpr std::size_t kMaxTools = 32;
 inline constexpr std::size_t kMaxMaterials = 32;  // labels are small indices
 
 /// The `file` of a [[volume]] that is computed instead of read.
@@ -46,6 +45,7 @@ struct ToolSpec {
   std::string shape;
   bool pitch_given = false;  ///< else the smallest voxel of what can be touched
   ToolSize size;
+  bool turns = true;
 };
 
 /// A scene file after parsing: every value checked alone, nothing loaded yet.

@@ -58,6 +58,7 @@ json tool_json(const SceneTool& tool) {
           {"radius_mm", tool.radius_mm},
           {"length_mm", tool.length_mm},
           {"round", tool.round},
+          {"turns", tool.turns},
           {"size_vox", tool.size_vox},
           {"profile", tool_profile(tool)},
           {"offsets_half_pitch", std::move(offsets)}};

@@ -167,6 +167,7 @@ SceneTool load_tool(const ToolSpec& spec, const TouchedVolumes& touched) {
                                 "; use a smaller tool or a coarser pitch");
   }
   SceneTool tool = make_tool(spec.name, spec.shape, size);
+  tool.turns = spec.turns;
   const double side_mm = std::max(2 * tool.radius_mm, tool.length_mm);
   if (side_mm > touched.side_mm) {
     refuse(spec.size_place, " makes a tool of " + number_text(side_mm) + " mm" +

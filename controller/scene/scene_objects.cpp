@@ -124,6 +124,7 @@ ToolSpec read_tool_table(const SceneTable& table) {
     tool.pitch_given = true;
     tool.pitch_place = table.place("pitch_mm");
   }
+  tool.turns = table.flag("turns").value_or(tool.turns);
   tool.name = table.text("name").value_or(tool.name);
   return tool;
 }

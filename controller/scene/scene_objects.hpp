@@ -15,8 +15,8 @@ namespace kerf {
 
 inline constexpr std::string_view kVolumeKeys[] = {"name", "file", "size", "spacing_mm", "window",
                                                    "iso",  "crop", "pose", "solid"};
-inline constexpr std::string_view kToolKeys[] = {"name",     "shape",     "radius_mm",
-                                                 "size_vox", "length_mm", "pitch_mm"};
+inline constexpr std::string_view kToolKeys[] = {"name",      "shape",    "radius_mm", "size_vox",
+                                                 "length_mm", "pitch_mm", "turns"};
 inline constexpr std::string_view kMaterialKeys[] = {"name", "iso", "machinability", "colour"};
 
 [[nodiscard]] VolumeSpec read_volume_table(const SceneTable& table);

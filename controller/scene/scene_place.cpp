@@ -105,7 +105,8 @@ std::optional<Point3> nearest_solid_voxel(const SceneVolume& volume, const World
         if (volume.image.density[grid.index(x, y, z)] < volume.iso) continue;
         const Point3 point = density.world_of_voxel(
             {static_cast<double>(x), static_cast<double>(y), static_cast<double>(z)});
-        const double distance_mm = std::hypot(point[0] - middle[0], point[2] - middle[2]);
+        const double dx = point[0] - middle[0], dz = point[2] - middle[2];
+        const double distance_mm = std::sqrt(dx * dx + dz * dz);
         const bool nearer = distance_mm < least_mm - same;
         const bool higher = best && distance_mm < least_mm + same && point[1] > (*best)[1];
         if (!nearer && !higher) continue;
@@ -138,8 +139,9 @@ std::array<double, 4> quaternion_of(const Matrix3& m) {
   if (largest == 1) q = {(m[1] + m[3]) / root, root, (m[5] + m[7]) / root, (m[2] - m[6]) / root};
   if (largest == 2) q = {(m[2] + m[6]) / root, (m[5] + m[7]) / root, root, (m[3] - m[1]) / root};
   if (largest == 3) q = {(m[7] - m[5]) / root, (m[2] - m[6]) / root, (m[3] - m[1]) / root, root};
-  const double scale =
-      (q[3] < 0 ? -1.0 : 1.0) / std::hypot(std::hypot(q[0], q[1]), std::hypot(q[2], q[3]));
+  // Not hypot: a square root has the same bits everywhere.
+  const double norm = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+  const double scale = (q[3] < 0 ? -1.0 : 1.0) / norm;
   for (double& component : q) component = component == 0 ? 0 : component * scale;  // no -0
   return q;
 }

@@ -5,11 +5,11 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "controller/servo/servo_limits.hpp"
 #include "shared/volume/voxel_grid.hpp"
 
 namespace kerf {
 
-inline constexpr std::size_t kMaxVolumes = 8;
 inline constexpr double kContactThresholdN = 0.01;  ///< a tick with more force is a contact tick
 
 /// Where the safety of the loop stands. Motors are on in `ramping` and `active` only.
@@ -59,7 +59,7 @@ struct ServoOutput {
   std::array<std::int32_t, 3> joint_counts{};  ///< unwrapped since docking
   std::array<double, 3> gimbal_rad{};          ///< yaw, pitch, roll
   std::array<double, 3> position_mm{};         ///< tip in the scene
-  std::array<double, 9> rotation{};            ///< world from tool, row-major
+  std::array<double, 9> rotation{};            ///< world from the tool as felt, row-major
   std::array<double, 3> velocity_mm_per_s{};   ///< device port, mean over 8 ticks
   std::array<double, 3> force_n{};             ///< sent to the hand, device port
   std::array<double, 3> contact_n{};           ///< part of it before limits, device port

@@ -12,14 +12,12 @@
 #include "controller/kernel/tool_offset.hpp"
 #include "controller/servo/force_limits.hpp"
 #include "controller/servo/kinematics/omni.hpp"
-#include "controller/servo/servo_output.hpp"
+#include "controller/servo/servo_limits.hpp"
 #include "controller/servo/sum_to_force.hpp"
 #include "controller/servo/supervisor.hpp"
 #include "shared/volume/voxel_grid.hpp"
 
 namespace kerf {
-
-inline constexpr std::size_t kMaxTools = 16;
 
 /// A solid volume as the loop sees it; constant during a run.
 template <class N>
@@ -35,16 +33,37 @@ struct VolumePlan {
   typename N::Real largest_spacing_mm{};
 };
 
+/// How contact and cut of one tool in one volume are computed. Fixed point knows all three; float
+/// and double gather, whether they cut or not.
+enum class Plan : std::uint8_t {
+  aligned,  ///< a correlation of the density with one table (controller/kernel/aligned_table.hpp)
+  gather,   ///< stored gradients, weighted at every sample (controller/kernel/contact.hpp)
+  splat,    ///< weights added up in the volume (controller/kernel/splat_table.hpp)
+};
+
+[[nodiscard]] constexpr const char* name_of(Plan plan) noexcept {
+  switch (plan) {
+    case Plan::aligned:
+      return "aligned";
+    case Plan::splat:
+      return "splat";
+    case Plan::gather:
+      break;
+  }
+  return "gather";
+}
+
 /// What one tool needs in one volume.
 template <class N>
 struct ToolInVolume {
   /// Voxels per pitch along the world's axes; times the tool's rotation it is the sample step.
   Transform<typename N::Ratio, VoxelSpace, WorldSpace> voxel_from_pitch;
-  std::array<std::array<typename N::Step, 3>, 3> unrotated_step{};  ///< for round tools
-  typename N::Step overlap_ratio{};                                 ///< a^3 / V_voxel
-  /// Plan `aligned` where set: no gradients are stored for it, and the two maps below take its
-  /// sums. Else plan `gather`. Fixed point only.
-  const AlignedTable* aligned = nullptr;
+  std::array<std::array<typename N::Step, 3>, 3>
+      unturned_step{};               ///< of a tool that keeps its axes
+  typename N::Step overlap_ratio{};  ///< a^3 / V_voxel
+  Plan plan = Plan::gather;
+  const AlignedTable* aligned = nullptr;  ///< of the plan `aligned`
+  // Of the plan's own sums:
   SumToForce<N> contact;       ///< F_c = -p0 a^3 grad: haptics-science 1.1, times workspace scale
   SumToForce<N> modification;  ///< F_m = -p1 V_voxel SUM r grad, times workspace scale
 };
@@ -52,7 +71,10 @@ struct ToolInVolume {
 template <class N>
 struct ToolPlan {
   std::span<const ToolOffset> offsets;
+  SampleTable samples;  ///< the same for the plans `gather` and `splat` in fixed point
+  /// A round tool has the same samples in every orientation: they keep the volume's axes.
   bool round = false;
+  bool turns = true;  ///< with the stylus; else the tool keeps the world's axes
   std::array<ToolInVolume<N>, kMaxVolumes> in_volume{};  ///< by index of the plan's volumes
 };
 
@@ -65,7 +87,8 @@ struct ServoPlan {
   std::array<ToolPlan<N>, kMaxTools> tools{};
 
   GradientKernel kernel = GradientKernel::farid;
-  const AlignedKernels* aligned_kernels = nullptr;  ///< what this machine runs the plan with
+  const AlignedTaps* taps = nullptr;        ///< of the kernel, for the plan `splat`
+  const AlignedKernels* kernels = nullptr;  ///< what this machine runs
   bool cutting = false;
   RemovalRate<N> removal_rate;
 

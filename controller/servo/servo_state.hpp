@@ -6,9 +6,9 @@
 #include <cstdint>
 #include <span>
 
-#include "controller/kernel/aligned_table.hpp"
 #include "controller/kernel/gradient.hpp"
 #include "controller/kernel/milling.hpp"
+#include "controller/kernel/splat_table.hpp"
 #include "controller/servo/force_limits.hpp"
 #include "controller/servo/hash_chain.hpp"
 #include "controller/servo/kinematics/omni.hpp"
@@ -21,7 +21,7 @@ namespace kerf {
 template <class N>
 struct VolumeState {
   std::span<Density> density;
-  std::span<Gradient<N>> gradient;   ///< empty where every tool is aligned
+  std::span<Gradient<N>> gradient;   ///< empty where no tool gathers
   std::span<RemovalCarry<N>> carry;  ///< fractions of density steps still owed
 };
 
@@ -50,7 +50,7 @@ struct ServoState {
   std::array<VolumeState<N>, kMaxVolumes> volumes{};
   OverlapBox<N> overlap;  ///< scratch of one tick, as is the next
   GradientScratch* gradient_scratch = nullptr;
-  AlignedScratch aligned_scratch;
+  SplatScratch splat;  ///< the plan `aligned` uses its inner part
 
   Supervisor supervisor;
   EncoderState encoders;

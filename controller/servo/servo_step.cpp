@@ -245,7 +245,8 @@ void drive(const ServoPlan<N>& plan, ServoState<N>& state, DeviceVec<typename N:
 
 /// The rest of the output, for the eyes and the log.
 template <class N>
-void tell(ServoState<N>& state, const Sensed<N>& sensed, bool fresh, ServoOutput& out) noexcept {
+void tell(const ServoPlan<N>& plan, ServoState<N>& state, const Sensed<N>& sensed, bool fresh,
+          ServoOutput& out) noexcept {
   using Real = typename N::Real;
   out.phase = state.supervisor.phase;
   out.fault = state.supervisor.fault;
@@ -257,7 +258,10 @@ void tell(ServoState<N>& state, const Sensed<N>& sensed, bool fresh, ServoOutput
     out.gimbal_rad[i] = as_double(sensed.pose.gimbal[i]);
   }
   out.position_mm = as_doubles(sensed.tip_mm);
-  for (std::size_t i = 0; i < 9; ++i) out.rotation[i] = as_double(state.rotation.row[i / 3][i % 3]);
+  // Drawn as it is felt: a tool that does not turn keeps the world's axes.
+  const Rotation<N> rotation =
+      plan.tools[state.active_tool].turns ? state.rotation : identity_rotation<N>();
+  for (std::size_t i = 0; i < 9; ++i) out.rotation[i] = as_double(rotation.row[i / 3][i % 3]);
   out.velocity_mm_per_s = sensed.velocity_mm_per_s;
   out.force_n = as_doubles(state.force_n);
   out.absorbed_mj = energy_mj<N>(state.absorbed_mj);
@@ -276,7 +280,7 @@ ServoOutput servo_step(const ServoPlan<N>& plan, ServoState<N>& state,
   const auto wanted_n = wanted_force(plan, state, sensed, out);
   drive(plan, state, wanted_n, out);
   if (sensed.usable) state.held_force_n = state.force_n;
-  tell(state, sensed, report.fresh, out);
+  tell(plan, state, sensed, report.fresh, out);
   return out;
 }
 

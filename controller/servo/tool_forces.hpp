@@ -7,9 +7,11 @@
 
 #include "controller/kernel/aligned.hpp"
 #include "controller/kernel/contact.hpp"
+#include "controller/kernel/gather.hpp"
 #include "controller/kernel/gradient.hpp"
 #include "controller/kernel/milling.hpp"
 #include "controller/kernel/overlap.hpp"
+#include "controller/kernel/splat.hpp"
 #include "controller/kernel/tool_pose.hpp"
 #include "controller/servo/servo_plan.hpp"
 #include "controller/servo/servo_state.hpp"
@@ -25,8 +27,8 @@ struct ToolForces {
   std::array<Removed, kMaxVolumes> removed{};  ///< by volume of the scene
 };
 
-/// Samples of the active tool in one volume. A round tool has the same samples in every
-/// orientation, so it stays unrotated.
+/// Samples of the active tool in one volume. A tool that is round, or that does not turn, has the
+/// same samples whatever the stylus does.
 template <class N>
 [[nodiscard]] ToolPose<N> tool_pose(const VolumePlan<N>& volume, const ToolPlan<N>& tool,
                                     const ToolInVolume<N>& in_volume,
@@ -34,8 +36,8 @@ template <class N>
                                     const Rotation<N>& rotation) noexcept {
   ToolPose<N> pose;
   pose.centre_vox = volume.voxel_from_world * (tip_mm - volume.position_mm);
-  pose.step = in_volume.unrotated_step;
-  if (tool.round) return pose;
+  pose.step = in_volume.unturned_step;
+  if (tool.round || !tool.turns) return pose;
   for (std::size_t i = 0; i < 3; ++i) {
     for (std::size_t j = 0; j < 3; ++j) {
       const auto& a = in_volume.voxel_from_pitch.row[i];
@@ -55,7 +57,7 @@ template <class N>
 }
 
 /// One volume by the plan `aligned`: contact, then the modification force and the removal where
-/// the plan cuts. Stored gradients exist only for other tools; they follow the cut.
+/// the plan cuts.
 inline void feel_and_cut_aligned(const ServoPlan<FixedNumbers>& plan,
                                  ServoState<FixedNumbers>& state, std::size_t v,
                                  const ToolPose<FixedNumbers>& pose,
@@ -63,8 +65,8 @@ inline void feel_and_cut_aligned(const ServoPlan<FixedNumbers>& plan,
   const VolumePlan<FixedNumbers>& volume = plan.volumes[v];
   VolumeState<FixedNumbers>& memory = state.volumes[v];
   const ToolInVolume<FixedNumbers>& in_volume = plan.tools[state.active_tool].in_volume[v];
-  const AlignedTick tick(*plan.aligned_kernels, *in_volume.aligned, state.aligned_scratch,
-                         volume.grid, memory.density, pose);
+  const AlignedTick tick(*plan.kernels, *in_volume.aligned, state.splat.tick, volume.grid,
+                         memory.density, pose);
   forces.contact_n =
       forces.contact_n - force_of_sum<FixedNumbers>(in_volume.contact, tick.contact());
   if (!plan.cutting) return;
@@ -72,12 +74,60 @@ inline void feel_and_cut_aligned(const ServoPlan<FixedNumbers>& plan,
   const AlignedTick::Milled milled = tick.mill(plan.removal_rate, memory.carry);
   forces.modification_n = forces.modification_n -
                           force_of_sum<FixedNumbers>(in_volume.modification, milled.modification);
-  if (!memory.gradient.empty()) {
-    refresh_gradients<FixedNumbers>(plan.kernel, volume.grid, memory.density,
-                                    milled.removed.changed, memory.gradient,
-                                    *state.gradient_scratch);
-  }
   forces.removed[volume.scene_index] = milled.removed;
+}
+
+/// One volume by the plan `splat`: both forces, then the removal.
+inline void feel_and_cut_splat(const ServoPlan<FixedNumbers>& plan, ServoState<FixedNumbers>& state,
+                               std::size_t v, const ToolPose<FixedNumbers>& pose,
+                               ToolForces<FixedNumbers>& forces) noexcept {
+  const VolumePlan<FixedNumbers>& volume = plan.volumes[v];
+  VolumeState<FixedNumbers>& memory = state.volumes[v];
+  const ToolPlan<FixedNumbers>& tool = plan.tools[state.active_tool];
+  const ToolInVolume<FixedNumbers>& in_volume = tool.in_volume[v];
+  const SplatOutcome out =
+      splat_tick(*plan.kernels, tool.samples, *plan.taps, state.splat, volume.grid, memory.density,
+                 pose, in_volume.overlap_ratio, plan.removal_rate, memory.carry);
+  forces.contact_n =
+      forces.contact_n - force_of_sum<FixedNumbers>(in_volume.contact, out.felt.contact);
+  forces.modification_n = forces.modification_n -
+                          force_of_sum<FixedNumbers>(in_volume.modification, out.felt.modification);
+  forces.removed[volume.scene_index] = out.removed;
+}
+
+/// One volume from stored gradients. Fixed point gets here only where nothing is cut.
+template <class N>
+void feel_and_cut_gathered(const ServoPlan<N>& plan, ServoState<N>& state, std::size_t v,
+                           const ToolPose<N>& pose, ToolForces<N>& forces) noexcept {
+  const VolumePlan<N>& volume = plan.volumes[v];
+  VolumeState<N>& memory = state.volumes[v];
+  const ToolPlan<N>& tool = plan.tools[state.active_tool];
+  const ToolInVolume<N>& in_volume = tool.in_volume[v];
+  const std::span<const Gradient<N>> gradient = memory.gradient;
+  if constexpr (N::kIsFixed) {
+    forces.contact_n =
+        forces.contact_n -
+        force_of_sum<N>(in_volume.contact,
+                        gathered_contact(*plan.kernels, tool.samples, volume.grid, gradient, pose));
+  } else {
+    forces.contact_n = forces.contact_n -
+                       force_of_sum<N>(in_volume.contact,
+                                       contact_sum<N>(volume.grid, gradient, tool.offsets, pose));
+    if (!plan.cutting) return;
+
+    const VoxelBox touched =
+        overlap<N>(volume.grid, tool.offsets, pose, in_volume.overlap_ratio, state.overlap);
+    if (touched.empty()) return;
+    forces.modification_n =
+        forces.modification_n -
+        force_of_sum<N>(in_volume.modification,
+                        modification_sum<N>(volume.grid, gradient, memory.density, state.overlap));
+    const Removed removed =
+        remove<N>(volume.grid, memory.density, state.overlap, plan.removal_rate, memory.carry);
+    refresh_gradients<N>(plan.kernel, volume.grid, memory.density, removed.changed, memory.gradient,
+                         *state.gradient_scratch);
+    forces.removed[volume.scene_index] = removed;
+  }
 }
 
 /// Contact force of the active tool in all solid volumes as they are; then, where the plan cuts,
@@ -89,35 +139,18 @@ template <class N>
   const ToolPlan<N>& tool = plan.tools[state.active_tool];
   ToolForces<N> forces;
   for (std::size_t v = 0; v < plan.volume_count; ++v) {
-    const VolumePlan<N>& volume = plan.volumes[v];
-    VolumeState<N>& memory = state.volumes[v];
-    const ToolInVolume<N>& in_volume = tool.in_volume[v];
-    const ToolPose<N> pose = tool_pose(volume, tool, in_volume, tip_mm, rotation);
+    const ToolPose<N> pose = tool_pose(plan.volumes[v], tool, tool.in_volume[v], tip_mm, rotation);
     if constexpr (N::kIsFixed) {
-      if (in_volume.aligned != nullptr) {
+      if (tool.in_volume[v].plan == Plan::aligned) {
         feel_and_cut_aligned(plan, state, v, pose, forces);
         continue;
       }
+      if (tool.in_volume[v].plan == Plan::splat) {
+        feel_and_cut_splat(plan, state, v, pose, forces);
+        continue;
+      }
     }
-
-    const std::span<const Gradient<N>> gradient = memory.gradient;
-    forces.contact_n = forces.contact_n -
-                       force_of_sum<N>(in_volume.contact,
-                                       contact_sum<N>(volume.grid, gradient, tool.offsets, pose));
-    if (!plan.cutting) continue;
-
-    const VoxelBox touched =
-        overlap<N>(volume.grid, tool.offsets, pose, in_volume.overlap_ratio, state.overlap);
-    if (touched.empty()) continue;
-    forces.modification_n =
-        forces.modification_n -
-        force_of_sum<N>(in_volume.modification,
-                        modification_sum<N>(volume.grid, gradient, memory.density, state.overlap));
-    const Removed removed =
-        remove<N>(volume.grid, memory.density, state.overlap, plan.removal_rate, memory.carry);
-    refresh_gradients<N>(plan.kernel, volume.grid, memory.density, removed.changed, memory.gradient,
-                         *state.gradient_scratch);
-    forces.removed[volume.scene_index] = removed;
+    feel_and_cut_gathered(plan, state, v, pose, forces);
   }
   return forces;
 }

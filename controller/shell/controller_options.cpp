@@ -88,8 +88,13 @@ std::optional<int> parse_options(int argc, const char* const* argv, ControllerOp
       ->check(CLI::Range(0, 900))
       ->capture_default_str();
   app.add_flag("--check", options.check, "load and check the scene, print what it means, and end");
+  app.add_flag("--explain", options.explain,
+               "tell what the scene costs: plans, operations, time, memory; and end");
+  app.add_flag("--calibrate", options.calibrate,
+               "with --explain: measure anew what an operation costs on this machine");
   app.add_flag("--progress", options.progress, "show a progress bar on a terminal");
-  app.add_option("--report", options.report, "write the figures of the run as JSON")
+  app.add_option("--report", options.report,
+                 "write the figures of the run, or of --explain, as JSON")
       ->type_name("FILE");
   app.add_option("--final", options.final_volume, "write the volume as it is at the end (.nrrd)")
       ->type_name("FILE");
@@ -115,10 +120,11 @@ std::optional<int> parse_options(int argc, const char* const* argv, ControllerOp
   for (const double edge_mm : spacing_mm) {
     if (!(edge_mm > 0)) return refuse("--spacing: a voxel edge is above 0 mm, for example 0.125");
   }
-  if (!options.check && options.port.empty()) {
+  const bool runs = !options.check && !options.explain;
+  if (runs && options.port.empty()) {
     return refuse("--port is missing; give socket:PATH, where kerf-emulator listens");
   }
-  if (!options.check && !options.port.starts_with("socket:")) {
+  if (runs && !options.port.starts_with("socket:")) {
     return refuse("--port '" + options.port +
                   "' is not known; use socket:PATH, where kerf-emulator listens");
   }

@@ -20,6 +20,8 @@ struct ControllerOptions {
   std::string name = "kerf";
   bool virtual_time = false;
   bool check = false;
+  bool explain = false;
+  bool calibrate = false;
   bool progress = false;
   RealTimeOptions real_time;
   std::string report;         ///< JSON, empty: none

@@ -26,6 +26,9 @@
 #include "controller/scene/scene_load.hpp"
 #include "controller/scene/scene_words.hpp"
 #include "controller/scene/volume_write.hpp"
+#include "controller/scene/work_budget.hpp"
+#include "controller/shell/calibration.hpp"
+#include "controller/shell/explain.hpp"
 #include "controller/shell/motor_guard.hpp"
 #include "controller/shell/progress_bar.hpp"
 #include "controller/shell/publisher.hpp"
@@ -36,7 +39,8 @@
 #include "shared/posix/cores.hpp"
 #include "shared/posix/memory.hpp"
 #include "shared/posix/new_file.hpp"
-#include "shared/segment/hash.hpp"
+#include "shared/segment/segment_plan.hpp"
+#include "shared/volume/density_hash.hpp"
 
 namespace kerf {
 namespace {
@@ -68,7 +72,7 @@ std::string hand_lines(const Scene& scene) {
          "\nrate_hz=" + std::to_string(scene.servo.rate_hz) + "\n";
 }
 
-SegmentWriter publish_scene(const Scene& scene, const std::string& json, std::uint64_t hash) {
+SegmentSpec segment_spec(const Scene& scene, const std::string& json, std::uint64_t hash) {
   SegmentSpec spec;
   spec.scene_json = json;
   spec.config_hash = hash;
@@ -87,7 +91,7 @@ SegmentWriter publish_scene(const Scene& scene, const std::string& json, std::ui
     v.density = volume.image.density;
     v.labels = volume.image.labels;
   }
-  return SegmentWriter::create(spec);
+  return spec;
 }
 
 /// Warns of each missing right, or refuses under --strict.
@@ -133,16 +137,11 @@ void write_final(const Scene& scene, const Servo& servo, const std::filesystem::
   }
 }
 
-/// Bytes that a run needs beyond the loaded scene, or a refusal: locked memory that is not there
-/// would end the program without a word.
-void check_memory(const Scene& scene) {
-  const bool fixed = scene.servo.numeric == NumericKind::fixed;
-  const std::uint64_t gradient_bytes = fixed ? 6 : 24;
-  std::uint64_t bytes = 0;
-  for (const SceneVolume& volume : scene.volumes) {
-    const std::uint64_t voxels = volume.image.grid.voxel_count();
-    bytes += voxels * (sizeof(Density) + (volume.solid ? gradient_bytes : 0));
-  }
+/// What a run takes beyond the loaded scene must be there: locked memory that is not would end the
+/// program without a word.
+void check_memory(const Scene& scene, const SceneCosts& costs, std::uint64_t segment_bytes) {
+  std::uint64_t bytes = segment_bytes;
+  for (const ArrayBytes& array : costs.arrays) bytes += array.taken ? 0 : array.bytes;
   const auto free_bytes = available_memory();
   if (free_bytes && bytes > *free_bytes) {
     throw std::runtime_error(scene.path + ": needs " + std::to_string(bytes >> 20) + " MiB, and " +
@@ -198,14 +197,32 @@ int check_scene(const Scene& scene) {
   return 0;
 }
 
+/// `--explain`: what the scene costs on this machine; it is not run.
+int explain_scene(const ControllerOptions& options, Scene& scene, CompiledScene& servo) {
+  const int core = options.real_time.cpu >= 0 ? options.real_time.cpu : allowed_cores().back();
+  static_cast<void>(pin_to_core(core));  // where it may not, times are less even
+  const Calibration calibration = calibration_of_machine(calibration_path(), options.calibrate);
+  const SegmentPlan segment = plan_segment(segment_spec(scene, canonical_json(scene), 0));
+  check_memory(scene, servo.costs(), 0);
+  servo.take(scene);
+  const Explanation told = explain(scene, servo, segment, calibration);
+  std::fputs(explanation_text(told).c_str(), stdout);
+  if (!options.report.empty()) write_new_file(options.report, explanation_json(told));
+  const std::string refusal = over_budget(scene, servo.costs());
+  if (!refusal.empty()) throw std::runtime_error(refusal);
+  return 0;
+}
+
 /// Everything that can be known to go wrong, before the hand is moved.
-void check_run(const ControllerOptions& options, const Scene& scene) {
+void check_run(const ControllerOptions& options, const Scene& scene, const SceneCosts& costs) {
   if (static_cast<double>(options.real_time.spin_us) * scene.servo.rate_hz > 0.9e6) {
     throw std::runtime_error("--spin-us " + std::to_string(options.real_time.spin_us) +
                              " is more than 90 % of a tick at " +
                              std::to_string(scene.servo.rate_hz) + " Hz; spin less");
   }
-  check_memory(scene);
+  // In lock-step the device waits: there is no deadline to keep.
+  const std::string refusal = options.virtual_time ? "" : over_budget(scene, costs);
+  if (!refusal.empty()) throw std::runtime_error(refusal);
   if (!options.report.empty()) check_new_file(options.report);
   if (!options.final_volume.empty()) check_volume_path(options.final_volume);
   if (const double stiffness = device_stiffness_n_per_mm(scene); stiffness > kStableNPerMm) {
@@ -309,15 +326,19 @@ int run_controller(const ControllerOptions& options) {
 
   Scene scene = load_scene(options.scene, options.overrides);
   if (options.check) return check_scene(scene);
-  check_run(options, scene);
-  if (!options.emulator_args.empty()) write_new_file(options.emulator_args, hand_lines(scene));
+  const std::unique_ptr<CompiledScene> servo = plan_scene(scene);
+  if (options.explain) return explain_scene(options, scene, *servo);
+  check_run(options, scene, servo->costs());
 
   const std::string json = canonical_json(scene);
   RunReport report = new_report(options, scene, fnv1a(json));
-  SegmentWriter segment = publish_scene(scene, json, report.config_hash);
+  const SegmentSpec spec = segment_spec(scene, json, report.config_hash);
+  check_memory(scene, servo->costs(), plan_segment(spec).header.total_bytes);
+  if (!options.emulator_args.empty()) write_new_file(options.emulator_args, hand_lines(scene));
+  SegmentWriter segment = SegmentWriter::create(spec);
   SegmentServer server(options.name, segment,
                        {.tools = static_cast<std::uint32_t>(scene.tools.size())});
-  const std::unique_ptr<Servo> servo = compile(scene);
+  servo->take(scene);
   std::optional<SocketPort> port;
   try {
     port.emplace(options.port.substr(std::string("socket:").size()), kPortPatienceMs, stop);

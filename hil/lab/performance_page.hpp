@@ -10,6 +10,7 @@ namespace kerf {
 
 /// `docs/performance.md`: the figures of one run with the machine, the compiler, the day and the
 /// command that made them. Markdown.
-[[nodiscard]] std::string performance_page(const std::vector<KernelRow>& rows);
+[[nodiscard]] std::string performance_page(const std::vector<KernelRow>& rows,
+                                           const std::vector<KernelRow>& layout);
 
 }  // namespace kerf

@@ -13,6 +13,7 @@
 #include "hil/lab/accuracy/command.hpp"
 #include "hil/lab/kernel_bench.hpp"
 #include "hil/lab/lab_run.hpp"
+#include "hil/lab/layout_bench.hpp"
 #include "hil/lab/performance_page.hpp"
 
 namespace kerf {
@@ -22,26 +23,33 @@ constexpr const char* kExitCodes = "Exit codes: 0 fine, 2 bad input or set-up.";
 
 std::string line_of(const KernelRow& row) {
   char text[160];
-  std::snprintf(text, sizeof text, "%-24s %-6s %-10s %10.0f %10.0f %8.1f %12zu", row.name.c_str(),
+  std::snprintf(text, sizeof text, "%-24s %-6s %-10s %10.0f %10.0f %8.3g %12zu", row.name.c_str(),
                 row.numeric.c_str(), row.isa.c_str(), row.p50_ns, row.p99_ns, row.ratio(),
                 row.bytes);
   return text;
 }
 
-std::string json_of(const std::vector<KernelRow>& rows, int core) {
+nlohmann::ordered_json json_of(const std::vector<KernelRow>& rows) {
+  auto list = nlohmann::ordered_json::array();
+  for (const KernelRow& row : rows) {
+    list.push_back({{"name", row.name},
+                    {"numeric", row.numeric},
+                    {"isa", row.isa},
+                    {"ns_p50", row.p50_ns},
+                    {"ns_p99", row.p99_ns},
+                    {"baseline_ns_p50", row.baseline_p50_ns},
+                    {"ratio", row.ratio()},
+                    {"bytes", row.bytes}});
+  }
+  return list;
+}
+
+std::string json_of(const std::vector<KernelRow>& rows, const std::vector<KernelRow>& layout,
+                    int core) {
   nlohmann::ordered_json report;
   report["core"] = core;
-  report["rows"] = nlohmann::ordered_json::array();
-  for (const KernelRow& row : rows) {
-    report["rows"].push_back({{"name", row.name},
-                              {"numeric", row.numeric},
-                              {"isa", row.isa},
-                              {"ns_p50", row.p50_ns},
-                              {"ns_p99", row.p99_ns},
-                              {"baseline_ns_p50", row.baseline_p50_ns},
-                              {"ratio", row.ratio()},
-                              {"bytes", row.bytes}});
-  }
+  report["rows"] = json_of(rows);
+  report["layout"] = json_of(layout);
   return report.dump(2) + "\n";
 }
 
@@ -79,10 +87,11 @@ int run_lab(int argc, const char* const* argv, std::ostream& out, std::ostream& 
     out << "ns a tick on core " << core << "; 256 x 256 x 161 voxels; ratio to the paper's form\n"
         << "tick                     number way               p50        p99    ratio        "
            "bytes\n";
-    const auto rows =
-        bench_kernels([&](const KernelRow& row) { out << line_of(row) << std::endl; });
-    as_json.write(json_of(rows, core));
-    as_page.write(performance_page(rows));
+    const auto told = [&](const KernelRow& row) { out << line_of(row) << std::endl; };
+    const auto rows = bench_kernels(told);
+    const auto layout = bench_layout(told);
+    as_json.write(json_of(rows, layout, core));
+    as_page.write(performance_page(rows, layout));
   } catch (const HilError& error) {
     err << "kerf-lab: " << error.what() << '\n';
     return 2;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 
@@ -18,6 +19,10 @@ namespace kerf {
 /// Little-endian, natural alignment, offsets instead of pointers. `layout_table.hpp` repeats every
 /// field as (name, offset, type); the table is checked against these structs and hashed into
 /// `kAbiHash`, so a program of another layout refuses the segment instead of misreading it.
+
+static_assert(std::endian::native == std::endian::little,
+              "the segment and the log are little-endian and written as they lie in memory; a "
+              "big-endian machine runs the servo core only (KERF_CORE_ONLY)");
 
 using Tick = std::uint64_t;  ///< count of servo steps; 0 is the state before the first one
 

@@ -14,6 +14,7 @@
 #include "shared/segment/segment_memory.hpp"
 #include "shared/segment/segment_plan.hpp"
 #include "shared/segment/shared_words.hpp"
+#include "shared/volume/density_hash.hpp"
 
 namespace kerf {
 namespace {
@@ -114,7 +115,7 @@ SegmentWriter SegmentWriter::create(const SegmentSpec& spec) {
                               .versions = base + descriptor.off_versions,
                               .content = base + descriptor.off_bricks,
                               .linear = source.density,
-                              .dirty = DirtyBricks(bricks)});
+                              .dirty = DirtyBricks(spec.mirror_updates ? bricks : BrickGrid{})});
     for (std::uint32_t id = 0; id < bricks.count(); ++id)
       state->volumes.back().copy(id, source.grid.box(), 0);
     state->volumes.back().linear = {};  // the source may go after `create`

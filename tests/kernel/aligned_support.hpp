@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -9,9 +10,8 @@
 #include <vector>
 
 #include "controller/kernel/aligned.hpp"
-#include "controller/kernel/aligned_reference.hpp"
 #include "controller/scene/aligned_tool.hpp"
-#include "tests/kernel/support.hpp"
+#include "tests/kernel/exact_field.hpp"
 
 /// Volumes, tools and the two ways to compute one tick of the plan `aligned`.
 namespace kerf::test {
@@ -65,7 +65,7 @@ inline TestVolume hard_volume(VoxelGrid grid, int fill, std::uint32_t seed) {
       case 7:
         return noise % 5 == 0 ? noise : Density{0};
       case 8:
-        return static_cast<Density>(x * 65535 / (grid.nx - 1));
+        return static_cast<Density>(x * 65535 / std::max(1, grid.nx - 1));
       case 9:
         return x == grid.nx / 2 && y == grid.ny / 2 && z == grid.nz / 2 ? 65535 : 0;
       case 10:
@@ -76,29 +76,50 @@ inline TestVolume hard_volume(VoxelGrid grid, int fill, std::uint32_t seed) {
   });
 }
 
-/// `gradient_exact` of every voxel, and of those outside that the volume reaches.
-class ExactField {
- public:
-  ExactField(const AlignedTaps& taps, const TestVolume& volume)
-      : grid_{volume.grid.nx + 4, volume.grid.ny + 4, volume.grid.nz + 4} {
-    values_.reserve(grid_.voxel_count());
-    for (std::int32_t z = -2; z < volume.grid.nz + 2; ++z) {
-      for (std::int32_t y = -2; y < volume.grid.ny + 2; ++y) {
-        for (std::int32_t x = -2; x < volume.grid.nx + 2; ++x) {
-          values_.push_back(gradient_exact(taps, volume.grid, volume.density, {x, y, z}));
-        }
-      }
-    }
-  }
-  SumVec<FixedNumbers> operator()(VoxelIndex v) const {
-    const VoxelIndex at{v.x + 2, v.y + 2, v.z + 2};
-    return grid_.contains(at) ? values_[grid_.index(at.x, at.y, at.z)] : SumVec<FixedNumbers>{};
-  }
+/// A centre with these raw Q15.16 coordinates.
+inline ToolPose<FixedNumbers> pose_of(std::array<std::int32_t, 3> raw) {
+  ToolPose<FixedNumbers> pose = pose_at<FixedNumbers>({0, 0, 0});
+  pose.centre_vox = {Q16::from_raw(raw[0]), Q16::from_raw(raw[1]), Q16::from_raw(raw[2])};
+  return pose;
+}
 
- private:
-  VoxelGrid grid_;
-  std::vector<SumVec<FixedNumbers>> values_;
-};
+/// Inside, across any face, edge or corner of the volume, or outside; every third or so on the
+/// lattice, half-way, or a step beside.
+inline ToolPose<FixedNumbers> random_pose(const VoxelGrid& grid, VoxelIndex tool_size,
+                                          std::mt19937& random) {
+  const std::array<std::int32_t, 3> edge{grid.nx, grid.ny, grid.nz};
+  const std::array<std::int32_t, 3> size{tool_size.x, tool_size.y, tool_size.z};
+  constexpr std::array<std::int32_t, 6> kFractions{0, 1, 0x7fff, 0x8000, 0xfffe, 0xffff};
+  const auto kind = random() % 4;  // across faces, inside, or each axis as it comes
+  std::array<std::int32_t, 3> raw{};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const std::int32_t reach = size[axis] / 2 + 4;
+    const auto whole_between = [&](std::int32_t low, std::int32_t high) {
+      return std::uniform_int_distribution<std::int32_t>(low, std::max(low, high))(random);
+    };
+    std::int32_t whole = 0;
+    switch (kind == 0 ? 4 + random() % 2 : kind == 1 ? 3 : random() % 7) {
+      case 3:
+        whole = whole_between(size[axis] / 2 + 2, edge[axis] - size[axis] / 2 - 4);
+        break;
+      case 4:
+        whole = whole_between(-reach, reach);
+        break;
+      case 5:
+        whole = edge[axis] - whole_between(-reach, reach);
+        break;
+      case 6:
+        whole = whole_between(-2 * reach, edge[axis] + 2 * reach);
+        break;
+      default:
+        whole = whole_between(0, edge[axis] - 1);
+    }
+    const auto fraction = random() % 3 == 0 ? kFractions[random() % kFractions.size()]
+                                            : static_cast<std::int32_t>(random() & 0xffff);
+    raw[axis] = whole * 65536 + fraction;
+  }
+  return pose_of(raw);
+}
 
 /// All that one tick gives and changes.
 struct AlignedOutcome {
@@ -126,7 +147,8 @@ inline AlignedOutcome outcome_by_definition(const AlignedTaps& taps, const TestV
   AlignedOutcome out{{}, {}, {}, volume.density, carry};
   out.contact = aligned_contact_sum(taps, field, tool, pose);
   overlap<FixedNumbers>(volume.grid, tool, pose, FixedNumbers::kStepOne, scratch);
-  out.modification = aligned_modification_sum(field, volume.grid, volume.density, scratch);
+  out.modification =
+      aligned_modification_sum(field, volume.grid, volume.density, scratch, tool.size());
   out.removed = remove<FixedNumbers>(volume.grid, out.density, scratch, rate, out.carry);
   return out;
 }

@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // The definitions of the plan `aligned` against double precision and the plan `gather`.
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <random>
 
 #include <doctest/doctest.h>
 
-#include "controller/kernel/aligned_reference.hpp"
-#include "tests/kernel/support.hpp"
+#include "tests/kernel/exact_field.hpp"
 
 using namespace kerf;
 using namespace kerf::test;
@@ -73,7 +74,8 @@ TEST_CASE("contact and modification sums are double's within 1.7e-4 of full scal
     }
     overlap<FixedNumbers>(volume.grid, tool, pose, FixedNumbers::kStepOne, fixed.overlap);
     overlap<DoubleNumbers>(volume.grid, tool, truth_pose, 1.0, wide.overlap);
-    const auto cut = aligned_modification_sum(exact, volume.grid, volume.density, fixed.overlap);
+    const auto cut =
+        aligned_modification_sum(exact, volume.grid, volume.density, fixed.overlap, tool.size());
     const auto cut_truth =
         modification_sum<DoubleNumbers>(volume.grid, field, volume.density, wide.overlap);
     const double unit = kGradientUnit / FixedNumbers::kWeightOne;
@@ -86,4 +88,20 @@ TEST_CASE("contact and modification sums are double's within 1.7e-4 of full scal
   CHECK(largest > 0.3 * full_scale);
   CHECK(worst_contact / full_scale <= 1.7e-4);
   CHECK(worst_modification / full_scale <= 1.7e-4);
+}
+
+// N7
+TEST_CASE("the order of the samples does not change a sum of the plan aligned") {
+  const TestVolume volume = random_volume({24, 22, 20}, 12);
+  const ExactField field(kAlignedFarid, volume);
+  auto tool = paper_ball(8);
+  const auto pose = pose_at<FixedNumbers>({11.37, 10.21, 9.83});
+  const auto first = aligned_contact_sum(kAlignedFarid, field, tool, pose);
+  std::mt19937 random(7);
+  bool same = true;
+  for (int n = 0; n < 1000; ++n) {
+    std::shuffle(tool.begin(), tool.end(), random);
+    same = same && aligned_contact_sum(kAlignedFarid, field, tool, pose) == first;
+  }
+  CHECK(same);
 }

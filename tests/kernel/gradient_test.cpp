@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <random>
 
 #include <doctest/doctest.h>
 #include <rapidcheck.h>
@@ -60,6 +61,7 @@ Angles direction_error(GradientKernel kernel) {
 
 }  // namespace
 
+// N1
 TEST_CASE("a ramp has its slope as gradient: exactly for central and Sobel, 0.9998159 for Farid") {
   constexpr int kSlope = 4096;
   for (int axis = 0; axis < 3; ++axis) {
@@ -78,6 +80,7 @@ TEST_CASE("a ramp has its slope as gradient: exactly for central and Sobel, 0.99
   }
 }
 
+// N3
 TEST_CASE("direction error on the surface of a ball of radius 10 is that of the kernel") {
   const Angles central = direction_error(GradientKernel::central);
   CHECK(central.rms_deg == doctest::Approx(8.1).epsilon(0.05));
@@ -90,6 +93,35 @@ TEST_CASE("direction error on the surface of a ball of radius 10 is that of the 
   CHECK(farid.worst_deg == doctest::Approx(1.53).epsilon(0.05));
 }
 
+// N2
+TEST_CASE("noise passes into the gradient by the kernel's own figure") {
+  std::mt19937 random(64);
+  std::normal_distribution<double> normal;
+  constexpr double kNoise = 4000;  // steps; eight of them fit on both sides of the middle
+  const TestVolume volume = made_of({64, 64, 64}, [&](auto, auto, auto) {
+    return static_cast<Density>(std::lround(32768 + kNoise * normal(random)));
+  });
+  const auto gain = [&](GradientKernel kernel) {
+    const auto field = gradients<FixedNumbers>(kernel, volume);
+    double square = 0;
+    int count = 0;
+    for (std::int32_t z = 2; z < 62; ++z) {
+      for (std::int32_t y = 2; y < 62; ++y) {
+        for (std::int32_t x = 2; x < 62; ++x) {
+          const auto& g = field[volume.grid.index(x, y, z)];
+          for (const double part : {g.x, g.y, g.z}) square += part * part;
+          count += 3;
+        }
+      }
+    }
+    return std::sqrt(square / count) / kNoise;
+  };
+  CHECK(gain(GradientKernel::central) == doctest::Approx(0.7071).epsilon(0.02));
+  CHECK(gain(GradientKernel::sobel5) == doctest::Approx(0.108).epsilon(0.02));
+  CHECK(gain(GradientKernel::farid) == doctest::Approx(0.1302).epsilon(0.02));
+}
+
+// N4
 TEST_CASE_TEMPLATE("separable gradients have the bits of the dense sum, across tile seams", N,
                    FixedNumbers, FloatNumbers, DoubleNumbers) {
   // Wider than two tiles along x, one and a bit along y.
@@ -109,6 +141,7 @@ TEST_CASE_TEMPLATE("separable gradients have the bits of the dense sum, across t
   }
 }
 
+// N4
 TEST_CASE("refreshing the changed box gives the same field as computing all of it again") {
   CHECK(rc::check([](std::uint32_t seed) {
     const VoxelGrid grid{*rc::gen::inRange(1, 45), *rc::gen::inRange(1, 40),
@@ -137,6 +170,7 @@ TEST_CASE("refreshing the changed box gives the same field as computing all of i
   }));
 }
 
+// N6
 TEST_CASE_TEMPLATE("a constant field has no gradient away from the border", N, FixedNumbers,
                    FloatNumbers, DoubleNumbers) {
   for (const Density value : {Density{0}, Density{1}, Density{65535}}) {

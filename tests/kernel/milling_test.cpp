@@ -71,6 +71,7 @@ TestVolume flat() {
 
 }  // namespace
 
+// F14
 TEST_CASE("one stamp of a ball removes the volume of the ball") {
   for (const double y : {24.0, 24.5, 24.3}) {
     CHECK(swept(5, 0.25, y, 0, 1) == doctest::Approx(capsule(5, 0)).epsilon(0.01));
@@ -85,6 +86,7 @@ TEST_CASE("one stamp of a ball removes the volume of the ball") {
         doctest::Approx(capsule(5, 0)).epsilon(0.01));
 }
 
+// F14
 TEST_CASE("a stamp that is sunk to a depth removes the cap") {
   TestVolume volume = solid({60, 48, 48}, [](double, double, double z) { return z - 24.0; });
   Cutter<FixedNumbers> cutter(32);
@@ -96,15 +98,18 @@ TEST_CASE("a stamp that is sunk to a depth removes the cap") {
         doctest::Approx(kPi * kDepth * kDepth * (3 * kRadius - kDepth) / 3).epsilon(0.01));
 }
 
-TEST_CASE("a straight sweep removes the capsule, and off the lattice at most half a voxel more") {
+// F14
+TEST_CASE("a straight sweep removes the capsule, and off the lattice half a voxel more") {
   // Stamps on the lattice cover voxels whole or not at all.
   CHECK(swept(10, 1.0, 24, 40, 1) == doctest::Approx(capsule(10, 40)).epsilon(0.01));
   // In between, voxels at the rim are partly covered by many stamps in a row, and each takes its
   // share of what is left: the paper's rule widens a groove, but only within the trilinear reach.
-  for (const double step : {1.0, 0.5, 0.25}) {
-    const double removed = swept(10, 0.5, 24.3, 40, step);
-    CHECK(removed > capsule(10, 40));
-    CHECK(removed < capsule(10.5, 40));
+  for (const int radius : {5, 10}) {
+    for (const double step : {1.0, 0.5, 0.25}) {
+      const double removed = swept(radius, 0.5, 24.3, 40, step);
+      CHECK(removed > capsule(radius, 40));
+      CHECK(removed < capsule(radius + 0.55, 40));
+    }
   }
 }
 

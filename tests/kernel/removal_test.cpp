@@ -23,19 +23,6 @@ double fraction(const RemovalRate<N>& rate, double ratio) {
   return double(bent_ratio(rate, weight)) / double(N::kWeightOne) * double(rate.mantissa) * scale;
 }
 
-/// Total density after holding `tool` still for `ticks`.
-template <class N>
-std::uint64_t held_still(TestVolume volume, std::span<const ToolOffset> tool,
-                         const ToolPose<N>& pose, double k_times_t, int ticks) {
-  Cutter<N> cutter(16);
-  const auto rate = removal_rate<N>(k_times_t, false);
-  overlap<N>(volume.grid, tool, pose, N::kStepOne, cutter.overlap);
-  for (int n = 0; n < ticks; ++n) {
-    remove<N>(volume.grid, volume.density, cutter.overlap, rate, cutter.carry);
-  }
-  return total_density(volume);
-}
-
 }  // namespace
 
 TEST_CASE_TEMPLATE("the linear rate removes r kT, at most everything", N, FixedNumbers,
@@ -145,35 +132,6 @@ TEST_CASE_TEMPLATE("what remove reports is what the volume lost, and its box hol
       RC_ASSERT(changed == removed.changed);
     }
   }));
-}
-
-TEST_CASE("20 000 slow ticks remove what they should, though each is less than a density step") {
-  // Wider than the tool by more than 32 voxels.
-  const TestVolume full = filled({60, 16, 16}, 65535);
-  const auto tool = paper_ball(10);
-  constexpr int kTicks = 20000;
-  // On the lattice only the carry and the rate's 15 bits err. In between, the fractions of barely
-  // covered voxels are cut to 15 bits as well, always below.
-  const auto relative_error = [&](const ToolPose<FixedNumbers>& pose, double kt) {
-    Cutter<FixedNumbers> cover(16);
-    const VoxelBox box =
-        overlap<FixedNumbers>(full.grid, tool, pose, FixedNumbers::kStepOne, cover.overlap);
-    double truth = 0;
-    for (std::int32_t z = box.lo.z; z < box.hi.z; ++z) {
-      for (std::int32_t y = box.lo.y; y < box.hi.y; ++y) {
-        for (const double weight : cover.overlap.row(y, z)) {
-          const double r = weight / FixedNumbers::kWeightOne;
-          truth += kDensityMax * (1 - std::pow(1 - r * kt, kTicks));
-        }
-      }
-    }
-    const double left = double(held_still<FixedNumbers>(full, tool, pose, kt, kTicks));
-    return std::abs((double(total_density(full)) - left) / truth - 1);
-  };
-  for (const double kt : {1e-3, 1e-4, 1e-5}) {
-    CHECK(relative_error(pose_at<FixedNumbers>({12.5, 7.5, 7.5}), kt) <= 3e-5);
-    CHECK(relative_error(pose_at<FixedNumbers>({12.3, 7.4, 7.6}), kt) <= 1e-4);
-  }
 }
 
 TEST_CASE("a tool with too little carry removes nothing, and the border keeps its lanes") {

@@ -25,6 +25,7 @@ VoxelVec<Q16> in_cell(std::uint16_t x, std::uint16_t y, std::uint16_t z) {
 
 }  // namespace
 
+// N5
 TEST_CASE("Q15 weights with 8 kept bits are within 3.1 steps of exact interpolation, 0.3 rms") {
   std::mt19937 random(5);
   std::uniform_real_distribution<double> fraction(0.0, 1.0);
@@ -51,6 +52,7 @@ TEST_CASE("Q15 weights with 8 kept bits are within 3.1 steps of exact interpolat
   CHECK(std::sqrt(square / kCases) <= 0.3);
 }
 
+// N6
 TEST_CASE("equal corners interpolate to themselves, exactly") {
   CHECK(rc::check([](std::int16_t value, std::uint16_t x, std::uint16_t y, std::uint16_t z) {
     std::array<std::int32_t, 8> corner{};
@@ -91,6 +93,50 @@ TEST_CASE_TEMPLATE("trilinear reproduces a linear field inside the cell", N, Fix
     if (cell.low.y == 1) weight.y = N::kWeightOne;
     const double value = double(trilinear<N>(corner, weight)) / double(N::kSampleOne);
     CHECK(value == doctest::Approx(field(t, 1 - t, t / 2)).epsilon(1e-6));
+  }
+}
+
+// N10
+TEST_CASE_TEMPLATE("halving the voxel quarters the error of interpolating a smooth field", N,
+                   FixedNumbers, FloatNumbers, DoubleNumbers) {
+  const auto field = [](double x, double y, double z) {
+    return 30000 * std::sin(2 * x + 0.3) * std::cos(1.5 * y) * std::sin(z + 1);
+  };
+  const double curvature = 30000 * (4 + 2.25 + 1);  // |fxx| + |fyy| + |fzz|, at most
+  const auto errors = [&](double h) {
+    using Real = typename N::Real;
+    std::mt19937 random(10);
+    std::uniform_real_distribution<double> unit(0, 1);
+    double square = 0, worst = 0;
+    constexpr int kPlaces = 20'000;
+    for (int n = 0; n < kPlaces; ++n) {
+      const VoxelVec<Real> at{Real(unit(random) / h), Real(unit(random) / h),
+                              Real(unit(random) / h)};
+      const Cell<N> cell = cell_at<N>(at);
+      std::array<typename N::Sample, 8> corner{};
+      for (std::size_t c = 0; c < 8; ++c) {
+        const auto along = [&](std::int32_t low, std::size_t axis) {
+          return h * (low + static_cast<int>(c >> axis & 1));
+        };
+        const double value =
+            field(along(cell.low.x, 0), along(cell.low.y, 1), along(cell.low.z, 2));
+        corner[c] = static_cast<typename N::Sample>(value * double(N::kSampleOne));
+      }
+      const double value = double(trilinear<N>(corner, cell.weight)) / double(N::kSampleOne);
+      const double error = value - field(h * double(at.x), h * double(at.y), h * double(at.z));
+      square += error * error;
+      worst = std::max(worst, std::abs(error));
+    }
+    CHECK(worst <= h * h / 8 * curvature + (N::kIsFixed ? 3.1 : 0.01));
+    return std::sqrt(square / kPlaces);
+  };
+  double coarse = errors(1.0 / 4);
+  for (const double h : {1.0 / 8, 1.0 / 16, 1.0 / 32}) {
+    const double fine = errors(h);
+    const double order = std::log2(coarse / fine);
+    CHECK(order >= 1.9);
+    CHECK(order <= 2.1);
+    coarse = fine;
   }
 }
 

@@ -98,7 +98,7 @@ TEST_CASE("F1: a ball of five voxels feels 27.61, 62.43 and 73.65 at depths of 1
   const AnalyticVolume volume = volume_of(plane({0, 0, 1}, 0), 5, kVoxelMm);
   const BallTool tool = five_voxels();
   REQUIRE(tool.offsets.size() == 515);
-  for (const auto storage : {Storage::gradients, Storage::aligned}) {
+  for (const auto storage : {Storage::gradients, Storage::aligned, Storage::splat}) {
     const auto method = contact_method({.storage = storage}, volume, tool);
     for (const auto& [depth, force] : {std::array{1.0, 27.61}, {3.0, 62.43}, {5.0, 73.65}}) {
       const Point share = force_share(*method, volume, tool, {0, 0, (5 - depth) * kVoxelMm});
@@ -121,6 +121,7 @@ TEST_CASE("every way to compute the force but the nearest voxel feels the same f
       ContactChoice{.kernel = GradientKernel::central},
       ContactChoice{.kernel = GradientKernel::sobel5},
       ContactChoice{.storage = Storage::aligned},
+      ContactChoice{.storage = Storage::splat},
       ContactChoice{.storage = Storage::spline, .interpolation = Interpolation::quadratic},
       ContactChoice{.storage = Storage::spline, .interpolation = Interpolation::cubic},
       ContactChoice{.interpolation = Interpolation::quadratic},
@@ -139,7 +140,9 @@ TEST_CASE("N2: noise gains are those of the kernels' table") {
   CHECK(noise_gain({.kernel = GradientKernel::sobel5}, tool) ==
         doctest::Approx(0.108).epsilon(0.02));
   CHECK(noise_gain({}, tool) == doctest::Approx(0.1302).epsilon(0.02));
-  CHECK(noise_gain({.storage = Storage::aligned}, tool) == doctest::Approx(0.1302).epsilon(0.02));
+  for (const auto storage : {Storage::aligned, Storage::splat}) {
+    CHECK(noise_gain({.storage = storage}, tool) == doctest::Approx(0.1302).epsilon(0.02));
+  }
 }
 
 TEST_CASE("N3: normals on a ball are off by what the kernels' table says") {

@@ -1,13 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 // The programs together, as a user starts them: emulator and controller as processes.
 #include <algorithm>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
 #include <optional>
 
 #include <doctest/doctest.h>
 #include <nlohmann/json.hpp>
 
 #include "shared/segment/hand_over.hpp"
-#include "shared/segment/hash.hpp"
+#include "shared/volume/density_hash.hpp"
 #include "tests/programs/process.hpp"
 
 using kerf::test::eventually;
@@ -256,6 +259,33 @@ TEST_CASE("a reader that joins in the middle of milling sees the controller's ow
   char text[17];
   std::snprintf(text, sizeof text, "%016llx", static_cast<unsigned long long>(hash));
   CHECK(pair.report()["volume_hash"] == text);
+}
+
+TEST_CASE("--explain tells what is really allocated, and keeps its calibration") {
+  const TemporaryFolder folder;
+  setenv("XDG_CACHE_HOME", folder.path().c_str(), 1);
+  std::filesystem::create_directory(folder / "kerf");
+  std::ofstream(folder / "kerf/calibration.json") << "{ broken";
+  for (const bool first : {true, false}) {
+    Process controller({kBin + "/kerf-controller", "--scene", kScenes + "/touch.toml", "--explain",
+                        "--report", (folder / "explain.json").string()},
+                       folder / "explain.log");
+    CHECK(controller.wait() == 0);
+    const std::string told = text_of(folder / "explain.log");
+    CHECK((told.find("calibration.json: is no calibration; measured anew") != std::string::npos) ==
+          first);
+    CHECK(told.find("ball 16 in phantom: aligned/") != std::string::npos);
+  }
+  unsetenv("XDG_CACHE_HOME");
+  const auto json = nlohmann::json::parse(text_of(folder / "explain.json"));
+  CHECK(json["ticks"].size() == 2);
+  for (const auto& tick : json["ticks"]) {
+    for (const auto& stage : tick["stages"]) {
+      CHECK(stage["operations"] > 0);
+      CHECK(stage["predicted_us"] > 0);
+    }
+  }
+  CHECK(json["total_bytes"] > 0);
 }
 
 TEST_CASE("bad arguments are one line and exit 2") {

@@ -53,6 +53,7 @@ TEST_CASE("the smallest scene takes every default") {
   CHECK_FALSE(scene.volumes[0].orientation);
   REQUIRE(scene.tools.size() == 1);
   CHECK(scene.tools[0].name == "ball 16 vox");
+  CHECK(scene.tools[0].turns);
   CHECK_FALSE(scene.offset_given);
   CHECK_FALSE(scene.device.torque_scale);  // motors off
   CHECK(scene.device.personality == "omni");
@@ -90,6 +91,7 @@ TEST_CASE("every key reaches its place") {
     shape = "wheel"
     radius_mm = 2
     length_mm = 0.5
+    turns = false
     pitch_mm = 0.05
     [[material]]
     name = "pulp"
@@ -136,6 +138,7 @@ TEST_CASE("every key reaches its place") {
   CHECK_FALSE(scene.volumes.at(1).solid);
   CHECK(scene.tools.at(0).name == "disc");
   CHECK(scene.tools.at(0).size.length_mm == 0.5);
+  CHECK_FALSE(scene.tools.at(0).turns);
   CHECK(scene.tools.at(0).pitch_given);
   CHECK(scene.materials.at(3).machinability == 7);
   CHECK(scene.materials.at(3).iso == kerf::default_materials().at(3).iso);
@@ -284,10 +287,10 @@ TEST_CASE("what contradicts itself or is missing is reported with its line") {
 
 TEST_CASE("too many tools are refused") {
   std::string text = kSmallest;
-  for (int i = 0; i < 32; ++i) {
+  for (int i = 0; i < 16; ++i) {
     text += "[[tool]]\nname = \"" + std::to_string(i) + "\"\nshape = \"ball\"\nsize_vox = 3\n";
   }
-  CHECK(error_of(text).find("has 33 entries; use at most 32") != std::string::npos);
+  CHECK(error_of(text).find("has 17 entries; use at most 16") != std::string::npos);
 }
 
 TEST_CASE("broken TOML is reported in one line with line and column") {

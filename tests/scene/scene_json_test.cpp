@@ -54,6 +54,7 @@ TEST_CASE("the scene's JSON holds what a reader of the segment needs") {
   const kerf::Scene scene = small_scene();
   const json& tool = root.at("tools").at(0);
   CHECK(tool.at("round") == true);
+  CHECK(tool.at("turns") == true);
   CHECK(tool.at("size_vox") == json({4, 4, 4}));
   REQUIRE(tool.at("offsets_half_pitch").size() == 3 * scene.tools[0].offsets.size());
   CHECK(tool.at("offsets_half_pitch").at(0) == scene.tools[0].offsets[0][0]);

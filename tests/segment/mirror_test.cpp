@@ -5,8 +5,8 @@
 #include <doctest/doctest.h>
 #include <unistd.h>
 
-#include "shared/segment/hash.hpp"
 #include "shared/segment/reader.hpp"
+#include "shared/volume/density_hash.hpp"
 #include "tests/segment/segment_support.hpp"
 
 using namespace kerf;

@@ -3,6 +3,7 @@
 
 #include "shared/segment/hash.hpp"
 #include "shared/segment/reader.hpp"
+#include "shared/volume/density_hash.hpp"
 #include "tests/segment/segment_support.hpp"
 
 using namespace kerf;

@@ -10,6 +10,9 @@
 
 #include <doctest/doctest.h>
 
+#include "controller/scene/plan_choice.hpp"
+#include "controller/scene/scene_error.hpp"
+#include "controller/scene/tool_shapes.hpp"
 #include "tests/servo/support.hpp"
 
 using namespace kerf;
@@ -113,4 +116,79 @@ TEST_CASE("two volumes of different spacing each get their own plan") {
             4e-4 * kFullScaleN);
   }
   CHECK(pair.exact.contact_n[1] > 0.01);
+}
+
+TEST_CASE("a tool that does not turn runs aligned in a standing volume, and ignores the stylus") {
+  constexpr std::array<double, 4> kStanding{-std::numbers::sqrt2 / 2, 0, 0,
+                                            std::numbers::sqrt2 / 2};
+  const auto scene_of = [&](bool turns) {
+    Scene scene = cutting_scene();
+    scene.volumes[0].pose.orientation = kStanding;
+    const double end = -scene.volumes[0].pose.position_mm[0];
+    scene.volumes[0].pose.position_mm = {-end, -end, end};  // its middle stays the origin
+    scene.tools[0] = make_tool("bur", "cone", {.pitch_mm = kVoxelMm, .radius_mm = 0.6});
+    scene.tools[0].turns = turns;
+    return scene;
+  };
+  const Scene unturned = scene_of(false), turning = scene_of(true);
+  const SceneVolume& volume = unturned.volumes[0];
+  REQUIRE(choose_plan(unturned, unturned.tools[0], volume).plan == Plan::aligned);
+  REQUIRE(choose_plan(turning, turning.tools[0], volume).plan == Plan::splat);
+
+  for (const bool turns : {false, true}) {  // by the plan `aligned`, by the plan `splat`
+    Pair pair([&] { return scene_of(turns); });
+    double deepest_n = 0;
+    for (int i = 0; i < 40; ++i) {
+      pair.step(0.3, 0.2, 0.5 - 0.02 * i);
+      deepest_n = std::max(deepest_n, std::abs(pair.exact.contact_n[2]));
+      REQUIRE(worst_difference_n(pair.fixed.contact_n, pair.exact.contact_n) < 4e-4 * kFullScaleN);
+      REQUIRE(worst_difference_n(pair.fixed.modification_n, pair.exact.modification_n) <
+              4e-4 * kFullScaleN);
+    }
+    CHECK(deepest_n > 0.01);
+    const std::array<double, 9> world{1, 0, 0, 0, 1, 0, 0, 0, 1};
+    CHECK((pair.fixed.rotation == world) == !turns);
+  }
+}
+
+TEST_CASE("a tool that no sum of fixed-point numbers can hold is refused with a way out") {
+  const auto refusal = [](const Scene& scene) -> std::string {
+    try {
+      static_cast<void>(choose_plan(scene, scene.tools[0], scene.volumes[0]));
+    } catch (const SceneError& error) {
+      return error.what();
+    }
+    return {};
+  };
+  Scene scene = cutting_scene();
+  scene.path = "x.toml";
+  scene.volumes[0].name = "tooth";
+  scene.tools[0] = make_tool("pin", "cylinder", {.pitch_mm = kVoxelMm / 6, .radius_mm = 0.1});
+  CHECK(refusal(scene).empty());
+  scene.tools[0].pitch_mm = kVoxelMm / 7;
+  CHECK(refusal(scene) ==
+        "x.toml: tool pin in volume tooth: up to 665 samples in one voxel, and 512 are the end; "
+        "resample the volume to finer voxels, or set servo.numeric = \"double\"");
+  scene.tools[0].pitch_mm = kVoxelMm;
+  scene.tools[0].size_vox = {200, 200, 200};
+  CHECK(refusal(scene).find(" voxels of a plane under the tool, and 36000 are the end") !=
+        std::string::npos);
+  scene.cut.model = CutModel::none;
+  CHECK(refusal(scene).empty());
+  scene.tools[0].size_vox = {1, 2100, 1};
+  CHECK(refusal(scene).find(" voxels wide, and 2000 are the end") != std::string::npos);
+  scene.servo.numeric = NumericKind::float64;
+  CHECK(refusal(scene).empty());
+}
+
+TEST_CASE("an unturned tool needs the volume's axes to be the world's") {
+  Scene scene = cutting_scene();
+  scene.tools.push_back(make_tool("cube", "cylinder", {.pitch_mm = kVoxelMm, .radius_mm = 1}));
+  scene.tools[1].turns = false;
+  scene.volumes[0].pose.orientation = {0, 0, std::sin(0.1), std::cos(0.1)};
+  const SceneVolume& volume = scene.volumes[0];
+  CHECK(choose_plan(scene, scene.tools[0], volume).plan == Plan::aligned);  // round
+  CHECK(choose_plan(scene, scene.tools[1], volume).plan == Plan::splat);
+  scene.cut.model = CutModel::none;
+  CHECK(choose_plan(scene, scene.tools[1], volume).plan == Plan::gather);
 }

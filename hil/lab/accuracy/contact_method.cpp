@@ -2,9 +2,11 @@
 #include "hil/lab/accuracy/contact_method.hpp"
 
 #include <numbers>
+#include <utility>
 
 #include "controller/scene/tool_shapes.hpp"
-#include "hil/lab/accuracy/density_methods.hpp"
+#include "hil/lab/accuracy/density_spline.hpp"
+#include "hil/lab/accuracy/servo_plans.hpp"
 #include "hil/lab/accuracy/stored_gradients.hpp"
 
 namespace kerf::accuracy {
@@ -19,13 +21,16 @@ std::unique_ptr<ContactMethod> from_field(const ContactChoice& choice, const Ana
 }  // namespace
 
 BallTool ball_tool(double radius_mm, double pitch_mm) {
-  return {radius_mm, pitch_mm,
-          make_tool("ball", "ball", {.pitch_mm = pitch_mm, .radius_mm = radius_mm}).offsets};
+  SceneTool tool = make_tool("ball", "ball", {.pitch_mm = pitch_mm, .radius_mm = radius_mm});
+  return {radius_mm, pitch_mm, tool.size_vox, std::move(tool.offsets)};
 }
 
 std::unique_ptr<ContactMethod> contact_method(const ContactChoice& choice,
                                               const AnalyticVolume& volume, const BallTool& tool) {
-  if (choice.storage == Storage::aligned) return std::make_unique<Aligned>(choice, volume, tool);
+  if (choice.storage == Storage::aligned) {
+    return std::make_unique<AlignedPlan>(choice, volume, tool);
+  }
+  if (choice.storage == Storage::splat) return std::make_unique<SplatPlan>(choice, volume, tool);
   if (choice.storage == Storage::spline) {
     if (choice.interpolation == Interpolation::cubic) {
       return std::make_unique<DensitySpline<3>>(choice, volume, tool);
@@ -57,7 +62,7 @@ std::unique_ptr<ContactMethod> contact_method(const ContactChoice& choice,
     case Arithmetic::q15:
       break;
   }
-  return fixed(Gather<FixedNumbers>{});
+  return std::make_unique<GatherPlan>(choice, volume, tool);
 }
 
 Point force_share(const ContactMethod& method, const AnalyticVolume& volume, const BallTool& tool,

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -23,12 +24,13 @@ enum class Interpolation : std::uint8_t { nearest, trilinear, quadratic, cubic }
 enum class Storage : std::uint8_t {
   gradients,  ///< kept for every voxel, as in the plan `gather`
   aligned,    ///< none: the plan `aligned`
+  splat,      ///< none: the plan `splat`
   spline,     ///< none: the derivative of the density's B-spline, quadratic or cubic
 };
 
-/// One way to compute the contact force. The servo has the texts of q15, float32 and float64
-/// (trilinear), and `aligned`; all else is plain text of the lab: the interpolations in double, the
-/// coarse weights through the servo's own lerp.
+/// One way to compute the contact force. In fixed point the servo's plans `gather`, `aligned` and
+/// `splat` run with their kernels, float32 and float64 are the servo's templates; all else is plain
+/// text of the lab: the interpolations in double, the coarse weights through the servo's own lerp.
 struct ContactChoice {
   Arithmetic arithmetic = Arithmetic::q15;
   double pitch_vox = 1;  ///< of the tool's samples
@@ -44,6 +46,7 @@ struct ContactChoice {
 struct BallTool {
   double radius_mm;
   double pitch_mm;
+  std::array<std::int32_t, 3> size_pitches;
   std::vector<ToolOffset> offsets;
 };
 [[nodiscard]] BallTool ball_tool(double radius_mm, double pitch_mm);

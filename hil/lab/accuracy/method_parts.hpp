@@ -5,7 +5,9 @@
 #include <cmath>
 #include <cstddef>
 #include <span>
+#include <vector>
 
+#include "controller/kernel/gradient.hpp"
 #include "controller/kernel/tool_pose.hpp"
 #include "hil/lab/accuracy/contact_method.hpp"
 
@@ -39,6 +41,14 @@ template <class N>
 Voxels full_densities(SumVec<N> sum, double unit) {
   const double scale = 1 / (unit * kDensityMax);
   return {double(sum.x) * scale, double(sum.y) * scale, double(sum.z) * scale};
+}
+
+template <class N>
+std::vector<Gradient<N>> field_of(GradientKernel kernel, const AnalyticVolume& volume) {
+  std::vector<Gradient<N>> field(volume.grid.voxel_count());
+  GradientScratch scratch;
+  refresh_gradients<N>(kernel, volume.grid, volume.density, volume.grid.box(), field, scratch);
+  return field;
 }
 
 }  // namespace kerf::accuracy

@@ -37,10 +37,11 @@ of white noise of deviation one.)",
           {"storage",
            R"(## What is stored beside the density
 
-`aligned` is the servo's plan for round tools, with the fastest kernels of this machine. `spline 2` and
-`spline 3` are the exact derivative of the density's quadratic and cubic B-spline, plain text in double:
-their accuracy is the reference, their time is not.)",
-           {kMemory, kDoubleMax, kTheory, kDirection, kSampleLoop, kToolLoop}},
+Int16 gradients are the servo's plan `gather`, `aligned` its plan for round tools, `splat` that for any
+tool in scenes that cut (its time holds the modification force, too). `spline 2` and `spline 3` are the
+exact derivative of the density's quadratic and cubic B-spline: their accuracy is the reference, their
+time is not.)",
+           {kMemory, kDouble, kDoubleMax, kTheory, kDirection, kSampleLoop, kToolLoop}},
           {"interpolation",
            R"(## Interpolation of the stored gradient
 
@@ -117,7 +118,9 @@ Forces are shares of full scale, p0 pi R^2. `direction` is the angle to the forc
 that has a tenth of full scale. `loop` is |SUM dW| / SUM |dW| around tilted circles of 0.375 mm, of one
 sample or of the whole tool: what a static tooth gives or takes in a closed path, where it should give nothing.
 `rms` and `max` are over all shapes unless said otherwise. Times are of one tick of the tool without
-milling, `us p50` and `p99`; they are comparable within this page only.
+milling, `us p50` and `p99`, on the fastest kernels of this machine where the servo has them: Q15 in the plans
+`gather`, `aligned` and `splat`. Float and double are the servo's templates; Q8, Q12 and other interpolations
+than trilinear are plain text of the lab, which shows what they would give rather than what they would cost.
 
 )";
 

@@ -53,13 +53,17 @@ std::string page_advice(const std::vector<Entry>& entries) {
   const Choices c(entries);
   std::string text = "## What to choose\n\n";
   text += filled(
-      R"(* A round tool: the plan `aligned`, at {} us a tick instead of {}, at most {} ppm of full scale away from
-  double, and nothing stored.
+      R"(* A round tool: the plan `aligned`, {} us a tick, at most {} ppm of full scale away from double. Nothing is
+  stored, so a cut refreshes nothing.
+* Any other tool: `gather` ({} us, at most {} ppm, {} bytes a voxel), and `splat` where the scene cuts ({} us,
+  at most {} ppm, nothing stored).
 )",
-      {c.us("aligned"), c.us("int16 gradients"), c.of("aligned", kDoubleMax)});
+      {c.us("aligned"), c.of("aligned", kDoubleMax), c.us("int16 gradients"),
+       c.of("int16 gradients", kDoubleMax), c.of("int16 gradients", kMemory), c.us("splat"),
+       c.of("splat", kDoubleMax)});
   text += filled(
-      R"(* Fixed point: Q15, at most {} ppm away from double (Q12 {}, Q8 {}). Theory is {} % away from all of them:
-  the hand could do with Q8, and Q15 costs nothing more.
+      R"(* Fixed point: Q15, at most {} ppm away from double (Q12 {}, Q8 {}). Theory is {} % away from all of them: the
+  hand could do with Q8; the 16 bits of the kernels hold Q15.
 )",
       {c.of("Q15", kDoubleMax), c.of("Q12", kDoubleMax), c.of("Q8", kDoubleMax),
        c.of("Q15", kTheory)});

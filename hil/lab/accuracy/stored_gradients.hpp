@@ -14,14 +14,6 @@
 
 namespace kerf::accuracy {
 
-template <class N>
-std::vector<Gradient<N>> field_of(GradientKernel kernel, const AnalyticVolume& volume) {
-  std::vector<Gradient<N>> field(volume.grid.voxel_count());
-  GradientScratch scratch;
-  refresh_gradients<N>(kernel, volume.grid, volume.density, volume.grid.box(), field, scratch);
-  return field;
-}
-
 /// The tool's samples one by one, from the stored gradients: `sum_of(field, offsets, pose)`.
 template <class N, class SumOf>
 class FromField final : public ContactMethod {
@@ -51,7 +43,7 @@ class FromField final : public ContactMethod {
   SumOf sum_of_;
 };
 
-/// The servo's plan `gather`.
+/// The servo's plan `gather` by its definition; fixed point has kernels for it.
 template <class N>
 struct Gather {
   Voxels operator()(const VoxelGrid& grid, std::span<const Gradient<N>> field, Offsets offsets,

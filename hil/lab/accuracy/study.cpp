@@ -39,6 +39,7 @@ std::vector<Variant> variants() {
       {"kernel", "farid", {}},
       {"storage", "int16 gradients", {}, true},
       {"storage", "aligned", {.storage = S::aligned}, true},
+      {"storage", "splat", {.storage = S::splat}, true},
       {"storage", "spline 2", {.storage = S::spline, .interpolation = I::quadratic}},
       {"storage", "spline 3", {.storage = S::spline, .interpolation = I::cubic}},
       {"interpolation", "nearest", {.interpolation = I::nearest}},

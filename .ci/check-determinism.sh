@@ -1,0 +1,99 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+# The golden run (tests/golden) on several compilers, optimisation levels and processors, each with
+# every kernel set that it runs; other processors under qemu. Prints a table; fails where a hash is
+# not the known one. Builds the servo core alone, without any library.
+#     .ci/check-determinism.sh [--all]      --all: every combination, some minutes
+set -euo pipefail
+cd "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/.."
+folder=build/determinism
+row='%-22s %-20s %-7s %-7s %-16s %-16s %-16s %-16s %7s\n'
+
+# check PROCESSOR COMPILER FLAGS: builds, runs, prints the rows of the table; false if any differs.
+check() {
+  local processor=$1 compiler=$2 flags=$3 name options=() targets=(test_golden) run=() result
+  name=$folder/$processor-$compiler${flags// /}
+  if [[ $processor != "$(uname -m)" ]]; then
+    options=(-DCMAKE_SYSTEM_NAME=Linux -DCMAKE_SYSTEM_PROCESSOR="$processor")
+    run=("qemu-$processor-static" -L "/usr/$processor-linux-gnu")
+  fi
+  if [[ $processor == aarch64 ]]; then targets+=(test_aligned); fi
+
+  # doctest is only headers; those of the other processor come first.
+  if ! { cmake -S . -B "$name" -G Ninja -DKERF_CORE_ONLY=ON -DKERF_WERROR=ON \
+    -DCMAKE_BUILD_TYPE=None -DCMAKE_CXX_COMPILER="$compiler" \
+    -DCMAKE_CXX_FLAGS="$flags -idirafter /usr/include" "${options[@]}" &&
+    cmake --build "$name" -j 1 --target "${targets[@]}"; } >"$name.log" 2>&1; then
+    echo "check-determinism: $compiler $flags: does not build; see $name.log" >&2
+    return 1
+  fi
+  # With its own kernels against their definition, where the tests of every change never run them.
+  if [[ $processor == aarch64 ]] && ! result=$("${run[@]}" "$name/bin/test_aligned"); then
+    echo "$result"
+    return 1
+  fi
+  local status=0
+  result=$("${run[@]}" "$name/bin/test_golden") || status=$?
+  # golden NUMBERS KERNELS HASH VOLUME_HASH SECONDS; float and double do not depend on the kernels.
+  awk -v compiler="$compiler" -v flags="$flags" -v processor="$processor" -v row="$row" '
+    $1 != "golden" { next }
+    $2 == "fixed" { line[++rows] = $0; next }
+    { other[$2] = $4; other_seconds += $6 }
+    END {
+      for (i = 1; i <= rows; ++i) {
+        split(line[i], field)
+        printf row, compiler, flags, processor, field[3], field[4], field[5], other["float"],
+          other["double"], sprintf("%.1f", field[6] + other_seconds)
+        other["float"] = other["double"] = "same run"
+        other_seconds = 0
+      }
+    }' <<<"$result"
+  if ((status)); then
+    grep -v '^golden ' <<<"$result" || true
+    return 1
+  fi
+}
+
+# The levels of x86-64 that this machine runs, the highest last.
+levels() {
+  echo x86-64
+  /lib64/ld-linux-x86-64.so.2 --help | sed -nE 's/^ +(x86-64-v[34]) \(supported.*/\1/p' | sort
+}
+
+# What to check, a line each: PROCESSOR COMPILER FLAGS. The longest first.
+list() {
+  local optimise compiler level
+  if [[ ${1:-} != --all ]]; then  # beside g++ -O2 and clang -O1, which the other tests build with
+    echo s390x s390x-linux-gnu-g++ -O2
+    echo aarch64 aarch64-linux-gnu-g++ -O2
+    echo x86_64 clang++-16 -O3 -march=x86-64
+    echo x86_64 g++ -O3 "-march=$(levels | tail -n 1)"
+    return
+  fi
+  for optimise in -O0 -O2 -O3; do
+    echo s390x s390x-linux-gnu-g++ "$optimise"
+    echo aarch64 aarch64-linux-gnu-g++ "$optimise"
+    for compiler in g++ clang++-16; do
+      for level in $(levels); do echo x86_64 "$compiler" "$optimise" "-march=$level"; done
+    done
+  done
+}
+
+mkdir -p "$folder"
+# shellcheck disable=SC2059
+printf "$row" compiler flags machine kernels fixed 'its volume' float double seconds
+failed=0 running=0
+collect() {
+  wait -n || failed=$((failed + 1))
+  running=$((running - 1))
+}
+while read -r processor compiler flags; do
+  if ((running == $(nproc))); then collect; fi
+  check "$processor" "$compiler" "$flags" &
+  running=$((running + 1))
+done < <(list "$@")
+while ((running)); do collect; done
+if ((failed)); then
+  echo "check-determinism: $failed builds are not as tests/golden says; docs/determinism.md" >&2
+  exit 1
+fi

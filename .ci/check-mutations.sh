@@ -1,0 +1,124 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+# check-mutations.sh [PATTERN]: can the kernel tests fail? Changes one token at a time in a copy of
+# the tree, builds the kernel tests and demands that one of them notices. Prints a table of file,
+# change and what caught it. PATTERN picks the changes whose line matches. Some minutes; nothing in
+# the tree is touched.
+set -euo pipefail
+cd "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/.."
+
+# FILE[,FILE] | what is wrong then | sed
+mutations() {
+  cat <<'LIST'
+controller/kernel/gradient.hpp | a tap: central -1 -> -2 | s/\{0, -1, 0, 1, 0\}/{0, -2, 0, 1, 0}/
+controller/kernel/gradient.hpp,controller/kernel/aligned_table.hpp | a tap in both plans: farid 55 -> 54 | s/\{5, 32, 55, 32, 5\}/{5, 32, 54, 32, 5}/
+controller/kernel/gradient.hpp,controller/kernel/aligned_table.hpp | a sign in both plans: sobel5 2 -> -2 | s/\{-1, -2, 0, 2, 1\}/{-1, -2, 0, -2, 1}/
+controller/kernel/gradient.hpp | rounding of a gradient | s/round_shift\(sum, shift\), kMax/sum >> shift, kMax/
+controller/kernel/gradient.hpp | reach of a refresh one short | s/changed\.grown\(kGradientReach\)/changed.grown(1)/
+controller/kernel/trilinear.hpp | rounding of a weight product | s/round_shift\(std::int64_t\{a\} \* b, 15\)/std::int64_t{a} * b >> 15/
+controller/kernel/trilinear.hpp | rounding of a cell's weight | s/0xffff\) \+ 1\) >> 1/0xffff)) >> 1/
+controller/kernel/trilinear.hpp | rounding of a lerp | s/round_shift\(way \* w, 15\)/(way * w >> 15)/
+controller/kernel/trilinear.hpp | a weight's sign | s/w\.y - w\.z \+ yz/w.y - w.z - yz/
+controller/kernel/trilinear.hpp | border: cells at 0 left out | s/return low\.x >= 0 \&\&/return low.x > 0 \&\&/
+controller/kernel/trilinear.hpp | border: a cell at -1 touches nothing | s/return low\.x >= -1 \&\&/return low.x >= 0 \&\&/
+controller/kernel/tool_pose.hpp | rounding of a sample's position | s/round_shift\(way, 5\)/(way >> 5)/
+controller/kernel/overlap.hpp | rounding of a scaled overlap | s/round_shift\(std::int64_t\{sum\} \* volume_ratio, 20\)/(std::int64_t{sum} * volume_ratio >> 20)/
+controller/kernel/overlap.hpp | the carry's first lane | s/lowest_x - 2/lowest_x - 1/
+controller/kernel/milling.hpp | shift of a loss | s/product >> \(rate\.exponent - 1\)/product >> rate.exponent/
+controller/kernel/milling.hpp | the carry loses a bit | s/total & 0xffff/total \& 0xfffe/
+controller/kernel/milling.hpp | the carry is not kept | s/owed = static_cast<std::uint16_t>\(total & 0xffff\)/owed = 0/
+controller/kernel/milling.hpp | air is felt | s/ \|\| density\[at\] == 0\) continue/) continue/
+controller/kernel/removal_rate.hpp | rounding of a bent ratio | s/\(ratio & 127\) \+ 64\) >> 7/(ratio \& 127)) >> 7/
+controller/kernel/penetration.hpp | rounding to the nearest voxel | s/round_shift\(at\.raw\(\), 16\)/at.raw() >> 16/
+controller/kernel/aligned_corner.hpp | rounding of the kept bits | s/round_shift\(taps\.factor \* sum, taps\.shift - kAlignedKeptBits\)/taps.factor * sum >> (taps.shift - kAlignedKeptBits)/
+controller/kernel/aligned_reference.hpp | the definition loses the last tap | s/for \(std::int32_t i = 0; i < 5; \+\+i\)/for (std::int32_t i = 0; i < 4; ++i)/
+controller/kernel/aligned.hpp | the box lies one voxel off | s/cell\.low\.y - kGradientReach/cell.low.y - 1/
+controller/kernel/aligned_scalar.cpp | a sign in the x filter | s/across -= tool/across += tool/
+controller/kernel/aligned_scalar.cpp | a mask row off by one | s/row = \(z \+ 1 - /row = (z - /
+controller/kernel/aligned_vector.hpp | border: one column too many | s/x >= from && x < to/x >= from \&\& x <= to/
+controller/kernel/aligned_vector.hpp | rows past the memory's end read whole | s/begin \+ padded > count\) \{/begin + width > count) {/
+controller/kernel/aligned_vector.hpp | sums never widened | s/end - chunk > tool\.flush \?/false ?/
+controller/kernel/aligned_vector.hpp | sums widened a chunk late | s/chunk \+ tool\.flush : end/chunk + tool.flush + 1 : end/
+controller/kernel/aligned_vector.hpp | a shift of the removal | s/const std::int32_t s = exponent - 1;/const std::int32_t s = exponent;/
+controller/kernel/aligned_avx2.cpp | the carry-out compares signed | s/_mm256_max_epu16\(sum, part\)/_mm256_max_epi16(sum, part)/
+controller/kernel/aligned_avx2.cpp | rows written back from the box | s/V \/\*rho\*\//V rho/; s/sub16\(load\(density \+ begin\), loss\)/sub16(rho, loss)/
+controller/kernel/aligned_avx512.cpp | the carry-out counts equality | s/_mm512_cmplt_epu16_mask/_mm512_cmple_epu16_mask/
+controller/kernel/aligned_avx512.cpp | the mask of a loss is whole | s/density \+ begin, lost, sub16/density + begin, ~0u, sub16/
+controller/kernel/aligned_vector.hpp | sums no longer in registers | s/GCC unroll 32/GCC unroll 1/
+controller/scene/aligned_tool.cpp | the flush bound is twice too large | s/\(2 \* largest \* 32768\)/(largest * 32768)/
+controller/scene/aligned_tool.cpp | a mask's lane off by one | s/static_cast<std::size_t>\(v\.x\) \+ 2 \+ moved/static_cast<std::size_t>(v.x) + 1 + moved/
+LIST
+}
+
+scratch=$(mktemp -d)
+trap 'rm -rf "$scratch"' EXIT
+git ls-files -z --cached --others --exclude-standard | xargs -0 cp --parents -t "$scratch"
+
+# Keeps what the compiler says in build.log.
+build() {
+  cmake --build "$scratch/build" --target test_kernel test_aligned >"$scratch/build.log" 2>&1
+}
+
+# The names of the test cases that fail, or the hot-loop check; nothing when all pass.
+failures() {
+  local test status
+  for test in test_kernel test_aligned; do
+    status=0
+    (cd "$scratch" && timeout 300 "build/bin/$test" >"$scratch/test.log" 2>&1) || status=$?
+    if ((status)); then
+      # A case's name stands above its first failure; a crash may leave none.
+      { grep '^TEST CASE:' "$scratch/test.log" || echo "TEST CASE: $test ends with $status"; } |
+        sed 's/^TEST CASE: *//' | sort -u
+    fi
+  done
+  if [[ $(uname -m) == x86_64 ]]; then
+    find "$scratch/build" -path '*kerf_aligned.dir*' -name '*.o' -print0 |
+      xargs -0 "$scratch/.ci/check-hot-loops.sh" >/dev/null 2>&1 || echo 'check-hot-loops.sh'
+  fi
+}
+
+echo "check-mutations: building the kernel tests as they are" >&2
+cmake -S "$scratch" -B "$scratch/build" -G Ninja -DCMAKE_BUILD_TYPE=Release \
+  -DCMAKE_CXX_FLAGS_RELEASE=-O2 --log-level=ERROR >/dev/null
+build || { cat "$scratch/build.log"; exit 2; }
+before=$(failures)
+if [[ -n $before ]]; then
+  echo "check-mutations: the tests fail without any change ($before); mend them first" >&2
+  exit 2
+fi
+
+missed=0
+printf '%-34s %-42s %s\n' file change 'caught by'
+while IFS='|' read -r files what edit; do
+  [[ -z ${1:-} || "$files|$what" =~ $1 ]] || continue
+  IFS=',' read -ra names <<<"${files// /}"
+  for name in "${names[@]}"; do
+    sed -E -i "$edit" "$scratch/$name"
+    if cmp -s "$name" "$scratch/$name"; then
+      echo "check-mutations: $name has no place for '$what'; mend the list" >&2
+      exit 2
+    fi
+  done
+  if build; then
+    caught=$(failures)
+  elif grep -qE 'static assertion failed|non-constant condition' "$scratch/build.log"; then
+    caught='the compiler: a static assertion fails'
+  else
+    cat "$scratch/build.log"
+    echo "check-mutations: '$what' does not compile; mend the list" >&2
+    exit 2
+  fi
+  if [[ -z $caught ]]; then
+    caught='NOTHING'
+    missed=$((missed + 1))
+  fi
+  count=$(wc -l <<<"$caught")
+  ((count == 1)) && more='' || more=" (and $((count - 1)) more)"
+  printf '%-34s %-42s %s\n' "${names[0]#controller/}" "${what# }" "$(head -n 1 <<<"$caught")$more"
+  for name in "${names[@]}"; do cp "$name" "$scratch/$name"; done
+done < <(mutations)
+
+if ((missed)); then
+  echo "check-mutations: $missed changes went unseen; add a test that fails with them" >&2
+  exit 1
+fi

@@ -1,0 +1,173 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "controller/scene/aligned_tool.hpp"
+#include "controller/scene/lattice.hpp"
+#include "controller/scene/sample_tool.hpp"
+#include "controller/scene/scene.hpp"
+#include "controller/scene/scene_costs.hpp"
+#include "controller/servo/servo_plan.hpp"
+#include "controller/servo/servo_state.hpp"
+
+namespace kerf {
+
+/// An array whose size is known before its memory is taken; empty where nothing needs it.
+template <class T>
+class PlannedArray {
+ public:
+  /// Several users share it: the largest wish counts.
+  void need(std::size_t count) { count_ = std::max(count_, count); }
+  void allocate() { memory_.resize(count_); }
+  [[nodiscard]] std::size_t bytes() const noexcept { return count_ * sizeof(T); }
+  [[nodiscard]] std::span<T> span() noexcept { return memory_; }
+
+ private:
+  std::size_t count_ = 0;
+  std::vector<T> memory_;
+};
+
+/// Owner of all arrays that a compiled scene steps on. First the `hold` functions, one a plan, say
+/// what a tool needs; then `take` makes the memory. What nobody needs does not exist. Load time.
+template <class N>
+class ServoMemory {
+ public:
+  explicit ServoMemory(const Scene& scene) : cutting_(scene.cut.model != CutModel::none) {
+    for (const SceneVolume& volume : scene.volumes) {
+      volumes_.push_back({volume.name, volume.image.density.size() * sizeof(Density),
+                          volume.image.labels.size() * sizeof(Label)});
+      if (volume.solid) solid_names_.push_back(volume.name);
+    }
+  }
+
+  /// The samples of the next tool; they stay where they are.
+  std::span<const ToolOffset> hold_samples(const SceneTool& tool) {
+    return samples_.emplace_back(tool.name, tool.offsets).second;
+  }
+
+  /// A table of the plan `aligned`; it stays where it is.
+  const AlignedTable& hold_table(const SceneTool& tool, const LatticeTurn& turn,
+                                 GradientKernel kernel, const AlignedKernels& kernels) {
+    tables_.emplace_back(tool.name, std::make_unique<AlignedTool>(turned(tool.offsets, turn),
+                                                                  aligned_taps(kernel), kernels));
+    return tables_.back().second->table();
+  }
+
+  /// What a tool needs in volume `v` of the plan, in the plan `aligned`.
+  void hold_aligned(std::size_t v, const AlignedTable& table) {
+    scratch_.tick().hold(table.size, cutting_);
+    if (cutting_) carries_[v].need(static_cast<std::size_t>(table.row_lanes));
+  }
+
+  /// The same in the plan `gather`.
+  void hold_gather(const SceneTool& tool, const SceneVolume& volume, std::size_t v) {
+    const auto& h = volume.image.spacing_mm;
+    gradients_[v].need(volume.image.grid.voxel_count() + kFieldPad);
+    if (!cutting_) return;
+    refresh_.need(1);
+    carries_[v].need(removal_lanes(overlap_width(tool.size_vox, tool.pitch_mm, h[0])));
+    overlap_.need(overlap_capacity(tool.size_vox, tool.pitch_mm, h));
+  }
+
+  /// The same in the plan `splat`.
+  void hold_splat(const SceneTool& tool, const SceneVolume& volume, std::size_t v) {
+    std::array<std::size_t, 3> width{};
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      width[axis] = overlap_width(tool.size_vox, tool.pitch_mm, volume.image.spacing_mm[axis]);
+    }
+    scratch_.hold(width, tool.offsets.size());
+    carries_[v].need(splat_lanes(width[0]));
+  }
+
+  /// A tool's samples for the plans that take any pose in fixed point; they stay where they are.
+  SampleTable hold_sample_table(const SceneTool& tool) {
+    const auto order = cutting_ ? SampleOrder::scattered : SampleOrder::as_given;
+    sample_tables_.emplace_back(tool.name, SampleTool(tool.offsets, order));
+    return sample_tables_.back().second.table();
+  }
+
+  /// Takes the volumes' densities over and allocates the rest; points `state` at it.
+  void take(Scene& scene, const ServoPlan<N>& plan, ServoState<N>& state) {
+    for (SceneVolume& volume : scene.volumes) {
+      densities_.push_back(std::move(volume.image.density));
+    }
+    const auto scratch = std::make_unique<GradientScratch>();
+    for (std::size_t v = 0; v < plan.volume_count; ++v) {
+      const VolumePlan<N>& volume = plan.volumes[v];
+      std::vector<Density>& density = densities_[volume.scene_index];
+      gradients_[v].allocate();
+      carries_[v].allocate();
+      if (gradients_[v].bytes() != 0) {
+        refresh_gradients<N>(plan.kernel, volume.grid, density, volume.grid.box(),
+                             gradients_[v].span(), *scratch);
+      }
+      state.volumes[v] = {density, gradients_[v].span(), carries_[v].span()};
+    }
+    overlap_.allocate();
+    refresh_.allocate();
+    state.overlap.memory = overlap_.span();
+    state.gradient_scratch = refresh_.span().data();
+    state.splat = scratch_.view();
+  }
+
+  [[nodiscard]] std::span<const Density> density(std::size_t scene_index) const noexcept {
+    return densities_[scene_index];
+  }
+
+  /// All of it by name, as it is before `take`.
+  [[nodiscard]] std::vector<ArrayBytes> arrays() const {
+    std::vector<ArrayBytes> list;
+    const auto add = [&](const std::string& name, std::size_t bytes, bool taken) {
+      if (bytes != 0) list.push_back({name, bytes, taken});
+    };
+    for (const VolumeBytes& volume : volumes_) {
+      add("density of " + volume.name, volume.density, true);
+      add("labels of " + volume.name, volume.labels, true);
+    }
+    for (std::size_t v = 0; v < solid_names_.size(); ++v) {
+      add("gradient of " + solid_names_[v], gradients_[v].bytes(), false);
+      add("carry of " + solid_names_[v], carries_[v].bytes(), false);
+    }
+    for (const auto& [name, samples] : samples_) {
+      add("samples of " + name, samples.size() * sizeof(ToolOffset), true);
+    }
+    for (const auto& [name, table] : tables_) add("table of " + name, table->bytes(), true);
+    add("overlap box", overlap_.bytes(), false);
+    add("refresh planes", refresh_.bytes(), false);
+    for (const auto& [name, table] : sample_tables_) {
+      add("ordered samples of " + name, table.bytes(), true);
+    }
+    for (const ArrayBytes& array : scratch_.arrays()) add(array.name, array.bytes, array.taken);
+    return list;
+  }
+
+ private:
+  struct VolumeBytes {
+    std::string name;
+    std::size_t density, labels;
+  };
+
+  bool cutting_;
+  std::vector<VolumeBytes> volumes_;  ///< by volume of the scene, as the densities
+  std::vector<std::string> solid_names_;
+  std::vector<std::vector<Density>> densities_;
+  std::vector<std::pair<std::string, std::vector<ToolOffset>>> samples_;
+  std::vector<std::pair<std::string, std::unique_ptr<AlignedTool>>> tables_;
+  std::vector<std::pair<std::string, SampleTool>> sample_tables_;
+  std::array<PlannedArray<Gradient<N>>, kMaxVolumes> gradients_;  ///< by volume of the plan
+  std::array<PlannedArray<RemovalCarry<N>>, kMaxVolumes> carries_;
+  PlannedArray<typename N::Weight> overlap_;
+  PlannedArray<GradientScratch> refresh_;
+  SplatMemory scratch_;
+};
+
+}  // namespace kerf

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "controller/scene/scene.hpp"
+#include "controller/scene/scene_costs.hpp"
+
+namespace kerf {
+
+// Which scenes are too dear. Decided from counts of operations and from prices that are constants,
+// so that the same scene is taken or refused in every run, however busy the machine is. Predictions
+// of time for a person come from a calibration instead (controller/shell/calibration.hpp).
+
+/// Price of one operation in ns on the reference machine, a core of 2024 at 4.4 GHz; rounded up
+/// from what `time_stages` gave there. Every stage of every plan has one.
+[[nodiscard]] double reference_price_ns(std::string_view way, std::string_view stage);
+
+/// Half of a tick: a machine half as fast as the reference still ends its ticks in time, and on the
+/// reference the other half is there for the device, the eyes and what else runs on the core.
+inline constexpr double kBudgetShare = 0.5;
+
+/// Work of one tick of one tool in one volume, us on the reference machine.
+[[nodiscard]] double work_us(const PlanCost& cost);
+
+/// The budget of a tick in the same unit.
+[[nodiscard]] double work_budget_us(const Scene& scene);
+
+/// Why the scene is refused: the tool whose tick, over all volumes, is above the budget, on one
+/// line with the way out. Empty where every tool fits.
+[[nodiscard]] std::string over_budget(const Scene& scene, const SceneCosts& costs);
+
+}  // namespace kerf

@@ -1,0 +1,168 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "controller/shell/calibration.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <fstream>
+#include <iterator>
+#include <stdexcept>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+#include <spdlog/spdlog.h>
+
+#include "controller/scene/compile.hpp"
+#include "controller/scene/plan_cost.hpp"
+#include "controller/scene/tool_shapes.hpp"
+#include "shared/posix/new_file.hpp"
+
+namespace kerf {
+namespace {
+
+std::string machine_name() {
+  std::ifstream info("/proc/cpuinfo");
+  for (std::string line; std::getline(info, line);) {
+    const auto colon = line.find(": ");
+    if (line.starts_with("model name") && colon != std::string::npos) return line.substr(colon + 2);
+  }
+  return "unknown";
+}
+
+std::string key_of(const PlanCost& cost, const StageCost& stage) {
+  return cost.way + "/" + stage.stage;
+}
+
+/// A solid block and tools of several sizes, of every plan that `numeric` has.
+Scene block_scene(NumericKind numeric) {
+  constexpr double kPitchMm = 0.125;
+  constexpr std::int32_t kEdge = 96;
+  Scene scene;
+  scene.path = "calibration";
+  scene.servo.numeric = numeric;
+  SceneVolume& block = scene.volumes.emplace_back();
+  block.name = "block";
+  block.image.grid = {kEdge, kEdge, kEdge};
+  block.image.spacing_mm = {kPitchMm, kPitchMm, kPitchMm};
+  block.image.density.assign(block.image.grid.voxel_count(), 65535);
+  const auto add = [&](const char* shape, ToolSize size) {
+    size.pitch_mm = kPitchMm;
+    scene.tools.push_back(make_tool(shape, shape, size));
+  };
+  if (numeric == NumericKind::fixed) {
+    for (const std::int32_t size : {10, 16, 24}) add("ball", {.size_vox = size});
+  }
+  add("cylinder", {.size_vox = 8});
+  add("cylinder", {.size_vox = 16});
+  add("cylinder", {.radius_mm = 0.5, .length_mm = 4.0});
+  add("wheel", {.radius_mm = 1.5, .length_mm = 0.8});
+  return scene;
+}
+
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+Calibration stored_calibration(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  const std::string text{std::istreambuf_iterator<char>(file), {}};
+  Calibration calibration = parse_calibration(text);
+  if (calibration.machine != machine_name()) {
+    throw std::runtime_error("is of another machine, " + calibration.machine);
+  }
+  return calibration;
+}
+
+}  // namespace
+
+std::optional<double> Calibration::stage_us(const PlanCost& cost, const StageCost& stage) const {
+  const auto price = price_ns.find(key_of(cost, stage));
+  if (price == price_ns.end()) return std::nullopt;
+  return static_cast<double>(stage.operations) * price->second / 1000;
+}
+
+Calibration measure_calibration() {
+  std::map<std::string, std::vector<double>> prices;
+  for (const NumericKind numeric :
+       {NumericKind::fixed, NumericKind::float32, NumericKind::float64}) {
+    Scene scene = block_scene(numeric);
+    const auto servo = compile(scene);
+    const std::vector<TickCost>& ticks = servo->costs().ticks;
+    for (std::size_t i = 0; i < ticks.size(); ++i) {
+      const std::vector<double> us = servo->time_stages(i);
+      for (std::size_t s = 0; s < us.size(); ++s) {
+        const StageCost& stage = ticks[i].cost.stages[s];
+        // The clock may be coarser than a stage: a price is positive.
+        prices[key_of(ticks[i].cost, stage)].push_back(
+            std::max(us[s] * 1000 / static_cast<double>(stage.operations), 1e-6));
+      }
+    }
+  }
+  Calibration calibration{machine_name(), {}};
+  for (auto& [key, values] : prices) calibration.price_ns[key] = median(std::move(values));
+  return calibration;
+}
+
+std::filesystem::path calibration_path() {
+  const auto folder = [](const char* variable) {
+    const char* value = std::getenv(variable);
+    return std::filesystem::path(value != nullptr ? value : "");
+  };
+  std::filesystem::path cache = folder("XDG_CACHE_HOME");
+  if (!cache.is_absolute()) cache = folder("HOME") / ".cache";
+  return cache.is_absolute() ? cache / "kerf" / "calibration.json" : std::filesystem::path();
+}
+
+std::string calibration_json(const Calibration& calibration) {
+  const nlohmann::ordered_json json{{"program", "kerf-controller"},
+                                    {"version", KERF_VERSION},
+                                    {"counts", kCountsRevision},
+                                    {"machine", calibration.machine},
+                                    {"ns_per_operation", calibration.price_ns}};
+  return json.dump(2) + "\n";
+}
+
+Calibration parse_calibration(const std::string& text) {
+  const auto json = nlohmann::json::parse(text, nullptr, false);
+  if (!json.is_object() || !json.contains("ns_per_operation") || !json.contains("machine") ||
+      !json["ns_per_operation"].is_object() || !json["machine"].is_string()) {
+    throw std::runtime_error("is no calibration");
+  }
+  if (json.value("version", nlohmann::json()) != KERF_VERSION ||
+      json.value("counts", nlohmann::json()) != kCountsRevision) {
+    throw std::runtime_error("is of another version");
+  }
+  Calibration calibration{json["machine"], {}};
+  for (const auto& [key, price] : json["ns_per_operation"].items()) {
+    constexpr double kMostNs = 1e6;
+    if (!price.is_number() || !(price.get<double>() > 0) || !(price.get<double>() < kMostNs)) {
+      throw std::runtime_error("has no price for " + key);
+    }
+    calibration.price_ns[key] = price.get<double>();
+  }
+  return calibration;
+}
+
+Calibration calibration_of_machine(const std::filesystem::path& path, bool renew) {
+  std::error_code ignored;
+  if (!renew && std::filesystem::exists(path, ignored)) {
+    try {
+      return stored_calibration(path);
+    } catch (const std::exception& error) {
+      spdlog::warn("{}: {}; measured anew", path.string(), error.what());
+    }
+  }
+  Calibration calibration = measure_calibration();
+  if (path.empty()) return calibration;
+  try {
+    std::filesystem::create_directories(path.parent_path());
+    write_new_file(path, calibration_json(calibration));
+  } catch (const std::exception& error) {
+    spdlog::warn("{}; the calibration is not kept", error.what());
+  }
+  return calibration;
+}
+
+}  // namespace kerf

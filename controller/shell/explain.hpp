@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "controller/scene/compile.hpp"
+#include "controller/scene/scene.hpp"
+#include "controller/scene/scene_costs.hpp"
+#include "controller/shell/calibration.hpp"
+#include "shared/segment/segment_plan.hpp"
+
+namespace kerf {
+
+/// One stage as it is explained. Times in us; predicted only where the calibration knows the stage.
+struct ExplainedStage {
+  StageCost cost;
+  std::optional<double> predicted_us;
+  double measured_us = 0;
+};
+
+/// One tool in one volume.
+struct ExplainedTick {
+  std::string tool, volume, way, why;
+  std::vector<ExplainedStage> stages;
+  double work_us = 0;  ///< against the budget, see work_budget.hpp
+};
+
+/// What `--explain` tells of a scene.
+struct Explanation {
+  std::string scene, numeric, cut, machine;
+  int rate_hz = 1000;
+  double budget_us = 0;
+  std::vector<ExplainedTick> ticks;
+  std::vector<ArrayBytes> arrays;  ///< of the servo, then of the segment
+};
+
+/// The parts of a segment as its layout places them, each up to where the next one begins.
+[[nodiscard]] std::vector<ArrayBytes> segment_arrays(const SegmentPlan& plan, const Scene& scene);
+
+/// Times every tool in every volume of a scene that `servo` has taken; see `time_stages`.
+[[nodiscard]] Explanation explain(const Scene& scene, CompiledScene& servo,
+                                  const SegmentPlan& segment, const Calibration& calibration);
+
+/// For a person.
+[[nodiscard]] std::string explanation_text(const Explanation& explanation);
+
+/// The same figures as JSON; ends with a newline.
+[[nodiscard]] std::string explanation_json(const Explanation& explanation);
+
+}  // namespace kerf

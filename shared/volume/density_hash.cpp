@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "shared/volume/density_hash.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cstddef>
+#include <cstring>
+
+namespace kerf {
+namespace {
+
+[[nodiscard]] std::uint64_t multiply_in(std::uint64_t lane, std::uint64_t word) noexcept {
+  return std::rotl((lane ^ word) * 0x9fb21c651e98df25, 29);
+}
+
+}  // namespace
+
+void DensityHasher::add_row(std::span<const Density> row) noexcept {
+  constexpr std::size_t kPerWord = sizeof(std::uint64_t) / sizeof(Density);
+  const auto word_at = [&row](std::size_t first, std::size_t count) {
+    std::uint64_t word = 0;  // the first density lowest
+    if constexpr (std::endian::native == std::endian::little) {
+      std::memcpy(&word, row.data() + first, count * sizeof(Density));
+    } else {
+      for (std::size_t k = 0; k < count; ++k) word |= std::uint64_t{row[first + k]} << (16 * k);
+    }
+    return word;
+  };
+  std::size_t i = 0;
+  for (; i + 4 * kPerWord <= row.size(); i += 4 * kPerWord) {
+    for (std::size_t k = 0; k < 4; ++k) {
+      lane_[k] = multiply_in(lane_[k], word_at(i + k * kPerWord, kPerWord));
+    }
+  }
+  for (std::size_t k = 0; i < row.size(); i += kPerWord, ++k) {
+    lane_[k] = multiply_in(lane_[k], word_at(i, std::min(kPerWord, row.size() - i)));
+  }
+  voxels_ += row.size();
+}
+
+std::uint64_t DensityHasher::value() const noexcept {
+  std::uint64_t hash = voxels_;
+  for (const std::uint64_t lane : lane_) hash = multiply_in(hash, lane);
+  return hash ^ hash >> 32;
+}
+
+std::uint64_t density_hash(std::span<const Density> density) noexcept {
+  DensityHasher hasher;
+  hasher.add_row(density);
+  return hasher.value();
+}
+
+std::uint64_t box_hash(std::span<const Density> linear, const VoxelGrid& grid,
+                       const VoxelBox& box) noexcept {
+  DensityHasher hasher;
+  const auto row_length = static_cast<std::size_t>(box.extent().x);
+  for (std::int32_t z = box.lo.z; z < box.hi.z; ++z) {
+    for (std::int32_t y = box.lo.y; y < box.hi.y; ++y) {
+      hasher.add_row(linear.subspan(grid.index(box.lo.x, y, z), row_length));
+    }
+  }
+  return hasher.value();
+}
+
+}  // namespace kerf

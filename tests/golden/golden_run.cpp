@@ -1,0 +1,151 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/golden/golden_run.hpp"
+
+#include <array>
+#include <cstddef>
+#include <memory>
+#include <utility>
+
+#include "controller/scene/compile.hpp"
+#include "shared/volume/density_hash.hpp"
+#include "tests/golden/golden_script.hpp"
+#include "tests/kernel/hash.hpp"
+
+namespace kerf::test {
+namespace {
+
+/// A ball with a soft rim in a thin noise.
+SceneVolume blob(VoxelGrid grid, std::array<double, 3> spacing_mm, Pose pose) {
+  SceneVolume volume;
+  volume.image.grid = grid;
+  volume.image.spacing_mm = spacing_mm;
+  volume.pose = pose;
+  std::uint32_t noise = 1;
+  for (std::int32_t z = 0; z < grid.nz; ++z) {
+    for (std::int32_t y = 0; y < grid.ny; ++y) {
+      for (std::int32_t x = 0; x < grid.nx; ++x) {
+        noise = noise * 1'664'525U + 1'013'904'223U;
+        const std::int32_t i = 2 * x - grid.nx, j = 2 * y - grid.ny, k = 2 * z - grid.nz;
+        const std::int32_t depth = 900 - (i * i + j * j + k * k);
+        const std::uint32_t density = depth > 220 ? 60'000 + (noise >> 20)
+                                      : depth > 0 ? static_cast<std::uint32_t>(depth) * 270
+                                                  : noise >> 25;
+        volume.image.density.push_back(static_cast<Density>(density));
+      }
+    }
+  }
+  return volume;
+}
+
+/// Those samples of a grid of `side` per axis that `is_part` of the tool; half pitches.
+template <class Predicate>
+SceneTool tool_of(std::int32_t side, double pitch_mm, bool round, Predicate is_part) {
+  SceneTool tool;
+  tool.pitch_mm = pitch_mm;
+  tool.round = round;
+  tool.size_vox = {side, side, side};
+  for (std::int32_t z = 1 - side; z < side; z += 2) {
+    for (std::int32_t y = 1 - side; y < side; y += 2) {
+      for (std::int32_t x = 1 - side; x < side; x += 2) {
+        if (!is_part(x, y, z)) continue;
+        tool.offsets.push_back({static_cast<std::int16_t>(x), static_cast<std::int16_t>(y),
+                                static_cast<std::int16_t>(z)});
+      }
+    }
+  }
+  return tool;
+}
+
+SceneTool ball(std::int32_t side, double pitch_mm) {
+  return tool_of(side, pitch_mm, true, [&](std::int32_t x, std::int32_t y, std::int32_t z) {
+    return x * x + y * y + z * z <= side * side;
+  });
+}
+
+/// Without any symmetry, so that a turn the wrong way shows.
+SceneTool hook(std::int32_t side, double pitch_mm) {
+  return tool_of(side, pitch_mm, false, [&](std::int32_t x, std::int32_t y, std::int32_t z) {
+    return (x < 0 && z < 2) || (y < 0 && x > 1) || (z > 1 && y > 1 && x < 2);
+  });
+}
+
+Scene golden_scene(NumericKind numeric) {
+  constexpr double kVoxelMm = 0.125;
+  Scene scene;
+  scene.path = "golden";
+  // Plan `aligned` for the balls of its own pitch, then one that no tool fits: turned, not cubic.
+  scene.volumes.push_back(
+      blob({44, 42, 40}, {kVoxelMm, kVoxelMm, kVoxelMm}, {{-2.75, -2.625, -2.5}, {0, 0, 0, 1}}));
+  scene.volumes.push_back(
+      blob({30, 34, 26}, {0.15, 0.11, 0.17}, {{0.5, -2.0, -1.0}, {0.48, 0, 0.36, 0.8}}));
+  scene.tools = {ball(6, kVoxelMm), hook(4, kVoxelMm), ball(7, kVoxelMm), hook(5, 0.11),
+                 ball(6, 0.1)};
+  scene.device.workspace_scale = 0.75;
+  scene.device.offset_mm = {4.1875, 47.25, 60.375};  // the middle of the hand's way
+  scene.device.torque_scale = std::array{0.342, 0.342, -0.342};
+  scene.force.p0_n_per_mm2 = 12.0;
+  scene.cut.model = CutModel::overlap_exact;
+  scene.cut.rate_per_s = 6.0;
+  scene.cut.p1_n_per_mm2 = 8.0;
+  scene.limits.speed_mm_per_s = 2'000;
+  scene.servo.numeric = numeric;
+  return scene;
+}
+
+void add(Hash& hash, const ServoOutput& out) {
+  const auto add_all = [&](const auto& numbers) {
+    for (const double number : numbers) hash.add(number);
+  };
+  add_all(out.gimbal_rad);
+  add_all(out.position_mm);
+  add_all(out.rotation);
+  add_all(out.velocity_mm_per_s);
+  add_all(out.force_n);
+  add_all(out.contact_n);
+  add_all(out.modification_n);
+  add_all(out.torque_n_mm);
+  hash.add(out.absorbed_mj);
+  for (const VoxelBox& box : out.changed) {
+    for (const std::int64_t edge : {box.lo.x, box.lo.y, box.lo.z, box.hi.x, box.hi.y, box.hi.z}) {
+      hash.add(edge);
+    }
+  }
+  hash.add(static_cast<std::uint64_t>(out.fault));
+  hash.add(out.output_hash);  // motor counts, removal, phase
+}
+
+}  // namespace
+
+GoldenRun golden_run(NumericKind numeric, const AlignedKernels& kernels) {
+  Scene scene = golden_scene(numeric);
+  const auto tools = static_cast<std::uint32_t>(scene.tools.size());
+  const std::size_t volumes = scene.volumes.size();
+  const std::unique_ptr<Servo> servo = compile(scene, kernels);
+
+  GoldenRun run;
+  Hash hash, volume_hash;
+  ServoOutput last;
+  for (std::int32_t tick = 0; tick < kGoldenTicks; ++tick) {
+    servo->apply(scripted_command(tick, tools));
+    const ServoOutput out = servo->step(scripted_report(tick));
+    add(hash, out);
+    if (tick % 50 == 0) hash.add(servo->penetration_mm());
+    run.contact_ticks += out.contact ? 1 : 0;
+    run.late_contact_ticks += out.contact && tick >= kGoldenTicks * 3 / 4 ? 1 : 0;
+    run.stale_ticks += out.stale ? 1 : 0;
+    run.limited_ticks += out.saturated ? 1 : 0;
+    run.motor_ticks += out.motors_on ? 1 : 0;
+    const bool is_new = out.fault != last.fault;
+    run.stale_faults += is_new && out.fault == Fault::stale_input ? 1 : 0;
+    run.speed_faults += is_new && out.fault == Fault::overspeed ? 1 : 0;
+    run.outings += last.phase == Phase::docked && out.phase == Phase::ramping ? 1 : 0;
+    for (std::size_t v = 0; v < volumes; ++v) run.removed_steps[v] += out.removed_by_volume[v];
+    last = out;
+  }
+  for (std::size_t v = 0; v < volumes; ++v) volume_hash.add(density_hash(servo->density(v)));
+  run.hash = hash.hex();
+  run.volume_hash = volume_hash.hex();
+  return run;
+}
+
+}  // namespace kerf::test

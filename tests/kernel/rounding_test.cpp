@@ -1,0 +1,199 @@
+// SPDX-License-Identifier: Apache-2.0
+// Every rounding of the fixed kernels against exact rational arithmetic: to the nearest, ties up.
+// Fast paths share these functions with the definitions that they are compared with, so a wrong
+// half would move both alike and nothing but a test of the function itself could see it.
+#include <array>
+#include <cstdint>
+#include <random>
+#include <vector>
+
+#include <doctest/doctest.h>
+
+#include "controller/kernel/aligned_corner.hpp"
+#include "controller/kernel/gradient.hpp"
+#include "controller/kernel/overlap.hpp"
+#include "controller/kernel/removal_rate.hpp"
+#include "controller/kernel/tool_pose.hpp"
+#include "controller/kernel/trilinear.hpp"
+
+using namespace kerf;
+
+namespace {
+
+__extension__ using Int128 = __int128;
+
+/// `value` is `exact` / 2^bits to the nearest, ties up: -1/2 < value - exact / 2^bits <= 1/2.
+bool is_nearest(std::int64_t value, Int128 exact, int bits) {
+  const Int128 twice = 2 * (Int128{value} * (Int128{1} << bits) - exact);
+  const Int128 one = Int128{1} << bits;
+  return -one < twice && twice <= one;
+}
+
+/// Weights that matter most, and some between.
+std::vector<std::int32_t> some_weights() {
+  std::vector<std::int32_t> weights{0, 1, 2, 3, 16383, 16384, 16385, 32766, 32767, 32768};
+  for (std::int32_t w = 5; w < 32768; w += 211) weights.push_back(w);
+  return weights;
+}
+
+}  // namespace
+
+TEST_CASE("the product of two weights is the nearest weight, ties up") {
+  std::int64_t wrong = 0, ties = 0;
+  for (const std::int32_t b : some_weights()) {
+    for (std::int32_t a = 0; a <= FixedNumbers::kWeightOne; ++a) {
+      const std::int64_t exact = std::int64_t{a} * b;
+      wrong += is_nearest(weight_product<FixedNumbers>(a, b), exact, 15) ? 0 : 1;
+      ties += exact % 32768 == 16384 ? 1 : 0;
+    }
+  }
+  CHECK(wrong == 0);
+  CHECK(ties > 0);
+}
+
+TEST_CASE("each of the eight weights is one rounded product or the rest of what it splits") {
+  std::int64_t wrong = 0;
+  for (const std::int32_t wy : some_weights()) {
+    for (const std::int32_t wz : some_weights()) {
+      for (const std::int32_t wx : {0, 1, 4321, 16384, 16385, 29999, 32767, 32768}) {
+        const auto w = trilinear_weights<FixedNumbers>({wx, wy, wz});
+        const std::int64_t edge[4] = {w[0] + w[1], w[2] + w[3], w[4] + w[5], w[6] + w[7]};
+        bool right = is_nearest(edge[3], std::int64_t{wy} * wz, 15);
+        right = right && edge[1] + edge[3] == wy && edge[2] + edge[3] == wz;
+        right = right && edge[0] + edge[1] + edge[2] + edge[3] == FixedNumbers::kWeightOne;
+        for (std::size_t q = 0; q < 4; ++q) {
+          right = right && w[2 * q] >= 0 && is_nearest(w[2 * q + 1], wx * edge[q], 15);
+        }
+        wrong += right ? 0 : 1;
+      }
+    }
+  }
+  CHECK(wrong == 0);
+}
+
+TEST_CASE("every fraction of a position becomes the nearest weight, in every cell") {
+  std::int64_t wrong = 0;
+  for (const std::int32_t cell : {-16384, -2, -1, 0, 1, 255, 16383}) {
+    for (std::int32_t fraction = 0; fraction < 65536; ++fraction) {
+      const Q16 at = Q16::from_raw(cell * 65536 + fraction);
+      const Cell<FixedNumbers> found = cell_at<FixedNumbers>({at, at, at});
+      const bool right = found.low == VoxelIndex{cell, cell, cell} &&
+                         is_nearest(found.weight.x, fraction, 1) &&
+                         found.weight.y == found.weight.x && found.weight.z == found.weight.x;
+      wrong += right ? 0 : 1;
+    }
+  }
+  CHECK(wrong == 0);
+}
+
+TEST_CASE("a lerp is the nearest value between its ends, ties up, in 32 and in 64 bits") {
+  std::mt19937_64 random(3);
+  std::int64_t wrong = 0;
+  for (int n = 0; n < 200'000; ++n) {
+    const auto w = static_cast<std::int32_t>(n % 5 == 0 ? random() % 3 * 16384 : random() % 32769);
+    const auto exact = [&](std::int64_t a, std::int64_t b) {
+      return Int128{a} * (32768 - w) + Int128{b} * w;
+    };
+    const std::int32_t a = static_cast<std::int16_t>(random()) * FixedNumbers::kSampleOne;
+    const std::int32_t b = static_cast<std::int16_t>(random()) * FixedNumbers::kSampleOne;
+    wrong += is_nearest(lerp<FixedNumbers>(a, b, w), exact(a, b), 15) ? 0 : 1;
+    const auto c = static_cast<std::int64_t>(random()) >> 18;  // |b - a| < 2^47
+    const auto d = static_cast<std::int64_t>(random()) >> 18;
+    wrong += is_nearest(lerp<FixedNumbers>(c, d, w), exact(c, d), 15) ? 0 : 1;
+  }
+  CHECK(wrong == 0);
+}
+
+TEST_CASE("three lerps go along x, then y, then z, each rounded on its own") {
+  std::mt19937 random(4);
+  std::int64_t wrong = 0;
+  for (int n = 0; n < 20'000; ++n) {
+    std::array<std::int32_t, 8> value{};
+    for (auto& v : value) v = static_cast<std::int16_t>(random()) * FixedNumbers::kSampleOne;
+    const std::array<std::int32_t, 3> w{static_cast<std::int32_t>(random() % 32769),
+                                        static_cast<std::int32_t>(random() % 32769),
+                                        static_cast<std::int32_t>(random() % 32769)};
+    const std::int32_t result = trilinear<FixedNumbers>(value, {w[0], w[1], w[2]});
+    for (std::size_t axis = 0, left = 8; axis < 3; ++axis) {
+      left /= 2;
+      for (std::size_t i = 0; i < left; ++i) {
+        const std::int64_t exact = std::int64_t{value[2 * i]} * (32768 - w[axis]) +
+                                   std::int64_t{value[2 * i + 1]} * w[axis];
+        std::int64_t nearest = exact / 32768 - 1;
+        while (nearest * 32768 + 16384 <= exact) ++nearest;
+        value[i] = static_cast<std::int32_t>(nearest);
+      }
+    }
+    wrong += result == value[0] ? 0 : 1;
+  }
+  CHECK(wrong == 0);
+}
+
+TEST_CASE("a sample's position is the nearest step to the exact one, ties up") {
+  std::mt19937 random(5);
+  std::int64_t wrong = 0;
+  for (int n = 0; n < 100'000; ++n) {
+    ToolPose<FixedNumbers> pose;
+    const auto centre = static_cast<std::int32_t>(random() % 40'000'000);
+    pose.centre_vox = {Q16::from_raw(centre), Q16::from_raw(-centre), Q16::from_raw(centre / 2)};
+    ToolOffset offset{};
+    for (auto& o : offset) o = static_cast<std::int16_t>(static_cast<int>(random() % 129) - 64);
+    for (auto& row : pose.step) {
+      for (auto& s : row) s = static_cast<std::int32_t>(random() % (1u << 21)) - (1 << 20);
+    }
+    const auto at = sample_position(pose, offset);
+    const std::int32_t place[3] = {at.x.raw(), at.y.raw(), at.z.raw()};
+    const std::int32_t start[3] = {centre, -centre, centre / 2};
+    for (std::size_t a = 0; a < 3; ++a) {
+      std::int64_t exact = std::int64_t{start[a]} * 32;  // half pitches of 2^-20: 2^-21 of a voxel
+      for (std::size_t b = 0; b < 3; ++b) exact += std::int64_t{pose.step[a][b]} * offset[b];
+      wrong += is_nearest(place[a], exact, 5) ? 0 : 1;
+    }
+  }
+  CHECK(wrong == 0);
+}
+
+TEST_CASE("gradients are rounded once, stored ones to a step and summed ones to 1/256") {
+  std::mt19937_64 random(6);
+  std::int64_t wrong = 0;
+  for (int n = 0; n < 100'000; ++n) {
+    const auto stored = static_cast<std::int64_t>(random() % (std::uint64_t{50'000} << 21)) -
+                        (std::int64_t{25'000} << 21);
+    wrong += is_nearest(gradient_from_sum<FixedNumbers>(stored, 21), stored, 21) ? 0 : 1;
+    const std::int64_t tie = stored - (stored & 0x1fffff) + (1 << 20);
+    wrong += is_nearest(gradient_from_sum<FixedNumbers>(tie, 21), tie, 21) ? 0 : 1;
+    const auto sum = static_cast<std::int64_t>(random()) >> 16;  // 2^47, the bound of a 64 cube
+    for (const AlignedTaps& taps : {kAlignedFarid, kAlignedSobel5}) {
+      wrong += is_nearest(kept_bits(taps, sum), Int128{taps.factor} * sum, taps.shift - 8) ? 0 : 1;
+    }
+  }
+  CHECK(wrong == 0);
+}
+
+TEST_CASE("a scaled overlap is the nearest weight, at most one") {
+  std::mt19937 random(7);
+  std::int64_t wrong = 0;
+  for (int n = 0; n < 100'000; ++n) {
+    const auto sum = static_cast<std::int32_t>(random() % 4'000'000);
+    const auto scale = static_cast<std::int32_t>(1 + random() % (1u << 22));
+    const std::int32_t ratio = detail::overlap_ratio<FixedNumbers>(sum, scale);
+    const bool whole = Int128{sum} * scale > Int128{32768} << 20;
+    wrong += (whole ? ratio == 32768 : is_nearest(ratio, Int128{sum} * scale, 20)) ? 0 : 1;
+  }
+  CHECK(wrong == 0);
+}
+
+TEST_CASE("the bent overlap is the nearest weight between two entries of its table") {
+  std::int64_t wrong = 0;
+  for (const double kt : {0.01, 0.7, 3.0, 42.0}) {
+    const auto rate = removal_rate<FixedNumbers>(kt, true);
+    for (std::int32_t ratio = 0; ratio < FixedNumbers::kWeightOne; ++ratio) {
+      const auto i = static_cast<std::size_t>(ratio / 128);
+      const std::int64_t exact =
+          std::int64_t{rate.bend[i]} * (128 - ratio % 128) + rate.bend[i + 1] * (ratio % 128);
+      wrong += is_nearest(bent_ratio(rate, ratio), exact, 7) ? 0 : 1;
+    }
+    CHECK(bent_ratio(rate, FixedNumbers::kWeightOne) == FixedNumbers::kWeightOne);
+  }
+  CHECK(wrong == 0);
+}
