@@ -126,7 +126,7 @@ TEST_CASE("lanes hold 127 chunks of the widest products and not one more, on eve
         run.insert(run.end(), lanes, std::int16_t{-256});
       }
       const std::vector<std::int16_t> box(8 * 8 * 8, std::int16_t{-32768});
-      for (const std::size_t count : {1, 126, 127, 128, 253, 254, 255, 1000}) {
+      for (const std::size_t count : {1u, 126u, 127u, 128u, 253u, 254u, 255u, 1000u}) {
         const std::vector<AlignedChunk> chunks(count, AlignedChunk{0, 0});
         AlignedTable table;
         table.box = {8, 8, 8};
