@@ -11,8 +11,8 @@ cd "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/.."
 mutations() {
   cat <<'LIST'
 controller/kernel/gradient.hpp | a tap: central -1 -> -2 | s/\{0, -1, 0, 1, 0\}/{0, -2, 0, 1, 0}/
-controller/kernel/gradient.hpp,controller/kernel/aligned_table.hpp | a tap in both plans: farid 55 -> 54 | s/\{5, 32, 55, 32, 5\}/{5, 32, 54, 32, 5}/
-controller/kernel/gradient.hpp,controller/kernel/aligned_table.hpp | a sign in both plans: sobel5 2 -> -2 | s/\{-1, -2, 0, 2, 1\}/{-1, -2, 0, -2, 1}/
+controller/kernel/gradient.hpp,controller/kernel/exact_taps.hpp | a tap in both plans: farid 55 -> 54 | s/\{5, 32, 55, 32, 5\}/{5, 32, 54, 32, 5}/
+controller/kernel/gradient.hpp,controller/kernel/exact_taps.hpp | a sign in both plans: sobel5 2 -> -2 | s/\{-1, -2, 0, 2, 1\}/{-1, -2, 0, -2, 1}/
 controller/kernel/gradient.hpp | rounding of a gradient | s/round_shift\(sum, shift\), kMax/sum >> shift, kMax/
 controller/kernel/gradient.hpp | reach of a refresh one short | s/changed\.grown\(kGradientReach\)/changed.grown(1)/
 controller/kernel/trilinear.hpp | rounding of a weight product | s/round_shift\(std::int64_t\{a\} \* b, 15\)/std::int64_t{a} * b >> 15/
@@ -33,18 +33,29 @@ controller/kernel/penetration.hpp | rounding to the nearest voxel | s/round_shif
 controller/kernel/aligned_corner.hpp | rounding of the kept bits | s/round_shift\(taps\.factor \* sum, taps\.shift - kAlignedKeptBits\)/taps.factor * sum >> (taps.shift - kAlignedKeptBits)/
 controller/kernel/aligned_reference.hpp | the definition loses the last tap | s/for \(std::int32_t i = 0; i < 5; \+\+i\)/for (std::int32_t i = 0; i < 4; ++i)/
 controller/kernel/aligned.hpp | the box lies one voxel off | s/cell\.low\.y - kGradientReach/cell.low.y - 1/
-controller/kernel/aligned_scalar.cpp | a sign in the x filter | s/across -= tool/across += tool/
-controller/kernel/aligned_scalar.cpp | a mask row off by one | s/row = \(z \+ 1 - /row = (z - /
-controller/kernel/aligned_vector.hpp | border: one column too many | s/x >= from && x < to/x >= from \&\& x <= to/
-controller/kernel/aligned_vector.hpp | border: one column too few | s/x >= from \&\& x < to/x > from \&\& x < to/
-controller/kernel/aligned_vector.hpp | sums never widened | s/end - chunk > tool\.flush \?/false ?/
-controller/kernel/aligned_vector.hpp | sums widened a chunk late | s/chunk \+ tool\.flush : end/chunk + tool.flush + 1 : end/
-controller/kernel/aligned_vector.hpp | a shift of the removal | s/const std::int32_t s = exponent - 1;/const std::int32_t s = exponent;/
-controller/kernel/aligned_avx2.cpp | the carry-out compares signed | s/_mm256_max_epu16\(sum, part\)/_mm256_max_epi16(sum, part)/
-controller/kernel/aligned_avx2.cpp | rows written back from the box | s/V \/\*rho\*\//V rho/; s/sub16\(load\(density \+ begin\), loss\)/sub16(rho, loss)/
-controller/kernel/aligned_avx512.cpp | the carry-out counts equality | s/_mm512_cmplt_epu16_mask/_mm512_cmple_epu16_mask/
-controller/kernel/aligned_avx512.cpp | the mask of a loss is whole | s/density \+ begin, lost, sub16/density + begin, ~0u, sub16/
-controller/kernel/aligned_avx512.cpp | sums no longer in registers | s/__asm__\("vpdpwssd.*/sum = _mm512_dpwssd_epi32(sum, a, b);/
+controller/kernel/sets/scalar.cpp | a sign in the x filter | s/across -= taps/across += taps/
+controller/kernel/sets/scalar.cpp | a mask row off by one | s/row = \(z \+ 1 - /row = (z - /
+controller/kernel/sets/box_vector.hpp | border: one column too many | s/x >= from && x < to/x >= from \&\& x <= to/
+controller/kernel/sets/box_vector.hpp | border: one column too few | s/x >= from \&\& x < to/x > from \&\& x < to/
+controller/kernel/sets/correlate_vector.hpp | sums never widened | s/end - chunk > tool\.flush \?/false ?/
+controller/kernel/sets/correlate_vector.hpp | sums widened a chunk late | s/chunk \+ tool\.flush : end/chunk + tool.flush + 1 : end/
+controller/kernel/sets/box_vector.hpp | a shift of the removal | s/const std::int32_t s = exponent - 1;/const std::int32_t s = exponent;/
+controller/kernel/sets/avx2.cpp | the carry-out compares signed | s/_mm256_max_epu16\(sum, part\)/_mm256_max_epi16(sum, part)/
+controller/kernel/sets/avx2.cpp | rows written back from the box | s/V \/\*rho\*\//V rho/; s/sub16\(load\(density \+ begin\), loss\)/sub16(rho, loss)/
+controller/kernel/sets/avx512.cpp | the carry-out counts equality | s/_mm512_cmplt_epu16_mask/_mm512_cmple_epu16_mask/
+controller/kernel/sets/avx512.cpp | the mask of a loss is whole | s/density \+ begin, lost, sub16/density + begin, ~0u, sub16/
+controller/kernel/sets/avx512.cpp | sums no longer in registers | s/__asm__\("vpdpwssd.*/sum = _mm512_dpwssd_epi32(sum, a, b);/
+controller/kernel/exact_taps.hpp | a tap of exact sums: central 32 -> 31 | s/\{0, 0, 32, 0, 0\}/{0, 0, 31, 0, 0}/
+controller/kernel/wide_sum.hpp | the low parts of a wide sum are lost | s/high \+ \(low >> shift\)/high/
+controller/kernel/sets/sample_place.hpp | rounding of a sample's place | s/z\[i\] \+ 16\) >> 5/z[i]) >> 5/
+controller/kernel/sets/sample_place.hpp | rounding of a weight product | s/wy \* wz \+ kHalf/wy * wz/
+controller/kernel/sets/gather_vector.hpp | border: one cell too many | s/grid\.nx - 2\)/grid.nx - 1)/
+controller/kernel/sets/gather_vector.hpp | sums widened too late | s/kGatherBlock = 65536/kGatherBlock = 262144/
+controller/kernel/sets/gather_vector.hpp | samples beyond the last count | s/\(i < count\) & //
+controller/kernel/sets/splat_loops.hpp | rounding of a scaled overlap | s/ \+ \(1 << 19\)\) >> 20/) >> 20/
+controller/kernel/sets/splat_loops.hpp | air is felt | s/density\[x\] == INT16_MIN \? 0 : covered/covered/
+controller/kernel/sets/splat_loops.hpp | what lies beyond a full voxel is lost | s/sums\[x\] - covered : sums/0 : sums/
+controller/kernel/splat.hpp | the box lies one voxel off | s/low\.y - kGradientReach/low.y - 1/
 controller/scene/aligned_tool.cpp | the flush bound is twice too large | s/\(2 \* largest \* 32768\)/(largest * 32768)/
 controller/scene/aligned_tool.cpp | a mask's lane off by one | s/static_cast<std::size_t>\(v\.x\) \+ 2 \+ moved/static_cast<std::size_t>(v.x) + 1 + moved/
 LIST
@@ -77,7 +88,7 @@ caught_by() {
     done
   done
   if [[ $(uname -m) == x86_64 ]]; then
-    find "$scratch/build" -path '*kerf_aligned.dir*' -name '*.o' -print0 |
+    find "$scratch/build" -path '*kerf_kernel_sets.dir*' -name '*.o' -print0 |
       xargs -0 "$scratch/.ci/check-hot-loops.sh" >/dev/null 2>&1 || echo 'check-hot-loops.sh'
   fi
 }
@@ -105,7 +116,7 @@ while IFS='|' read -r files what edit; do
   done
   # First the tests that are nearer.
   tests=(test_kernel test_aligned)
-  [[ $files == *aligned* ]] && tests=(test_aligned test_kernel)
+  [[ $files =~ aligned|sets|splat|exact ]] && tests=(test_aligned test_kernel)
   if ! caught=$(caught_by "${tests[@]}"); then
     cat "$scratch/build.log"
     echo "check-mutations: '$what' does not compile; mend the list" >&2

@@ -8,7 +8,7 @@
 #include <span>
 
 #include "controller/kernel/aligned_corner.hpp"
-#include "controller/kernel/aligned_kernels.hpp"
+#include "controller/kernel/kernel_set.hpp"
 #include "controller/kernel/milling.hpp"
 #include "controller/kernel/tool_pose.hpp"
 #include "controller/kernel/trilinear.hpp"
@@ -18,7 +18,7 @@ namespace kerf {
 namespace detail {
 
 /// The exact form of the removal rate, entry by entry: it is a table look-up.
-inline void bend_ratios(const TickBox& box, const AlignedScratch& scratch,
+inline void bend_ratios(const TickBox& box, const BoxScratch& scratch,
                         const RemovalRate<FixedNumbers>& rate) noexcept {
   std::int16_t* ratio = scratch.ratio + kRatioRowPad;
   const std::int32_t rows = (box.size.y + 1) * (box.size.z + 1);
@@ -34,17 +34,16 @@ inline void bend_ratios(const TickBox& box, const AlignedScratch& scratch,
 
 /// Takes from the volume what the ratios in the scratch say: `remove`. `carry` has at least
 /// row_lanes entries.
-[[nodiscard]] inline Removed cut_box(const AlignedKernels& kernels, const TickBox& box,
-                                     const AlignedScratch& scratch, const VoxelGrid& grid,
+[[nodiscard]] inline Removed cut_box(const KernelSet& kernels, const TickBox& box,
+                                     const BoxScratch& scratch, const VoxelGrid& grid,
                                      std::span<Density> density, VoxelIndex origin,
                                      const RemovalRate<FixedNumbers>& rate,
                                      std::span<std::uint16_t> carry) noexcept {
   Removed removed;
   if (rate.mantissa == 0) return removed;
   if (rate.bent) detail::bend_ratios(box, scratch, rate);
-  const AlignedCut cut =
-      kernels.cut(box, {static_cast<std::uint16_t>(rate.mantissa), rate.exponent}, grid,
-                  density.data(), origin, scratch, carry.data());
+  const BoxCut cut = kernels.cut(box, {static_cast<std::uint16_t>(rate.mantissa), rate.exponent},
+                                 grid, density.data(), origin, scratch, carry.data());
   removed.density_steps = cut.density_steps;
   if (cut.density_steps != 0) {
     removed.changed = {{origin.x + cut.lo.x, origin.y + cut.lo.y, origin.z + cut.lo.z},
@@ -61,8 +60,8 @@ class AlignedTick {
  public:
   /// `table` was made for `kernels`; `scratch` has at least the table's sizes. The tool must be
   /// unrotated: only `pose.centre_vox` is used.
-  AlignedTick(const AlignedKernels& kernels, const AlignedTable& table,
-              const AlignedScratch& scratch, const VoxelGrid& grid, std::span<Density> density,
+  AlignedTick(const KernelSet& kernels, const AlignedTable& table, const BoxScratch& scratch,
+              const VoxelGrid& grid, std::span<Density> density,
               const ToolPose<FixedNumbers>& pose) noexcept
       : kernels_(kernels), table_(table), scratch_(scratch), grid_(grid), density_(density) {
     const auto lowest = [](Q16 centre, std::int16_t low) {
@@ -98,7 +97,7 @@ class AlignedTick {
   }
 
   struct Milled {
-    SumVec<FixedNumbers> modification;  ///< `aligned_modification_sum`
+    SumVec<FixedNumbers> modification;  ///< `exact_modification_sum`
     Removed removed;
   };
 
@@ -119,9 +118,9 @@ class AlignedTick {
   }
 
  private:
-  const AlignedKernels& kernels_;
+  const KernelSet& kernels_;
   const AlignedTable& table_;
-  const AlignedScratch& scratch_;
+  const BoxScratch& scratch_;
   const VoxelGrid& grid_;
   std::span<Density> density_;
   VoxelIndex origin_;  ///< low corner of the box

@@ -20,7 +20,7 @@ namespace kerf {
 
 /// The exact tap sum of a voxel, inside or outside the volume (density outside is 0): its gradient
 /// times 2^shift / factor. At most kMaxExactGradient.
-[[nodiscard]] constexpr SumVec<FixedNumbers> gradient_exact(const AlignedTaps& taps,
+[[nodiscard]] constexpr SumVec<FixedNumbers> gradient_exact(const ExactTaps& taps,
                                                             const VoxelGrid& grid,
                                                             std::span<const Density> density,
                                                             VoxelIndex at) noexcept {
@@ -51,7 +51,7 @@ namespace kerf {
 /// `gradient_exact` or a cache of it.
 template <class GradientAt>
 [[nodiscard]] constexpr SumVec<FixedNumbers> aligned_contact_sum(
-    const AlignedTaps& taps, GradientAt&& gradient_at, std::span<const ToolOffset> offsets,
+    const ExactTaps& taps, GradientAt&& gradient_at, std::span<const ToolOffset> offsets,
     const ToolPose<FixedNumbers>& pose) noexcept {
   using Corners = std::array<std::int64_t, 8>;
   if (offsets.empty()) return {};
@@ -93,7 +93,7 @@ struct WideSumVec {
 /// per voxel times 2^(15 - sum_shift) * 2^shift / factor; `samples` are those of the tool. The
 /// density is that from before the removal.
 template <class GradientAt>
-[[nodiscard]] constexpr SumVec<FixedNumbers> aligned_modification_sum(
+[[nodiscard]] constexpr SumVec<FixedNumbers> exact_modification_sum(
     GradientAt&& gradient_at, const VoxelGrid& grid, std::span<const Density> density,
     const OverlapBox<FixedNumbers>& overlap, std::size_t samples) noexcept {
   const int shift = sum_shift(samples);

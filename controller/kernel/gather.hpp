@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <span>
 
-#include "controller/kernel/aligned_kernels.hpp"
 #include "controller/kernel/gradient.hpp"
+#include "controller/kernel/kernel_set.hpp"
 #include "controller/kernel/tool_pose.hpp"
 
 namespace kerf {
@@ -34,7 +34,7 @@ struct NearPose {
 /// `contact_sum` in the bits of the reference, whatever the kernels. `field` holds one gradient per
 /// voxel and kFieldPad entries more. Work is bounded by the samples. Servo thread; no heap.
 [[nodiscard]] inline SumVec<FixedNumbers> gathered_contact(
-    const AlignedKernels& kernels, const SampleTable& samples, const VoxelGrid& grid,
+    const KernelSet& kernels, const SampleTable& samples, const VoxelGrid& grid,
     std::span<const Gradient<FixedNumbers>> field, const ToolPose<FixedNumbers>& pose) noexcept {
   const NearPose at = near_pose(pose);
   if (!at.near) return {};

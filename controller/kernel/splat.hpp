@@ -21,11 +21,11 @@ class SplatTick {
  public:
   struct Felt {
     SumVec<FixedNumbers> contact;       ///< `splat_contact_sum`
-    SumVec<FixedNumbers> modification;  ///< `aligned_modification_sum`
+    SumVec<FixedNumbers> modification;  ///< `exact_modification_sum`
   };
 
   /// Places the samples.
-  SplatTick(const AlignedKernels& kernels, const SampleTable& samples, const AlignedTaps& taps,
+  SplatTick(const KernelSet& kernels, const SampleTable& samples, const ExactTaps& taps,
             const SplatScratch& scratch, const VoxelGrid& grid, std::span<Density> density,
             const ToolPose<FixedNumbers>& pose) noexcept
       : kernels_(kernels), samples_(samples), scratch_(scratch), grid_(grid), density_(density) {
@@ -65,7 +65,7 @@ class SplatTick {
   [[nodiscard]] const TickBox& box() const noexcept { return box_; }
 
  private:
-  const AlignedKernels& kernels_;
+  const KernelSet& kernels_;
   const SampleTable& samples_;
   const SplatScratch& scratch_;
   const VoxelGrid& grid_;
@@ -81,11 +81,13 @@ struct SplatOutcome {
   Removed removed;
 };
 
-[[nodiscard]] inline SplatOutcome splat_tick(
-    const AlignedKernels& kernels, const SampleTable& samples, const AlignedTaps& taps,
-    const SplatScratch& scratch, const VoxelGrid& grid, std::span<Density> density,
-    const ToolPose<FixedNumbers>& pose, std::int32_t volume_ratio,
-    const RemovalRate<FixedNumbers>& rate, std::span<std::uint16_t> carry) noexcept {
+[[nodiscard]] inline SplatOutcome splat_tick(const KernelSet& kernels, const SampleTable& samples,
+                                             const ExactTaps& taps, const SplatScratch& scratch,
+                                             const VoxelGrid& grid, std::span<Density> density,
+                                             const ToolPose<FixedNumbers>& pose,
+                                             std::int32_t volume_ratio,
+                                             const RemovalRate<FixedNumbers>& rate,
+                                             std::span<std::uint16_t> carry) noexcept {
   const SplatTick tick(kernels, samples, taps, scratch, grid, density, pose);
   tick.copy();
   tick.splat();

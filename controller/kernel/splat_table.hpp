@@ -20,7 +20,7 @@ inline constexpr double kMaxSplatDensity = 512.0;
 
 /// Working memory of one tick of the plan `splat`; any contents.
 struct SplatScratch {
-  AlignedScratch tick;           ///< box, ratios, filter and live rows
+  BoxScratch tick;               ///< box, ratios, filter and live rows
   std::int32_t* place[3] = {};   ///< of each sample, Q15.16 voxels
   std::int32_t* sums = nullptr;  ///< rows of row_lanes entries: R_j, weights of 2^15
   std::int16_t* rest[2] = {};    ///< one plane: minus the sums beyond the ratios, low 15 bits, high
@@ -30,17 +30,17 @@ struct SplatScratch {
 /// Lanes of the removal carry for a tool that touches at most `width_vox` voxels along x: the
 /// widest row of its box.
 [[nodiscard]] constexpr std::size_t splat_lanes(std::size_t width_vox) noexcept {
-  return (width_vox - 1 + kAlignedBoxMargin + 31) / 32 * 32;
+  return (width_vox - 1 + kBoxMargin + 31) / 32 * 32;
 }
 
-/// Entries of the arrays of SplatScratch, beside those of AlignedScratch.
+/// Entries of the arrays of SplatScratch, beside those of BoxScratch.
 struct SplatScratchSize {
   std::size_t place, sums, rest, rest_live;
 };
 
 [[nodiscard]] constexpr SplatScratchSize splat_scratch_size(VoxelIndex size,
                                                             std::size_t samples) noexcept {
-  const auto row = static_cast<std::size_t>(tick_box(size, kAlignedFarid, samples).row_lanes);
+  const auto row = static_cast<std::size_t>(tick_box(size, kExactFarid, samples).row_lanes);
   const auto rows = static_cast<std::size_t>(size.y) + 1;
   constexpr auto kGroup = static_cast<std::size_t>(kSampleGroup);
   return {.place = (samples + kGroup - 1) / kGroup * kGroup,

@@ -13,7 +13,7 @@ namespace kerf {
 namespace {
 
 /// Each product of three taps over 2^shift is that of the stored gradients.
-constexpr bool are_taps_of(const AlignedTaps& aligned, GradientKernel kernel) {
+constexpr bool are_taps_of(const ExactTaps& aligned, GradientKernel kernel) {
   const GradientTaps stored = taps(kernel);
   for (std::size_t i = 0; i < 125; ++i) {
     const std::size_t a = i % 5, b = i / 5 % 5, c = i / 25;
@@ -26,9 +26,9 @@ constexpr bool are_taps_of(const AlignedTaps& aligned, GradientKernel kernel) {
   }
   return true;
 }
-static_assert(are_taps_of(kAlignedFarid, GradientKernel::farid));
-static_assert(are_taps_of(kAlignedSobel5, GradientKernel::sobel5));
-static_assert(are_taps_of(kAlignedCentral, GradientKernel::central));
+static_assert(are_taps_of(kExactFarid, GradientKernel::farid));
+static_assert(are_taps_of(kExactSobel5, GradientKernel::sobel5));
+static_assert(are_taps_of(kExactCentral, GradientKernel::central));
 
 struct Extent {
   ToolOffset low{}, high{};
@@ -89,20 +89,20 @@ bool can_align(std::span<const ToolOffset> offsets) {
   return std::set<ToolOffset>(offsets.begin(), offsets.end()).size() == offsets.size();
 }
 
-const AlignedTaps& aligned_taps(GradientKernel kernel) {
+const ExactTaps& exact_taps(GradientKernel kernel) {
   switch (kernel) {
     case GradientKernel::sobel5:
-      return kAlignedSobel5;
+      return kExactSobel5;
     case GradientKernel::central:
-      return kAlignedCentral;
+      return kExactCentral;
     case GradientKernel::farid:
       break;
   }
-  return kAlignedFarid;
+  return kExactFarid;
 }
 
-AlignedTool::AlignedTool(std::span<const ToolOffset> offsets, const AlignedTaps& taps,
-                         const AlignedKernels& kernels) {
+AlignedTool::AlignedTool(std::span<const ToolOffset> offsets, const ExactTaps& taps,
+                         const KernelSet& kernels) {
   const Extent extent = extent_of(offsets);
   const auto length = [&](std::size_t axis) {
     return (extent.high[axis] - extent.low[axis]) / 2 + 1;
@@ -155,7 +155,7 @@ void AlignedTool::keep_mask(std::span<const VoxelIndex> voxels) {
 ///
 /// Fused, a density is loaded once for three axes; that pays while the joined list is little longer
 /// than the three (a cube's slopes lie on different faces).
-void AlignedTool::choose_chunks(std::span<const Table> tables, const AlignedKernels& kernels) {
+void AlignedTool::choose_chunks(std::span<const Table> tables, const KernelSet& kernels) {
   const auto lanes = static_cast<std::size_t>(kernels.lanes);
   std::size_t apart = 0;
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -209,37 +209,6 @@ std::size_t AlignedTool::bytes() const noexcept {
   for (const auto& list : chunks_) chunks += list.size();
   return chunks * sizeof(AlignedChunk) + vectors_.size() * sizeof(CacheLine) +
          mask_.size() * sizeof(mask_[0]);
-}
-
-void AlignedMemory::hold(VoxelIndex tool_size, bool mills) {
-  const AlignedScratchSize need = aligned_scratch_size(tool_size);
-  const auto grow = [](auto& memory, std::size_t size) {
-    if (memory.size() < size) memory.resize(size);
-  };
-  grow(box_, need.box);
-  grow(inside_, need.inside);
-  if (!mills) return;
-  grow(ratio_, need.ratio);
-  grow(filter_, need.filter);
-  grow(live_, need.live);
-}
-
-AlignedScratch AlignedMemory::view() noexcept {
-  return {box_.data(), ratio_.data(), filter_.data(), inside_.data(), live_.data()};
-}
-
-std::vector<ArrayBytes> AlignedMemory::arrays() const {
-  const auto named = [](const char* name, const auto& memory) {
-    return ArrayBytes{name, memory.size() * sizeof(memory[0]), true};
-  };
-  return {named("box", box_), named("box mask", inside_), named("overlap ratios", ratio_),
-          named("filtered rows", filter_), named("live rows", live_)};
-}
-
-std::size_t AlignedMemory::bytes() const {
-  std::size_t sum = 0;
-  for (const ArrayBytes& array : arrays()) sum += array.bytes;
-  return sum;
 }
 
 }  // namespace kerf

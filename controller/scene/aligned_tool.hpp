@@ -7,11 +7,10 @@
 #include <span>
 #include <vector>
 
-#include "controller/kernel/aligned_kernels.hpp"
 #include "controller/kernel/aligned_table.hpp"
 #include "controller/kernel/gradient.hpp"
+#include "controller/kernel/kernel_set.hpp"
 #include "controller/kernel/tool_offset.hpp"
-#include "controller/scene/scene_costs.hpp"
 
 namespace kerf {
 
@@ -20,14 +19,13 @@ namespace kerf {
 [[nodiscard]] bool can_align(std::span<const ToolOffset> offsets);
 
 /// The taps of a gradient kernel as exact sums take them.
-[[nodiscard]] const AlignedTaps& aligned_taps(GradientKernel kernel);
+[[nodiscard]] const ExactTaps& exact_taps(GradientKernel kernel);
 
 /// Owner of one tool's table for the plan `aligned`. Load time; moving it keeps the table valid.
 class AlignedTool {
  public:
   /// Requires `can_align(offsets)`.
-  AlignedTool(std::span<const ToolOffset> offsets, const AlignedTaps& taps,
-              const AlignedKernels& kernels);
+  AlignedTool(std::span<const ToolOffset> offsets, const ExactTaps& taps, const KernelSet& kernels);
 
   [[nodiscard]] const AlignedTable& table() const noexcept { return table_; }
   [[nodiscard]] std::size_t bytes() const noexcept;
@@ -40,28 +38,13 @@ class AlignedTool {
   };
 
   void keep_mask(std::span<const VoxelIndex> voxels);
-  void choose_chunks(std::span<const Table> tables, const AlignedKernels& kernels);
+  void choose_chunks(std::span<const Table> tables, const KernelSet& kernels);
   void keep_runs(std::span<const Table> tables);
 
   AlignedTable table_;
   std::array<std::vector<AlignedChunk>, 3> chunks_;
   std::vector<CacheLine> vectors_;
   std::vector<std::uint32_t> mask_;
-};
-
-/// Owner of the working memory that all tools share. Load time.
-class AlignedMemory {
- public:
-  /// Makes room for a tool; the arrays of milling exist only where some tool `mills`.
-  void hold(VoxelIndex tool_size, bool mills);
-  [[nodiscard]] AlignedScratch view() noexcept;
-  [[nodiscard]] std::vector<ArrayBytes> arrays() const;
-  [[nodiscard]] std::size_t bytes() const;
-
- private:
-  std::vector<std::int16_t> box_, ratio_, inside_;
-  std::vector<std::int32_t> filter_;
-  std::vector<std::uint8_t> live_;
 };
 
 }  // namespace kerf

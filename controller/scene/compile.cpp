@@ -23,11 +23,11 @@ namespace {
 template <class N>
 class SceneIn final : public CompiledScene {
  public:
-  SceneIn(const Scene& scene, const AlignedKernels& kernels) : memory_(scene) {
+  SceneIn(const Scene& scene, const KernelSet& kernels) : memory_(scene) {
     plan_device(scene.device, plan_);
     plan_limits(scene, plan_);
     plan_.kernel = scene.servo.kernel;
-    plan_.taps = &aligned_taps(scene.servo.kernel);
+    plan_.taps = &exact_taps(scene.servo.kernel);
     plan_.kernels = &kernels;
     plan_.cutting = scene.cut.model != CutModel::none;
     plan_.removal_rate = removal_rate<N>(scene.cut.rate_per_s / scene.servo.rate_hz,
@@ -114,7 +114,7 @@ class SceneIn final : public CompiledScene {
 
 }  // namespace
 
-std::unique_ptr<CompiledScene> plan_scene(const Scene& scene, const AlignedKernels& kernels) {
+std::unique_ptr<CompiledScene> plan_scene(const Scene& scene, const KernelSet& kernels) {
   switch (scene.servo.numeric) {
     case NumericKind::fixed:
       return std::make_unique<SceneIn<FixedNumbers>>(scene, kernels);
@@ -126,7 +126,7 @@ std::unique_ptr<CompiledScene> plan_scene(const Scene& scene, const AlignedKerne
   return std::make_unique<SceneIn<DoubleNumbers>>(scene, kernels);
 }
 
-std::unique_ptr<CompiledScene> compile(Scene& scene, const AlignedKernels& kernels) {
+std::unique_ptr<CompiledScene> compile(Scene& scene, const KernelSet& kernels) {
   auto compiled = plan_scene(scene, kernels);
   compiled->take(scene);
   return compiled;

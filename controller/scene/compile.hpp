@@ -4,7 +4,7 @@
 #include <memory>
 #include <vector>
 
-#include "controller/kernel/aligned_kernels.hpp"
+#include "controller/kernel/kernel_set.hpp"
 #include "controller/scene/scene.hpp"
 #include "controller/scene/scene_costs.hpp"
 #include "controller/servo/servo.hpp"
@@ -34,11 +34,11 @@ class CompiledScene : public Servo {
 /// number formats.
 ///
 /// `kernels` run the loop: the fastest of this machine unless a test asks for others.
-[[nodiscard]] std::unique_ptr<CompiledScene> plan_scene(
-    const Scene& scene, const AlignedKernels& kernels = **aligned_kernels());
+[[nodiscard]] std::unique_ptr<CompiledScene> plan_scene(const Scene& scene,
+                                                        const KernelSet& kernels = **kernel_sets());
 
 /// `plan_scene` and `take` in one.
-[[nodiscard]] std::unique_ptr<CompiledScene> compile(
-    Scene& scene, const AlignedKernels& kernels = **aligned_kernels());
+[[nodiscard]] std::unique_ptr<CompiledScene> compile(Scene& scene,
+                                                     const KernelSet& kernels = **kernel_sets());
 
 }  // namespace kerf

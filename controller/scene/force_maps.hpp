@@ -30,7 +30,7 @@ struct SumUnit {
           std::ldexp(std::max(samples, 1.0), 15 + kAlignedKeptBits)};
 }
 /// Sums of exact gradients times weights of 2^15, as far as `sum_shift` keeps them.
-[[nodiscard]] inline SumUnit exact_sum_unit(const AlignedTaps& taps, std::size_t samples) {
+[[nodiscard]] inline SumUnit exact_sum_unit(const ExactTaps& taps, std::size_t samples) {
   const int bits = 15 - sum_shift(samples);
   return {std::ldexp(taps.factor, -taps.shift - bits),
           std::ldexp(static_cast<double>(samples) * static_cast<double>(kMaxExactGradient), bits)};

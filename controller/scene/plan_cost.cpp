@@ -57,7 +57,7 @@ double largest_mean_span(std::span<const ToolOffset> offsets) {
 
 }  // namespace
 
-PlanCost aligned_cost(const AlignedTable& table, const AlignedKernels& kernels, bool cuts) {
+PlanCost aligned_cost(const AlignedTable& table, const KernelSet& kernels, bool cuts) {
   PlanCost cost{std::string("aligned/") + kernels.name, {}};
   cost.stages = {{"copy", count(table.box.x) * count(table.box.y) * count(table.box.z)},
                  {"contact", correlation_operations(table)}};
@@ -65,8 +65,7 @@ PlanCost aligned_cost(const AlignedTable& table, const AlignedKernels& kernels, 
   return cost;
 }
 
-PlanCost splat_cost(const AlignedKernels& kernels, const SceneTool& tool,
-                    const SceneVolume& volume) {
+PlanCost splat_cost(const KernelSet& kernels, const SceneTool& tool, const SceneVolume& volume) {
   const std::uint64_t samples = tool.offsets.size();
   const std::uint64_t box = covered_voxels(tool, volume, kCellMargin + 2 * kGradientReach);
   return {std::string("splat/") + kernels.name,
@@ -77,7 +76,7 @@ PlanCost splat_cost(const AlignedKernels& kernels, const SceneTool& tool,
            {"cut", covered_voxels(tool, volume, kCellMargin)}}};
 }
 
-PlanCost gather_cost(NumericKind numeric, const AlignedKernels& kernels, const SceneTool& tool,
+PlanCost gather_cost(NumericKind numeric, const KernelSet& kernels, const SceneTool& tool,
                      const SceneVolume& volume, bool cuts) {
   constexpr std::uint64_t kSpread = 2 * kPlace + 2 * kCorners;
   const std::uint64_t samples = tool.offsets.size();

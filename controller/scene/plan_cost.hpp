@@ -3,8 +3,8 @@
 
 #include <cstdint>
 
-#include "controller/kernel/aligned_kernels.hpp"
 #include "controller/kernel/aligned_table.hpp"
+#include "controller/kernel/kernel_set.hpp"
 #include "controller/scene/scene.hpp"
 #include "controller/scene/scene_costs.hpp"
 
@@ -19,8 +19,7 @@ inline constexpr int kCountsRevision = 2;
 /// contact  multiply-adds of the correlation: table entries x 2 halves x 8 corners, chunk by chunk
 /// mill     multiply-adds of masks, filters and products, and removals; rows as whole vectors of 32
 /// Reached in every tick in which the box meets the volume; `mill` where no row of it is air.
-[[nodiscard]] PlanCost aligned_cost(const AlignedTable& table, const AlignedKernels& kernels,
-                                    bool cuts);
+[[nodiscard]] PlanCost aligned_cost(const AlignedTable& table, const KernelSet& kernels, bool cuts);
 
 /// place  multiply-adds of the samples' places, 9 a sample
 /// copy   voxels of the box around the tool
@@ -28,7 +27,7 @@ inline constexpr int kCountsRevision = 2;
 /// press  voxels of that box, each filtered along three axes
 /// cut    voxels that the tool covers
 /// The boxes are bounded for every orientation that the tool can take.
-[[nodiscard]] PlanCost splat_cost(const AlignedKernels& kernels, const SceneTool& tool,
+[[nodiscard]] PlanCost splat_cost(const KernelSet& kernels, const SceneTool& tool,
                                   const SceneVolume& volume);
 
 /// contact       corners of the samples' cells: 8 a sample
@@ -38,7 +37,7 @@ inline constexpr int kCountsRevision = 2;
 /// removal       voxels of that box
 /// refresh       voxels of the box grown by the gradient's reach
 /// The box is bounded likewise. Fixed point gathers only where nothing is cut.
-[[nodiscard]] PlanCost gather_cost(NumericKind numeric, const AlignedKernels& kernels,
+[[nodiscard]] PlanCost gather_cost(NumericKind numeric, const KernelSet& kernels,
                                    const SceneTool& tool, const SceneVolume& volume, bool cuts);
 
 /// Voxels of the largest box that the cells of the tool's samples can span, grown by `margin`

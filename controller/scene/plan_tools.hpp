@@ -44,7 +44,7 @@ template <class N>
     }
     return m;
   };
-  const SumUnit exact = exact_sum_unit(aligned_taps(scene.servo.kernel), samples);
+  const SumUnit exact = exact_sum_unit(exact_taps(scene.servo.kernel), samples);
   SumUnit contact = gathered_sum(terms);
   // Each voxel counts at most once, and the tool touches at most eight voxels per sample.
   SumUnit modification = gathered_sum(8 * terms);

@@ -7,9 +7,8 @@
 #include <span>
 #include <vector>
 
-#include "controller/kernel/splat_table.hpp"
+#include "controller/kernel/sample_table.hpp"
 #include "controller/kernel/tool_offset.hpp"
-#include "controller/scene/aligned_tool.hpp"
 
 namespace kerf {
 
@@ -31,27 +30,6 @@ class SampleTool {
  private:
   std::array<std::vector<std::int32_t>, 3> offset_;
   std::int32_t count_;
-};
-
-/// Owner of the working memory of the plan `splat`, which all tools share. Load time.
-class SplatMemory {
- public:
-  /// Makes room for a tool that cuts and whose samples touch at most `width_vox` voxels along each
-  /// axis, in any orientation (`overlap_width`).
-  void hold(const std::array<std::size_t, 3>& width_vox, std::size_t samples);
-  /// The part that the plan `aligned` uses.
-  [[nodiscard]] AlignedMemory& tick() noexcept { return tick_; }
-  [[nodiscard]] SplatScratch view() noexcept;
-  /// All arrays by name.
-  [[nodiscard]] std::vector<ArrayBytes> arrays() const;
-  [[nodiscard]] std::size_t bytes() const;
-
- private:
-  AlignedMemory tick_;
-  std::array<std::vector<std::int32_t>, 3> place_;
-  std::vector<std::int32_t> sums_;
-  std::array<std::vector<std::int16_t>, 2> rest_;
-  std::vector<std::uint8_t> rest_live_;
 };
 
 }  // namespace kerf

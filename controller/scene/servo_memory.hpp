@@ -16,6 +16,7 @@
 #include "controller/scene/sample_tool.hpp"
 #include "controller/scene/scene.hpp"
 #include "controller/scene/scene_costs.hpp"
+#include "controller/scene/tick_memory.hpp"
 #include "controller/servo/servo_plan.hpp"
 #include "controller/servo/servo_state.hpp"
 
@@ -56,9 +57,9 @@ class ServoMemory {
 
   /// A table of the plan `aligned`; it stays where it is.
   const AlignedTable& hold_table(const SceneTool& tool, const LatticeTurn& turn,
-                                 GradientKernel kernel, const AlignedKernels& kernels) {
+                                 GradientKernel kernel, const KernelSet& kernels) {
     tables_.emplace_back(tool.name, std::make_unique<AlignedTool>(turned(tool.offsets, turn),
-                                                                  aligned_taps(kernel), kernels));
+                                                                  exact_taps(kernel), kernels));
     return tables_.back().second->table();
   }
 

@@ -6,8 +6,8 @@
 #include <cstdint>
 #include <span>
 
-#include "controller/kernel/aligned_kernels.hpp"
 #include "controller/kernel/gradient.hpp"
+#include "controller/kernel/kernel_set.hpp"
 #include "controller/kernel/milling.hpp"
 #include "controller/kernel/tool_offset.hpp"
 #include "controller/servo/force_limits.hpp"
@@ -87,8 +87,8 @@ struct ServoPlan {
   std::array<ToolPlan<N>, kMaxTools> tools{};
 
   GradientKernel kernel = GradientKernel::farid;
-  const AlignedTaps* taps = nullptr;        ///< of the kernel, for the plan `splat`
-  const AlignedKernels* kernels = nullptr;  ///< what this machine runs
+  const ExactTaps* taps = nullptr;     ///< of the kernel, for the plan `splat`
+  const KernelSet* kernels = nullptr;  ///< what this machine runs
   bool cutting = false;
   RemovalRate<N> removal_rate;
 

@@ -14,6 +14,7 @@
 #include "controller/kernel/splat.hpp"
 #include "controller/scene/aligned_tool.hpp"
 #include "controller/scene/sample_tool.hpp"
+#include "controller/scene/tick_memory.hpp"
 #include "hil/lab/bench_scene.hpp"
 #include "hil/lab/paper_baseline.hpp"
 #include "hil/lab/tick_timer.hpp"
@@ -66,14 +67,14 @@ class Bench {
       use(contact_sum<Numbers>(kGrid, field, ticks.tool, pose_of(ticks.place(i), turn(i))).x);
     });
     const SampleTool samples(ticks.tool, SampleOrder::as_given);
-    for (auto set = aligned_kernels(); !ticks.can_align && *set != nullptr; ++set) {
+    for (auto set = kernel_sets(); !ticks.can_align && *set != nullptr; ++set) {
       row("fixed", (*set)->name, field.size_bytes() + samples.bytes(), [&](int i) {
         const auto pose = pose_of(ticks.place(i), turn(i));
         use(gathered_contact(**set, samples.table(), kGrid, field, pose).x);
       });
     }
-    each_set(false, [&](const AlignedKernels& set, const AlignedTable& table,
-                        const AlignedScratch& scratch, std::size_t bytes) {
+    each_set(false, [&](const KernelSet& set, const AlignedTable& table, const BoxScratch& scratch,
+                        std::size_t bytes) {
       row("fixed", set.name, bytes, [&](int i) {
         const auto pose = pose_of(ticks.place(i), kUnturned);
         use(AlignedTick(set, table, scratch, kGrid, volume, pose).contact().x);
@@ -118,19 +119,19 @@ class Bench {
     const SampleTool samples(ticks.tool, SampleOrder::scattered);
     SplatMemory memory;
     memory.hold({kWidest, kWidest, kWidest}, ticks.tool.size());
-    for (auto set = aligned_kernels(); !ticks.can_align && *set != nullptr; ++set) {
+    for (auto set = kernel_sets(); !ticks.can_align && *set != nullptr; ++set) {
       std::vector<Density> volume = density;
       std::vector<std::uint16_t> carry(kWidest + 32);
       const SplatScratch scratch = memory.view();
       row("fixed", (*set)->name, samples.bytes() + memory.bytes(), [&](int i) {
         const auto pose = pose_of(ticks.place(i), turn(i));
-        const SplatOutcome out = splat_tick(**set, samples.table(), kAlignedFarid, scratch, kGrid,
+        const SplatOutcome out = splat_tick(**set, samples.table(), kExactFarid, scratch, kGrid,
                                             volume, pose, Numbers::kStepOne, rate, carry);
         use(out.felt.contact.x + out.felt.modification.x);
       });
     }
-    each_set(true, [&](const AlignedKernels& set, const AlignedTable& table,
-                       const AlignedScratch& scratch, std::size_t bytes) {
+    each_set(true, [&](const KernelSet& set, const AlignedTable& table, const BoxScratch& scratch,
+                       std::size_t bytes) {
       std::vector<Density> volume = density;
       std::vector<std::uint16_t> carry(static_cast<std::size_t>(table.row_lanes));
       row("fixed", set.name, bytes, [&](int i) {
@@ -158,9 +159,9 @@ class Bench {
   template <class Run>
   void each_set(bool mills, Run&& run) {
     if (!ticks_->can_align) return;
-    for (auto set = aligned_kernels(); *set != nullptr; ++set) {
-      const AlignedTool tool(ticks_->tool, kAlignedFarid, **set);
-      AlignedMemory memory;
+    for (auto set = kernel_sets(); *set != nullptr; ++set) {
+      const AlignedTool tool(ticks_->tool, kExactFarid, **set);
+      BoxMemory memory;
       memory.hold(tool.table().size, mills);
       run(**set, tool.table(), memory.view(), tool.bytes() + memory.bytes());
     }

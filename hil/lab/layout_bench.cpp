@@ -9,6 +9,7 @@
 
 #include "controller/kernel/aligned.hpp"
 #include "controller/scene/aligned_tool.hpp"
+#include "controller/scene/tick_memory.hpp"
 #include "hil/lab/bench_scene.hpp"
 #include "hil/lab/tick_timer.hpp"
 
@@ -67,9 +68,7 @@ class Bricks {
 class LayoutBench {
  public:
   explicit LayoutBench(const std::function<void(const KernelRow&)>& told)
-      : told_(told),
-        set_(**aligned_kernels()),
-        tool_(tool_of(kSize, Shape::ball), kAlignedFarid, set_) {
+      : told_(told), set_(**kernel_sets()), tool_(tool_of(kSize, Shape::ball), kExactFarid, set_) {
     memory_.hold(tool_.table().size, true);
     bricks_.resize(memory_.bytes());
   }
@@ -79,7 +78,7 @@ class LayoutBench {
     const auto density = ball_in(grid);
     const Bricks bricks(grid, density);
     const AlignedTable& table = tool_.table();
-    const AlignedScratch scratch = memory_.view();
+    const BoxScratch scratch = memory_.view();
     for (const bool cold : {false, true}) {
       const int count = cold ? 200 : 4000;
       const auto origin = [&](int i) -> VoxelIndex {
@@ -107,7 +106,7 @@ class LayoutBench {
       auto density = ball_in(grid);
       const std::string size =
           std::to_string(grid.nx) + "x" + std::to_string(grid.ny) + "x" + std::to_string(grid.nz);
-      const AlignedScratch scratch = memory_.view();
+      const BoxScratch scratch = memory_.view();
       const auto tick = [&](int i) {
         return AlignedTick(set_, tool_.table(), scratch, grid, density,
                            pose_of(around(grid, kSize, i, kCount), kUnturned));
@@ -146,9 +145,9 @@ class LayoutBench {
   }
 
   const std::function<void(const KernelRow&)>& told_;
-  const AlignedKernels& set_;
+  const KernelSet& set_;
   AlignedTool tool_;
-  AlignedMemory memory_;
+  BoxMemory memory_;
   std::vector<std::int16_t> bricks_;  ///< where bricks are copied to
   double baseline_ns_ = 0;
   std::vector<KernelRow> rows_;

@@ -116,7 +116,7 @@ void add(Hash& hash, const ServoOutput& out) {
 
 }  // namespace
 
-GoldenRun golden_run(NumericKind numeric, const AlignedKernels& kernels) {
+GoldenRun golden_run(NumericKind numeric, const KernelSet& kernels) {
   Scene scene = golden_scene(numeric);
   const auto tools = static_cast<std::uint32_t>(scene.tools.size());
   const std::size_t volumes = scene.volumes.size();

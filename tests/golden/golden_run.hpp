@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <string>
 
-#include "controller/kernel/aligned_kernels.hpp"
+#include "controller/kernel/kernel_set.hpp"
 #include "controller/scene/scene.hpp"
 
 namespace kerf::test {
@@ -26,6 +26,6 @@ struct GoldenRun {
 ///
 /// Volumes, tools, joint counts and commands come from integers, so that only the loop and its
 /// compiler decide about a bit of the result.
-[[nodiscard]] GoldenRun golden_run(NumericKind numeric, const AlignedKernels& kernels);
+[[nodiscard]] GoldenRun golden_run(NumericKind numeric, const KernelSet& kernels);
 
 }  // namespace kerf::test

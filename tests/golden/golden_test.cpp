@@ -14,7 +14,7 @@ using namespace kerf::test;
 
 namespace {
 
-GoldenRun printed_run(const char* name, NumericKind numeric, const AlignedKernels& kernels) {
+GoldenRun printed_run(const char* name, NumericKind numeric, const KernelSet& kernels) {
   const auto begin = std::chrono::steady_clock::now();
   const GoldenRun run = golden_run(numeric, kernels);
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - begin;
@@ -39,7 +39,7 @@ void check_rich(const GoldenRun& run) {
 }  // namespace
 
 TEST_CASE("20 s in fixed point end in the known bits on every instruction set") {
-  for (auto set = aligned_kernels(); *set != nullptr; ++set) {
+  for (auto set = kernel_sets(); *set != nullptr; ++set) {
     const GoldenRun run = printed_run("fixed", NumericKind::fixed, **set);
     CAPTURE(std::string((*set)->name));
     CHECK(run.hash == "13238c95e637973c");
@@ -49,7 +49,7 @@ TEST_CASE("20 s in fixed point end in the known bits on every instruction set") 
 }
 
 TEST_CASE("20 s in float and double end in the known bits") {
-  const AlignedKernels& unused = **aligned_kernels();
+  const KernelSet& unused = **kernel_sets();
   const GoldenRun in_float = printed_run("float", NumericKind::float32, unused);
   CHECK(in_float.hash == "a885d50797a1eac8");
   CHECK(in_float.volume_hash == "0f56cf84df38d579");

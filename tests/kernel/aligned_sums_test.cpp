@@ -27,8 +27,7 @@ std::vector<std::int32_t> low_halves(std::span<const ToolOffset> offsets, std::s
       std::int32_t tap = 1;
       std::array<std::int32_t, 3> at{};
       for (std::size_t axis = 0; axis < 3; ++axis) {
-        tap *=
-            axis == slope_axis ? kAlignedFarid.slope[step[axis]] : kAlignedFarid.smooth[step[axis]];
+        tap *= axis == slope_axis ? kExactFarid.slope[step[axis]] : kExactFarid.smooth[step[axis]];
         at[axis] = (offset[axis] - table.low[axis]) / 2 + static_cast<std::int32_t>(step[axis]);
       }
       sum[box.index(at[0], at[1], at[2])] += tap;
@@ -46,11 +45,11 @@ TEST_CASE("large tools feel the same on every instruction set") {
     std::vector<AlignedRig> rigs = rigs_for(tool);
     for (const int fill : {3, 4}) {
       const TestVolume volume = hard_volume({size + 12, size + 6, size + 5}, fill, 3);
-      const ExactField field(kAlignedFarid, volume);
+      const ExactField field(kExactFarid, volume);
       std::mt19937 random(1);
       for (int i = 0; i < (size == 32 ? 20 : 4); ++i) {
         const auto pose = random_pose(volume.grid, rigs.front().table().size, random);
-        const auto truth = aligned_contact_sum(kAlignedFarid, field, tool, pose);
+        const auto truth = aligned_contact_sum(kExactFarid, field, tool, pose);
         for (AlignedRig& rig : rigs) {
           const auto out = rig.run(volume, pose, {}, {});
           CHECK(out.contact == truth);
@@ -74,9 +73,9 @@ TEST_CASE("sums are widened before the worst volume overflows them, and without 
       for (std::size_t i = 0; i < low.size(); ++i) {
         volume.density[i] = (low[i] > 0) == positive ? 65535 : 0;
       }
-      const ExactField field(kAlignedFarid, volume);
+      const ExactField field(kExactFarid, volume);
       const auto pose = pose_at<FixedNumbers>({9.5, 9.5, 9.5});
-      const auto truth = aligned_contact_sum(kAlignedFarid, field, cube, pose);
+      const auto truth = aligned_contact_sum(kExactFarid, field, cube, pose);
       for (AlignedRig& rig : rigs) {
         CHECK(rig.run(volume, pose, {}, {}).contact == truth);
         AlignedTable endless = rig.table();
@@ -89,7 +88,7 @@ TEST_CASE("sums are widened before the worst volume overflows them, and without 
 }
 
 TEST_CASE("a table is widened as seldom as its largest half allows, every 127 chunks at worst") {
-  for (const AlignedTaps& taps : {kAlignedFarid, kAlignedSobel5}) {
+  for (const ExactTaps& taps : {kExactFarid, kExactSobel5}) {
     for (const auto& tool : {box_tool(1, 1, 1), paper_ball(10), paper_ball(16), paper_ball(32),
                              box_tool(16, 16, 16), ragged_tool(28, 7, 33, 6)}) {
       for (const AlignedRig& rig : rigs_for(tool, taps)) {
@@ -115,8 +114,8 @@ TEST_CASE("a table is widened as seldom as its largest half allows, every 127 ch
 
 // A table that no tool has: every half as large as it can be, against air, chunk after chunk.
 TEST_CASE("lanes hold 127 chunks of the widest products and not one more, on every list length") {
-  for (auto set = aligned_kernels(); *set != nullptr; ++set) {
-    const AlignedKernels& kernels = **set;
+  for (auto set = kernel_sets(); *set != nullptr; ++set) {
+    const KernelSet& kernels = **set;
     const auto lanes = static_cast<std::size_t>(kernels.lanes);
     for (const bool fused : {false, true}) {
       if (fused && !kernels.can_fuse) continue;
@@ -152,7 +151,7 @@ TEST_CASE("lanes hold 127 chunks of the widest products and not one more, on eve
         CAPTURE(count);
         CHECK(all_are(exact));
         table.flush = 128;  // 2^24 * 128 is one too many; the plain loops widen every chunk
-        CHECK(all_are(exact) == (count < 128 || &kernels == &kAlignedScalar));
+        CHECK(all_are(exact) == (count < 128 || &kernels == &kScalarSet));
       }
     }
   }

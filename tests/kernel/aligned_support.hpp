@@ -11,6 +11,7 @@
 
 #include "controller/kernel/aligned.hpp"
 #include "controller/scene/aligned_tool.hpp"
+#include "controller/scene/tick_memory.hpp"
 #include "tests/kernel/exact_field.hpp"
 
 /// Volumes, tools and the two ways to compute one tick of the plan `aligned`.
@@ -137,7 +138,7 @@ struct AlignedOutcome {
 };
 
 /// By the definitions.
-inline AlignedOutcome outcome_by_definition(const AlignedTaps& taps, const TestVolume& volume,
+inline AlignedOutcome outcome_by_definition(const ExactTaps& taps, const TestVolume& volume,
                                             const ExactField& field,
                                             std::span<const ToolOffset> tool,
                                             const ToolPose<FixedNumbers>& pose,
@@ -148,7 +149,7 @@ inline AlignedOutcome outcome_by_definition(const AlignedTaps& taps, const TestV
   out.contact = aligned_contact_sum(taps, field, tool, pose);
   overlap<FixedNumbers>(volume.grid, tool, pose, FixedNumbers::kStepOne, scratch);
   out.modification =
-      aligned_modification_sum(field, volume.grid, volume.density, scratch, tool.size());
+      exact_modification_sum(field, volume.grid, volume.density, scratch, tool.size());
   out.removed = remove<FixedNumbers>(volume.grid, out.density, scratch, rate, out.carry);
   return out;
 }
@@ -156,20 +157,19 @@ inline AlignedOutcome outcome_by_definition(const AlignedTaps& taps, const TestV
 /// One tool with the memory to run it on one instruction set.
 class AlignedRig {
  public:
-  AlignedRig(std::span<const ToolOffset> offsets, const AlignedTaps& taps,
-             const AlignedKernels& kernels)
+  AlignedRig(std::span<const ToolOffset> offsets, const ExactTaps& taps, const KernelSet& kernels)
       : kernels_(&kernels), tool_(offsets, taps, kernels) {
     memory_.hold(tool_.table().size, true);
   }
   [[nodiscard]] const AlignedTable& table() const { return tool_.table(); }
-  [[nodiscard]] const AlignedKernels& kernels() const { return *kernels_; }
+  [[nodiscard]] const KernelSet& kernels() const { return *kernels_; }
 
   /// The same tick with a table that may differ from the rig's.
   AlignedOutcome run(const TestVolume& volume, const ToolPose<FixedNumbers>& pose,
                      const RemovalRate<FixedNumbers>& rate, const std::vector<std::uint16_t>& carry,
                      const AlignedTable& table) {
     AlignedOutcome out{{}, {}, {}, volume.density, carry};
-    const AlignedScratch scratch = memory_.view();
+    const BoxScratch scratch = memory_.view();
     const AlignedTick tick(*kernels_, table, scratch, volume.grid, out.density, pose);
     out.contact = tick.contact();
     const AlignedTick::Milled milled = tick.mill(rate, out.carry);
@@ -184,17 +184,16 @@ class AlignedRig {
   }
 
  private:
-  const AlignedKernels* kernels_;
+  const KernelSet* kernels_;
   AlignedTool tool_;
-  AlignedMemory memory_;
+  BoxMemory memory_;
 };
 
 /// A rig for each instruction set of this machine.
 inline std::vector<AlignedRig> rigs_for(std::span<const ToolOffset> offsets,
-                                        const AlignedTaps& taps = kAlignedFarid) {
+                                        const ExactTaps& taps = kExactFarid) {
   std::vector<AlignedRig> rigs;
-  for (auto set = aligned_kernels(); *set != nullptr; ++set)
-    rigs.emplace_back(offsets, taps, **set);
+  for (auto set = kernel_sets(); *set != nullptr; ++set) rigs.emplace_back(offsets, taps, **set);
   return rigs;
 }
 

@@ -113,8 +113,7 @@ TEST_CASE("every instruction set gives the bits of the definition, wherever the 
   for (const Named& tool : tools) {
     CAPTURE(std::string(tool.name));
     std::mt19937 random(7);
-    std::array rigs_of{rigs_for(tool.offsets, kAlignedFarid),
-                       rigs_for(tool.offsets, kAlignedSobel5)};
+    std::array rigs_of{rigs_for(tool.offsets, kExactFarid), rigs_for(tool.offsets, kExactSobel5)};
     const AlignedTable& table = rigs_of[0].front().table();
     const VoxelIndex size = table.size;
     Cutter<FixedNumbers> cutter(static_cast<std::size_t>(std::max({size.x, size.y, size.z})) + 1);
@@ -125,7 +124,7 @@ TEST_CASE("every instruction set gives the bits of the definition, wherever the 
         const TestVolume volume = hard_volume(grid, fill, static_cast<std::uint32_t>(fill));
         // The second gradient kernel on every third volume.
         std::vector<AlignedRig>& rigs = rigs_of[(fill + grid.ny) % 3 == 0 ? 1 : 0];
-        const AlignedTaps& taps = rigs.front().table().taps;
+        const ExactTaps& taps = rigs.front().table().taps;
         const ExactField field(taps, volume);
         for (int i = 0; i < cases(tool.cases); ++i, ++count) {
           const auto pose = random_pose(grid, size, random);
@@ -168,13 +167,13 @@ TEST_CASE("contact by the table equals the definition without any cache") {
   const TestVolume volume = random_volume({20, 17, 15}, 9);
   const auto tool = paper_ball(6);
   const auto exact = [&](VoxelIndex v) {
-    return gradient_exact(kAlignedFarid, volume.grid, volume.density, v);
+    return gradient_exact(kExactFarid, volume.grid, volume.density, v);
   };
   for (AlignedRig& rig : rigs_for(tool)) {
     for (const auto& at : {std::array{10.3, 8.7, 7.2}, {1.6, 8.1, 7.9}, {18.2, 15.9, 13.1}}) {
       const auto pose = pose_at<FixedNumbers>(at);
       CHECK(rig.run(volume, pose, {}, {}).contact ==
-            aligned_contact_sum(kAlignedFarid, exact, tool, pose));
+            aligned_contact_sum(kExactFarid, exact, tool, pose));
     }
   }
 }

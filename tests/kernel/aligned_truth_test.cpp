@@ -34,7 +34,7 @@ std::array<double, 3> place(int i) {
 TEST_CASE("the exact gradient rounds to the stored one") {
   const TestVolume volume = random_volume({9, 8, 7}, 4);
   for (const auto kernel : {GradientKernel::farid, GradientKernel::sobel5}) {
-    const AlignedTaps& taps = kernel == GradientKernel::farid ? kAlignedFarid : kAlignedSobel5;
+    const ExactTaps& taps = kernel == GradientKernel::farid ? kExactFarid : kExactSobel5;
     for (std::int32_t z = 0; z < 7; ++z) {
       for (std::int32_t y = 0; y < 8; ++y) {
         for (std::int32_t x = 0; x < 9; ++x) {
@@ -55,7 +55,7 @@ TEST_CASE("contact and modification sums are double's within 1.7e-4 of full scal
   const auto tool = paper_ball(10);
   const auto field = gradients<DoubleNumbers>(GradientKernel::farid, volume);
   const auto exact = [&](VoxelIndex v) {
-    return gradient_exact(kAlignedFarid, volume.grid, volume.density, v);
+    return gradient_exact(kExactFarid, volume.grid, volume.density, v);
   };
   const double full_scale = kDensityMax * std::numbers::pi * 25;  // a flat face at the equator
   Cutter<FixedNumbers> fixed(16);
@@ -65,7 +65,7 @@ TEST_CASE("contact and modification sums are double's within 1.7e-4 of full scal
     const auto pose = pose_at<FixedNumbers>(place(i));
     const auto truth_pose = pose_at<DoubleNumbers>(
         {double(pose.centre_vox.x), double(pose.centre_vox.y), double(pose.centre_vox.z)});
-    const auto contact = aligned_contact_sum(kAlignedFarid, exact, tool, pose);
+    const auto contact = aligned_contact_sum(kExactFarid, exact, tool, pose);
     const auto truth = contact_sum<DoubleNumbers>(volume.grid, field, tool, truth_pose);
     largest = std::max(largest, std::abs(truth.x));
     for (const double error : {double(contact.x) / 256 - truth.x, double(contact.y) / 256 - truth.y,
@@ -75,7 +75,7 @@ TEST_CASE("contact and modification sums are double's within 1.7e-4 of full scal
     overlap<FixedNumbers>(volume.grid, tool, pose, FixedNumbers::kStepOne, fixed.overlap);
     overlap<DoubleNumbers>(volume.grid, tool, truth_pose, 1.0, wide.overlap);
     const auto cut =
-        aligned_modification_sum(exact, volume.grid, volume.density, fixed.overlap, tool.size());
+        exact_modification_sum(exact, volume.grid, volume.density, fixed.overlap, tool.size());
     const auto cut_truth =
         modification_sum<DoubleNumbers>(volume.grid, field, volume.density, wide.overlap);
     const double unit = kGradientUnit / FixedNumbers::kWeightOne;
@@ -93,15 +93,15 @@ TEST_CASE("contact and modification sums are double's within 1.7e-4 of full scal
 // N7
 TEST_CASE("the order of the samples does not change a sum of the plan aligned") {
   const TestVolume volume = random_volume({24, 22, 20}, 12);
-  const ExactField field(kAlignedFarid, volume);
+  const ExactField field(kExactFarid, volume);
   auto tool = paper_ball(8);
   const auto pose = pose_at<FixedNumbers>({11.37, 10.21, 9.83});
-  const auto first = aligned_contact_sum(kAlignedFarid, field, tool, pose);
+  const auto first = aligned_contact_sum(kExactFarid, field, tool, pose);
   std::mt19937 random(7);
   bool same = true;
   for (int n = 0; n < 1000; ++n) {
     std::shuffle(tool.begin(), tool.end(), random);
-    same = same && aligned_contact_sum(kAlignedFarid, field, tool, pose) == first;
+    same = same && aligned_contact_sum(kExactFarid, field, tool, pose) == first;
   }
   CHECK(same);
 }

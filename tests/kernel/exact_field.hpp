@@ -12,7 +12,7 @@ namespace kerf::test {
 /// `gradient_exact` of every voxel, and of those outside that the volume reaches.
 class ExactField {
  public:
-  ExactField(const AlignedTaps& taps, const TestVolume& volume)
+  ExactField(const ExactTaps& taps, const TestVolume& volume)
       : grid_{volume.grid.nx + 4, volume.grid.ny + 4, volume.grid.nz + 4} {
     values_.reserve(grid_.voxel_count());
     for (std::int32_t z = -2; z < volume.grid.nz + 2; ++z) {

@@ -46,7 +46,7 @@ int felt_alike(const VoxelGrid& grid, const Field& field, std::span<const ToolOf
                const SampleTable& samples, const ToolPose<FixedNumbers>& pose) {
   const std::span<const Gradient<FixedNumbers>> voxels(field.data(), grid.voxel_count());
   const auto truth = contact_sum<FixedNumbers>(grid, voxels, tool, pose);
-  for (auto set = aligned_kernels(); *set != nullptr; ++set) {
+  for (auto set = kernel_sets(); *set != nullptr; ++set) {
     const bool same = gathered_contact(**set, samples, grid, voxels, pose) == truth;
     if (!same) {
       INFO(std::string((*set)->name), ", ", tool.size(), " samples");

@@ -63,7 +63,7 @@ TEST_CASE("the steepest volume's exact gradient is the bound that the sums are s
     const TestVolume volume = made_of({5, 5, 5}, [&](std::int32_t x, auto, auto) {
       return static_cast<Density>((x > 2) == rising && x != 2 ? 65535 : 0);
     });
-    const auto g = gradient_exact(kAlignedFarid, volume.grid, volume.density, {2, 2, 2});
+    const auto g = gradient_exact(kExactFarid, volume.grid, volume.density, {2, 2, 2});
     CHECK(g.x == (rising ? 1 : -1) * kMaxExactGradient);
     steepest = std::max(steepest, g.x);
   }
@@ -80,11 +80,11 @@ TEST_CASE("a contact of the largest tool on the steepest gradient is exact in th
   const auto steepest = [](VoxelIndex) {
     return SumVec<FixedNumbers>{kMaxExactGradient, -kMaxExactGradient, 0};
   };
-  const auto sum = aligned_contact_sum(kAlignedFarid, steepest, cube,
+  const auto sum = aligned_contact_sum(kExactFarid, steepest, cube,
                                        pose_at<FixedNumbers>({40.37, 40.81, 40.11}));
   const std::int64_t total = 64LL * 64 * 64 * kMaxExactGradient;
-  CHECK(sum.x == kept_bits(kAlignedFarid, total));
-  CHECK(sum.y == kept_bits(kAlignedFarid, -total));
+  CHECK(sum.x == kept_bits(kExactFarid, total));
+  CHECK(sum.y == kept_bits(kExactFarid, -total));
   CHECK(sum.z == 0);
   // Corners at opposite ends: the widest way that a lerp can go.
   const std::array<std::int64_t, 8> corner{sum.x, sum.y, sum.y, sum.x, sum.y, sum.x, sum.x, sum.y};
@@ -105,7 +105,7 @@ TEST_CASE("a modification force of the largest cutting tool is exact in the plan
     return SumVec<FixedNumbers>{kMaxExactGradient, -kMaxExactGradient, 1};
   };
   const auto sum =
-      aligned_modification_sum(steepest, grid, volume.density, full.overlap, kNarrowSumSamples);
+      exact_modification_sum(steepest, grid, volume.density, full.overlap, kNarrowSumSamples);
   const auto bound = static_cast<std::int64_t>(kNarrowSumSamples) * 32768 * kMaxExactGradient;
   CHECK(sum.x == bound);
   CHECK(sum.y == -bound);
@@ -120,7 +120,7 @@ TEST_CASE("a modification force of a larger tool is exact over 2^16, beyond 63 b
     return SumVec<FixedNumbers>{kMaxExactGradient, -kMaxExactGradient, v.x == 0 ? 1 : 0};
   };
   const auto sum =
-      aligned_modification_sum(steepest, grid, volume.density, full.overlap, grid.voxel_count());
+      exact_modification_sum(steepest, grid, volume.density, full.overlap, grid.voxel_count());
   CHECK(sum.x == std::int64_t{64'000} * kMaxExactGradient / 2);  // 32768 / 2^16
   CHECK(sum.y == -(std::int64_t{64'000} * kMaxExactGradient / 2));
   CHECK(sum.z == 1600 / 2);

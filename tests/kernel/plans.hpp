@@ -39,7 +39,7 @@ class Aligned {
   static std::string name() { return "aligned, fixed"; }
 
   Aligned(GradientKernel kernel, const TestVolume& volume)
-      : taps_(kernel == GradientKernel::sobel5 ? kAlignedSobel5 : kAlignedFarid),
+      : taps_(kernel == GradientKernel::sobel5 ? kExactSobel5 : kExactFarid),
         field_(taps_, volume) {}
 
   [[nodiscard]] std::array<double, 3> at(std::span<const ToolOffset> tool,
@@ -50,7 +50,7 @@ class Aligned {
   }
 
  private:
-  AlignedTaps taps_;
+  ExactTaps taps_;
   ExactField field_;
 };
 

@@ -12,6 +12,7 @@
 
 #include "controller/kernel/splat_reference.hpp"
 #include "controller/scene/sample_tool.hpp"
+#include "controller/scene/tick_memory.hpp"
 #include "tests/kernel/aligned_support.hpp"
 #include "tests/kernel/hash.hpp"
 
@@ -26,9 +27,9 @@ struct SplatRig {
       : tool(std::move(offsets)), samples(tool, SampleOrder::scattered) {
     memory.hold({width_vox, width_vox, width_vox}, tool.size());
   }
-  AlignedOutcome run(const AlignedKernels& kernels, const AlignedTaps& taps,
-                     const TestVolume& volume, const ToolPose<FixedNumbers>& pose,
-                     std::int32_t volume_ratio, const RemovalRate<FixedNumbers>& rate,
+  AlignedOutcome run(const KernelSet& kernels, const ExactTaps& taps, const TestVolume& volume,
+                     const ToolPose<FixedNumbers>& pose, std::int32_t volume_ratio,
+                     const RemovalRate<FixedNumbers>& rate,
                      const std::vector<std::uint16_t>& carry) {
     AlignedOutcome out{{}, {}, {}, volume.density, carry};
     const SplatOutcome tick = splat_tick(kernels, samples.table(), taps, memory.view(), volume.grid,
@@ -53,7 +54,7 @@ AlignedOutcome by_definition(const SplatRig& rig, const TestVolume& volume, cons
   out.contact = splat_contact_sum(field, rig.tool, pose);
   overlap<FixedNumbers>(volume.grid, rig.tool, pose, volume_ratio, scratch);
   out.modification =
-      aligned_modification_sum(field, volume.grid, volume.density, scratch, rig.tool.size());
+      exact_modification_sum(field, volume.grid, volume.density, scratch, rig.tool.size());
   out.removed = remove<FixedNumbers>(volume.grid, out.density, scratch, rate, out.carry);
   return out;
 }
@@ -92,9 +93,9 @@ TEST_CASE("splatting gives the bits of the definition for any tool in any pose")
       // Rows longer than the widest vector, then a volume smaller than the tool.
       const VoxelGrid grid = fill % 4 == 3 ? VoxelGrid{7, 9, 8} : VoxelGrid{44, 14, 12};
       const TestVolume volume = hard_volume(grid, fill, static_cast<std::uint32_t>(fill));
-      const AlignedTaps& taps = fill % 3 == 0   ? kAlignedSobel5
-                                : fill % 5 == 1 ? kAlignedCentral
-                                                : kAlignedFarid;
+      const ExactTaps& taps = fill % 3 == 0   ? kExactSobel5
+                              : fill % 5 == 1 ? kExactCentral
+                                              : kExactFarid;
       const ExactField field(taps, volume);
       for (int i = 0; i < tool.cases; ++i) {
         const double out = i % 3 == 0 ? 5 : -2;
@@ -112,7 +113,7 @@ TEST_CASE("splatting gives the bits of the definition for any tool in any pose")
             by_definition(rig, volume, field, pose, volume_ratio, rate, carry, cutter.overlap);
         felt += truth.contact == SumVec<FixedNumbers>{} ? 0 : 1;
         cut_away += truth.removed.density_steps != 0 ? 1 : 0;
-        for (auto set = aligned_kernels(); *set != nullptr; ++set) {
+        for (auto set = kernel_sets(); *set != nullptr; ++set) {
           const bool same = rig.run(**set, taps, volume, pose, volume_ratio, rate, carry) == truth;
           if (!same) {
             INFO(tool.offsets.size(), " samples, ", std::string((*set)->name), ", fill ", fill,
@@ -137,7 +138,7 @@ TEST_CASE("an unturned tool of the voxels' pitch cuts the same by splatting and 
     const auto pose = pose_at<FixedNumbers>({x, 11.3, 9.8});
     for (AlignedRig& aligned : rigs_for(offsets)) {
       const AlignedOutcome a = aligned.run(volume, pose, rate, carry);
-      const AlignedOutcome b = rig.run(aligned.kernels(), kAlignedFarid, volume, pose,
+      const AlignedOutcome b = rig.run(aligned.kernels(), kExactFarid, volume, pose,
                                        FixedNumbers::kStepOne, rate, carry);
       CHECK(a.modification == b.modification);
       CHECK(a.density == b.density);
@@ -145,8 +146,8 @@ TEST_CASE("an unturned tool of the voxels' pitch cuts the same by splatting and 
       CHECK(a.removed.changed == b.removed.changed);
       // Contact keeps 8 bits in one plan and everything in the other: one step each at most.
       const double felt = static_cast<double>(a.contact.x) / 256;
-      const double exact = static_cast<double>(b.contact.x) * kAlignedFarid.factor /
-                           (32768.0 * static_cast<double>(1 << kAlignedFarid.shift));
+      const double exact = static_cast<double>(b.contact.x) * kExactFarid.factor /
+                           (32768.0 * static_cast<double>(1 << kExactFarid.shift));
       CHECK(felt == doctest::Approx(exact).epsilon(1e-4).scale(552));
     }
   }
@@ -155,7 +156,7 @@ TEST_CASE("an unturned tool of the voxels' pitch cuts the same by splatting and 
 TEST_CASE("a scripted turn through noise ends in the known hash on every instruction set") {
   SplatRig rig(box_tool(7, 4, 9), 17);
   const auto rate = removal_rate<FixedNumbers>(0.125, true);
-  for (auto set = aligned_kernels(); *set != nullptr; ++set) {
+  for (auto set = kernel_sets(); *set != nullptr; ++set) {
     std::uint32_t noise = 1;
     TestVolume volume = made_of({60, 26, 24}, [&](auto, auto, std::int32_t z) {
       noise = noise * 1664525u + 1013904223u;
@@ -168,7 +169,7 @@ TEST_CASE("a scripted turn through noise ends in the known hash on every instruc
       const auto pose = turned_pose<FixedNumbers>(
           {tick * 0.5625 - 6, 12 + tick * 0.03125, 15 - tick * 0.0625}, {1, 2, tick * 0.125, 3});
       AlignedOutcome out =
-          rig.run(**set, kAlignedFarid, volume, pose, FixedNumbers::kStepOne, rate, carry);
+          rig.run(**set, kExactFarid, volume, pose, FixedNumbers::kStepOne, rate, carry);
       hash.add(out.contact);
       hash.add(out.modification);
       hash.add(out.removed.density_steps);
@@ -191,11 +192,11 @@ TEST_CASE("splatting far outside, or with too few lanes to carry, does nothing")
     pose.centre_vox = {Q16::from_raw(x), Q16::from_raw(y), Q16::from_raw(z)};
     return pose;
   };
-  for (auto set = aligned_kernels(); *set != nullptr; ++set) {
+  for (auto set = kernel_sets(); *set != nullptr; ++set) {
     const auto nothing = [&](const ToolPose<FixedNumbers>& pose, std::size_t lanes) {
       const std::vector<std::uint16_t> carry(lanes, 65535);
       const AlignedOutcome out =
-          rig.run(**set, kAlignedFarid, volume, pose, FixedNumbers::kStepOne, rate, carry);
+          rig.run(**set, kExactFarid, volume, pose, FixedNumbers::kStepOne, rate, carry);
       return out.removed.density_steps == 0 && out.density == volume.density && out.carry == carry;
     };
     CHECK(nothing(at(kFar, 0, 0), 64));

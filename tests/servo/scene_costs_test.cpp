@@ -17,6 +17,7 @@
 #include "controller/scene/plan_cost.hpp"
 #include "controller/scene/sample_tool.hpp"
 #include "controller/scene/stage_timing.hpp"
+#include "controller/scene/tick_memory.hpp"
 #include "controller/scene/tool_shapes.hpp"
 #include "controller/scene/work_budget.hpp"
 #include "tests/servo/support.hpp"
@@ -85,24 +86,24 @@ TEST_CASE("the voxels that a tick copies are those that are written") {
   const std::vector<Density> air(std::size_t{64} * 64 * 64, 7);
   for (const int size : {3, 10, 16}) {
     const SceneTool tool = ball(size);
-    const AlignedTool aligned(tool.offsets, kAlignedFarid, kAlignedScalar);
-    AlignedMemory memory;
+    const AlignedTool aligned(tool.offsets, kExactFarid, kScalarSet);
+    BoxMemory memory;
     memory.hold(aligned.table().size, false);
-    const AlignedScratch scratch = memory.view();
-    const std::size_t room = aligned_scratch_size(aligned.table().size).box;
+    const BoxScratch scratch = memory.view();
+    const std::size_t room = box_scratch_size(aligned.table().size).box;
     std::fill_n(scratch.box, room, std::int16_t{1});
-    kAlignedScalar.copy_box(aligned.table(), {64, 64, 64}, air.data(), {20, 20, 20}, scratch);
+    kScalarSet.copy_box(aligned.table(), {64, 64, 64}, air.data(), {20, 20, 20}, scratch);
     const auto written = std::count(scratch.box, scratch.box + room, std::int16_t(7 - 32768));
-    CHECK(operations(aligned_cost(aligned.table(), kAlignedScalar, false), "copy") ==
+    CHECK(operations(aligned_cost(aligned.table(), kScalarSet, false), "copy") ==
           static_cast<std::uint64_t>(written));
   }
 }
 
 TEST_CASE("the multiply-adds of a correlation are those of its chunks, and cover the table") {
-  for (auto set = aligned_kernels(); *set != nullptr; ++set) {
+  for (auto set = kernel_sets(); *set != nullptr; ++set) {
     for (const int size : {3, 10, 16, 40}) {
       const SceneTool tool = ball(size);
-      const AlignedTool aligned(tool.offsets, kAlignedFarid, **set);
+      const AlignedTool aligned(tool.offsets, kExactFarid, **set);
       const AlignedTable& table = aligned.table();
       std::uint64_t visited = 0, filled = 0;  // table entries, as the kernel walks over them
       for (std::size_t list = 0; list < 3; ++list) {
@@ -145,7 +146,7 @@ TEST_CASE("the corners that a contact visits are the products of its sum") {
     Counted::products = 0;
     static_cast<void>(contact_sum<CountingNumbers>(
         block.image.grid, std::span<const Gradient<CountingNumbers>>(field), tool.offsets, pose));
-    CHECK(3 * operations(gather_cost(NumericKind::fixed, kAlignedScalar, tool, block, false),
+    CHECK(3 * operations(gather_cost(NumericKind::fixed, kScalarSet, tool, block, false),
                          "contact") ==
           Counted::products);
   }
@@ -160,7 +161,7 @@ TEST_CASE("a splatting tick copies no more voxels than it is said to, in any pos
     const std::size_t width = overlap_width(tool.size_vox, kVoxelMm, kVoxelMm);
     memory.hold({width, width, width}, tool.offsets.size());
     const SplatScratch scratch = memory.view();
-    const PlanCost cost = splat_cost(kAlignedScalar, tool, block);
+    const PlanCost cost = splat_cost(kScalarSet, tool, block);
     CHECK(operations(cost, "place") == 9 * tool.offsets.size());
     CHECK(operations(cost, "splat") == 8 * tool.offsets.size());
     std::int64_t most = 0;
@@ -171,8 +172,8 @@ TEST_CASE("a splatting tick copies no more voxels than it is said to, in any pos
       for (std::size_t a = 0; a < 3; ++a) {
         for (std::size_t b = 0; b < 3; ++b) pose.step[a][b] = step_of<FixedNumbers>(turn[a][b]);
       }
-      const SplatTick tick(kAlignedScalar, samples.table(), kAlignedFarid, scratch,
-                           block.image.grid, block.image.density, pose);
+      const SplatTick tick(kScalarSet, samples.table(), kExactFarid, scratch, block.image.grid,
+                           block.image.density, pose);
       const VoxelIndex box = tick.box().box;
       most = std::max(most, std::int64_t{box.x} * box.y * box.z);
     }
@@ -222,8 +223,8 @@ TEST_CASE("every stage of every plan has a price, and every stage is timed") {
       REQUIRE(us.size() == ticks[i].cost.stages.size());
     }
   }
-  const AlignedTool aligned(ball(10).offsets, kAlignedFarid, kAlignedScalar);
-  for (auto set = aligned_kernels(); *set != nullptr; ++set) {
+  const AlignedTool aligned(ball(10).offsets, kExactFarid, kScalarSet);
+  for (auto set = kernel_sets(); *set != nullptr; ++set) {
     CHECK(work_us(aligned_cost(aligned.table(), **set, true)) > 0);
   }
 }

@@ -10,6 +10,7 @@
 #include "controller/kernel/splat.hpp"
 #include "controller/scene/aligned_tool.hpp"
 #include "controller/scene/sample_tool.hpp"
+#include "controller/scene/tick_memory.hpp"
 #include "hil/lab/accuracy/method_parts.hpp"
 
 // The servo's plans in fixed point, each with the fastest kernels of this machine.
@@ -21,7 +22,7 @@ class GatherPlan final : public ContactMethod {
   GatherPlan(const ContactChoice& choice, const AnalyticVolume& volume, const BallTool& tool)
       : grid_(volume.grid),
         pitch_vox_(choice.pitch_vox),
-        kernels_(**aligned_kernels()),
+        kernels_(**kernel_sets()),
         tool_(tool.offsets, SampleOrder::as_given),
         one_(kOneSample, SampleOrder::as_given),
         field_(field_of<FixedNumbers>(choice.kernel, volume)) {
@@ -43,7 +44,7 @@ class GatherPlan final : public ContactMethod {
 
   VoxelGrid grid_;
   double pitch_vox_;
-  const AlignedKernels& kernels_;
+  const KernelSet& kernels_;
   SampleTool tool_, one_;
   std::vector<Gradient<FixedNumbers>> field_;
 };
@@ -54,9 +55,9 @@ class AlignedPlan final : public ContactMethod {
   AlignedPlan(const ContactChoice& choice, const AnalyticVolume& volume, const BallTool& tool)
       : grid_(volume.grid),
         density_(volume.density),
-        kernels_(**aligned_kernels()),
-        tool_(tool.offsets, aligned_taps(choice.kernel), kernels_),
-        one_(kOneSample, aligned_taps(choice.kernel), kernels_) {
+        kernels_(**kernel_sets()),
+        tool_(tool.offsets, exact_taps(choice.kernel), kernels_),
+        one_(kOneSample, exact_taps(choice.kernel), kernels_) {
     memory_.hold(tool_.table().size, false);
   }
 
@@ -66,7 +67,7 @@ class AlignedPlan final : public ContactMethod {
 
  private:
   [[nodiscard]] Voxels sum(const AlignedTool& tool, Voxels centre) const {
-    const AlignedScratch scratch = memory_.view();  // the tick keeps a reference
+    const BoxScratch scratch = memory_.view();  // the tick keeps a reference
     const AlignedTick tick(kernels_, tool.table(), scratch, grid_, density_,
                            pose_at<FixedNumbers>(centre, 1));
     return full_densities<FixedNumbers>(tick.contact(), 1 << kAlignedKeptBits);
@@ -74,9 +75,9 @@ class AlignedPlan final : public ContactMethod {
 
   VoxelGrid grid_;
   mutable std::vector<Density> density_;  // a tick could mill it; contact does not
-  const AlignedKernels& kernels_;
+  const KernelSet& kernels_;
   AlignedTool tool_, one_;
-  mutable AlignedMemory memory_;
+  mutable BoxMemory memory_;
 };
 
 /// From the density alone, for any tool in any pose, as in scenes that cut. Its tick finds the
@@ -87,8 +88,8 @@ class SplatPlan final : public ContactMethod {
       : grid_(volume.grid),
         pitch_vox_(choice.pitch_vox),
         density_(volume.density),
-        kernels_(**aligned_kernels()),
-        taps_(aligned_taps(choice.kernel)),
+        kernels_(**kernel_sets()),
+        taps_(exact_taps(choice.kernel)),
         tool_(tool.offsets, SampleOrder::scattered),
         one_(kOneSample, SampleOrder::scattered) {
     const std::size_t width = overlap_width(tool.size_pitches, tool.pitch_mm, volume.voxel_mm);
@@ -115,8 +116,8 @@ class SplatPlan final : public ContactMethod {
   VoxelGrid grid_;
   double pitch_vox_;
   mutable std::vector<Density> density_;  // a tick could mill it; contact does not
-  const AlignedKernels& kernels_;
-  const AlignedTaps& taps_;
+  const KernelSet& kernels_;
+  const ExactTaps& taps_;
   SampleTool tool_, one_;
   mutable SplatMemory memory_;
 };

@@ -5,7 +5,7 @@
 #include <cstdint>
 
 // For instruction sets that cannot store a vector in part. Internal linkage, for the reason told at
-// AlignedKernels.
+// KernelSet.
 
 namespace kerf {
 namespace {

@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/kernel/aligned_kernels.hpp"
+#include "controller/kernel/kernel_set.hpp"
 
 namespace kerf {
 namespace {
 
 // The fastest first; what a machine can run is a tail of this list.
-constexpr const AlignedKernels* kSets[] = {
+constexpr const KernelSet* kSets[] = {
 #if defined(KERF_X86_KERNELS)
-    &kAlignedAvx512, &kAlignedAvx2,
+    &kAvx512Set, &kAvx2Set,
 #elif defined(KERF_NEON_KERNELS)
-    &kAlignedNeon,
+    &kNeonSet,
 #endif
-    &kAlignedScalar, nullptr};
+    &kScalarSet, nullptr};
 
 std::size_t sets_beyond_this_machine() noexcept {
 #if defined(KERF_X86_KERNELS)
@@ -28,7 +28,7 @@ std::size_t sets_beyond_this_machine() noexcept {
 
 }  // namespace
 
-const AlignedKernels* const* aligned_kernels() noexcept {
+const KernelSet* const* kernel_sets() noexcept {
   return kSets + sets_beyond_this_machine();
 }
 

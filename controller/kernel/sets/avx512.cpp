@@ -109,13 +109,13 @@ struct Simd {
 }  // namespace
 }  // namespace kerf
 
-#include "controller/kernel/aligned_vector.hpp"
-#include "controller/kernel/gather_vector.hpp"
-#include "controller/kernel/splat_loops.hpp"
+#include "controller/kernel/sets/correlate_vector.hpp"
+#include "controller/kernel/sets/gather_vector.hpp"
+#include "controller/kernel/sets/splat_loops.hpp"
 
 namespace kerf {
 
-const AlignedKernels kAlignedAvx512{"avx512", Simd::kLanes, true,  copy_box, correlate, press,
-                                    cut,      gather,       place, splat,    press_sums};
+const KernelSet kAvx512Set{"avx512", Simd::kLanes, true,  copy_box, correlate, press,
+                           cut,      gather,       place, splat,    press_sums};
 
 }  // namespace kerf

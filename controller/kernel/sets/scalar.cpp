@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "controller/kernel/aligned_kernels.hpp"
+#include "controller/kernel/kernel_set.hpp"
 
 namespace kerf {
 namespace {
@@ -12,7 +12,7 @@ constexpr std::int32_t kLanes = 16;
 constexpr std::int16_t kAir = -32768;  ///< density 0 after re-centring
 
 void copy_box(const TickBox& tool, const VoxelGrid& grid, const Density* density, VoxelIndex origin,
-              const AlignedScratch& scratch) noexcept {
+              const BoxScratch& scratch) noexcept {
   std::int16_t* out = scratch.box;
   for (std::int32_t z = origin.z; z < origin.z + tool.box.z; ++z) {
     for (std::int32_t y = origin.y; y < origin.y + tool.box.y; ++y, out += tool.box.x) {
@@ -69,7 +69,7 @@ bool overlap_row(const AlignedTable& tool, const std::int32_t (&weight)[8], std:
 }
 
 /// Rows of the five planes from z on, filtered along z: smooth, then slope.
-void filter_z(const TickBox& tool, std::int32_t row_lanes, const AlignedScratch& scratch,
+void filter_z(const TickBox& tool, std::int32_t row_lanes, const BoxScratch& scratch,
               std::int32_t z, std::int32_t first, std::int32_t last) noexcept {
   const std::ptrdiff_t pitch = tool.box.x, plane = pitch * tool.box.y;
   for (std::int32_t y = first; y <= last + 4; ++y) {
@@ -104,7 +104,7 @@ struct RowSums {
 /// One row's part of a sum of gradients; the x filter works on the ratios, as in the vector form.
 void press_row(const TickBox& box, std::int32_t row_lanes, const std::int16_t* ratio,
                const std::int32_t* smooth_z, const std::int32_t* slope_z, RowSums& sum) noexcept {
-  const AlignedTaps& taps = box.taps;
+  const ExactTaps& taps = box.taps;
   for (std::int32_t x = 0; x < box.box.x; ++x) {
     std::int32_t along = 0, across = 0, smooth = 0, slope = 0, deep = 0;
     for (std::size_t k = 0; k < 5; ++k) {
@@ -121,7 +121,7 @@ void press_row(const TickBox& box, std::int32_t row_lanes, const std::int16_t* r
   }
 }
 
-void press(const AlignedTable& tool, const std::int32_t (&weight)[8], const AlignedScratch& scratch,
+void press(const AlignedTable& tool, const std::int32_t (&weight)[8], const BoxScratch& scratch,
            std::int64_t (&sum)[3]) noexcept {
   const std::int32_t* const slopes =
       scratch.filter + static_cast<std::ptrdiff_t>(tool.box.y) * tool.row_lanes;
@@ -149,10 +149,9 @@ void press(const AlignedTable& tool, const std::int32_t (&weight)[8], const Alig
   for (int axis = 0; axis < 3; ++axis) sum[axis] = total[axis].over(tool.sum_shift);
 }
 
-AlignedCut cut(const TickBox& tool, const AlignedRate& rate, const VoxelGrid& grid,
-               Density* density, VoxelIndex origin, const AlignedScratch& scratch,
-               std::uint16_t* carry) noexcept {
-  AlignedCut cut{0, {tool.box.x, tool.box.y, tool.box.z}, {-1, -1, -1}};
+BoxCut cut(const TickBox& tool, const CutRate& rate, const VoxelGrid& grid, Density* density,
+           VoxelIndex origin, const BoxScratch& scratch, std::uint16_t* carry) noexcept {
+  BoxCut cut{0, {tool.box.x, tool.box.y, tool.box.z}, {-1, -1, -1}};
   const auto include = [](std::int32_t at, std::int32_t& lo, std::int32_t& hi) {
     lo = at < lo ? at : lo;
     hi = at > hi ? at : hi;
@@ -187,12 +186,12 @@ AlignedCut cut(const TickBox& tool, const AlignedRate& rate, const VoxelGrid& gr
 }  // namespace
 }  // namespace kerf
 
-#include "controller/kernel/gather_loops.hpp"
-#include "controller/kernel/splat_loops.hpp"
+#include "controller/kernel/sets/gather_loops.hpp"
+#include "controller/kernel/sets/splat_loops.hpp"
 
 namespace kerf {
 
-const AlignedKernels kAlignedScalar{"scalar", kLanes, false, copy_box, correlate, press,
-                                    cut,      gather, place, splat,    press_sums};
+const KernelSet kScalarSet{"scalar", kLanes, false, copy_box, correlate, press,
+                           cut,      gather, place, splat,    press_sums};
 
 }  // namespace kerf

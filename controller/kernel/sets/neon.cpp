@@ -5,7 +5,7 @@
 
 #include <arm_neon.h>
 
-#include "controller/kernel/aligned_whole_write.hpp"
+#include "controller/kernel/sets/whole_write.hpp"
 
 namespace kerf {
 namespace {
@@ -95,13 +95,13 @@ struct Simd {
 }  // namespace
 }  // namespace kerf
 
-#include "controller/kernel/aligned_vector.hpp"
-#include "controller/kernel/gather_loops.hpp"
-#include "controller/kernel/splat_loops.hpp"
+#include "controller/kernel/sets/correlate_vector.hpp"
+#include "controller/kernel/sets/gather_loops.hpp"
+#include "controller/kernel/sets/splat_loops.hpp"
 
 namespace kerf {
 
-const AlignedKernels kAlignedNeon{"neon", Simd::kLanes, false, copy_box, correlate, press,
-                                  cut,    gather,       place, splat,    press_sums};
+const KernelSet kNeonSet{"neon", Simd::kLanes, false, copy_box, correlate, press,
+                         cut,    gather,       place, splat,    press_sums};
 
 }  // namespace kerf

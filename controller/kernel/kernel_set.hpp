@@ -12,13 +12,13 @@
 namespace kerf {
 
 /// The part of a removal rate that a kernel needs: mantissa 2^-(15 + exponent).
-struct AlignedRate {
+struct CutRate {
   std::uint16_t mantissa;
   std::int32_t exponent;  ///< 0..32
 };
 
 /// What one cut took; `lo` and `hi` (last one included) are box entries, meaningless when 0 steps.
-struct AlignedCut {
+struct BoxCut {
   std::uint64_t density_steps;
   VoxelIndex lo, hi;
 };
@@ -27,22 +27,22 @@ struct AlignedCut {
 ///
 /// Plain pointers and plain structs: these functions are compiled with instructions that other
 /// machines lack, so nothing that the linker could share with other files may be inlined here.
-struct AlignedKernels {
+struct KernelSet {
   const char* name;
   std::int32_t lanes;  ///< the width that tables are made for
   bool can_fuse;       ///< has registers for three axes at a time
   /// Copies the box at `origin`; densities outside the volume are 0.
   void (*copy_box)(const TickBox&, const VoxelGrid&, const Density*, VoxelIndex origin,
-                   const AlignedScratch&) noexcept;
+                   const BoxScratch&) noexcept;
   /// Exact sums by axis and corner 4 k + 2 j + i.
   void (*correlate)(const AlignedTable&, const std::int16_t* box,
                     std::int64_t (&sum)[3][8]) noexcept;
   /// Overlap ratios of all rows where there is density, and the exact modification sum.
-  void (*press)(const AlignedTable&, const std::int32_t (&weight)[8], const AlignedScratch&,
+  void (*press)(const AlignedTable&, const std::int32_t (&weight)[8], const BoxScratch&,
                 std::int64_t (&sum)[3]) noexcept;
   /// Takes from the volume what the ratios say; `carry` has row_lanes entries.
-  AlignedCut (*cut)(const TickBox&, const AlignedRate&, const VoxelGrid&, Density*,
-                    VoxelIndex origin, const AlignedScratch&, std::uint16_t* carry) noexcept;
+  BoxCut (*cut)(const TickBox&, const CutRate&, const VoxelGrid&, Density*, VoxelIndex origin,
+                const BoxScratch&, std::uint16_t* carry) noexcept;
   /// Contact of the plan `gather`: `contact_sum` over a field of three 16-bit parts a voxel, which
   /// goes on for kFieldPad voxels.
   void (*gather)(const SampleTable&, const SamplePose&, const VoxelGrid&, const std::int16_t* field,
@@ -60,16 +60,16 @@ struct AlignedKernels {
 /// Gradients beyond the last voxel of a field.
 inline constexpr std::size_t kFieldPad = 1;
 
-extern const AlignedKernels kAlignedScalar;
+extern const KernelSet kScalarSet;
 #if defined(KERF_X86_KERNELS)
-extern const AlignedKernels kAlignedAvx2;
-extern const AlignedKernels kAlignedAvx512;
+extern const KernelSet kAvx2Set;
+extern const KernelSet kAvx512Set;
 #elif defined(KERF_NEON_KERNELS)
-extern const AlignedKernels kAlignedNeon;
+extern const KernelSet kNeonSet;
 #endif
 
 /// Kernels that this machine can run, the fastest first; ends with nullptr, holds at least one.
 /// Load time.
-[[nodiscard]] const AlignedKernels* const* aligned_kernels() noexcept;
+[[nodiscard]] const KernelSet* const* kernel_sets() noexcept;
 
 }  // namespace kerf

@@ -4,11 +4,11 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "controller/kernel/sample_place.hpp"
+#include "controller/kernel/sets/sample_place.hpp"
 #include "shared/volume/voxel_grid.hpp"
 
 // Contact of the plan `gather` as plain loops; internal linkage, for the reason told at
-// AlignedKernels.
+// KernelSet.
 
 namespace kerf {
 namespace {
