@@ -120,7 +120,7 @@ class AlignedTick {
  private:
   const KernelSet& kernels_;
   const AlignedTable& table_;
-  const BoxScratch& scratch_;
+  BoxScratch scratch_;
   const VoxelGrid& grid_;
   std::span<Density> density_;
   VoxelIndex origin_;  ///< low corner of the box

@@ -66,8 +66,8 @@ class SplatTick {
 
  private:
   const KernelSet& kernels_;
-  const SampleTable& samples_;
-  const SplatScratch& scratch_;
+  SampleTable samples_;
+  SplatScratch scratch_;
   const VoxelGrid& grid_;
   std::span<Density> density_;
   TickBox box_{};

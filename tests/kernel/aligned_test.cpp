@@ -9,22 +9,13 @@
 #include <doctest/doctest.h>
 
 #include "tests/kernel/aligned_support.hpp"
+#include "tests/kernel/case_count.hpp"
 #include "tests/kernel/hash.hpp"
 
 using namespace kerf;
 using namespace kerf::test;
 
 namespace {
-
-/// How many random cases: KERF_CASES multiplies them. Sanitizers make each some twenty times
-/// slower.
-int cases(int usual) {
-#ifdef KERF_SANITIZED
-  usual = std::max(1, usual / 30);
-#endif
-  const char* factor = std::getenv("KERF_CASES");
-  return usual * (factor == nullptr ? 1 : std::max(1, std::atoi(factor)));
-}
 
 struct Named {
   const char* name;
@@ -158,7 +149,7 @@ TEST_CASE("every instruction set gives the bits of the definition, wherever the 
     CHECK(clipped.none > count / 20);
     CHECK(clipped.outside > count / 50);
   }
-#ifndef KERF_SANITIZED
+#ifndef KERF_FEWER_CASES
   CHECK(total >= 100'000);
 #endif
 }

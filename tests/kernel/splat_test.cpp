@@ -14,6 +14,7 @@
 #include "controller/scene/sample_tool.hpp"
 #include "controller/scene/tick_memory.hpp"
 #include "tests/kernel/aligned_support.hpp"
+#include "tests/kernel/case_count.hpp"
 #include "tests/kernel/hash.hpp"
 
 using namespace kerf;
@@ -59,12 +60,6 @@ AlignedOutcome by_definition(const SplatRig& rig, const TestVolume& volume, cons
   return out;
 }
 
-#if defined(KERF_SANITIZED)
-constexpr int kFewer = 50;
-#else
-constexpr int kFewer = 1;
-#endif
-
 }  // namespace
 
 TEST_CASE("splatting gives the bits of the definition for any tool in any pose") {
@@ -74,12 +69,12 @@ TEST_CASE("splatting gives the bits of the definition for any tool in any pose")
     std::size_t width;
     int cases;  ///< per fill of the volume, of which there are 12: 10^5 in all
   };
-  const std::array<Named, 7> tools{{{box_tool(1, 1, 1), 1, 6, 5'000 / kFewer},
-                                    {box_tool(3, 2, 1), 1, 9, 2'700 / kFewer},
-                                    {ragged_tool(5, 4, 6, 2), 0.7, 11, 500 / kFewer},
-                                    {box_tool(3, 3, 3), 3.1, 21, 100 / kFewer},
-                                    {box_tool(8, 8, 8), 0.13, 6, 60 / kFewer},
-                                    {box_tool(12, 3, 12), 1, 22, 30 / kFewer + 1},
+  const std::array<Named, 7> tools{{{box_tool(1, 1, 1), 1, 6, 5'000},
+                                    {box_tool(3, 2, 1), 1, 9, 2'700},
+                                    {ragged_tool(5, 4, 6, 2), 0.7, 11, 500},
+                                    {box_tool(3, 3, 3), 3.1, 21, 100},
+                                    {box_tool(8, 8, 8), 0.13, 6, 60},
+                                    {box_tool(12, 3, 12), 1, 22, 30},
                                     {box_tool(28, 27, 28), 0.7, 38, 2}}};
   std::mt19937 random(5);
   const auto within = [&](double from, double to) {
@@ -97,7 +92,7 @@ TEST_CASE("splatting gives the bits of the definition for any tool in any pose")
                               : fill % 5 == 1 ? kExactCentral
                                               : kExactFarid;
       const ExactField field(taps, volume);
-      for (int i = 0; i < tool.cases; ++i) {
+      for (int i = 0; i < cases(tool.cases); ++i) {
         const double out = i % 3 == 0 ? 5 : -2;
         const auto pose = turned_pose<FixedNumbers>(
             {within(-out, grid.nx + out), within(-out, grid.ny + out), within(-out, grid.nz + out)},
@@ -123,8 +118,8 @@ TEST_CASE("splatting gives the bits of the definition for any tool in any pose")
         }
       }
     }
-    CHECK(felt > 3 * tool.cases);
-    CHECK(cut_away > 2 * tool.cases);
+    CHECK(felt > 3 * cases(tool.cases));
+    CHECK(cut_away > 2 * cases(tool.cases));
   }
 }
 
