@@ -3,7 +3,7 @@
 # The golden run (tests/golden) on several compilers, optimisation levels and processors, each with
 # every kernel set that it runs; other processors under qemu. Prints a table; fails where a hash is
 # not the known one. Builds the servo core alone, without any library.
-#     .ci/check-determinism.sh [--all]      --all: every combination, some minutes
+#     .ci/check-determinism.sh [--all]      --all: every combination, a quarter of an hour
 set -euo pipefail
 cd "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/.."
 folder=build/determinism
