@@ -66,17 +66,17 @@ trap 'rm -rf "$scratch"' EXIT
 git ls-files -z --cached --others --exclude-standard | xargs -0 cp --parents -t "$scratch"
 
 # caught_by EXECUTABLE...: builds and runs one after the other up to the first that fails, and says
-# which test failed. Says nothing when all pass; 2 when it cannot be built.
+# which test failed. Says nothing when all pass; 2 when it cannot be built. The golden hashes see
+# nearly everything and explain nothing, so they come last.
 caught_by() {
-  local test which status
-  for test in "$@"; do
-    if ! cmake --build "$scratch/build" --target "$test" >"$scratch/build.log" 2>&1; then
-      grep -qE 'static assertion failed|non-constant condition' "$scratch/build.log" || return 2
-      echo 'the compiler: a static assertion'
-      return
-    fi
-    # The golden hashes see nearly everything and explain nothing, so they come last.
-    for which in -tce -tc; do
+  local which test status
+  for which in -tce -tc; do
+    for test in "$@"; do
+      if ! cmake --build "$scratch/build" --target "$test" >"$scratch/build.log" 2>&1; then
+        grep -qE 'static assertion failed|non-constant condition' "$scratch/build.log" || return 2
+        echo 'the compiler: a static assertion'
+        return
+      fi
       status=0
       (cd "$scratch" && timeout 300 "build/bin/$test" "$which=*known hash*" -aa=1) \
         >"$scratch/test.log" 2>&1 || status=$?
