@@ -23,7 +23,8 @@ struct BoxCut {
   VoxelIndex lo, hi;
 };
 
-/// The four stages of a tick for one instruction set. All sets give the same bits.
+/// The stages of a tick, of every plan of fixed point, for one instruction set. All sets give the
+/// same bits.
 ///
 /// Plain pointers and plain structs: these functions are compiled with instructions that other
 /// machines lack, so nothing that the linker could share with other files may be inlined here.

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <span>
 
-#include "controller/kernel/aligned.hpp"
+#include "controller/kernel/cut.hpp"
 #include "controller/kernel/gather.hpp"
 #include "controller/kernel/splat_table.hpp"
 

@@ -4,8 +4,8 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "controller/kernel/aligned_table.hpp"
 #include "controller/kernel/sample_table.hpp"
+#include "controller/kernel/tick_box.hpp"
 
 namespace kerf {
 

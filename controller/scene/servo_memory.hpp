@@ -117,7 +117,7 @@ class ServoMemory {
     refresh_.allocate();
     state.overlap.memory = overlap_.span();
     state.gradient_scratch = refresh_.span().data();
-    state.splat = scratch_.view();
+    state.scratch = scratch_.view();
   }
 
   [[nodiscard]] std::span<const Density> density(std::size_t scene_index) const noexcept {

@@ -126,7 +126,7 @@ template <class N>
     laps.begin();
     if constexpr (N::kIsFixed) {
       if (in_volume.plan == Plan::aligned) {
-        const AlignedTick tick(*plan.kernels, *in_volume.aligned, state.splat.tick, volume.grid,
+        const AlignedTick tick(*plan.kernels, *in_volume.aligned, state.scratch.tick, volume.grid,
                                memory.density, pose);
         laps.end_stage(0);
         laps.end_stage(tick.contact().x);
@@ -134,7 +134,7 @@ template <class N>
         continue;
       }
       if (in_volume.plan == Plan::splat) {
-        const SplatTick tick(*plan.kernels, tool.samples, *plan.taps, state.splat, volume.grid,
+        const SplatTick tick(*plan.kernels, tool.samples, *plan.taps, state.scratch, volume.grid,
                              memory.density, pose);
         laps.end_stage(tick.box().row_lanes);
         tick.copy();

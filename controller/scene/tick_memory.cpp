@@ -24,7 +24,7 @@ std::vector<ArrayBytes> BoxMemory::arrays() const {
   const auto named = [](const char* name, const auto& memory) {
     return ArrayBytes{name, memory.size() * sizeof(memory[0]), true};
   };
-  return {named("box", box_), named("box mask", inside_), named("overlap ratios", ratio_),
+  return {named("box", box_), named("columns inside", inside_), named("overlap ratios", ratio_),
           named("filtered rows", filter_), named("live rows", live_)};
 }
 

@@ -50,7 +50,7 @@ struct ServoState {
   std::array<VolumeState<N>, kMaxVolumes> volumes{};
   OverlapBox<N> overlap;  ///< scratch of one tick, as is the next
   GradientScratch* gradient_scratch = nullptr;
-  SplatScratch splat;  ///< the plan `aligned` uses its inner part
+  SplatScratch scratch;  ///< the plan `aligned` uses its inner part
 
   Supervisor supervisor;
   EncoderState encoders;

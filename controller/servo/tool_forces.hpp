@@ -65,7 +65,7 @@ inline void feel_and_cut_aligned(const ServoPlan<FixedNumbers>& plan,
   const VolumePlan<FixedNumbers>& volume = plan.volumes[v];
   VolumeState<FixedNumbers>& memory = state.volumes[v];
   const ToolInVolume<FixedNumbers>& in_volume = plan.tools[state.active_tool].in_volume[v];
-  const AlignedTick tick(*plan.kernels, *in_volume.aligned, state.splat.tick, volume.grid,
+  const AlignedTick tick(*plan.kernels, *in_volume.aligned, state.scratch.tick, volume.grid,
                          memory.density, pose);
   forces.contact_n =
       forces.contact_n - force_of_sum<FixedNumbers>(in_volume.contact, tick.contact());
@@ -86,8 +86,8 @@ inline void feel_and_cut_splat(const ServoPlan<FixedNumbers>& plan, ServoState<F
   const ToolPlan<FixedNumbers>& tool = plan.tools[state.active_tool];
   const ToolInVolume<FixedNumbers>& in_volume = tool.in_volume[v];
   const SplatOutcome out =
-      splat_tick(*plan.kernels, tool.samples, *plan.taps, state.splat, volume.grid, memory.density,
-                 pose, in_volume.overlap_ratio, plan.removal_rate, memory.carry);
+      splat_tick(*plan.kernels, tool.samples, *plan.taps, state.scratch, volume.grid,
+                 memory.density, pose, in_volume.overlap_ratio, plan.removal_rate, memory.carry);
   forces.contact_n =
       forces.contact_n - force_of_sum<FixedNumbers>(in_volume.contact, out.felt.contact);
   forces.modification_n = forces.modification_n -

@@ -203,3 +203,29 @@ TEST_CASE("splatting far outside, or with too few lanes to carry, does nothing")
     CHECK_FALSE(nothing(at(10 << 16, 10 << 16, 10 << 16), 32));
   }
 }
+
+TEST_CASE("what the tallest box loses is counted in full") {
+  // More rows than a 32-bit sum of full losses holds.
+  const TickBox box = tick_box({20, 139, 139}, kExactFarid, 1000);
+  const VoxelGrid grid{80, 160, 160};
+  BoxMemory memory;
+  memory.hold(box.size, true);
+  const BoxScratch scratch = memory.view();
+  const std::int32_t rows = (box.size.y + 1) * (box.size.z + 1);
+  for (auto set = kernel_sets(); *set != nullptr; ++set) {
+    std::vector<Density> density(grid.voxel_count(), 65535);
+    (*set)->copy_box(box, grid, density.data(), {4, 4, 4}, scratch);
+    std::int16_t* ratio = scratch.ratio + kRatioRowPad;
+    for (std::int32_t row = 0; row < rows; ++row, ratio += box.row_lanes + kRatioRowPad) {
+      scratch.live[row] = 1;
+      for (std::int32_t x = 0; x < box.row_lanes; ++x) {
+        ratio[x] = x >= 2 && x <= box.size.x + 2 ? std::int16_t{-32768} : std::int16_t{0};
+      }
+    }
+    std::vector<std::uint16_t> carry(static_cast<std::size_t>(box.row_lanes));
+    const BoxCut cut =
+        (*set)->cut(box, {32768, 0}, grid, density.data(), {4, 4, 4}, scratch, carry.data());
+    CAPTURE(std::string((*set)->name));
+    CHECK(cut.density_steps == std::uint64_t{65535} * 21 * static_cast<std::uint64_t>(rows));
+  }
+}

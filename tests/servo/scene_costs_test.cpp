@@ -253,11 +253,11 @@ TEST_CASE("a scene holds the arrays that it names, and no others") {
   const auto arrays_of = [](Scene scene) { return names(compile(scene)->costs().arrays); };
   Scene touch = half_space_scene(32);
   CHECK(arrays_of(touch) ==
-        Names{"density of test", "samples of ball", "table of ball", "box", "box mask"});
+        Names{"density of test", "samples of ball", "table of ball", "box", "columns inside"});
   Scene cut = touch;
   cut.cut.model = CutModel::overlap;
   CHECK(arrays_of(cut) == Names{"density of test", "carry of test", "samples of ball",
-                                "table of ball", "box", "box mask", "overlap ratios",
+                                "table of ball", "box", "columns inside", "overlap ratios",
                                 "filtered rows", "live rows"});
   Scene odd = touch;
   odd.tools = {shape("cone", 0.6, 2)};
@@ -267,7 +267,7 @@ TEST_CASE("a scene holds the arrays that it names, and no others") {
   odd_cut.cut.model = CutModel::overlap;
   odd_cut.volumes[0].image.labels.assign(odd_cut.volumes[0].image.density.size(), 1);
   CHECK(arrays_of(odd_cut) == Names{"density of test", "labels of test", "carry of test",
-                                    "samples of cone", "ordered samples of cone", "box", "box mask",
+                                    "samples of cone", "ordered samples of cone", "box", "columns inside",
                                     "overlap ratios", "filtered rows", "live rows", "sample places",
                                     "overlap sums", "rest rows", "live rest rows"});
   Scene floating = odd_cut;

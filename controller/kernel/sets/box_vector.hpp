@@ -36,10 +36,10 @@ constexpr std::int16_t kAir = -32768;  ///< density 0 after re-centring
 }
 
 /// A box that sticks out of the volume, or whose last vectors would leave the volume's memory.
-void copy_clipped_box(const TickBox& tool, const VoxelGrid& grid, const Density* density,
+void copy_clipped_box(const TickBox& area, const VoxelGrid& grid, const Density* density,
                       VoxelIndex origin, const BoxScratch& scratch, std::int32_t padded) noexcept {
   const V flip = Simd::set16(kAir);
-  const std::int32_t width = tool.box.x;
+  const std::int32_t width = area.box.x;
   const std::int32_t from = origin.x < 0 ? -origin.x : 0;
   const std::int32_t to = grid.nx - origin.x < width ? grid.nx - origin.x : width;
   for (std::int32_t x = 0; x < padded; ++x) {
@@ -47,8 +47,8 @@ void copy_clipped_box(const TickBox& tool, const VoxelGrid& grid, const Density*
   }
   const std::ptrdiff_t pitch = grid.nx, plane = pitch * grid.ny, count = plane * grid.nz;
   std::int16_t* out = scratch.box;
-  for (std::int32_t z = origin.z; z < origin.z + tool.box.z; ++z) {
-    for (std::int32_t y = origin.y; y < origin.y + tool.box.y; ++y, out += width) {
+  for (std::int32_t z = origin.z; z < origin.z + area.box.z; ++z) {
+    for (std::int32_t y = origin.y; y < origin.y + area.box.y; ++y, out += width) {
       if (y < 0 || z < 0 || y >= grid.ny || z >= grid.nz) {
         for (std::int32_t x = 0; x < padded; x += kLanes) Simd::store(out + x, flip);
         continue;
@@ -71,27 +71,27 @@ void copy_clipped_box(const TickBox& tool, const VoxelGrid& grid, const Density*
 }
 
 // Box rows are stored as whole vectors, in order: the next row overwrites what spills.
-void copy_box(const TickBox& tool, const VoxelGrid& grid, const Density* density, VoxelIndex origin,
+void copy_box(const TickBox& area, const VoxelGrid& grid, const Density* density, VoxelIndex origin,
               const BoxScratch& scratch) noexcept {
-  const std::int32_t width = tool.box.x;
+  const std::int32_t width = area.box.x;
   const std::int32_t padded = (width + kLanes - 1) / kLanes * kLanes;
   const std::ptrdiff_t pitch = grid.nx, plane = pitch * grid.ny, count = plane * grid.nz;
-  const VoxelIndex end{origin.x + width, origin.y + tool.box.y, origin.z + tool.box.z};
+  const VoxelIndex end{origin.x + width, origin.y + area.box.y, origin.z + area.box.z};
   const std::ptrdiff_t last_row = (end.z - 1) * plane + (end.y - 1) * pitch + origin.x;
   if (origin.x < 0 || origin.y < 0 || origin.z < 0 || end.x > grid.nx || end.y > grid.ny ||
       end.z > grid.nz || last_row + padded > count) {
-    copy_clipped_box(tool, grid, density, origin, scratch, padded);
+    copy_clipped_box(area, grid, density, origin, scratch, padded);
     return;
   }
   std::int16_t* out = scratch.box;
   for (std::int32_t z = origin.z; z < end.z; ++z) {
     const Density* row = density + z * plane + origin.y * pitch + origin.x;
     if (padded == 32) {  // tools up to 27 voxels: no loop within a row
-      for (std::int32_t y = 0; y < tool.box.y; ++y, row += pitch, out += width) {
+      for (std::int32_t y = 0; y < area.box.y; ++y, row += pitch, out += width) {
         copy_row(row, 32, out);
       }
     } else {
-      for (std::int32_t y = 0; y < tool.box.y; ++y, row += pitch, out += width) {
+      for (std::int32_t y = 0; y < area.box.y; ++y, row += pitch, out += width) {
         copy_row(row, padded, out);
       }
     }
@@ -116,12 +116,12 @@ struct TapPairs {
 };
 
 /// Rows y first .. last + 4 of the five planes at z, filtered along z: smooth, then slope.
-[[gnu::always_inline]] inline void filter_z(const TickBox& tool, std::int32_t row_lanes,
+[[gnu::always_inline]] inline void filter_z(const TickBox& area, std::int32_t row_lanes,
                                             const BoxScratch& scratch, std::int32_t z,
                                             std::int32_t first, std::int32_t last) noexcept {
-  const TapPairs smooth(tool.taps.smooth, 1), slope(tool.taps.slope, 1);
-  const std::ptrdiff_t pitch = tool.box.x, plane = pitch * tool.box.y;
-  std::int32_t* const slopes = scratch.filter + static_cast<std::ptrdiff_t>(tool.box.y) * row_lanes;
+  const TapPairs smooth(area.taps.smooth, 1), slope(area.taps.slope, 1);
+  const std::ptrdiff_t pitch = area.box.x, plane = pitch * area.box.y;
+  std::int32_t* const slopes = scratch.filter + static_cast<std::ptrdiff_t>(area.box.y) * row_lanes;
   for (std::int32_t y = first; y <= last + 4; ++y) {
     for (std::int32_t x = 0; x < row_lanes; x += kLanes) {
       const std::int16_t* d = scratch.box + z * plane + y * pitch + x;
@@ -226,26 +226,27 @@ struct RowSums {
   return Simd::add_carry(high, sum, low);
 }
 
-[[gnu::always_inline]] inline BoxCut cut_rows(TickBox tool, std::int32_t row_lanes, CutRate rate,
+[[gnu::always_inline]] inline BoxCut cut_rows(TickBox area, std::int32_t row_lanes, CutRate rate,
                                               VoxelGrid grid, Density* density, VoxelIndex origin,
                                               BoxScratch scratch, std::uint16_t* carry) noexcept {
-  BoxCut cut{0, {tool.box.x, tool.box.y, tool.box.z}, {-1, -1, -1}};
+  BoxCut cut{0, {area.box.x, area.box.y, area.box.z}, {-1, -1, -1}};
   const V air = Simd::set16(kAir), mantissa = Simd::set16(rate.mantissa);
   const std::ptrdiff_t pitch = grid.nx, plane = pitch * grid.ny, count = plane * grid.nz;
   const std::ptrdiff_t ratio_pitch = row_lanes + kRatioRowPad;
-  for (std::int32_t x = 0; x < row_lanes; x += kLanes) {  // a lane never leaves its vector
-    V owed = Simd::load(carry + x), steps = Simd::zero();
+  for (std::int32_t x = 0; x < row_lanes; x += kLanes) {         // a lane never leaves its vector
+    V owed = Simd::load(carry + x), taken_steps = Simd::zero();  // of 64 bits
     std::uint32_t changed = 0;
-    for (std::int32_t z = 0; z <= tool.size.z; ++z) {
-      const std::uint8_t* live = scratch.live + std::ptrdiff_t{z} * (tool.size.y + 1);
+    for (std::int32_t z = 0; z <= area.size.z; ++z) {
+      const std::uint8_t* live = scratch.live + std::ptrdiff_t{z} * (area.size.y + 1);
       const std::int16_t* ratio = scratch.ratio + kRatioRowPad + x +
-                                  static_cast<std::ptrdiff_t>(z) * (tool.size.y + 1) * ratio_pitch;
+                                  static_cast<std::ptrdiff_t>(z) * (area.size.y + 1) * ratio_pitch;
       const std::int16_t* box =
-          scratch.box + (static_cast<std::ptrdiff_t>(z + 2) * tool.box.y + 2) * tool.box.x + x;
+          scratch.box + (static_cast<std::ptrdiff_t>(z + 2) * area.box.y + 2) * area.box.x + x;
       std::ptrdiff_t begin = (origin.z + z + 2) * plane + (origin.y + 2) * pitch + origin.x + x;
-      std::int32_t first = tool.box.y, last = -1;
-      for (std::int32_t y = 0; y <= tool.size.y;
-           ++y, ratio += ratio_pitch, box += tool.box.x, begin += pitch) {
+      std::int32_t first = area.box.y, last = -1;
+      V steps = Simd::zero();  // of 32 bits: up to 16 384 rows
+      for (std::int32_t y = 0; y <= area.size.y;
+           ++y, ratio += ratio_pitch, box += area.box.x, begin += pitch) {
         if (live[y] == 0) continue;
         const V rho = Simd::bit_xor(Simd::load(box), air);
         const V loss =
@@ -260,13 +261,14 @@ struct RowSums {
         Simd::write_loss(density, begin, count, rho, loss, lost);
       }
       if (last < 0) continue;
+      taken_steps = Simd::add64(taken_steps, Simd::widened(steps));
       cut.lo.y = first + 2 < cut.lo.y ? first + 2 : cut.lo.y;
       cut.hi.y = last + 2 > cut.hi.y ? last + 2 : cut.hi.y;
       cut.lo.z = z + 2 < cut.lo.z ? z + 2 : cut.lo.z;
       cut.hi.z = z + 2 > cut.hi.z ? z + 2 : cut.hi.z;
     }
     Simd::store(carry + x, owed);
-    cut.density_steps += static_cast<std::uint64_t>(Simd::sum64(Simd::widened(steps)));
+    cut.density_steps += static_cast<std::uint64_t>(Simd::sum64(taken_steps));
     if (changed == 0) continue;
     const std::int32_t low = x + __builtin_ctz(changed), high = x + 31 - __builtin_clz(changed);
     cut.lo.x = low < cut.lo.x ? low : cut.lo.x;
@@ -275,10 +277,10 @@ struct RowSums {
   return cut;
 }
 
-BoxCut cut(const TickBox& tool, const CutRate& rate, const VoxelGrid& grid, Density* density,
+BoxCut cut(const TickBox& area, const CutRate& rate, const VoxelGrid& grid, Density* density,
            VoxelIndex origin, const BoxScratch& scratch, std::uint16_t* carry) noexcept {
-  if (tool.row_lanes == 32) return cut_rows(tool, 32, rate, grid, density, origin, scratch, carry);
-  return cut_rows(tool, tool.row_lanes, rate, grid, density, origin, scratch, carry);
+  if (area.row_lanes == 32) return cut_rows(area, 32, rate, grid, density, origin, scratch, carry);
+  return cut_rows(area, area.row_lanes, rate, grid, density, origin, scratch, carry);
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The kernels of the plan `aligned` for any machine: the same tables, plain loops.
+// The kernels for any machine: the same tables, plain loops.
 #include <cstddef>
 #include <cstdint>
 

@@ -21,13 +21,15 @@ void place(const SampleTable& samples, const SamplePose& pose, const SplatScratc
   std::int32_t low[3], high[3];
   for (std::size_t axis = 0; axis < 3; ++axis) {
     std::int32_t* out = scratch.place[axis];
+    std::int32_t placed = 0;
+    for (; placed < samples.count; placed += kSampleGroup) {
+      place_along(samples, placed, pose.centre[axis], pose.step[axis], out + placed);
+    }
+    // Apart, so that it is a loop of vectors. The copies at the end do no harm.
     std::int32_t min = INT32_MAX, max = INT32_MIN;
-    for (std::int32_t first = 0; first < samples.count; first += kSampleGroup) {
-      place_along(samples, first, pose.centre[axis], pose.step[axis], out + first);
-      for (std::int32_t i = first; i < first + kSampleGroup; ++i) {  // copies at the end do no harm
-        min = out[i] < min ? out[i] : min;
-        max = out[i] > max ? out[i] : max;
-      }
+    for (std::int32_t i = 0; i < placed; ++i) {
+      min = out[i] < min ? out[i] : min;
+      max = out[i] > max ? out[i] : max;
     }
     low[axis] = min >> 16;
     high[axis] = max >> 16;
