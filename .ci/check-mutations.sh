@@ -41,7 +41,7 @@ controller/kernel/sets/correlate_vector.hpp | sums never widened | s/end - chunk
 controller/kernel/sets/correlate_vector.hpp | sums widened a chunk late | s/chunk \+ tool\.flush : end/chunk + tool.flush + 1 : end/
 controller/kernel/sets/box_vector.hpp | a shift of the removal | s/const std::int32_t s = exponent - 1;/const std::int32_t s = exponent;/
 controller/kernel/sets/avx2.cpp | the carry-out compares signed | s/_mm256_max_epu16\(sum, part\)/_mm256_max_epi16(sum, part)/
-controller/kernel/sets/avx2.cpp | rows written back from the box | s/V \/\*rho\*\//V rho/; s/sub16\(load\(density \+ begin\), loss\)/sub16(rho, loss)/
+controller/kernel/sets/avx2.cpp | rows written back from the box | s/V \/\*rho\*\//V rho/; s/write_whole<Simd>\(density, begin, count, loss, lost\)/store(density + begin, sub16(rho, loss))/
 controller/kernel/sets/avx512.cpp | the carry-out counts equality | s/_mm512_cmplt_epu16_mask/_mm512_cmple_epu16_mask/
 controller/kernel/sets/avx512.cpp | the mask of a loss is whole | s/density \+ begin, lost, sub16/density + begin, ~0u, sub16/
 controller/kernel/sets/avx512.cpp | sums no longer in registers | s/__asm__\("vpdpwssd.*/sum = _mm512_dpwssd_epi32(sum, a, b);/

@@ -266,10 +266,10 @@ TEST_CASE("a scene holds the arrays that it names, and no others") {
   Scene odd_cut = odd;
   odd_cut.cut.model = CutModel::overlap;
   odd_cut.volumes[0].image.labels.assign(odd_cut.volumes[0].image.density.size(), 1);
-  CHECK(arrays_of(odd_cut) == Names{"density of test", "labels of test", "carry of test",
-                                    "samples of cone", "ordered samples of cone", "box", "columns inside",
-                                    "overlap ratios", "filtered rows", "live rows", "sample places",
-                                    "overlap sums", "rest rows", "live rest rows"});
+  CHECK(arrays_of(odd_cut) ==
+        Names{"density of test", "labels of test", "carry of test", "samples of cone",
+              "ordered samples of cone", "box", "columns inside", "overlap ratios", "filtered rows",
+              "live rows", "sample places", "overlap sums", "rest rows", "live rest rows"});
   Scene floating = odd_cut;
   floating.servo.numeric = NumericKind::float64;
   CHECK(arrays_of(floating) == Names{"density of test", "labels of test", "gradient of test",
