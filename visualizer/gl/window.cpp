@@ -81,6 +81,7 @@ void Window::set_title(const std::string& title) {
 
 void Window::present(const RenderTarget& target) {
   const PictureSize size = target.size();
+  glDisable(GL_SCISSOR_TEST);
   glBlitNamedFramebuffer(target.framebuffer(), 0, 0, 0, size.width, size.height, 0, 0, size.width,
                          size.height, GL_COLOR_BUFFER_BIT, GL_NEAREST);
   glfwSwapBuffers(handle_);
