@@ -142,6 +142,21 @@ void Picture::smooth_edges(const RenderTarget& from, const RenderTarget& to) {
   glDrawArrays(GL_TRIANGLES, 0, 3);
 }
 
+Redrawn draw_measured(Picture& picture, const Session& session, const OverlayFigures& figures,
+                      const RenderTarget& target, FrameReport& report) {
+  const Stopwatch watch;
+  const Redrawn redrawn = picture.draw(session, figures, target);
+  if (!redrawn.any) {
+    ++report.rest_frames;
+    return redrawn;
+  }
+  glFinish();
+  report.wall_ms.push_back(watch.wall_ms());
+  report.cpu_ms.push_back(watch.cpu_ms());
+  report.redrawn.push_back(redrawn.share);
+  return redrawn;
+}
+
 OverlayFigures overlay_figures(const Session& session) {
   OverlayFigures figures;
   if (const auto& record = session.latest()) {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "visualizer/camera.hpp"
+#include "visualizer/frame_report.hpp"
 #include "visualizer/hand_painter.hpp"
 #include "visualizer/overlay.hpp"
 #include "visualizer/renderer.hpp"
@@ -84,6 +85,10 @@ class Picture {
   Overlay overlay_;
   std::uint64_t bricks_uploaded_ = 0;
 };
+
+/// `Picture::draw`, complete when it returns, with its times and what it did in the report.
+Redrawn draw_measured(Picture& picture, const Session& session, const OverlayFigures& figures,
+                      const RenderTarget& target, FrameReport& report);
 
 /// The figures of the panel as the session stands; the caller adds what it alone knows.
 [[nodiscard]] OverlayFigures overlay_figures(const Session& session);
