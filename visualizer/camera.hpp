@@ -28,6 +28,7 @@ struct View {
   double far_mm = 100.0;
 
   [[nodiscard]] glm::dmat4 clip_from_eye() const;
+  friend bool operator==(const View&, const View&) noexcept = default;
 };
 
 /// Turns about a point. Yaw 0 looks from +z (the user); pitch is the height above the horizon.

@@ -59,6 +59,8 @@ void FrameReport::write(const std::filesystem::path& file) const {
                                       {"frames", wall_ms.size()},
                                       {"cpu_ms", spread(cpu_ms)},
                                       {"wall_ms", spread(wall_ms)},
+                                      {"redrawn", spread(redrawn)},
+                                      {"rest_frames", rest_frames},
                                       {"bricks_uploaded", bricks_uploaded},
                                       {"attach_ms", attach_ms},
                                       {"late_join_ms", late_join_ms},

@@ -25,7 +25,8 @@ class Stopwatch {
 /// Nearest-rank percentile, `share` in 0..1; 0 for nothing.
 [[nodiscard]] double percentile(std::vector<double> values, double share);
 
-/// What a run measured; times in ms, per drawn frame.
+/// What a run measured; times in ms, per drawn frame. A frame in which nothing had changed is a
+/// rest frame: nothing is drawn for it.
 struct FrameReport {
   std::string renderer{};
   std::string gl_renderer{};
@@ -36,8 +37,10 @@ struct FrameReport {
   double attach_ms = 0.0;     ///< from asking for the controller to its first complete volumes
   double late_join_ms = 0.0;  ///< from there to the first picture: textures, shaders, drawing
   bool clean_end = false;
+  std::uint64_t rest_frames = 0;
   std::vector<double> cpu_ms{};
   std::vector<double> wall_ms{};
+  std::vector<double> redrawn{};  ///< share of the picture whose volumes were drawn again
 
   /// As JSON, whole or not at all; throws VisualizerError.
   void write(const std::filesystem::path& file) const;

@@ -43,11 +43,7 @@ class FrameTaker {
   void draw(const Session& session) {
     OverlayFigures figures = overlay_figures(session);
     if (!report_.wall_ms.empty()) figures.frame_rate_hz = kMsPerS / report_.wall_ms.back();
-    const Stopwatch watch;
-    picture_.draw(session, figures, target_);
-    glFinish();
-    report_.wall_ms.push_back(watch.wall_ms());
-    report_.cpu_ms.push_back(watch.cpu_ms());
+    draw_measured(picture_, session, figures, target_, report_);
   }
   void write(const std::filesystem::path& file) const {
     write_png(file, target_.size(), target_.read_rgb());
@@ -82,6 +78,7 @@ int run_headless(const VisualizerOptions& options) {
   report.late_join_ms = since_attached.wall_ms();
   report.cpu_ms.clear();
   report.wall_ms.clear();
+  report.redrawn.clear();
 
   FrameSchedule schedule(options.frames, ticks_between(options, session.tick_ns()));
   bool over = false;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <string_view>
 
 #include <backends/imgui_impl_opengl3.h>
@@ -101,7 +102,21 @@ void key_help(ImVec2 size) {
   ImGui::End();
 }
 
+double rounded_to(double step, double value) {
+  return std::round(value / step) * step;
+}
+
 }  // namespace
+
+OverlayFigures OverlayFigures::rounded() const {
+  OverlayFigures shown = *this;
+  shown.force_n = rounded_to(0.01, force_n);
+  shown.removed_mm3 = rounded_to(0.01, removed_mm3);
+  if (tick_rate_hz) shown.tick_rate_hz = rounded_to(1.0, *tick_rate_hz);
+  if (frame_rate_hz) shown.frame_rate_hz = rounded_to(1.0, *frame_rate_hz);
+  if (data_age_ms) shown.data_age_ms = rounded_to(0.1, *data_age_ms);
+  return shown;
+}
 
 Overlay::Overlay() {
   ImGui::CreateContext();

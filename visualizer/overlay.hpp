@@ -20,6 +20,10 @@ struct OverlayFigures {
   std::optional<double> data_age_ms;
   std::string banner;  ///< shown large; empty: nothing is wrong
   bool help = false;   ///< shows the keys
+
+  /// As far as the panel shows them: two equal ones look alike.
+  [[nodiscard]] OverlayFigures rounded() const;
+  friend bool operator==(const OverlayFigures&, const OverlayFigures&) noexcept = default;
 };
 
 /// The panel over the picture, by Dear ImGui; it takes no input, so it needs no window. One at a

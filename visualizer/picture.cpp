@@ -4,38 +4,39 @@
 #include <algorithm>
 #include <cmath>
 
+#include "visualizer/screen_bounds.hpp"
+
 namespace kerf {
 
 namespace {
 
-constexpr double kStaleMs = 100.0;       // a servo that is alive beats each tick
-constexpr double kArrowRadiiPerN = 0.3;  // 1 N: 0.3 radii of the box; 3.3 N about one radius
-constexpr double kArrowThickness = 0.014;
-constexpr double kLeastArrowN = 0.01;  // below, the report does not count a contact either
-constexpr double kToolRoom = 1.5;  // radii around the volumes in which the tool is never clipped
-const Paint kSteel{.colour = {0.60F, 0.60F, 0.61F}, .metal = true};
-const Paint kForce{.colour = {0.75F, 0.13F, 0.01F}, .metal = false};  // vermillion
-
+constexpr double kStaleMs = 100.0;  // a servo that is alive beats each tick
+constexpr double kToolRoom = 1.5;   // radii around the volumes in which the tool is never clipped
 glm::dvec3 vec3(const float (&v)[3]) {
   return {v[0], v[1], v[2]};
 }
-glm::dvec3 vec3(const double (&v)[3]) {
-  return {v[0], v[1], v[2]};
+
+/// Half the diagonal of its box.
+double size_of(const VolumeView& volume) {
+  const BoxCorners box = volume.corners();
+  return 0.5 * glm::length(box.back() - box.front());
 }
 
 }  // namespace
 
 Picture::Picture(const Session& session, std::string_view renderer, double aspect)
-    : scene_(session.scene()), renderer_(make_renderer(renderer, scene_, session.contents())) {
+    : scene_(session.scene()),
+      renderer_(make_renderer(renderer, scene_, session.contents())),
+      stale_bricks_(scene_.volumes.size()),
+      hand_painter_(scene_, size_of(scene_.main_volume())) {
   const BoxCorners box = scene_.main_volume().corners();
   centre_mm_ = 0.5 * (box.front() + box.back());
-  radius_mm_ = glm::length(box.front() - centre_mm_);
+  radius_mm_ = size_of(scene_.main_volume());
   for (const VolumeView& volume : scene_.volumes) {
     for (const glm::dvec3& corner : volume.corners()) {
       reach_mm_ = std::max(reach_mm_, glm::length(corner - centre_mm_));
     }
   }
-  for (const ToolView& tool : scene_.tools) tools_.emplace_back(tool_mesh(tool.profile_mm));
   for (const VolumeView& volume : scene_.volumes) bricks_uploaded_ += volume.bricks.count();
   reset_camera(aspect);
 }
@@ -49,20 +50,74 @@ void Picture::update(const Session& session) {
     const VolumeSnapshot& snapshot = session.snapshot(v);
     renderer_->update(v, snapshot.density, snapshot.changed);
     bricks_uploaded_ += snapshot.changed.size();
+    stale_bricks_[v].insert(stale_bricks_[v].end(), snapshot.changed.begin(),
+                            snapshot.changed.end());
   }
 }
 
-void Picture::draw(const Session& session, const OverlayFigures& figures,
-                   const RenderTarget& target) {
+Redrawn Picture::draw(const Session& session, const OverlayFigures& figures,
+                      const RenderTarget& target) {
   const PictureSize size = target.size();
   const double aspect = static_cast<double>(size.width) / size.height;
   const View view = camera_.view(aspect, reach_mm_ + kToolRoom * radius_mm_);
-  if (!stage_ || stage_->size() != size) stage_.emplace(size);
-  draw_backdrop(*stage_);
-  renderer_->draw(view, *stage_);
-  if (session.latest()) draw_tool(*session.latest(), view, *stage_);
-  smooth_edges(*stage_, target);
-  overlay_.draw(figures, target);
+  std::optional<Hand> hand;
+  if (session.latest()) hand = hand_of(*session.latest());
+
+  const bool fresh = !layers_ || layers_->stage.size() != size;
+  if (fresh) layers_.emplace(size);
+  PixelRect volumes = target.all(), stage = target.all();
+  if (!fresh && view == shown_.view) {
+    volumes = stale_volumes(view, size);
+    stage = volumes.united(stale_hand(hand, view, size));
+    if (renderer_->translucent()) volumes = stage;  // the hand is under them
+  }
+  const OverlayFigures panel = figures.rounded();
+  const bool same_panel = panel == shown_.figures && target.framebuffer() == shown_.target;
+  for (auto& bricks : stale_bricks_) bricks.clear();
+  if (stage.empty() && same_panel) return {};
+
+  if (!stage.empty()) draw_layers(hand, view, volumes, stage);
+  target.copy(layers_->smooth, target.all());
+  overlay_.draw(panel, target);
+  glDisable(GL_SCISSOR_TEST);
+  shown_ = {view, hand, panel, target.framebuffer()};
+  return {true, static_cast<double>(volumes.area()) / target.all().area()};
+}
+
+PixelRect Picture::stale_volumes(const View& view, PictureSize size) const {
+  PixelRect stale;
+  for (std::size_t v = 0; v < scene_.volumes.size(); ++v) {
+    stale = stale.united(brick_bounds(scene_.volumes[v], stale_bricks_[v], view, size));
+  }
+  return stale;
+}
+
+PixelRect Picture::stale_hand(const std::optional<Hand>& hand, const View& view,
+                              PictureSize size) const {
+  if (hand == shown_.hand) return {};
+  PixelRect stale;
+  for (const auto& one : {hand, shown_.hand}) {
+    if (one) stale = stale.united(hand_painter_.bounds(*one, view, size));
+  }
+  return stale;
+}
+
+void Picture::draw_layers(const std::optional<Hand>& hand, const View& view, PixelRect volumes,
+                          PixelRect stage) {
+  const bool hand_first = renderer_->translucent();
+  if (!volumes.empty()) {
+    layers_->volumes.restrict_to(volumes);
+    draw_backdrop(layers_->volumes);
+    if (hand && hand_first) hand_painter_.draw(*hand, view, layers_->volumes);
+    layers_->volumes.bind();
+    renderer_->draw(view, layers_->volumes);
+  }
+  layers_->stage.restrict_to(stage);
+  layers_->stage.copy(layers_->volumes, stage);
+  if (hand && !hand_first) hand_painter_.draw(*hand, view, layers_->stage);
+  constexpr int kSmoothingReach = 3;  // pixels
+  layers_->smooth.restrict_to(stage.grown(kSmoothingReach));
+  smooth_edges(layers_->stage, layers_->smooth);
 }
 
 void Picture::draw_backdrop(const RenderTarget& target) {
@@ -87,22 +142,19 @@ void Picture::smooth_edges(const RenderTarget& from, const RenderTarget& to) {
   glDrawArrays(GL_TRIANGLES, 0, 3);
 }
 
-void Picture::draw_tool(const TickRecord& record, const View& view, const RenderTarget& target) {
-  const glm::dvec3 tip_mm = vec3(record.position_mm);
-  const auto& q = record.orientation;
-  if (record.active_tool < tools_.size()) {
-    painter_.draw(tools_[record.active_tool], rigid(tip_mm, {q[0], q[1], q[2], q[3]}), kSteel, view,
-                  target);
+Redrawn draw_measured(Picture& picture, const Session& session, const OverlayFigures& figures,
+                      const RenderTarget& target, FrameReport& report) {
+  const Stopwatch watch;
+  const Redrawn redrawn = picture.draw(session, figures, target);
+  if (!redrawn.any) {
+    ++report.rest_frames;
+    return redrawn;
   }
-  const glm::dvec3 force_n = vec3(record.commanded_force_n);
-  const double strength_n = glm::length(force_n);
-  if (strength_n < kLeastArrowN) return;
-  // From the surface of the head outwards: inside it a small force would not be seen.
-  const double head_mm =
-      record.active_tool < tools_.size() ? scene_.tools[record.active_tool].radius_mm : 0.0;
-  painter_.draw_arrow(tip_mm + force_n * (head_mm / strength_n),
-                      force_n * (kArrowRadiiPerN * radius_mm_), kArrowThickness * radius_mm_,
-                      kForce, view, target);
+  glFinish();
+  report.wall_ms.push_back(watch.wall_ms());
+  report.cpu_ms.push_back(watch.cpu_ms());
+  report.redrawn.push_back(redrawn.share);
+  return redrawn;
 }
 
 OverlayFigures overlay_figures(const Session& session) {

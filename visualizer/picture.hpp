@@ -8,12 +8,19 @@
 #include <vector>
 
 #include "visualizer/camera.hpp"
-#include "visualizer/mesh_painter.hpp"
+#include "visualizer/frame_report.hpp"
+#include "visualizer/hand_painter.hpp"
 #include "visualizer/overlay.hpp"
 #include "visualizer/renderer.hpp"
 #include "visualizer/session.hpp"
 
 namespace kerf {
+
+/// What a call of `Picture::draw` did.
+struct Redrawn {
+  bool any = false;    ///< false: nothing had changed, nothing was drawn
+  double share = 0.0;  ///< of the picture's pixels: where volumes were drawn again
+};
 
 /// Everything that is seen of one session: backdrop, volumes, tool, force arrow, panel.
 ///
@@ -26,8 +33,13 @@ class Picture {
   /// Uploads the bricks that the last `poll` changed. Call once after each `poll`.
   void update(const Session& session);
 
-  /// Draws the present state whole into `target`; its depth is not used.
-  void draw(const Session& session, const OverlayFigures& figures, const RenderTarget& target);
+  /// Draws the present state into `target`; its depth is not used. `target` holds what the last
+  /// call left there, and so do the layers of the picture: while the camera rests only the part of
+  /// the screen is drawn again where bricks changed or where the tool was or is. The result is that
+  /// of drawing everything.
+  Redrawn draw(const Session& session, const OverlayFigures& figures, const RenderTarget& target);
+  /// The next `draw` draws everything.
+  void redraw_all() noexcept { layers_.reset(); }
 
   [[nodiscard]] OrbitCamera& camera() noexcept { return camera_; }
   void reset_camera(double aspect);
@@ -36,7 +48,12 @@ class Picture {
  private:
   void draw_backdrop(const RenderTarget& target);
   void smooth_edges(const RenderTarget& from, const RenderTarget& to);
-  void draw_tool(const TickRecord& record, const View& view, const RenderTarget& target);
+  /// Pixels that changed densities and, where it moved, the hand change.
+  [[nodiscard]] PixelRect stale_volumes(const View& view, PictureSize size) const;
+  [[nodiscard]] PixelRect stale_hand(const std::optional<Hand>& hand, const View& view,
+                                     PictureSize size) const;
+  void draw_layers(const std::optional<Hand>& hand, const View& view, PixelRect volumes,
+                   PixelRect stage);
 
   SceneView scene_;
   std::unique_ptr<Renderer> renderer_;
@@ -46,13 +63,32 @@ class Picture {
   double reach_mm_ = 1.0;  ///< from that centre to the farthest corner of any volume
   GlProgram backdrop_{"screen.vert", "backdrop.frag"};
   GlProgram smooth_{"screen.vert", "smooth.frag"};
-  std::optional<RenderTarget> stage_;  ///< the picture before its edges are smoothed
+  /// The picture as it grows, kept from frame to frame.
+  struct Layers {
+    explicit Layers(PictureSize size) : volumes(size), stage(size), smooth(size) {}
+    RenderTarget volumes;  ///< backdrop and volumes; the hand too where they are translucent
+    RenderTarget stage;    ///< with the hand
+    RenderTarget smooth;   ///< with smoothed edges
+  };
+  /// What the layers show.
+  struct Shown {
+    View view;
+    std::optional<Hand> hand;
+    OverlayFigures figures;
+    GLuint target = 0;
+  };
+  std::optional<Layers> layers_;
+  Shown shown_;
+  std::vector<std::vector<std::uint32_t>> stale_bricks_;  ///< by volume, since the last `draw`
   GlVertexArray no_vertices_ = GlVertexArray::create();
-  std::vector<GpuMesh> tools_;
-  MeshPainter painter_;
+  HandPainter hand_painter_;
   Overlay overlay_;
   std::uint64_t bricks_uploaded_ = 0;
 };
+
+/// `Picture::draw`, complete when it returns, with its times and what it did in the report.
+Redrawn draw_measured(Picture& picture, const Session& session, const OverlayFigures& figures,
+                      const RenderTarget& target, FrameReport& report);
 
 /// The figures of the panel as the session stands; the caller adds what it alone knows.
 [[nodiscard]] OverlayFigures overlay_figures(const Session& session);

@@ -41,6 +41,12 @@ std::unique_ptr<Renderer> make_renderer(std::string_view kind, const SceneView& 
   return find_kind(kind).make(scene, contents);
 }
 
+std::vector<std::string_view> renderer_kinds() {
+  std::vector<std::string_view> names;
+  for (const Kind& kind : kKinds) names.push_back(kind.name);
+  return names;
+}
+
 void check_renderer(std::string_view kind) {
   static_cast<void>(find_kind(kind));
 }

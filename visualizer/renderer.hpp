@@ -5,6 +5,7 @@
 #include <memory>
 #include <span>
 #include <string_view>
+#include <vector>
 
 #include "visualizer/camera.hpp"
 #include "visualizer/gl/target.hpp"
@@ -24,13 +25,18 @@ class Renderer {
   /// Brick ids `changed` of a volume differ from what was drawn last; `density` is all of it.
   virtual void update(std::size_t volume, std::span<const Density> density,
                       std::span<const std::uint32_t> changed) = 0;
-  /// Draws over what is in `target`, under its depth test.
+  /// Draws over what is in `target`, under its depth test, within its part.
   virtual void draw(const View& view, const RenderTarget& target) = 0;
+  /// Lets what lies behind a surface shine through, so that it must be drawn before.
+  [[nodiscard]] virtual bool translucent() const noexcept { return false; }
 };
 
 /// `kind` as on the command line; throws VisualizerError for an unknown one and names the known.
 [[nodiscard]] std::unique_ptr<Renderer> make_renderer(std::string_view kind, const SceneView& scene,
                                                       std::span<const VolumeContent> contents);
+
+/// All that `make_renderer` knows.
+[[nodiscard]] std::vector<std::string_view> renderer_kinds();
 
 /// Throws as `make_renderer` does; needs no GL context.
 void check_renderer(std::string_view kind);

@@ -130,15 +130,6 @@ class Followed {
   Clock::time_point next_attach_{};
 };
 
-void draw_measured(Followed& followed, const OverlayFigures& figures, const RenderTarget& target,
-                   FrameReport& report) {
-  const Stopwatch watch;
-  followed.picture().draw(followed.session(), figures, target);
-  glFinish();
-  report.wall_ms.push_back(watch.wall_ms());
-  report.cpu_ms.push_back(watch.cpu_ms());
-}
-
 }  // namespace
 
 int run_window(const VisualizerOptions& options) {
@@ -165,7 +156,8 @@ int run_window(const VisualizerOptions& options) {
     const PictureSize size = window.size();
     const bool visible = size.width > 0 && size.height > 0;
     if (visible) aspect = static_cast<double>(size.width) / size.height;
-    if (controls.apply(window.poll(), followed.session(), followed.picture(), aspect)) break;
+    const WindowInput input = window.poll();
+    if (controls.apply(input, followed.session(), followed.picture(), aspect)) break;
     followed.update(aspect);
     if (visible) {
       if (!target || target->size() != size) target.emplace(size);
@@ -173,11 +165,12 @@ int run_window(const VisualizerOptions& options) {
       OverlayFigures figures = overlay_figures(followed.session());
       figures.frame_rate_hz = rate.hz();
       figures.help = controls.help;
-      draw_measured(followed, figures, *target, report);
+      const Redrawn redrawn =
+          draw_measured(followed.picture(), followed.session(), figures, *target, report);
       if (report.wall_ms.size() == 1) report.late_join_ms = since_attached.wall_ms();
       if (controls.screenshot) take_screenshot(options.out, *target);
       controls.screenshot = false;
-      window.present(*target);
+      if (redrawn.any || input.exposed) window.present(*target);
       report.width = size.width;
       report.height = size.height;
     }

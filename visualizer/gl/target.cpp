@@ -19,7 +19,7 @@ void flip_rows(std::vector<T>& picture, std::size_t row, std::size_t rows) {
 
 }  // namespace
 
-RenderTarget::RenderTarget(PictureSize size) : size_(size) {
+RenderTarget::RenderTarget(PictureSize size) : size_(size), part_(all()) {
   glTextureStorage2D(colour_.id(), 1, GL_RGBA8, size.width, size.height);
   glTextureParameteri(colour_.id(), GL_TEXTURE_MIN_FILTER, GL_LINEAR);
   glTextureParameteri(colour_.id(), GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
@@ -32,6 +32,19 @@ RenderTarget::RenderTarget(PictureSize size) : size_(size) {
 void RenderTarget::bind() const {
   glBindFramebuffer(GL_FRAMEBUFFER, framebuffer_.id());
   glViewport(0, 0, size_.width, size_.height);
+  glEnable(GL_SCISSOR_TEST);
+  glScissor(part_.x0, part_.y0, std::max(part_.x1 - part_.x0, 0), std::max(part_.y1 - part_.y0, 0));
+}
+
+void RenderTarget::copy(const RenderTarget& from, const PixelRect& part) const {
+  const PixelRect r = part.clipped(all());
+  if (r.empty()) return;
+  const auto copy_texture = [&](const GlTexture2D& source, const GlTexture2D& to) {
+    glCopyImageSubData(source.id(), GL_TEXTURE_2D, 0, r.x0, r.y0, 0, to.id(), GL_TEXTURE_2D, 0,
+                       r.x0, r.y0, 0, r.x1 - r.x0, r.y1 - r.y0, 1);
+  };
+  copy_texture(from.colour_, colour_);
+  copy_texture(from.depth_, depth_);
 }
 
 std::vector<std::uint8_t> RenderTarget::read_rgb() const {

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "visualizer/gl/names.hpp"
+#include "visualizer/pixel_rect.hpp"
 
 namespace kerf {
 
@@ -25,8 +26,15 @@ class RenderTarget {
   [[nodiscard]] GLuint colour_texture() const noexcept { return colour_.id(); }
   [[nodiscard]] GLuint framebuffer() const noexcept { return framebuffer_.id(); }
 
-  /// Makes it the place to draw, with its whole size as the viewport.
+  [[nodiscard]] PixelRect all() const noexcept { return {0, 0, size_.width, size_.height}; }
+  /// The part that may be drawn; all of it at first.
+  [[nodiscard]] const PixelRect& part() const noexcept { return part_; }
+  void restrict_to(const PixelRect& part) noexcept { part_ = part.clipped(all()); }
+
+  /// Makes it the place to draw, with its whole size as the viewport and its part as the scissor.
   void bind() const;
+  /// Takes colour and depth of `part` over from a target of the same size.
+  void copy(const RenderTarget& from, const PixelRect& part) const;
   /// RGB, 3 bytes per pixel, first row at the top. Waits until the picture is complete.
   [[nodiscard]] std::vector<std::uint8_t> read_rgb() const;
   /// Window depth 0..1, first row at the top.
@@ -34,6 +42,7 @@ class RenderTarget {
 
  private:
   PictureSize size_;
+  PixelRect part_;
   GlTexture2D colour_ = GlTexture2D::create();
   GlTexture2D depth_ = GlTexture2D::create();
   GlFramebuffer framebuffer_ = GlFramebuffer::create();

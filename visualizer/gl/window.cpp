@@ -60,6 +60,7 @@ Window::Window(PictureSize size, Visibility visibility) {
   glfwSetKeyCallback(handle_, on_key);
   glfwSetCursorPosCallback(handle_, on_cursor);
   glfwSetScrollCallback(handle_, on_scroll);
+  glfwSetWindowRefreshCallback(handle_, on_exposed);
   glfwMakeContextCurrent(handle_);
   glfwSwapInterval(1);
 }
@@ -79,8 +80,13 @@ void Window::set_title(const std::string& title) {
   glfwSetWindowTitle(handle_, title.c_str());
 }
 
+void Window::on_exposed(GLFWwindow* handle) {
+  window_of(handle).input_.exposed = true;
+}
+
 void Window::present(const RenderTarget& target) {
   const PictureSize size = target.size();
+  glDisable(GL_SCISSOR_TEST);
   glBlitNamedFramebuffer(target.framebuffer(), 0, 0, 0, size.width, size.height, 0, 0, size.width,
                          size.height, GL_COLOR_BUFFER_BIT, GL_NEAREST);
   glfwSwapBuffers(handle_);

@@ -19,6 +19,7 @@ struct WindowInput {
   double move_right = 0.0, move_up = 0.0;
   double wheel = 0.0;
   std::vector<char> keys;  ///< lower-case letters and digits, in order
+  bool exposed = false;    ///< what the window showed is lost: `present` again
   bool close = false;
 };
 
@@ -46,6 +47,7 @@ class Window final : public GlContext {
   static void on_key(GLFWwindow* handle, int key, int scancode, int action, int mods);
   static void on_cursor(GLFWwindow* handle, double x, double y);
   static void on_scroll(GLFWwindow* handle, double x, double y);
+  static void on_exposed(GLFWwindow* handle);
 
   GLFWwindow* handle_ = nullptr;
   WindowInput input_;

@@ -1,0 +1,204 @@
+// SPDX-License-Identifier: Apache-2.0
+// Partial redraw: the same pixels as drawing everything, for every renderer.
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <random>
+#include <string>
+#include <vector>
+
+#include <doctest/doctest.h>
+#include <unistd.h>
+
+#include "shared/segment/hand_over.hpp"
+#include "shared/segment/writer.hpp"
+#include "tests/visualizer/gl_fixture.hpp"
+#include "visualizer/gl/context.hpp"
+#include "visualizer/picture.hpp"
+#include "visualizer/screen_bounds.hpp"
+
+using namespace kerf;
+using namespace kerf::test;
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr const char* kScene = R"({
+  "volumes": [{"name": "upper", "solid": true}, {"name": "lower", "solid": true}],
+  "tools": [{"name": "ball", "profile": [[-2, 0], [-1.4, 1.4], [0, 2], [1.4, 1.4], [2, 0]]},
+            {"name": "pin", "profile": [[0, 0], [0.5, 0.8], [6, 0.8]]}],
+  "materials": [{"name": "none", "iso": 0, "colour": [0, 0, 0]},
+                {"name": "dentin", "iso": 0.3, "colour": [0.8, 0.7, 0.5]},
+                {"name": "enamel", "iso": 0.7, "colour": [0.9, 0.9, 0.85]}]})";
+
+/// A controller in this process with two volumes that stand across each other.
+class Controller {
+ public:
+  Controller() : writer_(SegmentWriter::create(spec())), server_("redraw", writer_) {
+    writer_.set_lifecycle(Lifecycle::run);
+    move({});
+  }
+
+  /// Cuts a box of volume `v` to `left` of its density.
+  void cut(std::size_t v, const VoxelBox& box, double left) {
+    begin();
+    const VoxelGrid& grid = writer_grid(v);
+    std::vector<Density>& density = density_[v];
+    std::uint32_t removed = 0;
+    const VoxelBox inside = box.clipped(grid.box());
+    for (int z = inside.lo.z; z < inside.hi.z; ++z) {
+      for (int y = inside.lo.y; y < inside.hi.y; ++y) {
+        for (int x = inside.lo.x; x < inside.hi.x; ++x) {
+          Density& at = density[grid.index(x, y, z)];
+          const auto now = static_cast<Density>(at * left);
+          removed += static_cast<std::uint32_t>(at - now);
+          at = now;
+        }
+      }
+    }
+    if (!inside.empty()) writer_.publish_box(v, density, inside, removed);
+    end();
+  }
+  void move(const Hand& hand) {
+    hand_ = hand;
+    begin();
+    end();
+  }
+
+ private:
+  static constexpr VoxelGrid kUpper{40, 32, 28};
+  static constexpr VoxelGrid kLower{24, 48, 30};
+  static const VoxelGrid& writer_grid(std::size_t v) { return v == 0 ? kUpper : kLower; }
+
+  SegmentSpec spec() {
+    SegmentSpec spec;
+    spec.scene_json = kScene;
+    for (std::size_t v = 0; v < 2; ++v) {
+      const VoxelGrid& grid = writer_grid(v);
+      std::vector<Density>& density = density_[v];
+      for (int z = 0; z < grid.nz; ++z) {
+        for (int y = 0; y < grid.ny; ++y) {
+          for (int x = 0; x < grid.nx; ++x) {
+            // A block with a pit, whose walls darken each other.
+            const bool pit =
+                std::abs(x - grid.nx / 2) < 6 && std::abs(z - grid.nz / 2) < 6 && y > 6;
+            const bool border = x < 2 || y < 2 || z < 2 || x > grid.nx - 3 || z > grid.nz - 3;
+            density.push_back(pit || border ? Density{0} : Density(y > 20 ? 65535 : 39'000));
+          }
+        }
+      }
+      SegmentVolumeSpec& volume = spec.volumes.emplace_back();
+      volume.grid = grid;
+      volume.spacing_mm = {0.5, 0.5, v == 0 ? 0.5 : 0.7};
+      volume.origin_mm = {v == 0 ? -10.0 : -4.0, -8.0, -7.0 + 3.0 * static_cast<double>(v)};
+      if (v == 1) volume.orientation = {0.0F, 0.0F, 0.3826834F, 0.9238795F};
+      volume.iso = 29'000;
+      volume.density = density;
+    }
+    return spec;
+  }
+  void begin() { writer_.begin_tick(++now_); }
+  void end() {
+    TickRecord record{};
+    record.tick = now_;
+    record.flags = kFlagArmed;
+    for (int i = 0; i < 3; ++i) {
+      record.position_mm[i] = hand_.tip_mm[i];
+      record.commanded_force_n[i] = static_cast<float>(hand_.force_n[i]);
+    }
+    for (int i = 0; i < 4; ++i) record.orientation[i] = static_cast<float>(hand_.orientation[i]);
+    record.active_tool = hand_.tool;
+    writer_.publish_state(record);
+    writer_.end_tick(0);
+  }
+
+  std::vector<Density> density_[2];
+  SegmentWriter writer_;
+  SegmentServer server_;
+  Hand hand_;
+  Tick now_ = 0;
+};
+
+/// A private folder for the controller's socket.
+struct Place {
+  fs::path path = fs::temp_directory_path() / ("kerf-redraw-" + std::to_string(::getpid()));
+  Place() {
+    fs::create_directories(path);
+    setenv("XDG_RUNTIME_DIR", path.c_str(), 1);
+  }
+  ~Place() { fs::remove_all(path); }
+};
+
+}  // namespace
+
+TEST_CASE("after any change the part that is drawn again makes the picture of drawing everything") {
+  if (!have_gl()) return;
+  const Place place;
+  for (const std::string_view kind : renderer_kinds()) {
+    CAPTURE(std::string(kind));
+    std::mt19937 random(3);
+    const auto below = [&](int n) { return static_cast<int>(random() % static_cast<unsigned>(n)); };
+    Controller controller;
+    Session session("redraw");
+    session.poll();
+    Picture picture(session, kind, 4.0 / 3.0);
+    const RenderTarget target({160, 120});
+    const OverlayFigures figures;
+    static_cast<void>(picture.draw(session, figures, target));
+    double redrawn = 0;
+    int parts = 0;
+    for (int edit = 0; edit < 200; ++edit) {
+      if (edit % 3 != 2) {
+        const VoxelIndex at{below(36), below(40), below(26)};
+        const int edge = 1 + below(4);
+        controller.cut(static_cast<std::size_t>(below(2)),
+                       {at, {at.x + edge, at.y + edge, at.z + edge}}, 0.25 * below(3));
+      }
+      if (edit % 4 == 3) {
+        Hand hand;
+        hand.tip_mm = {below(20) - 10.0, below(16) - 6.0, below(12) - 4.0};
+        hand.tool = static_cast<std::uint32_t>(below(2));
+        if (below(2) == 0) hand.force_n = {0.1 * below(20), 0.3, -0.2};
+        controller.move(hand);
+      }
+      if (edit % 10 == 9) picture.camera().orbit(0.05, 0.01);
+      session.poll();
+      picture.update(session);
+      const Redrawn part = picture.draw(session, figures, target);
+      const auto seen = target.read_rgb();
+      if (edit % 10 != 9) {
+        redrawn += part.share;
+        ++parts;
+      }
+      picture.redraw_all();
+      CHECK(picture.draw(session, figures, target).share == 1.0);
+      const bool same = seen == target.read_rgb();
+      if (!same) INFO("edit ", edit);
+      REQUIRE(same);
+      // At rest nothing is drawn.
+      session.poll();
+      picture.update(session);
+      CHECK_FALSE(picture.draw(session, figures, target).any);
+    }
+    CHECK(redrawn / parts < 0.6);
+    throw_on_gl_error();
+  }
+}
+
+TEST_CASE("bounds on the screen hold all that is inside a box, and the whole screen near the eye") {
+  const View view = look_at({0, 0, 10}, {0, 0, 0}, 1, 100);
+  const PictureSize size{200, 100};
+  std::vector<glm::dvec3> corners{{-0.5, -0.5, -0.5}, {0.5, 0.5, 0.5}};
+  View wide = view;
+  wide.aspect = 2.0;
+  const PixelRect bounds = screen_bounds(corners, wide, size);
+  CHECK(bounds.x0 > 60);
+  CHECK(bounds.x1 < 140);
+  CHECK(bounds.y0 >= 0);
+  CHECK(bounds.y1 <= 100);
+  CHECK(bounds.x0 + bounds.x1 == doctest::Approx(200).epsilon(0.05));
+  corners.emplace_back(0, 0, 9.5);
+  CHECK(screen_bounds(corners, wide, size) == PixelRect{0, 0, 200, 100});
+  corners = {{100, 0, 0}, {101, 1, 1}};
+  CHECK(screen_bounds(corners, wide, size).empty());
+}

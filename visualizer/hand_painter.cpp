@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "visualizer/hand_painter.hpp"
+
+#include <limits>
+#include <vector>
+
+#include "visualizer/screen_bounds.hpp"
+
+namespace kerf {
+
+namespace {
+
+constexpr double kArrowScalesPerN = 0.3;  // 1 N: 0.3 of the scale; 3.3 N about one
+constexpr double kArrowThickness = 0.014;
+constexpr double kArrowHeadRadii = 2.2;
+constexpr double kLeastArrowN = 0.01;  // below, the report does not count a contact either
+const Paint kSteel{.colour = {0.60F, 0.60F, 0.61F}, .metal = true};
+const Paint kForce{.colour = {0.75F, 0.13F, 0.01F}, .metal = false};  // vermillion
+
+glm::dmat4 pose_of(const Hand& hand) {
+  return rigid(hand.tip_mm, hand.orientation);
+}
+
+}  // namespace
+
+Hand hand_of(const TickRecord& record) {
+  const auto& p = record.position_mm;
+  const auto& q = record.orientation;
+  const auto& f = record.commanded_force_n;
+  return {{p[0], p[1], p[2]}, {q[0], q[1], q[2], q[3]}, record.active_tool, {f[0], f[1], f[2]}};
+}
+
+HandPainter::HandPainter(const SceneView& scene, double scale_mm) : scale_mm_(scale_mm) {
+  for (const ToolView& tool : scene.tools) {
+    const Mesh mesh = tool_mesh(tool.profile_mm);
+    glm::dvec3 low(std::numeric_limits<double>::max()), high(-low);
+    for (const Mesh::Vertex& vertex : mesh.vertices) {
+      low = glm::min(low, glm::dvec3(vertex.position));
+      high = glm::max(high, glm::dvec3(vertex.position));
+    }
+    tools_.push_back({GpuMesh(mesh), low, high, tool.radius_mm});
+  }
+}
+
+HandPainter::Arrow HandPainter::arrow_of(const Hand& hand) const {
+  const double strength_n = glm::length(hand.force_n);
+  if (strength_n < kLeastArrowN) return {hand.tip_mm, glm::dvec3(0.0), 0.0};
+  // From the surface of the head outwards: inside it a small force would not be seen.
+  const double head_mm = hand.tool < tools_.size() ? tools_[hand.tool].radius_mm : 0.0;
+  return {hand.tip_mm + hand.force_n * (head_mm / strength_n),
+          hand.force_n * (kArrowScalesPerN * scale_mm_), kArrowThickness * scale_mm_};
+}
+
+void HandPainter::draw(const Hand& hand, const View& view, const RenderTarget& target) {
+  if (hand.tool < tools_.size()) {
+    painter_.draw(tools_[hand.tool].mesh, pose_of(hand), kSteel, view, target);
+  }
+  const Arrow arrow = arrow_of(hand);
+  if (arrow.thickness_mm == 0.0) return;
+  painter_.draw_arrow(arrow.foot_mm, arrow.way_mm, arrow.thickness_mm, kForce, view, target);
+}
+
+PixelRect HandPainter::bounds(const Hand& hand, const View& view, PictureSize size) const {
+  std::vector<glm::dvec3> corners;
+  const auto add_box = [&](const glm::dmat4& pose, const glm::dvec3& low, const glm::dvec3& high) {
+    for (int c = 0; c < 8; ++c) {
+      const glm::dvec3 side(c & 1, c >> 1 & 1, c >> 2);
+      corners.emplace_back(pose * glm::dvec4(glm::mix(low, high, side), 1.0));
+    }
+  };
+  if (hand.tool < tools_.size()) {
+    const Tool& tool = tools_[hand.tool];
+    if (tool.low_mm.x <= tool.high_mm.x) add_box(pose_of(hand), tool.low_mm, tool.high_mm);
+  }
+  const Arrow arrow = arrow_of(hand);
+  if (arrow.thickness_mm > 0.0) {
+    const glm::dvec3 around(kArrowHeadRadii * arrow.thickness_mm),
+        end = arrow.foot_mm + arrow.way_mm;
+    add_box(glm::dmat4(1.0), glm::min(arrow.foot_mm, end) - around,
+            glm::max(arrow.foot_mm, end) + around);
+  }
+  return corners.empty() ? PixelRect{} : screen_bounds(corners, view, size);
+}
+
+}  // namespace kerf

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include <glm/glm.hpp>
+
+#include "shared/segment/layout.hpp"
+#include "visualizer/mesh_painter.hpp"
+#include "visualizer/pixel_rect.hpp"
+#include "visualizer/scene_view.hpp"
+
+namespace kerf {
+
+/// What the hand holds and feels at one moment.
+struct Hand {
+  glm::dvec3 tip_mm{0.0};
+  glm::dvec4 orientation{0.0, 0.0, 0.0, 1.0};  ///< quaternion x, y, z, w
+  std::uint32_t tool = 0;                      ///< none where the scene has fewer
+  glm::dvec3 force_n{0.0};
+  friend bool operator==(const Hand&, const Hand&) noexcept = default;
+};
+
+[[nodiscard]] Hand hand_of(const TickRecord& record);
+
+/// Draws the tool and the arrow of its force.
+class HandPainter {
+ public:
+  /// `scale_mm` is the size of what is looked at: lengths of the arrow follow it.
+  HandPainter(const SceneView& scene, double scale_mm);
+
+  void draw(const Hand& hand, const View& view, const RenderTarget& target);
+  /// Pixels that `draw` may touch.
+  [[nodiscard]] PixelRect bounds(const Hand& hand, const View& view, PictureSize size) const;
+
+ private:
+  struct Tool {
+    GpuMesh mesh;
+    glm::dvec3 low_mm, high_mm;  ///< its box, in its own axes
+    double radius_mm;
+  };
+  struct Arrow {
+    glm::dvec3 foot_mm, way_mm;
+    double thickness_mm;
+  };
+  [[nodiscard]] Arrow arrow_of(const Hand& hand) const;
+
+  std::vector<Tool> tools_;
+  double scale_mm_;
+  MeshPainter painter_;
+};
+
+}  // namespace kerf
