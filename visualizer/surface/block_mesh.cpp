@@ -66,11 +66,6 @@ std::uint16_t unit16(float share) {
   return static_cast<std::uint16_t>(share * 65535.0F + 0.5F);
 }
 
-FinePoint place_of(const SurfaceVertex& vertex, VoxelIndex start) {
-  return FinePoint(start.x, start.y, start.z) * kFinePerVoxel +
-         FinePoint(vertex.position[0], vertex.position[1], vertex.position[2]);
-}
-
 /// From what the vertex holds, not from what it was made of: to do it again gives the same bits.
 FinePoint inward_of(const SurfaceVertex& vertex, const glm::vec3& inverse_square_spacing) {
   glm::vec3 along(vertex.normal[0], vertex.normal[1], vertex.normal[2]);
@@ -112,7 +107,7 @@ void dress(SurfaceVertex& vertex, const SurfaceSource& source, VoxelIndex start,
     vertex.normal[static_cast<std::size_t>(i)] =
         static_cast<std::int16_t>(rounded(outward[i] * kNormalLength));
   }
-  const FinePoint at = place_of(vertex, start);
+  const FinePoint at = fine_place(vertex, start);
   const FinePoint inward = inward_of(vertex, source.inverse_square_spacing);
   const glm::vec3 colour = source.look->colour(source.volume, at, inward);
   vertex.colour = {unit16(colour.r), unit16(colour.g), unit16(colour.b)};
@@ -166,8 +161,8 @@ class Extraction {
       vertex_[Axis][z][y][x] = static_cast<std::uint16_t>(mesh_.vertices.size());
       const Density* low = sample(x, y, z);
       const int rise = low[Neighbourhood::kStride[Axis]] - low[0];
-      // (iso - 1/2 - low) / rise, with both doubled.
-      const int along = (2 * (iso_ - low[0]) - 1) * (kFinePerVoxel / 2) / rise;
+      // (iso - 1/2 - low) / rise, to the nearest; both have the same sign.
+      const int along = ((2 * (iso_ - low[0]) - 1) * (kFinePerVoxel / 2) + rise / 2) / rise;
       const std::array<unsigned, 3> from{x, y, z};
       SurfaceVertex& vertex = mesh_.vertices.emplace_back();
       for (unsigned axis = 0; axis < 3; ++axis) {
@@ -231,7 +226,7 @@ bool update_look(const SurfaceSource& source, VoxelIndex block, const VoxelBox& 
   bool differs = false;
   for (SurfaceVertex& vertex : mesh.vertices) {
     const SurfaceVertex before = vertex;
-    const FinePoint at = place_of(vertex, start);
+    const FinePoint at = fine_place(vertex, start);
     const VoxelIndex voxel = VolumeSamples::voxel_below(at);
     if (!all.contains(voxel)) continue;
     if (colours.contains(voxel)) {

@@ -31,6 +31,12 @@ struct SurfaceVertex {
   friend bool operator==(const SurfaceVertex&, const SurfaceVertex&) = default;
 };
 
+/// Where a vertex of the block that starts at `start` stands in the volume.
+[[nodiscard]] inline FinePoint fine_place(const SurfaceVertex& vertex, VoxelIndex start) noexcept {
+  const auto& at = vertex.position;
+  return FinePoint(start.x, start.y, start.z) * kFinePerVoxel + FinePoint(at[0], at[1], at[2]);
+}
+
 /// The surface within one block. A cube edge that the surface cuts has one vertex; blocks that meet
 /// have equal vertices on the face between them.
 struct BlockMesh {
@@ -53,8 +59,8 @@ struct SurfaceSource {
 /// voxels, the rest of a vertex on the voxels around it: see SurfaceLook.
 ///
 /// A vertex stands where the density, linear along its cube edge, passes iso - 1/2 (in steps of
-/// Density), in steps of 1/4096 voxel and never on a voxel: no two vertices of a volume meet, and
-/// no triangle has a side of length zero.
+/// Density), to the nearest 1/4096 voxel and never on a voxel: no two vertices of a volume meet,
+/// and no triangle has a side of length zero.
 [[nodiscard]] BlockMesh extract_block(const SurfaceSource& source, VoxelIndex block);
 
 /// What `extract_block` would give when only voxels in `changed` are others, and none of the
