@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <span>
 #include <utility>
@@ -11,6 +13,7 @@
 
 #include <glm/glm.hpp>
 
+#include "tests/visualizer/gl_fixture.hpp"
 #include "visualizer/surface/closed_mesh.hpp"
 
 namespace kerf::test {
@@ -36,6 +39,32 @@ using Triangles = std::span<const std::array<std::uint32_t, 3>>;
 [[nodiscard]] inline long euler_number(const ClosedMesh& mesh) {
   const auto triangles = static_cast<long>(mesh.triangles.size());
   return static_cast<long>(mesh.vertices.size()) - triangles * 3 / 2 + triangles;
+}
+
+using Shape = std::function<double(glm::dvec3)>;  ///< signed distance in mm, negative inside
+
+[[nodiscard]] inline Shape ball_shape(glm::dvec3 centre, double radius) {
+  return [=](glm::dvec3 at) { return glm::length(at - centre) - radius; };
+}
+/// About the z axis.
+[[nodiscard]] inline Shape torus_shape(double ring, double tube) {
+  return [=](glm::dvec3 at) { return std::hypot(std::hypot(at.x, at.y) - ring, at.z) - tube; };
+}
+[[nodiscard]] inline std::function<double(glm::dvec3)> density_of(const Shape& shape,
+                                                                  double ramp_mm) {
+  return [=](glm::dvec3 at) { return 0.5 - shape(at) / ramp_mm; };
+}
+
+[[nodiscard]] inline VolumeSurface surface_of(const TestVolume& volume) {
+  return VolumeSurface(volume.view, {}, volume.density, {});
+}
+[[nodiscard]] inline ClosedMesh closed(const VolumeSurface& surface, const TestVolume& volume) {
+  ClosedMesh mesh;
+  mesh.append(surface, volume.view.world_from_voxel);
+  return mesh;
+}
+[[nodiscard]] inline ClosedMesh closed(const TestVolume& volume) {
+  return closed(surface_of(volume), volume);
 }
 
 struct Measures {

@@ -63,10 +63,4 @@ struct SurfaceSource {
 /// and no triangle has a side of length zero.
 [[nodiscard]] BlockMesh extract_block(const SurfaceSource& source, VoxelIndex block);
 
-/// What `extract_block` would give when only voxels in `changed` are others, and none of the
-/// block's own: works out again how those vertices look that depend on them. True where one is
-/// another now.
-bool update_look(const SurfaceSource& source, VoxelIndex block, const VoxelBox& changed,
-                 BlockMesh& mesh);
-
 }  // namespace kerf

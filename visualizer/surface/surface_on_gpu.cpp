@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cstddef>
-#include <numbers>
 #include <numeric>
 
 namespace kerf {
@@ -42,8 +41,7 @@ void GrowingBuffer::write(std::size_t offset, std::size_t bytes, const void* dat
                        data);
 }
 
-SurfaceOnGpu::SurfaceOnGpu(const VolumeSurface& surface)
-    : blocks_(surface.blocks()), parts_(surface.meshes().size()) {
+SurfaceOnGpu::SurfaceOnGpu(const VolumeSurface& surface) : parts_(surface.meshes().size()) {
   std::vector<BlockStart> starts;
   starts.reserve(parts_.size());
   for (std::uint32_t id = 0; id < parts_.size(); ++id) {
@@ -73,6 +71,7 @@ void SurfaceOnGpu::update(const VolumeSurface& surface, std::span<const std::uin
   for (const std::uint32_t id : blocks) {
     const BlockMesh& mesh = surface.meshes()[id];
     Part& part = parts_[id];
+    part.bounds = bounds_of(mesh, surface.block(id));
     part.count = static_cast<std::uint32_t>(mesh.triangles.size());
     part.vertices =
         vertex_pool_.fit(part.vertices, static_cast<std::uint32_t>(mesh.vertices.size()));
@@ -97,23 +96,13 @@ void SurfaceOnGpu::update(const VolumeSurface& surface, std::span<const std::uin
   }
 }
 
-void SurfaceOnGpu::draw(const ViewCone& cone) {
-  constexpr double kHalf = 0.5 * kBlockEdge;
-  constexpr double kRadius = kHalf * std::numbers::sqrt3;
+void SurfaceOnGpu::draw(const Sight& sight) {
   commands_.clear();
-  std::uint32_t id = 0;
-  for (std::int32_t z = 0; z < blocks_.nz; ++z) {
-    for (std::int32_t y = 0; y < blocks_.ny; ++y) {
-      for (std::int32_t x = 0; x < blocks_.nx; ++x, ++id) {
-        const Part& part = parts_[id];
-        if (part.count == 0) continue;
-        const VoxelIndex start = block_start({x, y, z});
-        const glm::dvec3 centre = glm::dvec3(start.x, start.y, start.z) + kHalf;
-        if (!cone.may_show(centre, kRadius)) continue;
-        commands_.push_back(
-            {part.count * kIndices, 1, part.triangles.first * kIndices, part.vertices.first, id});
-      }
-    }
+  for (std::uint32_t id = 0; id < parts_.size(); ++id) {
+    const Part& part = parts_[id];
+    if (part.count == 0 || !sight.may_show(part.bounds)) continue;
+    commands_.push_back(
+        {part.count * kIndices, 1, part.triangles.first * kIndices, part.vertices.first, id});
   }
   if (commands_.empty()) return;
   glNamedBufferData(command_buffer_.id(),

@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "visualizer/gl/names.hpp"
+#include "visualizer/surface/block_bounds.hpp"
 #include "visualizer/surface/range_pool.hpp"
-#include "visualizer/surface/view_cone.hpp"
 #include "visualizer/surface/volume_surface.hpp"
 
 namespace kerf {
@@ -33,22 +33,21 @@ class SurfaceOnGpu {
   /// Uploads these blocks again, and nothing else.
   void update(const VolumeSurface& surface, std::span<const std::uint32_t> blocks);
 
-  /// Draws the blocks that `cone` (in voxel coordinates) may show, with the program in use;
-  /// attributes as in surface.vert.
-  void draw(const ViewCone& cone);
+  /// Draws the blocks that may be in sight, with the program in use; attributes as in surface.vert.
+  void draw(const Sight& sight);
 
  private:
   struct Part {
     RangePool::Range vertices;
     RangePool::Range triangles;
     std::uint32_t count = 0;  ///< triangles
+    BlockBounds bounds;
   };
   /// As GL reads it (DrawElementsIndirectCommand).
   struct Command {
     std::uint32_t indices, instances, first_index, base_vertex, base_instance;
   };
 
-  VoxelGrid blocks_;
   std::vector<Part> parts_;  ///< by block
   RangePool vertex_pool_;
   RangePool triangle_pool_;

@@ -58,7 +58,7 @@ void SurfaceRenderer::draw(const View& view, const RenderTarget& target) {
     program_.set("u_eye_from_voxel", glm::mat4(eye_from_voxel));
     program_.set("u_eye_from_voxel_normal",
                  glm::mat3(glm::inverseTranspose(glm::dmat3(eye_from_voxel))));
-    volume.gpu.draw(ViewCone(view.clip_from_eye() * eye_from_voxel, part.lo, part.hi));
+    volume.gpu.draw(Sight(view.clip_from_eye() * eye_from_voxel, part.lo, part.hi));
   }
   glDisable(GL_CULL_FACE);
 }

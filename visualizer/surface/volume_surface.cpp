@@ -5,14 +5,18 @@
 #include <atomic>
 #include <thread>
 
+#include "visualizer/surface/vertex_look.hpp"
+
 namespace kerf {
 
 namespace {
 
-// Block i lies on voxels 8i-1 to 8i+7, in bricks i-1 and i. What it looks like depends on more.
-constexpr std::int32_t kLookReach = 2;  // bricks, on both sides
-static_assert(SurfaceLook::kColourReachVox < SurfaceLook::kOpennessReachVox);
-static_assert(SurfaceLook::kOpennessReachVox < kBlockEdge * kLookReach);
+/// Blocks of which a sample lies in `box`: block i has samples 8i-1 to 8i+7.
+VoxelBox blocks_on(const VoxelBox& box) {
+  static_assert(kBlockEdge == 8);
+  return {{box.lo.x >> 3, box.lo.y >> 3, box.lo.z >> 3},
+          {(box.hi.x >> 3) + 1, (box.hi.y >> 3) + 1, (box.hi.z >> 3) + 1}};
+}
 
 glm::vec3 inverse_square_spacing(const glm::dmat4& world_from_voxel) {
   glm::dvec3 inverse;
@@ -43,10 +47,11 @@ VolumeSurface::VolumeSurface(const VolumeView& volume, const std::vector<Materia
       iso_(std::max(volume.iso, Density{1})),
       inverse_square_spacing_(inverse_square_spacing(volume.world_from_voxel)),
       look_(materials, iso_),
+      density_(density.begin(), density.end()),
       labels_(labels.begin(), labels.end()),
       meshes_(blocks_.voxel_count()),
       work_(blocks_.voxel_count(), Work::none) {
-  const SurfaceSource from = source(density);
+  const SurfaceSource from = source();
   for_each_in_parallel(blocks_.nz, [&](std::int32_t z) {
     for (std::int32_t y = 0; y < blocks_.ny; ++y) {
       for (std::int32_t x = 0; x < blocks_.nx; ++x) {
@@ -56,13 +61,29 @@ VolumeSurface::VolumeSurface(const VolumeView& volume, const std::vector<Materia
   });
 }
 
-SurfaceSource VolumeSurface::source(std::span<const Density> density) const {
-  return {{bricks_.grid, density, labels_}, iso_, inverse_square_spacing_, &look_};
+SurfaceSource VolumeSurface::source() const {
+  return {{bricks_.grid, density_, labels_}, iso_, inverse_square_spacing_, &look_};
 }
 
 VoxelIndex VolumeSurface::block(std::uint32_t id) const noexcept {
   const auto i = static_cast<std::int32_t>(id);
   return {i % blocks_.nx, i / blocks_.nx % blocks_.ny, i / blocks_.nx / blocks_.ny};
+}
+
+VoxelBox VolumeSurface::follow(std::span<const Density> density, const VoxelBox& box) {
+  VoxelBox differs;
+  for (std::int32_t z = box.lo.z; z < box.hi.z; ++z) {
+    for (std::int32_t y = box.lo.y; y < box.hi.y; ++y) {
+      const std::size_t row = bricks_.grid.index(0, y, z);
+      for (std::int32_t x = box.lo.x; x < box.hi.x; ++x) {
+        const std::size_t at = row + static_cast<std::size_t>(x);
+        if (density_[at] == density[at]) continue;
+        density_[at] = density[at];
+        differs = differs.united({{x, y, z}, {x + 1, y + 1, z + 1}});
+      }
+    }
+  }
+  return differs;
 }
 
 void VolumeSurface::mark(const VoxelBox& blocks, Work work) {
@@ -80,20 +101,21 @@ void VolumeSurface::mark(const VoxelBox& blocks, Work work) {
 
 std::span<const std::uint32_t> VolumeSurface::update(std::span<const Density> density,
                                                      std::span<const std::uint32_t> changed) {
-  VoxelBox box;
+  VoxelBox all;
   for (const std::uint32_t id : changed) {
-    box = box.united(bricks_.voxels(id));
-    const VoxelIndex b = bricks_.brick(id);
-    mark({b, {b.x + 2, b.y + 2, b.z + 2}}, Work::mesh);
-    mark(VoxelBox{b, {b.x + 1, b.y + 1, b.z + 1}}.grown(kLookReach), Work::look);
+    const VoxelBox box = follow(density, bricks_.voxels(id));
+    if (box.empty()) continue;
+    all = all.united(box);
+    mark(blocks_on(box), Work::mesh);
+    mark(blocks_on(box.grown(SurfaceLook::kOpennessReachVox)), Work::look);
   }
   std::sort(marked_.begin(), marked_.end());
   different_.clear();
-  const SurfaceSource from = source(density);
+  const SurfaceSource from = source();
   for (const std::uint32_t id : marked_) {
     BlockMesh& mesh = meshes_[id];
     if (work_[id] == Work::look) {
-      if (update_look(from, block(id), box, mesh)) different_.push_back(id);
+      if (update_look(from, block(id), all, mesh)) different_.push_back(id);
     } else {
       BlockMesh now = extract_block(from, block(id));
       if (now != mesh) {

@@ -18,7 +18,9 @@ namespace kerf {
 /// No GL. One thread calls; the first extraction uses the cores that the process may use.
 class VolumeSurface {
  public:
-  /// `density` and `labels` (empty, or one per voxel) cover the volume; the labels are copied.
+  /// `density` and `labels` (empty, or one per voxel) cover the volume. Both are copied; the
+  /// density so that an update knows which voxels of a changed brick are others: far fewer than
+  /// all.
   VolumeSurface(const VolumeView& volume, const std::vector<MaterialView>& materials,
                 std::span<const Density> density, std::span<const Label> labels);
 
@@ -35,7 +37,9 @@ class VolumeSurface {
  private:
   enum class Work : std::uint8_t { none, look, mesh };
 
-  [[nodiscard]] SurfaceSource source(std::span<const Density> density) const;
+  [[nodiscard]] SurfaceSource source() const;
+  /// Takes over what differs in `box` and returns the smallest box around it.
+  VoxelBox follow(std::span<const Density> density, const VoxelBox& box);
   void mark(const VoxelBox& blocks, Work work);
 
   BrickGrid bricks_;
@@ -43,6 +47,7 @@ class VolumeSurface {
   Density iso_;
   glm::vec3 inverse_square_spacing_;
   SurfaceLook look_;
+  std::vector<Density> density_;
   std::vector<Label> labels_;
   std::vector<BlockMesh> meshes_;
   std::vector<Work> work_;                ///< by block; all none between calls
