@@ -13,6 +13,7 @@
 #include "visualizer/picture.hpp"
 #include "visualizer/run.hpp"
 #include "visualizer/stop_signal.hpp"
+#include "visualizer/surface/export_surface.hpp"
 
 namespace kerf {
 
@@ -60,6 +61,7 @@ class FrameTaker {
 int run_headless(const VisualizerOptions& options) {
   place_process(options.cpus);
   make_folder(options.out);
+  if (options.mesh) check_export(*options.mesh);
   const auto context = make_headless_context();
   const GlDriver driver = query_gl_driver();
   FrameReport report{.renderer = options.renderer,
@@ -96,6 +98,7 @@ int run_headless(const VisualizerOptions& options) {
     if (!over) std::this_thread::sleep_for(kIdle);
   }
 
+  if (options.mesh) export_surface(*options.mesh, session.scene(), session.contents());
   report.bricks_uploaded = picture.bricks_uploaded();
   report.clean_end = session.ended_cleanly();
   if (options.report) report.write(*options.report);

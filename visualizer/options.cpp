@@ -17,7 +17,7 @@ namespace {
 
 constexpr const char* kKeys =
     "In the window: drag turns, shift or middle drag moves, the wheel zooms, 1..9 take a tool,\n"
-    "r first view, s screenshot, h keys, q quit.\n"
+    "r first view, s screenshot, e export the surface, h keys, q quit.\n"
     "Exit codes: 0 fine, 1 the controller did not end cleanly, 2 bad input or set-up.";
 
 /// CLI11 explains over several lines; a user wants one.
@@ -54,7 +54,7 @@ std::optional<VisualizerOptions> parse_options(int argc, const char* const* argv
   app.footer(kKeys);
   app.set_version_flag("--version", std::string("kerf-visualizer " KERF_VERSION));
   app.add_option("--name", options.name, "the controller's name")->capture_default_str();
-  app.add_option("--renderer", options.renderer, "how volumes are drawn: iso")
+  app.add_option("--renderer", options.renderer, "how volumes are drawn: iso, surface")
       ->capture_default_str();
   app.add_option("--size", size, "width and height in pixels")->capture_default_str();
   app.add_flag("--headless", options.headless, "no window: pictures into --out");
@@ -73,6 +73,10 @@ std::optional<VisualizerOptions> parse_options(int argc, const char* const* argv
   app.add_option("--cpu", options.cpus, "cores to run on, e.g. 0,1 (default: all but the last)")
       ->delimiter(',')
       ->check(CLI::Range(0, 1023));
+  app.add_option("--export", options.mesh,
+                 "surface of all solid volumes as a closed mesh in mm, FILE.stl or FILE.ply (with "
+                 "colours): headless at the end, in the window with e")
+      ->type_name("FILE");
   app.add_option("--report", options.report, "write times and counts to this JSON file");
   try {
     app.parse(argc, argv);

@@ -23,6 +23,7 @@ struct VisualizerOptions {
   std::optional<double> seconds;             ///< ends after this time; default: with the controller
   double wait_s = 10.0;                      ///< for the controller to appear
   std::vector<int> cpus;                     ///< empty: all but the last one
+  std::optional<std::filesystem::path> mesh;  ///< --export: .stl or .ply
   std::optional<std::filesystem::path> report;
 };
 

@@ -32,6 +32,7 @@ constexpr auto kKeys = std::to_array<std::array<const char*, 2>>({
     {"1 .. 9", "take this tool"},
     {"r", "first view again"},
     {"s", "screenshot"},
+    {"e", "export the surface"},
     {"h", "these keys"},
     {"q", "quit"},
 });

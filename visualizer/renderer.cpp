@@ -7,6 +7,7 @@
 
 #include "visualizer/error.hpp"
 #include "visualizer/iso_renderer.hpp"
+#include "visualizer/surface/surface_renderer.hpp"
 
 namespace kerf {
 
@@ -23,6 +24,11 @@ constexpr auto kKinds = std::to_array<Kind>({
     {"iso",
      [](const SceneView& scene, std::span<const VolumeContent> contents)
          -> std::unique_ptr<Renderer> { return std::make_unique<IsoRenderer>(scene, contents); }},
+    {"surface",
+     [](const SceneView& scene,
+        std::span<const VolumeContent> contents) -> std::unique_ptr<Renderer> {
+       return std::make_unique<SurfaceRenderer>(scene, contents);
+     }},
 });
 
 const Kind& find_kind(std::string_view name) {

@@ -5,17 +5,18 @@
 #include <deque>
 #include <limits>
 #include <optional>
+#include <stdexcept>
 #include <thread>
 #include <utility>
 
 #include "visualizer/cpu_placement.hpp"
-#include "visualizer/error.hpp"
 #include "visualizer/file_out.hpp"
 #include "visualizer/frame_report.hpp"
 #include "visualizer/gl/window.hpp"
 #include "visualizer/picture.hpp"
 #include "visualizer/run.hpp"
 #include "visualizer/stop_signal.hpp"
+#include "visualizer/surface/export_surface.hpp"
 
 namespace kerf {
 
@@ -44,30 +45,48 @@ class FrameRate {
   std::deque<Clock::time_point> frames_;
 };
 
-std::filesystem::path unused_screenshot(const std::filesystem::path& folder) {
+/// kerf-0001 and so on in `folder`, which is made where it is missing.
+std::filesystem::path unused_file(const std::filesystem::path& folder, const char* ending) {
+  make_folder(folder);
   for (int i = 1;; ++i) {
     std::array<char, 32> name{};
-    std::snprintf(name.data(), name.size(), "kerf-%04d.png", i);
+    std::snprintf(name.data(), name.size(), "kerf-%04d%s", i, ending);
     if (!std::filesystem::exists(folder / name.data())) return folder / name.data();
   }
 }
 
-/// A full disk must not end a session at the screen.
-void take_screenshot(const std::filesystem::path& folder, const RenderTarget& target) {
+/// `write` returns the file it wrote. A full disk must not end a session at the screen.
+template <typename Write>
+void write_for_user(const char* what, const Write& write) {
   try {
-    make_folder(folder);
-    const std::filesystem::path file = unused_screenshot(folder);
-    write_png(file, target.size(), target.read_rgb());
-    std::printf("screenshot: %s\n", file.string().c_str());
-  } catch (const VisualizerError& problem) {
+    std::printf("%s: %s\n", what, write().c_str());
+  } catch (const std::runtime_error& problem) {
     std::fprintf(stderr, "kerf-visualizer: %s\n", problem.what());
   }
+}
+
+void take_screenshot(const VisualizerOptions& options, const RenderTarget& target) {
+  write_for_user("screenshot", [&] {
+    const std::filesystem::path file = unused_file(options.out, ".png");
+    write_png(file, target.size(), target.read_rgb());
+    return file;
+  });
+}
+
+void export_mesh(const VisualizerOptions& options, const Session& session) {
+  write_for_user("surface", [&] {
+    const std::filesystem::path file =
+        options.mesh ? *options.mesh : unused_file(options.out, ".ply");
+    export_surface(file, session.scene(), session.contents());
+    return file;
+  });
 }
 
 /// What keys and drags change.
 struct Controls {
   bool help = false;
   bool screenshot = false;
+  bool mesh = false;
 
   /// True when the user wants to leave.
   bool apply(const WindowInput& input, Session& session, Picture& picture, double aspect) {
@@ -79,6 +98,7 @@ struct Controls {
       if (key == 'q') quit = true;
       if (key == 'r') picture.reset_camera(aspect);
       if (key == 's') screenshot = true;
+      if (key == 'e') mesh = true;
       if (key == 'h') help = !help;
       const int tool = key - '1';
       if (tool >= 0 && tool < static_cast<int>(session.scene().tools.size())) {
@@ -134,6 +154,7 @@ class Followed {
 
 int run_window(const VisualizerOptions& options) {
   place_process(options.cpus);
+  if (options.mesh) check_export(*options.mesh);
   Session first = Session::attach(options.name, std::chrono::duration<double>(options.wait_s));
   FrameReport report{.renderer = options.renderer};
   report.attach_ms = first.attach_ms();
@@ -159,6 +180,7 @@ int run_window(const VisualizerOptions& options) {
     const WindowInput input = window.poll();
     if (controls.apply(input, followed.session(), followed.picture(), aspect)) break;
     followed.update(aspect);
+    if (std::exchange(controls.mesh, false)) export_mesh(options, followed.session());
     if (visible) {
       if (!target || target->size() != size) target.emplace(size);
       rate.count(begin);
@@ -168,8 +190,7 @@ int run_window(const VisualizerOptions& options) {
       const Redrawn redrawn =
           draw_measured(followed.picture(), followed.session(), figures, *target, report);
       if (report.wall_ms.size() == 1) report.late_join_ms = since_attached.wall_ms();
-      if (controls.screenshot) take_screenshot(options.out, *target);
-      controls.screenshot = false;
+      if (std::exchange(controls.screenshot, false)) take_screenshot(options, *target);
       if (redrawn.any || input.exposed) window.present(*target);
       report.width = size.width;
       report.height = size.height;

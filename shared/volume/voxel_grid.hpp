@@ -19,6 +19,9 @@ struct VoxelBox {
   [[nodiscard]] constexpr bool empty() const noexcept {
     return hi.x <= lo.x || hi.y <= lo.y || hi.z <= lo.z;
   }
+  [[nodiscard]] constexpr bool contains(VoxelIndex v) const noexcept {
+    return v.x >= lo.x && v.y >= lo.y && v.z >= lo.z && v.x < hi.x && v.y < hi.y && v.z < hi.z;
+  }
   [[nodiscard]] constexpr VoxelIndex extent() const noexcept {
     return empty() ? VoxelIndex{} : VoxelIndex{hi.x - lo.x, hi.y - lo.y, hi.z - lo.z};
   }

@@ -25,7 +25,7 @@ std::optional<VisualizerOptions> parse(std::initializer_list<const char*> argume
 TEST_CASE("the command line of the demo is understood") {
   const auto options =
       parse({"--name", "demo", "--headless", "--frames", "12", "--every-ticks", "800", "--out", "o",
-             "--size", "640x480", "--report", "r.json", "--cpu", "0,1"});
+             "--size", "640x480", "--report", "r.json", "--cpu", "0,1", "--export", "m.ply"});
   REQUIRE(options);
   CHECK(options->name == "demo");
   CHECK(options->headless);
@@ -33,6 +33,7 @@ TEST_CASE("the command line of the demo is understood") {
   CHECK(options->every_ticks == 800);
   CHECK(options->size == PictureSize{640, 480});
   CHECK(options->report == "r.json");
+  CHECK(options->mesh == "m.ply");
   CHECK(options->cpus == std::vector<int>{0, 1});
 }
 
@@ -53,8 +54,8 @@ TEST_CASE("a size that is none is refused with the limits") {
 }
 
 TEST_CASE("an unknown renderer is refused and the known ones are named") {
-  CHECK_THROWS_WITH_AS(parse({"--renderer", "voxels"}), "--renderer: voxels is unknown; known: iso",
-                       VisualizerError);
+  CHECK_THROWS_WITH_AS(parse({"--renderer", "voxels"}),
+                       "--renderer: voxels is unknown; known: iso, surface", VisualizerError);
 }
 
 TEST_CASE("every mistake on the command line is one line") {

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstdlib>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <future>
@@ -209,6 +210,35 @@ TEST_CASE("a visualizer that joins late shows the picture of one that was there 
   const std::string picture = contents(options.out / "frame-0001.png");
   CHECK(picture.size() > 500);
   CHECK(contents(late.out / "frame-0001.png") == picture);
+}
+
+TEST_CASE("a headless run exports the final surface, drawn by the surface renderer") {
+  if (!have_gl()) return;
+  const Place place;
+  Miller miller;
+  VisualizerOptions options = place.options();
+  options.renderer = "surface";
+  options.mesh = place.path / "block.stl";
+  auto code = std::async(std::launch::async, [&] { return run_headless(options); });
+  miller.run_to(51);
+  REQUIRE(appears(options.out / "frame-0001.png"));
+  miller.run_to(170);
+  miller.say(Lifecycle::clean_end);
+  CHECK(code.get() == 0);
+  CHECK(contents(options.out / "frame-0001.png") != contents(options.out / "frame-0004.png"));
+  const std::string stl = contents(*options.mesh);
+  REQUIRE(stl.size() > 84);
+  std::uint32_t triangles = 0;
+  std::memcpy(&triangles, &stl[80], sizeof(triangles));
+  CHECK(triangles > 12'000);  // the block's six faces and the groove's
+  CHECK(stl.size() == 84 + 50 * std::size_t{triangles});
+}
+
+TEST_CASE("an export that cannot work is refused before anything is drawn") {
+  const Place place;
+  VisualizerOptions options = place.options();
+  options.mesh = place.path / "block.obj";
+  CHECK_THROWS_AS(static_cast<void>(run_headless(options)), VisualizerError);
 }
 
 TEST_CASE("without a controller the run gives up after its wait, in one line") {

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+#version 450 core
+// The surface of a volume: material and openness come with the vertices, light falls on each pixel.
+// Depth is that of the projection, which is equation (1): not written, so hidden pixels cost nothing.
+
+in vec3 v_eye_mm;
+in vec3 v_normal;
+in vec4 v_look;
+layout(location = 0) out vec4 o_colour;
+
+uniform vec3 u_up_eye;  // world up
+
+vec3 lit(vec3 albedo, vec3 normal, vec3 to_eye, vec3 up_eye, float openness);
+vec3 srgb(vec3 linear);
+
+void main() {
+  vec3 to_eye = -normalize(v_eye_mm);
+  vec3 normal = normalize(v_normal);
+  // What is seen faces the eye, whatever the gradient says at a silhouette.
+  if (dot(normal, to_eye) < 0.0) normal = normalize(normal - 1.02 * dot(normal, to_eye) * to_eye);
+  o_colour = vec4(srgb(lit(v_look.rgb, normal, to_eye, u_up_eye, v_look.a)), 1.0);
+}

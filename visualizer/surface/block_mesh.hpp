@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "visualizer/surface/surface_look.hpp"
+#include "visualizer/surface/volume_samples.hpp"
+
+namespace kerf {
+
+/// A block has 8^3 cells between voxel centres; block (i, j, k) starts at voxel 8i-1, so that the
+/// first and the last cells lie between the volume and the air around it: the surface is closed at
+/// the volume's border too. (The macrocells of `iso` stand in the same way.)
+inline constexpr std::int32_t kBlockEdge = 8;
+[[nodiscard]] constexpr VoxelIndex block_start(VoxelIndex block) noexcept {
+  return {block.x * kBlockEdge - 1, block.y * kBlockEdge - 1, block.z * kBlockEdge - 1};
+}
+/// Blocks along each axis of a volume.
+[[nodiscard]] constexpr VoxelGrid block_grid(const VoxelGrid& volume) noexcept {
+  return {volume.nx / kBlockEdge + 1, volume.ny / kBlockEdge + 1, volume.nz / kBlockEdge + 1};
+}
+
+/// As it goes to the GPU; attributes of surface.vert.
+struct SurfaceVertex {
+  std::array<std::uint16_t, 3> position{};  ///< 1/4096 voxel from `block_start`
+  std::array<std::int16_t, 3> normal{};     ///< outward, of length 32767 in voxel coordinates
+  std::array<std::uint16_t, 3> colour{};    ///< linear, 65535 = 1
+  std::uint16_t openness = 0;               ///< 65535 = 1
+  friend bool operator==(const SurfaceVertex&, const SurfaceVertex&) = default;
+};
+
+/// Where a vertex of the block that starts at `start` stands in the volume.
+[[nodiscard]] inline FinePoint fine_place(const SurfaceVertex& vertex, VoxelIndex start) noexcept {
+  const auto& at = vertex.position;
+  return FinePoint(start.x, start.y, start.z) * kFinePerVoxel + FinePoint(at[0], at[1], at[2]);
+}
+
+/// The surface within one block. A cube edge that the surface cuts has one vertex; blocks that meet
+/// have equal vertices on the face between them.
+struct BlockMesh {
+  std::vector<SurfaceVertex> vertices;
+  std::vector<std::array<std::uint16_t, 3>> triangles;  ///< counter-clockwise from the air
+  friend bool operator==(const BlockMesh&, const BlockMesh&) = default;
+};
+
+/// What a mesh is made from, and how it looks.
+struct SurfaceSource {
+  VolumeSamples volume;
+  Density iso = 1;  ///< solid from here up; at least 1
+  /// Turns a normal into the direction inwards where voxel edges are unequal; the largest part
+  /// is 1.
+  glm::vec3 inverse_square_spacing{1.0F};
+  const SurfaceLook* look = nullptr;
+};
+
+/// A pure function of the volume; any thread. Positions and triangles depend on the block's own
+/// voxels, the rest of a vertex on the voxels around it: see SurfaceLook.
+///
+/// A vertex stands where the density, linear along its cube edge, passes iso - 1/2 (in steps of
+/// Density), to the nearest 1/4096 voxel and never on a voxel: no two vertices of a volume meet,
+/// and no triangle has a side of length zero.
+[[nodiscard]] BlockMesh extract_block(const SurfaceSource& source, VoxelIndex block);
+
+}  // namespace kerf

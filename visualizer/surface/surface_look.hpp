@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <span>
+#include <vector>
+
+#include "visualizer/palette.hpp"
+#include "visualizer/surface/volume_samples.hpp"
+
+namespace kerf {
+
+/// What a point of the surface looks like before light falls on it: the same materials and the same
+/// shade in cavities as `iso` draws (shaders/iso.frag), worked out once for each vertex.
+///
+/// `inward` is the step of one voxel edge from the surface into the solid, along the normal.
+class SurfaceLook {
+ public:
+  /// Voxels that a colour, or the openness, depends on are at most so far from their point.
+  static constexpr int kColourReachVox = 4;
+  static constexpr int kOpennessReachVox = 13;
+
+  SurfaceLook(const std::vector<MaterialView>& materials, Density iso);
+
+  /// Linear colour of the material below the surface, each part 0..1.
+  [[nodiscard]] glm::vec3 colour(const VolumeSamples& volume, FinePoint at, FinePoint inward) const;
+  /// 1 in the open, less where the neighbourhood along the normal is solid.
+  [[nodiscard]] float openness(const VolumeSamples& volume, FinePoint at, FinePoint inward) const;
+  /// Whether `openness` there depends on a voxel in `box`.
+  [[nodiscard]] static bool openness_depends_on(const VoxelBox& box, FinePoint at,
+                                                FinePoint inward);
+
+ private:
+  [[nodiscard]] glm::vec4 label_colour(const VolumeSamples& volume, FinePoint at) const;
+  [[nodiscard]] glm::vec3 density_colour(int density) const;
+
+  std::array<glm::vec4, kPaletteWidth> by_density_;
+  std::array<glm::vec4, kPaletteWidth> by_label_;
+  float share_of_iso_;  ///< 1/iso
+};
+
+}  // namespace kerf

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "visualizer/gl/names.hpp"
+#include "visualizer/surface/block_bounds.hpp"
+#include "visualizer/surface/range_pool.hpp"
+#include "visualizer/surface/volume_surface.hpp"
+
+namespace kerf {
+
+/// A GL buffer that keeps its content when it grows.
+class GrowingBuffer {
+ public:
+  /// Room for `bytes`; true where the buffer is another one now.
+  bool reserve(std::size_t bytes);
+  void write(std::size_t offset, std::size_t bytes, const void* data) const;
+  [[nodiscard]] GLuint id() const noexcept { return buffer_.id(); }
+
+ private:
+  GlBuffer buffer_ = GlBuffer::create();
+  std::size_t bytes_ = 0;
+};
+
+/// The meshes of one volume in the memory of the GPU: all vertices in one buffer, all triangles in
+/// another, drawn by one call.
+class SurfaceOnGpu {
+ public:
+  explicit SurfaceOnGpu(const VolumeSurface& surface);
+
+  /// Uploads these blocks again, and nothing else.
+  void update(const VolumeSurface& surface, std::span<const std::uint32_t> blocks);
+
+  /// Draws the blocks that may be in sight, with the program in use; attributes as in surface.vert.
+  void draw(const Sight& sight);
+
+ private:
+  struct Part {
+    RangePool::Range vertices;
+    RangePool::Range triangles;
+    std::uint32_t count = 0;  ///< triangles
+    BlockBounds bounds;
+  };
+  /// As GL reads it (DrawElementsIndirectCommand).
+  struct Command {
+    std::uint32_t indices, instances, first_index, base_vertex, base_instance;
+  };
+
+  std::vector<Part> parts_;  ///< by block
+  RangePool vertex_pool_;
+  RangePool triangle_pool_;
+  GrowingBuffer vertices_;
+  GrowingBuffer triangles_;
+  GlBuffer starts_ = GlBuffer::create();  ///< block indices, the instance attribute
+  std::vector<Command> commands_;
+  GlBuffer command_buffer_ = GlBuffer::create();
+  GlVertexArray array_ = GlVertexArray::create();
+};
+
+}  // namespace kerf

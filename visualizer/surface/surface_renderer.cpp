@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "visualizer/surface/surface_renderer.hpp"
+
+#include <array>
+#include <utility>
+
+#include <glm/gtc/matrix_inverse.hpp>
+
+namespace kerf {
+
+namespace {
+
+/// The scissor in normalised device coordinates; the whole picture where there is none.
+struct DrawnPart {
+  glm::dvec2 lo{-1.0};
+  glm::dvec2 hi{1.0};
+
+  explicit DrawnPart(PictureSize size) {
+    if (glIsEnabled(GL_SCISSOR_TEST) == GL_FALSE) return;
+    std::array<GLint, 4> box{};  // x, y, width, height
+    glGetIntegerv(GL_SCISSOR_BOX, box.data());
+    const glm::dvec2 per_pixel = 2.0 / glm::dvec2(size.width, size.height);
+    lo = glm::dvec2(box[0], box[1]) * per_pixel - 1.0;
+    hi = glm::dvec2(box[0] + box[2], box[1] + box[3]) * per_pixel - 1.0;
+  }
+};
+
+}  // namespace
+
+SurfaceRenderer::SurfaceRenderer(const SceneView& scene, std::span<const VolumeContent> contents) {
+  volumes_.reserve(scene.volumes.size());
+  for (std::size_t i = 0; i < scene.volumes.size(); ++i) {
+    const VolumeView& view = scene.volumes[i];
+    VolumeSurface surface(view, scene.materials, contents[i].density, contents[i].labels);
+    SurfaceOnGpu gpu(surface);
+    volumes_.push_back({view.world_from_voxel, std::move(surface), std::move(gpu)});
+  }
+}
+
+void SurfaceRenderer::update(std::size_t volume, std::span<const Density> density,
+                             std::span<const std::uint32_t> changed) {
+  Volume& of = volumes_[volume];
+  of.gpu.update(of.surface, of.surface.update(density, changed));
+}
+
+void SurfaceRenderer::draw(const View& view, const RenderTarget& target) {
+  target.bind();
+  glEnable(GL_DEPTH_TEST);
+  glDepthFunc(GL_LESS);
+  glEnable(GL_CULL_FACE);
+  glDisable(GL_BLEND);
+  program_.set("u_clip_from_eye", glm::mat4(view.clip_from_eye()));
+  program_.set("u_up_eye", glm::vec3(view.eye_from_world * glm::dvec4(0, 1, 0, 0)));
+  program_.use();
+  const DrawnPart part(target.size());
+  for (Volume& volume : volumes_) {
+    const glm::dmat4 eye_from_voxel = view.eye_from_world * volume.world_from_voxel;
+    program_.set("u_eye_from_voxel", glm::mat4(eye_from_voxel));
+    program_.set("u_eye_from_voxel_normal",
+                 glm::mat3(glm::inverseTranspose(glm::dmat3(eye_from_voxel))));
+    volume.gpu.draw(Sight(view.clip_from_eye() * eye_from_voxel, part.lo, part.hi));
+  }
+  glDisable(GL_CULL_FACE);
+}
+
+}  // namespace kerf

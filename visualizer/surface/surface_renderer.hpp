@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <vector>
+
+#include "visualizer/gl/program.hpp"
+#include "visualizer/renderer.hpp"
+#include "visualizer/surface/surface_on_gpu.hpp"
+#include "visualizer/surface/volume_surface.hpp"
+
+namespace kerf {
+
+/// Iso-surfaces as meshes: marching cubes on the CPU, again only around what changed; the GPU draws
+/// triangles and never sees the volume.
+///
+/// Honours the GL scissor: blocks beside it are not drawn at all.
+class SurfaceRenderer final : public Renderer {
+ public:
+  SurfaceRenderer(const SceneView& scene, std::span<const VolumeContent> contents);
+
+  void update(std::size_t volume, std::span<const Density> density,
+              std::span<const std::uint32_t> changed) override;
+  void draw(const View& view, const RenderTarget& target) override;
+
+ private:
+  struct Volume {
+    glm::dmat4 world_from_voxel;
+    VolumeSurface surface;
+    SurfaceOnGpu gpu;
+  };
+
+  GlProgram program_{"surface.vert", "surface.frag", "lighting.frag"};
+  std::vector<Volume> volumes_;
+};
+
+}  // namespace kerf

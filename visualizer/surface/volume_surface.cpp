@@ -1,0 +1,132 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "visualizer/surface/volume_surface.hpp"
+
+#include <algorithm>
+#include <atomic>
+#include <thread>
+
+#include "visualizer/surface/vertex_look.hpp"
+
+namespace kerf {
+
+namespace {
+
+/// Blocks of which a sample lies in `box`: block i has samples 8i-1 to 8i+7.
+VoxelBox blocks_on(const VoxelBox& box) {
+  static_assert(kBlockEdge == 8);
+  return {{box.lo.x >> 3, box.lo.y >> 3, box.lo.z >> 3},
+          {(box.hi.x >> 3) + 1, (box.hi.y >> 3) + 1, (box.hi.z >> 3) + 1}};
+}
+
+glm::vec3 inverse_square_spacing(const glm::dmat4& world_from_voxel) {
+  glm::dvec3 inverse;
+  for (int axis = 0; axis < 3; ++axis) {
+    inverse[axis] = 1.0 / glm::dot(world_from_voxel[axis], world_from_voxel[axis]);
+  }
+  return inverse / std::max({inverse.x, inverse.y, inverse.z});
+}
+
+/// Calls `work` for 0..count-1, each once, in any order, on all cores of this process.
+template <typename Work>
+void for_each_in_parallel(std::int32_t count, const Work& work) {
+  std::atomic<std::int32_t> next = 0;
+  const auto take = [&] {
+    for (std::int32_t i = next++; i < count; i = next++) work(i);
+  };
+  std::vector<std::jthread> helpers(std::max(1U, std::thread::hardware_concurrency()) - 1);
+  for (std::jthread& helper : helpers) helper = std::jthread(take);
+  take();
+}
+
+}  // namespace
+
+VolumeSurface::VolumeSurface(const VolumeView& volume, const std::vector<MaterialView>& materials,
+                             std::span<const Density> density, std::span<const Label> labels)
+    : bricks_(volume.bricks),
+      blocks_(block_grid(volume.bricks.grid)),
+      iso_(std::max(volume.iso, Density{1})),
+      inverse_square_spacing_(inverse_square_spacing(volume.world_from_voxel)),
+      look_(materials, iso_),
+      density_(density.begin(), density.end()),
+      labels_(labels.begin(), labels.end()),
+      meshes_(blocks_.voxel_count()),
+      work_(blocks_.voxel_count(), Work::none) {
+  const SurfaceSource from = source();
+  for_each_in_parallel(blocks_.nz, [&](std::int32_t z) {
+    for (std::int32_t y = 0; y < blocks_.ny; ++y) {
+      for (std::int32_t x = 0; x < blocks_.nx; ++x) {
+        meshes_[blocks_.index(x, y, z)] = extract_block(from, {x, y, z});
+      }
+    }
+  });
+}
+
+SurfaceSource VolumeSurface::source() const {
+  return {{bricks_.grid, density_, labels_}, iso_, inverse_square_spacing_, &look_};
+}
+
+VoxelIndex VolumeSurface::block(std::uint32_t id) const noexcept {
+  const auto i = static_cast<std::int32_t>(id);
+  return {i % blocks_.nx, i / blocks_.nx % blocks_.ny, i / blocks_.nx / blocks_.ny};
+}
+
+VoxelBox VolumeSurface::follow(std::span<const Density> density, const VoxelBox& box) {
+  VoxelBox differs;
+  for (std::int32_t z = box.lo.z; z < box.hi.z; ++z) {
+    for (std::int32_t y = box.lo.y; y < box.hi.y; ++y) {
+      const std::size_t row = bricks_.grid.index(0, y, z);
+      for (std::int32_t x = box.lo.x; x < box.hi.x; ++x) {
+        const std::size_t at = row + static_cast<std::size_t>(x);
+        if (density_[at] == density[at]) continue;
+        density_[at] = density[at];
+        differs = differs.united({{x, y, z}, {x + 1, y + 1, z + 1}});
+      }
+    }
+  }
+  return differs;
+}
+
+void VolumeSurface::mark(const VoxelBox& blocks, Work work) {
+  const VoxelBox near = blocks.clipped(blocks_.box());
+  for (std::int32_t z = near.lo.z; z < near.hi.z; ++z) {
+    for (std::int32_t y = near.lo.y; y < near.hi.y; ++y) {
+      for (std::int32_t x = near.lo.x; x < near.hi.x; ++x) {
+        const std::size_t id = blocks_.index(x, y, z);
+        if (work_[id] == Work::none) marked_.push_back(static_cast<std::uint32_t>(id));
+        work_[id] = std::max(work_[id], work);
+      }
+    }
+  }
+}
+
+std::span<const std::uint32_t> VolumeSurface::update(std::span<const Density> density,
+                                                     std::span<const std::uint32_t> changed) {
+  VoxelBox all;
+  for (const std::uint32_t id : changed) {
+    const VoxelBox box = follow(density, bricks_.voxels(id));
+    if (box.empty()) continue;
+    all = all.united(box);
+    mark(blocks_on(box), Work::mesh);
+    mark(blocks_on(box.grown(SurfaceLook::kOpennessReachVox)), Work::look);
+  }
+  std::sort(marked_.begin(), marked_.end());
+  different_.clear();
+  const SurfaceSource from = source();
+  for (const std::uint32_t id : marked_) {
+    BlockMesh& mesh = meshes_[id];
+    if (work_[id] == Work::look) {
+      if (update_look(from, block(id), all, mesh)) different_.push_back(id);
+    } else {
+      BlockMesh now = extract_block(from, block(id));
+      if (now != mesh) {
+        mesh = std::move(now);
+        different_.push_back(id);
+      }
+    }
+    work_[id] = Work::none;
+  }
+  marked_.clear();
+  return different_;
+}
+
+}  // namespace kerf
