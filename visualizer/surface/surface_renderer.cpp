@@ -10,18 +10,16 @@ namespace kerf {
 
 namespace {
 
-/// The scissor in normalised device coordinates; the whole picture where there is none.
+/// The part of the target that may be drawn, in normalised device coordinates.
 struct DrawnPart {
-  glm::dvec2 lo{-1.0};
-  glm::dvec2 hi{1.0};
+  glm::dvec2 lo;
+  glm::dvec2 hi;
 
-  explicit DrawnPart(PictureSize size) {
-    if (glIsEnabled(GL_SCISSOR_TEST) == GL_FALSE) return;
-    std::array<GLint, 4> box{};  // x, y, width, height
-    glGetIntegerv(GL_SCISSOR_BOX, box.data());
-    const glm::dvec2 per_pixel = 2.0 / glm::dvec2(size.width, size.height);
-    lo = glm::dvec2(box[0], box[1]) * per_pixel - 1.0;
-    hi = glm::dvec2(box[0] + box[2], box[1] + box[3]) * per_pixel - 1.0;
+  explicit DrawnPart(const RenderTarget& target) {
+    const PixelRect& part = target.part();
+    const glm::dvec2 per_pixel = 2.0 / glm::dvec2(target.size().width, target.size().height);
+    lo = glm::dvec2(part.x0, part.y0) * per_pixel - 1.0;
+    hi = glm::dvec2(part.x1, part.y1) * per_pixel - 1.0;
   }
 };
 
@@ -52,7 +50,7 @@ void SurfaceRenderer::draw(const View& view, const RenderTarget& target) {
   program_.set("u_clip_from_eye", glm::mat4(view.clip_from_eye()));
   program_.set("u_up_eye", glm::vec3(view.eye_from_world * glm::dvec4(0, 1, 0, 0)));
   program_.use();
-  const DrawnPart part(target.size());
+  const DrawnPart part(target);
   for (Volume& volume : volumes_) {
     const glm::dmat4 eye_from_voxel = view.eye_from_world * volume.world_from_voxel;
     program_.set("u_eye_from_voxel", glm::mat4(eye_from_voxel));
