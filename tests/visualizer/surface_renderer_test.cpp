@@ -168,7 +168,9 @@ TEST_CASE("surface: after random cuts the picture equals that of a fresh upload,
   CHECK(differing == 0);
 }
 
-TEST_CASE("surface: inside a part of the target the picture is that of the whole, outside nothing changes") {
+TEST_CASE(
+    "surface: inside a part of the target the picture is that of the whole, outside nothing "
+    "changes") {
   if (!have_gl()) return;
   const VoxelGrid grid{64, 64, 64};
   const TestVolume volume(grid, centred(grid, glm::dvec3(0.15)), ball({}, 4.4, 0.5));
