@@ -14,10 +14,10 @@ namespace kerf::test {
 /// Two volumes, one that the tools' lattices fit and one that none fits.
 enum class GoldenScene : std::uint8_t {
   mill,  ///< cuts for 20 s: in fixed point the plans `aligned` and `splat`
-  feel,  ///< cuts nothing, turns tools without symmetry for 8 s: the plan `gather`
+  feel,  ///< cuts nothing, turns tools without symmetry for 3 s: the plan `gather`
 };
 constexpr std::int32_t golden_ticks(GoldenScene scene) noexcept {
-  return scene == GoldenScene::mill ? 20'000 : 8'000;  // at 1 kHz
+  return scene == GoldenScene::mill ? 20'000 : 3'000;  // at 1 kHz
 }
 
 /// What a run ends in, and what it met on the way.
