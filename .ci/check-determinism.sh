@@ -7,7 +7,7 @@
 set -euo pipefail
 cd "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/.."
 folder=build/determinism
-row='%-22s %-20s %-7s %-7s %-16s %-16s %-16s %-16s %7s\n'
+row='%-22s %-20s %-7s %-5s %-7s %-16s %-16s %-16s %-16s %7s\n'
 
 # check PROCESSOR COMPILER FLAGS: builds, runs, prints the rows of the table; false if any differs.
 check() {
@@ -34,18 +34,21 @@ check() {
   fi
   local status=0
   result=$("${run[@]}" "$name/bin/test_golden") || status=$?
-  # golden NUMBERS KERNELS HASH VOLUME_HASH SECONDS; float and double do not depend on the kernels.
+  # golden SCENE NUMBERS KERNELS HASH VOLUME_HASH SECONDS; float and double do not depend on the
+  # kernels.
   awk -v compiler="$compiler" -v flags="$flags" -v processor="$processor" -v row="$row" '
     $1 != "golden" { next }
-    $2 == "fixed" { line[++rows] = $0; next }
-    { other[$2] = $4; other_seconds += $6 }
+    $3 == "fixed" { line[++rows] = $0; next }
+    { other[$2, $3] = $5; other_seconds[$2] += $7 }
     END {
       for (i = 1; i <= rows; ++i) {
         split(line[i], field)
-        printf row, compiler, flags, processor, field[3], field[4], field[5], other["float"],
-          other["double"], sprintf("%.1f", field[6] + other_seconds)
-        other["float"] = other["double"] = "same run"
-        other_seconds = 0
+        scene = field[2]
+        printf row, compiler, flags, processor, scene, field[4], field[5], field[6],
+          other[scene, "float"], other[scene, "double"],
+          sprintf("%.1f", field[7] + other_seconds[scene])
+        other[scene, "float"] = other[scene, "double"] = "same run"
+        other_seconds[scene] = 0
       }
     }' <<<"$result"
   if ((status)); then
@@ -83,7 +86,7 @@ list() {
 
 mkdir -p "$folder"
 # shellcheck disable=SC2059
-printf "$row" compiler flags machine kernels fixed 'its volume' float double seconds
+printf "$row" compiler flags machine scene kernels fixed 'its volume' float double seconds
 failed=0 running=0
 collect() {
   wait -n || failed=$((failed + 1))

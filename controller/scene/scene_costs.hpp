@@ -19,7 +19,7 @@ struct StageCost {
 
 /// The ticks of one tool in one volume.
 struct PlanCost {
-  std::string way;  ///< plan and what runs it: "aligned/avx512", "gather/fixed"
+  std::string way;  ///< plan and what runs it: "aligned/avx512", "gather/double"
   std::vector<StageCost> stages;
 };
 

@@ -3,13 +3,23 @@
 
 #include <chrono>
 #include <cstdio>
+#include <filesystem>
 #include <fstream>
+#include <map>
+#include <utility>
 
 #include "hil/hil_error.hpp"
 #include "shared/posix/cores.hpp"
+#include "shared/posix/new_file.hpp"
 
 namespace kerf {
 namespace {
+
+#ifdef __clang__
+constexpr const char* kCompiler = "clang " __clang_version__;
+#else
+constexpr const char* kCompiler = "g++ " __VERSION__;
+#endif
 
 std::string processor() {
   std::ifstream table("/proc/cpuinfo");
@@ -49,21 +59,29 @@ int pin_lab(int core) {
 }
 
 std::string lab_provenance() {
-  return today() + ", " + processor() + ", " + "compiler " + __VERSION__ + ".";
+  return today() + ", " + processor() + ", " + kCompiler +
+         " " KERF_FLAGS " (kernels of an instruction set always -O3).";
 }
 
-LabOutput::LabOutput(const char* option, const std::string& path) : option_(option) {
-  if (path.empty()) return;
-  guarded(option_, [&] { file_.emplace(path); });
+LabOutput::LabOutput(const char* option, std::string path)
+    : option_(option), path_(std::move(path)) {
+  if (!path_.empty()) guarded(option_, [&] { check_new_file(path_); });
 }
 
-void LabOutput::write(const std::string& text) {
-  if (!file_) return;
-  guarded(option_, [&] {
-    file_->write(text.data(), text.size());
-    file_->close();
-    file_->commit();
-  });
+void LabOutput::write(const std::string& text) const {
+  if (!path_.empty()) guarded(option_, [&] { write_new_file(path_, text); });
+}
+
+void LabOutput::check_distinct(std::initializer_list<const LabOutput*> outputs) {
+  std::map<std::filesystem::path, const char*> options;
+  for (const LabOutput* output : outputs) {
+    if (output->path_.empty()) continue;
+    const auto file = std::filesystem::weakly_canonical(std::filesystem::absolute(output->path_));
+    const auto [other, is_new] = options.emplace(file, output->option_);
+    if (is_new) continue;
+    throw HilError(std::string(output->option_) + " " + output->path_ + ": " + other->second +
+                   " writes there, too; give each a file of its own");
+  }
 }
 
 }  // namespace kerf

@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <optional>
+#include <initializer_list>
 #include <string>
-
-#include "shared/posix/new_file.hpp"
 
 namespace kerf {
 
@@ -12,19 +10,23 @@ namespace kerf {
 /// last that it may use. Returns the core. Throws `HilError`.
 int pin_lab(int core);
 
-/// Day, processor and compiler of a run, for the page that it writes. One line.
+/// Day, processor, compiler and its flags of a run, for the page that it writes. One line.
 [[nodiscard]] std::string lab_provenance();
 
-/// A file that is opened before the measurement, so that a wrong name costs nothing. Does nothing
-/// for an empty path. Throws `HilError` that names the option.
+/// A file that is tried before the measurement, so that a wrong name costs nothing, and made after
+/// it, so that a run which is stopped leaves nothing behind. Does nothing for an empty path. Throws
+/// `HilError` that names the option.
 class LabOutput {
  public:
-  LabOutput(const char* option, const std::string& path);
-  void write(const std::string& text);
+  LabOutput(const char* option, std::string path);
+  void write(const std::string& text) const;
+
+  /// Throws `HilError` where two of a run's outputs are one file.
+  static void check_distinct(std::initializer_list<const LabOutput*> outputs);
 
  private:
   const char* option_;
-  std::optional<NewFile> file_;
+  std::string path_;
 };
 
 }  // namespace kerf

@@ -81,8 +81,9 @@ int run_lab(int argc, const char* const* argv, std::ostream& out, std::ostream& 
       accuracy.run(out);
       return 0;
     }
-    LabOutput as_json("--report", report);
-    LabOutput as_page("--page", page);
+    const LabOutput as_json("--report", report);
+    const LabOutput as_page("--page", page);
+    LabOutput::check_distinct({&as_json, &as_page});
     core = pin_lab(core);
     out << "ns a tick on core " << core << "; 256 x 256 x 161 voxels; ratio to the paper's form\n"
         << "tick                     number way               p50        p99    ratio        "

@@ -69,22 +69,26 @@ SceneTool hook(std::int32_t side, double pitch_mm) {
   });
 }
 
-Scene golden_scene(NumericKind numeric) {
+Scene golden_scene(GoldenScene which, NumericKind numeric) {
   constexpr double kVoxelMm = 0.125;
   Scene scene;
   scene.path = "golden";
-  // Plan `aligned` for the balls of its own pitch, then one that no tool fits: turned, not cubic.
+  // The lattice of the tools of its own pitch, then one that no tool fits: turned, not cubic.
   scene.volumes.push_back(
       blob({44, 42, 40}, {kVoxelMm, kVoxelMm, kVoxelMm}, {{-2.75, -2.625, -2.5}, {0, 0, 0, 1}}));
   scene.volumes.push_back(
       blob({30, 34, 26}, {0.15, 0.11, 0.17}, {{0.5, -2.0, -1.0}, {0.48, 0, 0.36, 0.8}}));
-  scene.tools = {ball(6, kVoxelMm), hook(4, kVoxelMm), ball(7, kVoxelMm), hook(5, 0.11),
-                 ball(6, 0.1)};
+  if (which == GoldenScene::mill) {
+    scene.tools = {ball(6, kVoxelMm), hook(4, kVoxelMm), ball(7, kVoxelMm), hook(5, 0.11),
+                   ball(6, 0.1)};
+  } else {
+    scene.tools = {hook(5, kVoxelMm), hook(7, 0.09)};
+  }
   scene.device.workspace_scale = 0.75;
   scene.device.offset_mm = {4.1875, 47.25, 60.375};  // the middle of the hand's way
   scene.device.torque_scale = std::array{0.342, 0.342, -0.342};
   scene.force.p0_n_per_mm2 = 12.0;
-  scene.cut.model = CutModel::overlap_exact;
+  scene.cut.model = which == GoldenScene::mill ? CutModel::overlap_exact : CutModel::none;
   scene.cut.rate_per_s = 6.0;
   scene.cut.p1_n_per_mm2 = 8.0;
   scene.limits.speed_mm_per_s = 2'000;
@@ -116,22 +120,24 @@ void add(Hash& hash, const ServoOutput& out) {
 
 }  // namespace
 
-GoldenRun golden_run(NumericKind numeric, const KernelSet& kernels) {
-  Scene scene = golden_scene(numeric);
+GoldenRun golden_run(GoldenScene which, NumericKind numeric, const KernelSet& kernels) {
+  const std::int32_t ticks = golden_ticks(which);
+  Scene scene = golden_scene(which, numeric);
   const auto tools = static_cast<std::uint32_t>(scene.tools.size());
   const std::size_t volumes = scene.volumes.size();
-  const std::unique_ptr<Servo> servo = compile(scene, kernels);
+  const std::unique_ptr<CompiledScene> servo = compile(scene, kernels);
 
   GoldenRun run;
+  for (const TickCost& pair : servo->costs().ticks) run.plans.insert(pair.choice.plan);
   Hash hash, volume_hash;
   ServoOutput last;
-  for (std::int32_t tick = 0; tick < kGoldenTicks; ++tick) {
+  for (std::int32_t tick = 0; tick < ticks; ++tick) {
     servo->apply(scripted_command(tick, tools));
     const ServoOutput out = servo->step(scripted_report(tick));
     add(hash, out);
     if (tick % 50 == 0) hash.add(servo->penetration_mm());
     run.contact_ticks += out.contact ? 1 : 0;
-    run.late_contact_ticks += out.contact && tick >= kGoldenTicks * 3 / 4 ? 1 : 0;
+    run.late_contact_ticks += out.contact && tick >= ticks * 3 / 4 ? 1 : 0;
     run.stale_ticks += out.stale ? 1 : 0;
     run.limited_ticks += out.saturated ? 1 : 0;
     run.motor_ticks += out.motors_on ? 1 : 0;

@@ -2,14 +2,23 @@
 #pragma once
 
 #include <cstdint>
+#include <set>
 #include <string>
 
 #include "controller/kernel/kernel_set.hpp"
 #include "controller/scene/scene.hpp"
+#include "controller/servo/servo_plan.hpp"
 
 namespace kerf::test {
 
-inline constexpr std::int32_t kGoldenTicks = 20'000;  ///< 20 s at 1 kHz
+/// Two volumes, one that the tools' lattices fit and one that none fits.
+enum class GoldenScene : std::uint8_t {
+  mill,  ///< cuts for 20 s: in fixed point the plans `aligned` and `splat`
+  feel,  ///< cuts nothing, turns tools without symmetry for 3 s: the plan `gather`
+};
+constexpr std::int32_t golden_ticks(GoldenScene scene) noexcept {
+  return scene == GoldenScene::mill ? 20'000 : 3'000;  // at 1 kHz
+}
 
 /// What a run ends in, and what it met on the way.
 struct GoldenRun {
@@ -19,13 +28,15 @@ struct GoldenRun {
   std::int32_t stale_ticks = 0, limited_ticks = 0, motor_ticks = 0;
   std::int32_t stale_faults = 0, speed_faults = 0, outings = 0;  ///< outings: force fades in
   std::uint64_t removed_steps[2] = {};                           ///< by volume
+  std::set<Plan> plans;                                          ///< of all tools in all volumes
 };
 
-/// 20 000 ticks of a compiled scene in virtual time: two volumes, tools of both plans, a hand that
-/// cuts, loses reports, runs into two faults and docks again.
+/// A compiled scene in virtual time, under a hand that loses reports, runs into two faults and
+/// docks again, as far as the scene's ticks go.
 ///
 /// Volumes, tools, joint counts and commands come from integers, so that only the loop and its
 /// compiler decide about a bit of the result.
-[[nodiscard]] GoldenRun golden_run(NumericKind numeric, const KernelSet& kernels);
+[[nodiscard]] GoldenRun golden_run(GoldenScene which, NumericKind numeric,
+                                   const KernelSet& kernels);
 
 }  // namespace kerf::test

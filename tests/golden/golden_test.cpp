@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-// 20 s of the servo step end in known bits: on every compiler, optimisation level, instruction set
-// and processor (docs/determinism.md). Prints what .ci/check-determinism.sh compares.
+// Two scenes of the servo step end in known bits: on every compiler, optimisation level,
+// instruction set and processor (docs/determinism.md). Prints what .ci/check-determinism.sh
+// compares.
 #include <chrono>
 #include <cstdio>
+#include <set>
 #include <string>
 
 #include <doctest/doctest.h>
 
+#include "controller/scene/scene_words.hpp"
 #include "tests/golden/golden_run.hpp"
 
 using namespace kerf;
@@ -14,11 +17,12 @@ using namespace kerf::test;
 
 namespace {
 
-GoldenRun printed_run(const char* name, NumericKind numeric, const KernelSet& kernels) {
+GoldenRun printed_run(GoldenScene scene, NumericKind numeric, const KernelSet& kernels) {
   const auto begin = std::chrono::steady_clock::now();
-  const GoldenRun run = golden_run(numeric, kernels);
+  const GoldenRun run = golden_run(scene, numeric, kernels);
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - begin;
-  std::printf("golden %s %s %s %s %.2f\n", name, kernels.name, run.hash.c_str(),
+  std::printf("golden %s %s %s %s %s %.2f\n", scene == GoldenScene::mill ? "mill" : "feel",
+              std::string(word_of(numeric)).c_str(), kernels.name, run.hash.c_str(),
               run.volume_hash.c_str(), took.count());
   return run;
 }
@@ -36,26 +40,55 @@ void check_rich(const GoldenRun& run) {
   for (const std::uint64_t steps : run.removed_steps) CHECK(steps > 10'000'000);
 }
 
+/// The same for the short scene: it is there for the contact of tools that turn.
+void check_felt(const GoldenRun& run) {
+  CHECK(run.plans == std::set{Plan::gather});
+  CHECK(run.contact_ticks > 1'000);
+  CHECK(run.late_contact_ticks > 400);
+  CHECK(run.motor_ticks > 2'000);
+  CHECK(run.volume_hash == "a62142e8a8487868");  // as they were made
+}
+
 }  // namespace
 
-TEST_CASE("20 s in fixed point end in the known bits on every instruction set") {
+TEST_CASE("20 s of milling in fixed point end in the known bits on every instruction set") {
   for (auto set = kernel_sets(); *set != nullptr; ++set) {
-    const GoldenRun run = printed_run("fixed", NumericKind::fixed, **set);
+    const GoldenRun run = printed_run(GoldenScene::mill, NumericKind::fixed, **set);
     CAPTURE(std::string((*set)->name));
     CHECK(run.hash == "13238c95e637973c");
     CHECK(run.volume_hash == "74b9e6fd06a55a59");
+    CHECK(run.plans == std::set{Plan::aligned, Plan::splat});
     check_rich(run);
   }
 }
 
-TEST_CASE("20 s in float and double end in the known bits") {
+TEST_CASE("20 s of milling in float and double end in the known bits") {
   const KernelSet& unused = **kernel_sets();
-  const GoldenRun in_float = printed_run("float", NumericKind::float32, unused);
+  const GoldenRun in_float = printed_run(GoldenScene::mill, NumericKind::float32, unused);
   CHECK(in_float.hash == "a885d50797a1eac8");
   CHECK(in_float.volume_hash == "0f56cf84df38d579");
   check_rich(in_float);
-  const GoldenRun in_double = printed_run("double", NumericKind::float64, unused);
+  const GoldenRun in_double = printed_run(GoldenScene::mill, NumericKind::float64, unused);
   CHECK(in_double.hash == "83ad2fdf7106bea7");
   CHECK(in_double.volume_hash == "a83c05782744d479");
   check_rich(in_double);
+}
+
+TEST_CASE("3 s of feeling in fixed point end in the known bits on every instruction set") {
+  for (auto set = kernel_sets(); *set != nullptr; ++set) {
+    const GoldenRun run = printed_run(GoldenScene::feel, NumericKind::fixed, **set);
+    CAPTURE(std::string((*set)->name));
+    CHECK(run.hash == "f0a930f069d75a5a");
+    check_felt(run);
+  }
+}
+
+TEST_CASE("3 s of feeling in float and double end in the known bits") {
+  const KernelSet& unused = **kernel_sets();
+  const GoldenRun in_float = printed_run(GoldenScene::feel, NumericKind::float32, unused);
+  CHECK(in_float.hash == "aba1dd5b032a1277");
+  check_felt(in_float);
+  const GoldenRun in_double = printed_run(GoldenScene::feel, NumericKind::float64, unused);
+  CHECK(in_double.hash == "5b757a25a882117a");
+  check_felt(in_double);
 }

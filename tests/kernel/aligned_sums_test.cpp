@@ -88,7 +88,7 @@ TEST_CASE("sums are widened before the worst volume overflows them, and without 
 }
 
 TEST_CASE("a table is widened as seldom as its largest half allows, every 127 chunks at worst") {
-  for (const ExactTaps& taps : {kExactFarid, kExactSobel5}) {
+  for (const ExactTaps& taps : {kExactFarid, kExactSobel5, kExactCentral}) {
     for (const auto& tool : {box_tool(1, 1, 1), paper_ball(10), paper_ball(16), paper_ball(32),
                              box_tool(16, 16, 16), ragged_tool(28, 7, 33, 6)}) {
       for (const AlignedRig& rig : rigs_for(tool, taps)) {

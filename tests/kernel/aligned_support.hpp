@@ -17,20 +17,6 @@
 /// Volumes, tools and the two ways to compute one tick of the plan `aligned`.
 namespace kerf::test {
 
-/// Every voxel of a box.
-inline std::vector<ToolOffset> box_tool(int nx, int ny, int nz) {
-  std::vector<ToolOffset> offsets;
-  for (int z = 1 - nz; z < nz; z += 2) {
-    for (int y = 1 - ny; y < ny; y += 2) {
-      for (int x = 1 - nx; x < nx; x += 2) {
-        offsets.push_back({static_cast<std::int16_t>(x), static_cast<std::int16_t>(y),
-                           static_cast<std::int16_t>(z)});
-      }
-    }
-  }
-  return offsets;
-}
-
 /// About half the voxels of a box: full of holes, and not centred.
 inline std::vector<ToolOffset> ragged_tool(int nx, int ny, int nz, std::uint32_t seed) {
   std::mt19937 random(seed);

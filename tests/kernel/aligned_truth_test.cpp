@@ -8,6 +8,7 @@
 
 #include <doctest/doctest.h>
 
+#include "controller/scene/aligned_tool.hpp"
 #include "tests/kernel/exact_field.hpp"
 
 using namespace kerf;
@@ -33,8 +34,9 @@ std::array<double, 3> place(int i) {
 
 TEST_CASE("the exact gradient rounds to the stored one") {
   const TestVolume volume = random_volume({9, 8, 7}, 4);
-  for (const auto kernel : {GradientKernel::farid, GradientKernel::sobel5}) {
-    const ExactTaps& taps = kernel == GradientKernel::farid ? kExactFarid : kExactSobel5;
+  for (const auto kernel :
+       {GradientKernel::farid, GradientKernel::sobel5, GradientKernel::central}) {
+    const ExactTaps& taps = exact_taps(kernel);
     for (std::int32_t z = 0; z < 7; ++z) {
       for (std::int32_t y = 0; y < 8; ++y) {
         for (std::int32_t x = 0; x < 9; ++x) {

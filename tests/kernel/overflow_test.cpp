@@ -34,14 +34,8 @@ TEST_CASE("4096 samples of the steepest gradient add up without overflow") {
   const VoxelGrid grid{20, 20, 20};
   const std::vector<Gradient<FixedNumbers>> field(grid.voxel_count(),
                                                   {kSteepest, kLowest, kSteepest});
-  std::vector<ToolOffset> cube;
-  for (int n = 0; n < 4096; ++n) {
-    cube.push_back({static_cast<std::int16_t>(2 * (n % 16) - 15),
-                    static_cast<std::int16_t>(2 * (n / 16 % 16) - 15),
-                    static_cast<std::int16_t>(2 * (n / 256) - 15)});
-  }
-  const auto sum =
-      contact_sum<FixedNumbers>(grid, field, cube, pose_at<FixedNumbers>({9.37, 9.81, 10.11}));
+  const auto sum = contact_sum<FixedNumbers>(grid, field, box_tool(16, 16, 16),
+                                             pose_at<FixedNumbers>({9.37, 9.81, 10.11}));
   CHECK(sum.x == 4096LL * 32768 * kSteepest);
   CHECK(sum.y == 4096LL * 32768 * kLowest);
 }
@@ -71,16 +65,10 @@ TEST_CASE("the steepest volume's exact gradient is the bound that the sums are s
 }
 
 TEST_CASE("a contact of the largest tool on the steepest gradient is exact in the plan aligned") {
-  std::vector<ToolOffset> cube;
-  for (std::int32_t n = 0; n < 64 * 64 * 64; ++n) {
-    cube.push_back({static_cast<std::int16_t>(2 * (n % 64) - 63),
-                    static_cast<std::int16_t>(2 * (n / 64 % 64) - 63),
-                    static_cast<std::int16_t>(2 * (n / 4096) - 63)});
-  }
   const auto steepest = [](VoxelIndex) {
     return SumVec<FixedNumbers>{kMaxExactGradient, -kMaxExactGradient, 0};
   };
-  const auto sum = aligned_contact_sum(kExactFarid, steepest, cube,
+  const auto sum = aligned_contact_sum(kExactFarid, steepest, box_tool(64, 64, 64),
                                        pose_at<FixedNumbers>({40.37, 40.81, 40.11}));
   const std::int64_t total = 64LL * 64 * 64 * kMaxExactGradient;
   CHECK(sum.x == kept_bits(kExactFarid, total));
@@ -96,7 +84,8 @@ TEST_CASE("a contact of the largest tool on the steepest gradient is exact in th
   CHECK(trilinear<FixedNumbers, std::int64_t>(corner, {32768, 32768, 32768}) == sum.y);
 }
 
-TEST_CASE("a modification force of the largest cutting tool is exact in the plan aligned") {
+TEST_CASE(
+    "a modification force of the largest tool with unshifted sums is exact in the plan aligned") {
   const VoxelGrid grid{30, 30, 20};
   REQUIRE(grid.voxel_count() == kNarrowSumSamples);
   const FullCover full(grid);
@@ -112,7 +101,7 @@ TEST_CASE("a modification force of the largest cutting tool is exact in the plan
   CHECK(sum.z == static_cast<std::int64_t>(kNarrowSumSamples) * 32768);
 }
 
-TEST_CASE("a modification force of a larger tool is exact over 2^16, beyond 63 bits") {
+TEST_CASE("a modification force of a larger tool is exact in steps of 2^16, beyond 63 bits") {
   const VoxelGrid grid{40, 40, 40};
   const FullCover full(grid);
   const TestVolume volume = filled(grid, 65535);

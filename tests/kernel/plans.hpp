@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "controller/scene/aligned_tool.hpp"
 #include "tests/kernel/exact_field.hpp"
 
 /// The contact force of an unturned tool of the volume's pitch by each plan: SUM_i grad(rho /
@@ -32,15 +33,14 @@ class Gathered {
   std::vector<Gradient<N>> field_;
 };
 
-/// No stored gradients: exact sums at the eight corners of one cell. Not for the central kernel.
+/// No stored gradients: exact sums at the eight corners of one cell.
 class Aligned {
  public:
   using Numbers = FixedNumbers;
   static std::string name() { return "aligned, fixed"; }
 
   Aligned(GradientKernel kernel, const TestVolume& volume)
-      : taps_(kernel == GradientKernel::sobel5 ? kExactSobel5 : kExactFarid),
-        field_(taps_, volume) {}
+      : taps_(exact_taps(kernel)), field_(taps_, volume) {}
 
   [[nodiscard]] std::array<double, 3> at(std::span<const ToolOffset> tool,
                                          const ToolPose<FixedNumbers>& pose) const {

@@ -163,7 +163,7 @@ TEST_CASE("gradients are rounded once, stored ones to a step and summed ones to 
     const std::int64_t tie = stored - (stored & 0x1fffff) + (1 << 20);
     wrong += is_nearest(gradient_from_sum<FixedNumbers>(tie, 21), tie, 21) ? 0 : 1;
     const auto sum = static_cast<std::int64_t>(random()) >> 16;  // 2^47, the bound of a 64 cube
-    for (const ExactTaps& taps : {kExactFarid, kExactSobel5}) {
+    for (const ExactTaps& taps : {kExactFarid, kExactSobel5, kExactCentral}) {
       wrong += is_nearest(kept_bits(taps, sum), Int128{taps.factor} * sum, taps.shift - 8) ? 0 : 1;
     }
   }

@@ -70,6 +70,20 @@ std::vector<Gradient<N>> gradients(GradientKernel kernel, const TestVolume& volu
   return field;
 }
 
+/// Every voxel of a box.
+inline std::vector<ToolOffset> box_tool(int nx, int ny, int nz) {
+  std::vector<ToolOffset> offsets;
+  for (int z = 1 - nz; z < nz; z += 2) {
+    for (int y = 1 - ny; y < ny; y += 2) {
+      for (int x = 1 - nx; x < nx; x += 2) {
+        offsets.push_back({static_cast<std::int16_t>(x), static_cast<std::int16_t>(y),
+                           static_cast<std::int16_t>(z)});
+      }
+    }
+  }
+  return offsets;
+}
+
 /// Samples of a ball around the origin, on whole pitches: 515 for a radius of 5.
 inline std::vector<ToolOffset> odd_ball(int radius_pitches) {
   std::vector<ToolOffset> offsets;

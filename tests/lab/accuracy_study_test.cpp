@@ -102,6 +102,20 @@ TEST_CASE(
   }
 }
 
+TEST_CASE("times of the lab's own text stand in brackets, and no others") {
+  const std::string text = page(small_study(), "accuracy.svg");
+  for (const Entry& e : small_study()) {
+    const std::string name = e.standard ? "**" + e.value + "**" : e.value;
+    const bool of_lab = count_of("\n| " + name + " | (", text) > 0;
+    CHECK(of_lab == e.plain);
+  }
+  for (const char* plain : {"Q8", "Q12"}) CHECK(entry("arithmetic", plain).plain);
+  for (const char* servos : {"float", "double"}) CHECK_FALSE(entry("arithmetic", servos).plain);
+  CHECK(entry("storage", "spline 3").plain);
+  CHECK(entry("interpolation", "nearest").plain);
+  CHECK_FALSE(entry("storage", "aligned 0.0625 mm").plain);
+}
+
 TEST_CASE("the plot's front leaves out what another choice beats in time and error") {
   const auto choice = [](const char* value, double us, double error) {
     return Entry{

@@ -8,6 +8,7 @@
 
 #include <doctest/doctest.h>
 
+#include "hil/lab/lab_run.hpp"
 #include "hil/lab/performance_page.hpp"
 
 namespace {
@@ -60,6 +61,31 @@ TEST_CASE("accuracy refuses a file or a core that cannot be, before anything is 
   const Answer answer = lab({"accuracy", "--cpu", "1000"});
   CHECK(answer.code == 2);
   CHECK(answer.complained.find("--cpu 1000") != std::string::npos);
+}
+
+TEST_CASE("two outputs that are one file are refused before anything is measured") {
+  const auto folder = std::filesystem::temp_directory_path();
+  const std::string file = folder / "kerf-lab-same.csv";
+  const std::string same = folder / "." / "kerf-lab-same.csv";
+  const Answer answer = lab({"accuracy", "--csv", file.c_str(), "--report", same.c_str()});
+  CHECK(answer.code == 2);
+  CHECK(answer.said.empty());
+  CHECK(answer.complained ==
+        "kerf-lab: --csv " + file + ": --report writes there, too; give each a file of its own\n");
+  const std::string svg = folder / "kerf-lab-same.svg";  // the plot goes beside the page
+  CHECK(lab({"accuracy", "--page", svg.c_str()}).code == 2);
+  CHECK(lab({"bench", "--page", file.c_str(), "--report", file.c_str()}).code == 2);
+}
+
+TEST_CASE("nothing lies beside an output while a run measures, so that it may be stopped") {
+  const auto folder = std::filesystem::temp_directory_path() / "kerf-lab-output-test";
+  std::filesystem::remove_all(folder);
+  std::filesystem::create_directory(folder);
+  const kerf::LabOutput output("--csv", folder / "a.csv");
+  CHECK(std::filesystem::is_empty(folder));
+  output.write("figures\n");
+  CHECK(std::filesystem::file_size(folder / "a.csv") == 8);
+  std::filesystem::remove_all(folder);
 }
 
 TEST_CASE("the page says where its figures come from, and holds one line for each") {

@@ -17,6 +17,7 @@
 #include "hil/lab/accuracy/plot.hpp"
 #include "hil/lab/accuracy/study.hpp"
 #include "hil/lab/lab_run.hpp"
+#include "shared/posix/new_file.hpp"
 
 namespace kerf::accuracy {
 namespace {
@@ -68,10 +69,11 @@ void Command::run(std::ostream& out) const {
   const std::filesystem::path plot = plot_.empty() && !page_.empty()
                                          ? std::filesystem::path(page_).replace_extension(".svg")
                                          : std::filesystem::path(plot_);
-  LabOutput as_json("--report", report_);
-  LabOutput as_csv("--csv", csv_);
-  LabOutput as_page("--page", page_);
-  LabOutput as_plot("--plot", plot.string());
+  const LabOutput as_json("--report", report_);
+  const LabOutput as_csv("--csv", csv_);
+  const LabOutput as_page("--page", page_);
+  const LabOutput as_plot("--plot", plot.string());
+  LabOutput::check_distinct({&as_json, &as_csv, &as_page, &as_plot});
   const int core = pin_lab(core_);
   std::vector<Entry> entries;
   {

@@ -20,6 +20,11 @@ std::unique_ptr<ContactMethod> from_field(const ContactChoice& choice, const Ana
 
 }  // namespace
 
+bool is_servos(const ContactChoice& choice) {
+  return choice.storage != Storage::spline && choice.interpolation == Interpolation::trilinear &&
+         choice.arithmetic != Arithmetic::q8 && choice.arithmetic != Arithmetic::q12;
+}
+
 BallTool ball_tool(double radius_mm, double pitch_mm) {
   SceneTool tool = make_tool("ball", "ball", {.pitch_mm = pitch_mm, .radius_mm = radius_mm});
   return {radius_mm, pitch_mm, tool.size_vox, std::move(tool.offsets)};

@@ -42,6 +42,9 @@ struct ContactChoice {
   friend bool operator==(const ContactChoice&, const ContactChoice&) = default;
 };
 
+/// Whether the servo has it, in its kernels or templates; else it is the lab's plain text.
+[[nodiscard]] bool is_servos(const ContactChoice& choice);
+
 /// A round tool, sampled as a scene's tool of this radius and pitch would be.
 struct BallTool {
   double radius_mm;

@@ -27,7 +27,7 @@ coarser weights through its lerp.)",
            R"(## Pitch of the tool's samples
 
 In voxel edges. A sample stands for the cube around it, so a coarse ball has not the ball's volume.)",
-           {kTheory, kTheoryMax, kDirection, kToolLoop, kStep}},
+           {kSamples, kTheory, kTheoryMax, kDirection, kToolLoop, kStep}},
           {"kernel",
            R"(## Gradient kernel
 
@@ -40,8 +40,8 @@ of white noise of deviation one.)",
 Int16 gradients are the servo's plan `gather`, `aligned` its plan for round tools, `splat` that for any
 tool in scenes that cut (its time holds the modification force, too). `spline 2` and `spline 3` are the
 exact derivative of the density's quadratic and cubic B-spline: their accuracy is the reference, their
-time is not.)",
-           {kMemory, kDouble, kDoubleMax, kTheory, kDirection, kSampleLoop, kToolLoop}},
+time is not. The last row has voxels half as wide: compare it with that of `gather` in "Voxel edge".)",
+           {kSamples, kMemory, kDouble, kDoubleMax, kTheory, kDirection, kSampleLoop, kToolLoop}},
           {"interpolation",
            R"(## Interpolation of the stored gradient
 
@@ -53,7 +53,7 @@ Trilinear is the servo's; the others are B-splines of degree 0, 2 and 3 in plain
 
 The same millimetres in 64^3, 128^3 and 256^3 voxels, tool pitch = voxel. `order`: log2 of how much
 smaller the error is than in the row above; a blur of fixed width in voxels gives 2 in the limit.)",
-           {kTheory, kTheoryMax, kOrder, kDirection, kToolLoop}}};
+           {kSamples, kTheory, kTheoryMax, kOrder, kDirection, kToolLoop}}};
 }
 
 std::string row_of(const std::string& first, const std::vector<std::string>& cells) {
@@ -68,14 +68,20 @@ std::string head_of(const char* first, const std::vector<std::string>& titles) {
   return head + "\n";
 }
 
+/// In brackets where it is not the time of what the servo runs.
+std::string time_cell(const Entry& entry, double ns) {
+  const std::string us = page_number(ns / 1e3);
+  return entry.plain ? "(" + us + ")" : us;
+}
+
 std::string table_of(const Table& table, const std::vector<Entry>& entries) {
   std::vector<std::string> titles{"us p50", "p99"};
   for (const PageColumn& column : table.columns) titles.emplace_back(column.title);
   std::string text = std::string(table.about) + "\n\n" + head_of(table.knob, titles);
   for (const Entry& entry : entries) {
     if (entry.knob != table.knob) continue;
-    std::vector<std::string> cells{page_number(entry.times.p50_ns / 1e3),
-                                   page_number(entry.times.p99_ns / 1e3)};
+    std::vector<std::string> cells{time_cell(entry, entry.times.p50_ns),
+                                   time_cell(entry, entry.times.p99_ns)};
     for (const PageColumn& column : table.columns) cells.push_back(column.cell(entry));
     text += row_of(entry.standard ? "**" + entry.value + "**" : entry.value, cells);
   }
@@ -102,6 +108,15 @@ std::string shapes_of(const Entry& standard) {
   return text + "\n";
 }
 
+constexpr const char* kRemoval = R"(## Removal
+
+Not measured here; `tests/kernel/milling_test.cpp` bounds it. One stamp of a ball of five voxels' radius removes
+the ball's volume to 1 %, and a straight sweep of ten voxels' radius that stays on the voxels' lattice its capsule.
+Off the lattice no sweep is that exact: voxels at its rim are partly covered by many stamps in a row, and by the
+paper's overlap rule each stamp takes its share of what is left. A groove then has a radius that is up to about
+half a voxel larger than the tool's, at steps of a quarter to a whole voxel: the coarser the voxels, the more.
+)";
+
 constexpr const char* kAbout = R"(# Accuracy
 
 Made by `./kerf lab accuracy --page docs/accuracy.md`; every figure comes from one run, nothing is typed
@@ -119,8 +134,9 @@ that has a tenth of full scale. `loop` is |SUM dW| / SUM |dW| around tilted circ
 sample or of the whole tool: what a static tooth gives or takes in a closed path, where it should give nothing.
 `rms` and `max` are over all shapes unless said otherwise. Times are of one tick of the tool without
 milling, `us p50` and `p99`, on the fastest kernels of this machine where the servo has them: Q15 in the plans
-`gather`, `aligned` and `splat`. Float and double are the servo's templates; Q8, Q12 and other interpolations
-than trilinear are plain text of the lab, which shows what they would give rather than what they would cost.
+`gather`, `aligned` and `splat`. Float and double are the servo's templates. Times in brackets are of plain text
+of the lab (Q8, Q12, splines, other interpolations than trilinear): it shows what these would give, not what
+they would cost, so compare them with no other time.
 
 )";
 
@@ -137,8 +153,7 @@ std::string page(const std::vector<Entry>& entries, const std::string& plot) {
     text += shapes_of(entry);
     break;
   }
-  text.pop_back();  // one line's end at the end
-  return text;
+  return text + kRemoval;
 }
 
 }  // namespace kerf::accuracy

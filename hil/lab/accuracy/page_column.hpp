@@ -46,6 +46,7 @@ inline constexpr PageColumn kToolLoop{"loop, tool", "loop_tool_rms"};
 inline constexpr PageColumn kStep{"step max permille", "step_max", kPermille};
 inline constexpr PageColumn kNoise{"noise", "noise_gain", 1, "noise"};
 inline constexpr PageColumn kMemory{"bytes a voxel", "memory", 1, "any"};
+inline constexpr PageColumn kSamples{"samples", "samples", 1, "any"};
 inline constexpr PageColumn kOrder{"order", "order"};
 }  // namespace column
 

@@ -18,7 +18,7 @@ struct Variant {
   bool against_double = false;
 };
 
-/// Each knob from coarse to fine. The voxel comes last: each of its positions has its own volumes.
+/// Each knob from coarse to fine. Other voxels come last: each edge has its own volumes.
 std::vector<Variant> variants() {
   using enum Arithmetic;
   using K = GradientKernel;
@@ -49,6 +49,7 @@ std::vector<Variant> variants() {
       {"voxel", "0.25 mm", {.voxel_mm = 2 * kVoxelMm}},
       {"voxel", "0.125 mm", {}},
       {"voxel", "0.0625 mm", {.voxel_mm = kVoxelMm / 2}},
+      {"storage", "aligned 0.0625 mm", {.storage = S::aligned, .voxel_mm = kVoxelMm / 2}},
   };
 }
 
@@ -110,6 +111,7 @@ Entry measured(const Variant& variant, const std::vector<Subject>& subjects, con
         entry.times = time_contact(*method, at, plan.ticks);
         figures.add("any", "memory", static_cast<double>(method->bytes_per_voxel()),
                     "bytes a voxel");
+        figures.add("any", "samples", static_cast<double>(tool.offsets.size()), "1");
       }
     }
     figures.add(subject.name, errors);
@@ -184,6 +186,7 @@ std::vector<Entry> study(const Plan& plan,
     entry.knob = variant.knob;
     entry.value = variant.value;
     entry.standard = is_standard;
+    entry.plain = !is_servos(variant.choice);
     if (is_standard) standard = entry;
     entries.push_back(std::move(entry));
   }

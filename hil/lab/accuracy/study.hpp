@@ -27,6 +27,7 @@ struct Entry {
       false;  ///< what the servo runs without the plan `aligned`: one measurement, in each knob
   TickTimes times;
   std::vector<Figure> figures;
+  bool plain = false;  ///< text of the lab: its times are not those of kernels
 
   /// The figure of a metric; nullptr where it was not measured.
   [[nodiscard]] const double* find(std::string_view metric, std::string_view shape = "all") const;
