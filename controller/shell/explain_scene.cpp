@@ -16,9 +16,11 @@
 namespace kerf {
 
 void explain_scene(const ControllerOptions& options, Scene& scene, CompiledScene& servo) {
+  if (!options.report.empty()) check_new_file(options.report);
   const int core = options.real_time.cpu >= 0 ? options.real_time.cpu : allowed_cores().back();
   static_cast<void>(pin_to_core(core));  // where it may not, times are less even
-  const Calibration calibration = calibration_of_machine(calibration_path(), options.calibrate);
+  const Calibration calibration =
+      calibration_of_machine(calibration_path(), options.calibrate, servo.costs());
   const SegmentPlan segment = plan_segment(segment_spec(scene, canonical_json(scene), 0));
   check_memory(scene, servo.costs(), 0);
   servo.take(scene);
