@@ -174,7 +174,7 @@ template <class N>
         laps.end_stage(tick.press(in_volume.overlap_ratio).contact.x);
         bend(box);
         laps.end_stage(tick.cut(unbent, memory.carry).changed.hi.x);
-        const std::uint8_t* const live = scratch.tick.live;
+        const std::uint8_t* const live = scratch.tick.live;  // touched: little of it is air here
         const std::ptrdiff_t rows = std::ptrdiff_t{box.size.y + 1} * (box.size.z + 1);
         const auto touched = static_cast<std::uint64_t>(std::count(live, live + rows, 1));
         done = splat_stages(tool.offsets.size(), box.size, touched, bends);

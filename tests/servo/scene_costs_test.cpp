@@ -314,6 +314,20 @@ TEST_CASE("a scene above the budget is refused on one line, and fits at a lower 
   CHECK(line.find('\n') == std::string::npos);
   scene.tools.pop_back();
   CHECK(over_budget(scene, plan_scene(scene)->costs()).empty());
+  // What fits one volume need not fit two: the refusal names both.
+  scene.tools.push_back(shape("cylinder", 0.5, 2));
+  const double alone_us = work_us(plan_scene(scene)->costs(), 1);
+  scene.servo.rate_hz = static_cast<int>(1e6 * kBudgetShare / (1.5 * alone_us));
+  CHECK(over_budget(scene, plan_scene(scene)->costs()).empty());
+  scene.volumes.push_back(scene.volumes.front());
+  scene.volumes.back().name = "other";
+  const SceneCosts both = plan_scene(scene)->costs();
+  const std::string why = over_budget(scene, both);
+  CHECK(why.find(" in test ") != std::string::npos);
+  CHECK(why.find(", in other ") != std::string::npos);
+  CHECK(work_us(both, 1) == doctest::Approx(2 * alone_us));
+  scene.volumes.pop_back();
+  scene.tools.pop_back();
   scene.tools.push_back(shape("cylinder", 0.5, 1));
   scene.servo.rate_hz = 250;
   CHECK(over_budget(scene, plan_scene(scene)->costs()).empty());
