@@ -23,7 +23,7 @@ namespace {
 template <class N>
 class SceneIn final : public CompiledScene {
  public:
-  SceneIn(const Scene& scene, const KernelSet& kernels) : memory_(scene) {
+  SceneIn(const Scene& scene, const KernelSet& kernels) : cut_(scene.cut.model), memory_(scene) {
     plan_device(scene.device, plan_);
     plan_limits(scene, plan_);
     plan_.kernel = scene.servo.kernel;
@@ -41,10 +41,9 @@ class SceneIn final : public CompiledScene {
 
   void take(Scene& scene) override { memory_.take(scene, plan_, state_); }
   [[nodiscard]] const SceneCosts& costs() const noexcept override { return costs_; }
-  [[nodiscard]] std::vector<double> time_stages(std::size_t tick) override {
-    const std::size_t stages = costs_.ticks[tick].cost.stages.size();
+  [[nodiscard]] std::vector<StageTime> time_stages(std::size_t tick) override {
     return kerf::time_stages(plan_, state_, tick / plan_.volume_count, tick % plan_.volume_count,
-                             stages);
+                             cut_, costs_.ticks[tick].cost.stages);
   }
 
   ServoOutput step(const DeviceReport& report) noexcept override {
@@ -83,15 +82,15 @@ class SceneIn final : public CompiledScene {
             table = &memory_.hold_table(tool, turn, scene.servo.kernel, *plan_.kernels);
           }
           memory_.hold_aligned(v, *table);
-          cost = aligned_cost(*table, *plan_.kernels, plan_.cutting);
+          cost = aligned_cost(*table, *plan_.kernels, scene.cut.model);
           break;
         case Plan::gather:
           memory_.hold_gather(tool, volume, v);
-          cost = gather_cost(scene.servo.numeric, *plan_.kernels, tool, volume, plan_.cutting);
+          cost = gather_cost(scene.servo.numeric, *plan_.kernels, tool, volume, scene.cut.model);
           break;
         case Plan::splat:
           memory_.hold_splat(tool, volume, v);
-          cost = splat_cost(*plan_.kernels, tool, volume);
+          cost = splat_cost(*plan_.kernels, tool, volume, scene.cut.model);
           break;
       }
       if constexpr (N::kIsFixed) {
@@ -105,6 +104,7 @@ class SceneIn final : public CompiledScene {
     }
   }
 
+  CutModel cut_;
   ServoPlan<N> plan_;
   ServoState<N> state_;
   std::vector<VoxelGrid> grids_;  ///< by volume of the scene

@@ -23,10 +23,10 @@ class CompiledScene : public Servo {
   /// rest. Once, before the first step; `scene` is the one that was compiled.
   virtual void take(Scene& scene) = 0;
 
-  /// Median of each stage of `costs().ticks[tick]` on the volume as it is, in us, with a tool that
-  /// is inside the densest part and turned as unfavourably as it can be. Cuts where the scene cuts:
+  /// Each stage of `costs().ticks[tick]` timed on the volume as it is, with a tool that is inside
+  /// the densest part and turned as unfavourably as it can be. Cuts where the scene cuts:
   /// only for a servo that will not be stepped. After `take`; takes about 250 ticks.
-  [[nodiscard]] virtual std::vector<double> time_stages(std::size_t tick) = 0;
+  [[nodiscard]] virtual std::vector<StageTime> time_stages(std::size_t tick) = 0;
 };
 
 /// Plans, tables and costs of a checked scene; no array of the size of a volume is made. Throws

@@ -39,7 +39,12 @@ void check_any_pose(const Scene& scene, const SceneTool& tool, const SceneVolume
                      number_text(std::floor(is)) + what + ", and " + number_text(most) +
                      " are the end; " + way_out + ", or set servo.numeric = \"double\"");
   };
-  double per_voxel = 1, widest = 0;
+  double farthest_pitches = 0;
+  for (const ToolOffset& offset : tool.offsets) {  // half pitches
+    const double x = offset[0], y = offset[1], z = offset[2];
+    farthest_pitches = std::max(farthest_pitches, std::sqrt(x * x + y * y + z * z) / 2);
+  }
+  double per_voxel = 1, reach = 0;
   std::array<double, 3> width{};
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const double mm = volume.image.spacing_mm[axis];
@@ -47,9 +52,10 @@ void check_any_pose(const Scene& scene, const SceneTool& tool, const SceneVolume
     // diagonal to each side: in any pose its weights add up to no more than that hat's volume.
     per_voxel *= mm / tool.pitch_mm + std::numbers::sqrt3;
     width[axis] = static_cast<double>(overlap_width(tool.size_vox, tool.pitch_mm, mm));
-    widest = std::max(widest, width[axis]);
+    reach = std::max(reach, farthest_pitches * tool.pitch_mm / mm);
   }
-  check(widest, 2 * kSampleReachVox, " voxels wide", "use a smaller tool");
+  check(reach, kSampleReachVox, " voxels from the tool's centre",
+        "use a smaller tool or one whose centre lies in its middle");
   if (scene.cut.model == CutModel::none) return;
   check(per_voxel, kMaxSplatDensity, " samples in one voxel",
         "resample the volume to finer voxels");

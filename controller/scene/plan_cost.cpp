@@ -2,23 +2,34 @@
 #include "controller/scene/plan_cost.hpp"
 
 #include <algorithm>
-#include <cmath>
-#include <numbers>
-#include <span>
+#include <cstddef>
 #include <string>
+#include <string_view>
 
-#include "controller/kernel/gradient.hpp"
-#include "controller/scene/lattice.hpp"
+#include "controller/kernel/tick_box.hpp"
 #include "controller/scene/scene_words.hpp"
+#include "controller/scene/turned_box.hpp"
 
 namespace kerf {
 namespace {
 
-constexpr int kCellMargin = 3;  ///< floors at both ends, and the far corners of the last cells
 constexpr std::uint64_t kPlace = 9, kCorners = 8;  ///< multiply-adds: three a component; one each
 
 std::uint64_t count(std::int32_t n) {
   return static_cast<std::uint64_t>(n);
+}
+
+std::uint64_t voxels_of(VoxelIndex edges) {
+  return count(edges.x) * count(edges.y) * count(edges.z);
+}
+
+/// Rows of a box's overlap.
+std::uint64_t rows_of(VoxelIndex size) {
+  return (count(size.y) + 1) * (count(size.z) + 1);
+}
+
+std::string way_of(Plan plan, std::string_view runs_it) {
+  return std::string(name_of(plan)) + "/" + std::string(runs_it);
 }
 
 std::uint64_t correlation_operations(const AlignedTable& table) {
@@ -39,77 +50,84 @@ std::uint64_t mill_operations(const AlignedTable& table) {
   return ratios * (kMasks + kTapsX + kTapsY + kProducts + kRemovals) + filtered * kTapsZ;
 }
 
-/// Mean of the spans along three axes at right angles, in pitches, in any orientation.
-double largest_mean_span(std::span<const ToolOffset> offsets) {
-  double across = 0, around = 0;   // largest distances from the axis and the centre, squared
-  std::int16_t low = 0, high = 0;  // along the axis; the centre counts too
-  for (const ToolOffset& offset : offsets) {
-    const double x = offset[0], y = offset[1], z = offset[2];  // half pitches
-    across = std::max(across, x * x + z * z);
-    around = std::max(around, x * x + y * y + z * z);
-    low = std::min(low, offset[1]);
-    high = std::max(high, offset[1]);
+/// Of every stage the most that it does in one of the boxes.
+template <class StagesOf>
+std::vector<StageCost> most_over(const std::vector<VoxelIndex>& sizes, StagesOf stages_of) {
+  std::vector<StageCost> most = stages_of(sizes.front());
+  for (const VoxelIndex& size : sizes) {
+    const std::vector<StageCost> stages = stages_of(size);
+    for (std::size_t s = 0; s < most.size(); ++s) {
+      most[s].operations = std::max(most[s].operations, stages[s].operations);
+    }
   }
-  const double cylinder =
-      std::numbers::sqrt3 * (high - low) / 2.0 + std::sqrt(6.0) * std::sqrt(across);
-  return std::min(cylinder, 3 * std::sqrt(around)) / 3;
+  return most;
 }
 
 }  // namespace
 
-PlanCost aligned_cost(const AlignedTable& table, const KernelSet& kernels, bool cuts) {
-  PlanCost cost{std::string("aligned/") + kernels.name, {}};
-  cost.stages = {{"copy", count(table.box.x) * count(table.box.y) * count(table.box.z)},
-                 {"contact", correlation_operations(table)}};
-  if (cuts) cost.stages.push_back({"mill", mill_operations(table)});
+PlanCost aligned_cost(const AlignedTable& table, const KernelSet& kernels, CutModel cut) {
+  PlanCost cost{way_of(Plan::aligned, kernels.name), {}};
+  cost.stages = {{"copy", voxels_of(table.box)}, {"contact", correlation_operations(table)}};
+  if (cut != CutModel::none) cost.stages.push_back({"mill", mill_operations(table)});
+  if (cut == CutModel::overlap_exact) {
+    cost.stages.push_back({"bend", (count(table.size.x) + 1) * rows_of(table.size)});
+  }
   return cost;
 }
 
-PlanCost splat_cost(const KernelSet& kernels, const SceneTool& tool, const SceneVolume& volume) {
-  const std::uint64_t samples = tool.offsets.size();
-  const std::uint64_t box = covered_voxels(tool, volume, kCellMargin + 2 * kGradientReach);
-  return {std::string("splat/") + kernels.name,
-          {{"place", kPlace * samples},
-           {"copy", box},
-           {"splat", kCorners * samples},
-           {"press", box},
-           {"cut", covered_voxels(tool, volume, kCellMargin)}}};
+std::vector<StageCost> splat_stages(std::uint64_t samples, VoxelIndex size, std::uint64_t touched,
+                                    bool bends) {
+  constexpr std::uint64_t kSplit = 3, kFilter = 5;
+  const TickBox box = tick_box(size, kExactFarid, samples);
+  const std::uint64_t lanes = count(box.row_lanes);
+  std::vector<StageCost> stages{{"place", kPlace * samples},
+                                {"copy", voxels_of(box.box)},
+                                {"splat", kCorners * samples},
+                                {"press", lanes * (kSplit * rows_of(size) + kFilter * touched)}};
+  if (bends) stages.push_back({"bend", (count(size.x) + 1) * touched});
+  stages.push_back({"cut", lanes * touched});
+  return stages;
+}
+
+PlanCost splat_cost(const KernelSet& kernels, const SceneTool& tool, const SceneVolume& volume,
+                    CutModel cut) {
+  return {way_of(Plan::splat, kernels.name),
+          most_over(box_sizes(tool, volume), [&](VoxelIndex size) {
+            return splat_stages(tool.offsets.size(), size, rows_of(size),
+                                cut == CutModel::overlap_exact);
+          })};
+}
+
+std::vector<StageCost> gather_stages(std::uint64_t samples, const std::optional<GatherBoxes>& boxes,
+                                     bool bends) {
+  constexpr std::uint64_t kSpread = 2 * kPlace + 2 * kCorners;
+  std::vector<StageCost> stages{{"contact", kCorners * samples}};
+  if (!boxes) return stages;
+  stages.push_back({"overlap", kSpread * samples + boxes->overlap});
+  stages.push_back({"modification", boxes->inside});
+  stages.push_back({bends ? "bent removal" : "removal", boxes->inside});
+  stages.push_back({"refresh", boxes->refreshed});
+  return stages;
 }
 
 PlanCost gather_cost(NumericKind numeric, const KernelSet& kernels, const SceneTool& tool,
-                     const SceneVolume& volume, bool cuts) {
-  constexpr std::uint64_t kSpread = 2 * kPlace + 2 * kCorners;
-  const std::uint64_t samples = tool.offsets.size();
-  PlanCost cost{
-      "gather/" + std::string(numeric == NumericKind::fixed ? kernels.name : word_of(numeric)),
-      {{"contact", kCorners * samples}}};
-  if (!cuts) return cost;
-  const std::uint64_t covered = covered_voxels(tool, volume, kCellMargin);
-  cost.stages.push_back({"overlap", kSpread * samples + covered});
-  cost.stages.push_back({"modification", covered});
-  cost.stages.push_back({"removal", covered});
-  cost.stages.push_back(
-      {"refresh", covered_voxels(tool, volume, kCellMargin + 2 * kGradientReach)});
-  return cost;
-}
-
-std::uint64_t covered_voxels(const SceneTool& tool, const SceneVolume& volume, int margin) {
-  const auto& h = volume.image.spacing_mm;
-  double voxels = 1;
-  if (tool.round || !tool.turns) {
-    const Matrix steps = unturned_steps(tool, volume);
-    for (const auto& row : steps) {
-      double edge = margin;
-      for (std::size_t j = 0; j < 3; ++j) edge += std::abs(row[j]) * (tool.size_vox[j] - 1);
-      voxels *= std::floor(edge + 1e-6);  // rounding of the steps must not lose a voxel
+                     const SceneVolume& volume, CutModel cut) {
+  const VoxelGrid& grid = volume.image.grid;
+  const auto clipped = [&](VoxelIndex edges, std::int32_t beyond) {
+    return voxels_of({std::min(edges.x, grid.nx + beyond), std::min(edges.y, grid.ny + beyond),
+                      std::min(edges.z, grid.nz + beyond)});
+  };
+  const auto stages_of = [&](VoxelIndex size) {
+    std::optional<GatherBoxes> boxes;
+    if (cut != CutModel::none) {
+      const VoxelIndex covered{size.x + 1, size.y + 1, size.z + 1};
+      const VoxelIndex reached{size.x + kBoxMargin, size.y + kBoxMargin, size.z + kBoxMargin};
+      boxes = {clipped(covered, 2), clipped(covered, 0), clipped(reached, 0)};
     }
-  } else {
-    double mean = largest_mean_span(tool.offsets);
-    for (const double mm : h) mean += margin * mm / tool.pitch_mm / 3;
-    for (const double mm : h) voxels *= mean * tool.pitch_mm / mm;
-  }
-  return std::min(static_cast<std::uint64_t>(std::ceil(voxels)),
-                  std::uint64_t{volume.image.grid.voxel_count()});
+    return gather_stages(tool.offsets.size(), boxes, cut == CutModel::overlap_exact);
+  };
+  return {way_of(Plan::gather, numeric == NumericKind::fixed ? kernels.name : word_of(numeric)),
+          most_over(box_sizes(tool, volume), stages_of)};
 }
 
 }  // namespace kerf

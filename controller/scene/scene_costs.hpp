@@ -17,6 +17,12 @@ struct StageCost {
   std::uint64_t operations;
 };
 
+/// A stage as it was timed: its median, and the operations that it did there.
+struct StageTime {
+  double us = 0;
+  std::uint64_t operations = 0;
+};
+
 /// The ticks of one tool in one volume.
 struct PlanCost {
   std::string way;  ///< plan and what runs it: "aligned/avx512", "gather/double"

@@ -7,13 +7,14 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "controller/kernel/aligned.hpp"
 #include "controller/kernel/contact.hpp"
 #include "controller/kernel/gather.hpp"
 #include "controller/kernel/splat.hpp"
-#include "controller/scene/plan_choice.hpp"
+#include "controller/scene/plan_cost.hpp"
 #include "controller/servo/tool_forces.hpp"
 
 namespace kerf {
@@ -63,29 +64,44 @@ class StageLaps {
   volatile std::int64_t sink_ = 0;
 };
 
-/// Where the most density lies within reach of a tool of `reach` voxels to each side: there nothing
-/// is air and every stage does all of its work.
+/// The box of voxels around a tool's samples at `pose`, counted from the tool's centre.
+template <class N>
+[[nodiscard]] VoxelBox reach_of(std::span<const ToolOffset> offsets, ToolPose<N> pose) {
+  pose.centre_vox = {};
+  VoxelBox reach;
+  for (const ToolOffset& offset : offsets) {
+    const VoxelIndex low = cell_at<N>(sample_position(pose, offset)).low;
+    reach = reach.united({low, {low.x + 1, low.y + 1, low.z + 1}});
+  }
+  return reach;
+}
+
+/// The centre of a tool of this reach where the most density lies within it: there hardly anything
+/// is air and every stage does most of its work.
 [[nodiscard]] inline VoxelIndex densest_place(const VoxelGrid& grid,
                                               std::span<const Density> density,
-                                              std::int32_t reach) {
+                                              const VoxelBox& reach) {
   constexpr std::int32_t kPlaces = 12, kProbes = 8;  // along each axis
-  const auto along = [](std::int32_t n, std::int32_t i) { return n * (2 * i + 1) / (2 * kPlaces); };
+  const auto along = [](std::int32_t lo, std::int32_t hi, std::int32_t i, std::int32_t n) {
+    return lo + (hi - lo) * (2 * i + 1) / (2 * n);
+  };
+  const auto spread = [&](const VoxelBox& box, std::int32_t i, std::int32_t n) {
+    return VoxelIndex{along(box.lo.x, box.hi.x, i % n, n), along(box.lo.y, box.hi.y, i / n % n, n),
+                      along(box.lo.z, box.hi.z, i / n / n, n)};
+  };
   VoxelIndex best{grid.nx / 2, grid.ny / 2, grid.nz / 2};
-  std::uint64_t most = 0;
+  int most = 0;
   for (std::int32_t place = 0; place < kPlaces * kPlaces * kPlaces; ++place) {
-    const VoxelIndex at{along(grid.nx, place % kPlaces), along(grid.ny, place / kPlaces % kPlaces),
-                        along(grid.nz, place / kPlaces / kPlaces)};
-    std::uint64_t sum = 0;
+    const VoxelIndex at = spread(grid.box(), place, kPlaces);
+    int full = 0;
     for (std::int32_t probe = 0; probe < kProbes * kProbes * kProbes; ++probe) {
-      const auto offset = [&](std::int32_t i) { return reach * (2 * i + 1 - kProbes) / kProbes; };
-      const VoxelIndex v{at.x + offset(probe % kProbes), at.y + offset(probe / kProbes % kProbes),
-                         at.z + offset(probe / kProbes / kProbes)};
-      if (grid.contains(v)) sum += density[grid.index(v.x, v.y, v.z)] != 0 ? 65536 : 0;
+      const VoxelIndex way = spread(reach, probe, kProbes);
+      const VoxelIndex v{at.x + way.x, at.y + way.y, at.z + way.z};
+      if (grid.contains(v) && density[grid.index(v.x, v.y, v.z)] != 0) ++full;
     }
-    if (sum > most) {
-      most = sum;
-      best = at;
-    }
+    if (full <= most) continue;
+    most = full;
+    best = at;
   }
   return best;
 }
@@ -99,50 +115,69 @@ template <class N>
   return {{{{U(a), U(b), U(c)}, {U(-a), U(b), U(c)}, {U(0), U(b), U(-2 * c)}}}};
 }
 
-/// Median of each stage of tool `t` in volume `v` of the plan, in us: the tool where the volume is
-/// densest, turned as unfavourably as it can be, and a cut so slow that it stays surrounded.
+[[nodiscard]] inline std::uint64_t voxels_in(VoxelIndex size) {
+  return VoxelGrid{size.x, size.y, size.z}.voxel_count();
+}
+
+/// Each stage of tool `t` in volume `v` of the plan, whose `bounds` are given: the tool where the
+/// volume is densest, turned as unfavourably as it can be, and a cut so slow that it stays
+/// surrounded. Operations are those of the last tick.
 template <class N>
-[[nodiscard]] std::vector<double> time_stages(const ServoPlan<N>& plan, ServoState<N>& state,
-                                              std::size_t t, std::size_t v, std::size_t stages) {
+[[nodiscard]] std::vector<StageTime> time_stages(const ServoPlan<N>& plan, ServoState<N>& state,
+                                                 std::size_t t, std::size_t v, CutModel cut,
+                                                 std::vector<StageCost> bounds) {
   constexpr int kTicks = 250;
   constexpr double kFraction = 1.0 / 4096;
-  const auto rate = removal_rate<N>(kFraction, plan.removal_rate.bent);
+  const bool bends = cut == CutModel::overlap_exact;  // at a rate of 0 too
+  const auto rate = removal_rate<N>(kFraction, bends);
   const VolumePlan<N>& volume = plan.volumes[v];
   const ToolPlan<N>& tool = plan.tools[t];
   const ToolInVolume<N>& in_volume = tool.in_volume[v];
   VolumeState<N>& memory = state.volumes[v];
   const std::span<const Gradient<N>> gradient = memory.gradient;
-  std::int32_t reach = 0;
-  for (const ToolOffset& offset : tool.offsets) {
-    for (const std::int16_t half_pitches : offset)
-      reach = std::max<std::int32_t>(reach, half_pitches / 2);
-  }
-  const VoxelIndex place = densest_place(volume.grid, memory.density, reach);
   ToolPose<N> pose = tool_pose(volume, tool, in_volume, volume.position_mm, widest_rotation<N>());
-  StageLaps laps(stages);
+  const VoxelIndex place = densest_place(volume.grid, memory.density, reach_of(tool.offsets, pose));
+  std::vector<StageCost> done = std::move(bounds);  // the plan `aligned` does no less
+  StageLaps laps(done.size());
   for (int i = 0; i < kTicks; ++i) {
     using Real = typename N::Real;
     pose.centre_vox = {Real(place.x + 0.002 * i), Real(place.y + 0.3), Real(place.z + 0.4)};
     laps.begin();
     if constexpr (N::kIsFixed) {
+      const SplatScratch& scratch = state.scratch;
+      RemovalRate<N> unbent = rate;  // the bend is timed apart
+      unbent.bent = false;
+      const auto bend = [&](const TickBox& box) {
+        if (!bends) return;
+        detail::bend_ratios(box, scratch.tick, rate);
+        laps.end_stage(0);
+      };
       if (in_volume.plan == Plan::aligned) {
-        const AlignedTick tick(*plan.kernels, *in_volume.aligned, state.scratch.tick, volume.grid,
+        const AlignedTick tick(*plan.kernels, *in_volume.aligned, scratch.tick, volume.grid,
                                memory.density, pose);
         laps.end_stage(0);
         laps.end_stage(tick.contact().x);
-        if (plan.cutting) laps.end_stage(tick.mill(rate, memory.carry).modification.x);
+        if (!plan.cutting) continue;
+        laps.end_stage(tick.mill(unbent, memory.carry).modification.x);
+        bend(*in_volume.aligned);
         continue;
       }
       if (in_volume.plan == Plan::splat) {
-        const SplatTick tick(*plan.kernels, tool.samples, *plan.taps, state.scratch, volume.grid,
+        const SplatTick tick(*plan.kernels, tool.samples, *plan.taps, scratch, volume.grid,
                              memory.density, pose);
-        laps.end_stage(tick.box().row_lanes);
+        const TickBox& box = tick.box();
+        laps.end_stage(box.row_lanes);
         tick.copy();
         laps.end_stage(0);
         tick.splat();
         laps.end_stage(0);
         laps.end_stage(tick.press(in_volume.overlap_ratio).contact.x);
-        laps.end_stage(tick.cut(rate, memory.carry).changed.hi.x);
+        bend(box);
+        laps.end_stage(tick.cut(unbent, memory.carry).changed.hi.x);
+        const std::uint8_t* const live = scratch.tick.live;  // touched: little of it is air here
+        const std::ptrdiff_t rows = std::ptrdiff_t{box.size.y + 1} * (box.size.z + 1);
+        const auto touched = static_cast<std::uint64_t>(std::count(live, live + rows, 1));
+        done = splat_stages(tool.offsets.size(), box.size, touched, bends);
         continue;
       }
       laps.end_stage(gathered_contact(*plan.kernels, tool.samples, volume.grid, gradient, pose).x);
@@ -151,8 +186,9 @@ template <class N>
     laps.end_stage(
         static_cast<std::int64_t>(contact_sum<N>(volume.grid, gradient, tool.offsets, pose).x));
     if (!plan.cutting) continue;
-    laps.end_stage(
-        overlap<N>(volume.grid, tool.offsets, pose, in_volume.overlap_ratio, state.overlap).hi.x);
+    const VoxelBox inside =
+        overlap<N>(volume.grid, tool.offsets, pose, in_volume.overlap_ratio, state.overlap);
+    laps.end_stage(inside.hi.x);
     laps.end_stage(static_cast<std::int64_t>(
         modification_sum<N>(volume.grid, gradient, memory.density, state.overlap).x));
     const Removed removed =
@@ -161,8 +197,15 @@ template <class N>
     refresh_gradients<N>(plan.kernel, volume.grid, memory.density, removed.changed, memory.gradient,
                          *state.gradient_scratch);
     laps.end_stage(0);
+    const VoxelBox refreshed = removed.changed.grown(kGradientReach).clipped(volume.grid.box());
+    done = gather_stages(tool.offsets.size(),
+                         GatherBoxes{voxels_in(state.overlap.box.extent()),
+                                     voxels_in(inside.extent()), voxels_in(refreshed.extent())},
+                         bends);
   }
-  return laps.medians_us();
+  std::vector<StageTime> times;
+  for (const double us : laps.medians_us()) times.push_back({us, done[times.size()].operations});
+  return times;
 }
 
 }  // namespace kerf

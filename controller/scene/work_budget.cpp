@@ -18,51 +18,68 @@ struct Price {
 constexpr std::array kPrices{
     Price{"aligned/avx512", "copy", 0.08},
     Price{"aligned/avx512", "contact", 0.005},
-    Price{"aligned/avx512", "mill", 0.01},
+    Price{"aligned/avx512", "mill", 0.011},
+    Price{"aligned/avx512", "bend", 0.8},
     Price{"aligned/avx2", "copy", 0.08},
-    Price{"aligned/avx2", "contact", 0.011},
+    Price{"aligned/avx2", "contact", 0.012},
     Price{"aligned/avx2", "mill", 0.021},
-    Price{"aligned/scalar", "copy", 1.0},
-    Price{"aligned/scalar", "contact", 0.042},
-    Price{"aligned/scalar", "mill", 0.22},
-    Price{"gather/avx512", "contact", 0.25},
-    Price{"gather/avx2", "contact", 0.35},
-    Price{"gather/scalar", "contact", 3.5},
-    Price{"splat/avx512", "place", 0.05},
-    Price{"splat/avx512", "copy", 0.09},
-    Price{"splat/avx512", "splat", 0.2},
-    Price{"splat/avx512", "press", 0.8},
-    Price{"splat/avx512", "cut", 0.2},
-    Price{"splat/avx2", "place", 0.06},
-    Price{"splat/avx2", "copy", 0.12},
-    Price{"splat/avx2", "splat", 0.22},
-    Price{"splat/avx2", "press", 1.2},
+    Price{"aligned/avx2", "bend", 0.8},
+    Price{"aligned/scalar", "copy", 1.1},
+    Price{"aligned/scalar", "contact", 0.06},
+    Price{"aligned/scalar", "mill", 0.27},
+    Price{"aligned/scalar", "bend", 0.8},
+    Price{"gather/avx512", "contact", 0.2},
+    Price{"gather/avx2", "contact", 0.3},
+    Price{"gather/scalar", "contact", 3},
+    Price{"splat/avx512", "place", 0.2},
+    Price{"splat/avx512", "copy", 0.08},
+    Price{"splat/avx512", "splat", 0.3},
+    Price{"splat/avx512", "press", 0.16},
+    Price{"splat/avx512", "bend", 1.1},
+    Price{"splat/avx512", "cut", 0.11},
+    Price{"splat/avx2", "place", 0.25},
+    Price{"splat/avx2", "copy", 0.08},
+    Price{"splat/avx2", "splat", 0.3},
+    Price{"splat/avx2", "press", 0.2},
+    Price{"splat/avx2", "bend", 1.1},
     Price{"splat/avx2", "cut", 0.25},
-    Price{"splat/scalar", "place", 0.2},
-    Price{"splat/scalar", "copy", 1.2},
-    Price{"splat/scalar", "splat", 0.5},
-    Price{"splat/scalar", "press", 8},
-    Price{"splat/scalar", "cut", 2.5},
+    Price{"splat/scalar", "place", 0.35},
+    Price{"splat/scalar", "copy", 1.1},
+    Price{"splat/scalar", "splat", 0.75},
+    Price{"splat/scalar", "press", 1.5},
+    Price{"splat/scalar", "bend", 1.1},
+    Price{"splat/scalar", "cut", 1.5},
+    Price{"gather/float", "contact", 1.4},
+    Price{"gather/float", "overlap", 0.9},
+    Price{"gather/float", "modification", 0.5},
+    Price{"gather/float", "removal", 3},
+    Price{"gather/float", "bent removal", 4.3},
+    Price{"gather/float", "refresh", 9},
+    Price{"gather/double", "contact", 2},
+    Price{"gather/double", "overlap", 1.1},
+    Price{"gather/double", "modification", 0.5},
+    Price{"gather/double", "removal", 3},
+    Price{"gather/double", "bent removal", 4.3},
+    Price{"gather/double", "refresh", 9},
+    // NEON was never measured on hardware: guesses, for slower cores.
     Price{"aligned/neon", "copy", 0.2},
     Price{"aligned/neon", "contact", 0.03},
     Price{"aligned/neon", "mill", 0.06},
+    Price{"aligned/neon", "bend", 1.6},
     Price{"gather/neon", "contact", 1},
-    Price{"splat/neon", "place", 0.1},
+    Price{"splat/neon", "place", 0.5},
     Price{"splat/neon", "copy", 0.2},
-    Price{"splat/neon", "splat", 0.4},
-    Price{"splat/neon", "press", 3},
-    Price{"splat/neon", "cut", 0.6},
-    Price{"gather/float", "contact", 1.4},
-    Price{"gather/float", "overlap", 0.8},
-    Price{"gather/float", "modification", 0.6},
-    Price{"gather/float", "removal", 2.2},
-    Price{"gather/float", "refresh", 8.0},
-    Price{"gather/double", "contact", 1.9},
-    Price{"gather/double", "overlap", 0.95},
-    Price{"gather/double", "modification", 0.6},
-    Price{"gather/double", "removal", 2.2},
-    Price{"gather/double", "refresh", 8.0},
+    Price{"splat/neon", "splat", 0.6},
+    Price{"splat/neon", "press", 0.6},
+    Price{"splat/neon", "bend", 2.2},
+    Price{"splat/neon", "cut", 0.4},
 };
+
+std::string us_text(double us) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.1f", us);
+  return text;
+}
 
 }  // namespace
 
@@ -74,12 +91,20 @@ double reference_price_ns(std::string_view way, std::string_view stage) {
   throw std::logic_error("no price for " + std::string(way) + " " + std::string(stage));
 }
 
+double work_us(const PlanCost& cost, const StageCost& stage) {
+  return static_cast<double>(stage.operations) * reference_price_ns(cost.way, stage.stage) / 1000;
+}
+
 double work_us(const PlanCost& cost) {
-  double ns = 0;
-  for (const StageCost& stage : cost.stages) {
-    ns += static_cast<double>(stage.operations) * reference_price_ns(cost.way, stage.stage);
-  }
-  return ns / 1000;
+  double us = 0;
+  for (const StageCost& stage : cost.stages) us += work_us(cost, stage);
+  return us;
+}
+
+double work_us(const SceneCosts& costs, std::size_t tool) {
+  double us = 0;
+  for (const TickCost& tick : costs.ticks) us += tick.tool == tool ? work_us(tick.cost) : 0;
+  return us;
 }
 
 double work_budget_us(const Scene& scene) {
@@ -89,25 +114,24 @@ double work_budget_us(const Scene& scene) {
 std::string over_budget(const Scene& scene, const SceneCosts& costs) {
   const double budget_us = work_budget_us(scene);
   for (std::size_t t = 0; t < scene.tools.size(); ++t) {
-    double sum_us = 0;
-    std::uint64_t operations = 0;
-    const TickCost* dearest = nullptr;
+    const double sum_us = work_us(costs, t);
+    if (sum_us <= budget_us) continue;
+    std::string parts;
+    bool all_aligned = true;
     for (const TickCost& tick : costs.ticks) {
       if (tick.tool != t) continue;
-      sum_us += work_us(tick.cost);
-      for (const StageCost& stage : tick.cost.stages) operations += stage.operations;
-      if (dearest == nullptr || work_us(tick.cost) > work_us(dearest->cost)) dearest = &tick;
+      if (!parts.empty()) parts += ", ";
+      parts += "in " + scene.volumes[tick.volume].name + " " + us_text(work_us(tick.cost)) +
+               " by plan " + tick.cost.way + " (" + tick.choice.why + ")";
+      all_aligned = all_aligned && tick.choice.plan == Plan::aligned;
     }
-    if (sum_us <= budget_us) continue;
-    char text[320];
-    std::snprintf(text, sizeof text,
-                  ": tool %s: up to %llu operations a tick by plan %s (%s), %.0f us of work, above "
-                  "the %.0f us for %d Hz; use a smaller tool, a lower rate%s",
-                  scene.tools[t].name.c_str(), static_cast<unsigned long long>(operations),
-                  dearest->cost.way.c_str(), dearest->choice.why.c_str(), sum_us, budget_us,
-                  scene.servo.rate_hz,
-                  dearest->choice.plan == Plan::aligned ? "" : ", or what plan aligned needs");
-    return scene.path + text;
+    return scene.path + ": tool " + scene.tools[t].name + ": up to " + us_text(sum_us) +
+           " us of work a tick, " + parts + ", above the " + us_text(budget_us) +
+           " us that are half a tick at " + std::to_string(scene.servo.rate_hz) +
+           " Hz; use a smaller tool, a lower rate" +
+           (all_aligned
+                ? ""
+                : ", or fixed numbers and a round or unturned tool on the volume's lattice");
   }
   return {};
 }

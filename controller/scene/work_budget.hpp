@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <string>
 #include <string_view>
 
@@ -14,15 +15,19 @@ namespace kerf {
 // of time for a person come from a calibration instead (controller/shell/calibration.hpp).
 
 /// Price of one operation in ns on the reference machine, a core of 2024 at 4.4 GHz; rounded up
-/// from what `time_stages` gave there. Every stage of every plan has one.
+/// from the dearest of the calibration's tools that `time_stages` gave there, but for NEON, which
+/// is guessed. Every stage of every plan has one.
 [[nodiscard]] double reference_price_ns(std::string_view way, std::string_view stage);
 
 /// Half of a tick: a machine half as fast as the reference still ends its ticks in time, and on the
 /// reference the other half is there for the device, the eyes and what else runs on the core.
 inline constexpr double kBudgetShare = 0.5;
 
-/// Work of one tick of one tool in one volume, us on the reference machine.
+/// Work of a stage, of one tick of one tool in one volume, and of that tool in all volumes: us on
+/// the reference machine.
+[[nodiscard]] double work_us(const PlanCost& cost, const StageCost& stage);
 [[nodiscard]] double work_us(const PlanCost& cost);
+[[nodiscard]] double work_us(const SceneCosts& costs, std::size_t tool);
 
 /// The budget of a tick in the same unit.
 [[nodiscard]] double work_budget_us(const Scene& scene);

@@ -7,6 +7,8 @@
 #include <fstream>
 #include <iterator>
 #include <stdexcept>
+#include <system_error>
+#include <utility>
 #include <vector>
 
 #include <nlohmann/json.hpp>
@@ -29,17 +31,18 @@ std::string machine_name() {
   return "unknown";
 }
 
-std::string key_of(const PlanCost& cost, const StageCost& stage) {
-  return cost.way + "/" + stage.stage;
+std::string key_of(const std::string& way, const StageCost& stage) {
+  return way + "/" + stage.stage;
 }
 
-/// A solid block and tools of several sizes, of every plan that `numeric` has.
-Scene block_scene(NumericKind numeric) {
+/// A solid block and tools of several sizes, of every plan that `numeric` has with `cut`.
+Scene block_scene(NumericKind numeric, CutModel cut) {
   constexpr double kPitchMm = 0.125;
   constexpr std::int32_t kEdge = 96;
   Scene scene;
   scene.path = "calibration";
   scene.servo.numeric = numeric;
+  scene.cut.model = cut;
   SceneVolume& block = scene.volumes.emplace_back();
   block.name = "block";
   block.image.grid = {kEdge, kEdge, kEdge};
@@ -52,9 +55,10 @@ Scene block_scene(NumericKind numeric) {
   if (numeric == NumericKind::fixed) {
     for (const std::int32_t size : {10, 16, 24}) add("ball", {.size_vox = size});
   }
-  add("cylinder", {.size_vox = 8});
   add("cylinder", {.size_vox = 16});
   add("cylinder", {.radius_mm = 0.5, .length_mm = 4.0});
+  add("cone", {.radius_mm = 0.6, .length_mm = 4.0});
+  add("flame", {.radius_mm = 0.6, .length_mm = 3.0});
   add("wheel", {.radius_mm = 1.5, .length_mm = 0.8});
   return scene;
 }
@@ -65,38 +69,70 @@ double median(std::vector<double> values) {
   return *middle;
 }
 
-Calibration stored_calibration(const std::filesystem::path& path) {
+/// Throws what is wrong with it.
+Calibration stored_calibration(const std::filesystem::path& path, const SceneCosts& costs) {
+  std::error_code ignored;
+  if (!std::filesystem::is_regular_file(path, ignored)) throw std::runtime_error("is no file");
   std::ifstream file(path, std::ios::binary);
+  if (!file) throw std::runtime_error("may not be read");
   const std::string text{std::istreambuf_iterator<char>(file), {}};
   Calibration calibration = parse_calibration(text);
   if (calibration.machine != machine_name()) {
     throw std::runtime_error("is of another machine, " + calibration.machine);
   }
+  for (const TickCost& tick : costs.ticks) {
+    for (const StageCost& stage : tick.cost.stages) {
+      if (calibration.stage_us(tick.cost.way, stage)) continue;
+      throw std::runtime_error("has no price for " + key_of(tick.cost.way, stage));
+    }
+  }
   return calibration;
+}
+
+/// Keeps it for the next time, or warns.
+void store_calibration(const std::filesystem::path& path, const Calibration& calibration) {
+  const auto warn = [](const std::string& reason) {
+    spdlog::warn("{}; the calibration is not kept: set XDG_CACHE_HOME to a folder for it", reason);
+  };
+  const std::filesystem::path folder = path.parent_path();
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (error) {
+    warn(folder.string() + ": " + error.message());
+    return;
+  }
+  try {
+    write_new_file(path, calibration_json(calibration));
+  } catch (const FileError& failure) {
+    warn(failure.what());
+  }
 }
 
 }  // namespace
 
-std::optional<double> Calibration::stage_us(const PlanCost& cost, const StageCost& stage) const {
-  const auto price = price_ns.find(key_of(cost, stage));
+std::optional<double> Calibration::stage_us(const std::string& way, const StageCost& stage) const {
+  const auto price = price_ns.find(key_of(way, stage));
   if (price == price_ns.end()) return std::nullopt;
   return static_cast<double>(stage.operations) * price->second / 1000;
 }
 
 Calibration measure_calibration() {
+  constexpr std::pair<NumericKind, CutModel> kScenes[] = {
+      // together they have every stage
+      {NumericKind::fixed, CutModel::none},      {NumericKind::fixed, CutModel::overlap_exact},
+      {NumericKind::float32, CutModel::overlap}, {NumericKind::float32, CutModel::overlap_exact},
+      {NumericKind::float64, CutModel::overlap}, {NumericKind::float64, CutModel::overlap_exact}};
   std::map<std::string, std::vector<double>> prices;
-  for (const NumericKind numeric :
-       {NumericKind::fixed, NumericKind::float32, NumericKind::float64}) {
-    Scene scene = block_scene(numeric);
+  for (const auto& [numeric, cut] : kScenes) {
+    Scene scene = block_scene(numeric, cut);
     const auto servo = compile(scene);
     const std::vector<TickCost>& ticks = servo->costs().ticks;
     for (std::size_t i = 0; i < ticks.size(); ++i) {
-      const std::vector<double> us = servo->time_stages(i);
-      for (std::size_t s = 0; s < us.size(); ++s) {
-        const StageCost& stage = ticks[i].cost.stages[s];
+      const std::vector<StageTime> timed = servo->time_stages(i);
+      for (std::size_t s = 0; s < timed.size(); ++s) {
         // The clock may be coarser than a stage: a price is positive.
-        prices[key_of(ticks[i].cost, stage)].push_back(
-            std::max(us[s] * 1000 / static_cast<double>(stage.operations), 1e-6));
+        prices[key_of(ticks[i].cost.way, ticks[i].cost.stages[s])].push_back(
+            std::max(timed[s].us * 1000 / static_cast<double>(timed[s].operations), 1e-6));
       }
     }
   }
@@ -145,23 +181,18 @@ Calibration parse_calibration(const std::string& text) {
   return calibration;
 }
 
-Calibration calibration_of_machine(const std::filesystem::path& path, bool renew) {
+Calibration calibration_of_machine(const std::filesystem::path& path, bool renew,
+                                   const SceneCosts& costs) {
   std::error_code ignored;
   if (!renew && std::filesystem::exists(path, ignored)) {
     try {
-      return stored_calibration(path);
+      return stored_calibration(path, costs);
     } catch (const std::exception& error) {
       spdlog::warn("{}: {}; measured anew", path.string(), error.what());
     }
   }
   Calibration calibration = measure_calibration();
-  if (path.empty()) return calibration;
-  try {
-    std::filesystem::create_directories(path.parent_path());
-    write_new_file(path, calibration_json(calibration));
-  } catch (const std::exception& error) {
-    spdlog::warn("{}; the calibration is not kept", error.what());
-  }
+  if (!path.empty()) store_calibration(path, calibration);
   return calibration;
 }
 

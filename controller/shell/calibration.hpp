@@ -16,12 +16,13 @@ struct Calibration {
   std::string machine;                     ///< name of the processor
   std::map<std::string, double> price_ns;  ///< by "way/stage": "aligned/avx512/copy"
 
-  /// Predicted us of each stage; nothing where a price is missing.
-  [[nodiscard]] std::optional<double> stage_us(const PlanCost& cost, const StageCost& stage) const;
+  /// Predicted us of a stage of the plan `way`; nothing where a price is missing.
+  [[nodiscard]] std::optional<double> stage_us(const std::string& way,
+                                               const StageCost& stage) const;
 };
 
-/// Measures anew, on the calling thread's core: the median over tools of several sizes in a solid
-/// block. Takes one to two seconds.
+/// Measures anew, on the calling thread's core: the median over tools of several shapes and sizes
+/// in a solid block, timed as a scene's tools are. Takes a few seconds.
 [[nodiscard]] Calibration measure_calibration();
 
 /// $XDG_CACHE_HOME/kerf/calibration.json, else below ~/.cache; empty where there is neither.
@@ -32,8 +33,10 @@ struct Calibration {
 [[nodiscard]] std::string calibration_json(const Calibration& calibration);
 [[nodiscard]] Calibration parse_calibration(const std::string& text);
 
-/// The stored one where it is sound, of this version and of this machine; else measured and stored.
-/// What is wrong with a stored one, or with the place, is told in one line and is no error.
-[[nodiscard]] Calibration calibration_of_machine(const std::filesystem::path& path, bool renew);
+/// The stored one where it is sound, of this version and of this machine, and has a price for every
+/// stage of `costs`; else measured and stored. What is wrong with a stored one, or with the place,
+/// is told in one line and is no error.
+[[nodiscard]] Calibration calibration_of_machine(const std::filesystem::path& path, bool renew,
+                                                 const SceneCosts& costs);
 
 }  // namespace kerf

@@ -78,7 +78,7 @@ std::optional<int> parse_options(int argc, const char* const* argv, ControllerOp
   app.add_flag("--strict", options.real_time.strict,
                "refuse to start without every real-time right");
   app.add_option("--cpu", options.real_time.cpu, "core of the servo thread (default: the last)")
-      ->check(CLI::NonNegativeNumber)
+      ->check(CLI::Range(0, 1023))
       ->type_name("N");
   app.add_option("--priority", options.real_time.priority, "SCHED_FIFO priority")
       ->check(CLI::Range(1, 99))
@@ -87,11 +87,15 @@ std::optional<int> parse_options(int argc, const char* const* argv, ControllerOp
                  "spin this long before each deadline instead of sleeping to it")
       ->check(CLI::Range(0, 900))
       ->capture_default_str();
-  app.add_flag("--check", options.check, "load and check the scene, print what it means, and end");
-  app.add_flag("--explain", options.explain,
-               "tell what the scene costs: plans, operations, time, memory; and end");
+  auto* check_flag = app.add_flag("--check", options.check,
+                                  "load and check the scene, print what it means, and end");
+  auto* explain_flag =
+      app.add_flag("--explain", options.explain,
+                   "tell what the scene costs: plans, operations, time, memory; and end")
+          ->excludes(check_flag);
   app.add_flag("--calibrate", options.calibrate,
-               "with --explain: measure anew what an operation costs on this machine");
+               "with --explain: measure anew what an operation costs on this machine")
+      ->needs(explain_flag);
   app.add_flag("--progress", options.progress, "show a progress bar on a terminal");
   app.add_option("--report", options.report,
                  "write the figures of the run, or of --explain, as JSON")

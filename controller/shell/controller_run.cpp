@@ -27,17 +27,16 @@
 #include "controller/scene/scene_words.hpp"
 #include "controller/scene/volume_write.hpp"
 #include "controller/scene/work_budget.hpp"
-#include "controller/shell/calibration.hpp"
-#include "controller/shell/explain.hpp"
+#include "controller/shell/explain_scene.hpp"
 #include "controller/shell/motor_guard.hpp"
 #include "controller/shell/progress_bar.hpp"
 #include "controller/shell/publisher.hpp"
 #include "controller/shell/run_report.hpp"
+#include "controller/shell/scene_segment.hpp"
 #include "controller/shell/servo_loop.hpp"
 #include "controller/shell/stop_signals.hpp"
 #include "controller/shell/watchdog.hpp"
 #include "shared/posix/cores.hpp"
-#include "shared/posix/memory.hpp"
 #include "shared/posix/new_file.hpp"
 #include "shared/segment/segment_plan.hpp"
 #include "shared/volume/density_hash.hpp"
@@ -70,28 +69,6 @@ std::string hand_lines(const Scene& scene) {
   std::snprintf(unit, sizeof unit, "%.9g", hand_unit_mm(scene));
   return "hand_unit_mm=" + std::string(unit) + "\nhand_script=" + scene.hand_script +
          "\nrate_hz=" + std::to_string(scene.servo.rate_hz) + "\n";
-}
-
-SegmentSpec segment_spec(const Scene& scene, const std::string& json, std::uint64_t hash) {
-  SegmentSpec spec;
-  spec.scene_json = json;
-  spec.config_hash = hash;
-  spec.tick_ns = static_cast<std::uint32_t>(1'000'000'000 / scene.servo.rate_hz);
-  spec.build_id = std::string("kerf-controller ") + KERF_VERSION;
-  spec.mirror_updates = scene.cut.model != CutModel::none;
-  for (const SceneVolume& volume : scene.volumes) {
-    SegmentVolumeSpec& v = spec.volumes.emplace_back();
-    v.grid = volume.image.grid;
-    v.spacing_mm = volume.image.spacing_mm;
-    v.origin_mm = volume.pose.position_mm;
-    for (std::size_t i = 0; i < 4; ++i) {
-      v.orientation[i] = static_cast<float>(volume.pose.orientation[i]);
-    }
-    v.iso = volume.iso;
-    v.density = volume.image.density;
-    v.labels = volume.image.labels;
-  }
-  return spec;
 }
 
 /// Warns of each missing right, or refuses under --strict.
@@ -134,19 +111,6 @@ void write_final(const Scene& scene, const Servo& servo, const std::filesystem::
                               path.extension().string());
     }
     write_volume(image, target);
-  }
-}
-
-/// What a run takes beyond the loaded scene must be there: locked memory that is not would end the
-/// program without a word.
-void check_memory(const Scene& scene, const SceneCosts& costs, std::uint64_t segment_bytes) {
-  std::uint64_t bytes = segment_bytes;
-  for (const ArrayBytes& array : costs.arrays) bytes += array.taken ? 0 : array.bytes;
-  const auto free_bytes = available_memory();
-  if (free_bytes && bytes > *free_bytes) {
-    throw std::runtime_error(scene.path + ": needs " + std::to_string(bytes >> 20) + " MiB, and " +
-                             std::to_string(*free_bytes >> 20) +
-                             " MiB are free; crop or resample the volume with kerf-volume");
   }
 }
 
@@ -194,22 +158,6 @@ int check_scene(const Scene& scene) {
   std::printf("p0_n_per_mm2=%g\nstiffness_at_device_n_per_mm=%g\n", scene.force.p0_n_per_mm2,
               device_stiffness_n_per_mm(scene));
   std::fputs(hand_lines(scene).c_str(), stdout);
-  return 0;
-}
-
-/// `--explain`: what the scene costs on this machine; it is not run.
-int explain_scene(const ControllerOptions& options, Scene& scene, CompiledScene& servo) {
-  const int core = options.real_time.cpu >= 0 ? options.real_time.cpu : allowed_cores().back();
-  static_cast<void>(pin_to_core(core));  // where it may not, times are less even
-  const Calibration calibration = calibration_of_machine(calibration_path(), options.calibrate);
-  const SegmentPlan segment = plan_segment(segment_spec(scene, canonical_json(scene), 0));
-  check_memory(scene, servo.costs(), 0);
-  servo.take(scene);
-  const Explanation told = explain(scene, servo, segment, calibration);
-  std::fputs(explanation_text(told).c_str(), stdout);
-  if (!options.report.empty()) write_new_file(options.report, explanation_json(told));
-  const std::string refusal = over_budget(scene, servo.costs());
-  if (!refusal.empty()) throw std::runtime_error(refusal);
   return 0;
 }
 
@@ -327,7 +275,10 @@ int run_controller(const ControllerOptions& options) {
   Scene scene = load_scene(options.scene, options.overrides);
   if (options.check) return check_scene(scene);
   const std::unique_ptr<CompiledScene> servo = plan_scene(scene);
-  if (options.explain) return explain_scene(options, scene, *servo);
+  if (options.explain) {
+    explain_scene(options, scene, *servo);
+    return 0;
+  }
   check_run(options, scene, servo->costs());
 
   const std::string json = canonical_json(scene);

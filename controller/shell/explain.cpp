@@ -14,24 +14,36 @@
 namespace kerf {
 namespace {
 
-struct Sums {
-  std::uint64_t operations = 0;
-  std::optional<double> predicted_us = 0.0;
-  double measured_us = 0;
+/// Both predictions, or none.
+std::optional<double> sum_of(std::optional<double> a, std::optional<double> b) {
+  return a && b ? std::optional(*a + *b) : std::nullopt;
+}
+
+/// The stages of a tick in one.
+ExplainedStage sum_of(const ExplainedTick& tick) {
+  ExplainedStage sum{{"tick", 0}, 0, 0, 0.0, 0};
+  for (const ExplainedStage& stage : tick.stages) {
+    sum.cost.operations += stage.cost.operations;
+    sum.work_us += stage.work_us;
+    sum.timed_operations += stage.timed_operations;
+    sum.predicted_us = sum_of(sum.predicted_us, stage.predicted_us);
+    sum.measured_us += stage.measured_us;
+  }
+  return sum;
+}
+
+struct ToolWork {
+  std::string tool;
+  double us = 0;  ///< over all volumes
 };
 
-Sums sums_of(const ExplainedTick& tick) {
-  Sums sums;
-  for (const ExplainedStage& stage : tick.stages) {
-    sums.operations += stage.cost.operations;
-    sums.measured_us += stage.measured_us;
-    if (stage.predicted_us && sums.predicted_us) {
-      *sums.predicted_us += *stage.predicted_us;
-    } else {
-      sums.predicted_us.reset();
-    }
+std::vector<ToolWork> works_of(const Explanation& explanation) {
+  std::vector<ToolWork> works;
+  for (const ExplainedTick& tick : explanation.ticks) {
+    if (works.empty() || works.back().tool != tick.tool) works.push_back({tick.tool, 0});
+    works.back().us += sum_of(tick).work_us;
   }
-  return sums;
+  return works;
 }
 
 std::uint64_t total_bytes(const Explanation& explanation) {
@@ -47,14 +59,12 @@ std::string format(const char* pattern, Values... values) {
   return text;
 }
 
-std::string us_text(std::optional<double> us) {
-  return us ? format("%14.2f", *us) : format("%14s", "-");
-}
-
-std::string figures(std::uint64_t operations, std::optional<double> predicted_us,
-                    double measured_us) {
-  return format("%12llu", static_cast<unsigned long long>(operations)) + us_text(predicted_us) +
-         us_text(measured_us);
+std::string stage_line(const ExplainedStage& stage) {
+  const auto count = [](std::uint64_t n) { return static_cast<unsigned long long>(n); };
+  return format("  %-14s%12llu%12.2f%12llu", stage.cost.stage, count(stage.cost.operations),
+                stage.work_us, count(stage.timed_operations)) +
+         (stage.predicted_us ? format("%14.2f", *stage.predicted_us) : format("%14s", "-")) +
+         format("%14.2f\n", stage.measured_us);
 }
 
 /// Bytes, KiB or MiB, whichever reads best.
@@ -66,17 +76,20 @@ std::string memory_line(const std::string& name, std::uint64_t bytes) {
                 mega ? "MiB" : (kilo ? "KiB" : "B"));
 }
 
-std::string tick_text(const ExplainedTick& tick, double budget_us) {
-  const Sums sums = sums_of(tick);
+std::string tick_text(const ExplainedTick& tick) {
   std::string text =
       "\n" + tick.tool + " in " + tick.volume + ": " + tick.way + " (" + tick.why + ")\n";
-  for (const ExplainedStage& stage : tick.stages) {
-    text += format("  %-14s", stage.cost.stage) +
-            figures(stage.cost.operations, stage.predicted_us, stage.measured_us) + "\n";
+  for (const ExplainedStage& stage : tick.stages) text += stage_line(stage);
+  return text + stage_line(sum_of(tick));
+}
+
+std::string budget_text(const Explanation& e) {
+  std::string text = "\nbudget: work of one tool in all volumes, at most " +
+                     format("%.1f us: half a tick at %d Hz\n", e.budget_us, e.rate_hz);
+  for (const ToolWork& work : works_of(e)) {
+    text += format("  %-36s%12.1f us%8.1f %%\n", work.tool.c_str(), work.us,
+                   100 * work.us / e.budget_us);
   }
-  text += format("  %-14s", "tick") +
-          figures(sums.operations, sums.predicted_us, sums.measured_us) +
-          format("%7.1f %%\n", 100 * tick.work_us / budget_us);
   return text;
 }
 
@@ -125,11 +138,12 @@ Explanation explain(const Scene& scene, CompiledScene& servo, const SegmentPlan&
     out.volume = scene.volumes[tick.volume].name;
     out.way = tick.cost.way;
     out.why = tick.choice.why;
-    out.work_us = work_us(tick.cost);
-    const std::vector<double> measured_us = servo.time_stages(i);
-    for (std::size_t s = 0; s < measured_us.size(); ++s) {
+    const std::vector<StageTime> timed = servo.time_stages(i);
+    for (std::size_t s = 0; s < timed.size(); ++s) {
       const StageCost& stage = tick.cost.stages[s];
-      out.stages.push_back({stage, calibration.stage_us(tick.cost, stage), measured_us[s]});
+      out.stages.push_back({stage, work_us(tick.cost, stage), timed[s].operations,
+                            calibration.stage_us(tick.cost.way, {stage.stage, timed[s].operations}),
+                            timed[s].us});
     }
   }
   return told;
@@ -138,9 +152,13 @@ Explanation explain(const Scene& scene, CompiledScene& servo, const SegmentPlan&
 std::string explanation_text(const Explanation& e) {
   std::string text = e.scene + ": " + std::to_string(e.rate_hz) + " Hz, " + e.numeric +
                      " numbers, cut " + e.cut + "\n\n";
-  text += format("  %-14s%12s%14s%14s%9s\n", "each tick", "operations", "predicted us",
-                 "measured us", "budget");
-  for (const ExplainedTick& tick : e.ticks) text += tick_text(tick, e.budget_us);
+  text += format("  %-14s%12s%12s%12s%14s%14s\n", "", "at most", "work us", "timed", "predicted us",
+                 "measured us");
+  for (const ExplainedTick& tick : e.ticks) text += tick_text(tick);
+  text +=
+      "\nat most: operations of any tick; work: their price on the reference machine\n"
+      "timed: operations inside the densest part; predicted, measured: of them on this machine\n";
+  text += budget_text(e);
   text += "\nmemory\n";
   for (const ArrayBytes& array : e.arrays) text += memory_line(array.name, array.bytes);
   text += memory_line("total", total_bytes(e));
@@ -156,19 +174,26 @@ std::string explanation_json(const Explanation& e) {
     for (const ExplainedStage& stage : tick.stages) {
       stages.push_back({{"stage", stage.cost.stage},
                         {"operations", stage.cost.operations},
+                        {"work_us", stage.work_us},
+                        {"timed_operations", stage.timed_operations},
                         {"predicted_us", number_or_null(stage.predicted_us)},
                         {"measured_us", stage.measured_us}});
     }
-    const Sums sums = sums_of(tick);
+    const ExplainedStage sum = sum_of(tick);
     ticks.push_back({{"tool", tick.tool},
                      {"volume", tick.volume},
                      {"plan", tick.way},
                      {"why", tick.why},
-                     {"operations", sums.operations},
-                     {"predicted_us", number_or_null(sums.predicted_us)},
-                     {"measured_us", sums.measured_us},
-                     {"work_us", tick.work_us},
+                     {"operations", sum.cost.operations},
+                     {"work_us", sum.work_us},
+                     {"timed_operations", sum.timed_operations},
+                     {"predicted_us", number_or_null(sum.predicted_us)},
+                     {"measured_us", sum.measured_us},
                      {"stages", stages}});
+  }
+  Json tools = Json::array();
+  for (const ToolWork& work : works_of(e)) {
+    tools.push_back({{"tool", work.tool}, {"work_us", work.us}});
   }
   Json arrays = Json::array();
   for (const ArrayBytes& array : e.arrays) {
@@ -182,6 +207,7 @@ std::string explanation_json(const Explanation& e) {
                   {"cut", e.cut},
                   {"machine", e.machine},
                   {"budget_us", e.budget_us},
+                  {"tools", tools},
                   {"ticks", ticks},
                   {"arrays", arrays},
                   {"total_bytes", total_bytes(e)}};

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -13,10 +14,14 @@
 
 namespace kerf {
 
-/// One stage as it is explained. Times in us; predicted only where the calibration knows the stage.
+/// One stage as it is explained. Two systems of prices meet here: `work_us` is what the operations
+/// of the worst tick cost on the reference machine, against the budget (work_budget.hpp); the other
+/// times are of this machine and of the operations that were timed.
 struct ExplainedStage {
-  StageCost cost;
-  std::optional<double> predicted_us;
+  StageCost cost;  ///< at most
+  double work_us = 0;
+  std::uint64_t timed_operations = 0;
+  std::optional<double> predicted_us;  ///< only where the calibration knows the stage
   double measured_us = 0;
 };
 
@@ -24,14 +29,13 @@ struct ExplainedStage {
 struct ExplainedTick {
   std::string tool, volume, way, why;
   std::vector<ExplainedStage> stages;
-  double work_us = 0;  ///< against the budget, see work_budget.hpp
 };
 
 /// What `--explain` tells of a scene.
 struct Explanation {
   std::string scene, numeric, cut, machine;
   int rate_hz = 1000;
-  double budget_us = 0;
+  double budget_us = 0;  ///< of work, for one tool in all volumes
   std::vector<ExplainedTick> ticks;
   std::vector<ArrayBytes> arrays;  ///< of the servo, then of the segment
 };

@@ -68,7 +68,7 @@ int run_lab(int argc, const char* const* argv, std::ostream& out, std::ostream& 
   bench->add_option("--page", page, "write the figures as a page (docs/performance.md)")
       ->type_name("FILE");
   bench->add_option("--cpu", core, "core to run on (default: the last)")
-      ->check(CLI::NonNegativeNumber);
+      ->check(CLI::Range(0, 1023));
   bench->footer(kExitCodes);
   accuracy::Command accuracy(app);
   try {

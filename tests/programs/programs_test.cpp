@@ -266,16 +266,21 @@ TEST_CASE("--explain tells what is really allocated, and keeps its calibration")
   setenv("XDG_CACHE_HOME", folder.path().c_str(), 1);
   std::filesystem::create_directory(folder / "kerf");
   std::ofstream(folder / "kerf/calibration.json") << "{ broken";
-  for (const bool first : {true, false}) {
+  const auto explain = [&] {
     Process controller({kBin + "/kerf-controller", "--scene", kScenes + "/touch.toml", "--explain",
                         "--report", (folder / "explain.json").string()},
                        folder / "explain.log");
     CHECK(controller.wait() == 0);
-    const std::string told = text_of(folder / "explain.log");
-    CHECK((told.find("calibration.json: is no calibration; measured anew") != std::string::npos) ==
-          first);
-    CHECK(told.find("ball 16 in phantom: aligned/") != std::string::npos);
-  }
+    return text_of(folder / "explain.log");
+  };
+  CHECK(explain().find("calibration.json: is no calibration; measured anew") != std::string::npos);
+  const std::string told = explain();
+  CHECK(told.find("measured anew") == std::string::npos);
+  CHECK(told.find("ball 16 in phantom: aligned/") != std::string::npos);
+  auto poor = nlohmann::json::parse(text_of(folder / "kerf/calibration.json"));
+  poor["ns_per_operation"].clear();
+  std::ofstream(folder / "kerf/calibration.json") << poor;
+  CHECK(explain().find("calibration.json: has no price for aligned/") != std::string::npos);
   unsetenv("XDG_CACHE_HOME");
   const auto json = nlohmann::json::parse(text_of(folder / "explain.json"));
   CHECK(json["ticks"].size() == 2);
@@ -299,6 +304,14 @@ TEST_CASE("bad arguments are one line and exit 2") {
   CHECK(
       refused({controller, "--scene", scene, "--device", "nonsense", "--check"}).find("nonsense") !=
       std::string::npos);
+  CHECK(refused({controller, "--scene", scene, "--check", "--explain"}).find("excludes") !=
+        std::string::npos);
+  CHECK(refused({controller, "--scene", scene, "--check", "--calibrate"}).find("--explain") !=
+        std::string::npos);
+  CHECK(refused({controller, "--scene", scene, "--explain", "--report", "/nonexistent/a.json"})
+            .find("/nonexistent/a.json") != std::string::npos);
+  CHECK(refused({controller, "--scene", scene, "--cpu", "-1", "--check"}).find("range 0 to 1023") !=
+        std::string::npos);
   CHECK(refused({controller, "--scene", scene, "--rate", "20000", "--check"}).find("20000") !=
         std::string::npos);
   CHECK(refused({controller, "--scene", scene, "--volume", "missing.nrrd", "--check"})

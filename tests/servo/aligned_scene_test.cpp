@@ -175,8 +175,9 @@ TEST_CASE("a tool that no sum of fixed-point numbers can hold is refused with a 
         std::string::npos);
   scene.cut.model = CutModel::none;
   CHECK(refusal(scene).empty());
-  scene.tools[0].size_vox = {1, 2100, 1};
-  CHECK(refusal(scene).find(" voxels wide, and 2000 are the end") != std::string::npos);
+  scene.tools[0].offsets.push_back({0, -2 * 1100, 0});  // no wider than 2000, all on one side
+  CHECK(refusal(scene).find("up to 1100 voxels from the tool's centre, and 1000 are the end") !=
+        std::string::npos);
   scene.servo.numeric = NumericKind::float64;
   CHECK(refusal(scene).empty());
 }

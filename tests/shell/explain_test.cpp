@@ -42,9 +42,8 @@ TEST_CASE("a calibration reads back as it was written, and predicts by its price
   const Calibration again = parse_calibration(calibration_json(calibration));
   CHECK(again.machine == calibration.machine);
   CHECK(again.price_ns == calibration.price_ns);
-  const PlanCost cost{"aligned/scalar", {{"copy", 4000}, {"mill", 1}}};
-  CHECK(again.stage_us(cost, cost.stages[0]) == 2.0);
-  CHECK_FALSE(again.stage_us(cost, cost.stages[1]).has_value());
+  CHECK(again.stage_us("aligned/scalar", {"copy", 4000}) == 2.0);
+  CHECK_FALSE(again.stage_us("aligned/scalar", {"mill", 1}).has_value());
 }
 
 TEST_CASE("what is no sound calibration is refused") {
@@ -83,17 +82,24 @@ TEST_CASE("an explanation is told in text and JSON with the same figures") {
   told.numeric = "fixed";
   told.cut = "none";
   told.budget_us = 500;
-  told.ticks.push_back(
-      {"ball", "tooth", "aligned/scalar", "round", {{{"copy", 4000}, 2.0, 2.25}}, 5.0});
+  for (const char* volume : {"tooth", "filling"}) {
+    told.ticks.push_back(
+        {"ball", volume, "aligned/scalar", "round", {{{"copy", 4000}, 5.0, 3000, 2.0, 2.25}}});
+  }
   told.arrays = {{"density of tooth", 3 << 20, true}, {"carry of tooth", 64, false}};
   const std::string text = explanation_text(told);
   CHECK(text.find("ball in tooth: aligned/scalar (round)") != std::string::npos);
   CHECK(text.find("3.0 MiB") != std::string::npos);
   CHECK(text.find("64 B") != std::string::npos);
-  CHECK(text.find("1.0 %") != std::string::npos);
+  CHECK(text.find("at most 500.0 us: half a tick at 1000 Hz") != std::string::npos);
+  CHECK(text.find("10.0 us     2.0 %") != std::string::npos);  // both volumes
   const auto json = nlohmann::json::parse(explanation_json(told));
   CHECK(json["ticks"][0]["stages"][0]["operations"] == 4000);
+  CHECK(json["ticks"][0]["stages"][0]["timed_operations"] == 3000);
   CHECK(json["ticks"][0]["predicted_us"] == 2.0);
+  CHECK(json["ticks"][0]["work_us"] == 5.0);
+  CHECK(json["tools"].size() == 1);
+  CHECK(json["tools"][0]["work_us"] == 10.0);
   CHECK(json["total_bytes"] == (3 << 20) + 64);
   told.ticks[0].stages[0].predicted_us.reset();
   CHECK(nlohmann::json::parse(explanation_json(told))["ticks"][0]["predicted_us"].is_null());

@@ -57,7 +57,7 @@ Command::Command(CLI::App& app)
                    "--plot says where")
       ->type_name("FILE");
   app_->add_option("--cpu", core_, "core to run on (default: the last)")
-      ->check(CLI::NonNegativeNumber);
+      ->check(CLI::Range(0, 1023));
   app_->footer(app.get_footer());
 }
 

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "controller/shell/explain_scene.hpp"
+
+#include <cstdio>
+#include <stdexcept>
+#include <string>
+
+#include "controller/scene/scene_json.hpp"
+#include "controller/scene/work_budget.hpp"
+#include "controller/shell/calibration.hpp"
+#include "controller/shell/explain.hpp"
+#include "controller/shell/scene_segment.hpp"
+#include "shared/posix/cores.hpp"
+#include "shared/posix/new_file.hpp"
+
+namespace kerf {
+
+void explain_scene(const ControllerOptions& options, Scene& scene, CompiledScene& servo) {
+  if (!options.report.empty()) check_new_file(options.report);
+  const int core = options.real_time.cpu >= 0 ? options.real_time.cpu : allowed_cores().back();
+  static_cast<void>(pin_to_core(core));  // where it may not, times are less even
+  const Calibration calibration =
+      calibration_of_machine(calibration_path(), options.calibrate, servo.costs());
+  const SegmentPlan segment = plan_segment(segment_spec(scene, canonical_json(scene), 0));
+  check_memory(scene, servo.costs(), 0);
+  servo.take(scene);
+  const Explanation told = explain(scene, servo, segment, calibration);
+  std::fputs(explanation_text(told).c_str(), stdout);
+  if (!options.report.empty()) write_new_file(options.report, explanation_json(told));
+  const std::string refusal = over_budget(scene, servo.costs());
+  if (!refusal.empty()) throw std::runtime_error(refusal);
+}
+
+}  // namespace kerf
