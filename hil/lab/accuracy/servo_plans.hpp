@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <vector>
 
+#include "controller/kernel/aligned.hpp"
 #include "controller/kernel/gather.hpp"
 #include "controller/kernel/overlap.hpp"
 #include "controller/kernel/splat.hpp"
