@@ -5,12 +5,18 @@
 #include <array>
 #include <string>
 
+#include "visualizer/blend_renderer.hpp"
 #include "visualizer/error.hpp"
 #include "visualizer/iso_renderer.hpp"
 
 namespace kerf {
 
 namespace {
+
+template <class Made>
+std::unique_ptr<Renderer> make(const SceneView& scene, std::span<const VolumeContent> contents) {
+  return std::make_unique<Made>(scene, contents);
+}
 
 using Make = std::unique_ptr<Renderer> (*)(const SceneView&, std::span<const VolumeContent>);
 
@@ -20,18 +26,16 @@ struct Kind {
 };
 
 constexpr auto kKinds = std::to_array<Kind>({
-    {"iso",
-     [](const SceneView& scene, std::span<const VolumeContent> contents)
-         -> std::unique_ptr<Renderer> { return std::make_unique<IsoRenderer>(scene, contents); }},
+    {"iso", make<IsoRenderer>},
+    {"blend", make<BlendRenderer>},
 });
 
 const Kind& find_kind(std::string_view name) {
   const auto found = std::find_if(kKinds.begin(), kKinds.end(),
                                   [&](const Kind& kind) { return kind.name == name; });
   if (found != kKinds.end()) return *found;
-  std::string known;
-  for (const Kind& kind : kKinds) known += (known.empty() ? "" : ", ") + std::string(kind.name);
-  throw VisualizerError("--renderer: " + std::string(name) + " is unknown; known: " + known);
+  throw VisualizerError("--renderer: " + std::string(name) +
+                        " is unknown; known: " + known_renderers());
 }
 
 }  // namespace
@@ -39,6 +43,12 @@ const Kind& find_kind(std::string_view name) {
 std::unique_ptr<Renderer> make_renderer(std::string_view kind, const SceneView& scene,
                                         std::span<const VolumeContent> contents) {
   return find_kind(kind).make(scene, contents);
+}
+
+std::string known_renderers() {
+  std::string known;
+  for (const Kind& kind : kKinds) known += (known.empty() ? "" : ", ") + std::string(kind.name);
+  return known;
 }
 
 void check_renderer(std::string_view kind) {

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <string>
 #include <string_view>
 
 #include "visualizer/camera.hpp"
@@ -24,13 +25,17 @@ class Renderer {
   /// Brick ids `changed` of a volume differ from what was drawn last; `density` is all of it.
   virtual void update(std::size_t volume, std::span<const Density> density,
                       std::span<const std::uint32_t> changed) = 0;
-  /// Draws over what is in `target`, under its depth test.
+  /// Draws over what is in `target`, under its depth test, and only within the scissor rectangle
+  /// where that test is enabled. Opaque things come first: some renderers look through.
   virtual void draw(const View& view, const RenderTarget& target) = 0;
 };
 
 /// `kind` as on the command line; throws VisualizerError for an unknown one and names the known.
 [[nodiscard]] std::unique_ptr<Renderer> make_renderer(std::string_view kind, const SceneView& scene,
                                                       std::span<const VolumeContent> contents);
+
+/// Every kind, as on the command line: "iso, blend, ...".
+[[nodiscard]] std::string known_renderers();
 
 /// Throws as `make_renderer` does; needs no GL context.
 void check_renderer(std::string_view kind);

@@ -23,6 +23,7 @@ class RenderTarget {
 
   [[nodiscard]] PictureSize size() const noexcept { return size_; }
   [[nodiscard]] GLuint colour_texture() const noexcept { return colour_.id(); }
+  [[nodiscard]] GLuint depth_texture() const noexcept { return depth_.id(); }
   [[nodiscard]] GLuint framebuffer() const noexcept { return framebuffer_.id(); }
 
   /// Makes it the place to draw, with its whole size as the viewport.
