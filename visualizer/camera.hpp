@@ -31,6 +31,7 @@ struct View {
   glm::dvec4 shown{0.0, 0.0, 0.0, 1.0};
 
   [[nodiscard]] glm::dmat4 clip_from_eye() const;
+  friend bool operator==(const View&, const View&) = default;
 };
 
 /// Turns about a point. Yaw 0 looks from +z (the user); pitch is the height above the horizon.

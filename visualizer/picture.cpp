@@ -58,9 +58,13 @@ void Picture::draw(const Session& session, const OverlayFigures& figures,
   const double aspect = static_cast<double>(size.width) / size.height;
   const View view = camera_.view(aspect, reach_mm_ + kToolRoom * radius_mm_);
   if (!stage_ || stage_->size() != size) stage_.emplace(size);
+  renderer_->set_moving(last_view_ && *last_view_ != view);
+  last_view_ = view;
   draw_backdrop(*stage_);
-  renderer_->draw(view, *stage_);
+  // The tool comes before the volumes, which it may shine through.
   if (session.latest()) draw_tool(*session.latest(), view, *stage_);
+  renderer_->draw(view, *stage_);
+  if (session.latest()) draw_force(*session.latest(), view, *stage_);
   smooth_edges(*stage_, target);
   overlay_.draw(figures, target);
 }
@@ -88,19 +92,20 @@ void Picture::smooth_edges(const RenderTarget& from, const RenderTarget& to) {
 }
 
 void Picture::draw_tool(const TickRecord& record, const View& view, const RenderTarget& target) {
-  const glm::dvec3 tip_mm = vec3(record.position_mm);
+  if (record.active_tool >= tools_.size()) return;
   const auto& q = record.orientation;
-  if (record.active_tool < tools_.size()) {
-    painter_.draw(tools_[record.active_tool], rigid(tip_mm, {q[0], q[1], q[2], q[3]}), kSteel, view,
-                  target);
-  }
+  painter_.draw(tools_[record.active_tool],
+                rigid(vec3(record.position_mm), {q[0], q[1], q[2], q[3]}), kSteel, view, target);
+}
+
+void Picture::draw_force(const TickRecord& record, const View& view, const RenderTarget& target) {
   const glm::dvec3 force_n = vec3(record.commanded_force_n);
   const double strength_n = glm::length(force_n);
   if (strength_n < kLeastArrowN) return;
   // From the surface of the head outwards: inside it a small force would not be seen.
   const double head_mm =
       record.active_tool < tools_.size() ? scene_.tools[record.active_tool].radius_mm : 0.0;
-  painter_.draw_arrow(tip_mm + force_n * (head_mm / strength_n),
+  painter_.draw_arrow(vec3(record.position_mm) + force_n * (head_mm / strength_n),
                       force_n * (kArrowRadiiPerN * radius_mm_), kArrowThickness * radius_mm_,
                       kForce, view, target);
 }

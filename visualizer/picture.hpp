@@ -37,10 +37,12 @@ class Picture {
   void draw_backdrop(const RenderTarget& target);
   void smooth_edges(const RenderTarget& from, const RenderTarget& to);
   void draw_tool(const TickRecord& record, const View& view, const RenderTarget& target);
+  void draw_force(const TickRecord& record, const View& view, const RenderTarget& target);
 
   SceneView scene_;
   std::unique_ptr<Renderer> renderer_;
   OrbitCamera camera_;
+  std::optional<View> last_view_;
   double radius_mm_ = 1.0;  ///< of the main volume's box: the size of what is looked at
   glm::dvec3 centre_mm_{0, 0, 0};
   double reach_mm_ = 1.0;  ///< from that centre to the farthest corner of any volume

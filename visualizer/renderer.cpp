@@ -8,6 +8,7 @@
 #include "visualizer/blend_renderer.hpp"
 #include "visualizer/error.hpp"
 #include "visualizer/iso_renderer.hpp"
+#include "visualizer/slices_renderer.hpp"
 
 namespace kerf {
 
@@ -28,6 +29,7 @@ struct Kind {
 constexpr auto kKinds = std::to_array<Kind>({
     {"iso", make<IsoRenderer>},
     {"blend", make<BlendRenderer>},
+    {"slices", make<SlicesRenderer>},
 });
 
 const Kind& find_kind(std::string_view name) {

@@ -25,6 +25,8 @@ class Renderer {
   /// Brick ids `changed` of a volume differ from what was drawn last; `density` is all of it.
   virtual void update(std::size_t volume, std::span<const Density> density,
                       std::span<const std::uint32_t> changed) = 0;
+  /// While camera or objects move, a renderer may draw more coarsely; at rest it is exact.
+  virtual void set_moving(bool /*moving*/) {}
   /// Draws over what is in `target`, under its depth test, and only within the scissor rectangle
   /// where that test is enabled. Opaque things come first: some renderers look through.
   virtual void draw(const View& view, const RenderTarget& target) = 0;
