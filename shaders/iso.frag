@@ -2,9 +2,8 @@
 #version 450 core
 // Iso-surface of one volume by ray casting: colour and true depth.
 //
-// A ray is parametrised by its distance `t` along the view axis, so t is the eye distance of the
-// paper's equation (1). Samples stand at whole multiples of the step whatever was skipped before:
-// skipping changes the time, never the picture.
+// Samples stand at whole multiples of the step whatever was skipped before: skipping changes the
+// time, never the picture.
 
 in vec2 v_ndc;
 layout(location = 0) out vec4 o_colour;
@@ -12,19 +11,22 @@ layout(location = 0) out vec4 o_colour;
 uniform sampler3D u_density;       // 0..1, inside a shell of air one voxel thick
 uniform usampler3D u_label;        // the same extent; 0 = none
 uniform usampler3D u_active_cell;  // 1 where a sample may reach iso
-uniform sampler2D u_entry_mm;      // where the ray meets the first active cell
+uniform sampler2DArray u_entry_mm;  // where the ray meets the first active cell
 uniform sampler2D u_palette;       // linear colour: row 0 by density, row 1 by label
 
 uniform mat4 u_texture_from_eye;   // mm to texture coordinates
 uniform vec3 u_texels;             // extent of u_density
-uniform vec2 u_half_size_at_1mm;   // half the picture, 1 mm from the eye
 uniform vec3 u_up_eye;             // world up
 uniform float u_near_mm;
 uniform float u_far_mm;
+uniform vec4 u_shown_eye;          // clip plane
 uniform float u_iso;
 uniform float u_step_vox;          // along the ray
 uniform bool u_has_labels;
 
+vec3 eye_direction_at(vec2 ndc);
+vec2 shown_mm(vec3 eye_direction);
+vec2 box_mm(vec3 origin, vec3 inverse_direction, vec3 lo, vec3 hi);
 vec3 lit(vec3 albedo, vec3 normal, vec3 to_eye, vec3 up_eye, float openness);
 vec3 srgb(vec3 linear);
 float window_depth(float eye_mm, float near_mm, float far_mm);
@@ -34,17 +36,11 @@ const int kRefinements = 3;
 
 float density_at(vec3 texture_point) { return texture(u_density, texture_point).r; }
 
-// Distance along the ray to the end of the box lo..hi, for a ray that is inside or before it.
-float exit_of(vec3 origin, vec3 inverse_direction, vec3 lo, vec3 hi) {
-  vec3 far = max((lo - origin) * inverse_direction, (hi - origin) * inverse_direction);
-  return min(min(far.x, far.y), far.z);
-}
-
 // Regula falsi (Illinois) between a sample below iso and one at or above it.
 float refined_mm(vec3 origin, vec3 direction, float below_mm, float above_mm, float above) {
   float below = density_at(origin + below_mm * direction) - u_iso;
   above -= u_iso;
-  if (below >= 0.0) return below_mm;  // the eye itself is inside
+  if (below >= 0.0) return below_mm;  // the ray begins inside
   float t = above_mm;
   for (int i = 0; i < kRefinements; ++i) {
     t = mix(below_mm, above_mm, below / (below - above));
@@ -124,13 +120,13 @@ float openness_at(vec3 p, vec3 inward_texture) {
 }
 
 void main() {
-  float entry_mm = max(texelFetch(u_entry_mm, ivec2(gl_FragCoord.xy), 0).r, u_near_mm);
-
-  vec3 eye_direction = vec3(v_ndc * u_half_size_at_1mm, -1.0);
+  vec3 eye_direction = eye_direction_at(v_ndc);
+  vec2 shown = shown_mm(eye_direction);
+  float entry_mm = texelFetch(u_entry_mm, ivec3(gl_FragCoord.xy, 0), 0).r;
   vec3 origin = u_texture_from_eye[3].xyz;
   vec3 direction = mat3(u_texture_from_eye) * eye_direction;
   vec3 inverse_direction = 1.0 / direction;
-  float end_mm = min(exit_of(origin, inverse_direction, vec3(0.0), vec3(1.0)), u_far_mm);
+  float end_mm = min(box_mm(origin, inverse_direction, vec3(0.0), vec3(1.0)).y, shown.y);
   float step_mm = u_step_vox / length(direction * u_texels);
 
   // Cell coordinates: voxel v has texel coordinate v + 1.5 and cell coordinate (v + 1) / 8.
@@ -139,12 +135,19 @@ void main() {
   vec3 cell_direction = direction * cells_per_texture;
   vec3 inverse_cell_direction = 1.0 / cell_direction;
 
-  float k = floor(entry_mm / step_mm);
+  // What the clip plane takes away must not be hit; where it cuts through solid, there is a face.
+  float k = max(floor(entry_mm / step_mm), ceil(shown.x / step_mm));
   float hit_density = -1.0;
+  bool on_face = false;
+  if (entry_mm <= shown.x && shown.x < end_mm) {
+    float density = density_at(origin + shown.x * direction);
+    if (density >= u_iso) hit_density = density;
+    on_face = hit_density >= 0.0 && shown.x > u_near_mm;
+  }
   while (k * step_mm < end_mm && hit_density < 0.0) {
     float t = k * step_mm;
     vec3 cell = floor(cell_origin + t * cell_direction);
-    float exit_mm = exit_of(cell_origin, inverse_cell_direction, cell, cell + 1.0);
+    float exit_mm = box_mm(cell_origin, inverse_cell_direction, cell, cell + 1.0).y;
     float k_exit = max(k + 1.0, ceil(exit_mm / step_mm));
     if (texelFetch(u_active_cell, ivec3(cell), 0).r == 0u) {
       k = k_exit;
@@ -161,8 +164,8 @@ void main() {
   }
   if (hit_density < 0.0) discard;
 
-  float below_mm = max((k - 1.0) * step_mm, u_near_mm);
-  float above_mm = max(k * step_mm, u_near_mm);
+  float below_mm = max((k - 1.0) * step_mm, shown.x);
+  float above_mm = max(k * step_mm, shown.x);
   float t = refined_mm(origin, direction, below_mm, above_mm, hit_density);
   vec3 p = origin + t * direction;
 
@@ -171,10 +174,12 @@ void main() {
   vec3 slope = transpose(mat3(u_texture_from_eye)) * (gradient_at(p) * u_texels);
   vec3 normal = dot(slope, slope) > 0.0 ? -normalize(slope) : to_eye;
   if (dot(normal, to_eye) < 0.0) normal = normalize(normal - 1.02 * dot(normal, to_eye) * to_eye);
+  if (on_face) normal = -u_shown_eye.xyz;
   vec3 inward = mat3(u_texture_from_eye) * -normal;
   inward /= length(inward * u_texels);  // one voxel edge
 
-  vec3 colour = lit(material_at(p, inward), normal, to_eye, u_up_eye, openness_at(p, inward));
+  float openness = on_face ? 1.0 : openness_at(p, inward);
+  vec3 colour = lit(material_at(p, inward), normal, to_eye, u_up_eye, openness);
   o_colour = vec4(srgb(colour), 1.0);
   gl_FragDepth = window_depth(t, u_near_mm, u_far_mm);
 }

@@ -51,10 +51,12 @@ HandPainter::Arrow HandPainter::arrow_of(const Hand& hand) const {
           hand.force_n * (kArrowScalesPerN * scale_mm_), kArrowThickness * scale_mm_};
 }
 
-void HandPainter::draw(const Hand& hand, const View& view, const RenderTarget& target) {
-  if (hand.tool < tools_.size()) {
-    painter_.draw(tools_[hand.tool].mesh, pose_of(hand), kSteel, view, target);
-  }
+void HandPainter::draw_tool(const Hand& hand, const View& view, const RenderTarget& target) {
+  if (hand.tool >= tools_.size()) return;
+  painter_.draw(tools_[hand.tool].mesh, pose_of(hand), kSteel, view, target);
+}
+
+void HandPainter::draw_force(const Hand& hand, const View& view, const RenderTarget& target) {
   const Arrow arrow = arrow_of(hand);
   if (arrow.thickness_mm == 0.0) return;
   painter_.draw_arrow(arrow.foot_mm, arrow.way_mm, arrow.thickness_mm, kForce, view, target);

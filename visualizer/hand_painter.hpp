@@ -30,8 +30,9 @@ class HandPainter {
   /// `scale_mm` is the size of what is looked at: lengths of the arrow follow it.
   HandPainter(const SceneView& scene, double scale_mm);
 
-  void draw(const Hand& hand, const View& view, const RenderTarget& target);
-  /// Pixels that `draw` may touch.
+  void draw_tool(const Hand& hand, const View& view, const RenderTarget& target);
+  void draw_force(const Hand& hand, const View& view, const RenderTarget& target);
+  /// Pixels that both may touch.
   [[nodiscard]] PixelRect bounds(const Hand& hand, const View& view, PictureSize size) const;
 
  private:

@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "visualizer/iso_renderer.hpp"
 
-#include <array>
-
 #include <glm/gtc/matrix_inverse.hpp>
 
 #include "visualizer/gl/context.hpp"
 #include "visualizer/palette.hpp"
+#include "visualizer/view_uniforms.hpp"
 
 namespace kerf {
 
@@ -45,61 +44,24 @@ void IsoRenderer::update(std::size_t volume, std::span<const Density> density,
   volumes_[volume].update_bricks(density, changed);
 }
 
-IsoRenderer::EntryBuffer::EntryBuffer(PictureSize of_size) : size(of_size) {
-  glTextureStorage2D(entry_mm.id(), 1, GL_R32F, size.width, size.height);
-  glTextureParameteri(entry_mm.id(), GL_TEXTURE_MIN_FILTER, GL_NEAREST);
-  glTextureParameteri(entry_mm.id(), GL_TEXTURE_MAG_FILTER, GL_NEAREST);
-  glTextureStorage2D(depth.id(), 1, GL_DEPTH_COMPONENT32F, size.width, size.height);
-  glNamedFramebufferTexture(framebuffer.id(), GL_COLOR_ATTACHMENT0, entry_mm.id(), 0);
-  glNamedFramebufferTexture(framebuffer.id(), GL_DEPTH_ATTACHMENT, depth.id(), 0);
-}
-
 void IsoRenderer::draw(const View& view, const RenderTarget& target) {
-  if (!entries_ || entries_->size != target.size()) entries_.emplace(target.size());
-  glEnable(GL_DEPTH_TEST);
-  glDepthFunc(GL_LESS);
-  glDisable(GL_CULL_FACE);
-  glDisable(GL_BLEND);
   for (const VolumeOnGpu& volume : volumes_) {
-    draw_entries(volume, view);
+    entries_.draw(0, volume.cells(), view, target.size());
     cast_rays(volume, view, target);
   }
-}
-
-void IsoRenderer::draw_entries(const VolumeOnGpu& volume, const View& view) {
-  const std::array<float, 4> nowhere{static_cast<float>(view.far_mm)};
-  const float farthest = 1.0F;
-  glBindFramebuffer(GL_FRAMEBUFFER, entries_->framebuffer.id());
-  glViewport(0, 0, entries_->size.width, entries_->size.height);
-  glClearNamedFramebufferfv(entries_->framebuffer.id(), GL_COLOR, 0, nowhere.data());
-  glClearNamedFramebufferfv(entries_->framebuffer.id(), GL_DEPTH, 0, &farthest);
-  entry_program_.set("u_clip_from_cell", glm::mat4(view.clip_from_eye() * view.eye_from_world *
-                                                   volume.world_from_cell()));
-  entry_program_.set("u_near_mm", static_cast<float>(view.near_mm));
-  entry_program_.use();
-  // Faces before the near or beyond the far plane count too: they say where a ray is inside.
-  glEnable(GL_DEPTH_CLAMP);
-  glDepthFunc(GL_LEQUAL);
-  volume.draw_cell_faces();
-  glDisable(GL_DEPTH_CLAMP);
-  glDepthFunc(GL_LESS);
 }
 
 void IsoRenderer::cast_rays(const VolumeOnGpu& volume, const View& view,
                             const RenderTarget& target) {
   target.bind();
   volume.bind_textures();
-  glBindTextureUnit(kEntryUnit, entries_->entry_mm.id());
+  entries_.bind(kEntryUnit);
   glBindTextureUnit(kPaletteUnit, palette_.id());
   const glm::dmat4 texture_from_eye =
       glm::affineInverse(view.eye_from_world * volume.world_from_texture());
   cast_program_.set("u_texture_from_eye", glm::mat4(texture_from_eye));
   cast_program_.set("u_texels", glm::vec3(volume.texels()));
-  cast_program_.set("u_half_size_at_1mm",
-                    glm::vec2(view.tan_half_height * view.aspect, view.tan_half_height));
-  cast_program_.set("u_up_eye", glm::vec3(view.eye_from_world * glm::dvec4(0, 1, 0, 0)));
-  cast_program_.set("u_near_mm", static_cast<float>(view.near_mm));
-  cast_program_.set("u_far_mm", static_cast<float>(view.far_mm));
+  set_view(cast_program_, view);
   cast_program_.set("u_iso", volume.iso());
   cast_program_.set("u_has_labels", volume.has_labels() ? 1 : 0);
   cast_program_.use();

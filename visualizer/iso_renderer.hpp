@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <optional>
 #include <vector>
 
 #include "visualizer/gl/program.hpp"
+#include "visualizer/ray_entries.hpp"
 #include "visualizer/renderer.hpp"
 
 namespace kerf {
@@ -30,25 +30,14 @@ class IsoRenderer final : public Renderer {
   void draw(const View& view, const RenderTarget& target) override;
 
  private:
-  /// Where the rays enter the active cells of the volume being drawn.
-  struct EntryBuffer {
-    explicit EntryBuffer(PictureSize size);
-    PictureSize size;
-    GlTexture2D entry_mm = GlTexture2D::create();
-    GlTexture2D depth = GlTexture2D::create();
-    GlFramebuffer framebuffer = GlFramebuffer::create();
-  };
-
-  void draw_entries(const VolumeOnGpu& volume, const View& view);
   void cast_rays(const VolumeOnGpu& volume, const View& view, const RenderTarget& target);
 
   Options options_;
-  GlProgram entry_program_{"cell_faces.vert", "cell_faces.frag"};
-  GlProgram cast_program_{"screen.vert", "iso.frag", "lighting.frag"};
+  GlProgram cast_program_{"screen.vert", "iso.frag", "ray.frag", "lighting.frag"};
   GlVertexArray no_vertices_ = GlVertexArray::create();
   GlTexture2D palette_ = GlTexture2D::create();
   std::vector<VolumeOnGpu> volumes_;
-  std::optional<EntryBuffer> entries_;
+  RayEntries entries_{1};
 };
 
 }  // namespace kerf

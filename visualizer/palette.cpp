@@ -2,36 +2,62 @@
 #include "visualizer/palette.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
+#include <vector>
 
 namespace kerf {
 
 namespace {
 
-constexpr glm::dvec3 kIvory{0.80, 0.74, 0.62};
 constexpr double kHalfBand = 0.03;  // density; CT noise of dentin is about 0.015
+// Per voxel edge. Enamel lets what is below shine through; behind a millimetre of dentin little
+// does.
+constexpr double kHardestOpacity = 0.10;
+constexpr double kSoftestOpacity = 0.40;
+constexpr glm::dvec4 kIvory{0.80, 0.74, 0.62, kSoftestOpacity};
+
+/// Colour and opacity of each material, from the softest to the hardest, in equal ratios.
+struct Look {
+  double iso;
+  std::size_t label;
+  glm::dvec4 colour;
+};
+
+std::vector<Look> looks_of(std::span<const MaterialView> materials) {
+  std::vector<Look> looks;
+  for (std::size_t m = 1; m < materials.size(); ++m) {
+    looks.push_back({materials[m].iso, m, glm::dvec4(materials[m].colour, kSoftestOpacity)});
+  }
+  std::stable_sort(looks.begin(), looks.end(),
+                   [](const Look& a, const Look& b) { return a.iso < b.iso; });
+  for (std::size_t i = 1; i < looks.size(); ++i) {
+    const double rank = static_cast<double>(i) / static_cast<double>(looks.size() - 1);
+    looks[i].colour.a = kSoftestOpacity * std::pow(kHardestOpacity / kSoftestOpacity, rank);
+  }
+  return looks;
+}
 
 }  // namespace
 
-std::array<std::array<glm::vec4, kPaletteWidth>, 2> make_palette(
-    std::span<const MaterialView> materials) {
-  std::vector<MaterialView> by_iso;
-  if (!materials.empty()) by_iso.assign(materials.begin() + 1, materials.end());
-  std::stable_sort(by_iso.begin(), by_iso.end(),
-                   [](const MaterialView& a, const MaterialView& b) { return a.iso < b.iso; });
-
-  std::array<std::array<glm::vec4, kPaletteWidth>, 2> palette{};
+Palette make_palette(std::span<const MaterialView> materials) {
+  const std::vector<Look> looks = looks_of(materials);
+  Palette palette{};
   for (std::size_t i = 0; i < kPaletteWidth; ++i) {
     const double density = static_cast<double>(i) / (kPaletteWidth - 1);
-    glm::dvec3 colour = by_iso.empty() ? kIvory : by_iso.front().colour;
-    for (std::size_t m = 1; m < by_iso.size(); ++m) {
-      const double iso = by_iso[m].iso;
+    glm::dvec4 colour = looks.empty() ? kIvory : looks.front().colour;
+    for (std::size_t m = 1; m < looks.size(); ++m) {
+      const double iso = looks[m].iso;
       const double share = glm::smoothstep(iso - kHalfBand, iso + kHalfBand, density);
-      colour = glm::mix(colour, by_iso[m].colour, share);
+      colour = glm::mix(colour, looks[m].colour, share);
     }
-    palette[0][i] = glm::vec4(glm::vec3(colour), 1.0F);
-    palette[1][i] = glm::vec4(glm::vec3(i < materials.size() ? materials[i].colour : kIvory), 1.0F);
+    palette[0][i] = glm::vec4(colour);
+    palette[1][i] = glm::vec4(kIvory);
   }
+  for (const Look& look : looks) {
+    if (look.label < kPaletteWidth) palette[1][look.label] = glm::vec4(look.colour);
+  }
+  if (!materials.empty()) palette[1][0] = glm::vec4(glm::vec3(materials[0].colour), 0.0F);
   return palette;
 }
 

@@ -66,7 +66,9 @@ Redrawn Picture::draw(const Session& session, const OverlayFigures& figures,
   const bool fresh = !layers_ || layers_->stage.size() != size;
   if (fresh) layers_.emplace(size);
   PixelRect volumes = target.all(), stage = target.all();
-  if (!fresh && view == shown_.view) {
+  const bool moving = !fresh && view != shown_.view;
+  const bool settles = shown_.moving && !moving;  // drawn coarsely until now
+  if (!fresh && !moving && !settles) {
     volumes = stale_volumes(view, size);
     stage = volumes.united(stale_hand(hand, view, size));
     if (renderer_->translucent()) volumes = stage;  // the hand is under them
@@ -76,11 +78,12 @@ Redrawn Picture::draw(const Session& session, const OverlayFigures& figures,
   for (auto& bricks : stale_bricks_) bricks.clear();
   if (stage.empty() && same_panel) return {};
 
+  renderer_->set_moving(moving);
   if (!stage.empty()) draw_layers(hand, view, volumes, stage);
   target.copy(layers_->smooth, target.all());
   overlay_.draw(panel, target);
   glDisable(GL_SCISSOR_TEST);
-  shown_ = {view, hand, panel, target.framebuffer()};
+  shown_ = {view, moving, hand, panel, target.framebuffer()};
   return {true, static_cast<double>(volumes.area()) / target.all().area()};
 }
 
@@ -104,17 +107,18 @@ PixelRect Picture::stale_hand(const std::optional<Hand>& hand, const View& view,
 
 void Picture::draw_layers(const std::optional<Hand>& hand, const View& view, PixelRect volumes,
                           PixelRect stage) {
-  const bool hand_first = renderer_->translucent();
+  const bool tool_first = renderer_->translucent();  // it shines through them
   if (!volumes.empty()) {
     layers_->volumes.restrict_to(volumes);
     draw_backdrop(layers_->volumes);
-    if (hand && hand_first) hand_painter_.draw(*hand, view, layers_->volumes);
+    if (hand && tool_first) hand_painter_.draw_tool(*hand, view, layers_->volumes);
     layers_->volumes.bind();
     renderer_->draw(view, layers_->volumes);
   }
   layers_->stage.restrict_to(stage);
   layers_->stage.copy(layers_->volumes, stage);
-  if (hand && !hand_first) hand_painter_.draw(*hand, view, layers_->stage);
+  if (hand && !tool_first) hand_painter_.draw_tool(*hand, view, layers_->stage);
+  if (hand) hand_painter_.draw_force(*hand, view, layers_->stage);
   constexpr int kSmoothingReach = 3;  // pixels
   layers_->smooth.restrict_to(stage.grown(kSmoothingReach));
   smooth_edges(layers_->stage, layers_->smooth);

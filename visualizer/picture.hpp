@@ -66,13 +66,14 @@ class Picture {
   /// The picture as it grows, kept from frame to frame.
   struct Layers {
     explicit Layers(PictureSize size) : volumes(size), stage(size), smooth(size) {}
-    RenderTarget volumes;  ///< backdrop and volumes; the hand too where they are translucent
+    RenderTarget volumes;  ///< backdrop and volumes; the tool too where they are translucent
     RenderTarget stage;    ///< with the hand
     RenderTarget smooth;   ///< with smoothed edges
   };
   /// What the layers show.
   struct Shown {
     View view;
+    bool moving = false;
     std::optional<Hand> hand;
     OverlayFigures figures;
     GLuint target = 0;

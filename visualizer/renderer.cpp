@@ -5,13 +5,20 @@
 #include <array>
 #include <string>
 
+#include "visualizer/blend_renderer.hpp"
 #include "visualizer/error.hpp"
 #include "visualizer/iso_renderer.hpp"
+#include "visualizer/slices_renderer.hpp"
 #include "visualizer/surface/surface_renderer.hpp"
 
 namespace kerf {
 
 namespace {
+
+template <class Made>
+std::unique_ptr<Renderer> make(const SceneView& scene, std::span<const VolumeContent> contents) {
+  return std::make_unique<Made>(scene, contents);
+}
 
 using Make = std::unique_ptr<Renderer> (*)(const SceneView&, std::span<const VolumeContent>);
 
@@ -21,23 +28,18 @@ struct Kind {
 };
 
 constexpr auto kKinds = std::to_array<Kind>({
-    {"iso",
-     [](const SceneView& scene, std::span<const VolumeContent> contents)
-         -> std::unique_ptr<Renderer> { return std::make_unique<IsoRenderer>(scene, contents); }},
-    {"surface",
-     [](const SceneView& scene,
-        std::span<const VolumeContent> contents) -> std::unique_ptr<Renderer> {
-       return std::make_unique<SurfaceRenderer>(scene, contents);
-     }},
+    {"iso", make<IsoRenderer>},
+    {"blend", make<BlendRenderer>},
+    {"surface", make<SurfaceRenderer>},
+    {"slices", make<SlicesRenderer>},
 });
 
 const Kind& find_kind(std::string_view name) {
   const auto found = std::find_if(kKinds.begin(), kKinds.end(),
                                   [&](const Kind& kind) { return kind.name == name; });
   if (found != kKinds.end()) return *found;
-  std::string known;
-  for (const Kind& kind : kKinds) known += (known.empty() ? "" : ", ") + std::string(kind.name);
-  throw VisualizerError("--renderer: " + std::string(name) + " is unknown; known: " + known);
+  throw VisualizerError("--renderer: " + std::string(name) +
+                        " is unknown; known: " + known_renderers());
 }
 
 }  // namespace
@@ -51,6 +53,12 @@ std::vector<std::string_view> renderer_kinds() {
   std::vector<std::string_view> names;
   for (const Kind& kind : kKinds) names.push_back(kind.name);
   return names;
+}
+
+std::string known_renderers() {
+  std::string known;
+  for (const Kind& kind : kKinds) known += (known.empty() ? "" : ", ") + std::string(kind.name);
+  return known;
 }
 
 void check_renderer(std::string_view kind) {

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -25,7 +26,10 @@ class Renderer {
   /// Brick ids `changed` of a volume differ from what was drawn last; `density` is all of it.
   virtual void update(std::size_t volume, std::span<const Density> density,
                       std::span<const std::uint32_t> changed) = 0;
-  /// Draws over what is in `target`, under its depth test, within its part.
+  /// While camera or objects move, a renderer may draw more coarsely; at rest it is exact.
+  virtual void set_moving(bool /*moving*/) {}
+  /// Draws over what is in `target`, under its depth test, within its part. Opaque things come
+  /// first: some renderers look through.
   virtual void draw(const View& view, const RenderTarget& target) = 0;
   /// Lets what lies behind a surface shine through, so that it must be drawn before.
   [[nodiscard]] virtual bool translucent() const noexcept { return false; }
@@ -37,6 +41,8 @@ class Renderer {
 
 /// All that `make_renderer` knows.
 [[nodiscard]] std::vector<std::string_view> renderer_kinds();
+/// Every kind, as on the command line: "iso, blend, ...".
+[[nodiscard]] std::string known_renderers();
 
 /// Throws as `make_renderer` does; needs no GL context.
 void check_renderer(std::string_view kind);

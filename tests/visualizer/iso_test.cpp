@@ -3,26 +3,18 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
-#include <random>
 
 #include <doctest/doctest.h>
 #include <glm/gtc/matrix_transform.hpp>
 
 #include "tests/visualizer/gl_fixture.hpp"
+#include "tests/visualizer/renderer_fixture.hpp"
 #include "visualizer/error.hpp"
 
 using namespace kerf;
 using namespace kerf::test;
 
 namespace {
-
-constexpr PictureSize kSize{96, 96};
-
-SceneView scene_of(std::initializer_list<const TestVolume*> volumes) {
-  SceneView scene;
-  for (const TestVolume* volume : volumes) scene.volumes.push_back(volume->view);
-  return scene;
-}
 
 /// Distance along the view axis at which the ray of a pixel enters a sphere.
 std::optional<double> sphere_mm(const PixelRay& ray, glm::dvec3 centre_mm, double radius_mm) {
@@ -45,11 +37,11 @@ struct DepthError {
 DepthError compare_with_sphere(const Drawn& drawn, const View& view, glm::dvec3 centre_mm,
                                double radius_mm) {
   DepthError error;
-  for (int y = 0; y < kSize.height; ++y) {
-    for (int x = 0; x < kSize.width; ++x) {
-      const PixelRay ray = pixel_ray(view, kSize, x, y);
+  for (int y = 0; y < kTestSize.height; ++y) {
+    for (int x = 0; x < kTestSize.width; ++x) {
+      const PixelRay ray = pixel_ray(view, kTestSize, x, y);
       if (!sphere_mm(ray, centre_mm, 0.97 * radius_mm)) continue;
-      const float depth = drawn.depth[static_cast<std::size_t>(y * kSize.width + x)];
+      const float depth = drawn.depth[static_cast<std::size_t>(y * kTestSize.width + x)];
       if (depth >= 1.0F) {
         ++error.missed;
         continue;
@@ -73,7 +65,7 @@ TEST_CASE("the depth of a ball is that of the sphere, to a tenth of a voxel") {
   const VolumeContent content = volume.content();
   IsoRenderer renderer(scene_of({&volume}), {&content, 1});
   const View view = look_at({9, 14, 17}, {}, 15, 35);
-  const Drawn drawn = draw(renderer, view, RenderTarget(kSize));
+  const Drawn drawn = draw(renderer, view, RenderTarget(kTestSize));
   const DepthError error = compare_with_sphere(drawn, view, {}, 4.0);
   CHECK(error.missed == 0);
   CHECK(error.hits > 1500);
@@ -90,7 +82,7 @@ TEST_CASE("unequal voxel edges and a turned volume give the same sphere") {
   const VolumeContent content = volume.content();
   IsoRenderer renderer(scene_of({&volume}), {&content, 1});
   const View view = look_at({-15, 3, 14}, {1, -2, 0.5}, 12, 34);
-  const Drawn drawn = draw(renderer, view, RenderTarget(kSize));
+  const Drawn drawn = draw(renderer, view, RenderTarget(kTestSize));
   const DepthError error = compare_with_sphere(drawn, view, {1, -2, 0.5}, 4.0);
   CHECK(error.missed == 0);
   CHECK(error.rms_mm < 0.1 * 0.3);
@@ -98,21 +90,10 @@ TEST_CASE("unequal voxel edges and a turned volume give the same sphere") {
 
 TEST_CASE("skipping empty cells changes no pixel") {
   if (!have_gl()) return;
-  const VoxelGrid grid{61, 44, 37};
-  std::mt19937 random(7);  // a heap of balls: silhouettes, gaps and self-occlusion
-  std::uniform_real_distribution<double> place(-4.0, 4.0);
-  std::vector<glm::dvec3> centres(25);
-  for (glm::dvec3& centre : centres) {
-    for (int axis = 0; axis < 3; ++axis) centre[axis] = place(random);
-  }
-  const TestVolume volume(grid, centred(grid, glm::dvec3(0.2)), [&](glm::dvec3 at) {
-    double most = 0.0;
-    for (const glm::dvec3& centre : centres) most = std::max(most, ball(centre, 0.7, 0.4)(at));
-    return most;
-  });
+  const TestVolume volume = heap_of_balls();
   const VolumeContent content = volume.content();
   const SceneView scene = scene_of({&volume});
-  const RenderTarget target(kSize);
+  const RenderTarget target(kTestSize);
   IsoRenderer skipping(scene, {&content, 1});
   IsoRenderer plain(scene, {&content, 1}, {.skip_empty = false});
   // From outside, from the middle of the heap, and with the far plane inside the box.
@@ -129,46 +110,9 @@ TEST_CASE("skipping empty cells changes no pixel") {
 
 TEST_CASE("after random cuts, uploading the changed bricks equals a fresh upload pixel by pixel") {
   if (!have_gl()) return;
-  const VoxelGrid grid{43, 37, 50};
-  TestVolume volume(grid, centred(grid, glm::dvec3(0.25)), ball({}, 4.4, 0.5));
-  const SceneView scene = scene_of({&volume});
-  VolumeContent content = volume.content();
-  IsoRenderer edited(scene, {&content, 1});
-  const RenderTarget target(kSize);
-  const View view = look_at({9, 14, 17}, {}, 15, 35);
-  std::mt19937 random(11);
-  const auto pick = [&](int n) { return std::uniform_int_distribution<int>(0, n - 1)(random); };
-  std::size_t differing = 0;
-  for (int cut = 0; cut < 12; ++cut) {
-    const VoxelIndex at{pick(grid.nx), pick(grid.ny), pick(grid.nz)};
-    const int reach = 2 + pick(6);
-    const VoxelBox box =
-        VoxelBox{at, {at.x + 1, at.y + 1, at.z + 1}}.grown(reach).clipped(grid.box());
-    for (int z = box.lo.z; z < box.hi.z; ++z) {
-      for (int y = box.lo.y; y < box.hi.y; ++y) {
-        for (int x = box.lo.x; x < box.hi.x; ++x) {
-          // Grows back in every third cut: cells become active again too.
-          volume.density[grid.index(x, y, z)] = cut % 3 == 2 ? 60000 : 0;
-        }
-      }
-    }
-    std::vector<std::uint32_t> changed;
-    const VoxelBox bricks = volume.view.bricks.bricks_of(box);
-    for (int z = bricks.lo.z; z < bricks.hi.z; ++z) {
-      for (int y = bricks.lo.y; y < bricks.hi.y; ++y) {
-        for (int x = bricks.lo.x; x < bricks.hi.x; ++x) {
-          changed.push_back(volume.view.bricks.id({x, y, z}));
-        }
-      }
-    }
-    edited.update(0, volume.density, changed);
-    content = volume.content();
-    IsoRenderer fresh(scene, {&content, 1});
-    const Drawn a = draw(edited, view, target);
-    const Drawn b = draw(fresh, view, target);
-    differing += a.rgb != b.rgb || a.depth != b.depth ? 1 : 0;
-  }
-  CHECK(differing == 0);
+  check_updates([](const SceneView& scene, std::span<const VolumeContent> contents) {
+    return std::make_unique<IsoRenderer>(scene, contents);
+  });
 }
 
 TEST_CASE("with the eye inside the volume's box the hollow around it is seen whole") {
@@ -181,12 +125,12 @@ TEST_CASE("with the eye inside the volume's box the hollow around it is seen who
   const VolumeContent content = volume.content();
   IsoRenderer renderer(scene_of({&volume}), {&content, 1});
   const View view = look_at({0.2, 0.1, 0}, {1, 2, 3}, 0.05, 20);
-  const Drawn drawn = draw(renderer, view, RenderTarget(kSize));
+  const Drawn drawn = draw(renderer, view, RenderTarget(kTestSize));
   double worst_mm = 0.0;
-  for (int y = 0; y < kSize.height; ++y) {
-    for (int x = 0; x < kSize.width; ++x) {
-      const PixelRay ray = pixel_ray(view, kSize, x, y);
-      const float depth = drawn.depth[static_cast<std::size_t>(y * kSize.width + x)];
+  for (int y = 0; y < kTestSize.height; ++y) {
+    for (int x = 0; x < kTestSize.width; ++x) {
+      const PixelRay ray = pixel_ray(view, kTestSize, x, y);
+      const float depth = drawn.depth[static_cast<std::size_t>(y * kTestSize.width + x)];
       const glm::dvec3 at =
           ray.origin_mm + eye_distance_mm(static_cast<double>(depth), view) * ray.direction;
       worst_mm = std::max(worst_mm, std::abs(glm::length(at) - 3.0));
@@ -202,9 +146,9 @@ TEST_CASE("a volume that is solid up to its border is closed there") {
   const VolumeContent content = volume.content();
   IsoRenderer renderer(scene_of({&volume}), {&content, 1});
   const View view = look_at({0, 0, 30}, {}, 10, 50);
-  const Drawn drawn = draw(renderer, view, RenderTarget(kSize));
-  const float depth =
-      drawn.depth[static_cast<std::size_t>(kSize.height / 2 * kSize.width + kSize.width / 2)];
+  const Drawn drawn = draw(renderer, view, RenderTarget(kTestSize));
+  const float depth = drawn.depth[static_cast<std::size_t>(kTestSize.height / 2 * kTestSize.width +
+                                                           kTestSize.width / 2)];
   // Half density half a voxel beyond the last centre: z = 7.5 * 0.5 + 0.25.
   CHECK(eye_distance_mm(static_cast<double>(depth), view) == doctest::Approx(26.0).epsilon(0.001));
 }

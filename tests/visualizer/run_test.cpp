@@ -12,6 +12,7 @@
 #include <iterator>
 #include <optional>
 #include <thread>
+#include <vector>
 
 #include <doctest/doctest.h>
 #include <nlohmann/json.hpp>
@@ -191,6 +192,25 @@ TEST_CASE("a controller that vanishes or faults is shown in its last state, and 
     CHECK(code.get() == 1);
     CHECK(fs::exists(place.options().out / "frame-0002.png"));
   }
+}
+
+TEST_CASE("every renderer draws a session") {
+  if (!have_gl()) return;
+  const Place place;
+  Miller miller;
+  miller.run_to(20);
+  miller.say(Lifecycle::clean_end);
+  std::vector<std::string> pictures;
+  for (const char* renderer : {"iso", "blend", "slices"}) {
+    CAPTURE(renderer);
+    VisualizerOptions options = place.options();
+    options.renderer = renderer;
+    options.out = place.path / renderer;
+    CHECK(run_headless(options) == 0);
+    pictures.push_back(contents(options.out / "frame-0001.png"));
+    CHECK(pictures.back().size() > 500);
+  }
+  CHECK(pictures[0] != pictures[1]);
 }
 
 TEST_CASE("a visualizer that joins late shows the picture of one that was there all the time") {

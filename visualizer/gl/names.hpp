@@ -72,6 +72,7 @@ inline void destroy_program(const GLuint* id) {
 template <GLenum Target>
 using GlTexture = GlName<gl_calls::create_texture<Target>, gl_calls::destroy_texture>;
 using GlTexture2D = GlTexture<GL_TEXTURE_2D>;
+using GlTexture2DArray = GlTexture<GL_TEXTURE_2D_ARRAY>;
 using GlTexture3D = GlTexture<GL_TEXTURE_3D>;
 using GlBuffer = GlName<gl_calls::create_buffer, gl_calls::destroy_buffer>;
 using GlVertexArray = GlName<gl_calls::create_vertex_array, gl_calls::destroy_vertex_array>;

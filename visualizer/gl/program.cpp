@@ -23,12 +23,16 @@ std::string_view shader_text(std::string_view file) {
   throw VisualizerError("shaders/" + std::string(file) + ": not part of this build");
 }
 
-void attach_stage(GLuint program, std::string_view file) {
+void attach_stage(GLuint program, std::string_view file, std::string_view defines) {
   const std::string_view text = shader_text(file);
+  const std::size_t below_version = text.find('\n', text.find("#version")) + 1;
+  std::string source(text.substr(0, below_version));
+  source += defines;
+  source += text.substr(below_version);
   const GLuint shader =
       glCreateShader(file.ends_with(".vert") ? GL_VERTEX_SHADER : GL_FRAGMENT_SHADER);
-  const char* const begin = text.data();
-  const auto length = static_cast<GLint>(text.size());
+  const char* const begin = source.data();
+  const auto length = static_cast<GLint>(source.size());
   glShaderSource(shader, 1, &begin, &length);
   glCompileShader(shader);
   GLint compiled = GL_FALSE;
@@ -47,11 +51,11 @@ void attach_stage(GLuint program, std::string_view file) {
 
 }  // namespace
 
-GlProgram::GlProgram(std::initializer_list<std::string_view> files)
+GlProgram::GlProgram(std::initializer_list<std::string_view> files, std::string_view defines)
     : name_(GlProgramName::create()) {
   std::string all;
   for (const std::string_view file : files) {
-    attach_stage(name_.id(), file);
+    attach_stage(name_.id(), file, defines);
     all += (all.empty() ? "" : " + ") + std::string(file);
   }
   glLinkProgram(name_.id());

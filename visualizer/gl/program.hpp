@@ -16,8 +16,9 @@ namespace kerf {
 class GlProgram {
  public:
   /// Names of files in `shaders/`, the stage by their ending (.vert, .frag); a stage may have
-  /// several. Throws VisualizerError with the driver's first line.
-  GlProgram(std::initializer_list<std::string_view> files);
+  /// several. `defines` are lines that each file sees below its #version. Throws VisualizerError
+  /// with the driver's first line.
+  GlProgram(std::initializer_list<std::string_view> files, std::string_view defines = {});
 
   void use() const { glUseProgram(name_.id()); }
   void set(std::string_view uniform, float value) const;

@@ -24,6 +24,7 @@ class RenderTarget {
 
   [[nodiscard]] PictureSize size() const noexcept { return size_; }
   [[nodiscard]] GLuint colour_texture() const noexcept { return colour_.id(); }
+  [[nodiscard]] GLuint depth_texture() const noexcept { return depth_.id(); }
   [[nodiscard]] GLuint framebuffer() const noexcept { return framebuffer_.id(); }
 
   [[nodiscard]] PixelRect all() const noexcept { return {0, 0, size_.width, size_.height}; }

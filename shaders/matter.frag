@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: Apache-2.0
+#version 450 core
+// What a sample inside a volume looks like: the transfer function and the light. The program defines
+// KERF_VOLUMES and KERF_HAS_LABELS, one bool for each.
+
+uniform sampler3D u_voxel[KERF_VOLUMES];     // gradient (128 + 127 g in 8 bits) and density
+uniform sampler3D u_material[KERF_VOLUMES];  // linear colour, opacity over one voxel edge
+uniform sampler2D u_by_density;              // the same by density, row v for volume v
+uniform vec3 u_texels[KERF_VOLUMES];
+uniform vec2 u_fade[KERF_VOLUMES];           // densities where a material begins and where it is whole
+uniform mat3 u_eye_from_gradient[KERF_VOLUMES];
+uniform float u_least_extinction;            // per voxel edge; less makes no difference
+uniform vec3 u_up_eye;                       // world up
+
+const bool kHasLabels[KERF_VOLUMES] = KERF_HAS_LABELS;
+
+vec3 lit(vec3 albedo, vec3 normal, vec3 to_eye, vec3 up_eye, float openness);
+
+// A volume without labels: the material at a border is that of what the border belongs to, a voxel
+// and a half up the gradient. By its own density every border would have a skin of softer tissue.
+vec4 material_by_density(int v, vec3 p, vec3 gradient, float density) {
+  const float kDepthVox = 1.5;
+  float size = length(gradient);
+  if (size > 0.0) {
+    vec3 inward = gradient * (kDepthVox / size) / u_texels[v];
+    density = max(density, textureLod(u_voxel[v], p + inward, 0.0).a);
+  }
+  return texelFetch(u_by_density, ivec2(density * 255.0 + 0.5, v), 0);
+}
+
+// Gradient and density.
+vec4 voxel_at(int v, vec3 p) { return textureLod(u_voxel[v], p, 0.0); }
+
+// How much of its material is there, 0..1, on the mean between two points. The density runs straight
+// between them, so the ramp of the transfer function is integrated exactly: sampled, a border that
+// is thinner than the step would leave rings (pre-integration: Engel, Kraus and Ertl 2001).
+float presence_between(int v, float front, float back) {
+  vec2 x = (vec2(front, back) - u_fade[v].x) / (u_fade[v].y - u_fade[v].x);
+  vec2 ramp = clamp(x, 0.0, 1.0);
+  vec2 integral = 0.5 * ramp * ramp + max(x - 1.0, 0.0);
+  float change = x.y - x.x;
+  return abs(change) > 0.01 ? (integral.y - integral.x) / change : 0.5 * (ramp.x + ramp.y);
+}
+
+// Where between the two, 0..1, the material begins to be there.
+float beginning_between(int v, float front, float back) {
+  return front < u_fade[v].x ? clamp((u_fade[v].x - front) / (back - front), 0.0, 1.0) : 0.0;
+}
+
+// Whether this extinction over a voxel edge counts as something that is seen.
+bool is_seen(float extinction) { return extinction >= u_least_extinction; }
+
+// Linear colour, lit, of what is at p, and -log2 of the transparency over one edge of it: times a
+// presence and a length in voxel edges that is exact, (1 - a)^(p s / s0) = 2^(-p s / s0 * this).
+vec4 matter_of(int v, vec4 voxel, vec3 p, vec3 to_eye) {
+  vec3 gradient = (voxel.rgb * 255.0 - 128.0) / 127.0;
+  vec4 material = kHasLabels[v] ? textureLod(u_material[v], p, 0.0)
+                                : material_by_density(v, p, gradient, voxel.a);
+
+  // Where the density hardly changes there is no surface to be lit; inside, light comes from
+  // everywhere.
+  const vec2 kSurface = vec2(0.04, 0.20);  // of the gradient
+  const float kInside = 0.62;
+  vec3 slope = u_eye_from_gradient[v] * gradient;
+  vec3 normal = dot(slope, slope) > 0.0 ? -normalize(slope) : to_eye;
+  if (dot(normal, to_eye) < 0.0) normal = -normal;
+  float surface = smoothstep(kSurface.x, kSurface.y, length(gradient));
+  vec3 colour = mix(kInside * material.rgb, lit(material.rgb, normal, to_eye, u_up_eye, 1.0), surface);
+  return vec4(colour, -log2(1.0 - min(material.a, 0.996)));
+}

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+#version 450 core
+// Rays as every ray caster sees them. A ray is parametrised by its distance `t` in mm along the view
+// axis, so t is the eye distance of the paper's equation (1).
+
+uniform vec2 u_half_size_at_1mm;  // half the picture, 1 mm from the eye
+uniform float u_near_mm;
+uniform float u_far_mm;
+uniform vec4 u_shown_eye;  // clip plane: shown where dot(this, (p, 1)) >= 0, p in eye mm
+
+// Where the ray of a pixel is 1 mm from the eye.
+vec3 eye_direction_at(vec2 ndc) { return vec3(ndc * u_half_size_at_1mm, -1.0); }
+
+// The part of a ray between the near, the far and the clip plane: t from x to y.
+vec2 shown_mm(vec3 eye_direction) {
+  vec2 shown = vec2(u_near_mm, u_far_mm);
+  float slope = dot(u_shown_eye.xyz, eye_direction);
+  float cut = -u_shown_eye.w / slope;
+  if (slope > 0.0) shown.x = max(shown.x, cut);
+  if (slope < 0.0) shown.y = min(shown.y, cut);
+  if (slope == 0.0 && u_shown_eye.w < 0.0) shown.y = 0.0;
+  return shown;
+}
+
+// Distances along a line at which it enters and leaves the box lo..hi.
+vec2 box_mm(vec3 origin, vec3 inverse_direction, vec3 lo, vec3 hi) {
+  vec3 to_lo = (lo - origin) * inverse_direction;
+  vec3 to_hi = (hi - origin) * inverse_direction;
+  vec3 near = min(to_lo, to_hi);
+  vec3 far = max(to_lo, to_hi);
+  return vec2(max(max(near.x, near.y), near.z), min(min(far.x, far.y), far.z));
+}

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "visualizer/gl/names.hpp"
+#include "visualizer/macrocells.hpp"
+#include "visualizer/scene_view.hpp"
+
+namespace kerf {
+
+/// The macrocells of one volume on the GPU: which are active, and the faces around those.
+class CellsOnGpu {
+ public:
+  /// Cells that hold a density of at least `threshold` are active.
+  CellsOnGpu(const VolumeView& volume, std::span<const Density> density, Density threshold);
+
+  /// Bricks `changed` of `density` (the whole volume) differ.
+  void update_bricks(std::span<const Density> density, std::span<const std::uint32_t> changed);
+
+  /// The texture: 1 in active cells.
+  void bind(GLuint unit) const { glBindTextureUnit(unit, active_.id()); }
+  /// Draws the faces around the active cells with the program in use; attribute 0 is a face.
+  void draw_faces() const;
+
+  [[nodiscard]] const glm::dmat4& world_from_cell() const noexcept { return world_from_cell_; }
+  /// In cells, the smallest box that holds every active one.
+  [[nodiscard]] const VoxelBox& active_box() const noexcept { return active_box_; }
+
+ private:
+  void upload();
+
+  BrickGrid bricks_;
+  glm::dmat4 world_from_cell_;
+  Macrocells cells_;
+  VoxelBox active_box_;
+  GlTexture3D active_ = GlTexture3D::create();
+  GlBuffer faces_ = GlBuffer::create();
+  GlVertexArray face_array_ = GlVertexArray::create();
+  GLsizei face_count_ = 0;
+};
+
+}  // namespace kerf
