@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+
+namespace kerf {
+
+/// As many as the segment has descriptors for.
+inline constexpr int kMaxCastVolumes = 8;
+
+/// One volume as the cast kernels see it: plain pointers, because their files are compiled for
+/// instruction sets that other machines lack, and no inline function may be shared with them.
+///
+/// Places are in voxel edges, counted from the shell of air: voxel v is at v + 1.
+struct CastVolumeJob {
+  const std::uint32_t* density = nullptr;  ///< `PairedRows`
+  const std::uint16_t* labels = nullptr;   ///< `PairedRows`, or none
+  const std::uint8_t* distance = nullptr;  ///< `CellDistance`
+  std::int32_t row = 0, plane = 0;         ///< of density and labels, in entries
+  std::int32_t cell_row = 0, cell_plane = 0;
+  float last[3] = {};         ///< a hair before the far side of the shell
+  float origin[3] = {};       ///< the eye
+  float from_eye[3][3] = {};  ///< [to][from]: mm of eye space to voxel edges
+  float iso = 0.5F;           ///< 0..1
+};
+
+/// The picture that the kernels fill. Rows from the bottom up, as GL has them.
+struct CastPixels {
+  std::int32_t width = 0, height = 0;
+  std::uint32_t* rgba = nullptr;     ///< sRGB and opacity (not multiplied in), red in the low byte
+  float* depth = nullptr;            ///< window depth, equation (1); 1 where nothing was hit
+  float* normal = nullptr;           ///< or none: x, y, z in eye space where iso hit something
+  const float* end_depth = nullptr;  ///< or none: window depth at which rays of blend end
+};
+
+/// Half-open rectangle of pixels; the first row is the lowest one.
+struct PixelRect {
+  std::int32_t x0 = 0, y0 = 0, x1 = 0, y1 = 0;
+};
+
+/// All that one picture needs.
+struct CastJob {
+  CastVolumeJob volumes[kMaxCastVolumes];
+  int volume_count = 0;
+  CastPixels pixels;
+  float half_width_at_1mm = 0.25F, half_height_at_1mm = 0.25F;
+  float near_mm = 1.0F, far_mm = 100.0F;
+  float depth_far = 0.0F, depth_slope = 0.0F;  ///< equation (1): depth_far - depth_slope / t
+  float step_vox = 0.75F;                      ///< along the ray
+  float key_light[3] = {}, fill_light[3] = {}, up[3] = {};  ///< unit vectors in eye space
+  const float* colour_by_density = nullptr;  ///< 256 x linear RGB and, for blend, extinction
+  const float* colour_by_label = nullptr;    ///< 256 x linear RGB and one unused
+};
+
+/// The kernels of one instruction set. All sets give the same bits: every ray is computed by
+/// itself, with the same operations in the same order, whatever packet it travels in.
+struct CastKernels {
+  const char* name;
+  void (*iso)(const CastJob& job, const PixelRect& rect);
+  void (*blend)(const CastJob& job, const PixelRect& rect);
+};
+
+/// What this machine can run, the fastest first; ends with the scalar set and a null.
+[[nodiscard]] const CastKernels* const* cast_kernels() noexcept;
+
+extern const CastKernels kCastAvx512;
+extern const CastKernels kCastAvx2;
+extern const CastKernels kCastScalar;
+
+}  // namespace kerf

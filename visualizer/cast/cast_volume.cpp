@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "visualizer/cast/cast_volume.hpp"
+
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include <glm/gtc/matrix_inverse.hpp>
+#include <glm/gtc/matrix_transform.hpp>
+
+#include "visualizer/error.hpp"
+
+namespace kerf {
+
+namespace {
+
+constexpr double kShell = 1.0;  // voxels of air around the volume: voxel v is at v + 1
+
+VoxelGrid checked(const VolumeView& volume) {
+  const VoxelGrid& n = volume.bricks.grid;
+  constexpr auto kLimit = static_cast<std::size_t>(std::numeric_limits<std::int32_t>::max());
+  const std::size_t entries = PairedRows<Density, std::uint32_t>::entry_count(n);
+  if (entries <= kLimit) return n;
+  throw VisualizerError("volume " + volume.name + ": " + std::to_string(n.nx) + "x" +
+                        std::to_string(n.ny) + "x" + std::to_string(n.nz) +
+                        " voxels, and the ray caster takes " + std::to_string(kLimit) +
+                        "; crop or resample it");
+}
+
+}  // namespace
+
+CastVolume::CastVolume(const VolumeView& volume, std::span<const Density> density,
+                       std::span<const Label> labels, Density least)
+    : bricks_(volume.bricks),
+      world_from_voxel_(volume.world_from_voxel),
+      iso_(static_cast<float>(volume.iso / kDensityMax)),
+      density_(checked(volume)),
+      cells_(volume.bricks.grid, density, least),
+      distance_(cells_) {
+  density_.copy(bricks_.grid.box(), density);
+  if (labels.empty()) return;
+  labels_.emplace(bricks_.grid);
+  labels_->copy(bricks_.grid.box(), labels);
+}
+
+void CastVolume::update_bricks(std::span<const Density> density,
+                               std::span<const std::uint32_t> changed) {
+  for (const std::uint32_t id : changed) {
+    density_.copy(bricks_.voxels(id), density);
+    const VoxelIndex at = bricks_.brick(id);
+    if (cells_.update_brick(at, density)) distance_.update_brick(at, cells_);
+  }
+}
+
+CastVolumeJob CastVolume::job(const glm::dmat4& eye_from_world) const {
+  const glm::dmat4 place_from_eye =
+      glm::affineInverse(eye_from_world * glm::translate(world_from_voxel_, glm::dvec3(-kShell)));
+  const VoxelGrid& grid = bricks_.grid;
+  const glm::ivec3 extent(grid.nx, grid.ny, grid.nz);
+  CastVolumeJob job;
+  job.density = density_.data();
+  job.labels = labels_ ? labels_->data() : nullptr;
+  job.distance = distance_.data();
+  job.row = density_.row();
+  job.plane = density_.plane();
+  job.cell_row = cells_.grid().nx;
+  job.cell_plane = cells_.grid().nx * cells_.grid().ny;
+  job.iso = iso_;
+  for (int to = 0; to < 3; ++to) {
+    // The last cell of voxels ends at extent + 1; its far side belongs to no cell.
+    job.last[to] = std::nextafter(static_cast<float>(extent[to] + 1), 0.0F);
+    job.origin[to] = static_cast<float>(place_from_eye[3][to]);
+    for (int from = 0; from < 3; ++from) {
+      job.from_eye[to][from] = static_cast<float>(place_from_eye[from][to]);
+    }
+  }
+  return job;
+}
+
+}  // namespace kerf

@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "visualizer/cast/caster.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "visualizer/error.hpp"
+
+namespace kerf {
+
+namespace {
+
+constexpr std::int32_t kTile = 16;    // pixels: coherent rays, and enough pieces to share out
+constexpr float kLeastClear = 1e-6F;  // of a voxel edge: opacity 1 has no finite extinction
+
+Density least_visible(const Caster::Options& options, const VolumeView& volume) {
+  if (options.mode == CastMode::iso) return volume.iso;
+  const auto first = std::find_if(options.opacity.begin(), options.opacity.end(),
+                                  [](float opacity) { return opacity > 0.0F; });
+  // Opacity is interpolated between entries: it begins above the last one that has none.
+  const auto entry = std::max<std::ptrdiff_t>(first - options.opacity.begin() - 1, 0);
+  return static_cast<Density>(std::max<double>(
+      1.0, std::floor((static_cast<double>(entry) + 0.5) / kPaletteWidth * kDensityMax)));
+}
+
+void put(float (&to)[3], const glm::dvec3& from) {
+  for (int i = 0; i < 3; ++i) to[i] = static_cast<float>(from[i]);
+}
+
+}  // namespace
+
+void CastPicture::resize(std::int32_t to_width, std::int32_t to_height) {
+  width = to_width;
+  height = to_height;
+  const auto pixels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
+  rgba.assign(pixels, 0);
+  depth.assign(pixels, 1.0F);
+}
+
+Caster::Caster(const SceneView& scene, std::span<const Content> contents, const Options& options)
+    : options_(options), palette_(make_palette(scene.materials)) {
+  if (scene.volumes.size() > kMaxCastVolumes) {
+    throw VisualizerError("scene: " + std::to_string(scene.volumes.size()) +
+                          " volumes, and the ray caster takes " + std::to_string(kMaxCastVolumes) +
+                          "; use --renderer iso");
+  }
+  volumes_.reserve(scene.volumes.size());
+  for (std::size_t i = 0; i < scene.volumes.size(); ++i) {
+    const VolumeView& volume = scene.volumes[i];
+    volumes_.emplace_back(volume, contents[i].density, contents[i].labels,
+                          least_visible(options, volume));
+  }
+  for (std::size_t i = 0; i < kPaletteWidth; ++i) {
+    palette_[0][i].w = std::log2(std::max(1.0F - options.opacity[i], kLeastClear));
+  }
+}
+
+void Caster::update(std::size_t volume, std::span<const Density> density,
+                    std::span<const std::uint32_t> changed) {
+  volumes_[volume].update_bricks(density, changed);
+}
+
+void Caster::draw(const View& view, const PixelRect& rect, CastPicture& picture,
+                  std::span<const float> end_depth, std::span<float> normals) {
+  CastJob job;
+  for (const CastVolume& volume : volumes_) {
+    job.volumes[job.volume_count++] = volume.job(view.eye_from_world);
+  }
+  job.pixels = {picture.width,
+                picture.height,
+                picture.rgba.data(),
+                picture.depth.data(),
+                normals.empty() ? nullptr : normals.data(),
+                end_depth.empty() ? nullptr : end_depth.data()};
+  job.half_width_at_1mm = static_cast<float>(view.tan_half_height * view.aspect);
+  job.half_height_at_1mm = static_cast<float>(view.tan_half_height);
+  job.near_mm = static_cast<float>(view.near_mm);
+  job.far_mm = static_cast<float>(view.far_mm);
+  // Equation (1) as depth_far - depth_slope / t.
+  const double span_mm = view.far_mm - view.near_mm;
+  job.depth_far = static_cast<float>(view.far_mm / span_mm);
+  job.depth_slope = static_cast<float>(view.far_mm * view.near_mm / span_mm);
+  job.step_vox = options_.step_vox;
+  put(job.key_light, glm::normalize(glm::dvec3(-0.45, 0.75, 0.70)));  // lighting.frag
+  put(job.fill_light, glm::normalize(glm::dvec3(0.80, 0.05, 0.45)));
+  put(job.up, glm::dvec3(view.eye_from_world * glm::dvec4(0, 1, 0, 0)));
+  job.colour_by_density = &palette_[0][0].x;
+  job.colour_by_label = &palette_[1][0].x;
+
+  const auto cast =
+      options_.mode == CastMode::iso ? options_.kernels->iso : options_.kernels->blend;
+  const std::int32_t across = (rect.x1 - rect.x0 + kTile - 1) / kTile;
+  const std::int32_t along = (rect.y1 - rect.y0 + kTile - 1) / kTile;
+  pool_.run(static_cast<std::uint32_t>(across * along), [&](std::uint32_t tile) {
+    const std::int32_t x = rect.x0 + static_cast<std::int32_t>(tile) % across * kTile;
+    const std::int32_t y = rect.y0 + static_cast<std::int32_t>(tile) / across * kTile;
+    cast(job, {x, y, std::min(x + kTile, rect.x1), std::min(y + kTile, rect.y1)});
+  });
+}
+
+std::array<float, kPaletteWidth> soft_opacity(double iso) {
+  constexpr double kThin = 0.04;   // per voxel edge, right at iso
+  constexpr double kThick = 0.30;  // at full density
+  std::array<float, kPaletteWidth> opacity{};
+  for (std::size_t i = 0; i < kPaletteWidth; ++i) {
+    const double density = static_cast<double>(i) / (kPaletteWidth - 1);
+    const double inside = glm::smoothstep(0.5 * iso, iso, density);
+    opacity[i] = static_cast<float>(inside * glm::mix(kThin, kThick, density));
+  }
+  return opacity;
+}
+
+}  // namespace kerf

@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: Apache-2.0
+// For the files that define `Simd` only: iso-surfaces by ray casting, as in shaders/iso.frag.
+//
+// Samples stand at whole multiples of the step whatever was skipped before: skipping changes the
+// time, never the picture.
+#pragma once
+
+#include "visualizer/cast/packet_pixels.hpp"
+#include "visualizer/cast/packet_shading.hpp"
+
+namespace kerf {
+namespace {
+
+struct Hit {
+  M found;
+  F t;        ///< mm along the view axis
+  F density;  ///< at t, not below iso
+};
+
+/// The first sample of `alive` rays that is not below iso; t is a multiple of the step.
+inline Hit first_sample(const CastVolumeJob& volume, const VolumeRays& rays, M alive) {
+  const F one = Simd::set(1.0F);
+  const F iso = Simd::set(volume.iso);
+  F k = whole(rays.begin_mm * rays.steps_per_mm);
+  F exit_k = k;  // of the cell around; not known yet
+  Hit hit{Simd::none(), k, k};
+  alive = Simd::both(alive, Simd::less(k * rays.step_mm, rays.end_mm));
+  while (Simd::any(alive)) {
+    M leaving = Simd::but_not(alive, Simd::less(k, exit_k));
+    while (Simd::any(leaving)) {
+      const Surroundings around = surroundings_at(volume, rays, k * rays.step_mm);
+      const F next = Simd::max(
+          k + one, whole(Simd::min(around.exit_mm, rays.end_mm) * rays.steps_per_mm) + one);
+      exit_k = Simd::select(leaving, next, exit_k);
+      const M skipping = Simd::but_not(leaving, around.visible);
+      k = Simd::select(skipping, next, k);
+      leaving = Simd::both(skipping, Simd::less(k * rays.step_mm, rays.end_mm));
+      alive = Simd::either(Simd::but_not(alive, skipping), leaving);
+    }
+    const F t = k * rays.step_mm;
+    const F density = density_at(volume, rays.origin + t * rays.direction);
+    const M found = Simd::but_not(alive, Simd::less(density, iso));
+    hit.found = Simd::either(hit.found, found);
+    hit.t = Simd::select(found, t, hit.t);
+    hit.density = Simd::select(found, density, hit.density);
+    k = k + one;
+    alive = Simd::both(Simd::but_not(alive, found), Simd::less(k * rays.step_mm, rays.end_mm));
+  }
+  return hit;
+}
+
+/// Regula falsi (Illinois) between a sample below iso and the first one that is not.
+inline F refined_mm(const CastJob& job, const CastVolumeJob& volume, const VolumeRays& rays,
+                    const Hit& hit) {
+  constexpr int kRefinements = 3;
+  const F zero = Simd::set(0.0F);
+  const F half = Simd::set(0.5F);
+  const F iso = Simd::set(volume.iso);
+  const F near_mm = Simd::set(job.near_mm);
+  F below_mm = Simd::max(hit.t - rays.step_mm, near_mm);
+  F above_mm = Simd::max(hit.t, near_mm);
+  F below = density_at(volume, rays.origin + below_mm * rays.direction) - iso;
+  F above = hit.density - iso;
+  const M eye_is_inside = Simd::but_not(hit.found, Simd::less(below, zero));
+  F t = above_mm;
+  const F begin_mm = below_mm;
+  for (int i = 0; i < kRefinements; ++i) {
+    t = mix(below_mm, above_mm, below / (below - above));
+    const F value = density_at(volume, rays.origin + t * rays.direction) - iso;
+    const M outside = Simd::less(value, zero);
+    below_mm = Simd::select(outside, t, below_mm);
+    above_mm = Simd::select(outside, above_mm, t);
+    const F other_below = half * below;
+    const F other_above = half * above;
+    below = Simd::select(outside, value, other_below);
+    above = Simd::select(outside, other_above, value);
+  }
+  return Simd::select(eye_is_inside, begin_mm, t);
+}
+
+inline void iso_packet(const CastJob& job, const Packet& packet) {
+  const Vec3 eye = eye_directions(job, packet);
+  const Vec3 to_eye = -normalized(eye);
+  const M drawn = drawn_lanes(packet);
+  F nearest_mm = Simd::set(job.far_mm);
+  M any_found = Simd::none();
+  VolumeRays rays[kMaxCastVolumes];
+  M found[kMaxCastVolumes];
+  for (int v = 0; v < job.volume_count; ++v) {
+    const CastVolumeJob& volume = job.volumes[v];
+    rays[v] = rays_through(job, volume, eye);
+    rays[v].end_mm = Simd::min(rays[v].end_mm, nearest_mm + rays[v].step_mm);
+    const Hit hit = first_sample(volume, rays[v], drawn);
+    found[v] = Simd::none();
+    if (!Simd::any(hit.found)) continue;
+    const F t = refined_mm(job, volume, rays[v], hit);
+    found[v] = Simd::both(hit.found, Simd::less(t, nearest_mm));
+    nearest_mm = Simd::select(found[v], t, nearest_mm);
+    any_found = Simd::either(any_found, found[v]);
+    for (int hidden = 0; hidden < v; ++hidden) {
+      found[hidden] = Simd::but_not(found[hidden], found[v]);
+    }
+  }
+  if (!Simd::any(any_found)) {
+    put(packet, I{}, job.pixels.rgba);
+    put(packet, Simd::set(1.0F), job.pixels.depth);
+    return;
+  }
+  Vec3 colour{};
+  Vec3 normal{};
+  for (int v = 0; v < job.volume_count; ++v) {
+    if (!Simd::any(found[v])) continue;
+    const CastVolumeJob& volume = job.volumes[v];
+    const SurfacePoint at = surface_point(volume, rays[v], nearest_mm, to_eye);
+    const Vec3 albedo = material_at(job, volume, at, found[v]);
+    const Vec3 shown = lit(job, albedo, at.normal, to_eye, openness_at(volume, at));
+    colour = select(found[v], shown, colour);
+    normal = select(found[v], at.normal, normal);
+  }
+  const F depth = Simd::set(job.depth_far) - Simd::set(job.depth_slope) / nearest_mm;
+  put(packet, Simd::select(any_found, srgb_bytes(colour, Simd::set(1.0F)), I{}), job.pixels.rgba);
+  put(packet, Simd::select(any_found, depth, Simd::set(1.0F)), job.pixels.depth);
+  if (job.pixels.normal != nullptr) {
+    put(packet, normal.x, job.pixels.normal, 3, 0);
+    put(packet, normal.y, job.pixels.normal, 3, 1);
+    put(packet, normal.z, job.pixels.normal, 3, 2);
+  }
+}
+
+void cast_iso(const CastJob& job, const PixelRect& rect) {
+  for_packets(job, rect, [&](const Packet& packet) { iso_packet(job, packet); });
+}
+
+}  // namespace
+}  // namespace kerf

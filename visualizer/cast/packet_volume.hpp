@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: Apache-2.0
+// For the files that define `Simd` only: how a packet of rays samples a volume and passes over its
+// empty cells. Places are in voxel edges from the shell (`CastVolumeJob`).
+#pragma once
+
+#include "visualizer/cast/packet_math.hpp"
+
+namespace kerf {
+namespace {
+
+/// A cell of 2^3 voxels: the entry of its lowest one, and the place within it.
+struct CellPlace {
+  I at;
+  Vec3 share;
+};
+
+/// Beyond the shell everything is as on it: air.
+inline Vec3 within(const CastVolumeJob& volume, Vec3 p) {
+  return {Simd::min(positive(p.x), Simd::set(volume.last[0])),
+          Simd::min(positive(p.y), Simd::set(volume.last[1])),
+          Simd::min(positive(p.z), Simd::set(volume.last[2]))};
+}
+
+inline CellPlace cell_place(const CastVolumeJob& volume, Vec3 p) {
+  const Vec3 q = within(volume, p);
+  const I x = Simd::to_int(q.x);
+  const I y = Simd::to_int(q.y);
+  const I z = Simd::to_int(q.z);
+  return {x + y * volume.row + z * volume.plane,
+          {q.x - Simd::to_float(x), q.y - Simd::to_float(y), q.z - Simd::to_float(z)}};
+}
+
+inline F mix(F a, F b, F share) {
+  return a + share * (b - a);
+}
+inline Vec3 mix(Vec3 a, Vec3 b, F share) {
+  return a + share * (b - a);
+}
+
+/// Trilinear, 0..1. Two loads of 64 bits bring all eight corners: `PairedRows`.
+inline F density_at(const CastVolumeJob& volume, Vec3 p) {
+  const CellPlace cell = cell_place(volume, p);
+  const auto plane = [&](const std::uint32_t* entries) {
+    I left{};
+    I right{};
+    Simd::gather_two(entries, cell.at, left, right);
+    const F low = mix(Simd::to_float(left & 0xffff), Simd::to_float(right & 0xffff), cell.share.x);
+    const F high = mix(Simd::to_float(left >> 16 & 0xffff), Simd::to_float(right >> 16 & 0xffff),
+                       cell.share.x);
+    return mix(low, high, cell.share.y);
+  };
+  return mix(plane(volume.density), plane(volume.density + volume.plane), cell.share.z) *
+         Simd::set(1.0F / 65535.0F);
+}
+
+/// Direction of the density gradient, from the eight corners of a cube: differences along one axis,
+/// means along the others (iso.frag).
+inline Vec3 gradient_at(const CastVolumeJob& volume, Vec3 p) {
+  const F one = Simd::set(1.0F);
+  Vec3 sum{};
+  for (int corner = 0; corner < 8; ++corner) {
+    const Vec3 side{(corner & 1) != 0 ? one : -one, (corner & 2) != 0 ? one : -one,
+                    (corner & 4) != 0 ? one : -one};
+    sum = sum + density_at(volume, p + side) * side;
+  }
+  return sum;
+}
+
+/// The rays of one packet through one volume, by their distance t along the view axis.
+struct VolumeRays {
+  Vec3 origin, direction;
+  Vec3 inverse;        ///< of the direction
+  F begin_mm, end_mm;  ///< in the volume's box; none where begin is beyond end
+  F step_mm, steps_per_mm;
+};
+
+inline VolumeRays rays_through(const CastJob& job, const CastVolumeJob& volume, Vec3 eye) {
+  VolumeRays rays;
+  rays.origin = vec3(volume.origin);
+  rays.direction = transformed(volume.from_eye, eye);
+  const F edges_per_mm = Simd::sqrt(dot(rays.direction, rays.direction));
+  rays.step_mm = Simd::set(job.step_vox) / edges_per_mm;
+  rays.steps_per_mm = edges_per_mm / Simd::set(job.step_vox);
+  rays.begin_mm = Simd::set(job.near_mm);
+  rays.end_mm = Simd::set(job.far_mm);
+  const auto clip = [&](F origin, F& direction, F& inverse, float last) {
+    // A ray along a face never meets the next one, but its inverse stays a number.
+    const F least = Simd::set(1e-12F);
+    direction = Simd::select(Simd::less(direction * direction, least * least), least, direction);
+    inverse = Simd::set(1.0F) / direction;
+    const F a = -origin * inverse;
+    const F b = (Simd::set(last) - origin) * inverse;
+    rays.begin_mm = Simd::max(rays.begin_mm, Simd::min(a, b));
+    rays.end_mm = Simd::min(rays.end_mm, Simd::max(a, b));
+  };
+  clip(rays.origin.x, rays.direction.x, rays.inverse.x, volume.last[0]);
+  clip(rays.origin.y, rays.direction.y, rays.inverse.y, volume.last[1]);
+  clip(rays.origin.z, rays.direction.z, rays.inverse.z, volume.last[2]);
+  return rays;
+}
+
+/// What is around a sample: whether it can show anything, and up to where that holds.
+struct Surroundings {
+  M visible;
+  F exit_mm;
+};
+
+inline Surroundings surroundings_at(const CastVolumeJob& volume, const VolumeRays& rays, F t) {
+  const Vec3 q = within(volume, rays.origin + t * rays.direction);
+  const F cells = Simd::set(1.0F / 8.0F);
+  const I x = Simd::to_int(q.x * cells);
+  const I y = Simd::to_int(q.y * cells);
+  const I z = Simd::to_int(q.z * cells);
+  const I distance =
+      Simd::gather_bytes<1>(volume.distance, x + y * volume.cell_row + z * volume.cell_plane) &
+      0xff;
+  const F reach = positive(Simd::to_float(distance) - Simd::set(1.0F));
+  const auto exit = [&](I cell, F origin, F inverse) {
+    const F low = Simd::to_float(cell) - reach;
+    const F high = Simd::to_float(cell) + reach + Simd::set(1.0F);
+    return Simd::max((Simd::set(8.0F) * low - origin) * inverse,
+                     (Simd::set(8.0F) * high - origin) * inverse);
+  };
+  return {Simd::equal(distance, I{}), Simd::min(Simd::min(exit(x, rays.origin.x, rays.inverse.x),
+                                                          exit(y, rays.origin.y, rays.inverse.y)),
+                                                exit(z, rays.origin.z, rays.inverse.z))};
+}
+
+}  // namespace
+}  // namespace kerf
