@@ -33,6 +33,7 @@ struct Simd {
   static F max(F a, F b) noexcept { return _mm256_max_ps(a, b); }
 
   static M none() noexcept { return _mm256_setzero_ps(); }
+  static M all() noexcept { return _mm256_castsi256_ps(_mm256_set1_epi32(-1)); }
   static M less(F a, F b) noexcept { return _mm256_cmp_ps(a, b, _CMP_LT_OQ); }
   static M equal(I a, I b) noexcept {
     return _mm256_castsi256_ps(_mm256_cmpeq_epi32((__m256i)a, (__m256i)b));
@@ -41,6 +42,9 @@ struct Simd {
   static M either(M a, M b) noexcept { return _mm256_or_ps(a, b); }
   static M but_not(M a, M b) noexcept { return _mm256_andnot_ps(b, a); }
   static bool any(M a) noexcept { return _mm256_movemask_ps(a) != 0; }
+  static int count(M a) noexcept {
+    return __builtin_popcount(static_cast<unsigned>(_mm256_movemask_ps(a)));
+  }
   static F select(M m, F yes, F no) noexcept { return _mm256_blendv_ps(no, yes, m); }
   static I select(M m, I yes, I no) noexcept {
     return bits(_mm256_blendv_ps(from_bits(no), from_bits(yes), m));

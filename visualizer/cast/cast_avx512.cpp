@@ -35,12 +35,14 @@ struct Simd {
   static F max(F a, F b) noexcept { return _mm512_max_ps(a, b); }
 
   static M none() noexcept { return 0; }
+  static M all() noexcept { return 0xffff; }
   static M less(F a, F b) noexcept { return _mm512_cmp_ps_mask(a, b, _CMP_LT_OQ); }
   static M equal(I a, I b) noexcept { return _mm512_cmpeq_epi32_mask((__m512i)a, (__m512i)b); }
   static M both(M a, M b) noexcept { return _kand_mask16(a, b); }
   static M either(M a, M b) noexcept { return _kor_mask16(a, b); }
   static M but_not(M a, M b) noexcept { return _kandn_mask16(b, a); }
   static bool any(M a) noexcept { return a != 0; }
+  static int count(M a) noexcept { return __builtin_popcount(a); }
   static F select(M m, F yes, F no) noexcept { return _mm512_mask_blend_ps(m, no, yes); }
   static I select(M m, I yes, I no) noexcept {
     return (I)_mm512_mask_blend_epi32(m, (__m512i)no, (__m512i)yes);

@@ -8,6 +8,15 @@ namespace kerf {
 /// As many as the segment has descriptors for.
 inline constexpr int kMaxCastVolumes = 8;
 
+/// Edge of the square blocks of pixels that share one `CastBlock`.
+inline constexpr std::int32_t kCastBlock = 8;
+
+/// The rays of a block need only this stretch, as distance along the view axis; none of it where
+/// begin is beyond end.
+struct CastBlock {
+  float begin_mm, end_mm;
+};
+
 /// One volume as the cast kernels see it: plain pointers, because their files are compiled for
 /// instruction sets that other machines lack, and no inline function may be shared with them.
 ///
@@ -15,7 +24,8 @@ inline constexpr int kMaxCastVolumes = 8;
 struct CastVolumeJob {
   const std::uint32_t* density = nullptr;  ///< `PairedRows`
   const std::uint16_t* labels = nullptr;   ///< `PairedRows`, or none
-  const std::uint8_t* distance = nullptr;  ///< `CellDistance`
+  const std::uint8_t* active = nullptr;    ///< of each macrocell: not 0 where it may show anything
+  const CastBlock* blocks = nullptr;       ///< `CellBlocks`: rows of the picture's blocks
   std::int32_t row = 0, plane = 0;         ///< of density and labels, in entries
   std::int32_t cell_row = 0, cell_plane = 0;
   float last[3] = {};         ///< a hair before the far side of the shell

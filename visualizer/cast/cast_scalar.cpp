@@ -31,12 +31,14 @@ struct Simd {
   static F max(F a, F b) noexcept { return a > b ? a : b; }
 
   static M none() noexcept { return false; }
+  static M all() noexcept { return true; }
   static M less(F a, F b) noexcept { return a < b; }
   static M equal(I a, I b) noexcept { return a == b; }
   static M both(M a, M b) noexcept { return a && b; }
   static M either(M a, M b) noexcept { return a || b; }
   static M but_not(M a, M b) noexcept { return a && !b; }
   static bool any(M a) noexcept { return a; }
+  static int count(M a) noexcept { return a ? 1 : 0; }
   static F select(M m, F yes, F no) noexcept { return m ? yes : no; }
   static I select(M m, I yes, I no) noexcept { return m ? yes : no; }
 

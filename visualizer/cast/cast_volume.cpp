@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "visualizer/cast/cast_volume.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <string>
@@ -35,8 +36,8 @@ CastVolume::CastVolume(const VolumeView& volume, std::span<const Density> densit
       world_from_voxel_(volume.world_from_voxel),
       iso_(static_cast<float>(volume.iso / kDensityMax)),
       density_(checked(volume)),
-      cells_(volume.bricks.grid, density, least),
-      distance_(cells_) {
+      cells_(volume.bricks.grid, density, least) {
+  find_outer_cells();
   density_.copy(bricks_.grid.box(), density);
   if (labels.empty()) return;
   labels_.emplace(bricks_.grid);
@@ -45,22 +46,33 @@ CastVolume::CastVolume(const VolumeView& volume, std::span<const Density> densit
 
 void CastVolume::update_bricks(std::span<const Density> density,
                                std::span<const std::uint32_t> changed) {
+  bool flipped = false;
   for (const std::uint32_t id : changed) {
     density_.copy(bricks_.voxels(id), density);
-    const VoxelIndex at = bricks_.brick(id);
-    if (cells_.update_brick(at, density)) distance_.update_brick(at, cells_);
+    flipped = cells_.update_brick(bricks_.brick(id), density) || flipped;
   }
+  if (flipped) find_outer_cells();
 }
 
-CastVolumeJob CastVolume::job(const glm::dmat4& eye_from_world) const {
-  const glm::dmat4 place_from_eye =
-      glm::affineInverse(eye_from_world * glm::translate(world_from_voxel_, glm::dvec3(-kShell)));
+void CastVolume::find_outer_cells() {
+  outer_cells_.clear();
+  for (const auto& [x, y, z, face] : cells_.boundary_faces()) outer_cells_.push_back({x, y, z});
+  // The faces of a cell come together.
+  outer_cells_.erase(std::unique(outer_cells_.begin(), outer_cells_.end()), outer_cells_.end());
+}
+
+CastVolumeJob CastVolume::job(const View& view, std::int32_t width, std::int32_t height) {
+  const glm::dmat4 world_from_shell = glm::translate(world_from_voxel_, glm::dvec3(-kShell));
+  blocks_.draw(outer_cells_, glm::scale(world_from_shell, glm::dvec3(Macrocells::kEdge)), view,
+               width, height);
+  const glm::dmat4 place_from_eye = glm::affineInverse(view.eye_from_world * world_from_shell);
   const VoxelGrid& grid = bricks_.grid;
   const glm::ivec3 extent(grid.nx, grid.ny, grid.nz);
   CastVolumeJob job;
   job.density = density_.data();
   job.labels = labels_ ? labels_->data() : nullptr;
-  job.distance = distance_.data();
+  job.active = cells_.active().data();
+  job.blocks = blocks_.data();
   job.row = density_.row();
   job.plane = density_.plane();
   job.cell_row = cells_.grid().nx;

@@ -4,9 +4,10 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <vector>
 
 #include "visualizer/cast/cast_job.hpp"
-#include "visualizer/cast/cell_distance.hpp"
+#include "visualizer/cast/cell_blocks.hpp"
 #include "visualizer/cast/paired_rows.hpp"
 #include "visualizer/macrocells.hpp"
 #include "visualizer/scene_view.hpp"
@@ -24,16 +25,20 @@ class CastVolume {
   /// Takes bricks `changed` of `density` (the whole volume) and the cells they touch.
   void update_bricks(std::span<const Density> density, std::span<const std::uint32_t> changed);
 
-  [[nodiscard]] CastVolumeJob job(const glm::dmat4& eye_from_world) const;
+  /// For a picture of `width` x `height`; good until the next call of anything.
+  [[nodiscard]] CastVolumeJob job(const View& view, std::int32_t width, std::int32_t height);
 
  private:
+  void find_outer_cells();
+
   BrickGrid bricks_;
   glm::dmat4 world_from_voxel_;
   float iso_;  ///< 0..1
   PairedRows<Density, std::uint32_t> density_;
   std::optional<PairedRows<Label, std::uint16_t>> labels_;
   Macrocells cells_;
-  CellDistance distance_;
+  std::vector<CellBlocks::Cell> outer_cells_;  ///< active, with a face to an empty one
+  CellBlocks blocks_;
 };
 
 }  // namespace kerf

@@ -63,8 +63,8 @@ void Caster::update(std::size_t volume, std::span<const Density> density,
 void Caster::draw(const View& view, const PixelRect& rect, CastPicture& picture,
                   std::span<const float> end_depth, std::span<float> normals) {
   CastJob job;
-  for (const CastVolume& volume : volumes_) {
-    job.volumes[job.volume_count++] = volume.job(view.eye_from_world);
+  for (CastVolume& volume : volumes_) {
+    job.volumes[job.volume_count++] = volume.job(view, picture.width, picture.height);
   }
   job.pixels = {picture.width,
                 picture.height,

@@ -108,7 +108,7 @@ inline void blend_packet(const CastJob& job, const Packet& packet) {
   Walk walks[kMaxCastVolumes];
   F step_mm = end_mm;
   for (int v = 0; v < job.volume_count; ++v) {
-    walks[v].rays = rays_through(job, job.volumes[v], eye);
+    walks[v].rays = rays_through(job, job.volumes[v], job.volumes[v].blocks[packet.block], eye);
     step_mm = Simd::min(step_mm, walks[v].rays.step_mm);
   }
   F k = Simd::set(kNever);

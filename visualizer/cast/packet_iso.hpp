@@ -26,16 +26,15 @@ inline Hit first_sample(const CastVolumeJob& volume, const VolumeRays& rays, M a
   Hit hit{Simd::none(), k, k};
   alive = Simd::both(alive, Simd::less(k * rays.step_mm, rays.end_mm));
   while (Simd::any(alive)) {
-    M leaving = Simd::but_not(alive, Simd::less(k, exit_k));
-    while (Simd::any(leaving)) {
+    const M leaving = Simd::but_not(alive, Simd::less(k, exit_k));
+    if (worth_a_look(leaving, alive)) {
       const Surroundings around = surroundings_at(volume, rays, k * rays.step_mm);
       const F next = Simd::max(
           k + one, whole(Simd::min(around.exit_mm, rays.end_mm) * rays.steps_per_mm) + one);
       exit_k = Simd::select(leaving, next, exit_k);
-      const M skipping = Simd::but_not(leaving, around.visible);
-      k = Simd::select(skipping, next, k);
-      leaving = Simd::both(skipping, Simd::less(k * rays.step_mm, rays.end_mm));
-      alive = Simd::either(Simd::but_not(alive, skipping), leaving);
+      k = Simd::select(Simd::but_not(leaving, around.visible), next, k);
+      alive = Simd::both(alive, Simd::less(k * rays.step_mm, rays.end_mm));
+      continue;
     }
     const F t = k * rays.step_mm;
     const F density = density_at(volume, rays.origin + t * rays.direction);
@@ -88,7 +87,7 @@ inline void iso_packet(const CastJob& job, const Packet& packet) {
   M found[kMaxCastVolumes];
   for (int v = 0; v < job.volume_count; ++v) {
     const CastVolumeJob& volume = job.volumes[v];
-    rays[v] = rays_through(job, volume, eye);
+    rays[v] = rays_through(job, volume, volume.blocks[packet.block], eye);
     rays[v].end_mm = Simd::min(rays[v].end_mm, nearest_mm + rays[v].step_mm);
     const Hit hit = first_sample(volume, rays[v], drawn);
     found[v] = Simd::none();

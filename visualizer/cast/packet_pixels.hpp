@@ -7,21 +7,28 @@
 namespace kerf {
 namespace {
 
-/// A packet's lowest left pixel; lanes beyond the rectangle are not drawn.
+/// A packet's lowest left pixel; lanes beyond the rectangle or the block are not drawn.
 struct Packet {
   const CastPixels* pixels;
   std::int32_t x, y;
-  std::int32_t wide, high;  ///< within the rectangle
+  std::int32_t wide, high;
+  std::int32_t block;  ///< index of the block that it lies in
 };
 
 /// Calls `cast` for each packet of `rect`.
 template <class Cast>
 void for_packets(const CastJob& job, const PixelRect& rect, const Cast& cast) {
-  for (std::int32_t y = rect.y0; y < rect.y1; y += Simd::kHigh) {
-    for (std::int32_t x = rect.x0; x < rect.x1; x += Simd::kWide) {
-      const std::int32_t wide = rect.x1 - x < Simd::kWide ? rect.x1 - x : Simd::kWide;
-      const std::int32_t high = rect.y1 - y < Simd::kHigh ? rect.y1 - y : Simd::kHigh;
-      cast(Packet{&job.pixels, x, y, wide, high});
+  const auto up_to = [](std::int32_t from, std::int32_t step, std::int32_t end) {
+    const std::int32_t next = from / step * step + step;
+    return next < end ? next : end;
+  };
+  const std::int32_t blocks_across = (job.pixels.width + kCastBlock - 1) / kCastBlock;
+  for (std::int32_t y = rect.y0, y1 = 0; y < rect.y1; y = y1) {
+    y1 = up_to(y, Simd::kHigh, rect.y1);
+    for (std::int32_t x = rect.x0, x1 = 0; x < rect.x1; x = x1) {
+      x1 = up_to(x, Simd::kWide, rect.x1);
+      cast(Packet{&job.pixels, x, y, x1 - x, y1 - y,
+                  y / kCastBlock * blocks_across + x / kCastBlock});
     }
   }
 }

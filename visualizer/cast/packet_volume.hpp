@@ -8,6 +8,8 @@
 namespace kerf {
 namespace {
 
+constexpr float kCellVox = 8.0F;  // Macrocells::kEdge
+
 /// A cell of 2^3 voxels: the entry of its lowest one, and the place within it.
 struct CellPlace {
   I at;
@@ -74,15 +76,16 @@ struct VolumeRays {
   F step_mm, steps_per_mm;
 };
 
-inline VolumeRays rays_through(const CastJob& job, const CastVolumeJob& volume, Vec3 eye) {
+inline VolumeRays rays_through(const CastJob& job, const CastVolumeJob& volume,
+                               const CastBlock& block, Vec3 eye) {
   VolumeRays rays;
   rays.origin = vec3(volume.origin);
   rays.direction = transformed(volume.from_eye, eye);
   const F edges_per_mm = Simd::sqrt(dot(rays.direction, rays.direction));
   rays.step_mm = Simd::set(job.step_vox) / edges_per_mm;
   rays.steps_per_mm = edges_per_mm / Simd::set(job.step_vox);
-  rays.begin_mm = Simd::set(job.near_mm);
-  rays.end_mm = Simd::set(job.far_mm);
+  rays.begin_mm = Simd::set(job.near_mm > block.begin_mm ? job.near_mm : block.begin_mm);
+  rays.end_mm = Simd::set(job.far_mm < block.end_mm ? job.far_mm : block.end_mm);
   const auto clip = [&](F origin, F& direction, F& inverse, float last) {
     // A ray along a face never meets the next one, but its inverse stays a number.
     const F least = Simd::set(1e-12F);
@@ -105,25 +108,31 @@ struct Surroundings {
   F exit_mm;
 };
 
+/// A look at the cells costs as much as a sample and serves only those lanes that do not know what
+/// is around them; a sample in an empty cell is wasted and never wrong. So a few lanes go on
+/// unknowing.
+inline bool worth_a_look(M unknowing, M alive) {
+  constexpr int kShare = 4;
+  return Simd::any(unknowing) && kShare * Simd::count(unknowing) >= Simd::count(alive);
+}
+
 inline Surroundings surroundings_at(const CastVolumeJob& volume, const VolumeRays& rays, F t) {
   const Vec3 q = within(volume, rays.origin + t * rays.direction);
-  const F cells = Simd::set(1.0F / 8.0F);
+  const F cells = Simd::set(1.0F / kCellVox);
   const I x = Simd::to_int(q.x * cells);
   const I y = Simd::to_int(q.y * cells);
   const I z = Simd::to_int(q.z * cells);
-  const I distance =
-      Simd::gather_bytes<1>(volume.distance, x + y * volume.cell_row + z * volume.cell_plane) &
-      0xff;
-  const F reach = positive(Simd::to_float(distance) - Simd::set(1.0F));
-  const auto exit = [&](I cell, F origin, F inverse) {
-    const F low = Simd::to_float(cell) - reach;
-    const F high = Simd::to_float(cell) + reach + Simd::set(1.0F);
-    return Simd::max((Simd::set(8.0F) * low - origin) * inverse,
-                     (Simd::set(8.0F) * high - origin) * inverse);
+  const I active =
+      Simd::gather_bytes<1>(volume.active, x + y * volume.cell_row + z * volume.cell_plane) & 0xff;
+  const auto exit = [](I cell, F origin, F inverse) {
+    const F low = Simd::set(kCellVox) * Simd::to_float(cell);
+    const F high = low + Simd::set(kCellVox);
+    return Simd::max((low - origin) * inverse, (high - origin) * inverse);
   };
-  return {Simd::equal(distance, I{}), Simd::min(Simd::min(exit(x, rays.origin.x, rays.inverse.x),
-                                                          exit(y, rays.origin.y, rays.inverse.y)),
-                                                exit(z, rays.origin.z, rays.inverse.z))};
+  return {Simd::but_not(Simd::all(), Simd::equal(active, I{})),
+          Simd::min(Simd::min(exit(x, rays.origin.x, rays.inverse.x),
+                              exit(y, rays.origin.y, rays.inverse.y)),
+                    exit(z, rays.origin.z, rays.inverse.z))};
 }
 
 }  // namespace
