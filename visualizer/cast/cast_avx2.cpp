@@ -15,6 +15,7 @@ struct Simd {
   using I = std::int32_t __attribute__((vector_size(32)));
   using M = __m256;  ///< all bits or none
   static constexpr int kWide = 4, kHigh = 2;
+  static constexpr int kAhead = 2;  ///< samples of a ray at once: more would not stay in registers
 
   static F set(float a) noexcept { return _mm256_set1_ps(a); }
   static F lane_x() noexcept { return _mm256_setr_ps(0, 1, 2, 3, 0, 1, 2, 3); }

@@ -9,7 +9,7 @@ namespace kerf {
 inline constexpr int kMaxCastVolumes = 8;
 
 /// Edge of the square blocks of pixels that share one `CastBlock`.
-inline constexpr std::int32_t kCastBlock = 8;
+inline constexpr std::int32_t kCastBlock = 4;
 
 /// The rays of a block need only this stretch, as distance along the view axis; none of it where
 /// begin is beyond end.

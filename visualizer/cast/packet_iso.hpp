@@ -36,14 +36,21 @@ inline Hit first_sample(const CastVolumeJob& volume, const VolumeRays& rays, M a
       alive = Simd::both(alive, Simd::less(k * rays.step_mm, rays.end_mm));
       continue;
     }
-    const F t = k * rays.step_mm;
-    const F density = density_at(volume, rays.origin + t * rays.direction);
-    const M found = Simd::but_not(alive, Simd::less(density, iso));
-    hit.found = Simd::either(hit.found, found);
-    hit.t = Simd::select(found, t, hit.t);
-    hit.density = Simd::select(found, density, hit.density);
-    k = k + one;
-    alive = Simd::both(Simd::but_not(alive, found), Simd::less(k * rays.step_mm, rays.end_mm));
+    // Several samples at once: while one waits for memory, the others compute.
+    F density[Simd::kAhead];
+    for (int i = 0; i < Simd::kAhead; ++i) {
+      const F t = (k + Simd::set(static_cast<float>(i))) * rays.step_mm;
+      density[i] = density_at(volume, rays.origin + t * rays.direction);
+    }
+    for (const F& here : density) {
+      const F t = k * rays.step_mm;
+      const M found = Simd::but_not(alive, Simd::less(here, iso));
+      hit.found = Simd::either(hit.found, found);
+      hit.t = Simd::select(found, t, hit.t);
+      hit.density = Simd::select(found, here, hit.density);
+      k = k + one;
+      alive = Simd::both(Simd::but_not(alive, found), Simd::less(k * rays.step_mm, rays.end_mm));
+    }
   }
   return hit;
 }
@@ -87,10 +94,11 @@ inline void iso_packet(const CastJob& job, const Packet& packet) {
   M found[kMaxCastVolumes];
   for (int v = 0; v < job.volume_count; ++v) {
     const CastVolumeJob& volume = job.volumes[v];
+    found[v] = Simd::none();
+    if (!is_met(volume.blocks[packet.block])) continue;
     rays[v] = rays_through(job, volume, volume.blocks[packet.block], eye);
     rays[v].end_mm = Simd::min(rays[v].end_mm, nearest_mm + rays[v].step_mm);
     const Hit hit = first_sample(volume, rays[v], drawn);
-    found[v] = Simd::none();
     if (!Simd::any(hit.found)) continue;
     const F t = refined_mm(job, volume, rays[v], hit);
     found[v] = Simd::both(hit.found, Simd::less(t, nearest_mm));

@@ -76,6 +76,10 @@ struct VolumeRays {
   F step_mm, steps_per_mm;
 };
 
+inline bool is_met(const CastBlock& block) {
+  return block.begin_mm < block.end_mm;
+}
+
 inline VolumeRays rays_through(const CastJob& job, const CastVolumeJob& volume,
                                const CastBlock& block, Vec3 eye) {
   VolumeRays rays;
@@ -99,6 +103,7 @@ inline VolumeRays rays_through(const CastJob& job, const CastVolumeJob& volume,
   clip(rays.origin.x, rays.direction.x, rays.inverse.x, volume.last[0]);
   clip(rays.origin.y, rays.direction.y, rays.inverse.y, volume.last[1]);
   clip(rays.origin.z, rays.direction.z, rays.inverse.z, volume.last[2]);
+  rays.begin_mm = Simd::min(rays.begin_mm, rays.end_mm);
   return rays;
 }
 
