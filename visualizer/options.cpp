@@ -54,7 +54,7 @@ std::optional<VisualizerOptions> parse_options(int argc, const char* const* argv
   app.footer(kKeys);
   app.set_version_flag("--version", std::string("kerf-visualizer " KERF_VERSION));
   app.add_option("--name", options.name, "the controller's name")->capture_default_str();
-  app.add_option("--renderer", options.renderer, "how volumes are drawn: iso")
+  app.add_option("--renderer", options.renderer, "how volumes are drawn: iso, cast, cast-blend")
       ->capture_default_str();
   app.add_option("--size", size, "width and height in pixels")->capture_default_str();
   app.add_flag("--headless", options.headless, "no window: pictures into --out");

@@ -5,6 +5,7 @@
 #include <array>
 #include <string>
 
+#include "visualizer/cast/cast_renderer.hpp"
 #include "visualizer/error.hpp"
 #include "visualizer/iso_renderer.hpp"
 
@@ -19,10 +20,18 @@ struct Kind {
   Make make;
 };
 
+template <CastMode mode>
+std::unique_ptr<Renderer> make_cast(const SceneView& scene,
+                                    std::span<const VolumeContent> contents) {
+  return std::make_unique<CastRenderer>(scene, contents, cast_options(mode, scene));
+}
+
 constexpr auto kKinds = std::to_array<Kind>({
     {"iso",
      [](const SceneView& scene, std::span<const VolumeContent> contents)
          -> std::unique_ptr<Renderer> { return std::make_unique<IsoRenderer>(scene, contents); }},
+    {"cast", make_cast<CastMode::iso>},
+    {"cast-blend", make_cast<CastMode::blend>},
 });
 
 const Kind& find_kind(std::string_view name) {
