@@ -7,12 +7,10 @@ layout(location = 0) out vec4 o_colour;
 uniform sampler2D u_colour;  // sRGB and opacity
 uniform sampler2D u_depth;   // window depth; 1 = nothing
 
-uniform bool u_needs_depth;  // draw only what has one
-
 void main() {
   ivec2 pixel = ivec2(gl_FragCoord.xy);
   float depth = texelFetch(u_depth, pixel, 0).r;
-  if (u_needs_depth && depth >= 1.0) discard;
+  if (depth >= 1.0) discard;
   o_colour = texelFetch(u_colour, pixel, 0);
   gl_FragDepth = depth;
 }

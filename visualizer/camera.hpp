@@ -26,8 +26,12 @@ struct View {
   double aspect = 1.0;            ///< width over height
   double near_mm = 1.0;
   double far_mm = 100.0;
+  /// Clip plane: of volumes only points with dot(shown, (x, y, z, 1)) >= 0 are drawn, in world mm;
+  /// the normal has length 1. As it stands, everything is shown.
+  glm::dvec4 shown{0.0, 0.0, 0.0, 1.0};
 
   [[nodiscard]] glm::dmat4 clip_from_eye() const;
+  friend bool operator==(const View&, const View&) = default;
 };
 
 /// Turns about a point. Yaw 0 looks from +z (the user); pitch is the height above the horizon.

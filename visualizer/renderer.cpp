@@ -23,7 +23,7 @@ struct Kind {
 template <CastMode mode>
 std::unique_ptr<Renderer> make_cast(const SceneView& scene,
                                     std::span<const VolumeContent> contents) {
-  return std::make_unique<CastRenderer>(scene, contents, cast_options(mode, scene));
+  return std::make_unique<CastRenderer>(scene, contents, mode);
 }
 
 constexpr auto kKinds = std::to_array<Kind>({

@@ -97,7 +97,7 @@ TEST_CASE("iso and cast draw the phantom alike, by labels and by density, also a
     Phantom phantom;
     const VolumeContent content = phantom.content(labelled);
     IsoRenderer iso(phantom.scene, {&content, 1});
-    CastRenderer cast(phantom.scene, {&content, 1}, cast_options(CastMode::iso, phantom.scene));
+    CastRenderer cast(phantom.scene, {&content, 1}, CastMode::iso);
     for (const bool drilled : {false, true}) {
       if (drilled) {
         const auto changed = phantom.drill();
@@ -123,7 +123,7 @@ TEST_CASE("under a scissor rectangle only its pixels are drawn, and they are tho
   const VolumeContent content = phantom.content(true);
   const RenderTarget target(kSize);
   for (const CastMode mode : {CastMode::iso, CastMode::blend}) {
-    CastRenderer cast(phantom.scene, {&content, 1}, cast_options(mode, phantom.scene));
+    CastRenderer cast(phantom.scene, {&content, 1}, mode);
     const Drawn whole = draw(cast, kViews[0], target);
     glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
     const std::vector<float> empty = target.read_depth();
@@ -162,7 +162,7 @@ TEST_CASE("a tool hides, is hidden and shines through as its place says") {
   const RenderTarget target(kSize);
   const std::size_t middle = pixel(kSize.width / 2, kSize.height / 2);
   const auto with_tool_at = [&](CastMode mode, double z_mm) {
-    CastRenderer cast(scene, {&content, 1}, cast_options(mode, scene));
+    CastRenderer cast(scene, {&content, 1}, mode);
     target.bind();
     glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
     painter.draw(tool, glm::translate(glm::dmat4(1.0), {0, 0, z_mm}), {}, view, target);

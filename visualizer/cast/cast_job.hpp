@@ -31,7 +31,12 @@ struct CastVolumeJob {
   float last[3] = {};         ///< a hair before the far side of the shell
   float origin[3] = {};       ///< the eye
   float from_eye[3][3] = {};  ///< [to][from]: mm of eye space to voxel edges
-  float iso = 0.5F;           ///< 0..1
+  float edge_mm = 1.0F;       ///< the shortest: opacities of blend hold over it
+  /// 256 x linear RGB and, for blend, extinction: -log2 of the transparency over an edge.
+  const float* by_density = nullptr;
+  const float* by_label = nullptr;
+  float empty = 0.0F, full = 1.0F;  ///< blend: densities where matter begins and where it is whole
+  float iso = 0.5F;                 ///< 0..1
 };
 
 /// The picture that the kernels fill. Rows from the bottom up, as GL has them.
@@ -56,10 +61,10 @@ struct CastJob {
   float half_width_at_1mm = 0.25F, half_height_at_1mm = 0.25F;
   float near_mm = 1.0F, far_mm = 100.0F;
   float depth_far = 0.0F, depth_slope = 0.0F;  ///< equation (1): depth_far - depth_slope / t
-  float step_vox = 0.75F;                      ///< along the ray
+  float step_vox = 0.75F;                      ///< iso: along the ray
+  float step_mm = 0.1F;                        ///< blend: along the view axis
+  float shown[4] = {0.0F, 0.0F, 0.0F, 1.0F};   ///< clip plane, of `View`, in eye space
   float key_light[3] = {}, fill_light[3] = {}, up[3] = {};  ///< unit vectors in eye space
-  const float* colour_by_density = nullptr;  ///< 256 x linear RGB and, for blend, extinction
-  const float* colour_by_label = nullptr;    ///< 256 x linear RGB and one unused
 };
 
 /// The kernels of one instruction set. All sets give the same bits: every ray is computed by

@@ -8,10 +8,40 @@ namespace kerf {
 
 namespace {
 
-std::vector<Caster::Content> plain(std::span<const VolumeContent> contents) {
-  std::vector<Caster::Content> plain;
-  for (const VolumeContent& content : contents) plain.push_back({content.density, content.labels});
-  return plain;
+/// The softer a material, the more opaque: dentin shows under enamel.
+constexpr float kHardest = 0.10F;  // opacity over one voxel edge
+constexpr float kSoftest = 0.40F;
+constexpr double kEmptyShare = 0.4;  // the ramp begins at this share of the density where it ends
+
+CastMatter matter_of(const SceneView& scene, const VolumeView& volume, bool labelled) {
+  CastMatter matter{.materials = make_palette(scene.materials), .full = volume.iso / kDensityMax};
+  for (std::size_t i = 0; i < kPaletteWidth; ++i) {
+    const float density = static_cast<float>(i) / (kPaletteWidth - 1);
+    matter.materials[0][i].w = kSoftest + (kHardest - kSoftest) * density;
+    const double iso = i < scene.materials.size() ? scene.materials[i].iso : 1.0;
+    matter.materials[1][i].w = kSoftest + (kHardest - kSoftest) * static_cast<float>(iso);
+    if (labelled && i > 0 && i < scene.materials.size()) matter.full = std::min(matter.full, iso);
+  }
+  matter.empty = kEmptyShare * matter.full;
+  return matter;
+}
+
+std::vector<CastContent> cast_contents(const SceneView& scene,
+                                       std::span<const VolumeContent> contents) {
+  std::vector<CastContent> all;
+  for (std::size_t i = 0; i < contents.size(); ++i) {
+    const VolumeContent& content = contents[i];
+    all.push_back({content.density, content.labels,
+                   matter_of(scene, scene.volumes[i], !content.labels.empty())});
+  }
+  return all;
+}
+
+Caster::Options cast_options(CastMode mode) {
+  Caster::Options options;
+  options.mode = mode;
+  if (mode == CastMode::blend) options.step_vox = 1.0F;
+  return options;
 }
 
 /// The scissor rectangle, or the whole picture where none is set.
@@ -34,16 +64,9 @@ std::size_t first_pixel(const PixelRect& rect, std::int32_t width) {
 
 }  // namespace
 
-Caster::Options cast_options(CastMode mode, const SceneView& scene) {
-  Caster::Options options;
-  options.mode = mode;
-  options.opacity = soft_opacity(scene.main_volume().iso / kDensityMax);
-  return options;
-}
-
 CastRenderer::CastRenderer(const SceneView& scene, std::span<const VolumeContent> contents,
-                           const Caster::Options& options)
-    : mode_(options.mode), caster_(scene, plain(contents), options) {
+                           CastMode mode)
+    : mode_(mode), caster_(scene, cast_contents(scene, contents), cast_options(mode)) {
   program_.set("u_colour", 0);
   program_.set("u_depth", 1);
 }
@@ -109,21 +132,15 @@ void CastRenderer::show(const RenderTarget& target) {
   glBindTextureUnit(1, frame_->depth.id());
   glBindVertexArray(no_vertices_.id());
   program_.use();
-  if (mode_ == CastMode::blend) {
-    // Matter too thin for a depth is seen all the same; its rays have ended at the target already.
-    program_.set("u_needs_depth", 0);
-    glDisable(GL_DEPTH_TEST);
-    glEnable(GL_BLEND);
-    glBlendFuncSeparate(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA, GL_ONE, GL_ONE_MINUS_SRC_ALPHA);
-    glDrawArrays(GL_TRIANGLES, 0, 3);
-    glColorMask(GL_FALSE, GL_FALSE, GL_FALSE, GL_FALSE);
-  }
-  program_.set("u_needs_depth", 1);
   glEnable(GL_DEPTH_TEST);
   glDepthFunc(GL_LESS);
-  glDisable(GL_BLEND);
+  if (mode_ == CastMode::blend) {
+    glEnable(GL_BLEND);
+    glBlendFuncSeparate(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA, GL_ONE, GL_ONE_MINUS_SRC_ALPHA);
+  } else {
+    glDisable(GL_BLEND);
+  }
   glDrawArrays(GL_TRIANGLES, 0, 3);
-  glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
 }
 
 }  // namespace kerf

@@ -16,8 +16,7 @@ namespace kerf {
 /// over it, and sets depth where enough of it has gathered to hide what comes later.
 class CastRenderer final : public Renderer {
  public:
-  CastRenderer(const SceneView& scene, std::span<const VolumeContent> contents,
-               const Caster::Options& options);
+  CastRenderer(const SceneView& scene, std::span<const VolumeContent> contents, CastMode mode);
 
   void update(std::size_t volume, std::span<const Density> density,
               std::span<const std::uint32_t> changed) override;
@@ -43,8 +42,5 @@ class CastRenderer final : public Renderer {
   GlVertexArray no_vertices_ = GlVertexArray::create();
   std::optional<Frame> frame_;
 };
-
-/// Options of `--renderer cast` and `cast-blend`.
-[[nodiscard]] Caster::Options cast_options(CastMode mode, const SceneView& scene);
 
 }  // namespace kerf

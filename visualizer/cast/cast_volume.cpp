@@ -15,7 +15,8 @@ namespace kerf {
 
 namespace {
 
-constexpr double kShell = 1.0;  // voxels of air around the volume: voxel v is at v + 1
+constexpr float kMost = 0.996F;  // opacity: 1 has no finite extinction
+constexpr double kShell = 1.0;   // voxels of air around the volume: voxel v is at v + 1
 
 VoxelGrid checked(const VolumeView& volume) {
   const VoxelGrid& n = volume.bricks.grid;
@@ -30,18 +31,26 @@ VoxelGrid checked(const VolumeView& volume) {
 
 }  // namespace
 
-CastVolume::CastVolume(const VolumeView& volume, std::span<const Density> density,
-                       std::span<const Label> labels, Density least)
+CastVolume::CastVolume(const VolumeView& volume, const CastContent& content, Density least)
     : bricks_(volume.bricks),
       world_from_voxel_(volume.world_from_voxel),
+      matter_(content.matter),
       iso_(static_cast<float>(volume.iso / kDensityMax)),
       density_(checked(volume)),
-      cells_(volume.bricks.grid, density, least) {
+      cells_(volume.bricks.grid, content.density, least) {
+  for (auto& row : matter_.materials) {
+    for (glm::vec4& material : row) material.w = -std::log2(1.0F - std::min(material.w, kMost));
+  }
   find_outer_cells();
-  density_.copy(bricks_.grid.box(), density);
-  if (labels.empty()) return;
+  density_.copy(bricks_.grid.box(), content.density);
+  if (content.labels.empty()) return;
   labels_.emplace(bricks_.grid);
-  labels_->copy(bricks_.grid.box(), labels);
+  labels_->copy(bricks_.grid.box(), content.labels);
+}
+
+double CastVolume::edge_mm() const {
+  return std::min({glm::length(world_from_voxel_[0]), glm::length(world_from_voxel_[1]),
+                   glm::length(world_from_voxel_[2])});
 }
 
 void CastVolume::update_bricks(std::span<const Density> density,
@@ -77,6 +86,11 @@ CastVolumeJob CastVolume::job(const View& view, std::int32_t width, std::int32_t
   job.plane = density_.plane();
   job.cell_row = cells_.grid().nx;
   job.cell_plane = cells_.grid().nx * cells_.grid().ny;
+  job.by_density = &matter_.materials[0][0].x;
+  job.by_label = &matter_.materials[1][0].x;
+  job.empty = static_cast<float>(matter_.empty);
+  job.full = static_cast<float>(matter_.full);
+  job.edge_mm = static_cast<float>(edge_mm());
   job.iso = iso_;
   for (int to = 0; to < 3; ++to) {
     // The last cell of voxels ends at extent + 1; its far side belongs to no cell.

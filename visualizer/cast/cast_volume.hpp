@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -10,22 +11,39 @@
 #include "visualizer/cast/cell_blocks.hpp"
 #include "visualizer/cast/paired_rows.hpp"
 #include "visualizer/macrocells.hpp"
+#include "visualizer/palette.hpp"
 #include "visualizer/scene_view.hpp"
 
 namespace kerf {
+
+/// What the voxels of a volume look like.
+struct CastMatter {
+  /// Linear colour, and opacity over one voxel edge in the fourth place: row 0 by density (entry i
+  /// is density i/255), row 1 by label.
+  std::array<std::array<glm::vec4, kPaletteWidth>, 2> materials{};
+  double empty = 0.0;  ///< blend: density up to which nothing is seen
+  double full = 1.0;   ///< blend: density from which the material is seen whole
+};
+
+/// One volume, whole.
+struct CastContent {
+  std::span<const Density> density;
+  std::span<const Label> labels;  ///< empty, or one per voxel
+  CastMatter matter;
+};
 
 /// A volume as the ray caster keeps it; whole once, then bricks only.
 class CastVolume {
  public:
   /// Samples below density `least` show nothing. Throws VisualizerError for a volume that the
   /// kernels cannot address.
-  CastVolume(const VolumeView& volume, std::span<const Density> density,
-             std::span<const Label> labels, Density least);
+  CastVolume(const VolumeView& volume, const CastContent& content, Density least);
 
   /// Takes bricks `changed` of `density` (the whole volume) and the cells they touch.
   void update_bricks(std::span<const Density> density, std::span<const std::uint32_t> changed);
 
   /// For a picture of `width` x `height`; good until the next call of anything.
+  [[nodiscard]] double edge_mm() const;  ///< the shortest
   [[nodiscard]] CastVolumeJob job(const View& view, std::int32_t width, std::int32_t height);
 
  private:
@@ -33,7 +51,8 @@ class CastVolume {
 
   BrickGrid bricks_;
   glm::dmat4 world_from_voxel_;
-  float iso_;  ///< 0..1
+  CastMatter matter_;  ///< extinction in place of opacity
+  float iso_;          ///< 0..1
   PairedRows<Density, std::uint32_t> density_;
   std::optional<PairedRows<Label, std::uint16_t>> labels_;
   Macrocells cells_;

@@ -3,6 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string>
+
+#include <glm/gtc/matrix_inverse.hpp>
 
 #include "visualizer/error.hpp"
 
@@ -10,17 +13,12 @@ namespace kerf {
 
 namespace {
 
-constexpr std::int32_t kTile = 16;    // pixels: coherent rays, and enough pieces to share out
-constexpr float kLeastClear = 1e-6F;  // of a voxel edge: opacity 1 has no finite extinction
+constexpr std::int32_t kTile = 16;  // pixels: coherent rays, and enough pieces to share out
 
-Density least_visible(const Caster::Options& options, const VolumeView& volume) {
-  if (options.mode == CastMode::iso) return volume.iso;
-  const auto first = std::find_if(options.opacity.begin(), options.opacity.end(),
-                                  [](float opacity) { return opacity > 0.0F; });
-  // Opacity is interpolated between entries: it begins above the last one that has none.
-  const auto entry = std::max<std::ptrdiff_t>(first - options.opacity.begin() - 1, 0);
-  return static_cast<Density>(std::max<double>(
-      1.0, std::floor((static_cast<double>(entry) + 0.5) / kPaletteWidth * kDensityMax)));
+/// Samples below show nothing.
+Density least_visible(CastMode mode, const VolumeView& volume, const CastMatter& matter) {
+  if (mode == CastMode::iso) return volume.iso;
+  return static_cast<Density>(std::max(1.0, std::floor(matter.empty * kDensityMax)));
 }
 
 void put(float (&to)[3], const glm::dvec3& from) {
@@ -37,8 +35,9 @@ void CastPicture::resize(std::int32_t to_width, std::int32_t to_height) {
   depth.assign(pixels, 1.0F);
 }
 
-Caster::Caster(const SceneView& scene, std::span<const Content> contents, const Options& options)
-    : options_(options), palette_(make_palette(scene.materials)) {
+Caster::Caster(const SceneView& scene, std::span<const CastContent> contents,
+               const Options& options)
+    : options_(options) {
   if (scene.volumes.size() > kMaxCastVolumes) {
     throw VisualizerError("scene: " + std::to_string(scene.volumes.size()) +
                           " volumes, and the ray caster takes " + std::to_string(kMaxCastVolumes) +
@@ -47,11 +46,8 @@ Caster::Caster(const SceneView& scene, std::span<const Content> contents, const 
   volumes_.reserve(scene.volumes.size());
   for (std::size_t i = 0; i < scene.volumes.size(); ++i) {
     const VolumeView& volume = scene.volumes[i];
-    volumes_.emplace_back(volume, contents[i].density, contents[i].labels,
-                          least_visible(options, volume));
-  }
-  for (std::size_t i = 0; i < kPaletteWidth; ++i) {
-    palette_[0][i].w = std::log2(std::max(1.0F - options.opacity[i], kLeastClear));
+    volumes_.emplace_back(volume, contents[i],
+                          least_visible(options.mode, volume, contents[i].matter));
   }
 }
 
@@ -63,7 +59,9 @@ void Caster::update(std::size_t volume, std::span<const Density> density,
 void Caster::draw(const View& view, const PixelRect& rect, CastPicture& picture,
                   std::span<const float> end_depth, std::span<float> normals) {
   CastJob job;
+  double shortest_mm = view.far_mm;
   for (CastVolume& volume : volumes_) {
+    shortest_mm = std::min(shortest_mm, volume.edge_mm());
     job.volumes[job.volume_count++] = volume.job(view, picture.width, picture.height);
   }
   job.pixels = {picture.width,
@@ -81,12 +79,13 @@ void Caster::draw(const View& view, const PixelRect& rect, CastPicture& picture,
   job.depth_far = static_cast<float>(view.far_mm / span_mm);
   job.depth_slope = static_cast<float>(view.far_mm * view.near_mm / span_mm);
   job.step_vox = options_.step_vox;
+  job.step_mm = options_.step_vox * static_cast<float>(shortest_mm);
+  // A plane goes over by the transposed inverse.
+  const glm::dvec4 shown = glm::transpose(glm::affineInverse(view.eye_from_world)) * view.shown;
+  for (int i = 0; i < 4; ++i) job.shown[i] = static_cast<float>(shown[i]);
   put(job.key_light, glm::normalize(glm::dvec3(-0.45, 0.75, 0.70)));  // lighting.frag
   put(job.fill_light, glm::normalize(glm::dvec3(0.80, 0.05, 0.45)));
   put(job.up, glm::dvec3(view.eye_from_world * glm::dvec4(0, 1, 0, 0)));
-  job.colour_by_density = &palette_[0][0].x;
-  job.colour_by_label = &palette_[1][0].x;
-
   const auto cast =
       options_.mode == CastMode::iso ? options_.kernels->iso : options_.kernels->blend;
   const std::int32_t across = (rect.x1 - rect.x0 + kTile - 1) / kTile;
@@ -96,18 +95,6 @@ void Caster::draw(const View& view, const PixelRect& rect, CastPicture& picture,
     const std::int32_t y = rect.y0 + static_cast<std::int32_t>(tile) / across * kTile;
     cast(job, {x, y, std::min(x + kTile, rect.x1), std::min(y + kTile, rect.y1)});
   });
-}
-
-std::array<float, kPaletteWidth> soft_opacity(double iso) {
-  constexpr double kThin = 0.04;   // per voxel edge, right at iso
-  constexpr double kThick = 0.30;  // at full density
-  std::array<float, kPaletteWidth> opacity{};
-  for (std::size_t i = 0; i < kPaletteWidth; ++i) {
-    const double density = static_cast<double>(i) / (kPaletteWidth - 1);
-    const double inside = glm::smoothstep(0.5 * iso, iso, density);
-    opacity[i] = static_cast<float>(inside * glm::mix(kThin, kThick, density));
-  }
-  return opacity;
 }
 
 }  // namespace kerf

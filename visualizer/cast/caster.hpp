@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -9,7 +8,6 @@
 #include "visualizer/camera.hpp"
 #include "visualizer/cast/cast_volume.hpp"
 #include "visualizer/cast/tile_pool.hpp"
-#include "visualizer/palette.hpp"
 
 namespace kerf {
 
@@ -34,18 +32,14 @@ class Caster {
  public:
   struct Options {
     CastMode mode = CastMode::iso;
-    float step_vox = 0.75F;  ///< a wall of one voxel, antialiased over two, is never stepped over
+    /// Iso: along the ray, so that a wall of one voxel, antialiased over two, is never stepped
+    /// over. Blend: along the view axis, in the shortest voxel edge of all volumes.
+    float step_vox = 0.75F;
     const CastKernels* kernels = cast_kernels()[0];
-    /// Blend: opacity over one voxel edge, by density (entry i is density i/255).
-    std::array<float, kPaletteWidth> opacity{};
   };
 
-  /// `density` and `labels` (or none) of each volume, whole. Throws VisualizerError.
-  struct Content {
-    std::span<const Density> density;
-    std::span<const Label> labels;
-  };
-  Caster(const SceneView& scene, std::span<const Content> contents, const Options& options);
+  /// Throws VisualizerError.
+  Caster(const SceneView& scene, std::span<const CastContent> contents, const Options& options);
 
   /// Bricks `changed` of a volume are not what they were; `density` is all of it.
   void update(std::size_t volume, std::span<const Density> density,
@@ -59,12 +53,8 @@ class Caster {
 
  private:
   Options options_;
-  std::array<std::array<glm::vec4, kPaletteWidth>, 2> palette_;
   std::vector<CastVolume> volumes_;
   TilePool pool_;
 };
-
-/// Opacities under which a tooth shows its inside: enamel veils, dentin closes.
-[[nodiscard]] std::array<float, kPaletteWidth> soft_opacity(double iso);
 
 }  // namespace kerf

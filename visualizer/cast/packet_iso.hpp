@@ -15,15 +15,28 @@ struct Hit {
   M found;
   F t;        ///< mm along the view axis
   F density;  ///< at t, not below iso
+  M begins;   ///< the ray begins in what is solid
 };
 
-/// The first sample of `alive` rays that is not below iso; t is a multiple of the step.
-inline Hit first_sample(const CastVolumeJob& volume, const VolumeRays& rays, M alive) {
+/// The first sample of `alive` rays that is not below iso: where the rays begin to be shown, or at
+/// a multiple of the step.
+inline Hit first_sample(const CastVolumeJob& volume, const VolumeRays& rays, F shown_from_mm,
+                        M alive) {
   const F one = Simd::set(1.0F);
   const F iso = Simd::set(volume.iso);
   F k = whole(rays.begin_mm * rays.steps_per_mm);
+  Hit hit{Simd::none(), rays.begin_mm, k, Simd::none()};
+  alive = Simd::both(alive, Simd::less(rays.begin_mm, rays.end_mm));
+  const M cut = Simd::but_not(alive, Simd::less(shown_from_mm, rays.begin_mm));
+  if (Simd::any(cut)) {
+    // What the clip plane takes away must not be hit; where it cuts through solid, there is a face.
+    k = Simd::select(cut, k + one, k);
+    hit.density = density_at(volume, rays.origin + rays.begin_mm * rays.direction);
+    hit.begins = Simd::but_not(cut, Simd::less(hit.density, iso));
+    hit.found = hit.begins;
+    alive = Simd::but_not(alive, hit.found);
+  }
   F exit_k = k;  // of the cell around; not known yet
-  Hit hit{Simd::none(), k, k};
   alive = Simd::both(alive, Simd::less(k * rays.step_mm, rays.end_mm));
   while (Simd::any(alive)) {
     const M leaving = Simd::but_not(alive, Simd::less(k, exit_k));
@@ -56,20 +69,17 @@ inline Hit first_sample(const CastVolumeJob& volume, const VolumeRays& rays, M a
 }
 
 /// Regula falsi (Illinois) between a sample below iso and the first one that is not.
-inline F refined_mm(const CastJob& job, const CastVolumeJob& volume, const VolumeRays& rays,
+inline F refined_mm(const CastVolumeJob& volume, const VolumeRays& rays, F shown_from_mm,
                     const Hit& hit) {
   constexpr int kRefinements = 3;
   const F zero = Simd::set(0.0F);
   const F half = Simd::set(0.5F);
   const F iso = Simd::set(volume.iso);
-  const F near_mm = Simd::set(job.near_mm);
-  F below_mm = Simd::max(hit.t - rays.step_mm, near_mm);
-  F above_mm = Simd::max(hit.t, near_mm);
+  F below_mm = Simd::max(hit.t - rays.step_mm, shown_from_mm);
+  F above_mm = hit.t;
   F below = density_at(volume, rays.origin + below_mm * rays.direction) - iso;
   F above = hit.density - iso;
-  const M eye_is_inside = Simd::but_not(hit.found, Simd::less(below, zero));
   F t = above_mm;
-  const F begin_mm = below_mm;
   for (int i = 0; i < kRefinements; ++i) {
     t = mix(below_mm, above_mm, below / (below - above));
     const F value = density_at(volume, rays.origin + t * rays.direction) - iso;
@@ -81,7 +91,7 @@ inline F refined_mm(const CastJob& job, const CastVolumeJob& volume, const Volum
     below = Simd::select(outside, value, other_below);
     above = Simd::select(outside, other_above, value);
   }
-  return Simd::select(eye_is_inside, begin_mm, t);
+  return Simd::select(hit.begins, hit.t, t);
 }
 
 inline void iso_packet(const CastJob& job, const Packet& packet) {
@@ -90,18 +100,21 @@ inline void iso_packet(const CastJob& job, const Packet& packet) {
   const M drawn = drawn_lanes(packet);
   F nearest_mm = Simd::set(job.far_mm);
   M any_found = Simd::none();
+  const Shown part = shown_of(job, eye);
   VolumeRays rays[kMaxCastVolumes];
   M found[kMaxCastVolumes];
+  M begins[kMaxCastVolumes];
   for (int v = 0; v < job.volume_count; ++v) {
     const CastVolumeJob& volume = job.volumes[v];
     found[v] = Simd::none();
     if (!is_met(volume.blocks[packet.block])) continue;
-    rays[v] = rays_through(job, volume, volume.blocks[packet.block], eye);
+    rays[v] = rays_through(job, volume, volume.blocks[packet.block], part, eye);
     rays[v].end_mm = Simd::min(rays[v].end_mm, nearest_mm + rays[v].step_mm);
-    const Hit hit = first_sample(volume, rays[v], drawn);
+    const Hit hit = first_sample(volume, rays[v], part.begin_mm, drawn);
     if (!Simd::any(hit.found)) continue;
-    const F t = refined_mm(job, volume, rays[v], hit);
+    const F t = refined_mm(volume, rays[v], part.begin_mm, hit);
     found[v] = Simd::both(hit.found, Simd::less(t, nearest_mm));
+    begins[v] = hit.begins;
     nearest_mm = Simd::select(found[v], t, nearest_mm);
     any_found = Simd::either(any_found, found[v]);
     for (int hidden = 0; hidden < v; ++hidden) {
@@ -118,9 +131,18 @@ inline void iso_packet(const CastJob& job, const Packet& packet) {
   for (int v = 0; v < job.volume_count; ++v) {
     if (!Simd::any(found[v])) continue;
     const CastVolumeJob& volume = job.volumes[v];
-    const SurfacePoint at = surface_point(volume, rays[v], nearest_mm, to_eye);
-    const Vec3 albedo = material_at(job, volume, at, found[v]);
-    const Vec3 shown = lit(job, albedo, at.normal, to_eye, openness_at(volume, at));
+    SurfacePoint at = surface_point(volume, rays[v], nearest_mm, to_eye);
+    F openness = openness_at(volume, at);
+    const M on_face = Simd::both(begins[v], Simd::less(Simd::set(job.near_mm), part.begin_mm));
+    if (Simd::any(on_face)) {
+      const Vec3 face =
+          -Vec3{Simd::set(job.shown[0]), Simd::set(job.shown[1]), Simd::set(job.shown[2])};
+      at.normal = select(on_face, face, at.normal);
+      at.inward = select(on_face, normalized(transformed(volume.from_eye, -face)), at.inward);
+      openness = Simd::select(on_face, Simd::set(1.0F), openness);
+    }
+    const Vec3 albedo = material_at(volume, at, found[v]);
+    const Vec3 shown = lit(job, albedo, at.normal, to_eye, openness);
     colour = select(found[v], shown, colour);
     normal = select(found[v], at.normal, normal);
   }

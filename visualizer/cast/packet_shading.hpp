@@ -8,34 +8,51 @@
 namespace kerf {
 namespace {
 
-/// Linear colour and a fourth value: share of labelled voxels, or extinction.
-struct Colour {
+constexpr float kSmall = 1e-6F;  // a share that is nothing, and no zero to divide by
+
+/// Linear colour and extinction (`CastVolumeJob`).
+struct Matter {
   Vec3 rgb;
-  F a;
+  F extinction;
 };
 
+inline Matter mix(Matter a, Matter b, F share) {
+  return {mix(a.rgb, b.rgb, share), mix(a.extinction, b.extinction, share)};
+}
+inline Matter select(M m, Matter yes, Matter no) {
+  return {select(m, yes.rgb, no.rgb), Simd::select(m, yes.extinction, no.extinction)};
+}
+
 /// An entry of 256 x 4.
-inline Colour entry_of(const float* table, I index) {
+inline Matter entry_of(const float* table, I index) {
   const I at = index << 2;
   return {{Simd::gather(table, at), Simd::gather(table + 1, at), Simd::gather(table + 2, at)},
           Simd::gather(table + 3, at)};
 }
 
 /// As a texture of 256 entries that is filtered and clamped to its edges.
-inline Colour by_density(const CastJob& job, F density) {
+inline Matter by_density(const CastVolumeJob& volume, F density) {
   const F at =
       Simd::min(positive(density * Simd::set(256.0F) - Simd::set(0.5F)), Simd::set(254.9999F));
   const I index = Simd::to_int(at);
-  const F share = at - Simd::to_float(index);
-  const Colour low = entry_of(job.colour_by_density, index);
-  const Colour high = entry_of(job.colour_by_density, index + 1);
-  return {mix(low.rgb, high.rgb, share), mix(low.a, high.a, share)};
+  return mix(entry_of(volume.by_density, index), entry_of(volume.by_density, index + 1),
+             at - Simd::to_float(index));
 }
 
-/// Colour of the labels around, blended so that their borders are smooth, times the share of voxels
-/// that have one. Where all eight labels agree, which is nearly everywhere, that is one look-up;
-/// `needed` are the lanes whose result counts.
-inline Colour by_labels(const CastJob& job, const CastVolumeJob& volume, Vec3 p, M needed) {
+/// The nearest entry: half the loads, for means over many samples.
+inline Matter nearest_by_density(const CastVolumeJob& volume, F density) {
+  return entry_of(volume.by_density, Simd::to_int(density * Simd::set(255.0F) + Simd::set(0.5F)));
+}
+
+/// The mean of the labelled voxels around, and their share.
+struct Labelled {
+  Matter mean;
+  F share;
+};
+
+/// Labels around, blended so that their borders are smooth. Where all eight agree, which is nearly
+/// everywhere, that is one look-up; `needed` are the lanes whose result counts.
+inline Labelled by_labels(const CastVolumeJob& volume, Vec3 p, M needed) {
   const CellPlace cell = cell_place(volume, p);
   const F zero = Simd::set(0.0F);
   const F one = Simd::set(1.0F);
@@ -44,12 +61,12 @@ inline Colour by_labels(const CastJob& job, const CastVolumeJob& volume, Vec3 p,
   const I first = labels[0] & 0xff;
   const M alike =
       Simd::both(Simd::equal(labels[0], labels[1]), Simd::equal(labels[0], first * 0x01010101));
-  const M unlabelled = Simd::equal(first, I{});
-  const F a = Simd::select(unlabelled, zero, one);
-  const Colour same{a * entry_of(job.colour_by_label, first).rgb, a};
+  const Labelled same{entry_of(volume.by_label, first),
+                      Simd::select(Simd::equal(first, I{}), zero, one)};
   if (!Simd::any(Simd::but_not(needed, alike))) return same;
 
-  Colour sum{};
+  Matter sum{};
+  F share{};
   for (int corner = 0; corner < 8; ++corner) {
     // Bytes of a gathered entry: (x, y), (x, y + 1), (x + 1, y), (x + 1, y + 1).
     const int x = corner & 1;
@@ -60,10 +77,13 @@ inline Colour by_labels(const CastJob& job, const CastVolumeJob& volume, Vec3 p,
     const F wy = y != 0 ? cell.share.y : one - cell.share.y;
     const F wz = z != 0 ? cell.share.z : one - cell.share.z;
     const F w = Simd::select(Simd::equal(label, I{}), zero, wx * wy * wz);
-    sum.rgb = sum.rgb + w * entry_of(job.colour_by_label, label).rgb;
-    sum.a = sum.a + w;
+    const Matter matter = entry_of(volume.by_label, label);
+    sum = {sum.rgb + w * matter.rgb, sum.extinction + w * matter.extinction};
+    share = share + w;
   }
-  return {select(alike, same.rgb, sum.rgb), Simd::select(alike, same.a, sum.a)};
+  const F per_share = one / Simd::max(share, Simd::set(kSmall));
+  return {select(alike, same.mean, {per_share * sum.rgb, per_share * sum.extinction}),
+          Simd::select(alike, same.share, share)};
 }
 
 /// A point of an iso-surface.
@@ -87,31 +107,32 @@ inline SurfacePoint surface_point(const CastVolumeJob& volume, const VolumeRays&
 }
 
 /// Below the surface, because the surface itself is half air; soft tissue on it coats it.
-inline Vec3 material_at(const CastJob& job, const CastVolumeJob& volume, const SurfacePoint& at,
-                        M needed) {
+inline Vec3 material_at(const CastVolumeJob& volume, const SurfacePoint& at, M needed) {
   const F depth_vox = Simd::set(1.25F);
   const F full_depth_vox = Simd::set(2.5F);
   const F coat_density = Simd::set(0.14F);
   const Vec3 below = at.place + depth_vox * at.inward;
-  Colour labelled{};
+  Vec3 colour{};
   M plain = needed;
   if (volume.labels != nullptr) {
-    labelled = by_labels(job, volume, below, needed);
+    Labelled labelled = by_labels(volume, below, needed);
     const Vec3 above = at.place - depth_vox * at.inward;
     const M coated = Simd::both(needed, Simd::less(coat_density, density_at(volume, above)));
     if (Simd::any(coated)) {
-      const Colour coat = by_labels(job, volume, above, coated);
-      const F share = Simd::select(coated, coat.a, Simd::set(0.0F));
-      labelled = {mix(labelled.rgb, coat.rgb, share), mix(labelled.a, coat.a, share)};
+      const Labelled coat = by_labels(volume, above, coated);
+      const F cover = Simd::select(coated, coat.share, Simd::set(0.0F));
+      const F share = labelled.share * (Simd::set(1.0F) - cover) + cover * cover;
+      labelled = {
+          mix(labelled.mean, coat.mean, cover * cover / Simd::max(share, Simd::set(kSmall))),
+          share};
     }
-    const M has_label = Simd::less(Simd::set(0.0F), labelled.a);
-    labelled.rgb = (Simd::set(1.0F) / labelled.a) * labelled.rgb;
-    plain = Simd::but_not(needed, has_label);
-    if (!Simd::any(plain)) return labelled.rgb;
+    colour = labelled.mean.rgb;
+    plain = Simd::but_not(needed, Simd::less(Simd::set(0.0F), labelled.share));
+    if (!Simd::any(plain)) return colour;
   }
   const F density = Simd::max(density_at(volume, below),
                               density_at(volume, at.place + full_depth_vox * at.inward));
-  return select(plain, by_density(job, density).rgb, labelled.rgb);
+  return select(plain, by_density(volume, density).rgb, colour);
 }
 
 /// 1 in the open, less where the neighbourhood along the normal is solid: cavities read as such.

@@ -68,6 +68,27 @@ inline Vec3 gradient_at(const CastVolumeJob& volume, Vec3 p) {
   return sum;
 }
 
+/// The part of each ray between the near, the far and the clip plane (ray.frag).
+struct Shown {
+  F begin_mm, end_mm;
+};
+
+inline Shown shown_of(const CastJob& job, Vec3 eye) {
+  const F zero = Simd::set(0.0F);
+  const F away = Simd::set(job.shown[3]);
+  const F slope = Simd::set(job.shown[0]) * eye.x + Simd::set(job.shown[1]) * eye.y +
+                  Simd::set(job.shown[2]) * eye.z;
+  const F cut = -away / slope;
+  const F near_mm = Simd::set(job.near_mm);
+  const F far_mm = Simd::set(job.far_mm);
+  const M hidden = Simd::both(
+      Simd::less(away, zero),
+      Simd::but_not(Simd::all(), Simd::either(Simd::less(slope, zero), Simd::less(zero, slope))));
+  const F end_mm = Simd::select(Simd::less(slope, zero), Simd::min(far_mm, cut), far_mm);
+  return {Simd::select(Simd::less(zero, slope), Simd::max(near_mm, cut), near_mm),
+          Simd::select(hidden, zero, end_mm)};
+}
+
 /// The rays of one packet through one volume, by their distance t along the view axis.
 struct VolumeRays {
   Vec3 origin, direction;
@@ -81,15 +102,15 @@ inline bool is_met(const CastBlock& block) {
 }
 
 inline VolumeRays rays_through(const CastJob& job, const CastVolumeJob& volume,
-                               const CastBlock& block, Vec3 eye) {
+                               const CastBlock& block, const Shown& shown, Vec3 eye) {
   VolumeRays rays;
   rays.origin = vec3(volume.origin);
   rays.direction = transformed(volume.from_eye, eye);
   const F edges_per_mm = Simd::sqrt(dot(rays.direction, rays.direction));
   rays.step_mm = Simd::set(job.step_vox) / edges_per_mm;
   rays.steps_per_mm = edges_per_mm / Simd::set(job.step_vox);
-  rays.begin_mm = Simd::set(job.near_mm > block.begin_mm ? job.near_mm : block.begin_mm);
-  rays.end_mm = Simd::set(job.far_mm < block.end_mm ? job.far_mm : block.end_mm);
+  rays.begin_mm = Simd::max(Simd::set(block.begin_mm), shown.begin_mm);
+  rays.end_mm = Simd::min(Simd::set(block.end_mm), shown.end_mm);
   const auto clip = [&](F origin, F& direction, F& inverse, float last) {
     // A ray along a face never meets the next one, but its inverse stays a number.
     const F least = Simd::set(1e-12F);
