@@ -327,6 +327,22 @@ TEST_CASE("of two intersecting volumes the analytically nearer surface is seen")
   CHECK(worst_mm < 0.25 * 0.15);
 }
 
+TEST_CASE("a clip plane cuts a face into a ball, and takes away what is before it") {
+  const VoxelGrid grid{40, 40, 40};
+  const TestVolume volume(grid, centred(grid, glm::dvec3(0.25)), ball({}, 4.0, 0.5));
+  View view = look_at({0, 0, 30}, {}, 15, 45);
+  view.shown = {0, 0, -1, 1.5};  // z <= 1.5 mm
+  Caster caster = caster_of({&volume});
+  const Cast drawn = cast(caster, view);
+  const std::size_t middle = drawn.picture.depth.size() / 2;
+  CHECK(eye_distance_mm(static_cast<double>(drawn.picture.depth[middle]), view) ==
+        doctest::Approx(28.5).epsilon(1e-5));
+  CHECK(drawn.normals[3 * middle + 2] == doctest::Approx(1.0));
+  view.shown = {0, 0, -1, -4.5};
+  const Cast nothing = cast(caster, view);
+  CHECK(*std::ranges::min_element(nothing.picture.depth) == 1.0F);
+}
+
 TEST_CASE("the opacity of blend hardly depends on the step") {
   const VoxelGrid grid{40, 40, 40};
   const TestVolume volume(grid, centred(grid, glm::dvec3(0.25)), ball({}, 4.0, 2.0));

@@ -53,7 +53,8 @@ TEST_CASE("a size that is none is refused with the limits") {
 }
 
 TEST_CASE("an unknown renderer is refused and the known ones are named") {
-  CHECK_THROWS_WITH_AS(parse({"--renderer", "voxels"}), "--renderer: voxels is unknown; known: iso",
+  CHECK_THROWS_WITH_AS(parse({"--renderer", "voxels"}),
+                       "--renderer: voxels is unknown; known: iso, cast, cast-blend",
                        VisualizerError);
 }
 

@@ -82,18 +82,7 @@ struct Glow {
   F per_mm{};
 };
 
-/// Differences of the corners of a tetrahedron: half the samples of `gradient_at`, and what it
-/// lacks in symmetry is not seen in the mean over a ray. Per voxel edge.
-inline Vec3 soft_gradient_at(const CastVolumeJob& volume, Vec3 p) {
-  const F one = Simd::set(1.0F);
-  const F a = density_at(volume, p + Vec3{one, one, one});
-  const F b = density_at(volume, p + Vec3{one, -one, -one});
-  const F c = density_at(volume, p + Vec3{-one, one, -one});
-  const F d = density_at(volume, p + Vec3{-one, -one, one});
-  return Simd::set(0.25F) * Vec3{a + b - c - d, a - b + c - d, a - b - c + d};
-}
-
-/// The matter at the far end of a piece, and its light.
+/// The matter in the middle of a piece, and its light.
 inline Matter matter_at(const CastJob& job, const CastVolumeJob& volume, Vec3 p, F density,
                         Vec3 to_eye, M there, M noticeable) {
   const F zero = Simd::set(0.0F);
@@ -107,7 +96,7 @@ inline Matter matter_at(const CastJob& job, const CastVolumeJob& volume, Vec3 p,
   }
   const M at_border = Simd::both(plain, Simd::less(density, full));
   Vec3 gradient{};
-  if (Simd::any(Simd::either(noticeable, at_border))) gradient = soft_gradient_at(volume, p);
+  if (Simd::any(Simd::either(noticeable, at_border))) gradient = gradient_at(volume, p);
   const F size_2 = dot(gradient, gradient);
   const M sloped = Simd::less(zero, size_2);
   const F size = Simd::sqrt(size_2);
@@ -126,7 +115,9 @@ inline Matter matter_at(const CastJob& job, const CastVolumeJob& volume, Vec3 p,
   // Where the density hardly changes there is no surface to be lit.
   const Vec3 slope = transformed_back(volume.from_eye, gradient);
   const Vec3 unit = select(sloped, -normalized(slope), to_eye);
-  const Vec3 normal = select(Simd::less(dot(unit, to_eye), zero), -unit, unit);
+  const F facing = dot(unit, to_eye);
+  const Vec3 edge_on = normalized(unit - (Simd::set(1.02F) * facing) * to_eye);
+  const Vec3 normal = select(Simd::less(facing, zero), edge_on, unit);
   const F x = clamped((size - Simd::set(0.02F)) * Simd::set(1.0F / 0.08F));
   const F surface = x * x * (Simd::set(3.0F) - Simd::set(2.0F) * x);
   const Vec3 bright = mix(dim, lit(job, matter.rgb, normal, to_eye, Simd::set(1.0F)), surface);
@@ -159,7 +150,10 @@ inline void add_piece(const CastJob& job, const CastVolumeJob& volume, Walk& wal
   const M there = Simd::less(zero, presence);
   if (!Simd::any(there)) return;
   const M noticeable = Simd::both(there, Simd::less(Simd::set(kNoticeable), presence * sum.clear));
-  const Matter matter = matter_at(job, volume, p, back, to_eye, there, noticeable);
+  const F half = Simd::set(0.5F);
+  const Vec3 middle = walk.rays.origin + (half * (from_mm + to_mm)) * walk.rays.direction;
+  const Matter matter =
+      matter_at(job, volume, middle, half * (front + back), to_eye, there, noticeable);
   const F extinction = Simd::select(there, matter.extinction * presence, zero);
   const F per_mm = extinction * Simd::set(1.0F / volume.edge_mm);
   glow = {glow.rgb + per_mm * matter.rgb, glow.per_mm + per_mm};

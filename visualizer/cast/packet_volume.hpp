@@ -40,8 +40,7 @@ inline Vec3 mix(Vec3 a, Vec3 b, F share) {
 }
 
 /// Trilinear, 0..1. Two loads of 64 bits bring all eight corners: `PairedRows`.
-inline F density_at(const CastVolumeJob& volume, Vec3 p) {
-  const CellPlace cell = cell_place(volume, p);
+inline F density_in(const CastVolumeJob& volume, const CellPlace& cell) {
   const auto plane = [&](const std::uint32_t* entries) {
     I left{};
     I right{};
@@ -55,17 +54,32 @@ inline F density_at(const CastVolumeJob& volume, Vec3 p) {
          Simd::set(1.0F / 65535.0F);
 }
 
-/// Direction of the density gradient, from the eight corners of a cube: differences along one axis,
-/// means along the others (iso.frag).
+inline F density_at(const CastVolumeJob& volume, Vec3 p) {
+  return density_in(volume, cell_place(volume, p));
+}
+
+/// The density gradient per voxel edge, from the eight corners of a cube around p: differences
+/// along one axis, means along the others (iso.frag). All corners have the same place within their
+/// cells.
 inline Vec3 gradient_at(const CastVolumeJob& volume, Vec3 p) {
   const F one = Simd::set(1.0F);
+  const auto inner = [&](F x, float last) {  // the whole cube is inside the shell
+    return Simd::max(Simd::min(x, Simd::set(last - 1.0F)), one);
+  };
+  const CellPlace middle = cell_place(
+      volume, {inner(p.x, volume.last[0]), inner(p.y, volume.last[1]), inner(p.z, volume.last[2])});
   Vec3 sum{};
   for (int corner = 0; corner < 8; ++corner) {
-    const Vec3 side{(corner & 1) != 0 ? one : -one, (corner & 2) != 0 ? one : -one,
-                    (corner & 4) != 0 ? one : -one};
-    sum = sum + density_at(volume, p + side) * side;
+    const int x = (corner & 1) != 0 ? 1 : -1;
+    const int y = (corner & 2) != 0 ? 1 : -1;
+    const int z = (corner & 4) != 0 ? 1 : -1;
+    const F density =
+        density_in(volume, {middle.at + (x + y * volume.row + z * volume.plane), middle.share});
+    sum.x = x > 0 ? sum.x + density : sum.x - density;
+    sum.y = y > 0 ? sum.y + density : sum.y - density;
+    sum.z = z > 0 ? sum.z + density : sum.z - density;
   }
-  return sum;
+  return Simd::set(0.125F) * sum;
 }
 
 /// The part of each ray between the near, the far and the clip plane (ray.frag).

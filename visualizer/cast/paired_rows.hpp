@@ -25,9 +25,10 @@ class PairedRows {
 
   /// What a volume of this extent takes.
   [[nodiscard]] static std::size_t entry_count(VoxelGrid grid) {
-    // One plane of air more on the far side, and a load may read beyond its last entry.
+    // One plane of air beyond the shell, for cubes around its last voxels, and a little more: a
+    // load may read beyond its last entry.
     return static_cast<std::size_t>(grid.nx + 2) * static_cast<std::size_t>(grid.ny + 1) *
-               static_cast<std::size_t>(grid.nz + 2) +
+               static_cast<std::size_t>(grid.nz + 3) +
            sizeof(std::uint64_t) / sizeof(Entry);
   }
 
