@@ -22,11 +22,13 @@ struct CastBlock {
 ///
 /// Places are in voxel edges, counted from the shell of air: voxel v is at v + 1.
 struct CastVolumeJob {
-  const std::uint32_t* density = nullptr;  ///< `PairedRows`
-  const std::uint16_t* labels = nullptr;   ///< `PairedRows`, or none
-  const std::uint8_t* active = nullptr;    ///< of each macrocell: not 0 where it may show anything
-  const CastBlock* blocks = nullptr;       ///< `CellBlocks`: rows of the picture's blocks
-  std::int32_t row = 0, plane = 0;         ///< of density and labels, in entries
+  const std::uint32_t* density = nullptr;   ///< `PairedRows`
+  const std::uint16_t* labels = nullptr;    ///< `PairedRows`, or none
+  const std::uint32_t* gradient = nullptr;  ///< `GradientRows`, for blend
+  const std::uint8_t* active = nullptr;     ///< of each macrocell: not 0 where it may show anything
+  const CastBlock* blocks = nullptr;        ///< `CellBlocks`: rows of the picture's blocks
+  std::int32_t row = 0, plane = 0;          ///< of density and labels, in entries
+  std::int32_t gradient_plane = 0;          ///< its rows are as long as the others
   std::int32_t cell_row = 0, cell_plane = 0;
   float last[3] = {};         ///< a hair before the far side of the shell
   float origin[3] = {};       ///< the eye

@@ -18,10 +18,16 @@ namespace {
 constexpr float kMost = 0.996F;  // opacity: 1 has no finite extinction
 constexpr double kShell = 1.0;   // voxels of air around the volume: voxel v is at v + 1
 
+/// Samples below show nothing.
+Density least_visible(CastMode mode, const VolumeView& volume, const CastMatter& matter) {
+  if (mode == CastMode::iso) return volume.iso;
+  return static_cast<Density>(std::max(1.0, std::floor(matter.empty * kDensityMax)));
+}
+
 VoxelGrid checked(const VolumeView& volume) {
   const VoxelGrid& n = volume.bricks.grid;
   constexpr auto kLimit = static_cast<std::size_t>(std::numeric_limits<std::int32_t>::max());
-  const std::size_t entries = PairedRows<Density, std::uint32_t>::entry_count(n);
+  const std::size_t entries = GradientRows::Densities::entry_count(n);
   if (entries <= kLimit) return n;
   throw VisualizerError("volume " + volume.name + ": " + std::to_string(n.nx) + "x" +
                         std::to_string(n.ny) + "x" + std::to_string(n.nz) +
@@ -31,18 +37,19 @@ VoxelGrid checked(const VolumeView& volume) {
 
 }  // namespace
 
-CastVolume::CastVolume(const VolumeView& volume, const CastContent& content, Density least)
+CastVolume::CastVolume(const VolumeView& volume, const CastContent& content, CastMode mode)
     : bricks_(volume.bricks),
       world_from_voxel_(volume.world_from_voxel),
       matter_(content.matter),
       iso_(static_cast<float>(volume.iso / kDensityMax)),
       density_(checked(volume)),
-      cells_(volume.bricks.grid, content.density, least) {
+      cells_(volume.bricks.grid, content.density, least_visible(mode, volume, content.matter)) {
   for (auto& row : matter_.materials) {
     for (glm::vec4& material : row) material.w = -std::log2(1.0F - std::min(material.w, kMost));
   }
   find_outer_cells();
   density_.copy(bricks_.grid.box(), content.density);
+  if (mode == CastMode::blend) gradient_.emplace(bricks_.grid, density_);
   if (content.labels.empty()) return;
   labels_.emplace(bricks_.grid);
   labels_->copy(bricks_.grid.box(), content.labels);
@@ -55,9 +62,10 @@ double CastVolume::edge_mm() const {
 
 void CastVolume::update_bricks(std::span<const Density> density,
                                std::span<const std::uint32_t> changed) {
+  for (const std::uint32_t id : changed) density_.copy(bricks_.voxels(id), density);
   bool flipped = false;
   for (const std::uint32_t id : changed) {
-    density_.copy(bricks_.voxels(id), density);
+    if (gradient_) gradient_->update(bricks_.voxels(id), density_);
     flipped = cells_.update_brick(bricks_.brick(id), density) || flipped;
   }
   if (flipped) find_outer_cells();
@@ -80,6 +88,8 @@ CastVolumeJob CastVolume::job(const View& view, std::int32_t width, std::int32_t
   CastVolumeJob job;
   job.density = density_.data();
   job.labels = labels_ ? labels_->data() : nullptr;
+  job.gradient = gradient_ ? gradient_->data() : nullptr;
+  job.gradient_plane = gradient_ ? gradient_->plane() : 0;
   job.active = cells_.active().data();
   job.blocks = blocks_.data();
   job.row = density_.row();

@@ -9,12 +9,15 @@
 
 #include "visualizer/cast/cast_job.hpp"
 #include "visualizer/cast/cell_blocks.hpp"
+#include "visualizer/cast/gradient_rows.hpp"
 #include "visualizer/cast/paired_rows.hpp"
 #include "visualizer/macrocells.hpp"
 #include "visualizer/palette.hpp"
 #include "visualizer/scene_view.hpp"
 
 namespace kerf {
+
+enum class CastMode : std::uint8_t { iso, blend };
 
 /// What the voxels of a volume look like.
 struct CastMatter {
@@ -35,9 +38,9 @@ struct CastContent {
 /// A volume as the ray caster keeps it; whole once, then bricks only.
 class CastVolume {
  public:
-  /// Samples below density `least` show nothing. Throws VisualizerError for a volume that the
+  /// Throws VisualizerError for a volume that the
   /// kernels cannot address.
-  CastVolume(const VolumeView& volume, const CastContent& content, Density least);
+  CastVolume(const VolumeView& volume, const CastContent& content, CastMode mode);
 
   /// Takes bricks `changed` of `density` (the whole volume) and the cells they touch.
   void update_bricks(std::span<const Density> density, std::span<const std::uint32_t> changed);
@@ -55,6 +58,7 @@ class CastVolume {
   float iso_;          ///< 0..1
   PairedRows<Density, std::uint32_t> density_;
   std::optional<PairedRows<Label, std::uint16_t>> labels_;
+  std::optional<GradientRows> gradient_;  ///< blend only
   Macrocells cells_;
   std::vector<CellBlocks::Cell> outer_cells_;  ///< active, with a face to an empty one
   CellBlocks blocks_;

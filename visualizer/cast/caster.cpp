@@ -15,12 +15,6 @@ namespace {
 
 constexpr std::int32_t kTile = 16;  // pixels: coherent rays, and enough pieces to share out
 
-/// Samples below show nothing.
-Density least_visible(CastMode mode, const VolumeView& volume, const CastMatter& matter) {
-  if (mode == CastMode::iso) return volume.iso;
-  return static_cast<Density>(std::max(1.0, std::floor(matter.empty * kDensityMax)));
-}
-
 void put(float (&to)[3], const glm::dvec3& from) {
   for (int i = 0; i < 3; ++i) to[i] = static_cast<float>(from[i]);
 }
@@ -45,9 +39,7 @@ Caster::Caster(const SceneView& scene, std::span<const CastContent> contents,
   }
   volumes_.reserve(scene.volumes.size());
   for (std::size_t i = 0; i < scene.volumes.size(); ++i) {
-    const VolumeView& volume = scene.volumes[i];
-    volumes_.emplace_back(volume, contents[i],
-                          least_visible(options.mode, volume, contents[i].matter));
+    volumes_.emplace_back(scene.volumes[i], contents[i], options.mode);
   }
 }
 

@@ -11,8 +11,6 @@
 
 namespace kerf {
 
-enum class CastMode : std::uint8_t { iso, blend };
-
 /// What the ray caster draws into. Rows from the bottom up, as GL has them.
 struct CastPicture {
   std::int32_t width = 0, height = 0;

@@ -96,7 +96,7 @@ inline Matter matter_at(const CastJob& job, const CastVolumeJob& volume, Vec3 p,
   }
   const M at_border = Simd::both(plain, Simd::less(density, full));
   Vec3 gradient{};
-  if (Simd::any(Simd::either(noticeable, at_border))) gradient = gradient_at(volume, p);
+  if (Simd::any(Simd::either(noticeable, at_border))) gradient = stored_gradient_at(volume, p);
   const F size_2 = dot(gradient, gradient);
   const M sloped = Simd::less(zero, size_2);
   const F size = Simd::sqrt(size_2);
@@ -230,11 +230,13 @@ inline void blend_packet(const CastJob& job, const Packet& packet) {
       for (int v = 0; v < job.volume_count; ++v) {
         add_piece(job, job.volumes[v], walks[v], alive, {k, from_mm, to_mm}, to_eye, sum, glow);
       }
-      const F extinction = glow.per_mm * (positive(to_mm - from_mm) * length_per_mm);
-      const F kept = exp2_of(-Simd::min(extinction, Simd::set(100.0F)));
-      const F colour = sum.clear * (one - kept) / Simd::max(glow.per_mm, Simd::set(1e-9F));
-      sum.rgb = sum.rgb + colour * glow.rgb;
-      sum.clear = sum.clear * kept;
+      if (Simd::any(Simd::less(Simd::set(0.0F), glow.per_mm))) {
+        const F extinction = glow.per_mm * (positive(to_mm - from_mm) * length_per_mm);
+        const F kept = exp2_of(-Simd::min(extinction, Simd::set(100.0F)));
+        const F colour = sum.clear * (one - kept) / Simd::max(glow.per_mm, Simd::set(1e-9F));
+        sum.rgb = sum.rgb + colour * glow.rgb;
+        sum.clear = sum.clear * kept;
+      }
       k = k + one;
       alive = Simd::both(alive, Simd::less(Simd::set(1.0F - kOpaque), sum.clear));
     }

@@ -23,13 +23,17 @@ inline Vec3 within(const CastVolumeJob& volume, Vec3 p) {
           Simd::min(positive(p.z), Simd::set(volume.last[2]))};
 }
 
-inline CellPlace cell_place(const CastVolumeJob& volume, Vec3 p) {
+inline CellPlace cell_place(const CastVolumeJob& volume, Vec3 p, std::int32_t plane) {
   const Vec3 q = within(volume, p);
   const I x = Simd::to_int(q.x);
   const I y = Simd::to_int(q.y);
   const I z = Simd::to_int(q.z);
-  return {x + y * volume.row + z * volume.plane,
+  return {x + y * volume.row + z * plane,
           {q.x - Simd::to_float(x), q.y - Simd::to_float(y), q.z - Simd::to_float(z)}};
+}
+
+inline CellPlace cell_place(const CastVolumeJob& volume, Vec3 p) {
+  return cell_place(volume, p, volume.plane);
 }
 
 inline F mix(F a, F b, F share) {
@@ -80,6 +84,27 @@ inline Vec3 gradient_at(const CastVolumeJob& volume, Vec3 p) {
     sum.z = z > 0 ? sum.z + density : sum.z - density;
   }
   return Simd::set(0.125F) * sum;
+}
+
+/// The same from stored gradients, in 8 bits: a quarter of the loads.
+inline Vec3 stored_gradient_at(const CastVolumeJob& volume, Vec3 p) {
+  const CellPlace cell = cell_place(volume, p, volume.gradient_plane);
+  I corner[4][2];  // by y and z, by x
+  for (int i = 0; i < 4; ++i) {
+    const std::int32_t step = (i & 1) * volume.row + (i >> 1) * volume.gradient_plane;
+    Simd::gather_two(volume.gradient + step, cell.at, corner[i][0], corner[i][1]);
+  }
+  const auto component = [&](int shift) {
+    F row[4];
+    for (int i = 0; i < 4; ++i) {
+      row[i] = mix(Simd::to_float(corner[i][0] >> shift & 0xff),
+                   Simd::to_float(corner[i][1] >> shift & 0xff), cell.share.x);
+    }
+    const F byte =
+        mix(mix(row[0], row[1], cell.share.y), mix(row[2], row[3], cell.share.y), cell.share.z);
+    return (byte - Simd::set(128.0F)) * Simd::set(0.5F / 127.0F);
+  };
+  return {component(0), component(8), component(16)};
 }
 
 /// The part of each ray between the near, the far and the clip plane (ray.frag).
