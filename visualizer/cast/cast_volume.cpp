@@ -47,7 +47,7 @@ CastVolume::CastVolume(const VolumeView& volume, const CastContent& content, Cas
   for (auto& row : matter_.materials) {
     for (glm::vec4& material : row) material.w = -std::log2(1.0F - std::min(material.w, kMost));
   }
-  find_outer_cells();
+  take_cells();
   density_.copy(bricks_.grid.box(), content.density);
   if (mode == CastMode::blend) gradient_.emplace(bricks_.grid, density_);
   if (content.labels.empty()) return;
@@ -68,10 +68,12 @@ void CastVolume::update_bricks(std::span<const Density> density,
     if (gradient_) gradient_->update(bricks_.voxels(id), density_);
     flipped = cells_.update_brick(bricks_.brick(id), density) || flipped;
   }
-  if (flipped) find_outer_cells();
+  if (flipped) take_cells();
 }
 
-void CastVolume::find_outer_cells() {
+void CastVolume::take_cells() {
+  active_.assign(cells_.active().begin(), cells_.active().end());
+  active_.resize(active_.size() + sizeof(std::uint32_t));
   outer_cells_.clear();
   for (const auto& [x, y, z, face] : cells_.boundary_faces()) outer_cells_.push_back({x, y, z});
   // The faces of a cell come together.
@@ -90,7 +92,7 @@ CastVolumeJob CastVolume::job(const View& view, std::int32_t width, std::int32_t
   job.labels = labels_ ? labels_->data() : nullptr;
   job.gradient = gradient_ ? gradient_->data() : nullptr;
   job.gradient_plane = gradient_ ? gradient_->plane() : 0;
-  job.active = cells_.active().data();
+  job.active = active_.data();
   job.blocks = blocks_.data();
   job.row = density_.row();
   job.plane = density_.plane();

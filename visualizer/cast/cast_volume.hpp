@@ -50,7 +50,7 @@ class CastVolume {
   [[nodiscard]] CastVolumeJob job(const View& view, std::int32_t width, std::int32_t height);
 
  private:
-  void find_outer_cells();
+  void take_cells();
 
   BrickGrid bricks_;
   glm::dmat4 world_from_voxel_;
@@ -60,6 +60,7 @@ class CastVolume {
   std::optional<PairedRows<Label, std::uint16_t>> labels_;
   std::optional<GradientRows> gradient_;  ///< blend only
   Macrocells cells_;
+  std::vector<std::uint8_t> active_;           ///< of the cells, and room to load four at the last
   std::vector<CellBlocks::Cell> outer_cells_;  ///< active, with a face to an empty one
   CellBlocks blocks_;
 };
