@@ -6,6 +6,7 @@
 #include <string>
 
 #include "visualizer/blend_renderer.hpp"
+#include "visualizer/cast/cast_renderer.hpp"
 #include "visualizer/error.hpp"
 #include "visualizer/iso_renderer.hpp"
 #include "visualizer/slices_renderer.hpp"
@@ -27,11 +28,19 @@ struct Kind {
   Make make;
 };
 
+template <CastMode mode>
+std::unique_ptr<Renderer> make_cast(const SceneView& scene,
+                                    std::span<const VolumeContent> contents) {
+  return std::make_unique<CastRenderer>(scene, contents, mode);
+}
+
 constexpr auto kKinds = std::to_array<Kind>({
     {"iso", make<IsoRenderer>},
     {"blend", make<BlendRenderer>},
     {"surface", make<SurfaceRenderer>},
     {"slices", make<SlicesRenderer>},
+    {"cast", make_cast<CastMode::iso>},
+    {"cast-blend", make_cast<CastMode::blend>},
 });
 
 const Kind& find_kind(std::string_view name) {

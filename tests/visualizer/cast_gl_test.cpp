@@ -1,0 +1,222 @@
+// SPDX-License-Identifier: Apache-2.0
+// The ray caster's pictures through GL: beside the shader's, and together with other things.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <optional>
+
+#include <doctest/doctest.h>
+#include <glm/gtc/matrix_transform.hpp>
+
+#include "controller/scene/phantom.hpp"
+#include "controller/scene/volume_density.hpp"
+#include "controller/scene/volume_io.hpp"
+#include "tests/visualizer/gl_fixture.hpp"
+#include "visualizer/cast/cast_renderer.hpp"
+#include "visualizer/gl/context.hpp"
+#include "visualizer/mesh_painter.hpp"
+
+using namespace kerf;
+using namespace kerf::test;
+
+namespace {
+
+constexpr PictureSize kSize{320, 320};
+
+/// A tooth, crown up, with its materials.
+struct Tooth {
+  VolumeImage image;
+  SceneView scene;
+  bool labelled;
+
+  Tooth(VolumeImage of, double iso, bool with_labels)
+      : image(std::move(of)), labelled(with_labels) {
+    VolumeView volume;
+    volume.name = "tooth";
+    volume.bricks = BrickGrid::of(image.grid);
+    volume.world_from_voxel = glm::rotate(glm::dmat4(1.0), glm::radians(-90.0), {1, 0, 0}) *
+                              centred(image.grid, glm::dvec3(image.spacing_mm[0]));
+    volume.iso = static_cast<Density>(iso * kDensityMax);
+    scene.volumes = {volume};
+    scene.materials = {{"none", 0.0, {}},
+                       {"enamel", 0.8, {0.88, 0.86, 0.80}},
+                       {"dentin", 0.45, {0.80, 0.60, 0.36}},
+                       {"pulp", 0.2, {0.70, 0.16, 0.14}}};
+  }
+  [[nodiscard]] VolumeContent content() const {
+    return {image.density, labelled ? std::span<const Label>(image.labels) : std::span<Label>()};
+  }
+  /// Opens the crown down to the pulp; returns the bricks that changed.
+  std::vector<std::uint32_t> drill() {
+    const VoxelGrid& grid = image.grid;
+    const double radius_vox = 0.05 * grid.nx;
+    for (int z = grid.nz * 3 / 8; z < grid.nz; ++z) {
+      for (int y = 0; y < grid.ny; ++y) {
+        for (int x = 0; x < grid.nx; ++x) {
+          if (std::hypot(x - 0.5 * grid.nx, y - 0.5 * grid.ny) < radius_vox) {
+            image.density[grid.index(x, y, z)] = 0;
+          }
+        }
+      }
+    }
+    std::vector<std::uint32_t> all;
+    for (std::uint32_t id = 0; id < scene.volumes[0].bricks.count(); ++id) all.push_back(id);
+    return all;
+  }
+};
+
+Tooth phantom(bool labelled) {
+  return {make_phantom({{128, 128, 80}, 0.25}), 0.45, labelled};
+}
+
+/// The CT tooth below $KERF_DATA; none, with a message, where it is not there.
+std::optional<Tooth> ct_tooth() {
+  const char* folder = std::getenv("KERF_DATA");
+  const auto file =
+      std::filesystem::path(folder != nullptr ? folder : "") / "ge_tooth_16bit" / "tooth.nhdr";
+  if (!std::filesystem::exists(file)) {
+    MESSAGE("skipped: ge_tooth_16bit/tooth.nhdr is not there (KERF_DATA names the folder)");
+    return std::nullopt;
+  }
+  ReadOptions options;
+  options.spacing_mm = {0.125, 0.125, 0.125};
+  constexpr double kAir = 391.0;
+  constexpr double kMost = 1300.0;
+  constexpr double kIso = 620.0;
+  return Tooth(apply_window(read_volume(file, options), {kAir, kMost}),
+               (kIso - kAir) / (kMost - kAir), false);
+}
+
+const std::array<View, 3> kViews{look_at({18, 22, 30}, {}, 20, 60), look_at({0, 40, 1}, {}, 20, 60),
+                                 look_at({-25, -8, 12}, {0, 2, 0}, 10, 60)};
+
+struct Agreement {
+  int compared = 0;  ///< pixels that either one drew
+  int alike = 0;
+};
+
+Agreement agreement(const Drawn& a, const Drawn& b, const View& view, double voxel_mm) {
+  Agreement found;
+  for (std::size_t i = 0; i < a.depth.size(); ++i) {
+    if (a.depth[i] >= 1.0F && b.depth[i] >= 1.0F) continue;
+    ++found.compared;
+    if (a.depth[i] >= 1.0F || b.depth[i] >= 1.0F) continue;
+    int worst = 0;
+    for (std::size_t c = 0; c < 3; ++c) {
+      worst = std::max(worst, std::abs(a.rgb[3 * i + c] - b.rgb[3 * i + c]));
+    }
+    const double apart_mm = eye_distance_mm(static_cast<double>(a.depth[i]), view) -
+                            eye_distance_mm(static_cast<double>(b.depth[i]), view);
+    found.alike += worst <= 3 && std::abs(apart_mm) <= 0.5 * voxel_mm ? 1 : 0;
+  }
+  return found;
+}
+
+std::size_t pixel(int x, int y) {
+  return static_cast<std::size_t>(y * kSize.width + x);
+}
+
+}  // namespace
+
+TEST_CASE("iso and cast draw teeth alike, by labels and by density, also after a cut") {
+  if (!have_gl()) return;
+  const RenderTarget target(kSize);
+  std::vector<Tooth> teeth{phantom(true), phantom(false)};
+  if (auto tooth = ct_tooth()) teeth.push_back(std::move(*tooth));
+  for (Tooth& tooth : teeth) {
+    const VolumeContent content = tooth.content();
+    IsoRenderer iso(tooth.scene, {&content, 1});
+    CastRenderer cast(tooth.scene, {&content, 1}, CastMode::iso);
+    for (const bool drilled : {false, true}) {
+      if (drilled) {
+        const auto changed = tooth.drill();
+        iso.update(0, tooth.image.density, changed);
+        cast.update(0, tooth.image.density, changed);
+      }
+      for (const View& view : kViews) {
+        const Drawn shader = draw(iso, view, target);
+        const Drawn own = draw(cast, view, target);
+        const Agreement found = agreement(shader, own, view, tooth.image.spacing_mm[0]);
+        CAPTURE(tooth.image.grid.nx);
+        CAPTURE(tooth.labelled);
+        CAPTURE(drilled);
+        CHECK(found.compared > 5'000);
+        CHECK(found.alike >= 0.995 * found.compared);
+      }
+    }
+  }
+}
+
+TEST_CASE(
+    "within a part of the target only its pixels are drawn, and they are those of the whole") {
+  if (!have_gl()) return;
+  const Tooth tooth = phantom(true);
+  const VolumeContent content = tooth.content();
+  RenderTarget target(kSize);
+  for (const CastMode mode : {CastMode::iso, CastMode::blend}) {
+    CastRenderer cast(tooth.scene, {&content, 1}, mode);
+    const Drawn whole = draw(cast, kViews[0], target);
+    glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
+    const std::vector<float> empty = target.read_depth();
+    target.restrict_to({100, 90, 175, 141});
+    cast.draw(kViews[0], target);
+    target.restrict_to(target.all());
+    throw_on_gl_error();
+    const std::vector<float> depth = target.read_depth();
+    const std::vector<std::uint8_t> rgb = target.read_rgb();
+    std::size_t wrong = 0;
+    for (int y = 0; y < kSize.height; ++y) {
+      for (int x = 0; x < kSize.width; ++x) {
+        const int from_below = kSize.height - 1 - y;
+        const bool in = x >= 100 && x < 175 && from_below >= 90 && from_below < 141;
+        const std::size_t at = pixel(x, y);
+        wrong += depth[at] != (in ? whole.depth[at] : empty[at]) ? 1 : 0;
+        wrong += rgb[3 * at] != (in ? whole.rgb[3 * at] : 0) ? 1 : 0;
+      }
+    }
+    CHECK(wrong == 0);
+  }
+}
+
+TEST_CASE("a tool hides, is hidden and shines through as its place says") {
+  if (!have_gl()) return;
+  const VoxelGrid grid{40, 40, 40};
+  const TestVolume volume(grid, centred(grid, glm::dvec3(0.25)), ball({}, 3.0, 1.0));
+  SceneView scene;
+  scene.volumes = {volume.view};
+  const VolumeContent content = volume.content();
+  const std::array<ProfilePoint, 4> cylinder{{{-1.0, 0.0}, {-1.0, 1.0}, {1.0, 1.0}, {1.0, 0.0}}};
+  const GpuMesh tool(lathe(cylinder));
+  MeshPainter painter;
+  const View view = look_at({0, 0, 30}, {}, 20, 40);
+  const RenderTarget target(kSize);
+  const std::size_t middle = pixel(kSize.width / 2, kSize.height / 2);
+  const auto with_tool_at = [&](CastMode mode, double z_mm) {
+    CastRenderer cast(scene, {&content, 1}, mode);
+    target.bind();
+    glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
+    painter.draw(tool, glm::translate(glm::dmat4(1.0), {0, 0, z_mm}), {}, view, target);
+    const std::uint8_t tool_red = target.read_rgb()[3 * middle];
+    cast.draw(view, target);
+    throw_on_gl_error();
+    return std::pair(target.read_rgb()[3 * middle] == tool_red,
+                     eye_distance_mm(static_cast<double>(target.read_depth()[middle]), view));
+  };
+  for (const CastMode mode : {CastMode::iso, CastMode::blend}) {
+    const auto [shown, before_mm] = with_tool_at(mode, 6.0);
+    CHECK(shown);
+    CHECK(before_mm == doctest::Approx(23.0).epsilon(0.001));
+    const auto [seen_behind, behind_mm] = with_tool_at(mode, -6.0);
+    CHECK_FALSE(seen_behind);
+    CHECK(std::abs(behind_mm - 27.0) < 0.8);
+  }
+  // Its front is 0.2 mm below the surface of the ball: iso covers it, blend veils it.
+  const auto [covered, iso_mm] = with_tool_at(CastMode::iso, 1.8);
+  CHECK_FALSE(covered);
+  CHECK(iso_mm == doctest::Approx(27.0).epsilon(0.001));
+  const auto [clear, blend_mm] = with_tool_at(CastMode::blend, 1.8);
+  CHECK_FALSE(clear);
+  CHECK(blend_mm <= doctest::Approx(27.2).epsilon(0.001));
+}

@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: Apache-2.0
+// AVX2: packets of 4x2 rays.
+#include <cstddef>
+#include <cstdint>
+
+#include <immintrin.h>
+
+#include "visualizer/cast/cast_job.hpp"
+
+namespace kerf {
+namespace {
+
+struct Simd {
+  using F = __m256;
+  using I = std::int32_t __attribute__((vector_size(32)));
+  using M = __m256;  ///< all bits or none
+  static constexpr int kWide = 4, kHigh = 2;
+  static constexpr int kAhead = 2;  ///< samples of a ray at once: more would not stay in registers
+
+  static F set(float a) noexcept { return _mm256_set1_ps(a); }
+  static F lane_x() noexcept { return _mm256_setr_ps(0, 1, 2, 3, 0, 1, 2, 3); }
+  static F lane_y() noexcept { return _mm256_setr_ps(0, 0, 0, 0, 1, 1, 1, 1); }
+  static void store(void* p, F a) noexcept { _mm256_storeu_ps(static_cast<float*>(p), a); }
+  static void store(void* p, I a) noexcept {
+    _mm256_storeu_si256(static_cast<__m256i*>(p), (__m256i)a);
+  }
+
+  static I to_int(F a) noexcept { return (I)_mm256_cvttps_epi32(a); }
+  static F to_float(I a) noexcept { return _mm256_cvtepi32_ps((__m256i)a); }
+  static I bits(F a) noexcept { return (I)_mm256_castps_si256(a); }
+  static F from_bits(I a) noexcept { return _mm256_castsi256_ps((__m256i)a); }
+  static F sqrt(F a) noexcept { return _mm256_sqrt_ps(a); }
+  static F min(F a, F b) noexcept { return _mm256_min_ps(a, b); }
+  static F max(F a, F b) noexcept { return _mm256_max_ps(a, b); }
+
+  static M none() noexcept { return _mm256_setzero_ps(); }
+  static M all() noexcept { return _mm256_castsi256_ps(_mm256_set1_epi32(-1)); }
+  static M less(F a, F b) noexcept { return _mm256_cmp_ps(a, b, _CMP_LT_OQ); }
+  static M equal(I a, I b) noexcept {
+    return _mm256_castsi256_ps(_mm256_cmpeq_epi32((__m256i)a, (__m256i)b));
+  }
+  static M both(M a, M b) noexcept { return _mm256_and_ps(a, b); }
+  static M either(M a, M b) noexcept { return _mm256_or_ps(a, b); }
+  static M but_not(M a, M b) noexcept { return _mm256_andnot_ps(b, a); }
+  static bool any(M a) noexcept { return _mm256_movemask_ps(a) != 0; }
+  static int count(M a) noexcept {
+    return __builtin_popcount(static_cast<unsigned>(_mm256_movemask_ps(a)));
+  }
+  static F select(M m, F yes, F no) noexcept { return _mm256_blendv_ps(no, yes, m); }
+  static I select(M m, I yes, I no) noexcept {
+    return bits(_mm256_blendv_ps(from_bits(no), from_bits(yes), m));
+  }
+
+  static F gather(const float* p, I at) noexcept {
+    return _mm256_i32gather_ps(p, (__m256i)at, sizeof(float));
+  }
+  template <int kEntryBytes>
+  static I gather_bytes(const void* p, I at) noexcept {
+    return (I)_mm256_i32gather_epi32(static_cast<const int*>(p), (__m256i)at, kEntryBytes);
+  }
+  static void gather_two(const std::uint32_t* p, I at, I& first, I& second) noexcept {
+    const auto* const base = reinterpret_cast<const long long*>(p);
+    const __m256i low = _mm256_i32gather_epi64(base, _mm256_castsi256_si128((__m256i)at), 4);
+    const __m256i high = _mm256_i32gather_epi64(base, _mm256_extracti128_si256((__m256i)at, 1), 4);
+    const F l = _mm256_castsi256_ps(low);
+    const F h = _mm256_castsi256_ps(high);
+    first = ordered(_mm256_shuffle_ps(l, h, 0x88));
+    second = ordered(_mm256_shuffle_ps(l, h, 0xdd));
+  }
+
+ private:
+  /// Lanes come as 0 1 4 5 | 2 3 6 7.
+  static I ordered(F a) noexcept {
+    return (I)_mm256_permute4x64_epi64(_mm256_castps_si256(a), 0xd8);
+  }
+};
+
+}  // namespace
+}  // namespace kerf
+
+#include "visualizer/cast/packet_blend.hpp"
+#include "visualizer/cast/packet_iso.hpp"
+
+namespace kerf {
+
+const CastKernels kCastAvx2{"avx2", cast_iso, cast_blend};
+
+}  // namespace kerf

@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+
+#include "visualizer/pixel_rect.hpp"
+
+namespace kerf {
+
+/// As many as the segment has descriptors for.
+inline constexpr int kMaxCastVolumes = 8;
+
+/// Edge of the square blocks of pixels that share one `CastBlock`.
+inline constexpr std::int32_t kCastBlock = 4;
+
+/// The rays of a block need only this stretch, as distance along the view axis; none of it where
+/// begin is beyond end.
+struct CastBlock {
+  float begin_mm, end_mm;
+};
+
+/// One volume as the cast kernels see it: plain pointers, because their files are compiled for
+/// instruction sets that other machines lack, and no inline function may be shared with them.
+///
+/// Places are in voxel edges, counted from the shell of air: voxel v is at v + 1.
+struct CastVolumeJob {
+  const std::uint32_t* density = nullptr;   ///< `PairedRows`
+  const std::uint16_t* labels = nullptr;    ///< `PairedRows`, or none
+  const std::uint32_t* gradient = nullptr;  ///< `GradientRows`, for blend
+  const std::uint8_t* active = nullptr;     ///< of each macrocell: not 0 where it may show anything
+  const CastBlock* blocks = nullptr;        ///< `CellBlocks`: rows of the picture's blocks
+  std::int32_t row = 0, plane = 0;          ///< of density and labels, in entries
+  std::int32_t gradient_plane = 0;          ///< its rows are as long as the others
+  std::int32_t cell_row = 0, cell_plane = 0;
+  float last[3] = {};         ///< a hair before the far side of the shell
+  float origin[3] = {};       ///< the eye
+  float from_eye[3][3] = {};  ///< [to][from]: mm of eye space to voxel edges
+  float edge_mm = 1.0F;       ///< the shortest: opacities of blend hold over it
+  /// 256 x linear RGB and, for blend, extinction: -log2 of the transparency over an edge.
+  const float* by_density = nullptr;
+  const float* by_label = nullptr;
+  float empty = 0.0F, full = 1.0F;  ///< blend: densities where matter begins and where it is whole
+  float iso = 0.5F;                 ///< 0..1
+};
+
+/// The picture that the kernels fill. Rows from the bottom up, as GL has them.
+struct CastPixels {
+  std::int32_t width = 0, height = 0;
+  std::uint32_t* rgba = nullptr;     ///< sRGB and opacity (not multiplied in), red in the low byte
+  float* depth = nullptr;            ///< window depth, equation (1); 1 where nothing was hit
+  float* normal = nullptr;           ///< or none: x, y, z in eye space where iso hit something
+  const float* end_depth = nullptr;  ///< or none: window depth at which rays of blend end
+};
+
+/// All that one picture needs.
+struct CastJob {
+  CastVolumeJob volumes[kMaxCastVolumes];
+  int volume_count = 0;
+  CastPixels pixels;
+  float half_width_at_1mm = 0.25F, half_height_at_1mm = 0.25F;
+  float near_mm = 1.0F, far_mm = 100.0F;
+  float depth_far = 0.0F, depth_slope = 0.0F;  ///< equation (1): depth_far - depth_slope / t
+  float step_vox = 0.75F;                      ///< iso: along the ray
+  float step_mm = 0.1F;                        ///< blend: along the view axis
+  float shown[4] = {0.0F, 0.0F, 0.0F, 1.0F};   ///< clip plane, of `View`, in eye space
+  float key_light[3] = {}, fill_light[3] = {}, up[3] = {};  ///< unit vectors in eye space
+};
+
+/// The kernels of one instruction set. All sets give the same bits: every ray is computed by
+/// itself, with the same operations in the same order, whatever packet it travels in.
+struct CastKernels {
+  const char* name;
+  void (*iso)(const CastJob& job, const PixelRect& rect);
+  void (*blend)(const CastJob& job, const PixelRect& rect);
+};
+
+/// What this machine can run, the fastest first; ends with the scalar set and a null.
+[[nodiscard]] const CastKernels* const* cast_kernels() noexcept;
+
+extern const CastKernels kCastAvx512;
+extern const CastKernels kCastAvx2;
+extern const CastKernels kCastScalar;
+
+}  // namespace kerf

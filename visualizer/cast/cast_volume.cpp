@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "visualizer/cast/cast_volume.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include <glm/gtc/matrix_inverse.hpp>
+#include <glm/gtc/matrix_transform.hpp>
+
+#include "visualizer/error.hpp"
+
+namespace kerf {
+
+namespace {
+
+constexpr float kMost = 0.996F;  // opacity: 1 has no finite extinction
+constexpr double kShell = 1.0;   // voxels of air around the volume: voxel v is at v + 1
+
+/// Samples below show nothing.
+Density least_visible(CastMode mode, const VolumeView& volume, const CastMatter& matter) {
+  if (mode == CastMode::iso) return volume.iso;
+  return static_cast<Density>(std::max(1.0, std::floor(matter.empty * kDensityMax)));
+}
+
+VoxelGrid checked(const VolumeView& volume) {
+  const VoxelGrid& n = volume.bricks.grid;
+  constexpr auto kLimit = static_cast<std::size_t>(std::numeric_limits<std::int32_t>::max());
+  const std::size_t entries = GradientRows::Densities::entry_count(n);
+  if (entries <= kLimit) return n;
+  throw VisualizerError("volume " + volume.name + ": " + std::to_string(n.nx) + "x" +
+                        std::to_string(n.ny) + "x" + std::to_string(n.nz) +
+                        " voxels, and the ray caster takes " + std::to_string(kLimit) +
+                        "; crop or resample it");
+}
+
+}  // namespace
+
+CastVolume::CastVolume(const VolumeView& volume, const CastContent& content, CastMode mode)
+    : bricks_(volume.bricks),
+      world_from_voxel_(volume.world_from_voxel),
+      matter_(content.matter),
+      iso_(static_cast<float>(volume.iso / kDensityMax)),
+      density_(checked(volume)),
+      cells_(volume.bricks.grid, content.density, least_visible(mode, volume, content.matter)) {
+  for (auto& row : matter_.materials) {
+    for (glm::vec4& material : row) material.w = -std::log2(1.0F - std::min(material.w, kMost));
+  }
+  take_cells();
+  density_.copy(bricks_.grid.box(), content.density);
+  if (mode == CastMode::blend) gradient_.emplace(bricks_.grid, density_);
+  if (content.labels.empty()) return;
+  labels_.emplace(bricks_.grid);
+  labels_->copy(bricks_.grid.box(), content.labels);
+}
+
+double CastVolume::edge_mm() const {
+  return std::min({glm::length(world_from_voxel_[0]), glm::length(world_from_voxel_[1]),
+                   glm::length(world_from_voxel_[2])});
+}
+
+void CastVolume::update_bricks(std::span<const Density> density,
+                               std::span<const std::uint32_t> changed) {
+  for (const std::uint32_t id : changed) density_.copy(bricks_.voxels(id), density);
+  bool flipped = false;
+  for (const std::uint32_t id : changed) {
+    if (gradient_) gradient_->update(bricks_.voxels(id), density_);
+    flipped = cells_.update_brick(bricks_.brick(id), density) || flipped;
+  }
+  if (flipped) take_cells();
+}
+
+void CastVolume::take_cells() {
+  active_.assign(cells_.active().begin(), cells_.active().end());
+  active_.resize(active_.size() + sizeof(std::uint32_t));
+  outer_cells_.clear();
+  for (const auto& [x, y, z, face] : cells_.boundary_faces()) outer_cells_.push_back({x, y, z});
+  // The faces of a cell come together.
+  outer_cells_.erase(std::unique(outer_cells_.begin(), outer_cells_.end()), outer_cells_.end());
+}
+
+CastVolumeJob CastVolume::job(const View& view, std::int32_t width, std::int32_t height) {
+  const glm::dmat4 world_from_shell = glm::translate(world_from_voxel_, glm::dvec3(-kShell));
+  blocks_.draw(outer_cells_, glm::scale(world_from_shell, glm::dvec3(Macrocells::kEdge)), view,
+               width, height);
+  const glm::dmat4 place_from_eye = glm::affineInverse(view.eye_from_world * world_from_shell);
+  const VoxelGrid& grid = bricks_.grid;
+  const glm::ivec3 extent(grid.nx, grid.ny, grid.nz);
+  CastVolumeJob job;
+  job.density = density_.data();
+  job.labels = labels_ ? labels_->data() : nullptr;
+  job.gradient = gradient_ ? gradient_->data() : nullptr;
+  job.gradient_plane = gradient_ ? gradient_->plane() : 0;
+  job.active = active_.data();
+  job.blocks = blocks_.data();
+  job.row = density_.row();
+  job.plane = density_.plane();
+  job.cell_row = cells_.grid().nx;
+  job.cell_plane = cells_.grid().nx * cells_.grid().ny;
+  job.by_density = &matter_.materials[0][0].x;
+  job.by_label = &matter_.materials[1][0].x;
+  job.empty = static_cast<float>(matter_.empty);
+  job.full = static_cast<float>(matter_.full);
+  job.edge_mm = static_cast<float>(edge_mm());
+  job.iso = iso_;
+  for (int to = 0; to < 3; ++to) {
+    // The last cell of voxels ends at extent + 1; its far side belongs to no cell.
+    job.last[to] = std::nextafter(static_cast<float>(extent[to] + 1), 0.0F);
+    job.origin[to] = static_cast<float>(place_from_eye[3][to]);
+    for (int from = 0; from < 3; ++from) {
+      job.from_eye[to][from] = static_cast<float>(place_from_eye[from][to]);
+    }
+  }
+  return job;
+}
+
+}  // namespace kerf

@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "visualizer/cast/cast_job.hpp"
+#include "visualizer/cast/cell_blocks.hpp"
+#include "visualizer/cast/gradient_rows.hpp"
+#include "visualizer/cast/paired_rows.hpp"
+#include "visualizer/macrocells.hpp"
+#include "visualizer/palette.hpp"
+#include "visualizer/scene_view.hpp"
+
+namespace kerf {
+
+enum class CastMode : std::uint8_t { iso, blend };
+
+/// What the voxels of a volume look like.
+struct CastMatter {
+  /// Linear colour, and opacity over one voxel edge in the fourth place: row 0 by density (entry i
+  /// is density i/255), row 1 by label.
+  std::array<std::array<glm::vec4, kPaletteWidth>, 2> materials{};
+  double empty = 0.0;  ///< blend: density up to which nothing is seen
+  double full = 1.0;   ///< blend: density from which the material is seen whole
+};
+
+/// One volume, whole.
+struct CastContent {
+  std::span<const Density> density;
+  std::span<const Label> labels;  ///< empty, or one per voxel
+  CastMatter matter;
+};
+
+/// A volume as the ray caster keeps it; whole once, then bricks only.
+class CastVolume {
+ public:
+  /// Throws VisualizerError for a volume that the
+  /// kernels cannot address.
+  CastVolume(const VolumeView& volume, const CastContent& content, CastMode mode);
+
+  /// Takes bricks `changed` of `density` (the whole volume) and the cells they touch.
+  void update_bricks(std::span<const Density> density, std::span<const std::uint32_t> changed);
+
+  /// For a picture of `width` x `height`; good until the next call of anything.
+  [[nodiscard]] double edge_mm() const;  ///< the shortest
+  [[nodiscard]] CastVolumeJob job(const View& view, std::int32_t width, std::int32_t height);
+
+ private:
+  void take_cells();
+
+  BrickGrid bricks_;
+  glm::dmat4 world_from_voxel_;
+  CastMatter matter_;  ///< extinction in place of opacity
+  float iso_;          ///< 0..1
+  PairedRows<Density, std::uint32_t> density_;
+  std::optional<PairedRows<Label, std::uint16_t>> labels_;
+  std::optional<GradientRows> gradient_;  ///< blend only
+  Macrocells cells_;
+  std::vector<std::uint8_t> active_;           ///< of the cells, and room to load four at the last
+  std::vector<CellBlocks::Cell> outer_cells_;  ///< active, with a face to an empty one
+  CellBlocks blocks_;
+};
+
+}  // namespace kerf

@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "visualizer/cast/caster.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include <glm/gtc/matrix_inverse.hpp>
+
+#include "visualizer/error.hpp"
+
+namespace kerf {
+
+namespace {
+
+constexpr std::int32_t kTile = 16;  // pixels: coherent rays, and enough pieces to share out
+
+void put(float (&to)[3], const glm::dvec3& from) {
+  for (int i = 0; i < 3; ++i) to[i] = static_cast<float>(from[i]);
+}
+
+}  // namespace
+
+void CastPicture::resize(std::int32_t to_width, std::int32_t to_height) {
+  width = to_width;
+  height = to_height;
+  const auto pixels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
+  rgba.assign(pixels, 0);
+  depth.assign(pixels, 1.0F);
+}
+
+Caster::Caster(const SceneView& scene, std::span<const CastContent> contents,
+               const Options& options)
+    : options_(options) {
+  if (scene.volumes.size() > kMaxCastVolumes) {
+    throw VisualizerError("scene: " + std::to_string(scene.volumes.size()) +
+                          " volumes, and the ray caster takes " + std::to_string(kMaxCastVolumes) +
+                          "; use --renderer iso");
+  }
+  volumes_.reserve(scene.volumes.size());
+  for (std::size_t i = 0; i < scene.volumes.size(); ++i) {
+    volumes_.emplace_back(scene.volumes[i], contents[i], options.mode);
+  }
+}
+
+void Caster::update(std::size_t volume, std::span<const Density> density,
+                    std::span<const std::uint32_t> changed) {
+  volumes_[volume].update_bricks(density, changed);
+}
+
+void Caster::draw(const View& view, const PixelRect& rect, CastPicture& picture,
+                  std::span<const float> end_depth, std::span<float> normals) {
+  CastJob job;
+  double shortest_mm = view.far_mm;
+  for (CastVolume& volume : volumes_) {
+    shortest_mm = std::min(shortest_mm, volume.edge_mm());
+    job.volumes[job.volume_count++] = volume.job(view, picture.width, picture.height);
+  }
+  job.pixels = {picture.width,
+                picture.height,
+                picture.rgba.data(),
+                picture.depth.data(),
+                normals.empty() ? nullptr : normals.data(),
+                end_depth.empty() ? nullptr : end_depth.data()};
+  job.half_width_at_1mm = static_cast<float>(view.tan_half_height * view.aspect);
+  job.half_height_at_1mm = static_cast<float>(view.tan_half_height);
+  job.near_mm = static_cast<float>(view.near_mm);
+  job.far_mm = static_cast<float>(view.far_mm);
+  // Equation (1) as depth_far - depth_slope / t.
+  const double span_mm = view.far_mm - view.near_mm;
+  job.depth_far = static_cast<float>(view.far_mm / span_mm);
+  job.depth_slope = static_cast<float>(view.far_mm * view.near_mm / span_mm);
+  job.step_vox = options_.step_vox;
+  job.step_mm = options_.step_vox * static_cast<float>(shortest_mm);
+  // A plane goes over by the transposed inverse.
+  const glm::dvec4 shown = glm::transpose(glm::affineInverse(view.eye_from_world)) * view.shown;
+  for (int i = 0; i < 4; ++i) job.shown[i] = static_cast<float>(shown[i]);
+  put(job.key_light, glm::normalize(glm::dvec3(-0.45, 0.75, 0.70)));  // lighting.frag
+  put(job.fill_light, glm::normalize(glm::dvec3(0.80, 0.05, 0.45)));
+  put(job.up, glm::dvec3(view.eye_from_world * glm::dvec4(0, 1, 0, 0)));
+  const auto cast =
+      options_.mode == CastMode::iso ? options_.kernels->iso : options_.kernels->blend;
+  const std::int32_t across = (rect.x1 - rect.x0 + kTile - 1) / kTile;
+  const std::int32_t along = (rect.y1 - rect.y0 + kTile - 1) / kTile;
+  pool_.run(static_cast<std::uint32_t>(across * along), [&](std::uint32_t tile) {
+    const std::int32_t x = rect.x0 + static_cast<std::int32_t>(tile) % across * kTile;
+    const std::int32_t y = rect.y0 + static_cast<std::int32_t>(tile) / across * kTile;
+    cast(job, {x, y, std::min(x + kTile, rect.x1), std::min(y + kTile, rect.y1)});
+  });
+}
+
+}  // namespace kerf

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "visualizer/camera.hpp"
+#include "visualizer/cast/cast_volume.hpp"
+#include "visualizer/cast/tile_pool.hpp"
+
+namespace kerf {
+
+/// What the ray caster draws into. Rows from the bottom up, as GL has them.
+struct CastPicture {
+  std::int32_t width = 0, height = 0;
+  std::vector<std::uint32_t> rgba;  ///< as `CastPixels::rgba`; 0 where nothing is
+  std::vector<float> depth;         ///< window depth; 1 where nothing is (blend: too little)
+
+  [[nodiscard]] PixelRect whole() const noexcept { return {0, 0, width, height}; }
+  /// Its pixels are not kept.
+  void resize(std::int32_t to_width, std::int32_t to_height);
+};
+
+/// Ray caster on the processor, for the volumes of one session: needs no GL, and gives the same
+/// bits with every instruction set and any number of threads.
+///
+/// One caller at a time.
+class Caster {
+ public:
+  struct Options {
+    CastMode mode = CastMode::iso;
+    /// Iso: along the ray, so that a wall of one voxel, antialiased over two, is never stepped
+    /// over. Blend: along the view axis, in the shortest voxel edge of all volumes.
+    float step_vox = 0.75F;
+    const CastKernels* kernels = cast_kernels()[0];
+  };
+
+  /// Throws VisualizerError.
+  Caster(const SceneView& scene, std::span<const CastContent> contents, const Options& options);
+
+  /// Bricks `changed` of a volume are not what they were; `density` is all of it.
+  void update(std::size_t volume, std::span<const Density> density,
+              std::span<const std::uint32_t> changed);
+
+  /// Draws `rect` of the picture; the rest of it stays. Rays of blend end at `end_depth` (window
+  /// depth, one per pixel of the picture) where it is given. `normals` (three floats per pixel, or
+  /// none) are those of iso in eye space, for measurements.
+  void draw(const View& view, const PixelRect& rect, CastPicture& picture,
+            std::span<const float> end_depth = {}, std::span<float> normals = {});
+
+ private:
+  Options options_;
+  std::vector<CastVolume> volumes_;
+  TilePool pool_;
+};
+
+}  // namespace kerf
