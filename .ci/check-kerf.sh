@@ -92,9 +92,8 @@ nothing_survives() {
 # interrupted SIGNAL: a demo that is hit in its middle ends within three seconds.
 interrupted() {
   rm -f "$lab/pids" "$lab/calls" "$lab/segment"
-  set -m  # else a background process ignores SIGINT
-  "$root/kerf" demo --seconds 60 --out "$lab/out" >"$lab/said" 2>&1 &
-  set +m
+  # A background process ignores SIGINT, and so does all that runs below one.
+  env --default-signal=INT "$root/kerf" demo --seconds 60 --out "$lab/out" >"$lab/said" 2>&1 &
   local demo=$! code=0 began
   until [[ -e $lab/calls ]] && called '^emulator'; do sleep 0.05; done
   sleep 0.2
@@ -114,6 +113,8 @@ expect 'a demo runs' kerf_gives 0 demo --seconds 1
 expect 'the hand is the one that the scene names' called '^emulator.*--hand hand.toml --unit-mm 2'
 expect 'the frames are spread over the run' called '^visualizer.*--every-ticks 41 '
 expect 'a demo leaves nothing behind' nothing_survives
+expect 'the way of drawing reaches the visualizer' kerf_gives 0 demo --seconds 1 --renderer cast
+expect 'as it was said' called '^visualizer.*--renderer cast '
 expect 'a demo keeps its results' kerf_gives 0 demo --seconds 1 --out "$lab/out" --virtual
 expect 'all of them' kept "$all"
 expect 'lock-step reaches the controller' called '^controller.*--virtual'
