@@ -15,7 +15,7 @@ namespace kerf {
 // One function a plan: its stages and the operations of each.
 
 /// Goes up when what counts as an operation changes: prices that were measured before are void.
-inline constexpr int kCountsRevision = 3;
+inline constexpr int kCountsRevision = 4;
 
 /// copy     voxels of the box around the tool
 /// contact  multiply-adds of the correlation: table entries x 2 halves x 8 corners, chunk by chunk

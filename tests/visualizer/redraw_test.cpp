@@ -79,11 +79,10 @@ class Controller {
       for (int z = 0; z < grid.nz; ++z) {
         for (int y = 0; y < grid.ny; ++y) {
           for (int x = 0; x < grid.nx; ++x) {
-            // A block with a pit, whose walls darken each other.
-            const bool pit =
-                std::abs(x - grid.nx / 2) < 6 && std::abs(z - grid.nz / 2) < 6 && y > 6;
+            // A comb, whose teeth darken each other over gaps of ten voxels.
+            const bool gap = y > 6 && x % 16 >= 6;
             const bool border = x < 2 || y < 2 || z < 2 || x > grid.nx - 3 || z > grid.nz - 3;
-            density.push_back(pit || border ? Density{0} : Density(y > 20 ? 65535 : 39'000));
+            density.push_back(gap || border ? Density{0} : Density(y > 20 ? 65535 : 39'000));
           }
         }
       }
@@ -150,7 +149,7 @@ TEST_CASE("after any change the part that is drawn again makes the picture of dr
     for (int edit = 0; edit < 200; ++edit) {
       if (edit % 3 != 2) {
         const VoxelIndex at{below(36), below(40), below(26)};
-        const int edge = 1 + below(4);
+        const int edge = 1 + below(9);
         controller.cut(static_cast<std::size_t>(below(2)),
                        {at, {at.x + edge, at.y + edge, at.z + edge}}, 0.25 * below(3));
       }
