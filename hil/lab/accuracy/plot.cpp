@@ -12,7 +12,7 @@
 namespace kerf::accuracy {
 namespace {
 
-constexpr double kWidth = 1200, kHeight = 1000;            // pixels of the picture
+constexpr double kWidth = 1200, kHeight = 1000;             // pixels of the picture
 constexpr double kPanelWidth = 0.40, kPanelHeight = 0.345;  // of the picture
 
 // Colours of Okabe and Ito, which differ for every kind of colour vision.
