@@ -10,6 +10,7 @@
 #include <imgui.h>
 
 #include "visualizer/error.hpp"
+#include "visualizer/renderer.hpp"
 
 namespace kerf {
 
@@ -25,11 +26,16 @@ constexpr ImGuiWindowFlags kStill =
     ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoInputs | ImGuiWindowFlags_AlwaysAutoResize |
     ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_NoFocusOnAppearing | ImGuiWindowFlags_NoNav;
 
+constexpr ImGuiWindowFlags kTouched =
+    (kStill & ~ImGuiWindowFlags_NoInputs) | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoNavInputs;
+
 constexpr auto kKeys = std::to_array<std::array<const char*, 2>>({
     {"drag", "turn"},
     {"shift or middle drag", "move"},
     {"wheel", "nearer, farther"},
     {"1 .. 9", "take this tool"},
+    {"v", "next renderer"},
+    {"c", "clip plane"},
     {"r", "first view again"},
     {"s", "screenshot"},
     {"e", "export the surface"},
@@ -143,20 +149,71 @@ Overlay::~Overlay() {
   ImGui::DestroyContext();
 }
 
+bool Overlay::handle(const Pointer& pointer, OverlayFigures& figures, PictureSize size) {
+  ImGuiIO& io = ImGui::GetIO();
+  io.MousePos = ImVec2(static_cast<float>(pointer.x), static_cast<float>(pointer.y));
+  io.MouseDown[0] = pointer.down;
+  ImGui_ImplOpenGL3_NewFrame();
+  lay_out(figures, size);
+  if (figures.controls && io.WantCaptureMouse) figures.controls->over = pointer;
+  return io.WantCaptureMouse;
+}
+
+void Overlay::lay_out(OverlayFigures& figures, PictureSize size) {
+  const ImVec2 all{static_cast<float>(size.width), static_cast<float>(size.height)};
+  ImGui::GetIO().DisplaySize = all;
+  ImGui::NewFrame();
+  panel(figures);
+  if (figures.controls) {
+    ImGui::SetNextWindowPos(ImVec2(12.0F, all.y - 12.0F), 0, ImVec2(0.0F, 1.0F));
+    ImGui::Begin("look", nullptr, kTouched);
+    look_controls(*figures.controls);
+    ImGui::End();
+  }
+  if (!figures.banner.empty()) banner(figures.banner, all);
+  if (figures.help) key_help(all);
+  ImGui::Render();
+}
+
+void Overlay::look_controls(LookControls& controls) {
+  constexpr float kWide = 130.0F;
+  constexpr ImGuiSliderFlags kDragOnly = ImGuiSliderFlags_NoInput | ImGuiSliderFlags_AlwaysClamp;
+  Look& look = controls.look;
+  ImGui::PushItemWidth(kWide);
+  if (ImGui::BeginCombo("renderer", look.renderer.c_str())) {
+    for (const std::string_view kind : renderer_kinds()) {
+      const std::string name(kind);
+      if (ImGui::Selectable(name.c_str(), look.renderer == name)) look.renderer = name;
+    }
+    ImGui::EndCombo();
+  }
+  float iso = dragged_iso_.value_or(static_cast<float>(look.iso.value_or(controls.own_iso)));
+  if (ImGui::SliderFloat("iso", &iso, 0.02F, 0.98F, "%.2f", kDragOnly)) dragged_iso_ = iso;
+  if (ImGui::IsItemDeactivated() && dragged_iso_) {
+    look.iso = *dragged_iso_;
+    dragged_iso_.reset();
+  }
+  ImGui::BeginDisabled(!controls.clips);
+  ImGui::Checkbox("clip", &look.clip.on);
+  if (look.clip.on) {
+    constexpr std::array kAxes{"x", "y", "z"};
+    for (int axis = 0; axis < 3; ++axis) {
+      ImGui::SameLine();
+      ImGui::RadioButton(kAxes[static_cast<std::size_t>(axis)], &look.clip.axis, axis);
+    }
+    auto at = static_cast<float>(look.clip.at);
+    if (ImGui::SliderFloat("plane", &at, 0.0F, 1.0F, "%.2f", kDragOnly)) look.clip.at = at;
+  }
+  ImGui::EndDisabled();
+  ImGui::PopItemWidth();
+}
+
 void Overlay::draw(const OverlayFigures& figures, const RenderTarget& target) {
   target.bind();
-  ImGuiIO& io = ImGui::GetIO();
-  io.DisplaySize =
-      ImVec2(static_cast<float>(target.size().width), static_cast<float>(target.size().height));
   ImGui_ImplOpenGL3_NewFrame();
+  OverlayFigures shown = figures;
   // ImGui learns the size of what a panel holds by laying it out: the second time is right.
-  for (int pass = 0; pass < 2; ++pass) {
-    ImGui::NewFrame();
-    panel(figures);
-    if (!figures.banner.empty()) banner(figures.banner, io.DisplaySize);
-    if (figures.help) key_help(io.DisplaySize);
-    ImGui::Render();
-  }
+  for (int pass = 0; pass < 2; ++pass) lay_out(shown, target.size());
   ImGui_ImplOpenGL3_RenderDrawData(ImGui::GetDrawData());
 }
 

@@ -141,7 +141,7 @@ TEST_CASE("after any change the part that is drawn again makes the picture of dr
     Controller controller;
     Session session("redraw");
     session.poll();
-    Picture picture(session, kind, 4.0 / 3.0);
+    Picture picture(session, {.renderer = std::string(kind)}, 4.0 / 3.0);
     const RenderTarget target({160, 120});
     const OverlayFigures figures;
     static_cast<void>(picture.draw(session, figures, target));
