@@ -22,6 +22,9 @@ const ImVec4 kStrong{0.90F, 0.62F, 0.00F, 1.0F};
 const ImVec4 kLimit{0.84F, 0.37F, 0.00F, 1.0F};
 const ImVec4 kLabel{0.66F, 0.69F, 0.73F, 1.0F};
 const ImVec4 kValue{0.95F, 0.96F, 0.97F, 1.0F};
+// Smaller peaks do not fill a plot: noise stays small.
+constexpr double kLeastFullForceN = 0.5;
+constexpr double kLeastFullDepthMm = 0.1;
 constexpr ImGuiWindowFlags kStill =
     ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoInputs | ImGuiWindowFlags_AlwaysAutoResize |
     ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_NoFocusOnAppearing | ImGuiWindowFlags_NoNav;
@@ -39,6 +42,7 @@ constexpr auto kKeys = std::to_array<std::array<const char*, 2>>({
     {"r", "first view again"},
     {"s", "screenshot"},
     {"e", "export the surface"},
+    {"p", "plot of force and depth"},
     {"h", "these keys"},
     {"q", "quit"},
 });
@@ -70,6 +74,32 @@ void force_bar(const OverlayFigures& figures) {
   ImGui::PopStyleColor();
 }
 
+/// One quantity over the last seconds, from 0 to its peak, but at least to `least_full`.
+void curve(const char* label, const char* format, const std::vector<ForcePlot::Point>& points,
+           float ForcePlot::Point::*value, double least_full, const ImVec4& colour) {
+  float peak = 0.0F;
+  for (const ForcePlot::Point& point : points) peak = std::max(peak, point.*value);
+  ImGui::TextColored(kLabel, "%s", label);
+  ImGui::SameLine();
+  ImGui::TextColored(kValue, format, static_cast<double>(peak));
+  const ImVec2 corner = ImGui::GetCursorScreenPos();
+  const ImVec2 kSize{170.0F, 44.0F};
+  ImGui::Dummy(kSize);
+  const float full = std::max(peak, static_cast<float>(least_full));
+  std::vector<ImVec2> line;
+  for (const ForcePlot::Point& point : points) {
+    const double ago_s = static_cast<double>(points.back().time_ns - point.time_ns) * 1e-9;
+    const auto along = static_cast<float>(1.0 - ago_s / ForcePlot::kSpanS);
+    line.emplace_back(corner.x + kSize.x * along,
+                      corner.y + kSize.y * (1.0F - std::max(point.*value, 0.0F) / full));
+  }
+  ImDrawList& to = *ImGui::GetWindowDrawList();
+  to.AddRectFilled(corner, ImVec2(corner.x + kSize.x, corner.y + kSize.y),
+                   ImGui::GetColorU32(ImGuiCol_FrameBg));
+  to.AddPolyline(line.data(), static_cast<int>(line.size()), ImGui::GetColorU32(colour),
+                 ImDrawFlags_None, 1.5F);
+}
+
 void panel(const OverlayFigures& figures) {
   ImGui::SetNextWindowPos(ImVec2(12.0F, 12.0F));
   ImGui::Begin("figures", nullptr, kStill);
@@ -86,6 +116,12 @@ void panel(const OverlayFigures& figures) {
     if (figures.frame_rate_hz) row("picture", "%.0f /s", *figures.frame_rate_hz);
     if (figures.data_age_ms) row("data age", "%.1f ms", *figures.data_age_ms);
     ImGui::EndTable();
+  }
+  if (!figures.plot.empty()) {
+    curve("force, 5 s, peak", "%.2f N", figures.plot, &ForcePlot::Point::force_n, kLeastFullForceN,
+          kCalm);
+    curve("depth, 5 s, peak", "%.2f mm", figures.plot, &ForcePlot::Point::penetration_mm,
+          kLeastFullDepthMm, kStrong);
   }
   ImGui::End();
 }

@@ -3,7 +3,9 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
+#include "visualizer/force_plot.hpp"
 #include "visualizer/gl/target.hpp"
 #include "visualizer/look.hpp"
 #include "visualizer/pointer.hpp"
@@ -31,6 +33,7 @@ struct OverlayFigures {
   std::optional<double> data_age_ms;
   std::string banner;                    ///< shown large; empty: nothing is wrong
   bool help = false;                     ///< shows the keys
+  std::vector<ForcePlot::Point> plot;    ///< force and depth over time; empty: no plot
   std::optional<LookControls> controls;  ///< in a window
 
   /// As far as the panel shows them: two equal ones look alike.

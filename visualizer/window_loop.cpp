@@ -16,6 +16,7 @@
 #include "visualizer/cpu_placement.hpp"
 #include "visualizer/error.hpp"
 #include "visualizer/file_out.hpp"
+#include "visualizer/force_plot.hpp"
 #include "visualizer/frame_report.hpp"
 #include "visualizer/gl/window.hpp"
 #include "visualizer/picture.hpp"
@@ -111,6 +112,7 @@ void move_camera(OrbitCamera& camera, const WindowInput& input) {
 /// What keys change.
 struct Keys {
   bool help = false;
+  bool plot = false;
   bool screenshot = false;
   bool mesh = false;
 
@@ -124,6 +126,7 @@ struct Keys {
       if (key == 's') screenshot = true;
       if (key == 'e') mesh = true;
       if (key == 'h') help = !help;
+      if (key == 'p') plot = !plot;
       if (key == 'v') look.renderer = next_renderer(look.renderer);
       if (key == 'c') look.clip.on = !look.clip.on;
       const int tool = key - '1';
@@ -198,6 +201,7 @@ int run_window(const VisualizerOptions& options) {
   std::optional<RenderTarget> target;
   FrameRate rate;
   Keys keys;
+  ForcePlot plot;
   constexpr double kMsPerS = 1e3;
   const double end_ms = options.seconds.value_or(std::numeric_limits<double>::infinity()) * kMsPerS;
   while (!stop_requested() && since_attached.wall_ms() < end_ms) {
@@ -208,6 +212,7 @@ int run_window(const VisualizerOptions& options) {
     const WindowInput input = window.poll();
     if (keys.apply(input, followed.session(), followed.picture(), aspect)) break;
     followed.update(aspect);
+    if (const auto& newest = followed.session().latest()) plot.add(*newest);
     if (std::exchange(keys.mesh, false)) export_mesh(options, followed.session());
     if (visible) {
       if (!target || target->size() != size) target.emplace(size);
@@ -215,6 +220,7 @@ int run_window(const VisualizerOptions& options) {
       OverlayFigures figures = overlay_figures(followed.session());
       figures.frame_rate_hz = rate.hz();
       figures.help = keys.help;
+      if (keys.plot) figures.plot = plot.points();
       figures.controls = followed.picture().controls();
       if (!followed.picture().handle(input.pointer, figures, size)) {
         move_camera(followed.picture().camera(), input);
