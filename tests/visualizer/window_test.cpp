@@ -36,7 +36,8 @@ constexpr VoxelGrid kGrid{32, 24, 16};
 bool have(const char* program) {
   const std::string command = std::string("command -v ") + program + " >/dev/null 2>&1";
   if (std::system(command.c_str()) == 0) return true;
-  MESSAGE("skipped: " << program << " is not installed (.ci/packages.txt, group check)");
+  MESSAGE("skipped: " << std::string(program)
+                      << " is not installed (.ci/packages.txt, group check)");
   return false;
 }
 
