@@ -17,7 +17,9 @@ namespace {
 
 constexpr const char* kKeys =
     "In the window: drag turns, shift or middle drag moves, the wheel zooms, 1..9 take a tool,\n"
-    "r first view, s screenshot, e export the surface, h keys, q quit.\n"
+    "v next renderer, c clip plane, p plot, r first view, s screenshot, e export the surface, h "
+    "keys, q "
+    "quit.\n"
     "Exit codes: 0 fine, 1 the controller did not end cleanly, 2 bad input or set-up.";
 
 /// CLI11 explains over several lines; a user wants one.

@@ -10,6 +10,7 @@
 #include <imgui.h>
 
 #include "visualizer/error.hpp"
+#include "visualizer/renderer.hpp"
 
 namespace kerf {
 
@@ -21,18 +22,27 @@ const ImVec4 kStrong{0.90F, 0.62F, 0.00F, 1.0F};
 const ImVec4 kLimit{0.84F, 0.37F, 0.00F, 1.0F};
 const ImVec4 kLabel{0.66F, 0.69F, 0.73F, 1.0F};
 const ImVec4 kValue{0.95F, 0.96F, 0.97F, 1.0F};
+// Smaller peaks do not fill a plot: noise stays small.
+constexpr double kLeastFullForceN = 0.5;
+constexpr double kLeastFullDepthMm = 0.1;
 constexpr ImGuiWindowFlags kStill =
     ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoInputs | ImGuiWindowFlags_AlwaysAutoResize |
     ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_NoFocusOnAppearing | ImGuiWindowFlags_NoNav;
+
+constexpr ImGuiWindowFlags kTouched =
+    (kStill & ~ImGuiWindowFlags_NoInputs) | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoNavInputs;
 
 constexpr auto kKeys = std::to_array<std::array<const char*, 2>>({
     {"drag", "turn"},
     {"shift or middle drag", "move"},
     {"wheel", "nearer, farther"},
     {"1 .. 9", "take this tool"},
+    {"v", "next renderer"},
+    {"c", "clip plane"},
     {"r", "first view again"},
     {"s", "screenshot"},
     {"e", "export the surface"},
+    {"p", "plot of force and depth"},
     {"h", "these keys"},
     {"q", "quit"},
 });
@@ -64,6 +74,32 @@ void force_bar(const OverlayFigures& figures) {
   ImGui::PopStyleColor();
 }
 
+/// One quantity over the last seconds, from 0 to its peak, but at least to `least_full`.
+void curve(const char* label, const char* format, const std::vector<ForcePlot::Point>& points,
+           float ForcePlot::Point::*value, double least_full, const ImVec4& colour) {
+  float peak = 0.0F;
+  for (const ForcePlot::Point& point : points) peak = std::max(peak, point.*value);
+  ImGui::TextColored(kLabel, "%s", label);
+  ImGui::SameLine();
+  ImGui::TextColored(kValue, format, static_cast<double>(peak));
+  const ImVec2 corner = ImGui::GetCursorScreenPos();
+  const ImVec2 kSize{170.0F, 44.0F};
+  ImGui::Dummy(kSize);
+  const float full = std::max(peak, static_cast<float>(least_full));
+  std::vector<ImVec2> line;
+  for (const ForcePlot::Point& point : points) {
+    const double ago_s = static_cast<double>(points.back().time_ns - point.time_ns) * 1e-9;
+    const auto along = static_cast<float>(1.0 - ago_s / ForcePlot::kSpanS);
+    line.emplace_back(corner.x + kSize.x * along,
+                      corner.y + kSize.y * (1.0F - std::max(point.*value, 0.0F) / full));
+  }
+  ImDrawList& to = *ImGui::GetWindowDrawList();
+  to.AddRectFilled(corner, ImVec2(corner.x + kSize.x, corner.y + kSize.y),
+                   ImGui::GetColorU32(ImGuiCol_FrameBg));
+  to.AddPolyline(line.data(), static_cast<int>(line.size()), ImGui::GetColorU32(colour),
+                 ImDrawFlags_None, 1.5F);
+}
+
 void panel(const OverlayFigures& figures) {
   ImGui::SetNextWindowPos(ImVec2(12.0F, 12.0F));
   ImGui::Begin("figures", nullptr, kStill);
@@ -80,6 +116,12 @@ void panel(const OverlayFigures& figures) {
     if (figures.frame_rate_hz) row("picture", "%.0f /s", *figures.frame_rate_hz);
     if (figures.data_age_ms) row("data age", "%.1f ms", *figures.data_age_ms);
     ImGui::EndTable();
+  }
+  if (!figures.plot.empty()) {
+    curve("force, 5 s, peak", "%.2f N", figures.plot, &ForcePlot::Point::force_n, kLeastFullForceN,
+          kCalm);
+    curve("depth, 5 s, peak", "%.2f mm", figures.plot, &ForcePlot::Point::penetration_mm,
+          kLeastFullDepthMm, kStrong);
   }
   ImGui::End();
 }
@@ -143,20 +185,71 @@ Overlay::~Overlay() {
   ImGui::DestroyContext();
 }
 
+bool Overlay::handle(const Pointer& pointer, OverlayFigures& figures, PictureSize size) {
+  ImGuiIO& io = ImGui::GetIO();
+  io.MousePos = ImVec2(static_cast<float>(pointer.x), static_cast<float>(pointer.y));
+  io.MouseDown[0] = pointer.down;
+  ImGui_ImplOpenGL3_NewFrame();
+  lay_out(figures, size);
+  if (figures.controls && io.WantCaptureMouse) figures.controls->over = pointer;
+  return io.WantCaptureMouse;
+}
+
+void Overlay::lay_out(OverlayFigures& figures, PictureSize size) {
+  const ImVec2 all{static_cast<float>(size.width), static_cast<float>(size.height)};
+  ImGui::GetIO().DisplaySize = all;
+  ImGui::NewFrame();
+  panel(figures);
+  if (figures.controls) {
+    ImGui::SetNextWindowPos(ImVec2(12.0F, all.y - 12.0F), 0, ImVec2(0.0F, 1.0F));
+    ImGui::Begin("look", nullptr, kTouched);
+    look_controls(*figures.controls);
+    ImGui::End();
+  }
+  if (!figures.banner.empty()) banner(figures.banner, all);
+  if (figures.help) key_help(all);
+  ImGui::Render();
+}
+
+void Overlay::look_controls(LookControls& controls) {
+  constexpr float kWide = 130.0F;
+  constexpr ImGuiSliderFlags kDragOnly = ImGuiSliderFlags_NoInput | ImGuiSliderFlags_AlwaysClamp;
+  Look& look = controls.look;
+  ImGui::PushItemWidth(kWide);
+  if (ImGui::BeginCombo("renderer", look.renderer.c_str())) {
+    for (const std::string_view kind : renderer_kinds()) {
+      const std::string name(kind);
+      if (ImGui::Selectable(name.c_str(), look.renderer == name)) look.renderer = name;
+    }
+    ImGui::EndCombo();
+  }
+  float iso = dragged_iso_.value_or(static_cast<float>(look.iso.value_or(controls.own_iso)));
+  if (ImGui::SliderFloat("iso", &iso, 0.02F, 0.98F, "%.2f", kDragOnly)) dragged_iso_ = iso;
+  if (ImGui::IsItemDeactivated() && dragged_iso_) {
+    look.iso = *dragged_iso_;
+    dragged_iso_.reset();
+  }
+  ImGui::BeginDisabled(!controls.clips);
+  ImGui::Checkbox("clip", &look.clip.on);
+  if (look.clip.on) {
+    constexpr std::array kAxes{"x", "y", "z"};
+    for (int axis = 0; axis < 3; ++axis) {
+      ImGui::SameLine();
+      ImGui::RadioButton(kAxes[static_cast<std::size_t>(axis)], &look.clip.axis, axis);
+    }
+    auto at = static_cast<float>(look.clip.at);
+    if (ImGui::SliderFloat("plane", &at, 0.0F, 1.0F, "%.2f", kDragOnly)) look.clip.at = at;
+  }
+  ImGui::EndDisabled();
+  ImGui::PopItemWidth();
+}
+
 void Overlay::draw(const OverlayFigures& figures, const RenderTarget& target) {
   target.bind();
-  ImGuiIO& io = ImGui::GetIO();
-  io.DisplaySize =
-      ImVec2(static_cast<float>(target.size().width), static_cast<float>(target.size().height));
   ImGui_ImplOpenGL3_NewFrame();
+  OverlayFigures shown = figures;
   // ImGui learns the size of what a panel holds by laying it out: the second time is right.
-  for (int pass = 0; pass < 2; ++pass) {
-    ImGui::NewFrame();
-    panel(figures);
-    if (!figures.banner.empty()) banner(figures.banner, io.DisplaySize);
-    if (figures.help) key_help(io.DisplaySize);
-    ImGui::Render();
-  }
+  for (int pass = 0; pass < 2; ++pass) lay_out(shown, target.size());
   ImGui_ImplOpenGL3_RenderDrawData(ImGui::GetDrawData());
 }
 

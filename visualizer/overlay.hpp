@@ -3,10 +3,23 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
+#include "visualizer/force_plot.hpp"
 #include "visualizer/gl/target.hpp"
+#include "visualizer/look.hpp"
+#include "visualizer/pointer.hpp"
 
 namespace kerf {
+
+/// What the controls show, and the look that they change.
+struct LookControls {
+  Look look;
+  double own_iso = 0.5;           ///< of the main volume, 0..1: where the look has none
+  bool clips = true;              ///< the renderer heeds the clip plane
+  std::optional<Pointer> over{};  ///< the mouse, while it is over them
+  friend bool operator==(const LookControls&, const LookControls&) noexcept = default;
+};
 
 /// What the panel in the corner says.
 struct OverlayFigures {
@@ -18,16 +31,18 @@ struct OverlayFigures {
   std::optional<double> tick_rate_hz;
   std::optional<double> frame_rate_hz;
   std::optional<double> data_age_ms;
-  std::string banner;  ///< shown large; empty: nothing is wrong
-  bool help = false;   ///< shows the keys
+  std::string banner;                    ///< shown large; empty: nothing is wrong
+  bool help = false;                     ///< shows the keys
+  std::vector<ForcePlot::Point> plot;    ///< force and depth over time; empty: no plot
+  std::optional<LookControls> controls;  ///< in a window
 
   /// As far as the panel shows them: two equal ones look alike.
   [[nodiscard]] OverlayFigures rounded() const;
   friend bool operator==(const OverlayFigures&, const OverlayFigures&) noexcept = default;
 };
 
-/// The panel over the picture, by Dear ImGui; it takes no input, so it needs no window. One at a
-/// time, on the thread of the GL context.
+/// The panels over the picture, by Dear ImGui, which is told where the mouse is: it needs no
+/// window. One at a time, on the thread of the GL context.
 class Overlay {
  public:
   Overlay();
@@ -35,7 +50,16 @@ class Overlay {
   Overlay(const Overlay&) = delete;
   Overlay& operator=(const Overlay&) = delete;
 
+  /// What the mouse does to the controls of `figures`, which it changes; draws nothing. True while
+  /// the mouse belongs to them and not to the camera.
+  bool handle(const Pointer& pointer, OverlayFigures& figures, PictureSize size);
   void draw(const OverlayFigures& figures, const RenderTarget& target);
+
+ private:
+  void lay_out(OverlayFigures& figures, PictureSize size);
+  void look_controls(LookControls& controls);
+
+  std::optional<float> dragged_iso_;  ///< taken over when the drag ends: all is drawn anew then
 };
 
 }  // namespace kerf

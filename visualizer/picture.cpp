@@ -24,21 +24,58 @@ double size_of(const VolumeView& volume) {
 
 }  // namespace
 
-Picture::Picture(const Session& session, std::string_view renderer, double aspect)
+Picture::Picture(const Session& session, const Look& look, double aspect)
     : scene_(session.scene()),
-      renderer_(make_renderer(renderer, scene_, session.contents())),
+      look_(look),
+      renderer_(renderer_for(session, look)),
       stale_bricks_(scene_.volumes.size()),
       hand_painter_(scene_, size_of(scene_.main_volume())) {
   const BoxCorners box = scene_.main_volume().corners();
   centre_mm_ = 0.5 * (box.front() + box.back());
   radius_mm_ = size_of(scene_.main_volume());
+  low_mm_ = high_mm_ = centre_mm_;
   for (const VolumeView& volume : scene_.volumes) {
     for (const glm::dvec3& corner : volume.corners()) {
+      low_mm_ = glm::min(low_mm_, corner);
+      high_mm_ = glm::max(high_mm_, corner);
       reach_mm_ = std::max(reach_mm_, glm::length(corner - centre_mm_));
     }
   }
   for (const VolumeView& volume : scene_.volumes) bricks_uploaded_ += volume.bricks.count();
   reset_camera(aspect);
+}
+
+std::unique_ptr<Renderer> Picture::renderer_for(const Session& session, const Look& look) {
+  SceneView scene = scene_;
+  for (VolumeView& volume : scene.volumes) {
+    if (look.iso) volume.iso = static_cast<Density>(std::lround(*look.iso * kDensityMax));
+  }
+  return make_renderer(look.renderer, scene, session.contents());
+}
+
+void Picture::set_look(const Session& session, const Look& look) {
+  if (look == look_) return;
+  if (look.renderer != look_.renderer || look.iso != look_.iso) {
+    renderer_ = renderer_for(session, look);
+    for (const VolumeView& volume : scene_.volumes) bricks_uploaded_ += volume.bricks.count();
+  }
+  look_ = look;
+  redraw_all();
+}
+
+LookControls Picture::controls() const {
+  return {.look = look_,
+          .own_iso = scene_.main_volume().iso / kDensityMax,
+          .clips = renderer_->clips()};
+}
+
+glm::dvec4 Picture::shown_half() const {
+  const ClipPlane& clip = look_.clip;
+  if (!clip.on) return View{}.shown;
+  glm::dvec4 shown(0.0);
+  shown[clip.axis] = -1.0;
+  shown.w = glm::mix(low_mm_, high_mm_, clip.at)[clip.axis];
+  return shown;
 }
 
 void Picture::reset_camera(double aspect) {
@@ -59,7 +96,8 @@ Redrawn Picture::draw(const Session& session, const OverlayFigures& figures,
                       const RenderTarget& target) {
   const PictureSize size = target.size();
   const double aspect = static_cast<double>(size.width) / size.height;
-  const View view = camera_.view(aspect, reach_mm_ + kToolRoom * radius_mm_);
+  View view = camera_.view(aspect, reach_mm_ + kToolRoom * radius_mm_);
+  view.shown = shown_half();
   std::optional<Hand> hand;
   if (session.latest()) hand = hand_of(*session.latest());
 

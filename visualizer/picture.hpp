@@ -10,6 +10,7 @@
 #include "visualizer/camera.hpp"
 #include "visualizer/frame_report.hpp"
 #include "visualizer/hand_painter.hpp"
+#include "visualizer/look.hpp"
 #include "visualizer/overlay.hpp"
 #include "visualizer/renderer.hpp"
 #include "visualizer/session.hpp"
@@ -27,8 +28,7 @@ struct Redrawn {
 /// Made after the first `poll` of its session, which is uploaded whole; later only what changed.
 class Picture {
  public:
-  /// `renderer` as on the command line.
-  Picture(const Session& session, std::string_view renderer, double aspect);
+  Picture(const Session& session, const Look& look, double aspect);
 
   /// Uploads the bricks that the last `poll` changed. Call once after each `poll`.
   void update(const Session& session);
@@ -41,11 +41,26 @@ class Picture {
   /// The next `draw` draws everything.
   void redraw_all() noexcept { layers_.reset(); }
 
+  [[nodiscard]] const Look& look() const noexcept { return look_; }
+  /// From the next `draw` on. Another renderer or iso value uploads all volumes again. Throws
+  /// VisualizerError where the renderer cannot show them; the look stays then.
+  void set_look(const Session& session, const Look& look);
+  /// For `OverlayFigures::controls`.
+  [[nodiscard]] LookControls controls() const;
+  /// The mouse over the panels: see `Overlay::handle`.
+  bool handle(const Pointer& pointer, OverlayFigures& figures, PictureSize size) {
+    return overlay_.handle(pointer, figures, size);
+  }
+
   [[nodiscard]] OrbitCamera& camera() noexcept { return camera_; }
   void reset_camera(double aspect);
   [[nodiscard]] std::uint64_t bricks_uploaded() const noexcept { return bricks_uploaded_; }
 
  private:
+  /// A scene of its own for each: renderers keep its iso values.
+  [[nodiscard]] std::unique_ptr<Renderer> renderer_for(const Session& session, const Look& look);
+  /// `View::shown` of the clip plane.
+  [[nodiscard]] glm::dvec4 shown_half() const;
   void draw_backdrop(const RenderTarget& target);
   void smooth_edges(const RenderTarget& from, const RenderTarget& to);
   /// Pixels that changed densities and, where it moved, the hand change.
@@ -56,10 +71,12 @@ class Picture {
                    PixelRect stage);
 
   SceneView scene_;
+  Look look_;
   std::unique_ptr<Renderer> renderer_;
   OrbitCamera camera_;
   double radius_mm_ = 1.0;  ///< of the main volume's box: the size of what is looked at
   glm::dvec3 centre_mm_{0, 0, 0};
+  glm::dvec3 low_mm_{0, 0, 0}, high_mm_{0, 0, 0};  ///< the box of all volumes
   double reach_mm_ = 1.0;  ///< from that centre to the farthest corner of any volume
   GlProgram backdrop_{"screen.vert", "backdrop.frag"};
   GlProgram smooth_{"screen.vert", "smooth.frag"};

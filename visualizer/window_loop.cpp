@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <cstdio>
@@ -6,11 +7,16 @@
 #include <limits>
 #include <optional>
 #include <stdexcept>
+#include <string>
+#include <string_view>
 #include <thread>
 #include <utility>
+#include <vector>
 
 #include "visualizer/cpu_placement.hpp"
+#include "visualizer/error.hpp"
 #include "visualizer/file_out.hpp"
+#include "visualizer/force_plot.hpp"
 #include "visualizer/frame_report.hpp"
 #include "visualizer/gl/window.hpp"
 #include "visualizer/picture.hpp"
@@ -82,29 +88,53 @@ void export_mesh(const VisualizerOptions& options, const Session& session) {
   });
 }
 
-/// What keys and drags change.
-struct Controls {
+std::string next_renderer(std::string_view now) {
+  const std::vector<std::string_view> kinds = renderer_kinds();
+  const auto found = std::find(kinds.begin(), kinds.end(), now);
+  return std::string(kinds[static_cast<std::size_t>(found - kinds.begin() + 1) % kinds.size()]);
+}
+
+/// A renderer that cannot show these volumes leaves the one that can.
+void change_look(Picture& picture, const Session& session, const Look& look) {
+  try {
+    picture.set_look(session, look);
+  } catch (const VisualizerError& problem) {
+    std::fprintf(stderr, "kerf-visualizer: %s\n", problem.what());
+  }
+}
+
+void move_camera(OrbitCamera& camera, const WindowInput& input) {
+  camera.orbit(input.turn_right, input.turn_up);
+  camera.pan(input.move_right, input.move_up);
+  if (input.wheel != 0.0) camera.zoom(input.wheel);
+}
+
+/// What keys change.
+struct Keys {
   bool help = false;
+  bool plot = false;
   bool screenshot = false;
   bool mesh = false;
 
   /// True when the user wants to leave.
   bool apply(const WindowInput& input, Session& session, Picture& picture, double aspect) {
-    picture.camera().orbit(input.turn_right, input.turn_up);
-    picture.camera().pan(input.move_right, input.move_up);
-    if (input.wheel != 0.0) picture.camera().zoom(input.wheel);
     bool quit = input.close;
+    Look look = picture.look();
     for (const char key : input.keys) {
       if (key == 'q') quit = true;
       if (key == 'r') picture.reset_camera(aspect);
       if (key == 's') screenshot = true;
       if (key == 'e') mesh = true;
       if (key == 'h') help = !help;
+      if (key == 'p') plot = !plot;
+      if (key == 'v') look.renderer = next_renderer(look.renderer);
+      if (key == 'c') look.clip.on = !look.clip.on;
       const int tool = key - '1';
       if (tool >= 0 && tool < static_cast<int>(session.scene().tools.size())) {
         session.select_tool(static_cast<std::uint32_t>(tool));
       }
     }
+    change_look(picture, session, look);
     return quit;
   }
 };
@@ -116,7 +146,7 @@ class Followed {
   Followed(const VisualizerOptions& options, Session first, double aspect)
       : options_(options),
         session_(std::move(first)),
-        picture_(std::in_place, session_, options.renderer, aspect) {}
+        picture_(std::in_place, session_, Look{.renderer = options.renderer}, aspect) {}
 
   [[nodiscard]] Session& session() noexcept { return session_; }
   [[nodiscard]] Picture& picture() noexcept { return *picture_; }
@@ -139,8 +169,9 @@ class Followed {
       return;  // not there yet
     }
     earlier_bricks_ += picture_->bricks_uploaded();
+    const Look look = picture_->look();
     picture_.reset();  // before the new one: one overlay at a time
-    picture_.emplace(session_, options_.renderer, aspect);
+    picture_.emplace(session_, look, aspect);
   }
 
   const VisualizerOptions& options_;
@@ -169,7 +200,8 @@ int run_window(const VisualizerOptions& options) {
   Followed followed(options, std::move(first), aspect);
   std::optional<RenderTarget> target;
   FrameRate rate;
-  Controls controls;
+  Keys keys;
+  ForcePlot plot;
   constexpr double kMsPerS = 1e3;
   const double end_ms = options.seconds.value_or(std::numeric_limits<double>::infinity()) * kMsPerS;
   while (!stop_requested() && since_attached.wall_ms() < end_ms) {
@@ -178,25 +210,33 @@ int run_window(const VisualizerOptions& options) {
     const bool visible = size.width > 0 && size.height > 0;
     if (visible) aspect = static_cast<double>(size.width) / size.height;
     const WindowInput input = window.poll();
-    if (controls.apply(input, followed.session(), followed.picture(), aspect)) break;
+    if (keys.apply(input, followed.session(), followed.picture(), aspect)) break;
     followed.update(aspect);
-    if (std::exchange(controls.mesh, false)) export_mesh(options, followed.session());
+    if (const auto& newest = followed.session().latest()) plot.add(*newest);
+    if (std::exchange(keys.mesh, false)) export_mesh(options, followed.session());
     if (visible) {
       if (!target || target->size() != size) target.emplace(size);
       rate.count(begin);
       OverlayFigures figures = overlay_figures(followed.session());
       figures.frame_rate_hz = rate.hz();
-      figures.help = controls.help;
+      figures.help = keys.help;
+      if (keys.plot) figures.plot = plot.points();
+      figures.controls = followed.picture().controls();
+      if (!followed.picture().handle(input.pointer, figures, size)) {
+        move_camera(followed.picture().camera(), input);
+      }
+      change_look(followed.picture(), followed.session(), figures.controls->look);
       const Redrawn redrawn =
           draw_measured(followed.picture(), followed.session(), figures, *target, report);
       if (report.wall_ms.size() == 1) report.late_join_ms = since_attached.wall_ms();
-      if (std::exchange(controls.screenshot, false)) take_screenshot(options, *target);
+      if (std::exchange(keys.screenshot, false)) take_screenshot(options, *target);
       if (redrawn.any || input.exposed) window.present(*target);
       report.width = size.width;
       report.height = size.height;
     }
     std::this_thread::sleep_until(begin + kFrame);
   }
+  report.renderer = followed.picture().look().renderer;
   report.bricks_uploaded = followed.bricks_uploaded();
   report.clean_end = followed.session().ended_cleanly();
   if (options.report) report.write(*options.report);

@@ -13,6 +13,7 @@
 #include "shared/segment/hand_over.hpp"
 #include "shared/segment/writer.hpp"
 #include "tests/visualizer/gl_fixture.hpp"
+#include "visualizer/error.hpp"
 #include "visualizer/gl/context.hpp"
 #include "visualizer/picture.hpp"
 #include "visualizer/screen_bounds.hpp"
@@ -140,7 +141,7 @@ TEST_CASE("after any change the part that is drawn again makes the picture of dr
     Controller controller;
     Session session("redraw");
     session.poll();
-    Picture picture(session, kind, 4.0 / 3.0);
+    Picture picture(session, {.renderer = std::string(kind)}, 4.0 / 3.0);
     const RenderTarget target({160, 120});
     const OverlayFigures figures;
     static_cast<void>(picture.draw(session, figures, target));
@@ -182,6 +183,37 @@ TEST_CASE("after any change the part that is drawn again makes the picture of dr
     }
     CHECK(redrawn / parts < 0.6);
     throw_on_gl_error();
+  }
+}
+
+TEST_CASE("a changed look shows the picture of one that had it from the start") {
+  if (!have_gl()) return;
+  const Place place;
+  Controller controller;
+  Session session("redraw");
+  session.poll();
+  const RenderTarget target({160, 120});
+  const auto drawn = [&](Picture& picture) {
+    static_cast<void>(picture.draw(session, {}, target));
+    return target.read_rgb();
+  };
+  Look clipped{.renderer = "iso"};
+  clipped.clip = {.on = true, .axis = 0, .at = 0.4};
+  for (const Look& look :
+       {Look{.renderer = "blend"}, Look{.renderer = "iso", .iso = 0.7}, clipped}) {
+    std::vector<std::uint8_t> changed;
+    {
+      Picture picture(session, {.renderer = "iso"}, 4.0 / 3.0);
+      const auto before = drawn(picture);
+      picture.set_look(session, look);
+      changed = drawn(picture);
+      CHECK(changed != before);
+      CHECK_THROWS_AS(picture.set_look(session, {.renderer = "voxels"}), VisualizerError);
+      CHECK(picture.look() == look);
+    }
+    Picture fresh(session, look, 4.0 / 3.0);
+    const bool same = drawn(fresh) == changed;
+    CHECK(same);
   }
 }
 

@@ -59,6 +59,7 @@ Window::Window(PictureSize size, Visibility visibility) {
   glfwSetWindowUserPointer(handle_, this);
   glfwSetKeyCallback(handle_, on_key);
   glfwSetCursorPosCallback(handle_, on_cursor);
+  glfwSetMouseButtonCallback(handle_, on_button);
   glfwSetScrollCallback(handle_, on_scroll);
   glfwSetWindowRefreshCallback(handle_, on_exposed);
   glfwMakeContextCurrent(handle_);
@@ -95,6 +96,14 @@ void Window::present(const RenderTarget& target) {
 WindowInput Window::poll() {
   glfwPollEvents();
   input_.close = glfwWindowShouldClose(handle_) == GLFW_TRUE;
+  int width = 0;
+  int height = 0;
+  glfwGetWindowSize(handle_, &width, &height);
+  if (width > 0 && height > 0) {  // a pixel may be less than a unit of the cursor
+    input_.pointer.x = cursor_x_ * size().width / width;
+    input_.pointer.y = cursor_y_ * size().height / height;
+  }
+  if (is_down(handle_, GLFW_MOUSE_BUTTON_LEFT)) input_.pointer.down = true;
   return std::exchange(input_, {});
 }
 
@@ -126,6 +135,13 @@ void Window::on_cursor(GLFWwindow* handle, double x, double y) {
   } else if (left) {
     input.turn_right += right / height;
     input.turn_up += up / height;
+  }
+}
+
+void Window::on_button(GLFWwindow* handle, int button, int action, int /*mods*/) {
+  // A click may be over before the next `poll`.
+  if (button == GLFW_MOUSE_BUTTON_LEFT && action == GLFW_PRESS) {
+    window_of(handle).input_.pointer.down = true;
   }
 }
 

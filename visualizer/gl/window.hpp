@@ -7,6 +7,7 @@
 
 #include "visualizer/gl/context.hpp"
 #include "visualizer/gl/target.hpp"
+#include "visualizer/pointer.hpp"
 
 struct GLFWwindow;
 
@@ -18,6 +19,7 @@ struct WindowInput {
   double turn_right = 0.0, turn_up = 0.0;
   double move_right = 0.0, move_up = 0.0;
   double wheel = 0.0;
+  Pointer pointer;         ///< at the end; down if it was so at any time
   std::vector<char> keys;  ///< lower-case letters and digits, in order
   bool exposed = false;    ///< what the window showed is lost: `present` again
   bool close = false;
@@ -46,6 +48,7 @@ class Window final : public GlContext {
  private:
   static void on_key(GLFWwindow* handle, int key, int scancode, int action, int mods);
   static void on_cursor(GLFWwindow* handle, double x, double y);
+  static void on_button(GLFWwindow* handle, int button, int action, int mods);
   static void on_scroll(GLFWwindow* handle, double x, double y);
   static void on_exposed(GLFWwindow* handle);
 

@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <string>
+
+namespace kerf {
+
+/// Cuts the volumes open, square to an axis of the world: what lies beyond is not drawn.
+struct ClipPlane {
+  bool on = false;
+  int axis = 2;     ///< 0 x, 1 y, 2 z: towards the first view
+  double at = 0.5;  ///< 0..1 of the way through the box of all volumes
+  friend bool operator==(const ClipPlane&, const ClipPlane&) noexcept = default;
+};
+
+/// How the volumes are shown: what a user may change while they are looked at.
+struct Look {
+  std::string renderer = "iso";  ///< as on the command line
+  std::optional<double> iso{};   ///< of all volumes, 0..1 of full density; none: each its own
+  ClipPlane clip{};
+  friend bool operator==(const Look&, const Look&) noexcept = default;
+};
+
+}  // namespace kerf
