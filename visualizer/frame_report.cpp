@@ -51,20 +51,15 @@ double percentile(std::vector<double> values, double share) {
 }
 
 void FrameReport::write(const std::filesystem::path& file) const {
-  const nlohmann::ordered_json report{{"renderer", renderer},
-                                      {"gl_renderer", gl_renderer},
-                                      {"context", context},
-                                      {"width", width},
-                                      {"height", height},
-                                      {"frames", wall_ms.size()},
-                                      {"cpu_ms", spread(cpu_ms)},
-                                      {"wall_ms", spread(wall_ms)},
-                                      {"redrawn", spread(redrawn)},
-                                      {"rest_frames", rest_frames},
-                                      {"bricks_uploaded", bricks_uploaded},
-                                      {"attach_ms", attach_ms},
-                                      {"late_join_ms", late_join_ms},
-                                      {"clean_end", clean_end}};
+  const nlohmann::ordered_json report{
+      {"renderer", renderer},       {"gl_renderer", gl_renderer},
+      {"context", context},         {"width", width},
+      {"height", height},           {"frames", wall_ms.size()},
+      {"cpu_ms", spread(cpu_ms)},   {"wall_ms", spread(wall_ms)},
+      {"redrawn", spread(redrawn)}, {"latency_ms", spread(latency_ms)},
+      {"rest_frames", rest_frames}, {"bricks_uploaded", bricks_uploaded},
+      {"attach_ms", attach_ms},     {"late_join_ms", late_join_ms},
+      {"clean_end", clean_end}};
   const std::string text = report.dump(2) + "\n";
   write_file(file, {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()});
 }

@@ -42,6 +42,10 @@ struct FrameReport {
   std::vector<double> wall_ms{};
   std::vector<double> redrawn{};  ///< share of the picture whose volumes were drawn again
 
+  /// From the oldest tick that removed material which a frame was the first to show, to the end of
+  /// drawing that frame; of frames that showed none, nothing.
+  std::vector<double> latency_ms{};
+
   /// As JSON, whole or not at all; throws VisualizerError.
   void write(const std::filesystem::path& file) const;
 };

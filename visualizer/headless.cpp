@@ -41,7 +41,7 @@ class FrameTaker {
   FrameTaker(Picture& picture, PictureSize size, FrameReport& report)
       : picture_(picture), target_(size), report_(report) {}
 
-  void draw(const Session& session) {
+  void draw(Session& session) {
     OverlayFigures figures = overlay_figures(session);
     if (!report_.wall_ms.empty()) figures.frame_rate_hz = kMsPerS / report_.wall_ms.back();
     draw_measured(picture_, session, figures, target_, report_);
@@ -81,6 +81,7 @@ int run_headless(const VisualizerOptions& options) {
   report.cpu_ms.clear();
   report.wall_ms.clear();
   report.redrawn.clear();
+  report.latency_ms.clear();
 
   FrameSchedule schedule(options.frames, ticks_between(options, session.tick_ns()));
   bool over = false;

@@ -12,6 +12,7 @@ int main(int argc, char** argv) {
     const auto options = kerf::parse_options(argc, argv);
     if (!options) return 0;
     kerf::catch_stop_signals();
+    if (options->bench) return kerf::run_bench(*options);
     if (options->headless) return kerf::run_headless(*options);
     if (!kerf::Window::has_screen()) {
       throw kerf::VisualizerError(

@@ -22,6 +22,8 @@ constexpr const char* kKeys =
     "quit.\n"
     "Exit codes: 0 fine, 1 the controller did not end cleanly, 2 bad input or set-up.";
 
+constexpr const char* kBenchSize = "512x512";  // the paper's
+
 /// CLI11 explains over several lines; a user wants one.
 std::string one_line(std::string text) {
   std::replace(text.begin(), text.end(), '\n', ' ');
@@ -80,6 +82,10 @@ std::optional<VisualizerOptions> parse_options(int argc, const char* const* argv
                  "colours): headless at the end, in the window with e")
       ->type_name("FILE");
   app.add_option("--report", options.report, "write times and counts to this JSON file");
+  auto* bench = app.add_flag("--bench", options.bench,
+                             "time every renderer, without a controller (512x512 unless --size)");
+  app.add_option("--page", options.page, "bench: write the table to this Markdown file")
+      ->needs(bench);
   try {
     app.parse(argc, argv);
   } catch (const CLI::Success& asked) {  // --help, --version
@@ -88,6 +94,7 @@ std::optional<VisualizerOptions> parse_options(int argc, const char* const* argv
   } catch (const CLI::ParseError& problem) {
     throw VisualizerError(one_line(problem.what()) + "; see --help");
   }
+  if (options.bench && app.count("--size") == 0) size = kBenchSize;
   options.size = parse_size(size);
   check_renderer(options.renderer);
   return options;

@@ -25,6 +25,8 @@ struct VisualizerOptions {
   std::vector<int> cpus;                     ///< empty: all but the last one
   std::optional<std::filesystem::path> mesh;  ///< --export: .stl or .ply
   std::optional<std::filesystem::path> report;
+  bool bench = false;                         ///< no controller: what pictures cost here
+  std::optional<std::filesystem::path> page;  ///< bench: as Markdown
 };
 
 /// "WxH"; throws VisualizerError.

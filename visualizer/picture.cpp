@@ -2,6 +2,7 @@
 #include "visualizer/picture.hpp"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 
 #include "visualizer/screen_bounds.hpp"
@@ -184,9 +185,10 @@ void Picture::smooth_edges(const RenderTarget& from, const RenderTarget& to) {
   glDrawArrays(GL_TRIANGLES, 0, 3);
 }
 
-Redrawn draw_measured(Picture& picture, const Session& session, const OverlayFigures& figures,
+Redrawn draw_measured(Picture& picture, Session& session, const OverlayFigures& figures,
                       const RenderTarget& target, FrameReport& report) {
   const Stopwatch watch;
+  const auto removal = session.take_oldest_removal();
   const Redrawn redrawn = picture.draw(session, figures, target);
   if (!redrawn.any) {
     ++report.rest_frames;
@@ -196,6 +198,10 @@ Redrawn draw_measured(Picture& picture, const Session& session, const OverlayFig
   report.wall_ms.push_back(watch.wall_ms());
   report.cpu_ms.push_back(watch.cpu_ms());
   report.redrawn.push_back(redrawn.share);
+  if (removal && redrawn.share > 0.0) {
+    const auto since = std::chrono::steady_clock::now() - *removal;
+    report.latency_ms.push_back(std::chrono::duration<double, std::milli>(since).count());
+  }
   return redrawn;
 }
 

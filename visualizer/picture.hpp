@@ -104,8 +104,9 @@ class Picture {
   std::uint64_t bricks_uploaded_ = 0;
 };
 
-/// `Picture::draw`, complete when it returns, with its times and what it did in the report.
-Redrawn draw_measured(Picture& picture, const Session& session, const OverlayFigures& figures,
+/// `Picture::draw`, complete when it returns, with its times and what it did in the report;
+/// takes the session's oldest removal for the latency.
+Redrawn draw_measured(Picture& picture, Session& session, const OverlayFigures& figures,
                       const RenderTarget& target, FrameReport& report);
 
 /// The figures of the panel as the session stands; the caller adds what it alone knows.

@@ -14,4 +14,9 @@ namespace kerf {
 /// The window; follows restarted controllers too. Returns 0 when the user closes it.
 [[nodiscard]] int run_window(const VisualizerOptions& options);
 
+/// Times every renderer on a volume of its own, without a controller: a table on stdout, all
+/// figures as JSON in `options.report`, a page in `options.page`. Returns 1 where it was stopped.
+/// Throws VisualizerError or FileError for bad set-up.
+[[nodiscard]] int run_bench(const VisualizerOptions& options);
+
 }  // namespace kerf

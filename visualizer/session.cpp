@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <thread>
+#include <utility>
 
 #include "visualizer/stop_signal.hpp"
 
@@ -33,6 +34,8 @@ Session::Session(std::string_view name)
       scene_(scene_view(connection_.reader().info())),
       snapshots_(scene_.volumes.size()) {
   poll();
+  on_the_way_.clear();
+  oldest_removal_ns_.reset();
   attach_ms_ = began_.wall_ms();
 }
 
@@ -54,6 +57,7 @@ void Session::poll() {
   for (std::size_t v = 0; v < snapshots_.size(); ++v) {
     connection_.reader().update(v, snapshots_[v]);
   }
+  note_arrivals();
 }
 
 void Session::read_states() {
@@ -86,8 +90,25 @@ void Session::read_removals() {
       continue;
     }
     if (record.volume >= scene_.volumes.size()) continue;
+    if (record.removed > 0) on_the_way_.push_back(record);
     removed_mm3_ += record.removed / kDensityMax * voxel_mm3(scene_.volumes[record.volume]);
   }
+}
+
+// A record may be out before its bricks are in the mirror.
+void Session::note_arrivals() {
+  std::erase_if(on_the_way_, [&](const DirtyRecord& removal) {
+    const VolumeSnapshot& snapshot = snapshots_[removal.volume];
+    if (!snapshot.consistent || snapshot.tick < removal.tick) return false;
+    oldest_removal_ns_ = std::min(oldest_removal_ns_.value_or(removal.time_ns), removal.time_ns);
+    return true;
+  });
+}
+
+std::optional<std::chrono::steady_clock::time_point> Session::take_oldest_removal() {
+  const auto taken_ns = std::exchange(oldest_removal_ns_, std::nullopt);
+  if (!taken_ns) return std::nullopt;
+  return std::chrono::steady_clock::time_point(std::chrono::nanoseconds(*taken_ns));
 }
 
 std::vector<VolumeContent> Session::contents() const {

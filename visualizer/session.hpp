@@ -45,6 +45,10 @@ class Session {
   [[nodiscard]] double removed_mm3() const noexcept { return removed_mm3_; }
   [[nodiscard]] bool joined_late() const noexcept { return joined_late_; }
   [[nodiscard]] std::optional<double> data_age_ms() const;
+  /// When the oldest of the ticks removed material whose bricks came with a `poll` since the last
+  /// call (a servo period early: the record of a cut carries the time of the tick before). None
+  /// where no such tick; what was removed before the session began does not count.
+  std::optional<std::chrono::steady_clock::time_point> take_oldest_removal();
   [[nodiscard]] std::uint32_t tick_ns() const noexcept;
   /// From asking for the controller to the first complete volumes.
   [[nodiscard]] double attach_ms() const noexcept { return attach_ms_; }
@@ -61,6 +65,7 @@ class Session {
  private:
   void read_states();
   void read_removals();
+  void note_arrivals();
 
   Stopwatch began_;
   SegmentConnection connection_;
@@ -70,6 +75,8 @@ class Session {
   std::optional<Tick> armed_;
   std::uint64_t next_state_ = 0;  ///< index of the first record not read yet
   std::uint64_t next_removal_ = 0;
+  std::vector<DirtyRecord> on_the_way_;  ///< removals whose bricks no snapshot holds yet
+  std::optional<std::uint64_t> oldest_removal_ns_;
   double removed_mm3_ = 0.0;
   bool joined_late_ = false;
   double attach_ms_ = 0.0;

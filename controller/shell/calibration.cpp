@@ -18,18 +18,10 @@
 #include "controller/scene/plan_cost.hpp"
 #include "controller/scene/tool_shapes.hpp"
 #include "shared/posix/new_file.hpp"
+#include "shared/posix/provenance.hpp"
 
 namespace kerf {
 namespace {
-
-std::string machine_name() {
-  std::ifstream info("/proc/cpuinfo");
-  for (std::string line; std::getline(info, line);) {
-    const auto colon = line.find(": ");
-    if (line.starts_with("model name") && colon != std::string::npos) return line.substr(colon + 2);
-  }
-  return "unknown";
-}
 
 std::string key_of(const std::string& way, const StageCost& stage) {
   return way + "/" + stage.stage;
@@ -77,7 +69,7 @@ Calibration stored_calibration(const std::filesystem::path& path, const SceneCos
   if (!file) throw std::runtime_error("may not be read");
   const std::string text{std::istreambuf_iterator<char>(file), {}};
   Calibration calibration = parse_calibration(text);
-  if (calibration.machine != machine_name()) {
+  if (calibration.machine != processor_name()) {
     throw std::runtime_error("is of another machine, " + calibration.machine);
   }
   for (const TickCost& tick : costs.ticks) {
@@ -136,7 +128,7 @@ Calibration measure_calibration() {
       }
     }
   }
-  Calibration calibration{machine_name(), {}};
+  Calibration calibration{processor_name(), {}};
   for (auto& [key, values] : prices) calibration.price_ns[key] = median(std::move(values));
   return calibration;
 }

@@ -1,16 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "hil/lab/lab_run.hpp"
 
-#include <chrono>
-#include <cstdio>
 #include <filesystem>
-#include <fstream>
 #include <map>
 #include <utility>
 
 #include "hil/hil_error.hpp"
 #include "shared/posix/cores.hpp"
 #include "shared/posix/new_file.hpp"
+#include "shared/posix/provenance.hpp"
 
 namespace kerf {
 namespace {
@@ -20,24 +18,6 @@ constexpr const char* kCompiler = "clang " __clang_version__;
 #else
 constexpr const char* kCompiler = "g++ " __VERSION__;
 #endif
-
-std::string processor() {
-  std::ifstream table("/proc/cpuinfo");
-  for (std::string line; std::getline(table, line);) {
-    const auto colon = line.find(": ");
-    if (line.starts_with("model name") && colon != std::string::npos) return line.substr(colon + 2);
-  }
-  return "a processor that does not tell its name";
-}
-
-std::string today() {
-  using namespace std::chrono;
-  const year_month_day day{floor<days>(system_clock::now())};
-  char text[32];
-  std::snprintf(text, sizeof text, "%04d-%02u-%02u", static_cast<int>(day.year()),
-                static_cast<unsigned>(day.month()), static_cast<unsigned>(day.day()));
-  return text;
-}
 
 template <class Work>
 void guarded(const char* option, const Work& work) {
@@ -59,7 +39,7 @@ int pin_lab(int core) {
 }
 
 std::string lab_provenance() {
-  return today() + ", " + processor() + ", " + kCompiler +
+  return today() + ", " + processor_name() + ", " + kCompiler +
          " " KERF_FLAGS " (kernels of an instruction set always -O3).";
 }
 

@@ -77,3 +77,10 @@ TEST_CASE("every mistake on the command line is one line") {
     }
   }
 }
+
+TEST_CASE("the bench draws as large as the paper unless told otherwise, and alone writes a page") {
+  CHECK(parse({"--bench"})->size == PictureSize{512, 512});
+  CHECK(parse({"--bench", "--page", "p.md"})->page == "p.md");
+  CHECK(parse({"--bench", "--size", "64x48"})->size == PictureSize{64, 48});
+  CHECK_THROWS_WITH_AS(parse({"--page", "p.md"}), doctest::Contains("--bench"), VisualizerError);
+}

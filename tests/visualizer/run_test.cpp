@@ -21,6 +21,7 @@
 #include "shared/segment/hand_over.hpp"
 #include "visualizer/error.hpp"
 #include "visualizer/gl/context.hpp"
+#include "visualizer/session.hpp"
 
 using namespace kerf;
 namespace fs = std::filesystem;
@@ -173,6 +174,34 @@ TEST_CASE("a headless run writes its pictures, follows the milling and ends with
   CHECK(report["bricks_uploaded"] > 64);  // all of them once, then what changed
   CHECK(report["gl_renderer"] != "");
   CHECK(report["cpu_ms"]["p50"] > 0.0);
+  // Each picture but the last is 50 ticks of a millisecond after the one before, and a cut comes
+  // every eight.
+  CHECK(report["latency_ms"]["p50"] > 1.0);
+  CHECK(report["latency_ms"]["p99"] >= report["latency_ms"]["p50"]);
+}
+
+TEST_CASE("a session tells once when the oldest new removal was, and nothing from before it") {
+  const Place place;
+  Miller miller;
+  miller.run_to(20);  // cuts in ticks 1, 8 and 16
+  Session session("test");
+  CHECK_FALSE(session.take_oldest_removal());
+  miller.run_to(22);
+  session.poll();
+  CHECK_FALSE(session.take_oldest_removal());
+  const auto before = std::chrono::steady_clock::now();
+  miller.run_to(23);
+  miller.run_to(24);  // the next cut, under the time of tick 23
+  const auto after_first = std::chrono::steady_clock::now();
+  CHECK_FALSE(session.take_oldest_removal());  // not polled
+  miller.run_to(32);                           // and one more
+  session.poll();
+  session.poll();  // what an earlier poll brought stays
+  const auto removal = session.take_oldest_removal();
+  REQUIRE(removal);
+  CHECK(*removal >= before);
+  CHECK(*removal < after_first);
+  CHECK_FALSE(session.take_oldest_removal());
 }
 
 TEST_CASE("a controller that vanishes or faults is shown in its last state, and the code says so") {

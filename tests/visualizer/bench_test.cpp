@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <set>
+
+#include <doctest/doctest.h>
+#include <nlohmann/json.hpp>
+
+#include "visualizer/bench/bench_tooth.hpp"
+#include "visualizer/bench/picture_page.hpp"
+
+using namespace kerf;
+
+namespace {
+
+std::size_t solid_voxels(const BenchTooth& tooth) {
+  return static_cast<std::size_t>(
+      std::count_if(tooth.density().begin(), tooth.density().end(),
+                    [&](Density density) { return density >= tooth.view().iso; }));
+}
+
+}  // namespace
+
+TEST_CASE("the made-up tooth is as large as the paper's, and a crop takes only air away") {
+  for (const VoxelGrid& padded : {VoxelGrid{128, 128, 80}, VoxelGrid{256, 256, 161}}) {
+    const BenchTooth tooth(padded, false);
+    const BenchTooth cropped(padded, true);
+    CHECK(solid_voxels(cropped) == solid_voxels(tooth));
+    CHECK(cropped.looked_at() == tooth.looked_at());
+    CHECK(cropped.looked_at() == cropped.view().corners());
+    // The paper's crops are 47x42x80 and 93x82x159.
+    const VoxelGrid& grid = cropped.view().bricks.grid;
+    CHECK(grid.nx == doctest::Approx(0.365 * padded.nx).epsilon(0.05));
+    CHECK(grid.ny == doctest::Approx(0.325 * padded.ny).epsilon(0.05));
+    CHECK(grid.nz == doctest::Approx(padded.nz).epsilon(0.03));
+  }
+}
+
+TEST_CASE("each cut takes material away, within the bricks that it names") {
+  constexpr int kCuts = 60;  // a run of the bench makes 44 at most; at some time nothing is left
+  for (const int diameter : {10, 16}) {
+    BenchTooth tooth({128, 128, 80}, true);
+    for (int i = 0; i < kCuts; ++i) {
+      CAPTURE(i);
+      const std::vector<Density> before = tooth.density();
+      const auto changed = tooth.cut(diameter);
+      const std::set<std::uint32_t> named(changed.begin(), changed.end());
+      CHECK(named.size() == changed.size());
+      const BrickGrid& bricks = tooth.view().bricks;
+      std::set<std::uint32_t> differ;
+      for (std::uint32_t id = 0; id < bricks.count(); ++id) {
+        const VoxelBox box = bricks.voxels(id);
+        for (int z = box.lo.z; z < box.hi.z; ++z) {
+          for (int y = box.lo.y; y < box.hi.y; ++y) {
+            for (int x = box.lo.x; x < box.hi.x; ++x) {
+              const std::size_t at = bricks.grid.index(x, y, z);
+              if (tooth.density()[at] != before[at]) differ.insert(id);
+            }
+          }
+        }
+      }
+      CHECK_FALSE(differ.empty());
+      CHECK(std::includes(named.begin(), named.end(), differ.begin(), differ.end()));
+    }
+  }
+}
+
+TEST_CASE("the bench's table has a line for each subject, beside the paper's figure") {
+  const VoxelGrid large{256, 256, 161};
+  const auto row = [&](const char* renderer, int tool, bool partial, double wall_ms) {
+    return PictureRow{.renderer = renderer,
+                      .volume = large,
+                      .tool = tool,
+                      .modifying = tool > 0,
+                      .partial = partial,
+                      .cpu_ms = 2.0 * wall_ms,
+                      .wall_ms_p50 = wall_ms,
+                      .wall_ms_p99 = wall_ms};
+  };
+  const std::vector<PictureRow> rows{row("iso", 0, false, 50.0), row("iso", 16, true, 4.0),
+                                     row("cast", 0, false, 8.0)};
+  const std::string table = picture_table(rows);
+  CHECK(table.find(
+            "| iso | 256x256x161 | 20.0 | - | - | - | 250 | 100 | - | 8.0 | GPU iso 6 / 6 |") !=
+        std::string::npos);
+  CHECK(table.find("| cast | 256x256x161 | 125 | - | - | - | - | 16.0 | - | - | - |") !=
+        std::string::npos);
+  CHECK(std::count(table.begin(), table.end(), '\n') == 4);
+
+  GlDriver driver;
+  driver.renderer = "a driver";
+  const auto report = nlohmann::json::parse(picture_report(rows, driver, {512, 512}, 2));
+  CHECK(report["gl_renderer"] == "a driver");
+  CHECK(report["rows"].size() == 3);
+  CHECK(report["rows"][1]["volume"] == "256x256x161");
+  CHECK(report["rows"][1]["modifying"] == true);
+  CHECK(report["rows"][1]["partial"] == true);
+  CHECK(report["rows"][1]["fps"] == doctest::Approx(250.0));
+  CHECK(picture_page(rows, driver, {512, 512}, 2).find("gl: a driver") != std::string::npos);
+}

@@ -1,0 +1,173 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "visualizer/bench/bench_tooth.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include <glm/gtc/matrix_transform.hpp>
+
+namespace kerf {
+
+namespace {
+
+// Lengths are shares of the tooth's height; the root tips are at z = 0, x is its width.
+constexpr double kHeightMm = 22.4;
+constexpr double kEnamel = 0.9, kDentin = 0.6, kIso = 0.3;
+constexpr double kEnamelThickness = 0.045, kEnamelFrom = 0.55;
+constexpr double kSmoothing = 0.05;
+
+struct Ellipsoid {
+  glm::dvec3 centre;
+  glm::dvec3 radii;
+};
+
+constexpr auto kParts = std::to_array<Ellipsoid>({
+    {{0.0, 0.0, 0.70}, {0.272, 0.235, 0.22}},     // crown
+    {{-0.13, -0.11, 0.89}, {0.10, 0.10, 0.105}},  // cusps
+    {{0.13, -0.11, 0.89}, {0.10, 0.10, 0.105}},
+    {{-0.13, 0.11, 0.88}, {0.10, 0.10, 0.105}},
+    {{0.13, 0.11, 0.88}, {0.10, 0.10, 0.105}},
+    {{-0.12, 0.0, 0.32}, {0.09, 0.13, 0.315}},  // roots
+    {{0.12, 0.0, 0.32}, {0.09, 0.13, 0.315}},
+});
+
+/// First-order distance |f| / |grad f|: exact on the surface.
+double distance_to(const Ellipsoid& part, glm::dvec3 at) {
+  const glm::dvec3 p = (at - part.centre) / part.radii;
+  const double f = glm::length(p);
+  const double slope = glm::length(p / part.radii);
+  constexpr double kMiddle = 1e-9;
+  return slope < kMiddle ? -1.0 : f * (f - 1.0) / slope;
+}
+
+/// Blends the two where they are within `kSmoothing` of one another.
+double smooth_min(double a, double b) {
+  const double near = std::max(kSmoothing - std::abs(a - b), 0.0);
+  return std::min(a, b) - near * near / (4.0 * kSmoothing);
+}
+
+/// Negative inside.
+double distance_to_tooth(glm::dvec3 at) {
+  double distance = distance_to(kParts.front(), at);
+  for (std::size_t i = 1; i < kParts.size(); ++i) {
+    distance = smooth_min(distance, distance_to(kParts[i], at));
+  }
+  return distance;
+}
+
+/// 0..1; falls to 0 over two voxels, which are `edge` long.
+double density_at(glm::dvec3 at, double edge) {
+  const double distance = distance_to_tooth(at);
+  const bool enamel = distance > -kEnamelThickness && at.z > kEnamelFrom;
+  return (enamel ? kEnamel : kDentin) * std::clamp(0.5 - distance / (2.0 * edge), 0.0, 1.0);
+}
+
+/// The box of what is not air, with one voxel around.
+VoxelBox body_of(const VoxelGrid& grid, const std::vector<Density>& density) {
+  VoxelBox body;
+  for (int z = 0; z < grid.nz; ++z) {
+    for (int y = 0; y < grid.ny; ++y) {
+      for (int x = 0; x < grid.nx; ++x) {
+        if (density[grid.index(x, y, z)] == 0) continue;
+        body = body.united({{x, y, z}, {x + 1, y + 1, z + 1}});
+      }
+    }
+  }
+  return body.grown(1).clipped(grid.box());
+}
+
+std::vector<Density> crop(const VoxelGrid& grid, const std::vector<Density>& density,
+                          const VoxelBox& box) {
+  std::vector<Density> cropped;
+  for (int z = box.lo.z; z < box.hi.z; ++z) {
+    for (int y = box.lo.y; y < box.hi.y; ++y) {
+      const auto row = density.begin() + static_cast<std::ptrdiff_t>(grid.index(box.lo.x, y, z));
+      cropped.insert(cropped.end(), row, row + box.extent().x);
+    }
+  }
+  return cropped;
+}
+
+}  // namespace
+
+BenchTooth::BenchTooth(const VoxelGrid& padded, bool cropped) {
+  const VoxelGrid& grid = padded;
+  const double edge = 1.0 / grid.nz;
+  const glm::dvec3 middle = 0.5 * glm::dvec3(grid.nx - 1, grid.ny - 1, 0);
+  density_.reserve(grid.voxel_count());
+  for (int z = 0; z < grid.nz; ++z) {
+    for (int y = 0; y < grid.ny; ++y) {
+      for (int x = 0; x < grid.nx; ++x) {
+        const double share = density_at((glm::dvec3(x, y, z) - middle) * edge, edge);
+        density_.push_back(static_cast<Density>(std::lround(share * kDensityMax)));
+      }
+    }
+  }
+  // The crown is up in the world, and the side of low y faces the camera.
+  const double edge_mm = edge * kHeightMm;
+  VolumeView whole;
+  whole.name = "tooth";
+  whole.bricks = BrickGrid::of(grid);
+  whole.world_from_voxel =
+      glm::dmat4(glm::dmat3({edge_mm, 0, 0}, {0, 0, -edge_mm}, {0, edge_mm, 0}));
+  whole.iso = static_cast<Density>(kIso * kDensityMax);
+  const VoxelBox body = body_of(grid, density_);
+  const VoxelIndex extent = body.extent();
+  VolumeView tight = whole;
+  tight.bricks = BrickGrid::of({extent.x, extent.y, extent.z});
+  tight.world_from_voxel =
+      glm::translate(whole.world_from_voxel, glm::dvec3(body.lo.x, body.lo.y, body.lo.z));
+  looked_at_ = tight.corners();
+  if (cropped) density_ = crop(grid, density_, body);
+  scene_.volumes = {cropped ? tight : whole};
+  scene_.materials = {{"none", 0.0, {0, 0, 0}},
+                      {"dentin", kIso, {0.80, 0.62, 0.33}},
+                      {"enamel", 0.5 * (kDentin + kEnamel), {0.93, 0.91, 0.85}}};
+}
+
+std::vector<std::uint32_t> BenchTooth::cut(int diameter) {
+  const BrickGrid& bricks = view().bricks;
+  const VoxelGrid& grid = bricks.grid;
+  const VoxelIndex centre = next_place();
+  const double radius = 0.5 * diameter;
+  const VoxelBox box = VoxelBox{centre, {centre.x + 1, centre.y + 1, centre.z + 1}}
+                           .grown(diameter / 2)
+                           .clipped(grid.box());
+  for (int z = box.lo.z; z < box.hi.z; ++z) {
+    for (int y = box.lo.y; y < box.hi.y; ++y) {
+      for (int x = box.lo.x; x < box.hi.x; ++x) {
+        const glm::dvec3 off(x - centre.x, y - centre.y, z - centre.z);
+        if (glm::length(off) <= radius) density_[grid.index(x, y, z)] = 0;
+      }
+    }
+  }
+  std::vector<std::uint32_t> changed;
+  const VoxelBox touched = bricks.bricks_of(box);
+  for (int z = touched.lo.z; z < touched.hi.z; ++z) {
+    for (int y = touched.lo.y; y < touched.hi.y; ++y) {
+      for (int x = touched.lo.x; x < touched.hi.x; ++x) changed.push_back(bricks.id({x, y, z}));
+    }
+  }
+  return changed;
+}
+
+/// To and fro across the crown, a row lower each time; from there in to what is left of the tooth.
+VoxelIndex BenchTooth::next_place() {
+  constexpr int kPlacesAcross = 12, kRows = 6;
+  constexpr double kWidth = 0.36, kTop = 0.82, kRowStep = 0.045;
+  const VoxelGrid& grid = view().bricks.grid;
+  const int row = cuts_ / kPlacesAcross % kRows;
+  const int along = cuts_ % kPlacesAcross;
+  const int across = row % 2 == 0 ? along : kPlacesAcross - 1 - along;
+  ++cuts_;
+  const double x = kWidth * ((across + 0.5) / kPlacesAcross - 0.5);
+  VoxelIndex place{grid.nx / 2 + static_cast<int>(std::lround(x * grid.nz)), 0,
+                   static_cast<int>(std::lround((kTop - kRowStep * row) * grid.nz))};
+  while (place.y < grid.ny - 1 && density_[grid.index(place.x, place.y, place.z)] < view().iso) {
+    ++place.y;
+  }
+  return place;
+}
+
+}  // namespace kerf

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "visualizer/scene_view.hpp"
+#include "visualizer/volume_on_gpu.hpp"
+
+namespace kerf {
+
+/// A made-up molar for timing pictures: crown with four cusps, two roots, enamel over dentin by
+/// density. It is as high as the grid and fills of it what the paper's padded tooth does.
+class BenchTooth {
+ public:
+  /// `cropped`: without the air around; the voxels are the same.
+  BenchTooth(const VoxelGrid& padded, bool cropped);
+
+  [[nodiscard]] const SceneView& scene() const noexcept { return scene_; }
+  [[nodiscard]] const VolumeView& view() const noexcept { return scene_.volumes.front(); }
+  /// The tooth's box, which a picture shows: the same, padded or cropped.
+  [[nodiscard]] const BoxCorners& looked_at() const noexcept { return looked_at_; }
+  [[nodiscard]] const std::vector<Density>& density() const noexcept { return density_; }
+  [[nodiscard]] VolumeContent content() const { return {density_, {}}; }
+
+  /// Takes away a ball of `diameter` voxels at the next place along a path on the crown's side
+  /// that the camera sees. Returns the ids of the bricks that it touches.
+  std::vector<std::uint32_t> cut(int diameter);
+
+ private:
+  [[nodiscard]] VoxelIndex next_place();
+
+  SceneView scene_;
+  BoxCorners looked_at_{};
+  std::vector<Density> density_;
+  int cuts_ = 0;
+};
+
+}  // namespace kerf
