@@ -119,6 +119,12 @@ class Controller {
   Tick now_ = 0;
 };
 
+#ifdef KERF_FEWER_CASES
+constexpr int kEdits = 40;
+#else
+constexpr int kEdits = 200;
+#endif
+
 /// A private folder for the controller's socket.
 struct Place {
   fs::path path = fs::temp_directory_path() / ("kerf-redraw-" + std::to_string(::getpid()));
@@ -147,7 +153,7 @@ TEST_CASE("after any change the part that is drawn again makes the picture of dr
     static_cast<void>(picture.draw(session, figures, target));
     double redrawn = 0;
     int parts = 0;
-    for (int edit = 0; edit < 200; ++edit) {
+    for (int edit = 0; edit < kEdits; ++edit) {
       if (edit % 3 != 2) {
         const VoxelIndex at{below(36), below(40), below(26)};
         const int edge = 1 + below(9);
