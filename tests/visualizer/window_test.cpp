@@ -110,7 +110,16 @@ class User {
   }
 
   void act(const std::string& events) {
-    REQUIRE(std::system(("xdotool " + events + " >/dev/null").c_str()) == 0);
+    // Where xdotool itself could not be started nothing was sent: that says nothing of the window.
+    constexpr int kNotStarted = 127;
+    int status = 0;
+    for (int tries = 0; tries < 3; ++tries) {
+      status = std::system(("xdotool " + events + " >/dev/null").c_str());
+      if (!WIFEXITED(status) || WEXITSTATUS(status) != kNotStarted) break;
+      std::this_thread::sleep_for(std::chrono::milliseconds(300));
+    }
+    CAPTURE(events);
+    REQUIRE(status == 0);
     std::this_thread::sleep_for(std::chrono::milliseconds(300));
   }
 
