@@ -69,21 +69,13 @@ TEST_CASE("the depth of a ball is where its material begins, to 0.15 voxel") {
 
 TEST_CASE("skipping empty cells changes no pixel") {
   if (!have_gl()) return;
-  const TestVolume volume = heap_of_balls();
-  const VolumeContent content = volume.content();
-  const SceneView scene = scene_of({&volume});
-  const RenderTarget target(kTestSize);
-  BlendRenderer skipping(scene, {&content, 1});
-  BlendRenderer plain(scene, {&content, 1}, {.skip_empty = false});
-  for (const View& view :
-       {look_at({14, 9, 20}, {}, 10, 40), look_at({0.1, 0.2, 0.3}, {5, 2, 1}, 0.05, 30),
-        look_at({-9, 9, 9}, {}, 5, 15)}) {
-    const Drawn a = draw(skipping, view, target);
-    const Drawn b = draw(plain, view, target);
-    CHECK(a.rgb == b.rgb);
-    CHECK(a.depth == b.depth);
-    CHECK(*std::min_element(a.depth.begin(), a.depth.end()) < 1.0F);
-  }
+  using Contents = std::span<const VolumeContent>;
+  check_skipping([](const SceneView& scene,
+                    Contents contents) { return std::make_unique<BlendRenderer>(scene, contents); },
+                 [](const SceneView& scene, Contents contents) {
+                   return std::make_unique<BlendRenderer>(
+                       scene, contents, BlendRenderer::Options{.skip_empty = false});
+                 });
 }
 
 TEST_CASE("after random cuts, uploading the changed bricks equals a fresh upload pixel by pixel") {

@@ -165,17 +165,6 @@ const std::array<View, 3> kViews{look_at({14, 9, 20}, {}, 10, 40),
                                  look_at({0.1, 0.2, 0.3}, {5, 2, 1}, 0.05, 30),
                                  look_at({-9, 9, 9}, {}, 5, 15)};
 
-std::vector<std::uint32_t> bricks_in(const BrickGrid& grid, const VoxelBox& box) {
-  std::vector<std::uint32_t> ids;
-  const VoxelBox bricks = grid.bricks_of(box);
-  for (int z = bricks.lo.z; z < bricks.hi.z; ++z) {
-    for (int y = bricks.lo.y; y < bricks.hi.y; ++y) {
-      for (int x = bricks.lo.x; x < bricks.hi.x; ++x) ids.push_back(grid.id({x, y, z}));
-    }
-  }
-  return ids;
-}
-
 }  // namespace
 
 TEST_CASE("N12: depth and normals of a ball and a torus are of second order in the voxel") {

@@ -53,6 +53,17 @@ glm::dmat4 centred(VoxelGrid grid, glm::dvec3 spacing_mm, glm::dvec3 centre_mm) 
                         -middle);
 }
 
+std::vector<std::uint32_t> bricks_in(const BrickGrid& grid, const VoxelBox& box) {
+  std::vector<std::uint32_t> ids;
+  const VoxelBox bricks = grid.bricks_of(box);
+  for (int z = bricks.lo.z; z < bricks.hi.z; ++z) {
+    for (int y = bricks.lo.y; y < bricks.hi.y; ++y) {
+      for (int x = bricks.lo.x; x < bricks.hi.x; ++x) ids.push_back(grid.id({x, y, z}));
+    }
+  }
+  return ids;
+}
+
 double eye_distance_mm(double window_depth, const View& view) {
   const double f = view.far_mm;
   const double n = view.near_mm;

@@ -43,6 +43,9 @@ struct PixelRay {
 };
 [[nodiscard]] PixelRay pixel_ray(const View& view, PictureSize size, int x, int y);
 
+/// Bricks that a box of voxels touches.
+[[nodiscard]] std::vector<std::uint32_t> bricks_in(const BrickGrid& grid, const VoxelBox& box);
+
 struct Drawn {
   std::vector<std::uint8_t> rgb;
   std::vector<float> depth;

@@ -95,6 +95,24 @@ Difference difference(const Drawn& a, const Drawn& b) {
   return difference;
 }
 
+void check_skipping(const MakeRenderer& skipping, const MakeRenderer& plain) {
+  const TestVolume volume = heap_of_balls();
+  const VolumeContent content = volume.content();
+  const SceneView scene = scene_of({&volume});
+  const RenderTarget target(kTestSize);
+  const auto skips = skipping(scene, {&content, 1});
+  const auto looks_everywhere = plain(scene, {&content, 1});
+  for (const View& view :
+       {look_at({14, 9, 20}, {}, 10, 40), look_at({0.1, 0.2, 0.3}, {5, 2, 1}, 0.05, 30),
+        look_at({-9, 9, 9}, {}, 5, 15)}) {
+    const Drawn a = draw(*skips, view, target);
+    const Drawn b = draw(*looks_everywhere, view, target);
+    CHECK(a.rgb == b.rgb);
+    CHECK(a.depth == b.depth);
+    CHECK(*std::min_element(a.depth.begin(), a.depth.end()) < 1.0F);
+  }
+}
+
 void check_updates(const MakeRenderer& make) {
   const VoxelGrid grid{43, 37, 50};
   TestVolume volume(grid, centred(grid, glm::dvec3(0.25)), ball({}, 4.4, 0.5));

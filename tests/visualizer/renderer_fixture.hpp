@@ -43,6 +43,9 @@ struct Difference {
 using MakeRenderer =
     std::function<std::unique_ptr<Renderer>(const SceneView&, std::span<const VolumeContent>)>;
 
+/// A renderer that skips empty cells against one that does not: from outside, from the middle of
+/// the heap, and with the far plane inside the box.
+void check_skipping(const MakeRenderer& skipping, const MakeRenderer& plain);
 /// Random cuts: a renderer that is told the changed bricks against one that is made anew.
 void check_updates(const MakeRenderer& make);
 /// A wall at several depths in a block dims as the transfer function says.

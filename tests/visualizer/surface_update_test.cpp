@@ -14,17 +14,6 @@ using namespace kerf::test;
 
 namespace {
 
-std::vector<std::uint32_t> bricks_in(const BrickGrid& grid, const VoxelBox& box) {
-  std::vector<std::uint32_t> ids;
-  const VoxelBox bricks = grid.bricks_of(box);
-  for (int z = bricks.lo.z; z < bricks.hi.z; ++z) {
-    for (int y = bricks.lo.y; y < bricks.hi.y; ++y) {
-      for (int x = bricks.lo.x; x < bricks.hi.x; ++x) ids.push_back(grid.id({x, y, z}));
-    }
-  }
-  return ids;
-}
-
 /// Applies `change(density, world mm)` to the voxels of a box and returns their bricks.
 template <typename Change>
 std::vector<std::uint32_t> edit(TestVolume& volume, VoxelIndex centre, int reach,
