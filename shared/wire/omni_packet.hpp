@@ -8,6 +8,7 @@
 #include <optional>
 #include <span>
 
+#include "shared/wire/little_endian.hpp"
 #include "shared/wire/omni_constants.hpp"
 
 /// The two isochronous packets of the PHANTOM Omni, byte by byte, for both ends.
@@ -72,23 +73,6 @@ inline constexpr std::uint16_t kReportMark = 0x001E;
 inline constexpr std::uint16_t kReportFlags = 0x1007;
 inline constexpr std::uint16_t kReportFw = 0x5746;
 
-[[nodiscard]] constexpr std::uint16_t get_u16(std::span<const std::uint8_t> bytes,
-                                              std::size_t at) noexcept {
-  return static_cast<std::uint16_t>(bytes[at] | bytes[at + 1] << 8);
-}
-constexpr void put_u16(std::span<std::uint8_t> bytes, std::size_t at, std::uint16_t v) noexcept {
-  bytes[at] = static_cast<std::uint8_t>(v & 0xFF);
-  bytes[at + 1] = static_cast<std::uint8_t>(v >> 8);
-}
-[[nodiscard]] constexpr std::uint32_t get_u32(std::span<const std::uint8_t> bytes,
-                                              std::size_t at) noexcept {
-  return get_u16(bytes, at) | static_cast<std::uint32_t>(get_u16(bytes, at + 2)) << 16;
-}
-constexpr void put_u32(std::span<std::uint8_t> bytes, std::size_t at, std::uint32_t v) noexcept {
-  put_u16(bytes, at, static_cast<std::uint16_t>(v & 0xFFFF));
-  put_u16(bytes, at + 2, static_cast<std::uint16_t>(v >> 16));
-}
-
 /// Motor counts of a relative torque `u` in [-1, 1], the mapping of the open drivers:
 /// floor((u + 1) / 2 * 4095) - 0x7FF. Saturates; NaN gives 0.
 [[nodiscard]] constexpr std::int16_t motor_from_unit(double u) noexcept {
@@ -112,11 +96,11 @@ constexpr void put_u32(std::span<std::uint8_t> bytes, std::size_t at, std::uint3
   omni::CommandBytes bytes{};
   for (std::size_t i = 0; i < 3; ++i) {
     const int word = std::clamp(command.motor[i] + omni::kMotorZero, 0, omni::kMotorWordMax);
-    omni::put_u16(bytes, 2 * i, static_cast<std::uint16_t>(word));
+    wire::put_u16(bytes, 2 * i, static_cast<std::uint16_t>(word));
   }
   const auto light = static_cast<unsigned>(command.light);
   const unsigned on = command.motors_on ? omni::kStatusMotorsOn : 0u;
-  omni::put_u16(bytes, 6, static_cast<std::uint16_t>(omni::kStatusBase | light | on));
+  wire::put_u16(bytes, 6, static_cast<std::uint16_t>(omni::kStatusBase | light | on));
   return bytes;
 }
 
@@ -127,14 +111,14 @@ constexpr void put_u32(std::span<std::uint8_t> bytes, std::size_t at, std::uint3
   if (bytes.size() != omni::kCommandBytes) return std::nullopt;
   OmniCommand command;
   for (std::size_t i = 0; i < 3; ++i) {
-    const int word = omni::get_u16(bytes, 2 * i);
+    const int word = wire::get_u16(bytes, 2 * i);
     if (word > omni::kMotorWordMax) return std::nullopt;
     command.motor[i] = static_cast<std::int16_t>(word - omni::kMotorZero);
   }
-  const unsigned status = omni::get_u16(bytes, 6);
+  const unsigned status = wire::get_u16(bytes, 6);
   constexpr unsigned kVariable = omni::kStatusLightMask | omni::kStatusMotorsOn;
   if ((status & ~kVariable) != omni::kStatusBase) return std::nullopt;
-  if (omni::get_u32(bytes, 8) != 0 || omni::get_u32(bytes, 12) != 0) return std::nullopt;
+  if (wire::get_u32(bytes, 8) != 0 || wire::get_u32(bytes, 12) != 0) return std::nullopt;
   command.light = static_cast<OmniCommand::Light>(status & omni::kStatusLightMask);
   command.motors_on = (status & omni::kStatusMotorsOn) != 0;
   return command;
@@ -143,19 +127,19 @@ constexpr void put_u32(std::span<std::uint8_t> bytes, std::size_t at, std::uint3
 /// Device side.
 [[nodiscard]] constexpr omni::ReportBytes encode(const OmniReport& report) noexcept {
   omni::ReportBytes bytes{};
-  omni::put_u16(bytes, 2, omni::kReportMark);
+  wire::put_u16(bytes, 2, omni::kReportMark);
   for (std::size_t i = 0; i < 3; ++i) {
-    omni::put_u16(bytes, 4 + 2 * i, static_cast<std::uint16_t>(report.encoder[i]));
-    omni::put_u16(bytes, 10 + 2 * i, report.pot_a[i]);
-    omni::put_u16(bytes, 22 + 2 * i, report.pot_b[i]);
+    wire::put_i16(bytes, 4 + 2 * i, report.encoder[i]);
+    wire::put_u16(bytes, 10 + 2 * i, report.pot_a[i]);
+    wire::put_u16(bytes, 22 + 2 * i, report.pot_b[i]);
   }
   bytes[19] = static_cast<std::uint8_t>((report.button1 ? 0 : omni::kButton1Up) |
                                         (report.button2 ? 0 : omni::kButton2Up) |
                                         (report.docked ? 0 : omni::kUndocked));
-  omni::put_u16(bytes, 20, omni::kReportFlags);
-  omni::put_u16(bytes, 28, omni::kReportFw);
-  omni::put_u32(bytes, 32, report.counter);
-  omni::put_u32(bytes, 40, report.counter / 2);
+  wire::put_u16(bytes, 20, omni::kReportFlags);
+  wire::put_u16(bytes, 28, omni::kReportFw);
+  wire::put_u32(bytes, 32, report.counter);
+  wire::put_u32(bytes, 40, report.counter / 2);
   return bytes;
 }
 
@@ -166,14 +150,14 @@ constexpr void put_u32(std::span<std::uint8_t> bytes, std::size_t at, std::uint3
   if (bytes.size() != omni::kReportBytes) return std::nullopt;
   OmniReport report;
   for (std::size_t i = 0; i < 3; ++i) {
-    report.encoder[i] = static_cast<std::int16_t>(omni::get_u16(bytes, 4 + 2 * i));
-    report.pot_a[i] = omni::get_u16(bytes, 10 + 2 * i);
-    report.pot_b[i] = omni::get_u16(bytes, 22 + 2 * i);
+    report.encoder[i] = wire::get_i16(bytes, 4 + 2 * i);
+    report.pot_a[i] = wire::get_u16(bytes, 10 + 2 * i);
+    report.pot_b[i] = wire::get_u16(bytes, 22 + 2 * i);
   }
   report.button1 = (bytes[19] & omni::kButton1Up) == 0;
   report.button2 = (bytes[19] & omni::kButton2Up) == 0;
   report.docked = (bytes[19] & omni::kUndocked) == 0;
-  report.counter = omni::get_u32(bytes, 32);
+  report.counter = wire::get_u32(bytes, 32);
   return report;
 }
 

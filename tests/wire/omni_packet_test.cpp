@@ -5,31 +5,18 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
-#include <string>
-#include <string_view>
-#include <vector>
 
 #include <doctest/doctest.h>
 #include <rapidcheck.h>
+
+#include "tests/wire/hex.hpp"
 
 namespace {
 
 using kerf::OmniCommand;
 using kerf::OmniReport;
-using Bytes = std::vector<std::uint8_t>;
-
-/// "00 1e 07" and "001e07" alike.
-Bytes from_hex(std::string_view text) {
-  Bytes bytes;
-  std::string digits;
-  for (const char c : text) {
-    if (c != ' ') digits += c;
-  }
-  for (std::size_t i = 0; i + 1 < digits.size(); i += 2) {
-    bytes.push_back(static_cast<std::uint8_t>(std::stoi(digits.substr(i, 2), nullptr, 16)));
-  }
-  return bytes;
-}
+using kerf::test::Bytes;
+using kerf::test::from_hex;
 
 template <class Packet>
 Bytes bytes_of(const Packet& packet) {
