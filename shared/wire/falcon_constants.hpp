@@ -36,7 +36,9 @@ inline constexpr double kHipAcrossMm = -23.09;   ///< s
 inline constexpr std::array<double, 3> kLegAzimuthRad{
     // about z, from x towards y
     105.0 * kRadPerDegree, -15.0 * kRadPerDegree, -135.0 * kRadPerDegree};
-inline constexpr double kOriginDepthMm = 110.0;  ///< device z = 0 is p.z = 110 mm: mid workspace
+/// Device z = 0 is p.z = 125 mm: a ball of kReachMm around it has no pose near a singular one.
+inline constexpr double kOriginDepthMm = 125.0;
+inline constexpr double kReachMm = 55.0;
 
 // Joint encoders: t1 = kZeroRad + kRadPerCount * count, once homed.
 inline constexpr double kShaftMm = 14.25;       ///< motor shaft, where the encoder sits
