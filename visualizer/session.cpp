@@ -69,7 +69,7 @@ void Session::read_states() {
     TickRecord record;
     for (; next_state_ < head && !armed_; ++next_state_) {
       if (reader.state_at(next_state_, record) != ReadState::ok) continue;
-      if ((record.flags & kFlagArmed) != 0) armed_ = record.tick;
+      if ((record.flags & kFlagStarted) != 0) armed_ = record.tick;
     }
   }
   if (auto newest = reader.latest()) latest_ = newest;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "controller/device/omni_driver.hpp"
 
-#include <array>
-#include <span>
+#include <algorithm>
+#include <cstdint>
 
 #include "shared/wire/omni_packet.hpp"
 
@@ -11,11 +11,12 @@ namespace {
 
 OmniCommand::Light light_of(Phase phase) noexcept {
   switch (phase) {
+    case Phase::off:
     case Phase::calibrating:
       return OmniCommand::Light::slow_flash;
     case Phase::fault:
       return OmniCommand::Light::fast_flash;
-    case Phase::docked:
+    case Phase::armed:
     case Phase::ramping:
     case Phase::active:
       return OmniCommand::Light::steady;
@@ -25,51 +26,38 @@ OmniCommand::Light light_of(Phase phase) noexcept {
 
 }  // namespace
 
-DeviceReport OmniDriver::read() noexcept {
-  last_.fresh = false;
-  // One byte more than a report: a longer packet shows by its size.
-  std::array<std::uint8_t, omni::kReportBytes + 1> packet;
-  for (int taken = 0; taken < kMaxDrain; ++taken) {
-    const std::size_t size = port_.receive(packet);
-    if (size == 0) break;
-    const auto report =
-        size <= packet.size() ? decode_report(std::span(packet).first(size)) : std::nullopt;
-    if (!report) {
-      ++refused_;
-      continue;
-    }
-    if (seen_) {
-      // A counter that steps back or stands still is an old packet: keep the newer one.
-      const std::uint32_t step = report->counter - last_.counter;
-      if (step == 0 || step > UINT32_MAX / 2) {
-        ++refused_;
-        continue;
-      }
-      lost_ += step - 1;
-    }
-    seen_ = true;
-    last_ = {.fresh = true,
-             .encoder = report->encoder,
-             .wiper_a = report->pot_a,
-             .wiper_b = report->pot_b,
-             .button1 = report->button1,
-             .button2 = report->button2,
-             .docked = report->docked,
-             .counter = report->counter};
+bool OmniDriver::take(std::span<const std::uint8_t> packet, DeviceReport& report) noexcept {
+  const auto said = decode_report(packet);
+  if (!said) return false;
+  if (seen_) {
+    // A counter that steps back or stands still is an old packet: keep the newer one.
+    const std::uint32_t step = said->counter - report.counter;
+    if (step == 0 || step > UINT32_MAX / 2) return false;
+    lost_ += step - 1;
   }
-  return last_;
+  seen_ = true;
+  report.encoder = said->encoder;
+  report.wiper_a = said->pot_a;
+  report.wiper_b = said->pot_b;
+  report.button1 = said->button1;
+  report.button2 = said->button2;
+  report.parked = said->docked;
+  report.counter = said->counter;
+  return true;
 }
 
-void OmniDriver::command(const ServoOutput& output) noexcept {
-  const bool on = output.motors_on && !released_.load(std::memory_order_relaxed);
-  const OmniCommand command{.motor = on ? output.motor_counts : std::array<std::int16_t, 3>{},
-                            .motors_on = on,
-                            .light = light_of(output.phase)};
-  port_.send(encode(command));
+std::size_t OmniDriver::compose(const ServoOutput& output, Packet& packet) noexcept {
+  const auto bytes = encode(OmniCommand{.motor = output.motor_counts,
+                                        .motors_on = output.motors_on,
+                                        .light = light_of(output.phase)});
+  std::ranges::copy(bytes, packet.begin());
+  return bytes.size();
 }
 
-bool OmniDriver::release() const noexcept {
-  return port_.send(encode(OmniCommand{}));
+std::size_t OmniDriver::compose_release(Packet& packet) const noexcept {
+  const auto bytes = encode(OmniCommand{});
+  std::ranges::copy(bytes, packet.begin());
+  return bytes.size();
 }
 
 }  // namespace kerf

@@ -2,27 +2,120 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 
 #include "controller/scene/matrices.hpp"
 #include "controller/scene/scene.hpp"
 #include "controller/servo/servo_plan.hpp"
+#include "shared/wire/falcon_constants.hpp"
+#include "shared/wire/omni_constants.hpp"
+#include "shared/wire/wooden_constants.hpp"
 
 namespace kerf {
 
-/// The device's place in the scene and its motors, as the loop's numbers hold them.
+namespace device_parts {
+
+/// How a joint of the servo's kinematics follows its encoder, and its motor the joint.
+struct JointSense {
+  double home_rad = 0;       ///< angle where the count is 0
+  double rad_per_count = 0;  ///< signed
+  double motor_sign = 1;     ///< of the count that gives a positive torque
+};
+
+/// Joints turret, thigh and forearm of a serial arm; the legs of the Falcon.
+inline std::array<JointSense, 3> joints_of(const Scene::Device& device) {
+  std::array<JointSense, 3> joints;
+  for (std::size_t i = 0; i < 3; ++i) {
+    switch (device.personality) {
+      case Personality::omni:
+        joints[i] = {device.dock_rad[i], omni::kEncoderSign[i] * omni::kRadPerCount, 1};
+        break;
+      case Personality::falcon:
+        joints[i] = {falcon::kZeroRad, falcon::kRadPerCount, double(falcon::kMotorSign)};
+        break;
+      case Personality::woodenhaptics: {
+        constexpr std::array<double, 3> kSign{-1, -1, 1};  // A = -q1, B = pi/2 - q2, C = q3
+        constexpr std::array<double, 3> kZeroRad{0, wooden::kPi / 2, 0};
+        joints[i] = {kZeroRad[i], kSign[i] * wooden::kRadPerCount[i], kSign[i]};
+        break;
+      }
+    }
+  }
+  return joints;
+}
+
+template <class N>
+SerialArm<N> serial_arm_of(Personality personality) {
+  using Real = typename N::Real;
+  if (personality == Personality::woodenhaptics) {
+    return {Real(wooden::kUpperLinkMm), Real(wooden::kForearmMm),
+            Real(wooden::kShoulderHeightMm - wooden::kOriginHeightMm),
+            Real(wooden::kOriginDepthMm)};
+  }
+  return {Real(omni::kUpperLinkMm), Real(omni::kForearmMm), Real(omni::kOriginHeightMm),
+          Real(omni::kOriginDepthMm)};
+}
+
+template <class N>
+DeltaArm<N> delta_arm() {
+  using Real = typename N::Real;
+  using Unit = typename N::Unit;
+  DeltaArm<N> arm{.hub_mm = Real(falcon::kHipOutMm - falcon::kPlateOutMm),
+                  .crank_mm = Real(falcon::kThighMm),
+                  .parallelogram_mm = Real(falcon::kShinMm),
+                  .hinges_mm = Real(falcon::kShinEndMm + falcon::kKneeEndMm),
+                  .side_mm = Real(falcon::kPlateAcrossMm - falcon::kHipAcrossMm),
+                  .origin_depth_mm = Real(falcon::kOriginDepthMm),
+                  .azimuth = {}};
+  for (std::size_t i = 0; i < 3; ++i) {
+    arm.azimuth[i] = {Unit(std::sin(falcon::kLegAzimuthRad[i])),
+                      Unit(std::cos(falcon::kLegAzimuthRad[i]))};
+  }
+  return arm;
+}
+
+inline std::int32_t motor_count_end(Personality personality) {
+  switch (personality) {
+    case Personality::omni:
+      return -omni::kMotorCountMin;
+    case Personality::falcon:
+      return falcon::kMotorCountMax;
+    case Personality::woodenhaptics:
+      break;
+  }
+  return wooden::kMaxMilliamps;
+}
+
+}  // namespace device_parts
+
+/// The device, its place in the scene and its motors, as the loop's numbers hold them.
 template <class N>
 void plan_device(const Scene::Device& device, ServoPlan<N>& plan) {
   using Real = typename N::Real;
-  using Angle = typename N::Angle;
-  plan.dock = {Angle(device.dock_rad[0]), Angle(device.dock_rad[1]), Angle(device.dock_rad[2])};
   plan.workspace_scale = Real(device.workspace_scale);
   plan.offset_mm = rounded<WorldVec<Real>, Real>(device.offset_mm);
-  plan.motors_configured = device.torque_scale.has_value();
-  if (!device.torque_scale) return;
+
+  DevicePlan<N>& arm = plan.device;
+  arm.personality = device.personality;
+  arm.absolute_encoders = device.personality != Personality::omni;
+  arm.serial = device_parts::serial_arm_of<N>(device.personality);
+  arm.delta = device_parts::delta_arm<N>();
+  arm.motor_count_end = device_parts::motor_count_end(device.personality);
+  arm.motors_configured = device.torque_scale.has_value();
+  const auto joints = device_parts::joints_of(device);
   for (std::size_t i = 0; i < 3; ++i) {
-    plan.counts_per_n_mm[i] = Real(1.0 / (*device.torque_scale)[i]);
+    arm.joints[i].home_rad = typename N::Angle(joints[i].home_rad);
+    if constexpr (N::kIsFixed) {
+      constexpr auto kOne = static_cast<double>(std::int64_t{1} << kAnglePerCountBits);
+      arm.joints[i].angle_per_count = static_cast<std::int64_t>(joints[i].rad_per_count * kOne);
+    } else {
+      arm.joints[i].angle_per_count = joints[i].rad_per_count;
+    }
+    if (!device.torque_scale) continue;
+    arm.joints[i].counts_per_n_mm = Real(joints[i].motor_sign / (*device.torque_scale)[i]);
   }
 }
 
@@ -48,7 +141,7 @@ void plan_limits(const Scene& scene, ServoPlan<N>& plan) {
                  // Below 500 Hz a tick is longer than the 2 ms: the first bad one trips.
                  .not_finite_ticks = static_cast<std::uint32_t>(2 * rate_hz / 1000),
                  .fade_in_ticks = ticks(100),
-                 .dock_ticks = ticks(50)};
+                 .rest_ticks = ticks(50)};
 }
 
 }  // namespace kerf

@@ -10,6 +10,7 @@
 #include "controller/kernel/gradient.hpp"
 #include "controller/kernel/tool_offset.hpp"
 #include "controller/scene/volume_image.hpp"
+#include "controller/servo/personality.hpp"
 
 namespace kerf {
 
@@ -63,11 +64,12 @@ struct Scene {
   std::vector<Material> materials;
 
   struct Device {
-    std::string personality = "omni";
-    double workspace_scale = 1.0;                       ///< x_scene = scale * x_device
-    std::array<double, 3> offset_mm{0, 0, 0};           ///< scene point under the device origin
-    std::optional<std::array<double, 3>> torque_scale;  ///< N mm per DAC count; none: motors off
-    std::array<double, 3> dock_rad{0.0, 0.23, -0.37};   ///< joint angles in the inkwell
+    Personality personality = Personality::omni;
+    double workspace_scale = 1.0;              ///< x_scene = scale * x_device
+    std::array<double, 3> offset_mm{0, 0, 0};  ///< scene point under the device origin
+    std::optional<std::array<double, 3>>
+        torque_scale;  ///< N mm at the joint per motor count; none: off
+    std::array<double, 3> dock_rad{0.0, 0.23, -0.37};  ///< of the Omni: joint angles in the inkwell
   } device;
   struct Force {
     double p0_n_per_mm2 = 0.06;

@@ -22,7 +22,8 @@ using Keys = std::string_view[];
 // shows.
 constexpr Range kWorldMm{-kLargestWorldMm, kLargestWorldMm};
 constexpr Range kWorkspaceScale{kMinWorkspaceScale, kMaxWorkspaceScale};
-constexpr Range kTorqueScale{-10, 10};  // N mm per count; the sign is the motor's
+constexpr Range kTorqueScale{-kMaxTorqueScale,
+                             kMaxTorqueScale};  // N mm per count; the sign is the motor's
 constexpr Range kAngleRad{-3.15, 3.15};
 constexpr Range kPressureNPerMm2{0, 1000};
 constexpr Range kCutRatePerS{0, 100000};
@@ -41,7 +42,6 @@ constexpr Keys kLimitKeys = {"force_n", "continuous_force_n", "slew_n_per_ms", "
 constexpr Keys kServoKeys = {"rate_hz", "numeric", "kernel"};
 constexpr Keys kHandKeys = {"script"};
 
-constexpr Keys kPersonalities = {"omni"};
 constexpr Keys kForceModels = {kPaperForce};
 constexpr Keys kCutRateWords = {"1/T"};
 
@@ -53,9 +53,7 @@ void read_choice(const SceneTable& table, std::string_view key,
 
 void read_device_table(const SceneTable& table, SceneSpec& scene) {
   Scene::Device& device = scene.device;
-  if (const auto index = table.choice("personality", kPersonalities)) {
-    device.personality = kPersonalities[*index];
-  }
+  read_choice(table, "personality", kPersonalityWords, device.personality);
   device.workspace_scale =
       table.number("workspace_scale", kWorkspaceScale).value_or(device.workspace_scale);
   scene.offset_given = table.has("offset_mm");
@@ -63,11 +61,14 @@ void read_device_table(const SceneTable& table, SceneSpec& scene) {
   device.torque_scale = table.numbers<3>("torque_scale", kTorqueScale);
   if (device.torque_scale) {
     for (const double scale : *device.torque_scale) {
-      if (std::abs(scale) < 1e-3) {
+      if (std::abs(scale) < kMinTorqueScale) {
         refuse(table.place("torque_scale"),
                " is below 0.001 N mm per count; leave the key out to keep the motors off");
       }
     }
+  }
+  if (table.has("dock_rad") && device.personality != Personality::omni) {
+    refuse(table.place("dock_rad"), " is of the Omni's inkwell; leave it out for this device");
   }
   device.dock_rad = table.numbers<3>("dock_rad", kAngleRad).value_or(device.dock_rad);
 }

@@ -16,6 +16,8 @@ namespace kerf {
 
 inline constexpr double kMinWorkspaceScale = 0.01, kMaxWorkspaceScale = 100;
 inline constexpr double kLargestWorldMm = 10000;  ///< a third of the range of the loop's numbers
+inline constexpr double kMinTorqueScale = 1e-3;   // N mm per count
+inline constexpr double kMaxTorqueScale = 10;
 inline constexpr int kMinRateHz = 250;            // slower than the hand can be held stable
 inline constexpr int kMaxRateHz = 8000;           // one tick per cycle of the FireWire bus
 inline constexpr std::size_t kMaxMaterials = 32;  // labels are small indices

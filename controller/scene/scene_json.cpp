@@ -72,7 +72,7 @@ json material_json(const Material& material) {
 }
 
 json device_json(const Scene::Device& device) {
-  json object = {{"personality", device.personality},
+  json object = {{"personality", kPersonalityWords[static_cast<std::size_t>(device.personality)]},
                  {"workspace_scale", device.workspace_scale},
                  {"offset_mm", device.offset_mm},
                  {"dock_rad", device.dock_rad}};

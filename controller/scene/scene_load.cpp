@@ -76,6 +76,11 @@ void apply_overrides(const SceneOverrides& overrides, SceneSpec& scene) {
   }
   scene.servo.rate_hz = overrides.rate_hz.value_or(scene.servo.rate_hz);
   scene.servo.numeric = overrides.numeric.value_or(scene.servo.numeric);
+  if (overrides.personality && *overrides.personality != scene.device.personality) {
+    scene.device.personality = *overrides.personality;
+    scene.device.torque_scale.reset();  // of another device's motors
+  }
+  if (overrides.torque_scale) scene.device.torque_scale = overrides.torque_scale;
   if (scene.cut_in_one_tick) scene.cut.rate_per_s = scene.servo.rate_hz;
 }
 

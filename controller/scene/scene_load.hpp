@@ -11,12 +11,14 @@ namespace kerf {
 
 /// What the command line may change of a scene. Spacing and window belong to the first volume.
 struct SceneOverrides {
-  std::optional<std::filesystem::path> volume_file{};  ///< --volume, "phantom" or a path
-  std::optional<std::array<double, 3>> spacing_mm{};   ///< --spacing a[,b,c]
-  std::optional<std::array<double, 2>> window{};       ///< --window lo,hi
-  std::optional<int> rate_hz{};                        ///< --rate
-  std::optional<NumericKind> numeric{};                ///< --numeric
-  std::optional<VoxelGrid> phantom_size{};             ///< every phantom, for tests and the lab
+  std::optional<std::filesystem::path> volume_file{};   ///< --volume, "phantom" or a path
+  std::optional<std::array<double, 3>> spacing_mm{};    ///< --spacing a[,b,c]
+  std::optional<std::array<double, 2>> window{};        ///< --window lo,hi
+  std::optional<int> rate_hz{};                         ///< --rate
+  std::optional<NumericKind> numeric{};                 ///< --numeric
+  std::optional<Personality> personality{};             ///< --device; torque_scale counts no more
+  std::optional<std::array<double, 3>> torque_scale{};  ///< --torque-scale a,b,c
+  std::optional<VoxelGrid> phantom_size{};              ///< every phantom, for tests and the lab
 };
 
 /// The tool of the default scene, at scale 1; `--volume` makes any other feel like it.

@@ -7,9 +7,9 @@
 #include <cstdint>
 #include <limits>
 
+#include "controller/servo/device_plan.hpp"
 #include "controller/servo/device_report.hpp"
-#include "controller/servo/kinematics/omni.hpp"
-#include "controller/servo/servo_plan.hpp"
+#include "controller/servo/kinematics/omni_gimbal.hpp"
 #include "controller/servo/servo_state.hpp"
 
 namespace kerf {
@@ -17,19 +17,19 @@ namespace kerf {
 /// Where the device is, from one good report.
 template <class N>
 struct DevicePose {
-  OmniPose<N> arm;
-  DeviceVec<typename N::Real> tip_mm;
-  Rotation<N> rotation;
+  ArmPose<N> arm;
+  Rotation<N> rotation = identity_rotation<N>();
   std::array<typename N::Angle, 3> gimbal{};  ///< yaw, pitch, roll
 };
 
 inline constexpr std::int32_t kRestCounts = 2;  ///< steps of an encoder that jitters at an edge
 
-/// Follows the encoders over the wrap at 16 bits. After `dock_ticks` at rest in the inkwell the
-/// counters start again from 0: that is the calibration. Returns whether it holds in this report.
-inline bool follow_encoders(const DeviceReport& report, std::uint32_t dock_ticks,
+/// Follows the encoders over the wrap at 16 bits. Parked at rest for `rest_ticks` and homed, the
+/// counters start again, from 0 or from the device's absolute counts: that is the calibration.
+/// Returns whether it holds in this report.
+inline bool follow_encoders(const DeviceReport& report, bool absolute, std::uint32_t rest_ticks,
                             EncoderState& encoders) noexcept {
-  bool at_rest = report.docked;
+  bool at_rest = report.parked && report.homed;
   for (std::size_t i = 0; i < 3; ++i) {
     const auto step = static_cast<std::int16_t>(report.encoder[i] - encoders.last[i]);
     constexpr std::int64_t kEnd = std::numeric_limits<std::int32_t>::max();  // either sign fits
@@ -38,10 +38,11 @@ inline bool follow_encoders(const DeviceReport& report, std::uint32_t dock_ticks
     encoders.last[i] = report.encoder[i];
     at_rest = at_rest && step >= -kRestCounts && step <= kRestCounts;
   }
-  encoders.rest_ticks = at_rest ? std::min(encoders.rest_ticks + 1, dock_ticks) : 0;
-  const bool calibrated = encoders.rest_ticks >= dock_ticks;
-  if (calibrated) encoders.unwrapped = {};
-  return calibrated;
+  encoders.rest_ticks = at_rest ? std::min(encoders.rest_ticks + 1, rest_ticks) : 0;
+  if (encoders.rest_ticks < rest_ticks) return false;
+  encoders.unwrapped = {};
+  if (absolute) std::ranges::copy(report.encoder, encoders.unwrapped.begin());
+  return true;
 }
 
 inline void follow_gimbal(const DeviceReport& report, GimbalFilter& filter) noexcept {
@@ -55,22 +56,37 @@ inline void follow_gimbal(const DeviceReport& report, GimbalFilter& filter) noex
   filter.next = (filter.next + 1) % GimbalFilter::kSamples;
 }
 
-/// Forward kinematics of the filtered counts.
+/// Angle of `counts` encoder steps from home.
 template <class N>
-[[nodiscard]] DevicePose<N> device_pose(const ServoPlan<N>& plan, const EncoderState& encoders,
+[[nodiscard]] constexpr typename N::Angle joint_angle(const JointPlan<N>& joint,
+                                                      std::int32_t counts) noexcept {
+  if constexpr (N::kIsFixed) {
+    return joint.home_rad + N::Angle::from_wide(counts * joint.angle_per_count, kAnglePerCountBits);
+  } else {
+    return joint.home_rad + typename N::Angle(joint.angle_per_count * counts);
+  }
+}
+
+/// Forward kinematics of the filtered counts. A device without a gimbal never turns the tool.
+template <class N>
+[[nodiscard]] DevicePose<N> device_pose(const DevicePlan<N>& device, const EncoderState& encoders,
                                         const GimbalFilter& gimbal) noexcept {
-  const auto joint = [&](std::size_t i, typename N::Angle dock) {
-    return dock + angle_of_counts<N>(omni::kEncoderSign[i] * encoders.unwrapped[i]);
-  };
-  const OmniJoints<N> joints{joint(0, plan.dock.turret), joint(1, plan.dock.thigh),
-                             joint(2, plan.dock.forearm)};
-  const std::array<std::uint32_t, 3> a{gimbal.sum[0], gimbal.sum[1], gimbal.sum[2]};
-  const std::array<std::uint32_t, 3> b{gimbal.sum[3], gimbal.sum[4], gimbal.sum[5]};
+  std::array<typename N::Angle, 3> angles;
+  for (std::size_t i = 0; i < 3; ++i) {
+    angles[i] = joint_angle(device.joints[i], encoders.unwrapped[i]);
+  }
   DevicePose<N> pose;
-  pose.arm = omni_pose(joints);
-  pose.tip_mm = omni_tip<N>(pose.arm);
-  pose.gimbal = omni_gimbal<N>(a, b);
-  pose.rotation = omni_orientation<N>(joints, pose.gimbal);
+  if (device.personality == Personality::falcon) {
+    pose.arm = delta_arm_pose(device.delta, angles);
+    return pose;
+  }
+  const SerialJoints<N> joints{angles[0], angles[1], angles[2]};
+  pose.arm = serial_arm_pose(device.serial, joints);
+  if (device.personality == Personality::omni) {
+    pose.gimbal = omni_gimbal<N>({gimbal.sum[0], gimbal.sum[1], gimbal.sum[2]},
+                                 {gimbal.sum[3], gimbal.sum[4], gimbal.sum[5]});
+    pose.rotation = omni_orientation<N>(joints, pose.gimbal);
+  }
   return pose;
 }
 

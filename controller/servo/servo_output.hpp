@@ -14,11 +14,12 @@ inline constexpr double kContactThresholdN = 0.01;  ///< a tick with more force 
 
 /// Where the safety of the loop stands. Motors are on in `ramping` and `active` only.
 enum class Phase : std::uint8_t {
-  calibrating,  ///< never docked yet: the joint angles are unknown
-  docked,       ///< in the inkwell, calibrated
-  ramping,      ///< left the inkwell: force fades in
+  off,          ///< no report has come yet
+  calibrating,  ///< never parked at rest yet, or homing lost: the joint angles are unknown
+  armed,        ///< calibrated and parked: waits for the hand
+  ramping,      ///< taken in hand: force fades in
   active,
-  fault  ///< latched; the next docking clears it
+  fault  ///< latched; parking at rest clears it
 };
 
 /// Why the force went to zero. Values go into logs: append only.
@@ -47,16 +48,16 @@ enum class Fault : std::uint32_t {
 ///
 /// Physical values are converted from the loop's numbers exactly; nothing here flows back.
 struct ServoOutput {
-  std::array<std::int16_t, 3> motor_counts{};  ///< signed DAC counts, 0 = no torque
+  std::array<std::int16_t, 3> motor_counts{};  ///< signed counts of the device, 0 = no torque
   bool motors_on = false;
-  Phase phase = Phase::calibrating;
+  Phase phase = Phase::off;
   Fault fault = Fault::none;
-  bool armed = false;      ///< calibrated and out of the inkwell at least once: ticks count
+  bool started = false;    ///< was armed and taken in hand at least once: ticks count
   bool stale = false;      ///< no fresh report in this tick
-  bool saturated = false;  ///< force, slew, thermal or DAC limit was active
+  bool saturated = false;  ///< force, slew, thermal or motor limit was active
   bool contact = false;    ///< commanded force above 0.01 N
 
-  std::array<std::int32_t, 3> joint_counts{};  ///< unwrapped since docking
+  std::array<std::int32_t, 3> joint_counts{};  ///< unwrapped since calibration
   std::array<double, 3> gimbal_rad{};          ///< yaw, pitch, roll
   std::array<double, 3> position_mm{};         ///< tip in the scene
   std::array<double, 9> rotation{};            ///< world from the tool as felt, row-major

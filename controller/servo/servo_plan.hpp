@@ -10,8 +10,8 @@
 #include "controller/kernel/kernel_set.hpp"
 #include "controller/kernel/milling.hpp"
 #include "controller/kernel/tool_offset.hpp"
+#include "controller/servo/device_plan.hpp"
 #include "controller/servo/force_limits.hpp"
-#include "controller/servo/kinematics/omni.hpp"
 #include "controller/servo/servo_limits.hpp"
 #include "controller/servo/sum_to_force.hpp"
 #include "controller/servo/supervisor.hpp"
@@ -92,11 +92,9 @@ struct ServoPlan {
   bool cutting = false;
   RemovalRate<N> removal_rate;
 
-  OmniJoints<N> dock;                  ///< joint angles in the inkwell
+  DevicePlan<N> device;
   typename N::Real workspace_scale{};  ///< x_scene = scale * x_device + offset
   WorldVec<typename N::Real> offset_mm;
-  bool motors_configured = false;
-  std::array<typename N::Real, 3> counts_per_n_mm{};  ///< DAC counts per motor torque, signed
 
   ForceLimits<N> limits;
   SafetyTiming timing;

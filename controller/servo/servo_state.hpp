@@ -11,7 +11,8 @@
 #include "controller/kernel/splat_table.hpp"
 #include "controller/servo/force_limits.hpp"
 #include "controller/servo/hash_chain.hpp"
-#include "controller/servo/kinematics/omni.hpp"
+#include "controller/servo/kinematics/arm_pose.hpp"
+#include "controller/servo/kinematics/rotation.hpp"
 #include "controller/servo/servo_output.hpp"
 #include "controller/servo/supervisor.hpp"
 
@@ -25,11 +26,11 @@ struct VolumeState {
   std::span<RemovalCarry<N>> carry;  ///< fractions of density steps still owed
 };
 
-/// Joint counters since the last docking.
+/// Joint counters since the last calibration.
 struct EncoderState {
   std::array<std::int16_t, 3> last{};
-  std::array<std::int32_t, 3> unwrapped{};  ///< counts since the inkwell, beyond 16 bits
-  std::uint32_t rest_ticks = 0;             ///< reports in a row: docked, and no joint turning
+  std::array<std::int32_t, 3> unwrapped{};  ///< counts from home, beyond 16 bits
+  std::uint32_t rest_ticks = 0;             ///< reports in a row: parked, and no joint turning
 };
 
 /// Sliding sum over the last 20 gimbal readings: the pots' low bits are noise.
@@ -58,7 +59,7 @@ struct ServoState {
   std::uint32_t active_tool = 0;
   bool hold = false;  ///< asked by command: force 0, nothing is cut
 
-  OmniPose<N> arm;         ///< of the last good report
+  Levers<N> lever_mm;      ///< of the last good report
   DeviceVec<Real> tip_mm;  ///< device port
   Rotation<N> rotation = identity_rotation<N>();
   bool tip_known = false;  ///< false before the first report

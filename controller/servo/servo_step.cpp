@@ -11,7 +11,6 @@
 #include "controller/servo/device_pose.hpp"
 #include "controller/servo/hash_chain.hpp"
 #include "controller/servo/tool_forces.hpp"
-#include "shared/wire/omni_constants.hpp"
 
 namespace kerf {
 namespace {
@@ -61,14 +60,14 @@ bool move_tip(const ServoPlan<N>& plan, ServoState<N>& state, const DevicePose<N
               std::uint32_t gap) noexcept {
   using Real = typename N::Real;
   if (!state.tip_known) {
-    state.tip_mm = pose.tip_mm;
-    state.tip_history.fill(pose.tip_mm);
+    state.tip_mm = pose.arm.tip_mm;
+    state.tip_history.fill(pose.arm.tip_mm);
   }
-  const auto moved_mm = pose.tip_mm - state.tip_mm;
+  const auto moved_mm = pose.arm.tip_mm - state.tip_mm;
   const auto ticks = Real(static_cast<double>(std::clamp<std::uint32_t>(gap, 1, 1000)));
   const bool overspeed = norm(moved_mm) > plan.speed_limit_mm_per_tick * ticks;
   absorb<N>(state.absorbed_mj, state.force_n, moved_mm);
-  state.tip_mm = pose.tip_mm;
+  state.tip_mm = pose.arm.tip_mm;
   state.rotation = pose.rotation;
   state.tip_known = true;
   return overspeed;
@@ -85,7 +84,7 @@ std::array<double, 3> advance_velocity(const ServoPlan<N>& plan, ServoState<N>& 
   return {moved_mm[0] * per_s, moved_mm[1] * per_s, moved_mm[2] * per_s};
 }
 
-/// What the converters give: signed counts, and the share of the force that they can carry.
+/// What the motors get: signed counts, and the share of the force that they can carry.
 template <class N>
 struct MotorCommand {
   std::array<std::int16_t, 3> counts{};
@@ -97,35 +96,36 @@ struct MotorCommand {
 template <class N>
 MotorCommand<N> motor_command(const ServoPlan<N>& plan,
                               JointVec<typename N::Real> torque_n_mm) noexcept {
-  constexpr std::int64_t kEnd = -omni::kMotorCountMin;
   const std::array<typename N::Real, 3> torque{torque_n_mm.x, torque_n_mm.y, torque_n_mm.z};
   MotorCommand<N> command;
   if constexpr (N::kIsFixed) {
     constexpr int kBits = 32;  // Q16 * Q16
+    const std::int64_t end = plan.device.motor_count_end;
     std::array<std::int64_t, 3> wide{};
-    std::int64_t largest = kEnd << kBits;
+    std::int64_t largest = end << kBits;
     for (std::size_t i = 0; i < 3; ++i) {
-      wide[i] = std::int64_t{torque[i].raw()} * plan.counts_per_n_mm[i].raw();
+      wide[i] = std::int64_t{torque[i].raw()} * plan.device.joints[i].counts_per_n_mm.raw();
       largest = std::max(largest, wide[i] < 0 ? -wide[i] : wide[i]);
     }
-    // kEnd / largest with 30 fraction bits. No product exceeds kEnd with 12 + 30 fraction bits.
-    const std::int64_t share = (kEnd << (30 + 20)) / (largest >> (kBits - 20));
+    // end / largest with 30 fraction bits. No product exceeds end, 13 bits, with 12 + 30 more.
+    const std::int64_t share = (end << (30 + 20)) / (largest >> (kBits - 20));
     command.share = N::Unit::from_raw(static_cast<std::int32_t>(share));
     for (std::size_t i = 0; i < 3; ++i) {
       command.counts[i] = static_cast<std::int16_t>(round_shift((wide[i] >> 20) * share, 12 + 30));
     }
   } else {
     using Real = typename N::Real;
+    const auto end = static_cast<Real>(plan.device.motor_count_end);
     std::array<Real, 3> wide{};
-    Real largest(kEnd);
+    Real largest = end;
     for (std::size_t i = 0; i < 3; ++i) {
-      wide[i] = torque[i] * plan.counts_per_n_mm[i];
+      wide[i] = torque[i] * plan.device.joints[i].counts_per_n_mm;
       largest = std::max(largest, wide[i] < 0 ? -wide[i] : wide[i]);
     }
-    command.share = Real(kEnd) / largest;
+    command.share = end / largest;
     for (std::size_t i = 0; i < 3; ++i) {
       // Half up, as in fixed: the offset keeps the argument of the cast positive.
-      constexpr int kOffset = 4096;
+      constexpr int kOffset = 8192;
       command.counts[i] = static_cast<std::int16_t>(
           static_cast<int>(wide[i] * command.share + Real(kOffset) + Real(0.5)) - kOffset);
     }
@@ -166,19 +166,20 @@ struct Sensed {
 template <class N>
 Sensed<N> sense(const ServoPlan<N>& plan, ServoState<N>& state,
                 const DeviceReport& report) noexcept {
-  SafetyInputs seen{.fresh = report.fresh, .docked = report.docked};
+  SafetyInputs seen{.fresh = report.fresh, .parked = report.parked, .homed = report.homed};
   if (report.fresh) {
-    seen.calibrated = follow_encoders(report, plan.timing.dock_ticks, state.encoders);
+    seen.calibrated = follow_encoders(report, plan.device.absolute_encoders, plan.timing.rest_ticks,
+                                      state.encoders);
     follow_gimbal(report, state.gimbal);
   }
   Sensed<N> sensed;
-  sensed.pose = device_pose(plan, state.encoders, state.gimbal);
-  seen.finite = all_finite(sensed.pose.tip_mm);
+  sensed.pose = device_pose(plan.device, state.encoders, state.gimbal);
+  seen.finite = all_finite(sensed.pose.arm.tip_mm);
   sensed.usable = seen.fresh && seen.finite;
   if (sensed.usable) {
-    state.arm = sensed.pose.arm;
+    state.lever_mm = sensed.pose.arm.lever_mm;
     const std::uint32_t gap = state.supervisor.stale_ticks + 1;
-    seen.overspeed = move_tip(plan, state, sensed.pose, gap) && !report.docked;
+    seen.overspeed = move_tip(plan, state, sensed.pose, gap) && !report.parked;
   }
   sensed.velocity_mm_per_s = advance_velocity(plan, state);
   sensed.tip_mm = relabel<WorldSpace>(state.tip_mm * plan.workspace_scale) + plan.offset_mm;
@@ -225,7 +226,7 @@ void drive(const ServoPlan<N>& plan, ServoState<N>& state, DeviceVec<typename N:
   if (state.supervisor.motors_on() && !all_finite(wanted_n)) {
     latch(Fault::not_finite, state.supervisor);
   }
-  out.motors_on = state.supervisor.motors_on() && plan.motors_configured;
+  out.motors_on = state.supervisor.motors_on() && plan.device.motors_configured;
   if (!out.motors_on) {
     heat_up(plan.limits, state.thermal, {});
     state.force_n = {};
@@ -233,13 +234,13 @@ void drive(const ServoPlan<N>& plan, ServoState<N>& state, DeviceVec<typename N:
   }
   const DeviceVec<Real> limited_n =
       limited_force(plan.limits, state.thermal, wanted_n, state.force_n);
-  const MotorCommand<N> motors = motor_command(plan, omni_torque<N>(state.arm, limited_n));
+  const MotorCommand<N> motors = motor_command(plan, state.lever_mm * limited_n);
   out.motor_counts = motors.counts;
   state.force_n = {multiply<Real>(motors.share, limited_n.x),
                    multiply<Real>(motors.share, limited_n.y),
                    multiply<Real>(motors.share, limited_n.z)};
   out.saturated = !(state.force_n == wanted_n);
-  const JointVec<Real> torque_n_mm = omni_torque<N>(state.arm, state.force_n);
+  const JointVec<Real> torque_n_mm = state.lever_mm * state.force_n;
   out.torque_n_mm = {as_double(torque_n_mm.x), as_double(torque_n_mm.y), as_double(torque_n_mm.z)};
 }
 
@@ -250,7 +251,7 @@ void tell(const ServoPlan<N>& plan, ServoState<N>& state, const Sensed<N>& sense
   using Real = typename N::Real;
   out.phase = state.supervisor.phase;
   out.fault = state.supervisor.fault;
-  out.armed = state.supervisor.armed;
+  out.started = state.supervisor.started;
   out.stale = !fresh;
   out.contact = norm(state.force_n) > Real(kContactThresholdN);
   for (std::size_t i = 0; i < 3; ++i) {

@@ -13,31 +13,34 @@ struct SafetyTiming {
   std::uint32_t zero_ticks = 20;       ///< then the force falls to zero by here (20 ms)
   std::uint32_t not_finite_ticks = 2;  ///< NaN for longer: motors off
   std::uint32_t fade_in_ticks = 100;   ///< after arming
-  std::uint32_t dock_ticks = 50;       ///< at rest in the inkwell this long: calibrated (50 ms)
+  std::uint32_t rest_ticks = 50;       ///< parked at rest this long: calibrated (50 ms)
 };
 
 /// What the supervisor saw in this tick.
 struct SafetyInputs {
   bool fresh = false;
-  bool docked = false;      ///< the device says so in this report
-  bool calibrated = false;  ///< and has rested there for `dock_ticks`
+  bool parked = false;      ///< the device says so in this report
+  bool calibrated = false;  ///< and has rested there for `rest_ticks`
+  bool homed = true;        ///< its encoders have a meaning
   bool finite = true;
   bool overspeed = false;
 };
 
 /// State machine in front of the motors. Motors are on only while it says so; a fault latches until
-/// the stylus has been at rest in the inkwell again.
+/// the device has been parked at rest again.
 ///
-///   calibrating --rest--> docked --left inkwell--> ramping --fade in--> active
-///                           ^------------ docked ------------'            |
-///                           '--- rest -- fault <------- any fault --------'
+///   off --report--> calibrating --rest--> armed --taken--> ramping --fade in--> active
+///                     ^                   ^  ^                |                   |
+///                     |                   |  '---- parked ----+-------------------+
+///                     '---- homing lost --+-------------------+-------------------'
+///                                         '-- rest -- fault <-- any fault, of either
 ///
-/// The docked bit alone switches the motors off, but only rest calibrates and clears: one corrupt
+/// The parked bit alone switches the motors off, but only rest calibrates and clears: one corrupt
 /// packet must neither move the tip nor forgive a fault.
 struct Supervisor {
-  Phase phase = Phase::calibrating;
+  Phase phase = Phase::off;
   Fault fault = Fault::none;
-  bool armed = false;
+  bool started = false;
   std::uint32_t stale_ticks = 0;
   std::uint32_t not_finite_ticks = 0;
   std::uint32_t fade_ticks = 0;
@@ -50,19 +53,28 @@ struct Supervisor {
 /// One tick of the state machine. Bounded, no clock.
 constexpr void supervise(const SafetyTiming& timing, const SafetyInputs& in,
                          Supervisor& s) noexcept {
-  s.stale_ticks = in.fresh ? 0 : s.stale_ticks + (s.stale_ticks < UINT32_MAX ? 1U : 0U);
-  s.not_finite_ticks =
-      in.finite ? 0 : s.not_finite_ticks + (s.not_finite_ticks < UINT32_MAX ? 1U : 0U);
+  const auto count = [](bool bad, std::uint32_t& ticks) {
+    ticks = bad ? ticks + (ticks < UINT32_MAX ? 1U : 0U) : 0;
+  };
+  count(!in.fresh, s.stale_ticks);
+  count(!in.finite, s.not_finite_ticks);
 
-  if (in.fresh && in.docked) {
-    if (in.calibrated) s.fault = Fault::none;
-    if (in.calibrated || s.motors_on()) s.phase = Phase::docked;
-    return;
-  }
-  if (s.phase == Phase::docked && in.fresh) {
-    s.phase = Phase::ramping;
-    s.fade_ticks = 0;
-    s.armed = true;
+  if (in.fresh) {
+    if (s.phase == Phase::off) s.phase = Phase::calibrating;
+    if (!in.homed) {
+      if (s.phase != Phase::fault) s.phase = Phase::calibrating;
+      return;
+    }
+    if (in.parked) {
+      if (in.calibrated) s.fault = Fault::none;
+      if (in.calibrated || s.motors_on()) s.phase = Phase::armed;
+      return;
+    }
+    if (s.phase == Phase::armed) {
+      s.phase = Phase::ramping;
+      s.fade_ticks = 0;
+      s.started = true;
+    }
   }
   if (!s.motors_on()) return;
 

@@ -3,11 +3,15 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <cstddef>
 #include <iostream>
+#include <string_view>
 #include <vector>
 
 #include <CLI/CLI.hpp>
 
+#include "controller/scene/scene_file.hpp"
 #include "controller/scene/scene_words.hpp"
 
 namespace kerf {
@@ -25,6 +29,16 @@ std::array<double, 3> three_of(const std::vector<double>& values) {
   return {values[0], values[1], values[2]};
 }
 
+template <std::size_t N>
+std::vector<std::string> words_of(const std::array<std::string_view, N>& words) {
+  return {words.begin(), words.end()};
+}
+
+template <std::size_t N>
+std::ptrdiff_t index_of(const std::array<std::string_view, N>& words, const std::string& word) {
+  return std::ranges::find(words, word) - words.begin();
+}
+
 }  // namespace
 
 std::optional<int> parse_options(int argc, const char* const* argv, ControllerOptions& options) {
@@ -38,6 +52,8 @@ std::optional<int> parse_options(int argc, const char* const* argv, ControllerOp
   std::vector<double> window;
   int rate_hz = 0;
   std::string numeric;
+  std::string device;
+  std::vector<double> torque_scale;
   app.add_option("--scene", options.scene, "scene file (TOML)")->required()->type_name("FILE");
   auto* volume_option =
       app.add_option("--volume", volume,
@@ -54,9 +70,15 @@ std::optional<int> parse_options(int argc, const char* const* argv, ControllerOp
           ->delimiter(',')
           ->expected(2)
           ->type_name("LO,HI");
-  app.add_option("--device", options.device, "device personality")
-      ->check(CLI::IsMember({"omni"}))
-      ->capture_default_str();
+  auto* device_option = app.add_option("--device", device, "what is held, instead of the scene's")
+                            ->check(CLI::IsMember(words_of(kPersonalityWords)))
+                            ->type_name("NAME");
+  auto* torque_option = app.add_option("--torque-scale", torque_scale,
+                                       "N mm at the joint per motor count, instead of the scene's")
+                            ->delimiter(',')
+                            ->expected(3)
+                            ->check(CLI::Range(-kMaxTorqueScale, kMaxTorqueScale))
+                            ->type_name("A,B,C");
   app.add_option("--port", options.port, "where the device is: socket:PATH of kerf-emulator")
       ->type_name("PORT");
   constexpr double kLongestS = 1e7;  // 115 days
@@ -69,8 +91,7 @@ std::optional<int> parse_options(int argc, const char* const* argv, ControllerOp
                           ->type_name("HZ");
   auto* numeric_option =
       app.add_option("--numeric", numeric, "numbers of the loop, instead of the scene's")
-          ->check(
-              CLI::IsMember(std::vector<std::string>(kNumericWords.begin(), kNumericWords.end())));
+          ->check(CLI::IsMember(words_of(kNumericWords)));
   app.add_option("--name", options.name, "name under which readers find the segment")
       ->capture_default_str();
   app.add_flag("--virtual", options.virtual_time,
@@ -124,6 +145,12 @@ std::optional<int> parse_options(int argc, const char* const* argv, ControllerOp
   for (const double edge_mm : spacing_mm) {
     if (!(edge_mm > 0)) return refuse("--spacing: a voxel edge is above 0 mm, for example 0.125");
   }
+  for (const double scale : torque_scale) {
+    if (std::abs(scale) < kMinTorqueScale) {
+      return refuse(
+          "--torque-scale is below 0.001 N mm per count; leave it out to keep the motors off");
+    }
+  }
   const bool runs = !options.check && !options.explain;
   if (runs && options.port.empty()) {
     return refuse("--port is missing; give socket:PATH, where kerf-emulator listens");
@@ -136,9 +163,13 @@ std::optional<int> parse_options(int argc, const char* const* argv, ControllerOp
   if (*spacing_option) options.overrides.spacing_mm = three_of(spacing_mm);
   if (*window_option) options.overrides.window = std::array{window[0], window[1]};
   if (*rate_option) options.overrides.rate_hz = rate_hz;
-  if (*numeric_option)
-    options.overrides.numeric =
-        static_cast<NumericKind>(std::ranges::find(kNumericWords, numeric) - kNumericWords.begin());
+  if (*numeric_option) {
+    options.overrides.numeric = static_cast<NumericKind>(index_of(kNumericWords, numeric));
+  }
+  if (*torque_option) options.overrides.torque_scale = three_of(torque_scale);
+  if (*device_option) {
+    options.overrides.personality = static_cast<Personality>(index_of(kPersonalityWords, device));
+  }
   return std::nullopt;
 }
 

@@ -14,7 +14,6 @@ namespace kerf {
 struct ControllerOptions {
   std::string scene;
   SceneOverrides overrides;
-  std::string device = "omni";
   std::string port;               ///< socket:PATH
   std::optional<double> seconds;  ///< servo time after arming; none: until stopped
   std::string name = "kerf";

@@ -19,7 +19,7 @@
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 
-#include "controller/device/omni_driver.hpp"
+#include "controller/device/make_driver.hpp"
 #include "controller/device/socket_port.hpp"
 #include "controller/scene/compile.hpp"
 #include "controller/scene/scene_json.hpp"
@@ -60,7 +60,7 @@ const char* text_of(EndReason end) {
     case EndReason::never_armed:
       break;
   }
-  return "the stylus was never docked";
+  return "the device was never calibrated";
 }
 
 /// What the demo script hands to the emulator.
@@ -123,7 +123,7 @@ void show_progress(const LoopSignals& signals, const std::atomic<bool>& ended,
     char text[64];
     std::snprintf(text, sizeof text, "%.1f s", done_s);
     bar.show(options.seconds ? done_s / *options.seconds : 0,
-             done_s > 0 ? text : "waiting for the stylus in the inkwell");
+             done_s > 0 ? text : "waiting for calibration");
     for (int i = 0; i < 10 && !ended.load(); ++i) std::this_thread::sleep_for(kWatchPeriod);
   }
 }
@@ -185,7 +185,7 @@ void check_run(const ControllerOptions& options, const Scene& scene, const Scene
 RunReport new_report(const ControllerOptions& options, const Scene& scene, std::uint64_t hash) {
   RunReport report;
   report.scene = options.scene;
-  report.device = options.device;
+  report.device = kPersonalityWords[static_cast<std::size_t>(scene.device.personality)];
   report.numeric = word_of(scene.servo.numeric);
   report.rate_hz = scene.servo.rate_hz;
   report.virtual_time = options.virtual_time;
@@ -213,7 +213,7 @@ struct Run {
   SegmentWriter& segment;
   SegmentServer& server;
   Servo& servo;
-  OmniDriver& device;
+  DeviceDriver& device;
   std::atomic<bool>& stop;
   RunReport& report;
 };
@@ -297,7 +297,9 @@ int run_controller(const ControllerOptions& options) {
     if (stop) return 1;  // asked to end before there was a device: nothing to tell
     throw;
   }
-  OmniDriver device(*port);
+  const std::unique_ptr<DeviceDriver> driver = make_driver(scene.device.personality, *port);
+  DeviceDriver& device = *driver;
+  device.start();
   if (!options.virtual_time) {
     report.missing_rights = lock_memory();
     if (!segment.locked() && report.missing_rights.empty()) {

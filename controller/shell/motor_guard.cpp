@@ -9,14 +9,14 @@
 namespace kerf {
 namespace {
 
-std::atomic<OmniDriver*> guarded{nullptr};  // a signal handler can reach nothing but globals
-static_assert(std::atomic<OmniDriver*>::is_always_lock_free);
+std::atomic<DeviceDriver*> guarded{nullptr};  // a signal handler can reach nothing but globals
+static_assert(std::atomic<DeviceDriver*>::is_always_lock_free);
 
 constexpr int kCrashes[] = {SIGSEGV, SIGBUS,  SIGFPE,  SIGILL,  SIGABRT, SIGQUIT,
                             SIGSYS,  SIGTRAP, SIGXCPU, SIGALRM, SIGUSR1, SIGUSR2};
 
 void on_crash(int signal) {
-  if (OmniDriver* device = guarded.load()) {
+  if (DeviceDriver* device = guarded.load()) {
     static_cast<void>(device->release_for_good());  // one send(): signal-safe
   }
   std::raise(signal);  // the handler was reset on entry: this ends the program
@@ -31,7 +31,7 @@ void handle_crashes(void (*handler)(int)) noexcept {
 
 }  // namespace
 
-MotorGuard::MotorGuard(OmniDriver& device) noexcept : device_(device) {
+MotorGuard::MotorGuard(DeviceDriver& device) noexcept : device_(device) {
   guarded = &device;
   handle_crashes(on_crash);
 }

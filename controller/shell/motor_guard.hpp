@@ -4,7 +4,7 @@
 #include <array>
 #include <cstddef>
 
-#include "controller/device/omni_driver.hpp"
+#include "controller/device/device_driver.hpp"
 
 namespace kerf {
 
@@ -15,7 +15,7 @@ namespace kerf {
 /// One at a time per process; the servo thread calls `guard_stack` once.
 class MotorGuard {
  public:
-  explicit MotorGuard(OmniDriver& device) noexcept;
+  explicit MotorGuard(DeviceDriver& device) noexcept;
   ~MotorGuard();
   MotorGuard(const MotorGuard&) = delete;
   MotorGuard& operator=(const MotorGuard&) = delete;
@@ -26,7 +26,7 @@ class MotorGuard {
 
  private:
   static constexpr std::size_t kStackBytes = 65536;
-  OmniDriver& device_;
+  DeviceDriver& device_;
   alignas(16) std::array<std::byte, kStackBytes> stack_{};
 };
 

@@ -26,13 +26,13 @@ std::uint32_t flags_of(const DeviceReport& report, const ServoOutput& output) no
   };
   set(report.button1, kFlagButton1);
   set(report.button2, kFlagButton2);
-  set(report.docked, kFlagDocked);
+  set(report.parked, kFlagParked);
   set(output.contact, kFlagContact);
   set(output.saturated, kFlagClamped);
   set(output.stale, kFlagStaleInput);
   set(output.fault != Fault::none, kFlagDeviceFault);
   set(output.motors_on, kFlagMotorsOn);
-  set(output.armed, kFlagArmed);
+  set(output.started, kFlagStarted);
   return flags;
 }
 
@@ -42,8 +42,8 @@ void put_raw(const DeviceReport& report, TickRecord& record) noexcept {
     record.raw[kRawPot + i] = report.wiper_a[i];
     record.raw[kRawPot + 3 + i] = report.wiper_b[i];
   }
-  record.raw[kRawStatus] =
-      (report.button1 ? 1 : 0) | (report.button2 ? 2 : 0) | (report.docked ? 4 : 0);
+  record.raw[kRawStatus] = (report.button1 ? 1 : 0) | (report.button2 ? 2 : 0) |
+                           (report.parked ? 4 : 0) | (report.homed ? 0 : 8);
   record.raw[kRawDeviceCounter] = static_cast<std::int32_t>(report.counter);
 }
 

@@ -36,7 +36,7 @@ class Bookkeeper {
       record_.add_fault(tick, fault_name(output.fault));
     }
     last_fault_ = output.fault;
-    if (!output.armed) return;
+    if (!output.started) return;
     if (record_.ticks == 0) {
       record_.armed_at_tick = tick;
       start();
@@ -79,7 +79,7 @@ class Bookkeeper {
 
 }  // namespace
 
-EndReason run_servo(TickSource& clock, OmniDriver& device, Servo& servo, Publisher& eyes,
+EndReason run_servo(TickSource& clock, DeviceDriver& device, Servo& servo, Publisher& eyes,
                     SegmentServer& commands, const LoopLimits& limits, LoopSignals& signals,
                     RunRecord& record) noexcept {
   EndReason end = EndReason::stopped;
@@ -127,7 +127,7 @@ EndReason run_servo(TickSource& clock, OmniDriver& device, Servo& servo, Publish
       end = EndReason::device_gone;
       break;
     }
-    if (!output.armed && tick >= limits.arming_ticks) {
+    if (!output.started && tick >= limits.arming_ticks) {
       end = EndReason::never_armed;
       break;
     }

@@ -4,7 +4,7 @@
 #include <atomic>
 #include <cstdint>
 
-#include "controller/device/omni_driver.hpp"
+#include "controller/device/device_driver.hpp"
 #include "controller/servo/servo.hpp"
 #include "controller/shell/publisher.hpp"
 #include "controller/shell/run_record.hpp"
@@ -33,7 +33,7 @@ struct LoopSignals {
 /// The loop around the servo step: time, device, step, device, eyes, statistics. Runs on the
 /// calling thread until a limit is met or somebody asks to stop; the motors are off when it
 /// returns.
-EndReason run_servo(TickSource& clock, OmniDriver& device, Servo& servo, Publisher& eyes,
+EndReason run_servo(TickSource& clock, DeviceDriver& device, Servo& servo, Publisher& eyes,
                     SegmentServer& commands, const LoopLimits& limits, LoopSignals& signals,
                     RunRecord& record) noexcept;
 

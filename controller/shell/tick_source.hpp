@@ -3,7 +3,7 @@
 
 #include <cstdint>
 
-#include "controller/device/omni_driver.hpp"
+#include "controller/device/device_driver.hpp"
 #include "controller/shell/clock.hpp"
 
 namespace kerf {
@@ -34,7 +34,7 @@ class RealTimeTicks final : public TickSource {
 /// seconds of real time lets ticks pass without a report until it speaks again.
 class LockStepTicks final : public TickSource {
  public:
-  explicit LockStepTicks(OmniDriver& device) noexcept : device_(device) {}
+  explicit LockStepTicks(DeviceDriver& device) noexcept : device_(device) {}
   std::int64_t wait_next() noexcept override {
     silent_ = !device_.wait(silent_ ? 0 : kPatienceMs);
     return 0;
@@ -43,7 +43,7 @@ class LockStepTicks final : public TickSource {
 
  private:
   static constexpr int kPatienceMs = 2000;
-  OmniDriver& device_;
+  DeviceDriver& device_;
   bool silent_ = false;
 };
 

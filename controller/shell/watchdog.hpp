@@ -3,7 +3,7 @@
 
 #include <cstdint>
 
-#include "controller/device/omni_driver.hpp"
+#include "controller/device/device_driver.hpp"
 #include "controller/shell/servo_loop.hpp"
 
 namespace kerf {
@@ -14,7 +14,7 @@ class Watchdog {
  public:
   static constexpr std::int64_t kPatienceNs = 20'000'000;
 
-  Watchdog(const OmniDriver& device, LoopSignals& signals) noexcept
+  Watchdog(const DeviceDriver& device, LoopSignals& signals) noexcept
       : device_(device), signals_(signals) {}
 
   /// Call every few milliseconds.
@@ -36,7 +36,7 @@ class Watchdog {
   [[nodiscard]] std::uint64_t trips() const noexcept { return trips_; }
 
  private:
-  const OmniDriver& device_;
+  const DeviceDriver& device_;
   LoopSignals& signals_;
   std::uint64_t last_heartbeat_ = 0;
   std::int64_t last_change_ns_ = 0;

@@ -160,12 +160,12 @@ inline constexpr std::uint32_t kFlagClamped = 1U << 4;    ///< force or slew lim
 inline constexpr std::uint32_t kFlagStaleInput = 1U << 5;
 inline constexpr std::uint32_t kFlagDeviceFault = 1U << 6;
 inline constexpr std::uint32_t kFlagMotorsOn = 1U << 7;
-inline constexpr std::uint32_t kFlagDocked = 1U << 8;
-inline constexpr std::uint32_t kFlagArmed = 1U << 9;
+inline constexpr std::uint32_t kFlagParked = 1U << 8;
+inline constexpr std::uint32_t kFlagStarted = 1U << 9;
 
 inline constexpr std::size_t kRawEncoder = 0;  ///< first of 3
 inline constexpr std::size_t kRawPot = 3;      ///< first of 6
-inline constexpr std::size_t kRawStatus = 9;
+inline constexpr std::size_t kRawStatus = 9;   ///< bits: button 1, button 2, parked, not homed
 inline constexpr std::size_t kRawDeviceCounter = 10;
 
 /// Why a box of voxels changed.

@@ -144,7 +144,7 @@ GoldenRun golden_run(GoldenScene which, NumericKind numeric, const KernelSet& ke
     const bool is_new = out.fault != last.fault;
     run.stale_faults += is_new && out.fault == Fault::stale_input ? 1 : 0;
     run.speed_faults += is_new && out.fault == Fault::overspeed ? 1 : 0;
-    run.outings += last.phase == Phase::docked && out.phase == Phase::ramping ? 1 : 0;
+    run.outings += last.phase == Phase::armed && out.phase == Phase::ramping ? 1 : 0;
     for (std::size_t v = 0; v < volumes; ++v) run.removed_steps[v] += out.removed_by_volume[v];
     last = out;
   }

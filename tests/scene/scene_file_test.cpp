@@ -56,7 +56,7 @@ TEST_CASE("the smallest scene takes every default") {
   CHECK(scene.tools[0].turns);
   CHECK_FALSE(scene.offset_given);
   CHECK_FALSE(scene.device.torque_scale);  // motors off
-  CHECK(scene.device.personality == "omni");
+  CHECK(scene.device.personality == kerf::Personality::omni);
   CHECK(scene.force.p0_n_per_mm2 == 0.06);
   CHECK(scene.cut.model == kerf::CutModel::overlap);
   CHECK(scene.limits.force_n == 3.3);

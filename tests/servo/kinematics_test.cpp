@@ -4,8 +4,10 @@
 #include <doctest/doctest.h>
 #include <rapidcheck.h>
 
-#include "controller/servo/kinematics/omni.hpp"
+#include "controller/servo/kinematics/omni_gimbal.hpp"
+#include "controller/servo/kinematics/serial_arm.hpp"
 #include "hil/devmodel/omni_arm.hpp"
+#include "shared/wire/omni_constants.hpp"
 
 using kerf::DeviceVec;
 using kerf::DoubleNumbers;
@@ -21,6 +23,16 @@ kerf::JointVec<double> random_joints() {
   };
   const double thigh = between(0.0, 1.5);
   return {between(-0.98, 0.98), thigh, thigh + between(-0.8, 1.2)};
+}
+
+template <class N>
+kerf::ArmPose<N> omni_pose(const kerf::JointVec<double>& q) {
+  using Real = typename N::Real;
+  using Angle = typename N::Angle;
+  namespace omni = kerf::omni;
+  return kerf::serial_arm_pose<N>({Real(omni::kUpperLinkMm), Real(omni::kForearmMm),
+                                   Real(omni::kOriginHeightMm), Real(omni::kOriginDepthMm)},
+                                  {Angle(q.x), Angle(q.y), Angle(q.z)});
 }
 
 template <class N>
@@ -50,9 +62,7 @@ TEST_CASE_TEMPLATE("the tip agrees with the emulator's own kinematics", N, Fixed
   const kerf::OmniArm arm;
   CHECK(rc::check([&] {
     const auto q = random_joints();
-    using Angle = typename N::Angle;
-    const auto pose = kerf::omni_pose<N>({Angle(q.x), Angle(q.y), Angle(q.z)});
-    RC_ASSERT(worst<N>(kerf::omni_tip<N>(pose), arm.tip_mm(q)) < tolerance_mm);
+    RC_ASSERT(worst<N>(omni_pose<N>(q).tip_mm, arm.tip_mm(q)) < tolerance_mm);
   }));
 }
 
@@ -65,10 +75,9 @@ TEST_CASE_TEMPLATE("torques push the tip with the commanded force, by the emulat
            0.99);  // away from the stretched arm, where J is singular
     const auto component = [] { return *rc::gen::inRange(-3000, 3001) / 1000.0; };
     const DeviceVec<double> force{component(), component(), component()};
-    using Angle = typename N::Angle;
     using Real = typename N::Real;
-    const auto pose = kerf::omni_pose<N>({Angle(q.x), Angle(q.y), Angle(q.z)});
-    const auto torque = kerf::omni_torque<N>(pose, {Real(force.x), Real(force.y), Real(force.z)});
+    const auto torque =
+        omni_pose<N>(q).lever_mm * DeviceVec<Real>{Real(force.x), Real(force.y), Real(force.z)};
     const auto felt = arm.tip_force_n(q, {double(torque.x), double(torque.y), double(torque.z)});
     RC_ASSERT(std::abs(felt.x - force.x) < 2e-3);
     RC_ASSERT(std::abs(felt.y - force.y) < 2e-3);

@@ -213,14 +213,14 @@ TEST_CASE("one packet with the docked bit neither moves the tip nor forgives a f
   arm_at(*servo, arm, 0, 5, 0);
   const ServoOutput before = settled(*servo, arm, 0, 0.3, 0);
   auto glitch = arm.at(0, 0.3, 0);
-  glitch.docked = true;
+  glitch.parked = true;
   CHECK_FALSE(servo->step(glitch).motors_on);
   const ServoOutput after = servo->step(arm.at(0, 0.3, 0));
   CHECK(after.position_mm == before.position_mm);
   CHECK(length(after.force_n) < 0.1 * length(before.force_n));  // fades in again
   for (int ms = 0; ms < 30; ++ms) static_cast<void>(servo->step({}));
   glitch = arm.at(0, 0.3, 0);
-  glitch.docked = true;
+  glitch.parked = true;
   CHECK(servo->step(glitch).fault == Fault::stale_input);
   CHECK_FALSE(servo->step(arm.at(0, 0.3, 0)).motors_on);
 }
@@ -231,7 +231,7 @@ TEST_CASE("a stylus that moves while the docked bit is set is not calibrated") {
   FakeArm arm;
   for (int tick = 0; tick < 100; ++tick) {
     auto report = arm.at(0, -30 + tick * 0.5, 0);
-    report.docked = true;
+    report.parked = true;
     CHECK(servo->step(report).phase == Phase::calibrating);
   }
 }

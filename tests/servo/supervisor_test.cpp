@@ -15,8 +15,9 @@ using kerf::Supervisor;
 namespace {
 
 constexpr SafetyTiming kTiming;
-constexpr SafetyInputs kDocked{.fresh = true, .docked = true, .calibrated = true};
-constexpr SafetyInputs kDockBit{.fresh = true, .docked = true};  // not yet at rest
+constexpr SafetyInputs kRested{.fresh = true, .parked = true, .calibrated = true};
+constexpr SafetyInputs kParkBit{.fresh = true, .parked = true};  // not yet at rest
+constexpr SafetyInputs kUnhomed{.fresh = true, .homed = false};
 constexpr SafetyInputs kFree{.fresh = true};
 constexpr SafetyInputs kSilent{};
 
@@ -30,48 +31,84 @@ Supervisor after(std::initializer_list<std::pair<SafetyInputs, int>> script) {
 
 std::vector<SafetyInputs> all_inputs() {
   std::vector<SafetyInputs> inputs;
-  for (unsigned bits = 0; bits < 32; ++bits) {
+  for (unsigned bits = 0; bits < 64; ++bits) {
+    const bool homed = (bits & 32) == 0;
     inputs.push_back({.fresh = (bits & 1) != 0,
-                      .docked = (bits & 2) != 0,
-                      .calibrated = (bits & 18) == 18,
+                      .parked = (bits & 2) != 0,
+                      .calibrated = (bits & 18) == 18 && homed,
+                      .homed = homed,
                       .finite = (bits & 4) != 0,
                       .overspeed = (bits & 8) != 0});
   }
   return inputs;
 }
 
-}  // namespace
-
-TEST_CASE("motors stay off until the stylus was docked and taken out again") {
-  CHECK_FALSE(after({{kFree, 1000}}).motors_on());
-  CHECK_FALSE(after({{kDocked, 1000}}).motors_on());
-  CHECK(after({{kDocked, 1}, {kFree, 1}}).phase == Phase::ramping);
-  CHECK(after({{kDocked, 1}, {kFree, 150}}).phase == Phase::active);
+/// The arrows of the diagram in supervisor.hpp, each with what it needs.
+bool is_legal(const Supervisor& before, Phase after, const SafetyInputs& in) {
+  const bool parked = in.fresh && in.homed && in.parked;
+  const bool rested = parked && in.calibrated;
+  switch (after) {
+    case Phase::off:
+      return false;
+    case Phase::calibrating:
+      return in.fresh &&
+             (before.phase == Phase::off || (!in.homed && before.phase != Phase::fault));
+    case Phase::armed:
+      return rested || (parked && before.motors_on());
+    case Phase::ramping:
+      return before.phase == Phase::armed && in.fresh && in.homed && !in.parked;
+    case Phase::active:
+      return before.phase == Phase::ramping;
+    case Phase::fault:
+      return before.motors_on() || before.phase == Phase::armed;  // taken and found bad in one tick
+  }
+  return false;
 }
 
-TEST_CASE("docking switches the motors off and clears a fault") {
-  CHECK_FALSE(after({{kDocked, 1}, {kFree, 150}, {kDocked, 1}}).motors_on());
+}  // namespace
+
+TEST_CASE("motors stay off until the device was parked and taken in hand") {
+  CHECK_FALSE(after({{kFree, 1000}}).motors_on());
+  CHECK_FALSE(after({{kRested, 1000}}).motors_on());
+  CHECK(after({{kRested, 1}, {kFree, 1}}).phase == Phase::ramping);
+  CHECK(after({{kRested, 1}, {kFree, 150}}).phase == Phase::active);
+}
+
+TEST_CASE("parking switches the motors off and clears a fault") {
+  CHECK_FALSE(after({{kRested, 1}, {kFree, 150}, {kRested, 1}}).motors_on());
   const Supervisor again =
-      after({{kDocked, 1}, {kFree, 150}, {kSilent, 30}, {kDocked, 1}, {kFree, 1}});
+      after({{kRested, 1}, {kFree, 150}, {kSilent, 30}, {kRested, 1}, {kFree, 1}});
   CHECK(again.fault == Fault::none);
   CHECK(again.phase == Phase::ramping);
 }
 
-TEST_CASE("the docked bit alone switches off, but neither calibrates nor forgives") {
-  CHECK(after({{kDockBit, 1000}}).phase == Phase::calibrating);
-  CHECK(after({{kDockBit, 1}, {kFree, 10}}).phase == Phase::calibrating);
-  CHECK_FALSE(after({{kDocked, 1}, {kFree, 150}, {kDockBit, 1}}).motors_on());
-  CHECK(after({{kDocked, 1}, {kFree, 150}, {kDockBit, 1}, {kFree, 1}}).phase == Phase::ramping);
-  const Supervisor faulty = after({{kDocked, 1}, {kFree, 150}, {kSilent, 30}, {kDockBit, 5}});
+TEST_CASE("the parked bit alone switches off, but neither calibrates nor forgives") {
+  CHECK(after({{kParkBit, 1000}}).phase == Phase::calibrating);
+  CHECK(after({{kParkBit, 1}, {kFree, 10}}).phase == Phase::calibrating);
+  CHECK_FALSE(after({{kRested, 1}, {kFree, 150}, {kParkBit, 1}}).motors_on());
+  CHECK(after({{kRested, 1}, {kFree, 150}, {kParkBit, 1}, {kFree, 1}}).phase == Phase::ramping);
+  const Supervisor faulty = after({{kRested, 1}, {kFree, 150}, {kSilent, 30}, {kParkBit, 5}});
   CHECK(faulty.fault == Fault::stale_input);
   CHECK(faulty.phase == Phase::fault);
 }
 
+TEST_CASE("a device that loses its homing must be homed and parked again") {
+  CHECK(after({{kUnhomed, 100}}).phase == Phase::calibrating);
+  const Supervisor lost = after({{kRested, 1}, {kFree, 150}, {kUnhomed, 1}});
+  CHECK(lost.phase == Phase::calibrating);
+  CHECK_FALSE(lost.motors_on());
+  CHECK(after({{kRested, 1}, {kFree, 150}, {kUnhomed, 1}, {kFree, 500}}).phase ==
+        Phase::calibrating);
+  CHECK(after({{kRested, 1}, {kFree, 150}, {kUnhomed, 1}, {kRested, 1}, {kFree, 1}}).phase ==
+        Phase::ramping);
+  CHECK(after({{kRested, 1}, {kFree, 150}, {kSilent, 20}, {kUnhomed, 9}}).phase == Phase::fault);
+}
+
 TEST_CASE("missing reports: tolerated for less than 20 ms, then a latched fault") {
-  CHECK(after({{kDocked, 1}, {kFree, 150}, {kSilent, 19}}).motors_on());
-  const Supervisor gone = after({{kDocked, 1}, {kFree, 150}, {kSilent, 20}});
+  CHECK(after({{kRested, 1}, {kFree, 150}, {kSilent, 19}}).motors_on());
+  const Supervisor gone = after({{kRested, 1}, {kFree, 150}, {kSilent, 20}});
   CHECK(gone.fault == Fault::stale_input);
-  CHECK(after({{kDocked, 1}, {kFree, 150}, {kSilent, 20}, {kFree, 500}}).phase == Phase::fault);
+  CHECK(after({{kRested, 1}, {kFree, 150}, {kSilent, 20}, {kFree, 500}}).phase == Phase::fault);
 }
 
 TEST_CASE("the held force is whole up to 5 ms and gone at 20 ms, falling in between") {
@@ -84,10 +121,10 @@ TEST_CASE("the held force is whole up to 5 ms and gone at 20 ms, falling in betw
 
 TEST_CASE("too fast, or not finite for more than 2 ms, ends the motors at once") {
   const SafetyInputs fast{.fresh = true, .overspeed = true};
-  CHECK(after({{kDocked, 1}, {kFree, 150}, {fast, 1}}).fault == Fault::overspeed);
+  CHECK(after({{kRested, 1}, {kFree, 150}, {fast, 1}}).fault == Fault::overspeed);
   const SafetyInputs nan{.fresh = true, .finite = false};
-  CHECK(after({{kDocked, 1}, {kFree, 150}, {nan, 2}}).motors_on());
-  CHECK(after({{kDocked, 1}, {kFree, 150}, {nan, 3}}).fault == Fault::not_finite);
+  CHECK(after({{kRested, 1}, {kFree, 150}, {nan, 2}}).motors_on());
+  CHECK(after({{kRested, 1}, {kFree, 150}, {nan, 3}}).fault == Fault::not_finite);
 }
 
 TEST_CASE("every reachable state and input: only legal transitions, no motors with a fault") {
@@ -95,9 +132,12 @@ TEST_CASE("every reachable state and input: only legal transitions, no motors wi
   constexpr SafetyTiming kShort{
       .hold_ticks = 1, .zero_ticks = 3, .not_finite_ticks = 1, .fade_in_ticks = 2};
   const auto key = [](const Supervisor& s) {
-    return std::array<std::uint32_t, 6>{
-        static_cast<std::uint32_t>(s.phase), static_cast<std::uint32_t>(s.fault), s.armed ? 1U : 0U,
-        std::min(s.stale_ticks, 5U),         std::min(s.not_finite_ticks, 4U),    s.fade_ticks};
+    return std::array<std::uint32_t, 6>{static_cast<std::uint32_t>(s.phase),
+                                        static_cast<std::uint32_t>(s.fault),
+                                        s.started ? 1U : 0U,
+                                        std::min(s.stale_ticks, 5U),
+                                        std::min(s.not_finite_ticks, 4U),
+                                        s.fade_ticks};
   };
   std::vector<Supervisor> states{Supervisor{}};
   std::vector<std::array<std::uint32_t, 6>> seen{key(states[0])};
@@ -108,18 +148,12 @@ TEST_CASE("every reachable state and input: only legal transitions, no motors wi
       kerf::supervise(kShort, input, s);
       REQUIRE((s.phase == Phase::fault) == (s.fault != Fault::none));
       REQUIRE_FALSE((s.motors_on() && s.fault != Fault::none));
-      REQUIRE((!s.motors_on() || s.armed));
-      if (before.phase != s.phase) {
-        const bool legal =
-            s.phase == Phase::docked
-                ? input.fresh && input.docked && (input.calibrated || before.motors_on())
-            : s.phase == Phase::ramping ? before.phase == Phase::docked
-            : s.phase == Phase::active
-                ? before.phase == Phase::ramping || before.phase == Phase::docked
-                : s.phase == Phase::fault && (before.motors_on() || before.phase == Phase::docked);
-        REQUIRE(legal);
-      }
-      if (input.fresh && input.docked) REQUIRE_FALSE(s.motors_on());
+      REQUIRE((!s.motors_on() || s.started));
+      CAPTURE(before.phase);
+      CAPTURE(s.phase);
+      if (before.phase != s.phase) REQUIRE(is_legal(before, s.phase, input));
+      if (input.fresh && !input.homed) REQUIRE_FALSE(s.motors_on());
+      if (input.fresh && input.parked) REQUIRE_FALSE(s.motors_on());
       if (std::find(seen.begin(), seen.end(), key(s)) == seen.end()) {
         seen.push_back(key(s));
         s.stale_ticks = std::min(s.stale_ticks, 5U);

@@ -94,7 +94,7 @@ class FakeArm {
     const std::array<double, 3> joints{q.x, q.y, q.z};
     DeviceReport report;
     report.fresh = true;
-    report.docked = docked;
+    report.parked = docked;
     report.counter = ++counter_;
     report.wiper_a = report.wiper_b = {0x8000, 0x8000, 0x8000};
     for (std::size_t i = 0; i < 3; ++i) {

@@ -3,6 +3,7 @@
 
 #include <doctest/doctest.h>
 
+#include "controller/device/omni_driver.hpp"
 #include "shared/wire/omni_packet.hpp"
 
 namespace {

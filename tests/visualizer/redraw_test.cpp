@@ -101,7 +101,7 @@ class Controller {
   void end() {
     TickRecord record{};
     record.tick = now_;
-    record.flags = kFlagArmed;
+    record.flags = kFlagStarted;
     for (int i = 0; i < 3; ++i) {
       record.position_mm[i] = hand_.tip_mm[i];
       record.commanded_force_n[i] = static_cast<float>(hand_.force_n[i]);

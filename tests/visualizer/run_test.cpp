@@ -97,7 +97,7 @@ class Miller {
       TickRecord record{};
       record.tick = tick_;
       record.start_ns = now_ns();
-      record.flags = kFlagArmed;
+      record.flags = kFlagStarted;
       record.position_mm[1] = 20.0;
       record.orientation[3] = 1.0F;
       record.commanded_force_n[1] = 1.0F;

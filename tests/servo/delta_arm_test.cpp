@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "controller/servo/kinematics/delta_arm.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <optional>
+#include <string>
+
+#include <doctest/doctest.h>
+
+#include "controller/scene/plan_device.hpp"
+#include "shared/wire/falcon_constants.hpp"
+
+using kerf::DeviceVec;
+using kerf::DoubleNumbers;
+using kerf::FixedNumbers;
+using kerf::FloatNumbers;
+
+namespace {
+
+namespace falcon = kerf::falcon;
+using Point = std::array<double, 3>;
+
+/// Crank angles by the closed form of Stamper's thesis; nothing out of reach.
+std::optional<std::array<double, 3>> angles_at(const Point& tip) {
+  std::array<double, 3> angles{};
+  for (std::size_t i = 0; i < 3; ++i) {
+    const double s = std::sin(falcon::kLegAzimuthRad[i]);
+    const double c = std::cos(falcon::kLegAzimuthRad[i]);
+    const double u = c * tip[0] + s * tip[1] - falcon::kHipOutMm;
+    const double v = c * tip[1] - s * tip[0] - falcon::kHipAcrossMm;
+    const double w = tip[2] + falcon::kOriginDepthMm;
+    const double a = falcon::kThighMm;
+    const double cos_t3 = (v + falcon::kPlateAcrossMm) / falcon::kShinMm;
+    const double along =
+        falcon::kShinEndMm + falcon::kKneeEndMm + falcon::kShinMm * std::sqrt(1 - cos_t3 * cos_t3);
+    const double out = u + falcon::kPlateOutMm;
+    const double far = std::hypot(out, w);
+    const double cosine = (far * far + a * a - along * along) / (2 * a * far);
+    if (std::abs(cosine) > 1) return std::nullopt;
+    angles[i] = std::atan2(w, out) - std::acos(cosine);
+  }
+  return angles;
+}
+
+template <class N>
+kerf::ArmPose<N> pose_at(const std::array<double, 3>& angles) {
+  using Angle = typename N::Angle;
+  return kerf::delta_arm_pose(kerf::device_parts::delta_arm<N>(),
+                              {Angle(angles[0]), Angle(angles[1]), Angle(angles[2])});
+}
+
+/// Calls `check(tip, angles)` on a grid over the device's workspace, a cube of 100 mm and a little.
+template <class Check>
+int over_the_workspace(const Check& check) {
+  int places = 0;
+  for (double x = -55; x <= 55; x += 11) {
+    for (double y = -55; y <= 55; y += 11) {
+      for (double z = -55; z <= 55; z += 5) {
+        const Point tip{x, y, z};
+        const auto angles = angles_at(tip);
+        if (!angles || *std::ranges::min_element(*angles) < -0.6 ||
+            *std::ranges::max_element(*angles) > 1.7) {
+          continue;  // beyond the end stops
+        }
+        check(tip, *angles);
+        ++places;
+      }
+    }
+  }
+  return places;
+}
+
+}  // namespace
+
+TEST_CASE("the closed form gives the published angles") {
+  constexpr double kZMm = 110 - falcon::kOriginDepthMm;  // published from the plane of the hips
+  const auto middle = angles_at({0, 0, kZMm});
+  REQUIRE(middle);
+  for (const double angle : *middle) {
+    CHECK(angle / falcon::kRadPerDegree == doctest::Approx(16.188).epsilon(1e-4));
+  }
+  const auto aside = angles_at({20, 0, kZMm});
+  REQUIRE(aside);
+  CHECK((*aside)[0] / falcon::kRadPerDegree == doctest::Approx(22.1981).epsilon(1e-5));
+  CHECK((*aside)[1] / falcon::kRadPerDegree == doctest::Approx(3.8035).epsilon(1e-4));
+  CHECK((*aside)[2] / falcon::kRadPerDegree == doctest::Approx(27.3623).epsilon(1e-5));
+}
+
+TEST_CASE_TEMPLATE("forward kinematics undo the closed form everywhere in the workspace", N,
+                   FixedNumbers, FloatNumbers, DoubleNumbers) {
+  const double tolerance_mm = sizeof(typename N::Real) == 8 ? 1e-9 : 1e-3;
+  double worst_mm = 0;
+  const int places = over_the_workspace([&](const Point& tip, const auto& angles) {
+    const auto found = pose_at<N>(angles).tip_mm;
+    const double error_mm =
+        std::max({std::abs(double(found.x) - tip[0]), std::abs(double(found.y) - tip[1]),
+                  std::abs(double(found.z) - tip[2])});
+    worst_mm = std::max(worst_mm, error_mm);
+    CAPTURE(tip[0]);
+    CAPTURE(tip[1]);
+    CAPTURE(tip[2]);
+    REQUIRE(error_mm < tolerance_mm);
+  });
+  MESSAGE(std::string(N::kName) << ": " << places << " places, worst " << worst_mm << " mm");
+  CHECK(places > 1000);
+}
+
+TEST_CASE_TEMPLATE("levers are the Jacobian, by differences of the closed form", N, FixedNumbers,
+                   DoubleNumbers) {
+  constexpr double kStepMm = 1e-3;
+  const int places = over_the_workspace([&](const Point& tip, const auto& angles) {
+    const auto levers = pose_at<N>(angles).lever_mm;
+    // d tip = SUM_i row_i^T d angle_i: the columns of J are the rows of the levers.
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      Point ahead = tip, behind = tip;
+      ahead[axis] += kStepMm;
+      behind[axis] -= kStepMm;
+      const auto later = angles_at(ahead);
+      const auto earlier = angles_at(behind);
+      if (!later || !earlier) return;
+      for (std::size_t along = 0; along < 3; ++along) {
+        double moved = 0;
+        for (std::size_t i = 0; i < 3; ++i) {
+          const double turned = ((*later)[i] - (*earlier)[i]) / (2 * kStepMm);
+          moved += double(levers.row[i][along]) * turned;
+        }
+        REQUIRE(std::abs(moved - (along == axis ? 1.0 : 0.0)) < 2e-4);
+      }
+    }
+  });
+  CHECK(places > 1000);
+}
+
+TEST_CASE("angles that no grip can have give a finite place in fixed point") {
+  for (const double a : {-7.9, -2.0, 0.0, 1.0, 3.0, 7.9}) {
+    for (const double b : {-7.9, 0.0, 2.0, 7.9}) {
+      const auto pose = pose_at<FixedNumbers>({a, b, -a});
+      CHECK(std::abs(double(pose.tip_mm.x)) <= 32768.0);
+    }
+  }
+}
