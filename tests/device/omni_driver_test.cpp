@@ -1,60 +1,29 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "controller/device/omni_driver.hpp"
 
-#include <algorithm>
-#include <deque>
-#include <vector>
+#include <cstdint>
 
 #include <doctest/doctest.h>
 
 #include "shared/wire/omni_packet.hpp"
+#include "tests/device/fake_port.hpp"
 
 namespace {
 
-/// A bus in memory.
-class FakePort final : public kerf::PacketPort {
- public:
-  std::size_t receive(std::span<std::uint8_t> out) noexcept override {
-    ++receive_calls;
-    if (endless) {
-      const auto bytes = kerf::encode(kerf::OmniReport{.counter = ++endless_counter});
-      std::ranges::copy(bytes, out.begin());
-      return bytes.size();
-    }
-    if (incoming.empty()) return 0;
-    const std::vector<std::uint8_t> packet = incoming.front();
-    incoming.pop_front();
-    std::copy_n(packet.begin(), std::min(packet.size(), out.size()), out.begin());
-    return packet.size();
-  }
-  bool send(std::span<const std::uint8_t> packet) noexcept override {
-    sent.emplace_back(packet.begin(), packet.end());
-    return true;
-  }
-  bool closed() const noexcept override { return false; }
-  bool wait(int) noexcept override { return !incoming.empty(); }
+using kerf::test::FakePort;
 
-  void push(std::uint32_t counter, std::int16_t encoder = 0) {
-    const auto bytes =
-        kerf::encode(kerf::OmniReport{.encoder = {encoder, 0, 0}, .counter = counter});
-    incoming.emplace_back(bytes.begin(), bytes.end());
-  }
-
-  std::deque<std::vector<std::uint8_t>> incoming;
-  std::vector<std::vector<std::uint8_t>> sent;
-  bool endless = false;
-  std::uint32_t endless_counter = 0;
-  int receive_calls = 0;
-};
+void push(FakePort& port, std::uint32_t counter, std::int16_t encoder = 0) {
+  port.push(kerf::encode(kerf::OmniReport{.encoder = {encoder, 0, 0}, .counter = counter}));
+}
 
 }  // namespace
 
 TEST_CASE("the newest of several waiting reports counts") {
   FakePort port;
   kerf::OmniDriver driver(port);
-  port.push(1, 10);
-  port.push(2, 20);
-  port.push(3, 30);
+  push(port, 1, 10);
+  push(port, 2, 20);
+  push(port, 3, 30);
   const auto report = driver.read();
   CHECK(report.fresh);
   CHECK(report.encoder[0] == 30);
@@ -65,7 +34,7 @@ TEST_CASE("no packet: the report is not fresh") {
   FakePort port;
   kerf::OmniDriver driver(port);
   CHECK_FALSE(driver.read().fresh);
-  port.push(1);
+  push(port, 1);
   CHECK(driver.read().fresh);
   CHECK_FALSE(driver.read().fresh);
 }
@@ -73,8 +42,8 @@ TEST_CASE("no packet: the report is not fresh") {
 TEST_CASE("losses are counted by the device's counter, also over its wrap") {
   FakePort port;
   kerf::OmniDriver driver(port);
-  port.push(0xfffffffe);
-  port.push(3);  // 0xffffffff, 0, 1, 2 are missing
+  push(port, 0xfffffffe);
+  push(port, 3);  // 0xffffffff, 0, 1, 2 are missing
   CHECK(driver.read().fresh);
   CHECK(driver.lost() == 4);
 }
@@ -82,9 +51,9 @@ TEST_CASE("losses are counted by the device's counter, also over its wrap") {
 TEST_CASE("an old or repeated packet does not move the tip back") {
   FakePort port;
   kerf::OmniDriver driver(port);
-  port.push(10, 100);
-  port.push(9, 90);
-  port.push(10, 91);
+  push(port, 10, 100);
+  push(port, 9, 90);
+  push(port, 10, 91);
   CHECK(driver.read().encoder[0] == 100);
   CHECK(driver.refused() == 2);
   CHECK(driver.lost() == 0);
@@ -102,7 +71,7 @@ TEST_CASE("truncated and overlong packets are refused, not read as reports") {
 
 TEST_CASE("a flood of packets is bounded work") {
   FakePort port;
-  port.endless = true;
+  for (std::uint32_t counter = 1; counter <= 1000; ++counter) push(port, counter);
   kerf::OmniDriver driver(port);
   CHECK(driver.read().fresh);
   CHECK(port.receive_calls <= 64);
