@@ -1,10 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <concepts>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <span>
+#include <utility>
 
+#include "hil/devmodel/device_model.hpp"
 #include "hil/devmodel/hand_motion.hpp"
 #include "hil/devmodel/hand_script.hpp"
 #include "hil/devmodel/omni_model.hpp"
@@ -26,37 +30,46 @@ struct EmulatorStats {
   std::uint64_t commands = 0;
   std::uint64_t refused = 0;  ///< packets that were no commands
   double peak_motor_force_n = 0;
-  std::optional<std::int64_t> undocked_at;  ///< bus cycle in which the stylus left the inkwell
+  std::optional<std::int64_t> undocked_at;            ///< bus cycle in which the arm left its rest
   std::uint64_t report_hash = 0xCBF2'9CE4'8422'2325;  ///< FNV-1a of all handed-out bytes
 };
 
-/// The Omni, its hand and its faults behind packets: no clock, no socket, so a front in real time,
+/// A device, its hand and its faults behind packets: no clock, no socket, so a front in real time,
 /// one in lock-step and a test run the same thing.
 ///
-/// The hand waits in the inkwell until the host looks calibrated (steady light or motors on) for
-/// 0.2 s, at most 2 s, then plays its script. Without a script the stylus stays where it is. One
-/// thread; allocates only when constructed.
+/// The hand waits until the host has the device calibrated, helps where it must (homes a Falcon,
+/// presses the button of WoodenHaptics), and plays its script 0.2 s later. For a host that does not
+/// begin to calibrate it waits 2 s. Without a script the arm stays where it is. One thread;
+/// allocates only when constructed.
 class Emulator final : public PacketDevice {
  public:
+  template <std::derived_from<DeviceModel> Model>
+  Emulator(std::unique_ptr<Model> model, const std::optional<HandScript>& script,
+           const EmulatorFaults& faults = {})
+      : model_(std::move(model)), faults_(faults) {
+    if (script) hand_.emplace(*script, model_->route());
+  }
+  /// An Omni.
   Emulator(const OmniParams& params, const std::optional<HandScript>& script,
-           const EmulatorFaults& faults = {});
+           const EmulatorFaults& faults = {})
+      : Emulator(std::make_unique<OmniModel>(params), script, faults) {}
 
   void receive(std::span<const std::uint8_t> packet) noexcept override;
   void advance(int cycles) noexcept override;
   [[nodiscard]] std::span<const std::uint8_t> next_packet() noexcept override;
 
   [[nodiscard]] const EmulatorStats& stats() const noexcept { return stats_; }
-  [[nodiscard]] const OmniModel& model() const noexcept { return model_; }
+  [[nodiscard]] const DeviceModel& model() const noexcept { return *model_; }
 
  private:
-  void let_hand_leave() noexcept;
+  void guide_hand() noexcept;
 
-  OmniModel model_;
+  std::unique_ptr<DeviceModel> model_;
   std::optional<HandMotion> hand_;
   EmulatorFaults faults_;
   EmulatorStats stats_;
   std::optional<std::int64_t> calibrated_at_;
-  omni::ReportBytes packet_{};
+  std::int64_t packets_ = 0;  ///< of the device, handed out or not
 };
 
 }  // namespace kerf

@@ -13,7 +13,7 @@ namespace kerf {
 namespace {
 
 double seconds_of(std::int64_t cycles) {
-  return static_cast<double>(cycles) / omni::kBusCyclesPerSecond;
+  return static_cast<double>(cycles) / kCyclesPerSecond;
 }
 
 std::string hex(std::uint64_t value) {
@@ -36,7 +36,7 @@ void write_run_report(const std::string& file, const Emulator& emulator, const F
   const EmulatorStats& stats = emulator.stats();
   const DeviceVec<double> tip = emulator.model().tip_mm();
   nlohmann::ordered_json report;
-  report["personality"] = "omni";
+  report["personality"] = emulator.model().name();
   report["seconds"] = seconds_of(stats.cycles);
   report["packets_sent"] = front.sent;
   report["packets_dropped"] = front.dropped;
@@ -48,6 +48,7 @@ void write_run_report(const std::string& file, const Emulator& emulator, const F
                        {"p99", front.wake.percentile_us(0.99)},
                        {"max", front.wake.max_us()}};
   report["peak_motor_force_n"] = stats.peak_motor_force_n;
+  report["calibrated"] = emulator.model().calibration() == Calibration::done;
   report["docked"] = emulator.model().docked();
   if (stats.undocked_at) {
     report["undocked_at_s"] = seconds_of(*stats.undocked_at);

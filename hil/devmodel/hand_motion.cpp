@@ -3,19 +3,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
-#include "shared/wire/omni_constants.hpp"
+#include "hil/devmodel/bus_cycle.hpp"
 
 namespace kerf {
 namespace {
-
-// The way out of the inkwell, device mm. All of it is inside the elbow's limits.
-constexpr double kLiftMm = 25.0;     // straight up
-constexpr double kClearYMm = 15.0;   // then over this height ...
-constexpr double kClearZMm = -60.0;  // ... behind the workpiece
-constexpr double kLiftS = 0.25;
-constexpr double kCrossS = 0.45;
-constexpr double kApproachS = 0.5;
 
 /// Position along a rest-to-rest motion of least jerk (Flash and Hogan 1985).
 double smooth(double t) noexcept {
@@ -26,31 +19,36 @@ DeviceVec<double> vec_of(const std::array<double, 3>& v) noexcept {
   return {v[0], v[1], v[2]};
 }
 
-HandStep move_to(std::array<double, 3> to, double seconds) {
-  HandStep step;
-  step.kind = HandStep::Kind::move;
-  step.seconds = seconds;
-  step.to = to;
-  return step;
-}
-
 }  // namespace
 
-HandMotion::HandMotion(const HandScript& script, DeviceVec<double> dock_tip_mm)
-    : from_mm_(dock_tip_mm) {
-  const double unit = script.unit_mm;
-  const std::array<double, 3> start{script.start[0] * unit, script.start[1] * unit,
-                                    script.start[2] * unit};
-  add(move_to({dock_tip_mm.x, dock_tip_mm.y + kLiftMm, dock_tip_mm.z}, kLiftS), 1.0);
-  add(move_to({start[0], std::max(kClearYMm, start[1]), kClearZMm}, kCrossS), 1.0);
-  add(move_to(start, kApproachS), 1.0);
-  const std::size_t prelude = legs_.size();
-  for (const HandStep& step : script.steps) add(step, unit);
-  repeat_from_ = script.repeat_from ? prelude + *script.repeat_from : legs_.size();
+HandMotion::HandMotion(const HandScript& script, const HandRoute& route)
+    : from_mm_(route.rest_tip_mm) {
+  const DeviceVec<double> rest = route.rest_tip_mm;
+  const DeviceVec<double> start = vec_of(script.start) * script.unit_mm;
+  for (const HandStep& step : route.calibration) add(step, 1.0);
+  way_from_ = legs_.size();
+  if (route.lift_mm > 0) {
+    add(hand_move(rest + DeviceVec<double>{0, route.lift_mm, 0}, route.lift_s), 1.0);
+  }
+  add(hand_move({start.x, std::max(route.clear_y_mm, start.y), route.clear_z_mm}, route.cross_s),
+      1.0);
+  add(hand_move(start, route.approach_s), 1.0);
+  const std::size_t script_from = legs_.size();
+  for (const HandStep& step : script.steps) add(step, script.unit_mm);
+  repeat_from_ = script.repeat_from ? script_from + *script.repeat_from : legs_.size();
+}
+
+void HandMotion::calibrate() noexcept {
+  if (phase_ == Phase::resting) phase_ = Phase::calibrating;
+}
+
+void HandMotion::leave() noexcept {
+  if (phase_ == Phase::resting) leg_ = way_from_;
+  phase_ = Phase::left;  // a motion of the calibration that has begun comes to its end
 }
 
 void HandMotion::add(const HandStep& step, double unit_mm) {
-  Leg leg{step, std::max<std::int64_t>(1, std::llround(step.seconds * omni::kBusCyclesPerSecond))};
+  Leg leg{step, std::max<std::int64_t>(1, std::llround(step.seconds * kCyclesPerSecond))};
   for (double& length : leg.step.to) length *= unit_mm;
   for (double& length : leg.step.size) length *= unit_mm;
   leg.step.sink *= unit_mm;
@@ -59,7 +57,7 @@ void HandMotion::add(const HandStep& step, double unit_mm) {
 
 DeviceVec<double> HandMotion::position(const Leg& leg, double progress) const noexcept {
   const HandStep& step = leg.step;
-  const double turn = 2 * omni::kPi * progress;
+  const double turn = 2 * std::numbers::pi * progress;
   const DeviceVec<double> sunk{0, -step.sink * progress, 0};
   switch (step.kind) {
     case HandStep::Kind::hold:
@@ -90,11 +88,14 @@ void HandMotion::begin_next_leg() noexcept {
   cycle_ = 0;
   ++leg_;
   if (leg_ == legs_.size()) leg_ = repeat_from_;
+  if (leg_ == way_from_ && phase_ == Phase::calibrating) leg_ = 0;  // once more, until it may leave
 }
 
 HandGoal HandMotion::next() noexcept {
   HandGoal goal;
-  if (!left_) return goal;
+  const bool moves = left() || (phase_ == Phase::calibrating && way_from_ > 0);
+  goal.calibrate = phase_ == Phase::calibrating && !moves;
+  if (!moves) return goal;
   goal.in_inkwell = false;
   goal.target_mm = from_mm_;
   goal.orientation_rad = from_orientation_rad_;

@@ -6,28 +6,34 @@
 #include <cstdint>
 #include <vector>
 
+#include "hil/devmodel/hand_goal.hpp"
+#include "hil/devmodel/hand_route.hpp"
 #include "hil/devmodel/hand_script.hpp"
-#include "hil/devmodel/omni_model.hpp"
 #include "shared/numeric/vec.hpp"
 
 namespace kerf {
 
 /// Where a scripted hand wants to be, bus cycle by bus cycle.
 ///
-/// It rests in the inkwell until `leave`; then it goes straight up out of the inkwell, over a point
-/// clear of the workpiece to the script's start (1.2 s in all), and through the script. Counts in
-/// whole bus cycles, so that repeats never drift. One thread; allocates only when constructed.
+/// It rests in the inkwell until `leave`; then it takes the device's way to the script's start and
+/// goes through the script. In between `calibrate` makes it do what the device's calibration needs.
+/// Counts in whole bus cycles, so that repeats never drift. One thread; allocates only when
+/// constructed.
 class HandMotion {
  public:
-  HandMotion(const HandScript& script, DeviceVec<double> dock_tip_mm);
+  HandMotion(const HandScript& script, const HandRoute& route);
 
-  void leave() noexcept { left_ = true; }
-  [[nodiscard]] bool left() const noexcept { return left_; }
+  /// Calibrates the device, again and again until it leaves.
+  void calibrate() noexcept;
+  void leave() noexcept;
+  [[nodiscard]] bool left() const noexcept { return phase_ == Phase::left; }
 
   /// The wish for the next bus cycle.
   [[nodiscard]] HandGoal next() noexcept;
 
  private:
+  enum class Phase : std::uint8_t { resting, calibrating, left };
+
   /// A step in device mm and bus cycles.
   struct Leg {
     HandStep step;
@@ -38,11 +44,12 @@ class HandMotion {
   [[nodiscard]] DeviceVec<double> position(const Leg& leg, double progress) const noexcept;
   void begin_next_leg() noexcept;
 
-  std::vector<Leg> legs_;
+  std::vector<Leg> legs_;        ///< calibration, way to the start, script
+  std::size_t way_from_ = 0;     ///< first leg after the calibration
   std::size_t repeat_from_ = 0;  ///< legs_.size(): no repeat
   std::size_t leg_ = 0;
   std::int64_t cycle_ = 0;
-  bool left_ = false;
+  Phase phase_ = Phase::resting;
   DeviceVec<double> from_mm_;
   std::array<double, 3> from_orientation_rad_{};
 };

@@ -5,34 +5,9 @@
 #include <array>
 #include <cmath>
 
+#include "hil/devmodel/solve.hpp"
+
 namespace kerf {
-namespace {
-
-constexpr double kTurretLimitRad = 0.98;
-constexpr double kThighMinRad = 0.0;
-constexpr double kThighMaxRad = 1.75;
-constexpr double kElbowMinRad = -0.81;
-constexpr double kElbowMaxRad = 1.25;
-
-/// Three linear equations by Cramer's rule.
-template <class To, class From>
-Vec<double, From> solve(const Transform<double, To, From>& m, Vec<double, To> rhs) noexcept {
-  const auto& a = m.row;
-  const auto determinant = [](double a0, double a1, double a2, double b0, double b1, double b2,
-                              double c0, double c1, double c2) {
-    return a0 * (b1 * c2 - b2 * c1) - a1 * (b0 * c2 - b2 * c0) + a2 * (b0 * c1 - b1 * c0);
-  };
-  const double whole =
-      determinant(a[0][0], a[0][1], a[0][2], a[1][0], a[1][1], a[1][2], a[2][0], a[2][1], a[2][2]);
-  return {determinant(rhs.x, a[0][1], a[0][2], rhs.y, a[1][1], a[1][2], rhs.z, a[2][1], a[2][2]) /
-              whole,
-          determinant(a[0][0], rhs.x, a[0][2], a[1][0], rhs.y, a[1][2], a[2][0], rhs.z, a[2][2]) /
-              whole,
-          determinant(a[0][0], a[0][1], rhs.x, a[1][0], a[1][1], rhs.y, a[2][0], a[2][1], rhs.z) /
-              whole};
-}
-
-}  // namespace
 
 DeviceVec<double> OmniArm::tip_mm(JointVec<double> q) const noexcept {
   const double reach = links_.upper_mm * std::cos(q.y) + links_.forearm_mm * std::sin(q.z);
@@ -79,10 +54,11 @@ JointVec<double> OmniArm::joint_rates(JointVec<double> q,
   return solve(jacobian(q), velocity);
 }
 
-bool OmniArm::within_limits(JointVec<double> q) noexcept {
+bool OmniArm::within_limits(JointVec<double> q) const noexcept {
   const double elbow = q.z - q.y;
-  return std::abs(q.x) <= kTurretLimitRad && q.y >= kThighMinRad && q.y <= kThighMaxRad &&
-         elbow >= kElbowMinRad && elbow <= kElbowMaxRad;
+  return std::abs(q.x) <= stops_.turret_rad && q.y >= stops_.thigh_min_rad &&
+         q.y <= stops_.thigh_max_rad && elbow >= stops_.elbow_min_rad &&
+         elbow <= stops_.elbow_max_rad;
 }
 
 bool OmniArm::stop_at_limits(JointVec<double>& q, DeviceVec<double>& tip_mm,
@@ -99,17 +75,16 @@ bool OmniArm::stop_at_limits(JointVec<double>& q, DeviceVec<double>& tip_mm,
     return side;
   };
   double elbow = q.z - q.y;
-  const std::array<Stop, 3> stops{{{{1, 0, 0}, clamp(q.x, -kTurretLimitRad, kTurretLimitRad)},
-                                   {{0, 1, 0}, clamp(q.y, kThighMinRad, kThighMaxRad)},
-                                   {{0, -1, 1}, clamp(elbow, kElbowMinRad, kElbowMaxRad)}}};
+  const std::array<Stop, 3> stops{
+      {{{1, 0, 0}, clamp(q.x, -stops_.turret_rad, stops_.turret_rad)},
+       {{0, 1, 0}, clamp(q.y, stops_.thigh_min_rad, stops_.thigh_max_rad)},
+       {{0, -1, 1}, clamp(elbow, stops_.elbow_min_rad, stops_.elbow_max_rad)}}};
   q.z = q.y + elbow;
   tip_mm = this->tip_mm(q);
   for (const Stop& stop : stops) {
     if (stop.side == 0) continue;
-    // The stop pushes the tip along the gradient of its angle; without friction, without bounce.
-    const DeviceVec<double> gradient = tip_force_n(q, stop.angle_of);
-    const double rate = dot(gradient, velocity);
-    if (rate * stop.side > 0) velocity = velocity - gradient * (rate / dot(gradient, gradient));
+    // It pushes the tip along the gradient of its angle.
+    stop_speed(velocity, tip_force_n(q, stop.angle_of), stop.side);
   }
   return true;
 }

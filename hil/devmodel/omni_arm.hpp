@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "hil/devmodel/arm_pose.hpp"
 #include "shared/numeric/vec.hpp"
 #include "shared/wire/omni_constants.hpp"
 
@@ -12,6 +13,15 @@ struct OmniLinks {
   double forearm_mm = omni::kForearmMm;
   double origin_height_mm = omni::kOriginHeightMm;
   double origin_depth_mm = omni::kOriginDepthMm;
+};
+
+/// Its mechanical end stops, rad; the elbow's angle is q3 - q2.
+struct OmniStops {
+  double turret_rad = 0.98;  ///< to both sides
+  double thigh_min_rad = 0.0;
+  double thigh_max_rad = 1.75;
+  double elbow_min_rad = -0.81;
+  double elbow_max_rad = 1.25;
 };
 
 /// The emulator's kinematics of the Omni: double precision, elbow up, written from the geometry and
@@ -30,7 +40,8 @@ class OmniArm {
  public:
   using Jacobian = Transform<double, DeviceSpace, JointSpace>;
 
-  explicit OmniArm(const OmniLinks& links = {}) noexcept : links_(links) {}
+  explicit OmniArm(const OmniLinks& links = {}, const OmniStops& stops = {}) noexcept
+      : links_(links), stops_(stops) {}
 
   [[nodiscard]] DeviceVec<double> tip_mm(JointVec<double> q) const noexcept;
   [[nodiscard]] JointVec<double> joints_rad(DeviceVec<double> tip_mm) const noexcept;
@@ -40,12 +51,19 @@ class OmniArm {
   /// The force that joint torques exert at a free tip: J^T F = torque.
   [[nodiscard]] DeviceVec<double> tip_force_n(JointVec<double> q,
                                               JointVec<double> torque_nmm) const noexcept;
+  [[nodiscard]] DeviceVec<double> tip_force_n(const ArmPose& pose,
+                                              JointVec<double> torque_nmm) const noexcept {
+    return tip_force_n(pose.q, torque_nmm);
+  }
   /// Joint rates of a tip velocity.
   [[nodiscard]] JointVec<double> joint_rates(JointVec<double> q,
                                              DeviceVec<double> velocity) const noexcept;
+  [[nodiscard]] JointVec<double> joint_rates(const ArmPose& pose,
+                                             DeviceVec<double> velocity) const noexcept {
+    return joint_rates(pose.q, velocity);
+  }
 
-  /// The mechanical end stops: turret +-0.98, thigh 0..1.75, elbow -0.81..1.25 rad.
-  [[nodiscard]] static bool within_limits(JointVec<double> q) noexcept;
+  [[nodiscard]] bool within_limits(JointVec<double> q) const noexcept;
 
   /// Puts an arm beyond an end stop back onto it and takes away the speed into the stop, so that
   /// the tip never gains energy. Returns whether a stop was met; joints and tip then agree.
@@ -54,6 +72,7 @@ class OmniArm {
 
  private:
   OmniLinks links_;
+  OmniStops stops_;
 };
 
 }  // namespace kerf

@@ -7,7 +7,7 @@
 
 #include <doctest/doctest.h>
 
-#include "hil/devmodel/omni_arm.hpp"
+#include "hil/devmodel/omni_model.hpp"
 #include "hil/hand_script_file.hpp"
 
 namespace {
@@ -20,8 +20,15 @@ constexpr int kSecond = kerf::omni::kBusCyclesPerSecond;
 constexpr int kPreludeCycles = kSecond * 12 / 10;  // inkwell to start
 const DeviceVec<double> kDock{0, -70, -86};
 
+/// The Omni's way, from another inkwell.
+kerf::HandRoute from_dock() {
+  kerf::HandRoute route = kerf::OmniModel().route();
+  route.rest_tip_mm = kDock;
+  return route;
+}
+
 HandMotion motion_of(const std::string& script) {
-  HandMotion motion(kerf::parse_hand_script(script, "test"), kDock);
+  HandMotion motion(kerf::parse_hand_script(script, "test"), from_dock());
   motion.leave();
   return motion;
 }
@@ -40,7 +47,7 @@ double distance(DeviceVec<double> a, DeviceVec<double> b) {
 
 TEST_CASE("the hand rests in the inkwell until it leaves, then is at the start after 1.2 s") {
   HandMotion motion(kerf::parse_hand_script("start_mm = [1, 4, 2]\n[[step]]\nhold = 1", "test"),
-                    kDock);
+                    from_dock());
   CHECK(after(motion, 100).in_inkwell);
   motion.leave();
   const auto first = motion.next();
@@ -94,7 +101,7 @@ TEST_CASE("the unit scales every length of the script and none of the way out") 
   kerf::HandScript script = kerf::parse_hand_script(
       "start_mm = [1, 2, 0]\n[[step]]\nmove_mm = [0, -1, 0]\nseconds = 1", "test");
   script.unit_mm = 3;
-  HandMotion motion(script, kDock);
+  HandMotion motion(script, from_dock());
   motion.leave();
   CHECK(distance(after(motion, kSecond / 4).target_mm, kDock + DeviceVec<double>{0, 25, 0}) < 1e-9);
   CHECK(distance(after(motion, kPreludeCycles - kSecond / 4).target_mm, {3, 6, 0}) < 1e-9);
@@ -121,13 +128,13 @@ TEST_CASE("the repeated block comes again to the cycle, and the orientation is k
 }
 
 TEST_CASE("every script of the project stays in the arm's reach and moves without jumps") {
-  const kerf::OmniArm arm;
-  const auto dock = arm.tip_mm({0.0, 0.23, -0.37});
+  const kerf::OmniModel omni;
+  const auto& arm = omni.arm();
   for (const std::string name : {"approach", "touch", "slide", "cut_cavity", "jerk"}) {
     CAPTURE(name);
-    HandMotion motion(kerf::read_hand_script(KERF_HANDS "/" + name + ".toml"), dock);
+    HandMotion motion(kerf::read_hand_script(KERF_HANDS "/" + name + ".toml"), omni.route());
     motion.leave();
-    auto last = dock;
+    auto last = omni.dock_tip_mm();
     double fastest = 0;
     double lowest_on_the_way = 25;
     double lowest = 25;
@@ -135,7 +142,7 @@ TEST_CASE("every script of the project stays in the arm's reach and moves withou
     bool reachable = true;
     for (int i = 0; i < 25 * kSecond; ++i) {
       const auto target = motion.next().target_mm;
-      reachable &= kerf::OmniArm::within_limits(arm.joints_rad(target));
+      reachable &= arm.within_limits(arm.joints_rad(target));
       fastest = std::max(fastest, norm(target - last) * kSecond);
       last = target;
       const bool on_the_way = i < kPreludeCycles;

@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "hil/devmodel/omni_model.hpp"
-#include "shared/wire/omni_constants.hpp"
+#include <algorithm>
+
+#include <rapidcheck.h>
+
+#include "hil/devmodel/device_model.hpp"
 
 namespace kerf::test {
 
-inline constexpr int kSecond = omni::kBusCyclesPerSecond;
+inline constexpr int kSecond = kCyclesPerSecond;
 
 /// A hand out of the inkwell that wants to be at `target_mm`.
 inline HandGoal at(DeviceVec<double> target_mm) {
@@ -16,8 +19,27 @@ inline HandGoal at(DeviceVec<double> target_mm) {
   return goal;
 }
 
-inline void run(OmniModel& model, const HandGoal& goal, int cycles) {
+inline void run(DeviceModel& model, const HandGoal& goal, int cycles) {
   for (int i = 0; i < cycles; ++i) model.step(goal);
+}
+
+/// Any place in a ball around the origin.
+inline DeviceVec<double> any_in_ball(double radius_mm) {
+  const auto part = [] { return *rc::gen::inRange(-1000, 1001) * 1e-3; };
+  const DeviceVec<double> in_cube{part(), part(), part()};
+  return in_cube * (radius_mm / std::max(1.0, norm(in_cube)));
+}
+
+/// Joint torques that do the work of a tip force, J' F, by differences of the forward kinematics.
+template <class Arm>
+JointVec<double> torque_by_differences(const Arm& arm, JointVec<double> q,
+                                       DeviceVec<double> force_n) {
+  constexpr double kStepRad = 1e-4;
+  const auto along = [&](JointVec<double> unit) {
+    return dot(arm.tip_mm(q + unit * kStepRad) - arm.tip_mm(q - unit * kStepRad), force_n) *
+           (0.5 / kStepRad);
+  };
+  return {along({1, 0, 0}), along({0, 1, 0}), along({0, 0, 1})};
 }
 
 }  // namespace kerf::test

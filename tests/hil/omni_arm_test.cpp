@@ -96,7 +96,7 @@ TEST_CASE("an end stop keeps the arm in its range and takes only the speed into 
   auto tip = arm.tip_mm(q);
   auto velocity = arm.jacobian({0.98, 0.5, 0.3}) * rates;
   REQUIRE(arm.stop_at_limits(q, tip, velocity));
-  CHECK(OmniArm::within_limits(q));
+  CHECK(arm.within_limits(q));
   CHECK(distance(tip, arm.tip_mm(q)) < 1e-9);
   // The turret's direction is at a right angle to the others: their rates stay.
   const auto kept = arm.joint_rates(q, velocity);

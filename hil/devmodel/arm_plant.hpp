@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "hil/devmodel/arm_pose.hpp"
+#include "hil/devmodel/bus_cycle.hpp"
+#include "hil/devmodel/hand_goal.hpp"
+#include "hil/devmodel/motor_chain.hpp"
+#include "hil/devmodel/plant_params.hpp"
+#include "hil/devmodel/rotors.hpp"
+#include "hil/devmodel/tip_mass.hpp"
+
+namespace kerf {
+
+/// What a plant shows of itself.
+struct PlantState {
+  ArmPose pose;
+  DeviceVec<double> velocity;       ///< of the tip, mm/s
+  DeviceVec<double> motor_force_n;  ///< of the motors at the tip, in the latest step
+  bool at_rest = true;              ///< held in the rest pose: inkwell, stand, calibration pose
+};
+
+/// The mechanics that all devices share: motors, an arm, its tip and the hand that holds it, in
+/// fixed steps and without a clock.
+///
+/// Per cycle: delay and lag of the motors, then four steps of torque to tip force, mass, friction,
+/// hand spring and end stops. Weight counts as balanced. `Arm` knows its geometry: `tip_mm`,
+/// `joints_rad`, `tip_force_n` (J^-T torque), `joint_rates` (J^-1 velocity), `stop_at_limits`. One
+/// thread; never allocates; the same calls give the same numbers, bit for bit on one machine.
+template <class Arm>
+class ArmPlant {
+ public:
+  ArmPlant(const Arm& arm, const PlantParams& params, JointVec<double> rest_rad) noexcept
+      : arm_(arm),
+        motors_(params),
+        mass_kg_(params.tip_mass_kg + params.hand_mass_kg),
+        mass_(mass_kg_, params.viscous_ns_per_mm + params.hand_damping_ns_per_mm, params.coulomb_n,
+              kStepS),
+        hand_stiffness_(params.hand_stiffness_n_per_mm),
+        hand_damping_(params.hand_damping_ns_per_mm),
+        rotors_(params, rest_rad),
+        rest_{rest_rad, arm.tip_mm(rest_rad)},
+        target_mm_(rest_.tip_mm) {
+    state_.pose = rest_;
+  }
+
+  [[nodiscard]] MotorChain& motors() noexcept { return motors_; }
+  [[nodiscard]] const MotorChain& motors() const noexcept { return motors_; }
+  [[nodiscard]] const Arm& arm() const noexcept { return arm_; }
+  [[nodiscard]] const PlantState& state() const noexcept { return state_; }
+  [[nodiscard]] const ArmPose& rest() const noexcept { return rest_; }
+  /// Joint angles as the encoders see them.
+  [[nodiscard]] JointVec<double> encoder_rad() const noexcept {
+    return rotors_.seen_rad(state_.pose.q);
+  }
+
+  /// One bus cycle.
+  void cycle(const HandGoal& hand) noexcept {
+    motors_.begin_cycle();
+    const DeviceVec<double> goal = hand.in_inkwell ? rest_.tip_mm : hand.target_mm;
+    const DeviceVec<double> goal_velocity = (goal - target_mm_) * (1.0 / kCycleS);
+    for (int i = 0; i < kStepsPerCycle; ++i) {
+      const JointVec<double> torque_nmm = motors_.step();
+      constexpr double kCatchMm = 2.0;  // the rest pose catches a tip that comes this close
+      state_.at_rest =
+          hand.in_inkwell && (state_.at_rest || norm(state_.pose.tip_mm - rest_.tip_mm) < kCatchMm);
+      if (state_.at_rest) {
+        rest(torque_nmm);
+      } else {
+        move(torque_nmm, target_mm_ + goal_velocity * ((i + 0.5) * kStepS), goal_velocity);
+      }
+    }
+    target_mm_ = goal;
+  }
+
+ private:
+  void rest(JointVec<double> torque_nmm) noexcept {
+    state_.pose = rest_;
+    state_.velocity = {};
+    rotors_.follow(arm_, rest_, {});
+    state_.motor_force_n = arm_.tip_force_n(rest_, rotors_.drive(torque_nmm, rest_.q, {}));
+  }
+
+  void move(JointVec<double> torque_nmm, DeviceVec<double> target_mm,
+            DeviceVec<double> target_velocity) noexcept {
+    DeviceVec<double>& tip_mm = state_.pose.tip_mm;
+    DeviceVec<double>& velocity = state_.velocity;
+    tip_mm = tip_mm + velocity * (kStepS / 2);
+    const ArmPose middle{arm_.joints_rad(tip_mm), tip_mm};
+    const JointVec<double> link_rates =
+        rotors_.flexible() ? arm_.joint_rates(middle, velocity) : JointVec<double>{};
+    state_.motor_force_n =
+        arm_.tip_force_n(middle, rotors_.drive(torque_nmm, middle.q, link_rates));
+    // The damper pulls towards the target's velocity; its part on the tip's own is in the mass.
+    const DeviceVec<double> hand_n =
+        (target_mm - tip_mm) * hand_stiffness_ + target_velocity * hand_damping_;
+    velocity = mass_.kick(velocity, state_.motor_force_n + hand_n);
+    velocity = rotors_.share(arm_, middle, mass_kg_, velocity);
+    tip_mm = tip_mm + velocity * (kStepS / 2);
+    state_.pose.q = arm_.joints_rad(tip_mm);
+    arm_.stop_at_limits(state_.pose.q, tip_mm, velocity);
+    rotors_.follow(arm_, middle, velocity);
+  }
+
+  Arm arm_;
+  MotorChain motors_;
+  double mass_kg_;
+  TipMass mass_;
+  double hand_stiffness_;  ///< N/mm
+  double hand_damping_;    ///< N s/mm
+  Rotors rotors_;
+  ArmPose rest_;
+  DeviceVec<double> target_mm_;
+  PlantState state_;
+};
+
+}  // namespace kerf
