@@ -27,11 +27,13 @@ bool FalconDriver::take(std::span<const std::uint8_t> packet, DeviceReport& repo
 }
 
 std::size_t FalconDriver::compose(const ServoOutput& output, Packet& packet) noexcept {
-  if (unanswered_ticks_ < kPatienceTicks) {
+  const bool lets_go = forcing_ && !output.motors_on;
+  if (unanswered_ticks_ < kPatienceTicks && !lets_go) {
     ++unanswered_ticks_;
     return 0;
   }
   unanswered_ticks_ = 0;
+  forcing_ = output.motors_on;
   const bool asks = output.phase == Phase::off || output.phase == Phase::calibrating;
   const bool fault = output.phase == Phase::fault;
   const auto bytes = encode(FalconCommand{.motor = output.motor_counts,

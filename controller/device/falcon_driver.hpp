@@ -5,7 +5,8 @@
 
 namespace kerf {
 
-/// The Falcon: host and device take turns, one answer to each packet. Asks for homing until all
+/// The Falcon: host and device take turns, one answer to each packet; only motors off does not wait
+/// for its turn. Asks for homing until all
 /// three axes are homed. The grip's centre button parks: held at rest it calibrates, let go it
 /// starts the force. Lights: red in a fault, blue while the user is asked to do something (home,
 /// park), green while parked or in force.
@@ -25,6 +26,7 @@ class FalconDriver final : public DeviceDriver {
   static constexpr int kPatienceTicks = 4;
 
   bool homed_ = false;
+  bool forcing_ = false;                   ///< by the last packet
   int unanswered_ticks_ = kPatienceTicks;  ///< at the end of patience it is the host's turn
 };
 

@@ -11,11 +11,12 @@
 namespace kerf {
 namespace {
 
-constexpr int kHomeCounts = 40;  // 10 mrad: a hand holds the pose that still
+constexpr int kHomeCounts = 40;        // 10 mrad: a hand holds the pose that still
+constexpr int kFarFromHome = 20 * 40;  // 0.2 rad: not held by mistake
 
-bool in_home_pose(const WoodenReport& report) noexcept {
+bool near_home(const std::array<std::int16_t, 6>& counts, int within) noexcept {
   for (std::size_t i = 0; i < 3; ++i) {
-    if (std::abs(report.encoder[i] - wooden::kHomeCounts[i]) > kHomeCounts) return false;
+    if (std::abs(counts[i] - wooden::kHomeCounts[i]) > within) return false;
   }
   return true;
 }
@@ -27,14 +28,15 @@ bool WoodenDriver::take(std::span<const std::uint8_t> packet, DeviceReport& repo
   if (!said) return false;
   packet_bytes_ = packet.size();
   button_ = said->calibrate;
-  const bool near_home = in_home_pose(*said);
+  counts_ = said->encoder;
+  const bool in_pose = near_home(counts_, kHomeCounts);
   if (button_) {
-    homed_ = false;
-  } else if (set_sent_ && near_home) {
+    homed_ = homed_ && !near_home(counts_, kFarFromHome);
+  } else if (set_sent_ && in_pose) {
     homed_ = at_home_ = true;
     set_sent_ = false;
   }
-  at_home_ = at_home_ && near_home;
+  at_home_ = at_home_ && in_pose;
   std::copy_n(said->encoder.begin(), 3, report.encoder.begin());
   report.button1 = wooden::wireless_button(said->encoder[3]);
   report.parked = button_ || set_sent_ || at_home_;
@@ -46,9 +48,13 @@ bool WoodenDriver::take(std::span<const std::uint8_t> packet, DeviceReport& repo
 std::size_t WoodenDriver::compose(const ServoOutput& output, Packet& packet) noexcept {
   WoodenCommand command{.milliamps = output.motor_counts, .set_encoders = {}};
   if (button_) {
-    const auto& home = wooden::kHomeCounts;
-    command.set_encoders = {home[0], home[1], home[2], 0, 0, 0};
-    set_sent_ = true;
+    // Setting them is also what makes the device let go of the button.
+    auto& counts = command.set_encoders.emplace(counts_);
+    if (!homed_) {
+      counts = {};
+      std::ranges::copy(wooden::kHomeCounts, counts.begin());
+      set_sent_ = true;
+    }
   }
   std::ranges::copy(encode(command), packet.begin());
   return packet_bytes_;

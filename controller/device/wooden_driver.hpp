@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstddef>
+#include <cstdint>
 
 #include "controller/device/device_driver.hpp"
 #include "shared/wire/wooden_constants.hpp"
@@ -27,7 +29,8 @@ class WoodenDriver final : public DeviceDriver {
 
   std::size_t packet_bytes_ = wooden::kPacketBytes;  ///< then as long as the device's own
   bool button_ = false;                              ///< of the newest report
-  bool set_sent_ = false;  ///< encoders were set since the button was pressed
+  std::array<std::int16_t, 6> counts_{};
+  bool set_sent_ = false;  ///< encoders were set to home since the button was pressed
   bool homed_ = false;
   bool at_home_ = false;  ///< has not left the pose since
 };

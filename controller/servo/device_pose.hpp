@@ -17,7 +17,7 @@ namespace kerf {
 /// Where the device is, from one good report.
 template <class N>
 struct DevicePose {
-  ArmPose<N> arm;
+  ForwardKinematics<N> arm;
   Rotation<N> rotation = identity_rotation<N>();
   std::array<typename N::Angle, 3> gimbal{};  ///< yaw, pitch, roll
 };

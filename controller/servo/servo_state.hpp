@@ -11,7 +11,7 @@
 #include "controller/kernel/splat_table.hpp"
 #include "controller/servo/force_limits.hpp"
 #include "controller/servo/hash_chain.hpp"
-#include "controller/servo/kinematics/arm_pose.hpp"
+#include "controller/servo/kinematics/forward_kinematics.hpp"
 #include "controller/servo/kinematics/rotation.hpp"
 #include "controller/servo/servo_output.hpp"
 #include "controller/servo/supervisor.hpp"

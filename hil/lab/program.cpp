@@ -11,6 +11,7 @@
 
 #include "hil/hil_error.hpp"
 #include "hil/lab/accuracy/command.hpp"
+#include "hil/lab/faults/command.hpp"
 #include "hil/lab/kernel_bench.hpp"
 #include "hil/lab/lab_run.hpp"
 #include "hil/lab/layout_bench.hpp"
@@ -19,7 +20,7 @@
 namespace kerf {
 namespace {
 
-constexpr const char* kExitCodes = "Exit codes: 0 fine, 2 bad input or set-up.";
+constexpr const char* kExitCodes = "Exit codes: 0 fine, 1 a check failed, 2 bad input or set-up.";
 
 std::string line_of(const KernelRow& row) {
   char text[160];
@@ -71,6 +72,7 @@ int run_lab(int argc, const char* const* argv, std::ostream& out, std::ostream& 
       ->check(CLI::Range(0, 1023));
   bench->footer(kExitCodes);
   accuracy::Command accuracy(app);
+  const faults::Command faults(app);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
@@ -81,6 +83,7 @@ int run_lab(int argc, const char* const* argv, std::ostream& out, std::ostream& 
       accuracy.run(out);
       return 0;
     }
+    if (faults.chosen()) return faults.run(out);
     const LabOutput as_json("--report", report);
     const LabOutput as_page("--page", page);
     LabOutput::check_distinct({&as_json, &as_page});

@@ -59,6 +59,17 @@ TEST_CASE("falcon: one command to each answer; a lost turn is taken again after 
   CHECK(port.sent.size() == 3);
 }
 
+TEST_CASE("falcon: motors off does not wait for its turn") {
+  FakePort port;
+  kerf::FalconDriver driver(port);
+  driver.command(forcing());
+  driver.command({});
+  REQUIRE(port.sent.size() == 2);
+  CHECK(last_sent(port).motor == std::array<std::int16_t, 3>{});
+  driver.command({});
+  CHECK(port.sent.size() == 2);
+}
+
 TEST_CASE("falcon: reports carry counts, buttons and homing of all three axes") {
   FakePort port;
   kerf::FalconDriver driver(port);

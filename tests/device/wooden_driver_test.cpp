@@ -78,7 +78,7 @@ TEST_CASE("wooden: the button sets the encoders; the arm is parked until it leav
   CHECK(report.homed);
 }
 
-TEST_CASE("wooden: the button in use takes the homing away until it is set again") {
+TEST_CASE("wooden: the button in use parks, and keeps the encoders as they are") {
   FakePort port;
   kerf::WoodenDriver driver(port);
   push(port, {0, 0, 0}, true);
@@ -86,10 +86,34 @@ TEST_CASE("wooden: the button in use takes the homing away until it is set again
   driver.command({});
   push(port, {0, 0, 6000});
   CHECK(driver.read().homed);
-  push(port, {400, 100, 5000});
+  push(port, {400, 1000, 5000});
+  CHECK_FALSE(driver.read().parked);
+  push(port, {400, 1000, 5000}, true);
+  const auto pressed = driver.read();
+  CHECK(pressed.parked);
+  CHECK(pressed.homed);
+  driver.command({});
+  const std::array<std::int16_t, 6> as_they_are{400, 1000, 5000, 0, 0, 0};
+  CHECK(last_sent(port).set_encoders == as_they_are);
+  push(port, {400, 1000, 5000});
+  const auto released = driver.read();
+  CHECK_FALSE(released.parked);
+  CHECK(released.homed);
+}
+
+TEST_CASE("wooden: near home the button calibrates again") {
+  FakePort port;
+  kerf::WoodenDriver driver(port);
+  push(port, {0, 0, 0}, true);
+  static_cast<void>(driver.read());
+  driver.command({});
+  push(port, {0, 0, 6000});
   CHECK(driver.read().homed);
-  push(port, {400, 100, 5000}, true);
+  push(port, {30, 200, 6100}, true);  // slipped: home reads like this now
   CHECK_FALSE(driver.read().homed);
+  driver.command({});
+  const std::array<std::int16_t, 6> home{0, 0, 6000, 0, 0, 0};
+  CHECK(last_sent(port).set_encoders == home);
 }
 
 TEST_CASE("wooden: counts that are not those of home after setting are no homing") {

@@ -46,7 +46,7 @@ std::optional<std::array<double, 3>> angles_at(const Point& tip) {
 }
 
 template <class N>
-kerf::ArmPose<N> pose_at(const std::array<double, 3>& angles) {
+kerf::ForwardKinematics<N> pose_at(const std::array<double, 3>& angles) {
   using Angle = typename N::Angle;
   return kerf::delta_arm_pose(kerf::device_parts::delta_arm<N>(),
                               {Angle(angles[0]), Angle(angles[1]), Angle(angles[2])});

@@ -26,7 +26,7 @@ kerf::JointVec<double> random_joints() {
 }
 
 template <class N>
-kerf::ArmPose<N> omni_pose(const kerf::JointVec<double>& q) {
+kerf::ForwardKinematics<N> omni_pose(const kerf::JointVec<double>& q) {
   using Real = typename N::Real;
   using Angle = typename N::Angle;
   namespace omni = kerf::omni;

@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "controller/servo/kinematics/arm_pose.hpp"
+#include "controller/servo/kinematics/forward_kinematics.hpp"
 #include "controller/servo/kinematics/trigonometry.hpp"
 #include "shared/numeric/vec.hpp"
 
@@ -107,7 +107,7 @@ template <class N>
 /// Tip and levers for three crank angles in rad, by Newton's method with a fixed number of steps.
 /// Angles that no grip can have give some finite place (fixed point) or NaN (floating point).
 template <class N>
-[[nodiscard]] constexpr ArmPose<N> delta_arm_pose(
+[[nodiscard]] constexpr ForwardKinematics<N> delta_arm_pose(
     const DeltaArm<N>& arm, const std::array<typename N::Angle, 3>& angles) noexcept {
   using Real = typename N::Real;
   using Unit = typename N::Unit;
@@ -132,7 +132,7 @@ template <class N>
 
   // A rod bears force along itself only: with f_i its force, F = SUM f_i rod_i, so f_i = g_i . F;
   // and it pulls its crank with the part of rod_i along the knee's way.
-  ArmPose<N> pose;
+  ForwardKinematics<N> pose;
   pose.tip_mm = {grip.x, grip.y, grip.z - arm.origin_depth_mm};
   for (std::size_t i = 0; i < 3; ++i) {
     const Unit out = arm.azimuth[i].cosine * legs[i].rod.x + arm.azimuth[i].sine * legs[i].rod.y;

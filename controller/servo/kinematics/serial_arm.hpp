@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "controller/servo/kinematics/arm_pose.hpp"
+#include "controller/servo/kinematics/forward_kinematics.hpp"
 #include "controller/servo/kinematics/trigonometry.hpp"
 #include "shared/numeric/vec.hpp"
 
@@ -31,8 +31,8 @@ struct SerialJoints {
 ///
 ///     [-c1 r, s1 L1 s2, -s1 L2 c3;   0, L1 c2, L2 s3;   -s1 r, -c1 L1 s2, c1 L2 c3]
 template <class N>
-[[nodiscard]] constexpr ArmPose<N> serial_arm_pose(const SerialArm<N>& arm,
-                                                   const SerialJoints<N>& q) noexcept {
+[[nodiscard]] constexpr ForwardKinematics<N> serial_arm_pose(const SerialArm<N>& arm,
+                                                             const SerialJoints<N>& q) noexcept {
   using Real = typename N::Real;
   const SineCosine<N> turret = sine_cosine<N>(q.turret);
   const SineCosine<N> thigh = sine_cosine<N>(q.thigh);
@@ -43,7 +43,7 @@ template <class N>
   const Real forearm_down = multiply<Real>(forearm.cosine, arm.forearm_mm);
   const Real reach = thigh_out + forearm_out;
 
-  ArmPose<N> pose;
+  ForwardKinematics<N> pose;
   pose.tip_mm = {-multiply<Real>(turret.sine, reach),
                  thigh_up - forearm_down + arm.origin_height_mm,
                  multiply<Real>(turret.cosine, reach) - arm.origin_depth_mm};

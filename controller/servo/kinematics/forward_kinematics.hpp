@@ -13,7 +13,7 @@ using Levers = Transform<typename N::Real, JointSpace, DeviceSpace>;
 /// What forward kinematics give: the tip in device mm (x right, y up, z to the user) and the levers
 /// there.
 template <class N>
-struct ArmPose {
+struct ForwardKinematics {
   DeviceVec<typename N::Real> tip_mm;
   Levers<N> lever_mm;
 };

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace kerf {
+
+/// What goes wrong. Names in fault files are those of `kFaultWords`.
+enum class FaultKind : std::uint8_t {
+  lose,       ///< packets vanish
+  delay,      ///< packets come `ms` late
+  duplicate,  ///< packets come twice
+  reorder,    ///< a packet comes after its successor
+  truncate,   ///< packets end early, at a random byte
+  corrupt,    ///< one random bit of a packet is wrong
+  stick,      ///< the encoder of `axis` stands still
+  jump,       ///< it is off by `counts`
+  wander,     ///< it is off by a random walk of steps up to `counts`
+  park,       ///< the device says that it is parked
+  chatter,    ///< it says so at random
+  unhome,     ///< the device says that it is not homed (Falcon)
+  noise,      ///< the low bits of the gimbal pots are noise (Omni)
+  silence,    ///< the device says nothing, and still hears
+  unplug,     ///< it neither says nor hears anything
+  host_late,  ///< the host stands still for `ms`
+};
+
+inline constexpr std::array<std::string_view, 16> kFaultWords{
+    "lose",   "delay", "duplicate", "reorder", "truncate", "corrupt", "stick",  "jump",
+    "wander", "park",  "chatter",   "unhome",  "noise",    "silence", "unplug", "host_late"};
+
+/// One fault. Its clock starts when the motors first push (0.05 N at the tip).
+struct ScriptedFault {
+  FaultKind kind = FaultKind::lose;
+  bool of_commands = false;  ///< of host packets; else of the device's (lose ... corrupt)
+  double at_s = 0;
+  double for_s = 0;  ///< 0: once
+  int every = 1;     ///< each n-th packet
+  int axis = 0;      ///< 0..2
+  int counts = 0;
+  double ms = 0;
+};
+
+struct FaultScript {
+  std::vector<ScriptedFault> faults;
+  std::uint32_t seed = 1;
+};
+
+}  // namespace kerf

@@ -1,0 +1,184 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "hil/fault/faulty_device.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "hil/devmodel/bus_cycle.hpp"
+
+namespace kerf {
+namespace {
+
+constexpr double kPushN = 0.05;
+constexpr int kPotNoiseMask = 31;
+
+std::int64_t cycles_of(double seconds) {
+  return std::llround(seconds * kCyclesPerSecond);
+}
+
+std::int16_t wrapped(int count) {
+  return static_cast<std::int16_t>(static_cast<std::uint16_t>(count));
+}
+
+}  // namespace
+
+FaultyDevice::FaultyDevice(Emulator& device, const FaultScript& script)
+    : device_(device), random_(script.seed) {
+  for (const ScriptedFault& fault : script.faults) {
+    const std::int64_t from = cycles_of(fault.at_s);
+    const double seconds = fault.kind == FaultKind::host_late ? fault.ms / 1000 : fault.for_s;
+    faults_.push_back(
+        {.fault = fault, .from = from, .to = from + std::max<std::int64_t>(cycles_of(seconds), 1)});
+  }
+}
+
+bool FaultyDevice::runs(const Running& running) const noexcept {
+  return clock_ && *clock_ >= running.from && *clock_ < running.to;
+}
+
+bool FaultyDevice::host_is_late() const noexcept {
+  return std::ranges::any_of(faults_, [&](const Running& running) {
+    return running.fault.kind == FaultKind::host_late && runs(running);
+  });
+}
+
+bool FaultyDevice::hits(Running& running, bool of_commands) noexcept {
+  const ScriptedFault& fault = running.fault;
+  if (fault.of_commands != of_commands || !runs(running)) return false;
+  return running.packets++ % fault.every == 0;
+}
+
+void FaultyDevice::send_on(std::span<const std::uint8_t> packet, bool of_commands,
+                           std::deque<Due>& way) {
+  Due due{cycle_, Bytes(packet.begin(), packet.end())};
+  if (!of_commands) break_sensors(due.bytes);
+  bool twice = false;
+  for (Running& running : faults_) {
+    const ScriptedFault& fault = running.fault;
+    const bool unplugged = fault.kind == FaultKind::unplug && runs(running);
+    const bool silent = fault.kind == FaultKind::silence && !of_commands && runs(running);
+    if (unplugged || silent) return;
+    if (fault.kind > FaultKind::corrupt || !hits(running, of_commands)) continue;
+    switch (fault.kind) {
+      case FaultKind::lose:
+        return;
+      case FaultKind::delay:
+        due.at = cycle_ + cycles_of(fault.ms / 1000);
+        break;
+      case FaultKind::duplicate:
+        twice = true;
+        break;
+      case FaultKind::reorder:
+        due.at = cycle_ + kCyclesPerUsbFrame + 1;  // any successor comes before that
+        break;
+      case FaultKind::truncate:
+        due.bytes.resize(random_() % due.bytes.size());
+        break;
+      case FaultKind::corrupt:
+        if (due.bytes.empty()) break;
+        due.bytes[random_() % due.bytes.size()] ^= static_cast<std::uint8_t>(1U << random_() % 8);
+        break;
+      default:
+        break;
+    }
+    if (due.bytes.empty()) return;
+  }
+  if (twice) way.push_back(due);
+  way.push_back(std::move(due));
+}
+
+void FaultyDevice::break_sensors(Bytes& packet) {
+  auto readings = readings_of(packet);
+  if (!readings) return;
+  bool changed = false;
+  for (Running& running : faults_) {
+    const ScriptedFault& fault = running.fault;
+    std::int16_t& count = readings->encoder[static_cast<std::size_t>(fault.axis)];
+    if (!runs(running)) {
+      running.stuck_at = count;
+      continue;
+    }
+    changed = true;
+    switch (fault.kind) {
+      case FaultKind::stick:
+        count = running.stuck_at;
+        break;
+      case FaultKind::jump:
+        count = wrapped(count + fault.counts);
+        break;
+      case FaultKind::wander: {
+        const auto widest = static_cast<std::uint32_t>(std::abs(fault.counts));
+        running.off_by += static_cast<int>(random_() % (2 * widest + 1)) - static_cast<int>(widest);
+        count = wrapped(count + running.off_by);
+        break;
+      }
+      case FaultKind::park:
+        readings->parked = true;
+        break;
+      case FaultKind::chatter:
+        readings->parked = random_() % 2 == 0;
+        break;
+      case FaultKind::unhome:
+        readings->homed = false;
+        break;
+      case FaultKind::noise:
+        for (std::uint16_t& pot : readings->pots) {
+          pot = static_cast<std::uint16_t>(pot ^ (random_() & kPotNoiseMask));
+        }
+        break;
+      default:
+        break;
+    }
+  }
+  if (changed) put_readings(*readings, packet);
+}
+
+void FaultyDevice::receive(std::span<const std::uint8_t> packet) noexcept {
+  send_on(packet, true, commands_);
+}
+
+void FaultyDevice::step_clock() noexcept {
+  ++cycle_;
+  if (clock_) {
+    ++*clock_;
+  } else if (norm(device_.model().motor_force_n()) > kPushN) {
+    clock_ = 0;
+  }
+  for (Running& running : faults_) {
+    if (running.begun || !runs(running)) continue;
+    running.begun = true;
+    ++begun_;
+  }
+}
+
+void FaultyDevice::advance(int cycles) noexcept {
+  for (int i = 0; i < cycles; ++i) {
+    for (auto due = commands_.begin(); due != commands_.end();) {
+      if (due->at > cycle_) {
+        ++due;
+        continue;
+      }
+      device_.receive(due->bytes);
+      due = commands_.erase(due);
+    }
+    device_.advance(1);
+    step_clock();
+  }
+  asked_ = false;
+}
+
+std::span<const std::uint8_t> FaultyDevice::next_packet() noexcept {
+  if (!asked_) {
+    asked_ = true;
+    const auto packet = device_.next_packet();
+    if (!packet.empty()) send_on(packet, false, reports_);
+  }
+  const auto due = std::ranges::find_if(reports_, [&](const Due& d) { return d.at <= cycle_; });
+  if (due == reports_.end()) return {};
+  handed_out_ = std::move(due->bytes);
+  reports_.erase(due);
+  return handed_out_;
+}
+
+}  // namespace kerf

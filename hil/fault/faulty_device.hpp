@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <optional>
+#include <random>
+#include <span>
+#include <vector>
+
+#include "hil/emulator.hpp"
+#include "hil/fault/fault_script.hpp"
+#include "hil/fault/readings.hpp"
+#include "hil/front/packet_device.hpp"
+
+namespace kerf {
+
+/// An emulated device whose packets and sensors go wrong by a script; without one it changes
+/// nothing. The same script and the same calls give the same faults. One thread.
+class FaultyDevice final : public PacketDevice {
+ public:
+  FaultyDevice(Emulator& device, const FaultScript& script);
+
+  void receive(std::span<const std::uint8_t> packet) noexcept override;
+  void advance(int cycles) noexcept override;
+  /// Several packets may be due after one `advance`: ask until it is empty.
+  [[nodiscard]] std::span<const std::uint8_t> next_packet() noexcept override;
+
+  /// Whether a fault has the host stand still now; the caller keeps it from running then.
+  [[nodiscard]] bool host_is_late() const noexcept;
+  /// Faults that have begun.
+  [[nodiscard]] std::uint64_t begun() const noexcept { return begun_; }
+
+ private:
+  using Bytes = std::vector<std::uint8_t>;
+  struct Running {
+    ScriptedFault fault;
+    std::int64_t from = 0, to = 0;  ///< cycles since the motors first pushed
+    bool begun = false;
+    int packets = 0;            ///< of its stream since it began
+    std::int16_t stuck_at = 0;  ///< of `stick`
+    int off_by = 0;             ///< of `wander`
+  };
+  /// A packet on its way.
+  struct Due {
+    std::int64_t at = 0;
+    Bytes bytes;
+  };
+
+  [[nodiscard]] bool runs(const Running& running) const noexcept;
+  /// Whether the running fault meets this packet of its stream.
+  [[nodiscard]] bool hits(Running& running, bool of_commands) noexcept;
+  void send_on(std::span<const std::uint8_t> packet, bool of_commands, std::deque<Due>& way);
+  void break_sensors(Bytes& packet);
+  void step_clock() noexcept;
+
+  Emulator& device_;
+  std::vector<Running> faults_;
+  std::mt19937 random_;
+  std::optional<std::int64_t> clock_;  ///< cycles; nothing before the motors push
+  std::int64_t cycle_ = 0;
+  std::deque<Due> reports_, commands_;
+  Bytes handed_out_;
+  bool asked_ = false;  ///< the device, since the last `advance`
+  std::uint64_t begun_ = 0;
+};
+
+}  // namespace kerf
