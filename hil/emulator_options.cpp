@@ -5,8 +5,6 @@
 #include <array>
 #include <string_view>
 
-#include <CLI/CLI.hpp>
-
 #include "hil/devmodel/bus_cycle.hpp"
 #include "hil/hil_error.hpp"
 #include "shared/wire/wooden_constants.hpp"

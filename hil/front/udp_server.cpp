@@ -63,7 +63,7 @@ int bind_to(const std::string& where) {
   if (fd >= 0 && bind(fd, list->ai_addr, list->ai_addrlen) == 0) return fd;
   const int cause = errno;
   if (fd >= 0) close(fd);
-  refuse(where, std::strerror(cause));
+  refuse(where, std::generic_category().message(cause));
 }
 
 }  // namespace

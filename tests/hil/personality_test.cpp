@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Whole runs of the three devices behind the emulator: calibration by host and hand, the script,
 // and the same bytes again.
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <memory>
@@ -10,19 +11,19 @@
 #include <vector>
 
 #include <doctest/doctest.h>
+#include <rapidcheck.h>
 
 #include "hil/devmodel/falcon_model.hpp"
 #include "hil/devmodel/omni_model.hpp"
 #include "hil/devmodel/wooden_model.hpp"
 #include "hil/emulator.hpp"
 #include "hil/hand_script_file.hpp"
+#include "tests/hil/model_runs.hpp"
 
 namespace {
 
-using kerf::DeviceVec;
 using kerf::Emulator;
 using kerf::FalconArm;
-using kerf::JointVec;
 
 constexpr int kTickCycles = 8;  // 1 kHz
 constexpr int kTicksPerSecond = 1000;
@@ -171,6 +172,31 @@ TEST_CASE("every script of the project stays in the reach of a Falcon and of Woo
     CHECK(in_reach);
     CHECK(fastest < (name == "jerk" ? 1100 : 500));
   }
+}
+
+TEST_CASE("no jump of a hand takes a Falcon or a WoodenHaptics arm out of its end stops") {
+  CHECK(rc::check([] {
+    kerf::FalconModel one;
+    kerf::WoodenModel other;
+    for (int jump = 0; jump < 4; ++jump) {
+      const auto goal = kerf::test::at(kerf::test::any_in_ball(600));
+      for (int cycle = 0; cycle < kerf::kCyclesPerSecond / 4; ++cycle) {
+        one.step(goal);
+        other.step(goal);
+        RC_ASSERT(norm(one.tip_mm()) < kerf::falcon::kReachMm + 1e-9);
+        // What a jump of 1.2 m gives at most through damper and spring: (b + sqrt(k m)) d / m.
+        RC_ASSERT(norm(one.velocity_mm_per_s()) < 170'000);
+        const auto q = other.joints_rad();
+        constexpr double kSlackRad = 1e-9;
+        RC_ASSERT(std::abs(q.x) < 1.0 + kSlackRad);
+        RC_ASSERT(q.y > -0.35 - kSlackRad);
+        RC_ASSERT(q.y < 1.35 + kSlackRad);
+        RC_ASSERT(q.y + q.z > 0.45 - kSlackRad);
+        RC_ASSERT(q.y + q.z < 2.6 + kSlackRad);
+        RC_ASSERT(norm(other.velocity_mm_per_s()) < 170'000);
+      }
+    }
+  }));
 }
 
 TEST_CASE("a packet of another device is refused and changes nothing") {
