@@ -6,8 +6,9 @@
 namespace kerf {
 namespace {
 
-constexpr std::int64_t kSettleCycles = kCyclesPerSecond / 5;    // 0.2 s after calibration
-constexpr std::int64_t kPatienceCycles = 2 * kCyclesPerSecond;  // hosts that never show it
+constexpr std::int64_t kSettleCycles = kCyclesPerSecond / 5;  // 0.2 s after calibration
+constexpr std::int64_t kPatienceCycles =
+    std::int64_t{2} * kCyclesPerSecond;  // hosts that never show it
 
 }  // namespace
 
@@ -25,6 +26,7 @@ void Emulator::guide_hand() noexcept {
 }
 
 void Emulator::advance(int cycles) noexcept {
+  asked_ = false;
   for (int i = 0; i < cycles; ++i) {
     if (hand_ && !hand_->left()) guide_hand();
     model_->step(hand_ ? hand_->next() : HandGoal{});
@@ -35,6 +37,8 @@ void Emulator::advance(int cycles) noexcept {
 }
 
 std::span<const std::uint8_t> Emulator::next_packet() noexcept {
+  if (asked_) return {};
+  asked_ = true;
   const std::span<const std::uint8_t> packet = model_->next_packet();
   if (packet.empty()) return {};
   ++packets_;

@@ -68,6 +68,7 @@ class Emulator final : public PacketDevice {
   std::optional<HandMotion> hand_;
   EmulatorFaults faults_;
   EmulatorStats stats_;
+  bool asked_ = false;  ///< for a packet, since the last `advance`
   std::optional<std::int64_t> calibrated_at_;
   std::int64_t packets_ = 0;  ///< of the device, handed out or not
 };

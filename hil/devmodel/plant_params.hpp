@@ -18,8 +18,8 @@ struct PlantParams {
   double viscous_ns_per_mm = 0.0005;  ///< sweep 0..0.002
   double coulomb_n = 0.1;             ///< sweep 0..0.3; the sheet names 0.26 of back-drive friction
 
-  /// Of each motor and what turns with it, at the joint; 0 = part of the tip mass. Encoders sit
-  /// here.
+  /// Of each motor and what turns with it, at the joint, where the encoder sits: all three, or 0 =
+  /// part of the tip mass.
   std::array<double, 3> joint_inertia_kg_m2{};
   /// Structural mode: each inertia above on a spring, with this frequency while the link is held;
   /// 0 = rigid.

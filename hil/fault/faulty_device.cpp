@@ -165,14 +165,11 @@ void FaultyDevice::advance(int cycles) noexcept {
     device_.advance(1);
     step_clock();
   }
-  asked_ = false;
 }
 
 std::span<const std::uint8_t> FaultyDevice::next_packet() noexcept {
-  if (!asked_) {
-    asked_ = true;
-    const auto packet = device_.next_packet();
-    if (!packet.empty()) send_on(packet, false, reports_);
+  for (auto packet = device_.next_packet(); !packet.empty(); packet = device_.next_packet()) {
+    send_on(packet, false, reports_);
   }
   const auto due = std::ranges::find_if(reports_, [&](const Due& d) { return d.at <= cycle_; });
   if (due == reports_.end()) return {};

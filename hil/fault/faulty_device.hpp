@@ -25,7 +25,6 @@ class FaultyDevice final : public PacketDevice {
 
   void receive(std::span<const std::uint8_t> packet) noexcept override;
   void advance(int cycles) noexcept override;
-  /// Several packets may be due after one `advance`: ask until it is empty.
   [[nodiscard]] std::span<const std::uint8_t> next_packet() noexcept override;
 
   /// Whether a fault has the host stand still now; the caller keeps it from running then.
@@ -63,7 +62,6 @@ class FaultyDevice final : public PacketDevice {
   std::int64_t cycle_ = 0;
   std::deque<Due> reports_, commands_;
   Bytes handed_out_;
-  bool asked_ = false;  ///< the device, since the last `advance`
   std::uint64_t begun_ = 0;
 };
 

@@ -15,7 +15,8 @@ class PacketDevice {
   /// A packet of the host as it came; what is no command is counted and ignored.
   virtual void receive(std::span<const std::uint8_t> packet) noexcept = 0;
   virtual void advance(int cycles) noexcept = 0;
-  /// The packet of this moment, valid until the next call; empty when the device says nothing.
+  /// The packet that is due now, valid until the next call; empty when the device says nothing
+  /// (more). Several may be due after one `advance`.
   [[nodiscard]] virtual std::span<const std::uint8_t> next_packet() noexcept = 0;
 };
 

@@ -84,7 +84,7 @@ std::span<const std::uint8_t> SeqpacketLink::wait(std::span<std::uint8_t> buffer
   return poll(&ready, 1, timeout_ms) > 0 ? take(buffer) : std::span<const std::uint8_t>{};
 }
 
-SeqpacketLink::Sent SeqpacketLink::send(std::span<const std::uint8_t> packet) noexcept {
+PacketLink::Sent SeqpacketLink::send(std::span<const std::uint8_t> packet) noexcept {
   const ssize_t sent = ::send(fd_, packet.data(), packet.size(), MSG_DONTWAIT | MSG_NOSIGNAL);
   if (sent >= 0) return Sent::yes;
   if (errno == EAGAIN || errno == EINTR) return Sent::full;

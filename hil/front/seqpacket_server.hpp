@@ -2,33 +2,29 @@
 #pragma once
 
 #include <atomic>
-#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <span>
 #include <string>
 
+#include "hil/front/packet_link.hpp"
+
 namespace kerf {
 
 /// One end of a SEQPACKET Unix socket: whole packets, in order, none merged. Owns the descriptor.
-class SeqpacketLink {
+class SeqpacketLink final : public PacketLink {
  public:
-  enum class Sent : std::uint8_t { yes, full, closed };
-
   explicit SeqpacketLink(int fd) noexcept : fd_(fd) {}
   SeqpacketLink(SeqpacketLink&& other) noexcept;
   SeqpacketLink& operator=(SeqpacketLink&&) = delete;
-  ~SeqpacketLink();
+  ~SeqpacketLink() override;
 
-  /// Oldest waiting packet into `buffer`; a longer one is cut. Empty when none waits, and then
-  /// `closed` tells whether the other end is gone. Never blocks.
-  [[nodiscard]] std::span<const std::uint8_t> take(std::span<std::uint8_t> buffer) noexcept;
-  /// As `take`, but waits up to `timeout_ms` for a packet.
+  [[nodiscard]] std::span<const std::uint8_t> take(
+      std::span<std::uint8_t> buffer) noexcept override;
   [[nodiscard]] std::span<const std::uint8_t> wait(std::span<std::uint8_t> buffer,
-                                                   int timeout_ms) noexcept;
-  /// Never blocks: `full` when the other end does not read.
-  [[nodiscard]] Sent send(std::span<const std::uint8_t> packet) noexcept;
-  [[nodiscard]] bool closed() const noexcept { return closed_; }
+                                                   int timeout_ms) noexcept override;
+  [[nodiscard]] Sent send(std::span<const std::uint8_t> packet) noexcept override;
+  [[nodiscard]] bool closed() const noexcept override { return closed_; }
 
  private:
   int fd_;

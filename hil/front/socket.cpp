@@ -15,22 +15,22 @@ constexpr int kMaxTakenPerPeriod = 64;  // a flooding host cannot hold the devic
 // One byte more than any command, so that a longer packet is seen to be wrong.
 using Buffer = std::array<std::uint8_t, 65>;
 
-void send(SeqpacketLink& client, PacketDevice& device, FrontStats& stats) noexcept {
-  const auto packet = device.next_packet();
-  if (packet.empty()) return;
-  const SeqpacketLink::Sent sent = client.send(packet);
-  if (sent == SeqpacketLink::Sent::yes) ++stats.sent;
-  if (sent == SeqpacketLink::Sent::full) ++stats.dropped;
+void send(PacketLink& client, PacketDevice& device, FrontStats& stats) noexcept {
+  for (auto packet = device.next_packet(); !packet.empty(); packet = device.next_packet()) {
+    const PacketLink::Sent sent = client.send(packet);
+    if (sent == PacketLink::Sent::yes) ++stats.sent;
+    if (sent == PacketLink::Sent::full) ++stats.dropped;
+  }
 }
 
-bool goes_on(const SeqpacketLink& client, const ServeLimits& limits, const FrontStats& stats) {
+bool goes_on(const PacketLink& client, const ServeLimits& limits, const FrontStats& stats) {
   return !client.closed() && !limits.stop.load(std::memory_order_relaxed) &&
          (limits.cycles == 0 || stats.cycles < limits.cycles);
 }
 
 }  // namespace
 
-void serve_real_time(SeqpacketLink& client, PacketDevice& device, int packet_cycles,
+void serve_real_time(PacketLink& client, PacketDevice& device, int packet_cycles,
                      const ServeLimits& limits, FrontStats& stats) {
   Buffer buffer;
   std::int64_t deadline_ns = monotonic_ns();
@@ -54,7 +54,7 @@ void serve_real_time(SeqpacketLink& client, PacketDevice& device, int packet_cyc
   }
 }
 
-void serve_lockstep(SeqpacketLink& client, PacketDevice& device, int tick_cycles,
+void serve_lockstep(PacketLink& client, PacketDevice& device, int tick_cycles,
                     const ServeLimits& limits, FrontStats& stats) {
   Buffer buffer;
   send(client, device, stats);

@@ -6,7 +6,7 @@
 
 #include "hil/front/lateness.hpp"
 #include "hil/front/packet_device.hpp"
-#include "hil/front/seqpacket_server.hpp"
+#include "hil/front/packet_link.hpp"
 
 namespace kerf {
 
@@ -25,16 +25,17 @@ struct FrontStats {
   Lateness wake;
 };
 
-/// Serves one client in real time: one packet every `packet_cycles` bus cycles at absolute
-/// deadlines, the newest packets of the host applied just before. Never waits for the client: what
-/// it does not read is dropped and counted. Returns when the client leaves, at the limit or at a
-/// stop.
-void serve_real_time(SeqpacketLink& client, PacketDevice& device, int packet_cycles,
+/// Serves one client in real time: every `packet_cycles` bus cycles, at absolute deadlines, the
+/// packets of the host are applied and the device's packet is sent, where one is due. Never waits
+/// for the client: what it does not read is dropped and counted. Returns when the client leaves, at
+/// the limit or at a stop.
+void serve_real_time(PacketLink& client, PacketDevice& device, int packet_cycles,
                      const ServeLimits& limits, FrontStats& stats);
 
-/// Serves one client in lock-step: one packet at once, then for every packet of the host
-/// `tick_cycles` bus cycles and exactly one packet. No clock: the same host sees the same bytes.
-void serve_lockstep(SeqpacketLink& client, PacketDevice& device, int tick_cycles,
+/// Serves one client in lock-step: one packet at once (of a device that speaks first), then for
+/// every packet of the host `tick_cycles` bus cycles and the packet that is due then. No clock: the
+/// same host sees the same bytes.
+void serve_lockstep(PacketLink& client, PacketDevice& device, int tick_cycles,
                     const ServeLimits& limits, FrontStats& stats);
 
 }  // namespace kerf

@@ -101,7 +101,7 @@ TEST_CASE("a missing file, a folder and an endless file are refused") {
   const auto big = folder / ("kerf-big-hand-" + std::to_string(::getpid()) + ".toml");
   std::ofstream(big) << std::string((1 << 20) + 1, '#');
   CHECK_THROWS_WITH_AS((void)kerf::read_hand_script(big),
-                       (big.string() + ": more than 1 MiB; use a shorter script").c_str(),
+                       (big.string() + ": more than 1 MiB; use a shorter one").c_str(),
                        kerf::HilError);
   std::filesystem::remove(big);
 }

@@ -60,7 +60,7 @@ TEST_CASE("bad input is one line that names place, value and way out, and exit c
   for (const auto& [arguments, place] : {
            Bad{{}, "--socket"},
            Bad{{"--socket", socket, "--wrong"}, "--wrong"},
-           Bad{{"--socket", socket, "--personality", "falcon"}, "--personality: falcon"},
+           Bad{{"--socket", socket, "--personality", "touch"}, "--personality: touch"},
            Bad{{"--socket", socket, "--front", "pigeon"}, "--front: pigeon"},
            Bad{{"--socket", socket, "--rate", "3000"}, "--rate: 3000"},
            Bad{{"--socket", socket, "--rate", "0"}, "--rate: 0"},
@@ -71,6 +71,18 @@ TEST_CASE("bad input is one line that names place, value and way out, and exit c
            Bad{{"--socket", socket, "--hand", "/nowhere.toml"}, "/nowhere.toml"},
            Bad{{"--socket", socket, "--lockstep", "--drop-every", "3"}, "--lockstep"},
            Bad{{"--socket", "/nowhere/socket"}, "--socket: /nowhere/socket"},
+           Bad{{"--front", "udp"}, "--udp"},
+           Bad{{"--front", "udp", "--udp", "harbour"}, "--udp: harbour"},
+           Bad{{"--socket", socket, "--mode-hz", "80"}, "--mode-hz"},
+           Bad{{"--socket", socket, "--joint-inertia", "-1"}, "--joint-inertia"},
+           Bad{{"--socket", socket, "--personality", "falcon", "--rate", "2000"}, "--rate: 2000"},
+           Bad{{"--socket", socket, "--personality", "falcon", "--pot-noise"}, "--pot-noise"},
+           Bad{{"--socket", socket, "--wireless-button"}, "--wireless-button"},
+           Bad{{"--socket", socket, "--packet-bytes", "64"}, "--packet-bytes"},
+           Bad{{"--socket", socket, "--personality", "woodenhaptics", "--packet-bytes", "8"},
+               "--packet-bytes: 8"},
+           Bad{{"--socket", socket, "--personality", "woodenhaptics", "--drop-torque"},
+               "--drop-torque"},
        }) {
     CAPTURE(place);
     const Outcome outcome = run(arguments);
