@@ -18,10 +18,10 @@ namespace {
 constexpr int kAbiVersion = 5;
 constexpr int kSpeed = SCODE_400;
 constexpr unsigned kLargestNumber = 0x18;
-constexpr std::size_t kMaxEntryBytes = 1
-                                       << 20;  // of one QUEUE_ISO; the rest counts as "memory full"
-constexpr int kMaxRequests = 64;               // transaction labels of a controller
-constexpr std::size_t kMaxContexts = 4;        // per direction, of a typical controller
+// Of one QUEUE_ISO: descriptor memory is full before so much is looked at.
+constexpr std::size_t kMaxEntryBytes = 16 << 20;
+constexpr int kMaxRequests = 64;         // transaction labels of a controller
+constexpr std::size_t kMaxContexts = 4;  // per direction, of a typical controller
 
 // Times on the bus: a transaction, an allocation (two of them), a client's patience.
 constexpr std::int64_t kRequestCycles = 2;
@@ -360,7 +360,7 @@ int FirewireClient::queue(const FuseIoctl& call) {
   if (!has_context(request.handle)) return -EINVAL;
   std::vector<std::uint8_t> entries(std::min<std::size_t>(request.size, kMaxEntryBytes));
   const std::size_t readable = read_caller(call.thread, request.packets, entries);
-  const bool all = readable == request.size;
+  const bool all = readable == entries.size();
   entries.resize(readable);
   const IsoContext::Queued queued = context_->queue(entries, all);
   if (queued.error != 0) return -queued.error;

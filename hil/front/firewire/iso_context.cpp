@@ -63,6 +63,10 @@ IsoContext::Queued IsoContext::queue(std::span<const std::uint8_t> entries, bool
     queued.bytes += sizeof control + sent;
     ++queued.entries;
   }
+  if (queued.bytes == entries.size() && !readable) {
+    queued.error = EFAULT;
+    return queued;
+  }
   halted_ = false;  // the engine is woken, unless an entry was bad
   return queued;
 }
