@@ -12,6 +12,7 @@
 #include "hil/front/real_time.hpp"
 #include "hil/front/seqpacket_server.hpp"
 #include "hil/front/socket.hpp"
+#include "hil/fuse_front.hpp"
 #include "hil/hand_script_file.hpp"
 #include "hil/hil_error.hpp"
 #include "hil/run_report.hpp"
@@ -26,6 +27,7 @@ struct Options {
   std::string personality = "omni";
   std::string front = "socket";
   std::string socket;
+  FuseFrontOptions fuse;
   std::string hand;
   std::optional<double> unit_mm;
   bool lockstep = false;
@@ -58,8 +60,9 @@ CLI::Validator between(double low, double high) {
 void declare(CLI::App& app, Options& o) {
   app.set_version_flag("--version", "kerf-emulator " KERF_VERSION);
   app.add_option("--personality", o.personality, "which device to be: omni");
-  app.add_option("--front", o.front, "how it is reached: socket");
-  app.add_option("--socket", o.socket, "path of the SEQPACKET socket to serve")->required();
+  app.add_option("--front", o.front, "how it is reached: socket or fuse");
+  app.add_option("--socket", o.socket, "front socket: path of the SEQPACKET socket to serve");
+  declare_fuse(app, o.fuse);
   app.add_option("--hand", o.hand, "hand script (TOML); none: the stylus stays in the inkwell");
   app.add_option("--unit-mm", o.unit_mm, "device mm per unit of the hand script")
       ->check(between(1e-3, 100.0));
@@ -91,7 +94,12 @@ void check(const Options& o) {
   if (o.personality != "omni") {
     throw HilError("--personality: " + o.personality + " is not known; use omni");
   }
-  if (o.front != "socket") throw HilError("--front: " + o.front + " is not known; use socket");
+  if (o.front != "socket" && o.front != "fuse") {
+    throw HilError("--front: " + o.front + " is not known; use socket or fuse");
+  }
+  if (o.front == "socket" && o.socket.empty()) {
+    throw HilError("--socket: missing; give the path of the socket to serve");
+  }
   if (o.rate_hz < 1 || omni::kBusCyclesPerSecond % o.rate_hz != 0) {
     throw HilError("--rate: " + std::to_string(o.rate_hz) +
                    " does not divide 8000; use 500, 1000, 2000, 4000 or 8000");
@@ -123,14 +131,17 @@ void serve(const Options& o, const std::atomic<bool>& stop, std::ostream& out, s
   if (!o.report.empty()) check_report(o.report);
   Emulator emulator = make_emulator(o);
   FrontStats stats;
-  {
+  if (!o.lockstep) {
+    const std::string missing = make_real_time(o.priority, o.cpu);
+    if (!missing.empty()) err << "kerf-emulator: warning: " << missing << std::endl;
+  }
+  const ServeLimits limits{cycles_of(o.seconds), stop};
+  if (o.front == "fuse") {
+    const FirewireSettings settings = firewire_settings(o.fuse, o.lockstep ? o.rate_hz : 0);
+    serve_fuse(o.fuse.mount, settings, emulator, limits, o.stay, stats, out);
+  } else {
     SeqpacketServer server(o.socket);
-    if (!o.lockstep) {
-      const std::string missing = make_real_time(o.priority, o.cpu);
-      if (!missing.empty()) err << "kerf-emulator: warning: " << missing << std::endl;
-    }
     out << "kerf-emulator: omni at " << o.socket << std::endl;
-    const ServeLimits limits{cycles_of(o.seconds), stop};
     do {
       auto client = server.accept(stop);
       if (!client) break;

@@ -4,10 +4,12 @@
 #include <algorithm>
 #include <array>
 #include <iostream>
+#include <stdexcept>
 #include <vector>
 
 #include <CLI/CLI.hpp>
 
+#include "controller/device/open_port.hpp"
 #include "controller/scene/scene_words.hpp"
 
 namespace kerf {
@@ -57,7 +59,9 @@ std::optional<int> parse_options(int argc, const char* const* argv, ControllerOp
   app.add_option("--device", options.device, "device personality")
       ->check(CLI::IsMember({"omni"}))
       ->capture_default_str();
-  app.add_option("--port", options.port, "where the device is: socket:PATH of kerf-emulator")
+  app.add_option(
+         "--port", options.port,
+         "where the device is: fw[:NODE or SERIAL] on FireWire, socket:PATH of kerf-emulator")
       ->type_name("PORT");
   constexpr double kLongestS = 1e7;  // 115 days
   app.add_option("--seconds", options.seconds,
@@ -126,11 +130,14 @@ std::optional<int> parse_options(int argc, const char* const* argv, ControllerOp
   }
   const bool runs = !options.check && !options.explain;
   if (runs && options.port.empty()) {
-    return refuse("--port is missing; give socket:PATH, where kerf-emulator listens");
+    return refuse("--port is missing; give fw, or socket:PATH, where kerf-emulator listens");
   }
-  if (runs && !options.port.starts_with("socket:")) {
-    return refuse("--port '" + options.port +
-                  "' is not known; use socket:PATH, where kerf-emulator listens");
+  if (runs) {
+    try {
+      check_port(options.port);
+    } catch (const std::runtime_error& error) {
+      return refuse(error.what());
+    }
   }
   if (*volume_option) options.overrides.volume_file = volume;
   if (*spacing_option) options.overrides.spacing_mm = three_of(spacing_mm);

@@ -5,27 +5,28 @@
 #include <cstdint>
 
 #include "shared/posix/monotonic_clock.hpp"
+#include "shared/wire/omni_constants.hpp"
 
 namespace kerf {
 
-inline constexpr std::int64_t kCyclesPerSecond = 8000;
+inline constexpr std::int64_t kBusCyclesPerSecond = omni::kBusCyclesPerSecond;
 inline constexpr int kTicksPerCycle = 3072;  ///< of the bus's 24.576 MHz clock
-inline constexpr std::int64_t kNsPerBusCycle = kNsPerSecond / kCyclesPerSecond;
+inline constexpr std::int64_t kNsPerBusCycle = kNsPerSecond / kBusCyclesPerSecond;
 
 /// A bus begins late in its 128 s, so that every run sees its counters wrap.
-inline constexpr std::int64_t kFirstCycle = 125 * kCyclesPerSecond;
+inline constexpr std::int64_t kFirstCycle = 125 * kBusCyclesPerSecond;
 
 /// 3 bits of the second and 13 bits of the cycle: the time stamp of an isochronous packet.
 [[nodiscard]] constexpr std::uint16_t iso_stamp(std::int64_t cycle) noexcept {
-  const auto second = static_cast<std::uint64_t>(cycle / kCyclesPerSecond) & 7;
+  const auto second = static_cast<std::uint64_t>(cycle / kBusCyclesPerSecond) & 7;
   return static_cast<std::uint16_t>(second << 13 |
-                                    static_cast<std::uint64_t>(cycle % kCyclesPerSecond));
+                                    static_cast<std::uint64_t>(cycle % kBusCyclesPerSecond));
 }
 
 /// 7 bits of the second, 13 of the cycle, 12 of the offset: the cycle timer of a controller.
 [[nodiscard]] constexpr std::uint32_t cycle_timer(std::int64_t cycle, int ticks) noexcept {
-  const auto second = static_cast<std::uint64_t>(cycle / kCyclesPerSecond) & 127;
-  const auto within = static_cast<std::uint64_t>(cycle % kCyclesPerSecond);
+  const auto second = static_cast<std::uint64_t>(cycle / kBusCyclesPerSecond) & 127;
+  const auto within = static_cast<std::uint64_t>(cycle % kBusCyclesPerSecond);
   return static_cast<std::uint32_t>(second << 25 | within << 12 | static_cast<unsigned>(ticks));
 }
 

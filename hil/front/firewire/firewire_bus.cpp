@@ -7,8 +7,9 @@
 namespace kerf {
 namespace {
 
-constexpr std::int64_t kRomCycles = kCyclesPerSecond / 2;   // a device's own reset: its ROM is read
-constexpr std::int64_t kGoneCycles = 2 * kCyclesPerSecond;  // until a lost device is given up
+constexpr std::int64_t kRomCycles =
+    kBusCyclesPerSecond / 2;  // a device's own reset: its ROM is read
+constexpr std::int64_t kGoneCycles = 2 * kBusCyclesPerSecond;  // until a lost device is given up
 constexpr std::uint32_t kOmniTag = 0;
 
 std::uint64_t fnv1a(std::uint64_t hash, std::uint64_t value) noexcept {
@@ -61,7 +62,8 @@ void FirewireBus::begin_cycle() {
     ++stats_.commands;
     device_.receive(*packet);
   }
-  device_.advance(1);
+  awake_ = awake_ || registers_.streams();
+  if (awake_) device_.advance(1);
 }
 
 void FirewireBus::finish_cycle() {

@@ -118,6 +118,7 @@ class FirewireBus {
   std::uint32_t generation_ = 1;
   bool present_ = true;
   bool listed_ = true;
+  bool awake_ = false;  ///< the device has streamed
   FirewireStats stats_;
 };
 

@@ -26,9 +26,9 @@ constexpr std::size_t kMaxContexts = 4;  // per direction, of a typical controll
 // Times on the bus: a transaction, an allocation (two of them), a client's patience.
 constexpr std::int64_t kRequestCycles = 2;
 constexpr std::int64_t kAllocationCycles = 4;
-constexpr std::int64_t kRetryCycles = kCyclesPerSecond / 3;
+constexpr std::int64_t kRetryCycles = kBusCyclesPerSecond / 3;
 constexpr std::int64_t kGraceCycles =
-    kCyclesPerSecond;  // of those who had resources before a reset
+    kBusCyclesPerSecond;  // of those who had resources before a reset
 
 constexpr std::uint32_t kNodeId = 0xFFC0;
 constexpr std::uint32_t kLocalNodeId = 0xFFC1;
@@ -381,9 +381,9 @@ int FirewireClient::start() {
   // 2 bits of the second and 13 of the cycle; -1 is the next one.
   std::int64_t first = bus_.cycle() + 1;
   if (request.cycle >= 0) {
-    constexpr std::int64_t kPeriod = 4 * kCyclesPerSecond;
+    constexpr std::int64_t kPeriod = 4 * kBusCyclesPerSecond;
     const std::int64_t wanted =
-        (request.cycle >> 13 & 3) * kCyclesPerSecond + (request.cycle & 0x1FFF);
+        (request.cycle >> 13 & 3) * kBusCyclesPerSecond + (request.cycle & 0x1FFF);
     first += ((wanted - first) % kPeriod + kPeriod) % kPeriod;
   }
   return -context_->start(first, request.tags);

@@ -18,7 +18,10 @@ void FirewireNode::release(FuseOpen open) {
   const auto found = opens_.find(open);
   if (found == opens_.end()) return;
   const FirewireClient& client = *found->second.client;
-  if (client.context()) double_starts_ += client.context()->double_starts();
+  if (client.context()) {
+    streamed_ = true;
+    double_starts_ += client.context()->double_starts();
+  }
   opens_.erase(found);
   deliver();
 }

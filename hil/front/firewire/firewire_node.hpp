@@ -38,6 +38,8 @@ class FirewireNode final : public FuseNode, private FirewireBus::Listener {
   [[nodiscard]] std::int64_t next_wake_ns() const noexcept override;
   void wake() override;
 
+  /// Somebody had a stream, and nobody has the node open any more.
+  [[nodiscard]] bool left() const noexcept { return streamed_ && opens_.empty(); }
   [[nodiscard]] const FirewireBus& bus() const noexcept { return bus_; }
   /// Largest number of events that one open has let wait.
   [[nodiscard]] std::size_t events_high_water() const noexcept { return high_water_; }
@@ -67,6 +69,7 @@ class FirewireNode final : public FuseNode, private FirewireBus::Listener {
   FirewireBus bus_;
   std::map<FuseOpen, Open> opens_;
   EventQueue::Bytes taken_;
+  bool streamed_ = false;
   std::size_t high_water_ = 0;
   std::uint64_t double_starts_ = 0;
 };

@@ -100,13 +100,13 @@ void FuseMount::add(std::string name, FuseNode& node) {
   node.attach(*this);
 }
 
-void FuseMount::serve(const std::atomic<bool>& stop) {
-  while (!gone_ && wait(stop)) serve_one();
+void FuseMount::serve(const std::function<bool()>& goes_on) {
+  while (!gone_ && wait(goes_on)) serve_one();
 }
 
-/// Wakes nodes when they are due, until a request is there; false at a stop.
-bool FuseMount::wait(const std::atomic<bool>& stop) {
-  while (!stop.load(std::memory_order_relaxed)) {
+/// Wakes nodes when they are due, until a request is there; false when it does not go on.
+bool FuseMount::wait(const std::function<bool()>& goes_on) {
+  while (goes_on()) {
     const std::int64_t now_ns = monotonic_ns();
     std::int64_t next_ns = now_ns + kStopCheckNs;
     for (const Named& named : nodes_) {

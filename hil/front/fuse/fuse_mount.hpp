@@ -2,9 +2,9 @@
 #pragma once
 
 #include <array>
-#include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <optional>
 #include <string>
@@ -32,8 +32,9 @@ class FuseMount final : public FuseReplies {
   /// Before `serve`. The node outlives the mount.
   void add(std::string name, FuseNode& node);
 
-  /// Serves until `stop`, which may take 100 ms to be seen, or until somebody else unmounts.
-  void serve(const std::atomic<bool>& stop);
+  /// Serves while `goes_on`, which is asked between requests and at least every 100 ms, or until
+  /// somebody else unmounts.
+  void serve(const std::function<bool()>& goes_on);
 
   void answer(FuseRequest request, const FuseAnswer& answer) noexcept override;
   void wake_pollers(FuseOpen open) noexcept override;
@@ -54,7 +55,7 @@ class FuseMount final : public FuseReplies {
     FuseNode* node;
   };
 
-  bool wait(const std::atomic<bool>& stop);
+  bool wait(const std::function<bool()>& goes_on);
   void serve_one();
   void dispatch(const Request& request);
   void look_up(const Request& request) noexcept;

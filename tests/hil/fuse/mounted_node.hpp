@@ -40,7 +40,7 @@ class MountedNode {
                        const std::optional<HandScript>& hand = {})
       : emulator_(params, hand), node_(settings, emulator_), mount_(folder_.path()) {
     mount_.add("fw1", node_);
-    thread_ = std::thread([this] { mount_.serve(stop_); });
+    thread_ = std::thread([this] { mount_.serve([this] { return !stop_; }); });
   }
   ~MountedNode() { stop(); }
 
