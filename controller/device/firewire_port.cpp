@@ -234,7 +234,7 @@ bool FirewirePort::open_streams() noexcept {
   for (FirewireFile* file : {&received_, &transmitted_}) {
     if (file->open(device_.path) != 0 || !file->link()) return false;
   }
-  if (receiver_.start(received_, listen_.channel) < 0) return false;
+  if (receiver_.prepare(received_, listen_.channel) < 0) return false;
   if (transmitter_.start(transmitted_, talk_.channel, kNeutral) < 0) return false;
   refused_ = false;
   return true;

@@ -56,21 +56,22 @@ std::span<const std::uint8_t> headers_of(std::span<const std::uint8_t> event) no
 
 }  // namespace
 
-int FirewireReceiver::start(FirewireFile& file, std::int32_t channel) noexcept {
+int FirewireReceiver::prepare(FirewireFile& file, std::int32_t channel) noexcept {
   headers_ = {};
+  running_ = false;
   free_packets_ = 0;
   entries_ = 0;
   if (const int error = create(file, FW_CDEV_ISO_CONTEXT_RECEIVE, channel, kHeaderBytes);
       error < 0) {
     return error;
   }
-  if (const int queued = queue(file, kEntries); queued != kEntries) {
-    return queued < 0 ? queued : -ENOMEM;
-  }
-  return start_now(file);
+  const int queued = queue(file, kEntries);
+  if (queued < 0) return queued;
+  return queued == kEntries ? 0 : -ENOMEM;
 }
 
 void FirewireReceiver::stop(FirewireFile& file) noexcept {
+  running_ = true;  // as far as `turn` is concerned
   stop_stream(file);
 }
 
@@ -89,6 +90,7 @@ int FirewireReceiver::queue(FirewireFile& file, int entries) noexcept {
 }
 
 void FirewireReceiver::turn(FirewireFile& file) noexcept {
+  if (!running_) running_ = start_now(file) >= 0;
   const int entries = std::min(free_packets_ / kPacketsPerEntry, kEntries);
   if (entries > 0) free_packets_ -= kPacketsPerEntry * std::max(queue(file, entries), 0);
   fw_cdev_flush_iso request{0};

@@ -28,8 +28,9 @@ namespace kerf {
 /// say so, which is a safety net against a servo that does not ask. Servo thread only.
 class FirewireReceiver {
  public:
-  /// Creates the context on a freshly opened file. 0 or a negative errno.
-  [[nodiscard]] int start(FirewireFile& file, std::int32_t channel) noexcept;
+  /// Creates the context on a freshly opened file. 0 or a negative errno. The stream begins with
+  /// the first `turn`, so that a servo which starts later finds no old packets.
+  [[nodiscard]] int prepare(FirewireFile& file, std::int32_t channel) noexcept;
   void stop(FirewireFile& file) noexcept;
 
   /// Gives back the room of packets that were taken, then asks for those that have come.
@@ -57,6 +58,7 @@ class FirewireReceiver {
   [[nodiscard]] int queue(FirewireFile& file, int entries) noexcept;
 
   std::span<const std::uint8_t> headers_;
+  bool running_ = false;
   int free_packets_ = 0;  ///< taken, and their room not given back yet
   std::uint32_t entries_ = 0;
   std::atomic<std::int32_t> newest_cycle_{-1};

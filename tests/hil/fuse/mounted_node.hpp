@@ -4,6 +4,8 @@
 #include <atomic>
 #include <cstdlib>
 #include <filesystem>
+#include <functional>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <thread>
@@ -33,16 +35,20 @@ class TempFolder {
   std::string path_;
 };
 
-/// The node `fw1` of an emulated Omni, served by a thread while this lives.
-class MountedNode {
+/// A device as the node `fw1`, served by a thread while this lives.
+class MountedDevice {
  public:
-  explicit MountedNode(const FirewireSettings& settings = {}, const OmniParams& params = {},
-                       const std::optional<HandScript>& hand = {})
-      : emulator_(params, hand), node_(settings, emulator_), mount_(folder_.path()) {
+  /// `prepare` runs first on the server's thread.
+  MountedDevice(const FirewireSettings& settings, PacketDevice& device,
+                std::function<void()> prepare = {})
+      : node_(settings, device), mount_(folder_.path()) {
     mount_.add("fw1", node_);
-    thread_ = std::thread([this] { mount_.serve([this] { return !stop_; }); });
+    thread_ = std::thread([this, prepare = std::move(prepare)] {
+      if (prepare) prepare();
+      mount_.serve([this] { return !stop_; });
+    });
   }
-  ~MountedNode() { stop(); }
+  ~MountedDevice() { stop(); }
 
   /// Ends the server; what it has seen may be read from then on.
   void stop() {
@@ -52,16 +58,33 @@ class MountedNode {
   [[nodiscard]] const std::string& folder() const noexcept { return folder_.path(); }
   [[nodiscard]] std::string path() const { return folder_.path() + "/fw1"; }
   [[nodiscard]] const FirewireNode& node() const noexcept { return node_; }
-  [[nodiscard]] const Emulator& emulator() const noexcept { return emulator_; }
   [[nodiscard]] const FuseMount& mount() const noexcept { return mount_; }
 
  private:
   TempFolder folder_;
-  Emulator emulator_;
   FirewireNode node_;
   FuseMount mount_;
   std::atomic<bool> stop_{false};
   std::thread thread_;
+};
+
+/// The emulated Omni in this way.
+class MountedNode {
+ public:
+  explicit MountedNode(const FirewireSettings& settings = {}, const OmniParams& params = {},
+                       const std::optional<HandScript>& hand = {})
+      : emulator_(params, hand), device_(settings, emulator_) {}
+
+  void stop() { device_.stop(); }
+  [[nodiscard]] const std::string& folder() const noexcept { return device_.folder(); }
+  [[nodiscard]] std::string path() const { return device_.path(); }
+  [[nodiscard]] const FirewireNode& node() const noexcept { return device_.node(); }
+  [[nodiscard]] const FuseMount& mount() const noexcept { return device_.mount(); }
+  [[nodiscard]] const Emulator& emulator() const noexcept { return emulator_; }
+
+ private:
+  Emulator emulator_;
+  MountedDevice device_;
 };
 
 }  // namespace kerf::test
