@@ -18,7 +18,6 @@ namespace kerf {
 namespace {
 
 constexpr std::uint32_t kVendor = 0x000B99;
-constexpr const char* kUsual = "/dev";
 
 /// Identity of the node at `path`; nothing when it is no device of the vendor.
 std::optional<FirewireDevice> identify(const std::string& path, int* refused) {
@@ -95,7 +94,7 @@ std::vector<FirewireDevice> list_firewire(const std::string& folder, int* refuse
   return devices;
 }
 
-FirewireDevice find_firewire(const FirewireOptions& options) {
+FirewireDevice find_firewire(const FirewireOptions& options, const std::string& folder) {
   const std::string& where = options.where;
   int refused = 0;
   const bool is_path = where.find('/') != std::string::npos;
@@ -105,7 +104,7 @@ FirewireDevice find_firewire(const FirewireOptions& options) {
     if (refused != 0) refuse(where, std::generic_category().message(refused) + "; see the node");
     refuse(where, "no device of SensAble; its vendor is not 000b99");
   }
-  auto devices = list_firewire(is_path ? where : kUsual, &refused);
+  auto devices = list_firewire(is_path ? where : folder, &refused);
   if (!is_path && !where.empty()) {
     std::erase_if(devices, [&](const FirewireDevice& device) { return device.serial != where; });
   }

@@ -38,8 +38,9 @@ struct FirewireOptions {
 /// not.
 [[nodiscard]] std::vector<FirewireDevice> list_firewire(const std::string& folder, int* refused);
 
-/// The one that `options.where` means. Throws std::runtime_error with one line when there is none,
-/// or more than one.
-[[nodiscard]] FirewireDevice find_firewire(const FirewireOptions& options);
+/// The one that `options.where` means; a serial number is looked for in `folder`. Throws
+/// std::runtime_error with one line when there is none, or more than one.
+[[nodiscard]] FirewireDevice find_firewire(const FirewireOptions& options,
+                                           const std::string& folder = "/dev");
 
 }  // namespace kerf
