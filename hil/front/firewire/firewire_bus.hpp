@@ -35,6 +35,7 @@ struct FirewireSettings {
   /// enable bit.
   bool reset_stops_stream = false;
   std::uint32_t packed_serial = 0x82B6'980C;
+  int abi_version = 5;  ///< of the kernel's interface: Linux 6.1; newer ones say more
   std::vector<ScriptedFault> script;
 };
 

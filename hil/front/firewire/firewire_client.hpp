@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <map>
 #include <memory>
 #include <optional>
@@ -25,7 +26,8 @@ namespace kerf {
 /// broadcasts, several channels in one context, resources for one generation.
 class FirewireClient : public std::enable_shared_from_this<FirewireClient> {
  public:
-  explicit FirewireClient(FirewireBus& bus) : bus_(bus) {}
+  explicit FirewireClient(FirewireBus& bus)
+      : bus_(bus), next_handle_(bus.settings().abi_version > 5 ? 1 : 0) {}
   ~FirewireClient();
   FirewireClient(const FirewireClient&) = delete;
   FirewireClient& operator=(const FirewireClient&) = delete;
@@ -83,12 +85,13 @@ class FirewireClient : public std::enable_shared_from_this<FirewireClient> {
   }
 
   static constexpr std::size_t kLargestArgument = 40;
+  static constexpr int kDeviceSpeed = SCODE_400;
 
   FirewireBus& bus_;
   EventQueue events_;
   std::optional<IsoContext> context_;
   std::map<std::uint32_t, Resource> resources_;
-  std::uint32_t next_handle_ = 0;
+  std::uint32_t next_handle_;  ///< newer kernels begin at 1
   std::uint32_t version_ = 0;
   std::uint64_t reset_closure_ = 0;
   bool linked_ = false;
@@ -96,5 +99,18 @@ class FirewireClient : public std::enable_shared_from_this<FirewireClient> {
   int requests_on_the_way_ = 0;
   std::array<std::uint8_t, kLargestArgument> argument_{};
 };
+
+template <class T>
+T FirewireClient::argument() const noexcept {
+  static_assert(sizeof(T) <= kLargestArgument);
+  T value{};
+  std::memcpy(&value, argument_.data(), sizeof value);
+  return value;
+}
+
+template <class T>
+void FirewireClient::give_back(const T& value) noexcept {
+  std::memcpy(argument_.data(), &value, sizeof value);
+}
 
 }  // namespace kerf
