@@ -30,9 +30,11 @@ CLI::Validator between(double low, double high) {
 }
 
 void declare_front(CLI::App& app, EmulatorOptions& o) {
-  app.add_option("--front", o.front, "how it is reached: socket, udp")->capture_default_str();
+  app.add_option("--front", o.front, "how it is reached: socket, udp, fuse (omni)")
+      ->capture_default_str();
   app.add_option("--socket", o.socket, "front socket: path of the SEQPACKET socket to serve");
   app.add_option("--udp", o.udp, "front udp: [ADDRESS:]PORT to serve (address: 127.0.0.1)");
+  declare_fuse(app, o.fuse);
   app.add_flag("--lockstep", o.lockstep, "no clock: one servo period per command received");
   app.add_option("--rate", o.rate_hz, "servo rate for --lockstep, Hz; must divide 8000 (USB: 1000)")
       ->capture_default_str();
@@ -79,12 +81,15 @@ void check_known(const char* option, const std::string& value,
 }
 
 void check_front(const EmulatorOptions& o) {
-  check_known("--front", o.front, std::array<std::string_view, 2>{"socket", "udp"});
+  check_known("--front", o.front, std::array<std::string_view, 3>{"socket", "udp", "fuse"});
   if (o.front == "socket" && o.socket.empty()) {
     throw HilError("--socket: no path; say where the socket shall be, or use --front udp");
   }
   if (o.front == "udp" && o.udp.empty()) {
     throw HilError("--udp: no port; say [ADDRESS:]PORT, or use --front socket");
+  }
+  if (o.front == "fuse" && o.personality != "omni") {
+    throw HilError("--front: fuse serves omni only; use socket or udp for " + o.personality);
   }
   const int fastest = o.personality == "omni" ? kCyclesPerSecond : 1000;  // a bus cycle, a frame
   if (o.rate_hz < 1 || fastest % o.rate_hz != 0) {

@@ -8,6 +8,8 @@
 
 #include <CLI/CLI.hpp>
 
+#include "hil/fuse_front.hpp"
+
 namespace kerf {
 
 /// The command line of kerf-emulator.
@@ -16,6 +18,7 @@ struct EmulatorOptions {
   std::string front = "socket";
   std::string socket;
   std::string udp;
+  FuseFrontOptions fuse;
   std::string hand;
   std::string fault;
   std::optional<double> unit_mm;

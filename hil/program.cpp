@@ -21,6 +21,7 @@
 #include "hil/front/seqpacket_server.hpp"
 #include "hil/front/socket.hpp"
 #include "hil/front/udp_server.hpp"
+#include "hil/fuse_front.hpp"
 #include "hil/hand_script_file.hpp"
 #include "hil/hil_error.hpp"
 #include "hil/run_report.hpp"
@@ -70,23 +71,18 @@ Emulator make_emulator(const EmulatorOptions& o) {
 /// Serves the clients of a port that is open already.
 template <class Server>
 void serve_clients(const EmulatorOptions& o, Server& server, const std::string& place,
-                   PacketDevice& device, FrontStats& stats, const std::atomic<bool>& stop,
-                   std::ostream& out, std::ostream& err) {
-  if (!o.lockstep) {
-    const std::string missing = make_real_time(o.priority, o.cpu);
-    if (!missing.empty()) err << "kerf-emulator: warning: " << missing << std::endl;
-  }
+                   PacketDevice& device, FrontStats& stats, const ServeLimits& limits,
+                   std::ostream& out) {
   out << "kerf-emulator: " << o.personality << " at " << place << std::endl;
-  const ServeLimits limits{cycles_of(o.seconds), stop};
   do {
-    auto client = server.accept(stop);
+    auto client = server.accept(limits.stop);
     if (!client) break;
     if (o.lockstep) {
       serve_lockstep(*client, device, kCyclesPerSecond / o.rate_hz, limits, stats);
     } else {
       serve_real_time(*client, device, o.packet_cycles, limits, stats);
     }
-  } while (o.stay && !stop.load(std::memory_order_relaxed) &&
+  } while (o.stay && !limits.stop.load(std::memory_order_relaxed) &&
            (limits.cycles == 0 || stats.cycles < limits.cycles));
 }
 
@@ -95,14 +91,22 @@ void serve(const EmulatorOptions& o, const std::atomic<bool>& stop, std::ostream
   if (!o.report.empty()) check_report(o.report);
   Emulator emulator = make_emulator(o);
   FaultyDevice device(emulator, o.fault.empty() ? FaultScript{} : read_fault_script(o.fault));
+  if (!o.lockstep) {
+    const std::string missing = make_real_time(o.priority, o.cpu);
+    if (!missing.empty()) err << "kerf-emulator: warning: " << missing << std::endl;
+  }
+  const ServeLimits limits{cycles_of(o.seconds), stop};
   FrontStats stats;
-  if (o.front == "udp") {
+  if (o.front == "fuse") {
+    const FirewireSettings settings = firewire_settings(o.fuse, o.lockstep ? o.rate_hz : 0);
+    serve_fuse(o.fuse.mount, settings, device, limits, o.stay, stats, out);
+  } else if (o.front == "udp") {
     UdpServer server(o.udp);
     const std::string place = "udp port " + std::to_string(server.port());
-    serve_clients(o, server, place, device, stats, stop, out, err);
+    serve_clients(o, server, place, device, stats, limits, out);
   } else {
     SeqpacketServer server(o.socket);
-    serve_clients(o, server, o.socket, device, stats, stop, out, err);
+    serve_clients(o, server, o.socket, device, stats, limits, out);
   }
   if (!o.report.empty()) write_run_report(o.report, emulator, stats);
 }

@@ -6,11 +6,13 @@
 #include <cmath>
 #include <cstddef>
 #include <iostream>
+#include <stdexcept>
 #include <string_view>
 #include <vector>
 
 #include <CLI/CLI.hpp>
 
+#include "controller/device/open_port.hpp"
 #include "controller/scene/scene_file.hpp"
 #include "controller/scene/scene_words.hpp"
 
@@ -79,7 +81,9 @@ std::optional<int> parse_options(int argc, const char* const* argv, ControllerOp
                             ->expected(3)
                             ->check(CLI::Range(-kMaxTorqueScale, kMaxTorqueScale))
                             ->type_name("A,B,C");
-  app.add_option("--port", options.port, "where the device is: socket:PATH of kerf-emulator")
+  app.add_option(
+         "--port", options.port,
+         "where the device is: fw[:NODE or SERIAL] on FireWire, socket:PATH of kerf-emulator")
       ->type_name("PORT");
   constexpr double kLongestS = 1e7;  // 115 days
   app.add_option("--seconds", options.seconds,
@@ -153,11 +157,14 @@ std::optional<int> parse_options(int argc, const char* const* argv, ControllerOp
   }
   const bool runs = !options.check && !options.explain;
   if (runs && options.port.empty()) {
-    return refuse("--port is missing; give socket:PATH, where kerf-emulator listens");
+    return refuse("--port is missing; give fw, or socket:PATH, where kerf-emulator listens");
   }
-  if (runs && !options.port.starts_with("socket:")) {
-    return refuse("--port '" + options.port +
-                  "' is not known; use socket:PATH, where kerf-emulator listens");
+  if (runs) {
+    try {
+      check_port(options.port);
+    } catch (const std::runtime_error& error) {
+      return refuse(error.what());
+    }
   }
   if (*volume_option) options.overrides.volume_file = volume;
   if (*spacing_option) options.overrides.spacing_mm = three_of(spacing_mm);

@@ -14,7 +14,7 @@ namespace kerf {
 struct ControllerOptions {
   std::string scene;
   SceneOverrides overrides;
-  std::string port;               ///< socket:PATH
+  std::string port;               ///< as open_port.hpp says
   std::optional<double> seconds;  ///< servo time after arming; none: until stopped
   std::string name = "kerf";
   bool virtual_time = false;

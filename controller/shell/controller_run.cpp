@@ -20,7 +20,7 @@
 #include <spdlog/spdlog.h>
 
 #include "controller/device/make_driver.hpp"
-#include "controller/device/socket_port.hpp"
+#include "controller/device/open_port.hpp"
 #include "controller/scene/compile.hpp"
 #include "controller/scene/scene_json.hpp"
 #include "controller/scene/scene_load.hpp"
@@ -290,9 +290,9 @@ int run_controller(const ControllerOptions& options) {
   SegmentServer server(options.name, segment,
                        {.tools = static_cast<std::uint32_t>(scene.tools.size())});
   servo->take(scene);
-  std::optional<SocketPort> port;
+  std::unique_ptr<PacketPort> port;
   try {
-    port.emplace(options.port.substr(std::string("socket:").size()), kPortPatienceMs, stop);
+    port = open_port(options.port, scene.servo.rate_hz, kPortPatienceMs, stop);
   } catch (const std::runtime_error&) {
     if (stop) return 1;  // asked to end before there was a device: nothing to tell
     throw;

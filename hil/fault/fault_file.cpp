@@ -38,11 +38,11 @@ int whole(const TomlTable& table, std::string_view key, int otherwise, Range ran
   return static_cast<int>(value);
 }
 
-ScriptedFault fault_of(const TomlTable& table) {
+DeviceFault fault_of(const TomlTable& table) {
   table.allow_only({"kind", "packets", "at_s", "for_s", "every", "axis", "counts", "ms"});
   if (!table.has("kind")) table.fail(": no kind; add one, for example kind = \"lose\"");
   const std::string word = table.word("kind", "", kFaultWords);
-  ScriptedFault fault;
+  DeviceFault fault;
   fault.kind = static_cast<FaultKind>(std::ranges::find(kFaultWords, word) - kFaultWords.begin());
   const auto only_if = [&](bool known, std::string_view key) {
     if (known || !table.has(key)) return;
@@ -95,7 +95,7 @@ FaultScript random_faults(std::uint32_t seed) {
   FaultScript script{.faults = {}, .seed = seed};
   const int count = 3 + below(4);
   for (int i = 0; i < count; ++i) {
-    ScriptedFault fault;
+    DeviceFault fault;
     fault.kind = static_cast<FaultKind>(below(kFaultWords.size()));
     fault.of_commands = is_of_packets(fault.kind) && below(2) == 1;
     fault.at_s = below(4000) / 1000.0;

@@ -34,7 +34,7 @@ inline constexpr std::array<std::string_view, 16> kFaultWords{
     "wander", "park",  "chatter",   "unhome",  "noise",    "silence", "unplug", "host_late"};
 
 /// One fault. Its clock starts when the motors first push (0.05 N at the tip).
-struct ScriptedFault {
+struct DeviceFault {
   FaultKind kind = FaultKind::lose;
   bool of_commands = false;  ///< of host packets; else of the device's (lose ... corrupt)
   double at_s = 0;
@@ -46,7 +46,7 @@ struct ScriptedFault {
 };
 
 struct FaultScript {
-  std::vector<ScriptedFault> faults;
+  std::vector<DeviceFault> faults;
   std::uint32_t seed = 1;
 };
 

@@ -25,7 +25,7 @@ std::int16_t wrapped(int count) {
 
 FaultyDevice::FaultyDevice(Emulator& device, const FaultScript& script)
     : device_(device), random_(script.seed) {
-  for (const ScriptedFault& fault : script.faults) {
+  for (const DeviceFault& fault : script.faults) {
     const std::int64_t from = cycles_of(fault.at_s);
     const double seconds = fault.kind == FaultKind::host_late ? fault.ms / 1000 : fault.for_s;
     faults_.push_back(
@@ -44,7 +44,7 @@ bool FaultyDevice::host_is_late() const noexcept {
 }
 
 bool FaultyDevice::hits(Running& running, bool of_commands) noexcept {
-  const ScriptedFault& fault = running.fault;
+  const DeviceFault& fault = running.fault;
   if (fault.of_commands != of_commands || !runs(running)) return false;
   return running.packets++ % fault.every == 0;
 }
@@ -55,7 +55,7 @@ void FaultyDevice::send_on(std::span<const std::uint8_t> packet, bool of_command
   if (!of_commands) break_sensors(due.bytes);
   bool twice = false;
   for (Running& running : faults_) {
-    const ScriptedFault& fault = running.fault;
+    const DeviceFault& fault = running.fault;
     const bool unplugged = fault.kind == FaultKind::unplug && runs(running);
     const bool silent = fault.kind == FaultKind::silence && !of_commands && runs(running);
     if (unplugged || silent) return;
@@ -93,7 +93,7 @@ void FaultyDevice::break_sensors(Bytes& packet) {
   if (!readings) return;
   bool changed = false;
   for (Running& running : faults_) {
-    const ScriptedFault& fault = running.fault;
+    const DeviceFault& fault = running.fault;
     std::int16_t& count = readings->encoder[static_cast<std::size_t>(fault.axis)];
     if (!runs(running)) {
       running.stuck_at = count;

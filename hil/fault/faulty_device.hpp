@@ -35,7 +35,7 @@ class FaultyDevice final : public PacketDevice {
  private:
   using Bytes = std::vector<std::uint8_t>;
   struct Running {
-    ScriptedFault fault;
+    DeviceFault fault;
     std::int64_t from = 0, to = 0;  ///< cycles since the motors first pushed
     bool begun = false;
     int packets = 0;            ///< of its stream since it began

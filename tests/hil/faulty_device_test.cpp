@@ -7,14 +7,14 @@
 
 #include "shared/wire/omni_packet.hpp"
 
+using kerf::DeviceFault;
 using kerf::FaultKind;
-using kerf::ScriptedFault;
 
 namespace {
 
 /// An Omni whose motors push, so that the faults' clock runs, and that is asked once a cycle.
 struct Bench {
-  explicit Bench(const ScriptedFault& fault)
+  explicit Bench(const DeviceFault& fault)
       : emulator(kerf::OmniParams{}, std::nullopt), device(emulator, {{fault}, 1}) {
     const auto push = kerf::encode(kerf::OmniCommand{.motor = {0, 400, 0}, .motors_on = true});
     device.receive(push);

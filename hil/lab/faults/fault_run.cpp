@@ -81,7 +81,7 @@ class DirectPort final : public PacketPort {
 
 /// Whether the motors' true force need not follow the commands under this script: a sensor tells of
 /// another pose than the true one, or commands do not arrive.
-bool misleads(const ScriptedFault& fault) {
+bool misleads(const DeviceFault& fault) {
   switch (fault.kind) {
     case FaultKind::stick:
     case FaultKind::jump:
@@ -108,7 +108,7 @@ bool misleads(const ScriptedFault& fault) {
 
 double end_of(const FaultScript& script) {
   double end_s = 0;
-  for (const ScriptedFault& fault : script.faults) {
+  for (const DeviceFault& fault : script.faults) {
     end_s = std::max(end_s, fault.at_s + fault.for_s + fault.ms / 1000);
   }
   return end_s;

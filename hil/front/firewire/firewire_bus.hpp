@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "hil/front/firewire/agenda.hpp"
+#include "hil/front/firewire/bus_clock.hpp"
+#include "hil/front/firewire/iso_context.hpp"
+#include "hil/front/firewire/iso_resources.hpp"
+#include "hil/front/firewire/omni_registers.hpp"
+#include "hil/front/packet_device.hpp"
+
+namespace kerf {
+
+/// What may happen to a bus.
+enum class BusFault : std::uint8_t {
+  reset,         ///< another node resets the bus
+  device_reset,  ///< the device itself does: clients hear of it half a second later
+  steal,         ///< a reset in which another node takes the lowest channel that is in use
+  vanish,        ///< the device is gone; clients hear of it after two seconds
+  back,          ///< and there again
+};
+
+struct ScriptedFault {
+  std::int64_t cycle = 0;  ///< counted from the begin of the bus
+  BusFault fault = BusFault::reset;
+};
+
+struct FirewireSettings {
+  BusClock clock = BusClock::lock_step();
+  int packet_cycles = 1;    ///< cycles per packet of the device: 1 = 8 kHz, 8 = 1 kHz
+  int lockstep_cycles = 8;  ///< that a FLUSH_ISO of the received stream lets pass in lock-step
+  /// What the real device does in a bus reset is not known: stream on, or forget channels and
+  /// enable bit.
+  bool reset_stops_stream = false;
+  std::uint32_t packed_serial = 0x82B6'980C;
+  int abi_version = 5;  ///< of the kernel's interface: Linux 6.1; newer ones say more
+  std::vector<ScriptedFault> script;
+};
+
+/// What the bus has seen.
+struct FirewireStats {
+  std::uint64_t commands = 0;  ///< packets of the host that reached the device
+  std::uint64_t reports = 0;   ///< packets of the device that reached an open
+  std::uint64_t unheard = 0;   ///< packets of the device that no descriptor waited for
+  /// FNV-1a over every packet of the host and the cycle in which it went out.
+  std::uint64_t command_hash = 0xCBF2'9CE4'8422'2325;
+};
+
+/// The bus and the device on it, cycle by cycle: who sends on which channel, generations,
+/// resources, faults. Advances only when asked to catch up with its clock. One thread.
+class FirewireBus {
+ public:
+  /// Who hears of what happened to all.
+  class Listener {
+   public:
+    virtual ~Listener() = default;
+    /// The generation is new; resources are to be claimed again now, clients to be told
+    /// `event_delay` cycles later.
+    virtual void bus_was_reset(std::int64_t event_delay) = 0;
+    /// The channel that a foreign node should take in a reset; -1 for none.
+    [[nodiscard]] virtual std::int32_t channel_in_use() const = 0;
+    virtual void device_is_gone() = 0;
+  };
+
+  FirewireBus(const FirewireSettings& settings, PacketDevice& device, Listener& listener);
+  FirewireBus(const FirewireBus&) = delete;
+  FirewireBus& operator=(const FirewireBus&) = delete;
+
+  void catch_up() { run_to(settings_.clock.cycle()); }
+  /// Lock-step only: lets so many cycles pass.
+  void pass(std::int64_t cycles);
+  /// In `cycles` cycles from now.
+  void later(std::int64_t cycles, std::function<void()> action) {
+    agenda_.at(cycle_ + cycles, std::move(action));
+  }
+  void reset(BusFault kind);
+
+  void attach(IsoContext& context) { contexts_.push_back(&context); }
+  void detach(const IsoContext& context) { std::erase(contexts_, &context); }
+  [[nodiscard]] const std::vector<IsoContext*>& contexts() const noexcept { return contexts_; }
+
+  [[nodiscard]] const BusClock& clock() const noexcept { return settings_.clock; }
+  [[nodiscard]] const FirewireSettings& settings() const noexcept { return settings_; }
+  [[nodiscard]] std::int64_t cycle() const noexcept { return cycle_; }
+  [[nodiscard]] std::int64_t reset_cycle() const noexcept { return reset_cycle_; }
+  [[nodiscard]] std::uint32_t generation() const noexcept { return generation_; }
+  /// On the bus; and known to the clients, who may hear two seconds later.
+  [[nodiscard]] bool present() const noexcept { return present_; }
+  [[nodiscard]] bool listed() const noexcept { return listed_; }
+  [[nodiscard]] OmniRegisters& registers() noexcept { return registers_; }
+  [[nodiscard]] IsoResources& resources() noexcept { return resources_; }
+  [[nodiscard]] const FirewireStats& stats() const noexcept { return stats_; }
+  /// The next cycle in which something is due that a client may wait for.
+  [[nodiscard]] std::int64_t next_due() const noexcept { return agenda_.next(); }
+  /// The same with interrupts and the script; `Agenda::kNever` for none.
+  [[nodiscard]] std::int64_t next_event() const noexcept;
+
+ private:
+  void run_to(std::int64_t cycle);
+  void begin_cycle();
+  void finish_cycle();
+  void strike(BusFault fault);
+  void vanish();
+  void come_back();
+
+  FirewireSettings settings_;
+  PacketDevice& device_;
+  Listener& listener_;
+  OmniRegisters registers_;
+  IsoResources resources_;
+  std::uint64_t foreign_channels_ = 0;
+  Agenda agenda_;
+  Agenda script_;
+  std::vector<IsoContext*> contexts_;
+  std::int64_t cycle_ = kFirstCycle;
+  std::int64_t reset_cycle_ = 0;
+  std::uint32_t generation_ = 1;
+  bool present_ = true;
+  bool listed_ = true;
+  bool awake_ = false;  ///< the device has streamed
+  FirewireStats stats_;
+};
+
+}  // namespace kerf

@@ -1,0 +1,148 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "hil/front/firewire/firewire_node.hpp"
+
+#include <algorithm>
+#include <cerrno>
+#include <utility>
+
+#include <poll.h>
+
+namespace kerf {
+
+void FirewireNode::open(FuseOpen open) {
+  opens_[open].client = std::make_shared<FirewireClient>(bus_);
+}
+
+void FirewireNode::release(FuseOpen open) {
+  bus_.catch_up();
+  const auto found = opens_.find(open);
+  if (found == opens_.end()) return;
+  const FirewireClient& client = *found->second.client;
+  if (client.context()) {
+    streamed_ = true;
+    double_starts_ += client.context()->double_starts();
+  }
+  opens_.erase(found);
+  deliver();
+}
+
+FuseAnswer FirewireNode::take(Open& open, std::size_t size) {
+  EventQueue& events = open.client->events();
+  taken_ = events.pop();
+  if (events.empty()) open.announced = false;
+  // A buffer that is too small loses the rest of the event.
+  return {.bytes = std::span<const std::uint8_t>(taken_).first(std::min(size, taken_.size()))};
+}
+
+/// The kernel knows no O_NONBLOCK here: who reads when there is nothing sleeps.
+std::optional<FuseAnswer> FirewireNode::read(FuseOpen id, FuseRequest request, std::size_t size) {
+  bus_.catch_up();
+  deliver();
+  Open& open = opens_.at(id);
+  if (open.client->events().empty()) sleep_on(open);
+  if (!open.client->events().empty()) return take(open, size);
+  if (open.client->gone()) return FuseAnswer::fail(ENODEV);
+  open.parked.push_back({request, size});
+  return std::nullopt;
+}
+
+std::optional<FuseAnswer> FirewireNode::write(FuseOpen /*open*/, FuseRequest /*request*/,
+                                              std::span<const std::uint8_t> /*bytes*/) {
+  return FuseAnswer::fail(EINVAL);  // the kernel's node has no write()
+}
+
+std::optional<FuseAnswer> FirewireNode::ioctl(FuseOpen id, const FuseIoctl& call) {
+  bus_.catch_up();
+  const FuseAnswer answer = opens_.at(id).client->ioctl(call);
+  deliver();
+  return answer;
+}
+
+std::uint32_t FirewireNode::poll(FuseOpen id, bool sleeps) {
+  bus_.catch_up();
+  Open& open = opens_.at(id);
+  if (sleeps && open.client->events().empty()) sleep_on(open);
+  deliver();
+  std::uint32_t now = 0;
+  if (open.client->gone()) now |= POLLHUP | POLLERR;
+  if (open.client->events().empty()) {
+    open.announced = false;
+  } else {
+    now |= POLLIN | POLLRDNORM;
+  }
+  return now;
+}
+
+/// In lock-step a sleep takes the bus to the answer that the client waits for.
+void FirewireNode::sleep_on(Open& open) {
+  if (!bus_.clock().is_lock_step()) return;
+  while (open.client->events().empty() && !open.client->gone() &&
+         bus_.next_due() != Agenda::kNever) {
+    bus_.pass(std::max<std::int64_t>(bus_.next_due() - bus_.cycle(), 1));
+  }
+}
+
+void FirewireNode::interrupted(FuseRequest request) {
+  for (auto& [id, open] : opens_) {
+    const auto found = std::ranges::find(open.parked, request, &ParkedRead::request);
+    if (found == open.parked.end()) continue;
+    open.parked.erase(found);
+    return replies_->answer(request, FuseAnswer::fail(EINTR));
+  }
+}
+
+std::int64_t FirewireNode::next_wake_ns() const noexcept {
+  const std::int64_t next = bus_.next_event();
+  if (bus_.clock().is_lock_step() || next == Agenda::kNever) return Agenda::kNever;
+  return bus_.clock().begin_ns(next);
+}
+
+void FirewireNode::wake() {
+  bus_.catch_up();
+  deliver();
+}
+
+/// Answers reads that wait for an event, and wakes those who poll for one.
+void FirewireNode::deliver() {
+  for (auto& [id, open] : opens_) {
+    EventQueue& events = open.client->events();
+    high_water_ = std::max(high_water_, events.high_water());
+    while (!open.parked.empty() && (!events.empty() || open.client->gone())) {
+      const ParkedRead parked = open.parked.front();
+      open.parked.pop_front();
+      replies_->answer(parked.request,
+                       events.empty() ? FuseAnswer::fail(ENODEV) : take(open, parked.size));
+    }
+    if (!open.announced && (!events.empty() || open.client->gone())) {
+      open.announced = true;
+      replies_->wake_pollers(id);
+    }
+  }
+}
+
+void FirewireNode::bus_was_reset(std::int64_t event_delay) {
+  for (auto& [id, open] : opens_) open.client->reclaim_resources();
+  const auto tell = [this] {
+    for (auto& [id, open] : opens_) open.client->tell_bus_reset();
+  };
+  if (event_delay == 0) {
+    tell();
+  } else {
+    bus_.later(event_delay, tell);
+  }
+}
+
+std::int32_t FirewireNode::channel_in_use() const {
+  std::int32_t lowest = -1;
+  for (const auto& [id, open] : opens_) {
+    const std::int32_t channel = open.client->lowest_channel();
+    if (channel >= 0 && (lowest < 0 || channel < lowest)) lowest = channel;
+  }
+  return lowest;
+}
+
+void FirewireNode::device_is_gone() {
+  for (auto& [id, open] : opens_) open.client->shut_down();
+}
+
+}  // namespace kerf

@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+
+#include <sys/types.h>
+
+namespace kerf {
+
+using FuseOpen = std::uint64_t;     ///< names one open of a node, never used twice
+using FuseRequest = std::uint64_t;  ///< names a call of a client until it is answered
+
+/// What a call returns to the client: an errno, or bytes and a result of 0 and above.
+struct FuseAnswer {
+  int error = 0;            ///< 0 or a positive errno; the rest is ignored then
+  std::int32_t result = 0;  ///< of ioctl()
+  std::span<const std::uint8_t> bytes{};
+
+  static FuseAnswer fail(int error) noexcept { return {.error = error}; }
+};
+
+/// One ioctl() of a client as it came: nothing in it can be trusted.
+struct FuseIoctl {
+  FuseRequest request = 0;
+  pid_t thread = 0;                       ///< of the caller, whose memory pointers point into
+  std::uint32_t command = 0;              ///< the whole number: direction, size, type, nr
+  std::uint64_t argument = 0;             ///< as passed: a user address, or a plain number
+  std::span<const std::uint8_t> input{};  ///< what the number says travels in
+  std::size_t output_bytes = 0;           ///< what it says travels out
+};
+
+/// How a node answers calls that it left open, and wakes those who sleep in poll().
+class FuseReplies {
+ public:
+  virtual ~FuseReplies() = default;
+  virtual void answer(FuseRequest request, const FuseAnswer& answer) noexcept = 0;
+  virtual void wake_pollers(FuseOpen open) noexcept = 0;
+};
+
+/// A device node as its clients see it: the file operations of one character device.
+///
+/// `FuseMount` calls, on one thread. A call that returns nothing is parked: the client sleeps until
+/// the node answers through `FuseReplies`, at the latest when it is `interrupted`. Bytes of an
+/// answer stay valid until the next call.
+class FuseNode {
+ public:
+  virtual ~FuseNode() = default;
+
+  /// Before the first call.
+  virtual void attach(FuseReplies& replies) noexcept = 0;
+  /// False: the name is not there, and cannot be opened.
+  [[nodiscard]] virtual bool present() const noexcept = 0;
+
+  virtual void open(FuseOpen open) = 0;
+  virtual void release(FuseOpen open) = 0;
+  virtual std::optional<FuseAnswer> read(FuseOpen open, FuseRequest request, std::size_t size) = 0;
+  virtual std::optional<FuseAnswer> write(FuseOpen open, FuseRequest request,
+                                          std::span<const std::uint8_t> bytes) = 0;
+  virtual std::optional<FuseAnswer> ioctl(FuseOpen open, const FuseIoctl& call) = 0;
+  /// POLLIN and others that hold now. `sleeps`: the caller waits for a change.
+  virtual std::uint32_t poll(FuseOpen open, bool sleeps) = 0;
+  /// A signal met the client of a parked call: answer it now, with EINTR.
+  virtual void interrupted(FuseRequest request) = 0;
+
+  /// When `wake` is due although nobody calls, CLOCK_MONOTONIC ns; INT64_MAX for never.
+  [[nodiscard]] virtual std::int64_t next_wake_ns() const noexcept = 0;
+  virtual void wake() = 0;
+};
+
+}  // namespace kerf
