@@ -7,11 +7,12 @@
 
 #include <linux/firewire-cdev.h>
 
+#include "controller/device/firewire_event.hpp"
+
 namespace kerf {
 namespace {
 
 constexpr std::uint32_t kTag0 = FW_CDEV_ISO_CONTEXT_MATCH_TAG0;
-constexpr std::size_t kHeadersAt = 20;  // offsetof header[]: the events have padding behind it
 
 std::uint32_t big_endian(std::span<const std::uint8_t> bytes) noexcept {
   return static_cast<std::uint32_t>(bytes[0]) << 24 | static_cast<std::uint32_t>(bytes[1]) << 16 |
@@ -47,11 +48,9 @@ void stop_stream(FirewireFile& file) noexcept {
 
 /// The headers of an ISO_INTERRUPT event, whatever follows them.
 std::span<const std::uint8_t> headers_of(std::span<const std::uint8_t> event) noexcept {
-  fw_cdev_event_iso_interrupt head{};
-  if (event.size() < kHeadersAt) return {};
-  std::memcpy(&head, event.data(), kHeadersAt);
-  return event.subspan(kHeadersAt,
-                       std::min<std::size_t>(head.header_length, event.size() - kHeadersAt));
+  if (event.size() < kIsoHeadersAt) return {};
+  const auto length = event_as<fw_cdev_event_iso_interrupt>(event).header_length;
+  return event.subspan(kIsoHeadersAt, std::min<std::size_t>(length, event.size() - kIsoHeadersAt));
 }
 
 }  // namespace
