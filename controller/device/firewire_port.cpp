@@ -304,7 +304,10 @@ void FirewirePort::hear_response(std::span<const std::uint8_t> event) noexcept {
 void FirewirePort::hear_resource(std::span<const std::uint8_t> event, bool allocated) noexcept {
   const auto resource = event_as<fw_cdev_event_iso_resource>(event);
   FirewireClaim& claim = resource.closure == kListen ? listen_ : talk_;
-  if (claim.handle != resource.handle) return;  // of an earlier claim
+  if (claim.handle != resource.handle) {  // of an earlier claim, which nobody waits for any more
+    if (allocated && resource.channel >= 0) requests_.give_back({resource.handle, -1});
+    return;
+  }
   if (allocated) {
     claim.channel = resource.channel;
     refused_ = refused_ || resource.channel < 0;
