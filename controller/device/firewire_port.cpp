@@ -27,13 +27,14 @@ constexpr std::array<std::uint8_t, 4> kModeBytes{0x00, 0x00, 0x0F, 0xF8};  // as
 constexpr std::uint64_t kListen = 1, kTalk = 2;
 
 // In ticks.
-constexpr int kRetryTurns = 20;   // an answer that does not come
-constexpr int kSilentTurns = 20;  // a stream that is armed and yet silent
-constexpr int kYieldTurns = 3;    // neutral packets before a stream stops
+constexpr int kRetryTurns = 20;  // an answer that does not come
+constexpr int kSilentTurns = 8;  // a stream that is armed and yet silent: before forces have faded
+constexpr int kYieldTurns = 3;   // neutral packets before a stream stops
 constexpr std::uint32_t kHousekeepingTurns = 64;
 
 constexpr int kConnectMs = 4000;  // a recent bus reset alone holds allocations back for a second
 constexpr int kAnswerMs = 50;
+constexpr std::chrono::milliseconds kFewCycles{2};
 
 const omni::CommandBytes kNeutral = encode(OmniCommand{});
 
@@ -48,7 +49,8 @@ FirewirePort::FirewirePort(const FirewireOptions& options, int patience_ms,
 
 FirewirePort::~FirewirePort() {
   transmitter_.send(transmitted_, kNeutral);
-  if (const auto control = requests_.read_byte(kControl)) {  // meanwhile the packet goes out
+  std::this_thread::sleep_for(kFewCycles);  // it goes out before the device is told to stop
+  if (const auto control = requests_.read_byte(kControl)) {
     requests_.write(kControl, static_cast<std::uint8_t>(*control & ~kStreams), 0);
     static_cast<void>(requests_.ready(kAnswerMs));
   }
