@@ -322,6 +322,10 @@ const Check kChecks[] = {
     fw_cdev_queue_iso after{};
     const int count = b.client.queue(many, &after);
     return after.size == (60'000U - static_cast<std::uint32_t>(count)) * 4 ? 4 * count : -1; }},
+  {"or 1032192 skipped cycles", 252 * 4096, [](Bench& b) -> std::int64_t {
+    b.client.create(kTransmit, 1);
+    const std::vector<std::uint32_t> many(1'100'000, kSkip);
+    return b.client.queue(many); }},
   // ---- START, STOP, FLUSH
   {"starting with no tag is EINVAL", -EINVAL, [](Bench& b) -> std::int64_t {
     b.client.create(kReceive, 2);
