@@ -43,6 +43,12 @@ case $name in
     rm "$LAB/segment"
     ;;
   emulator)
+    if [[ -n ${option[--mount]:-} ]]; then
+      trap 'exit 0' TERM
+      touch "${option[--mount]}/fw1"
+      while [[ -e $LAB/segment ]]; do sleep 0.05; done
+      exit 0
+    fi
     exec perl -MIO::Socket::UNIX -e '
       $socket = IO::Socket::UNIX->new(Local => shift, Listen => 1) or die;
       select undef, undef, undef, 0.05 while -e "$ENV{LAB}/segment"' "${option[--socket]}"
@@ -115,6 +121,10 @@ expect 'the frames are spread over the run' called '^visualizer.*--every-ticks 4
 expect 'a demo leaves nothing behind' nothing_survives
 expect 'the way of drawing reaches the visualizer' kerf_gives 0 demo --seconds 1 --renderer cast
 expect 'as it was said' called '^visualizer.*--renderer cast '
+expect 'an arm on FireWire' kerf_gives 0 demo --seconds 1 --port fw
+expect 'is where the emulator mounts it' called '^emulator.*--front fuse --mount .*/bus '
+expect 'and the controller looks' called '^controller.*--port fw:.*/bus '
+expect 'and leaves nothing behind' nothing_survives
 expect 'a demo keeps its results' kerf_gives 0 demo --seconds 1 --out "$lab/out" --virtual
 expect 'all of them' kept "$all"
 expect 'lock-step reaches the controller' called '^controller.*--virtual'
@@ -153,6 +163,7 @@ expect 'by the name of the first' says 'holds mine.txt'
 expect 'a file is no folder' kerf_gives 2 demo --out "$lab/out/mine.txt"
 expect 'a place that cannot be is refused' kerf_gives 2 demo --out /dev/null/x
 expect 'a size is two numbers' kerf_gives 2 demo --size big
+expect 'a port is one that a demo has' kerf_gives 2 demo --port usb
 expect 'seconds are positive' kerf_gives 2 demo --seconds 0.0
 expect 'a value may not lack' kerf_gives 2 demo --seconds
 expect 'an unknown option is named' kerf_gives 2 demo --fast

@@ -3,13 +3,14 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cstring>
 #include <stdexcept>
 #include <string>
 #include <system_error>
 #include <thread>
 
 #include <linux/firewire-cdev.h>
+
+#include "controller/device/firewire_event.hpp"
 
 namespace kerf {
 namespace {
@@ -22,32 +23,20 @@ constexpr std::uint64_t kMode20010 = 0x20010;
 constexpr std::uint8_t kStreams = 0x08;  // of the control register
 constexpr std::array<std::uint8_t, 4> kModeBytes{0x00, 0x00, 0x0F, 0xF8};  // as on the bus
 
-// Bandwidth units: 512 of overhead, and 16 per quadlet at S100 with header and two CRCs.
-constexpr std::uint32_t units(std::size_t payload_bytes) {
-  return static_cast<std::uint32_t>(512 + 16 * (payload_bytes + 12) / 4);
-}
-
-// What an event answers to.
-constexpr std::uint64_t kListen = 1, kTalk = 2;      // resources
-constexpr std::uint64_t kReadControl = 0xFFFF'FFFF;  // a request; register writes: the batch
+// Which of the two resources an event is about.
+constexpr std::uint64_t kListen = 1, kTalk = 2;
 
 // In ticks.
-constexpr int kRetryTurns = 20;   // an answer that does not come
-constexpr int kSilentTurns = 20;  // a stream that is armed and yet silent
-constexpr int kYieldTurns = 3;    // neutral packets before a stream stops
+constexpr int kRetryTurns = 20;  // an answer that does not come
+constexpr int kSilentTurns = 8;  // a stream that is armed and yet silent: before forces have faded
+constexpr int kYieldTurns = 3;   // neutral packets before a stream stops
 constexpr std::uint32_t kHousekeepingTurns = 64;
 
 constexpr int kConnectMs = 4000;  // a recent bus reset alone holds allocations back for a second
 constexpr int kAnswerMs = 50;
+constexpr std::chrono::milliseconds kFewCycles{2};
 
 const omni::CommandBytes kNeutral = encode(OmniCommand{});
-
-template <class Event>
-Event event_as(std::span<const std::uint8_t> bytes) noexcept {
-  Event event{};
-  std::memcpy(&event, bytes.data(), std::min(sizeof event, bytes.size()));
-  return event;
-}
 
 }  // namespace
 
@@ -60,9 +49,9 @@ FirewirePort::FirewirePort(const FirewireOptions& options, int patience_ms,
 
 FirewirePort::~FirewirePort() {
   transmitter_.send(transmitted_, kNeutral);
-  if (const auto control = read_control()) {  // also lets the neutral packet go out
-    const auto stopped = static_cast<std::uint8_t>(*control & ~kStreams);
-    write(kControl, {&stopped, 1}, 0);
+  std::this_thread::sleep_for(kFewCycles);  // it goes out before the device is told to stop
+  if (const auto control = requests_.read_byte(kControl)) {
+    requests_.write(kControl, static_cast<std::uint8_t>(*control & ~kStreams), 0);
     static_cast<void>(requests_.ready(kAnswerMs));
   }
   receiver_.stop(received_);
@@ -90,9 +79,7 @@ void FirewirePort::connect(const std::atomic<bool>& stop) {
     throw std::runtime_error(place + std::generic_category().message(error) +
                              "; give your user the right to it");
   }
-  const auto generation = requests_.link();
-  generation_ = generation.value_or(0);
-  const auto control = read_control();
+  const auto control = requests_.read_byte(kControl);
   if (!control) {
     throw std::runtime_error(place + "the device does not answer; unplug it and plug it in again");
   }
@@ -110,8 +97,7 @@ void FirewirePort::connect(const std::atomic<bool>& stop) {
   }
 }
 
-// ---- every tick
-// ----------------------------------------------------------------------------------
+// ---- every tick ----
 
 std::size_t FirewirePort::receive(std::span<std::uint8_t> out) noexcept {
   while (!closed_.load(std::memory_order_relaxed)) {
@@ -164,8 +150,7 @@ void FirewirePort::close_if_gone() noexcept {
   if (received_.gone() || requests_.gone()) closed_ = true;
 }
 
-// ---- the link
-// ------------------------------------------------------------------------------------
+// ---- the link ----
 
 /// One step towards a stream, or nothing where it streams.
 void FirewirePort::tend() noexcept {
@@ -204,27 +189,21 @@ void FirewirePort::tend() noexcept {
 
 /// Asks for two channels and their bandwidth; the answers come as events.
 void FirewirePort::claim() noexcept {
-  const auto ask = [this](std::uint64_t closure, std::size_t payload_bytes) {
-    fw_cdev_allocate_iso_resource request{};
-    request.closure = closure;
-    request.channels = ~std::uint64_t{0} >> 1;  // 63 is for everybody
-    request.bandwidth = units(payload_bytes);
-    if (requests_.call(FW_CDEV_IOC_ALLOCATE_ISO_RESOURCE, &request) < 0) refused_ = true;
-    return Claim{request.handle, -1};
-  };
   state_ = State::claiming;
   turns_ = 0;
-  refused_ = false;
-  listen_ = ask(kListen, omni::kReportBytes);
-  talk_ = ask(kTalk, omni::kCommandBytes);
+  const auto listen = requests_.claim(kListen, omni::kReportBytes);
+  const auto talk = requests_.claim(kTalk, omni::kCommandBytes);
+  refused_ = !listen || !talk;
+  listen_ = listen.value_or(FirewireClaim{});
+  talk_ = talk.value_or(FirewireClaim{});
 }
 
 /// Stops the streams and gives back what is left of the channels.
 void FirewirePort::yield() noexcept {
   receiver_.stop(received_);
   transmitter_.stop(transmitted_);
-  if (listen_.channel >= 0) deallocate(listen_.handle);
-  if (talk_.channel >= 0) deallocate(talk_.handle);
+  if (listen_.channel >= 0) requests_.give_back(listen_);
+  if (talk_.channel >= 0) requests_.give_back(talk_);
   listen_ = talk_ = {};
 }
 
@@ -247,32 +226,31 @@ void FirewirePort::arm() noexcept {
   ++batch_;
   turns_ = answers_ = writes_ = 0;
   stale_ = false;
-  const auto byte = [this](std::uint64_t offset, int value) {
-    const auto one = static_cast<std::uint8_t>(value);
-    write(offset, {&one, 1}, batch_);
+  const auto tell = [this](std::uint64_t offset, std::span<const std::uint8_t> bytes) {
+    requests_.write(offset, bytes, batch_);
     ++writes_;
   };
-  byte(kHostTalksOn, talk_.channel);
-  byte(kDeviceTalksOn, listen_.channel);
-  if (options_.write_20010) {
-    write(kMode20010, kModeBytes, batch_);
-    ++writes_;
-  }
-  byte(kControl, control_ | kStreams);
+  const auto tell_byte = [&tell](std::uint64_t offset, int value) {
+    const auto byte = static_cast<std::uint8_t>(value);
+    tell(offset, {&byte, 1});
+  };
+  tell_byte(kHostTalksOn, talk_.channel);
+  tell_byte(kDeviceTalksOn, listen_.channel);
+  if (options_.write_20010) tell(kMode20010, kModeBytes);
+  tell_byte(kControl, control_ | kStreams);
 }
 
 /// Arms in the generation of now: an event may tell it only half a second later.
 void FirewirePort::renew() noexcept {
-  generation_ = requests_.link().value_or(generation_);
+  requests_.refresh();
   arm();
 }
 
-// ---- events
-// --------------------------------------------------------------------------------------
+// ---- events ----
 
 void FirewirePort::read_requests() noexcept {
   while (requests_.ready(0)) {
-    const auto event = requests_.read(other_event_);
+    const auto event = requests_.event();
     if (event.empty()) return;
     hear(event);
   }
@@ -281,7 +259,7 @@ void FirewirePort::read_requests() noexcept {
 void FirewirePort::read_transmitted() noexcept {
   transmitter_.drained();
   while (transmitted_.ready(0)) {
-    const auto event = transmitted_.read(other_event_);
+    const auto event = transmitted_.read(sent_event_);
     if (event.empty()) return;
     if (event_as<fw_cdev_event_common>(event).type == FW_CDEV_EVENT_ISO_INTERRUPT) {
       transmitter_.take(event);
@@ -311,33 +289,27 @@ void FirewirePort::hear(std::span<const std::uint8_t> event) noexcept {
 
 /// Each open tells of the same reset; the first one counts.
 void FirewirePort::hear_reset(std::uint32_t generation) noexcept {
-  if (generation == generation_) return;
+  if (generation == requests_.generation()) return;
   ++stats_.resets;
-  generation_ = generation;
+  requests_.set_generation(generation);
   if (state_ == State::streaming || state_ == State::arming) arm();
 }
 
 void FirewirePort::hear_response(std::span<const std::uint8_t> event) noexcept {
   const auto response = event_as<fw_cdev_event_response>(event);
-  if (response.closure == kReadControl) {
-    answers_ = response.rcode == RCODE_COMPLETE && response.length == 1 ? 1 : -1;
-    answered_byte_ = event.size() > 20 ? event[20] : std::uint8_t{0};
-    return;
-  }
   if (state_ != State::arming || response.closure != batch_) return;
   if (response.rcode == RCODE_COMPLETE) ++answers_;
   // Any other answer is tried again later: a device may be busy, or away for a moment.
-  if (response.rcode == RCODE_GENERATION) {
-    const std::uint32_t before = generation_;
-    generation_ = requests_.link().value_or(generation_);
-    stale_ = generation_ != before;
-  }
+  if (response.rcode == RCODE_GENERATION && requests_.refresh()) stale_ = true;
 }
 
 void FirewirePort::hear_resource(std::span<const std::uint8_t> event, bool allocated) noexcept {
   const auto resource = event_as<fw_cdev_event_iso_resource>(event);
-  Claim& claim = resource.closure == kListen ? listen_ : talk_;
-  if (claim.handle != resource.handle) return;  // of an earlier claim
+  FirewireClaim& claim = resource.closure == kListen ? listen_ : talk_;
+  if (claim.handle != resource.handle) {  // of an earlier claim, which nobody waits for any more
+    if (allocated && resource.channel >= 0) requests_.give_back({resource.handle, -1});
+    return;
+  }
   if (allocated) {
     claim.channel = resource.channel;
     refused_ = refused_ || resource.channel < 0;
@@ -349,44 +321,6 @@ void FirewirePort::hear_resource(std::span<const std::uint8_t> event, bool alloc
   muted_ = true;
   state_ = State::yielding;
   turns_ = 0;
-}
-
-// ---- requests
-// ------------------------------------------------------------------------------------
-
-void FirewirePort::write(std::uint64_t offset, std::span<const std::uint8_t> bytes,
-                         std::uint64_t closure) noexcept {
-  fw_cdev_send_request request{};
-  request.tcode = TCODE_WRITE_BLOCK_REQUEST;
-  request.length = static_cast<std::uint32_t>(bytes.size());
-  request.offset = offset;
-  request.closure = closure;
-  request.data = reinterpret_cast<std::uintptr_t>(bytes.data());
-  request.generation = generation_;
-  requests_.call(FW_CDEV_IOC_SEND_REQUEST, &request);
-}
-
-/// The control register, at the begin and at the end: waits, and tries again after a bus reset.
-std::optional<std::uint8_t> FirewirePort::read_control() noexcept {
-  for (int tries = 0; tries < 3 && !requests_.gone(); ++tries) {
-    generation_ = requests_.link().value_or(generation_);
-    fw_cdev_send_request request{};
-    request.tcode = TCODE_READ_BLOCK_REQUEST;
-    request.length = 1;
-    request.offset = kControl;
-    request.closure = kReadControl;
-    request.generation = generation_;
-    answers_ = 0;
-    if (requests_.call(FW_CDEV_IOC_SEND_REQUEST, &request) < 0) continue;
-    while (answers_ == 0 && requests_.ready(kAnswerMs)) hear(requests_.read(other_event_));
-    if (answers_ == 1) return answered_byte_;
-  }
-  return std::nullopt;
-}
-
-void FirewirePort::deallocate(std::uint32_t handle) noexcept {
-  fw_cdev_deallocate request{handle};
-  requests_.call(FW_CDEV_IOC_DEALLOCATE_ISO_RESOURCE, &request);
 }
 
 }  // namespace kerf

@@ -5,11 +5,11 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
-#include <optional>
 #include <span>
 
 #include "controller/device/firewire_file.hpp"
 #include "controller/device/firewire_find.hpp"
+#include "controller/device/firewire_requests.hpp"
 #include "controller/device/firewire_streams.hpp"
 #include "controller/device/packet_port.hpp"
 #include "shared/wire/omni_packet.hpp"
@@ -88,44 +88,34 @@ class FirewirePort final : public PacketPort {
   void hear_reset(std::uint32_t generation) noexcept;
   void hear_response(std::span<const std::uint8_t> event) noexcept;
   void hear_resource(std::span<const std::uint8_t> event, bool allocated) noexcept;
-
-  void write(std::uint64_t offset, std::span<const std::uint8_t> bytes,
-             std::uint64_t closure) noexcept;
-  [[nodiscard]] std::optional<std::uint8_t> read_control() noexcept;
-  void deallocate(std::uint32_t handle) noexcept;
   void close_if_gone() noexcept;
 
   static constexpr std::size_t kEventBytes = 4096 + 64;  // a page of headers and their event
 
   FirewireOptions options_;
   FirewireDevice device_;
-  FirewireFile requests_, received_, transmitted_;
+  FirewireRequests requests_;
+  FirewireFile received_, transmitted_;
   FirewireReceiver receiver_;
   FirewireTransmitter transmitter_;
 
-  struct Claim {
-    std::uint32_t handle = 0;
-    std::int32_t channel = -1;
-  };
   State state_ = State::claiming;
-  Claim listen_, talk_;   ///< we hear the device; it hears us
-  bool refused_ = false;  ///< an answer was not what was hoped for
-  bool stale_ = false;    ///< ... because of a bus reset
-  std::uint32_t generation_ = 0;
-  std::uint32_t batch_ = 0;  ///< of register writes: older answers count no more
+  FirewireClaim listen_, talk_;  ///< we hear the device; it hears us
+  bool refused_ = false;         ///< no channel, or no stream on it
+  bool stale_ = false;           ///< a register write came too late for its generation
+  std::uint32_t batch_ = 0;      ///< of register writes: older answers count no more
   int answers_ = 0, writes_ = 0;
   int turns_ = 0;  ///< in this state, or without a packet
   std::uint32_t quiet_turns_ = 0;
   std::uint8_t control_ = 0;  ///< the control register as it was found
-  std::uint8_t answered_byte_ = 0;
   bool flushed_ = false;
 
   std::atomic<bool> muted_{false};  ///< every packet is a neutral one
   std::atomic<bool> closed_{false};
   std::atomic<std::uint64_t> misqueued_{0};
   FirewireLinkStats stats_;
-  alignas(8) std::array<std::uint8_t, kEventBytes> event_{};        ///< of the received stream
-  alignas(8) std::array<std::uint8_t, kEventBytes> other_event_{};  ///< of the other two
+  alignas(8) std::array<std::uint8_t, kEventBytes> event_{};       ///< of the received stream
+  alignas(8) std::array<std::uint8_t, kEventBytes> sent_event_{};  ///< of the transmitted one
 };
 
 }  // namespace kerf

@@ -7,15 +7,21 @@
 
 #include <linux/firewire-cdev.h>
 
+#include "controller/device/firewire_event.hpp"
+
 namespace kerf {
 namespace {
 
 constexpr std::uint32_t kTag0 = FW_CDEV_ISO_CONTEXT_MATCH_TAG0;
-constexpr std::size_t kHeadersAt = 20;  // offsetof header[]: the events have padding behind it
 
 std::uint32_t big_endian(std::span<const std::uint8_t> bytes) noexcept {
   return static_cast<std::uint32_t>(bytes[0]) << 24 | static_cast<std::uint32_t>(bytes[1]) << 16 |
          static_cast<std::uint32_t>(bytes[2]) << 8 | bytes[3];
+}
+
+/// A count of cycles as stamps tell it, 0..63999.
+std::int32_t wrapped(std::int64_t cycles) noexcept {
+  return static_cast<std::int32_t>((cycles % 64'000 + 64'000) % 64'000);
 }
 
 int create(FirewireFile& file, std::uint32_t type, std::int32_t channel,
@@ -47,11 +53,9 @@ void stop_stream(FirewireFile& file) noexcept {
 
 /// The headers of an ISO_INTERRUPT event, whatever follows them.
 std::span<const std::uint8_t> headers_of(std::span<const std::uint8_t> event) noexcept {
-  fw_cdev_event_iso_interrupt head{};
-  if (event.size() < kHeadersAt) return {};
-  std::memcpy(&head, event.data(), kHeadersAt);
-  return event.subspan(kHeadersAt,
-                       std::min<std::size_t>(head.header_length, event.size() - kHeadersAt));
+  if (event.size() < kIsoHeadersAt) return {};
+  const auto length = event_as<fw_cdev_event_iso_interrupt>(event).header_length;
+  return event.subspan(kIsoHeadersAt, std::min<std::size_t>(length, event.size() - kIsoHeadersAt));
 }
 
 }  // namespace
@@ -118,9 +122,8 @@ FirewireReceiver::Packet FirewireReceiver::next() noexcept {
 int FirewireTransmitter::start(FirewireFile& file, std::int32_t channel,
                                std::span<const std::uint8_t> first) noexcept {
   entries_.store(0, std::memory_order_relaxed);
-  drained_at_ = 0;
-  sent_ = 0;
-  sent_cycle_ = -1;
+  drained_at_ = told_ = 0;
+  lead_ = -1;
   if (const int error = create(file, FW_CDEV_ISO_CONTEXT_TRANSMIT, channel, 4); error < 0) {
     return error;
   }
@@ -139,7 +142,7 @@ bool FirewireTransmitter::send(FirewireFile& file, std::span<const std::uint8_t>
   if (packet.size() != omni::kCommandBytes) return false;
   skips = std::clamp(skips, 0, kMaxSkips);
   const auto count = static_cast<std::uint32_t>(skips) + 1;
-  const std::uint32_t begin = entries_.fetch_add(count, std::memory_order_relaxed);
+  const std::uint64_t begin = entries_.fetch_add(count, std::memory_order_relaxed);
 
   std::array<std::uint32_t, 1 + kPacketQuadlets + kMaxSkips> entries{};
   entries[0] = FW_CDEV_ISO_HEADER_LENGTH(static_cast<std::uint32_t>(omni::kCommandBytes));
@@ -157,16 +160,23 @@ bool FirewireTransmitter::send(FirewireFile& file, std::span<const std::uint8_t>
 void FirewireTransmitter::take(std::span<const std::uint8_t> event) noexcept {
   const auto stamps = headers_of(event);
   if (stamps.size() < 4) return;
-  sent_ += static_cast<std::uint32_t>(stamps.size() / 4);
-  sent_cycle_ = cycle_of_stamp(big_endian(stamps.last(4)));
+  told_ += stamps.size() / 4;
+  const std::int32_t cycle = cycle_of_stamp(big_endian(stamps.last(4)));
+  delay(wrapped(cycle - static_cast<std::int64_t>(told_ - 1)));
 }
 
-int FirewireTransmitter::wanted_skips(std::int32_t now, int period) const noexcept {
-  const std::int32_t sent_cycle = sent_cycle_.load(std::memory_order_relaxed);
-  if (sent_cycle < 0 || now < 0) return period - 1;
-  const auto waiting = static_cast<std::int32_t>(entries_.load(std::memory_order_relaxed) -
-                                                 sent_.load(std::memory_order_relaxed));
-  const std::int32_t depth = std::max(cycles_between(now, sent_cycle) + waiting, 0);
+/// Takes a lead over when it is later than the one that is known.
+void FirewireTransmitter::delay(std::int32_t lead) noexcept {
+  const std::int32_t known = lead_.load(std::memory_order_relaxed);
+  if (known < 0 || cycles_between(known, lead) > 0) lead_ = lead;
+}
+
+int FirewireTransmitter::wanted_skips(std::int32_t now, int period) noexcept {
+  if (now < 0) return period - 1;
+  const auto entries = static_cast<std::int64_t>(entries_.load(std::memory_order_relaxed));
+  delay(wrapped(now + 1 - entries));  // where the queue is dry, the next entry goes out next
+  const std::int32_t turn = wrapped(lead_.load(std::memory_order_relaxed) + entries);
+  const std::int32_t depth = cycles_between(now, turn) - 1;
   return std::clamp(kMargin + period - depth - 1, 0, period + kMargin);
 }
 

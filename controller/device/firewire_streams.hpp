@@ -86,17 +86,22 @@ class FirewireTransmitter {
   }
   void drained() noexcept { drained_at_ = entries_.load(std::memory_order_relaxed); }
 
-  /// How many skips keep the queue filled for `period` cycles, when it is cycle `now`.
-  [[nodiscard]] int wanted_skips(std::int32_t now, int period) const noexcept;
+  /// How many skips keep the queue filled for `period` cycles, when the newest packet that came is
+  /// of cycle `now`, or -1 when none has come yet.
+  [[nodiscard]] int wanted_skips(std::int32_t now, int period) noexcept;
 
  private:
-  static constexpr std::uint32_t kInterruptEvery = 64;
+  static constexpr std::uint64_t kInterruptEvery = 64;
   static constexpr int kMargin = 2;  // cycles that the controller reads ahead
 
-  std::atomic<std::uint32_t> entries_{0};  ///< queued so far
-  std::uint32_t drained_at_ = 0;
-  std::atomic<std::uint32_t> sent_{0};        ///< entries that went out, of those told
-  std::atomic<std::int32_t> sent_cycle_{-1};  ///< and the cycle of the last one
+  void delay(std::int32_t lead) noexcept;
+
+  std::atomic<std::uint64_t> entries_{0};  ///< queued so far
+  std::uint64_t drained_at_ = 0;
+  std::uint64_t told_ = 0;  ///< entries that are known to have gone out
+  /// Cycle of an entry less its number, 0..63999; it only grows, whenever the queue runs dry. -1:
+  /// not known.
+  std::atomic<std::int32_t> lead_{-1};
 };
 
 }  // namespace kerf

@@ -74,9 +74,3 @@ TEST_CASE("cycles are counted over the wrap of a stamp's eight seconds") {
   CHECK(cycles_between(1, 63'999) == -2);
   CHECK(cycles_between(0, 31'999) == 31'999);
 }
-
-TEST_CASE("a filled queue asks for as many skips as keep it at the next packet") {
-  const kerf::FirewireTransmitter fresh;
-  CHECK(fresh.wanted_skips(-1, 8) == 7);  // nothing known yet
-  CHECK(fresh.wanted_skips(100, 1) == 0);
-}

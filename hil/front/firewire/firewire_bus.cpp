@@ -53,14 +53,14 @@ void FirewireBus::begin_cycle() {
     const auto packet = context->transmit(cycle_);
     if (!packet) continue;
     stats_.command_hash = fnv1a(stats_.command_hash, static_cast<std::uint64_t>(cycle_));
-    for (const std::uint8_t byte : *packet) {
+    for (const std::uint8_t byte : packet->bytes) {
       stats_.command_hash = (stats_.command_hash ^ byte) * 0x0000'0100'0000'01B3;
     }
-    const bool heard = present_ && registers_.streams() &&
+    const bool heard = present_ && registers_.streams() && packet->tag == kOmniTag &&
                        static_cast<int>(context->settings().channel) == registers_.listens_on();
     if (!heard) continue;
     ++stats_.commands;
-    device_.receive(*packet);
+    device_.receive(packet->bytes);
   }
   awake_ = awake_ || registers_.streams();
   if (awake_) device_.advance(1);

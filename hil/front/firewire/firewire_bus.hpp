@@ -90,6 +90,7 @@ class FirewireBus {
   [[nodiscard]] bool present() const noexcept { return present_; }
   [[nodiscard]] bool listed() const noexcept { return listed_; }
   [[nodiscard]] OmniRegisters& registers() noexcept { return registers_; }
+  [[nodiscard]] const OmniRegisters& registers() const noexcept { return registers_; }
   [[nodiscard]] IsoResources& resources() noexcept { return resources_; }
   [[nodiscard]] const FirewireStats& stats() const noexcept { return stats_; }
   /// The next cycle in which something is due that a client may wait for.

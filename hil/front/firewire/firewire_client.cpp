@@ -122,8 +122,7 @@ int FirewireClient::get_info(const FuseIoctl& call) {
   return 0;
 }
 
-// ---- time
-// ----------------------------------------------------------------------------------------
+// ---- time ----
 
 int FirewireClient::get_cycle_timer2() {
   auto request = argument<fw_cdev_get_cycle_timer2>();

@@ -26,8 +26,7 @@ constexpr std::int64_t kGraceCycles = kBusCyclesPerSecond;
 
 }  // namespace
 
-// ---- asynchronous requests
-// -----------------------------------------------------------------------
+// ---- asynchronous requests ----
 
 int FirewireClient::send_request(const FuseIoctl& call) {
   const auto request = argument<fw_cdev_send_request>();
@@ -110,8 +109,7 @@ void FirewireClient::respond(std::uint64_t closure, std::uint32_t rcode,
   }
 }
 
-// ---- channels and bandwidth
-// ----------------------------------------------------------------------
+// ---- channels and bandwidth ----
 
 int FirewireClient::allocate() {
   auto request = argument<fw_cdev_allocate_iso_resource>();

@@ -20,8 +20,7 @@ constexpr std::size_t kMaxEntryBytes = 16 << 20;
 
 }  // namespace
 
-// ---- isochronous contexts
-// ------------------------------------------------------------------------
+// ---- isochronous contexts ----
 
 int FirewireClient::create_context() {
   auto request = argument<fw_cdev_create_iso_context>();

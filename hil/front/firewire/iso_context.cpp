@@ -82,14 +82,15 @@ bool IsoContext::append(std::uint32_t control, std::span<const std::uint8_t> dat
     const bool skips = (control & FW_CDEV_ISO_SKIP) != 0;
     const std::size_t block = skips ? 1 : 2 + (data.empty() ? 0 : 1) + blocks(data.size());
     if (!memory_.take(block * kDescriptorBytes)) return false;
-    descriptors_.push_back({memory_.page(), interrupts, skips, {data.begin(), data.end()}, 0});
+    descriptors_.push_back(
+        {memory_.page(), interrupts, skips, tag_of(control), {data.begin(), data.end()}, 0});
   } else {
     const std::size_t packets = header_bytes(control) / settings_.header_size;
     const std::size_t block = 1 + blocks(std::max<std::size_t>(settings_.header_size, 8));
     for (std::size_t i = 0; i < packets; ++i) {
       if (!memory_.take(block * kDescriptorBytes)) return false;
       const bool last = i + 1 == packets;
-      descriptors_.push_back({memory_.page(), interrupts && last, false, {}, 0});
+      descriptors_.push_back({memory_.page(), interrupts && last, false, 0, {}, 0});
     }
   }
   if (interrupts) interrupts_at_.push_back(completed_ + descriptors_.size() - 1);
@@ -114,11 +115,11 @@ bool IsoContext::can_work() noexcept {
   return !halted_;
 }
 
-std::optional<std::vector<std::uint8_t>> IsoContext::transmit(std::int64_t cycle) {
+std::optional<IsoContext::Packet> IsoContext::transmit(std::int64_t cycle) {
   if (cycle < start_cycle_ || !can_work()) return std::nullopt;
   const Descriptor& descriptor = descriptors_[done_];
-  std::optional<std::vector<std::uint8_t>> packet;
-  if (!descriptor.skips) packet = descriptor.data;
+  std::optional<Packet> packet;
+  if (!descriptor.skips) packet = Packet{descriptor.tag, descriptor.data};
   done(cycle);
   return packet;
 }

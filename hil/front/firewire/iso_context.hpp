@@ -46,7 +46,11 @@ class IsoContext {
   void flush() { complete(true); }
 
   /// The bus's side. Of a transmitter, the packet of `cycle`: nothing when it sends none.
-  [[nodiscard]] std::optional<std::vector<std::uint8_t>> transmit(std::int64_t cycle);
+  struct Packet {
+    std::uint32_t tag = 0;
+    std::vector<std::uint8_t> bytes;
+  };
+  [[nodiscard]] std::optional<Packet> transmit(std::int64_t cycle);
   /// Of a receiver: a packet of this context's channel.
   void receive(std::uint32_t tag, std::span<const std::uint8_t> packet, std::int64_t cycle);
 
@@ -63,6 +67,7 @@ class IsoContext {
     std::uint64_t page = 0;
     bool interrupts = false;
     bool skips = false;
+    std::uint32_t tag = 0;           ///< of what is sent
     std::vector<std::uint8_t> data;  ///< what is sent, or what has come
     std::uint16_t stamp = 0;
   };

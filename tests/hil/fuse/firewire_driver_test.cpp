@@ -29,6 +29,8 @@ TEST_CASE("the driver finds the device, reads every packet and is heard each tic
   CHECK(node.events_high_water() <= 4);  // it reads what it causes
   CHECK(session.mounted().emulator().stats().refused == 0);
   CHECK_FALSE(session.mounted().emulator().model().motors_on());
+  CHECK_FALSE(node.bus().registers().streams());  // its enable bit is clear again
+  CHECK(node.bus().registers().mode_20010() == 0);
 }
 
 TEST_CASE("the device's cycle of a packet moves by one servo period a tick, over its wrap") {
@@ -90,6 +92,7 @@ TEST_CASE("a device of 1 kHz, a filled queue and the disputed register work, too
       CAPTURE(fill);
       FirewireSettings settings;
       settings.packet_cycles = slow ? 8 : 1;
+      settings.abi_version = slow ? 6 : 5;  // a newer kernel, too
       kerf::FirewireOptions options;
       options.write_20010 = true;
       options.fill = fill;
@@ -99,9 +102,10 @@ TEST_CASE("a device of 1 kHz, a filled queue and the disputed register work, too
       CHECK(fresh >= 2999);
       CHECK(session.driver().lost() == 0);
       session.end();
-      auto& stats = session.mounted().node().bus().stats();
+      const auto& stats = session.mounted().node().bus().stats();
       // What is still queued at the end is at most a servo period and its margin.
       CHECK(stats.commands >= 2998);
+      CHECK(session.mounted().node().bus().registers().mode_20010() == 0x0FF8);
       CHECK(session.mounted().node().events_high_water() <= 4);
     }
   }

@@ -2,6 +2,7 @@
 // Conformance of the node with the kernel's firewire-cdev, by plain system calls: one table.
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cerrno>
 #include <csignal>
 #include <cstdint>
@@ -321,6 +322,10 @@ const Check kChecks[] = {
     fw_cdev_queue_iso after{};
     const int count = b.client.queue(many, &after);
     return after.size == (60'000U - static_cast<std::uint32_t>(count)) * 4 ? 4 * count : -1; }},
+  {"or 1032192 skipped cycles", 252 * 4096, [](Bench& b) -> std::int64_t {
+    b.client.create(kTransmit, 1);
+    const std::vector<std::uint32_t> many(1'100'000, kSkip);
+    return b.client.queue(many); }},
   // ---- START, STOP, FLUSH
   {"starting with no tag is EINVAL", -EINVAL, [](Bench& b) -> std::int64_t {
     b.client.create(kReceive, 2);
@@ -547,6 +552,36 @@ TEST_CASE("the node answers as the kernel's firewire-cdev") {
     CHECK(check.run(bench) == check.expected);
   }
   MESSAGE(std::size(kChecks), " checks");
+}
+
+TEST_CASE("a device hears what comes on its channel with tag 0, once it streams") {
+  struct : kerf::PacketDevice {
+    void receive(std::span<const std::uint8_t> /*packet*/) noexcept override { ++heard; }
+    void advance(int /*cycles*/) noexcept override {}
+    std::span<const std::uint8_t> next_packet() noexcept override { return {}; }
+    std::atomic<int> heard{0};
+  } device;
+  const kerf::test::MountedDevice mounted(FirewireSettings{}, device);
+  const PlainClient client(mounted.path()), sender(mounted.path()), watch(mounted.path());
+  REQUIRE(sender.create(kTransmit, 1) == 0);
+  REQUIRE(watch.create(kReceive, 60) == 0);
+  REQUIRE(sender.queue({kSkip}) == 1);
+  REQUIRE(sender.start() == 0);
+  const auto send = [&](std::uint32_t tag) {
+    sender.queue({kSixteen | FW_CDEV_ISO_TAG(tag), 0, 0, 0, 0});
+    watch.flush();
+    return device.heard.load();
+  };
+  CHECK(send(0) == 0);
+  for (const auto& [offset, value] : {std::pair{0x1000, 1}, {0x1087, 8}}) {
+    client.write_byte(static_cast<std::uint64_t>(offset), static_cast<std::uint8_t>(value));
+    CHECK(rcode_of(client) == 0);
+  }
+  CHECK(send(1) == 0);
+  CHECK(send(0) == 1);
+  client.write_byte(0x1000, 5);
+  CHECK(rcode_of(client) == 0);
+  CHECK(send(0) == 1);
 }
 
 TEST_CASE("in real time a sleeping poll is woken by an interrupt, and the stream keeps its pace") {
