@@ -20,7 +20,8 @@ constexpr const char* kKeys =
     "v next renderer, c clip plane, p plot, r first view, s screenshot, e export the surface, h "
     "keys, q "
     "quit.\n"
-    "Exit codes: 0 fine, 1 the controller did not end cleanly, 2 bad input or set-up.";
+    "Exit codes: 0 fine, 1 the controller did not end cleanly, 2 bad input or set-up, or the\n"
+    "screen or the graphics card is gone.";
 
 constexpr const char* kBenchSize = "512x512";  // the paper's
 

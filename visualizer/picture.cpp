@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cmath>
 
+#include "visualizer/gl/context.hpp"
 #include "visualizer/screen_bounds.hpp"
 
 namespace kerf {
@@ -195,6 +196,7 @@ Redrawn draw_measured(Picture& picture, Session& session, const OverlayFigures& 
     return redrawn;
   }
   glFinish();
+  throw_if_context_is_lost();
   report.wall_ms.push_back(watch.wall_ms());
   report.cpu_ms.push_back(watch.cpu_ms());
   report.redrawn.push_back(redrawn.share);

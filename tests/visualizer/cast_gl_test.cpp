@@ -15,7 +15,6 @@
 #include "controller/scene/volume_io.hpp"
 #include "tests/visualizer/gl_fixture.hpp"
 #include "visualizer/cast/cast_renderer.hpp"
-#include "visualizer/gl/context.hpp"
 #include "visualizer/mesh_painter.hpp"
 
 using namespace kerf;
@@ -163,7 +162,6 @@ TEST_CASE(
     target.restrict_to({100, 90, 175, 141});
     cast.draw(kViews[0], target);
     target.restrict_to(target.all());
-    throw_on_gl_error();
     const std::vector<float> depth = target.read_depth();
     const std::vector<std::uint8_t> rgb = target.read_rgb();
     std::size_t wrong = 0;
@@ -200,7 +198,6 @@ TEST_CASE("a tool hides, is hidden and shines through as its place says") {
     painter.draw(tool, glm::translate(glm::dmat4(1.0), {0, 0, z_mm}), {}, view, target);
     const std::uint8_t tool_red = target.read_rgb()[3 * middle];
     cast.draw(view, target);
-    throw_on_gl_error();
     return std::pair(target.read_rgb()[3 * middle] == tool_red,
                      eye_distance_mm(static_cast<double>(target.read_depth()[middle]), view));
   };

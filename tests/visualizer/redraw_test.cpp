@@ -14,7 +14,6 @@
 #include "shared/segment/writer.hpp"
 #include "tests/visualizer/gl_fixture.hpp"
 #include "visualizer/error.hpp"
-#include "visualizer/gl/context.hpp"
 #include "visualizer/picture.hpp"
 #include "visualizer/screen_bounds.hpp"
 
@@ -188,7 +187,6 @@ TEST_CASE("after any change the part that is drawn again makes the picture of dr
       CHECK_FALSE(picture.draw(session, figures, target).any);
     }
     CHECK(redrawn / parts < 0.6);
-    throw_on_gl_error();
   }
 }
 
