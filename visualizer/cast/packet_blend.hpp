@@ -157,14 +157,13 @@ inline void add_piece(const CastJob& job, const CastVolumeJob& volume, Walk& wal
   const F extinction = Simd::select(there, matter.extinction * presence, zero);
   const F per_mm = extinction * Simd::set(1.0F / volume.edge_mm);
   glow = {glow.rgb + per_mm * matter.rgb, glow.per_mm + per_mm};
-  const M seen = Simd::but_not(
-      Simd::both(there,
-                 Simd::but_not(Simd::all(), Simd::less(extinction, Simd::set(kLeastExtinction)))),
-      sum.has_depth);
+  const M seen = Simd::but_not(there, Simd::less(extinction, Simd::set(kLeastExtinction)));
   const F empty = Simd::set(volume.empty);
   const F before =
       Simd::select(Simd::less(front, empty), clamped((empty - front) / (back - front)), zero);
-  sum.depth_mm = Simd::select(seen, mix(from_mm, to_mm, before), sum.depth_mm);
+  // The least: two volumes may begin in one piece.
+  sum.depth_mm =
+      Simd::select(seen, Simd::min(sum.depth_mm, mix(from_mm, to_mm, before)), sum.depth_mm);
   sum.has_depth = Simd::either(sum.has_depth, seen);
 }
 
@@ -210,7 +209,7 @@ inline void blend_packet(const CastJob& job, const Packet& packet) {
   }
   Gathered sum;
   sum.clear = one;
-  sum.depth_mm = end_mm;
+  sum.depth_mm = never;
   sum.has_depth = Simd::none();
   M alive = Simd::both(drawn_lanes(packet), Simd::less(k * step_mm, end_mm));
   while (Simd::any(alive)) {

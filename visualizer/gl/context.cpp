@@ -184,6 +184,7 @@ void GlContext::watch_for_faults() {
   if (!gl_faults_are_reported()) return;
   glEnable(GL_DEBUG_OUTPUT);
   glEnable(GL_DEBUG_OUTPUT_SYNCHRONOUS);
+  glDebugMessageControl(GL_DONT_CARE, GL_DONT_CARE, GL_DONT_CARE, 0, nullptr, GL_TRUE);
   glDebugMessageCallback(on_gl_message, nullptr);
 }
 
