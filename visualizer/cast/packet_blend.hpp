@@ -94,13 +94,16 @@ inline Matter matter_at(const CastJob& job, const CastVolumeJob& volume, Vec3 p,
     matter = labelled.mean;
     plain = Simd::but_not(there, Simd::less(zero, labelled.share));
   }
-  const M at_border = Simd::both(plain, Simd::less(density, full));
+  const M fading = Simd::both(plain, Simd::less(density, full));
   Vec3 gradient{};
-  if (Simd::any(Simd::either(noticeable, at_border))) gradient = stored_gradient_at(volume, p);
+  if (Simd::any(Simd::either(noticeable, fading))) gradient = stored_gradient_at(volume, p);
   const F size_2 = dot(gradient, gradient);
   const M sloped = Simd::less(zero, size_2);
   const F size = Simd::sqrt(size_2);
+  const F flat = Simd::set(0.02F);
   if (Simd::any(plain)) {
+    const M steep = Simd::both(noticeable, Simd::less(flat, size));
+    const M at_border = Simd::both(plain, Simd::either(fading, steep));
     F deep = density;
     if (Simd::any(at_border)) {
       // A border has the material of what it belongs to, a voxel and a half up the gradient.
@@ -118,7 +121,7 @@ inline Matter matter_at(const CastJob& job, const CastVolumeJob& volume, Vec3 p,
   const F facing = dot(unit, to_eye);
   const Vec3 edge_on = normalized(unit - (Simd::set(1.02F) * facing) * to_eye);
   const Vec3 normal = select(Simd::less(facing, zero), edge_on, unit);
-  const F x = clamped((size - Simd::set(0.02F)) * Simd::set(1.0F / 0.08F));
+  const F x = clamped((size - flat) * Simd::set(1.0F / 0.08F));
   const F surface = x * x * (Simd::set(3.0F) - Simd::set(2.0F) * x);
   const Vec3 bright = mix(dim, lit(job, matter.rgb, normal, to_eye, Simd::set(1.0F)), surface);
   return {select(noticeable, bright, dim), matter.extinction};
