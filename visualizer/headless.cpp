@@ -3,8 +3,11 @@
 #include <array>
 #include <chrono>
 #include <cstdio>
+#include <optional>
 #include <thread>
 
+#include "shared/posix/new_file.hpp"
+#include "visualizer/contact_sheet.hpp"
 #include "visualizer/cpu_placement.hpp"
 #include "visualizer/file_out.hpp"
 #include "visualizer/frame_report.hpp"
@@ -62,6 +65,7 @@ int run_headless(const VisualizerOptions& options) {
   place_process(options.cpus);
   make_folder(options.out);
   if (options.mesh) check_export(*options.mesh);
+  if (options.sheet) check_new_file(*options.sheet);
   const auto context = make_headless_context();
   const GlDriver driver = query_gl_driver();
   FrameReport report{.renderer = options.renderer,
@@ -100,6 +104,11 @@ int run_headless(const VisualizerOptions& options) {
   }
 
   if (options.mesh) export_surface(*options.mesh, session.scene(), session.contents());
+  if (options.sheet) {
+    std::optional<Hand> hand;
+    if (session.latest()) hand = hand_of(*session.latest());
+    write_contact_sheet(*options.sheet, session.scene(), session.contents(), hand);
+  }
   report.bricks_uploaded = picture.bricks_uploaded();
   report.clean_end = session.ended_cleanly();
   if (options.report) report.write(*options.report);

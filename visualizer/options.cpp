@@ -62,7 +62,7 @@ std::optional<VisualizerOptions> parse_options(int argc, const char* const* argv
   app.add_option("--renderer", options.renderer, "how volumes are drawn: " + known_renderers())
       ->capture_default_str();
   app.add_option("--size", size, "width and height in pixels")->capture_default_str();
-  app.add_flag("--headless", options.headless, "no window: pictures into --out");
+  auto* headless = app.add_flag("--headless", options.headless, "no window: pictures into --out");
   app.add_option("--frames", options.frames, "headless: number of pictures")
       ->check(CLI::Range(1, 9999))
       ->capture_default_str();
@@ -82,6 +82,10 @@ std::optional<VisualizerOptions> parse_options(int argc, const char* const* argv
                  "surface of all solid volumes as a closed mesh in mm, FILE.stl or FILE.ply (with "
                  "colours): headless at the end, in the window with e")
       ->type_name("FILE");
+  app.add_option("--sheet", options.sheet,
+                 "headless: at the end one PNG with the final state by every renderer")
+      ->type_name("FILE")
+      ->needs(headless);
   app.add_option("--report", options.report, "write times and counts to this JSON file");
   auto* bench = app.add_flag("--bench", options.bench,
                              "time every renderer, without a controller (512x512 unless --size)");

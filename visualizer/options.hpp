@@ -23,7 +23,8 @@ struct VisualizerOptions {
   std::optional<double> seconds;             ///< ends after this time; default: with the controller
   double wait_s = 10.0;                      ///< for the controller to appear
   std::vector<int> cpus;                     ///< empty: all but the last one
-  std::optional<std::filesystem::path> mesh;  ///< --export: .stl or .ply
+  std::optional<std::filesystem::path> mesh;   ///< --export: .stl or .ply
+  std::optional<std::filesystem::path> sheet;  ///< headless: the final state by every renderer
   std::optional<std::filesystem::path> report;
   bool bench = false;                         ///< no controller: what pictures cost here
   std::optional<std::filesystem::path> page;  ///< bench: as Markdown

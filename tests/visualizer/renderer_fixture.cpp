@@ -9,7 +9,6 @@
 
 #include <doctest/doctest.h>
 
-
 namespace kerf::test {
 
 namespace {

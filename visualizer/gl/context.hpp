@@ -41,8 +41,8 @@ class GlContext {
 /// last resort. Throws VisualizerError when none works.
 [[nodiscard]] std::unique_ptr<GlContext> make_headless_context();
 
-/// Throws VisualizerError where the driver has lost the current context, say because it had to reset
-/// the GPU: nothing that the context holds can be drawn any more.
+/// Throws VisualizerError where the driver has lost the current context, say because it had to
+/// reset the GPU: nothing that the context holds can be drawn any more.
 void throw_if_context_is_lost();
 
 /// Gets what GL says of an error, of undefined behaviour, or of anything of high severity, on the
