@@ -52,13 +52,15 @@ std::vector<std::uint8_t> reduced(const std::vector<std::uint8_t>& fine) {
 /// Writes with the overlay's font, twice its size.
 class Pen {
  public:
+  static constexpr int kScale = 2;
+  static constexpr int kHeightPx = kScale * 13;  ///< of a line
+
   Pen() : font_(atlas_.AddFontDefault()) {
     int height = 0;
     atlas_.GetTexDataAsAlpha8(&coverage_, &width_, &height);
     height_ = height;
   }
   void write(std::string_view text, int x, int y, Sheet& sheet) const {
-    constexpr int kScale = 2;
     for (const char letter : text) {
       const ImFontGlyph& glyph = *font_->FindGlyph(static_cast<ImWchar>(letter));
       const int left = static_cast<int>(glyph.U0 * static_cast<float>(width_) + 0.5F);
@@ -91,12 +93,14 @@ void write_contact_sheet(const std::filesystem::path& file, const SceneView& sce
   constexpr int kMarginPx = 10;
   constexpr double kAspect = static_cast<double>(kTile.width) / kTile.height;
   constexpr double kNearer = 1.5;  // a tooth does not fill its box
+  constexpr double kLower = 0.07;  // of the tile's height: as seen from above it stands high
   constexpr double kReach = 3.0;   // half diagonals of the main volume: neighbours and tool
   const BoxCorners box = scene.main_volume().corners();
   const double size_mm = 0.5 * glm::length(box.back() - box.front());
   OrbitCamera camera;
   camera.frame(box, kAspect);
   camera.zoom(kNearer);
+  camera.pan(0.0, -kLower);
   const View view = camera.view(kAspect, kReach * size_mm);
   const RenderTarget target({kFiner * kTile.width, kFiner * kTile.height});
   HandPainter hand_painter(scene, size_mm);
@@ -124,7 +128,7 @@ void write_contact_sheet(const std::filesystem::path& file, const SceneView& sce
       std::copy_n(tile.begin() + static_cast<std::ptrdiff_t>(3 * y * kTile.width), 3 * kTile.width,
                   sheet.pixel(left, top + y));
     }
-    pen.write(kinds[i], left + kMarginPx, top + kMarginPx, sheet);
+    pen.write(kinds[i], left + kMarginPx, top + kTile.height - kMarginPx - Pen::kHeightPx, sheet);
   }
   write_png(file, sheet.size, sheet.rgb);
 }

@@ -34,7 +34,7 @@ TEST_CASE("a contact sheet has a tile for every renderer, and each shows its own
     const int height = sheet.size.height / rows;
     for (std::size_t i = 0; i < renderer_kinds().size(); ++i) {
       auto& tile = all.emplace_back();
-      for (int y = height / 4; y < height; ++y) {  // below the name
+      for (int y = 0; y < height * 3 / 4; ++y) {  // above the name
         const int row = static_cast<int>(i) / kColumns * height + y;
         const auto from = sheet.rgb.begin() +
                           3 * (row * sheet.size.width + static_cast<int>(i) % kColumns * width);
