@@ -7,6 +7,9 @@
 //
 // Of the CT tooth, whose terms are unclear, only a signature is kept: means over squares of eight
 // pixels.
+#include <map>
+#include <string>
+
 #include <doctest/doctest.h>
 
 #include "tests/visualizer/golden_picture.hpp"
@@ -25,13 +28,32 @@ View above() {
   return look_at({13, 30, 27}, {0, 0.5, 0}, 28, 56);
 }
 
-template <class Check>
-void draw_with_all(const Tooth& tooth, const Check& check) {
+using Pictures = std::map<std::string, RgbPicture>;
+
+/// By renderer.
+Pictures pictures_of(const Tooth& tooth) {
   const RenderTarget target(kSize);
   const VolumeContent content = tooth.content();
+  Pictures all;
   for (const std::string_view kind : renderer_kinds()) {
     const auto renderer = make_renderer(kind, tooth.scene, {&content, 1});
-    check(std::string(kind), with_depth(draw(*renderer, above(), target), above(), kSize));
+    all[std::string(kind)] = with_depth(draw(*renderer, above(), target), above(), kSize);
+  }
+  return all;
+}
+
+/// Renderers that show the same in different ways.
+void check_pairs(const Pictures& pictures) {
+  struct Pair {
+    std::string a, b;
+    double alike;
+  };
+  // Triangles are straight where a ray finds the curve within a cell: noisy CT shows it.
+  for (const Pair& pair : {Pair{"iso", "cast", 0.995}, Pair{"iso", "surface", 0.98},
+                           Pair{"blend", "slices", 0.995}, Pair{"blend", "cast-blend", 0.995}}) {
+    CAPTURE(pair.a);
+    CAPTURE(pair.b);
+    CHECK(likeness(pictures.at(pair.a), pictures.at(pair.b)).alike >= pair.alike);
   }
 }
 
@@ -41,9 +63,9 @@ TEST_CASE("every renderer draws the phantom of the default scene as it did") {
   if (!have_gl()) return;
   Tooth tooth = phantom({256, 256, 161}, true);
   tooth.drill();
-  draw_with_all(tooth, [](const std::string& kind, const RgbPicture& picture) {
-    check_golden("phantom-" + kind, picture);
-  });
+  const Pictures pictures = pictures_of(tooth);
+  for (const auto& [kind, picture] : pictures) check_golden("phantom-" + kind, picture);
+  check_pairs(pictures);
 }
 
 TEST_CASE("every renderer draws the CT tooth as it did") {
@@ -51,9 +73,11 @@ TEST_CASE("every renderer draws the CT tooth as it did") {
   auto tooth = ct_tooth();
   if (!tooth) return;
   tooth->drill();
-  draw_with_all(*tooth, [](const std::string& kind, const RgbPicture& picture) {
+  const Pictures pictures = pictures_of(*tooth);
+  for (const auto& [kind, picture] : pictures) {
     check_golden("tooth-" + kind, box_filtered(picture, 8));
-  });
+  }
+  check_pairs(pictures);
 }
 
 TEST_CASE("a picture is not like one with other pixels, and is like one with other roundings") {

@@ -119,8 +119,7 @@ inline Matter matter_at(const CastJob& job, const CastVolumeJob& volume, Vec3 p,
   const Vec3 slope = transformed_back(volume.from_eye, gradient);
   const Vec3 unit = select(sloped, -normalized(slope), to_eye);
   const F facing = dot(unit, to_eye);
-  const Vec3 edge_on = normalized(unit - (Simd::set(1.02F) * facing) * to_eye);
-  const Vec3 normal = select(Simd::less(facing, zero), edge_on, unit);
+  const Vec3 normal = select(Simd::less(facing, zero), -unit, unit);
   const F x = clamped((size - flat) * Simd::set(1.0F / 0.08F));
   const F surface = x * x * (Simd::set(3.0F) - Simd::set(2.0F) * x);
   const Vec3 bright = mix(dim, lit(job, matter.rgb, normal, to_eye, Simd::set(1.0F)), surface);
