@@ -4,10 +4,10 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <filesystem>
 #include <string_view>
 
 #include <doctest/doctest.h>
-#include <png.h>
 
 #include "visualizer/file_out.hpp"
 
@@ -38,19 +38,6 @@ RgbPicture difference_picture(const RgbPicture& a, const RgbPicture& b) {
 }
 
 }  // namespace
-
-std::optional<RgbPicture> read_png(const std::filesystem::path& file) {
-  png_image image{};
-  image.version = PNG_IMAGE_VERSION;
-  if (png_image_begin_read_from_file(&image, file.c_str()) == 0) return std::nullopt;
-  image.format = PNG_FORMAT_RGB;
-  RgbPicture picture{{static_cast<int>(image.width), static_cast<int>(image.height)}, {}};
-  picture.rgb.resize(PNG_IMAGE_SIZE(image));
-  if (png_image_finish_read(&image, nullptr, picture.rgb.data(), 0, nullptr) == 0) {
-    return std::nullopt;
-  }
-  return picture;
-}
 
 RgbPicture with_depth(const Drawn& drawn, const View& view, PictureSize size) {
   constexpr double kFarthest = 254.0;

@@ -1,24 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <cstdint>
-#include <filesystem>
-#include <optional>
 #include <string>
-#include <vector>
 
 #include "tests/visualizer/gl_fixture.hpp"
+#include "tests/visualizer/rgb_picture.hpp"
 
 namespace kerf::test {
-
-/// 8-bit RGB, first row at the top.
-struct RgbPicture {
-  PictureSize size;
-  std::vector<std::uint8_t> rgb;
-};
-
-/// None where there is no such PNG.
-[[nodiscard]] std::optional<RgbPicture> read_png(const std::filesystem::path& file);
 
 /// What was drawn, and right of it its depth in grey: from the near plane, black, to the far plane
 /// in equal steps of distance; white where nothing was drawn.

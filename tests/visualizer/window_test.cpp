@@ -16,13 +16,13 @@
 #include <epoxy/gl.h>
 #include <fcntl.h>
 #include <nlohmann/json.hpp>
-#include <png.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include "shared/segment/hand_over.hpp"
 #include "shared/segment/writer.hpp"
 #include "tests/programs/process.hpp"
+#include "tests/visualizer/rgb_picture.hpp"
 #include "visualizer/error.hpp"
 #include "visualizer/run.hpp"
 
@@ -158,17 +158,16 @@ class User {
     for (int tries = 0; tries < 3000 && !fs::exists(file); ++tries) {
       std::this_thread::sleep_for(std::chrono::milliseconds(10));
     }
-    png_image image{};
-    image.version = PNG_IMAGE_VERSION;
-    REQUIRE(png_image_begin_read_from_file(&image, file.c_str()) != 0);
-    image.format = PNG_FORMAT_RGB;
-    std::vector<std::uint8_t> all(PNG_IMAGE_SIZE(image));
-    REQUIRE(png_image_finish_read(&image, nullptr, all.data(), 0, nullptr) != 0);
+    const auto picture = read_png(file);
+    REQUIRE(picture);
     fs::remove(file);
+    const auto width = static_cast<std::size_t>(picture->size.width);
+    const auto height = static_cast<std::size_t>(picture->size.height);
     std::vector<std::uint8_t> middle;
-    for (std::size_t y = image.height / 4; y < image.height * 3 / 4; ++y) {
-      const auto row = all.begin() + static_cast<std::ptrdiff_t>(y * image.width * 3);
-      middle.insert(middle.end(), row + image.width * 3 * 5 / 9, row + image.width * 3 * 8 / 9);
+    for (std::size_t y = height / 4; y < height * 3 / 4; ++y) {
+      const auto row = picture->rgb.begin() + static_cast<std::ptrdiff_t>(y * width * 3);
+      middle.insert(middle.end(), row + picture->size.width * 3 * 5 / 9,
+                    row + picture->size.width * 3 * 8 / 9);
     }
     return middle;
   }
