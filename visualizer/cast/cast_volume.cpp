@@ -60,6 +60,24 @@ double CastVolume::edge_mm() const {
                    glm::length(world_from_voxel_[2])});
 }
 
+std::optional<BoxCorners> CastVolume::body() const {
+  if (outer_cells_.empty()) return std::nullopt;
+  glm::ivec3 low(std::numeric_limits<int>::max());
+  glm::ivec3 high(0);
+  for (const auto& [x, y, z] : outer_cells_) {
+    low = glm::min(low, glm::ivec3(x, y, z));
+    high = glm::max(high, glm::ivec3(x, y, z) + 1);
+  }
+  BoxCorners corners;
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    const glm::ivec3 cell((i & 1) != 0 ? high.x : low.x, (i & 2) != 0 ? high.y : low.y,
+                          (i & 4) != 0 ? high.z : low.z);
+    const glm::dvec3 voxel = glm::dvec3(Macrocells::kEdge * cell) - kShell;
+    corners[i] = glm::dvec3(world_from_voxel_ * glm::dvec4(voxel, 1.0));
+  }
+  return corners;
+}
+
 void CastVolume::update_bricks(std::span<const Density> density,
                                std::span<const std::uint32_t> changed) {
   for (const std::uint32_t id : changed) density_.copy(bricks_.voxels(id), density);
