@@ -10,8 +10,8 @@
 
 namespace kerf {
 
-/// Hands the pictures of `Caster` to GL. Only the part of the target that can show anything is cast and
-/// copied.
+/// Hands the pictures of `Caster` to GL. Only the part of the target that can show anything is cast
+/// and copied.
 ///
 /// Iso goes under the depth test of the target. Blend ends its rays at what is in the target, lies
 /// over it, and sets depth where enough of it has gathered to hide what comes later.
