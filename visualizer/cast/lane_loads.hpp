@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // For the x86 files that define `Simd` only: loads for single lanes.
 //
-// In place of gather instructions: those take half as long again where they are microcode, as on
-// Zen, and longer still on the many processors whose microcode mends "Downfall" (CVE-2022-40982).
+// In place of gather instructions: with those a picture took 18 to 30 % longer on Zen 5, where they
+// are microcode. Mended against "Downfall" (CVE-2022-40982), many Intel processors are slow at them
+// too; that was not measured.
 #pragma once
 
 #include <cstddef>
