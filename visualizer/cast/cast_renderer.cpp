@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "visualizer/cast/cast_renderer.hpp"
 
+#include "visualizer/screen_bounds.hpp"
 #include "visualizer/transfer_function.hpp"
 
 namespace kerf {
@@ -65,14 +66,22 @@ void CastRenderer::draw(const View& view, const RenderTarget& target) {
   if (!frame_ || frame_->picture.width != size.width || frame_->picture.height != size.height) {
     frame_.emplace(size);
   }
-  const PixelRect& rect = target.part();
+  const PixelRect rect = target.part().clipped(reach(view, size));
   if (rect.empty()) return;
   const bool ends_at_target = mode_ == CastMode::blend;
   if (ends_at_target) read_end_depth(target, rect);
   caster_.draw(view, rect, frame_->picture,
                ends_at_target ? std::span<const float>(frame_->end_depth) : std::span<float>());
   upload(rect);
-  show(target);
+  show(target, rect);
+}
+
+PixelRect CastRenderer::reach(const View& view, PictureSize size) const {
+  PixelRect reach;
+  for (const BoxCorners& body : caster_.bodies()) {
+    reach = reach.united(screen_bounds(body, view, size));
+  }
+  return reach;
 }
 
 void CastRenderer::read_end_depth(const RenderTarget& target, const PixelRect& rect) {
@@ -99,8 +108,9 @@ void CastRenderer::upload(const PixelRect& rect) {
   glPixelStorei(GL_UNPACK_ROW_LENGTH, 0);
 }
 
-void CastRenderer::show(const RenderTarget& target) {
+void CastRenderer::show(const RenderTarget& target, const PixelRect& rect) {
   target.bind();
+  glScissor(rect.x0, rect.y0, rect.x1 - rect.x0, rect.y1 - rect.y0);
   glBindTextureUnit(0, frame_->colour.id());
   glBindTextureUnit(1, frame_->depth.id());
   glBindVertexArray(no_vertices_.id());

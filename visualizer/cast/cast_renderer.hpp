@@ -10,7 +10,8 @@
 
 namespace kerf {
 
-/// Hands the pictures of `Caster` to GL. Only the target's part is cast.
+/// Hands the pictures of `Caster` to GL. Only the part of the target that can show anything is cast
+/// and copied.
 ///
 /// Iso goes under the depth test of the target. Blend ends its rays at what is in the target, lies
 /// over it, and sets depth where enough of it has gathered to hide what comes later.
@@ -33,9 +34,11 @@ class CastRenderer final : public Renderer {
     GlTexture2D depth = GlTexture2D::create();
   };
 
+  /// Pixels that may show anything of the volumes.
+  [[nodiscard]] PixelRect reach(const View& view, PictureSize size) const;
   void read_end_depth(const RenderTarget& target, const PixelRect& rect);
   void upload(const PixelRect& rect);
-  void show(const RenderTarget& target);
+  void show(const RenderTarget& target, const PixelRect& rect);
 
   CastMode mode_;
   Caster caster_;

@@ -45,8 +45,10 @@ class CastVolume {
   /// Takes bricks `changed` of `density` (the whole volume) and the cells they touch.
   void update_bricks(std::span<const Density> density, std::span<const std::uint32_t> changed);
 
-  /// For a picture of `width` x `height`; good until the next call of anything.
   [[nodiscard]] double edge_mm() const;  ///< the shortest
+  /// A box around all that can be seen of it; nothing can where there is none.
+  [[nodiscard]] std::optional<BoxCorners> body() const;
+  /// For a picture of `width` x `height`; good until the next call of anything.
   [[nodiscard]] CastVolumeJob job(const View& view, std::int32_t width, std::int32_t height);
 
  private:

@@ -48,6 +48,14 @@ void Caster::update(std::size_t volume, std::span<const Density> density,
   volumes_[volume].update_bricks(density, changed);
 }
 
+std::vector<BoxCorners> Caster::bodies() const {
+  std::vector<BoxCorners> bodies;
+  for (const CastVolume& volume : volumes_) {
+    if (const auto body = volume.body()) bodies.push_back(*body);
+  }
+  return bodies;
+}
+
 void Caster::draw(const View& view, const PixelRect& rect, CastPicture& picture,
                   std::span<const float> end_depth, std::span<float> normals) {
   CastJob job;
@@ -80,12 +88,15 @@ void Caster::draw(const View& view, const PixelRect& rect, CastPicture& picture,
   put(job.up, glm::dvec3(view.eye_from_world * glm::dvec4(0, 1, 0, 0)));
   const auto cast =
       options_.mode == CastMode::iso ? options_.kernels->iso : options_.kernels->blend;
-  const std::int32_t across = (rect.x1 - rect.x0 + kTile - 1) / kTile;
-  const std::int32_t along = (rect.y1 - rect.y0 + kTile - 1) / kTile;
+  // Tiles stand where they stand in the whole picture, so that blocks of pixels stay whole.
+  const std::int32_t left = rect.x0 / kTile;
+  const std::int32_t lowest = rect.y0 / kTile;
+  const std::int32_t across = (rect.x1 + kTile - 1) / kTile - left;
+  const std::int32_t along = (rect.y1 + kTile - 1) / kTile - lowest;
   pool_.run(static_cast<std::uint32_t>(across * along), [&](std::uint32_t tile) {
-    const std::int32_t x = rect.x0 + static_cast<std::int32_t>(tile) % across * kTile;
-    const std::int32_t y = rect.y0 + static_cast<std::int32_t>(tile) / across * kTile;
-    cast(job, {x, y, std::min(x + kTile, rect.x1), std::min(y + kTile, rect.y1)});
+    const std::int32_t x = (left + static_cast<std::int32_t>(tile) % across) * kTile;
+    const std::int32_t y = (lowest + static_cast<std::int32_t>(tile) / across) * kTile;
+    cast(job, PixelRect{x, y, x + kTile, y + kTile}.clipped(rect));
   });
 }
 

@@ -43,6 +43,9 @@ class Caster {
   void update(std::size_t volume, std::span<const Density> density,
               std::span<const std::uint32_t> changed);
 
+  /// What each picture shows is in one of these boxes.
+  [[nodiscard]] std::vector<BoxCorners> bodies() const;
+
   /// Draws `rect` of the picture; the rest of it stays. Rays of blend end at `end_depth` (window
   /// depth, one per pixel of the picture) where it is given. `normals` (three floats per pixel, or
   /// none) are those of iso in eye space, for measurements.

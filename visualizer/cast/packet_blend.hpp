@@ -114,16 +114,15 @@ inline Matter matter_at(const CastJob& job, const CastVolumeJob& volume, Vec3 p,
     matter = select(plain, nearest_by_density(volume, deep), matter);
   }
   const Vec3 dim = Simd::set(kInside) * matter.rgb;
-  if (!Simd::any(noticeable)) return {dim, matter.extinction};
   // Where the density hardly changes there is no surface to be lit.
-  const Vec3 slope = transformed_back(volume.from_eye, gradient);
-  const Vec3 unit = select(sloped, -normalized(slope), to_eye);
-  const F facing = dot(unit, to_eye);
-  const Vec3 normal = select(Simd::less(facing, zero), -unit, unit);
   const F x = clamped((size - flat) * Simd::set(1.0F / 0.08F));
+  const M lights = Simd::both(noticeable, Simd::less(zero, x));
+  if (!Simd::any(lights)) return {dim, matter.extinction};
+  const Vec3 unit = -normalized(transformed_back(volume.from_eye, gradient));
+  const Vec3 normal = select(Simd::less(dot(unit, to_eye), zero), -unit, unit);
   const F surface = x * x * (Simd::set(3.0F) - Simd::set(2.0F) * x);
   const Vec3 bright = mix(dim, lit(job, matter.rgb, normal, to_eye, Simd::set(1.0F)), surface);
-  return {select(noticeable, bright, dim), matter.extinction};
+  return {select(lights, bright, dim), matter.extinction};
 }
 
 /// Piece k of the rays.
