@@ -115,16 +115,24 @@ Redrawn Picture::draw(const Session& session, const OverlayFigures& figures,
     if (renderer_->translucent()) volumes = stage;  // the hand is under them
   }
   const OverlayFigures panel = figures.rounded();
-  const bool same_panel = panel == shown_.figures && target.framebuffer() == shown_.target;
+  const bool same_target = !fresh && target.framebuffer() == shown_.target;
+  const bool same_panel = panel == shown_.figures && same_target;
   for (StaleVolume& volume : stale_) volume.clear();
   if (stage.empty() && same_panel) return {};
 
   renderer_->set_moving(moving);
-  if (!stage.empty()) draw_layers(hand, view, volumes, stage);
-  target.copy(layers_->smooth, target.all());
-  overlay_.draw(panel, target);
+  std::vector<PixelRect> others;
+  if (!stage.empty()) others = draw_layers(hand, view, volumes, stage);
+  const PixelRect panels = overlay_.prepare(panel, size);
+  if (same_target) {
+    others.push_back(panels.united(shown_.panels));  // they let the picture shine through
+  } else {
+    others = {target.all()};
+  }
+  for (const PixelRect& part : others) target.copy_colour(layers_->smooth, part);
+  overlay_.draw(target);
   glDisable(GL_SCISSOR_TEST);
-  shown_ = {view, moving, hand, panel, target.framebuffer()};
+  shown_ = {view, moving, hand, panel, target.framebuffer(), panels};
   double drawn = 0.0;
   for (const PixelRect& part : volumes) drawn += part.area();
   return {true, drawn / target.all().area()};
@@ -145,8 +153,9 @@ void Picture::mark_hand(StaleTiles& tiles, const std::optional<Hand>& hand, cons
   }
 }
 
-void Picture::draw_layers(const std::optional<Hand>& hand, const View& view,
-                          std::span<const PixelRect> volumes, std::span<const PixelRect> stage) {
+std::vector<PixelRect> Picture::draw_layers(const std::optional<Hand>& hand, const View& view,
+                                            std::span<const PixelRect> volumes,
+                                            std::span<const PixelRect> stage) {
   const bool tool_first = renderer_->translucent();  // it shines through them
   if (!volumes.empty()) {
     layers_->volumes.restrict_to(volumes);
@@ -164,6 +173,7 @@ void Picture::draw_layers(const std::optional<Hand>& hand, const View& view,
   for (const PixelRect& part : stage) smoothed.push_back(part.grown(kSmoothingReach));
   layers_->smooth.restrict_to(smoothed);
   smooth_edges(layers_->stage, layers_->smooth);
+  return smoothed;
 }
 
 void Picture::draw_backdrop(const RenderTarget& target) {

@@ -68,8 +68,10 @@ class Picture {
   void mark_volumes(StaleTiles& tiles, const Session& session, const View& view) const;
   void mark_hand(StaleTiles& tiles, const std::optional<Hand>& hand, const View& view,
                  PictureSize size) const;
-  void draw_layers(const std::optional<Hand>& hand, const View& view,
-                   std::span<const PixelRect> volumes, std::span<const PixelRect> stage);
+  /// Returns the parts of the smooth layer that are others now.
+  std::vector<PixelRect> draw_layers(const std::optional<Hand>& hand, const View& view,
+                                     std::span<const PixelRect> volumes,
+                                     std::span<const PixelRect> stage);
 
   SceneView scene_;
   Look look_;
@@ -95,6 +97,7 @@ class Picture {
     std::optional<Hand> hand;
     OverlayFigures figures;
     GLuint target = 0;
+    PixelRect panels;
   };
   std::optional<Layers> layers_;
   Shown shown_;

@@ -133,9 +133,12 @@ void StaleVolume::mark(StaleTiles& tiles, const Renderer& renderer, const Volume
   }
   if (felt.empty()) return;
   const Feelers feelers(volume, density, differs_, view, kept.size());
-  mark_where(tiles, felt, [&](const PixelRect& tile) {
-    const auto [nearest, farthest] = depth.range(tile);
-    if (!feelers.may_reach(tile, nearest, farthest)) return false;
+  const auto is_near = [&](const PixelRect& pixels) {
+    const auto [nearest, farthest] = depth.range(pixels);
+    return feelers.may_reach(pixels, nearest, farthest);
+  };
+  const auto is_felt = [&](const PixelRect& tile) {
+    if (!is_near(tile)) return false;
     for (int y = tile.y0; y < tile.y1; ++y) {
       for (int x = tile.x0; x < tile.x1; ++x) {
         const float at = depth.row(y)[x];
@@ -143,7 +146,16 @@ void StaleVolume::mark(StaleTiles& tiles, const Renderer& renderer, const Volume
       }
     }
     return false;
-  });
+  };
+  // Most of it is far from the change: many tiles at once.
+  constexpr int kManyTiles = 4 * StaleTiles::kEdge;
+  const PixelRect whole = felt.clipped({0, 0, kept.size().width, kept.size().height});
+  for (int y = whole.y0 / kManyTiles * kManyTiles; y < whole.y1; y += kManyTiles) {
+    for (int x = whole.x0 / kManyTiles * kManyTiles; x < whole.x1; x += kManyTiles) {
+      const PixelRect some = PixelRect{x, y, x + kManyTiles, y + kManyTiles}.clipped(whole);
+      if (is_near(some)) mark_where(tiles, some, is_felt);
+    }
+  }
 }
 
 }  // namespace kerf

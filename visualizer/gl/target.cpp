@@ -17,6 +17,12 @@ void flip_rows(std::vector<T>& picture, std::size_t row, std::size_t rows) {
   }
 }
 
+void copy_texture(const GlTexture2D& from, const GlTexture2D& to, const PixelRect& r) {
+  if (r.empty()) return;
+  glCopyImageSubData(from.id(), GL_TEXTURE_2D, 0, r.x0, r.y0, 0, to.id(), GL_TEXTURE_2D, 0, r.x0,
+                     r.y0, 0, r.x1 - r.x0, r.y1 - r.y0, 1);
+}
+
 }  // namespace
 
 RenderTarget::RenderTarget(PictureSize size) : size_(size) {
@@ -52,14 +58,12 @@ void RenderTarget::bind() const {
 }
 
 void RenderTarget::copy(const RenderTarget& from, const PixelRect& part) const {
-  const PixelRect r = part.clipped(all());
-  if (r.empty()) return;
-  const auto copy_texture = [&](const GlTexture2D& source, const GlTexture2D& to) {
-    glCopyImageSubData(source.id(), GL_TEXTURE_2D, 0, r.x0, r.y0, 0, to.id(), GL_TEXTURE_2D, 0,
-                       r.x0, r.y0, 0, r.x1 - r.x0, r.y1 - r.y0, 1);
-  };
-  copy_texture(from.colour_, colour_);
-  copy_texture(from.depth_, depth_);
+  copy_colour(from, part);
+  copy_texture(from.depth_, depth_, part.clipped(all()));
+}
+
+void RenderTarget::copy_colour(const RenderTarget& from, const PixelRect& part) const {
+  copy_texture(from.colour_, colour_, part.clipped(all()));
 }
 
 std::vector<std::uint8_t> RenderTarget::read_rgb() const {
