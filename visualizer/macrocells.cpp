@@ -41,20 +41,33 @@ bool Macrocells::update_cell(VoxelIndex cell, std::span<const Density> density) 
   return active_[at] != before;
 }
 
-bool Macrocells::update_brick(VoxelIndex at, std::span<const Density> density) {
+bool Macrocells::update_bricks(const BrickGrid& bricks, std::span<const std::uint32_t> changed,
+                               std::span<const Density> density) {
   const std::int32_t per_brick = kBrickEdge / edge_;
-  const auto beyond = [&](std::int32_t brick) { return (brick + 1) * per_brick + 1; };
-  const VoxelBox touched = VoxelBox{
-      {at.x * per_brick, at.y * per_brick, at.z * per_brick},
-      {beyond(at.x), beyond(at.y),
-       beyond(at.z)}}.clipped(grid_.box());
-  bool flipped = false;
-  for (std::int32_t z = touched.lo.z; z < touched.hi.z; ++z) {
-    for (std::int32_t y = touched.lo.y; y < touched.hi.y; ++y) {
-      for (std::int32_t x = touched.lo.x; x < touched.hi.x; ++x) {
-        flipped = update_cell({x, y, z}, density) || flipped;
+  // Samples of a cell reach a voxel beyond it, so that bricks side by side share cells: each once.
+  std::vector<std::size_t> touched;
+  for (const std::uint32_t id : changed) {
+    const VoxelIndex at = bricks.brick(id);
+    const auto beyond = [&](std::int32_t brick) { return (brick + 1) * per_brick + 1; };
+    const VoxelBox cells = VoxelBox{
+        {at.x * per_brick, at.y * per_brick, at.z * per_brick},
+        {beyond(at.x), beyond(at.y),
+         beyond(at.z)}}.clipped(grid_.box());
+    for (std::int32_t z = cells.lo.z; z < cells.hi.z; ++z) {
+      for (std::int32_t y = cells.lo.y; y < cells.hi.y; ++y) {
+        for (std::int32_t x = cells.lo.x; x < cells.hi.x; ++x) {
+          touched.push_back(grid_.index(x, y, z));
+        }
       }
     }
+  }
+  std::sort(touched.begin(), touched.end());
+  touched.erase(std::unique(touched.begin(), touched.end()), touched.end());
+  bool flipped = false;
+  for (const std::size_t cell : touched) {
+    const auto i = static_cast<std::int32_t>(cell);
+    const VoxelIndex at{i % grid_.nx, i / grid_.nx % grid_.ny, i / grid_.nx / grid_.ny};
+    flipped = update_cell(at, density) || flipped;
   }
   return flipped;
 }

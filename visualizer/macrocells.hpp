@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "shared/volume/voxel_grid.hpp"
+#include "shared/segment/brick_grid.hpp"
 
 namespace kerf {
 
@@ -25,9 +25,10 @@ class Macrocells {
   Macrocells(VoxelGrid volume, std::span<const Density> density, Density iso,
              std::int32_t edge = kEdge);
 
-  /// Recomputes the cells that brick `at` (in bricks, not voxels) touches. Returns whether a cell
-  /// became active or inactive.
-  bool update_brick(VoxelIndex at, std::span<const Density> density);
+  /// Recomputes the cells that bricks `changed` touch. Returns whether a cell became active or
+  /// inactive.
+  bool update_bricks(const BrickGrid& bricks, std::span<const std::uint32_t> changed,
+                     std::span<const Density> density);
 
   [[nodiscard]] const VoxelGrid& grid() const noexcept { return grid_; }
   [[nodiscard]] std::span<const Density> maxima() const noexcept { return maxima_; }

@@ -244,12 +244,26 @@ void Overlay::look_controls(LookControls& controls) {
   ImGui::PopItemWidth();
 }
 
-void Overlay::draw(const OverlayFigures& figures, const RenderTarget& target) {
-  target.bind();
+PixelRect Overlay::prepare(const OverlayFigures& figures, PictureSize size) {
   ImGui_ImplOpenGL3_NewFrame();
   OverlayFigures shown = figures;
   // ImGui learns the size of what a panel holds by laying it out: the second time is right.
-  for (int pass = 0; pass < 2; ++pass) lay_out(shown, target.size());
+  for (int pass = 0; pass < 2; ++pass) lay_out(shown, size);
+  PixelRect bounds;
+  const ImDrawData& panels = *ImGui::GetDrawData();
+  for (int i = 0; i < panels.CmdListsCount; ++i) {
+    for (const ImDrawCmd& command : panels.CmdLists[i]->CmdBuffer) {
+      const ImVec4& clip = command.ClipRect;  // from the upper left corner
+      bounds = bounds.united(PixelRect{
+          static_cast<int>(std::floor(clip.x)), size.height - static_cast<int>(std::ceil(clip.w)),
+          static_cast<int>(std::ceil(clip.z)), size.height - static_cast<int>(std::floor(clip.y))});
+    }
+  }
+  return bounds;
+}
+
+void Overlay::draw(const RenderTarget& target) {
+  target.bind();
   ImGui_ImplOpenGL3_RenderDrawData(ImGui::GetDrawData());
 }
 

@@ -53,7 +53,10 @@ class Overlay {
   /// What the mouse does to the controls of `figures`, which it changes; draws nothing. True while
   /// the mouse belongs to them and not to the camera.
   bool handle(const Pointer& pointer, OverlayFigures& figures, PictureSize size);
-  void draw(const OverlayFigures& figures, const RenderTarget& target);
+  /// Lays the panels out; returns the part of a picture of this size that they cover.
+  PixelRect prepare(const OverlayFigures& figures, PictureSize size);
+  /// Draws what was laid out last over `target`.
+  void draw(const RenderTarget& target);
 
  private:
   void lay_out(OverlayFigures& figures, PictureSize size);

@@ -30,7 +30,7 @@ Picture::Picture(const Session& session, const Look& look, double aspect)
     : scene_(session.scene()),
       look_(look),
       renderer_(renderer_for(session, look)),
-      stale_bricks_(scene_.volumes.size()),
+      stale_(scene_.volumes.size()),
       hand_painter_(scene_, size_of(scene_.main_volume())) {
   const BoxCorners box = scene_.main_volume().corners();
   centre_mm_ = 0.5 * (box.front() + box.back());
@@ -89,8 +89,7 @@ void Picture::update(const Session& session) {
     const VolumeSnapshot& snapshot = session.snapshot(v);
     renderer_->update(v, snapshot.density, snapshot.changed);
     bricks_uploaded_ += snapshot.changed.size();
-    stale_bricks_[v].insert(stale_bricks_[v].end(), snapshot.changed.begin(),
-                            snapshot.changed.end());
+    stale_[v].add(*renderer_, v, snapshot.differs);
   }
 }
 
@@ -105,48 +104,59 @@ Redrawn Picture::draw(const Session& session, const OverlayFigures& figures,
 
   const bool fresh = !layers_ || layers_->stage.size() != size;
   if (fresh) layers_.emplace(size);
-  PixelRect volumes = target.all(), stage = target.all();
+  std::vector<PixelRect> volumes{target.all()}, stage{target.all()};
   const bool moving = !fresh && view != shown_.view;
   const bool settles = shown_.moving && !moving;  // drawn coarsely until now
   if (!fresh && !moving && !settles) {
-    volumes = stale_volumes(view, size);
-    stage = volumes.united(stale_hand(hand, view, size));
+    StaleTiles tiles(size);
+    mark_volumes(tiles, session, view);
+    volumes = tiles.rects();
+    mark_hand(tiles, hand, view, size);
+    stage = tiles.rects();
     if (renderer_->translucent()) volumes = stage;  // the hand is under them
   }
   const OverlayFigures panel = figures.rounded();
-  const bool same_panel = panel == shown_.figures && target.framebuffer() == shown_.target;
-  for (auto& bricks : stale_bricks_) bricks.clear();
+  const bool same_target = !fresh && target.framebuffer() == shown_.target;
+  const bool same_panel = panel == shown_.figures && same_target;
+  for (StaleVolume& volume : stale_) volume.clear();
   if (stage.empty() && same_panel) return {};
 
   renderer_->set_moving(moving);
-  if (!stage.empty()) draw_layers(hand, view, volumes, stage);
-  target.copy(layers_->smooth, target.all());
-  overlay_.draw(panel, target);
+  std::vector<PixelRect> others;
+  if (!stage.empty()) others = draw_layers(hand, view, volumes, stage);
+  const PixelRect panels = overlay_.prepare(panel, size);
+  if (same_target) {
+    others.push_back(panels.united(shown_.panels));  // they let the picture shine through
+  } else {
+    others = {target.all()};
+  }
+  for (const PixelRect& part : others) target.copy_colour(layers_->smooth, part);
+  overlay_.draw(target);
   glDisable(GL_SCISSOR_TEST);
-  shown_ = {view, moving, hand, panel, target.framebuffer()};
-  return {true, static_cast<double>(volumes.area()) / target.all().area()};
+  shown_ = {view, moving, hand, panel, target.framebuffer(), panels};
+  double drawn = 0.0;
+  for (const PixelRect& part : volumes) drawn += part.area();
+  return {true, drawn / target.all().area()};
 }
 
-PixelRect Picture::stale_volumes(const View& view, PictureSize size) const {
-  PixelRect stale;
+void Picture::mark_volumes(StaleTiles& tiles, const Session& session, const View& view) const {
   for (std::size_t v = 0; v < scene_.volumes.size(); ++v) {
-    stale = stale.united(brick_bounds(scene_.volumes[v], stale_bricks_[v], view, size));
+    stale_[v].mark(tiles, *renderer_, scene_.volumes[v], session.snapshot(v).density, view,
+                   layers_->volumes);
   }
-  return stale;
 }
 
-PixelRect Picture::stale_hand(const std::optional<Hand>& hand, const View& view,
-                              PictureSize size) const {
-  if (hand == shown_.hand) return {};
-  PixelRect stale;
+void Picture::mark_hand(StaleTiles& tiles, const std::optional<Hand>& hand, const View& view,
+                        PictureSize size) const {
+  if (hand == shown_.hand) return;
   for (const auto& one : {hand, shown_.hand}) {
-    if (one) stale = stale.united(hand_painter_.bounds(*one, view, size));
+    if (one) tiles.mark(hand_painter_.bounds(*one, view, size));
   }
-  return stale;
 }
 
-void Picture::draw_layers(const std::optional<Hand>& hand, const View& view, PixelRect volumes,
-                          PixelRect stage) {
+std::vector<PixelRect> Picture::draw_layers(const std::optional<Hand>& hand, const View& view,
+                                            std::span<const PixelRect> volumes,
+                                            std::span<const PixelRect> stage) {
   const bool tool_first = renderer_->translucent();  // it shines through them
   if (!volumes.empty()) {
     layers_->volumes.restrict_to(volumes);
@@ -156,23 +166,27 @@ void Picture::draw_layers(const std::optional<Hand>& hand, const View& view, Pix
     renderer_->draw(view, layers_->volumes);
   }
   layers_->stage.restrict_to(stage);
-  layers_->stage.copy(layers_->volumes, stage);
+  for (const PixelRect& part : stage) layers_->stage.copy(layers_->volumes, part);
   if (hand && !tool_first) hand_painter_.draw_tool(*hand, view, layers_->stage);
   if (hand) hand_painter_.draw_force(*hand, view, layers_->stage);
   constexpr int kSmoothingReach = 3;  // pixels
-  layers_->smooth.restrict_to(stage.grown(kSmoothingReach));
+  std::vector<PixelRect> smoothed;
+  for (const PixelRect& part : stage) smoothed.push_back(part.grown(kSmoothingReach));
+  layers_->smooth.restrict_to(smoothed);
   smooth_edges(layers_->stage, layers_->smooth);
+  return smoothed;
 }
 
 void Picture::draw_backdrop(const RenderTarget& target) {
-  constexpr float kFarthest = 1.0F;
   target.bind();
-  glClearNamedFramebufferfv(target.framebuffer(), GL_DEPTH, 0, &kFarthest);
-  glDisable(GL_DEPTH_TEST);
+  // Its depth is that of the far plane, whatever was there.
+  glEnable(GL_DEPTH_TEST);
+  glDepthFunc(GL_ALWAYS);
   glDisable(GL_BLEND);
   backdrop_.use();
   glBindVertexArray(no_vertices_.id());
-  glDrawArrays(GL_TRIANGLES, 0, 3);
+  target.for_parts([] { glDrawArrays(GL_TRIANGLES, 0, 3); });
+  glDepthFunc(GL_LESS);
 }
 
 void Picture::smooth_edges(const RenderTarget& from, const RenderTarget& to) {
@@ -183,7 +197,7 @@ void Picture::smooth_edges(const RenderTarget& from, const RenderTarget& to) {
   smooth_.set("u_picture", 0);
   smooth_.use();
   glBindVertexArray(no_vertices_.id());
-  glDrawArrays(GL_TRIANGLES, 0, 3);
+  to.for_parts([] { glDrawArrays(GL_TRIANGLES, 0, 3); });
 }
 
 Redrawn draw_measured(Picture& picture, Session& session, const OverlayFigures& figures,

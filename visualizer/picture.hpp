@@ -14,6 +14,7 @@
 #include "visualizer/overlay.hpp"
 #include "visualizer/renderer.hpp"
 #include "visualizer/session.hpp"
+#include "visualizer/stale_volume.hpp"
 
 namespace kerf {
 
@@ -63,12 +64,14 @@ class Picture {
   [[nodiscard]] glm::dvec4 shown_half() const;
   void draw_backdrop(const RenderTarget& target);
   void smooth_edges(const RenderTarget& from, const RenderTarget& to);
-  /// Pixels that changed densities and, where it moved, the hand change.
-  [[nodiscard]] PixelRect stale_volumes(const View& view, PictureSize size) const;
-  [[nodiscard]] PixelRect stale_hand(const std::optional<Hand>& hand, const View& view,
-                                     PictureSize size) const;
-  void draw_layers(const std::optional<Hand>& hand, const View& view, PixelRect volumes,
-                   PixelRect stage);
+  /// Marks what changed densities and, where it moved, the hand change.
+  void mark_volumes(StaleTiles& tiles, const Session& session, const View& view) const;
+  void mark_hand(StaleTiles& tiles, const std::optional<Hand>& hand, const View& view,
+                 PictureSize size) const;
+  /// Returns the parts of the smooth layer that are others now.
+  std::vector<PixelRect> draw_layers(const std::optional<Hand>& hand, const View& view,
+                                     std::span<const PixelRect> volumes,
+                                     std::span<const PixelRect> stage);
 
   SceneView scene_;
   Look look_;
@@ -94,10 +97,11 @@ class Picture {
     std::optional<Hand> hand;
     OverlayFigures figures;
     GLuint target = 0;
+    PixelRect panels;
   };
   std::optional<Layers> layers_;
   Shown shown_;
-  std::vector<std::vector<std::uint32_t>> stale_bricks_;  ///< by volume, since the last `draw`
+  std::vector<StaleVolume> stale_;  ///< by volume, since the last `draw`
   GlVertexArray no_vertices_ = GlVertexArray::create();
   HandPainter hand_painter_;
   Overlay overlay_;

@@ -83,7 +83,7 @@ TEST_CASE("cells kept up by changed bricks equal cells made anew") {
       }
     }
     const std::vector<std::uint8_t> before(kept.active().begin(), kept.active().end());
-    const bool flipped = kept.update_brick(bricks.brick(id), density);
+    const bool flipped = kept.update_bricks(bricks, {&id, 1}, density);
     const Macrocells made(grid, density, iso, edge);
     RC_ASSERT(std::ranges::equal(kept.maxima(), made.maxima()));
     RC_ASSERT(std::ranges::equal(kept.active(), made.active()));

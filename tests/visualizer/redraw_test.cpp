@@ -186,7 +186,9 @@ TEST_CASE("after any change the part that is drawn again makes the picture of dr
       picture.update(session);
       CHECK_FALSE(picture.draw(session, figures, target).any);
     }
-    CHECK(redrawn / parts < 0.6);
+    // One sees into the volume and the tool in it; of the other, what is hidden stays.
+    const bool opaque = kind == "iso" || kind == "surface" || kind == "cast";
+    CHECK(redrawn / parts < (opaque ? 0.08 : 0.2));
   }
 }
 

@@ -66,14 +66,22 @@ void CastRenderer::draw(const View& view, const RenderTarget& target) {
   if (!frame_ || frame_->picture.width != size.width || frame_->picture.height != size.height) {
     frame_.emplace(size);
   }
-  const PixelRect rect = target.part().clipped(reach(view, size));
-  if (rect.empty()) return;
+  const PixelRect reach = this->reach(view, size);
+  parts_.clear();
+  PixelRect bounds;
+  for (const PixelRect& part : target.parts()) {
+    const PixelRect shows = part.clipped(reach);
+    if (shows.empty()) continue;
+    parts_.push_back(shows);
+    bounds = bounds.united(shows);
+  }
+  if (parts_.empty()) return;
   const bool ends_at_target = mode_ == CastMode::blend;
-  if (ends_at_target) read_end_depth(target, rect);
-  caster_.draw(view, rect, frame_->picture,
+  if (ends_at_target) read_end_depth(target, bounds);
+  caster_.draw(view, parts_, frame_->picture,
                ends_at_target ? std::span<const float>(frame_->end_depth) : std::span<float>());
-  upload(rect);
-  show(target, rect);
+  upload(bounds);
+  show(target);
 }
 
 PixelRect CastRenderer::reach(const View& view, PictureSize size) const {
@@ -108,9 +116,8 @@ void CastRenderer::upload(const PixelRect& rect) {
   glPixelStorei(GL_UNPACK_ROW_LENGTH, 0);
 }
 
-void CastRenderer::show(const RenderTarget& target, const PixelRect& rect) {
+void CastRenderer::show(const RenderTarget& target) {
   target.bind();
-  glScissor(rect.x0, rect.y0, rect.x1 - rect.x0, rect.y1 - rect.y0);
   glBindTextureUnit(0, frame_->colour.id());
   glBindTextureUnit(1, frame_->depth.id());
   glBindVertexArray(no_vertices_.id());
@@ -123,7 +130,7 @@ void CastRenderer::show(const RenderTarget& target, const PixelRect& rect) {
   } else {
     glDisable(GL_BLEND);
   }
-  glDrawArrays(GL_TRIANGLES, 0, 3);
+  target.for_parts(parts_, [] { glDrawArrays(GL_TRIANGLES, 0, 3); });
 }
 
 }  // namespace kerf

@@ -10,8 +10,8 @@
 
 namespace kerf {
 
-/// Hands the pictures of `Caster` to GL. Only the part of the target that can show anything is cast
-/// and copied.
+/// Hands the pictures of `Caster` to GL. Only the target's parts, and of them what can show
+/// anything, are cast.
 ///
 /// Iso goes under the depth test of the target. Blend ends its rays at what is in the target, lies
 /// over it, and sets depth where enough of it has gathered to hide what comes later.
@@ -22,6 +22,7 @@ class CastRenderer final : public Renderer {
   void update(std::size_t volume, std::span<const Density> density,
               std::span<const std::uint32_t> changed) override;
   void draw(const View& view, const RenderTarget& target) override;
+  [[nodiscard]] bool feels_ahead() const noexcept override { return mode_ == CastMode::iso; }
   [[nodiscard]] bool translucent() const noexcept override { return mode_ == CastMode::blend; }
 
  private:
@@ -38,13 +39,14 @@ class CastRenderer final : public Renderer {
   [[nodiscard]] PixelRect reach(const View& view, PictureSize size) const;
   void read_end_depth(const RenderTarget& target, const PixelRect& rect);
   void upload(const PixelRect& rect);
-  void show(const RenderTarget& target, const PixelRect& rect);
+  void show(const RenderTarget& target);
 
   CastMode mode_;
   Caster caster_;
   GlProgram program_{"screen.vert", "cast.frag"};
   GlVertexArray no_vertices_ = GlVertexArray::create();
   std::optional<Frame> frame_;
+  std::vector<PixelRect> parts_;  ///< that are cast in this frame
 };
 
 }  // namespace kerf

@@ -82,12 +82,10 @@ std::optional<BoxCorners> CastVolume::body() const {
 void CastVolume::update_bricks(std::span<const Density> density,
                                std::span<const std::uint32_t> changed) {
   for (const std::uint32_t id : changed) density_.copy(bricks_.voxels(id), density);
-  bool flipped = false;
-  for (const std::uint32_t id : changed) {
-    if (gradient_) gradient_->update(bricks_.voxels(id), density_);
-    flipped = cells_.update_brick(bricks_.brick(id), density) || flipped;
+  if (gradient_) {
+    for (const std::uint32_t id : changed) gradient_->update(bricks_.voxels(id), density_);
   }
-  if (flipped) take_cells();
+  if (cells_.update_bricks(bricks_, changed, density)) take_cells();
 }
 
 void CastVolume::take_cells() {

@@ -56,7 +56,7 @@ std::vector<BoxCorners> Caster::bodies() const {
   return bodies;
 }
 
-void Caster::draw(const View& view, const PixelRect& rect, CastPicture& picture,
+void Caster::draw(const View& view, std::span<const PixelRect> parts, CastPicture& picture,
                   std::span<const float> end_depth, std::span<float> normals) {
   CastJob job;
   double shortest_mm = view.far_mm;
@@ -89,15 +89,17 @@ void Caster::draw(const View& view, const PixelRect& rect, CastPicture& picture,
   const auto cast =
       options_.mode == CastMode::iso ? options_.kernels->iso : options_.kernels->blend;
   // Tiles stand where they stand in the whole picture, so that blocks of pixels stay whole.
-  const std::int32_t left = rect.x0 / kTile;
-  const std::int32_t lowest = rect.y0 / kTile;
-  const std::int32_t across = (rect.x1 + kTile - 1) / kTile - left;
-  const std::int32_t along = (rect.y1 + kTile - 1) / kTile - lowest;
-  pool_.run(static_cast<std::uint32_t>(across * along), [&](std::uint32_t tile) {
-    const std::int32_t x = (left + static_cast<std::int32_t>(tile) % across) * kTile;
-    const std::int32_t y = (lowest + static_cast<std::int32_t>(tile) / across) * kTile;
-    cast(job, PixelRect{x, y, x + kTile, y + kTile}.clipped(rect));
-  });
+  const auto first = [](std::int32_t at) { return at / kTile * kTile; };
+  tiles_.clear();
+  for (const PixelRect& part : parts) {
+    for (std::int32_t y = first(part.y0); y < part.y1; y += kTile) {
+      for (std::int32_t x = first(part.x0); x < part.x1; x += kTile) {
+        tiles_.push_back(PixelRect{x, y, x + kTile, y + kTile}.clipped(part));
+      }
+    }
+  }
+  pool_.run(static_cast<std::uint32_t>(tiles_.size()),
+            [&](std::uint32_t tile) { cast(job, tiles_[tile]); });
 }
 
 }  // namespace kerf
