@@ -74,7 +74,7 @@ int run_headless(const VisualizerOptions& options) {
   report.attach_ms = session.attach_ms();
   const Stopwatch since_attached;
   const double aspect = static_cast<double>(options.size.width) / options.size.height;
-  Picture picture(session, {.renderer = options.renderer}, aspect);
+  Picture picture(session, first_look(options), aspect);
   FrameTaker taker(picture, options.size, report);
   taker.draw(session);  // not kept: the driver compiles shaders at their first use
   report.late_join_ms = since_attached.wall_ms();

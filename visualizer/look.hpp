@@ -14,11 +14,20 @@ struct ClipPlane {
   friend bool operator==(const ClipPlane&, const ClipPlane&) noexcept = default;
 };
 
+/// Two eyes side by side; lengths in mm.
+struct Stereo {
+  bool on = false;
+  std::optional<double> eyes_mm{};         ///< none: `kEyesPerConvergence` of the next
+  std::optional<double> convergence_mm{};  ///< none: as far as what the camera turns about
+  friend bool operator==(const Stereo&, const Stereo&) noexcept = default;
+};
+
 /// How the volumes are shown: what a user may change while they are looked at.
 struct Look {
   std::string renderer = "iso";  ///< as on the command line
   std::optional<double> iso{};   ///< of all volumes, 0..1 of full density; none: each its own
   ClipPlane clip{};
+  Stereo stereo{};
   friend bool operator==(const Look&, const Look&) noexcept = default;
 };
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <charconv>
 #include <iostream>
+#include <sstream>
 #include <string_view>
 
 #include <CLI/CLI.hpp>
@@ -30,7 +31,28 @@ std::string one_line(std::string text) {
   return text;
 }
 
+std::string limits(double lowest, double highest) {
+  std::ostringstream text;
+  text << "[" << lowest << " - " << highest << "]";
+  return text.str();
+}
+
+/// CLI::Range takes "nan" for a number in any range.
+CLI::Validator range(double lowest, double highest) {
+  const auto check = [=](const std::string& text) {
+    double value = 0.0;
+    const bool inside =
+        CLI::detail::lexical_cast(text, value) && value >= lowest && value <= highest;
+    return inside ? std::string() : text + " is no number in " + limits(lowest, highest);
+  };
+  return {check, limits(lowest, highest)};
+}
+
 }  // namespace
+
+Look first_look(const VisualizerOptions& options) {
+  return {.renderer = options.renderer, .stereo = options.stereo};
+}
 
 PictureSize parse_size(const std::string& text) {
   const std::string_view all = text;
@@ -61,6 +83,13 @@ std::optional<VisualizerOptions> parse_options(int argc, const char* const* argv
   app.add_option("--renderer", options.renderer, "how volumes are drawn: " + known_renderers())
       ->capture_default_str();
   app.add_option("--size", size, "width and height in pixels")->capture_default_str();
+  app.add_flag("--stereo", options.stereo.on, "two eyes side by side, each in half the width");
+  app.add_option("--eyes", options.stereo.eyes_mm,
+                 "stereo: mm between the eyes; negative: crossed (default: 1/30 of --convergence)")
+      ->check(range(-1e3, 1e3));
+  app.add_option("--convergence", options.stereo.convergence_mm,
+                 "stereo: mm to what lies in the screen (default: to where the camera looks)")
+      ->check(range(1.0, 1e6));
   app.add_flag("--headless", options.headless, "no window: pictures into --out");
   app.add_option("--frames", options.frames, "headless: number of pictures")
       ->check(CLI::Range(1, 9999))
@@ -70,9 +99,9 @@ std::optional<VisualizerOptions> parse_options(int argc, const char* const* argv
       ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1} << 40));
   app.add_option("--out", options.out, "folder for pictures and screenshots")
       ->capture_default_str();
-  app.add_option("--seconds", options.seconds, "end after this time")->check(CLI::Range(0.0, 1e6));
+  app.add_option("--seconds", options.seconds, "end after this time")->check(range(0.0, 1e6));
   app.add_option("--wait", options.wait_s, "seconds to wait for the controller")
-      ->check(CLI::Range(0.0, 1e6))
+      ->check(range(0.0, 1e6))
       ->capture_default_str();
   app.add_option("--cpu", options.cpus, "cores to run on, e.g. 0,1 (default: all but the last)")
       ->delimiter(',')

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "visualizer/gl/target.hpp"
+#include "visualizer/look.hpp"
 
 namespace kerf {
 
@@ -15,6 +16,7 @@ namespace kerf {
 struct VisualizerOptions {
   std::string name = "kerf";  ///< of the controller
   std::string renderer = "iso";
+  Stereo stereo;
   PictureSize size{800, 600};
   bool headless = false;
   std::uint32_t frames = 10;                 ///< headless: this many pictures
@@ -28,6 +30,9 @@ struct VisualizerOptions {
   bool bench = false;                         ///< no controller: what pictures cost here
   std::optional<std::filesystem::path> page;  ///< bench: as Markdown
 };
+
+/// What pictures look like at first.
+[[nodiscard]] Look first_look(const VisualizerOptions& options);
 
 /// "WxH"; throws VisualizerError.
 [[nodiscard]] PictureSize parse_size(const std::string& text);

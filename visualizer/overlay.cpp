@@ -39,6 +39,7 @@ constexpr auto kKeys = std::to_array<std::array<const char*, 2>>({
     {"1 .. 9", "take this tool"},
     {"v", "next renderer"},
     {"c", "clip plane"},
+    {"t", "two eyes: stereo, side by side"},
     {"r", "first view again"},
     {"s", "screenshot"},
     {"e", "export the surface"},
@@ -241,16 +242,23 @@ void Overlay::look_controls(LookControls& controls) {
     if (ImGui::SliderFloat("plane", &at, 0.0F, 1.0F, "%.2f", kDragOnly)) look.clip.at = at;
   }
   ImGui::EndDisabled();
+  ImGui::Checkbox("stereo", &look.stereo.on);
   ImGui::PopItemWidth();
 }
 
-void Overlay::draw(const OverlayFigures& figures, const RenderTarget& target) {
+void Overlay::draw(const OverlayFigures& figures, const RenderTarget& target, int eyes) {
   target.bind();
   ImGui_ImplOpenGL3_NewFrame();
   OverlayFigures shown = figures;
   // ImGui learns the size of what a panel holds by laying it out: the second time is right.
-  for (int pass = 0; pass < 2; ++pass) lay_out(shown, target.size());
-  ImGui_ImplOpenGL3_RenderDrawData(ImGui::GetDrawData());
+  const PictureSize size{target.size().width / eyes, target.size().height};
+  for (int pass = 0; pass < 2; ++pass) lay_out(shown, size);
+  ImDrawData& panels = *ImGui::GetDrawData();
+  panels.DisplaySize.x = static_cast<float>(target.size().width);
+  for (int eye = 0; eye < eyes; ++eye) {
+    panels.DisplayPos.x = static_cast<float>(-eye * size.width);
+    ImGui_ImplOpenGL3_RenderDrawData(&panels);
+  }
 }
 
 }  // namespace kerf

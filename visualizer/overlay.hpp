@@ -53,7 +53,9 @@ class Overlay {
   /// What the mouse does to the controls of `figures`, which it changes; draws nothing. True while
   /// the mouse belongs to them and not to the camera.
   bool handle(const Pointer& pointer, OverlayFigures& figures, PictureSize size);
-  void draw(const OverlayFigures& figures, const RenderTarget& target);
+  /// Once, or once for each of the `eyes` that lie side by side in `target`: at the same place for
+  /// both, so that the panels seem to lie in the screen.
+  void draw(const OverlayFigures& figures, const RenderTarget& target, int eyes = 1);
 
  private:
   void lay_out(OverlayFigures& figures, PictureSize size);

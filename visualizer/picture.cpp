@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "visualizer/screen_bounds.hpp"
+#include "visualizer/stereo.hpp"
 
 namespace kerf {
 
@@ -15,6 +16,12 @@ constexpr double kStaleMs = 100.0;  // a servo that is alive beats each tick
 constexpr double kToolRoom = 1.5;   // radii around the volumes in which the tool is never clipped
 glm::dvec3 vec3(const float (&v)[3]) {
   return {v[0], v[1], v[2]};
+}
+
+void clear(const RenderTarget& target) {
+  target.bind();
+  constexpr float kBlack[4] = {0.0F, 0.0F, 0.0F, 1.0F};
+  glClearNamedFramebufferfv(target.framebuffer(), GL_COLOR, 0, kBlack);
 }
 
 /// Half the diagonal of its box.
@@ -80,7 +87,7 @@ glm::dvec4 Picture::shown_half() const {
 }
 
 void Picture::reset_camera(double aspect) {
-  camera_.frame(scene_.main_volume().corners(), aspect);
+  camera_.frame(scene_.main_volume().corners(), look_.stereo.on ? 0.5 * aspect : aspect);
 }
 
 void Picture::update(const Session& session) {
@@ -93,37 +100,79 @@ void Picture::update(const Session& session) {
   }
 }
 
+std::vector<View> Picture::views(PictureSize size) const {
+  const double reach_mm = reach_mm_ + kToolRoom * radius_mm_;
+  const Stereo& stereo = look_.stereo;
+  const int width = eye_size(size).width;
+  View view = camera_.view(static_cast<double>(width) / size.height, reach_mm);
+  view.shown = shown_half();
+  if (width == size.width) return {view};
+  const double convergence_mm = stereo.convergence_mm.value_or(camera_.distance_mm());
+  const double eyes_mm = stereo.eyes_mm.value_or(kEyesPerConvergence * convergence_mm);
+  const auto both = eye_views(view, {eyes_mm, convergence_mm});
+  return {both.begin(), both.end()};
+}
+
+PictureSize Picture::eye_size(PictureSize size) const noexcept {
+  const bool fits_two = look_.stereo.on && size.width > 1;
+  return {fits_two ? size.width / 2 : size.width, size.height};
+}
+
 Redrawn Picture::draw(const Session& session, const OverlayFigures& figures,
                       const RenderTarget& target) {
-  const PictureSize size = target.size();
-  const double aspect = static_cast<double>(size.width) / size.height;
-  View view = camera_.view(aspect, reach_mm_ + kToolRoom * radius_mm_);
-  view.shown = shown_half();
+  const PictureSize size = eye_size(target.size());
+  const std::vector<View> views = this->views(target.size());
   std::optional<Hand> hand;
   if (session.latest()) hand = hand_of(*session.latest());
-
-  const bool fresh = !layers_ || layers_->stage.size() != size;
-  if (fresh) layers_.emplace(size);
-  PixelRect volumes = target.all(), stage = target.all();
-  const bool moving = !fresh && view != shown_.view;
-  const bool settles = shown_.moving && !moving;  // drawn coarsely until now
-  if (!fresh && !moving && !settles) {
-    volumes = stale_volumes(view, size);
-    stage = volumes.united(stale_hand(hand, view, size));
-    if (renderer_->translucent()) volumes = stage;  // the hand is under them
+  if (eyes_.size() != views.size() || eyes_.front().layers.stage.size() != size) {
+    eyes_.clear();
+    for (std::size_t eye = 0; eye < views.size(); ++eye) eyes_.emplace_back(size);
+    shown_in_ = 0;
+  }
+  std::vector<Stale> stale;
+  for (std::size_t eye = 0; eye < views.size(); ++eye) {
+    const auto& before = eyes_[eye].shown;
+    const bool moving = before && before->view != views[eye];
+    stale.push_back(this->stale(eyes_[eye], {views[eye], moving, hand}));
   }
   const OverlayFigures panel = figures.rounded();
-  const bool same_panel = panel == shown_.figures && target.framebuffer() == shown_.target;
+  const bool same_target = target.framebuffer() == shown_in_;
   for (auto& bricks : stale_bricks_) bricks.clear();
-  if (stage.empty() && same_panel) return {};
+  const bool rests =
+      std::all_of(stale.begin(), stale.end(), [](const Stale& one) { return one.stage.empty(); });
+  if (rests && same_target && panel == shown_figures_) return {};
 
-  renderer_->set_moving(moving);
-  if (!stage.empty()) draw_layers(hand, view, volumes, stage);
-  target.copy(layers_->smooth, target.all());
-  overlay_.draw(panel, target);
+  if (!same_target) clear(target);  // an odd column is nobody's
+  double redrawn = 0.0;
+  for (std::size_t eye = 0; eye < eyes_.size(); ++eye) {
+    draw_layers(eyes_[eye], stale[eye]);
+    const RenderTarget& seen = eyes_[eye].layers.smooth;
+    target.copy(seen, seen.all(), static_cast<int>(eye) * size.width);
+    redrawn += stale[eye].volumes.area();
+  }
+  overlay_.draw(panel, target, static_cast<int>(eyes_.size()));
   glDisable(GL_SCISSOR_TEST);
-  shown_ = {view, moving, hand, panel, target.framebuffer()};
-  return {true, static_cast<double>(volumes.area()) / target.all().area()};
+  shown_figures_ = panel;
+  shown_in_ = target.framebuffer();
+  return {true, redrawn / (static_cast<double>(eyes_.size()) * size.width * size.height)};
+}
+
+bool Picture::handle(const Pointer& pointer, OverlayFigures& figures, PictureSize size) {
+  const PictureSize eye = eye_size(size);
+  Pointer within = pointer;
+  if (within.x >= eye.width) within.x -= eye.width;
+  return overlay_.handle(within, figures, eye);
+}
+
+Picture::Stale Picture::stale(const Eye& eye, const Shown& now) const {
+  const PixelRect all = eye.layers.stage.all();
+  // What was drawn coarsely settles when the camera does.
+  if (!eye.shown || now.moving || eye.shown->moving) return {now, all, all};
+  const PictureSize size = eye.layers.stage.size();
+  PixelRect volumes = stale_volumes(now.view, size);
+  const PixelRect stage = volumes.united(stale_hand(now, *eye.shown, size));
+  if (renderer_->translucent()) volumes = stage;  // the hand is under them
+  return {now, volumes, stage};
 }
 
 PixelRect Picture::stale_volumes(const View& view, PictureSize size) const {
@@ -134,33 +183,36 @@ PixelRect Picture::stale_volumes(const View& view, PictureSize size) const {
   return stale;
 }
 
-PixelRect Picture::stale_hand(const std::optional<Hand>& hand, const View& view,
-                              PictureSize size) const {
-  if (hand == shown_.hand) return {};
+PixelRect Picture::stale_hand(const Shown& now, const Shown& before, PictureSize size) const {
+  if (now.hand == before.hand) return {};
   PixelRect stale;
-  for (const auto& one : {hand, shown_.hand}) {
-    if (one) stale = stale.united(hand_painter_.bounds(*one, view, size));
+  for (const auto& one : {now.hand, before.hand}) {
+    if (one) stale = stale.united(hand_painter_.bounds(*one, now.view, size));
   }
   return stale;
 }
 
-void Picture::draw_layers(const std::optional<Hand>& hand, const View& view, PixelRect volumes,
-                          PixelRect stage) {
+void Picture::draw_layers(Eye& eye, const Stale& stale) {
+  const auto& [view, moving, hand] = stale.now;
+  eye.shown = stale.now;
+  if (stale.stage.empty()) return;
+  Layers& layers = eye.layers;
+  renderer_->set_moving(moving);
   const bool tool_first = renderer_->translucent();  // it shines through them
-  if (!volumes.empty()) {
-    layers_->volumes.restrict_to(volumes);
-    draw_backdrop(layers_->volumes);
-    if (hand && tool_first) hand_painter_.draw_tool(*hand, view, layers_->volumes);
-    layers_->volumes.bind();
-    renderer_->draw(view, layers_->volumes);
+  if (!stale.volumes.empty()) {
+    layers.volumes.restrict_to(stale.volumes);
+    draw_backdrop(layers.volumes);
+    if (hand && tool_first) hand_painter_.draw_tool(*hand, view, layers.volumes);
+    layers.volumes.bind();
+    renderer_->draw(view, layers.volumes);
   }
-  layers_->stage.restrict_to(stage);
-  layers_->stage.copy(layers_->volumes, stage);
-  if (hand && !tool_first) hand_painter_.draw_tool(*hand, view, layers_->stage);
-  if (hand) hand_painter_.draw_force(*hand, view, layers_->stage);
+  layers.stage.restrict_to(stale.stage);
+  layers.stage.copy(layers.volumes, stale.stage);
+  if (hand && !tool_first) hand_painter_.draw_tool(*hand, view, layers.stage);
+  if (hand) hand_painter_.draw_force(*hand, view, layers.stage);
   constexpr int kSmoothingReach = 3;  // pixels
-  layers_->smooth.restrict_to(stage.grown(kSmoothingReach));
-  smooth_edges(layers_->stage, layers_->smooth);
+  layers.smooth.restrict_to(stale.stage.grown(kSmoothingReach));
+  smooth_edges(layers.stage, layers.smooth);
 }
 
 void Picture::draw_backdrop(const RenderTarget& target) {

@@ -129,6 +129,7 @@ struct Keys {
       if (key == 'p') plot = !plot;
       if (key == 'v') look.renderer = next_renderer(look.renderer);
       if (key == 'c') look.clip.on = !look.clip.on;
+      if (key == 't') look.stereo.on = !look.stereo.on;
       const int tool = key - '1';
       if (tool >= 0 && tool < static_cast<int>(session.scene().tools.size())) {
         session.select_tool(static_cast<std::uint32_t>(tool));
@@ -146,7 +147,7 @@ class Followed {
   Followed(const VisualizerOptions& options, Session first, double aspect)
       : options_(options),
         session_(std::move(first)),
-        picture_(std::in_place, session_, Look{.renderer = options.renderer}, aspect) {}
+        picture_(std::in_place, session_, first_look(options), aspect) {}
 
   [[nodiscard]] Session& session() noexcept { return session_; }
   [[nodiscard]] Picture& picture() noexcept { return *picture_; }

@@ -68,6 +68,10 @@ TEST_CASE("every mistake on the command line is one line") {
                                                                  {"--cpu", "a"},
                                                                  {"--every-ticks", "0"},
                                                                  {"stray"},
+                                                                 {"--eyes", "wide"},
+                                                                 {"--convergence", "0"},
+                                                                 {"--convergence", "nan"},
+                                                                 {"--seconds", "nan"},
                                                                  {"--seconds"}}) {
     try {
       static_cast<void>(parse(arguments));

@@ -64,6 +64,7 @@ void Caster::draw(const View& view, const PixelRect& rect, CastPicture& picture,
                 end_depth.empty() ? nullptr : end_depth.data()};
   job.half_width_at_1mm = static_cast<float>(view.tan_half_height * view.aspect);
   job.half_height_at_1mm = static_cast<float>(view.tan_half_height);
+  job.middle_right_at_1mm = static_cast<float>(view.middle_right);
   job.near_mm = static_cast<float>(view.near_mm);
   job.far_mm = static_cast<float>(view.far_mm);
   // Equation (1) as depth_far - depth_slope / t.

@@ -36,12 +36,12 @@ void RenderTarget::bind() const {
   glScissor(part_.x0, part_.y0, std::max(part_.x1 - part_.x0, 0), std::max(part_.y1 - part_.y0, 0));
 }
 
-void RenderTarget::copy(const RenderTarget& from, const PixelRect& part) const {
-  const PixelRect r = part.clipped(all());
+void RenderTarget::copy(const RenderTarget& from, const PixelRect& part, int right) const {
+  const PixelRect r = part.clipped(from.all());
   if (r.empty()) return;
   const auto copy_texture = [&](const GlTexture2D& source, const GlTexture2D& to) {
     glCopyImageSubData(source.id(), GL_TEXTURE_2D, 0, r.x0, r.y0, 0, to.id(), GL_TEXTURE_2D, 0,
-                       r.x0, r.y0, 0, r.x1 - r.x0, r.y1 - r.y0, 1);
+                       right + r.x0, r.y0, 0, r.x1 - r.x0, r.y1 - r.y0, 1);
   };
   copy_texture(from.colour_, colour_);
   copy_texture(from.depth_, depth_);
