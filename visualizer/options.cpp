@@ -110,6 +110,13 @@ std::optional<VisualizerOptions> parse_options(int argc, const char* const* argv
                  "surface of all solid volumes as a closed mesh in mm, FILE.stl or FILE.ply (with "
                  "colours): headless at the end, in the window with e")
       ->type_name("FILE");
+  auto* record = app.add_option("--record", options.record,
+                                "raw video in true time (y4m): a file, a pipe, or - for stdout; "
+                                "headless without pictures unless --frames")
+                     ->type_name("FILE");
+  app.add_option("--fps", options.video_hz, "record: frames per second of servo time")
+      ->check(CLI::Range(1, 240))
+      ->capture_default_str();
   app.add_option("--report", options.report, "write times and counts to this JSON file");
   auto* bench = app.add_flag("--bench", options.bench,
                              "time every renderer, without a controller (512x512 unless --size)");
@@ -123,6 +130,7 @@ std::optional<VisualizerOptions> parse_options(int argc, const char* const* argv
   } catch (const CLI::ParseError& problem) {
     throw VisualizerError(one_line(problem.what()) + "; see --help");
   }
+  if (*record && app.count("--frames") == 0) options.frames = 0;
   if (options.bench && app.count("--size") == 0) size = kBenchSize;
   options.size = parse_size(size);
   check_renderer(options.renderer);

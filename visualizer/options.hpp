@@ -19,11 +19,13 @@ struct VisualizerOptions {
   Stereo stereo;
   PictureSize size{800, 600};
   bool headless = false;
-  std::uint32_t frames = 10;                 ///< headless: this many pictures
+  std::uint32_t frames = 10;  ///< headless: this many pictures; beside a video none by default
   std::optional<std::uint64_t> every_ticks;  ///< headless: default once a second of servo time
   std::filesystem::path out = ".";           ///< pictures, screenshots
   std::optional<double> seconds;             ///< ends after this time; default: with the controller
   double wait_s = 10.0;                      ///< for the controller to appear
+  std::optional<std::string> record;         ///< video: a file, a pipe, or "-" for stdout
+  int video_hz = 60;                         ///< its frames per second of servo time
   std::vector<int> cpus;                     ///< empty: all but the last one
   std::optional<std::filesystem::path> mesh;  ///< --export: .stl or .ply
   std::optional<std::filesystem::path> report;

@@ -42,6 +42,7 @@ constexpr auto kKeys = std::to_array<std::array<const char*, 2>>({
     {"t", "two eyes: stereo, side by side"},
     {"r", "first view again"},
     {"s", "screenshot"},
+    {"m", "movie: begin, end"},
     {"e", "export the surface"},
     {"p", "plot of force and depth"},
     {"h", "these keys"},

@@ -151,6 +151,11 @@ std::uint32_t Session::tick_ns() const noexcept {
   return connection_.reader().info().tick_ns;
 }
 
+double Session::servo_s() const noexcept {
+  constexpr double kSPerNs = 1e-9;
+  return latest_ ? static_cast<double>(latest_->tick) * tick_ns() * kSPerNs : 0.0;
+}
+
 bool Session::ended() const noexcept {
   return connection_.reader().lifecycle() >= Lifecycle::clean_end || !connection_.alive();
 }

@@ -50,6 +50,8 @@ class Session {
   /// where no such tick; what was removed before the session began does not count.
   std::optional<std::chrono::steady_clock::time_point> take_oldest_removal();
   [[nodiscard]] std::uint32_t tick_ns() const noexcept;
+  /// The servo's own time at the newest record: its ticks times their length. 0 before the first.
+  [[nodiscard]] double servo_s() const noexcept;
   /// From asking for the controller to the first complete volumes.
   [[nodiscard]] double attach_ms() const noexcept { return attach_ms_; }
 

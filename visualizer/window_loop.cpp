@@ -20,6 +20,7 @@
 #include "visualizer/frame_report.hpp"
 #include "visualizer/gl/window.hpp"
 #include "visualizer/picture.hpp"
+#include "visualizer/recording.hpp"
 #include "visualizer/run.hpp"
 #include "visualizer/stop_signal.hpp"
 #include "visualizer/surface/export_surface.hpp"
@@ -79,6 +80,17 @@ void take_screenshot(const VisualizerOptions& options, const RenderTarget& targe
   });
 }
 
+/// Begins a video in a new file, or ends the one that runs.
+void toggle_recording(const VisualizerOptions& options, PictureSize size,
+                      std::optional<Recording>& recording) {
+  if (recording) return recording.reset();
+  write_for_user("video", [&] {
+    const std::filesystem::path file = unused_file(options.out, ".y4m");
+    recording.emplace(file.string(), size, options.video_hz);
+    return file;
+  });
+}
+
 void export_mesh(const VisualizerOptions& options, const Session& session) {
   write_for_user("surface", [&] {
     const std::filesystem::path file =
@@ -115,6 +127,7 @@ struct Keys {
   bool plot = false;
   bool screenshot = false;
   bool mesh = false;
+  bool record = false;  ///< begin or end
 
   /// True when the user wants to leave.
   bool apply(const WindowInput& input, Session& session, Picture& picture, double aspect) {
@@ -125,6 +138,7 @@ struct Keys {
       if (key == 'r') picture.reset_camera(aspect);
       if (key == 's') screenshot = true;
       if (key == 'e') mesh = true;
+      if (key == 'm') record = !record;
       if (key == 'h') help = !help;
       if (key == 'p') plot = !plot;
       if (key == 'v') look.renderer = next_renderer(look.renderer);
@@ -203,6 +217,9 @@ int run_window(const VisualizerOptions& options) {
   FrameRate rate;
   Keys keys;
   ForcePlot plot;
+  std::optional<Recording> recording;
+  auto next_frame = Clock::now();
+  bool record_from_start = options.record.has_value();
   constexpr double kMsPerS = 1e3;
   const double end_ms = options.seconds.value_or(std::numeric_limits<double>::infinity()) * kMsPerS;
   while (!stop_requested() && since_attached.wall_ms() < end_ms) {
@@ -217,6 +234,10 @@ int run_window(const VisualizerOptions& options) {
     if (std::exchange(keys.mesh, false)) export_mesh(options, followed.session());
     if (visible) {
       if (!target || target->size() != size) target.emplace(size);
+      if (std::exchange(record_from_start, false)) {
+        recording.emplace(*options.record, size, options.video_hz);
+      }
+      if (std::exchange(keys.record, false)) toggle_recording(options, size, recording);
       rate.count(begin);
       OverlayFigures figures = overlay_figures(followed.session());
       figures.frame_rate_hz = rate.hz();
@@ -232,10 +253,12 @@ int run_window(const VisualizerOptions& options) {
       if (report.wall_ms.size() == 1) report.late_join_ms = since_attached.wall_ms();
       if (std::exchange(keys.screenshot, false)) take_screenshot(options, *target);
       if (redrawn.any || input.exposed) window.present(*target);
+      film(recording, *target, followed.session().servo_s());
       report.width = size.width;
       report.height = size.height;
     }
-    std::this_thread::sleep_until(begin + kFrame);
+    next_frame = std::max(next_frame + kFrame, Clock::now());  // a late wake does not add up
+    std::this_thread::sleep_until(next_frame);
   }
   report.renderer = followed.picture().look().renderer;
   report.bricks_uploaded = followed.bricks_uploaded();

@@ -69,6 +69,9 @@ TEST_CASE("every mistake on the command line is one line") {
                                                                  {"--every-ticks", "0"},
                                                                  {"stray"},
                                                                  {"--eyes", "wide"},
+                                                                 {"--fps", "0"},
+                                                                 {"--fps", "241"},
+                                                                 {"--record"},
                                                                  {"--convergence", "0"},
                                                                  {"--convergence", "nan"},
                                                                  {"--seconds", "nan"},
@@ -80,6 +83,12 @@ TEST_CASE("every mistake on the command line is one line") {
       CHECK(std::string(problem.what()).find('\n') == std::string::npos);
     }
   }
+}
+
+TEST_CASE("beside a video there are pictures only where they are asked for") {
+  CHECK(parse({"--headless"})->frames == 10);
+  CHECK(parse({"--headless", "--record", "-"})->frames == 0);
+  CHECK(parse({"--headless", "--record", "v.y4m", "--frames", "3"})->frames == 3);
 }
 
 TEST_CASE("the bench draws as large as the paper unless told otherwise, and alone writes a page") {
