@@ -231,7 +231,6 @@ void Overlay::look_controls(LookControls& controls) {
     look.iso = *dragged_iso_;
     dragged_iso_.reset();
   }
-  ImGui::BeginDisabled(!controls.clips);
   ImGui::Checkbox("clip", &look.clip.on);
   if (look.clip.on) {
     constexpr std::array kAxes{"x", "y", "z"};
@@ -242,7 +241,6 @@ void Overlay::look_controls(LookControls& controls) {
     auto at = static_cast<float>(look.clip.at);
     if (ImGui::SliderFloat("plane", &at, 0.0F, 1.0F, "%.2f", kDragOnly)) look.clip.at = at;
   }
-  ImGui::EndDisabled();
   ImGui::Checkbox("stereo", &look.stereo.on);
   ImGui::PopItemWidth();
 }

@@ -16,7 +16,6 @@ namespace kerf {
 struct LookControls {
   Look look;
   double own_iso = 0.5;           ///< of the main volume, 0..1: where the look has none
-  bool clips = true;              ///< the renderer heeds the clip plane
   std::optional<Pointer> over{};  ///< the mouse, while it is over them
   friend bool operator==(const LookControls&, const LookControls&) noexcept = default;
 };

@@ -72,9 +72,7 @@ void Picture::set_look(const Session& session, const Look& look) {
 }
 
 LookControls Picture::controls() const {
-  return {.look = look_,
-          .own_iso = scene_.main_volume().iso / kDensityMax,
-          .clips = renderer_->clips()};
+  return {.look = look_, .own_iso = scene_.main_volume().iso / kDensityMax};
 }
 
 glm::dvec4 Picture::shown_half() const {

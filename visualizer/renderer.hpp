@@ -33,8 +33,6 @@ class Renderer {
   virtual void draw(const View& view, const RenderTarget& target) = 0;
   /// Lets what lies behind a surface shine through, so that it must be drawn before.
   [[nodiscard]] virtual bool translucent() const noexcept { return false; }
-  /// Heeds the clip plane, `View::shown`.
-  [[nodiscard]] virtual bool clips() const noexcept { return true; }
 };
 
 /// `kind` as on the command line; throws VisualizerError for an unknown one and names the known.

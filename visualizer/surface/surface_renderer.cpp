@@ -6,6 +6,8 @@
 
 #include <glm/gtc/matrix_inverse.hpp>
 
+#include "visualizer/view_uniforms.hpp"
+
 namespace kerf {
 
 namespace {
@@ -45,10 +47,12 @@ void SurfaceRenderer::draw(const View& view, const RenderTarget& target) {
   target.bind();
   glEnable(GL_DEPTH_TEST);
   glDepthFunc(GL_LESS);
-  glEnable(GL_CULL_FACE);
+  const bool opened = view.shown != View{}.shown;
+  (opened ? glDisable : glEnable)(GL_CULL_FACE);
+  if (opened) glEnable(GL_CLIP_DISTANCE0);
   glDisable(GL_BLEND);
   program_.set("u_clip_from_eye", glm::mat4(view.clip_from_eye()));
-  program_.set("u_up_eye", glm::vec3(view.eye_from_world * glm::dvec4(0, 1, 0, 0)));
+  set_view(program_, view);
   program_.use();
   const DrawnPart part(target);
   for (Volume& volume : volumes_) {
@@ -59,6 +63,7 @@ void SurfaceRenderer::draw(const View& view, const RenderTarget& target) {
     volume.gpu.draw(Sight(view.clip_from_eye() * eye_from_voxel, part.lo, part.hi));
   }
   glDisable(GL_CULL_FACE);
+  glDisable(GL_CLIP_DISTANCE0);
 }
 
 }  // namespace kerf
