@@ -15,6 +15,7 @@
 #include "visualizer/run.hpp"
 #include "visualizer/stop_signal.hpp"
 #include "visualizer/surface/export_surface.hpp"
+#include "visualizer/transfer_file.hpp"
 
 namespace kerf {
 
@@ -86,6 +87,9 @@ int run_headless(const VisualizerOptions& options) {
                      .height = options.size.height};
 
   Session session = Session::attach(options.name, std::chrono::duration<double>(options.wait_s));
+  if (options.transfer) {
+    check_materials(options.opacities, session.scene(), options.transfer->string());
+  }
   report.attach_ms = session.attach_ms();
   const Stopwatch since_attached;
   const double aspect = static_cast<double>(options.size.width) / options.size.height;

@@ -11,6 +11,7 @@
 
 #include "visualizer/error.hpp"
 #include "visualizer/renderer.hpp"
+#include "visualizer/transfer_file.hpp"
 
 namespace kerf {
 
@@ -51,7 +52,7 @@ CLI::Validator range(double lowest, double highest) {
 }  // namespace
 
 Look first_look(const VisualizerOptions& options) {
-  return {.renderer = options.renderer, .stereo = options.stereo};
+  return {.renderer = options.renderer, .opacities = options.opacities, .stereo = options.stereo};
 }
 
 PictureSize parse_size(const std::string& text) {
@@ -83,6 +84,11 @@ std::optional<VisualizerOptions> parse_options(int argc, const char* const* argv
   app.add_option("--renderer", options.renderer, "how volumes are drawn: " + known_renderers())
       ->capture_default_str();
   app.add_option("--size", size, "width and height in pixels")->capture_default_str();
+  app.add_option(
+         "--transfer", options.transfer,
+         "opacity of each material, TOML, for blend, slices and cast-blend; in the window w "
+         "writes it")
+      ->type_name("FILE");
   app.add_flag("--stereo", options.stereo.on, "two eyes side by side, each in half the width");
   app.add_option("--eyes", options.stereo.eyes_mm,
                  "stereo: mm between the eyes; negative: crossed (default: 1/30 of --convergence)")
@@ -134,6 +140,7 @@ std::optional<VisualizerOptions> parse_options(int argc, const char* const* argv
   if (options.bench && app.count("--size") == 0) size = kBenchSize;
   options.size = parse_size(size);
   check_renderer(options.renderer);
+  if (options.transfer) options.opacities = read_transfer(*options.transfer);
   return options;
 }
 

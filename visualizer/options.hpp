@@ -17,6 +17,7 @@ struct VisualizerOptions {
   std::string name = "kerf";  ///< of the controller
   std::string renderer = "iso";
   Stereo stereo;
+  Opacities opacities;  ///< of `transfer`
   PictureSize size{800, 600};
   bool headless = false;
   std::uint32_t frames = 10;  ///< headless: this many pictures; beside a video none by default
@@ -26,8 +27,9 @@ struct VisualizerOptions {
   double wait_s = 10.0;                      ///< for the controller to appear
   std::optional<std::string> record;         ///< video: a file, a pipe, or "-" for stdout
   int video_hz = 60;                         ///< its frames per second of servo time
-  std::vector<int> cpus;                     ///< empty: all but the last one
-  std::optional<std::filesystem::path> mesh;  ///< --export: .stl or .ply
+  std::optional<std::filesystem::path> transfer;  ///< opacities, TOML
+  std::vector<int> cpus;                          ///< empty: all but the last one
+  std::optional<std::filesystem::path> mesh;      ///< --export: .stl or .ply
   std::optional<std::filesystem::path> report;
   bool bench = false;                         ///< no controller: what pictures cost here
   std::optional<std::filesystem::path> page;  ///< bench: as Markdown

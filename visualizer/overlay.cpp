@@ -42,6 +42,7 @@ constexpr auto kKeys = std::to_array<std::array<const char*, 2>>({
     {"t", "two eyes: stereo, side by side"},
     {"r", "first view again"},
     {"s", "screenshot"},
+    {"w", "write the opacities"},
     {"m", "movie: begin, end"},
     {"e", "export the surface"},
     {"p", "plot of force and depth"},
@@ -230,6 +231,18 @@ void Overlay::look_controls(LookControls& controls) {
   if (ImGui::IsItemDeactivated() && dragged_iso_) {
     look.iso = *dragged_iso_;
     dragged_iso_.reset();
+  }
+  if (!controls.opacities.empty()) {
+    ImGui::TextColored(kLabel, "opacity of a voxel");
+    ImGui::SameLine();
+    controls.write = ImGui::SmallButton("write");
+  }
+  for (const auto& [material, opacity] : controls.opacities) {
+    auto value = static_cast<float>(opacity);
+    if (ImGui::SliderFloat(material.c_str(), &value, 0.0F, 1.0F, "%.3f",
+                           kDragOnly | ImGuiSliderFlags_Logarithmic)) {
+      look.opacities[material] = rounded_to(0.001, static_cast<double>(value));
+    }
   }
   ImGui::Checkbox("clip", &look.clip.on);
   if (look.clip.on) {

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cmath>
 
+#include "visualizer/palette.hpp"
 #include "visualizer/screen_bounds.hpp"
 #include "visualizer/stereo.hpp"
 
@@ -53,12 +54,20 @@ Picture::Picture(const Session& session, const Look& look, double aspect)
   reset_camera(aspect);
 }
 
-std::unique_ptr<Renderer> Picture::renderer_for(const Session& session, const Look& look) {
+SceneView Picture::scene_in(const Look& look) const {
   SceneView scene = scene_;
   for (VolumeView& volume : scene.volumes) {
     if (look.iso) volume.iso = static_cast<Density>(std::lround(*look.iso * kDensityMax));
   }
-  return make_renderer(look.renderer, scene, session.contents());
+  for (MaterialView& material : scene.materials) {
+    const auto chosen = look.opacities.find(material.name);
+    if (chosen != look.opacities.end()) material.opacity = chosen->second;
+  }
+  return scene;
+}
+
+std::unique_ptr<Renderer> Picture::renderer_for(const Session& session, const Look& look) {
+  return make_renderer(look.renderer, scene_in(look), session.contents());
 }
 
 void Picture::set_look(const Session& session, const Look& look) {
@@ -66,13 +75,26 @@ void Picture::set_look(const Session& session, const Look& look) {
   if (look.renderer != look_.renderer || look.iso != look_.iso) {
     renderer_ = renderer_for(session, look);
     for (const VolumeView& volume : scene_.volumes) bricks_uploaded_ += volume.bricks.count();
+  } else if (look.opacities != look_.opacities) {
+    renderer_->set_opacities(scene_in(look).materials, session.contents());
   }
   look_ = look;
   redraw_all();
 }
 
 LookControls Picture::controls() const {
-  return {.look = look_, .own_iso = scene_.main_volume().iso / kDensityMax};
+  LookControls controls{.look = look_, .own_iso = scene_.main_volume().iso / kDensityMax};
+  if (renderer_->translucent()) controls.opacities = opacities();
+  return controls;
+}
+
+Opacities Picture::opacities() const {
+  Opacities opacities;
+  const std::vector<MaterialView> materials = scene_in(look_).materials;
+  for (std::size_t m = 1; m < materials.size(); ++m) {
+    opacities[materials[m].name] = materials[m].opacity.value_or(default_opacity(materials, m));
+  }
+  return opacities;
 }
 
 glm::dvec4 Picture::shown_half() const {

@@ -42,9 +42,12 @@ class Picture {
   void redraw_all() noexcept { eyes_.clear(); }
 
   [[nodiscard]] const Look& look() const noexcept { return look_; }
-  /// From the next `draw` on. Another renderer or iso value uploads all volumes again. Throws
-  /// VisualizerError where the renderer cannot show them; the look stays then.
+  /// From the next `draw` on. Another renderer or iso value uploads all volumes again, an opacity
+  /// only the materials. Throws VisualizerError where the renderer cannot show them; the look stays
+  /// then.
   void set_look(const Session& session, const Look& look);
+  /// Of all materials, their own or chosen.
+  [[nodiscard]] Opacities opacities() const;
   /// For `OverlayFigures::controls`.
   [[nodiscard]] LookControls controls() const;
   /// The mouse over the panels: see `Overlay::handle`.
@@ -55,7 +58,8 @@ class Picture {
   [[nodiscard]] std::uint64_t bricks_uploaded() const noexcept { return bricks_uploaded_; }
 
  private:
-  /// A scene of its own for each: renderers keep its iso values.
+  /// The scene with the iso values and opacities of `look`.
+  [[nodiscard]] SceneView scene_in(const Look& look) const;
   [[nodiscard]] std::unique_ptr<Renderer> renderer_for(const Session& session, const Look& look);
   /// `View::shown` of the clip plane.
   [[nodiscard]] glm::dvec4 shown_half() const;

@@ -24,6 +24,7 @@
 #include "visualizer/run.hpp"
 #include "visualizer/stop_signal.hpp"
 #include "visualizer/surface/export_surface.hpp"
+#include "visualizer/transfer_file.hpp"
 
 namespace kerf {
 
@@ -91,6 +92,16 @@ void toggle_recording(const VisualizerOptions& options, PictureSize size,
   });
 }
 
+/// Where --transfer read them, or in a new file.
+void write_opacities(const VisualizerOptions& options, const Picture& picture) {
+  write_for_user("opacities", [&] {
+    const std::filesystem::path file =
+        options.transfer ? *options.transfer : unused_file(options.out, ".toml");
+    write_transfer(file, picture.opacities());
+    return file;
+  });
+}
+
 void export_mesh(const VisualizerOptions& options, const Session& session) {
   write_for_user("surface", [&] {
     const std::filesystem::path file =
@@ -127,6 +138,7 @@ struct Keys {
   bool plot = false;
   bool screenshot = false;
   bool mesh = false;
+  bool write = false;
   bool record = false;  ///< begin or end
 
   /// True when the user wants to leave.
@@ -138,6 +150,7 @@ struct Keys {
       if (key == 'r') picture.reset_camera(aspect);
       if (key == 's') screenshot = true;
       if (key == 'e') mesh = true;
+      if (key == 'w') write = true;
       if (key == 'm') record = !record;
       if (key == 'h') help = !help;
       if (key == 'p') plot = !plot;
@@ -202,6 +215,9 @@ int run_window(const VisualizerOptions& options) {
   place_process(options.cpus);
   if (options.mesh) check_export(*options.mesh);
   Session first = Session::attach(options.name, std::chrono::duration<double>(options.wait_s));
+  if (options.transfer) {
+    check_materials(options.opacities, first.scene(), options.transfer->string());
+  }
   FrameReport report{.renderer = options.renderer};
   report.attach_ms = first.attach_ms();
   const Stopwatch since_attached;
@@ -248,6 +264,9 @@ int run_window(const VisualizerOptions& options) {
         move_camera(followed.picture().camera(), input);
       }
       change_look(followed.picture(), followed.session(), figures.controls->look);
+      if (std::exchange(keys.write, false) || std::exchange(figures.controls->write, false)) {
+        write_opacities(options, followed.picture());
+      }
       const Redrawn redrawn =
           draw_measured(followed.picture(), followed.session(), figures, *target, report);
       if (report.wall_ms.size() == 1) report.late_join_ms = since_attached.wall_ms();

@@ -72,6 +72,8 @@ TEST_CASE("every mistake on the command line is one line") {
                                                                  {"--fps", "0"},
                                                                  {"--fps", "241"},
                                                                  {"--record"},
+                                                                 {"--transfer", "/nowhere/t.toml"},
+                                                                 {"--transfer", "/dev/null"},
                                                                  {"--convergence", "0"},
                                                                  {"--convergence", "nan"},
                                                                  {"--seconds", "nan"},

@@ -195,7 +195,10 @@ TEST_CASE("after any change the part that is drawn again makes the picture of dr
   for (const std::string_view kind : renderer_kinds()) {
     CAPTURE(std::string(kind));
     check_parts({.renderer = std::string(kind)}, {160, 120}, kEdits);
-    check_parts({.renderer = std::string(kind), .stereo = {.on = true}}, {161, 80}, kEdits / 10);
+    check_parts({.renderer = std::string(kind),
+                 .clip = {.on = true, .axis = 0, .at = 0.6},
+                 .stereo = {.on = true}},
+                {161, 80}, kEdits / 10);
   }
 }
 

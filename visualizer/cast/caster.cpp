@@ -48,6 +48,10 @@ void Caster::update(std::size_t volume, std::span<const Density> density,
   volumes_[volume].update_bricks(density, changed);
 }
 
+void Caster::set_materials(const Palette& materials) {
+  for (CastVolume& volume : volumes_) volume.set_materials(materials);
+}
+
 void Caster::draw(const View& view, const PixelRect& rect, CastPicture& picture,
                   std::span<const float> end_depth, std::span<float> normals) {
   CastJob job;

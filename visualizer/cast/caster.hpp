@@ -43,6 +43,9 @@ class Caster {
   void update(std::size_t volume, std::span<const Density> density,
               std::span<const std::uint32_t> changed);
 
+  /// Other colours and opacities for all volumes, as in `CastMatter`.
+  void set_materials(const Palette& materials);
+
   /// Draws `rect` of the picture; the rest of it stays. Rays of blend end at `end_depth` (window
   /// depth, one per pixel of the picture) where it is given. `normals` (three floats per pixel, or
   /// none) are those of iso in eye space, for measurements.
