@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <iomanip>
 #include <iostream>
 #include <sstream>
 #include <string_view>
@@ -10,6 +11,7 @@
 #include <CLI/CLI.hpp>
 
 #include "visualizer/error.hpp"
+#include "visualizer/keys.hpp"
 #include "visualizer/renderer.hpp"
 #include "visualizer/transfer_file.hpp"
 
@@ -17,19 +19,24 @@ namespace kerf {
 
 namespace {
 
-constexpr const char* kKeys =
-    "In the window: drag turns, shift or middle drag moves, the wheel zooms, 1..9 take a tool,\n"
-    "v next renderer, c clip plane, p plot, r first view, s screenshot, e export the surface, h "
-    "keys, q "
-    "quit.\n"
-    "Exit codes: 0 fine, 1 the controller did not end cleanly, 2 bad input or set-up.";
-
 constexpr const char* kBenchSize = "512x512";  // the paper's
 
 /// CLI11 explains over several lines; a user wants one.
 std::string one_line(std::string text) {
   std::replace(text.begin(), text.end(), '\n', ' ');
   return text;
+}
+
+std::string footer() {
+  std::ostringstream text;
+  text << "In the window (files go to --out):\n";
+  constexpr int kColumn = 22;
+  for (const auto& [key, meaning] : kKeys) {
+    text << "  " << std::left << std::setw(kColumn) << key << meaning << "\n";
+  }
+  text << "Exit codes: 0 fine, 1 the controller did not end cleanly or a video is cut short, 2 bad "
+          "input or set-up.";
+  return text.str();
 }
 
 std::string limits(double lowest, double highest) {
@@ -78,7 +85,7 @@ std::optional<VisualizerOptions> parse_options(int argc, const char* const* argv
   std::string size = "800x600";
   CLI::App app("Shows what a kerf-controller feels and mills, in a window or as PNG pictures.",
                "kerf-visualizer");
-  app.footer(kKeys);
+  app.footer(footer());
   app.set_version_flag("--version", std::string("kerf-visualizer " KERF_VERSION));
   app.add_option("--name", options.name, "the controller's name")->capture_default_str();
   app.add_option("--renderer", options.renderer, "how volumes are drawn: " + known_renderers())

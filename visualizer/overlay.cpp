@@ -10,6 +10,7 @@
 #include <imgui.h>
 
 #include "visualizer/error.hpp"
+#include "visualizer/keys.hpp"
 #include "visualizer/renderer.hpp"
 
 namespace kerf {
@@ -31,24 +32,6 @@ constexpr ImGuiWindowFlags kStill =
 
 constexpr ImGuiWindowFlags kTouched =
     (kStill & ~ImGuiWindowFlags_NoInputs) | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoNavInputs;
-
-constexpr auto kKeys = std::to_array<std::array<const char*, 2>>({
-    {"drag", "turn"},
-    {"shift or middle drag", "move"},
-    {"wheel", "nearer, farther"},
-    {"1 .. 9", "take this tool"},
-    {"v", "next renderer"},
-    {"c", "clip plane"},
-    {"t", "two eyes: stereo, side by side"},
-    {"r", "first view again"},
-    {"s", "screenshot"},
-    {"w", "write the opacities"},
-    {"m", "movie: begin, end"},
-    {"e", "export the surface"},
-    {"p", "plot of force and depth"},
-    {"h", "these keys"},
-    {"q", "quit"},
-});
 
 void row(const char* label, const char* format, double value) {
   ImGui::TableNextRow();
