@@ -37,7 +37,7 @@ Picture::Picture(const Session& session, const Look& look, double aspect)
     : scene_(session.scene()),
       look_(look),
       renderer_(renderer_for(session, look)),
-      stale_bricks_(scene_.volumes.size()),
+      stale_(scene_.volumes.size()),
       hand_painter_(scene_, size_of(scene_.main_volume())) {
   const BoxCorners box = scene_.main_volume().corners();
   centre_mm_ = 0.5 * (box.front() + box.back());
@@ -115,8 +115,7 @@ void Picture::update(const Session& session) {
     const VolumeSnapshot& snapshot = session.snapshot(v);
     renderer_->update(v, snapshot.density, snapshot.changed);
     bricks_uploaded_ += snapshot.changed.size();
-    stale_bricks_[v].insert(stale_bricks_[v].end(), snapshot.changed.begin(),
-                            snapshot.changed.end());
+    stale_[v].add(*renderer_, v, snapshot.differs);
   }
 }
 
@@ -153,11 +152,11 @@ Redrawn Picture::draw(const Session& session, const OverlayFigures& figures,
   for (std::size_t eye = 0; eye < views.size(); ++eye) {
     const auto& before = eyes_[eye].shown;
     const bool moving = before && before->view != views[eye];
-    stale.push_back(this->stale(eyes_[eye], {views[eye], moving, hand}));
+    stale.push_back(this->stale(eyes_[eye], {views[eye], moving, hand}, session));
   }
   const OverlayFigures panel = figures.rounded();
   const bool same_target = target.framebuffer() == shown_in_;
-  for (auto& bricks : stale_bricks_) bricks.clear();
+  for (StaleVolume& volume : stale_) volume.clear();
   const bool rests =
       std::all_of(stale.begin(), stale.end(), [](const Stale& one) { return one.stage.empty(); });
   if (rests && same_target && panel == shown_figures_) return {};
@@ -168,7 +167,7 @@ Redrawn Picture::draw(const Session& session, const OverlayFigures& figures,
     draw_layers(eyes_[eye], stale[eye]);
     const RenderTarget& seen = eyes_[eye].layers.smooth;
     target.copy(seen, seen.all(), static_cast<int>(eye) * size.width);
-    redrawn += stale[eye].volumes.area();
+    for (const PixelRect& part : stale[eye].volumes) redrawn += part.area();
   }
   overlay_.draw(panel, target, static_cast<int>(eyes_.size()));
   glDisable(GL_SCISSOR_TEST);
@@ -184,32 +183,34 @@ bool Picture::handle(const Pointer& pointer, OverlayFigures& figures, PictureSiz
   return overlay_.handle(within, figures, eye);
 }
 
-Picture::Stale Picture::stale(const Eye& eye, const Shown& now) const {
+Picture::Stale Picture::stale(const Eye& eye, const Shown& now, const Session& session) const {
   const PixelRect all = eye.layers.stage.all();
   // What was drawn coarsely settles when the camera does.
-  if (!eye.shown || now.moving || eye.shown->moving) return {now, all, all};
+  if (!eye.shown || now.moving || eye.shown->moving) return {now, {all}, {all}};
   const PictureSize size = eye.layers.stage.size();
-  PixelRect volumes = stale_volumes(now.view, size);
-  const PixelRect stage = volumes.united(stale_hand(now, *eye.shown, size));
+  StaleTiles tiles(size);
+  mark_volumes(tiles, session, now.view, eye.layers.volumes);
+  std::vector<PixelRect> volumes = tiles.rects();
+  mark_hand(tiles, now, *eye.shown, size);
+  const std::vector<PixelRect> stage = tiles.rects();
   if (renderer_->translucent()) volumes = stage;  // the hand is under them
   return {now, volumes, stage};
 }
 
-PixelRect Picture::stale_volumes(const View& view, PictureSize size) const {
-  PixelRect stale;
+void Picture::mark_volumes(StaleTiles& tiles, const Session& session, const View& view,
+                           const RenderTarget& kept) const {
   for (std::size_t v = 0; v < scene_.volumes.size(); ++v) {
-    stale = stale.united(brick_bounds(scene_.volumes[v], stale_bricks_[v], view, size));
+    stale_[v].mark(tiles, *renderer_, scene_.volumes[v], session.snapshot(v).density, view,
+                   kept);
   }
-  return stale;
 }
 
-PixelRect Picture::stale_hand(const Shown& now, const Shown& before, PictureSize size) const {
-  if (now.hand == before.hand) return {};
-  PixelRect stale;
+void Picture::mark_hand(StaleTiles& tiles, const Shown& now, const Shown& before,
+                        PictureSize size) const {
+  if (now.hand == before.hand) return;
   for (const auto& one : {now.hand, before.hand}) {
-    if (one) stale = stale.united(hand_painter_.bounds(*one, now.view, size));
+    if (one) tiles.mark(hand_painter_.bounds(*one, now.view, size));
   }
-  return stale;
 }
 
 void Picture::draw_layers(Eye& eye, const Stale& stale) {
@@ -227,23 +228,26 @@ void Picture::draw_layers(Eye& eye, const Stale& stale) {
     renderer_->draw(view, layers.volumes);
   }
   layers.stage.restrict_to(stale.stage);
-  layers.stage.copy(layers.volumes, stale.stage);
+  for (const PixelRect& part : stale.stage) layers.stage.copy(layers.volumes, part);
   if (hand && !tool_first) hand_painter_.draw_tool(*hand, view, layers.stage);
   if (hand) hand_painter_.draw_force(*hand, view, layers.stage);
   constexpr int kSmoothingReach = 3;  // pixels
-  layers.smooth.restrict_to(stale.stage.grown(kSmoothingReach));
+  std::vector<PixelRect> smoothed;
+  for (const PixelRect& part : stale.stage) smoothed.push_back(part.grown(kSmoothingReach));
+  layers.smooth.restrict_to(smoothed);
   smooth_edges(layers.stage, layers.smooth);
 }
 
 void Picture::draw_backdrop(const RenderTarget& target) {
-  constexpr float kFarthest = 1.0F;
   target.bind();
-  glClearNamedFramebufferfv(target.framebuffer(), GL_DEPTH, 0, &kFarthest);
-  glDisable(GL_DEPTH_TEST);
+  // Its depth is that of the far plane, whatever was there.
+  glEnable(GL_DEPTH_TEST);
+  glDepthFunc(GL_ALWAYS);
   glDisable(GL_BLEND);
   backdrop_.use();
   glBindVertexArray(no_vertices_.id());
-  glDrawArrays(GL_TRIANGLES, 0, 3);
+  target.for_parts([] { glDrawArrays(GL_TRIANGLES, 0, 3); });
+  glDepthFunc(GL_LESS);
 }
 
 void Picture::smooth_edges(const RenderTarget& from, const RenderTarget& to) {
@@ -254,7 +258,7 @@ void Picture::smooth_edges(const RenderTarget& from, const RenderTarget& to) {
   smooth_.set("u_picture", 0);
   smooth_.use();
   glBindVertexArray(no_vertices_.id());
-  glDrawArrays(GL_TRIANGLES, 0, 3);
+  to.for_parts([] { glDrawArrays(GL_TRIANGLES, 0, 3); });
 }
 
 Redrawn draw_measured(Picture& picture, Session& session, const OverlayFigures& figures,

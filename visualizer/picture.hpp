@@ -14,6 +14,7 @@
 #include "visualizer/overlay.hpp"
 #include "visualizer/renderer.hpp"
 #include "visualizer/session.hpp"
+#include "visualizer/stale_volume.hpp"
 
 namespace kerf {
 
@@ -98,22 +99,23 @@ class Picture {
   /// What must be drawn again, and with what.
   struct Stale {
     Shown now;
-    PixelRect volumes, stage;
+    std::vector<PixelRect> volumes, stage;
   };
   /// Of one eye in a picture of `size`.
   [[nodiscard]] PictureSize eye_size(PictureSize size) const noexcept;
   /// Of each eye, from the left.
   [[nodiscard]] std::vector<View> views(PictureSize size) const;
-  [[nodiscard]] Stale stale(const Eye& eye, const Shown& now) const;
-  /// Pixels that changed densities and, where it moved, the hand change.
-  [[nodiscard]] PixelRect stale_volumes(const View& view, PictureSize size) const;
-  [[nodiscard]] PixelRect stale_hand(const Shown& now, const Shown& before, PictureSize size) const;
+  [[nodiscard]] Stale stale(const Eye& eye, const Shown& now, const Session& session) const;
+  /// Marks what changed densities and, where it moved, the hand change.
+  void mark_volumes(StaleTiles& tiles, const Session& session, const View& view,
+                    const RenderTarget& kept) const;
+  void mark_hand(StaleTiles& tiles, const Shown& now, const Shown& before, PictureSize size) const;
   void draw_layers(Eye& eye, const Stale& stale);
 
   std::vector<Eye> eyes_;  ///< empty: draw everything
   OverlayFigures shown_figures_;
   GLuint shown_in_ = 0;                                   ///< framebuffer
-  std::vector<std::vector<std::uint32_t>> stale_bricks_;  ///< by volume, since the last `draw`
+  std::vector<StaleVolume> stale_;  ///< by volume, since the last `draw`
   GlVertexArray no_vertices_ = GlVertexArray::create();
   HandPainter hand_painter_;
   Overlay overlay_;

@@ -51,7 +51,23 @@ const Kind& find_kind(std::string_view name) {
                         " is unknown; known: " + known_renderers());
 }
 
+// How far, in voxel edges, samples are taken from a ray. A translucent one has its gradient from
+// interpolated differences (2) and its material from 1.5 below (matter.frag). A surface has its
+// material from 2.5 below and looks as far above (iso.frag). One for the interpolation comes on
+// top.
+constexpr int kTranslucentReachVox = 3;
+constexpr int kSurfaceReachVox = 4;
+
 }  // namespace
+
+std::vector<VoxelBox> Renderer::looks_different(std::size_t /*volume*/,
+                                                std::span<const VoxelBox> differs) const {
+  std::vector<VoxelBox> boxes(differs.begin(), differs.end());
+  for (VoxelBox& box : boxes) {
+    box = box.grown(translucent() ? kTranslucentReachVox : kSurfaceReachVox);
+  }
+  return boxes;
+}
 
 std::unique_ptr<Renderer> make_renderer(std::string_view kind, const SceneView& scene,
                                         std::span<const VolumeContent> contents) {

@@ -35,6 +35,14 @@ class Renderer {
   /// Draws over what is in `target`, under its depth test, within its part. Opaque things come
   /// first: some renderers look through.
   virtual void draw(const View& view, const RenderTarget& target) = 0;
+  /// Boxes of voxels around all of a volume that may look different since its last `update`, which
+  /// changed densities in `differs`: a ray that meets none of them before it ends shows what it
+  /// showed before.
+  [[nodiscard]] virtual std::vector<VoxelBox> looks_different(
+      std::size_t volume, std::span<const VoxelBox> differs) const;
+  /// Surfaces are shaded by what their normal points at from farther off than these boxes reach:
+  /// see `Feelers`.
+  [[nodiscard]] virtual bool feels_ahead() const noexcept { return false; }
   /// Lets what lies behind a surface shine through, so that it must be drawn before.
   [[nodiscard]] virtual bool translucent() const noexcept { return false; }
 };

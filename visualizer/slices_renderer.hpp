@@ -50,7 +50,7 @@ class SlicesRenderer final : public Renderer {
   };
 
   void cut_volume(std::size_t volume, const View& view, double step_mm);
-  void draw_cuts(const View& view) const;
+  void draw_cuts(const View& view, const RenderTarget& target) const;
 
   Options options_;
   bool moving_ = false;

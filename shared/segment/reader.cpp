@@ -36,15 +36,24 @@ using Brick = std::array<Density, kBrickVoxels>;
   return 0;
 }
 
-void place_brick(const Brick& brick, const VoxelBox& box, const VoxelGrid& grid,
-                 std::span<Density> linear) noexcept {
+/// The smallest box around the voxels that are others now.
+VoxelBox place_brick(const Brick& brick, const VoxelBox& box, const VoxelGrid& grid,
+                     std::span<Density> linear) noexcept {
   const auto row_voxels = static_cast<std::size_t>(box.hi.x - box.lo.x);
+  VoxelBox differs;
   for (std::int32_t z = box.lo.z; z < box.hi.z; ++z) {
     for (std::int32_t y = box.lo.y; y < box.hi.y; ++y) {
-      copy_row(linear.data() + grid.index(box.lo.x, y, z),
-               brick.data() + brick_row(y - box.lo.y, z - box.lo.z) * kBrickEdge, row_voxels);
+      Density* const to = linear.data() + grid.index(box.lo.x, y, z);
+      const Density* const from = brick.data() + brick_row(y - box.lo.y, z - box.lo.z) * kBrickEdge;
+      std::int32_t first = 0, end = box.hi.x - box.lo.x;
+      while (first < end && to[first] == from[first]) ++first;
+      if (first == end) continue;
+      while (to[end - 1] == from[end - 1]) --end;
+      differs = differs.united({{box.lo.x + first, y, z}, {box.lo.x + end, y + 1, z + 1}});
+      copy_row(to, from, row_voxels);
     }
   }
+  return differs;
 }
 
 }  // namespace
@@ -176,7 +185,9 @@ bool SegmentReader::copy_changed(const SegmentVolumeInfo& volume, VolumeSnapshot
       continue;
     }
     if (whole == snapshot.versions[id]) continue;
-    place_brick(brick, volume.bricks.voxels(id), volume.grid, snapshot.density);
+    const VoxelBox differs =
+        place_brick(brick, volume.bricks.voxels(id), volume.grid, snapshot.density);
+    if (!differs.empty()) snapshot.differs.push_back(differs);
     snapshot.versions[id] = whole;
     snapshot.changed.push_back(id);
   }
@@ -186,6 +197,7 @@ bool SegmentReader::copy_changed(const SegmentVolumeInfo& volume, VolumeSnapshot
 void SegmentReader::update(std::size_t volume, VolumeSnapshot& snapshot) const {
   const SegmentVolumeInfo& info = info_.volumes.at(volume);
   snapshot.changed.clear();
+  snapshot.differs.clear();
   snapshot.consistent = false;
   if (snapshot.session_id != info_.session_id || snapshot.versions.size() != info.bricks.count() ||
       snapshot.density.size() != info.grid.voxel_count()) {

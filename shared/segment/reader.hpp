@@ -57,6 +57,7 @@ struct VolumeSnapshot {
   std::vector<Density> density;         ///< linear, x fastest
   std::vector<std::uint64_t> versions;  ///< per brick, as seen; 0: never
   std::vector<std::uint32_t> changed;   ///< brick ids changed by the last `update`, ascending
+  std::vector<VoxelBox> differs;        ///< around the voxels in them that are others, none empty
   Tick tick = 0;                        ///< where consistent: `density` is exactly this tick's
   bool consistent = false;
 };

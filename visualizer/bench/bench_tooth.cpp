@@ -126,7 +126,7 @@ BenchTooth::BenchTooth(const VoxelGrid& padded, bool cropped) {
                       {"enamel", 0.5 * (kDentin + kEnamel), {0.93, 0.91, 0.85}}};
 }
 
-std::vector<std::uint32_t> BenchTooth::cut(int diameter) {
+BenchCut BenchTooth::cut(int diameter) {
   const BrickGrid& bricks = view().bricks;
   const VoxelGrid& grid = bricks.grid;
   const VoxelIndex centre = next_place();
@@ -134,22 +134,36 @@ std::vector<std::uint32_t> BenchTooth::cut(int diameter) {
   const VoxelBox box = VoxelBox{centre, {centre.x + 1, centre.y + 1, centre.z + 1}}
                            .grown(diameter / 2)
                            .clipped(grid.box());
+  BenchCut cut;
+  const VoxelBox touched = bricks.bricks_of(box);
+  for (int z = touched.lo.z; z < touched.hi.z; ++z) {
+    for (int y = touched.lo.y; y < touched.hi.y; ++y) {
+      for (int x = touched.lo.x; x < touched.hi.x; ++x) {
+        cut.bricks.push_back(bricks.id({x, y, z}));
+        const VoxelBox differs =
+            take_ball(bricks.voxels(cut.bricks.back()).clipped(box), centre, radius);
+        if (!differs.empty()) cut.differs.push_back(differs);
+      }
+    }
+  }
+  return cut;
+}
+
+/// Within `box`; returns the smallest box around the voxels that it changed.
+VoxelBox BenchTooth::take_ball(const VoxelBox& box, VoxelIndex centre, double radius) {
+  VoxelBox differs;
   for (int z = box.lo.z; z < box.hi.z; ++z) {
     for (int y = box.lo.y; y < box.hi.y; ++y) {
       for (int x = box.lo.x; x < box.hi.x; ++x) {
         const glm::dvec3 off(x - centre.x, y - centre.y, z - centre.z);
-        if (glm::length(off) <= radius) density_[grid.index(x, y, z)] = 0;
+        Density& at = density_[view().bricks.grid.index(x, y, z)];
+        if (glm::length(off) > radius || at == 0) continue;
+        at = 0;
+        differs = differs.united({{x, y, z}, {x + 1, y + 1, z + 1}});
       }
     }
   }
-  std::vector<std::uint32_t> changed;
-  const VoxelBox touched = bricks.bricks_of(box);
-  for (int z = touched.lo.z; z < touched.hi.z; ++z) {
-    for (int y = touched.lo.y; y < touched.hi.y; ++y) {
-      for (int x = touched.lo.x; x < touched.hi.x; ++x) changed.push_back(bricks.id({x, y, z}));
-    }
-  }
-  return changed;
+  return differs;
 }
 
 /// To and fro across the crown, a row lower each time; from there in to what is left of the tooth.

@@ -9,6 +9,12 @@
 
 namespace kerf {
 
+/// What a cut changed, as a snapshot of the segment has it.
+struct BenchCut {
+  std::vector<std::uint32_t> bricks;  ///< touched, ascending
+  std::vector<VoxelBox> differs;      ///< around the voxels in them that are others
+};
+
 /// A made-up molar for timing pictures: crown with four cusps, two roots, enamel over dentin by
 /// density. It is as high as the grid and fills of it what the paper's padded tooth does.
 class BenchTooth {
@@ -24,11 +30,12 @@ class BenchTooth {
   [[nodiscard]] VolumeContent content() const { return {density_, {}}; }
 
   /// Takes away a ball of `diameter` voxels at the next place along a path on the crown's side
-  /// that the camera sees. Returns the ids of the bricks that it touches.
-  std::vector<std::uint32_t> cut(int diameter);
+  /// that the camera sees.
+  BenchCut cut(int diameter);
 
  private:
   [[nodiscard]] VoxelIndex next_place();
+  VoxelBox take_ball(const VoxelBox& box, VoxelIndex centre, double radius);
 
   SceneView scene_;
   BoxCorners looked_at_{};

@@ -6,7 +6,7 @@
 #include "visualizer/bench/bench_tooth.hpp"
 #include "visualizer/frame_report.hpp"
 #include "visualizer/renderer.hpp"
-#include "visualizer/screen_bounds.hpp"
+#include "visualizer/stale_volume.hpp"
 #include "visualizer/stop_signal.hpp"
 
 namespace kerf {
@@ -56,14 +56,20 @@ class Stage {
 
  private:
   Stopwatch frame(const Change& change) {
-    std::vector<std::uint32_t> changed;
-    if (change.tool > 0) changed = tooth_.cut(change.tool);
+    BenchCut cut;
+    if (change.tool > 0) cut = tooth_.cut(change.tool);
     Stopwatch watch;
-    if (!changed.empty()) renderer_->update(0, tooth_.density(), changed);
-    target_.restrict_to(change.partial ? brick_bounds(tooth_.view(), changed, view_, target_.size())
-                                       : target_.all());
+    if (!cut.bricks.empty()) renderer_->update(0, tooth_.density(), cut.bricks);
+    target_.restrict_to(target_.all());
+    if (change.partial) {
+      StaleVolume stale;
+      stale.add(*renderer_, 0, cut.differs);
+      StaleTiles tiles(target_.size());
+      stale.mark(tiles, *renderer_, tooth_.view(), tooth_.density(), view_, target_);
+      target_.restrict_to(tiles.rects());
+    }
     target_.bind();
-    glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
+    target_.for_parts([] { glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT); });
     renderer_->draw(view_, target_);
     glFinish();
     return watch;

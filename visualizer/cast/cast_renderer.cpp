@@ -70,13 +70,11 @@ void CastRenderer::draw(const View& view, const RenderTarget& target) {
   if (!frame_ || frame_->picture.width != size.width || frame_->picture.height != size.height) {
     frame_.emplace(size);
   }
-  const PixelRect& rect = target.part();
-  if (rect.empty()) return;
   const bool ends_at_target = mode_ == CastMode::blend;
-  if (ends_at_target) read_end_depth(target, rect);
-  caster_.draw(view, rect, frame_->picture,
+  if (ends_at_target) read_end_depth(target, target.bounds());
+  caster_.draw(view, target.parts(), frame_->picture,
                ends_at_target ? std::span<const float>(frame_->end_depth) : std::span<float>());
-  upload(rect);
+  upload(target.bounds());
   show(target);
 }
 
@@ -118,7 +116,7 @@ void CastRenderer::show(const RenderTarget& target) {
   } else {
     glDisable(GL_BLEND);
   }
-  glDrawArrays(GL_TRIANGLES, 0, 3);
+  target.for_parts([] { glDrawArrays(GL_TRIANGLES, 0, 3); });
 }
 
 }  // namespace kerf

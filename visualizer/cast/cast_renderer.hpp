@@ -10,7 +10,7 @@
 
 namespace kerf {
 
-/// Hands the pictures of `Caster` to GL. Only the target's part is cast.
+/// Hands the pictures of `Caster` to GL. Only the target's parts are cast.
 ///
 /// Iso goes under the depth test of the target. Blend ends its rays at what is in the target, lies
 /// over it, and sets depth where enough of it has gathered to hide what comes later.
@@ -23,6 +23,7 @@ class CastRenderer final : public Renderer {
   void set_opacities(std::span<const MaterialView> materials,
                      std::span<const VolumeContent> contents) override;
   void draw(const View& view, const RenderTarget& target) override;
+  [[nodiscard]] bool feels_ahead() const noexcept override { return mode_ == CastMode::iso; }
   [[nodiscard]] bool translucent() const noexcept override { return mode_ == CastMode::blend; }
 
  private:

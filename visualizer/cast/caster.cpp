@@ -52,7 +52,7 @@ void Caster::set_materials(const Palette& materials) {
   for (CastVolume& volume : volumes_) volume.set_materials(materials);
 }
 
-void Caster::draw(const View& view, const PixelRect& rect, CastPicture& picture,
+void Caster::draw(const View& view, std::span<const PixelRect> parts, CastPicture& picture,
                   std::span<const float> end_depth, std::span<float> normals) {
   CastJob job;
   double shortest_mm = view.far_mm;
@@ -85,13 +85,16 @@ void Caster::draw(const View& view, const PixelRect& rect, CastPicture& picture,
   put(job.up, glm::dvec3(view.eye_from_world * glm::dvec4(0, 1, 0, 0)));
   const auto cast =
       options_.mode == CastMode::iso ? options_.kernels->iso : options_.kernels->blend;
-  const std::int32_t across = (rect.x1 - rect.x0 + kTile - 1) / kTile;
-  const std::int32_t along = (rect.y1 - rect.y0 + kTile - 1) / kTile;
-  pool_.run(static_cast<std::uint32_t>(across * along), [&](std::uint32_t tile) {
-    const std::int32_t x = rect.x0 + static_cast<std::int32_t>(tile) % across * kTile;
-    const std::int32_t y = rect.y0 + static_cast<std::int32_t>(tile) / across * kTile;
-    cast(job, {x, y, std::min(x + kTile, rect.x1), std::min(y + kTile, rect.y1)});
-  });
+  tiles_.clear();
+  for (const PixelRect& part : parts) {
+    for (std::int32_t y = part.y0; y < part.y1; y += kTile) {
+      for (std::int32_t x = part.x0; x < part.x1; x += kTile) {
+        tiles_.push_back({x, y, std::min(x + kTile, part.x1), std::min(y + kTile, part.y1)});
+      }
+    }
+  }
+  pool_.run(static_cast<std::uint32_t>(tiles_.size()),
+            [&](std::uint32_t tile) { cast(job, tiles_[tile]); });
 }
 
 }  // namespace kerf

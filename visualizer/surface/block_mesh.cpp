@@ -146,6 +146,32 @@ class Extraction {
 
 }  // namespace
 
+VoxelBox difference(const BlockMesh& before, const BlockMesh& now, VoxelIndex block,
+                    const VoxelBox& changed) {
+  if (before == now) return {};
+  const VoxelIndex start = block_start(block);
+  const auto voxel_of = [&](const SurfaceVertex& vertex) {
+    return VolumeSamples::voxel_below(fine_place(vertex, start));
+  };
+  VoxelBox differs;
+  // The vertices on edges that end in a changed voxel come and go; the others stay, in their order.
+  const VoxelBox touched{{changed.lo.x - 1, changed.lo.y - 1, changed.lo.z - 1}, changed.hi};
+  const auto next = [&](const std::vector<SurfaceVertex>& vertices, std::size_t from) {
+    while (from < vertices.size() && touched.contains(voxel_of(vertices[from]))) {
+      differs = differs.united(triangles_around(voxel_of(vertices[from])));
+      ++from;
+    }
+    return from;
+  };
+  std::size_t old = next(before.vertices, 0);
+  for (std::size_t i = next(now.vertices, 0); i < now.vertices.size();
+       i = next(now.vertices, i + 1), old = next(before.vertices, old + 1)) {
+    if (now.vertices[i] == before.vertices[old]) continue;
+    differs = differs.united(triangles_around(voxel_of(now.vertices[i])));
+  }
+  return differs;
+}
+
 BlockMesh extract_block(const SurfaceSource& source, VoxelIndex block) {
   constexpr std::int32_t kEdge = Neighbourhood::kSamples;
   const VoxelIndex start = block_start(block);

@@ -55,6 +55,16 @@ struct SurfaceSource {
   const SurfaceLook* look = nullptr;
 };
 
+/// The voxels around the triangles that share a vertex on an edge from `voxel` on.
+[[nodiscard]] constexpr VoxelBox triangles_around(VoxelIndex voxel) noexcept {
+  return VoxelBox{voxel, {voxel.x + 1, voxel.y + 1, voxel.z + 1}}.grown(1);
+}
+
+/// The voxels around the triangles of a block that look different in `now`, after densities in
+/// `changed` were others in `before`.
+[[nodiscard]] VoxelBox difference(const BlockMesh& before, const BlockMesh& now, VoxelIndex block,
+                                  const VoxelBox& changed);
+
 /// A pure function of the volume; any thread. Positions and triangles depend on the block's own
 /// voxels, the rest of a vertex on the voxels around it: see SurfaceLook.
 ///

@@ -18,7 +18,7 @@ struct DrawnPart {
   glm::dvec2 hi;
 
   explicit DrawnPart(const RenderTarget& target) {
-    const PixelRect& part = target.part();
+    const PixelRect& part = target.bounds();
     const glm::dvec2 per_pixel = 2.0 / glm::dvec2(target.size().width, target.size().height);
     lo = glm::dvec2(part.x0, part.y0) * per_pixel - 1.0;
     hi = glm::dvec2(part.x1, part.y1) * per_pixel - 1.0;
@@ -41,6 +41,12 @@ void SurfaceRenderer::update(std::size_t volume, std::span<const Density> densit
                              std::span<const std::uint32_t> changed) {
   Volume& of = volumes_[volume];
   of.gpu.update(of.surface, of.surface.update(density, changed));
+}
+
+std::vector<VoxelBox> SurfaceRenderer::looks_different(
+    std::size_t volume, std::span<const VoxelBox> /*differs*/) const {
+  const auto boxes = volumes_[volume].surface.looks_different();
+  return {boxes.begin(), boxes.end()};
 }
 
 void SurfaceRenderer::draw(const View& view, const RenderTarget& target) {

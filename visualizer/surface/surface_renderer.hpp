@@ -24,6 +24,9 @@ class SurfaceRenderer final : public Renderer {
   void update(std::size_t volume, std::span<const Density> density,
               std::span<const std::uint32_t> changed) override;
   void draw(const View& view, const RenderTarget& target) override;
+  /// The meshes tell exactly.
+  [[nodiscard]] std::vector<VoxelBox> looks_different(
+      std::size_t volume, std::span<const VoxelBox> differs) const override;
 
  private:
   struct Volume {

@@ -111,17 +111,21 @@ std::span<const std::uint32_t> VolumeSurface::update(std::span<const Density> de
   }
   std::sort(marked_.begin(), marked_.end());
   different_.clear();
+  looks_.clear();
   const SurfaceSource from = source();
   for (const std::uint32_t id : marked_) {
     BlockMesh& mesh = meshes_[id];
+    VoxelBox differs;
     if (work_[id] == Work::look) {
-      if (update_look(from, block(id), all, mesh)) different_.push_back(id);
+      differs = update_look(from, block(id), all, mesh);
     } else {
       BlockMesh now = extract_block(from, block(id));
-      if (now != mesh) {
-        mesh = std::move(now);
-        different_.push_back(id);
-      }
+      differs = difference(mesh, now, block(id), all);
+      mesh = std::move(now);
+    }
+    if (!differs.empty()) {
+      different_.push_back(id);
+      looks_.push_back(differs);
     }
     work_[id] = Work::none;
   }
