@@ -8,6 +8,7 @@
 #include "visualizer/blend_renderer.hpp"
 #include "visualizer/cast/cast_renderer.hpp"
 #include "visualizer/error.hpp"
+#include "visualizer/feelers.hpp"
 #include "visualizer/iso_renderer.hpp"
 #include "visualizer/slices_renderer.hpp"
 #include "visualizer/surface/surface_renderer.hpp"
@@ -51,12 +52,9 @@ const Kind& find_kind(std::string_view name) {
                         " is unknown; known: " + known_renderers());
 }
 
-// How far, in voxel edges, samples are taken from a ray. A translucent one has its gradient from
-// interpolated differences (2) and its material from 1.5 below (matter.frag). A surface has its
-// material from 2.5 below and looks as far above (iso.frag). One for the interpolation comes on
-// top.
+// A translucent volume has its gradient from interpolated differences (2) and its material from 1.5
+// below a sample (matter.frag); one for the interpolation.
 constexpr int kTranslucentReachVox = 3;
-constexpr int kSurfaceReachVox = 4;
 
 }  // namespace
 
@@ -64,7 +62,7 @@ std::vector<VoxelBox> Renderer::looks_different(std::size_t /*volume*/,
                                                 std::span<const VoxelBox> differs) const {
   std::vector<VoxelBox> boxes(differs.begin(), differs.end());
   for (VoxelBox& box : boxes) {
-    box = box.grown(translucent() ? kTranslucentReachVox : kSurfaceReachVox);
+    box = box.grown(translucent() ? kTranslucentReachVox : Feelers::kNormalReachVox);
   }
   return boxes;
 }

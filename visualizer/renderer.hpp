@@ -40,8 +40,8 @@ class Renderer {
   /// showed before.
   [[nodiscard]] virtual std::vector<VoxelBox> looks_different(
       std::size_t volume, std::span<const VoxelBox> differs) const;
-  /// Surfaces are shaded by what their normal points at from farther off than these boxes reach:
-  /// see `Feelers`.
+  /// Surfaces are shaded by what lies along their normal, farther off than these boxes reach: see
+  /// `Feelers`.
   [[nodiscard]] virtual bool feels_ahead() const noexcept { return false; }
   /// Lets what lies behind a surface shine through, so that it must be drawn before.
   [[nodiscard]] virtual bool translucent() const noexcept { return false; }

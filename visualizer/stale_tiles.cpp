@@ -29,28 +29,49 @@ void StaleTiles::mark(const PixelRect& pixels) {
   }
 }
 
+namespace {
+
+constexpr int kSpareTiles = 8;  // that are drawn for nothing to save a rectangle
+
+/// A rectangle of tiles that the next row may go on.
+struct Open {
+  PixelRect rect;
+  bool alone;  ///< no other rectangle is in its rows: it may become wider
+};
+
+/// Whether `row`, which lies on `below`, takes it in.
+bool takes_in(Open& row, const Open& below) {
+  const PixelRect both = row.rect.united(below.rect);
+  const bool same = row.rect.x0 == below.rect.x0 && row.rect.x1 == below.rect.x1;
+  const bool near =
+      row.alone && below.alone && both.area() <= row.rect.area() + below.rect.area() + kSpareTiles;
+  if (!same && !near) return false;
+  row = {both, row.alone && below.alone};
+  return true;
+}
+
+}  // namespace
+
 std::vector<PixelRect> StaleTiles::rects() const {
   std::vector<PixelRect> done;
-  std::vector<PixelRect> open;  // runs of the row below, in tiles, that may go on
+  std::vector<Open> open;
   for (int y = 0; y <= along_; ++y) {
-    std::vector<PixelRect> runs;
+    std::vector<Open> row;
     for (int x = 0; y < along_ && x < across_; ++x) {
       if (!marked(x, y)) continue;
       const int from = x;
       while (x < across_ && marked(x, y)) ++x;
-      runs.push_back({from, y, x, y + 1});
+      row.push_back({{from, y, x, y + 1}, true});
     }
-    for (const PixelRect& below : open) {
-      const auto same = std::find_if(runs.begin(), runs.end(), [&](const PixelRect& run) {
-        return run.x0 == below.x0 && run.x1 == below.x1;
-      });
-      if (same != runs.end()) {
-        same->y0 = below.y0;
-      } else {
-        done.push_back(below);
-      }
+    if (row.size() > 1) {
+      for (Open& run : row) run.alone = false;
     }
-    open = std::move(runs);
+    for (const Open& below : open) {
+      const bool goes_on =
+          std::any_of(row.begin(), row.end(), [&](Open& run) { return takes_in(run, below); });
+      if (!goes_on) done.push_back(below.rect);
+    }
+    open = std::move(row);
   }
   for (PixelRect& rect : done) {
     rect = PixelRect{rect.x0 * kEdge, rect.y0 * kEdge, rect.x1 * kEdge, rect.y1 * kEdge}.clipped(

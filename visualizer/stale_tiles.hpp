@@ -9,11 +9,11 @@
 
 namespace kerf {
 
-/// Which tiles of a picture must be drawn again. Tiles of 8x8 pixels: a cut of 16 voxels covers
-/// some tens of them, and no renderer gains from finer ones.
+/// Which tiles of a picture must be drawn again. Tiles of 4x4 pixels, in which the
+/// ray caster and a software GL shade.
 class StaleTiles {
  public:
-  static constexpr int kEdge = 8;
+  static constexpr int kEdge = 4;
 
   explicit StaleTiles(PictureSize size);
 
@@ -27,7 +27,8 @@ class StaleTiles {
   void mark(int x, int y) { marked_[at(x, y)] = 1; }
   [[nodiscard]] bool marked(int x, int y) const { return marked_[at(x, y)] != 0; }
 
-  /// Rectangles of pixels, apart from one another, that cover the marked tiles and nothing else.
+  /// Rectangles of pixels, apart from one another, that cover the marked tiles, and of others a few
+  /// where that saves rectangles: each costs a draw call.
   [[nodiscard]] std::vector<PixelRect> rects() const;
 
  private:

@@ -11,7 +11,7 @@ namespace kerf {
 
 namespace {
 
-constexpr std::size_t kMostBoxes = 256;  // some cuts between two pictures; more count as one
+constexpr std::size_t kMostBoxes = 1024;  // some cuts between two pictures; more count as one
 
 /// A box as the picture sees it.
 struct Covered {
@@ -24,38 +24,50 @@ Covered covered_by(const VoxelBox& box, const VolumeView& volume, const View& vi
   std::array<glm::dvec3, 8> corners;
   double nearest_mm = view.far_mm;
   for (std::size_t c = 0; c < corners.size(); ++c) {
-    const glm::dvec4 voxel((c & 1) != 0 ? box.hi.x - 1 : box.lo.x,
-                           (c & 2) != 0 ? box.hi.y - 1 : box.lo.y,
-                           (c & 4) != 0 ? box.hi.z - 1 : box.lo.z, 1.0);
+    constexpr double kSlackVox = 0.05;  // for what a depth of 24 bits and a shader round
+    const auto end = [&](std::size_t axis, std::int32_t lo, std::int32_t hi) {
+      return (c >> axis & 1) != 0 ? hi - 1 + kSlackVox : lo - kSlackVox;
+    };
+    const glm::dvec4 voxel(end(0, box.lo.x, box.hi.x), end(1, box.lo.y, box.hi.y),
+                           end(2, box.lo.z, box.hi.z), 1.0);
     corners[c] = glm::dvec3(volume.world_from_voxel * voxel);
     nearest_mm = std::min(nearest_mm, -(view.eye_from_world * glm::dvec4(corners[c], 1.0)).z);
   }
-  constexpr double kSlack = 1e-4;  // of the distance: the depth of a picture has 24 bits
+  constexpr double kSlack = 1e-4;  // of the distance
   const double from_mm = std::max(nearest_mm * (1.0 - kSlack), view.near_mm);
   return {screen_bounds(corners, view, size),
           static_cast<float>(window_depth(from_mm, view.near_mm, view.far_mm))};
 }
 
-/// The part of a picture's depth that is asked for.
+/// The depth of the tiles that touch a part of a picture.
 class KeptDepth {
  public:
-  KeptDepth(const RenderTarget& of, const PixelRect& part)
-      : part_(part), window_(of.read_depth(part)) {}
+  KeptDepth(const RenderTarget& of, const StaleTiles& tiles, const PixelRect& part) {
+    const PixelRect in = tiles.tiles_of(part);
+    pixels_ = tiles.pixels_of(in.x0, in.y0).united(tiles.pixels_of(in.x1 - 1, in.y1 - 1));
+    window_ = of.read_depth(pixels_);
+  }
 
   [[nodiscard]] const float* row(int y) const {
-    return window_.data() + static_cast<std::ptrdiff_t>(y - part_.y0) * (part_.x1 - part_.x0) -
-           part_.x0;
+    return window_.data() +
+           static_cast<std::ptrdiff_t>(y - pixels_.y0) * (pixels_.x1 - pixels_.x0) - pixels_.x0;
   }
-  [[nodiscard]] float farthest(const PixelRect& pixels) const {
-    float farthest = 0.0F;
+  struct Range {
+    float nearest, farthest;
+  };
+  [[nodiscard]] Range range(const PixelRect& pixels) const {
+    Range range{1.0F, 0.0F};
     for (int y = pixels.y0; y < pixels.y1; ++y) {
-      farthest = std::max(farthest, *std::max_element(row(y) + pixels.x0, row(y) + pixels.x1));
+      for (int x = pixels.x0; x < pixels.x1; ++x) {
+        range.nearest = std::min(range.nearest, row(y)[x]);
+        range.farthest = std::max(range.farthest, row(y)[x]);
+      }
     }
-    return farthest;
+    return range;
   }
 
  private:
-  PixelRect part_;
+  PixelRect pixels_;
   std::vector<float> window_;
 };
 
@@ -111,19 +123,19 @@ void StaleVolume::mark(StaleTiles& tiles, const Renderer& renderer, const Volume
   if (renderer.feels_ahead() && !differs_.empty()) {
     felt = covered_by(united(differs_).grown(Feelers::kReachVox), volume, view, kept.size()).pixels;
   }
-  // Whole tiles are looked at.
-  const PixelRect read = tiles.tiles_of(all.united(felt));
-  if (read.empty()) return;
-  const KeptDepth depth(
-      kept, tiles.pixels_of(read.x0, read.y0).united(tiles.pixels_of(read.x1 - 1, read.y1 - 1)));
+  all = all.united(felt);
+  if (all.empty()) return;
+  const KeptDepth depth(kept, tiles, all);
   for (const Covered& box : covered) {
     // What is in sight before the box hides it.
     mark_where(tiles, box.pixels,
-               [&](const PixelRect& tile) { return depth.farthest(tile) >= box.from; });
+               [&](const PixelRect& tile) { return depth.range(tile).farthest >= box.from; });
   }
   if (felt.empty()) return;
   const Feelers feelers(volume, density, differs_, view, kept.size());
   mark_where(tiles, felt, [&](const PixelRect& tile) {
+    const auto [nearest, farthest] = depth.range(tile);
+    if (!feelers.may_reach(tile, nearest, farthest)) return false;
     for (int y = tile.y0; y < tile.y1; ++y) {
       for (int x = tile.x0; x < tile.x1; ++x) {
         const float at = depth.row(y)[x];

@@ -140,30 +140,37 @@ BenchCut BenchTooth::cut(int diameter) {
     for (int y = touched.lo.y; y < touched.hi.y; ++y) {
       for (int x = touched.lo.x; x < touched.hi.x; ++x) {
         cut.bricks.push_back(bricks.id({x, y, z}));
-        const VoxelBox differs =
-            take_ball(bricks.voxels(cut.bricks.back()).clipped(box), centre, radius);
-        if (!differs.empty()) cut.differs.push_back(differs);
+        take_ball(bricks.voxels(cut.bricks.back()), centre, radius, cut.differs);
       }
     }
   }
   return cut;
 }
 
-/// Within `box`; returns the smallest box around the voxels that it changed.
-VoxelBox BenchTooth::take_ball(const VoxelBox& box, VoxelIndex centre, double radius) {
-  VoxelBox differs;
-  for (int z = box.lo.z; z < box.hi.z; ++z) {
-    for (int y = box.lo.y; y < box.hi.y; ++y) {
-      for (int x = box.lo.x; x < box.hi.x; ++x) {
-        const glm::dvec3 off(x - centre.x, y - centre.y, z - centre.z);
-        Density& at = density_[view().bricks.grid.index(x, y, z)];
-        if (glm::length(off) > radius || at == 0) continue;
-        at = 0;
-        differs = differs.united({{x, y, z}, {x + 1, y + 1, z + 1}});
+/// Within a brick; adds boxes around the voxels that it changed to `differs`.
+void BenchTooth::take_ball(const VoxelBox& brick, VoxelIndex centre, double radius,
+                           std::vector<VoxelBox>& differs) {
+  for (int eighth = 0; eighth < 8; ++eighth) {
+    const VoxelIndex lo{brick.lo.x + (eighth & 1) * kDiffersEdge,
+                        brick.lo.y + (eighth >> 1 & 1) * kDiffersEdge,
+                        brick.lo.z + (eighth >> 2) * kDiffersEdge};
+    const VoxelBox box =
+        VoxelBox{lo, {lo.x + kDiffersEdge, lo.y + kDiffersEdge, lo.z + kDiffersEdge}}.clipped(
+            brick);
+    VoxelBox around;
+    for (int z = box.lo.z; z < box.hi.z; ++z) {
+      for (int y = box.lo.y; y < box.hi.y; ++y) {
+        for (int x = box.lo.x; x < box.hi.x; ++x) {
+          const glm::dvec3 off(x - centre.x, y - centre.y, z - centre.z);
+          Density& at = density_[view().bricks.grid.index(x, y, z)];
+          if (glm::length(off) > radius || at == 0) continue;
+          at = 0;
+          around = around.united({{x, y, z}, {x + 1, y + 1, z + 1}});
+        }
       }
     }
+    if (!around.empty()) differs.push_back(around);
   }
-  return differs;
 }
 
 /// To and fro across the crown, a row lower each time; from there in to what is left of the tooth.

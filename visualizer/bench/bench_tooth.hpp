@@ -12,7 +12,7 @@ namespace kerf {
 /// What a cut changed, as a snapshot of the segment has it.
 struct BenchCut {
   std::vector<std::uint32_t> bricks;  ///< touched, ascending
-  std::vector<VoxelBox> differs;      ///< around the voxels in them that are others
+  std::vector<VoxelBox> differs;      ///< `VolumeSnapshot::differs`
 };
 
 /// A made-up molar for timing pictures: crown with four cusps, two roots, enamel over dentin by
@@ -35,7 +35,8 @@ class BenchTooth {
 
  private:
   [[nodiscard]] VoxelIndex next_place();
-  VoxelBox take_ball(const VoxelBox& box, VoxelIndex centre, double radius);
+  void take_ball(const VoxelBox& brick, VoxelIndex centre, double radius,
+                 std::vector<VoxelBox>& differs);
 
   SceneView scene_;
   BoxCorners looked_at_{};

@@ -115,18 +115,15 @@ std::span<const std::uint32_t> VolumeSurface::update(std::span<const Density> de
   const SurfaceSource from = source();
   for (const std::uint32_t id : marked_) {
     BlockMesh& mesh = meshes_[id];
-    VoxelBox differs;
+    DifferentParts parts(block(id));
     if (work_[id] == Work::look) {
-      differs = update_look(from, block(id), all, mesh);
+      parts = update_look(from, block(id), all, mesh);
     } else {
       BlockMesh now = extract_block(from, block(id));
-      differs = difference(mesh, now, block(id), all);
+      parts = difference(mesh, now, block(id), all);
       mesh = std::move(now);
     }
-    if (!differs.empty()) {
-      different_.push_back(id);
-      looks_.push_back(differs);
-    }
+    if (parts.append_to(looks_)) different_.push_back(id);
     work_[id] = Work::none;
   }
   marked_.clear();

@@ -29,8 +29,7 @@ class VolumeSurface {
   std::span<const std::uint32_t> update(std::span<const Density> density,
                                         std::span<const std::uint32_t> changed);
 
-  /// Boxes of voxels around all triangles that look different since the last `update`: one for each
-  /// block that it returned.
+  /// Boxes of voxels around all triangles that look different since the last `update`.
   [[nodiscard]] std::span<const VoxelBox> looks_different() const noexcept { return looks_; }
 
   [[nodiscard]] const VoxelGrid& blocks() const noexcept { return blocks_; }
