@@ -200,8 +200,7 @@ Picture::Stale Picture::stale(const Eye& eye, const Shown& now, const Session& s
 void Picture::mark_volumes(StaleTiles& tiles, const Session& session, const View& view,
                            const RenderTarget& kept) const {
   for (std::size_t v = 0; v < scene_.volumes.size(); ++v) {
-    stale_[v].mark(tiles, *renderer_, scene_.volumes[v], session.snapshot(v).density, view,
-                   kept);
+    stale_[v].mark(tiles, *renderer_, scene_.volumes[v], session.snapshot(v).density, view, kept);
   }
 }
 
@@ -229,8 +228,17 @@ void Picture::draw_layers(Eye& eye, const Stale& stale) {
   }
   layers.stage.restrict_to(stale.stage);
   for (const PixelRect& part : stale.stage) layers.stage.copy(layers.volumes, part);
-  if (hand && !tool_first) hand_painter_.draw_tool(*hand, view, layers.stage);
-  if (hand) hand_painter_.draw_force(*hand, view, layers.stage);
+  if (hand) {
+    std::vector<PixelRect> of_hand;
+    const PixelRect bounds = hand_painter_.bounds(*hand, view, layers.stage.size());
+    for (const PixelRect& part : stale.stage) {
+      const PixelRect both = part.clipped(bounds);
+      if (!both.empty()) of_hand.push_back(both);
+    }
+    layers.stage.restrict_to(of_hand);  // a mesh costs its vertices for each part
+    if (!tool_first) hand_painter_.draw_tool(*hand, view, layers.stage);
+    hand_painter_.draw_force(*hand, view, layers.stage);
+  }
   constexpr int kSmoothingReach = 3;  // pixels
   std::vector<PixelRect> smoothed;
   for (const PixelRect& part : stale.stage) smoothed.push_back(part.grown(kSmoothingReach));

@@ -114,7 +114,7 @@ class Picture {
 
   std::vector<Eye> eyes_;  ///< empty: draw everything
   OverlayFigures shown_figures_;
-  GLuint shown_in_ = 0;                                   ///< framebuffer
+  GLuint shown_in_ = 0;             ///< framebuffer
   std::vector<StaleVolume> stale_;  ///< by volume, since the last `draw`
   GlVertexArray no_vertices_ = GlVertexArray::create();
   HandPainter hand_painter_;

@@ -184,7 +184,8 @@ void check_parts(const Look& look, PictureSize size, int edits) {
     CHECK_FALSE(picture.draw(session, figures, target).any);
   }
   // One sees into the volume and the tool in it; of the other, what is hidden stays.
-  const bool opaque = look.renderer == "iso" || look.renderer == "surface" || look.renderer == "cast";
+  const bool opaque =
+      look.renderer == "iso" || look.renderer == "surface" || look.renderer == "cast";
   CHECK(redrawn / parts < (look.stereo.on ? 0.6 : opaque ? 0.08 : 0.2));
   throw_on_gl_error();
 }

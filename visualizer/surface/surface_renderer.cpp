@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "visualizer/surface/surface_renderer.hpp"
 
+#include <optional>
 #include <utility>
 
 #include <glm/gtc/matrix_inverse.hpp>
@@ -63,8 +64,9 @@ void SurfaceRenderer::draw(const View& view, const RenderTarget& target) {
     program_.set("u_eye_from_voxel", glm::mat4(eye_from_voxel));
     program_.set("u_eye_from_voxel_normal",
                  glm::mat3(glm::inverseTranspose(glm::dmat3(eye_from_voxel))));
-    volume.gpu.draw(Sight(view.clip_from_eye() * eye_from_voxel,
-                          glm::dvec3(glm::affineInverse(eye_from_voxel)[3]), parts));
+    std::optional<glm::dvec3> eye_voxel;
+    if (!opened) eye_voxel = glm::dvec3(glm::affineInverse(eye_from_voxel)[3]);
+    volume.gpu.draw(Sight(view.clip_from_eye() * eye_from_voxel, eye_voxel, parts));
   }
   glDisable(GL_CULL_FACE);
   glDisable(GL_CLIP_DISTANCE0);
