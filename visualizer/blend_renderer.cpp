@@ -22,6 +22,11 @@ void BlendRenderer::update(std::size_t volume, std::span<const Density> density,
   volumes_.update(volume, density, changed);
 }
 
+void BlendRenderer::set_opacities(std::span<const MaterialView> materials,
+                                  std::span<const VolumeContent> contents) {
+  volumes_.set_opacities(materials, contents);
+}
+
 void BlendRenderer::draw(const View& view, const RenderTarget& target) {
   int layer = 0;
   for (const TranslucentVolume& volume : volumes_.volumes()) {

@@ -44,7 +44,8 @@ Feelers::Feelers(const VolumeView& volume, std::span<const Density> density,
   origin_ = glm::vec3(voxel_from_eye[3]);
   const glm::dvec2 half(view.tan_half_height * view.aspect, view.tan_half_height);
   direction_per_pixel_ = 2.0 * half / glm::dvec2(size.width, size.height);
-  first_direction_ = 0.5F * direction_per_pixel_ - glm::vec2(half);
+  const glm::vec2 middle(view.middle_right, 0.0);
+  first_direction_ = middle + 0.5F * direction_per_pixel_ - glm::vec2(half);
   const auto box_around = [](const VoxelBox& box, float by) {
     return Box{glm::vec3(box.lo.x, box.lo.y, box.lo.z) - by,
                glm::vec3(box.hi.x - 1, box.hi.y - 1, box.hi.z - 1) + by};

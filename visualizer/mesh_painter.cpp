@@ -70,7 +70,7 @@ void MeshPainter::draw(const GpuMesh& mesh, const glm::dmat4& world_from_mesh, c
   glEnable(GL_CULL_FACE);
   glDisable(GL_BLEND);
   set_uniforms(world_from_mesh, paint, 1.0F, view);
-  target.for_parts([&] { mesh.draw(); });
+  mesh.draw();  // once within the bounds: beside the parts it is there already, at the same depth
   glDisable(GL_CULL_FACE);
 }
 

@@ -10,6 +10,7 @@
 #include <imgui.h>
 
 #include "visualizer/error.hpp"
+#include "visualizer/keys.hpp"
 #include "visualizer/renderer.hpp"
 
 namespace kerf {
@@ -31,21 +32,6 @@ constexpr ImGuiWindowFlags kStill =
 
 constexpr ImGuiWindowFlags kTouched =
     (kStill & ~ImGuiWindowFlags_NoInputs) | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoNavInputs;
-
-constexpr auto kKeys = std::to_array<std::array<const char*, 2>>({
-    {"drag", "turn"},
-    {"shift or middle drag", "move"},
-    {"wheel", "nearer, farther"},
-    {"1 .. 9", "take this tool"},
-    {"v", "next renderer"},
-    {"c", "clip plane"},
-    {"r", "first view again"},
-    {"s", "screenshot"},
-    {"e", "export the surface"},
-    {"p", "plot of force and depth"},
-    {"h", "these keys"},
-    {"q", "quit"},
-});
 
 void row(const char* label, const char* format, double value) {
   ImGui::TableNextRow();
@@ -229,7 +215,18 @@ void Overlay::look_controls(LookControls& controls) {
     look.iso = *dragged_iso_;
     dragged_iso_.reset();
   }
-  ImGui::BeginDisabled(!controls.clips);
+  if (!controls.opacities.empty()) {
+    ImGui::TextColored(kLabel, "opacity of a voxel");
+    ImGui::SameLine();
+    controls.write = ImGui::SmallButton("write");
+  }
+  for (const auto& [material, opacity] : controls.opacities) {
+    auto value = static_cast<float>(opacity);
+    if (ImGui::SliderFloat(material.c_str(), &value, 0.0F, 1.0F, "%.3f",
+                           kDragOnly | ImGuiSliderFlags_Logarithmic)) {
+      look.opacities[material] = rounded_to(0.001, static_cast<double>(value));
+    }
+  }
   ImGui::Checkbox("clip", &look.clip.on);
   if (look.clip.on) {
     constexpr std::array kAxes{"x", "y", "z"};
@@ -240,7 +237,7 @@ void Overlay::look_controls(LookControls& controls) {
     auto at = static_cast<float>(look.clip.at);
     if (ImGui::SliderFloat("plane", &at, 0.0F, 1.0F, "%.2f", kDragOnly)) look.clip.at = at;
   }
-  ImGui::EndDisabled();
+  ImGui::Checkbox("stereo", &look.stereo.on);
   ImGui::PopItemWidth();
 }
 
@@ -262,9 +259,15 @@ PixelRect Overlay::prepare(const OverlayFigures& figures, PictureSize size) {
   return bounds;
 }
 
-void Overlay::draw(const RenderTarget& target) {
+void Overlay::draw(const RenderTarget& target, int eyes) {
   target.bind();
-  ImGui_ImplOpenGL3_RenderDrawData(ImGui::GetDrawData());
+  ImDrawData& panels = *ImGui::GetDrawData();
+  panels.DisplaySize.x = static_cast<float>(target.size().width);
+  const int eye_width = target.size().width / eyes;
+  for (int eye = 0; eye < eyes; ++eye) {
+    panels.DisplayPos.x = static_cast<float>(-eye * eye_width);
+    ImGui_ImplOpenGL3_RenderDrawData(&panels);
+  }
 }
 
 }  // namespace kerf

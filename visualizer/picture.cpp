@@ -6,7 +6,9 @@
 #include <cmath>
 
 #include "visualizer/gl/context.hpp"
+#include "visualizer/palette.hpp"
 #include "visualizer/screen_bounds.hpp"
+#include "visualizer/stereo.hpp"
 
 namespace kerf {
 
@@ -16,6 +18,12 @@ constexpr double kStaleMs = 100.0;  // a servo that is alive beats each tick
 constexpr double kToolRoom = 1.5;   // radii around the volumes in which the tool is never clipped
 glm::dvec3 vec3(const float (&v)[3]) {
   return {v[0], v[1], v[2]};
+}
+
+void clear(const RenderTarget& target) {
+  target.bind();
+  constexpr float kBlack[4] = {0.0F, 0.0F, 0.0F, 1.0F};
+  glClearNamedFramebufferfv(target.framebuffer(), GL_COLOR, 0, kBlack);
 }
 
 /// Half the diagonal of its box.
@@ -47,12 +55,20 @@ Picture::Picture(const Session& session, const Look& look, double aspect)
   reset_camera(aspect);
 }
 
-std::unique_ptr<Renderer> Picture::renderer_for(const Session& session, const Look& look) {
+SceneView Picture::scene_in(const Look& look) const {
   SceneView scene = scene_;
   for (VolumeView& volume : scene.volumes) {
     if (look.iso) volume.iso = static_cast<Density>(std::lround(*look.iso * kDensityMax));
   }
-  return make_renderer(look.renderer, scene, session.contents());
+  for (MaterialView& material : scene.materials) {
+    const auto chosen = look.opacities.find(material.name);
+    if (chosen != look.opacities.end()) material.opacity = chosen->second;
+  }
+  return scene;
+}
+
+std::unique_ptr<Renderer> Picture::renderer_for(const Session& session, const Look& look) {
+  return make_renderer(look.renderer, scene_in(look), session.contents());
 }
 
 void Picture::set_look(const Session& session, const Look& look) {
@@ -60,15 +76,26 @@ void Picture::set_look(const Session& session, const Look& look) {
   if (look.renderer != look_.renderer || look.iso != look_.iso) {
     renderer_ = renderer_for(session, look);
     for (const VolumeView& volume : scene_.volumes) bricks_uploaded_ += volume.bricks.count();
+  } else if (look.opacities != look_.opacities) {
+    renderer_->set_opacities(scene_in(look).materials, session.contents());
   }
   look_ = look;
   redraw_all();
 }
 
 LookControls Picture::controls() const {
-  return {.look = look_,
-          .own_iso = scene_.main_volume().iso / kDensityMax,
-          .clips = renderer_->clips()};
+  LookControls controls{.look = look_, .own_iso = scene_.main_volume().iso / kDensityMax};
+  if (renderer_->translucent()) controls.opacities = opacities();
+  return controls;
+}
+
+Opacities Picture::opacities() const {
+  Opacities opacities;
+  const std::vector<MaterialView> materials = scene_in(look_).materials;
+  for (std::size_t m = 1; m < materials.size(); ++m) {
+    opacities[materials[m].name] = materials[m].opacity.value_or(default_opacity(materials, m));
+  }
+  return opacities;
 }
 
 glm::dvec4 Picture::shown_half() const {
@@ -81,7 +108,7 @@ glm::dvec4 Picture::shown_half() const {
 }
 
 void Picture::reset_camera(double aspect) {
-  camera_.frame(scene_.main_volume().corners(), aspect);
+  camera_.frame(scene_.main_volume().corners(), look_.stereo.on ? 0.5 * aspect : aspect);
 }
 
 void Picture::update(const Session& session) {
@@ -93,87 +120,140 @@ void Picture::update(const Session& session) {
   }
 }
 
+std::vector<View> Picture::views(PictureSize size) const {
+  const double reach_mm = reach_mm_ + kToolRoom * radius_mm_;
+  const Stereo& stereo = look_.stereo;
+  const int width = eye_size(size).width;
+  View view = camera_.view(static_cast<double>(width) / size.height, reach_mm);
+  view.shown = shown_half();
+  if (width == size.width) return {view};
+  const double convergence_mm = stereo.convergence_mm.value_or(camera_.distance_mm());
+  const double eyes_mm = stereo.eyes_mm.value_or(kEyesPerConvergence * convergence_mm);
+  const auto both = eye_views(view, {eyes_mm, convergence_mm});
+  return {both.begin(), both.end()};
+}
+
+PictureSize Picture::eye_size(PictureSize size) const noexcept {
+  const bool fits_two = look_.stereo.on && size.width > 1;
+  return {fits_two ? size.width / 2 : size.width, size.height};
+}
+
 Redrawn Picture::draw(const Session& session, const OverlayFigures& figures,
                       const RenderTarget& target) {
-  const PictureSize size = target.size();
-  const double aspect = static_cast<double>(size.width) / size.height;
-  View view = camera_.view(aspect, reach_mm_ + kToolRoom * radius_mm_);
-  view.shown = shown_half();
+  const PictureSize size = eye_size(target.size());
+  const std::vector<View> views = this->views(target.size());
   std::optional<Hand> hand;
   if (session.latest()) hand = hand_of(*session.latest());
-
-  const bool fresh = !layers_ || layers_->stage.size() != size;
-  if (fresh) layers_.emplace(size);
-  std::vector<PixelRect> volumes{target.all()}, stage{target.all()};
-  const bool moving = !fresh && view != shown_.view;
-  const bool settles = shown_.moving && !moving;  // drawn coarsely until now
-  if (!fresh && !moving && !settles) {
-    StaleTiles tiles(size);
-    mark_volumes(tiles, session, view);
-    volumes = tiles.rects();
-    mark_hand(tiles, hand, view, size);
-    stage = tiles.rects();
-    if (renderer_->translucent()) volumes = stage;  // the hand is under them
+  if (eyes_.size() != views.size() || eyes_.front().layers.stage.size() != size) {
+    eyes_.clear();
+    for (std::size_t eye = 0; eye < views.size(); ++eye) eyes_.emplace_back(size);
+    shown_in_ = 0;
+  }
+  std::vector<Stale> stale;
+  for (std::size_t eye = 0; eye < views.size(); ++eye) {
+    const auto& before = eyes_[eye].shown;
+    const bool moving = before && before->view != views[eye];
+    stale.push_back(this->stale(eyes_[eye], {views[eye], moving, hand}, session));
   }
   const OverlayFigures panel = figures.rounded();
-  const bool same_target = !fresh && target.framebuffer() == shown_.target;
-  const bool same_panel = panel == shown_.figures && same_target;
+  const bool same_target = target.framebuffer() == shown_in_;
   for (StaleVolume& volume : stale_) volume.clear();
-  if (stage.empty() && same_panel) return {};
+  const bool rests =
+      std::all_of(stale.begin(), stale.end(), [](const Stale& one) { return one.stage.empty(); });
+  if (rests && same_target && panel == shown_figures_) return {};
 
-  renderer_->set_moving(moving);
-  std::vector<PixelRect> others;
-  if (!stage.empty()) others = draw_layers(hand, view, volumes, stage);
+  if (!same_target) clear(target);  // an odd column is nobody's
   const PixelRect panels = overlay_.prepare(panel, size);
-  if (same_target) {
-    others.push_back(panels.united(shown_.panels));  // they let the picture shine through
-  } else {
-    others = {target.all()};
+  double redrawn = 0.0;
+  for (std::size_t eye = 0; eye < eyes_.size(); ++eye) {
+    std::vector<PixelRect> others = draw_layers(eyes_[eye], stale[eye]);
+    const RenderTarget& seen = eyes_[eye].layers.smooth;
+    if (same_target) {
+      others.push_back(panels.united(shown_panels_));  // they let the picture shine through
+    } else {
+      others = {seen.all()};
+    }
+    for (const PixelRect& part : others) {
+      target.copy_colour(seen, part, static_cast<int>(eye) * size.width);
+    }
+    for (const PixelRect& part : stale[eye].volumes) redrawn += part.area();
   }
-  for (const PixelRect& part : others) target.copy_colour(layers_->smooth, part);
-  overlay_.draw(target);
+  overlay_.draw(target, static_cast<int>(eyes_.size()));
   glDisable(GL_SCISSOR_TEST);
-  shown_ = {view, moving, hand, panel, target.framebuffer(), panels};
-  double drawn = 0.0;
-  for (const PixelRect& part : volumes) drawn += part.area();
-  return {true, drawn / target.all().area()};
+  shown_figures_ = panel;
+  shown_in_ = target.framebuffer();
+  shown_panels_ = panels;
+  return {true, redrawn / (static_cast<double>(eyes_.size()) * size.width * size.height)};
 }
 
-void Picture::mark_volumes(StaleTiles& tiles, const Session& session, const View& view) const {
+bool Picture::handle(const Pointer& pointer, OverlayFigures& figures, PictureSize size) {
+  const PictureSize eye = eye_size(size);
+  Pointer within = pointer;
+  if (within.x >= eye.width) within.x -= eye.width;
+  return overlay_.handle(within, figures, eye);
+}
+
+Picture::Stale Picture::stale(const Eye& eye, const Shown& now, const Session& session) const {
+  const PixelRect all = eye.layers.stage.all();
+  // What was drawn coarsely settles when the camera does.
+  if (!eye.shown || now.moving || eye.shown->moving) return {now, {all}, {all}};
+  const PictureSize size = eye.layers.stage.size();
+  StaleTiles tiles(size);
+  mark_volumes(tiles, session, now.view, eye.layers.volumes);
+  std::vector<PixelRect> volumes = tiles.rects();
+  mark_hand(tiles, now, *eye.shown, size);
+  const std::vector<PixelRect> stage = tiles.rects();
+  if (renderer_->translucent()) volumes = stage;  // the hand is under them
+  return {now, volumes, stage};
+}
+
+void Picture::mark_volumes(StaleTiles& tiles, const Session& session, const View& view,
+                           const RenderTarget& kept) const {
   for (std::size_t v = 0; v < scene_.volumes.size(); ++v) {
-    stale_[v].mark(tiles, *renderer_, scene_.volumes[v], session.snapshot(v).density, view,
-                   layers_->volumes);
+    stale_[v].mark(tiles, *renderer_, scene_.volumes[v], session.snapshot(v).density, view, kept);
   }
 }
 
-void Picture::mark_hand(StaleTiles& tiles, const std::optional<Hand>& hand, const View& view,
+void Picture::mark_hand(StaleTiles& tiles, const Shown& now, const Shown& before,
                         PictureSize size) const {
-  if (hand == shown_.hand) return;
-  for (const auto& one : {hand, shown_.hand}) {
-    if (one) tiles.mark(hand_painter_.bounds(*one, view, size));
+  if (now.hand == before.hand) return;
+  for (const auto& one : {now.hand, before.hand}) {
+    if (one) tiles.mark(hand_painter_.bounds(*one, now.view, size));
   }
 }
 
-std::vector<PixelRect> Picture::draw_layers(const std::optional<Hand>& hand, const View& view,
-                                            std::span<const PixelRect> volumes,
-                                            std::span<const PixelRect> stage) {
+std::vector<PixelRect> Picture::draw_layers(Eye& eye, const Stale& stale) {
+  const auto& [view, moving, hand] = stale.now;
+  eye.shown = stale.now;
+  if (stale.stage.empty()) return {};
+  Layers& layers = eye.layers;
+  renderer_->set_moving(moving);
   const bool tool_first = renderer_->translucent();  // it shines through them
-  if (!volumes.empty()) {
-    layers_->volumes.restrict_to(volumes);
-    draw_backdrop(layers_->volumes);
-    if (hand && tool_first) hand_painter_.draw_tool(*hand, view, layers_->volumes);
-    layers_->volumes.bind();
-    renderer_->draw(view, layers_->volumes);
+  if (!stale.volumes.empty()) {
+    layers.volumes.restrict_to(stale.volumes);
+    draw_backdrop(layers.volumes);
+    if (hand && tool_first) hand_painter_.draw_tool(*hand, view, layers.volumes);
+    layers.volumes.bind();
+    renderer_->draw(view, layers.volumes);
   }
-  layers_->stage.restrict_to(stage);
-  for (const PixelRect& part : stage) layers_->stage.copy(layers_->volumes, part);
-  if (hand && !tool_first) hand_painter_.draw_tool(*hand, view, layers_->stage);
-  if (hand) hand_painter_.draw_force(*hand, view, layers_->stage);
+  layers.stage.restrict_to(stale.stage);
+  for (const PixelRect& part : stale.stage) layers.stage.copy(layers.volumes, part);
+  if (hand) {
+    std::vector<PixelRect> of_hand;
+    const PixelRect bounds = hand_painter_.bounds(*hand, view, layers.stage.size());
+    for (const PixelRect& part : stale.stage) {
+      const PixelRect both = part.clipped(bounds);
+      if (!both.empty()) of_hand.push_back(both);
+    }
+    layers.stage.restrict_to(of_hand);  // a mesh costs its vertices for each part
+    if (!tool_first) hand_painter_.draw_tool(*hand, view, layers.stage);
+    hand_painter_.draw_force(*hand, view, layers.stage);
+  }
   constexpr int kSmoothingReach = 3;  // pixels
   std::vector<PixelRect> smoothed;
-  for (const PixelRect& part : stage) smoothed.push_back(part.grown(kSmoothingReach));
-  layers_->smooth.restrict_to(smoothed);
-  smooth_edges(layers_->stage, layers_->smooth);
+  for (const PixelRect& part : stale.stage) smoothed.push_back(part.grown(kSmoothingReach));
+  layers.smooth.restrict_to(smoothed);
+  smooth_edges(layers.stage, layers.smooth);
   return smoothed;
 }
 

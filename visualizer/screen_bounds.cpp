@@ -15,7 +15,8 @@ PixelRect screen_bounds(std::span<const glm::dvec3> corners, const View& view, P
     const double depth_mm = -eye.z;
     if (!(depth_mm > view.near_mm)) return all;
     const double up = eye.y / (depth_mm * view.tan_half_height);
-    const double right = eye.x / (depth_mm * view.tan_half_height * view.aspect);
+    const double right =
+        (eye.x / depth_mm - view.middle_right) / (view.tan_half_height * view.aspect);
     x0 = std::min(x0, right);
     x1 = std::max(x1, right);
     y0 = std::min(y0, up);

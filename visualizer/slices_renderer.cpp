@@ -62,6 +62,13 @@ void SlicesRenderer::update(std::size_t volume, std::span<const Density> density
   volumes_[volume]->volume.update(0, density, changed);
 }
 
+void SlicesRenderer::set_opacities(std::span<const MaterialView> materials,
+                                   std::span<const VolumeContent> contents) {
+  for (std::size_t v = 0; v < volumes_.size(); ++v) {
+    volumes_[v]->volume.set_opacities(materials, contents.subspan(v, 1));
+  }
+}
+
 void SlicesRenderer::cut_volume(std::size_t volume, const View& view, double step_mm) {
   // A slice shows what lies up to a step before it, along rays that lean.
   constexpr double kMarginSteps = 2.0;

@@ -77,7 +77,8 @@ View look_at(glm::dvec3 eye_mm, glm::dvec3 at_mm, double near_mm, double far_mm)
 }
 
 PixelRay pixel_ray(const View& view, PictureSize size, int x, int y) {
-  const double right = ((x + 0.5) / size.width * 2.0 - 1.0) * view.tan_half_height * view.aspect;
+  const double right =
+      ((x + 0.5) / size.width * 2.0 - 1.0) * view.tan_half_height * view.aspect + view.middle_right;
   const double up = (1.0 - (y + 0.5) / size.height * 2.0) * view.tan_half_height;
   const glm::dmat4 world_from_eye = glm::inverse(view.eye_from_world);
   return {glm::dvec3(world_from_eye[3]), glm::dmat3(world_from_eye) * glm::dvec3(right, up, -1.0)};

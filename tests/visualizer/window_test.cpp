@@ -25,6 +25,7 @@
 #include "tests/visualizer/rgb_picture.hpp"
 #include "visualizer/error.hpp"
 #include "visualizer/run.hpp"
+#include "visualizer/transfer_file.hpp"
 
 using namespace kerf;
 using namespace kerf::test;
@@ -176,6 +177,7 @@ class User {
     act("key q");
     return code_.get();
   }
+  [[nodiscard]] const fs::path& out() const { return out_; }
   [[nodiscard]] nlohmann::json report() const {
     return nlohmann::json::parse(std::ifstream(report_));
   }
@@ -223,6 +225,34 @@ TEST_CASE("keys and mouse work the window") {
     const auto after = user.look();
     CHECK(user.quit() == 0);
     CHECK(after == first);
+  }
+  SUBCASE("t shows two eyes side by side, and one again") {
+    act("key t");
+    CHECK(user.look() != first);
+    act("key t");
+    CHECK(user.look() == first);
+    CHECK(user.quit() == 0);
+  }
+  SUBCASE("a slider changes an opacity while it is dragged, and w writes it") {
+    act("key v");
+    const auto blended = user.look();
+    act("mousemove 131 284 sleep 0.2 mousedown 1 sleep 0.2 mousemove 60 284 sleep 0.2");
+    CHECK(user.look() != blended);
+    act("mouseup 1 mousemove 300 180 key w");
+    CHECK(user.quit() == 0);
+    const Opacities written = read_transfer(user.out() / "kerf-0001.toml");
+    REQUIRE(written.size() == 1);
+    CHECK(written.at("bone") < 0.1);
+  }
+  SUBCASE("m films until m") {
+    act("key m sleep 0.3 key m");
+    CHECK(user.quit() == 0);
+    std::ifstream video(user.out() / "kerf-0001.y4m", std::ios::binary);
+    std::string line;
+    std::getline(video, line);
+    CHECK(line.find("YUV4MPEG2 W480 H360 F60:1 ") == 0);
+    std::getline(video, line);
+    CHECK(line == "FRAME");
   }
   SUBCASE("every panel may be shown") {
     act("key p key h sleep 0.2 key p key h");

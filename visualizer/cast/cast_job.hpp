@@ -62,6 +62,7 @@ struct CastJob {
   int volume_count = 0;
   CastPixels pixels;
   float half_width_at_1mm = 0.25F, half_height_at_1mm = 0.25F;
+  float middle_right_at_1mm = 0.0F;  ///< `View::middle_right`
   float near_mm = 1.0F, far_mm = 100.0F;
   float depth_far = 0.0F, depth_slope = 0.0F;  ///< equation (1): depth_far - depth_slope / t
   float step_vox = 0.75F;                      ///< iso: along the ray

@@ -50,6 +50,11 @@ void CastRenderer::update(std::size_t volume, std::span<const Density> density,
   caster_.update(volume, density, changed);
 }
 
+void CastRenderer::set_opacities(std::span<const MaterialView> materials,
+                                 std::span<const VolumeContent> /*contents*/) {
+  caster_.set_materials(make_palette(materials));
+}
+
 CastRenderer::Frame::Frame(PictureSize size) {
   picture.resize(size.width, size.height);
   end_depth.resize(picture.depth.size());

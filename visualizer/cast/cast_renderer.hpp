@@ -21,6 +21,8 @@ class CastRenderer final : public Renderer {
 
   void update(std::size_t volume, std::span<const Density> density,
               std::span<const std::uint32_t> changed) override;
+  void set_opacities(std::span<const MaterialView> materials,
+                     std::span<const VolumeContent> contents) override;
   void draw(const View& view, const RenderTarget& target) override;
   [[nodiscard]] bool feels_ahead() const noexcept override { return mode_ == CastMode::iso; }
   [[nodiscard]] bool translucent() const noexcept override { return mode_ == CastMode::blend; }

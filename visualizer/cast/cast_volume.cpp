@@ -45,15 +45,20 @@ CastVolume::CastVolume(const VolumeView& volume, const CastContent& content, Cas
       density_(checked(volume)),
       cells_(volume.bricks.grid, content.density, least_visible(mode, volume, content.matter),
              kCastCellVox) {
-  for (auto& row : matter_.materials) {
-    for (glm::vec4& material : row) material.w = -std::log2(1.0F - std::min(material.w, kMost));
-  }
+  set_materials(content.matter.materials);
   take_cells();
   density_.copy(bricks_.grid.box(), content.density);
   if (mode == CastMode::blend) gradient_.emplace(bricks_.grid, density_);
   if (content.labels.empty()) return;
   labels_.emplace(bricks_.grid);
   labels_->copy(bricks_.grid.box(), content.labels);
+}
+
+void CastVolume::set_materials(const Palette& materials) {
+  matter_.materials = materials;
+  for (auto& row : matter_.materials) {
+    for (glm::vec4& material : row) material.w = -std::log2(1.0F - std::min(material.w, kMost));
+  }
 }
 
 double CastVolume::edge_mm() const {

@@ -56,6 +56,10 @@ std::vector<BoxCorners> Caster::bodies() const {
   return bodies;
 }
 
+void Caster::set_materials(const Palette& materials) {
+  for (CastVolume& volume : volumes_) volume.set_materials(materials);
+}
+
 void Caster::draw(const View& view, std::span<const PixelRect> parts, CastPicture& picture,
                   std::span<const float> end_depth, std::span<float> normals) {
   CastJob job;
@@ -72,6 +76,7 @@ void Caster::draw(const View& view, std::span<const PixelRect> parts, CastPictur
                 end_depth.empty() ? nullptr : end_depth.data()};
   job.half_width_at_1mm = static_cast<float>(view.tan_half_height * view.aspect);
   job.half_height_at_1mm = static_cast<float>(view.tan_half_height);
+  job.middle_right_at_1mm = static_cast<float>(view.middle_right);
   job.near_mm = static_cast<float>(view.near_mm);
   job.far_mm = static_cast<float>(view.far_mm);
   // Equation (1) as depth_far - depth_slope / t.

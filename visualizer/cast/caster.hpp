@@ -45,6 +45,8 @@ class Caster {
 
   /// What each picture shows is in one of these boxes.
   [[nodiscard]] std::vector<BoxCorners> bodies() const;
+  /// Other colours and opacities for all volumes, as in `CastMatter`.
+  void set_materials(const Palette& materials);
 
   /// Draws `parts` of the picture; the rest of it stays. Rays of blend end at `end_depth` (window
   /// depth, one per pixel of the picture) where it is given. `normals` (three floats per pixel, or

@@ -44,7 +44,8 @@ inline Vec3 eye_directions(const CastJob& job, const Packet& packet) {
     const F centre = lane + Simd::set(static_cast<float>(first) + 0.5F);
     return centre * Simd::set(2.0F / static_cast<float>(size)) - Simd::set(1.0F);
   };
-  return {place(Simd::lane_x(), packet.x, job.pixels.width) * Simd::set(job.half_width_at_1mm),
+  return {place(Simd::lane_x(), packet.x, job.pixels.width) * Simd::set(job.half_width_at_1mm) +
+              Simd::set(job.middle_right_at_1mm),
           place(Simd::lane_y(), packet.y, job.pixels.height) * Simd::set(job.half_height_at_1mm),
           Simd::set(-1.0F)};
 }

@@ -17,10 +17,10 @@ void flip_rows(std::vector<T>& picture, std::size_t row, std::size_t rows) {
   }
 }
 
-void copy_texture(const GlTexture2D& from, const GlTexture2D& to, const PixelRect& r) {
+void copy_texture(const GlTexture2D& from, const GlTexture2D& to, const PixelRect& r, int right) {
   if (r.empty()) return;
-  glCopyImageSubData(from.id(), GL_TEXTURE_2D, 0, r.x0, r.y0, 0, to.id(), GL_TEXTURE_2D, 0, r.x0,
-                     r.y0, 0, r.x1 - r.x0, r.y1 - r.y0, 1);
+  glCopyImageSubData(from.id(), GL_TEXTURE_2D, 0, r.x0, r.y0, 0, to.id(), GL_TEXTURE_2D, 0,
+                     right + r.x0, r.y0, 0, r.x1 - r.x0, r.y1 - r.y0, 1);
 }
 
 }  // namespace
@@ -59,11 +59,11 @@ void RenderTarget::bind() const {
 
 void RenderTarget::copy(const RenderTarget& from, const PixelRect& part) const {
   copy_colour(from, part);
-  copy_texture(from.depth_, depth_, part.clipped(all()));
+  copy_texture(from.depth_, depth_, part.clipped(all()), 0);
 }
 
-void RenderTarget::copy_colour(const RenderTarget& from, const PixelRect& part) const {
-  copy_texture(from.colour_, colour_, part.clipped(all()));
+void RenderTarget::copy_colour(const RenderTarget& from, const PixelRect& part, int right) const {
+  copy_texture(from.colour_, colour_, part.clipped(from.all()), right);
 }
 
 std::vector<std::uint8_t> RenderTarget::read_rgb() const {

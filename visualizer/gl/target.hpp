@@ -54,8 +54,9 @@ class RenderTarget {
   }
   /// Takes colour and depth of `part` over from a target of the same size.
   void copy(const RenderTarget& from, const PixelRect& part) const;
-  /// The same without the depth.
-  void copy_colour(const RenderTarget& from, const PixelRect& part) const;
+  /// Takes the colour of `part` of another target over, to the same place or to one `right` pixels
+  /// farther right; all of it must fit.
+  void copy_colour(const RenderTarget& from, const PixelRect& part, int right = 0) const;
   /// RGB, 3 bytes per pixel, first row at the top. Waits until the picture is complete.
   [[nodiscard]] std::vector<std::uint8_t> read_rgb() const;
   /// Window depth 0..1, first row at the top.

@@ -54,7 +54,7 @@ BlockBounds bounds_of(const BlockMesh& mesh, VoxelIndex block) {
           .normal_half = 0.5F * (normal_high - normal_low)};
 }
 
-Sight::Sight(const glm::dmat4& clip_from_voxel, const glm::dvec3& eye_voxel,
+Sight::Sight(const glm::dmat4& clip_from_voxel, const std::optional<glm::dvec3>& eye_voxel,
              std::span<const Part> parts)
     : eye_(eye_voxel) {
   // A point shows where w*lo <= x <= w*hi and so on (Gribb and Hartmann 2001).
@@ -76,7 +76,7 @@ bool Sight::may_show(const BlockBounds& block) const {
                      [&](const Planes& part) {
                        return std::none_of(part.begin(), part.end(), is_beyond);
                      }) &&
-         !faces_away(eye_, block);
+         !(eye_ && faces_away(*eye_, block));
 }
 
 }  // namespace kerf

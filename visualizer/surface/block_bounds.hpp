@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -29,7 +30,9 @@ class Sight {
   struct Part {
     glm::dvec2 lo, hi;
   };
-  Sight(const glm::dmat4& clip_from_voxel, const glm::dvec3& eye_voxel,
+  /// Without an eye blocks count that are seen from behind, as where a clip plane opens the
+  /// surface.
+  Sight(const glm::dmat4& clip_from_voxel, const std::optional<glm::dvec3>& eye_voxel,
         std::span<const Part> parts);
 
   /// False only where nothing in the box is in sight, or all of it is seen from behind.
@@ -39,7 +42,7 @@ class Sight {
   /// Positive inside.
   using Planes = std::array<glm::vec4, 4>;
 
-  glm::vec3 eye_;
+  std::optional<glm::vec3> eye_;
   std::array<glm::vec4, 2> near_far_;
   std::vector<Planes> parts_;
 };

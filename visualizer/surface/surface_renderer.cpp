@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "visualizer/surface/surface_renderer.hpp"
 
+#include <optional>
 #include <utility>
 
 #include <glm/gtc/matrix_inverse.hpp>
+
+#include "visualizer/view_uniforms.hpp"
 
 namespace kerf {
 
@@ -48,10 +51,12 @@ void SurfaceRenderer::draw(const View& view, const RenderTarget& target) {
   target.bind();
   glEnable(GL_DEPTH_TEST);
   glDepthFunc(GL_LESS);
-  glEnable(GL_CULL_FACE);
+  const bool opened = view.shown != View{}.shown;
+  (opened ? glDisable : glEnable)(GL_CULL_FACE);
+  if (opened) glEnable(GL_CLIP_DISTANCE0);
   glDisable(GL_BLEND);
   program_.set("u_clip_from_eye", glm::mat4(view.clip_from_eye()));
-  program_.set("u_up_eye", glm::vec3(view.eye_from_world * glm::dvec4(0, 1, 0, 0)));
+  set_view(program_, view);
   program_.use();
   const std::vector<Sight::Part> parts = drawn_parts(target);
   for (Volume& volume : volumes_) {
@@ -59,10 +64,12 @@ void SurfaceRenderer::draw(const View& view, const RenderTarget& target) {
     program_.set("u_eye_from_voxel", glm::mat4(eye_from_voxel));
     program_.set("u_eye_from_voxel_normal",
                  glm::mat3(glm::inverseTranspose(glm::dmat3(eye_from_voxel))));
-    volume.gpu.draw(Sight(view.clip_from_eye() * eye_from_voxel,
-                          glm::dvec3(glm::affineInverse(eye_from_voxel)[3]), parts));
+    std::optional<glm::dvec3> eye_voxel;
+    if (!opened) eye_voxel = glm::dvec3(glm::affineInverse(eye_from_voxel)[3]);
+    volume.gpu.draw(Sight(view.clip_from_eye() * eye_from_voxel, eye_voxel, parts));
   }
   glDisable(GL_CULL_FACE);
+  glDisable(GL_CLIP_DISTANCE0);
 }
 
 }  // namespace kerf

@@ -13,6 +13,9 @@ namespace kerf {
 /// Iso-surfaces as meshes: marching cubes on the CPU, again only around what changed; the GPU draws
 /// triangles and never sees the volume.
 ///
+/// A clip plane opens the shell that a mesh is, and shows its inside; there is no face in the
+/// plane.
+///
 /// Honours the GL scissor: blocks beside it are not drawn at all.
 class SurfaceRenderer final : public Renderer {
  public:
@@ -24,7 +27,6 @@ class SurfaceRenderer final : public Renderer {
   /// The meshes tell exactly.
   [[nodiscard]] std::vector<VoxelBox> looks_different(
       std::size_t volume, std::span<const VoxelBox> differs) const override;
-  [[nodiscard]] bool clips() const noexcept override { return false; }
 
  private:
   struct Volume {
