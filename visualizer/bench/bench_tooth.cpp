@@ -176,11 +176,11 @@ void BenchTooth::take_ball(const VoxelBox& brick, VoxelIndex centre, double radi
 /// To and fro across the crown, a row lower each time; from there in to what is left of the tooth.
 VoxelIndex BenchTooth::next_place() {
   constexpr int kPlacesAcross = 12, kRows = 6;
+  constexpr int kStride = 5;  // not beside the last cut, which would be deepened
   constexpr double kWidth = 0.36, kTop = 0.82, kRowStep = 0.045;
   const VoxelGrid& grid = view().bricks.grid;
-  const int row = cuts_ / kPlacesAcross % kRows;
-  const int along = cuts_ % kPlacesAcross;
-  const int across = row % 2 == 0 ? along : kPlacesAcross - 1 - along;
+  const int row = cuts_ % kRows;
+  const int across = kStride * cuts_ % kPlacesAcross;
   ++cuts_;
   const double x = kWidth * ((across + 0.5) / kPlacesAcross - 0.5);
   VoxelIndex place{grid.nx / 2 + static_cast<int>(std::lround(x * grid.nz)), 0,

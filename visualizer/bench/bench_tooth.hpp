@@ -29,8 +29,8 @@ class BenchTooth {
   [[nodiscard]] const std::vector<Density>& density() const noexcept { return density_; }
   [[nodiscard]] VolumeContent content() const { return {density_, {}}; }
 
-  /// Takes away a ball of `diameter` voxels at the next place along a path on the crown's side
-  /// that the camera sees.
+  /// Takes away a ball of `diameter` voxels at the next place on the crown's side that the camera
+  /// sees. A dozen places lie apart; after many a small tooth is bored through.
   BenchCut cut(int diameter);
 
  private:
