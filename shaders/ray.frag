@@ -4,12 +4,13 @@
 // axis, so t is the eye distance of the paper's equation (1).
 
 uniform vec2 u_half_size_at_1mm;  // half the picture, 1 mm from the eye
+uniform vec2 u_middle_at_1mm;     // the picture's middle, from the view axis
 uniform float u_near_mm;
 uniform float u_far_mm;
 uniform vec4 u_shown_eye;  // clip plane: shown where dot(this, (p, 1)) >= 0, p in eye mm
 
 // Where the ray of a pixel is 1 mm from the eye.
-vec3 eye_direction_at(vec2 ndc) { return vec3(ndc * u_half_size_at_1mm, -1.0); }
+vec3 eye_direction_at(vec2 ndc) { return vec3(u_middle_at_1mm + ndc * u_half_size_at_1mm, -1.0); }
 
 // The part of a ray between the near, the far and the clip plane: t from x to y.
 vec2 shown_mm(vec3 eye_direction) {

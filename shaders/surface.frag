@@ -2,6 +2,9 @@
 #version 450 core
 // The surface of a volume: material and openness come with the vertices, light falls on each pixel.
 // Depth is that of the projection, which is equation (1): not written, so hidden pixels cost nothing.
+//
+// A mesh is a shell: where the clip plane opens it, its inner side is seen, in the same colours and
+// with half of the light from the sky.
 
 in vec3 v_eye_mm;
 in vec3 v_normal;
@@ -17,6 +20,8 @@ void main() {
   vec3 to_eye = -normalize(v_eye_mm);
   vec3 normal = normalize(v_normal);
   // What is seen faces the eye, whatever the gradient says at a silhouette.
+  if (!gl_FrontFacing) normal = -normal;
   if (dot(normal, to_eye) < 0.0) normal = normalize(normal - 1.02 * dot(normal, to_eye) * to_eye);
-  o_colour = vec4(srgb(lit(v_look.rgb, normal, to_eye, u_up_eye, v_look.a)), 1.0);
+  float openness = gl_FrontFacing ? v_look.a : 0.5;
+  o_colour = vec4(srgb(lit(v_look.rgb, normal, to_eye, u_up_eye, openness)), 1.0);
 }

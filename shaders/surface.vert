@@ -10,6 +10,7 @@ layout(location = 3) in vec3 a_block;     // block (i, j, k) starts at voxel 8i 
 uniform mat4 u_eye_from_voxel;  // to mm
 uniform mat3 u_eye_from_voxel_normal;
 uniform mat4 u_clip_from_eye;
+uniform vec4 u_shown_eye;  // clip plane: shown where dot(this, (p, 1)) >= 0, p in eye mm
 
 out vec3 v_eye_mm;
 out vec3 v_normal;
@@ -22,5 +23,6 @@ void main() {
   v_eye_mm = eye.xyz;
   v_normal = u_eye_from_voxel_normal * a_normal;
   v_look = a_look;
+  gl_ClipDistance[0] = dot(u_shown_eye, eye);
   gl_Position = u_clip_from_eye * eye;
 }

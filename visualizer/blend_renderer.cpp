@@ -22,19 +22,24 @@ void BlendRenderer::update(std::size_t volume, std::span<const Density> density,
   volumes_.update(volume, density, changed);
 }
 
+void BlendRenderer::set_opacities(std::span<const MaterialView> materials,
+                                  std::span<const VolumeContent> contents) {
+  volumes_.set_opacities(materials, contents);
+}
+
 void BlendRenderer::draw(const View& view, const RenderTarget& target) {
   int layer = 0;
   for (const TranslucentVolume& volume : volumes_.volumes()) {
-    entries_.draw(layer++, volume.cells(), view, target.size());
+    entries_.draw(layer++, volume.cells(), view, target);
   }
-  layer_.begin(target.size());
+  layer_.begin(target);
   volumes_.bind(cast_program_, view);
   set_view(cast_program_, view);
   entries_.bind(volumes_.free_unit());
   glBindTextureUnit(volumes_.free_unit() + 1, target.depth_texture());
   cast_program_.use();
   glBindVertexArray(no_vertices_.id());
-  glDrawArrays(GL_TRIANGLES, 0, 3);
+  target.for_parts([] { glDrawArrays(GL_TRIANGLES, 0, 3); });
   layer_.finish(target);
 }
 

@@ -27,6 +27,8 @@ class BlendRenderer final : public Renderer {
 
   void update(std::size_t volume, std::span<const Density> density,
               std::span<const std::uint32_t> changed) override;
+  void set_opacities(std::span<const MaterialView> materials,
+                     std::span<const VolumeContent> contents) override;
   void draw(const View& view, const RenderTarget& target) override;
   [[nodiscard]] bool translucent() const noexcept override { return true; }
 

@@ -30,6 +30,7 @@ glm::dmat4 View::clip_from_eye() const {
   glm::dmat4 m(0.0);
   m[0][0] = 1.0 / (tan_half_height * aspect);
   m[1][1] = 1.0 / tan_half_height;
+  m[2][0] = middle_right / (tan_half_height * aspect);
   m[2][2] = -(f + n) / (f - n);
   m[2][3] = -1.0;
   m[3][2] = -2.0 * f * n / (f - n);

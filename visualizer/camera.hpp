@@ -24,6 +24,9 @@ struct View {
   glm::dmat4 eye_from_world{1.0};
   double tan_half_height = 0.25;  ///< half the picture's height at 1 mm from the eye, in mm
   double aspect = 1.0;            ///< width over height
+  /// The picture's middle, 1 mm from the eye, lies this far to the right of the view axis, in mm:
+  /// not 0 for an eye that looks straight ahead through a window beside it.
+  double middle_right = 0.0;
   double near_mm = 1.0;
   double far_mm = 100.0;
   /// Clip plane: of volumes only points with dot(shown, (x, y, z, 1)) >= 0 are drawn, in world mm;
@@ -48,6 +51,8 @@ class OrbitCamera {
 
   /// The near and far planes hold all that is within `reach_mm` of the framed box's centre.
   [[nodiscard]] View view(double aspect, double reach_mm) const;
+  /// From the eye to the point that it turns about.
+  [[nodiscard]] double distance_mm() const noexcept { return distance_mm_; }
 
  private:
   [[nodiscard]] glm::dmat3 eye_axes() const;  ///< rows: right, up, backward in world axes

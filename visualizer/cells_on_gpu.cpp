@@ -25,11 +25,7 @@ CellsOnGpu::CellsOnGpu(const VolumeView& volume, std::span<const Density> densit
 
 void CellsOnGpu::update_bricks(std::span<const Density> density,
                                std::span<const std::uint32_t> changed) {
-  bool flipped = false;
-  for (const std::uint32_t id : changed) {
-    flipped = cells_.update_brick(bricks_.brick(id), density) || flipped;
-  }
-  if (flipped) upload();
+  if (cells_.update_bricks(bricks_, changed, density)) upload();
 }
 
 void CellsOnGpu::upload() {

@@ -3,17 +3,22 @@
 #include <array>
 #include <chrono>
 #include <cstdio>
+#include <optional>
 #include <thread>
 
+#include "shared/posix/new_file.hpp"
+#include "visualizer/contact_sheet.hpp"
 #include "visualizer/cpu_placement.hpp"
 #include "visualizer/file_out.hpp"
 #include "visualizer/frame_report.hpp"
 #include "visualizer/frame_schedule.hpp"
 #include "visualizer/gl/context.hpp"
 #include "visualizer/picture.hpp"
+#include "visualizer/recording.hpp"
 #include "visualizer/run.hpp"
 #include "visualizer/stop_signal.hpp"
 #include "visualizer/surface/export_surface.hpp"
+#include "visualizer/transfer_file.hpp"
 
 namespace kerf {
 
@@ -46,6 +51,7 @@ class FrameTaker {
     if (!report_.wall_ms.empty()) figures.frame_rate_hz = kMsPerS / report_.wall_ms.back();
     draw_measured(picture_, session, figures, target_, report_);
   }
+  [[nodiscard]] const RenderTarget& target() const noexcept { return target_; }
   void write(const std::filesystem::path& file) const {
     write_png(file, target_.size(), target_.read_rgb());
   }
@@ -56,12 +62,26 @@ class FrameTaker {
   FrameReport& report_;
 };
 
+void tell(const VisualizerOptions& options, const FrameSchedule& schedule,
+          const std::optional<Recording>& recording, const FrameReport& report) {
+  if (schedule.taken() > 0) {
+    std::printf("%u pictures in %s, ", schedule.taken(), options.out.c_str());
+  }
+  if (recording) {
+    const VideoFile& video = recording->file();
+    std::printf("%ju frames in %s, ", std::uintmax_t{video.frames()}, video.path().c_str());
+  }
+  std::printf("%.1f cpu ms each (%s)\n", percentile(report.cpu_ms, 0.5),
+              report.gl_renderer.c_str());
+}
+
 }  // namespace
 
 int run_headless(const VisualizerOptions& options) {
   place_process(options.cpus);
-  make_folder(options.out);
+  if (options.frames > 0) make_folder(options.out);
   if (options.mesh) check_export(*options.mesh);
+  if (options.sheet) check_new_file(*options.sheet);
   const auto context = make_headless_context();
   const GlDriver driver = query_gl_driver();
   FrameReport report{.renderer = options.renderer,
@@ -71,10 +91,13 @@ int run_headless(const VisualizerOptions& options) {
                      .height = options.size.height};
 
   Session session = Session::attach(options.name, std::chrono::duration<double>(options.wait_s));
+  if (options.transfer) {
+    check_materials(options.opacities, session.scene(), options.transfer->string());
+  }
   report.attach_ms = session.attach_ms();
   const Stopwatch since_attached;
   const double aspect = static_cast<double>(options.size.width) / options.size.height;
-  Picture picture(session, {.renderer = options.renderer}, aspect);
+  Picture picture(session, first_look(options), aspect);
   FrameTaker taker(picture, options.size, report);
   taker.draw(session);  // not kept: the driver compiles shaders at their first use
   report.late_join_ms = since_attached.wall_ms();
@@ -83,32 +106,47 @@ int run_headless(const VisualizerOptions& options) {
   report.redrawn.clear();
   report.latency_ms.clear();
 
+  std::optional<Recording> recording;
+  if (options.record) recording.emplace(*options.record, options.size, options.video_hz);
   FrameSchedule schedule(options.frames, ticks_between(options, session.tick_ns()));
   bool over = false;
-  while (!over && !schedule.complete()) {
+  while (!over && (recording || !schedule.complete())) {
     over = session.ended() || stop_requested() ||
            (options.seconds && since_attached.wall_ms() >= *options.seconds * kMsPerS);
     session.poll();
     picture.update(session);
     const auto ticks = session.ticks_since_armed();
-    if (over ? schedule.final_due(ticks) : schedule.due(ticks)) taker.draw(session);
+    const bool filmed = recording && ticks && recording->due(session.servo_s());
+    if (filmed || (over ? schedule.final_due(ticks) : schedule.due(ticks))) taker.draw(session);
+    if (filmed) film(recording, taker.target(), session.servo_s());
     while (over ? schedule.final_due(ticks) : schedule.due(ticks)) {
       taker.write(frame_file(options.out, schedule.take(ticks)));
       if (!over) break;  // late pictures show the present, each its own
     }
-    if (!over) std::this_thread::sleep_for(kIdle);
+    if (over) continue;
+    std::chrono::duration<double> pause = kIdle;
+    if (recording && ticks) {
+      // A frame begins when it is due, not up to a pause later: its delay counts as latency.
+      const std::chrono::duration<double> due(recording->due_in_s(session.servo_s()));
+      pause = std::clamp(due, std::chrono::duration<double>::zero(), pause);
+    }
+    std::this_thread::sleep_for(pause);
   }
 
   if (options.mesh) export_surface(*options.mesh, session.scene(), session.contents());
+  if (options.sheet) {
+    std::optional<Hand> hand;
+    if (session.latest()) hand = hand_of(*session.latest());
+    write_contact_sheet(*options.sheet, session.scene(), session.contents(), hand);
+  }
   report.bricks_uploaded = picture.bricks_uploaded();
   report.clean_end = session.ended_cleanly();
   if (options.report) report.write(*options.report);
-  std::printf("%u pictures in %s, %.1f cpu ms each (%s)\n", schedule.taken(),
-              options.out.string().c_str(), percentile(report.cpu_ms, 0.5),
-              driver.renderer.c_str());
+  tell(options, schedule, recording, report);
+  const bool unfilmed = options.record && !recording;
   const bool lost = session.ended() && !session.ended_cleanly();
   if (lost) std::fprintf(stderr, "kerf-visualizer: the controller went away without a clean end\n");
-  return lost ? 1 : 0;
+  return lost || unfilmed ? 1 : 0;
 }
 
 }  // namespace kerf

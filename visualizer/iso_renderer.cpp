@@ -46,7 +46,7 @@ void IsoRenderer::update(std::size_t volume, std::span<const Density> density,
 
 void IsoRenderer::draw(const View& view, const RenderTarget& target) {
   for (const VolumeOnGpu& volume : volumes_) {
-    entries_.draw(0, volume.cells(), view, target.size());
+    entries_.draw(0, volume.cells(), view, target);
     cast_rays(volume, view, target);
   }
 }
@@ -66,7 +66,7 @@ void IsoRenderer::cast_rays(const VolumeOnGpu& volume, const View& view,
   cast_program_.set("u_has_labels", volume.has_labels() ? 1 : 0);
   cast_program_.use();
   glBindVertexArray(no_vertices_.id());
-  glDrawArrays(GL_TRIANGLES, 0, 3);
+  target.for_parts([] { glDrawArrays(GL_TRIANGLES, 0, 3); });
 }
 
 }  // namespace kerf

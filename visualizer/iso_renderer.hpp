@@ -28,6 +28,7 @@ class IsoRenderer final : public Renderer {
   void update(std::size_t volume, std::span<const Density> density,
               std::span<const std::uint32_t> changed) override;
   void draw(const View& view, const RenderTarget& target) override;
+  [[nodiscard]] bool feels_ahead() const noexcept override { return true; }
 
  private:
   void cast_rays(const VolumeOnGpu& volume, const View& view, const RenderTarget& target);

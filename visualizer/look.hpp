@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <map>
 #include <optional>
 #include <string>
 
@@ -14,11 +15,24 @@ struct ClipPlane {
   friend bool operator==(const ClipPlane&, const ClipPlane&) noexcept = default;
 };
 
+/// Two eyes side by side; lengths in mm.
+struct Stereo {
+  bool on = false;
+  std::optional<double> eyes_mm{};         ///< none: `kEyesPerConvergence` of the next
+  std::optional<double> convergence_mm{};  ///< none: as far as what the camera turns about
+  friend bool operator==(const Stereo&, const Stereo&) noexcept = default;
+};
+
+/// Opacity over one voxel edge, 0..1, by the name of the material.
+using Opacities = std::map<std::string, double>;
+
 /// How the volumes are shown: what a user may change while they are looked at.
 struct Look {
   std::string renderer = "iso";  ///< as on the command line
   std::optional<double> iso{};   ///< of all volumes, 0..1 of full density; none: each its own
+  Opacities opacities{};         ///< of the others: their own
   ClipPlane clip{};
+  Stereo stereo{};
   friend bool operator==(const Look&, const Look&) noexcept = default;
 };
 

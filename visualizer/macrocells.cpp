@@ -3,11 +3,15 @@
 
 #include <algorithm>
 
+#include "shared/segment/brick_grid.hpp"
+
 namespace kerf {
 
-Macrocells::Macrocells(VoxelGrid volume, std::span<const Density> density, Density iso)
+Macrocells::Macrocells(VoxelGrid volume, std::span<const Density> density, Density iso,
+                       std::int32_t edge)
     : volume_(volume),
-      grid_{volume.nx / kEdge + 1, volume.ny / kEdge + 1, volume.nz / kEdge + 1},
+      edge_(edge),
+      grid_{volume.nx / edge + 1, volume.ny / edge + 1, volume.nz / edge + 1},
       iso_(iso),
       maxima_(grid_.voxel_count()),
       active_(grid_.voxel_count()) {
@@ -19,9 +23,9 @@ Macrocells::Macrocells(VoxelGrid volume, std::span<const Density> density, Densi
 }
 
 bool Macrocells::update_cell(VoxelIndex cell, std::span<const Density> density) {
-  const VoxelIndex lo{cell.x * kEdge - 1, cell.y * kEdge - 1, cell.z * kEdge - 1};
+  const VoxelIndex lo{cell.x * edge_ - 1, cell.y * edge_ - 1, cell.z * edge_ - 1};
   const VoxelBox box =
-      VoxelBox{lo, {lo.x + kEdge + 1, lo.y + kEdge + 1, lo.z + kEdge + 1}}.clipped(volume_.box());
+      VoxelBox{lo, {lo.x + edge_ + 1, lo.y + edge_ + 1, lo.z + edge_ + 1}}.clipped(volume_.box());
   Density highest = 0;
   for (std::int32_t z = box.lo.z; z < box.hi.z; ++z) {
     for (std::int32_t y = box.lo.y; y < box.hi.y; ++y) {
@@ -37,15 +41,33 @@ bool Macrocells::update_cell(VoxelIndex cell, std::span<const Density> density) 
   return active_[at] != before;
 }
 
-bool Macrocells::update_brick(VoxelIndex at, std::span<const Density> density) {
-  const VoxelBox touched = VoxelBox{at, {at.x + 2, at.y + 2, at.z + 2}}.clipped(grid_.box());
-  bool flipped = false;
-  for (std::int32_t z = touched.lo.z; z < touched.hi.z; ++z) {
-    for (std::int32_t y = touched.lo.y; y < touched.hi.y; ++y) {
-      for (std::int32_t x = touched.lo.x; x < touched.hi.x; ++x) {
-        flipped = update_cell({x, y, z}, density) || flipped;
+bool Macrocells::update_bricks(const BrickGrid& bricks, std::span<const std::uint32_t> changed,
+                               std::span<const Density> density) {
+  const std::int32_t per_brick = kBrickEdge / edge_;
+  // Samples of a cell reach a voxel beyond it, so that bricks side by side share cells: each once.
+  std::vector<std::size_t> touched;
+  for (const std::uint32_t id : changed) {
+    const VoxelIndex at = bricks.brick(id);
+    const auto beyond = [&](std::int32_t brick) { return (brick + 1) * per_brick + 1; };
+    const VoxelBox cells = VoxelBox{
+        {at.x * per_brick, at.y * per_brick, at.z * per_brick},
+        {beyond(at.x), beyond(at.y),
+         beyond(at.z)}}.clipped(grid_.box());
+    for (std::int32_t z = cells.lo.z; z < cells.hi.z; ++z) {
+      for (std::int32_t y = cells.lo.y; y < cells.hi.y; ++y) {
+        for (std::int32_t x = cells.lo.x; x < cells.hi.x; ++x) {
+          touched.push_back(grid_.index(x, y, z));
+        }
       }
     }
+  }
+  std::sort(touched.begin(), touched.end());
+  touched.erase(std::unique(touched.begin(), touched.end()), touched.end());
+  bool flipped = false;
+  for (const std::size_t cell : touched) {
+    const auto i = static_cast<std::int32_t>(cell);
+    const VoxelIndex at{i % grid_.nx, i / grid_.nx % grid_.ny, i / grid_.nx / grid_.ny};
+    flipped = update_cell(at, density) || flipped;
   }
   return flipped;
 }

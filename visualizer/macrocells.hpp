@@ -6,25 +6,29 @@
 #include <span>
 #include <vector>
 
-#include "shared/volume/voxel_grid.hpp"
+#include "shared/segment/brick_grid.hpp"
 
 namespace kerf {
 
-/// The highest density in each cell of 8^3 voxel edges, so that rays pass over cells that cannot
+/// The highest density in each cell of e^3 voxel edges, so that rays pass over cells that cannot
 /// hold the iso-surface.
 ///
 /// Air surrounds the volume: its surface is closed at the border too. Cell (i, j, k) spans voxel
-/// coordinates 8i-1 to 8i+7 on each axis and its maximum covers both ends, so it bounds every
-/// trilinear sample in the cell. A changed brick (voxels 8b to 8b+7) touches cells b and b+1.
+/// coordinates ei-1 to ei+e-1 on each axis and its maximum covers both ends, so it bounds every
+/// trilinear sample in the cell. A changed brick (voxels 8b to 8b+7) touches cells 8b/e to
+/// 8(b+1)/e.
 class Macrocells {
  public:
   static constexpr std::int32_t kEdge = 8;
 
-  Macrocells(VoxelGrid volume, std::span<const Density> density, Density iso);
+  /// `edge` divides that of a brick.
+  Macrocells(VoxelGrid volume, std::span<const Density> density, Density iso,
+             std::int32_t edge = kEdge);
 
-  /// Recomputes the cells that brick `at` (in bricks, not voxels) touches. Returns whether a cell
-  /// became active or inactive.
-  bool update_brick(VoxelIndex at, std::span<const Density> density);
+  /// Recomputes the cells that bricks `changed` touch. Returns whether a cell became active or
+  /// inactive.
+  bool update_bricks(const BrickGrid& bricks, std::span<const std::uint32_t> changed,
+                     std::span<const Density> density);
 
   [[nodiscard]] const VoxelGrid& grid() const noexcept { return grid_; }
   [[nodiscard]] std::span<const Density> maxima() const noexcept { return maxima_; }
@@ -39,6 +43,7 @@ class Macrocells {
   bool update_cell(VoxelIndex cell, std::span<const Density> density);
 
   VoxelGrid volume_;
+  std::int32_t edge_;
   VoxelGrid grid_;
   Density iso_;
   std::vector<Density> maxima_;

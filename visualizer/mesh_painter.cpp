@@ -70,7 +70,7 @@ void MeshPainter::draw(const GpuMesh& mesh, const glm::dmat4& world_from_mesh, c
   glEnable(GL_CULL_FACE);
   glDisable(GL_BLEND);
   set_uniforms(world_from_mesh, paint, 1.0F, view);
-  mesh.draw();
+  mesh.draw();  // once within the bounds: beside the parts it is there already, at the same depth
   glDisable(GL_CULL_FACE);
 }
 
@@ -95,9 +95,9 @@ void MeshPainter::draw_arrow(const glm::dvec3& foot_mm, const glm::dvec3& arrow_
   glDepthMask(GL_FALSE);
   glEnable(GL_CULL_FACE);
   set_uniforms(shaft, paint, kFaint, view);
-  cylinder_.draw();
+  target.for_parts([&] { cylinder_.draw(); });
   set_uniforms(tip, paint, kFaint, view);
-  cone_.draw();
+  target.for_parts([&] { cone_.draw(); });
   glDepthMask(GL_TRUE);
   glDepthFunc(GL_LESS);
   draw(cylinder_, shaft, paint, view, target);

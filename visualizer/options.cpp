@@ -3,24 +3,21 @@
 
 #include <algorithm>
 #include <charconv>
+#include <iomanip>
 #include <iostream>
+#include <sstream>
 #include <string_view>
 
 #include <CLI/CLI.hpp>
 
 #include "visualizer/error.hpp"
+#include "visualizer/keys.hpp"
 #include "visualizer/renderer.hpp"
+#include "visualizer/transfer_file.hpp"
 
 namespace kerf {
 
 namespace {
-
-constexpr const char* kKeys =
-    "In the window: drag turns, shift or middle drag moves, the wheel zooms, 1..9 take a tool,\n"
-    "v next renderer, c clip plane, p plot, r first view, s screenshot, e export the surface, h "
-    "keys, q "
-    "quit.\n"
-    "Exit codes: 0 fine, 1 the controller did not end cleanly, 2 bad input or set-up.";
 
 constexpr const char* kBenchSize = "512x512";  // the paper's
 
@@ -30,7 +27,40 @@ std::string one_line(std::string text) {
   return text;
 }
 
+std::string footer() {
+  std::ostringstream text;
+  text << "In the window (files go to --out):\n";
+  constexpr int kColumn = 22;
+  for (const auto& [key, meaning] : kKeys) {
+    text << "  " << std::left << std::setw(kColumn) << key << meaning << "\n";
+  }
+  text << "Exit codes: 0 fine, 1 the controller did not end cleanly or a video is cut short, 2 bad "
+          "input or set-up, or the screen or the graphics card is gone.";
+  return text.str();
+}
+
+std::string limits(double lowest, double highest) {
+  std::ostringstream text;
+  text << "[" << lowest << " - " << highest << "]";
+  return text.str();
+}
+
+/// CLI::Range takes "nan" for a number in any range.
+CLI::Validator range(double lowest, double highest) {
+  const auto check = [=](const std::string& text) {
+    double value = 0.0;
+    const bool inside =
+        CLI::detail::lexical_cast(text, value) && value >= lowest && value <= highest;
+    return inside ? std::string() : text + " is no number in " + limits(lowest, highest);
+  };
+  return {check, limits(lowest, highest)};
+}
+
 }  // namespace
+
+Look first_look(const VisualizerOptions& options) {
+  return {.renderer = options.renderer, .opacities = options.opacities, .stereo = options.stereo};
+}
 
 PictureSize parse_size(const std::string& text) {
   const std::string_view all = text;
@@ -55,13 +85,25 @@ std::optional<VisualizerOptions> parse_options(int argc, const char* const* argv
   std::string size = "800x600";
   CLI::App app("Shows what a kerf-controller feels and mills, in a window or as PNG pictures.",
                "kerf-visualizer");
-  app.footer(kKeys);
+  app.footer(footer());
   app.set_version_flag("--version", std::string("kerf-visualizer " KERF_VERSION));
   app.add_option("--name", options.name, "the controller's name")->capture_default_str();
   app.add_option("--renderer", options.renderer, "how volumes are drawn: " + known_renderers())
       ->capture_default_str();
   app.add_option("--size", size, "width and height in pixels")->capture_default_str();
-  app.add_flag("--headless", options.headless, "no window: pictures into --out");
+  app.add_option(
+         "--transfer", options.transfer,
+         "opacity of each material, TOML, for blend, slices and cast-blend; in the window w "
+         "writes it")
+      ->type_name("FILE");
+  app.add_flag("--stereo", options.stereo.on, "two eyes side by side, each in half the width");
+  app.add_option("--eyes", options.stereo.eyes_mm,
+                 "stereo: mm between the eyes; negative: crossed (default: 1/30 of --convergence)")
+      ->check(range(-1e3, 1e3));
+  app.add_option("--convergence", options.stereo.convergence_mm,
+                 "stereo: mm to what lies in the screen (default: to where the camera looks)")
+      ->check(range(1.0, 1e6));
+  auto* headless = app.add_flag("--headless", options.headless, "no window: pictures into --out");
   app.add_option("--frames", options.frames, "headless: number of pictures")
       ->check(CLI::Range(1, 9999))
       ->capture_default_str();
@@ -70,9 +112,9 @@ std::optional<VisualizerOptions> parse_options(int argc, const char* const* argv
       ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1} << 40));
   app.add_option("--out", options.out, "folder for pictures and screenshots")
       ->capture_default_str();
-  app.add_option("--seconds", options.seconds, "end after this time")->check(CLI::Range(0.0, 1e6));
+  app.add_option("--seconds", options.seconds, "end after this time")->check(range(0.0, 1e6));
   app.add_option("--wait", options.wait_s, "seconds to wait for the controller")
-      ->check(CLI::Range(0.0, 1e6))
+      ->check(range(0.0, 1e6))
       ->capture_default_str();
   app.add_option("--cpu", options.cpus, "cores to run on, e.g. 0,1 (default: all but the last)")
       ->delimiter(',')
@@ -81,6 +123,17 @@ std::optional<VisualizerOptions> parse_options(int argc, const char* const* argv
                  "surface of all solid volumes as a closed mesh in mm, FILE.stl or FILE.ply (with "
                  "colours): headless at the end, in the window with e")
       ->type_name("FILE");
+  app.add_option("--sheet", options.sheet,
+                 "headless: at the end one PNG with the final state by every renderer")
+      ->type_name("FILE")
+      ->needs(headless);
+  auto* record = app.add_option("--record", options.record,
+                                "raw video in true time (y4m): a file, a pipe, or - for stdout; "
+                                "headless without pictures unless --frames")
+                     ->type_name("FILE");
+  app.add_option("--fps", options.video_hz, "record: frames per second of servo time")
+      ->check(CLI::Range(1, 240))
+      ->capture_default_str();
   app.add_option("--report", options.report, "write times and counts to this JSON file");
   auto* bench = app.add_flag("--bench", options.bench,
                              "time every renderer, without a controller (512x512 unless --size)");
@@ -94,9 +147,11 @@ std::optional<VisualizerOptions> parse_options(int argc, const char* const* argv
   } catch (const CLI::ParseError& problem) {
     throw VisualizerError(one_line(problem.what()) + "; see --help");
   }
+  if (*record && app.count("--frames") == 0) options.frames = 0;
   if (options.bench && app.count("--size") == 0) size = kBenchSize;
   options.size = parse_size(size);
   check_renderer(options.renderer);
+  if (options.transfer) options.opacities = read_transfer(*options.transfer);
   return options;
 }
 

@@ -10,6 +10,7 @@
 #include <imgui.h>
 
 #include "visualizer/error.hpp"
+#include "visualizer/keys.hpp"
 #include "visualizer/renderer.hpp"
 
 namespace kerf {
@@ -31,21 +32,6 @@ constexpr ImGuiWindowFlags kStill =
 
 constexpr ImGuiWindowFlags kTouched =
     (kStill & ~ImGuiWindowFlags_NoInputs) | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoNavInputs;
-
-constexpr auto kKeys = std::to_array<std::array<const char*, 2>>({
-    {"drag", "turn"},
-    {"shift or middle drag", "move"},
-    {"wheel", "nearer, farther"},
-    {"1 .. 9", "take this tool"},
-    {"v", "next renderer"},
-    {"c", "clip plane"},
-    {"r", "first view again"},
-    {"s", "screenshot"},
-    {"e", "export the surface"},
-    {"p", "plot of force and depth"},
-    {"h", "these keys"},
-    {"q", "quit"},
-});
 
 void row(const char* label, const char* format, double value) {
   ImGui::TableNextRow();
@@ -229,7 +215,18 @@ void Overlay::look_controls(LookControls& controls) {
     look.iso = *dragged_iso_;
     dragged_iso_.reset();
   }
-  ImGui::BeginDisabled(!controls.clips);
+  if (!controls.opacities.empty()) {
+    ImGui::TextColored(kLabel, "opacity of a voxel");
+    ImGui::SameLine();
+    controls.write = ImGui::SmallButton("write");
+  }
+  for (const auto& [material, opacity] : controls.opacities) {
+    auto value = static_cast<float>(opacity);
+    if (ImGui::SliderFloat(material.c_str(), &value, 0.0F, 1.0F, "%.3f",
+                           kDragOnly | ImGuiSliderFlags_Logarithmic)) {
+      look.opacities[material] = rounded_to(0.001, static_cast<double>(value));
+    }
+  }
   ImGui::Checkbox("clip", &look.clip.on);
   if (look.clip.on) {
     constexpr std::array kAxes{"x", "y", "z"};
@@ -240,17 +237,37 @@ void Overlay::look_controls(LookControls& controls) {
     auto at = static_cast<float>(look.clip.at);
     if (ImGui::SliderFloat("plane", &at, 0.0F, 1.0F, "%.2f", kDragOnly)) look.clip.at = at;
   }
-  ImGui::EndDisabled();
+  ImGui::Checkbox("stereo", &look.stereo.on);
   ImGui::PopItemWidth();
 }
 
-void Overlay::draw(const OverlayFigures& figures, const RenderTarget& target) {
-  target.bind();
+PixelRect Overlay::prepare(const OverlayFigures& figures, PictureSize size) {
   ImGui_ImplOpenGL3_NewFrame();
   OverlayFigures shown = figures;
   // ImGui learns the size of what a panel holds by laying it out: the second time is right.
-  for (int pass = 0; pass < 2; ++pass) lay_out(shown, target.size());
-  ImGui_ImplOpenGL3_RenderDrawData(ImGui::GetDrawData());
+  for (int pass = 0; pass < 2; ++pass) lay_out(shown, size);
+  PixelRect bounds;
+  const ImDrawData& panels = *ImGui::GetDrawData();
+  for (int i = 0; i < panels.CmdListsCount; ++i) {
+    for (const ImDrawCmd& command : panels.CmdLists[i]->CmdBuffer) {
+      const ImVec4& clip = command.ClipRect;  // from the upper left corner
+      bounds = bounds.united(PixelRect{
+          static_cast<int>(std::floor(clip.x)), size.height - static_cast<int>(std::ceil(clip.w)),
+          static_cast<int>(std::ceil(clip.z)), size.height - static_cast<int>(std::floor(clip.y))});
+    }
+  }
+  return bounds;
+}
+
+void Overlay::draw(const RenderTarget& target, int eyes) {
+  target.bind();
+  ImDrawData& panels = *ImGui::GetDrawData();
+  panels.DisplaySize.x = static_cast<float>(target.size().width);
+  const int eye_width = target.size().width / eyes;
+  for (int eye = 0; eye < eyes; ++eye) {
+    panels.DisplayPos.x = static_cast<float>(-eye * eye_width);
+    ImGui_ImplOpenGL3_RenderDrawData(&panels);
+  }
 }
 
 }  // namespace kerf

@@ -16,7 +16,8 @@ namespace kerf {
 struct LookControls {
   Look look;
   double own_iso = 0.5;           ///< of the main volume, 0..1: where the look has none
-  bool clips = true;              ///< the renderer heeds the clip plane
+  Opacities opacities{};          ///< of all materials, as they are; empty: not shown
+  bool write = false;             ///< the user asks for a file with them
   std::optional<Pointer> over{};  ///< the mouse, while it is over them
   friend bool operator==(const LookControls&, const LookControls&) noexcept = default;
 };
@@ -53,7 +54,11 @@ class Overlay {
   /// What the mouse does to the controls of `figures`, which it changes; draws nothing. True while
   /// the mouse belongs to them and not to the camera.
   bool handle(const Pointer& pointer, OverlayFigures& figures, PictureSize size);
-  void draw(const OverlayFigures& figures, const RenderTarget& target);
+  /// Lays the panels out; returns the part of a picture of this size that they cover.
+  PixelRect prepare(const OverlayFigures& figures, PictureSize size);
+  /// Draws what was laid out last over `target`: once, or once for each of the `eyes` that lie side
+  /// by side in it, at the same place for both, so that the panels seem to lie in the screen.
+  void draw(const RenderTarget& target, int eyes = 1);
 
  private:
   void lay_out(OverlayFigures& figures, PictureSize size);

@@ -17,7 +17,7 @@ constexpr double kHardestOpacity = 0.10;
 constexpr double kSoftestOpacity = 0.40;
 constexpr glm::dvec4 kIvory{0.80, 0.74, 0.62, kSoftestOpacity};
 
-/// Colour and opacity of each material, from the softest to the hardest, in equal ratios.
+/// Colour and opacity of each material, from the softest to the hardest.
 struct Look {
   double iso;
   std::size_t label;
@@ -27,18 +27,27 @@ struct Look {
 std::vector<Look> looks_of(std::span<const MaterialView> materials) {
   std::vector<Look> looks;
   for (std::size_t m = 1; m < materials.size(); ++m) {
-    looks.push_back({materials[m].iso, m, glm::dvec4(materials[m].colour, kSoftestOpacity)});
+    const double opacity = materials[m].opacity.value_or(default_opacity(materials, m));
+    looks.push_back({materials[m].iso, m, glm::dvec4(materials[m].colour, opacity)});
   }
   std::stable_sort(looks.begin(), looks.end(),
                    [](const Look& a, const Look& b) { return a.iso < b.iso; });
-  for (std::size_t i = 1; i < looks.size(); ++i) {
-    const double rank = static_cast<double>(i) / static_cast<double>(looks.size() - 1);
-    looks[i].colour.a = kSoftestOpacity * std::pow(kHardestOpacity / kSoftestOpacity, rank);
-  }
   return looks;
 }
 
 }  // namespace
+
+double default_opacity(std::span<const MaterialView> materials, std::size_t index) {
+  if (materials.size() < 3) return kSoftestOpacity;
+  // In equal ratios from the softest to the hardest; among equals the first is the softer.
+  std::size_t softer = 0;
+  for (std::size_t m = 1; m < materials.size(); ++m) {
+    const double iso = materials[m].iso;
+    if (iso < materials[index].iso || (iso == materials[index].iso && m < index)) ++softer;
+  }
+  const double rank = static_cast<double>(softer) / static_cast<double>(materials.size() - 2);
+  return kSoftestOpacity * std::pow(kHardestOpacity / kSoftestOpacity, rank);
+}
 
 Palette make_palette(std::span<const MaterialView> materials) {
   const std::vector<Look> looks = looks_of(materials);

@@ -5,7 +5,10 @@
 #include <chrono>
 #include <cmath>
 
+#include "visualizer/gl/context.hpp"
+#include "visualizer/palette.hpp"
 #include "visualizer/screen_bounds.hpp"
+#include "visualizer/stereo.hpp"
 
 namespace kerf {
 
@@ -15,6 +18,12 @@ constexpr double kStaleMs = 100.0;  // a servo that is alive beats each tick
 constexpr double kToolRoom = 1.5;   // radii around the volumes in which the tool is never clipped
 glm::dvec3 vec3(const float (&v)[3]) {
   return {v[0], v[1], v[2]};
+}
+
+void clear(const RenderTarget& target) {
+  target.bind();
+  constexpr float kBlack[4] = {0.0F, 0.0F, 0.0F, 1.0F};
+  glClearNamedFramebufferfv(target.framebuffer(), GL_COLOR, 0, kBlack);
 }
 
 /// Half the diagonal of its box.
@@ -29,7 +38,7 @@ Picture::Picture(const Session& session, const Look& look, double aspect)
     : scene_(session.scene()),
       look_(look),
       renderer_(renderer_for(session, look)),
-      stale_bricks_(scene_.volumes.size()),
+      stale_(scene_.volumes.size()),
       hand_painter_(scene_, size_of(scene_.main_volume())) {
   const BoxCorners box = scene_.main_volume().corners();
   centre_mm_ = 0.5 * (box.front() + box.back());
@@ -46,12 +55,20 @@ Picture::Picture(const Session& session, const Look& look, double aspect)
   reset_camera(aspect);
 }
 
-std::unique_ptr<Renderer> Picture::renderer_for(const Session& session, const Look& look) {
+SceneView Picture::scene_in(const Look& look) const {
   SceneView scene = scene_;
   for (VolumeView& volume : scene.volumes) {
     if (look.iso) volume.iso = static_cast<Density>(std::lround(*look.iso * kDensityMax));
   }
-  return make_renderer(look.renderer, scene, session.contents());
+  for (MaterialView& material : scene.materials) {
+    const auto chosen = look.opacities.find(material.name);
+    if (chosen != look.opacities.end()) material.opacity = chosen->second;
+  }
+  return scene;
+}
+
+std::unique_ptr<Renderer> Picture::renderer_for(const Session& session, const Look& look) {
+  return make_renderer(look.renderer, scene_in(look), session.contents());
 }
 
 void Picture::set_look(const Session& session, const Look& look) {
@@ -59,15 +76,26 @@ void Picture::set_look(const Session& session, const Look& look) {
   if (look.renderer != look_.renderer || look.iso != look_.iso) {
     renderer_ = renderer_for(session, look);
     for (const VolumeView& volume : scene_.volumes) bricks_uploaded_ += volume.bricks.count();
+  } else if (look.opacities != look_.opacities) {
+    renderer_->set_opacities(scene_in(look).materials, session.contents());
   }
   look_ = look;
   redraw_all();
 }
 
 LookControls Picture::controls() const {
-  return {.look = look_,
-          .own_iso = scene_.main_volume().iso / kDensityMax,
-          .clips = renderer_->clips()};
+  LookControls controls{.look = look_, .own_iso = scene_.main_volume().iso / kDensityMax};
+  if (renderer_->translucent()) controls.opacities = opacities();
+  return controls;
+}
+
+Opacities Picture::opacities() const {
+  Opacities opacities;
+  const std::vector<MaterialView> materials = scene_in(look_).materials;
+  for (std::size_t m = 1; m < materials.size(); ++m) {
+    opacities[materials[m].name] = materials[m].opacity.value_or(default_opacity(materials, m));
+  }
+  return opacities;
 }
 
 glm::dvec4 Picture::shown_half() const {
@@ -80,7 +108,7 @@ glm::dvec4 Picture::shown_half() const {
 }
 
 void Picture::reset_camera(double aspect) {
-  camera_.frame(scene_.main_volume().corners(), aspect);
+  camera_.frame(scene_.main_volume().corners(), look_.stereo.on ? 0.5 * aspect : aspect);
 }
 
 void Picture::update(const Session& session) {
@@ -88,90 +116,157 @@ void Picture::update(const Session& session) {
     const VolumeSnapshot& snapshot = session.snapshot(v);
     renderer_->update(v, snapshot.density, snapshot.changed);
     bricks_uploaded_ += snapshot.changed.size();
-    stale_bricks_[v].insert(stale_bricks_[v].end(), snapshot.changed.begin(),
-                            snapshot.changed.end());
+    stale_[v].add(*renderer_, v, snapshot.differs);
   }
+}
+
+std::vector<View> Picture::views(PictureSize size) const {
+  const double reach_mm = reach_mm_ + kToolRoom * radius_mm_;
+  const Stereo& stereo = look_.stereo;
+  const int width = eye_size(size).width;
+  View view = camera_.view(static_cast<double>(width) / size.height, reach_mm);
+  view.shown = shown_half();
+  if (width == size.width) return {view};
+  const double convergence_mm = stereo.convergence_mm.value_or(camera_.distance_mm());
+  const double eyes_mm = stereo.eyes_mm.value_or(kEyesPerConvergence * convergence_mm);
+  const auto both = eye_views(view, {eyes_mm, convergence_mm});
+  return {both.begin(), both.end()};
+}
+
+PictureSize Picture::eye_size(PictureSize size) const noexcept {
+  const bool fits_two = look_.stereo.on && size.width > 1;
+  return {fits_two ? size.width / 2 : size.width, size.height};
 }
 
 Redrawn Picture::draw(const Session& session, const OverlayFigures& figures,
                       const RenderTarget& target) {
-  const PictureSize size = target.size();
-  const double aspect = static_cast<double>(size.width) / size.height;
-  View view = camera_.view(aspect, reach_mm_ + kToolRoom * radius_mm_);
-  view.shown = shown_half();
+  const PictureSize size = eye_size(target.size());
+  const std::vector<View> views = this->views(target.size());
   std::optional<Hand> hand;
   if (session.latest()) hand = hand_of(*session.latest());
-
-  const bool fresh = !layers_ || layers_->stage.size() != size;
-  if (fresh) layers_.emplace(size);
-  PixelRect volumes = target.all(), stage = target.all();
-  const bool moving = !fresh && view != shown_.view;
-  const bool settles = shown_.moving && !moving;  // drawn coarsely until now
-  if (!fresh && !moving && !settles) {
-    volumes = stale_volumes(view, size);
-    stage = volumes.united(stale_hand(hand, view, size));
-    if (renderer_->translucent()) volumes = stage;  // the hand is under them
+  if (eyes_.size() != views.size() || eyes_.front().layers.stage.size() != size) {
+    eyes_.clear();
+    for (std::size_t eye = 0; eye < views.size(); ++eye) eyes_.emplace_back(size);
+    shown_in_ = 0;
+  }
+  std::vector<Stale> stale;
+  for (std::size_t eye = 0; eye < views.size(); ++eye) {
+    const auto& before = eyes_[eye].shown;
+    const bool moving = before && before->view != views[eye];
+    stale.push_back(this->stale(eyes_[eye], {views[eye], moving, hand}, session));
   }
   const OverlayFigures panel = figures.rounded();
-  const bool same_panel = panel == shown_.figures && target.framebuffer() == shown_.target;
-  for (auto& bricks : stale_bricks_) bricks.clear();
-  if (stage.empty() && same_panel) return {};
+  const bool same_target = target.framebuffer() == shown_in_;
+  for (StaleVolume& volume : stale_) volume.clear();
+  const bool rests =
+      std::all_of(stale.begin(), stale.end(), [](const Stale& one) { return one.stage.empty(); });
+  if (rests && same_target && panel == shown_figures_) return {};
 
-  renderer_->set_moving(moving);
-  if (!stage.empty()) draw_layers(hand, view, volumes, stage);
-  target.copy(layers_->smooth, target.all());
-  overlay_.draw(panel, target);
+  if (!same_target) clear(target);  // an odd column is nobody's
+  const PixelRect panels = overlay_.prepare(panel, size);
+  double redrawn = 0.0;
+  for (std::size_t eye = 0; eye < eyes_.size(); ++eye) {
+    std::vector<PixelRect> others = draw_layers(eyes_[eye], stale[eye]);
+    const RenderTarget& seen = eyes_[eye].layers.smooth;
+    if (same_target) {
+      others.push_back(panels.united(shown_panels_));  // they let the picture shine through
+    } else {
+      others = {seen.all()};
+    }
+    for (const PixelRect& part : others) {
+      target.copy_colour(seen, part, static_cast<int>(eye) * size.width);
+    }
+    for (const PixelRect& part : stale[eye].volumes) redrawn += part.area();
+  }
+  overlay_.draw(target, static_cast<int>(eyes_.size()));
   glDisable(GL_SCISSOR_TEST);
-  shown_ = {view, moving, hand, panel, target.framebuffer()};
-  return {true, static_cast<double>(volumes.area()) / target.all().area()};
+  shown_figures_ = panel;
+  shown_in_ = target.framebuffer();
+  shown_panels_ = panels;
+  return {true, redrawn / (static_cast<double>(eyes_.size()) * size.width * size.height)};
 }
 
-PixelRect Picture::stale_volumes(const View& view, PictureSize size) const {
-  PixelRect stale;
+bool Picture::handle(const Pointer& pointer, OverlayFigures& figures, PictureSize size) {
+  const PictureSize eye = eye_size(size);
+  Pointer within = pointer;
+  if (within.x >= eye.width) within.x -= eye.width;
+  return overlay_.handle(within, figures, eye);
+}
+
+Picture::Stale Picture::stale(const Eye& eye, const Shown& now, const Session& session) const {
+  const PixelRect all = eye.layers.stage.all();
+  // What was drawn coarsely settles when the camera does.
+  if (!eye.shown || now.moving || eye.shown->moving) return {now, {all}, {all}};
+  const PictureSize size = eye.layers.stage.size();
+  StaleTiles tiles(size);
+  mark_volumes(tiles, session, now.view, eye.layers.volumes);
+  std::vector<PixelRect> volumes = tiles.rects();
+  mark_hand(tiles, now, *eye.shown, size);
+  const std::vector<PixelRect> stage = tiles.rects();
+  if (renderer_->translucent()) volumes = stage;  // the hand is under them
+  return {now, volumes, stage};
+}
+
+void Picture::mark_volumes(StaleTiles& tiles, const Session& session, const View& view,
+                           const RenderTarget& kept) const {
   for (std::size_t v = 0; v < scene_.volumes.size(); ++v) {
-    stale = stale.united(brick_bounds(scene_.volumes[v], stale_bricks_[v], view, size));
+    stale_[v].mark(tiles, *renderer_, scene_.volumes[v], session.snapshot(v).density, view, kept);
   }
-  return stale;
 }
 
-PixelRect Picture::stale_hand(const std::optional<Hand>& hand, const View& view,
-                              PictureSize size) const {
-  if (hand == shown_.hand) return {};
-  PixelRect stale;
-  for (const auto& one : {hand, shown_.hand}) {
-    if (one) stale = stale.united(hand_painter_.bounds(*one, view, size));
+void Picture::mark_hand(StaleTiles& tiles, const Shown& now, const Shown& before,
+                        PictureSize size) const {
+  if (now.hand == before.hand) return;
+  for (const auto& one : {now.hand, before.hand}) {
+    if (one) tiles.mark(hand_painter_.bounds(*one, now.view, size));
   }
-  return stale;
 }
 
-void Picture::draw_layers(const std::optional<Hand>& hand, const View& view, PixelRect volumes,
-                          PixelRect stage) {
+std::vector<PixelRect> Picture::draw_layers(Eye& eye, const Stale& stale) {
+  const auto& [view, moving, hand] = stale.now;
+  eye.shown = stale.now;
+  if (stale.stage.empty()) return {};
+  Layers& layers = eye.layers;
+  renderer_->set_moving(moving);
   const bool tool_first = renderer_->translucent();  // it shines through them
-  if (!volumes.empty()) {
-    layers_->volumes.restrict_to(volumes);
-    draw_backdrop(layers_->volumes);
-    if (hand && tool_first) hand_painter_.draw_tool(*hand, view, layers_->volumes);
-    layers_->volumes.bind();
-    renderer_->draw(view, layers_->volumes);
+  if (!stale.volumes.empty()) {
+    layers.volumes.restrict_to(stale.volumes);
+    draw_backdrop(layers.volumes);
+    if (hand && tool_first) hand_painter_.draw_tool(*hand, view, layers.volumes);
+    layers.volumes.bind();
+    renderer_->draw(view, layers.volumes);
   }
-  layers_->stage.restrict_to(stage);
-  layers_->stage.copy(layers_->volumes, stage);
-  if (hand && !tool_first) hand_painter_.draw_tool(*hand, view, layers_->stage);
-  if (hand) hand_painter_.draw_force(*hand, view, layers_->stage);
+  layers.stage.restrict_to(stale.stage);
+  for (const PixelRect& part : stale.stage) layers.stage.copy(layers.volumes, part);
+  if (hand) {
+    std::vector<PixelRect> of_hand;
+    const PixelRect bounds = hand_painter_.bounds(*hand, view, layers.stage.size());
+    for (const PixelRect& part : stale.stage) {
+      const PixelRect both = part.clipped(bounds);
+      if (!both.empty()) of_hand.push_back(both);
+    }
+    layers.stage.restrict_to(of_hand);  // a mesh costs its vertices for each part
+    if (!tool_first) hand_painter_.draw_tool(*hand, view, layers.stage);
+    hand_painter_.draw_force(*hand, view, layers.stage);
+  }
   constexpr int kSmoothingReach = 3;  // pixels
-  layers_->smooth.restrict_to(stage.grown(kSmoothingReach));
-  smooth_edges(layers_->stage, layers_->smooth);
+  std::vector<PixelRect> smoothed;
+  for (const PixelRect& part : stale.stage) smoothed.push_back(part.grown(kSmoothingReach));
+  layers.smooth.restrict_to(smoothed);
+  smooth_edges(layers.stage, layers.smooth);
+  return smoothed;
 }
 
 void Picture::draw_backdrop(const RenderTarget& target) {
-  constexpr float kFarthest = 1.0F;
   target.bind();
-  glClearNamedFramebufferfv(target.framebuffer(), GL_DEPTH, 0, &kFarthest);
-  glDisable(GL_DEPTH_TEST);
+  // Its depth is that of the far plane, whatever was there.
+  glEnable(GL_DEPTH_TEST);
+  glDepthFunc(GL_ALWAYS);
   glDisable(GL_BLEND);
   backdrop_.use();
   glBindVertexArray(no_vertices_.id());
-  glDrawArrays(GL_TRIANGLES, 0, 3);
+  target.for_parts([] { glDrawArrays(GL_TRIANGLES, 0, 3); });
+  glDepthFunc(GL_LESS);
 }
 
 void Picture::smooth_edges(const RenderTarget& from, const RenderTarget& to) {
@@ -182,7 +277,7 @@ void Picture::smooth_edges(const RenderTarget& from, const RenderTarget& to) {
   smooth_.set("u_picture", 0);
   smooth_.use();
   glBindVertexArray(no_vertices_.id());
-  glDrawArrays(GL_TRIANGLES, 0, 3);
+  to.for_parts([] { glDrawArrays(GL_TRIANGLES, 0, 3); });
 }
 
 Redrawn draw_measured(Picture& picture, Session& session, const OverlayFigures& figures,
@@ -195,6 +290,7 @@ Redrawn draw_measured(Picture& picture, Session& session, const OverlayFigures& 
     return redrawn;
   }
   glFinish();
+  throw_if_context_is_lost();
   report.wall_ms.push_back(watch.wall_ms());
   report.cpu_ms.push_back(watch.cpu_ms());
   report.redrawn.push_back(redrawn.share);

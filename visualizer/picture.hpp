@@ -14,6 +14,7 @@
 #include "visualizer/overlay.hpp"
 #include "visualizer/renderer.hpp"
 #include "visualizer/session.hpp"
+#include "visualizer/stale_volume.hpp"
 
 namespace kerf {
 
@@ -33,42 +34,38 @@ class Picture {
   /// Uploads the bricks that the last `poll` changed. Call once after each `poll`.
   void update(const Session& session);
 
-  /// Draws the present state into `target`; its depth is not used. `target` holds what the last
-  /// call left there, and so do the layers of the picture: while the camera rests only the part of
-  /// the screen is drawn again where bricks changed or where the tool was or is. The result is that
-  /// of drawing everything.
+  /// Draws the present state, for one eye or for two side by side, into `target`; its depth is not
+  /// used. `target` holds what the last call left there, and so do the layers of the picture: while
+  /// the camera rests only the part of the screen is drawn again where bricks changed or where the
+  /// tool was or is. The result is that of drawing everything.
   Redrawn draw(const Session& session, const OverlayFigures& figures, const RenderTarget& target);
   /// The next `draw` draws everything.
-  void redraw_all() noexcept { layers_.reset(); }
+  void redraw_all() noexcept { eyes_.clear(); }
 
   [[nodiscard]] const Look& look() const noexcept { return look_; }
-  /// From the next `draw` on. Another renderer or iso value uploads all volumes again. Throws
-  /// VisualizerError where the renderer cannot show them; the look stays then.
+  /// From the next `draw` on. Another renderer or iso value uploads all volumes again, an opacity
+  /// only the materials. Throws VisualizerError where the renderer cannot show them; the look stays
+  /// then.
   void set_look(const Session& session, const Look& look);
+  /// Of all materials, their own or chosen.
+  [[nodiscard]] Opacities opacities() const;
   /// For `OverlayFigures::controls`.
   [[nodiscard]] LookControls controls() const;
   /// The mouse over the panels: see `Overlay::handle`.
-  bool handle(const Pointer& pointer, OverlayFigures& figures, PictureSize size) {
-    return overlay_.handle(pointer, figures, size);
-  }
+  bool handle(const Pointer& pointer, OverlayFigures& figures, PictureSize size);
 
   [[nodiscard]] OrbitCamera& camera() noexcept { return camera_; }
   void reset_camera(double aspect);
   [[nodiscard]] std::uint64_t bricks_uploaded() const noexcept { return bricks_uploaded_; }
 
  private:
-  /// A scene of its own for each: renderers keep its iso values.
+  /// The scene with the iso values and opacities of `look`.
+  [[nodiscard]] SceneView scene_in(const Look& look) const;
   [[nodiscard]] std::unique_ptr<Renderer> renderer_for(const Session& session, const Look& look);
   /// `View::shown` of the clip plane.
   [[nodiscard]] glm::dvec4 shown_half() const;
   void draw_backdrop(const RenderTarget& target);
   void smooth_edges(const RenderTarget& from, const RenderTarget& to);
-  /// Pixels that changed densities and, where it moved, the hand change.
-  [[nodiscard]] PixelRect stale_volumes(const View& view, PictureSize size) const;
-  [[nodiscard]] PixelRect stale_hand(const std::optional<Hand>& hand, const View& view,
-                                     PictureSize size) const;
-  void draw_layers(const std::optional<Hand>& hand, const View& view, PixelRect volumes,
-                   PixelRect stage);
 
   SceneView scene_;
   Look look_;
@@ -92,12 +89,35 @@ class Picture {
     View view;
     bool moving = false;
     std::optional<Hand> hand;
-    OverlayFigures figures;
-    GLuint target = 0;
   };
-  std::optional<Layers> layers_;
-  Shown shown_;
-  std::vector<std::vector<std::uint32_t>> stale_bricks_;  ///< by volume, since the last `draw`
+  /// A whole picture, or one half of two side by side.
+  struct Eye {
+    explicit Eye(PictureSize size) : layers(size) {}
+    Layers layers;
+    std::optional<Shown> shown{};  ///< none: nothing yet
+  };
+  /// What must be drawn again, and with what.
+  struct Stale {
+    Shown now;
+    std::vector<PixelRect> volumes, stage;
+  };
+  /// Of one eye in a picture of `size`.
+  [[nodiscard]] PictureSize eye_size(PictureSize size) const noexcept;
+  /// Of each eye, from the left.
+  [[nodiscard]] std::vector<View> views(PictureSize size) const;
+  [[nodiscard]] Stale stale(const Eye& eye, const Shown& now, const Session& session) const;
+  /// Marks what changed densities and, where it moved, the hand change.
+  void mark_volumes(StaleTiles& tiles, const Session& session, const View& view,
+                    const RenderTarget& kept) const;
+  void mark_hand(StaleTiles& tiles, const Shown& now, const Shown& before, PictureSize size) const;
+  /// Returns the parts of the smooth layer that are others now.
+  std::vector<PixelRect> draw_layers(Eye& eye, const Stale& stale);
+
+  std::vector<Eye> eyes_;  ///< empty: draw everything
+  OverlayFigures shown_figures_;
+  GLuint shown_in_ = 0;             ///< framebuffer
+  PixelRect shown_panels_;          ///< of each eye
+  std::vector<StaleVolume> stale_;  ///< by volume, since the last `draw`
   GlVertexArray no_vertices_ = GlVertexArray::create();
   HandPainter hand_painter_;
   Overlay overlay_;

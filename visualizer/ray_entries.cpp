@@ -13,7 +13,10 @@ RayEntries::Buffer::Buffer(PictureSize of_size, int layers) : size(of_size) {
   glNamedFramebufferTexture(framebuffer.id(), GL_DEPTH_ATTACHMENT, depth.id(), 0);
 }
 
-void RayEntries::draw(int layer, const CellsOnGpu& cells, const View& view, PictureSize size) {
+void RayEntries::draw(int layer, const CellsOnGpu& cells, const View& view,
+                      const RenderTarget& target) {
+  const PictureSize size = target.size();
+  const PixelRect& part = target.bounds();
   if (!buffer_ || buffer_->size != size) buffer_.emplace(size, layers_);
   const std::array<float, 4> nowhere{static_cast<float>(view.far_mm)};
   const float farthest = 1.0F;
@@ -22,6 +25,8 @@ void RayEntries::draw(int layer, const CellsOnGpu& cells, const View& view, Pict
                                  layer);
   glBindFramebuffer(GL_FRAMEBUFFER, framebuffer);
   glViewport(0, 0, size.width, size.height);
+  glEnable(GL_SCISSOR_TEST);
+  glScissor(part.x0, part.y0, part.x1 - part.x0, part.y1 - part.y0);
   glEnable(GL_DEPTH_TEST);
   glDisable(GL_CULL_FACE);
   glDisable(GL_BLEND);

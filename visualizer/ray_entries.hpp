@@ -17,8 +17,9 @@ class RayEntries {
  public:
   explicit RayEntries(int layers) : layers_(layers) {}
 
-  /// Draws `layer`. Leaves its own framebuffer bound, the depth test on and nothing culled.
-  void draw(int layer, const CellsOnGpu& cells, const View& view, PictureSize size);
+  /// Draws `layer` within the bounds of `target`'s parts. Leaves its own framebuffer bound, the
+  /// depth test on and nothing culled.
+  void draw(int layer, const CellsOnGpu& cells, const View& view, const RenderTarget& target);
   /// The layers as a texture array.
   void bind(GLuint unit) const { glBindTextureUnit(unit, buffer_->entry_mm.id()); }
 

@@ -8,6 +8,7 @@
 #include "visualizer/blend_renderer.hpp"
 #include "visualizer/cast/cast_renderer.hpp"
 #include "visualizer/error.hpp"
+#include "visualizer/feelers.hpp"
 #include "visualizer/iso_renderer.hpp"
 #include "visualizer/slices_renderer.hpp"
 #include "visualizer/surface/surface_renderer.hpp"
@@ -51,7 +52,20 @@ const Kind& find_kind(std::string_view name) {
                         " is unknown; known: " + known_renderers());
 }
 
+// A translucent volume has its gradient from interpolated differences (2) and its material from 1.5
+// below a sample (matter.frag); one for the interpolation.
+constexpr int kTranslucentReachVox = 3;
+
 }  // namespace
+
+std::vector<VoxelBox> Renderer::looks_different(std::size_t /*volume*/,
+                                                std::span<const VoxelBox> differs) const {
+  std::vector<VoxelBox> boxes(differs.begin(), differs.end());
+  for (VoxelBox& box : boxes) {
+    box = box.grown(translucent() ? kTranslucentReachVox : Feelers::kNormalReachVox);
+  }
+  return boxes;
+}
 
 std::unique_ptr<Renderer> make_renderer(std::string_view kind, const SceneView& scene,
                                         std::span<const VolumeContent> contents) {

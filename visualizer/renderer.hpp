@@ -26,15 +26,25 @@ class Renderer {
   /// Brick ids `changed` of a volume differ from what was drawn last; `density` is all of it.
   virtual void update(std::size_t volume, std::span<const Density> density,
                       std::span<const std::uint32_t> changed) = 0;
+  /// The materials have other opacities, and are else what they were. Renderers of iso-surfaces
+  /// show none. `contents` is all of the volumes.
+  virtual void set_opacities(std::span<const MaterialView> /*materials*/,
+                             std::span<const VolumeContent> /*contents*/) {}
   /// While camera or objects move, a renderer may draw more coarsely; at rest it is exact.
   virtual void set_moving(bool /*moving*/) {}
   /// Draws over what is in `target`, under its depth test, within its part. Opaque things come
   /// first: some renderers look through.
   virtual void draw(const View& view, const RenderTarget& target) = 0;
+  /// Boxes of voxels around all of a volume that may look different since its last `update`, which
+  /// changed densities in `differs`: a ray that meets none of them before it ends shows what it
+  /// showed before.
+  [[nodiscard]] virtual std::vector<VoxelBox> looks_different(
+      std::size_t volume, std::span<const VoxelBox> differs) const;
+  /// Surfaces are shaded by what lies along their normal, farther off than these boxes reach: see
+  /// `Feelers`.
+  [[nodiscard]] virtual bool feels_ahead() const noexcept { return false; }
   /// Lets what lies behind a surface shine through, so that it must be drawn before.
   [[nodiscard]] virtual bool translucent() const noexcept { return false; }
-  /// Heeds the clip plane, `View::shown`.
-  [[nodiscard]] virtual bool clips() const noexcept { return true; }
 };
 
 /// `kind` as on the command line; throws VisualizerError for an unknown one and names the known.

@@ -6,9 +6,10 @@
 namespace kerf {
 
 /// Follows one run of a controller and writes frame-0001.png and so on into `options.out`; the last
-/// one shows the final state. Returns the exit code: 0 when the controller ended cleanly, when the
-/// pictures are complete or when the time is over, 1 when it went away without a word. Throws
-/// VisualizerError or SegmentError for bad input or set-up.
+/// one shows the final state. A video goes on to the end of the run. Returns the exit code: 0 when
+/// the controller ended cleanly, when the pictures are complete or when the time is over, 1 when it
+/// went away without a word or when a video could not be written to its end. Throws VisualizerError
+/// or SegmentError for bad input or set-up.
 [[nodiscard]] int run_headless(const VisualizerOptions& options);
 
 /// The window; follows restarted controllers too. Returns 0 when the user closes it.

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -39,6 +40,7 @@ struct MaterialView {
   std::string name;
   double iso = 0.0;
   glm::dvec3 colour{0.9, 0.87, 0.8};  ///< linear RGB
+  std::optional<double> opacity{};    ///< over one voxel edge, 0..1; none: by its hardness
 };
 
 /// Everything about a session that does not change while it runs.

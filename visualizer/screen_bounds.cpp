@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "visualizer/screen_bounds.hpp"
 
-#include <array>
 #include <cmath>
 #include <limits>
 
@@ -16,7 +15,8 @@ PixelRect screen_bounds(std::span<const glm::dvec3> corners, const View& view, P
     const double depth_mm = -eye.z;
     if (!(depth_mm > view.near_mm)) return all;
     const double up = eye.y / (depth_mm * view.tan_half_height);
-    const double right = eye.x / (depth_mm * view.tan_half_height * view.aspect);
+    const double right =
+        (eye.x / depth_mm - view.middle_right) / (view.tan_half_height * view.aspect);
     x0 = std::min(x0, right);
     x1 = std::max(x1, right);
     y0 = std::min(y0, up);
@@ -31,23 +31,6 @@ PixelRect screen_bounds(std::span<const glm::dvec3> corners, const View& view, P
                          static_cast<int>(std::ceil(pixel(x1, size.width))),
                          static_cast<int>(std::ceil(pixel(y1, size.height)))};
   return bounds.grown(kRounding).clipped(all);
-}
-
-PixelRect brick_bounds(const VolumeView& volume, std::span<const std::uint32_t> changed,
-                       const View& view, PictureSize size) {
-  VoxelBox box;
-  for (const std::uint32_t id : changed) box = box.united(volume.bricks.voxels(id));
-  if (box.empty()) return {};
-  std::array<glm::dvec3, 8> corners;
-  for (std::size_t c = 0; c < corners.size(); ++c) {
-    const auto end = [&](std::size_t axis, std::int32_t lo, std::int32_t hi) {
-      return (c >> axis & 1) != 0 ? hi - 1 + kShadingReachVox : lo - kShadingReachVox;
-    };
-    corners[c] = glm::dvec3(volume.world_from_voxel * glm::dvec4(end(0, box.lo.x, box.hi.x),
-                                                                 end(1, box.lo.y, box.hi.y),
-                                                                 end(2, box.lo.z, box.hi.z), 1.0));
-  }
-  return screen_bounds(corners, view, size);
 }
 
 }  // namespace kerf

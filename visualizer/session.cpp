@@ -95,12 +95,27 @@ void Session::read_removals() {
   }
 }
 
+// The record itself carries the end of the tick before; that of the tick's state, where it is still
+// there, its start.
+std::uint64_t Session::began_ns(const DirtyRecord& removal) const {
+  const SegmentReader& reader = connection_.reader();
+  const std::uint64_t head = reader.state_head();
+  TickRecord state;
+  if (head == 0 || reader.state_at(head - 1, state) != ReadState::ok) return removal.time_ns;
+  const std::uint64_t ago = state.tick - removal.tick;
+  if (ago >= head || reader.state_at(head - 1 - ago, state) != ReadState::ok) {
+    return removal.time_ns;
+  }
+  return state.tick == removal.tick ? state.start_ns : removal.time_ns;
+}
+
 // A record may be out before its bricks are in the mirror.
 void Session::note_arrivals() {
   std::erase_if(on_the_way_, [&](const DirtyRecord& removal) {
     const VolumeSnapshot& snapshot = snapshots_[removal.volume];
     if (!snapshot.consistent || snapshot.tick < removal.tick) return false;
-    oldest_removal_ns_ = std::min(oldest_removal_ns_.value_or(removal.time_ns), removal.time_ns);
+    const std::uint64_t began_ns = this->began_ns(removal);
+    oldest_removal_ns_ = std::min(oldest_removal_ns_.value_or(began_ns), began_ns);
     return true;
   });
 }
@@ -149,6 +164,11 @@ std::optional<double> Session::data_age_ms() const {
 
 std::uint32_t Session::tick_ns() const noexcept {
   return connection_.reader().info().tick_ns;
+}
+
+double Session::servo_s() const noexcept {
+  constexpr double kSPerNs = 1e-9;
+  return latest_ ? static_cast<double>(latest_->tick) * tick_ns() * kSPerNs : 0.0;
 }
 
 bool Session::ended() const noexcept {

@@ -45,11 +45,13 @@ class Session {
   [[nodiscard]] double removed_mm3() const noexcept { return removed_mm3_; }
   [[nodiscard]] bool joined_late() const noexcept { return joined_late_; }
   [[nodiscard]] std::optional<double> data_age_ms() const;
-  /// When the oldest of the ticks removed material whose bricks came with a `poll` since the last
-  /// call (a servo period early: the record of a cut carries the time of the tick before). None
-  /// where no such tick; what was removed before the session began does not count.
+  /// When the oldest of the ticks began that removed material whose bricks came with a `poll` since
+  /// the last call. None where no such tick; what was removed before the session began does not
+  /// count.
   std::optional<std::chrono::steady_clock::time_point> take_oldest_removal();
   [[nodiscard]] std::uint32_t tick_ns() const noexcept;
+  /// The servo's own time at the newest record: its ticks times their length. 0 before the first.
+  [[nodiscard]] double servo_s() const noexcept;
   /// From asking for the controller to the first complete volumes.
   [[nodiscard]] double attach_ms() const noexcept { return attach_ms_; }
 
@@ -66,6 +68,7 @@ class Session {
   void read_states();
   void read_removals();
   void note_arrivals();
+  [[nodiscard]] std::uint64_t began_ns(const DirtyRecord& removal) const;
 
   Stopwatch began_;
   SegmentConnection connection_;

@@ -62,6 +62,13 @@ void SlicesRenderer::update(std::size_t volume, std::span<const Density> density
   volumes_[volume]->volume.update(0, density, changed);
 }
 
+void SlicesRenderer::set_opacities(std::span<const MaterialView> materials,
+                                   std::span<const VolumeContent> contents) {
+  for (std::size_t v = 0; v < volumes_.size(); ++v) {
+    volumes_[v]->volume.set_opacities(materials, contents.subspan(v, 1));
+  }
+}
+
 void SlicesRenderer::cut_volume(std::size_t volume, const View& view, double step_mm) {
   // A slice shows what lies up to a step before it, along rays that lean.
   constexpr double kMarginSteps = 2.0;
@@ -96,7 +103,7 @@ void SlicesRenderer::draw(const View& view, const RenderTarget& target) {
   glNamedBufferData(buffer_.id(), static_cast<GLsizeiptr>(vertices_.size() * sizeof(glm::vec3)),
                     vertices_.data(), GL_STREAM_DRAW);
 
-  layer_.begin(target.size());
+  layer_.begin(target);
   for (const auto& sliced : volumes_) {
     set_view(sliced->program, view);
     sliced->program.set("u_clip_from_eye", glm::mat4(view.clip_from_eye()));
@@ -109,13 +116,13 @@ void SlicesRenderer::draw(const View& view, const RenderTarget& target) {
   glBlendFunc(GL_ONE, GL_ONE_MINUS_SRC_ALPHA);
   glBlendEquationi(1, GL_MIN);
   glEnable(GL_DEPTH_CLAMP);  // a slice before the near plane shows what lies behind it
-  draw_cuts(view);
+  draw_cuts(view, target);
   glDisable(GL_DEPTH_CLAMP);
   glBlendEquationi(1, GL_FUNC_ADD);
   layer_.finish(target);
 }
 
-void SlicesRenderer::draw_cuts(const View& view) const {
+void SlicesRenderer::draw_cuts(const View& view, const RenderTarget& target) const {
   // As many slices in one call as are of one volume.
   for (auto begin = cuts_.begin(); begin != cuts_.end();) {
     const Sliced& sliced = *volumes_[begin->volume];
@@ -129,8 +136,10 @@ void SlicesRenderer::draw_cuts(const View& view) const {
     });
     sliced.volume.bind(sliced.program, view);
     sliced.program.use();
-    glMultiDrawArrays(GL_TRIANGLE_FAN, firsts.data(), counts.data(),
-                      static_cast<GLsizei>(firsts.size()));
+    target.for_parts([&] {
+      glMultiDrawArrays(GL_TRIANGLE_FAN, firsts.data(), counts.data(),
+                        static_cast<GLsizei>(firsts.size()));
+    });
     begin = end;
   }
 }

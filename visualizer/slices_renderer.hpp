@@ -29,6 +29,8 @@ class SlicesRenderer final : public Renderer {
   void update(std::size_t volume, std::span<const Density> density,
               std::span<const std::uint32_t> changed) override;
   void set_moving(bool moving) override { moving_ = moving; }
+  void set_opacities(std::span<const MaterialView> materials,
+                     std::span<const VolumeContent> contents) override;
   void draw(const View& view, const RenderTarget& target) override;
   [[nodiscard]] bool translucent() const noexcept override { return true; }
 
@@ -48,7 +50,7 @@ class SlicesRenderer final : public Renderer {
   };
 
   void cut_volume(std::size_t volume, const View& view, double step_mm);
-  void draw_cuts(const View& view) const;
+  void draw_cuts(const View& view, const RenderTarget& target) const;
 
   Options options_;
   bool moving_ = false;

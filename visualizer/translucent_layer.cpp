@@ -18,13 +18,17 @@ TranslucentLayer::Buffer::Buffer(PictureSize of_size) : size(of_size) {
   glNamedFramebufferDrawBuffers(framebuffer.id(), kOutputs.size(), kOutputs.data());
 }
 
-void TranslucentLayer::begin(PictureSize size) {
+void TranslucentLayer::begin(const RenderTarget& target) {
+  const PictureSize size = target.size();
   if (!buffer_ || buffer_->size != size) buffer_.emplace(size);
   constexpr std::array<float, 4> kNothing{};
   constexpr std::array<float, 4> kFarthest{1.0F};
-  glClearNamedFramebufferfv(buffer_->framebuffer.id(), GL_COLOR, 0, kNothing.data());
-  glClearNamedFramebufferfv(buffer_->framebuffer.id(), GL_COLOR, 1, kFarthest.data());
+  target.bind();
   glBindFramebuffer(GL_FRAMEBUFFER, buffer_->framebuffer.id());
+  target.for_parts([&] {
+    glClearBufferfv(GL_COLOR, 0, kNothing.data());
+    glClearBufferfv(GL_COLOR, 1, kFarthest.data());
+  });
   glViewport(0, 0, size.width, size.height);
   glDisable(GL_DEPTH_TEST);
   glDisable(GL_CULL_FACE);
@@ -44,7 +48,7 @@ void TranslucentLayer::finish(const RenderTarget& target) {
   program_.set("u_depth", 1);
   program_.use();
   glBindVertexArray(no_vertices_.id());
-  glDrawArrays(GL_TRIANGLES, 0, 3);
+  target.for_parts([] { glDrawArrays(GL_TRIANGLES, 0, 3); });
   glDisable(GL_BLEND);
 }
 

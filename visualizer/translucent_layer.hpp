@@ -14,8 +14,9 @@ namespace kerf {
 class TranslucentLayer {
  public:
   /// Makes the empty layer the place to draw, with two outputs: colour times opacity, and depth (1
-  /// where nothing is seen). No depth test; blending is off.
-  void begin(PictureSize size);
+  /// where nothing is seen). No depth test; blending is off. Only the parts of `target` are
+  /// emptied, and their bounds are the scissor.
+  void begin(const RenderTarget& target);
   /// Puts the layer over `target`: colour blended as sRGB, as meshes are, and depth. A pixel whose
   /// depth is not before the target's stays as it is.
   void finish(const RenderTarget& target);

@@ -51,15 +51,20 @@ TranslucentVolume::TranslucentVolume(const VolumeView& volume, const VolumeConte
       materials_(has_labels_ ? bricks_.grid : kNoVoxels, kTexel),
       cells_(volume, content.density, skip_empty ? transfer.lowest_seen() : Density{0}) {
   const VoxelGrid& grid = bricks_.grid;
-  if (has_labels_) {
-    const auto texels = material_texels(grid, content.density, content.labels, transfer.materials);
-    materials_.upload(texels.data(), grid.box());
-  }
+  set_materials(transfer.materials, content);
   // A layer of bricks at a time, so that the copy stays small.
   for (std::int32_t z = 0; z < grid.nz; z += kBrickEdge) {
     const VoxelBox layer{{0, 0, z}, {grid.nx, grid.ny, z + kBrickEdge}};
     upload(content.density, layer.clipped(grid.box()));
   }
+}
+
+void TranslucentVolume::set_materials(const Palette& materials, const VolumeContent& content) {
+  transfer_.materials = materials;
+  if (!has_labels_) return;
+  const VoxelGrid& grid = bricks_.grid;
+  const auto texels = material_texels(grid, content.density, content.labels, materials);
+  materials_.upload(texels.data(), grid.box());
 }
 
 void TranslucentVolume::upload(std::span<const Density> density, const VoxelBox& box) {
@@ -94,8 +99,21 @@ TranslucentVolumes::TranslucentVolumes(const SceneView& scene,
     const TransferFunction transfer =
         make_transfer_function(scene.materials, scene.volumes[v].iso, !contents[v].labels.empty());
     volumes_.emplace_back(scene.volumes[v], contents[v], transfer, limit, skip_empty);
-    glTextureSubImage2D(by_density_.id(), 0, 0, static_cast<GLint>(v), kPaletteWidth, 1, GL_RGBA,
-                        GL_FLOAT, transfer.materials[0].data());
+    upload_materials(v);
+  }
+}
+
+void TranslucentVolumes::upload_materials(std::size_t volume) {
+  glTextureSubImage2D(by_density_.id(), 0, 0, static_cast<GLint>(volume), kPaletteWidth, 1, GL_RGBA,
+                      GL_FLOAT, volumes_[volume].transfer().materials[0].data());
+}
+
+void TranslucentVolumes::set_opacities(std::span<const MaterialView> materials,
+                                       std::span<const VolumeContent> contents) {
+  const Palette palette = make_palette(materials);
+  for (std::size_t v = 0; v < volumes_.size(); ++v) {
+    volumes_[v].set_materials(palette, contents[v]);
+    upload_materials(v);
   }
 }
 

@@ -28,6 +28,9 @@ class TranslucentVolume {
   /// Three units from `unit` on: voxels, materials, active cells.
   void bind_textures(GLuint unit) const;
 
+  /// Uploads the materials again where there are labels.
+  void set_materials(const Palette& materials, const VolumeContent& content);
+
   [[nodiscard]] bool has_labels() const noexcept { return has_labels_; }
   [[nodiscard]] const TransferFunction& transfer() const noexcept { return transfer_; }
   [[nodiscard]] glm::dvec3 texels() const noexcept { return texels_of(bricks_.grid); }
@@ -66,6 +69,10 @@ class TranslucentVolumes {
   void update(std::size_t volume, std::span<const Density> density,
               std::span<const std::uint32_t> changed);
 
+  /// See `Renderer::set_opacities`.
+  void set_opacities(std::span<const MaterialView> materials,
+                     std::span<const VolumeContent> contents);
+
   /// Lines that tell the shaders which volumes there are: KERF_VOLUMES, KERF_EACH_VOLUME(f),
   /// KERF_HAS_LABELS.
   [[nodiscard]] std::string defines() const;
@@ -81,6 +88,8 @@ class TranslucentVolumes {
   [[nodiscard]] double edge_mm() const noexcept;
 
  private:
+  void upload_materials(std::size_t volume);
+
   std::vector<TranslucentVolume> volumes_;
   GlTexture2D by_density_ = GlTexture2D::create();  ///< row v: materials of volume v
 };

@@ -8,6 +8,7 @@ namespace kerf {
 void set_view(const GlProgram& program, const View& view) {
   program.set("u_half_size_at_1mm",
               glm::vec2(view.tan_half_height * view.aspect, view.tan_half_height));
+  program.set("u_middle_at_1mm", glm::vec2(view.middle_right, 0.0));
   program.set("u_near_mm", static_cast<float>(view.near_mm));
   program.set("u_far_mm", static_cast<float>(view.far_mm));
   // A plane goes to the eye as a row: dot(shown, world_from_eye * p).

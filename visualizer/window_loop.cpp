@@ -20,9 +20,11 @@
 #include "visualizer/frame_report.hpp"
 #include "visualizer/gl/window.hpp"
 #include "visualizer/picture.hpp"
+#include "visualizer/recording.hpp"
 #include "visualizer/run.hpp"
 #include "visualizer/stop_signal.hpp"
 #include "visualizer/surface/export_surface.hpp"
+#include "visualizer/transfer_file.hpp"
 
 namespace kerf {
 
@@ -79,6 +81,27 @@ void take_screenshot(const VisualizerOptions& options, const RenderTarget& targe
   });
 }
 
+/// Begins a video in a new file, or ends the one that runs.
+void toggle_recording(const VisualizerOptions& options, PictureSize size,
+                      std::optional<Recording>& recording) {
+  if (recording) return recording.reset();
+  write_for_user("video", [&] {
+    const std::filesystem::path file = unused_file(options.out, ".y4m");
+    recording.emplace(file.string(), size, options.video_hz);
+    return file;
+  });
+}
+
+/// Where --transfer read them, or in a new file.
+void write_opacities(const VisualizerOptions& options, const Picture& picture) {
+  write_for_user("opacities", [&] {
+    const std::filesystem::path file =
+        options.transfer ? *options.transfer : unused_file(options.out, ".toml");
+    write_transfer(file, picture.opacities());
+    return file;
+  });
+}
+
 void export_mesh(const VisualizerOptions& options, const Session& session) {
   write_for_user("surface", [&] {
     const std::filesystem::path file =
@@ -115,6 +138,8 @@ struct Keys {
   bool plot = false;
   bool screenshot = false;
   bool mesh = false;
+  bool write = false;
+  bool record = false;  ///< begin or end
 
   /// True when the user wants to leave.
   bool apply(const WindowInput& input, Session& session, Picture& picture, double aspect) {
@@ -125,10 +150,13 @@ struct Keys {
       if (key == 'r') picture.reset_camera(aspect);
       if (key == 's') screenshot = true;
       if (key == 'e') mesh = true;
+      if (key == 'w') write = true;
+      if (key == 'm') record = !record;
       if (key == 'h') help = !help;
       if (key == 'p') plot = !plot;
       if (key == 'v') look.renderer = next_renderer(look.renderer);
       if (key == 'c') look.clip.on = !look.clip.on;
+      if (key == 't') look.stereo.on = !look.stereo.on;
       const int tool = key - '1';
       if (tool >= 0 && tool < static_cast<int>(session.scene().tools.size())) {
         session.select_tool(static_cast<std::uint32_t>(tool));
@@ -146,7 +174,7 @@ class Followed {
   Followed(const VisualizerOptions& options, Session first, double aspect)
       : options_(options),
         session_(std::move(first)),
-        picture_(std::in_place, session_, Look{.renderer = options.renderer}, aspect) {}
+        picture_(std::in_place, session_, first_look(options), aspect) {}
 
   [[nodiscard]] Session& session() noexcept { return session_; }
   [[nodiscard]] Picture& picture() noexcept { return *picture_; }
@@ -187,6 +215,9 @@ int run_window(const VisualizerOptions& options) {
   place_process(options.cpus);
   if (options.mesh) check_export(*options.mesh);
   Session first = Session::attach(options.name, std::chrono::duration<double>(options.wait_s));
+  if (options.transfer) {
+    check_materials(options.opacities, first.scene(), options.transfer->string());
+  }
   FrameReport report{.renderer = options.renderer};
   report.attach_ms = first.attach_ms();
   const Stopwatch since_attached;
@@ -202,6 +233,9 @@ int run_window(const VisualizerOptions& options) {
   FrameRate rate;
   Keys keys;
   ForcePlot plot;
+  std::optional<Recording> recording;
+  auto next_frame = Clock::now();
+  bool record_from_start = options.record.has_value();
   constexpr double kMsPerS = 1e3;
   const double end_ms = options.seconds.value_or(std::numeric_limits<double>::infinity()) * kMsPerS;
   while (!stop_requested() && since_attached.wall_ms() < end_ms) {
@@ -216,6 +250,10 @@ int run_window(const VisualizerOptions& options) {
     if (std::exchange(keys.mesh, false)) export_mesh(options, followed.session());
     if (visible) {
       if (!target || target->size() != size) target.emplace(size);
+      if (std::exchange(record_from_start, false)) {
+        recording.emplace(*options.record, size, options.video_hz);
+      }
+      if (std::exchange(keys.record, false)) toggle_recording(options, size, recording);
       rate.count(begin);
       OverlayFigures figures = overlay_figures(followed.session());
       figures.frame_rate_hz = rate.hz();
@@ -226,15 +264,20 @@ int run_window(const VisualizerOptions& options) {
         move_camera(followed.picture().camera(), input);
       }
       change_look(followed.picture(), followed.session(), figures.controls->look);
+      if (std::exchange(keys.write, false) || std::exchange(figures.controls->write, false)) {
+        write_opacities(options, followed.picture());
+      }
       const Redrawn redrawn =
           draw_measured(followed.picture(), followed.session(), figures, *target, report);
       if (report.wall_ms.size() == 1) report.late_join_ms = since_attached.wall_ms();
       if (std::exchange(keys.screenshot, false)) take_screenshot(options, *target);
       if (redrawn.any || input.exposed) window.present(*target);
+      film(recording, *target, followed.session().servo_s());
       report.width = size.width;
       report.height = size.height;
     }
-    std::this_thread::sleep_until(begin + kFrame);
+    next_frame = std::max(next_frame + kFrame, Clock::now());  // a late wake does not add up
+    std::this_thread::sleep_until(next_frame);
   }
   report.renderer = followed.picture().look().renderer;
   report.bricks_uploaded = followed.bricks_uploaded();

@@ -2,9 +2,11 @@
 #include "shared/segment/reader.hpp"
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cerrno>
 #include <cstring>
+#include <iterator>
 #include <utility>
 
 #include <fcntl.h>
@@ -36,15 +38,30 @@ using Brick = std::array<Density, kBrickVoxels>;
   return 0;
 }
 
+/// Adds boxes around the voxels that are others now to `differs`.
 void place_brick(const Brick& brick, const VoxelBox& box, const VoxelGrid& grid,
-                 std::span<Density> linear) noexcept {
-  const auto row_voxels = static_cast<std::size_t>(box.hi.x - box.lo.x);
+                 std::span<Density> linear, std::vector<VoxelBox>& differs) {
+  const std::int32_t width = box.hi.x - box.lo.x;
+  std::array<VoxelBox, 8> eighths;
   for (std::int32_t z = box.lo.z; z < box.hi.z; ++z) {
     for (std::int32_t y = box.lo.y; y < box.hi.y; ++y) {
-      copy_row(linear.data() + grid.index(box.lo.x, y, z),
-               brick.data() + brick_row(y - box.lo.y, z - box.lo.z) * kBrickEdge, row_voxels);
+      Density* const to = linear.data() + grid.index(box.lo.x, y, z);
+      const Density* const from = brick.data() + brick_row(y - box.lo.y, z - box.lo.z) * kBrickEdge;
+      for (std::int32_t begin = 0; begin < width; begin += kDiffersEdge) {
+        std::int32_t first = begin, end = std::min(begin + kDiffersEdge, width);
+        while (first < end && to[first] == from[first]) ++first;
+        if (first == end) continue;
+        while (to[end - 1] == from[end - 1]) --end;
+        const std::int32_t eighth = (z - box.lo.z) / kDiffersEdge * 4 +
+                                    (y - box.lo.y) / kDiffersEdge * 2 + begin / kDiffersEdge;
+        VoxelBox& around = eighths[static_cast<std::size_t>(eighth)];
+        around = around.united({{box.lo.x + first, y, z}, {box.lo.x + end, y + 1, z + 1}});
+      }
+      copy_row(to, from, static_cast<std::size_t>(width));
     }
   }
+  std::copy_if(eighths.begin(), eighths.end(), std::back_inserter(differs),
+               [](const VoxelBox& around) { return !around.empty(); });
 }
 
 }  // namespace
@@ -176,7 +193,7 @@ bool SegmentReader::copy_changed(const SegmentVolumeInfo& volume, VolumeSnapshot
       continue;
     }
     if (whole == snapshot.versions[id]) continue;
-    place_brick(brick, volume.bricks.voxels(id), volume.grid, snapshot.density);
+    place_brick(brick, volume.bricks.voxels(id), volume.grid, snapshot.density, snapshot.differs);
     snapshot.versions[id] = whole;
     snapshot.changed.push_back(id);
   }
@@ -186,6 +203,7 @@ bool SegmentReader::copy_changed(const SegmentVolumeInfo& volume, VolumeSnapshot
 void SegmentReader::update(std::size_t volume, VolumeSnapshot& snapshot) const {
   const SegmentVolumeInfo& info = info_.volumes.at(volume);
   snapshot.changed.clear();
+  snapshot.differs.clear();
   snapshot.consistent = false;
   if (snapshot.session_id != info_.session_id || snapshot.versions.size() != info.bricks.count() ||
       snapshot.density.size() != info.grid.voxel_count()) {

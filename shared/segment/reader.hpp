@@ -57,9 +57,14 @@ struct VolumeSnapshot {
   std::vector<Density> density;         ///< linear, x fastest
   std::vector<std::uint64_t> versions;  ///< per brick, as seen; 0: never
   std::vector<std::uint32_t> changed;   ///< brick ids changed by the last `update`, ascending
+  std::vector<VoxelBox> differs;        ///< around the voxels in them that are others: see below
   Tick tick = 0;                        ///< where consistent: `density` is exactly this tick's
   bool consistent = false;
 };
+
+/// `VolumeSnapshot::differs` has the smallest box for each eighth of a brick, so that together they
+/// follow the shape of a cut; none is empty.
+inline constexpr std::int32_t kDiffersEdge = kBrickEdge / 2;
 
 enum class ReadState : std::uint8_t {
   ok,

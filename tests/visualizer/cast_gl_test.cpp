@@ -4,18 +4,13 @@
 #include <array>
 #include <cmath>
 #include <cstdlib>
-#include <filesystem>
-#include <optional>
 
 #include <doctest/doctest.h>
 #include <glm/gtc/matrix_transform.hpp>
 
-#include "controller/scene/phantom.hpp"
-#include "controller/scene/volume_density.hpp"
-#include "controller/scene/volume_io.hpp"
 #include "tests/visualizer/gl_fixture.hpp"
+#include "tests/visualizer/teeth.hpp"
 #include "visualizer/cast/cast_renderer.hpp"
-#include "visualizer/gl/context.hpp"
 #include "visualizer/mesh_painter.hpp"
 
 using namespace kerf;
@@ -24,70 +19,7 @@ using namespace kerf::test;
 namespace {
 
 constexpr PictureSize kSize{320, 320};
-
-/// A tooth, crown up, with its materials.
-struct Tooth {
-  VolumeImage image;
-  SceneView scene;
-  bool labelled;
-
-  Tooth(VolumeImage of, double iso, bool with_labels)
-      : image(std::move(of)), labelled(with_labels) {
-    VolumeView volume;
-    volume.name = "tooth";
-    volume.bricks = BrickGrid::of(image.grid);
-    volume.world_from_voxel = glm::rotate(glm::dmat4(1.0), glm::radians(-90.0), {1, 0, 0}) *
-                              centred(image.grid, glm::dvec3(image.spacing_mm[0]));
-    volume.iso = static_cast<Density>(iso * kDensityMax);
-    scene.volumes = {volume};
-    scene.materials = {{"none", 0.0, {}},
-                       {"enamel", 0.8, {0.88, 0.86, 0.80}},
-                       {"dentin", 0.45, {0.80, 0.60, 0.36}},
-                       {"pulp", 0.2, {0.70, 0.16, 0.14}}};
-  }
-  [[nodiscard]] VolumeContent content() const {
-    return {image.density, labelled ? std::span<const Label>(image.labels) : std::span<Label>()};
-  }
-  /// Opens the crown down to the pulp; returns the bricks that changed.
-  std::vector<std::uint32_t> drill() {
-    const VoxelGrid& grid = image.grid;
-    const double radius_vox = 0.05 * grid.nx;
-    for (int z = grid.nz * 3 / 8; z < grid.nz; ++z) {
-      for (int y = 0; y < grid.ny; ++y) {
-        for (int x = 0; x < grid.nx; ++x) {
-          if (std::hypot(x - 0.5 * grid.nx, y - 0.5 * grid.ny) < radius_vox) {
-            image.density[grid.index(x, y, z)] = 0;
-          }
-        }
-      }
-    }
-    std::vector<std::uint32_t> all;
-    for (std::uint32_t id = 0; id < scene.volumes[0].bricks.count(); ++id) all.push_back(id);
-    return all;
-  }
-};
-
-Tooth phantom(bool labelled) {
-  return {make_phantom({{128, 128, 80}, 0.25}), 0.45, labelled};
-}
-
-/// The CT tooth below $KERF_DATA; none, with a message, where it is not there.
-std::optional<Tooth> ct_tooth() {
-  const char* folder = std::getenv("KERF_DATA");
-  const auto file =
-      std::filesystem::path(folder != nullptr ? folder : "") / "ge_tooth_16bit" / "tooth.nhdr";
-  if (!std::filesystem::exists(file)) {
-    MESSAGE("skipped: ge_tooth_16bit/tooth.nhdr is not there (KERF_DATA names the folder)");
-    return std::nullopt;
-  }
-  ReadOptions options;
-  options.spacing_mm = {0.125, 0.125, 0.125};
-  constexpr double kAir = 391.0;
-  constexpr double kMost = 1300.0;
-  constexpr double kIso = 620.0;
-  return Tooth(apply_window(read_volume(file, options), {kAir, kMost}),
-               (kIso - kAir) / (kMost - kAir), false);
-}
+constexpr VoxelGrid kSmall{128, 128, 80};
 
 const std::array<View, 3> kViews{look_at({18, 22, 30}, {}, 20, 60), look_at({0, 40, 1}, {}, 20, 60),
                                  look_at({-25, -8, 12}, {0, 2, 0}, 10, 60)};
@@ -123,7 +55,7 @@ std::size_t pixel(int x, int y) {
 TEST_CASE("iso and cast draw teeth alike, by labels and by density, also after a cut") {
   if (!have_gl()) return;
   const RenderTarget target(kSize);
-  std::vector<Tooth> teeth{phantom(true), phantom(false)};
+  std::vector<Tooth> teeth{phantom(kSmall, true), phantom(kSmall, false)};
   if (auto tooth = ct_tooth()) teeth.push_back(std::move(*tooth));
   for (Tooth& tooth : teeth) {
     const VolumeContent content = tooth.content();
@@ -152,7 +84,7 @@ TEST_CASE("iso and cast draw teeth alike, by labels and by density, also after a
 TEST_CASE(
     "within a part of the target only its pixels are drawn, and they are those of the whole") {
   if (!have_gl()) return;
-  const Tooth tooth = phantom(true);
+  const Tooth tooth = phantom(kSmall, true);
   const VolumeContent content = tooth.content();
   RenderTarget target(kSize);
   for (const CastMode mode : {CastMode::iso, CastMode::blend}) {
@@ -163,7 +95,6 @@ TEST_CASE(
     target.restrict_to({100, 90, 175, 141});
     cast.draw(kViews[0], target);
     target.restrict_to(target.all());
-    throw_on_gl_error();
     const std::vector<float> depth = target.read_depth();
     const std::vector<std::uint8_t> rgb = target.read_rgb();
     std::size_t wrong = 0;
@@ -200,7 +131,6 @@ TEST_CASE("a tool hides, is hidden and shines through as its place says") {
     painter.draw(tool, glm::translate(glm::dmat4(1.0), {0, 0, z_mm}), {}, view, target);
     const std::uint8_t tool_red = target.read_rgb()[3 * middle];
     cast.draw(view, target);
-    throw_on_gl_error();
     return std::pair(target.read_rgb()[3 * middle] == tool_red,
                      eye_distance_mm(static_cast<double>(target.read_depth()[middle]), view));
   };

@@ -15,9 +15,7 @@ namespace kerf::test {
 bool have_gl() {
   static const std::unique_ptr<GlContext> context = []() -> std::unique_ptr<GlContext> {
     try {
-      auto made = make_headless_context();
-      enable_gl_debug();
-      return made;
+      return make_headless_context();
     } catch (const VisualizerError&) {
       return nullptr;
     }
@@ -79,7 +77,8 @@ View look_at(glm::dvec3 eye_mm, glm::dvec3 at_mm, double near_mm, double far_mm)
 }
 
 PixelRay pixel_ray(const View& view, PictureSize size, int x, int y) {
-  const double right = ((x + 0.5) / size.width * 2.0 - 1.0) * view.tan_half_height * view.aspect;
+  const double right =
+      ((x + 0.5) / size.width * 2.0 - 1.0) * view.tan_half_height * view.aspect + view.middle_right;
   const double up = (1.0 - (y + 0.5) / size.height * 2.0) * view.tan_half_height;
   const glm::dmat4 world_from_eye = glm::inverse(view.eye_from_world);
   return {glm::dvec3(world_from_eye[3]), glm::dmat3(world_from_eye) * glm::dvec3(right, up, -1.0)};
@@ -90,9 +89,7 @@ Drawn draw(Renderer& renderer, const View& view, const RenderTarget& target) {
   glClearColor(0.0F, 0.0F, 0.0F, 1.0F);
   glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
   renderer.draw(view, target);
-  Drawn drawn{target.read_rgb(), target.read_depth()};
-  throw_on_gl_error();
-  return drawn;
+  return {target.read_rgb(), target.read_depth()};
 }
 
 }  // namespace kerf::test

@@ -50,7 +50,7 @@ struct Drawn {
   std::vector<std::uint8_t> rgb;
   std::vector<float> depth;
 };
-/// Clears `target`, draws, reads back; a GL error is an exception.
+/// Clears `target`, draws, reads back.
 [[nodiscard]] Drawn draw(Renderer& renderer, const View& view, const RenderTarget& target);
 
 }  // namespace kerf::test

@@ -53,13 +53,12 @@ TEST_CASE("no sample in a cell is above the cell's maximum, in and around the vo
   CHECK(rc::check([] {
     const VoxelGrid grid = random_grid();
     const auto density = random_density(grid);
-    const Macrocells cells(grid, density, 1);
+    const std::int32_t edge = *rc::gen::element(4, 8);
+    const Macrocells cells(grid, density, 1, edge);
     const auto unit = rc::gen::inRange(0, 1001);
     const auto coordinate = [&](int n) { return -1.0 + *unit * 1e-3 * (n + 1); };
     const std::array<double, 3> at{coordinate(grid.nx), coordinate(grid.ny), coordinate(grid.nz)};
-    const auto cell = [](double v) {
-      return static_cast<std::int32_t>((v + 1.0) / Macrocells::kEdge);
-    };
+    const auto cell = [&](double v) { return static_cast<std::int32_t>((v + 1.0) / edge); };
     const VoxelIndex index{cell(at[0]), cell(at[1]), cell(at[2])};
     RC_ASSERT(cells.grid().contains(index));
     const double highest = cells.maxima()[cells.grid().index(index.x, index.y, index.z)];
@@ -72,7 +71,8 @@ TEST_CASE("cells kept up by changed bricks equal cells made anew") {
     const VoxelGrid grid = random_grid();
     const Density iso = *rc::gen::inRange<Density>(1, 65535);
     auto density = random_density(grid);
-    Macrocells kept(grid, density, iso);
+    const std::int32_t edge = *rc::gen::element(4, 8);
+    Macrocells kept(grid, density, iso, edge);
     const BrickGrid bricks = BrickGrid::of(grid);
     const auto id = *rc::gen::inRange(0U, bricks.count());
     const Density value = *rc::gen::arbitrary<Density>();
@@ -83,8 +83,8 @@ TEST_CASE("cells kept up by changed bricks equal cells made anew") {
       }
     }
     const std::vector<std::uint8_t> before(kept.active().begin(), kept.active().end());
-    const bool flipped = kept.update_brick(bricks.brick(id), density);
-    const Macrocells made(grid, density, iso);
+    const bool flipped = kept.update_bricks(bricks, {&id, 1}, density);
+    const Macrocells made(grid, density, iso, edge);
     RC_ASSERT(std::ranges::equal(kept.maxima(), made.maxima()));
     RC_ASSERT(std::ranges::equal(kept.active(), made.active()));
     RC_ASSERT(flipped == !std::ranges::equal(kept.active(), before));

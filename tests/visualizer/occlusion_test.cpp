@@ -7,7 +7,6 @@
 #include <glm/gtc/matrix_transform.hpp>
 
 #include "tests/visualizer/gl_fixture.hpp"
-#include "visualizer/gl/context.hpp"
 #include "visualizer/mesh_painter.hpp"
 
 using namespace kerf;
@@ -91,7 +90,6 @@ TEST_CASE(
   const auto with_tool_at = [&](glm::dvec3 at) {
     static_cast<void>(draw(renderer, view, target));
     painter.draw(tool, glm::translate(glm::dmat4(1.0), at), {}, view, target);
-    throw_on_gl_error();
     return Drawn{target.read_rgb(), target.read_depth()};
   };
   const std::size_t middle = pixel(kSize.width / 2, kSize.height / 2);
@@ -136,5 +134,4 @@ TEST_CASE("the part of the force arrow inside the volume shines through and leav
   static_cast<void>(draw(renderer, view, target));
   painter.draw_arrow({0, 0, 0}, {0, 0, 0}, 0.2, {}, view, target);  // no force, no arrow
   CHECK(target.read_rgb() == alone.rgb);
-  throw_on_gl_error();
 }

@@ -68,6 +68,15 @@ TEST_CASE("every mistake on the command line is one line") {
                                                                  {"--cpu", "a"},
                                                                  {"--every-ticks", "0"},
                                                                  {"stray"},
+                                                                 {"--eyes", "wide"},
+                                                                 {"--fps", "0"},
+                                                                 {"--fps", "241"},
+                                                                 {"--record"},
+                                                                 {"--transfer", "/nowhere/t.toml"},
+                                                                 {"--transfer", "/dev/null"},
+                                                                 {"--convergence", "0"},
+                                                                 {"--convergence", "nan"},
+                                                                 {"--seconds", "nan"},
                                                                  {"--seconds"}}) {
     try {
       static_cast<void>(parse(arguments));
@@ -76,6 +85,12 @@ TEST_CASE("every mistake on the command line is one line") {
       CHECK(std::string(problem.what()).find('\n') == std::string::npos);
     }
   }
+}
+
+TEST_CASE("beside a video there are pictures only where they are asked for") {
+  CHECK(parse({"--headless"})->frames == 10);
+  CHECK(parse({"--headless", "--record", "-"})->frames == 0);
+  CHECK(parse({"--headless", "--record", "v.y4m", "--frames", "3"})->frames == 3);
 }
 
 TEST_CASE("the bench draws as large as the paper unless told otherwise, and alone writes a page") {

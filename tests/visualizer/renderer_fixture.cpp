@@ -9,8 +9,6 @@
 
 #include <doctest/doctest.h>
 
-#include "visualizer/gl/context.hpp"
-
 namespace kerf::test {
 
 namespace {
@@ -25,9 +23,7 @@ Drawn draw_before_wall(Renderer& renderer, const View& view, const RenderTarget&
   glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
   glClearDepth(1.0);
   renderer.draw(view, target);
-  Drawn drawn{target.read_rgb(), target.read_depth()};
-  throw_on_gl_error();
-  return drawn;
+  return {target.read_rgb(), target.read_depth()};
 }
 
 }  // namespace

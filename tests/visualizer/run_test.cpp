@@ -18,6 +18,7 @@
 #include <nlohmann/json.hpp>
 #include <unistd.h>
 
+#include "shared/posix/new_file.hpp"
 #include "shared/segment/hand_over.hpp"
 #include "visualizer/error.hpp"
 #include "visualizer/gl/context.hpp"
@@ -180,6 +181,38 @@ TEST_CASE("a headless run writes its pictures, follows the milling and ends with
   CHECK(report["latency_ms"]["p99"] >= report["latency_ms"]["p50"]);
 }
 
+TEST_CASE("a headless video plays in the servo's time, to the end of the run") {
+  if (!have_gl()) return;
+  const Place place;
+  VisualizerOptions options = place.options();
+  options.frames = 0;
+  options.record = (place.path / "a.y4m").string();
+  options.video_hz = 50;
+  Miller miller;
+  miller.run_to(1);
+  auto code = std::async(std::launch::async, [&] { return run_headless(options); });
+  const std::size_t frame = 6 + 96 * 72 * 3 / 2;
+  // The first frame shows the first tick.
+  const auto begun = [&] {
+    return fs::exists(*options.record) && fs::file_size(*options.record) > frame;
+  };
+  for (int tries = 0; tries < 6000 && !begun(); ++tries) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  miller.run_to(400);
+  miller.say(Lifecycle::clean_end);
+  CHECK(code.get() == 0);
+  const std::string video = contents(*options.record);
+  const std::size_t header = video.find('\n') + 1;
+  CHECK((video.size() - header) % frame == 0);
+  const std::size_t frames = (video.size() - header) / frame;
+  CHECK(frames == 20);  // 399 ticks of a millisecond, the first one included
+  CHECK(video.substr(header, frame) != video.substr(video.size() - frame));
+  CHECK_FALSE(fs::exists(options.out));  // no pictures
+  options.record = "/dev/full";
+  CHECK_THROWS_AS(static_cast<void>(run_headless(options)), FileError);
+}
+
 TEST_CASE("a session tells once when the oldest new removal was, and nothing from before it") {
   const Place place;
   Miller miller;
@@ -189,9 +222,9 @@ TEST_CASE("a session tells once when the oldest new removal was, and nothing fro
   miller.run_to(22);
   session.poll();
   CHECK_FALSE(session.take_oldest_removal());
-  const auto before = std::chrono::steady_clock::now();
   miller.run_to(23);
-  miller.run_to(24);  // the next cut, under the time of tick 23
+  const auto before = std::chrono::steady_clock::now();
+  miller.run_to(24);  // the next cut
   const auto after_first = std::chrono::steady_clock::now();
   CHECK_FALSE(session.take_oldest_removal());  // not polled
   miller.run_to(32);                           // and one more

@@ -12,7 +12,8 @@ using namespace kerf::test;
 
 namespace {
 
-constexpr std::array<const char*, 3> kRenderers{"iso", "blend", "slices"};
+constexpr std::array<const char*, 4> kRenderers{"iso", "blend", "slices", "surface"};
+constexpr std::array<const char*, 3> kSolid{"iso", "blend", "slices"};  // with a face where cut
 
 }  // namespace
 
@@ -23,7 +24,7 @@ TEST_CASE("the clip plane leaves a face where it cuts through solid, and nothing
   const VolumeContent content = volume.content();
   View view = look_at({0, 0, 30}, {}, 20, 40);
   view.shown = {0, 0, -1, 1.03};  // z <= 1.03 mm
-  for (const char* kind : kRenderers) {
+  for (const char* kind : kSolid) {
     CAPTURE(kind);
     const auto renderer = make_renderer(kind, scene_of({&volume}), {&content, 1});
     const Drawn drawn = draw(*renderer, view, RenderTarget(kTestSize));
@@ -34,6 +35,29 @@ TEST_CASE("the clip plane leaves a face where it cuts through solid, and nothing
     for (const float depth : drawn.depth) {
       CHECK(eye_distance_mm(static_cast<double>(depth), view) > 28.969);
     }
+  }
+}
+
+TEST_CASE("a surface is a shell: opened by the clip plane, it shows its inner side at its depth") {
+  if (!have_gl()) return;
+  const VoxelGrid grid{40, 40, 40};
+  const TestVolume volume(grid, centred(grid, glm::dvec3(0.25)), ball({}, 3.5, 0.5));
+  const VolumeContent content = volume.content();
+  View view = look_at({0, 0, 30}, {}, 20, 40);
+  const auto renderer = make_renderer("surface", scene_of({&volume}), {&content, 1});
+  const RenderTarget target(kTestSize);
+  const Drawn whole = draw(*renderer, view, target);
+  view.shown = {0, 0, -1, 1.03};
+  const Drawn opened = draw(*renderer, view, target);
+  const std::size_t middle = pixel_at(48, 48);
+  CHECK(eye_distance_mm(static_cast<double>(whole.depth[middle]), view) ==
+        doctest::Approx(26.5).epsilon(1e-3));
+  CHECK(eye_distance_mm(static_cast<double>(opened.depth[middle]), view) ==
+        doctest::Approx(33.5).epsilon(1e-3));
+  CHECK(opened.rgb[3 * middle] > 40);                     // lit
+  CHECK(opened.rgb[3 * middle] < whole.rgb[3 * middle]);  // less than the outside
+  for (const float depth : opened.depth) {
+    CHECK(eye_distance_mm(static_cast<double>(depth), view) > 28.969);
   }
 }
 

@@ -12,7 +12,6 @@
 #include <glm/gtc/matrix_transform.hpp>
 
 #include "tests/visualizer/gl_fixture.hpp"
-#include "visualizer/gl/context.hpp"
 
 using namespace kerf;
 using namespace kerf::test;
@@ -198,7 +197,6 @@ TEST_CASE(
     for (const std::uint8_t c : in_part) lit_inside += c != 0;
     CHECK(lit == lit_inside);
   }
-  throw_on_gl_error();
 }
 
 TEST_CASE("surface and iso draw the same picture") {

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The window on a screen of its own (Xvfb), worked with real key and mouse events (xdotool).
+#include "visualizer/gl/window.hpp"
+
 #include <chrono>
 #include <csignal>
 #include <cstdlib>
@@ -11,17 +13,22 @@
 #include <vector>
 
 #include <doctest/doctest.h>
+#include <epoxy/gl.h>
 #include <fcntl.h>
 #include <nlohmann/json.hpp>
-#include <png.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include "shared/segment/hand_over.hpp"
 #include "shared/segment/writer.hpp"
+#include "tests/programs/process.hpp"
+#include "tests/visualizer/rgb_picture.hpp"
+#include "visualizer/error.hpp"
 #include "visualizer/run.hpp"
+#include "visualizer/transfer_file.hpp"
 
 using namespace kerf;
+using namespace kerf::test;
 namespace fs = std::filesystem;
 
 namespace {
@@ -67,9 +74,14 @@ class Screen {
     setenv("XDG_RUNTIME_DIR", folder.c_str(), 1);
   }
   ~Screen() {
-    kill(server_, SIGTERM);
-    waitpid(server_, nullptr, 0);
+    end(SIGTERM);
     fs::remove_all(folder);
+  }
+  void end(int signal) {
+    if (server_ < 0) return;
+    kill(server_, signal);
+    waitpid(server_, nullptr, 0);
+    server_ = -1;
   }
   Screen(const Screen&) = delete;
   Screen& operator=(const Screen&) = delete;
@@ -90,15 +102,46 @@ SegmentSpec block(std::vector<Density>& density) {
   return spec;
 }
 
-/// A window that shows a block, and a user before it.
+/// A controller of the name "test" that shows a block.
+class Controller {
+ public:
+  Controller() : writer_(SegmentWriter::create(block(density_))), server_("test", writer_) {
+    writer_.set_lifecycle(Lifecycle::run);
+  }
+  void tick() {
+    writer_.begin_tick(++now_);
+    TickRecord record{};
+    record.tick = now_;
+    writer_.publish_state(record);
+    writer_.end_tick(0);
+  }
+
+ private:
+  std::vector<Density> density_;
+  SegmentWriter writer_;
+  SegmentServer server_;
+  Tick now_ = 0;
+};
+
+/// Real events at the screen that DISPLAY names.
+void act(const std::string& events) {
+  // Where xdotool itself could not be started nothing was sent: that says nothing of the window.
+  constexpr int kNotStarted = 127;
+  int status = 0;
+  for (int tries = 0; tries < 3; ++tries) {
+    status = std::system(("xdotool " + events + " >/dev/null").c_str());
+    if (!WIFEXITED(status) || WEXITSTATUS(status) != kNotStarted) break;
+    std::this_thread::sleep_for(std::chrono::milliseconds(300));
+  }
+  CAPTURE(events);
+  REQUIRE(status == 0);
+  std::this_thread::sleep_for(std::chrono::milliseconds(300));
+}
+
+/// A window, and a user before it.
 class User {
  public:
-  explicit User(const fs::path& folder)
-      : out_(folder / "out"),
-        report_(folder / "report.json"),
-        writer_(SegmentWriter::create(block(density_))),
-        server_("test", writer_) {
-    writer_.set_lifecycle(Lifecycle::run);
+  explicit User(const fs::path& folder) : out_(folder / "out"), report_(folder / "report.json") {
     VisualizerOptions options;
     options.name = "test";
     options.size = {480, 360};
@@ -109,20 +152,6 @@ class User {
     act("search --sync --onlyvisible --name 'kerf: test' mousemove 300 180");
   }
 
-  void act(const std::string& events) {
-    // Where xdotool itself could not be started nothing was sent: that says nothing of the window.
-    constexpr int kNotStarted = 127;
-    int status = 0;
-    for (int tries = 0; tries < 3; ++tries) {
-      status = std::system(("xdotool " + events + " >/dev/null").c_str());
-      if (!WIFEXITED(status) || WEXITSTATUS(status) != kNotStarted) break;
-      std::this_thread::sleep_for(std::chrono::milliseconds(300));
-    }
-    CAPTURE(events);
-    REQUIRE(status == 0);
-    std::this_thread::sleep_for(std::chrono::milliseconds(300));
-  }
-
   /// The middle of the window, where no panel is.
   std::vector<std::uint8_t> look() {
     const fs::path file = out_ / "kerf-0001.png";
@@ -130,17 +159,16 @@ class User {
     for (int tries = 0; tries < 3000 && !fs::exists(file); ++tries) {
       std::this_thread::sleep_for(std::chrono::milliseconds(10));
     }
-    png_image image{};
-    image.version = PNG_IMAGE_VERSION;
-    REQUIRE(png_image_begin_read_from_file(&image, file.c_str()) != 0);
-    image.format = PNG_FORMAT_RGB;
-    std::vector<std::uint8_t> all(PNG_IMAGE_SIZE(image));
-    REQUIRE(png_image_finish_read(&image, nullptr, all.data(), 0, nullptr) != 0);
+    const auto picture = read_png(file);
+    REQUIRE(picture);
     fs::remove(file);
+    const auto width = static_cast<std::size_t>(picture->size.width);
+    const auto height = static_cast<std::size_t>(picture->size.height);
     std::vector<std::uint8_t> middle;
-    for (std::size_t y = image.height / 4; y < image.height * 3 / 4; ++y) {
-      const auto row = all.begin() + static_cast<std::ptrdiff_t>(y * image.width * 3);
-      middle.insert(middle.end(), row + image.width * 3 * 5 / 9, row + image.width * 3 * 8 / 9);
+    for (std::size_t y = height / 4; y < height * 3 / 4; ++y) {
+      const auto row = picture->rgb.begin() + static_cast<std::ptrdiff_t>(y * width * 3);
+      middle.insert(middle.end(), row + picture->size.width * 3 * 5 / 9,
+                    row + picture->size.width * 3 * 8 / 9);
     }
     return middle;
   }
@@ -149,15 +177,14 @@ class User {
     act("key q");
     return code_.get();
   }
+  [[nodiscard]] const fs::path& out() const { return out_; }
   [[nodiscard]] nlohmann::json report() const {
     return nlohmann::json::parse(std::ifstream(report_));
   }
 
  private:
   fs::path out_, report_;
-  std::vector<Density> density_;
-  SegmentWriter writer_;
-  SegmentServer server_;
+  Controller controller_;
   std::future<int> code_;
 };
 
@@ -171,48 +198,134 @@ TEST_CASE("keys and mouse work the window") {
   CHECK(user.look() == first);
 
   SUBCASE("v takes the next renderer") {
-    user.act("key v");
+    act("key v");
     CHECK(user.look() != first);
     CHECK(user.quit() == 0);
     CHECK(user.report()["renderer"] == "blend");
   }
   SUBCASE("c cuts the volumes open and closes them again") {
-    user.act("key c");
+    act("key c");
     CHECK(user.look() != first);
-    user.act("key c");
+    act("key c");
     CHECK(user.look() == first);
     CHECK(user.quit() == 0);
   }
   SUBCASE("a drag turns, r turns back, the wheel zooms") {
-    user.act("mousedown 1 mousemove 360 200 sleep 0.2 mouseup 1");
+    act("mousedown 1 mousemove 360 200 sleep 0.2 mouseup 1");
     CHECK(user.look() != first);
-    user.act("key r");
+    act("key r");
     CHECK(user.look() == first);
-    user.act("click 4");
+    act("click 4");
     CHECK(user.look() != first);
     CHECK(user.quit() == 0);
   }
   SUBCASE("a drag that begins on the controls does not turn") {
-    user.act(
-        "mousemove 190 330 sleep 0.2 mousedown 1 sleep 0.2 mousemove 300 100 sleep 0.2 mouseup 1 "
+    act("mousemove 190 330 sleep 0.2 mousedown 1 sleep 0.2 mousemove 300 100 sleep 0.2 mouseup 1 "
         "mousemove 300 180");
     const auto after = user.look();
     CHECK(user.quit() == 0);
     CHECK(after == first);
   }
-  SUBCASE("every panel may be shown") {
-    user.act("key p key h sleep 0.2 key p key h");
+  SUBCASE("t shows two eyes side by side, and one again") {
+    act("key t");
+    CHECK(user.look() != first);
+    act("key t");
     CHECK(user.look() == first);
     CHECK(user.quit() == 0);
   }
-  SUBCASE("a window that is tiny, hidden and shown again goes on") {
-    const std::string window = "search --name 'kerf: test' ";
-    user.act(window + "windowsize 1 1");
-    user.act(window + "windowunmap");
-    user.act(window + "windowmap");
-    user.act(window + "windowsize 480 360");
-    user.act("mousemove 300 180");
+  SUBCASE("a slider changes an opacity while it is dragged, and w writes it") {
+    act("key v");
+    const auto blended = user.look();
+    act("mousemove 131 284 sleep 0.2 mousedown 1 sleep 0.2 mousemove 60 284 sleep 0.2");
+    CHECK(user.look() != blended);
+    act("mouseup 1 mousemove 300 180 key w");
+    CHECK(user.quit() == 0);
+    const Opacities written = read_transfer(user.out() / "kerf-0001.toml");
+    REQUIRE(written.size() == 1);
+    CHECK(written.at("bone") < 0.1);
+  }
+  SUBCASE("m films until m") {
+    act("key m sleep 0.3 key m");
+    CHECK(user.quit() == 0);
+    std::ifstream video(user.out() / "kerf-0001.y4m", std::ios::binary);
+    std::string line;
+    std::getline(video, line);
+    CHECK(line.find("YUV4MPEG2 W480 H360 F60:1 ") == 0);
+    std::getline(video, line);
+    CHECK(line == "FRAME");
+  }
+  SUBCASE("every panel may be shown") {
+    act("key p key h sleep 0.2 key p key h");
     CHECK(user.look() == first);
     CHECK(user.quit() == 0);
+  }
+  const std::string window = "search --name 'kerf: test' ";
+  SUBCASE("a window of one pixel, or of nothing on a side, comes back whole") {
+    for (const char* size : {"1 1", "0 0", "1 360", "480 1"}) act(window + "windowsize " + size);
+    act(window + "windowsize 480 360");
+    act("mousemove 300 180");
+    CHECK(user.look() == first);
+    CHECK(user.quit() == 0);
+  }
+  SUBCASE("a window that is minimised and restored shows what it showed, and still follows keys") {
+    for (int times = 0; times < 3; ++times) {
+      act(window + "windowunmap");
+      act(window + "windowmap");
+    }
+    act("mousemove 300 180");
+    CHECK(user.look() == first);
+    act("key v");
+    CHECK(user.look() != first);
+    CHECK(user.quit() == 0);
+  }
+}
+
+TEST_CASE("a GL error in a window fails the test that makes it" * doctest::should_fail()) {
+  if (!have("Xvfb")) FAIL("no screen: nothing to see, and this test has to fail");
+  const Screen screen;
+  const Window window({64, 64}, Window::Visibility::hidden);
+  glEnable(GL_INVALID_ENUM);
+}
+
+TEST_CASE("a window whose GL context is lost ends with one line") {
+  if (!have("Xvfb")) return;
+  const Screen screen;
+  const Controller controller;
+  VisualizerOptions options;
+  options.name = "test";
+  options.seconds = 100.0;
+  // No test can reset a graphics card: the driver's answer is put in its place.
+  const auto driver = glGetGraphicsResetStatus;
+  glGetGraphicsResetStatus = []() -> GLenum { return GL_INNOCENT_CONTEXT_RESET; };
+  CHECK_THROWS_WITH_AS(static_cast<void>(run_window(options)),
+                       "OpenGL: the graphics card was reset by another program and its memory is "
+                       "lost; start kerf-visualizer again",
+                       VisualizerError);
+  glGetGraphicsResetStatus = driver;
+}
+
+TEST_CASE("when the X server dies the window ends with one line, and the controller goes on") {
+  if (!have("Xvfb") || !have("xdotool")) return;
+  for (const int signal : {SIGTERM, SIGKILL}) {
+    CAPTURE(signal);
+    Screen screen;
+    Controller controller;
+    Process window({KERF_TEST_BIN "/kerf-visualizer", "--name", "test"}, screen.folder / "said");
+    act("search --sync --onlyvisible --name 'kerf: test'");
+    screen.end(signal);
+    CHECK(window.wait() == 2);
+    CHECK(window.output() ==
+          "kerf-visualizer: window: the X server is gone; the controller goes on, so start "
+          "kerf-visualizer again on another screen or with --headless --out DIR\n");
+    controller.tick();
+    VisualizerOptions options;
+    options.name = "test";
+    options.headless = true;
+    options.frames = 1;
+    options.seconds = 0.5;
+    options.size = {64, 48};
+    options.out = screen.folder / "later";
+    CHECK(run_headless(options) == 0);
+    CHECK(fs::exists(options.out / "frame-0001.png"));
   }
 }

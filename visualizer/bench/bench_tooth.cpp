@@ -126,7 +126,7 @@ BenchTooth::BenchTooth(const VoxelGrid& padded, bool cropped) {
                       {"enamel", 0.5 * (kDentin + kEnamel), {0.93, 0.91, 0.85}}};
 }
 
-std::vector<std::uint32_t> BenchTooth::cut(int diameter) {
+BenchCut BenchTooth::cut(int diameter) {
   const BrickGrid& bricks = view().bricks;
   const VoxelGrid& grid = bricks.grid;
   const VoxelIndex centre = next_place();
@@ -134,32 +134,53 @@ std::vector<std::uint32_t> BenchTooth::cut(int diameter) {
   const VoxelBox box = VoxelBox{centre, {centre.x + 1, centre.y + 1, centre.z + 1}}
                            .grown(diameter / 2)
                            .clipped(grid.box());
-  for (int z = box.lo.z; z < box.hi.z; ++z) {
-    for (int y = box.lo.y; y < box.hi.y; ++y) {
-      for (int x = box.lo.x; x < box.hi.x; ++x) {
-        const glm::dvec3 off(x - centre.x, y - centre.y, z - centre.z);
-        if (glm::length(off) <= radius) density_[grid.index(x, y, z)] = 0;
-      }
-    }
-  }
-  std::vector<std::uint32_t> changed;
+  BenchCut cut;
   const VoxelBox touched = bricks.bricks_of(box);
   for (int z = touched.lo.z; z < touched.hi.z; ++z) {
     for (int y = touched.lo.y; y < touched.hi.y; ++y) {
-      for (int x = touched.lo.x; x < touched.hi.x; ++x) changed.push_back(bricks.id({x, y, z}));
+      for (int x = touched.lo.x; x < touched.hi.x; ++x) {
+        cut.bricks.push_back(bricks.id({x, y, z}));
+        take_ball(bricks.voxels(cut.bricks.back()), centre, radius, cut.differs);
+      }
     }
   }
-  return changed;
+  return cut;
+}
+
+/// Within a brick; adds boxes around the voxels that it changed to `differs`.
+void BenchTooth::take_ball(const VoxelBox& brick, VoxelIndex centre, double radius,
+                           std::vector<VoxelBox>& differs) {
+  for (int eighth = 0; eighth < 8; ++eighth) {
+    const VoxelIndex lo{brick.lo.x + (eighth & 1) * kDiffersEdge,
+                        brick.lo.y + (eighth >> 1 & 1) * kDiffersEdge,
+                        brick.lo.z + (eighth >> 2) * kDiffersEdge};
+    const VoxelBox box =
+        VoxelBox{lo, {lo.x + kDiffersEdge, lo.y + kDiffersEdge, lo.z + kDiffersEdge}}.clipped(
+            brick);
+    VoxelBox around;
+    for (int z = box.lo.z; z < box.hi.z; ++z) {
+      for (int y = box.lo.y; y < box.hi.y; ++y) {
+        for (int x = box.lo.x; x < box.hi.x; ++x) {
+          const glm::dvec3 off(x - centre.x, y - centre.y, z - centre.z);
+          Density& at = density_[view().bricks.grid.index(x, y, z)];
+          if (glm::length(off) > radius || at == 0) continue;
+          at = 0;
+          around = around.united({{x, y, z}, {x + 1, y + 1, z + 1}});
+        }
+      }
+    }
+    if (!around.empty()) differs.push_back(around);
+  }
 }
 
 /// To and fro across the crown, a row lower each time; from there in to what is left of the tooth.
 VoxelIndex BenchTooth::next_place() {
   constexpr int kPlacesAcross = 12, kRows = 6;
+  constexpr int kStride = 5;  // not beside the last cut, which would be deepened
   constexpr double kWidth = 0.36, kTop = 0.82, kRowStep = 0.045;
   const VoxelGrid& grid = view().bricks.grid;
-  const int row = cuts_ / kPlacesAcross % kRows;
-  const int along = cuts_ % kPlacesAcross;
-  const int across = row % 2 == 0 ? along : kPlacesAcross - 1 - along;
+  const int row = cuts_ % kRows;
+  const int across = kStride * cuts_ % kPlacesAcross;
   ++cuts_;
   const double x = kWidth * ((across + 0.5) / kPlacesAcross - 0.5);
   VoxelIndex place{grid.nx / 2 + static_cast<int>(std::lround(x * grid.nz)), 0,

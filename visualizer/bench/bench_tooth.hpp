@@ -9,6 +9,12 @@
 
 namespace kerf {
 
+/// What a cut changed, as a snapshot of the segment has it.
+struct BenchCut {
+  std::vector<std::uint32_t> bricks;  ///< touched, ascending
+  std::vector<VoxelBox> differs;      ///< `VolumeSnapshot::differs`
+};
+
 /// A made-up molar for timing pictures: crown with four cusps, two roots, enamel over dentin by
 /// density. It is as high as the grid and fills of it what the paper's padded tooth does.
 class BenchTooth {
@@ -23,12 +29,14 @@ class BenchTooth {
   [[nodiscard]] const std::vector<Density>& density() const noexcept { return density_; }
   [[nodiscard]] VolumeContent content() const { return {density_, {}}; }
 
-  /// Takes away a ball of `diameter` voxels at the next place along a path on the crown's side
-  /// that the camera sees. Returns the ids of the bricks that it touches.
-  std::vector<std::uint32_t> cut(int diameter);
+  /// Takes away a ball of `diameter` voxels at the next place on the crown's side that the camera
+  /// sees. A dozen places lie apart; after many a small tooth is bored through.
+  BenchCut cut(int diameter);
 
  private:
   [[nodiscard]] VoxelIndex next_place();
+  void take_ball(const VoxelBox& brick, VoxelIndex centre, double radius,
+                 std::vector<VoxelBox>& differs);
 
   SceneView scene_;
   BoxCorners looked_at_{};

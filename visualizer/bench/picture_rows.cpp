@@ -6,7 +6,7 @@
 #include "visualizer/bench/bench_tooth.hpp"
 #include "visualizer/frame_report.hpp"
 #include "visualizer/renderer.hpp"
-#include "visualizer/screen_bounds.hpp"
+#include "visualizer/stale_volume.hpp"
 #include "visualizer/stop_signal.hpp"
 
 namespace kerf {
@@ -40,7 +40,9 @@ class Stage {
 
   /// Fills the times in.
   void measure(const Change& change, PictureRow& row) {
-    frame(change);  // shaders, threads and textures are made at their first use
+    // Shaders, threads and textures are made at their first use; a part changes a whole picture.
+    frame({.tool = 0, .partial = false});
+    frame(change);
     std::vector<double> cpu_ms, wall_ms;
     const Stopwatch whole;
     for (int i = 0; i < kMostFrames && !stop_requested(); ++i) {
@@ -56,14 +58,20 @@ class Stage {
 
  private:
   Stopwatch frame(const Change& change) {
-    std::vector<std::uint32_t> changed;
-    if (change.tool > 0) changed = tooth_.cut(change.tool);
+    BenchCut cut;
+    if (change.tool > 0) cut = tooth_.cut(change.tool);
     Stopwatch watch;
-    if (!changed.empty()) renderer_->update(0, tooth_.density(), changed);
-    target_.restrict_to(change.partial ? brick_bounds(tooth_.view(), changed, view_, target_.size())
-                                       : target_.all());
+    if (!cut.bricks.empty()) renderer_->update(0, tooth_.density(), cut.bricks);
+    target_.restrict_to(target_.all());
+    if (change.partial) {
+      StaleVolume stale;
+      stale.add(*renderer_, 0, cut.differs);
+      StaleTiles tiles(target_.size());
+      stale.mark(tiles, *renderer_, tooth_.view(), tooth_.density(), view_, target_);
+      target_.restrict_to(tiles.rects());
+    }
     target_.bind();
-    glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
+    target_.for_parts([] { glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT); });
     renderer_->draw(view_, target_);
     glFinish();
     return watch;
@@ -88,7 +96,6 @@ std::vector<PictureRow> measure_pictures(
     for (const bool cropped : {false, true}) {
       const BenchTooth tooth(volume, cropped);
       for (const std::string_view kind : kinds) {
-        Stage stage(kind, tooth, size);
         for (const Change& change : kChanges) {
           if (stop_requested()) return rows;
           PictureRow row{.renderer = std::string(kind),
@@ -98,7 +105,7 @@ std::vector<PictureRow> measure_pictures(
                          .cropped = cropped,
                          .partial = change.partial};
           progress(row.renderer, static_cast<int>(rows.size()), all);
-          stage.measure(change, row);
+          Stage(kind, tooth, size).measure(change, row);  // each cuts a whole tooth
           rows.push_back(row);
         }
       }

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // AVX2: packets of 4x2 rays.
-#include <cstddef>
 #include <cstdint>
 
 #include <immintrin.h>
 
 #include "visualizer/cast/cast_job.hpp"
+#include "visualizer/cast/lane_loads.hpp"
 
 namespace kerf {
 namespace {
@@ -51,27 +51,44 @@ struct Simd {
     return bits(_mm256_blendv_ps(from_bits(no), from_bits(yes), m));
   }
 
-  static F gather(const float* p, I at) noexcept {
-    return _mm256_i32gather_ps(p, (__m256i)at, sizeof(float));
-  }
   template <int kEntryBytes>
   static I gather_bytes(const void* p, I at) noexcept {
-    return (I)_mm256_i32gather_epi32(static_cast<const int*>(p), (__m256i)at, kEntryBytes);
+    const Lanes lane(at);
+    const auto load = [&](int i) { return load_bytes(p, lane.at[i], kEntryBytes); };
+    return (I)_mm256_setr_epi32(load(0), load(1), load(2), load(3), load(4), load(5), load(6),
+                                load(7));
   }
   static void gather_two(const std::uint32_t* p, I at, I& first, I& second) noexcept {
-    const auto* const base = reinterpret_cast<const long long*>(p);
-    const __m256i low = _mm256_i32gather_epi64(base, _mm256_castsi256_si128((__m256i)at), 4);
-    const __m256i high = _mm256_i32gather_epi64(base, _mm256_extracti128_si256((__m256i)at, 1), 4);
-    const F l = _mm256_castsi256_ps(low);
-    const F h = _mm256_castsi256_ps(high);
-    first = ordered(_mm256_shuffle_ps(l, h, 0x88));
-    second = ordered(_mm256_shuffle_ps(l, h, 0xdd));
+    const Lanes lane(at);
+    const auto pair = [&](int i) { return load_pairs(p + lane.at[i], p + lane.at[i + 1]); };
+    const F left = joined(pair(0), pair(4));
+    const F right = joined(pair(2), pair(6));
+    first = bits(_mm256_shuffle_ps(left, right, 0x88));
+    second = bits(_mm256_shuffle_ps(left, right, 0xdd));
+  }
+  static void gather_four(const float* p, I at, F (&out)[4]) noexcept {
+    const Lanes lane(at);
+    const auto row = [&](int i) {
+      return joined(_mm_loadu_ps(p + lane.at[i]), _mm_loadu_ps(p + lane.at[i + 4]));
+    };
+    const F row0 = row(0), row1 = row(1), row2 = row(2), row3 = row(3);
+    const F low01 = _mm256_unpacklo_ps(row0, row1);
+    const F low23 = _mm256_unpacklo_ps(row2, row3);
+    const F high01 = _mm256_unpackhi_ps(row0, row1);
+    const F high23 = _mm256_unpackhi_ps(row2, row3);
+    out[0] = _mm256_shuffle_ps(low01, low23, 0x44);
+    out[1] = _mm256_shuffle_ps(low01, low23, 0xee);
+    out[2] = _mm256_shuffle_ps(high01, high23, 0x44);
+    out[3] = _mm256_shuffle_ps(high01, high23, 0xee);
   }
 
  private:
-  /// Lanes come as 0 1 4 5 | 2 3 6 7.
-  static I ordered(F a) noexcept {
-    return (I)_mm256_permute4x64_epi64(_mm256_castps_si256(a), 0xd8);
+  struct Lanes {
+    explicit Lanes(I of) noexcept { store(at, of); }
+    std::int32_t at[kWide * kHigh];
+  };
+  static F joined(__m128 low, __m128 high) noexcept {
+    return _mm256_insertf128_ps(_mm256_castps128_ps256(low), high, 1);
   }
 };
 

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // AVX-512: packets of 4x4 rays.
-#include <cstddef>
 #include <cstdint>
 
 #include <immintrin.h>
 
 #include "visualizer/cast/cast_job.hpp"
+#include "visualizer/cast/lane_loads.hpp"
 
 namespace kerf {
 namespace {
@@ -49,21 +49,46 @@ struct Simd {
     return (I)_mm512_mask_blend_epi32(m, (__m512i)no, (__m512i)yes);
   }
 
-  static F gather(const float* p, I at) noexcept {
-    return _mm512_i32gather_ps((__m512i)at, p, sizeof(float));
-  }
   template <int kEntryBytes>
   static I gather_bytes(const void* p, I at) noexcept {
-    return (I)_mm512_i32gather_epi32((__m512i)at, p, kEntryBytes);
+    const Lanes lane(at);
+    const auto load = [&](int i) { return load_bytes(p, lane.at[i], kEntryBytes); };
+    return (I)_mm512_setr_epi32(load(0), load(1), load(2), load(3), load(4), load(5), load(6),
+                                load(7), load(8), load(9), load(10), load(11), load(12), load(13),
+                                load(14), load(15));
   }
   static void gather_two(const std::uint32_t* p, I at, I& first, I& second) noexcept {
-    const __m512i low = _mm512_i32gather_epi64(_mm512_castsi512_si256((__m512i)at), p, 4);
-    const __m512i high = _mm512_i32gather_epi64(_mm512_extracti64x4_epi64((__m512i)at, 1), p, 4);
-    const __m512i even =
-        _mm512_setr_epi32(0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 26, 28, 30);
-    const __m512i odd = _mm512_add_epi32(even, _mm512_set1_epi32(1));
-    first = (I)_mm512_permutex2var_epi32(low, even, high);
-    second = (I)_mm512_permutex2var_epi32(low, odd, high);
+    const Lanes lane(at);
+    const auto pair = [&](int i) { return load_pairs(p + lane.at[i], p + lane.at[i + 1]); };
+    const F left = joined(pair(0), pair(4), pair(8), pair(12));
+    const F right = joined(pair(2), pair(6), pair(10), pair(14));
+    first = bits(_mm512_shuffle_ps(left, right, 0x88));
+    second = bits(_mm512_shuffle_ps(left, right, 0xdd));
+  }
+  static void gather_four(const float* p, I at, F (&out)[4]) noexcept {
+    const Lanes lane(at);
+    const auto load = [&](int i) { return _mm_loadu_ps(p + lane.at[i]); };
+    const auto row = [&](int i) { return joined(load(i), load(i + 4), load(i + 8), load(i + 12)); };
+    const F row0 = row(0), row1 = row(1), row2 = row(2), row3 = row(3);
+    const F low01 = _mm512_unpacklo_ps(row0, row1);
+    const F low23 = _mm512_unpacklo_ps(row2, row3);
+    const F high01 = _mm512_unpackhi_ps(row0, row1);
+    const F high23 = _mm512_unpackhi_ps(row2, row3);
+    out[0] = _mm512_shuffle_ps(low01, low23, 0x44);
+    out[1] = _mm512_shuffle_ps(low01, low23, 0xee);
+    out[2] = _mm512_shuffle_ps(high01, high23, 0x44);
+    out[3] = _mm512_shuffle_ps(high01, high23, 0xee);
+  }
+
+ private:
+  struct Lanes {
+    explicit Lanes(I of) noexcept { store(at, of); }
+    std::int32_t at[kWide * kHigh];
+  };
+  static F joined(__m128 a, __m128 b, __m128 c, __m128 d) noexcept {
+    const __m256 low = _mm256_insertf128_ps(_mm256_castps128_ps256(a), b, 1);
+    const __m256 high = _mm256_insertf128_ps(_mm256_castps128_ps256(c), d, 1);
+    return _mm512_insertf32x8(_mm512_castps256_ps512(low), high, 1);
   }
 };
 

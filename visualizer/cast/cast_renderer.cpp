@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "visualizer/cast/cast_renderer.hpp"
 
+#include "visualizer/screen_bounds.hpp"
 #include "visualizer/transfer_function.hpp"
 
 namespace kerf {
@@ -49,6 +50,11 @@ void CastRenderer::update(std::size_t volume, std::span<const Density> density,
   caster_.update(volume, density, changed);
 }
 
+void CastRenderer::set_opacities(std::span<const MaterialView> materials,
+                                 std::span<const VolumeContent> /*contents*/) {
+  caster_.set_materials(make_palette(materials));
+}
+
 CastRenderer::Frame::Frame(PictureSize size) {
   picture.resize(size.width, size.height);
   end_depth.resize(picture.depth.size());
@@ -65,14 +71,30 @@ void CastRenderer::draw(const View& view, const RenderTarget& target) {
   if (!frame_ || frame_->picture.width != size.width || frame_->picture.height != size.height) {
     frame_.emplace(size);
   }
-  const PixelRect& rect = target.part();
-  if (rect.empty()) return;
+  const PixelRect reach = this->reach(view, size);
+  parts_.clear();
+  PixelRect bounds;
+  for (const PixelRect& part : target.parts()) {
+    const PixelRect shows = part.clipped(reach);
+    if (shows.empty()) continue;
+    parts_.push_back(shows);
+    bounds = bounds.united(shows);
+  }
+  if (parts_.empty()) return;
   const bool ends_at_target = mode_ == CastMode::blend;
-  if (ends_at_target) read_end_depth(target, rect);
-  caster_.draw(view, rect, frame_->picture,
+  if (ends_at_target) read_end_depth(target, bounds);
+  caster_.draw(view, parts_, frame_->picture,
                ends_at_target ? std::span<const float>(frame_->end_depth) : std::span<float>());
-  upload(rect);
+  upload(bounds);
   show(target);
+}
+
+PixelRect CastRenderer::reach(const View& view, PictureSize size) const {
+  PixelRect reach;
+  for (const BoxCorners& body : caster_.bodies()) {
+    reach = reach.united(screen_bounds(body, view, size));
+  }
+  return reach;
 }
 
 void CastRenderer::read_end_depth(const RenderTarget& target, const PixelRect& rect) {
@@ -113,7 +135,7 @@ void CastRenderer::show(const RenderTarget& target) {
   } else {
     glDisable(GL_BLEND);
   }
-  glDrawArrays(GL_TRIANGLES, 0, 3);
+  target.for_parts(parts_, [] { glDrawArrays(GL_TRIANGLES, 0, 3); });
 }
 
 }  // namespace kerf

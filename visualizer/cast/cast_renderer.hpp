@@ -10,7 +10,8 @@
 
 namespace kerf {
 
-/// Hands the pictures of `Caster` to GL. Only the target's part is cast.
+/// Hands the pictures of `Caster` to GL. Only the target's parts, and of them what can show
+/// anything, are cast.
 ///
 /// Iso goes under the depth test of the target. Blend ends its rays at what is in the target, lies
 /// over it, and sets depth where enough of it has gathered to hide what comes later.
@@ -20,7 +21,10 @@ class CastRenderer final : public Renderer {
 
   void update(std::size_t volume, std::span<const Density> density,
               std::span<const std::uint32_t> changed) override;
+  void set_opacities(std::span<const MaterialView> materials,
+                     std::span<const VolumeContent> contents) override;
   void draw(const View& view, const RenderTarget& target) override;
+  [[nodiscard]] bool feels_ahead() const noexcept override { return mode_ == CastMode::iso; }
   [[nodiscard]] bool translucent() const noexcept override { return mode_ == CastMode::blend; }
 
  private:
@@ -33,6 +37,8 @@ class CastRenderer final : public Renderer {
     GlTexture2D depth = GlTexture2D::create();
   };
 
+  /// Pixels that may show anything of the volumes.
+  [[nodiscard]] PixelRect reach(const View& view, PictureSize size) const;
   void read_end_depth(const RenderTarget& target, const PixelRect& rect);
   void upload(const PixelRect& rect);
   void show(const RenderTarget& target);
@@ -42,6 +48,7 @@ class CastRenderer final : public Renderer {
   GlProgram program_{"screen.vert", "cast.frag"};
   GlVertexArray no_vertices_ = GlVertexArray::create();
   std::optional<Frame> frame_;
+  std::vector<PixelRect> parts_;  ///< that are cast in this frame
 };
 
 }  // namespace kerf

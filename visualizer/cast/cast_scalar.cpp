@@ -43,7 +43,6 @@ struct Simd {
   static F select(M m, F yes, F no) noexcept { return m ? yes : no; }
   static I select(M m, I yes, I no) noexcept { return m ? yes : no; }
 
-  static F gather(const float* p, I at) noexcept { return p[at]; }
   /// The four bytes from entry `at` on, in 1-, 2- or 4-byte entries.
   template <int kEntryBytes>
   static I gather_bytes(const void* p, I at) noexcept {
@@ -55,6 +54,10 @@ struct Simd {
   static void gather_two(const std::uint32_t* p, I at, I& first, I& second) noexcept {
     std::memcpy(&first, p + at, 4);
     std::memcpy(&second, p + at + 1, 4);
+  }
+  /// Entries `at` to `at + 3`.
+  static void gather_four(const float* p, I at, F (&out)[4]) noexcept {
+    std::memcpy(out, p + at, sizeof(out));
   }
 };
 

@@ -43,10 +43,9 @@ CastVolume::CastVolume(const VolumeView& volume, const CastContent& content, Cas
       matter_(content.matter),
       iso_(static_cast<float>(volume.iso / kDensityMax)),
       density_(checked(volume)),
-      cells_(volume.bricks.grid, content.density, least_visible(mode, volume, content.matter)) {
-  for (auto& row : matter_.materials) {
-    for (glm::vec4& material : row) material.w = -std::log2(1.0F - std::min(material.w, kMost));
-  }
+      cells_(volume.bricks.grid, content.density, least_visible(mode, volume, content.matter),
+             kCastCellVox) {
+  set_materials(content.matter.materials);
   take_cells();
   density_.copy(bricks_.grid.box(), content.density);
   if (mode == CastMode::blend) gradient_.emplace(bricks_.grid, density_);
@@ -55,20 +54,43 @@ CastVolume::CastVolume(const VolumeView& volume, const CastContent& content, Cas
   labels_->copy(bricks_.grid.box(), content.labels);
 }
 
+void CastVolume::set_materials(const Palette& materials) {
+  matter_.materials = materials;
+  for (auto& row : matter_.materials) {
+    for (glm::vec4& material : row) material.w = -std::log2(1.0F - std::min(material.w, kMost));
+  }
+}
+
 double CastVolume::edge_mm() const {
   return std::min({glm::length(world_from_voxel_[0]), glm::length(world_from_voxel_[1]),
                    glm::length(world_from_voxel_[2])});
 }
 
+std::optional<BoxCorners> CastVolume::body() const {
+  if (outer_cells_.empty()) return std::nullopt;
+  glm::ivec3 low(std::numeric_limits<int>::max());
+  glm::ivec3 high(0);
+  for (const auto& [x, y, z] : outer_cells_) {
+    low = glm::min(low, glm::ivec3(x, y, z));
+    high = glm::max(high, glm::ivec3(x, y, z) + 1);
+  }
+  BoxCorners corners;
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    const glm::ivec3 cell((i & 1) != 0 ? high.x : low.x, (i & 2) != 0 ? high.y : low.y,
+                          (i & 4) != 0 ? high.z : low.z);
+    const glm::dvec3 voxel = glm::dvec3(kCastCellVox * cell) - kShell;
+    corners[i] = glm::dvec3(world_from_voxel_ * glm::dvec4(voxel, 1.0));
+  }
+  return corners;
+}
+
 void CastVolume::update_bricks(std::span<const Density> density,
                                std::span<const std::uint32_t> changed) {
   for (const std::uint32_t id : changed) density_.copy(bricks_.voxels(id), density);
-  bool flipped = false;
-  for (const std::uint32_t id : changed) {
-    if (gradient_) gradient_->update(bricks_.voxels(id), density_);
-    flipped = cells_.update_brick(bricks_.brick(id), density) || flipped;
+  if (gradient_) {
+    for (const std::uint32_t id : changed) gradient_->update(bricks_.voxels(id), density_);
   }
-  if (flipped) take_cells();
+  if (cells_.update_bricks(bricks_, changed, density)) take_cells();
 }
 
 void CastVolume::take_cells() {
@@ -82,8 +104,8 @@ void CastVolume::take_cells() {
 
 CastVolumeJob CastVolume::job(const View& view, std::int32_t width, std::int32_t height) {
   const glm::dmat4 world_from_shell = glm::translate(world_from_voxel_, glm::dvec3(-kShell));
-  blocks_.draw(outer_cells_, glm::scale(world_from_shell, glm::dvec3(Macrocells::kEdge)), view,
-               width, height);
+  blocks_.draw(outer_cells_, glm::scale(world_from_shell, glm::dvec3(kCastCellVox)), view, width,
+               height);
   const glm::dmat4 place_from_eye = glm::affineInverse(view.eye_from_world * world_from_shell);
   const VoxelGrid& grid = bricks_.grid;
   const glm::ivec3 extent(grid.nx, grid.ny, grid.nz);

@@ -23,7 +23,7 @@ enum class CastMode : std::uint8_t { iso, blend };
 struct CastMatter {
   /// Linear colour, and opacity over one voxel edge in the fourth place: row 0 by density (entry i
   /// is density i/255), row 1 by label.
-  std::array<std::array<glm::vec4, kPaletteWidth>, 2> materials{};
+  Palette materials{};
   double empty = 0.0;  ///< blend: density up to which nothing is seen
   double full = 1.0;   ///< blend: density from which the material is seen whole
 };
@@ -45,8 +45,13 @@ class CastVolume {
   /// Takes bricks `changed` of `density` (the whole volume) and the cells they touch.
   void update_bricks(std::span<const Density> density, std::span<const std::uint32_t> changed);
 
-  /// For a picture of `width` x `height`; good until the next call of anything.
+  /// Other colours and opacities.
+  void set_materials(const Palette& materials);
+
   [[nodiscard]] double edge_mm() const;  ///< the shortest
+  /// A box around all that can be seen of it; nothing can where there is none.
+  [[nodiscard]] std::optional<BoxCorners> body() const;
+  /// For a picture of `width` x `height`; good until the next call of anything.
   [[nodiscard]] CastVolumeJob job(const View& view, std::int32_t width, std::int32_t height);
 
  private:

@@ -48,7 +48,19 @@ void Caster::update(std::size_t volume, std::span<const Density> density,
   volumes_[volume].update_bricks(density, changed);
 }
 
-void Caster::draw(const View& view, const PixelRect& rect, CastPicture& picture,
+std::vector<BoxCorners> Caster::bodies() const {
+  std::vector<BoxCorners> bodies;
+  for (const CastVolume& volume : volumes_) {
+    if (const auto body = volume.body()) bodies.push_back(*body);
+  }
+  return bodies;
+}
+
+void Caster::set_materials(const Palette& materials) {
+  for (CastVolume& volume : volumes_) volume.set_materials(materials);
+}
+
+void Caster::draw(const View& view, std::span<const PixelRect> parts, CastPicture& picture,
                   std::span<const float> end_depth, std::span<float> normals) {
   CastJob job;
   double shortest_mm = view.far_mm;
@@ -64,6 +76,7 @@ void Caster::draw(const View& view, const PixelRect& rect, CastPicture& picture,
                 end_depth.empty() ? nullptr : end_depth.data()};
   job.half_width_at_1mm = static_cast<float>(view.tan_half_height * view.aspect);
   job.half_height_at_1mm = static_cast<float>(view.tan_half_height);
+  job.middle_right_at_1mm = static_cast<float>(view.middle_right);
   job.near_mm = static_cast<float>(view.near_mm);
   job.far_mm = static_cast<float>(view.far_mm);
   // Equation (1) as depth_far - depth_slope / t.
@@ -80,13 +93,18 @@ void Caster::draw(const View& view, const PixelRect& rect, CastPicture& picture,
   put(job.up, glm::dvec3(view.eye_from_world * glm::dvec4(0, 1, 0, 0)));
   const auto cast =
       options_.mode == CastMode::iso ? options_.kernels->iso : options_.kernels->blend;
-  const std::int32_t across = (rect.x1 - rect.x0 + kTile - 1) / kTile;
-  const std::int32_t along = (rect.y1 - rect.y0 + kTile - 1) / kTile;
-  pool_.run(static_cast<std::uint32_t>(across * along), [&](std::uint32_t tile) {
-    const std::int32_t x = rect.x0 + static_cast<std::int32_t>(tile) % across * kTile;
-    const std::int32_t y = rect.y0 + static_cast<std::int32_t>(tile) / across * kTile;
-    cast(job, {x, y, std::min(x + kTile, rect.x1), std::min(y + kTile, rect.y1)});
-  });
+  // Tiles stand where they stand in the whole picture, so that blocks of pixels stay whole.
+  const auto first = [](std::int32_t at) { return at / kTile * kTile; };
+  tiles_.clear();
+  for (const PixelRect& part : parts) {
+    for (std::int32_t y = first(part.y0); y < part.y1; y += kTile) {
+      for (std::int32_t x = first(part.x0); x < part.x1; x += kTile) {
+        tiles_.push_back(PixelRect{x, y, x + kTile, y + kTile}.clipped(part));
+      }
+    }
+  }
+  pool_.run(static_cast<std::uint32_t>(tiles_.size()),
+            [&](std::uint32_t tile) { cast(job, tiles_[tile]); });
 }
 
 }  // namespace kerf

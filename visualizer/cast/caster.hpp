@@ -43,15 +43,25 @@ class Caster {
   void update(std::size_t volume, std::span<const Density> density,
               std::span<const std::uint32_t> changed);
 
-  /// Draws `rect` of the picture; the rest of it stays. Rays of blend end at `end_depth` (window
+  /// What each picture shows is in one of these boxes.
+  [[nodiscard]] std::vector<BoxCorners> bodies() const;
+  /// Other colours and opacities for all volumes, as in `CastMatter`.
+  void set_materials(const Palette& materials);
+
+  /// Draws `parts` of the picture; the rest of it stays. Rays of blend end at `end_depth` (window
   /// depth, one per pixel of the picture) where it is given. `normals` (three floats per pixel, or
   /// none) are those of iso in eye space, for measurements.
-  void draw(const View& view, const PixelRect& rect, CastPicture& picture,
+  void draw(const View& view, std::span<const PixelRect> parts, CastPicture& picture,
             std::span<const float> end_depth = {}, std::span<float> normals = {});
+  void draw(const View& view, const PixelRect& part, CastPicture& picture,
+            std::span<const float> end_depth = {}, std::span<float> normals = {}) {
+    draw(view, {&part, 1}, picture, end_depth, normals);
+  }
 
  private:
   Options options_;
   std::vector<CastVolume> volumes_;
+  std::vector<PixelRect> tiles_;  ///< pieces of work of one `draw`
   TilePool pool_;
 };
 

@@ -22,7 +22,8 @@ void CellBlocks::draw(std::span<const Cell> cells, const glm::dmat4& world_from_
   glm::dmat4 pixel_from_eye(0.0);
   pixel_from_eye[0][0] = 0.5 * width / (view.tan_half_height * view.aspect);
   pixel_from_eye[1][1] = 0.5 * height / view.tan_half_height;
-  pixel_from_eye[2] = glm::dvec4(-0.5 * width, -0.5 * height, -1.0, 0.0);
+  pixel_from_eye[2] =
+      glm::dvec4(pixel_from_eye[0][0] * view.middle_right - 0.5 * width, -0.5 * height, -1.0, 0.0);
   pixel_from_eye[3][3] = 1.0;
   const glm::dmat4x3 pixel_from_cell(pixel_from_eye * view.eye_from_world * world_from_cell);
   for (const Cell& cell : cells) {

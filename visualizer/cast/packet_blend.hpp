@@ -94,13 +94,16 @@ inline Matter matter_at(const CastJob& job, const CastVolumeJob& volume, Vec3 p,
     matter = labelled.mean;
     plain = Simd::but_not(there, Simd::less(zero, labelled.share));
   }
-  const M at_border = Simd::both(plain, Simd::less(density, full));
+  const M fading = Simd::both(plain, Simd::less(density, full));
   Vec3 gradient{};
-  if (Simd::any(Simd::either(noticeable, at_border))) gradient = stored_gradient_at(volume, p);
+  if (Simd::any(Simd::either(noticeable, fading))) gradient = stored_gradient_at(volume, p);
   const F size_2 = dot(gradient, gradient);
   const M sloped = Simd::less(zero, size_2);
   const F size = Simd::sqrt(size_2);
+  const F flat = Simd::set(0.02F);
   if (Simd::any(plain)) {
+    const M steep = Simd::both(noticeable, Simd::less(flat, size));
+    const M at_border = Simd::both(plain, Simd::either(fading, steep));
     F deep = density;
     if (Simd::any(at_border)) {
       // A border has the material of what it belongs to, a voxel and a half up the gradient.
@@ -111,17 +114,15 @@ inline Matter matter_at(const CastJob& job, const CastVolumeJob& volume, Vec3 p,
     matter = select(plain, nearest_by_density(volume, deep), matter);
   }
   const Vec3 dim = Simd::set(kInside) * matter.rgb;
-  if (!Simd::any(noticeable)) return {dim, matter.extinction};
   // Where the density hardly changes there is no surface to be lit.
-  const Vec3 slope = transformed_back(volume.from_eye, gradient);
-  const Vec3 unit = select(sloped, -normalized(slope), to_eye);
-  const F facing = dot(unit, to_eye);
-  const Vec3 edge_on = normalized(unit - (Simd::set(1.02F) * facing) * to_eye);
-  const Vec3 normal = select(Simd::less(facing, zero), edge_on, unit);
-  const F x = clamped((size - Simd::set(0.02F)) * Simd::set(1.0F / 0.08F));
+  const F x = clamped((size - flat) * Simd::set(1.0F / 0.08F));
+  const M lights = Simd::both(noticeable, Simd::less(zero, x));
+  if (!Simd::any(lights)) return {dim, matter.extinction};
+  const Vec3 unit = -normalized(transformed_back(volume.from_eye, gradient));
+  const Vec3 normal = select(Simd::less(dot(unit, to_eye), zero), -unit, unit);
   const F surface = x * x * (Simd::set(3.0F) - Simd::set(2.0F) * x);
   const Vec3 bright = mix(dim, lit(job, matter.rgb, normal, to_eye, Simd::set(1.0F)), surface);
-  return {select(noticeable, bright, dim), matter.extinction};
+  return {select(lights, bright, dim), matter.extinction};
 }
 
 /// Piece k of the rays.
@@ -157,14 +158,13 @@ inline void add_piece(const CastJob& job, const CastVolumeJob& volume, Walk& wal
   const F extinction = Simd::select(there, matter.extinction * presence, zero);
   const F per_mm = extinction * Simd::set(1.0F / volume.edge_mm);
   glow = {glow.rgb + per_mm * matter.rgb, glow.per_mm + per_mm};
-  const M seen = Simd::but_not(
-      Simd::both(there,
-                 Simd::but_not(Simd::all(), Simd::less(extinction, Simd::set(kLeastExtinction)))),
-      sum.has_depth);
+  const M seen = Simd::but_not(there, Simd::less(extinction, Simd::set(kLeastExtinction)));
   const F empty = Simd::set(volume.empty);
   const F before =
       Simd::select(Simd::less(front, empty), clamped((empty - front) / (back - front)), zero);
-  sum.depth_mm = Simd::select(seen, mix(from_mm, to_mm, before), sum.depth_mm);
+  // The least: two volumes may begin in one piece.
+  sum.depth_mm =
+      Simd::select(seen, Simd::min(sum.depth_mm, mix(from_mm, to_mm, before)), sum.depth_mm);
   sum.has_depth = Simd::either(sum.has_depth, seen);
 }
 
@@ -210,7 +210,7 @@ inline void blend_packet(const CastJob& job, const Packet& packet) {
   }
   Gathered sum;
   sum.clear = one;
-  sum.depth_mm = end_mm;
+  sum.depth_mm = never;
   sum.has_depth = Simd::none();
   M alive = Simd::both(drawn_lanes(packet), Simd::less(k * step_mm, end_mm));
   while (Simd::any(alive)) {

@@ -44,7 +44,8 @@ inline Vec3 eye_directions(const CastJob& job, const Packet& packet) {
     const F centre = lane + Simd::set(static_cast<float>(first) + 0.5F);
     return centre * Simd::set(2.0F / static_cast<float>(size)) - Simd::set(1.0F);
   };
-  return {place(Simd::lane_x(), packet.x, job.pixels.width) * Simd::set(job.half_width_at_1mm),
+  return {place(Simd::lane_x(), packet.x, job.pixels.width) * Simd::set(job.half_width_at_1mm) +
+              Simd::set(job.middle_right_at_1mm),
           place(Simd::lane_y(), packet.y, job.pixels.height) * Simd::set(job.half_height_at_1mm),
           Simd::set(-1.0F)};
 }
@@ -65,15 +66,14 @@ void put(const Packet& packet, Lanes lanes, Value* out, std::int32_t stride = 1,
 
 /// The opposite for entries of one value; 0 in lanes that are not drawn.
 inline F taken(const Packet& packet, const float* in) {
-  I at{};
-  std::int32_t place[Simd::kWide * Simd::kHigh] = {};
+  F lanes{};
+  float values[Simd::kWide * Simd::kHigh] = {};
   for (std::int32_t y = 0; y < packet.high; ++y) {
-    for (std::int32_t x = 0; x < packet.wide; ++x) {
-      place[y * Simd::kWide + x] = (packet.y + y) * packet.pixels->width + packet.x + x;
-    }
+    const std::int64_t row = std::int64_t{packet.y + y} * packet.pixels->width + packet.x;
+    for (std::int32_t x = 0; x < packet.wide; ++x) values[y * Simd::kWide + x] = in[row + x];
   }
-  __builtin_memcpy(&at, place, sizeof(at));
-  return Simd::gather(in, at);
+  __builtin_memcpy(&lanes, values, sizeof(lanes));
+  return lanes;
 }
 
 }  // namespace

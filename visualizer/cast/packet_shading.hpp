@@ -25,9 +25,9 @@ inline Matter select(M m, Matter yes, Matter no) {
 
 /// An entry of 256 x 4.
 inline Matter entry_of(const float* table, I index) {
-  const I at = index << 2;
-  return {{Simd::gather(table, at), Simd::gather(table + 1, at), Simd::gather(table + 2, at)},
-          Simd::gather(table + 3, at)};
+  F entry[4];
+  Simd::gather_four(table, index << 2, entry);
+  return {{entry[0], entry[1], entry[2]}, entry[3]};
 }
 
 /// As a texture of 256 entries that is filtered and clamped to its edges.

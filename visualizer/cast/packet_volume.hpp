@@ -8,8 +8,6 @@
 namespace kerf {
 namespace {
 
-constexpr float kCellVox = 8.0F;  // Macrocells::kEdge
-
 /// A cell of 2^3 voxels: the entry of its lowest one, and the place within it.
 struct CellPlace {
   I at;
@@ -183,15 +181,15 @@ inline bool worth_a_look(M unknowing, M alive) {
 
 inline Surroundings surroundings_at(const CastVolumeJob& volume, const VolumeRays& rays, F t) {
   const Vec3 q = within(volume, rays.origin + t * rays.direction);
-  const F cells = Simd::set(1.0F / kCellVox);
+  const F cells = Simd::set(1.0F / kCastCellVox);
   const I x = Simd::to_int(q.x * cells);
   const I y = Simd::to_int(q.y * cells);
   const I z = Simd::to_int(q.z * cells);
   const I active =
       Simd::gather_bytes<1>(volume.active, x + y * volume.cell_row + z * volume.cell_plane) & 0xff;
   const auto exit = [](I cell, F origin, F inverse) {
-    const F low = Simd::set(kCellVox) * Simd::to_float(cell);
-    const F high = low + Simd::set(kCellVox);
+    const F low = Simd::set(static_cast<float>(kCastCellVox)) * Simd::to_float(cell);
+    const F high = low + Simd::set(static_cast<float>(kCastCellVox));
     return Simd::max((low - origin) * inverse, (high - origin) * inverse);
   };
   return {Simd::but_not(Simd::all(), Simd::equal(active, I{})),

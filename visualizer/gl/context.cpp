@@ -3,7 +3,7 @@
 
 #include <array>
 #include <string_view>
-#include <utility>
+#include <vector>
 
 #include <epoxy/egl.h>
 #include <epoxy/gl.h>
@@ -92,28 +92,43 @@ bool EglContext::create() {
   if (eglChooseConfig(display_, kConfig.data(), &config, 1, &found) != EGL_TRUE || found == 0) {
     return false;
   }
-  constexpr std::array<EGLint, 7> kContext{EGL_CONTEXT_MAJOR_VERSION,
-                                           4,
-                                           EGL_CONTEXT_MINOR_VERSION,
-                                           5,
-                                           EGL_CONTEXT_OPENGL_PROFILE_MASK,
-                                           EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT,
-                                           EGL_NONE};
-  context_ = eglCreateContext(display_, config, EGL_NO_CONTEXT, kContext.data());
+  // Not every driver can tell that it lost a context.
+  for (const bool tells_of_loss : {true, false}) {
+    std::vector<EGLint> attributes{
+        EGL_CONTEXT_MAJOR_VERSION,       4,
+        EGL_CONTEXT_MINOR_VERSION,       5,
+        EGL_CONTEXT_OPENGL_PROFILE_MASK, EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT};
+    if (tells_of_loss) {
+      attributes.insert(attributes.end(), {EGL_CONTEXT_OPENGL_RESET_NOTIFICATION_STRATEGY,
+                                           EGL_LOSE_CONTEXT_ON_RESET});
+    }
+    if (gl_faults_are_reported()) {
+      attributes.insert(attributes.end(), {EGL_CONTEXT_OPENGL_DEBUG, EGL_TRUE});
+    }
+    attributes.push_back(EGL_NONE);
+    context_ = eglCreateContext(display_, config, EGL_NO_CONTEXT, attributes.data());
+    if (context_ != EGL_NO_CONTEXT) break;
+  }
   if (context_ == EGL_NO_CONTEXT) return false;
-  return eglMakeCurrent(display_, EGL_NO_SURFACE, EGL_NO_SURFACE, context_) == EGL_TRUE;
+  make_current();
+  if (eglGetCurrentContext() != context_) return false;
+  watch_for_faults();
+  return true;
 }
 
 bool is_software_device(EGLDeviceEXT device) {
   return has_extension(eglQueryDeviceStringEXT(device, EGL_EXTENSIONS), "EGL_MESA_device_software");
 }
 
-std::string g_first_error;
+GlFaultHandler g_fault_handler = nullptr;
 
-void GLAPIENTRY on_gl_message(GLenum, GLenum type, GLuint, GLenum, GLsizei length,
+void GLAPIENTRY on_gl_message(GLenum, GLenum type, GLuint, GLenum severity, GLsizei length,
                               const GLchar* text, const void*) {
-  if (type != GL_DEBUG_TYPE_ERROR || !g_first_error.empty()) return;
-  g_first_error.assign(text, static_cast<std::size_t>(length));
+  const bool fault = type == GL_DEBUG_TYPE_ERROR || type == GL_DEBUG_TYPE_UNDEFINED_BEHAVIOR ||
+                     severity == GL_DEBUG_SEVERITY_HIGH;
+  if (fault && g_fault_handler != nullptr) {
+    g_fault_handler(std::string(text, static_cast<std::size_t>(length)));
+  }
 }
 
 /// The best of what EGL offers, current; null where it offers nothing.
@@ -155,15 +170,30 @@ std::unique_ptr<GlContext> make_headless_context() {
       "driver (Debian: libegl1 libgl1-mesa-dri)");
 }
 
-void enable_gl_debug() {
+void throw_if_context_is_lost() {
+  const GLenum status = glGetGraphicsResetStatus();
+  if (status == GL_NO_ERROR) return;
+  const char* const whose = status == GL_GUILTY_CONTEXT_RESET     ? "by this program"
+                            : status == GL_INNOCENT_CONTEXT_RESET ? "by another program"
+                                                                  : "for an unknown reason";
+  throw VisualizerError(std::string("OpenGL: the graphics card was reset ") + whose +
+                        " and its memory is lost; start kerf-visualizer again");
+}
+
+void GlContext::watch_for_faults() {
+  if (!gl_faults_are_reported()) return;
   glEnable(GL_DEBUG_OUTPUT);
   glEnable(GL_DEBUG_OUTPUT_SYNCHRONOUS);
+  glDebugMessageControl(GL_DONT_CARE, GL_DONT_CARE, GL_DONT_CARE, 0, nullptr, GL_TRUE);
   glDebugMessageCallback(on_gl_message, nullptr);
 }
 
-void throw_on_gl_error() {
-  if (g_first_error.empty()) return;
-  throw VisualizerError("OpenGL: " + std::exchange(g_first_error, {}));
+void report_gl_faults(GlFaultHandler handler) noexcept {
+  g_fault_handler = handler;
+}
+
+bool gl_faults_are_reported() noexcept {
+  return g_fault_handler != nullptr;
 }
 
 }  // namespace kerf

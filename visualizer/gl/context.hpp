@@ -28,6 +28,10 @@ class GlContext {
   GlContext& operator=(const GlContext&) = delete;
   virtual ~GlContext() = default;
   [[nodiscard]] virtual ContextKind kind() const noexcept = 0;
+
+ protected:
+  /// For whoever has made a context, once it is current.
+  static void watch_for_faults();
 };
 
 /// A context that needs no screen.
@@ -37,9 +41,16 @@ class GlContext {
 /// last resort. Throws VisualizerError when none works.
 [[nodiscard]] std::unique_ptr<GlContext> make_headless_context();
 
-/// Has GL report its errors from now on in the current context; the first one since the last call
-/// is thrown by `throw_on_gl_error` as VisualizerError. For tests: it slows every call.
-void enable_gl_debug();
-void throw_on_gl_error();
+/// Throws VisualizerError where the driver has lost the current context, say because it had to
+/// reset the GPU: nothing that the context holds can be drawn any more.
+void throw_if_context_is_lost();
+
+/// Gets what GL says of an error, of undefined behaviour, or of anything of high severity, on the
+/// thread of the call that did it and before that returns.
+using GlFaultHandler = void (*)(const std::string& text);
+/// Contexts made from now on are debug contexts that tell `handler`; none: ordinary ones again. For
+/// tests: it slows every call.
+void report_gl_faults(GlFaultHandler handler) noexcept;
+[[nodiscard]] bool gl_faults_are_reported() noexcept;
 
 }  // namespace kerf

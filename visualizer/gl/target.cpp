@@ -17,9 +17,15 @@ void flip_rows(std::vector<T>& picture, std::size_t row, std::size_t rows) {
   }
 }
 
+void copy_texture(const GlTexture2D& from, const GlTexture2D& to, const PixelRect& r, int right) {
+  if (r.empty()) return;
+  glCopyImageSubData(from.id(), GL_TEXTURE_2D, 0, r.x0, r.y0, 0, to.id(), GL_TEXTURE_2D, 0,
+                     right + r.x0, r.y0, 0, r.x1 - r.x0, r.y1 - r.y0, 1);
+}
+
 }  // namespace
 
-RenderTarget::RenderTarget(PictureSize size) : size_(size), part_(all()) {
+RenderTarget::RenderTarget(PictureSize size) : size_(size) {
   glTextureStorage2D(colour_.id(), 1, GL_RGBA8, size.width, size.height);
   glTextureParameteri(colour_.id(), GL_TEXTURE_MIN_FILTER, GL_LINEAR);
   glTextureParameteri(colour_.id(), GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
@@ -29,22 +35,35 @@ RenderTarget::RenderTarget(PictureSize size) : size_(size), part_(all()) {
   glNamedFramebufferTexture(framebuffer_.id(), GL_DEPTH_ATTACHMENT, depth_.id(), 0);
 }
 
+void RenderTarget::restrict_to(std::span<const PixelRect> parts) {
+  parts_.clear();
+  bounds_ = {};
+  for (const PixelRect& part : parts) {
+    const PixelRect inside = part.clipped(all());
+    if (inside.empty()) continue;
+    parts_.push_back(inside);
+    bounds_ = bounds_.united(inside);
+  }
+}
+
+void RenderTarget::scissor(const PixelRect& part) {
+  glScissor(part.x0, part.y0, part.x1 - part.x0, part.y1 - part.y0);
+}
+
 void RenderTarget::bind() const {
   glBindFramebuffer(GL_FRAMEBUFFER, framebuffer_.id());
   glViewport(0, 0, size_.width, size_.height);
   glEnable(GL_SCISSOR_TEST);
-  glScissor(part_.x0, part_.y0, std::max(part_.x1 - part_.x0, 0), std::max(part_.y1 - part_.y0, 0));
+  scissor(bounds_);
 }
 
 void RenderTarget::copy(const RenderTarget& from, const PixelRect& part) const {
-  const PixelRect r = part.clipped(all());
-  if (r.empty()) return;
-  const auto copy_texture = [&](const GlTexture2D& source, const GlTexture2D& to) {
-    glCopyImageSubData(source.id(), GL_TEXTURE_2D, 0, r.x0, r.y0, 0, to.id(), GL_TEXTURE_2D, 0,
-                       r.x0, r.y0, 0, r.x1 - r.x0, r.y1 - r.y0, 1);
-  };
-  copy_texture(from.colour_, colour_);
-  copy_texture(from.depth_, depth_);
+  copy_colour(from, part);
+  copy_texture(from.depth_, depth_, part.clipped(all()), 0);
+}
+
+void RenderTarget::copy_colour(const RenderTarget& from, const PixelRect& part, int right) const {
+  copy_texture(from.colour_, colour_, part.clipped(from.all()), right);
 }
 
 std::vector<std::uint8_t> RenderTarget::read_rgb() const {
@@ -59,13 +78,17 @@ std::vector<std::uint8_t> RenderTarget::read_rgb() const {
 }
 
 std::vector<float> RenderTarget::read_depth() const {
-  const auto row = static_cast<std::size_t>(size_.width);
-  const auto rows = static_cast<std::size_t>(size_.height);
-  std::vector<float> depth(row * rows);
+  std::vector<float> depth = read_depth(all());
+  flip_rows(depth, static_cast<std::size_t>(size_.width), static_cast<std::size_t>(size_.height));
+  return depth;
+}
+
+std::vector<float> RenderTarget::read_depth(const PixelRect& part) const {
+  std::vector<float> depth(static_cast<std::size_t>(part.area()));
   glBindFramebuffer(GL_READ_FRAMEBUFFER, framebuffer_.id());
   glPixelStorei(GL_PACK_ALIGNMENT, 1);
-  glReadPixels(0, 0, size_.width, size_.height, GL_DEPTH_COMPONENT, GL_FLOAT, depth.data());
-  flip_rows(depth, row, rows);
+  glReadPixels(part.x0, part.y0, part.x1 - part.x0, part.y1 - part.y0, GL_DEPTH_COMPONENT, GL_FLOAT,
+               depth.data());
   return depth;
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "visualizer/gl/names.hpp"
@@ -28,22 +29,47 @@ class RenderTarget {
   [[nodiscard]] GLuint framebuffer() const noexcept { return framebuffer_.id(); }
 
   [[nodiscard]] PixelRect all() const noexcept { return {0, 0, size_.width, size_.height}; }
-  /// The part that may be drawn; all of it at first.
-  [[nodiscard]] const PixelRect& part() const noexcept { return part_; }
-  void restrict_to(const PixelRect& part) noexcept { part_ = part.clipped(all()); }
+  /// The parts that may be drawn, none empty; all of it at first.
+  [[nodiscard]] std::span<const PixelRect> parts() const noexcept { return parts_; }
+  /// The smallest rectangle that holds them.
+  [[nodiscard]] const PixelRect& bounds() const noexcept { return bounds_; }
+  void restrict_to(std::span<const PixelRect> parts);
+  void restrict_to(const PixelRect& part) { restrict_to({&part, 1}); }
 
-  /// Makes it the place to draw, with its whole size as the viewport and its part as the scissor.
+  /// Makes it the place to draw, with its whole size as the viewport and its bounds as the scissor.
   void bind() const;
+  /// Calls `draw` for each part, which is the scissor meanwhile; the bounds are again afterwards.
+  template <class Draw>
+  void for_parts(const Draw& draw) const {
+    for_parts(parts_, draw);
+  }
+  /// The same for `parts` within the target's own.
+  template <class Draw>
+  void for_parts(std::span<const PixelRect> parts, const Draw& draw) const {
+    for (const PixelRect& part : parts) {
+      scissor(part);
+      draw();
+    }
+    scissor(bounds_);
+  }
   /// Takes colour and depth of `part` over from a target of the same size.
   void copy(const RenderTarget& from, const PixelRect& part) const;
+  /// Takes the colour of `part` of another target over, to the same place or to one `right` pixels
+  /// farther right; all of it must fit.
+  void copy_colour(const RenderTarget& from, const PixelRect& part, int right = 0) const;
   /// RGB, 3 bytes per pixel, first row at the top. Waits until the picture is complete.
   [[nodiscard]] std::vector<std::uint8_t> read_rgb() const;
   /// Window depth 0..1, first row at the top.
   [[nodiscard]] std::vector<float> read_depth() const;
+  /// The same of `part`, which lies inside, first row at the bottom.
+  [[nodiscard]] std::vector<float> read_depth(const PixelRect& part) const;
 
  private:
+  static void scissor(const PixelRect& part);
+
   PictureSize size_;
-  PixelRect part_;
+  std::vector<PixelRect> parts_{all()};
+  PixelRect bounds_{all()};
   GlTexture2D colour_ = GlTexture2D::create();
   GlTexture2D depth_ = GlTexture2D::create();
   GlFramebuffer framebuffer_ = GlFramebuffer::create();

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include <GLFW/glfw3.h>
+#include <epoxy/glx.h>
 
 #include "visualizer/error.hpp"
 
@@ -24,6 +25,18 @@ namespace {
 
 Window& window_of(GLFWwindow* handle) {
   return *static_cast<Window*>(glfwGetWindowUserPointer(handle));
+}
+
+bool g_screen_is_gone = false;
+
+/// Xlib would print two lines of its own and end the process, wherever that stands. Without them
+/// its calls fail from then on, and `Window::poll` has the word.
+void outlive_the_screen() {
+  Display* const display = glXGetCurrentDisplay();
+  if (display == nullptr) return;  // a screen without X
+  XSetIOErrorHandler([](Display*) { return 0; });
+  XSetIOErrorExitHandler(
+      display, [](Display*, void*) { g_screen_is_gone = true; }, nullptr);
 }
 
 bool is_down(GLFWwindow* handle, int button) {
@@ -46,6 +59,8 @@ Window::Window(PictureSize size, Visibility visibility) {
   glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, 5);
   glfwWindowHint(GLFW_OPENGL_PROFILE, GLFW_OPENGL_CORE_PROFILE);
   glfwWindowHint(GLFW_DEPTH_BITS, 0);
+  glfwWindowHint(GLFW_CONTEXT_ROBUSTNESS, GLFW_LOSE_CONTEXT_ON_RESET);
+  glfwWindowHint(GLFW_OPENGL_DEBUG_CONTEXT, gl_faults_are_reported() ? GLFW_TRUE : GLFW_FALSE);
   glfwWindowHint(GLFW_VISIBLE, visibility == Visibility::shown ? GLFW_TRUE : GLFW_FALSE);
   handle_ = glfwCreateWindow(size.width, size.height, "kerf", nullptr, nullptr);
   if (handle_ == nullptr) {
@@ -63,10 +78,13 @@ Window::Window(PictureSize size, Visibility visibility) {
   glfwSetScrollCallback(handle_, on_scroll);
   glfwSetWindowRefreshCallback(handle_, on_exposed);
   glfwMakeContextCurrent(handle_);
+  outlive_the_screen();
+  watch_for_faults();
   glfwSwapInterval(1);
 }
 
 Window::~Window() {
+  if (g_screen_is_gone) return;  // there is nobody to give anything back to
   glfwDestroyWindow(handle_);
   glfwTerminate();
 }
@@ -95,6 +113,11 @@ void Window::present(const RenderTarget& target) {
 
 WindowInput Window::poll() {
   glfwPollEvents();
+  if (g_screen_is_gone) {
+    throw VisualizerError(
+        "window: the X server is gone; the controller goes on, so start "
+        "kerf-visualizer again on another screen or with --headless --out DIR");
+  }
   input_.close = glfwWindowShouldClose(handle_) == GLFW_TRUE;
   int width = 0;
   int height = 0;

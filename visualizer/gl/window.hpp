@@ -43,6 +43,7 @@ class Window final : public GlContext {
   void set_title(const std::string& title);
   /// Shows `target`, which has the window's size; waits for the screen's refresh where it can.
   void present(const RenderTarget& target);
+  /// Throws VisualizerError once the X server is gone.
   [[nodiscard]] WindowInput poll();
 
  private:

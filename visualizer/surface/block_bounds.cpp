@@ -5,39 +5,78 @@
 
 namespace kerf {
 
-BlockBounds bounds_of(const BlockMesh& mesh, VoxelIndex block) {
-  if (mesh.vertices.empty()) return {};
-  std::array<std::uint16_t, 3> lo = mesh.vertices.front().position;
-  std::array<std::uint16_t, 3> hi = lo;
-  for (const SurfaceVertex& vertex : mesh.vertices) {
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      lo[axis] = std::min(lo[axis], vertex.position[axis]);
-      hi[axis] = std::max(hi[axis], vertex.position[axis]);
-    }
-  }
-  const VoxelIndex start = block_start(block);
-  const glm::vec3 low(lo[0], lo[1], lo[2]);
-  const glm::vec3 high(hi[0], hi[1], hi[2]);
-  constexpr float kHalfVoxels = 0.5F / float{kFinePerVoxel};
-  return {.centre = glm::vec3(start.x, start.y, start.z) + kHalfVoxels * (high + low),
-          .half = kHalfVoxels * (high - low)};
+namespace {
+
+constexpr float kHalfVoxels = 0.5F / float{kFinePerVoxel};
+
+bool beyond(const glm::vec4& plane, const BlockBounds& block) {
+  constexpr float kSlackVox = 0.01F;  // far more than what float rounds
+  const glm::vec3 normal(plane);
+  const float reach = glm::dot(glm::abs(normal), block.half) + kSlackVox;
+  return glm::dot(normal, block.centre) + plane.w < -reach;
 }
 
-Sight::Sight(const glm::dmat4& clip_from_voxel, glm::dvec2 lo, glm::dvec2 hi) {
+/// Whether all triangles are seen from behind, wherever in the box they lie.
+bool faces_away(const glm::vec3& eye, const BlockBounds& block) {
+  constexpr float kSlack = 0.01F;  // of the distance
+  const glm::vec3 to_eye = eye - block.centre;
+  // The largest product of any normal with any direction in the two boxes.
+  const float most = glm::dot(to_eye, block.normal_centre) +
+                     glm::dot(glm::abs(to_eye) + block.half, block.normal_half) +
+                     glm::dot(block.half, glm::abs(block.normal_centre));
+  return most < -kSlack * glm::length(to_eye);
+}
+
+}  // namespace
+
+BlockBounds bounds_of(const BlockMesh& mesh, VoxelIndex block) {
+  if (mesh.vertices.empty()) return {};
+  const auto place = [&](std::uint16_t vertex) {
+    const auto& at = mesh.vertices[vertex].position;
+    return glm::vec3(at[0], at[1], at[2]);
+  };
+  glm::vec3 low = place(0), high = low;
+  for (const SurfaceVertex& vertex : mesh.vertices) {
+    const glm::vec3 at(vertex.position[0], vertex.position[1], vertex.position[2]);
+    low = glm::min(low, at);
+    high = glm::max(high, at);
+  }
+  glm::vec3 normal_low(1.0F), normal_high(-1.0F);
+  for (const auto& [a, b, c] : mesh.triangles) {
+    const glm::vec3 normal = glm::normalize(glm::cross(place(b) - place(a), place(c) - place(a)));
+    normal_low = glm::min(normal_low, normal);
+    normal_high = glm::max(normal_high, normal);
+  }
+  const VoxelIndex start = block_start(block);
+  return {.centre = glm::vec3(start.x, start.y, start.z) + kHalfVoxels * (high + low),
+          .half = kHalfVoxels * (high - low),
+          .normal_centre = 0.5F * (normal_high + normal_low),
+          .normal_half = 0.5F * (normal_high - normal_low)};
+}
+
+Sight::Sight(const glm::dmat4& clip_from_voxel, const std::optional<glm::dvec3>& eye_voxel,
+             std::span<const Part> parts)
+    : eye_(eye_voxel) {
   // A point shows where w*lo <= x <= w*hi and so on (Gribb and Hartmann 2001).
   const glm::dmat4 rows = glm::transpose(clip_from_voxel);
-  planes_ = {rows[0] - lo.x * rows[3], hi.x * rows[3] - rows[0], rows[1] - lo.y * rows[3],
-             hi.y * rows[3] - rows[1], rows[3] + rows[2],        rows[3] - rows[2]};
-  for (glm::vec4& plane : planes_) plane /= glm::length(glm::vec3(plane));
+  const auto plane = [](const glm::dvec4& row) {
+    return glm::vec4(row / glm::length(glm::dvec3(row)));
+  };
+  near_far_ = {plane(rows[3] + rows[2]), plane(rows[3] - rows[2])};
+  for (const Part& part : parts) {
+    parts_.push_back({plane(rows[0] - part.lo.x * rows[3]), plane(part.hi.x * rows[3] - rows[0]),
+                      plane(rows[1] - part.lo.y * rows[3]), plane(part.hi.y * rows[3] - rows[1])});
+  }
 }
 
 bool Sight::may_show(const BlockBounds& block) const {
-  constexpr float kSlackVox = 0.01F;  // far more than what float rounds
-  return std::all_of(planes_.begin(), planes_.end(), [&](const glm::vec4& plane) {
-    const glm::vec3 normal(plane);
-    const float reach = glm::dot(glm::abs(normal), block.half) + kSlackVox;
-    return glm::dot(normal, block.centre) + plane.w >= -reach;
-  });
+  const auto is_beyond = [&](const glm::vec4& plane) { return beyond(plane, block); };
+  if (std::any_of(near_far_.begin(), near_far_.end(), is_beyond)) return false;
+  return std::any_of(parts_.begin(), parts_.end(),
+                     [&](const Planes& part) {
+                       return std::none_of(part.begin(), part.end(), is_beyond);
+                     }) &&
+         !(eye_ && faces_away(*eye_, block));
 }
 
 }  // namespace kerf

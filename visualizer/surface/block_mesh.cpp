@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <bit>
 #include <cstring>
+#include <iterator>
 #include <utility>
 
 #include "visualizer/surface/cube_cases.hpp"
@@ -145,6 +146,39 @@ class Extraction {
 };
 
 }  // namespace
+
+bool DifferentParts::append_to(std::vector<VoxelBox>& boxes) const {
+  const std::size_t before = boxes.size();
+  std::copy_if(around_.begin(), around_.end(), std::back_inserter(boxes),
+               [](const VoxelBox& around) { return !around.empty(); });
+  return boxes.size() != before;
+}
+
+DifferentParts difference(const BlockMesh& before, const BlockMesh& now, VoxelIndex block,
+                          const VoxelBox& changed) {
+  DifferentParts parts(block);
+  if (before == now) return parts;
+  const VoxelIndex start = block_start(block);
+  const auto voxel_of = [&](const SurfaceVertex& vertex) {
+    return VolumeSamples::voxel_below(fine_place(vertex, start));
+  };
+  // The vertices on edges that end in a changed voxel come and go; the others stay, in their order.
+  const VoxelBox touched{{changed.lo.x - 1, changed.lo.y - 1, changed.lo.z - 1}, changed.hi};
+  const auto next = [&](const std::vector<SurfaceVertex>& vertices, std::size_t from) {
+    for (; from < vertices.size(); ++from) {
+      const VoxelIndex voxel = voxel_of(vertices[from]);
+      if (!touched.contains(voxel)) break;
+      parts.add(voxel);
+    }
+    return from;
+  };
+  std::size_t old = next(before.vertices, 0);
+  for (std::size_t i = next(now.vertices, 0); i < now.vertices.size();
+       i = next(now.vertices, i + 1), old = next(before.vertices, old + 1)) {
+    if (now.vertices[i] != before.vertices[old]) parts.add(voxel_of(now.vertices[i]));
+  }
+  return parts;
+}
 
 BlockMesh extract_block(const SurfaceSource& source, VoxelIndex block) {
   constexpr std::int32_t kEdge = Neighbourhood::kSamples;

@@ -55,6 +55,34 @@ struct SurfaceSource {
   const SurfaceLook* look = nullptr;
 };
 
+/// Boxes of voxels around the triangles of a block that look different: one for each eighth of it,
+/// so that together they follow their shape.
+class DifferentParts {
+ public:
+  explicit DifferentParts(VoxelIndex block) : start_(block_start(block)) {}
+
+  /// The triangles that share a vertex on an edge from `voxel` on.
+  void add(VoxelIndex voxel) noexcept {
+    constexpr std::int32_t kHalf = kBlockEdge / 2;
+    const auto half = [](std::int32_t at, std::int32_t start) {
+      return at - start < kHalf ? 0 : 1;
+    };
+    VoxelBox& around = around_[static_cast<std::size_t>(
+        half(voxel.x, start_.x) + 2 * half(voxel.y, start_.y) + 4 * half(voxel.z, start_.z))];
+    around = around.united(VoxelBox{voxel, {voxel.x + 1, voxel.y + 1, voxel.z + 1}}.grown(1));
+  }
+  /// Adds what is not empty to `boxes`; whether there was anything.
+  bool append_to(std::vector<VoxelBox>& boxes) const;
+
+ private:
+  VoxelIndex start_;
+  std::array<VoxelBox, 8> around_;
+};
+
+/// What looks different in `now`, after densities in `changed` were others in `before`.
+[[nodiscard]] DifferentParts difference(const BlockMesh& before, const BlockMesh& now,
+                                        VoxelIndex block, const VoxelBox& changed);
+
 /// A pure function of the volume; any thread. Positions and triangles depend on the block's own
 /// voxels, the rest of a vertex on the voxels around it: see SurfaceLook.
 ///

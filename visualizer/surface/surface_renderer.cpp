@@ -1,27 +1,27 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "visualizer/surface/surface_renderer.hpp"
 
-#include <array>
+#include <optional>
 #include <utility>
 
 #include <glm/gtc/matrix_inverse.hpp>
+
+#include "visualizer/view_uniforms.hpp"
 
 namespace kerf {
 
 namespace {
 
-/// The part of the target that may be drawn, in normalised device coordinates.
-struct DrawnPart {
-  glm::dvec2 lo;
-  glm::dvec2 hi;
-
-  explicit DrawnPart(const RenderTarget& target) {
-    const PixelRect& part = target.part();
-    const glm::dvec2 per_pixel = 2.0 / glm::dvec2(target.size().width, target.size().height);
-    lo = glm::dvec2(part.x0, part.y0) * per_pixel - 1.0;
-    hi = glm::dvec2(part.x1, part.y1) * per_pixel - 1.0;
+/// The parts of the target that may be drawn, in normalised device coordinates.
+std::vector<Sight::Part> drawn_parts(const RenderTarget& target) {
+  const glm::dvec2 per_pixel = 2.0 / glm::dvec2(target.size().width, target.size().height);
+  std::vector<Sight::Part> parts;
+  for (const PixelRect& part : target.parts()) {
+    parts.push_back({glm::dvec2(part.x0, part.y0) * per_pixel - 1.0,
+                     glm::dvec2(part.x1, part.y1) * per_pixel - 1.0});
   }
-};
+  return parts;
+}
 
 }  // namespace
 
@@ -41,24 +41,35 @@ void SurfaceRenderer::update(std::size_t volume, std::span<const Density> densit
   of.gpu.update(of.surface, of.surface.update(density, changed));
 }
 
+std::vector<VoxelBox> SurfaceRenderer::looks_different(
+    std::size_t volume, std::span<const VoxelBox> /*differs*/) const {
+  const auto boxes = volumes_[volume].surface.looks_different();
+  return {boxes.begin(), boxes.end()};
+}
+
 void SurfaceRenderer::draw(const View& view, const RenderTarget& target) {
   target.bind();
   glEnable(GL_DEPTH_TEST);
   glDepthFunc(GL_LESS);
-  glEnable(GL_CULL_FACE);
+  const bool opened = view.shown != View{}.shown;
+  (opened ? glDisable : glEnable)(GL_CULL_FACE);
+  if (opened) glEnable(GL_CLIP_DISTANCE0);
   glDisable(GL_BLEND);
   program_.set("u_clip_from_eye", glm::mat4(view.clip_from_eye()));
-  program_.set("u_up_eye", glm::vec3(view.eye_from_world * glm::dvec4(0, 1, 0, 0)));
+  set_view(program_, view);
   program_.use();
-  const DrawnPart part(target);
+  const std::vector<Sight::Part> parts = drawn_parts(target);
   for (Volume& volume : volumes_) {
     const glm::dmat4 eye_from_voxel = view.eye_from_world * volume.world_from_voxel;
     program_.set("u_eye_from_voxel", glm::mat4(eye_from_voxel));
     program_.set("u_eye_from_voxel_normal",
                  glm::mat3(glm::inverseTranspose(glm::dmat3(eye_from_voxel))));
-    volume.gpu.draw(Sight(view.clip_from_eye() * eye_from_voxel, part.lo, part.hi));
+    std::optional<glm::dvec3> eye_voxel;
+    if (!opened) eye_voxel = glm::dvec3(glm::affineInverse(eye_from_voxel)[3]);
+    volume.gpu.draw(Sight(view.clip_from_eye() * eye_from_voxel, eye_voxel, parts));
   }
   glDisable(GL_CULL_FACE);
+  glDisable(GL_CLIP_DISTANCE0);
 }
 
 }  // namespace kerf

@@ -13,6 +13,9 @@ namespace kerf {
 /// Iso-surfaces as meshes: marching cubes on the CPU, again only around what changed; the GPU draws
 /// triangles and never sees the volume.
 ///
+/// A clip plane opens the shell that a mesh is, and shows its inside; there is no face in the
+/// plane.
+///
 /// Honours the GL scissor: blocks beside it are not drawn at all.
 class SurfaceRenderer final : public Renderer {
  public:
@@ -21,7 +24,9 @@ class SurfaceRenderer final : public Renderer {
   void update(std::size_t volume, std::span<const Density> density,
               std::span<const std::uint32_t> changed) override;
   void draw(const View& view, const RenderTarget& target) override;
-  [[nodiscard]] bool clips() const noexcept override { return false; }
+  /// The meshes tell exactly.
+  [[nodiscard]] std::vector<VoxelBox> looks_different(
+      std::size_t volume, std::span<const VoxelBox> differs) const override;
 
  private:
   struct Volume {

@@ -69,13 +69,13 @@ void dress(SurfaceVertex& vertex, const SurfaceSource& source, VoxelIndex start,
   vertex.openness = unit16(source.look->openness(source.volume, at, inward));
 }
 
-bool update_look(const SurfaceSource& source, VoxelIndex block, const VoxelBox& changed,
-                 BlockMesh& mesh) {
+DifferentParts update_look(const SurfaceSource& source, VoxelIndex block, const VoxelBox& changed,
+                           BlockMesh& mesh) {
   const VoxelIndex start = block_start(block);
   const VoxelBox colours = changed.grown(SurfaceLook::kColourReachVox);
   const VoxelBox all = changed.grown(SurfaceLook::kOpennessReachVox);
   std::optional<Neighbourhood> near;
-  bool differs = false;
+  DifferentParts parts(block);
   for (SurfaceVertex& vertex : mesh.vertices) {
     const SurfaceVertex before = vertex;
     const FinePoint at = fine_place(vertex, start);
@@ -89,9 +89,9 @@ bool update_look(const SurfaceSource& source, VoxelIndex block, const VoxelBox& 
       if (!SurfaceLook::openness_depends_on(changed, at, inward)) continue;
       vertex.openness = unit16(source.look->openness(source.volume, at, inward));
     }
-    differs = differs || vertex != before;
+    if (vertex != before) parts.add(voxel);
   }
-  return differs;
+  return parts;
 }
 
 }  // namespace kerf

@@ -111,18 +111,19 @@ std::span<const std::uint32_t> VolumeSurface::update(std::span<const Density> de
   }
   std::sort(marked_.begin(), marked_.end());
   different_.clear();
+  looks_.clear();
   const SurfaceSource from = source();
   for (const std::uint32_t id : marked_) {
     BlockMesh& mesh = meshes_[id];
+    DifferentParts parts(block(id));
     if (work_[id] == Work::look) {
-      if (update_look(from, block(id), all, mesh)) different_.push_back(id);
+      parts = update_look(from, block(id), all, mesh);
     } else {
       BlockMesh now = extract_block(from, block(id));
-      if (now != mesh) {
-        mesh = std::move(now);
-        different_.push_back(id);
-      }
+      parts = difference(mesh, now, block(id), all);
+      mesh = std::move(now);
     }
+    if (parts.append_to(looks_)) different_.push_back(id);
     work_[id] = Work::none;
   }
   marked_.clear();

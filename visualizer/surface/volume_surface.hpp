@@ -29,6 +29,9 @@ class VolumeSurface {
   std::span<const std::uint32_t> update(std::span<const Density> density,
                                         std::span<const std::uint32_t> changed);
 
+  /// Boxes of voxels around all triangles that look different since the last `update`.
+  [[nodiscard]] std::span<const VoxelBox> looks_different() const noexcept { return looks_; }
+
   [[nodiscard]] const VoxelGrid& blocks() const noexcept { return blocks_; }
   [[nodiscard]] VoxelIndex block(std::uint32_t id) const noexcept;
   /// By block id, x fastest as in `blocks()`.
@@ -53,6 +56,7 @@ class VolumeSurface {
   std::vector<Work> work_;                ///< by block; all none between calls
   std::vector<std::uint32_t> marked_;     ///< blocks with work
   std::vector<std::uint32_t> different_;  ///< what the last update returned
+  std::vector<VoxelBox> looks_;
 };
 
 }  // namespace kerf

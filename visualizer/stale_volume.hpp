@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "visualizer/renderer.hpp"
+#include "visualizer/stale_tiles.hpp"
+
+namespace kerf {
+
+/// What has changed in one volume since a picture of it was drawn, and which tiles that leaves
+/// stale; the others would come out the same, bit by bit.
+class StaleVolume {
+ public:
+  /// Takes what the last `update` of volume `index` changed: densities in `differs`.
+  void add(const Renderer& renderer, std::size_t index, std::span<const VoxelBox> differs);
+  void clear();
+
+  /// `density` is all of the volume as it is now; `kept` holds the picture with its depth, of the
+  /// volumes alone where `renderer` is opaque.
+  void mark(StaleTiles& tiles, const Renderer& renderer, const VolumeView& volume,
+            std::span<const Density> density, const View& view, const RenderTarget& kept) const;
+
+ private:
+  std::vector<VoxelBox> differs_;
+  std::vector<VoxelBox> looks_;  ///< `Renderer::looks_different`
+};
+
+}  // namespace kerf
