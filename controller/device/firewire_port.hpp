@@ -26,8 +26,8 @@ struct FirewireLinkStats {
 /// The Omni on FireWire, by system calls on `/dev/fw*` alone.
 ///
 /// Three opens: requests and resources, the received stream, the transmitted one. Every tick
-/// flushes the received stream, so a packet is never older than a tick and a bus cycle; that, and a
-/// packet sent, are the only calls of an undisturbed tick.
+/// flushes the received stream, so a packet is never older than a tick and a bus cycle. Six calls
+/// make an undisturbed tick: room given back, flush, poll, read, poll, and a packet sent.
 ///
 /// The link repairs itself between ticks, without sleeping: after a bus reset the registers are
 /// written again; a device that has fallen silent is written to as well; channels that another node

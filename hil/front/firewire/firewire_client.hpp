@@ -22,8 +22,9 @@ namespace kerf {
 /// One open of a FireWire node: the ioctls of linux/firewire-cdev.h with the errors of the kernel's
 /// core-cdev.c (6.1), and the events that this open has not read yet.
 ///
-/// Not modelled, ENOSYS: address ranges, PHY packets, descriptors of the configuration ROM,
-/// broadcasts, several channels in one context, resources for one generation.
+/// Not modelled, ENOSYS (of which FUSE makes ENOTTY): address ranges, PHY packets, descriptors of
+/// the configuration ROM, broadcasts, several channels in one context, resources for one
+/// generation.
 class FirewireClient : public std::enable_shared_from_this<FirewireClient> {
  public:
   explicit FirewireClient(FirewireBus& bus)

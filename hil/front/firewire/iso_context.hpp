@@ -55,7 +55,6 @@ class IsoContext {
   void receive(std::uint32_t tag, std::span<const std::uint8_t> packet, std::int64_t cycle);
 
   [[nodiscard]] const IsoSettings& settings() const noexcept { return settings_; }
-  [[nodiscard]] bool running() const noexcept { return running_; }
   /// Descriptors until the next one that interrupts, itself included; 0 for none.
   [[nodiscard]] std::int64_t until_interrupt() const noexcept;
   /// Packets that came while no descriptor was queued.

@@ -26,10 +26,6 @@ class IsoResources {
     if (channels != 0) free_ |= bit(channel);
     bandwidth_ += bandwidth;
   }
-  [[nodiscard]] std::int32_t bandwidth() const noexcept { return bandwidth_; }
-  [[nodiscard]] bool is_free(std::int32_t channel) const noexcept {
-    return (free_ & bit(channel)) != 0;
-  }
 
  private:
   static constexpr std::uint64_t bit(std::int32_t channel) noexcept {
