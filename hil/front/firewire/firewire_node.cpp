@@ -35,7 +35,8 @@ FuseAnswer FirewireNode::take(Open& open, std::size_t size) {
 }
 
 /// The kernel knows no O_NONBLOCK here: who reads when there is nothing sleeps.
-std::optional<FuseAnswer> FirewireNode::read(FuseOpen id, FuseRequest request, std::size_t size) {
+std::optional<FuseAnswer> FirewireNode::read(FuseOpen id, FuseRequest request,
+                                             std::uint64_t /*offset*/, std::size_t size) {
   bus_.catch_up();
   deliver();
   Open& open = opens_.at(id);

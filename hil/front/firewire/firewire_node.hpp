@@ -29,7 +29,8 @@ class FirewireNode final : public FuseNode, private FirewireBus::Listener {
   [[nodiscard]] bool present() const noexcept override { return bus_.listed(); }
   void open(FuseOpen open) override;
   void release(FuseOpen open) override;
-  std::optional<FuseAnswer> read(FuseOpen open, FuseRequest request, std::size_t size) override;
+  std::optional<FuseAnswer> read(FuseOpen open, FuseRequest request, std::uint64_t offset,
+                                 std::size_t size) override;
   std::optional<FuseAnswer> write(FuseOpen open, FuseRequest request,
                                   std::span<const std::uint8_t> bytes) override;
   std::optional<FuseAnswer> ioctl(FuseOpen open, const FuseIoctl& call) override;

@@ -155,7 +155,8 @@ void FuseMount::open(const FuseMessage& request) {
   if (i >= nodes_.size() || !nodes_[i].node->present()) return channel_.reply(request.id(), ENOENT);
   fuse_open_out out{};
   out.fh = ++last_open_;
-  out.open_flags = FOPEN_DIRECT_IO | FOPEN_NONSEEKABLE | FOPEN_STREAM;
+  out.open_flags = FOPEN_DIRECT_IO;
+  if (!nodes_[i].node->seekable()) out.open_flags |= FOPEN_NONSEEKABLE | FOPEN_STREAM;
   opens_[out.fh] = nodes_[i].node;
   nodes_[i].node->open(out.fh);
   channel_.reply_with(request.id(), out);
@@ -175,7 +176,7 @@ void FuseMount::read(const FuseMessage& request) {
   const auto in = fuse_body<fuse_read_in>(request.body);
   FuseNode* node = in ? node_of(in->fh) : nullptr;
   if (!node) return channel_.reply(request.id(), EBADF);
-  settle(request, Kind::read, *node, node->read(in->fh, request.id(), in->size));
+  settle(request, Kind::read, *node, node->read(in->fh, request.id(), in->offset, in->size));
 }
 
 void FuseMount::write(const FuseMessage& request) {

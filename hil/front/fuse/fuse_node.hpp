@@ -54,9 +54,14 @@ class FuseNode {
   /// False: the name is not there, and cannot be opened.
   [[nodiscard]] virtual bool present() const noexcept = 0;
 
+  /// Whether lseek() works; else it says ESPIPE, as on most devices.
+  [[nodiscard]] virtual bool seekable() const noexcept { return false; }
+
   virtual void open(FuseOpen open) = 0;
   virtual void release(FuseOpen open) = 0;
-  virtual std::optional<FuseAnswer> read(FuseOpen open, FuseRequest request, std::size_t size) = 0;
+  /// `offset` grows from read to read where the node is seekable, else it is 0.
+  virtual std::optional<FuseAnswer> read(FuseOpen open, FuseRequest request, std::uint64_t offset,
+                                         std::size_t size) = 0;
   virtual std::optional<FuseAnswer> write(FuseOpen open, FuseRequest request,
                                           std::span<const std::uint8_t> bytes) = 0;
   virtual std::optional<FuseAnswer> ioctl(FuseOpen open, const FuseIoctl& call) = 0;
