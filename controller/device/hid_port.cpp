@@ -59,6 +59,7 @@ std::vector<Found> list_arms() {
     all.push_back({about->path, narrow(about->serial_number)});
   }
   hid_free_enumeration(list);
+  std::ranges::sort(all, {}, &Found::node);
   return all;
 }
 

@@ -68,6 +68,7 @@ std::vector<Found> list_falcons(libusb_context* context) {
     if (found.error == 0) found.serial = serial_of(found.handle);
   }
   if (devices) libusb_free_device_list(devices, 1);
+  std::ranges::sort(all, {}, &Found::node);
   return all;
 }
 

@@ -36,7 +36,7 @@ TEST_CASE("hid: from the calibration button to a force, with short and with long
     arm.stop();
     CHECK(arm.emulator().model().calibration() == kerf::Calibration::done);
     CHECK(arm.emulator().stats().refused == 0);
-    CHECK(arm.emulator().stats().peak_motor_force_n > 0.1);
+    CHECK(arm.emulator().stats().peak_motor_force_n > 0.01);
     CHECK(arm.node().lost() == 0);
   }
 }
