@@ -74,7 +74,7 @@ TEST_CASE("falcon boot: firmware that runs is left alone") {
 }
 
 TEST_CASE("falcon boot: the loader is greeted, takes every byte, and the firmware runs") {
-  for (const std::size_t piece : {62, 1, 3}) {
+  for (const std::size_t piece : {62U, 1U, 3U}) {
     Wire wire(false, -1, piece);
     kerf::start_falcon(wire, firmware());
     CHECK(wire.loader.running());

@@ -5,6 +5,7 @@
 #include <array>
 #include <cerrno>
 #include <cstddef>
+#include <cstring>
 #include <limits>
 
 #include <linux/usbdevice_fs.h>
@@ -151,15 +152,17 @@ int UsbfsNode::clear_halt(const FuseIoctl& call) {
 }
 
 std::optional<UsbfsNode::Urb> UsbfsNode::read_urb(const FuseIoctl& call) noexcept {
-  usbdevfs_urb head{};
-  const std::span<std::uint8_t> bytes(reinterpret_cast<std::uint8_t*>(&head), sizeof head);
-  if (read_caller(call.thread, call.argument, bytes) != sizeof head) return std::nullopt;
+  std::array<std::uint8_t, sizeof(usbdevfs_urb)> bytes{};  // it ends in an array without a size
+  if (read_caller(call.thread, call.argument, bytes) != bytes.size()) return std::nullopt;
+  const auto get = [&](auto& value, std::size_t offset) {
+    std::memcpy(&value, &bytes[offset], sizeof value);
+  };
   Urb urb;
   urb.address = call.argument;
-  urb.type = head.type;
-  urb.endpoint = head.endpoint;
-  urb.buffer = address_of(head.buffer);
-  urb.buffer_bytes = head.buffer_length;
+  get(urb.type, offsetof(usbdevfs_urb, type));
+  get(urb.endpoint, offsetof(usbdevfs_urb, endpoint));
+  get(urb.buffer, offsetof(usbdevfs_urb, buffer));
+  get(urb.buffer_bytes, offsetof(usbdevfs_urb, buffer_length));
   return urb;
 }
 
