@@ -17,11 +17,14 @@
 #include <sys/ioctl.h>
 #include <unistd.h>
 
+#include "shared/posix/cores.hpp"
 #include "shared/wire/wooden_constants.hpp"
 
 namespace kerf {
 namespace {
 
+constexpr int kPriority = 81;  // above the servo on its core: the hand comes first
+constexpr int kLastPacketMs = 20;
 constexpr const char* kGiveRight =
     "; give your user the right: a udev rule with KERNEL==\"hidraw*\", "
     "ATTRS{idVendor}==\"1234\", TAG+=\"uaccess\" (docs/devices.md)";
@@ -105,9 +108,15 @@ HidPort::HidPort(const std::string& where, int patience_ms, const std::atomic<bo
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
   }
   hid_set_nonblocking(device_, 1);
+  sem_init(&raised_, 0, 0);
+  thread_ = std::thread([this] { run(); });
 }
 
 HidPort::~HidPort() {
+  stop_ = true;
+  sem_post(&raised_);
+  thread_.join();
+  sem_destroy(&raised_);
   hid_close(device_);
 }
 
@@ -148,12 +157,32 @@ std::size_t HidPort::receive(std::span<std::uint8_t> out) noexcept {
 }
 
 bool HidPort::send(std::span<const std::uint8_t> packet) noexcept {
-  if (closed()) return false;
-  std::array<std::uint8_t, 1 + wooden::kLongPacketBytes> report{wooden::kReportId};
-  std::copy_n(packet.begin(), std::min(packet.size(), packet_bytes_), report.begin() + 1);
-  const int size = hid_write(device_, report.data(), 1 + packet_bytes_);
-  if (size < 0) closed_ = true;
-  return size >= 0;
+  if (closed() || !outbox_.put(packet)) return false;
+  sem_post(&raised_);
+  return true;
+}
+
+bool HidPort::send_last(std::span<const std::uint8_t> packet) noexcept {
+  return send(packet) && gettid() != thread_id_ && outbox_.wait_until_sent(kLastPacketMs);
+}
+
+void HidPort::run() noexcept {
+  thread_id_ = gettid();
+  // Without the right to either, packets leave later; the servo's own start tells the user.
+  static_cast<void>(pin_to_core(allowed_cores().back()));
+  static_cast<void>(set_fifo(kPriority));
+  while (!stop_ || !outbox_.empty()) {
+    while (sem_wait(&raised_) != 0) {
+    }
+    std::array<std::uint8_t, 1 + wooden::kLongPacketBytes> report{wooden::kReportId};
+    std::size_t size = 0;
+    while (const std::size_t next = outbox_.take(std::span(report).subspan(1))) size = next;
+    if (size > 0 && !closed()) {
+      std::fill(report.begin() + 1 + static_cast<std::ptrdiff_t>(size), report.end(), 0);
+      if (hid_write(device_, report.data(), 1 + packet_bytes_) < 0) closed_ = true;
+    }
+    outbox_.set_on_its_way(false);
+  }
 }
 
 bool HidPort::wait(int milliseconds) noexcept {

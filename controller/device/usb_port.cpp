@@ -8,7 +8,6 @@
 #include <vector>
 
 #include <libusb-1.0/libusb.h>
-#include <poll.h>
 #include <unistd.h>
 
 #include "shared/posix/cores.hpp"
@@ -75,12 +74,7 @@ UsbPort::~UsbPort() {
 }
 
 bool UsbPort::send_last(std::span<const std::uint8_t> packet) noexcept {
-  if (!send(packet) || gettid() == thread_id_) return false;
-  for (int ms = 0; ms < kLastPacketMs && !closed(); ++ms) {
-    if (outbox_.empty() && !writing_) return true;
-    poll(nullptr, 0, 1);  // a sleep that signal handlers may call
-  }
-  return false;
+  return send(packet) && gettid() != thread_id_ && outbox_.wait_until_sent(kLastPacketMs);
 }
 
 bool UsbPort::wait(int milliseconds) noexcept {
@@ -138,14 +132,13 @@ void UsbPort::send_waiting() noexcept {
   if (outbox_.empty()) return;
   for (Transfer& write : writes_) {
     if (write.busy) continue;
-    writing_ = true;  // before the packet leaves the outbox: `send_last` looks at both
     const std::size_t size = outbox_.take(write.bytes);
     if (size == 0) break;
     write.usb->length = static_cast<int>(size);
     submit(write);
     reply_due_ns_ = 0;
   }
-  writing_ = any_busy(writes_);
+  outbox_.set_on_its_way(any_busy(writes_));
 }
 
 void UsbPort::finished(Transfer& transfer) noexcept {
@@ -172,7 +165,7 @@ void UsbPort::finished(Transfer& transfer) noexcept {
       if (++failures_in_a_row_ > kMostFailures) closed_ = true;
   }
   if (is_read && !transfer.halted && !stop_ && !closed()) submit(transfer);
-  if (!is_read) writing_ = any_busy(writes_);
+  if (!is_read) outbox_.set_on_its_way(any_busy(writes_));
 }
 
 /// One packet of the chip: two bytes of status, then what came over the serial line.

@@ -9,9 +9,9 @@
 #include <span>
 #include <thread>
 
+#include "controller/device/io_mailbox.hpp"
 #include "controller/device/packet_port.hpp"
 #include "controller/device/usb_falcon.hpp"
-#include "controller/device/usb_mailbox.hpp"
 #include "shared/wire/falcon_framer.hpp"
 
 struct libusb_transfer;
@@ -86,7 +86,6 @@ class UsbPort final : public PacketPort {
   Inbox inbox_;
   Outbox outbox_;
   std::atomic<bool> closed_{false}, stop_{false};
-  std::atomic<bool> writing_{false};  ///< a packet has left the outbox and not arrived
   std::atomic<int> thread_id_{0};
   std::atomic<std::uint64_t> packets_{0}, overflow_{0}, strays_{0}, commands_{0}, failures_{0};
 

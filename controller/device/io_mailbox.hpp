@@ -8,13 +8,15 @@
 #include <cstdint>
 #include <span>
 
+#include <poll.h>
+
 namespace kerf {
 
-/// What stands between the servo and an I/O thread: packets in both directions, without a lock, a
-/// system call or an allocation. Packets have at most kMaxBytes; longer ones are cut.
-///
-/// Memory orders: whoever fills a place publishes it with release, whoever empties it looks with
-/// acquire, and the other way round for the empty place.
+// What stands between the servo and an I/O thread: packets in both directions, without a lock, a
+// system call or an allocation. Whoever fills a place publishes it with release, whoever empties it
+// looks with acquire, and the other way round for the empty place.
+
+/// A packet in there; one that is longer than kMaxBytes is cut.
 struct MailboxPacket {
   static constexpr std::size_t kMaxBytes = 64;
 
@@ -89,9 +91,22 @@ class Outbox {
       oldest = &place;
     }
     if (!oldest) return 0;
+    on_its_way_.store(true);  // before the place is free: `wait_until_sent` looks at both
     const std::size_t size = oldest->packet.copy_to(out);
     oldest->ticket.store(kFree, std::memory_order_release);
     return size;
+  }
+  /// The reader: whether what it took has not left the process yet.
+  void set_on_its_way(bool is) noexcept { on_its_way_.store(is); }
+
+  /// Any thread but the reader's, any signal handler: false when something is still here after so
+  /// many milliseconds.
+  bool wait_until_sent(int milliseconds) const noexcept {
+    for (int ms = 0; !empty() || on_its_way_.load(); ++ms) {
+      if (ms == milliseconds) return false;
+      poll(nullptr, 0, 1);  // a sleep that signal handlers may call
+    }
+    return true;
   }
   /// Any thread, any signal handler: no whole packet waits.
   [[nodiscard]] bool empty() const noexcept {
@@ -113,6 +128,7 @@ class Outbox {
 
   std::array<Place, kPlaces> places_{};
   std::atomic<std::uint64_t> next_ticket_{kFirstTicket};
+  std::atomic<bool> on_its_way_{false};
 };
 
 }  // namespace kerf
