@@ -9,7 +9,7 @@ namespace kerf {
 
 /// The narrow place where a bus ends and a driver begins: whole packets in, whole packets out.
 ///
-/// What stands behind it (a socket to an emulator, later FireWire, USB, HID) is invisible to the
+/// What stands behind it (a socket to an emulator, FireWire, USB, HID) is invisible to the
 /// driver. Never blocks, never allocates, never throws. Servo thread only, but for `send`,
 /// `send_last` and `closed`, which any thread and any signal handler may call.
 class PacketPort {
