@@ -15,6 +15,7 @@ namespace kerf {
 /// The command line of kerf-emulator.
 struct EmulatorOptions {
   std::string personality = "omni";
+  bool describe = false;
   std::string front = "socket";
   std::string socket;
   std::string udp;

@@ -59,6 +59,11 @@ std::unique_ptr<DeviceModel> make_device(const EmulatorOptions& o) {
   return std::make_unique<OmniModel>(params);
 }
 
+void describe(const EmulatorOptions& o, std::ostream& out) {
+  const auto scale = make_device(o)->torque_scale();
+  out << "torque_scale=" << scale[0] << ',' << scale[1] << ',' << scale[2] << '\n';
+}
+
 Emulator make_emulator(const EmulatorOptions& o) {
   std::optional<HandScript> script;
   if (!o.hand.empty()) {
@@ -86,6 +91,17 @@ void serve_clients(const EmulatorOptions& o, Server& server, const std::string& 
            (limits.cycles == 0 || stats.cycles < limits.cycles));
 }
 
+void serve_on_fuse(const EmulatorOptions& o, const FuseService& service) {
+  if (o.personality == "falcon") {
+    serve_fuse(service, {.firmware_runs = o.fuse.firmware_runs}, usb_script(o.fuse));
+  } else if (o.personality == "woodenhaptics") {
+    serve_fuse(service,
+               HidrawNode::Settings{.packet_bytes = o.packet_bytes, .script = usb_script(o.fuse)});
+  } else {
+    serve_fuse(service, firewire_settings(o.fuse, o.lockstep ? o.rate_hz : 0));
+  }
+}
+
 void serve(const EmulatorOptions& o, const std::atomic<bool>& stop, std::ostream& out,
            std::ostream& err) {
   if (!o.report.empty()) check_report(o.report);
@@ -98,8 +114,7 @@ void serve(const EmulatorOptions& o, const std::atomic<bool>& stop, std::ostream
   const ServeLimits limits{cycles_of(o.seconds), stop};
   FrontStats stats;
   if (o.front == "fuse") {
-    const FirewireSettings settings = firewire_settings(o.fuse, o.lockstep ? o.rate_hz : 0);
-    serve_fuse(o.fuse.mount, settings, device, limits, o.stay, stats, out);
+    serve_on_fuse(o, {o.fuse.mount, device, limits, o.stay, stats, out});
   } else if (o.front == "udp") {
     UdpServer server(o.udp);
     const std::string place = "udp port " + std::to_string(server.port());
@@ -121,7 +136,11 @@ int run_emulator(int argc, const char* const* argv, const std::atomic<bool>& sto
   try {
     app.parse(argc, argv);
     check(options);
-    serve(options, stop, out, err);
+    if (options.describe) {
+      describe(options, out);
+    } else {
+      serve(options, stop, out, err);
+    }
     return 0;
   } catch (const CLI::Success& wanted) {  // --help, --version
     return app.exit(wanted, out, err);

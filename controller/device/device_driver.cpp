@@ -32,4 +32,11 @@ bool DeviceDriver::release() const noexcept {
   return port_.send(std::span(packet).first(size));
 }
 
+bool DeviceDriver::release_for_good() noexcept {
+  released_.store(true);
+  Packet packet;
+  const std::size_t size = compose_release(packet);
+  return port_.send_last(std::span(packet).first(size));
+}
+
 }  // namespace kerf

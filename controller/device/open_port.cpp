@@ -7,38 +7,102 @@
 
 #include "controller/device/firewire_port.hpp"
 #include "controller/device/socket_port.hpp"
+#ifdef KERF_HAS_HID
+#include "controller/device/hid_port.hpp"
+#endif
+#ifdef KERF_HAS_USB
+#include "controller/device/usb_port.hpp"
+#endif
 
 namespace kerf {
 namespace {
 
 constexpr std::string_view kSocket = "socket:";
 
-/// What follows `fw`; nothing for another port.
-std::optional<std::string_view> after_fw(std::string_view text) {
-  if (text != "fw" && !text.starts_with("fw:") && !text.starts_with("fw,")) return std::nullopt;
-  return text.substr(2);
+struct Request {
+  int rate_hz = 0;
+  int patience_ms = 0;
+  const std::atomic<bool>& stop;
+};
+
+/// What follows the name of a bus; nothing for another port.
+std::optional<std::string_view> after(std::string_view bus, std::string_view text) {
+  if (!text.starts_with(bus)) return std::nullopt;
+  text.remove_prefix(bus.size());
+  if (!text.empty() && text.front() != ':' && text.front() != ',') return std::nullopt;
+  return text;
+}
+
+// Each opens its port, or only reads the text where there is no request.
+std::unique_ptr<PacketPort> firewire(std::string_view rest, const Request* request) {
+  FirewireOptions options = parse_firewire_port(rest);
+  if (!request) return nullptr;
+  options.rate_hz = request->rate_hz;
+  return std::make_unique<FirewirePort>(options, request->patience_ms, request->stop);
+}
+
+#ifdef KERF_HAS_USB
+std::unique_ptr<PacketPort> usb(std::string_view rest, const Request* request) {
+  const UsbOptions options = parse_usb_port(rest);
+  if (!request) return nullptr;
+  return std::make_unique<UsbPort>(options, request->patience_ms, request->stop);
+}
+#else
+std::unique_ptr<PacketPort> usb(std::string_view, const Request*) {
+  throw std::runtime_error(
+      "--port usb: left out of this build; install libusb-1.0-0-dev, then ./kerf setup");
+}
+#endif
+
+#ifdef KERF_HAS_HID
+std::unique_ptr<PacketPort> hid(std::string_view rest, const Request* request) {
+  const std::string where = parse_hid_port(rest);
+  if (!request) return nullptr;
+  return std::make_unique<HidPort>(where, request->patience_ms, request->stop);
+}
+#else
+std::unique_ptr<PacketPort> hid(std::string_view, const Request*) {
+  throw std::runtime_error(
+      "--port hid: left out of this build; install libhidapi-dev, then ./kerf setup");
+}
+#endif
+
+std::unique_ptr<PacketPort> port(const std::string& text, const Request* request) {
+  if (const auto rest = after("fw", text)) return firewire(*rest, request);
+  if (const auto rest = after("usb", text)) return usb(*rest, request);
+  if (const auto rest = after("hid", text)) return hid(*rest, request);
+  if (!text.starts_with(kSocket)) {
+    throw std::runtime_error(
+        "--port '" + text +
+        "' is not known; use auto, fw, usb, hid, or socket:PATH, where kerf-emulator listens");
+  }
+  if (!request) return nullptr;
+  return std::make_unique<SocketPort>(text.substr(kSocket.size()), request->patience_ms,
+                                      request->stop);
+}
+
+const char* bus_of(Personality personality) {
+  switch (personality) {
+    case Personality::omni:
+      return "fw";
+    case Personality::falcon:
+      return "usb";
+    case Personality::woodenhaptics:
+      return "hid";
+  }
+  return "";
 }
 
 }  // namespace
 
 void check_port(const std::string& text) {
-  if (const auto rest = after_fw(text)) {
-    static_cast<void>(parse_firewire_port(*rest));
-  } else if (!text.starts_with(kSocket)) {
-    throw std::runtime_error("--port '" + text +
-                             "' is not known; use fw, or socket:PATH, where kerf-emulator listens");
-  }
+  if (text != "auto") static_cast<void>(port(text, nullptr));
 }
 
-std::unique_ptr<PacketPort> open_port(const std::string& text, int rate_hz, int patience_ms,
-                                      const std::atomic<bool>& stop) {
-  check_port(text);
-  if (const auto rest = after_fw(text)) {
-    FirewireOptions options = parse_firewire_port(*rest);
-    options.rate_hz = rate_hz;
-    return std::make_unique<FirewirePort>(options, patience_ms, stop);
-  }
-  return std::make_unique<SocketPort>(text.substr(kSocket.size()), patience_ms, stop);
+std::unique_ptr<PacketPort> open_port(const std::string& text, Personality personality, int rate_hz,
+                                      int patience_ms, const std::atomic<bool>& stop) {
+  const Request request{rate_hz, patience_ms, stop};
+  return port(text == "auto" ? bus_of(personality) : text, &request);
 }
 
 }  // namespace kerf

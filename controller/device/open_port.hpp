@@ -6,21 +6,26 @@
 #include <string>
 
 #include "controller/device/packet_port.hpp"
+#include "controller/servo/personality.hpp"
 
 namespace kerf {
 
 /// The port that `--port` names:
 ///
-///     socket:PATH             an emulator's SEQPACKET socket
-///     fw[:WHERE][,OPTION...]  FireWire, as firewire_find.hpp says
+///     socket:PATH                    an emulator's SEQPACKET socket
+///     fw[:WHERE][,OPTION...]         FireWire, as firewire_find.hpp says
+///     usb[:WHERE][,firmware=FILE]    the Falcon, as usb_falcon.hpp says
+///     hid[:WHERE]                    WoodenHaptics, as hid_port.hpp says
+///     auto                           the bus of the device, any one that is there
 ///
-/// Both throw std::runtime_error with one line.
+/// All throw std::runtime_error with one line.
 
-/// For a text that names no port.
+/// For a text that names no port, or one that this build lacks.
 void check_port(const std::string& text);
 
 /// Tries for `patience_ms` while no device is there, or until `stop`.
-[[nodiscard]] std::unique_ptr<PacketPort> open_port(const std::string& text, int rate_hz,
+[[nodiscard]] std::unique_ptr<PacketPort> open_port(const std::string& text,
+                                                    Personality personality, int rate_hz,
                                                     int patience_ms, const std::atomic<bool>& stop);
 
 }  // namespace kerf

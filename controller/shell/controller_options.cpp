@@ -81,9 +81,9 @@ std::optional<int> parse_options(int argc, const char* const* argv, ControllerOp
                             ->expected(3)
                             ->check(CLI::Range(-kMaxTorqueScale, kMaxTorqueScale))
                             ->type_name("A,B,C");
-  app.add_option(
-         "--port", options.port,
-         "where the device is: fw[:NODE or SERIAL] on FireWire, socket:PATH of kerf-emulator")
+  app.add_option("--port", options.port,
+                 "where the device is: auto; fw, usb or hid, each [:NODE or :SERIAL]; usb also "
+                 "[,firmware=FILE]; socket:PATH of kerf-emulator")
       ->type_name("PORT");
   constexpr double kLongestS = 1e7;  // 115 days
   app.add_option("--seconds", options.seconds,
@@ -157,7 +157,7 @@ std::optional<int> parse_options(int argc, const char* const* argv, ControllerOp
   }
   const bool runs = !options.check && !options.explain;
   if (runs && options.port.empty()) {
-    return refuse("--port is missing; give fw, or socket:PATH, where kerf-emulator listens");
+    return refuse("--port is missing; give auto, or socket:PATH, where kerf-emulator listens");
   }
   if (runs) {
     try {

@@ -292,7 +292,8 @@ int run_controller(const ControllerOptions& options) {
   servo->take(scene);
   std::unique_ptr<PacketPort> port;
   try {
-    port = open_port(options.port, scene.servo.rate_hz, kPortPatienceMs, stop);
+    port = open_port(options.port, scene.device.personality, scene.servo.rate_hz, kPortPatienceMs,
+                     stop);
   } catch (const std::runtime_error&) {
     if (stop) return 1;  // asked to end before there was a device: nothing to tell
     throw;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 
@@ -39,6 +40,9 @@ class DeviceModel {
   /// How a hand calibrates this device and gets to the start of its script.
   [[nodiscard]] virtual HandRoute route() const = 0;
   [[nodiscard]] virtual const PlantState& state() const noexcept = 0;
+  /// Torque of one motor count at each joint, N mm, without its sign: what a host has to be told
+  /// of a unit (`torque_scale` of a scene, `--torque-scale`).
+  [[nodiscard]] virtual std::array<double, 3> torque_scale() const noexcept = 0;
 
   [[nodiscard]] DeviceVec<double> tip_mm() const noexcept { return state().pose.tip_mm; }
   [[nodiscard]] JointVec<double> joints_rad() const noexcept { return state().pose.q; }

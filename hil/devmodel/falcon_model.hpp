@@ -41,6 +41,9 @@ class FalconModel final : public DeviceModel {
   [[nodiscard]] Calibration calibration() const noexcept override;
   [[nodiscard]] HandRoute route() const override;
   [[nodiscard]] const PlantState& state() const noexcept override { return plant_.state(); }
+  [[nodiscard]] std::array<double, 3> torque_scale() const noexcept override {
+    return params_.torque_scale();
+  }
 
   [[nodiscard]] const FalconArm& arm() const noexcept { return plant_.arm(); }
 

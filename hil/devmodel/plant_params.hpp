@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstdint>
 
 namespace kerf {
@@ -35,6 +36,11 @@ struct PlantParams {
   double hand_stiffness_n_per_mm = 0.5;
   double hand_damping_ns_per_mm = 0.005;
   double hand_mass_kg = 0.1;  ///< moves with the tip
+
+  [[nodiscard]] std::array<double, 3> torque_scale() const noexcept {
+    const auto& t = torque_nmm_per_count;
+    return {std::abs(t[0]), std::abs(t[1]), std::abs(t[2])};
+  }
 };
 
 }  // namespace kerf

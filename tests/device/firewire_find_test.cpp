@@ -9,7 +9,6 @@
 #include <unistd.h>
 
 #include "controller/device/firewire_streams.hpp"
-#include "controller/device/open_port.hpp"
 
 using kerf::cycle_of_stamp;
 using kerf::cycles_between;
@@ -30,16 +29,6 @@ TEST_CASE("--port fw takes a place and options in any order after it") {
   CHECK_FALSE(bare.fill);
   CHECK_THROWS_WITH_AS(static_cast<void>(parse_firewire_port(":/dev/fw1,fast")),
                        "--port fw: 'fast' is not known; use 20010 or fill", std::runtime_error);
-}
-
-TEST_CASE("a port that is none is refused with the ones that are") {
-  CHECK_NOTHROW(kerf::check_port("fw"));
-  CHECK_NOTHROW(kerf::check_port("fw:/dev/fw1"));
-  CHECK_NOTHROW(kerf::check_port("socket:/tmp/x"));
-  for (const char* text : {"", "usb", "fwd", "sock:/tmp/x"}) {
-    CHECK_THROWS_WITH_AS(kerf::check_port(text), doctest::Contains("use fw, or socket:PATH"),
-                         std::runtime_error);
-  }
 }
 
 TEST_CASE("the serial number is unpacked as printed, whatever bit 0 says") {

@@ -299,7 +299,7 @@ TEST_CASE("bad arguments are one line and exit 2") {
   CHECK(refused({controller}).find("--scene") != std::string::npos);
   CHECK(refused({controller, "--scene", "missing.toml", "--check"}).find("missing.toml") !=
         std::string::npos);
-  CHECK(refused({controller, "--scene", scene, "--port", "usb"}).find("socket:PATH") !=
+  CHECK(refused({controller, "--scene", scene, "--port", "usbx"}).find("socket:PATH") !=
         std::string::npos);
   CHECK(
       refused({controller, "--scene", scene, "--device", "nonsense", "--check"}).find("nonsense") !=

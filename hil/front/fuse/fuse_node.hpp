@@ -53,11 +53,13 @@ class FuseNode {
   virtual void attach(FuseReplies& replies) noexcept = 0;
   /// False: the name is not there, and cannot be opened.
   [[nodiscard]] virtual bool present() const noexcept = 0;
-  /// True: there is a file position, and `read` is told it. False: lseek() is ESPIPE.
-  [[nodiscard]] virtual bool seekable() const noexcept = 0;
+
+  /// Whether lseek() works; else it says ESPIPE, as on most devices.
+  [[nodiscard]] virtual bool seekable() const noexcept { return false; }
 
   virtual void open(FuseOpen open) = 0;
   virtual void release(FuseOpen open) = 0;
+  /// `offset` grows from read to read where the node is seekable, else it is 0.
   virtual std::optional<FuseAnswer> read(FuseOpen open, FuseRequest request, std::uint64_t offset,
                                          std::size_t size) = 0;
   virtual std::optional<FuseAnswer> write(FuseOpen open, FuseRequest request,

@@ -16,13 +16,14 @@
 
 #include "controller/scene/scene_error.hpp"
 #include "controller/scene/scene_load.hpp"
+#include "hil/devmodel/falcon_model.hpp"
+#include "hil/devmodel/omni_model.hpp"
+#include "hil/devmodel/wooden_model.hpp"
 #include "hil/fault/fault_file.hpp"
 #include "hil/hand_script_file.hpp"
 #include "hil/hil_error.hpp"
 #include "hil/lab/faults/fault_run.hpp"
 #include "hil/lab/lab_run.hpp"
-#include "shared/wire/falcon_constants.hpp"
-#include "shared/wire/wooden_constants.hpp"
 
 namespace kerf::faults {
 namespace {
@@ -43,22 +44,17 @@ struct Row {
   Outcome worst;
 };
 
+/// Of the emulated unit.
 std::array<double, 3> torque_scale_of(Personality personality) {
-  std::array<double, 3> scale{};
   switch (personality) {
-    case Personality::omni:
-      scale.fill(0.342);  // the emulated unit's: OmniParams
-      break;
     case Personality::falcon:
-      scale.fill(falcon::kOpenDriverNmmPerCount);
-      break;
+      return FalconParams().torque_scale();
     case Personality::woodenhaptics:
-      for (std::size_t i = 0; i < 3; ++i) {
-        scale[i] = wooden::kTorqueNmmPerA2015[i] / 1000 * wooden::kBodyMm[i] / wooden::kCapstanMm;
-      }
+      return WoodenParams().torque_scale();
+    case Personality::omni:
       break;
   }
-  return scale;
+  return OmniParams().torque_scale();
 }
 
 std::vector<NamedScript> scripts_in(const std::string& place) {

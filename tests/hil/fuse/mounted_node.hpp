@@ -35,20 +35,23 @@ class TempFolder {
   std::string path_;
 };
 
-/// A device as the node `fw1`, served by a thread while this lives.
-class MountedDevice {
+/// A node in a folder of its own, served by a thread while this lives.
+template <class Node>
+class ServedNode {
  public:
-  /// `prepare` runs first on the server's thread.
-  MountedDevice(const FirewireSettings& settings, PacketDevice& device,
-                std::function<void()> prepare = {})
-      : node_(settings, device), mount_(folder_.path()) {
-    mount_.add("fw1", node_);
+  /// `prepare` runs first on the server's thread; the rest makes the node.
+  template <class... Arguments>
+  ServedNode(const char* name, std::function<void()> prepare, Arguments&&... arguments)
+      : name_(name), node_(std::forward<Arguments>(arguments)...), mount_(folder_.path()) {
+    mount_.add(name_, node_);
     thread_ = std::thread([this, prepare = std::move(prepare)] {
       if (prepare) prepare();
       mount_.serve([this] { return !stop_; });
     });
   }
-  ~MountedDevice() { stop(); }
+  ~ServedNode() { stop(); }
+  ServedNode(const ServedNode&) = delete;
+  ServedNode& operator=(const ServedNode&) = delete;
 
   /// Ends the server; what it has seen may be read from then on.
   void stop() {
@@ -56,16 +59,25 @@ class MountedDevice {
     if (thread_.joinable()) thread_.join();
   }
   [[nodiscard]] const std::string& folder() const noexcept { return folder_.path(); }
-  [[nodiscard]] std::string path() const { return folder_.path() + "/fw1"; }
-  [[nodiscard]] const FirewireNode& node() const noexcept { return node_; }
+  [[nodiscard]] std::string path() const { return folder_.path() + '/' + name_; }
+  [[nodiscard]] const Node& node() const noexcept { return node_; }
   [[nodiscard]] const FuseMount& mount() const noexcept { return mount_; }
 
  private:
+  std::string name_;
   TempFolder folder_;
-  FirewireNode node_;
+  Node node_;
   FuseMount mount_;
   std::atomic<bool> stop_{false};
   std::thread thread_;
+};
+
+/// A device on FireWire.
+class MountedDevice : public ServedNode<FirewireNode> {
+ public:
+  MountedDevice(const FirewireSettings& settings, PacketDevice& device,
+                std::function<void()> prepare = {})
+      : ServedNode("fw1", std::move(prepare), settings, device) {}
 };
 
 /// The emulated Omni in this way.

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <thread>
+
+#include <semaphore.h>
+
+#include "controller/device/io_mailbox.hpp"
+#include "controller/device/packet_port.hpp"
+
+struct hid_device_;
+
+namespace kerf {
+
+/// The WoodenHaptics arm over hidapi's hidraw back end: reports of 14 bytes (mbed firmware) or 64
+/// (Teensy), report number 0.
+///
+/// Reads on the servo thread itself: poll() and read(), which neither sleep nor allocate as long as
+/// they succeed (hidapi 0.13; it keeps a text of a failure, once, after which this port is closed).
+/// Writes do not: the kernel's write() to a hidraw node sleeps until the transfer has ended, up to
+/// a frame, and 5 s where the device takes nothing. So a thread of its own writes, the newest
+/// packet always, and `send` only leaves it in a mailbox and raises a semaphore: any thread, any
+/// signal handler. A device that is unplugged closes the port at the next call.
+class HidPort final : public PacketPort {
+ public:
+  /// `where`: a node (/dev/hidraw0), a serial number, or empty for the only arm. Tries for
+  /// `patience_ms` while none is there, or until `stop`. Throws std::runtime_error with one line.
+  HidPort(const std::string& where, int patience_ms, const std::atomic<bool>& stop);
+  ~HidPort() override;
+  HidPort(const HidPort&) = delete;
+  HidPort& operator=(const HidPort&) = delete;
+
+  [[nodiscard]] std::size_t receive(std::span<std::uint8_t> out) noexcept override;
+  bool send(std::span<const std::uint8_t> packet) noexcept override;
+  bool send_last(std::span<const std::uint8_t> packet) noexcept override;
+  [[nodiscard]] bool closed() const noexcept override {
+    return closed_.load(std::memory_order_relaxed);
+  }
+  [[nodiscard]] bool wait(int milliseconds) noexcept override;
+
+ private:
+  [[nodiscard]] bool open(const std::string& where);
+  [[nodiscard]] std::size_t read(std::span<std::uint8_t> out, int milliseconds) noexcept;
+  void run() noexcept;
+
+  hid_device_* device_ = nullptr;
+  std::size_t packet_bytes_ = 0;            ///< of this firmware; shorter packets are filled up
+  std::atomic<bool> closed_{false};         ///< written by whoever meets the end first
+  std::array<std::uint8_t, 64> waiting_{};  ///< what `wait` has read
+  std::size_t waiting_bytes_ = 0;
+
+  Outbox outbox_;
+  sem_t raised_{};  ///< once per packet, and once to stop
+  std::atomic<bool> stop_{false};
+  std::atomic<int> thread_id_{0};
+  std::thread thread_;  ///< writes
+};
+
+/// What follows "hid" in `--port hid[:WHERE]`. Throws std::runtime_error with one line.
+[[nodiscard]] std::string parse_hid_port(std::string_view text);
+
+}  // namespace kerf

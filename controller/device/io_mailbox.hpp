@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include <poll.h>
+
+namespace kerf {
+
+// What stands between the servo and an I/O thread: packets in both directions, without a lock, a
+// system call or an allocation. Whoever fills a place publishes it with release, whoever empties it
+// looks with acquire, and the other way round for the empty place.
+
+/// A packet in there; one that is longer than kMaxBytes is cut.
+struct MailboxPacket {
+  static constexpr std::size_t kMaxBytes = 64;
+
+  void assign(std::span<const std::uint8_t> packet) noexcept {
+    size = std::min(packet.size(), kMaxBytes);
+    std::copy_n(packet.begin(), size, bytes.begin());
+  }
+  /// The size of the packet, of which `out` gets what it can hold.
+  std::size_t copy_to(std::span<std::uint8_t> out) const noexcept {
+    std::copy_n(bytes.begin(), std::min(size, out.size()), out.begin());
+    return size;
+  }
+
+  std::array<std::uint8_t, kMaxBytes> bytes{};
+  std::size_t size = 0;
+};
+
+/// Reports: one writer, one reader, oldest first. Wait-free.
+class Inbox {
+ public:
+  /// The writer. False when the reader has fallen behind by kPlaces: the packet is lost then.
+  bool put(std::span<const std::uint8_t> packet) noexcept {
+    const std::size_t end = end_.load(std::memory_order_relaxed);
+    if (end - begin_.load(std::memory_order_acquire) == kPlaces) return false;
+    places_[end % kPlaces].assign(packet);
+    end_.store(end + 1, std::memory_order_release);
+    return true;
+  }
+  /// The reader. Size of the oldest packet; 0 when there is none.
+  [[nodiscard]] std::size_t take(std::span<std::uint8_t> out) noexcept {
+    const std::size_t begin = begin_.load(std::memory_order_relaxed);
+    if (begin == end_.load(std::memory_order_acquire)) return 0;
+    const std::size_t size = places_[begin % kPlaces].copy_to(out);
+    begin_.store(begin + 1, std::memory_order_release);
+    return size;
+  }
+  /// Any thread.
+  [[nodiscard]] bool empty() const noexcept {
+    return begin_.load(std::memory_order_acquire) == end_.load(std::memory_order_acquire);
+  }
+
+ private:
+  static constexpr std::size_t kPlaces = 64;
+  std::array<MailboxPacket, kPlaces> places_{};
+  std::atomic<std::size_t> begin_{0}, end_{0};
+};
+
+/// Commands: any thread and any signal handler writes, one reader. Each packet has a place of its
+/// own, so a writer that a crash stopped in the middle of one keeps nobody from the others.
+class Outbox {
+ public:
+  /// False when no place is free.
+  bool put(std::span<const std::uint8_t> packet) noexcept {
+    const std::uint64_t ticket = next_ticket_.fetch_add(1);
+    for (Place& place : places_) {
+      std::uint64_t expected = kFree;
+      if (!place.ticket.compare_exchange_strong(expected, kBeingWritten)) continue;
+      place.packet.assign(packet);
+      place.ticket.store(ticket, std::memory_order_release);
+      return true;
+    }
+    return false;
+  }
+  /// The reader. Size of the oldest packet; 0 when there is none.
+  [[nodiscard]] std::size_t take(std::span<std::uint8_t> out) noexcept {
+    Place* oldest = nullptr;
+    std::uint64_t lowest = ~std::uint64_t{0};
+    for (Place& place : places_) {
+      const std::uint64_t ticket = place.ticket.load(std::memory_order_acquire);
+      if (ticket < kFirstTicket || ticket >= lowest) continue;
+      lowest = ticket;
+      oldest = &place;
+    }
+    if (!oldest) return 0;
+    on_its_way_.store(true);  // before the place is free: `wait_until_sent` looks at both
+    const std::size_t size = oldest->packet.copy_to(out);
+    oldest->ticket.store(kFree, std::memory_order_release);
+    return size;
+  }
+  /// The reader: whether what it took has not left the process yet.
+  void set_on_its_way(bool is) noexcept { on_its_way_.store(is); }
+
+  /// Any thread but the reader's, any signal handler: false when something is still here after so
+  /// many milliseconds.
+  bool wait_until_sent(int milliseconds) const noexcept {
+    for (int ms = 0; !empty() || on_its_way_.load(); ++ms) {
+      if (ms == milliseconds) return false;
+      poll(nullptr, 0, 1);  // a sleep that signal handlers may call
+    }
+    return true;
+  }
+  /// Any thread, any signal handler: no whole packet waits.
+  [[nodiscard]] bool empty() const noexcept {
+    return std::ranges::all_of(places_, [](const Place& place) {
+      return place.ticket.load(std::memory_order_acquire) < kFirstTicket;
+    });
+  }
+
+ private:
+  static constexpr std::size_t kPlaces = 8;
+  static constexpr std::uint64_t kFree = 0;
+  static constexpr std::uint64_t kBeingWritten = 1;
+  static constexpr std::uint64_t kFirstTicket = 2;
+  struct Place {
+    std::atomic<std::uint64_t> ticket{kFree};
+    MailboxPacket packet;
+  };
+  static_assert(std::atomic<std::uint64_t>::is_always_lock_free);
+
+  std::array<Place, kPlaces> places_{};
+  std::atomic<std::uint64_t> next_ticket_{kFirstTicket};
+  std::atomic<bool> on_its_way_{false};
+};
+
+}  // namespace kerf

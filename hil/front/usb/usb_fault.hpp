@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+namespace kerf {
+
+/// What may happen to a device on USB.
+enum class UsbFault : std::uint8_t {
+  stall,   ///< the endpoint that is read halts until the host clears it (Falcon)
+  split,   ///< for 0.1 s the serial line is slow: packets come in pieces (Falcon)
+  vanish,  ///< unplugged
+  back,    ///< plugged in again, without power having been lost
+};
+
+struct ScriptedUsbFault {
+  std::int64_t cycle = 0;  ///< of 125 us, counted from the begin
+  UsbFault fault = UsbFault::vanish;
+};
+
+/// Faults in the order of time.
+class UsbFaultScript {
+ public:
+  explicit UsbFaultScript(std::vector<ScriptedUsbFault> faults) : faults_(std::move(faults)) {}
+
+  /// `strike(fault)` for each that is due in `cycle` or before it and has not struck yet.
+  template <class Strike>
+  void run(std::int64_t cycle, Strike strike) {
+    while (next_ < faults_.size() && faults_[next_].cycle <= cycle) strike(faults_[next_++].fault);
+  }
+
+ private:
+  std::vector<ScriptedUsbFault> faults_;
+  std::size_t next_ = 0;
+};
+
+}  // namespace kerf

@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "hil/front/fuse/fuse_node.hpp"
+#include "hil/front/usb/ftdi_falcon.hpp"
+#include "hil/front/usb/usb_fault.hpp"
+
+namespace kerf {
+
+/// The device node of an emulated Falcon on USB (`/dev/bus/usb/BBB/DDD`, linux/usbdevice_fs.h):
+/// what libusb cannot tell from the kernel's usbfs. Errors are those of the kernel's devio.c (6.1).
+///
+/// A read completes when the device has a packet, at most once per 1 ms frame; a write and a
+/// control request at once. Not modelled, ENOTTY: blocking REAPURB and BULK, isochronous transfers,
+/// streams, mmap(), suspending. One transfer is one packet, which is enough for buffers of 64
+/// bytes.
+class UsbfsNode final : public FuseNode {
+ public:
+  UsbfsNode(const FtdiFalcon::Settings& settings, std::vector<ScriptedUsbFault> script,
+            PacketDevice& device)
+      : chip_(settings, device), script_(std::move(script)) {}
+
+  void attach(FuseReplies& replies) noexcept override { replies_ = &replies; }
+  [[nodiscard]] bool present() const noexcept override { return present_; }
+  [[nodiscard]] bool seekable() const noexcept override { return true; }
+  void open(FuseOpen open) override;
+  void release(FuseOpen open) override;
+  /// The descriptors.
+  std::optional<FuseAnswer> read(FuseOpen open, FuseRequest request, std::uint64_t offset,
+                                 std::size_t size) override;
+  std::optional<FuseAnswer> write(FuseOpen open, FuseRequest request,
+                                  std::span<const std::uint8_t> bytes) override;
+  std::optional<FuseAnswer> ioctl(FuseOpen open, const FuseIoctl& call) override;
+  std::uint32_t poll(FuseOpen open, bool sleeps) override;
+  void interrupted(FuseRequest /*request*/) override {}  // nothing is ever parked
+  [[nodiscard]] std::int64_t next_wake_ns() const noexcept override;
+  void wake() override;
+
+  /// Somebody had transfers, and nobody has the node open any more.
+  [[nodiscard]] bool left() const noexcept { return used_ && opens_.empty(); }
+  [[nodiscard]] const FtdiFalcon& chip() const noexcept { return chip_; }
+
+ private:
+  /// A transfer of a client: its structure, where that stands in the client's memory, and the data
+  /// that are copied there when the client reaps it.
+  struct Urb {
+    std::uint64_t address = 0;
+    std::uint8_t type = 0;
+    std::uint8_t endpoint = 0;
+    std::uint64_t buffer = 0;
+    std::int32_t buffer_bytes = 0;
+    std::int32_t status = 0;
+    std::int32_t actual_bytes = 0;
+    std::vector<std::uint8_t> data;
+    std::size_t data_offset = 0;
+  };
+  struct Open {
+    std::deque<Urb> pending, done;
+    bool announced = false;  ///< pollers know of what is done
+    bool gone = false;       ///< the device was unplugged: nothing works any more
+  };
+
+  [[nodiscard]] static std::optional<Urb> read_urb(const FuseIoctl& call) noexcept;
+  // Each returns what the ioctl returns, or a negative errno.
+  int submit(Open& open, FuseOpen id, const FuseIoctl& call);
+  int submit_control(Open& open, Urb urb, pid_t thread);
+  int submit_bulk(Open& open, Urb urb, pid_t thread);
+  int reap(Open& open, const FuseIoctl& call);
+  int discard(Open& open, std::uint64_t address);
+  int claim(FuseOpen id, const FuseIoctl& call);
+  int give_up_interface(FuseOpen id);
+  int clear_halt(const FuseIoctl& call);
+  FuseAnswer control(const FuseIoctl& call);
+  int connect_info(const FuseIoctl& call);
+
+  static void finish(Open& open, Urb urb, int status);
+  void catch_up();
+  [[nodiscard]] Open* reader();
+  void strike(UsbFault fault);
+  void unplug();
+  void deliver();
+
+  FuseReplies* replies_ = nullptr;
+  FtdiFalcon chip_;
+  UsbFaultScript script_;
+  std::map<FuseOpen, Open> opens_;
+  std::optional<FuseOpen> claimed_by_;
+  std::vector<std::uint8_t> answer_;
+  bool present_ = true;
+  bool halted_ = false;  ///< the endpoint that is read
+  bool used_ = false;
+};
+
+}  // namespace kerf

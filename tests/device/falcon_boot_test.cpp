@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "controller/device/falcon_boot.hpp"
+
+#include <algorithm>
+#include <deque>
+#include <numeric>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <doctest/doctest.h>
+
+#include "hil/front/usb/falcon_boot_loader.hpp"
+#include "shared/wire/falcon_framer.hpp"
+
+using kerf::falcon::FtdiRequest;
+
+namespace {
+
+/// The emulator's boot loader at the other end of a wire, in pieces of at most `piece` bytes.
+class Wire final : public kerf::FalconLine {
+ public:
+  explicit Wire(bool runs, std::int64_t wrong_echo_at = -1, std::size_t piece = 62)
+      : loader(runs, wrong_echo_at), piece_(piece) {}
+
+  void control(FtdiRequest request, std::uint16_t value) override {
+    settings.emplace_back(request, value);
+    if (request == FtdiRequest::baud) loader.set_divisor(value);
+    if (request == FtdiRequest::modem && (value & 0x100) != 0) loader.set_dtr((value & 1) != 0);
+    if (request == FtdiRequest::reset) line_.clear();
+  }
+  void write(std::span<const std::uint8_t> bytes) override {
+    longest_write = std::max(longest_write, bytes.size());
+    for (const std::uint8_t byte : bytes) {
+      if (!loader.running()) {
+        if (!deaf) loader.take(byte, line_);
+      } else if (framer_.take(byte) && !mute) {
+        const auto answer = encode(kerf::FalconReport{});
+        line_.insert(line_.end(), answer.begin(), answer.end());
+      }
+    }
+  }
+  std::size_t read(std::span<std::uint8_t> out, int /*milliseconds*/) override {
+    const std::size_t size = std::min({line_.size(), out.size(), piece_});
+    std::copy_n(line_.begin(), size, out.begin());
+    line_.erase(line_.begin(), line_.begin() + static_cast<std::ptrdiff_t>(size));
+    return size;
+  }
+
+  kerf::FalconBootLoader loader;
+  std::vector<std::pair<FtdiRequest, std::uint16_t>> settings;
+  std::size_t longest_write = 0;
+  bool deaf = false;  ///< the boot loader hears nothing
+  bool mute = false;  ///< the firmware says nothing
+
+ private:
+  std::size_t piece_;
+  std::deque<std::uint8_t> line_;
+  kerf::falcon::Framer framer_;
+};
+
+std::vector<std::uint8_t> firmware() {
+  std::vector<std::uint8_t> bytes(1000);
+  std::iota(bytes.begin(), bytes.end(), std::uint8_t{0});
+  return bytes;
+}
+
+}  // namespace
+
+TEST_CASE("falcon boot: firmware that runs is left alone") {
+  Wire wire(true);
+  kerf::start_falcon(wire, {});
+  CHECK(wire.settings.front() == std::pair(FtdiRequest::latency, kerf::falcon::kRunLatencyMs));
+}
+
+TEST_CASE("falcon boot: the loader is greeted, takes every byte, and the firmware runs") {
+  for (const std::size_t piece : {62U, 1U, 3U}) {
+    Wire wire(false, -1, piece);
+    kerf::start_falcon(wire, firmware());
+    CHECK(wire.loader.running());
+    CHECK(wire.loader.stored() == 1000);
+    CHECK(wire.longest_write <= kerf::falcon::kUploadChunk);
+    CHECK(wire.settings[wire.settings.size() - 3] ==
+          std::pair(FtdiRequest::baud, kerf::falcon::kRunDivisor));
+  }
+}
+
+TEST_CASE("falcon boot: what goes wrong is told in one line with its place") {
+  const auto error_of = [](Wire& wire, std::span<const std::uint8_t> bytes) -> std::string {
+    try {
+      kerf::start_falcon(wire, bytes);
+    } catch (const std::runtime_error& error) {
+      CHECK(std::string(error.what()).find('\n') == std::string::npos);
+      return error.what();
+    }
+    return "";
+  };
+  Wire none(false);
+  CHECK(error_of(none, {}).find("has no firmware since it was powered up") != std::string::npos);
+
+  for (const std::int64_t at : {0, 61, 62, 999}) {
+    Wire wrong(false, at);
+    const std::string error = error_of(wrong, firmware());
+    CHECK(error.find("firmware: byte " + std::to_string(at) + " was ") == 0);
+  }
+  Wire deaf(false);
+  deaf.deaf = true;
+  CHECK(error_of(deaf, firmware()).find("the boot loader does not answer; ") == 0);
+  Wire mute(false);
+  mute.mute = true;
+  CHECK(error_of(mute, firmware()).find("the firmware was taken and does not answer") == 0);
+
+  CHECK_THROWS_WITH_AS(static_cast<void>(kerf::read_firmware("/nowhere/at/all")),
+                       doctest::Contains("firmware /nowhere/at/all: No such file"),
+                       std::runtime_error);
+  CHECK_THROWS_WITH_AS(static_cast<void>(kerf::read_firmware("/dev/null")),
+                       doctest::Contains("is empty"), std::runtime_error);
+}

@@ -1,0 +1,240 @@
+// SPDX-License-Identifier: Apache-2.0
+// The two nodes against what the kernel's usbfs and hidraw say, by system calls alone.
+#include <array>
+#include <cerrno>
+#include <cstdint>
+#include <cstring>
+#include <span>
+#include <string>
+#include <vector>
+
+#include <doctest/doctest.h>
+#include <fcntl.h>
+#include <linux/hidraw.h>
+#include <linux/usbdevice_fs.h>
+#include <poll.h>
+#include <sys/ioctl.h>
+#include <unistd.h>
+
+#include "shared/wire/falcon_packet.hpp"
+#include "shared/wire/wooden_packet.hpp"
+#include "tests/hil/fuse/usb_session.hpp"
+
+using kerf::UsbFault;
+using kerf::test::MountedArm;
+using kerf::test::MountedFalcon;
+
+namespace {
+
+/// One open of a node.
+class Client {
+ public:
+  explicit Client(const std::string& path) : fd_(open(path.c_str(), O_RDWR)) {}
+  ~Client() { close(fd_); }
+  Client(const Client&) = delete;
+  Client& operator=(const Client&) = delete;
+
+  /// What ioctl() returns, or a negative errno.
+  template <class T>
+  int call(unsigned long command, T argument) const {
+    const int result = ioctl(fd_, command, argument);
+    return result < 0 ? -errno : result;
+  }
+  [[nodiscard]] int ready(short events, int milliseconds) const {
+    pollfd watched{fd_, events, 0};
+    return poll(&watched, 1, milliseconds) > 0 ? watched.revents : 0;
+  }
+  /// The address of the oldest transfer that is done, within the time.
+  [[nodiscard]] usbdevfs_urb* reap(int milliseconds = 500) const {
+    if ((ready(POLLOUT, milliseconds) & POLLOUT) == 0) return nullptr;
+    void* urb = nullptr;
+    return call(USBDEVFS_REAPURBNDELAY, &urb) == 0 ? static_cast<usbdevfs_urb*>(urb) : nullptr;
+  }
+  [[nodiscard]] int fd() const noexcept { return fd_; }
+
+ private:
+  int fd_;
+};
+
+void fill(usbdevfs_urb& urb, std::uint8_t endpoint, std::span<std::uint8_t> buffer) {
+  std::memset(&urb, 0, sizeof urb);
+  urb.type = USBDEVFS_URB_TYPE_BULK;
+  urb.endpoint = endpoint;
+  urb.buffer = buffer.data();
+  urb.buffer_length = static_cast<int>(buffer.size());
+}
+
+}  // namespace
+
+TEST_CASE("usbfs: descriptors are read from an offset, and say what the device is") {
+  const MountedFalcon falcon;
+  const Client client(falcon.path());
+  std::array<std::uint8_t, 100> bytes{};
+  CHECK(read(client.fd(), bytes.data(), 18) == 18);
+  CHECK((bytes[8] | bytes[9] << 8) == kerf::falcon::kVendorId);
+  CHECK((bytes[10] | bytes[11] << 8) == kerf::falcon::kProductId);
+  CHECK(read(client.fd(), bytes.data(), bytes.size()) == 32);  // the configuration
+  CHECK(bytes[1] == 2);
+  CHECK(read(client.fd(), bytes.data(), bytes.size()) == 0);
+  CHECK(lseek(client.fd(), 0, SEEK_SET) == 0);
+  CHECK(read(client.fd(), bytes.data(), bytes.size()) == 50);
+  CHECK(write(client.fd(), bytes.data(), 1) == -1);
+}
+
+TEST_CASE("usbfs: an interface has one owner, and what is not there is refused") {
+  const MountedFalcon falcon;
+  const Client first(falcon.path()), second(falcon.path());
+  unsigned interface = 0, none = 1;
+  CHECK(first.call(USBDEVFS_CLAIMINTERFACE, &none) == -ENOENT);
+  CHECK(first.call(USBDEVFS_RELEASEINTERFACE, &interface) == -EINVAL);
+  CHECK(first.call(USBDEVFS_CLAIMINTERFACE, &interface) == 0);
+  CHECK(first.call(USBDEVFS_CLAIMINTERFACE, &interface) == 0);
+  CHECK(second.call(USBDEVFS_CLAIMINTERFACE, &interface) == -EBUSY);
+  CHECK(first.call(USBDEVFS_RELEASEINTERFACE, &interface) == 0);
+  CHECK(second.call(USBDEVFS_CLAIMINTERFACE, &interface) == 0);
+  CHECK(first.call(USBDEVFS_GET_SPEED, 0) == 2);
+  CHECK(first.call(USBDEVFS_GETDRIVER, &interface) == -ENODATA);
+  unsigned endpoint = 0x85;
+  CHECK(first.call(USBDEVFS_CLEAR_HALT, &endpoint) == -ENOENT);
+  CHECK(first.call(USBDEVFS_FORBID_SUSPEND, 0) == -ENOTTY);
+  CHECK(first.call(USBDEVFS_CLAIMINTERFACE, static_cast<unsigned*>(nullptr)) == -EFAULT);
+}
+
+TEST_CASE("usbfs: a read waits for the device, a discarded one comes back, none is invented") {
+  const MountedFalcon falcon({.firmware_runs = true}, {}, false);
+  const Client client(falcon.path());
+  std::array<std::uint8_t, 64> in{};
+  usbdevfs_urb read_urb;
+  fill(read_urb, kerf::falcon::kEndpointIn, in);
+  void* none = nullptr;
+  CHECK(client.call(USBDEVFS_REAPURBNDELAY, &none) == -EAGAIN);
+  CHECK(client.call(USBDEVFS_DISCARDURB, &read_urb) == -EINVAL);
+
+  // The latency timer of 16 ms has long run out: status alone comes with the next frame.
+  CHECK(client.call(USBDEVFS_SUBMITURB, &read_urb) == 0);
+  CHECK(client.reap() == &read_urb);
+  CHECK(read_urb.status == 0);
+  CHECK(read_urb.actual_length == 2);
+  const std::int64_t begin_ns = kerf::monotonic_ns();
+  CHECK(client.call(USBDEVFS_SUBMITURB, &read_urb) == 0);
+  CHECK(client.reap() == &read_urb);
+  CHECK(kerf::monotonic_ns() - begin_ns > 10'000'000);
+
+  CHECK(client.call(USBDEVFS_SUBMITURB, &read_urb) == 0);
+  CHECK(client.call(USBDEVFS_DISCARDURB, &read_urb) == 0);
+  CHECK(client.reap() == &read_urb);
+  CHECK(read_urb.status == -ENOENT);
+
+  usbdevfs_urb bad;
+  fill(bad, 0x83, in);
+  CHECK(client.call(USBDEVFS_SUBMITURB, &bad) == -ENOENT);
+  fill(bad, kerf::falcon::kEndpointIn, in);
+  bad.type = USBDEVFS_URB_TYPE_ISO;
+  CHECK(client.call(USBDEVFS_SUBMITURB, &bad) == -EINVAL);
+  CHECK(client.call(USBDEVFS_SUBMITURB, static_cast<usbdevfs_urb*>(nullptr)) == -EFAULT);
+}
+
+TEST_CASE("usbfs: one exchange per frame, two bytes of status before the answer") {
+  const MountedFalcon falcon({.firmware_runs = true}, {}, false);
+  const Client client(falcon.path());
+  usbdevfs_ctrltransfer latency{};
+  latency.bRequestType = kerf::falcon::kFtdiRequestType;
+  latency.bRequest = static_cast<std::uint8_t>(kerf::falcon::FtdiRequest::latency);
+  latency.wValue = 1;
+  CHECK(client.call(USBDEVFS_CONTROL, &latency) == 0);
+  latency.bRequest = 77;
+  CHECK(client.call(USBDEVFS_CONTROL, &latency) == -EPIPE);
+  std::array<std::uint8_t, 64> in{};
+  auto command = encode(kerf::FalconCommand{});
+  int answers = 0;
+  const std::int64_t begin_ns = kerf::monotonic_ns();
+  for (int i = 0; i < 100; ++i) {
+    usbdevfs_urb write_urb, read_urb;
+    fill(write_urb, kerf::falcon::kEndpointOut, command);
+    fill(read_urb, kerf::falcon::kEndpointIn, in);
+    REQUIRE(client.call(USBDEVFS_SUBMITURB, &write_urb) == 0);
+    REQUIRE(client.call(USBDEVFS_SUBMITURB, &read_urb) == 0);
+    REQUIRE(client.reap() == &write_urb);  // at once
+    CHECK(write_urb.actual_length == 16);
+    REQUIRE(client.reap() == &read_urb);
+    if (read_urb.actual_length != 2 + 16) continue;
+    ++answers;
+    CHECK(kerf::falcon::decode_report(std::span(in).subspan(2, 16)));
+  }
+  CHECK(answers >= 99);
+  CHECK(kerf::monotonic_ns() - begin_ns >= 98'000'000);
+}
+
+TEST_CASE("usbfs: after unplugging what was pending comes back, then everything is ENODEV") {
+  const MountedFalcon falcon({.firmware_runs = true},
+                             {{100, UsbFault::stall}, {200, UsbFault::vanish}}, false);
+  const Client client(falcon.path());
+  std::array<std::uint8_t, 64> in{};
+  usbdevfs_urb read_urb;
+  int status = 0;
+  while (status == 0) {
+    fill(read_urb, kerf::falcon::kEndpointIn, in);
+    REQUIRE(client.call(USBDEVFS_SUBMITURB, &read_urb) == 0);
+    REQUIRE(client.reap() == &read_urb);
+    status = read_urb.status;
+  }
+  CHECK(status == -EPIPE);
+  CHECK(client.call(USBDEVFS_SUBMITURB, &read_urb) == 0);  // halted: waits
+  CHECK(client.reap() == &read_urb);
+  CHECK(read_urb.status == -ESHUTDOWN);
+  CHECK((client.ready(POLLOUT, 0) & (POLLERR | POLLHUP)) == (POLLERR | POLLHUP));
+  void* none = nullptr;
+  CHECK(client.call(USBDEVFS_REAPURBNDELAY, &none) == -ENODEV);
+  CHECK(client.call(USBDEVFS_SUBMITURB, &read_urb) == -ENODEV);
+  CHECK(open(falcon.path().c_str(), O_RDWR) == -1);
+}
+
+TEST_CASE("hidraw: who it is, its descriptor, one report per read, from the first write on") {
+  for (const std::size_t bytes : {std::size_t{14}, std::size_t{64}}) {
+    const MountedArm arm({.packet_bytes = bytes, .serial = "S1"}, false);
+    const Client client(arm.path());
+    hidraw_devinfo info{};
+    CHECK(client.call(HIDIOCGRAWINFO, &info) == 0);
+    CHECK(info.vendor == (bytes == 14 ? 0x1234 : 0x16C0));
+    CHECK(info.product == (bytes == 14 ? 0x0006 : 0x0486));
+    int size = 0;
+    CHECK(client.call(HIDIOCGRDESCSIZE, &size) == 0);
+    hidraw_report_descriptor descriptor{};
+    descriptor.size = static_cast<unsigned>(size);
+    CHECK(client.call(HIDIOCGRDESC, &descriptor) == 0);
+    CHECK(descriptor.value[0] == 0x06);
+    CHECK(descriptor.value[size - 1] == 0xC0);
+    std::array<char, 32> serial{};
+    CHECK(client.call(HIDIOCGRAWUNIQ(32), serial.data()) == 3);
+    CHECK(std::string(serial.data()) == "S1");
+    CHECK(client.call(HIDIOCSFEATURE(8), serial.data()) == -EPIPE);
+    CHECK(client.call(0x4801, &size) == -ENOTTY);
+
+    CHECK((client.ready(POLLIN, 20) & POLLIN) == 0);  // it waits for its host
+    std::array<std::uint8_t, 65> report{};
+    CHECK(write(client.fd(), report.data(), 1) == -1);
+    CHECK(write(client.fd(), report.data(), 1 + bytes) == static_cast<ssize_t>(1 + bytes));
+    for (int i = 0; i < 20; ++i) {
+      CHECK((client.ready(POLLIN, 500) & POLLIN) != 0);
+      CHECK(read(client.fd(), report.data(), report.size()) == static_cast<ssize_t>(bytes));
+      CHECK(kerf::wooden::decode_report(std::span(report).first(bytes)));
+    }
+  }
+}
+
+TEST_CASE("hidraw: unplugged, it gives what waits and then EIO; nothing can be written") {
+  const MountedArm arm({.script = {{150, UsbFault::vanish}}}, false);
+  const Client client(arm.path());
+  std::array<std::uint8_t, 15> report{};
+  CHECK(write(client.fd(), report.data(), report.size()) == 15);
+  while ((client.ready(POLLIN, 500) & POLLERR) == 0) {
+    if (read(client.fd(), report.data(), report.size()) <= 0) break;
+  }
+  while (read(client.fd(), report.data(), report.size()) > 0) {
+  }
+  CHECK(errno == EIO);
+  CHECK((client.ready(POLLIN, 0) & (POLLERR | POLLHUP)) == (POLLERR | POLLHUP));
+  CHECK(write(client.fd(), report.data(), report.size()) == -1);
+  CHECK(errno == ENODEV);
+  CHECK(open(arm.path().c_str(), O_RDWR) == -1);
+}

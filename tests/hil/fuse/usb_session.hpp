@@ -1,0 +1,152 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <atomic>
+#include <memory>
+#include <optional>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "controller/device/device_driver.hpp"
+#include "controller/device/make_driver.hpp"
+#include "controller/device/open_port.hpp"
+#include "hil/devmodel/falcon_model.hpp"
+#include "hil/devmodel/wooden_model.hpp"
+#include "hil/front/hid/hidraw_node.hpp"
+#include "hil/front/real_time.hpp"
+#include "hil/front/usb/usbfs_node.hpp"
+#include "hil/hand_script_file.hpp"
+#include "shared/posix/monotonic_clock.hpp"
+#include "tests/hil/fuse/mounted_node.hpp"
+#include "tests/servo/support.hpp"
+
+namespace kerf::test {
+
+inline const std::atomic<bool> kGoOn{false};
+
+/// Faults at these milliseconds since the node was made.
+inline std::vector<ScriptedUsbFault> at_ms(std::vector<ScriptedUsbFault> script) {
+  for (ScriptedUsbFault& entry : script) entry.cycle *= kCyclesPerUsbFrame;
+  return script;
+}
+
+/// The server's thread, where there is the right to it: before the servo, on its core.
+inline void become_device() {
+  static_cast<void>(make_real_time(82, -1));
+}
+
+inline std::optional<HandScript> touching_hand() {
+  return read_hand_script(KERF_HANDS "/touch.toml");
+}
+
+/// The emulated Falcon as a usbfs node.
+class MountedFalcon {
+ public:
+  explicit MountedFalcon(const FtdiFalcon::Settings& settings = {.firmware_runs = true},
+                         std::vector<ScriptedUsbFault> script = {}, bool with_hand = true)
+      : emulator_(std::make_unique<FalconModel>(),
+                  with_hand ? touching_hand() : std::optional<HandScript>{}),
+        served_("usb", become_device, settings, at_ms(std::move(script)), emulator_) {}
+
+  void stop() { served_.stop(); }
+  [[nodiscard]] std::string path() const { return served_.path(); }
+  [[nodiscard]] const UsbfsNode& node() const noexcept { return served_.node(); }
+  [[nodiscard]] const Emulator& emulator() const noexcept { return emulator_; }
+
+ private:
+  Emulator emulator_;
+  ServedNode<UsbfsNode> served_;
+};
+
+/// The emulated WoodenHaptics arm as a hidraw node.
+class MountedArm {
+ public:
+  explicit MountedArm(HidrawNode::Settings settings = {}, bool with_hand = true)
+      : emulator_(std::make_unique<WoodenModel>(params_of(settings)),
+                  with_hand ? touching_hand() : std::optional<HandScript>{}),
+        served_("hidraw0", become_device, with_cycles(std::move(settings)), emulator_) {}
+
+  void stop() { served_.stop(); }
+  [[nodiscard]] std::string path() const { return served_.path(); }
+  [[nodiscard]] const HidrawNode& node() const noexcept { return served_.node(); }
+  [[nodiscard]] const Emulator& emulator() const noexcept { return emulator_; }
+
+ private:
+  static WoodenParams params_of(const HidrawNode::Settings& settings) {
+    WoodenParams params;
+    params.packet_bytes = settings.packet_bytes;
+    return params;
+  }
+  static HidrawNode::Settings with_cycles(HidrawNode::Settings settings) {
+    settings.script = at_ms(std::move(settings.script));
+    return settings;
+  }
+
+  Emulator emulator_;
+  ServedNode<HidrawNode> served_;
+};
+
+/// A driver above its real library, and a servo that touches a half-space above the driver, at 1
+/// kHz by the machine's clock.
+class ServoSession {
+ public:
+  ServoSession(Personality personality, PacketPort& port)
+      : driver_(make_driver(personality, port)) {
+    scene_.device.personality = personality;
+    scene_.device.torque_scale = std::array{0.3, 0.3, 0.3};
+    servo_ = compile(scene_);
+    driver_->start();
+  }
+
+  struct Course {
+    int ticks = 0, fresh = 0, contact = 0, motors = 0;
+    int longest_gap = 0;        ///< ticks without a report
+    int stale_with_motors = 0;  ///< ticks beyond 20 without a report and motors still asked for
+    int gap_at_end = 0;
+  };
+  /// Until so many ticks have passed, or `done` says so. On a thread with the servo's priority.
+  template <class Done>
+  Course run(int most_ticks, Done done) {
+    Course course;
+    std::thread([&] {
+      static_cast<void>(make_real_time(80, -1));
+      tick(most_ticks, done, course);
+    }).join();
+    return course;
+  }
+  Course run(int ticks) {
+    return run(ticks, [](const Course&) { return false; });
+  }
+
+  [[nodiscard]] DeviceDriver& driver() noexcept { return *driver_; }
+
+ private:
+  template <class Done>
+  void tick(int most_ticks, Done& done, Course& course) {
+    int gap = 0;
+    std::int64_t deadline_ns = monotonic_ns();
+    while (course.ticks < most_ticks && !done(course)) {
+      deadline_ns = std::max(deadline_ns + 1'000'000, monotonic_ns());
+      sleep_until_ns(deadline_ns);
+      const DeviceReport report = driver_->read();
+      const ServoOutput output = servo_->step(report);
+      driver_->command(output);
+      ++course.ticks;
+      gap = report.fresh ? 0 : gap + 1;
+      course.fresh += report.fresh ? 1 : 0;
+      course.contact += output.contact ? 1 : 0;
+      course.motors += output.motors_on ? 1 : 0;
+      course.longest_gap = std::max(course.longest_gap, gap);
+      if (gap > 20 && output.motors_on) ++course.stale_with_motors;
+      course.gap_at_end = gap;
+    }
+  }
+
+  Scene scene_ = half_space_scene();
+  std::unique_ptr<Servo> servo_;
+  std::unique_ptr<DeviceDriver> driver_;
+};
+
+}  // namespace kerf::test
