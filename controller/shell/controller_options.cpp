@@ -102,6 +102,8 @@ std::optional<int> parse_options(int argc, const char* const* argv, ControllerOp
                "lock-step with the device, no clock: the same input gives the same bits");
   app.add_flag("--strict", options.real_time.strict,
                "refuse to start without every real-time right");
+  app.add_flag("--guard", options.guard,
+               "an unexpected system call of the servo thread switches the motors off and ends it");
   app.add_option("--cpu", options.real_time.cpu, "core of the servo thread (default: the last)")
       ->check(CLI::Range(0, 1023))
       ->type_name("N");

@@ -293,6 +293,19 @@ TEST_CASE("--explain tells what is really allocated, and keeps its calibration")
   CHECK(json["total_bytes"] > 0);
 }
 
+TEST_CASE("--guard finds nothing to say about the program's own loop") {
+  for (const bool lockstep : {false, true}) {
+    Pair pair;
+    const std::vector<std::string> by_lockstep{"--virtual", "--guard", "--seconds", "1"};
+    const std::vector<std::string> by_clock{"--guard", "--seconds", "1"};
+    pair.start("cut_cavity.toml", lockstep ? by_lockstep : by_clock,
+               lockstep ? std::vector<std::string>{"--lockstep"} : std::vector<std::string>{});
+    CHECK(pair.controller->wait() == 0);
+    CHECK(pair.report()["guarded"] == true);
+    CHECK(pair.report()["unexpected_call"] == "");
+  }
+}
+
 TEST_CASE("--probe shows each device, and its motors never push") {
   for (const std::string device : {"omni", "falcon", "woodenhaptics"}) {
     CAPTURE(device);
