@@ -173,6 +173,14 @@ expect 'and the known ones are listed' says 'controller emulator record recorder
 expect 'a program runs by its short name' kerf_gives 0 record plot --out "$lab/plot.svg"
 expect 'with its arguments' called "^record plot --out $lab/plot.svg"
 expect 'help is fine' kerf_gives 0 --help
+printf '#!/bin/sh\necho "found    omni at /dev/fw1"\necho "missing  /dev/fw1: Permission denied"\necho "         the cure"\n' \
+  >"$lab/look"
+chmod +x "$lab/look" && ln -sf ../look "$lab/bin/kerf-controller"
+expect 'the doctor tells what the controller finds' kerf_gives 0 doctor
+expect 'a device' says '^ok .* omni at /dev/fw1'
+expect 'and what is missing' says '^warn  /dev/fw1 .*Permission denied'
+expect 'with its cure' says '^ *the cure'
+expect 'an unknown option of the doctor is refused' kerf_gives 2 doctor --fast
 
 echo "check-kerf: $checks checks, $failures failed"
 ((failures == 0))

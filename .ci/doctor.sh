@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# `./kerf doctor`: what this machine offers to kerf, and what each lack costs. Installs and builds
-# nothing.
+# `./kerf doctor [--demo]`: what this machine offers to kerf, and what each lack costs. Installs and
+# builds nothing; takes less than a second, with --demo some.
 # Ends with 1 when the demo cannot run here, else with 0.
 set -euo pipefail
 root=$(cd "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/.." && pwd)
@@ -37,34 +37,25 @@ else
   row warn cores 1 'pictures delay the servo: expect overruns; --virtual needs no second core'
 fi
 
-if chrt -f 80 true 2>/dev/null; then
-  row ok SCHED_FIFO 'may be taken (priority 80)'
-else
-  row warn SCHED_FIFO 'no right' \
-    'other programs delay ticks by milliseconds; raise rtprio in /etc/security/limits.conf'
-fi
-
-memlock=$(ulimit -l)
-if [[ $memlock == unlimited ]] || ((EUID == 0)); then
-  row ok memlock unlimited
-elif ((memlock >= 1024 * 1024)); then
-  row ok memlock "$((memlock / 1024)) MiB"
-else
-  row warn memlock "$((memlock / 1024)) MiB" \
-    'a page fault may delay a tick; raise memlock in /etc/security/limits.conf'
-fi
-
 throttle=$(cat /proc/sys/kernel/sched_rt_runtime_us 2>/dev/null || echo unknown)
 case $throttle in
   -1 | unknown) row ok 'rt throttling' "${throttle/-1/off}" ;;
   *) row ok 'rt throttling' "real-time threads may use $((throttle / 10000)) % of a core" ;;
 esac
 
-nodes=(/dev/fw[0-9]*)
-if [[ -e ${nodes[0]} ]]; then
-  row ok FireWire "${nodes[*]}"
+# Devices, rights to them and real-time rights: the controller's own look around.
+if [[ -x $bin/kerf-controller ]]; then
+  while read -r kind text; do
+    case $kind in
+      found) row ok device "$text" ;;
+      missing)
+        read -r cure || cure=''
+        row warn "${text%%:*}" "${text#*: }" "$cure"
+        ;;
+    esac
+  done < <("$bin/kerf-controller" --probe 2>&1)
 else
-  row warn FireWire 'no /dev/fw*' 'no real Omni can be reached; the emulated one needs no bus'
+  row warn device 'not looked for' './kerf setup builds the program that looks, and asks for rights'
 fi
 
 if [[ -r /dev/fuse && -w /dev/fuse ]]; then
@@ -72,6 +63,17 @@ if [[ -r /dev/fuse && -w /dev/fuse ]]; then
 else
   row warn FUSE 'no access to /dev/fuse' 'device nodes cannot be emulated; the socket port can'
 fi
+
+if command -v qemu-system-x86_64 >/dev/null; then
+  row ok QEMU "$(qemu-system-x86_64 --version | sed -n '1s/.*version \([0-9.]*\).*/\1/p')"
+else
+  row warn QEMU none 'tests in a guest are skipped; apt-get install qemu-system-x86'
+fi
+
+libraries=$(dpkg-query -W -f '${Package} ${Version}\n' libusb-1.0-0-dev libhidapi-dev \
+  libseccomp-dev libinsighttoolkit5-dev 2>/dev/null | sed -E 's/(-dev)? ([0-9]+:)?([0-9.]+).*/ \3/' |
+  paste -sd ',' | sed 's/,/, /g') || true
+row ok libraries "${libraries:-unknown: this is not Debian}"
 
 if [[ -n ${DISPLAY:-}${WAYLAND_DISPLAY:-} ]]; then
   row ok display "${WAYLAND_DISPLAY:-$DISPLAY}"
@@ -95,14 +97,19 @@ else
   row fail disk "$free_mib MiB free" 'packages and build take 4 GiB: make room'
 fi
 
-# The proof: a tenth of a second of the demo, in lock-step so that no right is needed.
 if [[ ! -x $bin/kerf-controller ]]; then
   row warn demo 'not built' './kerf setup builds it'
   exit "$impossible"
 fi
+if [[ ${1:-} != --demo ]]; then
+  row ok demo 'built; ./kerf doctor --demo tries it and OpenGL (some seconds)'
+  exit "$impossible"
+fi
+
+# The proof: a second of the demo, in lock-step so that no right is needed.
 lab=$(mktemp -d)
 trap 'rm -rf "$lab"' EXIT
-if KERF_BIN=$bin "$root/kerf" demo --headless --virtual --seconds 0.1 --out "$lab/out" \
+if KERF_BIN=$bin "$root/kerf" demo --headless --virtual --seconds 1 --out "$lab/out" \
   >"$lab/said" 2>&1; then
   row ok demo 'runs'
 else

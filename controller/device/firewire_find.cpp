@@ -13,11 +13,10 @@
 #include <linux/firewire-cdev.h>
 
 #include "controller/device/firewire_file.hpp"
+#include "shared/wire/omni_constants.hpp"
 
 namespace kerf {
 namespace {
-
-constexpr std::uint32_t kVendor = 0x000B99;
 
 /// Identity of the node at `path`; nothing when it is no device of the vendor.
 std::optional<FirewireDevice> identify(const std::string& path, int* refused) {
@@ -34,7 +33,7 @@ std::optional<FirewireDevice> identify(const std::string& path, int* refused) {
   if (file.call(FW_CDEV_IOC_GET_INFO, &info) < 0 || info.rom_length < sizeof rom) {
     return std::nullopt;
   }
-  if (rom[3] >> 8 != kVendor) return std::nullopt;
+  if (rom[3] >> 8 != omni::kVendorOui) return std::nullopt;
   return FirewireDevice{path, rom[4], firewire_serial(rom[4])};
 }
 

@@ -56,7 +56,7 @@ std::optional<int> parse_options(int argc, const char* const* argv, ControllerOp
   std::string numeric;
   std::string device;
   std::vector<double> torque_scale;
-  app.add_option("--scene", options.scene, "scene file (TOML)")->required()->type_name("FILE");
+  app.add_option("--scene", options.scene, "scene file (TOML)")->type_name("FILE");
   auto* volume_option =
       app.add_option("--volume", volume,
                      "replace the first volume: NRRD, MetaImage, NIfTI, DICOM folder")
@@ -87,7 +87,7 @@ std::optional<int> parse_options(int argc, const char* const* argv, ControllerOp
       ->type_name("PORT");
   constexpr double kLongestS = 1e7;  // 115 days
   app.add_option("--seconds", options.seconds,
-                 "end after this much servo time, counted from arming")
+                 "end after this much servo time, counted from arming; of --probe, from its start")
       ->check(CLI::Range(0.01, kLongestS))
       ->type_name("S");
   auto* rate_option = app.add_option("--rate", rate_hz, "servo rate, instead of the scene's")
@@ -102,6 +102,8 @@ std::optional<int> parse_options(int argc, const char* const* argv, ControllerOp
                "lock-step with the device, no clock: the same input gives the same bits");
   app.add_flag("--strict", options.real_time.strict,
                "refuse to start without every real-time right");
+  app.add_flag("--guard", options.guard,
+               "an unexpected system call of the servo thread switches the motors off and ends it");
   app.add_option("--cpu", options.real_time.cpu, "core of the servo thread (default: the last)")
       ->check(CLI::Range(0, 1023))
       ->type_name("N");
@@ -121,6 +123,11 @@ std::optional<int> parse_options(int argc, const char* const* argv, ControllerOp
   app.add_flag("--calibrate", options.calibrate,
                "with --explain: measure anew what an operation costs on this machine")
       ->needs(explain_flag);
+  app.add_flag("--probe", options.probe,
+               "no scene needed: show what the device says, its motors off; without --port, what "
+               "is connected and what is missing")
+      ->excludes(check_flag)
+      ->excludes(explain_flag);
   app.add_flag("--progress", options.progress, "show a progress bar on a terminal");
   app.add_option("--report", options.report,
                  "write the figures of the run, or of --explain, as JSON")
@@ -155,11 +162,17 @@ std::optional<int> parse_options(int argc, const char* const* argv, ControllerOp
           "--torque-scale is below 0.001 N mm per count; leave it out to keep the motors off");
     }
   }
-  const bool runs = !options.check && !options.explain;
+  if (options.scene.empty() && !options.probe) {
+    return refuse("--scene is missing; try scenes/phantom.toml");
+  }
+  if (options.probe && !options.port.empty() && options.scene.empty() && !*device_option) {
+    return refuse("--probe: which device? give --device, or a --scene that says it");
+  }
+  const bool runs = !options.check && !options.explain && !options.probe;
   if (runs && options.port.empty()) {
     return refuse("--port is missing; give auto, or socket:PATH, where kerf-emulator listens");
   }
-  if (runs) {
+  if (!options.port.empty()) {
     try {
       check_port(options.port);
     } catch (const std::runtime_error& error) {

@@ -21,6 +21,8 @@ struct ControllerOptions {
   bool check = false;
   bool explain = false;
   bool calibrate = false;
+  bool probe = false;
+  bool guard = false;
   bool progress = false;
   RealTimeOptions real_time;
   std::string report;         ///< JSON, empty: none

@@ -27,6 +27,7 @@
 #include "controller/scene/scene_words.hpp"
 #include "controller/scene/volume_write.hpp"
 #include "controller/scene/work_budget.hpp"
+#include "controller/shell/call_guard.hpp"
 #include "controller/shell/explain_scene.hpp"
 #include "controller/shell/motor_guard.hpp"
 #include "controller/shell/progress_bar.hpp"
@@ -57,6 +58,8 @@ const char* text_of(EndReason end) {
       return "stopped";
     case EndReason::device_gone:
       return "the device went away";
+    case EndReason::unexpected_call:
+      return "the servo thread made an unexpected system call";
     case EndReason::never_armed:
       break;
   }
@@ -190,6 +193,7 @@ RunReport new_report(const ControllerOptions& options, const Scene& scene, std::
   report.rate_hz = scene.servo.rate_hz;
   report.virtual_time = options.virtual_time;
   report.config_hash = hash;
+  report.guarded = options.guard;
 #ifdef KERF_SANITIZED
   report.allocations_counted = false;
 #endif
@@ -219,7 +223,7 @@ struct Run {
 };
 
 /// The servo thread from its first to its last tick. Throws where --strict misses a right.
-EndReason serve(const Run& run, LoopSignals& signals) {
+EndReason serve(const Run& run, LoopSignals& signals, CallGuard* calls) {
   const ControllerOptions& options = run.options;
   if (!options.virtual_time) {
     const auto missing = become_real_time(options.real_time);
@@ -231,8 +235,21 @@ EndReason serve(const Run& run, LoopSignals& signals) {
   RealTimeTicks real_time(kNsPerSecond / run.rate_hz, options.real_time.spin_us * 1000);
   LockStepTicks lock_step(run.device);
   TickSource& clock = options.virtual_time ? static_cast<TickSource&>(lock_step) : real_time;
-  return run_servo(clock, run.device, run.servo, eyes, run.server, limits_of(options, run.rate_hz),
-                   signals, run.report.record);
+  if (calls != nullptr) calls->enter(options.port);
+  const EndReason end = run_servo(clock, run.device, run.servo, eyes, run.server,
+                                  limits_of(options, run.rate_hz), signals, run.report.record);
+  if (calls != nullptr) calls->leave();
+  return end;
+}
+
+/// The end as the guard knows it: what looked like a wish to stop may have been its own.
+EndReason end_by(const CallGuard& calls, EndReason end, RunReport& report) {
+  report.unexpected_call = calls.unexpected();
+  if (report.unexpected_call.empty()) return end;
+  spdlog::error("--guard: system call {} on the servo thread; motors off; keep it out of the loop",
+                report.unexpected_call);
+  report.record.add_fault(report.record.armed_at_tick + report.record.ticks, "unexpected_call");
+  return EndReason::unexpected_call;
 }
 
 /// Servo, watchdog and progress until the run is over; the motors are off afterwards.
@@ -242,12 +259,14 @@ EndReason run_threads(const Run& run) {
   std::atomic<bool> ended{false};
   EndReason end = EndReason::stopped;
   std::exception_ptr failure;
+  std::optional<CallGuard> calls;
   {
     MotorGuard guard(run.device);
+    if (run.options.guard) calls.emplace(run.device, run.stop);
     const std::jthread servo_thread([&] {
       guard.guard_stack();
       try {
-        end = serve(run, signals);
+        end = serve(run, signals, calls ? &*calls : nullptr);
       } catch (...) {
         failure = std::current_exception();
       }
@@ -261,7 +280,7 @@ EndReason run_threads(const Run& run) {
   }
   run.report.watchdog_trips = watchdog.trips();
   if (failure) std::rethrow_exception(failure);
-  return end;
+  return calls ? end_by(*calls, end, run.report) : end;
 }
 
 }  // namespace

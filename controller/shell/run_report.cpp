@@ -70,6 +70,8 @@ std::string report_json(const RunReport& report) {
       {"allocations_counted", report.allocations_counted},
       {"minor_faults", r.faults_of_pages.minor},
       {"major_faults", r.faults_of_pages.major},
+      {"guarded", report.guarded},
+      {"unexpected_call", report.unexpected_call},
       {"contact_ticks", r.contact_ticks},
       {"peak_force_n", r.peak_force_n},
       {"removed_mm3", report.removed_mm3},

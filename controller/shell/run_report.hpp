@@ -20,6 +20,8 @@ struct RunReport {
   int rate_hz = 1000;
   bool virtual_time = false;
   bool allocations_counted = true;
+  bool guarded = false;         ///< --guard
+  std::string unexpected_call;  ///< that it caught; empty: none
   std::vector<MissingRight> missing_rights;
   double removed_mm3 = 0;
   std::uint64_t lost_packets = 0;

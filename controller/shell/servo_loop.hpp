@@ -13,8 +13,14 @@
 
 namespace kerf {
 
-/// Why the loop ended.
-enum class EndReason : std::uint8_t { ticks_done, stopped, device_gone, never_armed };
+/// Why the loop ended; `unexpected_call` is what `--guard` makes of a stop of its own.
+enum class EndReason : std::uint8_t {
+  ticks_done,
+  stopped,
+  device_gone,
+  never_armed,
+  unexpected_call
+};
 
 struct LoopLimits {
   std::uint64_t armed_ticks = UINT64_MAX;   ///< servo steps after arming

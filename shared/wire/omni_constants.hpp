@@ -19,6 +19,8 @@ namespace kerf::omni {
 
 inline constexpr double kPi = 3.14159265358979323846;
 
+inline constexpr std::uint32_t kVendorOui = 0x000B99;  ///< SensAble, in the configuration ROM
+
 // Links.
 inline constexpr double kUpperLinkMm = 133.35;  ///< L1
 inline constexpr double kForearmMm = 133.35;    ///< L2

@@ -293,6 +293,63 @@ TEST_CASE("--explain tells what is really allocated, and keeps its calibration")
   CHECK(json["total_bytes"] > 0);
 }
 
+TEST_CASE("--guard finds nothing to say about the program's own loop") {
+  for (const bool lockstep : {false, true}) {
+    Pair pair;
+    const std::vector<std::string> by_lockstep{"--virtual", "--guard", "--seconds", "1"};
+    const std::vector<std::string> by_clock{"--guard", "--seconds", "1"};
+    pair.start("cut_cavity.toml", lockstep ? by_lockstep : by_clock,
+               lockstep ? std::vector<std::string>{"--lockstep"} : std::vector<std::string>{});
+    CHECK(pair.controller->wait() == 0);
+    CHECK(pair.report()["guarded"] == true);
+    CHECK(pair.report()["unexpected_call"] == "");
+  }
+}
+
+TEST_CASE("--probe shows each device, and its motors never push") {
+  for (const std::string device : {"omni", "falcon", "woodenhaptics"}) {
+    CAPTURE(device);
+    const TemporaryFolder folder;
+    const std::string socket = (folder / "port").string();
+    Process emulator(
+        {kBin + "/kerf-emulator", "--personality", device, "--socket", socket, "--hand",
+         kScenes + "/hands/touch.toml", "--report", (folder / "emulator.json").string()},
+        folder / "emulator.log");
+    Process probe({kBin + "/kerf-controller", "--probe", "--device", device, "--port",
+                   "socket:" + socket, "--torque-scale", "1,1,1", "--seconds", "2.5", "--report",
+                   (folder / "probe.json").string()},
+                  folder / "probe.log");
+    REQUIRE(probe.wait() == 0);
+    CHECK(emulator.wait() == 0);
+    CHECK(probe.output().find("tip ") != std::string::npos);
+    const auto seen = nlohmann::json::parse(text_of(folder / "probe.json"));
+    CHECK(seen["reports"] > 1000);
+    CHECK(seen["lost_packets"] == 0);
+    CHECK(seen["homed"] == true);
+    CHECK(seen["calibrated"] == true);
+    const auto told = nlohmann::json::parse(text_of(folder / "emulator.json"));
+    CHECK(told["commands_received"] > 100);
+    CHECK(told["peak_motor_force_n"] == 0);
+  }
+}
+
+TEST_CASE("--probe without a port says what is there, with one that is silent it fails") {
+  const TemporaryFolder folder;
+  Process around({kBin + "/kerf-controller", "--probe", "--report", (folder / "r.json").string()},
+                 folder / "log");
+  CHECK(around.wait() == 0);
+  CHECK(nlohmann::json::parse(text_of(folder / "r.json")).contains("missing"));
+  CHECK(refused({kBin + "/kerf-controller", "--probe", "--port", "fw"}).find("which device") !=
+        std::string::npos);
+  const std::string socket = (folder / "port").string();
+  const Process mute({kBin + "/kerf-emulator", "--socket", socket, "--stop-after", "0.001"},
+                     folder / "emulator.log");
+  Process probe({kBin + "/kerf-controller", "--probe", "--device", "omni", "--port",
+                 "socket:" + socket, "--seconds", "0.3"},
+                folder / "probe.log");
+  CHECK(probe.wait() <= 1);  // a first packet may have come before it fell silent
+}
+
 TEST_CASE("bad arguments are one line and exit 2") {
   const std::string controller = kBin + "/kerf-controller";
   const std::string scene = kScenes + "/phantom.toml";

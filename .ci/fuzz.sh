@@ -1,0 +1,41 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+# Every fuzzer of tests/fuzz for so many seconds, as many at once as there are cores. What they find
+# out about the code stays in build/asan/fuzz; an input that breaks something stays there too and is
+# named. Ends with 1 when there is one.
+#     .ci/fuzz.sh [SECONDS [NAME...]]      e.g. .ci/fuzz.sh 300 scene
+set -euo pipefail
+cd "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/.."
+seconds=${1:-20}
+[[ $seconds =~ ^[1-9][0-9]*$ ]] || {
+  echo "fuzz: $seconds: no number of seconds; take 20" >&2
+  exit 2
+}
+build=build/asan
+if [[ ! -e $build/build.ninja ]]; then cmake --preset asan --log-level=NOTICE; fi
+cmake --build "$build" --target fuzzers >/dev/null
+
+# fuzz NAME CORPUS...: one fuzzer; its last lines when it finds something, else its figures.
+fuzz() {
+  local name=$1 work=$build/fuzz/$1 status=0
+  mkdir -p "$work/inputs"
+  # Memory of a text's nesting and of error messages stays far below; so does the time of one input.
+  "$build/bin/fuzz_$name" -max_total_time="$seconds" -timeout=5 -rss_limit_mb=1024 \
+    -artifact_prefix="$work/" -print_final_stats=1 "$work/inputs" "${@:2}" \
+    >"$work/log" 2>&1 || status=$?
+  if ((status)); then
+    tail -n 30 "$work/log" >&2
+    echo "fuzz: $name: found an input (above): $work" >&2
+    return 1
+  fi
+  awk -v name="$name" '/stat::number_of_executed_units/ { runs = $2 } /DONE/ { split($0, a, "cov: ");
+    split(a[2], b, " ") } END { printf "fuzz: %s: %d inputs, %d places covered\n", name, runs, b[1] }' \
+    "$work/log"
+}
+export -f fuzz
+export build seconds
+export UBSAN_OPTIONS=halt_on_error=1:print_stacktrace=1
+
+while read -r name corpus; do
+  if (($# < 2)) || [[ " ${*:2} " == *" $name "* ]]; then echo "$name $corpus"; fi
+done <"$build/tests/fuzz/fuzzers" | nice xargs -P "$(nproc)" -L 1 bash -c 'fuzz "$@"' fuzz

@@ -1,0 +1,10 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "hil/hand_script_file.hpp"
+#include "hil/hil_error.hpp"
+#include "tests/fuzz/text_fuzz.hpp"
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  kerf::fuzz::must_read_or_explain<kerf::HilError>(
+      data, size, [](std::string_view text) { return kerf::parse_hand_script(text, "hand.toml"); });
+  return 0;
+}

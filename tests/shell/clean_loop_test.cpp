@@ -1,0 +1,200 @@
+// SPDX-License-Identifier: Apache-2.0
+// The real servo loop on the socket port, beside an emulator: no allocation, no page fault, no
+// system call beyond clock and port. Each proof also meets the fault that it must catch.
+#include <atomic>
+#include <cstddef>
+#include <exception>
+#include <memory>
+#include <new>
+#include <optional>
+#include <thread>
+
+#include <doctest/doctest.h>
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include "controller/device/omni_driver.hpp"
+#include "controller/device/socket_port.hpp"
+#include "controller/scene/compile.hpp"
+#include "controller/scene/scene_json.hpp"
+#include "controller/scene/scene_load.hpp"
+#include "controller/shell/call_guard.hpp"
+#include "controller/shell/motor_guard.hpp"
+#include "controller/shell/scene_segment.hpp"
+#include "controller/shell/servo_loop.hpp"
+#include "shared/segment/segment_plan.hpp"
+#include "tests/programs/process.hpp"
+#include "tests/shell/system_call_count.hpp"
+
+#ifndef KERF_SANITIZED  // sanitizers allocate and call for themselves
+
+namespace {
+
+using kerf::test::Process;
+using kerf::test::TemporaryFolder;
+
+enum class Seed { none, allocation, page, call };
+
+/// The socket port; while it takes a packet it does what a clean loop must not, `kSeeds` times.
+class SeededPort final : public kerf::PacketPort {
+ public:
+  static constexpr std::size_t kSeeds = 20;
+
+  SeededPort(kerf::PacketPort& port, Seed seed)
+      : port_(port), seed_(seed), sink_(open("/dev/null", O_WRONLY | O_CLOEXEC)) {}
+  ~SeededPort() override {
+    close(sink_);
+    if (pages_ != nullptr) munmap(const_cast<char*>(pages_), kSeeds * page_);
+  }
+
+  std::size_t receive(std::span<std::uint8_t> out) noexcept override {
+    if (++receives > kWarmUp && planted < kSeeds) plant();
+    return port_.receive(out);
+  }
+  bool send(std::span<const std::uint8_t> packet) noexcept override {
+    ++sends;
+    return port_.send(packet);
+  }
+  bool closed() const noexcept override { return port_.closed(); }
+  bool wait(int milliseconds) noexcept override { return port_.wait(milliseconds); }
+
+  /// After memory was locked: pages that are not there yet.
+  void take_pages() {
+    void* const at =
+        mmap(nullptr, kSeeds * page_, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+    REQUIRE(at != MAP_FAILED);
+    pages_ = static_cast<volatile char*>(at);
+    munlock(at, kSeeds * page_);
+    madvise(at, kSeeds * page_, MADV_DONTNEED);
+  }
+
+  std::uint64_t receives = 0, sends = 0;
+  std::size_t planted = 0;
+
+ private:
+  void plant() noexcept {
+    if (seed_ == Seed::allocation) {
+      ::operator delete(::operator new(1));  // unlike an expression of new, never left out
+    } else if (seed_ == Seed::page) {
+      pages_[planted * page_] = 1;
+    } else if (seed_ == Seed::call) {
+      static_cast<void>(!write(sink_, "", 1));
+    }
+    ++planted;
+  }
+
+  static constexpr std::uint64_t kWarmUp = 1000;  // well after arming
+  kerf::PacketPort& port_;
+  Seed seed_;
+  int sink_;
+  std::size_t page_ = static_cast<std::size_t>(sysconf(_SC_PAGESIZE));
+  volatile char* pages_ = nullptr;
+};
+
+struct Outcome {
+  kerf::EndReason end = kerf::EndReason::never_armed;
+  kerf::RunRecord record;
+  bool locked = false;
+  std::string guarded_call;
+  bool stopped = false;
+  std::uint64_t planted = 0;
+  std::string uncounted;  ///< why the calls were not
+  std::uint64_t calls = 0, expected_calls = 0;
+};
+
+/// Half a second of the loop as controller_run.cpp wires it, with `seed` planted.
+Outcome run_loop(Seed seed, bool guarded = false) {
+  const TemporaryFolder folder;
+  const std::string socket = (folder / "port").string();
+  const Process emulator({KERF_TEST_BIN "/kerf-emulator", "--socket", socket, "--hand",
+                          KERF_TEST_SCENES "/hands/touch.toml"},
+                         folder / "emulator.log");
+  kerf::Scene scene = kerf::load_scene(KERF_TEST_SCENES "/touch.toml",
+                                       {.phantom_size = kerf::VoxelGrid{64, 64, 41}});
+  const auto servo = kerf::plan_scene(scene);
+  const std::string json = kerf::canonical_json(scene);
+  auto segment = kerf::SegmentWriter::create(kerf::segment_spec(scene, json, 0));
+  kerf::SegmentServer server("clean-" + std::to_string(getpid()), segment, {.tools = 1});
+  servo->take(scene);
+  std::atomic<bool> stop{false};
+  kerf::SocketPort socket_port(socket, 5000, stop);
+  SeededPort port(socket_port, seed);
+  kerf::OmniDriver device(port);
+
+  Outcome outcome;
+  outcome.locked = kerf::lock_memory().empty();
+  port.take_pages();
+  kerf::LoopSignals signals{stop};
+  {
+    kerf::MotorGuard motors(device);
+    std::optional<kerf::CallGuard> calls;
+    if (guarded) calls.emplace(device, stop);
+    std::thread([&] {
+      motors.guard_stack();
+      static_cast<void>(kerf::become_real_time({}));
+      kerf::Publisher eyes(segment, *servo);
+      kerf::RealTimeTicks clock(1'000'000, 0);
+      const kerf::test::SystemCallCount counter;
+      outcome.uncounted = counter.why_not();
+      const std::uint64_t before = port.receives + port.sends;
+      if (calls)
+        calls->enter("socket:");
+      else
+        counter.start();
+      outcome.end = kerf::run_servo(clock, device, *servo, eyes, server, {.armed_ticks = 1500},
+                                    signals, outcome.record);
+      if (calls)
+        calls->leave();
+      else
+        outcome.calls = counter.stop();
+      // A sleep and a look at the port per tick; three looks at the page faults, and the stop.
+      const std::uint64_t ticks = signals.heartbeat;
+      outcome.expected_calls = ticks + port.receives + port.sends - before + 3 + 1;
+    }).join();
+    if (calls) outcome.guarded_call = calls->unexpected();
+  }
+  kerf::unlock_memory();
+  outcome.planted = port.planted;
+  outcome.stopped = stop;
+  return outcome;
+}
+
+}  // namespace
+
+TEST_CASE("the loop is clean: no allocation, no page fault, one call per sleep and packet") {
+  const Outcome clean = run_loop(Seed::none);
+  CHECK(clean.end == kerf::EndReason::ticks_done);
+  CHECK(clean.record.allocations == 0);
+  if (clean.locked) {
+    CHECK(clean.record.faults_of_pages.minor == 0);
+    CHECK(clean.record.faults_of_pages.major == 0);
+  } else {
+    MESSAGE("page faults: skipped, no right to lock memory");
+  }
+  if (clean.uncounted.empty()) {
+    CHECK(clean.calls == clean.expected_calls);
+  } else {
+    MESSAGE("system calls: skipped, " << clean.uncounted);
+  }
+}
+
+TEST_CASE("an allocation, a page fault and a system call in the loop are counted") {
+  CHECK(run_loop(Seed::allocation).record.allocations == SeededPort::kSeeds);
+  const Outcome paged = run_loop(Seed::page);
+  CHECK(paged.record.faults_of_pages.minor >= static_cast<std::int64_t>(SeededPort::kSeeds));
+  const Outcome called = run_loop(Seed::call);
+  if (called.uncounted.empty()) CHECK(called.calls == called.expected_calls + SeededPort::kSeeds);
+}
+
+TEST_CASE("the guard lets a clean loop pass, and ends one that makes another call") {
+  const Outcome clean = run_loop(Seed::none, true);
+  CHECK(clean.end == kerf::EndReason::ticks_done);
+  CHECK(clean.guarded_call == "");
+  const Outcome called = run_loop(Seed::call, true);
+  CHECK(called.guarded_call == "write");
+  CHECK(called.stopped);
+  CHECK(called.end == kerf::EndReason::stopped);
+  CHECK(called.planted <= 3);  // within its tick
+  CHECK(called.record.ticks < 1500);
+}
+#endif
