@@ -112,11 +112,18 @@ class Controller {
     writer_.begin_tick(++now_);
     TickRecord record{};
     record.tick = now_;
+    record.start_ns = now_ns();
+    record.orientation[3] = 1.0F;
     writer_.publish_state(record);
-    writer_.end_tick(0);
+    writer_.end_tick(record.start_ns);
   }
+  void say(Lifecycle lifecycle) { writer_.set_lifecycle(lifecycle); }
 
  private:
+  static std::uint64_t now_ns() {
+    return static_cast<std::uint64_t>(std::chrono::steady_clock::now().time_since_epoch().count());
+  }
+
   std::vector<Density> density_;
   SegmentWriter writer_;
   SegmentServer server_;
@@ -178,6 +185,7 @@ class User {
     return code_.get();
   }
   [[nodiscard]] const fs::path& out() const { return out_; }
+  [[nodiscard]] Controller& controller() { return controller_; }
   [[nodiscard]] nlohmann::json report() const {
     return nlohmann::json::parse(std::ifstream(report_));
   }
@@ -278,6 +286,49 @@ TEST_CASE("keys and mouse work the window") {
     CHECK(user.look() != first);
     CHECK(user.quit() == 0);
   }
+}
+
+TEST_CASE("the exit code of a window tells how the controller ended, and a video cut short") {
+  if (!have("Xvfb") || !have("xdotool")) return;
+  const Screen screen;
+  User user(screen.folder);
+  SUBCASE("cleanly") {
+    user.controller().say(Lifecycle::clean_end);
+    CHECK(user.quit() == 0);
+  }
+  SUBCASE("by a fault") {
+    user.controller().say(Lifecycle::fault);
+    CHECK(user.quit() == 1);
+  }
+  SUBCASE("a window that changes its size ends the video") {
+    act("key m");
+    act("search --name 'kerf: test' windowsize 400 300");
+    CHECK(user.quit() == 1);
+  }
+  SUBCASE("a video that the user ends is whole") {
+    act("key m sleep 0.3 key m");
+    act("search --name 'kerf: test' windowsize 400 300");
+    CHECK(user.quit() == 0);
+  }
+}
+
+TEST_CASE("before a hand that is still most frames of a window draw nothing") {
+  if (!have("Xvfb")) return;
+  const Screen screen;
+  Controller controller;
+  VisualizerOptions options;
+  options.name = "test";
+  options.size = {160, 120};
+  options.seconds = 2.0;
+  options.report = screen.folder / "report.json";
+  auto code = std::async(std::launch::async, [&] { return run_window(options); });
+  while (code.wait_for(std::chrono::milliseconds(1)) != std::future_status::ready) {
+    controller.tick();
+  }
+  CHECK(code.get() == 0);
+  const auto report = nlohmann::json::parse(std::ifstream(*options.report));
+  CHECK(report["frames"] > 0);
+  CHECK(report["rest_frames"] > report["frames"]);
 }
 
 TEST_CASE("a GL error in a window fails the test that makes it" * doctest::should_fail()) {
