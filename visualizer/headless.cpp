@@ -40,9 +40,7 @@ class FrameTaker {
       : picture_(picture), target_(size), report_(report) {}
 
   void draw(Session& session) {
-    OverlayFigures figures = overlay_figures(session);
-    if (!report_.wall_ms.empty()) figures.frame_rate_hz = kMsPerS / report_.wall_ms.back();
-    draw_measured(picture_, session, figures, target_, report_);
+    draw_measured(picture_, session, overlay_figures(session), target_, report_);
   }
   [[nodiscard]] const RenderTarget& target() const noexcept { return target_; }
   void write(const std::filesystem::path& file) const {

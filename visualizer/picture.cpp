@@ -318,9 +318,11 @@ OverlayFigures overlay_figures(const Session& session) {
   if (session.ended()) {
     figures.banner = session.ended_cleanly() ? "the controller has ended: this is the final state"
                                              : "the controller is gone: this is its last state";
+    figures.alarm = !session.ended_cleanly();
     figures.data_age_ms.reset();
   } else if (figures.data_age_ms && *figures.data_age_ms > kStaleMs) {
     figures.banner = "stale: no news from the servo";
+    figures.alarm = true;
   }
   return figures;
 }

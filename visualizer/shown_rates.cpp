@@ -12,10 +12,12 @@ void ShownRates::show(OverlayFigures& figures, Clock::time_point now) {
     tick_rate_hz_ = figures.tick_rate_hz;
     frame_rate_hz_ = frame_rate_hz();
     data_age_ms_ = figures.data_age_ms;
+    filmed_frames_ = figures.filmed_frames;
   }
   figures.tick_rate_hz = tick_rate_hz_;
   figures.frame_rate_hz = frame_rate_hz_;
   figures.data_age_ms = data_age_ms_;
+  figures.filmed_frames = filmed_frames_;
 }
 
 std::optional<double> ShownRates::frame_rate_hz() const {

@@ -9,9 +9,9 @@
 
 namespace kerf {
 
-/// The panel's figures that differ in every frame though nothing happens: rates and the data's age.
-/// Each stays for `kHold`, so that it can be read, and so that a still hand leaves frames in which
-/// nothing is to be drawn.
+/// The panel's figures that differ in every frame though nothing happens: rates, the data's age,
+/// frames filmed. Each stays for `kHold`, so that it can be read, and so that a still hand leaves
+/// frames in which nothing is to be drawn.
 class ShownRates {
  public:
   using Clock = std::chrono::steady_clock;
@@ -28,6 +28,7 @@ class ShownRates {
   std::deque<Clock::time_point> frames_;
   std::optional<Clock::time_point> shown_since_;
   std::optional<double> tick_rate_hz_, frame_rate_hz_, data_age_ms_;
+  std::optional<std::uint64_t> filmed_frames_;
 };
 
 }  // namespace kerf

@@ -58,6 +58,7 @@ void move_camera(OrbitCamera& camera, const WindowInput& input) {
 /// What keys change.
 struct Keys {
   bool help = false;
+  bool hidden = false;  ///< the panels
   bool plot = false;
   bool screenshot = false;
   bool mesh = false;
@@ -75,7 +76,11 @@ struct Keys {
       if (key == 'e') mesh = true;
       if (key == 'w') write = true;
       if (key == 'm') record = !record;
-      if (key == 'h') help = !help;
+      if (key == 'h') {  // panels, with the keys, none
+        const bool shown = !hidden;
+        hidden = shown && help;
+        help = shown && !help;
+      }
       if (key == 'p') plot = !plot;
       if (key == 'v') look.renderer = next_renderer(look.renderer);
       if (key == 'c') look.clip.on = !look.clip.on;
@@ -180,8 +185,10 @@ int run_window(const VisualizerOptions& options) {
       }
       if (std::exchange(keys.record, false)) toggle_recording(options, size, recording);
       OverlayFigures figures = overlay_figures(followed.session());
+      if (recording) figures.filmed_frames = recording->file().frames();
       rates.show(figures, begin);
       figures.help = keys.help;
+      figures.hidden = keys.hidden;
       if (keys.plot) figures.plot = plot.points();
       figures.controls = followed.picture().controls();
       if (!followed.picture().handle(input.pointer, figures, size)) {
