@@ -125,6 +125,16 @@ expect 'an arm on FireWire' kerf_gives 0 demo --seconds 1 --port fw
 expect 'is where the emulator mounts it' called '^emulator.*--front fuse --mount .*/bus '
 expect 'and the controller looks' called '^controller.*--port fw:.*/bus '
 expect 'and leaves nothing behind' nothing_survives
+expect 'two eyes, opacities and a video' \
+  kerf_gives 0 demo --seconds 1 --stereo --transfer t.toml --record v.y4m
+expect 'reach the visualizer' called '^visualizer.*--stereo --transfer t.toml --record v.y4m '
+expect 'with a display they' with DISPLAY=:99 kerf_gives 0 demo --seconds 1 --stereo \
+  --record v.y4m --out "$lab/out"
+expect 'reach the window, which keeps its files with the others' \
+  called '^visualizer --name [^ ]* --size [^ ]* --stereo --record v.y4m --out .*/out/\.partial-'
+expect 'and there is one video' test "$(grep -c -- --record "$lab/calls")" == 1
+expect 'a video does not mix with what a demo says' kerf_gives 2 demo --record -
+expect 'and a file is asked for' says 'name a file or a pipe'
 expect 'a demo keeps its results' kerf_gives 0 demo --seconds 1 --out "$lab/out" --virtual
 expect 'all of them' kept "$all"
 expect 'lock-step reaches the controller' called '^controller.*--virtual'

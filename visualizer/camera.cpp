@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <numeric>
 
 namespace kerf {
 
@@ -37,16 +36,23 @@ glm::dmat4 View::clip_from_eye() const {
   return m;
 }
 
-void OrbitCamera::frame(const BoxCorners& box, double aspect) {
-  centre_mm_ = std::accumulate(box.begin(), box.end(), glm::dvec3(0.0)) / 8.0;
-  radius_mm_ = glm::length(box[0] - centre_mm_);
+void OrbitCamera::frame(std::span<const glm::dvec3> corners, double aspect) {
+  glm::dvec3 low = corners.front();
+  glm::dvec3 high = low;
+  for (const glm::dvec3& corner : corners) {
+    low = glm::min(low, corner);
+    high = glm::max(high, corner);
+  }
+  centre_mm_ = 0.5 * (low + high);
   target_mm_ = centre_mm_;
+  radius_mm_ = 0.0;
   yaw_rad_ = kHomeYawRad;
   pitch_rad_ = kHomePitchRad;
   distance_mm_ = 0.0;
   const double half = std::tan(kHalfHeightRad) / kMargin;
   const glm::dmat3 axes = eye_axes();
-  for (const glm::dvec3& corner : box) {
+  for (const glm::dvec3& corner : corners) {
+    radius_mm_ = std::max(radius_mm_, glm::length(corner - centre_mm_));
     const glm::dvec3 at = axes * (corner - centre_mm_);
     const double needed =
         std::max(std::abs(at.x) / std::max(aspect, 1.0), std::abs(at.y) * std::min(aspect, 1.0));

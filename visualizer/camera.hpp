@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <span>
 
 #include <glm/glm.hpp>
 
@@ -40,24 +41,29 @@ struct View {
 /// Turns about a point. Yaw 0 looks from +z (the user); pitch is the height above the horizon.
 class OrbitCamera {
  public:
-  /// Shows what is in `box` from above and in front, in a picture of `aspect` (width over height).
-  void frame(const BoxCorners& box, double aspect);
+  /// Shows what is in one or more boxes, by all their corners, from above and in front, in a
+  /// picture of `aspect` (width over height).
+  void frame(std::span<const glm::dvec3> corners, double aspect);
 
   /// Drags of the pointer, in fractions of the picture's height.
   void orbit(double right, double up);
   void pan(double right, double up);
-  /// Steps of the wheel: positive is nearer, down to 1/50 and up to 20 times the box's radius.
+  /// Steps of the wheel: positive is nearer, down to 1/50 and up to 20 times the radius of what is
+  /// framed.
   void zoom(double steps);
 
-  /// The near and far planes hold all that is within `reach_mm` of the framed box's centre.
+  /// The near and far planes hold all that is within `reach_mm` of the centre of what is framed:
+  /// the middle of the box around it.
   [[nodiscard]] View view(double aspect, double reach_mm) const;
+  /// From that centre to the farthest corner.
+  [[nodiscard]] double radius_mm() const noexcept { return radius_mm_; }
   /// From the eye to the point that it turns about.
   [[nodiscard]] double distance_mm() const noexcept { return distance_mm_; }
 
  private:
   [[nodiscard]] glm::dmat3 eye_axes() const;  ///< rows: right, up, backward in world axes
 
-  glm::dvec3 centre_mm_{0, 0, 0};  ///< of the framed box
+  glm::dvec3 centre_mm_{0, 0, 0};  ///< of what is framed
   double radius_mm_ = 1.0;
   glm::dvec3 target_mm_{0, 0, 0};
   double distance_mm_ = 4.0;

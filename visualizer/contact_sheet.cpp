@@ -92,16 +92,16 @@ void write_contact_sheet(const std::filesystem::path& file, const SceneView& sce
                          std::span<const VolumeContent> contents, const std::optional<Hand>& hand) {
   constexpr int kMarginPx = 10;
   constexpr double kAspect = static_cast<double>(kTile.width) / kTile.height;
-  constexpr double kNearer = 1.5;  // a tooth does not fill its box
+  constexpr double kNearer = 1.5;  // one tooth does not fill its box
   constexpr double kLower = 0.07;  // of the tile's height: as seen from above it stands high
-  constexpr double kReach = 3.0;   // half diagonals of the main volume: neighbours and tool
+  constexpr double kReach = 3.0;   // radii of what is framed: room for the tool
   const BoxCorners box = scene.main_volume().corners();
   const double size_mm = 0.5 * glm::length(box.back() - box.front());
   OrbitCamera camera;
-  camera.frame(box, kAspect);
-  camera.zoom(kNearer);
+  camera.frame(scene.corners(), kAspect);
+  if (scene.volumes.size() == 1) camera.zoom(kNearer);
   camera.pan(0.0, -kLower);
-  const View view = camera.view(kAspect, kReach * size_mm);
+  const View view = camera.view(kAspect, kReach * camera.radius_mm());
   const RenderTarget target({kFiner * kTile.width, kFiner * kTile.height});
   HandPainter hand_painter(scene, size_mm);
 

@@ -1,10 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <optional>
 
 namespace kerf {
+
+/// Ticks of `tick_ns` between pictures that are spread over `seconds`; without them, or where there
+/// is to be no picture, a second. At least 1.
+[[nodiscard]] constexpr std::uint64_t ticks_between(std::uint32_t frames,
+                                                    std::optional<double> seconds,
+                                                    std::uint32_t tick_ns) noexcept {
+  constexpr double kNsPerS = 1e9;
+  const double apart_s = seconds && frames > 0 ? *seconds / frames : 1.0;
+  return std::max(std::uint64_t{1}, static_cast<std::uint64_t>(apart_s * kNsPerS / tick_ns));
+}
 
 /// Which headless pictures are to be taken: picture i = 1, 2, ... once `i * every` ticks have
 /// passed since arming. A late one is taken at the next chance, so none is left out.

@@ -27,13 +27,6 @@ namespace {
 constexpr auto kIdle = std::chrono::milliseconds(2);  // two ticks: a picture is at most that late
 constexpr double kMsPerS = 1e3;
 
-std::uint64_t ticks_between(const VisualizerOptions& options, std::uint32_t tick_ns) {
-  if (options.every_ticks) return *options.every_ticks;
-  constexpr double kNsPerS = 1e9;
-  const double seconds = options.seconds ? *options.seconds / options.frames : 1.0;
-  return std::max(std::uint64_t{1}, static_cast<std::uint64_t>(seconds * kNsPerS / tick_ns));
-}
-
 std::filesystem::path frame_file(const std::filesystem::path& folder, std::uint32_t number) {
   std::array<char, 32> name{};
   std::snprintf(name.data(), name.size(), "frame-%04u.png", number);
@@ -47,9 +40,7 @@ class FrameTaker {
       : picture_(picture), target_(size), report_(report) {}
 
   void draw(Session& session) {
-    OverlayFigures figures = overlay_figures(session);
-    if (!report_.wall_ms.empty()) figures.frame_rate_hz = kMsPerS / report_.wall_ms.back();
-    draw_measured(picture_, session, figures, target_, report_);
+    draw_measured(picture_, session, overlay_figures(session), target_, report_);
   }
   [[nodiscard]] const RenderTarget& target() const noexcept { return target_; }
   void write(const std::filesystem::path& file) const {
@@ -81,7 +72,9 @@ int run_headless(const VisualizerOptions& options) {
   place_process(options.cpus);
   if (options.frames > 0) make_folder(options.out);
   if (options.mesh) check_export(*options.mesh);
-  if (options.sheet) check_new_file(*options.sheet);
+  for (const auto& file : {options.sheet, options.report}) {
+    if (file) check_new_file(*file);
+  }
   const auto context = make_headless_context();
   const GlDriver driver = query_gl_driver();
   FrameReport report{.renderer = options.renderer,
@@ -108,7 +101,8 @@ int run_headless(const VisualizerOptions& options) {
 
   std::optional<Recording> recording;
   if (options.record) recording.emplace(*options.record, options.size, options.video_hz);
-  FrameSchedule schedule(options.frames, ticks_between(options, session.tick_ns()));
+  FrameSchedule schedule(options.frames, options.every_ticks.value_or(ticks_between(
+                                             options.frames, options.seconds, session.tick_ns())));
   bool over = false;
   while (!over && (recording || !schedule.complete())) {
     over = session.ended() || stop_requested() ||
@@ -137,16 +131,13 @@ int run_headless(const VisualizerOptions& options) {
   if (options.sheet) {
     std::optional<Hand> hand;
     if (session.latest()) hand = hand_of(*session.latest());
-    write_contact_sheet(*options.sheet, session.scene(), session.contents(), hand);
+    write_contact_sheet(*options.sheet, picture.shown_scene(), session.contents(), hand);
   }
   report.bricks_uploaded = picture.bricks_uploaded();
   report.clean_end = session.ended_cleanly();
   if (options.report) report.write(*options.report);
   tell(options, schedule, recording, report);
-  const bool unfilmed = options.record && !recording;
-  const bool lost = session.ended() && !session.ended_cleanly();
-  if (lost) std::fprintf(stderr, "kerf-visualizer: the controller went away without a clean end\n");
-  return lost || unfilmed ? 1 : 0;
+  return exit_code(session, options.record && !recording);
 }
 
 }  // namespace kerf

@@ -24,7 +24,7 @@ inline constexpr auto kKeys = std::to_array<KeyHelp>({
     {"m", "movie: begin, end"},
     {"w", "write the opacities"},
     {"e", "export the surface"},
-    {"h", "these keys"},
+    {"h", "these keys; again: no panels; again: panels"},
     {"q", "quit"},
 });
 

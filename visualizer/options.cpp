@@ -41,11 +41,11 @@ std::string footer() {
 
 std::string limits(double lowest, double highest) {
   std::ostringstream text;
-  text << "[" << lowest << " - " << highest << "]";
+  text << std::setprecision(15) << "[" << lowest << " - " << highest << "]";
   return text.str();
 }
 
-/// CLI::Range takes "nan" for a number in any range.
+/// CLI::Range takes "nan" for a number in any range, and names the type once more.
 CLI::Validator range(double lowest, double highest) {
   const auto check = [=](const std::string& text) {
     double value = 0.0;
@@ -90,27 +90,32 @@ std::optional<VisualizerOptions> parse_options(int argc, const char* const* argv
   app.add_option("--name", options.name, "the controller's name")->capture_default_str();
   app.add_option("--renderer", options.renderer, "how volumes are drawn: " + known_renderers())
       ->capture_default_str();
-  app.add_option("--size", size, "width and height in pixels")->capture_default_str();
+  app.add_option("--size", size, "width and height in pixels")
+      ->type_name("WxH")
+      ->capture_default_str();
   app.add_option(
          "--transfer", options.transfer,
          "opacity of each material, TOML, for blend, slices and cast-blend; in the window w "
          "writes it")
       ->type_name("FILE");
-  app.add_flag("--stereo", options.stereo.on, "two eyes side by side, each in half the width");
+  app.add_flag("--stereo", options.stereo.on, "two eyes side by side, each in half the width")
+      ->disable_flag_override();
   app.add_option("--eyes", options.stereo.eyes_mm,
                  "stereo: mm between the eyes; negative: crossed (default: 1/30 of --convergence)")
       ->check(range(-1e3, 1e3));
   app.add_option("--convergence", options.stereo.convergence_mm,
                  "stereo: mm to what lies in the screen (default: to where the camera looks)")
       ->check(range(1.0, 1e6));
-  auto* headless = app.add_flag("--headless", options.headless, "no window: pictures into --out");
+  auto* headless = app.add_flag("--headless", options.headless, "no window: pictures into --out")
+                       ->disable_flag_override();
   app.add_option("--frames", options.frames, "headless: number of pictures")
-      ->check(CLI::Range(1, 9999))
+      ->check(range(1, 9999))
       ->capture_default_str();
   app.add_option("--every-ticks", options.every_ticks,
                  "headless: servo ticks between pictures (default: one second)")
-      ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1} << 40));
+      ->check(range(1.0, 0x1p40));
   app.add_option("--out", options.out, "folder for pictures and screenshots")
+      ->type_name("DIR")
       ->capture_default_str();
   app.add_option("--seconds", options.seconds, "end after this time")->check(range(0.0, 1e6));
   app.add_option("--wait", options.wait_s, "seconds to wait for the controller")
@@ -118,7 +123,7 @@ std::optional<VisualizerOptions> parse_options(int argc, const char* const* argv
       ->capture_default_str();
   app.add_option("--cpu", options.cpus, "cores to run on, e.g. 0,1 (default: all but the last)")
       ->delimiter(',')
-      ->check(CLI::Range(0, 1023));
+      ->check(range(0, 1023));
   app.add_option("--export", options.mesh,
                  "surface of all solid volumes as a closed mesh in mm, FILE.stl or FILE.ply (with "
                  "colours): headless at the end, in the window with e")
@@ -132,12 +137,15 @@ std::optional<VisualizerOptions> parse_options(int argc, const char* const* argv
                                 "headless without pictures unless --frames")
                      ->type_name("FILE");
   app.add_option("--fps", options.video_hz, "record: frames per second of servo time")
-      ->check(CLI::Range(1, 240))
+      ->check(range(1, 240))
       ->capture_default_str();
-  app.add_option("--report", options.report, "write times and counts to this JSON file");
+  app.add_option("--report", options.report, "write times and counts to this JSON file")
+      ->type_name("FILE");
   auto* bench = app.add_flag("--bench", options.bench,
-                             "time every renderer, without a controller (512x512 unless --size)");
+                             "time every renderer, without a controller (512x512 unless --size)")
+                    ->disable_flag_override();
   app.add_option("--page", options.page, "bench: write the table to this Markdown file")
+      ->type_name("FILE")
       ->needs(bench);
   try {
     app.parse(argc, argv);

@@ -101,6 +101,7 @@ void panel(const OverlayFigures& figures) {
     if (figures.tick_rate_hz) row("servo", "%.0f Hz", *figures.tick_rate_hz);
     if (figures.frame_rate_hz) row("picture", "%.0f /s", *figures.frame_rate_hz);
     if (figures.data_age_ms) row("data age", "%.1f ms", *figures.data_age_ms);
+    if (figures.filmed_frames) row("filmed", std::to_string(*figures.filmed_frames) + " frames");
     ImGui::EndTable();
   }
   if (!figures.plot.empty()) {
@@ -112,9 +113,11 @@ void panel(const OverlayFigures& figures) {
   ImGui::End();
 }
 
-void banner(const std::string& text, ImVec2 size) {
+void banner(const std::string& text, bool alarm, ImVec2 size) {
+  const ImVec4 kAlarm{0.45F, 0.20F, 0.0F, 0.92F};
+  const ImVec4 kNews{0.05F, 0.20F, 0.32F, 0.92F};
   ImGui::SetNextWindowPos(ImVec2(0.5F * size.x, size.y - 14.0F), 0, ImVec2(0.5F, 1.0F));
-  ImGui::PushStyleColor(ImGuiCol_WindowBg, ImVec4(0.45F, 0.20F, 0.0F, 0.92F));
+  ImGui::PushStyleColor(ImGuiCol_WindowBg, alarm ? kAlarm : kNews);
   ImGui::Begin("banner", nullptr, kStill);
   ImGui::TextColored(kValue, "%s", text.c_str());
   ImGui::End();
@@ -160,6 +163,9 @@ Overlay::Overlay() {
   style.CellPadding = ImVec2(4.0F, 1.5F);
   style.Colors[ImGuiCol_WindowBg] = ImVec4(0.04F, 0.05F, 0.06F, 0.72F);
   style.Colors[ImGuiCol_FrameBg] = ImVec4(1.0F, 1.0F, 1.0F, 0.12F);
+  // Dark enough for the digits that stand on it.
+  style.Colors[ImGuiCol_SliderGrab] = ImVec4(0.12F, 0.34F, 0.50F, 1.0F);
+  style.Colors[ImGuiCol_SliderGrabActive] = ImVec4(0.16F, 0.42F, 0.60F, 1.0F);
   if (!ImGui_ImplOpenGL3_Init("#version 450 core")) {
     ImGui::DestroyContext();
     throw VisualizerError("overlay: Dear ImGui finds no OpenGL functions; install libgl1");
@@ -185,14 +191,14 @@ void Overlay::lay_out(OverlayFigures& figures, PictureSize size) {
   const ImVec2 all{static_cast<float>(size.width), static_cast<float>(size.height)};
   ImGui::GetIO().DisplaySize = all;
   ImGui::NewFrame();
-  panel(figures);
-  if (figures.controls) {
+  if (!figures.hidden) panel(figures);
+  if (figures.controls && !figures.hidden) {
     ImGui::SetNextWindowPos(ImVec2(12.0F, all.y - 12.0F), 0, ImVec2(0.0F, 1.0F));
     ImGui::Begin("look", nullptr, kTouched);
     look_controls(*figures.controls);
     ImGui::End();
   }
-  if (!figures.banner.empty()) banner(figures.banner, all);
+  if (!figures.banner.empty()) banner(figures.banner, figures.alarm, all);
   if (figures.help) key_help(all);
   ImGui::Render();
 }
@@ -209,13 +215,14 @@ void Overlay::look_controls(LookControls& controls) {
     }
     ImGui::EndCombo();
   }
-  float iso = dragged_iso_.value_or(static_cast<float>(look.iso.value_or(controls.own_iso)));
-  if (ImGui::SliderFloat("iso", &iso, 0.02F, 0.98F, "%.2f", kDragOnly)) dragged_iso_ = iso;
-  if (ImGui::IsItemDeactivated() && dragged_iso_) {
-    look.iso = *dragged_iso_;
-    dragged_iso_.reset();
-  }
-  if (!controls.opacities.empty()) {
+  if (controls.opacities.empty()) {  // what is translucent has no iso-surface
+    float iso = dragged_iso_.value_or(static_cast<float>(look.iso.value_or(controls.own_iso)));
+    if (ImGui::SliderFloat("iso", &iso, 0.02F, 0.98F, "%.2f", kDragOnly)) dragged_iso_ = iso;
+    if (ImGui::IsItemDeactivated() && dragged_iso_) {
+      look.iso = *dragged_iso_;
+      dragged_iso_.reset();
+    }
+  } else {
     ImGui::TextColored(kLabel, "opacity of a voxel");
     ImGui::SameLine();
     controls.write = ImGui::SmallButton("write");

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -32,10 +33,13 @@ struct OverlayFigures {
   std::optional<double> tick_rate_hz;
   std::optional<double> frame_rate_hz;
   std::optional<double> data_age_ms;
-  std::string banner;                    ///< shown large; empty: nothing is wrong
-  bool help = false;                     ///< shows the keys
-  std::vector<ForcePlot::Point> plot;    ///< force and depth over time; empty: no plot
-  std::optional<LookControls> controls;  ///< in a window
+  std::optional<std::uint64_t> filmed_frames;  ///< written so far; none: no video
+  std::string banner;                          ///< shown large; empty: there is nothing to say
+  bool alarm = false;                          ///< it says that something is wrong
+  bool help = false;                           ///< shows the keys
+  bool hidden = false;                         ///< shows nothing but the banner: for films
+  std::vector<ForcePlot::Point> plot;          ///< force and depth over time; empty: no plot
+  std::optional<LookControls> controls;        ///< in a window
 
   /// As far as the panel shows them: two equal ones look alike.
   [[nodiscard]] OverlayFigures rounded() const;

@@ -15,7 +15,8 @@ namespace kerf {
 namespace {
 
 constexpr double kStaleMs = 100.0;  // a servo that is alive beats each tick
-constexpr double kToolRoom = 1.5;   // radii around the volumes in which the tool is never clipped
+constexpr double kToolRoom = 1.5;   // sizes around the volumes in which the tool is never clipped
+
 glm::dvec3 vec3(const float (&v)[3]) {
   return {v[0], v[1], v[2]};
 }
@@ -40,19 +41,19 @@ Picture::Picture(const Session& session, const Look& look, double aspect)
       renderer_(renderer_for(session, look)),
       stale_(scene_.volumes.size()),
       hand_painter_(scene_, size_of(scene_.main_volume())) {
-  const BoxCorners box = scene_.main_volume().corners();
-  centre_mm_ = 0.5 * (box.front() + box.back());
-  radius_mm_ = size_of(scene_.main_volume());
-  low_mm_ = high_mm_ = centre_mm_;
-  for (const VolumeView& volume : scene_.volumes) {
-    for (const glm::dvec3& corner : volume.corners()) {
-      low_mm_ = glm::min(low_mm_, corner);
-      high_mm_ = glm::max(high_mm_, corner);
-      reach_mm_ = std::max(reach_mm_, glm::length(corner - centre_mm_));
-    }
+  const std::vector<glm::dvec3> corners = scene_.corners();
+  low_mm_ = high_mm_ = corners.front();
+  for (const glm::dvec3& corner : corners) {
+    low_mm_ = glm::min(low_mm_, corner);
+    high_mm_ = glm::max(high_mm_, corner);
   }
+  size_mm_ = size_of(scene_.main_volume());
   for (const VolumeView& volume : scene_.volumes) bricks_uploaded_ += volume.bricks.count();
   reset_camera(aspect);
+}
+
+SceneView Picture::shown_scene() const {
+  return scene_in(look_);
 }
 
 SceneView Picture::scene_in(const Look& look) const {
@@ -108,7 +109,7 @@ glm::dvec4 Picture::shown_half() const {
 }
 
 void Picture::reset_camera(double aspect) {
-  camera_.frame(scene_.main_volume().corners(), look_.stereo.on ? 0.5 * aspect : aspect);
+  camera_.frame(scene_.corners(), look_.stereo.on ? 0.5 * aspect : aspect);
 }
 
 void Picture::update(const Session& session) {
@@ -121,7 +122,7 @@ void Picture::update(const Session& session) {
 }
 
 std::vector<View> Picture::views(PictureSize size) const {
-  const double reach_mm = reach_mm_ + kToolRoom * radius_mm_;
+  const double reach_mm = camera_.radius_mm() + kToolRoom * size_mm_;
   const Stereo& stereo = look_.stereo;
   const int width = eye_size(size).width;
   View view = camera_.view(static_cast<double>(width) / size.height, reach_mm);
@@ -156,7 +157,7 @@ Redrawn Picture::draw(const Session& session, const OverlayFigures& figures,
     stale.push_back(this->stale(eyes_[eye], {views[eye], moving, hand}, session));
   }
   const OverlayFigures panel = figures.rounded();
-  const bool same_target = target.framebuffer() == shown_in_;
+  const bool same_target = target.framebuffer() == shown_in_ && target.size() == shown_size_;
   for (StaleVolume& volume : stale_) volume.clear();
   const bool rests =
       std::all_of(stale.begin(), stale.end(), [](const Stale& one) { return one.stage.empty(); });
@@ -182,6 +183,7 @@ Redrawn Picture::draw(const Session& session, const OverlayFigures& figures,
   glDisable(GL_SCISSOR_TEST);
   shown_figures_ = panel;
   shown_in_ = target.framebuffer();
+  shown_size_ = target.size();
   shown_panels_ = panels;
   return {true, redrawn / (static_cast<double>(eyes_.size()) * size.width * size.height)};
 }
@@ -316,9 +318,11 @@ OverlayFigures overlay_figures(const Session& session) {
   if (session.ended()) {
     figures.banner = session.ended_cleanly() ? "the controller has ended: this is the final state"
                                              : "the controller is gone: this is its last state";
+    figures.alarm = !session.ended_cleanly();
     figures.data_age_ms.reset();
   } else if (figures.data_age_ms && *figures.data_age_ms > kStaleMs) {
     figures.banner = "stale: no news from the servo";
+    figures.alarm = true;
   }
   return figures;
 }

@@ -47,6 +47,8 @@ class Picture {
   /// only the materials. Throws VisualizerError where the renderer cannot show them; the look stays
   /// then.
   void set_look(const Session& session, const Look& look);
+  /// The scene with the iso values and opacities of the look.
+  [[nodiscard]] SceneView shown_scene() const;
   /// Of all materials, their own or chosen.
   [[nodiscard]] Opacities opacities() const;
   /// For `OverlayFigures::controls`.
@@ -59,7 +61,7 @@ class Picture {
   [[nodiscard]] std::uint64_t bricks_uploaded() const noexcept { return bricks_uploaded_; }
 
  private:
-  /// The scene with the iso values and opacities of `look`.
+  /// The same of another look.
   [[nodiscard]] SceneView scene_in(const Look& look) const;
   [[nodiscard]] std::unique_ptr<Renderer> renderer_for(const Session& session, const Look& look);
   /// `View::shown` of the clip plane.
@@ -71,10 +73,8 @@ class Picture {
   Look look_;
   std::unique_ptr<Renderer> renderer_;
   OrbitCamera camera_;
-  double radius_mm_ = 1.0;  ///< of the main volume's box: the size of what is looked at
-  glm::dvec3 centre_mm_{0, 0, 0};
   glm::dvec3 low_mm_{0, 0, 0}, high_mm_{0, 0, 0};  ///< the box of all volumes
-  double reach_mm_ = 1.0;  ///< from that centre to the farthest corner of any volume
+  double size_mm_ = 1.0;                           ///< half the diagonal of the main volume's box
   GlProgram backdrop_{"screen.vert", "backdrop.frag"};
   GlProgram smooth_{"screen.vert", "smooth.frag"};
   /// The picture as it grows, kept from frame to frame.
@@ -115,7 +115,8 @@ class Picture {
 
   std::vector<Eye> eyes_;  ///< empty: draw everything
   OverlayFigures shown_figures_;
-  GLuint shown_in_ = 0;             ///< framebuffer
+  GLuint shown_in_ = 0;             ///< framebuffer, whose name may be given to a later one
+  PictureSize shown_size_;          ///< of all of it
   PixelRect shown_panels_;          ///< of each eye
   std::vector<StaleVolume> stale_;  ///< by volume, since the last `draw`
   GlVertexArray no_vertices_ = GlVertexArray::create();

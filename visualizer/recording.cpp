@@ -32,13 +32,15 @@ void Recording::add(const RenderTarget& target, double servo_s) {
   while (due(servo_s)) file_.write_frame(yuv_);
 }
 
-void film(std::optional<Recording>& recording, const RenderTarget& target, double servo_s) {
-  if (!recording) return;
+bool film(std::optional<Recording>& recording, const RenderTarget& target, double servo_s) {
+  if (!recording) return true;
   try {
     recording->add(target, servo_s);
+    return true;
   } catch (const FileError& problem) {
     std::fprintf(stderr, "kerf-visualizer: %s\n", problem.what());
     recording.reset();
+    return false;
   }
 }
 

@@ -37,7 +37,7 @@ class Recording {
 };
 
 /// Films `target`, where there is a recording. One that fails says so in one line on stderr and
-/// ends; the picture goes on.
-void film(std::optional<Recording>& recording, const RenderTarget& target, double servo_s);
+/// ends, and false is returned; the picture goes on.
+bool film(std::optional<Recording>& recording, const RenderTarget& target, double servo_s);
 
 }  // namespace kerf

@@ -5,14 +5,19 @@
 
 namespace kerf {
 
+class Session;
+
+/// 0 where the controller still runs or ended cleanly, 1 where it went away without a word, which
+/// is told on stderr, or where a video is cut short.
+[[nodiscard]] int exit_code(const Session& session, bool video_is_cut);
+
 /// Follows one run of a controller and writes frame-0001.png and so on into `options.out`; the last
-/// one shows the final state. A video goes on to the end of the run. Returns the exit code: 0 when
-/// the controller ended cleanly, when the pictures are complete or when the time is over, 1 when it
-/// went away without a word or when a video could not be written to its end. Throws VisualizerError
-/// or SegmentError for bad input or set-up.
+/// one shows the final state. A video goes on to the end of the run. Returns the `exit_code`;
+/// throws VisualizerError, FileError or SegmentError for bad input or set-up.
 [[nodiscard]] int run_headless(const VisualizerOptions& options);
 
-/// The window; follows restarted controllers too. Returns 0 when the user closes it.
+/// The window; follows restarted controllers too. Returns the `exit_code` when the user closes it
+/// or the time is over; the video of a window that changes its size is cut short. Throws as above.
 [[nodiscard]] int run_window(const VisualizerOptions& options);
 
 /// Times every renderer on a volume of its own, without a controller: a table on stdout, all

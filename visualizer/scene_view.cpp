@@ -80,6 +80,15 @@ BoxCorners VolumeView::corners() const {
   return corners;
 }
 
+std::vector<glm::dvec3> SceneView::corners() const {
+  std::vector<glm::dvec3> all;
+  for (const VolumeView& volume : volumes) {
+    const BoxCorners box = volume.corners();
+    all.insert(all.end(), box.begin(), box.end());
+  }
+  return all;
+}
+
 const VolumeView& SceneView::main_volume() const {
   const auto solid = std::find_if(volumes.begin(), volumes.end(),
                                   [](const VolumeView& volume) { return volume.solid; });

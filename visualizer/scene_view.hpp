@@ -49,6 +49,8 @@ struct SceneView {
   std::vector<ToolView> tools;
   std::vector<MaterialView> materials;
 
+  /// Of the boxes of all volumes.
+  [[nodiscard]] std::vector<glm::dvec3> corners() const;
   /// The first solid volume, else the first one.
   [[nodiscard]] const VolumeView& main_volume() const;
 };

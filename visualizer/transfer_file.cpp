@@ -76,6 +76,9 @@ Opacities parse_transfer(std::string_view text, const std::string& name) {
 Opacities read_transfer(const std::filesystem::path& file) {
   constexpr std::uintmax_t kLargest = 1 << 16;
   std::error_code fault;
+  if (std::filesystem::is_directory(file, fault)) {
+    throw VisualizerError(file.string() + ": is a folder; name a file in it");
+  }
   if (!std::filesystem::is_regular_file(file, fault)) {
     throw VisualizerError(file.string() +
                           ": no such file; name a transfer function, as w in the window writes it");

@@ -1,30 +1,29 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
-#include <array>
 #include <chrono>
 #include <cstdio>
-#include <deque>
 #include <limits>
 #include <optional>
-#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <thread>
 #include <utility>
 #include <vector>
 
+#include "shared/posix/new_file.hpp"
 #include "visualizer/cpu_placement.hpp"
 #include "visualizer/error.hpp"
-#include "visualizer/file_out.hpp"
 #include "visualizer/force_plot.hpp"
 #include "visualizer/frame_report.hpp"
 #include "visualizer/gl/window.hpp"
 #include "visualizer/picture.hpp"
 #include "visualizer/recording.hpp"
 #include "visualizer/run.hpp"
+#include "visualizer/shown_rates.hpp"
 #include "visualizer/stop_signal.hpp"
 #include "visualizer/surface/export_surface.hpp"
 #include "visualizer/transfer_file.hpp"
+#include "visualizer/user_files.hpp"
 
 namespace kerf {
 
@@ -34,82 +33,6 @@ using Clock = std::chrono::steady_clock;
 
 constexpr auto kFrame = std::chrono::microseconds(16'667);  // no faster than screens refresh
 constexpr auto kReattachPause = std::chrono::milliseconds(500);
-constexpr auto kRateSpan = std::chrono::seconds(1);
-
-/// Frames begun in the last second.
-class FrameRate {
- public:
-  void count(Clock::time_point now) {
-    frames_.push_back(now);
-    while (now - frames_.front() > kRateSpan) frames_.pop_front();
-  }
-  [[nodiscard]] std::optional<double> hz() const {
-    if (frames_.size() < 2) return std::nullopt;
-    const std::chrono::duration<double> span = frames_.back() - frames_.front();
-    return static_cast<double>(frames_.size() - 1) / span.count();
-  }
-
- private:
-  std::deque<Clock::time_point> frames_;
-};
-
-/// kerf-0001 and so on in `folder`, which is made where it is missing.
-std::filesystem::path unused_file(const std::filesystem::path& folder, const char* ending) {
-  make_folder(folder);
-  for (int i = 1;; ++i) {
-    std::array<char, 32> name{};
-    std::snprintf(name.data(), name.size(), "kerf-%04d%s", i, ending);
-    if (!std::filesystem::exists(folder / name.data())) return folder / name.data();
-  }
-}
-
-/// `write` returns the file it wrote. A full disk must not end a session at the screen.
-template <typename Write>
-void write_for_user(const char* what, const Write& write) {
-  try {
-    std::printf("%s: %s\n", what, write().c_str());
-  } catch (const std::runtime_error& problem) {
-    std::fprintf(stderr, "kerf-visualizer: %s\n", problem.what());
-  }
-}
-
-void take_screenshot(const VisualizerOptions& options, const RenderTarget& target) {
-  write_for_user("screenshot", [&] {
-    const std::filesystem::path file = unused_file(options.out, ".png");
-    write_png(file, target.size(), target.read_rgb());
-    return file;
-  });
-}
-
-/// Begins a video in a new file, or ends the one that runs.
-void toggle_recording(const VisualizerOptions& options, PictureSize size,
-                      std::optional<Recording>& recording) {
-  if (recording) return recording.reset();
-  write_for_user("video", [&] {
-    const std::filesystem::path file = unused_file(options.out, ".y4m");
-    recording.emplace(file.string(), size, options.video_hz);
-    return file;
-  });
-}
-
-/// Where --transfer read them, or in a new file.
-void write_opacities(const VisualizerOptions& options, const Picture& picture) {
-  write_for_user("opacities", [&] {
-    const std::filesystem::path file =
-        options.transfer ? *options.transfer : unused_file(options.out, ".toml");
-    write_transfer(file, picture.opacities());
-    return file;
-  });
-}
-
-void export_mesh(const VisualizerOptions& options, const Session& session) {
-  write_for_user("surface", [&] {
-    const std::filesystem::path file =
-        options.mesh ? *options.mesh : unused_file(options.out, ".ply");
-    export_surface(file, session.scene(), session.contents());
-    return file;
-  });
-}
 
 std::string next_renderer(std::string_view now) {
   const std::vector<std::string_view> kinds = renderer_kinds();
@@ -135,6 +58,7 @@ void move_camera(OrbitCamera& camera, const WindowInput& input) {
 /// What keys change.
 struct Keys {
   bool help = false;
+  bool hidden = false;  ///< the panels
   bool plot = false;
   bool screenshot = false;
   bool mesh = false;
@@ -152,7 +76,11 @@ struct Keys {
       if (key == 'e') mesh = true;
       if (key == 'w') write = true;
       if (key == 'm') record = !record;
-      if (key == 'h') help = !help;
+      if (key == 'h') {  // panels, with the keys, none
+        const bool shown = !hidden;
+        hidden = shown && help;
+        help = shown && !help;
+      }
       if (key == 'p') plot = !plot;
       if (key == 'v') look.renderer = next_renderer(look.renderer);
       if (key == 'c') look.clip.on = !look.clip.on;
@@ -214,6 +142,7 @@ class Followed {
 int run_window(const VisualizerOptions& options) {
   place_process(options.cpus);
   if (options.mesh) check_export(*options.mesh);
+  if (options.report) check_new_file(*options.report);
   Session first = Session::attach(options.name, std::chrono::duration<double>(options.wait_s));
   if (options.transfer) {
     check_materials(options.opacities, first.scene(), options.transfer->string());
@@ -230,10 +159,11 @@ int run_window(const VisualizerOptions& options) {
   double aspect = static_cast<double>(options.size.width) / options.size.height;
   Followed followed(options, std::move(first), aspect);
   std::optional<RenderTarget> target;
-  FrameRate rate;
+  ShownRates rates;
   Keys keys;
   ForcePlot plot;
   std::optional<Recording> recording;
+  bool video_is_cut = false;
   auto next_frame = Clock::now();
   bool record_from_start = options.record.has_value();
   constexpr double kMsPerS = 1e3;
@@ -254,10 +184,11 @@ int run_window(const VisualizerOptions& options) {
         recording.emplace(*options.record, size, options.video_hz);
       }
       if (std::exchange(keys.record, false)) toggle_recording(options, size, recording);
-      rate.count(begin);
       OverlayFigures figures = overlay_figures(followed.session());
-      figures.frame_rate_hz = rate.hz();
+      if (recording) figures.filmed_frames = recording->file().frames();
+      rates.show(figures, begin);
       figures.help = keys.help;
+      figures.hidden = keys.hidden;
       if (keys.plot) figures.plot = plot.points();
       figures.controls = followed.picture().controls();
       if (!followed.picture().handle(input.pointer, figures, size)) {
@@ -272,7 +203,7 @@ int run_window(const VisualizerOptions& options) {
       if (report.wall_ms.size() == 1) report.late_join_ms = since_attached.wall_ms();
       if (std::exchange(keys.screenshot, false)) take_screenshot(options, *target);
       if (redrawn.any || input.exposed) window.present(*target);
-      film(recording, *target, followed.session().servo_s());
+      if (!film(recording, *target, followed.session().servo_s())) video_is_cut = true;
       report.width = size.width;
       report.height = size.height;
     }
@@ -283,7 +214,7 @@ int run_window(const VisualizerOptions& options) {
   report.bricks_uploaded = followed.bricks_uploaded();
   report.clean_end = followed.session().ended_cleanly();
   if (options.report) report.write(*options.report);
-  return 0;
+  return exit_code(followed.session(), video_is_cut);
 }
 
 }  // namespace kerf

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "visualizer/camera.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include <doctest/doctest.h>
 #include <rapidcheck.h>
@@ -58,6 +60,21 @@ TEST_CASE("a framed box lies between near and far with its middle in the middle 
     const glm::dvec3 middle = ndc(view, 0.5 * (lo + hi));
     RC_ASSERT(std::hypot(middle.x, middle.y) < 1e-9);
   }));
+}
+
+TEST_CASE("of two boxes far apart both are framed, as one box around both would be") {
+  const BoxCorners left = box({-30, -2, -2}, {-25, 3, 2});
+  const BoxCorners right = box({20, -1, -4}, {26, 4, 1});
+  std::vector<glm::dvec3> both(left.begin(), left.end());
+  both.insert(both.end(), right.begin(), right.end());
+  OrbitCamera camera;
+  camera.frame(both, 1.5);
+  CHECK(camera.radius_mm() == doctest::Approx(glm::length(glm::dvec3(28, 3, 3))).epsilon(0.05));
+  const View view = camera.view(1.5, camera.radius_mm());
+  double widest = 0.0;
+  for (const glm::dvec3& corner : both) widest = std::max(widest, std::abs(ndc(view, corner).x));
+  CHECK(widest > 0.8);
+  CHECK(widest < 1.2);
 }
 
 TEST_CASE("whatever the user drags, the view stays a rigid one with near before far") {

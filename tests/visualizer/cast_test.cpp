@@ -9,6 +9,7 @@
 #include <doctest/doctest.h>
 #include <glm/gtc/matrix_transform.hpp>
 
+#include "tests/visualizer/exact_body.hpp"
 #include "tests/visualizer/gl_fixture.hpp"
 #include "visualizer/cast/caster.hpp"
 #include "visualizer/error.hpp"
@@ -19,21 +20,6 @@ using namespace kerf::test;
 namespace {
 
 constexpr PictureSize kSize{101, 83};  // no multiple of a packet, a block or a tile
-
-/// Distance in mm to a surface at (x, y, z), negative inside.
-using Distance = std::function<double(glm::dvec3)>;
-
-double ball_distance(glm::dvec3 at) {
-  return glm::length(at) - 4.0;
-}
-double torus_distance(glm::dvec3 at) {
-  return glm::length(glm::dvec2(glm::length(glm::dvec2(at.x, at.z)) - 3.0, at.y)) - 1.4;
-}
-
-/// A body whose density falls over `ramp_mm` across its surface.
-std::function<double(glm::dvec3)> body(const Distance& distance, double ramp_mm) {
-  return [=](glm::dvec3 at) { return 0.5 - distance(at) / ramp_mm; };
-}
 
 struct Cast {
   CastPicture picture;
@@ -80,29 +66,6 @@ struct Errors {
   int hits = 0;
 };
 
-/// Where a ray first meets the surface, by going as far as is free; the body is in front of it.
-std::optional<double> exact_mm(const Distance& distance, const PixelRay& ray) {
-  double t = 0.0;
-  for (int i = 0; i < 400; ++i) {
-    const double free_mm = distance(ray.origin_mm + t * ray.direction);
-    if (free_mm < 1e-10) return t;
-    t += free_mm / glm::length(ray.direction);
-    if (t > 100.0) return std::nullopt;
-  }
-  return std::nullopt;
-}
-
-glm::dvec3 slope_of(const Distance& distance, glm::dvec3 at) {
-  constexpr double kStep = 1e-5;
-  glm::dvec3 slope;
-  for (int axis = 0; axis < 3; ++axis) {
-    glm::dvec3 side(0.0);
-    side[axis] = kStep;
-    slope[axis] = distance(at + side) - distance(at - side);
-  }
-  return glm::normalize(slope);
-}
-
 Errors errors_at(const Distance& distance, double spacing_mm) {
   const int n = static_cast<int>(std::lround(12.0 / spacing_mm)) + 1;
   const VoxelGrid grid{n, n, n};
@@ -117,8 +80,7 @@ Errors errors_at(const Distance& distance, double spacing_mm) {
       const auto exact = exact_mm(distance, ray);
       if (!exact) continue;
       const glm::dvec3 normal = slope_of(distance, ray.origin_mm + *exact * ray.direction);
-      // At a rim a small step across is a long way in depth.
-      if (-glm::dot(normal, glm::normalize(ray.direction)) < 0.35) continue;
+      if (-glm::dot(normal, glm::normalize(ray.direction)) < kLeastFacing) continue;
       const auto at = static_cast<std::size_t>((kSize.height - 1 - y) * kSize.width + x);
       REQUIRE(drawn.picture.depth[at] < 1.0F);
       const double off =

@@ -50,3 +50,12 @@ TEST_CASE("nothing is due before the device is armed, but the end is drawn") {
   CHECK(schedule.take(std::nullopt) == 1);
   CHECK_FALSE(schedule.final_due(std::nullopt));
 }
+
+TEST_CASE("pictures are spread over the time, else a second apart, also where there are none") {
+  constexpr std::uint32_t kTickNs = 1'000'000;
+  CHECK(ticks_between(4, 2.0, kTickNs) == 500);
+  CHECK(ticks_between(4, std::nullopt, kTickNs) == 1000);
+  // In a constant expression a division by zero does not compile.
+  static_assert(ticks_between(0, 2.0, kTickNs) == 1000);
+  static_assert(ticks_between(9999, 0.0, kTickNs) == 1);
+}

@@ -71,6 +71,10 @@ TEST_CASE("every mistake on the command line is one line") {
                                                                  {"--eyes", "wide"},
                                                                  {"--fps", "0"},
                                                                  {"--fps", "241"},
+                                                                 {"--stereo=7"},
+                                                                 {"--headless=no"},
+                                                                 {"--frames", "2.5"},
+                                                                 {"--transfer", "/tmp"},
                                                                  {"--record"},
                                                                  {"--transfer", "/nowhere/t.toml"},
                                                                  {"--transfer", "/dev/null"},
@@ -98,4 +102,9 @@ TEST_CASE("the bench draws as large as the paper unless told otherwise, and alon
   CHECK(parse({"--bench", "--page", "p.md"})->page == "p.md");
   CHECK(parse({"--bench", "--size", "64x48"})->size == PictureSize{64, 48});
   CHECK_THROWS_WITH_AS(parse({"--page", "p.md"}), doctest::Contains("--bench"), VisualizerError);
+}
+
+TEST_CASE("a folder in the place of a file of opacities is called a folder") {
+  CHECK_THROWS_WITH_AS(parse({"--transfer", "/tmp"}), "/tmp: is a folder; name a file in it",
+                       VisualizerError);
 }

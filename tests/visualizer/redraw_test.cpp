@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Partial redraw: the same pixels as drawing everything, for every renderer.
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
+#include <optional>
 #include <random>
 #include <string>
 #include <vector>
@@ -175,7 +177,7 @@ void check_parts(const Look& look, PictureSize size, int edits) {
     picture.redraw_all();
     CHECK(picture.draw(session, figures, target).share == 1.0);
     const bool same = seen == target.read_rgb();
-    if (!same) INFO("edit ", edit);
+    CAPTURE(edit);
     REQUIRE(same);
     // At rest nothing is drawn.
     session.poll();
@@ -232,6 +234,46 @@ TEST_CASE("a changed look shows the picture of one that had it from the start") 
     const bool same = drawn(fresh) == changed;
     CHECK(same);
   }
+}
+
+TEST_CASE("the first view shows every volume, in the middle of the picture") {
+  if (!have_gl()) return;
+  const Place place;
+  Controller controller;
+  Session session("redraw");
+  session.poll();
+  Picture picture(session, {.renderer = "iso"}, 1.0);
+  const View view = picture.camera().view(1.0, picture.camera().radius_mm());
+  for (const VolumeView& volume : session.scene().volumes) {
+    const BoxCorners box = volume.corners();
+    // A box's corners may lie outside, where there is hardly ever anything; its faces do not.
+    const glm::dvec3 middle = 0.5 * (box.front() + box.back());
+    for (const std::size_t along : {1U, 2U, 4U}) {
+      for (const double side : {-0.5, 0.5}) {
+        const glm::dvec3 face = middle + side * (box[along] - box[0]);
+        const glm::dvec4 clip = view.clip_from_eye() * view.eye_from_world * glm::dvec4(face, 1.0);
+        CHECK(std::max(std::abs(clip.x), std::abs(clip.y)) < clip.w);
+      }
+    }
+  }
+}
+
+TEST_CASE("a target made anew in the place of another, a column narrower, is drawn whole") {
+  if (!have_gl()) return;
+  const Place place;
+  Controller controller;
+  Session session("redraw");
+  session.poll();
+  Picture picture(session, {.renderer = "iso", .stereo = {.on = true}}, 4.0 / 3.0);
+  std::optional<RenderTarget> target(std::in_place, PictureSize{161, 80});
+  static_cast<void>(picture.draw(session, {}, *target));
+  target.emplace(PictureSize{160, 80});
+  static_cast<void>(picture.draw(session, {}, *target));
+  const auto seen = target->read_rgb();
+  picture.redraw_all();
+  static_cast<void>(picture.draw(session, {}, *target));
+  const bool same = seen == target->read_rgb();
+  CHECK(same);
 }
 
 TEST_CASE("bounds on the screen hold all that is inside a box, and the whole screen near the eye") {

@@ -11,6 +11,8 @@
 #include <future>
 #include <iterator>
 #include <optional>
+#include <string>
+#include <string_view>
 #include <thread>
 #include <vector>
 
@@ -22,6 +24,7 @@
 #include "shared/segment/hand_over.hpp"
 #include "visualizer/error.hpp"
 #include "visualizer/gl/context.hpp"
+#include "visualizer/renderer.hpp"
 #include "visualizer/session.hpp"
 
 using namespace kerf;
@@ -263,7 +266,8 @@ TEST_CASE("every renderer draws a session") {
   miller.run_to(20);
   miller.say(Lifecycle::clean_end);
   std::vector<std::string> pictures;
-  for (const char* renderer : {"iso", "blend", "slices"}) {
+  for (const std::string_view kind : renderer_kinds()) {
+    const std::string renderer(kind);
     CAPTURE(renderer);
     VisualizerOptions options = place.options();
     options.renderer = renderer;
@@ -316,11 +320,52 @@ TEST_CASE("a headless run exports the final surface, drawn by the surface render
   CHECK(stl.size() == 84 + 50 * std::size_t{triangles});
 }
 
+TEST_CASE("a sheet at the end of a headless run shows the opacities of --transfer") {
+  if (!have_gl()) return;
+  const Place place;
+  Miller miller;
+  miller.run_to(60);
+  miller.say(Lifecycle::clean_end);
+  std::vector<std::string> sheets;
+  for (const double opacity : {1.0, 0.01}) {
+    VisualizerOptions options = place.options();
+    options.sheet = place.path / "sheet.png";
+    options.transfer = "named in messages only";
+    options.opacities = {{"bone", opacity}};
+    CHECK(run_headless(options) == 0);
+    sheets.push_back(contents(*options.sheet));
+    CHECK(sheets.back().substr(1, 3) == "PNG");
+  }
+  CHECK(sheets[0] != sheets[1]);
+}
+
 TEST_CASE("an export that cannot work is refused before anything is drawn") {
   const Place place;
   VisualizerOptions options = place.options();
   options.mesh = place.path / "block.obj";
   CHECK_THROWS_AS(static_cast<void>(run_headless(options)), VisualizerError);
+}
+
+TEST_CASE("a report that cannot be written is refused before anything is drawn") {
+  const Place place;
+  VisualizerOptions options = place.options();
+  options.report = place.path / "none" / "report.json";
+  CHECK_THROWS_AS(static_cast<void>(run_headless(options)), FileError);
+  CHECK_THROWS_AS(static_cast<void>(run_window(options)), FileError);
+}
+
+TEST_CASE("a video alone ends when its time is over") {
+  if (!have_gl()) return;
+  const Place place;
+  VisualizerOptions options = place.options();
+  options.frames = 0;
+  options.every_ticks.reset();
+  options.seconds = 0.1;
+  options.record = (place.path / "a.y4m").string();
+  Miller miller;
+  miller.run_to(1);
+  CHECK(run_headless(options) == 0);
+  CHECK(contents(*options.record).find("FRAME") != std::string::npos);
 }
 
 TEST_CASE("without a controller the run gives up after its wait, in one line") {

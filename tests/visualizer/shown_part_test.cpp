@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // What every renderer leaves out on demand: what the clip plane takes, what is outside a rectangle.
-#include <array>
+#include <string>
+#include <string_view>
+#include <vector>
 
 #include <doctest/doctest.h>
 
@@ -12,8 +14,12 @@ using namespace kerf::test;
 
 namespace {
 
-constexpr std::array<const char*, 4> kRenderers{"iso", "blend", "slices", "surface"};
-constexpr std::array<const char*, 3> kSolid{"iso", "blend", "slices"};  // with a face where cut
+/// All but the shell: these have a face where they are cut.
+std::vector<std::string_view> solid_kinds() {
+  std::vector<std::string_view> kinds = renderer_kinds();
+  std::erase(kinds, "surface");
+  return kinds;
+}
 
 }  // namespace
 
@@ -24,8 +30,8 @@ TEST_CASE("the clip plane leaves a face where it cuts through solid, and nothing
   const VolumeContent content = volume.content();
   View view = look_at({0, 0, 30}, {}, 20, 40);
   view.shown = {0, 0, -1, 1.03};  // z <= 1.03 mm
-  for (const char* kind : kSolid) {
-    CAPTURE(kind);
+  for (const std::string_view kind : solid_kinds()) {
+    CAPTURE(std::string(kind));
     const auto renderer = make_renderer(kind, scene_of({&volume}), {&content, 1});
     const Drawn drawn = draw(*renderer, view, RenderTarget(kTestSize));
     const std::size_t middle = pixel_at(48, 48);
@@ -68,8 +74,8 @@ TEST_CASE("a plane beyond a volume hides it whole, one on its near side nothing"
   const VolumeContent content = volume.content();
   const View all = look_at({5, 7, 28}, {}, 20, 40);
   const RenderTarget target(kTestSize);
-  for (const char* kind : kRenderers) {
-    CAPTURE(kind);
+  for (const std::string_view kind : renderer_kinds()) {
+    CAPTURE(std::string(kind));
     const auto renderer = make_renderer(kind, scene_of({&volume}), {&content, 1});
     const Drawn whole = draw(*renderer, all, target);
     View view = all;
@@ -88,8 +94,8 @@ TEST_CASE(
   const View view = look_at({14, 9, 20}, {}, 10, 40);
   RenderTarget target(kTestSize);
   constexpr int kLeft = 31, kBottom = 22, kWide = 37, kHigh = 41;
-  for (const char* kind : kRenderers) {
-    CAPTURE(kind);
+  for (const std::string_view kind : renderer_kinds()) {
+    CAPTURE(std::string(kind));
     const auto renderer = make_renderer(kind, scene_of({&volume}), {&content, 1});
     const Drawn whole = draw(*renderer, view, target);
     target.bind();

@@ -35,7 +35,8 @@ namespace {
 
 constexpr const char* kScene = R"({
   "volumes": [{"name": "block", "solid": true}],
-  "tools": [],
+  "tools": [{"name": "ball", "profile": [[-1, 0], [0, 1], [1, 0]]},
+            {"name": "pin", "profile": [[0, 0], [1, 1]]}],
   "materials": [{"name": "none", "iso": 0, "colour": [0, 0, 0]},
                 {"name": "bone", "iso": 0.3, "colour": [0.8, 0.7, 0.5]}]})";
 constexpr VoxelGrid kGrid{32, 24, 16};
@@ -105,18 +106,32 @@ SegmentSpec block(std::vector<Density>& density) {
 /// A controller of the name "test" that shows a block.
 class Controller {
  public:
-  Controller() : writer_(SegmentWriter::create(block(density_))), server_("test", writer_) {
+  Controller()
+      : writer_(SegmentWriter::create(block(density_))), server_("test", writer_, {.tools = 2}) {
     writer_.set_lifecycle(Lifecycle::run);
   }
   void tick() {
     writer_.begin_tick(++now_);
     TickRecord record{};
     record.tick = now_;
+    record.start_ns = now_ns();
+    record.orientation[3] = 1.0F;
     writer_.publish_state(record);
-    writer_.end_tick(0);
+    writer_.end_tick(record.start_ns);
   }
+  /// What the window asked for since the last call.
+  std::vector<std::uint64_t> asked_tools() {
+    std::vector<std::uint64_t> tools;
+    while (const auto command = server_.take_command()) tools.push_back(command->argument);
+    return tools;
+  }
+  void say(Lifecycle lifecycle) { writer_.set_lifecycle(lifecycle); }
 
  private:
+  static std::uint64_t now_ns() {
+    return static_cast<std::uint64_t>(std::chrono::steady_clock::now().time_since_epoch().count());
+  }
+
   std::vector<Density> density_;
   SegmentWriter writer_;
   SegmentServer server_;
@@ -152,8 +167,8 @@ class User {
     act("search --sync --onlyvisible --name 'kerf: test' mousemove 300 180");
   }
 
-  /// The middle of the window, where no panel is.
-  std::vector<std::uint8_t> look() {
+  /// The window with its panels.
+  RgbPicture whole() {
     const fs::path file = out_ / "kerf-0001.png";
     act("key s");
     for (int tries = 0; tries < 3000 && !fs::exists(file); ++tries) {
@@ -162,13 +177,18 @@ class User {
     const auto picture = read_png(file);
     REQUIRE(picture);
     fs::remove(file);
-    const auto width = static_cast<std::size_t>(picture->size.width);
-    const auto height = static_cast<std::size_t>(picture->size.height);
+    return *picture;
+  }
+  /// The middle of it, where no panel is.
+  std::vector<std::uint8_t> look() {
+    const RgbPicture picture = whole();
+    const auto width = static_cast<std::size_t>(picture.size.width);
+    const auto height = static_cast<std::size_t>(picture.size.height);
     std::vector<std::uint8_t> middle;
     for (std::size_t y = height / 4; y < height * 3 / 4; ++y) {
-      const auto row = picture->rgb.begin() + static_cast<std::ptrdiff_t>(y * width * 3);
-      middle.insert(middle.end(), row + picture->size.width * 3 * 5 / 9,
-                    row + picture->size.width * 3 * 8 / 9);
+      const auto row = picture.rgb.begin() + static_cast<std::ptrdiff_t>(y * width * 3);
+      middle.insert(middle.end(), row + picture.size.width * 3 * 5 / 9,
+                    row + picture.size.width * 3 * 8 / 9);
     }
     return middle;
   }
@@ -178,6 +198,7 @@ class User {
     return code_.get();
   }
   [[nodiscard]] const fs::path& out() const { return out_; }
+  [[nodiscard]] Controller& controller() { return controller_; }
   [[nodiscard]] nlohmann::json report() const {
     return nlohmann::json::parse(std::ifstream(report_));
   }
@@ -217,6 +238,39 @@ TEST_CASE("keys and mouse work the window") {
     CHECK(user.look() == first);
     act("click 4");
     CHECK(user.look() != first);
+    CHECK(user.quit() == 0);
+  }
+  SUBCASE("a drag with shift, or with the middle button, moves") {
+    act("keydown shift mousedown 1 mousemove 340 200 sleep 0.2 mouseup 1 keyup shift");
+    const auto shifted = user.look();
+    CHECK(shifted != first);
+    act("key r mousemove 300 180");
+    CHECK(user.look() == first);
+    act("mousedown 2 mousemove 340 200 sleep 0.2 mouseup 2");
+    CHECK(user.look() == shifted);
+    CHECK(user.quit() == 0);
+  }
+  SUBCASE("a digit asks the controller for that tool, where there is one") {
+    act("key 2 key 9");
+    CHECK(user.controller().asked_tools() == std::vector<std::uint64_t>{1});
+    CHECK(user.quit() == 0);
+  }
+  SUBCASE("e exports the surface") {
+    act("key e");
+    CHECK(user.quit() == 0);
+    CHECK(fs::file_size(user.out() / "kerf-0001.ply") > 1000);
+  }
+  SUBCASE("h shows the keys, then no panel at all, then what was there") {
+    const auto panels = user.whole().rgb;
+    act("key h");
+    const auto keys = user.whole().rgb;
+    CHECK(keys != panels);
+    act("key h");
+    const auto nothing = user.whole().rgb;
+    CHECK(nothing != keys);
+    CHECK(nothing != panels);
+    act("key h");
+    CHECK(user.whole().rgb != nothing);
     CHECK(user.quit() == 0);
   }
   SUBCASE("a drag that begins on the controls does not turn") {
@@ -278,6 +332,49 @@ TEST_CASE("keys and mouse work the window") {
     CHECK(user.look() != first);
     CHECK(user.quit() == 0);
   }
+}
+
+TEST_CASE("the exit code of a window tells how the controller ended, and a video cut short") {
+  if (!have("Xvfb") || !have("xdotool")) return;
+  const Screen screen;
+  User user(screen.folder);
+  SUBCASE("cleanly") {
+    user.controller().say(Lifecycle::clean_end);
+    CHECK(user.quit() == 0);
+  }
+  SUBCASE("by a fault") {
+    user.controller().say(Lifecycle::fault);
+    CHECK(user.quit() == 1);
+  }
+  SUBCASE("a window that changes its size ends the video") {
+    act("key m");
+    act("search --name 'kerf: test' windowsize 400 300");
+    CHECK(user.quit() == 1);
+  }
+  SUBCASE("a video that the user ends is whole") {
+    act("key m sleep 0.3 key m");
+    act("search --name 'kerf: test' windowsize 400 300");
+    CHECK(user.quit() == 0);
+  }
+}
+
+TEST_CASE("before a hand that is still most frames of a window draw nothing") {
+  if (!have("Xvfb")) return;
+  const Screen screen;
+  Controller controller;
+  VisualizerOptions options;
+  options.name = "test";
+  options.size = {160, 120};
+  options.seconds = 2.0;
+  options.report = screen.folder / "report.json";
+  auto code = std::async(std::launch::async, [&] { return run_window(options); });
+  while (code.wait_for(std::chrono::milliseconds(1)) != std::future_status::ready) {
+    controller.tick();
+  }
+  CHECK(code.get() == 0);
+  const auto report = nlohmann::json::parse(std::ifstream(*options.report));
+  CHECK(report["frames"] > 0);
+  CHECK(report["rest_frames"] > report["frames"]);
 }
 
 TEST_CASE("a GL error in a window fails the test that makes it" * doctest::should_fail()) {

@@ -39,6 +39,21 @@ void outlive_the_screen() {
       display, [](Display*, void*) { g_screen_is_gone = true; }, nullptr);
 }
 
+/// A lower-case letter or a digit: what is printed on the key, or, where that is another sign (of
+/// other scripts, or the upper row of a French keyboard), what an American one has in its place. 0
+/// for any other key.
+char letter_of(int key, int scancode) {
+  const char* const printed = glfwGetKeyName(key, scancode);
+  if (printed != nullptr && printed[0] != '\0' && printed[1] == '\0') {
+    const char sign = printed[0];
+    if ((sign >= 'a' && sign <= 'z') || (sign >= '0' && sign <= '9')) return sign;
+    if (sign >= 'A' && sign <= 'Z') return static_cast<char>(sign - 'A' + 'a');
+  }
+  if (key >= GLFW_KEY_A && key <= GLFW_KEY_Z) return static_cast<char>('a' + (key - GLFW_KEY_A));
+  if (key >= GLFW_KEY_0 && key <= GLFW_KEY_9) return static_cast<char>('0' + (key - GLFW_KEY_0));
+  return '\0';
+}
+
 bool is_down(GLFWwindow* handle, int button) {
   return glfwGetMouseButton(handle, button) == GLFW_PRESS;
 }
@@ -130,14 +145,10 @@ WindowInput Window::poll() {
   return std::exchange(input_, {});
 }
 
-void Window::on_key(GLFWwindow* handle, int key, int /*scancode*/, int action, int /*mods*/) {
+void Window::on_key(GLFWwindow* handle, int key, int scancode, int action, int /*mods*/) {
   if (action != GLFW_PRESS) return;
-  std::vector<char>& keys = window_of(handle).input_.keys;
-  if (key >= GLFW_KEY_A && key <= GLFW_KEY_Z) {
-    keys.push_back(static_cast<char>('a' + (key - GLFW_KEY_A)));
-  } else if (key >= GLFW_KEY_0 && key <= GLFW_KEY_9) {
-    keys.push_back(static_cast<char>('0' + (key - GLFW_KEY_0)));
-  }
+  const char letter = letter_of(key, scancode);
+  if (letter != '\0') window_of(handle).input_.keys.push_back(letter);
 }
 
 void Window::on_cursor(GLFWwindow* handle, double x, double y) {

@@ -20,7 +20,7 @@ struct WindowInput {
   double move_right = 0.0, move_up = 0.0;
   double wheel = 0.0;
   Pointer pointer;         ///< at the end; down if it was so at any time
-  std::vector<char> keys;  ///< lower-case letters and digits, in order
+  std::vector<char> keys;  ///< lower-case letters and digits as printed on them
   bool exposed = false;    ///< what the window showed is lost: `present` again
   bool close = false;
 };
