@@ -25,7 +25,7 @@ CellsOnGpu::CellsOnGpu(const VolumeView& volume, std::span<const Density> densit
 
 void CellsOnGpu::update_bricks(std::span<const Density> density,
                                std::span<const std::uint32_t> changed) {
-  if (cells_.update_bricks(bricks_, changed, density)) upload();
+  if (!cells_.update_bricks(bricks_, changed, density).empty()) upload();
 }
 
 void CellsOnGpu::upload() {

@@ -13,8 +13,13 @@ namespace kerf {
 
 namespace {
 
-// Outwards; iso.frag.
-constexpr std::array<float, 6> kFeelersVox{-2.5F, -1.25F, 1.25F, 2.5F, 6.0F, 12.0F};
+using Reaches = float __attribute__((vector_size(16)));
+
+// Outwards; iso.frag. Some stand twice, to fill the rows.
+constexpr std::array<Reaches, 2> kFeelersVox{Reaches{-2.5F, -2.5F, -1.25F, 1.25F},
+                                             Reaches{2.5F, 6.0F, 12.0F, 12.0F}};
+constexpr float kInwardsVox = 2.5F;
+constexpr float kLongestVox = 12.0F;
 // A texture unit may filter with 8 bits of weight: on this steep a slope (of 4, from air to full
 // density) the normal of a shader is off by less than 1/24, half a voxel at the end of a feeler.
 constexpr float kLeastSlope = 0.5F;
@@ -28,10 +33,6 @@ VoxelBox united(std::span<const VoxelBox> boxes) {
 
 }  // namespace
 
-bool Feelers::Box::contains(const glm::vec3& p) const {
-  return p.x >= lo.x && p.y >= lo.y && p.z >= lo.z && p.x <= hi.x && p.y <= hi.y && p.z <= hi.z;
-}
-
 Feelers::Feelers(const VolumeView& volume, std::span<const Density> density,
                  std::span<const VoxelBox> differs, const View& view, PictureSize size)
     : grid_(volume.bricks.grid),
@@ -41,6 +42,7 @@ Feelers::Feelers(const VolumeView& volume, std::span<const Density> density,
   const glm::dmat4 eye_from_voxel = view.eye_from_world * volume.world_from_voxel;
   const glm::dmat4 voxel_from_eye = glm::affineInverse(eye_from_voxel);
   voxel_from_eye_ = glm::mat3(voxel_from_eye);
+  outward_from_gradient_ = -(voxel_from_eye_ * glm::transpose(voxel_from_eye_));
   origin_ = glm::vec3(voxel_from_eye[3]);
   const glm::dvec2 half(view.tan_half_height * view.aspect, view.tan_half_height);
   direction_per_pixel_ = 2.0 * half / glm::dvec2(size.width, size.height);
@@ -93,7 +95,6 @@ bool Feelers::may_reach(const PixelRect& tile, float nearest, float farthest) co
 /// How far along a ray, up to a factor that is the ray's, what a point at `t` feels begins: normals
 /// are turned towards the eye, so that is what lies before the point, and a little behind it.
 float Feelers::seen_from(const glm::vec3& along, float t) const {
-  constexpr float kInwardsVox = -kFeelersVox.front();
   return t * glm::dot(along, along) + kInwardsVox * longest_edge_mm_ * glm::length(along);
 }
 
@@ -104,81 +105,99 @@ float Feelers::nearest_end(const glm::vec3& along) const {
   return nearest;
 }
 
-bool Feelers::may_reach(int x, int y, float window_depth) const {
+bool Feelers::may_reach(int x, int y, float window_depth) {
   const glm::vec3 along = direction(x, y);
   const float t = eye_mm(window_depth);
-  const glm::vec3 at = origin_ + t * (voxel_from_eye_ * along);
+  const glm::vec3 per_mm = voxel_from_eye_ * along;
+  const glm::vec3 at = origin_ + t * per_mm;
   const glm::vec3 away = glm::max(glm::max(any_end_.lo - at, at - any_end_.hi), glm::vec3(0.0F));
-  constexpr float kLongest = kFeelersVox.back();
-  if (glm::dot(away, away) > kLongest * kLongest) return false;
-  if (seen_from(along, t) < nearest_end(along)) return false;
+  if (glm::dot(away, away) > kLongestVox * kLongestVox) return false;
 
   const glm::vec3 gradient = gradient_at(at);
   if (glm::dot(gradient, gradient) < kLeastSlope * kLeastSlope) return true;
   // As in iso.frag: by the transposed Jacobian to the eye's millimetres, turned, and back.
-  glm::vec3 normal = -glm::normalize(gradient * voxel_from_eye_);
-  const glm::vec3 to_eye = -glm::normalize(along);
-  const float facing = glm::dot(normal, to_eye);
-  if (facing < 0.0F) normal = glm::normalize(normal - 1.02F * facing * to_eye);
-  const glm::vec3 outward = glm::normalize(voxel_from_eye_ * normal);
-  return std::any_of(kFeelersVox.begin(), kFeelersVox.end(), [&](float reach) {
-    const glm::vec3 end = at + reach * outward;
-    return any_end_.contains(end) && std::any_of(ends_.begin(), ends_.end(),
-                                                 [&](const Box& box) { return box.contains(end); });
-  });
+  glm::vec3 outward = outward_from_gradient_ * gradient;
+  if (glm::dot(gradient, per_mm) < 0.0F) {  // it looks away from the eye
+    const glm::vec3 normal = -glm::normalize(gradient * voxel_from_eye_);
+    const glm::vec3 to_eye = -glm::normalize(along);
+    outward = voxel_from_eye_ * (normal - 1.02F * glm::dot(normal, to_eye) * to_eye);
+  }
+  return ends_in_change(at, glm::normalize(outward));
 }
 
-/// From the eight corners of a cube two voxels wide, as `gradient_at` in iso.frag, in full
-/// densities.
-glm::vec3 Feelers::gradient_at(const glm::vec3& voxel) const {
-  using Row = float __attribute__((vector_size(16)));
-  using Densities = Density __attribute__((vector_size(8)));
+bool Feelers::ends_in_change(const glm::vec3& at, const glm::vec3& outward) const {
+  const auto misses = [&](const Box& box) {
+    const auto beside = [&](const Row& reach) {
+      auto is = Row{} > Row{};
+      for (int axis = 0; axis < 3; ++axis) {
+        const Row end = at[axis] + reach * outward[axis];
+        is |= (end < box.lo[axis]) | (end > box.hi[axis]);
+      }
+      return is;
+    };
+    const auto all = beside(kFeelersVox[0]) & beside(kFeelersVox[1]);
+    return (all[0] & all[1] & all[2] & all[3]) != 0;
+  };
+  return !misses(any_end_) && !std::all_of(ends_.begin(), ends_.end(), misses);
+}
+
+/// As `gradient_at` in iso.frag, in full densities: from the eight corners of a cube two voxels
+/// wide. Densities between voxels are interpolated, and so are their gradients.
+glm::vec3 Feelers::gradient_at(const glm::vec3& voxel) {
   const glm::vec3 low = glm::floor(voxel);
-  const VoxelIndex first{static_cast<int>(low.x) - 1, static_cast<int>(low.y) - 1,
-                         static_cast<int>(low.z) - 1};
+  const glm::vec3 share = voxel - low;
+  const Cell& cell =
+      cell_at({static_cast<int>(low.x), static_cast<int>(low.y), static_cast<int>(low.z)});
+  const auto mixed = [&](const std::array<Row, 4>& of) {
+    const Row front = of[0] + share.y * (of[1] - of[0]);
+    const Row back = of[2] + share.y * (of[3] - of[2]);
+    return front + share.z * (back - front);
+  };
+  const Row z_and_x = mixed(cell.z_and_x), y = mixed(cell.y);
+  const glm::vec3 first(z_and_x[2], y[0], z_and_x[0]), second(z_and_x[3], y[1], z_and_x[1]);
+  return (first + share.x * (second - first)) / static_cast<float>(kDensityMax);
+}
+
+const Feelers::Cell& Feelers::cell_at(VoxelIndex at) {
+  // Cells beside one another have places of their own.
+  Cell& cell = cells_[static_cast<std::size_t>((at.x & 7) + 8 * (at.y & 3) + 32 * (at.z & 3))];
+  if (cell.made && cell.at == at) return cell;
+  cell.made = true;
+  cell.at = at;
+  using Densities = Density __attribute__((vector_size(8)));
+  const VoxelIndex first{at.x - 1, at.y - 1, at.z - 1};
   const VoxelBox around{first, {first.x + 4, first.y + 4, first.z + 4}};
   const bool inside = around.clipped(grid_.box()) == around;
-  const auto row_at = [&](int y, int z) {
-    Densities row{};
-    if (inside) {
-      std::memcpy(&row, &density_[grid_.index(first.x, first.y + y, first.z + z)], sizeof(row));
-    } else {
-      for (int x = 0; x < 4; ++x) {
-        const VoxelIndex v{first.x + x, first.y + y, first.z + z};
-        if (grid_.contains(v)) row[x] = density_[grid_.index(v.x, v.y, v.z)];
+  std::array<std::array<Row, 2>, 4> sums;   // by z and y: of the voxels before and behind in y
+  std::array<std::array<Row, 2>, 4> rises;  // their difference
+  for (int z = 0; z < 4; ++z) {
+    std::array<Row, 4> rows;  // by y: lanes 0 and 1 are sums along x, 2 and 3 are differences
+    for (int y = 0; y < 4; ++y) {
+      Densities row{};
+      if (inside) {
+        std::memcpy(&row, &density_[grid_.index(first.x, first.y + y, first.z + z)], sizeof(row));
+      } else {
+        for (int x = 0; x < 4; ++x) {
+          const VoxelIndex v{first.x + x, first.y + y, first.z + z};
+          if (grid_.contains(v)) row[x] = density_[grid_.index(v.x, v.y, v.z)];
+        }
       }
+      const Row d = __builtin_convertvector(row, Row);
+      rows[static_cast<std::size_t>(y)] =
+          __builtin_shufflevector(d, d, 2, 3, 2, 3) +
+          Row{1.0F, 1.0F, -1.0F, -1.0F} * __builtin_shufflevector(d, d, 0, 1, 0, 1);
     }
-    return __builtin_convertvector(row, Row);
-  };
-  // The weights of four voxels on an axis in the sum of the cube's two sides, and in their
-  // difference.
-  struct Weights {
-    std::array<float, 4> sum, rise;
-  };
-  const auto weights = [&](int axis) {
-    const float s = voxel[axis] - low[axis];
-    return Weights{{1.0F - s, s, 1.0F - s, s}, {s - 1.0F, -s, 1.0F - s, s}};
-  };
-  const Weights by_x = weights(0), by_y = weights(1), by_z = weights(2);
-  Row sums{}, rises_y{}, rises_z{};
-  for (std::size_t z = 0; z < 4; ++z) {
-    Row layer{}, layer_rise{};
-    for (std::size_t y = 0; y < 4; ++y) {
-      const Row row = row_at(static_cast<int>(y), static_cast<int>(z));
-      layer += by_y.sum[y] * row;
-      layer_rise += by_y.rise[y] * row;
-    }
-    sums += by_z.sum[z] * layer;
-    rises_y += by_z.sum[z] * layer_rise;
-    rises_z += by_z.rise[z] * layer;
+    const auto layer = static_cast<std::size_t>(z);
+    sums[layer] = {rows[0] + rows[2], rows[1] + rows[3]};
+    rises[layer] = {rows[2] - rows[0], rows[3] - rows[1]};
   }
-  glm::vec3 gradient(0.0F);
-  for (int x = 0; x < 4; ++x) {
-    const auto i = static_cast<std::size_t>(x);
-    gradient +=
-        glm::vec3(by_x.rise[i] * sums[x], by_x.sum[i] * rises_y[x], by_x.sum[i] * rises_z[x]);
+  for (std::size_t corner = 0; corner < 4; ++corner) {
+    const std::size_t y = corner & 1, z = corner >> 1;
+    cell.z_and_x[corner] = __builtin_shufflevector(sums[z + 2][y] - sums[z][y],
+                                                   sums[z + 2][y] + sums[z][y], 0, 1, 6, 7);
+    cell.y[corner] = rises[z][y] + rises[z + 2][y];
   }
-  return gradient / static_cast<float>(kDensityMax);
+  return cell;
 }
 
 }  // namespace kerf

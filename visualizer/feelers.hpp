@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <span>
 #include <vector>
 
@@ -33,12 +34,20 @@ class Feelers {
   /// pixels: a look at its corners.
   [[nodiscard]] bool may_reach(const PixelRect& tile, float nearest, float farthest) const;
   /// Whether the shade of pixel (x, y), whose surface is at this window depth, may have changed.
-  [[nodiscard]] bool may_reach(int x, int y, float window_depth) const;
+  [[nodiscard]] bool may_reach(int x, int y, float window_depth);
 
  private:
+  using Row = float __attribute__((vector_size(16)));
   struct Box {
     glm::vec3 lo, hi;
-    [[nodiscard]] bool contains(const glm::vec3& p) const;
+  };
+
+  /// The gradients at the corners of a cube of eight voxels: many pixels show the same one.
+  struct Cell {
+    bool made = false;
+    VoxelIndex at;  ///< its lowest corner
+    /// By corner in y and z; of both in x the z parts, then the x parts; the y parts.
+    std::array<Row, 4> z_and_x, y;
   };
 
   /// From the eye to a pixel's centre, 1 mm along the view axis.
@@ -46,18 +55,23 @@ class Feelers {
   [[nodiscard]] float eye_mm(float window_depth) const;
   [[nodiscard]] float seen_from(const glm::vec3& along, float t) const;
   [[nodiscard]] float nearest_end(const glm::vec3& along) const;
-  [[nodiscard]] glm::vec3 gradient_at(const glm::vec3& voxel) const;
+  /// Whether one of the feelers of a point does.
+  [[nodiscard]] bool ends_in_change(const glm::vec3& at, const glm::vec3& outward) const;
+  [[nodiscard]] glm::vec3 gradient_at(const glm::vec3& voxel);
+  [[nodiscard]] const Cell& cell_at(VoxelIndex at);
 
   VoxelGrid grid_;
   std::span<const Density> density_;
   glm::mat3 voxel_from_eye_;
-  glm::vec3 origin_;  ///< the eye, in voxel edges
+  glm::mat3 outward_from_gradient_;  ///< up to a factor, where the surface faces the eye
+  glm::vec3 origin_;                 ///< the eye, in voxel edges
   glm::vec2 first_direction_, direction_per_pixel_;
   float near_mm_, far_mm_;
   std::vector<Box> ends_;                   ///< where the end of a feeler finds a change
   Box any_end_;                             ///< around all of them
   Box within_;                              ///< from where one can be felt
   glm::vec3 eye_centre_{}, eye_half_[3]{};  ///< `any_end_` in eye space
+  std::array<Cell, 128> cells_;             ///< made so far, by their place
   float longest_edge_mm_ = 0.0F;            ///< of a voxel
 };
 

@@ -41,8 +41,8 @@ bool Macrocells::update_cell(VoxelIndex cell, std::span<const Density> density) 
   return active_[at] != before;
 }
 
-bool Macrocells::update_bricks(const BrickGrid& bricks, std::span<const std::uint32_t> changed,
-                               std::span<const Density> density) {
+VoxelBox Macrocells::update_bricks(const BrickGrid& bricks, std::span<const std::uint32_t> changed,
+                                   std::span<const Density> density) {
   const std::int32_t per_brick = kBrickEdge / edge_;
   // Samples of a cell reach a voxel beyond it, so that bricks side by side share cells: each once.
   std::vector<std::size_t> touched;
@@ -63,25 +63,26 @@ bool Macrocells::update_bricks(const BrickGrid& bricks, std::span<const std::uin
   }
   std::sort(touched.begin(), touched.end());
   touched.erase(std::unique(touched.begin(), touched.end()), touched.end());
-  bool flipped = false;
+  VoxelBox flipped;
   for (const std::size_t cell : touched) {
     const auto i = static_cast<std::int32_t>(cell);
     const VoxelIndex at{i % grid_.nx, i / grid_.nx % grid_.ny, i / grid_.nx / grid_.ny};
-    flipped = update_cell(at, density) || flipped;
+    if (!update_cell(at, density)) continue;
+    flipped = flipped.united({at, {at.x + 1, at.y + 1, at.z + 1}});
   }
   return flipped;
 }
 
-std::vector<std::array<std::uint16_t, 4>> Macrocells::boundary_faces() const {
+std::vector<std::array<std::uint16_t, 4>> Macrocells::boundary_faces(const VoxelBox& cells) const {
   constexpr std::array<VoxelIndex, 6> kNeighbour{
       {{-1, 0, 0}, {1, 0, 0}, {0, -1, 0}, {0, 1, 0}, {0, 0, -1}, {0, 0, 1}}};
   const auto is_active = [this](VoxelIndex c) {
     return grid_.contains(c) && active_[grid_.index(c.x, c.y, c.z)] != 0;
   };
   std::vector<std::array<std::uint16_t, 4>> faces;
-  for (std::int32_t z = 0; z < grid_.nz; ++z) {
-    for (std::int32_t y = 0; y < grid_.ny; ++y) {
-      for (std::int32_t x = 0; x < grid_.nx; ++x) {
+  for (std::int32_t z = cells.lo.z; z < cells.hi.z; ++z) {
+    for (std::int32_t y = cells.lo.y; y < cells.hi.y; ++y) {
+      for (std::int32_t x = cells.lo.x; x < cells.hi.x; ++x) {
         if (!is_active({x, y, z})) continue;
         for (std::size_t face = 0; face < kNeighbour.size(); ++face) {
           const VoxelIndex n = kNeighbour[face];

@@ -25,10 +25,10 @@ class Macrocells {
   Macrocells(VoxelGrid volume, std::span<const Density> density, Density iso,
              std::int32_t edge = kEdge);
 
-  /// Recomputes the cells that bricks `changed` touch. Returns whether a cell became active or
-  /// inactive.
-  bool update_bricks(const BrickGrid& bricks, std::span<const std::uint32_t> changed,
-                     std::span<const Density> density);
+  /// Recomputes the cells that bricks `changed` touch. Returns the smallest box around the cells
+  /// that became active or inactive.
+  VoxelBox update_bricks(const BrickGrid& bricks, std::span<const std::uint32_t> changed,
+                         std::span<const Density> density);
 
   [[nodiscard]] const VoxelGrid& grid() const noexcept { return grid_; }
   [[nodiscard]] std::span<const Density> maxima() const noexcept { return maxima_; }
@@ -37,7 +37,12 @@ class Macrocells {
 
   /// Faces between an active cell and an inactive one or the outside, `{x, y, z, face}` with face
   /// 2*axis + (1 when on the high side): where a ray enters or leaves what it must sample.
-  [[nodiscard]] std::vector<std::array<std::uint16_t, 4>> boundary_faces() const;
+  [[nodiscard]] std::vector<std::array<std::uint16_t, 4>> boundary_faces() const {
+    return boundary_faces(grid_.box());
+  }
+  /// The same of the active cells in a box within `grid()`.
+  [[nodiscard]] std::vector<std::array<std::uint16_t, 4>> boundary_faces(
+      const VoxelBox& cells) const;
 
  private:
   bool update_cell(VoxelIndex cell, std::span<const Density> density);

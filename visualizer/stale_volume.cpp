@@ -43,9 +43,11 @@ Covered covered_by(const VoxelBox& box, const VolumeView& volume, const View& vi
 class KeptDepth {
  public:
   KeptDepth(const RenderTarget& of, const StaleTiles& tiles, const PixelRect& part) {
-    const PixelRect in = tiles.tiles_of(part);
-    pixels_ = tiles.pixels_of(in.x0, in.y0).united(tiles.pixels_of(in.x1 - 1, in.y1 - 1));
+    within_ = tiles.tiles_of(part);
+    pixels_ = tiles.pixels_of(within_.x0, within_.y0)
+                  .united(tiles.pixels_of(within_.x1 - 1, within_.y1 - 1));
     window_ = of.read_depth(pixels_);
+    ranges_.resize(static_cast<std::size_t>(within_.area()));
   }
 
   [[nodiscard]] const float* row(int y) const {
@@ -53,31 +55,48 @@ class KeptDepth {
            static_cast<std::ptrdiff_t>(y - pixels_.y0) * (pixels_.x1 - pixels_.x0) - pixels_.x0;
   }
   struct Range {
-    float nearest, farthest;
+    float nearest = 1.0F, farthest = 0.0F;
+    void add(const Range& other) {
+      nearest = std::min(nearest, other.nearest);
+      farthest = std::max(farthest, other.farthest);
+    }
   };
-  [[nodiscard]] Range range(const PixelRect& pixels) const {
-    Range range{1.0F, 0.0F};
-    for (int y = pixels.y0; y < pixels.y1; ++y) {
-      for (int x = pixels.x0; x < pixels.x1; ++x) {
-        range.nearest = std::min(range.nearest, row(y)[x]);
-        range.farthest = std::max(range.farthest, row(y)[x]);
+  /// Of all pixels of these tiles.
+  [[nodiscard]] Range range(const PixelRect& tiles) {
+    Range range;
+    for (int y = tiles.y0; y < tiles.y1; ++y) {
+      for (int x = tiles.x0; x < tiles.x1; ++x) range.add(tile_range(x, y));
+    }
+    return range;
+  }
+  /// Of a tile; worked out when it is asked for first.
+  [[nodiscard]] const Range& tile_range(int x, int y) {
+    Range& range = ranges_[static_cast<std::size_t>((y - within_.y0) * (within_.x1 - within_.x0) +
+                                                    x - within_.x0)];
+    if (range.nearest > range.farthest) {
+      constexpr int kEdge = StaleTiles::kEdge;
+      for (int py = y * kEdge; py < std::min((y + 1) * kEdge, pixels_.y1); ++py) {
+        for (int px = x * kEdge; px < std::min((x + 1) * kEdge, pixels_.x1); ++px) {
+          range.add({row(py)[px], row(py)[px]});
+        }
       }
     }
     return range;
   }
 
  private:
+  PixelRect within_;  ///< tiles
   PixelRect pixels_;
   std::vector<float> window_;
+  std::vector<Range> ranges_;  ///< by tile; upside down where nobody has asked
 };
 
-/// Calls `look` for each tile of `pixels` that is not marked, and marks it where that says so.
+/// Calls `look` for each of these tiles that is not marked, and marks it where that says so.
 template <class Look>
-void mark_where(StaleTiles& tiles, const PixelRect& pixels, const Look& look) {
-  const PixelRect within = tiles.tiles_of(pixels);
+void mark_where(StaleTiles& tiles, const PixelRect& within, const Look& look) {
   for (int y = within.y0; y < within.y1; ++y) {
     for (int x = within.x0; x < within.x1; ++x) {
-      if (!tiles.marked(x, y) && look(tiles.pixels_of(x, y))) tiles.mark(x, y);
+      if (!tiles.marked(x, y) && look(x, y)) tiles.mark(x, y);
     }
   }
 }
@@ -125,20 +144,18 @@ void StaleVolume::mark(StaleTiles& tiles, const Renderer& renderer, const Volume
   }
   all = all.united(felt);
   if (all.empty()) return;
-  const KeptDepth depth(kept, tiles, all);
+  KeptDepth depth(kept, tiles, all);
   for (const Covered& box : covered) {
     // What is in sight before the box hides it.
-    mark_where(tiles, box.pixels,
-               [&](const PixelRect& tile) { return depth.range(tile).farthest >= box.from; });
+    mark_where(tiles, tiles.tiles_of(box.pixels),
+               [&](int x, int y) { return depth.tile_range(x, y).farthest >= box.from; });
   }
   if (felt.empty()) return;
-  const Feelers feelers(volume, density, differs_, view, kept.size());
-  const auto is_near = [&](const PixelRect& pixels) {
-    const auto [nearest, farthest] = depth.range(pixels);
-    return feelers.may_reach(pixels, nearest, farthest);
-  };
-  const auto is_felt = [&](const PixelRect& tile) {
-    if (!is_near(tile)) return false;
+  Feelers feelers(volume, density, differs_, view, kept.size());
+  const auto is_felt = [&](int tile_x, int tile_y) {
+    const PixelRect tile = tiles.pixels_of(tile_x, tile_y);
+    const auto [nearest, farthest] = depth.tile_range(tile_x, tile_y);
+    if (!feelers.may_reach(tile, nearest, farthest)) return false;
     for (int y = tile.y0; y < tile.y1; ++y) {
       for (int x = tile.x0; x < tile.x1; ++x) {
         const float at = depth.row(y)[x];
@@ -148,12 +165,15 @@ void StaleVolume::mark(StaleTiles& tiles, const Renderer& renderer, const Volume
     return false;
   };
   // Most of it is far from the change: many tiles at once.
-  constexpr int kManyTiles = 4 * StaleTiles::kEdge;
-  const PixelRect whole = felt.clipped({0, 0, kept.size().width, kept.size().height});
-  for (int y = whole.y0 / kManyTiles * kManyTiles; y < whole.y1; y += kManyTiles) {
-    for (int x = whole.x0 / kManyTiles * kManyTiles; x < whole.x1; x += kManyTiles) {
-      const PixelRect some = PixelRect{x, y, x + kManyTiles, y + kManyTiles}.clipped(whole);
-      if (is_near(some)) mark_where(tiles, some, is_felt);
+  constexpr int kMany = 4;
+  const PixelRect whole = tiles.tiles_of(felt);
+  for (int y = whole.y0; y < whole.y1; y += kMany) {
+    for (int x = whole.x0; x < whole.x1; x += kMany) {
+      const PixelRect some = PixelRect{x, y, x + kMany, y + kMany}.clipped(whole);
+      const auto [nearest, farthest] = depth.range(some);
+      const PixelRect pixels =
+          tiles.pixels_of(some.x0, some.y0).united(tiles.pixels_of(some.x1 - 1, some.y1 - 1));
+      if (feelers.may_reach(pixels, nearest, farthest)) mark_where(tiles, some, is_felt);
     }
   }
 }

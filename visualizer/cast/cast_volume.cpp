@@ -46,7 +46,8 @@ CastVolume::CastVolume(const VolumeView& volume, const CastContent& content, Cas
       cells_(volume.bricks.grid, content.density, least_visible(mode, volume, content.matter),
              kCastCellVox) {
   set_materials(content.matter.materials);
-  take_cells();
+  active_.resize(cells_.active().size() + sizeof(std::uint32_t));
+  take_cells(cells_.grid().box());
   density_.copy(bricks_.grid.box(), content.density);
   if (mode == CastMode::blend) gradient_.emplace(bricks_.grid, density_);
   if (content.labels.empty()) return;
@@ -67,13 +68,8 @@ double CastVolume::edge_mm() const {
 }
 
 std::optional<BoxCorners> CastVolume::body() const {
-  if (outer_cells_.empty()) return std::nullopt;
-  glm::ivec3 low(std::numeric_limits<int>::max());
-  glm::ivec3 high(0);
-  for (const auto& [x, y, z] : outer_cells_) {
-    low = glm::min(low, glm::ivec3(x, y, z));
-    high = glm::max(high, glm::ivec3(x, y, z) + 1);
-  }
+  if (body_.empty()) return std::nullopt;
+  const auto& [low, high] = body_;
   BoxCorners corners;
   for (std::size_t i = 0; i < corners.size(); ++i) {
     const glm::ivec3 cell((i & 1) != 0 ? high.x : low.x, (i & 2) != 0 ? high.y : low.y,
@@ -90,22 +86,40 @@ void CastVolume::update_bricks(std::span<const Density> density,
   if (gradient_) {
     for (const std::uint32_t id : changed) gradient_->update(bricks_.voxels(id), density_);
   }
-  if (cells_.update_bricks(bricks_, changed, density)) take_cells();
+  const VoxelBox flipped = cells_.update_bricks(bricks_, changed, density);
+  if (!flipped.empty()) take_cells(flipped);
 }
 
-void CastVolume::take_cells() {
-  active_.assign(cells_.active().begin(), cells_.active().end());
-  active_.resize(active_.size() + sizeof(std::uint32_t));
-  outer_cells_.clear();
-  for (const auto& [x, y, z, face] : cells_.boundary_faces()) outer_cells_.push_back({x, y, z});
+void CastVolume::take_cells(const VoxelBox& cells) {
+  const VoxelGrid& grid = cells_.grid();
+  for (std::int32_t z = cells.lo.z; z < cells.hi.z; ++z) {
+    for (std::int32_t y = cells.lo.y; y < cells.hi.y; ++y) {
+      const auto from =
+          cells_.active().begin() + static_cast<std::ptrdiff_t>(grid.index(cells.lo.x, y, z));
+      std::copy_n(from, cells.hi.x - cells.lo.x,
+                  active_.begin() + (from - cells_.active().begin()));
+    }
+  }
+  const VoxelBox near = cells.grown(1).clipped(grid.box());
+  std::erase_if(outer_cells_, [&](const CellBlocks::Cell& cell) {
+    return near.contains({cell[0], cell[1], cell[2]});
+  });
+  const auto first = static_cast<std::ptrdiff_t>(outer_cells_.size());
+  for (const auto& [x, y, z, face] : cells_.boundary_faces(near)) outer_cells_.push_back({x, y, z});
   // The faces of a cell come together.
-  outer_cells_.erase(std::unique(outer_cells_.begin(), outer_cells_.end()), outer_cells_.end());
+  outer_cells_.erase(std::unique(outer_cells_.begin() + first, outer_cells_.end()),
+                     outer_cells_.end());
+  body_ = {};
+  for (const auto& [x, y, z] : outer_cells_) {
+    body_ = body_.united({{x, y, z}, {x + 1, y + 1, z + 1}});
+  }
 }
 
-CastVolumeJob CastVolume::job(const View& view, std::int32_t width, std::int32_t height) {
+CastVolumeJob CastVolume::job(const View& view, std::int32_t width, std::int32_t height,
+                              const PixelRect& part) {
   const glm::dmat4 world_from_shell = glm::translate(world_from_voxel_, glm::dvec3(-kShell));
   blocks_.draw(outer_cells_, glm::scale(world_from_shell, glm::dvec3(kCastCellVox)), view, width,
-               height);
+               height, part);
   const glm::dmat4 place_from_eye = glm::affineInverse(view.eye_from_world * world_from_shell);
   const VoxelGrid& grid = bricks_.grid;
   const glm::ivec3 extent(grid.nx, grid.ny, grid.nz);

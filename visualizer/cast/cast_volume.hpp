@@ -51,11 +51,13 @@ class CastVolume {
   [[nodiscard]] double edge_mm() const;  ///< the shortest
   /// A box around all that can be seen of it; nothing can where there is none.
   [[nodiscard]] std::optional<BoxCorners> body() const;
-  /// For a picture of `width` x `height`; good until the next call of anything.
-  [[nodiscard]] CastVolumeJob job(const View& view, std::int32_t width, std::int32_t height);
+  /// For a part of a picture of `width` x `height`; good until the next call of anything.
+  [[nodiscard]] CastVolumeJob job(const View& view, std::int32_t width, std::int32_t height,
+                                  const PixelRect& part);
 
  private:
-  void take_cells();
+  /// What cells in a box are, and what that makes of their neighbours.
+  void take_cells(const VoxelBox& cells);
 
   BrickGrid bricks_;
   glm::dmat4 world_from_voxel_;
@@ -67,6 +69,7 @@ class CastVolume {
   Macrocells cells_;
   std::vector<std::uint8_t> active_;           ///< of the cells, and room to load four at the last
   std::vector<CellBlocks::Cell> outer_cells_;  ///< active, with a face to an empty one
+  VoxelBox body_;                              ///< around them
   CellBlocks blocks_;
 };
 

@@ -62,11 +62,13 @@ void Caster::set_materials(const Palette& materials) {
 
 void Caster::draw(const View& view, std::span<const PixelRect> parts, CastPicture& picture,
                   std::span<const float> end_depth, std::span<float> normals) {
+  PixelRect bounds;
+  for (const PixelRect& part : parts) bounds = bounds.united(part);
   CastJob job;
   double shortest_mm = view.far_mm;
   for (CastVolume& volume : volumes_) {
     shortest_mm = std::min(shortest_mm, volume.edge_mm());
-    job.volumes[job.volume_count++] = volume.job(view, picture.width, picture.height);
+    job.volumes[job.volume_count++] = volume.job(view, picture.width, picture.height, bounds);
   }
   job.pixels = {picture.width,
                 picture.height,

@@ -11,13 +11,38 @@ namespace {
 constexpr double kSlack = 1e-4;  // of a distance; and pixels: the kernels compute with 24 bits
 constexpr CastBlock kEmpty{1e30F, 0.0F};
 
+/// The planes through the eye and the sides of a rectangle of blocks, positive outside of it for
+/// all of a cell whose lowest corner is taken.
+std::array<glm::dvec4, 4> sides_of(const PixelRect& blocks, const glm::dmat4x3& pixel_from_cell) {
+  const glm::dmat3x4 row = glm::transpose(pixel_from_cell);
+  const auto pixel = [](std::int32_t block) { return static_cast<double>(block * kCastBlock); };
+  std::array<glm::dvec4, 4> sides{
+      (pixel(blocks.x0) - kSlack) * row[2] - row[0], row[0] - (pixel(blocks.x1) + kSlack) * row[2],
+      (pixel(blocks.y0) - kSlack) * row[2] - row[1], row[1] - (pixel(blocks.y1) + kSlack) * row[2]};
+  for (glm::dvec4& side : sides) {
+    for (int axis = 0; axis < 3; ++axis) side.w += std::min(side[axis], 0.0);
+  }
+  return sides;
+}
+
+bool is_beside(const CellBlocks::Cell& cell, const std::array<glm::dvec4, 4>& sides) {
+  return std::any_of(sides.begin(), sides.end(), [&](const glm::dvec4& side) {
+    return cell[0] * side.x + cell[1] * side.y + cell[2] * side.z + side.w > 0.0;
+  });
+}
+
 }  // namespace
 
 void CellBlocks::draw(std::span<const Cell> cells, const glm::dmat4& world_from_cell,
-                      const View& view, std::int32_t width, std::int32_t height) {
-  across_ = (width + kCastBlock - 1) / kCastBlock;
-  along_ = (height + kCastBlock - 1) / kCastBlock;
-  blocks_.assign(static_cast<std::size_t>(across_) * static_cast<std::size_t>(along_), kEmpty);
+                      const View& view, std::int32_t width, std::int32_t height,
+                      const PixelRect& part) {
+  const auto up = [](std::int32_t pixels) { return (pixels + kCastBlock - 1) / kCastBlock; };
+  across_ = up(width);
+  blocks_.resize(static_cast<std::size_t>(across_) * static_cast<std::size_t>(up(height)));
+  drawn_ = {part.x0 / kCastBlock, part.y0 / kCastBlock, up(part.x1), up(part.y1)};
+  for (std::int32_t y = drawn_.y0; y < drawn_.y1; ++y) {
+    std::fill_n(blocks_.begin() + y * across_ + drawn_.x0, drawn_.x1 - drawn_.x0, kEmpty);
+  }
   // x and y in pixels times the distance, which is z.
   glm::dmat4 pixel_from_eye(0.0);
   pixel_from_eye[0][0] = 0.5 * width / (view.tan_half_height * view.aspect);
@@ -26,7 +51,9 @@ void CellBlocks::draw(std::span<const Cell> cells, const glm::dmat4& world_from_
       glm::dvec4(pixel_from_eye[0][0] * view.middle_right - 0.5 * width, -0.5 * height, -1.0, 0.0);
   pixel_from_eye[3][3] = 1.0;
   const glm::dmat4x3 pixel_from_cell(pixel_from_eye * view.eye_from_world * world_from_cell);
+  const std::array<glm::dvec4, 4> sides = sides_of(drawn_, pixel_from_cell);
   for (const Cell& cell : cells) {
+    if (is_beside(cell, sides)) continue;
     const glm::dvec3 corner = pixel_from_cell * glm::dvec4(cell[0], cell[1], cell[2], 1.0);
     glm::dvec2 low(1e30);
     glm::dvec2 high(-1e30);
@@ -53,14 +80,14 @@ void CellBlocks::draw(std::span<const Cell> cells, const glm::dmat4& world_from_
 }
 
 void CellBlocks::cover(const glm::dvec2& low, const glm::dvec2& high, const CastBlock& range) {
-  const auto block = [](double pixel, std::int32_t count) {
+  const auto block = [](double pixel, std::int32_t first, std::int32_t end) {
     return static_cast<std::int32_t>(
-        std::clamp(std::floor(pixel / kCastBlock), -1.0, static_cast<double>(count)));
+        std::clamp(std::floor(pixel / kCastBlock), first - 1.0, static_cast<double>(end)));
   };
-  const std::int32_t x0 = std::max(block(low.x, across_), 0);
-  const std::int32_t x1 = std::min(block(high.x, across_), across_ - 1);
-  const std::int32_t y0 = std::max(block(low.y, along_), 0);
-  const std::int32_t y1 = std::min(block(high.y, along_), along_ - 1);
+  const std::int32_t x0 = std::max(block(low.x, drawn_.x0, drawn_.x1), drawn_.x0);
+  const std::int32_t x1 = std::min(block(high.x, drawn_.x0, drawn_.x1), drawn_.x1 - 1);
+  const std::int32_t y0 = std::max(block(low.y, drawn_.y0, drawn_.y1), drawn_.y0);
+  const std::int32_t y1 = std::min(block(high.y, drawn_.y0, drawn_.y1), drawn_.y1 - 1);
   for (std::int32_t y = y0; y <= y1; ++y) {
     for (std::int32_t x = x0; x <= x1; ++x) {
       CastBlock& at = blocks_[static_cast<std::size_t>(y * across_ + x)];

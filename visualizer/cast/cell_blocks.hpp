@@ -18,18 +18,19 @@ class CellBlocks {
  public:
   using Cell = std::array<std::uint16_t, 3>;
 
-  /// For a picture of `width` x `height` seen through `view`. `cells` are the active ones that have
-  /// a face to an empty one or to the outside.
+  /// For a part of a picture of `width` x `height` seen through `view`. `cells` are the active ones
+  /// that have a face to an empty one or to the outside.
   void draw(std::span<const Cell> cells, const glm::dmat4& world_from_cell, const View& view,
-            std::int32_t width, std::int32_t height);
+            std::int32_t width, std::int32_t height, const PixelRect& part);
 
-  /// `CastVolumeJob::blocks`.
+  /// `CastVolumeJob::blocks`; those beside the part are left over from other ones.
   [[nodiscard]] const CastBlock* data() const noexcept { return blocks_.data(); }
 
  private:
   void cover(const glm::dvec2& low, const glm::dvec2& high, const CastBlock& range);
 
-  std::int32_t across_ = 0, along_ = 0;
+  std::int32_t across_ = 0;
+  PixelRect drawn_;  ///< blocks of the part
   std::vector<CastBlock> blocks_;
 };
 
