@@ -123,7 +123,7 @@ expect 'the way of drawing reaches the visualizer' kerf_gives 0 demo --seconds 1
 expect 'as it was said' called '^visualizer.*--renderer cast '
 expect 'an arm on FireWire' kerf_gives 0 demo --seconds 1 --port fw
 expect 'is where the emulator mounts it' called '^emulator.*--front fuse --mount .*/bus '
-expect 'and the controller looks' called '^controller.*--port fw:.*/bus '
+expect 'and the controller looks' called '^controller.*--port fw:.*/bus/fw1 '
 expect 'and leaves nothing behind' nothing_survives
 expect 'two eyes, opacities and a video' \
   kerf_gives 0 demo --seconds 1 --stereo --transfer t.toml --record v.y4m

@@ -23,6 +23,7 @@ namespace {
 
 const std::string kBin = KERF_TEST_BIN;
 const std::string kScenes = KERF_TEST_SCENES;
+const std::string kTorqueScale = "0.342,0.342,0.342";  // of the emulated Omni
 
 std::string unique_name() {
   static int count = 0;
@@ -53,6 +54,8 @@ struct Pair {
     std::vector<std::string> servo{kBin + "/kerf-controller",
                                    "--scene",
                                    kScenes + "/phantom.toml",
+                                   "--torque-scale",
+                                   kTorqueScale,
                                    "--port",
                                    "socket:" + socket,
                                    "--name",
@@ -229,9 +232,9 @@ TEST_CASE("a second controller of the same name is refused in one line") {
   pair.start("touch.toml", {});
   REQUIRE(
       eventually([&] { return std::filesystem::exists(kerf::segment_socket(pair.name)); }, 20s));
-  const std::string line =
-      refused({kBin + "/kerf-controller", "--scene", kScenes + "/phantom.toml", "--port",
-               "socket:" + (pair.folder / "none").string(), "--name", pair.name});
+  const std::string line = refused(
+      {kBin + "/kerf-controller", "--scene", kScenes + "/phantom.toml", "--torque-scale",
+       kTorqueScale, "--port", "socket:" + (pair.folder / "none").string(), "--name", pair.name});
   CHECK(line.find(pair.name) != std::string::npos);
 }
 
