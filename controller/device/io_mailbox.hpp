@@ -82,14 +82,10 @@ class Outbox {
   }
   /// The reader. Size of the oldest packet; 0 when there is none.
   [[nodiscard]] std::size_t take(std::span<std::uint8_t> out) noexcept {
-    Place* oldest = nullptr;
-    std::uint64_t lowest = ~std::uint64_t{0};
-    for (Place& place : places_) {
-      const std::uint64_t ticket = place.ticket.load(std::memory_order_acquire);
-      if (ticket < kFirstTicket || ticket >= lowest) continue;
-      lowest = ticket;
-      oldest = &place;
-    }
+    // A packet may come to a place that was looked at already, and a later one to a place that was
+    // not yet: who sees the later one sees both when looking again.
+    Place* oldest = find_oldest();
+    for (Place* again = find_oldest(); again != oldest; again = find_oldest()) oldest = again;
     if (!oldest) return 0;
     on_its_way_.store(true);  // before the place is free: `wait_until_sent` looks at both
     const std::size_t size = oldest->packet.copy_to(out);
@@ -125,6 +121,18 @@ class Outbox {
     MailboxPacket packet;
   };
   static_assert(std::atomic<std::uint64_t>::is_always_lock_free);
+
+  [[nodiscard]] Place* find_oldest() noexcept {
+    Place* oldest = nullptr;
+    std::uint64_t lowest = ~std::uint64_t{0};
+    for (Place& place : places_) {
+      const std::uint64_t ticket = place.ticket.load(std::memory_order_acquire);
+      if (ticket < kFirstTicket || ticket >= lowest) continue;
+      lowest = ticket;
+      oldest = &place;
+    }
+    return oldest;
+  }
 
   std::array<Place, kPlaces> places_{};
   std::atomic<std::uint64_t> next_ticket_{kFirstTicket};
