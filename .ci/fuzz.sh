@@ -38,4 +38,4 @@ export UBSAN_OPTIONS=halt_on_error=1:print_stacktrace=1
 
 while read -r name corpus; do
   if (($# < 2)) || [[ " ${*:2} " == *" $name "* ]]; then echo "$name $corpus"; fi
-done <"$build/tests/fuzz/fuzzers" | nice xargs -P "$(nproc)" -L 1 bash -c 'fuzz "$@"' fuzz
+done <"$build/tests/fuzz/fuzzers" | nice xargs -P "$(nproc)" -L 1 bash -c 'fuzz "$@"' fuzz || exit 1
