@@ -10,7 +10,9 @@
 #include <thread>
 
 #include <doctest/doctest.h>
+#include <linux/futex.h>
 #include <sys/mman.h>
+#include <sys/syscall.h>
 #include <unistd.h>
 
 #include "controller/device/omni_driver.hpp"
@@ -33,7 +35,7 @@ namespace {
 using kerf::test::Process;
 using kerf::test::TemporaryFolder;
 
-enum class Seed { none, allocation, page, call };
+enum class Seed { none, allocation, page, call, wake, lock };
 
 /// The socket port; while it takes a packet it does what a clean loop must not, `kSeeds` times.
 class SeededPort final : public kerf::PacketPort {
@@ -79,6 +81,10 @@ class SeededPort final : public kerf::PacketPort {
       pages_[planted * page_] = 1;
     } else if (seed_ == Seed::call) {
       static_cast<void>(!write(sink_, "", 1));
+    } else if (seed_ == Seed::wake) {
+      syscall(SYS_futex, &word_, FUTEX_WAKE_PRIVATE, 1, nullptr, nullptr, 0);
+    } else if (seed_ == Seed::lock) {  // returns at once: the word is another one
+      syscall(SYS_futex, &word_, FUTEX_WAIT_PRIVATE, 1, nullptr, nullptr, 0);
     }
     ++planted;
   }
@@ -87,6 +93,7 @@ class SeededPort final : public kerf::PacketPort {
   kerf::PacketPort& port_;
   Seed seed_;
   int sink_;
+  int word_ = 0;
   std::size_t page_ = static_cast<std::size_t>(sysconf(_SC_PAGESIZE));
   volatile char* pages_ = nullptr;
 };
@@ -196,5 +203,7 @@ TEST_CASE("the guard lets a clean loop pass, and ends one that makes another cal
   CHECK(called.end == kerf::EndReason::stopped);
   CHECK(called.planted <= 3);  // within its tick
   CHECK(called.record.ticks < 1500);
+  CHECK(run_loop(Seed::lock, true).guarded_call == "futex");
+  CHECK(run_loop(Seed::wake, true).guarded_call == "");
 }
 #endif
