@@ -29,7 +29,7 @@ TEST_CASE("hid: from the calibration button to a force, with short and with long
       const auto course = session.run(8000, [](const auto& c) { return c.contact > 300; });
       CHECK(course.contact > 300);
       CHECK(course.motors > 300);
-      CHECK(course.fresh > course.ticks * 8 / 10);
+      if (kerf::test::kKeepsTime) CHECK(course.fresh > course.ticks * 8 / 10);
       CHECK(session.driver().refused() == 0);
       CHECK(session.driver().release());
     }
@@ -84,7 +84,7 @@ TEST_CASE("hid: a servo that stops reading for a while finds the newest state ag
   static_cast<void>(session.run(50));
   kerf::sleep_until_ns(kerf::monotonic_ns() + 100'000'000);  // more than the kernel's queue holds
   const auto course = session.run(100);
-  CHECK(course.fresh > 90);
+  if (kerf::test::kKeepsTime) CHECK(course.fresh > 90);
   CHECK(session.driver().refused() == 0);
 }
 

@@ -65,7 +65,7 @@ TEST_CASE("usb: from power-up over firmware and homing to a force") {
     CHECK(course.contact > 300);
     CHECK(course.motors > 300);
     // Taking turns, a tick that falls just before the answer gets it one tick later.
-    CHECK(course.fresh > course.ticks * 4 / 10);
+    if (kerf::test::kKeepsTime) CHECK(course.fresh > course.ticks * 4 / 10);
     CHECK(session.driver().refused() == 0);
     CHECK(session.driver().release());
     CHECK(port.stats().strays == 0);
@@ -159,7 +159,7 @@ TEST_CASE("usb: packets in pieces are put together, none is bad") {
   UsbPort port({falcon.path(), ""}, 0, kGoOn);
   ServoSession session(Personality::falcon, port);
   const auto course = session.run(1000);
-  CHECK(course.fresh > 600);  // every other frame while it lasts
+  if (kerf::test::kKeepsTime) CHECK(course.fresh > 600);  // every other frame while it lasts
   CHECK(course.longest_gap < 200);
   CHECK(session.driver().refused() == 0);
   CHECK(port.stats().strays == 0);

@@ -24,6 +24,13 @@
 
 namespace kerf::test {
 
+/// Sanitizers slow both ends down: how fresh reports are says nothing then.
+#ifdef KERF_SANITIZED
+inline constexpr bool kKeepsTime = false;
+#else
+inline constexpr bool kKeepsTime = true;
+#endif
+
 inline const std::atomic<bool> kGoOn{false};
 
 /// Faults at these milliseconds since the node was made.
