@@ -163,7 +163,8 @@ bool HidPort::send(std::span<const std::uint8_t> packet) noexcept {
 }
 
 bool HidPort::send_last(std::span<const std::uint8_t> packet) noexcept {
-  return send(packet) && gettid() != thread_id_ && outbox_.wait_until_sent(kLastPacketMs);
+  if (gettid() == thread_id_) return false;  // nobody is left to send it
+  return outbox_.send_and_wait([&] { return send(packet); }, kLastPacketMs);
 }
 
 void HidPort::run() noexcept {

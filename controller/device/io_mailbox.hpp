@@ -87,7 +87,7 @@ class Outbox {
     Place* oldest = find_oldest();
     for (Place* again = find_oldest(); again != oldest; again = find_oldest()) oldest = again;
     if (!oldest) return 0;
-    on_its_way_.store(true);  // before the place is free: `wait_until_sent` looks at both
+    on_its_way_.store(true);  // before the place is free: `send_and_wait` looks at both
     const std::size_t size = oldest->packet.copy_to(out);
     oldest->ticket.store(kFree, std::memory_order_release);
     return size;
@@ -95,12 +95,16 @@ class Outbox {
   /// The reader: whether what it took has not left the process yet.
   void set_on_its_way(bool is) noexcept { on_its_way_.store(is); }
 
-  /// Any thread but the reader's, any signal handler: false when something is still here after so
-  /// many milliseconds.
-  bool wait_until_sent(int milliseconds) const noexcept {
-    for (int ms = 0; !empty() || on_its_way_.load(); ++ms) {
+  /// Any thread but the reader's, any signal handler: calls `send`, again while all places are
+  /// taken, and waits until everything has left; false when that takes longer than so many
+  /// milliseconds.
+  template <class Send>
+  bool send_and_wait(const Send& send, int milliseconds) const noexcept {
+    bool is_put = send();
+    for (int ms = 0; !is_put || !empty() || on_its_way_.load(); ++ms) {
       if (ms == milliseconds) return false;
       poll(nullptr, 0, 1);  // a sleep that signal handlers may call
+      is_put = is_put || send();
     }
     return true;
   }

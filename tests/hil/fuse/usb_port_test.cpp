@@ -3,11 +3,13 @@
 #include "controller/device/usb_port.hpp"
 
 #include <array>
+#include <chrono>
 #include <csignal>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <string>
+#include <thread>
 
 #include <doctest/doctest.h>
 #include <sys/wait.h>
@@ -123,6 +125,8 @@ TEST_CASE("usb: a program that crashes while it pushes switches the motors off f
   CHECK(waitpid(child, &status, 0) == child);
   CHECK(WIFSIGNALED(status));
   CHECK(WTERMSIG(status) == SIGABRT);
+  // The device outlives the program: it reads what it was sent, one packet in a frame of 1 ms.
+  std::this_thread::sleep_for(std::chrono::milliseconds(50));
   falcon.stop();
   CHECK(falcon.emulator().stats().peak_motor_force_n > 1);
   CHECK_FALSE(falcon.emulator().model().motors_on());
