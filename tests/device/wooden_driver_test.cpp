@@ -38,6 +38,19 @@ kerf::ServoOutput forcing() {
   return output;
 }
 
+/// The button is pressed there, and the driver sends what the encoders are to be set to.
+void press(FakePort& port, kerf::WoodenDriver& driver, std::array<std::int16_t, 3> encoder) {
+  push(port, encoder, true);
+  static_cast<void>(driver.read());
+  driver.command({});
+}
+/// As after a press in the home pose that the device has heard.
+void home(FakePort& port, kerf::WoodenDriver& driver) {
+  press(port, driver, {0, 0, 0});
+  push(port, {0, 0, 6000});
+  REQUIRE(driver.read().homed);
+}
+
 }  // namespace
 
 TEST_CASE("wooden: the host begins, with no current") {
@@ -81,11 +94,7 @@ TEST_CASE("wooden: the button sets the encoders; the arm is parked until it leav
 TEST_CASE("wooden: the button in use parks, and keeps the encoders as they are") {
   FakePort port;
   kerf::WoodenDriver driver(port);
-  push(port, {0, 0, 0}, true);
-  static_cast<void>(driver.read());
-  driver.command({});
-  push(port, {0, 0, 6000});
-  CHECK(driver.read().homed);
+  home(port, driver);
   push(port, {400, 1000, 5000});
   CHECK_FALSE(driver.read().parked);
   push(port, {400, 1000, 5000}, true);
@@ -104,11 +113,7 @@ TEST_CASE("wooden: the button in use parks, and keeps the encoders as they are")
 TEST_CASE("wooden: near home the button calibrates again") {
   FakePort port;
   kerf::WoodenDriver driver(port);
-  push(port, {0, 0, 0}, true);
-  static_cast<void>(driver.read());
-  driver.command({});
-  push(port, {0, 0, 6000});
-  CHECK(driver.read().homed);
+  home(port, driver);
   push(port, {30, 200, 6100}, true);  // slipped: home reads like this now
   CHECK_FALSE(driver.read().homed);
   driver.command({});
@@ -119,9 +124,7 @@ TEST_CASE("wooden: near home the button calibrates again") {
 TEST_CASE("wooden: counts that are not those of home after setting are no homing") {
   FakePort port;
   kerf::WoodenDriver driver(port);
-  push(port, {10, 20, 30}, true);
-  static_cast<void>(driver.read());
-  driver.command({});
+  press(port, driver, {10, 20, 30});
   push(port, {10, 20, 30});  // the firmware let the button go and set nothing
   CHECK_FALSE(driver.read().homed);
 }
