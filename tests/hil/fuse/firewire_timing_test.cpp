@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // In real time: how old is what the servo reads, and how long from a packet to the command that it
 // caused. Figures of the machine at hand; only medians are checked.
-#include <algorithm>
 #include <atomic>
 #include <cstdint>
 #include <string>
@@ -15,6 +14,10 @@
 #include "shared/posix/monotonic_clock.hpp"
 #include "shared/wire/omni_packet.hpp"
 #include "tests/hil/fuse/mounted_node.hpp"
+#include "tests/hil/fuse/spread.hpp"
+
+using kerf::test::Spread;
+using kerf::test::spread_of;
 
 namespace {
 
@@ -39,22 +42,6 @@ class EchoDevice final : public kerf::PacketDevice {
   kerf::omni::ReportBytes packet_{};
   std::vector<std::int64_t> loops_;
 };
-
-struct Spread {
-  std::int64_t p50 = 0, p99 = 0, p999 = 0, max = 0;
-};
-Spread spread_of(std::vector<std::int64_t> values) {
-  if (values.empty()) return {};
-  std::ranges::sort(values);
-  const auto at = [&](double share) {
-    return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1))];
-  };
-  return {at(0.5), at(0.99), at(0.999), values.back()};
-}
-std::string text(const Spread& s) {
-  return std::to_string(s.p50) + " / " + std::to_string(s.p99) + " / " + std::to_string(s.p999) +
-         " (" + std::to_string(s.max) + ")";
-}
 
 struct Figures {
   Spread age_us, io_us, loop_cycles;

@@ -23,6 +23,10 @@
 #include "shared/wire/falcon_packet.hpp"
 #include "shared/wire/wooden_packet.hpp"
 #include "tests/hil/fuse/mounted_node.hpp"
+#include "tests/hil/fuse/spread.hpp"
+
+using kerf::test::Spread;
+using kerf::test::spread_of;
 
 namespace {
 
@@ -115,22 +119,6 @@ class EchoDevice final : public kerf::PacketDevice {
   std::optional<Numbers> numbers_;
   decltype(Wire::answer({})) packet_{};
 };
-
-struct Spread {
-  std::int64_t p50 = 0, p99 = 0, p999 = 0, max = 0;
-};
-Spread spread_of(std::vector<std::int64_t> values) {
-  if (values.empty()) return {};
-  std::ranges::sort(values);
-  const auto at = [&](double share) {
-    return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1))];
-  };
-  return {at(0.5), at(0.99), at(0.999), values.back()};
-}
-std::string text(const Spread& s) {
-  return std::to_string(s.p50) + " / " + std::to_string(s.p99) + " / " + std::to_string(s.p999) +
-         " (" + std::to_string(s.max) + ")";
-}
 
 int seconds() {
   const char* wanted = std::getenv("KERF_TIMING_SECONDS");
