@@ -46,9 +46,8 @@ std::string picture_of(const std::vector<Entry>& entries) {
 
 }  // namespace
 
-Command::Command(CLI::App& app)
-    : app_(app.add_subcommand("accuracy",
-                              "each knob of the contact force against analytic shapes")) {
+Command::Command(CLI::App& program)
+    : LabCommand(program, "accuracy", "each knob of the contact force against analytic shapes") {
   app_->add_option("--report", report_, "write the figures as JSON")->type_name("FILE");
   app_->add_option("--csv", csv_, "write the figures as a table")->type_name("FILE");
   app_->add_option("--plot", plot_, "draw error against time as SVG")->type_name("FILE");
@@ -58,14 +57,9 @@ Command::Command(CLI::App& app)
       ->type_name("FILE");
   app_->add_option("--cpu", core_, "core to run on (default: the last)")
       ->check(CLI::Range(0, 1023));
-  app_->footer(app.get_footer());
 }
 
-bool Command::chosen() const {
-  return app_->parsed();
-}
-
-void Command::run(std::ostream& out) const {
+int Command::run(std::ostream& out) const {
   const std::filesystem::path plot = plot_.empty() && !page_.empty()
                                          ? std::filesystem::path(page_).replace_extension(".svg")
                                          : std::filesystem::path(plot_);
@@ -89,6 +83,7 @@ void Command::run(std::ostream& out) const {
     as_page.write(page(entries, std::filesystem::absolute(plot).lexically_proximate(folder)));
   }
   if (!plot.empty()) as_plot.write(picture_of(entries));
+  return 0;
 }
 
 }  // namespace kerf::accuracy

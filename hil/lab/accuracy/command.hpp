@@ -1,30 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <iosfwd>
 #include <string>
 
-namespace CLI {  // NOLINT(readability-identifier-naming): the library's name
-class App;
-}
+#include "hil/lab/lab_command.hpp"
 
 namespace kerf::accuracy {
 
-/// `kerf-lab accuracy`: its options, and the run.
-class Command {
+/// `kerf-lab accuracy`: each knob of the contact force against analytic shapes.
+class Command final : public LabCommand {
  public:
-  /// Adds the subcommand to the program; must live as long as `app` parses.
-  explicit Command(CLI::App& app);
-  Command(const Command&) = delete;
-  Command& operator=(const Command&) = delete;
-
-  /// After parsing.
-  [[nodiscard]] bool chosen() const;
-  /// Measures, tells each choice on `out`, writes the files. Throws `HilError`.
-  void run(std::ostream& out) const;
+  explicit Command(CLI::App& program);
+  [[nodiscard]] int run(std::ostream& out) const override;
 
  private:
-  CLI::App* app_;
   std::string report_, csv_, plot_, page_;
   int core_ = -1;
 };

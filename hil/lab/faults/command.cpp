@@ -130,8 +130,8 @@ nlohmann::ordered_json json_of(const Row& row) {
 
 }  // namespace
 
-Command::Command(CLI::App& app)
-    : app_(app.add_subcommand("faults", "every device and fault against the safety contract")) {
+Command::Command(CLI::App& program)
+    : LabCommand(program, "faults", "every device and fault against the safety contract") {
   for (const std::string_view word : kPersonalityWords) devices_.emplace_back(word);
   app_->add_option("--device", devices_, "only these")
       ->check(CLI::IsMember(devices_))
@@ -148,10 +148,6 @@ Command::Command(CLI::App& app)
   app_->add_option("--hand", hand_, "how")->capture_default_str();
   app_->add_option("--report", report_, "write the figures as JSON")->type_name("FILE");
   app_->footer("Exit codes: 0 the contract holds, 1 it was broken, 2 bad input or set-up.");
-}
-
-bool Command::chosen() const {
-  return app_->parsed();
 }
 
 int Command::run(std::ostream& out) const {

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <iosfwd>
+
+namespace CLI {  // NOLINT(readability-identifier-naming): the library's name
+class App;
+}
+
+namespace kerf {
+
+/// A subcommand of `kerf-lab`: its options, and the run. Lives as long as the program parses.
+class LabCommand {
+ public:
+  virtual ~LabCommand() = default;
+  LabCommand(const LabCommand&) = delete;
+  LabCommand& operator=(const LabCommand&) = delete;
+
+  /// After parsing.
+  [[nodiscard]] bool chosen() const;
+  /// Measures, tells each row on `out`, writes the files. Returns 1 where a check failed, else 0.
+  /// Throws `HilError`.
+  [[nodiscard]] virtual int run(std::ostream& out) const = 0;
+
+ protected:
+  LabCommand(CLI::App& program, const char* name, const char* about);
+
+  CLI::App* app_;
+};
+
+}  // namespace kerf
