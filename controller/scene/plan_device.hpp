@@ -89,6 +89,20 @@ inline std::int32_t motor_count_end(Personality personality) {
   return wooden::kMaxMilliamps;
 }
 
+/// No tip is farther than this from where its encoders, rounded to whole counts, put it: half a
+/// count of one joint with all of the arm behind it. The Omni's 0.056 mm is its data sheet's 0.055.
+inline double tip_noise_mm(Personality personality) {
+  switch (personality) {
+    case Personality::omni:
+      return omni::kRadPerCount * (omni::kUpperLinkMm + omni::kForearmMm) / 2;
+    case Personality::falcon:
+      return falcon::kRadPerCount * falcon::kThighMm / 2;
+    case Personality::woodenhaptics:
+      break;
+  }
+  return wooden::kRadPerCount[1] * (wooden::kUpperLinkMm + wooden::kForearmMm) / 2;
+}
+
 }  // namespace device_parts
 
 /// The device, its place in the scene and its motors, as the loop's numbers hold them.
@@ -130,6 +144,9 @@ void plan_limits(const Scene& scene, ServoPlan<N>& plan) {
     return std::max(1U, static_cast<std::uint32_t>(ms * rate_hz / 1000.0));
   };
   plan.rate_hz = scene.servo.rate_hz;
+  plan.velocity = {.rate_hz = scene.servo.rate_hz,
+                   .stride = std::max(1, scene.servo.rate_hz / 1000),
+                   .noise_mm = Real(device_parts::tip_noise_mm(scene.device.personality))};
   constexpr double kStep = 1.0 / 65536;  // the limit is rounded down, not to nearest
   plan.limits.peak_n = Real(scene.limits.force_n - kStep);
   plan.limits.continuous_n = Real(std::min(scene.limits.continuous_force_n, scene.limits.force_n));

@@ -61,7 +61,7 @@ struct ServoOutput {
   std::array<double, 3> gimbal_rad{};          ///< yaw, pitch, roll
   std::array<double, 3> position_mm{};         ///< tip in the scene
   std::array<double, 9> rotation{};            ///< world from the tool as felt, row-major
-  std::array<double, 3> velocity_mm_per_s{};   ///< device port, mean over 8 ticks
+  std::array<double, 3> velocity_mm_per_s{};   ///< device port, by VelocityWindow
   std::array<double, 3> force_n{};             ///< sent to the hand, device port
   std::array<double, 3> contact_n{};           ///< part of it before limits, device port
   std::array<double, 3> modification_n{};

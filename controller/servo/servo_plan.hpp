@@ -15,6 +15,7 @@
 #include "controller/servo/servo_limits.hpp"
 #include "controller/servo/sum_to_force.hpp"
 #include "controller/servo/supervisor.hpp"
+#include "controller/servo/velocity_window.hpp"
 #include "shared/volume/voxel_grid.hpp"
 
 namespace kerf {
@@ -93,6 +94,7 @@ struct ServoPlan {
   RemovalRate<N> removal_rate;
 
   DevicePlan<N> device;
+  VelocityPlan<N> velocity;
   typename N::Real workspace_scale{};  ///< x_scene = scale * x_device + offset
   WorldVec<typename N::Real> offset_mm;
 

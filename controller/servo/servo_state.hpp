@@ -15,6 +15,7 @@
 #include "controller/servo/kinematics/rotation.hpp"
 #include "controller/servo/servo_output.hpp"
 #include "controller/servo/supervisor.hpp"
+#include "controller/servo/velocity_window.hpp"
 
 namespace kerf {
 
@@ -46,7 +47,6 @@ struct GimbalFilter {
 template <class N>
 struct ServoState {
   using Real = typename N::Real;
-  static constexpr std::size_t kVelocityWindow = 8;
 
   std::array<VolumeState<N>, kMaxVolumes> volumes{};
   OverlapBox<N> overlap;  ///< scratch of one tick, as is the next
@@ -63,8 +63,7 @@ struct ServoState {
   DeviceVec<Real> tip_mm;  ///< device port
   Rotation<N> rotation = identity_rotation<N>();
   bool tip_known = false;  ///< false before the first report
-  std::array<DeviceVec<Real>, kVelocityWindow> tip_history{};
-  std::size_t tip_history_next = 0;
+  VelocityWindow<N> velocity;
 
   DeviceVec<Real> contact_n;     ///< felt in the last tick, before limits
   DeviceVec<Real> force_n;       ///< sent in the last tick

@@ -53,7 +53,7 @@ bool all_finite(Vec<S, Space> v) noexcept {
   return is_finite(v.x) && is_finite(v.y) && is_finite(v.z);
 }
 
-/// Takes the new tip over, keeps the energy ledger and the velocity window. Returns true when the
+/// Takes the new tip over and keeps the energy ledger. Returns true when the
 /// tip moved faster than the limit since the last report, `gap` ticks ago.
 template <class N>
 bool move_tip(const ServoPlan<N>& plan, ServoState<N>& state, const DevicePose<N>& pose,
@@ -61,7 +61,7 @@ bool move_tip(const ServoPlan<N>& plan, ServoState<N>& state, const DevicePose<N
   using Real = typename N::Real;
   if (!state.tip_known) {
     state.tip_mm = pose.arm.tip_mm;
-    state.tip_history.fill(pose.arm.tip_mm);
+    state.velocity.start(pose.arm.tip_mm);
   }
   const auto moved_mm = pose.arm.tip_mm - state.tip_mm;
   const auto ticks = Real(static_cast<double>(std::clamp<std::uint32_t>(gap, 1, 1000)));
@@ -71,17 +71,6 @@ bool move_tip(const ServoPlan<N>& plan, ServoState<N>& state, const DevicePose<N
   state.rotation = pose.rotation;
   state.tip_known = true;
   return overspeed;
-}
-
-/// Mean velocity at the device port over the window, mm/s.
-template <class N>
-std::array<double, 3> advance_velocity(const ServoPlan<N>& plan, ServoState<N>& state) noexcept {
-  auto& oldest = state.tip_history[state.tip_history_next];
-  const auto moved_mm = as_doubles(state.tip_mm - oldest);
-  oldest = state.tip_mm;
-  state.tip_history_next = (state.tip_history_next + 1) % ServoState<N>::kVelocityWindow;
-  const double per_s = double(plan.rate_hz) / double(ServoState<N>::kVelocityWindow);
-  return {moved_mm[0] * per_s, moved_mm[1] * per_s, moved_mm[2] * per_s};
 }
 
 /// What the motors get: signed counts, and the share of the force that they can carry.
@@ -159,7 +148,7 @@ struct Sensed {
   DevicePose<N> pose;
   bool usable = false;  ///< a fresh report with a finite pose
   WorldVec<typename N::Real> tip_mm;
-  std::array<double, 3> velocity_mm_per_s{};
+  DeviceVec<typename N::Real> velocity_mm_per_s;
 };
 
 /// Where the device is and whether that can be trusted; decides about the motors.
@@ -181,7 +170,7 @@ Sensed<N> sense(const ServoPlan<N>& plan, ServoState<N>& state,
     const std::uint32_t gap = state.supervisor.stale_ticks + 1;
     seen.overspeed = move_tip(plan, state, sensed.pose, gap) && !report.parked;
   }
-  sensed.velocity_mm_per_s = advance_velocity(plan, state);
+  sensed.velocity_mm_per_s = state.velocity.advance(plan.velocity, state.tip_mm);
   sensed.tip_mm = relabel<WorldSpace>(state.tip_mm * plan.workspace_scale) + plan.offset_mm;
   supervise(plan.timing, seen, state.supervisor);
   return sensed;
@@ -263,7 +252,7 @@ void tell(const ServoPlan<N>& plan, ServoState<N>& state, const Sensed<N>& sense
   const Rotation<N> rotation =
       plan.tools[state.active_tool].turns ? state.rotation : identity_rotation<N>();
   for (std::size_t i = 0; i < 9; ++i) out.rotation[i] = as_double(rotation.row[i / 3][i % 3]);
-  out.velocity_mm_per_s = sensed.velocity_mm_per_s;
+  out.velocity_mm_per_s = as_doubles(sensed.velocity_mm_per_s);
   out.force_n = as_doubles(state.force_n);
   out.absorbed_mj = energy_mj<N>(state.absorbed_mj);
   out.active_tool = state.active_tool;

@@ -6,6 +6,8 @@
 
 #include <nlohmann/json.hpp>
 
+#include "controller/servo/velocity_window.hpp"
+
 namespace kerf {
 namespace {
 
@@ -57,6 +59,7 @@ std::string report_json(const RunReport& report) {
       {"device", report.device},
       {"numeric", report.numeric},
       {"rate_hz", report.rate_hz},
+      {"velocity_estimator", kVelocityEstimator},
       {"virtual", report.virtual_time},
       {"end", report.end},
       {"ticks", r.ticks},

@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <type_traits>
+
+#include "shared/numeric/numbers.hpp"
+#include "shared/numeric/vec.hpp"
+
+namespace kerf {
+
+/// How `VelocityWindow` reads the tip; constant of a run.
+template <class N>
+struct VelocityPlan {
+  std::int32_t rate_hz = 1000;
+  /// Ticks between the samples that are used: above 1 kHz a window still spans up to 16 ms.
+  std::int32_t stride = 1;
+  typename N::Real noise_mm{};  ///< no encoder reading is farther from the true place
+};
+
+/// What reports call it.
+inline constexpr const char* kVelocityEstimator = "FOAW, best fit over at most 16 intervals";
+
+/// Velocity of the tip by first-order adaptive windowing (Janabi-Sharifi, Hayward, Chen 2000): on
+/// each axis the longest window of at most 16 intervals in which the line through the newest sample
+/// with the least-squares slope misses no sample by more than `noise_mm`. Long windows at rest, so
+/// encoder steps do not show; short ones when the hand turns round, so the lag stays small.
+///
+/// The slope over i intervals of samples y_k (newest) .. y_{k-i} is
+/// 6 SUM_l (i - 2 l) y_{k-l} / (i (i+1) (i+2)) per interval. Servo thread; 120 comparisons an axis
+/// at most; no heap.
+template <class N>
+class VelocityWindow {
+ public:
+  using Real = typename N::Real;
+  static constexpr std::int32_t kIntervals = 16;
+  static constexpr std::int32_t kMaxStride = 8;
+
+  /// At rest here since ever.
+  constexpr void start(DeviceVec<Real> tip_mm) noexcept { ring_.fill(tip_mm); }
+
+  /// Takes the tip of this tick; returns its velocity in mm/s, saturated.
+  [[nodiscard]] constexpr DeviceVec<Real> advance(const VelocityPlan<N>& plan,
+                                                  DeviceVec<Real> tip_mm) noexcept {
+    newest_ = (newest_ + 1) % kRing;
+    ring_[static_cast<std::size_t>(newest_)] = tip_mm;
+    return {axis(plan, &DeviceVec<Real>::x), axis(plan, &DeviceVec<Real>::y),
+            axis(plan, &DeviceVec<Real>::z)};
+  }
+
+ private:
+  static constexpr std::int32_t kRing = kIntervals * kMaxStride + 1;
+  /// Fixed: exact integers. A difference has 33 bits, 6 SUM 44, times l 48, times the denominator
+  /// of the check, at most 16 * 17 * 18, 46.
+  using Wide = std::conditional_t<N::kIsFixed, std::int64_t, Real>;
+
+  static constexpr Wide wide(Real value) noexcept {
+    if constexpr (N::kIsFixed) {
+      return value.raw();
+    } else {
+      return value;
+    }
+  }
+
+  constexpr Real axis(const VelocityPlan<N>& plan, Real DeviceVec<Real>::*of) const noexcept {
+    const auto at = [&](std::int32_t l) {
+      const std::int32_t age = l * plan.stride;
+      return wide(ring_[static_cast<std::size_t>((newest_ + kRing - age) % kRing)].*of);
+    };
+    const Wide noise = wide(plan.noise_mm);
+    std::array<Wide, kIntervals + 1> back{};  // newest - sample
+    const Wide newest = at(0);
+    Wide slope{}, slope_of{1};  // per interval: slope / slope_of
+    Wide sum{};                 // SUM_l back_l
+    Wide moment{};              // SUM_l l back_l
+    for (std::int32_t i = 1; i <= kIntervals; ++i) {
+      const auto n = static_cast<std::size_t>(i);
+      back[n] = newest - at(i);
+      sum += back[n];
+      moment += Wide(i) * back[n];
+      // SUM_l (i - 2 l) y_{k-l} = SUM_l (2 l - i) back_l, as the weights add up to 0.
+      const Wide top = Wide(6) * (Wide(2) * moment - Wide(i) * sum);
+      const Wide bottom = Wide(i) * Wide(i + 1) * Wide(i + 2);
+      for (std::int32_t l = 1; l <= i; ++l) {
+        const Wide miss = back[static_cast<std::size_t>(l)] * bottom - Wide(l) * top;
+        if (i > 1 && (miss > noise * bottom || -miss > noise * bottom)) {
+          return per_second(plan, slope, slope_of);
+        }
+      }
+      slope = top;
+      slope_of = bottom;
+    }
+    return per_second(plan, slope, slope_of);
+  }
+
+  static constexpr Real per_second(const VelocityPlan<N>& plan, Wide top, Wide bottom) noexcept {
+    if constexpr (N::kIsFixed) {
+      const Wide scaled = top * plan.rate_hz;  // 44 + 13 bits
+      const Wide half = scaled < 0 ? -bottom * plan.stride / 2 : bottom * plan.stride / 2;
+      return Real::from_raw(saturate_i32((scaled + half) / (bottom * plan.stride)));
+    } else {
+      return top * Real(plan.rate_hz) / (bottom * Real(plan.stride));
+    }
+  }
+
+  std::array<DeviceVec<Real>, static_cast<std::size_t>(kRing)> ring_{};
+  std::int32_t newest_ = 0;
+};
+
+}  // namespace kerf

@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "controller/servo/velocity_window.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <vector>
+
+#include <doctest/doctest.h>
+#include <rapidcheck.h>
+
+using kerf::DeviceVec;
+using kerf::DoubleNumbers;
+using kerf::FixedNumbers;
+using kerf::FloatNumbers;
+
+namespace {
+
+constexpr double kStepMm = 0.055;  // of the Omni's encoders at the tip
+
+/// Estimates along x at `rate_hz`, the place rounded to whole encoder steps.
+template <class N>
+double rms_error(int rate_hz, double velocity_mm_per_s) {
+  using Real = typename N::Real;
+  const kerf::VelocityPlan<N> plan{rate_hz, std::max(1, rate_hz / 1000), Real(kStepMm)};
+  kerf::VelocityWindow<N> window;
+  window.start({});
+  double squares = 0;
+  const int settled = rate_hz / 10;
+  const int ticks = 4 * rate_hz;
+  for (int k = 0; k < ticks; ++k) {
+    const double x_mm = velocity_mm_per_s * k / rate_hz + 0.0123;
+    const double read_mm = kStepMm * std::floor(x_mm / kStepMm + 0.5);
+    const double error =
+        double(window.advance(plan, {Real(read_mm), Real(), Real()}).x) - velocity_mm_per_s;
+    if (k >= settled) squares += error * error;
+  }
+  return std::sqrt(squares / (ticks - settled));
+}
+
+}  // namespace
+
+TEST_CASE_TEMPLATE("S18: encoder steps of 0.055 mm at 1 kHz leave less than 0.6 mm/s", N,
+                   FixedNumbers, FloatNumbers, DoubleNumbers) {
+  CHECK(rms_error<N>(1000, 10) <= 0.6);
+  CHECK(rms_error<N>(1000, 200) <= 0.4);
+  CHECK(rms_error<N>(1000, 0.5) <= 1.5);
+  // One difference alone would be off by its quantum of 55 mm/s.
+  CHECK(rms_error<N>(8000, 10) <= 0.6);
+  CHECK(rms_error<N>(8000, 200) <= 0.4);
+}
+
+TEST_CASE_TEMPLATE("a hand that stops dead is at rest within two encoder steps", N, FixedNumbers,
+                   DoubleNumbers) {
+  using Real = typename N::Real;
+  const kerf::VelocityPlan<N> plan{1000, 1, Real(kStepMm)};
+  kerf::VelocityWindow<N> window;
+  window.start({});
+  double x_mm = 0;
+  for (int k = 0; k < 50; ++k) {  // 200 mm/s
+    x_mm += 0.2;
+    static_cast<void>(window.advance(plan, {Real(x_mm), Real(), Real()}));
+  }
+  double last = 0;
+  for (int k = 0; k < 3; ++k) last = double(window.advance(plan, {Real(x_mm), Real(), Real()}).x);
+  CHECK(std::abs(last) <= 1000 * kStepMm);
+  for (int k = 0; k < 16; ++k) last = double(window.advance(plan, {Real(x_mm), Real(), Real()}).x);
+  CHECK(last == 0);
+}
+
+TEST_CASE("whatever the places, the velocity is theirs within the range, and fixed is double") {
+  CHECK(rc::check([](std::vector<std::int32_t> places) {
+    const kerf::VelocityPlan<FixedNumbers> fixed_plan{8000, 8, kerf::Q16(kStepMm)};
+    const kerf::VelocityPlan<DoubleNumbers> plan{8000, 8, double(kerf::Q16(kStepMm))};
+    kerf::VelocityWindow<FixedNumbers> fixed;
+    kerf::VelocityWindow<DoubleNumbers> exact;
+    for (const std::int32_t raw : places) {
+      const auto place = kerf::Q16::from_raw(raw);
+      const double is = double(fixed.advance(fixed_plan, {place, place, place}).y);
+      const double should = exact.advance(plan, {double(place), double(place), double(place)}).y;
+      const double lowest = double(kerf::Q16::from_raw(INT32_MIN));
+      const double highest = double(kerf::Q16::from_raw(INT32_MAX));
+      RC_ASSERT(std::abs(is - std::clamp(should, lowest, highest)) <= 1e-4);
+    }
+  }));
+}
