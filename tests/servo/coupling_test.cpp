@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "controller/servo/coupling.hpp"
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include <doctest/doctest.h>
+#include <rapidcheck.h>
+
+using kerf::coupling_force;
+using kerf::DeviceVec;
+using kerf::DoubleNumbers;
+using kerf::FixedNumbers;
+using kerf::FloatNumbers;
+
+namespace {
+
+template <class N>
+kerf::Coupling<N> coupling(double stiffness_n_per_mm = 0.4, double damping_ns_per_mm = 0.002) {
+  return {typename N::Ratio(stiffness_n_per_mm), typename N::Unit(damping_ns_per_mm)};
+}
+
+template <class N>
+DeviceVec<typename N::Real> vec(double x, double y, double z) {
+  using Real = typename N::Real;
+  return {Real(x), Real(y), Real(z)};
+}
+
+}  // namespace
+
+TEST_CASE_TEMPLATE("at rest the coupling is a spring", N, FixedNumbers, FloatNumbers,
+                   DoubleNumbers) {
+  const auto force = coupling_force(coupling<N>(), vec<N>(0.5, -1, 0.25), vec<N>(0, 0, 0));
+  CHECK(double(force.x) == doctest::Approx(0.2).epsilon(1e-3));
+  CHECK(double(force.y) == doctest::Approx(-0.4).epsilon(1e-3));
+  CHECK(double(force.z) == doctest::Approx(0.1).epsilon(1e-3));
+}
+
+TEST_CASE_TEMPLATE("only motion along the spring is damped", N, FixedNumbers, DoubleNumbers) {
+  const auto spring = vec<N>(0, 1, 0);
+  CHECK(double(coupling_force(coupling<N>(), spring, vec<N>(300, 0, -500)).y) ==
+        doctest::Approx(0.4).epsilon(1e-3));
+  CHECK(double(coupling_force(coupling<N>(), spring, vec<N>(0, -50, 0)).y) ==
+        doctest::Approx(0.5).epsilon(1e-3));
+  CHECK(double(coupling_force(coupling<N>(), spring, vec<N>(0, 50, 0)).y) ==
+        doctest::Approx(0.3).epsilon(1e-3));
+}
+
+TEST_CASE_TEMPLATE("a hand that leaves fast is let go, never pulled", N, FixedNumbers,
+                   DoubleNumbers) {
+  CHECK(coupling_force(coupling<N>(), vec<N>(0, 1, 0), vec<N>(0, 1000, 0)) == vec<N>(0, 0, 0));
+}
+
+TEST_CASE_TEMPLATE("a hand that arrives fast feels no blow", N, FixedNumbers, DoubleNumbers) {
+  const auto touch = coupling_force(coupling<N>(), vec<N>(0, 0.001, 0), vec<N>(0, -1000, 0));
+  CHECK(double(touch.y) > 0.0);
+  CHECK(double(touch.y) < 0.03);
+}
+
+TEST_CASE("fixed follows double, and no input makes it point the wrong way") {
+  CHECK(rc::check([](std::array<std::int32_t, 6> raw) {
+    using kerf::Q16;
+    const auto at = [&](std::size_t i) {
+      return DeviceVec<Q16>{Q16::from_raw(raw[i]), Q16::from_raw(raw[i + 1]),
+                            Q16::from_raw(raw[i + 2])};
+    };
+    const auto exact = [](DeviceVec<Q16> v) {
+      return DeviceVec<double>{double(v.x), double(v.y), double(v.z)};
+    };
+    const auto fixed = exact(coupling_force(coupling<FixedNumbers>(), at(0), at(3)));
+    const auto truth = coupling_force(coupling<DoubleNumbers>(), exact(at(0)), exact(at(3)));
+    RC_ASSERT(kerf::dot(fixed, exact(at(0))) >= 0.0);
+    if (kerf::norm(exact(at(0))) < 0.05) return;  // short springs have coarse directions
+    if (kerf::norm(exact(at(0))) > 3000 || kerf::norm(exact(at(3))) > 10'000) return;
+    RC_ASSERT(kerf::norm(fixed - truth) <= 2e-3 * (1 + kerf::norm(truth)));
+  }));
+}
