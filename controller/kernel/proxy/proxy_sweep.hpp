@@ -1,0 +1,227 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <concepts>
+#include <cstdint>
+
+#include "controller/kernel/proxy/plane_bundle.hpp"
+#include "controller/kernel/proxy/tool_turn.hpp"
+
+namespace kerf {
+
+/// What the sweep asks of tool and volumes.
+///
+///   probe(q)          what the tool feels with its centre at q
+///   free_distance(q)  how far the centre may go from q in any direction and feel nothing; a lower
+///                     bound, 0 if unknown
+///   turn(t)           the orientation of the tool in every probe from now on
+template <class F, class N>
+concept ContactField = requires(F field, ContactVec<typename N::Real> q, ToolTurn<N> turn) {
+  { field.probe(q) } -> std::convertible_to<Probe<N>>;
+  { field.free_distance(q) } -> std::convertible_to<typename N::Real>;
+  field.turn(turn);
+};
+
+/// Units of contact space; sources: contact.md 3, where not given.
+struct SweepRules {
+  static constexpr std::int32_t kMaxProbes = 32;
+  static constexpr std::int32_t kMaxTurnProbes = 12;  ///< the rest is left to the move
+  static constexpr double kTolerance = 0.01;          ///< a place this deep is allowed
+  static constexpr double kNoMove = 0.002;            ///< a shorter way is none
+  static constexpr double kArrived = 0.004;
+  /// Longest way of any sample between two probes. The middle of the thinnest wall, 2 units, is one
+  /// unit deep: beyond it density falls again, and its gradient shows the way through.
+  static constexpr double kStep = 0.875;
+  static constexpr double kGain = 0.001;
+  static constexpr double kResidual = 0.8;  ///< share of the way that a step may leave
+  static constexpr double kShrink = 0.4;
+  static constexpr double kShortest = 0.1;  ///< share of a step below which the proxy rather lags
+  static constexpr double kPush = 0.5;      ///< longest correction of one push
+};
+
+/// Sine of half the angle that takes a sample `reach` units from the centre along kStep at most;
+/// reach >= 1. The arc is 2 reach asin(s), and asin(s) <= 1.0472 s up to 1/2.
+[[nodiscard]] constexpr double turn_step_of(double reach) noexcept {
+  return SweepRules::kStep / (2 * 1.0472 * reach);
+}
+
+/// Where the tool of the proxy is.
+template <class N>
+struct ProxyPose {
+  ContactVec<typename N::Real> centre{};
+  ToolTurn<N> turn{};
+
+  friend constexpr bool operator==(const ProxyPose&, const ProxyPose&) noexcept = default;
+};
+
+/// What one tick of the sweep found.
+template <class N>
+struct Swept {
+  PlaneBundle<N> planes;  ///< that hold the proxy, depths from its centre
+  Slide<N> slide;         ///< of the way from the proxy to its goal: loads in units of way
+  std::int32_t probes = 0;
+  bool turned = true;  ///< the tool has the orientation that was asked
+  typename N::Real depth{-1};
+  bool buried = false;  ///< nothing to push against: the start rule is needed
+};
+
+/// One tick of the proxy: from a pose that the solid allows towards a goal, in steps that no sample
+/// of the tool makes longer than 1 unit, each probed. Out of probes, or of ideas, the proxy lags;
+/// it never jumps, so what is thicker than a step holds it at any speed.
+///
+/// The orientation goes first and the centre gives way to it: a stylus without torque motors turns
+/// the tool whatever the tooth says. Where no centre allows a turn, the orientation lags too.
+///
+/// At most kMaxProbes calls of `probe`. Coordinates within +-8192 units.
+template <class N, ContactField<N> Field>
+class ProxySweep {
+  using Real = typename N::Real;
+  using Unit = typename N::Unit;
+  using Place = ContactVec<Real>;
+
+ public:
+  /// `friction`: Coulomb's coefficient, 0 to 1. `turn_step`: sine of half the angle that takes the
+  /// tool's farthest sample along kStep, 0 for a tool that does not turn or is round.
+  constexpr ProxySweep(Field& field, ProxyPose<N>& pose, Unit friction, Unit turn_step) noexcept
+      : field_(field), pose_(pose), friction_(friction), turn_step_(turn_step) {}
+
+  constexpr Swept<N> tick(const ProxyPose<N>& goal) noexcept {
+    here_ = turn_to(goal.turn);
+    held_by_ = bundle_of(here_);
+    if (!here_.buried) move_to(goal.centre);
+    return {held_by_,    nearest(held_by_, goal.centre - pose_.centre),
+            probes_,     pose_.turn == goal.turn,
+            here_.depth, here_.buried};
+  }
+
+ private:
+  /// A place that was tried: where the tool ended after the pushes, what it feels there, and what
+  /// it felt before them.
+  struct Trial {
+    Place centre;
+    Probe<N> felt;
+    Place first_centre;
+    Probe<N> first;
+  };
+
+  constexpr Probe<N> look(Place centre) noexcept {
+    ++probes_;
+    return field_.probe(centre);
+  }
+  [[nodiscard]] constexpr bool may_look() const noexcept {
+    return probes_ < SweepRules::kMaxProbes;
+  }
+  /// Never deeper than it is, where it is too deep already.
+  [[nodiscard]] constexpr bool allows(const Probe<N>& felt) const noexcept {
+    return !felt.buried && felt.depth <= std::max(Real(SweepRules::kTolerance), here_.depth);
+  }
+
+  /// The move that planes and friction leave of a way. Coulomb: the tool sticks while the way along
+  /// the planes is within friction times the load, and else slides that much less.
+  [[nodiscard]] constexpr Place slide(const PlaneBundle<N>& planes, Place way) const noexcept {
+    const Place move = nearest(planes, way).move;
+    if (friction_ <= Unit(0) || planes.count == 0) return move;
+    const Real held = multiply<Real>(friction_, norm(way - move));
+    const Real length = norm(move);
+    if (length <= held) return {};
+    return part_of<N>(move, share(length - held, length));
+  }
+
+  /// part / whole, 0 <= part <= whole, whole > 0.
+  [[nodiscard]] static constexpr Unit share(Real part, Real whole) noexcept {
+    if constexpr (N::kIsFixed) {
+      constexpr int kBits = Unit::kFractionBits;
+      return Unit::from_raw(
+          static_cast<std::int32_t>((std::int64_t{part.raw()} << kBits) / whole.raw()));
+    } else {
+      return part / whole;
+    }
+  }
+
+  /// Looks at a place, and where the tool is too deep there pushes it out: twice at most.
+  /// `moved(centre)` is the way from where `known` was made.
+  constexpr Trial attempt(Place centre, const PlaneBundle<N>& known, Place from) noexcept {
+    Trial trial{centre, look(centre), centre, {}};
+    trial.first = trial.felt;
+    for (int push = 0; push < 2; ++push) {
+      if (allows(trial.felt) || trial.felt.count == 0 || !may_look()) break;
+      PlaneBundle<N> planes = merged(trial.felt, known, trial.centre - from);
+      for (auto& plane : planes.plane) plane.depth = std::min(plane.depth, Real(SweepRules::kPush));
+      trial.centre = trial.centre + nearest(planes, {}).move;
+      trial.felt = look(trial.centre);
+    }
+    return trial;
+  }
+
+  /// Turns towards `goal` while places are found that allow it, and says what the tool feels then.
+  constexpr Probe<N> turn_to(const ToolTurn<N>& goal) noexcept {
+    if (turn_step_ <= Unit(0)) {
+      pose_.turn = goal;
+      field_.turn(goal);
+      return look(pose_.centre);
+    }
+    Unit step = turn_step_;
+    bool known = false;
+    while (!(pose_.turn == goal) && probes_ < SweepRules::kMaxTurnProbes) {
+      const ToolTurn<N> next = turned_towards(pose_.turn, goal, step);
+      field_.turn(next);
+      const Trial trial = attempt(pose_.centre, {}, pose_.centre);
+      if (allows(trial.felt)) {
+        pose_ = {trial.centre, next};
+        here_ = trial.felt;
+        known = true;
+        step = turn_step_;
+      } else {
+        step = step * Unit(SweepRules::kShrink);
+        if (step < turn_step_ * Unit(SweepRules::kShortest)) break;
+      }
+    }
+    field_.turn(pose_.turn);
+    return known ? here_ : look(pose_.centre);
+  }
+
+  constexpr void move_to(Place goal) noexcept {
+    Unit shrink(1);
+    while (may_look()) {
+      const Place from = pose_.centre;
+      const Place way = slide(held_by_, goal - from);
+      const Real length = norm(way);
+      if (length < Real(SweepRules::kNoMove)) return;
+      Real step(SweepRules::kStep);
+      if (here_.count == 0) step = std::max(step, field_.free_distance(from));
+      const Unit part = step < length ? shrink * share(step, length) : shrink;
+      const Trial trial = attempt(from + part_of<N>(way, part), held_by_, from);
+
+      const PlaneBundle<N> next = merged(trial.felt, held_by_, trial.centre - from);
+      Real left = length;
+      if (allows(trial.felt)) {
+        left = norm(slide(next, goal - trial.centre));
+        const Real gain = norm(goal - from) - norm(goal - trial.centre);
+        if (left < multiply<Real>(Unit(SweepRules::kResidual), length) ||
+            gain > Real(SweepRules::kGain)) {
+          pose_.centre = trial.centre;
+          here_ = trial.felt;
+          held_by_ = next;
+          shrink = Unit(1);
+          if (left < Real(SweepRules::kArrived)) return;
+          continue;
+        }
+      }
+      if (!learn(held_by_, trial.first, trial.first_centre - from)) {
+        shrink = shrink * Unit(SweepRules::kShrink);
+        if (shrink < Unit(SweepRules::kShortest)) return;
+      }
+    }
+  }
+
+  Field& field_;
+  ProxyPose<N>& pose_;
+  Unit friction_;
+  Unit turn_step_;
+  Probe<N> here_{};
+  PlaneBundle<N> held_by_{};
+  std::int32_t probes_ = 0;
+};
+
+}  // namespace kerf

@@ -1,0 +1,154 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "controller/kernel/proxy/plane_bundle.hpp"
+
+#include <doctest/doctest.h>
+
+#include "tests/proxy/points.hpp"
+
+using namespace kerf;
+using namespace kerf::test;
+
+namespace {
+
+template <class N>
+constexpr double kStep = N::kIsFixed                     ? 0x1p-16
+                         : sizeof(typename N::Real) == 4 ? 1e-5
+                                                         : 1e-9;
+
+/// One to three planes, no two closer than 15 degrees, that all let the tool rest within reach.
+template <class N>
+PlaneBundle<N> random_bundle(Dice& dice) {
+  PlaneBundle<N> bundle;
+  const auto wanted = static_cast<std::size_t>(dice.uniform(1, 4));
+  while (bundle.count < wanted) {
+    const auto normal = normal_of<N>(dice.direction());
+    if (has_plane_like(bundle, normal)) continue;
+    bundle.plane[bundle.count++] = {normal, typename N::Real(dice.uniform(-0.5, 0.3)), {}};
+  }
+  return bundle;
+}
+
+/// Dykstra's projections: slow, and in no way like the closed form.
+template <class N>
+Point projected(const PlaneBundle<N>& planes, Point way) {
+  std::array<Point, kMaxPlanes> correction{};
+  Point x = way;
+  for (int round = 0; round < 20'000; ++round) {
+    for (std::size_t i = 0; i < planes.count; ++i) {
+      const auto& n = planes.plane[i].normal;
+      const Point normal{double(n.x), double(n.y), double(n.z)};
+      const Point from = x + correction[i];
+      const double lack = double(planes.plane[i].depth) - dot(normal, from);
+      x = lack > 0 ? from + lack * normal : from;
+      correction[i] = from - x;
+    }
+  }
+  return x;
+}
+
+template <class N>
+Plane<N> plane(Point normal, double depth) {
+  return {normal_of<N>(unit(normal)), typename N::Real(depth), {}};
+}
+
+template <class N>
+Probe<N> felt(Plane<N> one) {
+  Probe<N> probe;
+  probe.depth = one.depth;
+  probe.count = 1;
+  probe.plane[0] = one;
+  return probe;
+}
+
+}  // namespace
+
+TEST_CASE_TEMPLATE("a slide ends at the nearest place that its planes allow", N, FixedNumbers,
+                   FloatNumbers, DoubleNumbers) {
+  Dice dice(1);
+  int checked = 0;
+  for (int i = 0; i < 300; ++i) {
+    const auto bundle = random_bundle<N>(dice);
+    const Point way = dice.uniform(0, 3) * dice.direction();
+    const Slide<N> slide = nearest(bundle, place_of<N>(way));
+    const Point truth = projected(bundle, way);
+    if (length(truth) > 10) continue;  // a cone too narrow for Dykstra
+    CHECK(length(point_of<N>(slide.move) - truth) < 2e-3);
+    ++checked;
+  }
+  CHECK(checked > 250);
+}
+
+TEST_CASE_TEMPLATE("planes push and never pull, and only where they are touched", N, FixedNumbers,
+                   FloatNumbers, DoubleNumbers) {
+  using Real = typename N::Real;
+  Dice dice(2);
+  int moved = 0;
+  for (int i = 0; i < 20'000; ++i) {
+    const auto bundle = random_bundle<N>(dice);
+    const Point way = dice.uniform(0, 3) * dice.direction();
+    const Slide<N> slide = nearest(bundle, place_of<N>(way));
+    if (slide.move == ContactVec<Real>{}) continue;
+    ++moved;
+    Point pushed = point_of<N>(slide.move) - way;
+    for (std::size_t k = 0; k < bundle.count; ++k) {
+      const auto& [normal, depth, arm] = bundle.plane[k];
+      const double gap = double(along<N>(normal, slide.move) - depth);
+      CHECK(gap >= -1e-4);
+      CHECK(slide.load[k] >= Real(0));
+      // Where normals are nearly parallel, a step of load is a long way along the crease.
+      if (slide.load[k] > Real(0)) CHECK(gap < 300 * kStep<N>);
+      pushed = pushed -
+               double(slide.load[k]) * Point{double(normal.x), double(normal.y), double(normal.z)};
+    }
+    CHECK(length(pushed) < 16 * kStep<N>);
+  }
+  CHECK(moved > 19'000);
+}
+
+TEST_CASE_TEMPLATE("a goal at the end of the range saturates nothing", N, FixedNumbers,
+                   DoubleNumbers) {
+  PlaneBundle<N> floor;
+  floor.plane[floor.count++] = plane<N>({0, 1, 0}, 0);
+  const Slide<N> slide = nearest(floor, place_of<N>({16384, -16384, 16384}));
+  CHECK(length(point_of<N>(slide.move) - Point{16384, 0, 16384}) < 1e-3);
+  CHECK(double(slide.load[0]) == doctest::Approx(16384));
+}
+
+TEST_CASE_TEMPLATE("a tool between planes that leave no room stays", N, FixedNumbers,
+                   DoubleNumbers) {
+  PlaneBundle<N> slot;
+  slot.plane[slot.count++] = plane<N>({1, 0, 0}, 0.1);
+  slot.plane[slot.count++] = plane<N>({-1, 0, 0}, 0.1);
+  CHECK(nearest(slot, place_of<N>({3, 4, 5})).move == ContactVec<typename N::Real>{});
+}
+
+TEST_CASE_TEMPLATE("a plane seen before is kept while it is near and unlike the new ones", N,
+                   FixedNumbers, DoubleNumbers) {
+  const auto newest = felt<N>(plane<N>({0, 1, 0}, 0));
+  const auto older = [](Point normal, double depth) {
+    PlaneBundle<N> bundle;
+    bundle.plane[bundle.count++] = plane<N>(normal, depth);
+    return bundle;
+  };
+  const auto still = place_of<N>({0, 0, 0});
+  CHECK(merged(newest, older({1, 0, 0}, 0), still).count == 2);
+  CHECK(merged(newest, older({std::sin(0.25), std::cos(0.25), 0}, 0), still).count == 1);
+  CHECK(merged(newest, older({std::sin(0.28), std::cos(0.28), 0}, 0), still).count == 2);
+  CHECK(merged(newest, older({1, 0, 0}, -0.6), still).count == 1);
+  CHECK(merged(newest, older({1, 0, 0}, 0.4), still).count == 1);
+  // Carried along: 0.25 nearer.
+  const auto carried = merged(newest, older({1, 0, 0}, -0.6), place_of<N>({-0.25, 0, 0}));
+  REQUIRE(carried.count == 2);
+  CHECK(double(carried.plane[1].depth) == doctest::Approx(-0.35));
+}
+
+TEST_CASE_TEMPLATE("a place that was too deep teaches the plane that it met", N, FixedNumbers,
+                   DoubleNumbers) {
+  PlaneBundle<N> known;
+  known.plane[known.count++] = plane<N>({0, 1, 0}, 0);
+  const auto met = felt<N>(plane<N>({1, 0, 0}, 0.5));
+  CHECK(learn(known, met, place_of<N>({-0.5, 0, 0})));
+  REQUIRE(known.count == 2);
+  CHECK(std::abs(double(known.plane[1].depth)) < 1e-4);
+  CHECK_FALSE(learn(known, met, place_of<N>({-0.5, 0, 0})));  // known by now
+}
