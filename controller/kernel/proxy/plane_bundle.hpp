@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <type_traits>
 
+#include "controller/kernel/proxy/contact_math.hpp"
 #include "controller/kernel/proxy/plane.hpp"
 
 namespace kerf {
@@ -16,36 +17,6 @@ struct PlaneBundle {
   std::size_t count = 0;
   std::array<Plane<N>, kMaxPlanes> plane{};
 };
-
-/// The part of `v` along a normal. Fixed: each product is below 2^60 for |v| of 16384 units, so
-/// that three fit; one rounding.
-template <class N>
-[[nodiscard]] constexpr typename N::Real along(ContactVec<typename N::Unit> normal,
-                                               ContactVec<typename N::Real> v) noexcept {
-  if constexpr (N::kIsFixed) {
-    const std::int64_t sum = std::int64_t{normal.x.raw()} * v.x.raw() +
-                             std::int64_t{normal.y.raw()} * v.y.raw() +
-                             std::int64_t{normal.z.raw()} * v.z.raw();
-    return N::Real::from_wide(sum, N::Unit::kFractionBits + N::Real::kFractionBits);
-  } else {
-    return dot(normal, v);
-  }
-}
-
-/// The vector of this length along a normal, or the part `factor` of a vector.
-template <class N>
-[[nodiscard]] constexpr ContactVec<typename N::Real> times(ContactVec<typename N::Unit> normal,
-                                                           typename N::Real length) noexcept {
-  using Real = typename N::Real;
-  return {multiply<Real>(normal.x, length), multiply<Real>(normal.y, length),
-          multiply<Real>(normal.z, length)};
-}
-template <class N>
-[[nodiscard]] constexpr ContactVec<typename N::Real> part_of(ContactVec<typename N::Real> v,
-                                                             typename N::Unit factor) noexcept {
-  using Real = typename N::Real;
-  return {multiply<Real>(factor, v.x), multiply<Real>(factor, v.y), multiply<Real>(factor, v.z)};
-}
 
 /// Where a tool goes that is asked to move by `way`: `move = way + SUM load_i normal_i`.
 template <class N>

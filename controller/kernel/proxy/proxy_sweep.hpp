@@ -117,26 +117,20 @@ class ProxySweep {
     return !felt.buried && felt.depth <= std::max(Real(SweepRules::kTolerance), here_.depth);
   }
 
-  /// The move that planes and friction leave of a way. Coulomb: the tool sticks while the way along
-  /// the planes is within friction times the load, and else slides that much less.
+  /// The move that planes and friction leave of a way. Coulomb: across the direction that presses
+  /// the tool sticks while the way is within friction times the load, and else slides that much
+  /// less. Towards the planes nothing rubs.
   [[nodiscard]] constexpr Place slide(const PlaneBundle<N>& planes, Place way) const noexcept {
     const Place move = nearest(planes, way).move;
     if (friction_ <= Unit(0) || planes.count == 0) return move;
-    const Real held = multiply<Real>(friction_, norm(way - move));
-    const Real length = norm(move);
-    if (length <= held) return {};
-    return part_of<N>(move, share(length - held, length));
-  }
-
-  /// part / whole, 0 <= part <= whole, whole > 0.
-  [[nodiscard]] static constexpr Unit share(Real part, Real whole) noexcept {
-    if constexpr (N::kIsFixed) {
-      constexpr int kBits = Unit::kFractionBits;
-      return Unit::from_raw(
-          static_cast<std::int32_t>((std::int64_t{part.raw()} << kBits) / whole.raw()));
-    } else {
-      return part / whole;
-    }
+    const Place pressed = move - way;
+    const auto normal = direction_of<N>(pressed);
+    const Place closing = times<N>(normal, along<N>(normal, move));
+    const Place rubbing = move - closing;
+    const Real held = multiply<Real>(friction_, norm(pressed));
+    const Real length = norm(rubbing);
+    if (length <= held) return closing;
+    return closing + part_of<N>(rubbing, share<N>(length - held, length));
   }
 
   /// Looks at a place, and where the tool is too deep there pushes it out: twice at most.
@@ -190,7 +184,7 @@ class ProxySweep {
       if (length < Real(SweepRules::kNoMove)) return;
       Real step(SweepRules::kStep);
       if (here_.count == 0) step = std::max(step, field_.free_distance(from));
-      const Unit part = step < length ? shrink * share(step, length) : shrink;
+      const Unit part = step < length ? shrink * share<N>(step, length) : shrink;
       const Trial trial = attempt(from + part_of<N>(way, part), held_by_, from);
 
       const PlaneBundle<N> next = merged(trial.felt, held_by_, trial.centre - from);

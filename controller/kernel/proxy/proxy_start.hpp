@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+
+#include "controller/kernel/proxy/proxy_sweep.hpp"
+
+namespace kerf {
+
+/// Whether the proxy has a place, and if not whether one is still looked for.
+enum class Placing : std::uint8_t { searching, placed, refused };
+
+/// Finds the first place of a proxy: the goal if that is free, else the nearest free place in one
+/// of 26 directions from it, one unit farther out in each tick. From there the sweep slides to the
+/// place nearest to the goal. With nothing free within kReach the tool is refused until its own
+/// goal is free.
+///
+/// At most 27 probes a tick. Only the tool's surface is felt, so what lies wholly inside of the
+/// tool does not count as solid here.
+template <class N>
+class StartSearch {
+  using Real = typename N::Real;
+  using Place = ContactVec<Real>;
+
+ public:
+  static constexpr std::int32_t kReach = 64;  ///< units
+
+  template <ContactField<N> Field>
+  constexpr Placing tick(Field& field, const ProxyPose<N>& goal, ProxyPose<N>& pose) noexcept {
+    field.turn(goal.turn);
+    if (is_free(field, goal.centre)) {
+      pose = goal;
+      return Placing::placed;
+    }
+    if (distance_ == kReach) return Placing::refused;
+    ++distance_;
+    for (int way = 0; way < 27; ++way) {
+      if (way == 13) continue;  // no way at all
+      const Place centre = goal.centre + step(way);
+      if (is_free(field, centre)) {
+        pose = {centre, goal.turn};
+        return Placing::placed;
+      }
+    }
+    return Placing::searching;
+  }
+
+ private:
+  template <ContactField<N> Field>
+  [[nodiscard]] static constexpr bool is_free(Field& field, Place centre) noexcept {
+    const Probe<N> felt = field.probe(centre);
+    return !felt.buried && felt.depth <= Real(SweepRules::kTolerance);
+  }
+  /// `distance_` along the way-th of the 27 directions of a 3x3x3 cube.
+  [[nodiscard]] constexpr Place step(int way) const noexcept {
+    constexpr double kPerAxis[4] = {0, 1, 0.7071067811865476, 0.5773502691896258};
+    const int x = way % 3 - 1, y = way / 3 % 3 - 1, z = way / 9 - 1;
+    const Real part = Real(distance_) * static_cast<Real>(kPerAxis[x * x + y * y + z * z]);
+    return {Real(x) * part, Real(y) * part, Real(z) * part};
+  }
+
+  std::int32_t distance_ = 0;
+};
+
+}  // namespace kerf

@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+
+#include "controller/kernel/proxy/proxy_start.hpp"
+#include "controller/kernel/proxy/proxy_sweep.hpp"
+
+namespace kerf {
+
+/// What one tool needs of the scene for the swept contact; constant during a run.
+template <class N>
+struct ProxyPlan {
+  typename N::Unit friction{};   ///< Coulomb's coefficient, 0 to 1
+  typename N::Unit turn_step{};  ///< turn_step_of(reach), or 0: round, or keeps the world's axes
+  /// Growth of the spring after a start inside of the solid: 0.1 N/ms over the spring's stiffness.
+  typename N::Real ramp_per_tick{};
+};
+
+/// What one tick hands to the next. A fresh state looks for a place; so does one that is reset, as
+/// after a jump of the device, a change of the tool or a volume that was filled again.
+template <class N>
+struct ProxyState {
+  ProxyPose<N> pose;
+  bool placed = false;
+  StartSearch<N> search;
+  bool ramping = false;
+  typename N::Real longest{};  ///< of the spring while it ramps
+};
+
+/// The contact of one tick.
+template <class N>
+struct ProxyContact {
+  Placing placing = Placing::searching;
+  ProxyPose<N> pose;
+  ContactVec<typename N::Real> spring{};  ///< force over stiffness: from goal to proxy, units
+  ContactVec<typename N::Unit> normal{};  ///< mean of what presses, out of the solid; 0 in air
+  /// Torque about the tool's centre over the length of the force, units.
+  ContactVec<typename N::Real> lever{};
+  std::int32_t probes = 0;
+  bool turned = true;  ///< the tool has the orientation of the goal
+};
+
+/// Deeper than this the tool did not get by moving: the solid changed, and the start rule applies.
+inline constexpr double kLostDepth = 1;  // units
+
+/// Sum of what presses, and its moment over the length of `spring`. Friction acts where the loads
+/// do.
+template <class N>
+constexpr void add_loads(const Swept<N>& swept, ProxyContact<N>& contact) noexcept {
+  using Real = typename N::Real;
+  const Real length = norm(contact.spring);
+  if (length < Real(1e-3)) return;
+  ContactVec<Real> pressed{}, arm{};
+  Real whole(0);
+  for (std::size_t i = 0; i < swept.planes.count; ++i) whole = whole + swept.slide.load[i];
+  if (whole < Real(1e-3)) return;
+  for (std::size_t i = 0; i < swept.planes.count; ++i) {
+    const Plane<N>& plane = swept.planes.plane[i];
+    const Real load = swept.slide.load[i];
+    pressed = pressed + times<N>(plane.normal, load);
+    arm = arm + part_of<N>(plane.arm, share<N>(load, whole));
+    contact.lever = contact.lever + moment<N>(plane.arm, plane.normal) * (load / length);
+  }
+  contact.normal = direction_of<N>(pressed);
+  const ContactVec<Real> along_faces = contact.spring - pressed;
+  const Real rubbed = norm(along_faces);
+  contact.lever = contact.lever + moment<N>(arm, direction_of<N>(along_faces)) *
+                                      (std::min(rubbed, length) / length);
+}
+
+/// One tick of the swept contact: the proxy follows `goal`, and its spring tells the force.
+///
+/// Servo thread; pure but for `state`. At most 32 probes, or 27 while a place is looked for. A goal
+/// that is not finite changes nothing and gives no force; one that is far is brought within
+/// kContactLimit. No force before the proxy is placed.
+template <class N, ContactField<N> Field>
+constexpr ProxyContact<N> follow(const ProxyPlan<N>& plan, ProxyState<N>& state, Field& field,
+                                 ProxyPose<N> goal) noexcept {
+  using Real = typename N::Real;
+  ProxyContact<N> contact;
+  contact.pose = state.pose;
+  contact.placing = state.placed ? Placing::placed : Placing::searching;
+  if (!is_finite(goal.centre.x + goal.centre.y + goal.centre.z) ||
+      !is_finite(goal.turn.x + goal.turn.y + goal.turn.z + goal.turn.w)) {
+    return contact;
+  }
+  const auto clamped = [](Real at) {
+    return std::clamp(at, Real(-kContactLimit), Real(kContactLimit));
+  };
+  goal.centre = {clamped(goal.centre.x), clamped(goal.centre.y), clamped(goal.centre.z)};
+  if (!state.placed) {
+    contact.placing = state.search.tick(field, goal, state.pose);
+    state.placed = contact.placing == Placing::placed;
+    state.ramping = state.placed && !(state.pose == goal);
+    state.longest = Real(0);
+    contact.pose = state.pose;
+    return contact;
+  }
+  const Swept<N> swept =
+      ProxySweep<N, Field>(field, state.pose, plan.friction, plan.turn_step).tick(goal);
+  contact.pose = state.pose;
+  contact.probes = swept.probes;
+  contact.turned = swept.turned;
+  if (swept.buried || swept.depth > Real(kLostDepth)) {
+    state = {};
+    contact.placing = Placing::searching;
+    return contact;
+  }
+  contact.spring = state.pose.centre - goal.centre;
+  add_loads(swept, contact);
+  if (state.ramping) {
+    state.longest = state.longest + plan.ramp_per_tick;
+    const Real length = norm(contact.spring);
+    state.ramping = length > state.longest;
+    if (state.ramping) contact.spring = part_of<N>(contact.spring, share<N>(state.longest, length));
+  }
+  return contact;
+}
+
+}  // namespace kerf

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "controller/kernel/proxy/tool_turn.hpp"
+#include "tests/proxy/points.hpp"
+
+namespace kerf::test {
+
+/// The half-space below the origin along `up`, felt by a point up to 1 unit above its face: truth
+/// in closed form. The contact is `arm` from the tool's centre, in the tool's own axes.
+template <class N>
+class FlatField {
+ public:
+  explicit FlatField(Point up, Point arm = {}) : up_(up), arm_(arm) {}
+
+  Probe<N> probe(ContactVec<typename N::Real> at) {
+    Probe<N> probe;
+    const double height = dot(up_, point_of<N>(at) + turned_arm());
+    if (height > 1) return probe;
+    probe.depth = typename N::Real(-height);
+    probe.count = 1;
+    probe.plane[0] = {normal_of<N>(up_), probe.depth, place_of<N>(turned_arm())};
+    return probe;
+  }
+  [[nodiscard]] typename N::Real free_distance(ContactVec<typename N::Real> at) const {
+    const double free = dot(up_, point_of<N>(at) + turned_arm()) - 1;
+    return typename N::Real(std::max(0.0, free));
+  }
+  void turn(const ToolTurn<N>& turn) { turn_ = turn; }
+
+ private:
+  [[nodiscard]] Point turned_arm() const {
+    const auto rows = rows_of(turn_);
+    Point turned{};
+    for (std::size_t a = 0; a < 3; ++a) {
+      for (std::size_t b = 0; b < 3; ++b) turned[a] += double(rows[a][b]) * arm_[b];
+    }
+    return turned;
+  }
+
+  Point up_, arm_;
+  ToolTurn<N> turn_;
+};
+
+}  // namespace kerf::test

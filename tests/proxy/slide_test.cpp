@@ -1,0 +1,228 @@
+// SPDX-License-Identifier: Apache-2.0
+// F8, F9: what a hand feels that slides a ball over faces, through grooves and round in creases.
+#include <numbers>
+#include <string>
+
+#include <doctest/doctest.h>
+
+#include "controller/kernel/proxy/proxy_sweep.hpp"
+#include "tests/proxy/shell_field.hpp"
+
+using namespace kerf;
+using namespace kerf::test;
+
+namespace {
+
+constexpr double kRadius = 8;
+
+/// A ball in a volume, led by hand.
+template <class N>
+struct Led {
+  Led(const TestVolume& volume, Point start, double coefficient = 0)
+      : field(volume, ball_shell(kRadius, 512), true),
+        pose{place_of<N>(start), {}},
+        friction(coefficient) {}
+
+  /// Spring from the hand to the proxy.
+  Point tick(Point hand) {
+    const typename N::Unit unturned{};
+    swept =
+        ProxySweep<N, ShellField<N>>(field, pose, friction, unturned).tick({place_of<N>(hand), {}});
+    most_probes = std::max(most_probes, swept.probes);
+    return point_of<N>(pose.centre) - hand;
+  }
+
+  ShellField<N> field;
+  ProxyPose<N> pose;
+  typename N::Unit friction;
+  Swept<N> swept;
+  int most_probes = 0;
+};
+
+/// Largest step of the force over its mean.
+class Roughness {
+ public:
+  void add(Point force) {
+    if (count_ > 0) largest_ = std::max(largest_, length(force - last_));
+    mean_ += length(force);
+    last_ = force;
+    ++count_;
+  }
+  [[nodiscard]] double ratio() const { return largest_ / (mean_ / count_); }
+
+ private:
+  Point last_{};
+  double largest_ = 0, mean_ = 0;
+  int count_ = 0;
+};
+
+/// Slides once over a ball of radius `bump`: force step, and the worst angle in degrees.
+template <class N>
+std::array<double, 2> over_a_bump(double bump, double step, double depth, Dice& dice) {
+  Frame frame(dice, {28, 28, 28});
+  frame.place = frame.at(0, -4 - bump, 0);
+  const TestVolume volume =
+      blurred({60, 60, 60}, [&](Point p) { return length(p - frame.place) - bump; });
+  const double height = bump + kRadius;
+  const auto hand = [&](double angle, double sunk) {
+    return frame.at((height - sunk) * std::sin(angle), (height - sunk) * std::cos(angle), 0);
+  };
+  const double end = std::min(0.6, 7 / bump);
+  Led<N> led(volume, hand(-end, -2));
+  for (double sunk = -2; sunk < depth; sunk += 0.1) led.tick(hand(-end, sunk));
+  Roughness roughness;
+  double degrees = 0;
+  for (double angle = -end; angle < end; angle += step / height) {
+    const Point force = led.tick(hand(angle, depth));
+    roughness.add(force);
+    const Point up = unit(hand(angle, 0) - frame.place);
+    degrees = std::max(degrees, length(cross(unit(force), up)) * 180 / std::numbers::pi);
+  }
+  CHECK(led.most_probes <= 8);
+  return {roughness.ratio(), degrees};
+}
+
+/// A slot along the frame's x with a half-round bottom, in a block whose top is at the frame's
+/// y = radius.
+TestVolume slot(const Frame& frame, double radius) {
+  return blurred({82, 82, 82}, [&](Point p) {
+    const Point at = frame.of(p);
+    const double wall = radius - (at[1] < 0 ? std::hypot(at[1], at[2]) : std::abs(at[2]));
+    return std::max(wall, at[1] - radius);
+  });
+}
+
+/// Work that one loop of the hand gives back, over all the work done there and back; mean over
+/// loops, and the largest of one.
+struct LoopGain {
+  double mean = 0, largest = -1;
+};
+
+LoopGain gain_in_a_crease(double friction, int loops) {
+  using N = DoubleNumbers;
+  Dice dice(21);
+  LoopGain gain;
+  for (int k = 0; k < loops; ++k) {
+    Frame frame(dice, {30, 30, 30});
+    frame.place = frame.at(0, -8, 0);
+    const TestVolume volume = blurred({62, 62, 62}, [&](Point p) {
+      const Point at = frame.of(p);
+      return (at[1] - std::abs(at[2])) * std::sqrt(0.5);
+    });
+    const double rest = kRadius * std::sqrt(2.0);
+    const Point middle = frame.at(0, rest - 3, 0), one = dice.direction(),
+                other = unit(cross(one, dice.direction()));
+    Led<N> led(volume, frame.at(0, rest + 3, 0), friction);
+    for (int i = 0; i < 60; ++i) led.tick(middle + (6 - 0.1 * i) * frame.up);
+    constexpr int kTicks = 250;
+    double work = 0, moved = 0;
+    Point last_hand = middle + 2 * one, last_force = led.tick(last_hand);
+    for (int i = 1; i <= 2 * kTicks; ++i) {
+      const double phase = 2 * std::numbers::pi * i / kTicks;
+      const Point hand = middle + 2 * std::cos(phase) * one + 2 * std::sin(phase) * other;
+      const Point force = led.tick(hand);
+      const double part = dot(force + last_force, hand - last_hand) / 2;
+      if (i > kTicks) {
+        work += part;
+        moved += std::abs(part);
+      }
+      last_hand = hand;
+      last_force = force;
+    }
+    gain.mean += work / moved / loops;
+    gain.largest = std::max(gain.largest, work / moved);
+  }
+  return gain;
+}
+
+}  // namespace
+
+TEST_CASE_TEMPLATE("force is smooth over bumps", N, FixedNumbers, DoubleNumbers) {
+  struct Row {
+    double bump, step, depth;
+    double limit;  // of the force step over the mean; the ball itself turns by step / height
+  };
+  for (const Row& row : {Row{40, 0.5, 2, 0.016}, Row{40, 0.5, 1, 0.016}, Row{40, 1, 1, 0.028},
+                         Row{14, 0.5, 1, 0.031}, Row{14, 1, 1, 0.054}}) {
+    Dice dice(5);
+    double force_step = 0, degrees = 0;
+    for (int k = 0; k < 3; ++k) {
+      const auto [ratio, angle] = over_a_bump<N>(row.bump, row.step, row.depth, dice);
+      force_step = std::max(force_step, ratio);
+      degrees = std::max(degrees, angle);
+    }
+    MESSAGE(std::string(N::kName) << ", bump of " << row.bump << ", " << row.step
+                                  << " units a tick, " << row.depth << " deep: force steps by "
+                                  << 100 * force_step << " % (the direction alone "
+                                  << 100 * row.step / (row.bump + kRadius) << "), angle within "
+                                  << degrees << " degrees");
+    CHECK(force_step < row.limit);
+    CHECK(degrees < 0.5);
+  }
+}
+
+// F9
+TEST_CASE_TEMPLATE("a ball rests on a flat of any tilt", N, FixedNumbers, DoubleNumbers) {
+  Dice dice(6);
+  double mean = 0, most = 0;
+  constexpr int kTilts = 100;
+  for (int k = 0; k < kTilts; ++k) {
+    Frame frame(dice, {12, 12, 12});
+    frame.place = frame.at(0, -4, 0);
+    const TestVolume volume = blurred({26, 26, 26}, [&](Point p) { return frame.of(p)[1]; });
+    Led<N> led(volume, frame.at(0, kRadius + 1.5, 0));
+    for (int i = 0; i < 20; ++i) led.tick(frame.at(0, kRadius + 1 - 0.1 * i, 0));
+    const double lack = kRadius - frame.of(point_of<N>(led.pose.centre))[1];
+    mean += lack / kTilts;
+    most = std::max(most, std::abs(lack));
+  }
+  MESSAGE(std::string(N::kName) << ": sunk by " << mean << " units, at most " << most);
+  CHECK(std::abs(mean) < 0.02);
+  CHECK(most < 0.05);
+}
+
+TEST_CASE_TEMPLATE("a ball follows a slot, with play, with hardly any and with none", N,
+                   FixedNumbers, DoubleNumbers) {
+  for (const double radius : {8.5, 8.1, 8.0}) {
+    for (const double aside : {0.0, 1.0}) {
+      Dice dice(7);
+      double force_step = 0, behind = 0;
+      int probes = 0;
+      for (int k = 0; k < 2; ++k) {
+        const Frame frame(dice, {40, 40, 40});
+        const TestVolume volume = slot(frame, radius);
+        Led<N> led(volume, frame.at(-12, radius + 4, 0));
+        for (int i = 0; i <= 50; ++i) {
+          const double in = i / 50.0;
+          led.tick(frame.at(-12, (radius + 4) * (1 - in) - 2 * in, aside * in));
+        }
+        led.most_probes = 0;
+        for (double x = -12; x < -10; x += 0.2) led.tick(frame.at(x, -2, aside));
+        Roughness roughness;
+        for (double x = -10; x < 12; x += 0.2) {
+          const Point force = led.tick(frame.at(x, -2, aside));
+          roughness.add(force);
+          behind = std::max(behind, std::abs(dot(force, frame.along)));
+        }
+        force_step = std::max(force_step, roughness.ratio());
+        probes = std::max(probes, led.most_probes);
+      }
+      MESSAGE(std::string(N::kName) << ", slot of " << radius << ", pushed aside by " << aside
+                                    << ": force steps by " << 100 * force_step << " %, " << behind
+                                    << " units behind, " << probes << " probes at most");
+      CHECK(force_step < 0.02);
+      CHECK(behind < 0.02);
+    }
+  }
+}
+
+// The estimate is no exact potential: without friction a crease can give energy back, a little.
+TEST_CASE("a loop of the hand in a crease gives nothing back under a little friction") {
+  const LoopGain smooth = gain_in_a_crease(0, 10), rough = gain_in_a_crease(0.03, 10);
+  MESSAGE("gain of a loop: " << 100 * smooth.mean << " %, at most " << 100 * smooth.largest
+                             << " %; with friction 0.03 " << 100 * rough.mean << " %, at most "
+                             << 100 * rough.largest << " %");
+  CHECK(smooth.largest < 0.02);
+  CHECK(rough.mean < 0);
+  CHECK(rough.largest < 0.002);
+}
