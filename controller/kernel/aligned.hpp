@@ -10,6 +10,7 @@
 #include "controller/kernel/aligned_corner.hpp"
 #include "controller/kernel/cut.hpp"
 #include "controller/kernel/kernel_set.hpp"
+#include "controller/kernel/overlap_rows.hpp"
 #include "controller/kernel/tool_pose.hpp"
 #include "controller/kernel/trilinear.hpp"
 
@@ -59,6 +60,21 @@ class AlignedTick {
     return {blended(sum[0]), blended(sum[1]), blended(sum[2])};
   }
 
+  /// Leaves the ratios of the overlap in the scratch; `exact_modification_sum` of them.
+  [[nodiscard]] SumVec<FixedNumbers> press() const noexcept {
+    if (outside_) return {};
+    const TrilinearWeights<FixedNumbers> corner = trilinear_weights<FixedNumbers>(weight_);
+    std::int32_t weights[8];
+    std::copy(corner.begin(), corner.end(), weights);
+    std::int64_t sum[3];
+    kernels_.press(table_, weights, scratch_, sum);
+    return {sum[0], sum[1], sum[2]};
+  }
+  /// What `press` left.
+  [[nodiscard]] BoxOverlap overlap() const noexcept {
+    return outside_ ? BoxOverlap{} : BoxOverlap{&table_, scratch_, origin_};
+  }
+
   struct Milled {
     SumVec<FixedNumbers> modification;  ///< `exact_modification_sum`
     Removed removed;
@@ -70,12 +86,7 @@ class AlignedTick {
                             std::span<std::uint16_t> carry) const noexcept {
     Milled milled;
     if (outside_ || carry.size() < static_cast<std::size_t>(table_.row_lanes)) return milled;
-    const TrilinearWeights<FixedNumbers> corner = trilinear_weights<FixedNumbers>(weight_);
-    std::int32_t weights[8];
-    std::copy(corner.begin(), corner.end(), weights);
-    std::int64_t sum[3];
-    kernels_.press(table_, weights, scratch_, sum);
-    milled.modification = {sum[0], sum[1], sum[2]};
+    milled.modification = press();
     milled.removed = cut_box(kernels_, table_, scratch_, grid_, density_, origin_, rate, carry);
     return milled;
   }

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "controller/kernel/decay.hpp"
 #include "shared/numeric/numbers.hpp"
 
 namespace kerf {
@@ -26,16 +27,6 @@ struct RemovalRate {
 };
 
 namespace detail {
-
-/// 1 - exp(-x) for small x >= 0 by its series; full double precision below 1/4.
-[[nodiscard]] constexpr double decay_small(double x) noexcept {
-  double term = x, sum = 0;
-  for (int n = 2; n < 16; ++n) {
-    sum += term;
-    term *= -x / n;
-  }
-  return sum;
-}
 
 /// A weight from 0..1, rounded.
 template <class N>
@@ -62,7 +53,7 @@ template <class N>
   double fraction = k_times_t < 1 ? k_times_t : 1;
   if (exact_exponential) {
     const double kt = k_times_t < kMaxRateTimesTick ? k_times_t : kMaxRateTimesTick;
-    const double step = detail::decay_small(kt / double(Rate::kSteps));
+    const double step = decay_small(kt / double(Rate::kSteps));
     std::array<double, Rate::kSteps + 1> decay{};
     for (std::size_t i = 0; i < Rate::kSteps; ++i) decay[i + 1] = decay[i] + (1 - decay[i]) * step;
     fraction = decay[Rate::kSteps];

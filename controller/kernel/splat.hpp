@@ -7,6 +7,7 @@
 
 #include "controller/kernel/cut.hpp"
 #include "controller/kernel/gather.hpp"
+#include "controller/kernel/overlap_rows.hpp"
 #include "controller/kernel/splat_table.hpp"
 
 namespace kerf {
@@ -54,6 +55,10 @@ class SplatTick {
     kernels_.press_sums(box_, volume_ratio, scratch_, contact, modification);
     return {{contact[0], contact[1], contact[2]},
             {modification[0], modification[1], modification[2]}};
+  }
+  /// The ratios that `press` left.
+  [[nodiscard]] BoxOverlap overlap() const noexcept {
+    return near_ ? BoxOverlap{&box_, scratch_.tick, origin_} : BoxOverlap{};
   }
   /// With a `carry` of less than the box's row_lanes nothing is cut.
   [[nodiscard]] Removed cut(const RemovalRate<FixedNumbers>& rate,

@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "controller/kernel/tool_pose.hpp"
+#include "shared/numeric/numbers.hpp"
+#include "shared/numeric/vec.hpp"
+#include "shared/volume/voxel_grid.hpp"
+
+namespace kerf {
+
+struct ToolSpace;  ///< mm in the tool's own frame: centre of the cutting head, shaft along +y
+
+/// Least speed of the tool's surface, of its rim's: abrasive grains at the pole of a ball still
+/// tear a little, and a flat end would otherwise never cut its middle (haptics-science 1.4).
+inline constexpr double kSpeedFloor = 0.08;
+
+/// Where voxels lie beside the spindle's axis, which is the tool's y, in rim radii: what speed the
+/// tool's surface has there, and which way it moves. Made once per tick, tool and volume.
+///
+/// Fixed: places with 20 fraction bits from steps rounded once, so a place 100 voxels away is off
+/// by 1e-4 at most; speeds within 2e-4 of the rim's.
+template <class N>
+class SpindleFrame {
+ public:
+  using Weight = typename N::Weight;
+  using Sum = typename N::Sum;
+
+  /// Distance from the axis along the tool's x and z; fixed: 20 fraction bits.
+  struct Place {
+    Sum x{}, z{};
+  };
+
+  constexpr SpindleFrame() noexcept = default;
+
+  /// `rims_from_voxel` takes voxel edges to rim radii along the world's axes: rotation of the
+  /// volume times spacing over the tool's largest radius, its entries below 64. `world_from_tool`
+  /// is the turn of the stylus, for round tools too.
+  constexpr SpindleFrame(
+      VoxelVec<typename N::Real> centre_vox,
+      const Transform<typename N::Ratio, WorldSpace, VoxelSpace>& rims_from_voxel,
+      const Transform<typename N::Unit, WorldSpace, ToolSpace>& world_from_tool) noexcept
+      : centre_(centre_vox) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      across_x_[axis] = along(rims_from_voxel, world_from_tool, 0, axis);
+      across_z_[axis] = along(rims_from_voxel, world_from_tool, 2, axis);
+    }
+  }
+
+  /// Place of a voxel within 2^9 of the centre.
+  [[nodiscard]] constexpr Place at(VoxelIndex v) const noexcept {
+    return {beside(across_x_, v), beside(across_z_, v)};
+  }
+  /// Place of the voxel `n` behind along x.
+  [[nodiscard]] constexpr Place behind(Place place, std::int32_t n) const noexcept {
+    return {place.x + Sum(across_x_[0]) * Sum(n), place.z + Sum(across_z_[0]) * Sum(n)};
+  }
+
+  /// Speed of the tool's surface there over its rim's: kSpeedFloor to 1, as a weight.
+  [[nodiscard]] static constexpr Weight speed(Place place) noexcept {
+    if constexpr (N::kIsFixed) {
+      const Sum x = std::clamp<Sum>(place.x, -kOne, kOne);
+      const Sum z = std::clamp<Sum>(place.z, -kOne, kOne);
+      const Sum square = std::min<Sum>((x * x + z * z) >> 15, kRootEnd);  // 25 fraction bits
+      const auto i = static_cast<std::size_t>(square >> 15);
+      const Sum rise = kRoots[i + 1] - kRoots[i];
+      return std::max(kFloor, static_cast<Weight>(kRoots[i] + (rise * (square & 0x7fff) >> 15)));
+    } else {
+      const Sum distance = square_root(place.x * place.x + place.z * place.z);
+      return std::clamp(distance, kFloor, N::kWeightOne);
+    }
+  }
+  /// A distance as a weight, at most the rim's.
+  [[nodiscard]] static constexpr Weight as_weight(Sum distance) noexcept {
+    if constexpr (N::kIsFixed) {
+      return static_cast<Weight>(std::clamp<Sum>(distance, -kOne, kOne) >> 5);
+    } else {
+      return std::clamp(distance, -N::kWeightOne, N::kWeightOne);
+    }
+  }
+
+ private:
+  using Step = typename N::Step;
+  static constexpr Sum kOne = N::kIsFixed ? Sum(1 << 20) : Sum(1);
+  static constexpr Weight kFloor = static_cast<Weight>(kSpeedFloor * double(N::kWeightOne));
+
+  // Square roots of 0, 1/1024 .. 1 and one more as weights; linear steps between.
+  static constexpr std::size_t kRootSteps = 1024;
+  static constexpr Sum kRootEnd = N::kIsFixed ? Sum(kRootSteps << 15) : Sum(1);
+  static constexpr std::array<std::uint16_t, kRootSteps + 2> kRoots = [] {
+    std::array<std::uint16_t, kRootSteps + 2> roots{};
+    for (std::size_t i = 0; i <= kRootSteps; ++i) {
+      roots[i] = static_cast<std::uint16_t>(integer_sqrt(std::uint64_t{i} << 20));
+    }
+    roots[kRootSteps + 1] = roots[kRootSteps];
+    return roots;
+  }();
+
+  /// Rim radii along axis `b` of the tool per voxel along axis `a`.
+  static constexpr Step along(
+      const Transform<typename N::Ratio, WorldSpace, VoxelSpace>& rims_from_voxel,
+      const Transform<typename N::Unit, WorldSpace, ToolSpace>& world_from_tool, std::size_t b,
+      std::size_t a) noexcept {
+    Sum sum{};
+    for (std::size_t w = 0; w < 3; ++w) {
+      if constexpr (N::kIsFixed) {  // Q24 * Q30 = Q54, three terms below 2^60
+        sum += Sum{rims_from_voxel.row[w][a].raw()} * world_from_tool.row[w][b].raw();
+      } else {
+        sum += rims_from_voxel.row[w][a] * world_from_tool.row[w][b];
+      }
+    }
+    if constexpr (N::kIsFixed) {
+      return saturate_i32(round_shift(sum, 54 - 20));
+    } else {
+      return sum;
+    }
+  }
+
+  [[nodiscard]] constexpr Sum beside(const std::array<Step, 3>& across,
+                                     VoxelIndex v) const noexcept {
+    if constexpr (N::kIsFixed) {  // Q20 * Q16: steps below 2^27, ways below 2^25
+      const auto term = [](Step step, std::int32_t at, Q16 centre) {
+        return std::int64_t{step} * ((std::int64_t{at} << 16) - centre.raw());
+      };
+      return round_shift(term(across[0], v.x, centre_.x) + term(across[1], v.y, centre_.y) +
+                             term(across[2], v.z, centre_.z),
+                         16);
+    } else {
+      return across[0] * (Sum(v.x) - centre_.x) + across[1] * (Sum(v.y) - centre_.y) +
+             across[2] * (Sum(v.z) - centre_.z);
+    }
+  }
+
+  VoxelVec<typename N::Real> centre_;
+  std::array<Step, 3> across_x_{}, across_z_{};
+};
+
+}  // namespace kerf

@@ -1,0 +1,290 @@
+// SPDX-License-Identifier: Apache-2.0
+// Cutting by force, tick by tick: how a budget is kept and dealt out. How a cut goes on in time is
+// in preston_feed_test.cpp.
+#include "controller/kernel/preston.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <numbers>
+#include <random>
+#include <vector>
+
+#include <doctest/doctest.h>
+
+#include "tests/kernel/preston_support.hpp"
+
+using namespace kerf;
+using namespace kerf::test;
+
+namespace {
+
+constexpr double kPi = std::numbers::pi;
+constexpr std::array<double, 3> kCentre{16.3, 15.8, 16.1};
+
+TestVolume block() {
+  return filled({32, 32, 32}, 65535);
+}
+
+double uniform(std::mt19937& random, double from, double to) {
+  return from + (to - from) * (static_cast<double>(random()) / 4294967296.0);
+}
+
+template <class N>
+PrestonRig<N> ball_in_block(Scale scale = {}) {
+  return {block(), odd_ball(6), 6, scale};
+}
+
+template <class N>
+double carried(const PrestonState<N>& state) {
+  double sum = 0;
+  for (const auto carry : state.carry) sum += steps_of<N>(carry);
+  return sum;
+}
+
+}  // namespace
+
+// F11
+TEST_CASE_TEMPLATE("what was removed and what is carried is the integral of G F", N, FixedNumbers,
+                   DoubleNumbers) {
+  for (const double tick_s : {1.0 / 250, 1.0 / 1000, 1.0 / 8000}) {
+    CAPTURE(tick_s);
+    auto rig = ball_in_block<N>({0.125, tick_s});
+    std::mt19937 random(1);
+    double fed = 0, removed = 0;
+    for (int i = 0; i < 300; ++i) {
+      const double force_n = std::floor(uniform(random, 0, 2) * 65536) / 65536;
+      const PrestonOutcome<N> out = rig.press(kCentre, force_n, 0.75);
+      fed += rig.scale.steps_per_n(kEnamelG) * force_n * 0.75;
+      removed += double(out.removed.density_steps);
+      CHECK(out.lost == 0);
+      CHECK(std::abs(carried<N>(rig.state)) < 100);  // a 600th of a voxel
+    }
+    CHECK(removed + carried<N>(rig.state) == doctest::Approx(fed).epsilon(1e-6));
+    CHECK(double(total_density(block()) - total_density(rig.volume)) == removed);
+  }
+}
+
+// F12
+TEST_CASE_TEMPLATE("without force, below the threshold or with the spindle standing nothing leaves",
+                   N, FixedNumbers, DoubleNumbers) {
+  auto rig = ball_in_block<N>();
+  rig.plan.threshold_n = typename N::Real(0.05);
+  rig.press(kCentre, 2);  // leaves a carry that nothing may spend
+  const TestVolume before = rig.volume;
+  const auto carry = rig.state.carry;
+  for (const auto& [force_n, ratio] :
+       {std::array{0.0, 1.0}, std::array{0.05, 1.0}, std::array{-1.0, 1.0}, std::array{3.0, 0.0}}) {
+    CHECK(rig.press(kCentre, force_n, ratio).removed.density_steps == 0);
+  }
+  CHECK(rig.volume.density == before.density);
+  CHECK(rig.state.carry == carry);
+  CHECK(rig.press(kCentre, 0.06).removed.density_steps > 0);
+}
+
+// F13
+TEST_CASE("a force whose part of a voxel rounds to nothing cuts all the same") {
+  const Scale scale{0.125, 1.0 / 8000};
+  auto rig = ball_in_block<FixedNumbers>(scale);
+  constexpr double kForceN = 1;
+  const double budget = scale.steps_per_n(kEnamelG) * kForceN;
+  rig.cover(kCentre);
+  double all = 0, largest = 0;  // weights without the speed, which only makes them more unequal
+  for (const auto w : rig.cutter.overlap.memory) {
+    all += double(w);
+    largest = std::max(largest, double(w));
+  }
+  // With 8 bits, and with 16: no voxel's part of a tick reaches half a step.
+  CHECK(budget / 257 * largest / all < 0.5);
+  CHECK(budget * largest / all < 0.5);
+  double removed = 0;
+  constexpr int kTicks = 500;
+  for (int i = 0; i < kTicks; ++i) {
+    removed += double(rig.press(kCentre, kForceN).removed.density_steps);
+  }
+  CHECK(removed + carried<FixedNumbers>(rig.state) ==
+        doctest::Approx(kTicks * budget).epsilon(1e-6));
+}
+
+TEST_CASE("over many ticks every voxel loses its part of the budget, whatever the budget") {
+  // 512.0 and 0.5 steps a tick: without a moving phase the same voxels would be rounded up always.
+  for (const double steps : {512.0, 0.5, 333.3}) {
+    CAPTURE(steps);
+    auto rig = ball_in_block<FixedNumbers>();
+    rig.plan.rate.fill(force_rate<FixedNumbers>(steps));
+    rig.cover(kCentre);
+    const auto frame = frame_at<FixedNumbers>(kCentre, rig.rim_vox);
+    std::vector<double> weight(rig.volume.density.size());
+    double all = 0;
+    for_each_row(rig.volume.grid, rig.cutter.overlap,
+                 [&](VoxelIndex first, std::int32_t count, auto&& ratio) {
+                   for (std::int32_t i = 0; i < count; ++i) {
+                     const auto place = frame.behind(frame.at(first), i);
+                     const double w = double(ratio(i)) * double(frame.speed(place));
+                     weight[rig.volume.grid.index(first.x + i, first.y, first.z)] = w;
+                     all += w;
+                   }
+                 });
+    constexpr int kTicks = 300;
+    for (int i = 0; i < kTicks; ++i) rig.press(kCentre, 1);
+    double worst = 0;
+    for (std::size_t at = 0; at < weight.size(); ++at) {
+      const double lost = 65535.0 - rig.volume.density[at];
+      worst = std::max(worst, std::abs(lost - kTicks * steps * weight[at] / all));
+    }
+    CHECK(worst < 6);  // density steps; half a step a tick all one way would be 150
+  }
+}
+
+TEST_CASE("in a mixture each material leaves at its own rate under its part of the force") {
+  auto rig = ball_in_block<FixedNumbers>();
+  std::vector<Label> labels(rig.volume.density.size());
+  for (std::size_t i = 0; i < labels.size(); ++i) labels[i] = i % 32 < 16 ? 1 : 2;
+  rig.plan.labels = labels;
+  rig.plan.rate[1] = force_rate<FixedNumbers>(1000);
+  rig.plan.rate[2] = force_rate<FixedNumbers>(3000);
+  rig.plan.rate[3] = force_rate<FixedNumbers>(70000);  // not there: nothing of it is fed
+  const auto by_material = [&] {
+    std::array<double, 4> lost{};
+    for (std::size_t i = 0; i < labels.size(); ++i)
+      lost[labels[i]] += 65535 - rig.volume.density[i];
+    return lost;
+  };
+  // The plane between the materials runs through the ball's middle: half of the force each.
+  constexpr int kTicks = 20;
+  for (int i = 0; i < kTicks; ++i) rig.press({15.5, 16, 16}, 0.5);
+  const auto lost = by_material();
+  CHECK(lost[1] == doctest::Approx(kTicks * 0.5 * 0.5 * 1000).epsilon(0.005));
+  CHECK(lost[2] == doctest::Approx(kTicks * 0.5 * 0.5 * 3000).epsilon(0.005));
+  CHECK(rig.state.carry[3] == 0);
+}
+
+TEST_CASE("a forbidden material is told, bears its part of the force and is never cut") {
+  auto rig = ball_in_block<FixedNumbers>();
+  std::vector<Label> labels(rig.volume.density.size(), 1);
+  for (std::size_t i = 0; i < labels.size(); ++i) labels[i] = i % 32 < 16 ? 1 : 3;
+  rig.plan.labels = labels;
+  rig.plan.forbidden[3] = true;
+  rig.plan.rate[3] = {};
+  double removed = 0;
+  for (int i = 0; i < 20; ++i) {
+    const auto out = rig.press({15.5, 16, 16}, 0.5);
+    CHECK(out.forbidden);
+    removed += double(out.removed.density_steps);
+    CHECK(out.removed.changed.hi.x <= 16);
+  }
+  CHECK(removed == doctest::Approx(20 * 0.25 * rig.scale.steps_per_n(kEnamelG)).epsilon(0.005));
+  CHECK_FALSE(rig.press({7, 16, 16}, 0.5).forbidden);   // clear of it
+  CHECK(rig.press({15.5, 16, 16}, 0.01, 0).forbidden);  // told whether it turns or not
+  for (std::size_t i = 0; i < labels.size(); ++i) {
+    if (labels[i] == 3) REQUIRE(rig.volume.density[i] == 65535);
+  }
+}
+
+TEST_CASE_TEMPLATE("a budget beyond the fullest voxels goes to the others, and at last is lost", N,
+                   FixedNumbers, DoubleNumbers) {
+  const auto after = [](double share) {
+    auto rig = ball_in_block<N>();
+    rig.cover(kCentre);
+    double covered = 0;  // full density
+    for (const auto w : rig.cutter.overlap.memory) covered += double(w) / double(N::kWeightOne);
+    rig.plan.rate.fill(force_rate<N>(covered * kDensityMax));
+    const auto out = rig.press(kCentre, share);
+    return std::array{double(out.removed.density_steps) / (covered * kDensityMax),
+                      carried<N>(rig.state) / kDensityMax, steps_of<N>(out.lost), covered};
+  };
+  // Speeds of 0.08 to 1 and 0.59 in the mean: beyond 0.6 the rim has nothing left.
+  CHECK(after(0.5)[0] == doctest::Approx(0.5).epsilon(1e-4));
+  CHECK(after(0.75)[0] == doctest::Approx(0.75).epsilon(0.002));
+  const auto all = after(3);
+  CHECK(all[0] == doctest::Approx(1).epsilon(1e-4));
+  CHECK(all[1] == 1);  // one full voxel waits
+  CHECK(all[2] == doctest::Approx((2 * all[3] - 1) * kDensityMax).epsilon(1e-3));
+}
+
+// F14
+TEST_CASE("with force to spare a stamp removes the ball and a sweep the capsule") {
+  const auto swept = [](double length_vox) {
+    PrestonRig<FixedNumbers> rig(filled({64, 24, 24}, 65535), odd_ball(32), 8);
+    rig.pitch_vox = 0.25;
+    rig.plan.rate.fill(force_rate<FixedNumbers>(1e9));
+    double steps = 0;
+    for (double x = 0; x <= length_vox; x += 1) {
+      steps += double(rig.press({12 + x, 12, 12}, 10).removed.density_steps);
+    }
+    return steps / kDensityMax;
+  };
+  const auto capsule = [](double radius, double length) {
+    return 4.0 / 3 * kPi * radius * radius * radius + kPi * radius * radius * length;
+  };
+  CHECK(swept(0) == doctest::Approx(capsule(8, 0)).epsilon(0.01));
+  // Each stamp takes the covered part of what is left at the rim, as the paper's rule does: the
+  // groove is wider within the trilinear reach.
+  const double groove = swept(30);
+  CHECK(groove > capsule(8, 30));
+  CHECK(groove < capsule(8.55, 30));
+}
+
+// F15
+TEST_CASE("a cut depends on the force of its own tick and on none that comes later") {
+  auto a = ball_in_block<FixedNumbers>(), b = ball_in_block<FixedNumbers>();
+  for (int i = 0; i < 10; ++i) {
+    a.press(kCentre, 1);
+    b.press(kCentre, i < 6 ? 1 : 2);
+    CHECK((a.volume.density == b.volume.density) == (i < 6));
+  }
+}
+
+TEST_CASE("fixed point cuts what double cuts, to a step of the voxel and a millionth of the sum") {
+  std::mt19937 random(3);
+  for (int n = 0; n < 30; ++n) {
+    const TestVolume start =
+        n % 2 == 0 ? block() : random_volume({32, 32, 32}, static_cast<std::uint32_t>(n));
+    PrestonRig<FixedNumbers> fixed(start, odd_ball(5), 5);
+    PrestonRig<DoubleNumbers> exact(start, odd_ball(5), 5);
+    // Places, forces and rates that both can hold.
+    const auto held = [&](double from, double to) {
+      return std::floor(uniform(random, from, to) * 64) / 64;
+    };
+    const std::array<double, 3> centre{held(-2, 34), held(-2, 34), held(-2, 34)};
+    const double force_n = held(0, 4), ratio = held(0, 1.5);
+    const auto a = fixed.press(centre, force_n, ratio);
+    const auto b = exact.press(centre, force_n, ratio);
+    int worst = 0;
+    for (std::size_t i = 0; i < start.density.size(); ++i) {
+      worst = std::max(worst, std::abs(fixed.volume.density[i] - exact.volume.density[i]));
+    }
+    CHECK(worst <= 1);
+    CHECK(double(a.removed.density_steps) + carried<FixedNumbers>(fixed.state) +
+              steps_of<FixedNumbers>(a.lost) ==
+          doctest::Approx(double(b.removed.density_steps) + carried<DoubleNumbers>(exact.state) +
+                          b.lost)
+              .epsilon(1e-6));
+    CHECK(std::abs(double(a.drag.x) - b.drag.x) < 5e-4);
+    CHECK(std::abs(double(a.drag.z) - b.drag.z) < 5e-4);
+    CHECK(std::abs(double(a.drag.arm) - b.drag.arm) < 5e-4);
+  }
+}
+
+TEST_CASE("extreme forces, rates and volumes stay in range") {
+  for (const double force_n : {1e-4, 3.3, 32767.0}) {
+    for (const double steps : {1e-9, 1.0, 1e6, 1e30}) {
+      for (const Density rho : {Density{1}, Density{65535}}) {
+        PrestonRig<FixedNumbers> rig(filled({32, 32, 32}, rho), odd_ball(6), 6);
+        rig.plan.rate.fill(force_rate<FixedNumbers>(steps));
+        for (int i = 0; i < 3; ++i) {
+          const auto out = rig.press(kCentre, force_n, 1.9);
+          CHECK(std::abs(carried<FixedNumbers>(rig.state)) <= 65535);
+          CHECK(out.lost >= 0);
+        }
+        CHECK(total_density(rig.volume) <= std::uint64_t{rho} * 32 * 32 * 32);
+      }
+    }
+  }
+  PrestonRig<FixedNumbers> rig(block(), odd_ball(6), 6);
+  rig.memory.resize(10);  // a tool that the scene did not size for
+  CHECK(rig.press(kCentre, 1).removed.density_steps > 0);
+  rig.memory.clear();
+  CHECK(rig.press(kCentre, 1).removed.density_steps == 0);
+}
