@@ -2,17 +2,13 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
-#include <type_traits>
 
+#include "controller/kernel/covered_voxels.hpp"
 #include "controller/kernel/milling.hpp"
-#include "controller/kernel/overlap_rows.hpp"
 #include "controller/kernel/preston_budget.hpp"
-#include "controller/kernel/surface_drag.hpp"
-#include "controller/kernel/surface_speed.hpp"
 
 namespace kerf {
 
@@ -27,23 +23,20 @@ namespace kerf {
 // part of the force; in one material the volume per second is G F_n n/n_ref. What cannot be cut
 // carries its part of the force and stays.
 
-/// Materials that a cut can tell apart; a label beyond counts as the last of them.
-inline constexpr std::size_t kMaxCutMaterials = 64;
-
 /// How force cuts one volume; constant during a run. Index: label, 0 where there are no labels.
 template <class N>
 struct PrestonPlan {
-  std::array<ForceRate<N>, kMaxCutMaterials> rate{};
-  std::array<bool, kMaxCutMaterials> forbidden{};  ///< never cut, and told when pressed upon
-  typename N::Real threshold_n{};                  ///< force that cuts nothing yet
-  std::span<const Label> labels;                   ///< one per voxel, or empty
+  ByMaterial<ForceRate<N>> rate{};
+  ByMaterial<bool> forbidden{};    ///< never cut, and told when pressed upon
+  typename N::Real threshold_n{};  ///< force that cuts nothing yet
+  std::span<const Label> labels;   ///< one per voxel, or empty
 };
 
 /// What a volume's cut hands to the next tick.
 template <class N>
 struct PrestonState {
   /// Budget not yet spent, by material: at most one full voxel either way.
-  std::array<CutBudget<N>, kMaxCutMaterials> carry{};
+  ByMaterial<CutBudget<N>> carry{};
   std::uint16_t phase = 0;  ///< of the rounding
 };
 
@@ -65,25 +58,6 @@ struct PrestonOutcome {
   bool forbidden = false;  ///< the tool presses on a forbidden material
 };
 
-/// A voxel under the tool during one tick.
-template <class N>
-struct CoveredVoxel {
-  std::uint32_t at;  ///< entry of the volume
-  std::array<std::int16_t, 3> place;
-  std::uint8_t material;
-  typename N::Weight speed;
-  /// Density that may still leave; fixed: 15 fraction bits.
-  std::conditional_t<N::kIsFixed, std::uint32_t, typename N::Sum> covered;
-
-  [[nodiscard]] constexpr CutWeight<N> weight() const noexcept {
-    if constexpr (N::kIsFixed) {
-      return std::uint64_t{covered} * static_cast<std::uint32_t>(speed) >> 15;
-    } else {
-      return covered * speed;
-    }
-  }
-};
-
 namespace detail {
 
 /// One tick of `cut_by_force` on one volume.
@@ -92,51 +66,24 @@ class PrestonTick {
  public:
   using Sum = typename N::Sum;
 
-  constexpr PrestonTick(const PrestonPlan<N>& plan, const VoxelGrid& grid,
-                        std::span<Density> density, PrestonState<N>& state,
-                        std::span<CoveredVoxel<N>> memory) noexcept
-      : plan_(plan), grid_(grid), density_(density), state_(state), memory_(memory) {}
-
-  /// Lists the voxels under the tool.
-  template <class Overlap>
-  constexpr void cover(const Overlap& overlap, const SpindleFrame<N>& frame,
-                       PrestonOutcome<N>& out) noexcept {
-    DragSums<N> drag;
-    for_each_row(grid_, overlap, [&](VoxelIndex first, std::int32_t count, auto&& ratio) {
-      const std::size_t row = grid_.index(first.x, first.y, first.z);
-      const auto start = frame.at(first);
-      for (std::int32_t i = 0; i < count; ++i) {
-        const auto r = ratio(i);
-        if (!(r > 0)) continue;
-        const std::size_t at = row + static_cast<std::size_t>(i);
-        if (density_[at] == 0 || found_ == memory_.size()) continue;
-        const auto place = frame.behind(start, i);
-        CoveredVoxel<N>& voxel = memory_[found_++];
-        voxel.at = static_cast<std::uint32_t>(at);
-        voxel.place = {static_cast<std::int16_t>(first.x + i), static_cast<std::int16_t>(first.y),
-                       static_cast<std::int16_t>(first.z)};
-        voxel.material = material_at(at);
-        voxel.speed = SpindleFrame<N>::speed(place);
-        voxel.covered = static_cast<Covered>(density_[at]) * static_cast<Covered>(r);
-        out.forbidden = out.forbidden || plan_.forbidden[voxel.material];
-        drag.add(voxel.covered, voxel.weight(), voxel.speed, place);
-      }
-    });
-    out.drag = drag.mean();
-  }
+  constexpr PrestonTick(const PrestonPlan<N>& plan, std::span<Density> density,
+                        PrestonState<N>& state, CoveredVoxels<N>& covered) noexcept
+      : plan_(plan),
+        density_(density),
+        state_(state),
+        voxels_(covered.list),
+        weight_(covered.weight) {}
 
   /// Feeds the accounts of the materials under the tool and spends them.
   constexpr void cut(Sum drive, PrestonOutcome<N>& out) noexcept {
-    weigh();
     CutWeight<N> all{};
-    for (const auto weight : weight_) all += weight;
-    for (std::size_t m = 0; m < kMaxCutMaterials; ++m) {
-      if (!(weight_[m] > 0)) continue;
+    each_material([&](std::size_t m) { all += weight_[m]; });
+    each_material([&](std::size_t m) {
       const auto fed = portion<N>(budget_of(plan_.rate[m], drive), share_of<N>(weight_[m], all));
-      if (!(fed > 0)) continue;
+      if (!(fed > 0)) return;
       budget_[m] = fed + state_.carry[m] / kCarryTicks;
       state_.carry[m] += fed;
-    }
+    });
     // What the fullest voxels cannot give is asked of the others once; the rest waits.
     if (spend(out.removed)) {
       weigh();
@@ -150,42 +97,52 @@ class PrestonTick {
   }
 
  private:
-  using Covered = decltype(CoveredVoxel<N>::covered);
+  using Covered = typename CoveredVoxel<N>::Covered;
   static constexpr CutBudget<N> kStep = N::kIsFixed ? CutBudget<N>(1 << kBudgetBits) : 1;
   /// The carry is spent over so many ticks: all at once, it would swing with the rounding.
   static constexpr CutBudget<N> kCarryTicks = 16;
   static constexpr CutBudget<N> kFullVoxel = CutBudget<N>(65535) * kStep;
 
-  [[nodiscard]] constexpr std::uint8_t material_at(std::size_t at) const noexcept {
-    if (plan_.labels.empty()) return 0;
-    return std::min(plan_.labels[at], static_cast<Label>(kMaxCutMaterials - 1));
-  }
-  [[nodiscard]] constexpr std::span<CoveredVoxel<N>> voxels() const noexcept {
-    return memory_.first(found_);
+  template <class Visit>
+  constexpr void each_material(Visit&& visit) const noexcept {
+    for (std::size_t m = 0; m < kMaxCutMaterials; ++m) {
+      if (weight_[m] > 0) visit(m);
+    }
   }
 
   /// Weights of what is still covered, by material.
   constexpr void weigh() noexcept {
     weight_ = {};
-    for (const CoveredVoxel<N>& voxel : voxels()) weight_[voxel.material] += voxel.weight();
+    for (CoveredVoxel<N>& voxel : voxels_) {
+      voxel.weight = weight_of<N>(voxel.covered, voxel.speed);
+      weight_[voxel.material] += voxel.weight;
+    }
   }
 
   /// Takes the budgets from the volume. True when some voxel had less to give than its part.
   constexpr bool spend(Removed& removed) noexcept {
-    std::array<BudgetPerWeight<N>, kMaxCutMaterials> price{};
-    for (std::size_t m = 0; m < kMaxCutMaterials; ++m) price[m] = {budget_[m], weight_[m]};
+    ByMaterial<BudgetPerWeight<N>> price{};
+    each_material([&](std::size_t m) { price[m] = {budget_[m], weight_[m]}; });
     state_.phase = static_cast<std::uint16_t>(state_.phase + kPhaseByTick);
+    ByMaterial<std::uint64_t> taken{};
     bool full = false;
-    for (CoveredVoxel<N>& voxel : voxels()) {
-      const auto wanted = price[voxel.material].of(voxel.weight());
-      const Density steps = take(voxel, wanted, full);
+    VoxelIndex lo{kPositionLimitVox, kPositionLimitVox, kPositionLimitVox}, hi{};
+    for (CoveredVoxel<N>& voxel : voxels_) {
+      const Density steps = take(voxel, price[voxel.material].of(voxel.weight), full);
       if (steps == 0) continue;
-      budget_[voxel.material] -= CutBudget<N>(steps) * kStep;
-      state_.carry[voxel.material] -= CutBudget<N>(steps) * kStep;
-      removed.density_steps += steps;
+      taken[voxel.material] += steps;
       const auto [x, y, z] = voxel.place;
-      removed.changed = removed.changed.united({{x, y, z}, {x + 1, y + 1, z + 1}});
+      lo = {std::min<std::int32_t>(lo.x, x), std::min<std::int32_t>(lo.y, y),
+            std::min<std::int32_t>(lo.z, z)};
+      hi = {std::max<std::int32_t>(hi.x, x + 1), std::max<std::int32_t>(hi.y, y + 1),
+            std::max<std::int32_t>(hi.z, z + 1)};
     }
+    removed.changed = removed.changed.united({lo, hi});
+    each_material([&](std::size_t m) {
+      budget_[m] -= static_cast<CutBudget<N>>(taken[m]) * kStep;
+      state_.carry[m] -= static_cast<CutBudget<N>>(taken[m]) * kStep;
+      removed.density_steps += taken[m];
+    });
     return full;
   }
 
@@ -203,7 +160,7 @@ class PrestonTick {
       const std::uint64_t most = std::uint64_t{voxel.covered} << 1;
       full = full || wanted > most;
       wanted = std::min(wanted, most);
-      voxel.covered -= static_cast<std::uint32_t>(wanted >> 1);
+      voxel.covered -= static_cast<Covered>(wanted >> 1);
       steps = static_cast<std::uint32_t>((wanted + phase) >> 16);
     } else {
       full = full || wanted > voxel.covered;
@@ -218,13 +175,11 @@ class PrestonTick {
   }
 
   const PrestonPlan<N>& plan_;
-  const VoxelGrid& grid_;
   std::span<Density> density_;
   PrestonState<N>& state_;
-  std::span<CoveredVoxel<N>> memory_;
-  std::size_t found_ = 0;
-  std::array<CutWeight<N>, kMaxCutMaterials> weight_{};
-  std::array<CutBudget<N>, kMaxCutMaterials> budget_{};  ///< of this tick, still to be spent
+  std::span<CoveredVoxel<N>> voxels_;
+  ByMaterial<CutWeight<N>>& weight_;
+  ByMaterial<CutBudget<N>> budget_{};  ///< of this tick, still to be spent
 };
 
 }  // namespace detail
@@ -245,10 +200,14 @@ constexpr PrestonOutcome<N> cut_by_force(const PrestonPlan<N>& plan, const Prest
                                          std::span<CoveredVoxel<N>> memory) noexcept {
   PrestonOutcome<N> out;
   if (!(press.normal_force_n > typename N::Real{})) return out;
-  detail::PrestonTick<N> tick(plan, grid, density, state, memory);
-  tick.cover(overlap, press.frame, out);
+  CoveredVoxels<N> covered = covered_voxels<N>(grid, std::span<const Density>(density), plan.labels,
+                                               overlap, press.frame, memory);
+  out.drag = covered.drag;
+  for (std::size_t m = 0; m < kMaxCutMaterials; ++m) {
+    out.forbidden = out.forbidden || (plan.forbidden[m] && covered.weight[m] > 0);
+  }
   const auto drive = cut_drive<N>(press.normal_force_n, plan.threshold_n, press.spindle_ratio);
-  if (drive > 0) tick.cut(drive, out);
+  if (drive > 0) detail::PrestonTick<N>(plan, density, state, covered).cut(drive, out);
   return out;
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 
 #include "controller/kernel/preston_budget.hpp"
@@ -11,53 +12,69 @@ namespace kerf {
 /// How the tool's surface moves over what it touches, averaged by the part covered.
 template <class N>
 struct SurfaceDrag {
-  /// Direction along the tool's x and z: shorter than 1 where the contact lies around the axis, up
-  /// to 1.42 where a tool of few voxels covers some beyond its rim.
+  /// Direction along the tool's x and z: shorter than 1 where the contact lies around the axis,
+  /// longer (below 2) where a tool of few voxels covers some beyond its rim.
   typename N::Unit x{}, z{};
   typename N::Unit arm{};  ///< distance from the axis over the rim radius, kSpeedFloor to 1
 };
 
 namespace detail {
 
-/// What `SurfaceDrag` is the mean of. Fixed: terms below 2^38, so 2^18 voxels stay below 2^56.
+/// What `SurfaceDrag` is the mean of, row by row. Fixed: covered densities and weights have 15
+/// fraction bits and add up to less than 2^49.
 template <class N>
 class DragSums {
  public:
-  /// A voxel of covered density `covered`; `weight` is that times the surface's `speed`.
-  template <class Covered>
-  constexpr void add(Covered covered_density, CutWeight<N> cut_weight, typename N::Weight v,
-                     typename SpindleFrame<N>::Place place) noexcept {
-    const Sum covered = reduced(covered_density), weight = reduced(cut_weight);
-    const auto speed = static_cast<Sum>(v);
+  using Sum = typename N::Sum;
+  using Weight = CutWeight<N>;
+
+  /// Sums over voxels of a row, the first of which is number 0.
+  struct Row {
+    Weight covered{};         ///< density that the tool covers
+    Weight covered_number{};  ///< times the voxel's number
+    Weight weight{};          ///< covered times the surface's speed
+    Weight weight_speed{};    ///< and once more; fixed: with 30 fraction bits
+  };
+
+  constexpr void add(const Row& row, typename SpindleFrame<N>::Place first,
+                     typename SpindleFrame<N>::Place step) noexcept {
+    if (!(row.weight > 0)) return;
     // omega x r of a turn about the tool's y.
-    x_ += covered * static_cast<Sum>(SpindleFrame<N>::as_weight(place.z));
-    z_ -= covered * static_cast<Sum>(SpindleFrame<N>::as_weight(place.x));
-    speed_ += covered * speed;
-    arm_ += weight * speed;
-    weight_ += weight * static_cast<Sum>(N::kWeightOne);
+    x_ += moment(row, first.z, step.z);
+    z_ -= moment(row, first.x, step.x);
+    weight_ += row.weight;
+    if constexpr (N::kIsFixed) {
+      weight_speed_ += row.weight_speed >> 15;
+    } else {
+      weight_speed_ += row.weight_speed;
+    }
   }
 
   [[nodiscard]] constexpr SurfaceDrag<N> mean() const noexcept {
-    return {unit(x_, speed_), unit(z_, speed_), unit(arm_, weight_)};
+    if (!(weight_ > 0)) return {};
+    return {along(x_), along(z_), unit(weight_speed_, weight_, false)};
   }
 
  private:
-  using Sum = typename N::Sum;
   using Unit = typename N::Unit;
 
-  template <class Wide>
-  [[nodiscard]] static constexpr Sum reduced(Wide covered) noexcept {
+  /// SUM covered times place; fixed: 15 fraction bits, rows below 2^56 before the shift.
+  static constexpr Sum moment(const Row& row, Sum first, Sum step) noexcept {
     if constexpr (N::kIsFixed) {
-      return static_cast<Sum>(covered >> 8);
+      return (static_cast<Sum>(row.covered >> 8) * first +
+              static_cast<Sum>(row.covered_number >> 8) * step) >>
+             12;
     } else {
-      return covered;
+      return row.covered * first + row.covered_number * step;
     }
   }
-  [[nodiscard]] static constexpr Unit unit(Sum part, Sum whole) noexcept {
-    if (!(whole > 0)) return {};
-    const bool negative = part < 0;
-    const auto size = static_cast<CutWeight<N>>(negative ? -part : part);
-    const auto share = share_of<N>(size, static_cast<CutWeight<N>>(whole));
+  [[nodiscard]] constexpr Unit along(Sum moment) const noexcept {
+    const bool negative = moment < 0;
+    return unit(std::min(static_cast<Weight>(negative ? -moment : moment), weight_ + weight_ / 2),
+                weight_, negative);
+  }
+  [[nodiscard]] static constexpr Unit unit(Weight part, Weight whole, bool negative) noexcept {
+    const auto share = share_of<N>(part, whole);
     if constexpr (N::kIsFixed) {
       return Unit::from_raw(static_cast<std::int32_t>(negative ? -share : share));
     } else {
@@ -65,7 +82,8 @@ class DragSums {
     }
   }
 
-  Sum x_{}, z_{}, speed_{}, arm_{}, weight_{};
+  Sum x_{}, z_{};
+  Weight weight_{}, weight_speed_{};
 };
 
 }  // namespace detail

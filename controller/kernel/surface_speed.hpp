@@ -33,6 +33,8 @@ class SpindleFrame {
   /// Distance from the axis along the tool's x and z; fixed: 20 fraction bits.
   struct Place {
     Sum x{}, z{};
+
+    friend constexpr Place operator+(Place a, Place b) noexcept { return {a.x + b.x, a.z + b.z}; }
   };
 
   constexpr SpindleFrame() noexcept = default;
@@ -55,9 +57,9 @@ class SpindleFrame {
   [[nodiscard]] constexpr Place at(VoxelIndex v) const noexcept {
     return {beside(across_x_, v), beside(across_z_, v)};
   }
-  /// Place of the voxel `n` behind along x.
-  [[nodiscard]] constexpr Place behind(Place place, std::int32_t n) const noexcept {
-    return {place.x + Sum(across_x_[0]) * Sum(n), place.z + Sum(across_z_[0]) * Sum(n)};
+  /// From a voxel to the next along x.
+  [[nodiscard]] constexpr Place step() const noexcept {
+    return {static_cast<Sum>(across_x_[0]), static_cast<Sum>(across_z_[0])};
   }
 
   /// Speed of the tool's surface there over its rim's: kSpeedFloor to 1, as a weight.
@@ -72,14 +74,6 @@ class SpindleFrame {
     } else {
       const Sum distance = square_root(place.x * place.x + place.z * place.z);
       return std::clamp(distance, kFloor, N::kWeightOne);
-    }
-  }
-  /// A distance as a weight, at most the rim's.
-  [[nodiscard]] static constexpr Weight as_weight(Sum distance) noexcept {
-    if constexpr (N::kIsFixed) {
-      return static_cast<Weight>(std::clamp<Sum>(distance, -kOne, kOne) >> 5);
-    } else {
-      return std::clamp(distance, -N::kWeightOne, N::kWeightOne);
     }
   }
 

@@ -119,8 +119,8 @@ TEST_CASE("over many ticks every voxel loses its part of the budget, whatever th
     double all = 0;
     for_each_row(rig.volume.grid, rig.cutter.overlap,
                  [&](VoxelIndex first, std::int32_t count, auto&& ratio) {
-                   for (std::int32_t i = 0; i < count; ++i) {
-                     const auto place = frame.behind(frame.at(first), i);
+                   auto place = frame.at(first);
+                   for (std::int32_t i = 0; i < count; ++i, place = place + frame.step()) {
                      const double w = double(ratio(i)) * double(frame.speed(place));
                      weight[rig.volume.grid.index(first.x + i, first.y, first.z)] = w;
                      all += w;
