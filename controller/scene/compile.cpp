@@ -13,6 +13,7 @@
 #include "controller/scene/plan_device.hpp"
 #include "controller/scene/plan_tools.hpp"
 #include "controller/scene/plan_volumes.hpp"
+#include "controller/scene/scene_error.hpp"
 #include "controller/scene/servo_memory.hpp"
 #include "controller/scene/stage_timing.hpp"
 #include "controller/servo/servo_step.hpp"
@@ -115,6 +116,11 @@ class SceneIn final : public CompiledScene {
 }  // namespace
 
 std::unique_ptr<CompiledScene> plan_scene(const Scene& scene, const KernelSet& kernels) {
+  if (scene.cut.model == CutModel::preston) {
+    throw SceneError(scene.path +
+                     ": cut.model = \"preston\" needs the normal force of a proxy, which the servo "
+                     "has not yet; set model = \"overlap\"");
+  }
   switch (scene.servo.numeric) {
     case NumericKind::fixed:
       return std::make_unique<SceneIn<FixedNumbers>>(scene, kernels);

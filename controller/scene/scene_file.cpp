@@ -8,6 +8,7 @@
 #include <span>
 #include <utility>
 
+#include "controller/scene/materials.hpp"
 #include "controller/scene/scene_objects.hpp"
 #include "controller/scene/scene_table.hpp"
 #include "controller/scene/scene_text.hpp"
@@ -27,17 +28,25 @@ constexpr Range kTorqueScale{-kMaxTorqueScale,
 constexpr Range kAngleRad{-3.15, 3.15};
 constexpr Range kPressureNPerMm2{0, 1000};
 constexpr Range kCutRatePerS{0, 100000};
+constexpr Range kMachinabilityMm3PerSN{1e-4, 100};
+constexpr Range kThresholdN{0, 3.3};
+constexpr Range kFriction{0, 2};
+constexpr Range kSpeedKrpm{1, 500};
+constexpr Range kStallTorqueNMm{0.1, 1000};
+constexpr Range kInertiaGMm2{0.01, 1000};
 constexpr Range kForceN{0.01, 3.3};       // what the Omni can give
 constexpr Range kSlewNPerMs{0.001, 0.5};  // a jump that the hand does not take for a blow
 constexpr Range kSpeedMmPerS{1, 10000};   // faster is a fault of the sensor
 constexpr Range kRateHz{kMinRateHz, kMaxRateHz};
 
-constexpr Keys kRootKeys = {"volume", "tool",  "device", "force",   "cut",
-                            "limits", "servo", "hand",   "material"};
+constexpr Keys kRootKeys = {"volume", "tool",  "device", "force",    "cut",
+                            "limits", "servo", "hand",   "material", "spindle"};
 constexpr Keys kDeviceKeys = {"personality", "workspace_scale", "offset_mm", "torque_scale",
                               "dock_rad"};
 constexpr Keys kForceKeys = {"model", "p0_n_per_mm2"};
-constexpr Keys kCutKeys = {"model", "rate_per_s", "p1_n_per_mm2"};
+constexpr Keys kCutKeys = {"model",       "rate_per_s", "p1_n_per_mm2", "machinability_mm3_per_s_n",
+                           "threshold_n", "friction"};
+constexpr Keys kSpindleKeys = {"speed_krpm", "stall_torque_n_mm", "inertia_g_mm2"};
 constexpr Keys kLimitKeys = {"force_n", "continuous_force_n", "slew_n_per_ms", "speed_mm_per_s"};
 constexpr Keys kServoKeys = {"rate_hz", "numeric", "kernel"};
 constexpr Keys kHandKeys = {"script"};
@@ -73,8 +82,31 @@ void read_device_table(const SceneTable& table, SceneSpec& scene) {
   device.dock_rad = table.numbers<3>("dock_rad", kAngleRad).value_or(device.dock_rad);
 }
 
+/// A key that its model of cutting would ignore is a misunderstanding.
+void refuse_other_model(const SceneTable& table, bool preston) {
+  constexpr Keys kOverlapKeys = {"rate_per_s", "p1_n_per_mm2"};
+  constexpr Keys kPrestonKeys = {"machinability_mm3_per_s_n", "threshold_n", "friction"};
+  for (const std::string_view key : kPrestonKeys) {
+    if (!preston && table.has(key)) {
+      refuse(table.place(key),
+             " is of the model preston; leave it out, or set model = \"preston\"");
+    }
+  }
+  for (const std::string_view key : kOverlapKeys) {
+    if (preston && table.has(key)) {
+      refuse(table.place(key), " is of the model overlap; leave it out, force alone cuts here");
+    }
+  }
+}
+
 void read_cut_table(const SceneTable& table, SceneSpec& scene) {
   read_choice(table, "model", kCutModelWords, scene.cut.model);
+  refuse_other_model(table, scene.cut.model == CutModel::preston);
+  Scene::Cut& cut = scene.cut;
+  cut.machinability_mm3_per_s_n = table.number("machinability_mm3_per_s_n", kMachinabilityMm3PerSN)
+                                      .value_or(cut.machinability_mm3_per_s_n);
+  cut.threshold_n = table.number("threshold_n", kThresholdN).value_or(cut.threshold_n);
+  cut.friction = table.number("friction", kFriction).value_or(cut.friction);
   if (table.is_text("rate_per_s")) {
     static_cast<void>(table.choice("rate_per_s", kCutRateWords));
     scene.cut_in_one_tick = true;
@@ -83,6 +115,30 @@ void read_cut_table(const SceneTable& table, SceneSpec& scene) {
   }
   scene.cut.p1_n_per_mm2 =
       table.number("p1_n_per_mm2", kPressureNPerMm2).value_or(scene.cut.p1_n_per_mm2);
+}
+
+void read_spindle_table(const SceneTable& table, SceneSpec& scene) {
+  if (scene.cut.model != CutModel::preston) {
+    refuse(table.place(),
+           " turns nothing: only cut.model = \"preston\" has a spindle; leave it out");
+  }
+  Scene::Spindle& spindle = scene.spindle;
+  spindle.speed_krpm = table.number("speed_krpm", kSpeedKrpm).value_or(spindle.speed_krpm);
+  spindle.stall_torque_n_mm =
+      table.number("stall_torque_n_mm", kStallTorqueNMm).value_or(spindle.stall_torque_n_mm);
+  spindle.inertia_g_mm2 =
+      table.number("inertia_g_mm2", kInertiaGMm2).value_or(spindle.inertia_g_mm2);
+}
+
+/// The overlap models cut whatever they meet.
+void refuse_uncut(const SceneSpec& scene) {
+  if (scene.cut.model == CutModel::none || scene.cut.model == CutModel::preston) return;
+  for (const Material& material : scene.materials) {
+    if (!material.forbidden) continue;
+    refuse(scene.path.string(), ": material " + material.name +
+                                    " is forbidden, and this cut.model cuts everything; set model "
+                                    "= \"preston\", or leave forbidden out");
+  }
 }
 
 void read_limits_table(const SceneTable& table, Scene::Limits& limits) {
@@ -148,6 +204,8 @@ SceneSpec read_scene(const toml::table& parsed, const std::filesystem::path& pat
         table->number("p0_n_per_mm2", kPressureNPerMm2).value_or(scene.force.p0_n_per_mm2);
   }
   if (const auto table = root.table("cut", kCutKeys)) read_cut_table(*table, scene);
+  if (const auto table = root.table("spindle", kSpindleKeys)) read_spindle_table(*table, scene);
+  refuse_uncut(scene);
   if (const auto table = root.table("limits", kLimitKeys)) read_limits_table(*table, scene.limits);
   if (const auto table = root.table("servo", kServoKeys)) read_servo_table(*table, scene.servo);
   if (const auto table = root.table("hand", kHandKeys)) {
@@ -159,14 +217,6 @@ SceneSpec read_scene(const toml::table& parsed, const std::filesystem::path& pat
 }
 
 }  // namespace
-
-std::vector<Material> default_materials() {
-  // Density at half-way to the next softer tissue; removal relative to enamel by hardness.
-  return {{.name = "none", .iso = 0.0, .machinability = 0.0, .colour = {0.0, 0.0, 0.0}},
-          {.name = "enamel", .iso = 0.81, .machinability = 1.0, .colour = {0.91, 0.88, 0.80}},
-          {.name = "dentin", .iso = 0.45, .machinability = 3.0, .colour = {0.80, 0.66, 0.42}},
-          {.name = "pulp", .iso = 0.14, .machinability = 10.0, .colour = {0.70, 0.25, 0.22}}};
-}
 
 SceneSpec parse_scene(std::string_view text, const std::filesystem::path& path) {
   const toml::parse_result parsed = toml::parse(text, path.string());

@@ -60,6 +60,7 @@ struct SceneSpec {
   bool offset_given = false;  ///< else the device origin is put on the first surface
   Scene::Force force;
   Scene::Cut cut;
+  Scene::Spindle spindle;
   bool cut_in_one_tick = false;  ///< rate_per_s = "1/T", the paper's own step
   Scene::Limits limits;
   Scene::Servo servo;
@@ -72,8 +73,5 @@ struct SceneSpec {
 
 /// Reads a scene file of at most 1 MiB.
 [[nodiscard]] SceneSpec parse_scene_file(const std::filesystem::path& path);
-
-/// The default material table: index 0 none, then enamel, dentin and pulp, as the phantom's labels.
-[[nodiscard]] std::vector<Material> default_materials();
 
 }  // namespace kerf

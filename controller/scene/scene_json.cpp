@@ -65,10 +65,26 @@ json tool_json(const SceneTool& tool) {
 }
 
 json material_json(const Material& material) {
-  return {{"name", material.name},
-          {"iso", material.iso},
-          {"machinability", material.machinability},
-          {"colour", material.colour}};
+  json object = {{"name", material.name},
+                 {"iso", material.iso},
+                 {"machinability", material.machinability},
+                 {"colour", material.colour}};
+  if (material.forbidden) object["forbidden"] = true;
+  return object;
+}
+
+/// What the model of cutting uses.
+json cut_json(const Scene::Cut& cut) {
+  json object = {{"model", word_of(cut.model)}};
+  if (cut.model == CutModel::preston) {
+    object["machinability_mm3_per_s_n"] = cut.machinability_mm3_per_s_n;
+    object["threshold_n"] = cut.threshold_n;
+    object["friction"] = cut.friction;
+  } else {
+    object["rate_per_s"] = cut.rate_per_s;
+    object["p1_n_per_mm2"] = cut.p1_n_per_mm2;
+  }
+  return object;
 }
 
 json device_json(const Scene::Device& device) {
@@ -90,26 +106,27 @@ std::string canonical_json(const Scene& scene) {
   json materials = json::array();
   for (const Material& material : scene.materials) materials.push_back(material_json(material));
 
-  const json root = {
-      {"volumes", std::move(volumes)},
-      {"tools", std::move(tools)},
-      {"active_tool", scene.active_tool},
-      {"materials", std::move(materials)},
-      {"device", device_json(scene.device)},
-      {"force", {{"model", kPaperForce}, {"p0_n_per_mm2", scene.force.p0_n_per_mm2}}},
-      {"cut",
-       {{"model", word_of(scene.cut.model)},
-        {"rate_per_s", scene.cut.rate_per_s},
-        {"p1_n_per_mm2", scene.cut.p1_n_per_mm2}}},
-      {"limits",
-       {{"force_n", scene.limits.force_n},
-        {"continuous_force_n", scene.limits.continuous_force_n},
-        {"slew_n_per_ms", scene.limits.slew_n_per_ms},
-        {"speed_mm_per_s", scene.limits.speed_mm_per_s}}},
-      {"servo",
-       {{"rate_hz", scene.servo.rate_hz},
-        {"numeric", word_of(scene.servo.numeric)},
-        {"kernel", word_of(scene.servo.kernel)}}}};
+  json root = {{"volumes", std::move(volumes)},
+               {"tools", std::move(tools)},
+               {"active_tool", scene.active_tool},
+               {"materials", std::move(materials)},
+               {"device", device_json(scene.device)},
+               {"force", {{"model", kPaperForce}, {"p0_n_per_mm2", scene.force.p0_n_per_mm2}}},
+               {"cut", cut_json(scene.cut)},
+               {"limits",
+                {{"force_n", scene.limits.force_n},
+                 {"continuous_force_n", scene.limits.continuous_force_n},
+                 {"slew_n_per_ms", scene.limits.slew_n_per_ms},
+                 {"speed_mm_per_s", scene.limits.speed_mm_per_s}}},
+               {"servo",
+                {{"rate_hz", scene.servo.rate_hz},
+                 {"numeric", word_of(scene.servo.numeric)},
+                 {"kernel", word_of(scene.servo.kernel)}}}};
+  if (scene.cut.model == CutModel::preston) {
+    root["spindle"] = {{"speed_krpm", scene.spindle.speed_krpm},
+                       {"stall_torque_n_mm", scene.spindle.stall_torque_n_mm},
+                       {"inertia_g_mm2", scene.spindle.inertia_g_mm2}};
+  }
   // A path need not be UTF-8; what is not, is replaced.
   return root.dump(-1, ' ', false, json::error_handler_t::replace);
 }

@@ -227,6 +227,7 @@ Scene load_scene(const std::filesystem::path& path, const SceneOverrides& overri
   scene.device = spec.device;
   scene.force = spec.force;
   scene.cut = spec.cut;
+  scene.spindle = spec.spindle;
   scene.limits = spec.limits;
   scene.servo = spec.servo;
   scene.hand_script = spec.hand_script;

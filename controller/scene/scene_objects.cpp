@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <iterator>
 
+#include "controller/scene/materials.hpp"
 #include "controller/scene/scene_text.hpp"
 
 namespace kerf {
@@ -138,12 +139,13 @@ void read_material_table(const SceneTable& table, std::vector<Material>& materia
   auto material = std::find_if(materials.begin(), materials.end(),
                                [&](const Material& m) { return m.name == *name; });
   if (material == materials.end()) {
-    materials.push_back({.name = *name});
+    materials.push_back(known_material(*name));
     material = std::prev(materials.end());
   }
   material->iso = table.number("iso", kUnitInterval).value_or(material->iso);
   material->machinability =
       table.number("machinability", kMachinability).value_or(material->machinability);
+  material->forbidden = table.flag("forbidden").value_or(material->forbidden);
   material->colour = table.numbers<3>("colour", kUnitInterval).value_or(material->colour);
 }
 

@@ -17,11 +17,12 @@ inline constexpr std::string_view kVolumeKeys[] = {"name", "file", "size", "spac
                                                    "iso",  "crop", "pose", "solid"};
 inline constexpr std::string_view kToolKeys[] = {"name",      "shape",    "radius_mm", "size_vox",
                                                  "length_mm", "pitch_mm", "turns"};
-inline constexpr std::string_view kMaterialKeys[] = {"name", "iso", "machinability", "colour"};
+inline constexpr std::string_view kMaterialKeys[] = {"name", "iso", "machinability", "forbidden",
+                                                     "colour"};
 
 [[nodiscard]] VolumeSpec read_volume_table(const SceneTable& table);
 [[nodiscard]] ToolSpec read_tool_table(const SceneTable& table);
-/// A known name changes that material, a new one is added.
+/// A name of the table changes that material, another one is added with what is known of it.
 void read_material_table(const SceneTable& table, std::vector<Material>& materials);
 
 }  // namespace kerf

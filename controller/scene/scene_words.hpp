@@ -11,8 +11,8 @@ namespace kerf {
 
 // The words of a scene for the values of an enumeration, in its order: one list for reading a scene
 // and for writing its JSON.
-inline constexpr std::array<std::string_view, 3> kCutModelWords = {"none", "overlap",
-                                                                   "overlap_exact"};
+inline constexpr std::array<std::string_view, 4> kCutModelWords = {"none", "overlap",
+                                                                   "overlap_exact", "preston"};
 inline constexpr std::array<std::string_view, 3> kNumericWords = {"fixed", "float", "double"};
 inline constexpr std::array<std::string_view, 3> kGradientWords = {"central", "sobel5", "farid"};
 
@@ -27,7 +27,7 @@ inline constexpr std::string_view kPaperForce = "paper";  ///< the only force mo
 [[nodiscard]] constexpr std::string_view word_of(GradientKernel kernel) {
   return kGradientWords.at(static_cast<std::size_t>(kernel));
 }
-static_assert(word_of(CutModel::overlap_exact) == "overlap_exact");
+static_assert(word_of(CutModel::preston) == "preston");
 static_assert(word_of(NumericKind::float64) == "double");
 static_assert(word_of(GradientKernel::farid) == "farid");
 

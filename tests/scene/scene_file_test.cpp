@@ -6,6 +6,7 @@
 
 #include <doctest/doctest.h>
 
+#include "controller/scene/materials.hpp"
 #include "tests/scene/support.hpp"
 
 namespace {

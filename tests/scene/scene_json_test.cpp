@@ -9,7 +9,7 @@
 #include <doctest/doctest.h>
 #include <nlohmann/json.hpp>
 
-#include "controller/scene/scene_file.hpp"
+#include "controller/scene/materials.hpp"
 #include "controller/scene/tool_shapes.hpp"
 #include "tests/scene/support.hpp"
 

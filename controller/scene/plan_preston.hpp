@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <numbers>
+
+#include "controller/kernel/cutting_friction.hpp"
+#include "controller/kernel/preston.hpp"
+#include "controller/kernel/spindle.hpp"
+#include "controller/scene/matrices.hpp"
+#include "controller/scene/scene.hpp"
+#include "controller/scene/turned_box.hpp"
+
+namespace kerf {
+
+// What a scene says about cutting by force, in the loop's numbers. Load time only.
+
+/// How force cuts `volume`. Matter without a label, and a volume without labels, is cut as enamel.
+/// The labels stay the volume's: it must outlive the plan.
+template <class N>
+[[nodiscard]] PrestonPlan<N> plan_preston(const Scene& scene, const SceneVolume& volume) {
+  const auto& h = volume.image.spacing_mm;
+  const double steps_per_mm3 = kDensityMax / (h[0] * h[1] * h[2]);
+  const double enamel = scene.cut.machinability_mm3_per_s_n / scene.servo.rate_hz * steps_per_mm3;
+  PrestonPlan<N> plan;
+  plan.rate[0] = force_rate<N>(enamel);
+  for (std::size_t m = 1; m < scene.materials.size(); ++m) {
+    const Material& material = scene.materials[m];
+    plan.forbidden[m] = material.forbidden;
+    if (!material.forbidden) plan.rate[m] = force_rate<N>(enamel * material.machinability);
+  }
+  plan.threshold_n = typename N::Real(scene.cut.threshold_n);
+  plan.labels = volume.image.labels;
+  return plan;
+}
+
+/// From voxel edges to rim radii of the tool along the world's axes, for a `SpindleFrame`.
+template <class N>
+[[nodiscard]] Transform<typename N::Ratio, WorldSpace, VoxelSpace> rims_from_voxel(
+    const SceneTool& tool, const SceneVolume& volume) {
+  Matrix m = matrix_of(volume.pose.orientation);
+  for (auto& row : m) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      row[axis] *= volume.image.spacing_mm[axis] / tool.radius_mm;
+    }
+  }
+  return rounded<typename N::Ratio, WorldSpace, VoxelSpace>(m);
+}
+
+/// Entries of the list of covered voxels that the tool needs in any orientation that it takes.
+[[nodiscard]] inline std::size_t covered_capacity(const SceneTool& tool,
+                                                  const SceneVolume& volume) {
+  std::size_t most = 0;
+  for (const VoxelIndex& size : box_sizes(tool, volume)) {
+    most = std::max(most, VoxelGrid{size.x + 1, size.y + 1, size.z + 1}.voxel_count());
+  }
+  return most;
+}
+
+template <class N>
+[[nodiscard]] SpindlePlan<N> plan_spindle(const Scene& scene) {
+  const Scene::Spindle& spindle = scene.spindle;
+  const double omega_per_s = spindle.speed_krpm * 1000 * 2 * std::numbers::pi / 60;
+  // g mm^2 / s^2 is 10^-6 N mm.
+  const double run_up_s = spindle.inertia_g_mm2 * 1e-6 * omega_per_s / spindle.stall_torque_n_mm;
+  return spindle_plan<N>(spindle.speed_krpm / kReferenceSpeedKrpm, spindle.stall_torque_n_mm,
+                         run_up_s, 1.0 / scene.servo.rate_hz);
+}
+
+template <class N>
+[[nodiscard]] FrictionPlan<N> plan_friction(const Scene& scene) {
+  return friction_plan<N>(scene.cut.friction, 1.0 / scene.servo.rate_hz);
+}
+
+}  // namespace kerf
