@@ -30,10 +30,14 @@ CLI::Validator between(double low, double high) {
 }
 
 void declare_front(CLI::App& app, EmulatorOptions& o) {
-  app.add_option("--front", o.front, "how it is reached: socket, udp, fuse")->capture_default_str();
+  app.add_option("--front", o.front,
+                 "how it is reached: socket; udp; fuse, a device node; usbip (falcon) or uhid "
+                 "(woodenhaptics), "
+                 "in this kernel's own USB or HID stack, as root")
+      ->capture_default_str();
   app.add_option("--socket", o.socket, "front socket: path of the SEQPACKET socket to serve");
   app.add_option("--udp", o.udp, "front udp: [ADDRESS:]PORT to serve (address: 127.0.0.1)");
-  declare_fuse(app, o.fuse);
+  declare_bus(app, o.bus);
   app.add_flag("--lockstep", o.lockstep, "no clock: one servo period per command received");
   app.add_option("--rate", o.rate_hz, "servo rate for --lockstep, Hz; must divide 8000 (USB: 1000)")
       ->capture_default_str();
@@ -80,17 +84,28 @@ void check_known(const char* option, const std::string& value,
 }
 
 void check_front(const EmulatorOptions& o) {
-  check_known("--front", o.front, std::array<std::string_view, 3>{"socket", "udp", "fuse"});
+  check_known("--front", o.front,
+              std::array<std::string_view, 5>{"socket", "udp", "fuse", "usbip", "uhid"});
   if (o.front == "socket" && o.socket.empty()) {
     throw HilError("--socket: no path; say where the socket shall be, or use --front udp");
   }
   if (o.front == "udp" && o.udp.empty()) {
     throw HilError("--udp: no port; say [ADDRESS:]PORT, or use --front socket");
   }
-  if (o.front == "fuse" && o.fuse.mount.empty()) {
+  if (o.front == "fuse" && o.bus.mount.empty()) {
     throw HilError("--mount: missing; name an empty folder for --front fuse");
   }
-  if (o.front == "fuse" && o.lockstep && o.personality != "omni") {
+  const auto speaks_for = [&](const char* front, const char* device) {
+    if (o.front == front && o.personality != device) {
+      throw HilError(std::string("--front ") + front + ": not for " + o.personality +
+                     "; use --personality " + device + ", or another front");
+    }
+  };
+  speaks_for("usbip", "falcon");
+  speaks_for("uhid", "woodenhaptics");
+  const bool is_usb =
+      o.front == "usbip" || o.front == "uhid" || (o.front == "fuse" && o.personality != "omni");
+  if (is_usb && o.lockstep) {
     throw HilError("--lockstep: the USB front runs by its own clock; use --front socket");
   }
   const int fastest = o.personality == "omni" ? kCyclesPerSecond : 1000;  // a bus cycle, a frame
@@ -112,7 +127,7 @@ void check_device(const EmulatorOptions& o) {
     }
   };
   belongs_to(o.pot_noise, "--pot-noise", "omni");
-  belongs_to(o.fuse.firmware_runs, "--firmware-runs", "falcon");
+  belongs_to(o.bus.firmware_runs, "--firmware-runs", "falcon");
   belongs_to(o.wireless_button, "--wireless-button", "woodenhaptics");
   belongs_to(o.packet_bytes != wooden::kPacketBytes, "--packet-bytes", "woodenhaptics");
   if (o.packet_bytes != wooden::kPacketBytes && o.packet_bytes != wooden::kLongPacketBytes) {

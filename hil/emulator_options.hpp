@@ -8,7 +8,7 @@
 
 #include <CLI/CLI.hpp>
 
-#include "hil/fuse_front.hpp"
+#include "hil/bus_options.hpp"
 
 namespace kerf {
 
@@ -19,7 +19,7 @@ struct EmulatorOptions {
   std::string front = "socket";
   std::string socket;
   std::string udp;
-  FuseFrontOptions fuse;
+  BusOptions bus;
   std::string hand;
   std::string fault;
   std::optional<double> unit_mm;

@@ -24,6 +24,7 @@
 #include "hil/fuse_front.hpp"
 #include "hil/hand_script_file.hpp"
 #include "hil/hil_error.hpp"
+#include "hil/kernel_front.hpp"
 #include "hil/run_report.hpp"
 
 namespace kerf {
@@ -91,14 +92,21 @@ void serve_clients(const EmulatorOptions& o, Server& server, const std::string& 
            (limits.cycles == 0 || stats.cycles < limits.cycles));
 }
 
-void serve_on_fuse(const EmulatorOptions& o, const FuseService& service) {
+FtdiFalcon::Settings falcon_settings(const EmulatorOptions& o) {
+  return {.firmware_runs = o.bus.firmware_runs};
+}
+
+WoodenHid::Settings wooden_settings(const EmulatorOptions& o) {
+  return {.packet_bytes = o.packet_bytes, .script = usb_script(o.bus)};
+}
+
+void serve_on_fuse(const EmulatorOptions& o, const BusService& service) {
   if (o.personality == "falcon") {
-    serve_fuse(service, {.firmware_runs = o.fuse.firmware_runs}, usb_script(o.fuse));
+    serve_fuse(service, o.bus.mount, falcon_settings(o), usb_script(o.bus));
   } else if (o.personality == "woodenhaptics") {
-    serve_fuse(service,
-               HidrawNode::Settings{.packet_bytes = o.packet_bytes, .script = usb_script(o.fuse)});
+    serve_fuse(service, o.bus.mount, wooden_settings(o));
   } else {
-    serve_fuse(service, firewire_settings(o.fuse, o.lockstep ? o.rate_hz : 0));
+    serve_fuse(service, o.bus.mount, firewire_settings(o.bus, o.lockstep ? o.rate_hz : 0));
   }
 }
 
@@ -113,8 +121,13 @@ void serve(const EmulatorOptions& o, const std::atomic<bool>& stop, std::ostream
   }
   const ServeLimits limits{cycles_of(o.seconds), stop};
   FrontStats stats;
+  const BusService bus{device, limits, o.stay, stats, out};
   if (o.front == "fuse") {
-    serve_on_fuse(o, {o.fuse.mount, device, limits, o.stay, stats, out});
+    serve_on_fuse(o, bus);
+  } else if (o.front == "usbip") {
+    serve_usbip(bus, falcon_settings(o), usb_script(o.bus));
+  } else if (o.front == "uhid") {
+    serve_uhid(bus, wooden_settings(o));
   } else if (o.front == "udp") {
     UdpServer server(o.udp);
     const std::string place = "udp port " + std::to_string(server.port());

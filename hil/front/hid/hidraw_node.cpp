@@ -18,54 +18,10 @@ namespace {
 
 constexpr std::size_t kMostReportBytes = 16384;  // HID_MAX_BUFFER_SIZE
 
-/// A vendor page with one report each way (HID 1.11, 6.2.2).
-std::vector<std::uint8_t> report_descriptor(std::size_t packet_bytes) {
-  const auto low = [](std::uint16_t value) { return static_cast<std::uint8_t>(value & 0xFF); };
-  const auto high = [](std::uint16_t value) { return static_cast<std::uint8_t>(value >> 8); };
-  const auto count = static_cast<std::uint8_t>(packet_bytes);
-  return {0x06,
-          low(wooden::kUsagePage),
-          high(wooden::kUsagePage),  // usage page
-          0x0A,
-          low(wooden::kUsage),
-          high(wooden::kUsage),  // usage
-          0xA1,
-          0x01,  // collection: application
-          0x75,
-          0x08,
-          0x15,
-          0x00,
-          0x26,
-          0xFF,
-          0x00,  // bytes of 0 to 255
-          0x95,
-          count,
-          0x09,
-          0x01,
-          0x81,
-          0x02,  // so many in
-          0x95,
-          count,
-          0x09,
-          0x02,
-          0x91,
-          0x02,  // and out
-          0xC0};
-}
-
 }  // namespace
 
-std::uint16_t HidrawNode::vendor_id() const noexcept {
-  return settings_.packet_bytes == wooden::kPacketBytes ? wooden::kMbedVendorId
-                                                        : wooden::kTeensyVendorId;
-}
-std::uint16_t HidrawNode::product_id() const noexcept {
-  return settings_.packet_bytes == wooden::kPacketBytes ? wooden::kMbedProductId
-                                                        : wooden::kTeensyProductId;
-}
-
 void HidrawNode::open(FuseOpen open) {
-  catch_up();
+  arm_.catch_up(*this);
   opens_[open];
 }
 
@@ -79,7 +35,7 @@ FuseAnswer HidrawNode::take(Open& open, std::size_t size) {
 /// O_NONBLOCK does not reach a FUSE server, so a read of nothing sleeps: hidapi polls before.
 std::optional<FuseAnswer> HidrawNode::read(FuseOpen id, FuseRequest request,
                                            std::uint64_t /*offset*/, std::size_t size) {
-  catch_up();
+  arm_.catch_up(*this);
   deliver();
   Open& open = opens_.at(id);
   if (!open.waiting.empty()) return take(open, size);
@@ -90,13 +46,12 @@ std::optional<FuseAnswer> HidrawNode::read(FuseOpen id, FuseRequest request,
 
 std::optional<FuseAnswer> HidrawNode::write(FuseOpen id, FuseRequest /*request*/,
                                             std::span<const std::uint8_t> bytes) {
-  catch_up();
+  arm_.catch_up(*this);
   deliver();
   if (opens_.at(id).gone) return FuseAnswer::fail(ENODEV);
   if (bytes.size() < 2 || bytes.size() > kMostReportBytes) return FuseAnswer::fail(EINVAL);
   used_ = true;
-  // Without numbered reports a leading 0 is no part of what is sent; another number is.
-  device_.receive(bytes.front() == wooden::kReportId ? bytes.subspan(1) : bytes);
+  arm_.out(bytes);
   return FuseAnswer{.result = static_cast<std::int32_t>(bytes.size())};
 }
 
@@ -113,7 +68,7 @@ std::optional<FuseAnswer> HidrawNode::ioctl(FuseOpen id, const FuseIoctl& call) 
     answer_.resize(std::min(answer_.size(), call.output_bytes));
     return FuseAnswer{.result = static_cast<std::int32_t>(answer_.size()), .bytes = answer_};
   };
-  const auto descriptor = report_descriptor(settings_.packet_bytes);
+  const auto descriptor = arm_.report_descriptor();
   if (call.command == HIDIOCGRDESCSIZE) return say(static_cast<std::int32_t>(descriptor.size()));
   if (call.command == HIDIOCGRDESC) {
     hidraw_report_descriptor told{};
@@ -122,17 +77,17 @@ std::optional<FuseAnswer> HidrawNode::ioctl(FuseOpen id, const FuseIoctl& call) 
     return say(told);
   }
   if (call.command == HIDIOCGRAWINFO) {
-    return say(hidraw_devinfo{BUS_USB, static_cast<std::int16_t>(vendor_id()),
-                              static_cast<std::int16_t>(product_id())});
+    return say(hidraw_devinfo{BUS_USB, static_cast<std::int16_t>(arm_.vendor_id()),
+                              static_cast<std::int16_t>(arm_.product_id())});
   }
   if (_IOC_TYPE(call.command) != 'H') return FuseAnswer::fail(EINVAL);
   switch (_IOC_NR(call.command)) {
     case _IOC_NR(HIDIOCGRAWNAME(0)):
-      return say_text("kerf emulated WoodenHaptics");
+      return say_text(WoodenHid::name());
     case _IOC_NR(HIDIOCGRAWPHYS(0)):
-      return say_text("usb-kerf-1/input0");
+      return say_text(WoodenHid::place());
     case _IOC_NR(HIDIOCGRAWUNIQ(0)):
-      return say_text(settings_.serial);
+      return say_text(arm_.serial());
     case _IOC_NR(HIDIOCGFEATURE(0)):
     case _IOC_NR(HIDIOCSFEATURE(0)):
       return FuseAnswer::fail(EPIPE);  // the firmware stalls them
@@ -142,7 +97,7 @@ std::optional<FuseAnswer> HidrawNode::ioctl(FuseOpen id, const FuseIoctl& call) 
 }
 
 std::uint32_t HidrawNode::poll(FuseOpen id, bool /*sleeps*/) {
-  catch_up();
+  arm_.catch_up(*this);
   Open& open = opens_.at(id);
   deliver();
   std::uint32_t now = POLLOUT | POLLWRNORM;
@@ -165,37 +120,27 @@ void HidrawNode::interrupted(FuseRequest request) {
 }
 
 std::int64_t HidrawNode::next_wake_ns() const noexcept {
-  return opens_.empty() ? std::numeric_limits<std::int64_t>::max() : time_.next_frame_ns();
+  return opens_.empty() ? std::numeric_limits<std::int64_t>::max() : arm_.time().next_frame_ns();
 }
 
 void HidrawNode::wake() {
-  catch_up();
+  arm_.catch_up(*this);
   deliver();
 }
 
-void HidrawNode::catch_up() {
-  time_.catch_up(
-      device_,
-      [this](std::span<const std::uint8_t> packet) {
-        ++reports_;
-        if (!present_) return;
-        for (auto& [id, open] : opens_) {
-          if (open.gone) continue;
-          if (open.waiting.size() < kWaitingReports) {
-            open.waiting.emplace_back(packet.begin(), packet.end());
-          } else {
-            ++lost_;
-          }
-        }
-      },
-      [] {});
-  script_.run(time_.cycle(), [this](UsbFault fault) { strike(fault); });
+void HidrawNode::hear(std::span<const std::uint8_t> report) {
+  for (auto& [id, open] : opens_) {
+    if (open.gone) continue;
+    if (open.waiting.size() < kWaitingReports) {
+      open.waiting.emplace_back(report.begin(), report.end());
+    } else {
+      ++lost_;
+    }
+  }
 }
 
-void HidrawNode::strike(UsbFault fault) {
-  if (fault == UsbFault::back) present_ = true;
-  if (fault != UsbFault::vanish) return;
-  present_ = false;
+void HidrawNode::plugged(bool in) {
+  if (in) return;  // whoever had it open finds it gone all the same
   for (auto& [id, open] : opens_) {
     open.gone = true;
     open.announced = false;

@@ -6,15 +6,10 @@
 #include <deque>
 #include <map>
 #include <optional>
-#include <string>
-#include <utility>
 #include <vector>
 
 #include "hil/front/fuse/fuse_node.hpp"
-#include "hil/front/packet_device.hpp"
-#include "hil/front/usb/usb_fault.hpp"
-#include "hil/front/usb/usb_time.hpp"
-#include "shared/wire/wooden_constants.hpp"
+#include "hil/front/hid/wooden_hid.hpp"
 
 namespace kerf {
 
@@ -22,20 +17,13 @@ namespace kerf {
 /// cannot tell from the kernel's. Errors and queues are those of the kernel's hidraw.c (6.1).
 ///
 /// Every open gets every report from its opening on, 1 kHz; who does not read loses the newest when
-/// 64 wait. Feature reports, numbered reports and input by ioctl are not there: the firmware has
-/// none.
-class HidrawNode final : public FuseNode {
+/// 64 wait. Input by ioctl is not there.
+class HidrawNode final : public FuseNode, private HidHost {
  public:
-  struct Settings {
-    std::size_t packet_bytes = wooden::kPacketBytes;  ///< 14: mbed's numbers; 64: Teensy's
-    std::string serial = "KERF0001";
-    std::vector<ScriptedUsbFault> script{};
-  };
-  HidrawNode(const Settings& settings, PacketDevice& device)
-      : settings_(settings), device_(device), script_(settings.script) {}
+  HidrawNode(const WoodenHid::Settings& settings, PacketDevice& device) : arm_(settings, device) {}
 
   void attach(FuseReplies& replies) noexcept override { replies_ = &replies; }
-  [[nodiscard]] bool present() const noexcept override { return present_; }
+  [[nodiscard]] bool present() const noexcept override { return arm_.present(); }
   void open(FuseOpen open) override;
   void release(FuseOpen open) override { opens_.erase(open); }
   std::optional<FuseAnswer> read(FuseOpen open, FuseRequest request, std::uint64_t offset,
@@ -51,12 +39,9 @@ class HidrawNode final : public FuseNode {
 
   /// Somebody has written, and nobody has the node open any more.
   [[nodiscard]] bool left() const noexcept { return used_ && opens_.empty(); }
-  [[nodiscard]] const UsbTime& time() const noexcept { return time_; }
-  /// Reports of the device, and ones for which an open had no place.
-  [[nodiscard]] std::uint64_t reports() const noexcept { return reports_; }
+  [[nodiscard]] const WoodenHid& arm() const noexcept { return arm_; }
+  /// Reports for which an open had no place.
   [[nodiscard]] std::uint64_t lost() const noexcept { return lost_; }
-  [[nodiscard]] std::uint16_t vendor_id() const noexcept;
-  [[nodiscard]] std::uint16_t product_id() const noexcept;
 
  private:
   static constexpr std::size_t kWaitingReports = 64;  // HIDRAW_BUFFER_SIZE
@@ -73,21 +58,17 @@ class HidrawNode final : public FuseNode {
   };
 
   [[nodiscard]] FuseAnswer take(Open& open, std::size_t size);
-  void catch_up();
-  void strike(UsbFault fault);
+  void hear(std::span<const std::uint8_t> report) override;
+  void plugged(bool in) override;
   void deliver();
 
-  Settings settings_;
-  PacketDevice& device_;
-  UsbFaultScript script_;
+  WoodenHid arm_;
   FuseReplies* replies_ = nullptr;
-  UsbTime time_;
   std::map<FuseOpen, Open> opens_;
   Report taken_;
   std::vector<std::uint8_t> answer_;
-  bool present_ = true;
   bool used_ = false;
-  std::uint64_t reports_ = 0, lost_ = 0;
+  std::uint64_t lost_ = 0;
 };
 
 }  // namespace kerf

@@ -11,19 +11,11 @@
 
 #include "hil/front/packet_device.hpp"
 #include "hil/front/usb/falcon_boot_loader.hpp"
+#include "hil/front/usb/usb_setup.hpp"
 #include "hil/front/usb/usb_time.hpp"
 #include "shared/wire/falcon_framer.hpp"
 
 namespace kerf {
-
-/// A control request to a USB device, as on the bus.
-struct UsbSetup {
-  std::uint8_t type = 0;
-  std::uint8_t request = 0;
-  std::uint16_t value = 0;
-  std::uint16_t index = 0;
-  std::uint16_t length = 0;
-};
 
 /// What the USB side of an emulated Falcon is made of: the FTDI chip FT232R (vendor requests, two
 /// status bytes, latency timer), and behind its serial line the boot loader and then `device`.

@@ -21,9 +21,7 @@ namespace {
 constexpr std::uint32_t kCapabilities =
     USBDEVFS_CAP_ZERO_PACKET | USBDEVFS_CAP_NO_PACKET_SIZE_LIM | USBDEVFS_CAP_REAP_AFTER_DISCONNECT;
 constexpr int kFullSpeed = 2;  // enum usb_device_speed
-constexpr int kSplitFrames = 100;
 constexpr std::int32_t kLongestTransfer = 4096;
-constexpr std::size_t kSetupBytes = 8;
 
 std::uint64_t address_of(const void* pointer) noexcept {
   return reinterpret_cast<std::uintptr_t>(pointer);  // of another process: never followed here
@@ -38,17 +36,10 @@ std::optional<T> argument(const FuseIoctl& call) noexcept {
   return value;
 }
 
-UsbSetup setup_of(std::span<const std::uint8_t, kSetupBytes> b) noexcept {
-  const auto word = [&](std::size_t at) {
-    return static_cast<std::uint16_t>(b[at] | b[at + 1] << 8);
-  };
-  return {b[0], b[1], word(2), word(4), word(6)};
-}
-
 }  // namespace
 
 void UsbfsNode::open(FuseOpen open) {
-  catch_up();
+  plug_.catch_up(*this);
   opens_[open];
 }
 
@@ -71,7 +62,7 @@ std::optional<FuseAnswer> UsbfsNode::write(FuseOpen /*open*/, FuseRequest /*requ
 }
 
 std::optional<FuseAnswer> UsbfsNode::ioctl(FuseOpen id, const FuseIoctl& call) {
-  catch_up();
+  plug_.catch_up(*this);
   Open& open = opens_.at(id);
   const auto answer = [this](int result) {
     deliver();
@@ -119,7 +110,7 @@ int UsbfsNode::connect_info(const FuseIoctl& call) {
 FuseAnswer UsbfsNode::control(const FuseIoctl& call) {
   const auto request = fuse_body<usbdevfs_ctrltransfer>(call.input);
   if (!request) return FuseAnswer::fail(EINVAL);
-  const auto said = chip_.control({request->bRequestType, request->bRequest, request->wValue,
+  const auto said = plug_.control({request->bRequestType, request->bRequest, request->wValue,
                                    request->wIndex, request->wLength});
   if (!said) return FuseAnswer::fail(EPIPE);
   if (!said->empty() && !write_caller(call.thread, address_of(request->data), *said)) {
@@ -146,9 +137,7 @@ int UsbfsNode::give_up_interface(FuseOpen id) {
 int UsbfsNode::clear_halt(const FuseIoctl& call) {
   const auto endpoint = argument<std::uint32_t>(call);
   if (!endpoint) return -EFAULT;
-  if (*endpoint != falcon::kEndpointIn && *endpoint != falcon::kEndpointOut) return -ENOENT;
-  if (*endpoint == falcon::kEndpointIn) halted_ = false;
-  return 0;
+  return plug_.clear_halt(*endpoint) ? 0 : -ENOENT;
 }
 
 std::optional<UsbfsNode::Urb> UsbfsNode::read_urb(const FuseIoctl& call) noexcept {
@@ -180,12 +169,12 @@ int UsbfsNode::submit(Open& open, FuseOpen id, const FuseIoctl& call) {
 }
 
 int UsbfsNode::submit_control(Open& open, Urb urb, pid_t thread) {
-  std::array<std::uint8_t, kSetupBytes> setup{};
-  if (urb.buffer_bytes < static_cast<int>(kSetupBytes)) return -EINVAL;
+  std::array<std::uint8_t, UsbSetup::kBytes> setup{};
+  if (urb.buffer_bytes < static_cast<int>(UsbSetup::kBytes)) return -EINVAL;
   if (read_caller(thread, urb.buffer, setup) != setup.size()) return -EFAULT;
-  auto said = chip_.control(setup_of(setup));
+  auto said = plug_.control(setup_of(setup));
   if (said) urb.data = std::move(*said);
-  urb.data_offset = kSetupBytes;
+  urb.data_offset = UsbSetup::kBytes;
   urb.actual_bytes = static_cast<int>(urb.data.size());
   finish(open, std::move(urb), said ? 0 : -EPIPE);
   return 0;
@@ -200,7 +189,7 @@ int UsbfsNode::submit_bulk(Open& open, Urb urb, pid_t thread) {
   std::vector<std::uint8_t> bytes(static_cast<std::size_t>(urb.buffer_bytes));
   if (read_caller(thread, urb.buffer, bytes) != bytes.size()) return -EFAULT;
   used_ = true;
-  chip_.out(bytes);
+  plug_.out(bytes);
   urb.actual_bytes = urb.buffer_bytes;
   finish(open, std::move(urb), 0);
   return 0;
@@ -236,7 +225,7 @@ int UsbfsNode::discard(Open& open, std::uint64_t address) {
 }
 
 std::uint32_t UsbfsNode::poll(FuseOpen id, bool /*sleeps*/) {
-  catch_up();
+  plug_.catch_up(*this);
   Open& open = opens_.at(id);
   deliver();
   std::uint32_t now = 0;
@@ -250,61 +239,38 @@ std::uint32_t UsbfsNode::poll(FuseOpen id, bool /*sleeps*/) {
 }
 
 std::int64_t UsbfsNode::next_wake_ns() const noexcept {
-  return opens_.empty() ? std::numeric_limits<std::int64_t>::max() : chip_.time().next_frame_ns();
+  return opens_.empty() ? std::numeric_limits<std::int64_t>::max() : chip().time().next_frame_ns();
 }
 
 void UsbfsNode::wake() {
-  catch_up();
+  plug_.catch_up(*this);
   deliver();
 }
 
-/// Who reads, if the endpoint gives anything.
 UsbfsNode::Open* UsbfsNode::reader() {
-  if (halted_ || !present_) return nullptr;
   for (auto& [id, open] : opens_) {
     if (!open.pending.empty()) return &open;
   }
   return nullptr;
 }
 
-void UsbfsNode::catch_up() {
-  chip_.catch_up([this] { return reader() != nullptr; },
-                 [this](std::span<const std::uint8_t> packet) {
-                   Open& open = *reader();
-                   Urb urb = std::move(open.pending.front());
-                   open.pending.pop_front();
-                   const auto room = static_cast<std::size_t>(urb.buffer_bytes);
-                   const bool fits = packet.size() <= room;
-                   const auto part = packet.first(std::min(packet.size(), room));
-                   urb.data.assign(part.begin(), part.end());
-                   urb.actual_bytes = static_cast<int>(part.size());
-                   finish(open, std::move(urb), fits ? 0 : -EOVERFLOW);
-                 });
-  script_.run(chip_.time().cycle(), [this](UsbFault fault) { strike(fault); });
+std::optional<std::size_t> UsbfsNode::room() {
+  const Open* open = reader();
+  if (!open) return std::nullopt;
+  return static_cast<std::size_t>(open->pending.front().buffer_bytes);
 }
 
-void UsbfsNode::strike(UsbFault fault) {
-  switch (fault) {
-    case UsbFault::stall:
-      if (Open* open = reader()) {
-        Urb urb = std::move(open->pending.front());
-        open->pending.pop_front();
-        finish(*open, std::move(urb), -EPIPE);
-      }
-      halted_ = true;
-      return;
-    case UsbFault::split:
-      return chip_.slow_down(kSplitFrames);
-    case UsbFault::vanish:
-      return unplug();
-    case UsbFault::back:
-      present_ = true;
-      return;
-  }
+void UsbfsNode::complete_read(int status, std::span<const std::uint8_t> bytes) {
+  Open& open = *reader();
+  Urb urb = std::move(open.pending.front());
+  open.pending.pop_front();
+  urb.data.assign(bytes.begin(), bytes.end());
+  urb.actual_bytes = static_cast<int>(bytes.size());
+  finish(open, std::move(urb), status);
 }
 
-void UsbfsNode::unplug() {
-  present_ = false;
+void UsbfsNode::plugged(bool in) {
+  if (in) return;  // whoever had it open finds it gone all the same
   claimed_by_.reset();
   for (auto& [id, open] : opens_) {
     open.gone = true;

@@ -9,8 +9,7 @@
 #include <vector>
 
 #include "hil/front/fuse/fuse_node.hpp"
-#include "hil/front/usb/ftdi_falcon.hpp"
-#include "hil/front/usb/usb_fault.hpp"
+#include "hil/front/usb/falcon_plug.hpp"
 
 namespace kerf {
 
@@ -21,14 +20,14 @@ namespace kerf {
 /// control request at once. Not modelled, ENOTTY: blocking REAPURB and BULK, isochronous transfers,
 /// streams, mmap(), suspending. One transfer is one packet, which is enough for buffers of 64
 /// bytes.
-class UsbfsNode final : public FuseNode {
+class UsbfsNode final : public FuseNode, private UsbHost {
  public:
   UsbfsNode(const FtdiFalcon::Settings& settings, std::vector<ScriptedUsbFault> script,
             PacketDevice& device)
-      : chip_(settings, device), script_(std::move(script)) {}
+      : plug_(settings, std::move(script), device) {}
 
   void attach(FuseReplies& replies) noexcept override { replies_ = &replies; }
-  [[nodiscard]] bool present() const noexcept override { return present_; }
+  [[nodiscard]] bool present() const noexcept override { return plug_.present(); }
   [[nodiscard]] bool seekable() const noexcept override { return true; }
   void open(FuseOpen open) override;
   void release(FuseOpen open) override;
@@ -45,7 +44,7 @@ class UsbfsNode final : public FuseNode {
 
   /// Somebody had transfers, and nobody has the node open any more.
   [[nodiscard]] bool left() const noexcept { return used_ && opens_.empty(); }
-  [[nodiscard]] const FtdiFalcon& chip() const noexcept { return chip_; }
+  [[nodiscard]] const FtdiFalcon& chip() const noexcept { return plug_.chip(); }
 
  private:
   /// A transfer of a client: its structure, where that stands in the client's memory, and the data
@@ -81,20 +80,17 @@ class UsbfsNode final : public FuseNode {
   int connect_info(const FuseIoctl& call);
 
   static void finish(Open& open, Urb urb, int status);
-  void catch_up();
+  [[nodiscard]] std::optional<std::size_t> room() override;
+  void complete_read(int status, std::span<const std::uint8_t> bytes) override;
+  void plugged(bool in) override;
   [[nodiscard]] Open* reader();
-  void strike(UsbFault fault);
-  void unplug();
   void deliver();
 
   FuseReplies* replies_ = nullptr;
-  FtdiFalcon chip_;
-  UsbFaultScript script_;
+  FalconPlug plug_;
   std::map<FuseOpen, Open> opens_;
   std::optional<FuseOpen> claimed_by_;
   std::vector<std::uint8_t> answer_;
-  bool present_ = true;
-  bool halted_ = false;  ///< the endpoint that is read
   bool used_ = false;
 };
 

@@ -27,7 +27,8 @@ void add(PrivateSysfs& sysfs, const MountedFalcon& falcon, int number) {
                 kerf::FtdiFalcon::descriptors());
 }
 void add(PrivateSysfs& sysfs, const MountedArm& arm, int number, const std::string& serial) {
-  sysfs.add_hid(arm.path(), number, arm.node().vendor_id(), arm.node().product_id(), serial);
+  sysfs.add_hid(arm.path(), number, arm.node().arm().vendor_id(), arm.node().arm().product_id(),
+                serial);
 }
 
 bool answers(UsbPort& port) {

@@ -70,7 +70,7 @@ class MountedFalcon {
 /// The emulated WoodenHaptics arm as a hidraw node.
 class MountedArm {
  public:
-  explicit MountedArm(HidrawNode::Settings settings = {}, bool with_hand = true)
+  explicit MountedArm(WoodenHid::Settings settings = {}, bool with_hand = true)
       : emulator_(std::make_unique<WoodenModel>(params_of(settings)),
                   with_hand ? touching_hand() : std::optional<HandScript>{}),
         served_("hidraw0", become_device, with_cycles(std::move(settings)), emulator_) {}
@@ -81,12 +81,12 @@ class MountedArm {
   [[nodiscard]] const Emulator& emulator() const noexcept { return emulator_; }
 
  private:
-  static WoodenParams params_of(const HidrawNode::Settings& settings) {
+  static WoodenParams params_of(const WoodenHid::Settings& settings) {
     WoodenParams params;
     params.packet_bytes = settings.packet_bytes;
     return params;
   }
-  static HidrawNode::Settings with_cycles(HidrawNode::Settings settings) {
+  static WoodenHid::Settings with_cycles(WoodenHid::Settings settings) {
     settings.script = at_ms(std::move(settings.script));
     return settings;
   }

@@ -203,7 +203,7 @@ TEST_CASE("hidapi through FUSE: a command and its answer cost far less than a fr
   EchoDevice<WoodenWire> device(ticks);
   kerf::test::ServedNode<kerf::HidrawNode> served(
       "hidraw0", [] { static_cast<void>(kerf::make_real_time(82, -1)); },
-      kerf::HidrawNode::Settings{}, device);
+      kerf::WoodenHid::Settings{}, device);
   measure(
       "hidapi", device, served,
       [](const std::string& path) {

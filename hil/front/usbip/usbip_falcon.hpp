@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <optional>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "hil/front/kernel_device.hpp"
+#include "hil/front/usb/falcon_plug.hpp"
+#include "hil/front/usbip/usbip_message.hpp"
+
+namespace kerf {
+
+/// An emulated Falcon that speaks USB/IP: behind `vhci_hcd` the kernel's own USB stack takes it for
+/// a device at one of its ports.
+///
+/// A read completes when the device has a packet, at most once per 1 ms frame; a write and a
+/// control request at once. A host that breaks the protocol is unplugged.
+class UsbipFalcon final : public KernelDevice, private UsbHost {
+ public:
+  /// Plugs the device in: one end of a stream socket whose other end the host has. Owned here.
+  using PlugIn = std::function<int()>;
+  UsbipFalcon(const FtdiFalcon::Settings& settings, std::vector<ScriptedUsbFault> script,
+              PacketDevice& device, PlugIn plug_in)
+      : plug_(settings, std::move(script), device), plug_in_(std::move(plug_in)), fd_(plug_in_()) {}
+  UsbipFalcon(const UsbipFalcon&) = delete;
+  UsbipFalcon& operator=(const UsbipFalcon&) = delete;
+  ~UsbipFalcon() override { unplug(); }
+
+  [[nodiscard]] int descriptor() const noexcept override { return fd_; }
+  void answer() override;
+  [[nodiscard]] std::int64_t next_wake_ns() const noexcept override {
+    return chip().time().next_frame_ns();
+  }
+  void wake() override { plug_.catch_up(*this); }
+
+  /// The host has closed the connection: nobody can plug the device in again.
+  [[nodiscard]] bool left() const noexcept { return left_; }
+  [[nodiscard]] const FtdiFalcon& chip() const noexcept { return plug_.chip(); }
+
+ private:
+  struct Read {
+    std::uint32_t sequence = 0;
+    std::size_t room = 0;
+  };
+
+  [[nodiscard]] std::optional<std::size_t> room() override;
+  void complete_read(int status, std::span<const std::uint8_t> bytes) override;
+  void plugged(bool in) override;
+
+  [[nodiscard]] bool take_message();
+  void serve(const usbip::Request& request, std::span<const std::uint8_t> bytes);
+  void submit_control(const usbip::Request& request);
+  void unlink(const usbip::Request& request);
+  void say(const usbip::Header& header, std::span<const std::uint8_t> bytes = {});
+  void lose_host() noexcept;
+  void unplug() noexcept;
+
+  FalconPlug plug_;
+  PlugIn plug_in_;
+  int fd_;
+  bool left_ = false;
+  std::vector<std::uint8_t> heard_;  ///< whole messages and the begin of one
+  std::deque<Read> reads_;
+};
+
+}  // namespace kerf

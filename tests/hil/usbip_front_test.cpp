@@ -1,0 +1,234 @@
+// SPDX-License-Identifier: Apache-2.0
+// The Falcon at the end of a USB/IP connection: the test is the kernel at its other end.
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <chrono>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <thread>
+#include <vector>
+
+#include <doctest/doctest.h>
+#include <poll.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include "hil/devmodel/falcon_model.hpp"
+#include "hil/emulator.hpp"
+#include "hil/front/usbip/usbip_falcon.hpp"
+#include "shared/wire/falcon_packet.hpp"
+
+namespace {
+
+using Bytes = std::vector<std::uint8_t>;
+constexpr std::uint32_t kIn = 1;  // numbers of the endpoints
+constexpr std::uint32_t kOut = 2;
+
+struct Answer {
+  std::uint32_t command = 0, sequence = 0;
+  int status = 0;
+  Bytes data;
+};
+
+std::uint32_t word_at(std::span<const std::uint8_t> in, std::size_t at) {
+  return std::uint32_t{in[at]} << 24 | std::uint32_t{in[at + 1]} << 16 |
+         std::uint32_t{in[at + 2]} << 8 | in[at + 3];
+}
+
+/// A kernel, and the device whose cable it holds.
+class Host {
+ public:
+  explicit Host(std::vector<kerf::ScriptedUsbFault> script = {})
+      : emulator_(std::make_unique<kerf::FalconModel>(), {}),
+        device_({.firmware_runs = true}, std::move(script), emulator_, [this] { return plug(); }) {}
+  ~Host() { close(fd_); }
+
+  void send(const Bytes& bytes) const {
+    REQUIRE(::send(fd_, bytes.data(), bytes.size(), MSG_NOSIGNAL) ==
+            static_cast<ssize_t>(bytes.size()));
+  }
+  static Bytes message(std::uint32_t command, std::uint32_t sequence, bool to_host,
+                       std::uint32_t endpoint, std::uint32_t at_20, std::uint32_t at_24,
+                       std::array<std::uint8_t, 8> setup = {}) {
+    Bytes out;
+    for (const std::uint32_t word :
+         {command, sequence, 1u, to_host ? 1u : 0u, endpoint, at_20, at_24, 0u, 0u, 0u}) {
+      for (int shift = 24; shift >= 0; shift -= 8) {
+        out.push_back(static_cast<std::uint8_t>(word >> shift));
+      }
+    }
+    out.insert(out.end(), setup.begin(), setup.end());
+    return out;
+  }
+  void submit_read(std::uint32_t sequence, std::uint32_t bytes = 64) const {
+    send(message(1, sequence, true, kIn, 0, bytes));
+  }
+  void submit_write(std::uint32_t sequence, std::span<const std::uint8_t> data) const {
+    Bytes out = message(1, sequence, false, kOut, 0, static_cast<std::uint32_t>(data.size()));
+    out.insert(out.end(), data.begin(), data.end());
+    send(out);
+  }
+  void control(std::uint32_t sequence, std::array<std::uint8_t, 8> setup) const {
+    send(message(1, sequence, (setup[0] & 0x80) != 0, 0, 0, setup[6], setup));
+  }
+  void unlink(std::uint32_t sequence, std::uint32_t other) const {
+    send(message(2, sequence, false, 0, other, 0));
+  }
+
+  /// Lets the device serve for so long, and takes the answers.
+  std::vector<Answer> hear(int milliseconds) {
+    const auto until = std::chrono::steady_clock::now() + std::chrono::milliseconds(milliseconds);
+    kerf::Lateness lateness;
+    kerf::serve_kernel(
+        device_, [&] { return std::chrono::steady_clock::now() < until; }, lateness);
+    return take();
+  }
+
+  [[nodiscard]] kerf::UsbipFalcon& device() { return device_; }
+  [[nodiscard]] const kerf::EmulatorStats& seen() const { return emulator_.stats(); }
+  /// Times that the device was plugged in.
+  [[nodiscard]] int plugs() const { return plugs_; }
+
+ private:
+  int plug() {
+    std::array<int, 2> cable{};
+    REQUIRE(socketpair(AF_UNIX, SOCK_STREAM, 0, cable.data()) == 0);
+    if (fd_ >= 0) close(fd_);
+    fd_ = cable[0];
+    ++plugs_;
+    return cable[1];
+  }
+  std::vector<Answer> take() const {
+    Bytes heard(65536);
+    const ssize_t size = recv(fd_, heard.data(), heard.size(), MSG_DONTWAIT);
+    heard.resize(static_cast<std::size_t>(std::max<ssize_t>(size, 0)));
+    std::vector<Answer> answers;
+    for (std::size_t at = 0; at + 48 <= heard.size();) {
+      const auto head = std::span(heard).subspan(at, 48);
+      Answer& answer = answers.emplace_back();
+      answer.command = word_at(head, 0);
+      answer.sequence = word_at(head, 4);
+      answer.status = static_cast<int>(word_at(head, 20));
+      at += 48;
+      const bool has_data = answer.command == 3 && !is_write(answer.sequence);
+      const std::size_t bytes = has_data ? word_at(head, 24) : 0;
+      answer.data.assign(heard.begin() + static_cast<std::ptrdiff_t>(at),
+                         heard.begin() + static_cast<std::ptrdiff_t>(at + bytes));
+      at += bytes;
+    }
+    return answers;
+  }
+  static bool is_write(std::uint32_t sequence) { return sequence >= 1000; }
+
+  int fd_ = -1;
+  int plugs_ = 0;
+  kerf::Emulator emulator_;
+  kerf::UsbipFalcon device_;
+};
+
+const Answer* find(const std::vector<Answer>& answers, std::uint32_t sequence) {
+  const auto found = std::ranges::find(answers, sequence, &Answer::sequence);
+  return found == answers.end() ? nullptr : &*found;
+}
+
+}  // namespace
+
+TEST_CASE("usbip: the kernel's questions at plug-in are answered, unknown ones stalled") {
+  Host host;
+  host.control(1, {0x80, 6, 0, 1, 0, 0, 18, 0});    // device descriptor
+  host.control(2, {0x80, 6, 0, 2, 0, 0, 9, 0});     // begin of the configuration
+  host.control(3, {0x00, 9, 1, 0, 0, 0, 0, 0});     // set the configuration
+  host.control(4, {0x80, 6, 0, 0x0F, 0, 0, 5, 0});  // a descriptor that is not there
+  const auto answers = host.hear(20);
+  REQUIRE(answers.size() == 4);
+  CHECK(answers[0].data.size() == 18);
+  CHECK(answers[0].data[8] == 0x03);
+  CHECK(answers[0].data[9] == 0x04);
+  CHECK(answers[1].data.size() == 9);
+  CHECK(answers[2].status == 0);
+  CHECK(answers[3].status == -EPIPE);
+  for (const Answer& answer : answers) CHECK(answer.command == 3);
+}
+
+TEST_CASE("usbip: a command in pieces is one command, and its answer fills a read") {
+  Host host;
+  host.control(1, {0x40, 9, 1, 0, 0, 0, 0, 0});  // latency timer: one frame
+  const auto command = encode(kerf::FalconCommand{});
+  Bytes written = Host::message(1, 1000, false, kOut, 0, command.size());
+  written.insert(written.end(), command.begin(), command.end());
+  host.submit_read(2);
+  for (const std::uint8_t byte : written) host.send({byte});
+  std::vector<Answer> all;
+  for (std::uint32_t next = 3; next < 50; ++next) {
+    const auto answers = host.hear(2);
+    all.insert(all.end(), answers.begin(), answers.end());
+    if (!all.empty() && all.back().data.size() > 2) break;
+    host.submit_read(next);
+  }
+  REQUIRE(find(all, 1000) != nullptr);
+  CHECK(find(all, 1000)->status == 0);
+  CHECK(host.seen().commands == 1);
+  CHECK(host.seen().refused == 0);
+  REQUIRE(all.back().data.size() == 2 + 16);
+  CHECK(kerf::falcon::decode_report(std::span(all.back().data).subspan(2, 16)));
+}
+
+TEST_CASE("usbip: a read that waits can be given up, one that is over cannot") {
+  Host host;
+  host.control(1, {0x40, 9, 255, 0, 0, 0, 0, 0});  // latency timer: 255 frames, so reads wait
+  host.submit_read(2);
+  host.unlink(3, 2);
+  host.unlink(4, 2);
+  host.submit_write(1000, Bytes{0});
+  host.send(Host::message(1, 1001, false, 5, 0, 0));  // no such endpoint
+  const auto answers = host.hear(5);
+  REQUIRE(answers.size() == 5);
+  CHECK(answers[1].command == 4);
+  CHECK(answers[1].status == -ECONNRESET);
+  CHECK(answers[2].status == 0);
+  CHECK(answers[3].status == 0);
+  CHECK(answers[4].status == -EPIPE);
+}
+
+TEST_CASE("usbip: a stalled endpoint says so once, is silent, and is freed by its clear") {
+  Host host({{8, kerf::UsbFault::stall}});
+  host.control(1, {0x40, 9, 1, 0, 0, 0, 0, 0});
+  for (std::uint32_t i = 2; i < 40; ++i) host.submit_read(i);
+  auto answers = host.hear(20);
+  CHECK(std::ranges::count(answers, -EPIPE, &Answer::status) == 1);
+  CHECK(host.hear(20).empty());
+  host.control(50, {0x02, 1, 0, 0, 0x81, 0, 0, 0});
+  answers = host.hear(20);
+  REQUIRE(answers.size() > 2);
+  CHECK(answers[0].sequence == 50);
+  CHECK(answers[1].status == 0);
+  host.control(51, {0x02, 1, 0, 0, 0x85, 0, 0, 0});  // no such endpoint
+  answers = host.hear(5);
+  REQUIRE(find(answers, 51) != nullptr);
+  CHECK(find(answers, 51)->status == -EPIPE);
+}
+
+TEST_CASE("usbip: unplugged the cable is dead, plugged in again there is another one") {
+  Host host({{40, kerf::UsbFault::vanish}, {80, kerf::UsbFault::back}});
+  host.submit_read(2);
+  host.hear(8);
+  CHECK(host.device().descriptor() < 0);
+  CHECK_FALSE(host.device().left());
+  host.hear(5);
+  CHECK(host.plugs() == 2);
+  host.control(1, {0x80, 6, 0, 1, 0, 0, 18, 0});
+  CHECK(find(host.hear(5), 1) != nullptr);
+}
+
+TEST_CASE("usbip: a host that breaks the protocol, or is gone, is let go") {
+  Host too_long;
+  too_long.submit_read(1, 5000);
+  too_long.hear(5);
+  CHECK(too_long.device().left());
+  Host unknown;
+  unknown.send(Host::message(7, 1, false, 0, 0, 0));
+  unknown.hear(5);
+  CHECK(unknown.device().left());
+}
