@@ -1,0 +1,99 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+# A machine of its own for kerf: Debian's kernel under QEMU, in virtual time, with nothing in it but
+# our programs (docs/devices.md tells what that shows). Needs no root.
+#     hil/guest/guest.sh image PROGRAMS FOLDER   makes the image in FOLDER of the programs in PROGRAMS
+#     hil/guest/guest.sh boot FOLDER LOG         runs it; what it prints is LOG
+# FOLDER keeps the kernel, which is Debian's newest when it is first needed. Exit code 77 and one line
+# where something is missing.
+set -euo pipefail
+here=$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")
+modules=(vhci-hcd hid-generic uhid)
+programs=(controller emulator recorder record)
+
+lack() {
+  echo "guest: $*"
+  exit 77
+}
+
+need() {
+  command -v "$1" >/dev/null || lack "no $1; .ci/packages.sh guest installs it"
+}
+
+# fetch_kernel FOLDER: the kernel and the modules of its USB and HID stacks; never installed.
+fetch_kernel() {
+  local package part=$1.part
+  if [[ -e $1 ]]; then return; fi
+  need apt-get
+  package=$(apt-cache depends linux-image-amd64 2>/dev/null |
+    sed -n 's/^ *Depends: \(linux-image-[0-9].*\)/\1/p')
+  [[ -n $package ]] || lack "apt knows no linux-image-amd64; apt-get update, on Debian for amd64"
+  rm -rf "$part"
+  mkdir -p "$part"
+  (cd "$part" && apt-get -q download "$package") >"$part/log" 2>&1 ||
+    lack "$package cannot be downloaded ($(tail -n 1 "$part/log"))"
+  dpkg-deb --fsys-tarfile "$part/$package"_*.deb | tar -xf - -C "$part" --wildcards \
+    './boot/vmlinuz-*' './lib/modules/*/kernel/drivers/usb/*' './lib/modules/*/kernel/drivers/hid/*'
+  rm "$part/$package"_*.deb
+  busybox depmod -b "$part" "${package#linux-image-}"
+  mv "$part" "$1"
+}
+
+# with_libraries FILE...: the programs and the libraries that they load.
+with_libraries() {
+  printf '%s\n' "$@"
+  ldd "$@" | sed -n 's|.*[ \t]\(/[^ ]*\) (0x.*|\1|p' | sort -u
+}
+
+make_image() {
+  local bin=$1 folder=$2 root=$2/root kernel=$2/kernel name path release
+  need qemu-system-x86_64
+  need busybox
+  mkdir -p "$folder"
+  fetch_kernel "$kernel"
+  rm -rf "$root"
+  mkdir -p "$root"/{bin,dev,kerf,proc,run,sys,tmp}
+  cp "$(command -v busybox)" "$root/bin/busybox"
+  cp "$here/init" "$root/"
+  cp "$here"/*.toml "$root/kerf/"
+  head -c 1000 "$here/init" >"$root/kerf/firmware"  # the emulated Falcon takes any bytes for it
+  mapfile -t programs < <(printf "$bin/kerf-%s\n" "${programs[@]}")
+  with_libraries "${programs[@]}" | while read -r path; do
+    if [[ $path == "$bin"/* ]]; then
+      cp "$path" "$root/bin/"
+    else
+      mkdir -p "$root${path%/*}"
+      cp -L "$path" "$root$path"
+    fi
+  done
+  release=$(basename "$kernel"/lib/modules/*)
+  for name in "${modules[@]}"; do  # each with all that it needs: "PATH: PATH ..."
+    sed -n "s|^\([^ ]*/$name.ko\):|\1|p" "$kernel/lib/modules/$release/modules.dep"
+  done | xargs -n 1 | while read -r path; do
+    mkdir -p "$root/lib/modules/$release/${path%/*}"
+    cp "$kernel/lib/modules/$release/$path" "$root/lib/modules/$release/$path"
+  done
+  busybox depmod -b "$root" "$release"
+  (cd "$root" && find . | LC_ALL=C sort | busybox cpio -o -H newc 2>/dev/null) >"$folder/image.part"
+  mv "$folder/image.part" "$folder/image"
+}
+
+# Guest time is the number of instructions: 2 ns each, and idle time is skipped. A fixed date, no
+# random numbers of the host and fixed addresses make two runs the same to the last byte; the
+# kernel's own tests of its ciphers are left out, which saves half of its start.
+boot() {
+  timeout 300 qemu-system-x86_64 -M q35 -accel tcg -cpu max,-erms -smp 1 -m 512 -nodefaults \
+    -no-user-config -display none -no-reboot -serial "file:$2" \
+    -icount shift=1,sleep=off -rtc base=2020-01-01T00:00:00,clock=vm -seed 1 \
+    -kernel "$1"/kernel/boot/vmlinuz-* -initrd "$1/image" -append "console=ttyS0 quiet panic=-1 \
+nokaslr norandmaps random.trust_cpu=1 tsc=reliable lpj=1000000 cryptomgr.notests"
+}
+
+case "${1:-}/$#" in
+  image/3) make_image "${@:2}" ;;
+  boot/3) boot "${@:2}" ;;
+  *)
+    echo "guest: ${1:-nothing}: say image PROGRAMS FOLDER, or boot FOLDER LOG" >&2
+    exit 2
+    ;;
+esac
