@@ -176,8 +176,7 @@ void HidPort::run() noexcept {
     while (sem_wait(&raised_) != 0) {
     }
     std::array<std::uint8_t, 1 + wooden::kLongPacketBytes> report{wooden::kReportId};
-    std::size_t size = 0;
-    while (const std::size_t next = outbox_.take(std::span(report).subspan(1))) size = next;
+    const std::size_t size = outbox_.take(std::span(report).subspan(1));
     if (size > 0 && !closed()) {
       std::fill(report.begin() + 1 + static_cast<std::ptrdiff_t>(size), report.end(), 0);
       if (hid_write(device_, report.data(), 1 + packet_bytes_) < 0) closed_ = true;

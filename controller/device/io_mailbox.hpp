@@ -64,40 +64,40 @@ class Inbox {
   std::atomic<std::size_t> begin_{0}, end_{0};
 };
 
-/// Commands: any thread and any signal handler writes, one reader. Each packet has a place of its
-/// own, so a writer that a crash stopped in the middle of one keeps nobody from the others.
+/// The next command: any thread and any signal handler writes, one reader takes the newest, and
+/// what is older is void: a reader that was held up does not send what was true before. Each packet
+/// has a place of its own, so a writer that a crash stopped in the middle of one keeps nobody from
+/// the others.
 class Outbox {
  public:
-  /// False when no place is free.
+  /// False when all places are in the hands of others.
   bool put(std::span<const std::uint8_t> packet) noexcept {
-    const std::uint64_t ticket = next_ticket_.fetch_add(1);
-    for (Place& place : places_) {
-      std::uint64_t expected = kFree;
-      if (!place.ticket.compare_exchange_strong(expected, kBeingWritten)) continue;
-      place.packet.assign(packet);
-      place.ticket.store(ticket, std::memory_order_release);
-      return true;
-    }
-    return false;
+    Place* const place = claim_oldest();
+    if (!place) return false;
+    place->packet.assign(packet);
+    place->ticket.store(next_ticket_.fetch_add(1), std::memory_order_release);
+    return true;
   }
-  /// The reader. Size of the oldest packet; 0 when there is none.
+  /// The reader. Size of the newest packet; 0 when there is none.
   [[nodiscard]] std::size_t take(std::span<std::uint8_t> out) noexcept {
-    // A packet may come to a place that was looked at already, and a later one to a place that was
-    // not yet: who sees the later one sees both when looking again.
-    Place* oldest = find_oldest();
-    for (Place* again = find_oldest(); again != oldest; again = find_oldest()) oldest = again;
-    if (!oldest) return 0;
-    on_its_way_.store(true);  // before the place is free: `send_and_wait` looks at both
-    const std::size_t size = oldest->packet.copy_to(out);
-    oldest->ticket.store(kFree, std::memory_order_release);
+    std::size_t size = 0;
+    for (Place& place : places_) {
+      const std::uint64_t ticket = place.ticket.load(std::memory_order_relaxed);
+      if (ticket == kFree || !claim(place, ticket)) continue;
+      if (ticket > newest_taken_) {
+        newest_taken_ = ticket;
+        on_its_way_.store(true);  // before the place is free: `send_and_wait` looks at both
+        size = place.packet.copy_to(out);
+      }
+      place.ticket.store(kFree, std::memory_order_release);
+    }
     return size;
   }
   /// The reader: whether what it took has not left the process yet.
   void set_on_its_way(bool is) noexcept { on_its_way_.store(is); }
 
-  /// Any thread but the reader's, any signal handler: calls `send`, again while all places are
-  /// taken, and waits until everything has left; false when that takes longer than so many
-  /// milliseconds.
+  /// Any thread but the reader's, any signal handler: calls `send`, again while it fails, and waits
+  /// until everything has left; false when that takes longer than so many milliseconds.
   template <class Send>
   bool send_and_wait(const Send& send, int milliseconds) const noexcept {
     bool is_put = send();
@@ -111,36 +111,47 @@ class Outbox {
   /// Any thread, any signal handler: no whole packet waits.
   [[nodiscard]] bool empty() const noexcept {
     return std::ranges::all_of(places_, [](const Place& place) {
-      return place.ticket.load(std::memory_order_acquire) < kFirstTicket;
+      const std::uint64_t ticket = place.ticket.load(std::memory_order_acquire);
+      return ticket == kFree || ticket == kInHand;
     });
   }
 
  private:
   static constexpr std::size_t kPlaces = 8;
+  // Tickets grow with time, between these two.
   static constexpr std::uint64_t kFree = 0;
-  static constexpr std::uint64_t kBeingWritten = 1;
-  static constexpr std::uint64_t kFirstTicket = 2;
+  static constexpr std::uint64_t kInHand = ~std::uint64_t{0};
   struct Place {
     std::atomic<std::uint64_t> ticket{kFree};
     MailboxPacket packet;
   };
   static_assert(std::atomic<std::uint64_t>::is_always_lock_free);
 
-  [[nodiscard]] Place* find_oldest() noexcept {
-    Place* oldest = nullptr;
-    std::uint64_t lowest = ~std::uint64_t{0};
-    for (Place& place : places_) {
-      const std::uint64_t ticket = place.ticket.load(std::memory_order_acquire);
-      if (ticket < kFirstTicket || ticket >= lowest) continue;
-      lowest = ticket;
-      oldest = &place;
+  /// Nobody else touches the place from now on. False where its ticket is another one by now.
+  [[nodiscard]] static bool claim(Place& place, std::uint64_t ticket) noexcept {
+    return ticket != kInHand &&
+           place.ticket.compare_exchange_strong(ticket, kInHand, std::memory_order_acquire);
+  }
+  /// A free place, or that of the oldest packet, which is void by now.
+  [[nodiscard]] Place* claim_oldest() noexcept {
+    for (std::size_t tries = 0; tries < kPlaces; ++tries) {
+      Place* oldest = nullptr;
+      std::uint64_t lowest = kInHand;
+      for (Place& place : places_) {
+        const std::uint64_t ticket = place.ticket.load(std::memory_order_relaxed);
+        if (ticket >= lowest) continue;
+        lowest = ticket;
+        oldest = &place;
+      }
+      if (!oldest || claim(*oldest, lowest)) return oldest;
     }
-    return oldest;
+    return nullptr;
   }
 
   std::array<Place, kPlaces> places_{};
-  std::atomic<std::uint64_t> next_ticket_{kFirstTicket};
+  std::atomic<std::uint64_t> next_ticket_{kFree + 1};
   std::atomic<bool> on_its_way_{false};
+  std::uint64_t newest_taken_ = kFree;  ///< the reader's: what is older came too late
 };
 
 }  // namespace kerf
