@@ -128,4 +128,28 @@ inline void arm_at(Servo& servo, FakeArm& arm, double x_mm, double y_mm, double 
   }
 }
 
+[[nodiscard]] inline double length(const std::array<double, 3>& v) {
+  return std::hypot(v[0], v[1], v[2]);
+}
+
+/// A compiled scene under an arm that was docked and led to `start_mm`, in the air above the flat.
+struct ArmedServo {
+  explicit ArmedServo(Scene& scene, const std::array<double, 3>& start_mm = {0, 5, 0})
+      : servo(compile(scene)) {
+    arm_at(*servo, arm, start_mm[0], start_mm[1], start_mm[2]);
+  }
+  ServoOutput step(double x_mm, double y_mm, double z_mm) {
+    return servo->step(arm.at(x_mm, y_mm, z_mm));
+  }
+  /// Steady output with the tip at a device place.
+  ServoOutput settled(double x_mm, double y_mm, double z_mm) {
+    ServoOutput out;
+    for (int tick = 0; tick < 20; ++tick) out = step(x_mm, y_mm, z_mm);
+    return out;
+  }
+
+  std::unique_ptr<Servo> servo;
+  FakeArm arm;
+};
+
 }  // namespace kerf::test

@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the step does when something is wrong, and which limits no scene gets past.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <cstdlib>
+#include <limits>
+
+#include <doctest/doctest.h>
+
+#include "tests/servo/support.hpp"
+
+using kerf::Fault;
+using kerf::NumericKind;
+using kerf::Phase;
+using kerf::Scene;
+using kerf::ServoOutput;
+using kerf::test::arm_at;
+using kerf::test::ArmedServo;
+using kerf::test::FakeArm;
+using kerf::test::half_space_scene;
+using kerf::test::length;
+
+TEST_CASE("reports stop: the force holds 5 ms, is zero at 20 ms, motors off, fault latched") {
+  Scene scene = half_space_scene();
+  ArmedServo armed(scene);
+  const double held_n = length(armed.settled(0, 0.3, 0).force_n);
+  REQUIRE(held_n > 0.1);
+  for (int ms = 1; ms <= 25; ++ms) {
+    const ServoOutput out = armed.servo->step({});
+    CAPTURE(ms);
+    if (ms <= 5) CHECK(length(out.force_n) == doctest::Approx(held_n).epsilon(1e-3));
+    if (ms > 5) CHECK(length(out.force_n) < held_n);
+    if (ms >= 20) {
+      CHECK(length(out.force_n) == 0);
+      CHECK_FALSE(out.motors_on);
+      CHECK(out.fault == Fault::stale_input);
+      CHECK(out.motor_counts == std::array<std::int16_t, 3>{});
+    }
+  }
+  CHECK(armed.settled(0, 0.3, 0).phase == Phase::fault);  // stays off
+  arm_at(*armed.servo, armed.arm, 0, 5, 0);               // until docked again
+  CHECK(length(armed.settled(0, 0.3, 0).force_n) > 0.1);
+}
+
+TEST_CASE("one packet with the docked bit neither moves the tip nor forgives a fault") {
+  Scene scene = half_space_scene();
+  ArmedServo armed(scene);
+  const ServoOutput before = armed.settled(0, 0.3, 0);
+  auto glitch = armed.arm.at(0, 0.3, 0);
+  glitch.parked = true;
+  CHECK_FALSE(armed.servo->step(glitch).motors_on);
+  const ServoOutput after = armed.step(0, 0.3, 0);
+  CHECK(after.position_mm == before.position_mm);
+  CHECK(length(after.force_n) < 0.1 * length(before.force_n));  // fades in again
+  for (int ms = 0; ms < 30; ++ms) static_cast<void>(armed.servo->step({}));
+  glitch = armed.arm.at(0, 0.3, 0);
+  glitch.parked = true;
+  CHECK(armed.servo->step(glitch).fault == Fault::stale_input);
+  CHECK_FALSE(armed.step(0, 0.3, 0).motors_on);
+}
+
+TEST_CASE("a stylus that moves while the docked bit is set is not calibrated") {
+  Scene scene = half_space_scene();
+  const auto servo = kerf::compile(scene);
+  FakeArm arm;
+  for (int tick = 0; tick < 100; ++tick) {
+    auto report = arm.at(0, -30 + tick * 0.5, 0);
+    report.parked = true;
+    CHECK(servo->step(report).phase == Phase::calibrating);
+  }
+}
+
+TEST_CASE("after a stall the force starts again from nothing") {
+  Scene scene = half_space_scene();
+  scene.force.p0_n_per_mm2 = 50;
+  ArmedServo armed(scene);
+  REQUIRE(length(armed.settled(0, 0.3, 0).force_n) > 3);
+  armed.servo->apply({.kind = kerf::ServoCommand::Kind::fade_in});
+  double last_n = 0;
+  for (int tick = 0; tick < 20; ++tick) {
+    const double force_n = length(armed.step(0, 0.3, 0).force_n);
+    CHECK(force_n <= last_n + 0.5 + 1e-4);
+    last_n = force_n;
+  }
+}
+
+TEST_CASE("a force beyond the motors keeps its direction, and what was sent is what is told") {
+  Scene scene = half_space_scene();
+  scene.force.p0_n_per_mm2 = 50;
+  scene.device.torque_scale = std::array{0.01, 0.01, 0.01};  // the range ends at 20 N mm
+  ArmedServo armed(scene);
+  const ServoOutput out = armed.settled(0.2, 0.3, 0.2);
+  CHECK(out.saturated);
+  CHECK(length(out.force_n) < 1);
+  int largest = 0;
+  for (std::size_t i = 0; i < 3; ++i) {
+    largest = std::max(largest, std::abs(int{out.motor_counts[i]}));
+    CHECK(out.motor_counts[i] * 0.01 == doctest::Approx(out.torque_n_mm[i]).epsilon(0.01));
+  }
+  CHECK(largest == 2047);
+}
+
+TEST_CASE("a force that is not finite ends the motors at once") {
+  Scene scene = half_space_scene();
+  scene.servo.numeric = NumericKind::float64;
+  scene.force.p0_n_per_mm2 = std::numeric_limits<double>::quiet_NaN();
+  ArmedServo armed(scene);
+  const ServoOutput out = armed.settled(0, 0.3, 0);
+  CHECK(out.fault == Fault::not_finite);
+  CHECK_FALSE(out.motors_on);
+  CHECK(out.motor_counts == std::array<std::int16_t, 3>{});
+}
+
+TEST_CASE("faster than 10 m/s: motors off in the same tick") {
+  Scene scene = half_space_scene();
+  ArmedServo armed(scene);
+  REQUIRE(armed.settled(0, 0.3, 0).motors_on);
+  const ServoOutput out = armed.step(0, 15.0, 0);
+  CHECK(out.fault == Fault::overspeed);
+  CHECK_FALSE(out.motors_on);
+  CHECK(length(out.force_n) == 0);
+}
+
+TEST_CASE("a scene without torque scale feels, but never turns the motors on") {
+  Scene scene = half_space_scene();
+  scene.device.torque_scale.reset();
+  ArmedServo armed(scene);
+  const ServoOutput out = armed.settled(0, 0.3, 0);
+  CHECK(length(out.contact_n) > 0.1);
+  CHECK_FALSE(out.motors_on);
+  CHECK(length(out.force_n) == 0);
+}
+
+TEST_CASE("a very stiff scene meets every limit and keeps the force below 3.3 N") {
+  Scene scene = half_space_scene();
+  scene.force.p0_n_per_mm2 = 50;
+  ArmedServo armed(scene);
+  std::array<double, 3> last{};
+  for (int tick = 0; tick < 200; ++tick) {
+    const ServoOutput out = armed.step(0, tick < 100 ? 0.0 : 5.0, 0);
+    CHECK(length(out.force_n) <= 3.3);
+    CHECK(std::hypot(out.force_n[0] - last[0], out.force_n[1] - last[1],
+                     out.force_n[2] - last[2]) <= 0.5 + 1e-4);
+    for (const auto counts : out.motor_counts) CHECK(std::abs(counts) <= 2047);
+    last = out.force_n;
+  }
+}
