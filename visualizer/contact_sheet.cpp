@@ -9,7 +9,7 @@
 #include <imgui.h>
 
 #include "visualizer/file_out.hpp"
-#include "visualizer/renderer.hpp"
+#include "visualizer/scene_painter.hpp"
 
 namespace kerf {
 
@@ -95,15 +95,14 @@ void write_contact_sheet(const std::filesystem::path& file, const SceneView& sce
   constexpr double kNearer = 1.5;  // one tooth does not fill its box
   constexpr double kLower = 0.07;  // of the tile's height: as seen from above it stands high
   constexpr double kReach = 3.0;   // radii of what is framed: room for the tool
-  const BoxCorners box = scene.main_volume().corners();
-  const double size_mm = 0.5 * glm::length(box.back() - box.front());
   OrbitCamera camera;
   camera.frame(scene.corners(), kAspect);
   if (scene.volumes.size() == 1) camera.zoom(kNearer);
   camera.pan(0.0, -kLower);
   const View view = camera.view(kAspect, kReach * camera.radius_mm());
   const RenderTarget target({kFiner * kTile.width, kFiner * kTile.height});
-  HandPainter hand_painter(scene, size_mm);
+  std::optional<Hand> tool = hand;
+  if (tool) tool->force_n = glm::dvec3(0.0);  // an arrow would hide what is to be compared
 
   const auto kinds = renderer_kinds();
   const int rows = (static_cast<int>(kinds.size()) + kColumns - 1) / kColumns;
@@ -111,16 +110,13 @@ void write_contact_sheet(const std::filesystem::path& file, const SceneView& sce
   sheet.rgb.resize(static_cast<std::size_t>(sheet.size.width * sheet.size.height) * 3);
   const Pen pen;
   for (std::size_t i = 0; i < kinds.size(); ++i) {
-    const auto renderer = make_renderer(kinds[i], scene, contents);
+    ScenePainter painter(kinds[i], scene, contents);
     constexpr float kGrey = kBackdrop / 255.0F;
     target.bind();
     glClearColor(kGrey, kGrey, kGrey, 1.0F);
     glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
-    // As in `Picture`: through translucent volumes the tool is seen.
-    if (hand && renderer->translucent()) hand_painter.draw_tool(*hand, view, target);
-    target.bind();
-    renderer->draw(view, target);
-    if (hand && !renderer->translucent()) hand_painter.draw_tool(*hand, view, target);
+    painter.draw_volumes(tool, view, target);
+    if (tool) painter.draw_over(*tool, view, target);
     const std::vector<std::uint8_t> tile = reduced(target.read_rgb());
     const int left = static_cast<int>(i) % kColumns * kTile.width;
     const int top = static_cast<int>(i) / kColumns * kTile.height;

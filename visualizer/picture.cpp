@@ -7,7 +7,6 @@
 
 #include "visualizer/gl/context.hpp"
 #include "visualizer/palette.hpp"
-#include "visualizer/screen_bounds.hpp"
 #include "visualizer/stereo.hpp"
 
 namespace kerf {
@@ -27,28 +26,16 @@ void clear(const RenderTarget& target) {
   glClearNamedFramebufferfv(target.framebuffer(), GL_COLOR, 0, kBlack);
 }
 
-/// Half the diagonal of its box.
-double size_of(const VolumeView& volume) {
-  const BoxCorners box = volume.corners();
-  return 0.5 * glm::length(box.back() - box.front());
-}
-
 }  // namespace
 
 Picture::Picture(const Session& session, const Look& look, double aspect)
-    : scene_(session.scene()),
-      look_(look),
-      renderer_(renderer_for(session, look)),
-      stale_(scene_.volumes.size()),
-      hand_painter_(scene_, size_of(scene_.main_volume())) {
+    : scene_(session.scene()), look_(look), painter_(painter_for(session, look)) {
   const std::vector<glm::dvec3> corners = scene_.corners();
   low_mm_ = high_mm_ = corners.front();
   for (const glm::dvec3& corner : corners) {
     low_mm_ = glm::min(low_mm_, corner);
     high_mm_ = glm::max(high_mm_, corner);
   }
-  size_mm_ = size_of(scene_.main_volume());
-  for (const VolumeView& volume : scene_.volumes) bricks_uploaded_ += volume.bricks.count();
   reset_camera(aspect);
 }
 
@@ -68,17 +55,18 @@ SceneView Picture::scene_in(const Look& look) const {
   return scene;
 }
 
-std::unique_ptr<Renderer> Picture::renderer_for(const Session& session, const Look& look) {
-  return make_renderer(look.renderer, scene_in(look), session.contents());
+std::unique_ptr<ScenePainter> Picture::painter_for(const Session& session, const Look& look) {
+  auto painter = std::make_unique<ScenePainter>(look.renderer, scene_in(look), session.contents());
+  for (const VolumeView& volume : scene_.volumes) bricks_uploaded_ += volume.bricks.count();
+  return painter;
 }
 
 void Picture::set_look(const Session& session, const Look& look) {
   if (look == look_) return;
   if (look.renderer != look_.renderer || look.iso != look_.iso) {
-    renderer_ = renderer_for(session, look);
-    for (const VolumeView& volume : scene_.volumes) bricks_uploaded_ += volume.bricks.count();
+    painter_ = painter_for(session, look);
   } else if (look.opacities != look_.opacities) {
-    renderer_->set_opacities(scene_in(look).materials, session.contents());
+    painter_->renderer().set_opacities(scene_in(look).materials, session.contents());
   }
   look_ = look;
   redraw_all();
@@ -86,7 +74,7 @@ void Picture::set_look(const Session& session, const Look& look) {
 
 LookControls Picture::controls() const {
   LookControls controls{.look = look_, .own_iso = scene_.main_volume().iso / kDensityMax};
-  if (renderer_->translucent()) controls.opacities = opacities();
+  if (painter_->renderer().translucent()) controls.opacities = opacities();
   return controls;
 }
 
@@ -114,15 +102,13 @@ void Picture::reset_camera(double aspect) {
 
 void Picture::update(const Session& session) {
   for (std::size_t v = 0; v < scene_.volumes.size(); ++v) {
-    const VolumeSnapshot& snapshot = session.snapshot(v);
-    renderer_->update(v, snapshot.density, snapshot.changed);
-    bricks_uploaded_ += snapshot.changed.size();
-    stale_[v].add(*renderer_, v, snapshot.differs);
+    painter_->update(v, session.snapshot(v));
+    bricks_uploaded_ += session.snapshot(v).changed.size();
   }
 }
 
 std::vector<View> Picture::views(PictureSize size) const {
-  const double reach_mm = camera_.radius_mm() + kToolRoom * size_mm_;
+  const double reach_mm = camera_.radius_mm() + kToolRoom * scene_.main_volume().radius_mm();
   const Stereo& stereo = look_.stereo;
   const int width = eye_size(size).width;
   View view = camera_.view(static_cast<double>(width) / size.height, reach_mm);
@@ -145,30 +131,29 @@ Redrawn Picture::draw(const Session& session, const OverlayFigures& figures,
   const std::vector<View> views = this->views(target.size());
   std::optional<Hand> hand;
   if (session.latest()) hand = hand_of(*session.latest());
-  if (eyes_.size() != views.size() || eyes_.front().layers.stage.size() != size) {
+  if (eyes_.size() != views.size() || eyes_.front().seen().size() != size) {
     eyes_.clear();
     for (std::size_t eye = 0; eye < views.size(); ++eye) eyes_.emplace_back(size);
     shown_in_ = 0;
   }
-  std::vector<Stale> stale;
+  const std::vector<VolumeContent> contents = session.contents();
+  std::vector<EyeLayers::Stale> stale;
   for (std::size_t eye = 0; eye < views.size(); ++eye) {
-    const auto& before = eyes_[eye].shown;
-    const bool moving = before && before->view != views[eye];
-    stale.push_back(this->stale(eyes_[eye], {views[eye], moving, hand}, session));
+    stale.push_back(eyes_[eye].stale(views[eye], hand, *painter_, contents));
   }
+  painter_->forget_changes();
   const OverlayFigures panel = figures.rounded();
   const bool same_target = target.framebuffer() == shown_in_ && target.size() == shown_size_;
-  for (StaleVolume& volume : stale_) volume.clear();
-  const bool rests =
-      std::all_of(stale.begin(), stale.end(), [](const Stale& one) { return one.stage.empty(); });
+  const bool rests = std::all_of(stale.begin(), stale.end(),
+                                 [](const EyeLayers::Stale& one) { return one.stage.empty(); });
   if (rests && same_target && panel == shown_figures_) return {};
 
   if (!same_target) clear(target);  // an odd column is nobody's
   const PixelRect panels = overlay_.prepare(panel, size);
   double redrawn = 0.0;
   for (std::size_t eye = 0; eye < eyes_.size(); ++eye) {
-    std::vector<PixelRect> others = draw_layers(eyes_[eye], stale[eye]);
-    const RenderTarget& seen = eyes_[eye].layers.smooth;
+    std::vector<PixelRect> others = eyes_[eye].draw(stale[eye], *painter_, passes_);
+    const RenderTarget& seen = eyes_[eye].seen();
     if (same_target) {
       others.push_back(panels.united(shown_panels_));  // they let the picture shine through
     } else {
@@ -193,93 +178,6 @@ bool Picture::handle(const Pointer& pointer, OverlayFigures& figures, PictureSiz
   Pointer within = pointer;
   if (within.x >= eye.width) within.x -= eye.width;
   return overlay_.handle(within, figures, eye);
-}
-
-Picture::Stale Picture::stale(const Eye& eye, const Shown& now, const Session& session) const {
-  const PixelRect all = eye.layers.stage.all();
-  // What was drawn coarsely settles when the camera does.
-  if (!eye.shown || now.moving || eye.shown->moving) return {now, {all}, {all}};
-  const PictureSize size = eye.layers.stage.size();
-  StaleTiles tiles(size);
-  mark_volumes(tiles, session, now.view, eye.layers.volumes);
-  std::vector<PixelRect> volumes = tiles.rects();
-  mark_hand(tiles, now, *eye.shown, size);
-  const std::vector<PixelRect> stage = tiles.rects();
-  if (renderer_->translucent()) volumes = stage;  // the hand is under them
-  return {now, volumes, stage};
-}
-
-void Picture::mark_volumes(StaleTiles& tiles, const Session& session, const View& view,
-                           const RenderTarget& kept) const {
-  for (std::size_t v = 0; v < scene_.volumes.size(); ++v) {
-    stale_[v].mark(tiles, *renderer_, scene_.volumes[v], session.snapshot(v).density, view, kept);
-  }
-}
-
-void Picture::mark_hand(StaleTiles& tiles, const Shown& now, const Shown& before,
-                        PictureSize size) const {
-  if (now.hand == before.hand) return;
-  for (const auto& one : {now.hand, before.hand}) {
-    if (one) tiles.mark(hand_painter_.bounds(*one, now.view, size));
-  }
-}
-
-std::vector<PixelRect> Picture::draw_layers(Eye& eye, const Stale& stale) {
-  const auto& [view, moving, hand] = stale.now;
-  eye.shown = stale.now;
-  if (stale.stage.empty()) return {};
-  Layers& layers = eye.layers;
-  renderer_->set_moving(moving);
-  const bool tool_first = renderer_->translucent();  // it shines through them
-  if (!stale.volumes.empty()) {
-    layers.volumes.restrict_to(stale.volumes);
-    draw_backdrop(layers.volumes);
-    if (hand && tool_first) hand_painter_.draw_tool(*hand, view, layers.volumes);
-    layers.volumes.bind();
-    renderer_->draw(view, layers.volumes);
-  }
-  layers.stage.restrict_to(stale.stage);
-  for (const PixelRect& part : stale.stage) layers.stage.copy(layers.volumes, part);
-  if (hand) {
-    std::vector<PixelRect> of_hand;
-    const PixelRect bounds = hand_painter_.bounds(*hand, view, layers.stage.size());
-    for (const PixelRect& part : stale.stage) {
-      const PixelRect both = part.clipped(bounds);
-      if (!both.empty()) of_hand.push_back(both);
-    }
-    layers.stage.restrict_to(of_hand);  // a mesh costs its vertices for each part
-    if (!tool_first) hand_painter_.draw_tool(*hand, view, layers.stage);
-    hand_painter_.draw_force(*hand, view, layers.stage);
-  }
-  constexpr int kSmoothingReach = 3;  // pixels
-  std::vector<PixelRect> smoothed;
-  for (const PixelRect& part : stale.stage) smoothed.push_back(part.grown(kSmoothingReach));
-  layers.smooth.restrict_to(smoothed);
-  smooth_edges(layers.stage, layers.smooth);
-  return smoothed;
-}
-
-void Picture::draw_backdrop(const RenderTarget& target) {
-  target.bind();
-  // Its depth is that of the far plane, whatever was there.
-  glEnable(GL_DEPTH_TEST);
-  glDepthFunc(GL_ALWAYS);
-  glDisable(GL_BLEND);
-  backdrop_.use();
-  glBindVertexArray(no_vertices_.id());
-  target.for_parts([] { glDrawArrays(GL_TRIANGLES, 0, 3); });
-  glDepthFunc(GL_LESS);
-}
-
-void Picture::smooth_edges(const RenderTarget& from, const RenderTarget& to) {
-  to.bind();
-  glDisable(GL_DEPTH_TEST);
-  glDisable(GL_BLEND);
-  glBindTextureUnit(0, from.colour_texture());
-  smooth_.set("u_picture", 0);
-  smooth_.use();
-  glBindVertexArray(no_vertices_.id());
-  to.for_parts([] { glDrawArrays(GL_TRIANGLES, 0, 3); });
 }
 
 Redrawn draw_measured(Picture& picture, Session& session, const OverlayFigures& figures,

@@ -3,18 +3,15 @@
 
 #include <cstdint>
 #include <memory>
-#include <optional>
 #include <string>
 #include <vector>
 
 #include "visualizer/camera.hpp"
+#include "visualizer/eye_layers.hpp"
 #include "visualizer/frame_report.hpp"
-#include "visualizer/hand_painter.hpp"
 #include "visualizer/look.hpp"
 #include "visualizer/overlay.hpp"
-#include "visualizer/renderer.hpp"
 #include "visualizer/session.hpp"
-#include "visualizer/stale_volume.hpp"
 
 namespace kerf {
 
@@ -63,66 +60,27 @@ class Picture {
  private:
   /// The same of another look.
   [[nodiscard]] SceneView scene_in(const Look& look) const;
-  [[nodiscard]] std::unique_ptr<Renderer> renderer_for(const Session& session, const Look& look);
+  [[nodiscard]] std::unique_ptr<ScenePainter> painter_for(const Session& session, const Look& look);
   /// `View::shown` of the clip plane.
   [[nodiscard]] glm::dvec4 shown_half() const;
-  void draw_backdrop(const RenderTarget& target);
-  void smooth_edges(const RenderTarget& from, const RenderTarget& to);
-
-  SceneView scene_;
-  Look look_;
-  std::unique_ptr<Renderer> renderer_;
-  OrbitCamera camera_;
-  glm::dvec3 low_mm_{0, 0, 0}, high_mm_{0, 0, 0};  ///< the box of all volumes
-  double size_mm_ = 1.0;                           ///< half the diagonal of the main volume's box
-  GlProgram backdrop_{"screen.vert", "backdrop.frag"};
-  GlProgram smooth_{"screen.vert", "smooth.frag"};
-  /// The picture as it grows, kept from frame to frame.
-  struct Layers {
-    explicit Layers(PictureSize size) : volumes(size), stage(size), smooth(size) {}
-    RenderTarget volumes;  ///< backdrop and volumes; the tool too where they are translucent
-    RenderTarget stage;    ///< with the hand
-    RenderTarget smooth;   ///< with smoothed edges
-  };
-  /// What the layers show.
-  struct Shown {
-    View view;
-    bool moving = false;
-    std::optional<Hand> hand;
-  };
-  /// A whole picture, or one half of two side by side.
-  struct Eye {
-    explicit Eye(PictureSize size) : layers(size) {}
-    Layers layers;
-    std::optional<Shown> shown{};  ///< none: nothing yet
-  };
-  /// What must be drawn again, and with what.
-  struct Stale {
-    Shown now;
-    std::vector<PixelRect> volumes, stage;
-  };
   /// Of one eye in a picture of `size`.
   [[nodiscard]] PictureSize eye_size(PictureSize size) const noexcept;
   /// Of each eye, from the left.
   [[nodiscard]] std::vector<View> views(PictureSize size) const;
-  [[nodiscard]] Stale stale(const Eye& eye, const Shown& now, const Session& session) const;
-  /// Marks what changed densities and, where it moved, the hand change.
-  void mark_volumes(StaleTiles& tiles, const Session& session, const View& view,
-                    const RenderTarget& kept) const;
-  void mark_hand(StaleTiles& tiles, const Shown& now, const Shown& before, PictureSize size) const;
-  /// Returns the parts of the smooth layer that are others now.
-  std::vector<PixelRect> draw_layers(Eye& eye, const Stale& stale);
 
-  std::vector<Eye> eyes_;  ///< empty: draw everything
-  OverlayFigures shown_figures_;
-  GLuint shown_in_ = 0;             ///< framebuffer, whose name may be given to a later one
-  PictureSize shown_size_;          ///< of all of it
-  PixelRect shown_panels_;          ///< of each eye
-  std::vector<StaleVolume> stale_;  ///< by volume, since the last `draw`
-  GlVertexArray no_vertices_ = GlVertexArray::create();
-  HandPainter hand_painter_;
-  Overlay overlay_;
+  SceneView scene_;
+  Look look_;
   std::uint64_t bricks_uploaded_ = 0;
+  std::unique_ptr<ScenePainter> painter_;  ///< making it counts bricks
+  OrbitCamera camera_;
+  glm::dvec3 low_mm_{0, 0, 0}, high_mm_{0, 0, 0};  ///< the box of all volumes
+  ScreenPasses passes_;
+  std::vector<EyeLayers> eyes_;  ///< empty: draw everything
+  Overlay overlay_;
+  OverlayFigures shown_figures_;
+  GLuint shown_in_ = 0;     ///< framebuffer, whose name may be given to a later one
+  PictureSize shown_size_;  ///< of all of it
+  PixelRect shown_panels_;  ///< of each eye
 };
 
 /// `Picture::draw`, complete when it returns, with its times and what it did in the report;

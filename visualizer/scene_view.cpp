@@ -80,6 +80,11 @@ BoxCorners VolumeView::corners() const {
   return corners;
 }
 
+double VolumeView::radius_mm() const {
+  const BoxCorners box = corners();
+  return 0.5 * glm::length(box.back() - box.front());
+}
+
 std::vector<glm::dvec3> SceneView::corners() const {
   std::vector<glm::dvec3> all;
   for (const VolumeView& volume : volumes) {

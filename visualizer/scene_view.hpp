@@ -25,6 +25,8 @@ struct VolumeView {
 
   /// Its box in the world, with the half voxel around.
   [[nodiscard]] BoxCorners corners() const;
+  /// Half the diagonal of that box.
+  [[nodiscard]] double radius_mm() const;
 };
 
 /// A tool as a body of revolution about its own y axis; the shaft goes to +y.
