@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "visualizer/cells_on_gpu.hpp"
 
+#include <array>
+
 #include <glm/gtc/matrix_transform.hpp>
 
 namespace kerf {
@@ -11,42 +13,59 @@ CellsOnGpu::CellsOnGpu(const VolumeView& volume, std::span<const Density> densit
       // Cell i begins at voxel 8i - 1.
       world_from_cell_(glm::scale(glm::translate(volume.world_from_voxel, glm::dvec3(-1.0)),
                                   glm::dvec3(Macrocells::kEdge))),
-      cells_(volume.bricks.grid, density, threshold) {
+      cells_(volume.bricks.grid, density, threshold),
+      faces_(cells_) {
   const VoxelGrid& n = cells_.grid();
   glTextureStorage3D(active_.id(), 1, GL_R8UI, n.nx, n.ny, n.nz);
   glTextureParameteri(active_.id(), GL_TEXTURE_MIN_FILTER, GL_NEAREST);
   glTextureParameteri(active_.id(), GL_TEXTURE_MAG_FILTER, GL_NEAREST);
-  glVertexArrayVertexBuffer(face_array_.id(), 0, faces_.id(), 0, 4 * sizeof(std::uint16_t));
+  glVertexArrayVertexBuffer(face_array_.id(), 0, face_buffer_.id(), 0, sizeof(CellFaces::Face));
   glEnableVertexArrayAttrib(face_array_.id(), 0);
   glVertexArrayAttribIFormat(face_array_.id(), 0, 4, GL_UNSIGNED_SHORT, 0);
   glVertexArrayBindingDivisor(face_array_.id(), 0, 1);
-  upload();
+  glNamedBufferStorage(face_buffer_.id(),
+                       static_cast<GLsizeiptr>(CellFaces::most(n) * sizeof(CellFaces::Face)),
+                       nullptr, GL_DYNAMIC_STORAGE_BIT);
+  upload_active(n.box());
+  upload_faces(std::array{CellFaces::Run{0, faces_.all().size()}});
 }
 
 void CellsOnGpu::update_bricks(std::span<const Density> density,
                                std::span<const std::uint32_t> changed) {
-  if (!cells_.update_bricks(bricks_, changed, density).empty()) upload();
+  const VoxelBox flipped = cells_.update_bricks(bricks_, changed, density);
+  if (flipped.empty()) return;
+  upload_active(flipped);
+  upload_faces(faces_.update(cells_, flipped));
 }
 
-void CellsOnGpu::upload() {
-  const VoxelGrid& n = cells_.grid();
+void CellsOnGpu::upload_active(const VoxelBox& cells) {
+  const VoxelGrid& grid = cells_.grid();
+  const VoxelIndex n = cells.extent();
   glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
-  glTextureSubImage3D(active_.id(), 0, 0, 0, 0, n.nx, n.ny, n.nz, GL_RED_INTEGER, GL_UNSIGNED_BYTE,
-                      cells_.active().data());
-  const auto faces = cells_.boundary_faces();
-  face_count_ = static_cast<GLsizei>(faces.size());
-  glNamedBufferData(faces_.id(), static_cast<GLsizeiptr>(faces.size() * sizeof(faces[0])),
-                    faces.data(), GL_DYNAMIC_DRAW);
-  active_box_ = {};
-  for (const auto& [x, y, z, face] : faces) {
-    active_box_ = active_box_.united({{x, y, z}, {x + 1, y + 1, z + 1}});
+  glPixelStorei(GL_UNPACK_ROW_LENGTH, grid.nx);
+  glPixelStorei(GL_UNPACK_IMAGE_HEIGHT, grid.ny);
+  glTextureSubImage3D(active_.id(), 0, cells.lo.x, cells.lo.y, cells.lo.z, n.x, n.y, n.z,
+                      GL_RED_INTEGER, GL_UNSIGNED_BYTE,
+                      &cells_.active()[grid.index(cells.lo.x, cells.lo.y, cells.lo.z)]);
+  glPixelStorei(GL_UNPACK_ROW_LENGTH, 0);  // others upload too
+  glPixelStorei(GL_UNPACK_IMAGE_HEIGHT, 0);
+}
+
+void CellsOnGpu::upload_faces(std::span<const CellFaces::Run> runs) {
+  constexpr std::size_t kBytes = sizeof(CellFaces::Face);
+  for (const auto& [first, end] : runs) {
+    glNamedBufferSubData(face_buffer_.id(), static_cast<GLintptr>(first * kBytes),
+                         static_cast<GLsizeiptr>((end - first) * kBytes),
+                         faces_.all().data() + first);
   }
+  active_box_ = faces_.active_box();
 }
 
 void CellsOnGpu::draw_faces() const {
   constexpr GLsizei kVerticesPerFace = 6;
   glBindVertexArray(face_array_.id());
-  glDrawArraysInstanced(GL_TRIANGLES, 0, kVerticesPerFace, face_count_);
+  glDrawArraysInstanced(GL_TRIANGLES, 0, kVerticesPerFace,
+                        static_cast<GLsizei>(faces_.all().size()));
 }
 
 }  // namespace kerf

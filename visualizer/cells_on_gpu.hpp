@@ -4,13 +4,14 @@
 #include <cstdint>
 #include <span>
 
+#include "visualizer/cell_faces.hpp"
 #include "visualizer/gl/names.hpp"
-#include "visualizer/macrocells.hpp"
 #include "visualizer/scene_view.hpp"
 
 namespace kerf {
 
-/// The macrocells of one volume on the GPU: which are active, and the faces around those.
+/// The macrocells of one volume on the GPU: which are active, and the faces around those; whole
+/// once, then only what changed.
 class CellsOnGpu {
  public:
   /// Cells that hold a density of at least `threshold` are active.
@@ -29,16 +30,17 @@ class CellsOnGpu {
   [[nodiscard]] const VoxelBox& active_box() const noexcept { return active_box_; }
 
  private:
-  void upload();
+  void upload_active(const VoxelBox& cells);
+  void upload_faces(std::span<const CellFaces::Run> runs);
 
   BrickGrid bricks_;
   glm::dmat4 world_from_cell_;
   Macrocells cells_;
+  CellFaces faces_;
   VoxelBox active_box_;
   GlTexture3D active_ = GlTexture3D::create();
-  GlBuffer faces_ = GlBuffer::create();
+  GlBuffer face_buffer_ = GlBuffer::create();
   GlVertexArray face_array_ = GlVertexArray::create();
-  GLsizei face_count_ = 0;
 };
 
 }  // namespace kerf
