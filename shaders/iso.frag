@@ -30,6 +30,7 @@ vec2 box_mm(vec3 origin, vec3 inverse_direction, vec3 lo, vec3 hi);
 vec3 lit(vec3 albedo, vec3 normal, vec3 to_eye, vec3 up_eye, float openness);
 vec3 srgb(vec3 linear);
 float window_depth(float eye_mm, float near_mm, float far_mm);
+vec3 gradient_at(vec3 texture_point);
 
 const float kCellVox = 8.0;
 const int kRefinements = 3;
@@ -56,20 +57,6 @@ float refined_mm(vec3 origin, vec3 direction, float below_mm, float above_mm, fl
     }
   }
   return t;
-}
-
-// Direction of the density gradient, from the eight corners of a cube: differences along one
-// axis, means along the others, which calms the steps that voxels and cuts leave in the density. Far
-// corners leave the two voxels over which a border is antialiased, and draw terraces.
-vec3 gradient_at(vec3 p) {
-  const float kReachVox = 1.0;
-  vec3 d = kReachVox / u_texels;
-  vec3 sum = vec3(0.0);
-  for (int corner = 0; corner < 8; ++corner) {
-    vec3 side = vec3((corner & 1) * 2 - 1, (corner & 2) - 1, (corner & 4) / 2 - 1);
-    sum += side * density_at(p + side * d);
-  }
-  return sum;
 }
 
 // Colour of the labels around, blended so that their borders are smooth, times the share (alpha) of

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #version 450 core
-// What every renderer shares: light, the step to the screen's colours, and true depth. Linked to a
-// fragment shader that declares the functions it uses.
+// What every renderer shares: light, and the step to the screen's colours. Linked to a fragment
+// shader that declares the functions it uses.
 
 // Two lights of a photographer that go with the eye, and a sky that stays with the world.
 vec3 lit(vec3 albedo, vec3 normal, vec3 to_eye, vec3 up_eye, float openness) {
@@ -22,18 +22,4 @@ vec3 lit(vec3 albedo, vec3 normal, vec3 to_eye, vec3 up_eye, float openness) {
 vec3 srgb(vec3 linear) {
   vec3 c = clamp(linear, 0.0, 1.0);
   return mix(12.92 * c, 1.055 * pow(c, vec3(1.0 / 2.4)) - 0.055, step(0.0031308, c));
-}
-
-// The paper's equation (1): 0 at the near plane, 1 at the far plane.
-float window_depth(float eye_mm, float near_mm, float far_mm) {
-  float f = far_mm;
-  float n = near_mm;
-  return ((f + n) / (f - n) - 2.0 * f * n / ((f - n) * eye_mm) + 1.0) / 2.0;
-}
-
-// Its inverse.
-float eye_distance(float window_depth, float near_mm, float far_mm) {
-  float f = far_mm;
-  float n = near_mm;
-  return 2.0 * f * n / (f + n - (2.0 * window_depth - 1.0) * (f - n));
 }

@@ -9,8 +9,9 @@ BlendRenderer::BlendRenderer(const SceneView& scene, std::span<const VolumeConte
                              Options options)
     : volumes_(scene, contents, options.skip_empty),
       entries_(static_cast<int>(scene.volumes.size())),
-      cast_program_({"screen.vert", "blend.frag", "matter.frag", "ray.frag", "lighting.frag"},
-                    volumes_.defines()) {
+      cast_program_(
+          {"screen.vert", "blend.frag", "matter.frag", "ray.frag", "lighting.frag", "depth.frag"},
+          volumes_.defines()) {
   volumes_.set_constants(cast_program_);
   cast_program_.set("u_entry_mm", static_cast<int>(volumes_.free_unit()));
   cast_program_.set("u_opaque_depth", static_cast<int>(volumes_.free_unit() + 1));

@@ -67,7 +67,7 @@ glm::vec3 Feelers::direction(int x, int y) const {
   return {first_direction_ + glm::vec2(x, y) * direction_per_pixel_, -1.0F};
 }
 
-/// The inverse of equation (1), as in lighting.frag.
+/// The inverse of equation (1), as in depth.frag.
 float Feelers::eye_mm(float window_depth) const {
   return 2.0F * far_mm_ * near_mm_ /
          (far_mm_ + near_mm_ - (2.0F * window_depth - 1.0F) * (far_mm_ - near_mm_));

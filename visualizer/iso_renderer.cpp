@@ -3,6 +3,7 @@
 
 #include <glm/gtc/matrix_inverse.hpp>
 
+#include "visualizer/feelers.hpp"
 #include "visualizer/gl/context.hpp"
 #include "visualizer/palette.hpp"
 #include "visualizer/view_uniforms.hpp"
@@ -11,18 +12,34 @@ namespace kerf {
 
 namespace {
 
-constexpr GLuint kEntryUnit = 3;  // after the textures of VolumeOnGpu
-constexpr GLuint kPaletteUnit = 4;
+constexpr GLuint kEntryUnit = 4;  // after the textures of VolumeOnGpu
+constexpr GLuint kPaletteUnit = 5;
+
+/// What gradient.frag asks for.
+std::string_view define_of(Gradient gradient) {
+  switch (gradient) {
+    case Gradient::central:
+      return "#define KERF_GRADIENT_CENTRAL\n";
+    case Gradient::farid5:
+      return "#define KERF_GRADIENT_FARID5\n";
+    case Gradient::corners:
+      break;
+  }
+  return {};
+}
 
 }  // namespace
 
 IsoRenderer::IsoRenderer(const SceneView& scene, std::span<const VolumeContent> contents,
                          Options options)
-    : options_(options) {
+    : gradient_(scene.gradient),
+      cast_program_(
+          {"screen.vert", "iso.frag", "gradient.frag", "ray.frag", options.light, "depth.frag"},
+          define_of(scene.gradient)) {
   const int limit = query_gl_driver().max_texture_size_3d;
   volumes_.reserve(scene.volumes.size());
   for (std::size_t i = 0; i < scene.volumes.size(); ++i) {
-    volumes_.emplace_back(scene.volumes[i], contents[i], limit, options.skip_empty);
+    volumes_.emplace_back(scene.volumes[i], contents[i], limit, options.skip_empty, scene.gradient);
   }
   const auto palette = make_palette(scene.materials);
   glTextureStorage2D(palette_.id(), 1, GL_RGBA32F, kPaletteWidth, 2);
@@ -34,6 +51,7 @@ IsoRenderer::IsoRenderer(const SceneView& scene, std::span<const VolumeContent> 
   cast_program_.set("u_density", 0);
   cast_program_.set("u_label", 1);
   cast_program_.set("u_active_cell", 2);
+  cast_program_.set("u_gradient", 3);
   cast_program_.set("u_entry_mm", static_cast<int>(kEntryUnit));
   cast_program_.set("u_palette", static_cast<int>(kPaletteUnit));
   cast_program_.set("u_step_vox", options.step_vox);
@@ -42,6 +60,14 @@ IsoRenderer::IsoRenderer(const SceneView& scene, std::span<const VolumeContent> 
 void IsoRenderer::update(std::size_t volume, std::span<const Density> density,
                          std::span<const std::uint32_t> changed) {
   volumes_[volume].update_bricks(density, changed);
+}
+
+std::vector<VoxelBox> IsoRenderer::looks_different(std::size_t volume,
+                                                   std::span<const VoxelBox> differs) const {
+  if (feels_ahead()) return Renderer::looks_different(volume, differs);
+  std::vector<VoxelBox> boxes(differs.begin(), differs.end());
+  for (VoxelBox& box : boxes) box = box.grown(Feelers::kReachVox);
+  return boxes;
 }
 
 void IsoRenderer::draw(const View& view, const RenderTarget& target) {

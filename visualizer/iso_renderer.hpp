@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <string_view>
 #include <vector>
 
 #include "visualizer/gl/program.hpp"
@@ -19,6 +20,7 @@ class IsoRenderer final : public Renderer {
   struct Options {
     bool skip_empty = true;  ///< false: sample every ray from end to end, for comparison
     float step_vox = 0.75F;  ///< a wall of one voxel, antialiased over two, is never stepped over
+    std::string_view light = "lighting.frag";  ///< or normals.frag, for measurements
   };
 
   IsoRenderer(const SceneView& scene, std::span<const VolumeContent> contents)
@@ -28,13 +30,18 @@ class IsoRenderer final : public Renderer {
   void update(std::size_t volume, std::span<const Density> density,
               std::span<const std::uint32_t> changed) override;
   void draw(const View& view, const RenderTarget& target) override;
-  [[nodiscard]] bool feels_ahead() const noexcept override { return true; }
+  /// `Feelers` know where the normals of one gradient point.
+  [[nodiscard]] bool feels_ahead() const noexcept override {
+    return gradient_ == Gradient::corners;
+  }
+  [[nodiscard]] std::vector<VoxelBox> looks_different(
+      std::size_t volume, std::span<const VoxelBox> differs) const override;
 
  private:
   void cast_rays(const VolumeOnGpu& volume, const View& view, const RenderTarget& target);
 
-  Options options_;
-  GlProgram cast_program_{"screen.vert", "iso.frag", "ray.frag", "lighting.frag"};
+  Gradient gradient_;
+  GlProgram cast_program_;
   GlVertexArray no_vertices_ = GlVertexArray::create();
   GlTexture2D palette_ = GlTexture2D::create();
   std::vector<VolumeOnGpu> volumes_;

@@ -5,6 +5,8 @@
 #include <optional>
 #include <string>
 
+#include "visualizer/gradient.hpp"
+
 namespace kerf {
 
 /// Cuts the volumes open, square to an axis of the world: what lies beyond is not drawn.
@@ -31,6 +33,7 @@ struct Look {
   std::string renderer = "iso";  ///< as on the command line
   std::optional<double> iso{};   ///< of all volumes, 0..1 of full density; none: each its own
   Opacities opacities{};         ///< of the others: their own
+  Gradient gradient = Gradient::corners;
   ClipPlane clip{};
   Stereo stereo{};
   friend bool operator==(const Look&, const Look&) noexcept = default;

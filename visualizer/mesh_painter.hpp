@@ -43,7 +43,7 @@ class MeshPainter {
   void set_uniforms(const glm::dmat4& world_from_mesh, const Paint& paint, float opacity,
                     const View& view);
 
-  GlProgram program_{"mesh.vert", "mesh.frag", "lighting.frag"};
+  GlProgram program_{"mesh.vert", "mesh.frag", "lighting.frag", "depth.frag"};
   GpuMesh cylinder_{unit_cylinder()};
   GpuMesh cone_{unit_cone()};
 };

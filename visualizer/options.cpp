@@ -59,7 +59,10 @@ CLI::Validator range(double lowest, double highest) {
 }  // namespace
 
 Look first_look(const VisualizerOptions& options) {
-  return {.renderer = options.renderer, .opacities = options.opacities, .stereo = options.stereo};
+  return {.renderer = options.renderer,
+          .opacities = options.opacities,
+          .gradient = options.gradient,
+          .stereo = options.stereo};
 }
 
 PictureSize parse_size(const std::string& text) {
@@ -83,12 +86,20 @@ PictureSize parse_size(const std::string& text) {
 std::optional<VisualizerOptions> parse_options(int argc, const char* const* argv) {
   VisualizerOptions options;
   std::string size = "800x600";
+  std::string gradient(kGradientNames[static_cast<std::size_t>(options.gradient)]);
   CLI::App app("Shows what a kerf-controller feels and mills, in a window or as PNG pictures.",
                "kerf-visualizer");
   app.footer(footer());
   app.set_version_flag("--version", std::string("kerf-visualizer " KERF_VERSION));
   app.add_option("--name", options.name, "the controller's name")->capture_default_str();
-  app.add_option("--renderer", options.renderer, "how volumes are drawn: " + known_renderers())
+  app.add_option("--renderer", options.renderer,
+                 "how volumes are drawn: " + known_renderers() +
+                     "; a clip plane opens surface without a face in the plane")
+      ->capture_default_str();
+  app.add_option("--gradient", gradient,
+                 "what iso, surface, blend and slices shade from: central (two voxels), corners "
+                 "(2x2x2 means) or farid5 (5x5x5, 8 more bytes a voxel in iso); cast always "
+                 "corners")
       ->capture_default_str();
   app.add_option("--size", size, "width and height in pixels")
       ->type_name("WxH")
@@ -159,6 +170,7 @@ std::optional<VisualizerOptions> parse_options(int argc, const char* const* argv
   if (options.bench && app.count("--size") == 0) size = kBenchSize;
   options.size = parse_size(size);
   check_renderer(options.renderer);
+  options.gradient = gradient_named(gradient);
   if (options.transfer) options.opacities = read_transfer(*options.transfer);
   return options;
 }

@@ -16,6 +16,7 @@ namespace kerf {
 struct VisualizerOptions {
   std::string name = "kerf";  ///< of the controller
   std::string renderer = "iso";
+  Gradient gradient = Gradient::corners;
   Stereo stereo;
   Opacities opacities;  ///< of `transfer`
   PictureSize size{800, 600};

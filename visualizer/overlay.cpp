@@ -215,6 +215,16 @@ void Overlay::look_controls(LookControls& controls) {
     }
     ImGui::EndCombo();
   }
+  if (controls.takes_gradient) {
+    auto chosen = static_cast<std::size_t>(look.gradient);
+    if (ImGui::BeginCombo("gradient", kGradientNames[chosen].data())) {
+      for (std::size_t i = 0; i < kGradientNames.size(); ++i) {
+        if (ImGui::Selectable(kGradientNames[i].data(), i == chosen)) chosen = i;
+      }
+      ImGui::EndCombo();
+    }
+    look.gradient = static_cast<Gradient>(chosen);
+  }
   if (controls.opacities.empty()) {  // what is translucent has no iso-surface
     float iso = dragged_iso_.value_or(static_cast<float>(look.iso.value_or(controls.own_iso)));
     if (ImGui::SliderFloat("iso", &iso, 0.02F, 0.98F, "%.2f", kDragOnly)) dragged_iso_ = iso;

@@ -17,6 +17,7 @@ namespace kerf {
 struct LookControls {
   Look look;
   double own_iso = 0.5;           ///< of the main volume, 0..1: where the look has none
+  bool takes_gradient = false;    ///< the renderer shades by the look's
   Opacities opacities{};          ///< of all materials, as they are; empty: not shown
   bool write = false;             ///< the user asks for a file with them
   std::optional<Pointer> over{};  ///< the mouse, while it is over them

@@ -45,6 +45,7 @@ SceneView Picture::shown_scene() const {
 
 SceneView Picture::scene_in(const Look& look) const {
   SceneView scene = scene_;
+  scene.gradient = look.gradient;
   for (VolumeView& volume : scene.volumes) {
     if (look.iso) volume.iso = static_cast<Density>(std::lround(*look.iso * kDensityMax));
   }
@@ -63,7 +64,7 @@ std::unique_ptr<ScenePainter> Picture::painter_for(const Session& session, const
 
 void Picture::set_look(const Session& session, const Look& look) {
   if (look == look_) return;
-  if (look.renderer != look_.renderer || look.iso != look_.iso) {
+  if (look.renderer != look_.renderer || look.iso != look_.iso || look.gradient != look_.gradient) {
     painter_ = painter_for(session, look);
   } else if (look.opacities != look_.opacities) {
     painter_->renderer().set_opacities(scene_in(look).materials, session.contents());
@@ -74,6 +75,7 @@ void Picture::set_look(const Session& session, const Look& look) {
 
 LookControls Picture::controls() const {
   LookControls controls{.look = look_, .own_iso = scene_.main_volume().iso / kDensityMax};
+  controls.takes_gradient = painter_->renderer().takes_gradient();
   if (painter_->renderer().translucent()) controls.opacities = opacities();
   return controls;
 }

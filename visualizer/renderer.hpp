@@ -43,6 +43,8 @@ class Renderer {
   /// Surfaces are shaded by what lies along their normal, farther off than these boxes reach: see
   /// `Feelers`.
   [[nodiscard]] virtual bool feels_ahead() const noexcept { return false; }
+  /// Shades from the gradient that the scene names; else always from `Gradient::corners`.
+  [[nodiscard]] virtual bool takes_gradient() const noexcept { return true; }
   /// Lets what lies behind a surface shine through, so that it must be drawn before.
   [[nodiscard]] virtual bool translucent() const noexcept { return false; }
 };

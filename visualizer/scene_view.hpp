@@ -12,6 +12,7 @@
 #include "shared/segment/brick_grid.hpp"
 #include "shared/segment/reader.hpp"
 #include "visualizer/camera.hpp"
+#include "visualizer/gradient.hpp"
 
 namespace kerf {
 
@@ -45,11 +46,12 @@ struct MaterialView {
   std::optional<double> opacity{};    ///< over one voxel edge, 0..1; none: by its hardness
 };
 
-/// Everything about a session that does not change while it runs.
+/// Everything about a session that does not change while it runs, as a look shows it.
 struct SceneView {
   std::vector<VolumeView> volumes;
   std::vector<ToolView> tools;
   std::vector<MaterialView> materials;
+  Gradient gradient = Gradient::corners;  ///< by which its volumes are shaded
 
   /// Of the boxes of all volumes.
   [[nodiscard]] std::vector<glm::dvec3> corners() const;

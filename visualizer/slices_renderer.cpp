@@ -38,8 +38,9 @@ BoxCorners active_corners(const CellsOnGpu& cells, const View& view, double marg
 
 SlicesRenderer::Sliced::Sliced(const SceneView& scene, const VolumeContent& content)
     : volume(scene, {&content, 1}, true),
-      program({"slices.vert", "slices.frag", "matter.frag", "ray.frag", "lighting.frag"},
-              volume.defines()) {
+      program(
+          {"slices.vert", "slices.frag", "matter.frag", "ray.frag", "lighting.frag", "depth.frag"},
+          volume.defines()) {
   volume.set_constants(program);
   program.set("u_opaque_depth", static_cast<int>(volume.free_unit()));
 }

@@ -40,23 +40,19 @@ std::string element(const char* array, std::size_t i) {
 }  // namespace
 
 TranslucentVolume::TranslucentVolume(const VolumeView& volume, const VolumeContent& content,
-                                     const TransferFunction& transfer, int max_texture_size,
-                                     bool skip_empty)
+                                     const TransferFunction& transfer, Gradient gradient,
+                                     int max_texture_size, bool skip_empty)
     : bricks_((check_extent(volume, max_texture_size), volume.bricks)),
       has_labels_(!content.labels.empty()),
       transfer_(transfer),
+      gradient_(gradient),
       world_from_texture_(kerf::world_from_texture(volume)),
       edge_mm_(shortest_edge_mm(volume.world_from_voxel)),
       voxels_(bricks_.grid, kTexel, &kAirTexel),
       materials_(has_labels_ ? bricks_.grid : kNoVoxels, kTexel),
       cells_(volume, content.density, skip_empty ? transfer.lowest_seen() : Density{0}) {
-  const VoxelGrid& grid = bricks_.grid;
   set_materials(transfer.materials, content);
-  // A layer of bricks at a time, so that the copy stays small.
-  for (std::int32_t z = 0; z < grid.nz; z += kBrickEdge) {
-    const VoxelBox layer{{0, 0, z}, {grid.nx, grid.ny, z + kBrickEdge}};
-    upload(content.density, layer.clipped(grid.box()));
-  }
+  for_each_layer(bricks_.grid, [&](const VoxelBox& layer) { upload(content.density, layer); });
 }
 
 void TranslucentVolume::set_materials(const Palette& materials, const VolumeContent& content) {
@@ -68,14 +64,15 @@ void TranslucentVolume::set_materials(const Palette& materials, const VolumeCont
 }
 
 void TranslucentVolume::upload(std::span<const Density> density, const VoxelBox& box) {
-  fill_gradient_texels(bricks_.grid, density, box, upload_buffer_);
+  fill_gradient_texels(gradient_, bricks_.grid, density, box, upload_buffer_);
   voxels_.upload(upload_buffer_.data(), box);
 }
 
 void TranslucentVolume::update_bricks(std::span<const Density> density,
                                       std::span<const std::uint32_t> changed) {
   for (const std::uint32_t id : changed) {
-    upload(density, bricks_.voxels(id).grown(1).clipped(bricks_.grid.box()));
+    const VoxelBox around = bricks_.voxels(id).grown(gradient_reach(gradient_));
+    upload(density, around.clipped(bricks_.grid.box()));
   }
   cells_.update_bricks(density, changed);
 }
@@ -98,7 +95,8 @@ TranslucentVolumes::TranslucentVolumes(const SceneView& scene,
   for (std::size_t v = 0; v < scene.volumes.size(); ++v) {
     const TransferFunction transfer =
         make_transfer_function(scene.materials, scene.volumes[v].iso, !contents[v].labels.empty());
-    volumes_.emplace_back(scene.volumes[v], contents[v], transfer, limit, skip_empty);
+    volumes_.emplace_back(scene.volumes[v], contents[v], transfer, scene.gradient, limit,
+                          skip_empty);
     upload_materials(v);
   }
 }

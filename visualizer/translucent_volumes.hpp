@@ -20,7 +20,8 @@ namespace kerf {
 class TranslucentVolume {
  public:
   TranslucentVolume(const VolumeView& volume, const VolumeContent& content,
-                    const TransferFunction& transfer, int max_texture_size, bool skip_empty);
+                    const TransferFunction& transfer, Gradient gradient, int max_texture_size,
+                    bool skip_empty);
 
   /// Uploads bricks `changed` of `density` (the whole volume), gradients around them included.
   void update_bricks(std::span<const Density> density, std::span<const std::uint32_t> changed);
@@ -47,6 +48,7 @@ class TranslucentVolume {
   BrickGrid bricks_;
   bool has_labels_;
   TransferFunction transfer_;
+  Gradient gradient_;
   glm::dmat4 world_from_texture_;
   double edge_mm_;
   VoxelTexture voxels_;

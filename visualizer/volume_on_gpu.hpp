@@ -2,7 +2,9 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
+#include <vector>
 
 #include "visualizer/cells_on_gpu.hpp"
 #include "visualizer/voxel_texture.hpp"
@@ -15,18 +17,19 @@ struct VolumeContent {
   std::span<const Label> labels;  ///< empty, or one per voxel
 };
 
-/// Density, labels and macrocells of one volume as textures; whole once, then bricks only.
+/// Density, labels and macrocells of one volume as textures, and the gradient where it spans too
+/// many voxels for a shader to work it out: 8 bytes a voxel. Whole once, then bricks only.
 class VolumeOnGpu {
  public:
   /// `skip_empty` false takes every cell for active: the slow obvious picture, for comparison.
   /// Throws VisualizerError where the volume is beyond `max_texture_size`.
   VolumeOnGpu(const VolumeView& volume, const VolumeContent& content, int max_texture_size,
-              bool skip_empty);
+              bool skip_empty, Gradient gradient = Gradient::corners);
 
   /// Uploads bricks `changed` of `density` (the whole volume) and the cells they touch.
   void update_bricks(std::span<const Density> density, std::span<const std::uint32_t> changed);
 
-  /// Density on unit 0, labels on 1, active cells on 2.
+  /// Density on unit 0, labels on 1, active cells on 2, gradient on 3.
   void bind_textures() const;
 
   [[nodiscard]] bool has_labels() const noexcept { return has_labels_; }
@@ -45,6 +48,12 @@ class VolumeOnGpu {
   VoxelTexture density_;
   VoxelTexture labels_;
   CellsOnGpu cells_;
+
+  using GradientTexel = std::array<std::int16_t, 4>;  ///< 32767 as 1; the last is nothing
+  void upload_gradient(std::span<const Density> density, const VoxelBox& box);
+  std::optional<VoxelTexture> gradient_;
+  std::vector<glm::vec3> gradients_;  ///< of the last upload
+  std::vector<GradientTexel> texels_;
 };
 
 }  // namespace kerf

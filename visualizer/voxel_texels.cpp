@@ -14,40 +14,9 @@ namespace {
 
 constexpr std::int32_t kMaterialReach = 2;  // voxels; a border is antialiased over two
 
-/// The densities of a box with one voxel around it, zeros outside the volume.
-class PaddedBox {
- public:
-  PaddedBox(const VoxelGrid& grid, std::span<const Density> density, const VoxelBox& box)
-      : padded_(box.grown(1)), n_(padded_.extent()), values_(cells()) {
-    const VoxelBox inside = padded_.clipped(grid.box());
-    for (std::int32_t z = inside.lo.z; z < inside.hi.z; ++z) {
-      for (std::int32_t y = inside.lo.y; y < inside.hi.y; ++y) {
-        const auto row = density.subspan(grid.index(inside.lo.x, y, z),
-                                         static_cast<std::size_t>(inside.hi.x - inside.lo.x));
-        std::copy(row.begin(), row.end(),
-                  values_.begin() + (row_at(y, z) - values_.data()) + inside.lo.x - padded_.lo.x);
-      }
-    }
-  }
-  /// The row at (y, z) of the volume, from one voxel before the box.
-  [[nodiscard]] const std::int32_t* row_at(std::int32_t y, std::int32_t z) const noexcept {
-    return values_.data() +
-           static_cast<std::ptrdiff_t>((z - padded_.lo.z) * n_.y + (y - padded_.lo.y)) * n_.x;
-  }
-
- private:
-  [[nodiscard]] std::size_t cells() const noexcept {
-    return VoxelGrid{n_.x, n_.y, n_.z}.voxel_count();
-  }
-
-  VoxelBox padded_;
-  VoxelIndex n_;
-  std::vector<std::int32_t> values_;
-};
-
-std::uint8_t gradient_byte(std::int32_t sum) noexcept {
-  constexpr float kPerSum = 127.0F / (4.0F * 65535.0F);
-  return static_cast<std::uint8_t>(static_cast<float>(sum) * kPerSum + 128.5F);
+/// 128.5 is the middle of what becomes 128.
+std::uint8_t gradient_byte(float gradient) noexcept {
+  return static_cast<std::uint8_t>(gradient * 127.0F + 128.5F);
 }
 
 std::uint8_t density_byte(std::int32_t density) noexcept {
@@ -111,29 +80,19 @@ class UnlabelledVoxels {
 
 }  // namespace
 
-void fill_gradient_texels(const VoxelGrid& grid, std::span<const Density> density,
+void fill_gradient_texels(Gradient kind, const VoxelGrid& grid, std::span<const Density> density,
                           const VoxelBox& box, std::vector<GradientTexel>& texels) {
-  const PaddedBox padded(grid, density, box);
-  const VoxelIndex n = box.extent();
-  texels.resize(VoxelGrid{n.x, n.y, n.z}.voxel_count());
-  GradientTexel* out = texels.data();
+  std::vector<glm::vec3> gradients;
+  fill_gradients(kind, grid, density, box, gradients);
+  texels.clear();
+  texels.reserve(gradients.size());
+  auto gradient = gradients.begin();
   for (std::int32_t z = box.lo.z; z < box.hi.z; ++z) {
     for (std::int32_t y = box.lo.y; y < box.hi.y; ++y) {
-      const std::int32_t* const middle = padded.row_at(y, z) + 1;
-      const std::int32_t* const ll = padded.row_at(y - 1, z - 1);  // low y, low z
-      const std::int32_t* const hl = padded.row_at(y + 1, z - 1);
-      const std::int32_t* const lh = padded.row_at(y - 1, z + 1);
-      const std::int32_t* const hh = padded.row_at(y + 1, z + 1);
-      for (std::int32_t x = 0; x < n.x; ++x, ++out) {
-        const std::int32_t below = ll[x] + hl[x] + lh[x] + hh[x];
-        const std::int32_t above = ll[x + 2] + hl[x + 2] + lh[x + 2] + hh[x + 2];
-        const std::int32_t low_low = ll[x] + ll[x + 2];
-        const std::int32_t high_low = hl[x] + hl[x + 2];
-        const std::int32_t low_high = lh[x] + lh[x + 2];
-        const std::int32_t high_high = hh[x] + hh[x + 2];
-        *out = {gradient_byte(above - below),
-                gradient_byte(high_low + high_high - low_low - low_high),
-                gradient_byte(low_high + high_high - low_low - high_low), density_byte(middle[x])};
+      const Density* const row = density.data() + grid.index(0, y, z);
+      for (std::int32_t x = box.lo.x; x < box.hi.x; ++x, ++gradient) {
+        texels.push_back({gradient_byte(gradient->x), gradient_byte(gradient->y),
+                          gradient_byte(gradient->z), density_byte(row[x])});
       }
     }
   }

@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "visualizer/gradient.hpp"
 #include "visualizer/palette.hpp"
 
 namespace kerf {
@@ -19,10 +20,8 @@ struct GradientTexel {
 };
 inline constexpr GradientTexel kAirTexel{128, 128, 128, 0};
 
-/// Fills `texels` for `box` out of a whole volume, x fastest, with air around it. The gradient is
-/// taken from the eight corners of the cube of two voxel edges around a voxel, as `iso` takes it:
-/// differences along one axis, means along the others. g = 1 is a step from air to full density.
-void fill_gradient_texels(const VoxelGrid& grid, std::span<const Density> density,
+/// Fills `texels` for `box` out of a whole volume: `fill_gradients` and the densities.
+void fill_gradient_texels(Gradient kind, const VoxelGrid& grid, std::span<const Density> density,
                           const VoxelBox& box, std::vector<GradientTexel>& texels);
 
 /// Linear colour of the material and its opacity over one voxel edge, 8 bits each.

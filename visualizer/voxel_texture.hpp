@@ -36,6 +36,15 @@ class VoxelTexture {
   GlTexture3D texture_ = GlTexture3D::create();
 };
 
+/// Calls `take` for one layer of bricks of a grid after the other: what is worked out for an upload
+/// stays small.
+template <class Take>
+void for_each_layer(const VoxelGrid& grid, const Take& take) {
+  for (std::int32_t z = 0; z < grid.nz; z += kBrickEdge) {
+    take(VoxelBox{{0, 0, z}, {grid.nx, grid.ny, z + kBrickEdge}}.clipped(grid.box()));
+  }
+}
+
 /// Extent of a voxel texture in texels.
 [[nodiscard]] glm::dvec3 texels_of(const VoxelGrid& grid);
 /// From texture coordinates (0..1) to world mm.

@@ -53,6 +53,15 @@ TEST_CASE("a size that is none is refused with the limits") {
   }));
 }
 
+TEST_CASE("the gradient is part of the first look") {
+  CHECK(first_look(*parse({})).gradient == Gradient::corners);
+  const Look look = first_look(*parse({"--gradient", "farid5"}));
+  CHECK(look.gradient == Gradient::farid5);
+  CHECK_THROWS_WITH_AS(parse({"--gradient", "sobel"}),
+                       "--gradient: sobel is unknown; known: central, corners, farid5",
+                       VisualizerError);
+}
+
 TEST_CASE("an unknown renderer is refused and the known ones are named") {
   CHECK_THROWS_WITH_AS(parse({"--renderer", "voxels"}),
                        doctest::Contains("--renderer: voxels is unknown; known: iso"),

@@ -25,6 +25,7 @@ class CastRenderer final : public Renderer {
                      std::span<const VolumeContent> contents) override;
   void draw(const View& view, const RenderTarget& target) override;
   [[nodiscard]] bool feels_ahead() const noexcept override { return mode_ == CastMode::iso; }
+  [[nodiscard]] bool takes_gradient() const noexcept override { return false; }
   [[nodiscard]] bool translucent() const noexcept override { return mode_ == CastMode::blend; }
 
  private:

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "visualizer/gradient.hpp"
 #include "visualizer/surface/surface_look.hpp"
 #include "visualizer/surface/volume_samples.hpp"
 
@@ -53,6 +54,7 @@ struct SurfaceSource {
   /// is 1.
   glm::vec3 inverse_square_spacing{1.0F};
   const SurfaceLook* look = nullptr;
+  Gradient gradient = Gradient::corners;  ///< of the normals
 };
 
 /// Boxes of voxels around the triangles of a block that look different: one for each eighth of it,

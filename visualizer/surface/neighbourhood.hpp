@@ -35,9 +35,8 @@ class Neighbourhood {
   /// Sample (0, 0, 0) is the block's start; each part -1..9.
   [[nodiscard]] const Density* at(int x, int y, int z) const { return &density_[index(x, y, z)]; }
 
-  /// Density gradient at a sample 0..8, up to a factor, from the eight corners of a cube two voxels
-  /// wide: differences along one axis, means along the others, as in iso.frag.
-  [[nodiscard]] static glm::vec3 gradient(const Density* at) {
+  /// `Gradient::corners` of a sample 0..8, up to a factor.
+  [[nodiscard]] static glm::vec3 corner_gradient(const Density* at) {
     // Sum and difference along x of the four rows, then along y and z.
     std::array<int, 4> sum{};
     std::array<int, 4> rise{};
@@ -48,6 +47,11 @@ class Neighbourhood {
     }
     return glm::vec3(rise[0] + rise[1] + rise[2] + rise[3], sum[1] - sum[0] + sum[3] - sum[2],
                      sum[2] + sum[3] - sum[0] - sum[1]);
+  }
+  /// `Gradient::central` of a sample 0..8, up to a factor.
+  [[nodiscard]] static glm::vec3 central_gradient(const Density* at) {
+    return glm::vec3(at[kStride[0]] - at[-kStride[0]], at[kStride[1]] - at[-kStride[1]],
+                     at[kStride[2]] - at[-kStride[2]]);
   }
 
  private:

@@ -29,7 +29,8 @@ SurfaceRenderer::SurfaceRenderer(const SceneView& scene, std::span<const VolumeC
   volumes_.reserve(scene.volumes.size());
   for (std::size_t i = 0; i < scene.volumes.size(); ++i) {
     const VolumeView& view = scene.volumes[i];
-    VolumeSurface surface(view, scene.materials, contents[i].density, contents[i].labels);
+    VolumeSurface surface(view, scene.materials, contents[i].density, contents[i].labels,
+                          scene.gradient);
     SurfaceOnGpu gpu(surface);
     volumes_.push_back({view.world_from_voxel, std::move(surface), std::move(gpu)});
   }

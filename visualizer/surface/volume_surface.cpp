@@ -41,12 +41,14 @@ void for_each_in_parallel(std::int32_t count, const Work& work) {
 }  // namespace
 
 VolumeSurface::VolumeSurface(const VolumeView& volume, const std::vector<MaterialView>& materials,
-                             std::span<const Density> density, std::span<const Label> labels)
+                             std::span<const Density> density, std::span<const Label> labels,
+                             Gradient gradient)
     : bricks_(volume.bricks),
       blocks_(block_grid(volume.bricks.grid)),
       iso_(std::max(volume.iso, Density{1})),
       inverse_square_spacing_(inverse_square_spacing(volume.world_from_voxel)),
       look_(materials, iso_),
+      gradient_(gradient),
       density_(density.begin(), density.end()),
       labels_(labels.begin(), labels.end()),
       meshes_(blocks_.voxel_count()),
@@ -62,7 +64,7 @@ VolumeSurface::VolumeSurface(const VolumeView& volume, const std::vector<Materia
 }
 
 SurfaceSource VolumeSurface::source() const {
-  return {{bricks_.grid, density_, labels_}, iso_, inverse_square_spacing_, &look_};
+  return {{bricks_.grid, density_, labels_}, iso_, inverse_square_spacing_, &look_, gradient_};
 }
 
 VoxelIndex VolumeSurface::block(std::uint32_t id) const noexcept {

@@ -22,7 +22,8 @@ class VolumeSurface {
   /// density so that an update knows which voxels of a changed brick are others: far fewer than
   /// all.
   VolumeSurface(const VolumeView& volume, const std::vector<MaterialView>& materials,
-                std::span<const Density> density, std::span<const Label> labels);
+                std::span<const Density> density, std::span<const Label> labels,
+                Gradient gradient = Gradient::corners);
 
   /// Follows a change of bricks `changed` (of the segment's brick grid); `density` is all of the
   /// volume. Returns the blocks whose mesh is another one now, ascending.
@@ -50,6 +51,7 @@ class VolumeSurface {
   Density iso_;
   glm::vec3 inverse_square_spacing_;
   SurfaceLook look_;
+  Gradient gradient_;
   std::vector<Density> density_;
   std::vector<Label> labels_;
   std::vector<BlockMesh> meshes_;
