@@ -24,9 +24,8 @@ need() {
 fetch_kernel() {
   local package part=$1.part
   if [[ -e $1 ]]; then return; fi
-  need apt-get
   package=$(apt-cache depends linux-image-amd64 2>/dev/null |
-    sed -n 's/^ *Depends: \(linux-image-[0-9].*\)/\1/p')
+    sed -n 's/^ *Depends: \(linux-image-[0-9].*\)/\1/p') || true
   [[ -n $package ]] || lack "apt knows no linux-image-amd64; apt-get update, on Debian for amd64"
   rm -rf "$part"
   mkdir -p "$part"
@@ -39,48 +38,50 @@ fetch_kernel() {
   mv "$part" "$1"
 }
 
-# with_libraries FILE...: the programs and the libraries that they load.
-with_libraries() {
-  printf '%s\n' "$@"
-  ldd "$@" | sed -n 's|.*[ \t]\(/[^ ]*\) (0x.*|\1|p' | sort -u
+# add_programs BIN ROOT: ours and busybox, and the libraries that ours load.
+add_programs() {
+  local ours=("${programs[@]/#/$1/kerf-}") path
+  cp "${ours[@]}" "$(command -v busybox)" "$2/bin/"
+  ldd "${ours[@]}" | sed -n 's|.*[ \t]\(/[^ ]*\) (0x.*|\1|p' | sort -u | while read -r path; do
+    mkdir -p "$2${path%/*}"
+    cp -L "$path" "$2$path"
+  done
+}
+
+# add_modules KERNEL ROOT: those of the list and all that they need.
+add_modules() {
+  local release name path
+  release=$(basename "$1"/lib/modules/*)
+  for name in "${modules[@]}"; do
+    sed -n "s|^\([^ ]*/$name.ko\):|\1|p" "$1/lib/modules/$release/modules.dep"  # PATH PATH ...
+  done | xargs -n 1 | while read -r path; do
+    mkdir -p "$2/lib/modules/$release/${path%/*}"
+    cp "$1/lib/modules/$release/$path" "$2/lib/modules/$release/$path"
+  done
+  busybox depmod -b "$2" "$release"
 }
 
 make_image() {
-  local bin=$1 folder=$2 root=$2/root kernel=$2/kernel name path release
+  local root=$2/root
   need qemu-system-x86_64
   need busybox
-  mkdir -p "$folder"
-  fetch_kernel "$kernel"
+  mkdir -p "$2"
+  fetch_kernel "$2/kernel"
   rm -rf "$root"
   mkdir -p "$root"/{bin,dev,kerf,proc,run,sys,tmp}
-  cp "$(command -v busybox)" "$root/bin/busybox"
   cp "$here/init" "$root/"
   cp "$here"/*.toml "$root/kerf/"
   head -c 1000 "$here/init" >"$root/kerf/firmware"  # the emulated Falcon takes any bytes for it
-  mapfile -t programs < <(printf "$bin/kerf-%s\n" "${programs[@]}")
-  with_libraries "${programs[@]}" | while read -r path; do
-    if [[ $path == "$bin"/* ]]; then
-      cp "$path" "$root/bin/"
-    else
-      mkdir -p "$root${path%/*}"
-      cp -L "$path" "$root$path"
-    fi
-  done
-  release=$(basename "$kernel"/lib/modules/*)
-  for name in "${modules[@]}"; do  # each with all that it needs: "PATH: PATH ..."
-    sed -n "s|^\([^ ]*/$name.ko\):|\1|p" "$kernel/lib/modules/$release/modules.dep"
-  done | xargs -n 1 | while read -r path; do
-    mkdir -p "$root/lib/modules/$release/${path%/*}"
-    cp "$kernel/lib/modules/$release/$path" "$root/lib/modules/$release/$path"
-  done
-  busybox depmod -b "$root" "$release"
-  (cd "$root" && find . | LC_ALL=C sort | busybox cpio -o -H newc 2>/dev/null) >"$folder/image.part"
-  mv "$folder/image.part" "$folder/image"
+  add_programs "$1" "$root"
+  add_modules "$2/kernel" "$root"
+  (cd "$root" && find . | LC_ALL=C sort | busybox cpio -o -H newc 2>/dev/null) >"$2/image.part"
+  mv "$2/image.part" "$2/image"
 }
 
-# Guest time is the number of instructions: 2 ns each, and idle time is skipped. A fixed date, no
-# random numbers of the host and fixed addresses make two runs the same to the last byte; the
-# kernel's own tests of its ciphers are left out, which saves half of its start.
+# Guest time is the number of instructions, 2 ns each, and idle time is skipped. A fixed date, one seed
+# for all random numbers (trust_cpu: nobody waits for better ones) and fixed addresses make two runs the
+# same to the last byte. For speed the kernel leaves out the tests of its ciphers, and copies by words
+# (-erms), because each step of a string instruction counts.
 boot() {
   timeout 300 qemu-system-x86_64 -M q35 -accel tcg -cpu max,-erms -smp 1 -m 512 -nodefaults \
     -no-user-config -display none -no-reboot -serial "file:$2" \
