@@ -5,6 +5,7 @@
 #include <cstdint>
 
 #include "controller/kernel/aligned_table.hpp"
+#include "controller/kernel/proxy/shell_table.hpp"
 #include "controller/kernel/sample_table.hpp"
 #include "controller/kernel/splat_table.hpp"
 #include "shared/volume/voxel_grid.hpp"
@@ -56,6 +57,12 @@ struct KernelSet {
                 const SplatScratch&) noexcept;
   void (*press_sums)(const TickBox&, std::int32_t volume_ratio, const SplatScratch&,
                      std::int64_t (&contact)[3], std::int64_t (&modification)[3]) noexcept;
+  /// The swept contact: `place_shell` and `shell_sums` of a tool's surface samples.
+  void (*place_shell)(const ShellTable<FixedNumbers>&, const ShellStep<FixedNumbers>&,
+                      const ShellPlaces<FixedNumbers>&) noexcept;
+  void (*sum_shell)(const ShellTable<FixedNumbers>&, const ShellPlaces<FixedNumbers>&,
+                    const std::int32_t (&centre)[3], const ShellField&,
+                    ShellSums<FixedNumbers>&) noexcept;
 };
 
 /// Gradients beyond the last voxel of a field.

@@ -13,7 +13,6 @@ namespace {
 constexpr double kInvertedConeNeck = 0.6;  // radius at the shaft over radius at the tip
 constexpr double kFlameBelly = 0.6;        // where a flame is widest, as a part of its length
 constexpr double kFlameNeck = 0.5;         // its radius at the shaft over the largest
-constexpr int kProfileSteps = 32;          // a ball keeps within 0.2 % of its radius
 
 /// Radius at `rise` = 0 (tip) .. 1 (shaft) over the largest radius; for shapes that only stretch.
 double relative_radius(std::string_view shape, double rise) {
@@ -114,12 +113,12 @@ double profile_radius_mm(const SceneTool& tool, double y_mm) {
   return tool.radius_mm * relative_radius(tool.shape, (y_mm + half_mm) / tool.length_mm);
 }
 
-std::vector<std::array<double, 2>> tool_profile(const SceneTool& tool) {
+std::vector<std::array<double, 2>> tool_profile(const SceneTool& tool, int steps) {
   const double half_mm = tool.length_mm / 2;
   std::vector<std::array<double, 2>> line{{-half_mm, 0.0}};
-  for (int i = 0; i <= kProfileSteps; ++i) {
+  for (int i = 0; i <= steps; ++i) {
     const double y_mm =
-        std::clamp(-half_mm * std::cos(std::numbers::pi * i / kProfileSteps), -half_mm, half_mm);
+        std::clamp(-half_mm * std::cos(std::numbers::pi * i / steps), -half_mm, half_mm);
     const double radius_mm = profile_radius_mm(tool, y_mm);
     if (radius_mm > 0) line.push_back({y_mm, radius_mm});
   }

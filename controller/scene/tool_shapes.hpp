@@ -56,7 +56,9 @@ struct ToolSize {
 [[nodiscard]] double profile_radius_mm(const SceneTool& tool, double y_mm);
 
 /// The profile as a closed polyline of {y, radius} in mm from tip to shaft, denser toward the ends
-/// where heads are round. Both ends lie on the axis, so a lathe of it is a closed mesh.
-[[nodiscard]] std::vector<std::array<double, 2>> tool_profile(const SceneTool& tool);
+/// where heads are round. Both ends lie on the axis, so a lathe of it is a closed mesh. With 32
+/// steps a ball keeps within 0.2 % of its radius.
+[[nodiscard]] std::vector<std::array<double, 2>> tool_profile(const SceneTool& tool,
+                                                              int steps = 32);
 
 }  // namespace kerf

@@ -47,6 +47,36 @@ struct Simd {
   static V shift_right16(V a, int n) noexcept { return _mm256_srl_epi16(a, _mm_cvtsi32_si128(n)); }
   /// 32-bit entries by 2^16, towards minus infinity.
   static V halved32(V a) noexcept { return _mm256_srai_epi32(a, 16); }
+  template <int kBits>
+  static V sra32(V a) noexcept {
+    return _mm256_srai_epi32(a, kBits);
+  }
+  template <int kBits>
+  static V srl32(V a) noexcept {
+    return _mm256_srli_epi32(a, kBits);
+  }
+  template <int kBits>
+  static V sll32(V a) noexcept {
+    return _mm256_slli_epi32(a, kBits);
+  }
+  static V srl32(V a, int n) noexcept { return _mm256_srl_epi32(a, _mm_cvtsi32_si128(n)); }
+  static V min32(V a, V b) noexcept { return _mm256_min_epi32(a, b); }
+  static V max32(V a, V b) noexcept { return _mm256_max_epi32(a, b); }
+  template <int kBits>
+  static V srl16(V a) noexcept {
+    return _mm256_srli_epi16(a, kBits);
+  }
+  /// a0 b0 + a1 b1 in each 32 bits, signed halves.
+  static V multiply_pairs(V a, V b) noexcept { return _mm256_madd_epi16(a, b); }
+  static V low32(V a) noexcept { return _mm256_blend_epi32(a, zero(), 0xaa); }
+  static bool any(V a) noexcept { return _mm256_testz_si256(a, a) == 0; }
+  /// (a b + 2^14) / 2^15 in each 16 bits.
+  static V multiply_round(V a, V b) noexcept { return _mm256_mulhrs_epi16(a, b); }
+  /// The densities index and index + 1 of each 32-bit index.
+  static V gather_pairs(const std::uint16_t* density, V index) noexcept {
+    return _mm256_i32gather_epi32(reinterpret_cast<const int*>(density), index, 2);
+  }
+
   static V bit_and(V a, V b) noexcept { return _mm256_and_si256(a, b); }
   static V bit_or(V a, V b) noexcept { return _mm256_or_si256(a, b); }
   static V bit_xor(V a, V b) noexcept { return _mm256_xor_si256(a, b); }
@@ -134,11 +164,23 @@ struct Simd {
 
 #include "controller/kernel/sets/correlate_vector.hpp"
 #include "controller/kernel/sets/gather_vector.hpp"
+#include "controller/kernel/sets/shell_vector.hpp"
 #include "controller/kernel/sets/splat_loops.hpp"
 
 namespace kerf {
 
-const KernelSet kAvx2Set{"avx2", Simd::kLanes, false, copy_box, correlate, press,
-                         cut,    gather,       place, splat,    press_sums};
+const KernelSet kAvx2Set{"avx2",
+                         Simd::kLanes,
+                         false,
+                         copy_box,
+                         correlate,
+                         press,
+                         cut,
+                         gather,
+                         place,
+                         splat,
+                         press_sums,
+                         place_shell_samples,
+                         sum_shell_samples};
 
 }  // namespace kerf

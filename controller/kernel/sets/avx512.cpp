@@ -39,6 +39,36 @@ struct Simd {
   static V shift_right16(V a, int n) noexcept { return _mm512_srl_epi16(a, _mm_cvtsi32_si128(n)); }
   /// 32-bit entries by 2^16, towards minus infinity.
   static V halved32(V a) noexcept { return _mm512_srai_epi32(a, 16); }
+  template <int kBits>
+  static V sra32(V a) noexcept {
+    return _mm512_srai_epi32(a, kBits);
+  }
+  template <int kBits>
+  static V srl32(V a) noexcept {
+    return _mm512_srli_epi32(a, kBits);
+  }
+  template <int kBits>
+  static V sll32(V a) noexcept {
+    return _mm512_slli_epi32(a, kBits);
+  }
+  static V srl32(V a, int n) noexcept { return _mm512_srl_epi32(a, _mm_cvtsi32_si128(n)); }
+  static V min32(V a, V b) noexcept { return _mm512_min_epi32(a, b); }
+  static V max32(V a, V b) noexcept { return _mm512_max_epi32(a, b); }
+  template <int kBits>
+  static V srl16(V a) noexcept {
+    return _mm512_srli_epi16(a, kBits);
+  }
+  /// a0 b0 + a1 b1 in each 32 bits, signed halves.
+  static V multiply_pairs(V a, V b) noexcept { return _mm512_madd_epi16(a, b); }
+  static V low32(V a) noexcept { return _mm512_maskz_mov_epi32(0x5555, a); }
+  static bool any(V a) noexcept { return _mm512_test_epi32_mask(a, a) != 0; }
+  /// (a b + 2^14) / 2^15 in each 16 bits.
+  static V multiply_round(V a, V b) noexcept { return _mm512_mulhrs_epi16(a, b); }
+  /// The densities index and index + 1 of each 32-bit index.
+  static V gather_pairs(const std::uint16_t* density, V index) noexcept {
+    return _mm512_i32gather_epi32(index, density, 2);
+  }
+
   static V bit_and(V a, V b) noexcept { return _mm512_and_si512(a, b); }
   static V bit_or(V a, V b) noexcept { return _mm512_or_si512(a, b); }
   static V bit_xor(V a, V b) noexcept { return _mm512_xor_si512(a, b); }
@@ -111,11 +141,23 @@ struct Simd {
 
 #include "controller/kernel/sets/correlate_vector.hpp"
 #include "controller/kernel/sets/gather_vector.hpp"
+#include "controller/kernel/sets/shell_vector.hpp"
 #include "controller/kernel/sets/splat_loops.hpp"
 
 namespace kerf {
 
-const KernelSet kAvx512Set{"avx512", Simd::kLanes, true,  copy_box, correlate, press,
-                           cut,      gather,       place, splat,    press_sums};
+const KernelSet kAvx512Set{"avx512",
+                           Simd::kLanes,
+                           true,
+                           copy_box,
+                           correlate,
+                           press,
+                           cut,
+                           gather,
+                           place,
+                           splat,
+                           press_sums,
+                           place_shell_samples,
+                           sum_shell_samples};
 
 }  // namespace kerf

@@ -97,11 +97,23 @@ struct Simd {
 
 #include "controller/kernel/sets/correlate_vector.hpp"
 #include "controller/kernel/sets/gather_loops.hpp"
+#include "controller/kernel/sets/shell_loops.hpp"
 #include "controller/kernel/sets/splat_loops.hpp"
 
 namespace kerf {
 
-const KernelSet kNeonSet{"neon", Simd::kLanes, false, copy_box, correlate, press,
-                         cut,    gather,       place, splat,    press_sums};
+const KernelSet kNeonSet{"neon",
+                         Simd::kLanes,
+                         false,
+                         copy_box,
+                         correlate,
+                         press,
+                         cut,
+                         gather,
+                         place,
+                         splat,
+                         press_sums,
+                         place_shell_samples,
+                         sum_shell_samples};
 
 }  // namespace kerf

@@ -187,11 +187,23 @@ BoxCut cut(const TickBox& tool, const CutRate& rate, const VoxelGrid& grid, Dens
 }  // namespace kerf
 
 #include "controller/kernel/sets/gather_loops.hpp"
+#include "controller/kernel/sets/shell_loops.hpp"
 #include "controller/kernel/sets/splat_loops.hpp"
 
 namespace kerf {
 
-const KernelSet kScalarSet{"scalar", kLanes, false, copy_box, correlate, press,
-                           cut,      gather, place, splat,    press_sums};
+const KernelSet kScalarSet{"scalar",
+                           kLanes,
+                           false,
+                           copy_box,
+                           correlate,
+                           press,
+                           cut,
+                           gather,
+                           place,
+                           splat,
+                           press_sums,
+                           place_shell_samples,
+                           sum_shell_samples};
 
 }  // namespace kerf

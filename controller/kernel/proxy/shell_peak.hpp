@@ -1,0 +1,156 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+
+#include "controller/kernel/proxy/contact_space.hpp"
+#include "controller/kernel/proxy/plane.hpp"
+#include "controller/kernel/proxy/shell_table.hpp"
+#include "controller/kernel/proxy/tool_turn.hpp"
+#include "shared/numeric/fixed.hpp"
+#include "shared/numeric/vec.hpp"
+
+namespace kerf {
+
+/// A ShellSums over its weight, in contact space. All within +-20, so Ratio (Q7.24) holds them.
+template <class N>
+struct ShellMeans {
+  using Ratio = typename N::Ratio;
+
+  Ratio density{}, square{};
+  ContactVec<Ratio> rise{};   ///< density per unit
+  ContactVec<Ratio> lever{};  ///< from the tool's centre, over its reach
+  Ratio top{};
+};
+
+/// How one volume lies in contact space: a place q is at voxel_from_contact * q + origin_vox. A
+/// voxel's edge is at least one unit, so no entry is above 1.
+template <class N>
+struct ContactFrame {
+  Transform<typename N::Ratio, VoxelSpace, ContactSpace> voxel_from_contact{};
+  VoxelVec<typename N::Real> origin_vox{};
+};
+
+/// `sums.weight` is above 0. Fixed: numerators stay below 2^62 for kMaxShellSamples.
+template <class N>
+[[nodiscard]] constexpr ShellMeans<N> shell_means(const ShellSums<N>& sums,
+                                                  const DensityScale& scale,
+                                                  const ContactFrame<N>& frame,
+                                                  const TurnRows<N>& turn) noexcept {
+  using Ratio = typename N::Ratio;
+  using Sum = typename N::Sum;
+  // `bits`: from the sum's fraction bits, less those of the weight, to 24.
+  const auto mean = [&sums](Sum sum, [[maybe_unused]] int bits) {
+    if constexpr (N::kIsFixed) {
+      return Ratio::from_raw(saturate_i32((sum << bits) / sums.weight));
+    } else {
+      return sum / sums.weight;
+    }
+  };
+  const auto slope = [&](const Sum(&sum)[3]) {
+    const auto along = [&](Sum part) {
+      if constexpr (N::kIsFixed) {
+        const std::int64_t unscaled = mean(part, 9).raw();  // 2^28 at most; times 2^16
+        return Ratio::from_raw(saturate_i32(round_shift(unscaled * scale.mantissa, scale.shift)));
+      } else {
+        return mean(part, 0);
+      }
+    };
+    const VoxelVec<Ratio> voxels{along(sum[0]), along(sum[1]), along(sum[2])};
+    return transposed(frame.voxel_from_contact) * voxels;
+  };
+  ShellMeans<N> means;
+  means.density = mean(sums.density, 9);
+  means.square = mean(sums.square, 8);
+  means.rise = slope(sums.rise);
+  const Ratio lever[3] = {mean(sums.lever[0], 9), mean(sums.lever[1], 9), mean(sums.lever[2], 9)};
+  const auto turned = [&](const std::array<typename N::Unit, 3>& row) {
+    return multiply<Ratio>(row[0], lever[0]) + multiply<Ratio>(row[1], lever[1]) +
+           multiply<Ratio>(row[2], lever[2]);
+  };
+  means.lever = {turned(turn[0]), turned(turn[1]), turned(turn[2])};
+  if constexpr (N::kIsFixed) {
+    means.top = Ratio::from_raw(sums.top << 9);
+  } else {
+    means.top = sums.top;
+  }
+  return means;
+}
+
+/// The direction of a vector, or none of one that is too short to have any.
+template <class N>
+[[nodiscard]] constexpr ContactVec<typename N::Unit> direction(
+    ContactVec<typename N::Ratio> v) noexcept {
+  using Unit = typename N::Unit;
+  const typename N::Ratio length = norm(v);
+  if constexpr (N::kIsFixed) {
+    if (length.raw() == 0) return {};
+    const auto over = [&](typename N::Ratio part) {
+      return Unit::from_raw(
+          saturate_i32((std::int64_t{part.raw()} << Unit::kFractionBits) / length.raw()));
+    };
+    return {over(v.x), over(v.y), over(v.z)};
+  } else {
+    if (!(length > Unit(0))) return {};
+    return {v.x / length, v.y / length, v.z / length};
+  }
+}
+
+/// Height of the peak of density over the tool's surface, from its power sums (contact.md 1).
+///
+/// Over a quadratic peak of height H the mean of h, weighted with h^p, is H (p + 1) / (p + 1 + e),
+/// whatever the curvatures and the number of samples; e is half the dimension over which the height
+/// falls. A ball touches in a point, e = 1. Any other shape may also touch in a line (1/2), in a
+/// face (0) or with a corner (2): there the mean of h^2 tells e.
+template <class N>
+[[nodiscard]] constexpr typename N::Ratio peak_height(const ShellMeans<N>& means,
+                                                      bool round) noexcept {
+  using Ratio = typename N::Ratio;
+  Ratio factor(1.2);  // p = 4
+  if (!round) {
+    // p = 6: mean of squares over the square of the mean is 8 (7 + e) / (7 (8 + e)).
+    const Ratio spread = std::max(Ratio(1), means.square / means.density / means.density);
+    const Ratio rest = Ratio(8) - Ratio(7) * spread;
+    const Ratio e =
+        rest > Ratio(0.001) ? std::min(Ratio(56) * (spread - Ratio(1)) / rest, Ratio(2)) : Ratio(2);
+    factor = Ratio(1) + e / Ratio(7);
+  }
+  // A lone spike is a peak of few samples: it may not rise far above the mean unseen.
+  constexpr Ratio kSpike(0.2);
+  return std::max(factor * means.density, means.top - kSpike);
+}
+
+/// Least and steepest slope that a depth is reckoned with, density per unit: flatter is noise, and
+/// no edge of a volume is steeper.
+inline constexpr double kFlattestSlope = 0.2;
+inline constexpr double kSteepestSlope = 1.2;
+
+/// The plane of one volume's contact. `reach` of the tool in units. The normal of a ball is minus
+/// its weighted lever, which reads no gradient and has no steps at the borders of cells; any other
+/// shape has the weighted gradient. None, of length 0, where the tool feels the same all round.
+template <class N>
+[[nodiscard]] constexpr Plane<N> plane_of(const ShellMeans<N>& means, typename N::Real reach,
+                                          bool round) noexcept {
+  using Real = typename N::Real;
+  using Ratio = typename N::Ratio;
+  Plane<N> plane;
+  Ratio slope{};
+  if (round) {
+    plane.normal = direction<N>(-means.lever);
+    const auto along = [](Ratio rise, typename N::Unit n) { return multiply<Ratio>(rise, n); };
+    slope = -(along(means.rise.x, plane.normal.x) + along(means.rise.y, plane.normal.y) +
+              along(means.rise.z, plane.normal.z));
+  } else {
+    plane.normal = direction<N>(-means.rise);
+    slope = norm(means.rise);
+  }
+  slope = std::clamp(slope, Ratio(kFlattestSlope), Ratio(kSteepestSlope));
+  plane.depth = Real((peak_height(means, round) - Ratio(0.5)) / slope);
+  plane.arm = {multiply<Real>(means.lever.x, reach), multiply<Real>(means.lever.y, reach),
+               multiply<Real>(means.lever.z, reach)};
+  return plane;
+}
+
+}  // namespace kerf

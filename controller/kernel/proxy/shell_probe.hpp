@@ -1,0 +1,178 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "controller/kernel/kernel_set.hpp"
+#include "controller/kernel/proxy/contact_math.hpp"
+#include "controller/kernel/proxy/plane.hpp"
+#include "controller/kernel/proxy/shell_peak.hpp"
+#include "controller/kernel/proxy/shell_sums.hpp"
+#include "controller/kernel/proxy/shell_table.hpp"
+#include "controller/kernel/proxy/tool_turn.hpp"
+
+namespace kerf {
+
+/// A tool as contact sees it: samples on its surface.
+template <class N>
+struct Shell {
+  ShellTable<N> table;
+  typename N::Real reach{};    ///< units from the centre to the farthest sample
+  std::int32_t step_bits = 0;  ///< fraction bits of ShellStep's rows: reach 2^step_bits < 2^16
+};
+
+/// One solid volume with room for the tool's places in it; `places` belongs to the servo's memory.
+template <class N>
+struct ShellVolume {
+  ShellField field;
+  ContactFrame<N> frame;
+  ShellPlaces<N> places;
+};
+
+/// What a tool feels among the solid volumes of a scene: the ContactField of the sweep.
+///
+/// `turn` first, then any number of probes with this orientation; a tool that does not turn needs
+/// it once. A probe costs as many reads as the shell has samples, times the volumes, whatever the
+/// place. In fixed all kernels give the same bits. Servo thread; no heap.
+template <class N>
+class ShellProbe {
+ public:
+  using Real = typename N::Real;
+
+  /// `kernels` serve fixed point alone.
+  ShellProbe(const KernelSet& kernels, const Shell<N>& shell,
+             std::span<const ShellVolume<N>> volumes) noexcept
+      : kernels_(kernels), shell_(shell), volumes_(volumes) {}
+
+  /// From the tool's axes to those of the world.
+  void turn(const ToolTurn<N>& turn) noexcept {
+    rows_ = rows_of(turn);
+    for (const ShellVolume<N>& volume : volumes_) {
+      const ShellStep<N> step = step_in(volume.frame);
+      if constexpr (N::kIsFixed) {
+        kernels_.place_shell(shell_.table, step, volume.places);
+      } else {
+        place_shell(shell_.table, step, volume.places);
+      }
+    }
+  }
+
+  /// The tool's centre at `q`: at most one plane a volume, the deepest three.
+  [[nodiscard]] Probe<N> probe(ContactVec<Real> q) const noexcept {
+    Probe<N> felt;
+    for (const ShellVolume<N>& volume : volumes_) feel(volume, q, felt);
+    if (felt.count > 0) felt.depth = std::max(felt.depth, felt.plane[0].depth);
+    return felt;
+  }
+
+  /// The tool's centre may move so far from `q` in any direction and feel nothing: a lower bound.
+  [[nodiscard]] Real free_distance(ContactVec<Real> q) const noexcept {
+    // A sample reads one voxel further, and half a unit is for roundings.
+    const Real own = shell_.reach + Real(1.5);
+    Real free(kContactLimit);
+    for (const ShellVolume<N>& volume : volumes_) {
+      const VoxelVec<Real> at = place_of(volume, q);
+      const std::int32_t x = whole(at.x), y = whole(at.y), z = whole(at.z);
+      const VoxelGrid& grid = volume.field.grid;
+      const auto beyond = [](std::int32_t i, std::int32_t n) { return std::max(-i, i - n + 1); };
+      const std::int32_t outside =
+          std::max({beyond(x, grid.nx), beyond(y, grid.ny), beyond(z, grid.nz)});
+      const std::int32_t bricks = volume.field.free.at(x, y, z);
+      // No edge of a voxel is shorter than a unit.
+      free = std::min(free, Real(std::max(outside, (bricks - 1) * kFreeBrick)) - own);
+    }
+    return std::max(free, Real(0));
+  }
+
+ private:
+  [[nodiscard]] static std::int32_t whole(Real x) noexcept {
+    if constexpr (N::kIsFixed) {
+      return x.raw() >> Real::kFractionBits;
+    } else {
+      return static_cast<std::int32_t>(x < Real(0) ? x - Real(1) : x);
+    }
+  }
+  [[nodiscard]] static VoxelVec<Real> place_of(const ShellVolume<N>& volume,
+                                               ContactVec<Real> q) noexcept {
+    return volume.frame.voxel_from_contact * q + volume.frame.origin_vox;
+  }
+
+  [[nodiscard]] ShellStep<N> step_in(const ContactFrame<N>& frame) const noexcept {
+    ShellStep<N> step;
+    step.shift = 15 + shell_.step_bits - 16;  // from levers times rows to Q15.16
+    for (std::size_t i = 0; i < 3; ++i) {
+      const auto& m = frame.voxel_from_contact.row[i];
+      for (std::size_t j = 0; j < 3; ++j) {
+        if constexpr (N::kIsFixed) {
+          std::int64_t turned = 0;  // Q24 Q30 = Q54, three terms of 2^54
+          for (std::size_t k = 0; k < 3; ++k) {
+            turned += std::int64_t{m[k].raw()} * rows_[k][j].raw();
+          }
+          // Q30 times a reach in Q16: 2^30 2^22.
+          const std::int64_t reached = round_shift(turned, 24) * shell_.reach.raw();
+          step.row[i][j] = static_cast<std::int32_t>(round_shift(reached, 46 - shell_.step_bits));
+        } else {
+          step.row[i][j] =
+              shell_.reach * (m[0] * rows_[0][j] + m[1] * rows_[1][j] + m[2] * rows_[2][j]);
+        }
+      }
+    }
+    return step;
+  }
+
+  /// Adds this volume's plane in the order of depths.
+  void feel(const ShellVolume<N>& volume, ContactVec<Real> q, Probe<N>& felt) const noexcept {
+    const VoxelVec<Real> at = place_of(volume, q);
+    const Real margin = shell_.reach + Real(1);
+    const auto near = [&](Real x, std::int32_t n) { return x > -margin && x < Real(n) + margin; };
+    const VoxelGrid& grid = volume.field.grid;
+    if (!near(at.x, grid.nx) || !near(at.y, grid.ny) || !near(at.z, grid.nz)) return;
+
+    const ShellSums<N> sums = sums_at(volume, at);
+    if (sums.weight <= typename N::Sum(0)) return;
+    const Plane<N> plane =
+        plane_of<N>(shell_means<N>(sums, volume.field.scale, volume.frame, rows_), shell_.reach,
+                    shell_.table.round);
+    // Almost the whole surface is in the solid, or it feels the same all round.
+    const ContactVec<typename N::Unit> none{};
+    if (sums.solid >= shell_.table.count - shell_.table.count / 16 || plane.normal == none) {
+      felt.buried = true;
+      felt.depth = std::max(felt.depth, plane.depth);
+      return;
+    }
+    auto slot = static_cast<std::size_t>(felt.count);
+    if (slot < kMaxPlanes) {
+      ++felt.count;
+    } else if (felt.plane[--slot].depth >= plane.depth) {
+      return;
+    }
+    for (; slot > 0 && felt.plane[slot - 1].depth < plane.depth; --slot) {
+      felt.plane[slot] = felt.plane[slot - 1];
+    }
+    felt.plane[slot] = plane;
+  }
+
+  [[nodiscard]] ShellSums<N> sums_at(const ShellVolume<N>& volume,
+                                     VoxelVec<Real> at) const noexcept {
+    if constexpr (N::kIsFixed) {
+      const std::int32_t centre[3] = {at.x.raw(), at.y.raw(), at.z.raw()};
+      ShellSums<N> sums;
+      kernels_.sum_shell(shell_.table, volume.places, centre, volume.field, sums);
+      return sums;
+    } else {
+      const Real centre[3] = {at.x, at.y, at.z};
+      return shell_sums<N>(shell_.table, volume.places, centre, volume.field);
+    }
+  }
+
+  const KernelSet& kernels_;
+  const Shell<N>& shell_;
+  std::span<const ShellVolume<N>> volumes_;
+  TurnRows<N> rows_{};
+};
+
+}  // namespace kerf

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+
+#include "controller/kernel/proxy/shell_sums.hpp"
+#include "controller/kernel/sets/shell_places.hpp"
+
+// Sums of a shell as the plain loop that defines them, for sets that need no instruction that other
+// machines lack.
+
+namespace kerf {
+namespace {
+
+void sum_shell_samples(const ShellTable<FixedNumbers>& table,
+                       const ShellPlaces<FixedNumbers>& places, const std::int32_t (&centre)[3],
+                       const ShellField& field, ShellSums<FixedNumbers>& sums) noexcept {
+  sums = shell_sums<FixedNumbers>(table, places, centre, field);
+}
+
+}  // namespace
+}  // namespace kerf

@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: Apache-2.0
+// A tool among several volumes, turned and stretched ones, far from them and deep in them.
+#include <array>
+#include <cmath>
+#include <cstddef>
+
+#include <doctest/doctest.h>
+
+#include "controller/kernel/proxy/proxy_sweep.hpp"
+#include "tests/kernel/shell_support.hpp"
+
+using namespace kerf;
+using namespace kerf::test;
+
+namespace {
+
+/// A volume turned by `rotation` (rows: its axes in contact space) with voxels of `edge` units.
+template <class N>
+ContactFrame<N> frame_of(const std::array<Point, 3>& rotation, const Point& edge,
+                         const Point& origin_vox) {
+  ContactFrame<N> frame;
+  for (std::size_t i = 0; i < 3; ++i) {
+    for (std::size_t j = 0; j < 3; ++j) {
+      frame.voxel_from_contact.row[i][j] = typename N::Ratio(rotation[i][j] / edge[i]);
+    }
+  }
+  using Real = typename N::Real;
+  frame.origin_vox = {Real(origin_vox[0]), Real(origin_vox[1]), Real(origin_vox[2])};
+  return frame;
+}
+
+static_assert(ContactField<ShellProbe<FixedNumbers>, FixedNumbers>);
+static_assert(ContactField<ShellProbe<DoubleNumbers>, DoubleNumbers>);
+
+const SceneTool kBall = tool_of_units("ball", 8, 16);
+
+}  // namespace
+
+TEST_CASE_TEMPLATE("turned volumes of long voxels feel like upright ones", N, FixedNumbers,
+                   DoubleNumbers) {
+  Dice dice(2);
+  for (int i = 0; i < 20; ++i) {
+    const Point n = dice.direction();
+    const std::array<Point, 3> axes = turned_to(dice.direction(), dice);
+    const Point edge{1, dice.within(1, 1.5), dice.within(1, 2)};
+    const SceneTool tool = i % 2 == 0 ? kBall : tool_of_units("cylinder", 5, 16);
+    const Point tool_axis = i % 4 == 1 ? n : dice.across(n);
+    const double support = tool.round || tool_axis == n ? 8 : 5;
+    // Contact space begins in the middle of the volume; the plane is `support` below.
+    const TestVolume volume = body({30, 30, 30}, 2, [&](const Point& voxel) {
+      double height = support;
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        height += edge[axis] * (voxel[axis] - 14.5) * dot(axes[axis], n);
+      }
+      return height;
+    });
+    ShellRig<N> rig(tool);
+    rig.add(volume, frame_of<N>(axes, edge, {14.5, 14.5, 14.5}));
+    rig.turn(turned_to(tool_axis, dice));
+    const double offset = rig.rest({0, 0, 0}, n);
+    CHECK(std::abs(offset) < 0.1);
+    const Probe<N> felt = rig.at(offset * n);
+    REQUIRE(felt.count == 1);
+    CHECK(degrees_between(normal_of(felt.plane[0]), n) < 1.5);
+    CHECK(std::abs(double(felt.depth)) < 0.01);
+    // Depths are in units, whatever the voxels.
+    CHECK(double(rig.at((offset - 0.3) * n).depth) == doctest::Approx(0.3).epsilon(0.2));
+  }
+}
+
+TEST_CASE_TEMPLATE("each volume gives a plane, the deepest three are kept in order", N,
+                   FixedNumbers, DoubleNumbers) {
+  // Walls below, behind, beside and above the ball.
+  const Point towards[] = {{0, 0, 1}, {0, 1, 0}, {1, 0, 0}, {0, 0, -1}};
+  const double deep[] = {0.1, 0.4, 0.2, 0.3};
+  std::array<TestVolume, 4> volumes;
+  ShellRig<N> rig(kBall);
+  for (std::size_t i = 0; i < 4; ++i) {
+    volumes[i] = body({28, 28, 28}, 2, [&](const Point& x) {
+      return dot(towards[i], x - Point{13.5, 13.5, 13.5}) + 8 - deep[i];
+    });
+    rig.add(volumes[i], plain_frame<N>());
+    const Probe<N> felt = rig.at({13.5, 13.5, 13.5});
+    CHECK(felt.count == static_cast<int>(std::min<std::size_t>(i + 1, 3)));
+    CHECK(felt.depth == felt.plane[0].depth);
+    CHECK_FALSE(felt.buried);
+  }
+  const Probe<N> felt = rig.at({13.5, 13.5, 13.5});
+  const std::size_t order[] = {1, 3, 2};
+  for (std::size_t i = 0; i < 3; ++i) {
+    CHECK(double(felt.plane[i].depth) == doctest::Approx(deep[order[i]]).epsilon(0.2));
+    CHECK(degrees_between(normal_of(felt.plane[i]), towards[order[i]]) < 0.5);
+  }
+}
+
+TEST_CASE_TEMPLATE("a tool deep in the solid is buried and has no plane", N, FixedNumbers,
+                   DoubleNumbers) {
+  const TestVolume volume = body({40, 40, 60}, 2, [](const Point& x) { return x[2] - 50; });
+  for (const SceneTool& tool : {kBall, tool_of_units("cone", 6, 18)}) {
+    const ShellRig<N> rig(tool, volume);
+    const Probe<N> felt = rig.at({20, 20, 20});
+    CHECK(felt.buried);
+    CHECK(felt.count == 0);
+    CHECK(felt.depth > typename N::Real(0.5));
+    CHECK_FALSE(rig.at({20, 20, 50}).buried);
+  }
+}
+
+TEST_CASE_TEMPLATE("far from every volume nothing is felt", N, FixedNumbers, DoubleNumbers) {
+  const TestVolume volume = filled({12, 12, 12}, 65535);
+  const ShellRig<N> rig(kBall, volume);
+  for (const double far : {-8192.0, -30.0, 30.0, 8192.0}) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      Point q{6, 6, 6};
+      q[axis] = far;
+      const Probe<N> felt = rig.at(q);
+      CHECK(felt.count == 0);
+      CHECK(felt.depth == typename N::Real(-1));
+      CHECK(rig.free_distance(q) > std::abs(far) - 24);
+      CHECK(rig.free_distance(q) < std::abs(far));
+    }
+  }
+  CHECK(rig.free_distance({6, 6, 6}) == 0);
+}
+
+TEST_CASE_TEMPLATE("within the free distance a tool feels nothing", N, FixedNumbers,
+                   DoubleNumbers) {
+  Dice dice(8);
+  const TestVolume volume = body({60, 50, 60}, 2, [](const Point& x) {
+    return length(x - Point{20, 25, 20}) - 6;
+  });
+  const ShellRig<N> rig(tool_of_units("ball", 3, 6), volume);
+  int free = 0;
+  for (int i = 0; i < 2000; ++i) {
+    const Point q{dice.within(-20, 80), dice.within(-20, 70), dice.within(-20, 80)};
+    const double distance = rig.free_distance(q);
+    if (distance == 0) continue;
+    ++free;
+    CHECK(rig.at(q + distance * dice.direction()).count == 0);
+  }
+  CHECK(free > 1000);
+}
+
+TEST_CASE_TEMPLATE("a lone high sample lifts the peak of many low ones", N, FixedNumbers,
+                   DoubleNumbers) {
+  using Ratio = typename N::Ratio;
+  ShellMeans<N> means;
+  means.density = Ratio(0.2);
+  means.square = Ratio(0.04);
+  means.top = Ratio(0.3);
+  CHECK(double(peak_height(means, true)) == doctest::Approx(0.24));
+  CHECK(double(peak_height(means, false)) == doctest::Approx(0.2));
+  means.top = Ratio(0.7);
+  CHECK(double(peak_height(means, true)) == doctest::Approx(0.5));
+  CHECK(double(peak_height(means, false)) == doctest::Approx(0.5));
+}
+
+TEST_CASE_TEMPLATE("the height of a peak does not depend on its dimension", N, FixedNumbers,
+                   DoubleNumbers) {
+  using Ratio = typename N::Ratio;
+  for (const double e : {0.0, 0.5, 1.0, 1.5, 2.0}) {
+    // Means of h and h^2 with weights h^6 where heights are as frequent as (H - h)^(e - 1).
+    const double height = 0.5, mean = height * 7 / (7 + e);
+    ShellMeans<N> means;
+    means.density = Ratio(mean);
+    means.square = Ratio(mean * height * 8 / (8 + e));
+    CHECK(double(peak_height(means, false)) == doctest::Approx(height).epsilon(1e-4));
+  }
+}
