@@ -15,15 +15,17 @@ constexpr double kStep = N::kIsFixed                     ? 0x1p-16
                          : sizeof(typename N::Real) == 4 ? 1e-5
                                                          : 1e-9;
 
-/// One to three planes, no two closer than 15 degrees, that all let the tool rest within reach.
+/// One to three planes, no two closer than 15 degrees, that leave room at some place near.
 template <class N>
 PlaneBundle<N> random_bundle(Dice& dice) {
   PlaneBundle<N> bundle;
   const auto wanted = static_cast<std::size_t>(dice.uniform(1, 4));
+  const Point room = dice.uniform(0, 0.5) * dice.direction();
   while (bundle.count < wanted) {
-    const auto normal = normal_of<N>(dice.direction());
-    if (has_plane_like(bundle, normal)) continue;
-    bundle.plane[bundle.count++] = {normal, typename N::Real(dice.uniform(-0.5, 0.3)), {}};
+    const Point normal = dice.direction();
+    if (has_plane_like(bundle, normal_of<N>(normal))) continue;
+    const double depth = dot(normal, room) - dice.uniform(0, 0.3);
+    bundle.plane[bundle.count++] = {normal_of<N>(normal), typename N::Real(depth), {}};
   }
   return bundle;
 }
@@ -82,13 +84,10 @@ TEST_CASE_TEMPLATE("planes push and never pull, and only where they are touched"
                    FloatNumbers, DoubleNumbers) {
   using Real = typename N::Real;
   Dice dice(2);
-  int moved = 0;
   for (int i = 0; i < 20'000; ++i) {
     const auto bundle = random_bundle<N>(dice);
     const Point way = dice.uniform(0, 3) * dice.direction();
     const Slide<N> slide = nearest(bundle, place_of<N>(way));
-    if (slide.move == ContactVec<Real>{}) continue;
-    ++moved;
     Point pushed = point_of<N>(slide.move) - way;
     for (std::size_t k = 0; k < bundle.count; ++k) {
       const auto& [normal, depth, arm] = bundle.plane[k];
@@ -102,7 +101,6 @@ TEST_CASE_TEMPLATE("planes push and never pull, and only where they are touched"
     }
     CHECK(length(pushed) < 16 * kStep<N>);
   }
-  CHECK(moved > 19'000);
 }
 
 TEST_CASE_TEMPLATE("a goal at the end of the range saturates nothing", N, FixedNumbers,
@@ -114,30 +112,35 @@ TEST_CASE_TEMPLATE("a goal at the end of the range saturates nothing", N, FixedN
   CHECK(double(slide.load[0]) == doctest::Approx(16384));
 }
 
-TEST_CASE_TEMPLATE("a tool between planes that leave no room stays", N, FixedNumbers,
+TEST_CASE_TEMPLATE("where planes leave no room the oldest gives way", N, FixedNumbers, FloatNumbers,
                    DoubleNumbers) {
   PlaneBundle<N> slot;
-  slot.plane[slot.count++] = plane<N>({1, 0, 0}, 0.1);
-  slot.plane[slot.count++] = plane<N>({-1, 0, 0}, 0.1);
-  CHECK(nearest(slot, place_of<N>({3, 4, 5})).move == ContactVec<typename N::Real>{});
+  slot.plane[slot.count++] = plane<N>({1, 0, 0}, 0.125);
+  slot.plane[slot.count++] = plane<N>({0, 1, 0}, 0);
+  slot.plane[slot.count++] = plane<N>({-1, 0, 0}, 0.125);
+  CHECK(point_of<N>(nearest(slot, place_of<N>({-3, -4, 5})).move) == Point{0.125, 0, 5});
+  CHECK(point_of<N>(nearest(slot, place_of<N>({3, -4, 5})).move) == Point{3, 0, 5});
 }
 
 TEST_CASE_TEMPLATE("a plane seen before is kept while it is near and unlike the new ones", N,
                    FixedNumbers, DoubleNumbers) {
-  const auto newest = felt<N>(plane<N>({0, 1, 0}, 0));
+  const auto merged = [](PlaneBundle<N> older, Point moved) {
+    auto bundle = bundle_of(felt<N>(plane<N>({0, 1, 0}, 0)));
+    keep(bundle, older, place_of<N>(moved));
+    return bundle;
+  };
   const auto older = [](Point normal, double depth) {
     PlaneBundle<N> bundle;
     bundle.plane[bundle.count++] = plane<N>(normal, depth);
     return bundle;
   };
-  const auto still = place_of<N>({0, 0, 0});
-  CHECK(merged(newest, older({1, 0, 0}, 0), still).count == 2);
-  CHECK(merged(newest, older({std::sin(0.25), std::cos(0.25), 0}, 0), still).count == 1);
-  CHECK(merged(newest, older({std::sin(0.28), std::cos(0.28), 0}, 0), still).count == 2);
-  CHECK(merged(newest, older({1, 0, 0}, -0.6), still).count == 1);
-  CHECK(merged(newest, older({1, 0, 0}, 0.4), still).count == 1);
+  CHECK(merged(older({1, 0, 0}, 0), {}).count == 2);
+  CHECK(merged(older({std::sin(0.25), std::cos(0.25), 0}, 0), {}).count == 1);
+  CHECK(merged(older({std::sin(0.28), std::cos(0.28), 0}, 0), {}).count == 2);
+  CHECK(merged(older({1, 0, 0}, -0.6), {}).count == 1);
+  CHECK(merged(older({1, 0, 0}, 0.4), {}).count == 1);
   // Carried along: 0.25 nearer.
-  const auto carried = merged(newest, older({1, 0, 0}, -0.6), place_of<N>({-0.25, 0, 0}));
+  const auto carried = merged(older({1, 0, 0}, -0.6), {-0.25, 0, 0});
   REQUIRE(carried.count == 2);
   CHECK(double(carried.plane[1].depth) == doctest::Approx(-0.35));
 }

@@ -218,11 +218,10 @@ TEST_CASE_TEMPLATE("a ball follows a slot, with play, with hardly any and with n
 
 // The estimate is no exact potential: without friction a crease can give energy back, a little.
 TEST_CASE("a loop of the hand in a crease gives nothing back under a little friction") {
-  const LoopGain smooth = gain_in_a_crease(0, 10), rough = gain_in_a_crease(0.03, 10);
+  const LoopGain smooth = gain_in_a_crease(0, 10), rough = gain_in_a_crease(0.02, 10);
   MESSAGE("gain of a loop: " << 100 * smooth.mean << " %, at most " << 100 * smooth.largest
-                             << " %; with friction 0.03 " << 100 * rough.mean << " %, at most "
+                             << " %; with friction 0.02 " << 100 * rough.mean << " %, at most "
                              << 100 * rough.largest << " %");
-  CHECK(smooth.largest < 0.02);
-  CHECK(rough.mean < 0);
-  CHECK(rough.largest < 0.002);
+  CHECK(smooth.largest < 0.01);
+  CHECK(rough.largest < 0);
 }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <type_traits>
@@ -25,101 +26,109 @@ struct Slide {
   std::array<typename N::Real, kMaxPlanes> load{};  ///< how hard each plane is pressed, units
 };
 
-/// Pair products of the normals of an active set and its loads by Cramer's rule. A plane outside of
-/// the set has a row of the unit matrix and a need of 0, so one text solves every set.
+/// How hard two or three planes are pressed that are all touched, by Cramer's rule: for each plane
+/// i SUM_j c_ij load_j = need_i, with c_ij the product of two normals (c_ii = 1) and need_i the way
+/// that plane i wants. False where the normals are too near to one line or plane: a determinant
+/// below 1e-3.
 template <class N>
-class ActiveSet {
+class Loads {
   using Real = typename N::Real;
   using Unit = typename N::Unit;
   /// |cofactor| <= 2. Q29 leaves room for the sum of three products with a Real: 3 * 2^61.
   using Cofactor = std::conditional_t<N::kIsFixed, Fixed<29>, Unit>;
-  template <class S>
-  using Matrix = std::array<std::array<S, kMaxPlanes>, kMaxPlanes>;
 
  public:
-  constexpr ActiveSet(const Matrix<Unit>& products, const std::array<Real, kMaxPlanes>& need,
-                      unsigned set) noexcept {
-    for (std::size_t i = 0; i < kMaxPlanes; ++i) {
-      for (std::size_t j = 0; j < kMaxPlanes; ++j) {
-        const bool both = (set >> i & 1U) != 0 && (set >> j & 1U) != 0;
-        gram_[i][j] = i == j ? Unit(1) : both ? products[i][j] : Unit(0);
-      }
-      need_[i] = (set >> i & 1U) != 0 ? need[i] : Real(0);
-    }
+  using Needs = std::array<Real, kMaxPlanes>;
+  using Products = std::array<std::array<Unit, kMaxPlanes>, kMaxPlanes>;
+
+  [[nodiscard]] static constexpr bool of_pair(const Products& c, const Needs& need, std::size_t i,
+                                              std::size_t j, Needs& load) noexcept {
+    const Cofactor one(1), minus_c = -Cofactor(c[i][j]);
+    const Cofactor determinant = one - multiply<Cofactor>(c[i][j], c[i][j]);
+    if (determinant < Cofactor(kLeast)) return false;
+    load[i] = quotient({one, minus_c, {}}, {need[i], need[j], {}}, determinant);
+    load[j] = quotient({minus_c, one, {}}, {need[i], need[j], {}}, determinant);
+    return true;
   }
 
-  /// False where the normals are too near to one plane or line: a determinant below 1e-3.
-  [[nodiscard]] constexpr bool solve(std::array<Real, kMaxPlanes>& load) const noexcept {
-    Matrix<Cofactor> cofactor{};
-    for (std::size_t i = 0; i < kMaxPlanes; ++i) {
-      for (std::size_t j = 0; j < kMaxPlanes; ++j) {
-        const std::size_t i1 = (i + 1) % 3, i2 = (i + 2) % 3, j1 = (j + 1) % 3, j2 = (j + 2) % 3;
-        cofactor[i][j] = multiply<Cofactor>(gram_[i1][j1], gram_[i2][j2]) -
-                         multiply<Cofactor>(gram_[i1][j2], gram_[i2][j1]);
-      }
-    }
-    const Cofactor determinant = multiply<Cofactor>(gram_[0][0], cofactor[0][0]) +
-                                 multiply<Cofactor>(gram_[0][1], cofactor[0][1]) +
-                                 multiply<Cofactor>(gram_[0][2], cofactor[0][2]);
-    if (determinant < Cofactor(1e-3)) return false;
-    for (std::size_t i = 0; i < kMaxPlanes; ++i) load[i] = quotient(cofactor[i], determinant);
+  [[nodiscard]] static constexpr bool of_three(const Products& c, const Needs& need,
+                                               Needs& load) noexcept {
+    const auto minor = [&](std::size_t i, std::size_t j, std::size_t k, std::size_t l) {
+      return multiply<Cofactor>(c[i][j], c[k][l]) - multiply<Cofactor>(c[i][l], c[k][j]);
+    };
+    const Cofactor c00 = minor(1, 1, 2, 2), c11 = minor(0, 0, 2, 2), c22 = minor(0, 0, 1, 1);
+    const Cofactor c01 = minor(1, 2, 2, 0), c02 = minor(1, 0, 2, 1), c12 = minor(0, 1, 2, 0);
+    const Cofactor determinant =
+        c00 + multiply<Cofactor>(c[0][1], c01) + multiply<Cofactor>(c[0][2], c02);
+    if (determinant < Cofactor(kLeast)) return false;
+    load = {quotient({c00, c01, c02}, need, determinant),
+            quotient({c01, c11, c12}, need, determinant),
+            quotient({c02, c12, c22}, need, determinant)};
     return true;
   }
 
  private:
+  static constexpr double kLeast = 1e-3;
+
   /// cofactor . need / determinant. Fixed: Q45 over Q29, exact up to the quotient's last bit.
-  [[nodiscard]] constexpr Real quotient(const std::array<Cofactor, kMaxPlanes>& cofactor,
-                                        Cofactor determinant) const noexcept {
+  [[nodiscard]] static constexpr Real quotient(const std::array<Cofactor, kMaxPlanes>& cofactor,
+                                               const Needs& need, Cofactor determinant) noexcept {
     if constexpr (N::kIsFixed) {
-      const std::int64_t sum = std::int64_t{cofactor[0].raw()} * need_[0].raw() +
-                               std::int64_t{cofactor[1].raw()} * need_[1].raw() +
-                               std::int64_t{cofactor[2].raw()} * need_[2].raw();
+      const std::int64_t sum = std::int64_t{cofactor[0].raw()} * need[0].raw() +
+                               std::int64_t{cofactor[1].raw()} * need[1].raw() +
+                               std::int64_t{cofactor[2].raw()} * need[2].raw();
       return Real::from_raw(saturate_i32(sum / determinant.raw()));
     } else {
-      return (cofactor[0] * need_[0] + cofactor[1] * need_[1] + cofactor[2] * need_[2]) /
-             determinant;
+      return (cofactor[0] * need[0] + cofactor[1] * need[1] + cofactor[2] * need[2]) / determinant;
     }
   }
-
-  Matrix<Unit> gram_{};
-  std::array<Real, kMaxPlanes> need_{};
 };
 
-/// The nearest place to `way` that all planes allow, found as the one active set whose loads push
-/// and whose place holds every plane. Stays where it is when no place is found: planes that leave
-/// none, or nearly parallel ones.
+/// The nearest place to `way` that all planes allow, found as the one set of touched planes whose
+/// loads push and whose place holds every plane. Where planes leave no place, as two walls of a
+/// slot without play, the oldest of them, which stands last, gives way to the others.
 ///
-/// Any |way| of 16384 units at most. At most eight sets; fixed: within 4 steps of each plane for a
-/// way of some units.
+/// Any |way| of 16384 units at most; eight sets at most, and four and two without the oldest.
+/// Fixed: within 4 steps of each plane for a way of some units.
 template <class N>
 [[nodiscard]] constexpr Slide<N> nearest(const PlaneBundle<N>& planes,
                                          ContactVec<typename N::Real> way) noexcept {
   using Real = typename N::Real;
   using Unit = typename N::Unit;
   constexpr auto kTouching = Real(1.0 / 16384);  // 4 steps of Q15.16
-  std::array<std::array<Unit, kMaxPlanes>, kMaxPlanes> products{};
-  std::array<Real, kMaxPlanes> need{};
+  typename Loads<N>::Products products{};
+  typename Loads<N>::Needs need{};
   for (std::size_t i = 0; i < planes.count; ++i) {
     need[i] = planes.plane[i].depth - along<N>(planes.plane[i].normal, way);
+    products[i][i] = Unit(1);
     for (std::size_t j = 0; j < i; ++j) {
       products[i][j] = products[j][i] = dot(planes.plane[i].normal, planes.plane[j].normal);
     }
   }
-  for (unsigned set = 0; set < 1U << planes.count; ++set) {
-    Slide<N> slide{way};
-    if (set != 0 && !ActiveSet<N>(products, need, set).solve(slide.load)) continue;
-    bool allowed = true;
-    for (std::size_t i = 0; i < planes.count; ++i) {
-      allowed = allowed && slide.load[i] >= Real(0);
-      slide.move = slide.move + times<N>(planes.plane[i].normal, slide.load[i]);
+  for (std::size_t count = planes.count; count > 0; --count) {
+    for (unsigned set = 0; set < 1U << count; ++set) {
+      Slide<N> slide{way};
+      if (set == 7) {
+        if (!Loads<N>::of_three(products, need, slide.load)) continue;
+      } else if (set != 0) {
+        const auto first = static_cast<std::size_t>(std::countr_zero(set));
+        const auto last = static_cast<std::size_t>(std::bit_width(set)) - 1;
+        slide.load[first] = need[first];
+        if (first != last && !Loads<N>::of_pair(products, need, first, last, slide.load)) continue;
+      }
+      bool allowed = true;
+      for (std::size_t i = 0; i < count; ++i) {
+        allowed = allowed && slide.load[i] >= Real(0);
+        slide.move = slide.move + times<N>(planes.plane[i].normal, slide.load[i]);
+      }
+      for (std::size_t i = 0; i < count; ++i) {
+        const Plane<N>& plane = planes.plane[i];
+        allowed = allowed && along<N>(plane.normal, slide.move) >= plane.depth - kTouching;
+      }
+      if (allowed) return slide;
     }
-    for (std::size_t i = 0; i < planes.count; ++i) {
-      const Plane<N>& plane = planes.plane[i];
-      allowed = allowed && along<N>(plane.normal, slide.move) >= plane.depth - kTouching;
-    }
-    if (allowed) return slide;
   }
-  return {};
+  return {way};
 }
 
 /// Planes closer than this are one: two places on a smooth curve look like a crease.
@@ -139,20 +148,18 @@ template <class N>
   return {static_cast<std::size_t>(probe.count), probe.plane};
 }
 
-/// The planes of the newest place; then those of the place `moved` before while there is room, if
-/// they are unlike and still near: between 0.5 units out of reach and 0.3 units deep.
+/// Adds planes of a place `moved` before while there is room, if they are unlike and still near:
+/// between 0.5 units out of reach and 0.3 units deep.
 template <class N>
-[[nodiscard]] constexpr PlaneBundle<N> merged(const Probe<N>& newest, const PlaneBundle<N>& older,
-                                              ContactVec<typename N::Real> moved) noexcept {
+constexpr void keep(PlaneBundle<N>& bundle, const PlaneBundle<N>& older,
+                    ContactVec<typename N::Real> moved) noexcept {
   using Real = typename N::Real;
-  PlaneBundle<N> bundle = bundle_of(newest);
   for (std::size_t i = 0; i < older.count && bundle.count < kMaxPlanes; ++i) {
     Plane<N> plane = older.plane[i];
     plane.depth = plane.depth - along<N>(plane.normal, moved);
     const bool near = plane.depth > Real(-0.5) && plane.depth < Real(0.3);
     if (near && !has_plane_like(bundle, plane.normal)) bundle.plane[bundle.count++] = plane;
   }
-  return bundle;
 }
 
 /// Adds those planes of a place that turned out too deep which hold the tool already where it is,

@@ -28,13 +28,15 @@ struct SweepRules {
   static constexpr std::int32_t kMaxProbes = 32;
   static constexpr std::int32_t kMaxTurnProbes = 12;  ///< the rest is left to the move
   static constexpr double kTolerance = 0.01;          ///< a place this deep is allowed
-  static constexpr double kNoMove = 0.002;            ///< a shorter way is none
-  static constexpr double kArrived = 0.004;
+  static constexpr double kNoMove = 0.002;            ///< a shorter way from rest is none
+  static constexpr double kArrived = 0.004;           ///< after a step this near is there
   /// Longest way of any sample between two probes. The middle of the thinnest wall, 2 units, is one
   /// unit deep: beyond it density falls again, and its gradient shows the way through.
   static constexpr double kStep = 0.875;
   static constexpr double kGain = 0.001;
-  static constexpr double kResidual = 0.8;  ///< share of the way that a step may leave
+  static constexpr double kResidual = 0.8;   ///< share of the way that a step may leave
+  static constexpr double kTelling = 0.02;   ///< a shorter step tells nothing of the curvature
+  static constexpr double kMostEased = 0.5;  ///< share of the way of a step in a deep bowl
   static constexpr double kShrink = 0.4;
   static constexpr double kShortest = 0.1;  ///< share of a step below which the proxy rather lags
   static constexpr double kPush = 0.5;      ///< longest correction of one push
@@ -89,19 +91,17 @@ class ProxySweep {
   constexpr Swept<N> tick(const ProxyPose<N>& goal) noexcept {
     here_ = turn_to(goal.turn);
     held_by_ = bundle_of(here_);
-    if (!here_.buried) move_to(goal.centre);
-    return {held_by_,    nearest(held_by_, goal.centre - pose_.centre),
-            probes_,     pose_.turn == goal.turn,
-            here_.depth, here_.buried};
+    const Slide<N> slide = move_to(goal.centre);
+    return {held_by_, slide, probes_, pose_.turn == goal.turn, here_.depth, here_.buried};
   }
 
  private:
-  /// A place that was tried: where the tool ended after the pushes, what it feels there, and what
-  /// it felt before them.
+  /// A place that was tried: where the tool ended after the pushes, what it feels there and which
+  /// planes it met on the way; and what it felt before the pushes.
   struct Trial {
     Place centre;
     Probe<N> felt;
-    Place first_centre;
+    PlaneBundle<N> planes;
     Probe<N> first;
   };
 
@@ -117,34 +117,49 @@ class ProxySweep {
     return !felt.buried && felt.depth <= std::max(Real(SweepRules::kTolerance), here_.depth);
   }
 
-  /// The move that planes and friction leave of a way. Coulomb: across the direction that presses
-  /// the tool sticks while the way is within friction times the load, and else slides that much
-  /// less. Towards the planes nothing rubs.
-  [[nodiscard]] constexpr Place slide(const PlaneBundle<N>& planes, Place way) const noexcept {
-    const Place move = nearest(planes, way).move;
-    if (friction_ <= Unit(0) || planes.count == 0) return move;
+  /// How to go on from a place.
+  struct Route {
+    Slide<N> slide;  ///< under the planes alone
+    Place way;       ///< that friction leaves of it
+    Real length;
+  };
+
+  /// Coulomb: across the direction that presses the tool sticks while its way is within friction
+  /// times the load, and else slides that much less. Towards the planes nothing rubs.
+  [[nodiscard]] constexpr Route route(const PlaneBundle<N>& planes, Place way) const noexcept {
+    const Slide<N> slide = nearest(planes, way);
+    const Place& move = slide.move;
+    if (friction_ <= Unit(0) || planes.count == 0) return {slide, move, norm(move)};
     const Place pressed = move - way;
     const auto normal = direction_of<N>(pressed);
     const Place closing = times<N>(normal, along<N>(normal, move));
     const Place rubbing = move - closing;
     const Real held = multiply<Real>(friction_, norm(pressed));
     const Real length = norm(rubbing);
-    if (length <= held) return closing;
-    return closing + part_of<N>(rubbing, share<N>(length - held, length));
+    if (length <= held) return {slide, closing, norm(closing)};
+    const Place left = closing + part_of<N>(rubbing, share<N>(length - held, length));
+    return {slide, left, norm(left)};
   }
 
-  /// Looks at a place, and where the tool is too deep there pushes it out: twice at most.
-  /// `moved(centre)` is the way from where `known` was made.
-  constexpr Trial attempt(Place centre, const PlaneBundle<N>& known, Place from) noexcept {
-    Trial trial{centre, look(centre), centre, {}};
-    trial.first = trial.felt;
+  /// Looks at a place `moved` from where the depths of `known` count, and where the tool is too
+  /// deep there pushes it out: twice at most.
+  constexpr Trial attempt(Place centre, const PlaneBundle<N>& known, Place moved) noexcept {
+    const Probe<N> first = look(centre);
+    Trial trial{centre, first, bundle_of(first), first};
+    keep(trial.planes, known, moved);
+    Place pushed{};
     for (int push = 0; push < 2; ++push) {
       if (allows(trial.felt) || trial.felt.count == 0 || !may_look()) break;
-      PlaneBundle<N> planes = merged(trial.felt, known, trial.centre - from);
-      for (auto& plane : planes.plane) plane.depth = std::min(plane.depth, Real(SweepRules::kPush));
-      trial.centre = trial.centre + nearest(planes, {}).move;
+      for (auto& plane : trial.planes.plane) {
+        plane.depth = std::min(plane.depth, Real(SweepRules::kPush));
+      }
+      pushed = pushed + nearest(trial.planes, {}).move;
+      trial.centre = centre + pushed;
       trial.felt = look(trial.centre);
+      trial.planes = bundle_of(trial.felt);
+      keep(trial.planes, known, moved + pushed);
     }
+    keep(trial.planes, bundle_of(first), pushed);
     return trial;
   }
 
@@ -160,7 +175,7 @@ class ProxySweep {
     while (!(pose_.turn == goal) && probes_ < SweepRules::kMaxTurnProbes) {
       const ToolTurn<N> next = turned_towards(pose_.turn, goal, step);
       field_.turn(next);
-      const Trial trial = attempt(pose_.centre, {}, pose_.centre);
+      const Trial trial = attempt(pose_.centre, {}, {});
       if (allows(trial.felt)) {
         pose_ = {trial.centre, next};
         here_ = trial.felt;
@@ -175,38 +190,56 @@ class ProxySweep {
     return known ? here_ : look(pose_.centre);
   }
 
-  constexpr void move_to(Place goal) noexcept {
+  /// Share of the way left that the next step takes. Over a bowl of radius R under a load of L the
+  /// way falls by 1 + L/R times the step, since the normal turns with it: a whole step would
+  /// overshoot and the proxy would swing. The last step tells how much (Barzilai and Borwein 1988);
+  /// a flat gives 1, and a bump, where steps fall short, is left at 1 as well.
+  static constexpr Unit eased(Place moved, Place way_before, Place way_now) noexcept {
+    const auto direction = direction_of<N>(moved);
+    const Real length = along<N>(direction, moved);
+    const Real fell = along<N>(direction, way_before - way_now);
+    if (length < Real(SweepRules::kTelling) || fell <= length) return Unit(1);
+    return std::max(share<N>(length, fell), Unit(SweepRules::kMostEased));
+  }
+
+  /// Moves towards `goal` while steps are found that the solid allows and that bring the tool
+  /// onward: judged by the way that is left under all planes known, not by the distance to the
+  /// goal, which would stick in creases and cycle in grooves. Returns the slide of the last place.
+  constexpr Slide<N> move_to(Place goal) noexcept {
     Unit shrink(1);
-    while (may_look()) {
+    Unit ease(1);
+    Route onward = route(held_by_, goal - pose_.centre);
+    Real enough(SweepRules::kNoMove);
+    while (may_look() && !here_.buried && onward.length >= enough) {
       const Place from = pose_.centre;
-      const Place way = slide(held_by_, goal - from);
-      const Real length = norm(way);
-      if (length < Real(SweepRules::kNoMove)) return;
       Real step(SweepRules::kStep);
       if (here_.count == 0) step = std::max(step, field_.free_distance(from));
-      const Unit part = step < length ? shrink * share<N>(step, length) : shrink;
-      const Trial trial = attempt(from + part_of<N>(way, part), held_by_, from);
-
-      const PlaneBundle<N> next = merged(trial.felt, held_by_, trial.centre - from);
-      Real left = length;
+      const Unit capped = step < onward.length ? share<N>(step, onward.length) : Unit(1);
+      const Unit part = shrink * std::min(ease, capped);
+      const Place moved = part_of<N>(onward.way, part);
+      const Trial trial = attempt(from + moved, held_by_, moved);
       if (allows(trial.felt)) {
-        left = norm(slide(next, goal - trial.centre));
-        const Real gain = norm(goal - from) - norm(goal - trial.centre);
-        if (left < multiply<Real>(Unit(SweepRules::kResidual), length) ||
-            gain > Real(SweepRules::kGain)) {
+        const Route next = route(trial.planes, goal - trial.centre);
+        if (next.length < multiply<Real>(Unit(SweepRules::kResidual), onward.length) ||
+            norm(goal - trial.centre) < norm(goal - from) - Real(SweepRules::kGain)) {
+          ease = eased(trial.centre - from, onward.way, next.way);
           pose_.centre = trial.centre;
           here_ = trial.felt;
-          held_by_ = next;
+          held_by_ = trial.planes;
+          onward = next;
           shrink = Unit(1);
-          if (left < Real(SweepRules::kArrived)) return;
+          enough = Real(SweepRules::kArrived);
           continue;
         }
       }
-      if (!learn(held_by_, trial.first, trial.first_centre - from)) {
+      if (learn(held_by_, trial.first, moved)) {
+        onward = route(held_by_, goal - from);
+      } else {
         shrink = shrink * Unit(SweepRules::kShrink);
-        if (shrink < Unit(SweepRules::kShortest)) return;
+        if (shrink < Unit(SweepRules::kShortest)) break;
       }
     }
+    return onward.slide;
   }
 
   Field& field_;

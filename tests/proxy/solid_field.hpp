@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <utility>
+
+#include "controller/kernel/proxy/tool_turn.hpp"
+#include "tests/proxy/points.hpp"
+
+namespace kerf::test {
+
+/// A ball against a solid in closed form, in double whatever the numbers of the solver: `Nearest`
+/// gives the height of a place above the solid's face and the face's normal there. Felt from 1 unit
+/// above to 1 unit deep.
+template <class N, class Nearest>
+class SolidField {
+ public:
+  SolidField(double radius, Nearest nearest) : radius_(radius), nearest_(std::move(nearest)) {}
+
+  Probe<N> probe(ContactVec<typename N::Real> at) {
+    const auto [height, normal] = nearest_(point_of<N>(at));
+    Probe<N> probe;
+    if (height - radius_ > 1) return probe;
+    probe.depth = typename N::Real(std::min(1.0, radius_ - height));
+    probe.count = 1;
+    probe.plane[0] = {normal_of<N>(normal), probe.depth, place_of<N>(-radius_ * normal)};
+    return probe;
+  }
+  [[nodiscard]] typename N::Real free_distance(ContactVec<typename N::Real> at) const {
+    return typename N::Real(std::max(0.0, nearest_(point_of<N>(at)).first - radius_ - 1));
+  }
+  void turn(const ToolTurn<N>&) const {}
+
+ private:
+  double radius_;
+  Nearest nearest_;
+};
+
+}  // namespace kerf::test
