@@ -26,14 +26,14 @@ concept ContactField = requires(F field, ContactVec<typename N::Real> q, ToolTur
 /// Units of contact space; sources: contact.md 3, where not given.
 struct SweepRules {
   static constexpr std::int32_t kMaxProbes = 32;
-  static constexpr std::int32_t kMaxTurnProbes = 12;  ///< the rest is left to the move
+  static constexpr std::int32_t kMaxTurnProbes = 12;  ///< and its pushes; the rest is the move's
   static constexpr double kTolerance = 0.01;          ///< a place this deep is allowed
   static constexpr double kNoMove = 0.002;            ///< a shorter way from rest is none
   static constexpr double kArrived = 0.004;           ///< after a step this near is there
   /// Longest way of any sample between two probes. The middle of the thinnest wall, 2 units, is one
   /// unit deep: beyond it density falls again, and its gradient shows the way through.
   static constexpr double kStep = 0.875;
-  static constexpr double kGain = 0.001;
+  static constexpr double kGain = 0.001;     ///< a step this much nearer to the goal is kept
   static constexpr double kResidual = 0.8;   ///< share of the way that a step may leave
   static constexpr double kTelling = 0.02;   ///< a shorter step tells nothing of the curvature
   static constexpr double kMostEased = 0.5;  ///< share of the way of a step in a deep bowl
@@ -69,13 +69,17 @@ struct Swept {
 };
 
 /// One tick of the proxy: from a pose that the solid allows towards a goal, in steps that no sample
-/// of the tool makes longer than 1 unit, each probed. Out of probes, or of ideas, the proxy lags;
-/// it never jumps, so what is thicker than a step holds it at any speed.
+/// of the tool makes longer than kStep, each probed; longer ones only where nothing can be felt.
+/// Out of probes, or of ideas, the proxy lags; it never jumps, so a wall of 2 units holds it at any
+/// speed.
 ///
 /// The orientation goes first and the centre gives way to it: a stylus without torque motors turns
 /// the tool whatever the tooth says. Where no centre allows a turn, the orientation lags too.
 ///
-/// At most kMaxProbes calls of `probe`. Coordinates within +-8192 units.
+/// At most kMaxProbes calls of `probe`. Coordinates within +-kContactLimit.
+///
+/// Limits: in a slot without any play a push to its side makes the force step by up to 6 %; what
+/// lies wholly inside of the tool is felt only when the tool leaves it, and then holds it.
 template <class N, ContactField<N> Field>
 class ProxySweep {
   using Real = typename N::Real;
