@@ -11,7 +11,7 @@ namespace {
 
 template <class N>
 struct Rubbing {
-  explicit Rubbing(double coefficient) : friction(coefficient) {}
+  explicit Rubbing(double coefficient) : friction(static_cast<typename N::Unit>(coefficient)) {}
   /// Where the proxy goes that is pulled to `hand`, the floor being at height 0.
   Point tick(Point hand) {
     ProxySweep<N, FlatField<N>>(field, pose, friction, {}).tick({place_of<N>(hand), {}});

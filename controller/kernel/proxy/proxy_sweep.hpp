@@ -213,10 +213,10 @@ class ProxySweep {
     Unit shrink(1);
     Unit ease(1);
     Route onward = route(held_by_, goal - pose_.centre);
-    Real enough(SweepRules::kNoMove);
+    auto enough = Real(SweepRules::kNoMove);
     while (may_look() && !here_.buried && onward.length >= enough) {
       const Place from = pose_.centre;
-      Real step(SweepRules::kStep);
+      auto step = Real(SweepRules::kStep);
       if (here_.count == 0) step = std::max(step, field_.free_distance(from));
       const Unit capped = step < onward.length ? share<N>(step, onward.length) : Unit(1);
       const Unit part = shrink * std::min(ease, capped);
