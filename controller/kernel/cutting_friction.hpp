@@ -17,8 +17,8 @@ struct FrictionPlan {
   typename N::Unit approach{};     ///< of the low-pass: part of the way done in one tick
 };
 
-/// Time constant of the low-pass: a chip's worth of change, above what a hand follows and below
-/// what the contact's own stiffness would answer with chatter.
+/// Time constant of the low-pass, 80 Hz: slower than the steps that single voxels make, faster than
+/// a hand can follow.
 inline constexpr double kFrictionSmoothingS = 0.002;
 
 template <class N>

@@ -7,6 +7,7 @@
 #include "controller/kernel/contact.hpp"
 #include "controller/kernel/milling.hpp"
 #include "controller/kernel/penetration.hpp"
+#include "controller/kernel/preston.hpp"
 
 using namespace kerf;
 
@@ -53,9 +54,47 @@ constexpr Outcome small_cut() {
 constexpr Outcome kAtCompileTime = small_cut();
 static_assert(kAtCompileTime.contact.x < 0 && kAtCompileTime.removed_steps > 0);
 
+/// Two voxels of a tool cut by the largest force and rate, so that one pass is not enough.
+constexpr std::uint64_t cut_by_largest_force() {
+  using N = FixedNumbers;
+  constexpr VoxelGrid kGrid{6, 5, 5};
+  std::array<Density, kGrid.voxel_count()> density{};
+  for (Density& rho : density) rho = 65535;
+  const std::array<ToolOffset, 2> tool = {ToolOffset{-1, 0, 0}, ToolOffset{1, 0, 0}};
+  ToolPose<N> pose;
+  pose.centre_vox = {Q16(2.25), Q16(2.5), Q16(1.75)};
+  for (std::size_t axis = 0; axis < 3; ++axis) pose.step[axis][axis] = N::kStepOne;
+  std::array<N::Weight, 64> ratios{};
+  OverlapBox<N> covered{ratios, {}, 0};
+  overlap<N>(kGrid, tool, pose, N::kStepOne, covered);
+
+  PrestonPlan<N> plan;
+  plan.rate.fill(force_rate<N>(1e30));
+  Transform<Fixed<24>, WorldSpace, VoxelSpace> rims;
+  Transform<Q30, WorldSpace, ToolSpace> upright;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    rims.row[axis][axis] = Fixed<24>(0.9);
+    upright.row[axis][axis] = Q30(1);
+  }
+  PrestonState<N> state;
+  std::array<CoveredVoxel<N>, 64> memory{};
+  PrestonPress<N> press{Q16(32767), Q30(1.99), {pose.centre_vox, rims, upright}};
+  std::uint64_t steps = 0;
+  for (int tick = 0; tick < 3; ++tick) {
+    steps += cut_by_force(plan, press, kGrid, std::span<Density>(density), covered, state,
+                          std::span<CoveredVoxel<N>>(memory))
+                 .removed.density_steps;
+  }
+  return steps;
+}
+
+constexpr std::uint64_t kForceAtCompileTime = cut_by_largest_force();
+
 }  // namespace
 
 TEST_CASE("a constant expression and the running program give the same bits") {
   CHECK(small_cut() == kAtCompileTime);
   CHECK(double(kAtCompileTime.depth) == 1.0);
+  CHECK(cut_by_largest_force() == kForceAtCompileTime);
+  CHECK(kForceAtCompileTime > 2 * 65534);  // the two voxels of the tool, and more of their rims
 }

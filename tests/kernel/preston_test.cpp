@@ -80,7 +80,13 @@ TEST_CASE_TEMPLATE("without force, below the threshold or with the spindle stand
   }
   CHECK(rig.volume.density == before.density);
   CHECK(rig.state.carry == carry);
-  CHECK(rig.press(kCentre, 0.06).removed.density_steps > 0);
+  // What is above the threshold cuts.
+  auto above = ball_in_block<N>();
+  above.plan.threshold_n = typename N::Real(0.25);
+  double removed = 0;
+  for (int i = 0; i < 100; ++i) removed += double(above.press(kCentre, 0.75).removed.density_steps);
+  CHECK(removed + carried<N>(above.state) ==
+        doctest::Approx(100 * 0.5 * above.scale.steps_per_n(kEnamelG)).epsilon(1e-6));
 }
 
 // F13

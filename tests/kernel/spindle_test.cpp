@@ -90,6 +90,8 @@ TEST_CASE("the surface's speed is the distance from the axis, down to the floor"
     worst = std::max(worst, std::abs(speed - std::clamp(distance, kSpeedFloor, 1.0)));
   }
   CHECK(worst < 2e-4);
+  const auto at_pole = frame_at<FixedNumbers>({20, 20, 20}, 8).at({20, 3, 20});
+  CHECK(std::abs(double(SpindleFrame<FixedNumbers>::speed(at_pole)) / 32768 - 0.08) < 1e-4);
 }
 
 TEST_CASE_TEMPLATE("friction pulls against the surface's motion, and not at the pole", N,
