@@ -56,6 +56,7 @@ struct ServoOutput {
   bool stale = false;      ///< no fresh report in this tick
   bool saturated = false;  ///< force, slew, thermal or motor limit was active
   bool contact = false;    ///< commanded force above 0.01 N
+  bool forbidden = false;  ///< the tool presses on a forbidden material
 
   std::array<std::int32_t, 3> joint_counts{};  ///< unwrapped since calibration
   std::array<double, 3> gimbal_rad{};          ///< yaw, pitch, roll
@@ -68,6 +69,8 @@ struct ServoOutput {
   std::array<double, 3> torque_n_mm{};  ///< motor torques
   double absorbed_mj = 0;               ///< SUM -F_sent . dx since arming; + = taken from the hand
 
+  double spindle_ratio = 0;  ///< speed over the reference speed
+  double spindle_load = 0;   ///< torque over the stall torque
   std::uint32_t active_tool = 0;
   std::uint64_t removed_steps = 0;  ///< density steps removed in this tick, all volumes
   std::array<std::uint64_t, kMaxVolumes> removed_by_volume{};

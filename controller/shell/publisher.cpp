@@ -33,6 +33,7 @@ std::uint32_t flags_of(const DeviceReport& report, const ServoOutput& output) no
   set(output.fault != Fault::none, kFlagDeviceFault);
   set(output.motors_on, kFlagMotorsOn);
   set(output.started, kFlagStarted);
+  set(output.forbidden, kFlagForbidden);
   return flags;
 }
 
@@ -102,6 +103,8 @@ void Publisher::publish(Tick tick, const DeviceReport& report, const ServoOutput
   record.sub_steps = 1;
   record.last_command = last_command;
   put_raw(report, record);
+  record.spindle_ratio = static_cast<float>(output.spindle_ratio);
+  record.spindle_load = static_cast<float>(output.spindle_load);
   record.active_tool = output.active_tool;
   record.fault = static_cast<std::uint32_t>(output.fault);
   record.stale = output.stale ? 1 : 0;
