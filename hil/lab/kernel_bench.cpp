@@ -5,12 +5,14 @@
 #include <cmath>
 #include <cstdint>
 #include <numbers>
+#include <optional>
 #include <span>
 
 #include "controller/kernel/aligned.hpp"
 #include "controller/kernel/contact.hpp"
 #include "controller/kernel/gather.hpp"
 #include "controller/kernel/milling.hpp"
+#include "controller/kernel/preston.hpp"
 #include "controller/kernel/splat.hpp"
 #include "controller/scene/aligned_tool.hpp"
 #include "controller/scene/sample_tool.hpp"
@@ -50,6 +52,18 @@ struct Ticks {
 constexpr std::size_t kWidest = 40;  ///< voxels that the widest milling tool touches
 
 constexpr std::size_t kPaperBytes = 14;  // of 16 a voxel
+constexpr double kEnamelSteps = 2785;    ///< density steps per N and ms, voxels of 0.125 mm
+
+/// The spindle along y, the tool's rim `rim_vox` from it.
+SpindleFrame<Numbers> frame_of(const ToolPose<Numbers>& pose, double rim_vox) {
+  Transform<Numbers::Ratio, WorldSpace, VoxelSpace> rims;
+  Transform<Numbers::Unit, WorldSpace, ToolSpace> upright;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    rims.row[axis][axis] = Numbers::Ratio(1 / rim_vox);
+    upright.row[axis][axis] = Numbers::Unit(1);
+  }
+  return {pose.centre_vox, rims, upright};
+}
 constexpr std::size_t kGatherBytes = sizeof(Gradient<Numbers>);
 
 class Bench {
@@ -143,6 +157,39 @@ class Bench {
     });
   }
 
+  /// Cutting by force at 1 N where the overlap is there already: what it costs beyond that. The
+  /// paper's row is its whole tick of cutting.
+  void press(const std::vector<Density>& density, const Ticks& ticks) {
+    begin(ticks);
+    PaperVolume paper(kGrid, density);
+    row("float", "paper", kPaperBytes * kGrid.voxel_count(), [&](int i) {
+      use(std::lround(
+          paper.mill(ticks.tool, paper_pose(ticks.place(i), kUnturned), 1.0F / 4096).removed));
+    });
+    PrestonPlan<Numbers> plan;
+    plan.rate.fill(force_rate<Numbers>(kEnamelSteps));
+    std::vector<CoveredVoxel<Numbers>> list(kWidest * kWidest * kWidest);
+    each_set(true, [&](const KernelSet& set, const AlignedTable& table, const BoxScratch& scratch,
+                       std::size_t bytes) {
+      std::vector<Density> volume = density;
+      PrestonState<Numbers> state;
+      std::optional<AlignedTick> tick;
+      PrestonPress<Numbers> press{Q16(1), Q30(1), {}};
+      int next = 0;
+      const auto overlap = [&] {
+        const auto pose = pose_of(ticks.place(next++ % ticks.count), kUnturned);
+        press.frame = frame_of(pose, 8);
+        tick.emplace(set, table, scratch, kGrid, volume, pose);
+        use(tick->press().x);
+      };
+      row("fixed", set.name, bytes + sizeof plan + sizeof state, overlap, [&](int) {
+        const auto out = cut_by_force(plan, press, kGrid, std::span<Density>(volume),
+                                      tick->overlap(), state, std::span(list));
+        use(static_cast<std::int64_t>(out.removed.density_steps));
+      });
+    });
+  }
+
   [[nodiscard]] std::vector<KernelRow> rows() && { return std::move(rows_); }
 
  private:
@@ -170,12 +217,16 @@ class Bench {
   template <class Tick>
   void row(const char* numeric, const char* isa, std::size_t bytes, Tick&& tick) {
     const bool cold = ticks_->cold;
-    const TickTimes times = time_ticks(
-        ticks_->count,
-        [&] {
-          if (cold) sweep_cache();
-        },
-        tick);
+    const auto cool = [cold] {
+      if (cold) sweep_cache();
+    };
+    row(numeric, isa, bytes, cool, tick);
+  }
+
+  /// `before` each tick is not timed.
+  template <class Before, class Tick>
+  void row(const char* numeric, const char* isa, std::size_t bytes, Before&& before, Tick&& tick) {
+    const TickTimes times = time_ticks(ticks_->count, before, tick);
     if (baseline_p50_ns_ == 0) baseline_p50_ns_ = times.p50_ns;  // the paper is the first row
     rows_.push_back(
         {ticks_->name, numeric, isa, times.p50_ns, times.p99_ns, baseline_p50_ns_, bytes});
@@ -242,6 +293,16 @@ std::vector<KernelRow> bench_kernels(const std::function<void(const KernelRow&)>
                          return {24 + 0.1 * i, 128.3, 66.8};
                        },
                        .can_align = false});
+  // A groove as wide as the ball, which lies in it a quarter of a voxel deep.
+  const auto groove = densities(kGrid, [](double, double y, double z) {
+    return std::min(96.6 - z, std::hypot(y - 128, z - 92) - 8);
+  });
+  bench.press(groove, {"preston/ball16/groove", tool_of(16, Shape::ball), 400, [](int i) -> Place {
+                         return {24 + 0.1 * i, 128, 91.75};
+                       }});
+  bench.press(density, {"preston/ball16/inside", tool_of(16, Shape::ball), 400, [](int i) -> Place {
+                          return {24 + 0.1 * i, 128.3, 66.8};
+                        }});
   return std::move(bench).rows();
 }
 
