@@ -25,10 +25,8 @@ constexpr FaultWord<BusFault> kBusFaultWords[] = {
     {"back", BusFault::back},
 };
 constexpr FaultWord<UsbFault> kUsbFaultWords[] = {
-    {"stall", UsbFault::stall},
-    {"split", UsbFault::split},
-    {"vanish", UsbFault::vanish},
-    {"back", UsbFault::back},
+    {"stall", UsbFault::stall},   {"split", UsbFault::split}, {"deaf", UsbFault::deaf},
+    {"vanish", UsbFault::vanish}, {"back", UsbFault::back},
 };
 
 /// SECONDS:KIND with one of the bus's words; the cycle, and which word it is.
@@ -67,7 +65,7 @@ void declare_bus(CLI::App& app, BusOptions& o) {
                "firmware)");
   app.add_option("--bus-fault", o.faults,
                  "fronts fuse, usbip, uhid: SECONDS:KIND, repeatable; vanish, back; omni: reset, "
-                 "device-reset, steal; falcon: stall, split");
+                 "device-reset, steal; falcon: stall, split, on fuse also deaf");
 }
 
 FirewireSettings firewire_settings(const BusOptions& o, int lockstep_hz) {

@@ -23,13 +23,21 @@ void DeviceDriver::command(const ServoOutput& output) noexcept {
   if (released_.load(std::memory_order_relaxed)) allowed.motors_on = false;
   if (!allowed.motors_on) allowed.motor_counts = {};
   Packet packet;
-  if (const std::size_t size = compose(allowed, packet)) port_.send(std::span(packet).first(size));
+  const std::size_t size = compose(allowed, packet);
+  const bool lets_go = forcing_ && !allowed.motors_on;
+  if (lets_go) {
+    port_.send_now(std::span(packet).first(size));
+  } else {
+    port_.send(std::span(packet).first(size));
+  }
+  forcing_ = allowed.motors_on;
+  if (forcing_ && released_.load()) release();  // meanwhile, by another thread
 }
 
 bool DeviceDriver::release() const noexcept {
   Packet packet;
   const std::size_t size = compose_release(packet);
-  return port_.send(std::span(packet).first(size));
+  return port_.send_now(std::span(packet).first(size));
 }
 
 bool DeviceDriver::release_for_good() noexcept {

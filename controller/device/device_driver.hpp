@@ -32,7 +32,8 @@ class DeviceDriver {
   /// `kMaxDrain` packets are taken, so a flood cannot hold the servo.
   [[nodiscard]] DeviceReport read() noexcept;
 
-  /// Sends the motor counts of this tick, with the lights that tell the phase.
+  /// Sends the motor counts of this tick, with the lights that tell the phase. Where packets take
+  /// turns, one that switches the motors off goes out of turn.
   void command(const ServoOutput& output) noexcept;
 
   /// Motors off now: one packet. False when it could not be sent. Any thread, any signal handler.
@@ -55,7 +56,7 @@ class DeviceDriver {
   /// Translates a packet of the device over the last report. False: it is none, or an old one.
   [[nodiscard]] virtual bool take(std::span<const std::uint8_t> packet,
                                   DeviceReport& report) noexcept = 0;
-  /// The packet for `output` into `packet`; its size, or 0 to send nothing in this tick.
+  /// The packet for `output` into `packet`; its size.
   [[nodiscard]] virtual std::size_t compose(const ServoOutput& output, Packet& packet) noexcept = 0;
   /// The packet that switches the motors off. Any thread.
   [[nodiscard]] virtual std::size_t compose_release(Packet& packet) const noexcept = 0;
@@ -67,6 +68,7 @@ class DeviceDriver {
 
   PacketPort& port_;
   std::atomic<bool> released_{false};
+  bool forcing_ = false;  ///< by the last command
   DeviceReport last_;
   std::uint64_t refused_ = 0;
 };

@@ -9,13 +9,12 @@
 namespace kerf {
 
 void FalconDriver::start() noexcept {
-  if (release()) unanswered_ticks_ = 0;
+  static_cast<void>(release());
 }
 
 bool FalconDriver::take(std::span<const std::uint8_t> packet, DeviceReport& report) noexcept {
   const auto said = falcon::decode_report(packet);
   if (!said) return false;
-  unanswered_ticks_ = kPatienceTicks;
   homed_ = std::ranges::all_of(said->homed, [](bool homed) { return homed; });
   report.encoder = said->encoder;
   report.button1 = (said->buttons & falcon::kButtonForward) != 0;
@@ -27,13 +26,6 @@ bool FalconDriver::take(std::span<const std::uint8_t> packet, DeviceReport& repo
 }
 
 std::size_t FalconDriver::compose(const ServoOutput& output, Packet& packet) noexcept {
-  const bool lets_go = forcing_ && !output.motors_on;
-  if (unanswered_ticks_ < kPatienceTicks && !lets_go) {
-    ++unanswered_ticks_;
-    return 0;
-  }
-  unanswered_ticks_ = 0;
-  forcing_ = output.motors_on;
   const bool asks = output.phase == Phase::off || output.phase == Phase::calibrating;
   const bool fault = output.phase == Phase::fault;
   const auto bytes = encode(FalconCommand{.motor = output.motor_counts,

@@ -10,8 +10,8 @@ namespace kerf {
 /// The narrow place where a bus ends and a driver begins: whole packets in, whole packets out.
 ///
 /// What stands behind it (a socket to an emulator, FireWire, USB, HID) is invisible to the
-/// driver. Never blocks, never allocates, never throws. Servo thread only, but for `send`,
-/// `send_last` and `closed`, which any thread and any signal handler may call.
+/// driver. Never blocks, never allocates, never throws. Servo thread only, but for the ways to send
+/// and `closed`, which any thread and any signal handler may call.
 class PacketPort {
  public:
   virtual ~PacketPort() = default;
@@ -23,8 +23,11 @@ class PacketPort {
   /// False when the packet could not be sent now; the next tick sends a newer one.
   virtual bool send(std::span<const std::uint8_t> packet) noexcept = 0;
 
-  /// As `send`, but for the last packet of a process that may end at once: where packets leave by
-  /// another thread, it waits up to 20 ms until this one has left.
+  /// As `send`, but where host and device take turns, out of turn.
+  virtual bool send_now(std::span<const std::uint8_t> packet) noexcept { return send(packet); }
+
+  /// As `send_now`, but for the last packet of a process that may end at once: where packets leave
+  /// by another thread, it waits up to 20 ms until this one has left.
   virtual bool send_last(std::span<const std::uint8_t> packet) noexcept { return send(packet); }
 
   /// True once the other end is gone for good.

@@ -48,34 +48,43 @@ UsbPort::UsbPort(const UsbOptions& options, int patience_ms, const std::atomic<b
   } catch (const std::runtime_error& error) {
     refuse_usb(options.where, error.what());
   }
-  const auto prepare = [this](Transfer& transfer, std::uint8_t endpoint) {
-    transfer.port = this;
-    transfer.usb = libusb_alloc_transfer(0);
-    libusb_fill_bulk_transfer(
-        transfer.usb, device_->handle(), endpoint, transfer.bytes.data(),
-        static_cast<int>(transfer.bytes.size()),
-        [](libusb_transfer* usb) {
-          auto& done = *static_cast<Transfer*>(usb->user_data);
-          done.port->finished(done);
-        },
-        &transfer, 0);
-  };
   for (Transfer& read : reads_) prepare(read, falcon::kEndpointIn);
-  for (Transfer& write : writes_) prepare(write, falcon::kEndpointOut);
+  prepare(write_, falcon::kEndpointOut);
   thread_ = std::thread([this] { run(); });
+}
+
+void UsbPort::prepare(Transfer& transfer, std::uint8_t endpoint) {
+  transfer.port = this;
+  transfer.usb = libusb_alloc_transfer(0);
+  libusb_fill_bulk_transfer(
+      transfer.usb, device_->handle(), endpoint, transfer.bytes.data(),
+      static_cast<int>(transfer.bytes.size()),
+      [](libusb_transfer* usb) {
+        auto& done = *static_cast<Transfer*>(usb->user_data);
+        done.port->finished(done);
+      },
+      &transfer, 0);
 }
 
 UsbPort::~UsbPort() {
   stop_ = true;
   if (thread_.joinable()) thread_.join();
-  for (Transfer& transfer : transfers_) {
+  const auto free = [](const Transfer& transfer) {
     if (!transfer.busy) libusb_free_transfer(transfer.usb);
-  }
+  };
+  std::ranges::for_each(reads_, free);
+  free(write_);
+}
+
+bool UsbPort::send_now(std::span<const std::uint8_t> packet) noexcept {
+  const bool is_put = send(packet);
+  hurry_ = true;
+  return is_put;
 }
 
 bool UsbPort::send_last(std::span<const std::uint8_t> packet) noexcept {
   if (gettid() == thread_id_) return false;  // nobody is left to send it
-  return outbox_.send_and_wait([&] { return send(packet); }, kLastPacketMs);
+  return outbox_.send_and_wait([&] { return send_now(packet); }, kLastPacketMs);
 }
 
 bool UsbPort::wait(int milliseconds) noexcept {
@@ -98,11 +107,10 @@ void UsbPort::run() noexcept {
   static_cast<void>(pin_to_core(allowed_cores().back()));
   static_cast<void>(set_fifo(kPriority));
   for (Transfer& read : reads_) submit(read);
-  while (!closed()) {
+  while (!closed() && !stop_) {
     send_waiting();
-    if (stop_ && outbox_.empty() && !any_busy(writes_)) break;
     const std::int64_t now_ns = monotonic_ns();
-    if (now_ns < reply_due_ns_) {
+    if (turns_.ours(now_ns) && now_ns < reply_due_ns_) {
       sleep_until_ns(now_ns + kLookNs);
     } else {
       handle_events(kEventsNs);
@@ -110,9 +118,22 @@ void UsbPort::run() noexcept {
     }
   }
   stop_ = true;
+  send_rest();
   const std::int64_t until_ns = monotonic_ns() + kCloseNs;
-  for (Transfer& transfer : transfers_) libusb_cancel_transfer(transfer.usb);
-  while (any_busy(transfers_) && monotonic_ns() < until_ns) {
+  for (Transfer& read : reads_) libusb_cancel_transfer(read.usb);
+  libusb_cancel_transfer(write_.usb);
+  const auto any_busy = [this] {
+    return write_.busy || std::ranges::any_of(reads_, &Transfer::busy);
+  };
+  while (any_busy() && monotonic_ns() < until_ns) handle_events(kEventsNs);
+}
+
+/// Of what waits at the end, as much as the device takes in time.
+void UsbPort::send_rest() noexcept {
+  const std::int64_t until_ns = monotonic_ns() + kLastPacketMs * 1'000'000;
+  while (!closed() && (write_.busy || !outbox_.empty()) && monotonic_ns() < until_ns) {
+    hurry_ = true;
+    send_waiting();
     handle_events(kEventsNs);
   }
 }
@@ -129,17 +150,21 @@ void UsbPort::submit(Transfer& transfer) noexcept {
   }
 }
 
+/// The newest command, when it is our turn or will not wait for it.
 void UsbPort::send_waiting() noexcept {
-  if (outbox_.empty()) return;
-  for (Transfer& write : writes_) {
-    if (write.busy) continue;
-    const std::size_t size = outbox_.take(write.bytes);
-    if (size == 0) break;
-    write.usb->length = static_cast<int>(size);
-    submit(write);
-    reply_due_ns_ = 0;
+  const std::int64_t now_ns = monotonic_ns();
+  if (outbox_.empty() || (!hurry_ && !turns_.ours(now_ns))) return;
+  if (write_.busy) {  // has grown old on its way
+    libusb_cancel_transfer(write_.usb);
+    return;
   }
-  outbox_.set_on_its_way(any_busy(writes_));
+  hurry_ = false;
+  const std::size_t size = outbox_.take(write_.bytes);
+  if (size == 0) return;
+  write_.usb->length = static_cast<int>(size);
+  submit(write_);
+  if (write_.busy) turns_.sent(now_ns);
+  outbox_.set_on_its_way(write_.busy);
 }
 
 void UsbPort::finished(Transfer& transfer) noexcept {
@@ -156,6 +181,7 @@ void UsbPort::finished(Transfer& transfer) noexcept {
       }
       break;
     case LIBUSB_TRANSFER_CANCELLED:
+      if (!is_read) turns_.answered();  // it will not be
       break;
     case LIBUSB_TRANSFER_NO_DEVICE:
       closed_ = true;
@@ -166,7 +192,7 @@ void UsbPort::finished(Transfer& transfer) noexcept {
       if (++failures_in_a_row_ > kMostFailures) closed_ = true;
   }
   if (is_read && !transfer.halted && !stop_ && !closed()) submit(transfer);
-  if (!is_read) outbox_.set_on_its_way(any_busy(writes_));
+  if (!is_read) outbox_.set_on_its_way(false);
 }
 
 /// One packet of the chip: two bytes of status, then what came over the serial line.
@@ -174,9 +200,11 @@ void UsbPort::hear(std::span<const std::uint8_t> bytes) noexcept {
   for (std::size_t i = falcon::kFtdiStatusBytes; i < bytes.size(); ++i) {
     if (!framer_.take(bytes[i])) continue;
     ++(inbox_.put(framer_.packet()) ? packets_ : overflow_);
+    turns_.answered();
     reply_due_ns_ = monotonic_ns() + kReplyNs;
   }
   strays_ = framer_.strays();
+  if (!stop_) send_waiting();
 }
 
 /// A stalled endpoint is freed, and read from again; a packet that was lost there is not repeated.
@@ -185,7 +213,7 @@ void UsbPort::repair() noexcept {
     if (transfer.halted) libusb_clear_halt(device_->handle(), transfer.usb->endpoint);
     return std::exchange(transfer.halted, false);
   };
-  for (Transfer& write : writes_) clear(write);
+  clear(write_);
   for (Transfer& read : reads_) {
     if (clear(read)) submit(read);
   }
@@ -194,10 +222,6 @@ void UsbPort::repair() noexcept {
 void UsbPort::handle_events(std::int64_t ns) noexcept {
   timeval patience{0, static_cast<suseconds_t>(ns / 1000)};
   libusb_handle_events_timeout_completed(device_->context(), &patience, nullptr);
-}
-
-bool UsbPort::any_busy(std::span<const Transfer> transfers) const noexcept {
-  return std::ranges::any_of(transfers, &Transfer::busy);
 }
 
 }  // namespace kerf

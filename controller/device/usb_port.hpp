@@ -11,6 +11,7 @@
 
 #include "controller/device/io_mailbox.hpp"
 #include "controller/device/packet_port.hpp"
+#include "controller/device/turns.hpp"
 #include "controller/device/usb_falcon.hpp"
 #include "shared/wire/falcon_framer.hpp"
 
@@ -32,12 +33,16 @@ struct UsbLinkStats {
 /// libusb allocates in every submit and sleeps in system calls, so a thread of its own does the
 /// input and output, with transfers that were allocated before and have no time-out. The servo
 /// touches only the mailbox: `receive` and `send` neither call the system, nor lock, nor allocate.
-/// Because nobody wakes the thread, it looks: every 50 us while the servo owes a packet, otherwise
-/// whenever a transfer ends, which the chip's latency timer makes happen once a millisecond.
 ///
-/// On the way out the destructor sends what waits. `send_last`, for the handler of a crash, waits
-/// until it is sent; only where the I/O thread itself has crashed, or on SIGKILL, the last packet
-/// stays behind.
+/// Host and device take turns. Each answer sends the newest command that waits, so it does not
+/// matter where in the device's frame the servo ticks. Where none waits the thread looks for one
+/// every 50 us, because nobody wakes it; otherwise whenever a transfer ends, which the chip's
+/// latency timer makes happen once a millisecond. A command that the device does not take in its
+/// turn is taken back for a newer one; `send_now` goes out of turn.
+///
+/// On the way out the destructor sends what waits, for 20 ms at most. `send_last`, for the handler
+/// of a crash, waits until it is sent; only where the I/O thread itself has crashed, or on SIGKILL,
+/// the last packet stays behind.
 class UsbPort final : public PacketPort {
  public:
   /// Finds the device, claims it, starts its firmware. Tries for `patience_ms` while none is there,
@@ -53,6 +58,7 @@ class UsbPort final : public PacketPort {
   bool send(std::span<const std::uint8_t> packet) noexcept override {
     return !closed() && outbox_.put(packet);
   }
+  bool send_now(std::span<const std::uint8_t> packet) noexcept override;
   bool send_last(std::span<const std::uint8_t> packet) noexcept override;
   [[nodiscard]] bool closed() const noexcept override {
     return closed_.load(std::memory_order_relaxed);
@@ -64,7 +70,6 @@ class UsbPort final : public PacketPort {
 
  private:
   static constexpr std::size_t kReads = 4;
-  static constexpr std::size_t kWrites = 4;
   struct Transfer {
     UsbPort* port = nullptr;
     libusb_transfer* usb = nullptr;
@@ -73,27 +78,29 @@ class UsbPort final : public PacketPort {
     std::array<std::uint8_t, falcon::kFtdiPacketBytes> bytes{};
   };
 
+  void prepare(Transfer& transfer, std::uint8_t endpoint);
   void run() noexcept;
+  void send_rest() noexcept;
   void submit(Transfer& transfer) noexcept;
   void send_waiting() noexcept;
   void finished(Transfer& transfer) noexcept;
   void hear(std::span<const std::uint8_t> bytes) noexcept;
   void repair() noexcept;
   void handle_events(std::int64_t ns) noexcept;
-  [[nodiscard]] bool any_busy(std::span<const Transfer> transfers) const noexcept;
 
   std::unique_ptr<UsbFalcon> device_;
   Inbox inbox_;
   Outbox outbox_;
   std::atomic<bool> closed_{false}, stop_{false};
+  std::atomic<bool> hurry_{false};  ///< what waits does so for no turn
   std::atomic<int> thread_id_{0};
   std::atomic<std::uint64_t> packets_{0}, overflow_{0}, strays_{0}, commands_{0}, failures_{0};
 
   // I/O thread only.
-  std::array<Transfer, kReads + kWrites> transfers_{};
-  std::span<Transfer> reads_ = std::span(transfers_).first(kReads);
-  std::span<Transfer> writes_ = std::span(transfers_).last(kWrites);
+  std::array<Transfer, kReads> reads_{};
+  Transfer write_;
   falcon::Framer framer_;
+  Turns turns_;
   std::int64_t reply_due_ns_ = 0;  ///< until then the servo's answer to a packet is looked for
   int failures_in_a_row_ = 0;
   std::thread thread_;

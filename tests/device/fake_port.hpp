@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <deque>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -24,8 +25,13 @@ class FakePort final : public PacketPort {
     return packet.size();
   }
   bool send(std::span<const std::uint8_t> packet) noexcept override {
+    if (before_send) before_send();
     sent.emplace_back(packet.begin(), packet.end());
     return true;
+  }
+  bool send_now(std::span<const std::uint8_t> packet) noexcept override {
+    ++sent_now;
+    return send(packet);
   }
   bool closed() const noexcept override { return false; }
   bool wait(int) noexcept override { return !incoming.empty(); }
@@ -37,7 +43,9 @@ class FakePort final : public PacketPort {
 
   std::deque<std::vector<std::uint8_t>> incoming;
   std::vector<std::vector<std::uint8_t>> sent;
+  int sent_now = 0;  ///< of these, out of turn
   int receive_calls = 0;
+  std::function<void()> before_send;
 };
 
 }  // namespace kerf::test

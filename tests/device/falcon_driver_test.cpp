@@ -43,31 +43,33 @@ TEST_CASE("falcon: the host begins, with the motors off") {
   CHECK(last_sent(port) == FalconCommand{});
 }
 
-TEST_CASE("falcon: one command to each answer; a lost turn is taken again after a while") {
+TEST_CASE("falcon: every tick leaves a command; what switches the motors off goes out of turn") {
   FakePort port;
   kerf::FalconDriver driver(port);
   driver.start();
+  CHECK(port.sent_now == 1);
   driver.command(forcing());
-  CHECK(port.sent.size() == 1);  // no answer yet: it is the device's turn
-  port.push(kerf::encode(FalconReport{.homed = kHomed}));
-  CHECK(driver.read().fresh);
-  driver.command(forcing());
-  CHECK(port.sent.size() == 2);
-  for (int tick = 0; tick < 4; ++tick) driver.command(forcing());
-  CHECK(port.sent.size() == 2);
   driver.command(forcing());
   CHECK(port.sent.size() == 3);
-}
-
-TEST_CASE("falcon: motors off does not wait for its turn") {
-  FakePort port;
-  kerf::FalconDriver driver(port);
-  driver.command(forcing());
+  CHECK(port.sent_now == 1);
   driver.command({});
-  REQUIRE(port.sent.size() == 2);
+  CHECK(port.sent_now == 2);
   CHECK(last_sent(port).motor == std::array<std::int16_t, 3>{});
   driver.command({});
-  CHECK(port.sent.size() == 2);
+  CHECK(port.sent.size() == 5);
+  CHECK(port.sent_now == 2);
+}
+
+TEST_CASE("falcon: a release by another thread in the middle of a command has the last word") {
+  FakePort port;
+  kerf::FalconDriver driver(port);
+  port.before_send = [&] {
+    port.before_send = nullptr;
+    CHECK(driver.release_for_good());
+  };
+  driver.command(forcing());
+  REQUIRE(port.sent.size() == 3);
+  CHECK(last_sent(port).motor == std::array<std::int16_t, 3>{});
 }
 
 TEST_CASE("falcon: reports carry counts, buttons and homing of all three axes") {

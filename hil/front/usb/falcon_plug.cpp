@@ -7,7 +7,7 @@
 namespace kerf {
 namespace {
 
-constexpr int kSplitFrames = 100;
+constexpr int kFaultFrames = 100;
 constexpr std::uint8_t kToEndpoint = 0x02;    // bmRequestType (USB 2.0, 9.4)
 constexpr std::uint8_t kClearFeature = 0x01;  // value 0: ENDPOINT_HALT
 
@@ -42,7 +42,10 @@ void FalconPlug::strike(UsbFault fault, UsbHost& host) {
       halted_ = true;
       return;
     case UsbFault::split:
-      return chip_.slow_down(kSplitFrames);
+      return chip_.slow_down(kFaultFrames);
+    case UsbFault::deaf:
+      deaf_until_ = chip_.time().cycle() + kFaultFrames * kCyclesPerUsbFrame;
+      return;
     case UsbFault::vanish:
     case UsbFault::back:
       present_ = fault == UsbFault::back;

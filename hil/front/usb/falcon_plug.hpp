@@ -41,6 +41,8 @@ class FalconPlug {
   /// Frees an endpoint; false where there is none of that address.
   bool clear_halt(unsigned endpoint) noexcept;
   void out(std::span<const std::uint8_t> bytes) { chip_.out(bytes); }
+  /// It takes nothing now.
+  [[nodiscard]] bool deaf() const noexcept { return chip_.time().cycle() < deaf_until_; }
 
   [[nodiscard]] bool present() const noexcept { return present_; }
   [[nodiscard]] const FtdiFalcon& chip() const noexcept { return chip_; }
@@ -52,6 +54,7 @@ class FalconPlug {
   UsbFaultScript script_;
   bool present_ = true;
   bool halted_ = false;  ///< the endpoint that is read
+  std::int64_t deaf_until_ = 0;
 };
 
 }  // namespace kerf

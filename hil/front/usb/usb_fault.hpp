@@ -12,6 +12,7 @@ namespace kerf {
 enum class UsbFault : std::uint8_t {
   stall,   ///< the endpoint that is read halts until the host clears it (Falcon)
   split,   ///< for 0.1 s the serial line is slow: packets come in pieces (Falcon)
+  deaf,    ///< for 0.1 s it takes nothing: what the host writes has to wait (Falcon on usbfs)
   vanish,  ///< unplugged
   back,    ///< plugged in again, without power having been lost
 };

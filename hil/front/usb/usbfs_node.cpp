@@ -39,7 +39,7 @@ std::optional<T> argument(const FuseIoctl& call) noexcept {
 }  // namespace
 
 void UsbfsNode::open(FuseOpen open) {
-  plug_.catch_up(*this);
+  catch_up();
   opens_[open];
 }
 
@@ -62,7 +62,7 @@ std::optional<FuseAnswer> UsbfsNode::write(FuseOpen /*open*/, FuseRequest /*requ
 }
 
 std::optional<FuseAnswer> UsbfsNode::ioctl(FuseOpen id, const FuseIoctl& call) {
-  plug_.catch_up(*this);
+  catch_up();
   Open& open = opens_.at(id);
   const auto answer = [this](int result) {
     deliver();
@@ -182,17 +182,27 @@ int UsbfsNode::submit_control(Open& open, Urb urb, pid_t thread) {
 
 int UsbfsNode::submit_bulk(Open& open, Urb urb, pid_t thread) {
   if (urb.endpoint == falcon::kEndpointIn) {
-    open.pending.push_back(std::move(urb));
+    open.reads.push_back(std::move(urb));
     return 0;
   }
   if (urb.endpoint != falcon::kEndpointOut) return -ENOENT;
-  std::vector<std::uint8_t> bytes(static_cast<std::size_t>(urb.buffer_bytes));
-  if (read_caller(thread, urb.buffer, bytes) != bytes.size()) return -EFAULT;
+  urb.data.resize(static_cast<std::size_t>(urb.buffer_bytes));
+  if (read_caller(thread, urb.buffer, urb.data) != urb.data.size()) return -EFAULT;
   used_ = true;
-  plug_.out(bytes);
-  urb.actual_bytes = urb.buffer_bytes;
-  finish(open, std::move(urb), 0);
+  open.writes.push_back(std::move(urb));
+  take_writes(open);
   return 0;
+}
+
+void UsbfsNode::take_writes(Open& open) {
+  while (!plug_.deaf() && !open.writes.empty()) {
+    Urb urb = std::move(open.writes.front());
+    open.writes.pop_front();
+    plug_.out(urb.data);
+    urb.data.clear();  // nothing comes back
+    urb.actual_bytes = urb.buffer_bytes;
+    finish(open, std::move(urb), 0);
+  }
 }
 
 void UsbfsNode::finish(Open& open, Urb urb, int status) {
@@ -216,16 +226,20 @@ int UsbfsNode::reap(Open& open, const FuseIoctl& call) {
 }
 
 int UsbfsNode::discard(Open& open, std::uint64_t address) {
-  const auto found = std::ranges::find(open.pending, address, &Urb::address);
-  if (found == open.pending.end()) return -EINVAL;
-  Urb urb = std::move(*found);
-  open.pending.erase(found);
-  finish(open, std::move(urb), -ENOENT);
-  return 0;
+  for (std::deque<Urb>* const urbs : {&open.reads, &open.writes}) {
+    const auto found = std::ranges::find(*urbs, address, &Urb::address);
+    if (found == urbs->end()) continue;
+    Urb urb = std::move(*found);
+    urbs->erase(found);
+    urb.data.clear();
+    finish(open, std::move(urb), -ENOENT);
+    return 0;
+  }
+  return -EINVAL;
 }
 
 std::uint32_t UsbfsNode::poll(FuseOpen id, bool /*sleeps*/) {
-  plug_.catch_up(*this);
+  catch_up();
   Open& open = opens_.at(id);
   deliver();
   std::uint32_t now = 0;
@@ -243,13 +257,18 @@ std::int64_t UsbfsNode::next_wake_ns() const noexcept {
 }
 
 void UsbfsNode::wake() {
-  plug_.catch_up(*this);
+  catch_up();
   deliver();
+}
+
+void UsbfsNode::catch_up() {
+  plug_.catch_up(*this);
+  for (auto& [id, open] : opens_) take_writes(open);
 }
 
 UsbfsNode::Open* UsbfsNode::reader() {
   for (auto& [id, open] : opens_) {
-    if (!open.pending.empty()) return &open;
+    if (!open.reads.empty()) return &open;
   }
   return nullptr;
 }
@@ -257,13 +276,13 @@ UsbfsNode::Open* UsbfsNode::reader() {
 std::optional<std::size_t> UsbfsNode::room() {
   const Open* open = reader();
   if (!open) return std::nullopt;
-  return static_cast<std::size_t>(open->pending.front().buffer_bytes);
+  return static_cast<std::size_t>(open->reads.front().buffer_bytes);
 }
 
 void UsbfsNode::complete_read(int status, std::span<const std::uint8_t> bytes) {
   Open& open = *reader();
-  Urb urb = std::move(open.pending.front());
-  open.pending.pop_front();
+  Urb urb = std::move(open.reads.front());
+  open.reads.pop_front();
   urb.data.assign(bytes.begin(), bytes.end());
   urb.actual_bytes = static_cast<int>(bytes.size());
   finish(open, std::move(urb), status);
@@ -275,10 +294,11 @@ void UsbfsNode::plugged(bool in) {
   for (auto& [id, open] : opens_) {
     open.gone = true;
     open.announced = false;
-    while (!open.pending.empty()) {
-      Urb urb = std::move(open.pending.front());
-      open.pending.pop_front();
-      finish(open, std::move(urb), -ESHUTDOWN);
+    for (std::deque<Urb>* const urbs : {&open.reads, &open.writes}) {
+      for (; !urbs->empty(); urbs->pop_front()) {
+        urbs->front().data.clear();
+        finish(open, std::move(urbs->front()), -ESHUTDOWN);
+      }
     }
   }
 }

@@ -61,7 +61,7 @@ class UsbfsNode final : public FuseNode, private UsbHost {
     std::size_t data_offset = 0;
   };
   struct Open {
-    std::deque<Urb> pending, done;
+    std::deque<Urb> reads, writes, done;
     bool announced = false;  ///< pollers know of what is done
     bool gone = false;       ///< the device was unplugged: nothing works any more
   };
@@ -84,6 +84,8 @@ class UsbfsNode final : public FuseNode, private UsbHost {
   void complete_read(int status, std::span<const std::uint8_t> bytes) override;
   void plugged(bool in) override;
   [[nodiscard]] Open* reader();
+  void catch_up();
+  void take_writes(Open& open);
   void deliver();
 
   FuseReplies* replies_ = nullptr;

@@ -73,7 +73,7 @@ TEST_CASE("kerf-emulator --front fuse knows the faults and the limits of each bu
     return outcome.err;
   };
   CHECK(refused("falcon", {"--bus-fault", "1:steal"})
-            .find("1:steal is not SECONDS:KIND with one of stall, split, vanish, back") !=
+            .find("1:steal is not SECONDS:KIND with one of stall, split, deaf, vanish, back") !=
         std::string::npos);
   CHECK(refused("omni", {"--bus-fault", "1:stall"}).find("one of reset, device-reset") !=
         std::string::npos);
