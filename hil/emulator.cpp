@@ -41,13 +41,6 @@ std::span<const std::uint8_t> Emulator::next_packet() noexcept {
   asked_ = true;
   const std::span<const std::uint8_t> packet = model_->next_packet();
   if (packet.empty()) return {};
-  ++packets_;
-  const bool lost = faults_.drop_every > 0 && packets_ % faults_.drop_every == 0;
-  const bool silent = faults_.silent_after > 0 && stats_.cycles > faults_.silent_after;
-  if (lost || silent) {
-    ++stats_.withheld;
-    return {};
-  }
   ++stats_.reports;
   for (const std::uint8_t byte : packet) {
     stats_.report_hash = (stats_.report_hash ^ byte) * 0x0000'0100'0000'01B3;

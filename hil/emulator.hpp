@@ -16,17 +16,10 @@
 
 namespace kerf {
 
-/// Scripted faults of the device, 0 = never.
-struct EmulatorFaults {
-  std::int64_t drop_every = 0;    ///< each n-th packet is lost after it was counted
-  std::int64_t silent_after = 0;  ///< bus cycles; then the device says nothing any more
-};
-
 /// What a run has shown so far.
 struct EmulatorStats {
   std::int64_t cycles = 0;
-  std::uint64_t reports = 0;   ///< handed to the front
-  std::uint64_t withheld = 0;  ///< by faults
+  std::uint64_t reports = 0;  ///< handed out
   std::uint64_t commands = 0;
   std::uint64_t refused = 0;  ///< packets that were no commands
   double peak_motor_force_n = 0;
@@ -34,8 +27,8 @@ struct EmulatorStats {
   std::uint64_t report_hash = 0xCBF2'9CE4'8422'2325;  ///< FNV-1a of all handed-out bytes
 };
 
-/// A device, its hand and its faults behind packets: no clock, no socket, so a front in real time,
-/// one in lock-step and a test run the same thing.
+/// A device and its hand behind packets: no clock, no socket, so a front in real time, one in
+/// lock-step and a test run the same thing.
 ///
 /// The hand waits until the host has the device calibrated, helps where it must (homes a Falcon,
 /// presses the button of WoodenHaptics), and plays its script 0.2 s later. For a host that does not
@@ -44,15 +37,13 @@ struct EmulatorStats {
 class Emulator final : public PacketDevice {
  public:
   template <std::derived_from<DeviceModel> Model>
-  Emulator(std::unique_ptr<Model> model, const std::optional<HandScript>& script,
-           const EmulatorFaults& faults = {})
-      : model_(std::move(model)), faults_(faults) {
+  Emulator(std::unique_ptr<Model> model, const std::optional<HandScript>& script)
+      : model_(std::move(model)) {
     if (script) hand_.emplace(*script, model_->route());
   }
   /// An Omni.
-  Emulator(const OmniParams& params, const std::optional<HandScript>& script,
-           const EmulatorFaults& faults = {})
-      : Emulator(std::make_unique<OmniModel>(params), script, faults) {}
+  Emulator(const OmniParams& params, const std::optional<HandScript>& script)
+      : Emulator(std::make_unique<OmniModel>(params), script) {}
 
   void receive(std::span<const std::uint8_t> packet) noexcept override;
   void advance(int cycles) noexcept override;
@@ -66,11 +57,9 @@ class Emulator final : public PacketDevice {
 
   std::unique_ptr<DeviceModel> model_;
   std::optional<HandMotion> hand_;
-  EmulatorFaults faults_;
   EmulatorStats stats_;
   bool asked_ = false;  ///< for a packet, since the last `advance`
   std::optional<std::int64_t> calibrated_at_;
-  std::int64_t packets_ = 0;  ///< of the device, handed out or not
 };
 
 }  // namespace kerf

@@ -13,7 +13,6 @@ namespace kerf {
 namespace {
 
 constexpr double kMaxSeconds = 1e6;
-constexpr double kMaxDropEvery = 1e9;
 constexpr double kMaxInertiaKgM2 = 0.1;
 constexpr double kMaxModeHz = 1000;  // beyond, a step of 31 us no longer resolves it
 
@@ -68,10 +67,6 @@ void declare_device(CLI::App& app, EmulatorOptions& o) {
   app.add_flag("--wireless-button", o.wireless_button,
                "woodenhaptics: the hand's first button shows on encoder d");
   app.add_option("--seed", o.seed, "of the noise")->capture_default_str();
-  app.add_option("--drop-every", o.drop_every, "fault: lose each n-th packet")
-      ->check(between(0, kMaxDropEvery));
-  app.add_option("--stop-after", o.stop_after_s, "fault: fall silent after so many seconds")
-      ->check(between(0.0, kMaxSeconds));
 }
 
 template <std::size_t N>
@@ -113,9 +108,10 @@ void check_front(const EmulatorOptions& o) {
     throw HilError("--rate: " + std::to_string(o.rate_hz) + " does not divide " +
                    std::to_string(fastest) + ", the rate of the bus; use such as 500 or 1000");
   }
-  if (o.lockstep && (o.drop_every > 0 || o.stop_after_s > 0 || !o.fault.empty())) {
+  if (o.lockstep && !o.fault.empty()) {
     throw HilError(
-        "--lockstep: a lost packet would stop both sides for ever; use the faults in real time");
+        "--fault: in lock-step a lost packet would stop both sides for ever; use the faults in "
+        "real time");
   }
 }
 

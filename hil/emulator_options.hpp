@@ -30,8 +30,6 @@ struct EmulatorOptions {
   int cpu = -1;
   bool stay = false;
   double seconds = 0;
-  std::int64_t drop_every = 0;
-  double stop_after_s = 0;
   double joint_inertia_kg_m2 = 0;
   double mode_hz = 0;
   bool drop_torque = false;

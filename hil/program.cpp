@@ -71,7 +71,7 @@ Emulator make_emulator(const EmulatorOptions& o) {
     script = read_hand_script(o.hand);
     if (o.unit_mm) script->unit_mm = *o.unit_mm;
   }
-  return Emulator(make_device(o), script, {o.drop_every, cycles_of(o.stop_after_s)});
+  return Emulator(make_device(o), script);
 }
 
 /// Serves the clients of a port that is open already.
@@ -136,7 +136,7 @@ void serve(const EmulatorOptions& o, const std::atomic<bool>& stop, std::ostream
     SeqpacketServer server(o.socket);
     serve_clients(o, server, o.socket, device, stats, limits, out);
   }
-  if (!o.report.empty()) write_run_report(o.report, emulator, stats);
+  if (!o.report.empty()) write_run_report(o.report, emulator, device.withheld(), stats);
 }
 
 }  // namespace

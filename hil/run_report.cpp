@@ -32,7 +32,8 @@ void check_report(const std::string& file) {
   }
 }
 
-void write_run_report(const std::string& file, const Emulator& emulator, const FrontStats& front) {
+void write_run_report(const std::string& file, const Emulator& emulator, std::uint64_t withheld,
+                      const FrontStats& front) {
   const EmulatorStats& stats = emulator.stats();
   const DeviceVec<double> tip = emulator.model().tip_mm();
   nlohmann::ordered_json report;
@@ -40,7 +41,7 @@ void write_run_report(const std::string& file, const Emulator& emulator, const F
   report["seconds"] = seconds_of(stats.cycles);
   report["packets_sent"] = front.sent;
   report["packets_dropped"] = front.dropped;
-  report["packets_withheld"] = stats.withheld;
+  report["packets_withheld"] = withheld;
   report["commands_received"] = stats.commands;
   report["commands_refused"] = stats.refused;
   report["resyncs"] = front.resyncs;

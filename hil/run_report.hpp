@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <string>
 
 #include "hil/emulator.hpp"
@@ -12,7 +13,9 @@ namespace kerf {
 void check_report(const std::string& file);
 
 /// Writes what a run has shown as JSON: under another name first, then renamed, so the file is
-/// whole or absent. Times in s from the first client on, device time. Throws `HilError`.
-void write_run_report(const std::string& file, const Emulator& emulator, const FrontStats& front);
+/// whole or absent. Times in s from the first client on, device time. `withheld`: packets that
+/// faults kept from the host. Throws `HilError`.
+void write_run_report(const std::string& file, const Emulator& emulator, std::uint64_t withheld,
+                      const FrontStats& front);
 
 }  // namespace kerf

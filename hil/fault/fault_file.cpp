@@ -75,10 +75,12 @@ DeviceFault fault_of(const TomlTable& table) {
 FaultScript parse_fault_script(std::string_view text, const std::string& place) {
   const toml::table file = parse_toml(text, place);
   const TomlTable top(file, place, "");
-  top.allow_only({"seed", "fault"});
+  top.allow_only({"seed", "clock", "fault"});
   FaultScript script;
   constexpr double kMaxSeed = 4294967295.0;
   script.seed = static_cast<std::uint32_t>(top.number("seed", script.seed, {0, kMaxSeed}));
+  const std::string clock = top.word("clock", "push", kFaultClockWords);
+  script.clock = clock == "start" ? FaultClock::start : FaultClock::push;
   for (const toml::node& element : tables_of(file, "fault", kMaxFaults, place)) {
     script.faults.push_back(fault_of(TomlTable(*element.as_table(), place, "fault")));
   }

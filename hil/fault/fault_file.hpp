@@ -10,16 +10,20 @@
 
 namespace kerf {
 
-/// Reads a fault script, TOML of at most 1 MiB and 1000 faults:
+/// Reads a fault script, TOML of at most 1 MiB and 1000 faults.
 ///
-///     seed = 1                # of everything random below
+///     seed = 1               # of everything random below
+///     clock = "push"         # begins when the motors first push; or "start": with the emulator
 ///     [[fault]]
-///     kind = "lose"           # a word of kFaultWords
-///     packets = "reports"     # or "commands"; of lose, delay, duplicate, reorder, truncate,
-///     corrupt at_s = 0.5              # after the motors first push for_s = 0.1             #
-///     none: once every = 3               # each n-th packet axis = 0                # of stick,
-///     jump, wander: 0, 1 or 2 counts = 200            # of jump, wander ms = 10                 #
-///     of delay, host_late
+///     kind = "lose"          # a word of kFaultWords
+///     packets = "reports"    # or "commands"; of lose, delay, duplicate, reorder, truncate,
+///                            # corrupt
+///     at_s = 0.5
+///     for_s = 0.1            # none: once
+///     every = 3              # each n-th packet, the first one included
+///     axis = 0               # of stick, jump, wander: 0, 1 or 2
+///     counts = 200           # of jump, wander
+///     ms = 10                # of delay, host_late
 ///
 /// Strict: an unknown key, a wrong type, a value out of range or a key that the kind does not have
 /// throws `HilError` that names file and line. Start-up only.

@@ -33,7 +33,15 @@ inline constexpr std::array<std::string_view, 16> kFaultWords{
     "lose",   "delay", "duplicate", "reorder", "truncate", "corrupt", "stick",  "jump",
     "wander", "park",  "chatter",   "unhome",  "noise",    "silence", "unplug", "host_late"};
 
-/// One fault. Its clock starts when the motors first push (0.05 N at the tip).
+/// What starts the clock of a script; words in fault files are those of `kFaultClockWords`.
+enum class FaultClock : std::uint8_t {
+  push,   ///< the motors' first push (0.05 N at the tip)
+  start,  ///< the emulator
+};
+
+inline constexpr std::array<std::string_view, 2> kFaultClockWords{"push", "start"};
+
+/// One fault, by the script's clock.
 struct DeviceFault {
   FaultKind kind = FaultKind::lose;
   bool of_commands = false;  ///< of host packets; else of the device's (lose ... corrupt)
@@ -48,6 +56,7 @@ struct DeviceFault {
 struct FaultScript {
   std::vector<DeviceFault> faults;
   std::uint32_t seed = 1;
+  FaultClock clock = FaultClock::push;
 };
 
 }  // namespace kerf

@@ -25,6 +25,7 @@ std::int16_t wrapped(int count) {
 
 FaultyDevice::FaultyDevice(Emulator& device, const FaultScript& script)
     : device_(device), random_(script.seed) {
+  if (script.clock == FaultClock::start) clock_ = 0;
   for (const DeviceFault& fault : script.faults) {
     const std::int64_t from = cycles_of(fault.at_s);
     const double seconds = fault.kind == FaultKind::host_late ? fault.ms / 1000 : fault.for_s;
@@ -49,7 +50,7 @@ bool FaultyDevice::hits(Running& running, bool of_commands) noexcept {
   return running.packets++ % fault.every == 0;
 }
 
-void FaultyDevice::send_on(std::span<const std::uint8_t> packet, bool of_commands,
+bool FaultyDevice::send_on(std::span<const std::uint8_t> packet, bool of_commands,
                            std::deque<Due>& way) {
   Due due{cycle_, Bytes(packet.begin(), packet.end())};
   if (!of_commands) break_sensors(due.bytes);
@@ -58,11 +59,11 @@ void FaultyDevice::send_on(std::span<const std::uint8_t> packet, bool of_command
     const DeviceFault& fault = running.fault;
     const bool unplugged = fault.kind == FaultKind::unplug && runs(running);
     const bool silent = fault.kind == FaultKind::silence && !of_commands && runs(running);
-    if (unplugged || silent) return;
+    if (unplugged || silent) return false;
     if (fault.kind > FaultKind::corrupt || !hits(running, of_commands)) continue;
     switch (fault.kind) {
       case FaultKind::lose:
-        return;
+        return false;
       case FaultKind::delay:
         due.at = cycle_ + cycles_of(fault.ms / 1000);
         break;
@@ -82,10 +83,11 @@ void FaultyDevice::send_on(std::span<const std::uint8_t> packet, bool of_command
       default:
         break;
     }
-    if (due.bytes.empty()) return;
+    if (due.bytes.empty()) return false;
   }
   if (twice) way.push_back(due);
   way.push_back(std::move(due));
+  return true;
 }
 
 void FaultyDevice::break_sensors(Bytes& packet) {
@@ -169,7 +171,7 @@ void FaultyDevice::advance(int cycles) noexcept {
 
 std::span<const std::uint8_t> FaultyDevice::next_packet() noexcept {
   for (auto packet = device_.next_packet(); !packet.empty(); packet = device_.next_packet()) {
-    send_on(packet, false, reports_);
+    if (!send_on(packet, false, reports_)) ++withheld_;
   }
   const auto due = std::ranges::find_if(reports_, [&](const Due& d) { return d.at <= cycle_; });
   if (due == reports_.end()) return {};

@@ -31,12 +31,14 @@ class FaultyDevice final : public PacketDevice {
   [[nodiscard]] bool host_is_late() const noexcept;
   /// Faults that have begun.
   [[nodiscard]] std::uint64_t begun() const noexcept { return begun_; }
+  /// Packets of the device that they kept from the host.
+  [[nodiscard]] std::uint64_t withheld() const noexcept { return withheld_; }
 
  private:
   using Bytes = std::vector<std::uint8_t>;
   struct Running {
     DeviceFault fault;
-    std::int64_t from = 0, to = 0;  ///< cycles since the motors first pushed
+    std::int64_t from = 0, to = 0;  ///< cycles of the script's clock
     bool begun = false;
     int packets = 0;            ///< of its stream since it began
     std::int16_t stuck_at = 0;  ///< of `stick`
@@ -51,18 +53,19 @@ class FaultyDevice final : public PacketDevice {
   [[nodiscard]] bool runs(const Running& running) const noexcept;
   /// Whether the running fault meets this packet of its stream.
   [[nodiscard]] bool hits(Running& running, bool of_commands) noexcept;
-  void send_on(std::span<const std::uint8_t> packet, bool of_commands, std::deque<Due>& way);
+  /// False when a fault lets nothing of the packet arrive.
+  bool send_on(std::span<const std::uint8_t> packet, bool of_commands, std::deque<Due>& way);
   void break_sensors(Bytes& packet);
   void step_clock() noexcept;
 
   Emulator& device_;
   std::vector<Running> faults_;
   std::mt19937 random_;
-  std::optional<std::int64_t> clock_;  ///< cycles; nothing before the motors push
+  std::optional<std::int64_t> clock_;  ///< cycles; nothing before it starts
   std::int64_t cycle_ = 0;
   std::deque<Due> reports_, commands_;
   Bytes handed_out_;
-  std::uint64_t begun_ = 0;
+  std::uint64_t begun_ = 0, withheld_ = 0;
 };
 
 }  // namespace kerf

@@ -69,6 +69,8 @@ TEST_CASE("bad fault scripts are refused with file, line, value and way out") {
             .starts_with("faults.toml:3: fault.axis = 3 is out of range"));
   CHECK(error_of("[[fault]]\nkind = \"stick\"\naxis = 0.5\n") ==
         "faults.toml:1: fault: axis is not whole; use a whole number");
+  CHECK(error_of("clock = \"noon\"\n[[fault]]\nkind = \"lose\"\n")
+            .starts_with("faults.toml:1: clock: unknown"));
   CHECK(error_of("[[fault]]\nkind = \"lose\"\nat = 1\n").starts_with("faults.toml:3: fault.at"));
   CHECK(error_of("[[fault]\n").starts_with("faults.toml:"));
 }

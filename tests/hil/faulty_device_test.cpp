@@ -54,6 +54,17 @@ TEST_CASE("without a running fault every packet passes as it is") {
   CHECK(bench.counters(5) == std::vector<std::uint32_t>{1, 2, 3, 4, 5});
 }
 
+TEST_CASE("a script by the emulator's clock does not wait for a push") {
+  kerf::Emulator emulator(kerf::OmniParams{}, std::nullopt);
+  kerf::FaultyDevice device(emulator, {.faults = {{.kind = FaultKind::silence, .for_s = 1}},
+                                       .clock = kerf::FaultClock::start});
+  for (int i = 0; i < 80; ++i) {
+    device.advance(1);
+    CHECK(device.next_packet().empty());
+  }
+  CHECK(device.withheld() == 80);
+}
+
 TEST_CASE("lose: each n-th packet, for as long as asked") {
   Bench bench({.kind = FaultKind::lose, .at_s = 4 * kCycleS, .for_s = 6 * kCycleS, .every = 2});
   const auto counters = bench.counters(12);

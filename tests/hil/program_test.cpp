@@ -69,7 +69,8 @@ TEST_CASE("bad input is one line that names place, value and way out, and exit c
            Bad{{"--socket", socket, "--unit-mm", "big"}, "--unit-mm"},
            Bad{{"--socket", socket, "--priority", "100"}, "--priority"},
            Bad{{"--socket", socket, "--hand", "/nowhere.toml"}, "/nowhere.toml"},
-           Bad{{"--socket", socket, "--lockstep", "--drop-every", "3"}, "--lockstep"},
+           Bad{{"--socket", socket, "--lockstep", "--fault", KERF_FAULTS_DIR "/silence.toml"},
+               "--fault: in lock-step"},
            Bad{{"--socket", "/nowhere/socket"}, "--socket: /nowhere/socket"},
            Bad{{"--front", "udp"}, "--udp"},
            Bad{{"--front", "udp", "--udp", "harbour"}, "--udp: harbour"},
@@ -136,10 +137,13 @@ TEST_CASE("a lock-step run ends with its client and leaves the same report twice
 TEST_CASE("a real-time run ends after its seconds, and a stop request ends a waiting one") {
   const SocketPath path("seconds");
   const SocketPath report("seconds-report.json");
+  const SocketPath faults("seconds-faults.toml");
+  std::ofstream(faults.text())
+      << "clock = \"start\"\n[[fault]]\nkind = \"lose\"\nfor_s = 1\nevery = 10\n";
   Outcome outcome;
   std::thread emulator([&] {
     outcome = run({"--socket", path.text(), "--seconds", "0.2", "--priority", "0", "--stay",
-                   "--drop-every", "10", "--report", report.text()});
+                   "--fault", faults.text(), "--report", report.text()});
   });
   FakeHost host(path.text());
   int received = 0;
