@@ -81,28 +81,29 @@ std::unique_ptr<PacketPort> port(const std::string& text, const Request* request
                                       request->stop);
 }
 
-const char* bus_of(Personality personality) {
-  switch (personality) {
-    case Personality::omni:
-      return "fw";
-    case Personality::falcon:
-      return "usb";
-    case Personality::woodenhaptics:
-      return "hid";
-  }
-  return "";
-}
-
 }  // namespace
 
 void check_port(const std::string& text) {
   if (text != "auto") static_cast<void>(port(text, nullptr));
 }
 
-std::unique_ptr<PacketPort> open_port(const std::string& text, Personality personality, int rate_hz,
-                                      int patience_ms, const std::atomic<bool>& stop) {
+std::string resolve_port(const std::string& text, Personality personality) {
+  if (text != "auto") return text;
+  switch (personality) {
+    case Personality::falcon:
+      return "usb";
+    case Personality::woodenhaptics:
+      return "hid";
+    case Personality::omni:
+      break;
+  }
+  return "fw";
+}
+
+std::unique_ptr<PacketPort> open_port(const std::string& text, int rate_hz, int patience_ms,
+                                      const std::atomic<bool>& stop) {
   const Request request{rate_hz, patience_ms, stop};
-  return port(text == "auto" ? bus_of(personality) : text, &request);
+  return port(text, &request);
 }
 
 }  // namespace kerf

@@ -18,14 +18,16 @@ namespace kerf {
 ///     hid[:WHERE]                    WoodenHaptics, as hid_port.hpp says
 ///     auto                           the bus of the device, any one that is there
 ///
-/// All throw std::runtime_error with one line.
+/// Those that take such a text throw std::runtime_error with one line.
 
 /// For a text that names no port, or one that this build lacks.
 void check_port(const std::string& text);
 
-/// Tries for `patience_ms` while no device is there, or until `stop`.
-[[nodiscard]] std::unique_ptr<PacketPort> open_port(const std::string& text,
-                                                    Personality personality, int rate_hz,
+/// What stands for `auto` with this device; any other text as it is.
+[[nodiscard]] std::string resolve_port(const std::string& text, Personality personality);
+
+/// A resolved one. Tries for `patience_ms` while no device is there, or until `stop`.
+[[nodiscard]] std::unique_ptr<PacketPort> open_port(const std::string& text, int rate_hz,
                                                     int patience_ms, const std::atomic<bool>& stop);
 
 }  // namespace kerf

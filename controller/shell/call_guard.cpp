@@ -56,14 +56,16 @@ constexpr std::initializer_list<int> kSocket{SCMP_SYS(recvfrom), SCMP_SYS(sendto
                                              SCMP_SYS(ppoll)};
 // A FireWire node is opened again when its channels were lost.
 constexpr std::initializer_list<int> kFireWire{SCMP_SYS(ioctl), SCMP_SYS(read),   SCMP_SYS(poll),
-                                               SCMP_SYS(ppoll), SCMP_SYS(openat), SCMP_SYS(close)};
-// Nodes of HID, and the mailbox in front of an I/O thread.
-constexpr std::initializer_list<int> kNode{SCMP_SYS(ioctl), SCMP_SYS(read), SCMP_SYS(write),
-                                           SCMP_SYS(poll), SCMP_SYS(ppoll)};
+                                               SCMP_SYS(ppoll), SCMP_SYS(openat), SCMP_SYS(dup3),
+                                               SCMP_SYS(close)};
+// Behind a mailbox, where only a handler waits until the last packet has left.
+constexpr std::initializer_list<int> kUsb{SCMP_SYS(poll), SCMP_SYS(ppoll)};
+constexpr std::initializer_list<int> kHid{SCMP_SYS(read), SCMP_SYS(poll), SCMP_SYS(ppoll)};
 
 std::initializer_list<int> calls_of(std::string_view port) {
-  if (port.starts_with("socket:")) return kSocket;
-  return port.starts_with("fw") ? kFireWire : kNode;
+  if (port.starts_with("fw")) return kFireWire;
+  if (port.starts_with("usb")) return kUsb;
+  return port.starts_with("hid") ? kHid : kSocket;
 }
 
 }  // namespace

@@ -24,8 +24,8 @@ class CallGuard {
   CallGuard(const CallGuard&) = delete;
   CallGuard& operator=(const CallGuard&) = delete;
 
-  /// Servo thread, before the loop. `port` as `--port` names it. Throws std::runtime_error with one
-  /// line where the kernel has no such filter.
+  /// Servo thread, before the loop. `port` as `--port` names it, `auto` resolved. Throws
+  /// std::runtime_error with one line where the kernel has no such filter.
   void enter(std::string_view port);
   /// Servo thread, after the loop: further calls that are not allowed fail, and mean no harm.
   void leave() noexcept;

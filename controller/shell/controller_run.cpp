@@ -213,6 +213,7 @@ LoopLimits limits_of(const ControllerOptions& options, double rate_hz) {
 /// What the threads of a run share.
 struct Run {
   const ControllerOptions& options;
+  const std::string& port;  ///< as `--port` names it, `auto` resolved
   int rate_hz;
   SegmentWriter& segment;
   SegmentServer& server;
@@ -235,7 +236,7 @@ EndReason serve(const Run& run, LoopSignals& signals, CallGuard* calls) {
   RealTimeTicks real_time(kNsPerSecond / run.rate_hz, options.real_time.spin_us * 1000);
   LockStepTicks lock_step(run.device);
   TickSource& clock = options.virtual_time ? static_cast<TickSource&>(lock_step) : real_time;
-  if (calls != nullptr) calls->enter(options.port);
+  if (calls != nullptr) calls->enter(run.port);
   const EndReason end = run_servo(clock, run.device, run.servo, eyes, run.server,
                                   limits_of(options, run.rate_hz), signals, run.report.record);
   if (calls != nullptr) calls->leave();
@@ -309,10 +310,10 @@ int run_controller(const ControllerOptions& options) {
   SegmentServer server(options.name, segment,
                        {.tools = static_cast<std::uint32_t>(scene.tools.size())});
   servo->take(scene);
+  const std::string port_text = resolve_port(options.port, scene.device.personality);
   std::unique_ptr<PacketPort> port;
   try {
-    port = open_port(options.port, scene.device.personality, scene.servo.rate_hz, kPortPatienceMs,
-                     stop);
+    port = open_port(port_text, scene.servo.rate_hz, kPortPatienceMs, stop);
   } catch (const std::runtime_error&) {
     if (stop) return 1;  // asked to end before there was a device: nothing to tell
     throw;
@@ -330,8 +331,8 @@ int run_controller(const ControllerOptions& options) {
 
   segment.set_lifecycle(Lifecycle::run);
   report.load_s = static_cast<double>(monotonic_ns() - began_ns) / 1e9;
-  const EndReason end =
-      run_threads({options, scene.servo.rate_hz, segment, server, *servo, device, stop, report});
+  const EndReason end = run_threads(
+      {options, port_text, scene.servo.rate_hz, segment, server, *servo, device, stop, report});
   if (!options.virtual_time) unlock_memory();
 
   const bool clean = end == EndReason::ticks_done || end == EndReason::stopped;

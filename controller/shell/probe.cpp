@@ -137,7 +137,7 @@ void print(const std::vector<Lack>& lacks) {
 std::unique_ptr<PacketPort> open_or_explain(const ControllerOptions& options, Personality kind,
                                             int rate_hz, const std::atomic<bool>& stop) {
   try {
-    return open_port(options.port, kind, rate_hz, kPatienceMs, stop);
+    return open_port(resolve_port(options.port, kind), rate_hz, kPatienceMs, stop);
   } catch (const std::runtime_error&) {
     if (!options.port.starts_with("socket:")) print(lacks_of_nodes(kind, list_device_nodes()));
     throw;

@@ -13,7 +13,7 @@ const std::atomic<bool> kGoOn{false};
 
 std::string error_of(const std::string& text, kerf::Personality personality) {
   try {
-    static_cast<void>(kerf::open_port(text, personality, 1000, 0, kGoOn));
+    static_cast<void>(kerf::open_port(kerf::resolve_port(text, personality), 1000, 0, kGoOn));
   } catch (const std::runtime_error& error) {
     return error.what();
   }
@@ -45,6 +45,14 @@ TEST_CASE("a port that is none is refused with the ones that are") {
                          doctest::Contains("use auto, fw, usb, hid, or socket:PATH"),
                          std::runtime_error);
   }
+}
+
+TEST_CASE("auto is the bus of the device") {
+  using kerf::Personality;
+  CHECK(kerf::resolve_port("auto", Personality::omni) == "fw");
+  CHECK(kerf::resolve_port("auto", Personality::falcon) == "usb");
+  CHECK(kerf::resolve_port("auto", Personality::woodenhaptics) == "hid");
+  CHECK(kerf::resolve_port("hid:KERF0001", Personality::omni) == "hid:KERF0001");
 }
 
 TEST_CASE("--port usb: options, and what is told where no Falcon can be") {

@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: Apache-2.0
+// --guard above real buses: what the servo thread calls there is allowed, and nothing else.
+#include <atomic>
+#include <memory>
+#include <string>
+#include <thread>
+
+#include <doctest/doctest.h>
+#include <unistd.h>
+
+#include "controller/shell/call_guard.hpp"
+#include "controller/shell/motor_guard.hpp"
+#include "tests/hil/fuse/usb_session.hpp"
+
+namespace {
+
+using kerf::BusFault;
+using kerf::Personality;
+using kerf::UsbFault;
+using kerf::test::kGoOn;
+
+/// Guarded ticks of a driver on the bus at `text`, until it is gone or for a while; the name of the
+/// call that was trapped, empty for none. `seeded`: the loop makes a call that no bus needs.
+/// FireWire is in lock-step here, and needs no clock.
+std::string unexpected_call(Personality personality, const std::string& text, bool seeded = false) {
+  const bool lockstep = personality == Personality::omni;
+  const auto port = kerf::open_port(text, 1000, 1000, kGoOn);
+  const auto driver = kerf::make_driver(personality, *port);
+  driver->start();
+  std::atomic<bool> stop{false};
+  kerf::MotorGuard motors(*driver);
+  kerf::CallGuard calls(*driver, stop);
+  std::thread([&] {
+    motors.guard_stack();
+    calls.enter(text);
+    std::int64_t deadline_ns = kerf::monotonic_ns();
+    for (int tick = 0; tick < 2000 && !stop && !port->closed(); ++tick) {
+      if (!lockstep) deadline_ns += 1'000'000;
+      kerf::sleep_until_ns(deadline_ns);
+      static_cast<void>(driver->read());
+      driver->command({});
+      if (seeded && tick == 20) getppid();
+    }
+    calls.leave();
+  }).join();
+  CHECK(stop == seeded);
+  return calls.unexpected();
+}
+
+}  // namespace
+
+TEST_CASE("the guard lets each bus make its calls, also when channels are lost or it vanishes") {
+  {
+    kerf::FirewireSettings settings;
+    settings.script = {{8 * 100, BusFault::steal}};
+    const kerf::test::MountedNode omni(settings);
+    CHECK(unexpected_call(Personality::omni, "fw:" + omni.path()) == "");
+  }
+  {
+    const kerf::test::MountedFalcon falcon({.firmware_runs = true}, {{1000, UsbFault::vanish}});
+    CHECK(unexpected_call(Personality::falcon, "usb:" + falcon.path()) == "");
+  }
+  {
+    const kerf::test::MountedArm arm({.script = {{1000, UsbFault::vanish}}});
+    CHECK(unexpected_call(Personality::woodenhaptics, "hid:" + arm.path()) == "");
+  }
+}
+
+TEST_CASE("the guard ends a loop that makes another call, on each bus") {
+  const kerf::test::MountedNode omni;
+  CHECK(unexpected_call(Personality::omni, "fw:" + omni.path(), true) == "getppid");
+  const kerf::test::MountedFalcon falcon;
+  CHECK(unexpected_call(Personality::falcon, "usb:" + falcon.path(), true) == "getppid");
+  const kerf::test::MountedArm arm;
+  CHECK(unexpected_call(Personality::woodenhaptics, "hid:" + arm.path(), true) == "getppid");
+}
