@@ -133,6 +133,13 @@ bool FirewirePort::wait(int milliseconds) noexcept {
   return ready;
 }
 
+std::vector<LinkCounter> FirewirePort::counters() const {
+  return {{"bus_resets", stats_.resets},
+          {"armings", stats_.armings},
+          {"reclaims", stats_.reclaims},
+          {"misqueued", misqueued()}};
+}
+
 bool FirewirePort::send(std::span<const std::uint8_t> packet) noexcept {
   if (closed_.load(std::memory_order_relaxed)) return false;
   if (muted_.load(std::memory_order_relaxed)) packet = kNeutral;

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <vector>
 
 #include "controller/device/firewire_file.hpp"
 #include "controller/device/firewire_find.hpp"
@@ -52,6 +53,8 @@ class FirewirePort final : public PacketPort {
   }
   /// Flushes once, then waits for what comes by itself.
   [[nodiscard]] bool wait(int milliseconds) noexcept override;
+
+  [[nodiscard]] std::vector<LinkCounter> counters() const override;
 
   /// Bus cycle of the newest packet taken, 0..63999, or -1: the device's clock, free of the host's
   /// jitter.

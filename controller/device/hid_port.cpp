@@ -145,6 +145,7 @@ std::size_t HidPort::read(std::span<std::uint8_t> out, int milliseconds) noexcep
   if (closed()) return 0;
   const int size = hid_read_timeout(device_, out.data(), out.size(), milliseconds);
   if (size < 0) closed_ = true;
+  if (size > 0) ++packets_;
   return static_cast<std::size_t>(std::max(size, 0));
 }
 
@@ -179,10 +180,18 @@ void HidPort::run() noexcept {
     const std::size_t size = outbox_.take(std::span(report).subspan(1));
     if (size > 0 && !closed()) {
       std::fill(report.begin() + 1 + static_cast<std::ptrdiff_t>(size), report.end(), 0);
-      if (hid_write(device_, report.data(), 1 + packet_bytes_) < 0) closed_ = true;
+      if (hid_write(device_, report.data(), 1 + packet_bytes_) < 0) {
+        closed_ = true;
+      } else {
+        ++commands_;
+      }
     }
     outbox_.set_on_its_way(false);
   }
+}
+
+std::vector<LinkCounter> HidPort::counters() const {
+  return {{"packets", packets_}, {"commands", commands_}};
 }
 
 bool HidPort::wait(int milliseconds) noexcept {

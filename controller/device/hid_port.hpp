@@ -9,6 +9,7 @@
 #include <string>
 #include <string_view>
 #include <thread>
+#include <vector>
 
 #include <semaphore.h>
 
@@ -44,6 +45,7 @@ class HidPort final : public PacketPort {
     return closed_.load(std::memory_order_relaxed);
   }
   [[nodiscard]] bool wait(int milliseconds) noexcept override;
+  [[nodiscard]] std::vector<LinkCounter> counters() const override;
 
  private:
   [[nodiscard]] bool open(const std::string& where);
@@ -55,9 +57,11 @@ class HidPort final : public PacketPort {
   std::atomic<bool> closed_{false};         ///< written by whoever meets the end first
   std::array<std::uint8_t, 64> waiting_{};  ///< what `wait` has read
   std::size_t waiting_bytes_ = 0;
+  std::uint64_t packets_ = 0;  ///< of the device
 
   Outbox outbox_;
-  sem_t raised_{};  ///< once per packet, and once to stop
+  sem_t raised_{};                          ///< once per packet, and once to stop
+  std::atomic<std::uint64_t> commands_{0};  ///< packets that the kernel has sent
   std::atomic<bool> stop_{false};
   std::atomic<int> thread_id_{0};
   std::thread thread_;  ///< writes

@@ -4,14 +4,21 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <vector>
 
 namespace kerf {
+
+/// One figure of what a link has been through, as the reports name it.
+struct LinkCounter {
+  const char* name = "";
+  std::uint64_t value = 0;
+};
 
 /// The narrow place where a bus ends and a driver begins: whole packets in, whole packets out.
 ///
 /// What stands behind it (a socket to an emulator, FireWire, USB, HID) is invisible to the
-/// driver. Never blocks, never allocates, never throws. Servo thread only, but for the ways to send
-/// and `closed`, which any thread and any signal handler may call.
+/// driver. Never blocks, never allocates, never throws, but where said. Servo thread only, but for
+/// the ways to send and `closed`, which any thread and any signal handler may call.
 class PacketPort {
  public:
   virtual ~PacketPort() = default;
@@ -36,6 +43,9 @@ class PacketPort {
   /// Waits at most `milliseconds` for a packet, for lock-step runs and for calibration. Not real
   /// time.
   [[nodiscard]] virtual bool wait(int milliseconds) noexcept = 0;
+
+  /// What the link has been through; for reports, when no servo runs. Allocates.
+  [[nodiscard]] virtual std::vector<LinkCounter> counters() const { return {}; }
 };
 
 }  // namespace kerf

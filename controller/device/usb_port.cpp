@@ -101,6 +101,15 @@ UsbLinkStats UsbPort::stats() const noexcept {
   return {packets_, overflow_, strays_, commands_, failures_};
 }
 
+std::vector<LinkCounter> UsbPort::counters() const {
+  const UsbLinkStats now = stats();
+  return {{"packets", now.packets},
+          {"overflow", now.overflow},
+          {"stray_bytes", now.strays},
+          {"commands", now.commands},
+          {"failed_transfers", now.failures}};
+}
+
 void UsbPort::run() noexcept {
   thread_id_ = gettid();
   // Without the right to either, packets come later; the servo's own start tells the user.

@@ -8,6 +8,7 @@
 #include <memory>
 #include <span>
 #include <thread>
+#include <vector>
 
 #include "controller/device/io_mailbox.hpp"
 #include "controller/device/packet_port.hpp"
@@ -64,6 +65,8 @@ class UsbPort final : public PacketPort {
     return closed_.load(std::memory_order_relaxed);
   }
   [[nodiscard]] bool wait(int milliseconds) noexcept override;
+
+  [[nodiscard]] std::vector<LinkCounter> counters() const override;
 
   /// Any thread.
   [[nodiscard]] UsbLinkStats stats() const noexcept;

@@ -341,6 +341,10 @@ int run_controller(const ControllerOptions& options) {
   report.removed_mm3 = removed_mm3(scene, report.record);
   report.lost_packets = device.lost();
   report.refused_packets = device.refused();
+  report.link = port->counters();
+  if (const std::int64_t first_ns = report.record.first_force_ns; first_ns > 0) {
+    report.start_to_force_ms = static_cast<double>(first_ns - began_ns) / 1e6;
+  }
   report.volume_hash = hash_of_volumes(scene, *servo);
   std::fputs(summary(report).c_str(), stdout);
   if (!options.report.empty()) write_new_file(options.report, report_json(report));

@@ -170,8 +170,11 @@ int look_around(const ControllerOptions& options) {
 }
 
 nlohmann::ordered_json report_of(const ControllerOptions& options, const Scene::Device& device,
-                                 const DeviceDriver& driver, const ProbeView& view, int rate_hz) {
+                                 const PacketPort& port, const DeviceDriver& driver,
+                                 const ProbeView& view, int rate_hz) {
   const ProbeView::Seen& seen = view.seen();
+  nlohmann::ordered_json link = nlohmann::ordered_json::object();
+  for (const LinkCounter& counter : port.counters()) link[counter.name] = counter.value;
   const double seconds = static_cast<double>(seen.ticks) / rate_hz;
   return {{"program", "kerf-controller --probe"},
           {"version", KERF_VERSION},
@@ -183,6 +186,7 @@ nlohmann::ordered_json report_of(const ControllerOptions& options, const Scene::
           {"longest_gap_ms", seen.longest_gap_ms},
           {"lost_packets", driver.lost()},
           {"refused_packets", driver.refused()},
+          {"link", link},
           {"counts", view.last().encoder},
           {"lowest_travel_counts", seen.lowest},
           {"highest_travel_counts", seen.highest},
@@ -222,7 +226,7 @@ int run_probe(const ControllerOptions& options) {
               static_cast<unsigned long long>(driver->refused()));
   print(lacks);
   if (!options.report.empty()) {
-    auto json = report_of(options, device, *driver, view, rate_hz);
+    auto json = report_of(options, device, *port, *driver, view, rate_hz);
     json["missing"] = json_of(lacks);
     write_new_file(options.report, json.dump(2) + "\n");
   }

@@ -27,6 +27,7 @@ struct RunRecord {
   std::uint64_t contact_ticks = 0;
   Histogram wake, compute, publish;
   double peak_force_n = 0;
+  std::int64_t first_force_ns = 0;  ///< when the first force was sent, CLOCK_MONOTONIC; 0: none was
   std::array<std::uint64_t, kMaxVolumes> removed_steps{};  ///< by volume
   double absorbed_mj = 0;
   std::uint64_t output_hash = 0;

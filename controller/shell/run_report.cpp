@@ -51,6 +51,10 @@ std::string report_json(const RunReport& report) {
   for (const MissingRight& right : report.missing_rights) {
     missing.push_back({{"what", right.what}, {"effect", right.effect}});
   }
+  nlohmann::ordered_json link = nlohmann::ordered_json::object();
+  for (const LinkCounter& counter : report.link) link[counter.name] = counter.value;
+  nlohmann::ordered_json start_to_force_ms;  // null where there was none
+  if (report.start_to_force_ms) start_to_force_ms = *report.start_to_force_ms;
   const nlohmann::ordered_json json{
       {"program", "kerf-controller"},
       {"version", KERF_VERSION},
@@ -85,8 +89,10 @@ std::string report_json(const RunReport& report) {
       {"watchdog_trips", report.watchdog_trips},
       {"lost_packets", report.lost_packets},
       {"refused_packets", report.refused_packets},
+      {"link", link},
       {"missing_rights", missing},
       {"load_s", report.load_s},
+      {"start_to_force_ms", start_to_force_ms},
       {"volume_hash", hex(report.volume_hash)},
       {"output_hash", hex(r.output_hash)},
   };

@@ -2,9 +2,11 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "controller/device/packet_port.hpp"
 #include "controller/shell/real_time.hpp"
 #include "controller/shell/run_record.hpp"
 
@@ -26,10 +28,12 @@ struct RunReport {
   double removed_mm3 = 0;
   std::uint64_t lost_packets = 0;
   std::uint64_t refused_packets = 0;
+  std::vector<LinkCounter> link;  ///< of the port
   std::uint64_t watchdog_trips = 0;
   std::uint64_t volume_hash = 0;
   std::uint64_t config_hash = 0;
-  double load_s = 0;  ///< from start to the first servo tick
+  double load_s = 0;                        ///< from start to the first servo tick
+  std::optional<double> start_to_force_ms;  ///< from start to the first force that was sent
 };
 
 /// JSON text with the keys of the design page; ends with a newline.

@@ -30,7 +30,7 @@ class Bookkeeper {
   Bookkeeper(RunRecord& record, const TickSource& clock) noexcept
       : record_(record), clock_(clock) {}
 
-  void count(Tick tick, const ServoOutput& output, const TickTiming& timing,
+  void count(Tick tick, const ServoOutput& output, const TickTiming& timing, std::int64_t sent_ns,
              std::int64_t publish_ns) noexcept {
     if (output.fault != last_fault_ && output.fault != Fault::none) {
       record_.add_fault(tick, fault_name(output.fault));
@@ -44,7 +44,11 @@ class Bookkeeper {
     ++record_.ticks;
     record_.stale_ticks += output.stale ? 1 : 0;
     record_.contact_ticks += output.contact ? 1 : 0;
-    record_.peak_force_n = std::max(record_.peak_force_n, length(output.force_n));
+    const double force_n = length(output.force_n);
+    record_.peak_force_n = std::max(record_.peak_force_n, force_n);
+    if (record_.first_force_ns == 0 && output.motors_on && force_n > 0) {
+      record_.first_force_ns = sent_ns;
+    }
     for (std::size_t v = 0; v < kMaxVolumes; ++v) {
       record_.removed_steps[v] += output.removed_by_volume[v];
     }
@@ -113,7 +117,7 @@ EndReason run_servo(TickSource& clock, DeviceDriver& device, Servo& servo, Publi
     }
     const std::int64_t sent_ns = monotonic_ns();
     eyes.publish(tick, report, output, last_command, timing);  // then the eyes
-    books.count(tick, output, timing, monotonic_ns() - sent_ns);
+    books.count(tick, output, timing, sent_ns, monotonic_ns() - sent_ns);
 
     signals.heartbeat.store(tick, std::memory_order_relaxed);
     signals.armed_ticks.store(record.ticks, std::memory_order_relaxed);

@@ -9,6 +9,8 @@ TEST_CASE("the report has every promised key, hashes as 16 hex digits") {
   report.record.ticks = 3;
   report.record.output_hash = 0xab;
   report.record.add_event(2, "stale_input");
+  report.link = {{"bus_resets", 2}};
+  report.start_to_force_ms = 812.5;
   const auto json = nlohmann::json::parse(kerf::report_json(report));
   for (const char* key :
        {"ticks", "overruns", "stale_ticks", "wake_us", "compute_us", "publish_us", "allocations",
@@ -23,6 +25,8 @@ TEST_CASE("the report has every promised key, hashes as 16 hex digits") {
   CHECK(json["output_hash"] == "00000000000000ab");
   CHECK(json["faults"][0]["tick"] == 2);
   CHECK(json["faults"][0]["name"] == "stale_input");
+  CHECK(json["link"]["bus_resets"] == 2);
+  CHECK(json["start_to_force_ms"] == 812.5);
 }
 
 TEST_CASE("more events than fit are counted, and the first ones kept") {
