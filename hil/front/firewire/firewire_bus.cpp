@@ -68,8 +68,13 @@ void FirewireBus::begin_cycle() {
 
 void FirewireBus::finish_cycle() {
   if (cycle_ % settings_.packet_cycles != 0) return;
-  const auto packet = device_.next_packet();  // its counter runs whether it is heard or not
-  if (packet.empty() || !present_ || !registers_.streams()) return;
+  // Its counter runs whether it is heard or not.
+  for (auto packet = device_.next_packet(); !packet.empty(); packet = device_.next_packet()) {
+    if (present_ && registers_.streams()) carry(packet);
+  }
+}
+
+void FirewireBus::carry(std::span<const std::uint8_t> packet) {
   for (IsoContext* context : contexts_) {
     if (context->settings().transmits ||
         static_cast<int>(context->settings().channel) != registers_.transmits_on()) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "hil/front/firewire/agenda.hpp"
@@ -102,6 +103,7 @@ class FirewireBus {
   void run_to(std::int64_t cycle);
   void begin_cycle();
   void finish_cycle();
+  void carry(std::span<const std::uint8_t> packet);
   void strike(BusFault fault);
   void vanish();
   void come_back();

@@ -5,6 +5,7 @@
 #include <atomic>
 #include <cstdint>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include <doctest/doctest.h>
@@ -119,12 +120,14 @@ TEST_CASE("a stolen channel carries nothing but neutral packets, whatever is com
     void receive(std::span<const std::uint8_t> packet) noexcept override {
       motors_on = kerf::decode_command(packet)->motors_on;
     }
-    void advance(int /*cycles*/) noexcept override {}
+    void advance(int /*cycles*/) noexcept override { due = true; }
     std::span<const std::uint8_t> next_packet() noexcept override {
+      if (!std::exchange(due, false)) return {};
       bytes = kerf::encode(kerf::OmniReport{.counter = ++counter});
       return bytes;
     }
     std::atomic<bool> motors_on{false};
+    bool due = false;
     std::uint32_t counter = 0;
     kerf::omni::ReportBytes bytes{};
   } device;

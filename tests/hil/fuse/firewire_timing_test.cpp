@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include <doctest/doctest.h>
@@ -30,14 +31,16 @@ class EchoDevice final : public kerf::PacketDevice {
     const auto read = static_cast<std::uint32_t>(command->motor[0]);
     loops_.push_back(static_cast<std::int64_t>(counter_ + 1 - read) & 0x7FF);
   }
-  void advance(int /*cycles*/) noexcept override {}
+  void advance(int /*cycles*/) noexcept override { due_ = true; }
   std::span<const std::uint8_t> next_packet() noexcept override {
+    if (!std::exchange(due_, false)) return {};
     packet_ = kerf::encode(kerf::OmniReport{.counter = ++counter_});
     return packet_;
   }
   [[nodiscard]] const std::vector<std::int64_t>& loops() const noexcept { return loops_; }
 
  private:
+  bool due_ = false;
   std::uint32_t counter_ = 0;
   kerf::omni::ReportBytes packet_{};
   std::vector<std::int64_t> loops_;
