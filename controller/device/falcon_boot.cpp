@@ -16,7 +16,7 @@ namespace {
 using falcon::FtdiRequest;
 
 constexpr int kAnswerMs = 20;  // the boot loader's latency timer is 16 ms
-constexpr int kProbes = 5;
+constexpr int kProbes = 10;
 constexpr int kEchoMs = 200;
 
 void purge(FalconLine& line) {

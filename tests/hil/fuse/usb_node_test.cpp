@@ -101,7 +101,7 @@ TEST_CASE("usbfs: an interface has one owner, and what is not there is refused")
 }
 
 TEST_CASE("usbfs: a read waits for the device, a discarded one comes back, none is invented") {
-  const MountedFalcon falcon({.firmware_runs = true}, {}, false);
+  const MountedFalcon falcon({.firmware_runs = true}, {}, std::nullopt);
   const Client client(falcon.path());
   std::array<std::uint8_t, 64> in{};
   usbdevfs_urb read_urb;
@@ -135,7 +135,7 @@ TEST_CASE("usbfs: a read waits for the device, a discarded one comes back, none 
 }
 
 TEST_CASE("usbfs: one exchange per frame, two bytes of status before the answer") {
-  const MountedFalcon falcon({.firmware_runs = true}, {}, false);
+  const MountedFalcon falcon({.firmware_runs = true}, {}, std::nullopt);
   const Client client(falcon.path());
   usbdevfs_ctrltransfer latency{};
   latency.bRequestType = kerf::falcon::kFtdiRequestType;
@@ -167,7 +167,7 @@ TEST_CASE("usbfs: one exchange per frame, two bytes of status before the answer"
 
 TEST_CASE("usbfs: after unplugging what was pending comes back, then everything is ENODEV") {
   const MountedFalcon falcon({.firmware_runs = true},
-                             {{100, UsbFault::stall}, {200, UsbFault::vanish}}, false);
+                             {{100, UsbFault::stall}, {200, UsbFault::vanish}}, std::nullopt);
   const Client client(falcon.path());
   std::array<std::uint8_t, 64> in{};
   usbdevfs_urb read_urb;
@@ -191,7 +191,7 @@ TEST_CASE("usbfs: after unplugging what was pending comes back, then everything 
 
 TEST_CASE("hidraw: who it is, its descriptor, one report per read, from the first write on") {
   for (const std::size_t bytes : {std::size_t{14}, std::size_t{64}}) {
-    const MountedArm arm({.packet_bytes = bytes, .serial = "S1"}, false);
+    const MountedArm arm({.packet_bytes = bytes, .serial = "S1"}, std::nullopt);
     const Client client(arm.path());
     hidraw_devinfo info{};
     CHECK(client.call(HIDIOCGRAWINFO, &info) == 0);
@@ -223,7 +223,7 @@ TEST_CASE("hidraw: who it is, its descriptor, one report per read, from the firs
 }
 
 TEST_CASE("hidraw: unplugged, it gives what waits and then EIO; nothing can be written") {
-  const MountedArm arm({.script = {{150, UsbFault::vanish}}}, false);
+  const MountedArm arm({.script = {{150, UsbFault::vanish}}}, std::nullopt);
   const Client client(arm.path());
   std::array<std::uint8_t, 15> report{};
   CHECK(write(client.fd(), report.data(), report.size()) == 15);

@@ -141,7 +141,7 @@ TEST_CASE("usb: the last packet of a process has left when the call returns") {
 }
 
 TEST_CASE("usb: a program that crashes while it pushes switches the motors off first") {
-  MountedFalcon falcon({.firmware_runs = true}, {}, false);
+  MountedFalcon falcon({.firmware_runs = true}, {}, std::nullopt);
   const pid_t child = fork();
   if (child == 0) {
     UsbPort port({falcon.path(), ""}, 0, kGoOn);
@@ -210,7 +210,7 @@ TEST_CASE("usb: packets in pieces are put together, none is bad, none is lost") 
 }
 
 TEST_CASE("usb: the device answers in each of its frames, wherever the servo ticks in them") {
-  MountedFalcon falcon({.firmware_runs = true}, {}, false);
+  MountedFalcon falcon({.firmware_runs = true}, {}, std::nullopt);
   UsbPort port({falcon.path(), ""}, 0, kGoOn);
   std::thread([&] {
     static_cast<void>(kerf::make_real_time(80, -1));

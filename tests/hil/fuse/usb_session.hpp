@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <atomic>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -48,13 +50,27 @@ inline std::optional<HandScript> touching_hand() {
   return read_hand_script(KERF_HANDS "/touch.toml");
 }
 
+/// A hand that comes down, and then presses on.
+inline std::optional<HandScript> pressing_hand() {
+  HandScript script;
+  script.start = {0, 4, 0};
+  script.steps = {hand_move({0, -1, 0}, 0.4), hand_move({0, -1, 0}, 10)};
+  return script;
+}
+/// Something firm to press on.
+inline Scene firm_half_space() {
+  Scene scene = half_space_scene();
+  scene.force.p0_n_per_mm2 *= 10;
+  return scene;
+}
+
 /// The emulated Falcon as a usbfs node.
 class MountedFalcon {
  public:
   explicit MountedFalcon(const FtdiFalcon::Settings& settings = {.firmware_runs = true},
-                         std::vector<ScriptedUsbFault> script = {}, bool with_hand = true)
-      : emulator_(std::make_unique<FalconModel>(),
-                  with_hand ? touching_hand() : std::optional<HandScript>{}),
+                         std::vector<ScriptedUsbFault> script = {},
+                         const std::optional<HandScript>& hand = touching_hand())
+      : emulator_(std::make_unique<FalconModel>(), hand),
         served_("usb", become_device, settings, at_ms(std::move(script)), emulator_) {}
 
   void stop() { served_.stop(); }
@@ -70,9 +86,9 @@ class MountedFalcon {
 /// The emulated WoodenHaptics arm as a hidraw node.
 class MountedArm {
  public:
-  explicit MountedArm(WoodenHid::Settings settings = {}, bool with_hand = true)
-      : emulator_(std::make_unique<WoodenModel>(params_of(settings)),
-                  with_hand ? touching_hand() : std::optional<HandScript>{}),
+  explicit MountedArm(WoodenHid::Settings settings = {},
+                      const std::optional<HandScript>& hand = touching_hand())
+      : emulator_(std::make_unique<WoodenModel>(params_of(settings)), hand),
         served_("hidraw0", become_device, with_cycles(std::move(settings)), emulator_) {}
 
   void stop() { served_.stop(); }
@@ -99,8 +115,8 @@ class MountedArm {
 /// kHz by the machine's clock.
 class ServoSession {
  public:
-  ServoSession(Personality personality, PacketPort& port)
-      : driver_(make_driver(personality, port)) {
+  ServoSession(Personality personality, PacketPort& port, Scene scene = half_space_scene())
+      : scene_(std::move(scene)), driver_(make_driver(personality, port)) {
     scene_.device.personality = personality;
     scene_.device.torque_scale = std::array{0.3, 0.3, 0.3};
     servo_ = compile(scene_);
@@ -109,6 +125,7 @@ class ServoSession {
 
   struct Course {
     int ticks = 0, fresh = 0, contact = 0, motors = 0;
+    int faults = 0;             ///< ticks with one
     int longest_gap = 0;        ///< ticks without a report
     int stale_with_motors = 0;  ///< ticks beyond 20 without a report and motors still asked for
     int gap_at_end = 0;
@@ -127,6 +144,20 @@ class ServoSession {
     return run(ticks, [](const Course&) { return false; });
   }
 
+  struct Tick {
+    DeviceReport report;
+    ServoOutput output;
+  };
+  /// One tick, now.
+  Tick step() {
+    const DeviceReport report = driver_->read();
+    const ServoOutput output = servo_->step(report);
+    driver_->command(output);
+    return {report, output};
+  }
+  /// Who is told of each tick's output in `run`, on its thread.
+  void watch(std::function<void(const ServoOutput&)> watch) { watch_ = std::move(watch); }
+
   [[nodiscard]] DeviceDriver& driver() noexcept { return *driver_; }
 
  private:
@@ -137,23 +168,24 @@ class ServoSession {
     while (course.ticks < most_ticks && !done(course)) {
       deadline_ns = std::max(deadline_ns + 1'000'000, monotonic_ns());
       sleep_until_ns(deadline_ns);
-      const DeviceReport report = driver_->read();
-      const ServoOutput output = servo_->step(report);
-      driver_->command(output);
+      const auto [report, output] = step();
+      if (watch_) watch_(output);
       ++course.ticks;
       gap = report.fresh ? 0 : gap + 1;
       course.fresh += report.fresh ? 1 : 0;
       course.contact += output.contact ? 1 : 0;
       course.motors += output.motors_on ? 1 : 0;
+      course.faults += output.fault != Fault::none ? 1 : 0;
       course.longest_gap = std::max(course.longest_gap, gap);
       if (gap > 20 && output.motors_on) ++course.stale_with_motors;
       course.gap_at_end = gap;
     }
   }
 
-  Scene scene_ = half_space_scene();
+  Scene scene_;
   std::unique_ptr<Servo> servo_;
   std::unique_ptr<DeviceDriver> driver_;
+  std::function<void(const ServoOutput&)> watch_;
 };
 
 }  // namespace kerf::test

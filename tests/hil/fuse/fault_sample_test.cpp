@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: Apache-2.0
+// A sample of the fault matrix (./kerf lab faults) through each device's own bus: the same faults,
+// the same rules, the same watch. The Omni's bus is in lock-step, the others run by the clock.
+#include <memory>
+#include <mutex>
+#include <string>
+
+#include <doctest/doctest.h>
+
+#include "hil/devmodel/omni_model.hpp"
+#include "hil/fault/faulty_device.hpp"
+#include "hil/lab/faults/contract.hpp"
+#include "tests/hil/fuse/usb_session.hpp"
+
+namespace {
+
+using kerf::DeviceFault;
+using kerf::Emulator;
+using kerf::FaultKind;
+using kerf::Personality;
+using kerf::ServoOutput;
+using kerf::test::kGoOn;
+
+/// What may go wrong with reports, one after the other; the last one latches a fault.
+const kerf::FaultScript kSample{
+    .faults = {{.kind = FaultKind::lose, .at_s = 0.05, .for_s = 0.1, .every = 2},
+               {.kind = FaultKind::duplicate, .at_s = 0.2, .for_s = 0.1},
+               {.kind = FaultKind::reorder, .at_s = 0.35, .for_s = 0.1, .every = 3},
+               {.kind = FaultKind::truncate, .at_s = 0.5, .for_s = 0.1, .every = 3},
+               {.kind = FaultKind::delay, .at_s = 0.65, .for_s = 0.1, .every = 2, .ms = 3},
+               {.kind = FaultKind::lose, .at_s = 0.8, .for_s = 0.05}}};
+constexpr int kTicksAfterFault = 100;
+constexpr int kMostTicks = 8000;
+
+/// The device with its faults, watched from both ends: the servo's thread and the node's.
+class WatchedDevice final : public kerf::PacketDevice {
+ public:
+  explicit WatchedDevice(Emulator& emulator) : emulator_(emulator), device_(emulator, kSample) {}
+
+  void receive(std::span<const std::uint8_t> packet) noexcept override { device_.receive(packet); }
+  void advance(int cycles) noexcept override {
+    for (int i = 0; i < cycles; ++i) {
+      device_.advance(1);
+      const std::scoped_lock lock(mutex_);
+      time_ms_ = static_cast<double>(emulator_.stats().cycles) * 1000 / kerf::kCyclesPerSecond;
+      contract_.device_force(time_ms_, norm(emulator_.model().motor_force_n()),
+                             kerf::test::kKeepsTime);
+    }
+  }
+  std::span<const std::uint8_t> next_packet() noexcept override { return device_.next_packet(); }
+
+  void tick(const ServoOutput& output) {
+    const std::scoped_lock lock(mutex_);
+    contract_.tick(time_ms_, output);
+  }
+  /// When nobody calls any more.
+  [[nodiscard]] const kerf::faults::Outcome& outcome() {
+    outcome_.faults_begun = device_.begun();
+    return outcome_;
+  }
+
+ private:
+  Emulator& emulator_;
+  kerf::FaultyDevice device_;
+  std::mutex mutex_;
+  double time_ms_ = 0;
+  kerf::faults::Outcome outcome_;
+  kerf::faults::Contract contract_{1000, kerf::test::half_space_scene().limits.force_n, outcome_};
+};
+
+/// Plays the sample; `serve(device)` makes the node.
+template <class Serve>
+void play(Personality personality, Emulator& emulator, const std::string& bus, Serve serve) {
+  WatchedDevice device(emulator);
+  const auto served = serve(device);
+  int pushing = 0, in_fault = 0;
+  {
+    const auto port = kerf::open_port(bus + ":" + served->path(), 1000, 1000, kGoOn);
+    kerf::test::ServoSession session(personality, *port, kerf::test::firm_half_space());
+    const auto watch = [&](const ServoOutput& output) {
+      device.tick(output);
+      pushing += output.contact ? 1 : 0;
+      in_fault += output.fault == kerf::Fault::stale_input ? 1 : 0;
+    };
+    const auto done = [&] { return in_fault >= kTicksAfterFault; };
+    if (personality == Personality::omni) {
+      for (int tick = 0; tick < kMostTicks && !done(); ++tick) watch(session.step().output);
+    } else {
+      session.watch(watch);
+      session.run(kMostTicks, [&](const auto&) { return done(); });
+    }
+  }
+  served->stop();
+  const auto& outcome = device.outcome();
+  for (const std::string& violation : outcome.violations) MESSAGE(violation);
+  CHECK(outcome.violation_count == 0);
+  CHECK(outcome.faults_begun == kSample.faults.size());
+  CHECK(outcome.device_peak_n > 0.05);
+  CHECK(pushing > 300);
+  CHECK(in_fault == kTicksAfterFault);
+}
+
+}  // namespace
+
+TEST_CASE("the sample of faults breaks no rule with the Omni over FireWire") {
+  Emulator emulator({}, kerf::test::pressing_hand());
+  play(Personality::omni, emulator, "fw", [](kerf::PacketDevice& device) {
+    return std::make_unique<kerf::test::MountedDevice>(kerf::FirewireSettings{}, device);
+  });
+}
+
+TEST_CASE("the sample of faults breaks no rule with the Falcon over USB") {
+  Emulator emulator(std::make_unique<kerf::FalconModel>(), kerf::test::pressing_hand());
+  play(Personality::falcon, emulator, "usb", [](kerf::PacketDevice& device) {
+    return std::make_unique<kerf::test::ServedNode<kerf::UsbfsNode>>(
+        "usb", kerf::test::become_device, kerf::FtdiFalcon::Settings{.firmware_runs = true},
+        std::vector<kerf::ScriptedUsbFault>{}, device);
+  });
+}
+
+TEST_CASE("the sample of faults breaks no rule with WoodenHaptics over HID") {
+  Emulator emulator(std::make_unique<kerf::WoodenModel>(), kerf::test::pressing_hand());
+  play(Personality::woodenhaptics, emulator, "hid", [](kerf::PacketDevice& device) {
+    return std::make_unique<kerf::test::ServedNode<kerf::HidrawNode>>(
+        "hidraw0", kerf::test::become_device, kerf::WoodenHid::Settings{}, device);
+  });
+}

@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: Apache-2.0
+// A Falcon and a WoodenHaptics arm on one machine, each with its own servo; the Falcon dies.
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <thread>
+
+#include <doctest/doctest.h>
+
+#include "controller/device/hid_port.hpp"
+#include "controller/device/usb_port.hpp"
+#include "tests/hil/fuse/usb_session.hpp"
+
+using kerf::Personality;
+using kerf::UsbFault;
+using kerf::test::kGoOn;
+using kerf::test::MountedArm;
+using kerf::test::MountedFalcon;
+using kerf::test::ServoSession;
+
+namespace {
+
+/// An arm that presses on, over a part of a run.
+struct Part {
+  int ticks = 0, stale = 0, longest_stale = 0;
+  double least_n = 1000, most_n = 0;
+
+  void add(const kerf::ServoOutput& output) {
+    const double n = std::hypot(output.force_n[0], output.force_n[1], output.force_n[2]);
+    ++ticks;
+    stale = output.stale ? stale + 1 : 0;
+    longest_stale = std::max(longest_stale, stale);
+    least_n = std::min(least_n, n);
+    most_n = std::max(most_n, n);
+  }
+};
+
+}  // namespace
+
+TEST_CASE("usb: one of two devices dies, the other's force and timing stay as they were") {
+  const MountedArm arm({}, kerf::test::pressing_hand());
+  const MountedFalcon falcon({.firmware_runs = true}, {{3300, UsbFault::vanish}});
+  kerf::HidPort arm_port(arm.path(), 0, kGoOn);
+  kerf::UsbPort falcon_port({falcon.path(), ""}, 0, kGoOn);
+  ServoSession arm_session(Personality::woodenhaptics, arm_port, kerf::test::firm_half_space());
+  ServoSession falcon_session(Personality::falcon, falcon_port);
+
+  constexpr int kSettle = 300;  // ticks of contact before the force has come to rest
+  Part before, after;
+  int contact = 0;
+  arm_session.watch([&](const kerf::ServoOutput& output) {
+    if (output.contact && ++contact > kSettle) (falcon_port.closed() ? after : before).add(output);
+  });
+  std::atomic<bool> arm_done{false};
+  ServoSession::Course of_falcon;
+  std::thread beside(
+      [&] { of_falcon = falcon_session.run(8000, [&](const auto&) { return arm_done.load(); }); });
+  const auto of_arm = arm_session.run(8000, [&](const auto&) { return after.ticks >= 500; });
+  arm_done = true;
+  beside.join();
+
+  CHECK(of_falcon.motors > 0);  // it died in action
+  CHECK(of_falcon.faults > 0);
+  CHECK(of_falcon.stale_with_motors == 0);
+  CHECK(of_arm.faults == 0);
+  CHECK(before.ticks > 0);
+  CHECK(after.ticks == 500);
+  if (kerf::test::kKeepsTime) CHECK(after.longest_stale <= std::max(before.longest_stale, 5));
+  CHECK(after.least_n > before.least_n * 0.9);
+  CHECK(after.most_n < before.most_n * 1.1);
+}
