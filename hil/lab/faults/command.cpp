@@ -146,11 +146,16 @@ Command::Command(CLI::App& program)
       ->capture_default_str();
   app_->add_option("--scene", scene_, "what is touched")->capture_default_str();
   app_->add_option("--hand", hand_, "how")->capture_default_str();
+  app_->add_option("--rate", rate_hz_, "of the servo, Hz; must divide 8000")->capture_default_str();
   app_->add_option("--report", report_, "write the figures as JSON")->type_name("FILE");
   app_->footer("Exit codes: 0 the contract holds, 1 it was broken, 2 bad input or set-up.");
 }
 
 int Command::run(std::ostream& out) const {
+  if (rate_hz_ < 1 || kCyclesPerSecond % rate_hz_ != 0) {
+    throw HilError("--rate: " + std::to_string(rate_hz_) +
+                   " does not divide 8000, the rate of the devices' mechanics; use such as 4000");
+  }
   const LabOutput report("--report", report_);
   auto scripts = scripts_in(scripts_);
   if (random_ != 0) scripts.push_back({"at random", std::nullopt});
@@ -167,6 +172,7 @@ int Command::run(std::ostream& out) const {
                                                      kPersonalityWords.begin());
     overrides.torque_scale = torque_scale_of(*overrides.personality);
     overrides.phantom_size = VoxelGrid{64, 64, 40};
+    overrides.rate_hz = rate_hz_;
     Scene scene;
     try {
       scene = load_scene(scene_, overrides);

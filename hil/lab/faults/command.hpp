@@ -20,6 +20,7 @@ class Command final : public LabCommand {
   std::vector<std::string> devices_;
   unsigned seeds_ = 20;
   unsigned random_ = 1;
+  int rate_hz_ = 1000;
 };
 
 }  // namespace kerf::faults
