@@ -10,9 +10,9 @@ find_package(nlohmann_json REQUIRED)
 find_package(CLI11 REQUIRED)
 
 add_library(kerf_volume STATIC
-  phantom.cpp phantom_shape.cpp volume_crop.cpp volume_density.cpp volume_header.cpp
-  volume_io.cpp volume_limits.cpp volume_nifti.cpp volume_resample.cpp volume_source.cpp
-  volume_write.cpp)
+  library_messages.cpp phantom.cpp phantom_shape.cpp volume_crop.cpp volume_density.cpp
+  volume_header.cpp volume_io.cpp volume_limits.cpp volume_nifti.cpp volume_resample.cpp
+  volume_slices.cpp volume_source.cpp volume_write.cpp)
 # SYSTEM: ITK's headers do not pass our warnings; only volume_io.cpp includes them.
 target_include_directories(kerf_volume SYSTEM PRIVATE ${ITK_INCLUDE_DIRS})
 target_link_libraries(kerf_volume PUBLIC kerf_shared kerf_posix PRIVATE ${ITK_LIBRARIES} ZLIB::ZLIB)

@@ -2,12 +2,9 @@
 #include "controller/scene/volume_io.hpp"
 
 #include <algorithm>
-#include <cmath>
-#include <iostream>
 #include <limits>
 #include <map>
 #include <new>
-#include <sstream>
 #include <string>
 
 // clang-format off
@@ -19,8 +16,10 @@
 #include <itkNiftiImageIO.h>
 #include <itkNrrdImageIO.h>
 
+#include "controller/scene/library_messages.hpp"
 #include "controller/scene/scene_error.hpp"
 #include "controller/scene/volume_header.hpp"
+#include "controller/scene/volume_slices.hpp"
 #include "controller/scene/volume_source.hpp"
 #include "controller/scene/volume_write.hpp"
 
@@ -40,36 +39,9 @@ namespace fs = std::filesystem;
 namespace {
 
 using ImageIo = itk::ImageIOBase;
-using volume::dot, volume::cross, volume::minus, volume::scaled;
+using volume::cross, volume::dot;
 using volume::Place, volume::set_frame, volume::set_grid, volume::set_range, volume::set_spacing;
-
-/// Keeps what ITK, MetaIO and GDCM print to std::cerr and std::cout while it lives.
-class Quiet {
- public:
-  Quiet() : cerr_(std::cerr.rdbuf(kept_.rdbuf())), cout_(std::cout.rdbuf(kept_.rdbuf())) {
-    itk::Object::GlobalWarningDisplayOff();
-  }
-  ~Quiet() {
-    std::cerr.rdbuf(cerr_);
-    std::cout.rdbuf(cout_);
-  }
-  Quiet(const Quiet&) = delete;
-  Quiet& operator=(const Quiet&) = delete;
-
-  /// MetaIO and GDCM only print that voxels are missing, and go on.
-  void refuse_if_missing(const fs::path& path) const {
-    const std::string text = kept_.str();
-    if (text.find("not read completely") != std::string::npos ||
-        text.find("Incomplete Pixel Data") != std::string::npos) {
-      throw SceneError(path.string() + ": voxels are missing at its end; copy the file again");
-    }
-  }
-
- private:
-  std::ostringstream kept_;
-  std::streambuf* cerr_;
-  std::streambuf* cout_;
-};
+using volume::Quiet, volume::Slice;
 
 std::string lower(std::string text) {
   std::transform(text.begin(), text.end(), text.begin(), [](char c) {
@@ -78,23 +50,8 @@ std::string lower(std::string text) {
   return text;
 }
 
-/// The last line of a library's message, which is the most precise one, without its prefix.
-std::string last_line(const std::string& message) {
-  std::istringstream lines(message);
-  std::string line;
-  std::string last = "no reason given";
-  while (std::getline(lines, line)) {
-    if (line.find_first_not_of(" \t\r") != std::string::npos) last = line;
-  }
-  const std::size_t object = last.find("): ");  // "ITK ERROR: Class(0x1234): text"
-  if (object != std::string::npos) last.erase(0, object + 3);
-  const std::size_t biff = last.find("] ");  // "[nrrd] function: text"
-  if (last.front() == '[' && biff != std::string::npos) last.erase(0, biff + 2);
-  return last;
-}
-
 [[noreturn]] void refuse_unreadable(const fs::path& path, const std::string& reason) {
-  throw SceneError(path.string() + ": cannot be read (" + last_line(reason) +
+  throw SceneError(path.string() + ": cannot be read (" + volume::last_line(reason) +
                    "); check that the file is whole and of the kind its name says");
 }
 
@@ -241,13 +198,6 @@ SourceVolume read_dicom_file(const fs::path& path, const ReadOptions& options) {
   return read_one_file(path, *io, header, options);
 }
 
-/// One slice of a series and where it lies along the normal.
-struct Slice {
-  fs::path file;
-  Place origin_mm;
-  double depth_mm;
-};
-
 /// The DICOM images in a folder, which must be of one series. Other files may lie beside them.
 std::vector<fs::path> series_files(const fs::path& folder) {
   std::vector<fs::path> files;
@@ -273,32 +223,6 @@ std::vector<fs::path> series_files(const fs::path& folder) {
   }
   std::sort(files.begin(), files.end());  // the order in which a folder lists is chance
   return files;
-}
-
-/// The slices' common distance along the normal; refuses gaps and a slanted stack.
-double slice_distance(const fs::path& folder, const std::vector<Slice>& slices,
-                      const Place& normal) {
-  const double step =
-      (slices.back().depth_mm - slices.front().depth_mm) / static_cast<double>(slices.size() - 1);
-  const double slack_mm = std::max(0.02 * step, 1e-3);  // positions are rounded in the files
-  for (std::size_t i = 1; i < slices.size(); ++i) {
-    const Place way = minus(slices[i].origin_mm, slices[i - 1].origin_mm);
-    const double depth = dot(way, normal);
-    const Place aside = minus(way, scaled(normal, depth));
-    if (std::abs(depth - step) > slack_mm) {
-      std::ostringstream text;
-      text << folder.string() << ": " << depth << " mm before slice "
-           << slices[i].file.filename().string() << " where " << step
-           << " mm is usual; add the missing slices or remove doubled ones";
-      throw SceneError(text.str());
-    }
-    if (std::sqrt(dot(aside, aside)) > slack_mm) {
-      throw SceneError(folder.string() +
-                       ": its axes are not at right angles (tilted gantry); resample it to a "
-                       "straight grid first");
-    }
-  }
-  return step;
 }
 
 SourceVolume read_dicom_series(const fs::path& folder, const ReadOptions& options) {
@@ -331,7 +255,7 @@ SourceVolume read_dicom_series(const fs::path& folder, const ReadOptions& option
   }
   std::sort(slices.begin(), slices.end(),
             [](const Slice& a, const Slice& b) { return a.depth_mm < b.depth_mm; });
-  const double step = slice_distance(folder, slices, normal);
+  const double step = volume::slice_distance(folder, slices, normal);
   set_spacing(folder, options, in_file, {pixel[0], pixel[1], step}, volume);
   volume.origin_mm = slices.front().origin_mm;
 
@@ -349,6 +273,7 @@ SourceVolume read_dicom_series(const fs::path& folder, const ReadOptions& option
 }  // namespace
 
 SourceVolume read_volume(const fs::path& path, const ReadOptions& options) {
+  itk::Object::GlobalWarningDisplayOff();  // what it warns of is refused or fine
   if (!fs::exists(path)) {
     throw SceneError(path.string() + ": no such file or folder; check the path");
   }
