@@ -4,10 +4,17 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <cstdlib>
 #include <string>
 #include <vector>
 
 namespace kerf::test {
+
+/// Servo ticks of 1 ms that a timing test runs: two seconds, or KERF_TIMING_SECONDS.
+[[nodiscard]] inline int timing_ticks() {
+  const char* const wanted = std::getenv("KERF_TIMING_SECONDS");
+  return 1000 * (wanted ? std::max(1, std::atoi(wanted)) : 2);
+}
 
 /// Percentiles of measured times; the unit is that of the values.
 struct Spread {

@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // 1 kHz through FUSE with libusb and hidapi, emulator, I/O thread and servo on one core: the way of
 // a command from the servo to the device plus the way of the answer back, without the time that the
-// device lets the answer wait for its frame. KERF_TIMING_SECONDS makes it longer than 4 s.
+// device lets the answer wait for its frame. KERF_TIMING_SECONDS makes it longer than 2 s.
 #include <algorithm>
 #include <array>
 #include <atomic>
 #include <cstdint>
-#include <cstdlib>
 #include <optional>
 #include <string>
 #include <thread>
@@ -120,11 +119,6 @@ class EchoDevice final : public kerf::PacketDevice {
   decltype(Wire::answer({})) packet_{};
 };
 
-int seconds() {
-  const char* wanted = std::getenv("KERF_TIMING_SECONDS");
-  return wanted ? std::max(1, std::atoi(wanted)) : 4;
-}
-
 /// `make_port(path)` after the node is there; `device` is the one in it.
 template <class Wire, class Served, class MakePort>
 void measure(const char* name, EchoDevice<Wire>& device, Served& served, MakePort make_port,
@@ -183,7 +177,7 @@ void measure(const char* name, EchoDevice<Wire>& device, Served& served, MakePor
 }  // namespace
 
 TEST_CASE("libusb through FUSE: a command and its answer cost far less than a frame") {
-  const int ticks = seconds() * 1000;
+  const int ticks = kerf::test::timing_ticks();
   EchoDevice<FalconWire> device(ticks);
   kerf::test::ServedNode<kerf::UsbfsNode> served(
       "usb", [] { static_cast<void>(kerf::make_real_time(82, -1)); },
@@ -199,7 +193,7 @@ TEST_CASE("libusb through FUSE: a command and its answer cost far less than a fr
 }
 
 TEST_CASE("hidapi through FUSE: a command and its answer cost far less than a frame") {
-  const int ticks = seconds() * 1000;
+  const int ticks = kerf::test::timing_ticks();
   EchoDevice<WoodenWire> device(ticks);
   kerf::test::ServedNode<kerf::HidrawNode> served(
       "hidraw0", [] { static_cast<void>(kerf::make_real_time(82, -1)); },
