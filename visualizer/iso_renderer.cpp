@@ -3,7 +3,7 @@
 
 #include <glm/gtc/matrix_inverse.hpp>
 
-#include "visualizer/feelers.hpp"
+#include "visualizer/cast/change_job.hpp"
 #include "visualizer/gl/context.hpp"
 #include "visualizer/palette.hpp"
 #include "visualizer/view_uniforms.hpp"
@@ -62,12 +62,15 @@ void IsoRenderer::update(std::size_t volume, std::span<const Density> density,
   volumes_[volume].update_bricks(density, changed);
 }
 
-std::vector<VoxelBox> IsoRenderer::looks_different(std::size_t volume,
-                                                   std::span<const VoxelBox> differs) const {
-  if (feels_ahead()) return Renderer::looks_different(volume, differs);
-  std::vector<VoxelBox> boxes(differs.begin(), differs.end());
-  for (VoxelBox& box : boxes) box = box.grown(Feelers::kReachVox);
-  return boxes;
+SightReach IsoRenderer::reach() const noexcept {
+  SightReach reach = Renderer::reach();
+  if (gradient_ != Gradient::corners) {
+    // The kernels know where the normals of one gradient point; of others a feeler may be anywhere,
+    // and a density is interpolated between two voxels.
+    reach.at_end = static_cast<int>(2.0F * (kLongestFeelerVox + 1.0F)) + 1;
+    reach.feels_ahead = false;
+  }
+  return reach;
 }
 
 void IsoRenderer::draw(const View& view, const RenderTarget& target) {

@@ -30,12 +30,7 @@ class IsoRenderer final : public Renderer {
   void update(std::size_t volume, std::span<const Density> density,
               std::span<const std::uint32_t> changed) override;
   void draw(const View& view, const RenderTarget& target) override;
-  /// `Feelers` know where the normals of one gradient point.
-  [[nodiscard]] bool feels_ahead() const noexcept override {
-    return gradient_ == Gradient::corners;
-  }
-  [[nodiscard]] std::vector<VoxelBox> looks_different(
-      std::size_t volume, std::span<const VoxelBox> differs) const override;
+  [[nodiscard]] SightReach reach() const noexcept override;
 
  private:
   void cast_rays(const VolumeOnGpu& volume, const View& view, const RenderTarget& target);

@@ -8,7 +8,6 @@
 #include "visualizer/blend_renderer.hpp"
 #include "visualizer/cast/cast_renderer.hpp"
 #include "visualizer/error.hpp"
-#include "visualizer/feelers.hpp"
 #include "visualizer/iso_renderer.hpp"
 #include "visualizer/slices_renderer.hpp"
 #include "visualizer/surface/surface_renderer.hpp"
@@ -52,19 +51,23 @@ const Kind& find_kind(std::string_view name) {
                         " is unknown; known: " + known_renderers());
 }
 
-// A translucent volume has its gradient from interpolated differences (2) and its material from 1.5
-// below a sample (matter.frag); one for the interpolation.
-constexpr int kTranslucentReachVox = 3;
+// A density is interpolated between two voxels (1 edge), a surface has its gradient from a cube two
+// voxels wide (2).
+constexpr SightReach kSurfaceReach{.along = 3, .at_end = 5, .feels_ahead = true};
+// A sample within takes its material from 1.5 edges up the gradient (matter.frag), or its gradient
+// from five voxels along each axis (3).
+constexpr SightReach kMatterReach{.along = 6}, kWideMatterReach{.along = 7};
 
 }  // namespace
 
 std::vector<VoxelBox> Renderer::looks_different(std::size_t /*volume*/,
                                                 std::span<const VoxelBox> differs) const {
-  std::vector<VoxelBox> boxes(differs.begin(), differs.end());
-  for (VoxelBox& box : boxes) {
-    box = box.grown(translucent() ? kTranslucentReachVox : Feelers::kNormalReachVox);
-  }
-  return boxes;
+  return {differs.begin(), differs.end()};
+}
+
+SightReach Renderer::reach() const noexcept {
+  if (!translucent()) return kSurfaceReach;
+  return takes_gradient() ? kWideMatterReach : kMatterReach;
 }
 
 std::unique_ptr<Renderer> make_renderer(std::string_view kind, const SceneView& scene,

@@ -11,6 +11,7 @@
 #include "visualizer/camera.hpp"
 #include "visualizer/gl/target.hpp"
 #include "visualizer/scene_view.hpp"
+#include "visualizer/sight_reach.hpp"
 #include "visualizer/volume_on_gpu.hpp"
 
 namespace kerf {
@@ -35,14 +36,11 @@ class Renderer {
   /// Draws over what is in `target`, under its depth test, within its part. Opaque things come
   /// first: some renderers look through.
   virtual void draw(const View& view, const RenderTarget& target) = 0;
-  /// Boxes of voxels around all of a volume that may look different since its last `update`, which
-  /// changed densities in `differs`: a ray that meets none of them before it ends shows what it
-  /// showed before.
+  /// Boxes of all voxels of a volume that may make a ray look different since its last `update`,
+  /// which changed densities in `differs`; rays farther off than `reach` show what they showed.
   [[nodiscard]] virtual std::vector<VoxelBox> looks_different(
       std::size_t volume, std::span<const VoxelBox> differs) const;
-  /// Surfaces are shaded by what lies along their normal, farther off than these boxes reach: see
-  /// `Feelers`.
-  [[nodiscard]] virtual bool feels_ahead() const noexcept { return false; }
+  [[nodiscard]] virtual SightReach reach() const noexcept;
   /// Shades from the gradient that the scene names; else always from `Gradient::corners`.
   [[nodiscard]] virtual bool takes_gradient() const noexcept { return true; }
   /// Lets what lies behind a surface shine through, so that it must be drawn before.

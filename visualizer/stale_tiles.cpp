@@ -17,8 +17,8 @@ PixelRect StaleTiles::tiles_of(const PixelRect& pixels) const {
   return {in.x0 / kEdge, in.y0 / kEdge, (in.x1 - 1) / kEdge + 1, (in.y1 - 1) / kEdge + 1};
 }
 
-PixelRect StaleTiles::pixels_of(int x, int y) const {
-  return PixelRect{x * kEdge, y * kEdge, (x + 1) * kEdge, (y + 1) * kEdge}.clipped(
+PixelRect StaleTiles::pixels_of(const PixelRect& tiles) const {
+  return PixelRect{tiles.x0 * kEdge, tiles.y0 * kEdge, tiles.x1 * kEdge, tiles.y1 * kEdge}.clipped(
       {0, 0, size_.width, size_.height});
 }
 
@@ -31,7 +31,7 @@ void StaleTiles::mark(const PixelRect& pixels) {
 
 namespace {
 
-constexpr int kSpareTiles = 8;  // that are drawn for nothing to save a rectangle
+constexpr int kSpareTiles = 4;  // that are drawn for nothing to save a rectangle
 
 /// A rectangle of tiles that the next row may go on.
 struct Open {
@@ -73,10 +73,7 @@ std::vector<PixelRect> StaleTiles::rects() const {
     }
     open = std::move(row);
   }
-  for (PixelRect& rect : done) {
-    rect = PixelRect{rect.x0 * kEdge, rect.y0 * kEdge, rect.x1 * kEdge, rect.y1 * kEdge}.clipped(
-        {0, 0, size_.width, size_.height});
-  }
+  for (PixelRect& rect : done) rect = pixels_of(rect);
   return done;
 }
 

@@ -19,8 +19,8 @@ class StaleTiles {
 
   /// The tiles, counted in tiles, that `pixels` touch; clipped to the picture.
   [[nodiscard]] PixelRect tiles_of(const PixelRect& pixels) const;
-  /// The pixels of a tile that exist.
-  [[nodiscard]] PixelRect pixels_of(int x, int y) const;
+  /// The pixels of some tiles that exist.
+  [[nodiscard]] PixelRect pixels_of(const PixelRect& tiles) const;
 
   /// All that `pixels` touch.
   void mark(const PixelRect& pixels);

@@ -4,104 +4,23 @@
 #include <algorithm>
 #include <array>
 
-#include "visualizer/feelers.hpp"
+#include <glm/gtc/matrix_inverse.hpp>
+#include <glm/gtc/matrix_transform.hpp>
+
+#include "visualizer/cast/cast_eye.hpp"
+#include "visualizer/changed_cells.hpp"
 #include "visualizer/screen_bounds.hpp"
 
 namespace kerf {
 
 namespace {
 
-constexpr std::size_t kMostBoxes = 1024;  // some cuts between two pictures; more count as one
+constexpr std::size_t kMostBoxes = 8192;  // some cuts between two pictures; more count as one
+// Voxels around boxes that are looked at together: a cut. Between boxes far apart is only air, and
+// in a larger one little to be left out.
+constexpr std::size_t kMostTogether = 64 * 64 * 64;
 
-/// A box as the picture sees it.
-struct Covered {
-  PixelRect pixels;
-  float from;  ///< window depth of its nearest corner
-};
-
-Covered covered_by(const VoxelBox& box, const VolumeView& volume, const View& view,
-                   PictureSize size) {
-  std::array<glm::dvec3, 8> corners;
-  double nearest_mm = view.far_mm;
-  for (std::size_t c = 0; c < corners.size(); ++c) {
-    constexpr double kSlackVox = 0.05;  // for what a depth of 24 bits and a shader round
-    const auto end = [&](std::size_t axis, std::int32_t lo, std::int32_t hi) {
-      return (c >> axis & 1) != 0 ? hi - 1 + kSlackVox : lo - kSlackVox;
-    };
-    const glm::dvec4 voxel(end(0, box.lo.x, box.hi.x), end(1, box.lo.y, box.hi.y),
-                           end(2, box.lo.z, box.hi.z), 1.0);
-    corners[c] = glm::dvec3(volume.world_from_voxel * voxel);
-    nearest_mm = std::min(nearest_mm, -(view.eye_from_world * glm::dvec4(corners[c], 1.0)).z);
-  }
-  constexpr double kSlack = 1e-4;  // of the distance
-  const double from_mm = std::max(nearest_mm * (1.0 - kSlack), view.near_mm);
-  return {screen_bounds(corners, view, size),
-          static_cast<float>(window_depth(from_mm, view.near_mm, view.far_mm))};
-}
-
-/// The depth of the tiles that touch a part of a picture.
-class KeptDepth {
- public:
-  KeptDepth(const RenderTarget& of, const StaleTiles& tiles, const PixelRect& part) {
-    within_ = tiles.tiles_of(part);
-    pixels_ = tiles.pixels_of(within_.x0, within_.y0)
-                  .united(tiles.pixels_of(within_.x1 - 1, within_.y1 - 1));
-    window_ = of.read_depth(pixels_);
-    ranges_.resize(static_cast<std::size_t>(within_.area()));
-  }
-
-  [[nodiscard]] const float* row(int y) const {
-    return window_.data() +
-           static_cast<std::ptrdiff_t>(y - pixels_.y0) * (pixels_.x1 - pixels_.x0) - pixels_.x0;
-  }
-  struct Range {
-    float nearest = 1.0F, farthest = 0.0F;
-    void add(const Range& other) {
-      nearest = std::min(nearest, other.nearest);
-      farthest = std::max(farthest, other.farthest);
-    }
-  };
-  /// Of all pixels of these tiles.
-  [[nodiscard]] Range range(const PixelRect& tiles) {
-    Range range;
-    for (int y = tiles.y0; y < tiles.y1; ++y) {
-      for (int x = tiles.x0; x < tiles.x1; ++x) range.add(tile_range(x, y));
-    }
-    return range;
-  }
-  /// Of a tile; worked out when it is asked for first.
-  [[nodiscard]] const Range& tile_range(int x, int y) {
-    Range& range = ranges_[static_cast<std::size_t>((y - within_.y0) * (within_.x1 - within_.x0) +
-                                                    x - within_.x0)];
-    if (range.nearest > range.farthest) {
-      constexpr int kEdge = StaleTiles::kEdge;
-      for (int py = y * kEdge; py < std::min((y + 1) * kEdge, pixels_.y1); ++py) {
-        for (int px = x * kEdge; px < std::min((x + 1) * kEdge, pixels_.x1); ++px) {
-          range.add({row(py)[px], row(py)[px]});
-        }
-      }
-    }
-    return range;
-  }
-
- private:
-  PixelRect within_;  ///< tiles
-  PixelRect pixels_;
-  std::vector<float> window_;
-  std::vector<Range> ranges_;  ///< by tile; upside down where nobody has asked
-};
-
-/// Calls `look` for each of these tiles that is not marked, and marks it where that says so.
-template <class Look>
-void mark_where(StaleTiles& tiles, const PixelRect& within, const Look& look) {
-  for (int y = within.y0; y < within.y1; ++y) {
-    for (int x = within.x0; x < within.x1; ++x) {
-      if (!tiles.marked(x, y) && look(x, y)) tiles.mark(x, y);
-    }
-  }
-}
-
-VoxelBox united(const std::vector<VoxelBox>& boxes) {
+VoxelBox united(std::span<const VoxelBox> boxes) {
   VoxelBox all;
   for (const VoxelBox& box : boxes) all = all.united(box);
   return all;
@@ -112,69 +31,121 @@ void add_to(std::vector<VoxelBox>& boxes, std::span<const VoxelBox> more) {
   if (boxes.size() > kMostBoxes) boxes = {united(boxes)};
 }
 
+std::size_t voxels_in(const VoxelBox& box) {
+  const VoxelIndex extent = box.extent();
+  return VoxelGrid{extent.x, extent.y, extent.z}.voxel_count();
+}
+
+/// Boxes that lie together.
+std::vector<std::vector<VoxelBox>> clusters_of(std::span<const VoxelBox> boxes) {
+  std::vector<std::vector<VoxelBox>> clusters;
+  std::vector<VoxelBox> around;
+  for (const VoxelBox& box : boxes) {
+    std::size_t at = 0;
+    while (at < around.size() && voxels_in(around[at].united(box)) > kMostTogether) ++at;
+    if (at == around.size()) {
+      around.emplace_back();
+      clusters.emplace_back();
+    }
+    around[at] = around[at].united(box);
+    clusters[at].push_back(box);
+  }
+  return clusters;
+}
+
+/// The pixels whose rays may pass a box in voxel coordinates.
+PixelRect pixels_of(const glm::dvec3& low, const glm::dvec3& high, const VolumeView& volume,
+                    const View& view, PictureSize size) {
+  std::array<glm::dvec3, 8> corners;
+  for (unsigned c = 0; c < corners.size(); ++c) {
+    const glm::dvec4 corner((c & 1) != 0 ? high.x : low.x, (c & 2) != 0 ? high.y : low.y,
+                            (c & 4) != 0 ? high.z : low.z, 1.0);
+    corners[c] = glm::dvec3(volume.world_from_voxel * corner);
+  }
+  return screen_bounds(corners, view, size);
+}
+
+/// A change in a volume, as one view sees it.
+ChangeJob change_job(const ChangedCells& cells, const VolumeView& volume, const View& view,
+                     PictureSize size) {
+  const glm::dmat4 eye_from_cell =
+      view.eye_from_world * glm::translate(volume.world_from_voxel, cells.low());
+  const glm::dmat4 cell_from_eye = glm::affineInverse(eye_from_cell);
+  ChangeJob job;
+  job.eye = cast_eye(view, size.width, size.height);
+  put(job.origin, glm::dvec3(cell_from_eye[3]));
+  put(job.from_eye, glm::dmat3(cell_from_eye));
+  cells.put(job);
+  return job;
+}
+
+/// What lets its surface feel the change: all of `density`.
+void put_density(ChangeJob& job, const ChangedCells& cells, const VolumeView& volume,
+                 std::span<const Density> density, const View& view) {
+  const VoxelGrid& grid = volume.bricks.grid;
+  job.density = density.data();
+  job.extent[0] = grid.nx;
+  job.extent[1] = grid.ny;
+  job.extent[2] = grid.nz;
+  put(job.first_voxel, -cells.low());
+  const glm::dmat4 eye_from_voxel = view.eye_from_world * volume.world_from_voxel;
+  const glm::dvec3 half = 0.5 * (cells.high() - cells.low());
+  put(job.centre_mm, glm::dvec3(eye_from_voxel * glm::dvec4(cells.low() + half, 1.0)));
+  double edge_mm = 0.0;
+  for (int axis = 0; axis < 3; ++axis) {
+    put(job.half_mm[axis], half[axis] * glm::dvec3(eye_from_voxel[axis]));
+    edge_mm = std::max(edge_mm, glm::length(glm::dvec3(eye_from_voxel[axis])));
+  }
+  job.edge_mm = static_cast<float>(edge_mm);
+}
+
+/// Marks those of `within` that are not yet and of which `is_stale` says so.
+template <class IsStale>
+void mark_where(StaleTiles& tiles, const PixelRect& within, const IsStale& is_stale) {
+  for (int y = within.y0; y < within.y1; ++y) {
+    for (int x = within.x0; x < within.x1; ++x) {
+      if (!tiles.marked(x, y) && is_stale(tiles.pixels_of({x, y, x + 1, y + 1}))) tiles.mark(x, y);
+    }
+  }
+}
+
 }  // namespace
 
 void StaleVolume::add(const Renderer& renderer, std::size_t index,
                       std::span<const VoxelBox> differs) {
-  add_to(differs_, differs);
-  add_to(looks_, renderer.looks_different(index, differs));
-}
-
-void StaleVolume::clear() {
-  differs_.clear();
-  looks_.clear();
+  add_to(changed_, renderer.looks_different(index, differs));
 }
 
 void StaleVolume::mark(StaleTiles& tiles, const Renderer& renderer, const VolumeView& volume,
                        std::span<const Density> density, const View& view,
                        const RenderTarget& kept) const {
-  std::vector<Covered> covered;
-  PixelRect all;
-  for (const VoxelBox& box : looks_) {
-    covered.push_back(covered_by(box, volume, view, kept.size()));
-    all = all.united(covered.back().pixels);
-  }
-  if (renderer.translucent()) {
-    for (const Covered& box : covered) tiles.mark(box.pixels);
-    return;
-  }
-  PixelRect felt;
-  if (renderer.feels_ahead() && !differs_.empty()) {
-    felt = covered_by(united(differs_).grown(Feelers::kReachVox), volume, view, kept.size()).pixels;
-  }
-  all = all.united(felt);
-  if (all.empty()) return;
-  KeptDepth depth(kept, tiles, all);
-  for (const Covered& box : covered) {
-    // What is in sight before the box hides it.
-    mark_where(tiles, tiles.tiles_of(box.pixels),
-               [&](int x, int y) { return depth.tile_range(x, y).farthest >= box.from; });
-  }
-  if (felt.empty()) return;
-  Feelers feelers(volume, density, differs_, view, kept.size());
-  const auto is_felt = [&](int tile_x, int tile_y) {
-    const PixelRect tile = tiles.pixels_of(tile_x, tile_y);
-    const auto [nearest, farthest] = depth.tile_range(tile_x, tile_y);
-    if (!feelers.may_reach(tile, nearest, farthest)) return false;
-    for (int y = tile.y0; y < tile.y1; ++y) {
-      for (int x = tile.x0; x < tile.x1; ++x) {
-        const float at = depth.row(y)[x];
-        if (at < 1.0F && feelers.may_reach(x, y, at)) return true;
-      }
-    }
-    return false;
+  const SightReach reach = renderer.reach();
+  const CastKernels& kernels = *cast_kernels()[0];
+  const double feels_vox = reach.feels_ahead ? kLongestFeelerVox : 0.0;
+  const auto pixels_around = [&](const glm::dvec3& low, const glm::dvec3& high, double vox) {
+    return pixels_of(low - vox, high + vox, volume, view, kept.size());
   };
-  // Most of it is far from the change: many tiles at once.
-  constexpr int kMany = 4;
-  const PixelRect whole = tiles.tiles_of(felt);
-  for (int y = whole.y0; y < whole.y1; y += kMany) {
-    for (int x = whole.x0; x < whole.x1; x += kMany) {
-      const PixelRect some = PixelRect{x, y, x + kMany, y + kMany}.clipped(whole);
-      const auto [nearest, farthest] = depth.range(some);
-      const PixelRect pixels =
-          tiles.pixels_of(some.x0, some.y0).united(tiles.pixels_of(some.x1 - 1, some.y1 - 1));
-      if (feelers.may_reach(pixels, nearest, farthest)) mark_where(tiles, some, is_felt);
+  for (const std::vector<VoxelBox>& together : clusters_of(changed_)) {
+    if (const auto& [lo, hi] = together.front(); voxels_in({lo, hi}) > kMostTogether) {
+      const double around_vox = 0.5 * std::max(reach.along, reach.at_end) + feels_vox;
+      tiles.mark(pixels_around({lo.x, lo.y, lo.z}, {hi.x, hi.y, hi.z}, around_vox));
+      continue;
     }
+    const ChangedCells cells(together, reach);
+    const PixelRect passing = tiles.tiles_of(pixels_around(cells.low(), cells.high(), 0.0));
+    const PixelRect all = tiles.tiles_of(pixels_around(cells.low(), cells.high(), feels_vox));
+    if (all.empty()) continue;
+    ChangeJob job = change_job(cells, volume, view, kept.size());
+    std::vector<float> depth;
+    if (!renderer.translucent()) {
+      job.window = tiles.pixels_of(all);
+      depth = kept.read_depth(job.window);
+      job.depth = depth.data();
+    }
+    mark_where(tiles, passing, [&](const PixelRect& tile) { return kernels.meets(job, tile); });
+    if (!reach.feels_ahead) continue;
+    put_density(job, cells, volume, density, view);
+    mark_where(tiles, all, [&](const PixelRect& tile) { return kernels.feels(job, tile); });
   }
 }
 

@@ -42,7 +42,8 @@ using Brick = std::array<Density, kBrickVoxels>;
 void place_brick(const Brick& brick, const VoxelBox& box, const VoxelGrid& grid,
                  std::span<Density> linear, std::vector<VoxelBox>& differs) {
   const std::int32_t width = box.hi.x - box.lo.x;
-  std::array<VoxelBox, 8> eighths;
+  constexpr std::int32_t kParts = kBrickEdge / kDiffersEdge;
+  std::array<VoxelBox, std::size_t{kParts} * kParts * kParts> parts;
   for (std::int32_t z = box.lo.z; z < box.hi.z; ++z) {
     for (std::int32_t y = box.lo.y; y < box.hi.y; ++y) {
       Density* const to = linear.data() + grid.index(box.lo.x, y, z);
@@ -52,15 +53,16 @@ void place_brick(const Brick& brick, const VoxelBox& box, const VoxelGrid& grid,
         while (first < end && to[first] == from[first]) ++first;
         if (first == end) continue;
         while (to[end - 1] == from[end - 1]) --end;
-        const std::int32_t eighth = (z - box.lo.z) / kDiffersEdge * 4 +
-                                    (y - box.lo.y) / kDiffersEdge * 2 + begin / kDiffersEdge;
-        VoxelBox& around = eighths[static_cast<std::size_t>(eighth)];
+        const std::int32_t part =
+            ((z - box.lo.z) / kDiffersEdge * kParts + (y - box.lo.y) / kDiffersEdge) * kParts +
+            begin / kDiffersEdge;
+        VoxelBox& around = parts[static_cast<std::size_t>(part)];
         around = around.united({{box.lo.x + first, y, z}, {box.lo.x + end, y + 1, z + 1}});
       }
       copy_row(to, from, static_cast<std::size_t>(width));
     }
   }
-  std::copy_if(eighths.begin(), eighths.end(), std::back_inserter(differs),
+  std::copy_if(parts.begin(), parts.end(), std::back_inserter(differs),
                [](const VoxelBox& around) { return !around.empty(); });
 }
 

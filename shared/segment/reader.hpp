@@ -62,9 +62,9 @@ struct VolumeSnapshot {
   bool consistent = false;
 };
 
-/// `VolumeSnapshot::differs` has the smallest box for each eighth of a brick, so that together they
-/// follow the shape of a cut; none is empty.
-inline constexpr std::int32_t kDiffersEdge = kBrickEdge / 2;
+/// `VolumeSnapshot::differs` has the smallest box for each 2^3 voxels of a brick, so that together
+/// they follow the shape of a cut; none is empty.
+inline constexpr std::int32_t kDiffersEdge = 2;
 
 enum class ReadState : std::uint8_t {
   ok,

@@ -150,10 +150,11 @@ BenchCut BenchTooth::cut(int diameter) {
 /// Within a brick; adds boxes around the voxels that it changed to `differs`.
 void BenchTooth::take_ball(const VoxelBox& brick, VoxelIndex centre, double radius,
                            std::vector<VoxelBox>& differs) {
-  for (int eighth = 0; eighth < 8; ++eighth) {
-    const VoxelIndex lo{brick.lo.x + (eighth & 1) * kDiffersEdge,
-                        brick.lo.y + (eighth >> 1 & 1) * kDiffersEdge,
-                        brick.lo.z + (eighth >> 2) * kDiffersEdge};
+  constexpr int kParts = kBrickEdge / kDiffersEdge;
+  for (int part = 0; part < kParts * kParts * kParts; ++part) {
+    const VoxelIndex lo{brick.lo.x + part % kParts * kDiffersEdge,
+                        brick.lo.y + part / kParts % kParts * kDiffersEdge,
+                        brick.lo.z + part / kParts / kParts * kDiffersEdge};
     const VoxelBox box =
         VoxelBox{lo, {lo.x + kDiffersEdge, lo.y + kDiffersEdge, lo.z + kDiffersEdge}}.clipped(
             brick);

@@ -58,9 +58,10 @@ struct Simd {
     return (I)_mm256_setr_epi32(load(0), load(1), load(2), load(3), load(4), load(5), load(6),
                                 load(7));
   }
-  static void gather_two(const std::uint32_t* p, I at, I& first, I& second) noexcept {
+  template <int kEntryBytes>
+  static void gather_two(const void* p, I at, I& first, I& second) noexcept {
     const Lanes lane(at);
-    const auto pair = [&](int i) { return load_pairs(p + lane.at[i], p + lane.at[i + 1]); };
+    const auto pair = [&](int i) { return load_pairs(p, lane.at[i], lane.at[i + 1], kEntryBytes); };
     const F left = joined(pair(0), pair(4));
     const F right = joined(pair(2), pair(6));
     first = bits(_mm256_shuffle_ps(left, right, 0x88));
@@ -96,10 +97,11 @@ struct Simd {
 }  // namespace kerf
 
 #include "visualizer/cast/packet_blend.hpp"
+#include "visualizer/cast/packet_change.hpp"
 #include "visualizer/cast/packet_iso.hpp"
 
 namespace kerf {
 
-const CastKernels kCastAvx2{"avx2", cast_iso, cast_blend};
+const CastKernels kCastAvx2{"avx2", cast_iso, cast_blend, cast_meets, cast_feels};
 
 }  // namespace kerf

@@ -57,9 +57,10 @@ struct Simd {
                                 load(7), load(8), load(9), load(10), load(11), load(12), load(13),
                                 load(14), load(15));
   }
-  static void gather_two(const std::uint32_t* p, I at, I& first, I& second) noexcept {
+  template <int kEntryBytes>
+  static void gather_two(const void* p, I at, I& first, I& second) noexcept {
     const Lanes lane(at);
-    const auto pair = [&](int i) { return load_pairs(p + lane.at[i], p + lane.at[i + 1]); };
+    const auto pair = [&](int i) { return load_pairs(p, lane.at[i], lane.at[i + 1], kEntryBytes); };
     const F left = joined(pair(0), pair(4), pair(8), pair(12));
     const F right = joined(pair(2), pair(6), pair(10), pair(14));
     first = bits(_mm512_shuffle_ps(left, right, 0x88));
@@ -96,10 +97,11 @@ struct Simd {
 }  // namespace kerf
 
 #include "visualizer/cast/packet_blend.hpp"
+#include "visualizer/cast/packet_change.hpp"
 #include "visualizer/cast/packet_iso.hpp"
 
 namespace kerf {
 
-const CastKernels kCastAvx512{"avx512", cast_iso, cast_blend};
+const CastKernels kCastAvx512{"avx512", cast_iso, cast_blend, cast_meets, cast_feels};
 
 }  // namespace kerf

@@ -47,9 +47,18 @@ struct CastVolumeJob {
   float iso = 0.5F;                 ///< 0..1
 };
 
+/// A picture and the eye that sees it. Eye space: x right, y up, rays along -z, in mm.
+struct CastEye {
+  std::int32_t width = 0, height = 0;
+  float half_width_at_1mm = 0.25F, half_height_at_1mm = 0.25F;
+  float middle_right_at_1mm = 0.0F;  ///< `View::middle_right`
+  float near_mm = 1.0F, far_mm = 100.0F;
+  float depth_far = 0.0F, depth_slope = 0.0F;  ///< equation (1): depth_far - depth_slope / t
+  float shown[4] = {0.0F, 0.0F, 0.0F, 1.0F};   ///< clip plane, of `View`
+};
+
 /// The picture that the kernels fill. Rows from the bottom up, as GL has them.
 struct CastPixels {
-  std::int32_t width = 0, height = 0;
   std::uint32_t* rgba = nullptr;     ///< sRGB and opacity (not multiplied in), red in the low byte
   float* depth = nullptr;            ///< window depth, equation (1); 1 where nothing was hit
   float* normal = nullptr;           ///< or none: x, y, z in eye space where iso hit something
@@ -60,16 +69,14 @@ struct CastPixels {
 struct CastJob {
   CastVolumeJob volumes[kMaxCastVolumes];
   int volume_count = 0;
+  CastEye eye;
   CastPixels pixels;
-  float half_width_at_1mm = 0.25F, half_height_at_1mm = 0.25F;
-  float middle_right_at_1mm = 0.0F;  ///< `View::middle_right`
-  float near_mm = 1.0F, far_mm = 100.0F;
-  float depth_far = 0.0F, depth_slope = 0.0F;  ///< equation (1): depth_far - depth_slope / t
-  float step_vox = 0.75F;                      ///< iso: along the ray
-  float step_mm = 0.1F;                        ///< blend: along the view axis
-  float shown[4] = {0.0F, 0.0F, 0.0F, 1.0F};   ///< clip plane, of `View`, in eye space
+  float step_vox = 0.75F;                                   ///< iso: along the ray
+  float step_mm = 0.1F;                                     ///< blend: along the view axis
   float key_light[3] = {}, fill_light[3] = {}, up[3] = {};  ///< unit vectors in eye space
 };
+
+struct ChangeJob;
 
 /// The kernels of one instruction set. All sets give the same bits: every ray is computed by
 /// itself, with the same operations in the same order, whatever packet it travels in.
@@ -77,6 +84,10 @@ struct CastKernels {
   const char* name;
   void (*iso)(const CastJob& job, const PixelRect& rect);
   void (*blend)(const CastJob& job, const PixelRect& rect);
+  /// Whether a ray of `rect` passes a marked cell, or ends in one.
+  bool (*meets)(const ChangeJob& job, const PixelRect& rect);
+  /// Whether the shading of the surface there reaches one.
+  bool (*feels)(const ChangeJob& job, const PixelRect& rect);
 };
 
 /// What this machine can run, the fastest first; ends with the scalar set and a null.

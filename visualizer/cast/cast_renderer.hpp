@@ -24,7 +24,6 @@ class CastRenderer final : public Renderer {
   void set_opacities(std::span<const MaterialView> materials,
                      std::span<const VolumeContent> contents) override;
   void draw(const View& view, const RenderTarget& target) override;
-  [[nodiscard]] bool feels_ahead() const noexcept override { return mode_ == CastMode::iso; }
   [[nodiscard]] bool takes_gradient() const noexcept override { return false; }
   [[nodiscard]] bool translucent() const noexcept override { return mode_ == CastMode::blend; }
 

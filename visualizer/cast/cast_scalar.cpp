@@ -50,10 +50,12 @@ struct Simd {
     std::memcpy(&value, static_cast<const char*>(p) + std::ptrdiff_t{at} * kEntryBytes, 4);
     return value;
   }
-  /// Entries `at` and `at + 1`.
-  static void gather_two(const std::uint32_t* p, I at, I& first, I& second) noexcept {
-    std::memcpy(&first, p + at, 4);
-    std::memcpy(&second, p + at + 1, 4);
+  /// The same and the four bytes after them.
+  template <int kEntryBytes>
+  static void gather_two(const void* p, I at, I& first, I& second) noexcept {
+    const char* const from = static_cast<const char*>(p) + std::ptrdiff_t{at} * kEntryBytes;
+    std::memcpy(&first, from, 4);
+    std::memcpy(&second, from + 4, 4);
   }
   /// Entries `at` to `at + 3`.
   static void gather_four(const float* p, I at, F (&out)[4]) noexcept {
@@ -65,10 +67,11 @@ struct Simd {
 }  // namespace kerf
 
 #include "visualizer/cast/packet_blend.hpp"
+#include "visualizer/cast/packet_change.hpp"
 #include "visualizer/cast/packet_iso.hpp"
 
 namespace kerf {
 
-const CastKernels kCastScalar{"scalar", cast_iso, cast_blend};
+const CastKernels kCastScalar{"scalar", cast_iso, cast_blend, cast_meets, cast_feels};
 
 }  // namespace kerf

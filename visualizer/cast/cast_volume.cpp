@@ -9,6 +9,7 @@
 #include <glm/gtc/matrix_inverse.hpp>
 #include <glm/gtc/matrix_transform.hpp>
 
+#include "visualizer/cast/cast_eye.hpp"
 #include "visualizer/error.hpp"
 
 namespace kerf {
@@ -143,11 +144,9 @@ CastVolumeJob CastVolume::job(const View& view, std::int32_t width, std::int32_t
   for (int to = 0; to < 3; ++to) {
     // The last cell of voxels ends at extent + 1; its far side belongs to no cell.
     job.last[to] = std::nextafter(static_cast<float>(extent[to] + 1), 0.0F);
-    job.origin[to] = static_cast<float>(place_from_eye[3][to]);
-    for (int from = 0; from < 3; ++from) {
-      job.from_eye[to][from] = static_cast<float>(place_from_eye[from][to]);
-    }
   }
+  put(job.origin, glm::dvec3(place_from_eye[3]));
+  put(job.from_eye, glm::dmat3(place_from_eye));
   return job;
 }
 

@@ -2,11 +2,9 @@
 #include "visualizer/cast/caster.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <string>
 
-#include <glm/gtc/matrix_inverse.hpp>
-
+#include "visualizer/cast/cast_eye.hpp"
 #include "visualizer/error.hpp"
 
 namespace kerf {
@@ -14,10 +12,6 @@ namespace kerf {
 namespace {
 
 constexpr std::int32_t kTile = 16;  // pixels: coherent rays, and enough pieces to share out
-
-void put(float (&to)[3], const glm::dvec3& from) {
-  for (int i = 0; i < 3; ++i) to[i] = static_cast<float>(from[i]);
-}
 
 }  // namespace
 
@@ -70,26 +64,12 @@ void Caster::draw(const View& view, std::span<const PixelRect> parts, CastPictur
     shortest_mm = std::min(shortest_mm, volume.edge_mm());
     job.volumes[job.volume_count++] = volume.job(view, picture.width, picture.height, bounds);
   }
-  job.pixels = {picture.width,
-                picture.height,
-                picture.rgba.data(),
-                picture.depth.data(),
+  job.eye = cast_eye(view, picture.width, picture.height);
+  job.pixels = {picture.rgba.data(), picture.depth.data(),
                 normals.empty() ? nullptr : normals.data(),
                 end_depth.empty() ? nullptr : end_depth.data()};
-  job.half_width_at_1mm = static_cast<float>(view.tan_half_height * view.aspect);
-  job.half_height_at_1mm = static_cast<float>(view.tan_half_height);
-  job.middle_right_at_1mm = static_cast<float>(view.middle_right);
-  job.near_mm = static_cast<float>(view.near_mm);
-  job.far_mm = static_cast<float>(view.far_mm);
-  // Equation (1) as depth_far - depth_slope / t.
-  const double span_mm = view.far_mm - view.near_mm;
-  job.depth_far = static_cast<float>(view.far_mm / span_mm);
-  job.depth_slope = static_cast<float>(view.far_mm * view.near_mm / span_mm);
   job.step_vox = options_.step_vox;
   job.step_mm = options_.step_vox * static_cast<float>(shortest_mm);
-  // A plane goes over by the transposed inverse.
-  const glm::dvec4 shown = glm::transpose(glm::affineInverse(view.eye_from_world)) * view.shown;
-  for (int i = 0; i < 4; ++i) job.shown[i] = static_cast<float>(shown[i]);
   put(job.key_light, glm::normalize(glm::dvec3(-0.45, 0.75, 0.70)));  // lighting.frag
   put(job.fill_light, glm::normalize(glm::dvec3(0.80, 0.05, 0.45)));
   put(job.up, glm::dvec3(view.eye_from_world * glm::dvec4(0, 1, 0, 0)));

@@ -22,10 +22,13 @@ inline std::int32_t load_bytes(const void* p, std::int32_t at, int entry_bytes) 
   return value;
 }
 
-/// Two entries from `a` on, then two from `b` on.
-inline __m128 load_pairs(const std::uint32_t* a, const std::uint32_t* b) noexcept {
-  const __m128i low = _mm_loadl_epi64(reinterpret_cast<const __m128i*>(a));
-  return _mm_loadh_pi(_mm_castsi128_ps(low), reinterpret_cast<const __m64*>(b));
+/// Eight bytes from entry `a` on, then as many from `b` on.
+inline __m128 load_pairs(const void* p, std::int32_t a, std::int32_t b, int entry_bytes) noexcept {
+  const auto* const bytes = static_cast<const char*>(p);
+  const void* const from_a = bytes + std::ptrdiff_t{a} * entry_bytes;
+  const void* const from_b = bytes + std::ptrdiff_t{b} * entry_bytes;
+  const __m128i low = _mm_loadl_epi64(static_cast<const __m128i*>(from_a));
+  return _mm_loadh_pi(_mm_castsi128_ps(low), static_cast<const __m64*>(from_b));
 }
 
 }  // namespace

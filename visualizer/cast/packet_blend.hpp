@@ -173,7 +173,7 @@ inline void put(const CastJob& job, const Packet& packet, const Gathered& sum) {
   const F gathered = one - sum.clear;
   const Vec3 rgb = (one / Simd::max(gathered, Simd::set(kSmall))) * sum.rgb;
   const F opacity = Simd::min(gathered * Simd::set(1.0F / kOpaque), one);
-  const F depth = Simd::set(job.depth_far) - Simd::set(job.depth_slope) / sum.depth_mm;
+  const F depth = Simd::set(job.eye.depth_far) - Simd::set(job.eye.depth_slope) / sum.depth_mm;
   put(packet, Simd::select(sum.has_depth, srgb_bytes(rgb, opacity), I{}), job.pixels.rgba);
   put(packet, Simd::select(sum.has_depth, depth, one), job.pixels.depth);
 }
@@ -182,13 +182,14 @@ inline void blend_packet(const CastJob& job, const Packet& packet) {
   const F one = Simd::set(1.0F);
   const F never = Simd::set(kNever);
   const F step_mm = Simd::set(job.step_mm);
-  const Vec3 eye = eye_directions(job, packet);
+  const Vec3 eye = eye_directions(job.eye, packet);
   const Vec3 to_eye = -normalized(eye);
   const F length_per_mm = Simd::sqrt(dot(eye, eye));
-  Shown part = shown_of(job, eye);
+  Shown part = shown_of(job.eye, eye);
   if (job.pixels.end_depth != nullptr) {
-    const F end_depth = taken(packet, job.pixels.end_depth);
-    const F end_mm = Simd::set(job.depth_slope) / (Simd::set(job.depth_far) - end_depth);
+    const std::int64_t first = std::int64_t{packet.y} * packet.row + packet.x;
+    const F end_depth = taken(packet, job.pixels.end_depth + first, packet.row);
+    const F end_mm = Simd::set(job.eye.depth_slope) / (Simd::set(job.eye.depth_far) - end_depth);
     part.end_mm = Simd::min(end_mm, part.end_mm);
   }
   Walk walks[kMaxCastVolumes];
@@ -246,7 +247,7 @@ inline void blend_packet(const CastJob& job, const Packet& packet) {
 }
 
 void cast_blend(const CastJob& job, const PixelRect& rect) {
-  for_packets(job, rect, [&](const Packet& packet) { blend_packet(job, packet); });
+  for_packets(job.eye, rect, [&](const Packet& packet) { blend_packet(job, packet); });
 }
 
 }  // namespace

@@ -95,12 +95,12 @@ inline F refined_mm(const CastVolumeJob& volume, const VolumeRays& rays, F shown
 }
 
 inline void iso_packet(const CastJob& job, const Packet& packet) {
-  const Vec3 eye = eye_directions(job, packet);
+  const Vec3 eye = eye_directions(job.eye, packet);
   const Vec3 to_eye = -normalized(eye);
   const M drawn = drawn_lanes(packet);
-  F nearest_mm = Simd::set(job.far_mm);
+  F nearest_mm = Simd::set(job.eye.far_mm);
   M any_found = Simd::none();
-  const Shown part = shown_of(job, eye);
+  const Shown part = shown_of(job.eye, eye);
   VolumeRays rays[kMaxCastVolumes];
   M found[kMaxCastVolumes];
   M begins[kMaxCastVolumes];
@@ -133,10 +133,10 @@ inline void iso_packet(const CastJob& job, const Packet& packet) {
     const CastVolumeJob& volume = job.volumes[v];
     SurfacePoint at = surface_point(volume, rays[v], nearest_mm, to_eye);
     F openness = openness_at(volume, at);
-    const M on_face = Simd::both(begins[v], Simd::less(Simd::set(job.near_mm), part.begin_mm));
+    const M on_face = Simd::both(begins[v], Simd::less(Simd::set(job.eye.near_mm), part.begin_mm));
     if (Simd::any(on_face)) {
-      const Vec3 face =
-          -Vec3{Simd::set(job.shown[0]), Simd::set(job.shown[1]), Simd::set(job.shown[2])};
+      const Vec3 face = -Vec3{Simd::set(job.eye.shown[0]), Simd::set(job.eye.shown[1]),
+                              Simd::set(job.eye.shown[2])};
       at.normal = select(on_face, face, at.normal);
       at.inward = select(on_face, normalized(transformed(volume.from_eye, -face)), at.inward);
       openness = Simd::select(on_face, Simd::set(1.0F), openness);
@@ -146,7 +146,7 @@ inline void iso_packet(const CastJob& job, const Packet& packet) {
     colour = select(found[v], shown, colour);
     normal = select(found[v], at.normal, normal);
   }
-  const F depth = Simd::set(job.depth_far) - Simd::set(job.depth_slope) / nearest_mm;
+  const F depth = Simd::set(job.eye.depth_far) - Simd::set(job.eye.depth_slope) / nearest_mm;
   put(packet, Simd::select(any_found, srgb_bytes(colour, Simd::set(1.0F)), I{}), job.pixels.rgba);
   put(packet, Simd::select(any_found, depth, Simd::set(1.0F)), job.pixels.depth);
   if (job.pixels.normal != nullptr) {
@@ -157,7 +157,7 @@ inline void iso_packet(const CastJob& job, const Packet& packet) {
 }
 
 void cast_iso(const CastJob& job, const PixelRect& rect) {
-  for_packets(job, rect, [&](const Packet& packet) { iso_packet(job, packet); });
+  for_packets(job.eye, rect, [&](const Packet& packet) { iso_packet(job, packet); });
 }
 
 }  // namespace

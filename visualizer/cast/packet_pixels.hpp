@@ -9,26 +9,26 @@ namespace {
 
 /// A packet's lowest left pixel; lanes beyond the rectangle or the block are not drawn.
 struct Packet {
-  const CastPixels* pixels;
   std::int32_t x, y;
   std::int32_t wide, high;
+  std::int32_t row;    ///< of the picture
   std::int32_t block;  ///< index of the block that it lies in
 };
 
 /// Calls `cast` for each packet of `rect`.
 template <class Cast>
-void for_packets(const CastJob& job, const PixelRect& rect, const Cast& cast) {
+void for_packets(const CastEye& eye, const PixelRect& rect, const Cast& cast) {
   const auto up_to = [](std::int32_t from, std::int32_t step, std::int32_t end) {
     const std::int32_t next = from / step * step + step;
     return next < end ? next : end;
   };
-  const std::int32_t blocks_across = (job.pixels.width + kCastBlock - 1) / kCastBlock;
+  const std::int32_t blocks_across = (eye.width + kCastBlock - 1) / kCastBlock;
   for (std::int32_t y = rect.y0, y1 = 0; y < rect.y1; y = y1) {
     y1 = up_to(y, Simd::kHigh, rect.y1);
     for (std::int32_t x = rect.x0, x1 = 0; x < rect.x1; x = x1) {
       x1 = up_to(x, Simd::kWide, rect.x1);
-      cast(Packet{&job.pixels, x, y, x1 - x, y1 - y,
-                  y / kCastBlock * blocks_across + x / kCastBlock});
+      cast(
+          Packet{x, y, x1 - x, y1 - y, eye.width, y / kCastBlock * blocks_across + x / kCastBlock});
     }
   }
 }
@@ -39,14 +39,14 @@ inline M drawn_lanes(const Packet& packet) {
 }
 
 /// From the eye to the pixels' centres, 1 mm along the view axis.
-inline Vec3 eye_directions(const CastJob& job, const Packet& packet) {
+inline Vec3 eye_directions(const CastEye& eye, const Packet& packet) {
   const auto place = [](F lane, std::int32_t first, std::int32_t size) {
     const F centre = lane + Simd::set(static_cast<float>(first) + 0.5F);
     return centre * Simd::set(2.0F / static_cast<float>(size)) - Simd::set(1.0F);
   };
-  return {place(Simd::lane_x(), packet.x, job.pixels.width) * Simd::set(job.half_width_at_1mm) +
-              Simd::set(job.middle_right_at_1mm),
-          place(Simd::lane_y(), packet.y, job.pixels.height) * Simd::set(job.half_height_at_1mm),
+  return {place(Simd::lane_x(), packet.x, eye.width) * Simd::set(eye.half_width_at_1mm) +
+              Simd::set(eye.middle_right_at_1mm),
+          place(Simd::lane_y(), packet.y, eye.height) * Simd::set(eye.half_height_at_1mm),
           Simd::set(-1.0F)};
 }
 
@@ -57,20 +57,25 @@ void put(const Packet& packet, Lanes lanes, Value* out, std::int32_t stride = 1,
   Value values[Simd::kWide * Simd::kHigh];
   Simd::store(values, lanes);
   for (std::int32_t y = 0; y < packet.high; ++y) {
-    const std::int64_t row = std::int64_t{packet.y + y} * packet.pixels->width + packet.x;
+    const std::int64_t row = std::int64_t{packet.y + y} * packet.row + packet.x;
     for (std::int32_t x = 0; x < packet.wide; ++x) {
       out[(row + x) * stride + offset] = values[y * Simd::kWide + x];
     }
   }
 }
 
-/// The opposite for entries of one value; 0 in lanes that are not drawn.
-inline F taken(const Packet& packet, const float* in) {
+/// Reads what lies at the packet's pixels; 0 in lanes that are not drawn. `in` is the value of its
+/// lowest left pixel, in rows of `row`.
+inline F taken(const Packet& packet, const float* in, std::int32_t row) {
   F lanes{};
   float values[Simd::kWide * Simd::kHigh] = {};
   for (std::int32_t y = 0; y < packet.high; ++y) {
-    const std::int64_t row = std::int64_t{packet.y + y} * packet.pixels->width + packet.x;
-    for (std::int32_t x = 0; x < packet.wide; ++x) values[y * Simd::kWide + x] = in[row + x];
+    const float* const from = in + std::int64_t{y} * row;
+    if (packet.wide == Simd::kWide) {
+      __builtin_memcpy(&values[y * Simd::kWide], from, Simd::kWide * sizeof(float));
+      continue;
+    }
+    for (std::int32_t x = 0; x < packet.wide; ++x) values[y * Simd::kWide + x] = from[x];
   }
   __builtin_memcpy(&lanes, values, sizeof(lanes));
   return lanes;

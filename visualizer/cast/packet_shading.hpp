@@ -86,24 +86,34 @@ inline Labelled by_labels(const CastVolumeJob& volume, Vec3 p, M needed) {
           Simd::select(alike, same.share, share)};
 }
 
-/// A point of an iso-surface.
-struct SurfacePoint {
-  Vec3 place;   ///< voxel edges
+/// Which way an iso-surface faces.
+struct Facing {
   Vec3 inward;  ///< one voxel edge long
   Vec3 normal;  ///< eye space, towards the eye
 };
 
-inline SurfacePoint surface_point(const CastVolumeJob& volume, const VolumeRays& rays, F t,
-                                  Vec3 to_eye) {
-  const Vec3 p = rays.origin + t * rays.direction;
+inline Facing facing_of(const float (&voxel_from_eye)[3][3], Vec3 gradient, Vec3 to_eye) {
   // A gradient in voxel edges goes to the eye's millimetres by the transposed Jacobian.
-  const Vec3 slope = transformed_back(volume.from_eye, gradient_at(volume, p));
+  const Vec3 slope = transformed_back(voxel_from_eye, gradient);
   const F zero = Simd::set(0.0F);
   Vec3 normal = select(Simd::less(zero, dot(slope, slope)), -normalized(slope), to_eye);
   const F facing = dot(normal, to_eye);
   const Vec3 turned = normalized(normal - (Simd::set(1.02F) * facing) * to_eye);
   normal = select(Simd::less(facing, zero), turned, normal);
-  return {p, normalized(transformed(volume.from_eye, -normal)), normal};
+  return {normalized(transformed(voxel_from_eye, -normal)), normal};
+}
+
+/// A point of an iso-surface.
+struct SurfacePoint {
+  Vec3 place;  ///< voxel edges
+  Vec3 inward, normal;
+};
+
+inline SurfacePoint surface_point(const CastVolumeJob& volume, const VolumeRays& rays, F t,
+                                  Vec3 to_eye) {
+  const Vec3 p = rays.origin + t * rays.direction;
+  const Facing facing = facing_of(volume.from_eye, gradient_at(volume, p), to_eye);
+  return {p, facing.inward, facing.normal};
 }
 
 /// Below the surface, because the surface itself is half air; soft tissue on it coats it.

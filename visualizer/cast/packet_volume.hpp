@@ -46,7 +46,7 @@ inline F density_in(const CastVolumeJob& volume, const CellPlace& cell) {
   const auto plane = [&](const std::uint32_t* entries) {
     I left{};
     I right{};
-    Simd::gather_two(entries, cell.at, left, right);
+    Simd::gather_two<4>(entries, cell.at, left, right);
     const F low = mix(Simd::to_float(left & 0xffff), Simd::to_float(right & 0xffff), cell.share.x);
     const F high = mix(Simd::to_float(left >> 16 & 0xffff), Simd::to_float(right >> 16 & 0xffff),
                        cell.share.x);
@@ -90,7 +90,7 @@ inline Vec3 stored_gradient_at(const CastVolumeJob& volume, Vec3 p) {
   I corner[4][2];  // by y and z, by x
   for (int i = 0; i < 4; ++i) {
     const std::int32_t step = (i & 1) * volume.row + (i >> 1) * volume.gradient_plane;
-    Simd::gather_two(volume.gradient + step, cell.at, corner[i][0], corner[i][1]);
+    Simd::gather_two<4>(volume.gradient + step, cell.at, corner[i][0], corner[i][1]);
   }
   const auto component = [&](int shift) {
     F row[4];
@@ -110,14 +110,14 @@ struct Shown {
   F begin_mm, end_mm;
 };
 
-inline Shown shown_of(const CastJob& job, Vec3 eye) {
+inline Shown shown_of(const CastEye& from, Vec3 eye) {
   const F zero = Simd::set(0.0F);
-  const F away = Simd::set(job.shown[3]);
-  const F slope = Simd::set(job.shown[0]) * eye.x + Simd::set(job.shown[1]) * eye.y +
-                  Simd::set(job.shown[2]) * eye.z;
+  const F away = Simd::set(from.shown[3]);
+  const F slope = Simd::set(from.shown[0]) * eye.x + Simd::set(from.shown[1]) * eye.y +
+                  Simd::set(from.shown[2]) * eye.z;
   const F cut = -away / slope;
-  const F near_mm = Simd::set(job.near_mm);
-  const F far_mm = Simd::set(job.far_mm);
+  const F near_mm = Simd::set(from.near_mm);
+  const F far_mm = Simd::set(from.far_mm);
   const M hidden = Simd::both(
       Simd::less(away, zero),
       Simd::but_not(Simd::all(), Simd::either(Simd::less(slope, zero), Simd::less(zero, slope))));
@@ -138,6 +138,25 @@ inline bool is_met(const CastBlock& block) {
   return block.begin_mm < block.end_mm;
 }
 
+/// Ends rays where they leave 0..size along one axis.
+inline void clip_to(float size, F origin, F& direction, F& inverse, F& begin_mm, F& end_mm) {
+  // A ray along a face never meets the next one, but its inverse stays a number.
+  const F least = Simd::set(1e-12F);
+  direction = Simd::select(Simd::less(direction * direction, least * least), least, direction);
+  inverse = Simd::set(1.0F) / direction;
+  const F a = -origin * inverse;
+  const F b = (Simd::set(size) - origin) * inverse;
+  begin_mm = Simd::max(begin_mm, Simd::min(a, b));
+  end_mm = Simd::min(end_mm, Simd::max(a, b));
+}
+
+/// The same along all axes.
+inline void clip_to(const float (&size)[3], VolumeRays& rays) {
+  clip_to(size[0], rays.origin.x, rays.direction.x, rays.inverse.x, rays.begin_mm, rays.end_mm);
+  clip_to(size[1], rays.origin.y, rays.direction.y, rays.inverse.y, rays.begin_mm, rays.end_mm);
+  clip_to(size[2], rays.origin.z, rays.direction.z, rays.inverse.z, rays.begin_mm, rays.end_mm);
+}
+
 inline VolumeRays rays_through(const CastJob& job, const CastVolumeJob& volume,
                                const CastBlock& block, const Shown& shown, Vec3 eye) {
   VolumeRays rays;
@@ -148,19 +167,7 @@ inline VolumeRays rays_through(const CastJob& job, const CastVolumeJob& volume,
   rays.steps_per_mm = edges_per_mm / Simd::set(job.step_vox);
   rays.begin_mm = Simd::max(Simd::set(block.begin_mm), shown.begin_mm);
   rays.end_mm = Simd::min(Simd::set(block.end_mm), shown.end_mm);
-  const auto clip = [&](F origin, F& direction, F& inverse, float last) {
-    // A ray along a face never meets the next one, but its inverse stays a number.
-    const F least = Simd::set(1e-12F);
-    direction = Simd::select(Simd::less(direction * direction, least * least), least, direction);
-    inverse = Simd::set(1.0F) / direction;
-    const F a = -origin * inverse;
-    const F b = (Simd::set(last) - origin) * inverse;
-    rays.begin_mm = Simd::max(rays.begin_mm, Simd::min(a, b));
-    rays.end_mm = Simd::min(rays.end_mm, Simd::max(a, b));
-  };
-  clip(rays.origin.x, rays.direction.x, rays.inverse.x, volume.last[0]);
-  clip(rays.origin.y, rays.direction.y, rays.inverse.y, volume.last[1]);
-  clip(rays.origin.z, rays.direction.z, rays.inverse.z, volume.last[2]);
+  clip_to(volume.last, rays);
   rays.begin_mm = Simd::min(rays.begin_mm, rays.end_mm);
   return rays;
 }

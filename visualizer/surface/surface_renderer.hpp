@@ -27,6 +27,8 @@ class SurfaceRenderer final : public Renderer {
   /// The meshes tell exactly.
   [[nodiscard]] std::vector<VoxelBox> looks_different(
       std::size_t volume, std::span<const VoxelBox> differs) const override;
+  /// To the ends of the edges that triangles with one vertex in common run between.
+  [[nodiscard]] SightReach reach() const noexcept override { return {.along = 3}; }
 
  private:
   struct Volume {
