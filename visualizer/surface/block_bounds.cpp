@@ -62,16 +62,25 @@ Sight::Sight(const glm::dmat4& clip_from_voxel, const std::optional<glm::dvec3>&
   const auto plane = [](const glm::dvec4& row) {
     return glm::vec4(row / glm::length(glm::dvec3(row)));
   };
+  const auto planes = [&](const Part& part) {
+    return Planes{plane(rows[0] - part.lo.x * rows[3]), plane(part.hi.x * rows[3] - rows[0]),
+                  plane(rows[1] - part.lo.y * rows[3]), plane(part.hi.y * rows[3] - rows[1])};
+  };
   near_far_ = {plane(rows[3] + rows[2]), plane(rows[3] - rows[2])};
+  Part around{glm::dvec2(1.0), glm::dvec2(-1.0)};
   for (const Part& part : parts) {
-    parts_.push_back({plane(rows[0] - part.lo.x * rows[3]), plane(part.hi.x * rows[3] - rows[0]),
-                      plane(rows[1] - part.lo.y * rows[3]), plane(part.hi.y * rows[3] - rows[1])});
+    around = {glm::min(around.lo, part.lo), glm::max(around.hi, part.hi)};
+    parts_.push_back(planes(part));
   }
+  around_ = planes(around);
 }
 
 bool Sight::may_show(const BlockBounds& block) const {
   const auto is_beyond = [&](const glm::vec4& plane) { return beyond(plane, block); };
-  if (std::any_of(near_far_.begin(), near_far_.end(), is_beyond)) return false;
+  if (std::any_of(around_.begin(), around_.end(), is_beyond) ||
+      std::any_of(near_far_.begin(), near_far_.end(), is_beyond)) {
+    return false;
+  }
   return std::any_of(parts_.begin(), parts_.end(),
                      [&](const Planes& part) {
                        return std::none_of(part.begin(), part.end(), is_beyond);

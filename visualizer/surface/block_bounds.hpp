@@ -44,6 +44,7 @@ class Sight {
 
   std::optional<glm::vec3> eye_;
   std::array<glm::vec4, 2> near_far_;
+  Planes around_;  ///< all parts: most blocks lie beyond
   std::vector<Planes> parts_;
 };
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <bit>
 #include <cstring>
+#include <functional>
 #include <iterator>
 #include <utility>
 
@@ -145,6 +146,16 @@ class Extraction {
   BlockMesh mesh_;
 };
 
+/// The order in which `Extraction` finds vertices: by the start of their edge in z and y, then by
+/// the axis along which it runs, then by the start in x.
+unsigned place_in_order(const SurfaceVertex& vertex) {
+  const auto& at = vertex.position;
+  constexpr unsigned kRest = kFinePerVoxel - 1;  // never 0 along the edge, always 0 across
+  const unsigned axis = (at[0] & kRest) != 0 ? 0 : (at[1] & kRest) != 0 ? 1 : 2;
+  const auto voxel = [&](std::size_t i) { return unsigned{at[i]} >> kFineLog2; };
+  return ((voxel(2) * kSamples + voxel(1)) * 3 + axis) * kSamples + voxel(0);
+}
+
 }  // namespace
 
 bool DifferentParts::append_to(std::vector<VoxelBox>& boxes) const {
@@ -154,29 +165,25 @@ bool DifferentParts::append_to(std::vector<VoxelBox>& boxes) const {
   return boxes.size() != before;
 }
 
-DifferentParts difference(const BlockMesh& before, const BlockMesh& now, VoxelIndex block,
-                          const VoxelBox& changed) {
+DifferentParts difference(const BlockMesh& before, const BlockMesh& now, VoxelIndex block) {
   DifferentParts parts(block);
   if (before == now) return parts;
   const VoxelIndex start = block_start(block);
-  const auto voxel_of = [&](const SurfaceVertex& vertex) {
-    return VolumeSamples::voxel_below(fine_place(vertex, start));
+  const auto add = [&](const SurfaceVertex& vertex) {
+    parts.add(VolumeSamples::voxel_below(fine_place(vertex, start)));
   };
-  // The vertices on edges that end in a changed voxel come and go; the others stay, in their order.
-  const VoxelBox touched{{changed.lo.x - 1, changed.lo.y - 1, changed.lo.z - 1}, changed.hi};
-  const auto next = [&](const std::vector<SurfaceVertex>& vertices, std::size_t from) {
-    for (; from < vertices.size(); ++from) {
-      const VoxelIndex voxel = voxel_of(vertices[from]);
-      if (!touched.contains(voxel)) break;
-      parts.add(voxel);
-    }
-    return from;
+  // Vertices come and go; those of both have the same order.
+  auto old = before.vertices.begin();
+  const auto is_next = [&](auto&& compare, const SurfaceVertex& vertex) {
+    return old != before.vertices.end() && compare(place_in_order(*old), place_in_order(vertex));
   };
-  std::size_t old = next(before.vertices, 0);
-  for (std::size_t i = next(now.vertices, 0); i < now.vertices.size();
-       i = next(now.vertices, i + 1), old = next(before.vertices, old + 1)) {
-    if (now.vertices[i] != before.vertices[old]) parts.add(voxel_of(now.vertices[i]));
+  for (const SurfaceVertex& vertex : now.vertices) {
+    while (is_next(std::less<>(), vertex)) add(*old++);
+    const bool stays = is_next(std::equal_to<>(), vertex);
+    if (!stays || *old != vertex) add(vertex);
+    if (stays) ++old;
   }
+  std::for_each(old, before.vertices.end(), add);
   return parts;
 }
 

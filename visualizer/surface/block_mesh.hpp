@@ -57,7 +57,7 @@ struct SurfaceSource {
   Gradient gradient = Gradient::corners;  ///< of the normals
 };
 
-/// Boxes of voxels around the triangles of a block that look different: one for each eighth of it,
+/// Boxes of voxels at the triangles of a block that look different: one for each 2^3 voxels of it,
 /// so that together they follow their shape.
 class DifferentParts {
  public:
@@ -65,25 +65,27 @@ class DifferentParts {
 
   /// The triangles that share a vertex on an edge from `voxel` on.
   void add(VoxelIndex voxel) noexcept {
-    constexpr std::int32_t kHalf = kBlockEdge / 2;
-    const auto half = [](std::int32_t at, std::int32_t start) {
-      return at - start < kHalf ? 0 : 1;
-    };
+    const auto part = [](std::int32_t at, std::int32_t start) { return (at - start) / kPartEdge; };
     VoxelBox& around = around_[static_cast<std::size_t>(
-        half(voxel.x, start_.x) + 2 * half(voxel.y, start_.y) + 4 * half(voxel.z, start_.z))];
-    around = around.united(VoxelBox{voxel, {voxel.x + 1, voxel.y + 1, voxel.z + 1}}.grown(1));
+        (part(voxel.z, start_.z) * kParts + part(voxel.y, start_.y)) * kParts +
+        part(voxel.x, start_.x))];
+    around = around.united(VoxelBox{voxel, {voxel.x + 1, voxel.y + 1, voxel.z + 1}});
   }
   /// Adds what is not empty to `boxes`; whether there was anything.
   bool append_to(std::vector<VoxelBox>& boxes) const;
 
  private:
+  static constexpr std::int32_t kPartEdge = 2;
+  /// Edges begin on the voxels at both ends of a block.
+  static constexpr std::int32_t kParts = kBlockEdge / kPartEdge + 1;
+
   VoxelIndex start_;
-  std::array<VoxelBox, 8> around_;
+  std::array<VoxelBox, std::size_t{kParts} * kParts * kParts> around_;
 };
 
-/// What looks different in `now`, after densities in `changed` were others in `before`.
+/// What looks different in one mesh of a block and in another.
 [[nodiscard]] DifferentParts difference(const BlockMesh& before, const BlockMesh& now,
-                                        VoxelIndex block, const VoxelBox& changed);
+                                        VoxelIndex block);
 
 /// A pure function of the volume; any thread. Positions and triangles depend on the block's own
 /// voxels, the rest of a vertex on the voxels around it: see SurfaceLook.

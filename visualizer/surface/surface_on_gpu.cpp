@@ -71,6 +71,14 @@ void SurfaceOnGpu::update(const VolumeSurface& surface, std::span<const std::uin
   for (const std::uint32_t id : blocks) {
     const BlockMesh& mesh = surface.meshes()[id];
     Part& part = parts_[id];
+    if (mesh.triangles.empty() != (part.count == 0)) {
+      const auto at = std::lower_bound(filled_.begin(), filled_.end(), id);
+      if (part.count == 0) {
+        filled_.insert(at, id);
+      } else {
+        filled_.erase(at);
+      }
+    }
     part.bounds = bounds_of(mesh, surface.block(id));
     part.count = static_cast<std::uint32_t>(mesh.triangles.size());
     part.vertices =
@@ -98,9 +106,9 @@ void SurfaceOnGpu::update(const VolumeSurface& surface, std::span<const std::uin
 
 void SurfaceOnGpu::draw(const Sight& sight) {
   commands_.clear();
-  for (std::uint32_t id = 0; id < parts_.size(); ++id) {
+  for (const std::uint32_t id : filled_) {
     const Part& part = parts_[id];
-    if (part.count == 0 || !sight.may_show(part.bounds)) continue;
+    if (!sight.may_show(part.bounds)) continue;
     commands_.push_back(
         {part.count * kIndices, 1, part.triangles.first * kIndices, part.vertices.first, id});
   }

@@ -48,7 +48,8 @@ class SurfaceOnGpu {
     std::uint32_t indices, instances, first_index, base_vertex, base_instance;
   };
 
-  std::vector<Part> parts_;  ///< by block
+  std::vector<Part> parts_;            ///< by block
+  std::vector<std::uint32_t> filled_;  ///< blocks with triangles, ascending: few of all
   RangePool vertex_pool_;
   RangePool triangle_pool_;
   GrowingBuffer vertices_;

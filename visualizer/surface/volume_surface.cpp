@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cstring>
 #include <thread>
+#include <utility>
 
 #include "visualizer/surface/vertex_look.hpp"
 
@@ -77,6 +79,9 @@ VoxelBox VolumeSurface::follow(std::span<const Density> density, const VoxelBox&
   for (std::int32_t z = box.lo.z; z < box.hi.z; ++z) {
     for (std::int32_t y = box.lo.y; y < box.hi.y; ++y) {
       const std::size_t row = bricks_.grid.index(0, y, z);
+      const auto bytes = static_cast<std::size_t>(box.hi.x - box.lo.x) * sizeof(Density);
+      const std::size_t first = row + static_cast<std::size_t>(box.lo.x);
+      if (std::memcmp(&density_[first], &density[first], bytes) == 0) continue;
       for (std::int32_t x = box.lo.x; x < box.hi.x; ++x) {
         const std::size_t at = row + static_cast<std::size_t>(x);
         if (density_[at] == density[at]) continue;
@@ -117,16 +122,17 @@ std::span<const std::uint32_t> VolumeSurface::update(std::span<const Density> de
   const SurfaceSource from = source();
   for (const std::uint32_t id : marked_) {
     BlockMesh& mesh = meshes_[id];
+    const Work work = std::exchange(work_[id], Work::none);
+    if (work == Work::look && mesh.vertices.empty()) continue;
     DifferentParts parts(block(id));
-    if (work_[id] == Work::look) {
+    if (work == Work::look) {
       parts = update_look(from, block(id), all, mesh);
     } else {
       BlockMesh now = extract_block(from, block(id));
-      parts = difference(mesh, now, block(id), all);
+      parts = difference(mesh, now, block(id));
       mesh = std::move(now);
     }
     if (parts.append_to(looks_)) different_.push_back(id);
-    work_[id] = Work::none;
   }
   marked_.clear();
   return different_;
