@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #version 450 core
-// A mesh as steel or as plain paint, with true depth.
+// A mesh as steel (KERF_METAL 1) or as plain paint (0): a software GL would work out both where a
+// uniform chose. Depth is that of the projection, which is equation (1): not written, so hidden pixels
+// cost nothing.
 
 in vec3 v_eye_mm;
 in vec3 v_normal;
@@ -8,14 +10,10 @@ layout(location = 0) out vec4 o_colour;
 
 uniform vec3 u_colour;     // linear
 uniform float u_opacity;   // 0..1
-uniform bool u_is_metal;
 uniform vec3 u_up_eye;     // world up
-uniform float u_near_mm;
-uniform float u_far_mm;
 
 vec3 lit(vec3 albedo, vec3 normal, vec3 to_eye, vec3 up_eye, float openness);
 vec3 srgb(vec3 linear);
-float window_depth(float eye_mm, float near_mm, float far_mm);
 
 // A photographer's tent: bright above, two strip lights, a dark floor.
 vec3 studio(vec3 direction) {
@@ -27,15 +25,19 @@ vec3 studio(vec3 direction) {
 }
 
 vec3 steel(vec3 normal, vec3 to_eye) {
-  float facing = max(dot(normal, to_eye), 0.0);
-  vec3 mirror = u_colour + (1.0 - u_colour) * pow(1.0 - facing, 5.0);  // Schlick
+  float away = 1.0 - max(dot(normal, to_eye), 0.0);
+  float away_2 = away * away;
+  vec3 mirror = u_colour + (1.0 - u_colour) * (away_2 * away_2 * away);  // Schlick
   return mirror * studio(reflect(-to_eye, normal));
 }
 
 void main() {
   vec3 normal = normalize(v_normal);
   vec3 to_eye = -normalize(v_eye_mm);
-  vec3 colour = u_is_metal ? steel(normal, to_eye) : lit(u_colour, normal, to_eye, u_up_eye, 1.0);
+#if KERF_METAL
+  vec3 colour = steel(normal, to_eye);
+#else
+  vec3 colour = lit(u_colour, normal, to_eye, u_up_eye, 1.0);
+#endif
   o_colour = vec4(srgb(colour), u_opacity);
-  gl_FragDepth = window_depth(-v_eye_mm.z, u_near_mm, u_far_mm);
 }

@@ -16,7 +16,8 @@ EyeLayers::Stale EyeLayers::stale(const View& view, const std::optional<Hand>& h
   std::vector<PixelRect> volumes = tiles.rects();
   if (hand != shown_->hand) {
     for (const auto& one : {hand, shown_->hand}) {
-      if (one) tiles.mark(painter.bounds(*one, view, stage_.size()));
+      if (!one) continue;
+      for (const PixelRect& part : painter.bounds(*one, view, stage_.size())) tiles.mark(part);
     }
   }
   const std::vector<PixelRect> stage = tiles.rects();
@@ -53,7 +54,10 @@ void EyeLayers::draw_stage(const Stale& stale, ScenePainter& painter) {
   const auto& [view, moving, hand] = stale.now;
   if (!hand) return;
   std::vector<PixelRect> of_hand;
-  const PixelRect bounds = painter.bounds(*hand, view, stage_.size());
+  PixelRect bounds;
+  for (const PixelRect& part : painter.bounds(*hand, view, stage_.size())) {
+    bounds = bounds.united(part);
+  }
   for (const PixelRect& part : stale.stage) {
     const PixelRect both = part.clipped(bounds);
     if (!both.empty()) of_hand.push_back(both);

@@ -17,8 +17,20 @@ constexpr double kLeastArrowN = 0.01;  // below, the report does not count a con
 const Paint kSteel{.colour = {0.60F, 0.60F, 0.61F}, .metal = true};
 const Paint kForce{.colour = {0.75F, 0.13F, 0.01F}, .metal = false};  // vermillion
 
+constexpr int kPieces = 6;  // of a tool or an arrow: rectangles that follow it
+
 glm::dmat4 pose_of(const Hand& hand) {
   return rigid(hand.tip_mm, hand.orientation);
+}
+
+BoxCorners corners_of(const glm::dvec3& low, const glm::dvec3& high,
+                      const glm::dmat4& pose = glm::dmat4(1.0)) {
+  BoxCorners corners;
+  for (std::size_t c = 0; c < corners.size(); ++c) {
+    const glm::dvec3 side(c & 1, c >> 1 & 1, c >> 2);
+    corners[c] = glm::dvec3(pose * glm::dvec4(glm::mix(low, high, side), 1.0));
+  }
+  return corners;
 }
 
 }  // namespace
@@ -62,26 +74,31 @@ void HandPainter::draw_force(const Hand& hand, const View& view, const RenderTar
   painter_.draw_arrow(arrow.foot_mm, arrow.way_mm, arrow.thickness_mm, kForce, view, target);
 }
 
-PixelRect HandPainter::bounds(const Hand& hand, const View& view, PictureSize size) const {
-  std::vector<glm::dvec3> corners;
-  const auto add_box = [&](const glm::dmat4& pose, const glm::dvec3& low, const glm::dvec3& high) {
-    for (int c = 0; c < 8; ++c) {
-      const glm::dvec3 side(c & 1, c >> 1 & 1, c >> 2);
-      corners.emplace_back(pose * glm::dvec4(glm::mix(low, high, side), 1.0));
-    }
-  };
-  if (hand.tool < tools_.size()) {
+std::vector<PixelRect> HandPainter::bounds(const Hand& hand, const View& view,
+                                           PictureSize size) const {
+  std::vector<PixelRect> bounds;
+  const bool is_there =
+      hand.tool < tools_.size() && tools_[hand.tool].low_mm.x <= tools_[hand.tool].high_mm.x;
+  if (is_there) {
     const Tool& tool = tools_[hand.tool];
-    if (tool.low_mm.x <= tool.high_mm.x) add_box(pose_of(hand), tool.low_mm, tool.high_mm);
+    const glm::dmat4 pose = pose_of(hand);
+    for (int piece = 0; piece < kPieces; ++piece) {
+      glm::dvec3 low = tool.low_mm, high = tool.high_mm;
+      low.y = glm::mix(tool.low_mm.y, tool.high_mm.y, static_cast<double>(piece) / kPieces);
+      high.y = glm::mix(tool.low_mm.y, tool.high_mm.y, (piece + 1.0) / kPieces);
+      bounds.push_back(screen_bounds(corners_of(low, high, pose), view, size));
+    }
   }
   const Arrow arrow = arrow_of(hand);
-  if (arrow.thickness_mm > 0.0) {
-    const glm::dvec3 around(kArrowHeadRadii * arrow.thickness_mm),
-        end = arrow.foot_mm + arrow.way_mm;
-    add_box(glm::dmat4(1.0), glm::min(arrow.foot_mm, end) - around,
-            glm::max(arrow.foot_mm, end) + around);
+  if (arrow.thickness_mm == 0.0) return bounds;
+  const double around_mm = kArrowHeadRadii * arrow.thickness_mm;
+  for (int piece = 0; piece < kPieces; ++piece) {
+    const glm::dvec3 from = arrow.foot_mm + arrow.way_mm * (static_cast<double>(piece) / kPieces);
+    const glm::dvec3 to = arrow.foot_mm + arrow.way_mm * ((piece + 1.0) / kPieces);
+    bounds.push_back(screen_bounds(
+        corners_of(glm::min(from, to) - around_mm, glm::max(from, to) + around_mm), view, size));
   }
-  return corners.empty() ? PixelRect{} : screen_bounds(corners, view, size);
+  return bounds;
 }
 
 }  // namespace kerf

@@ -32,8 +32,9 @@ class HandPainter {
 
   void draw_tool(const Hand& hand, const View& view, const RenderTarget& target);
   void draw_force(const Hand& hand, const View& view, const RenderTarget& target);
-  /// Pixels that both may touch.
-  [[nodiscard]] PixelRect bounds(const Hand& hand, const View& view, PictureSize size) const;
+  /// Rectangles of pixels that both may touch: several along each, which seldom stand upright.
+  [[nodiscard]] std::vector<PixelRect> bounds(const Hand& hand, const View& view,
+                                              PictureSize size) const;
 
  private:
   struct Tool {

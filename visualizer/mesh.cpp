@@ -45,7 +45,6 @@ Mesh lathe(std::span<const ProfilePoint> profile) {
   if (points.front()[1] > 0.0) points.insert(points.begin(), {points.front()[0], 0.0});
   if (points.back()[1] > 0.0) points.push_back({points.back()[0], 0.0});
 
-  // Each wall has its own two rings; where walls meet smoothly their normals are the same.
   const std::size_t walls = points.size() - 1;
   const auto normal_at = [&](std::size_t wall, std::size_t point) {
     const glm::dvec2 own = wall_normal(points[wall], points[wall + 1]);
@@ -55,10 +54,14 @@ Mesh lathe(std::span<const ProfilePoint> profile) {
     return glm::dot(own, next) < kCosCrease ? own : glm::normalize(own + next);
   };
   Mesh mesh;
+  glm::dvec2 last_normal(0.0);
   for (std::size_t wall = 0; wall < walls; ++wall) {
-    const auto base = static_cast<std::uint32_t>(mesh.vertices.size());
-    append_ring(mesh, points[wall], normal_at(wall, wall));
-    append_ring(mesh, points[wall + 1], normal_at(wall, wall + 1));
+    // Walls that meet smoothly have the same normals there, and share the ring.
+    const glm::dvec2 low_normal = normal_at(wall, wall), high_normal = normal_at(wall, wall + 1);
+    if (low_normal != last_normal) append_ring(mesh, points[wall], low_normal);
+    const auto base = static_cast<std::uint32_t>(mesh.vertices.size()) - (kSides + 1);
+    append_ring(mesh, points[wall + 1], high_normal);
+    last_normal = high_normal;
     for (std::uint32_t i = 0; i < kSides; ++i) {
       const std::uint32_t low = base + i;
       const std::uint32_t high = low + kSides + 1;

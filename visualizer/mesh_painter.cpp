@@ -46,20 +46,18 @@ void GpuMesh::draw() const {
   glDrawElements(GL_TRIANGLES, indices_, GL_UNSIGNED_INT, nullptr);
 }
 
-void MeshPainter::set_uniforms(const glm::dmat4& world_from_mesh, const Paint& paint, float opacity,
-                               const View& view) {
+void MeshPainter::use_program(const glm::dmat4& world_from_mesh, const Paint& paint, float opacity,
+                              const View& view) {
+  const GlProgram& program = paint.metal ? metal_ : plain_;
   const glm::dmat4 eye_from_mesh = view.eye_from_world * world_from_mesh;
-  program_.set("u_eye_from_mesh", glm::mat4(eye_from_mesh));
-  program_.set("u_eye_from_mesh_normal",
-               glm::mat3(glm::inverseTranspose(glm::dmat3(eye_from_mesh))));
-  program_.set("u_clip_from_eye", glm::mat4(view.clip_from_eye()));
-  program_.set("u_colour", paint.colour);
-  program_.set("u_opacity", opacity);
-  program_.set("u_is_metal", paint.metal ? 1 : 0);
-  program_.set("u_up_eye", glm::vec3(view.eye_from_world * glm::dvec4(0, 1, 0, 0)));
-  program_.set("u_near_mm", static_cast<float>(view.near_mm));
-  program_.set("u_far_mm", static_cast<float>(view.far_mm));
-  program_.use();
+  program.set("u_eye_from_mesh", glm::mat4(eye_from_mesh));
+  program.set("u_eye_from_mesh_normal",
+              glm::mat3(glm::inverseTranspose(glm::dmat3(eye_from_mesh))));
+  program.set("u_clip_from_eye", glm::mat4(view.clip_from_eye()));
+  program.set("u_colour", paint.colour);
+  program.set("u_opacity", opacity);
+  program.set("u_up_eye", glm::vec3(view.eye_from_world * glm::dvec4(0, 1, 0, 0)));
+  program.use();
 }
 
 void MeshPainter::draw(const GpuMesh& mesh, const glm::dmat4& world_from_mesh, const Paint& paint,
@@ -69,7 +67,7 @@ void MeshPainter::draw(const GpuMesh& mesh, const glm::dmat4& world_from_mesh, c
   glDepthFunc(GL_LESS);
   glEnable(GL_CULL_FACE);
   glDisable(GL_BLEND);
-  set_uniforms(world_from_mesh, paint, 1.0F, view);
+  use_program(world_from_mesh, paint, 1.0F, view);
   mesh.draw();  // once within the bounds: beside the parts it is there already, at the same depth
   glDisable(GL_CULL_FACE);
 }
@@ -94,9 +92,9 @@ void MeshPainter::draw_arrow(const glm::dvec3& foot_mm, const glm::dvec3& arrow_
   glDepthFunc(GL_GREATER);
   glDepthMask(GL_FALSE);
   glEnable(GL_CULL_FACE);
-  set_uniforms(shaft, paint, kFaint, view);
+  use_program(shaft, paint, kFaint, view);
   target.for_parts([&] { cylinder_.draw(); });
-  set_uniforms(tip, paint, kFaint, view);
+  use_program(tip, paint, kFaint, view);
   target.for_parts([&] { cone_.draw(); });
   glDepthMask(GL_TRUE);
   glDepthFunc(GL_LESS);

@@ -40,10 +40,11 @@ class MeshPainter {
                   const Paint& paint, const View& view, const RenderTarget& target);
 
  private:
-  void set_uniforms(const glm::dmat4& world_from_mesh, const Paint& paint, float opacity,
-                    const View& view);
+  void use_program(const glm::dmat4& world_from_mesh, const Paint& paint, float opacity,
+                   const View& view);
 
-  GlProgram program_{"mesh.vert", "mesh.frag", "lighting.frag", "depth.frag"};
+  GlProgram plain_{{"mesh.vert", "mesh.frag", "lighting.frag"}, "#define KERF_METAL 0\n"};
+  GlProgram metal_{{"mesh.vert", "mesh.frag", "lighting.frag"}, "#define KERF_METAL 1\n"};
   GpuMesh cylinder_{unit_cylinder()};
   GpuMesh cone_{unit_cone()};
 };

@@ -36,8 +36,9 @@ class ScenePainter {
   void draw_over(const Hand& hand, const View& view, const RenderTarget& target);
   /// A hand that moves changes what `draw_volumes` draws.
   [[nodiscard]] bool hand_is_among_volumes() const noexcept { return renderer_->translucent(); }
-  /// Pixels that the hand may touch.
-  [[nodiscard]] PixelRect bounds(const Hand& hand, const View& view, PictureSize size) const {
+  /// Rectangles of pixels that the hand may touch.
+  [[nodiscard]] std::vector<PixelRect> bounds(const Hand& hand, const View& view,
+                                              PictureSize size) const {
     return hand_.bounds(hand, view, size);
   }
 
