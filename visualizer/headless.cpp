@@ -25,6 +25,7 @@ namespace kerf {
 namespace {
 
 constexpr auto kIdle = std::chrono::milliseconds(2);  // two ticks: a picture is at most that late
+constexpr auto kShort = std::chrono::microseconds(100);  // where the next tick is due
 constexpr double kMsPerS = 1e3;
 
 std::filesystem::path frame_file(const std::filesystem::path& folder, std::uint32_t number) {
@@ -120,9 +121,11 @@ int run_headless(const VisualizerOptions& options) {
     if (over) continue;
     std::chrono::duration<double> pause = kIdle;
     if (recording && ticks) {
-      // A frame begins when it is due, not up to a pause later: its delay counts as latency.
-      const std::chrono::duration<double> due(recording->due_in_s(session.servo_s()));
-      pause = std::clamp(due, std::chrono::duration<double>::zero(), pause);
+      // A frame begins when the tick that it waits for is out, not up to a pause later: its delay
+      // counts as latency.
+      const std::chrono::duration<double> due(recording->due_in_s(session.servo_s()) -
+                                              session.record_age_s());
+      pause = std::clamp<std::chrono::duration<double>>(due, kShort, kIdle);
     }
     std::this_thread::sleep_for(pause);
   }

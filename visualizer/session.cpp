@@ -171,6 +171,11 @@ double Session::servo_s() const noexcept {
   return latest_ ? static_cast<double>(latest_->tick) * tick_ns() * kSPerNs : 0.0;
 }
 
+double Session::record_age_s() const noexcept {
+  constexpr double kSPerNs = 1e-9;
+  return latest_ ? (now_ns() - static_cast<double>(latest_->start_ns)) * kSPerNs : 0.0;
+}
+
 bool Session::ended() const noexcept {
   return connection_.reader().lifecycle() >= Lifecycle::clean_end || !connection_.alive();
 }

@@ -52,6 +52,8 @@ class Session {
   [[nodiscard]] std::uint32_t tick_ns() const noexcept;
   /// The servo's own time at the newest record: its ticks times their length. 0 before the first.
   [[nodiscard]] double servo_s() const noexcept;
+  /// Since the tick of the newest record began; 0 before the first.
+  [[nodiscard]] double record_age_s() const noexcept;
   /// From asking for the controller to the first complete volumes.
   [[nodiscard]] double attach_ms() const noexcept { return attach_ms_; }
 
