@@ -23,6 +23,10 @@ void BlendRenderer::update(std::size_t volume, std::span<const Density> density,
   volumes_.update(volume, density, changed);
 }
 
+void BlendRenderer::place(std::size_t volume, const glm::dmat4& world_from_voxel) {
+  volumes_.place(volume, world_from_voxel);
+}
+
 void BlendRenderer::set_opacities(std::span<const MaterialView> materials,
                                   std::span<const VolumeContent> contents) {
   volumes_.set_opacities(materials, contents);

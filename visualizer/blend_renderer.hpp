@@ -27,6 +27,7 @@ class BlendRenderer final : public Renderer {
 
   void update(std::size_t volume, std::span<const Density> density,
               std::span<const std::uint32_t> changed) override;
+  void place(std::size_t volume, const glm::dmat4& world_from_voxel) override;
   void set_opacities(std::span<const MaterialView> materials,
                      std::span<const VolumeContent> contents) override;
   void draw(const View& view, const RenderTarget& target) override;

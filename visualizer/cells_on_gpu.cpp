@@ -9,12 +9,8 @@ namespace kerf {
 
 CellsOnGpu::CellsOnGpu(const VolumeView& volume, std::span<const Density> density,
                        Density threshold)
-    : bricks_(volume.bricks),
-      // Cell i begins at voxel 8i - 1.
-      world_from_cell_(glm::scale(glm::translate(volume.world_from_voxel, glm::dvec3(-1.0)),
-                                  glm::dvec3(Macrocells::kEdge))),
-      cells_(volume.bricks.grid, density, threshold),
-      faces_(cells_) {
+    : bricks_(volume.bricks), cells_(volume.bricks.grid, density, threshold), faces_(cells_) {
+  place(volume.world_from_voxel);
   const VoxelGrid& n = cells_.grid();
   glTextureStorage3D(active_.id(), 1, GL_R8UI, n.nx, n.ny, n.nz);
   glTextureParameteri(active_.id(), GL_TEXTURE_MIN_FILTER, GL_NEAREST);
@@ -36,6 +32,12 @@ void CellsOnGpu::update_bricks(std::span<const Density> density,
   if (flipped.empty()) return;
   upload_active(flipped);
   upload_faces(faces_.update(cells_, flipped));
+}
+
+void CellsOnGpu::place(const glm::dmat4& world_from_voxel) {
+  // Cell i begins at voxel 8i - 1.
+  world_from_cell_ =
+      glm::scale(glm::translate(world_from_voxel, glm::dvec3(-1.0)), glm::dvec3(Macrocells::kEdge));
 }
 
 void CellsOnGpu::upload_active(const VoxelBox& cells) {

@@ -20,6 +20,9 @@ class CellsOnGpu {
   /// Bricks `changed` of `density` (the whole volume) differ.
   void update_bricks(std::span<const Density> density, std::span<const std::uint32_t> changed);
 
+  /// See `Renderer::place`.
+  void place(const glm::dmat4& world_from_voxel);
+
   /// The texture: 1 in active cells.
   void bind(GLuint unit) const { glBindTextureUnit(unit, active_.id()); }
   /// Draws the faces around the active cells with the program in use; attribute 0 is a face.
@@ -34,7 +37,7 @@ class CellsOnGpu {
   void upload_faces(std::span<const CellFaces::Run> runs);
 
   BrickGrid bricks_;
-  glm::dmat4 world_from_cell_;
+  glm::dmat4 world_from_cell_{1.0};
   Macrocells cells_;
   CellFaces faces_;
   VoxelBox active_box_;

@@ -62,6 +62,10 @@ void IsoRenderer::update(std::size_t volume, std::span<const Density> density,
   volumes_[volume].update_bricks(density, changed);
 }
 
+void IsoRenderer::place(std::size_t volume, const glm::dmat4& world_from_voxel) {
+  volumes_[volume].place(world_from_voxel);
+}
+
 SightReach IsoRenderer::reach() const noexcept {
   SightReach reach = Renderer::reach();
   if (gradient_ != Gradient::corners) {

@@ -29,6 +29,7 @@ class IsoRenderer final : public Renderer {
 
   void update(std::size_t volume, std::span<const Density> density,
               std::span<const std::uint32_t> changed) override;
+  void place(std::size_t volume, const glm::dmat4& world_from_voxel) override;
   void draw(const View& view, const RenderTarget& target) override;
   [[nodiscard]] SightReach reach() const noexcept override;
 

@@ -36,6 +36,7 @@ struct Look {
   Gradient gradient = Gradient::corners;
   ClipPlane clip{};
   Stereo stereo{};
+  bool voxel_tool = false;  ///< the tool is a volume, not a mesh
   friend bool operator==(const Look&, const Look&) noexcept = default;
 };
 

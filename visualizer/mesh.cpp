@@ -71,20 +71,25 @@ Mesh lathe(std::span<const ProfilePoint> profile) {
   return mesh;
 }
 
-Mesh tool_mesh(std::span<const ProfilePoint> profile_mm) {
-  Mesh mesh = lathe(profile_mm);
-  if (mesh.vertices.empty()) return mesh;
+Outlines tool_outlines(std::span<const ProfilePoint> profile_mm) {
   double radius = 0.0;
   for (const ProfilePoint& point : profile_mm) radius = std::max(radius, point[1]);
+  if (radius == 0.0) return {};
   const double low = profile_mm.front()[0];
   const double high = profile_mm.back()[0];
   // A neck that starts inside the head, and the shank of a real bur in proportion to it.
   const double neck = 0.42 * radius;
   const double shank = 0.62 * radius;
-  mesh.append(lathe(std::array<ProfilePoint, 4>{{{0.5 * (low + high), neck},
-                                                 {high + 1.5 * radius, neck},
-                                                 {high + 2.5 * radius, shank},
-                                                 {high + 16.0 * radius, shank}}}));
+  return {{profile_mm.begin(), profile_mm.end()},
+          {{0.5 * (low + high), neck},
+           {high + 1.5 * radius, neck},
+           {high + 2.5 * radius, shank},
+           {high + 16.0 * radius, shank}}};
+}
+
+Mesh tool_mesh(std::span<const ProfilePoint> profile_mm) {
+  Mesh mesh;
+  for (const auto& outline : tool_outlines(profile_mm)) mesh.append(lathe(outline));
   return mesh;
 }
 

@@ -30,7 +30,11 @@ using ProfilePoint = std::array<double, 2>;
 /// points.
 [[nodiscard]] Mesh lathe(std::span<const ProfilePoint> profile);
 
-/// A bur: the head from its profile (mm) and a shank along +y, thinner than the head.
+/// What a bur is made of: the head by its profile (mm), and a shank along +y, thinner than the
+/// head, that begins inside it. Neither where the head has no extent.
+using Outlines = std::vector<std::vector<ProfilePoint>>;
+[[nodiscard]] Outlines tool_outlines(std::span<const ProfilePoint> profile_mm);
+/// Both as a mesh.
 [[nodiscard]] Mesh tool_mesh(std::span<const ProfilePoint> profile_mm);
 
 /// Cylinder of radius 1 from y = 0 to 1, and cone of base radius 1 from y = 0 to its tip at 1.

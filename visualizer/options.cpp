@@ -62,7 +62,8 @@ Look first_look(const VisualizerOptions& options) {
   return {.renderer = options.renderer,
           .opacities = options.opacities,
           .gradient = options.gradient,
-          .stereo = options.stereo};
+          .stereo = options.stereo,
+          .voxel_tool = options.voxel_tool};
 }
 
 PictureSize parse_size(const std::string& text) {
@@ -109,6 +110,10 @@ std::optional<VisualizerOptions> parse_options(int argc, const char* const* argv
          "opacity of each material, TOML, for blend, slices and cast-blend; in the window w "
          "writes it")
       ->type_name("FILE");
+  app.add_flag("--voxel-tool", options.voxel_tool,
+               "the tool as a volume of voxels, which the renderer draws as it does the others and "
+               "the clip plane cuts too")
+      ->disable_flag_override();
   app.add_flag("--stereo", options.stereo.on, "two eyes side by side, each in half the width")
       ->disable_flag_override();
   app.add_option("--eyes", options.stereo.eyes_mm,

@@ -18,6 +18,7 @@ struct VisualizerOptions {
   std::string renderer = "iso";
   Gradient gradient = Gradient::corners;
   Stereo stereo;
+  bool voxel_tool = false;
   Opacities opacities;  ///< of `transfer`
   PictureSize size{800, 600};
   bool headless = false;

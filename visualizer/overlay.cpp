@@ -255,6 +255,8 @@ void Overlay::look_controls(LookControls& controls) {
     if (ImGui::SliderFloat("plane", &at, 0.0F, 1.0F, "%.2f", kDragOnly)) look.clip.at = at;
   }
   ImGui::Checkbox("stereo", &look.stereo.on);
+  ImGui::SameLine();
+  ImGui::Checkbox("voxel tool", &look.voxel_tool);
   ImGui::PopItemWidth();
 }
 

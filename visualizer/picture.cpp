@@ -46,6 +46,7 @@ SceneView Picture::shown_scene() const {
 SceneView Picture::scene_in(const Look& look) const {
   SceneView scene = scene_;
   scene.gradient = look.gradient;
+  scene.voxel_tool = look.voxel_tool;
   for (VolumeView& volume : scene.volumes) {
     if (look.iso) volume.iso = static_cast<Density>(std::lround(*look.iso * kDensityMax));
   }
@@ -64,10 +65,11 @@ std::unique_ptr<ScenePainter> Picture::painter_for(const Session& session, const
 
 void Picture::set_look(const Session& session, const Look& look) {
   if (look == look_) return;
-  if (look.renderer != look_.renderer || look.iso != look_.iso || look.gradient != look_.gradient) {
+  if (look.renderer != look_.renderer || look.iso != look_.iso || look.gradient != look_.gradient ||
+      look.voxel_tool != look_.voxel_tool) {
     painter_ = painter_for(session, look);
   } else if (look.opacities != look_.opacities) {
-    painter_->renderer().set_opacities(scene_in(look).materials, session.contents());
+    painter_->set_opacities(scene_in(look), session.contents());
   }
   look_ = look;
   redraw_all();

@@ -27,6 +27,8 @@ class Renderer {
   /// Brick ids `changed` of a volume differ from what was drawn last; `density` is all of it.
   virtual void update(std::size_t volume, std::span<const Density> density,
                       std::span<const std::uint32_t> changed) = 0;
+  /// A volume lies elsewhere now; its voxels keep their edges.
+  virtual void place(std::size_t volume, const glm::dmat4& world_from_voxel) = 0;
   /// The materials have other opacities, and are else what they were. Renderers of iso-surfaces
   /// show none. `contents` is all of the volumes.
   virtual void set_opacities(std::span<const MaterialView> /*materials*/,

@@ -10,6 +10,7 @@
 #include "visualizer/hand_painter.hpp"
 #include "visualizer/renderer.hpp"
 #include "visualizer/stale_volume.hpp"
+#include "visualizer/tool_volume.hpp"
 
 namespace kerf {
 
@@ -17,7 +18,7 @@ namespace kerf {
 /// picture a change of either leaves stale.
 ///
 /// Translucent volumes come after the tool, which shines through them; opaque ones come before it,
-/// so that a tool which moves leaves them as they are.
+/// so that a tool which moves leaves them as they are. A tool of voxels is a volume itself.
 class ScenePainter {
  public:
   /// Throws VisualizerError where the renderer is unknown or cannot show the volumes.
@@ -27,6 +28,8 @@ class ScenePainter {
   [[nodiscard]] Renderer& renderer() noexcept { return *renderer_; }
   [[nodiscard]] const Renderer& renderer() const noexcept { return *renderer_; }
 
+  /// The scene with other opacities; `contents` are all of its volumes.
+  void set_opacities(const SceneView& scene, std::span<const VolumeContent> contents);
   /// What the last poll changed in a volume.
   void update(std::size_t volume, const VolumeSnapshot& snapshot);
 
@@ -35,12 +38,12 @@ class ScenePainter {
   /// The rest of the hand: the force, and the tool where that comes after the volumes.
   void draw_over(const Hand& hand, const View& view, const RenderTarget& target);
   /// A hand that moves changes what `draw_volumes` draws.
-  [[nodiscard]] bool hand_is_among_volumes() const noexcept { return renderer_->translucent(); }
+  [[nodiscard]] bool hand_is_among_volumes() const noexcept {
+    return tool_ || renderer_->translucent();
+  }
   /// Rectangles of pixels that the hand may touch.
   [[nodiscard]] std::vector<PixelRect> bounds(const Hand& hand, const View& view,
-                                              PictureSize size) const {
-    return hand_.bounds(hand, view, size);
-  }
+                                              PictureSize size) const;
 
   /// Marks what changed in the volumes since `forget_changes`. `contents` are all of them as they
   /// are now, `kept` what `draw_volumes` drew before.
@@ -49,7 +52,11 @@ class ScenePainter {
   void forget_changes();
 
  private:
-  std::vector<VolumeView> volumes_;
+  /// Puts the tool of voxels into the hand.
+  void hold_tool(const Hand& hand);
+
+  std::vector<VolumeView> volumes_;  ///< of the session
+  std::optional<ToolVolume> tool_;
   std::unique_ptr<Renderer> renderer_;
   std::vector<StaleVolume> stale_;  ///< by volume
   HandPainter hand_;

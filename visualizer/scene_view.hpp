@@ -52,6 +52,7 @@ struct SceneView {
   std::vector<ToolView> tools;
   std::vector<MaterialView> materials;
   Gradient gradient = Gradient::corners;  ///< by which its volumes are shaded
+  bool voxel_tool = false;                ///< the tool is one volume more
 
   /// Of the boxes of all volumes.
   [[nodiscard]] std::vector<glm::dvec3> corners() const;

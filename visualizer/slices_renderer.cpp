@@ -63,6 +63,10 @@ void SlicesRenderer::update(std::size_t volume, std::span<const Density> density
   volumes_[volume]->volume.update(0, density, changed);
 }
 
+void SlicesRenderer::place(std::size_t volume, const glm::dmat4& world_from_voxel) {
+  volumes_[volume]->volume.place(0, world_from_voxel);
+}
+
 void SlicesRenderer::set_opacities(std::span<const MaterialView> materials,
                                    std::span<const VolumeContent> contents) {
   for (std::size_t v = 0; v < volumes_.size(); ++v) {

@@ -46,7 +46,7 @@ TranslucentVolume::TranslucentVolume(const VolumeView& volume, const VolumeConte
       has_labels_(!content.labels.empty()),
       transfer_(transfer),
       gradient_(gradient),
-      world_from_texture_(kerf::world_from_texture(volume)),
+      world_from_texture_(kerf::world_from_texture(volume.world_from_voxel, volume.bricks.grid)),
       edge_mm_(shortest_edge_mm(volume.world_from_voxel)),
       voxels_(bricks_.grid, kTexel, &kAirTexel),
       materials_(has_labels_ ? bricks_.grid : kNoVoxels, kTexel),
@@ -75,6 +75,11 @@ void TranslucentVolume::update_bricks(std::span<const Density> density,
     upload(density, around.clipped(bricks_.grid.box()));
   }
   cells_.update_bricks(density, changed);
+}
+
+void TranslucentVolume::place(const glm::dmat4& world_from_voxel) {
+  world_from_texture_ = kerf::world_from_texture(world_from_voxel, bricks_.grid);
+  cells_.place(world_from_voxel);
 }
 
 void TranslucentVolume::bind_textures(GLuint unit) const {

@@ -26,6 +26,9 @@ class TranslucentVolume {
   /// Uploads bricks `changed` of `density` (the whole volume), gradients around them included.
   void update_bricks(std::span<const Density> density, std::span<const std::uint32_t> changed);
 
+  /// See `Renderer::place`.
+  void place(const glm::dmat4& world_from_voxel);
+
   /// Three units from `unit` on: voxels, materials, active cells.
   void bind_textures(GLuint unit) const;
 
@@ -70,6 +73,11 @@ class TranslucentVolumes {
 
   void update(std::size_t volume, std::span<const Density> density,
               std::span<const std::uint32_t> changed);
+
+  /// See `Renderer::place`.
+  void place(std::size_t volume, const glm::dmat4& world_from_voxel) {
+    volumes_[volume].place(world_from_voxel);
+  }
 
   /// See `Renderer::set_opacities`.
   void set_opacities(std::span<const MaterialView> materials,

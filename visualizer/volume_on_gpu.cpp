@@ -26,7 +26,7 @@ VolumeOnGpu::VolumeOnGpu(const VolumeView& volume, const VolumeContent& content,
     : bricks_(volume.bricks),
       has_labels_(!content.labels.empty()),
       iso_(static_cast<float>(volume.iso / kDensityMax)),
-      world_from_texture_(kerf::world_from_texture(volume)),
+      world_from_texture_(kerf::world_from_texture(volume.world_from_voxel, volume.bricks.grid)),
       density_(checked_grid(volume, max_texture_size), kDensityTexel),
       labels_(has_labels_ ? bricks_.grid : kNoVoxels, kLabelTexel),
       cells_(volume, content.density, skip_empty ? volume.iso : Density{0}) {
@@ -62,6 +62,11 @@ void VolumeOnGpu::upload_gradient(std::span<const Density> density, const VoxelB
     texels_.push_back({part(g.x), part(g.y), part(g.z), 0});
   }
   gradient_->upload(texels_.data(), box);
+}
+
+void VolumeOnGpu::place(const glm::dmat4& world_from_voxel) {
+  world_from_texture_ = kerf::world_from_texture(world_from_voxel, bricks_.grid);
+  cells_.place(world_from_voxel);
 }
 
 void VolumeOnGpu::bind_textures() const {

@@ -29,6 +29,9 @@ class VolumeOnGpu {
   /// Uploads bricks `changed` of `density` (the whole volume) and the cells they touch.
   void update_bricks(std::span<const Density> density, std::span<const std::uint32_t> changed);
 
+  /// See `Renderer::place`.
+  void place(const glm::dmat4& world_from_voxel);
+
   /// Density on unit 0, labels on 1, active cells on 2, gradient on 3.
   void bind_textures() const;
 

@@ -55,9 +55,8 @@ glm::dvec3 texels_of(const VoxelGrid& grid) {
   return glm::dvec3(grid.nx, grid.ny, grid.nz) + 2.0 * kShell;
 }
 
-glm::dmat4 world_from_texture(const VolumeView& volume) {
-  return glm::scale(glm::translate(volume.world_from_voxel, glm::dvec3(-kShell - 0.5)),
-                    texels_of(volume.bricks.grid));
+glm::dmat4 world_from_texture(const glm::dmat4& world_from_voxel, const VoxelGrid& grid) {
+  return glm::scale(glm::translate(world_from_voxel, glm::dvec3(-kShell - 0.5)), texels_of(grid));
 }
 
 void check_extent(const VolumeView& volume, int max_texture_size) {

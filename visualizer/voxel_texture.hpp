@@ -48,7 +48,8 @@ void for_each_layer(const VoxelGrid& grid, const Take& take) {
 /// Extent of a voxel texture in texels.
 [[nodiscard]] glm::dvec3 texels_of(const VoxelGrid& grid);
 /// From texture coordinates (0..1) to world mm.
-[[nodiscard]] glm::dmat4 world_from_texture(const VolumeView& volume);
+[[nodiscard]] glm::dmat4 world_from_texture(const glm::dmat4& world_from_voxel,
+                                            const VoxelGrid& grid);
 
 /// Throws VisualizerError where the volume with its shell is beyond `max_texture_size`.
 void check_extent(const VolumeView& volume, int max_texture_size);

@@ -53,10 +53,12 @@ TEST_CASE("a size that is none is refused with the limits") {
   }));
 }
 
-TEST_CASE("the gradient is part of the first look") {
+TEST_CASE("the gradient and a tool of voxels are part of the first look") {
   CHECK(first_look(*parse({})).gradient == Gradient::corners);
-  const Look look = first_look(*parse({"--gradient", "farid5"}));
+  CHECK_FALSE(first_look(*parse({})).voxel_tool);
+  const Look look = first_look(*parse({"--gradient", "farid5", "--voxel-tool"}));
   CHECK(look.gradient == Gradient::farid5);
+  CHECK(look.voxel_tool);
   CHECK_THROWS_WITH_AS(parse({"--gradient", "sobel"}),
                        "--gradient: sobel is unknown; known: central, corners, farid5",
                        VisualizerError);

@@ -187,7 +187,7 @@ void check_parts(const Look& look, PictureSize size, int edits) {
   // One sees into the volume and the tool in it; of the other, what is hidden stays.
   const bool opaque =
       look.renderer == "iso" || look.renderer == "surface" || look.renderer == "cast";
-  const bool wide = look.stereo.on || look.gradient != Gradient::corners;
+  const bool wide = look.stereo.on || look.voxel_tool || look.gradient != Gradient::corners;
   CHECK(redrawn / parts < (wide ? 0.6 : opaque ? 0.08 : 0.2));
 }
 
@@ -215,6 +215,15 @@ TEST_CASE("so it does with any gradient") {
   for (const char* kind : {"surface", "blend", "slices"}) {
     CAPTURE(std::string(kind));
     check_parts({.renderer = kind, .gradient = Gradient::farid5}, {96, 72}, kEdits / 20);
+  }
+}
+
+TEST_CASE("so it does with a tool of voxels") {
+  if (!have_gl()) return;
+  const Place place;
+  for (const std::string_view kind : renderer_kinds()) {
+    CAPTURE(std::string(kind));
+    check_parts({.renderer = std::string(kind), .voxel_tool = true}, {96, 72}, kEdits / 10);
   }
 }
 

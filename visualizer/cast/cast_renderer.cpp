@@ -50,6 +50,10 @@ void CastRenderer::update(std::size_t volume, std::span<const Density> density,
   caster_.update(volume, density, changed);
 }
 
+void CastRenderer::place(std::size_t volume, const glm::dmat4& world_from_voxel) {
+  caster_.place(volume, world_from_voxel);
+}
+
 void CastRenderer::set_opacities(std::span<const MaterialView> materials,
                                  std::span<const VolumeContent> /*contents*/) {
   caster_.set_materials(make_palette(materials));

@@ -43,6 +43,11 @@ class Caster {
   void update(std::size_t volume, std::span<const Density> density,
               std::span<const std::uint32_t> changed);
 
+  /// A volume lies elsewhere now; its voxels keep their edges.
+  void place(std::size_t volume, const glm::dmat4& world_from_voxel) {
+    volumes_[volume].place(world_from_voxel);
+  }
+
   /// What each picture shows is in one of these boxes.
   [[nodiscard]] std::vector<BoxCorners> bodies() const;
   /// Other colours and opacities for all volumes, as in `CastMatter`.

@@ -42,6 +42,10 @@ void SurfaceRenderer::update(std::size_t volume, std::span<const Density> densit
   of.gpu.update(of.surface, of.surface.update(density, changed));
 }
 
+void SurfaceRenderer::place(std::size_t volume, const glm::dmat4& world_from_voxel) {
+  volumes_[volume].world_from_voxel = world_from_voxel;
+}
+
 std::vector<VoxelBox> SurfaceRenderer::looks_different(
     std::size_t volume, std::span<const VoxelBox> /*differs*/) const {
   const auto boxes = volumes_[volume].surface.looks_different();

@@ -23,6 +23,7 @@ class SurfaceRenderer final : public Renderer {
 
   void update(std::size_t volume, std::span<const Density> density,
               std::span<const std::uint32_t> changed) override;
+  void place(std::size_t volume, const glm::dmat4& world_from_voxel) override;
   void draw(const View& view, const RenderTarget& target) override;
   /// The meshes tell exactly.
   [[nodiscard]] std::vector<VoxelBox> looks_different(
