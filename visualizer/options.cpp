@@ -163,6 +163,10 @@ std::optional<VisualizerOptions> parse_options(int argc, const char* const* argv
   app.add_option("--page", options.page, "bench: write the table to this Markdown file")
       ->type_name("FILE")
       ->needs(bench);
+  app.add_option("--summary", options.summary,
+                 "bench: write a short table as its part of this Markdown file")
+      ->type_name("FILE")
+      ->needs(bench);
   try {
     app.parse(argc, argv);
   } catch (const CLI::Success& asked) {  // --help, --version

@@ -34,8 +34,9 @@ struct VisualizerOptions {
   std::optional<std::filesystem::path> mesh;      ///< --export: .stl or .ply
   std::optional<std::filesystem::path> sheet;     ///< headless: the final state by every renderer
   std::optional<std::filesystem::path> report;
-  bool bench = false;                         ///< no controller: what pictures cost here
-  std::optional<std::filesystem::path> page;  ///< bench: as Markdown
+  bool bench = false;                            ///< no controller: what pictures cost here
+  std::optional<std::filesystem::path> page;     ///< bench: as Markdown
+  std::optional<std::filesystem::path> summary;  ///< bench: as a part of a page
 };
 
 /// What pictures look like at first.

@@ -21,7 +21,8 @@ class Session;
 [[nodiscard]] int run_window(const VisualizerOptions& options);
 
 /// Times every renderer on a volume of its own, without a controller: a table on stdout, all
-/// figures as JSON in `options.report`, a page in `options.page`. Returns 1 where it was stopped.
+/// figures as JSON in `options.report`, a page in `options.page`, the short of it as a part of
+/// `options.summary`. Returns 1 where it was stopped.
 /// Throws VisualizerError or FileError for bad set-up.
 [[nodiscard]] int run_bench(const VisualizerOptions& options);
 

@@ -8,6 +8,7 @@
 #include "hil/hil_error.hpp"
 #include "shared/posix/cores.hpp"
 #include "shared/posix/new_file.hpp"
+#include "shared/posix/page_part.hpp"
 #include "shared/posix/provenance.hpp"
 
 namespace kerf {
@@ -50,6 +51,10 @@ LabOutput::LabOutput(const char* option, std::string path)
 
 void LabOutput::write(const std::string& text) const {
   if (!path_.empty()) guarded(option_, [&] { write_new_file(path_, text); });
+}
+
+void LabOutput::write_part(const char* name, const std::string& text) const {
+  if (!path_.empty()) guarded(option_, [&] { write_page_part(path_, name, text); });
 }
 
 void LabOutput::check_distinct(std::initializer_list<const LabOutput*> outputs) {

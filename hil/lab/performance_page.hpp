@@ -8,8 +8,8 @@
 
 namespace kerf {
 
-/// `docs/performance.md`: the figures of one run with the machine, the compiler, the day and the
-/// command that made them. Markdown.
+/// The part of `docs/performance.md` on kernels: the figures of one run with the machine, the
+/// compiler, the day and the command that made them. Markdown.
 [[nodiscard]] std::string performance_page(const std::vector<KernelRow>& rows,
                                            const std::vector<KernelRow>& layout);
 

@@ -5,6 +5,8 @@
 #include <doctest/doctest.h>
 #include <nlohmann/json.hpp>
 
+#include "shared/posix/page_part.hpp"
+#include "tests/visualizer/gl_fixture.hpp"
 #include "visualizer/bench/bench_tooth.hpp"
 #include "visualizer/bench/picture_page.hpp"
 
@@ -94,14 +96,70 @@ TEST_CASE("the bench's table has a line for each subject, beside the paper's fig
         std::string::npos);
   CHECK(std::count(table.begin(), table.end(), '\n') == 4);
 
-  GlDriver driver;
-  driver.renderer = "a driver";
-  const auto report = nlohmann::json::parse(picture_report(rows, driver, {512, 512}, 2));
+  const PictureFigures figures{.rows = rows,
+                               .gradients = {{Gradient::corners, 0.5, 1.25}},
+                               .gl_renderer = "a driver",
+                               .size = {512, 512},
+                               .cores = 2};
+  const auto report = nlohmann::json::parse(picture_report(figures));
   CHECK(report["gl_renderer"] == "a driver");
   CHECK(report["rows"].size() == 3);
   CHECK(report["rows"][1]["volume"] == "256x256x161");
+  CHECK(report["rows"][1]["gradient"] == "corners");
   CHECK(report["rows"][1]["modifying"] == true);
   CHECK(report["rows"][1]["partial"] == true);
   CHECK(report["rows"][1]["fps"] == doctest::Approx(250.0));
-  CHECK(picture_page(rows, driver, {512, 512}, 2).find("gl: a driver") != std::string::npos);
+  CHECK(report["gradients"][0]["noisy_angle_deg"] == 1.25);
+  const std::string page = picture_page(figures);
+  CHECK(page.find("gl: a driver") != std::string::npos);
+  CHECK(page.find("| corners | 0.50 | 1.25 | 100 | - | 8.0 |") != std::string::npos);
+}
+
+TEST_CASE("the bench's summary has a line for each renderer on the paper's padded tooth") {
+  const auto row = [&](int edge, bool cropped, int tool, bool partial, double cpu_ms) {
+    return PictureRow{.renderer = "cast",
+                      .volume = {edge, edge, edge},
+                      .tool = tool,
+                      .cropped = cropped,
+                      .partial = partial,
+                      .cpu_ms = cpu_ms,
+                      .wall_ms_p50 = cpu_ms};
+  };
+  const PictureFigures figures{
+      .rows = {row(128, false, 0, false, 1.0), row(256, false, 0, false, 8.0),
+               row(256, false, 16, false, 9.0), row(256, false, 16, true, 0.5),
+               row(256, true, 0, false, 3.0)},
+      .gradients = {},
+      .gl_renderer = "a driver",
+      .size = {512, 512}};
+  const std::string summary = picture_summary(figures);
+  CHECK(summary.find("| cast | 125 | 2000 | 8.0 | 0.5 | 1/18.0 | - |\n") != std::string::npos);
+  CHECK(summary.find("gl: a driver") != std::string::npos);
+  CHECK(summary.find("docs/pictures.md") != std::string::npos);
+  CHECK(summary.find("| cast |", summary.find("| cast |") + 1) == std::string::npos);
+}
+
+TEST_CASE("each program replaces its own part of a page and leaves the others") {
+  const std::string first = with_part("", "a", "one\n");
+  const std::string both = with_part(first, "b", "two\n");
+  CHECK(first == "<!-- begin a -->\none\n<!-- end a -->\n");
+  CHECK(both.starts_with(first));
+  CHECK(with_part(both, "a", "one\n") == both);
+  CHECK(with_part(with_part(both, "a", "more\n"), "a", "one\n") == both);
+  CHECK(with_part("by hand\n", "a", "") == "by hand\n\n<!-- begin a -->\n<!-- end a -->\n");
+}
+
+TEST_CASE("on an antialiased ball the widest gradient has the least angle, with noise too") {
+  if (!kerf::test::have_gl()) return;
+  const std::vector<GradientRow> rows = measure_gradients();
+  REQUIRE(rows.size() == kGradientNames.size());
+  const GradientRow& widest = rows.back();
+  CHECK(widest.gradient == Gradient::farid5);
+  CHECK(widest.angle_deg < 0.3);
+  CHECK(widest.noisy_angle_deg < 0.6);
+  for (const GradientRow& row : rows) {
+    CHECK(row.angle_deg >= widest.angle_deg);
+    CHECK(row.noisy_angle_deg >= widest.noisy_angle_deg);
+    CHECK(row.noisy_angle_deg > row.angle_deg);
+  }
 }

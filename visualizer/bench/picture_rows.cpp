@@ -27,9 +27,10 @@ constexpr auto kChanges =
 /// One renderer on one tooth, which fills the picture.
 class Stage {
  public:
-  Stage(std::string_view renderer, const BenchTooth& tooth, PictureSize size)
+  Stage(const PictureRow& row, const BenchTooth& tooth, PictureSize size)
       : tooth_(tooth),
-        renderer_(make_renderer(renderer, tooth_.scene(), std::array{tooth_.content()})),
+        renderer_(make_renderer(row.renderer, scene_of(tooth_, row.gradient),
+                                std::array{tooth_.content()})),
         target_(size) {
     const BoxCorners box = tooth_.view().corners();
     OrbitCamera camera;
@@ -57,6 +58,12 @@ class Stage {
   }
 
  private:
+  static SceneView scene_of(const BenchTooth& tooth, Gradient gradient) {
+    SceneView scene = tooth.scene();
+    scene.gradient = gradient;
+    return scene;
+  }
+
   Stopwatch frame(const Change& change) {
     BenchCut cut;
     if (change.tool > 0) cut = tooth_.cut(change.tool);
@@ -83,32 +90,41 @@ class Stage {
   View view_;
 };
 
+/// What is measured, without figures: one of each renderer and volume.
+std::vector<PictureRow> subjects() {
+  std::vector<PictureRow> rows;
+  for (const VoxelGrid& volume : kVolumes) {
+    for (const bool cropped : {false, true}) {
+      for (const std::string_view kind : renderer_kinds()) {
+        rows.push_back({.renderer = std::string(kind), .volume = volume, .cropped = cropped});
+      }
+    }
+  }
+  for (const Gradient gradient : {Gradient::central, Gradient::farid5}) {
+    rows.push_back({.renderer = "iso", .gradient = gradient, .volume = kVolumes.back()});
+  }
+  return rows;
+}
+
 }  // namespace
 
 std::vector<PictureRow> measure_pictures(
     PictureSize size,
     const std::function<void(const std::string& next, int done, int all)>& progress) {
-  const std::vector<std::string_view> kinds = renderer_kinds();
-  constexpr std::size_t kTeeth = 2 * kVolumes.size();
-  const int all = static_cast<int>(kTeeth * kinds.size() * kChanges.size());
+  const std::vector<PictureRow> all_subjects = subjects();
+  const int all = static_cast<int>(all_subjects.size() * kChanges.size());
   std::vector<PictureRow> rows;
-  for (const VoxelGrid& volume : kVolumes) {
-    for (const bool cropped : {false, true}) {
-      const BenchTooth tooth(volume, cropped);
-      for (const std::string_view kind : kinds) {
-        for (const Change& change : kChanges) {
-          if (stop_requested()) return rows;
-          PictureRow row{.renderer = std::string(kind),
-                         .volume = volume,
-                         .tool = change.tool,
-                         .modifying = change.tool > 0,
-                         .cropped = cropped,
-                         .partial = change.partial};
-          progress(row.renderer, static_cast<int>(rows.size()), all);
-          Stage(kind, tooth, size).measure(change, row);  // each cuts a whole tooth
-          rows.push_back(row);
-        }
-      }
+  for (const PictureRow& subject : all_subjects) {
+    const BenchTooth tooth(subject.volume, subject.cropped);
+    for (const Change& change : kChanges) {
+      if (stop_requested()) return rows;
+      PictureRow row = subject;
+      row.tool = change.tool;
+      row.modifying = change.tool > 0;
+      row.partial = change.partial;
+      progress(row.renderer, static_cast<int>(rows.size()), all);
+      Stage(row, tooth, size).measure(change, row);  // each cuts a whole tooth
+      rows.push_back(row);
     }
   }
   return rows;

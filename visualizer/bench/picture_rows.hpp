@@ -7,12 +7,14 @@
 
 #include "shared/volume/voxel_grid.hpp"
 #include "visualizer/gl/target.hpp"
+#include "visualizer/gradient.hpp"
 
 namespace kerf {
 
 /// What one kind of frame costs.
 struct PictureRow {
   std::string renderer;
+  Gradient gradient = Gradient::corners;
   VoxelGrid volume;          ///< as the paper names it, before any crop
   int tool = 0;              ///< voxels across; 0: nothing is cut
   bool modifying = false;    ///< a ball of the tool's size is cut before each frame
@@ -25,8 +27,9 @@ struct PictureRow {
 };
 
 /// Times the volumes of every renderer (no tool, no panel) in a picture of `size`, camera at rest:
-/// the paper's volumes and tools, padded and cropped. Needs a current GL context. `progress` is
-/// told what comes next, and how many of how many kinds of frame are done.
+/// the paper's volumes and tools, padded and cropped; and `iso` with every gradient. Needs a
+/// current GL context. `progress` is told what comes next, and how many of how many kinds of frame
+/// are done.
 [[nodiscard]] std::vector<PictureRow> measure_pictures(
     PictureSize size,
     const std::function<void(const std::string& next, int done, int all)>& progress);

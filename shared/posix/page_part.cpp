@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "shared/posix/page_part.hpp"
+
+#include <fstream>
+#include <iterator>
+
+#include "shared/posix/new_file.hpp"
+
+namespace kerf {
+
+std::string with_part(std::string_view page, std::string_view name, std::string_view text) {
+  const std::string begin = "<!-- begin " + std::string(name) + " -->\n";
+  const std::string end = "<!-- end " + std::string(name) + " -->\n";
+  const std::string part = begin + std::string(text) + end;
+  const std::size_t first = page.find(begin);
+  const std::size_t last = first == page.npos ? page.npos : page.find(end, first);
+  if (last == page.npos) return std::string(page) + (page.empty() ? "" : "\n") + part;
+  return std::string(page.substr(0, first)) + part + std::string(page.substr(last + end.size()));
+}
+
+void write_page_part(const std::filesystem::path& file, std::string_view name,
+                     std::string_view text) {
+  std::ifstream before(file, std::ios::binary);
+  const std::string page{std::istreambuf_iterator<char>(before), {}};
+  write_new_file(file, with_part(page, name, text));
+}
+
+}  // namespace kerf
