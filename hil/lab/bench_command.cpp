@@ -12,6 +12,7 @@
 #include "hil/lab/lab_run.hpp"
 #include "hil/lab/layout_bench.hpp"
 #include "hil/lab/performance_page.hpp"
+#include "hil/lab/probe_bench.hpp"
 
 namespace kerf {
 namespace {
@@ -39,11 +40,12 @@ nlohmann::ordered_json json_of(const std::vector<KernelRow>& rows) {
   return list;
 }
 
-std::string json_of(const std::vector<KernelRow>& rows, const std::vector<KernelRow>& layout,
-                    int core) {
+std::string json_of(const std::vector<KernelRow>& rows, const std::vector<KernelRow>& probes,
+                    const std::vector<KernelRow>& layout, int core) {
   nlohmann::ordered_json report;
   report["core"] = core;
   report["rows"] = json_of(rows);
+  report["probes"] = json_of(probes);
   report["layout"] = json_of(layout);
   return report.dump(2) + "\n";
 }
@@ -71,9 +73,10 @@ int BenchCommand::run(std::ostream& out) const {
          "bytes\n";
   const auto told = [&](const KernelRow& row) { out << line_of(row) << std::endl; };
   const auto rows = bench_kernels(told);
+  const auto probes = bench_probes(told);
   const auto layout = bench_layout(told);
-  as_json.write(json_of(rows, layout, core));
-  as_page.write_part("kernels", performance_page(rows, layout));
+  as_json.write(json_of(rows, probes, layout, core));
+  as_page.write_part("kernels", performance_page(rows, probes, layout));
   return 0;
 }
 

@@ -14,7 +14,7 @@ struct KernelRow {
   std::string numeric;  ///< float (the paper) or fixed
   std::string isa;      ///< paper, reference (plan `gather`, plain templates), scalar, avx2, avx512
   double p50_ns = 0, p99_ns = 0;
-  double baseline_p50_ns = 0;  ///< the paper's form in this run, the same tick
+  double baseline_p50_ns = 0;  ///< in this run, the same tick: the paper's form where it has one
   std::size_t bytes = 0;       ///< memory of the tick beyond two bytes a voxel
 
   [[nodiscard]] double ratio() const noexcept { return baseline_p50_ns / p50_ns; }

@@ -23,6 +23,16 @@ two bytes a voxel.
 
 )";
 
+constexpr const char* kAboutProbes = R"(
+## A probe of the swept contact
+
+What a tool feels at one place, read at samples of its surface: a ball of radius 8 voxels (515 samples)
+and a cylinder of radius 5 and length 16 (658). `slide` dips 2 voxels into a ball of radius 40, `half`
+lies half in a flat solid, `immersed` wholly. `turn` places the samples anew. A tick takes 2 or 3
+probes while it slides and at most 32. The ratio divides the plain loop, which is `scalar`.
+
+)";
+
 constexpr const char* kAboutLayout = R"(
 ## Where the volume lies
 
@@ -49,8 +59,10 @@ std::string table_of(const std::vector<KernelRow>& rows) {
 }  // namespace
 
 std::string performance_page(const std::vector<KernelRow>& rows,
+                             const std::vector<KernelRow>& probes,
                              const std::vector<KernelRow>& layout) {
-  return kAbout + lab_provenance() + "\n\n" + table_of(rows) + kAboutLayout + table_of(layout);
+  return kAbout + lab_provenance() + "\n\n" + table_of(rows) + kAboutProbes + table_of(probes) +
+         kAboutLayout + table_of(layout);
 }
 
 }  // namespace kerf
