@@ -39,7 +39,7 @@ struct Part {
 
 TEST_CASE("usb: one of two devices dies, the other's force and timing stay as they were") {
   const MountedArm arm({}, kerf::test::pressing_hand());
-  const MountedFalcon falcon({.firmware_runs = true}, {{3300, UsbFault::vanish}});
+  const MountedFalcon falcon({.firmware_runs = true}, {{4000, UsbFault::vanish}});
   kerf::HidPort arm_port(arm.path(), 0, kGoOn);
   kerf::UsbPort falcon_port({falcon.path(), ""}, 0, kGoOn);
   ServoSession arm_session(Personality::woodenhaptics, arm_port, kerf::test::firm_half_space());
