@@ -39,7 +39,11 @@ Hand hand_of(const TickRecord& record) {
   const auto& p = record.position_mm;
   const auto& q = record.orientation;
   const auto& f = record.commanded_force_n;
-  return {{p[0], p[1], p[2]}, {q[0], q[1], q[2], q[3]}, record.active_tool, {f[0], f[1], f[2]}};
+  const auto& off = record.proxy_offset_mm;
+  return {{p[0] + off[0], p[1] + off[1], p[2] + off[2]},
+          {q[0], q[1], q[2], q[3]},
+          record.active_tool,
+          {f[0], f[1], f[2]}};
 }
 
 HandPainter::HandPainter(const SceneView& scene, double scale_mm) : scale_mm_(scale_mm) {

@@ -22,6 +22,8 @@ struct Hand {
   friend bool operator==(const Hand&, const Hand&) noexcept = default;
 };
 
+/// The tip is the proxy's, where there is one: a tool that is held by the tooth's surface is drawn
+/// there, however deep the hand pushes.
 [[nodiscard]] Hand hand_of(const TickRecord& record);
 
 /// Draws the tool and the arrow of its force.

@@ -9,6 +9,7 @@
 
 #include "controller/scene/aligned_tool.hpp"
 #include "controller/scene/plan_choice.hpp"
+#include "controller/scene/plan_contact.hpp"
 #include "controller/scene/plan_cost.hpp"
 #include "controller/scene/plan_device.hpp"
 #include "controller/scene/plan_tools.hpp"
@@ -34,6 +35,12 @@ class SceneIn final : public CompiledScene {
     plan_.removal_rate = removal_rate<N>(scene.cut.rate_per_s / scene.servo.rate_hz,
                                          scene.cut.model == CutModel::overlap_exact);
     plan_volumes(scene, plan_);
+    plan_contact(scene, plan_);
+    if (plan_.contact.swept) {
+      for (std::size_t v = 0; v < plan_.volume_count; ++v) {
+        memory_.contact().hold_volume(scene.volumes[plan_.volumes[v].scene_index]);
+      }
+    }
     for (const SceneTool& tool : scene.tools) plan_tool_everywhere(scene, tool);
     state_.active_tool = static_cast<std::uint32_t>(scene.active_tool);
     for (const SceneVolume& volume : scene.volumes) grids_.push_back(volume.image.grid);
@@ -69,6 +76,10 @@ class SceneIn final : public CompiledScene {
     plan.round = tool.round;
     plan.turns = tool.turns;
     plan.offsets = memory_.hold_samples(tool);
+    if (plan_.contact.swept) {
+      plan.swept.shell = memory_.contact().hold_shell(scene, tool);
+      plan.swept.proxy = plan_proxy(scene, tool, plan.swept.shell);
+    }
     const AlignedTable* table = nullptr;  // of the last volume that could use one
     LatticeTurn turn{};
     for (std::size_t v = 0; v < plan_.volume_count; ++v) {
@@ -93,9 +104,14 @@ class SceneIn final : public CompiledScene {
           memory_.hold_splat(tool, volume, v);
           cost = splat_cost(*plan_.kernels, tool, volume, scene.cut.model);
           break;
+        case Plan::surface:
+          cost = surface_cost(scene.servo.numeric, *plan_.kernels);
+          break;
       }
+      if (plan_.contact.swept) sweep_instead(plan.swept.shell.table.count, cost.stages);
       if constexpr (N::kIsFixed) {
-        if (choice.plan != Plan::aligned && plan.samples.count == 0) {
+        const bool any_pose = choice.plan == Plan::gather || choice.plan == Plan::splat;
+        if (any_pose && plan.samples.count == 0) {
           plan.samples = memory_.hold_sample_table(tool);
         }
       }

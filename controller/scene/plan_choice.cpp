@@ -66,6 +66,9 @@ void check_any_pose(const Scene& scene, const SceneTool& tool, const SceneVolume
 }  // namespace
 
 PlanChoice choose_plan(const Scene& scene, const SceneTool& tool, const SceneVolume& volume) {
+  if (scene.force.model == ForceModel::proxy && scene.cut.model == CutModel::none) {
+    return {Plan::surface, "its surface alone is felt, and nothing is cut", {}};
+  }
   const std::optional<LatticeTurn> turn = lattice_turn(tool, volume);
   std::string reason = not_aligned(scene, tool, turn);
   if (!reason.empty()) {

@@ -6,6 +6,7 @@
 #include <string>
 #include <string_view>
 
+#include "controller/kernel/proxy/proxy_sweep.hpp"
 #include "controller/kernel/tick_box.hpp"
 #include "controller/scene/scene_words.hpp"
 #include "controller/scene/turned_box.hpp"
@@ -128,6 +129,17 @@ PlanCost gather_cost(NumericKind numeric, const KernelSet& kernels, const SceneT
   };
   return {way_of(Plan::gather, numeric == NumericKind::fixed ? kernels.name : word_of(numeric)),
           most_over(box_sizes(tool, volume), stages_of)};
+}
+
+PlanCost surface_cost(NumericKind numeric, const KernelSet& kernels) {
+  return {way_of(Plan::surface, numeric == NumericKind::fixed ? kernels.name : word_of(numeric)),
+          {}};
+}
+
+void sweep_instead(std::int32_t surface_samples, std::vector<StageCost>& stages) {
+  std::erase_if(stages,
+                [](const StageCost& stage) { return std::string_view(stage.stage) == "contact"; });
+  stages.insert(stages.begin(), {"probes", count(surface_samples) * SweepRules::kMaxProbes});
 }
 
 }  // namespace kerf

@@ -52,6 +52,13 @@ inline constexpr int kCountsRevision = 4;
 [[nodiscard]] PlanCost gather_cost(NumericKind numeric, const KernelSet& kernels,
                                    const SceneTool& tool, const SceneVolume& volume, CutModel cut);
 
+/// The plan `surface` does nothing of its own.
+[[nodiscard]] PlanCost surface_cost(NumericKind numeric, const KernelSet& kernels);
+
+/// Where the swept proxy is felt: instead of `contact`, before all else,
+/// probes  samples of the tool's surface that are read: all of them in each probe of a tick
+void sweep_instead(std::int32_t surface_samples, std::vector<StageCost>& stages);
+
 /// Voxels that the stages of `gather` work on.
 struct GatherBoxes {
   std::uint64_t overlap = 0, inside = 0, refreshed = 0;

@@ -59,6 +59,10 @@ struct SceneTool {
 };
 
 enum class NumericKind : std::uint8_t { fixed, float32, float64 };
+enum class ForceModel : std::uint8_t {
+  paper,  ///< sum of gradients over the tool's samples
+  proxy   ///< swept contact of the tool's surface, coupled to the hand
+};
 enum class CutModel : std::uint8_t { none, overlap, overlap_exact, preston };
 
 /// A scene after loading: everything the controller needs, in double, checked. Load time only.
@@ -78,7 +82,11 @@ struct Scene {
     std::array<double, 3> dock_rad{0.0, 0.23, -0.37};  ///< of the Omni: joint angles in the inkwell
   } device;
   struct Force {
-    double p0_n_per_mm2 = 0.06;
+    ForceModel model = ForceModel::paper;
+    double p0_n_per_mm2 = 0.06;        ///< of the paper's force
+    double stiffness_n_per_mm = 0.4;   ///< of the coupling to the proxy, at the device port
+    double damping_ns_per_mm = 0.002;  ///< the same
+    double friction = 0.0;             ///< Coulomb coefficient of the proxy on the surface
   } force;
   struct Cut {
     CutModel model = CutModel::overlap;

@@ -18,6 +18,7 @@ namespace kerf {
 namespace {
 
 using Keys = std::string_view[];
+using KeyList = std::span<const std::string_view>;
 
 // Ranges are wide enough for any tooth, bone and device, narrow enough that a slip of the unit
 // shows.
@@ -27,6 +28,10 @@ constexpr Range kTorqueScale{-kMaxTorqueScale,
                              kMaxTorqueScale};  // N mm per count; the sign is the motor's
 constexpr Range kAngleRad{-3.15, 3.15};
 constexpr Range kPressureNPerMm2{0, 1000};
+// Beyond, an Omni trembles in the hand (what other haptics packages allow it).
+constexpr Range kStiffnessNPerMm{0.01, 0.7};
+constexpr Range kDampingNsPerMm{0, 0.005};
+constexpr Range kProxyFriction{0, 1};
 constexpr Range kCutRatePerS{0, 100000};
 constexpr Range kMachinabilityMm3PerSN{1e-4, 100};
 constexpr Range kThresholdN{0, 3.3};
@@ -43,7 +48,8 @@ constexpr Keys kRootKeys = {"volume", "tool",  "device", "force",    "cut",
                             "limits", "servo", "hand",   "material", "spindle"};
 constexpr Keys kDeviceKeys = {"personality", "workspace_scale", "offset_mm", "torque_scale",
                               "dock_rad"};
-constexpr Keys kForceKeys = {"model", "p0_n_per_mm2"};
+constexpr Keys kForceKeys = {"model", "p0_n_per_mm2", "stiffness_n_per_mm", "damping_ns_per_mm",
+                             "friction"};
 constexpr Keys kCutKeys = {"model",       "rate_per_s", "p1_n_per_mm2", "machinability_mm3_per_s_n",
                            "threshold_n", "friction"};
 constexpr Keys kSpindleKeys = {"speed_krpm", "stall_torque_n_mm", "inertia_g_mm2"};
@@ -51,7 +57,6 @@ constexpr Keys kLimitKeys = {"force_n", "continuous_force_n", "slew_n_per_ms", "
 constexpr Keys kServoKeys = {"rate_hz", "numeric", "kernel"};
 constexpr Keys kHandKeys = {"script"};
 
-constexpr Keys kForceModels = {kPaperForce};
 constexpr Keys kCutRateWords = {"1/T"};
 
 template <class Enum>
@@ -82,26 +87,38 @@ void read_device_table(const SceneTable& table, SceneSpec& scene) {
   device.dock_rad = table.numbers<3>("dock_rad", kAngleRad).value_or(device.dock_rad);
 }
 
-/// A key that its model of cutting would ignore is a misunderstanding.
-void refuse_other_model(const SceneTable& table, bool preston) {
-  constexpr Keys kOverlapKeys = {"rate_per_s", "p1_n_per_mm2"};
-  constexpr Keys kPrestonKeys = {"machinability_mm3_per_s_n", "threshold_n", "friction"};
-  for (const std::string_view key : kPrestonKeys) {
-    if (!preston && table.has(key)) {
-      refuse(table.place(key),
-             " is of the model preston; leave it out, or set model = \"preston\"");
-    }
-  }
-  for (const std::string_view key : kOverlapKeys) {
-    if (preston && table.has(key)) {
-      refuse(table.place(key), " is of the model overlap; leave it out, force alone cuts here");
+/// A key that its model would ignore is a misunderstanding.
+void refuse_ignored(const SceneTable& table, KeyList keys, const std::string& of_model) {
+  for (const std::string_view key : keys) {
+    if (table.has(key)) {
+      refuse(table.place(key), " is of the model " + of_model +
+                                   "; leave it out, or set model = \"" + of_model + "\"");
     }
   }
 }
 
+void read_force_table(const SceneTable& table, Scene::Force& force) {
+  constexpr Keys kPaperKeys = {"p0_n_per_mm2"};
+  constexpr Keys kProxyKeys = {"stiffness_n_per_mm", "damping_ns_per_mm", "friction"};
+  read_choice(table, "model", kForceModelWords, force.model);
+  const bool proxy = force.model == ForceModel::proxy;
+  refuse_ignored(table, proxy ? KeyList(kPaperKeys) : KeyList(kProxyKeys),
+                 proxy ? "paper" : "proxy");
+  force.p0_n_per_mm2 = table.number("p0_n_per_mm2", kPressureNPerMm2).value_or(force.p0_n_per_mm2);
+  force.stiffness_n_per_mm =
+      table.number("stiffness_n_per_mm", kStiffnessNPerMm).value_or(force.stiffness_n_per_mm);
+  force.damping_ns_per_mm =
+      table.number("damping_ns_per_mm", kDampingNsPerMm).value_or(force.damping_ns_per_mm);
+  force.friction = table.number("friction", kProxyFriction).value_or(force.friction);
+}
+
 void read_cut_table(const SceneTable& table, SceneSpec& scene) {
   read_choice(table, "model", kCutModelWords, scene.cut.model);
-  refuse_other_model(table, scene.cut.model == CutModel::preston);
+  constexpr Keys kOverlapKeys = {"rate_per_s", "p1_n_per_mm2"};
+  constexpr Keys kPrestonKeys = {"machinability_mm3_per_s_n", "threshold_n", "friction"};
+  const bool preston = scene.cut.model == CutModel::preston;
+  refuse_ignored(table, preston ? KeyList(kOverlapKeys) : KeyList(kPrestonKeys),
+                 preston ? "overlap" : "preston");
   Scene::Cut& cut = scene.cut;
   cut.machinability_mm3_per_s_n = table.number("machinability_mm3_per_s_n", kMachinabilityMm3PerSN)
                                       .value_or(cut.machinability_mm3_per_s_n);
@@ -198,11 +215,7 @@ SceneSpec read_scene(const toml::table& parsed, const std::filesystem::path& pat
     read_material_table(table, scene.materials);
   }
   if (const auto table = root.table("device", kDeviceKeys)) read_device_table(*table, scene);
-  if (const auto table = root.table("force", kForceKeys)) {
-    static_cast<void>(table->choice("model", kForceModels));
-    scene.force.p0_n_per_mm2 =
-        table->number("p0_n_per_mm2", kPressureNPerMm2).value_or(scene.force.p0_n_per_mm2);
-  }
+  if (const auto table = root.table("force", kForceKeys)) read_force_table(*table, scene.force);
   if (const auto table = root.table("cut", kCutKeys)) read_cut_table(*table, scene);
   if (const auto table = root.table("spindle", kSpindleKeys)) read_spindle_table(*table, scene);
   refuse_uncut(scene);

@@ -73,6 +73,16 @@ json material_json(const Material& material) {
   return object;
 }
 
+json force_json(const Scene::Force& force) {
+  if (force.model == ForceModel::paper) {
+    return {{"model", word_of(force.model)}, {"p0_n_per_mm2", force.p0_n_per_mm2}};
+  }
+  return {{"model", word_of(force.model)},
+          {"stiffness_n_per_mm", force.stiffness_n_per_mm},
+          {"damping_ns_per_mm", force.damping_ns_per_mm},
+          {"friction", force.friction}};
+}
+
 /// What the model of cutting uses.
 json cut_json(const Scene::Cut& cut) {
   json object = {{"model", word_of(cut.model)}};
@@ -111,7 +121,7 @@ std::string canonical_json(const Scene& scene) {
                {"active_tool", scene.active_tool},
                {"materials", std::move(materials)},
                {"device", device_json(scene.device)},
-               {"force", {{"model", kPaperForce}, {"p0_n_per_mm2", scene.force.p0_n_per_mm2}}},
+               {"force", force_json(scene.force)},
                {"cut", cut_json(scene.cut)},
                {"limits",
                 {{"force_n", scene.limits.force_n},

@@ -267,6 +267,7 @@ Scene load_scene(const std::filesystem::path& path, const SceneOverrides& overri
 }
 
 double device_stiffness_n_per_mm(const Scene& scene) {
+  if (scene.force.model == ForceModel::proxy) return scene.force.stiffness_n_per_mm;
   const double scale = scene.device.workspace_scale;
   return scale * scale * 2 * std::numbers::pi * scene.tools[scene.active_tool].radius_mm *
          scene.force.p0_n_per_mm2;

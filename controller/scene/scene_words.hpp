@@ -11,13 +11,15 @@ namespace kerf {
 
 // The words of a scene for the values of an enumeration, in its order: one list for reading a scene
 // and for writing its JSON.
+inline constexpr std::array<std::string_view, 2> kForceModelWords = {"paper", "proxy"};
 inline constexpr std::array<std::string_view, 4> kCutModelWords = {"none", "overlap",
                                                                    "overlap_exact", "preston"};
 inline constexpr std::array<std::string_view, 3> kNumericWords = {"fixed", "float", "double"};
 inline constexpr std::array<std::string_view, 3> kGradientWords = {"central", "sobel5", "farid"};
 
-inline constexpr std::string_view kPaperForce = "paper";  ///< the only force model so far
-
+[[nodiscard]] constexpr std::string_view word_of(ForceModel model) {
+  return kForceModelWords.at(static_cast<std::size_t>(model));
+}
 [[nodiscard]] constexpr std::string_view word_of(CutModel model) {
   return kCutModelWords.at(static_cast<std::size_t>(model));
 }
@@ -27,6 +29,7 @@ inline constexpr std::string_view kPaperForce = "paper";  ///< the only force mo
 [[nodiscard]] constexpr std::string_view word_of(GradientKernel kernel) {
   return kGradientWords.at(static_cast<std::size_t>(kernel));
 }
+static_assert(word_of(ForceModel::proxy) == "proxy");
 static_assert(word_of(CutModel::preston) == "preston");
 static_assert(word_of(NumericKind::float64) == "double");
 static_assert(word_of(GradientKernel::farid) == "farid");

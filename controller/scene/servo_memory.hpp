@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "controller/scene/aligned_tool.hpp"
+#include "controller/scene/contact_memory.hpp"
 #include "controller/scene/lattice.hpp"
 #include "controller/scene/sample_tool.hpp"
 #include "controller/scene/scene.hpp"
@@ -54,6 +55,8 @@ class ServoMemory {
   std::span<const ToolOffset> hold_samples(const SceneTool& tool) {
     return samples_.emplace_back(tool.name, tool.offsets).second;
   }
+
+  [[nodiscard]] ContactMemory<N>& contact() noexcept { return contact_; }
 
   /// A table of the plan `aligned`; it stays where it is.
   const AlignedTable& hold_table(const SceneTool& tool, const LatticeTurn& turn,
@@ -112,6 +115,9 @@ class ServoMemory {
                              gradients_[v].span(), *scratch);
       }
       state.volumes[v] = {density, gradients_[v].span(), carries_[v].span()};
+      if (plan.contact.swept) {
+        contact_.take(scene, scene.volumes[volume.scene_index], v, density, state.contact);
+      }
     }
     overlap_.allocate();
     refresh_.allocate();
@@ -148,6 +154,7 @@ class ServoMemory {
       add("ordered samples of " + name, table.bytes(), true);
     }
     for (const ArrayBytes& array : scratch_.arrays()) add(array.name, array.bytes, array.taken);
+    for (const ArrayBytes& array : contact_.arrays()) add(array.name, array.bytes, array.taken);
     return list;
   }
 
@@ -169,6 +176,7 @@ class ServoMemory {
   PlannedArray<typename N::Weight> overlap_;
   PlannedArray<GradientScratch> refresh_;
   SplatMemory scratch_;
+  ContactMemory<N> contact_;
 };
 
 }  // namespace kerf

@@ -119,6 +119,24 @@ template <class N>
   return VoxelGrid{size.x, size.y, size.z}.voxel_count();
 }
 
+/// As many probes as a tick may make, with the tool's centre at a place in volume `v` alone.
+template <class N>
+std::int64_t probe_often(const ServoPlan<N>& plan, const ServoState<N>& state,
+                         const Shell<N>& shell, std::size_t v,
+                         VoxelVec<typename N::Real> centre_vox) {
+  ShellVolume<N> volume = state.contact.volumes[v];
+  volume.frame = {};  // contact space is the volume's
+  for (std::size_t i = 0; i < 3; ++i)
+    volume.frame.voxel_from_contact.row[i][i] = typename N::Ratio(1);
+  ShellProbe<N> probe(*plan.kernels, shell, std::span(&volume, 1));
+  probe.turn({});
+  std::int64_t planes = 0;
+  for (std::int32_t i = 0; i < SweepRules::kMaxProbes; ++i) {
+    planes += probe.probe(relabel<ContactSpace>(centre_vox)).count;
+  }
+  return planes;
+}
+
 /// Each stage of tool `t` in volume `v` of the plan, whose `bounds` are given: the tool where the
 /// volume is densest, turned as unfavourably as it can be, and a cut so slow that it stays
 /// surrounded. Operations are those of the last tick.
@@ -143,6 +161,10 @@ template <class N>
     using Real = typename N::Real;
     pose.centre_vox = {Real(place.x + 0.002 * i), Real(place.y + 0.3), Real(place.z + 0.4)};
     laps.begin();
+    if (plan.contact.swept) {
+      laps.end_stage(probe_often(plan, state, tool.swept.shell, v, pose.centre_vox));
+      if (in_volume.plan == Plan::surface) continue;
+    }
     if constexpr (N::kIsFixed) {
       const SplatScratch& scratch = state.scratch;
       RemovalRate<N> unbent = rate;  // the bend is timed apart
@@ -156,7 +178,7 @@ template <class N>
         const AlignedTick tick(*plan.kernels, *in_volume.aligned, scratch.tick, volume.grid,
                                memory.density, pose);
         laps.end_stage(0);
-        laps.end_stage(tick.contact().x);
+        if (!plan.contact.swept) laps.end_stage(tick.contact().x);
         if (!plan.cutting) continue;
         laps.end_stage(tick.mill(unbent, memory.carry).modification.x);
         bend(*in_volume.aligned);
@@ -178,13 +200,16 @@ template <class N>
         const std::ptrdiff_t rows = std::ptrdiff_t{box.size.y + 1} * (box.size.z + 1);
         const auto touched = static_cast<std::uint64_t>(std::count(live, live + rows, 1));
         done = splat_stages(tool.offsets.size(), box.size, touched, bends);
+        if (plan.contact.swept) sweep_instead(tool.swept.shell.table.count, done);
         continue;
       }
       laps.end_stage(gathered_contact(*plan.kernels, tool.samples, volume.grid, gradient, pose).x);
       continue;
     }
-    laps.end_stage(
-        static_cast<std::int64_t>(contact_sum<N>(volume.grid, gradient, tool.offsets, pose).x));
+    if (!plan.contact.swept) {
+      laps.end_stage(
+          static_cast<std::int64_t>(contact_sum<N>(volume.grid, gradient, tool.offsets, pose).x));
+    }
     if (!plan.cutting) continue;
     const VoxelBox inside =
         overlap<N>(volume.grid, tool.offsets, pose, in_volume.overlap_ratio, state.overlap);
@@ -202,6 +227,7 @@ template <class N>
                          GatherBoxes{voxels_in(state.overlap.box.extent()),
                                      voxels_in(inside.extent()), voxels_in(refreshed.extent())},
                          bends);
+    if (plan.contact.swept) sweep_instead(tool.swept.shell.table.count, done);
   }
   std::vector<StageTime> times;
   for (const double us : laps.medians_us()) times.push_back({us, done[times.size()].operations});

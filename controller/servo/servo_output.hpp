@@ -66,8 +66,10 @@ struct ServoOutput {
   std::array<double, 3> force_n{};             ///< sent to the hand, device port
   std::array<double, 3> contact_n{};           ///< part of it before limits, device port
   std::array<double, 3> modification_n{};
-  std::array<double, 3> torque_n_mm{};  ///< motor torques
-  double absorbed_mj = 0;               ///< SUM -F_sent . dx since arming; + = taken from the hand
+  std::array<double, 3> torque_n_mm{};      ///< motor torques
+  std::array<double, 3> proxy_offset_mm{};  ///< from the tip to the proxy's, in the scene
+  std::array<double, 3> tip_torque_n_mm{};  ///< of the contact about the tip, device port
+  double absorbed_mj = 0;  ///< SUM -F_sent . dx since arming; + = taken from the hand
 
   double spindle_ratio = 0;  ///< speed over the reference speed
   double spindle_load = 0;   ///< torque over the stall torque

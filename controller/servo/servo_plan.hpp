@@ -10,6 +10,7 @@
 #include "controller/kernel/kernel_set.hpp"
 #include "controller/kernel/milling.hpp"
 #include "controller/kernel/tool_offset.hpp"
+#include "controller/servo/contact_plan.hpp"
 #include "controller/servo/device_plan.hpp"
 #include "controller/servo/force_limits.hpp"
 #include "controller/servo/servo_limits.hpp"
@@ -40,6 +41,7 @@ enum class Plan : std::uint8_t {
   aligned,  ///< a correlation of the density with one table (controller/kernel/aligned_table.hpp)
   gather,   ///< stored gradients, weighted at every sample (controller/kernel/contact.hpp)
   splat,    ///< weights added up in the volume (controller/kernel/splat_table.hpp)
+  surface,  ///< none of them: the swept proxy feels, and nothing is cut
 };
 
 [[nodiscard]] constexpr const char* name_of(Plan plan) noexcept {
@@ -48,6 +50,8 @@ enum class Plan : std::uint8_t {
       return "aligned";
     case Plan::splat:
       return "splat";
+    case Plan::surface:
+      return "surface";
     case Plan::gather:
       break;
   }
@@ -75,7 +79,8 @@ struct ToolPlan {
   SampleTable samples;  ///< the same for the plans `gather` and `splat` in fixed point
   /// A round tool has the same samples in every orientation: they keep the volume's axes.
   bool round = false;
-  bool turns = true;  ///< with the stylus; else the tool keeps the world's axes
+  bool turns = true;   ///< with the stylus; else the tool keeps the world's axes
+  SweptTool<N> swept;  ///< where the swept proxy is felt
   std::array<ToolInVolume<N>, kMaxVolumes> in_volume{};  ///< by index of the plan's volumes
 };
 
@@ -90,6 +95,7 @@ struct ServoPlan {
   GradientKernel kernel = GradientKernel::farid;
   const ExactTaps* taps = nullptr;     ///< of the kernel, for the plan `splat`
   const KernelSet* kernels = nullptr;  ///< what this machine runs
+  ContactPlan<N> contact;
   bool cutting = false;
   RemovalRate<N> removal_rate;
 

@@ -9,6 +9,7 @@
 #include "controller/kernel/gradient.hpp"
 #include "controller/kernel/milling.hpp"
 #include "controller/kernel/splat_table.hpp"
+#include "controller/servo/contact_plan.hpp"
 #include "controller/servo/force_limits.hpp"
 #include "controller/servo/hash_chain.hpp"
 #include "controller/servo/kinematics/forward_kinematics.hpp"
@@ -53,6 +54,8 @@ struct ServoState {
   GradientScratch* gradient_scratch = nullptr;
   SplatScratch scratch;  ///< the plan `aligned` uses its inner part
 
+  ContactState<N> contact;  ///< of the swept proxy
+
   Supervisor supervisor;
   EncoderState encoders;
   GimbalFilter gimbal;
@@ -65,9 +68,10 @@ struct ServoState {
   bool tip_known = false;  ///< false before the first report
   VelocityWindow<N> velocity;
 
-  DeviceVec<Real> contact_n;     ///< felt in the last tick, before limits
-  DeviceVec<Real> force_n;       ///< sent in the last tick
-  DeviceVec<Real> held_force_n;  ///< sent with the last good report: faded when reports stop
+  DeviceVec<Real> contact_n;       ///< felt in the last tick, before limits
+  WorldVec<Real> proxy_offset_mm;  ///< in the last tick
+  DeviceVec<Real> force_n;         ///< sent in the last tick
+  DeviceVec<Real> held_force_n;    ///< sent with the last good report: faded when reports stop
   ThermalState<N> thermal;
   typename N::Energy absorbed_mj{};
   std::uint64_t output_hash = kHashSeed;

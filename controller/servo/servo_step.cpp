@@ -188,13 +188,21 @@ DeviceVec<typename N::Real> wanted_force(const ServoPlan<N>& plan, ServoState<N>
     return Real(double(part)) / Real(double(whole));
   };
   state.contact_n = {};
-  if (!supervisor.motors_on() || (sensed.usable && state.hold)) return {};
+  state.proxy_offset_mm = {};
+  if (!supervisor.motors_on() || (sensed.usable && state.hold)) {
+    state.contact.proxy = {};  // it looks for a new place when the tool is taken up again
+    return {};
+  }
   if (!sensed.usable) {
     return state.held_force_n * share(stale_share(timing, supervisor.stale_ticks),
                                       timing.zero_ticks - timing.hold_ticks);
   }
-  const ToolForces<N> forces = feel_and_cut(plan, state, sensed.tip_mm, state.rotation);
+  const ToolForces<N> forces =
+      feel_and_cut(plan, state, sensed.tip_mm, state.rotation, sensed.velocity_mm_per_s);
   state.contact_n = forces.contact_n;
+  state.proxy_offset_mm = forces.proxy_offset_mm;
+  out.proxy_offset_mm = as_doubles(forces.proxy_offset_mm);
+  out.tip_torque_n_mm = as_doubles(forces.tip_torque_n_mm);
   out.contact_n = as_doubles(forces.contact_n);
   out.modification_n = as_doubles(forces.modification_n);
   for (std::size_t v = 0; v < kMaxVolumes; ++v) {
@@ -277,6 +285,7 @@ ServoOutput servo_step(const ServoPlan<N>& plan, ServoState<N>& state,
 template <class N>
 double penetration_mm(const ServoPlan<N>& plan, const ServoState<N>& state) noexcept {
   using Real = typename N::Real;
+  if (plan.contact.swept) return as_double(norm(state.proxy_offset_mm));
   const Real length = norm(state.contact_n);
   if (!(length > Real(0))) return 0;
   using Unit = typename N::Unit;
@@ -304,6 +313,7 @@ void apply_command(const ServoPlan<N>& plan, ServoState<N>& state,
       return;
     case ServoCommand::Kind::select_tool:
       if (command.argument < plan.tool_count) state.active_tool = command.argument;
+      state.contact.proxy = {};  // the new tool may not fit where the old one was
       return;
     case ServoCommand::Kind::fade_in:
       restart_fade(state.supervisor);

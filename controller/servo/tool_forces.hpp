@@ -15,16 +15,19 @@
 #include "controller/kernel/tool_pose.hpp"
 #include "controller/servo/servo_plan.hpp"
 #include "controller/servo/servo_state.hpp"
+#include "controller/servo/swept_force.hpp"
 
 namespace kerf {
 
-/// The two forces of the paper at the device port, before any limit, and what was cut because of
-/// this tick's pose.
+/// Contact and modification at the device port, before any limit, and what was cut because of this
+/// tick's pose.
 template <class N>
 struct ToolForces {
   DeviceVec<typename N::Real> contact_n;
   DeviceVec<typename N::Real> modification_n;
-  std::array<Removed, kMaxVolumes> removed{};  ///< by volume of the scene
+  WorldVec<typename N::Real> proxy_offset_mm;   ///< from the tip; 0 without a proxy
+  DeviceVec<typename N::Real> tip_torque_n_mm;  ///< likewise
+  std::array<Removed, kMaxVolumes> removed{};   ///< by volume of the scene
 };
 
 /// Samples of the active tool in one volume. A tool that is round, or that does not turn, has the
@@ -67,8 +70,10 @@ inline void feel_and_cut_aligned(const ServoPlan<FixedNumbers>& plan,
   const ToolInVolume<FixedNumbers>& in_volume = plan.tools[state.active_tool].in_volume[v];
   const AlignedTick tick(*plan.kernels, *in_volume.aligned, state.scratch.tick, volume.grid,
                          memory.density, pose);
-  forces.contact_n =
-      forces.contact_n - force_of_sum<FixedNumbers>(in_volume.contact, tick.contact());
+  if (!plan.contact.swept) {
+    forces.contact_n =
+        forces.contact_n - force_of_sum<FixedNumbers>(in_volume.contact, tick.contact());
+  }
   if (!plan.cutting) return;
 
   const AlignedTick::Milled milled = tick.mill(plan.removal_rate, memory.carry);
@@ -88,8 +93,10 @@ inline void feel_and_cut_splat(const ServoPlan<FixedNumbers>& plan, ServoState<F
   const SplatOutcome out =
       splat_tick(*plan.kernels, tool.samples, *plan.taps, state.scratch, volume.grid,
                  memory.density, pose, in_volume.overlap_ratio, plan.removal_rate, memory.carry);
-  forces.contact_n =
-      forces.contact_n - force_of_sum<FixedNumbers>(in_volume.contact, out.felt.contact);
+  if (!plan.contact.swept) {
+    forces.contact_n =
+        forces.contact_n - force_of_sum<FixedNumbers>(in_volume.contact, out.felt.contact);
+  }
   forces.modification_n = forces.modification_n -
                           force_of_sum<FixedNumbers>(in_volume.modification, out.felt.modification);
   forces.removed[volume.scene_index] = out.removed;
@@ -110,9 +117,11 @@ void feel_and_cut_gathered(const ServoPlan<N>& plan, ServoState<N>& state, std::
         force_of_sum<N>(in_volume.contact,
                         gathered_contact(*plan.kernels, tool.samples, volume.grid, gradient, pose));
   } else {
-    forces.contact_n = forces.contact_n -
-                       force_of_sum<N>(in_volume.contact,
-                                       contact_sum<N>(volume.grid, gradient, tool.offsets, pose));
+    if (!plan.contact.swept) {
+      forces.contact_n = forces.contact_n -
+                         force_of_sum<N>(in_volume.contact,
+                                         contact_sum<N>(volume.grid, gradient, tool.offsets, pose));
+    }
     if (!plan.cutting) return;
 
     const VoxelBox touched =
@@ -135,9 +144,17 @@ void feel_and_cut_gathered(const ServoPlan<N>& plan, ServoState<N>& state, std::
 template <class N>
 [[nodiscard]] ToolForces<N> feel_and_cut(const ServoPlan<N>& plan, ServoState<N>& state,
                                          WorldVec<typename N::Real> tip_mm,
-                                         const Rotation<N>& rotation) noexcept {
+                                         const Rotation<N>& rotation,
+                                         DeviceVec<typename N::Real> velocity_mm_per_s) noexcept {
   const ToolPlan<N>& tool = plan.tools[state.active_tool];
   ToolForces<N> forces;
+  if (plan.contact.swept) {
+    const SweptForce<N> felt = feel_swept(plan, state, tip_mm, rotation, velocity_mm_per_s);
+    forces.contact_n = felt.force_n;
+    forces.proxy_offset_mm = felt.offset_mm;
+    forces.tip_torque_n_mm = felt.torque_n_mm;
+    if (!plan.cutting) return forces;
+  }
   for (std::size_t v = 0; v < plan.volume_count; ++v) {
     const ToolPose<N> pose = tool_pose(plan.volumes[v], tool, tool.in_volume[v], tip_mm, rotation);
     if constexpr (N::kIsFixed) {

@@ -93,7 +93,8 @@ void Publisher::publish(Tick tick, const DeviceReport& report, const ServoOutput
   put(record.commanded_force_n, output.force_n);
   put(record.contact_force_n, output.contact_n);
   put(record.modification_force_n, output.modification_n);
-  put(record.torque_n_mm, output.torque_n_mm);
+  put(record.torque_n_mm, output.tip_torque_n_mm);
+  put(record.proxy_offset_mm, output.proxy_offset_mm);
   std::ranges::copy(output.motor_counts, record.dac_counts);
   record.removed = static_cast<std::uint32_t>(output.removed_steps);
   record.port_energy_j = output.absorbed_mj / 1000.0;

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "controller/scene/compile.hpp"
+#include "controller/scene/tool_shapes.hpp"
 #include "shared/volume/density_hash.hpp"
 #include "tests/golden/golden_script.hpp"
 #include "tests/kernel/hash.hpp"
@@ -81,13 +82,18 @@ Scene golden_scene(GoldenScene which, NumericKind numeric) {
   if (which == GoldenScene::mill) {
     scene.tools = {ball(6, kVoxelMm), hook(4, kVoxelMm), ball(7, kVoxelMm), hook(5, 0.11),
                    ball(6, 0.1)};
-  } else {
+  } else if (which == GoldenScene::feel) {
     scene.tools = {hook(5, kVoxelMm), hook(7, 0.09)};
+  } else {
+    scene.tools = {
+        make_tool("ball", "ball", {.pitch_mm = kVoxelMm, .size_vox = 6}),
+        make_tool("shaft", "cylinder", {.pitch_mm = kVoxelMm, .radius_mm = 0.3, .length_mm = 1.5})};
+    scene.force = {.model = ForceModel::proxy, .friction = 0.2};
   }
   scene.device.workspace_scale = 0.75;
   scene.device.offset_mm = {4.1875, 47.25, 60.375};  // the middle of the hand's way
   scene.device.torque_scale = std::array{0.342, 0.342, -0.342};
-  scene.force.p0_n_per_mm2 = 12.0;
+  scene.force.p0_n_per_mm2 = 12.0;  // of the paper's force
   scene.cut.model = which == GoldenScene::mill ? CutModel::overlap_exact : CutModel::none;
   scene.cut.rate_per_s = 6.0;
   scene.cut.p1_n_per_mm2 = 8.0;
@@ -135,6 +141,10 @@ GoldenRun golden_run(GoldenScene which, NumericKind numeric, const KernelSet& ke
     servo->apply(scripted_command(tick, tools));
     const ServoOutput out = servo->step(scripted_report(tick));
     add(hash, out);
+    if (which == GoldenScene::sweep) {
+      for (const double mm : out.proxy_offset_mm) hash.add(mm);
+      for (const double n_mm : out.tip_torque_n_mm) hash.add(n_mm);
+    }
     if (tick % 50 == 0) hash.add(servo->penetration_mm());
     run.contact_ticks += out.contact ? 1 : 0;
     run.late_contact_ticks += out.contact && tick >= ticks * 3 / 4 ? 1 : 0;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <set>
 #include <string>
@@ -15,7 +16,12 @@ namespace kerf::test {
 enum class GoldenScene : std::uint8_t {
   mill,  ///< cuts for 20 s: in fixed point the plans `aligned` and `splat`
   feel,  ///< cuts nothing, turns tools without symmetry for 3 s: the plan `gather`
+  sweep  ///< feels by the swept proxy for 3 s, a ball and a shaft that turns
 };
+[[nodiscard]] constexpr const char* name_of(GoldenScene scene) noexcept {
+  constexpr const char* kNames[] = {"mill", "feel", "sweep"};
+  return kNames[static_cast<std::size_t>(scene)];
+}
 constexpr std::int32_t golden_ticks(GoldenScene scene) noexcept {
   return scene == GoldenScene::mill ? 20'000 : 3'000;  // at 1 kHz
 }

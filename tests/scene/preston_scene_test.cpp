@@ -87,13 +87,19 @@ TEST_CASE("the keys of cutting by force reach their places, and have defaults") 
   CHECK(scene.materials[5].machinability == 20);
 }
 
-TEST_CASE("a key of the other model of cutting is refused") {
+TEST_CASE("a key of another model of force or cutting is refused") {
+  CHECK(error_after("[force]\nmodel = \"proxy\"\np0_n_per_mm2 = 0.1\n") ==
+        "x.toml:8: force.p0_n_per_mm2 = 0.1 is of the model paper; leave it out, or set model = "
+        "\"paper\"");
+  CHECK(error_after("[force]\nstiffness_n_per_mm = 0.1\n") ==
+        "x.toml:7: force.stiffness_n_per_mm = 0.1 is of the model proxy; leave it out, or set "
+        "model = \"proxy\"");
   CHECK(error_after("[cut]\nfriction = 0.4\n") ==
         "x.toml:7: cut.friction = 0.4 is of the model preston; leave it out, or set model = "
         "\"preston\"");
   CHECK(error_after(kPreston + "rate_per_s = 8\n") ==
-        "x.toml:8: cut.rate_per_s = 8 is of the model overlap; leave it out, force alone cuts "
-        "here");
+        "x.toml:8: cut.rate_per_s = 8 is of the model overlap; leave it out, or set model = "
+        "\"overlap\"");
   CHECK(
       error_after("[spindle]\nspeed_krpm = 100\n") ==
       "x.toml:6: spindle turns nothing: only cut.model = \"preston\" has a spindle; leave it out");

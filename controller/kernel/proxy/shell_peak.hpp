@@ -108,7 +108,7 @@ template <class N>
 [[nodiscard]] constexpr typename N::Ratio peak_height(const ShellMeans<N>& means,
                                                       bool round) noexcept {
   using Ratio = typename N::Ratio;
-  Ratio factor(1.2);  // p = 4
+  auto factor = static_cast<Ratio>(1.2);  // p = 4
   if (!round) {
     // p = 6: mean of squares over the square of the mean is 8 (7 + e) / (7 (8 + e)).
     const Ratio spread = std::max(Ratio(1), means.square / means.density / means.density);
@@ -118,7 +118,7 @@ template <class N>
     factor = Ratio(1) + e / Ratio(7);
   }
   // A lone spike is a peak of few samples: it may not rise far above the mean unseen.
-  constexpr Ratio kSpike(0.2);
+  constexpr auto kSpike = static_cast<Ratio>(0.2);
   return std::max(factor * means.density, means.top - kSpike);
 }
 

@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "controller/scene/free_brick_map.hpp"
+#include "controller/scene/plan_contact.hpp"
+#include "controller/scene/shell_tool.hpp"
+#include "controller/scene/surface_samples.hpp"
+#include "controller/servo/servo_state.hpp"
+
+namespace kerf {
+
+/// Owner of what the swept contact needs: the tools' surfaces, room for their places in each volume
+/// and the volumes' free bricks. Empty where the force is the paper's. Load time.
+template <class N>
+class ContactMemory {
+ public:
+  /// Samples of a tool's surface; they stay where they are.
+  Shell<N> hold_shell(const Scene& scene, const SceneTool& tool) {
+    const double unit_mm = contact_unit_mm(scene);
+    auto samples = surface_samples(tool, unit_mm);
+    for (auto& sample : samples) {
+      for (double& x : sample) x /= unit_mm;
+    }
+    const bool ball = tool.shape == "ball";
+    const auto& held = tools_.emplace_back(tool.name, ShellTool<N>(samples, ball)).second;
+    for (ShellMemory<N>& places : places_) places.hold(held.shell());
+    return held.shell();
+  }
+
+  /// Room in one more volume of the plan.
+  void hold_volume(const SceneVolume& volume) {
+    names_.push_back(volume.name);
+    const VoxelGrid& grid = volume.image.grid;
+    const auto bricks = [](std::int32_t voxels) {
+      return static_cast<std::size_t>((voxels + kFreeBrick - 1) / kFreeBrick);
+    };
+    map_bytes_.push_back(bricks(grid.nx) * bricks(grid.ny) * bricks(grid.nz));
+    places_.emplace_back();
+  }
+
+  /// What contact reads in volume `v` of the plan, whose densities are those of the servo.
+  void take(const Scene& scene, const SceneVolume& volume, std::size_t v,
+            std::span<const Density> density, ContactState<N>& state) {
+    const Density faintest = static_cast<Density>(volume.iso / 8);
+    const FreeBrickMap& map = maps_.emplace_back(volume.image.grid, density, faintest);
+    state.volumes[v] = {
+        {volume.image.grid, density.data(), density_scale(volume.iso), map.bricks()},
+        contact_frame<N>(scene, volume),
+        places_[v].places()};
+  }
+
+  [[nodiscard]] std::vector<ArrayBytes> arrays() const {
+    std::vector<ArrayBytes> list;
+    for (const auto& [name, tool] : tools_) {
+      list.push_back({"surface of " + name, tool.bytes(), true});
+    }
+    for (std::size_t v = 0; v < names_.size(); ++v) {
+      list.push_back({"places in " + names_[v], places_[v].bytes(), true});
+      list.push_back({"free bricks of " + names_[v], map_bytes_[v], false});
+    }
+    return list;
+  }
+
+ private:
+  std::vector<std::pair<std::string, ShellTool<N>>> tools_;
+  std::vector<std::string> names_;  ///< by volume of the plan
+  std::vector<std::size_t> map_bytes_;
+  std::vector<ShellMemory<N>> places_;
+  std::vector<FreeBrickMap> maps_;
+};
+
+}  // namespace kerf

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+
+#include "controller/kernel/proxy/contact_space.hpp"
+#include "controller/kernel/proxy/shell_probe.hpp"
+#include "controller/servo/coupling.hpp"
+#include "controller/servo/proxy_contact.hpp"
+#include "controller/servo/servo_limits.hpp"
+#include "shared/numeric/vec.hpp"
+
+namespace kerf {
+
+/// Force by the swept proxy; constant during a run.
+template <class N>
+struct ContactPlan {
+  bool swept = false;                      ///< else the paper's sums are felt
+  WorldVec<typename N::Real> origin_mm;    ///< of contact space
+  typename N::Ratio units_per_mm{};        ///< of the world
+  typename N::Ratio device_mm_per_unit{};  ///< unit over workspace scale
+  typename N::Ratio mm_per_unit{};         ///< of the world
+  Coupling<N> coupling;
+};
+
+/// A tool's surface and how its proxy moves.
+template <class N>
+struct SweptTool {
+  Shell<N> shell;
+  ProxyPlan<N> proxy;
+};
+
+/// The part that changes; places belong to the compiled scene.
+template <class N>
+struct ContactState {
+  std::array<ShellVolume<N>, kMaxVolumes> volumes{};  ///< by index of the plan's volumes
+  ProxyState<N> proxy;
+};
+
+}  // namespace kerf

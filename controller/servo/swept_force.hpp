@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <span>
+
+#include "controller/servo/servo_plan.hpp"
+#include "controller/servo/servo_state.hpp"
+
+namespace kerf {
+
+/// What the swept proxy gives the hand.
+template <class N>
+struct SweptForce {
+  DeviceVec<typename N::Real> force_n;      ///< of the coupling, before any limit
+  WorldVec<typename N::Real> offset_mm;     ///< from the hand's tip to the proxy's
+  WorldVec<typename N::Unit> normal{};      ///< out of the solid; 0 in air
+  DeviceVec<typename N::Real> torque_n_mm;  ///< about the tip, axes of the device
+};
+
+/// The proxy of the active tool follows the hand; the coupling pulls the hand to it. A tool that is
+/// round, or that does not turn, keeps the world's axes. Servo thread; at most 32 probes.
+template <class N>
+[[nodiscard]] SweptForce<N> feel_swept(const ServoPlan<N>& plan, ServoState<N>& state,
+                                       WorldVec<typename N::Real> tip_mm,
+                                       const Rotation<N>& rotation,
+                                       DeviceVec<typename N::Real> velocity_mm_per_s) noexcept {
+  using Real = typename N::Real;
+  const ContactPlan<N>& contact = plan.contact;
+  const ToolPlan<N>& tool = plan.tools[state.active_tool];
+  const auto scaled = [](ContactVec<Real> v, typename N::Ratio by) {
+    return ContactVec<Real>{multiply<Real>(by, v.x), multiply<Real>(by, v.y),
+                            multiply<Real>(by, v.z)};
+  };
+
+  ProxyPose<N> goal;
+  goal.centre = scaled(relabel<ContactSpace>(tip_mm - contact.origin_mm), contact.units_per_mm);
+  if (tool.turns && !tool.round) goal.turn = turn_of<N>(rotation.row);
+  ShellProbe<N> field(*plan.kernels, tool.swept.shell,
+                      std::span(state.contact.volumes).first(plan.volume_count));
+  const ProxyContact<N> felt = follow<N>(tool.swept.proxy, state.contact.proxy, field, goal);
+
+  SweptForce<N> out;
+  out.force_n = coupling_force(
+      contact.coupling, relabel<DeviceSpace>(scaled(felt.spring, contact.device_mm_per_unit)),
+      velocity_mm_per_s);
+  out.offset_mm = relabel<WorldSpace>(scaled(felt.pose.centre - goal.centre, contact.mm_per_unit));
+  out.normal = relabel<WorldSpace>(felt.normal);
+  out.torque_n_mm =
+      relabel<DeviceSpace>(scaled(felt.lever, contact.device_mm_per_unit)) * norm(out.force_n);
+  return out;
+}
+
+}  // namespace kerf
