@@ -69,13 +69,15 @@ void put(const Packet& packet, Lanes lanes, Value* out, std::int32_t stride = 1,
 inline F taken(const Packet& packet, const float* in, std::int32_t row) {
   F lanes{};
   float values[Simd::kWide * Simd::kHigh] = {};
-  for (std::int32_t y = 0; y < packet.high; ++y) {
+  const std::int32_t high = packet.high < Simd::kHigh ? packet.high : Simd::kHigh;
+  const std::int32_t wide = packet.wide < Simd::kWide ? packet.wide : Simd::kWide;
+  for (std::int32_t y = 0; y < high; ++y) {
     const float* const from = in + std::int64_t{y} * row;
-    if (packet.wide == Simd::kWide) {
+    if (wide == Simd::kWide) {
       __builtin_memcpy(&values[y * Simd::kWide], from, Simd::kWide * sizeof(float));
       continue;
     }
-    for (std::int32_t x = 0; x < packet.wide; ++x) values[y * Simd::kWide + x] = from[x];
+    for (std::int32_t x = 0; x < wide; ++x) values[y * Simd::kWide + x] = from[x];
   }
   __builtin_memcpy(&lanes, values, sizeof(lanes));
   return lanes;
