@@ -60,8 +60,10 @@ TEST_CASE("an outbox gives the newest packet, and what is older is void") {
   kerf::Outbox outbox;
   Bytes out{};
   CHECK(outbox.take(out) == 0);
-  for (std::uint8_t waiting : {1, 3, 8}) {
-    for (std::uint8_t i = 0; i < waiting; ++i) CHECK(outbox.put(packet(1, i)));
+  for (const int waiting : {1, 3, 8}) {
+    for (int i = 0; i < waiting; ++i) {
+      CHECK(outbox.put(packet(1, static_cast<std::uint8_t>(i))));
+    }
     CHECK_FALSE(outbox.empty());
     CHECK(outbox.take(out) == 16);
     CHECK(out[1] == waiting - 1);

@@ -80,8 +80,8 @@ class Kernel {
 /// Its number, then a command of the short form.
 std::vector<std::uint8_t> neutral_report() {
   const auto command = encode(kerf::WoodenCommand{});
-  std::vector<std::uint8_t> report{kerf::wooden::kReportId};
-  report.insert(report.end(), command.begin(), command.begin() + kerf::wooden::kPacketBytes);
+  std::vector<std::uint8_t> report(1 + kerf::wooden::kPacketBytes, kerf::wooden::kReportId);
+  std::copy_n(command.begin(), kerf::wooden::kPacketBytes, report.begin() + 1);
   return report;
 }
 

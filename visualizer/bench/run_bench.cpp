@@ -18,7 +18,9 @@ int run_bench(const VisualizerOptions& options) {
   for (const auto& file : {options.report, options.page, options.summary}) {
     if (file) check_new_file(*file);
   }
-  PictureFigures figures{.size = options.size, .cores = place_process(options.cpus).size()};
+  PictureFigures figures;
+  figures.size = options.size;
+  figures.cores = place_process(options.cpus).size();
   const auto context = make_headless_context();
   figures.gl_renderer = query_gl_driver().renderer;
   const bool terminal = isatty(STDERR_FILENO) == 1;
