@@ -40,7 +40,7 @@ Field filtered(Field& from) {
   constexpr GradientTaps kBoth = gradient_taps(kKind);
   constexpr std::array<float, 5> kTaps = kSlope ? kBoth.slope : kBoth.smooth;
   constexpr int kReach = gradient_reach(kKind);
-  constexpr int kMiddle = 2;
+  constexpr std::size_t kMiddle = 2;
   VoxelIndex n = from.n;
   (kAxis == 0 ? n.x : kAxis == 1 ? n.y : n.z) -= 2 * kReach;
   Field to(n);
@@ -51,8 +51,9 @@ Field filtered(Field& from) {
       float* const out = to.row(y, z);
       for (std::int32_t x = 0; x < n.x; ++x) {
         float sum = kTaps[kMiddle] * in[x];
-        for (int i = 1; i <= kReach; ++i) {
-          sum += kTaps[kMiddle + i] * in[x + i * stride] + kTaps[kMiddle - i] * in[x - i * stride];
+        for (std::size_t i = 1; i <= std::size_t{kReach}; ++i) {
+          const std::ptrdiff_t way = static_cast<std::ptrdiff_t>(i) * stride;
+          sum += kTaps[kMiddle + i] * in[x + way] + kTaps[kMiddle - i] * in[x - way];
         }
         out[x] = sum;
       }

@@ -108,7 +108,7 @@ TEST_CASE("small tools get finer samples, large ones are refused in one line") {
   CHECK(surface_samples(tool_of("ball", 31.5, 63), 1).size() == 7981);
   const SceneTool large = tool_of("ball", 31.5, 63);
   CHECK_THROWS_WITH_AS(
-      surface_samples(large, 0.5),
+      static_cast<void>(surface_samples(large, 0.5)),
       "tool 'tool': 31921 samples of its surface, of which contact reads at most 8000 in time; use "
       "a smaller tool or coarser voxels than 0.5 mm",
       SceneError);

@@ -75,30 +75,30 @@ void CastRenderer::draw(const View& view, const RenderTarget& target) {
   if (!frame_ || frame_->picture.width != size.width || frame_->picture.height != size.height) {
     frame_.emplace(size);
   }
-  const PixelRect reach = this->reach(view, size);
+  const PixelRect volumes = bounds(view, size);
   parts_.clear();
-  PixelRect bounds;
+  PixelRect drawn;
   for (const PixelRect& part : target.parts()) {
-    const PixelRect shows = part.clipped(reach);
+    const PixelRect shows = part.clipped(volumes);
     if (shows.empty()) continue;
     parts_.push_back(shows);
-    bounds = bounds.united(shows);
+    drawn = drawn.united(shows);
   }
   if (parts_.empty()) return;
   const bool ends_at_target = mode_ == CastMode::blend;
-  if (ends_at_target) read_end_depth(target, bounds);
+  if (ends_at_target) read_end_depth(target, drawn);
   caster_.draw(view, parts_, frame_->picture,
                ends_at_target ? std::span<const float>(frame_->end_depth) : std::span<float>());
-  upload(bounds);
+  upload(drawn);
   show(target);
 }
 
-PixelRect CastRenderer::reach(const View& view, PictureSize size) const {
-  PixelRect reach;
+PixelRect CastRenderer::bounds(const View& view, PictureSize size) const {
+  PixelRect bounds;
   for (const BoxCorners& body : caster_.bodies()) {
-    reach = reach.united(screen_bounds(body, view, size));
+    bounds = bounds.united(screen_bounds(body, view, size));
   }
-  return reach;
+  return bounds;
 }
 
 void CastRenderer::read_end_depth(const RenderTarget& target, const PixelRect& rect) {

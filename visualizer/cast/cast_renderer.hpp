@@ -39,7 +39,7 @@ class CastRenderer final : public Renderer {
   };
 
   /// Pixels that may show anything of the volumes.
-  [[nodiscard]] PixelRect reach(const View& view, PictureSize size) const;
+  [[nodiscard]] PixelRect bounds(const View& view, PictureSize size) const;
   void read_end_depth(const RenderTarget& target, const PixelRect& rect);
   void upload(const PixelRect& rect);
   void show(const RenderTarget& target);
