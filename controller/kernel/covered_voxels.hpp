@@ -91,7 +91,7 @@ class CoverScan {
   constexpr typename DragSums<N>::Row add_row(VoxelIndex first, std::int32_t count, Ratio ratio,
                                               Place place, Place step) noexcept {
     const std::size_t row = grid_.index(first.x, first.y, first.z);
-    const Density* const density = density_.data() + row;
+    const std::span<const Density> density = density_;
     CoveredVoxel<N>* voxel = memory_.data() + count_;
     const CoveredVoxel<N>* const end = memory_.data() + memory_.size();
     typename DragSums<N>::Row sums;
@@ -99,9 +99,10 @@ class CoverScan {
     Label material = 0;
     for (std::int32_t i = 0; i < count; ++i, place = place + step) {
       const auto r = ratio(i);
-      const Density rho = density[i];
-      if (!(r > 0) || rho == 0 || voxel == end) continue;
+      if (!(r > 0)) continue;  // a row may begin before the volume, where there is no ratio
       const std::size_t at = row + static_cast<std::size_t>(i);
+      const Density rho = density[at];
+      if (rho == 0 || voxel == end) continue;
       const Label here = material_at(at);
       if (here != material) {
         found_.weight[material] += sums.weight - settled;
