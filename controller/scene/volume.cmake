@@ -16,6 +16,7 @@ add_library(kerf_volume STATIC
 # SYSTEM: ITK's headers do not pass our warnings; only volume_io.cpp includes them.
 target_include_directories(kerf_volume SYSTEM PRIVATE ${ITK_INCLUDE_DIRS})
 target_link_libraries(kerf_volume PUBLIC kerf_shared kerf_posix PRIVATE ${ITK_LIBRARIES} ZLIB::ZLIB)
+kerf_computes(kerf_volume)
 
 add_library(kerf_volume_tool STATIC
   ../volume_tool/volume_commands.cpp ../volume_tool/volume_info.cpp)
