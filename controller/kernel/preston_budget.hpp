@@ -99,6 +99,18 @@ template <class N>
   }
 }
 
+/// The same as a number of the loop.
+template <class N>
+[[nodiscard]] constexpr typename N::Unit unit_share_of(CutWeight<N> part,
+                                                       CutWeight<N> whole) noexcept {
+  const auto share = share_of<N>(part, whole);
+  if constexpr (N::kIsFixed) {
+    return N::Unit::from_raw(static_cast<std::int32_t>(share));
+  } else {
+    return share;
+  }
+}
+
 /// budget times a `share_of`; fixed: rounded down.
 template <class N>
 [[nodiscard]] constexpr CutBudget<N> portion(CutBudget<N> budget, CutBudget<N> share) noexcept {

@@ -9,7 +9,8 @@
 
 namespace kerf {
 
-/// How the tool's surface moves over what it touches, averaged by the part covered.
+/// How the tool's surface moves over what it touches, averaged by the part covered. Burs turn
+/// clockwise as seen from the shaft, which lies along +y.
 template <class N>
 struct SurfaceDrag {
   /// Direction along the tool's x and z: shorter than 1 where the contact lies around the axis,
@@ -39,9 +40,9 @@ class DragSums {
   constexpr void add(const Row& row, typename SpindleFrame<N>::Place first,
                      typename SpindleFrame<N>::Place step) noexcept {
     if (!(row.weight > 0)) return;
-    // omega x r of a turn about the tool's y.
-    x_ += moment(row, first.z, step.z);
-    z_ -= moment(row, first.x, step.x);
+    // omega x r with omega along -y.
+    x_ -= moment(row, first.z, step.z);
+    z_ += moment(row, first.x, step.x);
     weight_ += row.weight;
     if constexpr (N::kIsFixed) {
       weight_speed_ += row.weight_speed >> 15;
@@ -52,7 +53,7 @@ class DragSums {
 
   [[nodiscard]] constexpr SurfaceDrag<N> mean() const noexcept {
     if (!(weight_ > 0)) return {};
-    return {along(x_), along(z_), unit(weight_speed_, weight_, false)};
+    return {along(x_), along(z_), unit_share_of<N>(weight_speed_, weight_)};
   }
 
  private:
@@ -70,16 +71,9 @@ class DragSums {
   }
   [[nodiscard]] constexpr Unit along(Sum moment) const noexcept {
     const bool negative = moment < 0;
-    return unit(std::min(static_cast<Weight>(negative ? -moment : moment), weight_ + weight_ / 2),
-                weight_, negative);
-  }
-  [[nodiscard]] static constexpr Unit unit(Weight part, Weight whole, bool negative) noexcept {
-    const auto share = share_of<N>(part, whole);
-    if constexpr (N::kIsFixed) {
-      return Unit::from_raw(static_cast<std::int32_t>(negative ? -share : share));
-    } else {
-      return negative ? -share : share;
-    }
+    const auto length = static_cast<Weight>(negative ? -moment : moment);
+    const Unit share = unit_share_of<N>(std::min(length, weight_ + weight_ / 2), weight_);
+    return negative ? -share : share;
   }
 
   Sum x_{}, z_{};
