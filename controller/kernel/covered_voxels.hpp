@@ -51,6 +51,12 @@ struct CoveredVoxels {
   std::span<CoveredVoxel<N>> list;
   ByMaterial<CutWeight<N>> weight{};  ///< sums of the list's
   SurfaceDrag<N> drag;
+
+  [[nodiscard]] constexpr CutWeight<N> whole_weight() const noexcept {
+    CutWeight<N> sum{};
+    for (const CutWeight<N> w : weight) sum += w;
+    return sum;
+  }
 };
 
 namespace detail {

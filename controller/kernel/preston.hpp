@@ -21,15 +21,15 @@ namespace kerf {
 //
 // So a tool between two materials presses on both, and each leaves at its own rate G under its own
 // part of the force; in one material the volume per second is G F_n n/n_ref. What cannot be cut
-// carries its part of the force and stays.
+// carries its part of the force and stays. Over several volumes the sum of w goes through all of
+// them: each gets its share of the drive F_n n/n_ref (`cut_drive`).
 
 /// How force cuts one volume; constant during a run. Index: label, 0 where there are no labels.
 template <class N>
 struct PrestonPlan {
   ByMaterial<ForceRate<N>> rate{};
-  ByMaterial<bool> forbidden{};    ///< never cut, and told when pressed upon
-  typename N::Real threshold_n{};  ///< force that cuts nothing yet
-  std::span<const Label> labels;   ///< one per voxel, or empty
+  ByMaterial<bool> forbidden{};   ///< never cut, and told when pressed upon
+  std::span<const Label> labels;  ///< one per voxel, or empty
 };
 
 /// What a volume's cut hands to the next tick.
@@ -40,22 +40,12 @@ struct PrestonState {
   std::uint16_t phase = 0;  ///< of the rounding
 };
 
-/// The tool's press on one volume in one tick.
-template <class N>
-struct PrestonPress {
-  typename N::Real normal_force_n{};  ///< in the scene, after the force limit
-  typename N::Unit spindle_ratio{};   ///< n / n_ref; 0: the spindle stands, nothing is cut
-  SpindleFrame<N> frame;
-};
-
 template <class N>
 struct PrestonOutcome {
   Removed removed;
   /// Budget that found nothing to remove and went beyond the carry: 0 unless the force is more
   /// than the covered voxels can hold in one tick.
   CutBudget<N> lost{};
-  SurfaceDrag<N> drag;
-  bool forbidden = false;  ///< the tool presses on a forbidden material
 };
 
 namespace detail {
@@ -68,18 +58,14 @@ class PrestonTick {
 
   constexpr PrestonTick(const PrestonPlan<N>& plan, std::span<Density> density,
                         PrestonState<N>& state, CoveredVoxels<N>& covered) noexcept
-      : plan_(plan),
-        density_(density),
-        state_(state),
-        voxels_(covered.list),
-        weight_(covered.weight) {}
+      : plan_(plan), density_(density), state_(state), covered_(covered) {}
 
   /// Feeds the accounts of the materials under the tool and spends them.
   constexpr void cut(Sum drive, PrestonOutcome<N>& out) noexcept {
-    CutWeight<N> all{};
-    each_material([&](std::size_t m) { all += weight_[m]; });
+    const CutWeight<N> all = covered_.whole_weight();
     each_material([&](std::size_t m) {
-      const auto fed = portion<N>(budget_of(plan_.rate[m], drive), share_of<N>(weight_[m], all));
+      const auto fed =
+          portion<N>(budget_of(plan_.rate[m], drive), share_of<N>(covered_.weight[m], all));
       if (!(fed > 0)) return;
       budget_[m] = fed + state_.carry[m] / kCarryTicks;
       state_.carry[m] += fed;
@@ -106,28 +92,28 @@ class PrestonTick {
   template <class Visit>
   constexpr void each_material(Visit&& visit) const noexcept {
     for (std::size_t m = 0; m < kMaxCutMaterials; ++m) {
-      if (weight_[m] > 0) visit(m);
+      if (covered_.weight[m] > 0) visit(m);
     }
   }
 
   /// Weights of what is still covered, by material.
   constexpr void weigh() noexcept {
-    weight_ = {};
-    for (CoveredVoxel<N>& voxel : voxels_) {
+    covered_.weight = {};
+    for (CoveredVoxel<N>& voxel : covered_.list) {
       voxel.weight = weight_of<N>(voxel.covered, voxel.speed);
-      weight_[voxel.material] += voxel.weight;
+      covered_.weight[voxel.material] += voxel.weight;
     }
   }
 
   /// Takes the budgets from the volume. True when some voxel had less to give than its part.
   constexpr bool spend(Removed& removed) noexcept {
     ByMaterial<BudgetPerWeight<N>> price{};
-    each_material([&](std::size_t m) { price[m] = {budget_[m], weight_[m]}; });
+    each_material([&](std::size_t m) { price[m] = {budget_[m], covered_.weight[m]}; });
     state_.phase = static_cast<std::uint16_t>(state_.phase + kPhaseByTick);
     ByMaterial<std::uint64_t> taken{};
     bool full = false;
     VoxelIndex lo{kPositionLimitVox, kPositionLimitVox, kPositionLimitVox}, hi{};
-    for (CoveredVoxel<N>& voxel : voxels_) {
+    for (CoveredVoxel<N>& voxel : covered_.list) {
       const Density steps = take(voxel, price[voxel.material].of(voxel.weight), full);
       if (steps == 0) continue;
       taken[voxel.material] += steps;
@@ -177,36 +163,35 @@ class PrestonTick {
   const PrestonPlan<N>& plan_;
   std::span<Density> density_;
   PrestonState<N>& state_;
-  std::span<CoveredVoxel<N>> voxels_;
-  ByMaterial<CutWeight<N>>& weight_;
+  CoveredVoxels<N>& covered_;
   ByMaterial<CutBudget<N>> budget_{};  ///< of this tick, still to be spent
 };
 
 }  // namespace detail
 
-/// Takes from one volume what the tool's press cuts in one tick. `overlap` holds the ratios of the
-/// tool where it is after an advance of a quarter voxel into the surface: a `BoxOverlap`, or an
-/// `OverlapBox<N>` that `overlap` filled.
+/// The tool, where it covers these voxels, touches a forbidden material.
+template <class N>
+[[nodiscard]] constexpr bool touches_forbidden(const PrestonPlan<N>& plan,
+                                               const CoveredVoxels<N>& covered) noexcept {
+  bool touches = false;
+  for (std::size_t m = 0; m < kMaxCutMaterials; ++m) {
+    touches = touches || (plan.forbidden[m] && covered.weight[m] > 0);
+  }
+  return touches;
+}
+
+/// Takes from one volume what `drive` cuts in one tick of the voxels that the tool covers, where it
+/// is after an advance of a quarter voxel into the surface; their list is used up.
 ///
 /// Removed steps, carry and `lost` add up to the budgets of all ticks: in fixed exactly, each
 /// budget within a millionth. No voxel loses more than the part that the tool covers; what the
 /// fullest cannot give is dealt out to the others once, and the rest waits in the carry. Without
-/// force, or with the spindle standing, nothing changes. Work is bounded by `memory`, which the
-/// scene sizes for the whole overlap: voxels beyond it are not cut. Servo thread; no heap.
-template <class N, class Overlap>
-constexpr PrestonOutcome<N> cut_by_force(const PrestonPlan<N>& plan, const PrestonPress<N>& press,
-                                         const VoxelGrid& grid, std::span<Density> density,
-                                         const Overlap& overlap, PrestonState<N>& state,
-                                         std::span<CoveredVoxel<N>> memory) noexcept {
+/// drive nothing changes. Work is bounded by the list. Servo thread; no heap.
+template <class N>
+constexpr PrestonOutcome<N> cut_by_force(const PrestonPlan<N>& plan, typename N::Sum drive,
+                                         std::span<Density> density, PrestonState<N>& state,
+                                         CoveredVoxels<N>& covered) noexcept {
   PrestonOutcome<N> out;
-  if (!(press.normal_force_n > typename N::Real{})) return out;
-  CoveredVoxels<N> covered = covered_voxels<N>(grid, std::span<const Density>(density), plan.labels,
-                                               overlap, press.frame, memory);
-  out.drag = covered.drag;
-  for (std::size_t m = 0; m < kMaxCutMaterials; ++m) {
-    out.forbidden = out.forbidden || (plan.forbidden[m] && covered.weight[m] > 0);
-  }
-  const auto drive = cut_drive<N>(press.normal_force_n, plan.threshold_n, press.spindle_ratio);
   if (drive > 0) detail::PrestonTick<N>(plan, density, state, covered).cut(drive, out);
   return out;
 }

@@ -12,6 +12,7 @@
 #include "controller/scene/plan_contact.hpp"
 #include "controller/scene/plan_cost.hpp"
 #include "controller/scene/plan_device.hpp"
+#include "controller/scene/plan_preston.hpp"
 #include "controller/scene/plan_tools.hpp"
 #include "controller/scene/plan_volumes.hpp"
 #include "controller/scene/scene_error.hpp"
@@ -31,11 +32,13 @@ class SceneIn final : public CompiledScene {
     plan_.kernel = scene.servo.kernel;
     plan_.taps = &exact_taps(scene.servo.kernel);
     plan_.kernels = &kernels;
-    plan_.cutting = scene.cut.model != CutModel::none;
+    plan_.cutting =
+        scene.cut.model == CutModel::overlap || scene.cut.model == CutModel::overlap_exact;
     plan_.removal_rate = removal_rate<N>(scene.cut.rate_per_s / scene.servo.rate_hz,
                                          scene.cut.model == CutModel::overlap_exact);
     plan_volumes(scene, plan_);
     plan_contact(scene, plan_);
+    plan_.force_cut = plan_force_cut(scene, plan_);
     if (plan_.contact.swept) {
       for (std::size_t v = 0; v < plan_.volume_count; ++v) {
         memory_.contact().hold_volume(scene.volumes[plan_.volumes[v].scene_index]);
@@ -75,6 +78,7 @@ class SceneIn final : public CompiledScene {
     ToolPlan<N>& plan = plan_.tools[plan_.tool_count++];
     plan.round = tool.round;
     plan.turns = tool.turns;
+    plan.rim_mm = typename N::Real(tool.radius_mm);
     plan.offsets = memory_.hold_samples(tool);
     if (plan_.contact.swept) {
       plan.swept.shell = memory_.contact().hold_shell(scene, tool);
@@ -85,6 +89,7 @@ class SceneIn final : public CompiledScene {
     for (std::size_t v = 0; v < plan_.volume_count; ++v) {
       const std::size_t scene_index = plan_.volumes[v].scene_index;
       const SceneVolume& volume = scene.volumes[scene_index];
+      if (plan_.force_cut.on) memory_.force_cut().hold(tool, volume, v);
       const PlanChoice choice = choose_plan(scene, tool, volume);
       PlanCost cost;
       switch (choice.plan) {
@@ -132,10 +137,10 @@ class SceneIn final : public CompiledScene {
 }  // namespace
 
 std::unique_ptr<CompiledScene> plan_scene(const Scene& scene, const KernelSet& kernels) {
-  if (scene.cut.model == CutModel::preston) {
+  if (scene.cut.model == CutModel::preston && scene.force.model != ForceModel::proxy) {
     throw SceneError(scene.path +
-                     ": cut.model = \"preston\" needs the normal force of a proxy, which the servo "
-                     "has not yet; set model = \"overlap\"");
+                     ": cut.model = \"preston\" needs the normal force of a proxy; set force.model "
+                     "= \"proxy\", or cut.model = \"overlap\"");
   }
   switch (scene.servo.numeric) {
     case NumericKind::fixed:

@@ -41,14 +41,28 @@ std::uint64_t correlation_operations(const AlignedTable& table) {
   return chunks * count(table.lanes) * axes * kHalves * kCorners;
 }
 
-std::uint64_t mill_operations(const AlignedTable& table) {
+std::uint64_t ratios_of(const AlignedTable& table) {
+  return rows_of(table.size) * count(table.row_lanes);
+}
+
+std::uint64_t press_operations(const AlignedTable& table) {
   constexpr std::uint64_t kMasks = 8;  // corners of a cell
   constexpr std::uint64_t kTapsX = 2 * 5, kTapsY = 3 * 5, kTapsZ = 2 * 5;
-  constexpr std::uint64_t kProducts = 3, kRemovals = 1;
+  constexpr std::uint64_t kProducts = 3;
   const std::uint64_t planes = count(table.size.z) + 1;
-  const std::uint64_t ratios = planes * (count(table.size.y) + 1) * count(table.row_lanes);
   const std::uint64_t filtered = planes * count(table.box.y) * count(table.row_lanes);
-  return ratios * (kMasks + kTapsX + kTapsY + kProducts + kRemovals) + filtered * kTapsZ;
+  return ratios_of(table) * (kMasks + kTapsX + kTapsY + kProducts) + filtered * kTapsZ;
+}
+
+/// Voxels that a tool can cover.
+std::uint64_t voxels_under(VoxelIndex size) {
+  return (count(size.x) + 1) * rows_of(size);
+}
+
+/// What cutting by force does with the voxels of the box that the tool covers.
+void add_force_stages(std::uint64_t voxels, std::vector<StageCost>& stages) {
+  stages.push_back({"list", voxels});
+  stages.push_back({"spend", voxels});
 }
 
 /// Of every stage the most that it does in one of the boxes.
@@ -69,7 +83,13 @@ std::vector<StageCost> most_over(const std::vector<VoxelIndex>& sizes, StagesOf 
 PlanCost aligned_cost(const AlignedTable& table, const KernelSet& kernels, CutModel cut) {
   PlanCost cost{way_of(Plan::aligned, kernels.name), {}};
   cost.stages = {{"copy", voxels_of(table.box)}, {"contact", correlation_operations(table)}};
-  if (cut != CutModel::none) cost.stages.push_back({"mill", mill_operations(table)});
+  if (cut == CutModel::none) return cost;
+  if (cut == CutModel::preston) {
+    cost.stages.push_back({"press", press_operations(table)});
+    add_force_stages(voxels_under(table.size), cost.stages);
+    return cost;
+  }
+  cost.stages.push_back({"mill", press_operations(table) + ratios_of(table)});
   if (cut == CutModel::overlap_exact) {
     cost.stages.push_back({"bend", (count(table.size.x) + 1) * rows_of(table.size)});
   }
@@ -77,7 +97,7 @@ PlanCost aligned_cost(const AlignedTable& table, const KernelSet& kernels, CutMo
 }
 
 std::vector<StageCost> splat_stages(std::uint64_t samples, VoxelIndex size, std::uint64_t touched,
-                                    bool bends) {
+                                    CutModel cut) {
   constexpr std::uint64_t kSplit = 3, kFilter = 5;
   const TickBox box = tick_box(size, kExactFarid, samples);
   const std::uint64_t lanes = count(box.row_lanes);
@@ -85,7 +105,13 @@ std::vector<StageCost> splat_stages(std::uint64_t samples, VoxelIndex size, std:
                                 {"copy", voxels_of(box.box)},
                                 {"splat", kCorners * samples},
                                 {"press", lanes * (kSplit * rows_of(size) + kFilter * touched)}};
-  if (bends) stages.push_back({"bend", (count(size.x) + 1) * touched});
+  if (cut == CutModel::preston) {
+    add_force_stages((count(size.x) + 1) * touched, stages);
+    return stages;
+  }
+  if (cut == CutModel::overlap_exact) {
+    stages.push_back({"bend", (count(size.x) + 1) * touched});
+  }
   stages.push_back({"cut", lanes * touched});
   return stages;
 }
@@ -94,17 +120,21 @@ PlanCost splat_cost(const KernelSet& kernels, const SceneTool& tool, const Scene
                     CutModel cut) {
   return {way_of(Plan::splat, kernels.name),
           most_over(box_sizes(tool, volume), [&](VoxelIndex size) {
-            return splat_stages(tool.offsets.size(), size, rows_of(size),
-                                cut == CutModel::overlap_exact);
+            return splat_stages(tool.offsets.size(), size, rows_of(size), cut);
           })};
 }
 
 std::vector<StageCost> gather_stages(std::uint64_t samples, const std::optional<GatherBoxes>& boxes,
-                                     bool bends) {
+                                     CutModel cut) {
   constexpr std::uint64_t kSpread = 2 * kPlace + 2 * kCorners;
   std::vector<StageCost> stages{{"contact", kCorners * samples}};
   if (!boxes) return stages;
   stages.push_back({"overlap", kSpread * samples + boxes->overlap});
+  if (cut == CutModel::preston) {
+    add_force_stages(boxes->inside, stages);
+    return stages;
+  }
+  const bool bends = cut == CutModel::overlap_exact;
   stages.push_back({"modification", boxes->inside});
   stages.push_back({bends ? "bent removal" : "removal", boxes->inside});
   stages.push_back({"refresh", boxes->refreshed});
@@ -125,7 +155,7 @@ PlanCost gather_cost(NumericKind numeric, const KernelSet& kernels, const SceneT
       const VoxelIndex reached{size.x + kBoxMargin, size.y + kBoxMargin, size.z + kBoxMargin};
       boxes = {clipped(covered, 2), clipped(covered, 0), clipped(reached, 0)};
     }
-    return gather_stages(tool.offsets.size(), boxes, cut == CutModel::overlap_exact);
+    return gather_stages(tool.offsets.size(), boxes, cut);
   };
   return {way_of(Plan::gather, numeric == NumericKind::fixed ? kernels.name : word_of(numeric)),
           most_over(box_sizes(tool, volume), stages_of)};

@@ -12,7 +12,15 @@
 
 namespace kerf {
 
-// One function a plan: its stages and the operations of each.
+// One function a plan: its stages and the operations of each. Where force cuts, every plan ends
+// otherwise:
+//
+//   press  (plan `aligned`) what `mill` does, but for the removals; no gradient is needed, and the
+//          kernel makes their sum all the same
+//   list   voxels that the tool covers, read with what they weigh
+//   spend  the same voxels, from which the budget is taken; twice where the fullest have not enough
+//
+// Those come instead of `mill`, of `bend` and `cut`, and of all that follows `overlap`.
 
 /// Goes up when what counts as an operation changes: prices that were measured before are void.
 inline constexpr int kCountsRevision = 4;
@@ -39,7 +47,7 @@ inline constexpr int kCountsRevision = 4;
 
 /// Its stages where the box is known; `size` as in TickBox, `touched` counts rows.
 [[nodiscard]] std::vector<StageCost> splat_stages(std::uint64_t samples, VoxelIndex size,
-                                                  std::uint64_t touched, bool bends);
+                                                  std::uint64_t touched, CutModel cut);
 
 /// contact       corners of the samples' cells: 8 a sample
 /// overlap       multiply-adds of a sample's place (twice), its weights and its sums, 34 a sample;
@@ -67,6 +75,6 @@ struct GatherBoxes {
 /// Its stages where the boxes are known; without them where nothing is cut.
 [[nodiscard]] std::vector<StageCost> gather_stages(std::uint64_t samples,
                                                    const std::optional<GatherBoxes>& boxes,
-                                                   bool bends);
+                                                   CutModel cut);
 
 }  // namespace kerf

@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
+#include <array>
 #include <cstddef>
 #include <numbers>
 
-#include "controller/kernel/cutting_friction.hpp"
-#include "controller/kernel/preston.hpp"
-#include "controller/kernel/spindle.hpp"
 #include "controller/scene/matrices.hpp"
 #include "controller/scene/scene.hpp"
 #include "controller/scene/turned_box.hpp"
+#include "controller/servo/servo_plan.hpp"
 
 namespace kerf {
 
@@ -29,7 +29,6 @@ template <class N>
     plan.forbidden[m] = material.forbidden;
     if (!material.forbidden) plan.rate[m] = force_rate<N>(enamel * material.machinability);
   }
-  plan.threshold_n = typename N::Real(scene.cut.threshold_n);
   plan.labels = volume.image.labels;
   return plan;
 }
@@ -70,6 +69,37 @@ template <class N>
 template <class N>
 [[nodiscard]] FrictionPlan<N> plan_friction(const Scene& scene) {
   return friction_plan<N>(scene.cut.friction, 1.0 / scene.servo.rate_hz);
+}
+
+/// All of it, for the volumes of the plan; without labels, which get a place of their own later.
+template <class N>
+[[nodiscard]] ForceCutPlan<N> plan_force_cut(const Scene& scene, const ServoPlan<N>& plan) {
+  ForceCutPlan<N> cut;
+  cut.on = scene.cut.model == CutModel::preston;
+  if (!cut.on) return cut;
+  constexpr double kAdvancePerS = 20;  // units: from least to most within 40 ms
+  cut.threshold_n = typename N::Real(scene.cut.threshold_n);
+  cut.advance_step = typename N::Real(kAdvancePerS / scene.servo.rate_hz);
+  cut.spindle = plan_spindle<N>(scene);
+  cut.friction = plan_friction<N>(scene);
+  std::array<double, kMaxVolumes> voxel_mm3{};
+  for (std::size_t v = 0; v < plan.volume_count; ++v) {
+    const SceneVolume& volume = scene.volumes[plan.volumes[v].scene_index];
+    const auto& h = volume.image.spacing_mm;
+    voxel_mm3[v] = h[0] * h[1] * h[2];
+    cut.volume[v] = plan_preston<N>(scene, volume);
+    cut.volume[v].labels = {};
+  }
+  const double largest = *std::max_element(voxel_mm3.begin(), voxel_mm3.end());
+  for (std::size_t v = 0; v < plan.volume_count; ++v) {
+    const double share = voxel_mm3[v] / largest;
+    if constexpr (N::kIsFixed) {
+      cut.voxel_share[v] = typename N::Unit(share).raw();
+    } else {
+      cut.voxel_share[v] = static_cast<CutBudget<N>>(share);
+    }
+  }
+  return cut;
 }
 
 }  // namespace kerf

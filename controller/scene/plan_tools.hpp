@@ -7,6 +7,7 @@
 #include "controller/scene/force_maps.hpp"
 #include "controller/scene/lattice.hpp"
 #include "controller/scene/matrices.hpp"
+#include "controller/scene/plan_preston.hpp"
 #include "controller/scene/scene.hpp"
 #include "controller/servo/servo_plan.hpp"
 
@@ -33,6 +34,7 @@ template <class N>
     for (std::size_t j = 0; j < 3; ++j) in.unturned_step[i][j] = step_of<N>(unturned[i][j]);
   }
   in.overlap_ratio = step_of<N>(a * a * a / voxel_mm3);
+  in.rims_from_voxel = rims_from_voxel<N>(tool, volume);
 
   // World gradient per mm of density over its maximum: rotation * (1 / spacing) / 65535.
   const auto newtons = [&](double n_mm) {

@@ -36,7 +36,7 @@ constexpr Range kCutRatePerS{0, 100000};
 constexpr Range kMachinabilityMm3PerSN{1e-4, 100};
 constexpr Range kThresholdN{0, 3.3};
 constexpr Range kFriction{0, 2};
-constexpr Range kSpeedKrpm{1, 500};
+constexpr Range kSpeedKrpm{0, 500};  // 0: it stands, and nothing is cut
 constexpr Range kStallTorqueNMm{0.1, 1000};
 constexpr Range kInertiaGMm2{0.01, 1000};
 constexpr Range kForceN{0.01, 3.3};       // what the Omni can give

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -13,7 +12,9 @@
 
 #include "controller/scene/aligned_tool.hpp"
 #include "controller/scene/contact_memory.hpp"
+#include "controller/scene/force_cut_memory.hpp"
 #include "controller/scene/lattice.hpp"
+#include "controller/scene/planned_array.hpp"
 #include "controller/scene/sample_tool.hpp"
 #include "controller/scene/scene.hpp"
 #include "controller/scene/scene_costs.hpp"
@@ -23,27 +24,14 @@
 
 namespace kerf {
 
-/// An array whose size is known before its memory is taken; empty where nothing needs it.
-template <class T>
-class PlannedArray {
- public:
-  /// Several users share it: the largest wish counts.
-  void need(std::size_t count) { count_ = std::max(count_, count); }
-  void allocate() { memory_.resize(count_); }
-  [[nodiscard]] std::size_t bytes() const noexcept { return count_ * sizeof(T); }
-  [[nodiscard]] std::span<T> span() noexcept { return memory_; }
-
- private:
-  std::size_t count_ = 0;
-  std::vector<T> memory_;
-};
-
 /// Owner of all arrays that a compiled scene steps on. First the `hold` functions, one a plan, say
 /// what a tool needs; then `take` makes the memory. What nobody needs does not exist. Load time.
 template <class N>
 class ServoMemory {
  public:
-  explicit ServoMemory(const Scene& scene) : cutting_(scene.cut.model != CutModel::none) {
+  explicit ServoMemory(const Scene& scene)
+      : cutting_(scene.cut.model != CutModel::none),
+        by_force_(scene.cut.model == CutModel::preston) {
     for (const SceneVolume& volume : scene.volumes) {
       volumes_.push_back({volume.name, volume.image.density.size() * sizeof(Density),
                           volume.image.labels.size() * sizeof(Label)});
@@ -57,6 +45,7 @@ class ServoMemory {
   }
 
   [[nodiscard]] ContactMemory<N>& contact() noexcept { return contact_; }
+  [[nodiscard]] ForceCutMemory<N>& force_cut() noexcept { return force_cut_; }
 
   /// A table of the plan `aligned`; it stays where it is.
   const AlignedTable& hold_table(const SceneTool& tool, const LatticeTurn& turn,
@@ -69,17 +58,18 @@ class ServoMemory {
   /// What a tool needs in volume `v` of the plan, in the plan `aligned`.
   void hold_aligned(std::size_t v, const AlignedTable& table) {
     scratch_.tick().hold(table.size, cutting_);
-    if (cutting_) carries_[v].need(static_cast<std::size_t>(table.row_lanes));
+    if (cutting_ && !by_force_) carries_[v].need(static_cast<std::size_t>(table.row_lanes));
   }
 
   /// The same in the plan `gather`.
   void hold_gather(const SceneTool& tool, const SceneVolume& volume, std::size_t v) {
     const auto& h = volume.image.spacing_mm;
+    if (cutting_) overlap_.need(overlap_capacity(tool.size_vox, tool.pitch_mm, h));
+    if (by_force_) return;
     gradients_[v].need(volume.image.grid.voxel_count() + kFieldPad);
     if (!cutting_) return;
     refresh_.need(1);
     carries_[v].need(removal_lanes(overlap_width(tool.size_vox, tool.pitch_mm, h[0])));
-    overlap_.need(overlap_capacity(tool.size_vox, tool.pitch_mm, h));
   }
 
   /// The same in the plan `splat`.
@@ -89,7 +79,7 @@ class ServoMemory {
       width[axis] = overlap_width(tool.size_vox, tool.pitch_mm, volume.image.spacing_mm[axis]);
     }
     scratch_.hold(width, tool.offsets.size());
-    carries_[v].need(splat_lanes(width[0]));
+    if (!by_force_) carries_[v].need(splat_lanes(width[0]));
   }
 
   /// A tool's samples for the plans that take any pose in fixed point; they stay where they are.
@@ -99,8 +89,8 @@ class ServoMemory {
     return sample_tables_.back().second.table();
   }
 
-  /// Takes the volumes' densities over and allocates the rest; points `state` at it.
-  void take(Scene& scene, const ServoPlan<N>& plan, ServoState<N>& state) {
+  /// Takes the volumes' densities over and allocates the rest; points `plan` and `state` at it.
+  void take(Scene& scene, ServoPlan<N>& plan, ServoState<N>& state) {
     for (SceneVolume& volume : scene.volumes) {
       densities_.push_back(std::move(volume.image.density));
     }
@@ -119,6 +109,7 @@ class ServoMemory {
         contact_.take(scene, scene.volumes[volume.scene_index], v, density, state.contact);
       }
     }
+    force_cut_.take(scene, plan, state.force_cut);
     overlap_.allocate();
     refresh_.allocate();
     state.overlap.memory = overlap_.span();
@@ -155,6 +146,7 @@ class ServoMemory {
     }
     for (const ArrayBytes& array : scratch_.arrays()) add(array.name, array.bytes, array.taken);
     for (const ArrayBytes& array : contact_.arrays()) add(array.name, array.bytes, array.taken);
+    for (const ArrayBytes& array : force_cut_.arrays()) add(array.name, array.bytes, array.taken);
     return list;
   }
 
@@ -164,7 +156,7 @@ class ServoMemory {
     std::size_t density, labels;
   };
 
-  bool cutting_;
+  bool cutting_, by_force_;
   std::vector<VolumeBytes> volumes_;  ///< by volume of the scene, as the densities
   std::vector<std::string> solid_names_;
   std::vector<std::vector<Density>> densities_;
@@ -177,6 +169,7 @@ class ServoMemory {
   PlannedArray<GradientScratch> refresh_;
   SplatMemory scratch_;
   ContactMemory<N> contact_;
+  ForceCutMemory<N> force_cut_;
 };
 
 }  // namespace kerf

@@ -157,6 +157,19 @@ template <class N>
   const VoxelIndex place = densest_place(volume.grid, memory.density, reach_of(tool.offsets, pose));
   std::vector<StageCost> done = std::move(bounds);  // the plan `aligned` does no less
   StageLaps laps(done.size());
+  const ForceCutPlan<N>& by_force = plan.force_cut;
+  const auto list_and_spend = [&](const auto& overlap) {
+    using Real = typename N::Real;
+    const SpindleFrame<N> frame(pose.centre_vox, in_volume.rims_from_voxel, widest_rotation<N>());
+    auto covered =
+        covered_voxels<N>(volume.grid, std::span<const Density>(memory.density),
+                          by_force.volume[v].labels, overlap, frame, state.force_cut.list[v]);
+    laps.end_stage(static_cast<std::int64_t>(covered.list.size()));
+    const auto drive = cut_drive<N>(Real(1), Real(0), typename N::Unit(1));
+    laps.end_stage(
+        cut_by_force(by_force.volume[v], drive, memory.density, state.force_cut.volume[v], covered)
+            .removed.changed.hi.x);
+  };
   for (int i = 0; i < kTicks; ++i) {
     using Real = typename N::Real;
     pose.centre_vox = {Real(place.x + 0.002 * i), Real(place.y + 0.3), Real(place.z + 0.4)};
@@ -179,6 +192,10 @@ template <class N>
                                memory.density, pose);
         laps.end_stage(0);
         if (!plan.contact.swept) laps.end_stage(tick.contact().x);
+        if (by_force.on) {
+          laps.end_stage(tick.press().x);
+          list_and_spend(tick.overlap());
+        }
         if (!plan.cutting) continue;
         laps.end_stage(tick.mill(unbent, memory.carry).modification.x);
         bend(*in_volume.aligned);
@@ -194,12 +211,16 @@ template <class N>
         tick.splat();
         laps.end_stage(0);
         laps.end_stage(tick.press(in_volume.overlap_ratio).contact.x);
-        bend(box);
-        laps.end_stage(tick.cut(unbent, memory.carry).changed.hi.x);
+        if (by_force.on) {
+          list_and_spend(tick.overlap());
+        } else {
+          bend(box);
+          laps.end_stage(tick.cut(unbent, memory.carry).changed.hi.x);
+        }
         const std::uint8_t* const live = scratch.tick.live;  // touched: little of it is air here
         const std::ptrdiff_t rows = std::ptrdiff_t{box.size.y + 1} * (box.size.z + 1);
         const auto touched = static_cast<std::uint64_t>(std::count(live, live + rows, 1));
-        done = splat_stages(tool.offsets.size(), box.size, touched, bends);
+        done = splat_stages(tool.offsets.size(), box.size, touched, cut);
         if (plan.contact.swept) sweep_instead(tool.swept.shell.table.count, done);
         continue;
       }
@@ -210,10 +231,17 @@ template <class N>
       laps.end_stage(
           static_cast<std::int64_t>(contact_sum<N>(volume.grid, gradient, tool.offsets, pose).x));
     }
-    if (!plan.cutting) continue;
+    if (cut == CutModel::none) continue;
     const VoxelBox inside =
         overlap<N>(volume.grid, tool.offsets, pose, in_volume.overlap_ratio, state.overlap);
     laps.end_stage(inside.hi.x);
+    GatherBoxes boxes{voxels_in(state.overlap.box.extent()), voxels_in(inside.extent()), 0};
+    if (by_force.on) {
+      list_and_spend(state.overlap);
+      done = gather_stages(tool.offsets.size(), boxes, cut);
+      sweep_instead(tool.swept.shell.table.count, done);
+      continue;
+    }
     laps.end_stage(static_cast<std::int64_t>(
         modification_sum<N>(volume.grid, gradient, memory.density, state.overlap).x));
     const Removed removed =
@@ -222,11 +250,9 @@ template <class N>
     refresh_gradients<N>(plan.kernel, volume.grid, memory.density, removed.changed, memory.gradient,
                          *state.gradient_scratch);
     laps.end_stage(0);
-    const VoxelBox refreshed = removed.changed.grown(kGradientReach).clipped(volume.grid.box());
-    done = gather_stages(tool.offsets.size(),
-                         GatherBoxes{voxels_in(state.overlap.box.extent()),
-                                     voxels_in(inside.extent()), voxels_in(refreshed.extent())},
-                         bends);
+    boxes.refreshed =
+        voxels_in(removed.changed.grown(kGradientReach).clipped(volume.grid.box()).extent());
+    done = gather_stages(tool.offsets.size(), boxes, cut);
     if (plan.contact.swept) sweep_instead(tool.swept.shell.table.count, done);
   }
   std::vector<StageTime> times;

@@ -65,13 +65,14 @@ struct ServoOutput {
   std::array<double, 3> velocity_mm_per_s{};   ///< device port, by VelocityWindow
   std::array<double, 3> force_n{};             ///< sent to the hand, device port
   std::array<double, 3> contact_n{};           ///< part of it before limits, device port
-  std::array<double, 3> modification_n{};
-  std::array<double, 3> torque_n_mm{};      ///< motor torques
-  std::array<double, 3> proxy_offset_mm{};  ///< from the tip to the proxy's, in the scene
-  std::array<double, 3> tip_torque_n_mm{};  ///< of the contact about the tip, device port
+  std::array<double, 3> modification_n{};      ///< and of the cutting: reaction, or friction
+  std::array<double, 3> torque_n_mm{};         ///< motor torques
+  std::array<double, 3> proxy_offset_mm{};     ///< from the tip to the proxy's, in the scene
+  std::array<double, 3> tip_torque_n_mm{};     ///< of the contact about the tip, device port
   double absorbed_mj = 0;  ///< SUM -F_sent . dx since arming; + = taken from the hand
 
-  double spindle_ratio = 0;  ///< speed over the reference speed
+  double press_n = 0;        ///< normal force that cuts, in the scene
+  double spindle_ratio = 0;  ///< speed over the reference speed, in this tick's cut
   double spindle_load = 0;   ///< torque over the stall torque
   std::uint32_t active_tool = 0;
   std::uint64_t removed_steps = 0;  ///< density steps removed in this tick, all volumes

@@ -12,6 +12,7 @@
 #include "controller/kernel/tool_offset.hpp"
 #include "controller/servo/contact_plan.hpp"
 #include "controller/servo/device_plan.hpp"
+#include "controller/servo/force_cut_plan.hpp"
 #include "controller/servo/force_limits.hpp"
 #include "controller/servo/servo_limits.hpp"
 #include "controller/servo/sum_to_force.hpp"
@@ -71,6 +72,8 @@ struct ToolInVolume {
   // Of the plan's own sums:
   SumToForce<N> contact;       ///< F_c = -p0 a^3 grad: haptics-science 1.1, times workspace scale
   SumToForce<N> modification;  ///< F_m = -p1 V_voxel SUM r grad, times workspace scale
+  /// Where force cuts: from voxel edges to rim radii along the world's axes, for a `SpindleFrame`.
+  Transform<typename N::Ratio, WorldSpace, VoxelSpace> rims_from_voxel;
 };
 
 template <class N>
@@ -79,8 +82,9 @@ struct ToolPlan {
   SampleTable samples;  ///< the same for the plans `gather` and `splat` in fixed point
   /// A round tool has the same samples in every orientation: they keep the volume's axes.
   bool round = false;
-  bool turns = true;   ///< with the stylus; else the tool keeps the world's axes
-  SweptTool<N> swept;  ///< where the swept proxy is felt
+  bool turns = true;          ///< with the stylus; else the tool keeps the world's axes
+  typename N::Real rim_mm{};  ///< largest radius about the shaft
+  SweptTool<N> swept;         ///< where the swept proxy is felt
   std::array<ToolInVolume<N>, kMaxVolumes> in_volume{};  ///< by index of the plan's volumes
 };
 
@@ -96,8 +100,9 @@ struct ServoPlan {
   const ExactTaps* taps = nullptr;     ///< of the kernel, for the plan `splat`
   const KernelSet* kernels = nullptr;  ///< what this machine runs
   ContactPlan<N> contact;
-  bool cutting = false;
+  bool cutting = false;  ///< by overlap, whatever the force
   RemovalRate<N> removal_rate;
+  ForceCutPlan<N> force_cut;  ///< else, by force
 
   DevicePlan<N> device;
   VelocityPlan<N> velocity;

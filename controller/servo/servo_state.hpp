@@ -10,6 +10,7 @@
 #include "controller/kernel/milling.hpp"
 #include "controller/kernel/splat_table.hpp"
 #include "controller/servo/contact_plan.hpp"
+#include "controller/servo/force_cut_plan.hpp"
 #include "controller/servo/force_limits.hpp"
 #include "controller/servo/hash_chain.hpp"
 #include "controller/servo/kinematics/forward_kinematics.hpp"
@@ -54,7 +55,8 @@ struct ServoState {
   GradientScratch* gradient_scratch = nullptr;
   SplatScratch scratch;  ///< the plan `aligned` uses its inner part
 
-  ContactState<N> contact;  ///< of the swept proxy
+  ContactState<N> contact;     ///< of the swept proxy
+  ForceCutState<N> force_cut;  ///< of cutting by force
 
   Supervisor supervisor;
   EncoderState encoders;

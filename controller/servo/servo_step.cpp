@@ -176,11 +176,26 @@ Sensed<N> sense(const ServoPlan<N>& plan, ServoState<N>& state,
   return sensed;
 }
 
-/// The force that the tool feels and the removal it makes there. Without a usable pose the force of
-/// the last good report is held and then faded, and nothing is cut.
+/// A force before its limits, and how the tool touches.
 template <class N>
-DeviceVec<typename N::Real> wanted_force(const ServoPlan<N>& plan, ServoState<N>& state,
-                                         const Sensed<N>& sensed, ServoOutput& out) noexcept {
+struct Wanted {
+  DeviceVec<typename N::Real> force_n;
+  ToolContact<N> tool;
+};
+
+void tell_removed(const std::array<Removed, kMaxVolumes>& removed, ServoOutput& out) noexcept {
+  for (std::size_t v = 0; v < kMaxVolumes; ++v) {
+    out.removed_by_volume[v] = removed[v].density_steps;
+    out.removed_steps += removed[v].density_steps;
+    out.changed[v] = removed[v].changed;
+  }
+}
+
+/// The force that the tool feels, and the removal it makes there by overlap. Without a usable pose
+/// the force of the last good report is held and then faded, and nothing is cut.
+template <class N>
+Wanted<N> wanted_force(const ServoPlan<N>& plan, ServoState<N>& state, const Sensed<N>& sensed,
+                       ServoOutput& out) noexcept {
   using Real = typename N::Real;
   const Supervisor& supervisor = state.supervisor;
   const SafetyTiming& timing = plan.timing;
@@ -194,8 +209,9 @@ DeviceVec<typename N::Real> wanted_force(const ServoPlan<N>& plan, ServoState<N>
     return {};
   }
   if (!sensed.usable) {
-    return state.held_force_n * share(stale_share(timing, supervisor.stale_ticks),
-                                      timing.zero_ticks - timing.hold_ticks);
+    return {state.held_force_n * share(stale_share(timing, supervisor.stale_ticks),
+                                       timing.zero_ticks - timing.hold_ticks),
+            {}};
   }
   const ToolForces<N> forces =
       feel_and_cut(plan, state, sensed.tip_mm, state.rotation, sensed.velocity_mm_per_s);
@@ -205,14 +221,10 @@ DeviceVec<typename N::Real> wanted_force(const ServoPlan<N>& plan, ServoState<N>
   out.tip_torque_n_mm = as_doubles(forces.tip_torque_n_mm);
   out.contact_n = as_doubles(forces.contact_n);
   out.modification_n = as_doubles(forces.modification_n);
-  for (std::size_t v = 0; v < kMaxVolumes; ++v) {
-    out.removed_by_volume[v] = forces.removed[v].density_steps;
-    out.removed_steps += forces.removed[v].density_steps;
-    out.changed[v] = forces.removed[v].changed;
-  }
+  tell_removed(forces.removed, out);
   const DeviceVec<Real> felt_n = forces.contact_n + forces.modification_n;
-  if (supervisor.phase != Phase::ramping) return felt_n;
-  return felt_n * share(supervisor.fade_ticks, timing.fade_in_ticks);
+  if (supervisor.phase != Phase::ramping) return {felt_n, forces.tool};
+  return {felt_n * share(supervisor.fade_ticks, timing.fade_in_ticks), forces.tool};
 }
 
 /// Limits the force and turns it into motor counts. Switching off is exempt from the slew limit.
@@ -239,6 +251,20 @@ void drive(const ServoPlan<N>& plan, ServoState<N>& state, DeviceVec<typename N:
   out.saturated = !(state.force_n == wanted_n);
   const JointVec<Real> torque_n_mm = state.lever_mm * state.force_n;
   out.torque_n_mm = {as_double(torque_n_mm.x), as_double(torque_n_mm.y), as_double(torque_n_mm.z)};
+}
+
+/// What the force that was sent cuts. The spindle runs while the hand is held by the motors.
+template <class N>
+void cut(const ServoPlan<N>& plan, ServoState<N>& state, const ToolContact<N>& tool,
+         ServoOutput& out) noexcept {
+  if (!plan.force_cut.on) return;
+  out.spindle_ratio = as_double(state.force_cut.spindle.ratio);
+  const bool runs = state.supervisor.motors_on() && !state.hold;
+  const ForceCut<N> done = cut_by_sent_force(plan, state, tool, state.force_n, runs);
+  out.press_n = as_double(done.press_n);
+  out.spindle_load = as_double(state.force_cut.spindle.load);
+  out.forbidden = done.forbidden;
+  tell_removed(done.removed, out);
 }
 
 /// The rest of the output, for the eyes and the log.
@@ -275,8 +301,9 @@ ServoOutput servo_step(const ServoPlan<N>& plan, ServoState<N>& state,
                        const DeviceReport& report) noexcept {
   ServoOutput out;
   const Sensed<N> sensed = sense(plan, state, report);
-  const auto wanted_n = wanted_force(plan, state, sensed, out);
-  drive(plan, state, wanted_n, out);
+  const Wanted<N> wanted = wanted_force(plan, state, sensed, out);
+  drive(plan, state, wanted.force_n, out);
+  cut(plan, state, wanted.tool, out);
   if (sensed.usable) state.held_force_n = state.force_n;
   tell(plan, state, sensed, report.fresh, out);
   return out;

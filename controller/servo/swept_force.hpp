@@ -5,6 +5,7 @@
 
 #include "controller/servo/servo_plan.hpp"
 #include "controller/servo/servo_state.hpp"
+#include "controller/servo/tool_contact.hpp"
 
 namespace kerf {
 
@@ -13,8 +14,8 @@ template <class N>
 struct SweptForce {
   DeviceVec<typename N::Real> force_n;      ///< of the coupling, before any limit
   WorldVec<typename N::Real> offset_mm;     ///< from the hand's tip to the proxy's
-  WorldVec<typename N::Unit> normal{};      ///< out of the solid; 0 in air
   DeviceVec<typename N::Real> torque_n_mm;  ///< about the tip, axes of the device
+  ToolContact<N> tool;
 };
 
 /// The proxy of the active tool follows the hand; the coupling pulls the hand to it. A tool that is
@@ -44,7 +45,10 @@ template <class N>
       contact.coupling, relabel<DeviceSpace>(scaled(felt.spring, contact.device_mm_per_unit)),
       velocity_mm_per_s);
   out.offset_mm = relabel<WorldSpace>(scaled(felt.pose.centre - goal.centre, contact.mm_per_unit));
-  out.normal = relabel<WorldSpace>(felt.normal);
+  out.tool.centre_mm =
+      contact.origin_mm + relabel<WorldSpace>(scaled(felt.pose.centre, contact.mm_per_unit));
+  if (tool.turns && !tool.round) out.tool.rotation = {rows_of(felt.pose.turn)};
+  out.tool.normal = relabel<WorldSpace>(felt.normal);
   out.torque_n_mm =
       relabel<DeviceSpace>(scaled(felt.lever, contact.device_mm_per_unit)) * norm(out.force_n);
   return out;

@@ -13,51 +13,25 @@
 #include "controller/kernel/overlap.hpp"
 #include "controller/kernel/splat.hpp"
 #include "controller/kernel/tool_pose.hpp"
+#include "controller/servo/force_cut.hpp"
 #include "controller/servo/servo_plan.hpp"
 #include "controller/servo/servo_state.hpp"
 #include "controller/servo/swept_force.hpp"
+#include "controller/servo/tool_contact.hpp"
 
 namespace kerf {
 
 /// Contact and modification at the device port, before any limit, and what was cut because of this
-/// tick's pose.
+/// tick's pose. Where force cuts, the modification force is its friction, and the cut comes later.
 template <class N>
 struct ToolForces {
   DeviceVec<typename N::Real> contact_n;
   DeviceVec<typename N::Real> modification_n;
   WorldVec<typename N::Real> proxy_offset_mm;   ///< from the tip; 0 without a proxy
   DeviceVec<typename N::Real> tip_torque_n_mm;  ///< likewise
+  ToolContact<N> tool;                          ///< likewise
   std::array<Removed, kMaxVolumes> removed{};   ///< by volume of the scene
 };
-
-/// Samples of the active tool in one volume. A tool that is round, or that does not turn, has the
-/// same samples whatever the stylus does.
-template <class N>
-[[nodiscard]] ToolPose<N> tool_pose(const VolumePlan<N>& volume, const ToolPlan<N>& tool,
-                                    const ToolInVolume<N>& in_volume,
-                                    WorldVec<typename N::Real> tip_mm,
-                                    const Rotation<N>& rotation) noexcept {
-  ToolPose<N> pose;
-  pose.centre_vox = volume.voxel_from_world * (tip_mm - volume.position_mm);
-  pose.step = in_volume.unturned_step;
-  if (tool.round || !tool.turns) return pose;
-  for (std::size_t i = 0; i < 3; ++i) {
-    for (std::size_t j = 0; j < 3; ++j) {
-      const auto& a = in_volume.voxel_from_pitch.row[i];
-      if constexpr (N::kIsFixed) {
-        std::int64_t sum = 0;  // Q24 * Q30 = Q54, three terms below 2^61.6
-        for (std::size_t k = 0; k < 3; ++k) {
-          sum += std::int64_t{a[k].raw()} * rotation.row[k][j].raw();
-        }
-        pose.step[i][j] = saturate_i32(round_shift(sum, 54 - 20));
-      } else {
-        pose.step[i][j] =
-            a[0] * rotation.row[0][j] + a[1] * rotation.row[1][j] + a[2] * rotation.row[2][j];
-      }
-    }
-  }
-  return pose;
-}
 
 /// One volume by the plan `aligned`: contact, then the modification force and the removal where
 /// the plan cuts.
@@ -153,6 +127,8 @@ template <class N>
     forces.contact_n = felt.force_n;
     forces.proxy_offset_mm = felt.offset_mm;
     forces.tip_torque_n_mm = felt.torque_n_mm;
+    forces.tool = felt.tool;
+    if (plan.force_cut.on) forces.modification_n = felt_friction(plan, state, felt.tool);
     if (!plan.cutting) return forces;
   }
   for (std::size_t v = 0; v < plan.volume_count; ++v) {

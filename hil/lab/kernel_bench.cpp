@@ -174,17 +174,19 @@ class Bench {
       std::vector<Density> volume = density;
       PrestonState<Numbers> state;
       std::optional<AlignedTick> tick;
-      PrestonPress<Numbers> press{Q16(1), Q30(1), {}};
+      SpindleFrame<Numbers> frame;
       int next = 0;
       const auto overlap = [&] {
         const auto pose = pose_of(ticks.place(next++ % ticks.count), kUnturned);
-        press.frame = frame_of(pose, 8);
+        frame = frame_of(pose, 8);
         tick.emplace(set, table, scratch, kGrid, volume, pose);
         use(tick->press().x);
       };
       row("fixed", set.name, bytes + sizeof plan + sizeof state, overlap, [&](int) {
-        const auto out = cut_by_force(plan, press, kGrid, std::span<Density>(volume),
-                                      tick->overlap(), state, std::span(list));
+        auto covered = covered_voxels<Numbers>(kGrid, std::span<const Density>(volume), {},
+                                               tick->overlap(), frame, std::span(list));
+        const auto drive = cut_drive<Numbers>(Q16(1), Q16(0), Q30(1));
+        const auto out = cut_by_force(plan, drive, std::span<Density>(volume), state, covered);
         use(static_cast<std::int64_t>(out.removed.density_steps));
       });
     });

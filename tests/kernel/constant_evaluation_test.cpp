@@ -78,12 +78,14 @@ constexpr std::uint64_t cut_by_largest_force() {
   }
   PrestonState<N> state;
   std::array<CoveredVoxel<N>, 64> memory{};
-  PrestonPress<N> press{Q16(32767), Q30(1.99), {pose.centre_vox, rims, upright}};
+  const auto drive = cut_drive<N>(Q16(32767), Q16(0), Q30(1.99));
   std::uint64_t steps = 0;
   for (int tick = 0; tick < 3; ++tick) {
-    steps += cut_by_force(plan, press, kGrid, std::span<Density>(density), covered, state,
-                          std::span<CoveredVoxel<N>>(memory))
-                 .removed.density_steps;
+    auto voxels =
+        covered_voxels<N>(kGrid, std::span<const Density>(density), {}, covered,
+                          {pose.centre_vox, rims, upright}, std::span<CoveredVoxel<N>>(memory));
+    steps +=
+        cut_by_force(plan, drive, std::span<Density>(density), state, voxels).removed.density_steps;
   }
   return steps;
 }

@@ -40,7 +40,7 @@ class FlatFeed {
     }
     return highest * rig_.scale.voxel_mm;
   }
-  PrestonOutcome<N> press(double force_n) {
+  Pressed<N> press(double force_n) {
     const double y = height_mm() / rig_.scale.voxel_mm + 0.5 - kAdvanceVox;
     return rig_.press({double(middle_), y, double(middle_)}, force_n);
   }

@@ -36,13 +36,12 @@ Cut cut_of(const TestVolume& volume, const ToolPose<N>& pose, const Overlap& ove
   plan.rate.fill(force_rate<N>(3000));
   PrestonState<N> state;
   Cut cut{volume.density, {}, 0};
-  const PrestonPress<N> press{
-      Q16(1.5), Q30(0.9),
-      frame_at<N>({double(pose.centre_vox.x), double(pose.centre_vox.y), double(pose.centre_vox.z)},
-                  4.0)};
-  cut.removed = cut_by_force(plan, press, volume.grid, std::span<Density>(cut.density), overlap,
-                             state, std::span<CoveredVoxel<N>>(memory))
-                    .removed;
+  const auto frame = frame_at<N>(
+      {double(pose.centre_vox.x), double(pose.centre_vox.y), double(pose.centre_vox.z)}, 4.0);
+  auto covered = covered_voxels<N>(volume.grid, std::span<const Density>(cut.density), {}, overlap,
+                                   frame, std::span<CoveredVoxel<N>>(memory));
+  const auto drive = cut_drive<N>(Q16(1.5), Q16(0), Q30(0.9));
+  cut.removed = cut_by_force(plan, drive, std::span<Density>(cut.density), state, covered).removed;
   cut.carry = state.carry[0];
   return cut;
 }

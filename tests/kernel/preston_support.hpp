@@ -52,6 +52,13 @@ SpindleFrame<N> frame_at(std::array<double, 3> centre_vox, double rim_vox, Axis 
   return {{Real(centre_vox[0]), Real(centre_vox[1]), Real(centre_vox[2])}, rims, turn};
 }
 
+/// What one press of the tool did and told.
+template <class N>
+struct Pressed : PrestonOutcome<N> {
+  SurfaceDrag<N> drag;
+  bool forbidden = false;
+};
+
 /// One unturned tool of the volume's pitch on one volume.
 template <class N>
 struct PrestonRig {
@@ -69,18 +76,24 @@ struct PrestonRig {
     overlap<N>(volume.grid, tool, pose_at<N>(centre_vox, pitch_vox),
                step_from<N>(pitch_vox * pitch_vox * pitch_vox), cutter.overlap);
   }
-  PrestonOutcome<N> press(std::array<double, 3> centre_vox, double force_n, double ratio = 1) {
+  Pressed<N> press(std::array<double, 3> centre_vox, double force_n, double ratio = 1) {
     cover(centre_vox);
-    const PrestonPress<N> press{typename N::Real(force_n), typename N::Unit(ratio),
-                                frame_at<N>(centre_vox, rim_vox, axis)};
-    return cut_by_force(plan, press, volume.grid, std::span<Density>(volume.density),
-                        cutter.overlap, state, std::span<CoveredVoxel<N>>(memory));
+    auto covered = covered_voxels<N>(volume.grid, std::span<const Density>(volume.density),
+                                     plan.labels, cutter.overlap,
+                                     frame_at<N>(centre_vox, rim_vox, axis), std::span(memory));
+    Pressed<N> pressed{{}, covered.drag, touches_forbidden(plan, covered)};
+    const auto drive = cut_drive<N>(typename N::Real(force_n), typename N::Real(threshold_n),
+                                    typename N::Unit(ratio));
+    static_cast<PrestonOutcome<N>&>(pressed) =
+        cut_by_force(plan, drive, std::span<Density>(volume.density), state, covered);
+    return pressed;
   }
 
   TestVolume volume;
   std::vector<ToolOffset> tool;
   double rim_vox;
   double pitch_vox = 1;
+  double threshold_n = 0;
   Axis axis = Axis::y;
   Scale scale;
   PrestonPlan<N> plan;

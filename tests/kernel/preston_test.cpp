@@ -55,7 +55,7 @@ TEST_CASE_TEMPLATE("what was removed and what is carried is the integral of G F"
     double fed = 0, removed = 0;
     for (int i = 0; i < 300; ++i) {
       const double force_n = std::floor(uniform(random, 0, 2) * 65536) / 65536;
-      const PrestonOutcome<N> out = rig.press(kCentre, force_n, 0.75);
+      const auto out = rig.press(kCentre, force_n, 0.75);
       fed += rig.scale.steps_per_n(kEnamelG) * force_n * 0.75;
       removed += double(out.removed.density_steps);
       CHECK(out.lost == 0);
@@ -70,7 +70,7 @@ TEST_CASE_TEMPLATE("what was removed and what is carried is the integral of G F"
 TEST_CASE_TEMPLATE("without force, below the threshold or with the spindle standing nothing leaves",
                    N, FixedNumbers, DoubleNumbers) {
   auto rig = ball_in_block<N>();
-  rig.plan.threshold_n = typename N::Real(0.05);
+  rig.threshold_n = 0.05;
   rig.press(kCentre, 2);  // leaves a carry that nothing may spend
   const TestVolume before = rig.volume;
   const auto carry = rig.state.carry;
@@ -82,7 +82,7 @@ TEST_CASE_TEMPLATE("without force, below the threshold or with the spindle stand
   CHECK(rig.state.carry == carry);
   // What is above the threshold cuts.
   auto above = ball_in_block<N>();
-  above.plan.threshold_n = typename N::Real(0.25);
+  above.threshold_n = 0.25;
   double removed = 0;
   for (int i = 0; i < 100; ++i) removed += double(above.press(kCentre, 0.75).removed.density_steps);
   CHECK(removed + carried<N>(above.state) ==

@@ -41,6 +41,7 @@ Scene block_scene() {
   Scene scene;
   scene.path = "block.toml";
   scene.materials = default_materials();
+  scene.force.model = ForceModel::proxy;
   scene.cut.model = CutModel::preston;
   SceneVolume volume;
   volume.image.grid = {20, 20, 20};
@@ -106,15 +107,16 @@ TEST_CASE("a key of another model of force or cutting is refused") {
   CHECK(error_after("[[material]]\nname = \"pulp\"\nforbidden = true\n") ==
         "x.toml: material pulp is forbidden, and this cut.model cuts everything; set model = "
         "\"preston\", or leave forbidden out");
-  CHECK(error_after(kPreston + "[spindle]\nspeed_krpm = 0\n")
-            .rfind("x.toml:9: spindle.speed_krpm = 0 is ", 0) == 0);
+  CHECK(error_after(kPreston + "[spindle]\nspeed_krpm = -1\n")
+            .rfind("x.toml:9: spindle.speed_krpm = -1 is ", 0) == 0);
 }
 
-TEST_CASE("the servo refuses cutting by force until it has a proxy") {
-  CHECK(
-      test::error_of([] { static_cast<void>(plan_scene(block_scene())); }) ==
-      "block.toml: cut.model = \"preston\" needs the normal force of a proxy, which the servo has "
-      "not yet; set model = \"overlap\"");
+TEST_CASE("cutting by force without a proxy is refused") {
+  Scene scene = block_scene();
+  scene.force.model = ForceModel::paper;
+  CHECK(test::error_of([&] { static_cast<void>(plan_scene(scene)); }) ==
+        "block.toml: cut.model = \"preston\" needs the normal force of a proxy; set force.model = "
+        "\"proxy\", or cut.model = \"overlap\"");
 }
 
 TEST_CASE("the scene's identity holds what its model of cutting uses, and nothing else") {
@@ -127,7 +129,7 @@ TEST_CASE("the scene's identity holds what its model of cutting uses, and nothin
   scene.cut.model = CutModel::overlap;
   const std::string text = canonical_json(scene);
   CHECK(text.find("spindle") == std::string::npos);
-  CHECK(text.find("friction") == std::string::npos);
+  CHECK(text.find("threshold_n") == std::string::npos);
   CHECK(text.find("forbidden") == std::string::npos);
 }
 
@@ -142,7 +144,6 @@ TEST_CASE("the tables of a scene hold rates by material, per newton and tick") {
   CHECK(steps_per_n(plan, 2) == doctest::Approx(3 * enamel).epsilon(1e-12));
   CHECK(plan.forbidden[3]);
   CHECK(steps_per_n(plan, 3) == 0);
-  CHECK(plan.threshold_n == 0.05);
   CHECK(plan.labels.size() == 8000);
 }
 
@@ -180,9 +181,8 @@ TEST_CASE_TEMPLATE("the tables cut a block: each material at its rate, at the sa
     }
     Transform<typename N::Unit, WorldSpace, ToolSpace> upright;
     for (std::size_t axis = 0; axis < 3; ++axis) upright.row[axis][axis] = typename N::Unit(1);
-    const PrestonPress<N> press{Real(1.05),
-                                typename N::Unit(1),
-                                {pose.centre_vox, rims_from_voxel<N>(tool, volume), upright}};
+    const SpindleFrame<N> frame{pose.centre_vox, rims_from_voxel<N>(tool, volume), upright};
+    const auto drive = cut_drive<N>(Real(1.05), Real(scene.cut.threshold_n), typename N::Unit(1));
     PrestonState<N> state;
     std::size_t largest = 0;
     for (int i = 0; i < rate_hz / 10; ++i) {
@@ -191,8 +191,10 @@ TEST_CASE_TEMPLATE("the tables cut a block: each material at its rate, at the sa
       largest = std::max(
           largest,
           VoxelGrid{reached.extent().x, reached.extent().y, reached.extent().z}.voxel_count());
-      cut_by_force(plan, press, volume.image.grid, std::span<Density>(volume.image.density), box,
-                   state, std::span<CoveredVoxel<N>>(memory));
+      const std::span<Density> density = volume.image.density;
+      auto covered = covered_voxels<N>(volume.image.grid, std::span<const Density>(density),
+                                       plan.labels, box, frame, std::span(memory));
+      cut_by_force(plan, drive, density, state, covered);
     }
     CHECK(largest <= memory.size());
     double removed = 0;

@@ -1,0 +1,159 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <span>
+
+#include "controller/kernel/aligned.hpp"
+#include "controller/kernel/overlap.hpp"
+#include "controller/kernel/overlap_rows.hpp"
+#include "controller/kernel/proxy/contact_math.hpp"
+#include "controller/kernel/splat.hpp"
+#include "controller/servo/servo_plan.hpp"
+#include "controller/servo/servo_state.hpp"
+#include "controller/servo/tool_contact.hpp"
+
+namespace kerf {
+
+// Cutting because of the force that the hand feels, in the same tick: after all limits, since what
+// the hand does not feel must not cut (haptics-science 1.4).
+
+/// What one tick cut.
+template <class N>
+struct ForceCut {
+  typename N::Real press_n{};                  ///< normal force in the scene
+  bool forbidden = false;                      ///< the tool presses on a forbidden material
+  std::array<Removed, kMaxVolumes> removed{};  ///< by volume of the scene
+};
+
+/// Axes of the spindle. A round tool has the same samples in every orientation, but turns about its
+/// shaft.
+template <class N>
+[[nodiscard]] const Rotation<N>& spindle_axes(const ToolPlan<N>& tool, const ServoState<N>& state,
+                                              const ToolContact<N>& at) noexcept {
+  return tool.round && tool.turns ? state.rotation : at.rotation;
+}
+
+/// Friction of the last cut at the device port, for the tool as it is held now. By
+/// x_scene = s x_device power is kept: F_device = s F_scene.
+template <class N>
+[[nodiscard]] DeviceVec<typename N::Real> felt_friction(const ServoPlan<N>& plan,
+                                                        const ServoState<N>& state,
+                                                        const ToolContact<N>& at) noexcept {
+  const Rotation<N>& axes = spindle_axes(plan.tools[state.active_tool], state, at);
+  return relabel<DeviceSpace>(axes * state.force_cut.friction_n) * plan.workspace_scale;
+}
+
+/// Voxels of volume `v` under the tool at `centre_mm`.
+template <class N>
+[[nodiscard]] CoveredVoxels<N> cover(const ServoPlan<N>& plan, ServoState<N>& state, std::size_t v,
+                                     WorldVec<typename N::Real> centre_mm,
+                                     const ToolContact<N>& at) noexcept {
+  const VolumePlan<N>& volume = plan.volumes[v];
+  const ToolPlan<N>& tool = plan.tools[state.active_tool];
+  const ToolInVolume<N>& in_volume = tool.in_volume[v];
+  const std::span<Density> density = state.volumes[v].density;
+  const ToolPose<N> pose = tool_pose(volume, tool, in_volume, centre_mm, at.rotation);
+  const SpindleFrame<N> frame(pose.centre_vox, in_volume.rims_from_voxel,
+                              spindle_axes(tool, state, at));
+  const auto listed = [&](const auto& overlap) {
+    return covered_voxels<N>(volume.grid, std::span<const Density>(density),
+                             plan.force_cut.volume[v].labels, overlap, frame,
+                             state.force_cut.list[v]);
+  };
+  if constexpr (N::kIsFixed) {
+    if (in_volume.plan == Plan::aligned) {
+      const AlignedTick tick(*plan.kernels, *in_volume.aligned, state.scratch.tick, volume.grid,
+                             density, pose);
+      static_cast<void>(tick.press());
+      return listed(tick.overlap());
+    }
+    const SplatTick tick(*plan.kernels, tool.samples, *plan.taps, state.scratch, volume.grid,
+                         density, pose);
+    tick.copy();
+    tick.splat();
+    static_cast<void>(tick.press(in_volume.overlap_ratio));
+    return listed(tick.overlap());
+  } else {
+    static_cast<void>(
+        overlap<N>(volume.grid, tool.offsets, pose, in_volume.overlap_ratio, state.overlap));
+    return listed(state.overlap);
+  }
+}
+
+/// Deals a press of `cut.press_n` out over the volumes, by the part of each that the tool covers,
+/// cuts them and returns the friction.
+template <class N>
+[[nodiscard]] CuttingFriction<N> press_on_volumes(const ServoPlan<N>& plan, ServoState<N>& state,
+                                                  const ToolContact<N>& at,
+                                                  ForceCut<N>& cut) noexcept {
+  using Real = typename N::Real;
+  const ForceCutPlan<N>& rules = plan.force_cut;
+  const Real advance_mm = multiply<Real>(plan.contact.mm_per_unit, state.force_cut.advance);
+  const WorldVec<Real> centre_mm =
+      at.centre_mm - relabel<WorldSpace>(times<N>(relabel<ContactSpace>(at.normal), advance_mm));
+
+  std::array<CoveredVoxels<N>, kMaxVolumes> covered;
+  std::array<CutWeight<N>, kMaxVolumes> weight{};  // in voxels of the largest kind
+  CutWeight<N> whole{};
+  for (std::size_t v = 0; v < plan.volume_count; ++v) {
+    covered[v] = cover(plan, state, v, centre_mm, at);
+    const auto own = static_cast<CutBudget<N>>(covered[v].whole_weight());
+    weight[v] = static_cast<CutWeight<N>>(portion<N>(own, rules.voxel_share[v]));
+    whole += weight[v];
+  }
+
+  CuttingFriction<N> friction;
+  bool starves = false;
+  const auto drive = cut_drive<N>(cut.press_n, rules.threshold_n, state.force_cut.spindle.ratio);
+  for (std::size_t v = 0; v < plan.volume_count; ++v) {
+    if (!(weight[v] > 0)) continue;
+    const PrestonPlan<N>& volume = rules.volume[v];
+    cut.forbidden = cut.forbidden || touches_forbidden(volume, covered[v]);
+    const Real press_n = multiply<Real>(unit_share_of<N>(weight[v], whole), cut.press_n);
+    friction.add(rules.friction, press_n, covered[v].drag);
+    const auto part = portion<N>(drive, share_of<N>(weight[v], whole));
+    const PrestonOutcome<N> out =
+        cut_by_force(volume, part, state.volumes[v].density, state.force_cut.volume[v], covered[v]);
+    cut.removed[plan.volumes[v].scene_index] = out.removed;
+    starves = starves || out.lost > 0;
+  }
+  Real& advance = state.force_cut.advance;
+  advance = std::clamp(starves ? advance + rules.advance_step : advance - rules.advance_step,
+                       Real(kCutAdvance), Real(kDeepestAdvance));
+  return friction;
+}
+
+/// One tick of the spindle, and of what it cuts where the tool touches. `sent_n` is the force that
+/// the hand feels; its normal part over the workspace scale presses in the scene, by
+/// F_device = s F_scene. Friction is left out of it: it is made of that force and would feed on
+/// itself. The spindle is switched on while `runs`; where it stands nothing is cut and nothing
+/// rubs.
+///
+/// The force of this tick decides about this cut; the cut's friction is felt from the next tick on.
+/// Servo thread; no heap. Work: the tool's box in each volume, and the voxels in it.
+template <class N>
+[[nodiscard]] ForceCut<N> cut_by_sent_force(const ServoPlan<N>& plan, ServoState<N>& state,
+                                            const ToolContact<N>& at,
+                                            DeviceVec<typename N::Real> sent_n,
+                                            bool runs) noexcept {
+  using Real = typename N::Real;
+  const ForceCutPlan<N>& rules = plan.force_cut;
+  ForceCutState<N>& memory = state.force_cut;
+  ForceCut<N> cut;
+  cut.press_n =
+      std::max(Real(0), along<N>(relabel<ContactSpace>(at.normal), relabel<ContactSpace>(sent_n)) /
+                            plan.workspace_scale);
+  CuttingFriction<N> friction;
+  if (cut.press_n > Real(0)) friction = press_on_volumes(plan, state, at, cut);
+  const bool turns = rules.spindle.free_ratio > typename N::Unit{};
+  if (!turns) friction = {};
+  turn_spindle(rules.spindle, runs, friction.torque_n_mm(plan.tools[state.active_tool].rim_mm),
+               memory.spindle);
+  follow_friction(rules.friction, friction.force_n(), memory.friction_n);
+  return cut;
+}
+
+}  // namespace kerf

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <span>
+
+#include "controller/kernel/cutting_friction.hpp"
+#include "controller/kernel/preston.hpp"
+#include "controller/kernel/spindle.hpp"
+#include "controller/servo/servo_limits.hpp"
+
+namespace kerf {
+
+/// The tool cuts this far inside of the surface that it rests on, so that the groove leaves it play
+/// (contact.md 6): units of contact space. The samples of an odd shape end up to 0.7 of a pitch
+/// inside of its surface, so that its rims may rest on matter that they do not cover. While a tool
+/// finds less than its force would cut it reaches deeper, to the second figure, and then back.
+inline constexpr double kCutAdvance = 0.25, kDeepestAdvance = 1;
+
+/// Cutting by force; constant during a run. Arrays: by index of the plan's volumes.
+template <class N>
+struct ForceCutPlan {
+  bool on = false;
+  typename N::Real threshold_n{};   ///< force in the scene that cuts nothing yet
+  typename N::Real advance_step{};  ///< change of the advance in a tick, units
+  SpindlePlan<N> spindle;
+  FrictionPlan<N> friction;
+  std::array<PrestonPlan<N>, kMaxVolumes> volume{};
+  /// Size of a voxel over that of the largest, as a `share_of`.
+  std::array<CutBudget<N>, kMaxVolumes> voxel_share{};
+};
+
+/// The part that changes; the lists belong to the compiled scene.
+template <class N>
+struct ForceCutState {
+  typename N::Real advance{kCutAdvance};
+  SpindleState<N> spindle;
+  Vec<typename N::Real, ToolSpace> friction_n;  ///< felt in the next tick, force in the scene
+  std::array<PrestonState<N>, kMaxVolumes> volume{};
+  std::array<std::span<CoveredVoxel<N>>, kMaxVolumes> list{};  ///< scratch of one tick
+};
+
+}  // namespace kerf

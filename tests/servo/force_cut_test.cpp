@@ -1,0 +1,294 @@
+// SPDX-License-Identifier: Apache-2.0
+// Cutting by force in the whole servo step: from joint counts to removed volume and felt friction.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include <doctest/doctest.h>
+
+#include "controller/scene/materials.hpp"
+#include "controller/scene/phantom.hpp"
+#include "controller/scene/tool_shapes.hpp"
+#include "controller/shell/allocation_counter.hpp"
+#include "tests/servo/support.hpp"
+
+using namespace kerf;
+using namespace kerf::test;
+
+namespace {
+
+using Shape = std::function<double(double, double, double)>;
+
+double flat(double, double y_mm, double) {
+  return y_mm;
+}
+
+/// A solid with an edge over two voxels, milled by a ball of radius 1 mm.
+Scene mill_scene(const Shape& signed_distance_mm = flat, int edge = 48) {
+  Scene scene = half_space_scene(8);
+  scene.volumes[0] = volume_of(edge, kVoxelMm, [&](double x, double y, double z) {
+    return signed_distance_mm(x, y, z) / 2;
+  });
+  scene.force.model = ForceModel::proxy;
+  scene.cut.model = CutModel::preston;
+  scene.cut.threshold_n = 0.0625;  // that every kind of numbers holds
+  return scene;
+}
+
+double voxel_mm3(const SceneVolume& volume) {
+  const auto& h = volume.image.spacing_mm;
+  return h[0] * h[1] * h[2];
+}
+
+/// A servo whose hand does what it is told, and what it has cut by then.
+class Miller {
+ public:
+  explicit Miller(Scene scene, const std::array<double, 3>& start_mm = {0, 1.3, 0})
+      : tick_s_(1.0 / scene.servo.rate_hz),
+        threshold_n_(scene.cut.threshold_n),
+        machinability_(scene.cut.machinability_mm3_per_s_n) {
+    for (const SceneVolume& volume : scene.volumes) voxel_mm3_.push_back(voxel_mm3(volume));
+    servo_ = compile(scene);
+    const int rest = kDockTicks * std::max(1, scene.servo.rate_hz / 1000);
+    for (int tick = 0; tick < rest; ++tick) static_cast<void>(servo_->step(arm_.docked()));
+    // From the inkwell around what there is to be cut, and down on it from above.
+    constexpr std::array<double, 3> kAbove{0, 30, -60};
+    arm_at(*servo_, arm_, kAbove[0], kAbove[1], kAbove[2]);
+    for (int i = 1; i <= 200; ++i) {
+      const double s = i / 200.0;
+      step({s * start_mm[0], kAbove[1] + s * (start_mm[1] - kAbove[1]), (1 - s) * kAbove[2]});
+    }
+    hold(start_mm, 0.3);  // until the force is faded in and the spindle is up to speed
+  }
+
+  ServoOutput step(const std::array<double, 3>& at_mm) {
+    const ServoOutput out = servo_->step(arm_.at(at_mm[0], at_mm[1], at_mm[2]));
+    for (std::size_t v = 0; v < voxel_mm3_.size(); ++v) {
+      removed_mm3_ += double(out.removed_by_volume[v]) / kDensityMax * voxel_mm3_[v];
+    }
+    fed_mm3_ +=
+        machinability_ * std::max(0.0, out.press_n - threshold_n_) * out.spindle_ratio * tick_s_;
+    return out;
+  }
+  ServoOutput hold(const std::array<double, 3>& at_mm, double seconds) {
+    ServoOutput out;
+    const long ticks = std::lround(seconds / tick_s_);
+    for (long tick = 0; tick < ticks; ++tick) out = step(at_mm);
+    return out;
+  }
+
+  [[nodiscard]] double removed_mm3() const { return removed_mm3_; }
+  /// SUM G F T, all as enamel.
+  [[nodiscard]] double fed_mm3() const { return fed_mm3_; }
+  [[nodiscard]] Servo& servo() { return *servo_; }
+
+ private:
+  double tick_s_, threshold_n_, machinability_;
+  std::vector<double> voxel_mm3_;
+  std::unique_ptr<Servo> servo_;
+  FakeArm arm_;
+  double removed_mm3_ = 0, fed_mm3_ = 0;
+};
+
+/// Part of `force` along `normal`.
+double along(const std::array<double, 3>& a, const std::array<double, 3>& b) {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+}  // namespace
+
+// F11
+TEST_CASE("what the servo removes is the integral of G F") {
+  for (const auto numeric : {NumericKind::fixed, NumericKind::float64}) {
+    for (const double scale : {1.0, 0.5}) {
+      CAPTURE(static_cast<int>(numeric));
+      CAPTURE(scale);
+      Scene scene = mill_scene();
+      scene.servo.numeric = numeric;
+      scene.device.workspace_scale = scale;
+      scene.cut.machinability_mm3_per_s_n = 8;  // so that what is carried is a millionth of it all
+      Miller miller(scene, {0, 1.3 / scale, 0});
+      for (int ms = 0; ms < 1000; ++ms) {
+        miller.step({0.3 * std::sin(0.01 * ms), (0.8 - 0.0025 * ms) / scale, 0});
+      }
+      CHECK(miller.removed_mm3() > 2);
+      CHECK(std::abs(miller.removed_mm3() / miller.fed_mm3() - 1) < 1e-6);
+    }
+  }
+}
+
+TEST_CASE("the same hand removes the same at 1, 2, 4 and 8 kHz") {
+  std::vector<double> removed_mm3;
+  for (const int rate_hz : {1000, 2000, 4000, 8000}) {
+    Scene scene = mill_scene();
+    scene.servo.rate_hz = rate_hz;
+    scene.cut.machinability_mm3_per_s_n = 4;
+    Miller miller(scene);
+    for (int step = 0; step < 10; ++step) miller.hold({0.1 * step, 0.8 - 0.1 * step, 0}, 0.02);
+    removed_mm3.push_back(miller.removed_mm3());
+  }
+  CHECK(removed_mm3[0] > 0.1);
+  for (const double mm3 : removed_mm3) CHECK(std::abs(mm3 / removed_mm3[0] - 1) < 0.01);
+}
+
+// F12
+TEST_CASE("a spindle that stands removes nothing and rubs nothing") {
+  Scene scene = mill_scene();
+  scene.spindle.speed_krpm = 0;
+  Miller miller(scene);
+  const ServoOutput out = miller.hold({0, -0.5, 0}, 0.1);
+  CHECK(out.press_n > 0.5);
+  CHECK(out.spindle_ratio == 0);
+  CHECK(out.spindle_load == 0);
+  CHECK(length(out.modification_n) == 0);
+  CHECK(miller.removed_mm3() == 0);
+}
+
+TEST_CASE("the spindle runs up, slows down under load and is braked by a hold") {
+  Miller miller(mill_scene());
+  const ServoOutput running = miller.step({0, 1.3, 0});
+  CHECK(running.spindle_ratio == doctest::Approx(1).epsilon(0.01));
+  CHECK(running.spindle_load == 0);
+  const ServoOutput pressed = miller.hold({0, -1, 0}, 0.3);
+  CHECK(pressed.spindle_load > 0.02);
+  CHECK(pressed.spindle_ratio == doctest::Approx(1 - pressed.spindle_load).epsilon(0.01));
+  miller.servo().apply({ServoCommand::Kind::hold, 1});
+  const double before_mm3 = miller.removed_mm3();
+  CHECK(miller.hold({0, -1, 0}, 0.5).spindle_ratio < 0.01);
+  CHECK(miller.removed_mm3() == before_mm3);
+}
+
+TEST_CASE("friction pulls against a bur that turns clockwise, by its part of the press") {
+  Miller miller(mill_scene());
+  const ServoOutput out = miller.hold({0, 0, 0}, 0.05);
+  // The face lies at -y of the centre: omega x r with omega along minus the shaft is R a x y.
+  const std::array<double, 3> shaft{out.rotation[1], out.rotation[4], out.rotation[7]};
+  std::array<double, 3> moves{-shaft[2], 0, shaft[0]};
+  const double across = length(moves);
+  REQUIRE(across > 0.2);  // the stylus leans, else the pole would touch
+  for (double& x : moves) x /= across;
+  const double friction_n = -along(out.modification_n, moves);
+  CHECK(friction_n > 0.25 * out.press_n);
+  CHECK(friction_n < 0.5 * out.press_n);
+  CHECK(length(out.modification_n) < 1.05 * friction_n);
+  CHECK(std::abs(out.force_n[1] - out.press_n) < 0.05 * out.press_n);  // friction does not press
+}
+
+TEST_CASE("a forbidden material is told and never cut") {
+  Scene scene = mill_scene();
+  scene.materials = default_materials();
+  scene.materials[kLabelPulp].forbidden = true;
+  scene.cut.machinability_mm3_per_s_n = 8;
+  VolumeImage& image = scene.volumes[0].image;
+  const VoxelGrid grid = image.grid;
+  for (int i = 0; i < int(grid.voxel_count()); ++i) {
+    image.labels.push_back(i / grid.nx % grid.ny < 18 ? kLabelPulp : kLabelEnamel);
+  }
+  const std::vector<Label> labels = image.labels;
+  const std::vector<Density> before = image.density;
+  Miller miller(scene);
+  scene = {};  // the servo keeps the labels that it needs
+  CHECK_FALSE(miller.hold({0, 0.6, 0}, 0.01).forbidden);
+  CHECK(miller.hold({0, -1.5, 0}, 0.5).forbidden);
+  CHECK(miller.removed_mm3() > 0.5);
+  const auto after = miller.servo().density(0);
+  for (std::size_t i = 0; i < before.size(); ++i) {
+    if (labels[i] == kLabelPulp) REQUIRE(after[i] == before[i]);
+  }
+}
+
+TEST_CASE("the press is shared by two volumes, whatever their voxels") {
+  // The same solid twice, the second time on voxels of twice the length along z, and turned half
+  // round.
+  Scene scene = mill_scene();
+  scene.volumes.push_back(scene.volumes[0]);
+  SceneVolume& second = scene.volumes[1];
+  VolumeImage& image = second.image;
+  image.grid.nz /= 2;
+  image.spacing_mm[2] *= 2;
+  image.density.resize(image.grid.voxel_count());  // it is the same on every plane
+  std::reverse(image.density.begin(), image.density.end());
+  const double corner = -second.pose.position_mm[0];
+  second.pose = {{corner, corner, -corner}, {0, 0, 1, 0}};
+  Miller miller(scene);
+  std::array<std::uint64_t, 2> steps{};
+  for (int ms = 0; ms < 600; ++ms) {
+    const ServoOutput out = miller.step({0, 0.8 - 0.002 * ms, 0});
+    for (std::size_t v = 0; v < 2; ++v) steps[v] += out.removed_by_volume[v];
+  }
+  CHECK(std::abs(miller.removed_mm3() / miller.fed_mm3() - 1) < 1e-3);
+  // Nearly the same volume of both, though half as many voxels.
+  CHECK(double(steps[0]) / double(2 * steps[1]) == doctest::Approx(1).epsilon(0.2));
+}
+
+TEST_CASE("a thin wall gives way to cutting alone, and without a blow") {
+  const Shape wall = [](double, double y, double) { return std::abs(y) - kVoxelMm; };
+  for (const bool turns : {false, true}) {
+    Scene scene = mill_scene(wall);
+    scene.spindle.speed_krpm = turns ? 300 : 0;
+    scene.cut.machinability_mm3_per_s_n = 2;
+    scene.force.damping_ns_per_mm = 0;
+    Miller miller(scene);
+    std::array<double, 3> last_n{};
+    double worst_n = 0;
+    ServoOutput out;
+    for (int ms = 0; ms < 1500; ++ms) {
+      out = miller.step({0, std::max(-1.5, 1.2 - 0.01 * ms), 0});
+      const std::array<double, 3> step_n{out.force_n[0] - last_n[0], out.force_n[1] - last_n[1],
+                                         out.force_n[2] - last_n[2]};
+      worst_n = std::max(worst_n, length(step_n));
+      last_n = out.force_n;
+    }
+    const double tool_mm = out.position_mm[1] + out.proxy_offset_mm[1];
+    CHECK((tool_mm < -1) == turns);  // through, or still on the upper face
+    CHECK((length(out.force_n) < 0.2) == turns);
+    CHECK(worst_n <= scene.limits.slew_n_per_ms + 1e-3);
+  }
+}
+
+TEST_CASE("a tool that leaves its groove is not held back") {
+  Scene scene = mill_scene();
+  scene.cut.machinability_mm3_per_s_n = 1;
+  Miller miller(scene);
+  miller.hold({0, 0.2, 0}, 0.5);
+  for (int ms = 0; ms < 150; ++ms) {
+    const ServoOutput out = miller.step({0, 0.2 + 0.02 * ms, 0});
+    CHECK(out.contact_n[1] >= 0);
+    CHECK(out.force_n[1] > -0.01);
+    if (ms > 60) CHECK(length(out.force_n) < 0.01);
+  }
+}
+
+TEST_CASE("a tool that turns with the stylus cuts by the same law") {
+  Scene scene = mill_scene();
+  scene.tools = {
+      make_tool("shaft", "cylinder", {.pitch_mm = kVoxelMm, .radius_mm = 0.5, .length_mm = 3.0})};
+  scene.cut.machinability_mm3_per_s_n = 0.5;
+  Miller miller(scene, {0, 4, 0});
+  for (int ms = 0; ms < 1000; ++ms) miller.step({0, 3 - 0.004 * ms, 0});
+  CHECK(miller.removed_mm3() > 0.05);
+  // Its samples end inside of the rim that it rests on: what they miss is lost until it reaches
+  // deeper.
+  CHECK(std::abs(miller.removed_mm3() / miller.fed_mm3() - 1) < 0.004);
+}
+
+TEST_CASE("the same reports cut the same bits, and no tick of cutting touches the heap") {
+  const auto run = [](double force) {
+    Scene scene = mill_scene();
+    Miller miller(scene);
+    const std::uint64_t before = CountedAllocations::total();
+    ServoOutput out;
+    {
+      const CountedAllocations counted;
+      for (int ms = 0; ms < 500; ++ms) out = miller.step({0.001 * ms, 0.8 - force, 0});
+    }
+    CHECK(CountedAllocations::total() == before);
+    return out.output_hash;
+  };
+  CHECK(run(1) == run(1));
+  CHECK(run(1) != run(1.5));
+}
