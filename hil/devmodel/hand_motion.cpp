@@ -30,8 +30,10 @@ HandMotion::HandMotion(const HandScript& script, const HandRoute& route)
   if (route.lift_mm > 0) {
     add(hand_move(rest + DeviceVec<double>{0, route.lift_mm, 0}, route.lift_s), 1.0);
   }
-  add(hand_move({start.x, std::max(route.clear_y_mm, start.y), route.clear_z_mm}, route.cross_s),
-      1.0);
+  if (route.cross_s > 0) {
+    const double clear_y = std::max(route.clear_y_mm, start.y);
+    add(hand_move({start.x, clear_y, route.clear_z_mm}, route.cross_s), 1.0);
+  }
   add(hand_move(start, route.approach_s), 1.0);
   const std::size_t script_from = legs_.size();
   for (const HandStep& step : script.steps) add(step, script.unit_mm);

@@ -16,14 +16,14 @@ struct HandRoute {
   std::vector<HandStep> calibration;
   /// Then straight up ...
   double lift_mm = 0;  ///< 0: not at all
-  double lift_s = 0.25;
+  double lift_s = 0.15;
   /// ... at this height or the start's, whichever is higher, over to this depth, clear of the
   /// workpiece ...
   double clear_y_mm = 15;
   double clear_z_mm = 0;
-  double cross_s = 0.45;
+  double cross_s = 0.4;  ///< 0: not at all
   /// ... and on to the start.
-  double approach_s = 0.5;
+  double approach_s = 0.25;
 };
 
 /// A smooth move.

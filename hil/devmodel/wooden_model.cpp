@@ -74,12 +74,8 @@ Calibration WoodenModel::calibration() const noexcept {
 }
 
 HandRoute WoodenModel::route() const {
-  // The rest pose is 0.2 m above the workpiece: a second to come down.
-  return {.rest_tip_mm = plant_.rest().tip_mm,
-          .calibration = {},
-          .clear_y_mm = 40,
-          .clear_z_mm = -20,
-          .cross_s = 1.0};
+  // The rest pose is 0.2 m above the workpiece: straight down.
+  return {.rest_tip_mm = plant_.rest().tip_mm, .calibration = {}, .cross_s = 0, .approach_s = 0.85};
 }
 
 WoodenReport WoodenModel::report() const noexcept {

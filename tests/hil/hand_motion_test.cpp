@@ -17,7 +17,7 @@ using kerf::HandGoal;
 using kerf::HandMotion;
 
 constexpr int kSecond = kerf::omni::kBusCyclesPerSecond;
-constexpr int kPreludeCycles = kSecond * 12 / 10;  // inkwell to start
+constexpr int kPreludeCycles = kSecond * 8 / 10;  // inkwell to start
 const DeviceVec<double> kDock{0, -70, -86};
 
 /// The Omni's way, from another inkwell.
@@ -45,7 +45,7 @@ double distance(DeviceVec<double> a, DeviceVec<double> b) {
 
 }  // namespace
 
-TEST_CASE("the hand rests in the inkwell until it leaves, then is at the start after 1.2 s") {
+TEST_CASE("the hand rests in the inkwell until it leaves, then is at the start after 0.8 s") {
   HandMotion motion(kerf::parse_hand_script("start_mm = [1, 4, 2]\n[[step]]\nhold = 1", "test"),
                     from_dock());
   CHECK(after(motion, 100).in_inkwell);
@@ -103,8 +103,9 @@ TEST_CASE("the unit scales every length of the script and none of the way out") 
   script.unit_mm = 3;
   HandMotion motion(script, from_dock());
   motion.leave();
-  CHECK(distance(after(motion, kSecond / 4).target_mm, kDock + DeviceVec<double>{0, 25, 0}) < 1e-9);
-  CHECK(distance(after(motion, kPreludeCycles - kSecond / 4).target_mm, {3, 6, 0}) < 1e-9);
+  constexpr int kLiftCycles = kSecond * 15 / 100;
+  CHECK(distance(after(motion, kLiftCycles).target_mm, kDock + DeviceVec<double>{0, 25, 0}) < 1e-9);
+  CHECK(distance(after(motion, kPreludeCycles - kLiftCycles).target_mm, {3, 6, 0}) < 1e-9);
   CHECK(distance(after(motion, kSecond).target_mm, {0, -3, 0}) < 1e-9);
 }
 
