@@ -63,9 +63,10 @@ void declare_bus(CLI::App& app, BusOptions& o) {
   app.add_flag("--firmware-runs", o.firmware_runs,
                "fronts fuse, usbip: the falcon was started before (default: it waits for its "
                "firmware)");
-  app.add_option("--bus-fault", o.faults,
-                 "fronts fuse, usbip, uhid: SECONDS:KIND, repeatable; vanish, back; omni: reset, "
-                 "device-reset, steal; falcon: stall, split, on fuse also deaf");
+  app.add_option(
+      "--bus-fault", o.faults,
+      "fronts fuse, usbip, uhid: SECONDS:KIND, repeatable; vanish, back; omni: reset, "
+      "device-reset, steal; falcon: stall, split; falcon and woodenhaptics on fuse: deaf");
 }
 
 FirewireSettings firewire_settings(const BusOptions& o, int lockstep_hz) {

@@ -8,7 +8,6 @@
 #include <stdexcept>
 #include <system_error>
 #include <thread>
-#include <utility>
 #include <vector>
 
 #include <fcntl.h>
@@ -24,6 +23,7 @@ namespace kerf {
 namespace {
 
 constexpr int kPriority = 81;  // above the servo on its core: the hand comes first
+constexpr int kReadMs = 20;    // then the end is looked for
 constexpr int kLastPacketMs = 20;
 constexpr const char* kGiveRight =
     "; give your user the right: a udev rule with KERNEL==\"hidraw*\", "
@@ -86,6 +86,12 @@ std::optional<std::size_t> identify(const std::string& where, const std::string&
   return bytes;
 }
 
+/// Without the right to either, packets come and leave later; the servo's own start tells the user.
+void hurry() noexcept {
+  static_cast<void>(pin_to_core(allowed_cores().back()));
+  static_cast<void>(set_fifo(kPriority));
+}
+
 }  // namespace
 
 std::string parse_hid_port(std::string_view text) {
@@ -107,15 +113,16 @@ HidPort::HidPort(const std::string& where, int patience_ms, const std::atomic<bo
     }
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
   }
-  hid_set_nonblocking(device_, 1);
   sem_init(&raised_, 0, 0);
-  thread_ = std::thread([this] { run(); });
+  reader_ = std::thread([this] { read_reports(); });
+  writer_ = std::thread([this] { write_commands(); });
 }
 
 HidPort::~HidPort() {
   stop_ = true;
   sem_post(&raised_);
-  thread_.join();
+  writer_.join();
+  reader_.join();
   sem_destroy(&raised_);
   hid_close(device_);
 }
@@ -141,22 +148,6 @@ bool HidPort::open(const std::string& where) {
   return true;
 }
 
-std::size_t HidPort::read(std::span<std::uint8_t> out, int milliseconds) noexcept {
-  if (closed()) return 0;
-  const int size = hid_read_timeout(device_, out.data(), out.size(), milliseconds);
-  if (size < 0) closed_ = true;
-  if (size > 0) ++packets_;
-  return static_cast<std::size_t>(std::max(size, 0));
-}
-
-std::size_t HidPort::receive(std::span<std::uint8_t> out) noexcept {
-  if (waiting_bytes_ > 0) {
-    std::copy_n(waiting_.begin(), std::min(waiting_bytes_, out.size()), out.begin());
-    return std::exchange(waiting_bytes_, 0);
-  }
-  return read(out, 0);
-}
-
 bool HidPort::send(std::span<const std::uint8_t> packet) noexcept {
   if (closed() || !outbox_.put(packet)) return false;
   sem_post(&raised_);
@@ -164,15 +155,24 @@ bool HidPort::send(std::span<const std::uint8_t> packet) noexcept {
 }
 
 bool HidPort::send_last(std::span<const std::uint8_t> packet) noexcept {
-  if (gettid() == thread_id_) return false;  // nobody is left to send it
+  if (gettid() == writer_id_) return false;  // nobody is left to send it
   return outbox_.send_and_wait([&] { return send(packet); }, kLastPacketMs);
 }
 
-void HidPort::run() noexcept {
-  thread_id_ = gettid();
-  // Without the right to either, packets leave later; the servo's own start tells the user.
-  static_cast<void>(pin_to_core(allowed_cores().back()));
-  static_cast<void>(set_fifo(kPriority));
+void HidPort::read_reports() noexcept {
+  hurry();
+  std::array<std::uint8_t, MailboxPacket::kMaxBytes> report{};
+  while (!stop_ && !closed()) {
+    const int size = hid_read_timeout(device_, report.data(), report.size(), kReadMs);
+    if (size < 0) closed_ = true;
+    if (size <= 0) continue;
+    ++(inbox_.put(std::span(report).first(static_cast<std::size_t>(size))) ? packets_ : overflow_);
+  }
+}
+
+void HidPort::write_commands() noexcept {
+  writer_id_ = gettid();
+  hurry();
   while (!stop_ || !outbox_.empty()) {
     while (sem_wait(&raised_) != 0) {
     }
@@ -191,12 +191,7 @@ void HidPort::run() noexcept {
 }
 
 std::vector<LinkCounter> HidPort::counters() const {
-  return {{"packets", packets_}, {"commands", commands_}};
-}
-
-bool HidPort::wait(int milliseconds) noexcept {
-  if (waiting_bytes_ == 0) waiting_bytes_ = read(waiting_, milliseconds);
-  return waiting_bytes_ > 0;
+  return {{"packets", packets_}, {"overflow", overflow_}, {"commands", commands_}};
 }
 
 }  // namespace kerf

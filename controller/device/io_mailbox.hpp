@@ -10,6 +10,8 @@
 
 #include <poll.h>
 
+#include "shared/posix/monotonic_clock.hpp"
+
 namespace kerf {
 
 // What stands between the servo and an I/O thread: packets in both directions, without a lock, a
@@ -57,8 +59,20 @@ class Inbox {
   [[nodiscard]] bool empty() const noexcept {
     return begin_.load(std::memory_order_acquire) == end_.load(std::memory_order_acquire);
   }
+  /// The reader: sleeps until there is a packet; false after so many milliseconds, or once `closed`
+  /// with nothing left.
+  [[nodiscard]] bool wait(int milliseconds, const std::atomic<bool>& closed) const noexcept {
+    const std::int64_t until_ns = monotonic_ns() + std::int64_t{milliseconds} * 1'000'000;
+    while (empty() && !closed.load(std::memory_order_relaxed)) {
+      const std::int64_t now_ns = monotonic_ns();
+      if (now_ns >= until_ns) return false;
+      sleep_until_ns(std::min(until_ns, now_ns + kLookNs));
+    }
+    return !empty();
+  }
 
  private:
+  static constexpr std::int64_t kLookNs = 50'000;
   static constexpr std::size_t kPlaces = 64;
   std::array<MailboxPacket, kPlaces> places_{};
   std::atomic<std::size_t> begin_{0}, end_{0};

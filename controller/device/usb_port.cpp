@@ -87,16 +87,6 @@ bool UsbPort::send_last(std::span<const std::uint8_t> packet) noexcept {
   return outbox_.send_and_wait([&] { return send_now(packet); }, kLastPacketMs);
 }
 
-bool UsbPort::wait(int milliseconds) noexcept {
-  const std::int64_t until_ns = monotonic_ns() + std::int64_t{milliseconds} * 1'000'000;
-  while (inbox_.empty() && !closed()) {
-    const std::int64_t now_ns = monotonic_ns();
-    if (now_ns >= until_ns) return false;
-    sleep_until_ns(std::min(until_ns, now_ns + kLookNs));
-  }
-  return !inbox_.empty();
-}
-
 UsbLinkStats UsbPort::stats() const noexcept {
   return {packets_, overflow_, strays_, commands_, failures_};
 }
@@ -150,13 +140,14 @@ void UsbPort::send_rest() noexcept {
 void UsbPort::submit(Transfer& transfer) noexcept {
   const int error = libusb_submit_transfer(transfer.usb);
   transfer.busy = error == 0;
-  transfer.halted = false;
   if (error == LIBUSB_ERROR_NO_DEVICE) closed_ = true;
-  if (error != 0) {
-    transfer.halted = true;
-    ++failures_;
-    if (++failures_in_a_row_ > kMostFailures) closed_ = true;
-  }
+  if (error != 0) failed(transfer);
+}
+
+void UsbPort::failed(const Transfer& transfer) noexcept {
+  (&transfer == &write_ ? write_halted_ : read_halted_) = true;
+  ++failures_;
+  if (++failures_in_a_row_ > kMostFailures) closed_ = true;
 }
 
 /// The newest command, when it is our turn or will not wait for it.
@@ -196,11 +187,9 @@ void UsbPort::finished(Transfer& transfer) noexcept {
       closed_ = true;
       break;
     default:
-      transfer.halted = true;
-      ++failures_;
-      if (++failures_in_a_row_ > kMostFailures) closed_ = true;
+      failed(transfer);
   }
-  if (is_read && !transfer.halted && !stop_ && !closed()) submit(transfer);
+  if (is_read && !read_halted_ && !stop_ && !closed()) submit(transfer);
   if (!is_read) outbox_.set_on_its_way(false);
 }
 
@@ -216,16 +205,20 @@ void UsbPort::hear(std::span<const std::uint8_t> bytes) noexcept {
   if (!stop_) send_waiting();
 }
 
-/// A stalled endpoint is freed, and read from again; a packet that was lost there is not repeated.
+/// A stalled endpoint is freed, and used again; a packet that was lost there is not repeated. The
+/// kernel wants no transfer to wait on an endpoint that is freed, so reads are taken back before.
 void UsbPort::repair() noexcept {
-  const auto clear = [this](Transfer& transfer) {
-    if (transfer.halted) libusb_clear_halt(device_->handle(), transfer.usb->endpoint);
-    return std::exchange(transfer.halted, false);
-  };
-  clear(write_);
-  for (Transfer& read : reads_) {
-    if (clear(read)) submit(read);
+  if (std::exchange(write_halted_, false)) {
+    libusb_clear_halt(device_->handle(), falcon::kEndpointOut);
   }
+  if (!read_halted_) return;
+  if (std::ranges::any_of(reads_, &Transfer::busy)) {
+    for (Transfer& read : reads_) libusb_cancel_transfer(read.usb);
+    return;  // until they have come back
+  }
+  read_halted_ = false;
+  libusb_clear_halt(device_->handle(), falcon::kEndpointIn);
+  for (Transfer& read : reads_) submit(read);
 }
 
 void UsbPort::handle_events(std::int64_t ns) noexcept {

@@ -64,7 +64,9 @@ class UsbPort final : public PacketPort {
   [[nodiscard]] bool closed() const noexcept override {
     return closed_.load(std::memory_order_relaxed);
   }
-  [[nodiscard]] bool wait(int milliseconds) noexcept override;
+  [[nodiscard]] bool wait(int milliseconds) noexcept override {
+    return inbox_.wait(milliseconds, closed_);
+  }
 
   [[nodiscard]] std::vector<LinkCounter> counters() const override;
 
@@ -77,7 +79,6 @@ class UsbPort final : public PacketPort {
     UsbPort* port = nullptr;
     libusb_transfer* usb = nullptr;
     bool busy = false;
-    bool halted = false;  ///< its endpoint: to be cleared outside of the callback
     std::array<std::uint8_t, falcon::kFtdiPacketBytes> bytes{};
   };
 
@@ -85,6 +86,7 @@ class UsbPort final : public PacketPort {
   void run() noexcept;
   void send_rest() noexcept;
   void submit(Transfer& transfer) noexcept;
+  void failed(const Transfer& transfer) noexcept;
   void send_waiting() noexcept;
   void finished(Transfer& transfer) noexcept;
   void hear(std::span<const std::uint8_t> bytes) noexcept;
@@ -102,6 +104,7 @@ class UsbPort final : public PacketPort {
   // I/O thread only.
   std::array<Transfer, kReads> reads_{};
   Transfer write_;
+  bool read_halted_ = false, write_halted_ = false;  ///< endpoints: freed outside of the callback
   falcon::Framer framer_;
   Turns turns_;
   std::int64_t reply_due_ns_ = 0;  ///< until then the servo's answer to a packet is looked for

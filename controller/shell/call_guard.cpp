@@ -59,13 +59,11 @@ constexpr std::initializer_list<int> kFireWire{SCMP_SYS(ioctl), SCMP_SYS(read), 
                                                SCMP_SYS(ppoll), SCMP_SYS(openat), SCMP_SYS(dup3),
                                                SCMP_SYS(close)};
 // Behind a mailbox, where only a handler waits until the last packet has left.
-constexpr std::initializer_list<int> kUsb{SCMP_SYS(poll), SCMP_SYS(ppoll)};
-constexpr std::initializer_list<int> kHid{SCMP_SYS(read), SCMP_SYS(poll), SCMP_SYS(ppoll)};
+constexpr std::initializer_list<int> kMailbox{SCMP_SYS(poll), SCMP_SYS(ppoll)};
 
 std::initializer_list<int> calls_of(std::string_view port) {
   if (port.starts_with("fw")) return kFireWire;
-  if (port.starts_with("usb")) return kUsb;
-  return port.starts_with("hid") ? kHid : kSocket;
+  return port.starts_with("usb") || port.starts_with("hid") ? kMailbox : kSocket;
 }
 
 }  // namespace

@@ -44,15 +44,33 @@ std::optional<FuseAnswer> HidrawNode::read(FuseOpen id, FuseRequest request,
   return std::nullopt;
 }
 
-std::optional<FuseAnswer> HidrawNode::write(FuseOpen id, FuseRequest /*request*/,
+std::optional<FuseAnswer> HidrawNode::write(FuseOpen id, FuseRequest request,
                                             std::span<const std::uint8_t> bytes) {
   arm_.catch_up(*this);
   deliver();
   if (opens_.at(id).gone) return FuseAnswer::fail(ENODEV);
   if (bytes.size() < 2 || bytes.size() > kMostReportBytes) return FuseAnswer::fail(EINVAL);
   used_ = true;
+  if (arm_.deaf()) {
+    opens_.at(id).writes.push_back({request, {bytes.begin(), bytes.end()}});
+    return std::nullopt;
+  }
   arm_.out(bytes);
   return FuseAnswer{.result = static_cast<std::int32_t>(bytes.size())};
+}
+
+void HidrawNode::take_writes(Open& open) {
+  while (!open.writes.empty() && (open.gone || !arm_.deaf())) {
+    const ParkedWrite write = std::move(open.writes.front());
+    open.writes.pop_front();
+    if (open.gone) {
+      replies_->answer(write.request, FuseAnswer::fail(ENODEV));
+      continue;
+    }
+    arm_.out(write.report);
+    const auto bytes = static_cast<std::int32_t>(write.report.size());
+    replies_->answer(write.request, {.result = bytes});
+  }
 }
 
 std::optional<FuseAnswer> HidrawNode::ioctl(FuseOpen id, const FuseIoctl& call) {
@@ -112,9 +130,8 @@ std::uint32_t HidrawNode::poll(FuseOpen id, bool /*sleeps*/) {
 
 void HidrawNode::interrupted(FuseRequest request) {
   for (auto& [id, open] : opens_) {
-    const auto found = std::ranges::find(open.parked, request, &ParkedRead::request);
-    if (found == open.parked.end()) continue;
-    open.parked.erase(found);
+    const auto is_it = [request](const auto& parked) { return parked.request == request; };
+    if (std::erase_if(open.parked, is_it) + std::erase_if(open.writes, is_it) == 0) continue;
     return replies_->answer(request, FuseAnswer::fail(EINTR));
   }
 }
@@ -150,6 +167,7 @@ void HidrawNode::plugged(bool in) {
 /// Answers reads that wait for a report, and wakes those who poll for one.
 void HidrawNode::deliver() {
   for (auto& [id, open] : opens_) {
+    take_writes(open);
     while (!open.parked.empty() && (!open.waiting.empty() || open.gone)) {
       const ParkedRead parked = open.parked.front();
       open.parked.pop_front();

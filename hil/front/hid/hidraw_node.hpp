@@ -17,7 +17,7 @@ namespace kerf {
 /// cannot tell from the kernel's. Errors and queues are those of the kernel's hidraw.c (6.1).
 ///
 /// Every open gets every report from its opening on, 1 kHz; who does not read loses the newest when
-/// 64 wait. Input by ioctl is not there.
+/// 64 wait. Input by ioctl is not there, nor the kernel's own patience of 5 s with a deaf device.
 class HidrawNode final : public FuseNode, private HidHost {
  public:
   HidrawNode(const WoodenHid::Settings& settings, PacketDevice& device) : arm_(settings, device) {}
@@ -28,7 +28,7 @@ class HidrawNode final : public FuseNode, private HidHost {
   void release(FuseOpen open) override { opens_.erase(open); }
   std::optional<FuseAnswer> read(FuseOpen open, FuseRequest request, std::uint64_t offset,
                                  std::size_t size) override;
-  /// The number of the report, 0, and its bytes.
+  /// The number of the report, 0, and its bytes. Sleeps until the device has taken it.
   std::optional<FuseAnswer> write(FuseOpen open, FuseRequest request,
                                   std::span<const std::uint8_t> bytes) override;
   std::optional<FuseAnswer> ioctl(FuseOpen open, const FuseIoctl& call) override;
@@ -50,10 +50,15 @@ class HidrawNode final : public FuseNode, private HidHost {
     FuseRequest request;
     std::size_t size;
   };
+  struct ParkedWrite {
+    FuseRequest request;
+    Report report;
+  };
   struct Open {
     std::deque<Report> waiting;
     std::deque<ParkedRead> parked;
-    bool announced = false;  ///< pollers know of the reports that wait
+    std::deque<ParkedWrite> writes;  ///< of which the device takes none now
+    bool announced = false;          ///< pollers know of the reports that wait
     bool gone = false;
   };
 
@@ -61,6 +66,7 @@ class HidrawNode final : public FuseNode, private HidHost {
   void hear(std::span<const std::uint8_t> report) override;
   void plugged(bool in) override;
   void deliver();
+  void take_writes(Open& open);
 
   WoodenHid arm_;
   FuseReplies* replies_ = nullptr;

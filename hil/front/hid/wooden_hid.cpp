@@ -53,6 +53,9 @@ void WoodenHid::catch_up(HidHost& host) {
       },
       [] {});
   script_.run(time_.cycle(), [&](UsbFault fault) {
+    if (fault == UsbFault::deaf) {
+      deaf_until_ = time_.cycle() + kUsbFaultFrames * kCyclesPerUsbFrame;
+    }
     if (fault != UsbFault::vanish && fault != UsbFault::back) return;
     present_ = fault == UsbFault::back;
     host.plugged(present_);

@@ -53,6 +53,8 @@ class WoodenHid {
   /// An output report as a program writes it: its number, 0, then its bytes.
   void out(std::span<const std::uint8_t> report) noexcept;
 
+  /// It takes nothing now.
+  [[nodiscard]] bool deaf() const noexcept { return time_.cycle() < deaf_until_; }
   [[nodiscard]] bool present() const noexcept { return present_; }
   [[nodiscard]] const UsbTime& time() const noexcept { return time_; }
   /// Reports of the device, heard or not.
@@ -65,6 +67,7 @@ class WoodenHid {
   UsbFaultScript script_;
   UsbTime time_;
   bool present_ = true;
+  std::int64_t deaf_until_ = 0;
   std::uint64_t reports_ = 0;
 };
 

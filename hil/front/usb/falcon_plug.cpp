@@ -7,7 +7,6 @@
 namespace kerf {
 namespace {
 
-constexpr int kFaultFrames = 100;
 constexpr std::uint8_t kToEndpoint = 0x02;    // bmRequestType (USB 2.0, 9.4)
 constexpr std::uint8_t kClearFeature = 0x01;  // value 0: ENDPOINT_HALT
 
@@ -42,9 +41,9 @@ void FalconPlug::strike(UsbFault fault, UsbHost& host) {
       halted_ = true;
       return;
     case UsbFault::split:
-      return chip_.slow_down(kFaultFrames);
+      return chip_.slow_down(kUsbFaultFrames);
     case UsbFault::deaf:
-      deaf_until_ = chip_.time().cycle() + kFaultFrames * kCyclesPerUsbFrame;
+      deaf_until_ = chip_.time().cycle() + kUsbFaultFrames * kCyclesPerUsbFrame;
       return;
     case UsbFault::vanish:
     case UsbFault::back:

@@ -12,10 +12,13 @@ namespace kerf {
 enum class UsbFault : std::uint8_t {
   stall,   ///< the endpoint that is read halts until the host clears it (Falcon)
   split,   ///< for 0.1 s the serial line is slow: packets come in pieces (Falcon)
-  deaf,    ///< for 0.1 s it takes nothing: what the host writes has to wait (Falcon on usbfs)
+  deaf,    ///< for 0.1 s it takes nothing: what the host writes has to wait (FUSE nodes)
   vanish,  ///< unplugged
   back,    ///< plugged in again, without power having been lost
 };
+
+/// How long one lasts that passes by itself.
+inline constexpr int kUsbFaultFrames = 100;
 
 struct ScriptedUsbFault {
   std::int64_t cycle = 0;  ///< of 125 us, counted from the begin

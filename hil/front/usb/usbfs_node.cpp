@@ -137,6 +137,7 @@ int UsbfsNode::give_up_interface(FuseOpen id) {
 int UsbfsNode::clear_halt(const FuseIoctl& call) {
   const auto endpoint = argument<std::uint32_t>(call);
   if (!endpoint) return -EFAULT;
+  if (*endpoint == falcon::kEndpointIn && reader()) ++rash_clears_;
   return plug_.clear_halt(*endpoint) ? 0 : -ENOENT;
 }
 

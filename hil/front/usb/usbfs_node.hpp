@@ -44,6 +44,9 @@ class UsbfsNode final : public FuseNode, private UsbHost {
 
   /// Somebody had transfers, and nobody has the node open any more.
   [[nodiscard]] bool left() const noexcept { return used_ && opens_.empty(); }
+  /// Times that an endpoint was freed while reads waited there, which the kernel does not allow
+  /// (usb_clear_halt): what becomes of them is up to its controller.
+  [[nodiscard]] int rash_clears() const noexcept { return rash_clears_; }
   [[nodiscard]] const FtdiFalcon& chip() const noexcept { return plug_.chip(); }
 
  private:
@@ -94,6 +97,7 @@ class UsbfsNode final : public FuseNode, private UsbHost {
   std::optional<FuseOpen> claimed_by_;
   std::vector<std::uint8_t> answer_;
   bool used_ = false;
+  int rash_clears_ = 0;
 };
 
 }  // namespace kerf

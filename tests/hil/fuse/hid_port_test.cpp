@@ -2,9 +2,15 @@
 // The WoodenHaptics driver with hidapi itself above the emulated node: calibration, force, faults.
 #include "controller/device/hid_port.hpp"
 
+#include <algorithm>
 #include <array>
+#include <atomic>
+#include <chrono>
+#include <functional>
 #include <span>
 #include <string>
+#include <thread>
+#include <vector>
 
 #include <doctest/doctest.h>
 
@@ -18,6 +24,32 @@ using kerf::UsbFault;
 using kerf::test::kGoOn;
 using kerf::test::MountedArm;
 using kerf::test::ServoSession;
+
+namespace {
+
+/// Never answers; notes how many ticks ago each command was made.
+class ListeningDevice final : public kerf::PacketDevice {
+ public:
+  void receive(std::span<const std::uint8_t> packet) noexcept override {
+    const auto command = kerf::wooden::decode_command(packet);
+    if (!command) return;
+    const int tick = command->milliamps[0];
+    ages.push_back(newest - tick);
+    longest_gap = std::max(longest_gap, tick - last_);
+    last_ = tick;
+  }
+  void advance(int /*cycles*/) noexcept override {}
+  std::span<const std::uint8_t> next_packet() noexcept override { return {}; }
+
+  std::atomic<int> newest{0};  ///< tick of the host
+  std::vector<int> ages;
+  int longest_gap = 0;
+
+ private:
+  int last_ = 0;
+};
+
+}  // namespace
 
 TEST_CASE("hid: from the calibration button to a force, with short and with long reports") {
   for (const std::size_t bytes : {std::size_t{14}, std::size_t{64}}) {
@@ -41,8 +73,8 @@ TEST_CASE("hid: from the calibration button to a force, with short and with long
   }
 }
 
-TEST_CASE("hid: neither a read, nor a write, nor a read of nothing allocates") {
-  const MountedArm arm;
+TEST_CASE("hid: no read, no write, no read of nothing, no loss of the arm allocates in the servo") {
+  const MountedArm arm({.script = {{500, UsbFault::vanish}}});
   HidPort port(arm.path(), 0, kGoOn);
   const auto command = encode(kerf::WoodenCommand{});
   std::array<std::uint8_t, 65> packet{};
@@ -55,20 +87,50 @@ TEST_CASE("hid: neither a read, nor a write, nor a read of nothing allocates") {
       if (port.wait(100)) received += port.receive(packet) == 14 ? 1 : 0;
       empty += port.receive(packet) == 0 ? 1 : 0;
     }
+    for (int i = 0; i < 2000 && !port.closed(); ++i) {
+      port.send(std::span(command).first(14));
+      if (port.wait(1)) static_cast<void>(port.receive(packet));
+    }
   }
+  CHECK(port.closed());
   CHECK(kerf::CountedAllocations::total() == before);
   CHECK(received > 190);
   CHECK(empty > 100);
 }
 
+TEST_CASE("hid: a device that took nothing for a while gets what was on its way, then the newest") {
+  ListeningDevice device;
+  kerf::test::ServedNode<kerf::HidrawNode> served(
+      "hidraw0", kerf::test::become_device,
+      kerf::WoodenHid::Settings{.script = kerf::test::at_ms({{100, UsbFault::deaf}})}, device);
+  {
+    HidPort port(served.path(), 0, kGoOn);
+    std::thread([&] {
+      static_cast<void>(kerf::make_real_time(80, -1));
+      for (std::int16_t tick = 1; tick <= 300; ++tick) {
+        device.newest = tick;
+        const kerf::WoodenCommand command{.milliamps = {tick, 0, 0}, .set_encoders = {}};
+        CHECK(port.send(std::span<const std::uint8_t>(encode(command)).first(14)));
+        std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      }
+    }).join();
+  }
+  served.stop();
+  std::ranges::sort(device.ages, std::greater<>{});
+  REQUIRE(device.ages.size() > 2);
+  CHECK(device.longest_gap > 20);  // ticks that went on while it heard nothing: 100 as a rule
+  CHECK(device.ages[0] >= device.longest_gap - 2);  // in the kernel's hands all the while
+  CHECK(device.ages[1] < device.longest_gap / 2);
+}
+
 TEST_CASE("hid: an unplugged arm closes the port, and the motors are not asked for any more") {
-  MountedArm arm({.script = {{4500, UsbFault::vanish}}});
+  MountedArm arm({.script = {{2200, UsbFault::vanish}}});
   HidPort port(arm.path(), 0, kGoOn);
   ServoSession session(Personality::woodenhaptics, port);
   const auto course = session.run(8000, [&](const auto&) { return port.closed(); });
   CHECK(port.closed());
   CHECK(course.motors > 100);
-  CHECK(course.ticks < 6000);
+  CHECK(course.ticks < 3700);
   const auto after = session.run(100);
   CHECK(after.fresh == 0);
   CHECK(after.stale_with_motors == 0);
