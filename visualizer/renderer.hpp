@@ -12,6 +12,7 @@
 #include "visualizer/gl/target.hpp"
 #include "visualizer/scene_view.hpp"
 #include "visualizer/sight_reach.hpp"
+#include "visualizer/surface/volume_samples.hpp"
 #include "visualizer/volume_on_gpu.hpp"
 
 namespace kerf {
@@ -43,6 +44,12 @@ class Renderer {
   [[nodiscard]] virtual std::vector<VoxelBox> looks_different(
       std::size_t volume, std::span<const VoxelBox> differs) const;
   [[nodiscard]] virtual SightReach reach() const noexcept;
+  /// The same of a renderer that draws a mesh: triangles that came, went or look different; rays
+  /// that meet none of them show what they showed.
+  [[nodiscard]] virtual std::span<const FineTriangle> different_triangles(
+      std::size_t /*volume*/) const {
+    return {};
+  }
   /// Shades from the gradient that the scene names; else always from `Gradient::corners`.
   [[nodiscard]] virtual bool takes_gradient() const noexcept { return true; }
   /// Lets what lies behind a surface shine through, so that it must be drawn before.

@@ -10,12 +10,14 @@
 #include "visualizer/cast/cast_eye.hpp"
 #include "visualizer/changed_cells.hpp"
 #include "visualizer/screen_bounds.hpp"
+#include "visualizer/stale_triangles.hpp"
 
 namespace kerf {
 
 namespace {
 
-constexpr std::size_t kMostBoxes = 8192;  // some cuts between two pictures; more count as one
+constexpr std::size_t kMostBoxes = 8192;       // some cuts between two pictures; more count as one
+constexpr std::size_t kMostTriangles = 65536;  // likewise
 // Voxels around boxes that are looked at together: a cut. Between boxes far apart is only air, and
 // in a larger one little to be left out.
 constexpr std::size_t kMostTogether = 64 * 64 * 64;
@@ -29,6 +31,17 @@ VoxelBox united(std::span<const VoxelBox> boxes) {
 void add_to(std::vector<VoxelBox>& boxes, std::span<const VoxelBox> more) {
   boxes.insert(boxes.end(), more.begin(), more.end());
   if (boxes.size() > kMostBoxes) boxes = {united(boxes)};
+}
+
+VoxelBox voxels_around(std::span<const FineTriangle> triangles) {
+  VoxelBox all;
+  for (const FineTriangle& triangle : triangles) {
+    for (const FinePoint& corner : triangle) {
+      const VoxelIndex v = VolumeSamples::voxel_below(corner);
+      all = all.united({v, {v.x + 2, v.y + 2, v.z + 2}});
+    }
+  }
+  return all;
 }
 
 std::size_t voxels_in(const VoxelBox& box) {
@@ -114,11 +127,26 @@ void mark_where(StaleTiles& tiles, const PixelRect& within, const IsStale& is_st
 void StaleVolume::add(const Renderer& renderer, std::size_t index,
                       std::span<const VoxelBox> differs) {
   add_to(changed_, renderer.looks_different(index, differs));
+  const auto triangles = renderer.different_triangles(index);
+  triangles_.insert(triangles_.end(), triangles.begin(), triangles.end());
+  if (triangles_.size() <= kMostTriangles) return;
+  add_to(changed_, std::array{voxels_around(triangles_)});
+  triangles_.clear();
+}
+
+void StaleVolume::clear() {
+  changed_.clear();
+  triangles_.clear();
 }
 
 void StaleVolume::mark(StaleTiles& tiles, const Renderer& renderer, const VolumeView& volume,
                        std::span<const Density> density, const View& view,
                        const RenderTarget& kept) const {
+  if (!triangles_.empty()) {
+    const glm::dmat4 clip_from_voxel =
+        view.clip_from_eye() * view.eye_from_world * volume.world_from_voxel;
+    mark_triangles(tiles, triangles_, clip_from_voxel, kept);
+  }
   const SightReach reach = renderer.reach();
   const CastKernels& kernels = *cast_kernels()[0];
   const double feels_vox = reach.feels_ahead ? kLongestFeelerVox : 0.0;

@@ -15,7 +15,7 @@ class StaleVolume {
  public:
   /// Takes what the last `update` of volume `index` changed: densities in `differs`.
   void add(const Renderer& renderer, std::size_t index, std::span<const VoxelBox> differs);
-  void clear() { changed_.clear(); }
+  void clear();
 
   /// `density` is all of the volume as it is now; `kept` holds the picture with its depth, of the
   /// volumes alone where `renderer` is opaque.
@@ -23,7 +23,8 @@ class StaleVolume {
             std::span<const Density> density, const View& view, const RenderTarget& kept) const;
 
  private:
-  std::vector<VoxelBox> changed_;  ///< `Renderer::looks_different`
+  std::vector<VoxelBox> changed_;        ///< `Renderer::looks_different`
+  std::vector<FineTriangle> triangles_;  ///< `Renderer::different_triangles`
 };
 
 }  // namespace kerf

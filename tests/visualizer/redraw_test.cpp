@@ -206,6 +206,34 @@ TEST_CASE("after any change the part that is drawn again makes the picture of dr
   }
 }
 
+TEST_CASE("so it does after more changes than are told apart") {
+  if (!have_gl()) return;
+  const Place place;
+  for (const char* kind : {"surface", "cast"}) {
+    CAPTURE(std::string(kind));
+    std::mt19937 random(3);
+    const auto below = [&](int n) { return static_cast<int>(random() % static_cast<unsigned>(n)); };
+    Controller controller;
+    Session session("redraw");
+    session.poll();
+    Picture picture(session, {.renderer = kind}, 4.0 / 3.0);
+    const RenderTarget target({96, 72});
+    static_cast<void>(picture.draw(session, {}, target));
+    for (int cut = 0; cut < 300; ++cut) {
+      const VoxelIndex at{below(40), below(40), below(28)};
+      controller.cut(static_cast<std::size_t>(below(2)), {at, {at.x + 5, at.y + 5, at.z + 5}}, 0.4);
+      session.poll();
+      picture.update(session);
+    }
+    static_cast<void>(picture.draw(session, {}, target));
+    const auto seen = target.read_rgb();
+    picture.redraw_all();
+    static_cast<void>(picture.draw(session, {}, target));
+    const bool same = seen == target.read_rgb();
+    CHECK(same);
+  }
+}
+
 TEST_CASE("so it does with any gradient") {
   if (!have_gl()) return;
   const Place place;

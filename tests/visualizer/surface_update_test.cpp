@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // Meshes that follow cuts, against meshes made afresh.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <random>
+#include <span>
+#include <utility>
 
 #include <doctest/doctest.h>
 
@@ -53,6 +56,26 @@ std::vector<std::uint32_t> cut(TestVolume& volume, glm::dvec3 centre_mm, double 
 glm::dvec3 random_direction(std::mt19937& random) {
   std::normal_distribution<double> part;
   return glm::normalize(glm::dvec3(part(random), part(random), part(random)));
+}
+
+/// Triangles of a mesh of `block` that another one of it does not have, with the same look, and
+/// that are not among `told`.
+int untold(const BlockMesh& mesh, const BlockMesh& other, VoxelIndex block,
+           std::span<const FineTriangle> told) {
+  const auto corners = [](const BlockMesh& of, const BlockTriangle& triangle) {
+    return std::array{of.vertices[triangle[0]], of.vertices[triangle[1]], of.vertices[triangle[2]]};
+  };
+  const VoxelIndex start = block_start(block);
+  return static_cast<int>(
+      std::count_if(mesh.triangles.begin(), mesh.triangles.end(), [&](const auto& triangle) {
+        const auto seen = corners(mesh, triangle);
+        const bool stays =
+            std::any_of(other.triangles.begin(), other.triangles.end(),
+                        [&](const auto& one) { return corners(other, one) == seen; });
+        const FineTriangle place{fine_place(seen[0], start), fine_place(seen[1], start),
+                                 fine_place(seen[2], start)};
+        return !stays && std::find(told.begin(), told.end(), place) == told.end();
+      }));
 }
 
 }  // namespace
@@ -118,6 +141,8 @@ TEST_CASE("after rough edits an update equals a fresh mesh, coloured by labels o
     const auto pick = [&](int n) { return std::uniform_int_distribution<int>(0, n - 1)(random); };
     int wrong = 0;
     int told_wrong = 0;
+    int triangles_untold = 0;
+    std::size_t triangles_told = 0;
     for (int i = 0; i < 60; ++i) {
       const int value = i % 3 == 0 ? 65535 : i % 3 == 1 ? 0 : -1;  // regrows, cuts, noise
       const auto changed = edit(volume, {pick(grid.nx), pick(grid.ny), pick(grid.nz)}, pick(6),
@@ -131,11 +156,20 @@ TEST_CASE("after rough edits an update equals a fresh mesh, coloured by labels o
       // What it tells to be another mesh now is all of that and nothing else.
       std::vector<std::uint32_t> really;
       for (std::uint32_t id = 0; id < before.size(); ++id) {
-        if (before[id] != surface.meshes()[id]) really.push_back(id);
+        if (before[id] == surface.meshes()[id]) continue;
+        really.push_back(id);
+        for (const auto& [one, other] : {std::pair(&before[id], &surface.meshes()[id]),
+                                         std::pair(&surface.meshes()[id], &before[id])}) {
+          triangles_untold +=
+              untold(*one, *other, surface.block(id), surface.different_triangles());
+        }
       }
+      triangles_told = std::max(triangles_told, surface.different_triangles().size());
       told_wrong += std::equal(told.begin(), told.end(), really.begin(), really.end()) ? 0 : 1;
     }
     CHECK(wrong == 0);
     CHECK(told_wrong == 0);
+    CHECK(triangles_untold == 0);
+    CHECK(triangles_told > 0);
   }
 }

@@ -5,7 +5,6 @@
 #include <bit>
 #include <cstring>
 #include <functional>
-#include <iterator>
 #include <utility>
 
 #include "visualizer/surface/cube_cases.hpp"
@@ -158,33 +157,58 @@ unsigned place_in_order(const SurfaceVertex& vertex) {
 
 }  // namespace
 
-bool DifferentParts::append_to(std::vector<VoxelBox>& boxes) const {
-  const std::size_t before = boxes.size();
-  std::copy_if(around_.begin(), around_.end(), std::back_inserter(boxes),
-               [](const VoxelBox& around) { return !around.empty(); });
-  return boxes.size() != before;
+void DifferentCells::add(const SurfaceVertex& vertex) noexcept {
+  // By axis the first and the last cell; along the edge both are the same.
+  std::array<unsigned, 3> first{}, last{};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const unsigned at = vertex.position[axis];
+    last[axis] = std::min(at >> kFineLog2, unsigned{kBlockEdge - 1});
+    first[axis] = at == 0 ? 0 : (at - 1) >> kFineLog2;
+  }
+  const auto row = static_cast<std::uint8_t>(1U << first[0] | 1U << last[0]);
+  for (unsigned z = first[2]; z <= last[2]; ++z) {
+    for (unsigned y = first[1]; y <= last[1]; ++y) rows_[z][y] |= row;
+  }
 }
 
-DifferentParts difference(const BlockMesh& before, const BlockMesh& now, VoxelIndex block) {
-  DifferentParts parts(block);
-  if (before == now) return parts;
+bool DifferentCells::any() const noexcept {
+  return rows_ != DifferentCells{}.rows_;
+}
+
+void DifferentCells::append_triangles(const BlockMesh& mesh, VoxelIndex block,
+                                      std::vector<FineTriangle>& to) const {
+  if (!any()) return;
   const VoxelIndex start = block_start(block);
-  const auto add = [&](const SurfaceVertex& vertex) {
-    parts.add(VolumeSamples::voxel_below(fine_place(vertex, start)));
-  };
+  for (const BlockTriangle& triangle : mesh.triangles) {
+    const SurfaceVertex* corner[3];
+    for (std::size_t i = 0; i < 3; ++i) corner[i] = &mesh.vertices[triangle[i]];
+    const auto cell = [&](std::size_t axis) {  // that holds the middle
+      const int sum =
+          corner[0]->position[axis] + corner[1]->position[axis] + corner[2]->position[axis];
+      return static_cast<unsigned>(sum / (3 * kFinePerVoxel));
+    };
+    if ((rows_[cell(2)][cell(1)] >> cell(0) & 1) == 0) continue;
+    to.push_back({fine_place(*corner[0], start), fine_place(*corner[1], start),
+                  fine_place(*corner[2], start)});
+  }
+}
+
+DifferentCells difference(const BlockMesh& before, const BlockMesh& now) {
+  DifferentCells cells;
+  if (before == now) return cells;
   // Vertices come and go; those of both have the same order.
   auto old = before.vertices.begin();
   const auto is_next = [&](auto&& compare, const SurfaceVertex& vertex) {
     return old != before.vertices.end() && compare(place_in_order(*old), place_in_order(vertex));
   };
   for (const SurfaceVertex& vertex : now.vertices) {
-    while (is_next(std::less<>(), vertex)) add(*old++);
+    while (is_next(std::less<>(), vertex)) cells.add(*old++);
     const bool stays = is_next(std::equal_to<>(), vertex);
-    if (!stays || *old != vertex) add(vertex);
+    if (!stays || *old != vertex) cells.add(vertex);
     if (stays) ++old;
   }
-  std::for_each(old, before.vertices.end(), add);
-  return parts;
+  std::for_each(old, before.vertices.end(), [&](const SurfaceVertex& gone) { cells.add(gone); });
+  return cells;
 }
 
 BlockMesh extract_block(const SurfaceSource& source, VoxelIndex block) {

@@ -38,11 +38,17 @@ struct SurfaceVertex {
   return FinePoint(start.x, start.y, start.z) * kFinePerVoxel + FinePoint(at[0], at[1], at[2]);
 }
 
+/// Vertices by number, counter-clockwise from the air.
+using BlockTriangle = std::array<std::uint16_t, 3>;
+/// At most one on each edge of its cells.
+inline constexpr std::size_t kMostBlockVertices =
+    std::size_t{3} * kBlockEdge * (kBlockEdge + 1) * (kBlockEdge + 1);
+
 /// The surface within one block. A cube edge that the surface cuts has one vertex; blocks that meet
 /// have equal vertices on the face between them.
 struct BlockMesh {
   std::vector<SurfaceVertex> vertices;
-  std::vector<std::array<std::uint16_t, 3>> triangles;  ///< counter-clockwise from the air
+  std::vector<BlockTriangle> triangles;
   friend bool operator==(const BlockMesh&, const BlockMesh&) = default;
 };
 
@@ -57,35 +63,23 @@ struct SurfaceSource {
   Gradient gradient = Gradient::corners;  ///< of the normals
 };
 
-/// Boxes of voxels at the triangles of a block that look different: one for each 2^3 voxels of it,
-/// so that together they follow their shape.
-class DifferentParts {
+/// Cells of a block in which triangles came, went or look different.
+class DifferentCells {
  public:
-  explicit DifferentParts(VoxelIndex block) : start_(block_start(block)) {}
-
-  /// The triangles that share a vertex on an edge from `voxel` on.
-  void add(VoxelIndex voxel) noexcept {
-    const auto part = [](std::int32_t at, std::int32_t start) { return (at - start) / kPartEdge; };
-    VoxelBox& around = around_[static_cast<std::size_t>(
-        (part(voxel.z, start_.z) * kParts + part(voxel.y, start_.y)) * kParts +
-        part(voxel.x, start_.x))];
-    around = around.united(VoxelBox{voxel, {voxel.x + 1, voxel.y + 1, voxel.z + 1}});
-  }
-  /// Adds what is not empty to `boxes`; whether there was anything.
-  bool append_to(std::vector<VoxelBox>& boxes) const;
+  /// The cells around the edge that this vertex stands on.
+  void add(const SurfaceVertex& vertex) noexcept;
+  [[nodiscard]] bool any() const noexcept;
+  /// Appends the triangles of a mesh of `block` that lie in these cells.
+  void append_triangles(const BlockMesh& mesh, VoxelIndex block,
+                        std::vector<FineTriangle>& to) const;
 
  private:
-  static constexpr std::int32_t kPartEdge = 2;
-  /// Edges begin on the voxels at both ends of a block.
-  static constexpr std::int32_t kParts = kBlockEdge / kPartEdge + 1;
-
-  VoxelIndex start_;
-  std::array<VoxelBox, std::size_t{kParts} * kParts * kParts> around_;
+  /// Bit x of rows_[z][y]. No triangle lies between two cells (cube_cases.hpp).
+  std::array<std::array<std::uint8_t, kBlockEdge>, kBlockEdge> rows_{};
 };
 
-/// What looks different in one mesh of a block and in another.
-[[nodiscard]] DifferentParts difference(const BlockMesh& before, const BlockMesh& now,
-                                        VoxelIndex block);
+/// Where two meshes of a block differ.
+[[nodiscard]] DifferentCells difference(const BlockMesh& before, const BlockMesh& now);
 
 /// A pure function of the volume; any thread. Positions and triangles depend on the block's own
 /// voxels, the rest of a vertex on the voxels around it: see SurfaceLook.

@@ -85,34 +85,50 @@ void SurfaceOnGpu::update(const VolumeSurface& surface, std::span<const std::uin
         vertex_pool_.fit(part.vertices, static_cast<std::uint32_t>(mesh.vertices.size()));
     part.triangles = triangle_pool_.fit(part.triangles, part.count);
   }
-  if (vertices_.reserve(vertex_pool_.size() * sizeof(SurfaceVertex))) {
-    glVertexArrayVertexBuffer(array_.id(), kVertexBinding, vertices_.id(), 0,
-                              sizeof(SurfaceVertex));
-  }
-  constexpr std::size_t kTriangleBytes = sizeof(BlockMesh::triangles[0]);
-  if (triangles_.reserve(triangle_pool_.size() * kTriangleBytes)) {
-    glVertexArrayElementBuffer(array_.id(), triangles_.id());
-  }
+  grow();
   for (const std::uint32_t id : blocks) {
     const BlockMesh& mesh = surface.meshes()[id];
     if (mesh.triangles.empty()) continue;
     const Part& part = parts_[id];
     vertices_.write(part.vertices.first * sizeof(SurfaceVertex),
                     mesh.vertices.size() * sizeof(SurfaceVertex), mesh.vertices.data());
-    triangles_.write(part.triangles.first * kTriangleBytes, part.count * kTriangleBytes,
-                     mesh.triangles.data());
+    triangles_.write(part.triangles.first * sizeof(BlockTriangle),
+                     part.count * sizeof(BlockTriangle), mesh.triangles.data());
   }
 }
 
-void SurfaceOnGpu::draw(const Sight& sight) {
+void SurfaceOnGpu::grow() {
+  if (vertices_.reserve(vertex_pool_.size() * sizeof(SurfaceVertex))) {
+    glVertexArrayVertexBuffer(array_.id(), kVertexBinding, vertices_.id(), 0,
+                              sizeof(SurfaceVertex));
+  }
+  if (triangles_.reserve(triangle_pool_.size() * sizeof(BlockTriangle))) {
+    glVertexArrayElementBuffer(array_.id(), triangles_.id());
+  }
+}
+
+void SurfaceOnGpu::draw(const VolumeSurface& surface, const Sight& sight) {
   commands_.clear();
+  picked_.clear();
+  of_picked_.clear();
   for (const std::uint32_t id : filled_) {
     const Part& part = parts_[id];
-    if (!sight.may_show(part.bounds)) continue;
-    commands_.push_back(
-        {part.count * kIndices, 1, part.triangles.first * kIndices, part.vertices.first, id});
+    const Sight::Shown shown = sight.shown(part.bounds);
+    if (shown == Sight::Shown::nothing) continue;
+    Command command{part.count * kIndices, 1, part.triangles.first * kIndices, part.vertices.first,
+                    id};
+    if (shown == Sight::Shown::some) {
+      const std::size_t before = picked_.size();
+      sight.append_seen(surface.meshes()[id], part.bounds, surface.block(id), picked_);
+      if (picked_.size() == before) continue;
+      command.indices = static_cast<std::uint32_t>(picked_.size() - before) * kIndices;
+      command.first_index = static_cast<std::uint32_t>(before) * kIndices;
+      of_picked_.push_back(commands_.size());
+    }
+    commands_.push_back(command);
   }
   if (commands_.empty()) return;
+  upload_picked();
   glNamedBufferData(command_buffer_.id(),
                     static_cast<GLsizeiptr>(commands_.size() * sizeof(Command)), commands_.data(),
                     GL_STREAM_DRAW);
@@ -121,6 +137,17 @@ void SurfaceOnGpu::draw(const Sight& sight) {
   glMultiDrawElementsIndirect(GL_TRIANGLES, GL_UNSIGNED_SHORT, nullptr,
                               static_cast<GLsizei>(commands_.size()), 0);
   glBindBuffer(GL_DRAW_INDIRECT_BUFFER, 0);
+}
+
+void SurfaceOnGpu::upload_picked() {
+  if (picked_.empty()) return;
+  picked_range_ = triangle_pool_.fit(picked_range_, static_cast<std::uint32_t>(picked_.size()));
+  grow();
+  triangles_.write(picked_range_.first * sizeof(BlockTriangle),
+                   picked_.size() * sizeof(BlockTriangle), picked_.data());
+  for (const std::size_t i : of_picked_) {
+    commands_[i].first_index += picked_range_.first * kIndices;
+  }
 }
 
 }  // namespace kerf

@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "visualizer/gl/names.hpp"
-#include "visualizer/surface/block_bounds.hpp"
 #include "visualizer/surface/range_pool.hpp"
+#include "visualizer/surface/sight.hpp"
 #include "visualizer/surface/volume_surface.hpp"
 
 namespace kerf {
@@ -26,6 +26,9 @@ class GrowingBuffer {
 
 /// The meshes of one volume in the memory of the GPU: all vertices in one buffer, all triangles in
 /// another, drawn by one call.
+///
+/// Of a block that shows only in parts of the picture the triangles in sight are picked and
+/// uploaded at each draw: to pick one costs far less than to draw it in software.
 class SurfaceOnGpu {
  public:
   explicit SurfaceOnGpu(const VolumeSurface& surface);
@@ -33,8 +36,9 @@ class SurfaceOnGpu {
   /// Uploads these blocks again, and nothing else.
   void update(const VolumeSurface& surface, std::span<const std::uint32_t> blocks);
 
-  /// Draws the blocks that may be in sight, with the program in use; attributes as in surface.vert.
-  void draw(const Sight& sight);
+  /// Draws what may be in sight of the surface that was uploaded last, with the program in use;
+  /// attributes as in surface.vert.
+  void draw(const VolumeSurface& surface, const Sight& sight);
 
  private:
   struct Part {
@@ -48,6 +52,11 @@ class SurfaceOnGpu {
     std::uint32_t indices, instances, first_index, base_vertex, base_instance;
   };
 
+  /// Room for all that the pools hold.
+  void grow();
+  /// And lets the commands of `of_picked_` read from there.
+  void upload_picked();
+
   std::vector<Part> parts_;            ///< by block
   std::vector<std::uint32_t> filled_;  ///< blocks with triangles, ascending: few of all
   RangePool vertex_pool_;
@@ -56,6 +65,9 @@ class SurfaceOnGpu {
   GrowingBuffer triangles_;
   GlBuffer starts_ = GlBuffer::create();  ///< block indices, the instance attribute
   std::vector<Command> commands_;
+  std::vector<BlockTriangle> picked_;   ///< of blocks that are not drawn whole
+  std::vector<std::size_t> of_picked_;  ///< commands that draw them
+  RangePool::Range picked_range_;
   GlBuffer command_buffer_ = GlBuffer::create();
   GlVertexArray array_ = GlVertexArray::create();
 };

@@ -46,12 +46,6 @@ void SurfaceRenderer::place(std::size_t volume, const glm::dmat4& world_from_vox
   volumes_[volume].world_from_voxel = world_from_voxel;
 }
 
-std::vector<VoxelBox> SurfaceRenderer::looks_different(
-    std::size_t volume, std::span<const VoxelBox> /*differs*/) const {
-  const auto boxes = volumes_[volume].surface.looks_different();
-  return {boxes.begin(), boxes.end()};
-}
-
 void SurfaceRenderer::draw(const View& view, const RenderTarget& target) {
   target.bind();
   glEnable(GL_DEPTH_TEST);
@@ -71,7 +65,7 @@ void SurfaceRenderer::draw(const View& view, const RenderTarget& target) {
                  glm::mat3(glm::inverseTranspose(glm::dmat3(eye_from_voxel))));
     std::optional<glm::dvec3> eye_voxel;
     if (!opened) eye_voxel = glm::dvec3(glm::affineInverse(eye_from_voxel)[3]);
-    volume.gpu.draw(Sight(view.clip_from_eye() * eye_from_voxel, eye_voxel, parts));
+    volume.gpu.draw(volume.surface, Sight(view.clip_from_eye() * eye_from_voxel, eye_voxel, parts));
   }
   glDisable(GL_CULL_FACE);
   glDisable(GL_CLIP_DISTANCE0);

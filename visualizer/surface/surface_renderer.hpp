@@ -25,11 +25,15 @@ class SurfaceRenderer final : public Renderer {
               std::span<const std::uint32_t> changed) override;
   void place(std::size_t volume, const glm::dmat4& world_from_voxel) override;
   void draw(const View& view, const RenderTarget& target) override;
-  /// The meshes tell exactly.
+  /// Its triangles tell.
   [[nodiscard]] std::vector<VoxelBox> looks_different(
-      std::size_t volume, std::span<const VoxelBox> differs) const override;
-  /// To the ends of the edges that triangles with one vertex in common run between.
-  [[nodiscard]] SightReach reach() const noexcept override { return {.along = 3}; }
+      std::size_t /*volume*/, std::span<const VoxelBox> /*differs*/) const override {
+    return {};
+  }
+  [[nodiscard]] std::span<const FineTriangle> different_triangles(
+      std::size_t volume) const override {
+    return volumes_[volume].surface.different_triangles();
+  }
 
  private:
   struct Volume {

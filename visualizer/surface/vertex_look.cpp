@@ -110,13 +110,13 @@ void dress(SurfaceVertex& vertex, const SurfaceSource& source, VoxelIndex start,
   vertex.openness = unit16(source.look->openness(source.volume, at, inward));
 }
 
-DifferentParts update_look(const SurfaceSource& source, VoxelIndex block, const VoxelBox& changed,
+DifferentCells update_look(const SurfaceSource& source, VoxelIndex block, const VoxelBox& changed,
                            BlockMesh& mesh) {
   const VoxelIndex start = block_start(block);
   const VoxelBox colours = changed.grown(SurfaceLook::kColourReachVox);
   const VoxelBox all = changed.grown(SurfaceLook::kOpennessReachVox);
   std::optional<Neighbourhood> near;
-  DifferentParts parts(block);
+  DifferentCells cells;
   for (SurfaceVertex& vertex : mesh.vertices) {
     const SurfaceVertex before = vertex;
     const FinePoint at = fine_place(vertex, start);
@@ -130,9 +130,9 @@ DifferentParts update_look(const SurfaceSource& source, VoxelIndex block, const 
       if (!SurfaceLook::openness_depends_on(changed, at, inward)) continue;
       vertex.openness = unit16(source.look->openness(source.volume, at, inward));
     }
-    if (vertex != before) parts.add(voxel);
+    if (vertex != before) cells.add(vertex);
   }
-  return parts;
+  return cells;
 }
 
 }  // namespace kerf

@@ -12,9 +12,8 @@ void dress(SurfaceVertex& vertex, const SurfaceSource& source, VoxelIndex start,
            const Neighbourhood& near);
 
 /// What `extract_block` would give when only voxels in `changed` are others, and none of the
-/// block's own: dresses those vertices again that depend on them. Returns what looks
-/// different.
-DifferentParts update_look(const SurfaceSource& source, VoxelIndex block, const VoxelBox& changed,
+/// block's own: dresses those vertices again that depend on them. Returns where it looks different.
+DifferentCells update_look(const SurfaceSource& source, VoxelIndex block, const VoxelBox& changed,
                            BlockMesh& mesh);
 
 }  // namespace kerf

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 
@@ -13,6 +14,8 @@ namespace kerf {
 /// A place in a volume: voxel coordinates in steps of 1/4096. Whole numbers, so that two bricks
 /// that meet compute the same place on every machine.
 using FinePoint = glm::ivec3;
+/// Its corners.
+using FineTriangle = std::array<FinePoint, 3>;
 inline constexpr int kFineLog2 = 12;
 inline constexpr int kFinePerVoxel = 1 << kFineLog2;
 

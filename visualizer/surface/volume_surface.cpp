@@ -118,21 +118,24 @@ std::span<const std::uint32_t> VolumeSurface::update(std::span<const Density> de
   }
   std::sort(marked_.begin(), marked_.end());
   different_.clear();
-  looks_.clear();
+  different_triangles_.clear();
   const SurfaceSource from = source();
   for (const std::uint32_t id : marked_) {
     BlockMesh& mesh = meshes_[id];
     const Work work = std::exchange(work_[id], Work::none);
     if (work == Work::look && mesh.vertices.empty()) continue;
-    DifferentParts parts(block(id));
+    DifferentCells cells;
     if (work == Work::look) {
-      parts = update_look(from, block(id), all, mesh);
+      cells = update_look(from, block(id), all, mesh);
     } else {
       BlockMesh now = extract_block(from, block(id));
-      parts = difference(mesh, now, block(id));
+      cells = difference(mesh, now);
+      cells.append_triangles(mesh, block(id), different_triangles_);
       mesh = std::move(now);
     }
-    if (parts.append_to(looks_)) different_.push_back(id);
+    if (!cells.any()) continue;
+    cells.append_triangles(mesh, block(id), different_triangles_);
+    different_.push_back(id);
   }
   marked_.clear();
   return different_;

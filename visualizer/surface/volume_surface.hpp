@@ -30,8 +30,11 @@ class VolumeSurface {
   std::span<const std::uint32_t> update(std::span<const Density> density,
                                         std::span<const std::uint32_t> changed);
 
-  /// Boxes of voxels around all triangles that look different since the last `update`.
-  [[nodiscard]] std::span<const VoxelBox> looks_different() const noexcept { return looks_; }
+  /// What the last `update` took away, made, or gave another look: all triangles of the cells in
+  /// which there is any, as they were and as they are.
+  [[nodiscard]] std::span<const FineTriangle> different_triangles() const noexcept {
+    return different_triangles_;
+  }
 
   [[nodiscard]] const VoxelGrid& blocks() const noexcept { return blocks_; }
   [[nodiscard]] VoxelIndex block(std::uint32_t id) const noexcept;
@@ -58,7 +61,7 @@ class VolumeSurface {
   std::vector<Work> work_;                ///< by block; all none between calls
   std::vector<std::uint32_t> marked_;     ///< blocks with work
   std::vector<std::uint32_t> different_;  ///< what the last update returned
-  std::vector<VoxelBox> looks_;
+  std::vector<FineTriangle> different_triangles_;
 };
 
 }  // namespace kerf
