@@ -35,6 +35,7 @@ Scene block_scene(NumericKind numeric, CutModel cut) {
   scene.path = "calibration";
   scene.servo.numeric = numeric;
   scene.cut.model = cut;
+  if (cut == CutModel::preston) scene.force.model = ForceModel::proxy;
   SceneVolume& block = scene.volumes.emplace_back();
   block.name = "block";
   block.image.grid = {kEdge, kEdge, kEdge};
@@ -111,9 +112,15 @@ std::optional<double> Calibration::stage_us(const std::string& way, const StageC
 Calibration measure_calibration() {
   constexpr std::pair<NumericKind, CutModel> kScenes[] = {
       // together they have every stage
-      {NumericKind::fixed, CutModel::none},      {NumericKind::fixed, CutModel::overlap_exact},
-      {NumericKind::float32, CutModel::overlap}, {NumericKind::float32, CutModel::overlap_exact},
-      {NumericKind::float64, CutModel::overlap}, {NumericKind::float64, CutModel::overlap_exact}};
+      {NumericKind::fixed, CutModel::none},
+      {NumericKind::fixed, CutModel::overlap_exact},
+      {NumericKind::fixed, CutModel::preston},
+      {NumericKind::float32, CutModel::overlap},
+      {NumericKind::float32, CutModel::preston},
+      {NumericKind::float32, CutModel::overlap_exact},
+      {NumericKind::float64, CutModel::overlap},
+      {NumericKind::float64, CutModel::preston},
+      {NumericKind::float64, CutModel::overlap_exact}};
   std::map<std::string, std::vector<double>> prices;
   for (const auto& [numeric, cut] : kScenes) {
     Scene scene = block_scene(numeric, cut);

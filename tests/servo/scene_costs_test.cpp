@@ -249,7 +249,8 @@ TEST_CASE("every stage of every plan has a price, on machines of all kinds") {
     KernelSet set = kScalarSet;  // prices go by name
     set.name = name;
     const AlignedTool aligned(ball(10).offsets, kExactFarid, set);
-    for (const CutModel cut : {CutModel::none, CutModel::overlap, CutModel::overlap_exact}) {
+    for (const CutModel cut :
+         {CutModel::none, CutModel::overlap, CutModel::overlap_exact, CutModel::preston}) {
       CHECK(work_us(aligned_cost(aligned.table(), set, cut)) > 0);
       CHECK(work_us(splat_cost(set, cone, block, cut)) > 0);
       const bool gathers = cut == CutModel::none;  // fixed point, where nothing is cut
@@ -262,8 +263,10 @@ TEST_CASE("every stage of every plan has a price, on machines of all kinds") {
 
 TEST_CASE("every stage is timed, and does there no more than it is said to") {
   for (const auto numeric : {NumericKind::fixed, NumericKind::float32, NumericKind::float64}) {
-    for (const auto cut : {CutModel::none, CutModel::overlap, CutModel::overlap_exact}) {
+    for (const auto cut :
+         {CutModel::none, CutModel::overlap, CutModel::overlap_exact, CutModel::preston}) {
       Scene scene = half_space_scene(48);
+      if (cut == CutModel::preston) scene.force.model = ForceModel::proxy;
       scene.tools.push_back(shape("cone", 0.6, 2));
       scene.cut.model = cut;
       scene.cut.rate_per_s = 0;  // timed all the same
