@@ -38,6 +38,20 @@ SceneVolume blob(VoxelGrid grid, std::array<double, 3> spacing_mm, Pose pose) {
   return volume;
 }
 
+/// Shells of three materials around the middle.
+void label(VolumeImage& image) {
+  const VoxelGrid& grid = image.grid;
+  for (std::int32_t z = 0; z < grid.nz; ++z) {
+    for (std::int32_t y = 0; y < grid.ny; ++y) {
+      for (std::int32_t x = 0; x < grid.nx; ++x) {
+        const std::int32_t i = 2 * x - grid.nx, j = 2 * y - grid.ny, k = 2 * z - grid.nz;
+        const std::int32_t square = i * i + j * j + k * k;
+        image.labels.push_back(square > 700 ? 1 : (square > 550 ? 2 : 3));
+      }
+    }
+  }
+}
+
 /// Those samples of a grid of `side` per axis that `is_part` of the tool; half pitches.
 template <class Predicate>
 SceneTool tool_of(std::int32_t side, double pitch_mm, bool round, Predicate is_part) {
@@ -89,12 +103,19 @@ Scene golden_scene(GoldenScene which, NumericKind numeric) {
         make_tool("ball", "ball", {.pitch_mm = kVoxelMm, .size_vox = 6}),
         make_tool("shaft", "cylinder", {.pitch_mm = kVoxelMm, .radius_mm = 0.3, .length_mm = 1.5})};
     scene.force = {.model = ForceModel::proxy, .friction = 0.2};
+    label(scene.volumes[0].image);
+    scene.materials.resize(4);
+    scene.materials[2].machinability = 3;
+    scene.materials[3].forbidden = true;
+    scene.cut.machinability_mm3_per_s_n = 4;
   }
   scene.device.workspace_scale = 0.75;
   scene.device.offset_mm = {4.1875, 47.25, 60.375};  // the middle of the hand's way
   scene.device.torque_scale = std::array{0.342, 0.342, -0.342};
   scene.force.p0_n_per_mm2 = 12.0;  // of the paper's force
-  scene.cut.model = which == GoldenScene::mill ? CutModel::overlap_exact : CutModel::none;
+  scene.cut.model = which == GoldenScene::mill   ? CutModel::overlap_exact
+                    : which == GoldenScene::feel ? CutModel::none
+                                                 : CutModel::preston;
   scene.cut.rate_per_s = 6.0;
   scene.cut.p1_n_per_mm2 = 8.0;
   scene.limits.speed_mm_per_s = 2'000;
@@ -144,8 +165,11 @@ GoldenRun golden_run(GoldenScene which, NumericKind numeric, const KernelSet& ke
     if (which == GoldenScene::sweep) {
       for (const double mm : out.proxy_offset_mm) hash.add(mm);
       for (const double n_mm : out.tip_torque_n_mm) hash.add(n_mm);
+      for (const double part : {out.press_n, out.spindle_ratio, out.spindle_load}) hash.add(part);
+      hash.add(static_cast<std::uint64_t>(out.forbidden));
     }
     if (tick % 50 == 0) hash.add(servo->penetration_mm());
+    run.forbidden_ticks += out.forbidden ? 1 : 0;
     run.contact_ticks += out.contact ? 1 : 0;
     run.late_contact_ticks += out.contact && tick >= ticks * 3 / 4 ? 1 : 0;
     run.stale_ticks += out.stale ? 1 : 0;

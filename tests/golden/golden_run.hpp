@@ -16,7 +16,7 @@ namespace kerf::test {
 enum class GoldenScene : std::uint8_t {
   mill,  ///< cuts for 20 s: in fixed point the plans `aligned` and `splat`
   feel,  ///< cuts nothing, turns tools without symmetry for 3 s: the plan `gather`
-  sweep  ///< feels by the swept proxy for 3 s, a ball and a shaft that turns
+  sweep  ///< feels by the swept proxy and cuts by its force for 3 s: a ball, a shaft that turns
 };
 [[nodiscard]] constexpr const char* name_of(GoldenScene scene) noexcept {
   constexpr const char* kNames[] = {"mill", "feel", "sweep"};
@@ -32,6 +32,7 @@ struct GoldenRun {
   std::string volume_hash;  ///< over the densities of all volumes at the end
   std::int32_t contact_ticks = 0, late_contact_ticks = 0;  ///< late: in the last quarter
   std::int32_t stale_ticks = 0, limited_ticks = 0, motor_ticks = 0;
+  std::int32_t forbidden_ticks = 0;
   std::int32_t stale_faults = 0, speed_faults = 0, outings = 0;  ///< outings: force fades in
   std::uint64_t removed_steps[2] = {};                           ///< by volume
   std::set<Plan> plans;                                          ///< of all tools in all volumes

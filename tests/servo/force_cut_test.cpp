@@ -225,6 +225,37 @@ TEST_CASE("the press is shared by two volumes, whatever their voxels") {
   CHECK(double(steps[0]) / double(2 * steps[1]) == doctest::Approx(1).epsilon(0.2));
 }
 
+TEST_CASE("milling into a tooth changes the force by less than 2 % a tick") {
+  // The crown of the phantom around the middle of its chewing face, all of it enamel.
+  double top_mm = 12;
+  while (phantom_signed_distance(1, 1, top_mm) > 0) top_mm -= 0.01;
+  const Shape crown = [&](double x, double y, double z) {
+    return phantom_signed_distance(x + 1, 1 - z, y + top_mm);
+  };
+  Scene scene = mill_scene(crown, 64);
+  scene.force.damping_ns_per_mm = 0;  // of the hand's own steps, which are counts
+  Miller miller(scene);
+  const auto depth_mm = [](int ms) { return -0.5 + 0.005 * std::min(ms, 500); };
+  double last_n = 0, sum_n = 0, worst_n = 0;
+  std::array<double, 3> last_mm{};
+  constexpr int kTouched = 200, kEnd = 2500;
+  for (int ms = 0; ms < kEnd; ++ms) {
+    const ServoOutput out = miller.step({0, 0.8 - depth_mm(ms), 0});
+    const double force_n = length(out.force_n);
+    if (ms >= kTouched) {
+      sum_n += force_n;
+      // A count of the encoders is a step of the hand, which is none of the cut.
+      if (out.position_mm == last_mm) worst_n = std::max(worst_n, std::abs(force_n - last_n));
+    }
+    last_n = force_n;
+    last_mm = out.position_mm;
+  }
+  const double mean_n = sum_n / (kEnd - kTouched);
+  MESSAGE("largest step ", 100 * worst_n / mean_n, " % of ", mean_n, " N");
+  CHECK(miller.removed_mm3() > 0.05);
+  CHECK(worst_n < 0.02 * mean_n);
+}
+
 TEST_CASE("a thin wall gives way to cutting alone, and without a blow") {
   const Shape wall = [](double, double y, double) { return std::abs(y) - kVoxelMm; };
   for (const bool turns : {false, true}) {

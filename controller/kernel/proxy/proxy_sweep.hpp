@@ -40,6 +40,7 @@ struct SweepRules {
   static constexpr double kShrink = 0.4;
   static constexpr double kShortest = 0.1;  ///< share of a step below which the proxy rather lags
   static constexpr double kPush = 0.5;      ///< longest correction of one push
+  static constexpr double kAstray = 0.25;   ///< farther from the goal than before: rather stays
 };
 
 /// Sine of half the angle that takes a sample `reach` units from the centre along kStep at most;
@@ -76,6 +77,9 @@ struct Swept {
 /// The orientation goes first and the centre gives way to it: a stylus without torque motors turns
 /// the tool whatever the tooth says. Where no centre allows a turn, the orientation lags too.
 ///
+/// A tool that may stay where it is does not end a tick farther from its goal than it began: in a
+/// groove of its own shape planes that hop about would lead it astray.
+///
 /// At most kMaxProbes calls of `probe`. Coordinates within +-kContactLimit.
 ///
 /// Limits: in a slot without any play a push to its side makes the force step by up to 6 %; what
@@ -95,7 +99,16 @@ class ProxySweep {
   constexpr Swept<N> tick(const ProxyPose<N>& goal) noexcept {
     here_ = turn_to(goal.turn);
     held_by_ = bundle_of(here_);
-    const Slide<N> slide = move_to(goal.centre);
+    const Trial start{pose_.centre, here_, held_by_, here_};
+    Slide<N> slide = move_to(goal.centre);
+    if (start.felt.count > 0 && allows_rest(start.felt) &&
+        norm(goal.centre - pose_.centre) >
+            norm(goal.centre - start.centre) + Real(SweepRules::kAstray)) {
+      pose_.centre = start.centre;
+      here_ = start.felt;
+      held_by_ = start.planes;
+      slide = route(held_by_, goal.centre - start.centre).slide;
+    }
     return {held_by_, slide, probes_, pose_.turn == goal.turn, here_.depth, here_.buried};
   }
 
@@ -116,9 +129,13 @@ class ProxySweep {
   [[nodiscard]] constexpr bool may_look() const noexcept {
     return probes_ < SweepRules::kMaxProbes;
   }
-  /// Never deeper than it is, where it is too deep already.
+  /// The tool may stay.
+  [[nodiscard]] static constexpr bool allows_rest(const Probe<N>& felt) noexcept {
+    return !felt.buried && felt.depth <= Real(SweepRules::kTolerance);
+  }
+  /// The same, or no deeper than it is where it is too deep already.
   [[nodiscard]] constexpr bool allows(const Probe<N>& felt) const noexcept {
-    return !felt.buried && felt.depth <= std::max(Real(SweepRules::kTolerance), here_.depth);
+    return allows_rest(felt) || (!felt.buried && felt.depth <= here_.depth);
   }
 
   /// How to go on from a place.
