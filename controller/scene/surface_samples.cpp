@@ -39,9 +39,12 @@ double area_of(const Profile& profile) {
 }
 
 std::vector<Sample> fibonacci_ball(double radius_mm, int count) {
+  // Layers of equal area begin at 0.5; a little nearer to the poles these are no emptier than the
+  // rest (the worst normal on a ball of 6 is 0.5 degrees off instead of 0.7).
+  constexpr double kFirst = 0.36;
   std::vector<Sample> samples;
   for (int i = 0; i < count; ++i) {
-    const double y = (2 * i + 1.0) / count - 1, across = std::sqrt(1 - y * y);
+    const double y = 2 * (i + kFirst) / (count - 1 + 2 * kFirst) - 1, across = std::sqrt(1 - y * y);
     samples.push_back({radius_mm * across * std::cos(i * kGoldenAngle), radius_mm * y,
                        radius_mm * across * std::sin(i * kGoldenAngle)});
   }

@@ -22,7 +22,8 @@ constexpr double kRadius = 8;
 struct Body {
   const char* name;
   double rest;
-  double most;  ///< offset of the mean
+  double most;     ///< offset of the mean
+  double degrees;  ///< of the normal
   std::function<double(const Point& n, const Point& b, const Point& from_p)> distance;
 };
 
@@ -61,7 +62,7 @@ Rest rest_on(const Body& body_under, int places) {
   Rest found;
   for (int i = 0; i < places; ++i) {
     const Point n = dice.direction(), b = dice.across(n);
-    const Point centre{13 + dice.within(0, 1), 13 + dice.within(0, 1), 13 + dice.within(0, 1)};
+    const Point centre{13 + dice.uniform(0, 1), 13 + dice.uniform(0, 1), 13 + dice.uniform(0, 1)};
     const Point p = centre - body_under.rest * n;
     const TestVolume volume =
         body({28, 28, 28}, 2, [&](const Point& x) { return body_under.distance(n, b, x - p); });
@@ -83,33 +84,34 @@ Rest rest_on(const Body& body_under, int places) {
 TEST_CASE_TEMPLATE("a ball rests where its surface touches", N, FixedNumbers, DoubleNumbers) {
   // Trilinear densities place the iso-surface of a ball 1 / (6 R) too low: 0.028 for a radius of 6,
   // 0.012 for 14. The rest of the offset is the contact's.
-  const std::array<Body, 7> bodies{{{"plane", 8, 0.02, plane},
-                                    {"ball of 40", 8, 0.02, sphere(40)},
-                                    {"ball of 14", 8, 0.025, sphere(14)},
-                                    {"ball of 6", 8, 0.05, sphere(6)},
-                                    {"hollow of 40", 8, 0.02, sphere(-40)},
-                                    {"hollow of 14", 8, 0.02, sphere(-14)},
-                                    {"crease of 90 degrees", 8 * std::sqrt(2.0), 0.02, crease}}};
+  // Fewer samples touch a smaller ball.
+  const std::array<Body, 7> bodies{
+      {{"plane", 8, 0.02, 0.4, plane},
+       {"ball of 40", 8, 0.02, 0.4, sphere(40)},
+       {"ball of 14", 8, 0.025, 0.4, sphere(14)},
+       {"ball of 6", 8, 0.05, 0.55, sphere(6)},
+       {"hollow of 40", 8, 0.02, 0.4, sphere(-40)},
+       {"hollow of 14", 8, 0.02, 0.4, sphere(-14)},
+       {"crease of 90 degrees", 8 * std::sqrt(2.0), 0.02, 0.9, crease}}};
   for (const Body& body_under : bodies) {
     const Rest rest = rest_on<N>(body_under, 100);
     CAPTURE(std::string(body_under.name));
     CHECK(std::abs(rest.mean) < body_under.most);
     CHECK(rest.lowest > -0.06);
     CHECK(rest.highest < 0.02);
-    CHECK(rest.worst_angle_deg <
-          (body_under.distance.target_type() == typeid(&crease) ? 0.9 : 0.5));
+    CHECK(rest.worst_angle_deg < body_under.degrees);
   }
 }
 
 TEST_CASE_TEMPLATE("thin things hold a ball too", N, FixedNumbers, DoubleNumbers) {
   // What is thinner than the samples are apart lets the ball in by part of its edge.
-  const Rest needle = rest_on<N>({"rod of 2", 8, 0, rod(1)}, 40);
+  const Rest needle = rest_on<N>({"rod of 2", 8, 0, 0, rod(1)}, 40);
   CHECK(std::abs(needle.mean) < 0.1);
   CHECK(needle.lowest > -0.35);
-  const Rest rod4 = rest_on<N>({"rod of 4", 8, 0, rod(2)}, 40);
+  const Rest rod4 = rest_on<N>({"rod of 4", 8, 0, 0, rod(2)}, 40);
   CHECK(std::abs(rod4.mean) < 0.05);
   CHECK(rod4.lowest > -0.05);
-  const Rest blade = rest_on<N>({"plate of 2 on edge", 8, 0, plate_on_edge}, 40);
+  const Rest blade = rest_on<N>({"plate of 2 on edge", 8, 0, 0, plate_on_edge}, 40);
   CHECK(std::abs(blade.mean) < 0.05);
   CHECK(blade.lowest > -0.12);
 }
@@ -152,9 +154,9 @@ TEST_CASE("fixed point feels what double feels, on noise as well") {
       const Point n = dice.direction();
       const double noise = i % 3 == 0 ? 0.02 : 0, rise = std::abs(n[1]);
       const double support = tool.round ? 8 : 8 * rise + 5 * std::sqrt(1 - rise * rise);
-      const Point centre{15 + dice.within(0, 1), 15 + dice.within(0, 1), 15 + dice.within(0, 1)};
+      const Point centre{15 + dice.uniform(0, 1), 15 + dice.uniform(0, 1), 15 + dice.uniform(0, 1)};
       const TestVolume volume = body({32, 32, 32}, 2, [&](const Point& x) {
-        return dot(n, x - centre) + support - 0.3 + dice.within(-noise, noise);
+        return dot(n, x - centre) + support - 0.3 + dice.uniform(-noise, noise);
       });
       const ShellRig<FixedNumbers> fixed(tool, volume);
       const ShellRig<DoubleNumbers> real(tool, volume);
@@ -188,7 +190,7 @@ TEST_CASE_TEMPLATE("a turned cylinder rests on rim, side and face", N, FixedNumb
     const Point axis = i % 4 == 0 ? n : i % 4 == 1 ? dice.across(n) : dice.direction();
     const double rise = std::abs(dot(n, axis));
     const double support = 8 * rise + 5 * std::sqrt(1 - std::min(1.0, rise * rise));
-    const Point centre{15 + dice.within(0, 1), 15 + dice.within(0, 1), 15 + dice.within(0, 1)};
+    const Point centre{15 + dice.uniform(0, 1), 15 + dice.uniform(0, 1), 15 + dice.uniform(0, 1)};
     const TestVolume volume =
         body({32, 32, 32}, 2, [&](const Point& x) { return dot(n, x - centre) + support; });
     ShellRig<N> rig(cylinder, volume);
@@ -198,7 +200,7 @@ TEST_CASE_TEMPLATE("a turned cylinder rests on rim, side and face", N, FixedNumb
     CHECK(std::abs(offset) < 0.075);
     const Probe<N> felt = rig.at(centre + offset * n);
     REQUIRE(felt.count == 1);
-    CHECK(degrees_between(normal_of(felt.plane[0]), n) < 1.0);
+    CHECK(degrees_between(normal_of(felt.plane[0]), n) < 0.9);
     // The arm leads to the contact: as deep along n as the tool reaches.
     const Point arm{double(felt.plane[0].arm.x), double(felt.plane[0].arm.y),
                     double(felt.plane[0].arm.z)};
@@ -229,14 +231,17 @@ TEST_CASE_TEMPLATE("every shape rests on planes whatever its pose", N, FixedNumb
       double support = 0;
       for (const auto& [y, radius] : profile)
         support = std::max(support, radius * across - y * rise);
-      const Point centre{14 + dice.within(0, 1), 14 + dice.within(0, 1), 14 + dice.within(0, 1)};
+      const Point centre{14 + dice.uniform(0, 1), 14 + dice.uniform(0, 1), 14 + dice.uniform(0, 1)};
       const TestVolume volume =
           body({30, 30, 30}, 2, [&](const Point& x) { return dot(n, x - centre) + support; });
       ShellRig<N> rig(tool, volume);
       rig.turn(turned_to(axis, dice));
-      mean += rig.rest(centre, n) / kPlaces;
+      const double offset = rig.rest(centre, n);
+      CAPTURE(std::string(c.shape));
+      CHECK(std::abs(offset) < 0.075);
+      mean += offset / kPlaces;
     }
     CAPTURE(std::string(c.shape));
-    CHECK(std::abs(mean) < 0.075);
+    CHECK(std::abs(mean) < 0.04);
   }
 }

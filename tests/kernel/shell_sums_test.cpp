@@ -41,22 +41,22 @@ TestVolume hard_field(const VoxelGrid& grid, int kind, Dice& dice) {
   return made_of(grid, [&](std::int32_t x, std::int32_t y, std::int32_t z) -> Density {
     switch (kind) {
       case 0:
-        return static_cast<Density>(dice.within(0, 65536));
+        return static_cast<Density>(dice.uniform(0, 65536));
       case 1:
-        return dice.within(0, 1) < 0.5 ? 0 : 65535;
+        return dice.uniform(0, 1) < 0.5 ? 0 : 65535;
       case 2:
         return 65535;
       case 3:
         return (x + y + z) % 2 == 0 ? 65535 : 0;
       default:
-        return x < grid.nx / 3 ? static_cast<Density>(dice.within(0, 65536)) : Density{0};
+        return x < grid.nx / 3 ? static_cast<Density>(dice.uniform(0, 65536)) : Density{0};
     }
   });
 }
 
 ShellStep<FixedNumbers> any_step(const Shell<FixedNumbers>& shell, Dice& dice) {
   const std::array<Point, 3> rotation = turned_to(dice.direction(), dice);
-  const double stretch = std::ldexp(double(shell.reach), shell.step_bits) * dice.within(0.2, 1);
+  const double stretch = std::ldexp(double(shell.reach), shell.step_bits) * dice.uniform(0.2, 1);
   ShellStep<FixedNumbers> step;
   step.shift = shell.step_bits - 1;
   for (std::size_t i = 0; i < 3; ++i) {
@@ -82,7 +82,7 @@ TEST_CASE("every instruction set sums a shell to the bit, wherever it is") {
         ShellMemory<FixedNumbers> memory, truth_memory;
         memory.hold(shell);
         truth_memory.hold(shell);
-        const Density iso = kind == 2 ? 65535 : static_cast<Density>(dice.within(1, 65536));
+        const Density iso = kind == 2 ? 65535 : static_cast<Density>(dice.uniform(1, 65536));
         const ShellField all{grid, volume.density.data(), density_scale(iso), {}};
         const FreeBrickMap map(grid, volume.density, 1);
         ShellField field = all;
@@ -91,9 +91,9 @@ TEST_CASE("every instruction set sums a shell to the bit, wherever it is") {
           const ShellStep<FixedNumbers> step = any_step(shell, dice);
           place_shell<FixedNumbers>(shell.table, step, truth_memory.places());
           const double out = i % 3 == 0 ? 7 : -1;  // across the border, or inside
-          const Q16 at[3] = {Q16(dice.within(-out, grid.nx + out)),
-                             Q16(dice.within(-out, grid.ny + out)),
-                             Q16(dice.within(-out, grid.nz + out))};
+          const Q16 at[3] = {Q16(dice.uniform(-out, grid.nx + out)),
+                             Q16(dice.uniform(-out, grid.ny + out)),
+                             Q16(dice.uniform(-out, grid.nz + out))};
           std::int32_t centre[3] = {at[0].raw(), at[1].raw(), at[2].raw()};
           if (i % 4 == 1) centre[0] |= 0xffff;
           if (i % 4 == 2) centre[1] &= ~0xffff;

@@ -5,11 +5,8 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <cstdint>
 #include <deque>
-#include <numbers>
 #include <optional>
-#include <random>
 #include <vector>
 
 #include "controller/kernel/proxy/shell_probe.hpp"
@@ -18,52 +15,10 @@
 #include "controller/scene/surface_samples.hpp"
 #include "controller/scene/tool_shapes.hpp"
 #include "tests/kernel/support.hpp"
+#include "tests/proxy/points.hpp"
 
 /// Tools and bodies of known shape for the tests of the swept contact; all lengths in units.
 namespace kerf::test {
-
-using Point = std::array<double, 3>;
-
-inline Point operator+(const Point& a, const Point& b) {
-  return {a[0] + b[0], a[1] + b[1], a[2] + b[2]};
-}
-inline Point operator-(const Point& a, const Point& b) {
-  return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
-}
-inline Point operator*(double s, const Point& a) {
-  return {s * a[0], s * a[1], s * a[2]};
-}
-inline double dot(const Point& a, const Point& b) {
-  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-inline double length(const Point& a) {
-  return std::sqrt(dot(a, a));
-}
-inline Point unit(const Point& a) {
-  return (1 / length(a)) * a;
-}
-inline Point cross(const Point& a, const Point& b) {
-  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
-
-/// Random numbers that are the same with every standard library.
-class Dice {
- public:
-  explicit Dice(std::uint32_t seed) : random_(seed) {}
-  double within(double from, double to) {
-    return from + (to - from) * (static_cast<double>(random_()) / 4294967296.0);
-  }
-  Point direction() {
-    for (;;) {
-      const Point p{within(-1, 1), within(-1, 1), within(-1, 1)};
-      if (length(p) < 1 && length(p) > 0.05) return unit(p);
-    }
-  }
-  Point across(const Point& n) { return unit(cross(n, direction())); }
-
- private:
-  std::mt19937 random_;
-};
 
 /// Density from a signed distance, antialiased over `edge` voxels, the iso-surface at 1/2.
 template <class Distance>
@@ -129,10 +84,13 @@ class ShellRig {
     turn(kUpright);
   }
 
+  /// What a sweep asks.
+  [[nodiscard]] ShellProbe<N>& field() { return *probe_; }
+
   void turn(const std::array<Point, 3>& rotation) { probe_->turn(tool_turn<N>(rotation)); }
-  [[nodiscard]] Probe<N> at(const Point& q) const { return probe_->probe(place(q)); }
+  [[nodiscard]] Probe<N> at(const Point& q) const { return probe_->probe(place_of<N>(q)); }
   [[nodiscard]] double free_distance(const Point& q) const {
-    return double(probe_->free_distance(place(q)));
+    return double(probe_->free_distance(place_of<N>(q)));
   }
 
   /// How far beyond `q` along `n` the tool rests: its depth is 0 there. Within +-`range`.
@@ -146,11 +104,6 @@ class ShellRig {
   }
 
  private:
-  static ContactVec<typename N::Real> place(const Point& q) {
-    using Real = typename N::Real;
-    return {Real(q[0]), Real(q[1]), Real(q[2])};
-  }
-
   const KernelSet& kernels_;
   ShellTool<N> tool_;
   Shell<N> shell_;
@@ -159,14 +112,5 @@ class ShellRig {
   std::vector<ShellVolume<N>> volumes_;
   std::optional<ShellProbe<N>> probe_;
 };
-
-template <class N>
-Point normal_of(const Plane<N>& plane) {
-  return {double(plane.normal.x), double(plane.normal.y), double(plane.normal.z)};
-}
-
-inline double degrees_between(const Point& a, const Point& b) {
-  return std::atan2(length(cross(a, b)), dot(a, b)) * 180 / std::numbers::pi;
-}
 
 }  // namespace kerf::test

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <numbers>
 #include <random>
 
 #include "controller/kernel/proxy/plane.hpp"
@@ -36,6 +37,10 @@ inline Point cross(Point a, Point b) {
   return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
 }
 
+inline double degrees_between(Point a, Point b) {
+  return std::atan2(length(cross(a, b)), dot(a, b)) * 180 / std::numbers::pi;
+}
+
 template <class N>
 Point point_of(ContactVec<typename N::Real> v) {
   return {double(v.x), double(v.y), double(v.z)};
@@ -49,6 +54,11 @@ template <class N>
 ContactVec<typename N::Unit> normal_of(Point p) {
   using Unit = typename N::Unit;
   return {Unit(p[0]), Unit(p[1]), Unit(p[2])};
+}
+
+template <class N>
+Point normal_of(const Plane<N>& plane) {
+  return {double(plane.normal.x), double(plane.normal.y), double(plane.normal.z)};
 }
 
 /// The same sequence on every machine.
@@ -65,6 +75,8 @@ class Dice {
       if (length(p) < 1 && length(p) > 0.05) return unit(p);
     }
   }
+  /// At right angles to `n`.
+  Point across(Point n) { return unit(cross(n, direction())); }
   /// About a random axis.
   template <class N>
   ToolTurn<N> turn(double angle_rad) {
@@ -84,7 +96,7 @@ struct Frame {
   Frame(Dice& dice, Point about)
       : place(about + Point{dice.uniform(0, 1), dice.uniform(0, 1), dice.uniform(0, 1)}),
         up(dice.direction()),
-        along(unit(cross(up, dice.direction()))),
+        along(dice.across(up)),
         across(cross(up, along)) {}
   /// Coordinates in the frame.
   [[nodiscard]] Point of(Point p) const {

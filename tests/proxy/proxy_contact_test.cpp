@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "controller/servo/proxy_contact.hpp"
 
+#include <algorithm>
 #include <limits>
 
 #include <doctest/doctest.h>
 
+#include "tests/kernel/shell_support.hpp"
 #include "tests/proxy/flat_field.hpp"
-#include "tests/proxy/shell_field.hpp"
 
 using namespace kerf;
 using namespace kerf::test;
@@ -15,6 +16,7 @@ namespace {
 
 constexpr double kRadius = 8;
 constexpr Point kUp{0, 1, 0};
+const SceneTool kBall = tool_of_units("ball", kRadius, 2 * kRadius);
 
 template <class N>
 ProxyPlan<N> plan(double friction = 0, double turn_step = 0) {
@@ -24,11 +26,27 @@ ProxyPlan<N> plan(double friction = 0, double turn_step = 0) {
 
 /// A block whose top is at height 30, seven voxels from the other ends of its volume.
 TestVolume block() {
-  return blurred({60, 60, 60}, [](Point p) {
+  return body({60, 60, 60}, 2, [](Point p) {
     const double side = std::max(std::abs(p[0] - 30), std::abs(p[2] - 30)) - 23;
     return std::max({side, p[1] - 30, 7 - p[1]});
   });
 }
+
+/// Counts the probes.
+template <class N>
+struct CountedField {
+  Probe<N> probe(ContactVec<typename N::Real> q) {
+    ++probes;
+    return field.probe(q);
+  }
+  typename N::Real free_distance(ContactVec<typename N::Real> q) const {
+    return field.free_distance(q);
+  }
+  void turn(const ToolTurn<N>& turn) { field.turn(turn); }
+
+  ShellProbe<N>& field;
+  int probes = 0;
+};
 
 template <class N>
 ProxyPose<N> pose_of(Point place) {
@@ -40,12 +58,12 @@ ProxyPose<N> pose_of(Point place) {
 TEST_CASE_TEMPLATE("a contact tells spring, normal and no torque of a ball", N, FixedNumbers,
                    DoubleNumbers) {
   const TestVolume volume = block();
-  ShellField<N> field(volume, ball_shell(kRadius, 512), true);
+  ShellRig<N> rig(kBall, volume);
   ProxyState<N> state;
-  CHECK(follow(plan<N>(), state, field, pose_of<N>({30, 40, 30})).placing == Placing::placed);
+  CHECK(follow(plan<N>(), state, rig.field(), pose_of<N>({30, 40, 30})).placing == Placing::placed);
   ProxyContact<N> contact;
   for (double y = 40; y > 35; y -= 0.5) {
-    contact = follow(plan<N>(), state, field, pose_of<N>({30, y, 30}));
+    contact = follow(plan<N>(), state, rig.field(), pose_of<N>({30, y, 30}));
   }
   CHECK(point_of<N>(contact.spring)[1] == doctest::Approx(38 - 35.5).epsilon(0.02));
   CHECK(double(contact.normal.y) == doctest::Approx(1));
@@ -102,28 +120,29 @@ TEST_CASE_TEMPLATE("a tool with no room to turn keeps its orientation, and follo
                    FixedNumbers, DoubleNumbers) {
   // A bar of 16 in a shaft 12 wide whose walls go on forever upwards.
   const TestVolume volume =
-      blurred({70, 70, 70}, [](Point p) { return 6 - std::hypot(p[0] - 35, p[2] - 35); });
-  ShellField<N> field(volume, cylinder_shell(5, 8), false);
+      body({70, 70, 70}, 2, [](Point p) { return 6 - std::hypot(p[0] - 35, p[2] - 35); });
+  ShellRig<N> rig(tool_of_units("cylinder", 5, 16), volume);
   ProxyState<N> state;
   const auto turning = plan<N>(0, turn_step_of(9.5));
   ProxyPose<N> goal = pose_of<N>({35, 35, 35});
-  REQUIRE(follow(turning, state, field, goal).placing == Placing::placed);
+  REQUIRE(follow(turning, state, rig.field(), goal).placing == Placing::placed);
   const double half = 0.5;  // a radian about z
   goal.turn = {{}, {}, typename N::Unit(std::sin(half)), typename N::Unit(std::cos(half))};
   ProxyContact<N> contact;
-  for (int i = 0; i < 50; ++i) contact = follow(turning, state, field, goal);
+  for (int i = 0; i < 50; ++i) contact = follow(turning, state, rig.field(), goal);
   CHECK_FALSE(contact.turned);
   const double turned = 2 * std::asin(double(contact.pose.turn.z));
   CHECK(turned > 0.05);
   CHECK(turned < 0.4);
   goal.turn = {};
-  CHECK(follow(turning, state, field, goal).turned);
+  CHECK(follow(turning, state, rig.field(), goal).turned);
 }
 
 TEST_CASE_TEMPLATE("a start inside of the solid ends outside, by a force that grows", N,
                    FixedNumbers, DoubleNumbers) {
   const TestVolume volume = block();
-  ShellField<N> field(volume, ball_shell(kRadius, 512), true);
+  ShellRig<N> rig(kBall, volume);
+  CountedField<N> field{rig.field()};
   ProxyState<N> state;
   const auto goal = pose_of<N>({30, 22, 30});  // 16 deep
   double felt = 0;
@@ -160,16 +179,18 @@ TEST_CASE_TEMPLATE("a start with nothing free near is refused, until the hand is
 
 TEST_CASE_TEMPLATE("a volume that fills up around the tool starts the search again", N,
                    FixedNumbers, DoubleNumbers) {
-  TestVolume volume = filled({60, 60, 60}, 0);
-  ShellField<N> field(volume, ball_shell(kRadius, 512), true);
+  const TestVolume full = block();
+  TestVolume volume = full;
+  ShellRig<N> rig(kBall, volume);  // its map of what is free knows the full block
+  std::fill(volume.density.begin(), volume.density.end(), Density{0});
   ProxyState<N> state;
   const auto goal = pose_of<N>({30, 31, 30});
-  CHECK(follow(plan<N>(), state, field, goal).placing == Placing::placed);
-  volume = block();
+  CHECK(follow(plan<N>(), state, rig.field(), goal).placing == Placing::placed);
+  std::copy(full.density.begin(), full.density.end(), volume.density.begin());
   double felt = 0;
   ProxyContact<N> contact;
   for (int i = 0; i < 100; ++i) {
-    contact = follow(plan<N>(), state, field, goal);
+    contact = follow(plan<N>(), state, rig.field(), goal);
     const double now = length(point_of<N>(contact.spring));
     CHECK(now <= felt + 0.25 + 1e-3);
     felt = now;

@@ -7,7 +7,7 @@
 
 #include "controller/kernel/proxy/proxy_sweep.hpp"
 #include "tests/kernel/case_count.hpp"
-#include "tests/proxy/shell_field.hpp"
+#include "tests/kernel/shell_support.hpp"
 
 using namespace kerf;
 using namespace kerf::test;
@@ -36,14 +36,14 @@ struct Tally {
 template <class N>
 void shake(double wall, bool round, int ticks, Dice& dice, Tally& tally) {
   const Frame frame(dice, {32, 32, 32});
-  const TestVolume volume = blurred({66, 66, 66}, [&](Point p) {
+  const TestVolume volume = body({66, 66, 66}, 2, [&](Point p) {
     const double height = frame.of(p)[1];
     return wall > 40 ? height : std::abs(height + wall / 2) - wall / 2;
   });
   const double reach = round ? kBallRadius : std::hypot(kCylinderRadius, kCylinderHalf);
-  ShellField<N> field(
-      volume, round ? ball_shell(kBallRadius, 512) : cylinder_shell(kCylinderRadius, kCylinderHalf),
-      round);
+  ShellRig<N> rig(round ? tool_of_units("ball", kBallRadius, 2 * kBallRadius)
+                        : tool_of_units("cylinder", kCylinderRadius, 2 * kCylinderHalf),
+                  volume);
   const typename N::Unit turn_step(round ? 0 : turn_step_of(reach));
   Point hand = frame.at(0, reach + 3, 0);
   ProxyPose<N> pose{place_of<N>(hand), {}}, goal = pose;
@@ -56,7 +56,8 @@ void shake(double wall, bool round, int ticks, Dice& dice, Tally& tally) {
     goal.turn = compose(dice.turn<N>(i % 3 == 0 ? 3 : dice.uniform(0, 0.2)), goal.turn);
     const Point before = point_of<N>(pose.centre);
 
-    const Swept<N> swept = ProxySweep<N, ShellField<N>>(field, pose, {}, turn_step).tick(goal);
+    const Swept<N> swept =
+        ProxySweep<N, ShellProbe<N>>(rig.field(), pose, {}, turn_step).tick(goal);
     const Point place = point_of<N>(pose.centre);
     const double below = reach_below(pose.turn, frame.up, round);
     ++tally.ticks;

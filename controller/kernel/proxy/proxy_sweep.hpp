@@ -82,8 +82,8 @@ struct Swept {
 ///
 /// At most kMaxProbes calls of `probe`. Coordinates within +-kContactLimit.
 ///
-/// Limits: in a slot without any play a push to its side makes the force step by up to 6 %; what
-/// lies wholly inside of the tool is felt only when the tool leaves it, and then holds it.
+/// Limit: what lies wholly inside of the tool is felt only when the tool leaves it, and then holds
+/// it.
 template <class N, ContactField<N> Field>
 class ProxySweep {
   using Real = typename N::Real;

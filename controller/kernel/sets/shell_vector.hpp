@@ -104,30 +104,39 @@ template <bool kRound, bool kInside>
   const V r = Simd::bit_and(Simd::min32(scaled, Simd::set32(32767)), strong);
   if (!Simd::any(r)) return;
 
-  const V near_y = blend16(c00, c01, cell.z), far_y = blend16(c10, c11, cell.z);
-  const V open = Simd::sra32<31>(Simd::sub32(scaled, Simd::set32(32768)));
-  const V slope[3] = {Simd::multiply_pairs(at, Simd::pair16(-1, 1)),
-                      blend_halves(Simd::sub16(far_y, near_y), cell.x),
-                      blend_halves(Simd::sub16(far_z, near_z), cell.x)};
-
-  const auto rounded = [](V product, int half) { return Simd::add32(product, Simd::set32(half)); };
-  const V r2 = Simd::srl32<14>(rounded(Simd::multiply_pairs(r, r), 1 << 13));
-  const V r2_squared = Simd::multiply32(r2, r2);
-  V w = r2_squared;
+  const V r2 = Simd::srl32<14>(Simd::add32(Simd::multiply_pairs(r, r), Simd::set32(1 << 13)));
+  const V r4 = Simd::multiply32(r2, r2);
+  V w = r4;
   if constexpr (!kRound) {
-    w = Simd::multiply32(Simd::srl32<16>(rounded(r2_squared, 1 << 15)), r2);
+    w = Simd::multiply32(Simd::srl32<16>(Simd::add32(r4, Simd::set32(1 << 15))), r2);
   }
-  const ShellWeights weights(Simd::srl32<8>(w));
+  w = Simd::srl32<8>(w);
+  const ShellWeights weights(w);
   sums.weight = Simd::add64(sums.weight, Simd::low32(weights.even));
   sums.weight = Simd::add64(sums.weight, weights.odd);
   weights.add(sums.density, r);
+  if constexpr (!kRound) weights.add(sums.square, r2);
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    weights.add(sums.rise[axis], Simd::bit_and(slope[axis], open));
     weights.add(sums.lever[axis], Simd::load(table.lever[axis] + first));
   }
-  if constexpr (!kRound) weights.add(sums.square, r2);
   sums.top = Simd::max32(sums.top, r);
   sums.solid = Simd::add32(sums.solid, Simd::srl32<14>(r));
+
+  // Only where the density is not clipped it has a gradient.
+  const V open = Simd::sra32<31>(Simd::sub32(scaled, Simd::set32(32768)));
+  V v = w;
+  if constexpr (kRound) {
+    const V r3 = Simd::srl32<6>(Simd::multiply_pairs(Simd::srl32<1>(r2), r));
+    v = Simd::sub32(Simd::add32(Simd::add32(w, w), w), r3);
+  }
+  v = Simd::bit_and(v, open);
+  if (!Simd::any(v)) return;
+  const V near_y = blend16(c00, c01, cell.z), far_y = blend16(c10, c11, cell.z);
+  const V slope[3] = {Simd::multiply_pairs(at, Simd::pair16(-1, 1)),
+                      blend_halves(Simd::sub16(far_y, near_y), cell.x),
+                      blend_halves(Simd::sub16(far_z, near_z), cell.x)};
+  const ShellWeights pulls(v);
+  for (std::size_t axis = 0; axis < 3; ++axis) pulls.add(sums.rise[axis], slope[axis]);
 }
 
 /// `kInside`: the whole tool is. What fills the last group up is not, so that one is read with
