@@ -9,6 +9,7 @@
 #include "hil/hil_error.hpp"
 #include "hil/lab/accuracy/command.hpp"
 #include "hil/lab/bench_command.hpp"
+#include "hil/lab/extremes/command.hpp"
 #include "hil/lab/faults/command.hpp"
 
 namespace kerf {
@@ -20,8 +21,9 @@ int run_lab(int argc, const char* const* argv, std::ostream& out, std::ostream& 
   app.require_subcommand(1);
   const BenchCommand bench(app);
   const accuracy::Command accuracy(app);
+  const extremes::Command extremes(app);
   const faults::Command faults(app);
-  const std::array<const LabCommand*, 3> commands{&bench, &accuracy, &faults};
+  const std::array<const LabCommand*, 4> commands{&bench, &accuracy, &extremes, &faults};
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

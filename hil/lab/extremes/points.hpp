@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <numbers>
+#include <random>
+
+#include "controller/kernel/proxy/plane.hpp"
+#include "controller/kernel/proxy/tool_turn.hpp"
+
+/// Places, directions and turns in plain double, and random ones. Lengths in units of contact space.
+namespace kerf::extremes {
+
+using Point = std::array<double, 3>;
+
+inline Point operator+(Point a, Point b) {
+  return {a[0] + b[0], a[1] + b[1], a[2] + b[2]};
+}
+inline Point operator-(Point a, Point b) {
+  return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
+}
+inline Point operator*(double s, Point a) {
+  return {s * a[0], s * a[1], s * a[2]};
+}
+inline double dot(Point a, Point b) {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+inline double length(Point a) {
+  return std::sqrt(dot(a, a));
+}
+inline Point unit(Point a) {
+  return 1 / length(a) * a;
+}
+inline Point cross(Point a, Point b) {
+  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+}
+
+inline double degrees_between(Point a, Point b) {
+  return std::atan2(length(cross(a, b)), dot(a, b)) * 180 / std::numbers::pi;
+}
+
+template <class N>
+Point point_of(ContactVec<typename N::Real> v) {
+  return {double(v.x), double(v.y), double(v.z)};
+}
+template <class N>
+ContactVec<typename N::Real> place_of(Point p) {
+  using Real = typename N::Real;
+  return {Real(p[0]), Real(p[1]), Real(p[2])};
+}
+template <class N>
+ContactVec<typename N::Unit> normal_of(Point p) {
+  using Unit = typename N::Unit;
+  return {Unit(p[0]), Unit(p[1]), Unit(p[2])};
+}
+
+template <class N>
+Point normal_of(const Plane<N>& plane) {
+  return {double(plane.normal.x), double(plane.normal.y), double(plane.normal.z)};
+}
+
+/// The same sequence on every machine.
+class Dice {
+ public:
+  explicit Dice(std::uint64_t seed) : random_(seed) {}
+
+  double uniform(double low, double high) {
+    return low + (high - low) * static_cast<double>(random_() >> 11) * 0x1p-53;
+  }
+  Point direction() {
+    for (;;) {
+      const Point p{uniform(-1, 1), uniform(-1, 1), uniform(-1, 1)};
+      if (length(p) < 1 && length(p) > 0.05) return unit(p);
+    }
+  }
+  /// At right angles to `n`.
+  Point across(Point n) { return unit(cross(n, direction())); }
+  /// About a random axis.
+  template <class N>
+  ToolTurn<N> turn(double angle_rad) {
+    using Unit = typename N::Unit;
+    const Point axis = std::sin(angle_rad / 2) * direction();
+    return {Unit(axis[0]), Unit(axis[1]), Unit(axis[2]), Unit(std::cos(angle_rad / 2))};
+  }
+
+ private:
+  std::mt19937_64 random_;
+};
+
+/// A place and three directions at right angles: a measurement turned any way.
+struct Frame {
+  Point place, up, along, across;
+
+  Frame(Dice& dice, Point about)
+      : place(about + Point{dice.uniform(0, 1), dice.uniform(0, 1), dice.uniform(0, 1)}),
+        up(dice.direction()),
+        along(dice.across(up)),
+        across(cross(up, along)) {}
+  /// Coordinates in the frame.
+  [[nodiscard]] Point of(Point p) const {
+    const Point way = p - place;
+    return {dot(along, way), dot(up, way), dot(across, way)};
+  }
+  [[nodiscard]] Point at(double x, double y, double z) const {
+    return place + x * along + y * up + z * across;
+  }
+};
+
+}  // namespace kerf::extremes
