@@ -5,6 +5,8 @@
 #include <map>
 #include <utility>
 
+#include "controller/record/gnuplot.hpp"
+#include "controller/record/record_error.hpp"
 #include "hil/hil_error.hpp"
 #include "shared/posix/cores.hpp"
 #include "shared/posix/new_file.hpp"
@@ -42,6 +44,16 @@ int pin_lab(int core) {
 std::string lab_provenance() {
   return today() + ", " + processor_name() + ", " + kCompiler +
          " " KERF_FLAGS " (kernels of an instruction set always -O3).";
+}
+
+std::string lab_svg(const std::string& script) {
+  try {
+    return gnuplot_svg(script);
+  } catch (const RecordError& error) {
+    throw HilError(error.what());
+  } catch (const FileError& error) {
+    throw HilError(error.what());
+  }
 }
 
 LabOutput::LabOutput(const char* option, std::string path)

@@ -8,16 +8,12 @@
 
 #include <CLI/CLI.hpp>
 
-#include "controller/record/gnuplot.hpp"
-#include "controller/record/record_error.hpp"
 #include "controller/shell/progress_bar.hpp"
-#include "hil/hil_error.hpp"
 #include "hil/lab/accuracy/export.hpp"
 #include "hil/lab/accuracy/page.hpp"
 #include "hil/lab/accuracy/plot.hpp"
 #include "hil/lab/accuracy/study.hpp"
 #include "hil/lab/lab_run.hpp"
-#include "shared/posix/new_file.hpp"
 
 namespace kerf::accuracy {
 namespace {
@@ -32,16 +28,6 @@ std::string line_of(const Entry& entry) {
                 entry.times.p99_ns / 1e3, *entry.find("force_vs_theory_rms") * 100,
                 *entry.find("force_direction_rms"), *entry.find("loop_tool_rms"));
   return text;
-}
-
-std::string picture_of(const std::vector<Entry>& entries) {
-  try {
-    return gnuplot_svg(plot_script(entries));
-  } catch (const RecordError& error) {
-    throw HilError(error.what());
-  } catch (const FileError& error) {
-    throw HilError(error.what());
-  }
 }
 
 }  // namespace
@@ -82,7 +68,7 @@ int Command::run(std::ostream& out) const {
     const auto folder = std::filesystem::absolute(page_).parent_path();
     as_page.write(page(entries, std::filesystem::absolute(plot).lexically_proximate(folder)));
   }
-  if (!plot.empty()) as_plot.write(picture_of(entries));
+  if (!plot.empty()) as_plot.write(lab_svg(plot_script(entries)));
   return 0;
 }
 

@@ -23,6 +23,9 @@ class Led {
     return proxy() - hand;
   }
 
+  /// Takes the proxy to a place that is free.
+  void start(Point at) { pose_.centre = place_of<N>(at); }
+
   [[nodiscard]] Point proxy() const { return point_of<N>(pose_.centre); }
   [[nodiscard]] const ProxyPose<N>& pose() const { return pose_; }
   [[nodiscard]] const Swept<N>& swept() const { return swept_; }

@@ -10,7 +10,8 @@
 #include "controller/kernel/proxy/plane.hpp"
 #include "controller/kernel/proxy/tool_turn.hpp"
 
-/// Places, directions and turns in plain double, and random ones. Lengths in units of contact space.
+/// Places, directions and turns in plain double, and random ones. Lengths in units of contact
+/// space.
 namespace kerf::extremes {
 
 using Point = std::array<double, 3>;

@@ -4,7 +4,8 @@
 #include <functional>
 #include <optional>
 #include <string>
-#include <utility>
+
+#include "shared/volume/voxel_grid.hpp"
 
 namespace kerf::extremes {
 
@@ -27,11 +28,13 @@ using Told = std::function<void(Row)>;
 struct Effort {
   int walls = 500;  ///< of each kind of wall and tool, 500 ticks at each: a million ticks in all
   int tilts = 100;
-  int slides = 10;      ///< over each bump
+  int slides = 10;        ///< over each bump
   int tick_count = 2000;  ///< that are timed
-  int phases = 64;      ///< of the ticks along a stroke
+  int phases = 64;        ///< of the ticks along a stroke
+  VoxelGrid phantom{256, 256, 161};
+  double hand_seconds = 8;
 
-  [[nodiscard]] static Effort quick() { return {5, 8, 1, 200, 8}; }
+  [[nodiscard]] static Effort quick() { return {5, 8, 1, 200, 8, {128, 128, 80}, 4}; }
 };
 
 }  // namespace kerf::extremes

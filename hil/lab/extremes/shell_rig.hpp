@@ -81,8 +81,7 @@ class ShellRig {
   [[nodiscard]] ShellVolume<N> volume_of(const Body& body) {
     memory_.hold(shell_);
     ShellVolume<N> volume;
-    volume.field = {body.grid, body.density.data(), density_scale(kIso),
-                    map_.bricks()};
+    volume.field = {body.grid, body.density.data(), density_scale(kIso), map_.bricks()};
     for (std::size_t axis = 0; axis < 3; ++axis) {
       volume.frame.voxel_from_contact.row[axis][axis] = typename N::Ratio(1);
     }

@@ -82,7 +82,8 @@ void measure_ticks(const Effort& effort, const Told& told) {
     state.pose = {place_of<N>({200, 80, 128}), {}};
     // Half a unit a tick: 50 mm/s.
     const auto place = [&](int i) { return bench::around(kGrid, 16, i, 580); };
-    for (int i = 0; i < 40; ++i) bench::use(follow(plan, state, rig.field(), goal_at(place(0))).probes);
+    for (int i = 0; i < 40; ++i)
+      bench::use(follow(plan, state, rig.field(), goal_at(place(0))).probes);
     const TickTimes times = time_ticks(
         effort.tick_count, [] {},
         [&](int i) { bench::use(follow(plan, state, rig.field(), goal_at(place(i))).probes); });
@@ -91,9 +92,9 @@ void measure_ticks(const Effort& effort, const Told& told) {
   }
   {
     const accuracy::AnalyticVolume volume{kGrid, 0.1, ball.density};
-    const auto paper = accuracy::contact_method({.storage = accuracy::Storage::aligned,
-                                                 .voxel_mm = volume.voxel_mm},
-                                                volume, accuracy::ball_tool(0.8, 0.1));
+    const auto paper = accuracy::contact_method(
+        {.storage = accuracy::Storage::aligned, .voxel_mm = volume.voxel_mm}, volume,
+        accuracy::ball_tool(0.8, 0.1));
     const TickTimes times = time_ticks(
         effort.tick_count, [] {},
         [&](int i) {
@@ -104,7 +105,8 @@ void measure_ticks(const Effort& effort, const Told& told) {
     row("paper, sliding at 50 mm/s: p99", times.p99_ns / 1e3, std::nullopt);
   }
   constexpr double kFace = 96.6;
-  const Body half{kGrid, bench::densities(kGrid, [](double, double, double z) { return kFace - z; })};
+  const Body half{kGrid,
+                  bench::densities(kGrid, [](double, double, double z) { return kFace - z; })};
   const int ticks = 10 * effort.tick_count;
   row("proxy, ball, costliest of random ticks", worst_us({}, half, kFace, ticks), 60, 40);
   row("proxy, turning cylinder, costliest of random ticks",

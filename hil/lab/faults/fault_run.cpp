@@ -4,9 +4,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cstddef>
-#include <deque>
 #include <memory>
-#include <span>
 
 #include "controller/device/make_driver.hpp"
 #include "controller/scene/compile.hpp"
@@ -18,6 +16,7 @@
 #include "hil/devmodel/wooden_model.hpp"
 #include "hil/emulator.hpp"
 #include "hil/fault/faulty_device.hpp"
+#include "hil/lab/direct_port.hpp"
 #include "hil/lab/faults/contract.hpp"
 
 namespace kerf::faults {
@@ -46,38 +45,6 @@ Emulator make_emulator(const Subject& subject, std::uint32_t seed) {
   params.dock_rad = subject.scene.device.dock_rad;
   return {params, subject.hand};
 }
-
-/// The port to a device in the same process.
-class DirectPort final : public PacketPort {
- public:
-  explicit DirectPort(FaultyDevice& device) : device_(device) {}
-
-  /// One bus cycle of the device; what it says waits here.
-  void cycle() {
-    device_.advance(1);
-    for (auto packet = device_.next_packet(); !packet.empty(); packet = device_.next_packet()) {
-      waiting_.emplace_back(packet.begin(), packet.end());
-    }
-  }
-
-  std::size_t receive(std::span<std::uint8_t> out) noexcept override {
-    if (waiting_.empty()) return 0;
-    const std::vector<std::uint8_t> packet = std::move(waiting_.front());
-    waiting_.pop_front();
-    std::copy_n(packet.begin(), std::min(packet.size(), out.size()), out.begin());
-    return packet.size();
-  }
-  bool send(std::span<const std::uint8_t> packet) noexcept override {
-    device_.receive(packet);
-    return true;
-  }
-  [[nodiscard]] bool closed() const noexcept override { return false; }
-  [[nodiscard]] bool wait(int) noexcept override { return !waiting_.empty(); }
-
- private:
-  FaultyDevice& device_;
-  std::deque<std::vector<std::uint8_t>> waiting_;
-};
 
 /// Whether the motors' true force need not follow the commands under this script: a sensor tells of
 /// another pose than the true one, or commands do not arrive.

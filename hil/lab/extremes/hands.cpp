@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "hil/lab/extremes/hands.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <utility>
+
+#include "controller/scene/scene_error.hpp"
+#include "controller/scene/scene_load.hpp"
+#include "hil/hand_script_file.hpp"
+#include "hil/hil_error.hpp"
+#include "hil/lab/extremes/points.hpp"
+
+namespace kerf::extremes {
+namespace {
+
+Scene scene_of(const Effort& effort) {
+  try {
+    return load_scene("scenes/proxy.toml", {.phantom_size = effort.phantom});
+  } catch (const SceneError& error) {
+    throw HilError(error.what());
+  }
+}
+
+void tell(const HandRun& run, const Told& told) {
+  double peak_n = 0, step_n = 0;
+  std::size_t contact = 0;
+  const HandTick* before = nullptr;
+  for (const HandTick& tick : run.ticks) {
+    const Point& f = tick.force_n;
+    peak_n = std::max(peak_n, length(f));
+    contact += tick.contact ? 1 : 0;
+    if (before != nullptr) step_n = std::max(step_n, length(f - before->force_n));
+    before = &tick;
+  }
+  const Chatter chatter = chatter_of(run, kChatterHz);
+  const auto row = [&](const char* what, double value, const char* unit,
+                       std::optional<double> must = std::nullopt) {
+    told({"hands", run.name + what, value, unit, must, {}});
+  };
+  row(": in contact", 100 * double(contact) / double(run.ticks.size()), "%");
+  row(": peak force", peak_n, "N");
+  row(": largest step of the force in a tick", step_n, "N");
+  row(": removed", run.ticks.empty() ? 0 : run.ticks.back().removed_mm3, "mm^3");
+  row(": force above 150 Hz over the mean", 100 * chatter.share, "%", 2);
+  row(": the same, worst window of 0.128 s", 100 * chatter.worst, "%");
+  row(": windows in contact", chatter.windows, "1");
+  row(": ticks with a fault", double(run.faults), "ticks", 0);
+}
+
+}  // namespace
+
+std::vector<HandRun> try_hands(const Effort& effort, const Told& told) {
+  const Scene scene = scene_of(effort);
+  std::vector<HandRun> runs;
+  for (const char* name : {"touch", "slide", "groove", "cut_cavity", "jerk"}) {
+    HandScript hand = read_hand_script(std::string("scenes/hands/") + name + ".toml");
+    hand.unit_mm = hand_unit_mm(scene);
+    HandRun run = run_hand(scene, hand, effort.hand_seconds);
+    run.name = name;
+    tell(run, told);
+    runs.push_back(std::move(run));
+  }
+  return runs;
+}
+
+}  // namespace kerf::extremes

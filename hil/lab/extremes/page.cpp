@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "hil/lab/extremes/page.hpp"
+
+#include <cstdio>
+
+#include "hil/lab/lab_run.hpp"
+
+namespace kerf::extremes {
+namespace {
+
+constexpr const char* kAbout = R"(# Contact
+
+Made by `./kerf lab extremes --page docs/contact.md`; every figure comes from one run, nothing is typed by
+hand. But for the times of ticks a run repeats bit for bit. `--report` writes the rows as JSON, `--only` measures
+some groups of them, and the command exits with 1 where a limit is not kept.
+
+The swept proxy (`[force] model = "proxy"`) keeps the whole tool out of the solid and pulls the hand to it by a
+spring; the paper's force (`"paper"`) adds up the density's gradient where the tool is. Both are measured as the
+servo runs them: fixed point, the fastest kernels of this machine. A voxel is 0.1 mm, a tick 1 ms and the tool a
+ball of 16 voxels unless said; density rises over two voxels at a face.
+
+)";
+
+constexpr const char* kCompared = R"(## The paper's force and the swept proxy
+
+![Both forces on the same motions](%s)
+
+A hand that presses on loses the paper's force. It grows with the area in touch, here to %s N, and ends where the
+ball is wholly inside; behind a wall of two voxels it pushes onward. Of a press of 3 mm it holds nothing back on %s mm
+in the thick wall and %s mm at the thin one. The proxy stays in front, and its force grows with the depth.
+
+A stroke whose step is wider than the zone of force can pass the face between two ticks. From these speeds on some
+phase of the ticks is unfelt; the proxy was tried up to the 10 m/s at which the supervisor stops every hand.
+
+| update rate | paper, %s | paper, %s | proxy, both |
+|---:|---:|---:|---:|
+%s
+On a slide over a smooth ball both are smooth: at 50 mm/s the force steps by %s %% (paper) and %s %% (proxy) of its
+mean, within %s and %s degrees of the normal.
+
+)";
+
+struct About {
+  const char* group;
+  const char* title;
+  const char* text;
+};
+constexpr About kGroups[] = {
+    {"walls", "Walls",
+     "Random steps of 0.1 to 10 m/s at a tilted wall, the cylinder turned at random too; no "
+     "supervisor."},
+    {"rests", "Where a ball comes to rest",
+     "Against the ideal solid, tilted anyhow; on edges against the volume's own iso-surface, since "
+     "trilinear\n"
+     "density holds no sharp edge."},
+    {"slides", "Slides",
+     "The step is of the force from tick to tick over its mean; that of the direction alone is "
+     "1.04 % at R 40 and\n"
+     "4.5 % at R 14. `CT` has edges blurred by a deviation of one voxel, and noise of 2 %."},
+    {"shapes", "Tools that are no balls",
+     "At rest on flats of any tilt; limits are 1.5 times those of the ball."},
+    {"ticks", "Ticks",
+     "On 256 x 256 x 161 voxels. The costliest ticks are picked from random ones and repeated, and "
+     "the fastest\n"
+     "repetition counts."},
+    {"hands", "Hands",
+     "An emulated Omni, its driver and the whole servo in virtual time, `scenes/proxy.toml`. Force "
+     "above 150 Hz\n"
+     "is rms, by windows of 0.128 s wholly in contact. A count of an encoder is up to 0.06 mm, or "
+     "0.024 N."},
+};
+
+std::string number(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, value < 1000 ? "%.3g" : "%.0f", value);
+  return text;
+}
+
+std::string cell(const std::optional<double>& limit) {
+  return limit ? number(*limit) : "";
+}
+
+std::string table_of(const std::vector<Row>& rows, const std::string& group) {
+  std::string table = "| what | value | | must | aim | |\n|---|---:|---|---:|---:|---|\n";
+  for (const Row& row : rows) {
+    if (row.group != group) continue;
+    const char* verdict = !row.must ? "" : !row.pass() ? "**missed**" : "kept";
+    table += "| " + row.name + " | " + number(row.value) + " | " +
+             (row.unit == "1" ? "" : row.unit) + " | " + cell(row.must) + " | " + cell(row.aim) +
+             " | " + verdict + " |\n";
+  }
+  return table + "\n";
+}
+
+std::string speed(const std::optional<double>& mm_per_s) {
+  return mm_per_s ? number(*mm_per_s) + " mm/s" : "never";
+}
+
+std::string compared(const Comparison& comparison, const std::string& plot) {
+  const Wall &thick = comparison.walls[0], &thin = comparison.walls[1];
+  std::string speeds;
+  for (std::size_t i = 0; i < thick.losses.size(); ++i) {
+    const Loss &at = thick.losses[i], &also = thin.losses[i];
+    speeds += "| " + number(at.rate_hz) + " Hz | " + speed(at.paper_mm_per_s) + " | " +
+              speed(also.paper_mm_per_s) + " | " +
+              speed(at.proxy_mm_per_s ? at.proxy_mm_per_s : also.proxy_mm_per_s) + " |\n";
+  }
+  const Slide& slide = comparison.slide;
+  char text[4096];
+  std::snprintf(text, sizeof text, kCompared, plot.c_str(), number(thick.paper_most_n).c_str(),
+                number(thick.paper_unfelt_mm).c_str(), number(thin.paper_unfelt_mm).c_str(),
+                thick.name.c_str(), thin.name.c_str(), speeds.c_str(),
+                number(100 * slide.paper_step).c_str(), number(100 * slide.proxy_step).c_str(),
+                number(slide.paper_degrees).c_str(), number(slide.proxy_degrees).c_str());
+  return text;
+}
+
+}  // namespace
+
+std::string page(const std::vector<Row>& rows, const Comparison& comparison,
+                 const std::string& plot, const std::string& hands_plot) {
+  std::string text = kAbout + lab_provenance() + "\n\n" + compared(comparison, plot);
+  for (const About& about : kGroups) {
+    text += std::string("## ") + about.title + "\n\n" + about.text + "\n\n";
+    if (std::string(about.group) == "hands") {
+      text += "![Height and force of each hand](" + hands_plot + ")\n\n";
+    }
+    text += table_of(rows, about.group);
+  }
+  text.pop_back();
+  return text;
+}
+
+}  // namespace kerf::extremes

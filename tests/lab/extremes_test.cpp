@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include <doctest/doctest.h>
+#include <nlohmann/json.hpp>
+#include <unistd.h>
+
+#include "hil/lab/extremes/comparison.hpp"
+#include "hil/lab/program.hpp"
+
+using namespace kerf::extremes;
+
+namespace {
+
+struct Answer {
+  int code;
+  std::string said, complained;
+};
+
+Answer extremes(std::vector<const char*> arguments) {
+  arguments.insert(arguments.begin(), {"kerf-lab", "extremes"});
+  std::ostringstream out, err;
+  const int code = kerf::run_lab(static_cast<int>(arguments.size()), arguments.data(), out, err);
+  return {code, out.str(), err.str()};
+}
+
+}  // namespace
+
+TEST_CASE("a row passes up to its limit; one without a limit is only told") {
+  CHECK(Row{"g", "n", 2, "1", 2, 1}.pass());
+  CHECK_FALSE(Row{"g", "n", 2.001, "1", 2, 1}.pass());
+  CHECK(Row{"g", "n", 1e9, "1", {}, {}}.pass());
+}
+
+TEST_CASE("extremes refuses what it cannot do before anything is measured") {
+  CHECK(extremes({"--only", "wall"}).code == 2);
+  CHECK(extremes({"--only", "walls", "--page", "contact.md"}).code == 2);
+  const Answer answer = extremes({"--page", "/nonexistent/contact.md"});
+  CHECK(answer.code == 2);
+  CHECK(answer.said.empty());
+  CHECK(answer.complained.find("/nonexistent/contact.md: cannot be written") != std::string::npos);
+}
+
+TEST_CASE("the report has each row with its limit and whether it is kept, and the code says so") {
+  const auto file = std::filesystem::temp_directory_path() /
+                    ("kerf-extremes-" + std::to_string(getpid()) + ".json");
+  const Answer answer = extremes({"--quick", "--only", "slides", "--report", file.c_str()});
+  std::ifstream stream(file);
+  const auto rows = nlohmann::json::parse(stream)["rows"];
+  std::filesystem::remove(file);
+  CHECK(rows.size() == 12);
+  bool all = true;
+  for (const auto& row : rows) {
+    CHECK(row["group"] == "slides");
+    CHECK(row["pass"] == (row["value"] <= row["limit"]));
+    all = all && row["pass"];
+    CHECK(answer.said.find(row["name"]) != std::string::npos);
+  }
+  CHECK(answer.code == (all ? 0 : 1));
+}
+
+TEST_CASE("the paper's force ends inside of a wall and can be passed; the proxy's does not") {
+  const Comparison comparison = compare(Effort::quick(), [](const Row&) {});
+  for (const Wall& wall : comparison.walls) {
+    CHECK(std::abs(wall.presses.back().paper_n) < 1e-6);
+    CHECK(wall.presses.back().proxy_n ==
+          doctest::Approx(0.4 * wall.presses.back().depth_mm).epsilon(0.01));
+    double before = 0;
+    for (const Loss& loss : wall.losses) {
+      CHECK_FALSE(loss.proxy_mm_per_s);
+      REQUIRE(loss.paper_mm_per_s);
+      CHECK(*loss.paper_mm_per_s > before);  // a higher rate helps
+      before = *loss.paper_mm_per_s;
+    }
+  }
+  // The zone of force on a thick wall is the ball's diameter and the width of its edge.
+  CHECK(*comparison.walls[0].losses.back().paper_mm_per_s ==
+        doctest::Approx(1000 * (1.6 + 0.4)).epsilon(0.15));
+}
