@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -12,10 +11,11 @@
 
 #include "controller/scene/compile.hpp"
 #include "controller/scene/scene.hpp"
-#include "controller/servo/device_report.hpp"
-#include "hil/devmodel/omni_arm.hpp"
+#include "hil/lab/fake_arm.hpp"
 
 namespace kerf::test {
+
+using kerf::arm_at, kerf::FakeArm, kerf::kDockTicks;
 
 inline constexpr double kVoxelMm = 0.125;
 
@@ -74,58 +74,6 @@ inline Scene half_space_scene(int edge = 64) {
   scene.cut.model = CutModel::none;
   scene.device.torque_scale = std::array{0.342, 0.342, 0.342};
   return scene;
-}
-
-/// A device that is where one puts it: counts from the emulator's own inverse kinematics.
-class FakeArm {
- public:
-  /// The stylus in the inkwell, buttons up, gimbal centred.
-  [[nodiscard]] DeviceReport docked() {
-    const auto& dock = omni::kDockRad;
-    return report_of({dock[0], dock[1], dock[2]}, true);
-  }
-  /// The tip at a place of the device's workspace, to the nearest count.
-  [[nodiscard]] DeviceReport at(double x_mm, double y_mm, double z_mm) {
-    return report_of(arm_.joints_rad({x_mm, y_mm, z_mm}), false);
-  }
-
- private:
-  DeviceReport report_of(JointVec<double> q, bool docked) {
-    const std::array<double, 3> joints{q.x, q.y, q.z};
-    DeviceReport report;
-    report.fresh = true;
-    report.parked = docked;
-    report.counter = ++counter_;
-    report.wiper_a = report.wiper_b = {0x8000, 0x8000, 0x8000};
-    for (std::size_t i = 0; i < 3; ++i) {
-      const double turned = (joints[i] - omni::kDockRad[i]) / omni::kRadPerCount;
-      const auto counts = kPowerUp[i] + omni::kEncoderSign[i] * std::lround(turned);
-      report.encoder[i] = static_cast<std::int16_t>(counts);  // wraps as the device does
-    }
-    return report;
-  }
-
-  static constexpr std::array<long, 3> kPowerUp{32760, -32700, 32700};
-  OmniArm arm_;
-  std::uint32_t counter_ = 0;
-};
-
-inline constexpr int kDockTicks = 60;  ///< enough rest in the inkwell to be calibrated at 1 kHz
-
-/// Docks, leaves the inkwell, waits there until the force is faded in.
-inline void arm_at(Servo& servo, FakeArm& arm, double x_mm, double y_mm, double z_mm) {
-  for (int tick = 0; tick < kDockTicks; ++tick) static_cast<void>(servo.step(arm.docked()));
-  // The way from the inkwell is slow enough for the speed limit: held far away, then close.
-  constexpr int kSteps = 200;
-  const OmniArm geometry;
-  const auto& d = omni::kDockRad;
-  const auto start = geometry.tip_mm({d[0], d[1], d[2]});
-  for (int i = 1; i <= kSteps; ++i) {
-    const double s = double(i) / kSteps;
-    static_cast<void>(
-        servo.step(arm.at(start.x + s * (x_mm - start.x), start.y + s * (y_mm - start.y),
-                          start.z + s * (z_mm - start.z))));
-  }
 }
 
 [[nodiscard]] inline double length(const std::array<double, 3>& v) {
