@@ -35,11 +35,12 @@ template <void (*kMeasure)(const Effort&, const Told&)>
 void rows_only(const Effort& effort, const Told& told, Findings&) {
   kMeasure(effort, told);
 }
-constexpr std::array<Group, 7> kGroups{{
+constexpr std::array<Group, 8> kGroups{{
     {"walls", rows_only<measure_walls>},
     {"rests", rows_only<measure_rests>},
     {"slides", rows_only<measure_slides>},
     {"shapes", rows_only<measure_shapes>},
+    {"cutting", rows_only<measure_cutting>},
     {"ticks", rows_only<measure_ticks>},
     {"paper", [](const Effort& effort, const Told& told,
                  Findings& findings) { findings.comparison = compare(effort, told); }},

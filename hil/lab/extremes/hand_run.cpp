@@ -2,6 +2,7 @@
 #include "hil/lab/extremes/hand_run.hpp"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <complex>
 #include <cstddef>
@@ -65,7 +66,10 @@ HandRun run_hand(Scene scene, const HandScript& hand, double seconds) {
   driver->start();
   while (static_cast<std::int64_t>(run.ticks.size()) < ticks) {
     for (int cycle = 0; cycle < cycles_per_tick; ++cycle) port.cycle();
-    const ServoOutput out = servo->step(driver->read());
+    const DeviceReport report = driver->read();
+    const auto begin = std::chrono::steady_clock::now();
+    const ServoOutput out = servo->step(report);
+    const std::chrono::duration<double, std::micro> took = std::chrono::steady_clock::now() - begin;
     driver->command(out);
     if (!out.started) {
       if (emulator.stats().cycles > 20 * kCyclesPerSecond) break;  // never calibrated
@@ -76,8 +80,8 @@ HandRun run_hand(Scene scene, const HandScript& hand, double seconds) {
       removed_mm3 += mm3_per_step[v] * static_cast<double>(out.removed_by_volume[v]);
     }
     const double height_mm = out.position_mm[1] - scene.device.offset_mm[1];
-    run.ticks.push_back(
-        {height_mm, height_mm + out.proxy_offset_mm[1], out.force_n, removed_mm3, out.contact});
+    run.ticks.push_back({height_mm, height_mm + out.proxy_offset_mm[1], out.force_n, removed_mm3,
+                         out.contact, took.count()});
   }
   return run;
 }

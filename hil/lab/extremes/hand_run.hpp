@@ -18,6 +18,7 @@ struct HandTick {
   std::array<double, 3> force_n{};
   double removed_mm3 = 0;  ///< since the start
   bool contact = false;
+  double compute_us = 0;  ///< of the servo step, ticks back to back
 };
 
 /// A scripted hand at an emulated Omni, its driver and the whole servo step in virtual time.

@@ -15,14 +15,6 @@
 namespace kerf::extremes {
 namespace {
 
-Scene scene_of(const Effort& effort) {
-  try {
-    return load_scene("scenes/proxy.toml", {.phantom_size = effort.phantom});
-  } catch (const SceneError& error) {
-    throw HilError(error.what());
-  }
-}
-
 void tell(const HandRun& run, const Told& told) {
   double peak_n = 0, step_n = 0;
   std::size_t contact = 0;
@@ -51,17 +43,37 @@ void tell(const HandRun& run, const Told& told) {
 
 }  // namespace
 
-std::vector<HandRun> try_hands(const Effort& effort, const Told& told) {
-  const Scene scene = scene_of(effort);
-  std::vector<HandRun> runs;
-  for (const char* name : {"touch", "slide", "groove", "cut_cavity", "jerk"}) {
-    HandScript hand = read_hand_script(std::string("scenes/hands/") + name + ".toml");
-    hand.unit_mm = hand_unit_mm(scene);
-    HandRun run = run_hand(scene, hand, effort.hand_seconds);
-    run.name = name;
-    tell(run, told);
-    runs.push_back(std::move(run));
+Scene hand_scene(const Effort& effort, CutModel cut) {
+  try {
+    Scene scene = load_scene("scenes/proxy.toml", {.phantom_size = effort.phantom});
+    scene.cut.model = cut;
+    return scene;
+  } catch (const SceneError& error) {
+    throw HilError(error.what());
   }
+}
+
+HandRun run_hand(const Scene& scene, const std::string& name, const Effort& effort) {
+  HandScript hand = read_hand_script("scenes/hands/" + name + ".toml");
+  hand.unit_mm = hand_unit_mm(scene);
+  HandRun run = run_hand(scene, hand, effort.hand_seconds);
+  run.name = name;
+  return run;
+}
+
+std::vector<HandRun> try_hands(const Effort& effort, const Told& told) {
+  const Scene feeling = hand_scene(effort, CutModel::none);
+  const Scene cutting = hand_scene(effort, CutModel::preston);
+  std::vector<HandRun> runs;
+  const auto run = [&](const Scene& scene, const char* name) {
+    runs.push_back(run_hand(scene, name, effort));
+    tell(runs.back(), told);
+  };
+  run(feeling, "touch");
+  run(feeling, "slide");
+  run(cutting, "groove");
+  run(cutting, "cut_cavity");
+  run(feeling, "jerk");
   return runs;
 }
 

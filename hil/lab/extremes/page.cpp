@@ -59,12 +59,18 @@ constexpr About kGroups[] = {
      "4.5 % at R 14. `CT` has edges blurred by a deviation of one voxel, and noise of 2 %."},
     {"shapes", "Tools that are no balls",
      "At rest on flats of any tilt; limits are 1.5 times those of the ball."},
+    {"cutting", "Cutting by force",
+     "The whole servo with `[cut] model = \"preston\"`, led by hand: a ball of radius 1 mm at a "
+     "flat, and at the\n"
+     "phantom's crown at the rate of enamel."},
     {"ticks", "Ticks",
      "On 256 x 256 x 161 voxels. The costliest ticks are picked from random ones and repeated, and "
      "the fastest\n"
      "repetition counts."},
     {"hands", "Hands",
-     "An emulated Omni, its driver and the whole servo in virtual time, `scenes/proxy.toml`. Force "
+     "An emulated Omni, its driver and the whole servo in virtual time, `scenes/proxy.toml`; "
+     "`groove` and\n"
+     "`cut_cavity` with `[cut] model = \"preston\"`. Force "
      "above 150 Hz\n"
      "is rms, by windows of 0.128 s wholly in contact. A count of an encoder is up to 0.06 mm, or "
      "0.024 N."},
