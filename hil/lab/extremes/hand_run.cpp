@@ -15,6 +15,7 @@
 #include "hil/devmodel/bus_cycle.hpp"
 #include "hil/devmodel/omni_model.hpp"
 #include "hil/emulator.hpp"
+#include "hil/hil_error.hpp"
 #include "hil/lab/direct_port.hpp"
 #include "hil/lab/extremes/points.hpp"
 
@@ -22,6 +23,7 @@ namespace kerf::extremes {
 namespace {
 
 constexpr std::size_t kWindow = 128;
+constexpr std::int64_t kPatienceS = 20;  // until the hand has calibrated and left the inkwell
 
 /// Power of one axis above a cutoff in cycles a tick: of the periodogram under a Hann window, which
 /// keeps what is slow from leaking up.
@@ -72,8 +74,9 @@ HandRun run_hand(Scene scene, const HandScript& hand, double seconds) {
     const std::chrono::duration<double, std::micro> took = std::chrono::steady_clock::now() - begin;
     driver->command(out);
     if (!out.started) {
-      if (emulator.stats().cycles > 20 * kCyclesPerSecond) break;  // never calibrated
-      continue;
+      if (emulator.stats().cycles < kPatienceS * kCyclesPerSecond) continue;
+      throw HilError(
+          "the emulated hand: did not take up the device within 20 s; see [device] dock_rad");
     }
     run.faults += out.fault == Fault::none ? 0 : 1;
     for (std::size_t v = 0; v < mm3_per_step.size(); ++v) {

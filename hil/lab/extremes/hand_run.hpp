@@ -30,7 +30,8 @@ struct HandRun {
 };
 
 /// `scene` is for an Omni; its torques are set to those of the emulated unit. The same arguments
-/// give the same run.
+/// give the same run, but for its times; it has at least one tick. Throws HilError where the hand
+/// does not get to its script.
 [[nodiscard]] HandRun run_hand(Scene scene, const HandScript& hand, double seconds);
 
 /// Force above a frequency, over the mean force, in windows of 128 ticks wholly in contact.

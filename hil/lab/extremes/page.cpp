@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "hil/lab/extremes/page.hpp"
 
+#include <algorithm>
 #include <cstdio>
 
 #include "hil/lab/lab_run.hpp"
@@ -121,11 +122,26 @@ std::string compared(const Comparison& comparison, const std::string& plot) {
   return text;
 }
 
+/// How many limits are kept, and which are not.
+std::string verdict(const std::vector<Row>& rows) {
+  const auto judged = std::ranges::count_if(rows, [](const Row& row) { return bool(row.must); });
+  const auto missed = std::ranges::count_if(rows, [](const Row& row) { return !row.pass(); });
+  std::string text = "Of " + std::to_string(judged) + " limits " + std::to_string(judged - missed) +
+                     " are kept" + (missed > 0 ? "; missed are\n\n" : ".\n");
+  for (const Row& row : rows) {
+    if (row.pass()) continue;
+    text += "* " + row.group + ", " + row.name + ": " + number(row.value) + " " + row.unit +
+            " instead of " + cell(row.must) + "\n";
+  }
+  return text + "\n";
+}
+
 }  // namespace
 
 std::string page(const std::vector<Row>& rows, const Comparison& comparison,
                  const std::string& plot, const std::string& hands_plot) {
-  std::string text = kAbout + lab_provenance() + "\n\n" + compared(comparison, plot);
+  std::string text =
+      kAbout + lab_provenance() + "\n\n" + verdict(rows) + compared(comparison, plot);
   for (const About& about : kGroups) {
     text += std::string("## ") + about.title + "\n\n" + about.text + "\n\n";
     if (std::string(about.group) == "hands") {

@@ -71,7 +71,7 @@ void draw(std::ostream& script, const Slide& slide) {
 
 /// From shortly before the first contact on.
 void draw(std::ostream& script, const HandRun& run, bool cuts) {
-  constexpr std::size_t kEvery = 20;  // ticks: what the eye can tell
+  constexpr std::size_t kEvery = 32;  // ticks: what the eye can tell
   constexpr double kBeforeS = 0.3;
   const auto first = std::ranges::find_if(run.ticks, &HandTick::contact) - run.ticks.begin();
   const double begin = std::max(0.0, static_cast<double>(first) - kBeforeS * run.rate_hz);
@@ -88,10 +88,13 @@ void draw(std::ostream& script, const HandRun& run, bool cuts) {
          << kPaperLine << ", $hand using 1:3 title 'tool as felt' with " << kProxyLine
          << "\nset title '" << run.name
          << ": force (N)' noenhanced\nplot $hand using 1:4 notitle with " << kProxyLine << '\n';
-  if (!cuts) return;
-  script << "set title '" << run.name
-         << ": removed (mm^3)' noenhanced\nplot $hand using 1:5 notitle with " << kProxyLine
-         << '\n';
+  if (run.ticks.back().removed_mm3 > 0) {
+    script << "set title '" << run.name
+           << ": removed (mm^3)' noenhanced\nplot $hand using 1:5 notitle with " << kProxyLine
+           << '\n';
+  } else if (cuts) {
+    script << "set multiplot next\n";
+  }
 }
 
 }  // namespace
@@ -109,16 +112,17 @@ std::string plot_of(const Comparison& comparison) {
 std::string plot_of(const std::vector<HandRun>& hands) {
   bool cuts = false;
   for (const HandRun& run : hands) {
-    cuts = cuts || (!run.ticks.empty() && run.ticks.back().removed_mm3 > 0);
+    cuts = cuts || run.ticks.back().removed_mm3 > 0;
   }
   std::ostringstream script;
   const std::string layout = std::to_string(hands.size()) + (cuts ? ",3" : ",2");
   begin(script, 1100, 250 * static_cast<int>(hands.size()), layout.c_str());
-  script
-      << "set key right top\nset offsets 0,0,graph 0.15,graph 0.1\nset xlabel 's' offset 0,0.5\n";
+  // Room for the key, which the first picture has for all.
+  script << "unset grid\nset xtics 2\nset xlabel 's' offset 0,0.5\nset key right top\n"
+            "set offsets 0,0,graph 0.7,graph 0.1\n";
   for (const HandRun& run : hands) {
     draw(script, run, cuts);
-    script << "unset key\n";  // once is enough
+    script << "unset key\nset offsets 0,0,graph 0.15,graph 0.1\n";
   }
   script << "unset multiplot\n";
   return script.str();
