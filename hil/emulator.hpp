@@ -31,7 +31,7 @@ struct EmulatorStats {
 /// lock-step and a test run the same thing.
 ///
 /// The hand waits until the host has the device calibrated, helps where it must (homes a Falcon,
-/// presses the button of WoodenHaptics), and plays its script 0.05 s later. For a host that does
+/// presses the button of WoodenHaptics), and plays its script 0.15 s later. For a host that does
 /// not begin to calibrate it waits 2 s. Without a script the arm stays where it is. One thread;
 /// allocates only when constructed.
 class Emulator final : public PacketDevice {

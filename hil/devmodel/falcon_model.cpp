@@ -59,13 +59,14 @@ Calibration FalconModel::calibration() const noexcept {
 HandRoute FalconModel::route() const {
   // Out and in above the workpiece; then the centre button, for hosts that wait for it.
   HandStep press;
-  press.seconds = 0.1;
+  press.seconds = 0.15;
   press.button = 1;
   return {.rest_tip_mm = plant_.rest().tip_mm,
           .calibration = {hand_move({0, 20, 35}, 0.2), hand_move({0, 20, -35}, 0.3), press},
           .clear_y_mm = 20,
           .clear_z_mm = -20,
-          .cross_s = 0.1};
+          .cross_s = 0.1,
+          .approach_s = 0.15};
 }
 
 FalconReport FalconModel::report() const noexcept {

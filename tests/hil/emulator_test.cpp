@@ -71,11 +71,11 @@ TEST_CASE("twenty seconds of a script are the same bytes every time, and others 
   CHECK(first != twenty_seconds(params));
 }
 
-TEST_CASE("the hand waits for a calibrated host 0.05 s, for any other 2 s") {
+TEST_CASE("the hand waits for a calibrated host 0.15 s, for any other 2 s") {
   using Light = OmniCommand::Light;
   CHECK(undocked_after(OmniCommand{{}, false, Light::steady}) ==
-        doctest::Approx(0.05).epsilon(4e-2));
-  CHECK(undocked_after(OmniCommand{{}, true, Light::off}) == doctest::Approx(0.05).epsilon(4e-2));
+        doctest::Approx(0.15).epsilon(1e-2));
+  CHECK(undocked_after(OmniCommand{{}, true, Light::off}) == doctest::Approx(0.15).epsilon(1e-2));
   CHECK(undocked_after(OmniCommand{{}, false, Light::slow_flash}) ==
         doctest::Approx(2.0).epsilon(1e-3));
   CHECK(undocked_after(std::nullopt) == doctest::Approx(2.0).epsilon(1e-3));
@@ -91,7 +91,7 @@ TEST_CASE("without a hand the stylus stays in the inkwell") {
 TEST_CASE("the tip follows the script to the surface within friction and inertia") {
   Emulator emulator({}, cut_cavity());
   tell(emulator, {{}, true, OmniCommand::Light::steady});
-  emulator.advance(static_cast<int>((0.05 + 0.8) * kerf::omni::kBusCyclesPerSecond));
+  emulator.advance(static_cast<int>((0.15 + 0.8) * kerf::omni::kBusCyclesPerSecond));
   CHECK(norm(emulator.model().tip_mm() - DeviceVec<double>{0, 4, 0}) < 1.5);
   emulator.advance(8 * kerf::omni::kBusCyclesPerSecond);
   // One round later it comes up again: the target is 3 mm over the surface.
