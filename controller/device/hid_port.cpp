@@ -58,7 +58,7 @@ std::vector<Found> list_arms() {
   std::vector<Found> all;
   hid_device_info* const list = hid_enumerate(0, 0);
   for (const hid_device_info* about = list; about; about = about->next) {
-    if (!packet_bytes_of(about->vendor_id, about->product_id)) continue;
+    if (!about->path || !packet_bytes_of(about->vendor_id, about->product_id)) continue;
     all.push_back({about->path, narrow(about->serial_number)});
   }
   hid_free_enumeration(list);
