@@ -65,8 +65,7 @@ HandRoute FalconModel::route() const {
           .calibration = {hand_move({0, 20, 35}, 0.2), hand_move({0, 20, -35}, 0.3), press},
           .clear_y_mm = 20,
           .clear_z_mm = -20,
-          .cross_s = 0.1,
-          .approach_s = 0.15};
+          .cross_s = 0.1};
 }
 
 FalconReport FalconModel::report() const noexcept {
