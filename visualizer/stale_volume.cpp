@@ -17,7 +17,7 @@ namespace kerf {
 namespace {
 
 constexpr std::size_t kMostBoxes = 8192;       // some cuts between two pictures; more count as one
-constexpr std::size_t kMostTriangles = 65536;  // likewise
+constexpr std::size_t kMostTriangles = 32768;  // likewise
 // Voxels around boxes that are looked at together: a cut. Between boxes far apart is only air, and
 // in a larger one little to be left out.
 constexpr std::size_t kMostTogether = 64 * 64 * 64;

@@ -198,7 +198,10 @@ TEST_CASE("after any change the part that is drawn again makes the picture of dr
   const Place place;
   for (const std::string_view kind : renderer_kinds()) {
     CAPTURE(std::string(kind));
-    check_parts({.renderer = std::string(kind)}, {160, 120}, kEdits);
+    // What software GL draws slowly is small: to draw everything is most of the time.
+    const bool slow = kind == "blend" || kind == "slices";
+    check_parts({.renderer = std::string(kind)}, slow ? PictureSize{96, 72} : PictureSize{160, 120},
+                kEdits);
     check_parts({.renderer = std::string(kind),
                  .clip = {.on = true, .axis = 0, .at = 0.6},
                  .stereo = {.on = true}},
@@ -219,9 +222,9 @@ TEST_CASE("so it does after more changes than are told apart") {
     Picture picture(session, {.renderer = kind}, 4.0 / 3.0);
     const RenderTarget target({96, 72});
     static_cast<void>(picture.draw(session, {}, target));
-    for (int cut = 0; cut < 300; ++cut) {
+    for (int cut = 0; cut < 400; ++cut) {
       const VoxelIndex at{below(40), below(40), below(28)};
-      controller.cut(static_cast<std::size_t>(below(2)), {at, {at.x + 5, at.y + 5, at.z + 5}}, 0.4);
+      controller.cut(static_cast<std::size_t>(below(2)), {at, {at.x + 9, at.y + 9, at.z + 9}}, 0.9);
       session.poll();
       picture.update(session);
     }

@@ -58,6 +58,8 @@ double distance_to_tooth(glm::dvec3 at) {
 
 /// 0..1; falls to 0 over two voxels, which are `edge` long.
 double density_at(glm::dvec3 at, double edge) {
+  constexpr double kFarOut = 0.4;  // there is only air
+  if (std::max(std::abs(at.x), std::abs(at.y)) > kFarOut) return 0.0;
   const double distance = distance_to_tooth(at);
   const bool enamel = distance > -kEnamelThickness && at.z > kEnamelFrom;
   return (enamel ? kEnamel : kDentin) * std::clamp(0.5 - distance / (2.0 * edge), 0.0, 1.0);
