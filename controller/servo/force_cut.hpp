@@ -106,8 +106,8 @@ template <class N>
   }
 
   CuttingFriction<N> friction;
-  bool starves = false;
   const auto drive = cut_drive<N>(cut.press_n, rules.threshold_n, state.force_cut.spindle.ratio);
+  bool starves = drive > 0 && !(whole > 0);
   for (std::size_t v = 0; v < plan.volume_count; ++v) {
     if (!(weight[v] > 0)) continue;
     const PrestonPlan<N>& volume = rules.volume[v];
