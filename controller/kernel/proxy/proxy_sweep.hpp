@@ -82,8 +82,9 @@ struct Swept {
 ///
 /// At most kMaxProbes calls of `probe`. Coordinates within +-kContactLimit.
 ///
-/// Limit: what lies wholly inside of the tool is felt only when the tool leaves it, and then holds
-/// it.
+/// Limits: a loose bit of material less than 2.5 units across may slip in between the samples of
+/// the tool. What is wholly inside is not felt until the tool leaves it; from 2 units on it then
+/// may hold the tool. Into a slot without any play the tool may not find its way.
 template <class N, ContactField<N> Field>
 class ProxySweep {
   using Real = typename N::Real;
