@@ -134,16 +134,19 @@ inline constexpr double kSteepestSlope = 1.2;
 /// Minus the weighted lever reads no gradient and has no steps at the borders of cells, so it is a
 /// ball's normal. In a groove of the ball's own radius, however, the levers point out of its bottom
 /// whichever wall the ball is in: from 20 degrees between the two on the derivative of the peak
-/// takes over, wholly at 50. (From 30 to 60 the force steps by 5 % there instead of 2.)
+/// takes over, wholly at 50. (From 30 to 60 the force steps by 5 % there instead of 2.) Well below
+/// the iso, `height` under 0.45, its weights turn negative; clipped densities have none: levers
+/// again.
 template <class N>
 [[nodiscard]] constexpr ContactVec<typename N::Unit> ball_normal(
-    ContactVec<typename N::Unit> lever, ContactVec<typename N::Unit> downhill) noexcept {
+    ContactVec<typename N::Unit> lever, ContactVec<typename N::Unit> downhill,
+    typename N::Ratio height) noexcept {
   using Unit = typename N::Unit;
   using Ratio = typename N::Ratio;
   constexpr auto kFrom = static_cast<Unit>(0.9396926207859084);  // cosine of 20 degrees
   constexpr auto kTo = static_cast<Unit>(0.6427876096865394);    // and of 50
   const Unit cosine = dot(lever, downhill);
-  if (cosine >= kFrom) return lever;
+  if (cosine >= kFrom || height < Ratio(0.45) || downhill == ContactVec<Unit>{}) return lever;
   if (cosine <= kTo) return downhill;
   const Unit share = (kFrom - cosine) / (kFrom - kTo), rest = Unit(1) - share;
   const auto mixed = [&](Unit a, Unit b) { return Ratio(rest * a + share * b); };
@@ -160,14 +163,15 @@ template <class N>
   using Ratio = typename N::Ratio;
   const auto downhill = direction<N>(-means.rise);
   Plane<N> plane;
-  plane.normal = round ? ball_normal<N>(direction<N>(-means.lever), downhill) : downhill;
+  const Ratio height = peak_height(means, round);
+  plane.normal = round ? ball_normal<N>(direction<N>(-means.lever), downhill, height) : downhill;
   const auto along = [](Ratio rise, typename N::Unit n) { return multiply<Ratio>(rise, n); };
   const Ratio uphill = -(along(means.rise.x, plane.normal.x) + along(means.rise.y, plane.normal.y) +
                          along(means.rise.z, plane.normal.z));
   // v is half a ball's derivative.
   const Ratio slope =
       std::clamp(round ? uphill + uphill : uphill, Ratio(kFlattestSlope), Ratio(kSteepestSlope));
-  plane.depth = Real((peak_height(means, round) - Ratio(0.5)) / slope);
+  plane.depth = Real((height - Ratio(0.5)) / slope);
   plane.arm = {multiply<Real>(means.lever.x, reach), multiply<Real>(means.lever.y, reach),
                multiply<Real>(means.lever.z, reach)};
   return plane;
