@@ -131,24 +131,31 @@ template <class N>
 inline constexpr double kFlattestSlope = 0.2;
 inline constexpr double kSteepestSlope = 1.2;
 
+/// Share of the way from `from` to `to`, within 0 to 1; `to` lies below `from`.
+template <class N>
+[[nodiscard]] constexpr typename N::Unit falling_share(typename N::Unit value, double from,
+                                                       double to) noexcept {
+  using Unit = typename N::Unit;
+  const auto top = static_cast<Unit>(from), bottom = static_cast<Unit>(to);
+  return (top - std::clamp(value, bottom, top)) / (top - bottom);
+}
+
 /// Minus the weighted lever reads no gradient and has no steps at the borders of cells, so it is a
-/// ball's normal. In a groove of the ball's own radius, however, the levers point out of its bottom
-/// whichever wall the ball is in: from 20 degrees between the two on the derivative of the peak
-/// takes over, wholly at 50. (From 30 to 60 the force steps by 5 % there instead of 2.) Well below
-/// the iso, `height` under 0.45, its weights turn negative; clipped densities have none: levers
-/// again.
+/// ball's normal, and the only one that a wall of two voxels leaves right: behind its middle the
+/// gradient points on. In a groove of the ball's own radius, however, the levers point out of its
+/// bottom whichever wall the ball is in. There they are spread over half a turn and their mean is
+/// short, 2 / pi: from 0.85 to 0.7 of the reach, and from 20 to 50 degrees between the two, the
+/// derivative of the peak takes over. (From 30 to 60 the force steps by 5 % there instead of 2.)
 template <class N>
 [[nodiscard]] constexpr ContactVec<typename N::Unit> ball_normal(
-    ContactVec<typename N::Unit> lever, ContactVec<typename N::Unit> downhill,
-    typename N::Ratio height) noexcept {
+    const ShellMeans<N>& means, ContactVec<typename N::Unit> downhill) noexcept {
   using Unit = typename N::Unit;
   using Ratio = typename N::Ratio;
-  constexpr auto kFrom = static_cast<Unit>(0.9396926207859084);  // cosine of 20 degrees
-  constexpr auto kTo = static_cast<Unit>(0.6427876096865394);    // and of 50
-  const Unit cosine = dot(lever, downhill);
-  if (cosine >= kFrom || height < Ratio(0.45) || downhill == ContactVec<Unit>{}) return lever;
-  if (cosine <= kTo) return downhill;
-  const Unit share = (kFrom - cosine) / (kFrom - kTo), rest = Unit(1) - share;
+  const ContactVec<Unit> lever = direction<N>(-means.lever);
+  const Unit spread = falling_share<N>(Unit(std::min(norm(means.lever), Ratio(1))), 0.85, 0.7);
+  const Unit share = spread * falling_share<N>(dot(lever, downhill), 0.9397, 0.6428);
+  if (share <= Unit{} || downhill == ContactVec<Unit>{}) return lever;
+  const Unit rest = Unit(1) - share;
   const auto mixed = [&](Unit a, Unit b) { return Ratio(rest * a + share * b); };
   return direction<N>(ContactVec<Ratio>{mixed(lever.x, downhill.x), mixed(lever.y, downhill.y),
                                         mixed(lever.z, downhill.z)});
@@ -164,7 +171,7 @@ template <class N>
   const auto downhill = direction<N>(-means.rise);
   Plane<N> plane;
   const Ratio height = peak_height(means, round);
-  plane.normal = round ? ball_normal<N>(direction<N>(-means.lever), downhill, height) : downhill;
+  plane.normal = round ? ball_normal<N>(means, downhill) : downhill;
   const auto along = [](Ratio rise, typename N::Unit n) { return multiply<Ratio>(rise, n); };
   const Ratio uphill = -(along(means.rise.x, plane.normal.x) + along(means.rise.y, plane.normal.y) +
                          along(means.rise.z, plane.normal.z));
