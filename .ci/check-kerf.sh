@@ -183,6 +183,8 @@ expect 'and the known ones are listed' says 'controller emulator record recorder
 expect 'a program runs by its short name' kerf_gives 0 record plot --out "$lab/plot.svg"
 expect 'with its arguments' called "^record plot --out $lab/plot.svg"
 expect 'help is fine' kerf_gives 0 --help
+expect 'of a command too' kerf_gives 0 bench --help
+expect 'and is that of all' says '--device D'
 printf '#!/bin/sh\necho "found    omni at /dev/fw1"\necho "missing  /dev/fw1: Permission denied"\necho "         the cure"\n' \
   >"$lab/look"
 chmod +x "$lab/look" && ln -sf ../look "$lab/bin/kerf-controller"

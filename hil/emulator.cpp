@@ -21,7 +21,9 @@ void Emulator::guide_hand() noexcept {
   if (calibration == Calibration::needs_hand) hand_->calibrate();
   if (calibration == Calibration::done && !calibrated_at_) calibrated_at_ = stats_.cycles;
   const bool settled = calibrated_at_ && stats_.cycles - *calibrated_at_ >= kSettleCycles;
-  const bool in_vain = calibration != Calibration::needs_hand && stats_.cycles >= kPatienceCycles;
+  if (!host_since_ && stats_.commands + stats_.reports > 0) host_since_ = stats_.cycles;
+  const bool in_vain = calibration != Calibration::needs_hand && host_since_ &&
+                       stats_.cycles - *host_since_ >= kPatienceCycles;
   if (settled || in_vain) hand_->leave();
 }
 

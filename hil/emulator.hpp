@@ -32,8 +32,8 @@ struct EmulatorStats {
 ///
 /// The hand waits until the host has the device calibrated, helps where it must (homes a Falcon,
 /// presses the button of WoodenHaptics), and plays its script 0.15 s later. For a host that does
-/// not begin to calibrate it waits 2 s. Without a script the arm stays where it is. One thread;
-/// allocates only when constructed.
+/// not begin to calibrate it waits 2 s, and for a host at all as long as it takes. Without a script
+/// the arm stays where it is. One thread; allocates only when constructed.
 class Emulator final : public PacketDevice {
  public:
   template <std::derived_from<DeviceModel> Model>
@@ -58,7 +58,8 @@ class Emulator final : public PacketDevice {
   std::unique_ptr<DeviceModel> model_;
   std::optional<HandMotion> hand_;
   EmulatorStats stats_;
-  bool asked_ = false;  ///< for a packet, since the last `advance`
+  bool asked_ = false;                      ///< for a packet, since the last `advance`
+  std::optional<std::int64_t> host_since_;  ///< cycle of the first packet, of either side
   std::optional<std::int64_t> calibrated_at_;
 };
 

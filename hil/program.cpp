@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "hil/program.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <memory>
 #include <optional>
@@ -74,6 +75,17 @@ Emulator make_emulator(const EmulatorOptions& o) {
   return Emulator(make_device(o), script);
 }
 
+/// Faults of a device; one of its host can only be played where both are in one program.
+FaultScript faults_of(const EmulatorOptions& o) {
+  if (o.fault.empty()) return {};
+  FaultScript script = read_fault_script(o.fault);
+  if (std::ranges::count(script.faults, FaultKind::host_late, &DeviceFault::kind) > 0) {
+    throw HilError(o.fault + ": host_late: no device can hold up its host; use ./kerf lab faults " +
+                   "--scripts " + o.fault + ", or stop the controller (kill -STOP)");
+  }
+  return script;
+}
+
 /// Serves the clients of a port that is open already.
 template <class Server>
 void serve_clients(const EmulatorOptions& o, Server& server, const std::string& place,
@@ -114,7 +126,7 @@ void serve(const EmulatorOptions& o, const std::atomic<bool>& stop, std::ostream
            std::ostream& err) {
   if (!o.report.empty()) check_report(o.report);
   Emulator emulator = make_emulator(o);
-  FaultyDevice device(emulator, o.fault.empty() ? FaultScript{} : read_fault_script(o.fault));
+  FaultyDevice device(emulator, faults_of(o));
   if (!o.lockstep) {
     const std::string missing = make_real_time(o.priority, o.cpu);
     if (!missing.empty()) err << "kerf-emulator: warning: " << missing << std::endl;

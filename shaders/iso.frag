@@ -8,21 +8,17 @@
 in vec2 v_ndc;
 layout(location = 0) out vec4 o_colour;
 
-uniform sampler3D u_density;       // 0..1, inside a shell of air one voxel thick
-uniform usampler3D u_label;        // the same extent; 0 = none
-uniform usampler3D u_active_cell;  // 1 where a sample may reach iso
+uniform usampler3D u_active_cell;   // 1 where a sample may reach iso
 uniform sampler2DArray u_entry_mm;  // where the ray meets the first active cell
-uniform sampler2D u_palette;       // linear colour: row 0 by density, row 1 by label
 
 uniform mat4 u_texture_from_eye;   // mm to texture coordinates
-uniform vec3 u_texels;             // extent of u_density
+uniform vec3 u_texels;             // extent of the volume's textures
 uniform vec3 u_up_eye;             // world up
 uniform float u_near_mm;
 uniform float u_far_mm;
 uniform vec4 u_shown_eye;          // clip plane
 uniform float u_iso;
 uniform float u_step_vox;          // along the ray
-uniform bool u_has_labels;
 
 vec3 eye_direction_at(vec2 ndc);
 vec2 shown_mm(vec3 eye_direction);
@@ -31,11 +27,11 @@ vec3 lit(vec3 albedo, vec3 normal, vec3 to_eye, vec3 up_eye, float openness);
 vec3 srgb(vec3 linear);
 float window_depth(float eye_mm, float near_mm, float far_mm);
 vec3 gradient_at(vec3 texture_point);
+float density_at(vec3 texture_point);
+vec3 material_at(vec3 p, vec3 inward_texture);
 
 const float kCellVox = 8.0;
 const int kRefinements = 3;
-
-float density_at(vec3 texture_point) { return texture(u_density, texture_point).r; }
 
 // Regula falsi (Illinois) between a sample below iso and one at or above it.
 float refined_mm(vec3 origin, vec3 direction, float below_mm, float above_mm, float above) {
@@ -57,43 +53,6 @@ float refined_mm(vec3 origin, vec3 direction, float below_mm, float above_mm, fl
     }
   }
   return t;
-}
-
-// Colour of the labels around, blended so that their borders are smooth, times the share (alpha) of
-// voxels that have one.
-vec4 label_colour_at(vec3 texture_point) {
-  vec3 texel = texture_point * u_texels - 0.5;
-  ivec3 low = ivec3(floor(texel));
-  vec3 share = texel - vec3(low);
-  vec4 sum = vec4(0.0);
-  for (int corner = 0; corner < 8; ++corner) {
-    ivec3 side = ivec3(corner & 1, corner >> 1 & 1, corner >> 2);
-    uint label = texelFetch(u_label, low + side, 0).r;
-    vec3 weight = mix(1.0 - share, share, vec3(side));
-    float w = label != 0u ? weight.x * weight.y * weight.z : 0.0;
-    sum += w * vec4(texelFetch(u_palette, ivec2(label, 1), 0).rgb, 1.0);
-  }
-  return sum;
-}
-
-// Below the surface, because the surface itself is half air. Soft tissue that lies on the surface,
-// too thin for iso, coats it until it is milled away: pulp on the walls of its chamber.
-vec3 material_at(vec3 p, vec3 inward_texture) {
-  const float kDepthVox = 1.25;
-  const float kFullDepthVox = 2.5;  // past the two voxels over which a border is antialiased
-  const float kCoatDensity = 0.14;
-  vec3 below = p + kDepthVox * inward_texture;
-  vec3 above = p - kDepthVox * inward_texture;
-  if (u_has_labels) {
-    vec4 labelled = label_colour_at(below);
-    if (density_at(above) > kCoatDensity) {
-      vec4 coat = label_colour_at(above);
-      labelled = mix(labelled, coat, coat.a);
-    }
-    if (labelled.a > 0.0) return labelled.rgb / labelled.a;
-  }
-  float density = max(density_at(below), density_at(p + kFullDepthVox * inward_texture));
-  return texture(u_palette, vec2(density, 0.25)).rgb;
 }
 
 // 1 in the open, less where the neighbourhood along the normal is solid: cavities read as such.
@@ -161,9 +120,12 @@ void main() {
   vec3 slope = transpose(mat3(u_texture_from_eye)) * (gradient_at(p) * u_texels);
   vec3 normal = dot(slope, slope) > 0.0 ? -normalize(slope) : to_eye;
   if (dot(normal, to_eye) < 0.0) normal = normalize(normal - 1.02 * dot(normal, to_eye) * to_eye);
-  if (on_face) normal = -u_shown_eye.xyz;
   vec3 inward = mat3(u_texture_from_eye) * -normal;
   inward /= length(inward * u_texels);  // one voxel edge
+  if (on_face) {
+    normal = -u_shown_eye.xyz;
+    inward = vec3(0.0);  // no border: it shows what lies in the plane
+  }
 
   float openness = on_face ? 1.0 : openness_at(p, inward);
   vec3 colour = lit(material_at(p, inward), normal, to_eye, u_up_eye, openness);

@@ -3,15 +3,16 @@
 // The surface of a volume: material and openness come with the vertices, light falls on each pixel.
 // Depth is that of the projection, which is equation (1): not written, so hidden pixels cost nothing.
 //
-// A mesh is a shell: where the clip plane opens it, its inner side is seen, in the same colours and
-// with half of the light from the sky.
+// A mesh is a shell. Where the clip plane opens it, section.frag draws the face; its inner side shows
+// only in slits, thinner than a voxel, between the two, and is lit like the face.
 
 in vec3 v_eye_mm;
 in vec3 v_normal;
 in vec4 v_look;
 layout(location = 0) out vec4 o_colour;
 
-uniform vec3 u_up_eye;  // world up
+uniform vec3 u_up_eye;     // world up
+uniform vec4 u_shown_eye;  // clip plane
 
 vec3 lit(vec3 albedo, vec3 normal, vec3 to_eye, vec3 up_eye, float openness);
 vec3 srgb(vec3 linear);
@@ -19,9 +20,13 @@ vec3 srgb(vec3 linear);
 void main() {
   vec3 to_eye = -normalize(v_eye_mm);
   vec3 normal = normalize(v_normal);
-  // What is seen faces the eye, whatever the gradient says at a silhouette.
-  if (!gl_FrontFacing) normal = -normal;
-  if (dot(normal, to_eye) < 0.0) normal = normalize(normal - 1.02 * dot(normal, to_eye) * to_eye);
-  float openness = gl_FrontFacing ? v_look.a : 0.5;
+  float openness = v_look.a;
+  if (!gl_FrontFacing) {
+    normal = -u_shown_eye.xyz;
+    openness = 1.0;
+  } else if (dot(normal, to_eye) < 0.0) {
+    // What is seen faces the eye, whatever the gradient says at a silhouette.
+    normal = normalize(normal - 1.02 * dot(normal, to_eye) * to_eye);
+  }
   o_colour = vec4(srgb(lit(v_look.rgb, normal, to_eye, u_up_eye, openness)), 1.0);
 }

@@ -110,13 +110,15 @@ void write_contact_sheet(const std::filesystem::path& file, const SceneView& sce
   sheet.rgb.resize(static_cast<std::size_t>(sheet.size.width * sheet.size.height) * 3);
   const Pen pen;
   for (std::size_t i = 0; i < kinds.size(); ++i) {
-    ScenePainter painter(kinds[i], scene, contents);
+    ScenePainter painter(std::string(kinds[i]), scene, contents);
     constexpr float kGrey = kBackdrop / 255.0F;
     target.bind();
     glClearColor(kGrey, kGrey, kGrey, 1.0F);
     glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
-    painter.draw_volumes(tool, view, target);
-    if (tool) painter.draw_over(*tool, view, target);
+    if (tool) painter.hold(*tool);
+    painter.draw_volumes(ScenePainter::Layer::opaque, view, target);
+    if (tool) painter.draw_tool(*tool, view, target);
+    painter.draw_volumes(ScenePainter::Layer::translucent, view, target);
     const std::vector<std::uint8_t> tile = reduced(target.read_rgb());
     const int left = static_cast<int>(i) % kColumns * kTile.width;
     const int top = static_cast<int>(i) / kColumns * kTile.height;

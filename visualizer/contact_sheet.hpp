@@ -7,7 +7,6 @@
 
 #include "visualizer/hand_painter.hpp"
 #include "visualizer/scene_view.hpp"
-#include "visualizer/volume_on_gpu.hpp"
 
 namespace kerf {
 

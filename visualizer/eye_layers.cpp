@@ -3,34 +3,52 @@
 
 namespace kerf {
 
+namespace {
+
+using Layer = ScenePainter::Layer;
+
+bool has_moved(const std::optional<Hand>& from, const std::optional<Hand>& to) {
+  return from && to ? !from->rests_at(*to) : from.has_value() != to.has_value();
+}
+
+}  // namespace
+
 EyeLayers::Stale EyeLayers::stale(const View& view, const std::optional<Hand>& hand,
                                   const ScenePainter& painter,
                                   std::span<const VolumeContent> contents) const {
   const PixelRect all = stage_.all();
-  const bool moving = shown_ && shown_->view != view;
-  const Moment now{view, moving, hand};
-  // What was drawn coarsely settles when the camera does.
-  if (!shown_ || moving || shown_->moving) return {now, {all}, {all}};
-  StaleTiles tiles(stage_.size());
-  painter.mark_volumes(tiles, contents, view, volumes_);
-  std::vector<PixelRect> volumes = tiles.rects();
+  const bool turned = shown_ && shown_->view != view;
+  const Moment now{view, turned || (shown_ && has_moved(shown_->hand, hand)), hand};
+  if (!shown_ || turned) return {now, {all}, {all}};
+  StaleTiles of_hand(stage_.size());
   if (hand != shown_->hand) {
     for (const auto& one : {hand, shown_->hand}) {
       if (!one) continue;
-      for (const PixelRect& part : painter.bounds(*one, view, stage_.size())) tiles.mark(part);
+      for (const PixelRect& part : painter.bounds(*one, view, stage_.size())) of_hand.mark(part);
     }
   }
-  const std::vector<PixelRect> stage = tiles.rects();
-  if (painter.hand_is_among_volumes()) volumes = stage;
-  return {now, volumes, stage};
+  StaleTiles tiles(stage_.size());
+  painter.mark_volumes(Layer::opaque, tiles, contents, view, opaque_);
+  if (painter.hand_is_opaque_volume()) tiles.mark(of_hand);
+  const std::vector<PixelRect> opaque = tiles.rects();
+  painter.mark_volumes(Layer::translucent, tiles, contents, view, opaque_);
+  tiles.mark(of_hand);
+  if (!now.moving) tiles.mark(coarse_);
+  return {now, opaque, tiles.rects()};
 }
 
 std::vector<PixelRect> EyeLayers::draw(const Stale& stale, ScenePainter& painter,
                                        ScreenPasses& passes) {
   shown_ = stale.now;
   if (stale.stage.empty()) return {};
-  painter.renderer().set_moving(stale.now.moving);
-  draw_volumes(stale, painter, passes);
+  painter.renderers().set_moving(stale.now.moving);
+  if (!stale.now.moving) {
+    coarse_.clear();
+  } else if (painter.renderers().coarse_while_moving()) {
+    for (const PixelRect& part : stale.stage) coarse_.mark(part);
+  }
+  if (stale.now.hand) painter.hold(*stale.now.hand);
+  draw_opaque(stale, painter, passes);
   draw_stage(stale, painter);
   std::vector<PixelRect> smoothed;
   for (const PixelRect& part : stale.stage) {
@@ -41,29 +59,35 @@ std::vector<PixelRect> EyeLayers::draw(const Stale& stale, ScenePainter& painter
   return smoothed;
 }
 
-void EyeLayers::draw_volumes(const Stale& stale, ScenePainter& painter, ScreenPasses& passes) {
-  if (stale.volumes.empty()) return;
-  volumes_.restrict_to(stale.volumes);
-  passes.draw_backdrop(volumes_);
-  painter.draw_volumes(stale.now.hand, stale.now.view, volumes_);
+void EyeLayers::draw_opaque(const Stale& stale, ScenePainter& painter, ScreenPasses& passes) {
+  if (stale.opaque.empty()) return;
+  opaque_.restrict_to(stale.opaque);
+  passes.draw_backdrop(opaque_);
+  painter.draw_volumes(Layer::opaque, stale.now.view, opaque_);
 }
 
 void EyeLayers::draw_stage(const Stale& stale, ScenePainter& painter) {
   stage_.restrict_to(stale.stage);
-  for (const PixelRect& part : stale.stage) stage_.copy(volumes_, part);
+  for (const PixelRect& part : stale.stage) stage_.copy(opaque_, part);
   const auto& [view, moving, hand] = stale.now;
+  std::vector<PixelRect> of_hand;  // a mesh costs its vertices for each part
+  if (hand) {
+    PixelRect bounds;
+    for (const PixelRect& part : painter.bounds(*hand, view, stage_.size())) {
+      bounds = bounds.united(part);
+    }
+    for (const PixelRect& part : stale.stage) {
+      const PixelRect both = part.clipped(bounds);
+      if (!both.empty()) of_hand.push_back(both);
+    }
+    stage_.restrict_to(of_hand);
+    painter.draw_tool(*hand, view, stage_);
+  }
+  stage_.restrict_to(stale.stage);
+  painter.draw_volumes(Layer::translucent, view, stage_);
   if (!hand) return;
-  std::vector<PixelRect> of_hand;
-  PixelRect bounds;
-  for (const PixelRect& part : painter.bounds(*hand, view, stage_.size())) {
-    bounds = bounds.united(part);
-  }
-  for (const PixelRect& part : stale.stage) {
-    const PixelRect both = part.clipped(bounds);
-    if (!both.empty()) of_hand.push_back(both);
-  }
-  stage_.restrict_to(of_hand);  // a mesh costs its vertices for each part
-  painter.draw_over(*hand, view, stage_);
+  stage_.restrict_to(of_hand);
+  painter.draw_force(*hand, view, stage_);
 }
 
 }  // namespace kerf

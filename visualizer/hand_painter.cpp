@@ -48,7 +48,7 @@ Hand hand_of(const TickRecord& record) {
 
 HandPainter::HandPainter(const SceneView& scene, double scale_mm) : scale_mm_(scale_mm) {
   for (const ToolView& tool : scene.tools) {
-    const Mesh mesh = tool_mesh(tool.profile_mm);
+    const Mesh mesh = tool_mesh(tool);
     glm::dvec3 low(std::numeric_limits<double>::max()), high(-low);
     for (const Mesh::Vertex& vertex : mesh.vertices) {
       low = glm::min(low, glm::dvec3(vertex.position));

@@ -20,6 +20,10 @@ struct Hand {
   std::uint32_t tool = 0;                      ///< none where the scene has fewer
   glm::dvec3 force_n{0.0};
   friend bool operator==(const Hand&, const Hand&) noexcept = default;
+  /// The same tool in the same place, whatever it feels.
+  [[nodiscard]] bool rests_at(const Hand& other) const noexcept {
+    return tip_mm == other.tip_mm && orientation == other.orientation && tool == other.tool;
+  }
 };
 
 /// The tip is the proxy's, where there is one: a tool that is held by the tooth's surface is drawn

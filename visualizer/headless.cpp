@@ -41,10 +41,13 @@ class FrameTaker {
       : picture_(picture), target_(size), report_(report) {}
 
   void draw(Session& session) {
-    draw_measured(picture_, session, overlay_figures(session), target_, report_);
+    figures_ = overlay_figures(session);
+    draw_measured(picture_, session, figures_, target_, report_);
   }
   [[nodiscard]] const RenderTarget& target() const noexcept { return target_; }
-  void write(const std::filesystem::path& file) const {
+  /// What was drawn last, as it looks at rest: a still shows nothing coarsely.
+  void write(const Session& session, const std::filesystem::path& file) {
+    static_cast<void>(picture_.draw(session, figures_, target_));
     write_png(file, target_.size(), target_.read_rgb());
   }
 
@@ -52,6 +55,7 @@ class FrameTaker {
   Picture& picture_;
   RenderTarget target_;
   FrameReport& report_;
+  OverlayFigures figures_;
 };
 
 void tell(const VisualizerOptions& options, const FrameSchedule& schedule,
@@ -113,9 +117,12 @@ int run_headless(const VisualizerOptions& options) {
     const auto ticks = session.ticks_since_armed();
     const bool filmed = recording && ticks && recording->due(session.servo_s());
     if (filmed || (over ? schedule.final_due(ticks) : schedule.due(ticks))) taker.draw(session);
-    if (filmed) film(recording, taker.target(), session.servo_s());
+    if (filmed) {
+      const auto problem = film(recording, taker.target(), session.servo_s());
+      if (problem) std::fprintf(stderr, "kerf-visualizer: %s\n", problem->c_str());
+    }
     while (over ? schedule.final_due(ticks) : schedule.due(ticks)) {
-      taker.write(frame_file(options.out, schedule.take(ticks)));
+      taker.write(session, frame_file(options.out, schedule.take(ticks)));
       if (!over) break;  // late pictures show the present, each its own
     }
     if (over) continue;

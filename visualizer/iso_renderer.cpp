@@ -1,11 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "visualizer/iso_renderer.hpp"
 
-#include <glm/gtc/matrix_inverse.hpp>
-
 #include "visualizer/cast/change_job.hpp"
 #include "visualizer/gl/context.hpp"
-#include "visualizer/palette.hpp"
 #include "visualizer/view_uniforms.hpp"
 
 namespace kerf {
@@ -33,27 +30,19 @@ std::string_view define_of(Gradient gradient) {
 IsoRenderer::IsoRenderer(const SceneView& scene, std::span<const VolumeContent> contents,
                          Options options)
     : gradient_(scene.gradient),
-      cast_program_(
-          {"screen.vert", "iso.frag", "gradient.frag", "ray.frag", options.light, "depth.frag"},
-          define_of(scene.gradient)) {
+      cast_program_({"screen.vert", "iso.frag", "solid.frag", "gradient.frag", "ray.frag",
+                     options.light, "depth.frag"},
+                    define_of(scene.gradient)),
+      palette_(palette_texture(scene.materials)) {
   const int limit = query_gl_driver().max_texture_size_3d;
   volumes_.reserve(scene.volumes.size());
   for (std::size_t i = 0; i < scene.volumes.size(); ++i) {
     volumes_.emplace_back(scene.volumes[i], contents[i], limit, options.skip_empty, scene.gradient);
   }
-  const auto palette = make_palette(scene.materials);
-  glTextureStorage2D(palette_.id(), 1, GL_RGBA32F, kPaletteWidth, 2);
-  glTextureSubImage2D(palette_.id(), 0, 0, 0, kPaletteWidth, 2, GL_RGBA, GL_FLOAT, palette.data());
-  glTextureParameteri(palette_.id(), GL_TEXTURE_MIN_FILTER, GL_LINEAR);
-  glTextureParameteri(palette_.id(), GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
-  glTextureParameteri(palette_.id(), GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
-
-  cast_program_.set("u_density", 0);
-  cast_program_.set("u_label", 1);
+  SolidOnGpu::set_units(cast_program_, static_cast<int>(kPaletteUnit));
   cast_program_.set("u_active_cell", 2);
   cast_program_.set("u_gradient", 3);
   cast_program_.set("u_entry_mm", static_cast<int>(kEntryUnit));
-  cast_program_.set("u_palette", static_cast<int>(kPaletteUnit));
   cast_program_.set("u_step_vox", options.step_vox);
 }
 
@@ -87,16 +76,10 @@ void IsoRenderer::draw(const View& view, const RenderTarget& target) {
 void IsoRenderer::cast_rays(const VolumeOnGpu& volume, const View& view,
                             const RenderTarget& target) {
   target.bind();
-  volume.bind_textures();
+  volume.bind(cast_program_, view);
   entries_.bind(kEntryUnit);
   glBindTextureUnit(kPaletteUnit, palette_.id());
-  const glm::dmat4 texture_from_eye =
-      glm::affineInverse(view.eye_from_world * volume.world_from_texture());
-  cast_program_.set("u_texture_from_eye", glm::mat4(texture_from_eye));
-  cast_program_.set("u_texels", glm::vec3(volume.texels()));
   set_view(cast_program_, view);
-  cast_program_.set("u_iso", volume.iso());
-  cast_program_.set("u_has_labels", volume.has_labels() ? 1 : 0);
   cast_program_.use();
   glBindVertexArray(no_vertices_.id());
   target.for_parts([] { glDrawArrays(GL_TRIANGLES, 0, 3); });

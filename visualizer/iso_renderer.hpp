@@ -7,6 +7,7 @@
 #include "visualizer/gl/program.hpp"
 #include "visualizer/ray_entries.hpp"
 #include "visualizer/renderer.hpp"
+#include "visualizer/volume_on_gpu.hpp"
 
 namespace kerf {
 
@@ -39,7 +40,7 @@ class IsoRenderer final : public Renderer {
   Gradient gradient_;
   GlProgram cast_program_;
   GlVertexArray no_vertices_ = GlVertexArray::create();
-  GlTexture2D palette_ = GlTexture2D::create();
+  GlTexture2D palette_;
   std::vector<VolumeOnGpu> volumes_;
   RayEntries entries_{1};
 };

@@ -17,6 +17,7 @@ inline constexpr auto kKeys = std::to_array<KeyHelp>({
     {"r", "first view again"},
     {"1 .. 9", "take this tool"},
     {"v", "next renderer"},
+    {"b", "v is for one volume after another; then for all"},
     {"c", "clip plane"},
     {"t", "two eyes: stereo, side by side"},
     {"p", "plot of force and depth"},

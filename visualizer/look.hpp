@@ -30,7 +30,7 @@ using Opacities = std::map<std::string, double>;
 
 /// How the volumes are shown: what a user may change while they are looked at.
 struct Look {
-  std::string renderer = "iso";  ///< as on the command line
+  std::string renderer = "iso";  ///< of all volumes, or of each: renderer_choice.hpp
   std::optional<double> iso{};   ///< of all volumes, 0..1 of full density; none: each its own
   Opacities opacities{};         ///< of the others: their own
   Gradient gradient = Gradient::corners;

@@ -71,25 +71,60 @@ Mesh lathe(std::span<const ProfilePoint> profile) {
   return mesh;
 }
 
-Outlines tool_outlines(std::span<const ProfilePoint> profile_mm) {
-  double radius = 0.0;
-  for (const ProfilePoint& point : profile_mm) radius = std::max(radius, point[1]);
-  if (radius == 0.0) return {};
-  const double low = profile_mm.front()[0];
-  const double high = profile_mm.back()[0];
-  // A neck that starts inside the head, and the shank of a real bur in proportion to it.
-  const double neck = 0.42 * radius;
-  const double shank = 0.62 * radius;
-  return {{profile_mm.begin(), profile_mm.end()},
-          {{0.5 * (low + high), neck},
-           {high + 1.5 * radius, neck},
-           {high + 2.5 * radius, shank},
-           {high + 16.0 * radius, shank}}};
+Mesh shaded(const Facets& facets) {
+  const auto point = [&](std::uint32_t i) {
+    const auto& p = facets.points_mm[i];
+    return glm::dvec3(p[0], p[1], p[2]);
+  };
+  std::vector<glm::dvec3> area;  // by triangle, along its normal
+  std::vector<std::vector<std::size_t>> meeting(facets.points_mm.size());
+  for (const auto& [a, b, c] : facets.triangles) {
+    for (const std::uint32_t corner : {a, b, c}) meeting[corner].push_back(area.size());
+    area.push_back(glm::cross(point(b) - point(a), point(c) - point(a)));
+  }
+  Mesh mesh;
+  for (std::size_t t = 0; t < area.size(); ++t) {
+    const double own = glm::length(area[t]);
+    if (!(own > 1e-12)) continue;  // mm^2: no face to see
+    for (const std::uint32_t corner : facets.triangles[t]) {
+      glm::dvec3 normal(0.0);
+      for (const std::size_t other : meeting[corner]) {
+        const double product = own * glm::length(area[other]);
+        if (glm::dot(area[t], area[other]) >= kCosCrease * product) normal += area[other];
+      }
+      mesh.triangles.push_back(static_cast<std::uint32_t>(mesh.vertices.size()));
+      mesh.vertices.push_back({glm::vec3(point(corner)), glm::vec3(glm::normalize(normal))});
+    }
+  }
+  return mesh;
 }
 
-Mesh tool_mesh(std::span<const ProfilePoint> profile_mm) {
-  Mesh mesh;
-  for (const auto& outline : tool_outlines(profile_mm)) mesh.append(lathe(outline));
+Outlines tool_outlines(const ToolView& tool) {
+  if (tool.radius_mm == 0.0) return {};
+  double low = 0.0, high = 0.0;
+  Outlines outlines;
+  if (tool.facets.triangles.empty()) {
+    low = tool.profile_mm.front()[0];
+    high = tool.profile_mm.back()[0];
+    outlines.push_back(tool.profile_mm);
+  }
+  for (const auto& [x, y, z] : tool.facets.points_mm) {
+    low = std::min(low, y);
+    high = std::max(high, y);
+  }
+  // A neck that starts inside the head, and the shank of a real bur in proportion to it.
+  const double neck = 0.42 * tool.radius_mm;
+  const double shank = 0.62 * tool.radius_mm;
+  outlines.push_back({{0.5 * (low + high), neck},
+                      {high + 1.5 * tool.radius_mm, neck},
+                      {high + 2.5 * tool.radius_mm, shank},
+                      {high + 16.0 * tool.radius_mm, shank}});
+  return outlines;
+}
+
+Mesh tool_mesh(const ToolView& tool) {
+  Mesh mesh = shaded(tool.facets);
+  for (const auto& outline : tool_outlines(tool)) mesh.append(lathe(outline));
   return mesh;
 }
 

@@ -8,6 +8,8 @@
 
 #include <glm/glm.hpp>
 
+#include "visualizer/scene_view.hpp"
+
 namespace kerf {
 
 /// Triangles with a normal per vertex; counter-clockwise from the outside.
@@ -30,12 +32,16 @@ using ProfilePoint = std::array<double, 2>;
 /// points.
 [[nodiscard]] Mesh lathe(std::span<const ProfilePoint> profile);
 
+/// A closed mesh with normals. Edges sharper than 40 degrees stay sharp.
+[[nodiscard]] Mesh shaded(const Facets& facets);
+
 /// What a bur is made of: the head by its profile (mm), and a shank along +y, thinner than the
-/// head, that begins inside it. Neither where the head has no extent.
+/// head, that begins inside it. Neither where the head has no extent. A head that is a mesh has no
+/// outline.
 using Outlines = std::vector<std::vector<ProfilePoint>>;
-[[nodiscard]] Outlines tool_outlines(std::span<const ProfilePoint> profile_mm);
-/// Both as a mesh.
-[[nodiscard]] Mesh tool_mesh(std::span<const ProfilePoint> profile_mm);
+[[nodiscard]] Outlines tool_outlines(const ToolView& tool);
+/// All of it as a mesh.
+[[nodiscard]] Mesh tool_mesh(const ToolView& tool);
 
 /// Cylinder of radius 1 from y = 0 to 1, and cone of base radius 1 from y = 0 to its tip at 1.
 [[nodiscard]] Mesh unit_cylinder();

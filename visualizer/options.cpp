@@ -13,6 +13,7 @@
 #include "visualizer/error.hpp"
 #include "visualizer/keys.hpp"
 #include "visualizer/renderer.hpp"
+#include "visualizer/renderer_choice.hpp"
 #include "visualizer/transfer_file.hpp"
 
 namespace kerf {
@@ -95,7 +96,8 @@ std::optional<VisualizerOptions> parse_options(int argc, const char* const* argv
   app.add_option("--name", options.name, "the controller's name")->capture_default_str();
   app.add_option("--renderer", options.renderer,
                  "how volumes are drawn: " + known_renderers() +
-                     "; a clip plane opens surface without a face in the plane")
+                     "; with commas one for each volume, such as surface,blend")
+      ->type_name("KIND[,KIND...]")
       ->capture_default_str();
   app.add_option("--gradient", gradient,
                  "what iso, surface, blend and slices shade from: central (two voxels), corners "
@@ -178,7 +180,7 @@ std::optional<VisualizerOptions> parse_options(int argc, const char* const* argv
   if (*record && app.count("--frames") == 0) options.frames = 0;
   if (options.bench && app.count("--size") == 0) size = kBenchSize;
   options.size = parse_size(size);
-  check_renderer(options.renderer);
+  check_renderers(options.renderer);
   options.gradient = gradient_named(gradient);
   if (options.transfer) options.opacities = read_transfer(*options.transfer);
   return options;

@@ -14,8 +14,8 @@ namespace kerf {
 
 /// The command line of kerf-visualizer.
 struct VisualizerOptions {
-  std::string name = "kerf";  ///< of the controller
-  std::string renderer = "iso";
+  std::string name = "kerf";     ///< of the controller
+  std::string renderer = "iso";  ///< of all volumes, or of each: renderer_choice.hpp
   Gradient gradient = Gradient::corners;
   Stereo stereo;
   bool voxel_tool = false;

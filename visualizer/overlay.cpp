@@ -12,6 +12,7 @@
 #include "visualizer/error.hpp"
 #include "visualizer/keys.hpp"
 #include "visualizer/renderer.hpp"
+#include "visualizer/renderer_choice.hpp"
 
 namespace kerf {
 
@@ -119,19 +120,41 @@ void banner(const std::string& text, bool alarm, ImVec2 size) {
   ImGui::SetNextWindowPos(ImVec2(0.5F * size.x, size.y - 14.0F), 0, ImVec2(0.5F, 1.0F));
   ImGui::PushStyleColor(ImGuiCol_WindowBg, alarm ? kAlarm : kNews);
   ImGui::Begin("banner", nullptr, kStill);
+  ImGui::PushTextWrapPos(std::max(0.9F * size.x, 80.0F));
   ImGui::TextColored(kValue, "%s", text.c_str());
+  ImGui::PopTextWrapPos();
   ImGui::End();
   ImGui::PopStyleColor();
 }
 
 void key_help(ImVec2 size) {
   ImGui::SetNextWindowPos(ImVec2(size.x - 12.0F, 12.0F), 0, ImVec2(1.0F, 0.0F));
+  ImGui::SetNextWindowBgAlpha(0.9F);  // many words over whatever is behind
   ImGui::Begin("keys", nullptr, kStill);
   if (ImGui::BeginTable("keys", 2)) {
     for (const auto& [key, meaning] : kKeys) row(key, std::string(meaning));
     ImGui::EndTable();
   }
   ImGui::End();
+}
+
+/// One for each volume.
+void renderer_controls(LookControls& controls) {
+  const std::size_t count = controls.volumes.size();
+  const std::vector<std::string> now = renderer_of_each(controls.look.renderer, count);
+  for (std::size_t v = 0; v < count; ++v) {
+    ImGui::PushID(static_cast<int>(v));
+    const std::string label = count == 1 ? "renderer" : controls.volumes[v];
+    if (ImGui::BeginCombo(label.c_str(), now[v].c_str())) {
+      for (const std::string_view kind : renderer_kinds()) {
+        const std::string name(kind);
+        if (!ImGui::Selectable(name.c_str(), now[v] == name)) continue;
+        controls.look.renderer = with_renderer(controls.look.renderer, count, v, name);
+      }
+      ImGui::EndCombo();
+    }
+    ImGui::PopID();
+  }
 }
 
 double rounded_to(double step, double value) {
@@ -208,13 +231,7 @@ void Overlay::look_controls(LookControls& controls) {
   constexpr ImGuiSliderFlags kDragOnly = ImGuiSliderFlags_NoInput | ImGuiSliderFlags_AlwaysClamp;
   Look& look = controls.look;
   ImGui::PushItemWidth(kWide);
-  if (ImGui::BeginCombo("renderer", look.renderer.c_str())) {
-    for (const std::string_view kind : renderer_kinds()) {
-      const std::string name(kind);
-      if (ImGui::Selectable(name.c_str(), look.renderer == name)) look.renderer = name;
-    }
-    ImGui::EndCombo();
-  }
+  renderer_controls(controls);
   if (controls.takes_gradient) {
     auto chosen = static_cast<std::size_t>(look.gradient);
     if (ImGui::BeginCombo("gradient", kGradientNames[chosen].data())) {
@@ -225,14 +242,15 @@ void Overlay::look_controls(LookControls& controls) {
     }
     look.gradient = static_cast<Gradient>(chosen);
   }
-  if (controls.opacities.empty()) {  // what is translucent has no iso-surface
+  if (controls.has_iso) {
     float iso = dragged_iso_.value_or(static_cast<float>(look.iso.value_or(controls.own_iso)));
     if (ImGui::SliderFloat("iso", &iso, 0.02F, 0.98F, "%.2f", kDragOnly)) dragged_iso_ = iso;
     if (ImGui::IsItemDeactivated() && dragged_iso_) {
       look.iso = *dragged_iso_;
       dragged_iso_.reset();
     }
-  } else {
+  }
+  if (!controls.opacities.empty()) {
     ImGui::TextColored(kLabel, "opacity of a voxel");
     ImGui::SameLine();
     controls.write = ImGui::SmallButton("write");

@@ -16,11 +16,13 @@ namespace kerf {
 /// What the controls show, and the look that they change.
 struct LookControls {
   Look look;
-  double own_iso = 0.5;           ///< of the main volume, 0..1: where the look has none
-  bool takes_gradient = false;    ///< the renderer shades by the look's
-  Opacities opacities{};          ///< of all materials, as they are; empty: not shown
-  bool write = false;             ///< the user asks for a file with them
-  std::optional<Pointer> over{};  ///< the mouse, while it is over them
+  double own_iso = 0.5;                ///< of the main volume, 0..1: where the look has none
+  std::vector<std::string> volumes{};  ///< their names
+  bool has_iso = false;                ///< a volume shows its iso-surface
+  bool takes_gradient = false;         ///< a renderer shades by the look's
+  Opacities opacities{};               ///< of all materials, as they are; empty: not shown
+  bool write = false;                  ///< the user asks for a file with them
+  std::optional<Pointer> over{};       ///< the mouse, while it is over them
   friend bool operator==(const LookControls&, const LookControls&) noexcept = default;
 };
 

@@ -59,6 +59,7 @@ SceneView Picture::scene_in(const Look& look) const {
 
 std::unique_ptr<ScenePainter> Picture::painter_for(const Session& session, const Look& look) {
   auto painter = std::make_unique<ScenePainter>(look.renderer, scene_in(look), session.contents());
+  if (look.clip.on) painter->set_cut_open(true, session.contents());
   for (const VolumeView& volume : scene_.volumes) bricks_uploaded_ += volume.bricks.count();
   return painter;
 }
@@ -68,8 +69,11 @@ void Picture::set_look(const Session& session, const Look& look) {
   if (look.renderer != look_.renderer || look.iso != look_.iso || look.gradient != look_.gradient ||
       look.voxel_tool != look_.voxel_tool) {
     painter_ = painter_for(session, look);
-  } else if (look.opacities != look_.opacities) {
-    painter_->set_opacities(scene_in(look), session.contents());
+  } else {
+    if (look.clip.on != look_.clip.on) painter_->set_cut_open(look.clip.on, session.contents());
+    if (look.opacities != look_.opacities) {
+      painter_->set_opacities(scene_in(look), session.contents());
+    }
   }
   look_ = look;
   redraw_all();
@@ -77,8 +81,12 @@ void Picture::set_look(const Session& session, const Look& look) {
 
 LookControls Picture::controls() const {
   LookControls controls{.look = look_, .own_iso = scene_.main_volume().iso / kDensityMax};
-  controls.takes_gradient = painter_->renderer().takes_gradient();
-  if (painter_->renderer().translucent()) controls.opacities = opacities();
+  for (const VolumeView& volume : scene_.volumes) controls.volumes.push_back(volume.name);
+  controls.takes_gradient = painter_->renderers().take_gradient();
+  controls.has_iso = painter_->renderers().any(ScenePainter::Layer::opaque);
+  if (painter_->renderers().any(ScenePainter::Layer::translucent)) {
+    controls.opacities = opacities();
+  }
   return controls;
 }
 
@@ -166,7 +174,9 @@ Redrawn Picture::draw(const Session& session, const OverlayFigures& figures,
     for (const PixelRect& part : others) {
       target.copy_colour(seen, part, static_cast<int>(eye) * size.width);
     }
-    for (const PixelRect& part : stale[eye].volumes) redrawn += part.area();
+    const bool translucent = painter_->renderers().any(ScenePainter::Layer::translucent);
+    const std::vector<PixelRect>& volumes = translucent ? stale[eye].stage : stale[eye].opaque;
+    for (const PixelRect& part : volumes) redrawn += part.area();
   }
   overlay_.draw(target, static_cast<int>(eyes_.size()));
   glDisable(GL_SCISSOR_TEST);

@@ -2,7 +2,6 @@
 #include "visualizer/recording.hpp"
 
 #include <algorithm>
-#include <cstdio>
 
 #include "shared/posix/new_file.hpp"
 #include "visualizer/yuv.hpp"
@@ -32,15 +31,15 @@ void Recording::add(const RenderTarget& target, double servo_s) {
   while (due(servo_s)) file_.write_frame(yuv_);
 }
 
-bool film(std::optional<Recording>& recording, const RenderTarget& target, double servo_s) {
-  if (!recording) return true;
+std::optional<std::string> film(std::optional<Recording>& recording, const RenderTarget& target,
+                                double servo_s) {
+  if (!recording) return std::nullopt;
   try {
     recording->add(target, servo_s);
-    return true;
+    return std::nullopt;
   } catch (const FileError& problem) {
-    std::fprintf(stderr, "kerf-visualizer: %s\n", problem.what());
     recording.reset();
-    return false;
+    return problem.what();
   }
 }
 

@@ -36,8 +36,9 @@ class Recording {
   std::vector<std::uint8_t> yuv_;
 };
 
-/// Films `target`, where there is a recording. One that fails says so in one line on stderr and
-/// ends, and false is returned; the picture goes on.
-bool film(std::optional<Recording>& recording, const RenderTarget& target, double servo_s);
+/// Films `target`, where there is a recording. One that fails ends, and the reason is returned; the
+/// picture goes on.
+[[nodiscard]] std::optional<std::string> film(std::optional<Recording>& recording,
+                                              const RenderTarget& target, double servo_s);
 
 }  // namespace kerf

@@ -26,6 +26,7 @@ using Make = std::unique_ptr<Renderer> (*)(const SceneView&, std::span<const Vol
 struct Kind {
   std::string_view name;
   Make make;
+  bool translucent;
 };
 
 template <CastMode mode>
@@ -35,12 +36,12 @@ std::unique_ptr<Renderer> make_cast(const SceneView& scene,
 }
 
 constexpr auto kKinds = std::to_array<Kind>({
-    {"iso", make<IsoRenderer>},
-    {"blend", make<BlendRenderer>},
-    {"surface", make<SurfaceRenderer>},
-    {"slices", make<SlicesRenderer>},
-    {"cast", make_cast<CastMode::iso>},
-    {"cast-blend", make_cast<CastMode::blend>},
+    {"iso", make<IsoRenderer>, false},
+    {"blend", make<BlendRenderer>, true},
+    {"surface", make<SurfaceRenderer>, false},
+    {"slices", make<SlicesRenderer>, true},
+    {"cast", make_cast<CastMode::iso>, false},
+    {"cast-blend", make_cast<CastMode::blend>, true},
 });
 
 const Kind& find_kind(std::string_view name) {
@@ -87,8 +88,8 @@ std::string known_renderers() {
   return known;
 }
 
-void check_renderer(std::string_view kind) {
-  static_cast<void>(find_kind(kind));
+bool is_translucent(std::string_view kind) {
+  return find_kind(kind).translucent;
 }
 
 }  // namespace kerf

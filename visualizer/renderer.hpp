@@ -13,7 +13,6 @@
 #include "visualizer/scene_view.hpp"
 #include "visualizer/sight_reach.hpp"
 #include "visualizer/surface/volume_samples.hpp"
-#include "visualizer/volume_on_gpu.hpp"
 
 namespace kerf {
 
@@ -34,8 +33,14 @@ class Renderer {
   /// show none. `contents` is all of the volumes.
   virtual void set_opacities(std::span<const MaterialView> /*materials*/,
                              std::span<const VolumeContent> /*contents*/) {}
+  /// Views have a clip plane from now on, or none any more. Renderers that hold no voxels cut no
+  /// faces without being told; what they hold for that costs memory, and each update a little.
+  /// `contents` is all of the volumes. Throws VisualizerError where the driver cannot hold them.
+  virtual void set_cut_open(bool /*open*/, std::span<const VolumeContent> /*contents*/) {}
   /// While camera or objects move, a renderer may draw more coarsely; at rest it is exact.
   virtual void set_moving(bool /*moving*/) {}
+  /// It does draw more coarsely then.
+  [[nodiscard]] virtual bool coarse_while_moving() const noexcept { return false; }
   /// Draws over what is in `target`, under its depth test, within its part. Opaque things come
   /// first: some renderers look through.
   virtual void draw(const View& view, const RenderTarget& target) = 0;
@@ -65,7 +70,7 @@ class Renderer {
 /// Every kind, as on the command line: "iso, blend, ...".
 [[nodiscard]] std::string known_renderers();
 
-/// Throws as `make_renderer` does; needs no GL context.
-void check_renderer(std::string_view kind);
+/// `Renderer::translucent` of a kind. Throws as `make_renderer` does; needs no GL context.
+[[nodiscard]] bool is_translucent(std::string_view kind);
 
 }  // namespace kerf

@@ -1,53 +1,57 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "visualizer/scene_painter.hpp"
 
+#include "visualizer/renderer_choice.hpp"
 #include "visualizer/screen_bounds.hpp"
 
 namespace kerf {
 
-ScenePainter::ScenePainter(std::string_view renderer, const SceneView& scene,
+ScenePainter::ScenePainter(const std::string& renderers, const SceneView& scene,
                            std::span<const VolumeContent> contents)
     : volumes_(scene.volumes),
+      tool_(scene.voxel_tool ? std::optional<ToolVolume>(scene) : std::nullopt),
+      renderers_(made(renderers, scene, contents)),
       stale_(scene.volumes.size()),
-      hand_(scene, scene.main_volume().radius_mm()) {
-  if (!scene.voxel_tool) {
-    renderer_ = make_renderer(renderer, scene, contents);
-    return;
-  }
-  tool_.emplace(scene);
+      hand_(scene, scene.main_volume().radius_mm()) {}
+
+VolumeRenderers ScenePainter::made(const std::string& renderers, const SceneView& scene,
+                                   std::span<const VolumeContent> contents) const {
+  std::vector<std::string> kinds = renderer_of_each(renderers, volumes_.size());
+  if (!tool_) return {kinds, scene, contents};
+  kinds.push_back(kinds.front());
+  return {kinds, tool_->added_to(scene), with_tool(contents)};
+}
+
+std::vector<VolumeContent> ScenePainter::with_tool(std::span<const VolumeContent> contents) const {
   std::vector<VolumeContent> all(contents.begin(), contents.end());
-  all.push_back(tool_->content());
-  renderer_ = make_renderer(renderer, tool_->added_to(scene), all);
+  if (tool_) all.push_back(tool_->content());
+  return all;
 }
 
 void ScenePainter::set_opacities(const SceneView& scene, std::span<const VolumeContent> contents) {
-  std::vector<VolumeContent> all(contents.begin(), contents.end());
-  if (tool_) all.push_back(tool_->content());
-  renderer_->set_opacities(tool_ ? tool_->added_to(scene).materials : scene.materials, all);
+  renderers_.set_opacities(tool_ ? tool_->added_to(scene).materials : scene.materials,
+                           with_tool(contents));
+}
+
+void ScenePainter::set_cut_open(bool open, std::span<const VolumeContent> contents) {
+  renderers_.set_cut_open(open, with_tool(contents));
 }
 
 void ScenePainter::update(std::size_t volume, const VolumeSnapshot& snapshot) {
-  renderer_->update(volume, snapshot.density, snapshot.changed);
-  stale_[volume].add(*renderer_, volume, snapshot.differs);
+  renderers_.update(volume, snapshot.density, snapshot.changed);
+  const auto [renderer, index] = renderers_.of(volume);
+  stale_[volume].add(renderer, index, snapshot.differs);
 }
 
-void ScenePainter::hold_tool(const Hand& hand) {
+void ScenePainter::hold(const Hand& hand) {
+  if (!tool_) return;
   const std::size_t last = volumes_.size();
-  if (tool_->take(hand.tool)) renderer_->update(last, tool_->content().density, tool_->bricks());
-  renderer_->place(last, tool_->world_from_voxel(hand));
+  if (tool_->take(hand.tool)) renderers_.update(last, tool_->content().density, tool_->bricks());
+  renderers_.place(last, tool_->world_from_voxel(hand));
 }
 
-void ScenePainter::draw_volumes(const std::optional<Hand>& hand, const View& view,
-                                const RenderTarget& target) {
-  if (hand && tool_) hold_tool(*hand);
-  if (hand && !tool_ && renderer_->translucent()) hand_.draw_tool(*hand, view, target);
-  target.bind();
-  renderer_->draw(view, target);
-}
-
-void ScenePainter::draw_over(const Hand& hand, const View& view, const RenderTarget& target) {
-  if (!hand_is_among_volumes()) hand_.draw_tool(hand, view, target);
-  hand_.draw_force(hand, view, target);
+void ScenePainter::draw_tool(const Hand& hand, const View& view, const RenderTarget& target) {
+  if (!tool_) hand_.draw_tool(hand, view, target);
 }
 
 std::vector<PixelRect> ScenePainter::bounds(const Hand& hand, const View& view,
@@ -58,10 +62,12 @@ std::vector<PixelRect> ScenePainter::bounds(const Hand& hand, const View& view,
   return bounds;
 }
 
-void ScenePainter::mark_volumes(StaleTiles& tiles, std::span<const VolumeContent> contents,
-                                const View& view, const RenderTarget& kept) const {
+void ScenePainter::mark_volumes(Layer layer, StaleTiles& tiles,
+                                std::span<const VolumeContent> contents, const View& view,
+                                const RenderTarget& kept) const {
   for (std::size_t v = 0; v < volumes_.size(); ++v) {
-    stale_[v].mark(tiles, *renderer_, volumes_[v], contents[v].density, view, kept);
+    if (renderers_.layer_of(v) != layer) continue;
+    stale_[v].mark(tiles, renderers_.of(v).renderer, volumes_[v], contents[v].density, view, kept);
   }
 }
 

@@ -18,10 +18,10 @@ using nlohmann::json;
 
 constexpr std::size_t kMaxProfilePoints = 4096;  // a mesh of some 10^5 triangles
 
-ToolView tool_view(const json& text) {
-  ToolView tool;
-  tool.name = text.at("name").get<std::string>();
-  for (const json& point : text.at("profile")) {
+constexpr std::size_t kMaxTriangles = 65536;  // as the controller takes them
+
+void read_profile(const json& text, ToolView& tool) {
+  for (const json& point : text) {
     const auto at = point.get<std::array<double, 2>>();
     if (!std::isfinite(at[0]) || !std::isfinite(at[1]) || at[1] < 0.0) {
       throw VisualizerError("segment scene: tool " + tool.name +
@@ -35,6 +35,42 @@ ToolView tool_view(const json& text) {
     throw VisualizerError("segment scene: tool " + tool.name + " has " +
                           std::to_string(tool.profile_mm.size()) + " profile points; at most " +
                           std::to_string(kMaxProfilePoints));
+  }
+}
+
+void read_facets(const json& text, ToolView& tool) {
+  Facets& facets = tool.facets;
+  text.at("points_mm").get_to(facets.points_mm);
+  text.at("triangles").get_to(facets.triangles);
+  const std::size_t points = facets.points_mm.size();
+  const bool is_mesh =
+      !facets.triangles.empty() && facets.triangles.size() <= kMaxTriangles &&
+      std::ranges::all_of(facets.points_mm,
+                          [](const auto& p) {
+                            return std::ranges::all_of(p,
+                                                       [](double x) { return std::isfinite(x); });
+                          }) &&
+      std::ranges::all_of(facets.triangles, [points](const auto& t) {
+        return std::ranges::all_of(t, [points](std::uint32_t corner) { return corner < points; });
+      });
+  if (!is_mesh) {
+    throw VisualizerError("segment scene: tool " + tool.name + " has a mesh that is none, of " +
+                          std::to_string(points) + " points and " +
+                          std::to_string(facets.triangles.size()) +
+                          " triangles; restart the controller");
+  }
+  for (const auto& [x, y, z] : facets.points_mm) {
+    tool.radius_mm = std::max(tool.radius_mm, std::hypot(x, z));
+  }
+}
+
+ToolView tool_view(const json& text) {
+  ToolView tool;
+  tool.name = text.at("name").get<std::string>();
+  if (text.contains("mesh")) {
+    read_facets(text.at("mesh"), tool);
+  } else {
+    read_profile(text.at("profile"), tool);
   }
   return tool;
 }

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -30,11 +31,24 @@ struct VolumeView {
   [[nodiscard]] double radius_mm() const;
 };
 
-/// A tool as a body of revolution about its own y axis; the shaft goes to +y.
+/// What a renderer draws of a volume at this moment; spans of the caller, x fastest.
+struct VolumeContent {
+  std::span<const Density> density;
+  std::span<const Label> labels;  ///< empty, or one per voxel
+};
+
+/// A closed mesh; counter-clockwise from the outside.
+struct Facets {
+  std::vector<std::array<double, 3>> points_mm;
+  std::vector<std::array<std::uint32_t, 3>> triangles;
+};
+
+/// A tool as a body of revolution about its own y axis, or as a mesh; the shaft goes to +y.
 struct ToolView {
   std::string name;
   std::vector<std::array<double, 2>> profile_mm;  ///< (y, radius), from the tip upwards
-  double radius_mm = 0.0;                         ///< of the cutting head: the profile's widest
+  double radius_mm = 0.0;                         ///< of the cutting head, at its widest
+  Facets facets{};                                ///< instead of a profile
 };
 
 /// A material shows from density `iso` (0..1) upwards, or by its label, which is its index; index 0

@@ -11,7 +11,6 @@
 #include "shared/segment/hand_over.hpp"
 #include "visualizer/frame_report.hpp"
 #include "visualizer/scene_view.hpp"
-#include "visualizer/volume_on_gpu.hpp"
 
 namespace kerf {
 

@@ -30,6 +30,7 @@ class SlicesRenderer final : public Renderer {
               std::span<const std::uint32_t> changed) override;
   void place(std::size_t volume, const glm::dmat4& world_from_voxel) override;
   void set_moving(bool moving) override { moving_ = moving; }
+  [[nodiscard]] bool coarse_while_moving() const noexcept override { return true; }
   void set_opacities(std::span<const MaterialView> materials,
                      std::span<const VolumeContent> contents) override;
   void draw(const View& view, const RenderTarget& target) override;

@@ -2,6 +2,7 @@
 #include "visualizer/stale_tiles.hpp"
 
 #include <algorithm>
+#include <functional>
 
 namespace kerf {
 
@@ -27,6 +28,15 @@ void StaleTiles::mark(const PixelRect& pixels) {
   for (int y = tiles.y0; y < tiles.y1; ++y) {
     for (int x = tiles.x0; x < tiles.x1; ++x) mark(x, y);
   }
+}
+
+void StaleTiles::mark(const StaleTiles& other) {
+  std::transform(marked_.begin(), marked_.end(), other.marked_.begin(), marked_.begin(),
+                 std::bit_or<>());
+}
+
+void StaleTiles::clear() {
+  std::fill(marked_.begin(), marked_.end(), std::uint8_t{0});
 }
 
 namespace {

@@ -25,6 +25,9 @@ class StaleTiles {
   /// All that `pixels` touch.
   void mark(const PixelRect& pixels);
   void mark(int x, int y) { marked_[at(x, y)] = 1; }
+  /// All that are marked in `other`, of the same picture.
+  void mark(const StaleTiles& other);
+  void clear();
   [[nodiscard]] bool marked(int x, int y) const { return marked_[at(x, y)] != 0; }
 
   /// Rectangles of pixels, apart from one another, that cover the marked tiles, and of others a few

@@ -17,8 +17,8 @@ class StaleVolume {
   void add(const Renderer& renderer, std::size_t index, std::span<const VoxelBox> differs);
   void clear();
 
-  /// `density` is all of the volume as it is now; `kept` holds the picture with its depth, of the
-  /// volumes alone where `renderer` is opaque.
+  /// `density` is all of the volume as it is now; `kept` holds the picture of the opaque
+  /// volumes alone, with its depth.
   void mark(StaleTiles& tiles, const Renderer& renderer, const VolumeView& volume,
             std::span<const Density> density, const View& view, const RenderTarget& kept) const;
 

@@ -9,6 +9,7 @@
 #include <glm/gtc/matrix_transform.hpp>
 
 #include "visualizer/error.hpp"
+#include "visualizer/facet_distance.hpp"
 #include "visualizer/palette.hpp"
 
 namespace kerf {
@@ -73,14 +74,15 @@ ToolVolume::ToolVolume(const SceneView& scene)
   }
   Extent all;
   for (const ToolView& tool : scene.tools) {
-    tools_.push_back(closed(tool_outlines(tool.profile_mm)));
+    tools_.push_back({closed(tool_outlines(tool)), tool.facets});
     Extent& own = extents_.emplace_back();
-    for (const std::vector<ProfilePoint>& points : tools_.back()) {
-      for (const auto& [y, radius] : points) {
-        own.add(y, radius);
-        all.add(y, radius);
-      }
+    for (const std::vector<ProfilePoint>& points : tools_.back().outlines) {
+      for (const auto& [y, radius] : points) own.add(y, radius);
     }
+    for (const auto& [x, y, z] : tool.facets.points_mm) own.add(y, std::hypot(x, z));
+    if (own.low_mm > own.high_mm) continue;  // nothing to see
+    all.add(own.low_mm, own.radius_mm);
+    all.add(own.high_mm, own.radius_mm);
   }
   const double along_mm = all.high_mm - all.low_mm;
   if (!(along_mm > 0.0 && all.radius_mm > 0.0 && std::isfinite(along_mm))) {
@@ -125,25 +127,30 @@ bool ToolVolume::take(std::uint32_t tool) {
   return true;
 }
 
-/// Distances are worked out on half a plane through the axis, twice as fine as the voxels, and
-/// interpolated.
-void ToolVolume::fill(const Outlines& outlines) {
+/// Distances to what is swept are worked out on half a plane through the axis, twice as fine as the
+/// voxels, and interpolated.
+void ToolVolume::fill(const Parts& parts) {
   constexpr double kFiner = 2.0;
   std::vector<double> to_surface(static_cast<std::size_t>(kFiner * grid_.nx) + 2);
+  const double ramp_mm = 0.5 * kRampEdges * edge_mm_;
+  const std::vector<float> to_facets =
+      facet_distances(parts.facets, {grid_, first_mm_, edge_mm_}, ramp_mm);
   for (std::int32_t y = 0; y < grid_.ny; ++y) {
     for (std::size_t i = 0; i < to_surface.size(); ++i) {
       const double radius_mm = static_cast<double>(i) * edge_mm_ / kFiner;
-      to_surface[i] = distance_to(outlines, {first_mm_.y + y * edge_mm_, radius_mm});
+      to_surface[i] = distance_to(parts.outlines, {first_mm_.y + y * edge_mm_, radius_mm});
     }
     for (std::int32_t z = 0; z < grid_.nz; ++z) {
       for (std::int32_t x = 0; x < grid_.nx; ++x) {
         const double at =
             kFiner * std::hypot(first_mm_.x / edge_mm_ + x, first_mm_.z / edge_mm_ + z);
         const auto low = static_cast<std::size_t>(at);
-        const double distance_mm =
+        const double swept_mm =
             std::lerp(to_surface[low], to_surface[low + 1], at - static_cast<double>(low));
-        const double share = std::clamp(0.5 - distance_mm / (kRampEdges * edge_mm_), 0.0, 1.0);
-        density_[grid_.index(x, y, z)] = static_cast<Density>(std::lround(share * kDensityMax));
+        const std::size_t voxel = grid_.index(x, y, z);
+        const double distance_mm = std::min(swept_mm, static_cast<double>(to_facets[voxel]));
+        const double share = std::clamp(0.5 - 0.5 * distance_mm / ramp_mm, 0.0, 1.0);
+        density_[voxel] = static_cast<Density>(std::lround(share * kDensityMax));
       }
     }
   }
@@ -155,7 +162,7 @@ glm::dmat4 ToolVolume::world_from_voxel(const Hand& hand) const {
 }
 
 std::optional<BoxCorners> ToolVolume::corners(const Hand& hand) const {
-  if (hand.tool >= tools_.size() || tools_[hand.tool].empty()) return std::nullopt;
+  if (hand.tool >= tools_.size() || tools_[hand.tool].outlines.empty()) return std::nullopt;
   const Extent& extent = extents_[hand.tool];
   const double margin_mm = kMarginEdges * edge_mm_;
   const double radius_mm = extent.radius_mm + margin_mm;

@@ -8,7 +8,7 @@
 
 #include "visualizer/hand_painter.hpp"
 #include "visualizer/mesh.hpp"
-#include "visualizer/volume_on_gpu.hpp"
+#include "visualizer/scene_view.hpp"
 
 namespace kerf {
 
@@ -44,9 +44,14 @@ class ToolVolume {
       radius_mm = std::max(radius_mm, out_mm);
     }
   };
-  void fill(const Outlines& outlines);
+  /// What a tool is made of: what is swept about its axis, and a mesh.
+  struct Parts {
+    Outlines outlines;
+    Facets facets;
+  };
+  void fill(const Parts& parts);
 
-  std::vector<Outlines> tools_;
+  std::vector<Parts> tools_;
   std::vector<Extent> extents_;  ///< by tool
   double edge_mm_ = 0.0;         ///< of a voxel
   glm::dvec3 first_mm_{0.0};     ///< its first voxel, from the tip

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <array>
+#include <cstddef>
 #include <span>
 
 #include <glm/glm.hpp>
@@ -39,9 +39,17 @@ struct TransferFunction {
 inline constexpr double kLeastOpacity = 1.0 / 255.0;
 
 /// Made from materials: the softer, the more opaque, so that dentin shows under enamel and pulp
-/// in a cut. A volume with labels fades in up to its softest material; one without up to `iso`,
-/// because air and noise have densities too.
+/// in a cut. A volume with labels fades in up to its softest material; one without from `air` on,
+/// up to `iso`, because air and noise have densities too.
 [[nodiscard]] TransferFunction make_transfer_function(std::span<const MaterialView> materials,
-                                                      Density iso, bool has_labels);
+                                                      Density iso, bool has_labels,
+                                                      Density air = 0);
+/// That of one volume of a scene, whose air is what most of it has below the iso density.
+[[nodiscard]] TransferFunction make_transfer_function(const SceneView& scene, std::size_t volume,
+                                                      const VolumeContent& content);
+
+/// The median of the densities below `iso`, rounded down to 8 bits; 0 where there are none. A CT
+/// has its own value for air, far above the lowest one, as the paper's tooth: 0.3 of the highest.
+[[nodiscard]] Density air_level(std::span<const Density> density, Density iso);
 
 }  // namespace kerf

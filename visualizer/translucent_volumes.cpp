@@ -98,8 +98,7 @@ TranslucentVolumes::TranslucentVolumes(const SceneView& scene,
   glTextureParameteri(by_density_.id(), GL_TEXTURE_MIN_FILTER, GL_NEAREST);
   glTextureParameteri(by_density_.id(), GL_TEXTURE_MAG_FILTER, GL_NEAREST);
   for (std::size_t v = 0; v < scene.volumes.size(); ++v) {
-    const TransferFunction transfer =
-        make_transfer_function(scene.materials, scene.volumes[v].iso, !contents[v].labels.empty());
+    const TransferFunction transfer = make_transfer_function(scene, v, contents[v]);
     volumes_.emplace_back(scene.volumes[v], contents[v], transfer, scene.gradient, limit,
                           skip_empty);
     upload_materials(v);

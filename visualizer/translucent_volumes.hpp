@@ -10,8 +10,8 @@
 #include "visualizer/cells_on_gpu.hpp"
 #include "visualizer/gl/program.hpp"
 #include "visualizer/transfer_function.hpp"
-#include "visualizer/volume_on_gpu.hpp"
 #include "visualizer/voxel_texels.hpp"
+#include "visualizer/voxel_texture.hpp"
 
 namespace kerf {
 

@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <stdexcept>
+#include <string>
 
 #include "visualizer/file_out.hpp"
 #include "visualizer/surface/export_surface.hpp"
@@ -26,36 +27,41 @@ std::filesystem::path unused_file(const std::filesystem::path& folder, const cha
 
 /// `write` returns the file it wrote.
 template <typename Write>
-void write_for_user(const char* what, const Write& write) {
+Notice write_for_user(const std::string& what, const Write& write) {
   try {
-    std::printf("%s: %s\n", what, write().c_str());
+    return {what + ": " + write().string()};
   } catch (const std::runtime_error& problem) {
-    std::fprintf(stderr, "kerf-visualizer: %s\n", problem.what());
+    return {problem.what(), true};
   }
 }
 
 }  // namespace
 
-void take_screenshot(const VisualizerOptions& options, const RenderTarget& target) {
-  write_for_user("screenshot", [&] {
+Notice take_screenshot(const VisualizerOptions& options, const RenderTarget& target) {
+  return write_for_user("screenshot", [&] {
     const std::filesystem::path file = unused_file(options.out, ".png");
     write_png(file, target.size(), target.read_rgb());
     return file;
   });
 }
 
-void toggle_recording(const VisualizerOptions& options, PictureSize size,
-                      std::optional<Recording>& recording) {
-  if (recording) return recording.reset();
-  write_for_user("video", [&] {
+Notice toggle_recording(const VisualizerOptions& options, PictureSize size,
+                        std::optional<Recording>& recording) {
+  if (recording) {
+    const VideoFile& file = recording->file();
+    const Notice ended{"video: " + file.path() + ": " + std::to_string(file.frames()) + " frames"};
+    recording.reset();
+    return ended;
+  }
+  return write_for_user("video begins", [&] {
     const std::filesystem::path file = unused_file(options.out, ".y4m");
     recording.emplace(file.string(), size, options.video_hz);
     return file;
   });
 }
 
-void write_opacities(const VisualizerOptions& options, const Picture& picture) {
-  write_for_user("opacities", [&] {
+Notice write_opacities(const VisualizerOptions& options, const Picture& picture) {
+  return write_for_user("opacities", [&] {
     const std::filesystem::path file =
         options.transfer ? *options.transfer : unused_file(options.out, ".toml");
     write_transfer(file, picture.opacities());
@@ -63,8 +69,8 @@ void write_opacities(const VisualizerOptions& options, const Picture& picture) {
   });
 }
 
-void export_mesh(const VisualizerOptions& options, const Session& session) {
-  write_for_user("surface", [&] {
+Notice export_mesh(const VisualizerOptions& options, const Session& session) {
+  return write_for_user("surface", [&] {
     const std::filesystem::path file =
         options.mesh ? *options.mesh : unused_file(options.out, ".ply");
     export_surface(file, session.scene(), session.contents());

@@ -3,25 +3,26 @@
 
 #include <optional>
 
+#include "visualizer/notices.hpp"
 #include "visualizer/options.hpp"
 #include "visualizer/picture.hpp"
 #include "visualizer/recording.hpp"
 
 namespace kerf {
 
-// What keys of the window write: each says in one line where it went, or on stderr why it did not.
-// A full disk must not end a session at the screen. New files are kerf-0001 and so on in --out.
+// What keys of the window write: each says where it went, or why it did not. A full disk must not
+// end a session at the screen. New files are kerf-0001 and so on in --out.
 
-void take_screenshot(const VisualizerOptions& options, const RenderTarget& target);
+[[nodiscard]] Notice take_screenshot(const VisualizerOptions& options, const RenderTarget& target);
 
 /// Begins a video in a new file, or ends the one that runs.
-void toggle_recording(const VisualizerOptions& options, PictureSize size,
-                      std::optional<Recording>& recording);
+[[nodiscard]] Notice toggle_recording(const VisualizerOptions& options, PictureSize size,
+                                      std::optional<Recording>& recording);
 
 /// Where --transfer read them, or in a new file.
-void write_opacities(const VisualizerOptions& options, const Picture& picture);
+[[nodiscard]] Notice write_opacities(const VisualizerOptions& options, const Picture& picture);
 
 /// Where --export says, or in a new file.
-void export_mesh(const VisualizerOptions& options, const Session& session);
+[[nodiscard]] Notice export_mesh(const VisualizerOptions& options, const Session& session);
 
 }  // namespace kerf

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <chrono>
-#include <cstdio>
 #include <limits>
 #include <optional>
 #include <string>
@@ -16,8 +15,10 @@
 #include "visualizer/force_plot.hpp"
 #include "visualizer/frame_report.hpp"
 #include "visualizer/gl/window.hpp"
+#include "visualizer/notices.hpp"
 #include "visualizer/picture.hpp"
 #include "visualizer/recording.hpp"
+#include "visualizer/renderer_choice.hpp"
 #include "visualizer/run.hpp"
 #include "visualizer/shown_rates.hpp"
 #include "visualizer/stop_signal.hpp"
@@ -34,18 +35,12 @@ using Clock = std::chrono::steady_clock;
 constexpr auto kFrame = std::chrono::microseconds(16'667);  // no faster than screens refresh
 constexpr auto kReattachPause = std::chrono::milliseconds(500);
 
-std::string next_renderer(std::string_view now) {
-  const std::vector<std::string_view> kinds = renderer_kinds();
-  const auto found = std::find(kinds.begin(), kinds.end(), now);
-  return std::string(kinds[static_cast<std::size_t>(found - kinds.begin() + 1) % kinds.size()]);
-}
-
 /// A renderer that cannot show these volumes leaves the one that can.
-void change_look(Picture& picture, const Session& session, const Look& look) {
+void change_look(Picture& picture, const Session& session, const Look& look, Notices& notices) {
   try {
     picture.set_look(session, look);
   } catch (const VisualizerError& problem) {
-    std::fprintf(stderr, "kerf-visualizer: %s\n", problem.what());
+    notices.say({problem.what(), true}, Clock::now());
   }
 }
 
@@ -64,11 +59,15 @@ struct Keys {
   bool mesh = false;
   bool write = false;
   bool record = false;  ///< begin or end
+  std::size_t one = 0;  ///< volume that v is for, counted from 1; 0: all
 
   /// True when the user wants to leave.
-  bool apply(const WindowInput& input, Session& session, Picture& picture, double aspect) {
+  bool apply(const WindowInput& input, Session& session, Picture& picture, double aspect,
+             Notices& notices) {
     bool quit = input.close;
     Look look = picture.look();
+    const std::vector<VolumeView>& volumes = session.scene().volumes;
+    if (one > volumes.size()) one = 0;  // another controller may show fewer
     for (const char key : input.keys) {
       if (key == 'q') quit = true;
       if (key == 'r') picture.reset_camera(aspect);
@@ -82,7 +81,14 @@ struct Keys {
         help = shown && !help;
       }
       if (key == 'p') plot = !plot;
-      if (key == 'v') look.renderer = next_renderer(look.renderer);
+      if (key == 'v') {
+        look.renderer = one > 0 ? next_renderer(look.renderer, volumes.size(), one - 1)
+                                : next_renderer(look.renderer);
+      }
+      if (key == 'b') {
+        one = (one + 1) % (volumes.size() + 1);
+        notices.say({"v: " + (one > 0 ? volumes[one - 1].name : "all volumes")}, Clock::now());
+      }
       if (key == 'c') look.clip.on = !look.clip.on;
       if (key == 't') look.stereo.on = !look.stereo.on;
       const int tool = key - '1';
@@ -90,7 +96,7 @@ struct Keys {
         session.select_tool(static_cast<std::uint32_t>(tool));
       }
     }
-    change_look(picture, session, look);
+    change_look(picture, session, look, notices);
     return quit;
   }
 };
@@ -119,13 +125,17 @@ class Followed {
  private:
   void attach_again(double aspect) {
     next_attach_ = Clock::now() + kReattachPause;
+    const std::size_t volumes = session_.scene().volumes.size();
     try {
       session_ = Session(options_.name);
     } catch (const SegmentError&) {
       return;  // not there yet
     }
     earlier_bricks_ += picture_->bricks_uploaded();
-    const Look look = picture_->look();
+    Look look = picture_->look();
+    if (session_.scene().volumes.size() != volumes) {
+      look.renderer = renderer_of_each(look.renderer, volumes).front();
+    }
     picture_.reset();  // before the new one: one overlay at a time
     picture_.emplace(session_, look, aspect);
   }
@@ -161,6 +171,7 @@ int run_window(const VisualizerOptions& options) {
   std::optional<RenderTarget> target;
   ShownRates rates;
   Keys keys;
+  Notices notices;
   ForcePlot plot;
   std::optional<Recording> recording;
   bool video_is_cut = false;
@@ -174,36 +185,47 @@ int run_window(const VisualizerOptions& options) {
     const bool visible = size.width > 0 && size.height > 0;
     if (visible) aspect = static_cast<double>(size.width) / size.height;
     const WindowInput input = window.poll();
-    if (keys.apply(input, followed.session(), followed.picture(), aspect)) break;
+    if (keys.apply(input, followed.session(), followed.picture(), aspect, notices)) break;
     followed.update(aspect);
     if (const auto& newest = followed.session().latest()) plot.add(*newest);
-    if (std::exchange(keys.mesh, false)) export_mesh(options, followed.session());
+    if (std::exchange(keys.mesh, false)) {
+      notices.say(export_mesh(options, followed.session()), begin);
+    }
+    if (keys.screenshot) notices.clear();  // what was said of the one before
     if (visible) {
       if (!target || target->size() != size) target.emplace(size);
       if (std::exchange(record_from_start, false)) {
         recording.emplace(*options.record, size, options.video_hz);
       }
-      if (std::exchange(keys.record, false)) toggle_recording(options, size, recording);
+      if (std::exchange(keys.record, false)) {
+        notices.say(toggle_recording(options, size, recording), begin);
+      }
       OverlayFigures figures = overlay_figures(followed.session());
       if (recording) figures.filmed_frames = recording->file().frames();
       rates.show(figures, begin);
       figures.help = keys.help;
       figures.hidden = keys.hidden;
+      notices.show(figures, begin);
       if (keys.plot) figures.plot = plot.points();
       figures.controls = followed.picture().controls();
       if (!followed.picture().handle(input.pointer, figures, size)) {
         move_camera(followed.picture().camera(), input);
       }
-      change_look(followed.picture(), followed.session(), figures.controls->look);
+      change_look(followed.picture(), followed.session(), figures.controls->look, notices);
       if (std::exchange(keys.write, false) || std::exchange(figures.controls->write, false)) {
-        write_opacities(options, followed.picture());
+        notices.say(write_opacities(options, followed.picture()), begin);
       }
       const Redrawn redrawn =
           draw_measured(followed.picture(), followed.session(), figures, *target, report);
       if (report.wall_ms.size() == 1) report.late_join_ms = since_attached.wall_ms();
-      if (std::exchange(keys.screenshot, false)) take_screenshot(options, *target);
+      if (std::exchange(keys.screenshot, false)) {
+        notices.say(take_screenshot(options, *target), begin);
+      }
       if (redrawn.any || input.exposed) window.present(*target);
-      if (!film(recording, *target, followed.session().servo_s())) video_is_cut = true;
+      if (const auto problem = film(recording, *target, followed.session().servo_s())) {
+        notices.say({*problem, true}, begin);
+        video_is_cut = true;
+      }
       report.width = size.width;
       report.height = size.height;
     }

@@ -12,11 +12,15 @@
 
 #include <linux/firewire-cdev.h>
 
+#include "controller/device/absent_device.hpp"
 #include "controller/device/firewire_file.hpp"
 #include "shared/wire/omni_constants.hpp"
 
 namespace kerf {
 namespace {
+
+constexpr SoughtDevice kSought{
+    .name = "device of SensAble", .port = "fw", .emulation = "--port fw"};
 
 /// Identity of the node at `path`; nothing when it is no device of the vendor.
 std::optional<FirewireDevice> identify(const std::string& path, int* refused) {
@@ -41,10 +45,9 @@ std::optional<FirewireDevice> identify(const std::string& path, int* refused) {
   throw std::runtime_error("--port fw" + (where.empty() ? "" : ":" + where) + ": " + rest);
 }
 
-std::string hint_of(int refused) {
-  if (refused == 0) return "connect one, or try ./kerf demo --port fw";
-  const std::string reason = std::generic_category().message(refused);
-  return "a node cannot be opened (" + reason + "): give your user the right to it";
+std::string reason_of(int refused) {
+  return "a node cannot be opened (" + std::generic_category().message(refused) +
+         "); give your user the right to it: docs/devices.md";
 }
 
 }  // namespace
@@ -100,14 +103,19 @@ FirewireDevice find_firewire(const FirewireOptions& options, const std::string& 
   if (is_path && !std::filesystem::is_directory(where)) {
     const auto device = identify(where, &refused);
     if (device) return *device;
-    if (refused != 0) refuse(where, std::generic_category().message(refused) + "; see the node");
+    if (refused == ENOENT) refuse(where, absent_node(kSought));
+    if (refused != 0) refuse(where, reason_of(refused));
     refuse(where, "no device of SensAble; its vendor is not 000b99");
   }
   auto devices = list_firewire(is_path ? where : folder, &refused);
   if (!is_path && !where.empty()) {
     std::erase_if(devices, [&](const FirewireDevice& device) { return device.serial != where; });
   }
-  if (devices.empty()) refuse(where, "no device of SensAble is there; " + hint_of(refused));
+  if (devices.empty() && refused != 0) refuse(where, reason_of(refused));
+  if (devices.empty()) {
+    const bool is_serial = !is_path && !where.empty();
+    refuse(where, absent_device(kSought, is_serial));
+  }
   if (devices.size() > 1) {
     std::string all;
     for (const FirewireDevice& device : devices)

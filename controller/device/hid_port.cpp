@@ -16,6 +16,7 @@
 #include <sys/ioctl.h>
 #include <unistd.h>
 
+#include "controller/device/absent_device.hpp"
 #include "shared/posix/cores.hpp"
 #include "shared/wire/wooden_constants.hpp"
 
@@ -25,6 +26,9 @@ namespace {
 constexpr int kPriority = 81;  // above the servo on its core: the hand comes first
 constexpr int kReadMs = 20;    // then the end is looked for
 constexpr int kLastPacketMs = 20;
+constexpr SoughtDevice kSought{.name = "WoodenHaptics arm (1234:0006 or 16c0:0486)",
+                               .port = "hid",
+                               .emulation = "--device woodenhaptics --port hid"};
 constexpr const char* kGiveRight =
     "; give your user the right: a udev rule with KERNEL==\"hidraw*\", "
     "ATTRS{idVendor}==\"1234\", TAG+=\"uaccess\" (docs/devices.md)";
@@ -107,9 +111,7 @@ HidPort::HidPort(const std::string& where, int patience_ms, const std::atomic<bo
   const auto give_up = std::chrono::steady_clock::now() + std::chrono::milliseconds(patience_ms);
   while (!open(where)) {
     if (stop || std::chrono::steady_clock::now() >= give_up) {
-      refuse(where,
-             "no WoodenHaptics arm (1234:0006 or 16c0:0486) is there; connect one, or try "
-             "./kerf demo --device woodenhaptics --port hid");
+      refuse(where, absent_text(kSought, where));
     }
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
   }

@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "controller/device/open_port.hpp"
 
+#include <array>
+#include <cstddef>
 #include <optional>
 #include <stdexcept>
 #include <string_view>
 
 #include "controller/device/firewire_port.hpp"
 #include "controller/device/socket_port.hpp"
+#include "controller/device/udp_port.hpp"
 #ifdef KERF_HAS_HID
 #include "controller/device/hid_port.hpp"
 #endif
@@ -18,6 +21,9 @@ namespace kerf {
 namespace {
 
 constexpr std::string_view kSocket = "socket:";
+constexpr std::string_view kUdp = "udp:";
+constexpr std::array<std::string_view, 3> kBusOf{"fw", "usb", "hid"};  // by Personality
+static_assert(kBusOf.size() == kPersonalityWords.size());
 
 struct Request {
   int rate_hz = 0;
@@ -71,12 +77,16 @@ std::unique_ptr<PacketPort> port(const std::string& text, const Request* request
   if (const auto rest = after("fw", text)) return firewire(*rest, request);
   if (const auto rest = after("usb", text)) return usb(*rest, request);
   if (const auto rest = after("hid", text)) return hid(*rest, request);
-  if (!text.starts_with(kSocket)) {
-    throw std::runtime_error(
-        "--port '" + text +
-        "' is not known; use auto, fw, usb, hid, or socket:PATH, where kerf-emulator listens");
+  const bool is_udp = text.starts_with(kUdp);
+  if (!is_udp && !text.starts_with(kSocket)) {
+    throw std::runtime_error("--port '" + text +
+                             "' is not known; use auto, fw, usb, hid, or socket:PATH or "
+                             "udp:[ADDRESS:]PORT, where kerf-emulator listens");
   }
   if (!request) return nullptr;
+  if (is_udp) {
+    return std::make_unique<UdpPort>(text.substr(kUdp.size()), request->patience_ms, request->stop);
+  }
   return std::make_unique<SocketPort>(text.substr(kSocket.size()), request->patience_ms,
                                       request->stop);
 }
@@ -88,16 +98,15 @@ void check_port(const std::string& text) {
 }
 
 std::string resolve_port(const std::string& text, Personality personality) {
-  if (text != "auto") return text;
-  switch (personality) {
-    case Personality::falcon:
-      return "usb";
-    case Personality::woodenhaptics:
-      return "hid";
-    case Personality::omni:
-      break;
+  const auto device = static_cast<std::size_t>(personality);
+  if (text == "auto") return std::string(kBusOf[device]);
+  for (const std::string_view bus : kBusOf) {
+    if (bus == kBusOf[device] || !after(bus, text)) continue;
+    throw std::runtime_error("--port " + text + ": not for --device " +
+                             std::string(kPersonalityWords[device]) + "; take " +
+                             std::string(kBusOf[device]) + ", or another --device");
   }
-  return "fw";
+  return text;
 }
 
 std::unique_ptr<PacketPort> open_port(const std::string& text, int rate_hz, int patience_ms,

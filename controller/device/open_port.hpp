@@ -13,6 +13,7 @@ namespace kerf {
 /// The port that `--port` names:
 ///
 ///     socket:PATH                    an emulator's SEQPACKET socket
+///     udp:[ADDRESS:]PORT             an emulator on another machine
 ///     fw[:WHERE][,OPTION...]         FireWire, as firewire_find.hpp says
 ///     usb[:WHERE][,firmware=FILE]    the Falcon, as usb_falcon.hpp says
 ///     hid[:WHERE]                    WoodenHaptics, as hid_port.hpp says
@@ -23,7 +24,7 @@ namespace kerf {
 /// For a text that names no port, or one that this build lacks.
 void check_port(const std::string& text);
 
-/// What stands for `auto` with this device; any other text as it is.
+/// What stands for `auto` with this device; any other text as it is. Throws for another one's bus.
 [[nodiscard]] std::string resolve_port(const std::string& text, Personality personality);
 
 /// A resolved one. Tries for `patience_ms` while no device is there, or until `stop`.

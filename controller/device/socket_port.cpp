@@ -55,7 +55,7 @@ std::size_t SocketPort::receive(std::span<std::uint8_t> out) noexcept {
   if (closed_) return 0;
   const ssize_t size = recv(fd_, out.data(), out.size(), MSG_DONTWAIT | MSG_TRUNC);
   if (size > 0) return static_cast<std::size_t>(size);
-  // A SEQPACKET socket says 0 only at its end: the port's packets are never empty.
+  // No packet is empty: 0 is the end of a SEQPACKET socket, and the goodbye over UDP.
   if (size == 0 || (errno != EAGAIN && errno != EINTR)) closed_ = true;
   return 0;
 }
@@ -64,7 +64,9 @@ bool SocketPort::send(std::span<const std::uint8_t> packet) noexcept {
   if (closed_) return false;
   const ssize_t sent = ::send(fd_, packet.data(), packet.size(), MSG_DONTWAIT | MSG_NOSIGNAL);
   if (sent == static_cast<ssize_t>(packet.size())) return true;
-  if (errno == EPIPE || errno == ECONNRESET || errno == ENOTCONN) closed_ = true;
+  if (errno == EPIPE || errno == ECONNRESET || errno == ENOTCONN || errno == ECONNREFUSED) {
+    closed_ = true;
+  }
   return false;
 }
 

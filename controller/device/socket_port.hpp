@@ -9,7 +9,7 @@
 namespace kerf {
 
 /// A packet port over a Unix SEQPACKET socket: one datagram is one packet of the bus.
-class SocketPort final : public PacketPort {
+class SocketPort : public PacketPort {
  public:
   /// Connects, trying again for `patience_ms` while nobody listens, or until `stop`. Throws
   /// std::runtime_error with one line when nobody does.
@@ -24,6 +24,10 @@ class SocketPort final : public PacketPort {
     return closed_.load(std::memory_order_relaxed);
   }
   [[nodiscard]] bool wait(int milliseconds) noexcept override;
+
+ protected:
+  /// Over a socket that is connected already, and does not block.
+  explicit SocketPort(int fd) noexcept : fd_(fd) {}
 
  private:
   int fd_ = -1;

@@ -10,6 +10,7 @@
 #include <libusb-1.0/libusb.h>
 #include <unistd.h>
 
+#include "controller/device/absent_device.hpp"
 #include "shared/posix/cores.hpp"
 #include "shared/posix/monotonic_clock.hpp"
 
@@ -24,6 +25,8 @@ constexpr std::int64_t kEventsNs = 2'000'000;  // a chip that is well ends a tra
 constexpr std::int64_t kCloseNs = 500'000'000;
 constexpr int kMostFailures = 100;
 constexpr int kLastPacketMs = 20;
+constexpr SoughtDevice kSought{
+    .name = "Falcon (0403:cb48)", .port = "usb", .emulation = "--device falcon --port usb"};
 
 }  // namespace
 
@@ -37,9 +40,7 @@ UsbPort::UsbPort(const UsbOptions& options, int patience_ms, const std::atomic<b
   }
   while (!(device_ = UsbFalcon::open(options.where))) {
     if (stop || std::chrono::steady_clock::now() >= give_up) {
-      refuse_usb(options.where,
-                 "no Falcon (0403:cb48) is there; connect one, or try ./kerf demo --device falcon "
-                 "--port usb");
+      refuse_usb(options.where, absent_text(kSought, options.where));
     }
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
   }

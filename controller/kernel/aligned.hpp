@@ -63,14 +63,15 @@ class AlignedTick {
   /// Leaves the ratios of the overlap in the scratch; `exact_modification_sum` of them.
   [[nodiscard]] SumVec<FixedNumbers> press() const noexcept {
     if (outside_) return {};
-    const TrilinearWeights<FixedNumbers> corner = trilinear_weights<FixedNumbers>(weight_);
-    std::int32_t weights[8];
-    std::copy(corner.begin(), corner.end(), weights);
     std::int64_t sum[3];
-    kernels_.press(table_, weights, scratch_, sum);
+    kernels_.press(table_, corner_weights().weight, scratch_, sum);
     return {sum[0], sum[1], sum[2]};
   }
-  /// What `press` left.
+  /// The ratios alone.
+  void cover() const noexcept {
+    if (!outside_) kernels_.cover(table_, corner_weights().weight, scratch_);
+  }
+  /// What `press` or `cover` left.
   [[nodiscard]] BoxOverlap overlap() const noexcept {
     return outside_ ? BoxOverlap{} : BoxOverlap{&table_, scratch_, origin_};
   }
@@ -92,6 +93,16 @@ class AlignedTick {
   }
 
  private:
+  struct CornerWeights {
+    std::int32_t weight[8];
+  };
+  [[nodiscard]] CornerWeights corner_weights() const noexcept {
+    const TrilinearWeights<FixedNumbers> corner = trilinear_weights<FixedNumbers>(weight_);
+    CornerWeights weights;
+    std::copy(corner.begin(), corner.end(), weights.weight);
+    return weights;
+  }
+
   const KernelSet& kernels_;
   const AlignedTable& table_;
   BoxScratch scratch_;

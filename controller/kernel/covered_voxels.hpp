@@ -8,15 +8,13 @@
 #include <span>
 #include <type_traits>
 
+#include "controller/kernel/cover_table.hpp"
 #include "controller/kernel/overlap_rows.hpp"
 #include "controller/kernel/preston_budget.hpp"
 #include "controller/kernel/surface_drag.hpp"
 #include "controller/kernel/surface_speed.hpp"
 
 namespace kerf {
-
-/// Materials that a cut can tell apart; a label beyond counts as the last of them.
-inline constexpr std::size_t kMaxCutMaterials = 64;
 
 /// Index: label, 0 where a volume has no labels.
 template <class T>
@@ -45,10 +43,9 @@ struct CoveredVoxel {
   Covered weight;   ///< times speed
 };
 
-/// What the tool covers in one tick. The list is in the caller's memory, in z, y, x order.
+/// What there is of each material under the tool in one tick, and how the tool moves over it.
 template <class N>
-struct CoveredVoxels {
-  std::span<CoveredVoxel<N>> list;
+struct CoveredWeights {
   ByMaterial<CutWeight<N>> weight{};  ///< sums of the list's
   SurfaceDrag<N> drag;
 
@@ -57,6 +54,12 @@ struct CoveredVoxels {
     for (const CutWeight<N> w : weight) sum += w;
     return sum;
   }
+};
+
+/// What the tool covers in one tick. The list is in the caller's memory, in z, y, x order.
+template <class N>
+struct CoveredVoxels : CoveredWeights<N> {
+  std::span<CoveredVoxel<N>> list;
 };
 
 namespace detail {

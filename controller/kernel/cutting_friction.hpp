@@ -17,9 +17,9 @@ struct FrictionPlan {
   typename N::Unit approach{};     ///< of the low-pass: part of the way done in one tick
 };
 
-/// Time constant of the low-pass, 80 Hz: slower than the steps that single voxels make, faster than
+/// Time constant of the low-pass, 32 Hz: slower than the steps that single voxels make, faster than
 /// a hand can follow.
-inline constexpr double kFrictionSmoothingS = 0.002;
+inline constexpr double kFrictionSmoothingS = 0.005;
 
 template <class N>
 [[nodiscard]] FrictionPlan<N> friction_plan(double coefficient, double tick_s) {

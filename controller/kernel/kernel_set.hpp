@@ -5,6 +5,7 @@
 #include <cstdint>
 
 #include "controller/kernel/aligned_table.hpp"
+#include "controller/kernel/cover_table.hpp"
 #include "controller/kernel/proxy/shell_table.hpp"
 #include "controller/kernel/sample_table.hpp"
 #include "controller/kernel/splat_table.hpp"
@@ -57,6 +58,16 @@ struct KernelSet {
                 const SplatScratch&) noexcept;
   void (*press_sums)(const TickBox&, std::int32_t volume_ratio, const SplatScratch&,
                      std::int64_t (&contact)[3], std::int64_t (&modification)[3]) noexcept;
+  /// Where force cuts: the ratios of `press` and of `press_sums` alone.
+  void (*cover)(const AlignedTable&, const std::int32_t (&weight)[8], const BoxScratch&) noexcept;
+  void (*cover_sums)(const TickBox&, std::int32_t volume_ratio, const SplatScratch&) noexcept;
+  /// And what is done with them, by rows and then by groups of voxels (covered_groups.hpp).
+  std::int32_t (*weigh_row)(const CoverRow&, CoveredGroup* list, std::int32_t room, CoverSums&,
+                            std::uint64_t* weight_by_material) noexcept;
+  void (*weigh_again)(CoveredGroup* list, std::int32_t count,
+                      std::uint64_t* weight_by_material) noexcept;
+  void (*take_steps)(const CoverSpend&, CoveredGroup* list, std::int32_t count, Density*,
+                     std::int64_t entries, CoverTaken&) noexcept;
   /// The swept contact: `place_shell` and `shell_sums` of a tool's surface samples.
   void (*place_shell)(const ShellTable<FixedNumbers>&, const ShellStep<FixedNumbers>&,
                       const ShellPlaces<FixedNumbers>&) noexcept;

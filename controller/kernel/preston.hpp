@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <span>
 
+#include "controller/kernel/covered_steps.hpp"
 #include "controller/kernel/covered_voxels.hpp"
 #include "controller/kernel/milling.hpp"
 #include "controller/kernel/preston_budget.hpp"
@@ -51,13 +52,13 @@ struct PrestonOutcome {
 namespace detail {
 
 /// One tick of `cut_by_force` on one volume.
-template <class N>
+template <class N, class Covered>
 class PrestonTick {
  public:
   using Sum = typename N::Sum;
 
   constexpr PrestonTick(const PrestonPlan<N>& plan, std::span<Density> density,
-                        PrestonState<N>& state, CoveredVoxels<N>& covered) noexcept
+                        PrestonState<N>& state, Covered& covered) noexcept
       : plan_(plan), density_(density), state_(state), covered_(covered) {}
 
   /// Feeds the accounts of the materials under the tool and spends them.
@@ -72,7 +73,7 @@ class PrestonTick {
     });
     // What the fullest voxels cannot give is asked of the others once; the rest waits.
     if (spend(out.removed)) {
-      weigh();
+      weigh_again(covered_);
       spend(out.removed);
     }
     for (auto& carry : state_.carry) {
@@ -83,7 +84,6 @@ class PrestonTick {
   }
 
  private:
-  using Covered = typename CoveredVoxel<N>::Covered;
   static constexpr CutBudget<N> kStep = N::kIsFixed ? CutBudget<N>(1 << kBudgetBits) : 1;
   /// The carry is spent over so many ticks: all at once, it would swing with the rounding.
   static constexpr CutBudget<N> kCarryTicks = 16;
@@ -96,74 +96,25 @@ class PrestonTick {
     }
   }
 
-  /// Weights of what is still covered, by material.
-  constexpr void weigh() noexcept {
-    covered_.weight = {};
-    for (CoveredVoxel<N>& voxel : covered_.list) {
-      voxel.weight = weight_of<N>(voxel.covered, voxel.speed);
-      covered_.weight[voxel.material] += voxel.weight;
-    }
-  }
-
   /// Takes the budgets from the volume. True when some voxel had less to give than its part.
   constexpr bool spend(Removed& removed) noexcept {
     ByMaterial<BudgetPerWeight<N>> price{};
     each_material([&](std::size_t m) { price[m] = {budget_[m], covered_.weight[m]}; });
     state_.phase = static_cast<std::uint16_t>(state_.phase + kPhaseByTick);
-    ByMaterial<std::uint64_t> taken{};
-    bool full = false;
-    VoxelIndex lo{kPositionLimitVox, kPositionLimitVox, kPositionLimitVox}, hi{};
-    for (CoveredVoxel<N>& voxel : covered_.list) {
-      const Density steps = take(voxel, price[voxel.material].of(voxel.weight), full);
-      if (steps == 0) continue;
-      taken[voxel.material] += steps;
-      const auto [x, y, z] = voxel.place;
-      lo = {std::min<std::int32_t>(lo.x, x), std::min<std::int32_t>(lo.y, y),
-            std::min<std::int32_t>(lo.z, z)};
-      hi = {std::max<std::int32_t>(hi.x, x + 1), std::max<std::int32_t>(hi.y, y + 1),
-            std::max<std::int32_t>(hi.z, z + 1)};
-    }
-    removed.changed = removed.changed.united({lo, hi});
+    const TakenSteps taken = take(covered_, price, state_.phase, density_);
+    removed.changed = removed.changed.united(taken.changed);
     each_material([&](std::size_t m) {
-      budget_[m] -= static_cast<CutBudget<N>>(taken[m]) * kStep;
-      state_.carry[m] -= static_cast<CutBudget<N>>(taken[m]) * kStep;
-      removed.density_steps += taken[m];
+      budget_[m] -= static_cast<CutBudget<N>>(taken.steps[m]) * kStep;
+      state_.carry[m] -= static_cast<CutBudget<N>>(taken.steps[m]) * kStep;
+      removed.density_steps += taken.steps[m];
     });
-    return full;
-  }
-
-  // The part of a step is rounded up or down by a phase that goes through the voxels and the ticks
-  // along two irrational ways (those of the plastic number), so that it evens out in every voxel
-  // and every tick. Rounding to the nearest would stall slow cutting.
-  static constexpr std::uint32_t kPhaseByVoxel = 49471, kPhaseByTick = 37345;  // of 2^16
-
-  /// Whole density steps of `wanted` leave the voxel; `full` is set when it has not so much.
-  constexpr Density take(CoveredVoxel<N>& voxel, typename BudgetPerWeight<N>::Steps wanted,
-                         bool& full) noexcept {
-    const auto phase = static_cast<std::uint16_t>(voxel.at * kPhaseByVoxel + state_.phase);
-    std::uint32_t steps = 0;
-    if constexpr (N::kIsFixed) {  // 16 fraction bits
-      const std::uint64_t most = std::uint64_t{voxel.covered} << 1;
-      full = full || wanted > most;
-      wanted = std::min(wanted, most);
-      voxel.covered -= static_cast<Covered>(wanted >> 1);
-      steps = static_cast<std::uint32_t>((wanted + phase) >> 16);
-    } else {
-      full = full || wanted > voxel.covered;
-      wanted = std::min(wanted, voxel.covered);
-      voxel.covered -= wanted;
-      steps = static_cast<std::uint32_t>(wanted + Sum(phase) / Sum(65536));
-    }
-    Density& rho = density_[voxel.at];
-    const auto decrease = static_cast<Density>(std::min<std::uint32_t>(steps, rho));
-    rho = static_cast<Density>(rho - decrease);
-    return decrease;
+    return taken.full;
   }
 
   const PrestonPlan<N>& plan_;
   std::span<Density> density_;
   PrestonState<N>& state_;
-  CoveredVoxels<N>& covered_;
+  Covered& covered_;
   ByMaterial<CutBudget<N>> budget_{};  ///< of this tick, still to be spent
 };
 
@@ -172,7 +123,7 @@ class PrestonTick {
 /// The tool, where it covers these voxels, touches a forbidden material.
 template <class N>
 [[nodiscard]] constexpr bool touches_forbidden(const PrestonPlan<N>& plan,
-                                               const CoveredVoxels<N>& covered) noexcept {
+                                               const CoveredWeights<N>& covered) noexcept {
   bool touches = false;
   for (std::size_t m = 0; m < kMaxCutMaterials; ++m) {
     touches = touches || (plan.forbidden[m] && covered.weight[m] > 0);
@@ -181,18 +132,19 @@ template <class N>
 }
 
 /// Takes from one volume what `drive` cuts in one tick of the voxels that the tool covers, where it
-/// is after an advance of a quarter voxel into the surface; their list is used up.
+/// is after an advance of a quarter voxel into the surface; their list, `CoveredVoxels<N>` or
+/// `CoveredGroups`, is used up.
 ///
 /// Removed steps, carry and `lost` add up to the budgets of all ticks: in fixed exactly, each
 /// budget within a millionth. No voxel loses more than the part that the tool covers; what the
 /// fullest cannot give is dealt out to the others once, and the rest waits in the carry. Without
 /// drive nothing changes. Work is bounded by the list. Servo thread; no heap.
-template <class N>
+template <class N, class Covered>
 constexpr PrestonOutcome<N> cut_by_force(const PrestonPlan<N>& plan, typename N::Sum drive,
                                          std::span<Density> density, PrestonState<N>& state,
-                                         CoveredVoxels<N>& covered) noexcept {
+                                         Covered& covered) noexcept {
   PrestonOutcome<N> out;
-  if (drive > 0) detail::PrestonTick<N>(plan, density, state, covered).cut(drive, out);
+  if (drive > 0) detail::PrestonTick<N, Covered>(plan, density, state, covered).cut(drive, out);
   return out;
 }
 

@@ -151,6 +151,9 @@ class BudgetPerWeight {
     }
   }
 
+  [[nodiscard]] constexpr CutWeight<N> mantissa() const noexcept { return mantissa_; }
+  [[nodiscard]] constexpr int shift() const noexcept { return shift_; }
+
   /// `weight` below 2^31 in fixed.
   [[nodiscard]] constexpr Steps of(CutWeight<N> weight) const noexcept {
     if constexpr (N::kIsFixed) {

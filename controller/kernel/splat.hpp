@@ -56,7 +56,11 @@ class SplatTick {
     return {{contact[0], contact[1], contact[2]},
             {modification[0], modification[1], modification[2]}};
   }
-  /// The ratios that `press` left.
+  /// The ratios alone.
+  void cover(std::int32_t volume_ratio) const noexcept {
+    if (near_) kernels_.cover_sums(box_, volume_ratio, scratch_);
+  }
+  /// The ratios that `press` or `cover` left.
   [[nodiscard]] BoxOverlap overlap() const noexcept {
     return near_ ? BoxOverlap{&box_, scratch_.tick, origin_} : BoxOverlap{};
   }

@@ -19,6 +19,23 @@ struct ToolSpace;  ///< mm in the tool's own frame: centre of the cutting head, 
 /// tear a little, and a flat end would otherwise never cut its middle (haptics-science 1.4).
 inline constexpr double kSpeedFloor = 0.08;
 
+/// Square roots of 0, 1/1024 .. 1 as weights of fixed point in the low halves, what is added up to
+/// the next in the high ones: linear steps between.
+inline constexpr std::size_t kRootSteps = 1024;
+inline constexpr std::array<std::uint32_t, kRootSteps + 1> kSpeedRoots = [] {
+  const auto root = [](std::size_t i) {
+    return static_cast<std::uint32_t>(integer_sqrt(std::uint64_t{i} << 20));
+  };
+  std::array<std::uint32_t, kRootSteps + 1> roots{};
+  for (std::size_t i = 0; i < kRootSteps; ++i) roots[i] = root(i) | (root(i + 1) - root(i)) << 16;
+  roots[kRootSteps] = root(kRootSteps);
+  return roots;
+}();
+
+/// Rim radii per voxel that a frame tells apart, 64 with 20 fraction bits: a thinner tool would be
+/// lost between two voxels anyway.
+inline constexpr std::int64_t kSteepestStep = std::int64_t{64} << 20;
+
 /// Where voxels lie beside the spindle's axis, which is the tool's y, in rim radii: what speed the
 /// tool's surface has there, and which way it moves. Made once per tick, tool and volume.
 ///
@@ -62,15 +79,17 @@ class SpindleFrame {
     return {static_cast<Sum>(across_x_[0]), static_cast<Sum>(across_z_[0])};
   }
 
+  static constexpr Weight kFloor = static_cast<Weight>(kSpeedFloor * double(N::kWeightOne));
+
   /// Speed of the tool's surface there over its rim's: kSpeedFloor to 1, as a weight.
   [[nodiscard]] static constexpr Weight speed(Place place) noexcept {
     if constexpr (N::kIsFixed) {
       const Sum x = std::clamp<Sum>(place.x, -kOne, kOne);
       const Sum z = std::clamp<Sum>(place.z, -kOne, kOne);
       const Sum square = std::min<Sum>((x * x + z * z) >> 15, kRootEnd);  // 25 fraction bits
-      const auto i = static_cast<std::size_t>(square >> 15);
-      const Sum rise = kRoots[i + 1] - kRoots[i];
-      return std::max(kFloor, static_cast<Weight>(kRoots[i] + (rise * (square & 0x7fff) >> 15)));
+      const std::uint32_t found = kSpeedRoots[static_cast<std::size_t>(square >> 15)];
+      const Sum root = found & 0xffff, rise = found >> 16;
+      return std::max(kFloor, static_cast<Weight>(root + (rise * (square & 0x7fff) >> 15)));
     } else {
       const Sum distance = square_root(place.x * place.x + place.z * place.z);
       return std::clamp(distance, kFloor, N::kWeightOne);
@@ -80,19 +99,8 @@ class SpindleFrame {
  private:
   using Step = typename N::Step;
   static constexpr Sum kOne = N::kIsFixed ? Sum(1 << 20) : Sum(1);
-  static constexpr Weight kFloor = static_cast<Weight>(kSpeedFloor * double(N::kWeightOne));
 
-  // Square roots of 0, 1/1024 .. 1 and one more as weights; linear steps between.
-  static constexpr std::size_t kRootSteps = 1024;
-  static constexpr Sum kRootEnd = N::kIsFixed ? Sum(kRootSteps << 15) : Sum(1);
-  static constexpr std::array<std::uint16_t, kRootSteps + 2> kRoots = [] {
-    std::array<std::uint16_t, kRootSteps + 2> roots{};
-    for (std::size_t i = 0; i <= kRootSteps; ++i) {
-      roots[i] = static_cast<std::uint16_t>(integer_sqrt(std::uint64_t{i} << 20));
-    }
-    roots[kRootSteps + 1] = roots[kRootSteps];
-    return roots;
-  }();
+  static constexpr Sum kRootEnd = Sum(kRootSteps << 15);  // 25 fraction bits, of fixed point
 
   /// Rim radii along axis `b` of the tool per voxel along axis `a`.
   static constexpr Step along(
@@ -108,7 +116,8 @@ class SpindleFrame {
       }
     }
     if constexpr (N::kIsFixed) {
-      return saturate_i32(round_shift(sum, 54 - 20));
+      return static_cast<Step>(
+          std::clamp(round_shift(sum, 54 - 20), -kSteepestStep, kSteepestStep));
     } else {
       return sum;
     }
@@ -116,7 +125,7 @@ class SpindleFrame {
 
   [[nodiscard]] constexpr Sum beside(const std::array<Step, 3>& across,
                                      VoxelIndex v) const noexcept {
-    if constexpr (N::kIsFixed) {  // Q20 * Q16: steps below 2^27, ways below 2^25
+    if constexpr (N::kIsFixed) {  // Q20 * Q16: steps up to 2^26, ways below 2^25
       const auto term = [](Step step, std::int32_t at, Q16 centre) {
         return std::int64_t{step} * ((std::int64_t{at} << 16) - centre.raw());
       };

@@ -113,7 +113,7 @@ class SceneIn final : public CompiledScene {
           cost = surface_cost(scene.servo.numeric, *plan_.kernels);
           break;
       }
-      if (plan_.contact.swept) sweep_instead(plan.swept.shell.table.count, cost.stages);
+      if (plan_.contact.swept) sweep_instead(samples_a_probe(plan.swept.shell.table), cost.stages);
       if constexpr (N::kIsFixed) {
         const bool any_pose = choice.plan == Plan::gather || choice.plan == Plan::splat;
         if (any_pose && plan.samples.count == 0) {

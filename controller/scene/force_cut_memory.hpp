@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "controller/scene/plan_preston.hpp"
+#include "controller/scene/covered_bound.hpp"
 #include "controller/scene/planned_array.hpp"
 #include "controller/scene/scene.hpp"
 #include "controller/scene/scene_costs.hpp"
@@ -23,7 +23,7 @@ class ForceCutMemory {
   /// What a tool needs in volume `v` of the plan, the next one or one that is known.
   void hold(const SceneTool& tool, const SceneVolume& volume, std::size_t v) {
     if (v == volumes_.size()) volumes_.push_back({volume.name, volume.image.labels.size(), {}, {}});
-    volumes_[v].list.need(covered_capacity(tool, volume));
+    volumes_[v].list.need(N::kIsFixed ? most_groups(tool, volume) : most_covered(tool, volume));
   }
 
   /// Allocates; points plan and state at it.
@@ -51,7 +51,7 @@ class ForceCutMemory {
   struct Volume {
     std::string name;
     std::size_t label_count;
-    PlannedArray<CoveredVoxel<N>> list;
+    PlannedArray<CoveredEntry<N>> list;
     std::vector<Label> labels;
   };
 

@@ -8,6 +8,7 @@
 
 #include "controller/kernel/proxy/proxy_sweep.hpp"
 #include "controller/kernel/tick_box.hpp"
+#include "controller/scene/covered_bound.hpp"
 #include "controller/scene/scene_words.hpp"
 #include "controller/scene/turned_box.hpp"
 
@@ -45,24 +46,14 @@ std::uint64_t ratios_of(const AlignedTable& table) {
   return rows_of(table.size) * count(table.row_lanes);
 }
 
+constexpr std::uint64_t kMasks = 8;  ///< of an entry of ratios: corners of a cell
+
 std::uint64_t press_operations(const AlignedTable& table) {
-  constexpr std::uint64_t kMasks = 8;  // corners of a cell
   constexpr std::uint64_t kTapsX = 2 * 5, kTapsY = 3 * 5, kTapsZ = 2 * 5;
   constexpr std::uint64_t kProducts = 3;
   const std::uint64_t planes = count(table.size.z) + 1;
   const std::uint64_t filtered = planes * count(table.box.y) * count(table.row_lanes);
   return ratios_of(table) * (kMasks + kTapsX + kTapsY + kProducts) + filtered * kTapsZ;
-}
-
-/// Voxels that a tool can cover.
-std::uint64_t voxels_under(VoxelIndex size) {
-  return (count(size.x) + 1) * rows_of(size);
-}
-
-/// What cutting by force does with the voxels of the box that the tool covers.
-void add_force_stages(std::uint64_t voxels, std::vector<StageCost>& stages) {
-  stages.push_back({"list", voxels});
-  stages.push_back({"spend", voxels});
 }
 
 /// Of every stage the most that it does in one of the boxes.
@@ -85,8 +76,8 @@ PlanCost aligned_cost(const AlignedTable& table, const KernelSet& kernels, CutMo
   cost.stages = {{"copy", voxels_of(table.box)}, {"contact", correlation_operations(table)}};
   if (cut == CutModel::none) return cost;
   if (cut == CutModel::preston) {
-    cost.stages.push_back({"press", press_operations(table)});
-    add_force_stages(voxels_under(table.size), cost.stages);
+    cost.stages.push_back({"cover", kMasks * ratios_of(table)});
+    add_force_stages(most_groups(table), cost.stages);
     return cost;
   }
   cost.stages.push_back({"mill", press_operations(table) + ratios_of(table)});
@@ -96,19 +87,23 @@ PlanCost aligned_cost(const AlignedTable& table, const KernelSet& kernels, CutMo
   return cost;
 }
 
+void add_force_stages(std::uint64_t covered, std::vector<StageCost>& stages) {
+  stages.push_back({"list", covered});
+  stages.push_back({"spend", covered});
+}
+
 std::vector<StageCost> splat_stages(std::uint64_t samples, VoxelIndex size, std::uint64_t touched,
                                     CutModel cut) {
   constexpr std::uint64_t kSplit = 3, kFilter = 5;
   const TickBox box = tick_box(size, kExactFarid, samples);
   const std::uint64_t lanes = count(box.row_lanes);
-  std::vector<StageCost> stages{{"place", kPlace * samples},
-                                {"copy", voxels_of(box.box)},
-                                {"splat", kCorners * samples},
-                                {"press", lanes * (kSplit * rows_of(size) + kFilter * touched)}};
+  std::vector<StageCost> stages{
+      {"place", kPlace * samples}, {"copy", voxels_of(box.box)}, {"splat", kCorners * samples}};
   if (cut == CutModel::preston) {
-    add_force_stages((count(size.x) + 1) * touched, stages);
+    stages.push_back({"cover", lanes * rows_of(size)});
     return stages;
   }
+  stages.push_back({"press", lanes * (kSplit * rows_of(size) + kFilter * touched)});
   if (cut == CutModel::overlap_exact) {
     stages.push_back({"bend", (count(size.x) + 1) * touched});
   }
@@ -118,10 +113,12 @@ std::vector<StageCost> splat_stages(std::uint64_t samples, VoxelIndex size, std:
 
 PlanCost splat_cost(const KernelSet& kernels, const SceneTool& tool, const SceneVolume& volume,
                     CutModel cut) {
-  return {way_of(Plan::splat, kernels.name),
-          most_over(box_sizes(tool, volume), [&](VoxelIndex size) {
-            return splat_stages(tool.offsets.size(), size, rows_of(size), cut);
-          })};
+  PlanCost cost{way_of(Plan::splat, kernels.name),
+                most_over(box_sizes(tool, volume), [&](VoxelIndex size) {
+                  return splat_stages(tool.offsets.size(), size, rows_of(size), cut);
+                })};
+  if (cut == CutModel::preston) add_force_stages(most_groups(tool, volume), cost.stages);
+  return cost;
 }
 
 std::vector<StageCost> gather_stages(std::uint64_t samples, const std::optional<GatherBoxes>& boxes,
@@ -130,10 +127,7 @@ std::vector<StageCost> gather_stages(std::uint64_t samples, const std::optional<
   std::vector<StageCost> stages{{"contact", kCorners * samples}};
   if (!boxes) return stages;
   stages.push_back({"overlap", kSpread * samples + boxes->overlap});
-  if (cut == CutModel::preston) {
-    add_force_stages(boxes->inside, stages);
-    return stages;
-  }
+  if (cut == CutModel::preston) return stages;
   const bool bends = cut == CutModel::overlap_exact;
   stages.push_back({"modification", boxes->inside});
   stages.push_back({bends ? "bent removal" : "removal", boxes->inside});
@@ -157,8 +151,11 @@ PlanCost gather_cost(NumericKind numeric, const KernelSet& kernels, const SceneT
     }
     return gather_stages(tool.offsets.size(), boxes, cut);
   };
-  return {way_of(Plan::gather, numeric == NumericKind::fixed ? kernels.name : word_of(numeric)),
-          most_over(box_sizes(tool, volume), stages_of)};
+  PlanCost cost{
+      way_of(Plan::gather, numeric == NumericKind::fixed ? kernels.name : word_of(numeric)),
+      most_over(box_sizes(tool, volume), stages_of)};
+  if (cut == CutModel::preston) add_force_stages(most_covered(tool, volume), cost.stages);
+  return cost;
 }
 
 PlanCost surface_cost(NumericKind numeric, const KernelSet& kernels) {
@@ -166,10 +163,10 @@ PlanCost surface_cost(NumericKind numeric, const KernelSet& kernels) {
           {}};
 }
 
-void sweep_instead(std::int32_t surface_samples, std::vector<StageCost>& stages) {
+void sweep_instead(std::int32_t samples_a_probe, std::vector<StageCost>& stages) {
   std::erase_if(stages,
                 [](const StageCost& stage) { return std::string_view(stage.stage) == "contact"; });
-  stages.insert(stages.begin(), {"probes", count(surface_samples) * SweepRules::kMaxProbes});
+  stages.insert(stages.begin(), {"probes", count(samples_a_probe) * SweepRules::kMaxProbes});
 }
 
 }  // namespace kerf

@@ -1,12 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <vector>
 
 #include "controller/kernel/aligned_table.hpp"
 #include "controller/kernel/kernel_set.hpp"
+#include "controller/kernel/proxy/shell_cap.hpp"
+#include "controller/kernel/proxy/shell_patch.hpp"
+#include "controller/kernel/proxy/shell_table.hpp"
 #include "controller/scene/scene.hpp"
 #include "controller/scene/scene_costs.hpp"
 
@@ -15,15 +19,17 @@ namespace kerf {
 // One function a plan: its stages and the operations of each. Where force cuts, every plan ends
 // otherwise:
 //
-//   press  (plan `aligned`) what `mill` does, but for the removals; no gradient is needed, and the
-//          kernel makes their sum all the same
-//   list   voxels that the tool covers, read with what they weigh
-//   spend  the same voxels, from which the budget is taken; twice where the fullest have not enough
+//   cover  overlap ratios of all rows, as whole vectors of 32: multiply-adds of masks, 8 an entry,
+//   or
+//          entries that are scaled (plan `splat`)
+//   list   groups of voxels that the tool covers (covered_bound.hpp), read with what they weigh;
+//          voxel by voxel in the plan `gather`
+//   spend  the same, from which the budget is taken; twice where the fullest have not enough
 //
-// Those come instead of `mill`, of `bend` and `cut`, and of all that follows `overlap`.
+// Those come instead of `mill`, of all that follows `splat`, and of all that follows `overlap`.
 
 /// Goes up when what counts as an operation changes: prices that were measured before are void.
-inline constexpr int kCountsRevision = 4;
+inline constexpr int kCountsRevision = 7;
 
 /// copy     voxels of the box around the tool
 /// contact  multiply-adds of the correlation: table entries x 2 halves x 8 corners, chunk by chunk
@@ -63,9 +69,21 @@ inline constexpr int kCountsRevision = 4;
 /// The plan `surface` does nothing of its own.
 [[nodiscard]] PlanCost surface_cost(NumericKind numeric, const KernelSet& kernels);
 
+/// Where force cuts, after all else: `list` and `spend` of so many covered groups or voxels.
+inline constexpr std::size_t kForceStages = 2;
+void add_force_stages(std::uint64_t covered, std::vector<StageCost>& stages);
+
 /// Where the swept proxy is felt: instead of `contact`, before all else,
-/// probes  samples of the tool's surface that are read: all of them in each probe of a tick
-void sweep_instead(std::int32_t surface_samples, std::vector<StageCost>& stages);
+/// probes  samples that are read: in each probe of a tick all of the tool's surface and those of a
+///         closer look at the contact, a ball's cap (shell_cap.hpp) or the patch of another shape
+///         (shell_patch.hpp)
+void sweep_instead(std::int32_t samples_a_probe, std::vector<StageCost>& stages);
+
+/// At most, for such a shell.
+template <class N>
+[[nodiscard]] std::int32_t samples_a_probe(const ShellTable<N>& shell) {
+  return shell.count + static_cast<std::int32_t>(shell.round ? kCapSamples : kPatchSamples);
+}
 
 /// Voxels that the stages of `gather` work on.
 struct GatherBoxes {

@@ -8,7 +8,6 @@
 
 #include "controller/scene/matrices.hpp"
 #include "controller/scene/scene.hpp"
-#include "controller/scene/turned_box.hpp"
 #include "controller/servo/servo_plan.hpp"
 
 namespace kerf {
@@ -46,16 +45,6 @@ template <class N>
   return rounded<typename N::Ratio, WorldSpace, VoxelSpace>(m);
 }
 
-/// Entries of the list of covered voxels that the tool needs in any orientation that it takes.
-[[nodiscard]] inline std::size_t covered_capacity(const SceneTool& tool,
-                                                  const SceneVolume& volume) {
-  std::size_t most = 0;
-  for (const VoxelIndex& size : box_sizes(tool, volume)) {
-    most = std::max(most, VoxelGrid{size.x + 1, size.y + 1, size.z + 1}.voxel_count());
-  }
-  return most;
-}
-
 template <class N>
 [[nodiscard]] SpindlePlan<N> plan_spindle(const Scene& scene) {
   const Scene::Spindle& spindle = scene.spindle;
@@ -77,9 +66,10 @@ template <class N>
   ForceCutPlan<N> cut;
   cut.on = scene.cut.model == CutModel::preston;
   if (!cut.on) return cut;
-  constexpr double kAdvancePerS = 20;  // units: from least to most within 40 ms
+  constexpr double kDeeperPerS = 100, kBackPerS = 1;  // units: there in 10 ms, back in a second
   cut.threshold_n = typename N::Real(scene.cut.threshold_n);
-  cut.advance_step = typename N::Real(kAdvancePerS / scene.servo.rate_hz);
+  cut.deeper_step = typename N::Real(kDeeperPerS / scene.servo.rate_hz);
+  cut.back_step = typename N::Real(kBackPerS / scene.servo.rate_hz);
   cut.spindle = plan_spindle<N>(scene);
   cut.friction = plan_friction<N>(scene);
   std::array<double, kMaxVolumes> voxel_mm3{};

@@ -9,6 +9,7 @@
 
 #include "controller/kernel/gradient.hpp"
 #include "controller/kernel/tool_offset.hpp"
+#include "controller/scene/tool_mesh.hpp"
 #include "controller/scene/volume_image.hpp"
 #include "controller/servo/personality.hpp"
 
@@ -28,6 +29,7 @@ inline constexpr double kReferenceSpeedKrpm = 300;
 struct Material {
   std::string name;
   double iso = 0.5;                              ///< density, 0..1
+  std::optional<double> felt_iso{};              ///< where its surface lies; none: volume's iso
   double machinability = 1.0;                    ///< removal rate over that of enamel
   bool forbidden = false;                        ///< never cut by force, and told when pressed upon
   std::array<double, 3> colour{0.9, 0.87, 0.8};  ///< linear RGB, 0..1
@@ -56,6 +58,7 @@ struct SceneTool {
   bool turns = true;  ///< with the stylus; else it keeps the world's axes
   std::array<std::int32_t, 3> size_vox{};
   std::vector<ToolOffset> offsets;
+  ToolMesh mesh;  ///< of the shape "stl"; else empty, and the shape says all
 };
 
 enum class NumericKind : std::uint8_t { fixed, float32, float64 };
@@ -82,14 +85,14 @@ struct Scene {
     std::array<double, 3> dock_rad{0.0, 0.23, -0.37};  ///< of the Omni: joint angles in the inkwell
   } device;
   struct Force {
-    ForceModel model = ForceModel::paper;
+    ForceModel model = ForceModel::proxy;
     double p0_n_per_mm2 = 0.06;        ///< of the paper's force
     double stiffness_n_per_mm = 0.4;   ///< of the coupling to the proxy, at the device port
     double damping_ns_per_mm = 0.002;  ///< the same
     double friction = 0.0;             ///< Coulomb coefficient of the proxy on the surface
   } force;
   struct Cut {
-    CutModel model = CutModel::overlap;
+    CutModel model = CutModel::preston;
     double rate_per_s = 20.0;  ///< k; 1/T is the paper's own step
     double p1_n_per_mm2 = 0.06;
     // Of the model preston:

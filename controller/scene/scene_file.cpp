@@ -147,6 +147,15 @@ void read_spindle_table(const SceneTable& table, SceneSpec& scene) {
       table.number("inertia_g_mm2", kInertiaGMm2).value_or(spindle.inertia_g_mm2);
 }
 
+/// The paper's force knows no normal that could cut by force: unless its scene says another model
+/// of cutting, it comes with the paper's own.
+void read_models(const SceneTable& root, SceneSpec& scene) {
+  if (const auto table = root.table("force", kForceKeys)) read_force_table(*table, scene.force);
+  if (scene.force.model == ForceModel::paper) scene.cut.model = CutModel::overlap;
+  if (const auto table = root.table("cut", kCutKeys)) read_cut_table(*table, scene);
+  if (const auto table = root.table("spindle", kSpindleKeys)) read_spindle_table(*table, scene);
+}
+
 /// The overlap models cut whatever they meet.
 void refuse_uncut(const SceneSpec& scene) {
   if (scene.cut.model == CutModel::none || scene.cut.model == CutModel::preston) return;
@@ -215,9 +224,7 @@ SceneSpec read_scene(const toml::table& parsed, const std::filesystem::path& pat
     read_material_table(table, scene.materials);
   }
   if (const auto table = root.table("device", kDeviceKeys)) read_device_table(*table, scene);
-  if (const auto table = root.table("force", kForceKeys)) read_force_table(*table, scene.force);
-  if (const auto table = root.table("cut", kCutKeys)) read_cut_table(*table, scene);
-  if (const auto table = root.table("spindle", kSpindleKeys)) read_spindle_table(*table, scene);
+  read_models(root, scene);
   refuse_uncut(scene);
   if (const auto table = root.table("limits", kLimitKeys)) read_limits_table(*table, scene.limits);
   if (const auto table = root.table("servo", kServoKeys)) read_servo_table(*table, scene.servo);

@@ -42,9 +42,12 @@ struct VolumeSpec {
 
 /// One [[tool]] as the scene file says it; the places begin complaints about size and pitch.
 struct ToolSpec {
+  std::string where;  ///< `file:line`, of a mesh
   std::string size_place, pitch_place;
   std::string name;
   std::string shape;
+  std::string file;          ///< of a mesh, as written
+  double scale = 1;          ///< mm per unit of the mesh
   bool pitch_given = false;  ///< else the smallest voxel of what can be touched
   ToolSize size;
   bool turns = true;

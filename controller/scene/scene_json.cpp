@@ -52,16 +52,21 @@ json tool_json(const SceneTool& tool) {
   for (const ToolOffset& offset : tool.offsets) {
     for (const std::int16_t component : offset) offsets.push_back(component);
   }
-  return {{"name", tool.name},
-          {"shape", tool.shape},
-          {"pitch_mm", tool.pitch_mm},
-          {"radius_mm", tool.radius_mm},
-          {"length_mm", tool.length_mm},
-          {"round", tool.round},
-          {"turns", tool.turns},
-          {"size_vox", tool.size_vox},
-          {"profile", tool_profile(tool)},
-          {"offsets_half_pitch", std::move(offsets)}};
+  json object = {{"name", tool.name},
+                 {"shape", tool.shape},
+                 {"pitch_mm", tool.pitch_mm},
+                 {"radius_mm", tool.radius_mm},
+                 {"length_mm", tool.length_mm},
+                 {"round", tool.round},
+                 {"turns", tool.turns},
+                 {"size_vox", tool.size_vox},
+                 {"offsets_half_pitch", std::move(offsets)}};
+  if (tool.mesh.triangles.empty()) {
+    object["profile"] = tool_profile(tool);
+  } else {
+    object["mesh"] = {{"points_mm", tool.mesh.points_mm}, {"triangles", tool.mesh.triangles}};
+  }
+  return object;
 }
 
 json material_json(const Material& material) {

@@ -16,7 +16,8 @@ namespace kerf {
 ///   volumes    [{name, file, iso (u16), solid, spacing_mm, grid, pose {position_mm, orientation},
 ///              density_hash}]
 ///   tools      [{name, shape, pitch_mm, radius_mm, length_mm, round, turns, size_vox,
-///              profile [[y_mm, radius_mm]..], offsets_half_pitch [x, y, z, x, y, z..]}]
+///              offsets_half_pitch [x, y, z, x, y, z..], and what it looks like: profile
+///              [[y_mm, radius_mm]..] or mesh {points_mm [[x, y, z]..], triangles [[a, b, c]..]}}]
 ///   active_tool, materials [{name, iso, machinability, colour}]
 ///   device, force, cut, limits, servo  as their keys in the scene file
 [[nodiscard]] std::string canonical_json(const Scene& scene);

@@ -3,17 +3,18 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numbers>
+#include <optional>
 #include <string>
 #include <utility>
 
+#include "controller/scene/felt_density.hpp"
+#include "controller/scene/load_tool.hpp"
 #include "controller/scene/phantom.hpp"
 #include "controller/scene/scene_error.hpp"
 #include "controller/scene/scene_file.hpp"
 #include "controller/scene/scene_place.hpp"
 #include "controller/scene/scene_text.hpp"
-#include "controller/scene/tool_shapes.hpp"
 #include "controller/scene/volume_crop.hpp"
 #include "controller/scene/volume_density.hpp"
 #include "controller/scene/volume_io.hpp"
@@ -97,6 +98,19 @@ VolumeImage load_image(const VolumeSpec& spec, const std::filesystem::path& fold
   return image;
 }
 
+/// A surface of a material's own needs to know where the material is.
+void check_felt_materials(const Scene& scene) {
+  const auto labelled = [](const SceneVolume& volume) { return !volume.image.labels.empty(); };
+  if (std::any_of(scene.volumes.begin(), scene.volumes.end(), labelled)) return;
+  for (const Material& material : scene.materials) {
+    if (!material.felt_iso) continue;
+    refuse(scene.path, ": material " + material.name +
+                           " has felt_iso = " + number_text(*material.felt_iso) +
+                           ", and no volume has labels to tell where it is; put them beside its "
+                           "file (NAME-labels.nrrd), or leave felt_iso out");
+  }
+}
+
 void check_labels(const VolumeImage& image, std::size_t materials) {
   const auto highest = std::max_element(image.labels.begin(), image.labels.end());
   if (highest == image.labels.end() || *highest < materials) return;
@@ -104,17 +118,20 @@ void check_labels(const VolumeImage& image, std::size_t materials) {
                    std::to_string(materials - 1) + "; add a [[material]] for it");
 }
 
+/// `felt_at`: the iso that the materials' `felt_iso` were written for; none: that of the volume.
 SceneVolume load_volume(const VolumeSpec& spec, const std::filesystem::path& folder,
-                        std::size_t materials) {
+                        const std::vector<Material>& materials, std::optional<double> felt_at) {
   SceneVolume volume;
   volume.name = spec.name;
   volume.file = spec.file;
   volume.solid = spec.solid;
   try {
     volume.image = load_image(spec, folder);
-    check_labels(volume.image, materials);
+    check_labels(volume.image, materials.size());
     volume.iso = spec.iso ? static_cast<Density>(std::lround(*spec.iso * kDensityMax))
                           : otsu_threshold(volume.image);
+    scale_to_felt_iso(materials, felt_at ? nearest_density(*felt_at * kDensityMax) : volume.iso,
+                      volume.image);
     if (spec.crop) volume.image = crop_to_solid(volume.image, volume.iso);
   } catch (const SceneError& error) {
     refuse(spec.where, std::string(": ") + error.what());
@@ -133,56 +150,6 @@ SceneVolume load_volume(const VolumeSpec& spec, const std::filesystem::path& fol
   return volume;
 }
 
-/// What the tools are measured against: the volumes that can be touched.
-struct TouchedVolumes {
-  double voxel_mm = std::numeric_limits<double>::infinity();  ///< smallest edge
-  double side_mm = 0;                                         ///< longest side of a box
-};
-
-TouchedVolumes touched_volumes(const std::vector<SceneVolume>& volumes) {
-  TouchedVolumes touched;
-  for (const SceneVolume& volume : volumes) {
-    if (!volume.solid) continue;
-    const VolumeImage& image = volume.image;
-    const std::array<std::int32_t, 3> extent = {image.grid.nx, image.grid.ny, image.grid.nz};
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      touched.voxel_mm = std::min(touched.voxel_mm, image.spacing_mm[axis]);
-      touched.side_mm = std::max(touched.side_mm, image.spacing_mm[axis] * extent[axis]);
-    }
-  }
-  return touched;
-}
-
-SceneTool load_tool(const ToolSpec& spec, const TouchedVolumes& touched) {
-  ToolSize size = spec.size;
-  if (!spec.pitch_given) size.pitch_mm = touched.voxel_mm;
-  if (size.pitch_mm > touched.voxel_mm * (1 + 1e-9)) {
-    refuse(spec.pitch_place, " is above the smallest voxel edge and leaves gaps; use at most " +
-                                 number_text(touched.voxel_mm));
-  }
-  if (!size.size_vox && size.radius_mm < touched.voxel_mm / 2) {
-    refuse(spec.size_place, " is below half a voxel (" + number_text(touched.voxel_mm / 2) +
-                                "); use a larger radius or a finer volume");
-  }
-  const double side_vox = tool_side_vox(spec.shape, size);
-  if (side_vox > kMaxToolSide) {
-    refuse(spec.size_place, " makes a tool of " + number_text(side_vox) +
-                                " samples along a side, above the limit of " +
-                                std::to_string(kMaxToolSide) +
-                                "; use a smaller tool or a coarser pitch");
-  }
-  SceneTool tool = make_tool(spec.name, spec.shape, size);
-  tool.turns = spec.turns;
-  const double side_mm = std::max(2 * tool.radius_mm, tool.length_mm);
-  if (side_mm > touched.side_mm) {
-    refuse(spec.size_place, " makes a tool of " + number_text(side_mm) + " mm" +
-                                (tool.length_mm > 2 * tool.radius_mm ? " (its length)" : "") +
-                                ", larger than the volume (" + number_text(touched.side_mm) +
-                                " mm); use a smaller tool");
-  }
-  return tool;
-}
-
 /// Moves the materials' densities so that what began at the surface `from` begins at `to`; air and
 /// full density stay where they are.
 void move_materials(double from, double to, std::vector<Material>& materials) {
@@ -192,6 +159,15 @@ void move_materials(double from, double to, std::vector<Material>& materials) {
   }
 }
 
+/// The press of the hand, 1 / scale of it in the scene, takes the same share of a tool `grown`
+/// times as large per second, and slows its spindle as much.
+void fit_cutting(double grown, double scale, Scene& scene) {
+  scene.cut.machinability_mm3_per_s_n *= scale * grown * grown * grown;
+  scene.cut.threshold_n /= scale;
+  scene.spindle.stall_torque_n_mm *= grown / scale;
+  scene.spindle.inertia_g_mm2 *= grown / scale;  // runs up in the same time
+}
+
 /// Fits a scene to the volume of --volume; what is done is told in the header.
 void fit_to_volume(double written_mm, SceneSpec& spec, Scene& scene) {
   const double grown = touched_volumes(scene.volumes).voxel_mm / written_mm;
@@ -199,6 +175,7 @@ void fit_to_volume(double written_mm, SceneSpec& spec, Scene& scene) {
     tool.size.radius_mm *= grown;
     tool.size.pitch_mm *= grown;
     if (tool.size.length_mm) *tool.size.length_mm *= grown;
+    tool.scale *= grown;
   }
   const WorldBox box = world_box(scene.volumes.front());
   double scale = kMinWorkspaceScale;
@@ -211,6 +188,7 @@ void fit_to_volume(double written_mm, SceneSpec& spec, Scene& scene) {
                            "; check --spacing");
   }
   scene.device.workspace_scale = scale;
+  fit_cutting(grown, scale, scene);
 }
 
 }  // namespace
@@ -233,9 +211,11 @@ Scene load_scene(const std::filesystem::path& path, const SceneOverrides& overri
   scene.hand_script = spec.hand_script;
   for (std::size_t i = 0; i < spec.volumes.size(); ++i) {
     const bool from_command_line = i == 0 && overrides.volume_file;
-    scene.volumes.push_back(load_volume(
-        spec.volumes[i], from_command_line ? "" : path.parent_path(), scene.materials.size()));
+    scene.volumes.push_back(
+        load_volume(spec.volumes[i], from_command_line ? "" : path.parent_path(), scene.materials,
+                    from_command_line ? written_iso : std::nullopt));
   }
+  check_felt_materials(scene);
   if (overrides.volume_file) {
     fit_to_volume(written_mm, spec, scene);
     if (written_iso && *written_iso > 0 && *written_iso < 1) {
@@ -245,7 +225,7 @@ Scene load_scene(const std::filesystem::path& path, const SceneOverrides& overri
   const TouchedVolumes touched = touched_volumes(scene.volumes);
   for (const ToolSpec& tool : spec.tools) {
     try {
-      scene.tools.push_back(load_tool(tool, touched));
+      scene.tools.push_back(load_tool(tool, touched, path.parent_path()));
     } catch (const SceneError&) {
       // A spare tool of the scene that does not fit a volume of --volume is nobody's mistake.
       if (!overrides.volume_file || scene.tools.empty()) throw;

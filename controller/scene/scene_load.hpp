@@ -41,18 +41,20 @@ inline constexpr std::array<double, 3> kWorkspaceMm = {100.0, 80.0, 60.0};
 /// - tools keep their size in voxels: lengths are scaled by the new over the old voxel edge (old:
 ///   the scene's spacing_mm, or that of the phantom);
 /// - the materials' densities move with the surface: what begins at the scene's iso begins at the
-/// new
-///   one;
+///   new one;
 /// - spare tools (all but the first) that do not fit the volume are left out;
 /// - workspace_scale s is such that its box, after cropping and in world axes, fits kWorkspaceMm;
 ///   the offset is found as above;
 /// - p0 and p1 are multiplied by kReferenceRadiusMm / (s^2 R), R the radius of the active tool: the
 ///   stiffness felt at the device port becomes that of a ball of 1 mm at scale 1, as in the default
-///   scene (K = s^2 2 pi R p0 = 0.377 N/mm with p0 = 0.06 N/mm^2).
+///   scene (K = s^2 2 pi R p0 = 0.377 N/mm with p0 = 0.06 N/mm^2). The proxy's stiffness is at the
+///   device port as it stands;
+/// - a tool g times as large takes g^3 as much at the same force of the hand: machinability is
+///   multiplied by s g^3, the threshold by 1/s, the spindle's stall torque and inertia by g/s.
 [[nodiscard]] Scene load_scene(const std::filesystem::path& path, const SceneOverrides& = {});
 
-/// Stiffness in N/mm at the device port when the active tool, taken as a ball of its radius, first
-/// touches a flat face: s^2 2 pi R p0.
+/// Stiffness in N/mm at the device port: of the coupling to the proxy; of the paper's force when
+/// the active tool, taken as a ball of its radius, first touches a flat face: s^2 2 pi R p0.
 [[nodiscard]] double device_stiffness_n_per_mm(const Scene& scene);
 
 /// Radius of the active tool at the device port over 1 mm. Hand scripts are written for a tool of

@@ -2,11 +2,13 @@
 #include "controller/scene/scene_objects.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <filesystem>
 #include <iterator>
 
 #include "controller/scene/materials.hpp"
+#include "controller/scene/mesh_tool.hpp"
 #include "controller/scene/scene_text.hpp"
 
 namespace kerf {
@@ -22,6 +24,14 @@ constexpr Range kPhantomSide{16, 512};
 constexpr Range kMachinability{0, 1000};
 constexpr Range kWorldMm{-kLargestWorldMm, kLargestWorldMm};
 
+constexpr Range kMeshScale{1e-6, 1000};  // mm per unit: from nanometres to metres
+
+constexpr auto kShapeWords = [] {
+  std::array<std::string_view, kToolShapes.size() + 1> words{};
+  std::copy(kToolShapes.begin(), kToolShapes.end(), words.begin());
+  words.back() = kMeshShape;
+  return words;
+}();
 constexpr std::string_view kPoseKeys[] = {"position_mm", "orientation"};
 constexpr std::string_view kIsoWords[] = {"otsu"};
 
@@ -56,6 +66,53 @@ void read_phantom_keys(const SceneTable& table, VolumeSpec& volume) {
       }
     }
     volume.phantom_size = VoxelGrid{whole[0], whole[1], whole[2]};
+  }
+}
+
+/// A mesh has its own size.
+void read_mesh_keys(const SceneTable& table, ToolSpec& tool) {
+  const auto file = table.text("file");
+  if (!file) refuse(table.place(), " has no file; write file = \"bur.stl\"");
+  for (const std::string_view key : {"radius_mm", "size_vox", "length_mm"}) {
+    if (!table.has(key)) continue;
+    refuse(table.place(key),
+           " is given with a mesh, which has its own size; leave it out, or set "
+           "scale (mm per unit of the file)");
+  }
+  tool.file = *file;
+  tool.where = table.where("file");
+  tool.size_place = table.place("file");
+  tool.scale = table.number("scale", kMeshScale).value_or(tool.scale);
+  tool.name = std::filesystem::path(tool.file).stem().string();
+}
+
+void read_size_keys(const SceneTable& table, ToolSpec& tool) {
+  for (const std::string_view key : {"file", "scale"}) {
+    if (!table.has(key)) continue;
+    refuse(table.place(key), " is of shape = \"stl\"; leave it out, or set that shape");
+  }
+  if (table.has("radius_mm") == table.has("size_vox")) {
+    refuse(table.place(), " needs either radius_mm or size_vox; write one of them");
+  }
+  ToolSize& size = tool.size;
+  if (const auto radius_mm = table.number("radius_mm", kLengthMm)) {
+    size.radius_mm = *radius_mm;
+    tool.size_place = table.place("radius_mm");
+    tool.name = tool.shape + " " + number_text(size.radius_mm) + " mm";
+  } else {
+    size.size_vox = table.whole("size_vox", {1, 10000});  // its own limit is told with the way out
+    tool.size_place = table.place("size_vox");
+    tool.name = tool.shape + " " + std::to_string(*size.size_vox) + " vox";
+  }
+  size.length_mm = table.number("length_mm", kLengthMm);
+  if (size.length_mm && (size.size_vox || tool.shape == "ball")) {
+    refuse(table.place("length_mm"), size.size_vox
+                                         ? " contradicts size_vox, which is a cube; leave it out"
+                                         : " contradicts the ball, which is round; leave it out");
+  }
+  if (tool.shape == "wheel" && size.length_mm && *size.length_mm > 2 * size.radius_mm) {
+    refuse(table.place("length_mm"),
+           " is more than the wheel's diameter; use at most " + number_text(2 * size.radius_mm));
   }
 }
 
@@ -94,32 +151,15 @@ VolumeSpec read_volume_table(const SceneTable& table) {
 
 ToolSpec read_tool_table(const SceneTable& table) {
   ToolSpec tool;
-  const auto shape = table.choice("shape", kToolShapes);
+  const auto shape = table.choice("shape", kShapeWords);
   if (!shape) refuse(table.place(), " has no shape; write shape = \"ball\" or another");
-  tool.shape = kToolShapes[*shape];
-  if (table.has("radius_mm") == table.has("size_vox")) {
-    refuse(table.place(), " needs either radius_mm or size_vox; write one of them");
+  tool.shape = kShapeWords[*shape];
+  if (tool.shape == kMeshShape) {
+    read_mesh_keys(table, tool);
+  } else {
+    read_size_keys(table, tool);
   }
   ToolSize& size = tool.size;
-  if (const auto radius_mm = table.number("radius_mm", kLengthMm)) {
-    size.radius_mm = *radius_mm;
-    tool.size_place = table.place("radius_mm");
-    tool.name = tool.shape + " " + number_text(size.radius_mm) + " mm";
-  } else {
-    size.size_vox = table.whole("size_vox", {1, 10000});  // its own limit is told with the way out
-    tool.size_place = table.place("size_vox");
-    tool.name = tool.shape + " " + std::to_string(*size.size_vox) + " vox";
-  }
-  size.length_mm = table.number("length_mm", kLengthMm);
-  if (size.length_mm && (size.size_vox || tool.shape == "ball")) {
-    refuse(table.place("length_mm"), size.size_vox
-                                         ? " contradicts size_vox, which is a cube; leave it out"
-                                         : " contradicts the ball, which is round; leave it out");
-  }
-  if (tool.shape == "wheel" && size.length_mm && *size.length_mm > 2 * size.radius_mm) {
-    refuse(table.place("length_mm"),
-           " is more than the wheel's diameter; use at most " + number_text(2 * size.radius_mm));
-  }
   if (const auto pitch_mm = table.number("pitch_mm", kSpacingMm)) {
     size.pitch_mm = *pitch_mm;
     tool.pitch_given = true;
@@ -143,6 +183,7 @@ void read_material_table(const SceneTable& table, std::vector<Material>& materia
     material = std::prev(materials.end());
   }
   material->iso = table.number("iso", kUnitInterval).value_or(material->iso);
+  if (const auto felt_iso = table.number("felt_iso", kIso)) material->felt_iso = felt_iso;
   material->machinability =
       table.number("machinability", kMachinability).value_or(material->machinability);
   material->forbidden = table.flag("forbidden").value_or(material->forbidden);

@@ -15,10 +15,10 @@ namespace kerf {
 
 inline constexpr std::string_view kVolumeKeys[] = {"name", "file", "size", "spacing_mm", "window",
                                                    "iso",  "crop", "pose", "solid"};
-inline constexpr std::string_view kToolKeys[] = {"name",      "shape",    "radius_mm", "size_vox",
-                                                 "length_mm", "pitch_mm", "turns"};
-inline constexpr std::string_view kMaterialKeys[] = {"name", "iso", "machinability", "forbidden",
-                                                     "colour"};
+inline constexpr std::string_view kToolKeys[] = {
+    "name", "shape", "radius_mm", "size_vox", "length_mm", "file", "scale", "pitch_mm", "turns"};
+inline constexpr std::string_view kMaterialKeys[] = {"name",          "iso",       "felt_iso",
+                                                     "machinability", "forbidden", "colour"};
 
 [[nodiscard]] VolumeSpec read_volume_table(const SceneTable& table);
 [[nodiscard]] ToolSpec read_tool_table(const SceneTable& table);

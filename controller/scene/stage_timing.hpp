@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -119,7 +120,8 @@ template <class N>
   return VoxelGrid{size.x, size.y, size.z}.voxel_count();
 }
 
-/// As many probes as a tick may make, with the tool's centre at a place in volume `v` alone.
+/// As many probes as a tick may make, with the tool's centre at a place in volume `v` alone. Inside
+/// of the solid no patch is read.
 template <class N>
 std::int64_t probe_often(const ServoPlan<N>& plan, const ServoState<N>& state,
                          const Shell<N>& shell, std::size_t v,
@@ -155,17 +157,26 @@ template <class N>
   const std::span<const Gradient<N>> gradient = memory.gradient;
   ToolPose<N> pose = tool_pose(volume, tool, in_volume, volume.position_mm, widest_rotation<N>());
   const VoxelIndex place = densest_place(volume.grid, memory.density, reach_of(tool.offsets, pose));
-  std::vector<StageCost> done = std::move(bounds);  // the plan `aligned` does no less
-  StageLaps laps(done.size());
+  StageLaps laps(bounds.size());
   const ForceCutPlan<N>& by_force = plan.force_cut;
-  const auto list_and_spend = [&](const auto& overlap) {
+  std::vector<StageCost> done = std::move(bounds);           // the plan `aligned` does no less
+  if (by_force.on) done.resize(done.size() - kForceStages);  // but for what the tool covers
+  std::size_t listed = 0;
+  const auto list_and_spend = [&]<class Overlap>(const Overlap& overlap) {
     using Real = typename N::Real;
     const SpindleFrame<N> frame(pose.centre_vox, in_volume.rims_from_voxel, widest_rotation<N>());
-    auto covered =
-        covered_voxels<N>(volume.grid, std::span<const Density>(memory.density),
-                          by_force.volume[v].labels, overlap, frame, state.force_cut.list[v]);
-    laps.end_stage(static_cast<std::int64_t>(covered.list.size()));
-    const auto drive = cut_drive<N>(Real(1), Real(0), typename N::Unit(1));
+    const std::span<const Label> labels = by_force.volume[v].labels;
+    Covered<N> covered;
+    if constexpr (std::is_same_v<Overlap, BoxOverlap>) {
+      covered = covered_groups(*plan.kernels, volume.grid, labels, overlap, frame,
+                               state.force_cut.list[v]);
+    } else if constexpr (!N::kIsFixed) {
+      covered = covered_voxels<N>(volume.grid, std::span<const Density>(memory.density), labels,
+                                  overlap, frame, state.force_cut.list[v]);
+    }
+    listed = covered.list.size();
+    laps.end_stage(static_cast<std::int64_t>(listed));
+    const auto drive = cut_drive<N>(Real(kFraction), Real(0), typename N::Unit(1));
     laps.end_stage(
         cut_by_force(by_force.volume[v], drive, memory.density, state.force_cut.volume[v], covered)
             .removed.changed.hi.x);
@@ -193,7 +204,8 @@ template <class N>
         laps.end_stage(0);
         if (!plan.contact.swept) laps.end_stage(tick.contact().x);
         if (by_force.on) {
-          laps.end_stage(tick.press().x);
+          tick.cover();
+          laps.end_stage(0);
           list_and_spend(tick.overlap());
         }
         if (!plan.cutting) continue;
@@ -210,10 +222,12 @@ template <class N>
         laps.end_stage(0);
         tick.splat();
         laps.end_stage(0);
-        laps.end_stage(tick.press(in_volume.overlap_ratio).contact.x);
         if (by_force.on) {
+          tick.cover(in_volume.overlap_ratio);
+          laps.end_stage(0);
           list_and_spend(tick.overlap());
         } else {
+          laps.end_stage(tick.press(in_volume.overlap_ratio).contact.x);
           bend(box);
           laps.end_stage(tick.cut(unbent, memory.carry).changed.hi.x);
         }
@@ -255,6 +269,7 @@ template <class N>
     done = gather_stages(tool.offsets.size(), boxes, cut);
     if (plan.contact.swept) sweep_instead(tool.swept.shell.table.count, done);
   }
+  if (by_force.on) add_force_stages(listed, done);
   std::vector<StageTime> times;
   for (const double us : laps.medians_us()) times.push_back({us, done[times.size()].operations});
   return times;

@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include "controller/kernel/proxy/shell_table.hpp"
+#include "controller/scene/mesh_surface.hpp"
 #include "controller/scene/scene_error.hpp"
 #include "controller/scene/tool_shapes.hpp"
 
@@ -120,21 +121,31 @@ class RingSampler {
   std::vector<Sample> samples_;
 };
 
+void check_count(const SceneTool& tool, double count, double unit_mm) {
+  if (count <= kMaxSurfaceSamples) return;
+  std::ostringstream line;
+  line << "tool '" << tool.name << "': " << count << " samples of its surface, of which contact "
+       << "reads at most " << kMaxSurfaceSamples
+       << " in time; use a smaller tool or coarser voxels than " << unit_mm << " mm";
+  throw SceneError(line.str());
+}
+
 }  // namespace
 
 std::vector<Sample> surface_samples(const SceneTool& tool, double unit_mm) {
-  const Profile profile = tool_profile(tool, kProfileSteps);
-  const double area_mm2 = area_of(profile);
+  const bool meshed = !tool.mesh.triangles.empty();
+  const Profile profile = meshed ? Profile{} : tool_profile(tool, kProfileSteps);
+  const double area_mm2 = meshed ? surface_mm2(tool.mesh) : area_of(profile);
   const double finest_mm = std::sqrt(area_mm2 / kMinSurfaceSamples);
-  const double pitch_mm =
-      std::min(finest_mm, unit_mm * (tool.round ? kBallSamplePitch : kShapeSamplePitch));
+  const double widest =
+      tool.round ? ball_sample_pitch(tool.radius_mm / unit_mm) : kShapeSamplePitch;
+  const double pitch_mm = std::min(finest_mm, unit_mm * widest);
   const double count = std::ceil(area_mm2 / (pitch_mm * pitch_mm));
-  if (!(count <= kMaxSurfaceSamples)) {
-    std::ostringstream line;
-    line << "tool '" << tool.name << "': " << count << " samples of its surface, of which contact "
-         << "reads at most " << kMaxSurfaceSamples
-         << " in time; use a smaller tool or coarser voxels than " << unit_mm << " mm";
-    throw SceneError(line.str());
+  check_count(tool, count, unit_mm);
+  if (meshed) {
+    auto samples = mesh_surface_samples(tool.mesh, static_cast<std::size_t>(count));
+    check_count(tool, static_cast<double>(samples.size()), unit_mm);  // long rims of little area
+    return samples;
   }
   if (tool.round) return fibonacci_ball(tool.radius_mm, static_cast<int>(count));
 

@@ -11,26 +11,6 @@
 
 namespace kerf::volume {
 namespace fs = std::filesystem;
-namespace {
-
-Place unit(const Place& a) {
-  return scaled(a, 1.0 / std::sqrt(dot(a, a)));
-}
-
-}  // namespace
-
-double dot(const Place& a, const Place& b) {
-  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-Place cross(const Place& a, const Place& b) {
-  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
-Place minus(const Place& a, const Place& b) {
-  return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
-}
-Place scaled(const Place& a, double s) {
-  return {a[0] * s, a[1] * s, a[2] * s};
-}
 
 void set_frame(const fs::path& path, Place x, Place y, Place z, SourceVolume& volume) {
   constexpr double kSkew = 2e-3;  // files round their cosines; a shear is far above this
@@ -41,8 +21,8 @@ void set_frame(const fs::path& path, Place x, Place y, Place z, SourceVolume& vo
     throw SceneError(path.string() +
                      ": its axes are not at right angles; resample it to a straight grid first");
   }
-  x = unit(x);
-  y = unit(minus(y, scaled(x, dot(x, y))));
+  x = vec3::unit(x);
+  y = vec3::unit(minus(y, scaled(x, dot(x, y))));
   const Place right_handed = cross(x, y);
   if (dot(right_handed, z) < 0.0) {
     const std::size_t layer =

@@ -5,18 +5,18 @@
 #include <cstdint>
 #include <filesystem>
 
+#include "controller/scene/vec3.hpp"
 #include "controller/scene/volume_io.hpp"
 
 /// The steps that fill a SourceVolume, whatever library read the file. Each checks what it sets and
 /// throws SceneError with `path` as the place.
 namespace kerf::volume {
 
-using Place = std::array<double, 3>;
-
-[[nodiscard]] double dot(const Place& a, const Place& b);
-[[nodiscard]] Place cross(const Place& a, const Place& b);
-[[nodiscard]] Place minus(const Place& a, const Place& b);
-[[nodiscard]] Place scaled(const Place& a, double s);
+using Place = vec3::Vec;
+using vec3::cross;
+using vec3::dot;
+using vec3::minus;
+using vec3::scaled;
 
 /// Refuses sizes that are empty or above the limits.
 void set_grid(const std::filesystem::path& path, const std::array<std::int64_t, 3>& size,

@@ -48,9 +48,9 @@ template <class N>
 
 /// Voxels of volume `v` under the tool at `centre_mm`.
 template <class N>
-[[nodiscard]] CoveredVoxels<N> cover(const ServoPlan<N>& plan, ServoState<N>& state, std::size_t v,
-                                     WorldVec<typename N::Real> centre_mm,
-                                     const ToolContact<N>& at) noexcept {
+[[nodiscard]] Covered<N> cover(const ServoPlan<N>& plan, ServoState<N>& state, std::size_t v,
+                               WorldVec<typename N::Real> centre_mm,
+                               const ToolContact<N>& at) noexcept {
   const VolumePlan<N>& volume = plan.volumes[v];
   const ToolPlan<N>& tool = plan.tools[state.active_tool];
   const ToolInVolume<N>& in_volume = tool.in_volume[v];
@@ -58,28 +58,29 @@ template <class N>
   const ToolPose<N> pose = tool_pose(volume, tool, in_volume, centre_mm, at.rotation);
   const SpindleFrame<N> frame(pose.centre_vox, in_volume.rims_from_voxel,
                               spindle_axes(tool, state, at));
-  const auto listed = [&](const auto& overlap) {
-    return covered_voxels<N>(volume.grid, std::span<const Density>(density),
-                             plan.force_cut.volume[v].labels, overlap, frame,
-                             state.force_cut.list[v]);
-  };
+  const std::span<const Label> labels = plan.force_cut.volume[v].labels;
+  const std::span<CoveredEntry<N>> memory = state.force_cut.list[v];
   if constexpr (N::kIsFixed) {
+    const auto listed = [&](const BoxOverlap& overlap) {
+      return covered_groups(*plan.kernels, volume.grid, labels, overlap, frame, memory);
+    };
     if (in_volume.plan == Plan::aligned) {
       const AlignedTick tick(*plan.kernels, *in_volume.aligned, state.scratch.tick, volume.grid,
                              density, pose);
-      static_cast<void>(tick.press());
+      tick.cover();
       return listed(tick.overlap());
     }
     const SplatTick tick(*plan.kernels, tool.samples, *plan.taps, state.scratch, volume.grid,
                          density, pose);
     tick.copy();
     tick.splat();
-    static_cast<void>(tick.press(in_volume.overlap_ratio));
+    tick.cover(in_volume.overlap_ratio);
     return listed(tick.overlap());
   } else {
     static_cast<void>(
         overlap<N>(volume.grid, tool.offsets, pose, in_volume.overlap_ratio, state.overlap));
-    return listed(state.overlap);
+    return covered_voxels<N>(volume.grid, std::span<const Density>(density), labels, state.overlap,
+                             frame, memory);
   }
 }
 
@@ -95,7 +96,7 @@ template <class N>
   const WorldVec<Real> centre_mm =
       at.centre_mm - relabel<WorldSpace>(times<N>(relabel<ContactSpace>(at.normal), advance_mm));
 
-  std::array<CoveredVoxels<N>, kMaxVolumes> covered;
+  std::array<Covered<N>, kMaxVolumes> covered;
   std::array<CutWeight<N>, kMaxVolumes> weight{};  // in voxels of the largest kind
   CutWeight<N> whole{};
   for (std::size_t v = 0; v < plan.volume_count; ++v) {
@@ -121,7 +122,7 @@ template <class N>
     starves = starves || out.lost > 0;
   }
   Real& advance = state.force_cut.advance;
-  advance = std::clamp(starves ? advance + rules.advance_step : advance - rules.advance_step,
+  advance = std::clamp(starves ? advance + rules.deeper_step : advance - rules.back_step,
                        Real(kCutAdvance), Real(kDeepestAdvance));
   return friction;
 }

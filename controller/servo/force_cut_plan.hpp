@@ -3,7 +3,9 @@
 
 #include <array>
 #include <span>
+#include <type_traits>
 
+#include "controller/kernel/covered_groups.hpp"
 #include "controller/kernel/cutting_friction.hpp"
 #include "controller/kernel/preston.hpp"
 #include "controller/kernel/spindle.hpp"
@@ -13,22 +15,31 @@ namespace kerf {
 
 /// The tool cuts this far inside of the surface that it rests on, so that the groove leaves it play
 /// (contact.md 6): units of contact space. The samples of an odd shape end up to 0.7 of a pitch
-/// inside of its surface, so that its rims may rest on matter that they do not cover. While a tool
-/// finds less than its force would cut it reaches deeper, to the second figure, and then back.
+/// inside of its surface, so that its rims may rest on matter that they do not cover; those of a
+/// ball that is given by its radius end there all round but at six poles of one sample each. While
+/// a tool finds less than its force would cut it reaches deeper, to the second figure, and then
+/// back, slowly: what it rests on now it will also rest on in a moment.
 inline constexpr double kCutAdvance = 0.25, kDeepestAdvance = 1;
 
 /// Cutting by force; constant during a run. Arrays: by index of the plan's volumes.
 template <class N>
 struct ForceCutPlan {
   bool on = false;
-  typename N::Real threshold_n{};   ///< force in the scene that cuts nothing yet
-  typename N::Real advance_step{};  ///< change of the advance in a tick, units
+  typename N::Real threshold_n{};  ///< force in the scene that cuts nothing yet
+  typename N::Real deeper_step{};  ///< of the advance in a tick that finds too little, units
+  typename N::Real back_step{};    ///< of the advance in any other
   SpindlePlan<N> spindle;
   FrictionPlan<N> friction;
   std::array<PrestonPlan<N>, kMaxVolumes> volume{};
   /// Size of a voxel over that of the largest, as a `share_of`.
   std::array<CutBudget<N>, kMaxVolumes> voxel_share{};
 };
+
+/// What the tool covers: groups for the kernels of fixed point, voxel by voxel otherwise.
+template <class N>
+using Covered = std::conditional_t<N::kIsFixed, CoveredGroups, CoveredVoxels<N>>;
+template <class N>
+using CoveredEntry = typename decltype(Covered<N>::list)::value_type;
 
 /// The part that changes; the lists belong to the compiled scene.
 template <class N>
@@ -37,7 +48,7 @@ struct ForceCutState {
   SpindleState<N> spindle;
   Vec<typename N::Real, ToolSpace> friction_n;  ///< felt in the next tick, force in the scene
   std::array<PrestonState<N>, kMaxVolumes> volume{};
-  std::array<std::span<CoveredVoxel<N>>, kMaxVolumes> list{};  ///< scratch of one tick
+  std::array<std::span<CoveredEntry<N>>, kMaxVolumes> list{};  ///< scratch of one tick
 };
 
 }  // namespace kerf

@@ -224,7 +224,9 @@ Wanted<N> wanted_force(const ServoPlan<N>& plan, ServoState<N>& state, const Sen
   tell_removed(forces.removed, out);
   const DeviceVec<Real> felt_n = forces.contact_n + forces.modification_n;
   if (supervisor.phase != Phase::ramping) return {felt_n, forces.tool};
-  return {felt_n * share(supervisor.fade_ticks, timing.fade_in_ticks), forces.tool};
+  // What is beyond the peak is never sent, so it must not hasten the fade.
+  return {clamped(felt_n, plan.limits.peak_n) * share(supervisor.fade_ticks, timing.fade_in_ticks),
+          forces.tool};
 }
 
 /// Limits the force and turns it into motor counts. Switching off is exempt from the slew limit.

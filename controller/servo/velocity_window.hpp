@@ -26,8 +26,9 @@ inline constexpr const char* kVelocityEstimator = "FOAW, best fit over at most 1
 
 /// Velocity of the tip by first-order adaptive windowing (Janabi-Sharifi, Hayward, Chen 2000): on
 /// each axis the longest window of at most 16 intervals in which the line through the newest sample
-/// with the least-squares slope misses no sample by more than `noise_mm`. Long windows at rest, so
-/// encoder steps do not show; short ones when the hand turns round, so the lag stays small.
+/// with the least-squares slope misses no sample by more than twice `noise_mm`: both the sample and
+/// the newest may be off by it, so a steady hand never shortens its window. Long windows keep the
+/// encoder's steps out of the damping; short ones where the hand turns round keep the lag small.
 ///
 /// The slope over i intervals of samples y_k (newest) .. y_{k-i} is
 /// 6 SUM_l (i - 2 l) y_{k-l} / (i (i+1) (i+2)) per interval. Servo thread; 120 comparisons an axis
@@ -70,7 +71,7 @@ class VelocityWindow {
       const std::int32_t age = l * plan.stride;
       return wide(ring_[static_cast<std::size_t>((newest_ + kRing - age) % kRing)].*of);
     };
-    const Wide noise = wide(plan.noise_mm);
+    const Wide most = Wide(2) * wide(plan.noise_mm);
     std::array<Wide, kIntervals + 1> back{};  // newest - sample
     const Wide newest = at(0);
     Wide slope{}, slope_of{1};  // per interval: slope / slope_of
@@ -86,7 +87,7 @@ class VelocityWindow {
       const Wide bottom = Wide(i) * Wide(i + 1) * Wide(i + 2);
       for (std::int32_t l = 1; l <= i; ++l) {
         const Wide miss = back[static_cast<std::size_t>(l)] * bottom - Wide(l) * top;
-        if (i > 1 && (miss > noise * bottom || -miss > noise * bottom)) {
+        if (i > 1 && (miss > most * bottom || -miss > most * bottom)) {
           return per_second(plan, slope, slope_of);
         }
       }

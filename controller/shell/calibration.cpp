@@ -27,15 +27,15 @@ std::string key_of(const std::string& way, const StageCost& stage) {
   return way + "/" + stage.stage;
 }
 
-/// A solid block and tools of several sizes, of every plan that `numeric` has with `cut`.
-Scene block_scene(NumericKind numeric, CutModel cut) {
+/// A solid block and tools of several sizes, of every plan that `numeric` has with these models.
+Scene block_scene(NumericKind numeric, ForceModel force, CutModel cut) {
   constexpr double kPitchMm = 0.125;
   constexpr std::int32_t kEdge = 96;
   Scene scene;
   scene.path = "calibration";
   scene.servo.numeric = numeric;
+  scene.force.model = force;
   scene.cut.model = cut;
-  if (cut == CutModel::preston) scene.force.model = ForceModel::proxy;
   SceneVolume& block = scene.volumes.emplace_back();
   block.name = "block";
   block.image.grid = {kEdge, kEdge, kEdge};
@@ -110,20 +110,25 @@ std::optional<double> Calibration::stage_us(const std::string& way, const StageC
 }
 
 Calibration measure_calibration() {
-  constexpr std::pair<NumericKind, CutModel> kScenes[] = {
-      // together they have every stage
-      {NumericKind::fixed, CutModel::none},
-      {NumericKind::fixed, CutModel::overlap_exact},
-      {NumericKind::fixed, CutModel::preston},
-      {NumericKind::float32, CutModel::overlap},
-      {NumericKind::float32, CutModel::preston},
-      {NumericKind::float32, CutModel::overlap_exact},
-      {NumericKind::float64, CutModel::overlap},
-      {NumericKind::float64, CutModel::preston},
-      {NumericKind::float64, CutModel::overlap_exact}};
+  constexpr struct {  // together they have every stage
+    NumericKind numeric;
+    ForceModel force;
+    CutModel cut;
+  } kScenes[] = {{NumericKind::fixed, ForceModel::paper, CutModel::none},
+                 {NumericKind::fixed, ForceModel::paper, CutModel::overlap_exact},
+                 {NumericKind::fixed, ForceModel::proxy, CutModel::none},
+                 {NumericKind::fixed, ForceModel::proxy, CutModel::preston},
+                 {NumericKind::float32, ForceModel::paper, CutModel::overlap},
+                 {NumericKind::float32, ForceModel::paper, CutModel::overlap_exact},
+                 {NumericKind::float32, ForceModel::proxy, CutModel::none},
+                 {NumericKind::float32, ForceModel::proxy, CutModel::preston},
+                 {NumericKind::float64, ForceModel::paper, CutModel::overlap},
+                 {NumericKind::float64, ForceModel::paper, CutModel::overlap_exact},
+                 {NumericKind::float64, ForceModel::proxy, CutModel::none},
+                 {NumericKind::float64, ForceModel::proxy, CutModel::preston}};
   std::map<std::string, std::vector<double>> prices;
-  for (const auto& [numeric, cut] : kScenes) {
-    Scene scene = block_scene(numeric, cut);
+  for (const auto& [numeric, force, cut] : kScenes) {
+    Scene scene = block_scene(numeric, force, cut);
     const auto servo = compile(scene);
     const std::vector<TickCost>& ticks = servo->costs().ticks;
     for (std::size_t i = 0; i < ticks.size(); ++i) {

@@ -83,7 +83,7 @@ std::optional<int> parse_options(int argc, const char* const* argv, ControllerOp
                             ->type_name("A,B,C");
   app.add_option("--port", options.port,
                  "where the device is: auto; fw, usb or hid, each [:NODE or :SERIAL]; usb also "
-                 "[,firmware=FILE]; socket:PATH of kerf-emulator")
+                 "[,firmware=FILE]; socket:PATH or udp:[ADDRESS:]PORT of kerf-emulator")
       ->type_name("PORT");
   constexpr double kLongestS = 1e7;  // 115 days
   app.add_option("--seconds", options.seconds,

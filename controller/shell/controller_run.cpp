@@ -36,8 +36,7 @@
 #include "controller/shell/scene_segment.hpp"
 #include "controller/shell/servo_loop.hpp"
 #include "controller/shell/stop_signals.hpp"
-#include "controller/shell/watchdog.hpp"
-#include "shared/posix/cores.hpp"
+#include "controller/shell/watchdog_thread.hpp"
 #include "shared/posix/new_file.hpp"
 #include "shared/segment/segment_plan.hpp"
 #include "shared/volume/density_hash.hpp"
@@ -48,7 +47,7 @@ namespace {
 constexpr int kPortPatienceMs = 5000;
 constexpr double kArmingPatienceS = 60;
 constexpr double kStableNPerMm = 0.7;  // CHAI3D's cap for the Omni; the design's for couplings
-constexpr std::chrono::milliseconds kWatchPeriod{5};
+constexpr std::chrono::milliseconds kLookPeriod{5};
 
 const char* text_of(EndReason end) {
   switch (end) {
@@ -63,7 +62,7 @@ const char* text_of(EndReason end) {
     case EndReason::never_armed:
       break;
   }
-  return "the device was never calibrated";
+  return "the device was never calibrated: nobody parked it at rest; see docs/devices.md";
 }
 
 /// What the demo script hands to the emulator.
@@ -126,21 +125,9 @@ void show_progress(const LoopSignals& signals, const std::atomic<bool>& ended,
     char text[64];
     std::snprintf(text, sizeof text, "%.1f s", done_s);
     bar.show(options.seconds ? done_s / *options.seconds : 0,
-             done_s > 0 ? text : "waiting for calibration");
-    for (int i = 0; i < 10 && !ended.load(); ++i) std::this_thread::sleep_for(kWatchPeriod);
+             done_s > 0 ? text : "waiting for the device to be parked at rest");
+    for (int i = 0; i < 10 && !ended.load(); ++i) std::this_thread::sleep_for(kLookPeriod);
   }
-}
-
-/// A thread of its own above the servo, so that neither a slow terminal nor the servo itself can
-/// keep it from looking.
-std::jthread start_watchdog(Watchdog& watchdog, int servo_priority) {
-  return std::jthread([&watchdog, servo_priority](const std::stop_token& stop) {
-    static_cast<void>(set_fifo(std::min(servo_priority + 1, 99)));  // without the right: as it is
-    while (!stop.stop_requested()) {
-      watchdog.look(monotonic_ns());
-      std::this_thread::sleep_for(kWatchPeriod);
-    }
-  });
 }
 
 int check_scene(const Scene& scene) {
@@ -158,8 +145,9 @@ int check_scene(const Scene& scene) {
   const auto& o = scene.device.offset_mm;
   std::printf("workspace_scale=%g\noffset_mm=%g,%g,%g\n", scene.device.workspace_scale, o[0], o[1],
               o[2]);
-  std::printf("p0_n_per_mm2=%g\nstiffness_at_device_n_per_mm=%g\n", scene.force.p0_n_per_mm2,
-              device_stiffness_n_per_mm(scene));
+  std::printf("force=%s\ncut=%s\n", std::string(word_of(scene.force.model)).c_str(),
+              std::string(word_of(scene.cut.model)).c_str());
+  std::printf("stiffness_at_device_n_per_mm=%g\n", device_stiffness_n_per_mm(scene));
   std::fputs(hand_lines(scene).c_str(), stdout);
   return 0;
 }
@@ -177,11 +165,17 @@ void check_run(const ControllerOptions& options, const Scene& scene, const Scene
   if (!options.report.empty()) check_new_file(options.report);
   if (!options.final_volume.empty()) check_volume_path(options.final_volume);
   if (const double stiffness = device_stiffness_n_per_mm(scene); stiffness > kStableNPerMm) {
-    spdlog::warn("first contact is {:.3g} N/mm stiff at the device, an Omni bears {}: it will {}",
-                 stiffness, kStableNPerMm, "tremble; lower force.p0_n_per_mm2");
+    const bool paper = scene.force.model == ForceModel::paper;
+    spdlog::warn(
+        "contact is {:.3g} N/mm stiff at the device, an Omni bears {}: it will tremble; {}",
+        stiffness, kStableNPerMm,
+        paper ? "lower force.p0_n_per_mm2" : "lower force.stiffness_n_per_mm");
   }
   if (!scene.device.torque_scale) {
-    spdlog::warn("device.torque_scale is not set: the motors stay off; measure it for your device");
+    spdlog::warn(
+        "device.torque_scale is not set for {}: the motors stay off; measure it, and write "
+        "device.personality beside it",
+        kPersonalityWords[static_cast<std::size_t>(scene.device.personality)]);
   }
 }
 
@@ -275,7 +269,7 @@ EndReason run_threads(const Run& run) {
     });
     std::jthread watching;
     if (!run.options.virtual_time) {
-      watching = start_watchdog(watchdog, run.options.real_time.priority);
+      watching = start_watchdog(watchdog, run.options.real_time);
     }
     show_progress(signals, ended, run.options, run.rate_hz);
   }

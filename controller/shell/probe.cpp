@@ -136,10 +136,12 @@ void print(const std::vector<Lack>& lacks) {
 /// A port of a real bus that cannot be opened is followed by what may be the reason.
 std::unique_ptr<PacketPort> open_or_explain(const ControllerOptions& options, Personality kind,
                                             int rate_hz, const std::atomic<bool>& stop) {
+  const std::string port = resolve_port(options.port, kind);
   try {
-    return open_port(resolve_port(options.port, kind), rate_hz, kPatienceMs, stop);
+    return open_port(port, rate_hz, kPatienceMs, stop);
   } catch (const std::runtime_error&) {
-    if (!options.port.starts_with("socket:")) print(lacks_of_nodes(kind, list_device_nodes()));
+    const bool is_emulated = port.starts_with("socket:") || port.starts_with("udp:");
+    if (!is_emulated) print(lacks_of_nodes(kind, list_device_nodes()));
     throw;
   }
 }

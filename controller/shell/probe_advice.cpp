@@ -35,7 +35,7 @@ Bus bus_of(Personality personality) {
               "sudo modprobe firewire-ohci (is there a card? lspci | grep 1394)",
               "connect and power it, then: sudo dmesg | grep firewire"};
     case Personality::falcon:
-      return {"sys/bus/usb", "sudo modprobe usbcore xhci-pci",
+      return {"sys/bus/usb", "sudo modprobe xhci-pci (is there a controller? lspci | grep USB)",
               "connect and power it, then: lsusb -d 0403:cb48"};
     case Personality::woodenhaptics:
       break;

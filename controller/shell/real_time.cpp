@@ -28,9 +28,13 @@ std::vector<MissingRight> lock_memory() {
            "page faults may delay a tick by milliseconds"}};
 }
 
+int core_of(const RealTimeOptions& options) {
+  return options.cpu >= 0 ? options.cpu : allowed_cores().back();
+}
+
 std::vector<MissingRight> become_real_time(const RealTimeOptions& options) {
   std::vector<MissingRight> missing;
-  const int core = options.cpu >= 0 ? options.cpu : allowed_cores().back();
+  const int core = core_of(options);
   if (const int error = pin_to_core(core); error != 0) {
     missing.push_back(
         {"core " + std::to_string(core) + " (" + std::generic_category().message(error) + ")",

@@ -14,6 +14,9 @@ struct RealTimeOptions {
   bool strict = false;       ///< a missing right refuses instead of warning
 };
 
+/// The core that the servo thread takes.
+[[nodiscard]] int core_of(const RealTimeOptions& options);
+
 /// A right that the system did not give, and what that costs.
 struct MissingRight {
   std::string what;

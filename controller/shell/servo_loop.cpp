@@ -102,9 +102,11 @@ EndReason run_servo(TickSource& clock, DeviceDriver& device, Servo& servo, Publi
       servo.apply(servo_command(*command));
       last_command = command->index;
     }
-    if (signals.stalled.exchange(false, std::memory_order_relaxed)) {
+    // What stopped the servo may have stopped its watchdog too: the clock tells as well.
+    const bool watchdog_tripped = signals.stalled.exchange(false, std::memory_order_relaxed);
+    if (watchdog_tripped || clock.stood_still()) {
       servo.apply({.kind = ServoCommand::Kind::fade_in});
-      record.add_event(tick, "watchdog");
+      record.add_event(tick, watchdog_tripped ? "watchdog" : "stood_still");
     }
     const std::int64_t in_hand_ns = monotonic_ns();
     const ServoOutput output = servo.step(report);  // all physics, all limits

@@ -8,6 +8,9 @@
 
 namespace kerf {
 
+/// A servo whose ticks lie so far apart has stood still: what it felt then is no longer true.
+inline constexpr std::int64_t kStandstillNs = 20'000'000;
+
 /// What starts a tick: the clock, or in lock-step the device's next report.
 class TickSource {
  public:
@@ -16,6 +19,8 @@ class TickSource {
   virtual std::int64_t wait_next() noexcept = 0;
   /// Deadlines that were skipped because a tick ran over.
   [[nodiscard]] virtual std::uint64_t overruns() const noexcept = 0;
+  /// Whether this tick began kStandstillNs or more after the last one; never where no clock runs.
+  [[nodiscard]] virtual bool stood_still() const noexcept { return false; }
 };
 
 /// Real time: absolute deadlines.
@@ -23,11 +28,20 @@ class RealTimeTicks final : public TickSource {
  public:
   RealTimeTicks(std::int64_t period_ns, std::int64_t spin_ns) noexcept
       : clock_(period_ns, spin_ns) {}
-  std::int64_t wait_next() noexcept override { return clock_.wait_next(); }
+  std::int64_t wait_next() noexcept override {
+    const std::int64_t late_ns = clock_.wait_next();
+    const std::int64_t now_ns = monotonic_ns();
+    stood_still_ = began_ns_ > 0 && now_ns - began_ns_ >= kStandstillNs;
+    began_ns_ = now_ns;
+    return late_ns;
+  }
   [[nodiscard]] std::uint64_t overruns() const noexcept override { return clock_.overruns(); }
+  [[nodiscard]] bool stood_still() const noexcept override { return stood_still_; }
 
  private:
   DeadlineClock clock_;
+  std::int64_t began_ns_ = 0;  ///< the last tick
+  bool stood_still_ = false;
 };
 
 /// Virtual time: one tick per report, as fast as both ends go. A device that is silent for two

@@ -12,8 +12,6 @@ namespace kerf {
 /// motors go off, once per stall; the loop fades the force in again when it comes back.
 class Watchdog {
  public:
-  static constexpr std::int64_t kPatienceNs = 20'000'000;
-
   Watchdog(const DeviceDriver& device, LoopSignals& signals) noexcept
       : device_(device), signals_(signals) {}
 
@@ -26,7 +24,7 @@ class Watchdog {
       tripped_ = false;
       return;
     }
-    if (tripped_ || now_ns - last_change_ns_ < kPatienceNs) return;
+    if (tripped_ || now_ns - last_change_ns_ < kStandstillNs) return;
     static_cast<void>(device_.release());
     tripped_ = true;
     ++trips_;

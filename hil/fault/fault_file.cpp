@@ -75,12 +75,13 @@ DeviceFault fault_of(const TomlTable& table) {
 FaultScript parse_fault_script(std::string_view text, const std::string& place) {
   const toml::table file = parse_toml(text, place);
   const TomlTable top(file, place, "");
-  top.allow_only({"seed", "clock", "fault"});
+  top.allow_only({"seed", "clock", "latches", "fault"});
   FaultScript script;
   constexpr double kMaxSeed = 4294967295.0;
   script.seed = static_cast<std::uint32_t>(top.number("seed", script.seed, {0, kMaxSeed}));
   const std::string clock = top.word("clock", "push", kFaultClockWords);
   script.clock = clock == "start" ? FaultClock::start : FaultClock::push;
+  script.latches = top.word("latches", "", kLatchWords);
   for (const toml::node& element : tables_of(file, "fault", kMaxFaults, place)) {
     script.faults.push_back(fault_of(TomlTable(*element.as_table(), place, "fault")));
   }
@@ -94,7 +95,8 @@ FaultScript read_fault_script(const std::filesystem::path& file) {
 FaultScript random_faults(std::uint32_t seed) {
   std::mt19937 random(seed);
   const auto below = [&](std::uint32_t end) { return static_cast<int>(random() % end); };
-  FaultScript script{.faults = {}, .seed = seed};
+  FaultScript script;
+  script.seed = seed;
   const int count = 3 + below(4);
   for (int i = 0; i < count; ++i) {
     DeviceFault fault;

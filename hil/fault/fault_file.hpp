@@ -14,6 +14,7 @@ namespace kerf {
 ///
 ///     seed = 1               # of everything random below
 ///     clock = "push"         # begins when the motors first push; or "start": with the emulator
+///     latches = "none"       # what kerf-lab faults demands: a word of kLatchWords; none: nothing
 ///     [[fault]]
 ///     kind = "lose"          # a word of kFaultWords
 ///     packets = "reports"    # or "commands"; of lose, delay, duplicate, reorder, truncate,

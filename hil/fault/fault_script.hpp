@@ -41,6 +41,11 @@ enum class FaultClock : std::uint8_t {
 
 inline constexpr std::array<std::string_view, 2> kFaultClockWords{"push", "start"};
 
+/// What a controller that keeps its safety contract latches in such a run, and nothing else; words
+/// in fault files.
+inline constexpr std::array<std::string_view, 4> kLatchWords{"none", "stale_input", "not_finite",
+                                                             "overspeed"};
+
 /// One fault, by the script's clock.
 struct DeviceFault {
   FaultKind kind = FaultKind::lose;
@@ -57,6 +62,7 @@ struct FaultScript {
   std::vector<DeviceFault> faults;
   std::uint32_t seed = 1;
   FaultClock clock = FaultClock::push;
+  std::string latches{};  ///< of kLatchWords; empty: chance or the device decides
 };
 
 }  // namespace kerf

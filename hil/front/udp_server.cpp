@@ -2,18 +2,16 @@
 #include "hil/front/udp_server.hpp"
 
 #include <cerrno>
-#include <charconv>
 #include <cstring>
-#include <memory>
 #include <system_error>
 
-#include <netdb.h>
 #include <netinet/in.h>
 #include <poll.h>
 #include <unistd.h>
 
 #include "hil/hil_error.hpp"
 #include "shared/posix/monotonic_clock.hpp"
+#include "shared/posix/udp_address.hpp"
 
 namespace kerf {
 namespace {
@@ -21,7 +19,6 @@ namespace {
 constexpr int kStopCheckMs = 100;                // how long a stop request may wait
 constexpr std::int64_t kGoneNs = 2'000'000'000;  // silence of a host that has left
 constexpr int kMaxStrangers = 64;                // datagrams of others, thrown away in one call
-constexpr const char* kThisMachine = "127.0.0.1";
 
 // The sockets API takes every address as a sockaddr.
 sockaddr* generic(sockaddr_storage& address) {
@@ -32,10 +29,6 @@ bool readable(int fd, int timeout_ms) noexcept {
   return poll(&waiting, 1, timeout_ms) > 0;
 }
 
-struct FreeAddresses {
-  void operator()(addrinfo* list) const noexcept { freeaddrinfo(list); }
-};
-
 [[noreturn]] void refuse(const std::string& where, const std::string& why) {
   throw HilError("--udp: " + where + ": " + why +
                  "; use [ADDRESS:]PORT with an address of this machine and a free port");
@@ -43,24 +36,10 @@ struct FreeAddresses {
 
 /// A socket bound to `where`.
 int bind_to(const std::string& where) {
-  const auto colon = where.rfind(':');
-  std::string host = colon == std::string::npos ? kThisMachine : where.substr(0, colon);
-  const std::string port = colon == std::string::npos ? where : where.substr(colon + 1);
-  if (host.size() > 2 && host.front() == '[' && host.back() == ']') {  // IPv6
-    host = host.substr(1, host.size() - 2);
-  }
-  std::uint16_t number = 0;  // the resolver itself takes 99999 and an empty port
-  const auto [end, error] = std::from_chars(port.data(), port.data() + port.size(), number);
-  if (error != std::errc{} || end != port.data() + port.size()) refuse(where, "no port");
-  addrinfo wanted{};
-  wanted.ai_socktype = SOCK_DGRAM;
-  wanted.ai_flags = AI_PASSIVE | AI_NUMERICSERV;
-  addrinfo* found = nullptr;
-  const int failed = getaddrinfo(host.c_str(), port.c_str(), &wanted, &found);
-  if (failed != 0) refuse(where, gai_strerror(failed));
-  const std::unique_ptr<addrinfo, FreeAddresses> list(found);
-  const int fd = socket(list->ai_family, SOCK_DGRAM | SOCK_CLOEXEC, 0);
-  if (fd >= 0 && bind(fd, list->ai_addr, list->ai_addrlen) == 0) return fd;
+  const UdpAddress address = resolve_udp(where);
+  if (!address.error.empty()) refuse(where, address.error);
+  const int fd = socket(address.storage.ss_family, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+  if (fd >= 0 && bind(fd, address.get(), address.bytes) == 0) return fd;
   const int cause = errno;
   if (fd >= 0) close(fd);
   refuse(where, std::generic_category().message(cause));

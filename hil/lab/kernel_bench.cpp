@@ -5,16 +5,17 @@
 #include <cmath>
 #include <cstdint>
 #include <numbers>
-#include <optional>
 #include <span>
 
 #include "controller/kernel/aligned.hpp"
 #include "controller/kernel/contact.hpp"
+#include "controller/kernel/covered_groups.hpp"
 #include "controller/kernel/gather.hpp"
 #include "controller/kernel/milling.hpp"
 #include "controller/kernel/preston.hpp"
 #include "controller/kernel/splat.hpp"
 #include "controller/scene/aligned_tool.hpp"
+#include "controller/scene/covered_bound.hpp"
 #include "controller/scene/sample_tool.hpp"
 #include "controller/scene/tick_memory.hpp"
 #include "hil/lab/bench_scene.hpp"
@@ -157,8 +158,8 @@ class Bench {
     });
   }
 
-  /// Cutting by force at 1 N where the overlap is there already: what it costs beyond that. The
-  /// paper's row is its whole tick of cutting.
+  /// Cutting by force at 1 N, from the overlap to what leaves the volume; the reference lists voxel
+  /// by voxel. The paper's row is its whole tick of cutting.
   void press(const std::vector<Density>& density, const Ticks& ticks) {
     begin(ticks);
     PaperVolume paper(kGrid, density);
@@ -168,26 +169,37 @@ class Bench {
     });
     PrestonPlan<Numbers> plan;
     plan.rate.fill(force_rate<Numbers>(kEnamelSteps));
-    std::vector<CoveredVoxel<Numbers>> list(kWidest * kWidest * kWidest);
+    const auto drive = cut_drive<Numbers>(Q16(1), Q16(0), Q30(1));
+    const auto cut = [&](auto covered, std::vector<Density>& volume, PrestonState<Numbers>& state) {
+      const auto out = cut_by_force(plan, drive, std::span<Density>(volume), state, covered);
+      use(static_cast<std::int64_t>(out.removed.density_steps));
+    };
+    {
+      std::vector<Density> volume = density;
+      PrestonState<Numbers> state;
+      std::vector<Numbers::Weight> memory(kWidest * kWidest * kWidest);
+      std::vector<CoveredVoxel<Numbers>> list(memory.size());
+      OverlapBox<Numbers> box{memory, {}, 0};
+      const std::size_t bytes =
+          memory.size() * sizeof(Numbers::Weight) + list.size() * sizeof list[0];
+      row("fixed", "reference", bytes, [&](int i) {
+        const auto pose = pose_of(ticks.place(i), kUnturned);
+        overlap<Numbers>(kGrid, ticks.tool, pose, Numbers::kStepOne, box);
+        cut(covered_voxels<Numbers>(kGrid, std::span<const Density>(volume), {}, box,
+                                    frame_of(pose, 8), std::span(list)),
+            volume, state);
+      });
+    }
     each_set(true, [&](const KernelSet& set, const AlignedTable& table, const BoxScratch& scratch,
                        std::size_t bytes) {
       std::vector<Density> volume = density;
       PrestonState<Numbers> state;
-      std::optional<AlignedTick> tick;
-      SpindleFrame<Numbers> frame;
-      int next = 0;
-      const auto overlap = [&] {
-        const auto pose = pose_of(ticks.place(next++ % ticks.count), kUnturned);
-        frame = frame_of(pose, 8);
-        tick.emplace(set, table, scratch, kGrid, volume, pose);
-        use(tick->press().x);
-      };
-      row("fixed", set.name, bytes + sizeof plan + sizeof state, overlap, [&](int) {
-        auto covered = covered_voxels<Numbers>(kGrid, std::span<const Density>(volume), {},
-                                               tick->overlap(), frame, std::span(list));
-        const auto drive = cut_drive<Numbers>(Q16(1), Q16(0), Q30(1));
-        const auto out = cut_by_force(plan, drive, std::span<Density>(volume), state, covered);
-        use(static_cast<std::int64_t>(out.removed.density_steps));
+      std::vector<CoveredGroup> list(most_groups(table));
+      row("fixed", set.name, bytes + list.size() * sizeof list[0], [&](int i) {
+        const auto pose = pose_of(ticks.place(i), kUnturned);
+        const AlignedTick tick(set, table, scratch, kGrid, volume, pose);
+        tick.cover();
+        cut(covered_groups(set, kGrid, {}, tick.overlap(), frame_of(pose, 8), list), volume, state);
       });
     });
   }
@@ -222,13 +234,7 @@ class Bench {
     const auto cool = [cold] {
       if (cold) sweep_cache();
     };
-    row(numeric, isa, bytes, cool, tick);
-  }
-
-  /// `before` each tick is not timed.
-  template <class Before, class Tick>
-  void row(const char* numeric, const char* isa, std::size_t bytes, Before&& before, Tick&& tick) {
-    const TickTimes times = time_ticks(ticks_->count, before, tick);
+    const TickTimes times = time_ticks(ticks_->count, cool, tick);
     if (baseline_p50_ns_ == 0) baseline_p50_ns_ = times.p50_ns;  // the paper is the first row
     rows_.push_back(
         {ticks_->name, numeric, isa, times.p50_ns, times.p99_ns, baseline_p50_ns_, bytes});

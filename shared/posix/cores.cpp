@@ -34,4 +34,13 @@ int pin_to_core(int core) noexcept {
   return pthread_setaffinity_np(pthread_self(), sizeof set, &set);
 }
 
+int leave_core(int core) noexcept {
+  if (core < 0 || core >= CPU_SETSIZE) return EINVAL;
+  cpu_set_t set;
+  CPU_ZERO(&set);
+  if (sched_getaffinity(0, sizeof set, &set) != 0) return errno;
+  CPU_CLR(static_cast<std::size_t>(core), &set);
+  return pthread_setaffinity_np(pthread_self(), sizeof set, &set);  // refuses an empty set
+}
+
 }  // namespace kerf

@@ -15,4 +15,8 @@ namespace kerf {
 /// Keeps the calling thread on one core. Returns 0 or the system's error number.
 [[nodiscard]] int pin_to_core(int core) noexcept;
 
+/// Keeps the calling thread on the other cores that it may use. Returns 0 or the system's error
+/// number; EINVAL, and the thread stays where it is, when there is no other.
+[[nodiscard]] int leave_core(int core) noexcept;
+
 }  // namespace kerf

@@ -45,9 +45,15 @@ TEST_CASE("where no device is, one line says what to do") {
       doctest::Contains("no device of SensAble is there; connect one, or try ./kerf demo"),
       std::runtime_error);
   options.where = "/dev/fw-nothing";
-  CHECK_THROWS_WITH_AS(static_cast<void>(kerf::find_firewire(options)),
-                       doctest::Contains("/dev/fw-nothing: No such file or directory"),
-                       std::runtime_error);
+  CHECK_THROWS_WITH_AS(
+      static_cast<void>(kerf::find_firewire(options)),
+      "--port fw:/dev/fw-nothing: no such node; --port fw finds the device by itself",
+      std::runtime_error);
+  options.where = "12345678901";
+  CHECK_THROWS_WITH_AS(
+      static_cast<void>(kerf::find_firewire(options, std::filesystem::temp_directory_path())),
+      doctest::Contains("no device of SensAble with this serial number is there"),
+      std::runtime_error);
   options.where = "/dev/null";  // it opens, and is something else
   CHECK_THROWS_WITH_AS(static_cast<void>(kerf::find_firewire(options)),
                        doctest::Contains("no device of SensAble"), std::runtime_error);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Every packet decoder, of device and host, and every driver behind it. The input is a sequence of
-// packets, each after one byte that says its length.
+// Every packet decoder, of device and host, and every driver behind it; the Falcon's serial line
+// and the events of FireWire, in which packets come. The input is a sequence of packets, each after
+// one byte that says its length, or one stream, or one event.
 #include <algorithm>
 #include <array>
 #include <cstddef>
@@ -9,8 +10,10 @@
 #include <span>
 
 #include "controller/device/falcon_driver.hpp"
+#include "controller/device/firewire_streams.hpp"
 #include "controller/device/omni_driver.hpp"
 #include "controller/device/wooden_driver.hpp"
+#include "shared/wire/falcon_framer.hpp"
 #include "shared/wire/falcon_packet.hpp"
 #include "shared/wire/omni_packet.hpp"
 #include "shared/wire/wooden_packet.hpp"
@@ -89,6 +92,33 @@ void drive(Bytes input, bool (*neutral)(Bytes)) {
   }
 }
 
+/// Every byte of the line is of a packet, a stray, or of the packet that is not whole yet.
+void frame(Bytes line) {
+  kerf::falcon::Framer framer;
+  std::size_t packets = 0;
+  for (const std::uint8_t byte : line) packets += framer.take(byte) ? 1 : 0;
+  const std::size_t told = packets * kerf::falcon::kPacketBytes + framer.strays();
+  require(told <= line.size() && line.size() - told < kerf::falcon::kPacketBytes);
+}
+
+/// However the kernel's headers lie, a packet is within its event, and none comes for ever.
+void take_events(Bytes event) {
+  kerf::FirewireFile closed;
+  kerf::FirewireReceiver receiver;
+  receiver.take(event);
+  std::size_t packets = 0;
+  for (auto packet = receiver.next(); packet.size > 0; packet = receiver.next()) {
+    require(++packets * packet.bytes.size() <= event.size());
+    require(packet.bytes.size() <= kerf::omni::kReportBytes);
+    require(receiver.newest_cycle() >= 0 && receiver.newest_cycle() < 64'000);
+  }
+  receiver.turn(closed);
+  kerf::FirewireTransmitter transmitter;
+  transmitter.take(event);
+  const int skips = transmitter.wanted_skips(receiver.newest_cycle(), 8);
+  require(skips >= 0 && skips <= 16);
+}
+
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
@@ -102,6 +132,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     round_trip(packet, [](Bytes b) { return kerf::wooden::decode_report(b); });
     round_trip(packet, [](Bytes b) { return kerf::wooden::decode_command(b); });
   }
+  frame(input);
+  take_events(input);
   drive<kerf::OmniDriver>(input, omni_is_neutral);
   drive<kerf::FalconDriver>(input, falcon_is_neutral);
   drive<kerf::WoodenDriver>(input, wooden_is_neutral);

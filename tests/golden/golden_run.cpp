@@ -102,7 +102,7 @@ Scene golden_scene(GoldenScene which, NumericKind numeric) {
     scene.tools = {
         make_tool("ball", "ball", {.pitch_mm = kVoxelMm, .size_vox = 6}),
         make_tool("shaft", "cylinder", {.pitch_mm = kVoxelMm, .radius_mm = 0.3, .length_mm = 1.5})};
-    scene.force = {.model = ForceModel::proxy, .friction = 0.2};
+    scene.force.friction = 0.2;
     label(scene.volumes[0].image);
     scene.materials.resize(4);
     scene.materials[2].machinability = 3;
@@ -113,6 +113,7 @@ Scene golden_scene(GoldenScene which, NumericKind numeric) {
   scene.device.offset_mm = {4.1875, 47.25, 60.375};  // the middle of the hand's way
   scene.device.torque_scale = std::array{0.342, 0.342, -0.342};
   scene.force.p0_n_per_mm2 = 12.0;  // of the paper's force
+  if (which != GoldenScene::sweep) scene.force.model = ForceModel::paper;
   scene.cut.model = which == GoldenScene::mill   ? CutModel::overlap_exact
                     : which == GoldenScene::feel ? CutModel::none
                                                  : CutModel::preston;

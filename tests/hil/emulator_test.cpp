@@ -4,12 +4,15 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <vector>
 
 #include <doctest/doctest.h>
 
+#include "hil/devmodel/falcon_model.hpp"
 #include "hil/hand_script_file.hpp"
+#include "shared/wire/falcon_packet.hpp"
 
 namespace {
 
@@ -53,6 +56,7 @@ std::vector<std::uint8_t> twenty_seconds(const OmniParams& params) {
 /// Seconds of device time after which the stylus is out of the inkwell.
 double undocked_after(const std::optional<OmniCommand>& command) {
   Emulator emulator({}, cut_cavity());
+  CHECK_FALSE(emulator.next_packet().empty());  // it listens, at least
   if (command) tell(emulator, *command);
   emulator.advance(4 * kerf::omni::kBusCyclesPerSecond);
   REQUIRE(emulator.stats().undocked_at);
@@ -81,6 +85,21 @@ TEST_CASE("the hand waits for a calibrated host 0.15 s, for any other 2 s") {
   CHECK(undocked_after(std::nullopt) == doctest::Approx(2.0).epsilon(1e-3));
 }
 
+TEST_CASE("the hand waits for a host at all, and then homes a Falcon as if it had just begun") {
+  Emulator emulator(std::make_unique<kerf::FalconModel>(), cut_cavity());
+  emulator.advance(10 * kerf::kCyclesPerSecond);
+  const auto all_homed = [&] {
+    for (int tick = 0; tick < kTicksPerSecond; ++tick) {
+      emulator.receive(encode(kerf::FalconCommand{.motor = {}, .homing = true}));
+      emulator.advance(kTickCycles);
+      const auto report = kerf::falcon::decode_report(emulator.next_packet());
+      if (report && report->homed == std::array{true, true, true}) return true;
+    }
+    return false;
+  };
+  CHECK(all_homed());
+}
+
 TEST_CASE("without a hand the stylus stays in the inkwell") {
   Emulator emulator({}, std::nullopt);
   emulator.advance(5 * kerf::omni::kBusCyclesPerSecond);
@@ -94,8 +113,8 @@ TEST_CASE("the tip follows the script to the surface within friction and inertia
   emulator.advance(static_cast<int>((0.15 + 0.8) * kerf::omni::kBusCyclesPerSecond));
   CHECK(norm(emulator.model().tip_mm() - DeviceVec<double>{0, 4, 0}) < 1.5);
   emulator.advance(8 * kerf::omni::kBusCyclesPerSecond);
-  // One round later it comes up again: the target is 3 mm over the surface.
-  CHECK(norm(emulator.model().tip_mm() - DeviceVec<double>{0, 3, 0}) < 1.5);
+  // One round later it is up and aside.
+  CHECK(norm(emulator.model().tip_mm() - DeviceVec<double>{3, 5, 0}) < 1.5);
 }
 
 TEST_CASE("a packet that is no command changes nothing but a count") {

@@ -26,6 +26,7 @@ std::string error_of(const std::string& text) {
 TEST_CASE("a fault script is read whole") {
   const auto script = parse_fault_script(R"(
     seed = 7
+    latches = "overspeed"
     [[fault]]
     kind = "lose"
     packets = "commands"
@@ -42,6 +43,7 @@ TEST_CASE("a fault script is read whole") {
   )",
                                          "faults.toml");
   CHECK(script.seed == 7);
+  CHECK(script.latches == "overspeed");
   REQUIRE(script.faults.size() == 3);
   CHECK(script.faults[0].kind == FaultKind::lose);
   CHECK(script.faults[0].of_commands);
@@ -71,6 +73,8 @@ TEST_CASE("bad fault scripts are refused with file, line, value and way out") {
         "faults.toml:1: fault: axis is not whole; use a whole number");
   CHECK(error_of("clock = \"noon\"\n[[fault]]\nkind = \"lose\"\n")
             .starts_with("faults.toml:1: clock: unknown"));
+  CHECK(error_of("latches = \"fear\"\n[[fault]]\nkind = \"lose\"\n")
+            .starts_with("faults.toml:1: latches: unknown"));
   CHECK(error_of("[[fault]]\nkind = \"lose\"\nat = 1\n").starts_with("faults.toml:3: fault.at"));
   CHECK(error_of("[[fault]\n").starts_with("faults.toml:"));
 }

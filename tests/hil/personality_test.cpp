@@ -112,6 +112,7 @@ TEST_CASE("the hand homes a Falcon whose host asks for it, then plays its script
 
 TEST_CASE("a Falcon whose host never asks for homing is moved after 2 s all the same") {
   Emulator emulator = falcon(hand());
+  emulator.receive(encode(kerf::FalconCommand{}));
   emulator.advance(kerf::kCyclesPerSecond * 19 / 10);
   CHECK(emulator.model().docked());
   emulator.advance(kerf::kCyclesPerSecond * 2 / 10);

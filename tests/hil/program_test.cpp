@@ -71,6 +71,8 @@ TEST_CASE("bad input is one line that names place, value and way out, and exit c
            Bad{{"--socket", socket, "--hand", "/nowhere.toml"}, "/nowhere.toml"},
            Bad{{"--socket", socket, "--lockstep", "--fault", KERF_FAULTS_DIR "/silence.toml"},
                "--fault: in lock-step"},
+           Bad{{"--socket", socket, "--fault", KERF_FAULTS_DIR "/late_host.toml"},
+               "late_host.toml: host_late: no device"},
            Bad{{"--socket", "/nowhere/socket"}, "--socket: /nowhere/socket"},
            Bad{{"--front", "udp"}, "--udp"},
            Bad{{"--front", "udp", "--udp", "harbour"}, "--udp: harbour"},

@@ -20,6 +20,7 @@
 #include "hil/emulator.hpp"
 #include "hil/front/uhid/uhid_arm.hpp"
 #include "shared/wire/wooden_packet.hpp"
+#include "tests/hil/serve_for.hpp"
 
 namespace {
 
@@ -52,10 +53,7 @@ class Kernel {
   }
   /// Lets the arm serve for so long, and takes what it said.
   std::vector<Event> hear(int milliseconds) {
-    const auto until = std::chrono::steady_clock::now() + std::chrono::milliseconds(milliseconds);
-    kerf::Lateness lateness;
-    kerf::serve_kernel(
-        arm_, [&] { return std::chrono::steady_clock::now() < until; }, lateness);
+    kerf::test::serve_for(arm_, milliseconds);
     std::vector<Event> all;
     for (;;) {
       auto event = std::make_unique<uhid_event>();

@@ -2,6 +2,7 @@
 // The Falcon at the end of a USB/IP connection: the test is the kernel at its other end.
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cerrno>
 #include <chrono>
 #include <cstdint>
@@ -19,6 +20,7 @@
 #include "hil/emulator.hpp"
 #include "hil/front/usbip/usbip_falcon.hpp"
 #include "shared/wire/falcon_packet.hpp"
+#include "tests/hil/serve_for.hpp"
 
 namespace {
 
@@ -79,10 +81,7 @@ class Host {
 
   /// Lets the device serve for so long, and takes the answers.
   std::vector<Answer> hear(int milliseconds) {
-    const auto until = std::chrono::steady_clock::now() + std::chrono::milliseconds(milliseconds);
-    kerf::Lateness lateness;
-    kerf::serve_kernel(
-        device_, [&] { return std::chrono::steady_clock::now() < until; }, lateness);
+    kerf::test::serve_for(device_, milliseconds);
     return take();
   }
 
@@ -210,12 +209,24 @@ TEST_CASE("usbip: a stalled endpoint says so once, is silent, and is freed by it
   CHECK(find(answers, 51)->status == -EPIPE);
 }
 
+TEST_CASE("usbip: an endpoint that stalls while nobody reads tells the first read that comes") {
+  Host host({{8, kerf::UsbFault::stall}});
+  host.hear(5);
+  for (std::uint32_t i = 2; i < 10; ++i) host.submit_read(i);
+  const auto answers = host.hear(20);
+  REQUIRE(answers.size() == 1);
+  CHECK(answers[0].sequence == 2);
+  CHECK(answers[0].status == -EPIPE);
+}
+
 TEST_CASE("usbip: unplugged the cable is dead, plugged in again there is another one") {
-  Host host({{40, kerf::UsbFault::vanish}, {80, kerf::UsbFault::back}});
+  std::atomic<bool> again{false};
+  Host host({{40, kerf::UsbFault::vanish}, {80, kerf::UsbFault::back, &again}});
   host.submit_read(2);
   host.hear(8);
   CHECK(host.device().descriptor() < 0);
   CHECK_FALSE(host.device().left());
+  again = true;
   host.hear(5);
   CHECK(host.plugs() == 2);
   host.control(1, {0x80, 6, 0, 1, 0, 0, 18, 0});

@@ -17,16 +17,17 @@ namespace {
 constexpr double kPi = std::numbers::pi;
 
 /// Volume in voxels that a ball of `radius_vox` takes out of full material by stamps along x.
+template <class N>
 double swept(int radius_vox, double pitch_vox, double y, double length_vox, double step_vox) {
   TestVolume volume = filled({100, 48, 48}, 65535);
   const auto ball = odd_ball(static_cast<int>(radius_vox / pitch_vox));
-  Cutter<FixedNumbers> cutter(32);
-  const auto rate = removal_rate<FixedNumbers>(1.0, false);
-  const auto ratio = step_from<FixedNumbers>(pitch_vox * pitch_vox * pitch_vox);
+  Cutter<N> cutter(32);
+  const auto rate = removal_rate<N>(1.0, false);
+  const auto ratio = step_from<N>(pitch_vox * pitch_vox * pitch_vox);
   std::uint64_t steps = 0;
   for (double x = 0; x <= length_vox; x += step_vox) {
-    const auto pose = pose_at<FixedNumbers>({30 + x, y, 24}, pitch_vox);
-    steps += cut<FixedNumbers>(volume, ball, pose, rate, cutter, ratio).density_steps;
+    const auto pose = pose_at<N>({30 + x, y, 24}, pitch_vox);
+    steps += cut<N>(volume, ball, pose, rate, cutter, ratio).density_steps;
   }
   return double(steps) / kDensityMax;
 }
@@ -72,41 +73,44 @@ TestVolume flat() {
 }  // namespace
 
 // F14
-TEST_CASE("one stamp of a ball removes the volume of the ball") {
+TEST_CASE_TEMPLATE("one stamp of a ball removes the volume of the ball", N, FixedNumbers,
+                   DoubleNumbers) {
   for (const double y : {24.0, 24.5, 24.3}) {
-    CHECK(swept(5, 0.25, y, 0, 1) == doctest::Approx(capsule(5, 0)).epsilon(0.01));
+    CHECK(swept<N>(5, 0.25, y, 0, 1) == doctest::Approx(capsule(5, 0)).epsilon(0.01));
   }
   // A turned tool loses a little where its samples crowd and the ratio is held at 1.
   TestVolume volume = filled({60, 24, 24}, 65535);
-  Cutter<FixedNumbers> cutter(32);
-  const auto removed = cut<FixedNumbers>(
-      volume, odd_ball(20), turned_pose<FixedNumbers>({30.2, 12.1, 11.8}, {.3, .2, -.4, .8}, 0.25),
-      removal_rate<FixedNumbers>(1.0, false), cutter, step_from<FixedNumbers>(1.0 / 64));
+  Cutter<N> cutter(32);
+  const auto removed =
+      cut<N>(volume, odd_ball(20), turned_pose<N>({30.2, 12.1, 11.8}, {.3, .2, -.4, .8}, 0.25),
+             removal_rate<N>(1.0, false), cutter, step_from<N>(1.0 / 64));
   CHECK(double(removed.density_steps) / kDensityMax ==
         doctest::Approx(capsule(5, 0)).epsilon(0.01));
 }
 
 // F14
-TEST_CASE("a stamp that is sunk to a depth removes the cap") {
+TEST_CASE_TEMPLATE("a stamp that is sunk to a depth removes the cap", N, FixedNumbers,
+                   DoubleNumbers) {
   TestVolume volume = solid({60, 48, 48}, [](double, double, double z) { return z - 24.0; });
-  Cutter<FixedNumbers> cutter(32);
+  Cutter<N> cutter(32);
   constexpr double kRadius = 10, kDepth = 6;
-  const auto removed = cut<FixedNumbers>(
-      volume, odd_ball(40), pose_at<FixedNumbers>({30, 24, 24 + kRadius - kDepth}, 0.25),
-      removal_rate<FixedNumbers>(1.0, false), cutter, step_from<FixedNumbers>(1.0 / 64));
+  const auto removed =
+      cut<N>(volume, odd_ball(40), pose_at<N>({30, 24, 24 + kRadius - kDepth}, 0.25),
+             removal_rate<N>(1.0, false), cutter, step_from<N>(1.0 / 64));
   CHECK(double(removed.density_steps) / kDensityMax ==
         doctest::Approx(kPi * kDepth * kDepth * (3 * kRadius - kDepth) / 3).epsilon(0.01));
 }
 
 // F14
-TEST_CASE("a straight sweep removes the capsule, and off the lattice half a voxel more") {
+TEST_CASE_TEMPLATE("a straight sweep removes the capsule, and off the lattice half a voxel more", N,
+                   FixedNumbers, DoubleNumbers) {
   // Stamps on the lattice cover voxels whole or not at all.
-  CHECK(swept(10, 1.0, 24, 40, 1) == doctest::Approx(capsule(10, 40)).epsilon(0.01));
+  CHECK(swept<N>(10, 1.0, 24, 40, 1) == doctest::Approx(capsule(10, 40)).epsilon(0.01));
   // In between, voxels at the rim are partly covered by many stamps in a row, and each takes its
   // share of what is left: the paper's rule widens a groove, but only within the trilinear reach.
   for (const int radius : {5, 10}) {
     for (const double step : {1.0, 0.5, 0.25}) {
-      const double removed = swept(radius, 0.5, 24.3, 40, step);
+      const double removed = swept<N>(radius, 0.5, 24.3, 40, step);
       CHECK(removed > capsule(radius, 40));
       CHECK(removed < capsule(radius + 0.55, 40));
     }

@@ -3,9 +3,12 @@
 // plain overlap, on every instruction set.
 #include <random>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include <doctest/doctest.h>
 
+#include "controller/kernel/covered_groups.hpp"
 #include "controller/kernel/splat.hpp"
 #include "controller/scene/sample_tool.hpp"
 #include "tests/kernel/aligned_support.hpp"
@@ -20,30 +23,82 @@ using N = FixedNumbers;
 
 struct Cut {
   std::vector<Density> density;
+  ByMaterial<CutWeight<N>> weight;
+  SurfaceDrag<N> drag;
   Removed removed;
-  std::int64_t carry;
+  ByMaterial<CutBudget<N>> carry;
+  CutBudget<N> lost = 0;
 
+  /// The drag depends on where rows begin, by its roundings.
+  [[nodiscard]] bool same_but_for_drag(const Cut& b) const {
+    return density == b.density && weight == b.weight &&
+           removed.density_steps == b.removed.density_steps &&
+           removed.changed == b.removed.changed && carry == b.carry && lost == b.lost;
+  }
   friend bool operator==(const Cut& a, const Cut& b) {
-    return a.density == b.density && a.removed.density_steps == b.removed.density_steps &&
-           a.removed.changed == b.removed.changed && a.carry == b.carry;
+    return a.same_but_for_drag(b) && a.drag.x == b.drag.x && a.drag.z == b.drag.z &&
+           a.drag.arm == b.drag.arm;
   }
 };
 
-template <class Overlap>
-Cut cut_of(const TestVolume& volume, const ToolPose<N>& pose, const Overlap& overlap) {
-  static std::vector<CoveredVoxel<N>> memory(60'000);
-  PrestonPlan<N> plan;
-  plan.rate.fill(force_rate<N>(3000));
-  PrestonState<N> state;
-  Cut cut{volume.density, {}, 0};
-  const auto frame = frame_at<N>(
-      {double(pose.centre_vox.x), double(pose.centre_vox.y), double(pose.centre_vox.z)}, 4.0);
-  auto covered = covered_voxels<N>(volume.grid, std::span<const Density>(cut.density), {}, overlap,
-                                   frame, std::span<CoveredVoxel<N>>(memory));
-  const auto drive = cut_drive<N>(Q16(1.5), Q16(0), Q30(0.9));
-  cut.removed = cut_by_force(plan, drive, std::span<Density>(cut.density), state, covered).removed;
-  cut.carry = state.carry[0];
-  return cut;
+/// One press upon a volume of up to three materials, one of them forbidden; at `force_n` the
+/// fullest voxels may have too little.
+class Press {
+ public:
+  Press(const TestVolume& volume, std::vector<Label> labels, const ToolPose<N>& pose,
+        double force_n)
+      : volume_(volume),
+        labels_(std::move(labels)),
+        drive_(cut_drive<N>(Q16(force_n), Q16(0), Q30(0.9))) {
+    plan_.rate.fill(force_rate<N>(20000));
+    plan_.rate[2] = force_rate<N>(0.7);
+    plan_.rate[3] = {};
+    plan_.labels = labels_;
+    const auto& at = pose.centre_vox;
+    // Across the rows, so that speeds change along them.
+    frame_ = frame_at<N>({double(at.x), double(at.y), double(at.z)}, 4.0, Axis::z);
+  }
+
+  template <class Overlap>
+  [[nodiscard]] Cut by_list(const Overlap& overlap) const {
+    static std::vector<CoveredVoxel<N>> memory(60'000);
+    return cut(covered_voxels<N>(volume_.grid, std::span<const Density>(volume_.density), labels_,
+                                 overlap, frame_, std::span(memory)));
+  }
+  [[nodiscard]] Cut by_groups(const KernelSet& set, const BoxOverlap& overlap) const {
+    static std::vector<CoveredGroup> memory(4000);
+    return cut(covered_groups(set, volume_.grid, labels_, overlap, frame_, memory));
+  }
+
+ private:
+  template <class Covered>
+  [[nodiscard]] Cut cut(Covered covered) const {
+    Cut cut{volume_.density, covered.weight, covered.drag, {}, {}};
+    PrestonState<N> state;
+    const auto out = cut_by_force(plan_, drive_, std::span<Density>(cut.density), state, covered);
+    cut.removed = out.removed;
+    cut.lost = out.lost;
+    cut.carry = state.carry;
+    return cut;
+  }
+
+  const TestVolume& volume_;
+  std::vector<Label> labels_;
+  N::Sum drive_;
+  PrestonPlan<N> plan_;
+  SpindleFrame<N> frame_;
+};
+
+/// Of every kind of group: one material, borders along and across rows, single voxels, labels
+/// beyond the last material.
+std::vector<Label> labels_of(const VoxelGrid& grid, int kind) {
+  std::vector<Label> labels(kind == 0 ? 0 : grid.voxel_count());
+  for (std::size_t i = 0; i < labels.size(); ++i) {
+    const auto x = i % static_cast<std::size_t>(grid.nx);
+    const std::size_t label[] = {0, 1, x < 20 ? 1U : 2U, i * 2654435761U >> 7 & 3, 61 + i % 9};
+    labels[i] = static_cast<Label>(label[kind]);
+  }
+  return labels;
 }
 
 }  // namespace
@@ -60,22 +115,27 @@ TEST_CASE("every plan and instruction set cuts the same by force, inside and acr
     tables.emplace_back(tool, kExactFarid, **set);
   Cutter<N> cutter(20);
   std::mt19937 random(11);
-  int cuts = 0;
+  int cuts = 0, exhausted = 0, case_number = 0;
   for (int fill = 0; fill < kFills; ++fill) {
     const VoxelGrid grid = fill % 4 == 3 ? VoxelGrid{7, 9, 8} : VoxelGrid{44, 14, 12};
     const TestVolume volume = hard_volume(grid, fill, static_cast<std::uint32_t>(fill));
-    for (int i = 0; i < 60; ++i) {
+    for (int i = 0; i < 60; ++i, ++case_number) {
       const auto pose = random_pose(grid, {9, 7, 8}, random);
+      const Press press(volume, labels_of(grid, case_number % 5), pose, i % 4 == 0 ? 60 : 1.5);
       overlap<N>(grid, tool, pose, N::kStepOne, cutter.overlap);
-      const Cut truth = cut_of(volume, pose, cutter.overlap);
+      const Cut truth = press.by_list(cutter.overlap);
       cuts += truth.removed.density_steps != 0 ? 1 : 0;
+      exhausted += truth.lost > 0 ? 1 : 0;
       for (auto set = kernel_sets(); *set != nullptr; ++set) {
         INFO(std::string((*set)->name), ", fill ", fill, ", case ", i);
         std::vector<Density> density = volume.density;
         const AlignedTable& table = tables[static_cast<std::size_t>(set - kernel_sets())].table();
         const AlignedTick aligned(**set, table, memory.view(), grid, density, pose);
         static_cast<void>(aligned.press());
-        const bool same = cut_of(volume, pose, aligned.overlap()) == truth;
+        const Cut listed = press.by_list(aligned.overlap());
+        REQUIRE(listed.same_but_for_drag(truth));
+        aligned.cover();
+        const bool same = press.by_groups(**set, aligned.overlap()) == listed;
         REQUIRE(same);
 
         const SplatTick splat(**set, samples.table(), kExactFarid, splat_memory.view(), grid,
@@ -83,10 +143,46 @@ TEST_CASE("every plan and instruction set cuts the same by force, inside and acr
         splat.copy();
         splat.splat();
         static_cast<void>(splat.press(N::kStepOne));
-        const bool splat_same = cut_of(volume, pose, splat.overlap()) == truth;
+        const Cut splat_listed = press.by_list(splat.overlap());
+        REQUIRE(splat_listed.same_but_for_drag(truth));
+        splat.cover(N::kStepOne);
+        const bool splat_same = press.by_groups(**set, splat.overlap()) == splat_listed;
         REQUIRE(splat_same);
       }
     }
   }
   CHECK(cuts > 200);
+  CHECK(exhausted > 20);
+}
+
+TEST_CASE("a long thin tool of any step along its rows weighs the same in groups") {
+  // Rows of 50 voxels, of which the tool is wide enough to cover three groups and a half; rims of a
+  // few voxels, of one, and of less than one, which all of a row is far beyond.
+  const VoxelGrid grid{64, 9, 9};
+  const TestVolume volume = hard_volume(grid, 3, 1);
+  const auto tool = box_tool(50, 3, 3);
+  BoxMemory memory;
+  memory.hold({50, 3, 3}, true);
+  const auto pose = pose_of({(31 << 16) + 7, (4 << 16) + 99, 4 << 16});
+  std::vector<CoveredVoxel<N>> list(60'000);
+  std::vector<CoveredGroup> groups(1000);
+  for (auto set = kernel_sets(); *set != nullptr; ++set) {
+    const AlignedTool table(tool, kExactFarid, **set);
+    std::vector<Density> density = volume.density;
+    const AlignedTick tick(**set, table.table(), memory.view(), grid, density, pose);
+    tick.cover();
+    for (const double rim_vox : {25.0, 4.0, 1.0, 0.3, 0.016}) {
+      CAPTURE((*set)->name);
+      CAPTURE(rim_vox);
+      const auto frame = frame_at<N>({31.0, 4.0, 4.0}, rim_vox);
+      const auto plain = covered_voxels<N>(grid, std::span<const Density>(density), {},
+                                           tick.overlap(), frame, std::span(list));
+      const auto grouped = covered_groups(**set, grid, {}, tick.overlap(), frame, groups);
+      CHECK(grouped.weight == plain.weight);
+      CHECK(grouped.drag.x == plain.drag.x);
+      CHECK(grouped.drag.z == plain.drag.z);
+      CHECK(grouped.drag.arm == plain.drag.arm);
+      CHECK(plain.list.size() > 600);
+    }
+  }
 }

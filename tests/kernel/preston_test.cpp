@@ -90,9 +90,10 @@ TEST_CASE_TEMPLATE("without force, below the threshold or with the spindle stand
 }
 
 // F13
-TEST_CASE("a force whose part of a voxel rounds to nothing cuts all the same") {
+TEST_CASE_TEMPLATE("a force whose part of a voxel rounds to nothing cuts all the same", N,
+                   FixedNumbers, DoubleNumbers) {
   const Scale scale{0.125, 1.0 / 8000};
-  auto rig = ball_in_block<FixedNumbers>(scale);
+  auto rig = ball_in_block<N>(scale);
   constexpr double kForceN = 1;
   const double budget = scale.steps_per_n(kEnamelG) * kForceN;
   rig.cover(kCentre);
@@ -109,8 +110,7 @@ TEST_CASE("a force whose part of a voxel rounds to nothing cuts all the same") {
   for (int i = 0; i < kTicks; ++i) {
     removed += double(rig.press(kCentre, kForceN).removed.density_steps);
   }
-  CHECK(removed + carried<FixedNumbers>(rig.state) ==
-        doctest::Approx(kTicks * budget).epsilon(1e-6));
+  CHECK(removed + carried<N>(rig.state) == doctest::Approx(kTicks * budget).epsilon(1e-6));
 }
 
 TEST_CASE("over many ticks every voxel loses its part of the budget, whatever the budget") {
@@ -210,11 +210,12 @@ TEST_CASE_TEMPLATE("a budget beyond the fullest voxels goes to the others, and a
 }
 
 // F14
-TEST_CASE("with force to spare a stamp removes the ball and a sweep the capsule") {
+TEST_CASE_TEMPLATE("with force to spare a stamp removes the ball and a sweep the capsule", N,
+                   FixedNumbers, DoubleNumbers) {
   const auto swept = [](double length_vox) {
-    PrestonRig<FixedNumbers> rig(filled({64, 24, 24}, 65535), odd_ball(32), 8);
+    PrestonRig<N> rig(filled({64, 24, 24}, 65535), odd_ball(32), 8);
     rig.pitch_vox = 0.25;
-    rig.plan.rate.fill(force_rate<FixedNumbers>(1e9));
+    rig.plan.rate.fill(force_rate<N>(1e9));
     double steps = 0;
     for (double x = 0; x <= length_vox; x += 1) {
       steps += double(rig.press({12 + x, 12, 12}, 10).removed.density_steps);
@@ -233,8 +234,9 @@ TEST_CASE("with force to spare a stamp removes the ball and a sweep the capsule"
 }
 
 // F15
-TEST_CASE("a cut depends on the force of its own tick and on none that comes later") {
-  auto a = ball_in_block<FixedNumbers>(), b = ball_in_block<FixedNumbers>();
+TEST_CASE_TEMPLATE("a cut depends on the force of its own tick and on none that comes later", N,
+                   FixedNumbers, DoubleNumbers) {
+  auto a = ball_in_block<N>(), b = ball_in_block<N>();
   for (int i = 0; i < 10; ++i) {
     a.press(kCentre, 1);
     b.press(kCentre, i < 6 ? 1 : 2);

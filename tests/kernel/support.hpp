@@ -14,31 +14,16 @@
 #include "controller/kernel/gradient.hpp"
 #include "controller/kernel/milling.hpp"
 #include "controller/kernel/tool_pose.hpp"
+#include "hil/lab/extremes/body.hpp"
 
 /// Analytic volumes, tools and poses for the kernel tests.
 namespace kerf::test {
 
-struct TestVolume {
-  VoxelGrid grid;
-  std::vector<Density> density;
-};
+using TestVolume = extremes::Body;
+using extremes::made_of;
 
 inline TestVolume filled(VoxelGrid grid, Density value) {
   return {grid, std::vector<Density>(grid.voxel_count(), value)};
-}
-
-/// Density of every voxel from a function of its indices.
-template <class DensityAt>
-TestVolume made_of(VoxelGrid grid, DensityAt&& density_at) {
-  TestVolume volume = filled(grid, 0);
-  for (std::int32_t z = 0; z < grid.nz; ++z) {
-    for (std::int32_t y = 0; y < grid.ny; ++y) {
-      for (std::int32_t x = 0; x < grid.nx; ++x) {
-        volume.density[grid.index(x, y, z)] = density_at(x, y, z);
-      }
-    }
-  }
-  return volume;
 }
 
 /// Density from a signed distance in voxels (negative inside), antialiased over one voxel: a voxel

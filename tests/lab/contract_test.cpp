@@ -33,6 +33,17 @@ struct Watched {
     for (double f = 0.5; f < force_n; f += 0.5) tick(pushing(f));
     tick(pushing(force_n));
   }
+  /// A force, a fault, so many ms until too high a speed is latched, and the end.
+  void end_latched(int after_ms, const char* latches) {
+    push_up_to(1);
+    contract.fault_begins(time_ms);
+    for (int i = 1; i < after_ms; ++i) tick(pushing(1));
+    ServoOutput off;
+    off.phase = Phase::fault;
+    off.fault = kerf::Fault::overspeed;
+    tick(off);
+    contract.end(time_ms, latches);
+  }
 };
 
 }  // namespace
@@ -98,6 +109,27 @@ TEST_CASE("the contract sees each way to break it") {
     run.push_up_to(3.3);
     run.contract.device_force(run.time_ms, 3.6, true);
   }
+  SUBCASE("a fault that should be latched, and is not") {
+    run.push_up_to(1);
+    run.contract.end(run.time_ms, "overspeed");
+  }
+  SUBCASE("a fault that should not be latched") {
+    run.end_latched(1, "none");
+  }
+  SUBCASE("another fault than the script says") {
+    run.end_latched(1, "stale_input");
+  }
+  SUBCASE("a fault that is latched 3 ms after it began") {
+    run.end_latched(3, "overspeed");
+  }
   CHECK(run.outcome.violation_count > 0);
   CHECK_FALSE(run.outcome.violations.empty());
+}
+
+TEST_CASE("the contract accepts the fault that the script says, in time") {
+  Watched run;
+  run.end_latched(1, "overspeed");
+  CHECK(run.outcome.violation_count == 0);
+  CHECK(run.outcome.latched == "overspeed");
+  CHECK(run.outcome.latch_ms == doctest::Approx(1));
 }

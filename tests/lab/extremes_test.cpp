@@ -11,6 +11,7 @@
 #include <unistd.h>
 
 #include "hil/lab/extremes/comparison.hpp"
+#include "hil/lab/extremes/page.hpp"
 #include "hil/lab/program.hpp"
 
 using namespace kerf::extremes;
@@ -35,6 +36,16 @@ TEST_CASE("a row passes up to its limit; one without a limit is only told") {
   CHECK(Row{"g", "n", 2, "1", 2, 1}.pass());
   CHECK_FALSE(Row{"g", "n", 2.001, "1", 2, 1}.pass());
   CHECK(Row{"g", "n", 1e9, "1", {}, {}}.pass());
+}
+
+TEST_CASE("a row that was skipped is not judged, and says why") {
+  const Row skipped{"g", "n", 3, "1", 2, 1, "no --data"};
+  CHECK_FALSE(skipped.judged());
+  CHECK(skipped.pass());
+  const std::string text =
+      page({{"cutting", "a tooth", 3, "%", 2, 1.5, "no --data"}}, Comparison{}, "", "");
+  CHECK(text.find("| a tooth | | | 2 | 1.5 | skipped: no --data |") != std::string::npos);
+  CHECK(text.find("Of 0 limits 0 are kept.") != std::string::npos);
 }
 
 TEST_CASE("extremes refuses what it cannot do before anything is measured") {

@@ -1,86 +1,31 @@
 // SPDX-License-Identifier: Apache-2.0
 // The programs together, as a user starts them: emulator and controller as processes.
 #include <algorithm>
+#include <csignal>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <optional>
+#include <thread>
 
 #include <doctest/doctest.h>
 #include <nlohmann/json.hpp>
 
 #include "shared/segment/hand_over.hpp"
 #include "shared/volume/density_hash.hpp"
-#include "tests/programs/process.hpp"
+#include "tests/programs/pair.hpp"
 
 using kerf::test::eventually;
+using kerf::test::kBin;
+using kerf::test::kScenes;
+using kerf::test::kTorqueScale;
+using kerf::test::Pair;
 using kerf::test::Process;
 using kerf::test::TemporaryFolder;
 using kerf::test::text_of;
 using namespace std::chrono_literals;
 
 namespace {
-
-const std::string kBin = KERF_TEST_BIN;
-const std::string kScenes = KERF_TEST_SCENES;
-const std::string kTorqueScale = "0.342,0.342,0.342";  // of the emulated Omni
-
-std::string unique_name() {
-  static int count = 0;
-  return "test-" + std::to_string(getpid()) + "-" + std::to_string(++count);
-}
-
-/// Emulator and controller on a private socket.
-struct Pair {
-  TemporaryFolder folder;
-  std::string name = unique_name();
-  std::optional<Process> emulator;
-  std::optional<Process> controller;
-
-  void start(const std::string& hand, std::vector<std::string> controller_options,
-             std::vector<std::string> emulator_options = {}) {
-    const std::string socket = (folder / "port").string();
-    std::vector<std::string> device{kBin + "/kerf-emulator",
-                                    "--personality",
-                                    "omni",
-                                    "--front",
-                                    "socket",
-                                    "--socket",
-                                    socket,
-                                    "--hand",
-                                    kScenes + "/hands/" + hand};
-    device.insert(device.end(), emulator_options.begin(), emulator_options.end());
-    emulator.emplace(device, folder / "emulator.log");
-    std::vector<std::string> servo{kBin + "/kerf-controller",
-                                   "--scene",
-                                   kScenes + "/phantom.toml",
-                                   "--torque-scale",
-                                   kTorqueScale,
-                                   "--port",
-                                   "socket:" + socket,
-                                   "--name",
-                                   name,
-                                   "--report",
-                                   (folder / "report.json").string()};
-    servo.insert(servo.end(), controller_options.begin(), controller_options.end());
-    controller.emplace(servo, folder / "controller.log");
-  }
-  /// Waits until the servo has published ticks.
-  [[nodiscard]] bool ticks_within(std::chrono::milliseconds patience) const {
-    return eventually(
-        [&] {
-          try {
-            return kerf::connect_segment(name).reader().state_head() > 10;
-          } catch (const kerf::SegmentError&) {
-            return false;
-          }
-        },
-        patience);
-  }
-  [[nodiscard]] nlohmann::json report() const {
-    return nlohmann::json::parse(text_of(folder / "report.json"));
-  }
-};
 
 /// Runs one program to its end and expects one line and exit code 2.
 std::string refused(const std::vector<std::string>& arguments) {
@@ -111,62 +56,18 @@ TEST_CASE("virtual time: the same demo twice gives the same volume and output ha
   CHECK(reports[0]["output_hash"] == reports[1]["output_hash"]);
 }
 
-TEST_CASE("kill -9 of the emulator: fault in the report, exit 1 after two seconds") {
-  Pair pair;
-  pair.start("touch.toml", {"--seconds", "60"});
-  REQUIRE(eventually(
-      [&] {
-        try {
-          const auto connection = kerf::connect_segment(pair.name);
-          const auto latest = connection.reader().latest();
-          return latest && (latest->flags & kerf::kFlagMotorsOn) != 0;
-        } catch (const kerf::SegmentError&) {
-          return false;
-        }
-      },
-      20s));
-  const auto connection = kerf::connect_segment(pair.name);
-  pair.emulator->signal(SIGKILL);
-  const auto killed = std::chrono::steady_clock::now();
-  CHECK(pair.controller->wait() == 1);
-  const auto ended = std::chrono::steady_clock::now() - killed;
-  CHECK(ended > 1500ms);
-  CHECK(ended < 10s);
-  const auto report = pair.report();
-  const auto met = [&](const char* name) {
-    return std::ranges::any_of(report["faults"], [&](const auto& f) { return f["name"] == name; });
-  };
-  CHECK(met("stale_input"));
-  CHECK(met("device_gone"));
-
-  // The segment outlives the controller: in it, from 20 silent ticks on there is no force.
-  const kerf::SegmentReader& reader = connection.reader();
-  const std::uint64_t head = reader.state_head();
-  int silent = 0;
-  for (std::uint64_t i = head > 3000 ? head - 3000 : 0; i < head; ++i) {
-    kerf::TickRecord record{};
-    REQUIRE(reader.state_at(i, record) == kerf::ReadState::ok);
-    silent = record.stale != 0 ? silent + 1 : 0;
-    if (silent < 20) continue;
-    REQUIRE(record.commanded_force_n[0] == 0);
-    REQUIRE(record.commanded_force_n[1] == 0);
-    REQUIRE(record.commanded_force_n[2] == 0);
-    REQUIRE((record.flags & kerf::kFlagMotorsOn) == 0);
-  }
-  CHECK(silent > 1900);
-  CHECK_FALSE(connection.alive());
-}
-
-TEST_CASE("SIGINT and SIGTERM end in order: exit 0, a report, no socket left") {
-  for (const int signal : {SIGINT, SIGTERM}) {
+TEST_CASE("a tool from an STL file cuts the same voxels in every run") {
+  nlohmann::json reports[2];
+  for (auto& report : reports) {
     Pair pair;
-    pair.start("touch.toml", {});
-    REQUIRE(pair.ticks_within(20s));
-    pair.controller->signal(signal);
-    CHECK(pair.controller->wait() == 0);
-    CHECK(pair.report()["end"] == "stopped");
-    CHECK_FALSE(std::filesystem::exists(kerf::segment_socket(pair.name)));
+    pair.scene = "fluted_bur.toml";
+    pair.start("groove.toml", {"--virtual", "--seconds", "1.5"}, {"--lockstep"});
+    REQUIRE(pair.controller->wait() == 0);
+    report = pair.report();
   }
+  CHECK(reports[0]["removed_mm3"] > 0);
+  CHECK(reports[0]["volume_hash"] == reports[1]["volume_hash"]);
+  CHECK(reports[0]["output_hash"] == reports[1]["output_hash"]);
 }
 
 TEST_CASE("results that cannot be written are refused before the hand is moved") {
@@ -279,14 +180,14 @@ TEST_CASE("--explain tells what is really allocated, and keeps its calibration")
   CHECK(explain().find("calibration.json: is no calibration; measured anew") != std::string::npos);
   const std::string told = explain();
   CHECK(told.find("measured anew") == std::string::npos);
-  CHECK(told.find("ball 16 in phantom: aligned/") != std::string::npos);
+  CHECK(told.find("ball 16 in phantom: surface/") != std::string::npos);
   auto poor = nlohmann::json::parse(text_of(folder / "kerf/calibration.json"));
   poor["ns_per_operation"].clear();
   std::ofstream(folder / "kerf/calibration.json") << poor;
-  CHECK(explain().find("calibration.json: has no price for aligned/") != std::string::npos);
+  CHECK(explain().find("calibration.json: has no price for surface/") != std::string::npos);
   unsetenv("XDG_CACHE_HOME");
   const auto json = nlohmann::json::parse(text_of(folder / "explain.json"));
-  CHECK(json["ticks"].size() == 2);
+  CHECK(json["ticks"].size() == 3);
   for (const auto& tick : json["ticks"]) {
     for (const auto& stage : tick["stages"]) {
       CHECK(stage["operations"] > 0);

@@ -2,9 +2,11 @@
 #pragma once
 
 #include "controller/kernel/proxy/tool_turn.hpp"
-#include "tests/proxy/points.hpp"
+#include "hil/lab/extremes/points.hpp"
 
 namespace kerf::test {
+
+using namespace extremes;
 
 /// The half-space below the origin along `up`, felt by a point up to 1 unit above its face: truth
 /// in closed form. The contact is `arm` from the tool's centre, in the tool's own axes.

@@ -3,10 +3,10 @@
 
 #include <doctest/doctest.h>
 
-#include "tests/proxy/points.hpp"
+#include "hil/lab/extremes/points.hpp"
 
 using namespace kerf;
-using namespace kerf::test;
+using namespace kerf::extremes;
 
 namespace {
 
@@ -135,8 +135,8 @@ TEST_CASE_TEMPLATE("a plane seen before is kept while it is near and unlike the 
     return bundle;
   };
   CHECK(merged(older({1, 0, 0}, 0), {}).count == 2);
-  CHECK(merged(older({std::sin(0.25), std::cos(0.25), 0}, 0), {}).count == 1);
-  CHECK(merged(older({std::sin(0.28), std::cos(0.28), 0}, 0), {}).count == 2);
+  CHECK(merged(older({std::sin(0.77), std::cos(0.77), 0}, 0), {}).count == 1);
+  CHECK(merged(older({std::sin(0.8), std::cos(0.8), 0}, 0), {}).count == 2);
   CHECK(merged(older({1, 0, 0}, -0.6), {}).count == 1);
   CHECK(merged(older({1, 0, 0}, 0.4), {}).count == 1);
   // Carried along: 0.25 nearer.

@@ -26,7 +26,7 @@ ProxyPlan<N> plan(double friction = 0, double turn_step = 0) {
 
 /// A block whose top is at height 30, seven voxels from the other ends of its volume.
 TestVolume block() {
-  return body({60, 60, 60}, 2, [](Point p) {
+  return blurred({60, 60, 60}, [](Point p) {
     const double side = std::max(std::abs(p[0] - 30), std::abs(p[2] - 30)) - 23;
     return std::max({side, p[1] - 30, 7 - p[1]});
   });
@@ -120,7 +120,7 @@ TEST_CASE_TEMPLATE("a tool with no room to turn keeps its orientation, and follo
                    FixedNumbers, DoubleNumbers) {
   // A bar of 16 in a shaft 12 wide whose walls go on forever upwards.
   const TestVolume volume =
-      body({70, 70, 70}, 2, [](Point p) { return 6 - std::hypot(p[0] - 35, p[2] - 35); });
+      blurred({70, 70, 70}, [](Point p) { return 6 - std::hypot(p[0] - 35, p[2] - 35); });
   ShellRig<N> rig(tool_of_units("cylinder", 5, 16), volume);
   ProxyState<N> state;
   const auto turning = plan<N>(0, turn_step_of(9.5));

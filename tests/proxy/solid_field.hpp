@@ -5,9 +5,11 @@
 #include <utility>
 
 #include "controller/kernel/proxy/tool_turn.hpp"
-#include "tests/proxy/points.hpp"
+#include "hil/lab/extremes/points.hpp"
 
 namespace kerf::test {
+
+using namespace extremes;
 
 /// A ball against a solid in closed form, in double whatever the numbers of the solver: `Nearest`
 /// gives the height of a place above the solid's face and the face's normal there. Felt from 1 unit

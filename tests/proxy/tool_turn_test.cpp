@@ -5,10 +5,10 @@
 
 #include <doctest/doctest.h>
 
-#include "tests/proxy/points.hpp"
+#include "hil/lab/extremes/points.hpp"
 
 using namespace kerf;
-using namespace kerf::test;
+using namespace kerf::extremes;
 
 namespace {
 

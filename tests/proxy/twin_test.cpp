@@ -9,7 +9,6 @@
 #include <doctest/doctest.h>
 
 #include "controller/kernel/proxy/proxy_sweep.hpp"
-#include "tests/kernel/case_count.hpp"
 #include "tests/proxy/solid_field.hpp"
 
 using namespace kerf;
@@ -82,7 +81,7 @@ Face corner(Point p) {
 }  // namespace
 
 TEST_CASE("fixed point goes where double goes") {
-  const int ticks = cases(10'000);  // of each, so 1e5 in all
+  constexpr int kTicks = 10'000;  // of each, so 1e5 in all
   for (const double friction : {0.0, 0.2}) {
     struct Row {
       const char* name;
@@ -90,7 +89,7 @@ TEST_CASE("fixed point goes where double goes") {
     };
     for (const auto& [name, nearest] : {Row{"flat", flat}, Row{"bump", bump}, Row{"bowl", bowl},
                                         Row{"crease", crease}, Row{"corner", corner}}) {
-      const Tally tally = led_alike(nearest, friction, ticks);
+      const Tally tally = led_alike(nearest, friction, kTicks);
       MESSAGE(std::string(name) << ", friction " << friction << ": " << tally.otherwise << " of "
                                 << tally.ticks << " ticks more than 0.001 units apart, "
                                 << tally.apart << " at most, " << tally.out_of_probes

@@ -8,6 +8,7 @@
 #include <doctest/doctest.h>
 
 #include "controller/scene/compile.hpp"
+#include "controller/scene/covered_bound.hpp"
 #include "controller/scene/materials.hpp"
 #include "controller/scene/plan_preston.hpp"
 #include "controller/scene/scene_file.hpp"
@@ -26,7 +27,7 @@ const std::string kSmallest =
     "[[tool]]\n"
     "shape = \"ball\"\n"
     "size_vox = 16\n";
-const std::string kPreston = "[cut]\nmodel = \"preston\"\n";
+const std::string kOverlap = "[cut]\nmodel = \"overlap\"\n";
 
 SceneSpec parse(const std::string& lines) {
   return parse_scene(kSmallest + lines, "x.toml");
@@ -41,8 +42,6 @@ Scene block_scene() {
   Scene scene;
   scene.path = "block.toml";
   scene.materials = default_materials();
-  scene.force.model = ForceModel::proxy;
-  scene.cut.model = CutModel::preston;
   SceneVolume volume;
   volume.image.grid = {20, 20, 20};
   volume.image.spacing_mm = {0.1, 0.2, 0.25};
@@ -62,19 +61,20 @@ double steps_per_n(const PrestonPlan<DoubleNumbers>& plan, std::size_t material)
 }  // namespace
 
 TEST_CASE("the keys of cutting by force reach their places, and have defaults") {
-  const SceneSpec plain = parse(kPreston);
+  const SceneSpec plain = parse("");
+  CHECK(plain.force.model == ForceModel::proxy);
   CHECK(plain.cut.model == CutModel::preston);
   CHECK(plain.cut.machinability_mm3_per_s_n == 0.083);
   CHECK(plain.cut.threshold_n == 0.05);
   CHECK(plain.cut.friction == 0.5);
   CHECK(plain.spindle.speed_krpm == 300);
-  const SceneSpec scene = parse(kPreston +
-                                "machinability_mm3_per_s_n = 0.1\nthreshold_n = 0.2\n"
-                                "friction = 0.4\n[spindle]\nspeed_krpm = 150\n"
-                                "stall_torque_n_mm = 2\ninertia_g_mm2 = 3\n"
-                                "[[material]]\nname = \"pulp\"\nforbidden = true\n"
-                                "[[material]]\nname = \"amalgam\"\n"
-                                "[[material]]\nname = \"wax\"\nmachinability = 20\n");
+  const SceneSpec scene = parse(
+      "[cut]\nmachinability_mm3_per_s_n = 0.1\nthreshold_n = 0.2\n"
+      "friction = 0.4\n[spindle]\nspeed_krpm = 150\n"
+      "stall_torque_n_mm = 2\ninertia_g_mm2 = 3\n"
+      "[[material]]\nname = \"pulp\"\nforbidden = true\n"
+      "[[material]]\nname = \"amalgam\"\n"
+      "[[material]]\nname = \"wax\"\nmachinability = 20\n");
   CHECK(scene.cut.machinability_mm3_per_s_n == 0.1);
   CHECK(scene.cut.threshold_n == 0.2);
   CHECK(scene.cut.friction == 0.4);
@@ -88,27 +88,36 @@ TEST_CASE("the keys of cutting by force reach their places, and have defaults") 
   CHECK(scene.materials[5].machinability == 20);
 }
 
+TEST_CASE("the paper's force comes with the paper's cut, unless another is written") {
+  const std::string paper = "[force]\nmodel = \"paper\"\n";
+  CHECK(parse(paper).force.model == ForceModel::paper);
+  CHECK(parse(paper).cut.model == CutModel::overlap);
+  CHECK(parse(paper + "[cut]\nmodel = \"none\"\n").cut.model == CutModel::none);
+  CHECK(parse("[cut]\nmodel = \"preston\"\n" + paper).cut.model == CutModel::preston);
+  CHECK(parse(kOverlap).force.model == ForceModel::proxy);
+}
+
 TEST_CASE("a key of another model of force or cutting is refused") {
-  CHECK(error_after("[force]\nmodel = \"proxy\"\np0_n_per_mm2 = 0.1\n") ==
-        "x.toml:8: force.p0_n_per_mm2 = 0.1 is of the model paper; leave it out, or set model = "
+  CHECK(error_after("[force]\np0_n_per_mm2 = 0.1\n") ==
+        "x.toml:7: force.p0_n_per_mm2 = 0.1 is of the model paper; leave it out, or set model = "
         "\"paper\"");
-  CHECK(error_after("[force]\nstiffness_n_per_mm = 0.1\n") ==
-        "x.toml:7: force.stiffness_n_per_mm = 0.1 is of the model proxy; leave it out, or set "
+  CHECK(error_after("[force]\nmodel = \"paper\"\nstiffness_n_per_mm = 0.1\n") ==
+        "x.toml:8: force.stiffness_n_per_mm = 0.1 is of the model proxy; leave it out, or set "
         "model = \"proxy\"");
-  CHECK(error_after("[cut]\nfriction = 0.4\n") ==
-        "x.toml:7: cut.friction = 0.4 is of the model preston; leave it out, or set model = "
+  CHECK(error_after(kOverlap + "friction = 0.4\n") ==
+        "x.toml:8: cut.friction = 0.4 is of the model preston; leave it out, or set model = "
         "\"preston\"");
-  CHECK(error_after(kPreston + "rate_per_s = 8\n") ==
-        "x.toml:8: cut.rate_per_s = 8 is of the model overlap; leave it out, or set model = "
+  CHECK(error_after("[cut]\nrate_per_s = 8\n") ==
+        "x.toml:7: cut.rate_per_s = 8 is of the model overlap; leave it out, or set model = "
         "\"overlap\"");
   CHECK(
-      error_after("[spindle]\nspeed_krpm = 100\n") ==
-      "x.toml:6: spindle turns nothing: only cut.model = \"preston\" has a spindle; leave it out");
-  CHECK(error_after("[[material]]\nname = \"pulp\"\nforbidden = true\n") ==
+      error_after(kOverlap + "[spindle]\nspeed_krpm = 100\n") ==
+      "x.toml:8: spindle turns nothing: only cut.model = \"preston\" has a spindle; leave it out");
+  CHECK(error_after(kOverlap + "[[material]]\nname = \"pulp\"\nforbidden = true\n") ==
         "x.toml: material pulp is forbidden, and this cut.model cuts everything; set model = "
         "\"preston\", or leave forbidden out");
-  CHECK(error_after(kPreston + "[spindle]\nspeed_krpm = -1\n")
-            .rfind("x.toml:9: spindle.speed_krpm = -1 is ", 0) == 0);
+  CHECK(error_after("[spindle]\nspeed_krpm = -1\n")
+            .rfind("x.toml:7: spindle.speed_krpm = -1 is ", 0) == 0);
 }
 
 TEST_CASE("cutting by force without a proxy is refused") {
@@ -170,7 +179,7 @@ TEST_CASE_TEMPLATE("the tables cut a block: each material at its rate, at the sa
     scene.servo.rate_hz = rate_hz;
     volume.image.density.assign(8000, 65535);
     const auto plan = plan_preston<N>(scene, volume);
-    std::vector<CoveredVoxel<N>> memory(covered_capacity(tool, volume));
+    std::vector<CoveredVoxel<N>> memory(most_covered(tool, volume));
     const std::size_t capacity = overlap_capacity(tool.size_vox, tool.pitch_mm, {0.1, 0.2, 0.25});
     std::vector<typename N::Weight> ratios(capacity);
     OverlapBox<N> box{ratios, {}, 0};

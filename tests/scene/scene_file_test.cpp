@@ -58,8 +58,9 @@ TEST_CASE("the smallest scene takes every default") {
   CHECK_FALSE(scene.offset_given);
   CHECK_FALSE(scene.device.torque_scale);  // motors off
   CHECK(scene.device.personality == kerf::Personality::omni);
-  CHECK(scene.force.p0_n_per_mm2 == 0.06);
-  CHECK(scene.cut.model == kerf::CutModel::overlap);
+  CHECK(scene.force.model == kerf::ForceModel::proxy);
+  CHECK(scene.force.stiffness_n_per_mm == 0.4);
+  CHECK(scene.cut.model == kerf::CutModel::preston);
   CHECK(scene.limits.force_n == 3.3);
   CHECK(scene.servo.rate_hz == 1000);
   CHECK(scene.servo.numeric == kerf::NumericKind::fixed);
@@ -217,12 +218,12 @@ TEST_CASE("a value out of range is reported with its line and the range") {
         "scenes/x.toml:7: servo.rate_hz = 100 is out of range; use 250 to 8000");
   CHECK(error_after("[device]\nworkspace_scale = 0\n") ==
         "scenes/x.toml:7: device.workspace_scale = 0 is out of range; use 0.01 to 100");
-  CHECK(begins(error_after("[force]\np0_n_per_mm2 = nan\n"),
-               "scenes/x.toml:7: force.p0_n_per_mm2 = nan is out of range"));
-  CHECK(begins(error_after("[force]\np0_n_per_mm2 = inf\n"),
-               "scenes/x.toml:7: force.p0_n_per_mm2 = inf is out of range"));
-  CHECK(begins(error_after("[cut]\nrate_per_s = -1\n"),
-               "scenes/x.toml:7: cut.rate_per_s = -1 is out of range"));
+  CHECK(begins(error_after("[force]\nstiffness_n_per_mm = nan\n"),
+               "scenes/x.toml:7: force.stiffness_n_per_mm = nan is out of range"));
+  CHECK(begins(error_after("[force]\nstiffness_n_per_mm = inf\n"),
+               "scenes/x.toml:7: force.stiffness_n_per_mm = inf is out of range"));
+  CHECK(begins(error_after("[cut]\nthreshold_n = -1\n"),
+               "scenes/x.toml:7: cut.threshold_n = -1 is out of range"));
   CHECK(begins(error_after("[limits]\nforce_n = 1\ncontinuous_force_n = 2\n"),
                "scenes/x.toml:8: limits.continuous_force_n = 2 is out of range; use 0.01 to 1"));
   CHECK(begins(error_with("file = \"phantom\"", "file = \"phantom\"\niso = 2"),
@@ -238,13 +239,13 @@ TEST_CASE("a value out of range is reported with its line and the range") {
 TEST_CASE("a word that is not known is reported with those that are") {
   CHECK(error_with("\"ball\"", "\"bal\"") ==
         "scenes/x.toml:4: tool.shape = \"bal\" is unknown; did you mean \"ball\"? known: ball, "
-        "cylinder, cone, inverted_cone, flame, wheel");
+        "cylinder, cone, inverted_cone, flame, wheel, stl");
   CHECK(begins(error_after("[device]\npersonality = \"spacemouse\"\n"),
                "scenes/x.toml:7: device.personality = \"spacemouse\" is unknown"));
   CHECK(begins(error_after("[force]\nmodel = \"glue\"\n"),
                "scenes/x.toml:7: force.model = \"glue\" is unknown"));
-  CHECK(begins(error_after("[cut]\nrate_per_s = \"T\"\n"),
-               "scenes/x.toml:7: cut.rate_per_s = \"T\" is unknown"));
+  CHECK(begins(error_after("[cut]\nmodel = \"overlap\"\nrate_per_s = \"T\"\n"),
+               "scenes/x.toml:8: cut.rate_per_s = \"T\" is unknown"));
   CHECK(begins(error_with("file = \"phantom\"", "file = \"phantom\"\niso = \"auto\""),
                "scenes/x.toml:3: volume.iso = \"auto\" is unknown"));
 }

@@ -66,8 +66,8 @@ TEST_CASE("the scene's JSON holds what a reader of the segment needs") {
   CHECK(root.at("materials").at(1).at("name") == "enamel");
   CHECK(root.at("materials").at(1).at("colour").size() == 3);
   CHECK(root.at("device").at("torque_scale").at(0) == 0.342);
-  CHECK(root.at("force").at("model") == "paper");
-  CHECK(root.at("cut").at("model") == "overlap");
+  CHECK(root.at("force").at("model") == "proxy");
+  CHECK(root.at("cut").at("model") == "preston");
   CHECK(root.at("limits").at("force_n") == 3.3);
   CHECK(root.at("servo").at("numeric") == "fixed");
   CHECK(root.at("servo").at("kernel") == "farid");
@@ -78,7 +78,7 @@ TEST_CASE("the JSON is canonical: one line, sorted keys, and the same after a ro
   CHECK(text == kerf::canonical_json(small_scene()));
   CHECK(text.find('\n') == std::string::npos);
   CHECK(json::parse(text).dump() == text);  // nlohmann sorts keys on parsing
-  CHECK(text.rfind("{\"active_tool\":1,\"cut\":{\"model\":", 0) == 0);
+  CHECK(text.rfind("{\"active_tool\":1,\"cut\":{\"friction\":", 0) == 0);
 }
 
 TEST_CASE("where a scene lies does not change its identity, anything in it does") {
@@ -100,7 +100,7 @@ TEST_CASE("where a scene lies does not change its identity, anything in it does"
       [](auto& s) { s.materials[1].machinability = 2; },
       [](auto& s) { s.device.torque_scale.reset(); },
       [](auto& s) { s.device.dock_rad[1] = 0.2; },
-      [](auto& s) { s.force.p0_n_per_mm2 = 0.07; },
+      [](auto& s) { s.force.stiffness_n_per_mm = 0.3; },
       [](auto& s) { s.cut.model = kerf::CutModel::none; },
       [](auto& s) { s.limits.slew_n_per_ms = 0.4; },
       [](auto& s) { s.servo.rate_hz = 2000; },

@@ -64,7 +64,7 @@ TEST_CASE("the default scene is what the hand scripts were written for") {
   CHECK(scene.tools.at(0).offsets.size() == 2176);
   CHECK(scene.tools.at(1).offsets.size() == 552);
   CHECK(kerf::hand_unit_mm(scene) == 1.0);
-  CHECK(kerf::device_stiffness_n_per_mm(scene) == doctest::Approx(2 * std::numbers::pi * 0.06));
+  CHECK(kerf::device_stiffness_n_per_mm(scene) == 0.4);
   CHECK(scene.volumes.at(0).image.labels.size() == scene.volumes.at(0).image.density.size());
 }
 
@@ -110,14 +110,13 @@ TEST_CASE("the first solid volume is touched, not what is only seen") {
 
 TEST_CASE("a volume from the command line is fitted to the hand") {
   const kerf::test::TempFolder folder;
+  const std::string lines =
+      "[[volume]]\nfile = \"phantom\"\n[[tool]]\nshape = \"ball\"\nsize_vox = 8\n[[tool]]\n"
+      "shape = \"cylinder\"\nradius_mm = 0.5\nlength_mm = 1\n[device]\noffset_mm = [9, 9, 9]\n";
   for (const double edge_mm : {0.05, 0.5, 3.0}) {
     CAPTURE(edge_mm);
     static_cast<void>(block_scene(folder, edge_mm, kBall));
-    const auto base = folder.write(
-        "base.toml",
-        "[[volume]]\nfile = \"phantom\"\n[[tool]]\nshape = \"ball\"\nsize_vox = 8\n[[tool]]\nshape "
-        "= "
-        "\"cylinder\"\nradius_mm = 0.5\nlength_mm = 1\n[device]\noffset_mm = [9, 9, 9]\n");
+    const auto base = folder.write("base.toml", lines + "[force]\nmodel = \"paper\"\n");
     kerf::SceneOverrides overrides;
     overrides.volume_file = base.parent_path() / "block.nrrd";
     const kerf::Scene scene = kerf::load_scene(base, overrides);
@@ -146,9 +145,35 @@ TEST_CASE("a volume from the command line is fitted to the hand") {
   }
 }
 
+TEST_CASE("a press cuts the same share of the tool's volume in a volume of the command line") {
+  const kerf::test::TempFolder folder;
+  constexpr double kEdgeMm = 0.5, kGrown = 4;  // over the phantom's voxels
+  static_cast<void>(block_scene(folder, kEdgeMm, kBall));
+  const auto base = folder.write("base.toml", "[[volume]]\nfile = \"phantom\"\n" + kBall);
+  kerf::SceneOverrides overrides;
+  overrides.volume_file = base.parent_path() / "block.nrrd";
+  const kerf::Scene fitted = kerf::load_scene(base, overrides);
+  const kerf::Scene plain;
+  const double scale = fitted.device.workspace_scale;
+
+  // Of a hand's newton, over the threshold: tool volumes per second.
+  const auto share = [](const kerf::Scene& scene, double device_n) {
+    const double force_n = device_n / scene.device.workspace_scale - scene.cut.threshold_n;
+    return scene.cut.machinability_mm3_per_s_n * force_n;
+  };
+  CHECK(share(fitted, 0.3) / (kGrown * kGrown * kGrown) == doctest::Approx(share(plain, 0.3)));
+  // Torque goes with force and radius, and the run-up with inertia over torque.
+  CHECK(fitted.spindle.stall_torque_n_mm * scale / kGrown ==
+        doctest::Approx(plain.spindle.stall_torque_n_mm));
+  CHECK(fitted.spindle.inertia_g_mm2 / fitted.spindle.stall_torque_n_mm ==
+        doctest::Approx(plain.spindle.inertia_g_mm2 / plain.spindle.stall_torque_n_mm));
+  CHECK(kerf::device_stiffness_n_per_mm(fitted) == kerf::device_stiffness_n_per_mm(plain));
+}
+
 TEST_CASE("power is kept between hand and scene: F dx is the same on both sides") {
   // K_device = s^2 K_scene: twice the scale, a quarter of p0, the same stiffness at the hand.
   kerf::Scene scene;
+  scene.force.model = kerf::ForceModel::paper;
   scene.tools.emplace_back();
   const double at_one = kerf::device_stiffness_n_per_mm(scene);
   scene.device.workspace_scale = 2;
@@ -159,7 +184,8 @@ TEST_CASE("power is kept between hand and scene: F dx is the same on both sides"
 
 TEST_CASE("options of the command line change the scene") {
   const kerf::test::TempFolder folder;
-  const auto path = block_scene(folder, 0.5, kBall + "[cut]\nrate_per_s = \"1/T\"\n");
+  const auto path =
+      block_scene(folder, 0.5, kBall + "[cut]\nmodel = \"overlap\"\nrate_per_s = \"1/T\"\n");
   kerf::SceneOverrides overrides;
   overrides.rate_hz = 4000;
   overrides.numeric = kerf::NumericKind::float32;
@@ -248,9 +274,9 @@ TEST_CASE("real volumes load with any scene, by their size in voxels") {
     overrides.volume_file = std::filesystem::path(data) / file;
     const kerf::Scene scene = kerf::load_scene(scene_path, overrides);
     CHECK(scene.tools.at(0).offsets.size() == 2176);
-    CHECK(kerf::device_stiffness_n_per_mm(scene) == doctest::Approx(2 * std::numbers::pi * 0.06));
     MESSAGE(file << ": scale " << scene.device.workspace_scale << ", iso " << scene.volumes[0].iso
                  << ", offset y " << scene.device.offset_mm[1] << ", hand unit "
-                 << kerf::hand_unit_mm(scene) << ", p0 " << scene.force.p0_n_per_mm2);
+                 << kerf::hand_unit_mm(scene) << ", machinability "
+                 << scene.cut.machinability_mm3_per_s_n);
   }
 }

@@ -55,7 +55,7 @@ class Pair {
 };
 
 Scene cutting_scene() {
-  Scene scene = half_space_scene();
+  Scene scene = paper_scene();
   scene.cut.model = CutModel::overlap;
   return scene;
 }

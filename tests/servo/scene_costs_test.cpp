@@ -2,7 +2,6 @@
 // What a scene is said to cost, against counts of what is really done and really there.
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstdint>
 #include <cstdlib>
 #include <set>
@@ -19,9 +18,8 @@
 #include "controller/scene/sample_tool.hpp"
 #include "controller/scene/stage_timing.hpp"
 #include "controller/scene/tick_memory.hpp"
-#include "controller/scene/tool_shapes.hpp"
 #include "controller/scene/work_budget.hpp"
-#include "tests/servo/support.hpp"
+#include "tests/servo/costs_support.hpp"
 
 using namespace kerf;
 using namespace kerf::test;
@@ -33,11 +31,6 @@ std::uint64_t operations(const PlanCost& cost, const std::string& stage) {
     if (s.stage == stage) return s.operations;
   }
   return 0;
-}
-
-SceneTool shape(const char* name, double radius_mm, double length_mm) {
-  return make_tool(name, name,
-                   {.pitch_mm = kVoxelMm, .radius_mm = radius_mm, .length_mm = length_mm});
 }
 
 /// A sum that counts the products which it was made of.
@@ -54,23 +47,6 @@ struct Counted {
 struct CountingNumbers : DoubleNumbers {
   using Sum = Counted;
 };
-
-/// All voxels full: every stage does all that it ever does.
-SceneVolume full_block(int edge) {
-  return volume_of(edge, kVoxelMm, [](double, double, double) { return -1.0; });
-}
-
-/// A random turn, from a random quaternion.
-Matrix random_turn() {
-  std::array<double, 4> q{};
-  double length = 0;
-  for (double& part : q) {
-    part = std::rand() / (RAND_MAX / 2.0) - 1;
-    length += part * part;
-  }
-  for (double& part : q) part /= std::sqrt(length);
-  return matrix_of(q);
-}
 
 std::set<std::string> names(const std::vector<ArrayBytes>& arrays) {
   std::set<std::string> set;
@@ -242,6 +218,15 @@ TEST_CASE("a gathering tick that cuts works on no more voxels than it is said to
   }
 }
 
+TEST_CASE("a probe reads the tool's surface, and the cap of a ball or the patch of another shape") {
+  ShellTable<FixedNumbers> shell;
+  shell.count = 500;
+  shell.round = true;
+  CHECK(samples_a_probe(shell) == 500 + 160);
+  shell.round = false;
+  CHECK(samples_a_probe(shell) == 500 + 32);
+}
+
 TEST_CASE("every stage of every plan has a price, on machines of all kinds") {
   const SceneVolume block = full_block(32);
   const SceneTool cone = shape("cone", 0.6, 2);
@@ -266,7 +251,7 @@ TEST_CASE("every stage is timed, and does there no more than it is said to") {
     for (const auto cut :
          {CutModel::none, CutModel::overlap, CutModel::overlap_exact, CutModel::preston}) {
       Scene scene = half_space_scene(48);
-      if (cut == CutModel::preston) scene.force.model = ForceModel::proxy;
+      if (cut != CutModel::preston) scene.force.model = ForceModel::paper;
       scene.tools.push_back(shape("cone", 0.6, 2));
       scene.cut.model = cut;
       scene.cut.rate_per_s = 0;  // timed all the same
@@ -302,7 +287,7 @@ TEST_CASE("a tool is timed where it has most density around it, wherever its cen
 }
 
 TEST_CASE("a scene above the budget is refused on one line, and fits at a lower rate") {
-  Scene scene = half_space_scene(48);
+  Scene scene = paper_scene(48);
   scene.path = "scenes/x.toml";
   scene.cut.model = CutModel::overlap;
   scene.tools.push_back(shape("cylinder", 2, 4));
@@ -339,7 +324,7 @@ TEST_CASE("a scene above the budget is refused on one line, and fits at a lower 
 TEST_CASE("a scene holds the arrays that it names, and no others") {
   using Names = std::set<std::string>;
   const auto arrays_of = [](Scene scene) { return names(compile(scene)->costs().arrays); };
-  Scene touch = half_space_scene(32);
+  Scene touch = paper_scene(32);
   CHECK(arrays_of(touch) ==
         Names{"density of test", "samples of ball", "table of ball", "box", "columns inside"});
   Scene cut = touch;

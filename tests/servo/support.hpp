@@ -65,7 +65,7 @@ inline SceneVolume volume_of(int edge, double spacing_mm,
   return volume;
 }
 
-/// Solid below y = 0, touched with a 16^3 ball, nothing cut, motors configured.
+/// Solid below y = 0, felt with a 16^3 ball by the default force, nothing cut, motors configured.
 inline Scene half_space_scene(int edge = 64) {
   Scene scene;
   scene.path = "test";
@@ -73,6 +73,13 @@ inline Scene half_space_scene(int edge = 64) {
   scene.tools.push_back(ball(16));
   scene.cut.model = CutModel::none;
   scene.device.torque_scale = std::array{0.342, 0.342, 0.342};
+  return scene;
+}
+
+/// The same by the paper's force.
+inline Scene paper_scene(int edge = 64) {
+  Scene scene = half_space_scene(edge);
+  scene.force.model = ForceModel::paper;
   return scene;
 }
 

@@ -19,7 +19,6 @@ namespace {
 Scene swept_scene(NumericKind numeric) {
   Scene scene = half_space_scene(48);
   scene.volumes[0] = volume_of(48, kVoxelMm, [](double, double y, double) { return y / 2; });
-  scene.force.model = ForceModel::proxy;
   scene.servo.numeric = numeric;
   return scene;
 }
@@ -109,7 +108,7 @@ TEST_CASE("a scene pays only for the force that it names") {
       return array.name.find(name) != std::string::npos;
     });
   };
-  Scene scene = half_space_scene(16);
+  Scene scene = paper_scene(16);
   CHECK_FALSE(has(scene, "surface"));
   CHECK(has(scene, "table"));
   scene.force.model = ForceModel::proxy;

@@ -1,9 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "controller/shell/watchdog.hpp"
 
+#include <chrono>
+#include <thread>
+
 #include <doctest/doctest.h>
+#include <pthread.h>
+#include <sched.h>
 
 #include "controller/device/omni_driver.hpp"
+#include "controller/shell/watchdog_thread.hpp"
+#include "shared/posix/cores.hpp"
 #include "shared/wire/omni_packet.hpp"
 
 namespace {
@@ -51,4 +58,27 @@ TEST_CASE("a servo that stands still for 20 ms loses its motors, once per stall"
   watchdog.look(now += 5 * kMs);
   watchdog.look(now += 25 * kMs);
   CHECK(watchdog.trips() == 2);
+}
+
+TEST_CASE("the watchdog's thread may run on every core but the servo's") {
+  const auto cores = kerf::allowed_cores();
+  if (cores.size() < 2) return;  // nowhere to go
+  CountingPort port;
+  kerf::OmniDriver driver(port);
+  std::atomic<bool> stop{false};
+  kerf::LoopSignals signals{stop};
+  kerf::Watchdog watchdog(driver, signals);
+  for (const int servo : {cores.front(), cores.back()}) {
+    std::jthread watching = kerf::start_watchdog(watchdog, {.cpu = servo});
+    const auto may_run_on = [&](int core) {
+      cpu_set_t set;
+      REQUIRE(pthread_getaffinity_np(watching.native_handle(), sizeof set, &set) == 0);
+      return CPU_ISSET(static_cast<std::size_t>(core), &set) != 0;
+    };
+    // It leaves by itself, some time after it was started.
+    for (int tries = 0; tries < 5000 && may_run_on(servo); ++tries) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+    for (const int core : cores) CHECK(may_run_on(core) == (core != servo));
+  }
 }

@@ -8,10 +8,14 @@
 #include <doctest/doctest.h>
 #include <glm/gtc/matrix_transform.hpp>
 
+#include "tests/visualizer/exact_body.hpp"
 #include "tests/visualizer/gl_fixture.hpp"
+#include "tests/visualizer/renderer_fixture.hpp"
 #include "tests/visualizer/teeth.hpp"
+#include "visualizer/blend_renderer.hpp"
 #include "visualizer/cast/cast_renderer.hpp"
 #include "visualizer/mesh_painter.hpp"
+#include "visualizer/slices_renderer.hpp"
 
 using namespace kerf;
 using namespace kerf::test;
@@ -77,6 +81,35 @@ TEST_CASE("iso and cast draw teeth alike, by labels and by density, also after a
         CHECK(found.compared > 5'000);
         CHECK(found.alike >= 0.995 * found.compared);
       }
+    }
+  }
+}
+
+TEST_CASE("shader and cast agree where the near and the far plane cut through solid") {
+  if (!have_gl()) return;
+  // Beyond a far plane in the ring's nearer side there is a hole, and more ring.
+  const VoxelGrid grid{80, 36, 80};
+  const TestVolume ring(grid, centred(grid, glm::dvec3(0.12)), body(torus_distance, 0.3));
+  SceneView scene;
+  scene.volumes = {ring.view};
+  const VolumeContent content = ring.content();
+  IsoRenderer iso(scene, {&content, 1});
+  CastRenderer cast(scene, {&content, 1}, CastMode::iso);
+  BlendRenderer blend(scene, {&content, 1});
+  SlicesRenderer slices(scene, {&content, 1});
+  CastRenderer cast_blend(scene, {&content, 1}, CastMode::blend);
+  const RenderTarget target({128, 128});
+  for (const auto& [near_mm, far_mm] :
+       {std::pair{24.0, 26.5}, {26.0, 26.4}, {26.5, 40.0}, {28.5, 31.0}, {26.3, 26.6}}) {
+    CAPTURE(near_mm);
+    const View view = look_at({-29, -2, -6}, {}, near_mm, far_mm);
+    const Drawn shader = draw(iso, view, target);
+    const Agreement found = agreement(shader, draw(cast, view, target), view, 0.12);
+    CHECK(found.compared > 500);
+    CHECK(found.alike >= 0.98 * found.compared);
+    const Drawn rays = draw(blend, view, target);
+    for (Renderer* const other : std::initializer_list<Renderer*>{&slices, &cast_blend}) {
+      CHECK(difference(rays, draw(*other, view, target)).mean < 0.25);
     }
   }
 }

@@ -315,6 +315,46 @@ TEST_CASE("the opacity of blend hardly depends on the step") {
   CHECK(worst(drawn(0.75F / 4)) <= 2);
 }
 
+TEST_CASE(
+    "blend gathers all between the near and the far plane, also where they cut through solid") {
+  const VoxelGrid grid{40, 40, 40};
+  constexpr double kEdgeMm = 0.25;
+  constexpr double kEyeMm = 30.0;
+  const TestVolume block(grid, centred(grid, glm::dvec3(kEdgeMm)), [](glm::dvec3) { return 1.0; });
+  // Beyond the last centres the density falls to nothing over an edge, of which `matter` shows
+  // 0.65.
+  constexpr double kHalfMm = 19.5 * kEdgeMm + 0.65 * kEdgeMm;
+  constexpr double kSafeMm = 4.5;  // from the axis: no ray passes a side
+  for (const auto& [near_mm, far_mm] :
+       {std::pair{20.0, 26.7}, {26.7, 28.9}, {29.9, 30.1}, {33.1, 40.0}}) {
+    CAPTURE(near_mm);
+    const View view = look_at({0, 0, kEyeMm}, {}, near_mm, far_mm);
+    Caster caster = caster_of({&block}, blending());
+    const Cast drawn = cast(caster, view);
+    const double begin_mm = std::max(near_mm, kEyeMm - kHalfMm);
+    const double end_mm = std::min(far_mm, kEyeMm + kHalfMm);
+    int compared = 0;
+    int wrong = 0;
+    for (int y = 0; y < kSize.height; ++y) {
+      for (int x = 0; x < kSize.width; ++x) {
+        const glm::dvec3 along = pixel_ray(view, kSize, x, y).direction;
+        if (std::max(std::abs(along.x), std::abs(along.y)) * end_mm > kSafeMm) continue;
+        const double edges = (end_mm - begin_mm) * glm::length(along) / kEdgeMm;
+        const double opacity = std::min((1.0 - std::pow(1.0 - 0.1, edges)) / 0.98, 1.0);
+        const auto at = static_cast<std::size_t>((kSize.height - 1 - y) * kSize.width + x);
+        wrong += std::abs((drawn.picture.rgba[at] >> 24) - 255.0 * opacity) > 1.0 ? 1 : 0;
+        wrong += std::abs(eye_distance_mm(static_cast<double>(drawn.picture.depth[at]), view) -
+                          begin_mm) > 0.15 * kEdgeMm
+                     ? 1
+                     : 0;
+        ++compared;
+      }
+    }
+    CHECK(compared > 1'500);
+    CHECK(wrong == 0);
+  }
+}
+
 TEST_CASE("blend ends its rays at the depth that it is given") {
   const VoxelGrid grid{40, 40, 40};
   const TestVolume volume(grid, centred(grid, glm::dvec3(0.25)), ball({}, 4.0, 0.5));

@@ -91,7 +91,8 @@ TEST_CASE("profiles that are no body give no mesh, and doubled points do no harm
 }
 
 TEST_CASE("a tool has its head around the origin and a thinner shank towards +y") {
-  const Mesh mesh = tool_mesh(circle_profile(1.0));
+  const Mesh mesh =
+      tool_mesh({.name = "ball", .profile_mm = circle_profile(1.0), .radius_mm = 1.0});
   float lowest = 0.0F;
   float highest = 0.0F;
   float widest_above_head = 0.0F;
@@ -107,4 +108,40 @@ TEST_CASE("a tool has its head around the origin and a thinner shank towards +y"
   CHECK(highest > 4.0F);
   CHECK(widest_above_head > 0.0F);
   CHECK(widest_above_head < 1.0F);
+}
+
+TEST_CASE("a mesh is drawn as it is: sharp edges stay sharp, and round ones are lit round") {
+  // A bar of 24 sides: 15 degrees between two of them, 90 to the ends.
+  constexpr std::uint32_t kSides = 24;
+  Facets bar;
+  for (std::uint32_t i = 0; i < kSides; ++i) {
+    const double angle = 2.0 * std::numbers::pi * i / kSides;
+    for (const double y : {-1.0, 1.0})
+      bar.points_mm.push_back({std::cos(angle), y, std::sin(angle)});
+  }
+  const auto low_end = 2 * kSides, high_end = 2 * kSides + 1;
+  bar.points_mm.push_back({0.0, -1.0, 0.0});
+  bar.points_mm.push_back({0.0, 1.0, 0.0});
+  for (std::uint32_t i = 0; i < kSides; ++i) {
+    const std::uint32_t low = 2 * i, next = 2 * ((i + 1) % kSides);
+    bar.triangles.insert(bar.triangles.end(), {{low, low + 1, next},
+                                               {next, low + 1, next + 1},
+                                               {low_end, low, next},
+                                               {high_end, next + 1, low + 1}});
+  }
+  const Mesh mesh = shaded(bar);
+  CHECK(open_edges(mesh) == 0);
+  CHECK(volume_mm3(mesh) == doctest::Approx(2.0 * std::numbers::pi).epsilon(0.02));
+  for (const Mesh::Vertex& vertex : mesh.vertices) {
+    const glm::vec3 round = glm::normalize(glm::vec3(vertex.position.x, 0.0F, vertex.position.z));
+    if (std::abs(vertex.normal.y) > 0.5F) {
+      CHECK(std::abs(vertex.normal.y) == doctest::Approx(1.0));
+    } else {
+      CHECK(glm::dot(vertex.normal, round) > 0.998F);
+    }
+  }
+  const Mesh tool = tool_mesh({.name = "bar", .profile_mm = {}, .radius_mm = 1.0, .facets = bar});
+  float highest = 0.0F;
+  for (const Mesh::Vertex& vertex : tool.vertices) highest = std::max(highest, vertex.position.y);
+  CHECK(highest > 4.0F);  // its shank
 }

@@ -9,6 +9,7 @@
 #include <rapidcheck.h>
 
 #include "visualizer/error.hpp"
+#include "visualizer/renderer_choice.hpp"
 
 using namespace kerf;
 
@@ -68,6 +69,34 @@ TEST_CASE("an unknown renderer is refused and the known ones are named") {
   CHECK_THROWS_WITH_AS(parse({"--renderer", "voxels"}),
                        doctest::Contains("--renderer: voxels is unknown; known: iso"),
                        VisualizerError);
+}
+
+TEST_CASE("each volume may have a renderer of its own, and one kind of them looks into volumes") {
+  CHECK(first_look(*parse({"--renderer", "surface,blend"})).renderer == "surface,blend");
+  CHECK_THROWS_WITH_AS(parse({"--renderer", "surface,"}),
+                       doctest::Contains("--renderer:  is unknown; known: iso"), VisualizerError);
+  CHECK_THROWS_WITH_AS(parse({"--renderer", "blend,iso,slices"}),
+                       "--renderer: blend,iso,slices: blend and slices do not mix where volumes "
+                       "intersect; take one of them for both",
+                       VisualizerError);
+  using Kinds = std::vector<std::string>;
+  CHECK(renderer_of_each("cast", 3) == Kinds{"cast", "cast", "cast"});
+  CHECK(renderer_of_each("cast,blend", 2) == Kinds{"cast", "blend"});
+  CHECK_THROWS_WITH_AS(static_cast<void>(renderer_of_each("cast,blend", 1)),
+                       "--renderer: cast,blend is for 2 volumes, and the scene has 1; name one for "
+                       "all or one for each",
+                       VisualizerError);
+}
+
+TEST_CASE("a choice for one volume leaves the others, but what is looked into has one renderer") {
+  CHECK(with_renderer("iso", 2, 1, "blend") == "iso,blend");
+  CHECK(with_renderer("iso,blend", 2, 0, "blend") == "blend");
+  CHECK(with_renderer("blend,cast,blend", 3, 0, "slices") == "slices,cast,slices");
+  CHECK(with_renderer("blend", 1, 0, "cast") == "cast");
+  CHECK(next_renderer("iso,blend") == "blend");
+  CHECK(next_renderer("cast-blend") == "iso");
+  CHECK(next_renderer("iso", 2, 1) == "iso,blend");
+  CHECK(next_renderer("surface,blend", 2, 1) == "surface");
 }
 
 TEST_CASE("every mistake on the command line is one line") {

@@ -15,6 +15,7 @@
 
 #include "tests/visualizer/order_scene.hpp"
 #include "visualizer/mesh_painter.hpp"
+#include "visualizer/scene_painter.hpp"
 
 using namespace kerf;
 using namespace kerf::test;
@@ -45,10 +46,6 @@ struct Tally {
   int wrong_depth = 0, wrong_colour = 0, wrong_air = 0;
   double worst_mm = 0.0;
 };
-
-bool is_translucent(std::string_view kind) {
-  return kind == "blend" || kind == "slices" || kind == "cast-blend";
-}
 
 bool alike(const Drawn& a, const Drawn& b, std::size_t at, int steps) {
   return std::equal(&a.rgb[3 * at], &a.rgb[3 * at] + 3, &b.rgb[3 * at],
@@ -149,6 +146,46 @@ TEST_CASE(
     CHECK(before > 3'000);
     CHECK(behind > 3'000);
     CHECK(wrong == 0);
+  }
+}
+
+TEST_CASE("volumes of different renderers intersect as their surfaces and veils do") {
+  if (!have_gl()) return;
+  const RenderTarget target(kSize);
+  for (const auto& [first, second] : {std::pair{"surface", "blend"},
+                                      {"cast-blend", "iso"},
+                                      {"cast", "slices"},
+                                      {"iso", "surface"},
+                                      {"cast", "surface"}}) {
+    const std::string choice = std::string(first) + "," + second;
+    CAPTURE(choice);
+    const TwoBodies two(false);
+    ScenePainter painter(choice, two.scene, two.contents());
+    const std::vector<double> reach_mm{two.reach_mm(is_translucent(first)),
+                                       two.reach_mm(is_translucent(second))};
+    int compared = 0, wrong_depth = 0, wrong_colour = 0;
+    for (const View& view : views()) {
+      target.bind();
+      glClearColor(0.0F, 0.0F, 0.0F, 1.0F);
+      glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
+      painter.draw_volumes(ScenePainter::Layer::opaque, view, target);
+      painter.draw_volumes(ScenePainter::Layer::translucent, view, target);
+      const Drawn drawn{target.read_rgb(), target.read_depth()};
+      const auto answer = nearest_bodies(two.bodies, reach_mm, view, kSize);
+      const auto clear = clear_pixels(answer, kSize, kMarginMm);
+      for (std::size_t at = 0; at < answer.size(); ++at) {
+        if (!clear[at] || answer[at].body < 0) continue;
+        const auto body = static_cast<std::size_t>(answer[at].body);
+        wrong_depth += std::abs(depth_mm(drawn, at, view) - answer[at].mm) > kDepthMm ? 1 : 0;
+        ++compared;
+        if (is_translucent(body == 0 ? first : second)) continue;  // the other may shine through
+        const std::uint8_t* const rgb = &drawn.rgb[3 * at];
+        wrong_colour += rgb[two.channel(body)] <= rgb[two.channel(1 - body)] ? 1 : 0;
+      }
+    }
+    CHECK(compared > 10'000);
+    CHECK(wrong_depth == 0);
+    CHECK(wrong_colour == 0);
   }
 }
 

@@ -152,11 +152,13 @@ TEST_CASE("a picture of another size ends the video, and the picture goes on") {
   const Place place;
   const fs::path file = place.path / "a.y4m";
   std::optional<Recording> recording(std::in_place, file.string(), PictureSize{4, 4}, 30);
-  film(recording, RenderTarget({4, 4}), 0.0);
+  CHECK_FALSE(film(recording, RenderTarget({4, 4}), 0.0));
   CHECK(recording);
-  film(recording, RenderTarget({6, 4}), 1.0);
+  const auto problem = film(recording, RenderTarget({6, 4}), 1.0);
+  REQUIRE(problem);
+  CHECK(problem->find("another size") != std::string::npos);
   CHECK_FALSE(recording);
-  film(recording, RenderTarget({6, 4}), 1.0);  // nothing to do
+  CHECK_FALSE(film(recording, RenderTarget({6, 4}), 1.0));  // nothing to do
   CHECK(read_back(file, {4, 4}).frames.size() == 1);
 }
 

@@ -17,6 +17,7 @@
 #include "tests/visualizer/gl_fixture.hpp"
 #include "visualizer/error.hpp"
 #include "visualizer/picture.hpp"
+#include "visualizer/renderer_choice.hpp"
 #include "visualizer/screen_bounds.hpp"
 
 using namespace kerf;
@@ -148,6 +149,7 @@ void check_parts(const Look& look, PictureSize size, int edits) {
   const RenderTarget target(size);
   const OverlayFigures figures;
   static_cast<void>(picture.draw(session, figures, target));
+  const bool coarse = look.renderer.find("slices") != std::string::npos;  // while something moves
   double redrawn = 0;
   int parts = 0;
   for (int edit = 0; edit < edits; ++edit) {
@@ -167,8 +169,10 @@ void check_parts(const Look& look, PictureSize size, int edits) {
     if (edit % 10 == 9) picture.camera().orbit(0.05, 0.01);
     session.poll();
     picture.update(session);
-    Redrawn part = picture.draw(session, figures, target);
-    if (edit % 10 == 9) part = picture.draw(session, figures, target);  // comes to rest
+    const Redrawn part = picture.draw(session, figures, target);
+    if (edit % 10 == 9 || edit % 4 == 3) {  // comes to rest
+      CHECK(picture.draw(session, figures, target).any == coarse);
+    }
     const auto seen = target.read_rgb();
     if (edit % 10 != 9) {
       redrawn += part.share;
@@ -185,8 +189,8 @@ void check_parts(const Look& look, PictureSize size, int edits) {
     CHECK_FALSE(picture.draw(session, figures, target).any);
   }
   // One sees into the volume and the tool in it; of the other, what is hidden stays.
-  const bool opaque =
-      look.renderer == "iso" || look.renderer == "surface" || look.renderer == "cast";
+  const std::vector<std::string> kinds = renderer_of_each(look.renderer, 2);
+  const bool opaque = std::none_of(kinds.begin(), kinds.end(), is_translucent);
   const bool wide = look.stereo.on || look.voxel_tool || look.gradient != Gradient::corners;
   CHECK(redrawn / parts < (wide ? 0.6 : opaque ? 0.08 : 0.2));
 }
@@ -203,9 +207,51 @@ TEST_CASE("after any change the part that is drawn again makes the picture of dr
     check_parts({.renderer = std::string(kind)}, slow ? PictureSize{96, 72} : PictureSize{160, 120},
                 kEdits);
     check_parts({.renderer = std::string(kind),
-                 .clip = {.on = true, .axis = 0, .at = 0.6},
+                 .clip = {.on = true, .axis = 2, .at = 0.6},  // towards the camera
                  .stereo = {.on = true}},
                 {161, 80}, kEdits / 10);
+  }
+}
+
+TEST_CASE("so it does where each volume has a renderer of its own") {
+  if (!have_gl()) return;
+  const Place place;
+  for (const char* choice : {"surface,blend", "cast-blend,iso", "slices,cast", "cast,surface"}) {
+    CAPTURE(choice);
+    check_parts({.renderer = choice}, {96, 72}, kEdits / 4);
+    check_parts({.renderer = choice, .voxel_tool = true}, {96, 72}, kEdits / 20);
+  }
+}
+
+TEST_CASE("slices are fewer around a tool that moves, and all of them once it rests") {
+  if (!have_gl()) return;
+  const Place place;
+  for (const bool voxel_tool : {false, true}) {
+    Controller controller;
+    Session session("redraw");
+    session.poll();
+    Picture picture(session, {.renderer = "slices", .voxel_tool = voxel_tool}, 4.0 / 3.0);
+    const RenderTarget target({160, 120});
+    static_cast<void>(picture.draw(session, {}, target));
+    std::vector<std::uint8_t> moving;
+    for (const double x_mm : {-2.0, 0.0, 2.0}) {
+      controller.move({.tip_mm = {x_mm, 6.0, 4.0}});
+      session.poll();
+      const double share = picture.draw(session, {}, target).share;
+      CHECK(share > 0.0);
+      CHECK(share < 0.5);
+      moving = target.read_rgb();
+    }
+    // A force that changes is no motion.
+    controller.move({.tip_mm = {2.0, 6.0, 4.0}, .force_n = {0.0, 0.01, 0.0}});
+    session.poll();
+    CHECK(picture.draw(session, {}, target).any);
+    const auto rest = target.read_rgb();
+    CHECK(rest != moving);
+    CHECK_FALSE(picture.draw(session, {}, target).any);
+    picture.redraw_all();
+    static_cast<void>(picture.draw(session, {}, target));
+    CHECK(rest == target.read_rgb());
   }
 }
 
@@ -271,8 +317,8 @@ TEST_CASE("a changed look shows the picture of one that had it from the start") 
   };
   Look clipped{.renderer = "iso"};
   clipped.clip = {.on = true, .axis = 0, .at = 0.4};
-  for (const Look& look :
-       {Look{.renderer = "blend"}, Look{.renderer = "iso", .iso = 0.7}, clipped}) {
+  for (const Look& look : {Look{.renderer = "blend"}, Look{.renderer = "surface,blend"},
+                           Look{.renderer = "iso", .iso = 0.7}, clipped}) {
     std::vector<std::uint8_t> changed;
     {
       Picture picture(session, {.renderer = "iso"}, 4.0 / 3.0);

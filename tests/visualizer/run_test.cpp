@@ -277,6 +277,11 @@ TEST_CASE("every renderer draws a session") {
     CHECK(pictures.back().size() > 500);
   }
   CHECK(pictures[0] != pictures[1]);
+  VisualizerOptions options = place.options();
+  options.renderer = "surface,blend";
+  CHECK_THROWS_WITH_AS(static_cast<void>(run_headless(options)),
+                       doctest::Contains("surface,blend is for 2 volumes, and the scene has 1"),
+                       VisualizerError);
 }
 
 TEST_CASE("a visualizer that joins late shows the picture of one that was there all the time") {

@@ -53,11 +53,27 @@ TEST_CASE("a box has its corners half a voxel outside the outermost centres") {
   CHECK(glm::length(diagonal) == doctest::Approx(std::sqrt(1.0 + 16.0 + 81.0)));
 }
 
+TEST_CASE("a tool that is a mesh comes with its points and triangles") {
+  const SceneView scene = scene_view(segment_with(R"({
+    "volumes": [], "materials": [], "tools": [{"name": "wedge", "mesh": {
+      "points_mm": [[0, 0, 0], [1, 0, 0], [0, 2, 0], [0, 0, 3]],
+      "triangles": [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]}}]})"));
+  CHECK(scene.tools[0].facets.points_mm.size() == 4);
+  CHECK(scene.tools[0].facets.triangles[1] == std::array<std::uint32_t, 3>{0, 1, 3});
+  CHECK(scene.tools[0].radius_mm == 3.0);
+}
+
 TEST_CASE("a scene text that is not ours is refused in one line, never a crash") {
   for (const char* text :
        {"", "{}", "[1]", "nonsense", R"({"volumes": 3, "tools": [], "materials": []})",
         R"({"volumes": [], "tools": [{"name": "t", "profile": [[0, -1]]}], "materials": []})",
-        R"({"volumes": [], "tools": [{"name": "t", "profile": [[0]]}], "materials": []})"}) {
+        R"({"volumes": [], "tools": [{"name": "t", "profile": [[0]]}], "materials": []})",
+        R"({"volumes": [], "tools": [{"name": "t", "mesh": {"points_mm": [[0, 0, 0]],
+           "triangles": [[0, 0, 1]]}}], "materials": []})",
+        R"({"volumes": [], "tools": [{"name": "t", "mesh": {"points_mm": [[0, 0, 1e999]],
+           "triangles": [[0, 0, 0]]}}], "materials": []})",
+        R"({"volumes": [], "tools": [{"name": "t", "mesh": {"points_mm": [],
+           "triangles": []}}], "materials": []})"}) {
     CAPTURE(text);
     CHECK_THROWS_AS(static_cast<void>(scene_view(segment_with(text))), VisualizerError);
   }

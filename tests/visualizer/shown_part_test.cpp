@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What every renderer leaves out on demand: what the clip plane takes, what is outside a rectangle.
+#include <cmath>
+#include <memory>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -12,17 +14,6 @@
 using namespace kerf;
 using namespace kerf::test;
 
-namespace {
-
-/// All but the shell: these have a face where they are cut.
-std::vector<std::string_view> solid_kinds() {
-  std::vector<std::string_view> kinds = renderer_kinds();
-  std::erase(kinds, "surface");
-  return kinds;
-}
-
-}  // namespace
-
 TEST_CASE("the clip plane leaves a face where it cuts through solid, and nothing before it") {
   if (!have_gl()) return;
   const VoxelGrid grid{40, 40, 40};
@@ -30,9 +21,10 @@ TEST_CASE("the clip plane leaves a face where it cuts through solid, and nothing
   const VolumeContent content = volume.content();
   View view = look_at({0, 0, 30}, {}, 20, 40);
   view.shown = {0, 0, -1, 1.03};  // z <= 1.03 mm
-  for (const std::string_view kind : solid_kinds()) {
+  for (const std::string_view kind : renderer_kinds()) {
     CAPTURE(std::string(kind));
     const auto renderer = make_renderer(kind, scene_of({&volume}), {&content, 1});
+    renderer->set_cut_open(true, {&content, 1});
     const Drawn drawn = draw(*renderer, view, RenderTarget(kTestSize));
     const std::size_t middle = pixel_at(48, 48);
     CHECK(eye_distance_mm(static_cast<double>(drawn.depth[middle]), view) ==
@@ -44,26 +36,85 @@ TEST_CASE("the clip plane leaves a face where it cuts through solid, and nothing
   }
 }
 
-TEST_CASE("a surface is a shell: opened by the clip plane, it shows its inner side at its depth") {
+TEST_CASE("iso, surface and cast show the same face in the clip plane, also after a cut") {
   if (!have_gl()) return;
-  const VoxelGrid grid{40, 40, 40};
-  const TestVolume volume(grid, centred(grid, glm::dvec3(0.25)), ball({}, 3.5, 0.5));
+  const VoxelGrid grid{48, 40, 36};
+  // A soft core, which colours a part of the face.
+  TestVolume volume(grid, centred(grid, {0.2, 0.25, 0.3}), [](glm::dvec3 at) {
+    return ball({}, 3.5, 0.5)(at) - 0.4 * ball({0.5, 0.3, 0.0}, 1.2, 0.5)(at);
+  });
+  SceneView scene = scene_of({&volume});
+  scene.materials = {
+      {"none", 0.0, {0, 0, 0}}, {"dentin", 0.4, {0.8, 0.2, 0.1}}, {"enamel", 0.8, {0.2, 0.3, 0.9}}};
+  const VolumeContent content = volume.content();
+  View view = look_at({9, 12, 30}, {}, 20, 45);
+  view.shown = {0.0, -0.6, -0.8, 0.3};
+  const RenderTarget target(kTestSize);
+  std::vector<std::unique_ptr<Renderer>> renderers;
+  for (const char* kind : {"iso", "surface", "cast"}) {
+    renderers.push_back(make_renderer(kind, scene, {&content, 1}));
+    renderers.back()->set_cut_open(true, {&content, 1});
+  }
+  const VoxelBox cut{{20, 14, 14}, {31, 22, 30}};
+  for (const bool after : {false, true}) {
+    if (after) {
+      for (int z = cut.lo.z; z < cut.hi.z; ++z) {
+        for (int y = cut.lo.y; y < cut.hi.y; ++y) {
+          for (int x = cut.lo.x; x < cut.hi.x; ++x) volume.density[grid.index(x, y, z)] = 0;
+        }
+      }
+      const auto changed = bricks_in(volume.view.bricks, cut);
+      for (const auto& renderer : renderers) renderer->update(0, volume.density, changed);
+    }
+    const Drawn iso = draw(*renderers[0], view, target);
+    for (std::size_t other : {1U, 2U}) {
+      const Drawn drawn = draw(*renderers[other], view, target);
+      int face = 0, same = 0;
+      for (int y = 0; y < kTestSize.height; ++y) {
+        for (int x = 0; x < kTestSize.width; ++x) {
+          const std::size_t at = pixel_at(x, y);
+          const PixelRay ray = pixel_ray(view, kTestSize, x, y);
+          const auto eye_mm = eye_distance_mm(static_cast<double>(iso.depth[at]), view);
+          const glm::dvec4 hit(ray.origin_mm + eye_mm * ray.direction, 1.0);
+          if (std::abs(glm::dot(view.shown, hit)) > 1e-3) continue;
+          ++face;
+          bool equal = std::abs(drawn.depth[at] - iso.depth[at]) < 1e-6F;
+          for (std::size_t c = 3 * at; c < 3 * at + 3; ++c) {
+            equal = equal && std::abs(drawn.rgb[c] - iso.rgb[c]) <= 3;
+          }
+          if (equal) ++same;
+        }
+      }
+      CAPTURE(after);
+      CAPTURE(other);
+      CHECK(face > 1000);
+      CHECK(same >= face * 0.995);
+    }
+  }
+}
+
+TEST_CASE("a face in the clip plane has the colour of what lies in it, not behind it") {
+  if (!have_gl()) return;
+  const VoxelGrid grid{32, 32, 32};
+  const TestVolume volume(grid, centred(grid, glm::dvec3(0.25)),
+                          [](glm::dvec3 at) { return at.z > 1.0 ? 0.5 : 1.0; });
+  SceneView scene = scene_of({&volume});
+  scene.volumes[0].iso = 20'000;
+  scene.materials = {
+      {"none", 0.0, {0, 0, 0}}, {"red", 0.3, {0.8, 0.1, 0.1}}, {"blue", 0.8, {0.1, 0.1, 0.8}}};
   const VolumeContent content = volume.content();
   View view = look_at({0, 0, 30}, {}, 20, 40);
-  const auto renderer = make_renderer("surface", scene_of({&volume}), {&content, 1});
-  const RenderTarget target(kTestSize);
-  const Drawn whole = draw(*renderer, view, target);
-  view.shown = {0, 0, -1, 1.03};
-  const Drawn opened = draw(*renderer, view, target);
-  const std::size_t middle = pixel_at(48, 48);
-  CHECK(eye_distance_mm(static_cast<double>(whole.depth[middle]), view) ==
-        doctest::Approx(26.5).epsilon(1e-3));
-  CHECK(eye_distance_mm(static_cast<double>(opened.depth[middle]), view) ==
-        doctest::Approx(33.5).epsilon(1e-3));
-  CHECK(opened.rgb[3 * middle] > 40);                     // lit
-  CHECK(opened.rgb[3 * middle] < whole.rgb[3 * middle]);  // less than the outside
-  for (const float depth : opened.depth) {
-    CHECK(eye_distance_mm(static_cast<double>(depth), view) > 28.969);
+  for (const char* kind : {"iso", "surface", "cast"}) {
+    CAPTURE(std::string(kind));
+    const auto renderer = make_renderer(kind, scene, {&content, 1});
+    renderer->set_cut_open(true, {&content, 1});
+    const std::size_t middle = 3 * pixel_at(48, 48);
+    view.shown = {0, 0, -1, 1.125};  // through the last red voxels
+    const Drawn red = draw(*renderer, view, RenderTarget(kTestSize));
+    CHECK(red.rgb[middle] > 2 * red.rgb[middle + 2]);
+    view.shown = {0, 0, -1, 0.875};
+    const Drawn blue = draw(*renderer, view, RenderTarget(kTestSize));
+    CHECK(blue.rgb[middle + 2] > 2 * blue.rgb[middle]);
   }
 }
 
@@ -78,6 +129,7 @@ TEST_CASE("a plane beyond a volume hides it whole, one on its near side nothing"
     CAPTURE(std::string(kind));
     const auto renderer = make_renderer(kind, scene_of({&volume}), {&content, 1});
     const Drawn whole = draw(*renderer, all, target);
+    renderer->set_cut_open(true, {&content, 1});
     View view = all;
     view.shown = {1, 0, 0, 4.0};
     CHECK(draw(*renderer, view, target).rgb == whole.rgb);

@@ -11,7 +11,7 @@
 #include <doctest/doctest.h>
 #include <glm/gtc/matrix_transform.hpp>
 
-#include "tests/visualizer/gl_fixture.hpp"
+#include "tests/visualizer/renderer_fixture.hpp"
 
 using namespace kerf;
 using namespace kerf::test;
@@ -19,12 +19,6 @@ using namespace kerf::test;
 namespace {
 
 constexpr PictureSize kSize{96, 96};
-
-SceneView scene_of(std::initializer_list<const TestVolume*> volumes) {
-  SceneView scene;
-  for (const TestVolume* volume : volumes) scene.volumes.push_back(volume->view);
-  return scene;
-}
 
 std::size_t pixel(int x, int y) {
   return static_cast<std::size_t>(y * kSize.width + x);
@@ -246,4 +240,18 @@ TEST_CASE("surface and iso draw the same picture") {
     CHECK(alike > 0.98 * drawn);
     CHECK(near > 0.99 * drawn);
   }
+}
+
+TEST_CASE("a surface tells of changed voxels while a plane cuts it open, else of triangles alone") {
+  if (!have_gl()) return;
+  const VoxelGrid grid{24, 24, 24};
+  const TestVolume volume(grid, centred(grid, glm::dvec3(0.25)), ball({}, 2.0, 0.5));
+  const VolumeContent content = volume.content();
+  const auto renderer = make_renderer("surface", scene_of({&volume}), {&content, 1});
+  const std::vector<VoxelBox> differs{{{8, 8, 8}, {12, 13, 14}}};
+  CHECK(renderer->looks_different(0, differs).empty());
+  renderer->set_cut_open(true, {&content, 1});
+  CHECK(renderer->looks_different(0, differs) == differs);
+  renderer->set_cut_open(false, {&content, 1});
+  CHECK(renderer->looks_different(0, differs).empty());
 }

@@ -6,7 +6,6 @@
 
 #include "controller/scene/volume_image.hpp"
 #include "visualizer/scene_view.hpp"
-#include "visualizer/volume_on_gpu.hpp"
 
 namespace kerf::test {
 

@@ -5,12 +5,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <vector>
 
 #include <doctest/doctest.h>
 #include <glm/gtc/matrix_transform.hpp>
 
 #include "tests/visualizer/order_scene.hpp"
 #include "visualizer/error.hpp"
+#include "visualizer/mesh.hpp"
 #include "visualizer/palette.hpp"
 #include "visualizer/scene_painter.hpp"
 
@@ -94,6 +96,31 @@ TEST_CASE("a tool of voxels is half dense on its surface, and fades over two vox
   CHECK_FALSE(is_air());
   CHECK(tool.take(7));  // the scene has none
   CHECK(is_air());
+}
+
+TEST_CASE("a tool that is a mesh has the voxels of the same body swept about its axis") {
+  SceneView scene = TwoBodies(false).scene;
+  ToolView meshed{.name = "mesh", .profile_mm = {}, .radius_mm = kRadiusMm};
+  const Mesh ball = lathe(ball_tool().profile_mm);
+  for (const Mesh::Vertex& vertex : ball.vertices) {
+    meshed.facets.points_mm.push_back({vertex.position.x, vertex.position.y, vertex.position.z});
+  }
+  for (std::size_t i = 0; i < ball.triangles.size(); i += 3) {
+    meshed.facets.triangles.push_back(
+        {ball.triangles[i], ball.triangles[i + 1], ball.triangles[i + 2]});
+  }
+  scene.tools = {ball_tool(), meshed};
+  ToolVolume tool(scene);
+  tool.take(0);
+  const auto swept = tool.content().density;
+  const std::vector<Density> expected(swept.begin(), swept.end());
+  tool.take(1);
+  int worst = 0;
+  for (std::size_t i = 0; i < expected.size(); ++i) {
+    worst = std::max(worst, std::abs(tool.content().density[i] - expected[i]));
+  }
+  // The middle of one of 48 sides is 0.0028 mm inside of the circle.
+  CHECK(worst < 0.0029 / (2 * kEdgeMm) * kDensityMax + 0.005 * kDensityMax);
 }
 
 TEST_CASE("a box around the tool holds all of its voxels that are not air") {
@@ -185,9 +212,10 @@ TEST_CASE("of a tool of voxels and two volumes the nearest is seen, in every ren
   const View view = look_at({2, 3, 30}, {0.4, 0, 0.2}, 15, 45);
   for (const std::string_view kind : renderer_kinds()) {
     CAPTURE(std::string(kind));
-    ScenePainter painter(kind, two.scene, two.contents());
-    REQUIRE(painter.hand_is_among_volumes());
-    const double reach_mm = two.reach_mm(painter.renderer().translucent());
+    ScenePainter painter(std::string(kind), two.scene, two.contents());
+    const bool translucent = is_translucent(kind);
+    REQUIRE(painter.hand_is_opaque_volume() != translucent);
+    const double reach_mm = two.reach_mm(translucent);
     const double tool_reach_mm = reach_mm * 2.0 * kEdgeMm / TwoBodies::kRampMm;
     int shown = 0, covered = 0;
     for (const glm::dvec3 tip_mm :
@@ -196,7 +224,10 @@ TEST_CASE("of a tool of voxels and two volumes the nearest is seen, in every ren
       target.bind();
       glClearColor(0.0F, 0.0F, 0.0F, 1.0F);
       glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
-      painter.draw_volumes(hand, view, target);
+      painter.hold(hand);
+      for (const auto layer : {ScenePainter::Layer::opaque, ScenePainter::Layer::translucent}) {
+        painter.draw_volumes(layer, view, target);
+      }
       const Drawn drawn{target.read_rgb(), target.read_depth()};
       const glm::dmat4 tool_from_world = glm::inverse(rigid(hand.tip_mm, hand.orientation));
       const auto answer_for = [&](double shank_mm) {
@@ -214,7 +245,7 @@ TEST_CASE("of a tool of voxels and two volumes the nearest is seen, in every ren
         const double off_mm = eye_distance_mm(double{drawn.depth[at]}, view) - nearest.mm;
         wrong_depth += std::abs(off_mm) > kDepthMm ? 1 : 0;
         (nearest.body == 2 ? shown : covered) += 1;
-        if (painter.renderer().translucent()) continue;
+        if (translucent) continue;
         const std::uint8_t* const rgb = &drawn.rgb[3 * at];
         const bool grey = std::abs(rgb[0] - rgb[1]) < 30;
         wrong_colour += grey == (nearest.body == 2) ? 0 : 1;

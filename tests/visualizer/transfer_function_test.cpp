@@ -29,6 +29,30 @@ TEST_CASE("air is not seen, what the materials are made of is, and between the t
   CHECK(make_transfer_function(kTooth, 29491, true).presence(0.28) == doctest::Approx(1.0));
 }
 
+TEST_CASE("a CT whose air is far from black is seen through its air, not as a block") {
+  constexpr Density kAir = 19'700, kNoise = 900, kIso = 32'000;
+  std::vector<Density> density(3000, kAir);
+  for (std::size_t i = 0; i < density.size(); i += 3) density[i] = kAir - kNoise;
+  for (std::size_t i = 1; i < density.size(); i += 3) density[i] = kAir + kNoise;
+  for (std::size_t i = 0; i < density.size(); i += 4) density[i] = 50'000;
+  const Density air = air_level(density, kIso);
+  CHECK(air <= kAir);
+  CHECK(air > kAir - 256);
+  const TransferFunction made = make_transfer_function(kTooth, kIso, false, air);
+  CHECK(made.presence((kAir + kNoise) / kDensityMax) == 0.0);
+  CHECK(made.presence(kIso / kDensityMax) == doctest::Approx(1.0));
+  CHECK(make_transfer_function(kTooth, kIso, false).presence(kAir / kDensityMax) > 0.3);
+}
+
+TEST_CASE("air is 0 where nothing is below iso, and leaves a ramp where all is just below") {
+  const std::vector<Density> full(100, 65535);
+  CHECK(air_level(full, 30'000) == 0);
+  CHECK(air_level({}, 30'000) == 0);
+  const std::vector<Density> grey(100, 29'999);
+  const TransferFunction made = make_transfer_function({}, 30'000, false, air_level(grey, 30'000));
+  CHECK(made.full - made.empty > 0.1 * made.full);
+}
+
 TEST_CASE("the softer a material, the more opaque: hard enamel shows what is below") {
   const Palette look = make_transfer_function(kTooth, 29491, true).materials;
   CHECK(look[1][1].a < look[1][2].a);

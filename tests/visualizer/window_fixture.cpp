@@ -12,6 +12,9 @@
 #include <sys/wait.h>
 
 #include "visualizer/run.hpp"
+// After all others: it defines plain words.
+#include <X11/Xlib.h>
+#include <X11/Xutil.h>
 
 namespace kerf::test {
 
@@ -20,25 +23,67 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr const char* kScene = R"({
-  "volumes": [{"name": "block", "solid": true}],
+  "volumes": [%],
   "tools": [{"name": "ball", "profile": [[-1, 0], [0, 1], [1, 0]]},
             {"name": "pin", "profile": [[0, 0], [1, 1]]}],
   "materials": [{"name": "none", "iso": 0, "colour": [0, 0, 0]},
                 {"name": "bone", "iso": 0.3, "colour": [0.8, 0.7, 0.5]}]})";
 constexpr VoxelGrid kGrid{32, 24, 16};
 
-SegmentSpec block(std::vector<Density>& density) {
+SegmentSpec blocks_of(std::vector<Density>& density, int blocks) {
   density.assign(kGrid.voxel_count(), 50'000);
   SegmentSpec spec;
+  std::string names;
+  for (int i = 0; i < blocks; ++i) {
+    names +=
+        i == 0 ? R"({"name": "block", "solid": true})" : R"(, {"name": "other", "solid": true})";
+    SegmentVolumeSpec& volume = spec.volumes.emplace_back();
+    volume.grid = kGrid;
+    volume.origin_mm = {0.0, 20.0 * i, 0.0};  // they overlap
+    volume.density = density;
+  }
   spec.scene_json = kScene;
-  SegmentVolumeSpec& volume = spec.volumes.emplace_back();
-  volume.grid = kGrid;
-  volume.density = density;
+  spec.scene_json.replace(spec.scene_json.find('%'), 1, names);
   return spec;
 }
 
 std::uint64_t now_ns() {
   return static_cast<std::uint64_t>(std::chrono::steady_clock::now().time_since_epoch().count());
+}
+
+/// What `User::look` takes of a picture.
+std::vector<std::uint8_t> middle_of(const RgbPicture& picture) {
+  const auto width = static_cast<std::size_t>(picture.size.width);
+  const auto height = static_cast<std::size_t>(picture.size.height);
+  std::vector<std::uint8_t> middle;
+  for (std::size_t y = height / 4; y < height * 3 / 4; ++y) {
+    const auto row = picture.rgb.begin() + static_cast<std::ptrdiff_t>(y * width * 3);
+    middle.insert(middle.end(), row + picture.size.width * 3 * 5 / 9,
+                  row + picture.size.width * 3 * 8 / 9);
+  }
+  return middle;
+}
+
+/// The upper left corner of the screen that DISPLAY names.
+RgbPicture read_screen(PictureSize size) {
+  Display* const display = XOpenDisplay(nullptr);
+  REQUIRE(display != nullptr);
+  XImage* const image =
+      XGetImage(display, DefaultRootWindow(display), 0, 0, static_cast<unsigned>(size.width),
+                static_cast<unsigned>(size.height), AllPlanes, ZPixmap);
+  REQUIRE(image != nullptr);
+  RgbPicture picture{size, {}};
+  for (int y = 0; y < size.height; ++y) {
+    for (int x = 0; x < size.width; ++x) {
+      const unsigned long pixel = XGetPixel(image, x, y);
+      for (const int shift : {16, 8, 0}) {
+        picture.rgb.push_back(static_cast<std::uint8_t>(pixel >> shift));
+      }
+    }
+  }
+  XDestroyImage(image);
+  XCloseDisplay(display);
+  return picture;
 }
 
 }  // namespace
@@ -86,8 +131,9 @@ void Screen::end(int signal) {
   server_ = -1;
 }
 
-Controller::Controller()
-    : writer_(SegmentWriter::create(block(density_))), server_("test", writer_, {.tools = 2}) {
+Controller::Controller(int blocks)
+    : writer_(SegmentWriter::create(blocks_of(density_, blocks))),
+      server_("test", writer_, {.tools = 2}) {
   writer_.set_lifecycle(Lifecycle::run);
 }
 
@@ -121,7 +167,8 @@ void act(const std::string& events) {
   std::this_thread::sleep_for(std::chrono::milliseconds(300));
 }
 
-User::User(const fs::path& folder) : out_(folder / "out"), report_(folder / "report.json") {
+User::User(const fs::path& folder, int blocks)
+    : out_(folder / "out"), report_(folder / "report.json"), controller_(blocks) {
   VisualizerOptions options;
   options.name = "test";
   options.size = {480, 360};
@@ -145,16 +192,11 @@ RgbPicture User::whole() {
 }
 
 std::vector<std::uint8_t> User::look() {
-  const RgbPicture picture = whole();
-  const auto width = static_cast<std::size_t>(picture.size.width);
-  const auto height = static_cast<std::size_t>(picture.size.height);
-  std::vector<std::uint8_t> middle;
-  for (std::size_t y = height / 4; y < height * 3 / 4; ++y) {
-    const auto row = picture.rgb.begin() + static_cast<std::ptrdiff_t>(y * width * 3);
-    middle.insert(middle.end(), row + picture.size.width * 3 * 5 / 9,
-                  row + picture.size.width * 3 * 8 / 9);
-  }
-  return middle;
+  return middle_of(whole());
+}
+
+std::vector<std::uint8_t> User::look_at_screen() {
+  return middle_of(read_screen(whole().size));
 }
 
 int User::quit() {

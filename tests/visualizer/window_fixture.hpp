@@ -35,10 +35,11 @@ class Screen {
   pid_t server_ = -1;
 };
 
-/// A controller of the name "test" that shows a block and has two tools.
+/// A controller of the name "test" that shows one block, or two beside one another, and has two
+/// tools.
 class Controller {
  public:
-  Controller();
+  explicit Controller(int blocks = 1);
   void tick();
   /// What the window asked for since the last call.
   std::vector<std::uint64_t> asked_tools();
@@ -57,12 +58,14 @@ void act(const std::string& events);
 /// A window, and a user before it.
 class User {
  public:
-  explicit User(const std::filesystem::path& folder);
+  explicit User(const std::filesystem::path& folder, int blocks = 1);
 
   /// The window with its panels.
   RgbPicture whole();
   /// The middle of it, where no panel is.
   std::vector<std::uint8_t> look();
+  /// The same as it stands on the screen, whose upper left corner the window is in.
+  std::vector<std::uint8_t> look_at_screen();
 
   int quit();
   [[nodiscard]] const std::filesystem::path& out() const { return out_; }

@@ -122,6 +122,17 @@ TEST_CASE("keys and mouse work the window") {
     act(window + "windowsize 480 360");
     act("mousemove 300 180");
     CHECK(user.look() == first);
+    CHECK(user.look_at_screen() == first);
+    CHECK(user.quit() == 0);
+  }
+  SUBCASE("a window of another size fills the screen with a picture of that size") {
+    CHECK(user.look_at_screen() == first);
+    for (const char* size : {"360 270", "600 450"}) {
+      act(window + "windowsize " + size);
+      const auto seen = user.look();
+      CHECK(seen.size() != first.size());
+      CHECK(user.look_at_screen() == seen);
+    }
     CHECK(user.quit() == 0);
   }
   SUBCASE("a window that is minimised and restored shows what it showed, and still follows keys") {
@@ -134,6 +145,35 @@ TEST_CASE("keys and mouse work the window") {
     act("key v");
     CHECK(user.look() != first);
     CHECK(user.quit() == 0);
+  }
+}
+
+TEST_CASE("each of two volumes takes its own renderer, by keys and by its list") {
+  if (!have("Xvfb") || !have("xdotool")) return;
+  const Screen screen;
+  User user(screen.folder, 2);
+  const auto first = user.look();
+  SUBCASE("b says which one v is for, and then that it is for all again") {
+    act("key b key b key v");  // the second
+    const auto mixed = user.look();
+    CHECK(mixed != first);
+    act("key b key v key v key v key v key v key v");
+    CHECK(user.look() == first);
+    act("key b key b key v");
+    CHECK(user.look() == mixed);
+    CHECK(user.quit() == 0);
+    CHECK(user.report()["renderer"] == "iso,blend");
+  }
+  SUBCASE("its list in the panel") {
+    const auto click = [](const std::string& at) {
+      act("mousemove " + at + " sleep 0.2 mousedown 1 sleep 0.2 mouseup 1");
+    };
+    click("90 238");  // the second one's,
+    click("45 145");  // and in it blend
+    act("mousemove 300 180");
+    CHECK(user.look() != first);
+    CHECK(user.quit() == 0);
+    CHECK(user.report()["renderer"] == "iso,blend");
   }
 }
 

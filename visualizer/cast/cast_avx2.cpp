@@ -29,6 +29,7 @@ struct Simd {
   static F to_float(I a) noexcept { return _mm256_cvtepi32_ps((__m256i)a); }
   static I bits(F a) noexcept { return (I)_mm256_castps_si256(a); }
   static F from_bits(I a) noexcept { return _mm256_castsi256_ps((__m256i)a); }
+  static I high_half(I a) noexcept { return (I)_mm256_srli_epi32((__m256i)a, 16); }
   static F sqrt(F a) noexcept { return _mm256_sqrt_ps(a); }
   static F min(F a, F b) noexcept { return _mm256_min_ps(a, b); }
   static F max(F a, F b) noexcept { return _mm256_max_ps(a, b); }
@@ -36,6 +37,7 @@ struct Simd {
   static M none() noexcept { return _mm256_setzero_ps(); }
   static M all() noexcept { return _mm256_castsi256_ps(_mm256_set1_epi32(-1)); }
   static M less(F a, F b) noexcept { return _mm256_cmp_ps(a, b, _CMP_LT_OQ); }
+  static M equal(F a, F b) noexcept { return _mm256_cmp_ps(a, b, _CMP_EQ_OQ); }
   static M equal(I a, I b) noexcept {
     return _mm256_castsi256_ps(_mm256_cmpeq_epi32((__m256i)a, (__m256i)b));
   }

@@ -43,6 +43,7 @@ struct CastVolumeJob {
   /// 256 x linear RGB and, for blend, extinction: -log2 of the transparency over an edge.
   const float* by_density = nullptr;
   const float* by_label = nullptr;
+  float settled = 1.0F;             ///< from this density on `by_density` stays what it is
   float empty = 0.0F, full = 1.0F;  ///< blend: densities where matter begins and where it is whole
   float iso = 0.5F;                 ///< 0..1
 };
@@ -94,6 +95,7 @@ struct CastKernels {
 [[nodiscard]] const CastKernels* const* cast_kernels() noexcept;
 
 extern const CastKernels kCastAvx512;
+extern const CastKernels kCastAvx512Gather;
 extern const CastKernels kCastAvx2;
 extern const CastKernels kCastScalar;
 

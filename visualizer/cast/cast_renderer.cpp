@@ -8,18 +8,14 @@ namespace kerf {
 
 namespace {
 
-CastMatter matter_of(const SceneView& scene, const VolumeView& volume, bool labelled) {
-  const TransferFunction look = make_transfer_function(scene.materials, volume.iso, labelled);
-  return {.materials = look.materials, .empty = look.empty, .full = look.full};
-}
-
 std::vector<CastContent> cast_contents(const SceneView& scene,
                                        std::span<const VolumeContent> contents) {
   std::vector<CastContent> all;
   for (std::size_t i = 0; i < contents.size(); ++i) {
-    const VolumeContent& content = contents[i];
-    all.push_back({content.density, content.labels,
-                   matter_of(scene, scene.volumes[i], !content.labels.empty())});
+    const TransferFunction look = make_transfer_function(scene, i, contents[i]);
+    all.push_back({contents[i].density,
+                   contents[i].labels,
+                   {.materials = look.materials, .empty = look.empty, .full = look.full}});
   }
   return all;
 }

@@ -26,6 +26,7 @@ struct Simd {
   static F to_float(I a) noexcept { return static_cast<F>(a); }
   static I bits(F a) noexcept { return __builtin_bit_cast(I, a); }
   static F from_bits(I a) noexcept { return __builtin_bit_cast(F, a); }
+  static I high_half(I a) noexcept { return a >> 16 & 0xffff; }
   static F sqrt(F a) noexcept { return __builtin_sqrtf(a); }
   /// b where a is not a number, here and in `max`.
   static F min(F a, F b) noexcept { return a < b ? a : b; }
@@ -34,6 +35,7 @@ struct Simd {
   static M none() noexcept { return false; }
   static M all() noexcept { return true; }
   static M less(F a, F b) noexcept { return a < b; }
+  static M equal(F a, F b) noexcept { return a == b; }
   static M equal(I a, I b) noexcept { return a == b; }
   static M both(M a, M b) noexcept { return a && b; }
   static M either(M a, M b) noexcept { return a || b; }

@@ -61,6 +61,10 @@ void CastVolume::set_materials(const Palette& materials) {
   for (auto& row : matter_.materials) {
     for (glm::vec4& material : row) material.w = -std::log2(1.0F - std::min(material.w, kMost));
   }
+  const auto& by_density = matter_.materials[0];
+  std::size_t first = by_density.size() - 1;
+  while (first > 0 && by_density[first - 1] == by_density.back()) --first;
+  settled_ = static_cast<float>(first) / static_cast<float>(by_density.size() - 1);
 }
 
 double CastVolume::edge_mm() const {
@@ -116,11 +120,45 @@ void CastVolume::take_cells(const VoxelBox& cells) {
   }
 }
 
+bool CastVolume::near_plane_is_inside(const View& view, const glm::dmat4& world_from_cell) const {
+  const glm::dmat4 cell_from_eye = glm::affineInverse(view.eye_from_world * world_from_cell);
+  glm::dvec3 low(1e30);
+  glm::dvec3 high(-1e30);
+  for (const double side : {-1.0, 1.0}) {
+    for (const double end : {-1.0, 1.0}) {
+      const double right = view.middle_right + side * view.aspect * view.tan_half_height;
+      const glm::dvec3 corner = view.near_mm * glm::dvec3(right, end * view.tan_half_height, -1.0);
+      const glm::dvec3 cell(cell_from_eye * glm::dvec4(corner, 1.0));
+      low = glm::min(low, cell);
+      high = glm::max(high, cell);
+    }
+  }
+  const VoxelGrid& grid = cells_.grid();
+  const auto index = [](double at, std::int32_t size) {  // one beyond is as good as any
+    return static_cast<std::int32_t>(std::clamp(std::floor(at), -2.0, size + 1.0));
+  };
+  const VoxelBox around =
+      VoxelBox{{index(low.x, grid.nx), index(low.y, grid.ny), index(low.z, grid.nz)},
+               {index(high.x, grid.nx) + 1, index(high.y, grid.ny) + 1, index(high.z, grid.nz) + 1}}
+          .grown(1)  // the kernels compute with 24 bits
+          .clipped(body_);
+  for (std::int32_t z = around.lo.z; z < around.hi.z; ++z) {
+    for (std::int32_t y = around.lo.y; y < around.hi.y; ++y) {
+      const std::uint8_t* const row = active_.data() + grid.index(0, y, z);
+      if (std::any_of(row + around.lo.x, row + around.hi.x, [](auto cell) { return cell != 0; })) {
+        return true;
+      }
+    }
+  }
+  return false;
+}
+
 CastVolumeJob CastVolume::job(const View& view, std::int32_t width, std::int32_t height,
                               const PixelRect& part) {
   const glm::dmat4 world_from_shell = glm::translate(world_from_voxel_, glm::dvec3(-kShell));
-  blocks_.draw(outer_cells_, glm::scale(world_from_shell, glm::dvec3(kCastCellVox)), view, width,
-               height, part);
+  const glm::dmat4 world_from_cell = glm::scale(world_from_shell, glm::dvec3(kCastCellVox));
+  blocks_.draw(outer_cells_, near_plane_is_inside(view, world_from_cell), world_from_cell, view,
+               width, height, part);
   const glm::dmat4 place_from_eye = glm::affineInverse(view.eye_from_world * world_from_shell);
   const VoxelGrid& grid = bricks_.grid;
   const glm::ivec3 extent(grid.nx, grid.ny, grid.nz);
@@ -137,6 +175,7 @@ CastVolumeJob CastVolume::job(const View& view, std::int32_t width, std::int32_t
   job.cell_plane = cells_.grid().nx * cells_.grid().ny;
   job.by_density = &matter_.materials[0][0].x;
   job.by_label = &matter_.materials[1][0].x;
+  job.settled = settled_;
   job.empty = static_cast<float>(matter_.empty);
   job.full = static_cast<float>(matter_.full);
   job.edge_mm = static_cast<float>(edge_mm());

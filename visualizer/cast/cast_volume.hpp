@@ -59,13 +59,17 @@ class CastVolume {
                                   const PixelRect& part);
 
  private:
+  /// Whether the near plane of `view` may pass an active cell within the picture.
+  [[nodiscard]] bool near_plane_is_inside(const View& view,
+                                          const glm::dmat4& world_from_cell) const;
   /// What cells in a box are, and what that makes of their neighbours.
   void take_cells(const VoxelBox& cells);
 
   BrickGrid bricks_;
   glm::dmat4 world_from_voxel_;
-  CastMatter matter_;  ///< extinction in place of opacity
-  float iso_;          ///< 0..1
+  CastMatter matter_;     ///< extinction in place of opacity
+  float settled_ = 1.0F;  ///< `CastVolumeJob::settled`
+  float iso_;             ///< 0..1
   PairedRows<Density, std::uint32_t> density_;
   std::optional<PairedRows<Label, std::uint16_t>> labels_;
   std::optional<GradientRows> gradient_;  ///< blend only

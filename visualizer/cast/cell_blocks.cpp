@@ -33,9 +33,9 @@ bool is_beside(const CellBlocks::Cell& cell, const std::array<glm::dvec4, 4>& si
 
 }  // namespace
 
-void CellBlocks::draw(std::span<const Cell> cells, const glm::dmat4& world_from_cell,
-                      const View& view, std::int32_t width, std::int32_t height,
-                      const PixelRect& part) {
+void CellBlocks::draw(std::span<const Cell> cells, bool begin_inside,
+                      const glm::dmat4& world_from_cell, const View& view, std::int32_t width,
+                      std::int32_t height, const PixelRect& part) {
   const auto up = [](std::int32_t pixels) { return (pixels + kCastBlock - 1) / kCastBlock; };
   across_ = up(width);
   blocks_.resize(static_cast<std::size_t>(across_) * static_cast<std::size_t>(up(height)));
@@ -68,14 +68,15 @@ void CellBlocks::draw(std::span<const Cell> cells, const glm::dmat4& world_from_
       low = glm::min(low, glm::dvec2(at) / at.z);
       high = glm::max(high, glm::dvec2(at) / at.z);
     }
-    if (farthest_mm < view.near_mm || nearest_mm > view.far_mm) continue;
+    // One beyond the far plane is kept: a ray that ends inside leaves through it.
+    if (farthest_mm < view.near_mm) continue;
     if (nearest_mm < 0.5 * view.near_mm) {  // the eye may be inside: it is anywhere in the picture
       low = glm::dvec2(0.0);
       high = glm::dvec2(width, height);
     }
+    const double begin_mm = begin_inside ? view.near_mm : nearest_mm * (1.0 - kSlack);
     cover(low - kSlack, high + kSlack,
-          {static_cast<float>(nearest_mm * (1.0 - kSlack)),
-           static_cast<float>(farthest_mm * (1.0 + kSlack))});
+          {static_cast<float>(begin_mm), static_cast<float>(farthest_mm * (1.0 + kSlack))});
   }
 }
 

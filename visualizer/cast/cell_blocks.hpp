@@ -19,9 +19,10 @@ class CellBlocks {
   using Cell = std::array<std::uint16_t, 3>;
 
   /// For a part of a picture of `width` x `height` seen through `view`. `cells` are the active ones
-  /// that have a face to an empty one or to the outside.
-  void draw(std::span<const Cell> cells, const glm::dmat4& world_from_cell, const View& view,
-            std::int32_t width, std::int32_t height, const PixelRect& part);
+  /// that have a face to an empty one or to the outside: a ray enters and leaves what is active
+  /// through them. Where rays may `begin_inside`, all begin at the near plane.
+  void draw(std::span<const Cell> cells, bool begin_inside, const glm::dmat4& world_from_cell,
+            const View& view, std::int32_t width, std::int32_t height, const PixelRect& part);
 
   /// `CastVolumeJob::blocks`; those beside the part are left over from other ones.
   [[nodiscard]] const CastBlock* data() const noexcept { return blocks_.data(); }

@@ -2,8 +2,8 @@
 // For the x86 files that define `Simd` only: loads for single lanes.
 //
 // In place of gather instructions: with those a picture took 18 to 30 % longer on Zen 5, where they
-// are microcode. Mended against "Downfall" (CVE-2022-40982), many Intel processors are slow at them
-// too; that was not measured.
+// are microcode. With AVX-512 it takes a fifth less on Sapphire Rapids, so there is a file for
+// both; with AVX2 it does not pay.
 #pragma once
 
 #include <cstddef>

@@ -29,34 +29,43 @@ struct Walk {
   F front_k;
 };
 
-/// Looks around where a lane of `alive` leaves what it knows. Returns the lanes that see something.
+/// Looks around where a lane of `alive` leaves what it knows, and knows nothing else: a piece that
+/// begins in matter shows some. Returns the lanes that see something, or may.
 inline M look_around(const CastVolumeJob& volume, Walk& walk, M alive, F k, const CastJob& job) {
   const M leaving = Simd::but_not(alive, Simd::less(k, walk.exit_k));
   if (!Simd::any(leaving)) return walk.visible;
   const F one = Simd::set(1.0F);
   const F t = k * Simd::set(job.step_mm);
-  const M inside = Simd::less(t, walk.rays.end_mm);
+  const M inside = Simd::both(leaving, Simd::less(t, walk.rays.end_mm));
+  walk.exit_k = Simd::select(Simd::but_not(leaving, inside), Simd::set(kNever), walk.exit_k);
+  walk.visible = Simd::either(Simd::but_not(walk.visible, leaving), inside);
+  const M in_matter =
+      Simd::both(Simd::equal(k, walk.front_k), Simd::less(Simd::set(volume.empty), walk.front));
+  if (!worth_a_look(Simd::but_not(inside, in_matter), alive)) return walk.visible;
   const Surroundings around = surroundings_at(volume, walk.rays, t);
   const F exit_k =
       whole(Simd::min(around.exit_mm, walk.rays.end_mm) * Simd::set(1.0F / job.step_mm));
   // A piece that begins in an empty cell and ends in the next one must be looked at.
-  const M sees = Simd::either(around.visible, Simd::less(exit_k, k + one));
+  const M blind = Simd::but_not(Simd::but_not(inside, around.visible), Simd::less(exit_k, k + one));
   const F known_k = Simd::max(k, Simd::select(around.visible, exit_k, exit_k - one)) + one;
-  walk.exit_k =
-      Simd::select(leaving, Simd::select(inside, known_k, Simd::set(kNever)), walk.exit_k);
-  walk.visible = Simd::either(Simd::but_not(walk.visible, leaving),
-                              Simd::both(Simd::both(leaving, inside), sees));
+  walk.exit_k = Simd::select(inside, known_k, walk.exit_k);
+  walk.visible = Simd::but_not(walk.visible, blind);
   return walk.visible;
 }
 
-/// p on the mean over a piece. The density runs straight between its ends, so the ramp is
-/// integrated exactly: sampled, a border thinner than the step would leave rings (pre-integration:
-/// Engel, Kraus and Ertl 2001).
-inline F presence_between(const CastVolumeJob& volume, F front, F back) {
+/// p on the mean over a piece; 0 in lanes that are not on. The density runs straight between its
+/// ends, so the ramp is integrated exactly: sampled, a border thinner than the step would leave
+/// rings (pre-integration: Engel, Kraus and Ertl 2001).
+inline F presence_between(const CastVolumeJob& volume, F front, F back, M on) {
+  const F one = Simd::set(1.0F);
   const F empty = Simd::set(volume.empty);
+  const F full = Simd::set(volume.full);
+  const M whole = Simd::but_not(on, Simd::less(Simd::min(front, back), full));
+  const F plain = Simd::select(whole, one, Simd::set(0.0F));
+  const M on_ramp = Simd::both(Simd::but_not(on, whole), Simd::less(empty, Simd::max(front, back)));
+  if (!Simd::any(on_ramp)) return plain;
   const F per_ramp = Simd::set(1.0F / (volume.full - volume.empty));
   const F half = Simd::set(0.5F);
-  const F one = Simd::set(1.0F);
   const F x = (front - empty) * per_ramp;
   const F y = (back - empty) * per_ramp;
   const F ramp_x = clamped(x);
@@ -65,7 +74,8 @@ inline F presence_between(const CastVolumeJob& volume, F front, F back) {
       half * (ramp_y * ramp_y - ramp_x * ramp_x) + (positive(y - one) - positive(x - one));
   const F change = y - x;
   const M steep = Simd::less(Simd::set(1e-4F), change * change);
-  return Simd::select(steep, integral / change, half * (ramp_x + ramp_y));
+  return Simd::select(on_ramp, Simd::select(steep, integral / change, half * (ramp_x + ramp_y)),
+                      plain);
 }
 
 /// What is gathered along the rays.
@@ -84,7 +94,7 @@ struct Glow {
 
 /// The matter in the middle of a piece, and its light.
 inline Matter matter_at(const CastJob& job, const CastVolumeJob& volume, Vec3 p, F density,
-                        Vec3 to_eye, M there, M noticeable) {
+                        const Gaze& gaze, M there, M noticeable) {
   const F zero = Simd::set(0.0F);
   const F full = Simd::set(volume.full);
   M plain = there;
@@ -103,7 +113,9 @@ inline Matter matter_at(const CastJob& job, const CastVolumeJob& volume, Vec3 p,
   const F flat = Simd::set(0.02F);
   if (Simd::any(plain)) {
     const M steep = Simd::both(noticeable, Simd::less(flat, size));
-    const M at_border = Simd::both(plain, Simd::either(fading, steep));
+    // What is settled has the material of whatever is denser.
+    const M open = Simd::both(plain, Simd::less(density, Simd::set(volume.settled)));
+    const M at_border = Simd::both(open, Simd::either(fading, steep));
     F deep = density;
     if (Simd::any(at_border)) {
       // A border has the material of what it belongs to, a voxel and a half up the gradient.
@@ -119,9 +131,9 @@ inline Matter matter_at(const CastJob& job, const CastVolumeJob& volume, Vec3 p,
   const M lights = Simd::both(noticeable, Simd::less(zero, x));
   if (!Simd::any(lights)) return {dim, matter.extinction};
   const Vec3 unit = -normalized(transformed_back(volume.from_eye, gradient));
-  const Vec3 normal = select(Simd::less(dot(unit, to_eye), zero), -unit, unit);
+  const Vec3 normal = select(Simd::less(dot(unit, gaze.to_eye), zero), -unit, unit);
   const F surface = x * x * (Simd::set(3.0F) - Simd::set(2.0F) * x);
-  const Vec3 bright = mix(dim, lit(job, matter.rgb, normal, to_eye, Simd::set(1.0F)), surface);
+  const Vec3 bright = mix(dim, lit(job, matter.rgb, normal, gaze, Simd::set(1.0F)), surface);
   return {select(lights, bright, dim), matter.extinction};
 }
 
@@ -131,13 +143,12 @@ struct Piece {
 };
 
 inline void add_piece(const CastJob& job, const CastVolumeJob& volume, Walk& walk, M alive,
-                      const Piece& piece, Vec3 to_eye, Gathered& sum, Glow& glow) {
+                      const Piece& piece, const Gaze& gaze, Gathered& sum, Glow& glow) {
   const F zero = Simd::set(0.0F);
   const M on = Simd::both(alive, walk.visible);
   if (!Simd::any(on)) return;
   const auto [k, from_mm, to_mm] = piece;
-  const M unknown =
-      Simd::both(on, Simd::either(Simd::less(k, walk.front_k), Simd::less(walk.front_k, k)));
+  const M unknown = Simd::but_not(on, Simd::equal(k, walk.front_k));
   if (Simd::any(unknown)) {
     const F density = density_at(volume, walk.rays.origin + from_mm * walk.rays.direction);
     walk.front = Simd::select(unknown, density, walk.front);
@@ -147,25 +158,27 @@ inline void add_piece(const CastJob& job, const CastVolumeJob& volume, Walk& wal
   const F front = walk.front;
   walk.front = Simd::select(on, back, walk.front);
   walk.front_k = Simd::select(on, k + Simd::set(1.0F), walk.front_k);
-  const F presence = Simd::select(on, presence_between(volume, front, back), zero);
+  const F presence = presence_between(volume, front, back, on);
   const M there = Simd::less(zero, presence);
   if (!Simd::any(there)) return;
   const M noticeable = Simd::both(there, Simd::less(Simd::set(kNoticeable), presence * sum.clear));
   const F half = Simd::set(0.5F);
   const Vec3 middle = walk.rays.origin + (half * (from_mm + to_mm)) * walk.rays.direction;
   const Matter matter =
-      matter_at(job, volume, middle, half * (front + back), to_eye, there, noticeable);
+      matter_at(job, volume, middle, half * (front + back), gaze, there, noticeable);
   const F extinction = Simd::select(there, matter.extinction * presence, zero);
   const F per_mm = extinction * Simd::set(1.0F / volume.edge_mm);
   glow = {glow.rgb + per_mm * matter.rgb, glow.per_mm + per_mm};
+  // Two volumes may begin in one piece; later pieces are farther away.
   const M seen = Simd::but_not(there, Simd::less(extinction, Simd::set(kLeastExtinction)));
+  const M first = Simd::both(seen, Simd::less(from_mm, sum.depth_mm));
+  if (!Simd::any(first)) return;
   const F empty = Simd::set(volume.empty);
   const F before =
       Simd::select(Simd::less(front, empty), clamped((empty - front) / (back - front)), zero);
-  // The least: two volumes may begin in one piece.
   sum.depth_mm =
-      Simd::select(seen, Simd::min(sum.depth_mm, mix(from_mm, to_mm, before)), sum.depth_mm);
-  sum.has_depth = Simd::either(sum.has_depth, seen);
+      Simd::select(first, Simd::min(sum.depth_mm, mix(from_mm, to_mm, before)), sum.depth_mm);
+  sum.has_depth = Simd::either(sum.has_depth, first);
 }
 
 inline void put(const CastJob& job, const Packet& packet, const Gathered& sum) {
@@ -183,7 +196,6 @@ inline void blend_packet(const CastJob& job, const Packet& packet) {
   const F never = Simd::set(kNever);
   const F step_mm = Simd::set(job.step_mm);
   const Vec3 eye = eye_directions(job.eye, packet);
-  const Vec3 to_eye = -normalized(eye);
   const F length_per_mm = Simd::sqrt(dot(eye, eye));
   Shown part = shown_of(job.eye, eye);
   if (job.pixels.end_depth != nullptr) {
@@ -214,6 +226,7 @@ inline void blend_packet(const CastJob& job, const Packet& packet) {
   sum.depth_mm = never;
   sum.has_depth = Simd::none();
   M alive = Simd::both(drawn_lanes(packet), Simd::less(k * step_mm, end_mm));
+  const Gaze gaze = Simd::any(alive) ? gaze_along(job, eye) : Gaze{};
   while (Simd::any(alive)) {
     M seeing = Simd::none();
     F soonest = never;
@@ -229,7 +242,7 @@ inline void blend_packet(const CastJob& job, const Packet& packet) {
       const F to_mm = Simd::min((k + one) * step_mm, part.end_mm);
       Glow glow;
       for (int v = 0; v < job.volume_count; ++v) {
-        add_piece(job, job.volumes[v], walks[v], alive, {k, from_mm, to_mm}, to_eye, sum, glow);
+        add_piece(job, job.volumes[v], walks[v], alive, {k, from_mm, to_mm}, gaze, sum, glow);
       }
       if (Simd::any(Simd::less(Simd::set(0.0F), glow.per_mm))) {
         const F extinction = glow.per_mm * (positive(to_mm - from_mm) * length_per_mm);

@@ -96,7 +96,6 @@ inline F refined_mm(const CastVolumeJob& volume, const VolumeRays& rays, F shown
 
 inline void iso_packet(const CastJob& job, const Packet& packet) {
   const Vec3 eye = eye_directions(job.eye, packet);
-  const Vec3 to_eye = -normalized(eye);
   const M drawn = drawn_lanes(packet);
   F nearest_mm = Simd::set(job.eye.far_mm);
   M any_found = Simd::none();
@@ -126,23 +125,24 @@ inline void iso_packet(const CastJob& job, const Packet& packet) {
     put(packet, Simd::set(1.0F), job.pixels.depth);
     return;
   }
+  const Gaze gaze = gaze_along(job, eye);
   Vec3 colour{};
   Vec3 normal{};
   for (int v = 0; v < job.volume_count; ++v) {
     if (!Simd::any(found[v])) continue;
     const CastVolumeJob& volume = job.volumes[v];
-    SurfacePoint at = surface_point(volume, rays[v], nearest_mm, to_eye);
+    SurfacePoint at = surface_point(volume, rays[v], nearest_mm, gaze.to_eye);
     F openness = openness_at(volume, at);
     const M on_face = Simd::both(begins[v], Simd::less(Simd::set(job.eye.near_mm), part.begin_mm));
     if (Simd::any(on_face)) {
       const Vec3 face = -Vec3{Simd::set(job.eye.shown[0]), Simd::set(job.eye.shown[1]),
                               Simd::set(job.eye.shown[2])};
       at.normal = select(on_face, face, at.normal);
-      at.inward = select(on_face, normalized(transformed(volume.from_eye, -face)), at.inward);
+      at.inward = select(on_face, Vec3{}, at.inward);  // no border: it shows what lies in the plane
       openness = Simd::select(on_face, Simd::set(1.0F), openness);
     }
     const Vec3 albedo = material_at(volume, at, found[v]);
-    const Vec3 shown = lit(job, albedo, at.normal, to_eye, openness);
+    const Vec3 shown = lit(job, albedo, at.normal, gaze, openness);
     colour = select(found[v], shown, colour);
     normal = select(found[v], at.normal, normal);
   }

@@ -107,23 +107,33 @@ inline F to_the_24th(F a) {
   return b;
 }
 
+/// Unit vectors of a ray, the same for all that it meets.
+struct Gaze {
+  Vec3 to_eye;
+  Vec3 key_half, fill_half;  ///< half-way to a light: normals that mirror it into the eye
+};
+
+inline Gaze gaze_along(const CastJob& job, Vec3 eye) {
+  const Vec3 to_eye = -normalized(eye);
+  return {to_eye, normalized(vec3(job.key_light) + to_eye),
+          normalized(vec3(job.fill_light) + to_eye)};
+}
+
 /// lighting.frag: two lights of a photographer that go with the eye, and a sky that stays.
-inline Vec3 lit(const CastJob& job, Vec3 albedo, Vec3 normal, Vec3 to_eye, F openness) {
+inline Vec3 lit(const CastJob& job, Vec3 albedo, Vec3 normal, const Gaze& gaze, F openness) {
   const F one = Simd::set(1.0F);
   const F half = Simd::set(0.5F);
-  const Vec3 key_light = vec3(job.key_light);
-  const Vec3 fill_light = vec3(job.fill_light);
   const F skyward = half + half * dot(normal, vec3(job.up));
   const Vec3 ground{Simd::set(0.16F), Simd::set(0.145F), Simd::set(0.13F)};
   const Vec3 sky{Simd::set(0.32F), Simd::set(0.34F), Simd::set(0.37F)};
   const Vec3 ambient = ground + skyward * (sky - ground);
-  const F key = Simd::set(0.72F) *
-                positive((dot(normal, key_light) + Simd::set(0.15F)) * Simd::set(1.0F / 1.15F));
-  const F fill = Simd::set(0.16F) * positive(dot(normal, fill_light));
+  const F key = Simd::set(0.72F) * positive((dot(normal, vec3(job.key_light)) + Simd::set(0.15F)) *
+                                            Simd::set(1.0F / 1.15F));
+  const F fill = Simd::set(0.16F) * positive(dot(normal, vec3(job.fill_light)));
   const Vec3 diffuse = key * Vec3{one, Simd::set(0.97F), Simd::set(0.92F)} +
                        fill * Vec3{Simd::set(0.75F), Simd::set(0.85F), one};
-  const F key_shine = to_the_24th(positive(dot(normal, normalized(key_light + to_eye))));
-  const F fill_shine = to_the_24th(positive(dot(normal, normalized(fill_light + to_eye))));
+  const F key_shine = to_the_24th(positive(dot(normal, gaze.key_half)));
+  const F fill_shine = to_the_24th(positive(dot(normal, gaze.fill_half)));
   const F shine =
       openness * (Simd::set(0.22F) * key_shine * key_shine + Simd::set(0.04F) * fill_shine);
   const F share = Simd::set(0.35F) + openness * Simd::set(0.65F);

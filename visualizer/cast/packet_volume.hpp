@@ -48,8 +48,8 @@ inline F density_in(const CastVolumeJob& volume, const CellPlace& cell) {
     I right{};
     Simd::gather_two<4>(entries, cell.at, left, right);
     const F low = mix(Simd::to_float(left & 0xffff), Simd::to_float(right & 0xffff), cell.share.x);
-    const F high = mix(Simd::to_float(left >> 16 & 0xffff), Simd::to_float(right >> 16 & 0xffff),
-                       cell.share.x);
+    const F high = mix(Simd::to_float(Simd::high_half(left)),
+                       Simd::to_float(Simd::high_half(right)), cell.share.x);
     return mix(low, high, cell.share.y);
   };
   return mix(plane(volume.density), plane(volume.density + volume.plane), cell.share.z) *
@@ -92,15 +92,17 @@ inline Vec3 stored_gradient_at(const CastVolumeJob& volume, Vec3 p) {
     const std::int32_t step = (i & 1) * volume.row + (i >> 1) * volume.gradient_plane;
     Simd::gather_two<4>(volume.gradient + step, cell.at, corner[i][0], corner[i][1]);
   }
-  const auto component = [&](int shift) {
+  const auto component = [&](int shift) {  // of bytes where they lie, times 2^shift
+    const std::int32_t byte = 0xff << shift;
     F row[4];
     for (int i = 0; i < 4; ++i) {
-      row[i] = mix(Simd::to_float(corner[i][0] >> shift & 0xff),
-                   Simd::to_float(corner[i][1] >> shift & 0xff), cell.share.x);
+      row[i] = mix(Simd::to_float(corner[i][0] & byte), Simd::to_float(corner[i][1] & byte),
+                   cell.share.x);
     }
-    const F byte =
+    const F mean =
         mix(mix(row[0], row[1], cell.share.y), mix(row[2], row[3], cell.share.y), cell.share.z);
-    return (byte - Simd::set(128.0F)) * Simd::set(0.5F / 127.0F);
+    const auto unit = static_cast<float>(1 << shift);
+    return (mean - Simd::set(128.0F * unit)) * Simd::set(0.5F / 127.0F / unit);
   };
   return {component(0), component(8), component(16)};
 }

@@ -120,6 +120,7 @@ void Window::on_exposed(GLFWwindow* handle) {
 
 void Window::present(const RenderTarget& target) {
   const PictureSize size = target.size();
+  glBindFramebuffer(GL_DRAW_FRAMEBUFFER, 0);  // Mesa takes a new size over from a bound window only
   glDisable(GL_SCISSOR_TEST);
   glBlitNamedFramebuffer(target.framebuffer(), 0, 0, 0, size.width, size.height, 0, 0, size.width,
                          size.height, GL_COLOR_BUFFER_BIT, GL_NEAREST);

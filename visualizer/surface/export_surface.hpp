@@ -5,7 +5,6 @@
 #include <span>
 
 #include "visualizer/scene_view.hpp"
-#include "visualizer/volume_on_gpu.hpp"
 
 namespace kerf {
 

@@ -133,6 +133,13 @@ Sight::Shown Sight::shown(const BlockBounds& block) const {
   return eye_ && faces_away(*eye_, block) ? Shown::nothing : most;
 }
 
+float Sight::distance_2(VoxelIndex block) const {
+  if (!eye_) return 0.0F;
+  const VoxelIndex start = block_start(block);
+  const glm::vec3 off = glm::vec3(start.x, start.y, start.z) + 0.5F * kBlockEdge - *eye_;
+  return glm::dot(off, off);
+}
+
 void Sight::append_seen(const BlockMesh& mesh, const BlockBounds& bounds, VoxelIndex block,
                         std::vector<BlockTriangle>& seen) const {
   constexpr std::size_t kMostParts = 8;

@@ -32,6 +32,10 @@ class Sight {
   /// only where the box lies within one part.
   [[nodiscard]] Shown shown(const BlockBounds& block) const;
 
+  /// For an order from front to back: squared, from the eye to the middle of the block. Without an
+  /// eye all are as far.
+  [[nodiscard]] float distance_2(VoxelIndex block) const;
+
   /// Appends to `seen` the triangles of the mesh of a block that may touch a part, in their order.
   void append_seen(const BlockMesh& mesh, const BlockBounds& bounds, VoxelIndex block,
                    std::vector<BlockTriangle>& seen) const;

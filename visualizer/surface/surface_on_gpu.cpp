@@ -107,17 +107,27 @@ void SurfaceOnGpu::grow() {
   }
 }
 
+void SurfaceOnGpu::look_from(const VolumeSurface& surface, const Sight& sight) {
+  seen_.clear();
+  for (const std::uint32_t id : filled_) {
+    const Sight::Shown shown = sight.shown(parts_[id].bounds);
+    if (shown == Sight::Shown::nothing) continue;
+    seen_.push_back({sight.distance_2(surface.block(id)), id, shown == Sight::Shown::all});
+  }
+  // What is hidden by then costs no light. The places of blocks never change, nor does their order.
+  std::sort(seen_.begin(), seen_.end());
+}
+
 void SurfaceOnGpu::draw(const VolumeSurface& surface, const Sight& sight) {
+  look_from(surface, sight);
   commands_.clear();
   picked_.clear();
   of_picked_.clear();
-  for (const std::uint32_t id : filled_) {
+  for (const auto& [distance_2, id, all] : seen_) {
     const Part& part = parts_[id];
-    const Sight::Shown shown = sight.shown(part.bounds);
-    if (shown == Sight::Shown::nothing) continue;
     Command command{part.count * kIndices, 1, part.triangles.first * kIndices, part.vertices.first,
                     id};
-    if (shown == Sight::Shown::some) {
+    if (!all) {
       const std::size_t before = picked_.size();
       sight.append_seen(surface.meshes()[id], part.bounds, surface.block(id), picked_);
       if (picked_.size() == before) continue;

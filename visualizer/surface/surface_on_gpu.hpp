@@ -52,6 +52,15 @@ class SurfaceOnGpu {
     std::uint32_t indices, instances, first_index, base_vertex, base_instance;
   };
 
+  /// A block in sight; all of it, or some.
+  struct Seen {
+    float distance_2;
+    std::uint32_t id;
+    bool all;
+    auto operator<=>(const Seen&) const = default;
+  };
+
+  void look_from(const VolumeSurface& surface, const Sight& sight);
   /// Room for all that the pools hold.
   void grow();
   /// And lets the commands of `of_picked_` read from there.
@@ -64,6 +73,7 @@ class SurfaceOnGpu {
   GrowingBuffer vertices_;
   GrowingBuffer triangles_;
   GlBuffer starts_ = GlBuffer::create();  ///< block indices, the instance attribute
+  std::vector<Seen> seen_;                ///< front to back
   std::vector<Command> commands_;
   std::vector<BlockTriangle> picked_;   ///< of blocks that are not drawn whole
   std::vector<std::size_t> of_picked_;  ///< commands that draw them

@@ -25,14 +25,15 @@ std::vector<Sight::Part> drawn_parts(const RenderTarget& target) {
 
 }  // namespace
 
-SurfaceRenderer::SurfaceRenderer(const SceneView& scene, std::span<const VolumeContent> contents) {
+SurfaceRenderer::SurfaceRenderer(const SceneView& scene, std::span<const VolumeContent> contents)
+    : scene_(scene) {
   volumes_.reserve(scene.volumes.size());
   for (std::size_t i = 0; i < scene.volumes.size(); ++i) {
     const VolumeView& view = scene.volumes[i];
     VolumeSurface surface(view, scene.materials, contents[i].density, contents[i].labels,
                           scene.gradient);
     SurfaceOnGpu gpu(surface);
-    volumes_.push_back({view.world_from_voxel, std::move(surface), std::move(gpu)});
+    volumes_.push_back({std::move(surface), std::move(gpu)});
   }
 }
 
@@ -40,10 +41,23 @@ void SurfaceRenderer::update(std::size_t volume, std::span<const Density> densit
                              std::span<const std::uint32_t> changed) {
   Volume& of = volumes_[volume];
   of.gpu.update(of.surface, of.surface.update(density, changed));
+  if (faces_) faces_->update(volume, density, changed);
 }
 
 void SurfaceRenderer::place(std::size_t volume, const glm::dmat4& world_from_voxel) {
-  volumes_[volume].world_from_voxel = world_from_voxel;
+  scene_.volumes[volume].world_from_voxel = world_from_voxel;
+  if (faces_) faces_->place(volume, world_from_voxel);
+}
+
+void SurfaceRenderer::set_cut_open(bool open, std::span<const VolumeContent> contents) {
+  faces_.reset();
+  if (open) faces_.emplace(scene_, contents);
+}
+
+std::vector<VoxelBox> SurfaceRenderer::looks_different(std::size_t volume,
+                                                       std::span<const VoxelBox> differs) const {
+  if (!faces_) return {};
+  return Renderer::looks_different(volume, differs);
 }
 
 void SurfaceRenderer::draw(const View& view, const RenderTarget& target) {
@@ -58,8 +72,9 @@ void SurfaceRenderer::draw(const View& view, const RenderTarget& target) {
   set_view(program_, view);
   program_.use();
   const std::vector<Sight::Part> parts = drawn_parts(target);
-  for (Volume& volume : volumes_) {
-    const glm::dmat4 eye_from_voxel = view.eye_from_world * volume.world_from_voxel;
+  for (std::size_t v = 0; v < volumes_.size(); ++v) {
+    Volume& volume = volumes_[v];
+    const glm::dmat4 eye_from_voxel = view.eye_from_world * scene_.volumes[v].world_from_voxel;
     program_.set("u_eye_from_voxel", glm::mat4(eye_from_voxel));
     program_.set("u_eye_from_voxel_normal",
                  glm::mat3(glm::inverseTranspose(glm::dmat3(eye_from_voxel))));
@@ -69,6 +84,7 @@ void SurfaceRenderer::draw(const View& view, const RenderTarget& target) {
   }
   glDisable(GL_CULL_FACE);
   glDisable(GL_CLIP_DISTANCE0);
+  if (opened && faces_) faces_->draw(view, target);
 }
 
 }  // namespace kerf

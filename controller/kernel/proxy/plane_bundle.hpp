@@ -131,8 +131,10 @@ template <class N>
   return {way};
 }
 
-/// Planes closer than this are one: two places on a smooth curve look like a crease.
-inline constexpr double kFalseCreaseCosine = 0.9659258262890683;  // 15 degrees
+/// Planes closer than this are one face seen from two places: on a bump they would look like a
+/// crease, and in a hollow bowl.hpp knows better how it goes on between them. (With 15 degrees a
+/// slot with a play of 0.1 units lets the tool rest between two places up to 0.05 units apart.)
+inline constexpr double kFalseCreaseCosine = 0.7071067811865476;  // 45 degrees
 
 template <class N>
 [[nodiscard]] constexpr bool has_plane_like(const PlaneBundle<N>& planes,

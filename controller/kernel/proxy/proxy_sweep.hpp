@@ -5,6 +5,7 @@
 #include <concepts>
 #include <cstdint>
 
+#include "controller/kernel/proxy/bowl.hpp"
 #include "controller/kernel/proxy/plane_bundle.hpp"
 #include "controller/kernel/proxy/tool_turn.hpp"
 
@@ -33,10 +34,9 @@ struct SweepRules {
   /// Longest way of any sample between two probes. The middle of the thinnest wall, 2 units, is one
   /// unit deep: beyond it density falls again, and its gradient shows the way through.
   static constexpr double kStep = 0.875;
-  static constexpr double kGain = 0.001;     ///< a step this much nearer to the goal is kept
-  static constexpr double kResidual = 0.8;   ///< share of the way that a step may leave
-  static constexpr double kTelling = 0.02;   ///< a shorter step tells nothing of the curvature
-  static constexpr double kMostEased = 0.5;  ///< share of the way of a step in a deep bowl
+  static constexpr double kGain = 0.001;    ///< a step this much nearer to the goal is kept
+  static constexpr double kResidual = 0.8;  ///< share of the way that a step may leave
+  static constexpr double kEased = 0.5;     ///< share of a step to which a bowl shortens the next
   static constexpr double kShrink = 0.4;
   static constexpr double kShortest = 0.1;  ///< share of a step below which the proxy rather lags
   static constexpr double kPush = 0.5;      ///< longest correction of one push
@@ -82,7 +82,7 @@ struct Swept {
 ///
 /// At most kMaxProbes calls of `probe`. Coordinates within +-kContactLimit.
 ///
-/// Limits: a loose bit of material less than 2.5 units across may slip in between the samples of
+/// Limits: a loose bit of material less than 1.5 units across may slip in between the samples of
 /// the tool. What is wholly inside is not felt until the tool leaves it; from 2 units on it then
 /// may hold the tool. Into a slot without any play the tool may not find its way.
 template <class N, ContactField<N> Field>
@@ -212,16 +212,13 @@ class ProxySweep {
     return known ? here_ : look(pose_.centre);
   }
 
-  /// Share of the way left that the next step takes. Over a bowl of radius R under a load of L the
-  /// way falls by 1 + L/R times the step, since the normal turns with it: a whole step would
-  /// overshoot and the proxy would swing. The last step tells how much (Barzilai and Borwein 1988);
-  /// a flat gives 1, and a bump, where steps fall short, is left at 1 as well.
-  static constexpr Unit eased(Place moved, Place way_before, Place way_now) noexcept {
-    const auto direction = direction_of<N>(moved);
-    const Real length = along<N>(direction, moved);
-    const Real fell = along<N>(direction, way_before - way_now);
-    if (length < Real(SweepRules::kTelling) || fell <= length) return Unit(1);
-    return std::max(share<N>(length, fell), Unit(SweepRules::kMostEased));
+  /// The route from a place whose deepest plane stands first, in a bowl.
+  [[nodiscard]] constexpr Route route(const PlaneBundle<N>& planes, Place way,
+                                      const Bowl<N>& bowl) const noexcept {
+    Route onward = route(planes, way);
+    onward.way = bowl.eased(onward.way, onward.slide.load[0]);
+    onward.length = norm(onward.way);
+    return onward;
   }
 
   /// Moves towards `goal` while steps are found that the solid allows and that bring the tool
@@ -229,7 +226,7 @@ class ProxySweep {
   /// goal, which would stick in creases and cycle in grooves. Returns the slide of the last place.
   constexpr Slide<N> move_to(Place goal) noexcept {
     Unit shrink(1);
-    Unit ease(1);
+    Bowl<N> bowl;
     Route onward = route(held_by_, goal - pose_.centre);
     auto enough = Real(SweepRules::kNoMove);
     while (may_look() && !here_.buried && onward.length >= enough) {
@@ -237,14 +234,13 @@ class ProxySweep {
       auto step = Real(SweepRules::kStep);
       if (here_.count == 0) step = std::max(step, field_.free_distance(from));
       const Unit capped = step < onward.length ? share<N>(step, onward.length) : Unit(1);
-      const Unit part = shrink * std::min(ease, capped);
-      const Place moved = part_of<N>(onward.way, part);
+      const Place moved = part_of<N>(onward.way, shrink * capped);
       const Trial trial = attempt(from + moved, held_by_, moved);
+      bowl.learn(here_, trial.felt, trial.centre - from);
       if (allows(trial.felt)) {
-        const Route next = route(trial.planes, goal - trial.centre);
+        const Route next = route(trial.planes, goal - trial.centre, bowl);
         if (next.length < multiply<Real>(Unit(SweepRules::kResidual), onward.length) ||
             norm(goal - trial.centre) < norm(goal - from) - Real(SweepRules::kGain)) {
-          ease = eased(trial.centre - from, onward.way, next.way);
           pose_.centre = trial.centre;
           here_ = trial.felt;
           held_by_ = trial.planes;
@@ -254,8 +250,10 @@ class ProxySweep {
           continue;
         }
       }
-      if (learn(held_by_, trial.first, moved)) {
-        onward = route(held_by_, goal - from);
+      const bool learned = learn(held_by_, trial.first, moved);
+      const Route again = route(held_by_, goal - from, bowl);
+      if (learned || again.length < multiply<Real>(Unit(SweepRules::kEased), norm(moved))) {
+        onward = again;
       } else {
         shrink = shrink * Unit(SweepRules::kShrink);
         if (shrink < Unit(SweepRules::kShortest)) break;

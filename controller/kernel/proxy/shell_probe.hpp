@@ -10,7 +10,10 @@
 #include "controller/kernel/kernel_set.hpp"
 #include "controller/kernel/proxy/contact_math.hpp"
 #include "controller/kernel/proxy/plane.hpp"
+#include "controller/kernel/proxy/shell_cap.hpp"
+#include "controller/kernel/proxy/shell_patch.hpp"
 #include "controller/kernel/proxy/shell_peak.hpp"
+#include "controller/kernel/proxy/shell_spiral.hpp"
 #include "controller/kernel/proxy/shell_sums.hpp"
 #include "controller/kernel/proxy/shell_table.hpp"
 #include "controller/kernel/proxy/tool_turn.hpp"
@@ -52,12 +55,7 @@ class ShellProbe {
   void turn(const ToolTurn<N>& turn) noexcept {
     rows_ = rows_of(turn);
     for (const ShellVolume<N>& volume : volumes_) {
-      const ShellStep<N> step = step_in(volume.frame);
-      if constexpr (N::kIsFixed) {
-        kernels_.place_shell(shell_.table, step, volume.places);
-      } else {
-        place_shell(shell_.table, step, volume.places);
-      }
+      place(shell_, rows_, volume.frame, volume.places);
     }
   }
 
@@ -101,27 +99,33 @@ class ShellProbe {
     return volume.frame.voxel_from_contact * q + volume.frame.origin_vox;
   }
 
-  [[nodiscard]] ShellStep<N> step_in(const ContactFrame<N>& frame) const noexcept {
+  /// A shell whose axes `rows` takes to those of the world.
+  void place(const Shell<N>& shell, const TurnRows<N>& rows, const ContactFrame<N>& frame,
+             const ShellPlaces<N>& places) const noexcept {
     ShellStep<N> step;
-    step.shift = 15 + shell_.step_bits - 16;  // from levers times rows to Q15.16
+    step.shift = 15 + shell.step_bits - 16;  // from levers times rows to Q15.16
     for (std::size_t i = 0; i < 3; ++i) {
       const auto& m = frame.voxel_from_contact.row[i];
       for (std::size_t j = 0; j < 3; ++j) {
         if constexpr (N::kIsFixed) {
           std::int64_t turned = 0;  // Q24 Q30 = Q54, three terms of 2^54
           for (std::size_t k = 0; k < 3; ++k) {
-            turned += std::int64_t{m[k].raw()} * rows_[k][j].raw();
+            turned += std::int64_t{m[k].raw()} * rows[k][j].raw();
           }
           // Q30 times a reach in Q16: 2^30 2^22.
-          const std::int64_t reached = round_shift(turned, 24) * shell_.reach.raw();
-          step.row[i][j] = static_cast<std::int32_t>(round_shift(reached, 46 - shell_.step_bits));
+          const std::int64_t reached = round_shift(turned, 24) * shell.reach.raw();
+          step.row[i][j] = static_cast<std::int32_t>(round_shift(reached, 46 - shell.step_bits));
         } else {
           step.row[i][j] =
-              shell_.reach * (m[0] * rows_[0][j] + m[1] * rows_[1][j] + m[2] * rows_[2][j]);
+              shell.reach * (m[0] * rows[0][j] + m[1] * rows[1][j] + m[2] * rows[2][j]);
         }
       }
     }
-    return step;
+    if constexpr (N::kIsFixed) {
+      kernels_.place_shell(shell.table, step, places);
+    } else {
+      place_shell(shell.table, step, places);
+    }
   }
 
   /// Adds this volume's plane in the order of depths.
@@ -132,11 +136,16 @@ class ShellProbe {
     const VoxelGrid& grid = volume.field.grid;
     if (!near(at.x, grid.nx) || !near(at.y, grid.ny) || !near(at.z, grid.nz)) return;
 
-    const ShellSums<N> sums = sums_at(volume, at);
+    const ShellSums<N> sums = sums_at(volume.field, shell_.table, volume.places, at);
     if (sums.weight <= typename N::Sum(0)) return;
-    const Plane<N> plane =
-        plane_of<N>(shell_means<N>(sums, volume.field.scale, volume.frame, rows_), shell_.reach,
-                    shell_.table.round);
+    const bool round = shell_.table.round;
+    const auto means = shell_means<N>(sums, volume.field.scale, volume.frame, rows_, round);
+    Plane<N> plane = plane_of<N>(means, shell_.reach, round);
+    if (round && plane.depth < Real(kCapBelow) && -plane.depth < Real(kCapAbove)) {
+      plane.depth = depth_around(volume, at, sums, means, plane);
+    } else if (!round && std::max(plane.depth, -plane.depth) < Real(kPatchDepth)) {
+      plane.normal = normal_around(volume, at, sums, plane);
+    }
     // Almost the whole surface is in the solid, or it feels the same all round.
     const ContactVec<typename N::Unit> none{};
     if (sums.solid >= shell_.table.count - shell_.table.count / 16 || plane.normal == none) {
@@ -156,16 +165,55 @@ class ShellProbe {
     felt.plane[slot] = plane;
   }
 
-  [[nodiscard]] ShellSums<N> sums_at(const ShellVolume<N>& volume,
+  /// The normal with the gradients of a patch around the middle of the contact, too.
+  [[nodiscard]] ContactVec<typename N::Unit> normal_around(const ShellVolume<N>& volume,
+                                                           VoxelVec<Real> at, ShellSums<N> sums,
+                                                           const Plane<N>& plane) const noexcept {
+    constexpr Shell<N> kPatch{kPatchArrays<N>.table(), Real(kPatchRadius), 15};
+    SpiralPlaces<N, kPatchSamples> memory;
+    const ShellPlaces<N> places = memory.places();
+    place(kPatch, flattened<N>(plane.normal), volume.frame, places);
+    const VoxelVec<Real> middle = at + volume.frame.voxel_from_contact * plane.arm;
+    const ShellSums<N> patch = sums_at(volume.field, kPatch.table, places, middle);
+    if (patch.weight <= typename N::Sum(0)) return plane.normal;
+    sums.weight += patch.weight;
+    for (std::size_t axis = 0; axis < 3; ++axis) sums.rise[axis] += patch.rise[axis];
+    return direction<N>(-mean_rise<N>(sums, volume.field.scale, volume.frame));
+  }
+
+  /// A ball's depth with the height of a cap around the middle of the contact, where it is sharp.
+  [[nodiscard]] Real depth_around(const ShellVolume<N>& volume, VoxelVec<Real> at,
+                                  const ShellSums<N>& sums, const ShellMeans<N>& means,
+                                  const Plane<N>& plane) const noexcept {
+    using Ratio = typename N::Ratio;
+    const Ratio height = peak_height(means, true), slope = slope_along(means, plane.normal, true);
+    const auto sharp = sharpness(sums, shell_.table.count, height, slope, shell_.reach);
+    const auto out = direction<N>(means.lever);
+    if (sharp <= typename N::Unit(0) || out == decltype(out){}) return plane.depth;
+    const Real half = multiply<Real>(shell_.reach, typename N::Unit(0.5));
+    const Shell<N> cap{kCapArrays<N>.table(), std::min(Real(kCapRadius), half), 14};
+    SpiralPlaces<N, kCapSamples> memory;
+    const ShellPlaces<N> places = memory.places();
+    place(cap, cap_rows<N>(out, cap.reach, shell_.reach), volume.frame, places);
+    const VoxelVec<Real> top = at + volume.frame.voxel_from_contact * times<N>(out, shell_.reach);
+    const ShellSums<N> near = sums_at(volume.field, cap.table, places, top);
+    if (near.weight <= typename N::Sum(0)) return plane.depth;
+    const Ratio summit =
+        peak_height(shell_means<N>(near, volume.field.scale, volume.frame, rows_, false), false);
+    return depth_of<N>(height + multiply<Ratio>(sharp, summit - height), slope);
+  }
+
+  [[nodiscard]] ShellSums<N> sums_at(const ShellField& field, const ShellTable<N>& table,
+                                     const ShellPlaces<N>& places,
                                      VoxelVec<Real> at) const noexcept {
     if constexpr (N::kIsFixed) {
       const std::int32_t centre[3] = {at.x.raw(), at.y.raw(), at.z.raw()};
       ShellSums<N> sums;
-      kernels_.sum_shell(shell_.table, volume.places, centre, volume.field, sums);
+      kernels_.sum_shell(table, places, centre, field, sums);
       return sums;
     } else {
       const Real centre[3] = {at.x, at.y, at.z};
-      return shell_sums<N>(shell_.table, volume.places, centre, volume.field);
+      return shell_sums<N>(table, places, centre, field);
     }
   }
 

@@ -99,33 +99,37 @@ template <class N>
   return sample;
 }
 
-/// Adds one sample. Fixed: r^2 in Q16, r^3 and w in Q24, each product of 32 unsigned bits.
+/// Adds one sample. Fixed: r^2 in Q16, r^3 and the weights in Q24, each product of 32 unsigned
+/// bits.
 template <class N>
 constexpr void add_sample(ShellSums<N>& sums, const ShellSample<N>& sample,
                           const ShellNumber<N> (&lever)[3], bool round) noexcept {
   using Sum = typename N::Sum;
   const ShellNumber<N> r = sample.density;
   if (r < kFaintest<N>) return;
-  Sum square{}, weight{}, pull{};  // r^2, w, v
+  Sum square{}, weight{}, pull{}, lift{};  // r^2, w, v, u
   if constexpr (N::kIsFixed) {
     const auto density = static_cast<std::uint32_t>(r);
     const std::uint32_t r2 = (density * density + (1 << 13)) >> 14;
+    const std::uint32_t r3 = (r2 >> 1) * density >> 6;
     const std::uint32_t r4 = (r2 * r2 + (1 << 15)) >> 16;
     square = r2;
     weight = round ? r2 * r2 >> 8 : r4 * r2 >> 8;
-    pull = round ? 3 * weight - ((r2 >> 1) * density >> 6) : weight;
+    pull = round ? 3 * weight - r3 : weight;
+    lift = round ? (r3 >> 8) * r2 >> 8 : weight;
     sums.solid += r >> 14;
   } else {
     square = r * r;
     weight = round ? square * square : square * square * square;
     pull = round ? Sum(3) * weight - square * r : weight;
+    lift = round ? weight * r : weight;
     sums.solid += r >= ShellNumber<N>(0.5) ? 1 : 0;
   }
   sums.weight += weight;
   sums.density += weight * r;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     sums.rise[axis] += pull * sample.gradient[axis];
-    sums.lever[axis] += weight * lever[axis];
+    sums.lever[axis] += lift * lever[axis];
   }
   sums.top = sums.top < r ? r : sums.top;
   if (!round) sums.square += weight * square;

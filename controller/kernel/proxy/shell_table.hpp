@@ -84,16 +84,18 @@ struct ShellField {
 
 /// Sums over the samples, r the density of contact, w = r^p, p = 4 for balls and 6 for the rest.
 /// v = w, but 3 w - w / r for balls: half the derivative of their peak (shell_peak.hpp) where it is
-/// at the iso, but for SUM w. In fixed r is Q15, w and v are Q24, gradients are in the volume's
-/// densities over 2, levers in Q0.15. Exact, so that no order and no instruction set matters:
-/// |sum| < 2^53.
+/// at the iso, but for SUM w. Levers are weighted with u = w, but w r for balls: where density
+/// begins trilinear reads are raised, and over a normal near an axis of the voxels, whose layers
+/// cross the contact in bands, that would tilt a ball's normal. In fixed r is Q15, the weights are
+/// Q24, gradients are in the volume's densities over 2, levers in Q0.15. Exact, so that no order
+/// and no instruction set matters: |sum| < 2^53.
 template <class N>
 struct ShellSums {
   typename N::Sum weight{};       ///< SUM w
   typename N::Sum density{};      ///< SUM w r
   typename N::Sum square{};       ///< SUM w r^2, r^2 in Q16; 0 for balls
   typename N::Sum rise[3] = {};   ///< SUM v grad, voxel axes
-  typename N::Sum lever[3] = {};  ///< SUM w lever
+  typename N::Sum lever[3] = {};  ///< SUM u lever
   ShellNumber<N> top{};           ///< the largest r
   std::int32_t solid = 0;         ///< samples in the solid, r >= 1/2
 };

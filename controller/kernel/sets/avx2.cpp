@@ -32,6 +32,7 @@ struct Simd {
             : "x"(a), "x"(b));
   }
   static V multiply_even(V a, V b) noexcept { return _mm256_mul_epi32(a, b); }
+  static V multiply_even_unsigned(V a, V b) noexcept { return _mm256_mul_epu32(a, b); }
   static V odd32(V a) noexcept { return _mm256_srli_epi64(a, 32); }
   static V multiply32(V a, V b) noexcept { return _mm256_mullo_epi32(a, b); }
   static V multiply_high(V a, V b) noexcept { return _mm256_mulhi_epu16(a, b); }
@@ -42,6 +43,11 @@ struct Simd {
   static V add32(V a, V b) noexcept { return _mm256_add_epi32(a, b); }
   static V sub32(V a, V b) noexcept { return _mm256_sub_epi32(a, b); }
   static V add64(V a, V b) noexcept { return _mm256_add_epi64(a, b); }
+  static V sub64(V a, V b) noexcept { return _mm256_sub_epi64(a, b); }
+  /// Of entries below 2^63.
+  static V min64(V a, V b) noexcept { return _mm256_blendv_epi8(a, b, _mm256_cmpgt_epi64(a, b)); }
+  static V srl64(V a, V n) noexcept { return _mm256_srlv_epi64(a, n); }
+  static bool negative64(V a) noexcept { return _mm256_movemask_pd(_mm256_castsi256_pd(a)) != 0; }
   static V times512(V a) noexcept { return _mm256_slli_epi64(a, 9); }
   static V shift_left16(V a, int n) noexcept { return _mm256_sll_epi16(a, _mm_cvtsi32_si128(n)); }
   static V shift_right16(V a, int n) noexcept { return _mm256_srl_epi16(a, _mm_cvtsi32_si128(n)); }
@@ -68,6 +74,8 @@ struct Simd {
   }
   /// a0 b0 + a1 b1 in each 32 bits, signed halves.
   static V multiply_pairs(V a, V b) noexcept { return _mm256_madd_epi16(a, b); }
+  /// Low halves of 64 bits become the high ones.
+  static V even32(V a) noexcept { return _mm256_slli_epi64(a, 32); }
   static V low32(V a) noexcept { return _mm256_blend_epi32(a, zero(), 0xaa); }
   static bool any(V a) noexcept { return _mm256_testz_si256(a, a) == 0; }
   /// (a b + 2^14) / 2^15 in each 16 bits.
@@ -75,6 +83,21 @@ struct Simd {
   /// The densities index and index + 1 of each 32-bit index.
   static V gather_pairs(const std::uint16_t* density, V index) noexcept {
     return _mm256_i32gather_epi32(reinterpret_cast<const int*>(density), index, 2);
+  }
+
+  static V gather32(const std::uint32_t* table, V index) noexcept {
+    return _mm256_i32gather_epi32(reinterpret_cast<const int*>(table), index, 4);
+  }
+  /// 0, 1, 2 .. in 32 bits each.
+  static V count32() noexcept { return _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7); }
+  /// 16-bit entries as 32 bits each, without sign, and back.
+  static V widen16(const void* p) noexcept { return _mm256_cvtepu16_epi32(load4(p)); }
+  static V widen8(const std::uint8_t* p) noexcept {
+    return _mm256_cvtepu8_epi32(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(p)));
+  }
+  static void narrow16(std::uint16_t* p, V a) noexcept {
+    const V low = _mm256_permute4x64_epi64(_mm256_packus_epi32(a, a), 0x08);
+    store4(p, _mm256_castsi256_si128(low));
   }
 
   static V bit_and(V a, V b) noexcept { return _mm256_and_si256(a, b); }
@@ -91,6 +114,10 @@ struct Simd {
   }
   static V zero_where_equal(V kept, V a, V b) noexcept {
     return _mm256_andnot_si256(_mm256_cmpeq_epi16(a, b), kept);
+  }
+  static std::uint32_t not_zero32(V a) noexcept {
+    const V empty = _mm256_cmpeq_epi32(a, zero());
+    return ~static_cast<std::uint32_t>(_mm256_movemask_ps(_mm256_castsi256_ps(empty))) & 0xff;
   }
   static std::uint32_t not_zero16(V a) noexcept {
     const V empty = _mm256_cmpeq_epi16(a, zero());
@@ -163,24 +190,17 @@ struct Simd {
 }  // namespace kerf
 
 #include "controller/kernel/sets/correlate_vector.hpp"
+#include "controller/kernel/sets/cover_lanes_vector.hpp"
+#include "controller/kernel/sets/cover_loops.hpp"
 #include "controller/kernel/sets/gather_vector.hpp"
 #include "controller/kernel/sets/shell_vector.hpp"
 #include "controller/kernel/sets/splat_loops.hpp"
 
 namespace kerf {
 
-const KernelSet kAvx2Set{"avx2",
-                         Simd::kLanes,
-                         false,
-                         copy_box,
-                         correlate,
-                         press,
-                         cut,
-                         gather,
-                         place,
-                         splat,
-                         press_sums,
-                         place_shell_samples,
-                         sum_shell_samples};
+const KernelSet kAvx2Set{
+    "avx2",     Simd::kLanes, false,       copy_box,   correlate,           press,
+    cut,        gather,       place,       splat,      press_sums,          cover,
+    cover_sums, weigh_row,    weigh_again, take_steps, place_shell_samples, sum_shell_samples};
 
 }  // namespace kerf

@@ -24,6 +24,7 @@ struct Simd {
     __asm__("vpdpwssd %2, %1, %0" : "+v"(sum) : "v"(a), "v"(b));
   }
   static V multiply_even(V a, V b) noexcept { return _mm512_mul_epi32(a, b); }
+  static V multiply_even_unsigned(V a, V b) noexcept { return _mm512_mul_epu32(a, b); }
   static V odd32(V a) noexcept { return _mm512_srli_epi64(a, 32); }
   static V multiply32(V a, V b) noexcept { return _mm512_mullo_epi32(a, b); }
   static V multiply_high(V a, V b) noexcept { return _mm512_mulhi_epu16(a, b); }
@@ -34,6 +35,11 @@ struct Simd {
   static V add32(V a, V b) noexcept { return _mm512_add_epi32(a, b); }
   static V sub32(V a, V b) noexcept { return _mm512_sub_epi32(a, b); }
   static V add64(V a, V b) noexcept { return _mm512_add_epi64(a, b); }
+  static V sub64(V a, V b) noexcept { return _mm512_sub_epi64(a, b); }
+  /// Of entries below 2^63.
+  static V min64(V a, V b) noexcept { return _mm512_min_epu64(a, b); }
+  static V srl64(V a, V n) noexcept { return _mm512_srlv_epi64(a, n); }
+  static bool negative64(V a) noexcept { return _mm512_movepi64_mask(a) != 0; }
   static V times512(V a) noexcept { return _mm512_slli_epi64(a, 9); }
   static V shift_left16(V a, int n) noexcept { return _mm512_sll_epi16(a, _mm_cvtsi32_si128(n)); }
   static V shift_right16(V a, int n) noexcept { return _mm512_srl_epi16(a, _mm_cvtsi32_si128(n)); }
@@ -60,6 +66,8 @@ struct Simd {
   }
   /// a0 b0 + a1 b1 in each 32 bits, signed halves.
   static V multiply_pairs(V a, V b) noexcept { return _mm512_madd_epi16(a, b); }
+  /// Low halves of 64 bits become the high ones.
+  static V even32(V a) noexcept { return _mm512_slli_epi64(a, 32); }
   static V low32(V a) noexcept { return _mm512_maskz_mov_epi32(0x5555, a); }
   static bool any(V a) noexcept { return _mm512_test_epi32_mask(a, a) != 0; }
   /// (a b + 2^14) / 2^15 in each 16 bits.
@@ -67,6 +75,24 @@ struct Simd {
   /// The densities index and index + 1 of each 32-bit index.
   static V gather_pairs(const std::uint16_t* density, V index) noexcept {
     return _mm512_i32gather_epi32(index, density, 2);
+  }
+
+  static V gather32(const std::uint32_t* table, V index) noexcept {
+    return _mm512_i32gather_epi32(index, table, 4);
+  }
+  /// 0, 1, 2 .. in 32 bits each.
+  static V count32() noexcept {
+    return _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+  }
+  /// 16-bit entries as 32 bits each, without sign, and back.
+  static V widen16(const void* p) noexcept {
+    return _mm512_cvtepu16_epi32(_mm256_loadu_si256(static_cast<const __m256i*>(p)));
+  }
+  static V widen8(const std::uint8_t* p) noexcept {
+    return _mm512_cvtepu8_epi32(_mm_loadu_si128(reinterpret_cast<const __m128i*>(p)));
+  }
+  static void narrow16(std::uint16_t* p, V a) noexcept {
+    _mm256_storeu_si256(reinterpret_cast<__m256i*>(p), _mm512_cvtepi32_epi16(a));
   }
 
   static V bit_and(V a, V b) noexcept { return _mm512_and_si512(a, b); }
@@ -81,6 +107,7 @@ struct Simd {
   static V zero_where_equal(V kept, V a, V b) noexcept {
     return _mm512_maskz_mov_epi16(_mm512_cmpneq_epi16_mask(a, b), kept);
   }
+  static std::uint32_t not_zero32(V a) noexcept { return _mm512_test_epi32_mask(a, a); }
   static std::uint32_t not_zero16(V a) noexcept { return _mm512_test_epi16_mask(a, a); }
   /// `high` plus the carry out of `part` + something = `sum`.
   static V add_carry(V high, V sum, V part) noexcept {
@@ -140,24 +167,17 @@ struct Simd {
 }  // namespace kerf
 
 #include "controller/kernel/sets/correlate_vector.hpp"
+#include "controller/kernel/sets/cover_lanes_vector.hpp"
+#include "controller/kernel/sets/cover_loops.hpp"
 #include "controller/kernel/sets/gather_vector.hpp"
 #include "controller/kernel/sets/shell_vector.hpp"
 #include "controller/kernel/sets/splat_loops.hpp"
 
 namespace kerf {
 
-const KernelSet kAvx512Set{"avx512",
-                           Simd::kLanes,
-                           true,
-                           copy_box,
-                           correlate,
-                           press,
-                           cut,
-                           gather,
-                           place,
-                           splat,
-                           press_sums,
-                           place_shell_samples,
-                           sum_shell_samples};
+const KernelSet kAvx512Set{
+    "avx512",   Simd::kLanes, true,        copy_box,   correlate,           press,
+    cut,        gather,       place,       splat,      press_sums,          cover,
+    cover_sums, weigh_row,    weigh_again, take_steps, place_shell_samples, sum_shell_samples};
 
 }  // namespace kerf

@@ -168,6 +168,26 @@ void correlate(const AlignedTable& tool, const std::int16_t* box,
   for (int axis = 0; axis < 3; ++axis) sum[axis] = total[axis].over(tool.sum_shift);
 }
 
+[[gnu::always_inline]] inline void cover_rows(AlignedTable tool, std::int32_t row_lanes,
+                                              const std::int32_t (&weights)[8],
+                                              BoxScratch scratch) noexcept {
+  V weight[8];
+  for (int c = 0; c < 8; ++c) weight[c] = Simd::set16(weights[c]);
+  std::int32_t first = 0, last = -1;
+  for (std::int32_t z = 0; z <= tool.size.z; ++z) {
+    overlap_plane(tool, row_lanes, weight, scratch, z, first, last);
+  }
+}
+
+void cover(const AlignedTable& tool, const std::int32_t (&weights)[8],
+           const BoxScratch& scratch) noexcept {
+  if (tool.row_lanes == 32) {
+    cover_rows(tool, 32, weights, scratch);
+  } else {
+    cover_rows(tool, tool.row_lanes, weights, scratch);
+  }
+}
+
 void press(const AlignedTable& tool, const std::int32_t (&weights)[8], const BoxScratch& scratch,
            std::int64_t (&sum)[3]) noexcept {
   if (tool.row_lanes == 32) {  // tools up to 27 voxels: no loop within a row

@@ -96,24 +96,17 @@ struct Simd {
 }  // namespace kerf
 
 #include "controller/kernel/sets/correlate_vector.hpp"
+#include "controller/kernel/sets/cover_lanes.hpp"
+#include "controller/kernel/sets/cover_loops.hpp"
 #include "controller/kernel/sets/gather_loops.hpp"
 #include "controller/kernel/sets/shell_loops.hpp"
 #include "controller/kernel/sets/splat_loops.hpp"
 
 namespace kerf {
 
-const KernelSet kNeonSet{"neon",
-                         Simd::kLanes,
-                         false,
-                         copy_box,
-                         correlate,
-                         press,
-                         cut,
-                         gather,
-                         place,
-                         splat,
-                         press_sums,
-                         place_shell_samples,
-                         sum_shell_samples};
+const KernelSet kNeonSet{
+    "neon",     Simd::kLanes, false,       copy_box,   correlate,           press,
+    cut,        gather,       place,       splat,      press_sums,          cover,
+    cover_sums, weigh_row,    weigh_again, take_steps, place_shell_samples, sum_shell_samples};
 
 }  // namespace kerf

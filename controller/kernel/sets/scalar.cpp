@@ -149,6 +149,20 @@ void press(const AlignedTable& tool, const std::int32_t (&weight)[8], const BoxS
   for (int axis = 0; axis < 3; ++axis) sum[axis] = total[axis].over(tool.sum_shift);
 }
 
+void cover(const AlignedTable& tool, const std::int32_t (&weight)[8],
+           const BoxScratch& scratch) noexcept {
+  std::int16_t* ratio = scratch.ratio + kRatioRowPad;
+  std::uint8_t* live = scratch.live;
+  for (std::int32_t z = 0; z <= tool.size.z; ++z) {
+    for (std::int32_t y = 0; y <= tool.size.y; ++y, ratio += tool.row_lanes + kRatioRowPad) {
+      const std::int16_t* density =
+          scratch.box + (static_cast<std::ptrdiff_t>(z + 2) * tool.box.y + y + 2) * tool.box.x;
+      *live++ = overlap_row(tool, weight, y, z, density, ratio) ? 1 : 0;
+      for (std::int32_t x = 0; x < kRatioRowPad; ++x) ratio[tool.row_lanes + x] = 0;
+    }
+  }
+}
+
 BoxCut cut(const TickBox& tool, const CutRate& rate, const VoxelGrid& grid, Density* density,
            VoxelIndex origin, const BoxScratch& scratch, std::uint16_t* carry) noexcept {
   BoxCut cut{0, {tool.box.x, tool.box.y, tool.box.z}, {-1, -1, -1}};
@@ -186,24 +200,17 @@ BoxCut cut(const TickBox& tool, const CutRate& rate, const VoxelGrid& grid, Dens
 }  // namespace
 }  // namespace kerf
 
+#include "controller/kernel/sets/cover_lanes.hpp"
+#include "controller/kernel/sets/cover_loops.hpp"
 #include "controller/kernel/sets/gather_loops.hpp"
 #include "controller/kernel/sets/shell_loops.hpp"
 #include "controller/kernel/sets/splat_loops.hpp"
 
 namespace kerf {
 
-const KernelSet kScalarSet{"scalar",
-                           kLanes,
-                           false,
-                           copy_box,
-                           correlate,
-                           press,
-                           cut,
-                           gather,
-                           place,
-                           splat,
-                           press_sums,
-                           place_shell_samples,
-                           sum_shell_samples};
+const KernelSet kScalarSet{
+    "scalar",   kLanes,    false,       copy_box,   correlate,           press,
+    cut,        gather,    place,       splat,      press_sums,          cover,
+    cover_sums, weigh_row, weigh_again, take_steps, place_shell_samples, sum_shell_samples};
 
 }  // namespace kerf

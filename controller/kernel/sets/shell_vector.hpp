@@ -116,8 +116,14 @@ template <bool kRound, bool kInside>
   sums.weight = Simd::add64(sums.weight, weights.odd);
   weights.add(sums.density, r);
   if constexpr (!kRound) weights.add(sums.square, r2);
+  V r3 = Simd::zero(), lift = w;
+  if constexpr (kRound) {
+    r3 = Simd::srl32<6>(Simd::multiply_pairs(Simd::srl32<1>(r2), r));
+    lift = Simd::srl32<8>(Simd::multiply32(Simd::srl32<8>(r3), r2));
+  }
+  const ShellWeights lifts(lift);
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    weights.add(sums.lever[axis], Simd::load(table.lever[axis] + first));
+    lifts.add(sums.lever[axis], Simd::load(table.lever[axis] + first));
   }
   sums.top = Simd::max32(sums.top, r);
   sums.solid = Simd::add32(sums.solid, Simd::srl32<14>(r));
@@ -125,10 +131,7 @@ template <bool kRound, bool kInside>
   // Only where the density is not clipped it has a gradient.
   const V open = Simd::sra32<31>(Simd::sub32(scaled, Simd::set32(32768)));
   V v = w;
-  if constexpr (kRound) {
-    const V r3 = Simd::srl32<6>(Simd::multiply_pairs(Simd::srl32<1>(r2), r));
-    v = Simd::sub32(Simd::add32(Simd::add32(w, w), w), r3);
-  }
+  if constexpr (kRound) v = Simd::sub32(Simd::add32(Simd::add32(w, w), w), r3);
   v = Simd::bit_and(v, open);
   if (!Simd::any(v)) return;
   const V near_y = blend16(c00, c01, cell.z), far_y = blend16(c10, c11, cell.z);

@@ -79,6 +79,20 @@ void splat(const SampleTable& samples, const TickBox& box, VoxelIndex origin,
   }
 }
 
+/// The overlap ratio of a sum of weights, 0 where there is no density.
+template <bool kUnit>
+[[gnu::always_inline]] inline std::int32_t covered_part(std::int32_t sum, std::int16_t density,
+                                                        std::int32_t volume_ratio) noexcept {
+  constexpr std::int32_t kOne = 1 << 15;
+  std::int32_t covered = sum;
+  if constexpr (!kUnit) {
+    const std::int64_t scaled = (std::int64_t{covered} * volume_ratio + (1 << 19)) >> 20;
+    covered = static_cast<std::int32_t>(scaled < kOne ? scaled : kOne);
+  }
+  covered = covered < kOne ? covered : kOne;
+  return density == INT16_MIN ? 0 : covered;
+}
+
 /// What one row of sums is split into: minus the overlap ratio where there is density, and minus
 /// what contact feels beyond that, 15 bits at a time. Bit 0 says that ratios are left, 1 and 2 that
 /// the rest is.
@@ -92,13 +106,7 @@ template <bool kUnit>
   constexpr std::int32_t kOne = 1 << 15;
   std::int32_t any = 0, any_low = 0, any_high = 0;
   for (std::int32_t x = 0; x < row_lanes; ++x) {
-    std::int32_t covered = sums[x];
-    if constexpr (!kUnit) {
-      const std::int64_t scaled = (std::int64_t{covered} * volume_ratio + (1 << 19)) >> 20;
-      covered = static_cast<std::int32_t>(scaled < kOne ? scaled : kOne);
-    }
-    covered = covered < kOne ? covered : kOne;
-    covered = density[x] == INT16_MIN ? 0 : covered;
+    const std::int32_t covered = covered_part<kUnit>(sums[x], density[x], volume_ratio);
     const std::int32_t rest = kUnit ? sums[x] - covered : sums[x];
     const std::int32_t rest_low = rest & (kOne - 1), rest_high = rest >> 15;
     any |= covered;
@@ -177,6 +185,39 @@ void press_sums(const TickBox& box, std::int32_t volume_ratio, const SplatScratc
     press_sums_by<true>(box, volume_ratio, scratch, contact, modification);
   } else {
     press_sums_by<false>(box, volume_ratio, scratch, contact, modification);
+  }
+}
+
+template <bool kUnit>
+[[gnu::always_inline]] inline void cover_sums_by(const TickBox& box, std::int32_t volume_ratio,
+                                                 const SplatScratch& scratch) noexcept {
+  std::int16_t* ratio = scratch.tick.ratio + kRatioRowPad;
+  const std::int32_t* sums = scratch.sums;
+  std::uint8_t* live = scratch.tick.live;
+  for (std::int32_t z = 0; z <= box.size.z; ++z) {
+    for (std::int32_t y = 0; y <= box.size.y; ++y) {
+      const std::int16_t* density =
+          scratch.tick.box + (std::ptrdiff_t{z + 2} * box.box.y + y + 2) * box.box.x;
+      std::int32_t any = 0;
+      for (std::int32_t x = 0; x < box.row_lanes; ++x) {
+        const std::int32_t covered = covered_part<kUnit>(sums[x], density[x], volume_ratio);
+        any |= covered;
+        ratio[x] = static_cast<std::int16_t>(-covered);
+      }
+      for (std::int32_t x = 0; x < kRatioRowPad; ++x) ratio[box.row_lanes + x] = 0;
+      *live++ = any != 0 ? 1 : 0;
+      ratio += box.row_lanes + kRatioRowPad;
+      sums += box.row_lanes;
+    }
+  }
+}
+
+void cover_sums(const TickBox& box, std::int32_t volume_ratio,
+                const SplatScratch& scratch) noexcept {
+  if (volume_ratio == 1 << 20) {
+    cover_sums_by<true>(box, volume_ratio, scratch);
+  } else {
+    cover_sums_by<false>(box, volume_ratio, scratch);
   }
 }
 

@@ -13,13 +13,17 @@ constexpr std::uint8_t kClearFeature = 0x01;  // value 0: ENDPOINT_HALT
 }  // namespace
 
 void FalconPlug::catch_up(UsbHost& host) {
-  chip_.catch_up([&] { return present_ && !halted_ && host.room(); },
+  chip_.catch_up([&] { return present_ && halt_ == Halt::none && host.room(); },
                  [&](std::span<const std::uint8_t> packet) {
                    const std::size_t room = *host.room();
                    const auto part = packet.first(std::min(packet.size(), room));
                    host.complete_read(packet.size() <= room ? 0 : -EOVERFLOW, part);
                  });
   script_.run(chip_.time().cycle(), [&](UsbFault fault) { strike(fault, host); });
+  if (halt_ == Halt::untold && present_ && host.room()) {
+    halt_ = Halt::told;
+    host.complete_read(-EPIPE, {});
+  }
 }
 
 std::optional<std::vector<std::uint8_t>> FalconPlug::control(const UsbSetup& setup) {
@@ -30,15 +34,14 @@ std::optional<std::vector<std::uint8_t>> FalconPlug::control(const UsbSetup& set
 }
 
 bool FalconPlug::clear_halt(unsigned endpoint) noexcept {
-  if (endpoint == falcon::kEndpointIn) halted_ = false;
+  if (endpoint == falcon::kEndpointIn) halt_ = Halt::none;
   return endpoint == falcon::kEndpointIn || endpoint == falcon::kEndpointOut;
 }
 
 void FalconPlug::strike(UsbFault fault, UsbHost& host) {
   switch (fault) {
     case UsbFault::stall:
-      if (present_ && !halted_ && host.room()) host.complete_read(-EPIPE, {});
-      halted_ = true;
+      if (halt_ == Halt::none) halt_ = Halt::untold;
       return;
     case UsbFault::split:
       return chip_.slow_down(kUsbFaultFrames);

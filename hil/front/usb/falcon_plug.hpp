@@ -48,12 +48,14 @@ class FalconPlug {
   [[nodiscard]] const FtdiFalcon& chip() const noexcept { return chip_; }
 
  private:
+  /// Of the endpoint that is read: the first read that meets it ends with -EPIPE, later ones wait.
+  enum class Halt { none, untold, told };
   void strike(UsbFault fault, UsbHost& host);
 
   FtdiFalcon chip_;
   UsbFaultScript script_;
   bool present_ = true;
-  bool halted_ = false;  ///< the endpoint that is read
+  Halt halt_ = Halt::none;
   std::int64_t deaf_until_ = 0;
 };
 

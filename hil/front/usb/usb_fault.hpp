@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <utility>
@@ -23,6 +24,7 @@ inline constexpr int kUsbFaultFrames = 100;
 struct ScriptedUsbFault {
   std::int64_t cycle = 0;  ///< of 125 us, counted from the begin
   UsbFault fault = UsbFault::vanish;
+  const std::atomic<bool>* when = nullptr;  ///< and not before this is set; any thread may do so
 };
 
 /// Faults in the order of time.
@@ -33,10 +35,14 @@ class UsbFaultScript {
   /// `strike(fault)` for each that is due in `cycle` or before it and has not struck yet.
   template <class Strike>
   void run(std::int64_t cycle, Strike strike) {
-    while (next_ < faults_.size() && faults_[next_].cycle <= cycle) strike(faults_[next_++].fault);
+    while (next_ < faults_.size() && is_due(faults_[next_], cycle)) strike(faults_[next_++].fault);
   }
 
  private:
+  static bool is_due(const ScriptedUsbFault& entry, std::int64_t cycle) noexcept {
+    return entry.cycle <= cycle && (!entry.when || entry.when->load());
+  }
+
   std::vector<ScriptedUsbFault> faults_;
   std::size_t next_ = 0;
 };

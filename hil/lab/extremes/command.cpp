@@ -56,6 +56,11 @@ std::string limit_of(const std::optional<double>& limit) {
 
 std::string line_of(const Row& row) {
   char text[192];
+  if (!row.skipped.empty()) {
+    std::snprintf(text, sizeof text, "%-8s %-52s skipped: %s", row.group.c_str(), row.name.c_str(),
+                  row.skipped.c_str());
+    return text;
+  }
   std::snprintf(text, sizeof text, "%-8s %-52s %10.4g %-7s %8s %8s  %s", row.group.c_str(),
                 row.name.c_str(), row.value, row.unit.c_str(), limit_of(row.must).c_str(),
                 limit_of(row.aim).c_str(),
@@ -73,7 +78,7 @@ std::string json_of(const std::vector<Row>& rows) {
   for (const Row& row : rows) {
     list.push_back({{"group", row.group},
                     {"name", row.name},
-                    {"value", row.value},
+                    {"value", row.skipped.empty() ? number(row.value) : number(std::nullopt)},
                     {"unit", row.unit},
                     {"limit", number(row.must)},
                     {"aim", number(row.aim)},
@@ -95,6 +100,9 @@ Command::Command(CLI::App& program)
   app_->add_option("--page", page_, "write all as a page (docs/contact.md), its plots beside it")
       ->excludes(only)
       ->type_name("FILE");
+  app_->add_option("--data", data_, "folder of real volumes (default: $KERF_DATA)")
+      ->envname("KERF_DATA")
+      ->type_name("DIR");
   app_->add_option("--cpu", core_, "core to run on (default: the last)")
       ->check(CLI::Range(0, 1023));
   app_->footer("Exit codes: 0 every limit is kept, 1 one is not, 2 bad input or set-up.");
@@ -111,7 +119,8 @@ int Command::run(std::ostream& out) const {
   const LabOutput as_hands_plot("--page", hands_plot);
   LabOutput::check_distinct({&as_json, &as_page, &as_plot, &as_hands_plot});
   static_cast<void>(pin_lab(core_));
-  const Effort effort = quick_ ? Effort::quick() : Effort{};
+  Effort effort = quick_ ? Effort::quick() : Effort{};
+  effort.data = data_;
   Findings findings;
   out << "group    what                                                      value unit        "
          "must "

@@ -15,7 +15,7 @@ class Command final : public LabCommand {
   [[nodiscard]] int run(std::ostream& out) const override;
 
  private:
-  std::string report_, page_;
+  std::string report_, page_, data_;
   std::vector<std::string> only_;
   bool quick_ = false;
   int core_ = -1;

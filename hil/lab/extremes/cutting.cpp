@@ -3,11 +3,19 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
 #include <functional>
 #include <string>
+#include <utility>
 
 #include "controller/scene/phantom.hpp"
+#include "controller/scene/scene_error.hpp"
+#include "controller/scene/scene_place.hpp"
 #include "controller/scene/tool_shapes.hpp"
+#include "controller/scene/volume_crop.hpp"
+#include "controller/scene/volume_density.hpp"
+#include "controller/scene/volume_io.hpp"
+#include "hil/hil_error.hpp"
 #include "hil/lab/extremes/measures.hpp"
 #include "hil/lab/extremes/miller.hpp"
 #include "hil/lab/extremes/shell_rig.hpp"
@@ -15,10 +23,10 @@
 namespace kerf::extremes {
 namespace {
 
-constexpr double kSideMm = 8;
+constexpr double kSideMm = 8, kVoxelMm = 0.125;
 
 /// A ball of radius 1 mm over a solid about the device's origin, by its signed distance in mm.
-Scene mill_scene(const std::function<double(Point)>& distance_mm, double voxel_mm = 0.125) {
+Scene mill_scene(const std::function<double(Point)>& distance_mm, double voxel_mm = kVoxelMm) {
   Scene scene;
   const auto edge = static_cast<std::int32_t>(std::lround(kSideMm / voxel_mm));
   const double corner = -voxel_mm * (edge - 1) / 2;
@@ -57,59 +65,99 @@ double balance_error(double voxel_mm) {
   return std::abs(miller.removed_mm3() / miller.fed_mm3() - 1);
 }
 
-/// What the same hand takes off, mm^3.
-double removed_at(int rate_hz) {
-  Scene scene = mill_scene(flat);
+/// Removed by a force history at a servo rate and a voxel size, mm^3.
+double removed_at(int rate_hz, double voxel_mm) {
+  Scene scene = mill_scene(flat, voxel_mm);
   scene.servo.rate_hz = rate_hz;
-  scene.cut.machinability_mm3_per_s_n = 4;
-  Miller miller(scene);
-  for (int step = 0; step < 10; ++step) {
-    static_cast<void>(miller.hold({0.1 * step, 0.8 - 0.1 * step, 0}, 0.02));
-  }
-  return miller.removed_mm3();
+  scene.force.damping_ns_per_mm = 0;  // the history is the spring's
+  scene.cut.machinability_mm3_per_s_n = 10 * kEnamelMm3PerSN;
+  return removed_by_press(scene);
 }
 
-/// Largest step of the force over its mean while the ball sinks into the crown of the phantom at
-/// the rate of enamel. A count of the encoders is a step of the hand, which is none of the cut.
-double milling_step() {
+/// Largest step of the force over its mean while the ball sinks into a crown at the rate of enamel.
+double milling_step(Scene scene) {
+  scene.force.damping_ns_per_mm = 0;  // of the hand's own steps
+  Miller miller(std::move(scene));
+  return sink(miller).step_ratio;
+}
+
+/// The phantom's crown around the middle of its chewing face.
+Scene phantom_crown() {
   double top_mm = 12;
   while (phantom_signed_distance(1, 1, top_mm) > 0) top_mm -= 0.01;
-  Scene scene = mill_scene(
+  return mill_scene(
       [&](Point p) { return phantom_signed_distance(p[0] + 1, 1 - p[2], p[1] + top_mm); });
-  scene.force.damping_ns_per_mm = 0;  // of the hand's own steps
-  Miller miller(scene);
-  constexpr int kSinkMs = 500, kMs = 2500, kFeltMs = 200;
-  double last_n = 0, sum_n = 0, most_n = 0;
-  Point last_mm{};
-  for (int ms = 0; ms < kMs; ++ms) {
-    const ServoOutput out = miller.step({0, 1.3 - 0.005 * std::min(ms, kSinkMs), 0});
-    const double force_n = length(out.force_n);
-    if (ms > kFeltMs) {
-      if (out.position_mm == last_mm) most_n = std::max(most_n, std::abs(force_n - last_n));
-      sum_n += force_n / (kMs - kFeltMs - 1);
+}
+
+/// A CT of a tooth whose files name no size, in voxels of 0.125 mm, the device's origin where a
+/// hand from above first meets it.
+Scene tooth_crown(const std::filesystem::path& file, const Matrix3& standing) {
+  Scene scene = mill_scene(flat);
+  SceneVolume& volume = scene.volumes.front();
+  const SourceVolume source =
+      read_volume(file, {.spacing_mm = std::array{kVoxelMm, kVoxelMm, kVoxelMm}});
+  volume.image = apply_window(source, range_window(source));
+  volume.iso = otsu_threshold(volume.image);
+  volume.image = crop_to_solid(volume.image, volume.iso);
+  volume.pose = place_volume(volume.image, standing, {});
+  scene.device.offset_mm = first_surface_from_above(volume);
+  return scene;
+}
+
+void measure_teeth(const Effort& effort, const Told& told) {
+  struct Tooth {
+    const char* name;
+    const char* file;
+    Matrix3 standing;
+  };
+  constexpr Matrix3 kUpsideDown = {1, 0, 0, 0, 0, -1, 0, 1, 0};
+  for (const Tooth& tooth :
+       {Tooth{"GE tooth, 16 bits", "ge_tooth_16bit/tooth.nhdr", kSourceStanding},
+        Tooth{"GE tooth, 8 bits", "ge_tooth_8bit/tooth.mhd", kUpsideDown}}) {
+    Row row{"cutting", std::string("milling into the ") + tooth.name + ", force step over the mean",
+            0,         "%",
+            2,         1.5};
+    const std::filesystem::path file = effort.data / tooth.file;
+    try {
+      if (effort.data.empty()) {
+        row.skipped = "no --data";
+      } else if (!std::filesystem::exists(file)) {
+        row.skipped = std::string("no ") + tooth.file + " in --data";
+      } else {
+        row.value = 100 * milling_step(tooth_crown(file, tooth.standing));
+      }
+    } catch (const SceneError& error) {
+      throw HilError(error.what());
     }
-    last_n = force_n;
-    last_mm = out.position_mm;
+    told(std::move(row));
   }
-  return most_n / sum_n;
 }
 
 }  // namespace
 
-void measure_cutting(const Effort&, const Told& told) {
+void measure_cutting(const Effort& effort, const Told& told) {
   for (const double voxel_mm : {0.0625, 0.125, 0.25}) {
     char name[80];
     std::snprintf(name, sizeof name, "removed against the integral of G F, voxels of %g mm",
                   voxel_mm);
     told({"cutting", name, balance_error(voxel_mm), "1", 1e-6, {}});
   }
-  const double usual_mm3 = removed_at(1000);
-  for (const int rate_hz : {2000, 4000, 8000}) {
-    told({"cutting", "removed by the same hand at " + std::to_string(rate_hz) + " Hz against 1 kHz",
-          100 * std::abs(removed_at(rate_hz) / usual_mm3 - 1), "%", 3, 1});
+  const double usual_mm3 = removed_at(1000, kVoxelMm);
+  const auto against_usual = [&](const std::string& by, int rate_hz, double voxel_mm) {
+    told({"cutting", "removed by the same force " + by,
+          100 * std::abs(removed_at(rate_hz, voxel_mm) / usual_mm3 - 1), "%", 3, 1});
+  };
+  for (const int rate_hz : {250, 500, 2000, 4000, 8000}) {
+    against_usual("at " + std::to_string(rate_hz) + " Hz, against 1 kHz", rate_hz, kVoxelMm);
   }
-  told({"cutting", "milling into the phantom, force step over the mean", 100 * milling_step(), "%",
-        2, 1.5});
+  for (const double voxel_mm : {0.05, 0.1, 0.25}) {
+    char by[64];
+    std::snprintf(by, sizeof by, "in voxels of %g mm, against 0.125", voxel_mm);
+    against_usual(by, 1000, voxel_mm);
+  }
+  told({"cutting", "milling into the phantom, force step over the mean",
+        100 * milling_step(phantom_crown()), "%", 2, 1.5});
+  measure_teeth(effort, told);
 }
 
 }  // namespace kerf::extremes

@@ -43,14 +43,18 @@ void tell(const HandRun& run, const Told& told) {
 
 }  // namespace
 
-Scene hand_scene(const Effort& effort, CutModel cut) {
+Scene shipped_scene(const std::string& name, const Effort& effort) {
   try {
-    Scene scene = load_scene("scenes/proxy.toml", {.phantom_size = effort.phantom});
-    scene.cut.model = cut;
-    return scene;
+    return load_scene("scenes/" + name + ".toml", {.phantom_size = effort.phantom});
   } catch (const SceneError& error) {
     throw HilError(error.what());
   }
+}
+
+Scene hand_scene(const Effort& effort, CutModel cut) {
+  Scene scene = shipped_scene("touch", effort);
+  scene.cut.model = cut;
+  return scene;
 }
 
 HandRun run_hand(const Scene& scene, const std::string& name, const Effort& effort) {

@@ -12,7 +12,9 @@ namespace kerf::extremes {
 /// Force faster than a hand moves is chatter from here on.
 inline constexpr double kChatterHz = 150;
 
-/// scenes/proxy.toml with another way to cut. Throws HilError where it cannot be read.
+/// scenes/NAME.toml with the phantom of this effort. Throws HilError where it cannot be read.
+[[nodiscard]] Scene shipped_scene(const std::string& name, const Effort& effort);
+/// scenes/touch.toml with another way to cut. Throws HilError where it cannot be read.
 [[nodiscard]] Scene hand_scene(const Effort& effort, CutModel cut);
 /// The hand of scenes/hands/NAME.toml in it. Throws HilError where it cannot be read.
 [[nodiscard]] HandRun run_hand(const Scene& scene, const std::string& name, const Effort& effort);

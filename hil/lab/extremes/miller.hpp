@@ -6,9 +6,11 @@
 #include <cmath>
 #include <cstddef>
 #include <memory>
+#include <numbers>
 #include <vector>
 
 #include "controller/scene/compile.hpp"
+#include "hil/lab/extremes/points.hpp"
 #include "hil/lab/fake_arm.hpp"
 
 namespace kerf::extremes {
@@ -57,6 +59,7 @@ class Miller {
     return out;
   }
 
+  [[nodiscard]] Servo& servo() { return *servo_; }
   [[nodiscard]] double removed_mm3() const { return removed_mm3_; }
   [[nodiscard]] double fed_mm3() const { return fed_mm3_; }
 
@@ -67,5 +70,58 @@ class Miller {
   FakeArm arm_;
   double removed_mm3_ = 0, fed_mm3_ = 0;
 };
+
+/// What a hand takes off a flat at height 0 in 0.2 s of a stroke down to 0.9 mm from it, mm^3.
+inline double removed_by_stroke(const Scene& scene) {
+  Miller miller(scene);
+  for (int step = 0; step < 10; ++step) {
+    static_cast<void>(miller.hold({0.1 * step, 0.8 - 0.1 * step, 0}, 0.02));
+  }
+  return miller.removed_mm3();
+}
+
+/// What a hand takes off a flat at height 0 in half a second by a force of its own, up to 1.2 N and
+/// back whatever gives way, mm^3.
+inline double removed_by_press(const Scene& scene) {
+  Miller miller(scene);
+  constexpr double kSeconds = 0.5, kMeanN = 0.6;
+  const int ticks = static_cast<int>(kSeconds * scene.servo.rate_hz);
+  double proxy_mm = 1;
+  for (int i = 0; i < ticks; ++i) {
+    const double turn = 2 * std::numbers::pi * (i + 0.5) / ticks;
+    const double force_n = kMeanN * (1 - std::cos(turn));
+    const ServoOutput out =
+        miller.step({0, proxy_mm - force_n / scene.force.stiffness_n_per_mm, 0});
+    proxy_mm = out.position_mm[1] + out.proxy_offset_mm[1];
+  }
+  return miller.removed_mm3();
+}
+
+/// What a hand feels that sinks a ball of radius 1 mm by 2.5 mm in half a second, from 0.3 mm above
+/// a crown at height 0, and stays there for two.
+struct SunkForce {
+  double step_ratio = 0;  ///< largest step in a tick over the mean, at 1 kHz
+  double mean_n = 0;
+};
+
+/// A count of the encoders is a step of the hand, which is none of the cut: such ticks do not count
+/// for the step.
+inline SunkForce sink(Miller& miller) {
+  constexpr int kSinkMs = 500, kMs = 2500, kFeltMs = 200;
+  double sum_n = 0, largest_n = 0, last_n = 0;
+  std::array<double, 3> last_mm{};
+  for (int ms = 0; ms < kMs; ++ms) {
+    const ServoOutput out = miller.step({0, 1.3 - 0.005 * std::min(ms, kSinkMs), 0});
+    const double force_n = length(out.force_n);
+    if (ms >= kFeltMs) {
+      sum_n += force_n;
+      if (out.position_mm == last_mm) largest_n = std::max(largest_n, std::abs(force_n - last_n));
+    }
+    last_n = force_n;
+    last_mm = out.position_mm;
+  }
+  const double mean_n = sum_n / (kMs - kFeltMs);
+  return {largest_n / mean_n, mean_n};
+}
 
 }  // namespace kerf::extremes

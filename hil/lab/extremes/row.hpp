@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <filesystem>
 #include <functional>
 #include <optional>
 #include <string>
@@ -16,8 +17,10 @@ struct Row {
   double value = 0;
   std::string unit;
   std::optional<double> must, aim;  ///< none: told, not judged
+  std::string skipped{};            ///< why it was not measured; empty: it was
 
-  [[nodiscard]] bool pass() const { return !must || value <= *must; }
+  [[nodiscard]] bool judged() const { return must && skipped.empty(); }
+  [[nodiscard]] bool pass() const { return !judged() || value <= *must; }
   [[nodiscard]] bool reached() const { return !aim || value <= *aim; }
 };
 
@@ -33,8 +36,9 @@ struct Effort {
   int phases = 64;        ///< of the ticks along a stroke
   VoxelGrid phantom{256, 256, 161};
   double hand_seconds = 8;
+  std::filesystem::path data;  ///< folder of real volumes; empty: there is none
 
-  [[nodiscard]] static Effort quick() { return {5, 8, 1, 200, 8, {128, 128, 80}, 4}; }
+  [[nodiscard]] static Effort quick() { return {5, 8, 1, 200, 8, {128, 128, 80}, 4, {}}; }
 };
 
 }  // namespace kerf::extremes

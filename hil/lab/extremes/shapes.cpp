@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <numbers>
+#include <vector>
 
+#include "hil/lab/extremes/loft.hpp"
 #include "hil/lab/extremes/measures.hpp"
 #include "hil/lab/extremes/rest.hpp"
 
@@ -16,46 +18,68 @@ constexpr Point kMiddle{21, 21, 21};
 
 enum class Pose { any, upright, lying };
 
-/// The turn that takes the tool's axis to `axis`.
-ToolTurn<N> turn_to(Point axis, Dice& dice) {
-  const Point a = dice.across(axis), b = cross(a, axis);
-  TurnRows<N> rows;
-  for (std::size_t i = 0; i < 3; ++i) {
-    rows[i] = {N::Unit(a[i]), N::Unit(axis[i]), N::Unit(b[i])};
+/// The tool's axes in the world.
+struct Axes {
+  Point x, y, z;
+
+  [[nodiscard]] ToolTurn<N> turn() const {
+    TurnRows<N> rows;
+    for (std::size_t i = 0; i < 3; ++i) rows[i] = {N::Unit(x[i]), N::Unit(y[i]), N::Unit(z[i])};
+    return turn_of<N>(rows);
   }
-  return turn_of<N>(rows);
+  [[nodiscard]] Point to_tool(Point world) const {
+    return {dot(x, world), dot(y, world), dot(z, world)};
+  }
+};
+
+Axes standing_on(Point axis, Dice& dice) {
+  const Point across = dice.across(axis);
+  return {across, axis, cross(across, axis)};
 }
 
-/// How far the tool reaches along a direction that has `cosine` with its axis.
-double reach_along(const std::vector<std::array<double, 2>>& profile, double cosine) {
-  const double sine = std::sqrt(std::max(0.0, 1 - cosine * cosine));
-  double most = 0;
-  for (const auto& [y, radius] : profile) most = std::max(most, y * cosine + radius * sine);
-  return most;
-}
+/// How far a tool reaches along a direction of its own axes.
+class Reach {
+ public:
+  explicit Reach(const SceneTool& tool) : points_(tool.mesh.points_mm) {
+    if (points_.empty()) profile_ = tool_profile(tool, 512);
+  }
+  [[nodiscard]] double along(Point direction) const {
+    double most = 0;
+    for (const Point& point : points_) most = std::max(most, dot(point, direction));
+    const double sine = std::sqrt(std::max(0.0, 1 - direction[1] * direction[1]));
+    for (const auto& [y, radius] : profile_) {
+      most = std::max(most, y * direction[1] + radius * sine);
+    }
+    return most;
+  }
+
+ private:
+  std::vector<Point> points_;
+  std::vector<std::array<double, 2>> profile_;
+};
 
 }  // namespace
 
 void measure_shapes(const Effort& effort, const Told& told) {
   struct Subject {
     const char* name;
-    const char* shape;
-    double radius, length;
+    SceneTool tool;
     Pose pose;
   };
   // 1.5 times what a ball may.
   constexpr double kOffset = 0.075, kOffsetAim = 0.03, kDegrees = 0.75, kDegreesAim = 0.45;
   for (const Subject& subject :
-       {Subject{"cylinder, any pose", "cylinder", 5, 16, Pose::any},
-        Subject{"cylinder on its end", "cylinder", 5, 16, Pose::upright},
-        Subject{"cylinder on its side", "cylinder", 5, 16, Pose::lying},
-        Subject{"cone, any pose", "cone", 5, 16, Pose::any},
-        Subject{"inverted cone, any pose", "inverted_cone", 5, 10, Pose::any},
-        Subject{"flame, any pose", "flame", 4, 16, Pose::any},
-        Subject{"wheel, any pose", "wheel", 8, 4, Pose::any},
-        Subject{"needle 2 voxels thick, any pose", "cylinder", 1, 16, Pose::any}}) {
-    const SceneTool tool = tool_of_units(subject.shape, subject.radius, subject.length);
-    const auto profile = tool_profile(tool, 512);
+       {Subject{"cylinder, any pose", tool_of_units("cylinder", 5, 16), Pose::any},
+        Subject{"cylinder on its end", tool_of_units("cylinder", 5, 16), Pose::upright},
+        Subject{"cylinder on its side", tool_of_units("cylinder", 5, 16), Pose::lying},
+        Subject{"cone, any pose", tool_of_units("cone", 5, 16), Pose::any},
+        Subject{"inverted cone, any pose", tool_of_units("inverted_cone", 5, 10), Pose::any},
+        Subject{"flame, any pose", tool_of_units("flame", 4, 16), Pose::any},
+        Subject{"wheel, any pose", tool_of_units("wheel", 8, 4), Pose::any},
+        Subject{"needle 2 voxels thick, any pose", tool_of_units("cylinder", 1, 16), Pose::any},
+        Subject{"STL, square bar, any pose", mesh_of_units("bar", prism(6, 16, 4)), Pose::any},
+        Subject{"STL, fluted bur, any pose", mesh_of_units("bur", fluted_bur(24)), Pose::any}}) {
+    const Reach reach(subject.tool);
     Dice dice(8);
     double sum = 0, most = 0, degrees = 0;
     for (int k = 0; k < effort.tilts; ++k) {
@@ -63,11 +87,11 @@ void measure_shapes(const Effort& effort, const Told& told) {
       const Point axis = subject.pose == Pose::upright ? frame.up
                          : subject.pose == Pose::lying ? frame.along
                                                        : dice.direction();
-      const double support = reach_along(profile, -dot(axis, frame.up));
+      const Axes axes = standing_on(axis, dice);
+      const double support = reach.along(axes.to_tool(-1 * frame.up));
       const Body body = blurred(kGrid, [&](Point p) { return frame.of(p)[1] + support; });
-      const ToolTurn<N> turn = turn_to(axis, dice);
       // From so high that the tool can turn first.
-      const Point rest = rest_of<N>(tool, body, frame.place, frame.up, turn, 20);
+      const Point rest = rest_of<N>(subject.tool, body, frame.place, frame.up, axes.turn(), 20);
       const double off = frame.of(rest)[1];
       sum += off;
       most = std::max(most, std::abs(off));

@@ -13,10 +13,10 @@ void measure_walls(const Effort& effort, const Told& told) {
     double deepest;
   };
   const ShakenTool ball, cylinder{.round = false, .radius = 5, .half = 8};
-  for (const Subject& subject :
-       {Subject{"ball at 50 voxels", 50, ball, 0.05}, Subject{"ball at 2 voxels", 2, ball, 0.05},
-        Subject{"turning cylinder at 50 voxels", 50, cylinder, 0.1},
-        Subject{"turning cylinder at 2 voxels", 2, cylinder, 0.1}}) {
+  for (const Subject& subject : {Subject{"ball, wall of 5 mm", 50, ball, 0.05},
+                                 Subject{"ball, wall of 2 voxels", 2, ball, 0.05},
+                                 Subject{"turning cylinder, wall of 5 mm", 50, cylinder, 0.1},
+                                 Subject{"turning cylinder, wall of 2 voxels", 2, cylinder, 0.1}}) {
     Shaken seen;
     Dice dice(11);
     for (int k = 0; k < effort.walls; ++k) {

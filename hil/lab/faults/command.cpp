@@ -41,6 +41,7 @@ struct Row {
   unsigned runs = 0;
   unsigned without_push = 0;  ///< runs in which nothing could go wrong
   unsigned pushed_again = 0;  ///< runs with force after the last fault
+  unsigned latched = 0;       ///< runs in which the servo latched a fault
   Outcome worst;
 };
 
@@ -80,6 +81,8 @@ void add(const Outcome& outcome, Row& row) {
   ++row.runs;
   row.without_push += outcome.pushed ? 0 : 1;
   row.pushed_again += outcome.pushed_again ? 1 : 0;
+  row.latched += outcome.latched != worst.latched ? 1 : 0;
+  worst.latch_ms = std::max(worst.latch_ms, outcome.latch_ms);
   worst.violation_count += outcome.violation_count;
   if (worst.violations.empty()) worst.violations = outcome.violations;
   worst.faults_begun += outcome.faults_begun;
@@ -104,12 +107,12 @@ Row run_row(const Subject& subject, const std::string& device, const NamedScript
 
 std::string line_of(const Row& row) {
   char text[160];
-  std::snprintf(text, sizeof text, "%-14s %-20s %5u %7llu %8u %7.2f %7.2f %7.3f %7.2f %6llu",
-                row.device.c_str(), row.script.c_str(), row.runs,
-                static_cast<unsigned long long>(row.worst.faults_begun), row.pushed_again,
-                row.worst.peak_n, row.worst.device_peak_n, row.worst.steepest_n_per_ms,
-                row.worst.slowest_off_ms,
-                static_cast<unsigned long long>(row.worst.violation_count));
+  std::snprintf(
+      text, sizeof text, "%-14s %-18s %5u %7llu %7u %8.2f %8u %7.2f %7.2f %7.3f %6.2f %6llu",
+      row.device.c_str(), row.script.c_str(), row.runs,
+      static_cast<unsigned long long>(row.worst.faults_begun), row.latched, row.worst.latch_ms,
+      row.pushed_again, row.worst.peak_n, row.worst.device_peak_n, row.worst.steepest_n_per_ms,
+      row.worst.slowest_off_ms, static_cast<unsigned long long>(row.worst.violation_count));
   return text;
 }
 
@@ -119,6 +122,8 @@ nlohmann::ordered_json json_of(const Row& row) {
           {"runs", row.runs},
           {"faults", row.worst.faults_begun},
           {"runs_without_push", row.without_push},
+          {"runs_latched", row.latched},
+          {"slowest_latch_ms", row.worst.latch_ms},
           {"runs_pushed_again", row.pushed_again},
           {"peak_n", row.worst.peak_n},
           {"device_peak_n", row.worst.device_peak_n},
@@ -161,9 +166,8 @@ int Command::run(std::ostream& out) const {
   if (random_ != 0) scripts.push_back({"at random", std::nullopt});
   HandScript hand = read_hand_script(hand_);
 
-  out << "device         script                runs  faults  on again  peak N  tip N    N/ms  off "
-         "ms"
-         " broken\n";
+  out << "device         script              runs  faults latched latch ms on again  peak N   tip N"
+         "    N/ms off ms broken\n";
   auto rows = nlohmann::ordered_json::array();
   std::uint64_t broken = 0;
   for (const std::string& device : devices_) {

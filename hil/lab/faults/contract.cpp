@@ -12,6 +12,8 @@ namespace {
 // The contract: docs/safety.md.
 constexpr double kSlewNPerMs = 0.5;
 constexpr double kHoldMs = 5, kZeroMs = 20, kFadeInMs = 100, kOffMs = 2;
+constexpr double kNotFiniteMs = 2;  // from the first tick without a finite pose
+constexpr double kReportMs = 1;     // from one report to the next, of the slowest device
 // A step of the converters is 0.4 to 5 mN at the tip, and the watch is on the outside of them.
 constexpr double kStepN = 0.01;
 constexpr double kDeviceShare = 1.03;  // the tip moves on while a command is under way
@@ -21,16 +23,29 @@ double length(const std::array<double, 3>& v) noexcept {
   return std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
 }
 
+/// From the begin of a fault at the device until the servo has latched `name`. A fault that the
+/// servo bears for a while begins for it with the report that first shows it, or that is missing.
+double latest_latch_ms(const std::string& name) {
+  if (name == fault_name(Fault::stale_input)) return kZeroMs + kReportMs;
+  if (name == fault_name(Fault::not_finite)) return kNotFiniteMs + kReportMs;
+  return kOffMs;
+}
+
 }  // namespace
 
 void Contract::check(bool kept, double time_ms, const char* rule, double value, double limit) {
   if (kept) return;
+  char line[128];
+  std::snprintf(line, sizeof line, "%s: %.3f, limit %.3f", rule, value, limit);
+  broken(time_ms, line);
+}
+
+void Contract::broken(double time_ms, const std::string& what) {
   ++outcome_.violation_count;
   if (outcome_.violations.size() >= kTold) return;
-  char line[160];
-  std::snprintf(line, sizeof line, "%.3f s: %s: %.3f, limit %.3f", time_ms / 1000, rule, value,
-                limit);
-  outcome_.violations.emplace_back(line);
+  char time[24];
+  std::snprintf(time, sizeof time, "%.3f s: ", time_ms / 1000);
+  outcome_.violations.emplace_back(time + what);
 }
 
 void Contract::tick(double time_ms, const ServoOutput& output) {
@@ -61,9 +76,24 @@ void Contract::tick(double time_ms, const ServoOutput& output) {
   const double ramp = std::min(1.0, static_cast<double>(on_ticks_) / ticks_per_ms_ / kFadeInMs);
   check(now_n <= peak_n_ * ramp + kStepN, time_ms, "force while fading in, in N", now_n,
         peak_n_ * ramp);
+  if (output.fault != Fault::none && outcome_.latched == fault_name(Fault::none)) {
+    outcome_.latched = fault_name(output.fault);
+    outcome_.latch_ms = time_ms - begun_ms_;
+  }
   if (on_ && !output.motors_on) off_since_ms_ = time_ms;
   on_ = output.motors_on;
   last_n_ = now_n;
+}
+
+void Contract::end(double time_ms, const std::string& latches) {
+  if (latches.empty()) return;
+  if (outcome_.latched != latches) {
+    broken(time_ms, "latched " + outcome_.latched + ", not " + latches);
+  } else if (outcome_.latched != fault_name(Fault::none)) {
+    const double limit_ms = latest_latch_ms(latches);
+    check(outcome_.latch_ms <= limit_ms, time_ms, "ms until it was latched", outcome_.latch_ms,
+          limit_ms);
+  }
 }
 
 void Contract::device_force(double time_ms, double force_n, bool trusted) {

@@ -18,6 +18,10 @@ class Contract {
 
   /// One tick of the servo, at `time_ms`.
   void tick(double time_ms, const ServoOutput& output);
+  /// Something went wrong for the first time.
+  void fault_begins(double time_ms) noexcept { begun_ms_ = time_ms; }
+  /// The run is over; `latches` as in FaultScript.
+  void end(double time_ms, const std::string& latches);
   /// The watchdog switched the motors off in the servo's place: its next force begins at zero.
   void watchdog_off() noexcept { last_n_ = 0; }
   /// Force of the motors at the true tip; `trusted`: neither sensors nor commands are broken, so it
@@ -26,6 +30,7 @@ class Contract {
 
  private:
   void check(bool kept, double time_ms, const char* rule, double value, double limit);
+  void broken(double time_ms, const std::string& what);
 
   double ticks_per_ms_;
   double peak_n_;
@@ -36,6 +41,7 @@ class Contract {
   std::uint64_t on_ticks_ = 0;  ///< since the motors came on
   double off_since_ms_ = 0;
   bool on_ = false;
+  double begun_ms_ = 0;
 };
 
 }  // namespace kerf::faults

@@ -101,13 +101,16 @@ Outcome run_faults(const Subject& subject, const FaultScript& script) {
   Contract contract(rate_hz, scene.limits.force_n, outcome);
   const bool trusted = std::ranges::none_of(script.faults, misleads);
   double first_push_s = -1;
+  double time_ms = 0;
+  bool is_well = true;
 
   driver->start();
   for (std::int64_t tick = 1; tick <= ticks; ++tick) {
-    double time_ms = 0;
     for (int cycle = 0; cycle < cycles_per_tick; ++cycle) {
       port.cycle();
       time_ms = static_cast<double>(emulator.stats().cycles) * 1000 / kCyclesPerSecond;
+      if (is_well && device.begun() > 0) contract.fault_begins(time_ms);
+      is_well = device.begun() == 0;
       contract.device_force(time_ms, norm(emulator.model().motor_force_n()), trusted);
     }
     watchdog.look(static_cast<std::int64_t>(time_ms * 1e6));
@@ -129,6 +132,7 @@ Outcome run_faults(const Subject& subject, const FaultScript& script) {
     outcome.pushed = true;
     outcome.pushed_again = time_ms / 1000 > first_push_s + end_of(script) + 0.05;
   }
+  contract.end(time_ms, script.latches);
   outcome.faults_begun = device.begun();
   return outcome;
 }

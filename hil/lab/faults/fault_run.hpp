@@ -27,6 +27,8 @@ struct Outcome {
   double device_peak_n = 0;      ///< of the motors at the true tip
   double steepest_n_per_ms = 0;  ///< rise of the command
   double slowest_off_ms = 0;     ///< from the tick that switched the motors off to no torque
+  std::string latched = "none";  ///< the first fault that the servo latched
+  double latch_ms = 0;           ///< from the first fault of the script to that
   bool pushed = false;           ///< there was a force to go wrong
   bool pushed_again = false;     ///< and again after the last fault
 };

@@ -44,7 +44,7 @@ class WatchedDevice final : public kerf::PacketDevice {
       const std::scoped_lock lock(mutex_);
       time_ms_ = static_cast<double>(emulator_.stats().cycles) * 1000 / kerf::kCyclesPerSecond;
       contract_.device_force(time_ms_, norm(emulator_.model().motor_force_n()),
-                             kerf::test::kKeepsTime);
+                             kerf::test::keeps_time());
     }
   }
   std::span<const std::uint8_t> next_packet() noexcept override { return device_.next_packet(); }

@@ -55,26 +55,30 @@ TEST_CASE("hid: from the calibration button to a force, with short and with long
   for (const std::size_t bytes : {std::size_t{14}, std::size_t{64}}) {
     CAPTURE(bytes);
     MountedArm arm({.packet_bytes = bytes});
+    std::int64_t longest_silence_ms = 0;
     {
       HidPort port(arm.path(), 0, kGoOn);
       ServoSession session(Personality::woodenhaptics, port);
       const auto course = session.run(8000, [](const auto& c) { return c.contact > 300; });
       CHECK(course.contact > 300);
       CHECK(course.motors > 300);
-      if (kerf::test::kKeepsTime) CHECK(course.fresh > course.ticks * 8 / 10);
+      if (kerf::test::keeps_time()) CHECK(course.fresh > course.ticks * 8 / 10);
       CHECK(session.driver().refused() == 0);
       CHECK(session.driver().release());
+      longest_silence_ms = course.longest_silence_ms;
     }
     arm.stop();
     CHECK(arm.emulator().model().calibration() == kerf::Calibration::done);
     CHECK(arm.emulator().stats().refused == 0);
     CHECK(arm.emulator().stats().peak_motor_force_n > 0.01);
-    CHECK(arm.node().lost() == 0);
+    // The kernel keeps 64 reports, one each ms: fewer than somebody's longest standstill may cost.
+    if (longest_silence_ms < 50) CHECK(arm.node().lost() == 0);
   }
 }
 
 TEST_CASE("hid: no read, no write, no read of nothing, no loss of the arm allocates in the servo") {
-  const MountedArm arm({.script = {{500, UsbFault::vanish}}});
+  std::atomic<bool> read_all{false};
+  const MountedArm arm({.script = {{0, UsbFault::vanish, &read_all}}});
   HidPort port(arm.path(), 0, kGoOn);
   const auto command = encode(kerf::WoodenCommand{});
   std::array<std::uint8_t, 65> packet{};
@@ -87,6 +91,7 @@ TEST_CASE("hid: no read, no write, no read of nothing, no loss of the arm alloca
       if (port.wait(100)) received += port.receive(packet) == 14 ? 1 : 0;
       empty += port.receive(packet) == 0 ? 1 : 0;
     }
+    read_all = true;
     for (int i = 0; i < 2000 && !port.closed(); ++i) {
       port.send(std::span(command).first(14));
       if (port.wait(1)) static_cast<void>(port.receive(packet));
@@ -100,15 +105,18 @@ TEST_CASE("hid: no read, no write, no read of nothing, no loss of the arm alloca
 
 TEST_CASE("hid: a device that took nothing for a while gets what was on its way, then the newest") {
   ListeningDevice device;
+  std::atomic<bool> streams{false};
   kerf::test::ServedNode<kerf::HidrawNode> served(
       "hidraw0", kerf::test::become_device,
-      kerf::WoodenHid::Settings{.script = kerf::test::at_ms({{100, UsbFault::deaf}})}, device);
+      kerf::WoodenHid::Settings{.script = kerf::test::at_ms({{0, UsbFault::deaf, &streams}})},
+      device);
   {
     HidPort port(served.path(), 0, kGoOn);
     std::thread([&] {
       static_cast<void>(kerf::make_real_time(80, -1));
       for (std::int16_t tick = 1; tick <= 300; ++tick) {
         device.newest = tick;
+        streams = tick >= 100;
         const kerf::WoodenCommand command{.milliamps = {tick, 0, 0}, .set_encoders = {}};
         CHECK(port.send(std::span<const std::uint8_t>(encode(command)).first(14)));
         std::this_thread::sleep_for(std::chrono::milliseconds(1));
@@ -124,18 +132,21 @@ TEST_CASE("hid: a device that took nothing for a while gets what was on its way,
 }
 
 TEST_CASE("hid: an unplugged arm closes the port, and the motors are not asked for any more") {
-  MountedArm arm({.script = {{2200, UsbFault::vanish}}});
+  std::atomic<bool> pushes{false};
+  MountedArm arm({.script = {{0, UsbFault::vanish, &pushes}}});
   HidPort port(arm.path(), 0, kGoOn);
   ServoSession session(Personality::woodenhaptics, port);
-  const auto course = session.run(8000, [&](const auto&) { return port.closed(); });
+  const auto course = session.run(8000, [&](const auto& c) {
+    pushes = c.motors > 100;
+    return port.closed();
+  });
   CHECK(port.closed());
   CHECK(course.motors > 100);
-  CHECK(course.ticks < 3700);
   const auto after = session.run(100);
   CHECK(after.fresh == 0);
   CHECK(after.stale_with_motors == 0);
   CHECK_FALSE(session.driver().release());
-  CHECK_THROWS_WITH_AS(HidPort(arm.path(), 0, kGoOn), doctest::Contains("no WoodenHaptics arm"),
+  CHECK_THROWS_WITH_AS(HidPort(arm.path(), 0, kGoOn), doctest::Contains("no such node"),
                        std::runtime_error);
 }
 
@@ -146,7 +157,7 @@ TEST_CASE("hid: a servo that stops reading for a while finds the newest state ag
   static_cast<void>(session.run(50));
   kerf::sleep_until_ns(kerf::monotonic_ns() + 100'000'000);  // more than the kernel's queue holds
   const auto course = session.run(100);
-  if (kerf::test::kKeepsTime) CHECK(course.fresh > 90);
+  if (kerf::test::keeps_time()) CHECK(course.fresh > 90);
   CHECK(session.driver().refused() == 0);
 }
 

@@ -63,7 +63,7 @@ TEST_CASE("kerf-emulator --front fuse serves one client, ends with it and unmoun
 TEST_CASE("kerf-emulator --front fuse refuses what cannot be, in one line with a way out") {
   const kerf::test::TempFolder folder;
   const auto refused = [&](std::vector<std::string> more) {
-    std::vector<std::string> arguments{"--front", "fuse"};
+    std::vector<std::string> arguments{"--front", "fuse", "--priority", "0"};
     arguments.insert(arguments.end(), more.begin(), more.end());
     const Outcome outcome = run(arguments, kGoOn);
     CHECK(outcome.code == 2);

@@ -10,10 +10,11 @@
 
 namespace kerf::test {
 
-/// Servo ticks of 1 ms that a timing test runs: two seconds, or KERF_TIMING_SECONDS.
+/// Servo ticks of 1 ms that a timing test runs: these, or KERF_TIMING_SECONDS.
+inline constexpr int kTimingTicks = 2000;
 [[nodiscard]] inline int timing_ticks() {
   const char* const wanted = std::getenv("KERF_TIMING_SECONDS");
-  return 1000 * (wanted ? std::max(1, std::atoi(wanted)) : 2);
+  return wanted ? 1000 * std::clamp(std::atoi(wanted), 1, 3600) : kTimingTicks;
 }
 
 /// Percentiles of measured times; the unit is that of the values.

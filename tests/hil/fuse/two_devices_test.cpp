@@ -68,7 +68,8 @@ TEST_CASE("of two devices one is named by its node or its serial, and none is gu
   CHECK(kerf::find_firewire(options, arms.folder.path()).path == arms.folder.path() + "/fw0");
   options.where = "50626300007";
   CHECK_THROWS_WITH_AS(static_cast<void>(kerf::find_firewire(options, arms.folder.path())),
-                       doctest::Contains("no device of SensAble is there"), std::runtime_error);
+                       doctest::Contains("no device of SensAble with this serial number is there"),
+                       std::runtime_error);
 }
 
 TEST_CASE("one of two devices dies, the other one runs on") {

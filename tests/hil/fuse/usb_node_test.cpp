@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The two nodes against what the kernel's usbfs and hidraw say, by system calls alone.
 #include <array>
+#include <atomic>
 #include <cerrno>
 #include <cstdint>
 #include <cstring>
@@ -110,16 +111,21 @@ TEST_CASE("usbfs: a read waits for the device, a discarded one comes back, none 
   CHECK(client.call(USBDEVFS_REAPURBNDELAY, &none) == -EAGAIN);
   CHECK(client.call(USBDEVFS_DISCARDURB, &read_urb) == -EINVAL);
 
-  // The latency timer of 16 ms has long run out: status alone comes with the next frame.
+  // Status alone comes when the latency timer of 16 ms has run out, and again 16 ms later.
+  const std::int64_t begin_ns = kerf::monotonic_ns();
   CHECK(client.call(USBDEVFS_SUBMITURB, &read_urb) == 0);
   CHECK(client.reap() == &read_urb);
   CHECK(read_urb.status == 0);
   CHECK(read_urb.actual_length == 2);
-  const std::int64_t begin_ns = kerf::monotonic_ns();
   CHECK(client.call(USBDEVFS_SUBMITURB, &read_urb) == 0);
   CHECK(client.reap() == &read_urb);
   CHECK(kerf::monotonic_ns() - begin_ns > 10'000'000);
 
+  usbdevfs_ctrltransfer latency{};
+  latency.bRequestType = kerf::falcon::kFtdiRequestType;
+  latency.bRequest = static_cast<std::uint8_t>(kerf::falcon::FtdiRequest::latency);
+  latency.wValue = 255;  // ms: nothing comes meanwhile
+  CHECK(client.call(USBDEVFS_CONTROL, &latency) == 0);
   CHECK(client.call(USBDEVFS_SUBMITURB, &read_urb) == 0);
   CHECK(client.call(USBDEVFS_DISCARDURB, &read_urb) == 0);
   CHECK(client.reap() == &read_urb);
@@ -166,8 +172,9 @@ TEST_CASE("usbfs: one exchange per frame, two bytes of status before the answer"
 }
 
 TEST_CASE("usbfs: after unplugging what was pending comes back, then everything is ENODEV") {
+  std::atomic<bool> waits{false};
   const MountedFalcon falcon({.firmware_runs = true},
-                             {{100, UsbFault::stall}, {200, UsbFault::vanish}}, std::nullopt);
+                             {{100, UsbFault::stall}, {0, UsbFault::vanish, &waits}}, std::nullopt);
   const Client client(falcon.path());
   std::array<std::uint8_t, 64> in{};
   usbdevfs_urb read_urb;
@@ -180,6 +187,7 @@ TEST_CASE("usbfs: after unplugging what was pending comes back, then everything 
   }
   CHECK(status == -EPIPE);
   CHECK(client.call(USBDEVFS_SUBMITURB, &read_urb) == 0);  // halted: waits
+  waits = true;
   CHECK(client.reap() == &read_urb);
   CHECK(read_urb.status == -ESHUTDOWN);
   CHECK((client.ready(POLLOUT, 0) & (POLLERR | POLLHUP)) == (POLLERR | POLLHUP));
@@ -223,12 +231,14 @@ TEST_CASE("hidraw: who it is, its descriptor, one report per read, from the firs
 }
 
 TEST_CASE("hidraw: unplugged, it gives what waits and then EIO; nothing can be written") {
-  const MountedArm arm({.script = {{150, UsbFault::vanish}}}, std::nullopt);
+  std::atomic<bool> streams{false};
+  const MountedArm arm({.script = {{0, UsbFault::vanish, &streams}}}, std::nullopt);
   const Client client(arm.path());
   std::array<std::uint8_t, 15> report{};
   CHECK(write(client.fd(), report.data(), report.size()) == 15);
   while ((client.ready(POLLIN, 500) & POLLERR) == 0) {
     if (read(client.fd(), report.data(), report.size()) <= 0) break;
+    streams = true;
   }
   while (read(client.fd(), report.data(), report.size()) > 0) {
   }

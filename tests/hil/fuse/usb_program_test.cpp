@@ -65,8 +65,8 @@ TEST_CASE("kerf-emulator --front fuse is a Falcon or a WoodenHaptics arm for one
 TEST_CASE("kerf-emulator --front fuse knows the faults and the limits of each bus") {
   const kerf::test::TempFolder folder;
   const auto refused = [&](const std::string& device, std::vector<std::string> more) {
-    more.insert(more.begin(),
-                {"--personality", device, "--front", "fuse", "--mount", folder.path()});
+    more.insert(more.begin(), {"--personality", device, "--front", "fuse", "--mount", folder.path(),
+                               "--priority", "0"});
     const Outcome outcome = run(more);
     CHECK(outcome.code == 2);
     CHECK(std::count(outcome.err.begin(), outcome.err.end(), '\n') == 1);

@@ -55,8 +55,24 @@ UmockdevNode::UmockdevNode(UMockdevTestbed* bed, const std::string& path, FuseNo
 }
 
 UmockdevNode::~UmockdevNode() {
-  if (frames_) g_source_unref(frames_);
+  if (frames_) {
+    const auto stop = +[](gpointer self) -> gboolean {
+      node_of(self).stop();
+      return G_SOURCE_REMOVE;
+    };
+    g_main_context_invoke(g_source_get_context(frames_), stop, this);
+    stopped_.get_future().wait();
+    g_source_unref(frames_);
+  }
   g_object_unref(base_);
+}
+
+/// On the bed's thread: nothing of it is under way then, and nothing comes after.
+void UmockdevNode::stop() {
+  g_source_destroy(frames_);
+  g_signal_handlers_disconnect_by_data(base_, this);
+  for (UMockdevIoctlClient* const client : waiting_) end(client, FuseAnswer::fail(ENODEV));
+  stopped_.set_value();
 }
 
 /// With the first call: the bed's thread is known only on it.

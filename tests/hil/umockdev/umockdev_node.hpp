@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <future>
 #include <map>
 #include <optional>
 #include <string>
@@ -20,7 +21,7 @@ namespace kerf::test {
 /// calls on the same descriptor wait behind it, which suits libusb on one thread; a program that
 /// reads on one thread and writes on another would starve the latter.
 ///
-/// Everything runs on the test bed's thread. Ends after the test bed.
+/// Everything runs on the test bed's thread, so this has to end before the bed.
 class UmockdevNode final : private FuseReplies {
  public:
   /// `path` is one of the bed's own, as "/dev/bus/usb/001/002". Throws std::runtime_error.
@@ -34,6 +35,7 @@ class UmockdevNode final : private FuseReplies {
   void take(UMockdevIoctlClient* client);
   void close(UMockdevIoctlClient* client);
   void frame();
+  void stop();
   [[nodiscard]] FuseAnswer ask(UMockdevIoctlClient* client);
 
   // Nothing parks an ioctl for longer than a frame, and nobody sleeps in poll().
@@ -43,6 +45,7 @@ class UmockdevNode final : private FuseReplies {
   FuseNode& node_;
   UMockdevIoctlBase* base_ = umockdev_ioctl_base_new();
   GSource* frames_ = nullptr;
+  std::promise<void> stopped_;
   std::map<UMockdevIoctlClient*, FuseOpen> opens_;
   std::vector<UMockdevIoctlClient*> waiting_;
   FuseOpen last_open_ = 0;

@@ -4,7 +4,6 @@
 #include <cstdio>
 #include <filesystem>
 #include <memory>
-#include <optional>
 #include <span>
 #include <string>
 
@@ -66,9 +65,8 @@ TEST_CASE("umockdev: libusb finds the Falcon and brings it from homing to a forc
   kerf::Emulator emulator(std::make_unique<kerf::FalconModel>(), kerf::test::touching_hand());
   kerf::UsbfsNode node({.firmware_runs = true}, {}, emulator);
   {
-    std::optional<UmockdevNode> served;
     const Bed bed(falcon_on_usb());
-    served.emplace(bed.get(), "/dev/bus/usb/001/002", node);
+    const UmockdevNode served(bed.get(), "/dev/bus/usb/001/002", node);
     kerf::UsbPort port({"", ""}, 0, kGoOn);
     ServoSession session(Personality::falcon, port);
     const auto course = session.run(8000, [](const auto& c) { return c.contact > 100; });

@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+
+#include "controller/kernel/proxy/contact_math.hpp"
+#include "controller/kernel/proxy/plane.hpp"
+#include "controller/kernel/proxy/plane_bundle.hpp"
+
+namespace kerf {
+
+/// How the solid curves around a tool that sits in a bowl or a slot hardly wider than itself: the
+/// places that its centre may take are a hollow, and over a step `moved` its normal turns by
+/// (across . moved) / radius along `across`. Of length 0: no bowl, or not known.
+template <class N>
+struct Curve {
+  ContactVec<typename N::Unit> across{};
+  typename N::Real radius{};  ///< units
+
+  [[nodiscard]] constexpr bool known() const noexcept { return radius > typename N::Real(0); }
+};
+
+/// The curves of the last two steps, as the symmetric rank-one estimate of a curvature (Nocedal and
+/// Wright 2006, 6.2, with a memory of two).
+///
+/// A plane alone does not tell how far to go in a bowl. Where a load L presses on it, the way left
+/// falls by 1 + L / radius times the step along `across`: a slot with a play of a tenth of a voxel
+/// turns a step of the hand of 0.01 into a swing of 0.2. And what a tool has milled with a
+/// wandering hand is a bowl along both directions of its plane.
+template <class N>
+class Bowl {
+  using Real = typename N::Real;
+  using Unit = typename N::Unit;
+  using Place = ContactVec<Real>;
+
+ public:
+  /// What the deepest planes of two places tell, the second `moved` from the first. Planes that are
+  /// unlike are two walls. Where the normals turn away from each other there is a bump: its steps
+  /// fall short, and are left alone.
+  constexpr void learn(const Probe<N>& before, const Probe<N>& after, Place moved) noexcept {
+    constexpr double kTelling = 0.01;  // units: over less noise turns a normal as much
+    if (before.count == 0 || after.count == 0) return forget();
+    const auto& from = before.plane[0].normal;
+    const auto& to = after.plane[0].normal;
+    if (dot(from, to) < Unit(kFalseCreaseCosine)) return forget();
+    const Real length = norm(moved);
+    if (length < Real(kTelling)) return;
+    const Place turned{Real(from.x - to.x), Real(from.y - to.y), Real(from.z - to.z)};
+    const Curve<N> whole = curve_of(turned, moved, Real(0));
+    const Curve<N> rest = last_.known() ? curve_of(turned - turn_of_normal(last_, moved), moved,
+                                                   multiply<Real>(Unit(kSkew), length))
+                                        : Curve<N>{};
+    first_ = rest.known() ? last_ : whole;
+    second_ = rest;
+    last_ = whole;
+  }
+
+  /// The way of a step that ends where the load presses straight: Newton's, with this curvature.
+  [[nodiscard]] constexpr Place eased(Place way, Real load) const noexcept {
+    if (!first_.known() || load <= Real(0)) return way;
+    const Unit p = share<N>(load, load + first_.radius);
+    const Real a = along<N>(first_.across, way);
+    if (!second_.known()) return way - times<N>(first_.across, multiply<Real>(p, a));
+    const Unit q = share<N>(load, load + second_.radius);
+    const Real b = along<N>(second_.across, way);
+    const Unit mixed = dot(first_.across, second_.across);
+    const Real whole(Unit(1) - mixed * p * (mixed * q));
+    if (whole < Real(0.02)) return way - times<N>(second_.across, multiply<Real>(q, b));
+    const Real one = multiply<Real>(p, a - multiply<Real>(mixed * q, b)) / whole;
+    const Real two = multiply<Real>(q, b - multiply<Real>(mixed * p, a)) / whole;
+    return way - times<N>(first_.across, one) - times<N>(second_.across, two);
+  }
+
+ private:
+  static constexpr double kSkew = 0.3;  ///< cosine to a step above which the rest of a turn tells
+
+  constexpr void forget() noexcept { first_ = second_ = last_ = {}; }
+
+  static constexpr Curve<N> curve_of(Place turned, Place moved, Real least) noexcept {
+    constexpr double kTightest = 0.05;  // units: no play is noticed below
+    const auto across = direction_of<N>(turned);
+    const Real closing = along<N>(across, moved);
+    if (closing <= least) return {};
+    return {across, std::max(closing / norm(turned), Real(kTightest))};
+  }
+  static constexpr Place turn_of_normal(const Curve<N>& curve, Place moved) noexcept {
+    return times<N>(curve.across, along<N>(curve.across, moved) / curve.radius);
+  }
+
+  Curve<N> first_, second_;  ///< of the estimate
+  Curve<N> last_;            ///< of the last step alone
+};
+
+}  // namespace kerf

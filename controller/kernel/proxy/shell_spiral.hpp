@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "controller/kernel/proxy/free_bricks.hpp"
+#include "controller/kernel/proxy/shell_table.hpp"
+
+namespace kerf {
+
+/// A small shell whose samples follow Fibonacci's spiral about the axis y, for a look at a contact;
+/// it is laid out anew for each.
+template <class N, std::size_t kCount>
+struct SpiralArrays {
+  static constexpr std::size_t kGroups = kCount / kShellGroup;
+  static_assert(kGroups * kShellGroup == kCount);
+
+  std::array<std::array<ShellNumber<N>, kCount>, 3> lever{};
+  std::array<ShellNumber<N>, kGroups> middle{};
+  std::array<std::uint8_t, kGroups> bricks{};
+  double reach{};
+
+  struct Place {
+    double across, along;
+  };
+  /// `place_of(i)`: how far sample i is from the axis, and where along it. No offset is longer than
+  /// `longest` units.
+  template <class PlaceOf>
+  constexpr SpiralArrays(double longest, PlaceOf place_of) noexcept : reach(longest) {
+    constexpr double kOne = N::kIsFixed ? 32768 : 1;
+    // Of the golden angle, pi (3 - sqrt(5)).
+    constexpr double kCosine = -0.7373688780783197, kSine = 0.6754902942615238;
+    double cosine = 1, sine = 0;
+    for (std::size_t i = 0; i < kCount; ++i) {
+      const Place place = place_of(i);
+      const double at[3] = {place.across * cosine, place.along, place.across * sine};
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        lever[axis][i] = static_cast<ShellNumber<N>>(kOne * at[axis]);
+      }
+      const double turned = cosine * kCosine - sine * kSine;
+      sine = sine * kCosine + cosine * kSine;
+      cosine = turned;
+    }
+    bricks.fill(static_cast<std::uint8_t>(free_bricks_for(reach)));
+  }
+
+  /// No voxel's edge is shorter than a unit, so `reach` holds in voxels.
+  [[nodiscard]] constexpr ShellTable<N> table() const noexcept {
+    ShellTable<N> table;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      table.lever[axis] = lever[axis].data();
+      table.middle[axis] = middle.data();
+    }
+    table.bricks = bricks.data();
+    table.count = static_cast<std::int32_t>(kCount);
+    table.groups = static_cast<std::int32_t>(kGroups);
+    table.reach = static_cast<ShellNumber<N>>(reach * (N::kIsFixed ? 65536 : 1));
+    return table;
+  }
+};
+
+/// Memory of the places of a spiral.
+template <class N, std::size_t kCount>
+struct SpiralPlaces {
+  std::array<std::array<ShellNumber<N>, kCount>, 3> offset;
+  std::array<std::array<ShellNumber<N>, SpiralArrays<N, kCount>::kGroups>, 3> middle;
+
+  [[nodiscard]] ShellPlaces<N> places() noexcept {
+    return {{offset[0].data(), offset[1].data(), offset[2].data()},
+            {middle[0].data(), middle[1].data(), middle[2].data()}};
+  }
+};
+
+}  // namespace kerf

@@ -1,0 +1,167 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+
+#include "controller/kernel/cover_table.hpp"
+
+// Weighing and cutting what a tool covers, with the bits of `covered_voxels` and of the list's
+// `take`: one text for every instruction set, as loops that a compiler turns into vectors. Included
+// after the set's `weigh_lanes` and `take_lanes`; internal linkage, for the reason told at
+// KernelSet.
+
+namespace kerf {
+namespace {
+
+/// A loop over lanes: g++ would unroll it before it could turn it into vectors.
+#if defined(__clang__)
+#define KERF_LANES
+#else
+#define KERF_LANES _Pragma("GCC unroll 1")
+#endif
+
+/// covered times speed / 2^15, in 32 bits.
+[[gnu::always_inline]] inline std::uint32_t weight_in_parts(std::uint32_t covered,
+                                                            std::uint32_t speed) noexcept {
+  return (covered >> 15) * speed + ((covered & 0x7fff) * speed >> 15);
+}
+
+/// Sets the materials of a group.
+[[gnu::always_inline]] inline void find_materials(const CoverRow& row, CoveredGroup& group) {
+  constexpr Label kLast = kMaxCutMaterials - 1;
+  group.mixed = false;
+  if (row.labels == nullptr) {
+    std::memset(group.material, 0, sizeof group.material);
+    return;
+  }
+  alignas(kCoverGroup) Label label[kCoverGroup], low[kCoverGroup], high[kCoverGroup];
+  if (group.at >= 0 && group.at + kCoverGroup <= row.label_count) {
+    std::memcpy(label, row.labels + group.at, sizeof label);
+    std::uint64_t eight[2];
+    std::memcpy(eight, label, sizeof eight);
+    const std::uint64_t alike = label[0] * std::uint64_t{0x0101'0101'0101'0101};
+    if (eight[0] == alike && eight[1] == alike) {  // mostly
+      std::memset(group.material, label[0] < kLast ? label[0] : kLast, sizeof label);
+      return;
+    }
+  } else {
+    for (std::int32_t i = 0; i < kCoverGroup; ++i) {
+      label[i] = group.covered[i] != 0 ? row.labels[group.at + i] : Label{0};
+    }
+  }
+  KERF_LANES
+  for (std::int32_t i = 0; i < kCoverGroup; ++i) {
+    label[i] = label[i] < kLast ? label[i] : kLast;
+    low[i] = group.covered[i] != 0 ? label[i] : kLast;
+    high[i] = group.covered[i] != 0 ? label[i] : Label{0};
+  }
+  Label least = kLast, most = 0;
+  KERF_LANES
+  for (std::int32_t i = 0; i < kCoverGroup; ++i) {
+    least = low[i] < least ? low[i] : least;
+    most = high[i] > most ? high[i] : most;
+  }
+  group.mixed = least != most;
+  if (group.mixed) {
+    std::memcpy(group.material, label, sizeof label);
+  } else {
+    std::memset(group.material, most, sizeof label);
+  }
+}
+
+[[gnu::always_inline]] inline void add_weights(const CoveredGroup& group, std::uint64_t sum,
+                                               std::uint64_t* by_material) noexcept {
+  if (!group.mixed) {
+    by_material[group.material[0]] += sum;
+    return;
+  }
+  KERF_LANES
+  for (std::int32_t i = 0; i < kCoverGroup; ++i) by_material[group.material[i]] += group.weight[i];
+}
+
+/// Lists the groups of a row that the tool covers some of, at most `room`, and adds their weights.
+/// Returns their number.
+std::int32_t weigh_row(const CoverRow& row, CoveredGroup* list, std::int32_t room, CoverSums& sums,
+                       std::uint64_t* by_material) noexcept {
+  sums = {};
+  std::int32_t listed = 0;
+  for (std::int32_t lane = 0; lane < row.count && listed < room; lane += kCoverGroup) {
+    CoveredGroup& group = list[listed];
+    CoverSums own;
+    if (!weigh_lanes(row, lane, group, own)) continue;
+    sums.covered += own.covered;
+    sums.covered_number += own.covered_number + own.covered * static_cast<std::uint64_t>(lane);
+    sums.weight += own.weight;
+    sums.weight_speed += own.weight_speed;
+    group.at = row.at + lane;
+    group.place[0] = static_cast<std::int16_t>(row.first.x + lane);
+    group.place[1] = static_cast<std::int16_t>(row.first.y);
+    group.place[2] = static_cast<std::int16_t>(row.first.z);
+    find_materials(row, group);
+    add_weights(group, own.weight, by_material);
+    ++listed;
+  }
+  return listed;
+}
+
+/// Weights of what is still covered; adds them up.
+void weigh_again(CoveredGroup* list, std::int32_t count, std::uint64_t* by_material) noexcept {
+  for (CoveredGroup* group = list; group != list + count; ++group) {
+    std::uint64_t sum = 0;
+    KERF_LANES
+    for (std::int32_t i = 0; i < kCoverGroup; ++i) {
+      group->weight[i] = weight_in_parts(group->covered[i], group->speed[i]);
+      sum += group->weight[i];
+    }
+    add_weights(*group, sum, by_material);
+  }
+}
+
+/// Takes budgets from `count` groups, of a volume of `entries`.
+void take_steps(const CoverSpend& spend, CoveredGroup* list, std::int32_t count,
+                std::uint16_t* density, std::int64_t entries, CoverTaken& taken) noexcept {
+  for (CoveredGroup* group = list; group != list + count; ++group) {
+    alignas(32) std::uint16_t rho[kCoverGroup];
+    const std::int64_t at = group->at;
+    const bool whole = at >= 0 && at + kCoverGroup <= entries;
+    if (whole) {
+      std::memcpy(rho, density + at, sizeof rho);
+    } else {  // no lane outside of the volume is covered
+      KERF_LANES
+      for (std::int32_t i = 0; i < kCoverGroup; ++i) {
+        rho[i] = group->covered[i] != 0 ? density[at + i] : 0;
+      }
+    }
+    const TakenLanes lost = take_lanes(spend, *group, rho);
+    taken.full = taken.full || lost.full;
+    if (lost.lanes == 0) continue;
+    if (group->mixed) {
+      for (std::int32_t i = 0; i < kCoverGroup; ++i)
+        taken.steps[group->material[i]] += lost.steps[i];
+    } else {
+      taken.steps[group->material[0]] += lost.sum;
+    }
+    if (whole) {  // what loses nothing is written back as it is
+      std::memcpy(density + at, rho, sizeof rho);
+    } else {
+      for (std::uint32_t left = lost.lanes; left != 0; left &= left - 1) {
+        const int i = __builtin_ctz(left);
+        density[at + i] = rho[i];
+      }
+    }
+    const std::int32_t x = group->place[0], y = group->place[1], z = group->place[2];
+    const std::int32_t first = x + __builtin_ctz(lost.lanes);
+    const std::int32_t end = x + 32 - __builtin_clz(lost.lanes);
+    taken.lo.x = first < taken.lo.x ? first : taken.lo.x;
+    taken.lo.y = y < taken.lo.y ? y : taken.lo.y;
+    taken.lo.z = z < taken.lo.z ? z : taken.lo.z;
+    taken.hi.x = end > taken.hi.x ? end : taken.hi.x;
+    taken.hi.y = y + 1 > taken.hi.y ? y + 1 : taken.hi.y;
+    taken.hi.z = z + 1 > taken.hi.z ? z + 1 : taken.hi.z;
+  }
+}
+
+}  // namespace
+}  // namespace kerf

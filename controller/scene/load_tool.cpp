@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "controller/scene/load_tool.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <utility>
+
+#include "controller/scene/mesh_tool.hpp"
+#include "controller/scene/scene_error.hpp"
+#include "controller/scene/scene_text.hpp"
+#include "controller/scene/stl_file.hpp"
+#include "controller/scene/tool_shapes.hpp"
+
+namespace kerf {
+namespace {
+
+void check_side(const ToolSpec& spec, double side_vox) {
+  if (side_vox <= kMaxToolSide) return;
+  refuse(spec.size_place, " makes a tool of " + number_text(side_vox) +
+                              " samples along a side, above the limit of " +
+                              std::to_string(kMaxToolSide) +
+                              "; use a smaller tool or a coarser pitch");
+}
+
+SceneTool load_shape(const ToolSpec& spec, const ToolSize& size, double voxel_mm) {
+  if (!size.size_vox && size.radius_mm < voxel_mm / 2) {
+    refuse(spec.size_place, " is below half a voxel (" + number_text(voxel_mm / 2) +
+                                "); use a larger radius or a finer volume");
+  }
+  check_side(spec, tool_side_vox(spec.shape, size));
+  return make_tool(spec.name, spec.shape, size);
+}
+
+SceneTool load_mesh(const ToolSpec& spec, double pitch_mm, double voxel_mm,
+                    const std::filesystem::path& folder) {
+  const std::filesystem::path path = folder / spec.file;
+  ToolMesh mesh;
+  try {
+    mesh = join_triangles(read_stl(path), spec.scale, path.string());
+  } catch (const SceneError& error) {
+    refuse(spec.where, std::string(": ") + error.what());
+  }
+  check_side(spec, mesh_side_vox(mesh, pitch_mm));
+  SceneTool tool = make_mesh_tool(spec.name, std::move(mesh), pitch_mm);
+  if (tool.radius_mm < voxel_mm / 2) {
+    refuse(spec.size_place, " reaches less than half a voxel (" + number_text(voxel_mm / 2) +
+                                " mm) from its axis; use a larger scale or a finer volume");
+  }
+  if (tool.offsets.empty()) {
+    refuse(spec.size_place, " is so thin that no sample lies in it, they are " +
+                                number_text(pitch_mm) +
+                                " mm apart; give a smaller pitch_mm or a larger scale");
+  }
+  return tool;
+}
+
+}  // namespace
+
+TouchedVolumes touched_volumes(const std::vector<SceneVolume>& volumes) {
+  TouchedVolumes touched;
+  for (const SceneVolume& volume : volumes) {
+    if (!volume.solid) continue;
+    const VolumeImage& image = volume.image;
+    const std::array<std::int32_t, 3> extent = {image.grid.nx, image.grid.ny, image.grid.nz};
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      touched.voxel_mm = std::min(touched.voxel_mm, image.spacing_mm[axis]);
+      touched.side_mm = std::max(touched.side_mm, image.spacing_mm[axis] * extent[axis]);
+    }
+  }
+  return touched;
+}
+
+SceneTool load_tool(const ToolSpec& spec, const TouchedVolumes& touched,
+                    const std::filesystem::path& folder) {
+  ToolSize size = spec.size;
+  if (!spec.pitch_given) size.pitch_mm = touched.voxel_mm;
+  if (size.pitch_mm > touched.voxel_mm * (1 + 1e-9)) {
+    refuse(spec.pitch_place, " is above the smallest voxel edge and leaves gaps; use at most " +
+                                 number_text(touched.voxel_mm));
+  }
+  SceneTool tool = spec.shape == kMeshShape
+                       ? load_mesh(spec, size.pitch_mm, touched.voxel_mm, folder)
+                       : load_shape(spec, size, touched.voxel_mm);
+  tool.turns = spec.turns;
+  const double side_mm = std::max(2 * tool.radius_mm, tool.length_mm);
+  if (side_mm > touched.side_mm) {
+    refuse(spec.size_place, " makes a tool of " + number_text(side_mm) + " mm" +
+                                (tool.length_mm > 2 * tool.radius_mm ? " (its length)" : "") +
+                                ", larger than the volume (" + number_text(touched.side_mm) +
+                                " mm); use a smaller tool");
+  }
+  return tool;
+}
+
+}  // namespace kerf

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <utility>
+
+#include "controller/scene/mesh_surface.hpp"
+#include "controller/scene/mesh_tool.hpp"
+#include "controller/scene/scene_error.hpp"
+#include "controller/scene/stl_file.hpp"
+#include "controller/scene/tool_shapes.hpp"
+#include "tests/fuzz/text_fuzz.hpp"
+
+/// The file, and what is made of a mesh that passes.
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  kerf::fuzz::must_read_or_explain<kerf::SceneError>(data, size, [](std::string_view bytes) {
+    kerf::ToolMesh mesh = kerf::join_triangles(kerf::parse_stl(bytes, "bur.stl"), 1, "bur.stl");
+    static_cast<void>(kerf::mesh_surface_samples(mesh, 64));
+    if (kerf::mesh_side_vox(mesh, 0.25) <= kerf::kMaxToolSide) {
+      static_cast<void>(kerf::make_mesh_tool("bur", std::move(mesh), 0.25));
+    }
+    return 0;
+  });
+  return 0;
+}

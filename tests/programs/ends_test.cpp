@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: Apache-2.0
+// What ends or holds up a controller that pushes: signals, a standstill, the death of its device.
+#include <algorithm>
+#include <cmath>
+#include <csignal>
+#include <cstdint>
+#include <filesystem>
+#include <thread>
+
+#include <doctest/doctest.h>
+
+#include "tests/programs/pair.hpp"
+
+using kerf::test::eventually;
+using kerf::test::Pair;
+using namespace std::chrono_literals;
+
+TEST_CASE("kill -9 of the emulator: fault in the report, exit 1 after 2000 ticks") {
+  Pair pair;
+  pair.start("touch.toml", {"--seconds", "60"});
+  REQUIRE(eventually(
+      [&] {
+        try {
+          const auto connection = kerf::connect_segment(pair.name);
+          const auto latest = connection.reader().latest();
+          return latest && (latest->flags & kerf::kFlagMotorsOn) != 0;
+        } catch (const kerf::SegmentError&) {
+          return false;
+        }
+      },
+      20s));
+  const auto connection = kerf::connect_segment(pair.name);
+  pair.emulator->signal(SIGKILL);
+  CHECK(pair.controller->wait() == 1);
+  const auto report = pair.report();
+  const auto met = [&](const char* name) {
+    return std::ranges::any_of(report["faults"], [&](const auto& f) { return f["name"] == name; });
+  };
+  CHECK(met("stale_input"));
+  CHECK(met("device_gone"));
+
+  // The segment outlives the controller: in it, from 20 silent ticks on there is no force.
+  const kerf::SegmentReader& reader = connection.reader();
+  const std::uint64_t head = reader.state_head();
+  int silent = 0;
+  for (std::uint64_t i = head > 3000 ? head - 3000 : 0; i < head; ++i) {
+    kerf::TickRecord record{};
+    REQUIRE(reader.state_at(i, record) == kerf::ReadState::ok);
+    silent = record.stale != 0 ? silent + 1 : 0;
+    if (silent < 20) continue;
+    REQUIRE(record.commanded_force_n[0] == 0);
+    REQUIRE(record.commanded_force_n[1] == 0);
+    REQUIRE(record.commanded_force_n[2] == 0);
+    REQUIRE((record.flags & kerf::kFlagMotorsOn) == 0);
+  }
+  CHECK(silent > 1900);
+  CHECK_FALSE(connection.alive());
+}
+
+TEST_CASE("SIGINT and SIGTERM end in order: exit 0, a report, no socket left") {
+  for (const int signal : {SIGINT, SIGTERM}) {
+    Pair pair;
+    pair.start("touch.toml", {});
+    REQUIRE(pair.ticks_within(20s));
+    pair.controller->signal(signal);
+    CHECK(pair.controller->wait() == 0);
+    CHECK(pair.report()["end"] == "stopped");
+    CHECK_FALSE(std::filesystem::exists(kerf::segment_socket(pair.name)));
+  }
+}
+
+TEST_CASE("a controller that stood still with all its threads pushes again only by the ramp") {
+  Pair pair;
+  pair.start("touch.toml", {});
+  REQUIRE(pair.ticks_within(20s));
+  const auto connection = kerf::connect_segment(pair.name);
+  const kerf::SegmentReader& reader = connection.reader();
+  const auto force_n = [](const kerf::TickRecord& record) {
+    return std::hypot(record.commanded_force_n[0], record.commanded_force_n[1],
+                      record.commanded_force_n[2]);
+  };
+  const auto pushes = [&] {
+    const auto latest = reader.latest();
+    return latest && force_n(*latest) > 0.3;
+  };
+  REQUIRE(eventually(pushes, 20s));
+  pair.controller->signal(SIGSTOP);
+  std::this_thread::sleep_for(60ms);
+  pair.controller->signal(SIGCONT);
+  const std::uint64_t stopped_at = reader.state_head();
+  CHECK(eventually([&] { return reader.state_head() > stopped_at + 10 && pushes(); }, 2s));
+  pair.controller->signal(SIGTERM);
+  CHECK(pair.controller->wait() == 0);
+
+  // However deep the hand is by then, the ramp bounds its force: a hundredth more in each tick.
+  constexpr double kPeakN = 3.3;
+  constexpr int kFadeTicks = 100;
+  int standstills = 0;
+  int fade_ticks = kFadeTicks;
+  const std::uint64_t head = reader.state_head();
+  kerf::TickRecord last{};
+  for (std::uint64_t i = head > 3000 ? head - 3000 : 0; i < head; ++i) {
+    kerf::TickRecord record{};
+    REQUIRE(reader.state_at(i, record) == kerf::ReadState::ok);
+    if (last.tick != 0 && record.start_ns > last.start_ns + 40'000'000) {
+      if (force_n(last) > 0.3) ++standstills;
+      fade_ticks = 0;
+    }
+    if (fade_ticks < kFadeTicks) {
+      ++fade_ticks;
+      CHECK(force_n(record) <= kPeakN * fade_ticks / kFadeTicks);
+    }
+    last = record;
+  }
+  CHECK(standstills >= 1);
+  const auto events = pair.report()["faults"];
+  CHECK(std::ranges::any_of(events, [](const auto& event) {
+    return event["name"] == "watchdog" || event["name"] == "stood_still";
+  }));
+}

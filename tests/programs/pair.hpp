@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <chrono>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+#include <unistd.h>
+
+#include "shared/segment/hand_over.hpp"
+#include "tests/programs/process.hpp"
+
+namespace kerf::test {
+
+inline const std::string kBin = KERF_TEST_BIN;
+inline const std::string kScenes = KERF_TEST_SCENES;
+inline const std::string kTorqueScale = "0.342,0.342,0.342";  // of the emulated Omni
+
+inline std::string unique_name() {
+  static int count = 0;
+  return "test-" + std::to_string(getpid()) + "-" + std::to_string(++count);
+}
+
+/// Emulator and controller, as processes, on a private socket.
+struct Pair {
+  TemporaryFolder folder;
+  std::string name = unique_name();
+  std::string scene = "phantom.toml";
+  std::optional<Process> emulator;
+  std::optional<Process> controller;
+
+  void start(const std::string& hand, std::vector<std::string> controller_options,
+             std::vector<std::string> emulator_options = {}) {
+    const std::string socket = (folder / "port").string();
+    std::vector<std::string> device{kBin + "/kerf-emulator",
+                                    "--personality",
+                                    "omni",
+                                    "--front",
+                                    "socket",
+                                    "--socket",
+                                    socket,
+                                    "--hand",
+                                    kScenes + "/hands/" + hand};
+    device.insert(device.end(), emulator_options.begin(), emulator_options.end());
+    emulator.emplace(device, folder / "emulator.log");
+    std::vector<std::string> servo{kBin + "/kerf-controller",
+                                   "--scene",
+                                   kScenes + "/" + scene,
+                                   "--torque-scale",
+                                   kTorqueScale,
+                                   "--port",
+                                   "socket:" + socket,
+                                   "--name",
+                                   name,
+                                   "--report",
+                                   (folder / "report.json").string()};
+    servo.insert(servo.end(), controller_options.begin(), controller_options.end());
+    controller.emplace(servo, folder / "controller.log");
+  }
+  /// Waits until the servo has published ticks.
+  [[nodiscard]] bool ticks_within(std::chrono::milliseconds patience) const {
+    return eventually(
+        [&] {
+          try {
+            return kerf::connect_segment(name).reader().state_head() > 10;
+          } catch (const kerf::SegmentError&) {
+            return false;
+          }
+        },
+        patience);
+  }
+  [[nodiscard]] nlohmann::json report() const {
+    return nlohmann::json::parse(text_of(folder / "report.json"));
+  }
+};
+
+}  // namespace kerf::test

@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "controller/scene/stl_file.hpp"
+
+#include <algorithm>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include <doctest/doctest.h>
+
+#include "controller/scene/tool_mesh.hpp"
+#include "hil/lab/extremes/loft.hpp"
+#include "tests/scene/stl_support.hpp"
+#include "tests/scene/support.hpp"
+
+using namespace kerf;
+using test::binary_stl;
+using test::text_stl;
+
+namespace {
+
+using Triangles = std::vector<LooseTriangle>;
+
+const Triangles kBar = extremes::prism(1.5, 4, 4);  // 16 triangles
+
+std::string parse_error(const std::string& bytes) {
+  return test::error_of([&] { static_cast<void>(parse_stl(bytes, "bur.stl")); });
+}
+
+std::string join_error(const Triangles& triangles, double scale = 1) {
+  return test::error_of([&] { static_cast<void>(join_triangles(triangles, scale, "bur.stl")); });
+}
+
+bool begins(const std::string& text, const std::string& with) {
+  return text.starts_with(with);
+}
+
+double volume_mm3(const ToolMesh& mesh) {
+  double sum = 0;
+  for (const auto& t : mesh.triangles) {
+    const auto [a, b, c] = mesh.corners(t);
+    sum += extremes::dot(a, extremes::cross(b, c)) / 6;
+  }
+  return sum;
+}
+
+}  // namespace
+
+TEST_CASE("a binary STL and the same as text give the same triangles") {
+  CHECK(parse_stl(binary_stl(kBar), "bur.stl") == kBar);
+  CHECK(parse_stl(text_stl(kBar), "bur.stl") == kBar);
+  std::string crlf = text_stl(kBar);
+  for (std::size_t at = 0; (at = crlf.find('\n', at)) != crlf.npos; at += 2) crlf.insert(at, "\r");
+  CHECK(parse_stl(crlf, "bur.stl") == kBar);
+}
+
+TEST_CASE("a binary STL whose header begins as text does is still binary") {
+  const std::string bytes = binary_stl(kBar);
+  CHECK(parse_stl("solid" + bytes.substr(5), "bur.stl") == kBar);
+}
+
+TEST_CASE("several solids of one text are one mesh") {
+  CHECK(parse_stl(text_stl(kBar) + text_stl(kBar), "bur.stl").size() == 2 * kBar.size());
+}
+
+TEST_CASE("a file that is no STL is refused with the place, what is there and the way out") {
+  const std::string bytes = binary_stl(kBar), text = text_stl(kBar);
+  CHECK(parse_error(bytes.substr(0, bytes.size() - 1)) ==
+        "bur.stl: a binary STL of 16 triangles has 884 bytes, and the file has 883; export the "
+        "mesh again");
+  CHECK(begins(parse_error(bytes + "x"), "bur.stl: a binary STL of 16 triangles has 884 bytes"));
+  CHECK(parse_error(text.substr(0, text.rfind("endloop"))) ==
+        "bur.stl:112: the file ends where endloop belongs; export the mesh again");
+  CHECK(parse_error("solid x\nfacet normal 0 0 1\nouter loop\nvertex 0 one 0\n") ==
+        "bur.stl:4: \"one\" where a number belongs; export the mesh again");
+  CHECK(begins(parse_error("solid x\nfacet normal 0 0 1\nouter loop\nvertex 1e99 0 0\n"),
+               "bur.stl:4: \"1e99\" where a number"));
+  CHECK(begins(parse_error("ply\n"), "bur.stl:1: \"ply\" where solid belongs"));
+  CHECK(parse_stl("", "bur.stl").empty());
+}
+
+TEST_CASE("a file of more triangles than are taken is refused before they are") {
+  std::string bytes(80, ' ');
+  test::append_word(bytes, kMaxMeshTriangles + 1);
+  bytes.resize(84 + 50 * (kMaxMeshTriangles + 1));
+  CHECK(parse_error(bytes) == "bur.stl: more than 65536 triangles; simplify the mesh");
+}
+
+TEST_CASE("joined triangles share corners, stand in the middle and are in mm") {
+  Triangles high = kBar;
+  for (LooseTriangle& t : high) {
+    for (auto& corner : t) corner[1] += 10;
+  }
+  const ToolMesh mesh = join_triangles(high, 0.5, "bur.stl");
+  CHECK(mesh.points_mm.size() == 10);
+  CHECK(mesh.triangles.size() == 16);
+  double low = 1e9, top = -1e9;
+  for (const auto& p : mesh.points_mm) {
+    low = std::min(low, p[1]);
+    top = std::max(top, p[1]);
+  }
+  CHECK(low == -1.0);
+  CHECK(top == 1.0);
+  CHECK(volume_mm3(mesh) == doctest::Approx(4.5 * 4 / 8));
+}
+
+TEST_CASE("a mesh that is inside out is turned, and a triangle without area is left out") {
+  Triangles inside_out = kBar;
+  for (LooseTriangle& t : inside_out) std::swap(t[0], t[1]);
+  CHECK(volume_mm3(join_triangles(inside_out, 1, "bur.stl")) == doctest::Approx(4.5 * 4));
+  Triangles more = kBar;
+  more.push_back({kBar[0][0], kBar[0][1], kBar[0][0]});
+  CHECK(join_triangles(more, 1, "bur.stl").triangles.size() == 16);
+}
+
+TEST_CASE("a mesh that encloses nothing or has a hole is refused with the edge") {
+  CHECK(join_error({}) == "bur.stl: no triangles; export a closed mesh");
+  Triangles open = kBar;
+  open.pop_back();
+  CHECK(begins(join_error(open), "bur.stl: not closed, the edge from ("));
+  CHECK(join_error(open).find(" has no partner; close the hole there") != std::string::npos);
+  Triangles twisted = kBar;
+  std::swap(twisted[3][0], twisted[3][1]);
+  CHECK(join_error(twisted).find("turned against each other") != std::string::npos);
+  Triangles flat = {kBar[0], kBar[0]};
+  std::swap(flat[1][0], flat[1][1]);
+  CHECK(begins(join_error(flat), "bur.stl: the mesh encloses 0 mm^3"));
+}
+
+TEST_CASE("coordinates that no tool has are refused with their triangle") {
+  for (const float bad : {std::numeric_limits<float>::quiet_NaN(),
+                          std::numeric_limits<float>::infinity(), 1001.0F, -3e38F}) {
+    Triangles triangles = kBar;
+    triangles[2][1][0] = bad;
+    CHECK(begins(join_error(triangles), "bur.stl: triangle 3 has the coordinate "));
+  }
+  CHECK(begins(join_error(kBar, 1000), "bur.stl: triangle 1 has the coordinate "));
+}
