@@ -14,37 +14,63 @@
 namespace kerf {
 namespace {
 
-/// Radius and length of the cylinder about the tool's axis that holds its samples, mm.
-struct Hull {
-  double radius = 0, length = 0;
+/// The cylinder about the tool's axis that holds its samples, grown by boxes of three of the
+/// volume's longest voxel edges; mm. `along_x` is the square of the cosine of its axis to the
+/// volume's x axis; the other two are alike. What is asked of it is symmetric in y and z and
+/// concave in the three squares, whose sum is 1: for no other direction it is more.
+class GrownHull {
+ public:
+  GrownHull(const SceneTool& tool, const SceneVolume& volume) {
+    double low = 1e9, high = -1e9;  // half pitches
+    for (const ToolOffset& offset : tool.offsets) {
+      radius_ = std::max(radius_, std::hypot(double(offset[0]), double(offset[2])));
+      low = std::min(low, double(offset[1]));
+      high = std::max(high, double(offset[1]));
+    }
+    radius_ *= tool.pitch_mm / 2;
+    length_ = std::max(0.0, high - low) * tool.pitch_mm / 2;
+    const auto& h = volume.image.spacing_mm;
+    grown_ = 3 * std::max({h[0], h[1], h[2]});
+  }
+
+  [[nodiscard]] double volume(double along_x) const {
+    const double aside = (1 - along_x) / 2;
+    const double shadows = shadow(along_x) + 2 * shadow(aside);
+    const double widths = width(along_x) + 2 * width(aside);
+    return disc() * length_ + grown_ * (shadows + grown_ * (widths + grown_));
+  }
+  /// Along x.
+  [[nodiscard]] double shadow_area(double along_x) const {
+    return shadow(along_x) + grown_ * (2 * width((1 - along_x) / 2) + grown_);
+  }
+
+ private:
+  [[nodiscard]] double disc() const { return std::numbers::pi * radius_ * radius_; }
+  /// Before it is grown, along a direction with this square of the axis' cosine.
+  [[nodiscard]] double shadow(double square) const {
+    return 2 * radius_ * length_ * std::sqrt(1 - square) + disc() * std::sqrt(square);
+  }
+  [[nodiscard]] double width(double square) const {
+    return length_ * std::sqrt(square) + 2 * radius_ * std::sqrt(1 - square);
+  }
+
+  double radius_ = 0, length_ = 0, grown_ = 0;
 };
 
-Hull hull_of(const SceneTool& tool) {
-  double radius = 0, low = 1e9, high = -1e9;  // half pitches
-  for (const ToolOffset& offset : tool.offsets) {
-    radius = std::max(radius, std::hypot(double(offset[0]), double(offset[2])));
-    low = std::min(low, double(offset[1]));
-    high = std::max(high, double(offset[1]));
+/// Of a concave function between 0 and 1.
+template <class Function>
+double maximum(Function f) {
+  constexpr int kThirds = 60;
+  double low = 0, high = 1;
+  for (int i = 0; i < kThirds; ++i) {
+    const double third = (high - low) / 3;
+    if (f(low + third) < f(high - third)) {
+      low += third;
+    } else {
+      high -= third;
+    }
   }
-  const double half_pitch_mm = tool.pitch_mm / 2;
-  return {radius * half_pitch_mm, std::max(0.0, high - low) * half_pitch_mm};
-}
-
-double grown_by(const SceneVolume& volume) {
-  const auto& h = volume.image.spacing_mm;
-  return 3 * std::max({h[0], h[1], h[2]});
-}
-
-/// Rows along x that meet the grown hull.
-double rows_by_hull(const SceneTool& tool, const SceneVolume& volume) {
-  const auto& h = volume.image.spacing_mm;
-  const double b = grown_by(volume);
-  const auto [radius, length] = hull_of(tool);
-  // A shadow is 2 r L sin + pi r^2 cos of the axis' angle to x; of the two widths that it grows by,
-  // each is L cos + 2 r sin.
-  const double shadow = std::hypot(2 * radius * length, std::numbers::pi * radius * radius);
-  const double widths = length * std::numbers::sqrt2 + 2 * 2 * radius;
-  return (shadow + b * widths + b * b) / (h[1] * h[2]);
+  return f((low + high) / 2);
 }
 
 /// For each row of the overlap the bits of what is covered, word by word.
@@ -67,20 +93,6 @@ void each_covered_word(const AlignedTable& table, Visit&& visit) {
   }
 }
 
-std::size_t by_hull(const SceneTool& tool, const SceneVolume& volume) {
-  // Sums over three axes of |cos| and of sin of their angles to one direction.
-  constexpr double kMostCosines = std::numbers::sqrt3;
-  constexpr double kMostSines = std::numbers::sqrt2 * std::numbers::sqrt3;
-  const auto& h = volume.image.spacing_mm;
-  const double b = grown_by(volume);
-  const auto [radius, length] = hull_of(tool);
-  const double disc = std::numbers::pi * radius * radius;
-  const double shadows = 2 * radius * length * kMostSines + disc * kMostCosines;
-  const double widths = length * kMostCosines + 2 * radius * kMostSines;
-  const double grown = disc * length + b * shadows + b * b * widths + b * b * b;
-  return static_cast<std::size_t>(grown / (h[0] * h[1] * h[2]));
-}
-
 }  // namespace
 
 std::size_t most_covered(const SceneTool& tool, const SceneVolume& volume) {
@@ -88,7 +100,9 @@ std::size_t most_covered(const SceneTool& tool, const SceneVolume& volume) {
   for (const VoxelIndex& size : box_sizes(tool, volume)) {
     by_box = std::max(by_box, VoxelGrid{size.x + 1, size.y + 1, size.z + 1}.voxel_count());
   }
-  return std::min(by_box, by_hull(tool, volume));
+  const auto& h = volume.image.spacing_mm;
+  const double by_hull = GrownHull(tool, volume).volume(1.0 / 3) / (h[0] * h[1] * h[2]);
+  return std::min(by_box, static_cast<std::size_t>(by_hull));
 }
 
 std::size_t most_covered(const AlignedTable& table) {
@@ -106,8 +120,13 @@ std::size_t most_groups(const SceneTool& tool, const SceneVolume& volume) {
     by_box = std::max(by_box, VoxelGrid{in_row, size.y + 1, size.z + 1}.voxel_count());
   }
   constexpr double kGroup = kCoverGroup;
-  const double by_rows = rows_by_hull(tool, volume) * (kGroup - 1) / kGroup +
-                         static_cast<double>(by_hull(tool, volume)) / kGroup;
+  const auto& h = volume.image.spacing_mm;
+  const GrownHull hull(tool, volume);
+  const double by_rows = maximum([&](double along_x) {
+    const double rows = hull.shadow_area(along_x) / (h[1] * h[2]);
+    const double voxels = hull.volume(along_x) / (h[0] * h[1] * h[2]);
+    return (rows * (kGroup - 1) + voxels) / kGroup;
+  });
   return std::min(by_box, static_cast<std::size_t>(by_rows));
 }
 

@@ -30,7 +30,8 @@ namespace kerf {
 ///
 /// Groups begin at a covered voxel, so a row that spans w voxels has (w + 15) / 16 at most. The
 /// rows are no more than the shadow of the grown hull along x has room for, and their spans
-/// together no more than the hull itself: it is convex.
+/// together no more than the hull itself: it is convex. Of the two together the largest counts that
+/// one direction of K's axis has.
 [[nodiscard]] std::size_t most_groups(const SceneTool& tool, const SceneVolume& volume);
 [[nodiscard]] std::size_t most_groups(const AlignedTable& table);
 
