@@ -17,6 +17,10 @@ namespace kerf {
 /// Price of one operation in ns on the reference machine, a core of 2024 at 4.4 GHz; rounded up
 /// from the dearest of the calibration's tools that `time_stages` gave there, but for NEON, which
 /// is guessed. Every stage of every plan has one.
+///
+/// `probes` are priced by the costliest ticks that `kerf lab extremes` finds: their probes begin in
+/// air. Where all lie inside of the solid, as `time_stages` has them and a tool may that is taken
+/// up there, they cost up to 1.7 times as much, which the other half of the tick bears.
 [[nodiscard]] double reference_price_ns(std::string_view way, std::string_view stage);
 
 /// Half of a tick: a machine half as fast as the reference still ends its ticks in time, and on the
