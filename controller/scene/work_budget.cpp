@@ -7,6 +7,8 @@
 #include <cstdio>
 #include <stdexcept>
 
+#include "controller/scene/scene_file.hpp"
+
 namespace kerf {
 namespace {
 
@@ -103,6 +105,11 @@ constexpr std::array kPrices{
     Price{"splat/neon", "cut", 0.4},
 };
 
+struct StageWork {
+  const char* stage = "";
+  double us = 0;
+};
+
 std::string us_text(double us) {
   char text[32];
   std::snprintf(text, sizeof text, "%.1f", us);
@@ -139,29 +146,51 @@ double work_budget_us(const Scene& scene) {
   return kBudgetShare * 1e6 / scene.servo.rate_hz;
 }
 
+int highest_rate_hz(double work_us) {
+  const double rate_hz = std::min(kBudgetShare * 1e6 / work_us, double{kMaxRateHz});
+  return rate_hz < kMinRateHz ? 0 : static_cast<int>(rate_hz);
+}
+
+std::size_t costliest_tool(const SceneCosts& costs) {
+  const auto cheaper = [&](const TickCost& a, const TickCost& b) {
+    return work_us(costs, a.tool) < work_us(costs, b.tool);
+  };
+  return std::max_element(costs.ticks.begin(), costs.ticks.end(), cheaper)->tool;
+}
+
 std::string over_budget(const Scene& scene, const SceneCosts& costs) {
   const double budget_us = work_budget_us(scene);
-  for (std::size_t t = 0; t < scene.tools.size(); ++t) {
-    const double sum_us = work_us(costs, t);
-    if (sum_us <= budget_us) continue;
-    std::string parts;
-    bool all_aligned = true;
-    for (const TickCost& tick : costs.ticks) {
-      if (tick.tool != t) continue;
-      if (!parts.empty()) parts += ", ";
-      parts += "in " + scene.volumes[tick.volume].name + " " + us_text(work_us(tick.cost)) +
-               " by plan " + tick.cost.way + " (" + tick.choice.why + ")";
-      all_aligned = all_aligned && tick.choice.plan == Plan::aligned;
+  const std::size_t tool = costliest_tool(costs);
+  const double sum_us = work_us(costs, tool);
+  if (sum_us <= budget_us) return {};
+  std::string parts, others;
+  bool may_align = false;
+  StageWork most;
+  for (const TickCost& tick : costs.ticks) {
+    if (tick.tool != tool) continue;
+    parts += ", in " + scene.volumes[tick.volume].name + " " + us_text(work_us(tick.cost)) +
+             " by plan " + tick.cost.way + " (" + tick.choice.why + ")";
+    may_align = may_align || tick.choice.plan == Plan::splat || tick.choice.plan == Plan::gather;
+    for (const StageCost& stage : tick.cost.stages) {
+      const double us = work_us(tick.cost, stage);
+      if (us > most.us) most = {stage.stage, us};
     }
-    return scene.path + ": tool " + scene.tools[t].name + ": up to " + us_text(sum_us) +
-           " us of work a tick, " + parts + ", above the " + us_text(budget_us) +
-           " us that are half a tick at " + std::to_string(scene.servo.rate_hz) +
-           " Hz; use a smaller tool, a lower rate" +
-           (all_aligned
-                ? ""
-                : ", or fixed numbers and a round or unturned tool on the volume's lattice");
   }
-  return {};
+  for (std::size_t t = 0; t < scene.tools.size(); ++t) {
+    if (t == tool || work_us(costs, t) <= budget_us) continue;
+    others += (others.empty() ? " (too dear as well: " : ", ") + scene.tools[t].name;
+  }
+  const int rate_hz = highest_rate_hz(sum_us);
+  const bool fixed = scene.servo.numeric == NumericKind::fixed;
+  const bool helps = fixed && may_align && std::string_view(most.stage) != "probes";
+  return scene.path + ": tool " + scene.tools[tool].name + ": up to " + us_text(sum_us) +
+         " us of work a tick, most of it " + most.stage + " (" + us_text(most.us) + ")" + parts +
+         ", above the " + us_text(budget_us) + " us that are half a tick at " +
+         std::to_string(scene.servo.rate_hz) + " Hz; use " +
+         (rate_hz == 0 ? "" : "--rate " + std::to_string(rate_hz) + " or lower, ") +
+         "a smaller tool" + others + (others.empty() ? "" : ")") +
+         (fixed ? "" : ", or fixed numbers") +
+         (helps ? ", or a round or unturned tool on the volume's lattice" : "");
 }
 
 }  // namespace kerf

@@ -36,8 +36,16 @@ inline constexpr double kBudgetShare = 0.5;
 /// The budget of a tick in the same unit.
 [[nodiscard]] double work_budget_us(const Scene& scene);
 
-/// Why the scene is refused: the tool whose tick, over all volumes, is above the budget, on one
-/// line with the way out. Empty where every tool fits.
+/// The highest rate with room for so much work, at most kMaxRateHz; 0 where that is below
+/// kMinRateHz.
+[[nodiscard]] int highest_rate_hz(double work_us);
+
+/// The tool whose tick costs most over all volumes. It decides for the scene, since a command may
+/// take it up at any tick.
+[[nodiscard]] std::size_t costliest_tool(const SceneCosts& costs);
+
+/// Why the scene is refused: the costliest tool, its dearest stage and the highest rate that fits,
+/// on one line with the way out. Empty where every tool fits.
 [[nodiscard]] std::string over_budget(const Scene& scene, const SceneCosts& costs);
 
 }  // namespace kerf

@@ -130,7 +130,14 @@ void show_progress(const LoopSignals& signals, const std::atomic<bool>& ended,
   }
 }
 
-int check_scene(const Scene& scene) {
+/// In lock-step the device waits: there is no deadline to keep.
+void check_budget(const ControllerOptions& options, const Scene& scene, const SceneCosts& costs) {
+  const std::string refusal = options.virtual_time ? "" : over_budget(scene, costs);
+  if (!refusal.empty()) throw std::runtime_error(refusal);
+}
+
+/// Whatever can be said without memory for the loop.
+int check_scene(const ControllerOptions& options, const Scene& scene, const SceneCosts& costs) {
   std::printf("scene=%s\n", scene.path.c_str());
   for (const SceneVolume& v : scene.volumes) {
     const auto& g = v.image.grid;
@@ -148,7 +155,11 @@ int check_scene(const Scene& scene) {
   std::printf("force=%s\ncut=%s\n", std::string(word_of(scene.force.model)).c_str(),
               std::string(word_of(scene.cut.model)).c_str());
   std::printf("stiffness_at_device_n_per_mm=%g\n", device_stiffness_n_per_mm(scene));
+  const std::size_t costliest = costliest_tool(costs);
+  std::printf("costliest_tool=%s\nhighest_rate_hz=%d\n", scene.tools[costliest].name.c_str(),
+              highest_rate_hz(work_us(costs, costliest)));
   std::fputs(hand_lines(scene).c_str(), stdout);
+  check_budget(options, scene, costs);
   return 0;
 }
 
@@ -159,9 +170,7 @@ void check_run(const ControllerOptions& options, const Scene& scene, const Scene
                              " is more than 90 % of a tick at " +
                              std::to_string(scene.servo.rate_hz) + " Hz; spin less");
   }
-  // In lock-step the device waits: there is no deadline to keep.
-  const std::string refusal = options.virtual_time ? "" : over_budget(scene, costs);
-  if (!refusal.empty()) throw std::runtime_error(refusal);
+  check_budget(options, scene, costs);
   if (!options.report.empty()) check_new_file(options.report);
   if (!options.final_volume.empty()) check_volume_path(options.final_volume);
   if (const double stiffness = device_stiffness_n_per_mm(scene); stiffness > kStableNPerMm) {
@@ -287,8 +296,8 @@ int run_controller(const ControllerOptions& options) {
   std::atomic<bool>& stop = catch_stop_signals();
 
   Scene scene = load_scene(options.scene, options.overrides);
-  if (options.check) return check_scene(scene);
   const std::unique_ptr<CompiledScene> servo = plan_scene(scene);
+  if (options.check) return check_scene(options, scene, servo->costs());
   if (options.explain) {
     explain_scene(options, scene, *servo);
     return 0;

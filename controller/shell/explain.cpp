@@ -87,8 +87,8 @@ std::string budget_text(const Explanation& e) {
   std::string text = "\nbudget: work of one tool in all volumes, at most " +
                      format("%.1f us: half a tick at %d Hz\n", e.budget_us, e.rate_hz);
   for (const ToolWork& work : works_of(e)) {
-    text += format("  %-36s%12.1f us%8.1f %%\n", work.tool.c_str(), work.us,
-                   100 * work.us / e.budget_us);
+    text += format("  %-36s%12.1f us%8.1f %%%8d Hz at most\n", work.tool.c_str(), work.us,
+                   100 * work.us / e.budget_us, highest_rate_hz(work.us));
   }
   return text;
 }
@@ -193,7 +193,8 @@ std::string explanation_json(const Explanation& e) {
   }
   Json tools = Json::array();
   for (const ToolWork& work : works_of(e)) {
-    tools.push_back({{"tool", work.tool}, {"work_us", work.us}});
+    tools.push_back(
+        {{"tool", work.tool}, {"work_us", work.us}, {"highest_rate_hz", highest_rate_hz(work.us)}});
   }
   Json arrays = Json::array();
   for (const ArrayBytes& array : e.arrays) {

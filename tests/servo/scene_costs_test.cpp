@@ -16,6 +16,7 @@
 #include "controller/scene/aligned_tool.hpp"
 #include "controller/scene/plan_cost.hpp"
 #include "controller/scene/sample_tool.hpp"
+#include "controller/scene/scene_file.hpp"
 #include "controller/scene/stage_timing.hpp"
 #include "controller/scene/tick_memory.hpp"
 #include "controller/scene/work_budget.hpp"
@@ -296,10 +297,26 @@ TEST_CASE("a scene above the budget is refused on one line, and fits at a lower 
   const std::string line = over_budget(scene, plan_scene(scene)->costs());
   CHECK(line.find("scenes/x.toml: tool stub: up to ") == 0);
   CHECK(line.find(" by plan splat/") != std::string::npos);
-  CHECK(
-      line.find(", above the 62.5 us that are half a tick at 8000 Hz; use a smaller tool, a lower "
-                "rate, or fixed numbers and a round or unturned tool") != std::string::npos);
+  CHECK(line.find(" us of work a tick, most of it press (") != std::string::npos);
+  const double stub_us = work_us(plan_scene(scene)->costs(), 1);
+  const int highest_hz = highest_rate_hz(stub_us);
+  CHECK(line.find(", above the 62.5 us that are half a tick at 8000 Hz; use --rate " +
+                  std::to_string(highest_hz) +
+                  " or lower, a smaller tool, or a round or unturned tool on the volume's "
+                  "lattice") != std::string::npos);
   CHECK(line.find('\n') == std::string::npos);
+  scene.servo.rate_hz = highest_hz;
+  CHECK(over_budget(scene, plan_scene(scene)->costs()).empty());
+  scene.servo.rate_hz = highest_hz + 1;
+  CHECK_FALSE(over_budget(scene, plan_scene(scene)->costs()).empty());
+  // Of several the costliest decides, wherever it stands; the others are named.
+  scene.servo.rate_hz = 8000;
+  scene.tools.push_back(shape("cylinder", 2.5, 5));
+  scene.tools.back().name = "stump";
+  const std::string two = over_budget(scene, plan_scene(scene)->costs());
+  CHECK(two.find("scenes/x.toml: tool stump: ") == 0);
+  CHECK(two.find(" a smaller tool (too dear as well: stub), or a round") != std::string::npos);
+  scene.tools.pop_back();
   scene.tools.pop_back();
   CHECK(over_budget(scene, plan_scene(scene)->costs()).empty());
   // What fits one volume need not fit two: the refusal names both.
@@ -319,6 +336,21 @@ TEST_CASE("a scene above the budget is refused on one line, and fits at a lower 
   scene.tools.push_back(shape("cylinder", 0.5, 1));
   scene.servo.rate_hz = 250;
   CHECK(over_budget(scene, plan_scene(scene)->costs()).empty());
+}
+
+TEST_CASE("where probes cost most no other plan is advised, and in floating point other numbers") {
+  Scene scene = half_space_scene(48);
+  scene.path = "scenes/x.toml";
+  scene.tools.push_back(shape("wheel", 2, 1));
+  scene.servo.rate_hz = 8000;
+  const auto refusal = [&] { return over_budget(scene, plan_scene(scene)->costs()); };
+  CHECK(refusal().find(" most of it probes (") != std::string::npos);
+  CHECK(refusal().find("lattice") == std::string::npos);
+  scene.servo.numeric = NumericKind::float64;
+  CHECK(refusal().find(", or fixed numbers") != std::string::npos);
+  CHECK(highest_rate_hz(10) == kMaxRateHz);
+  CHECK(highest_rate_hz(200) == 2500);
+  CHECK(highest_rate_hz(2001) == 0);  // 249.9 Hz are not offered
 }
 
 TEST_CASE("a scene holds the arrays that it names, and no others") {
