@@ -36,7 +36,8 @@ case $name in
   controller)
     trap 'stop=1' TERM
     touch "$LAB/segment"
-    printf 'hand_unit_mm=2\nhand_script=hand.toml\nrate_hz=500\n' >"${option[--emulator-args]}"
+    printf 'hand_unit_mm=2\nhand_script=hand.toml\nrate_hz=%s\n' "${RATE_HZ:-500}" \
+      >"${option[--emulator-args]}"
     for ((i = 0; i < 10 * option[--seconds] && !stop; ++i)); do sleep 0.03; done
     echo '{}' >"${option[--report]}"
     touch "${option[--final]}"
@@ -135,6 +136,10 @@ expect 'reach the window, which keeps its files with the others' \
 expect 'and there is one video' test "$(grep -c -- --record "$lab/calls")" == 1
 expect 'a video does not mix with what a demo says' kerf_gives 2 demo --record -
 expect 'and a file is asked for' says 'name a file or a pipe'
+expect 'a fast servo' with RATE_HZ=8000 kerf_gives 0 demo --seconds 1
+expect 'is answered in every cycle of the bus' called '^emulator.*--packet-cycles 1 '
+expect 'a slow one' kerf_gives 0 demo --seconds 1
+expect 'leaves the emulator its own pace' test "$(grep -c -- --packet-cycles "$lab/calls")" == 0
 expect 'a demo keeps its results' kerf_gives 0 demo --seconds 1 --out "$lab/out" --virtual
 expect 'all of them' kept "$all"
 expect 'lock-step reaches the controller' called '^controller.*--virtual'
