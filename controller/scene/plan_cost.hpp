@@ -19,9 +19,8 @@ namespace kerf {
 // One function a plan: its stages and the operations of each. Where force cuts, every plan ends
 // otherwise:
 //
-//   cover  overlap ratios of all rows, as whole vectors of 32: multiply-adds of masks, 8 an entry,
-//   or
-//          entries that are scaled (plan `splat`)
+//   cover  overlap ratios of all rows, as whole vectors of 32: multiply-adds of masks, 8 an entry;
+//          in the plan `splat` entries that are scaled
 //   list   groups of voxels that the tool covers (covered_bound.hpp), read with what they weigh;
 //          voxel by voxel in the plan `gather`
 //   spend  the same, from which the budget is taken; twice where the fullest have not enough

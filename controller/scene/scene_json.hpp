@@ -18,8 +18,9 @@ namespace kerf {
 ///   tools      [{name, shape, pitch_mm, radius_mm, length_mm, round, turns, size_vox,
 ///              offsets_half_pitch [x, y, z, x, y, z..], and what it looks like: profile
 ///              [[y_mm, radius_mm]..] or mesh {points_mm [[x, y, z]..], triangles [[a, b, c]..]}}]
-///   active_tool, materials [{name, iso, machinability, colour}]
-///   device, force, cut, limits, servo  as their keys in the scene file
+///   active_tool, materials [{name, iso, machinability, colour, and forbidden: true where it is}]
+///   device, force, cut, limits, servo  as their keys in the scene file, of the models that it has;
+///              spindle where force cuts
 [[nodiscard]] std::string canonical_json(const Scene& scene);
 
 /// FNV-1a of bytes, 64 bits.

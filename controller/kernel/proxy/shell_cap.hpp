@@ -55,6 +55,10 @@ template <class N>
 /// `count` r^4 sums to over a ball: SUM w = count height^5 / (10 slope reach). Half of it and more
 /// is no edge but a ball of 8 or larger, a flat or a crease, which the ball's own samples know
 /// better; from 0.35 it is an edge. (A ball of 6 has 0.43, edges of 90 degrees 0.15 to 0.4.)
+///
+/// Coarse where contact is faint: in fixed point the mean weight has steps of 2^-24, and of a flat
+/// at a height of 0.08 it is 1.4 of them (slope 0.5, reach 8), so there the cap counts wholly or
+/// not at all. The depth is 0.16 units then, 0.01 N in the default scene.
 template <class N>
 [[nodiscard]] constexpr typename N::Unit sharpness(const ShellSums<N>& sums, std::int32_t count,
                                                    typename N::Ratio height,
