@@ -10,6 +10,7 @@
 
 #include "controller/scene/free_brick_map.hpp"
 #include "controller/scene/plan_contact.hpp"
+#include "controller/scene/scene_error.hpp"
 #include "controller/scene/shell_tool.hpp"
 #include "controller/scene/surface_samples.hpp"
 #include "controller/servo/servo_state.hpp"
@@ -24,7 +25,7 @@ class ContactMemory {
   /// Samples of a tool's surface; they stay where they are.
   Shell<N> hold_shell(const Scene& scene, const SceneTool& tool) {
     const double unit_mm = contact_unit_mm(scene);
-    auto samples = surface_samples(tool, unit_mm);
+    auto samples = samples_of(scene, tool, unit_mm);
     for (auto& sample : samples) {
       for (double& x : sample) x /= unit_mm;
     }
@@ -69,6 +70,14 @@ class ContactMemory {
   }
 
  private:
+  static auto samples_of(const Scene& scene, const SceneTool& tool, double unit_mm) {
+    try {
+      return surface_samples(tool, unit_mm);
+    } catch (const SceneError& error) {
+      throw SceneError(scene.path + ": " + error.what());
+    }
+  }
+
   std::vector<std::pair<std::string, ShellTool<N>>> tools_;
   std::vector<std::string> names_;  ///< by volume of the plan
   std::vector<std::size_t> map_bytes_;

@@ -17,20 +17,34 @@
 namespace kerf {
 namespace {
 
-void check_side(const ToolSpec& spec, double side_vox) {
+void check_side(const ToolSpec& spec, double side_vox, const char* way_out) {
   if (side_vox <= kMaxToolSide) return;
-  refuse(spec.size_place, " makes a tool of " + number_text(side_vox) +
+  refuse(spec.size_place, " makes a tool of " + short_text(side_vox) +
                               " samples along a side, above the limit of " +
-                              std::to_string(kMaxToolSide) +
-                              "; use a smaller tool or a coarser pitch");
+                              std::to_string(kMaxToolSide) + "; " + way_out);
+}
+
+/// The spindle turns about x = z = 0.
+void check_axis(const ToolSpec& spec, const ToolMesh& mesh) {
+  for (const auto& [axis, name] : {std::pair{std::size_t{0}, "x"}, {2, "z"}}) {
+    const auto [low, high] = std::ranges::minmax_element(
+        mesh.points_mm, {}, [i = axis](const ToolMesh::Point& p) { return p[i]; });
+    const double low_mm = (*low)[axis], high_mm = (*high)[axis];
+    if (low_mm < 0 && high_mm > 0) continue;
+    refuse(spec.size_place, std::string(" lies beside its axis, the file's y: ") + name +
+                                " goes from " + short_text(low_mm) + " to " + short_text(high_mm) +
+                                " mm; move the mesh so that the spindle's axis is at x = z = 0");
+  }
 }
 
 SceneTool load_shape(const ToolSpec& spec, const ToolSize& size, double voxel_mm) {
   if (!size.size_vox && size.radius_mm < voxel_mm / 2) {
-    refuse(spec.size_place, " is below half a voxel (" + number_text(voxel_mm / 2) +
+    refuse(spec.size_place, " is below half a voxel (" + short_text(voxel_mm / 2) +
                                 "); use a larger radius or a finer volume");
   }
-  check_side(spec, tool_side_vox(spec.shape, size));
+  check_side(spec, tool_side_vox(spec.shape, size),
+             size.pitch_mm < voxel_mm ? "use a smaller tool or a coarser pitch"
+                                      : "use a smaller tool or a coarser volume");
   return make_tool(spec.name, spec.shape, size);
 }
 
@@ -43,15 +57,17 @@ SceneTool load_mesh(const ToolSpec& spec, double pitch_mm, double voxel_mm,
   } catch (const SceneError& error) {
     refuse(spec.where, std::string(": ") + error.what());
   }
-  check_side(spec, mesh_side_vox(mesh, pitch_mm));
+  check_axis(spec, mesh);
+  check_side(spec, mesh_side_vox(mesh, pitch_mm),
+             "use a smaller scale (mm per unit of the file) or a coarser volume");
   SceneTool tool = make_mesh_tool(spec.name, std::move(mesh), pitch_mm);
   if (tool.radius_mm < voxel_mm / 2) {
-    refuse(spec.size_place, " reaches less than half a voxel (" + number_text(voxel_mm / 2) +
+    refuse(spec.size_place, " reaches less than half a voxel (" + short_text(voxel_mm / 2) +
                                 " mm) from its axis; use a larger scale or a finer volume");
   }
   if (tool.offsets.empty()) {
     refuse(spec.size_place, " is so thin that no sample lies in it, they are " +
-                                number_text(pitch_mm) +
+                                short_text(pitch_mm) +
                                 " mm apart; give a smaller pitch_mm or a larger scale");
   }
   return tool;
@@ -87,10 +103,11 @@ SceneTool load_tool(const ToolSpec& spec, const TouchedVolumes& touched,
   tool.turns = spec.turns;
   const double side_mm = std::max(2 * tool.radius_mm, tool.length_mm);
   if (side_mm > touched.side_mm) {
-    refuse(spec.size_place, " makes a tool of " + number_text(side_mm) + " mm" +
+    refuse(spec.size_place, " makes a tool of " + short_text(side_mm) + " mm" +
                                 (tool.length_mm > 2 * tool.radius_mm ? " (its length)" : "") +
-                                ", larger than the volume (" + number_text(touched.side_mm) +
-                                " mm); use a smaller tool");
+                                ", larger than the volume (" + short_text(touched.side_mm) +
+                                " mm); use a smaller " +
+                                (spec.shape == kMeshShape ? "scale" : "tool"));
   }
   return tool;
 }

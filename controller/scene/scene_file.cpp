@@ -250,6 +250,9 @@ SceneSpec parse_scene(std::string_view text, const std::filesystem::path& path) 
 SceneSpec parse_scene_file(const std::filesystem::path& path) {
   constexpr std::uintmax_t kLargestFile = std::uintmax_t{1} << 20;
   std::error_code fault;
+  if (std::filesystem::is_directory(path, fault)) {
+    refuse(path.string(), ": is a folder; name a scene file in it");
+  }
   if (!std::filesystem::is_regular_file(path, fault)) {
     refuse(path.string(), ": no such scene file; name one, for example scenes/phantom.toml");
   }

@@ -143,7 +143,7 @@ SceneVolume load_volume(const VolumeSpec& spec, const std::filesystem::path& fol
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const double reach_mm = std::max(-box.lo_mm[axis], box.hi_mm[axis]);
     if (reach_mm <= kLargestWorldMm) continue;
-    refuse(spec.where, ": the volume reaches " + number_text(reach_mm) +
+    refuse(spec.where, ": the volume reaches " + short_text(reach_mm) +
                            " mm from the origin; keep it within " + number_text(kLargestWorldMm) +
                            ", check position_mm and spacing_mm");
   }
@@ -183,7 +183,7 @@ void fit_to_volume(double written_mm, SceneSpec& spec, Scene& scene) {
     scale = std::max(scale, (box.hi_mm[axis] - box.lo_mm[axis]) / kWorkspaceMm[axis]);
   }
   if (scale > kMaxWorkspaceScale) {
-    refuse("--volume", ": the box needs a workspace scale of " + number_text(scale) +
+    refuse("--volume", ": the box needs a workspace scale of " + short_text(scale) +
                            ", above the limit of " + number_text(kMaxWorkspaceScale) +
                            "; check --spacing");
   }

@@ -41,7 +41,7 @@ std::array<double, 4> unit_quaternion(const SceneTable& pose) {
   const double length = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
   if (std::abs(length - 1) > kTolerance) {
     refuse(pose.place("orientation"),
-           " has length " + number_text(length) + "; write a unit quaternion [x, y, z, w]");
+           " has length " + short_text(length) + "; write a unit quaternion [x, y, z, w]");
   }
   for (double& component : q) component /= length;
   return q;

@@ -44,6 +44,14 @@ std::string number_text(double value) {
   return {buffer.data(), end.ptr};
 }
 
+std::string short_text(double value) {
+  constexpr int kDigits = 6;
+  std::array<char, 32> buffer{};
+  const auto end = std::to_chars(buffer.data(), buffer.data() + buffer.size(), value,
+                                 std::chars_format::general, kDigits);
+  return {buffer.data(), end.ptr};
+}
+
 std::string one_line(std::string_view text) {
   constexpr std::size_t kLongestLine = 400;
   std::string line(text.substr(0, kLongestLine));

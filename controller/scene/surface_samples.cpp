@@ -124,7 +124,8 @@ class RingSampler {
 void check_count(const SceneTool& tool, double count, double unit_mm) {
   if (count <= kMaxSurfaceSamples) return;
   std::ostringstream line;
-  line << "tool '" << tool.name << "': " << count << " samples of its surface, of which contact "
+  line << "tool '" << tool.name << "': " << std::llround(count)
+       << " samples of its surface, of which contact "
        << "reads at most " << kMaxSurfaceSamples
        << " in time; use a smaller tool or coarser voxels than " << unit_mm << " mm";
   throw SceneError(line.str());

@@ -324,5 +324,5 @@ TEST_CASE("a scene file that is not there, a folder or a huge file is refused") 
         }).find("larger than 1 MiB") != std::string::npos);
   const auto is_folder =
       kerf::test::error_of([&] { static_cast<void>(kerf::parse_scene_file(huge.parent_path())); });
-  CHECK(is_folder.find("no such scene file") != std::string::npos);
+  CHECK(is_folder.find(": is a folder; name a scene file in it") != std::string::npos);
 }

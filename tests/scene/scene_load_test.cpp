@@ -7,10 +7,14 @@
 #include <filesystem>
 #include <numbers>
 #include <string>
+#include <vector>
 
 #include <doctest/doctest.h>
 
+#include "controller/scene/compile.hpp"
 #include "controller/scene/scene_place.hpp"
+#include "hil/lab/extremes/loft.hpp"
+#include "tests/scene/stl_support.hpp"
 #include "tests/scene/support.hpp"
 
 namespace {
@@ -257,6 +261,45 @@ TEST_CASE("a tool that does not suit the volume is reported with its line and th
   CHECK(has(error_with("shape = \"ball\"\nsize_vox = 8\npitch_mm = 0.2\n"),
             "scene.toml:6: tool.pitch_mm = 0.2 is above the smallest voxel edge and leaves gaps; "
             "use at most 0.125"));
+}
+
+TEST_CASE("a mesh that does not suit the volume is reported with what to do about it") {
+  const kerf::test::TempFolder folder;
+  const auto error_of = [&](std::vector<kerf::LooseTriangle> triangles, double aside,
+                            const char* lines) {
+    for (kerf::LooseTriangle& t : triangles) {
+      for (auto& corner : t) corner[2] += static_cast<float>(aside);
+    }
+    static_cast<void>(folder.write("bur.stl", kerf::test::text_stl(triangles)));
+    return load_error(block_scene(
+        folder, 0.125, "[[tool]]\nshape = \"stl\"\nfile = \"bur.stl\"\n" + std::string(lines)));
+  };
+  const auto bar = kerf::extremes::prism(0.5, 1, 4);
+  CHECK(error_of(bar, 0, "").empty());
+  CHECK(error_of(bar, 0.4, "").empty());  // askew, but around its axis
+  CHECK(has(
+      error_of(bar, 2, ""),
+      "scene.toml:5: tool.file = \"bur.stl\" lies beside its axis, the file's y: z goes from "));
+  CHECK(has(error_of(bar, 2, ""), " mm; move the mesh so that the spindle's axis is at x = z = 0"));
+  CHECK(has(error_of(bar, 0, "scale = 30\n"),
+            " samples along a side, above the limit of 64; use a smaller scale (mm per unit of the "
+            "file) or a coarser volume"));
+  CHECK(has(error_of(bar, 0, "scale = 5\n"), " mm); use a smaller scale"));
+  // What was computed is told in six digits.
+  CHECK(has(error_of(bar, 0, "scale = 0.1\n"), "reaches less than half a voxel (0.0625 mm)"));
+}
+
+TEST_CASE("a tool with more surface than contact can read is reported with the scene and count") {
+  const kerf::test::TempFolder folder;
+  kerf::Scene scene =
+      kerf::load_scene(block_scene(folder, 0.125, "[[tool]]\nshape = \"ball\"\nradius_mm = 1.5\n"));
+  scene.tools[0].radius_mm = 150;
+  scene.tools[0].length_mm = 300;
+  const std::string error =
+      kerf::test::error_of([&] { static_cast<void>(kerf::plan_scene(scene)); });
+  CAPTURE(error);
+  CHECK(has(error, "scene.toml: tool 'ball 1.5 mm': "));
+  CHECK_FALSE(has(error, "e+"));
 }
 
 TEST_CASE("real volumes load with any scene, by their size in voxels") {
