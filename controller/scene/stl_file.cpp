@@ -4,9 +4,11 @@
 #include <algorithm>
 #include <bit>
 #include <charconv>
+#include <cmath>
 #include <cstddef>
 #include <fstream>
 #include <iterator>
+#include <limits>
 #include <system_error>
 
 #include "controller/scene/scene_text.hpp"
@@ -45,6 +47,12 @@ std::vector<LooseTriangle> binary_triangles(std::string_view bytes, std::size_t 
   return triangles;
 }
 
+/// Of keywords: ASCII letters in any case.
+bool is_word(std::string_view word, std::string_view lower) {
+  return std::ranges::equal(word, lower, {},
+                            [](char c) { return c >= 'A' && c <= 'Z' ? char(c - 'A' + 'a') : c; });
+}
+
 /// Word after word of an STL text, with the line for complaints.
 class StlText {
  public:
@@ -59,15 +67,16 @@ class StlText {
   }
   void expect(std::string_view wanted) {
     const std::string_view word = next();
-    if (word != wanted) complain(word, wanted);
+    if (!is_word(word, wanted)) complain(word, wanted);
   }
   float number() {
     std::string_view word = next();
     if (word.starts_with('+')) word.remove_prefix(1);
-    float value = 0;
+    double value = 0;  // what a float would lose below its range is 0
     const auto [end, fault] = std::from_chars(word.data(), word.data() + word.size(), value);
-    if (fault != std::errc() || end != word.data() + word.size()) complain(word, "a number");
-    return value;
+    const bool number = fault == std::errc() && end == word.data() + word.size();
+    if (!number || std::abs(value) > std::numeric_limits<float>::max()) complain(word, "a number");
+    return static_cast<float>(value);
   }
   void skip_line() { skip(std::min(rest_.find('\n'), rest_.size())); }
 
@@ -109,12 +118,12 @@ LooseTriangle read_facet(StlText& text) {
 std::vector<LooseTriangle> text_triangles(StlText text, const std::string& place) {
   std::vector<LooseTriangle> triangles;
   for (std::string_view solid = text.next(); !solid.empty(); solid = text.next()) {
-    if (solid != "solid") text.complain(solid, "solid");
+    if (!is_word(solid, "solid")) text.complain(solid, "solid");
     text.skip_line();  // its name
     for (;;) {
       const std::string_view word = text.next();
-      if (word == "endsolid") break;
-      if (word != "facet") text.complain(word, "facet or endsolid");
+      if (is_word(word, "endsolid")) break;
+      if (!is_word(word, "facet")) text.complain(word, "facet or endsolid");
       triangles.push_back(read_facet(text));
       check_count(triangles.size(), place);
     }
@@ -132,8 +141,8 @@ std::vector<LooseTriangle> parse_stl(std::string_view bytes, const std::string& 
       check_count(count, place);
       return binary_triangles(bytes, count);
     }
-    // Text holds no zero byte; the header of a binary file may begin with any word.
-    if (!bytes.starts_with("solid") || bytes.find('\0') != bytes.npos) {
+    // Text holds no zero byte; a binary file does, in its count if nowhere else.
+    if (bytes.find('\0') != bytes.npos) {
       refuse(place, ": a binary STL of " + std::to_string(count) + " triangles has " +
                         std::to_string(kHeaderBytes + kTriangleBytes * count) +
                         " bytes, and the file has " + std::to_string(bytes.size()) +
@@ -145,6 +154,9 @@ std::vector<LooseTriangle> parse_stl(std::string_view bytes, const std::string& 
 
 std::vector<LooseTriangle> read_stl(const std::filesystem::path& path) {
   std::error_code fault;
+  if (std::filesystem::is_directory(path, fault)) {
+    refuse(path.string(), ": is a folder; name an STL file in it");
+  }
   if (!std::filesystem::is_regular_file(path, fault)) {
     refuse(path.string(), ": no such STL file; name one, relative to the scene's folder");
   }

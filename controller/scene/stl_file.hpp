@@ -18,8 +18,9 @@ inline constexpr std::uintmax_t kMaxStlBytes = std::uintmax_t{512} * kMaxMeshTri
 ///
 /// Binary: 80 bytes of header, u32 count, then 50 bytes each: normal and three corners as f32, and
 /// two bytes that mean nothing; little-endian. Text: `solid`, `facet normal`, `outer loop`, three
-/// `vertex`, `endloop`, `endfacet`, `endsolid`; several solids are one mesh. A file whose size is
-/// that of its binary count is binary, whatever its first word.
+/// `vertex`, `endloop`, `endfacet`, `endsolid`, in any case; several solids are one mesh. A file
+/// whose size is that of its binary count is binary, whatever its first word; of others one without
+/// a zero byte is text.
 ///
 /// `place` begins a complaint. Throws SceneError with the line or the number of bytes where it is
 /// anything else, or above kMaxMeshTriangles. Any thread; load time.

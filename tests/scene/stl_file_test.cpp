@@ -2,6 +2,8 @@
 #include "controller/scene/stl_file.hpp"
 
 #include <algorithm>
+#include <array>
+#include <cctype>
 #include <limits>
 #include <string>
 #include <vector>
@@ -59,6 +61,19 @@ TEST_CASE("a binary STL whose header begins as text does is still binary") {
   CHECK(parse_stl("solid" + bytes.substr(5), "bur.stl") == kBar);
 }
 
+TEST_CASE("keywords are read in any case, and numbers that a float takes for zero") {
+  std::string upper = text_stl(kBar);
+  std::ranges::transform(upper, upper.begin(),
+                         [](unsigned char c) { return static_cast<char>(std::toupper(c)); });
+  CHECK(parse_stl(upper, "bur.stl") == kBar);
+  const auto tiny = parse_stl(
+      "Solid x\nFacet Normal 0 0 1\nOuter Loop\nVertex 1e-50 -1e-50 +2\nVertex 0 1 0\n"
+      "Vertex 1 0 0\nEndLoop\nEndFacet\nEndSolid x\n",
+      "bur.stl");
+  REQUIRE(tiny.size() == 1);
+  CHECK(tiny[0][0] == std::array<float, 3>{0, 0, 2});
+}
+
 TEST_CASE("several solids of one text are one mesh") {
   CHECK(parse_stl(text_stl(kBar) + text_stl(kBar), "bur.stl").size() == 2 * kBar.size());
 }
@@ -76,6 +91,10 @@ TEST_CASE("a file that is no STL is refused with the place, what is there and th
   CHECK(begins(parse_error("solid x\nfacet normal 0 0 1\nouter loop\nvertex 1e99 0 0\n"),
                "bur.stl:4: \"1e99\" where a number"));
   CHECK(begins(parse_error("ply\n"), "bur.stl:1: \"ply\" where solid belongs"));
+  // Long enough for a binary header; only a zero byte makes it one.
+  const std::string prose(200, 'x');
+  CHECK(begins(parse_error(prose), "bur.stl:1: \"xxx"));
+  CHECK(begins(parse_error(prose + '\0'), "bur.stl: a binary STL of "));
   CHECK(parse_stl("", "bur.stl").empty());
 }
 
@@ -111,6 +130,16 @@ TEST_CASE("a mesh that is inside out is turned, and a triangle without area is l
   Triangles more = kBar;
   more.push_back({kBar[0][0], kBar[0][1], kBar[0][0]});
   CHECK(join_triangles(more, 1, "bur.stl").triangles.size() == 16);
+}
+
+TEST_CASE("a folder is no STL file, and says so") {
+  const test::TempFolder folder;
+  const auto path = folder.write("bur.stl", text_stl(kBar));
+  CHECK(read_stl(path) == kBar);
+  const auto error = test::error_of([&] { static_cast<void>(read_stl(path.parent_path())); });
+  CHECK(error.find(": is a folder; name an STL file in it") != std::string::npos);
+  const auto none = test::error_of([&] { static_cast<void>(read_stl(path / "x")); });
+  CHECK(none.find(": no such STL file") != std::string::npos);
 }
 
 TEST_CASE("a mesh that encloses nothing or has a hole is refused with the edge") {
