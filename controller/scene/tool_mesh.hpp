@@ -33,7 +33,7 @@ using LooseTriangle = std::array<std::array<float, 3>, 3>;
 
 /// Joins triangles at corners of equal coordinates. `scale` is mm per unit of theirs; `place`
 /// begins a complaint. Triangles with two equal corners are left out. A mesh that is turned inside
-/// out is turned back.
+/// out is turned back, and so is each part of it, joined by edges, that is no hollow in another.
 ///
 /// Throws SceneError for coordinates beyond kLargestMeshMm, for an edge without a partner, for
 /// neighbours that are turned against each other, and where nothing is enclosed. Load time.

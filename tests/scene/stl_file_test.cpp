@@ -132,6 +132,35 @@ TEST_CASE("a mesh that is inside out is turned, and a triangle without area is l
   CHECK(join_triangles(more, 1, "bur.stl").triangles.size() == 16);
 }
 
+TEST_CASE("a part that is inside out is turned beside one that is not") {
+  Triangles both = kBar;
+  for (LooseTriangle t : kBar) {
+    for (auto& corner : t) corner[0] += 5;
+    std::swap(t[0], t[1]);
+    both.push_back(t);
+  }
+  const ToolMesh mesh = join_triangles(both, 1, "bur.stl");
+  CHECK(volume_mm3(mesh) == doctest::Approx(2 * 4.5 * 4));
+  CHECK(mesh.triangles.size() == 32);
+}
+
+TEST_CASE("a hollow stays one, also where the whole mesh is inside out") {
+  const Triangles outer = extremes::prism(3, 8, 4);
+  Triangles hollow = outer, inside_out = kBar;
+  for (LooseTriangle t : kBar) {
+    std::swap(t[0], t[1]);
+    hollow.push_back(t);
+  }
+  for (LooseTriangle t : outer) {
+    std::swap(t[0], t[1]);
+    inside_out.push_back(t);
+  }
+  const double outer_mm3 = volume_mm3(join_triangles(outer, 1, "bur.stl"));
+  for (const Triangles& mesh : {hollow, inside_out}) {
+    CHECK(volume_mm3(join_triangles(mesh, 1, "bur.stl")) == doctest::Approx(outer_mm3 - 4.5 * 4));
+  }
+}
+
 TEST_CASE("a folder is no STL file, and says so") {
   const test::TempFolder folder;
   const auto path = folder.write("bur.stl", text_stl(kBar));
