@@ -183,14 +183,16 @@ std::string over_budget(const Scene& scene, const SceneCosts& costs) {
   const int rate_hz = highest_rate_hz(sum_us);
   const bool fixed = scene.servo.numeric == NumericKind::fixed;
   const bool helps = fixed && may_align && std::string_view(most.stage) != "probes";
+  const std::string third = helps   ? ", or a round or unturned tool on the volume's lattice"
+                            : fixed ? ""
+                                    : ", or fixed numbers";
   return scene.path + ": tool " + scene.tools[tool].name + ": up to " + us_text(sum_us) +
          " us of work a tick, most of it " + most.stage + " (" + us_text(most.us) + ")" + parts +
          ", above the " + us_text(budget_us) + " us that are half a tick at " +
          std::to_string(scene.servo.rate_hz) + " Hz; use " +
          (rate_hz == 0 ? "" : "--rate " + std::to_string(rate_hz) + " or lower, ") +
-         "a smaller tool" + others + (others.empty() ? "" : ")") +
-         (fixed ? "" : ", or fixed numbers") +
-         (helps ? ", or a round or unturned tool on the volume's lattice" : "");
+         (rate_hz != 0 && third.empty() ? "or " : "") + "a smaller tool" + others +
+         (others.empty() ? "" : ")") + third;
 }
 
 }  // namespace kerf
