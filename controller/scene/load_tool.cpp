@@ -17,11 +17,11 @@
 namespace kerf {
 namespace {
 
-void check_side(const ToolSpec& spec, double side_vox, const char* way_out) {
+void check_side(const ToolSpec& spec, double side_vox, const char* side, const char* way_out) {
   if (side_vox <= kMaxToolSide) return;
-  refuse(spec.size_place, " makes a tool of " + short_text(side_vox) +
-                              " samples along a side, above the limit of " +
-                              std::to_string(kMaxToolSide) + "; " + way_out);
+  refuse(spec.size_place, " makes a tool of " + short_text(side_vox) + " samples along " + side +
+                              ", above the limit of " + std::to_string(kMaxToolSide) + "; " +
+                              way_out);
 }
 
 /// The spindle turns about x = z = 0.
@@ -42,7 +42,15 @@ SceneTool load_shape(const ToolSpec& spec, const ToolSize& size, double voxel_mm
     refuse(spec.size_place, " is below half a voxel (" + short_text(voxel_mm / 2) +
                                 "); use a larger radius or a finer volume");
   }
-  check_side(spec, tool_side_vox(spec.shape, size),
+  if (size.size_vox && *size.size_vox * size.pitch_mm < voxel_mm * (1 - 1e-9)) {
+    refuse(spec.size_place, " makes a tool of " + short_text(*size.size_vox * size.pitch_mm) +
+                                " mm, below a voxel (" + short_text(voxel_mm) +
+                                "); use a larger one or a larger pitch_mm");
+  }
+  const double across_mm = 2 * size.radius_mm;
+  const bool long_tool = !size.size_vox && size.length_mm.value_or(default_length_mm(
+                                               spec.shape, size.radius_mm)) > across_mm;
+  check_side(spec, tool_side_vox(spec.shape, size), long_tool ? "its length" : "a side",
              size.pitch_mm < voxel_mm ? "use a smaller tool or a coarser pitch"
                                       : "use a smaller tool or a coarser volume");
   return make_tool(spec.name, spec.shape, size);
@@ -58,7 +66,7 @@ SceneTool load_mesh(const ToolSpec& spec, double pitch_mm, double voxel_mm,
     refuse(spec.where, std::string(": ") + error.what());
   }
   check_axis(spec, mesh);
-  check_side(spec, mesh_side_vox(mesh, pitch_mm),
+  check_side(spec, mesh_side_vox(mesh, pitch_mm), "a side",
              "use a smaller scale (mm per unit of the file) or a coarser volume");
   SceneTool tool = make_mesh_tool(spec.name, std::move(mesh), pitch_mm);
   if (tool.radius_mm < voxel_mm / 2) {

@@ -57,8 +57,10 @@ void check_any_pose(const Scene& scene, const SceneTool& tool, const SceneVolume
   check(reach, kSampleReachVox, " voxels from the tool's centre",
         "use a smaller tool or one whose centre lies in its middle");
   if (scene.cut.model == CutModel::none) return;
+  const auto& h = volume.image.spacing_mm;
+  const bool fine = tool.pitch_mm < 0.99 * std::min({h[0], h[1], h[2]});
   check(per_voxel, kMaxSplatDensity, " samples in one voxel",
-        "resample the volume to finer voxels");
+        fine ? "give the tool a larger pitch_mm" : "resample the volume to finer voxels");
   check(width[0] * width[1], kMaxPlaneVoxels, " voxels of a plane under the tool",
         "use a smaller tool");
 }

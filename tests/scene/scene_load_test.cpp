@@ -252,8 +252,18 @@ TEST_CASE("a tool that does not suit the volume is reported with its line and th
             "scene.toml:5: tool.size_vox = 65 makes a tool of 65 samples along a side, above the "
             "limit of 64"));
   CHECK(has(error_with("shape = \"ball\"\nradius_mm = 999\n"), "above the limit of 64"));
-  CHECK(has(error_with("shape = \"cylinder\"\nradius_mm = 0.5\nlength_mm = 9\n"),
-            "makes a tool of 72 samples"));
+  CHECK(
+      has(error_with("shape = \"cylinder\"\nradius_mm = 0.5\nlength_mm = 9\n"),
+          "makes a tool of 72 samples along its length, above the limit of 64; use a smaller tool "
+          "or a coarser volume"));
+  CHECK(
+      has(error_with("shape = \"ball\"\nradius_mm = 1\npitch_mm = 0.01\n"),
+          "makes a tool of 201 samples along a side, above the limit of 64; use a smaller tool or "
+          "a coarser pitch"));
+  CHECK(
+      has(error_with("shape = \"ball\"\nsize_vox = 16\npitch_mm = 0.001\n"),
+          "scene.toml:5: tool.size_vox = 16 makes a tool of 0.016 mm, below a voxel (0.125); use a "
+          "larger one or a larger pitch_mm"));
   CHECK(
       has(error_with("shape = \"ball\"\nsize_vox = 30\n"),
           "scene.toml:5: tool.size_vox = 30 makes a tool of 3.75 mm, larger than the volume (3.25 "

@@ -168,7 +168,7 @@ TEST_CASE("a tool that no sum of fixed-point numbers can hold is refused with a 
   scene.tools[0].pitch_mm = kVoxelMm / 7;
   CHECK(refusal(scene) ==
         "x.toml: tool pin in volume tooth: up to 665 samples in one voxel, and 512 are the end; "
-        "resample the volume to finer voxels, or set servo.numeric = \"double\"");
+        "give the tool a larger pitch_mm, or set servo.numeric = \"double\"");
   scene.tools[0].pitch_mm = kVoxelMm;
   scene.tools[0].size_vox = {200, 200, 200};
   CHECK(refusal(scene).find(" voxels of a plane under the tool, and 36000 are the end") !=
