@@ -20,7 +20,8 @@ namespace kerf {
 ///
 /// `probes` are priced by the costliest ticks that `kerf lab extremes` finds: their probes begin in
 /// air. Where all lie inside of the solid, as `time_stages` has them and a tool may that is taken
-/// up there, they cost up to 1.7 times as much, which the other half of the tick bears.
+/// up there, they cost 1.5 (AVX-512) to 2 times as much (plain C++), which the other half of the
+/// tick bears.
 [[nodiscard]] double reference_price_ns(std::string_view way, std::string_view stage);
 
 /// Half of a tick: a machine half as fast as the reference still ends its ticks in time, and on the
