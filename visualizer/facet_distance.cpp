@@ -48,12 +48,58 @@ std::array<std::int32_t, 2> points_between(double low, double high, std::int32_t
   return {static_cast<std::int32_t>(first), static_cast<std::int32_t>(end)};
 }
 
-/// Calls `visit(x, y, z)` for the points of a box, x fastest.
+/// Where `dot(normal, at) <= most`.
+struct HalfSpace {
+  glm::dvec3 normal;
+  double most;
+};
+
+/// What holds all points within `reach` of a triangle and few others: its plane and its edges moved
+/// out; all points where it is hardly more than a line, which says little of its plane.
+std::array<HalfSpace, 5> around(const Corners& t, double reach) {
+  constexpr double kSlack = 1e-6;  // edges of the grid: more than rounding
+  constexpr double kLeastShare = 1e-6;
+  std::array<HalfSpace, 5> sides{};
+  const glm::dvec3 across = glm::cross(t[1] - t[0], t[2] - t[0]);
+  const double size = glm::length(across);
+  double longest_2 = 0.0;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const glm::dvec3 edge = t[(k + 1) % 3] - t[k];
+    longest_2 = std::max(longest_2, glm::dot(edge, edge));
+  }
+  if (!(size > kLeastShare * longest_2)) return sides;
+  const glm::dvec3 normal = across / size;
+  const auto side = [&](const glm::dvec3& out, const glm::dvec3& through) {
+    return HalfSpace{out, glm::dot(out, through) + reach + kSlack};
+  };
+  sides[0] = side(normal, t[0]);
+  sides[1] = side(-normal, t[0]);
+  for (std::size_t k = 0; k < 3; ++k) {
+    sides[2 + k] = side(glm::normalize(glm::cross(t[(k + 1) % 3] - t[k], normal)), t[k]);
+  }
+  return sides;
+}
+
+/// Calls `visit(x, y, z)` for the grid points within `reach` of a triangle and few others.
 template <class Visit>
-void for_points(const std::array<std::array<std::int32_t, 2>, 3>& box, const Visit& visit) {
-  for (std::int32_t z = box[2][0]; z < box[2][1]; ++z) {
-    for (std::int32_t y = box[1][0]; y < box[1][1]; ++y) {
-      for (std::int32_t x = box[0][0]; x < box[0][1]; ++x) visit(x, y, z);
+void for_points_near(const Corners& t, double reach, const VoxelGrid& grid, const Visit& visit) {
+  const glm::dvec3 low = glm::min(glm::min(t[0], t[1]), t[2]) - reach;
+  const glm::dvec3 high = glm::max(glm::max(t[0], t[1]), t[2]) + reach;
+  const std::array<HalfSpace, 5> sides = around(t, reach);
+  const auto [z0, z1] = points_between(low.z, high.z, grid.nz);
+  const auto [y0, y1] = points_between(low.y, high.y, grid.ny);
+  for (std::int32_t z = z0; z < z1; ++z) {
+    for (std::int32_t y = y0; y < y1; ++y) {
+      double from = low.x, to = high.x;
+      for (const HalfSpace& side : sides) {
+        const double left = side.most - side.normal.y * y - side.normal.z * z;
+        if (side.normal.x > 0.0) to = std::min(to, left / side.normal.x);
+        if (side.normal.x < 0.0) from = std::max(from, left / side.normal.x);
+        if (side.normal.x == 0.0 && left < 0.0) to = from - 1.0;
+      }
+      if (to < from) continue;
+      const auto [x0, x1] = points_between(from, to, grid.nx);
+      for (std::int32_t x = x0; x < x1; ++x) visit(x, y, z);
     }
   }
 }
@@ -67,15 +113,15 @@ double side_of(const glm::dvec3& a, const glm::dvec3& b, double x, double z) {
   return swapped ? -side : side;
 }
 
-/// Adds what a triangle does to the winding numbers below it.
-void wind(const Corners& t, const VoxelGrid& grid, std::vector<std::int32_t>& winding) {
+/// Adds what a triangle does to the winding numbers of all points below it, at the highest of them.
+void wind(const Corners& t, const VoxelGrid& grid, std::vector<std::int32_t>& steps) {
   // Aside of the grid's columns, so that none meets an edge.
   constexpr double kAsideX = 1.3e-6, kAsideZ = 2.1e-6;
   const auto [x_low, x_high] = std::minmax({t[0].x, t[1].x, t[2].x});
   const auto [z_low, z_high] = std::minmax({t[0].z, t[1].z, t[2].z});
   const auto columns_x = points_between(x_low - 1.0, x_high + 1.0, grid.nx);
   const auto columns_z = points_between(z_low - 1.0, z_high + 1.0, grid.nz);
-  for_points({columns_x, {0, 1}, columns_z}, [&](std::int32_t ix, std::int32_t, std::int32_t iz) {
+  const auto pierce = [&](std::int32_t ix, std::int32_t iz) {
     const double x = ix + kAsideX, z = iz + kAsideZ;
     const double a = side_of(t[1], t[2], x, z), b = side_of(t[2], t[0], x, z);
     const double c = side_of(t[0], t[1], x, z);
@@ -83,10 +129,11 @@ void wind(const Corners& t, const VoxelGrid& grid, std::vector<std::int32_t>& wi
     if (a == 0.0 || b == 0.0 || c == 0.0 || (b < 0.0) != faces_up || (c < 0.0) != faces_up) return;
     const double y = (a * t[0].y + b * t[1].y + c * t[2].y) / (a + b + c);
     const auto below = points_between(0.0, std::ceil(y) - 1.0, grid.ny);
-    for (std::int32_t iy = below[0]; iy < below[1]; ++iy) {
-      winding[grid.index(ix, iy, iz)] += faces_up ? 1 : -1;
-    }
-  });
+    if (below[1] > 0) steps[grid.index(ix, below[1] - 1, iz)] += faces_up ? 1 : -1;
+  };
+  for (std::int32_t iz = columns_z[0]; iz < columns_z[1]; ++iz) {
+    for (std::int32_t ix = columns_x[0]; ix < columns_x[1]; ++ix) pierce(ix, iz);
+  }
 }
 
 }  // namespace
@@ -96,22 +143,24 @@ std::vector<float> facet_distances(const Facets& facets, const GridPlaces& place
   const VoxelGrid& grid = places.grid;
   const double reach = reach_mm / places.edge_mm;
   std::vector<float> distance(grid.voxel_count(), static_cast<float>(reach_mm));
-  std::vector<std::int32_t> winding(distance.size());
+  std::vector<std::int32_t> winding(distance.size());  // steps of it, from above to below
   for (std::size_t i = 0; i < facets.triangles.size(); ++i) {
     const Corners t = corners_of(facets, i, places);
-    const glm::dvec3 low = glm::min(glm::min(t[0], t[1]), t[2]) - reach;
-    const glm::dvec3 high = glm::max(glm::max(t[0], t[1]), t[2]) + reach;
-    for_points({points_between(low.x, high.x, grid.nx), points_between(low.y, high.y, grid.ny),
-                points_between(low.z, high.z, grid.nz)},
-               [&](std::int32_t x, std::int32_t y, std::int32_t z) {
-                 float& nearest = distance[grid.index(x, y, z)];
-                 const double own = distance_to(t, glm::dvec3(x, y, z)) * places.edge_mm;
-                 nearest = std::min(nearest, static_cast<float>(own));
-               });
+    for_points_near(t, reach, grid, [&](std::int32_t x, std::int32_t y, std::int32_t z) {
+      float& nearest = distance[grid.index(x, y, z)];
+      const double own = distance_to(t, glm::dvec3(x, y, z)) * places.edge_mm;
+      nearest = std::min(nearest, static_cast<float>(own));
+    });
     wind(t, grid, winding);
   }
-  for (std::size_t i = 0; i < distance.size(); ++i) {
-    if (winding[i] > 0) distance[i] = -distance[i];
+  for (std::int32_t z = 0; z < grid.nz; ++z) {
+    for (std::int32_t y = grid.ny - 1; y >= 0; --y) {
+      for (std::int32_t x = 0; x < grid.nx; ++x) {
+        const std::size_t i = grid.index(x, y, z);
+        if (y + 1 < grid.ny) winding[i] += winding[grid.index(x, y + 1, z)];
+        if (winding[i] > 0) distance[i] = -distance[i];
+      }
+    }
   }
   return distance;
 }
