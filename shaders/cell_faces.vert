@@ -5,6 +5,7 @@
 layout(location = 0) in uvec4 a_face;  // cell x, y, z; 2 * axis + (1 on the high side)
 
 uniform mat4 u_clip_from_cell;
+uniform float u_near_mm;
 
 void main() {
   const vec2 kCorner[6] = vec2[](vec2(0, 0), vec2(1, 0), vec2(1, 1),   //
@@ -15,4 +16,6 @@ void main() {
   if (!high) at = at.yx;  // counter-clockwise when seen from the outside
   vec3 corner = axis == 0u ? vec3(high, at) : axis == 1u ? vec3(at.y, high, at.x) : vec3(at, high);
   gl_Position = u_clip_from_cell * vec4(vec3(a_face.xyz) + corner, 1.0);
+  // No far plane: beyond it the nearest face still says whether a ray has been inside all the way.
+  gl_Position.z = gl_Position.w - 2.0 * u_near_mm;
 }

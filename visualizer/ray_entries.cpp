@@ -28,6 +28,7 @@ void RayEntries::draw(int layer, const CellsOnGpu& cells, const View& view,
   glEnable(GL_SCISSOR_TEST);
   glScissor(part.x0, part.y0, part.x1 - part.x0, part.y1 - part.y0);
   glEnable(GL_DEPTH_TEST);
+  glDepthFunc(GL_LESS);
   glDisable(GL_CULL_FACE);
   glDisable(GL_BLEND);
   glClearNamedFramebufferfv(framebuffer, GL_COLOR, 0, nowhere.data());
@@ -36,12 +37,10 @@ void RayEntries::draw(int layer, const CellsOnGpu& cells, const View& view,
                glm::mat4(view.clip_from_eye() * view.eye_from_world * cells.world_from_cell()));
   program_.set("u_near_mm", static_cast<float>(view.near_mm));
   program_.use();
-  // Faces before the near or beyond the far plane count too: they say where a ray is inside.
+  // Faces before the near plane count too: they say where a ray is inside.
   glEnable(GL_DEPTH_CLAMP);
-  glDepthFunc(GL_LEQUAL);
   cells.draw_faces();
   glDisable(GL_DEPTH_CLAMP);
-  glDepthFunc(GL_LESS);
 }
 
 }  // namespace kerf

@@ -72,6 +72,26 @@ TEST_CASE("the depth of a ball is that of the sphere, to a tenth of a voxel") {
   CHECK(error.rms_mm < 0.1 * 0.25);
 }
 
+TEST_CASE(
+    "rays that begin and end inside one body begin there, whatever lies beyond the far plane") {
+  if (!have_gl()) return;
+  // A wide body around the eye, a gap, and a thin one. Rays leave the gap in a higher row of cells
+  // than they came into it by, and enter the thin body by a later face than they leave it by.
+  const VoxelGrid grid{120, 24, 120};
+  const TestVolume volume(grid, centred(grid, glm::dvec3(0.25)), [](glm::dvec3 at) {
+    return at.x > 0.0 || (at.x < -10.0 && at.x > -12.0) ? 1.0 : 0.0;
+  });
+  const VolumeContent content = volume.content();
+  IsoRenderer renderer(scene_of({&volume}), {&content, 1});
+  const glm::dvec3 eye(6.0, 0.1, -9.0);
+  View view = look_at(eye, eye + glm::dvec3(-1.0, 0.0, 0.45), 0.5, 2.0);
+  view.tan_half_height = 0.1;
+  const Drawn drawn = draw(renderer, view, RenderTarget(kTestSize));
+  int holes = 0;
+  for (const float depth : drawn.depth) holes += depth >= 1.0F ? 1 : 0;
+  CHECK(holes == 0);
+}
+
 TEST_CASE("unequal voxel edges and a turned volume give the same sphere") {
   if (!have_gl()) return;
   const VoxelGrid grid{50, 36, 24};
