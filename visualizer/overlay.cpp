@@ -114,17 +114,31 @@ void panel(const OverlayFigures& figures) {
   ImGui::End();
 }
 
-void banner(const std::string& text, bool alarm, ImVec2 size) {
+/// At the foot of the picture, beside the controls, which end at `controls_x`; at its top where the
+/// picture is too narrow for both. The controls stay where they are under the mouse; no panel lies
+/// over the banner.
+void banner(const std::string& text, bool alarm, ImVec2 size, float controls_x) {
   const ImVec4 kAlarm{0.45F, 0.20F, 0.0F, 0.92F};
   const ImVec4 kNews{0.05F, 0.20F, 0.32F, 0.92F};
-  ImGui::SetNextWindowPos(ImVec2(0.5F * size.x, size.y - 14.0F), 0, ImVec2(0.5F, 1.0F));
-  ImGui::PushStyleColor(ImGuiCol_WindowBg, alarm ? kAlarm : kNews);
-  ImGui::Begin("banner", nullptr, kStill);
-  ImGui::PushTextWrapPos(std::max(0.9F * size.x, 80.0F));
-  ImGui::TextColored(kValue, "%s", text.c_str());
-  ImGui::PopTextWrapPos();
-  ImGui::End();
-  ImGui::PopStyleColor();
+  constexpr float kGap = 8.0F, kFoot = 14.0F, kLeastWide = 160.0F;
+  const ImVec2 padding = ImGui::GetStyle().WindowPadding;
+  const bool alone = controls_x <= 0.0F;
+  const bool beside = size.x - controls_x - 2.0F * kGap >= kLeastWide;
+  const float left = beside && !alone ? controls_x + kGap : 0.05F * size.x;
+  const float right = beside && !alone ? size.x - kGap : 0.95F * size.x;
+  const float wrap = std::max(right - left - 2.0F * padding.x, 60.0F);
+  const ImVec2 words = ImGui::CalcTextSize(text.c_str(), nullptr, false, wrap);
+  const ImVec2 whole{words.x + 2.0F * padding.x, words.y + 2.0F * padding.y};
+  const float top = alone || beside ? size.y - kFoot - whole.y : kGap;
+  const ImVec2 low{std::floor(0.5F * (left + right - whole.x)), std::floor(std::max(top, 0.0F))};
+  const ImVec2 high{low.x + whole.x, low.y + whole.y};
+  ImDrawList& to = *ImGui::GetForegroundDrawList();
+  to.PushClipRect(low, high);
+  to.AddRectFilled(low, high, ImGui::GetColorU32(alarm ? kAlarm : kNews),
+                   ImGui::GetStyle().WindowRounding);
+  to.AddText(ImGui::GetFont(), ImGui::GetFontSize(), ImVec2(low.x + padding.x, low.y + padding.y),
+             ImGui::GetColorU32(kValue), text.c_str(), nullptr, wrap);
+  to.PopClipRect();
 }
 
 void key_help(ImVec2 size) {
@@ -215,14 +229,16 @@ void Overlay::lay_out(OverlayFigures& figures, PictureSize size) {
   ImGui::GetIO().DisplaySize = all;
   ImGui::NewFrame();
   if (!figures.hidden) panel(figures);
+  float controls_x = 0.0F;
   if (figures.controls && !figures.hidden) {
     ImGui::SetNextWindowPos(ImVec2(12.0F, all.y - 12.0F), 0, ImVec2(0.0F, 1.0F));
     ImGui::Begin("look", nullptr, kTouched);
     look_controls(*figures.controls);
+    controls_x = ImGui::GetWindowPos().x + ImGui::GetWindowWidth();
     ImGui::End();
   }
-  if (!figures.banner.empty()) banner(figures.banner, figures.alarm, all);
   if (figures.help) key_help(all);
+  if (!figures.banner.empty()) banner(figures.banner, figures.alarm, all, controls_x);
   ImGui::Render();
 }
 

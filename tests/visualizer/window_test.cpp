@@ -14,6 +14,20 @@ using namespace kerf;
 using namespace kerf::test;
 namespace fs = std::filesystem;
 
+namespace {
+
+/// Pixels of a warning's ground.
+int warning_pixels(const RgbPicture& picture) {
+  int count = 0;
+  for (std::size_t i = 0; i < picture.rgb.size(); i += 3) {
+    const int red = picture.rgb[i], green = picture.rgb[i + 1], blue = picture.rgb[i + 2];
+    count += red > 100 && red < 140 && green > 40 && green < 75 && blue < 25 ? 1 : 0;
+  }
+  return count;
+}
+
+}  // namespace
+
 TEST_CASE("keys and mouse work the window") {
   if (!have("Xvfb") || !have("xdotool")) return;
   const Screen screen;
@@ -146,6 +160,21 @@ TEST_CASE("keys and mouse work the window") {
     CHECK(user.look() != first);
     CHECK(user.quit() == 0);
   }
+}
+
+TEST_CASE("nothing covers a warning, whatever else is shown and in a small window too") {
+  if (!have("Xvfb") || !have("xdotool")) return;
+  const Screen screen;
+  User user(screen.folder);
+  constexpr int kMostOfIt = 5'000;  // of the ground of "stale: no news from the servo"
+  CHECK(warning_pixels(user.whole()) > kMostOfIt);
+  act("mousemove 100 310 sleep 0.2 mousedown 1 sleep 0.2 mouseup 1");  // the controls, to the front
+  CHECK(warning_pixels(user.whole()) > kMostOfIt);
+  act("key h");
+  CHECK(warning_pixels(user.whole()) > kMostOfIt);
+  act("search --name 'kerf: test' windowsize 300 360");
+  CHECK(warning_pixels(user.whole()) > kMostOfIt);
+  CHECK(user.quit() == 0);
 }
 
 TEST_CASE("each of two volumes takes its own renderer, by keys and by its list") {
