@@ -53,7 +53,7 @@ TEST_CASE("no sample in a cell is above the cell's maximum, in and around the vo
   CHECK(rc::check([] {
     const VoxelGrid grid = random_grid();
     const auto density = random_density(grid);
-    const std::int32_t edge = *rc::gen::element(4, 8);
+    const std::int32_t edge = *rc::gen::element(2, 4, 8);
     const Macrocells cells(grid, density, 1, edge);
     const auto unit = rc::gen::inRange(0, 1001);
     const auto coordinate = [&](int n) { return -1.0 + *unit * 1e-3 * (n + 1); };
@@ -71,7 +71,7 @@ TEST_CASE("cells kept up by changed bricks equal cells made anew") {
     const VoxelGrid grid = random_grid();
     const Density iso = *rc::gen::inRange<Density>(1, 65535);
     auto density = random_density(grid);
-    const std::int32_t edge = *rc::gen::element(4, 8);
+    const std::int32_t edge = *rc::gen::element(2, 4, 8);
     Macrocells kept(grid, density, iso, edge);
     const BrickGrid bricks = BrickGrid::of(grid);
     const auto id = *rc::gen::inRange(0U, bricks.count());
