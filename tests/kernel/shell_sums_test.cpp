@@ -100,6 +100,8 @@ TEST_CASE("every instruction set sums a shell to the bit, wherever it is") {
           // Every group read, against every set with groups left out.
           const Sums truth =
               shell_sums<FixedNumbers>(shell.table, truth_memory.places(), centre, all);
+          const std::int32_t looked_at =
+              shell_sums<FixedNumbers>(shell.table, truth_memory.places(), centre, field).read;
           felt += truth.weight != 0 ? 1 : 0;
           skipped += kind == 4 && truth.weight == 0 ? 1 : 0;
           for (auto set = kernel_sets(); *set != nullptr; ++set) {
@@ -107,7 +109,7 @@ TEST_CASE("every instruction set sums a shell to the bit, wherever it is") {
             Sums sums;
             sums.weight = sums.square = sums.top = -1;  // left over from before
             (*set)->sum_shell(shell.table, memory.places(), centre, field, sums);
-            const bool alike = same(sums, truth);
+            const bool alike = same(sums, truth) && sums.read == looked_at;
             if (!alike) {
               INFO(std::string((*set)->name), ", ", count, " samples, kind ", kind, ", case ", i);
               REQUIRE(alike);

@@ -173,6 +173,8 @@ template <class N>
                                                 const ShellNumber<N> (&centre)[3],
                                                 const ShellField& field) noexcept {
   ShellSums<N> sums;
+  const VoxelGrid& grid = field.grid;
+  if (grid.nx < 2 || grid.ny < 2 || grid.nz < 2) return sums;  // no cell
   for (std::int32_t group = 0; group < table.groups; ++group) {
     std::int32_t middle[3] = {};
     for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -181,6 +183,7 @@ template <class N>
           N::kIsFixed ? static_cast<std::int32_t>(at) >> 16 : static_cast<std::int32_t>(at);
     }
     if (field.free.at(middle[0], middle[1], middle[2]) >= table.bricks[group]) continue;
+    sums.read += kShellGroup;
     for (std::int32_t i = group * kShellGroup; i < (group + 1) * kShellGroup; ++i) {
       const ShellNumber<N> place[3] = {centre[0] + places.offset[0][i],
                                        centre[1] + places.offset[1][i],

@@ -98,6 +98,7 @@ struct ShellSums {
   typename N::Sum lever[3] = {};  ///< SUM u lever
   ShellNumber<N> top{};           ///< the largest r
   std::int32_t solid = 0;         ///< samples in the solid, r >= 1/2
+  std::int32_t read = 0;          ///< samples that were looked at, by whole groups
 };
 
 }  // namespace kerf

@@ -5,6 +5,7 @@
 
 #include <immintrin.h>
 
+#include "controller/kernel/sets/load_pairs.hpp"
 #include "controller/kernel/sets/whole_write.hpp"
 
 namespace kerf {
@@ -80,9 +81,10 @@ struct Simd {
   static bool any(V a) noexcept { return _mm256_testz_si256(a, a) == 0; }
   /// (a b + 2^14) / 2^15 in each 16 bits.
   static V multiply_round(V a, V b) noexcept { return _mm256_mulhrs_epi16(a, b); }
-  /// The densities index and index + 1 of each 32-bit index.
-  static V gather_pairs(const std::uint16_t* density, V index) noexcept {
-    return _mm256_i32gather_epi32(reinterpret_cast<const int*>(density), index, 2);
+
+  /// The densities index and index + 1 of each of 8 indices.
+  static V load_pairs(const std::uint16_t* density, const std::uint32_t* index) noexcept {
+    return _mm256_setr_m128i(load_four_pairs(density, index), load_four_pairs(density, index + 4));
   }
 
   static V gather32(const std::uint32_t* table, V index) noexcept {

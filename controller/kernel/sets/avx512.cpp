@@ -5,6 +5,8 @@
 
 #include <immintrin.h>
 
+#include "controller/kernel/sets/load_pairs.hpp"
+
 namespace kerf {
 namespace {
 
@@ -72,9 +74,14 @@ struct Simd {
   static bool any(V a) noexcept { return _mm512_test_epi32_mask(a, a) != 0; }
   /// (a b + 2^14) / 2^15 in each 16 bits.
   static V multiply_round(V a, V b) noexcept { return _mm512_mulhrs_epi16(a, b); }
-  /// The densities index and index + 1 of each 32-bit index.
-  static V gather_pairs(const std::uint16_t* density, V index) noexcept {
-    return _mm512_i32gather_epi32(index, density, 2);
+
+  /// The densities index and index + 1 of each of 16 indices.
+  static V load_pairs(const std::uint16_t* density, const std::uint32_t* index) noexcept {
+    const __m256i low = _mm256_setr_m128i(load_four_pairs(density, index),
+                                          load_four_pairs(density, index + 4)),
+                  high = _mm256_setr_m128i(load_four_pairs(density, index + 8),
+                                           load_four_pairs(density, index + 12));
+    return _mm512_inserti64x4(_mm512_castsi256_si512(low), high, 1);
   }
 
   static V gather32(const std::uint32_t* table, V index) noexcept {

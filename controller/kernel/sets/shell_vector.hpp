@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "controller/kernel/proxy/shell_table.hpp"
+#include "controller/kernel/proxy/shell_sums.hpp"
 #include "controller/kernel/sets/shell_places.hpp"
 
 // Sums of a shell for AVX2 and AVX-512, in the bits of shell_sums.hpp; `Simd` as in box_vector.hpp.
@@ -31,7 +31,18 @@ struct ShellVectors {
   V rise[3] = {Simd::zero(), Simd::zero(), Simd::zero()};
   V lever[3] = {Simd::zero(), Simd::zero(), Simd::zero()};
   V top = Simd::zero(), solid = Simd::zero();
+  V full_lever[3] = {Simd::zero(), Simd::zero(), Simd::zero()};  ///< of vectors of full density
+  std::int32_t full = 0;                                         ///< samples in such vectors
+  std::int32_t read = 0;
 };
+
+/// One sample of full density whose lever is (1, 0, 0).
+template <bool kRound>
+inline constexpr ShellSums<FixedNumbers> kFullSample = [] {
+  ShellSums<FixedNumbers> sums;
+  add_sample<FixedNumbers>(sums, {32767, {}}, {1, 0, 0}, kRound);
+  return sums;
+}();
 
 /// a + (b - a) t of 15-bit entries of 16 bits.
 [[gnu::always_inline]] inline V blend16(V a, V b, V t) noexcept {
@@ -45,9 +56,20 @@ struct ShellVectors {
 
 /// Where the cells of some samples are.
 struct ShellCells {
-  V voxel;    ///< index of the low corner, 0 outside
+  alignas(64) std::uint32_t voxel[kShellLanes];  ///< index of the low corner, 0 outside
   V inside;   ///< all ones inside; not set where all are known to be
   V x, y, z;  ///< how far in: weights of `blend_halves`, then twice 16 bits
+};
+
+/// Vectors of samples that take each step together. A sample's steps wait for each other, some 150
+/// cycles in all, and no core looks far enough ahead to begin the next one meanwhile.
+struct ShellBlock {
+  static constexpr std::int32_t kMost = 16;
+
+  std::int32_t count = 0;
+  std::int32_t first[kMost];  ///< sample of each vector
+  ShellCells cell[kMost];
+  V corner[kMost][4];  ///< densities over 2 at (y, z), (y + 1, z), (y, z + 1), (y + 1, z + 1)
 };
 
 /// `kInside`: all are known to be in the volume.
@@ -63,8 +85,8 @@ template <bool kInside>
     in[axis] = Simd::srl32<1>(Simd::bit_and(at, Simd::set32(0xffff)));
   }
   const V row = Simd::add32(low[1], Simd::multiply32(low[2], Simd::set32(grid.ny)));
+  V voxel = Simd::add32(low[0], Simd::multiply32(row, Simd::set32(grid.nx)));
   ShellCells cells;
-  cells.voxel = Simd::add32(low[0], Simd::multiply32(row, Simd::set32(grid.nx)));
   cells.x = Simd::sub32(Simd::bit_or(in[0], Simd::set32(0x8000)), Simd::sll32<16>(in[0]));
   cells.y = Simd::bit_or(in[1], Simd::sll32<16>(in[1]));
   cells.z = Simd::bit_or(in[2], Simd::sll32<16>(in[2]));
@@ -75,31 +97,35 @@ template <bool kInside>
     beyond = Simd::bit_or(beyond, Simd::sub32(Simd::set32(grid.ny - 2), low[1]));
     beyond = Simd::bit_or(beyond, Simd::sub32(Simd::set32(grid.nz - 2), low[2]));
     cells.inside = Simd::bit_xor(Simd::sra32<31>(beyond), Simd::set32(-1));
-    cells.voxel = Simd::bit_and(cells.voxel, cells.inside);
+    voxel = Simd::bit_and(voxel, cells.inside);
   }
+  Simd::store(cells.voxel, voxel);
   return cells;
 }
 
 /// `shell_sample` and `add_sample` of kShellLanes samples.
 template <bool kRound, bool kInside>
 [[gnu::always_inline]] inline void add_samples(const ShellTable<FixedNumbers>& table,
-                                               const ShellPlaces<FixedNumbers>& places,
-                                               const std::int32_t (&centre)[3],
-                                               const ShellField& field, std::int32_t first,
+                                               const DensityScale& scale, std::int32_t first,
+                                               const ShellCells& cell, const V (&corner)[4],
                                                ShellVectors& sums) noexcept {
-  const ShellCells cell = shell_cells<kInside>(places, centre, field.grid, first);
-  const std::ptrdiff_t row = field.grid.nx, plane = row * field.grid.ny;
-  const auto corner = [&](std::ptrdiff_t offset) {
-    return Simd::srl16<1>(Simd::gather_pairs(field.density + offset, cell.voxel));
-  };
-  const V c00 = corner(0), c10 = corner(row), c01 = corner(plane), c11 = corner(plane + row);
+  const V c00 = corner[0], c10 = corner[1], c01 = corner[2], c11 = corner[3];
   const V near_z = blend16(c00, c10, cell.y), far_z = blend16(c01, c11, cell.y);
   const V at = blend16(near_z, far_z, cell.z);
   V read = blend_halves(at, cell.x);
   if constexpr (!kInside) read = Simd::bit_and(read, cell.inside);
-  const V scaled =
-      Simd::srl32(Simd::multiply32(read, Simd::set32(static_cast<int>(field.scale.mantissa))),
-                  field.scale.shift);
+  const V scaled = Simd::srl32(
+      Simd::multiply32(read, Simd::set32(static_cast<int>(scale.mantissa))), scale.shift);
+  // Only where the density is not clipped it has a gradient.
+  const V open = Simd::sra32<31>(Simd::sub32(scaled, Simd::set32(32768)));
+  if (!Simd::any(open)) {  // deep inside
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      sums.full_lever[axis] =
+          Simd::add32(sums.full_lever[axis], Simd::load(table.lever[axis] + first));
+    }
+    sums.full += kShellLanes;
+    return;
+  }
   const V strong = Simd::sra32<31>(Simd::sub32(Simd::set32(2047), scaled));
   const V r = Simd::bit_and(Simd::min32(scaled, Simd::set32(32767)), strong);
   if (!Simd::any(r)) return;
@@ -128,8 +154,6 @@ template <bool kRound, bool kInside>
   sums.top = Simd::max32(sums.top, r);
   sums.solid = Simd::add32(sums.solid, Simd::srl32<14>(r));
 
-  // Only where the density is not clipped it has a gradient.
-  const V open = Simd::sra32<31>(Simd::sub32(scaled, Simd::set32(32768)));
   V v = w;
   if constexpr (kRound) v = Simd::sub32(Simd::add32(Simd::add32(w, w), w), r3);
   v = Simd::bit_and(v, open);
@@ -142,6 +166,66 @@ template <bool kRound, bool kInside>
   for (std::size_t axis = 0; axis < 3; ++axis) pulls.add(sums.rise[axis], slope[axis]);
 }
 
+template <bool kRound, bool kInside>
+[[gnu::always_inline]] inline void add_block(const ShellTable<FixedNumbers>& table,
+                                             const ShellPlaces<FixedNumbers>& places,
+                                             const std::int32_t (&centre)[3],
+                                             const ShellField& field, ShellBlock& block,
+                                             ShellVectors& sums) noexcept {
+  for (std::int32_t k = 0; k < block.count; ++k) {
+    block.cell[k] = shell_cells<kInside>(places, centre, field.grid, block.first[k]);
+  }
+  const std::ptrdiff_t row = field.grid.nx, plane = row * field.grid.ny;
+  for (std::int32_t k = 0; k < block.count; ++k) {
+    const auto read = [&](std::ptrdiff_t offset) {
+      return Simd::srl16<1>(Simd::load_pairs(field.density + offset, block.cell[k].voxel));
+    };
+    block.corner[k][0] = read(0);
+    block.corner[k][1] = read(row);
+    block.corner[k][2] = read(plane);
+    block.corner[k][3] = read(plane + row);
+  }
+  for (std::int32_t k = 0; k < block.count; ++k) {
+    add_samples<kRound, kInside>(table, field.scale, block.first[k], block.cell[k], block.corner[k],
+                                 sums);
+  }
+  block.count = 0;
+}
+
+/// Groups from `group` to `end`, but those in free space.
+template <bool kRound, bool kInside>
+[[gnu::always_inline]] inline void add_groups(const ShellTable<FixedNumbers>& table,
+                                              const ShellPlaces<FixedNumbers>& places,
+                                              const std::int32_t (&centre)[3],
+                                              const ShellField& field, std::int32_t group,
+                                              std::int32_t end, ShellVectors& sums) noexcept {
+  ShellBlock block;
+  for (; group < end; ++group) {
+    if (field.free.at((centre[0] + places.middle[0][group]) >> 16,
+                      (centre[1] + places.middle[1][group]) >> 16,
+                      (centre[2] + places.middle[2][group]) >> 16) >= table.bricks[group]) {
+      continue;
+    }
+    sums.read += kShellGroup;
+    for (std::int32_t i = 0; i < kShellGroup; i += kShellLanes) {
+      block.first[block.count++] = group * kShellGroup + i;
+    }
+    if (block.count == ShellBlock::kMost) {
+      add_block<kRound, kInside>(table, places, centre, field, block, sums);
+    }
+  }
+  add_block<kRound, kInside>(table, places, centre, field, block, sums);
+}
+
+/// Of the 32-bit entries.
+inline std::int32_t sum32(V entries) noexcept {
+  alignas(64) std::int32_t lane[kShellLanes];
+  Simd::store(lane, entries);
+  std::int32_t sum = 0;
+  for (const std::int32_t entry : lane) sum += entry;
+  return sum;
+}
+
 /// `kInside`: the whole tool is. What fills the last group up is not, so that one is read with
 /// care.
 template <bool kRound, bool kInside>
@@ -151,36 +235,25 @@ template <bool kRound, bool kInside>
                                                 const ShellField& field,
                                                 ShellSums<FixedNumbers>& out) noexcept {
   ShellVectors sums;
-  for (std::int32_t group = 0; group < table.groups; ++group) {
-    if (field.free.at((centre[0] + places.middle[0][group]) >> 16,
-                      (centre[1] + places.middle[1][group]) >> 16,
-                      (centre[2] + places.middle[2][group]) >> 16) >= table.bricks[group]) {
-      continue;
-    }
-    const std::int32_t first = group * kShellGroup, end = first + kShellGroup;
-    for (std::int32_t i = first; i < end; i += kShellLanes) {
-      if (kInside && end <= table.count) {
-        add_samples<kRound, true>(table, places, centre, field, i, sums);
-      } else {
-        add_samples<kRound, false>(table, places, centre, field, i, sums);
-      }
-    }
+  const std::int32_t whole = kInside ? table.count / kShellGroup : 0;
+  if constexpr (kInside) {
+    add_groups<kRound, true>(table, places, centre, field, 0, whole, sums);
   }
-  out.weight = Simd::sum64(sums.weight);
-  out.density = Simd::sum64(sums.density);
-  out.square = Simd::sum64(sums.square);
+  add_groups<kRound, false>(table, places, centre, field, whole, table.groups, sums);
+  constexpr const ShellSums<FixedNumbers>& kFull = kFullSample<kRound>;
+  out.weight = Simd::sum64(sums.weight) + sums.full * kFull.weight;
+  out.density = Simd::sum64(sums.density) + sums.full * kFull.density;
+  out.square = Simd::sum64(sums.square) + sums.full * kFull.square;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     out.rise[axis] = Simd::sum64(sums.rise[axis]);
-    out.lever[axis] = Simd::sum64(sums.lever[axis]);
+    out.lever[axis] = Simd::sum64(sums.lever[axis]) + kFull.lever[0] * sum32(sums.full_lever[axis]);
   }
-  alignas(64) std::int32_t top[kShellLanes], solid[kShellLanes];
+  alignas(64) std::int32_t top[kShellLanes];
   Simd::store(top, sums.top);
-  Simd::store(solid, sums.solid);
-  out.top = out.solid = 0;
-  for (std::int32_t i = 0; i < kShellLanes; ++i) {
-    out.top = top[i] > out.top ? top[i] : out.top;
-    out.solid += solid[i];
-  }
+  out.top = sums.full > 0 ? kFull.top : 0;
+  for (const std::int32_t lane : top) out.top = lane > out.top ? lane : out.top;
+  out.solid = sum32(sums.solid) + sums.full;
+  out.read = sums.read;
 }
 
 void sum_shell_samples(const ShellTable<FixedNumbers>& table,
