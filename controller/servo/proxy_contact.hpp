@@ -72,7 +72,7 @@ constexpr void add_loads(const Swept<N>& swept, ProxyContact<N>& contact) noexce
 
 /// One tick of the swept contact: the proxy follows `goal`, and its spring tells the force.
 ///
-/// Servo thread; pure but for `state`. At most 32 probes, or 27 while a place is looked for. A goal
+/// Servo thread; pure but for `state`. At most 32 probes, or 14 while a place is looked for. A goal
 /// that is not finite changes nothing and gives no force; one that is far is brought within
 /// kContactLimit. No force before the proxy is placed.
 template <class N, ContactField<N> Field>

@@ -38,6 +38,7 @@ template <class N>
   if (tool.turns && !tool.round) goal.turn = turn_of<N>(rotation.row);
   ShellProbe<N> field(*plan.kernels, tool.swept.shell,
                       std::span(state.contact.volumes).first(plan.volume_count));
+  field.begin_tick();
   const ProxyContact<N> felt = follow<N>(tool.swept.proxy, state.contact.proxy, field, goal);
 
   SweptForce<N> out;

@@ -170,3 +170,29 @@ TEST_CASE_TEMPLATE("the height of a peak does not depend on its dimension", N, F
     CHECK(double(peak_height(means, false)) == doctest::Approx(height).epsilon(1e-4));
   }
 }
+
+TEST_CASE_TEMPLATE(
+    "what the probes of a tick look at is bounded; the first after a turn is answered", N,
+    FixedNumbers, DoubleNumbers) {
+  // Felt on all sides, solid nowhere: the dearest that there is.
+  const TestVolume tissue = blurred({40, 40, 40}, [](Point p) { return 0.2 + 0.01 * (p[1] - 20); });
+  for (const SceneTool& tool : {kBall, tool_of_units("cylinder", 5, 16)}) {
+    ProbeRig<N> rig(tool);
+    rig.add(tissue, plain_frame<N>());
+    const Point middle{20, 20, 20};
+    const auto answered = [&] {
+      int probes = 0;
+      while (probes < 100 && !rig.at(middle).buried) ++probes;
+      return probes;
+    };
+    CHECK(answered() == 100);  // nothing is counted before the first tick
+    for (int tick = 0; tick < 3; ++tick) {
+      rig.field().begin_tick();
+      const int probes = answered();
+      CHECK(probes >= ShellProbe<N>::kLeastProbes);
+      CHECK(probes <= 25);
+    }
+    rig.field().turn({});
+    CHECK(answered() == 1);
+  }
+}

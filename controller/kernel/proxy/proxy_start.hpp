@@ -11,11 +11,11 @@ namespace kerf {
 enum class Placing : std::uint8_t { searching, placed, refused };
 
 /// Finds the first place of a proxy: the goal if that is free, else the nearest free place in one
-/// of 26 directions from it, one unit farther out in each tick. From there the sweep slides to the
-/// place nearest to the goal. With nothing free within kReach the tool is refused until its own
-/// goal is free.
+/// of 26 directions from it, half of them in a tick and one unit farther out every second. From
+/// there the sweep slides to the place nearest to the goal. With nothing free within kReach the
+/// tool is refused until its own goal is free.
 ///
-/// At most 27 probes a tick. Only the tool's surface is felt, so what lies wholly inside of the
+/// At most 14 probes a tick. Only the tool's surface is felt, so what lies wholly inside of the
 /// tool does not count as solid here.
 template <class N>
 class StartSearch {
@@ -32,10 +32,11 @@ class StartSearch {
       pose = goal;
       return Placing::placed;
     }
-    if (distance_ == kReach) return Placing::refused;
-    ++distance_;
-    for (int way = 0; way < 27; ++way) {
-      if (way == 13) continue;  // no way at all
+    if (distance_ == kReach && !halfway_) return Placing::refused;
+    if (!halfway_) ++distance_;
+    halfway_ = !halfway_;
+    // The 14th is no way at all.
+    for (int way = halfway_ ? 0 : 14, end = way + 13; way < end; ++way) {
       const Place centre = goal.centre + step(way);
       if (is_free(field, centre)) {
         pose = {centre, goal.turn};
@@ -60,6 +61,7 @@ class StartSearch {
   }
 
   std::int32_t distance_ = 0;
+  bool halfway_ = false;  ///< the first half of the directions was tried at this distance
 };
 
 }  // namespace kerf

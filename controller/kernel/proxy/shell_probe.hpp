@@ -5,6 +5,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <span>
 
 #include "controller/kernel/kernel_set.hpp"
@@ -39,12 +40,23 @@ struct ShellVolume {
 /// What a tool feels among the solid volumes of a scene: the ContactField of the sweep.
 ///
 /// `turn` first, then any number of probes with this orientation; a tool that does not turn needs
-/// it once. A probe costs as many reads as the shell has samples, times the volumes, whatever the
-/// place. In fixed all kernels give the same bits. Servo thread; no heap.
+/// it once. A probe costs up to as many reads as the shell has samples, times the volumes: those in
+/// free space are left out. In fixed all kernels give the same bits. Servo thread; no heap.
+///
+/// What a tick may cost is counted in samples: where tissue or noise is felt on all sides, a probe
+/// is twice as dear as at a face. Once the count of `begin_tick` is spent, probes answer `buried`
+/// unseen, and a sweep stays at the last place that it found; but the first probe after a turn is
+/// always answered.
 template <class N>
 class ShellProbe {
  public:
   using Real = typename N::Real;
+
+  /// Samples that the probes of a tick look at, some 2.5 ns each, and what a look costs besides, in
+  /// samples. A tool of very many is allowed some probes of all of them.
+  static constexpr std::int32_t kTickSamples = 18000;
+  static constexpr std::int32_t kLookSamples = 128;
+  static constexpr std::int32_t kLeastProbes = 12;
 
   /// `kernels` serve fixed point alone.
   ShellProbe(const KernelSet& kernels, const Shell<N>& shell,
@@ -54,14 +66,27 @@ class ShellProbe {
   /// From the tool's axes to those of the world.
   void turn(const ToolTurn<N>& turn) noexcept {
     rows_ = rows_of(turn);
+    turned_ = true;
+    left_ -= turn_samples() * static_cast<std::int32_t>(volumes_.size());
     for (const ShellVolume<N>& volume : volumes_) {
       place(shell_, rows_, volume.frame, volume.places);
     }
   }
 
+  /// The probes from now on are those of one tick; before the first, nothing is counted.
+  void begin_tick() noexcept {
+    const auto closer = static_cast<std::int32_t>(shell_.table.round ? kCapSamples : kPatchSamples);
+    const std::int32_t probe = turn_samples() + shell_.table.count + closer + 2 * kLookSamples;
+    left_ =
+        std::max(kTickSamples, kLeastProbes * probe * static_cast<std::int32_t>(volumes_.size()));
+  }
+
   /// The tool's centre at `q`: at most one plane a volume, the deepest three.
   [[nodiscard]] Probe<N> probe(ContactVec<Real> q) const noexcept {
     Probe<N> felt;
+    felt.buried = left_ <= 0 && !turned_;
+    if (felt.buried) return felt;
+    turned_ = false;
     for (const ShellVolume<N>& volume : volumes_) feel(volume, q, felt);
     if (felt.count > 0) felt.depth = std::max(felt.depth, felt.plane[0].depth);
     return felt;
@@ -87,6 +112,8 @@ class ShellProbe {
   }
 
  private:
+  /// What it costs to place all samples anew.
+  [[nodiscard]] std::int32_t turn_samples() const noexcept { return shell_.table.count / 8; }
   [[nodiscard]] static std::int32_t whole(Real x) noexcept {
     if constexpr (N::kIsFixed) {
       return x.raw() >> Real::kFractionBits;
@@ -210,10 +237,13 @@ class ShellProbe {
       const std::int32_t centre[3] = {at.x.raw(), at.y.raw(), at.z.raw()};
       ShellSums<N> sums;
       kernels_.sum_shell(table, places, centre, field, sums);
+      left_ -= kLookSamples + sums.read;
       return sums;
     } else {
       const Real centre[3] = {at.x, at.y, at.z};
-      return shell_sums<N>(table, places, centre, field);
+      const ShellSums<N> sums = shell_sums<N>(table, places, centre, field);
+      left_ -= kLookSamples + sums.read;
+      return sums;
     }
   }
 
@@ -221,6 +251,8 @@ class ShellProbe {
   const Shell<N>& shell_;
   std::span<const ShellVolume<N>> volumes_;
   TurnRows<N> rows_{};
+  mutable std::int64_t left_ = std::numeric_limits<std::int64_t>::max();  ///< of the tick's samples
+  mutable bool turned_ = false;                                           ///< and not probed since
 };
 
 }  // namespace kerf

@@ -17,6 +17,7 @@ class Led {
 
   /// The spring from the hand to the proxy: the force over the stiffness.
   Point tick(Point hand, const ToolTurn<N>& turn = {}) {
+    rig_.field().begin_tick();
     swept_ = ProxySweep<N, ShellProbe<N>>(rig_.field(), pose_, friction_, rig_.turn_step())
                  .tick({place_of<N>(hand), turn});
     most_probes_ = std::max(most_probes_, swept_.probes);
