@@ -21,7 +21,8 @@ Shaken shaken(double wall, const ShakenTool& tool) {
   Dice dice(11);
   constexpr int kTicksPerWall = 500;
   const int walls = test::cases(tool.round ? 10 : 5);  // KERF_CASES=34: a million ticks in all
-  for (int k = 0; k < walls; ++k) shake<N>(wall, tool, kTicksPerWall, dice, tally);
+  const SampledTool made(tool.made());
+  for (int k = 0; k < walls; ++k) shake<N>(wall, tool, made, kTicksPerWall, dice, tally);
   MESSAGE(std::string(N::kName) << ", wall of " << wall
                                 << std::string(tool.round ? ", ball: " : ", turning cylinder: ")
                                 << tally.ticks << " ticks, " << tally.behind << " behind the face, "

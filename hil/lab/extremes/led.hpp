@@ -12,7 +12,7 @@ namespace kerf::extremes {
 template <class N>
 class Led {
  public:
-  Led(const SceneTool& tool, const Body& body, Point start, double friction = 0)
+  Led(const SampledTool& tool, const Body& body, Point start, double friction = 0)
       : rig_(tool, body), pose_{place_of<N>(start), {}}, friction_(friction) {}
 
   /// The spring from the hand to the proxy: the force over the stiffness.

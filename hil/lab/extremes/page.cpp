@@ -49,8 +49,9 @@ struct About {
 };
 constexpr About kGroups[] = {
     {"walls", "Walls",
-     "Random steps of 0.1 to 10 m/s at a tilted wall, the cylinder turned at random too; no "
-     "supervisor."},
+     "Random steps of 0.1 to 10 m/s at a tilted wall, the cylinder and the bur of "
+     "`scenes/fluted_bur.toml` turned at\n"
+     "random too; no supervisor."},
     {"rests", "Where a ball comes to rest",
      "Against the ideal solid, tilted anyhow; on edges against the volume's own iso-surface, since "
      "trilinear\n"

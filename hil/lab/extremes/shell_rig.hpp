@@ -24,6 +24,15 @@ inline constexpr Density kIso = 32768;
   return make_tool(shape, shape, {.pitch_mm = 1, .radius_mm = radius, .length_mm = length});
 }
 
+/// The samples of a tool in units: of a mesh they take a third of a second.
+struct SampledTool {
+  std::vector<Point> samples;
+  bool round = false;
+
+  SampledTool(const SceneTool& tool)  // NOLINT(google-explicit-constructor): a tool is one
+      : samples(surface_samples(tool, 1.0)), round(tool.round) {}
+};
+
 /// A volume whose voxels are units, at the origin of contact space.
 template <class N>
 [[nodiscard]] ContactFrame<N> plain_frame() {
@@ -39,9 +48,9 @@ template <class N>
 template <class N>
 class ShellRig {
  public:
-  explicit ShellRig(const SceneTool& tool, const KernelSet& kernels = **kernel_sets())
-      : kernels_(kernels), tool_(surface_samples(tool, 1.0), tool.round), shell_(tool_.shell()) {}
-  ShellRig(const SceneTool& tool, const Body& body) : ShellRig(tool) {
+  explicit ShellRig(const SampledTool& tool, const KernelSet& kernels = **kernel_sets())
+      : kernels_(kernels), tool_(tool.samples, tool.round), shell_(tool_.shell()) {}
+  ShellRig(const SampledTool& tool, const Body& body) : ShellRig(tool) {
     add(body, plain_frame<N>());
   }
   ShellRig(const ShellRig&) = delete;

@@ -8,22 +8,38 @@
 
 namespace kerf::extremes {
 
-/// A ball, or a cylinder that is turned at random.
+/// A ball; or a cylinder or a mesh, which are turned at random.
 struct ShakenTool {
   bool round = true;
   double radius = 8, half = 8;
+  const SceneTool* mesh = nullptr;  ///< instead of a cylinder; the caller's
 
   [[nodiscard]] SceneTool made() const {
-    return tool_of_units(round ? "ball" : "cylinder", radius, 2 * half);
+    return mesh != nullptr ? *mesh : tool_of_units(round ? "ball" : "cylinder", radius, 2 * half);
   }
-  [[nodiscard]] double reach() const { return round ? radius : std::hypot(radius, half); }
+  [[nodiscard]] double reach() const {
+    if (mesh == nullptr) return round ? radius : std::hypot(radius, half);
+    double farthest = 0;
+    for (const Point& point : mesh->mesh.points_mm) farthest = std::max(farthest, length(point));
+    return farthest;
+  }
   /// How far it reaches down along `up` from its centre.
   template <class N>
   [[nodiscard]] double reach_below(const ToolTurn<N>& turn, Point up) const {
     if (round) return radius;
     const auto rows = rows_of(turn);
-    const double axis = std::abs(double(rows[0][1]) * up[0] + double(rows[1][1]) * up[1] +
-                                 double(rows[2][1]) * up[2]);
+    Point in_tool{};  // `up` along the tool's axes
+    for (std::size_t i = 0; i < 3; ++i) {
+      for (std::size_t j = 0; j < 3; ++j) in_tool[j] += double(rows[i][j]) * up[i];
+    }
+    if (mesh != nullptr) {
+      double lowest = 0;
+      for (const Point& point : mesh->mesh.points_mm) {
+        lowest = std::min(lowest, dot(point, in_tool));
+      }
+      return -lowest;
+    }
+    const double axis = std::abs(in_tool[1]);
     return half * axis + radius * std::sqrt(std::max(0.0, 1 - axis * axis));
   }
 };
@@ -42,8 +58,10 @@ struct Shaken {
 
 /// F7: a hand at the face of a wall of `thickness` units, tilted anyhow, goes random steps of 0.1
 /// to 10 m/s (at 0.1 mm a unit and 1 kHz), with small turns and large ones. No supervisor stops it.
+/// `made` is the tool's.
 template <class N>
-void shake(double thickness, const ShakenTool& tool, int ticks, Dice& dice, Shaken& seen) {
+void shake(double thickness, const ShakenTool& tool, const SampledTool& made, int ticks, Dice& dice,
+           Shaken& seen) {
   const Frame frame(dice, {32, 32, 32});
   const Body wall = blurred({66, 66, 66}, [&](Point p) {
     const double height = frame.of(p)[1];
@@ -51,7 +69,7 @@ void shake(double thickness, const ShakenTool& tool, int ticks, Dice& dice, Shak
   });
   Point hand = frame.at(0, tool.reach() + 3, 0);
   ToolTurn<N> turn;
-  Led<N> led(tool.made(), wall, hand);
+  Led<N> led(made, wall, hand);
   for (int i = 0; i < ticks; ++i) {
     hand = hand + std::pow(10.0, dice.uniform(0, 2)) * dice.direction();
     const Point h = frame.of(hand);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "hil/lab/extremes/measures.hpp"
+#include "hil/lab/extremes/shipped_bur.hpp"
 #include "hil/lab/extremes/wall_shake.hpp"
 
 namespace kerf::extremes {
@@ -12,15 +13,20 @@ void measure_walls(const Effort& effort, const Told& told) {
     ShakenTool tool;
     double deepest;
   };
-  const ShakenTool ball, cylinder{.round = false, .radius = 5, .half = 8};
+  const SceneTool fluted = shipped_bur();
+  const ShakenTool ball, cylinder{.round = false, .radius = 5, .half = 8},
+      bur{.round = false, .mesh = &fluted};
   for (const Subject& subject : {Subject{"ball, wall of 5 mm", 50, ball, 0.05},
                                  Subject{"ball, wall of 2 voxels", 2, ball, 0.05},
                                  Subject{"turning cylinder, wall of 5 mm", 50, cylinder, 0.1},
-                                 Subject{"turning cylinder, wall of 2 voxels", 2, cylinder, 0.1}}) {
+                                 Subject{"turning cylinder, wall of 2 voxels", 2, cylinder, 0.1},
+                                 Subject{"turning bur (STL), wall of 5 mm", 50, bur, 0.1},
+                                 Subject{"turning bur (STL), wall of 2 voxels", 2, bur, 0.1}}) {
+    const SampledTool made(subject.tool.made());
     Shaken seen;
     Dice dice(11);
     for (int k = 0; k < effort.walls; ++k) {
-      shake<FixedNumbers>(subject.thickness, subject.tool, kTicksPerWall, dice, seen);
+      shake<FixedNumbers>(subject.thickness, subject.tool, made, kTicksPerWall, dice, seen);
     }
     const std::string name = subject.name;
     const auto row = [&](const char* what, double value, const char* unit,
