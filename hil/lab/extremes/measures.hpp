@@ -16,6 +16,9 @@ void measure_rests(const Effort& effort, const Told& told);
 void measure_slides(const Effort& effort, const Told& told);
 /// Tools that are no balls, on flats, in any pose.
 void measure_shapes(const Effort& effort, const Told& told);
+/// Their part that slides over a bump of 40 units, and the one that rests on sharp edges.
+void measure_shape_slides(const Effort& effort, const Told& told);
+void measure_shape_edges(const Effort& effort, const Told& told);
 /// F11: what force removes in the whole servo, and what the hand feels of it. Few cases at any
 /// effort.
 void measure_cutting(const Effort& effort, const Told& told);

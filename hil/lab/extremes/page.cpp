@@ -61,7 +61,18 @@ constexpr About kGroups[] = {
      "1.04 % at R 40 and\n"
      "4.5 % at R 14. `CT` has edges blurred by a deviation of one voxel, and noise of 2 %."},
     {"shapes", "Tools that are no balls",
-     "At rest on flats of any tilt; limits are 1.5 times those of the ball."},
+     "At rest on flats of any tilt and on sharp edges of 90 degrees, these against the volume's "
+     "own "
+     "iso-surface; and\n"
+     "sliding at 50 mm/s over a ball of R 40, 2 deep. Limits are 1.5 times those of the ball. "
+     "Where "
+     "a rim or a point\n"
+     "slides with the surface beside it almost flat on the bump, the gradient is averaged over "
+     "what "
+     "lies on one side\n"
+     "of the point, and the normal is that of a place up to 2 voxels from it. Where a tool's edge "
+     "crosses that of the\n"
+     "solid, what touches is smaller than the distance of the samples, and the tool sinks in."},
     {"cutting", "Cutting by force",
      "The whole servo with `[cut] model = \"preston\"`: a ball of radius 1 mm, led by hand over a "
      "flat; pressed on it\n"

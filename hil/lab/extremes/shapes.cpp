@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <vector>
+#include <string>
 
 #include "hil/lab/extremes/loft.hpp"
 #include "hil/lab/extremes/measures.hpp"
+#include "hil/lab/extremes/posed_tool.hpp"
 #include "hil/lab/extremes/rest.hpp"
 
 namespace kerf::extremes {
@@ -17,46 +17,6 @@ constexpr VoxelGrid kGrid{44, 44, 44};
 constexpr Point kMiddle{21, 21, 21};
 
 enum class Pose { any, upright, lying };
-
-/// The tool's axes in the world.
-struct Axes {
-  Point x, y, z;
-
-  [[nodiscard]] ToolTurn<N> turn() const {
-    TurnRows<N> rows;
-    for (std::size_t i = 0; i < 3; ++i) rows[i] = {N::Unit(x[i]), N::Unit(y[i]), N::Unit(z[i])};
-    return turn_of<N>(rows);
-  }
-  [[nodiscard]] Point to_tool(Point world) const {
-    return {dot(x, world), dot(y, world), dot(z, world)};
-  }
-};
-
-Axes standing_on(Point axis, Dice& dice) {
-  const Point across = dice.across(axis);
-  return {across, axis, cross(across, axis)};
-}
-
-/// How far a tool reaches along a direction of its own axes.
-class Reach {
- public:
-  explicit Reach(const SceneTool& tool) : points_(tool.mesh.points_mm) {
-    if (points_.empty()) profile_ = tool_profile(tool, 512);
-  }
-  [[nodiscard]] double along(Point direction) const {
-    double most = 0;
-    for (const Point& point : points_) most = std::max(most, dot(point, direction));
-    const double sine = std::sqrt(std::max(0.0, 1 - direction[1] * direction[1]));
-    for (const auto& [y, radius] : profile_) {
-      most = std::max(most, y * direction[1] + radius * sine);
-    }
-    return most;
-  }
-
- private:
-  std::vector<Point> points_;
-  std::vector<std::array<double, 2>> profile_;
-};
 
 }  // namespace
 
@@ -91,7 +51,7 @@ void measure_shapes(const Effort& effort, const Told& told) {
       const double support = reach.along(axes.to_tool(-1 * frame.up));
       const Body body = blurred(kGrid, [&](Point p) { return frame.of(p)[1] + support; });
       // From so high that the tool can turn first.
-      const Point rest = rest_of<N>(subject.tool, body, frame.place, frame.up, axes.turn(), 20);
+      const Point rest = rest_of<N>(subject.tool, body, frame.place, frame.up, axes.turn<N>(), 20);
       const double off = frame.of(rest)[1];
       sum += off;
       most = std::max(most, std::abs(off));
@@ -105,6 +65,8 @@ void measure_shapes(const Effort& effort, const Told& told) {
     row(": largest offset", most, "voxels", kOffset, kOffsetAim);
     row(": angle", degrees, "deg", kDegrees, kDegreesAim);
   }
+  measure_shape_edges(effort, told);
+  measure_shape_slides(effort, told);
 }
 
 }  // namespace kerf::extremes
