@@ -12,6 +12,8 @@
 
 #include "hil/lab/extremes/comparison.hpp"
 #include "hil/lab/extremes/page.hpp"
+#include "hil/lab/extremes/shell_rig.hpp"
+#include "hil/lab/extremes/worst_tick.hpp"
 #include "hil/lab/program.hpp"
 
 using namespace kerf::extremes;
@@ -92,4 +94,18 @@ TEST_CASE("the paper's force ends inside of a wall and can be passed; the proxy'
   // The zone of force on a thick wall is the ball's diameter and the width of its edge.
   CHECK(*comparison.walls[0].losses.back().paper_mm_per_s ==
         doctest::Approx(1000 * (1.6 + 0.4)).epsilon(0.15));
+}
+
+TEST_CASE("the costliest tick is told with its place; a body out of reach keeps the one before") {
+  const Trap flat{"flat", {}, {20, 20, 20}, kIso};
+  const Body solid = blurred({40, 40, 40}, [](Point p) { return p[2] - 20; });
+  const kerf::SceneTool ball = tool_of_units("ball", 8, 16);
+  WorstTick worst;
+  find_worst_tick(ball, flat, solid, 200, worst);
+  CHECK(worst.us > 0);
+  CHECK(worst.trap == "flat");
+  CHECK(worst.probes <= kerf::SweepRules::kMaxProbes);
+  worst.us = 1e9;
+  find_worst_tick(ball, {"air", {}, {1000, 20, 20}, kIso}, solid, 200, worst);
+  CHECK(worst.trap == "flat");
 }

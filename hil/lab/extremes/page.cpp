@@ -81,9 +81,14 @@ constexpr About kGroups[] = {
      "`GE tooth` is a real\n"
      "one by CT, below `--data` or `$KERF_DATA`."},
     {"ticks", "Ticks",
-     "On 256 x 256 x 161 voxels. The costliest ticks are picked from random ones and repeated, and "
-     "the fastest\n"
-     "repetition counts."},
+     "On 256 x 256 x 161 voxels. The costliest tick of each tool is looked for among thousands, at "
+     "flat, sharp, hollow\n"
+     "and noisy solids, in a slot with a play of 0.1 voxels, in tissue just below the iso and at "
+     "the "
+     "GE tooth, with goals\n"
+     "near and far and places looked for anew. Those that took longest are repeated from the same "
+     "state, and the fastest\n"
+     "repetition counts; where it was found is told."},
     {"hands", "Hands",
      "An emulated Omni, its driver and the whole servo in virtual time, `scenes/touch.toml`; "
      "`groove` and\n"

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <string>
 #include <vector>
 
 #include "controller/servo/proxy_contact.hpp"
@@ -7,7 +8,9 @@
 #include "hil/lab/bench_scene.hpp"
 #include "hil/lab/extremes/hands.hpp"
 #include "hil/lab/extremes/measures.hpp"
-#include "hil/lab/extremes/wall_shake.hpp"
+#include "hil/lab/extremes/shell_rig.hpp"
+#include "hil/lab/extremes/shipped_bur.hpp"
+#include "hil/lab/extremes/worst_tick.hpp"
 #include "hil/lab/tick_timer.hpp"
 
 namespace kerf::extremes {
@@ -22,49 +25,27 @@ ProxyPose<N> goal_at(const bench::Place& p) {
   return {place_of<N>({p[0], p[1], p[2]}), {}};
 }
 
-/// The 20 costliest of random ticks at a wall, each the fastest of some repetitions: what other
-/// programs steal does not count, what the input costs does.
-double worst_us(const ShakenTool& shaken, const Body& half, double face, int ticks) {
-  ShellRig<N> rig(shaken.made(), half);
-  struct Costly {
-    std::int32_t probes;
-    ProxyPose<N> from, goal;
+void measure_worst_ticks(const Effort& effort, const Told& told) {
+  struct Subject {
+    const char* name;
+    SceneTool tool;
+    WorstTick worst;
   };
-  std::vector<Costly> all;
-  Dice dice(3);
-  Point hand{128, 128, face + shaken.reach() + 3};
-  ProxyPose<N> pose{place_of<N>(hand), {}}, goal = pose;
-  const auto tick = [&](ProxyPose<N>& at, const ProxyPose<N>& to) {
-    return ProxySweep<N, ShellProbe<N>>(rig.field(), at, {}, rig.turn_step()).tick(to).probes;
-  };
-  for (int i = 0; i < ticks; ++i) {
-    hand = hand + std::pow(10.0, dice.uniform(0, 2)) * dice.direction();
-    hand = {std::clamp(hand[0], 40.0, 200.0), std::clamp(hand[1], 40.0, 200.0),
-            std::clamp(hand[2], face - 14, face + 14)};
-    goal.centre = place_of<N>(hand);
-    goal.turn = compose(dice.turn<N>(i % 3 == 0 ? 3 : dice.uniform(0, 0.2)), goal.turn);
-    const ProxyPose<N> from = pose;
-    all.push_back({tick(pose, goal), from, goal});
-  }
-  std::sort(all.begin(), all.end(),
-            [](const Costly& a, const Costly& b) { return a.probes > b.probes; });
-  all.resize(std::min<std::size_t>(all.size(), 20));
-  double worst_ns = 0;
-  for (const Costly& costly : all) {
-    constexpr int kRepetitions = 25;
-    double fastest_ns = 1e12;
-    for (int i = 0; i < kRepetitions; ++i) {
-      const TickTimes times = time_ticks(
-          1, [] {},
-          [&](int) {
-            ProxyPose<N> at = costly.from;
-            bench::use(tick(at, costly.goal));
-          });
-      fastest_ns = std::min(fastest_ns, times.p50_ns);
+  Subject subjects[] = {{"ball", tool_of_units("ball", kRadius, 2 * kRadius), {}},
+                        {"turning cylinder", tool_of_units("cylinder", 5, 16), {}},
+                        {"turning bur (STL)", shipped_bur(), {}}};
+  for (const Trap& trap : worst_traps(effort.data)) {
+    const Body body = trap.body();
+    for (Subject& subject : subjects) {
+      find_worst_tick(subject.tool, trap, body, 2 * effort.tick_count, subject.worst);
     }
-    worst_ns = std::max(worst_ns, fastest_ns);
   }
-  return worst_ns / 1e3;
+  for (const Subject& subject : subjects) {
+    told({"ticks",
+          std::string("proxy, ") + subject.name + ", costliest tick found (" + subject.worst.trap +
+              ")",
+          subject.worst.us, "us", 60, 40});
+  }
 }
 
 /// The whole servo in the default demo, ticks back to back; of each tick the fastest of some runs,
@@ -126,13 +107,7 @@ void measure_ticks(const Effort& effort, const Told& told) {
     row("paper, sliding at 50 mm/s: p50", times.p50_ns / 1e3, std::nullopt);
     row("paper, sliding at 50 mm/s: p99", times.p99_ns / 1e3, std::nullopt);
   }
-  constexpr double kFace = 96.6;
-  const Body half{kGrid,
-                  bench::densities(kGrid, [](double, double, double z) { return kFace - z; })};
-  const int ticks = 10 * effort.tick_count;
-  row("proxy, ball, costliest of random ticks", worst_us({}, half, kFace, ticks), 60, 40);
-  row("proxy, turning cylinder, costliest of random ticks",
-      worst_us({.round = false, .radius = 5, .half = 8}, half, kFace, ticks), 60, 40);
+  measure_worst_ticks(effort, told);
   measure_cutting_ticks(effort, told);
 }
 
