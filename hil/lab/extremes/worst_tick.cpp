@@ -96,8 +96,16 @@ void find_worst_tick(const SceneTool& tool, const Trap& trap, const Body& body, 
     }
   }
   keep_costliest(tried, kCostliest);
-  for (Tick& tick : tried) {
-    stopwatch.time(tick, 25);
+  // In rounds: another program on the same core may last as long as many repetitions.
+  constexpr int kRounds = 20;
+  for (int round = 0; round < kRounds; ++round) {
+    for (Tick& tick : tried) {
+      const double before_ns = tick.ns;
+      stopwatch.time(tick, 5);
+      tick.ns = std::min(tick.ns, before_ns);
+    }
+  }
+  for (const Tick& tick : tried) {
     if (tick.ns / 1e3 > worst.us) worst = {tick.ns / 1e3, tick.probes, trap.name};
   }
 }
