@@ -64,15 +64,14 @@ constexpr About kGroups[] = {
      "At rest on flats of any tilt and on sharp edges of 90 degrees, these against the volume's "
      "own "
      "iso-surface; and\n"
-     "sliding at 50 mm/s over a ball of R 40, 2 deep. Limits are 1.5 times those of the ball. "
-     "Where "
-     "a rim or a point\n"
-     "slides with the surface beside it almost flat on the bump, the gradient is averaged over "
-     "what "
-     "lies on one side\n"
-     "of the point, and the normal is that of a place up to 2 voxels from it. Where a tool's edge "
-     "crosses that of the\n"
-     "solid, what touches is smaller than the distance of the samples, and the tool sinks in."},
+     "sliding at 50 mm/s over a ball of R 40, 2 deep. Limits are 1.5 times those of the ball; "
+     "those "
+     "of angles, surface\n"
+     "and edges are not kept by all. Probably: where a rim or a point slides with the surface "
+     "beside it almost flat on\n"
+     "the bump, the gradient is averaged over what lies on one side of the point; and where a "
+     "tool's edge crosses that\n"
+     "of the solid, what touches is smaller than the distance of the samples."},
     {"cutting", "Cutting by force",
      "The whole servo with `[cut] model = \"preston\"`: a ball of radius 1 mm, led by hand over a "
      "flat; pressed on it\n"
