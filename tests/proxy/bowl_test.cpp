@@ -82,6 +82,16 @@ TEST_CASE_TEMPLATE("two steps tell of both directions", N, FixedNumbers, DoubleN
   CHECK(std::abs(end_of_step(hollow<N>(kPlay), one, kPlay, from)[2]) > 0.1);
 }
 
+// The normal turns by 0.0005, 30 steps of Q15.16.
+TEST_CASE("short steps in a wide bowl tell fixed point what they tell double") {
+  constexpr double kPlay = 32, kLoad = 28, kTurn = 0.0005;
+  const auto eased = [&]<class N>(N) {
+    const auto bowl = learned<N>(hollow<N>(kPlay), {on(kPlay, 0.1 + kTurn), on(kPlay, 0.1)});
+    return point_of<N>(bowl.eased(place_of<N>({0.3, 0.2, -0.1}), typename N::Real(kLoad)));
+  };
+  CHECK(length(minus(eased(FixedNumbers{}), eased(DoubleNumbers{}))) < 1e-3);
+}
+
 TEST_CASE_TEMPLATE("a slot leaves the way along it", N, FixedNumbers, DoubleNumbers) {
   constexpr double kPlay = 0.5;
   const auto face = [](Point p) {

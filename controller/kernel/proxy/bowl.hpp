@@ -32,6 +32,7 @@ class Bowl {
   using Real = typename N::Real;
   using Unit = typename N::Unit;
   using Place = ContactVec<Real>;
+  using Turn = ContactVec<Unit>;  ///< of a normal: far less than a unit
 
  public:
   /// What the deepest planes of two places tell, the second `moved` from the first. Planes that are
@@ -45,7 +46,7 @@ class Bowl {
     if (dot(from, to) < Unit(kFalseCreaseCosine)) return forget();
     const Real length = norm(moved);
     if (length < Real(kTelling)) return;
-    const Place turned{Real(from.x - to.x), Real(from.y - to.y), Real(from.z - to.z)};
+    const Turn turned = from - to;
     const Curve<N> whole = curve_of(turned, moved, Real(0));
     const Curve<N> rest = last_.known() ? curve_of(turned - turn_of_normal(last_, moved), moved,
                                                    multiply<Real>(Unit(kSkew), length))
@@ -76,15 +77,18 @@ class Bowl {
 
   constexpr void forget() noexcept { first_ = second_ = last_ = {}; }
 
-  static constexpr Curve<N> curve_of(Place turned, Place moved, Real least) noexcept {
+  static constexpr Curve<N> curve_of(Turn turned, Place moved, Real least) noexcept {
     constexpr double kTightest = 0.05;  // units: no play is noticed below
-    const auto across = direction_of<N>(turned);
+    const Turn across = direction_of_turn<N>(turned);
     const Real closing = along<N>(across, moved);
     if (closing <= least) return {};
-    return {across, std::max(closing / norm(turned), Real(kTightest))};
+    return {across, std::max(quotient<N>(closing, norm(turned)), Real(kTightest))};
   }
-  static constexpr Place turn_of_normal(const Curve<N>& curve, Place moved) noexcept {
-    return times<N>(curve.across, along<N>(curve.across, moved) / curve.radius);
+  /// At most a radian.
+  static constexpr Turn turn_of_normal(const Curve<N>& curve, Place moved) noexcept {
+    const Real way = std::clamp(along<N>(curve.across, moved), -curve.radius, curve.radius);
+    const Unit turn = share<N>(way, curve.radius);
+    return {curve.across.x * turn, curve.across.y * turn, curve.across.z * turn};
   }
 
   Curve<N> first_, second_;  ///< of the estimate

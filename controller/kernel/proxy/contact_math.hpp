@@ -56,6 +56,18 @@ template <class N>
   }
 }
 
+/// way / turn, turn > 0: the radius of an arc. Fixed: rounds toward 0, saturates.
+template <class N>
+[[nodiscard]] constexpr typename N::Real quotient(typename N::Real way,
+                                                  typename N::Unit turn) noexcept {
+  if constexpr (N::kIsFixed) {
+    constexpr std::int64_t kOne = std::int64_t{1} << N::Unit::kFractionBits;
+    return N::Real::from_raw(saturate_i32(way.raw() * kOne / turn.raw()));
+  } else {
+    return way / turn;
+  }
+}
+
 /// The direction of a vector; none of one that is shorter than a few steps of Q15.16.
 template <class N>
 [[nodiscard]] constexpr ContactVec<typename N::Unit> direction_of(
@@ -64,6 +76,16 @@ template <class N>
   const Real length = norm(v);
   if (length < Real(1e-4)) return {};
   return {share<N>(v.x, length), share<N>(v.y, length), share<N>(v.z, length)};
+}
+
+/// The direction of a small turn; none below 1e-6.
+template <class N>
+[[nodiscard]] constexpr ContactVec<typename N::Unit> direction_of_turn(
+    ContactVec<typename N::Unit> v) noexcept {
+  using Unit = typename N::Unit;
+  const Unit length = norm(v);
+  if (length < Unit(1e-6)) return {};
+  return {v.x / length, v.y / length, v.z / length};
 }
 
 /// Moment of the unit force `direction` at `arm`: a lever in units.
