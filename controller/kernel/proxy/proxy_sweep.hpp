@@ -38,9 +38,14 @@ struct SweepRules {
   static constexpr double kResidual = 0.8;  ///< share of the way that a step may leave
   static constexpr double kEased = 0.5;     ///< share of a step to which a bowl shortens the next
   static constexpr double kShrink = 0.4;
-  static constexpr double kShortest = 0.1;  ///< share of a step below which the proxy rather lags
-  static constexpr double kPush = 0.5;      ///< longest correction of one push
-  static constexpr double kAstray = 0.25;   ///< farther from the goal than before: rather stays
+  /// Share of a step below which the proxy rather lags. What a tool has milled leaves it a play of
+  /// hundredths of a unit, where longer steps only meet the other wall.
+  static constexpr double kShortest = 0.02;
+  static constexpr double kPush = 0.5;  ///< longest correction of one push
+  /// No step ends so much farther from the goal than the nearest place of the tick. With more a
+  /// tool at rest wanders about on noise; allowed places differ by kTolerance in depth, and with
+  /// less than two of it a slot without play does not let the tool out.
+  static constexpr double kAstray = 0.03;
 };
 
 /// Sine of half the angle that takes a sample `reach` units from the centre along kStep at most;
@@ -77,8 +82,8 @@ struct Swept {
 /// The orientation goes first and the centre gives way to it: a stylus without torque motors turns
 /// the tool whatever the tooth says. Where no centre allows a turn, the orientation lags too.
 ///
-/// A tool that may stay where it is does not end a tick farther from its goal than it began: in a
-/// groove of its own shape planes that hop about would lead it astray.
+/// From a place that the solid allows the tool does not go farther from its goal, but by kAstray:
+/// in a groove of its own shape planes that hop about would lead it on and on.
 ///
 /// At most kMaxProbes calls of `probe`. Coordinates within +-kContactLimit.
 ///
@@ -100,16 +105,7 @@ class ProxySweep {
   constexpr Swept<N> tick(const ProxyPose<N>& goal) noexcept {
     here_ = turn_to(goal.turn);
     held_by_ = bundle_of(here_);
-    const Trial start{pose_.centre, here_, held_by_, here_};
-    Slide<N> slide = move_to(goal.centre);
-    if (start.felt.count > 0 && allows_rest(start.felt) &&
-        norm(goal.centre - pose_.centre) >
-            norm(goal.centre - start.centre) + Real(SweepRules::kAstray)) {
-      pose_.centre = start.centre;
-      here_ = start.felt;
-      held_by_ = start.planes;
-      slide = route(held_by_, goal.centre - start.centre).slide;
-    }
+    const Slide<N> slide = move_to(goal.centre);
     return {held_by_, slide, probes_, pose_.turn == goal.turn, here_.depth, here_.buried};
   }
 
@@ -223,11 +219,14 @@ class ProxySweep {
 
   /// Moves towards `goal` while steps are found that the solid allows and that bring the tool
   /// onward: judged by the way that is left under all planes known, not by the distance to the
-  /// goal, which would stick in creases and cycle in grooves. Returns the slide of the last place.
+  /// goal, which would stick in creases and cycle in grooves, unless that grows. Returns the slide
+  /// of the last place.
   constexpr Slide<N> move_to(Place goal) noexcept {
     Unit shrink(1);
     Bowl<N> bowl;
     Route onward = route(held_by_, goal - pose_.centre);
+    // Farther than any way, while the tool has to get out of the solid.
+    Real nearest_yet = allows_rest(here_) ? norm(goal - pose_.centre) : Real(4 * kContactLimit);
     auto enough = Real(SweepRules::kNoMove);
     while (may_look() && !here_.buried && onward.length >= enough) {
       const Place from = pose_.centre;
@@ -239,10 +238,13 @@ class ProxySweep {
       bowl.learn(here_, trial.felt, trial.centre - from);
       if (allows(trial.felt)) {
         const Route next = route(trial.planes, goal - trial.centre, bowl);
-        if (next.length < multiply<Real>(Unit(SweepRules::kResidual), onward.length) ||
-            norm(goal - trial.centre) < norm(goal - from) - Real(SweepRules::kGain)) {
+        const Real distance = norm(goal - trial.centre);
+        const bool strays = distance > nearest_yet + Real(SweepRules::kAstray);
+        const bool leads = next.length < multiply<Real>(Unit(SweepRules::kResidual), onward.length);
+        if ((leads && !strays) || distance < norm(goal - from) - Real(SweepRules::kGain)) {
           pose_.centre = trial.centre;
           here_ = trial.felt;
+          if (allows_rest(here_)) nearest_yet = std::min(nearest_yet, distance);
           held_by_ = trial.planes;
           onward = next;
           shrink = Unit(1);
