@@ -46,9 +46,11 @@ struct ProxyContact {
 inline constexpr double kLostDepth = 1;  // units
 
 /// Sum of what presses, and its moment over the length of `spring`. Friction acts where the loads
-/// do.
+/// do. Of what it cannot hold of the spring, planes do that the sweep has not found: in a groove of
+/// the tool's own shape it knows but one of many at a time.
 template <class N>
-constexpr void add_loads(const Swept<N>& swept, ProxyContact<N>& contact) noexcept {
+constexpr void add_loads(const Swept<N>& swept, typename N::Unit friction,
+                         ProxyContact<N>& contact) noexcept {
   using Real = typename N::Real;
   const Real length = norm(contact.spring);
   if (length < Real(1e-3)) return;
@@ -63,9 +65,11 @@ constexpr void add_loads(const Swept<N>& swept, ProxyContact<N>& contact) noexce
     arm = arm + part_of<N>(plane.arm, share<N>(load, whole));
     contact.lever = contact.lever + moment<N>(plane.arm, plane.normal) * (load / length);
   }
-  contact.normal = direction_of<N>(pressed);
   const ContactVec<Real> along_faces = contact.spring - pressed;
   const Real rubbed = norm(along_faces);
+  const Real held = multiply<Real>(friction, norm(pressed));
+  if (rubbed > held) pressed = pressed + part_of<N>(along_faces, share<N>(rubbed - held, rubbed));
+  contact.normal = direction_of<N>(pressed);
   contact.lever = contact.lever + moment<N>(arm, direction_of<N>(along_faces)) *
                                       (std::min(rubbed, length) / length);
 }
@@ -109,7 +113,7 @@ constexpr ProxyContact<N> follow(const ProxyPlan<N>& plan, ProxyState<N>& state,
     return contact;
   }
   contact.spring = state.pose.centre - goal.centre;
-  add_loads(swept, contact);
+  add_loads(swept, plan.friction, contact);
   if (state.ramping) {
     state.longest = state.longest + plan.ramp_per_tick;
     const Real length = norm(contact.spring);

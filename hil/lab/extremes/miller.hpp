@@ -97,6 +97,8 @@ inline double removed_by_press(const Scene& scene) {
   return miller.removed_mm3();
 }
 
+inline constexpr double kSinkFromMm = 1.3;  ///< of the tool's centre: 0.3 mm of air
+
 /// What a hand feels that sinks a ball of radius 1 mm by 2.5 mm in half a second, from 0.3 mm above
 /// a crown at height 0, and stays there for two.
 struct SunkForce {
@@ -105,13 +107,13 @@ struct SunkForce {
 };
 
 /// A count of the encoders is a step of the hand, which is none of the cut: such ticks do not count
-/// for the step.
-inline SunkForce sink(Miller& miller) {
+/// for the step. The miller is above the place.
+inline SunkForce sink(Miller& miller, double x_mm = 0, double z_mm = 0) {
   constexpr int kSinkMs = 500, kMs = 2500, kFeltMs = 200;
   double sum_n = 0, largest_n = 0, last_n = 0;
   std::array<double, 3> last_mm{};
   for (int ms = 0; ms < kMs; ++ms) {
-    const ServoOutput out = miller.step({0, 1.3 - 0.005 * std::min(ms, kSinkMs), 0});
+    const ServoOutput out = miller.step({x_mm, kSinkFromMm - 0.005 * std::min(ms, kSinkMs), z_mm});
     const double force_n = length(out.force_n);
     if (ms >= kFeltMs) {
       sum_n += force_n;
