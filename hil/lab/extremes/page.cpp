@@ -76,9 +76,8 @@ constexpr About kGroups[] = {
      "The whole servo with `[cut] model = \"preston\"`: a ball of radius 1 mm, led by hand over a "
      "flat; pressed on it\n"
      "with the same force, up to 1.2 N and back, whatever gives way; and sunk into a crown at the "
-     "rate of enamel. "
-     "`GE tooth` is a real\n"
-     "one by CT, below `--data` or `$KERF_DATA`."},
+     "rate of enamel,\n"
+     "the worst of nine places. `GE tooth` is a real one by CT, below `--data` or `$KERF_DATA`."},
     {"ticks", "Ticks",
      "On 256 x 256 x 161 voxels. The costliest tick of each tool is looked for among thousands, at "
      "flat, sharp, hollow\n"
