@@ -39,9 +39,13 @@ struct SweepRules {
   static constexpr double kEased = 0.5;     ///< share of a step to which a bowl shortens the next
   static constexpr double kShrink = 0.4;
   /// Share of a step below which the proxy rather lags. What a tool has milled leaves it a play of
-  /// hundredths of a unit, where longer steps only meet the other wall.
-  static constexpr double kShortest = 0.02;
-  static constexpr double kPush = 0.5;  ///< longest correction of one push
+  /// hundredths of a unit, where longer steps only meet the other wall: for kFineProbes it may try
+  /// finer ones.
+  static constexpr double kShortest = 0.1;
+  static constexpr double kFinest = 0.02;
+  static constexpr std::int32_t kFineProbes = 14;
+  static constexpr std::int32_t kStillProbes = 24;  ///< without a nearer place the tool stays
+  static constexpr double kPush = 0.5;              ///< longest correction of one push
   /// No step ends so much farther from the goal than the nearest place of the tick. With more a
   /// tool at rest wanders about on noise; allowed places differ by kTolerance in depth, and with
   /// less than two of it a slot without play does not let the tool out.
@@ -227,6 +231,7 @@ class ProxySweep {
     Route onward = route(held_by_, goal - pose_.centre);
     // Farther than any way, while the tool has to get out of the solid.
     Real nearest_yet = allows_rest(here_) ? norm(goal - pose_.centre) : Real(4 * kContactLimit);
+    const Real closer = nearest_yet - Real(SweepRules::kGain);
     auto enough = Real(SweepRules::kNoMove);
     while (may_look() && !here_.buried && onward.length >= enough) {
       const Place from = pose_.centre;
@@ -258,7 +263,9 @@ class ProxySweep {
         onward = again;
       } else {
         shrink = shrink * Unit(SweepRules::kShrink);
-        if (shrink < Unit(SweepRules::kShortest)) break;
+        if (probes_ >= SweepRules::kStillProbes && nearest_yet >= closer) break;
+        const bool fine = probes_ <= SweepRules::kFineProbes;
+        if (shrink < Unit(fine ? SweepRules::kFinest : SweepRules::kShortest)) break;
       }
     }
     return onward.slide;
