@@ -72,7 +72,7 @@ class StlText {
   float number() {
     std::string_view word = next();
     if (word.starts_with('+')) word.remove_prefix(1);
-    double value = 0;  // what a float would lose below its range is 0
+    double value = 0;  // to double's range; what a float loses is 0
     const auto [end, fault] = std::from_chars(word.data(), word.data() + word.size(), value);
     const bool number = fault == std::errc() && end == word.data() + word.size();
     if (!number || std::abs(value) > std::numeric_limits<float>::max()) complain(word, "a number");

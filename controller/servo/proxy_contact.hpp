@@ -47,9 +47,9 @@ inline constexpr double kLostDepth = 1;  // units
 
 /// Sum of what presses, and its moment over the length of `spring`. Friction acts where the loads
 /// do. Of what it cannot hold of the spring, planes do that the sweep has not found: in a groove of
-/// the tool's own shape it knows but one of many at a time.
+/// the tool's own shape it knows but one of many at a time. Nothing holds it `on_its_way`.
 template <class N>
-constexpr void add_loads(const Swept<N>& swept, typename N::Unit friction,
+constexpr void add_loads(const Swept<N>& swept, typename N::Unit friction, bool on_its_way,
                          ProxyContact<N>& contact) noexcept {
   using Real = typename N::Real;
   const Real length = norm(contact.spring);
@@ -68,7 +68,8 @@ constexpr void add_loads(const Swept<N>& swept, typename N::Unit friction,
   const ContactVec<Real> along_faces = contact.spring - pressed;
   const Real rubbed = norm(along_faces);
   const Real held = multiply<Real>(friction, norm(pressed));
-  if (rubbed > held) pressed = pressed + part_of<N>(along_faces, share<N>(rubbed - held, rubbed));
+  if (rubbed > held && !on_its_way)
+    pressed = pressed + part_of<N>(along_faces, share<N>(rubbed - held, rubbed));
   contact.normal = direction_of<N>(pressed);
   contact.lever = contact.lever + moment<N>(arm, direction_of<N>(along_faces)) *
                                       (std::min(rubbed, length) / length);
@@ -102,6 +103,7 @@ constexpr ProxyContact<N> follow(const ProxyPlan<N>& plan, ProxyState<N>& state,
     contact.pose = state.pose;
     return contact;
   }
+  const ContactVec<Real> from = state.pose.centre;
   const Swept<N> swept =
       ProxySweep<N, Field>(field, state.pose, plan.friction, plan.turn_step).tick(goal);
   contact.pose = state.pose;
@@ -113,7 +115,9 @@ constexpr ProxyContact<N> follow(const ProxyPlan<N>& plan, ProxyState<N>& state,
     return contact;
   }
   contact.spring = state.pose.centre - goal.centre;
-  add_loads(swept, plan.friction, contact);
+  // After a whole step it may only lag, for want of work.
+  const bool on_its_way = norm(state.pose.centre - from) >= Real(SweepRules::kStep);
+  add_loads(swept, plan.friction, on_its_way, contact);
   if (state.ramping) {
     state.longest = state.longest + plan.ramp_per_tick;
     const Real length = norm(contact.spring);

@@ -114,8 +114,9 @@ std::optional<int> parse_options(int argc, const char* const* argv, ControllerOp
                  "spin this long before each deadline instead of sleeping to it")
       ->check(CLI::Range(0, 900))
       ->capture_default_str();
-  auto* check_flag = app.add_flag("--check", options.check,
-                                  "load and check the scene, print what it means, and end");
+  auto* check_flag = app.add_flag(
+      "--check", options.check,
+      "load and check the scene, whether its rate fits too, print what it means, and end");
   auto* explain_flag =
       app.add_flag("--explain", options.explain,
                    "tell what the scene costs: plans, operations, time, memory; and end")

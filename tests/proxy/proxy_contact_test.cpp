@@ -96,6 +96,18 @@ TEST_CASE_TEMPLATE("friction turns a ball backwards", N, FixedNumbers, DoubleNum
   CHECK(length(point_of<N>(contact.lever) - Point{0, 0, -4 / std::sqrt(5.0)}) < 0.05);
 }
 
+TEST_CASE_TEMPLATE("a tool that lags is pressed by what it slides on, not by its way", N,
+                   FixedNumbers, DoubleNumbers) {
+  FlatField<N> field(kUp, {0, -4, 0});
+  ProxyState<N> state;
+  follow(plan<N>(), state, field, pose_of<N>({0, 4.5, 0}));
+  for (int i = 1; i < 20; ++i) {
+    const auto contact = follow(plan<N>(), state, field, pose_of<N>({40.0 * i, 3.5, 0}));
+    CHECK(point_of<N>(contact.spring)[0] < -10);
+    CHECK(double(contact.normal.y) == doctest::Approx(1));
+  }
+}
+
 TEST_CASE_TEMPLATE("a turn that would sink the tool lifts it", N, FixedNumbers, DoubleNumbers) {
   FlatField<N> field(kUp, {6, 0, 0});  // a finger along x, 6 units long
   ProxyState<N> state;

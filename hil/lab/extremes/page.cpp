@@ -64,14 +64,14 @@ constexpr About kGroups[] = {
      "At rest on flats of any tilt and on sharp edges of 90 degrees, these against the volume's "
      "own "
      "iso-surface; and\n"
-     "sliding at 50 mm/s over a ball of R 40, 2 deep. Limits are 1.5 times those of the ball; "
-     "those "
-     "of angles, surface\n"
-     "and edges are not kept by all. Probably: where a rim or a point slides with the surface "
-     "beside it almost flat on\n"
-     "the bump, the gradient is averaged over what lies on one side of the point; and where a "
-     "tool's edge crosses that\n"
-     "of the solid, what touches is smaller than the distance of the samples."},
+     "sliding at 50 mm/s over a ball of R 40, 2 deep. Limits are 1.5 times those of the ball. What "
+     "is missed probably has\n"
+     "two causes: where a rim or a point slides with the surface beside it almost flat on the "
+     "bump, "
+     "the gradient is averaged\n"
+     "over what lies on one side of the point; and where a tool's edge crosses that of the solid, "
+     "what touches is smaller\n"
+     "than the distance of the samples."},
     {"cutting", "Cutting by force",
      "The whole servo with `[cut] model = \"preston\"`: a ball of radius 1 mm, led by hand over a "
      "flat; pressed on it\n"
@@ -81,12 +81,12 @@ constexpr About kGroups[] = {
     {"ticks", "Ticks",
      "On 256 x 256 x 161 voxels. The costliest tick of each tool is looked for among thousands, at "
      "flat, sharp, hollow\n"
-     "and noisy solids, in a slot with a play of 0.1 voxels, in tissue just below the iso and at "
-     "the "
-     "GE tooth, with goals\n"
-     "near and far and places looked for anew. Those that took longest are repeated from the same "
-     "state, and the fastest\n"
-     "repetition counts; where it was found is told."},
+     "and noisy solids, in a slot with a play of 0.1 voxels, in tissue just below the iso and, "
+     "where "
+     "its data are, at the\n"
+     "GE tooth, with goals near and far and places looked for anew. Those that took longest are "
+     "repeated from the same\n"
+     "state, and the fastest repetition counts; where it was found is told."},
     {"hands", "Hands",
      "An emulated Omni, its driver and the whole servo in virtual time, `scenes/touch.toml`; "
      "`groove` and\n"
