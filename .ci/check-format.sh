@@ -7,11 +7,18 @@ cd "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/.."
 
 mapfile -t sources < <(find shared controller visualizer hil tests -name '*.[ch]pp' | sort)
 status=0
-for file in "${sources[@]}"; do
-  if ! clang-format-14 --dry-run -Werror "$file" 2>/dev/null; then
-    echo "$file: not formatted; run clang-format-14 -i $file"
-    status=1
+unformatted() {
+  if ! clang-format-14 --dry-run -Werror "$1" 2>/dev/null; then
+    echo "$1: not formatted; run clang-format-14 -i $1"
   fi
+}
+export -f unformatted
+found=$(printf '%s\n' "${sources[@]}" | xargs -P "$(nproc)" -I{} bash -c 'unformatted {}')
+if [[ -n $found ]]; then
+  echo "$found"
+  status=1
+fi
+for file in "${sources[@]}"; do
   read -r first <"$file" || true
   if [[ $first != '// SPDX-License-Identifier: Apache-2.0' ]]; then
     echo "$file:1: no SPDX line; begin with // SPDX-License-Identifier: Apache-2.0"
