@@ -19,9 +19,8 @@ cmake --build "$build" --target fuzzers >/dev/null
 fuzz() {
   local name=$1 work=$build/fuzz/$1 status=0
   mkdir -p "$work/inputs"
-  # Memory of a text's nesting and of error messages stays far below; so does the time of one input,
-  # also where the fuzzers give way to other work.
-  "$build/bin/fuzz_$name" -max_total_time="$seconds" -timeout=20 -rss_limit_mb=1024 \
+  # Memory of a text's nesting and of error messages stays far below; so does the time of one input.
+  "$build/bin/fuzz_$name" -max_total_time="$seconds" -timeout=5 -rss_limit_mb=1024 \
     -artifact_prefix="$work/" -print_final_stats=1 "$work/inputs" "${@:2}" \
     >"$work/log" 2>&1 || status=$?
   if ((status)); then

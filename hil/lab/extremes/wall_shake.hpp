@@ -44,9 +44,6 @@ struct ShakenTool {
   }
 };
 
-inline constexpr double kBehind = 0.1;     ///< of the hand below the face, in units
-inline constexpr double kNoSpring = 0.02;  ///< from there to a proxy that has sunk in a little
-
 /// What happened at the walls.
 struct Shaken {
   long ticks = 0;
@@ -90,9 +87,9 @@ void shake(double thickness, const ShakenTool& tool, const SampledTool& made, in
     seen.longest_jump = std::max(seen.longest_jump, length(led.proxy() - before));
     seen.crossed += height < 0 ? 1 : 0;
     seen.turned_late += led.swept().turned ? 0 : 1;
-    if (frame.of(hand)[1] < below - kBehind) {
+    if (frame.of(hand)[1] < below - 0.1) {
       ++seen.behind;
-      seen.unfelt += spring < kNoSpring ? 1 : 0;
+      seen.unfelt += spring < 0.05 ? 1 : 0;
     }
   }
 }
