@@ -2,11 +2,13 @@
 #include "controller/scene/compile.hpp"
 
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <span>
 #include <utility>
 #include <vector>
 
+#include "controller/kernel/proxy/probe_work.hpp"
 #include "controller/scene/aligned_tool.hpp"
 #include "controller/scene/plan_choice.hpp"
 #include "controller/scene/plan_contact.hpp"
@@ -113,7 +115,7 @@ class SceneIn final : public CompiledScene {
           cost = surface_cost(scene.servo.numeric, *plan_.kernels);
           break;
       }
-      if (plan_.contact.swept) sweep_instead(samples_a_probe(plan.swept.shell.table), cost.stages);
+      if (plan_.contact.swept) sweep_instead(most_samples(plan.swept.shell), cost.stages);
       if constexpr (N::kIsFixed) {
         const bool any_pose = choice.plan == Plan::gather || choice.plan == Plan::splat;
         if (any_pose && plan.samples.count == 0) {
@@ -124,6 +126,12 @@ class SceneIn final : public CompiledScene {
                                        choice.plan == Plan::aligned ? table : nullptr);
       costs_.ticks.push_back({plan_.tool_count - 1, scene_index, choice, std::move(cost)});
     }
+  }
+
+  /// Of one volume, rounded up.
+  [[nodiscard]] std::uint64_t most_samples(const Shell<N>& shell) const {
+    const std::int64_t all = probe_work(shell.table, plan_.volume_count).most();
+    return (static_cast<std::uint64_t>(all) + plan_.volume_count - 1) / plan_.volume_count;
   }
 
   CutModel cut_;

@@ -6,7 +6,6 @@
 #include <string>
 #include <string_view>
 
-#include "controller/kernel/proxy/proxy_sweep.hpp"
 #include "controller/kernel/tick_box.hpp"
 #include "controller/scene/covered_bound.hpp"
 #include "controller/scene/scene_words.hpp"
@@ -163,10 +162,10 @@ PlanCost surface_cost(NumericKind numeric, const KernelSet& kernels) {
           {}};
 }
 
-void sweep_instead(std::int32_t samples_a_probe, std::vector<StageCost>& stages) {
+void sweep_instead(std::uint64_t samples, std::vector<StageCost>& stages) {
   std::erase_if(stages,
                 [](const StageCost& stage) { return std::string_view(stage.stage) == "contact"; });
-  stages.insert(stages.begin(), {"probes", count(samples_a_probe) * SweepRules::kMaxProbes});
+  stages.insert(stages.begin(), {"probes", samples});
 }
 
 }  // namespace kerf

@@ -8,9 +8,6 @@
 
 #include "controller/kernel/aligned_table.hpp"
 #include "controller/kernel/kernel_set.hpp"
-#include "controller/kernel/proxy/shell_cap.hpp"
-#include "controller/kernel/proxy/shell_patch.hpp"
-#include "controller/kernel/proxy/shell_table.hpp"
 #include "controller/scene/scene.hpp"
 #include "controller/scene/scene_costs.hpp"
 
@@ -28,7 +25,7 @@ namespace kerf {
 // Those come instead of `mill`, of all that follows `splat`, and of all that follows `overlap`.
 
 /// Goes up when what counts as an operation changes: prices that were measured before are void.
-inline constexpr int kCountsRevision = 7;
+inline constexpr int kCountsRevision = 8;
 
 /// copy     voxels of the box around the tool
 /// contact  multiply-adds of the correlation: table entries x 2 halves x 8 corners, chunk by chunk
@@ -73,16 +70,9 @@ inline constexpr std::size_t kForceStages = 2;
 void add_force_stages(std::uint64_t covered, std::vector<StageCost>& stages);
 
 /// Where the swept proxy is felt: instead of `contact`, before all else,
-/// probes  samples that are read: in each probe of a tick all of the tool's surface and those of a
-///         closer look at the contact, a ball's cap (shell_cap.hpp) or the patch of another shape
-///         (shell_patch.hpp)
-void sweep_instead(std::int32_t samples_a_probe, std::vector<StageCost>& stages);
-
-/// At most, for such a shell.
-template <class N>
-[[nodiscard]] std::int32_t samples_a_probe(const ShellTable<N>& shell) {
-  return shell.count + static_cast<std::int32_t>(shell.round ? kCapSamples : kPatchSamples);
-}
+/// probes  samples that are read, and what is counted like them: a volume's share of what a tick
+///         may spend in all of them (probe_work.hpp)
+void sweep_instead(std::uint64_t samples, std::vector<StageCost>& stages);
 
 /// Voxels that the stages of `gather` work on.
 struct GatherBoxes {

@@ -120,23 +120,24 @@ template <class N>
   return VoxelGrid{size.x, size.y, size.z}.voxel_count();
 }
 
-/// As many probes as a tick may make, with the tool's centre at a place in volume `v` alone. Inside
-/// of the solid no patch is read.
+/// Probes with the tool's centre at a place in volume `v` alone, as many as `samples` are enough
+/// for. Inside of the solid no closer look is taken. Returns what they cost.
 template <class N>
-std::int64_t probe_often(const ServoPlan<N>& plan, const ServoState<N>& state,
-                         const Shell<N>& shell, std::size_t v,
-                         VoxelVec<typename N::Real> centre_vox) {
+std::uint64_t probe_often(const ServoPlan<N>& plan, const ServoState<N>& state,
+                          const Shell<N>& shell, std::size_t v,
+                          VoxelVec<typename N::Real> centre_vox, std::uint64_t samples) {
   ShellVolume<N> volume = state.contact.volumes[v];
   volume.frame = {};  // contact space is the volume's
   for (std::size_t i = 0; i < 3; ++i)
     volume.frame.voxel_from_contact.row[i][i] = typename N::Ratio(1);
   ShellProbe<N> probe(*plan.kernels, shell, std::span(&volume, 1));
+  const std::int64_t enough = static_cast<std::int64_t>(samples) - probe.work().probe;
+  probe.begin_tick();
   probe.turn({});
-  std::int64_t planes = 0;
-  for (std::int32_t i = 0; i < SweepRules::kMaxProbes; ++i) {
-    planes += probe.probe(relabel<ContactSpace>(centre_vox)).count;
-  }
-  return planes;
+  do {
+    static_cast<void>(probe.probe(relabel<ContactSpace>(centre_vox)));
+  } while (probe.spent() <= enough && probe.spent() < probe.work().budget());
+  return static_cast<std::uint64_t>(probe.spent());
 }
 
 /// Each stage of tool `t` in volume `v` of the plan, whose `bounds` are given: the tool where the
@@ -159,8 +160,10 @@ template <class N>
   const VoxelIndex place = densest_place(volume.grid, memory.density, reach_of(tool.offsets, pose));
   StageLaps laps(bounds.size());
   const ForceCutPlan<N>& by_force = plan.force_cut;
-  std::vector<StageCost> done = std::move(bounds);           // the plan `aligned` does no less
+  std::vector<StageCost> done = std::move(bounds);           // `aligned` does no less but probes
   if (by_force.on) done.resize(done.size() - kForceStages);  // but for what the tool covers
+  const std::uint64_t most_probed = done.front().operations;
+  std::uint64_t probed = 0;
   std::size_t listed = 0;
   const auto list_and_spend = [&]<class Overlap>(const Overlap& overlap) {
     using Real = typename N::Real;
@@ -186,7 +189,9 @@ template <class N>
     pose.centre_vox = {Real(place.x + 0.002 * i), Real(place.y + 0.3), Real(place.z + 0.4)};
     laps.begin();
     if (plan.contact.swept) {
-      laps.end_stage(probe_often(plan, state, tool.swept.shell, v, pose.centre_vox));
+      probed = probe_often(plan, state, tool.swept.shell, v, pose.centre_vox, most_probed);
+      laps.end_stage(static_cast<std::int64_t>(probed));
+      done.front().operations = probed;
       if (in_volume.plan == Plan::surface) continue;
     }
     if constexpr (N::kIsFixed) {
@@ -235,7 +240,7 @@ template <class N>
         const std::ptrdiff_t rows = std::ptrdiff_t{box.size.y + 1} * (box.size.z + 1);
         const auto touched = static_cast<std::uint64_t>(std::count(live, live + rows, 1));
         done = splat_stages(tool.offsets.size(), box.size, touched, cut);
-        if (plan.contact.swept) sweep_instead(tool.swept.shell.table.count, done);
+        if (plan.contact.swept) sweep_instead(probed, done);
         continue;
       }
       laps.end_stage(gathered_contact(*plan.kernels, tool.samples, volume.grid, gradient, pose).x);
@@ -253,7 +258,7 @@ template <class N>
     if (by_force.on) {
       list_and_spend(state.overlap);
       done = gather_stages(tool.offsets.size(), boxes, cut);
-      sweep_instead(tool.swept.shell.table.count, done);
+      sweep_instead(probed, done);
       continue;
     }
     laps.end_stage(static_cast<std::int64_t>(
@@ -267,7 +272,7 @@ template <class N>
     boxes.refreshed =
         voxels_in(removed.changed.grown(kGradientReach).clipped(volume.grid.box()).extent());
     done = gather_stages(tool.offsets.size(), boxes, cut);
-    if (plan.contact.swept) sweep_instead(tool.swept.shell.table.count, done);
+    if (plan.contact.swept) sweep_instead(probed, done);
   }
   if (by_force.on) add_force_stages(listed, done);
   std::vector<StageTime> times;

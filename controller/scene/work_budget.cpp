@@ -71,12 +71,12 @@ constexpr std::array kPrices{
     Price{"gather/double", "refresh", 9},
     // Probes cost the same beside every plan, and so does cutting by force: groups of voxels where
     // kernels do it, voxels in float and double.
-    Price{"avx512", "probes", 2},
-    Price{"avx2", "probes", 2.5},
-    Price{"scalar", "probes", 12},
+    Price{"avx512", "probes", 2.4},
+    Price{"avx2", "probes", 2.6},
+    Price{"scalar", "probes", 18},
     Price{"neon", "probes", 9},
-    Price{"float", "probes", 12},
-    Price{"double", "probes", 12},
+    Price{"float", "probes", 19},
+    Price{"double", "probes", 18},
     Price{"avx512", "list", 32},
     Price{"avx2", "list", 42},
     Price{"scalar", "list", 80},

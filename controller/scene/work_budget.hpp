@@ -18,9 +18,8 @@ namespace kerf {
 /// from the dearest of the calibration's tools that `time_stages` gave there, but for NEON, which
 /// is guessed. Every stage of every plan has one.
 ///
-/// `probes` are priced by the costliest ticks of 32 probes that begin in air. Inside of the solid,
-/// as `time_stages` has them, one costs 1.5 (AVX-512) to 2 times as much (plain C++); a tick takes
-/// fewer of these (`ShellProbe::kTickSamples`), which the count of operations leaves out.
+/// `probes` are priced by the costliest ticks that `kerf lab extremes` finds, of tools of 500 to
+/// 1100 samples, and by probes inside of the solid, as `time_stages` has them.
 [[nodiscard]] double reference_price_ns(std::string_view way, std::string_view stage);
 
 /// Half of a tick: a machine half as fast as the reference still ends its ticks in time, and on the

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // A tool among several volumes, turned and stretched ones, far from them and deep in them.
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 
 #include <doctest/doctest.h>
 
@@ -189,10 +191,34 @@ TEST_CASE_TEMPLATE(
     for (int tick = 0; tick < 3; ++tick) {
       rig.field().begin_tick();
       const int probes = answered();
-      CHECK(probes >= ShellProbe<N>::kLeastProbes);
+      CHECK(probes >= ProbeWork::kLeastProbes);
       CHECK(probes <= 25);
     }
     rig.field().turn({});
     CHECK(answered() == 1);
+  }
+}
+
+TEST_CASE_TEMPLATE("no tick of a sweep spends more than a scene is planned with", N, FixedNumbers,
+                   DoubleNumbers) {
+  const TestVolume tissue = blurred({60, 60, 60}, [](Point p) { return 0.1 + 0.01 * (p[1] - 30); });
+  const Point middle{30, 30, 30};
+  for (const SceneTool& tool :
+       {kBall, tool_of_units("cylinder", 5, 16), tool_of_units("cylinder", 10, 30)}) {
+    ShellRig<N> rig(tool);
+    rig.add(tissue, plain_frame<N>());
+    const ProbeWork work = rig.field().work();
+    Dice dice(7);
+    std::int64_t most = 0;
+    for (int tick = 0; tick < 300; ++tick) {
+      ProxyPose<N> pose{place_of<N>(middle), {}};
+      const ProxyPose<N> goal{place_of<N>(middle + dice.uniform(1, 30) * dice.direction()),
+                              dice.turn<N>(dice.uniform(0, 3))};
+      rig.field().begin_tick();
+      ProxySweep<N, ShellProbe<N>>(rig.field(), pose, {}, rig.turn_step()).tick(goal);
+      most = std::max(most, rig.field().spent());
+    }
+    CHECK(most <= work.most());
+    CHECK(double(most) > 0.8 * double(work.most()));
   }
 }

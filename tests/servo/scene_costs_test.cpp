@@ -219,13 +219,29 @@ TEST_CASE("a gathering tick that cuts works on no more voxels than it is said to
   }
 }
 
-TEST_CASE("a probe reads the tool's surface, and the cap of a ball or the patch of another shape") {
+TEST_CASE("a scene is planned with what the servo allows the probes of a tick") {
   ShellTable<FixedNumbers> shell;
   shell.count = 500;
+  shell.groups = 32;
   shell.round = true;
-  CHECK(samples_a_probe(shell) == 500 + 160);
+  CHECK(probe_work(shell, 2).probe == 2 * (512 + 160 + 256));
+  CHECK(probe_work(shell, 2).turn == 2 * 62);
   shell.round = false;
-  CHECK(samples_a_probe(shell) == 500 + 32);
+  CHECK(probe_work(shell, 1).probe == 512 + 32 + 256);
+  CHECK(ProbeWork{.probe = 400, .turn = 50}.most() == 32 * 400 + 13 * 50);
+  CHECK(ProbeWork{.probe = 1000, .turn = 90}.most() == 18000 + 1000);
+  CHECK(ProbeWork{.probe = 2000, .turn = 200}.most() == 15 * 2000 + 13 * 200);
+
+  Scene scene = half_space_scene(48);
+  scene.tools = {shape("wheel", 2, 1)};
+  const auto probes_of = [&] {
+    return operations(plan_scene(scene)->costs().ticks.front().cost, "probes");
+  };
+  const std::uint64_t alone = probes_of();
+  scene.volumes.push_back(scene.volumes.front());
+  scene.volumes.back().name = "other";
+  CHECK(2 * probes_of() >= alone);  // of both together
+  CHECK(probes_of() <= alone);
 }
 
 TEST_CASE("every stage of every plan has a price, on machines of all kinds") {

@@ -11,6 +11,7 @@
 #include "controller/kernel/kernel_set.hpp"
 #include "controller/kernel/proxy/contact_math.hpp"
 #include "controller/kernel/proxy/plane.hpp"
+#include "controller/kernel/proxy/probe_work.hpp"
 #include "controller/kernel/proxy/shell_cap.hpp"
 #include "controller/kernel/proxy/shell_patch.hpp"
 #include "controller/kernel/proxy/shell_peak.hpp"
@@ -52,34 +53,29 @@ class ShellProbe {
  public:
   using Real = typename N::Real;
 
-  /// Samples that the probes of a tick look at, some 2.5 ns each, and what a look costs besides, in
-  /// samples. A tool of very many is allowed some probes of all of them.
-  static constexpr std::int32_t kTickSamples = 18000;
-  static constexpr std::int32_t kLookSamples = 128;
-  static constexpr std::int32_t kLeastProbes = 12;
-
   /// `kernels` serve fixed point alone.
   ShellProbe(const KernelSet& kernels, const Shell<N>& shell,
              std::span<const ShellVolume<N>> volumes) noexcept
-      : kernels_(kernels), shell_(shell), volumes_(volumes) {}
+      : kernels_(kernels),
+        shell_(shell),
+        volumes_(volumes),
+        work_(probe_work(shell.table, volumes.size())) {}
 
   /// From the tool's axes to those of the world.
   void turn(const ToolTurn<N>& turn) noexcept {
     rows_ = rows_of(turn);
     turned_ = true;
-    left_ -= turn_samples() * static_cast<std::int32_t>(volumes_.size());
+    left_ -= work_.turn;
     for (const ShellVolume<N>& volume : volumes_) {
       place(shell_, rows_, volume.frame, volume.places);
     }
   }
 
   /// The probes from now on are those of one tick; before the first, nothing is counted.
-  void begin_tick() noexcept {
-    const auto closer = static_cast<std::int32_t>(shell_.table.round ? kCapSamples : kPatchSamples);
-    const std::int32_t probe = turn_samples() + shell_.table.count + closer + 2 * kLookSamples;
-    left_ =
-        std::max(kTickSamples, kLeastProbes * probe * static_cast<std::int32_t>(volumes_.size()));
-  }
+  void begin_tick() noexcept { left_ = work_.budget(); }
+  [[nodiscard]] const ProbeWork& work() const noexcept { return work_; }
+  /// Since then, counted as `work` is.
+  [[nodiscard]] std::int64_t spent() const noexcept { return work_.budget() - left_; }
 
   /// The tool's centre at `q`: at most one plane a volume, the deepest three.
   [[nodiscard]] Probe<N> probe(ContactVec<Real> q) const noexcept {
@@ -112,8 +108,6 @@ class ShellProbe {
   }
 
  private:
-  /// What it costs to place all samples anew.
-  [[nodiscard]] std::int32_t turn_samples() const noexcept { return shell_.table.count / 8; }
   [[nodiscard]] static std::int32_t whole(Real x) noexcept {
     if constexpr (N::kIsFixed) {
       return x.raw() >> Real::kFractionBits;
@@ -237,12 +231,12 @@ class ShellProbe {
       const std::int32_t centre[3] = {at.x.raw(), at.y.raw(), at.z.raw()};
       ShellSums<N> sums;
       kernels_.sum_shell(table, places, centre, field, sums);
-      left_ -= kLookSamples + sums.read;
+      left_ -= ProbeWork::kLookSamples + sums.read;
       return sums;
     } else {
       const Real centre[3] = {at.x, at.y, at.z};
       const ShellSums<N> sums = shell_sums<N>(table, places, centre, field);
-      left_ -= kLookSamples + sums.read;
+      left_ -= ProbeWork::kLookSamples + sums.read;
       return sums;
     }
   }
@@ -250,6 +244,7 @@ class ShellProbe {
   const KernelSet& kernels_;
   const Shell<N>& shell_;
   std::span<const ShellVolume<N>> volumes_;
+  ProbeWork work_;
   TurnRows<N> rows_{};
   mutable std::int64_t left_ = std::numeric_limits<std::int64_t>::max();  ///< of the tick's samples
   mutable bool turned_ = false;                                           ///< and not probed since
