@@ -6,6 +6,7 @@
 #include <charconv>
 #include <cmath>
 #include <cstddef>
+#include <cstdlib>
 #include <fstream>
 #include <iterator>
 #include <limits>
@@ -72,9 +73,12 @@ class StlText {
   float number() {
     std::string_view word = next();
     if (word.starts_with('+')) word.remove_prefix(1);
-    double value = 0;  // to double's range; what a float loses is 0
+    double value = 0;
     const auto [end, fault] = std::from_chars(word.data(), word.data() + word.size(), value);
-    const bool number = fault == std::errc() && end == word.data() + word.size();
+    // Says not whether too large or too small; what is too small for a number is 0.
+    if (fault == std::errc::result_out_of_range)
+      value = std::strtod(std::string(word).c_str(), nullptr);
+    const bool number = fault != std::errc::invalid_argument && end == word.data() + word.size();
     if (!number || std::abs(value) > std::numeric_limits<float>::max()) complain(word, "a number");
     return static_cast<float>(value);
   }

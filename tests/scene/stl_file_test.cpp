@@ -74,6 +74,23 @@ TEST_CASE("keywords are read in any case, and numbers that a float takes for zer
   CHECK(tiny[0][0] == std::array<float, 3>{0, 0, 2});
 }
 
+TEST_CASE("a number too small for any is read as zero, and one too large is refused") {
+  const auto facet = [](const std::string& x) {
+    return "solid x\nfacet normal 0 0 1\nouter loop\nvertex " + x +
+           " 0 2\nvertex 0 1 0\nvertex 1 0 0\nendloop\nendfacet\nendsolid x\n";
+  };
+  for (const char* x : {"1e-400", "-1e-400", "+0.001e-99999"}) {
+    const auto read = parse_stl(facet(x), "bur.stl");
+    REQUIRE(read.size() == 1);
+    CHECK(read[0][0] == std::array<float, 3>{0, 0, 2});
+  }
+  for (const std::string x : {"1e400", "-1e99999"}) {
+    CHECK(parse_error(facet(x)) ==
+          "bur.stl:4: \"" + x + "\" where a number belongs; export the mesh again");
+  }
+  CHECK(begins(parse_error(facet("1e-400x")), "bur.stl:4: \"1e-400x\" where a number"));
+}
+
 TEST_CASE("several solids of one text are one mesh") {
   CHECK(parse_stl(text_stl(kBar) + text_stl(kBar), "bur.stl").size() == 2 * kBar.size());
 }
