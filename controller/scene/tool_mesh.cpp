@@ -133,7 +133,8 @@ double winding(const ToolMesh& mesh, const Part& part, const ToolMesh::Point& at
 }
 
 /// Turns what is inside out: all of the mesh, and then each part of it that is no hollow in
-/// another. Gives what they enclose together.
+/// another. A part is judged after those that it lies in, whatever their order in the file. Gives
+/// what they enclose together.
 double turn_outward(ToolMesh& mesh) {
   std::vector<Part> parts = parts_of(mesh);
   const auto sum_mm3 = [&] {
@@ -145,15 +146,24 @@ double turn_outward(ToolMesh& mesh) {
       std::swap(mesh.triangles[t][1], mesh.triangles[t][2]);
     part.volume_mm3 = -part.volume_mm3;
   };
+  // The sum of what `of` makes of how often each other part winds around this one.
+  const auto around = [&](const Part& part, auto of) {
+    const ToolMesh::Point at = mesh.corners(mesh.triangles[part.triangles.front()])[0];
+    double sum = 0;
+    for (const Part& other : parts) {
+      if (&other != &part && other.box_holds(at)) sum += of(winding(mesh, other, at));
+    }
+    return sum;
+  };
   if (sum_mm3() < 0) std::ranges::for_each(parts, turn);
+  std::vector<std::pair<double, Part*>> inside_out;  // by the number of parts that each lies in
   for (Part& part : parts) {
     if (part.volume_mm3 >= 0) continue;
-    const ToolMesh::Point at = mesh.corners(mesh.triangles[part.triangles.front()])[0];
-    double around = 0;
-    for (const Part& other : parts) {
-      if (&other != &part && other.box_holds(at)) around += winding(mesh, other, at);
-    }
-    if (around < 0.5) turn(part);
+    inside_out.emplace_back(around(part, [](double w) { return std::round(std::abs(w)); }), &part);
+  }
+  std::ranges::stable_sort(inside_out, {}, &std::pair<double, Part*>::first);
+  for (const auto& [depth, part] : inside_out) {
+    if (around(*part, [](double w) { return w; }) < 0.5) turn(*part);
   }
   return sum_mm3();
 }

@@ -178,6 +178,27 @@ TEST_CASE("a hollow stays one, also where the whole mesh is inside out") {
   }
 }
 
+TEST_CASE("a body that is inside out keeps its hollow, in whatever order its parts come") {
+  const auto inside_out = [](Triangles mesh) {
+    for (LooseTriangle& t : mesh) std::swap(t[0], t[1]);
+    return mesh;
+  };
+  Triangles aside = extremes::prism(4, 8, 4);  // the larger: the mesh is not inside out as a whole
+  for (LooseTriangle& t : aside) {
+    for (auto& corner : t) corner[0] += 20;
+  }
+  const Triangles body = extremes::prism(3, 8, 4), hollow = kBar;
+  const double solid_mm3 = volume_mm3(join_triangles(aside, 1, "bur.stl")) +
+                           volume_mm3(join_triangles(body, 1, "bur.stl"));
+  std::array<Triangles, 3> parts{aside, inside_out(body), inside_out(hollow)};
+  for (std::array<std::size_t, 3> order{0, 1, 2};;) {
+    Triangles all;
+    for (const std::size_t i : order) all.insert(all.end(), parts[i].begin(), parts[i].end());
+    CHECK(volume_mm3(join_triangles(all, 1, "bur.stl")) == doctest::Approx(solid_mm3 - 4.5 * 4));
+    if (!std::next_permutation(order.begin(), order.end())) break;
+  }
+}
+
 TEST_CASE("a folder is no STL file, and says so") {
   const test::TempFolder folder;
   const auto path = folder.write("bur.stl", text_stl(kBar));
