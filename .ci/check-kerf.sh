@@ -38,6 +38,7 @@ case $name in
     touch "$LAB/segment"
     printf 'hand_unit_mm=2\nhand_script=hand.toml\nrate_hz=%s\n' "${RATE_HZ:-500}" \
       >"${option[--emulator-args]}"
+    until grep -q '^emulator.*--hand' "$LAB/calls" || ((stop)); do sleep 0.02; done
     for ((i = 0; i < 10 * option[--seconds] && !stop; ++i)); do sleep 0.03; done
     echo '{}' >"${option[--report]}"
     touch "${option[--final]}"
@@ -56,6 +57,11 @@ case $name in
     ;;
   visualizer | recorder)
     trap 'exit 0' TERM
+    if [[ $name == visualizer ]]; then
+      sleep "${SLOW:-0}"
+      [[ -e $LAB/segment ]] || { echo 'kerf-visualizer: no controller' >&2; exit 2; }
+      touch "${option[--attached]}"
+    fi
     while [[ -e $LAB/segment ]]; do sleep 0.05; done
     if [[ $name == recorder ]]; then mkdir -p "$out"; else touch "$out/frame-0001.png"; fi
     ;;
@@ -120,6 +126,8 @@ expect 'a demo runs' kerf_gives 0 demo --seconds 1
 expect 'the hand is the one that the scene names' called '^emulator.*--hand hand.toml --unit-mm 2'
 expect 'the frames are spread over the run' called '^visualizer.*--every-ticks 41 '
 expect 'a demo leaves nothing behind' nothing_survives
+expect 'a run may be shorter than the visualizer takes to start' \
+  with SLOW=1 kerf_gives 0 demo --seconds 1
 expect 'the way of drawing reaches the visualizer' kerf_gives 0 demo --seconds 1 --renderer cast
 expect 'as it was said' called '^visualizer.*--renderer cast '
 expect 'an arm on FireWire' kerf_gives 0 demo --seconds 1 --port fw

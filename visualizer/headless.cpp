@@ -98,6 +98,7 @@ int run_headless(const VisualizerOptions& options) {
   Picture picture(session, first_look(options), aspect);
   FrameTaker taker(picture, options.size, report);
   taker.draw(session);  // not kept: the driver compiles shaders at their first use
+  if (options.attached) write_new_file(*options.attached, "");
   report.late_join_ms = since_attached.wall_ms();
   report.cpu_ms.clear();
   report.wall_ms.clear();

@@ -139,6 +139,9 @@ std::optional<VisualizerOptions> parse_options(int argc, const char* const* argv
   app.add_option("--wait", options.wait_s, "seconds to wait for the controller")
       ->check(range(0.0, 1e6))
       ->capture_default_str();
+  app.add_option("--attached", options.attached,
+                 "make this empty file once the controller is shown: a short run may begin")
+      ->type_name("FILE");
   app.add_option("--cpu", options.cpus, "cores to run on, e.g. 0,1 (default: all but the last)")
       ->delimiter(',')
       ->check(range(0, 1023));

@@ -168,6 +168,7 @@ int run_window(const VisualizerOptions& options) {
 
   double aspect = static_cast<double>(options.size.width) / options.size.height;
   Followed followed(options, std::move(first), aspect);
+  if (options.attached) write_new_file(*options.attached, "");
   std::optional<RenderTarget> target;
   ShownRates rates;
   Keys keys;
