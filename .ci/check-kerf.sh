@@ -146,6 +146,8 @@ expect 'a video does not mix with what a demo says' kerf_gives 2 demo --record -
 expect 'and a file is asked for' says 'name a file or a pipe'
 expect 'a fast servo' with RATE_HZ=8000 kerf_gives 0 demo --seconds 1
 expect 'is answered in every cycle of the bus' called '^emulator.*--packet-cycles 1 '
+expect 'its rate' kerf_gives 0 demo --seconds 1 --rate 4000
+expect 'is that of the controller' called '^controller.*--rate 4000 '
 expect 'a slow one' kerf_gives 0 demo --seconds 1
 expect 'leaves the emulator its own pace' test "$(grep -c -- --packet-cycles "$lab/calls")" == 0
 expect 'a demo keeps its results' kerf_gives 0 demo --seconds 1 --out "$lab/out" --virtual
