@@ -64,6 +64,24 @@ std::vector<std::uint8_t> middle_of(const RgbPicture& picture) {
   return middle;
 }
 
+void send(const std::string& events) {
+  // Where xdotool itself could not be started nothing was sent: that says nothing of the window.
+  constexpr int kNotStarted = 127;
+  int status = 0;
+  for (int tries = 0; tries < 3; ++tries) {
+    status = std::system(("xdotool " + events + " >/dev/null").c_str());
+    if (!WIFEXITED(status) || WEXITSTATUS(status) != kNotStarted) break;
+    std::this_thread::sleep_for(std::chrono::milliseconds(300));
+  }
+  CAPTURE(events);
+  REQUIRE(status == 0);
+}
+
+/// Until the window and its screen show what was sent.
+void let_it_show() {
+  std::this_thread::sleep_for(std::chrono::milliseconds(300));
+}
+
 /// The upper left corner of the screen that DISPLAY names.
 RgbPicture read_screen(PictureSize size) {
   Display* const display = XOpenDisplay(nullptr);
@@ -154,17 +172,8 @@ std::vector<std::uint64_t> Controller::asked_tools() {
 }
 
 void act(const std::string& events) {
-  // Where xdotool itself could not be started nothing was sent: that says nothing of the window.
-  constexpr int kNotStarted = 127;
-  int status = 0;
-  for (int tries = 0; tries < 3; ++tries) {
-    status = std::system(("xdotool " + events + " >/dev/null").c_str());
-    if (!WIFEXITED(status) || WEXITSTATUS(status) != kNotStarted) break;
-    std::this_thread::sleep_for(std::chrono::milliseconds(300));
-  }
-  CAPTURE(events);
-  REQUIRE(status == 0);
-  std::this_thread::sleep_for(std::chrono::milliseconds(300));
+  send(events);
+  let_it_show();
 }
 
 User::User(const fs::path& folder, int blocks)
@@ -181,7 +190,7 @@ User::User(const fs::path& folder, int blocks)
 
 RgbPicture User::whole() {
   const fs::path file = out_ / "kerf-0001.png";
-  act("key s");
+  send("key s");
   for (int tries = 0; tries < 3000 && !fs::exists(file); ++tries) {
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
   }
@@ -196,11 +205,13 @@ std::vector<std::uint8_t> User::look() {
 }
 
 std::vector<std::uint8_t> User::look_at_screen() {
-  return middle_of(read_screen(whole().size));
+  const PictureSize size = whole().size;
+  let_it_show();
+  return middle_of(read_screen(size));
 }
 
 int User::quit() {
-  act("key q");
+  send("key q");
   return code_.get();
 }
 

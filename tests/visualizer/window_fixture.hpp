@@ -52,7 +52,7 @@ class Controller {
   Tick now_ = 0;
 };
 
-/// Real events at the screen that DISPLAY names.
+/// Real events at the screen that DISPLAY names, and the time in which a window shows what they do.
 void act(const std::string& events);
 
 /// A window, and a user before it.
