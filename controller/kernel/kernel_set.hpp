@@ -68,12 +68,15 @@ struct KernelSet {
                       std::uint64_t* weight_by_material) noexcept;
   void (*take_steps)(const CoverSpend&, CoveredGroup* list, std::int32_t count, Density*,
                      std::int64_t entries, CoverTaken&) noexcept;
-  /// The swept contact: `place_shell` and `shell_sums` of a tool's surface samples.
+  /// The swept contact: `place_shell`, `shell_sums` and `read_shell` of a tool's surface samples.
   void (*place_shell)(const ShellTable<FixedNumbers>&, const ShellStep<FixedNumbers>&,
                       const ShellPlaces<FixedNumbers>&) noexcept;
   void (*sum_shell)(const ShellTable<FixedNumbers>&, const ShellPlaces<FixedNumbers>&,
                     const std::int32_t (&centre)[3], const ShellField&,
                     ShellSums<FixedNumbers>&) noexcept;
+  void (*read_shell)(const ShellPlaces<FixedNumbers>&, std::int32_t count,
+                     const std::int32_t (&centre)[3], const ShellField&,
+                     std::int32_t* density) noexcept;
 };
 
 /// Gradients beyond the last voxel of a field.

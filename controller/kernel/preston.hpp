@@ -47,6 +47,7 @@ struct PrestonOutcome {
   /// Budget that found nothing to remove and went beyond the carry: 0 unless the force is more
   /// than the covered voxels can hold in one tick.
   CutBudget<N> lost{};
+  bool starves = false;  ///< more than half a voxel waits: soon some would be lost
 };
 
 namespace detail {
@@ -79,6 +80,7 @@ class PrestonTick {
     for (auto& carry : state_.carry) {
       const auto kept = std::clamp(carry, -kFullVoxel, kFullVoxel);
       out.lost += carry - kept;
+      out.starves = out.starves || kept > kFullVoxel / 2;
       carry = kept;
     }
   }

@@ -19,6 +19,19 @@ struct SurfaceDrag {
   typename N::Unit arm{};  ///< distance from the axis over the rim radius, kSpeedFloor to 1
 };
 
+/// That of a ball whose contact bears a load along `normal`, out of the solid, at `arm` from the
+/// axis on average. Whatever places bear it, SUM load_i r_i is -R times the load, so omega x r is
+/// known without them. Most of what a ball covers of its own bore bears nothing, and changes sides
+/// where the ball moves by a tenth of a voxel.
+template <class N>
+[[nodiscard]] constexpr SurfaceDrag<N> ball_drag(Vec<typename N::Unit, ToolSpace> normal,
+                                                 typename N::Unit arm) noexcept {
+  using Unit = typename N::Unit;
+  const Unit from_axis = norm(Vec<Unit, ToolSpace>{normal.x, Unit(0), normal.z});
+  const Unit mean = std::max(arm, from_axis);
+  return {normal.z / mean, -normal.x / mean, arm};
+}
+
 namespace detail {
 
 /// What `SurfaceDrag` is the mean of, row by row. Fixed: covered densities and weights have 15

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -25,12 +26,16 @@ class ContactMemory {
   /// Samples of a tool's surface; they stay where they are.
   Shell<N> hold_shell(const Scene& scene, const SceneTool& tool) {
     const double unit_mm = contact_unit_mm(scene);
-    auto samples = samples_of(scene, tool, unit_mm);
-    for (auto& sample : samples) {
-      for (double& x : sample) x /= unit_mm;
-    }
-    const bool ball = tool.shape == "ball";
-    const auto& held = tools_.emplace_back(tool.name, ShellTool<N>(samples, ball)).second;
+    const auto in_units = [unit_mm](std::vector<std::array<double, 3>> samples) {
+      for (auto& sample : samples) {
+        for (double& x : sample) x /= unit_mm;
+      }
+      return samples;
+    };
+    const auto samples = in_units(samples_of(scene, tool, unit_mm));
+    const auto close = in_units(close_samples(tool, unit_mm));
+    const auto& held =
+        tools_.emplace_back(tool.name, ShellTool<N>(samples, tool.round, close)).second;
     for (ShellMemory<N>& places : places_) places.hold(held.shell());
     return held.shell();
   }

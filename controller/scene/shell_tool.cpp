@@ -5,6 +5,8 @@
 #include <cassert>
 #include <cmath>
 
+#include "controller/scene/lever_of.hpp"
+
 namespace kerf {
 namespace {
 
@@ -46,24 +48,26 @@ double distance(const Point& a, const Point& b) {
   return std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
 }
 
-template <class N>
-ShellNumber<N> lever_of(double share) {
-  if constexpr (N::kIsFixed) {
-    return static_cast<ShellNumber<N>>(std::lround(share * 32768));
-  } else {
-    return static_cast<ShellNumber<N>>(share);
+double reach_of(std::span<const Point> samples, std::span<const Point> close) {
+  double reach = 0;
+  for (const auto& points : {samples, close}) {
+    for (const Point& p : points) reach = std::max(reach, distance(p, {}));
   }
+  return reach;
 }
 
 }  // namespace
 
 template <class N>
-ShellTool<N>::ShellTool(std::span<const Point> samples_units, bool round)
-    : count_(samples_units.size()), round_(round) {
+ShellTool<N>::ShellTool(std::span<const Point> samples_units, bool round,
+                        std::span<const Point> close_units)
+    : count_(samples_units.size()),
+      reach_(reach_of(samples_units, close_units)),
+      round_(round),
+      close_(close_units, reach_) {
   assert(!samples_units.empty() && samples_units.size() <= kMaxShellSamples);
   std::vector<Point> points(samples_units.begin(), samples_units.end());
   group_together(points);
-  for (const Point& p : points) reach_ = std::max(reach_, distance(p, {}));
   const auto add = [this](auto& to, const Point& p) {
     for (std::size_t axis = 0; axis < 3; ++axis) to[axis].push_back(lever_of<N>(p[axis] / reach_));
   };
@@ -92,6 +96,7 @@ Shell<N> ShellTool<N>::shell() const noexcept {
   shell.table.count = static_cast<std::int32_t>(count_);
   shell.table.groups = static_cast<std::int32_t>(bricks_.size());
   shell.table.round = round_;
+  shell.close = close_.table();
   shell.reach = typename N::Real(reach_);
   // No voxel's edge is shorter than a unit; a little for roundings.
   const double longest = reach_ + rounding();
@@ -104,7 +109,8 @@ Shell<N> ShellTool<N>::shell() const noexcept {
 
 template <class N>
 std::size_t ShellTool<N>::bytes() const noexcept {
-  return 3 * (lever_[0].size() + middle_[0].size()) * sizeof(ShellNumber<N>) + bricks_.size();
+  return 3 * (lever_[0].size() + middle_[0].size()) * sizeof(ShellNumber<N>) + bricks_.size() +
+         close_.bytes();
 }
 
 template <class N>

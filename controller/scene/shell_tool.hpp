@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "controller/kernel/proxy/shell_probe.hpp"
+#include "controller/scene/close_cells.hpp"
 
 namespace kerf {
 
@@ -17,8 +18,10 @@ template <class N>
 class ShellTool {
  public:
   /// `samples_units`: from the tool's centre, in contact units; they are sorted into groups that
-  /// lie together. `round`: they are those of a ball.
-  ShellTool(std::span<const std::array<double, 3>> samples_units, bool round);
+  /// lie together. `round`: they are those of a ball. `close_units`: the close samples of another
+  /// shape; without them there is no closer look at its contacts.
+  ShellTool(std::span<const std::array<double, 3>> samples_units, bool round,
+            std::span<const std::array<double, 3>> close_units = {});
 
   [[nodiscard]] Shell<N> shell() const noexcept;
   [[nodiscard]] std::size_t bytes() const noexcept;
@@ -31,8 +34,9 @@ class ShellTool {
   std::array<std::vector<ShellNumber<N>>, 3> lever_, middle_;
   std::vector<std::uint8_t> bricks_;
   std::size_t count_;
-  double reach_ = 0;
+  double reach_;
   bool round_;
+  CloseCells<N> close_;
 };
 
 /// Memory for the places of the widest of several tools in one volume.

@@ -134,9 +134,11 @@ std::uint64_t probe_often(const ServoPlan<N>& plan, const ServoState<N>& state,
   const std::int64_t enough = static_cast<std::int64_t>(samples) - probe.work().probe;
   probe.begin_tick();
   probe.turn({});
+  std::int64_t before = 0;
   do {
+    before = probe.spent();
     static_cast<void>(probe.probe(relabel<ContactSpace>(centre_vox)));
-  } while (probe.spent() <= enough && probe.spent() < probe.work().budget());
+  } while (probe.spent() <= enough && probe.spent() > before);
   return static_cast<std::uint64_t>(probe.spent());
 }
 

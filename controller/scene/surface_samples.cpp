@@ -8,6 +8,7 @@
 #include <span>
 #include <sstream>
 
+#include "controller/kernel/proxy/shell_closeup.hpp"
 #include "controller/kernel/proxy/shell_table.hpp"
 #include "controller/scene/mesh_surface.hpp"
 #include "controller/scene/scene_error.hpp"
@@ -121,6 +122,21 @@ class RingSampler {
   std::vector<Sample> samples_;
 };
 
+/// Of any shape but a ball.
+std::vector<Sample> samples_apart(const SceneTool& tool, const Profile& profile, double pitch_mm) {
+  if (profile.empty()) {
+    const double count = std::ceil(surface_mm2(tool.mesh) / (pitch_mm * pitch_mm));
+    return mesh_surface_samples(tool.mesh, static_cast<std::size_t>(count));
+  }
+  RingSampler rings(pitch_mm);
+  for (const auto& part : smooth_parts(profile)) rings.add(part);
+  return std::move(rings).samples();
+}
+
+Profile profile_of(const SceneTool& tool) {
+  return tool.mesh.triangles.empty() ? tool_profile(tool, kProfileSteps) : Profile{};
+}
+
 void check_count(const SceneTool& tool, double count, double unit_mm) {
   if (count <= kMaxSurfaceSamples) return;
   std::ostringstream line;
@@ -134,25 +150,23 @@ void check_count(const SceneTool& tool, double count, double unit_mm) {
 }  // namespace
 
 std::vector<Sample> surface_samples(const SceneTool& tool, double unit_mm) {
-  const bool meshed = !tool.mesh.triangles.empty();
-  const Profile profile = meshed ? Profile{} : tool_profile(tool, kProfileSteps);
-  const double area_mm2 = meshed ? surface_mm2(tool.mesh) : area_of(profile);
+  const Profile profile = profile_of(tool);
+  const double area_mm2 = profile.empty() ? surface_mm2(tool.mesh) : area_of(profile);
   const double finest_mm = std::sqrt(area_mm2 / kMinSurfaceSamples);
   const double widest =
       tool.round ? ball_sample_pitch(tool.radius_mm / unit_mm) : kShapeSamplePitch;
   const double pitch_mm = std::min(finest_mm, unit_mm * widest);
   const double count = std::ceil(area_mm2 / (pitch_mm * pitch_mm));
   check_count(tool, count, unit_mm);
-  if (meshed) {
-    auto samples = mesh_surface_samples(tool.mesh, static_cast<std::size_t>(count));
-    check_count(tool, static_cast<double>(samples.size()), unit_mm);  // long rims of little area
-    return samples;
-  }
   if (tool.round) return fibonacci_ball(tool.radius_mm, static_cast<int>(count));
+  auto samples = samples_apart(tool, profile, pitch_mm);
+  check_count(tool, static_cast<double>(samples.size()), unit_mm);  // long rims of little area
+  return samples;
+}
 
-  RingSampler rings(pitch_mm);
-  for (const auto& part : smooth_parts(profile)) rings.add(part);
-  return std::move(rings).samples();
+std::vector<Sample> close_samples(const SceneTool& tool, double unit_mm) {
+  if (tool.round) return {};
+  return samples_apart(tool, profile_of(tool), kClosePitch * unit_mm);
 }
 
 }  // namespace kerf

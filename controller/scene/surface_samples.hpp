@@ -43,4 +43,9 @@ inline constexpr int kMaxSurfaceSamples = 8000;
 [[nodiscard]] std::vector<std::array<double, 3>> surface_samples(const SceneTool& tool,
                                                                  double unit_mm);
 
+/// Samples kClosePitch units apart of a tool that is no ball, in the same way, for a closer look at
+/// a contact (shell_closeup.hpp). None of a ball. Load time.
+[[nodiscard]] std::vector<std::array<double, 3>> close_samples(const SceneTool& tool,
+                                                               double unit_mm);
+
 }  // namespace kerf

@@ -106,6 +106,8 @@ template <class N>
     whole += weight[v];
   }
 
+  const ToolPlan<N>& tool = plan.tools[state.active_tool];
+  const auto normal = transposed(spindle_axes(tool, state, at)) * at.normal;
   CuttingFriction<N> friction;
   const auto drive = cut_drive<N>(cut.press_n, rules.threshold_n, state.force_cut.spindle.ratio);
   bool starves = drive > 0 && !(whole > 0);
@@ -114,12 +116,13 @@ template <class N>
     const PrestonPlan<N>& volume = rules.volume[v];
     cut.forbidden = cut.forbidden || touches_forbidden(volume, covered[v]);
     const Real press_n = multiply<Real>(unit_share_of<N>(weight[v], whole), cut.press_n);
-    friction.add(rules.friction, press_n, covered[v].drag);
+    const SurfaceDrag<N>& drag = covered[v].drag;
+    friction.add(rules.friction, press_n, tool.round ? ball_drag<N>(normal, drag.arm) : drag);
     const auto part = portion<N>(drive, share_of<N>(weight[v], whole));
     const PrestonOutcome<N> out =
         cut_by_force(volume, part, state.volumes[v].density, state.force_cut.volume[v], covered[v]);
     cut.removed[plan.volumes[v].scene_index] = out.removed;
-    starves = starves || out.lost > 0;
+    starves = starves || out.starves;
   }
   Real& advance = state.force_cut.advance;
   advance = std::clamp(starves ? advance + rules.deeper_step : advance - rules.back_step,

@@ -52,7 +52,8 @@ class ProbeBench {
   void tool(const std::string& name, const char* shape, double radius, double length) {
     const SceneTool tool =
         make_tool(name, shape, {.pitch_mm = 1, .radius_mm = radius, .length_mm = length});
-    const ShellTool<FixedNumbers> samples(surface_samples(tool, 1), tool.round);
+    const ShellTool<FixedNumbers> samples(surface_samples(tool, 1), tool.round,
+                                          close_samples(tool, 1));
     const auto slide = [](int i) { return around(kGrid, 16, i, kTicks); };
     const auto at_depth = [](double z) {
       return [z](int i) -> Place { return {24 + 0.05 * i, 128.3, z}; };

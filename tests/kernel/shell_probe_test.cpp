@@ -172,8 +172,8 @@ TEST_CASE("fixed point feels what double feels, on noise as well") {
     CAPTURE(tool.shape);
     CHECK(worst_height < 5e-4);
     // Gradients have steps at the borders of cells: a rounded place may be on the other side of
-    // one.
-    CHECK(worst_deg < (tool.round ? 0.03 : 0.06));
+    // one; a patch has 64.
+    CHECK(worst_deg < (tool.round ? 0.03 : 0.1));
   }
 }
 

@@ -22,10 +22,13 @@ using Sums = ShellSums<FixedNumbers>;
 
 bool same(const Sums& a, const Sums& b) {
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    if (a.rise[axis] != b.rise[axis] || a.lever[axis] != b.lever[axis]) return false;
+    if (a.rise[axis] != b.rise[axis] || a.lever[axis] != b.lever[axis] ||
+        a.high_lever[axis] != b.high_lever[axis]) {
+      return false;
+    }
   }
-  return a.weight == b.weight && a.density == b.density && a.square == b.square && a.top == b.top &&
-         a.solid == b.solid;
+  return a.weight == b.weight && a.density == b.density && a.square == b.square &&
+         a.high == b.high && a.top == b.top && a.top_sample == b.top_sample && a.solid == b.solid;
 }
 
 /// Some samples of a sphere, the last group not full.
@@ -107,7 +110,7 @@ TEST_CASE("every instruction set sums a shell to the bit, wherever it is") {
           for (auto set = kernel_sets(); *set != nullptr; ++set) {
             (*set)->place_shell(shell.table, step, memory.places());
             Sums sums;
-            sums.weight = sums.square = sums.top = -1;  // left over from before
+            sums.weight = sums.square = sums.high = sums.top = -1;  // left over from before
             (*set)->sum_shell(shell.table, memory.places(), centre, field, sums);
             const bool alike = same(sums, truth) && sums.read == looked_at;
             if (!alike) {

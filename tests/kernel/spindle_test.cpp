@@ -124,6 +124,16 @@ TEST_CASE_TEMPLATE("friction pulls against the surface's motion, and not at the 
   const auto pole = outcome(Axis::x, {27.3, 20, 20});
   CHECK(std::hypot(double(pole.x), double(pole.z)) < 0.01);
   CHECK(double(pole.arm) < 0.5);
+  // What a ball covers agrees with what its load alone tells.
+  using Unit = typename N::Unit;
+  const auto by_load = [](double x, double y, Unit arm) {
+    return ball_drag<N>({Unit(x), Unit(y), Unit(0)}, arm);
+  };
+  CHECK(std::abs(double(by_load(1, 0, side.arm).x)) < 1e-6);
+  CHECK(std::abs(double(by_load(1, 0, side.arm).z - side.z)) < 0.05);
+  CHECK(by_load(0, 1, pole.arm).z == Unit(0));
+  CHECK(std::abs(double(by_load(-0.6, 0.8, Unit(0.6)).z) - 1) < 1e-6);
+  CHECK(std::abs(double(by_load(-0.6, 0.8, Unit(0.8)).z) - 0.75) < 1e-6);  // all round its bore
 }
 
 TEST_CASE_TEMPLATE("friction is bounded and follows within its time constant at every rate", N,

@@ -24,6 +24,7 @@ class FlatField {
     probe.plane[0] = {normal_of<N>(up_), probe.depth, place_of<N>(turned_arm())};
     return probe;
   }
+  [[nodiscard]] bool half_spent() const { return false; }
   [[nodiscard]] typename N::Real free_distance(ContactVec<typename N::Real> at) const {
     const double free = dot(up_, point_of<N>(at) + turned_arm()) - 1;
     return typename N::Real(std::max(0.0, free));

@@ -39,6 +39,7 @@ struct CountedField {
     ++probes;
     return field.probe(q);
   }
+  [[nodiscard]] bool half_spent() const { return field.half_spent(); }
   typename N::Real free_distance(ContactVec<typename N::Real> q) const {
     return field.free_distance(q);
   }

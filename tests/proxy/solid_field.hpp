@@ -28,6 +28,7 @@ class SolidField {
     probe.plane[0] = {normal_of<N>(normal), probe.depth, place_of<N>(-radius_ * normal)};
     return probe;
   }
+  [[nodiscard]] bool half_spent() const { return false; }
   [[nodiscard]] typename N::Real free_distance(ContactVec<typename N::Real> at) const {
     return typename N::Real(std::max(0.0, nearest_(point_of<N>(at)).first - radius_ - 1));
   }

@@ -123,6 +123,24 @@ TEST_CASE("friction pulls against a bur that turns clockwise, by its part of the
   CHECK(std::abs(out.force_n[1] - out.press_n) < 0.05 * out.press_n);  // friction does not press
 }
 
+TEST_CASE("friction does not press a ball in its own bore") {
+  Scene scene = mill_scene(flat, 64);
+  scene.cut.machinability_mm3_per_s_n = 0.5;
+  Miller miller(scene);
+  static_cast<void>(miller.hold({0, -1, 0}, 1));
+  double pressed = 0, largest = 0;
+  for (int ms = 0; ms < 1000; ++ms) {
+    const double turn = 0.005 * ms;
+    const ServoOutput out = miller.step({0.4 * std::sin(turn), -1, 0.4 * std::cos(turn)});
+    const double along_load_n = along(out.modification_n, out.contact_n) / length(out.contact_n);
+    pressed = std::max(pressed, std::abs(along_load_n) / out.press_n);
+    largest = std::max(largest, length(out.modification_n) / out.press_n);
+  }
+  MESSAGE("friction along the load at most ", pressed, " of the press, and ", largest, " in all");
+  CHECK(largest > 0.1);
+  CHECK(pressed < 0.02);
+}
+
 TEST_CASE("a forbidden material is told and never cut") {
   Scene scene = mill_scene();
   scene.materials = default_materials();

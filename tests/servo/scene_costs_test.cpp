@@ -224,13 +224,19 @@ TEST_CASE("a scene is planned with what the servo allows the probes of a tick") 
   shell.count = 500;
   shell.groups = 32;
   shell.round = true;
-  CHECK(probe_work(shell, 2).probe == 2 * (512 + 160 + 256));
+  CHECK(probe_work(shell, 2).probe == 2 * (512 + 128));
+  CHECK(probe_work(shell, 2).closer == 2 * (96 + 128 + 256));
   CHECK(probe_work(shell, 2).turn == 2 * 62);
   shell.round = false;
-  CHECK(probe_work(shell, 1).probe == 512 + 32 + 256);
-  CHECK(ProbeWork{.probe = 400, .turn = 50}.most() == 32 * 400 + 13 * 50);
-  CHECK(ProbeWork{.probe = 1000, .turn = 90}.most() == 18000 + 1000);
-  CHECK(ProbeWork{.probe = 2000, .turn = 200}.most() == 15 * 2000 + 13 * 200);
+  CHECK(probe_work(shell, 1).probe == 512 + 128);
+  CHECK(probe_work(shell, 1).closer == 2 * (128 + 4 * 256) + 2 * (128 + 64));
+  const auto most = [](std::int64_t probe, std::int64_t closer, std::int64_t turn) {
+    return ProbeWork{probe, closer, turn}.most();
+  };
+  CHECK(most(300, 100, 50) == 32 * 400 + 13 * 50);
+  CHECK(most(900, 100, 90) == 18000);
+  CHECK(most(2000, 200, 200) == 12 * 2200);
+  CHECK(most(900, 3200, 90) == 18000 + 990);
 
   Scene scene = half_space_scene(48);
   scene.tools = {shape("wheel", 2, 1)};

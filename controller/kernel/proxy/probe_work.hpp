@@ -7,6 +7,7 @@
 
 #include "controller/kernel/proxy/proxy_sweep.hpp"
 #include "controller/kernel/proxy/shell_cap.hpp"
+#include "controller/kernel/proxy/shell_closeup.hpp"
 #include "controller/kernel/proxy/shell_patch.hpp"
 #include "controller/kernel/proxy/shell_table.hpp"
 
@@ -19,34 +20,39 @@ struct ProbeWork {
   static constexpr std::int64_t kTickSamples = 18000;
   static constexpr std::int64_t kLeastProbes = 12;
   static constexpr std::int64_t kLookSamples = 128;  ///< what a look costs besides those it reads
+  static constexpr std::int64_t kCloseSamples = 4;   ///< what one of a closeup costs
 
-  std::int64_t probe = 0;  ///< at most: all of the surface, and a closer look in every volume
-  std::int64_t turn = 0;   ///< to place all samples anew
+  std::int64_t probe = 0;   ///< at most: all of the surface in every volume
+  std::int64_t closer = 0;  ///< at most, after that: closer looks
+  std::int64_t turn = 0;    ///< to place all samples anew
 
-  /// After so many in a tick no probe begins, but the one after a turn.
+  /// No probe begins in a tick that might go beyond, but for the first after a turn, which then is
+  /// without a closer look.
   [[nodiscard]] constexpr std::int64_t budget() const noexcept {
     return std::max(kTickSamples, kLeastProbes * (probe + turn));
   }
-  /// Of any tick of a sweep: the budget with the probe that goes beyond it, or all that may be
-  /// spent on the turn, with the pushes of its last trial and the look after it. A sweep of few
-  /// samples ends before, with the last probe that it may take.
+  /// Of any tick of a sweep: the budget, and the look after the turns where their last trial, of
+  /// three probes, may take the half that is the move's. A sweep of few samples ends before, with
+  /// the last probe that it may take.
   [[nodiscard]] constexpr std::int64_t most() const noexcept {
     constexpr std::int64_t kTurns = SweepRules::kMaxTurnProbes + 1;
-    const std::int64_t turning = (kTurns + 2) * probe + kTurns * turn;
-    return std::min(std::max(budget() + probe, turning),
-                    SweepRules::kMaxProbes * probe + kTurns * turn);
+    const std::int64_t after = 8 * (probe + closer) > budget() ? turn + probe : 0;
+    return std::min(budget() + after, SweepRules::kMaxProbes * (probe + closer) + kTurns * turn);
   }
 };
 
-/// A closer look is at a ball's cap (shell_cap.hpp) or the patch of another shape
-/// (shell_patch.hpp).
+/// A closer look is at a ball's two caps (shell_cap.hpp), or twice at the close samples of another
+/// shape (shell_closeup.hpp) and twice at a patch (shell_patch.hpp).
 template <class N>
 [[nodiscard]] constexpr ProbeWork probe_work(const ShellTable<N>& shell,
                                              std::size_t volumes) noexcept {
-  const std::int64_t closer = shell.round ? kCapSamples : kPatchSamples;
-  const std::int64_t surface = std::int64_t{shell.groups} * kShellGroup;
+  constexpr std::int64_t kLook = ProbeWork::kLookSamples;
+  constexpr std::int64_t kCloseup = kLook + ProbeWork::kCloseSamples * kMostClose;
+  const std::int64_t closer = shell.round ? 2 * kLook + kCapSamples + kSummitSamples
+                                          : 2 * kCloseup + 2 * (kLook + kPatchSamples);
+  const std::int64_t probe = std::int64_t{shell.groups} * kShellGroup + kLook;
   const auto times = static_cast<std::int64_t>(volumes);
-  return {times * (surface + closer + 2 * ProbeWork::kLookSamples), times * (shell.count / 8)};
+  return {times * probe, times * closer, times * (shell.count / 8)};
 }
 
 }  // namespace kerf

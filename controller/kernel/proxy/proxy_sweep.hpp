@@ -17,11 +17,13 @@ namespace kerf {
 ///   free_distance(q)  how far the centre may go from q in any direction and feel nothing; a lower
 ///                     bound, 0 if unknown
 ///   turn(t)           the orientation of the tool in every probe from now on
+///   half_spent()      what is left of the tick's probes is the move's
 template <class F, class N>
 concept ContactField = requires(F field, ContactVec<typename N::Real> q, ToolTurn<N> turn) {
   { field.probe(q) } -> std::convertible_to<Probe<N>>;
   { field.free_distance(q) } -> std::convertible_to<typename N::Real>;
   field.turn(turn);
+  { field.half_spent() } -> std::convertible_to<bool>;
 };
 
 /// Units of contact space; sources: contact.md 3, where not given.
@@ -29,6 +31,7 @@ struct SweepRules {
   static constexpr std::int32_t kMaxProbes = 32;
   static constexpr std::int32_t kMaxTurnProbes = 12;  ///< and its pushes; the rest is the move's
   static constexpr double kTolerance = 0.01;          ///< a place this deep is allowed
+  static constexpr double kTurnTolerance = 0.005;     ///< for a turn, which leaves the move a play
   static constexpr double kNoMove = 0.002;            ///< a shorter way from rest is none
   static constexpr double kArrived = 0.004;           ///< after a step this near is there
   /// Longest way of any sample between two probes. The middle of the thinnest wall, 2 units, is one
@@ -134,9 +137,10 @@ class ProxySweep {
   [[nodiscard]] static constexpr bool allows_rest(const Probe<N>& felt) noexcept {
     return !felt.buried && felt.depth <= Real(SweepRules::kTolerance);
   }
-  /// The same, or no deeper than it is where it is too deep already.
-  [[nodiscard]] constexpr bool allows(const Probe<N>& felt) const noexcept {
-    return allows_rest(felt) || (!felt.buried && felt.depth <= here_.depth);
+  /// Within the tolerance, or no deeper than the tool is where it is too deep already.
+  [[nodiscard]] constexpr bool allows(
+      const Probe<N>& felt, Real tolerance = Real(SweepRules::kTolerance)) const noexcept {
+    return !felt.buried && felt.depth <= std::max(tolerance, here_.depth);
   }
 
   /// How to go on from a place.
@@ -163,15 +167,16 @@ class ProxySweep {
     return {slide, left, norm(left)};
   }
 
-  /// Looks at a place `moved` from where the depths of `known` count, and where the tool is too
-  /// deep there pushes it out: twice at most.
-  constexpr Trial attempt(Place centre, const PlaneBundle<N>& known, Place moved) noexcept {
+  /// Looks at a place `moved` from where the depths of `known` count, and where the tool is deeper
+  /// there than is allowed pushes it out: twice at most.
+  constexpr Trial attempt(Place centre, const PlaneBundle<N>& known, Place moved,
+                          Real tolerance = Real(SweepRules::kTolerance)) noexcept {
     const Probe<N> first = look(centre);
     Trial trial{centre, first, bundle_of(first), first};
     keep(trial.planes, known, moved);
     Place pushed{};
     for (int push = 0; push < 2; ++push) {
-      if (allows(trial.felt) || trial.felt.count == 0 || !may_look()) break;
+      if (allows(trial.felt, tolerance) || trial.felt.count == 0 || !may_look()) break;
       for (auto& plane : trial.planes.plane) {
         plane.depth = std::min(plane.depth, Real(SweepRules::kPush));
       }
@@ -192,13 +197,14 @@ class ProxySweep {
       field_.turn(goal);
       return look(pose_.centre);
     }
+    const auto tolerance = Real(SweepRules::kTurnTolerance);
     Unit step = turn_step_;
     bool known = false;
-    while (!(pose_.turn == goal) && probes_ < SweepRules::kMaxTurnProbes) {
+    while (!(pose_.turn == goal) && probes_ < SweepRules::kMaxTurnProbes && !field_.half_spent()) {
       const ToolTurn<N> next = turned_towards(pose_.turn, goal, step);
       field_.turn(next);
-      const Trial trial = attempt(pose_.centre, {}, {});
-      if (allows(trial.felt)) {
+      const Trial trial = attempt(pose_.centre, {}, {}, tolerance);
+      if (allows(trial.felt, tolerance)) {
         pose_ = {trial.centre, next};
         here_ = trial.felt;
         known = true;

@@ -64,6 +64,18 @@ template <class N>
   return transposed(frame.voxel_from_contact) * voxels;
 }
 
+/// A lever from the tool's axes to those of the world.
+template <class N>
+[[nodiscard]] constexpr ContactVec<typename N::Ratio> turned_lever(
+    const typename N::Ratio (&lever)[3], const TurnRows<N>& turn) noexcept {
+  using Ratio = typename N::Ratio;
+  const auto turned = [&](const std::array<typename N::Unit, 3>& row) {
+    return multiply<Ratio>(row[0], lever[0]) + multiply<Ratio>(row[1], lever[1]) +
+           multiply<Ratio>(row[2], lever[2]);
+  };
+  return {turned(turn[0]), turned(turn[1]), turned(turn[2])};
+}
+
 template <class N>
 [[nodiscard]] constexpr ShellMeans<N> shell_means(const ShellSums<N>& sums,
                                                   const DensityScale& scale,
@@ -78,11 +90,7 @@ template <class N>
   if constexpr (N::kIsFixed) lift >>= round ? 15 : 0;         // Q24 of Q39: 16 at least
   const Ratio lever[3] = {mean_of<N>(sums.lever[0], lift, 9), mean_of<N>(sums.lever[1], lift, 9),
                           mean_of<N>(sums.lever[2], lift, 9)};
-  const auto turned = [&](const std::array<typename N::Unit, 3>& row) {
-    return multiply<Ratio>(row[0], lever[0]) + multiply<Ratio>(row[1], lever[1]) +
-           multiply<Ratio>(row[2], lever[2]);
-  };
-  means.lever = {turned(turn[0]), turned(turn[1]), turned(turn[2])};
+  means.lever = turned_lever<N>(lever, turn);
   if constexpr (N::kIsFixed) {
     means.top = Ratio::from_raw(sums.top << 9);
   } else {
@@ -110,6 +118,17 @@ template <class N>
   }
 }
 
+/// e of a shape that is no ball, see peak_height, from its mean of h^2: over the square of the mean
+/// it is 8 (7 + e) / (7 (8 + e)).
+template <class N>
+[[nodiscard]] constexpr typename N::Ratio fall_of(const ShellMeans<N>& means) noexcept {
+  using Ratio = typename N::Ratio;
+  const Ratio spread = std::max(Ratio(1), means.square / means.density / means.density);
+  const Ratio rest = Ratio(8) - Ratio(7) * spread;
+  return rest > Ratio(0.001) ? std::min(Ratio(56) * (spread - Ratio(1)) / rest, Ratio(2))
+                             : Ratio(2);
+}
+
 /// Height of the peak of density over the tool's surface, from its power sums (contact.md 1).
 ///
 /// Over a quadratic peak of height H the mean of h, weighted with h^p, is H (p + 1) / (p + 1 + e),
@@ -122,15 +141,7 @@ template <class N>
   using Ratio = typename N::Ratio;
   // p = 4 gives 1.2. Where density begins trilinear reads are raised, and samples below 1/16 are
   // left out: on planes the mean is 0.75 % low.
-  auto factor = static_cast<Ratio>(1.209);
-  if (!round) {
-    // p = 6: mean of squares over the square of the mean is 8 (7 + e) / (7 (8 + e)).
-    const Ratio spread = std::max(Ratio(1), means.square / means.density / means.density);
-    const Ratio rest = Ratio(8) - Ratio(7) * spread;
-    const Ratio e =
-        rest > Ratio(0.001) ? std::min(Ratio(56) * (spread - Ratio(1)) / rest, Ratio(2)) : Ratio(2);
-    factor = Ratio(1) + e / Ratio(7);
-  }
+  const Ratio factor = round ? static_cast<Ratio>(1.209) : Ratio(1) + fall_of(means) / Ratio(7);
   // A lone spike is a peak of few samples: it may not rise far above the mean unseen.
   constexpr auto kSpike = static_cast<Ratio>(0.2);
   const Ratio height = std::max(factor * means.density, means.top - kSpike);
@@ -153,6 +164,18 @@ template <class N>
   return (top - std::clamp(value, bottom, top)) / (top - bottom);
 }
 
+/// The direction `share` of the way from one to another.
+template <class N>
+[[nodiscard]] constexpr ContactVec<typename N::Unit> between(ContactVec<typename N::Unit> a,
+                                                             ContactVec<typename N::Unit> b,
+                                                             typename N::Unit share) noexcept {
+  using Unit = typename N::Unit;
+  using Ratio = typename N::Ratio;
+  const Unit rest = Unit(1) - share;
+  const auto mixed = [&](Unit p, Unit q) { return Ratio(rest * p + share * q); };
+  return direction<N>(ContactVec<Ratio>{mixed(a.x, b.x), mixed(a.y, b.y), mixed(a.z, b.z)});
+}
+
 /// Minus the weighted lever reads no gradient and has no steps at the borders of cells, so it is a
 /// ball's normal, and the only one that a wall of two voxels leaves right: behind its middle the
 /// gradient points on. In a groove of the ball's own radius, however, the levers point out of its
@@ -168,10 +191,7 @@ template <class N>
   const Unit spread = falling_share<N>(Unit(std::min(norm(means.lever), Ratio(1))), 0.85, 0.7);
   const Unit share = spread * falling_share<N>(dot(lever, downhill), 0.9397, 0.6428);
   if (share <= Unit{} || downhill == ContactVec<Unit>{}) return lever;
-  const Unit rest = Unit(1) - share;
-  const auto mixed = [&](Unit a, Unit b) { return Ratio(rest * a + share * b); };
-  return direction<N>(ContactVec<Ratio>{mixed(lever.x, downhill.x), mixed(lever.y, downhill.y),
-                                        mixed(lever.z, downhill.z)});
+  return between<N>(lever, downhill, share);
 }
 
 /// How density falls along a normal, per unit. v is half a ball's derivative.

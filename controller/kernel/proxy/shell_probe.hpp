@@ -13,6 +13,7 @@
 #include "controller/kernel/proxy/plane.hpp"
 #include "controller/kernel/proxy/probe_work.hpp"
 #include "controller/kernel/proxy/shell_cap.hpp"
+#include "controller/kernel/proxy/shell_closeup.hpp"
 #include "controller/kernel/proxy/shell_patch.hpp"
 #include "controller/kernel/proxy/shell_peak.hpp"
 #include "controller/kernel/proxy/shell_spiral.hpp"
@@ -26,6 +27,7 @@ namespace kerf {
 template <class N>
 struct Shell {
   ShellTable<N> table;
+  CloseTable<N> close;         ///< none of a ball
   typename N::Real reach{};    ///< units from the centre to the farthest sample
   std::int32_t step_bits = 0;  ///< fraction bits of ShellStep's rows: reach 2^step_bits < 2^16
 };
@@ -74,13 +76,15 @@ class ShellProbe {
   /// The probes from now on are those of one tick; before the first, nothing is counted.
   void begin_tick() noexcept { left_ = work_.budget(); }
   [[nodiscard]] const ProbeWork& work() const noexcept { return work_; }
+  /// See ContactField.
+  [[nodiscard]] bool half_spent() const noexcept { return left_ <= work_.budget() / 2; }
   /// Since then, counted as `work` is.
   [[nodiscard]] std::int64_t spent() const noexcept { return work_.budget() - left_; }
 
   /// The tool's centre at `q`: at most one plane a volume, the deepest three.
   [[nodiscard]] Probe<N> probe(ContactVec<Real> q) const noexcept {
     Probe<N> felt;
-    felt.buried = left_ <= 0 && !turned_;
+    felt.buried = left_ < work_.probe + work_.closer && !turned_;
     if (felt.buried) return felt;
     turned_ = false;
     for (const ShellVolume<N>& volume : volumes_) feel(volume, q, felt);
@@ -115,14 +119,21 @@ class ShellProbe {
       return static_cast<std::int32_t>(x < Real(0) ? x - Real(1) : x);
     }
   }
+  [[nodiscard]] static ShellNumber<N> number_of(Real x) noexcept {
+    if constexpr (N::kIsFixed) {
+      return x.raw();
+    } else {
+      return x;
+    }
+  }
   [[nodiscard]] static VoxelVec<Real> place_of(const ShellVolume<N>& volume,
                                                ContactVec<Real> q) noexcept {
     return volume.frame.voxel_from_contact * q + volume.frame.origin_vox;
   }
 
-  /// A shell whose axes `rows` takes to those of the world.
-  void place(const Shell<N>& shell, const TurnRows<N>& rows, const ContactFrame<N>& frame,
-             const ShellPlaces<N>& places) const noexcept {
+  /// How the levers of a shell become voxels whose axes `rows` takes to those of the world.
+  [[nodiscard]] static ShellStep<N> step_of(const Shell<N>& shell, const TurnRows<N>& rows,
+                                            const ContactFrame<N>& frame) noexcept {
     ShellStep<N> step;
     step.shift = 15 + shell.step_bits - 16;  // from levers times rows to Q15.16
     for (std::size_t i = 0; i < 3; ++i) {
@@ -142,6 +153,12 @@ class ShellProbe {
         }
       }
     }
+    return step;
+  }
+
+  void place(const Shell<N>& shell, const TurnRows<N>& rows, const ContactFrame<N>& frame,
+             const ShellPlaces<N>& places) const noexcept {
+    const ShellStep<N> step = step_of(shell, rows, frame);
     if constexpr (N::kIsFixed) {
       kernels_.place_shell(shell.table, step, places);
     } else {
@@ -162,10 +179,12 @@ class ShellProbe {
     const bool round = shell_.table.round;
     const auto means = shell_means<N>(sums, volume.field.scale, volume.frame, rows_, round);
     Plane<N> plane = plane_of<N>(means, shell_.reach, round);
-    if (round && plane.depth < Real(kCapBelow) && -plane.depth < Real(kCapAbove)) {
-      plane.depth = depth_around(volume, at, sums, means, plane);
-    } else if (!round && std::max(plane.depth, -plane.depth) < Real(kPatchDepth)) {
-      plane.normal = normal_around(volume, at, sums, plane);
+    if (left_ >= work_.closer) {
+      if (round && plane.depth < Real(kCapBelow) && -plane.depth < Real(kCapAbove)) {
+        plane.depth = depth_around(volume, at, sums, means, plane);
+      } else if (!round && std::max(plane.depth, -plane.depth) < Real(kCloseDepth)) {
+        look_again(volume, at, sums, means, plane);
+      }
     }
     // Almost the whole surface is in the solid, or it feels the same all round.
     const ContactVec<typename N::Unit> none{};
@@ -186,59 +205,142 @@ class ShellProbe {
     felt.plane[slot] = plane;
   }
 
-  /// The normal with the gradients of a patch around the middle of the contact, too.
-  [[nodiscard]] ContactVec<typename N::Unit> normal_around(const ShellVolume<N>& volume,
-                                                           VoxelVec<Real> at, ShellSums<N> sums,
-                                                           const Plane<N>& plane) const noexcept {
-    constexpr Shell<N> kPatch{kPatchArrays<N>.table(), Real(kPatchRadius), 15};
-    SpiralPlaces<N, kPatchSamples> memory;
-    const ShellPlaces<N> places = memory.places();
-    place(kPatch, flattened<N>(plane.normal), volume.frame, places);
-    const VoxelVec<Real> middle = at + volume.frame.voxel_from_contact * plane.arm;
-    const ShellSums<N> patch = sums_at(volume.field, kPatch.table, places, middle);
-    if (patch.weight <= typename N::Sum(0)) return plane.normal;
-    sums.weight += patch.weight;
-    for (std::size_t axis = 0; axis < 3; ++axis) sums.rise[axis] += patch.rise[axis];
-    return direction<N>(-mean_rise<N>(sums, volume.field.scale, volume.frame));
+  /// The plane by the close samples around the peak, and by a patch of the volume around where they
+  /// show it.
+  void look_again(const ShellVolume<N>& volume, VoxelVec<Real> at, const ShellSums<N>& sums,
+                  const ShellMeans<N>& means, Plane<N>& plane) const noexcept {
+    if (shell_.close.first == nullptr) return;
+    using Unit = typename N::Unit;
+    using Ratio = typename N::Ratio;
+    ShellNumber<N> peak[3] = {};
+    peak_lever(sums, fall_of(means), peak);
+    Closeup<N> seen = look_closely_at(volume, at, peak);
+    Ratio height = seen.height;
+    // The highest sample of the shell may not be among what was seen: the tool touches twice.
+    const auto share = falling_share<N>(Unit(means.top - seen.top), 0.06, 0.02);
+    if (share < Unit(1)) {
+      const auto top = static_cast<std::size_t>(sums.top_sample);
+      const auto& lever = shell_.table.lever;
+      const Closeup<N> other =
+          look_closely_at(volume, at, {lever[0][top], lever[1][top], lever[2][top]});
+      height = other.height + multiply<Ratio>(share, height - other.height);
+      if (share <= Unit(0)) seen = other;
+    }
+    const auto lever = turned_lever<N>(seen.lever, rows_);
+    const ContactVec<Real> arm{multiply<Real>(lever.x, shell_.reach),
+                               multiply<Real>(lever.y, shell_.reach),
+                               multiply<Real>(lever.z, shell_.reach)};
+    const VoxelVec<Real> middle = at + volume.frame.voxel_from_contact * arm;
+    // The first patch lies askew, as its normal is that of the middle.
+    auto rise = patch_rise(volume, middle, plane.normal);
+    rise = patch_rise(volume, middle, direction<N>(-rise));
+    const auto normal = direction<N>(-rise);
+    // Where the shell rises far less than the patch, it touches faces that look another way.
+    const Ratio steep = norm(rise);
+    if (steep < Ratio(0.01)) return;
+    const Ratio along =
+        -(multiply<Ratio>(means.rise.x, normal.x) + multiply<Ratio>(means.rise.y, normal.y) +
+          multiply<Ratio>(means.rise.z, normal.z));
+    const Unit alike =
+        Unit(1) -
+        falling_share<N>(Unit(std::clamp(along / steep, Ratio(0), Ratio(1))), kAlike, kUnlike);
+    const Ratio own = peak_height(means, false);
+    plane.depth = depth_of<N>(own + multiply<Ratio>(alike, std::max(height, means.top) - own),
+                              slope_along(means, plane.normal, false));
+    const Unit counts = alike * share;
+    plane.arm = plane.arm + part_of<N>(arm - plane.arm, counts);
+    plane.normal = between<N>(plane.normal, normal, counts);
   }
 
-  /// A ball's depth with the height of a cap around the middle of the contact, where it is sharp.
+  [[nodiscard]] Closeup<N> look_closely_at(const ShellVolume<N>& volume, VoxelVec<Real> at,
+                                           const ShellNumber<N> (&lever)[3]) const noexcept {
+    CloseSamples<N> samples;
+    samples.take(shell_.close, lever);
+    const ShellTable<N> table = samples.table();
+    const ShellPlaces<N> places = samples.places();
+    const ShellStep<N> step = step_of(shell_, rows_, volume.frame);
+    const ShellNumber<N> centre[3] = {number_of(at.x), number_of(at.y), number_of(at.z)};
+    if constexpr (N::kIsFixed) {
+      kernels_.place_shell(table, step, places);
+      kernels_.read_shell(places, table.count, centre, volume.field, samples.density.data());
+    } else {
+      place_shell(table, step, places);
+      read_shell<N>(places, table.count, centre, volume.field, samples.density.data());
+    }
+    left_ -= ProbeWork::kLookSamples + ProbeWork::kCloseSamples * table.count;
+    return peak_among(samples);
+  }
+
+  /// The mean gradient of a patch across `normal`.
+  [[nodiscard]] ContactVec<typename N::Ratio> patch_rise(
+      const ShellVolume<N>& volume, VoxelVec<Real> middle,
+      ContactVec<typename N::Unit> normal) const noexcept {
+    constexpr Shell<N> kPatch{kPatchArrays<N>.table(), {}, Real(kPatchRadius), 15};
+    SpiralPlaces<N, kPatchSamples> memory;
+    const ShellPlaces<N> places = memory.places();
+    place(kPatch, flattened<N>(normal), volume.frame, places);
+    const ShellSums<N> patch = sums_at(volume.field, kPatch.table, places, middle);
+    if (patch.weight <= typename N::Sum(0)) return {};
+    return mean_rise<N>(patch, volume.field.scale, volume.frame);
+  }
+
+  /// A ball's depth with the height of its caps around the middle of the contact, where it is
+  /// sharp.
   [[nodiscard]] Real depth_around(const ShellVolume<N>& volume, VoxelVec<Real> at,
                                   const ShellSums<N>& sums, const ShellMeans<N>& means,
                                   const Plane<N>& plane) const noexcept {
     using Ratio = typename N::Ratio;
+    using Unit = typename N::Unit;
     const Ratio height = peak_height(means, true), slope = slope_along(means, plane.normal, true);
-    const auto sharp = sharpness(sums, shell_.table.count, height, slope, shell_.reach);
+    const Unit sharp = sharpness(sums, shell_.table.count, height, slope, shell_.reach);
     const auto out = direction<N>(means.lever);
-    if (sharp <= typename N::Unit(0) || out == decltype(out){}) return plane.depth;
-    const Real half = multiply<Real>(shell_.reach, typename N::Unit(0.5));
-    const Shell<N> cap{kCapArrays<N>.table(), std::min(Real(kCapRadius), half), 14};
-    SpiralPlaces<N, kCapSamples> memory;
+    if (sharp <= Unit(0) || out == decltype(out){}) return plane.depth;
+    const Real half = multiply<Real>(shell_.reach, Unit(0.5));
+    const Real wide = std::min(Real(kCapRadius), half),
+               narrow = std::min(Real(kSummitRadius), half);
+    const ShellMeans<N> found = cap_means(volume, at, out, kCapArrays<N>, wide);
+    const Unit share(wide / shell_.reach);
+    const auto moved = [&](Unit from, Ratio by) {
+      return Ratio(from) + multiply<Ratio>(share, by);
+    };
+    const auto up = direction<N>(ContactVec<Ratio>{
+        moved(out.x, found.lever.x), moved(out.y, found.lever.y), moved(out.z, found.lever.z)});
+    const ShellMeans<N> near = cap_means(volume, at, up, kSummitArrays<N>, narrow);
+    if (near.density <= Ratio(0)) return plane.depth;
+    const Ratio summit = peak_height(near, false);
+    return depth_of<N>(height + multiply<Ratio>(sharp, summit - height), slope) +
+           multiply<Real>(sharp, Real(kSummitAbove));
+  }
+
+  /// Of a cap in the direction `out` from a ball's centre; 0 where it feels nothing.
+  template <std::size_t kCount>
+  [[nodiscard]] ShellMeans<N> cap_means(const ShellVolume<N>& volume, VoxelVec<Real> at,
+                                        ContactVec<typename N::Unit> out,
+                                        const SpiralArrays<N, kCount>& arrays,
+                                        Real radius) const noexcept {
+    const Shell<N> cap{arrays.table(), {}, radius, 14};
+    SpiralPlaces<N, kCount> memory;
     const ShellPlaces<N> places = memory.places();
-    place(cap, cap_rows<N>(out, cap.reach, shell_.reach), volume.frame, places);
+    const TurnRows<N> rows = cap_rows<N>(out, radius, shell_.reach);
+    place(cap, rows, volume.frame, places);
     const VoxelVec<Real> top = at + volume.frame.voxel_from_contact * times<N>(out, shell_.reach);
-    const ShellSums<N> near = sums_at(volume.field, cap.table, places, top);
-    if (near.weight <= typename N::Sum(0)) return plane.depth;
-    const Ratio summit =
-        peak_height(shell_means<N>(near, volume.field.scale, volume.frame, rows_, false), false);
-    return depth_of<N>(height + multiply<Ratio>(sharp, summit - height), slope);
+    const ShellSums<N> sums = sums_at(volume.field, cap.table, places, top);
+    if (sums.weight <= typename N::Sum(0)) return {};
+    return shell_means<N>(sums, volume.field.scale, volume.frame, rows, false);
   }
 
   [[nodiscard]] ShellSums<N> sums_at(const ShellField& field, const ShellTable<N>& table,
                                      const ShellPlaces<N>& places,
                                      VoxelVec<Real> at) const noexcept {
+    const ShellNumber<N> centre[3] = {number_of(at.x), number_of(at.y), number_of(at.z)};
+    ShellSums<N> sums;
     if constexpr (N::kIsFixed) {
-      const std::int32_t centre[3] = {at.x.raw(), at.y.raw(), at.z.raw()};
-      ShellSums<N> sums;
       kernels_.sum_shell(table, places, centre, field, sums);
-      left_ -= ProbeWork::kLookSamples + sums.read;
-      return sums;
     } else {
-      const Real centre[3] = {at.x, at.y, at.z};
-      const ShellSums<N> sums = shell_sums<N>(table, places, centre, field);
-      left_ -= ProbeWork::kLookSamples + sums.read;
-      return sums;
+      sums = shell_sums<N>(table, places, centre, field);
     }
+    left_ -= ProbeWork::kLookSamples + sums.read;
+    return sums;
   }
 
   const KernelSet& kernels_;

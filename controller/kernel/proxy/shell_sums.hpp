@@ -99,10 +99,10 @@ template <class N>
   return sample;
 }
 
-/// Adds one sample. Fixed: r^2 in Q16, r^3 and the weights in Q24, each product of 32 unsigned
+/// Adds sample i. Fixed: r^2 in Q16, r^3 and the weights in Q24, each product of 32 unsigned
 /// bits.
 template <class N>
-constexpr void add_sample(ShellSums<N>& sums, const ShellSample<N>& sample,
+constexpr void add_sample(ShellSums<N>& sums, std::int32_t i, const ShellSample<N>& sample,
                           const ShellNumber<N> (&lever)[3], bool round) noexcept {
   using Sum = typename N::Sum;
   const ShellNumber<N> r = sample.density;
@@ -131,8 +131,16 @@ constexpr void add_sample(ShellSums<N>& sums, const ShellSample<N>& sample,
     sums.rise[axis] += pull * sample.gradient[axis];
     sums.lever[axis] += lift * lever[axis];
   }
-  sums.top = sums.top < r ? r : sums.top;
-  if (!round) sums.square += weight * square;
+  if (r >= sums.top) {
+    sums.top = r;
+    sums.top_sample = i;
+  }
+  if (round) return;
+  sums.square += weight * square;
+  Sum high = weight * square;
+  if constexpr (N::kIsFixed) high = (weight >> 8) * square >> 8;
+  sums.high += high;
+  for (std::size_t axis = 0; axis < 3; ++axis) sums.high_lever[axis] += high * lever[axis];
 }
 
 /// One offset: see ShellStep.
@@ -165,6 +173,19 @@ constexpr void place_shell(const ShellTable<N>& table, const ShellStep<N>& step,
   }
 }
 
+/// The densities of so many samples, a multiple of kShellGroup.
+template <class N>
+constexpr void read_shell(const ShellPlaces<N>& places, std::int32_t count,
+                          const ShellNumber<N> (&centre)[3], const ShellField& field,
+                          ShellNumber<N>* density) noexcept {
+  for (std::int32_t i = 0; i < count; ++i) {
+    const ShellNumber<N> place[3] = {centre[0] + places.offset[0][i],
+                                     centre[1] + places.offset[1][i],
+                                     centre[2] + places.offset[2][i]};
+    density[i] = shell_sample<N>(field, place).density;
+  }
+}
+
 /// All groups but those around which the volume is free: their densities are faint anyway. `centre`
 /// of the tool in voxels (fixed: Q15.16), near enough for all places to stay in range.
 template <class N>
@@ -189,7 +210,7 @@ template <class N>
                                        centre[1] + places.offset[1][i],
                                        centre[2] + places.offset[2][i]};
       const ShellNumber<N> lever[3] = {table.lever[0][i], table.lever[1][i], table.lever[2][i]};
-      add_sample<N>(sums, shell_sample<N>(field, place), lever, table.round);
+      add_sample<N>(sums, i, shell_sample<N>(field, place), lever, table.round);
     }
   }
   return sums;

@@ -96,9 +96,12 @@ struct ShellSums {
   typename N::Sum square{};       ///< SUM w r^2, r^2 in Q16; 0 for balls
   typename N::Sum rise[3] = {};   ///< SUM v grad, voxel axes
   typename N::Sum lever[3] = {};  ///< SUM u lever
-  ShellNumber<N> top{};           ///< the largest r
-  std::int32_t solid = 0;         ///< samples in the solid, r >= 1/2
-  std::int32_t read = 0;          ///< samples that were looked at, by whole groups
+  typename N::Sum high{};         ///< SUM w r^2, which weights `high_lever`; 0 for balls
+  typename N::Sum high_lever[3] = {};
+  ShellNumber<N> top{};         ///< the largest r
+  std::int32_t top_sample = 0;  ///< the last sample that has it
+  std::int32_t solid = 0;       ///< samples in the solid, r >= 1/2
+  std::int32_t read = 0;        ///< samples that were looked at, by whole groups
 };
 
 }  // namespace kerf

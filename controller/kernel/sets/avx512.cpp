@@ -182,9 +182,24 @@ struct Simd {
 
 namespace kerf {
 
-const KernelSet kAvx512Set{
-    "avx512",   Simd::kLanes, true,        copy_box,   correlate,           press,
-    cut,        gather,       place,       splat,      press_sums,          cover,
-    cover_sums, weigh_row,    weigh_again, take_steps, place_shell_samples, sum_shell_samples};
+const KernelSet kAvx512Set{"avx512",
+                           Simd::kLanes,
+                           true,
+                           copy_box,
+                           correlate,
+                           press,
+                           cut,
+                           gather,
+                           place,
+                           splat,
+                           press_sums,
+                           cover,
+                           cover_sums,
+                           weigh_row,
+                           weigh_again,
+                           take_steps,
+                           place_shell_samples,
+                           sum_shell_samples,
+                           read_shell_samples};
 
 }  // namespace kerf

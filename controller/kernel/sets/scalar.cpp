@@ -208,9 +208,24 @@ BoxCut cut(const TickBox& tool, const CutRate& rate, const VoxelGrid& grid, Dens
 
 namespace kerf {
 
-const KernelSet kScalarSet{
-    "scalar",   kLanes,    false,       copy_box,   correlate,           press,
-    cut,        gather,    place,       splat,      press_sums,          cover,
-    cover_sums, weigh_row, weigh_again, take_steps, place_shell_samples, sum_shell_samples};
+const KernelSet kScalarSet{"scalar",
+                           kLanes,
+                           false,
+                           copy_box,
+                           correlate,
+                           press,
+                           cut,
+                           gather,
+                           place,
+                           splat,
+                           press_sums,
+                           cover,
+                           cover_sums,
+                           weigh_row,
+                           weigh_again,
+                           take_steps,
+                           place_shell_samples,
+                           sum_shell_samples,
+                           read_shell_samples};
 
 }  // namespace kerf

@@ -6,8 +6,8 @@
 #include "controller/kernel/proxy/shell_sums.hpp"
 #include "controller/kernel/sets/shell_places.hpp"
 
-// Sums of a shell as the plain loop that defines them, for sets that need no instruction that other
-// machines lack.
+// Sums and densities of a shell as the plain loops that define them, for sets that need no
+// instruction that other machines lack.
 
 namespace kerf {
 namespace {
@@ -16,6 +16,12 @@ void sum_shell_samples(const ShellTable<FixedNumbers>& table,
                        const ShellPlaces<FixedNumbers>& places, const std::int32_t (&centre)[3],
                        const ShellField& field, ShellSums<FixedNumbers>& sums) noexcept {
   sums = shell_sums<FixedNumbers>(table, places, centre, field);
+}
+
+void read_shell_samples(const ShellPlaces<FixedNumbers>& places, std::int32_t count,
+                        const std::int32_t (&centre)[3], const ShellField& field,
+                        std::int32_t* density) noexcept {
+  read_shell<FixedNumbers>(places, count, centre, field, density);
 }
 
 }  // namespace

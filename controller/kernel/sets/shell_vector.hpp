@@ -14,12 +14,17 @@ namespace kerf {
 namespace {
 
 constexpr std::int32_t kShellLanes = kLanes / 2;
+constexpr int kSampleBits = 13;
+static_assert(kMaxShellSamples == 1 << kSampleBits);
 
 /// 64-bit sums of products of 32-bit entries, even and odd ones together.
 struct ShellWeights {
   V even, odd;
 
   explicit ShellWeights(V weight) noexcept : even(weight), odd(Simd::odd32(weight)) {}
+  [[gnu::always_inline]] void count(V& sum) const noexcept {
+    sum = Simd::add64(Simd::add64(sum, Simd::low32(even)), odd);
+  }
   [[gnu::always_inline]] void add(V& sum, V value) const noexcept {
     sum = Simd::add64(sum, Simd::multiply_even(even, value));
     sum = Simd::add64(sum, Simd::multiply_even(odd, Simd::odd32(value)));
@@ -30,7 +35,9 @@ struct ShellVectors {
   V weight = Simd::zero(), density = Simd::zero(), square = Simd::zero();
   V rise[3] = {Simd::zero(), Simd::zero(), Simd::zero()};
   V lever[3] = {Simd::zero(), Simd::zero(), Simd::zero()};
-  V top = Simd::zero(), solid = Simd::zero();
+  V high = Simd::zero(), high_lever[3] = {Simd::zero(), Simd::zero(), Simd::zero()};
+  V top = Simd::zero();  ///< r 2^kSampleBits + sample
+  V solid = Simd::zero();
   V full_lever[3] = {Simd::zero(), Simd::zero(), Simd::zero()};  ///< of vectors of full density
   std::int32_t full = 0;                                         ///< samples in such vectors
   std::int32_t read = 0;
@@ -40,7 +47,7 @@ struct ShellVectors {
 template <bool kRound>
 inline constexpr ShellSums<FixedNumbers> kFullSample = [] {
   ShellSums<FixedNumbers> sums;
-  add_sample<FixedNumbers>(sums, {32767, {}}, {1, 0, 0}, kRound);
+  add_sample<FixedNumbers>(sums, 0, {32767, {}}, {1, 0, 0}, kRound);
   return sums;
 }();
 
@@ -69,7 +76,7 @@ struct ShellBlock {
   std::int32_t count = 0;
   std::int32_t first[kMost];  ///< sample of each vector
   ShellCells cell[kMost];
-  V corner[kMost][4];  ///< densities over 2 at (y, z), (y + 1, z), (y, z + 1), (y + 1, z + 1)
+  V corner[kMost][4];
 };
 
 /// `kInside`: all are known to be in the volume.
@@ -103,6 +110,29 @@ template <bool kInside>
   return cells;
 }
 
+/// Densities over 2 at (y, z), (y + 1, z), (y, z + 1), (y + 1, z + 1) of each cell.
+[[gnu::always_inline]] inline void read_corners(const ShellField& field, const ShellCells& cell,
+                                                V (&corner)[4]) noexcept {
+  const std::ptrdiff_t row = field.grid.nx, plane = row * field.grid.ny;
+  const auto read = [&](std::ptrdiff_t offset) {
+    return Simd::srl16<1>(Simd::load_pairs(field.density + offset, cell.voxel));
+  };
+  corner[0] = read(0);
+  corner[1] = read(row);
+  corner[2] = read(plane);
+  corner[3] = read(plane + row);
+}
+
+/// The density of contact, not clipped, from both halves of the cell along x.
+template <bool kInside>
+[[gnu::always_inline]] inline V scaled_density(V at, const ShellCells& cell,
+                                               const DensityScale& scale) noexcept {
+  V read = blend_halves(at, cell.x);
+  if constexpr (!kInside) read = Simd::bit_and(read, cell.inside);
+  return Simd::srl32(Simd::multiply32(read, Simd::set32(static_cast<int>(scale.mantissa))),
+                     scale.shift);
+}
+
 /// `shell_sample` and `add_sample` of kShellLanes samples.
 template <bool kRound, bool kInside>
 [[gnu::always_inline]] inline void add_samples(const ShellTable<FixedNumbers>& table,
@@ -112,13 +142,12 @@ template <bool kRound, bool kInside>
   const V c00 = corner[0], c10 = corner[1], c01 = corner[2], c11 = corner[3];
   const V near_z = blend16(c00, c10, cell.y), far_z = blend16(c01, c11, cell.y);
   const V at = blend16(near_z, far_z, cell.z);
-  V read = blend_halves(at, cell.x);
-  if constexpr (!kInside) read = Simd::bit_and(read, cell.inside);
-  const V scaled = Simd::srl32(
-      Simd::multiply32(read, Simd::set32(static_cast<int>(scale.mantissa))), scale.shift);
+  const V scaled = scaled_density<kInside>(at, cell, scale);
   // Only where the density is not clipped it has a gradient.
   const V open = Simd::sra32<31>(Simd::sub32(scaled, Simd::set32(32768)));
+  const V sample = Simd::add32(Simd::count32(), Simd::set32(first));
   if (!Simd::any(open)) {  // deep inside
+    sums.top = Simd::max32(sums.top, Simd::bit_or(Simd::set32(32767 << kSampleBits), sample));
     for (std::size_t axis = 0; axis < 3; ++axis) {
       sums.full_lever[axis] =
           Simd::add32(sums.full_lever[axis], Simd::load(table.lever[axis] + first));
@@ -138,8 +167,7 @@ template <bool kRound, bool kInside>
   }
   w = Simd::srl32<8>(w);
   const ShellWeights weights(w);
-  sums.weight = Simd::add64(sums.weight, Simd::low32(weights.even));
-  sums.weight = Simd::add64(sums.weight, weights.odd);
+  weights.count(sums.weight);
   weights.add(sums.density, r);
   if constexpr (!kRound) weights.add(sums.square, r2);
   V r3 = Simd::zero(), lift = w;
@@ -151,7 +179,15 @@ template <bool kRound, bool kInside>
   for (std::size_t axis = 0; axis < 3; ++axis) {
     lifts.add(sums.lever[axis], Simd::load(table.lever[axis] + first));
   }
-  sums.top = Simd::max32(sums.top, r);
+  if constexpr (!kRound) {
+    const ShellWeights highs(Simd::srl32<8>(Simd::multiply32(Simd::srl32<8>(w), r2)));
+    highs.count(sums.high);
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      highs.add(sums.high_lever[axis], Simd::load(table.lever[axis] + first));
+    }
+  }
+  const V marked = Simd::bit_or(Simd::sll32<kSampleBits>(r), Simd::bit_and(sample, strong));
+  sums.top = Simd::max32(sums.top, marked);
   sums.solid = Simd::add32(sums.solid, Simd::srl32<14>(r));
 
   V v = w;
@@ -175,15 +211,8 @@ template <bool kRound, bool kInside>
   for (std::int32_t k = 0; k < block.count; ++k) {
     block.cell[k] = shell_cells<kInside>(places, centre, field.grid, block.first[k]);
   }
-  const std::ptrdiff_t row = field.grid.nx, plane = row * field.grid.ny;
   for (std::int32_t k = 0; k < block.count; ++k) {
-    const auto read = [&](std::ptrdiff_t offset) {
-      return Simd::srl16<1>(Simd::load_pairs(field.density + offset, block.cell[k].voxel));
-    };
-    block.corner[k][0] = read(0);
-    block.corner[k][1] = read(row);
-    block.corner[k][2] = read(plane);
-    block.corner[k][3] = read(plane + row);
+    read_corners(field, block.cell[k], block.corner[k]);
   }
   for (std::int32_t k = 0; k < block.count; ++k) {
     add_samples<kRound, kInside>(table, field.scale, block.first[k], block.cell[k], block.corner[k],
@@ -244,14 +273,19 @@ template <bool kRound, bool kInside>
   out.weight = Simd::sum64(sums.weight) + sums.full * kFull.weight;
   out.density = Simd::sum64(sums.density) + sums.full * kFull.density;
   out.square = Simd::sum64(sums.square) + sums.full * kFull.square;
+  out.high = Simd::sum64(sums.high) + sums.full * kFull.high;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     out.rise[axis] = Simd::sum64(sums.rise[axis]);
-    out.lever[axis] = Simd::sum64(sums.lever[axis]) + kFull.lever[0] * sum32(sums.full_lever[axis]);
+    const std::int64_t full_lever = sum32(sums.full_lever[axis]);
+    out.lever[axis] = Simd::sum64(sums.lever[axis]) + kFull.lever[0] * full_lever;
+    out.high_lever[axis] = Simd::sum64(sums.high_lever[axis]) + kFull.high_lever[0] * full_lever;
   }
   alignas(64) std::int32_t top[kShellLanes];
   Simd::store(top, sums.top);
-  out.top = sums.full > 0 ? kFull.top : 0;
-  for (const std::int32_t lane : top) out.top = lane > out.top ? lane : out.top;
+  std::int32_t highest = 0;
+  for (const std::int32_t lane : top) highest = lane > highest ? lane : highest;
+  out.top = highest >> kSampleBits;
+  out.top_sample = highest & (kMaxShellSamples - 1);
   out.solid = sum32(sums.solid) + sums.full;
   out.read = sums.read;
 }
@@ -274,6 +308,25 @@ void sum_shell_samples(const ShellTable<FixedNumbers>& table,
   } else {
     inside ? sum_shell_by<false, true>(table, places, centre, field, sums)
            : sum_shell_by<false, false>(table, places, centre, field, sums);
+  }
+}
+
+void read_shell_samples(const ShellPlaces<FixedNumbers>& places, std::int32_t count,
+                        const std::int32_t (&centre)[3], const ShellField& field,
+                        std::int32_t* density) noexcept {
+  const VoxelGrid& grid = field.grid;
+  const bool has_cells = grid.nx > 1 && grid.ny > 1 && grid.nz > 1;
+  for (std::int32_t i = 0; i < count; i += kShellLanes) {
+    V scaled = Simd::zero();
+    if (has_cells) {
+      const ShellCells cell = shell_cells<false>(places, centre, grid, i);
+      V corner[4];
+      read_corners(field, cell, corner);
+      const V near_z = blend16(corner[0], corner[1], cell.y),
+              far_z = blend16(corner[2], corner[3], cell.y);
+      scaled = scaled_density<false>(blend16(near_z, far_z, cell.z), cell, field.scale);
+    }
+    Simd::store(density + i, Simd::min32(scaled, Simd::set32(32767)));
   }
 }
 

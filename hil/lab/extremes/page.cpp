@@ -64,14 +64,13 @@ constexpr About kGroups[] = {
      "At rest on flats of any tilt and on sharp edges of 90 degrees, these against the volume's "
      "own "
      "iso-surface; and\n"
-     "sliding at 50 mm/s over a ball of R 40, 2 deep. Limits are 1.5 times those of the ball. What "
-     "is missed probably has\n"
-     "two causes: where a rim or a point slides with the surface beside it almost flat on the "
-     "bump, "
-     "the gradient is averaged\n"
-     "over what lies on one side of the point; and where a tool's edge crosses that of the solid, "
-     "what touches is smaller\n"
-     "than the distance of the samples."},
+     "sliding at 50 mm/s over a ball of R 40, 2 deep. Limits are 1.5 times those of the ball, on "
+     "CT "
+     "too. There a rim\n"
+     "or a point misses them: it touches in one place, and the noise of one voxel is a surface "
+     "that "
+     "waves by 0.03 voxels,\n"
+     "where a ball's height and normal are the means of some fifty."},
     {"cutting", "Cutting by force",
      "The whole servo with `[cut] model = \"preston\"`: a ball of radius 1 mm, led by hand over a "
      "flat; pressed on it\n"

@@ -8,7 +8,7 @@ namespace kerf::extremes {
 /// F9: where a tool comes to rest that a hand presses from `off` units above `at` to one below it,
 /// against `up`, in 20 ticks.
 template <class N>
-[[nodiscard]] Point rest_of(const SceneTool& tool, const Body& body, Point at, Point up,
+[[nodiscard]] Point rest_of(const SampledTool& tool, const Body& body, Point at, Point up,
                             const ToolTurn<N>& turn = {}, double off = 1.5) {
   Led<N> led(tool, body, at + off * up);
   constexpr int kTicks = 20;

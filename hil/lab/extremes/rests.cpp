@@ -67,7 +67,7 @@ double iso_distance(const Body& body, Point centre) {
 }  // namespace
 
 void measure_rests(const Effort& effort, const Told& told) {
-  const SceneTool ball = tool_of_units("ball", kRadius, 2 * kRadius);
+  const SampledTool ball(tool_of_units("ball", kRadius, 2 * kRadius));
   const auto placed = [&](const Solid& solid, const auto& measured) {
     Dice dice(6);
     for (int k = 0; k < effort.tilts; ++k) {

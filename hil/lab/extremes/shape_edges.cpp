@@ -80,6 +80,7 @@ void measure_shape_edges(const Effort& effort, const Told& told) {
         Subject{"cone, any pose", tool_of_units("cone", 5, 16)},
         Subject{"STL, square bar, any pose", mesh_of_units("bar", prism(6, 16, 4))}}) {
     const std::vector<Point> surface = surface_points(subject.tool);
+    const SampledTool tool(subject.tool);
     Dice dice(7);
     double sum = 0, most = 0;
     for (int k = 0; k < effort.tilts; ++k) {
@@ -99,7 +100,7 @@ void measure_shape_edges(const Effort& effort, const Told& told) {
       const Body body = blurred({44, 44, 44}, [&](Point p) {
         return (above(p - frame.place) - lowest) * std::sqrt(0.5);
       });
-      const Point rest = rest_of<N>(subject.tool, body, frame.place, frame.up, axes.turn<N>(), 20);
+      const Point rest = rest_of<N>(tool, body, frame.place, frame.up, axes.turn<N>(), 20);
       const Point out = unit(rest - frame.at(0, -1, 0));  // from the hand
       const double off = -depth_of(body, near, rest, out);
       sum += off;

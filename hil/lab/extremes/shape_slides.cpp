@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <string>
 #include <vector>
 
+#include "hil/lab/extremes/ct_edge.hpp"
 #include "hil/lab/extremes/led.hpp"
 #include "hil/lab/extremes/loft.hpp"
 #include "hil/lab/extremes/measures.hpp"
@@ -55,11 +57,14 @@ struct Figures {
   double force_step = 0, degrees = 0, height_sd = 0;
 };
 
-void slide(const SceneTool& tool, const Reach& reach, Dice& dice, Figures& figures) {
+/// `share` of full density by signed distance.
+void slide(const SampledTool& tool, const Reach& reach, const std::function<double(double)>& share,
+           Dice& dice, Figures& figures) {
   Frame frame(dice, {28, 28, 28});
   frame.place = frame.at(0, -4 - kBump, 0);
   const Axes axes = standing_on(dice.direction(), dice);
-  const Body body = blurred({60, 60, 60}, [&](Point p) { return length(p - frame.place) - kBump; });
+  const Body body =
+      body_of({60, 60, 60}, [&](Point p) { return share(length(p - frame.place) - kBump); });
   const std::vector<Touch> way = way_over(frame, axes, reach);
   const ToolTurn<N> turn = axes.turn<N>();
   constexpr double kHigh = 20;  // the tool turns first
@@ -88,6 +93,12 @@ void slide(const SceneTool& tool, const Reach& reach, Dice& dice, Figures& figur
 }  // namespace
 
 void measure_shape_slides(const Effort& effort, const Told& told) {
+  struct Limit {
+    double must, aim;
+  };
+  struct Limits {
+    Limit step, degrees, sd;
+  };
   struct Subject {
     const char* name;
     SceneTool tool;
@@ -97,16 +108,23 @@ void measure_shape_slides(const Effort& effort, const Told& told) {
         Subject{"cone, any pose", tool_of_units("cone", 5, 16)},
         Subject{"STL, square bar, any pose", mesh_of_units("bar", prism(6, 16, 4))}}) {
     const Reach reach(subject.tool);
-    Dice dice(5);
-    Figures figures;
-    for (int k = 0; k < effort.slides; ++k) slide(subject.tool, reach, dice, figures);
-    const auto row = [&](const char* what, double value, const char* unit, double must,
-                         double aim) {
-      told({"shapes", std::string(subject.name) + what, value, unit, must, aim});
+    const SampledTool tool(subject.tool);
+    CtEdge ct;
+    const auto measure = [&](const std::string& name, const std::function<double(double)>& share,
+                             const Limits& limits) {
+      Dice dice(5);
+      Figures figures;
+      for (int k = 0; k < effort.slides; ++k) slide(tool, reach, share, dice, figures);
+      const auto row = [&](const char* what, double value, const char* unit, Limit limit) {
+        told({"shapes", subject.name + name + what, value, unit, limit.must, limit.aim});
+      };
+      row(", force step over the mean", 100 * figures.force_step, "%", limits.step);
+      row(", angle", figures.degrees, "deg", limits.degrees);
+      row(", surface sd", figures.height_sd, "voxels", limits.sd);
     };
-    row(": sliding, force step over the mean", 100 * figures.force_step, "%", 3, 2.1);
-    row(": sliding, angle", figures.degrees, "deg", 0.75, 0.45);
-    row(": sliding, surface sd", figures.height_sd, "voxels", 0.0075, 0.003);
+    measure(": sliding", [](double distance) { return 0.5 - distance / 2; },
+            {{3, 2.1}, {0.75, 0.45}, {0.0075, 0.003}});
+    measure(": sliding on CT with noise", std::ref(ct), {{4.5, 2.7}, {1.8, 1.35}, {0.03, 0.0225}});
   }
 }
 

@@ -40,6 +40,7 @@ void measure_shapes(const Effort& effort, const Told& told) {
         Subject{"STL, square bar, any pose", mesh_of_units("bar", prism(6, 16, 4)), Pose::any},
         Subject{"STL, fluted bur, any pose", mesh_of_units("bur", fluted_bur(24)), Pose::any}}) {
     const Reach reach(subject.tool);
+    const SampledTool tool(subject.tool);
     Dice dice(8);
     double sum = 0, most = 0, degrees = 0;
     for (int k = 0; k < effort.tilts; ++k) {
@@ -51,7 +52,7 @@ void measure_shapes(const Effort& effort, const Told& told) {
       const double support = reach.along(axes.to_tool(-1 * frame.up));
       const Body body = blurred(kGrid, [&](Point p) { return frame.of(p)[1] + support; });
       // From so high that the tool can turn first.
-      const Point rest = rest_of<N>(subject.tool, body, frame.place, frame.up, axes.turn<N>(), 20);
+      const Point rest = rest_of<N>(tool, body, frame.place, frame.up, axes.turn<N>(), 20);
       const double off = frame.of(rest)[1];
       sum += off;
       most = std::max(most, std::abs(off));

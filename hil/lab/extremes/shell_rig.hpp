@@ -26,11 +26,11 @@ inline constexpr Density kIso = 32768;
 
 /// The samples of a tool in units: of a mesh they take a third of a second.
 struct SampledTool {
-  std::vector<Point> samples;
+  std::vector<Point> samples, close;
   bool round = false;
 
   SampledTool(const SceneTool& tool)  // NOLINT(google-explicit-constructor): a tool is one
-      : samples(surface_samples(tool, 1.0)), round(tool.round) {}
+      : samples(surface_samples(tool, 1.0)), close(close_samples(tool, 1.0)), round(tool.round) {}
 };
 
 /// A volume whose voxels are units, at the origin of contact space.
@@ -49,7 +49,7 @@ template <class N>
 class ShellRig {
  public:
   explicit ShellRig(const SampledTool& tool, const KernelSet& kernels = **kernel_sets())
-      : kernels_(kernels), tool_(tool.samples, tool.round), shell_(tool_.shell()) {}
+      : kernels_(kernels), tool_(tool.samples, tool.round, tool.close), shell_(tool_.shell()) {}
   ShellRig(const SampledTool& tool, const Body& body) : ShellRig(tool) {
     add(body, plain_frame<N>());
   }

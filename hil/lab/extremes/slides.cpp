@@ -1,21 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <cmath>
-#include <numbers>
+#include <functional>
+#include <string>
 
 #include "hil/lab/extremes/bump_slide.hpp"
+#include "hil/lab/extremes/ct_edge.hpp"
 #include "hil/lab/extremes/measures.hpp"
 
 namespace kerf::extremes {
-namespace {
-
-/// From the normal distribution, mean 0 and deviation 1 (Box and Muller 1958).
-double normal(Dice& dice) {
-  const double r = std::sqrt(-2 * std::log(dice.uniform(1e-12, 1)));
-  return r * std::cos(2 * std::numbers::pi * dice.uniform(0, 1));
-}
-
-}  // namespace
-
 void measure_slides(const Effort& effort, const Told& told) {
   struct Limits {
     double must, aim;
@@ -25,10 +16,7 @@ void measure_slides(const Effort& effort, const Told& told) {
     BumpSlide slide;
     Limits step, degrees, sd;
   };
-  Dice noise(9);
-  const auto ct = [&](double distance) {
-    return 0.5 * std::erfc(distance / std::sqrt(2.0)) + 0.02 * normal(noise);
-  };
+  CtEdge ct;
   const Limits two{0.02, 0.014}, half{0.5, 0.3}, fine{0.005, 0.002};
   for (const Subject& subject :
        {Subject{"R 40, 2 deep, 50 mm/s", {}, two, half, fine},
@@ -36,7 +24,7 @@ void measure_slides(const Effort& effort, const Told& told) {
         // F8 asks for 0.08 N at 0.4 N/mm, two units; more than that the direction turns.
         Subject{"R 14, 1 deep, 100 mm/s", {.bump = 14, .step = 1, .depth = 1}, {2, 2}, half, fine},
         Subject{"CT with noise, R 40, 2 deep, 50 mm/s",
-                {.share = ct},
+                {.share = std::ref(ct)},
                 {0.03, 0.018},
                 {1.2, 0.9},
                 {0.02, 0.015}}}) {

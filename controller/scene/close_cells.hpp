@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "controller/kernel/proxy/shell_closeup.hpp"
+
+namespace kerf {
+
+/// Owner of a tool's close samples, sorted by cells. Load time; moving it keeps the table valid. In
+/// FixedNumbers, FloatNumbers and DoubleNumbers.
+template <class N>
+class CloseCells {
+ public:
+  /// `samples_units`: from the tool's centre, none farther than `reach`; contact units. Of a cell
+  /// with more than kMostInCell, so many stay, evenly chosen. Without samples there is no table.
+  CloseCells(std::span<const std::array<double, 3>> samples_units, double reach);
+
+  [[nodiscard]] CloseTable<N> table() const noexcept;
+  [[nodiscard]] std::size_t bytes() const noexcept;
+
+ private:
+  std::array<std::vector<ShellNumber<N>>, 3> lever_;
+  std::vector<std::int32_t> first_;
+  std::array<std::int32_t, 3> cells_{};
+  std::array<ShellNumber<N>, 3> low_{};
+  ShellNumber<N> edge_{};
+};
+
+}  // namespace kerf

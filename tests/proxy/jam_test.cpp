@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: Apache-2.0
+// What holds a tool that the hand turns about, in a slot that lets it turn no farther, lets it out.
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <numbers>
+
+#include <doctest/doctest.h>
+
+#include "hil/lab/extremes/led.hpp"
+
+using namespace kerf;
+using namespace kerf::extremes;
+
+namespace {
+
+constexpr double kTop = 50, kBottom = 30, kMiddle = 30.2;
+
+enum class Hollow { well, slot };
+
+/// A hole along y through a block whose top is at kTop.
+Body block_with(Hollow hollow, double radius) {
+  return blurred({60, 100, 60}, [=](Point p) {
+    const double x = p[0] - kMiddle, z = p[2] - kMiddle;
+    const double inside = hollow == Hollow::slot ? std::abs(z) : std::hypot(x, z);
+    return std::max(radius - inside, p[1] - kTop);
+  });
+}
+
+template <class N>
+ToolTurn<N> about(std::size_t axis, double angle_rad) {
+  using Unit = typename N::Unit;
+  Unit half[3] = {};
+  half[axis] = Unit(std::sin(angle_rad / 2));
+  return {half[0], half[1], half[2], Unit(std::cos(angle_rad / 2))};
+}
+
+/// Ticks until the tool is out that a hand spins by `spin_rad` a tick and tilts against the walls:
+/// it is held there for 50 ticks and then pulled up by 0.2 units a tick.
+template <class N>
+int ticks_out(const SampledTool& tool, const Body& body, double half, double spin_rad,
+              int at_most) {
+  Led<N> led(tool, body, {kMiddle, kBottom, kMiddle});
+  int tick = 0, out = 0;
+  const auto pull = [&](double height) {
+    const auto spin = about<N>(1, std::remainder(spin_rad * tick++, 4 * std::numbers::pi));
+    led.tick({kMiddle, height, kMiddle}, compose(about<N>(0, 0.1), spin));
+  };
+  while (tick < 50) pull(kBottom);
+  while (out < at_most && led.proxy()[1] - half < kTop + 3)
+    pull(std::min(kBottom + 0.2 * ++out, 90.0));
+  return out;
+}
+
+}  // namespace
+
+TEST_CASE_TEMPLATE("a tool that turns on and on in a tight slot is pulled out", N, FixedNumbers,
+                   DoubleNumbers) {
+  struct Cylinder {
+    double radius, length;
+  };
+  for (const auto [radius, length] : {Cylinder{7, 20}, Cylinder{8, 24}, Cylinder{10, 30}}) {
+    const SampledTool tool(tool_of_units("cylinder", radius, length));
+    const int lifted = static_cast<int>((kTop + 3 + length / 2 - kBottom) / 0.2);
+    for (const Hollow hollow : {Hollow::well, Hollow::slot}) {
+      for (const double play : {0.15, 0.3, 0.4, 0.5}) {
+        const Body body = block_with(hollow, radius + play);
+        for (const double spin_rad : {0.05, 0.15, 2.5}) {
+          CAPTURE(length);
+          CAPTURE((hollow == Hollow::slot));
+          CAPTURE(play);
+          CAPTURE(spin_rad);
+          CHECK(ticks_out<N>(tool, body, length / 2, spin_rad, 2 * lifted) < 2 * lifted);
+        }
+      }
+    }
+  }
+}
