@@ -22,6 +22,7 @@ struct Rests {
 
 Rests rest_on_flats(const SceneTool& shape, const SceneTool& mesh) {
   constexpr VoxelGrid kGrid{40, 40, 40};
+  const SampledTool shape_samples(shape), mesh_samples(mesh);
   Dice dice(5);
   Rests rests;
   for (int k = 0; k < 8; ++k) {
@@ -38,11 +39,11 @@ Rests rest_on_flats(const SceneTool& shape, const SceneTool& mesh) {
       support = std::max(support, -dot(at, frame.up));
     }
     const Body flat = blurred(kGrid, [&](Point p) { return frame.of(p)[1] + support; });
-    const auto height = [&](const SceneTool& tool) {
+    const auto height = [&](const SampledTool& tool) {
       return frame.of(rest_of<N>(tool, flat, frame.place, frame.up, turn, 16))[1];
     };
-    const double of_mesh = height(mesh);
-    rests.apart = std::max(rests.apart, std::abs(of_mesh - height(shape)));
+    const double of_mesh = height(mesh_samples);
+    rests.apart = std::max(rests.apart, std::abs(of_mesh - height(shape_samples)));
     rests.off = std::max(rests.off, std::abs(of_mesh));
   }
   return rests;
