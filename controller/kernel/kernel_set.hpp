@@ -6,6 +6,7 @@
 
 #include "controller/kernel/aligned_table.hpp"
 #include "controller/kernel/cover_table.hpp"
+#include "controller/kernel/proxy/close_sums.hpp"
 #include "controller/kernel/proxy/shell_table.hpp"
 #include "controller/kernel/sample_table.hpp"
 #include "controller/kernel/splat_table.hpp"
@@ -77,6 +78,9 @@ struct KernelSet {
   void (*read_shell)(const ShellPlaces<FixedNumbers>&, std::int32_t count,
                      const std::int32_t (&centre)[3], const ShellField&,
                      std::int32_t* density) noexcept;
+  /// `close_sums`.
+  void (*sum_close)(const ShellTable<FixedNumbers>&, const std::int32_t* density,
+                    CloseSums<FixedNumbers>&) noexcept;
 };
 
 /// Gradients beyond the last voxel of a field.

@@ -47,7 +47,7 @@ struct PrestonOutcome {
   /// Budget that found nothing to remove and went beyond the carry: 0 unless the force is more
   /// than the covered voxels can hold in one tick.
   CutBudget<N> lost{};
-  bool starves = false;  ///< more than half a voxel waits: soon some would be lost
+  bool starves = false;  ///< more than half a voxel of what is fed waits: some would soon be lost
 };
 
 namespace detail {
@@ -77,11 +77,11 @@ class PrestonTick {
       weigh_again(covered_);
       spend(out.removed);
     }
-    for (auto& carry : state_.carry) {
-      const auto kept = std::clamp(carry, -kFullVoxel, kFullVoxel);
-      out.lost += carry - kept;
-      out.starves = out.starves || kept > kFullVoxel / 2;
-      carry = kept;
+    for (std::size_t m = 0; m < kMaxCutMaterials; ++m) {
+      const auto kept = std::clamp(state_.carry[m], -kFullVoxel, kFullVoxel);
+      out.lost += state_.carry[m] - kept;
+      out.starves = out.starves || (budget_[m] > 0 && kept > kFullVoxel / 2);
+      state_.carry[m] = kept;
     }
   }
 

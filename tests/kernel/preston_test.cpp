@@ -166,6 +166,26 @@ TEST_CASE("in a mixture each material leaves at its own rate under its part of t
   CHECK(rig.state.carry[3] == 0);
 }
 
+TEST_CASE_TEMPLATE("what waits of a material that is no longer there makes nothing starve", N,
+                   FixedNumbers, DoubleNumbers) {
+  auto rig = ball_in_block<N>();
+  // Under the ball there is first some faint enamel alone, then dentin.
+  std::vector<Label> labels(rig.volume.density.size(), 2);
+  rig.plan.labels = labels;
+  rig.plan.rate[1] = force_rate<N>(70000);
+  rig.plan.rate[2] = force_rate<N>(100);
+  const std::vector<Density> dentin = rig.volume.density;
+  const std::size_t enamel = rig.volume.grid.index(16, 16, 16);
+  std::ranges::fill(rig.volume.density, Density{0});
+  rig.volume.density[enamel] = 2000;
+  labels[enamel] = 1;
+  CHECK(rig.press(kCentre, 1).starves);
+  CHECK(double(rig.state.carry[1]) > 0);
+  rig.volume.density = dentin;
+  rig.volume.density[enamel] = 0;
+  for (int tick = 0; tick < 20; ++tick) CHECK_FALSE(rig.press(kCentre, 1).starves);
+}
+
 TEST_CASE("a forbidden material is told, bears its part of the force and is never cut") {
   auto rig = ball_in_block<FixedNumbers>();
   std::vector<Label> labels(rig.volume.density.size(), 1);

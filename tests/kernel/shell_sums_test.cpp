@@ -85,6 +85,8 @@ TEST_CASE("every instruction set sums a shell to the bit, wherever it is") {
         ShellMemory<FixedNumbers> memory, truth_memory;
         memory.hold(shell);
         truth_memory.hold(shell);
+        const std::int32_t whole = count / kShellGroup * kShellGroup;  // groups to be read
+        const auto room = static_cast<std::size_t>(whole);
         const Density iso = kind == 2 ? 65535 : static_cast<Density>(dice.uniform(1, 65536));
         const ShellField all{grid, volume.density.data(), density_scale(iso), {}};
         const FreeBrickMap map(grid, volume.density, 1);
@@ -113,9 +115,14 @@ TEST_CASE("every instruction set sums a shell to the bit, wherever it is") {
             sums.weight = sums.square = sums.high = sums.top = -1;  // left over from before
             (*set)->sum_shell(shell.table, memory.places(), centre, field, sums);
             const bool alike = same(sums, truth) && sums.read == looked_at;
-            if (!alike) {
+            std::vector<std::int32_t> read(room), truly_read(room);
+            (*set)->read_shell(memory.places(), whole, centre, field, read.data());
+            read_shell<FixedNumbers>(truth_memory.places(), whole, centre, field,
+                                     truly_read.data());
+            if (!alike || read != truly_read) {
               INFO(std::string((*set)->name), ", ", count, " samples, kind ", kind, ", case ", i);
               REQUIRE(alike);
+              REQUIRE(read == truly_read);
             }
           }
         }

@@ -191,12 +191,34 @@ TEST_CASE_TEMPLATE(
     for (int tick = 0; tick < 3; ++tick) {
       rig.field().begin_tick();
       const int probes = answered();
-      // Of these the first have closer looks, which cost a cylinder as much as four probes.
-      CHECK(probes >= (tool.round ? ProbeWork::kLeastProbes : ProbeWork::kLeastProbes / 2));
+      // A cylinder's have closer looks, which cost as much as two probes.
+      CHECK(probes >= (tool.round ? ProbeWork::kLeastProbes : 8));
       CHECK(probes <= 25);
     }
     rig.field().turn({});
     CHECK(answered() == 1);
+  }
+}
+
+TEST_CASE_TEMPLATE("all volumes of a probe are looked at alike, while the tick has probes left", N,
+                   FixedNumbers, DoubleNumbers) {
+  const SampledTool cylinder(tool_of_units("cylinder", 5, 16));
+  Dice dice(4);
+  for (int pose = 0; pose < 20; ++pose) {
+    const Point n = dice.direction(), top{20, 20, 20};
+    const TestVolume flat = blurred({40, 40, 40}, [&](Point p) { return dot(p - top, n); });
+    ShellRig<N> rig(cylinder);
+    for (int copy = 0; copy < 3; ++copy) rig.add(flat, plain_frame<N>());
+    rig.field().turn(dice.turn<N>(dice.uniform(0, 3)));
+    const auto place = place_of<N>(top + dice.uniform(4, 8) * n);
+    rig.field().begin_tick();
+    rig.field().turn(dice.turn<N>(0));
+    for (Probe<N> felt = rig.field().probe(place); !felt.buried; felt = rig.field().probe(place)) {
+      for (std::int32_t k = 1; k < felt.count; ++k) {
+        CHECK(felt.plane[static_cast<std::size_t>(k)].depth == felt.plane[0].depth);
+        CHECK(felt.plane[static_cast<std::size_t>(k)].normal == felt.plane[0].normal);
+      }
+    }
   }
 }
 

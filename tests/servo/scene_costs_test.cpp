@@ -229,7 +229,7 @@ TEST_CASE("a scene is planned with what the servo allows the probes of a tick") 
   CHECK(probe_work(shell, 2).turn == 2 * 62);
   shell.round = false;
   CHECK(probe_work(shell, 1).probe == 512 + 128);
-  CHECK(probe_work(shell, 1).closer == 2 * (128 + 4 * 256) + 2 * (128 + 64));
+  CHECK(probe_work(shell, 1).closer == 2 * (128 + 2 * 256) + 2 * (128 + 64));
   const auto most = [](std::int64_t probe, std::int64_t closer, std::int64_t turn) {
     return ProbeWork{probe, closer, turn}.most();
   };

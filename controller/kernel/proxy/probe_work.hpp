@@ -20,7 +20,7 @@ struct ProbeWork {
   static constexpr std::int64_t kTickSamples = 18000;
   static constexpr std::int64_t kLeastProbes = 12;
   static constexpr std::int64_t kLookSamples = 128;  ///< what a look costs besides those it reads
-  static constexpr std::int64_t kCloseSamples = 4;   ///< what one of a closeup costs
+  static constexpr std::int64_t kCloseSamples = 2;   ///< what one of a closeup costs
 
   std::int64_t probe = 0;   ///< at most: all of the surface in every volume
   std::int64_t closer = 0;  ///< at most, after that: closer looks

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "controller/kernel/proxy/close_sums.hpp"
 #include "controller/kernel/proxy/shell_peak.hpp"
 #include "controller/kernel/proxy/shell_sums.hpp"
 #include "controller/kernel/proxy/shell_table.hpp"
@@ -43,7 +44,7 @@ struct CloseSamples {
   Array density;
   std::int32_t count = 0;
 
-  /// Those of the cells around `middle`, a lever; the first kMostClose of more.
+  /// Those of the cells around `middle`, a lever; of too many kMostClose that are spread evenly.
   constexpr void take(const CloseTable<N>& table, const ShellNumber<N> (&middle)[3]) noexcept {
     constexpr auto kReach = static_cast<std::int32_t>(kCloseRadius / kCloseCell);
     using Number = ShellNumber<N>;
@@ -55,20 +56,38 @@ struct CloseSamples {
       from[axis] = std::max(0, cell - kReach);
       to[axis] = std::min(cell + kReach + 1, table.cells[axis]);
     }
+    const auto each_row = [&](auto&& visit) {  // of cells: its first sample, and the end
+      for (std::int32_t z = from[2]; z < to[2]; ++z) {
+        for (std::int32_t y = from[1]; y < to[1]; ++y) {
+          const std::int32_t row = (z * table.cells[1] + y) * table.cells[0];
+          visit(table.first[row + from[0]], table.first[row + to[0]]);
+        }
+      }
+    };
+    std::int32_t all = 0;
+    each_row([&](std::int32_t first, std::int32_t end) { all += end - first; });
+    std::int32_t seen = 0;  // of all
     count = 0;
-    for (std::int32_t z = from[2]; z < to[2]; ++z) {
-      for (std::int32_t y = from[1]; y < to[1]; ++y) {
-        const std::int32_t row = (z * table.cells[1] + y) * table.cells[0];
-        const std::int32_t first = table.first[row + from[0]];
-        const std::int32_t more = std::min(table.first[row + to[0]] - first, kMostClose - count);
+    each_row([&](std::int32_t first, std::int32_t end) {
+      const std::int32_t more = end - first;
+      if (all <= kMostClose) {
         for (std::size_t axis = 0; axis < 3; ++axis) {
           std::copy_n(table.lever[axis] + first, more, lever[axis].data() + count);
         }
         count += more;
+        return;
       }
-    }
+      for (; count < kMostClose; ++count) {
+        const std::int32_t at = count * all / kMostClose - seen;
+        if (at >= more) break;
+        const auto to = static_cast<std::size_t>(count);
+        for (std::size_t axis = 0; axis < 3; ++axis)
+          lever[axis][to] = table.lever[axis][first + at];
+      }
+      seen += more;
+    });
   }
-  /// Whole vectors of them; what fills the last up is no sample.
+  /// Whole vectors of them; what fills the last up is no sample: `fade` it once all are read.
   [[nodiscard]] constexpr ShellTable<N> table() noexcept {
     ShellTable<N> table;
     table.count = (count + kShellGroup - 1) / kShellGroup * kShellGroup;
@@ -77,6 +96,9 @@ struct CloseSamples {
       table.lever[axis] = lever[axis].data();
     }
     return table;
+  }
+  constexpr void fade(const ShellTable<N>& table) noexcept {
+    std::fill(density.begin() + count, density.begin() + table.count, ShellNumber<N>(0));
   }
   [[nodiscard]] constexpr ShellPlaces<N> places() noexcept {
     return {{offset[0].data(), offset[1].data(), offset[2].data()}, {}};
@@ -89,30 +111,6 @@ struct Closeup {
   typename N::Ratio height{};
   typename N::Ratio lever[3]{};  ///< from the tool's centre to the peak, over the reach; its axes
   typename N::Ratio top{};       ///< density of the highest sample
-};
-
-/// Sums over samples, weighted with a power of t: their density over the highest. Fixed: t and its
-/// powers in Q16.
-template <class N>
-struct PowerSums {
-  typename N::Sum weight{}, density{}, lever[3]{};  ///< SUM t^p, SUM t^p t, SUM t^p lever
-
-  constexpr void add(ShellNumber<N> power, ShellNumber<N> t,
-                     const ShellNumber<N> (&at)[3]) noexcept {
-    using Sum = typename N::Sum;
-    weight += power;
-    density += Sum(power) * t;
-    for (std::size_t axis = 0; axis < 3; ++axis) lever[axis] += Sum(power) * at[axis];
-  }
-  /// `sum` over the weight; `bits`: from its fraction bits, less those of the weight, to 24.
-  [[nodiscard]] constexpr typename N::Ratio mean(typename N::Sum sum,
-                                                 [[maybe_unused]] int bits) const noexcept {
-    if constexpr (N::kIsFixed) {
-      return N::Ratio::from_raw(static_cast<std::int32_t>((sum << bits) / weight));
-    } else {
-      return sum / weight;
-    }
-  }
 };
 
 /// Where about the peak is: its lever in the tool's axes, from the shell's sums. Beside a rim or a
@@ -137,59 +135,35 @@ constexpr void peak_lever(const ShellSums<N>& sums, typename N::Ratio e,
   }
 }
 
-/// The peak of density over a tool's surface, from its close samples.
+/// The peak of density over a tool's surface, from the sums over its close samples.
 ///
 /// As in shell_peak.hpp the mean of the height, weighted with its power p, is the summit's times
 /// (p + 1) / (p + 1 + e). With p = 32 and 64 two such means tell e and the summit. They also tell
 /// where it is, as in peak_lever.
 template <class N>
-[[nodiscard]] constexpr Closeup<N> peak_among(const CloseSamples<N>& samples) noexcept {
-  using Number = ShellNumber<N>;
+[[nodiscard]] constexpr Closeup<N> peak_of(const CloseSums<N>& sums) noexcept {
   using Ratio = typename N::Ratio;
   Closeup<N> found;
-  const auto count = static_cast<std::size_t>(samples.count);
-  Number top(0);
-  for (std::size_t i = 0; i < count; ++i) top = std::max(top, samples.density[i]);
-  if (top < kFaintest<N>) return found;
-  [[maybe_unused]] const std::int64_t over_top =
-      N::kIsFixed ? (std::int64_t{1} << 31) / std::int64_t(top) : 0;
-  PowerSums<N> low, high;
-  for (std::size_t i = 0; i < count; ++i) {
-    const Number density = samples.density[i];
-    if (density < top - top / 4) continue;  // 0.75^32 is nothing
-    Number t{};
-    if constexpr (N::kIsFixed) {
-      t = static_cast<Number>(std::int64_t{density} * over_top >> 15);
-    } else {
-      t = density / top;
-    }
-    const auto squared = [](Number a) {
-      if constexpr (N::kIsFixed) {
-        return static_cast<Number>((std::int64_t{a} * a + (1 << 15)) >> 16);
-      } else {
-        return a * a;
-      }
-    };
-    const Number power = squared(squared(squared(squared(squared(t)))));
-    const Number lever[3] = {samples.lever[0][i], samples.lever[1][i], samples.lever[2][i]};
-    low.add(power, t, lever);
-    high.add(squared(power), t, lever);
-  }
-  constexpr double kLowOne = 33, kHighOne = 65;  // p + 1
-  const Ratio below = low.mean(low.density, 8), above = high.mean(high.density, 8);
+  if (sums.low.weight <= typename N::Sum(0)) return found;
+  constexpr double kLowOne = CloseSums<N>::kLowPower + 1, kHighOne = CloseSums<N>::kHighPower + 1;
+  const auto mean = [](const PowerSums<N>& of, typename N::Sum sum) {
+    return mean_of<N>(sum, of.weight, 9);
+  };
+  const Ratio below = mean(sums.low, sums.low.density), above = mean(sums.high, sums.high.density);
   const Ratio e =
       std::clamp(Ratio(kLowOne) * (above - below) / (below - Ratio(kLowOne / kHighOne) * above),
                  Ratio(0), Ratio(2));
   constexpr auto kUnsampled = Ratio(1.02);  // no summit is far above the highest sample
   const Ratio summit = std::min(above + above * (e / Ratio(kHighOne)), kUnsampled);
   if constexpr (N::kIsFixed) {
-    found.top = Ratio::from_raw(top << 9);
+    found.top = Ratio::from_raw(sums.top << 9);
   } else {
-    found.top = top;
+    found.top = sums.top;
   }
   found.height = found.top * summit;
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    const Ratio near = low.mean(low.lever[axis], 9), peak = high.mean(high.lever[axis], 9);
+    const Ratio near = mean(sums.low, sums.low.lever[axis]),
+                peak = mean(sums.high, sums.high.lever[axis]);
     found.lever[axis] = peak + (peak - near) * ((Ratio(kLowOne) + e) / Ratio(kHighOne - kLowOne));
   }
   return found;

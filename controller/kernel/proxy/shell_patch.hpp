@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 
 #include "controller/kernel/proxy/contact_space.hpp"
+#include "controller/kernel/proxy/shell_peak.hpp"
 #include "controller/kernel/proxy/shell_spiral.hpp"
 #include "controller/kernel/proxy/tool_turn.hpp"
 #include "shared/numeric/fixed.hpp"
@@ -31,6 +33,11 @@ inline constexpr double kCloseDepth = 0.4;  // units
 /// kAlike of it down to kUnlike the shell's plane, which leads between the two, takes over.
 inline constexpr double kAlike = 0.85, kUnlike = 0.65;
 
+/// Of a tool's own samples so many touch, by their weights, where a patch tells the normal and the
+/// place of the contact; from kWide on the mean of so many does, which no voxel's noise turns by
+/// more than a third of a degree.
+inline constexpr double kNarrow = 32, kWide = 64;
+
 /// Points of the unit sphere; a little more reach is for roundings.
 template <class N>
 inline constexpr SpiralArrays<N, kPatchSamples> kPatchArrays(kPatchRadius + 0.1, [](std::size_t i) {
@@ -47,6 +54,25 @@ template <class N>
   return {{{one - n.x * n.x, -(n.x * n.y), -(n.x * n.z)},
            {-(n.x * n.y), one - n.y * n.y, -(n.y * n.z)},
            {-(n.x * n.z), -(n.y * n.z), one - n.z * n.z}}};
+}
+
+/// 1 where few of a tool's own samples touch, 0 from kWide on. Each counts by its weight over that
+/// of the highest.
+template <class N>
+[[nodiscard]] constexpr typename N::Unit narrowness(const ShellSums<N>& sums,
+                                                    typename N::Ratio top) noexcept {
+  using Unit = typename N::Unit;
+  using Ratio = typename N::Ratio;
+  using Sum = typename N::Sum;
+  const Ratio cube = top * top * top, weight = cube * cube;
+  Sum of_wide(kWide);
+  if constexpr (N::kIsFixed) {
+    of_wide *= std::max(1, weight.raw());
+  } else {
+    of_wide *= weight;
+  }
+  const Ratio width = std::min(mean_of<N>(sums.weight, of_wide, 24), Ratio(1));
+  return falling_share<N>(Unit(width), 1, kNarrow / kWide);
 }
 
 }  // namespace kerf

@@ -87,7 +87,8 @@ class ShellProbe {
     felt.buried = left_ < work_.probe + work_.closer && !turned_;
     if (felt.buried) return felt;
     turned_ = false;
-    for (const ShellVolume<N>& volume : volumes_) feel(volume, q, felt);
+    const bool closer = left_ >= work_.probe + work_.closer;
+    for (const ShellVolume<N>& volume : volumes_) feel(volume, q, closer, felt);
     if (felt.count > 0) felt.depth = std::max(felt.depth, felt.plane[0].depth);
     return felt;
   }
@@ -166,8 +167,9 @@ class ShellProbe {
     }
   }
 
-  /// Adds this volume's plane in the order of depths.
-  void feel(const ShellVolume<N>& volume, ContactVec<Real> q, Probe<N>& felt) const noexcept {
+  /// Adds this volume's plane in the order of depths, by a closer look where it is near rest.
+  void feel(const ShellVolume<N>& volume, ContactVec<Real> q, bool closer,
+            Probe<N>& felt) const noexcept {
     const VoxelVec<Real> at = place_of(volume, q);
     const Real margin = shell_.reach + Real(1);
     const auto near = [&](Real x, std::int32_t n) { return x > -margin && x < Real(n) + margin; };
@@ -179,7 +181,7 @@ class ShellProbe {
     const bool round = shell_.table.round;
     const auto means = shell_means<N>(sums, volume.field.scale, volume.frame, rows_, round);
     Plane<N> plane = plane_of<N>(means, shell_.reach, round);
-    if (left_ >= work_.closer) {
+    if (closer) {
       if (round && plane.depth < Real(kCapBelow) && -plane.depth < Real(kCapAbove)) {
         plane.depth = depth_around(volume, at, sums, means, plane);
       } else if (!round && std::max(plane.depth, -plane.depth) < Real(kCloseDepth)) {
@@ -247,7 +249,7 @@ class ShellProbe {
     const Ratio own = peak_height(means, false);
     plane.depth = depth_of<N>(own + multiply<Ratio>(alike, std::max(height, means.top) - own),
                               slope_along(means, plane.normal, false));
-    const Unit counts = alike * share;
+    const Unit counts = alike * share * narrowness<N>(sums, means.top);
     plane.arm = plane.arm + part_of<N>(arm - plane.arm, counts);
     plane.normal = between<N>(plane.normal, normal, counts);
   }
@@ -260,15 +262,20 @@ class ShellProbe {
     const ShellPlaces<N> places = samples.places();
     const ShellStep<N> step = step_of(shell_, rows_, volume.frame);
     const ShellNumber<N> centre[3] = {number_of(at.x), number_of(at.y), number_of(at.z)};
+    CloseSums<N> sums;
     if constexpr (N::kIsFixed) {
       kernels_.place_shell(table, step, places);
       kernels_.read_shell(places, table.count, centre, volume.field, samples.density.data());
+      samples.fade(table);
+      kernels_.sum_close(table, samples.density.data(), sums);
     } else {
       place_shell(table, step, places);
       read_shell<N>(places, table.count, centre, volume.field, samples.density.data());
+      samples.fade(table);
+      sums = close_sums<N>(table, samples.density.data());
     }
     left_ -= ProbeWork::kLookSamples + ProbeWork::kCloseSamples * table.count;
-    return peak_among(samples);
+    return peak_of(sums);
   }
 
   /// The mean gradient of a patch across `normal`.

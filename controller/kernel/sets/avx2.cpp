@@ -218,6 +218,7 @@ const KernelSet kAvx2Set{"avx2",
                          take_steps,
                          place_shell_samples,
                          sum_shell_samples,
-                         read_shell_samples};
+                         read_shell_samples,
+                         sum_close_samples};
 
 }  // namespace kerf

@@ -200,6 +200,7 @@ const KernelSet kAvx512Set{"avx512",
                            take_steps,
                            place_shell_samples,
                            sum_shell_samples,
-                           read_shell_samples};
+                           read_shell_samples,
+                           sum_close_samples};
 
 }  // namespace kerf

@@ -122,6 +122,7 @@ const KernelSet kNeonSet{"neon",
                          take_steps,
                          place_shell_samples,
                          sum_shell_samples,
-                         read_shell_samples};
+                         read_shell_samples,
+                         sum_close_samples};
 
 }  // namespace kerf

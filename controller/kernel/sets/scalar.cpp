@@ -226,6 +226,7 @@ const KernelSet kScalarSet{"scalar",
                            take_steps,
                            place_shell_samples,
                            sum_shell_samples,
-                           read_shell_samples};
+                           read_shell_samples,
+                           sum_close_samples};
 
 }  // namespace kerf

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 
+#include "controller/kernel/proxy/close_sums.hpp"
 #include "controller/kernel/proxy/shell_sums.hpp"
 #include "controller/kernel/sets/shell_places.hpp"
 
@@ -22,6 +23,11 @@ void read_shell_samples(const ShellPlaces<FixedNumbers>& places, std::int32_t co
                         const std::int32_t (&centre)[3], const ShellField& field,
                         std::int32_t* density) noexcept {
   read_shell<FixedNumbers>(places, count, centre, field, density);
+}
+
+void sum_close_samples(const ShellTable<FixedNumbers>& table, const std::int32_t* density,
+                       CloseSums<FixedNumbers>& sums) noexcept {
+  sums = close_sums<FixedNumbers>(table, density);
 }
 
 }  // namespace

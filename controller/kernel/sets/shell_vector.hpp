@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "controller/kernel/proxy/close_sums.hpp"
 #include "controller/kernel/proxy/shell_sums.hpp"
 #include "controller/kernel/sets/shell_places.hpp"
 
@@ -255,6 +256,15 @@ inline std::int32_t sum32(V entries) noexcept {
   return sum;
 }
 
+/// Of 32-bit entries that are not negative.
+inline std::int32_t highest32(V entries) noexcept {
+  alignas(64) std::int32_t lane[kShellLanes];
+  Simd::store(lane, entries);
+  std::int32_t highest = 0;
+  for (const std::int32_t entry : lane) highest = entry > highest ? entry : highest;
+  return highest;
+}
+
 /// `kInside`: the whole tool is. What fills the last group up is not, so that one is read with
 /// care.
 template <bool kRound, bool kInside>
@@ -280,10 +290,7 @@ template <bool kRound, bool kInside>
     out.lever[axis] = Simd::sum64(sums.lever[axis]) + kFull.lever[0] * full_lever;
     out.high_lever[axis] = Simd::sum64(sums.high_lever[axis]) + kFull.high_lever[0] * full_lever;
   }
-  alignas(64) std::int32_t top[kShellLanes];
-  Simd::store(top, sums.top);
-  std::int32_t highest = 0;
-  for (const std::int32_t lane : top) highest = lane > highest ? lane : highest;
+  const std::int32_t highest = highest32(sums.top);
   out.top = highest >> kSampleBits;
   out.top_sample = highest & (kMaxShellSamples - 1);
   out.solid = sum32(sums.solid) + sums.full;
@@ -328,6 +335,52 @@ void read_shell_samples(const ShellPlaces<FixedNumbers>& places, std::int32_t co
     }
     Simd::store(density + i, Simd::min32(scaled, Simd::set32(32767)));
   }
+}
+
+/// Of 64-bit entries.
+struct PowerVectors {
+  V weight = Simd::zero(), density = Simd::zero();
+  V lever[3] = {Simd::zero(), Simd::zero(), Simd::zero()};
+
+  [[gnu::always_inline]] void add(V power, V t, const V (&at)[3]) noexcept {
+    const ShellWeights weights(power);
+    weights.count(weight);
+    weights.add(density, t);
+    for (std::size_t axis = 0; axis < 3; ++axis) weights.add(lever[axis], at[axis]);
+  }
+  [[nodiscard]] PowerSums<FixedNumbers> sums() const noexcept {
+    return {Simd::sum64(weight),
+            Simd::sum64(density),
+            {Simd::sum64(lever[0]), Simd::sum64(lever[1]), Simd::sum64(lever[2])}};
+  }
+};
+
+void sum_close_samples(const ShellTable<FixedNumbers>& table, const std::int32_t* density,
+                       CloseSums<FixedNumbers>& sums) noexcept {
+  sums = {};
+  V top = Simd::zero();
+  for (std::int32_t i = 0; i < table.count; i += kShellLanes) {
+    top = Simd::max32(top, Simd::load(density + i));
+  }
+  sums.top = highest32(top);
+  if (sums.top < kFaintest<FixedNumbers>) return;
+  const auto over_top =
+      Simd::set32(static_cast<std::int32_t>((1U << 31) / static_cast<std::uint32_t>(sums.top)));
+  const auto square = [](V t) {
+    return Simd::srl32<15>(Simd::add32(Simd::multiply32(t, t), Simd::set32(1 << 14)));
+  };
+  PowerVectors low, high;
+  for (std::int32_t i = 0; i < table.count; i += kShellLanes) {
+    const V t = Simd::srl32<16>(Simd::multiply32(Simd::load(density + i), over_top));
+    V power = t;
+    for (int p = 1; p < CloseSums<FixedNumbers>::kLowPower; p *= 2) power = square(power);
+    const V lever[3] = {Simd::load(table.lever[0] + i), Simd::load(table.lever[1] + i),
+                        Simd::load(table.lever[2] + i)};
+    low.add(power, t, lever);
+    high.add(square(power), t, lever);
+  }
+  sums.low = low.sums();
+  sums.high = high.sums();
 }
 
 }  // namespace
