@@ -2,10 +2,12 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "hil/lab/extremes/ct_edge.hpp"
+#include "hil/lab/extremes/exact_touch.hpp"
 #include "hil/lab/extremes/led.hpp"
 #include "hil/lab/extremes/loft.hpp"
 #include "hil/lab/extremes/measures.hpp"
@@ -57,9 +59,33 @@ struct Figures {
   double force_step = 0, degrees = 0, height_sd = 0;
 };
 
-/// `share` of full density by signed distance.
+/// One slide's forces over the stiffness and heights over the ideal place.
+class Course {
+ public:
+  void add(const Touch& touch, Point force, double height) {
+    roughness_.add(force);
+    degrees_ = std::max(degrees_, degrees_between(force, touch.normal));
+    sum_ += height;
+    squares_ += height * height;
+    ++count_;
+  }
+  void worsen(Figures& figures) const {
+    const double mean = sum_ / count_;
+    figures.force_step = std::max(figures.force_step, roughness_.ratio());
+    figures.degrees = std::max(figures.degrees, degrees_);
+    figures.height_sd =
+        std::max(figures.height_sd, std::sqrt(std::max(0.0, squares_ / count_ - mean * mean)));
+  }
+
+ private:
+  Roughness roughness_;
+  double degrees_ = 0, sum_ = 0, squares_ = 0;
+  int count_ = 0;
+};
+
+/// `share` of full density by signed distance. `exact`: what ExactTouch has on the same way.
 void slide(const SampledTool& tool, const Reach& reach, const std::function<double(double)>& share,
-           Dice& dice, Figures& figures) {
+           Dice& dice, Figures& figures, Figures* exact) {
   Frame frame(dice, {28, 28, 28});
   frame.place = frame.at(0, -4 - kBump, 0);
   const Axes axes = standing_on(dice.direction(), dice);
@@ -73,28 +99,28 @@ void slide(const SampledTool& tool, const Reach& reach, const std::function<doub
     led.tick(way.front().hand(-kHigh), turn);
   }
   for (double depth = -kHigh; depth < kDepth; depth += 0.1) led.tick(way.front().hand(depth), turn);
-  Roughness roughness;
-  double sum = 0, squares = 0;
+  Course course;
   for (const Touch& touch : way) {
     const Point force = led.tick(touch.hand(kDepth), turn);
-    roughness.add(force);
-    figures.degrees = std::max(figures.degrees, degrees_between(force, touch.normal));
-    const double off = dot(led.proxy() - touch.centre, touch.normal);
-    sum += off;
-    squares += off * off;
+    course.add(touch, force, dot(led.proxy() - touch.centre, touch.normal));
   }
-  const auto count = static_cast<double>(way.size());
-  const double mean = sum / count;
-  figures.force_step = std::max(figures.force_step, roughness.ratio());
-  figures.height_sd =
-      std::max(figures.height_sd, std::sqrt(std::max(0.0, squares / count - mean * mean)));
+  course.worsen(figures);
+  if (exact == nullptr) return;
+  const ExactTouch truth(tool, axes, body);
+  Course exact_course;
+  for (const Touch& touch : way) {
+    const double height = truth.height(touch.centre, touch.normal);
+    const Point normal = truth.normal(touch.centre, touch.normal);
+    exact_course.add(touch, (kDepth + height) * normal, height);
+  }
+  exact_course.worsen(*exact);
 }
 
 }  // namespace
 
 void measure_shape_slides(const Effort& effort, const Told& told) {
   struct Limit {
-    double must, aim;
+    std::optional<double> must, aim;
   };
   struct Limits {
     Limit step, degrees, sd;
@@ -109,22 +135,27 @@ void measure_shape_slides(const Effort& effort, const Told& told) {
         Subject{"STL, square bar, any pose", mesh_of_units("bar", prism(6, 16, 4))}}) {
     const Reach reach(subject.tool);
     const SampledTool tool(subject.tool);
-    CtEdge ct;
-    const auto measure = [&](const std::string& name, const std::function<double(double)>& share,
-                             const Limits& limits) {
-      Dice dice(5);
-      Figures figures;
-      for (int k = 0; k < effort.slides; ++k) slide(tool, reach, share, dice, figures);
-      const auto row = [&](const char* what, double value, const char* unit, Limit limit) {
+    const auto tell = [&](const std::string& name, const Figures& figures, const Limits& limits) {
+      const auto row = [&](const char* what, double value, const char* unit, const Limit& limit) {
         told({"shapes", subject.name + name + what, value, unit, limit.must, limit.aim});
       };
       row(", force step over the mean", 100 * figures.force_step, "%", limits.step);
       row(", angle", figures.degrees, "deg", limits.degrees);
       row(", surface sd", figures.height_sd, "voxels", limits.sd);
     };
-    measure(": sliding", [](double distance) { return 0.5 - distance / 2; },
-            {{3, 2.1}, {0.75, 0.45}, {0.0075, 0.003}});
-    measure(": sliding on CT with noise", std::ref(ct), {{4.5, 2.7}, {1.8, 1.35}, {0.03, 0.0225}});
+    const auto measure = [&](const std::function<double(double)>& share, Figures* exact) {
+      Dice dice(5);
+      Figures figures;
+      for (int k = 0; k < 2 * effort.slides; ++k) slide(tool, reach, share, dice, figures, exact);
+      return figures;
+    };
+    const auto clean = [](double distance) { return 0.5 - distance / 2; };
+    tell(": sliding", measure(clean, nullptr), {{3, 2.1}, {0.75, 0.45}, {0.0075, 0.003}});
+    CtEdge ct;
+    Figures exact;
+    tell(": sliding on CT with noise", measure(std::ref(ct), &exact),
+         {{4.5, 2.7}, {1.8, 1.35}, {0.03, 0.0225}});
+    tell(": exact contact on CT with noise", exact, {});
   }
 }
 
