@@ -16,8 +16,6 @@ namespace {
 
 using Point = ToolMesh::Point;
 
-constexpr std::size_t kDotsPerSample = 32;  // what stands for the surface while samples move
-constexpr int kRounds = 24;                 // later ones move a sample by less than 0.01 distances
 constexpr std::size_t kNone = std::numeric_limits<std::size_t>::max();
 
 /// A place on the surface.
@@ -218,11 +216,12 @@ double surface_mm2(const ToolMesh& mesh) {
   return sum;
 }
 
-std::vector<Point> mesh_surface_samples(const ToolMesh& mesh, std::size_t count) {
+std::vector<Point> mesh_surface_samples(const ToolMesh& mesh, std::size_t count,
+                                        Relaxation relaxation) {
   const double distance_mm = std::sqrt(surface_mm2(mesh) / static_cast<double>(count));
   std::vector<Site> sites;
   for (const Point& p : rim_samples(mesh, distance_mm)) sites.push_back({p, {}, true});
-  std::vector<Dot> dots = spread_dots(mesh, kDotsPerSample * count);
+  std::vector<Dot> dots = spread_dots(mesh, relaxation.dots * count);
   if (sites.size() < count) {
     // The others begin where no rim is near.
     auto beyond = dots.begin();
@@ -236,7 +235,7 @@ std::vector<Point> mesh_surface_samples(const ToolMesh& mesh, std::size_t count)
     }
     begin_sites_by_side({beyond, dots.end()}, count - sites.size(), sites);
   }
-  for (int i = 0; i < kRounds; ++i) relax(dots, distance_mm, sites);
+  for (int i = 0; i < relaxation.rounds; ++i) relax(dots, distance_mm, sites);
   std::vector<Point> samples;
   for (const Site& site : sites) samples.push_back(site.at);
   return samples;

@@ -123,10 +123,11 @@ class RingSampler {
 };
 
 /// Of any shape but a ball.
-std::vector<Sample> samples_apart(const SceneTool& tool, const Profile& profile, double pitch_mm) {
+std::vector<Sample> samples_apart(const SceneTool& tool, const Profile& profile, double pitch_mm,
+                                  Relaxation relaxation = kEven) {
   if (profile.empty()) {
     const double count = std::ceil(surface_mm2(tool.mesh) / (pitch_mm * pitch_mm));
-    return mesh_surface_samples(tool.mesh, static_cast<std::size_t>(count));
+    return mesh_surface_samples(tool.mesh, static_cast<std::size_t>(count), relaxation);
   }
   RingSampler rings(pitch_mm);
   for (const auto& part : smooth_parts(profile)) rings.add(part);
@@ -166,7 +167,7 @@ std::vector<Sample> surface_samples(const SceneTool& tool, double unit_mm) {
 
 std::vector<Sample> close_samples(const SceneTool& tool, double unit_mm) {
   if (tool.round) return {};
-  return samples_apart(tool, profile_of(tool), kClosePitch * unit_mm);
+  return samples_apart(tool, profile_of(tool), kClosePitch * unit_mm, kNearlyEven);
 }
 
 }  // namespace kerf
