@@ -13,6 +13,10 @@
 
 namespace kerf {
 
+/// So near to where the tool rests there is a closer look at the contact of a tool that is no ball.
+/// At an edge the shell's own samples hold the tool to be up to 0.4 higher than it is.
+inline constexpr double kCloseDepth = 0.4;  ///< units
+
 /// A closeup sees at least so far around a contact, and samples up to half a unit farther.
 inline constexpr double kCloseRadius = 2;
 inline constexpr double kCloseCell = 1;          ///< units; edge of the cells of close samples

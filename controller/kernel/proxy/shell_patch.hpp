@@ -24,10 +24,6 @@ namespace kerf {
 inline constexpr std::size_t kPatchSamples = 4 * kShellGroup;
 inline constexpr double kPatchRadius = 1.5;
 
-/// So near to where the tool rests there is a closer look at its contact. At an edge the shell's
-/// own samples hold the tool to be up to 0.4 higher than it is.
-inline constexpr double kCloseDepth = 0.4;  // units
-
 /// Where the tool touches two faces that look different ways, as the walls of a slot, the mean
 /// gradient of its own samples is shorter along the patch's normal than that of the patch. From
 /// kAlike of it down to kUnlike the shell's plane, which leads between the two, takes over.

@@ -212,8 +212,10 @@ template <class N>
   return typename N::Real((height - typename N::Ratio(0.5)) / slope);
 }
 
-/// The plane of one volume's contact. `reach` of the tool in units. The normal is the weighted
-/// gradient, of a ball `ball_normal`; none, of length 0, where the tool feels the same all round.
+/// The plane of one volume's contact by the shell's own samples. `reach` of the tool in units. The
+/// normal is of a ball `ball_normal`, of another shape the weighted gradient, which near rest is a
+/// first guess: a closer look corrects all three parts (shell_probe.hpp). None, of length 0, where
+/// the tool feels the same all round.
 template <class N>
 [[nodiscard]] constexpr Plane<N> plane_of(const ShellMeans<N>& means, typename N::Real reach,
                                           bool round) noexcept {

@@ -43,8 +43,10 @@ struct ShellVolume {
 /// What a tool feels among the solid volumes of a scene: the ContactField of the sweep.
 ///
 /// `turn` first, then any number of probes with this orientation; a tool that does not turn needs
-/// it once. A probe costs up to as many reads as the shell has samples, times the volumes: those in
-/// free space are left out. In fixed all kernels give the same bits. Servo thread; no heap.
+/// it once. A probe reads at most all samples of the shell in every volume: those in free space are
+/// left out. Where a volume's contact is near rest a closer look is added: at a ball's two caps, or
+/// at other tools' close samples and a patch of the volume; `probe_work` counts both. In fixed all
+/// kernels give the same bits. Servo thread; no heap.
 ///
 /// What a tick may cost is counted in samples: where tissue or noise is felt on all sides, a probe
 /// is twice as dear as at a face. Once the count of `begin_tick` is spent, probes answer `buried`
