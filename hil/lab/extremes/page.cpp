@@ -49,51 +49,33 @@ struct About {
 };
 constexpr About kGroups[] = {
     {"walls", "Walls",
-     "Random steps of 0.1 to 10 m/s at a tilted wall, the cylinder and the bur of "
-     "`scenes/fluted_bur.toml` turned at\n"
-     "random too; no supervisor."},
+     R"(Random steps of 0.1 to 10 m/s at a tilted wall, the cylinder and the bur of `scenes/fluted_bur.toml` turned at
+random too; no supervisor.)"},
     {"rests", "Where a ball comes to rest",
-     "Against the ideal solid, tilted anyhow; on edges against the volume's own iso-surface, since "
-     "trilinear\n"
-     "density holds no sharp edge."},
+     R"(Against the ideal solid, tilted anyhow; on edges against the volume's own iso-surface, since trilinear
+density holds no sharp edge.)"},
     {"slides", "Slides",
-     "The step is of the force from tick to tick over its mean; that of the direction alone is "
-     "1.04 % at R 40 and\n"
-     "4.5 % at R 14. `CT` has edges blurred by a deviation of one voxel, and noise of 2 %."},
+     R"(The step is of the force from tick to tick over its mean; that of the direction alone is 1.04 % at R 40 and
+4.5 % at R 14. `CT` has edges blurred by a deviation of one voxel, and noise of 2 %.)"},
     {"shapes", "Tools that are no balls",
-     "At rest on flats of any tilt and on sharp edges of 90 degrees, these against the volume's "
-     "own "
-     "iso-surface; and\n"
-     "sliding at 50 mm/s over a ball of R 40, 2 deep. Limits are 1.5 times those of the ball, on "
-     "CT "
-     "too. There a rim\n"
-     "or a point misses them: it touches in one place, and the noise of one voxel is a surface "
-     "that "
-     "waves by 0.03 voxels,\n"
-     "where a ball's height and normal are the means of some fifty."},
+     R"(At rest on flats of any tilt and on sharp edges of 90 degrees, these against the volume's own iso-surface; and
+sliding at 50 mm/s over a ball of R 40, 2 deep. Limits are 1.5 times those of the ball, on CT too. There a rim
+or a point misses them: it touches in one place, and the noise of one voxel is a surface that waves by 0.03 voxels,
+where a ball's height and normal are the means of some fifty.)"},
     {"cutting", "Cutting by force",
-     "The whole servo with `[cut] model = \"preston\"`: a ball of radius 1 mm, led by hand over a "
-     "flat; pressed on it\n"
-     "with the same force, up to 1.2 N and back, whatever gives way; and sunk into a crown at the "
-     "rate of enamel,\n"
-     "the worst of nine places. `GE tooth` is a real one by CT, below `--data` or `$KERF_DATA`."},
+     R"(The whole servo with `[cut] model = "preston"`: a ball of radius 1 mm, led by hand over a flat; pressed on it
+with the same force, up to 1.2 N and back, whatever gives way; and sunk into a crown at the rate of enamel,
+the worst of nine places. `GE tooth` is a real one by CT, below `--data` or `$KERF_DATA`.)"},
     {"ticks", "Ticks",
-     "On 256 x 256 x 161 voxels. The costliest tick of each tool is looked for among thousands, at "
-     "flat, sharp, hollow\n"
-     "and noisy solids, in a slot with a play of 0.1 voxels, in tissue just below the iso and, "
-     "where "
-     "its data are, at the\n"
-     "GE tooth, with goals near and far and places looked for anew. Those that took longest are "
-     "repeated from the same\n"
-     "state, and the fastest repetition counts; where it was found is told."},
+     R"(On 256 x 256 x 161 voxels. The costliest tick of each tool is looked for among thousands, at flat, sharp, hollow
+and noisy solids, in a slot with a play of 0.1 voxels, in tissue just below the iso and, where its data are, at the
+GE tooth, with goals near and far and places looked for anew. Those that took longest are repeated from the same
+state, and the fastest repetition counts; where it was found is told.)"},
     {"hands", "Hands",
-     "An emulated Omni, its driver and the whole servo in virtual time, `scenes/touch.toml`; "
-     "`groove` and\n"
-     "`cut_cavity` with `[cut] model = \"preston\"`. Force "
-     "above 150 Hz\n"
-     "is rms, by windows of 0.128 s wholly in contact. A count of an encoder is up to 0.06 mm, or "
-     "0.024 N.\n"
-     "The second stab of `jerk` goes beside the crown."},
+     R"(An emulated Omni, its driver and the whole servo in virtual time, `scenes/touch.toml`; `groove` and
+`cut_cavity` with `[cut] model = "preston"`. Force above 150 Hz
+is rms, by windows of 0.128 s wholly in contact. A count of an encoder is up to 0.06 mm, or 0.024 N.
+The second stab of `jerk` goes beside the crown.)"},
 };
 
 std::string number(double value) {
