@@ -60,8 +60,9 @@ density holds no sharp edge.)"},
     {"shapes", "Tools that are no balls",
      R"(At rest on flats of any tilt and on sharp edges of 90 degrees, these against the volume's own iso-surface; and
 sliding at 50 mm/s over a ball of R 40, 2 deep. Limits are 1.5 times those of the ball, on CT too. There a rim
-or a point misses them: it touches in one place, and the noise of one voxel is a surface that waves by 0.03 voxels,
-where a ball's height and normal are the means of some fifty.)"},
+or a point misses them: it touches in one place, where the noise of one voxel makes waves of the surface itself, and
+a ball's height and normal are the means of some fifty samples. `exact contact` is what a tool of exact shape would
+feel on the same iso-surface of trilinear density, without any mean.)"},
     {"cutting", "Cutting by force",
      R"(The whole servo with `[cut] model = "preston"`: a ball of radius 1 mm, led by hand over a flat; pressed on it
 with the same force, up to 1.2 N and back, whatever gives way; and sunk into a crown at the rate of enamel,
