@@ -69,6 +69,7 @@ class PrestonTick {
       const auto fed =
           portion<N>(budget_of(plan_.rate[m], drive), share_of<N>(covered_.weight[m], all));
       if (!(fed > 0)) return;
+      fed_[m] = true;
       budget_[m] = fed + state_.carry[m] / kCarryTicks;
       state_.carry[m] += fed;
     });
@@ -80,7 +81,7 @@ class PrestonTick {
     for (std::size_t m = 0; m < kMaxCutMaterials; ++m) {
       const auto kept = std::clamp(state_.carry[m], -kFullVoxel, kFullVoxel);
       out.lost += state_.carry[m] - kept;
-      out.starves = out.starves || (budget_[m] > 0 && kept > kFullVoxel / 2);
+      out.starves = out.starves || (fed_[m] && kept > kFullVoxel / 2);
       state_.carry[m] = kept;
     }
   }
@@ -118,6 +119,7 @@ class PrestonTick {
   PrestonState<N>& state_;
   Covered& covered_;
   ByMaterial<CutBudget<N>> budget_{};  ///< of this tick, still to be spent
+  ByMaterial<bool> fed_{};             ///< in this tick
 };
 
 }  // namespace detail

@@ -16,7 +16,8 @@ struct Relaxation {
   std::size_t dots;
   int rounds;
 };
-inline constexpr Relaxation kEven{32, 24};       ///< a later round moves them by less than 1 %
+inline constexpr Relaxation kEven{
+    32, 24};  ///< later rounds move them by less than 1 % of their distance
 inline constexpr Relaxation kNearlyEven{12, 8};  ///< takes a sixth of the time
 
 /// Some `count` samples of a mesh, each with the same area to itself: those of its rims and points,

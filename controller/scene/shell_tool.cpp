@@ -79,7 +79,8 @@ ShellTool<N>::ShellTool(std::span<const Point> samples_units, bool round,
     Point middle{};
     for (std::size_t axis = 0; axis < 3; ++axis) middle[axis] = (b.low[axis] + b.high[axis]) / 2;
     const double out = distance(middle, {});
-    for (double& part : middle) part *= std::min(1.0, reach_ / std::max(out, reach_));  // a lever
+    // No lever is beyond the reach: 31 bits would not hold its place.
+    for (double& part : middle) part *= reach_ / std::max(out, reach_);
     double radius = 0;
     for (const Point& p : group) radius = std::max(radius, distance(p, middle));
     add(middle_, middle);

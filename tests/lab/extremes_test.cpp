@@ -11,6 +11,7 @@
 #include <unistd.h>
 
 #include "hil/lab/extremes/comparison.hpp"
+#include "hil/lab/extremes/exact_touch.hpp"
 #include "hil/lab/extremes/page.hpp"
 #include "hil/lab/extremes/shell_rig.hpp"
 #include "hil/lab/extremes/worst_tick.hpp"
@@ -108,4 +109,20 @@ TEST_CASE("the costliest tick is told with its place; a body out of reach keeps 
   worst.us = 1e9;
   find_worst_tick(ball, {"air", {}, {1000, 20, 20}, kIso}, solid, 200, worst);
   CHECK(worst.trap == "flat");
+}
+
+TEST_CASE("exact contact on a smooth ball is where and how the ball is") {
+  const SampledTool cone(tool_of_units("cone", 5, 16));
+  Dice dice(2);
+  for (int pose = 0; pose < 10; ++pose) {
+    const Point up = dice.direction(), top{30, 30, 30};
+    const Axes axes = standing_on(dice.direction(), dice);
+    const Body bump =
+        blurred({60, 60, 60}, [&](Point p) { return length(p - top + 40 * up) - 40; });
+    const Reach reach(tool_of_units("cone", 5, 16));
+    const Point centre = top - axes.to_world(reach.farthest(axes.to_tool(-1 * up)));
+    const ExactTouch touch(cone, axes, bump);
+    CHECK(std::abs(touch.height(centre, up)) < 0.03);
+    CHECK(degrees_between(touch.normal(centre, up), up) < 1);
+  }
 }

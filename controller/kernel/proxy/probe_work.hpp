@@ -31,8 +31,8 @@ struct ProbeWork {
   [[nodiscard]] constexpr std::int64_t budget() const noexcept {
     return std::max(kTickSamples, kLeastProbes * (probe + turn));
   }
-  /// Of any tick of a sweep: the budget, and the look after the turns where their last trial, of
-  /// three probes, may take the half that is the move's. A sweep of few samples ends before, with
+  /// Of any tick of a sweep: the budget, and the look after the turns where their last probes may
+  /// take of the half that is the move's. A sweep of few samples ends before, with
   /// the last probe that it may take.
   [[nodiscard]] constexpr std::int64_t most() const noexcept {
     constexpr std::int64_t kTurns = SweepRules::kMaxTurnProbes + 1;

@@ -49,7 +49,8 @@ struct SweepRules {
   static constexpr std::int32_t kFineProbes = 14;
   static constexpr std::int32_t kStillProbes = 24;  ///< without a nearer place the tool stays
   static constexpr double kPush = 0.5;              ///< longest correction of one push
-  /// Where a push from one wall only leads into another, the tool may be this deep in the first.
+  /// Where a push from one wall leads into another, or the tick has no probe left to see whether it
+  /// does, the tool may be this deep in the first.
   /// What two opposite faces read differs by some hundredths from place to place, and a tool that
   /// is turned until both hold it would stay there whatever the hand does: 4 % of tools that spin
   /// askew in slots did, with 0.03 still one in a thousand.
@@ -129,8 +130,7 @@ class ProxySweep {
     Probe<N> felt;
     PlaneBundle<N> planes;
     Probe<N> first;
-    bool allowed = false;  ///< the tool may stay there
-    bool wedged = false;   ///< deeper than the tolerance
+    bool allowed = false;  ///< the tool may go there
   };
   enum class Trying { turn, move };
 
@@ -141,13 +141,20 @@ class ProxySweep {
   [[nodiscard]] constexpr bool may_look() const noexcept {
     return probes_ < SweepRules::kMaxProbes;
   }
-  /// The tool may stay.
+  /// No deeper than where walls hold the tool: it need not get out.
   [[nodiscard]] static constexpr bool allows_rest(const Probe<N>& felt) noexcept {
-    return !felt.buried && felt.depth <= Real(SweepRules::kTolerance);
+    return !felt.buried && felt.depth <= Real(SweepRules::kWedged);
   }
   /// Within the tolerance, or no deeper than the tool is where it is too deep already.
   [[nodiscard]] constexpr bool allows(const Probe<N>& felt, Real tolerance) const noexcept {
     return !felt.buried && felt.depth <= std::max(tolerance, here_.depth);
+  }
+
+  /// A push out of what was felt first led into another wall, or was not seen.
+  [[nodiscard]] static constexpr bool meets_another(const Probe<N>& first,
+                                                    const Probe<N>& pushed) noexcept {
+    if (first.count == 0 || pushed.count == 0) return true;
+    return dot(first.plane[0].normal, pushed.plane[0].normal) < Unit(kFalseCreaseCosine);
   }
 
   /// How to go on from a place.
@@ -175,7 +182,8 @@ class ProxySweep {
   }
 
   /// Looks at a place `moved` from where the depths of `known` count, and where the tool is deeper
-  /// there than is allowed pushes it out: twice at most. A turn may only spend half of the tick.
+  /// there than is allowed pushes it out: twice at most. A turn begins no push in the second half
+  /// of the tick.
   constexpr Trial attempt(Trying what, Place centre, const PlaneBundle<N>& known,
                           Place moved) noexcept {
     const bool turns = what == Trying::turn;
@@ -199,9 +207,9 @@ class ProxySweep {
       keep(trial.planes, known, moved + pushed);
     }
     trial.allowed = allows(trial.felt, tolerance);
-    trial.wedged =
-        !turns && !trial.allowed && !first.buried && first.depth <= Real(SweepRules::kWedged);
-    if (trial.wedged) return {centre, first, unpushed, first, true, true};
+    if (!turns && !trial.allowed && allows_rest(first) && meets_another(first, trial.felt)) {
+      return {centre, first, unpushed, first, true};
+    }
     keep(trial.planes, bundle_of(first), pushed);
     return trial;
   }
@@ -270,7 +278,7 @@ class ProxySweep {
         if ((leads && !strays) || distance < norm(goal - from) - Real(SweepRules::kGain)) {
           pose_.centre = trial.centre;
           here_ = trial.felt;
-          if (allows_rest(here_) || trial.wedged) nearest_yet = std::min(nearest_yet, distance);
+          if (allows_rest(here_)) nearest_yet = std::min(nearest_yet, distance);
           held_by_ = trial.planes;
           onward = next;
           shrink = Unit(1);

@@ -17,7 +17,7 @@ namespace kerf {
 /// At an edge the shell's own samples hold the tool to be up to 0.4 higher than it is.
 inline constexpr double kCloseDepth = 0.4;  ///< units
 
-/// A closeup sees at least so far around a contact, and samples up to half a unit farther.
+/// A closeup sees at least so far around a contact, and samples up to a cell farther.
 inline constexpr double kCloseRadius = 2;
 inline constexpr double kCloseCell = 1;          ///< units; edge of the cells of close samples
 inline constexpr double kClosePitch = 0.35;      ///< units between them
@@ -84,9 +84,9 @@ struct CloseSamples {
       for (; count < kMostClose; ++count) {
         const std::int32_t at = count * all / kMostClose - seen;
         if (at >= more) break;
-        const auto to = static_cast<std::size_t>(count);
+        const auto slot = static_cast<std::size_t>(count);
         for (std::size_t axis = 0; axis < 3; ++axis)
-          lever[axis][to] = table.lever[axis][first + at];
+          lever[axis][slot] = table.lever[axis][first + at];
       }
       seen += more;
     });

@@ -61,7 +61,7 @@ template <class N>
   using Ratio = typename N::Ratio;
   using Sum = typename N::Sum;
   const Ratio cube = top * top * top, weight = cube * cube;
-  Sum of_wide(kWide);
+  auto of_wide = static_cast<Sum>(kWide);
   if constexpr (N::kIsFixed) {
     of_wide *= std::max(1, weight.raw());
   } else {

@@ -50,8 +50,8 @@ struct ShellVolume {
 ///
 /// What a tick may cost is counted in samples: where tissue or noise is felt on all sides, a probe
 /// is twice as dear as at a face. Once the count of `begin_tick` is spent, probes answer `buried`
-/// unseen, and a sweep stays at the last place that it found; but the first probe after a turn is
-/// always answered.
+/// unseen, and a sweep stays at the last place that it found (SweepRules::kWedged); but the first
+/// probe after a turn is always answered.
 template <class N>
 class ShellProbe {
  public:

@@ -35,7 +35,8 @@ struct ShellTable {
 /// The step from levers to voxels of one volume: offset_i = (SUM_k row[i][k] lever[k]) 2^-shift in
 /// Q15.16, rounded half up. In fixed |row[i]| <= 65000 and |lever| <= 2^15, but for their
 /// roundings, so no sum leaves 31 bits. A ball's caps have levers of up to 1.42 times that, but
-/// their rows are made so that no offset is above 1.04 radii. In floating point there is no shift.
+/// rows of 53248 at most, made so that no offset is above 1.04 radii. In floating point there is no
+/// shift.
 template <class N>
 struct ShellStep {
   ShellNumber<N> row[3][3] = {};

@@ -56,13 +56,14 @@ random too; no supervisor.)"},
 density holds no sharp edge.)"},
     {"slides", "Slides",
      R"(The step is of the force from tick to tick over its mean; that of the direction alone is 1.04 % at R 40 and
-4.5 % at R 14. `CT` has edges blurred by a deviation of one voxel, and noise of 2 %.)"},
+4.5 % at R 14, where the limit is 0.08 N or twice the mean. `CT` has edges blurred by a deviation of one voxel, and noise of 2 %.)"},
     {"shapes", "Tools that are no balls",
      R"(At rest on flats of any tilt and on sharp edges of 90 degrees, these against the volume's own iso-surface; and
 sliding at 50 mm/s over a ball of R 40, 2 deep. Limits are 1.5 times those of the ball, on CT too. There a rim
 or a point misses them: it touches in one place, where the noise of one voxel makes waves of the surface itself, and
-a ball's height and normal are the means of some fifty samples. `exact contact` is what a tool of exact shape would
-feel on the same iso-surface of trilinear density, without any mean.)"},
+a ball's height and normal are the means of some fifty samples. `exact contact` is height and normal of
+the same iso-surface where the tool's close samples touch it at the ideal place, the normal over half a voxel: what
+a contact without any mean begins with.)"},
     {"cutting", "Cutting by force",
      R"(The whole servo with `[cut] model = "preston"`: a ball of radius 1 mm, led by hand over a flat; pressed on it
 with the same force, up to 1.2 N and back, whatever gives way; and sunk into a crown at the rate of enamel,
