@@ -3,7 +3,7 @@
 #include <iostream>
 
 #include "controller/shell/controller_run.hpp"
-#include "controller/shell/probe.hpp"
+#include "controller/shell/probe/probe.hpp"
 
 int main(int argc, char** argv) {
   kerf::ControllerOptions options;

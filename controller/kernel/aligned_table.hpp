@@ -27,7 +27,7 @@ struct AlignedChunk {
 };
 
 /// What the aligned plan holds of one tool, for kernels of one vector width. Made at load time
-/// (controller/scene/aligned_tool.hpp), constant afterwards; points into the maker's memory.
+/// (controller/plan/aligned_tool.hpp), constant afterwards; points into the maker's memory.
 ///
 /// A table entry has up to 18 bits and is kept as 512 hi + lo, both in 16 bits. A run is `lanes`
 /// entries lo, then `lanes` entries hi; with `fused` axes x, y, z follow each other in one run.

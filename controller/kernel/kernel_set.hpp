@@ -6,8 +6,8 @@
 
 #include "controller/kernel/aligned_table.hpp"
 #include "controller/kernel/cover_table.hpp"
-#include "controller/kernel/proxy/close_sums.hpp"
-#include "controller/kernel/proxy/shell_table.hpp"
+#include "controller/kernel/point_shell/close_sums.hpp"
+#include "controller/kernel/point_shell/shell_table.hpp"
 #include "controller/kernel/sample_table.hpp"
 #include "controller/kernel/splat_table.hpp"
 #include "shared/volume/voxel_grid.hpp"

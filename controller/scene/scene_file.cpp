@@ -13,6 +13,7 @@
 #include "controller/scene/scene_table.hpp"
 #include "controller/scene/scene_text.hpp"
 #include "controller/scene/scene_words.hpp"
+#include "controller/servo/servo_limits.hpp"
 
 namespace kerf {
 namespace {
@@ -65,8 +66,8 @@ void read_choice(const SceneTable& table, std::string_view key,
   if (const auto index = table.choice(key, words)) into = static_cast<Enum>(*index);
 }
 
-void read_device_table(const SceneTable& table, SceneSpec& scene) {
-  Scene::Device& device = scene.device;
+void read_device_table(const SceneTable& table, Scene& scene) {
+  DeviceSettings& device = scene.device;
   read_choice(table, "personality", kPersonalityWords, device.personality);
   device.workspace_scale =
       table.number("workspace_scale", kWorkspaceScale).value_or(device.workspace_scale);
@@ -97,7 +98,7 @@ void refuse_ignored(const SceneTable& table, KeyList keys, const std::string& of
   }
 }
 
-void read_force_table(const SceneTable& table, Scene::Force& force) {
+void read_force_table(const SceneTable& table, ForceSettings& force) {
   constexpr Keys kPaperKeys = {"p0_n_per_mm2"};
   constexpr Keys kProxyKeys = {"stiffness_n_per_mm", "damping_ns_per_mm", "friction"};
   read_choice(table, "model", kForceModelWords, force.model);
@@ -112,14 +113,14 @@ void read_force_table(const SceneTable& table, Scene::Force& force) {
   force.friction = table.number("friction", kProxyFriction).value_or(force.friction);
 }
 
-void read_cut_table(const SceneTable& table, SceneSpec& scene) {
+void read_cut_table(const SceneTable& table, Scene& scene) {
   read_choice(table, "model", kCutModelWords, scene.cut.model);
   constexpr Keys kOverlapKeys = {"rate_per_s", "p1_n_per_mm2"};
   constexpr Keys kPrestonKeys = {"machinability_mm3_per_s_n", "threshold_n", "friction"};
   const bool preston = scene.cut.model == CutModel::preston;
   refuse_ignored(table, preston ? KeyList(kOverlapKeys) : KeyList(kPrestonKeys),
                  preston ? "overlap" : "preston");
-  Scene::Cut& cut = scene.cut;
+  CutSettings& cut = scene.cut;
   cut.machinability_mm3_per_s_n = table.number("machinability_mm3_per_s_n", kMachinabilityMm3PerSN)
                                       .value_or(cut.machinability_mm3_per_s_n);
   cut.threshold_n = table.number("threshold_n", kThresholdN).value_or(cut.threshold_n);
@@ -134,12 +135,12 @@ void read_cut_table(const SceneTable& table, SceneSpec& scene) {
       table.number("p1_n_per_mm2", kPressureNPerMm2).value_or(scene.cut.p1_n_per_mm2);
 }
 
-void read_spindle_table(const SceneTable& table, SceneSpec& scene) {
+void read_spindle_table(const SceneTable& table, Scene& scene) {
   if (scene.cut.model != CutModel::preston) {
     refuse(table.place(),
            " turns nothing: only cut.model = \"preston\" has a spindle; leave it out");
   }
-  Scene::Spindle& spindle = scene.spindle;
+  SpindleSettings& spindle = scene.spindle;
   spindle.speed_krpm = table.number("speed_krpm", kSpeedKrpm).value_or(spindle.speed_krpm);
   spindle.stall_torque_n_mm =
       table.number("stall_torque_n_mm", kStallTorqueNMm).value_or(spindle.stall_torque_n_mm);
@@ -149,7 +150,7 @@ void read_spindle_table(const SceneTable& table, SceneSpec& scene) {
 
 /// The paper's force knows no normal that could cut by force: unless its scene says another model
 /// of cutting, it comes with the paper's own.
-void read_models(const SceneTable& root, SceneSpec& scene) {
+void read_models(const SceneTable& root, Scene& scene) {
   if (const auto table = root.table("force", kForceKeys)) read_force_table(*table, scene.force);
   if (scene.force.model == ForceModel::paper) scene.cut.model = CutModel::overlap;
   if (const auto table = root.table("cut", kCutKeys)) read_cut_table(*table, scene);
@@ -157,17 +158,17 @@ void read_models(const SceneTable& root, SceneSpec& scene) {
 }
 
 /// The overlap models cut whatever they meet.
-void refuse_uncut(const SceneSpec& scene) {
+void refuse_uncut(const Scene& scene) {
   if (scene.cut.model == CutModel::none || scene.cut.model == CutModel::preston) return;
   for (const Material& material : scene.materials) {
     if (!material.forbidden) continue;
-    refuse(scene.path.string(), ": material " + material.name +
-                                    " is forbidden, and this cut.model cuts everything; set model "
-                                    "= \"preston\", or leave forbidden out");
+    refuse(scene.path, ": material " + material.name +
+                           " is forbidden, and this cut.model cuts everything; set model "
+                           "= \"preston\", or leave forbidden out");
   }
 }
 
-void read_limits_table(const SceneTable& table, Scene::Limits& limits) {
+void read_limits_table(const SceneTable& table, LimitSettings& limits) {
   limits.force_n = table.number("force_n", kForceN).value_or(limits.force_n);
   limits.slew_n_per_ms = table.number("slew_n_per_ms", kSlewNPerMs).value_or(limits.slew_n_per_ms);
   limits.speed_mm_per_s =
@@ -176,7 +177,7 @@ void read_limits_table(const SceneTable& table, Scene::Limits& limits) {
                                   .value_or(std::min(limits.continuous_force_n, limits.force_n));
 }
 
-void read_servo_table(const SceneTable& table, Scene::Servo& servo) {
+void read_servo_table(const SceneTable& table, ServoSettings& servo) {
   servo.rate_hz = table.whole("rate_hz", kRateHz).value_or(servo.rate_hz);
   read_choice(table, "numeric", kNumericWords, servo.numeric);
   read_choice(table, "kernel", kGradientWords, servo.kernel);
@@ -193,9 +194,9 @@ void refuse_second(const SceneTable& table, const std::string& name,
   refuse(table.place(), " is the second named \"" + name + "\"; write another name = \"..\"");
 }
 
-SceneSpec read_scene(const toml::table& parsed, const std::filesystem::path& path) {
-  SceneSpec scene;
-  scene.path = path;
+Scene read_scene(const toml::table& parsed, const std::filesystem::path& path) {
+  Scene scene;
+  scene.path = path.string();
   scene.materials = default_materials();
   const SceneTable root(parsed, "", path.string(), kRootKeys);
 
@@ -238,7 +239,7 @@ SceneSpec read_scene(const toml::table& parsed, const std::filesystem::path& pat
 
 }  // namespace
 
-SceneSpec parse_scene(std::string_view text, const std::filesystem::path& path) {
+Scene parse_scene(std::string_view text, const std::filesystem::path& path) {
   const toml::parse_result parsed = toml::parse(text, path.string());
   if (parsed) return read_scene(parsed.table(), path);
   const toml::parse_error& error = parsed.error();
@@ -247,7 +248,7 @@ SceneSpec parse_scene(std::string_view text, const std::filesystem::path& path) 
          ": " + std::string(error.description()) + "; correct the TOML syntax here");
 }
 
-SceneSpec parse_scene_file(const std::filesystem::path& path) {
+Scene parse_scene_file(const std::filesystem::path& path) {
   constexpr std::uintmax_t kLargestFile = std::uintmax_t{1} << 20;
   std::error_code fault;
   if (std::filesystem::is_directory(path, fault)) {

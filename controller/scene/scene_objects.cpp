@@ -8,7 +8,6 @@
 #include <iterator>
 
 #include "controller/scene/materials.hpp"
-#include "controller/scene/mesh_tool.hpp"
 #include "controller/scene/scene_text.hpp"
 
 namespace kerf {

@@ -5,7 +5,7 @@
 #include <string>
 #include <string_view>
 
-#include "controller/device/device_driver.hpp"
+#include "controller/device/driver/device_driver.hpp"
 
 namespace kerf {
 

@@ -12,7 +12,7 @@
 
 #include <CLI/CLI.hpp>
 
-#include "controller/device/open_port.hpp"
+#include "controller/device/port/open_port.hpp"
 #include "controller/scene/scene_file.hpp"
 #include "controller/scene/scene_words.hpp"
 

@@ -5,7 +5,7 @@
 #include <optional>
 #include <string>
 
-#include "controller/scene/scene_load.hpp"
+#include "controller/load/scene_load.hpp"
 #include "controller/shell/real_time.hpp"
 
 namespace kerf {

@@ -19,14 +19,13 @@
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 
-#include "controller/device/make_driver.hpp"
-#include "controller/device/open_port.hpp"
-#include "controller/scene/compile.hpp"
-#include "controller/scene/scene_json.hpp"
-#include "controller/scene/scene_load.hpp"
+#include "controller/device/driver/make_driver.hpp"
+#include "controller/device/port/open_port.hpp"
+#include "controller/load/scene_json.hpp"
+#include "controller/load/scene_load.hpp"
+#include "controller/plan/compile.hpp"
+#include "controller/plan/cost/work_budget.hpp"
 #include "controller/scene/scene_words.hpp"
-#include "controller/scene/volume_write.hpp"
-#include "controller/scene/work_budget.hpp"
 #include "controller/shell/call_guard.hpp"
 #include "controller/shell/explain_scene.hpp"
 #include "controller/shell/motor_guard.hpp"
@@ -37,6 +36,7 @@
 #include "controller/shell/servo_loop.hpp"
 #include "controller/shell/stop_signals.hpp"
 #include "controller/shell/watchdog_thread.hpp"
+#include "controller/volume/volume_write.hpp"
 #include "shared/posix/new_file.hpp"
 #include "shared/segment/segment_plan.hpp"
 #include "shared/volume/density_hash.hpp"
@@ -66,7 +66,7 @@ const char* text_of(EndReason end) {
 }
 
 /// What the demo script hands to the emulator.
-std::string hand_lines(const Scene& scene) {
+std::string hand_lines(const LoadedScene& scene) {
   char unit[64];
   std::snprintf(unit, sizeof unit, "%.9g", hand_unit_mm(scene));
   return "hand_unit_mm=" + std::string(unit) + "\nhand_script=" + scene.hand_script +
@@ -83,7 +83,7 @@ void accept_rights(const std::vector<MissingRight>& missing, bool strict) {
   }
 }
 
-double removed_mm3(const Scene& scene, const RunRecord& record) {
+double removed_mm3(const LoadedScene& scene, const RunRecord& record) {
   double mm3 = 0;
   for (std::size_t v = 0; v < scene.volumes.size(); ++v) {
     const auto& h = scene.volumes[v].image.spacing_mm;
@@ -92,7 +92,7 @@ double removed_mm3(const Scene& scene, const RunRecord& record) {
   return mm3;
 }
 
-std::uint64_t hash_of_volumes(const Scene& scene, const Servo& servo) {
+std::uint64_t hash_of_volumes(const LoadedScene& scene, const Servo& servo) {
   std::uint64_t hash = kHashSeed;
   for (std::size_t v = 0; v < scene.volumes.size(); ++v) {
     hash = hash_word(hash, density_hash(servo.density(v)));
@@ -101,7 +101,7 @@ std::uint64_t hash_of_volumes(const Scene& scene, const Servo& servo) {
 }
 
 /// The volumes as they are now: the first as `path`, others beside it under their names.
-void write_final(const Scene& scene, const Servo& servo, const std::filesystem::path& path) {
+void write_final(const LoadedScene& scene, const Servo& servo, const std::filesystem::path& path) {
   for (std::size_t v = 0; v < scene.volumes.size(); ++v) {
     if (v > 0 && !scene.volumes[v].solid) continue;
     VolumeImage image = scene.volumes[v].image;
@@ -131,13 +131,15 @@ void show_progress(const LoopSignals& signals, const std::atomic<bool>& ended,
 }
 
 /// In lock-step the device waits: there is no deadline to keep.
-void check_budget(const ControllerOptions& options, const Scene& scene, const SceneCosts& costs) {
+void check_budget(const ControllerOptions& options, const LoadedScene& scene,
+                  const SceneCosts& costs) {
   const std::string refusal = options.virtual_time ? "" : over_budget(scene, costs);
   if (!refusal.empty()) throw std::runtime_error(refusal);
 }
 
 /// Whatever can be said without memory for the loop.
-int check_scene(const ControllerOptions& options, const Scene& scene, const SceneCosts& costs) {
+int check_scene(const ControllerOptions& options, const LoadedScene& scene,
+                const SceneCosts& costs) {
   std::printf("scene=%s\n", scene.path.c_str());
   for (const SceneVolume& v : scene.volumes) {
     const auto& g = v.image.grid;
@@ -164,7 +166,8 @@ int check_scene(const ControllerOptions& options, const Scene& scene, const Scen
 }
 
 /// Everything that can be known to go wrong, before the hand is moved.
-void check_run(const ControllerOptions& options, const Scene& scene, const SceneCosts& costs) {
+void check_run(const ControllerOptions& options, const LoadedScene& scene,
+               const SceneCosts& costs) {
   if (static_cast<double>(options.real_time.spin_us) * scene.servo.rate_hz > 0.9e6) {
     throw std::runtime_error("--spin-us " + std::to_string(options.real_time.spin_us) +
                              " is more than 90 % of a tick at " +
@@ -188,7 +191,8 @@ void check_run(const ControllerOptions& options, const Scene& scene, const Scene
   }
 }
 
-RunReport new_report(const ControllerOptions& options, const Scene& scene, std::uint64_t hash) {
+RunReport new_report(const ControllerOptions& options, const LoadedScene& scene,
+                     std::uint64_t hash) {
   RunReport report;
   report.scene = options.scene;
   report.device = kPersonalityWords[static_cast<std::size_t>(scene.device.personality)];
@@ -295,7 +299,7 @@ int run_controller(const ControllerOptions& options) {
   spdlog::set_pattern("kerf-controller: %^%l%$: %v");
   std::atomic<bool>& stop = catch_stop_signals();
 
-  Scene scene = load_scene(options.scene, options.overrides);
+  LoadedScene scene = load_scene(options.scene, options.overrides);
   const std::unique_ptr<CompiledScene> servo = plan_scene(scene);
   if (options.check) return check_scene(options, scene, servo->costs());
   if (options.explain) {

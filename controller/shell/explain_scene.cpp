@@ -5,17 +5,17 @@
 #include <stdexcept>
 #include <string>
 
-#include "controller/scene/scene_json.hpp"
-#include "controller/scene/work_budget.hpp"
-#include "controller/shell/calibration.hpp"
-#include "controller/shell/explain.hpp"
+#include "controller/load/scene_json.hpp"
+#include "controller/plan/cost/calibration.hpp"
+#include "controller/plan/cost/explain.hpp"
+#include "controller/plan/cost/work_budget.hpp"
 #include "controller/shell/scene_segment.hpp"
 #include "shared/posix/cores.hpp"
 #include "shared/posix/new_file.hpp"
 
 namespace kerf {
 
-void explain_scene(const ControllerOptions& options, Scene& scene, CompiledScene& servo) {
+void explain_scene(const ControllerOptions& options, LoadedScene& scene, CompiledScene& servo) {
   if (!options.report.empty()) check_new_file(options.report);
   const int core = options.real_time.cpu >= 0 ? options.real_time.cpu : allowed_cores().back();
   static_cast<void>(pin_to_core(core));  // where it may not, times are less even

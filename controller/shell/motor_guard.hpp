@@ -4,7 +4,7 @@
 #include <array>
 #include <cstddef>
 
-#include "controller/device/device_driver.hpp"
+#include "controller/device/driver/device_driver.hpp"
 
 namespace kerf {
 

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstddef>
 
-#include "controller/scene/scene_place.hpp"
+#include "controller/load/scene_place.hpp"
 #include "shared/numeric/fixed.hpp"
 
 namespace kerf {

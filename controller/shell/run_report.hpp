@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "controller/device/packet_port.hpp"
+#include "controller/device/port/packet_port.hpp"
 #include "controller/shell/real_time.hpp"
 #include "controller/shell/run_record.hpp"
 

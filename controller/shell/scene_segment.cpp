@@ -8,7 +8,7 @@
 
 namespace kerf {
 
-SegmentSpec segment_spec(const Scene& scene, const std::string& json, std::uint64_t hash) {
+SegmentSpec segment_spec(const LoadedScene& scene, const std::string& json, std::uint64_t hash) {
   SegmentSpec spec;
   spec.scene_json = json;
   spec.config_hash = hash;
@@ -30,7 +30,7 @@ SegmentSpec segment_spec(const Scene& scene, const std::string& json, std::uint6
   return spec;
 }
 
-void check_memory(const Scene& scene, const SceneCosts& costs, std::uint64_t segment_bytes) {
+void check_memory(const LoadedScene& scene, const SceneCosts& costs, std::uint64_t segment_bytes) {
   std::uint64_t bytes = segment_bytes;
   for (const ArrayBytes& array : costs.arrays) bytes += array.taken ? 0 : array.bytes;
   const auto free_bytes = available_memory();

@@ -4,7 +4,7 @@
 #include <atomic>
 #include <cstdint>
 
-#include "controller/device/device_driver.hpp"
+#include "controller/device/driver/device_driver.hpp"
 #include "controller/servo/servo.hpp"
 #include "controller/shell/publisher.hpp"
 #include "controller/shell/run_record.hpp"

@@ -3,7 +3,7 @@
 
 #include <cstdint>
 
-#include "controller/device/device_driver.hpp"
+#include "controller/device/driver/device_driver.hpp"
 #include "controller/shell/servo_loop.hpp"
 
 namespace kerf {

@@ -13,13 +13,13 @@
 
 #include <CLI/CLI.hpp>
 
-#include "controller/scene/phantom.hpp"
 #include "controller/scene/scene_error.hpp"
-#include "controller/scene/volume_crop.hpp"
-#include "controller/scene/volume_density.hpp"
-#include "controller/scene/volume_io.hpp"
-#include "controller/scene/volume_resample.hpp"
-#include "controller/scene/volume_write.hpp"
+#include "controller/volume/phantom.hpp"
+#include "controller/volume/volume_crop.hpp"
+#include "controller/volume/volume_density.hpp"
+#include "controller/volume/volume_io.hpp"
+#include "controller/volume/volume_resample.hpp"
+#include "controller/volume/volume_write.hpp"
 #include "controller/volume_tool/volume_info.hpp"
 
 namespace kerf {

@@ -7,8 +7,8 @@
 #include <iosfwd>
 #include <string>
 
-#include "controller/scene/volume_density.hpp"
-#include "controller/scene/volume_io.hpp"
+#include "controller/volume/volume_density.hpp"
+#include "controller/volume/volume_io.hpp"
 
 namespace kerf {
 

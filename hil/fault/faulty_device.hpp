@@ -10,9 +10,9 @@
 #include <span>
 #include <vector>
 
-#include "hil/emulator.hpp"
 #include "hil/fault/fault_script.hpp"
 #include "hil/fault/readings.hpp"
+#include "hil/front/emulator.hpp"
 #include "hil/front/packet_device.hpp"
 
 namespace kerf {

@@ -9,7 +9,7 @@
 #include <span>
 #include <vector>
 
-#include "controller/device/packet_port.hpp"
+#include "controller/device/port/packet_port.hpp"
 
 namespace kerf::test {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/device/falcon_boot.hpp"
+#include "controller/device/port/falcon_boot.hpp"
 
 #include <algorithm>
 #include <deque>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/device/firewire_find.hpp"
+#include "controller/device/port/firewire_find.hpp"
 
 #include <filesystem>
 #include <stdexcept>
@@ -8,7 +8,7 @@
 #include <doctest/doctest.h>
 #include <unistd.h>
 
-#include "controller/device/firewire_streams.hpp"
+#include "controller/device/port/firewire_streams.hpp"
 
 using kerf::cycle_of_stamp;
 using kerf::cycles_between;

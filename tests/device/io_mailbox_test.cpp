@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/device/io_mailbox.hpp"
+#include "controller/device/port/io_mailbox.hpp"
 
 #include <algorithm>
 #include <array>

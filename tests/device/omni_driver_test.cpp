@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/device/omni_driver.hpp"
+#include "controller/device/driver/omni_driver.hpp"
 
 #include <cstdint>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/device/socket_port.hpp"
+#include "controller/device/port/socket_port.hpp"
 
 #include <array>
 #include <cstring>

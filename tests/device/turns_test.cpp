@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/device/turns.hpp"
+#include "controller/device/port/turns.hpp"
 
 #include <doctest/doctest.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/device/udp_port.hpp"
+#include "controller/device/port/udp_port.hpp"
 
 #include <array>
 #include <cstdint>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/device/wooden_driver.hpp"
+#include "controller/device/driver/wooden_driver.hpp"
 
 #include <array>
 #include <cstdint>

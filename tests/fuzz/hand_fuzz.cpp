@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "hil/hand_script_file.hpp"
+#include "hil/emulator/hand_script_file.hpp"
 #include "hil/hil_error.hpp"
 #include "tests/fuzz/text_fuzz.hpp"
 

@@ -9,10 +9,10 @@
 #include <cstdlib>
 #include <span>
 
-#include "controller/device/falcon_driver.hpp"
-#include "controller/device/firewire_streams.hpp"
-#include "controller/device/omni_driver.hpp"
-#include "controller/device/wooden_driver.hpp"
+#include "controller/device/driver/falcon_driver.hpp"
+#include "controller/device/driver/omni_driver.hpp"
+#include "controller/device/driver/wooden_driver.hpp"
+#include "controller/device/port/firewire_streams.hpp"
 #include "shared/wire/falcon_framer.hpp"
 #include "shared/wire/falcon_packet.hpp"
 #include "shared/wire/omni_packet.hpp"

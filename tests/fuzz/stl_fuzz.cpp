@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <utility>
 
-#include "controller/scene/mesh_surface.hpp"
-#include "controller/scene/mesh_tool.hpp"
 #include "controller/scene/scene_error.hpp"
-#include "controller/scene/stl_file.hpp"
-#include "controller/scene/tool_shapes.hpp"
+#include "controller/tool/mesh_surface.hpp"
+#include "controller/tool/mesh_tool.hpp"
+#include "controller/tool/stl_file.hpp"
+#include "controller/tool/tool_shapes.hpp"
 #include "tests/fuzz/text_fuzz.hpp"
 
 /// The file, and what is made of a mesh that passes.

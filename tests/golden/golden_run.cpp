@@ -6,8 +6,8 @@
 #include <memory>
 #include <utility>
 
-#include "controller/scene/compile.hpp"
-#include "controller/scene/tool_shapes.hpp"
+#include "controller/plan/compile.hpp"
+#include "controller/tool/tool_shapes.hpp"
 #include "shared/volume/density_hash.hpp"
 #include "tests/golden/golden_script.hpp"
 #include "tests/kernel/hash.hpp"
@@ -84,9 +84,9 @@ SceneTool hook(std::int32_t side, double pitch_mm) {
   });
 }
 
-Scene golden_scene(GoldenScene which, NumericKind numeric) {
+LoadedScene golden_scene(GoldenScene which, NumericKind numeric) {
   constexpr double kVoxelMm = 0.125;
-  Scene scene;
+  LoadedScene scene;
   scene.path = "golden";
   // The lattice of the tools of its own pitch, then one that no tool fits: turned, not cubic.
   scene.volumes.push_back(
@@ -150,7 +150,7 @@ void add(Hash& hash, const ServoOutput& out) {
 
 GoldenRun golden_run(GoldenScene which, NumericKind numeric, const KernelSet& kernels) {
   const std::int32_t ticks = golden_ticks(which);
-  Scene scene = golden_scene(which, numeric);
+  LoadedScene scene = golden_scene(which, numeric);
   const auto tools = static_cast<std::uint32_t>(scene.tools.size());
   const std::size_t volumes = scene.volumes.size();
   const std::unique_ptr<CompiledScene> servo = compile(scene, kernels);

@@ -7,7 +7,7 @@
 #include <string>
 
 #include "controller/kernel/kernel_set.hpp"
-#include "controller/scene/scene.hpp"
+#include "controller/load/loaded_scene.hpp"
 #include "controller/servo/servo_plan.hpp"
 
 namespace kerf::test {

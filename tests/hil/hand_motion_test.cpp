@@ -8,7 +8,7 @@
 #include <doctest/doctest.h>
 
 #include "hil/devmodel/omni_model.hpp"
-#include "hil/hand_script_file.hpp"
+#include "hil/emulator/hand_script_file.hpp"
 
 namespace {
 

@@ -7,7 +7,7 @@
 #include <doctest/doctest.h>
 #include <unistd.h>
 
-#include "hil/hand_script_file.hpp"
+#include "hil/emulator/hand_script_file.hpp"
 #include "hil/hil_error.hpp"
 
 namespace {

@@ -16,8 +16,8 @@
 #include "hil/devmodel/falcon_model.hpp"
 #include "hil/devmodel/omni_model.hpp"
 #include "hil/devmodel/wooden_model.hpp"
-#include "hil/emulator.hpp"
-#include "hil/hand_script_file.hpp"
+#include "hil/emulator/hand_script_file.hpp"
+#include "hil/front/emulator.hpp"
 #include "tests/hil/model_runs.hpp"
 
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "hil/program.hpp"
+#include "hil/emulator/program.hpp"
 
 #include <atomic>
 #include <filesystem>

@@ -16,7 +16,7 @@
 #include <unistd.h>
 
 #include "hil/devmodel/falcon_model.hpp"
-#include "hil/emulator.hpp"
+#include "hil/front/emulator.hpp"
 #include "hil/front/socket.hpp"
 #include "hil/front/udp_server.hpp"
 #include "hil/hil_error.hpp"

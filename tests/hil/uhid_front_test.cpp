@@ -17,7 +17,7 @@
 #include <unistd.h>
 
 #include "hil/devmodel/wooden_model.hpp"
-#include "hil/emulator.hpp"
+#include "hil/front/emulator.hpp"
 #include "hil/front/uhid/uhid_arm.hpp"
 #include "shared/wire/wooden_packet.hpp"
 #include "tests/hil/serve_for.hpp"

@@ -17,7 +17,7 @@
 #include <unistd.h>
 
 #include "hil/devmodel/falcon_model.hpp"
-#include "hil/emulator.hpp"
+#include "hil/front/emulator.hpp"
 #include "hil/front/usbip/usbip_falcon.hpp"
 #include "shared/wire/falcon_packet.hpp"
 #include "tests/hil/serve_for.hpp"

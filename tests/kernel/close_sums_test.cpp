@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // A closer look at a contact: which samples it takes, and their sums in every instruction set.
-#include "controller/kernel/proxy/close_sums.hpp"
+#include "controller/kernel/point_shell/close_sums.hpp"
 
 #include <algorithm>
 #include <array>
@@ -16,7 +16,7 @@
 
 #include "controller/kernel/kernel_set.hpp"
 #include "controller/kernel/proxy/shell_closeup.hpp"
-#include "controller/scene/close_cells.hpp"
+#include "controller/plan/close_cells.hpp"
 #include "tests/kernel/case_count.hpp"
 #include "tests/kernel/shell_support.hpp"
 

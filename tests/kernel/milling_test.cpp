@@ -44,8 +44,8 @@ struct Tick {
 };
 
 template <class N>
-struct Scene {
-  explicit Scene(TestVolume start)
+struct LoadedScene {
+  explicit LoadedScene(TestVolume start)
       : volume(std::move(start)), field(gradients<N>(GradientKernel::farid, volume)) {}
 
   Tick<N> tick(std::span<const ToolOffset> tool, const ToolPose<N>& pose,
@@ -121,7 +121,7 @@ TEST_CASE_TEMPLATE("the forces of a tick come from the volume before its cut", N
                    FloatNumbers, DoubleNumbers) {
   const auto tool = odd_ball(4);
   const auto pose = turned_pose<N>({30.2, 12.1, 14.2}, {0.2, 0.1, -0.3, 0.9});
-  Scene<N> gentle(flat()), greedy(flat());
+  LoadedScene<N> gentle(flat()), greedy(flat());
   const auto slow = removal_rate<N>(1e-6, false), fast = removal_rate<N>(1.0, false);
   const Tick<N> a = gentle.tick(tool, pose, slow);
   const Tick<N> b = greedy.tick(tool, pose, fast);
@@ -137,8 +137,8 @@ TEST_CASE_TEMPLATE("the forces of a tick come from the volume before its cut", N
 }
 
 TEST_CASE("the modification force is the ratio-weighted sum of the stored gradients") {
-  Scene<FixedNumbers> fixed(flat());
-  Scene<DoubleNumbers> exact(flat());
+  LoadedScene<FixedNumbers> fixed(flat());
+  LoadedScene<DoubleNumbers> exact(flat());
   const auto tool = odd_ball(4);
   for (const double z : {9.5, 11.3, 13.7, 15.1}) {
     const std::array<double, 3> centre{30.4, 12.2, z};
@@ -169,7 +169,7 @@ TEST_CASE("the modification force is the ratio-weighted sum of the stored gradie
 }
 
 TEST_CASE("air gives no modification force even where gradients reach into it") {
-  Scene<FixedNumbers> scene(flat());
+  LoadedScene<FixedNumbers> scene(flat());
   const auto tool = odd_ball(2);
   // The gradient of the face reaches 13 + 2; the tool covers the empty layers 14 and up only.
   overlap<FixedNumbers>(scene.volume.grid, tool, pose_at<FixedNumbers>({30, 12, 16}),
@@ -180,7 +180,7 @@ TEST_CASE("air gives no modification force even where gradients reach into it") 
 }
 
 TEST_CASE("after many cuts the refreshed field is the field of the volume as it is") {
-  Scene<FixedNumbers> scene(random_volume({70, 20, 18}, 9));
+  LoadedScene<FixedNumbers> scene(random_volume({70, 20, 18}, 9));
   const auto tool = paper_ball(6);
   for (int n = 0; n < 60; ++n) {
     const double t = n * 0.9;

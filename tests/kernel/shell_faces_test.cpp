@@ -9,8 +9,8 @@
 
 #include <doctest/doctest.h>
 
-#include "hil/lab/extremes/loft.hpp"
-#include "hil/lab/extremes/posed_tool.hpp"
+#include "lab/rig/loft.hpp"
+#include "lab/rig/posed_tool.hpp"
 #include "tests/kernel/shell_support.hpp"
 
 using namespace kerf;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The shell's sums: every instruction set against their definition, bit for bit.
-#include "controller/kernel/proxy/shell_sums.hpp"
+#include "controller/kernel/point_shell/shell_sums.hpp"
 
 #include <array>
 #include <cstddef>

@@ -4,7 +4,7 @@
 #include <array>
 #include <cstddef>
 
-#include "hil/lab/extremes/shell_rig.hpp"
+#include "lab/rig/shell_rig.hpp"
 #include "tests/kernel/support.hpp"
 
 /// Tools and bodies of known shape for the tests of the swept contact; all lengths in units.

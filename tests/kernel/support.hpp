@@ -14,7 +14,7 @@
 #include "controller/kernel/gradient.hpp"
 #include "controller/kernel/milling.hpp"
 #include "controller/kernel/tool_pose.hpp"
-#include "hil/lab/extremes/body.hpp"
+#include "lab/rig/body.hpp"
 
 /// Analytic volumes, tools and poses for the kernel tests.
 namespace kerf::test {

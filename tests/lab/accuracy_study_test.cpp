@@ -8,11 +8,11 @@
 
 #include <doctest/doctest.h>
 
-#include "hil/lab/accuracy/export.hpp"
-#include "hil/lab/accuracy/label_places.hpp"
-#include "hil/lab/accuracy/page.hpp"
-#include "hil/lab/accuracy/plot.hpp"
-#include "hil/lab/accuracy/study.hpp"
+#include "lab/accuracy/export.hpp"
+#include "lab/accuracy/label_places.hpp"
+#include "lab/accuracy/page.hpp"
+#include "lab/accuracy/plot.hpp"
+#include "lab/accuracy/study.hpp"
 
 using namespace kerf::accuracy;
 

@@ -9,8 +9,8 @@
 
 #include <doctest/doctest.h>
 
-#include "hil/lab/accuracy/contact_errors.hpp"
-#include "hil/lab/accuracy/spline.hpp"
+#include "lab/accuracy/contact_errors.hpp"
+#include "lab/accuracy/spline.hpp"
 
 using namespace kerf;
 using namespace kerf::accuracy;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "hil/lab/faults/contract.hpp"
+#include "lab/faults/contract.hpp"
 
 #include <doctest/doctest.h>
 

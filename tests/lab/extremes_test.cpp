@@ -10,12 +10,12 @@
 #include <nlohmann/json.hpp>
 #include <unistd.h>
 
-#include "hil/lab/extremes/comparison.hpp"
-#include "hil/lab/extremes/exact_touch.hpp"
-#include "hil/lab/extremes/page.hpp"
-#include "hil/lab/extremes/shell_rig.hpp"
-#include "hil/lab/extremes/worst_tick.hpp"
-#include "hil/lab/program.hpp"
+#include "lab/extremes/comparison.hpp"
+#include "lab/extremes/page.hpp"
+#include "lab/extremes/worst_tick.hpp"
+#include "lab/program.hpp"
+#include "lab/rig/exact_touch.hpp"
+#include "lab/rig/shell_rig.hpp"
 
 using namespace kerf::extremes;
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "hil/lab/faults/fault_run.hpp"
+#include "lab/faults/fault_run.hpp"
 
 #include <doctest/doctest.h>
 
@@ -14,7 +14,7 @@ namespace {
 
 /// A Falcon whose hand comes down on a half-space and presses on; a servo in float.
 kerf::faults::Outcome pressing_falcon(const DeviceFault& fault) {
-  kerf::Scene scene = kerf::test::half_space_scene();
+  kerf::LoadedScene scene = kerf::test::half_space_scene();
   scene.device.personality = Personality::falcon;
   scene.device.torque_scale = kerf::FalconParams().torque_scale();
   scene.servo.numeric = kerf::NumericKind::float32;

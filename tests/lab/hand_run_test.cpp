@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "hil/lab/extremes/hand_run.hpp"
+#include "lab/extremes/hand_run.hpp"
 
 #include <cmath>
 #include <numbers>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The baseline of all ratios is the paper's method indeed, computed right.
-#include "hil/lab/paper_baseline.hpp"
+#include "lab/bench/paper_baseline.hpp"
 
 #include <array>
 #include <cmath>

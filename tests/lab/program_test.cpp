@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "hil/lab/program.hpp"
+#include "lab/program.hpp"
 
 #include <filesystem>
 #include <sstream>
@@ -8,8 +8,8 @@
 
 #include <doctest/doctest.h>
 
-#include "hil/lab/lab_run.hpp"
-#include "hil/lab/performance_page.hpp"
+#include "lab/bench/performance_page.hpp"
+#include "lab/rig/lab_run.hpp"
 
 namespace {
 

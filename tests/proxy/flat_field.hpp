@@ -2,7 +2,7 @@
 #pragma once
 
 #include "controller/kernel/proxy/tool_turn.hpp"
-#include "hil/lab/extremes/points.hpp"
+#include "lab/rig/points.hpp"
 
 namespace kerf::test {
 

@@ -7,7 +7,7 @@
 
 #include <doctest/doctest.h>
 
-#include "hil/lab/extremes/led.hpp"
+#include "lab/rig/led.hpp"
 
 using namespace kerf;
 using namespace kerf::extremes;

@@ -3,7 +3,7 @@
 
 #include <doctest/doctest.h>
 
-#include "hil/lab/extremes/points.hpp"
+#include "lab/rig/points.hpp"
 
 using namespace kerf;
 using namespace kerf::extremes;

@@ -6,8 +6,8 @@
 
 #include <doctest/doctest.h>
 
-#include "hil/lab/extremes/bump_slide.hpp"
-#include "hil/lab/extremes/rest.hpp"
+#include "lab/rig/bump_slide.hpp"
+#include "lab/rig/rest.hpp"
 
 using namespace kerf;
 using namespace kerf::extremes;

@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "controller/kernel/proxy/tool_turn.hpp"
-#include "hil/lab/extremes/points.hpp"
+#include "lab/rig/points.hpp"
 
 namespace kerf::test {
 

@@ -5,7 +5,7 @@
 
 #include <doctest/doctest.h>
 
-#include "hil/lab/extremes/wall_shake.hpp"
+#include "lab/rig/wall_shake.hpp"
 #include "tests/kernel/case_count.hpp"
 
 using namespace kerf;

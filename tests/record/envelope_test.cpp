@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/record/envelope.hpp"
+#include "record/envelope.hpp"
 
 #include <algorithm>
 #include <vector>

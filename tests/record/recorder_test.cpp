@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/record/recorder.hpp"
+#include "record/recorder.hpp"
 
 #include "tests/record/record_support.hpp"
 

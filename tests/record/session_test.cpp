@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/record/session.hpp"
+#include "record/session.hpp"
 
 #include <array>
 #include <chrono>
@@ -10,7 +10,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "controller/record/tick_log.hpp"
+#include "record/tick_log.hpp"
 #include "tests/record/record_support.hpp"
 
 using namespace kerf;

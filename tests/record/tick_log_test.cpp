@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/record/tick_log.hpp"
+#include "record/tick_log.hpp"
 
 #include <csignal>
 #include <cstring>
@@ -8,7 +8,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "controller/record/record_error.hpp"
+#include "record/record_error.hpp"
 #include "shared/segment/hash.hpp"
 #include "tests/record/record_support.hpp"
 

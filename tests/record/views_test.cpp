@@ -3,10 +3,10 @@
 
 #include <nlohmann/json.hpp>
 
-#include "controller/record/export_csv.hpp"
-#include "controller/record/manifest.hpp"
-#include "controller/record/plot.hpp"
-#include "controller/record/summary.hpp"
+#include "record/export_csv.hpp"
+#include "record/manifest.hpp"
+#include "record/plot.hpp"
+#include "record/summary.hpp"
 #include "tests/record/record_support.hpp"
 
 using namespace kerf;

@@ -19,7 +19,7 @@ const std::string kSmallest =
     "shape = \"ball\"\n"
     "size_vox = 16\n";
 
-kerf::SceneSpec parse(const std::string& text) {
+kerf::Scene parse(const std::string& text) {
   return kerf::parse_scene(text, "scenes/x.toml");
 }
 
@@ -45,7 +45,7 @@ bool begins(const std::string& text, const std::string& with) {
 }  // namespace
 
 TEST_CASE("the smallest scene takes every default") {
-  const kerf::SceneSpec scene = parse(kSmallest);
+  const kerf::Scene scene = parse(kSmallest);
   REQUIRE(scene.volumes.size() == 1);
   CHECK(scene.volumes[0].name == "phantom");
   CHECK(scene.volumes[0].crop);
@@ -74,7 +74,7 @@ TEST_CASE("the smallest scene takes every default") {
 }
 
 TEST_CASE("every key reaches its place") {
-  const kerf::SceneSpec scene = parse(R"(
+  const kerf::Scene scene = parse(R"(
     [[volume]]
     file = "ct/a.nrrd"
     name = "jaw"

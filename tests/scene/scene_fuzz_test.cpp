@@ -8,8 +8,8 @@
 #include <doctest/doctest.h>
 #include <rapidcheck.h>
 
+#include "controller/load/scene_load.hpp"
 #include "controller/scene/scene_file.hpp"
-#include "controller/scene/scene_load.hpp"
 #include "tests/scene/support.hpp"
 
 namespace {
@@ -77,7 +77,7 @@ TEST_CASE("a damaged scene file is loaded whole or explained") {
       "[[volume]]\nfile=\"a.nrrd\"\nspacing_mm=[0.5,0.4,0.3]\nwindow=[0,900]\niso=0.4\n"
       "pose={position_mm=[1,2,3]}\n[[tool]]\nshape=\"flame\"\nradius_mm=0.6\nlength_mm=2.5\n"
       "[device]\nworkspace_scale=2\n[limits]\nforce_n=2.5\n[servo]\nrate_hz=2000\n";
-  kerf::Scene valid = kerf::load_scene(folder.write("valid.toml", scene));
+  kerf::LoadedScene valid = kerf::load_scene(folder.write("valid.toml", scene));
   REQUIRE_FALSE(valid.tools.at(0).offsets.empty());
   CHECK(rc::check("loading", [&] {
     const auto path = folder.write("damaged.toml", mutated(scene));

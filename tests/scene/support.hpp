@@ -10,7 +10,7 @@
 
 #include <unistd.h>
 
-#include "controller/scene/scene.hpp"
+#include "controller/load/loaded_scene.hpp"
 #include "controller/scene/scene_error.hpp"
 
 namespace kerf::test {

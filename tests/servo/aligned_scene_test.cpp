@@ -10,9 +10,9 @@
 
 #include <doctest/doctest.h>
 
-#include "controller/scene/plan_choice.hpp"
+#include "controller/plan/plan_choice.hpp"
 #include "controller/scene/scene_error.hpp"
-#include "controller/scene/tool_shapes.hpp"
+#include "controller/tool/tool_shapes.hpp"
 #include "tests/servo/support.hpp"
 
 using namespace kerf;
@@ -31,8 +31,8 @@ double worst_difference_n(const std::array<double, 3>& a, const std::array<doubl
 /// The same scene in fixed point and in double, stepped by the same hand.
 class Pair {
  public:
-  explicit Pair(const std::function<Scene()>& make) {
-    Scene first = make(), second = make();
+  explicit Pair(const std::function<LoadedScene()>& make) {
+    LoadedScene first = make(), second = make();
     second.servo.numeric = NumericKind::float64;
     fixed_ = compile(first);
     exact_ = compile(second);
@@ -54,8 +54,8 @@ class Pair {
   FakeArm fixed_arm_, exact_arm_;
 };
 
-Scene cutting_scene() {
-  Scene scene = paper_scene();
+LoadedScene cutting_scene() {
+  LoadedScene scene = paper_scene();
   scene.cut.model = CutModel::overlap;
   return scene;
 }
@@ -66,7 +66,7 @@ TEST_CASE("both forces of the first cutting tick are double's within 1.7e-4 of f
   for (const auto kernel : {GradientKernel::farid, GradientKernel::sobel5}) {
     for (const double y : {0.9, 0.6, 0.2}) {
       Pair pair([&] {
-        Scene scene = cutting_scene();
+        LoadedScene scene = cutting_scene();
         scene.servo.kernel = kernel;
         if (y < 0.5) scene.cut.model = CutModel::overlap_exact;
         return scene;
@@ -87,7 +87,7 @@ TEST_CASE("both forces of the first cutting tick are double's within 1.7e-4 of f
 
 TEST_CASE("tools of both plans feel what the other has cut") {
   Pair pair([] {
-    Scene scene = cutting_scene();
+    LoadedScene scene = cutting_scene();
     scene.tools.push_back(ball(20, kVoxelMm / 2));  // finer than the volume: stored gradients
     return scene;
   });
@@ -104,7 +104,7 @@ TEST_CASE("tools of both plans feel what the other has cut") {
 
 TEST_CASE("two volumes of different spacing each get their own plan") {
   Pair pair([] {
-    Scene scene = cutting_scene();
+    LoadedScene scene = cutting_scene();
     scene.volumes.push_back(
         volume_of(40, 0.2, [](double x, double y, double) { return std::max(y, x); }));
     return scene;
@@ -122,7 +122,7 @@ TEST_CASE("a tool that does not turn runs aligned in a standing volume, and igno
   constexpr std::array<double, 4> kStanding{-std::numbers::sqrt2 / 2, 0, 0,
                                             std::numbers::sqrt2 / 2};
   const auto scene_of = [&](bool turns) {
-    Scene scene = cutting_scene();
+    LoadedScene scene = cutting_scene();
     scene.volumes[0].pose.orientation = kStanding;
     const double end = -scene.volumes[0].pose.position_mm[0];
     scene.volumes[0].pose.position_mm = {-end, -end, end};  // its middle stays the origin
@@ -130,7 +130,7 @@ TEST_CASE("a tool that does not turn runs aligned in a standing volume, and igno
     scene.tools[0].turns = turns;
     return scene;
   };
-  const Scene unturned = scene_of(false), turning = scene_of(true);
+  const LoadedScene unturned = scene_of(false), turning = scene_of(true);
   const SceneVolume& volume = unturned.volumes[0];
   REQUIRE(choose_plan(unturned, unturned.tools[0], volume).plan == Plan::aligned);
   REQUIRE(choose_plan(turning, turning.tools[0], volume).plan == Plan::splat);
@@ -152,7 +152,7 @@ TEST_CASE("a tool that does not turn runs aligned in a standing volume, and igno
 }
 
 TEST_CASE("a tool that no sum of fixed-point numbers can hold is refused with a way out") {
-  const auto refusal = [](const Scene& scene) -> std::string {
+  const auto refusal = [](const LoadedScene& scene) -> std::string {
     try {
       static_cast<void>(choose_plan(scene, scene.tools[0], scene.volumes[0]));
     } catch (const SceneError& error) {
@@ -160,7 +160,7 @@ TEST_CASE("a tool that no sum of fixed-point numbers can hold is refused with a 
     }
     return {};
   };
-  Scene scene = cutting_scene();
+  LoadedScene scene = cutting_scene();
   scene.path = "x.toml";
   scene.volumes[0].name = "tooth";
   scene.tools[0] = make_tool("pin", "cylinder", {.pitch_mm = kVoxelMm / 6, .radius_mm = 0.1});
@@ -183,7 +183,7 @@ TEST_CASE("a tool that no sum of fixed-point numbers can hold is refused with a 
 }
 
 TEST_CASE("an unturned tool needs the volume's axes to be the world's") {
-  Scene scene = cutting_scene();
+  LoadedScene scene = cutting_scene();
   scene.tools.push_back(make_tool("cube", "cylinder", {.pitch_mm = kVoxelMm, .radius_mm = 1}));
   scene.tools[1].turns = false;
   scene.volumes[0].pose.orientation = {0, 0, std::sin(0.1), std::cos(0.1)};

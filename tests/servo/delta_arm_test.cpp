@@ -10,7 +10,7 @@
 
 #include <doctest/doctest.h>
 
-#include "controller/scene/plan_device.hpp"
+#include "controller/plan/plan_device.hpp"
 #include "shared/wire/falcon_constants.hpp"
 
 using kerf::DeviceVec;

@@ -11,10 +11,10 @@
 #include <doctest/doctest.h>
 
 #include "controller/scene/materials.hpp"
-#include "controller/scene/phantom.hpp"
-#include "controller/scene/tool_shapes.hpp"
 #include "controller/shell/allocation_counter.hpp"
-#include "hil/lab/extremes/miller.hpp"
+#include "controller/tool/tool_shapes.hpp"
+#include "controller/volume/phantom.hpp"
+#include "lab/rig/miller.hpp"
 #include "tests/servo/support.hpp"
 
 using namespace kerf;
@@ -31,8 +31,8 @@ double flat(double, double y_mm, double) {
 }
 
 /// A solid with an edge over two voxels, milled by a ball of radius 1 mm.
-Scene mill_scene(const Shape& signed_distance_mm = flat, int edge = 48) {
-  Scene scene = half_space_scene(8);
+LoadedScene mill_scene(const Shape& signed_distance_mm = flat, int edge = 48) {
+  LoadedScene scene = half_space_scene(8);
   scene.volumes[0] = volume_of(edge, kVoxelMm, [&](double x, double y, double z) {
     return signed_distance_mm(x, y, z) / 2;
   });
@@ -54,7 +54,7 @@ TEST_CASE("what the servo removes is the integral of G F") {
     for (const double scale : {1.0, 0.5}) {
       CAPTURE(static_cast<int>(numeric));
       CAPTURE(scale);
-      Scene scene = mill_scene();
+      LoadedScene scene = mill_scene();
       scene.servo.numeric = numeric;
       scene.device.workspace_scale = scale;
       scene.cut.machinability_mm3_per_s_n = 8;  // so that what is carried is a millionth of it all
@@ -71,7 +71,7 @@ TEST_CASE("what the servo removes is the integral of G F") {
 TEST_CASE("the same hand removes the same at 1, 2, 4 and 8 kHz") {
   std::vector<double> removed_mm3;
   for (const int rate_hz : {1000, 2000, 4000, 8000}) {
-    Scene scene = mill_scene();
+    LoadedScene scene = mill_scene();
     scene.servo.rate_hz = rate_hz;
     scene.cut.machinability_mm3_per_s_n = 4;
     removed_mm3.push_back(removed_by_stroke(scene));
@@ -82,7 +82,7 @@ TEST_CASE("the same hand removes the same at 1, 2, 4 and 8 kHz") {
 
 // F12
 TEST_CASE("a spindle that stands removes nothing and rubs nothing") {
-  Scene scene = mill_scene();
+  LoadedScene scene = mill_scene();
   scene.spindle.speed_krpm = 0;
   Miller miller(scene);
   const ServoOutput out = miller.hold({0, -0.5, 0}, 0.1);
@@ -124,7 +124,7 @@ TEST_CASE("friction pulls against a bur that turns clockwise, by its part of the
 }
 
 TEST_CASE("friction does not press a ball in its own bore") {
-  Scene scene = mill_scene(flat, 64);
+  LoadedScene scene = mill_scene(flat, 64);
   scene.cut.machinability_mm3_per_s_n = 0.5;
   Miller miller(scene);
   static_cast<void>(miller.hold({0, -1, 0}, 1));
@@ -142,7 +142,7 @@ TEST_CASE("friction does not press a ball in its own bore") {
 }
 
 TEST_CASE("a forbidden material is told and never cut") {
-  Scene scene = mill_scene();
+  LoadedScene scene = mill_scene();
   scene.materials = default_materials();
   scene.materials[kLabelPulp].forbidden = true;
   scene.cut.machinability_mm3_per_s_n = 8;
@@ -167,7 +167,7 @@ TEST_CASE("a forbidden material is told and never cut") {
 TEST_CASE("the press is shared by two volumes, whatever their voxels") {
   // The same solid twice, the second time on voxels of twice the length along z, and turned half
   // round.
-  Scene scene = mill_scene();
+  LoadedScene scene = mill_scene();
   scene.volumes.push_back(scene.volumes[0]);
   SceneVolume& second = scene.volumes[1];
   VolumeImage& image = second.image;
@@ -195,7 +195,7 @@ TEST_CASE("milling into a tooth changes the force by less than 2 % a tick") {
   const Shape crown = [&](double x, double y, double z) {
     return phantom_signed_distance(x + 1, 1 - z, y + top_mm);
   };
-  Scene scene = mill_scene(crown, 64);
+  LoadedScene scene = mill_scene(crown, 64);
   scene.force.damping_ns_per_mm = 0;  // of the hand's own steps, which are counts
   Miller miller(scene);
   const SunkForce felt = sink(miller);
@@ -212,8 +212,8 @@ TEST_CASE("milling into a noisy valley changes the force by less than 2 % a tick
   const Shape valley = [](double x, double y, double z) {
     return 0.75 * std::max(y - 0.2 - std::abs(0.6 * x + 0.3 * z), y - 1);
   };
-  Scene scene = mill_scene(valley, kEdge);
-  scene.cut.threshold_n = Scene{}.cut.threshold_n;
+  LoadedScene scene = mill_scene(valley, kEdge);
+  scene.cut.threshold_n = LoadedScene{}.cut.threshold_n;
   SceneVolume& volume = scene.volumes[0];
   volume.iso = static_cast<Density>(kIsoShare * kDensityMax);
   Dice dice(9);
@@ -247,7 +247,7 @@ TEST_CASE("milling into a noisy valley changes the force by less than 2 % a tick
 TEST_CASE("a thin wall gives way to cutting alone, and without a blow") {
   const Shape wall = [](double, double y, double) { return std::abs(y) - kVoxelMm; };
   for (const bool turns : {false, true}) {
-    Scene scene = mill_scene(wall);
+    LoadedScene scene = mill_scene(wall);
     scene.spindle.speed_krpm = turns ? 300 : 0;
     scene.cut.machinability_mm3_per_s_n = 2;
     scene.force.damping_ns_per_mm = 0;
@@ -270,7 +270,7 @@ TEST_CASE("a thin wall gives way to cutting alone, and without a blow") {
 }
 
 TEST_CASE("a tool that leaves its groove is not held back") {
-  Scene scene = mill_scene();
+  LoadedScene scene = mill_scene();
   scene.cut.machinability_mm3_per_s_n = 1;
   Miller miller(scene);
   miller.hold({0, 0.2, 0}, 0.5);
@@ -283,7 +283,7 @@ TEST_CASE("a tool that leaves its groove is not held back") {
 }
 
 TEST_CASE("a tool that turns with the stylus cuts by the same law") {
-  Scene scene = mill_scene();
+  LoadedScene scene = mill_scene();
   scene.tools = {
       make_tool("shaft", "cylinder", {.pitch_mm = kVoxelMm, .radius_mm = 0.5, .length_mm = 3.0})};
   scene.cut.machinability_mm3_per_s_n = 0.5;
@@ -296,7 +296,7 @@ TEST_CASE("a tool that turns with the stylus cuts by the same law") {
 }
 
 TEST_CASE("a ball of one sample at each pole loses nothing of what it should cut") {
-  Scene scene = mill_scene(flat, 64);
+  LoadedScene scene = mill_scene(flat, 64);
   scene.tools = {make_tool("ball", "ball", {.pitch_mm = kVoxelMm, .radius_mm = 1.0})};
   scene.cut.machinability_mm3_per_s_n = 2;  // 24 times that of enamel
   Miller miller(scene);
@@ -309,7 +309,7 @@ TEST_CASE("a ball of one sample at each pole loses nothing of what it should cut
 
 TEST_CASE("the same reports cut the same bits, and no tick of cutting touches the heap") {
   const auto run = [](double force) {
-    Scene scene = mill_scene();
+    LoadedScene scene = mill_scene();
     Miller miller(scene);
     const std::uint64_t before = CountedAllocations::total();
     ServoOutput out;

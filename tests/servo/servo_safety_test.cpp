@@ -12,9 +12,9 @@
 #include "tests/servo/support.hpp"
 
 using kerf::Fault;
+using kerf::LoadedScene;
 using kerf::NumericKind;
 using kerf::Phase;
-using kerf::Scene;
 using kerf::ServoOutput;
 using kerf::test::arm_at;
 using kerf::test::ArmedServo;
@@ -24,7 +24,7 @@ using kerf::test::length;
 using kerf::test::paper_scene;
 
 TEST_CASE("reports stop: the force holds 5 ms, is zero at 20 ms, motors off, fault latched") {
-  Scene scene = half_space_scene();
+  LoadedScene scene = half_space_scene();
   ArmedServo armed(scene);
   const double held_n = length(armed.settled(0, 0.3, 0).force_n);
   REQUIRE(held_n > 0.1);
@@ -46,7 +46,7 @@ TEST_CASE("reports stop: the force holds 5 ms, is zero at 20 ms, motors off, fau
 }
 
 TEST_CASE("one packet with the docked bit neither moves the tip nor forgives a fault") {
-  Scene scene = half_space_scene();
+  LoadedScene scene = half_space_scene();
   ArmedServo armed(scene);
   const ServoOutput before = armed.settled(0, 0.3, 0);
   auto glitch = armed.arm.at(0, 0.3, 0);
@@ -63,7 +63,7 @@ TEST_CASE("one packet with the docked bit neither moves the tip nor forgives a f
 }
 
 TEST_CASE("a stylus that moves while the docked bit is set is not calibrated") {
-  Scene scene = half_space_scene();
+  LoadedScene scene = half_space_scene();
   const auto servo = kerf::compile(scene);
   FakeArm arm;
   for (int tick = 0; tick < 100; ++tick) {
@@ -74,7 +74,7 @@ TEST_CASE("a stylus that moves while the docked bit is set is not calibrated") {
 }
 
 TEST_CASE("after a stall the force starts again from nothing") {
-  Scene scene = half_space_scene();
+  LoadedScene scene = half_space_scene();
   scene.force.stiffness_n_per_mm = 50;
   ArmedServo armed(scene);
   REQUIRE(length(armed.settled(0, 0.3, 0).force_n) > 3);
@@ -90,7 +90,7 @@ TEST_CASE("after a stall the force starts again from nothing") {
 }
 
 TEST_CASE("a force beyond the motors keeps its direction, and what was sent is what is told") {
-  Scene scene = half_space_scene();
+  LoadedScene scene = half_space_scene();
   scene.force.stiffness_n_per_mm = 50;
   scene.device.torque_scale = std::array{0.01, 0.01, 0.01};  // the range ends at 20 N mm
   ArmedServo armed(scene);
@@ -106,7 +106,7 @@ TEST_CASE("a force beyond the motors keeps its direction, and what was sent is w
 }
 
 TEST_CASE("a force that is not finite ends the motors at once") {
-  Scene scene = paper_scene();
+  LoadedScene scene = paper_scene();
   scene.servo.numeric = NumericKind::float64;
   scene.force.p0_n_per_mm2 = std::numeric_limits<double>::quiet_NaN();
   ArmedServo armed(scene);
@@ -117,7 +117,7 @@ TEST_CASE("a force that is not finite ends the motors at once") {
 }
 
 TEST_CASE("faster than 10 m/s: motors off in the same tick") {
-  Scene scene = half_space_scene();
+  LoadedScene scene = half_space_scene();
   ArmedServo armed(scene);
   REQUIRE(armed.settled(0, 0.3, 0).motors_on);
   const ServoOutput out = armed.step(0, 15.0, 0);
@@ -127,7 +127,7 @@ TEST_CASE("faster than 10 m/s: motors off in the same tick") {
 }
 
 TEST_CASE("a scene without torque scale feels, but never turns the motors on") {
-  Scene scene = half_space_scene();
+  LoadedScene scene = half_space_scene();
   scene.device.torque_scale.reset();
   ArmedServo armed(scene);
   const ServoOutput out = armed.settled(0, 0.3, 0);
@@ -137,7 +137,7 @@ TEST_CASE("a scene without torque scale feels, but never turns the motors on") {
 }
 
 TEST_CASE("a very stiff scene meets every limit and keeps the force below 3.3 N") {
-  Scene scene = half_space_scene();
+  LoadedScene scene = half_space_scene();
   scene.force.stiffness_n_per_mm = 50;
   ArmedServo armed(scene);
   std::array<double, 3> last{};

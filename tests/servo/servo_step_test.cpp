@@ -9,8 +9,8 @@
 #include "controller/shell/allocation_counter.hpp"
 #include "tests/servo/support.hpp"
 
+using kerf::LoadedScene;
 using kerf::NumericKind;
-using kerf::Scene;
 using kerf::ServoOutput;
 using kerf::test::ArmedServo;
 using kerf::test::half_space_scene;
@@ -29,7 +29,7 @@ double theory_n(double p_mm) {
 TEST_CASE("a ball in a half-space pushes straight out with the theory's force") {
   for (const NumericKind numeric :
        {NumericKind::fixed, NumericKind::float32, NumericKind::float64}) {
-    Scene scene = paper_scene();
+    LoadedScene scene = paper_scene();
     scene.servo.numeric = numeric;
     ArmedServo armed(scene);
     for (const double y : {0.75, 0.5, 0.3}) {
@@ -45,15 +45,15 @@ TEST_CASE("a ball in a half-space pushes straight out with the theory's force") 
 }
 
 TEST_CASE("no force in the air, none when immersed") {
-  Scene scene = paper_scene();
+  LoadedScene scene = paper_scene();
   ArmedServo armed(scene);
   CHECK(length(armed.settled(0, 2, 0).force_n) == 0);
   CHECK(length(armed.settled(0, -2, 0).force_n) < 1e-4);
 }
 
 TEST_CASE("workspace scale keeps power: F_device = s F_scene at x_scene = s x_device") {
-  Scene plain = paper_scene();
-  Scene scaled = paper_scene();
+  LoadedScene plain = paper_scene();
+  LoadedScene scaled = paper_scene();
   scaled.device.workspace_scale = 0.5;
   ArmedServo one(plain);
   ArmedServo half(scaled);
@@ -66,7 +66,7 @@ TEST_CASE("workspace scale keeps power: F_device = s F_scene at x_scene = s x_de
 }
 
 TEST_CASE("turning volume and approach together turns the force with them") {
-  Scene scene = paper_scene();
+  LoadedScene scene = paper_scene();
   // Volume's y axis along world x: a turn by -90 degrees about z.
   auto& volume = scene.volumes[0];
   volume.pose.orientation = {0, 0, -std::sqrt(0.5), std::sqrt(0.5)};
@@ -81,8 +81,8 @@ TEST_CASE("turning volume and approach together turns the force with them") {
 
 TEST_CASE("two halves as two volumes push as one whole") {
   // The same half-space twice, each at half the density: the force is linear in density.
-  Scene whole = paper_scene();
-  Scene parts = paper_scene();
+  LoadedScene whole = paper_scene();
+  LoadedScene parts = paper_scene();
   for (auto& d : parts.volumes[0].image.density) d = static_cast<kerf::Density>(d / 2);
   parts.volumes.push_back(parts.volumes[0]);
   ArmedServo one(whole);
@@ -92,8 +92,8 @@ TEST_CASE("two halves as two volumes push as one whole") {
 }
 
 TEST_CASE("force comes from the volume before this tick's cut; both forces resist") {
-  Scene touch = paper_scene();
-  Scene cut = paper_scene();
+  LoadedScene touch = paper_scene();
+  LoadedScene cut = paper_scene();
   cut.cut.model = kerf::CutModel::overlap;
   cut.cut.rate_per_s = 1000;  // the paper's own step: all of the overlap at once
   ArmedServo feel(touch);
@@ -109,7 +109,7 @@ TEST_CASE("force comes from the volume before this tick's cut; both forces resis
 }
 
 TEST_CASE("what leaves the volume is what the output counts") {
-  Scene scene = paper_scene();
+  LoadedScene scene = paper_scene();
   scene.cut.model = kerf::CutModel::overlap;
   ArmedServo armed(scene);
   const auto total = [&] {
@@ -128,8 +128,8 @@ TEST_CASE("what leaves the volume is what the output counts") {
 }
 
 TEST_CASE("fixed agrees with double within 1.7e-4 of full scale") {
-  Scene fixed = paper_scene();
-  Scene exact = paper_scene();
+  LoadedScene fixed = paper_scene();
+  LoadedScene exact = paper_scene();
   exact.servo.numeric = NumericKind::float64;
   ArmedServo a(fixed);
   ArmedServo b(exact);
@@ -146,14 +146,14 @@ TEST_CASE("fixed agrees with double within 1.7e-4 of full scale") {
 }
 
 TEST_CASE("voxels too fine for fixed point are refused, not felt wrongly") {
-  Scene scene = paper_scene(16);
+  LoadedScene scene = paper_scene(16);
   scene.volumes[0].image.spacing_mm = {0.004, 0.004, 0.004};
   CHECK_THROWS_WITH_AS(static_cast<void>(kerf::compile(scene)), doctest::Contains("resample"),
                        kerf::SceneError);
 }
 
 TEST_CASE("the tool changes at a tick boundary, to a known index only") {
-  Scene scene = paper_scene();
+  LoadedScene scene = paper_scene();
   scene.tools.push_back(kerf::test::ball(10));
   ArmedServo armed(scene);
   const double large_n = armed.settled(0, 0.4, 0).force_n[1];
@@ -167,7 +167,7 @@ TEST_CASE("the tool changes at a tick boundary, to a known index only") {
 }
 
 TEST_CASE("hold gives no force and cuts nothing") {
-  Scene scene = half_space_scene();
+  LoadedScene scene = half_space_scene();
   scene.cut.model = kerf::CutModel::preston;
   ArmedServo armed(scene);
   armed.servo->apply({kerf::ServoCommand::Kind::hold, 1});
@@ -178,7 +178,7 @@ TEST_CASE("hold gives no force and cuts nothing") {
 
 TEST_CASE("two runs of the same reports give the same bits; another motion gives others") {
   const auto run = [](double radius_mm) {
-    Scene scene = half_space_scene();
+    LoadedScene scene = half_space_scene();
     scene.cut.model = kerf::CutModel::preston;
     ArmedServo armed(scene);
     ServoOutput out;
@@ -192,7 +192,7 @@ TEST_CASE("two runs of the same reports give the same bits; another motion gives
 }
 
 TEST_CASE("ten seconds of cutting never touch the heap") {
-  Scene scene = half_space_scene();
+  LoadedScene scene = half_space_scene();
   scene.cut.model = kerf::CutModel::preston;
   ArmedServo armed(scene);
 #ifdef KERF_SANITIZED

@@ -7,10 +7,10 @@
 
 #include <doctest/doctest.h>
 
-#include "controller/scene/felt_density.hpp"
+#include "controller/load/felt_density.hpp"
 #include "controller/scene/materials.hpp"
-#include "hil/lab/extremes/miller.hpp"
-#include "hil/lab/extremes/rest.hpp"
+#include "lab/rig/miller.hpp"
+#include "lab/rig/rest.hpp"
 #include "tests/servo/support.hpp"
 
 using namespace kerf;
@@ -66,7 +66,7 @@ TEST_CASE_TEMPLATE("a ball rests at each material's own surface, and on their bo
 
 TEST_CASE("a soft material is cut, and felt after the cut, as a hard one of its shape") {
   const auto stroke = [](bool soft) {
-    Scene scene = test::half_space_scene(48);
+    LoadedScene scene = test::half_space_scene(48);
     SceneVolume& volume = scene.volumes[0];
     volume.image.density = hard_beside_soft({48, 48, 48}, 23.5, soft ? -1 : 48).density;
     volume.image.labels = hard_beside_soft({48, 48, 48}, 23.5, soft ? -1 : 48).labels;

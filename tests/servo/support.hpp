@@ -9,9 +9,9 @@
 #include <memory>
 #include <string>
 
-#include "controller/scene/compile.hpp"
-#include "controller/scene/scene.hpp"
-#include "hil/lab/fake_arm.hpp"
+#include "controller/load/loaded_scene.hpp"
+#include "controller/plan/compile.hpp"
+#include "lab/rig/fake_arm.hpp"
 
 namespace kerf::test {
 
@@ -66,8 +66,8 @@ inline SceneVolume volume_of(int edge, double spacing_mm,
 }
 
 /// Solid below y = 0, felt with a 16^3 ball by the default force, nothing cut, motors configured.
-inline Scene half_space_scene(int edge = 64) {
-  Scene scene;
+inline LoadedScene half_space_scene(int edge = 64) {
+  LoadedScene scene;
   scene.path = "test";
   scene.volumes.push_back(volume_of(edge, kVoxelMm, [](double, double y, double) { return y; }));
   scene.tools.push_back(ball(16));
@@ -77,8 +77,8 @@ inline Scene half_space_scene(int edge = 64) {
 }
 
 /// The same by the paper's force.
-inline Scene paper_scene(int edge = 64) {
-  Scene scene = half_space_scene(edge);
+inline LoadedScene paper_scene(int edge = 64) {
+  LoadedScene scene = half_space_scene(edge);
   scene.force.model = ForceModel::paper;
   return scene;
 }
@@ -89,7 +89,7 @@ inline Scene paper_scene(int edge = 64) {
 
 /// A compiled scene under an arm that was docked and led to `start_mm`, in the air above the flat.
 struct ArmedServo {
-  explicit ArmedServo(Scene& scene, const std::array<double, 3>& start_mm = {0, 5, 0})
+  explicit ArmedServo(LoadedScene& scene, const std::array<double, 3>& start_mm = {0, 5, 0})
       : servo(compile(scene)) {
     arm_at(*servo, arm, start_mm[0], start_mm[1], start_mm[2]);
   }

@@ -7,7 +7,7 @@
 
 #include <doctest/doctest.h>
 
-#include "controller/scene/tool_shapes.hpp"
+#include "controller/tool/tool_shapes.hpp"
 #include "tests/servo/support.hpp"
 
 using namespace kerf;
@@ -16,8 +16,8 @@ using namespace kerf::test;
 namespace {
 
 /// Solid below y = 0 with an edge of two voxels, a ball of radius 1 mm, nothing cut.
-Scene swept_scene(NumericKind numeric) {
-  Scene scene = half_space_scene(48);
+LoadedScene swept_scene(NumericKind numeric) {
+  LoadedScene scene = half_space_scene(48);
   scene.volumes[0] = volume_of(48, kVoxelMm, [](double, double y, double) { return y / 2; });
   scene.servo.numeric = numeric;
   return scene;
@@ -28,7 +28,7 @@ Scene swept_scene(NumericKind numeric) {
 TEST_CASE("the force is stiffness times depth, along the normal, in every kind of numbers") {
   for (const auto numeric : {NumericKind::fixed, NumericKind::float32, NumericKind::float64}) {
     CAPTURE(static_cast<int>(numeric));
-    Scene scene = swept_scene(numeric);
+    LoadedScene scene = swept_scene(numeric);
     ArmedServo armed(scene, {0, 3, 0});
     CHECK(length(armed.settled(0, 1.2, 0).force_n) == 0);  // the ball ends at 0.2
     for (const double y_mm : {0.8, 0.3, -0.5, -2.0}) {
@@ -45,7 +45,7 @@ TEST_CASE("the force is stiffness times depth, along the normal, in every kind o
 }
 
 TEST_CASE("a workspace scale leaves the stiffness at the device as it is") {
-  Scene scene = swept_scene(NumericKind::fixed);
+  LoadedScene scene = swept_scene(NumericKind::fixed);
   scene.device.workspace_scale = 0.5;
   ArmedServo armed(scene, {0, 6, 0});
   const ServoOutput out = armed.settled(0, 1, 0);
@@ -53,7 +53,7 @@ TEST_CASE("a workspace scale leaves the stiffness at the device as it is") {
 }
 
 TEST_CASE("no stroke gets through a wall of two voxels, nor feels nothing behind it") {
-  Scene scene = swept_scene(NumericKind::fixed);
+  LoadedScene scene = swept_scene(NumericKind::fixed);
   scene.volumes[0] = volume_of(
       48, kVoxelMm, [](double, double y, double) { return (std::abs(y) - kVoxelMm) / 2; });
   ArmedServo armed(scene, {0, 3, 0});
@@ -70,7 +70,7 @@ TEST_CASE("no stroke gets through a wall of two voxels, nor feels nothing behind
 }
 
 TEST_CASE("a tool that is taken up inside of the solid is pushed out with a ramp") {
-  Scene scene = swept_scene(NumericKind::fixed);
+  LoadedScene scene = swept_scene(NumericKind::fixed);
   ArmedServo armed(scene, {0, -1.5, 0});  // from the side, below the surface, docked outside
   armed.servo->apply({.kind = ServoCommand::Kind::select_tool, .argument = 0});
   double last_n = 0;
@@ -85,7 +85,7 @@ TEST_CASE("a tool that is taken up inside of the solid is pushed out with a ramp
 }
 
 TEST_CASE("a tool that turns is held by its whole shape, and its torque is told") {
-  Scene scene = swept_scene(NumericKind::fixed);
+  LoadedScene scene = swept_scene(NumericKind::fixed);
   scene.tools = {
       make_tool("shaft", "cylinder", {.pitch_mm = kVoxelMm, .radius_mm = 0.5, .length_mm = 3.0})};
   // A step: the shaft's tip is over the low side, its flank against the edge of the high one.
@@ -101,14 +101,14 @@ TEST_CASE("a tool that turns is held by its whole shape, and its torque is told"
 }
 
 TEST_CASE("a scene pays only for the force that it names") {
-  const auto has = [](const Scene& scene, const std::string& name) {
+  const auto has = [](const LoadedScene& scene, const std::string& name) {
     const auto compiled = plan_scene(scene);
     const auto& arrays = compiled->costs().arrays;
     return std::any_of(arrays.begin(), arrays.end(), [&](const ArrayBytes& array) {
       return array.name.find(name) != std::string::npos;
     });
   };
-  Scene scene = paper_scene(16);
+  LoadedScene scene = paper_scene(16);
   CHECK_FALSE(has(scene, "surface"));
   CHECK(has(scene, "table"));
   scene.force.model = ForceModel::proxy;

@@ -15,11 +15,11 @@
 #include <sys/syscall.h>
 #include <unistd.h>
 
-#include "controller/device/omni_driver.hpp"
-#include "controller/device/socket_port.hpp"
-#include "controller/scene/compile.hpp"
-#include "controller/scene/scene_json.hpp"
-#include "controller/scene/scene_load.hpp"
+#include "controller/device/driver/omni_driver.hpp"
+#include "controller/device/port/socket_port.hpp"
+#include "controller/load/scene_json.hpp"
+#include "controller/load/scene_load.hpp"
+#include "controller/plan/compile.hpp"
 #include "controller/shell/call_guard.hpp"
 #include "controller/shell/motor_guard.hpp"
 #include "controller/shell/scene_segment.hpp"
@@ -116,8 +116,8 @@ Outcome run_loop(Seed seed, bool guarded = false) {
   const Process emulator({KERF_TEST_BIN "/kerf-emulator", "--socket", socket, "--hand",
                           KERF_TEST_SCENES "/hands/touch.toml"},
                          folder / "emulator.log");
-  kerf::Scene scene = kerf::load_scene(KERF_TEST_SCENES "/touch.toml",
-                                       {.phantom_size = kerf::VoxelGrid{64, 64, 41}});
+  kerf::LoadedScene scene = kerf::load_scene(KERF_TEST_SCENES "/touch.toml",
+                                             {.phantom_size = kerf::VoxelGrid{64, 64, 41}});
   const auto servo = kerf::plan_scene(scene);
   const std::string json = kerf::canonical_json(scene);
   auto segment = kerf::SegmentWriter::create(kerf::segment_spec(scene, json, 0));

@@ -11,7 +11,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "controller/device/omni_driver.hpp"
+#include "controller/device/driver/omni_driver.hpp"
 #include "controller/shell/stop_signals.hpp"
 #include "shared/wire/omni_packet.hpp"
 

@@ -6,9 +6,9 @@
 #include <doctest/doctest.h>
 #include <unistd.h>
 
-#include "controller/shell/probe_advice.hpp"
-#include "controller/shell/probe_nodes.hpp"
-#include "controller/shell/probe_view.hpp"
+#include "controller/shell/probe/probe_advice.hpp"
+#include "controller/shell/probe/probe_nodes.hpp"
+#include "controller/shell/probe/probe_view.hpp"
 #include "tests/programs/process.hpp"
 
 namespace {
@@ -107,7 +107,7 @@ TEST_CASE("the view follows counts over the wrap and knows the tip once parked a
 }
 
 TEST_CASE("an unhomed device is never calibrated") {
-  kerf::Scene::Device falcon;
+  kerf::DeviceSettings falcon;
   falcon.personality = Personality::falcon;
   kerf::ProbeView view(falcon, 1000);
   for (int i = 0; i < 100; ++i) view.take(report({1, 2, 3}, true, false), i * 1'000'000);

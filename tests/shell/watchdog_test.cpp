@@ -8,7 +8,7 @@
 #include <pthread.h>
 #include <sched.h>
 
-#include "controller/device/omni_driver.hpp"
+#include "controller/device/driver/omni_driver.hpp"
 #include "controller/shell/watchdog_thread.hpp"
 #include "shared/posix/cores.hpp"
 #include "shared/wire/omni_packet.hpp"

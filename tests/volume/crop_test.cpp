@@ -3,8 +3,8 @@
 #include <rapidcheck.h>
 
 #include "controller/scene/scene_error.hpp"
-#include "controller/scene/volume_crop.hpp"
-#include "controller/scene/volume_density.hpp"
+#include "controller/volume/volume_crop.hpp"
+#include "controller/volume/volume_density.hpp"
 #include "tests/volume/volume_files.hpp"
 
 using namespace kerf;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/scene/phantom.hpp"
+#include "controller/volume/phantom.hpp"
 
 #include <array>
 #include <cmath>
@@ -7,9 +7,9 @@
 #include <doctest/doctest.h>
 #include <rapidcheck.h>
 
-#include "controller/scene/phantom_shape.hpp"
 #include "controller/scene/scene_error.hpp"
-#include "controller/scene/volume_density.hpp"
+#include "controller/volume/phantom_shape.hpp"
+#include "controller/volume/volume_density.hpp"
 #include "tests/volume/volume_files.hpp"
 
 using namespace kerf;

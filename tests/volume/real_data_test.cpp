@@ -4,8 +4,8 @@
 
 #include <doctest/doctest.h>
 
-#include "controller/scene/volume_crop.hpp"
-#include "controller/scene/volume_density.hpp"
+#include "controller/volume/volume_crop.hpp"
+#include "controller/volume/volume_density.hpp"
 #include "tests/volume/volume_files.hpp"
 
 using namespace kerf;

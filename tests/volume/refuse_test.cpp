@@ -5,7 +5,7 @@
 #include <rapidcheck.h>
 
 #include "controller/scene/scene_error.hpp"
-#include "controller/scene/volume_limits.hpp"
+#include "controller/volume/volume_limits.hpp"
 #include "tests/volume/volume_files.hpp"
 
 using namespace kerf;

@@ -6,7 +6,7 @@
 #include <rapidcheck.h>
 
 #include "controller/scene/scene_error.hpp"
-#include "controller/scene/volume_resample.hpp"
+#include "controller/volume/volume_resample.hpp"
 #include "tests/volume/volume_files.hpp"
 
 using namespace kerf;

@@ -5,8 +5,8 @@
 #include <doctest/doctest.h>
 #include <nlohmann/json.hpp>
 
-#include "controller/scene/phantom.hpp"
-#include "controller/scene/volume_density.hpp"
+#include "controller/volume/phantom.hpp"
+#include "controller/volume/volume_density.hpp"
 #include "controller/volume_tool/volume_commands.hpp"
 #include "tests/volume/volume_files.hpp"
 

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "visualizer/scene_view.hpp"
+#include "visualizer/view/scene_view.hpp"
 
 namespace kerf {
 

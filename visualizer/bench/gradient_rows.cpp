@@ -9,7 +9,7 @@
 #include <glm/gtc/matrix_transform.hpp>
 
 #include "visualizer/bench/shown_normal.hpp"
-#include "visualizer/iso_renderer.hpp"
+#include "visualizer/render/iso_renderer.hpp"
 
 namespace kerf {
 

@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "visualizer/gradient.hpp"
+#include "visualizer/view/gradient.hpp"
 
 namespace kerf {
 

@@ -4,10 +4,10 @@
 #include <array>
 
 #include "visualizer/bench/bench_tooth.hpp"
-#include "visualizer/frame_report.hpp"
-#include "visualizer/renderer.hpp"
-#include "visualizer/stale_volume.hpp"
-#include "visualizer/stop_signal.hpp"
+#include "visualizer/compose/stale_volume.hpp"
+#include "visualizer/render/renderer.hpp"
+#include "visualizer/view/frame_report.hpp"
+#include "visualizer/view/stop_signal.hpp"
 
 namespace kerf {
 

@@ -7,7 +7,7 @@
 
 #include "shared/volume/voxel_grid.hpp"
 #include "visualizer/gl/target.hpp"
-#include "visualizer/gradient.hpp"
+#include "visualizer/view/gradient.hpp"
 
 namespace kerf {
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "visualizer/camera.hpp"
 #include "visualizer/cast/cast_job.hpp"
+#include "visualizer/view/camera.hpp"
 
 namespace kerf {
 

@@ -3,7 +3,7 @@
 
 #include <cstdint>
 
-#include "visualizer/pixel_rect.hpp"
+#include "visualizer/view/pixel_rect.hpp"
 
 namespace kerf {
 

@@ -10,10 +10,10 @@
 #include "visualizer/cast/cast_job.hpp"
 #include "visualizer/cast/cell_blocks.hpp"
 #include "visualizer/cast/gradient_rows.hpp"
+#include "visualizer/cast/macrocells.hpp"
 #include "visualizer/cast/paired_rows.hpp"
-#include "visualizer/macrocells.hpp"
-#include "visualizer/palette.hpp"
-#include "visualizer/scene_view.hpp"
+#include "visualizer/view/palette.hpp"
+#include "visualizer/view/scene_view.hpp"
 
 namespace kerf {
 

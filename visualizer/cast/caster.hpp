@@ -5,9 +5,9 @@
 #include <span>
 #include <vector>
 
-#include "visualizer/camera.hpp"
 #include "visualizer/cast/cast_volume.hpp"
 #include "visualizer/cast/tile_pool.hpp"
+#include "visualizer/view/camera.hpp"
 
 namespace kerf {
 

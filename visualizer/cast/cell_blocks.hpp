@@ -6,8 +6,8 @@
 #include <span>
 #include <vector>
 
-#include "visualizer/camera.hpp"
 #include "visualizer/cast/cast_job.hpp"
+#include "visualizer/view/camera.hpp"
 
 namespace kerf {
 

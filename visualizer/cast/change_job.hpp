@@ -4,7 +4,7 @@
 #include <cstdint>
 
 #include "visualizer/cast/cast_job.hpp"
-#include "visualizer/pixel_rect.hpp"
+#include "visualizer/view/pixel_rect.hpp"
 
 namespace kerf {
 

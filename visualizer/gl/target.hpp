@@ -6,17 +6,9 @@
 #include <vector>
 
 #include "visualizer/gl/names.hpp"
-#include "visualizer/pixel_rect.hpp"
+#include "visualizer/view/pixel_rect.hpp"
 
 namespace kerf {
-
-/// Width and height of a picture in pixels, each 1..kMaxSide.
-struct PictureSize {
-  static constexpr int kMaxSide = 8192;  ///< a 32-bit colour picture of 256 MiB
-  int width = 512;
-  int height = 512;
-  friend constexpr bool operator==(PictureSize, PictureSize) noexcept = default;
-};
 
 /// A picture off the screen: RGBA8 colour and 32-bit float depth.
 class RenderTarget {

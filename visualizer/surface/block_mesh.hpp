@@ -5,9 +5,9 @@
 #include <cstdint>
 #include <vector>
 
-#include "visualizer/gradient.hpp"
 #include "visualizer/surface/surface_look.hpp"
 #include "visualizer/surface/volume_samples.hpp"
+#include "visualizer/view/gradient.hpp"
 
 namespace kerf {
 

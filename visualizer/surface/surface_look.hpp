@@ -5,8 +5,8 @@
 #include <span>
 #include <vector>
 
-#include "visualizer/palette.hpp"
 #include "visualizer/surface/volume_samples.hpp"
+#include "visualizer/view/palette.hpp"
 
 namespace kerf {
 

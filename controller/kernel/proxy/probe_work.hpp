@@ -5,11 +5,11 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "controller/kernel/point_shell/shell_table.hpp"
 #include "controller/kernel/proxy/proxy_sweep.hpp"
 #include "controller/kernel/proxy/shell_cap.hpp"
 #include "controller/kernel/proxy/shell_closeup.hpp"
 #include "controller/kernel/proxy/shell_patch.hpp"
-#include "controller/kernel/proxy/shell_table.hpp"
 
 namespace kerf {
 

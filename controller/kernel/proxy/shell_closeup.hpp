@@ -6,10 +6,10 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "controller/kernel/proxy/close_sums.hpp"
+#include "controller/kernel/point_shell/close_sums.hpp"
+#include "controller/kernel/point_shell/shell_sums.hpp"
+#include "controller/kernel/point_shell/shell_table.hpp"
 #include "controller/kernel/proxy/shell_peak.hpp"
-#include "controller/kernel/proxy/shell_sums.hpp"
-#include "controller/kernel/proxy/shell_table.hpp"
 
 namespace kerf {
 
@@ -27,7 +27,7 @@ inline constexpr std::int32_t kMostInCell = 32;
 /// A tool's surface in samples that lie close together: the rim or the point of a tool on a sharp
 /// edge touches in less than the distance of the shell's own samples.
 ///
-/// Sorted by cells, along x first. Made at load (controller/scene/close_cells.hpp) and points into
+/// Sorted by cells, along x first. Made at load (controller/plan/close_cells.hpp) and points into
 /// the maker's memory. A ball has none.
 template <class N>
 struct CloseTable {

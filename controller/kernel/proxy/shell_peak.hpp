@@ -5,9 +5,9 @@
 #include <array>
 #include <cstdint>
 
+#include "controller/kernel/point_shell/shell_table.hpp"
 #include "controller/kernel/proxy/contact_space.hpp"
 #include "controller/kernel/proxy/plane.hpp"
-#include "controller/kernel/proxy/shell_table.hpp"
 #include "controller/kernel/proxy/tool_turn.hpp"
 #include "shared/numeric/fixed.hpp"
 #include "shared/numeric/vec.hpp"

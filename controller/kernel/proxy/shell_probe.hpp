@@ -9,6 +9,8 @@
 #include <span>
 
 #include "controller/kernel/kernel_set.hpp"
+#include "controller/kernel/point_shell/shell_sums.hpp"
+#include "controller/kernel/point_shell/shell_table.hpp"
 #include "controller/kernel/proxy/contact_math.hpp"
 #include "controller/kernel/proxy/plane.hpp"
 #include "controller/kernel/proxy/probe_work.hpp"
@@ -17,8 +19,6 @@
 #include "controller/kernel/proxy/shell_patch.hpp"
 #include "controller/kernel/proxy/shell_peak.hpp"
 #include "controller/kernel/proxy/shell_spiral.hpp"
-#include "controller/kernel/proxy/shell_sums.hpp"
-#include "controller/kernel/proxy/shell_table.hpp"
 #include "controller/kernel/proxy/tool_turn.hpp"
 
 namespace kerf {

@@ -5,8 +5,8 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "controller/kernel/proxy/free_bricks.hpp"
-#include "controller/kernel/proxy/shell_table.hpp"
+#include "controller/kernel/point_shell/free_bricks.hpp"
+#include "controller/kernel/point_shell/shell_table.hpp"
 
 namespace kerf {
 

@@ -3,8 +3,8 @@
 
 #include <cstdint>
 
-#include "controller/kernel/proxy/close_sums.hpp"
-#include "controller/kernel/proxy/shell_sums.hpp"
+#include "controller/kernel/point_shell/close_sums.hpp"
+#include "controller/kernel/point_shell/shell_sums.hpp"
 #include "controller/kernel/sets/shell_places.hpp"
 
 // Sums and densities of a shell as the plain loops that define them, for sets that need no

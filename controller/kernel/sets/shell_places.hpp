@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "controller/kernel/proxy/shell_table.hpp"
+#include "controller/kernel/point_shell/shell_table.hpp"
 
 // Places of a shell as loops that a compiler turns into vectors, one text for every instruction
 // set; internal linkage, for the reason told at KernelSet.

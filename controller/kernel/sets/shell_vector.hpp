@@ -4,8 +4,8 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "controller/kernel/proxy/close_sums.hpp"
-#include "controller/kernel/proxy/shell_sums.hpp"
+#include "controller/kernel/point_shell/close_sums.hpp"
+#include "controller/kernel/point_shell/shell_sums.hpp"
 #include "controller/kernel/sets/shell_places.hpp"
 
 // Sums of a shell for AVX2 and AVX-512, in the bits of shell_sums.hpp; `Simd` as in box_vector.hpp.

@@ -10,8 +10,8 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "controller/device/firewire_port.hpp"
-#include "controller/device/omni_driver.hpp"
+#include "controller/device/driver/omni_driver.hpp"
+#include "controller/device/port/firewire_port.hpp"
 #include "controller/shell/motor_guard.hpp"
 #include "tests/hil/fuse/mounted_node.hpp"
 

@@ -9,7 +9,7 @@
 
 #include "hil/devmodel/omni_model.hpp"
 #include "hil/fault/faulty_device.hpp"
-#include "hil/lab/faults/contract.hpp"
+#include "lab/faults/contract.hpp"
 #include "tests/hil/fuse/usb_session.hpp"
 
 namespace {

@@ -11,7 +11,7 @@
 
 #include <doctest/doctest.h>
 
-#include "controller/device/firewire_port.hpp"
+#include "controller/device/port/firewire_port.hpp"
 #include "hil/front/real_time.hpp"
 #include "shared/posix/monotonic_clock.hpp"
 #include "shared/wire/omni_packet.hpp"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The WoodenHaptics driver with hidapi itself above the emulated node: calibration, force, faults.
-#include "controller/device/hid_port.hpp"
+#include "controller/device/port/hid_port.hpp"
 
 #include <algorithm>
 #include <array>

@@ -4,9 +4,9 @@
 #include <atomic>
 #include <memory>
 
-#include "controller/device/firewire_port.hpp"
-#include "controller/device/omni_driver.hpp"
-#include "hil/hand_script_file.hpp"
+#include "controller/device/driver/omni_driver.hpp"
+#include "controller/device/port/firewire_port.hpp"
+#include "hil/emulator/hand_script_file.hpp"
 #include "tests/hil/fuse/mounted_node.hpp"
 #include "tests/servo/support.hpp"
 
@@ -54,7 +54,7 @@ class FirewireSession {
 
  private:
   MountedNode mounted_;
-  Scene scene_ = half_space_scene();
+  LoadedScene scene_ = half_space_scene();
   std::unique_ptr<FirewirePort> port_;
   std::unique_ptr<OmniDriver> driver_;
   std::unique_ptr<Servo> servo_;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "hil/program.hpp"
+#include "hil/emulator/program.hpp"
 
 #include <atomic>
 #include <filesystem>
@@ -10,8 +10,8 @@
 
 #include <doctest/doctest.h>
 
-#include "controller/device/firewire_port.hpp"
-#include "controller/device/omni_driver.hpp"
+#include "controller/device/driver/omni_driver.hpp"
+#include "controller/device/port/firewire_port.hpp"
 #include "tests/hil/fuse/mounted_node.hpp"
 
 namespace {

@@ -7,8 +7,8 @@
 
 #include <doctest/doctest.h>
 
-#include "controller/device/firewire_port.hpp"
-#include "controller/device/omni_driver.hpp"
+#include "controller/device/driver/omni_driver.hpp"
+#include "controller/device/port/firewire_port.hpp"
 #include "tests/hil/fuse/mounted_node.hpp"
 
 namespace {

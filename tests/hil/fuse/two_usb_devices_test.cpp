@@ -7,8 +7,8 @@
 
 #include <doctest/doctest.h>
 
-#include "controller/device/hid_port.hpp"
-#include "controller/device/usb_port.hpp"
+#include "controller/device/port/hid_port.hpp"
+#include "controller/device/port/usb_port.hpp"
 #include "tests/hil/fuse/usb_session.hpp"
 
 using kerf::Personality;

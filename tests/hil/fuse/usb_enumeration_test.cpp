@@ -6,8 +6,8 @@
 
 #include <doctest/doctest.h>
 
-#include "controller/device/hid_port.hpp"
-#include "controller/device/usb_port.hpp"
+#include "controller/device/port/hid_port.hpp"
+#include "controller/device/port/usb_port.hpp"
 #include "shared/wire/falcon_packet.hpp"
 #include "shared/wire/wooden_packet.hpp"
 #include "tests/hil/fuse/private_sysfs.hpp"

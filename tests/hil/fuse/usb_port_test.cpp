@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The Falcon's driver with libusb itself above the emulated node: boot, homing, force, faults.
-#include "controller/device/usb_port.hpp"
+#include "controller/device/port/usb_port.hpp"
 
 #include <algorithm>
 #include <array>

@@ -11,15 +11,15 @@
 #include <utility>
 #include <vector>
 
-#include "controller/device/device_driver.hpp"
-#include "controller/device/make_driver.hpp"
-#include "controller/device/open_port.hpp"
+#include "controller/device/driver/device_driver.hpp"
+#include "controller/device/driver/make_driver.hpp"
+#include "controller/device/port/open_port.hpp"
 #include "hil/devmodel/falcon_model.hpp"
 #include "hil/devmodel/wooden_model.hpp"
+#include "hil/emulator/hand_script_file.hpp"
 #include "hil/front/hid/hidraw_node.hpp"
 #include "hil/front/real_time.hpp"
 #include "hil/front/usb/usbfs_node.hpp"
-#include "hil/hand_script_file.hpp"
 #include "shared/posix/monotonic_clock.hpp"
 #include "tests/hil/fuse/mounted_node.hpp"
 #include "tests/servo/support.hpp"
@@ -66,8 +66,8 @@ inline std::optional<HandScript> pressing_hand() {
   return script;
 }
 /// Something firm to press on.
-inline Scene firm_half_space() {
-  Scene scene = half_space_scene();
+inline LoadedScene firm_half_space() {
+  LoadedScene scene = half_space_scene();
   scene.force.stiffness_n_per_mm = 0.7;
   return scene;
 }
@@ -123,7 +123,7 @@ class MountedArm {
 /// kHz by the machine's clock.
 class ServoSession {
  public:
-  ServoSession(Personality personality, PacketPort& port, Scene scene = half_space_scene())
+  ServoSession(Personality personality, PacketPort& port, LoadedScene scene = half_space_scene())
       : scene_(std::move(scene)), driver_(make_driver(personality, port)) {
     scene_.device.personality = personality;
     scene_.device.torque_scale = std::array{0.3, 0.3, 0.3};
@@ -196,7 +196,7 @@ class ServoSession {
     }
   }
 
-  Scene scene_;
+  LoadedScene scene_;
   std::unique_ptr<Servo> servo_;
   std::unique_ptr<DeviceDriver> driver_;
   std::function<void(const ServoOutput&)> watch_;

@@ -14,8 +14,8 @@
 
 #include <doctest/doctest.h>
 
-#include "controller/device/hid_port.hpp"
-#include "controller/device/usb_port.hpp"
+#include "controller/device/port/hid_port.hpp"
+#include "controller/device/port/usb_port.hpp"
 #include "hil/front/hid/hidraw_node.hpp"
 #include "hil/front/real_time.hpp"
 #include "hil/front/usb/usbfs_node.hpp"

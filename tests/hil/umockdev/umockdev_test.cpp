@@ -10,7 +10,7 @@
 #define DOCTEST_CONFIG_IMPLEMENT
 #include <doctest/doctest.h>
 
-#include "controller/device/usb_port.hpp"
+#include "controller/device/port/usb_port.hpp"
 #include "tests/hil/fuse/usb_session.hpp"
 #include "tests/hil/umockdev/umockdev_node.hpp"
 

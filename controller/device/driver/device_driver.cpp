@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "controller/device/driver/device_driver.hpp"
+
+namespace kerf {
+
+DeviceReport DeviceDriver::read() noexcept {
+  last_.fresh = false;
+  std::array<std::uint8_t, kMaxPacketBytes + 1> packet;  // a longer packet shows by its size
+  for (int taken = 0; taken < kMaxDrain; ++taken) {
+    const std::size_t size = port_.receive(packet);
+    if (size == 0) break;
+    if (size <= kMaxPacketBytes && take(std::span(packet).first(size), last_)) {
+      last_.fresh = true;
+    } else {
+      ++refused_;
+    }
+  }
+  return last_;
+}
+
+void DeviceDriver::command(const ServoOutput& output) noexcept {
+  ServoOutput allowed = output;
+  if (released_.load(std::memory_order_relaxed)) allowed.motors_on = false;
+  if (!allowed.motors_on) allowed.motor_counts = {};
+  Packet packet;
+  const std::size_t size = compose(allowed, packet);
+  const bool lets_go = forcing_ && !allowed.motors_on;
+  if (lets_go) {
+    port_.send_now(std::span(packet).first(size));
+  } else {
+    port_.send(std::span(packet).first(size));
+  }
+  forcing_ = allowed.motors_on;
+  if (forcing_ && released_.load()) release();  // meanwhile, by another thread
+}
+
+bool DeviceDriver::release() const noexcept {
+  Packet packet;
+  const std::size_t size = compose_release(packet);
+  return port_.send_now(std::span(packet).first(size));
+}
+
+bool DeviceDriver::release_for_good() noexcept {
+  released_.store(true);
+  Packet packet;
+  const std::size_t size = compose_release(packet);
+  return port_.send_last(std::span(packet).first(size));
+}
+
+}  // namespace kerf

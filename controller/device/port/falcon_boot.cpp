@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "controller/device/port/falcon_boot.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <fstream>
+#include <iterator>
+#include <system_error>
+
+#include "shared/wire/falcon_framer.hpp"
+
+namespace kerf {
+namespace {
+
+using falcon::FtdiRequest;
+
+constexpr int kAnswerMs = 20;  // the boot loader's latency timer is 16 ms
+constexpr int kProbes = 10;
+constexpr int kEchoMs = 200;
+
+void purge(FalconLine& line) {
+  line.control(FtdiRequest::reset, falcon::kFtdiPurgeRx);
+  line.control(FtdiRequest::reset, falcon::kFtdiPurgeTx);
+}
+
+void settle_to_run(FalconLine& line) {
+  line.control(FtdiRequest::latency, falcon::kRunLatencyMs);
+  line.control(FtdiRequest::baud, falcon::kRunDivisor);
+  purge(line);
+}
+
+/// Whether the firmware is there: it answers each packet with one.
+bool runs(FalconLine& line) {
+  falcon::Framer framer;
+  std::array<std::uint8_t, falcon::kFtdiPacketBytes> bytes{};
+  for (int probe = 0; probe < kProbes; ++probe) {
+    line.write(encode(FalconCommand{}));
+    for (std::size_t size = 0; (size = line.read(bytes, kAnswerMs)) > 0;) {
+      for (std::size_t i = 0; i < size; ++i) {
+        if (framer.take(bytes[i]) && falcon::decode_report(framer.packet())) return true;
+      }
+    }
+  }
+  return false;
+}
+
+/// Reads until what came ends in `wanted`, at most so many times.
+template <std::size_t N>
+bool hears(FalconLine& line, const std::array<std::uint8_t, N>& wanted, int tries) {
+  std::vector<std::uint8_t> heard;
+  std::array<std::uint8_t, falcon::kFtdiPacketBytes> bytes{};
+  for (int i = 0; i < tries; ++i) {
+    const std::size_t size = line.read(bytes, kAnswerMs);
+    heard.insert(heard.end(), bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(size));
+    if (std::ranges::search(heard, wanted).size() == N) return true;
+  }
+  return false;
+}
+
+void greet(FalconLine& line) {
+  purge(line);
+  line.control(FtdiRequest::latency, falcon::kBootLatencyMs);
+  line.control(FtdiRequest::baud, falcon::kBootDivisor);
+  line.control(FtdiRequest::data, falcon::kFtdi8N1);
+  line.control(FtdiRequest::flow, falcon::kFtdiNoFlowControl);
+  line.control(FtdiRequest::modem, falcon::kFtdiRtsLow);
+  line.control(FtdiRequest::modem, falcon::kFtdiDtrLow);
+  line.control(FtdiRequest::modem, falcon::kFtdiDtrHigh);
+  line.write(falcon::kBootHello);
+  if (!hears(line, falcon::kBootHelloReply, falcon::kBootTries)) {
+    throw std::runtime_error(
+        "the boot loader does not answer; unplug the device and its power, plug them in again");
+  }
+  line.control(FtdiRequest::modem, falcon::kFtdiDtrLow);
+  line.control(FtdiRequest::baud, falcon::kUploadDivisor);
+  line.write(falcon::kUploadBegin);
+  if (!hears(line, falcon::kUploadBegin, falcon::kBootTries)) {
+    throw std::runtime_error(
+        "the boot loader takes no firmware; unplug the device and its power, plug them in again");
+  }
+}
+
+/// Sends one chunk and compares what comes back.
+void upload(FalconLine& line, std::span<const std::uint8_t> chunk, std::size_t offset) {
+  line.write(chunk);
+  std::array<std::uint8_t, falcon::kFtdiPacketBytes> bytes{};
+  for (std::size_t done = 0; done < chunk.size();) {
+    const std::size_t size = line.read(bytes, kEchoMs);
+    if (size == 0) {
+      throw std::runtime_error("firmware: no echo from byte " + std::to_string(offset + done) +
+                               " on; unplug the device and its power, plug them in again");
+    }
+    for (std::size_t i = 0; i < size && done < chunk.size(); ++i, ++done) {
+      if (bytes[i] == chunk[done]) continue;
+      throw std::runtime_error(
+          "firmware: byte " + std::to_string(offset + done) + " was " +
+          std::to_string(chunk[done]) + " and came back as " + std::to_string(bytes[i]) +
+          "; unplug the device and its power, plug them in again, use another cable");
+    }
+  }
+}
+
+}  // namespace
+
+std::vector<std::uint8_t> read_firmware(const std::string& file) {
+  std::ifstream in(file, std::ios::binary);
+  std::vector<std::uint8_t> bytes{std::istreambuf_iterator<char>(in), {}};
+  if (!in.is_open() || in.bad() || bytes.empty()) {
+    throw std::runtime_error("firmware " + file + ": " +
+                             (in.is_open() ? "is empty" : std::generic_category().message(errno)) +
+                             "; name the file with the Falcon's firmware");
+  }
+  return bytes;
+}
+
+void start_falcon(FalconLine& line, std::span<const std::uint8_t> firmware) {
+  settle_to_run(line);
+  if (runs(line)) return;
+  if (firmware.empty()) {
+    throw std::runtime_error(
+        "the Falcon has no firmware since it was powered up; name its file: ,firmware=FILE");
+  }
+  greet(line);
+  for (std::size_t at = 0; at < firmware.size(); at += falcon::kUploadChunk) {
+    const std::size_t size = std::min(falcon::kUploadChunk, firmware.size() - at);
+    upload(line, firmware.subspan(at, size), at);
+  }
+  settle_to_run(line);
+  if (!runs(line)) {
+    throw std::runtime_error(
+        "the firmware was taken and does not answer; is that file the Falcon's?");
+  }
+}
+
+}  // namespace kerf

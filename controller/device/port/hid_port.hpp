@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <thread>
+#include <vector>
+
+#include <semaphore.h>
+
+#include "controller/device/port/io_mailbox.hpp"
+#include "controller/device/port/packet_port.hpp"
+
+struct hid_device_;
+
+namespace kerf {
+
+/// The WoodenHaptics arm over hidapi's hidraw back end: reports of 14 bytes (mbed firmware) or 64
+/// (Teensy), report number 0.
+///
+/// hidapi allocates the text of a failure, and the kernel's write() to a hidraw node sleeps until
+/// the transfer has ended: up to a frame, and 5 s where the device takes nothing. So one thread
+/// reads, another writes, the newest packet always, and the servo touches only the mailboxes;
+/// `send` raises a semaphore besides: any thread, any signal handler. A device that is unplugged
+/// closes the port.
+class HidPort final : public PacketPort {
+ public:
+  /// `where`: a node (/dev/hidraw0), a serial number, or empty for the only arm. Tries for
+  /// `patience_ms` while none is there, or until `stop`. Throws std::runtime_error with one line.
+  HidPort(const std::string& where, int patience_ms, const std::atomic<bool>& stop);
+  ~HidPort() override;
+  HidPort(const HidPort&) = delete;
+  HidPort& operator=(const HidPort&) = delete;
+
+  [[nodiscard]] std::size_t receive(std::span<std::uint8_t> out) noexcept override {
+    return inbox_.take(out);
+  }
+  bool send(std::span<const std::uint8_t> packet) noexcept override;
+  bool send_last(std::span<const std::uint8_t> packet) noexcept override;
+  [[nodiscard]] bool closed() const noexcept override {
+    return closed_.load(std::memory_order_relaxed);
+  }
+  [[nodiscard]] bool wait(int milliseconds) noexcept override {
+    return inbox_.wait(milliseconds, closed_);
+  }
+  [[nodiscard]] std::vector<LinkCounter> counters() const override;
+
+ private:
+  [[nodiscard]] bool open(const std::string& where);
+  void read_reports() noexcept;
+  void write_commands() noexcept;
+
+  hid_device_* device_ = nullptr;
+  std::size_t packet_bytes_ = 0;     ///< of this firmware; shorter packets are filled up
+  std::atomic<bool> closed_{false};  ///< written by whoever meets the end first
+  Inbox inbox_;
+  Outbox outbox_;
+  sem_t raised_{};                                       ///< once per packet, and once to stop
+  std::atomic<std::uint64_t> packets_{0}, overflow_{0};  ///< as UsbLinkStats
+  std::atomic<std::uint64_t> commands_{0};               ///< packets that the kernel has sent
+  std::atomic<bool> stop_{false};
+  std::atomic<int> writer_id_{0};
+  std::thread reader_, writer_;
+};
+
+/// What follows "hid" in `--port hid[:WHERE]`. Throws std::runtime_error with one line.
+[[nodiscard]] std::string parse_hid_port(std::string_view text);
+
+}  // namespace kerf

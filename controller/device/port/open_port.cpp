@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "controller/device/port/open_port.hpp"
+
+#include <array>
+#include <cstddef>
+#include <optional>
+#include <stdexcept>
+#include <string_view>
+
+#include "controller/device/port/firewire_port.hpp"
+#include "controller/device/port/socket_port.hpp"
+#include "controller/device/port/udp_port.hpp"
+#ifdef KERF_HAS_HID
+#include "controller/device/port/hid_port.hpp"
+#endif
+#ifdef KERF_HAS_USB
+#include "controller/device/port/usb_port.hpp"
+#endif
+
+namespace kerf {
+namespace {
+
+constexpr std::string_view kSocket = "socket:";
+constexpr std::string_view kUdp = "udp:";
+constexpr std::array<std::string_view, 3> kBusOf{"fw", "usb", "hid"};  // by Personality
+static_assert(kBusOf.size() == kPersonalityWords.size());
+
+struct Request {
+  int rate_hz = 0;
+  int patience_ms = 0;
+  const std::atomic<bool>& stop;
+};
+
+/// What follows the name of a bus; nothing for another port.
+std::optional<std::string_view> after(std::string_view bus, std::string_view text) {
+  if (!text.starts_with(bus)) return std::nullopt;
+  text.remove_prefix(bus.size());
+  if (!text.empty() && text.front() != ':' && text.front() != ',') return std::nullopt;
+  return text;
+}
+
+// Each opens its port, or only reads the text where there is no request.
+std::unique_ptr<PacketPort> firewire(std::string_view rest, const Request* request) {
+  FirewireOptions options = parse_firewire_port(rest);
+  if (!request) return nullptr;
+  options.rate_hz = request->rate_hz;
+  return std::make_unique<FirewirePort>(options, request->patience_ms, request->stop);
+}
+
+#ifdef KERF_HAS_USB
+std::unique_ptr<PacketPort> usb(std::string_view rest, const Request* request) {
+  const UsbOptions options = parse_usb_port(rest);
+  if (!request) return nullptr;
+  return std::make_unique<UsbPort>(options, request->patience_ms, request->stop);
+}
+#else
+std::unique_ptr<PacketPort> usb(std::string_view, const Request*) {
+  throw std::runtime_error(
+      "--port usb: left out of this build; install libusb-1.0-0-dev, then ./kerf setup");
+}
+#endif
+
+#ifdef KERF_HAS_HID
+std::unique_ptr<PacketPort> hid(std::string_view rest, const Request* request) {
+  const std::string where = parse_hid_port(rest);
+  if (!request) return nullptr;
+  return std::make_unique<HidPort>(where, request->patience_ms, request->stop);
+}
+#else
+std::unique_ptr<PacketPort> hid(std::string_view, const Request*) {
+  throw std::runtime_error(
+      "--port hid: left out of this build; install libhidapi-dev, then ./kerf setup");
+}
+#endif
+
+std::unique_ptr<PacketPort> port(const std::string& text, const Request* request) {
+  if (const auto rest = after("fw", text)) return firewire(*rest, request);
+  if (const auto rest = after("usb", text)) return usb(*rest, request);
+  if (const auto rest = after("hid", text)) return hid(*rest, request);
+  const bool is_udp = text.starts_with(kUdp);
+  if (!is_udp && !text.starts_with(kSocket)) {
+    throw std::runtime_error("--port '" + text +
+                             "' is not known; use auto, fw, usb, hid, or socket:PATH or "
+                             "udp:[ADDRESS:]PORT, where kerf-emulator listens");
+  }
+  if (!request) return nullptr;
+  if (is_udp) {
+    return std::make_unique<UdpPort>(text.substr(kUdp.size()), request->patience_ms, request->stop);
+  }
+  return std::make_unique<SocketPort>(text.substr(kSocket.size()), request->patience_ms,
+                                      request->stop);
+}
+
+}  // namespace
+
+void check_port(const std::string& text) {
+  if (text != "auto") static_cast<void>(port(text, nullptr));
+}
+
+std::string resolve_port(const std::string& text, Personality personality) {
+  const auto device = static_cast<std::size_t>(personality);
+  if (text == "auto") return std::string(kBusOf[device]);
+  for (const std::string_view bus : kBusOf) {
+    if (bus == kBusOf[device] || !after(bus, text)) continue;
+    throw std::runtime_error("--port " + text + ": not for --device " +
+                             std::string(kPersonalityWords[device]) + "; take " +
+                             std::string(kBusOf[device]) + ", or another --device");
+  }
+  return text;
+}
+
+std::unique_ptr<PacketPort> open_port(const std::string& text, int rate_hz, int patience_ms,
+                                      const std::atomic<bool>& stop) {
+  const Request request{rate_hz, patience_ms, stop};
+  return port(text, &request);
+}
+
+}  // namespace kerf

@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "controller/device/port/socket_port.hpp"
+
+#include <cerrno>
+#include <chrono>
+#include <cstring>
+#include <stdexcept>
+#include <system_error>
+#include <thread>
+
+#include <poll.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+namespace kerf {
+
+SocketPort::SocketPort(const std::filesystem::path& path, int patience_ms,
+                       const std::atomic<bool>& stop) {
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  const std::string text = path.string();
+  if (text.empty() || text.size() >= sizeof address.sun_path) {
+    throw std::runtime_error("--port socket:" + text + ": a socket path has 1 to " +
+                             std::to_string(sizeof address.sun_path - 1) +
+                             " bytes; use a shorter one");
+  }
+  std::memcpy(address.sun_path, text.c_str(), text.size() + 1);
+
+  const auto give_up = std::chrono::steady_clock::now() + std::chrono::milliseconds(patience_ms);
+  for (;;) {
+    fd_ = socket(AF_UNIX, SOCK_SEQPACKET | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
+    if (fd_ >= 0 &&
+        // NOLINTNEXTLINE(cppcoreguidelines-pro-type-reinterpret-cast): the sockets API asks for it
+        connect(fd_, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0) {
+      return;
+    }
+    const int error = errno;
+    if (fd_ >= 0) close(fd_);
+    fd_ = -1;
+    if (stop || std::chrono::steady_clock::now() >= give_up) {
+      throw std::runtime_error("--port socket:" + text + ": no device answers (" +
+                               std::generic_category().message(error) +
+                               "); start kerf-emulator --front socket --socket " + text);
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+}
+
+SocketPort::~SocketPort() {
+  if (fd_ >= 0) close(fd_);
+}
+
+std::size_t SocketPort::receive(std::span<std::uint8_t> out) noexcept {
+  if (closed_) return 0;
+  const ssize_t size = recv(fd_, out.data(), out.size(), MSG_DONTWAIT | MSG_TRUNC);
+  if (size > 0) return static_cast<std::size_t>(size);
+  // No packet is empty: 0 is the end of a SEQPACKET socket, and the goodbye over UDP.
+  if (size == 0 || (errno != EAGAIN && errno != EINTR)) closed_ = true;
+  return 0;
+}
+
+bool SocketPort::send(std::span<const std::uint8_t> packet) noexcept {
+  if (closed_) return false;
+  const ssize_t sent = ::send(fd_, packet.data(), packet.size(), MSG_DONTWAIT | MSG_NOSIGNAL);
+  if (sent == static_cast<ssize_t>(packet.size())) return true;
+  if (errno == EPIPE || errno == ECONNRESET || errno == ENOTCONN || errno == ECONNREFUSED) {
+    closed_ = true;
+  }
+  return false;
+}
+
+bool SocketPort::wait(int milliseconds) noexcept {
+  pollfd watched{fd_, POLLIN, 0};
+  int ready = -1;
+  while (!closed_ && (ready = poll(&watched, 1, milliseconds)) < 0 && errno == EINTR) {
+  }
+  return ready > 0;
+}
+
+}  // namespace kerf

@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+
+#include "controller/kernel/point_shell/shell_sums.hpp"
+#include "controller/kernel/point_shell/shell_table.hpp"
+
+namespace kerf {
+
+/// Sums over samples, weighted with a power p of t: their density over the highest. Fixed: t, its
+/// powers and levers in Q15.
+template <class N>
+struct PowerSums {
+  typename N::Sum weight{}, density{}, lever[3]{};  ///< SUM t^p, SUM t^p t, SUM t^p lever
+};
+
+/// What a closeup (shell_closeup.hpp) sums over its samples; nothing where all are faint.
+template <class N>
+struct CloseSums {
+  static constexpr int kLowPower = 32, kHighPower = 64;
+
+  ShellNumber<N> top{};  ///< density of the highest
+  PowerSums<N> low, high;
+};
+
+/// In fixed each product is of 32 unsigned bits.
+template <class N>
+[[nodiscard]] constexpr ShellNumber<N> close_square(ShellNumber<N> t) noexcept {
+  if constexpr (N::kIsFixed) {
+    return (t * t + (1 << 14)) >> 15;
+  } else {
+    return t * t;
+  }
+}
+
+/// The sums that define those of every set, over the table's samples with these densities.
+template <class N>
+[[nodiscard]] constexpr CloseSums<N> close_sums(const ShellTable<N>& table,
+                                                const ShellNumber<N>* density) noexcept {
+  using Number = ShellNumber<N>;
+  CloseSums<N> sums;
+  for (std::int32_t i = 0; i < table.count; ++i) sums.top = std::max(sums.top, density[i]);
+  if (sums.top < kFaintest<N>) return sums;
+  const auto add = [&table](PowerSums<N>& to, Number power, Number t, std::int32_t i) {
+    using Sum = typename N::Sum;
+    to.weight += power;
+    to.density += Sum(power) * t;
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      to.lever[axis] += Sum(power) * table.lever[axis][i];
+  };
+  const auto share = [&sums](Number of) {
+    if constexpr (N::kIsFixed) {
+      const std::uint32_t over_top = (1U << 31) / static_cast<std::uint32_t>(sums.top);
+      return static_cast<Number>(static_cast<std::uint32_t>(of) * over_top >> 16);
+    } else {
+      return of / sums.top;
+    }
+  };
+  for (std::int32_t i = 0; i < table.count; ++i) {
+    const Number t = share(density[i]);
+    Number power = t;
+    for (int p = 1; p < CloseSums<N>::kLowPower; p *= 2) power = close_square<N>(power);
+    add(sums.low, power, t, i);
+    add(sums.high, close_square<N>(power), t, i);
+  }
+  return sums;
+}
+
+}  // namespace kerf

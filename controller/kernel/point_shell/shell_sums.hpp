@@ -1,0 +1,219 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "controller/kernel/point_shell/shell_table.hpp"
+#include "shared/volume/voxel_grid.hpp"
+
+namespace kerf {
+
+/// What one sample reads: density of contact in 0..1 (fixed: 0..32767), and its gradient in voxel
+/// axes; in fixed that of the volume's densities over 2, before `DensityScale`.
+template <class N>
+struct ShellSample {
+  ShellNumber<N> density{};
+  ShellNumber<N> gradient[3] = {};
+};
+
+/// Fainter samples weigh nothing: below 1/16. They are noise, and w has no bits left for them.
+template <class N>
+inline constexpr ShellNumber<N> kFaintest = N::kIsFixed ? ShellNumber<N>(2048)
+                                                        : ShellNumber<N>(0.0625);
+
+/// a + (b - a) w; fixed: w in Q0.15, rounded half up.
+template <class N>
+[[nodiscard]] constexpr ShellNumber<N> shell_lerp(ShellNumber<N> a, ShellNumber<N> b,
+                                                  ShellNumber<N> w) noexcept {
+  if constexpr (N::kIsFixed) {
+    return a + (((b - a) * w + (1 << 14)) >> 15);
+  } else {
+    return a + (b - a) * w;
+  }
+}
+
+/// Reads the volume at a place in voxels (fixed: Q15.16). Trilinear, and nothing where one of the
+/// eight voxels would be outside: volumes have a guard of air.
+///
+/// Fixed keeps 15 bits of density and rounds at each of the three blends: within 2.5 steps of the
+/// exact value. Differences are 16 bits, products 31. Where the density is clipped at 1 it has no
+/// gradient.
+template <class N>
+[[nodiscard]] constexpr ShellSample<N> shell_sample(const ShellField& field,
+                                                    const ShellNumber<N> (&place)[3]) noexcept {
+  using S = ShellNumber<N>;
+  std::int32_t low[3] = {};
+  S w[3] = {};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    if constexpr (N::kIsFixed) {
+      low[axis] = place[axis] >> 16;
+      w[axis] = (place[axis] & 0xffff) >> 1;
+    } else {
+      low[axis] = static_cast<std::int32_t>(place[axis]);
+      if (S(low[axis]) > place[axis]) --low[axis];
+      w[axis] = place[axis] - S(low[axis]);
+    }
+  }
+  const VoxelGrid& grid = field.grid;
+  if (low[0] < 0 || low[1] < 0 || low[2] < 0 || low[0] >= grid.nx - 1 || low[1] >= grid.ny - 1 ||
+      low[2] >= grid.nz - 1) {
+    return {};
+  }
+  const Density* voxel = field.density + grid.index(low[0], low[1], low[2]);
+  const auto row = static_cast<std::size_t>(grid.nx);
+  const std::size_t plane = row * static_cast<std::size_t>(grid.ny);
+  const auto blend = [](S a, S b, S t) { return shell_lerp<N>(a, b, t); };
+  S at[2], along_y[2], along_z[2];  // by the x of the corner
+  for (std::size_t x = 0; x < 2; ++x) {
+    const auto corner = [&](std::size_t y, std::size_t z) {
+      const Density d = voxel[x + y * row + z * plane];
+      return N::kIsFixed ? S(d >> 1) : S(d) / S(2);
+    };
+    const S near_z = blend(corner(0, 0), corner(1, 0), w[1]);
+    const S far_z = blend(corner(0, 1), corner(1, 1), w[1]);
+    const S near_y = blend(corner(0, 0), corner(0, 1), w[2]);
+    const S far_y = blend(corner(1, 0), corner(1, 1), w[2]);
+    at[x] = blend(near_z, far_z, w[2]);
+    along_y[x] = far_y - near_y;
+    along_z[x] = far_z - near_z;
+  }
+  ShellSample<N> sample;
+  const S read = blend(at[0], at[1], w[0]);
+  sample.gradient[0] = at[1] - at[0];
+  sample.gradient[1] = blend(along_y[0], along_y[1], w[0]);
+  sample.gradient[2] = blend(along_z[0], along_z[1], w[0]);
+  bool clipped = false;
+  if constexpr (N::kIsFixed) {
+    const std::uint32_t scaled =
+        static_cast<std::uint32_t>(read) * field.scale.mantissa >> field.scale.shift;
+    clipped = scaled > 32767;
+    sample.density = clipped ? 32767 : static_cast<S>(scaled);
+  } else {
+    const S scale = scale_factor<S>(field.scale) / S(32768);
+    clipped = read * scale > S(1);
+    sample.density = clipped ? S(1) : read * scale;
+    for (S& slope : sample.gradient) slope *= scale;
+  }
+  if (clipped) sample.gradient[0] = sample.gradient[1] = sample.gradient[2] = S(0);
+  return sample;
+}
+
+/// Adds sample i. Fixed: r^2 in Q16, r^3 and the weights in Q24, each product of 32 unsigned
+/// bits.
+template <class N>
+constexpr void add_sample(ShellSums<N>& sums, std::int32_t i, const ShellSample<N>& sample,
+                          const ShellNumber<N> (&lever)[3], bool round) noexcept {
+  using Sum = typename N::Sum;
+  const ShellNumber<N> r = sample.density;
+  if (r < kFaintest<N>) return;
+  Sum square{}, weight{}, pull{}, lift{};  // r^2, w, v, u
+  if constexpr (N::kIsFixed) {
+    const auto density = static_cast<std::uint32_t>(r);
+    const std::uint32_t r2 = (density * density + (1 << 13)) >> 14;
+    const std::uint32_t r3 = (r2 >> 1) * density >> 6;
+    const std::uint32_t r4 = (r2 * r2 + (1 << 15)) >> 16;
+    square = r2;
+    weight = round ? r2 * r2 >> 8 : r4 * r2 >> 8;
+    pull = round ? 3 * weight - r3 : weight;
+    lift = round ? (r3 >> 8) * r2 >> 8 : weight;
+    sums.solid += r >> 14;
+  } else {
+    square = r * r;
+    weight = round ? square * square : square * square * square;
+    pull = round ? Sum(3) * weight - square * r : weight;
+    lift = round ? weight * r : weight;
+    sums.solid += r >= ShellNumber<N>(0.5) ? 1 : 0;
+  }
+  sums.weight += weight;
+  sums.density += weight * r;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    sums.rise[axis] += pull * sample.gradient[axis];
+    sums.lever[axis] += lift * lever[axis];
+  }
+  if (r >= sums.top) {
+    sums.top = r;
+    sums.top_sample = i;
+  }
+  if (round) return;
+  sums.square += weight * square;
+  Sum high = weight * square;
+  if constexpr (N::kIsFixed) high = (weight >> 8) * square >> 8;
+  sums.high += high;
+  for (std::size_t axis = 0; axis < 3; ++axis) sums.high_lever[axis] += high * lever[axis];
+}
+
+/// One offset: see ShellStep.
+template <class N>
+[[nodiscard]] constexpr ShellNumber<N> shell_offset(const ShellStep<N>& step, std::size_t axis,
+                                                    const ShellNumber<N> (&lever)[3]) noexcept {
+  const auto& row = step.row[axis];
+  const ShellNumber<N> way = row[0] * lever[0] + row[1] * lever[1] + row[2] * lever[2];
+  if constexpr (N::kIsFixed) {
+    return (way + (1 << (step.shift - 1))) >> step.shift;
+  } else {
+    return way;
+  }
+}
+
+template <class N>
+constexpr void place_shell(const ShellTable<N>& table, const ShellStep<N>& step,
+                           const ShellPlaces<N>& places) noexcept {
+  const auto place = [&step](const auto& from, const auto& to, std::int32_t count) {
+    for (std::int32_t i = 0; i < count; ++i) {
+      const ShellNumber<N> lever[3] = {from[0][i], from[1][i], from[2][i]};
+      for (std::size_t axis = 0; axis < 3; ++axis) to[axis][i] = shell_offset<N>(step, axis, lever);
+    }
+  };
+  place(table.lever, places.offset, table.count);
+  place(table.middle, places.middle, table.groups);
+  constexpr ShellNumber<N> kNone(N::kIsFixed ? kNoSampleVox << 16 : kNoSampleVox);
+  for (std::int32_t i = table.count; i < table.groups * kShellGroup; ++i) {
+    places.offset[0][i] = kNone;
+  }
+}
+
+/// The densities of so many samples, a multiple of kShellGroup.
+template <class N>
+constexpr void read_shell(const ShellPlaces<N>& places, std::int32_t count,
+                          const ShellNumber<N> (&centre)[3], const ShellField& field,
+                          ShellNumber<N>* density) noexcept {
+  for (std::int32_t i = 0; i < count; ++i) {
+    const ShellNumber<N> place[3] = {centre[0] + places.offset[0][i],
+                                     centre[1] + places.offset[1][i],
+                                     centre[2] + places.offset[2][i]};
+    density[i] = shell_sample<N>(field, place).density;
+  }
+}
+
+/// All groups but those around which the volume is free: their densities are faint anyway. `centre`
+/// of the tool in voxels (fixed: Q15.16), near enough for all places to stay in range.
+template <class N>
+[[nodiscard]] constexpr ShellSums<N> shell_sums(const ShellTable<N>& table,
+                                                const ShellPlaces<N>& places,
+                                                const ShellNumber<N> (&centre)[3],
+                                                const ShellField& field) noexcept {
+  ShellSums<N> sums;
+  const VoxelGrid& grid = field.grid;
+  if (grid.nx < 2 || grid.ny < 2 || grid.nz < 2) return sums;  // no cell
+  for (std::int32_t group = 0; group < table.groups; ++group) {
+    std::int32_t middle[3] = {};
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const ShellNumber<N> at = centre[axis] + places.middle[axis][group];
+      middle[axis] =
+          N::kIsFixed ? static_cast<std::int32_t>(at) >> 16 : static_cast<std::int32_t>(at);
+    }
+    if (field.free.at(middle[0], middle[1], middle[2]) >= table.bricks[group]) continue;
+    sums.read += kShellGroup;
+    for (std::int32_t i = group * kShellGroup; i < (group + 1) * kShellGroup; ++i) {
+      const ShellNumber<N> place[3] = {centre[0] + places.offset[0][i],
+                                       centre[1] + places.offset[1][i],
+                                       centre[2] + places.offset[2][i]};
+      const ShellNumber<N> lever[3] = {table.lever[0][i], table.lever[1][i], table.lever[2][i]};
+      add_sample<N>(sums, i, shell_sample<N>(field, place), lever, table.round);
+    }
+  }
+  return sums;
+}
+
+}  // namespace kerf

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "controller/scene/scene.hpp"
+#include "controller/tool/scene_tool.hpp"
+#include "controller/volume/volume_image.hpp"
+
+namespace kerf {
+
+/// Position in mm and orientation as a quaternion x, y, z, w of unit length.
+struct Pose {
+  std::array<double, 3> position_mm{0, 0, 0};
+  std::array<double, 4> orientation{0, 0, 0, 1};
+};
+
+/// One [[volume]] after loading, windowing and cropping. `pose` takes volume-frame mm (voxel
+/// (0,0,0) at the origin, axes along the voxel axes) to world.
+struct SceneVolume {
+  std::string name;
+  std::string file;
+  VolumeImage image;
+  Pose pose;
+  Density iso = 32768;
+  bool solid = true;
+};
+
+/// A scene after loading: everything the controller needs, in double, checked. Load time only.
+struct LoadedScene : SceneSettings {
+  std::vector<SceneVolume> volumes;
+  std::vector<SceneTool> tools;
+  std::size_t active_tool = 0;
+};
+
+}  // namespace kerf

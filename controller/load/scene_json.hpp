@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+#include "controller/load/loaded_scene.hpp"
+
+namespace kerf {
+
+/// The scene as readers of the segment and of recordings get it: JSON text on one line, keys
+/// sorted, numbers as a short text that reads back equal. The same scene gives the same text
+/// on every machine, so its path is left out and a volume's `file` stands as the scene wrote it.
+///
+///   volumes    [{name, file, iso (u16), solid, spacing_mm, grid, pose {position_mm, orientation},
+///              density_hash}]
+///   tools      [{name, shape, pitch_mm, radius_mm, length_mm, round, turns, size_vox,
+///              offsets_half_pitch [x, y, z, x, y, z..], and what it looks like: profile
+///              [[y_mm, radius_mm]..] or mesh {points_mm [[x, y, z]..], triangles [[a, b, c]..]}}]
+///   active_tool, materials [{name, iso, machinability, colour, and forbidden: true where it is}]
+///   device, force, cut, limits, servo  as their keys in the scene file, of the models that it has;
+///              spindle where force cuts
+[[nodiscard]] std::string canonical_json(const LoadedScene& scene);
+
+/// FNV-1a of bytes, 64 bits.
+[[nodiscard]] std::uint64_t fnv1a(std::string_view bytes);
+
+/// Identity of everything that decides what a run does: fnv1a of `canonical_json`, which holds the
+/// hash of each volume's density and labels too.
+[[nodiscard]] std::uint64_t config_hash(const LoadedScene& scene);
+
+}  // namespace kerf

@@ -1,0 +1,252 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "controller/load/scene_load.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "controller/load/felt_density.hpp"
+#include "controller/load/load_tool.hpp"
+#include "controller/load/scene_place.hpp"
+#include "controller/scene/scene_error.hpp"
+#include "controller/scene/scene_file.hpp"
+#include "controller/scene/scene_text.hpp"
+#include "controller/volume/phantom.hpp"
+#include "controller/volume/volume_crop.hpp"
+#include "controller/volume/volume_density.hpp"
+#include "controller/volume/volume_io.hpp"
+#include "controller/volume/volume_limits.hpp"
+
+namespace kerf {
+namespace {
+
+constexpr double kPhantomVoxelMm = 0.125;  // of the default grid; other grids keep the tooth's size
+
+/// The voxel edge that a tool's size in mm was written for, before --volume replaced the volume.
+double written_voxel_mm(const VolumeSpec& volume) {
+  if (volume.spacing_mm) {
+    return *std::min_element(volume.spacing_mm->begin(), volume.spacing_mm->end());
+  }
+  if (!volume.phantom_size) return kPhantomVoxelMm;
+  return kPhantomVoxelMm * PhantomSpec{}.grid.nx / volume.phantom_size->nx;
+}
+
+bool is_phantom(const VolumeSpec& volume) {
+  return volume.file == kPhantomFile;
+}
+
+void check_overrides(const SceneOverrides& overrides) {
+  if (overrides.rate_hz && (*overrides.rate_hz < kMinRateHz || *overrides.rate_hz > kMaxRateHz)) {
+    refuse("--rate " + std::to_string(*overrides.rate_hz), " is out of range; use " +
+                                                               std::to_string(kMinRateHz) + " to " +
+                                                               std::to_string(kMaxRateHz));
+  }
+  if (overrides.window && !((*overrides.window)[0] < (*overrides.window)[1])) {
+    refuse("--window", " is empty; write low,high with low < high");
+  }
+  if (overrides.spacing_mm) check_spacing("--spacing", *overrides.spacing_mm);
+}
+
+void apply_overrides(const SceneOverrides& overrides, Scene& scene) {
+  check_overrides(overrides);
+  VolumeSpec& first = scene.volumes.front();
+  if (overrides.volume_file) {
+    VolumeSpec replaced;
+    replaced.where = "--volume";
+    replaced.file = overrides.volume_file->string();
+    replaced.name = overrides.volume_file->stem().string();
+    replaced.crop = first.crop;
+    replaced.position_mm = first.position_mm;
+    replaced.orientation = first.orientation;
+    first = replaced;
+    scene.offset_given = false;
+  }
+  if (is_phantom(first) && (overrides.spacing_mm || overrides.window)) {
+    refuse(overrides.spacing_mm ? "--spacing" : "--window",
+           ": the phantom has its own; leave the option out, or give a --volume");
+  }
+  if (overrides.spacing_mm) first.spacing_mm = overrides.spacing_mm;
+  if (overrides.window) first.window = overrides.window;
+  if (overrides.phantom_size) {
+    for (VolumeSpec& volume : scene.volumes) {
+      if (is_phantom(volume)) volume.phantom_size = overrides.phantom_size;
+    }
+  }
+  scene.servo.rate_hz = overrides.rate_hz.value_or(scene.servo.rate_hz);
+  scene.servo.numeric = overrides.numeric.value_or(scene.servo.numeric);
+  if (overrides.personality && *overrides.personality != scene.device.personality) {
+    scene.device.personality = *overrides.personality;
+    scene.device.torque_scale.reset();  // of another device's motors
+  }
+  if (overrides.torque_scale) scene.device.torque_scale = overrides.torque_scale;
+  if (scene.cut_in_one_tick) scene.cut.rate_per_s = scene.servo.rate_hz;
+}
+
+VolumeImage load_image(const VolumeSpec& spec, const std::filesystem::path& folder) {
+  if (is_phantom(spec)) {
+    return make_phantom({.grid = spec.phantom_size.value_or(PhantomSpec{}.grid)});
+  }
+  const std::filesystem::path path = folder / spec.file;
+  const SourceVolume source = read_volume(path, {.spacing_mm = spec.spacing_mm});
+  const Window window =
+      spec.window ? Window{(*spec.window)[0], (*spec.window)[1]} : range_window(source);
+  VolumeImage image = apply_window(source, window);
+  read_labels_beside(path, image);
+  return image;
+}
+
+/// A surface of a material's own needs to know where the material is.
+void check_felt_materials(const LoadedScene& scene) {
+  const auto labelled = [](const SceneVolume& volume) { return !volume.image.labels.empty(); };
+  if (std::any_of(scene.volumes.begin(), scene.volumes.end(), labelled)) return;
+  for (const Material& material : scene.materials) {
+    if (!material.felt_iso) continue;
+    refuse(scene.path, ": material " + material.name +
+                           " has felt_iso = " + number_text(*material.felt_iso) +
+                           ", and no volume has labels to tell where it is; put them beside its "
+                           "file (NAME-labels.nrrd), or leave felt_iso out");
+  }
+}
+
+void check_labels(const VolumeImage& image, std::size_t materials) {
+  const auto highest = std::max_element(image.labels.begin(), image.labels.end());
+  if (highest == image.labels.end() || *highest < materials) return;
+  throw SceneError("label " + std::to_string(*highest) + " stands for no material, the last is " +
+                   std::to_string(materials - 1) + "; add a [[material]] for it");
+}
+
+/// `felt_at`: the iso that the materials' `felt_iso` were written for; none: that of the volume.
+SceneVolume load_volume(const VolumeSpec& spec, const std::filesystem::path& folder,
+                        const std::vector<Material>& materials, std::optional<double> felt_at) {
+  SceneVolume volume;
+  volume.name = spec.name;
+  volume.file = spec.file;
+  volume.solid = spec.solid;
+  try {
+    volume.image = load_image(spec, folder);
+    check_labels(volume.image, materials.size());
+    volume.iso = spec.iso ? static_cast<Density>(std::lround(*spec.iso * kDensityMax))
+                          : otsu_threshold(volume.image);
+    scale_to_felt_iso(materials, felt_at ? nearest_density(*felt_at * kDensityMax) : volume.iso,
+                      volume.image);
+    if (spec.crop) volume.image = crop_to_solid(volume.image, volume.iso);
+  } catch (const SceneError& error) {
+    refuse(spec.where, std::string(": ") + error.what());
+  }
+  volume.pose = place_volume(volume.image,
+                             spec.orientation ? rotation_of(*spec.orientation) : kSourceStanding,
+                             spec.position_mm);
+  const WorldBox box = world_box(volume);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const double reach_mm = std::max(-box.lo_mm[axis], box.hi_mm[axis]);
+    if (reach_mm <= kLargestWorldMm) continue;
+    refuse(spec.where, ": the volume reaches " + short_text(reach_mm) +
+                           " mm from the origin; keep it within " + number_text(kLargestWorldMm) +
+                           ", check position_mm and spacing_mm");
+  }
+  return volume;
+}
+
+/// Moves the materials' densities so that what began at the surface `from` begins at `to`; air and
+/// full density stay where they are.
+void move_materials(double from, double to, std::vector<Material>& materials) {
+  for (Material& material : materials) {
+    material.iso = material.iso < from ? material.iso * to / from
+                                       : 1 - (1 - material.iso) * (1 - to) / (1 - from);
+  }
+}
+
+/// The press of the hand, 1 / scale of it in the scene, takes the same share of a tool `grown`
+/// times as large per second, and slows its spindle as much.
+void fit_cutting(double grown, double scale, LoadedScene& scene) {
+  scene.cut.machinability_mm3_per_s_n *= scale * grown * grown * grown;
+  scene.cut.threshold_n /= scale;
+  scene.spindle.stall_torque_n_mm *= grown / scale;
+  scene.spindle.inertia_g_mm2 *= grown / scale;  // runs up in the same time
+}
+
+/// Fits a scene to the volume of --volume; what is done is told in the header.
+void fit_to_volume(double written_mm, Scene& spec, LoadedScene& scene) {
+  const double grown = touched_volumes(scene.volumes).voxel_mm / written_mm;
+  for (ToolSpec& tool : spec.tools) {
+    tool.size.radius_mm *= grown;
+    tool.size.pitch_mm *= grown;
+    if (tool.size.length_mm) *tool.size.length_mm *= grown;
+    tool.scale *= grown;
+  }
+  const WorldBox box = world_box(scene.volumes.front());
+  double scale = kMinWorkspaceScale;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    scale = std::max(scale, (box.hi_mm[axis] - box.lo_mm[axis]) / kWorkspaceMm[axis]);
+  }
+  if (scale > kMaxWorkspaceScale) {
+    refuse("--volume", ": the box needs a workspace scale of " + short_text(scale) +
+                           ", above the limit of " + number_text(kMaxWorkspaceScale) +
+                           "; check --spacing");
+  }
+  scene.device.workspace_scale = scale;
+  fit_cutting(grown, scale, scene);
+}
+
+}  // namespace
+
+LoadedScene load_scene(const std::filesystem::path& path, const SceneOverrides& overrides) {
+  Scene spec = parse_scene_file(path);
+  const double written_mm = written_voxel_mm(spec.volumes.front());
+  const std::optional<double> written_iso = spec.volumes.front().iso;
+  apply_overrides(overrides, spec);
+
+  LoadedScene scene{SceneSettings(spec), {}, {}};
+  for (std::size_t i = 0; i < spec.volumes.size(); ++i) {
+    const bool from_command_line = i == 0 && overrides.volume_file;
+    scene.volumes.push_back(
+        load_volume(spec.volumes[i], from_command_line ? "" : path.parent_path(), scene.materials,
+                    from_command_line ? written_iso : std::nullopt));
+  }
+  check_felt_materials(scene);
+  if (overrides.volume_file) {
+    fit_to_volume(written_mm, spec, scene);
+    if (written_iso && *written_iso > 0 && *written_iso < 1) {
+      move_materials(*written_iso, scene.volumes.front().iso / kDensityMax, scene.materials);
+    }
+  }
+  const TouchedVolumes touched = touched_volumes(scene.volumes);
+  for (const ToolSpec& tool : spec.tools) {
+    try {
+      scene.tools.push_back(load_tool(tool, touched, path.parent_path()));
+    } catch (const SceneError&) {
+      // A spare tool of the scene that does not fit a volume of --volume is nobody's mistake.
+      if (!overrides.volume_file || scene.tools.empty()) throw;
+    }
+  }
+
+  if (overrides.volume_file) {
+    const double scale = scene.device.workspace_scale;
+    const double weaker =
+        kReferenceRadiusMm / (scale * scale * scene.tools[scene.active_tool].radius_mm);
+    scene.force.p0_n_per_mm2 *= weaker;
+    scene.cut.p1_n_per_mm2 *= weaker;
+  }
+  if (!spec.offset_given) {
+    scene.device.offset_mm = first_surface_from_above(*std::find_if(
+        scene.volumes.begin(), scene.volumes.end(), [](const SceneVolume& v) { return v.solid; }));
+  }
+  return scene;
+}
+
+double device_stiffness_n_per_mm(const LoadedScene& scene) {
+  if (scene.force.model == ForceModel::proxy) return scene.force.stiffness_n_per_mm;
+  const double scale = scene.device.workspace_scale;
+  return scale * scale * 2 * std::numbers::pi * scene.tools[scene.active_tool].radius_mm *
+         scene.force.p0_n_per_mm2;
+}
+
+double hand_unit_mm(const LoadedScene& scene) {
+  return scene.tools[scene.active_tool].radius_mm / scene.device.workspace_scale /
+         kReferenceRadiusMm;
+}
+
+}  // namespace kerf

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+
+#include "controller/load/loaded_scene.hpp"
+
+namespace kerf {
+
+using Matrix3 = std::array<double, 9>;  ///< row-major
+using Point3 = std::array<double, 3>;   ///< mm
+
+/// Rotation matrix of a unit quaternion (x, y, z, w), and back (w >= 0).
+[[nodiscard]] Matrix3 rotation_of(const std::array<double, 4>& quaternion);
+[[nodiscard]] std::array<double, 4> quaternion_of(const Matrix3& rotation);
+[[nodiscard]] Matrix3 product(const Matrix3& a, const Matrix3& b);
+[[nodiscard]] Point3 rotated(const Matrix3& rotation, const Point3& point);
+
+/// World from source when a scene gives no orientation: the source's z axis points up (world y), so
+/// that a scan of a standing patient stands: (x, y, z) -> (x, z, -y).
+inline constexpr Matrix3 kSourceStanding = {1, 0, 0, 0, 0, 1, 0, -1, 0};
+
+/// Pose of a volume whose box has its middle at `middle_mm` in the world, turned by `orientation`
+/// (world from the source file's frame) after the directions that the file itself has.
+[[nodiscard]] Pose place_volume(const VolumeImage& image, const Matrix3& orientation,
+                                const Point3& middle_mm);
+
+/// Axis-parallel world box around a volume: all of its voxels, whole.
+struct WorldBox {
+  Point3 lo_mm, hi_mm;
+};
+[[nodiscard]] WorldBox world_box(const SceneVolume& volume);
+
+/// Where a hand that comes down from +y first touches: the highest point at which the density
+/// reaches the volume's iso on the vertical line through the middle of its box, or, where that line
+/// meets nothing, on the line through the solid voxel nearest to it in (x, z). Between voxels the
+/// density is trilinear, outside it is 0.
+///
+/// The place is exact to 1/100 of the smallest voxel edge, and walls thinner than a quarter of that
+/// edge may be missed on the first line. Throws SceneError when no voxel reaches iso.
+[[nodiscard]] Point3 first_surface_from_above(const SceneVolume& volume);
+
+}  // namespace kerf

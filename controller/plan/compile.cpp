@@ -1,0 +1,171 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "controller/plan/compile.hpp"
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "controller/kernel/proxy/probe_work.hpp"
+#include "controller/plan/aligned_tool.hpp"
+#include "controller/plan/plan_choice.hpp"
+#include "controller/plan/plan_contact.hpp"
+#include "controller/plan/plan_cost.hpp"
+#include "controller/plan/plan_device.hpp"
+#include "controller/plan/plan_preston.hpp"
+#include "controller/plan/plan_tools.hpp"
+#include "controller/plan/plan_volumes.hpp"
+#include "controller/plan/servo_memory.hpp"
+#include "controller/plan/stage_timing.hpp"
+#include "controller/scene/scene_error.hpp"
+#include "controller/servo/servo_step.hpp"
+
+namespace kerf {
+namespace {
+
+template <class N>
+class SceneIn final : public CompiledScene {
+ public:
+  SceneIn(const LoadedScene& scene, const KernelSet& kernels)
+      : cut_(scene.cut.model), memory_(scene) {
+    plan_device(scene.device, plan_);
+    plan_limits(scene, plan_);
+    plan_.kernel = scene.servo.kernel;
+    plan_.taps = &exact_taps(scene.servo.kernel);
+    plan_.kernels = &kernels;
+    plan_.cutting =
+        scene.cut.model == CutModel::overlap || scene.cut.model == CutModel::overlap_exact;
+    plan_.removal_rate = removal_rate<N>(scene.cut.rate_per_s / scene.servo.rate_hz,
+                                         scene.cut.model == CutModel::overlap_exact);
+    plan_volumes(scene, plan_);
+    plan_contact(scene, plan_);
+    plan_.force_cut = plan_force_cut(scene, plan_);
+    if (plan_.contact.swept) {
+      for (std::size_t v = 0; v < plan_.volume_count; ++v) {
+        memory_.contact().hold_volume(scene.volumes[plan_.volumes[v].scene_index]);
+      }
+    }
+    for (const SceneTool& tool : scene.tools) plan_tool_everywhere(scene, tool);
+    state_.active_tool = static_cast<std::uint32_t>(scene.active_tool);
+    for (const SceneVolume& volume : scene.volumes) grids_.push_back(volume.image.grid);
+    costs_.arrays = memory_.arrays();
+  }
+
+  void take(LoadedScene& scene) override { memory_.take(scene, plan_, state_); }
+  [[nodiscard]] const SceneCosts& costs() const noexcept override { return costs_; }
+  [[nodiscard]] std::vector<StageTime> time_stages(std::size_t tick) override {
+    return kerf::time_stages(plan_, state_, tick / plan_.volume_count, tick % plan_.volume_count,
+                             cut_, costs_.ticks[tick].cost.stages);
+  }
+
+  ServoOutput step(const DeviceReport& report) noexcept override {
+    return servo_step(plan_, state_, report);
+  }
+  void apply(const ServoCommand& command) noexcept override {
+    apply_command(plan_, state_, command);
+  }
+  [[nodiscard]] double penetration_mm() const noexcept override {
+    return kerf::penetration_mm(plan_, state_);
+  }
+  [[nodiscard]] VoxelGrid grid(std::size_t scene_index) const noexcept override {
+    return grids_[scene_index];
+  }
+  [[nodiscard]] std::span<const Density> density(std::size_t scene_index) const noexcept override {
+    return memory_.density(scene_index);
+  }
+
+ private:
+  void plan_tool_everywhere(const LoadedScene& scene, const SceneTool& tool) {
+    ToolPlan<N>& plan = plan_.tools[plan_.tool_count++];
+    plan.round = tool.round;
+    plan.turns = tool.turns;
+    plan.rim_mm = typename N::Real(tool.radius_mm);
+    plan.offsets = memory_.hold_samples(tool);
+    if (plan_.contact.swept) {
+      plan.swept.shell = memory_.contact().hold_shell(scene, tool);
+      plan.swept.proxy = plan_proxy(scene, tool, plan.swept.shell);
+    }
+    const AlignedTable* table = nullptr;  // of the last volume that could use one
+    LatticeTurn turn{};
+    for (std::size_t v = 0; v < plan_.volume_count; ++v) {
+      const std::size_t scene_index = plan_.volumes[v].scene_index;
+      const SceneVolume& volume = scene.volumes[scene_index];
+      if (plan_.force_cut.on) memory_.force_cut().hold(tool, volume, v);
+      const PlanChoice choice = choose_plan(scene, tool, volume);
+      PlanCost cost;
+      switch (choice.plan) {
+        case Plan::aligned:
+          if (table == nullptr || turn != choice.turn) {
+            turn = choice.turn;
+            table = &memory_.hold_table(tool, turn, scene.servo.kernel, *plan_.kernels);
+          }
+          memory_.hold_aligned(v, *table);
+          cost = aligned_cost(*table, *plan_.kernels, scene.cut.model);
+          break;
+        case Plan::gather:
+          memory_.hold_gather(tool, volume, v);
+          cost = gather_cost(scene.servo.numeric, *plan_.kernels, tool, volume, scene.cut.model);
+          break;
+        case Plan::splat:
+          memory_.hold_splat(tool, volume, v);
+          cost = splat_cost(*plan_.kernels, tool, volume, scene.cut.model);
+          break;
+        case Plan::surface:
+          cost = surface_cost(scene.servo.numeric, *plan_.kernels);
+          break;
+      }
+      if (plan_.contact.swept) sweep_instead(most_samples(plan.swept.shell), cost.stages);
+      if constexpr (N::kIsFixed) {
+        const bool any_pose = choice.plan == Plan::gather || choice.plan == Plan::splat;
+        if (any_pose && plan.samples.count == 0) {
+          plan.samples = memory_.hold_sample_table(tool);
+        }
+      }
+      plan.in_volume[v] = plan_tool<N>(scene, tool, volume, choice.plan,
+                                       choice.plan == Plan::aligned ? table : nullptr);
+      costs_.ticks.push_back({plan_.tool_count - 1, scene_index, choice, std::move(cost)});
+    }
+  }
+
+  /// Of one volume, rounded up.
+  [[nodiscard]] std::uint64_t most_samples(const Shell<N>& shell) const {
+    const std::int64_t all = probe_work(shell.table, plan_.volume_count).most();
+    return (static_cast<std::uint64_t>(all) + plan_.volume_count - 1) / plan_.volume_count;
+  }
+
+  CutModel cut_;
+  ServoPlan<N> plan_;
+  ServoState<N> state_;
+  std::vector<VoxelGrid> grids_;  ///< by volume of the scene
+  ServoMemory<N> memory_;
+  SceneCosts costs_;
+};
+
+}  // namespace
+
+std::unique_ptr<CompiledScene> plan_scene(const LoadedScene& scene, const KernelSet& kernels) {
+  if (scene.cut.model == CutModel::preston && scene.force.model != ForceModel::proxy) {
+    throw SceneError(scene.path +
+                     ": cut.model = \"preston\" needs the normal force of a proxy; set force.model "
+                     "= \"proxy\", or cut.model = \"overlap\"");
+  }
+  switch (scene.servo.numeric) {
+    case NumericKind::fixed:
+      return std::make_unique<SceneIn<FixedNumbers>>(scene, kernels);
+    case NumericKind::float32:
+      return std::make_unique<SceneIn<FloatNumbers>>(scene, kernels);
+    case NumericKind::float64:
+      break;
+  }
+  return std::make_unique<SceneIn<DoubleNumbers>>(scene, kernels);
+}
+
+std::unique_ptr<CompiledScene> compile(LoadedScene& scene, const KernelSet& kernels) {
+  auto compiled = plan_scene(scene, kernels);
+  compiled->take(scene);
+  return compiled;
+}
+
+}  // namespace kerf

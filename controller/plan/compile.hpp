@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "controller/kernel/kernel_set.hpp"
+#include "controller/load/loaded_scene.hpp"
+#include "controller/plan/scene_costs.hpp"
+#include "controller/servo/servo.hpp"
+
+namespace kerf {
+
+/// A scene turned into plan and memory of the servo step, in the numbers that the scene asks for.
+///
+/// Each tool has one plan in each solid volume (`choose_plan`). The costs are known at once; the
+/// memory exists after `take`, and nothing is allocated after that.
+class CompiledScene : public Servo {
+ public:
+  [[nodiscard]] virtual const SceneCosts& costs() const noexcept = 0;
+
+  /// Takes the volumes' densities over (they are empty in the scene afterwards) and allocates the
+  /// rest. Once, before the first step; `scene` is the one that was compiled.
+  virtual void take(LoadedScene& scene) = 0;
+
+  /// Each stage of `costs().ticks[tick]` timed on the volume as it is, with a tool that is inside
+  /// the densest part and turned as unfavourably as it can be. Cuts where the scene cuts:
+  /// only for a servo that will not be stepped. After `take`; takes about 250 ticks.
+  [[nodiscard]] virtual std::vector<StageTime> time_stages(std::size_t tick) = 0;
+};
+
+/// Plans, tables and costs of a checked scene; no array of the size of a volume is made. Throws
+/// SceneError for a scene that the loop cannot hold: no solid volume, a voxel or a step outside the
+/// number formats.
+///
+/// `kernels` run the loop: the fastest of this machine unless a test asks for others.
+[[nodiscard]] std::unique_ptr<CompiledScene> plan_scene(const LoadedScene& scene,
+                                                        const KernelSet& kernels = **kernel_sets());
+
+/// `plan_scene` and `take` in one.
+[[nodiscard]] std::unique_ptr<CompiledScene> compile(LoadedScene& scene,
+                                                     const KernelSet& kernels = **kernel_sets());
+
+}  // namespace kerf

@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <string>
+
+#include "controller/load/loaded_scene.hpp"
+#include "controller/plan/matrices.hpp"
+#include "controller/scene/scene_error.hpp"
+#include "controller/servo/servo_plan.hpp"
+
+namespace kerf {
+
+// The swept contact of a scene: where its space lies and how stiff the hand is held to the proxy.
+
+/// Edge of the finest voxel of the solid volumes.
+[[nodiscard]] inline double contact_unit_mm(const LoadedScene& scene) {
+  double finest = std::numeric_limits<double>::max();
+  for (const SceneVolume& volume : scene.volumes) {
+    if (!volume.solid) continue;
+    finest = std::min(
+        finest, *std::min_element(volume.image.spacing_mm.begin(), volume.image.spacing_mm.end()));
+  }
+  return finest;
+}
+
+namespace contact_parts {
+
+inline std::array<double, 3> middle_mm(const SceneVolume& volume) {
+  const Matrix rotation = matrix_of(volume.pose.orientation);
+  const VoxelGrid& grid = volume.image.grid;
+  const std::array<double, 3> half{(grid.nx - 1) / 2.0, (grid.ny - 1) / 2.0, (grid.nz - 1) / 2.0};
+  std::array<double, 3> at = volume.pose.position_mm;
+  for (std::size_t i = 0; i < 3; ++i) {
+    for (std::size_t j = 0; j < 3; ++j) {
+      at[i] += rotation[i][j] * half[j] * volume.image.spacing_mm[j];
+    }
+  }
+  return at;
+}
+
+}  // namespace contact_parts
+
+/// The origin is the middle of the first solid volume. Throws SceneError for a volume so far from
+/// it that the proxy could not get there.
+template <class N>
+void plan_contact(const LoadedScene& scene, ServoPlan<N>& plan) {
+  using Real = typename N::Real;
+  using Ratio = typename N::Ratio;
+  ContactPlan<N>& contact = plan.contact;
+  contact.swept = scene.force.model == ForceModel::proxy;
+  if (!contact.swept) return;
+  const double unit_mm = contact_unit_mm(scene);
+  const auto first = contact_parts::middle_mm(scene.volumes[plan.volumes[0].scene_index]);
+  for (std::size_t v = 1; v < plan.volume_count; ++v) {
+    const SceneVolume& volume = scene.volumes[plan.volumes[v].scene_index];
+    const auto middle = contact_parts::middle_mm(volume);
+    for (std::size_t i = 0; i < 3; ++i) {
+      if (std::abs(middle[i] - first[i]) < kContactLimit / 2 * unit_mm) continue;
+      throw SceneError(scene.path + ": volume " + volume.name +
+                       " lies more than 4096 of the finest voxels from the first; bring them "
+                       "together or set force.model = \"paper\"");
+    }
+  }
+  contact.origin_mm = rounded<WorldVec<Real>, Real>(first);
+  contact.units_per_mm = Ratio(1 / unit_mm);
+  contact.mm_per_unit = Ratio(unit_mm);
+  contact.device_mm_per_unit = Ratio(unit_mm / scene.device.workspace_scale);
+  contact.coupling = {Ratio(scene.force.stiffness_n_per_mm),
+                      typename N::Unit(scene.force.damping_ns_per_mm)};
+}
+
+/// How volume `v` of the plan lies in contact space.
+template <class N>
+[[nodiscard]] ContactFrame<N> contact_frame(const LoadedScene& scene, const SceneVolume& volume) {
+  const double unit_mm = contact_unit_mm(scene);
+  const auto& h = volume.image.spacing_mm;
+  const Matrix rotation = matrix_of(volume.pose.orientation);
+  const Matrix into = into_volume(rotation, {unit_mm / h[0], unit_mm / h[1], unit_mm / h[2]});
+  const SceneVolume& first = *std::find_if(scene.volumes.begin(), scene.volumes.end(),
+                                           [](const SceneVolume& v) { return v.solid; });
+  const auto origin_mm = contact_parts::middle_mm(first);
+  std::array<double, 3> origin_vox{};
+  for (std::size_t i = 0; i < 3; ++i) {
+    for (std::size_t j = 0; j < 3; ++j) {
+      origin_vox[i] += into[i][j] * (origin_mm[j] - volume.pose.position_mm[j]) / unit_mm;
+    }
+  }
+  return {rounded<typename N::Ratio, VoxelSpace, ContactSpace>(into),
+          rounded<VoxelVec<typename N::Real>, typename N::Real>(origin_vox)};
+}
+
+/// How the proxy of a tool whose surface is `shell` moves.
+template <class N>
+[[nodiscard]] ProxyPlan<N> plan_proxy(const LoadedScene& scene, const SceneTool& tool,
+                                      const Shell<N>& shell) {
+  constexpr double kRampNPerMs = 0.1;  // after a start inside of the solid: haptics-science 3.4
+  const double n_per_unit =
+      scene.force.stiffness_n_per_mm * contact_unit_mm(scene) / scene.device.workspace_scale;
+  const bool turning = tool.turns && !tool.round;
+  const double reach = std::max(1.0, static_cast<double>(shell.reach));
+  return {.friction = typename N::Unit(scene.force.friction),
+          .turn_step = typename N::Unit(turning ? turn_step_of(reach) : 0.0),
+          .ramp_per_tick = typename N::Real(kRampNPerMs * 1000 / scene.servo.rate_hz / n_per_unit)};
+}
+
+}  // namespace kerf

@@ -1,0 +1,164 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+
+#include "controller/load/loaded_scene.hpp"
+#include "controller/plan/matrices.hpp"
+#include "controller/servo/servo_plan.hpp"
+#include "shared/wire/falcon_constants.hpp"
+#include "shared/wire/omni_constants.hpp"
+#include "shared/wire/wooden_constants.hpp"
+
+namespace kerf {
+
+namespace device_parts {
+
+/// How a joint of the servo's kinematics follows its encoder, and its motor the joint.
+struct JointSense {
+  double home_rad = 0;       ///< angle where the count is 0
+  double rad_per_count = 0;  ///< signed
+  double motor_sign = 1;     ///< of the count that gives a positive torque
+};
+
+/// Joints turret, thigh and forearm of a serial arm; the legs of the Falcon.
+inline std::array<JointSense, 3> joints_of(const DeviceSettings& device) {
+  std::array<JointSense, 3> joints;
+  for (std::size_t i = 0; i < 3; ++i) {
+    switch (device.personality) {
+      case Personality::omni:
+        joints[i] = {device.dock_rad[i], omni::kEncoderSign[i] * omni::kRadPerCount, 1};
+        break;
+      case Personality::falcon:
+        joints[i] = {falcon::kZeroRad, falcon::kRadPerCount, double(falcon::kMotorSign)};
+        break;
+      case Personality::woodenhaptics: {
+        constexpr std::array<double, 3> kSign{-1, -1, 1};  // A = -q1, B = pi/2 - q2, C = q3
+        constexpr std::array<double, 3> kZeroRad{0, wooden::kPi / 2, 0};
+        joints[i] = {kZeroRad[i], kSign[i] * wooden::kRadPerCount[i], kSign[i]};
+        break;
+      }
+    }
+  }
+  return joints;
+}
+
+template <class N>
+SerialArm<N> serial_arm_of(Personality personality) {
+  using Real = typename N::Real;
+  if (personality == Personality::woodenhaptics) {
+    return {Real(wooden::kUpperLinkMm), Real(wooden::kForearmMm),
+            Real(wooden::kShoulderHeightMm - wooden::kOriginHeightMm),
+            Real(wooden::kOriginDepthMm)};
+  }
+  return {Real(omni::kUpperLinkMm), Real(omni::kForearmMm), Real(omni::kOriginHeightMm),
+          Real(omni::kOriginDepthMm)};
+}
+
+template <class N>
+DeltaArm<N> delta_arm() {
+  using Real = typename N::Real;
+  using Unit = typename N::Unit;
+  DeltaArm<N> arm{.hub_mm = Real(falcon::kHipOutMm - falcon::kPlateOutMm),
+                  .crank_mm = Real(falcon::kThighMm),
+                  .parallelogram_mm = Real(falcon::kShinMm),
+                  .hinges_mm = Real(falcon::kShinEndMm + falcon::kKneeEndMm),
+                  .side_mm = Real(falcon::kPlateAcrossMm - falcon::kHipAcrossMm),
+                  .origin_depth_mm = Real(falcon::kOriginDepthMm),
+                  .azimuth = {}};
+  for (std::size_t i = 0; i < 3; ++i) {
+    arm.azimuth[i] = {Unit(std::sin(falcon::kLegAzimuthRad[i])),
+                      Unit(std::cos(falcon::kLegAzimuthRad[i]))};
+  }
+  return arm;
+}
+
+inline std::int32_t motor_count_end(Personality personality) {
+  switch (personality) {
+    case Personality::omni:
+      return -omni::kMotorCountMin;
+    case Personality::falcon:
+      return falcon::kMotorCountMax;
+    case Personality::woodenhaptics:
+      break;
+  }
+  return wooden::kMaxMilliamps;
+}
+
+/// No tip is farther than this from where its encoders, rounded to whole counts, put it: half a
+/// count of one joint with all of the arm behind it. The Omni's 0.056 mm is its data sheet's 0.055.
+inline double tip_noise_mm(Personality personality) {
+  switch (personality) {
+    case Personality::omni:
+      return omni::kRadPerCount * (omni::kUpperLinkMm + omni::kForearmMm) / 2;
+    case Personality::falcon:
+      return falcon::kRadPerCount * falcon::kThighMm / 2;
+    case Personality::woodenhaptics:
+      break;
+  }
+  return wooden::kRadPerCount[1] * (wooden::kUpperLinkMm + wooden::kForearmMm) / 2;
+}
+
+}  // namespace device_parts
+
+/// The device, its place in the scene and its motors, as the loop's numbers hold them.
+template <class N>
+void plan_device(const DeviceSettings& device, ServoPlan<N>& plan) {
+  using Real = typename N::Real;
+  plan.workspace_scale = Real(device.workspace_scale);
+  plan.offset_mm = rounded<WorldVec<Real>, Real>(device.offset_mm);
+
+  DevicePlan<N>& arm = plan.device;
+  arm.personality = device.personality;
+  arm.absolute_encoders = device.personality != Personality::omni;
+  arm.serial = device_parts::serial_arm_of<N>(device.personality);
+  arm.delta = device_parts::delta_arm<N>();
+  arm.motor_count_end = device_parts::motor_count_end(device.personality);
+  arm.motors_configured = device.torque_scale.has_value();
+  const auto joints = device_parts::joints_of(device);
+  for (std::size_t i = 0; i < 3; ++i) {
+    arm.joints[i].home_rad = typename N::Angle(joints[i].home_rad);
+    if constexpr (N::kIsFixed) {
+      constexpr auto kOne = static_cast<double>(std::int64_t{1} << kAnglePerCountBits);
+      arm.joints[i].angle_per_count = static_cast<std::int64_t>(joints[i].rad_per_count * kOne);
+    } else {
+      arm.joints[i].angle_per_count = joints[i].rad_per_count;
+    }
+    if (!device.torque_scale) continue;
+    arm.joints[i].counts_per_n_mm = Real(joints[i].motor_sign / (*device.torque_scale)[i]);
+  }
+}
+
+/// Limits and times, in ticks of the scene's rate.
+template <class N>
+void plan_limits(const LoadedScene& scene, ServoPlan<N>& plan) {
+  using Real = typename N::Real;
+  // Of a small motor's winding: order of ten seconds (Maxon RE25: 12 s).
+  constexpr double kThermalTimeS = 10.0;
+  const double rate_hz = scene.servo.rate_hz;
+  const auto ticks = [&](double ms) {
+    return std::max(1U, static_cast<std::uint32_t>(ms * rate_hz / 1000.0));
+  };
+  plan.rate_hz = scene.servo.rate_hz;
+  plan.velocity = {.rate_hz = scene.servo.rate_hz,
+                   .stride = std::max(1, scene.servo.rate_hz / 1000),
+                   .noise_mm = Real(device_parts::tip_noise_mm(scene.device.personality))};
+  constexpr double kStep = 1.0 / 65536;  // the limit is rounded down, not to nearest
+  plan.limits.peak_n = Real(scene.limits.force_n - kStep);
+  plan.limits.continuous_n = Real(std::min(scene.limits.continuous_force_n, scene.limits.force_n));
+  plan.limits.slew_n_per_tick = Real(scene.limits.slew_n_per_ms * 1000.0 / rate_hz);
+  plan.limits.thermal_per_tick = typename N::Ratio(1.0 / (rate_hz * kThermalTimeS));
+  plan.speed_limit_mm_per_tick = Real(scene.limits.speed_mm_per_s / rate_hz);
+  plan.timing = {.hold_ticks = ticks(5),
+                 .zero_ticks = ticks(20),
+                 // Below 500 Hz a tick is longer than the 2 ms: the first bad one trips.
+                 .not_finite_ticks = static_cast<std::uint32_t>(2 * rate_hz / 1000),
+                 .fade_in_ticks = ticks(100),
+                 .rest_ticks = ticks(50)};
+}
+
+}  // namespace kerf

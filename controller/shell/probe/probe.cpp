@@ -1,0 +1,238 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "controller/shell/probe/probe.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <memory>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+#include <unistd.h>
+
+#include "controller/device/driver/make_driver.hpp"
+#include "controller/device/port/open_port.hpp"
+#include "controller/scene/scene_file.hpp"
+#include "controller/shell/clock.hpp"
+#include "controller/shell/motor_guard.hpp"
+#include "controller/shell/probe/probe_advice.hpp"
+#include "controller/shell/probe/probe_nodes.hpp"
+#include "controller/shell/probe/probe_view.hpp"
+#include "controller/shell/real_time.hpp"
+#include "controller/shell/stop_signals.hpp"
+#include "shared/posix/new_file.hpp"
+
+namespace kerf {
+namespace {
+
+constexpr int kPatienceMs = 2000;
+constexpr int kDefaultRateHz = 1000;
+
+std::string word_of(Personality personality) {
+  return std::string(kPersonalityWords[static_cast<std::size_t>(personality)]);
+}
+
+/// The device as the scene describes it; without a scene, with the defaults of its kind.
+DeviceSettings device_of(const ControllerOptions& options) {
+  DeviceSettings device;
+  if (!options.scene.empty()) device = parse_scene_file(options.scene).device;
+  if (const auto kind = options.overrides.personality; kind && *kind != device.personality) {
+    device.personality = *kind;
+    device.torque_scale.reset();  // was measured on the other one
+  }
+  if (options.overrides.torque_scale) device.torque_scale = options.overrides.torque_scale;
+  return device;
+}
+
+/// What the device itself still waits for, in the order in which a user does it.
+void add_lacks_of_device(const DeviceSettings& device, const ProbeView::Seen& seen,
+                         std::vector<Lack>& lacks) {
+  const std::string name = word_of(device.personality);
+  if (seen.reports == 0) {
+    lacks.push_back({name + ": not one report",
+                     device.personality == Personality::falcon
+                         ? "load its firmware (docs/devices.md), or unplug it and plug it in again"
+                         : "unplug it and plug it in again"});
+    return;
+  }
+  if (!seen.homed) {
+    lacks.push_back(
+        {name + ": not homed", device.personality == Personality::falcon
+                                   ? "pull the grip all the way out, then push it in"
+                                   : "hold the home pose, press its calibration button"});
+  } else if (!seen.calibrated) {
+    lacks.push_back(
+        {name + ": not calibrated", device.personality == Personality::omni
+                                        ? "put the stylus into the inkwell and let it rest there"
+                                    : device.personality == Personality::falcon
+                                        ? "hold the grip's centre button, at rest"
+                                        : "hold the home pose, press its calibration button"});
+  }
+  if (!device.torque_scale) {
+    lacks.push_back({name + ": device.torque_scale is not set, so its motors will stay off",
+                     "measure it: docs/devices.md"});
+  }
+}
+
+/// One line that is drawn again on a terminal; line by line elsewhere.
+class LiveLine {
+ public:
+  void show(const std::string& text) const {
+    std::printf(terminal_ ? "\r\033[K%s" : "%s\n", text.c_str());
+    std::fflush(stdout);
+  }
+  void end() const {
+    if (terminal_) std::fputs("\n", stdout);
+  }
+  [[nodiscard]] int per_second() const noexcept { return terminal_ ? 10 : 1; }
+
+ private:
+  bool terminal_ = isatty(STDOUT_FILENO) == 1;
+};
+
+/// Reads and shows until the end; every packet sent is the driver's neutral one.
+void watch(DeviceDriver& driver, const PacketPort& port, ProbeView& view, std::uint64_t ticks,
+           int rate_hz, const std::atomic<bool>& stop) {
+  const LiveLine live;
+  const MotorGuard guard(driver);
+  static_cast<void>(driver.release_for_good());  // whatever is commanded below: no torque
+  DeadlineClock clock(kNsPerSecond / rate_hz, 0);
+  const auto show_every = static_cast<std::uint64_t>(rate_hz / live.per_second());
+  std::uint64_t shown_reports = 0;
+  for (std::uint64_t tick = 1; tick <= ticks && !stop && !port.closed(); ++tick) {
+    clock.wait_next();
+    view.take(driver.read(), monotonic_ns());
+    ServoOutput output;  // asks for homing and shows the lights of a device that waits
+    output.phase = Phase::calibrating;
+    driver.command(output);
+    if (tick % show_every != 0) continue;
+    const auto rate =
+        (view.seen().reports - shown_reports) * static_cast<unsigned>(live.per_second());
+    shown_reports = view.seen().reports;
+    char head[48];
+    std::snprintf(head, sizeof head, "%7.1f s %5llu/s  ", static_cast<double>(tick) / rate_hz,
+                  static_cast<unsigned long long>(rate));
+    live.show(head + (view.seen().reports > 0 ? view.line() : "no report yet") + "  lost " +
+              std::to_string(driver.lost()));
+  }
+  live.end();
+}
+
+nlohmann::ordered_json json_of(const std::vector<Lack>& lacks) {
+  auto list = nlohmann::ordered_json::array();
+  for (const Lack& lack : lacks) list.push_back({{"what", lack.what}, {"cure", lack.cure}});
+  return list;
+}
+
+void print(const std::vector<Lack>& lacks) {
+  for (const Lack& lack : lacks) {
+    std::printf("missing  %s\n         %s\n", lack.what.c_str(), lack.cure.c_str());
+  }
+}
+
+/// A port of a real bus that cannot be opened is followed by what may be the reason.
+std::unique_ptr<PacketPort> open_or_explain(const ControllerOptions& options, Personality kind,
+                                            int rate_hz, const std::atomic<bool>& stop) {
+  const std::string port = resolve_port(options.port, kind);
+  try {
+    return open_port(port, rate_hz, kPatienceMs, stop);
+  } catch (const std::runtime_error&) {
+    const bool is_emulated = port.starts_with("socket:") || port.starts_with("udp:");
+    if (!is_emulated) print(lacks_of_nodes(kind, list_device_nodes()));
+    throw;
+  }
+}
+
+int look_around(const ControllerOptions& options) {
+  const auto nodes = list_device_nodes();
+  auto lacks = lacks_of_nodes(options.overrides.personality, nodes);
+  const auto rights = lacks_of_rights();
+  lacks.insert(lacks.end(), rights.begin(), rights.end());
+  auto devices = nlohmann::ordered_json::array();
+  for (const DeviceNode& node : nodes) {
+    std::printf("found    %s at %s\n", word_of(node.personality).c_str(), node.path.c_str());
+    devices.push_back({{"device", word_of(node.personality)},
+                       {"node", node.path},
+                       {"usable", node.open_error == 0}});
+  }
+  if (nodes.empty()) std::puts("found    no device; ./kerf demo needs none");
+  if (rights.empty()) std::puts("found    real-time priority and locked memory");
+  print(lacks);
+  if (!options.report.empty()) {
+    const nlohmann::ordered_json json{{"program", "kerf-controller --probe"},
+                                      {"version", KERF_VERSION},
+                                      {"devices", devices},
+                                      {"missing", json_of(lacks)}};
+    write_new_file(options.report, json.dump(2) + "\n");
+  }
+  return 0;
+}
+
+nlohmann::ordered_json report_of(const ControllerOptions& options, const DeviceSettings& device,
+                                 const PacketPort& port, const DeviceDriver& driver,
+                                 const ProbeView& view, int rate_hz) {
+  const ProbeView::Seen& seen = view.seen();
+  nlohmann::ordered_json link = nlohmann::ordered_json::object();
+  for (const LinkCounter& counter : port.counters()) link[counter.name] = counter.value;
+  const double seconds = static_cast<double>(seen.ticks) / rate_hz;
+  return {{"program", "kerf-controller --probe"},
+          {"version", KERF_VERSION},
+          {"device", word_of(device.personality)},
+          {"port", options.port},
+          {"seconds", seconds},
+          {"reports", seen.reports},
+          {"fresh_per_s", seconds > 0 ? static_cast<double>(seen.reports) / seconds : 0},
+          {"longest_gap_ms", seen.longest_gap_ms},
+          {"lost_packets", driver.lost()},
+          {"refused_packets", driver.refused()},
+          {"link", link},
+          {"counts", view.last().encoder},
+          {"lowest_travel_counts", seen.lowest},
+          {"highest_travel_counts", seen.highest},
+          {"buttons_pressed", seen.pressed},
+          {"parked", seen.parked},
+          {"homed", seen.homed},
+          {"calibrated", seen.calibrated},
+          {"tip_mm", seen.calibrated ? nlohmann::ordered_json(view.tip_mm()) : nullptr}};
+}
+
+}  // namespace
+
+int run_probe(const ControllerOptions& options) {
+  if (options.port.empty()) return look_around(options);
+  if (!options.report.empty()) check_new_file(options.report);
+  const int rate_hz = options.overrides.rate_hz.value_or(kDefaultRateHz);
+  const DeviceSettings device = device_of(options);
+  std::atomic<bool>& stop = catch_stop_signals();
+  const auto port = open_or_explain(options, device.personality, rate_hz, stop);
+  const auto driver = make_driver(device.personality, *port);
+  driver->start();
+  static_cast<void>(become_real_time(options.real_time));  // what lacks is told at the end
+
+  ProbeView view(device, rate_hz);
+  const auto ticks = options.seconds
+                         ? static_cast<std::uint64_t>(std::llround(*options.seconds * rate_hz))
+                         : UINT64_MAX;
+  watch(*driver, *port, view, ticks, rate_hz, stop);
+
+  std::vector<Lack> lacks;
+  add_lacks_of_device(device, view.seen(), lacks);
+  const auto rights = lacks_of_rights();
+  lacks.insert(lacks.end(), rights.begin(), rights.end());
+  std::printf("kerf: %llu reports, longest gap %.1f ms, %llu lost, %llu refused\n",
+              static_cast<unsigned long long>(view.seen().reports), view.seen().longest_gap_ms,
+              static_cast<unsigned long long>(driver->lost()),
+              static_cast<unsigned long long>(driver->refused()));
+  print(lacks);
+  if (!options.report.empty()) {
+    auto json = report_of(options, device, *port, *driver, view, rate_hz);
+    json["missing"] = json_of(lacks);
+    write_new_file(options.report, json.dump(2) + "\n");
+  }
+  return view.seen().reports > 0 ? 0 : 1;
+}
+
+}  // namespace kerf

@@ -1,0 +1,173 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "controller/tool/surface_samples.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <numbers>
+#include <span>
+#include <sstream>
+
+#include "controller/kernel/point_shell/shell_table.hpp"
+#include "controller/kernel/proxy/shell_closeup.hpp"
+#include "controller/scene/scene_error.hpp"
+#include "controller/tool/mesh_surface.hpp"
+#include "controller/tool/tool_shapes.hpp"
+
+namespace kerf {
+namespace {
+
+static_assert(kMaxSurfaceSamples * 1.02 < kMaxShellSamples);  // rings are rounded to whole samples
+
+constexpr int kProfileSteps = 2048;  // no corner but the shape's own turns by more than 0.1 deg
+constexpr double kRimAngle = 0.2;    // rad
+constexpr double kBeforeRim = 0.05;  // of the distance of rings; tuned, see the header
+constexpr double kGoldenAngle = 2.399963229728653;  // pi (3 - sqrt(5))
+
+using Sample = std::array<double, 3>;
+using Profile = std::vector<std::array<double, 2>>;  // {y, radius}
+
+double length_of(const std::array<double, 2>& a, const std::array<double, 2>& b) {
+  return std::hypot(b[0] - a[0], b[1] - a[1]);
+}
+
+double area_of(const Profile& profile) {
+  double area = 0;
+  for (std::size_t k = 1; k < profile.size(); ++k) {
+    area += std::numbers::pi * (profile[k - 1][1] + profile[k][1]) *
+            length_of(profile[k - 1], profile[k]);
+  }
+  return area;
+}
+
+std::vector<Sample> fibonacci_ball(double radius_mm, int count) {
+  // Layers of equal area begin at 0.5; a little nearer to the poles these are no emptier than the
+  // rest (the worst normal on a ball of 6 is 0.5 degrees off instead of 0.7).
+  constexpr double kFirst = 0.36;
+  std::vector<Sample> samples;
+  for (int i = 0; i < count; ++i) {
+    const double y = 2 * (i + kFirst) / (count - 1 + 2 * kFirst) - 1, across = std::sqrt(1 - y * y);
+    samples.push_back({radius_mm * across * std::cos(i * kGoldenAngle), radius_mm * y,
+                       radius_mm * across * std::sin(i * kGoldenAngle)});
+  }
+  return samples;
+}
+
+/// The smooth parts of a profile, from rim to rim.
+std::vector<std::span<const std::array<double, 2>>> smooth_parts(const Profile& profile) {
+  std::vector<std::span<const std::array<double, 2>>> parts;
+  const auto heading = [&](std::size_t k) {
+    return std::atan2(profile[k + 1][1] - profile[k][1], profile[k + 1][0] - profile[k][0]);
+  };
+  std::size_t first = 0;
+  for (std::size_t k = 1; k + 1 < profile.size(); ++k) {
+    if (std::abs(heading(k) - heading(k - 1)) < kRimAngle) continue;
+    parts.emplace_back(profile.data() + first, k - first + 1);
+    first = k;
+  }
+  parts.emplace_back(profile.data() + first, profile.size() - first);
+  return parts;
+}
+
+class RingSampler {
+ public:
+  explicit RingSampler(double pitch_mm) : pitch_mm_(pitch_mm) {}
+
+  /// From the axis or a rim to the next. On an axis the rings begin half a distance from it.
+  void add(std::span<const std::array<double, 2>> part) {
+    double length_mm = 0;
+    for (std::size_t k = 1; k < part.size(); ++k) length_mm += length_of(part[k - 1], part[k]);
+    const double point_mm = add_point(part), rest_mm = length_mm - point_mm;
+    const double begin = part.front()[1] == 0 ? 0.5 : 1 - kBeforeRim;
+    const double end = part.back()[1] == 0 ? 0.5 : kBeforeRim;
+    const int rings =
+        std::max(1, static_cast<int>(std::lround(rest_mm / pitch_mm_ + 1 - begin - end)));
+    const double distance_mm = rest_mm / (rings - 1 + begin + end);
+    for (int ring = 0; ring < rings; ++ring) {
+      add_ring(part, point_mm + (ring + begin) * distance_mm, distance_mm);
+    }
+  }
+
+  [[nodiscard]] std::vector<Sample> samples() && { return std::move(samples_); }
+
+ private:
+  /// The tip of a part that begins with a point, and how much of the part is its share.
+  double add_point(std::span<const std::array<double, 2>> part) {
+    const double slope = (part[1][1] - part[0][1]) / length_of(part[0], part[1]);
+    if (part[0][1] != 0 || slope > 0.95) return 0;
+    samples_.push_back({0, part[0][0], 0});
+    return pitch_mm_ / std::sqrt(std::numbers::pi * slope);  // a cone of the area pitch^2
+  }
+
+  void add_ring(std::span<const std::array<double, 2>> part, double way_mm, double distance_mm) {
+    std::size_t k = 1;
+    for (; k + 1 < part.size() && way_mm > length_of(part[k - 1], part[k]); ++k) {
+      way_mm -= length_of(part[k - 1], part[k]);
+    }
+    const double share = way_mm / length_of(part[k - 1], part[k]);
+    const double y_mm = std::lerp(part[k - 1][0], part[k][0], share);
+    const double radius_mm = std::lerp(part[k - 1][1], part[k][1], share);
+    const double area_mm2 = 2 * std::numbers::pi * radius_mm * distance_mm;
+    const int count =
+        std::max(1, static_cast<int>(std::lround(area_mm2 / (pitch_mm_ * pitch_mm_))));
+    turn_ += kGoldenAngle;
+    for (int i = 0; i < count; ++i) {
+      const double angle = turn_ + 2 * std::numbers::pi * i / count;
+      samples_.push_back({radius_mm * std::cos(angle), y_mm, radius_mm * std::sin(angle)});
+    }
+  }
+
+  double pitch_mm_;
+  double turn_ = 0;
+  std::vector<Sample> samples_;
+};
+
+/// Of any shape but a ball.
+std::vector<Sample> samples_apart(const SceneTool& tool, const Profile& profile, double pitch_mm,
+                                  Relaxation relaxation = kEven) {
+  if (profile.empty()) {
+    const double count = std::ceil(surface_mm2(tool.mesh) / (pitch_mm * pitch_mm));
+    return mesh_surface_samples(tool.mesh, static_cast<std::size_t>(count), relaxation);
+  }
+  RingSampler rings(pitch_mm);
+  for (const auto& part : smooth_parts(profile)) rings.add(part);
+  return std::move(rings).samples();
+}
+
+Profile profile_of(const SceneTool& tool) {
+  return tool.mesh.triangles.empty() ? tool_profile(tool, kProfileSteps) : Profile{};
+}
+
+void check_count(const SceneTool& tool, double count, double unit_mm) {
+  if (count <= kMaxSurfaceSamples) return;
+  std::ostringstream line;
+  line << "tool '" << tool.name << "': " << std::llround(count)
+       << " samples of its surface, of which contact "
+       << "reads at most " << kMaxSurfaceSamples
+       << " in time; use a smaller tool or coarser voxels than " << unit_mm << " mm";
+  throw SceneError(line.str());
+}
+
+}  // namespace
+
+std::vector<Sample> surface_samples(const SceneTool& tool, double unit_mm) {
+  const Profile profile = profile_of(tool);
+  const double area_mm2 = profile.empty() ? surface_mm2(tool.mesh) : area_of(profile);
+  const double finest_mm = std::sqrt(area_mm2 / kMinSurfaceSamples);
+  const double widest =
+      tool.round ? ball_sample_pitch(tool.radius_mm / unit_mm) : kShapeSamplePitch;
+  const double pitch_mm = std::min(finest_mm, unit_mm * widest);
+  const double count = std::ceil(area_mm2 / (pitch_mm * pitch_mm));
+  check_count(tool, count, unit_mm);
+  if (tool.round) return fibonacci_ball(tool.radius_mm, static_cast<int>(count));
+  auto samples = samples_apart(tool, profile, pitch_mm);
+  check_count(tool, static_cast<double>(samples.size()), unit_mm);  // long rims of little area
+  return samples;
+}
+
+std::vector<Sample> close_samples(const SceneTool& tool, double unit_mm) {
+  if (tool.round) return {};
+  return samples_apart(tool, profile_of(tool), kClosePitch * unit_mm, kNearlyEven);
+}
+
+}  // namespace kerf

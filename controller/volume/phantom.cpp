@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "controller/volume/phantom.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <thread>
+
+#include "controller/volume/phantom_shape.hpp"
+#include "controller/volume/volume_density.hpp"
+#include "controller/volume/volume_limits.hpp"
+
+namespace kerf {
+namespace {
+
+/// A box, cut across its longest side.
+struct Halves {
+  explicit Halves(const VoxelBox& box) noexcept : low(box), high(box) {
+    const VoxelIndex n = box.extent();
+    const std::int32_t longest = std::max({n.x, n.y, n.z});
+    if (n.x == longest) {
+      low.hi.x = high.lo.x = box.lo.x + n.x / 2;
+    } else if (n.y == longest) {
+      low.hi.y = high.lo.y = box.lo.y + n.y / 2;
+    } else {
+      low.hi.z = high.lo.z = box.lo.z + n.z / 2;
+    }
+  }
+  VoxelBox low, high;
+};
+
+/// Samples the shape block by block. A block whose middle is far from every boundary is all of one
+/// material and is filled; others are halved down to `kLeaf` voxels.
+class Sampler {
+ public:
+  explicit Sampler(VolumeImage& image)
+      : image_(image), h_mm_(image.spacing_mm[0]), far_mm_(phantom::kSteepest * h_mm_) {}
+
+  /// On 2^cuts threads: blocks share no voxel, so the image is the same bit by bit.
+  void sample_on_threads(const VoxelBox& box, int cuts) {
+    if (cuts == 0) return sample(box);
+    const Halves half(box);
+    const std::jthread other([&] { sample_on_threads(half.low, cuts - 1); });
+    sample_on_threads(half.high, cuts - 1);
+  }
+
+ private:
+  static constexpr std::int32_t kLeaf = 4;
+
+  void sample(const VoxelBox& box) {
+    if (box.empty()) return;
+    const VoxelIndex n = box.extent();
+    if (std::max({n.x, n.y, n.z}) <= kLeaf) return sample_voxels(box);
+    if (fill_if_uniform(box)) return;
+    const Halves half(box);
+    sample(half.low);
+    sample(half.high);
+  }
+
+  /// Share of the voxel inside the boundary, from 0 to 1 over two voxels.
+  [[nodiscard]] double cover(phantom::Field field, phantom::Point p, double value) const noexcept {
+    if (value >= far_mm_) return 0.0;
+    if (value <= -far_mm_) return 1.0;
+    return std::clamp(0.5 - phantom::distance(field, p, value) / (2.0 * h_mm_), 0.0, 1.0);
+  }
+
+  [[nodiscard]] phantom::Point position(double x, double y, double z) const noexcept {
+    const auto& origin = image_.origin_mm;
+    return {origin[0] + x * h_mm_, origin[1] + y * h_mm_, origin[2] + z * h_mm_};
+  }
+
+  bool fill_if_uniform(const VoxelBox& box) {
+    const VoxelIndex n = box.extent();
+    const phantom::Point middle = position(box.lo.x + 0.5 * (n.x - 1), box.lo.y + 0.5 * (n.y - 1),
+                                           box.lo.z + 0.5 * (n.z - 1));
+    const double radius_mm =
+        0.5 * h_mm_ * std::sqrt(double(n.x) * n.x + double(n.y) * n.y + double(n.z) * n.z);
+    const double clear = phantom::kSteepest * radius_mm + far_mm_;
+    const double outer = phantom::outer_field(middle);
+    if (outer > clear) return true;  // air, as the image starts
+    if (outer > -clear) return false;
+    const double dentin = phantom::dentin_field(middle);
+    if (std::abs(dentin) < clear) return false;
+    if (dentin > 0.0) return fill(box, kPhantomEnamel, kLabelEnamel);
+    const double pulp = phantom::pulp_field(middle);
+    if (std::abs(pulp) < clear) return false;
+    return pulp > 0.0 ? fill(box, kPhantomDentin, kLabelDentin)
+                      : fill(box, kPhantomPulp, kLabelPulp);
+  }
+
+  bool fill(const VoxelBox& box, Density density, Label label) {
+    for (std::int32_t z = box.lo.z; z < box.hi.z; ++z) {
+      for (std::int32_t y = box.lo.y; y < box.hi.y; ++y) {
+        const std::size_t first = image_.grid.index(box.lo.x, y, z);
+        const auto count = static_cast<std::size_t>(box.hi.x - box.lo.x);
+        std::fill_n(image_.density.begin() + static_cast<std::ptrdiff_t>(first), count, density);
+        std::fill_n(image_.labels.begin() + static_cast<std::ptrdiff_t>(first), count, label);
+      }
+    }
+    return true;
+  }
+
+  void sample_voxels(const VoxelBox& box) {
+    for (std::int32_t z = box.lo.z; z < box.hi.z; ++z) {
+      for (std::int32_t y = box.lo.y; y < box.hi.y; ++y) {
+        for (std::int32_t x = box.lo.x; x < box.hi.x; ++x) {
+          sample_voxel(image_.grid.index(x, y, z), position(x, y, z));
+        }
+      }
+    }
+  }
+
+  void sample_voxel(std::size_t at, phantom::Point p) {
+    const double tooth = cover(phantom::outer_field, p, phantom::outer_field(p));
+    if (tooth <= 0.0) return;
+    const double dentin =
+        std::min(tooth, cover(phantom::dentin_field, p, phantom::dentin_field(p)));
+    const double pulp = std::min(dentin, cover(phantom::pulp_field, p, phantom::pulp_field(p)));
+    const double density =
+        kPhantomEnamel * (tooth - dentin) + kPhantomDentin * (dentin - pulp) + kPhantomPulp * pulp;
+    image_.density[at] = nearest_density(density);
+    if (image_.density[at] == 0) return;
+    // What fills most of the voxel's solid part.
+    if (2.0 * pulp > tooth) {
+      image_.labels[at] = kLabelPulp;
+    } else {
+      image_.labels[at] = 2.0 * dentin > tooth ? kLabelDentin : kLabelEnamel;
+    }
+  }
+
+  VolumeImage& image_;
+  double h_mm_;
+  double far_mm_;  ///< a field value beyond this is more than one voxel from its boundary
+};
+
+}  // namespace
+
+VolumeImage make_phantom(const PhantomSpec& spec) {
+  check_grid("phantom size", spec.grid.nx, spec.grid.ny, spec.grid.nz);
+  double spacing = spec.spacing_mm;
+  if (spacing == 0.0) {
+    spacing = std::max({32.0 / spec.grid.nx, 32.0 / spec.grid.ny, 20.0 / spec.grid.nz});
+  }
+  check_spacing("phantom spacing", {spacing, spacing, spacing});
+  VolumeImage image;
+  image.grid = spec.grid;
+  image.spacing_mm = {spacing, spacing, spacing};
+  image.origin_mm = {-0.5 * spacing * (spec.grid.nx - 1), -0.5 * spacing * (spec.grid.ny - 1),
+                     -0.5 * spacing * (spec.grid.nz - 1)};
+  image.density.assign(spec.grid.voxel_count(), 0);
+  image.labels.assign(spec.grid.voxel_count(), 0);
+  constexpr int kCuts = 2;  // the first is in the middle of the tooth: halves of equal work
+  Sampler(image).sample_on_threads(spec.grid.box(), kCuts);
+  return image;
+}
+
+double phantom_signed_distance(double x_mm, double y_mm, double z_mm) noexcept {
+  const phantom::Point p{x_mm, y_mm, z_mm};
+  return phantom::distance(phantom::outer_field, p, phantom::outer_field(p));
+}
+
+}  // namespace kerf

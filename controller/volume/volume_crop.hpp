@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "controller/volume/volume_image.hpp"
+
+namespace kerf {
+
+/// Layers of voxels kept around what is solid, so that gradients and the tool's first contact find
+/// neighbours there.
+inline constexpr std::int32_t kGuardVoxels = 3;
+
+/// The part of `image` inside `box`, density and labels; the origin moves along, so every voxel
+/// stays where it was. Where the box leaves the image there is air. Throws SceneError for an empty
+/// box or one above the limits of volume_limits.hpp.
+[[nodiscard]] VolumeImage crop(const VolumeImage& image, const VoxelBox& box);
+
+/// Crops to the tightest box around the voxels of at least `iso`, plus `guard` voxels on each side.
+/// Throws SceneError where nothing is solid.
+[[nodiscard]] VolumeImage crop_to_solid(const VolumeImage& image, Density iso,
+                                        std::int32_t guard = kGuardVoxels);
+
+}  // namespace kerf

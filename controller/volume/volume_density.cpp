@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "controller/volume/volume_density.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <sstream>
+
+#include "controller/scene/scene_error.hpp"
+
+namespace kerf {
+
+Window range_window(const SourceVolume& source) noexcept {
+  return {source.min, source.max};
+}
+
+VolumeImage apply_window(const SourceVolume& source, Window window) {
+  const double width = window.hi - window.lo;
+  if (!(width > 0.0) || !std::isfinite(width)) {
+    std::ostringstream text;
+    text << "window: " << window.lo << ".." << window.hi
+         << " is empty; the values of the file go from " << source.min << " to " << source.max;
+    if (source.min == source.max) {
+      text << ", so there is nothing to see in it";
+    } else {
+      text << ", give `window = [lo, hi]` in the scene or `--window lo,hi` with lo < hi";
+    }
+    throw SceneError(text.str());
+  }
+  VolumeImage image;
+  image.grid = source.grid;
+  image.spacing_mm = source.spacing_mm;
+  image.origin_mm = source.origin_mm;
+  image.direction = source.direction;
+  image.density.resize(source.values.size());
+  const double scale = kDensityMax / width;
+  std::transform(source.values.begin(), source.values.end(), image.density.begin(), [&](float v) {
+    return nearest_density((static_cast<double>(v) - window.lo) * scale);
+  });
+  return image;
+}
+
+Density otsu_threshold(const VolumeImage& image) {
+  constexpr int kBinBits = 12;
+  constexpr int kShift = 16 - kBinBits;
+  std::array<double, 1 << kBinBits> count{};
+  for (const Density d : image.density) count[d >> kShift] += 1.0;
+
+  double total = 0.0;
+  double total_sum = 0.0;
+  for (std::size_t bin = 0; bin < count.size(); ++bin) {
+    total += count[bin];
+    total_sum += count[bin] * static_cast<double>(bin);
+  }
+  // Both ends of the range of best thresholds; counts are whole, so equal parts compare equal.
+  double best = 0.0;
+  std::size_t first = count.size() / 2;
+  std::size_t last = first;
+  double below = 0.0;
+  double below_sum = 0.0;
+  for (std::size_t bin = 1; bin < count.size(); ++bin) {  // classes: [0, bin) and [bin, end)
+    below += count[bin - 1];
+    below_sum += count[bin - 1] * static_cast<double>(bin - 1);
+    if (below == 0.0 || below == total) continue;
+    const double distance = below_sum / below - (total_sum - below_sum) / (total - below);
+    const double between = below * (total - below) * distance * distance;
+    if (between > best) {
+      best = between;
+      first = bin;
+    }
+    if (between == best) last = bin;
+  }
+  return static_cast<Density>(((first + last) << kShift) / 2);
+}
+
+VoxelBox solid_box(const VolumeImage& image, Density iso) noexcept {
+  VoxelBox box{{image.grid.nx, image.grid.ny, image.grid.nz}, {0, 0, 0}};
+  const Density* row = image.density.data();
+  for (std::int32_t z = 0; z < image.grid.nz; ++z) {
+    for (std::int32_t y = 0; y < image.grid.ny; ++y, row += image.grid.nx) {
+      const Density* const end = row + image.grid.nx;
+      const auto solid = [iso](Density d) { return d >= iso; };
+      const Density* const left = std::find_if(row, end, solid);
+      if (left == end) continue;
+      const Density* right = end;
+      while (!solid(right[-1])) --right;
+      box.lo = {std::min(box.lo.x, static_cast<std::int32_t>(left - row)), std::min(box.lo.y, y),
+                std::min(box.lo.z, z)};
+      box.hi = {std::max(box.hi.x, static_cast<std::int32_t>(right - row)),
+                std::max(box.hi.y, y + 1), z + 1};
+    }
+  }
+  return box.empty() ? VoxelBox{} : box;
+}
+
+}  // namespace kerf

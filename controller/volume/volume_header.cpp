@@ -1,0 +1,183 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "controller/volume/volume_header.hpp"
+
+#include <algorithm>
+#include <cctype>
+#include <charconv>
+#include <cmath>
+#include <fstream>
+#include <map>
+#include <sstream>
+#include <vector>
+
+#include "controller/scene/scene_error.hpp"
+#include "controller/volume/volume_limits.hpp"
+
+namespace kerf {
+namespace fs = std::filesystem;
+namespace {
+
+/// Lines of `key<separator>value` up to a blank line, the end, or the key `last`. Keys in lower
+/// case.
+struct TextHeader {
+  std::map<std::string, std::string> fields;
+  std::uint64_t end = 0;  ///< offset of the byte after the header
+
+  [[nodiscard]] std::string get(const std::string& key) const {
+    const auto it = fields.find(key);
+    return it == fields.end() ? std::string{} : it->second;
+  }
+};
+
+std::string trimmed(const std::string& text) {
+  const auto space = [](char c) { return std::isspace(static_cast<unsigned char>(c)) != 0; };
+  const auto first = std::find_if_not(text.begin(), text.end(), space);
+  const auto last = std::find_if_not(text.rbegin(), text.rend(), space).base();
+  return first < last ? std::string(first, last) : std::string{};
+}
+
+std::string lower(std::string text) {
+  for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return text;
+}
+
+TextHeader read_text(const fs::path& path, char separator, const std::string& last) {
+  constexpr std::size_t kLongestLine = 4096;  // together: a binary file is given up after 4 MiB
+  constexpr int kMostLines = 1024;
+  std::ifstream in(path, std::ios::binary);
+  TextHeader header;
+  std::string line;
+  for (int lines = 0; lines < kMostLines; ++lines) {
+    line.clear();
+    int c = in.get();
+    for (; c != EOF && c != '\n' && line.size() < kLongestLine; c = in.get()) {
+      line.push_back(static_cast<char>(c));
+    }
+    header.end = c == EOF ? fs::file_size(path) : static_cast<std::uint64_t>(in.tellg());
+    if (c == EOF && line.empty()) return header;
+    if (trimmed(line).empty() && last.empty()) return header;
+    const std::size_t at = line.find(separator);
+    if (at == std::string::npos || line.front() == '#') continue;
+    const std::string key = lower(trimmed(line.substr(0, at)));
+    header.fields[key] = trimmed(line.substr(at + 1));
+    if (!last.empty() && key == last) return header;
+  }
+  return header;
+}
+
+/// The numbers in a list such as `1 2 3` or `(1,0,0) none (0,2,0)`; words are left out.
+std::vector<double> numbers(const std::string& text) {
+  std::vector<double> found;
+  std::string word;
+  for (const char c : text + ' ') {
+    if (c != ' ' && c != '\t' && c != ',' && c != '(' && c != ')') {
+      word.push_back(c);
+      continue;
+    }
+    double value = 0;
+    const auto result = std::from_chars(word.data(), word.data() + word.size(), value);
+    if (!word.empty() && result.ec == std::errc{} && std::isfinite(value)) found.push_back(value);
+    word.clear();
+  }
+  return found;
+}
+
+/// Refuses a size that ITK would wrap to 32 bits. The other limits are checked after it has read.
+void check_sizes(const fs::path& path, const std::string& text) {
+  std::vector<double> sizes = numbers(text);
+  if (sizes.size() < 3) return;  // the number of axes is judged after reading
+  constexpr double kFar = 1e15;  // far above the limit, and whole in 64 bits
+  for (double& s : sizes) s = std::clamp(s, -1.0, kFar);
+  for (const double s : sizes) {
+    if (s < 1.0 || s > static_cast<double>(kMaxVoxelsPerAxis)) {
+      check_grid(path.string(), static_cast<std::int64_t>(sizes[0]),
+                 static_cast<std::int64_t>(sizes[1]), static_cast<std::int64_t>(sizes[2]));
+    }
+  }
+}
+
+/// Sets where the voxels lie and how many bytes they can be. `offset`: bytes before them.
+void locate_data(VolumeHeader& header, const fs::path& path, const fs::path& data,
+                 std::uint64_t offset, bool compressed) {
+  std::error_code error;
+  const std::uint64_t size = fs::file_size(data, error);
+  if (error) {
+    throw SceneError(path.string() + ": data file " + data.string() + " cannot be read (" +
+                     error.message() + "); put it beside the header or correct the header");
+  }
+  // Deflate packs at most 1032 bytes into one.
+  constexpr std::uint64_t kBestDeflate = 1032;
+  const std::uint64_t held = size - std::min(size, offset);
+  header.data_file = data.string();
+  header.data_bytes_at_most = compressed ? held * kBestDeflate : held;
+}
+
+}  // namespace
+
+VolumeHeader read_nrrd_header(const fs::path& path) {
+  const TextHeader text = read_text(path, ':', "");
+  const std::string sizes = text.get("sizes");
+  if (sizes.empty()) {
+    throw SceneError(path.string() +
+                     ": no NRRD header (`sizes` is missing); is it another format?");
+  }
+  check_sizes(path, sizes);
+  VolumeHeader header;
+  const std::vector<double> spacings = numbers(text.get("spacings"));
+  const std::vector<double> directions = numbers(text.get("space directions"));
+  header.has_spacing = spacings.size() >= 3 || directions.size() >= 9;
+  if (std::find(spacings.begin(), spacings.end(), 0.0) != spacings.end()) {
+    throw SceneError(
+        path.string() + ": spacings: " + text.get("spacings") +
+        " holds a zero; correct the header, or remove the line and give the spacing in "
+        "the scene or with `--spacing`");
+  }
+  std::string data = text.get("data file");
+  if (data.empty()) data = text.get("datafile");
+  const std::string encoding = lower(text.get("encoding"));
+  const bool compressed = encoding == "gzip" || encoding == "gz";
+  const bool several = data.find('%') != std::string::npos || lower(data).rfind("list", 0) == 0;
+  if (several || (encoding != "raw" && !compressed)) return header;  // the reader counts
+  const fs::path file = data.empty() ? path : path.parent_path() / data;
+  locate_data(header, path, file, data.empty() ? text.end : 0, compressed);
+  return header;
+}
+
+VolumeHeader read_meta_header(const fs::path& path) {
+  const TextHeader text = read_text(path, '=', "elementdatafile");
+  const std::string sizes = text.get("dimsize");
+  const std::string data = text.get("elementdatafile");
+  if (sizes.empty() || data.empty()) {
+    throw SceneError(path.string() +
+                     ": no MetaImage header (`DimSize` or `ElementDataFile` is missing); is it "
+                     "another format?");
+  }
+  check_sizes(path, sizes);
+  VolumeHeader header;
+  header.has_spacing = !text.get("elementspacing").empty() || !text.get("elementsize").empty();
+  const bool several = data.find('%') != std::string::npos || lower(data).rfind("list", 0) == 0;
+  const bool ascii = lower(text.get("binarydata")) == "false";
+  if (several || ascii) return header;  // the reader counts
+  const bool local = lower(data) == "local";
+  locate_data(header, path, local ? path : path.parent_path() / data, local ? text.end : 0,
+              lower(text.get("compresseddata")) == "true");
+  return header;
+}
+
+void refuse_not_finite(const fs::path& path, std::uint64_t count, std::uint64_t first_index,
+                       std::uint64_t nx, std::uint64_t ny) {
+  std::ostringstream text;
+  text << path.string() << ": " << count << (count == 1 ? " voxel is" : " voxels are")
+       << " NaN or infinite, the first at (" << first_index % nx << ", " << first_index / nx % ny
+       << ", " << first_index / nx / ny << "); replace them with the value of air";
+  throw SceneError(text.str());
+}
+
+void refuse_truncated(const std::string& file, std::uint64_t held, std::uint64_t expected) {
+  std::ostringstream text;
+  text << file << ": " << held << " of " << expected
+       << " bytes of voxels; the file is cut off, copy it again";
+  throw SceneError(text.str());
+}
+
+}  // namespace kerf

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <filesystem>
+#include <optional>
+#include <vector>
+
+#include "controller/volume/volume_image.hpp"
+
+namespace kerf {
+
+/// A volume as its file holds it: values in the file's own units (often HU), x fastest.
+///
+/// Frame as in VolumeImage: LPS for the medical formats, the file's own where it names none.
+/// `direction` is a proper rotation: a mirrored file is read with its last axis reversed, so the
+/// picture is the same and the axes are right-handed.
+struct SourceVolume {
+  VoxelGrid grid;
+  std::array<double, 3> spacing_mm{1, 1, 1};
+  std::array<double, 3> origin_mm{0, 0, 0};
+  std::array<double, 9> direction{1, 0, 0, 0, 1, 0, 0, 0, 1};
+  bool has_spacing = true;  ///< false: neither the file nor the options name one; 1 mm stands in
+  std::vector<float> values;
+  double min = 0, max = 0;
+};
+
+struct ReadOptions {
+  std::optional<std::array<double, 3>> spacing_mm;  ///< goes before what the file says
+  bool allow_missing_spacing = false;               ///< for a first look; see `has_spacing`
+};
+
+/// Reads NRRD (.nrrd, .nhdr), MetaImage (.mha, .mhd), NIfTI (.nii, .nii.gz), one DICOM file (.dcm)
+/// or the one DICOM series in a folder. Integer and floating types, either byte order.
+///
+/// Throws SceneError, one line, for anything that is not a whole, finite, scalar volume of three
+/// axes with right angles between them, of known spacing and within the limits of
+/// volume_limits.hpp (checked before memory is taken). Load time, before other threads write to
+/// std::cout or std::cerr: what the libraries print there meanwhile is swallowed.
+[[nodiscard]] SourceVolume read_volume(const std::filesystem::path& path,
+                                       const ReadOptions& options = {});
+
+/// Takes the labels in the file that `write_volume` puts beside a volume, where there is one.
+/// Throws SceneError when it does not fit the image.
+void read_labels_beside(const std::filesystem::path& volume_path, VolumeImage& image);
+
+}  // namespace kerf

@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "controller/volume/volume_source.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "controller/scene/scene_error.hpp"
+#include "controller/volume/volume_header.hpp"
+#include "controller/volume/volume_limits.hpp"
+
+namespace kerf::volume {
+namespace fs = std::filesystem;
+
+void set_frame(const fs::path& path, Place x, Place y, Place z, SourceVolume& volume) {
+  constexpr double kSkew = 2e-3;  // files round their cosines; a shear is far above this
+  const double skew =
+      std::max({std::abs(dot(x, y)), std::abs(dot(y, z)), std::abs(dot(z, x)),
+                std::abs(dot(x, x) - 1.0), std::abs(dot(y, y) - 1.0), std::abs(dot(z, z) - 1.0)});
+  if (!(skew < kSkew)) {
+    throw SceneError(path.string() +
+                     ": its axes are not at right angles; resample it to a straight grid first");
+  }
+  x = vec3::unit(x);
+  y = vec3::unit(minus(y, scaled(x, dot(x, y))));
+  const Place right_handed = cross(x, y);
+  if (dot(right_handed, z) < 0.0) {
+    const std::size_t layer =
+        static_cast<std::size_t>(volume.grid.nx) * static_cast<std::size_t>(volume.grid.ny);
+    auto low = volume.values.begin();
+    auto high = volume.values.end();
+    for (; high - low >= static_cast<std::ptrdiff_t>(2 * layer);
+         low += static_cast<std::ptrdiff_t>(layer)) {
+      high -= static_cast<std::ptrdiff_t>(layer);
+      std::swap_ranges(low, low + static_cast<std::ptrdiff_t>(layer), high);
+    }
+    const double depth_mm = volume.spacing_mm[2] * (volume.grid.nz - 1);
+    volume.origin_mm = minus(volume.origin_mm, scaled(right_handed, depth_mm));
+  }
+  volume.direction = {x[0], y[0], right_handed[0], x[1], y[1], right_handed[1],
+                      x[2], y[2], right_handed[2]};
+}
+
+void set_grid(const fs::path& path, const std::array<std::int64_t, 3>& size, SourceVolume& volume) {
+  check_grid(path.string(), size[0], size[1], size[2]);
+  volume.grid = {static_cast<std::int32_t>(size[0]), static_cast<std::int32_t>(size[1]),
+                 static_cast<std::int32_t>(size[2])};
+}
+
+void set_spacing(const fs::path& path, const ReadOptions& options, bool in_file,
+                 const std::array<double, 3>& from_file, SourceVolume& volume) {
+  volume.has_spacing = in_file || options.spacing_mm.has_value();
+  if (options.spacing_mm) {
+    volume.spacing_mm = *options.spacing_mm;
+  } else if (in_file) {
+    volume.spacing_mm = from_file;
+  } else if (!options.allow_missing_spacing) {
+    throw SceneError(path.string() +
+                     ": spacing is not in the file; add `spacing_mm = [x, y, z]` to the scene or "
+                     "`--spacing x,y,z` (mm)");
+  }
+  check_spacing(path.string(), volume.spacing_mm);
+}
+
+void set_range(const fs::path& path, SourceVolume& volume) {
+  float min = std::numeric_limits<float>::infinity();
+  float max = -min;
+  std::uint64_t bad = 0;
+  std::uint64_t first_bad = 0;
+  for (std::size_t i = 0; i < volume.values.size(); ++i) {
+    const float v = volume.values[i];
+    if (!std::isfinite(v) && bad++ == 0) first_bad = i;
+    min = std::min(min, v);
+    max = std::max(max, v);
+  }
+  if (bad != 0) {
+    refuse_not_finite(path, bad, first_bad, static_cast<std::uint64_t>(volume.grid.nx),
+                      static_cast<std::uint64_t>(volume.grid.ny));
+  }
+  volume.min = static_cast<double>(min);
+  volume.max = static_cast<double>(max);
+}
+
+}  // namespace kerf::volume

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+
+#include "controller/volume/volume_io.hpp"
+#include "shared/numeric/vec3.hpp"
+
+/// The steps that fill a SourceVolume, whatever library read the file. Each checks what it sets and
+/// throws SceneError with `path` as the place.
+namespace kerf::volume {
+
+using Place = vec3::Vec;
+using vec3::cross;
+using vec3::dot;
+using vec3::minus;
+using vec3::scaled;
+
+/// Refuses sizes that are empty or above the limits.
+void set_grid(const std::filesystem::path& path, const std::array<std::int64_t, 3>& size,
+              SourceVolume& volume);
+
+/// Chooses between the file's spacing and the option.
+void set_spacing(const std::filesystem::path& path, const ReadOptions& options, bool in_file,
+                 const std::array<double, 3>& from_file, SourceVolume& volume);
+
+/// Sets `min` and `max` from the values; refuses NaN and infinity.
+void set_range(const std::filesystem::path& path, SourceVolume& volume);
+
+/// Sets the direction from three axes that should be at right angles, exactly so afterwards. A
+/// left-handed file has its last axis reversed: same picture, right-handed axes. After the values,
+/// the spacing and the origin.
+void set_frame(const std::filesystem::path& path, Place x, Place y, Place z, SourceVolume& volume);
+
+}  // namespace kerf::volume

@@ -1,0 +1,143 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "controller/volume/volume_write.hpp"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <charconv>
+#include <new>
+#include <string>
+#include <string_view>
+
+#define ZLIB_CONST  // its input is const then
+#include <zlib.h>
+
+#include "controller/scene/scene_error.hpp"
+#include "shared/posix/new_file.hpp"
+
+namespace kerf {
+namespace fs = std::filesystem;
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "the header says little-endian");
+
+void write_gzip(NewFile& file, const void* data, std::size_t size) {
+  constexpr int kLevel = 4;             // near the best size for volumes, at twice the speed
+  constexpr int kGzipWindow = 15 + 16;  // largest window, gzip framing
+  constexpr int kMemory = 8;            // zlib's default
+  constexpr std::size_t kPiece = std::size_t{1} << 18;
+  z_stream stream{};
+  if (deflateInit2(&stream, kLevel, Z_DEFLATED, kGzipWindow, kMemory, Z_DEFAULT_STRATEGY) != Z_OK) {
+    throw std::bad_alloc();
+  }
+  const struct End {
+    z_stream* stream;
+    ~End() { deflateEnd(stream); }
+  } end{&stream};
+  std::vector<unsigned char> packed(kPiece);
+  const auto* at = static_cast<const unsigned char*>(data);
+  int state = Z_OK;
+  while (state != Z_STREAM_END) {
+    const std::size_t take = std::min(size, kPiece);
+    if (stream.avail_in == 0 && take > 0) {
+      stream.next_in = at;
+      stream.avail_in = static_cast<uInt>(take);
+      at += take;
+      size -= take;
+    }
+    stream.next_out = packed.data();
+    stream.avail_out = static_cast<uInt>(packed.size());
+    state = deflate(&stream, size == 0 ? Z_FINISH : Z_NO_FLUSH);
+    file.write(packed.data(), packed.size() - stream.avail_out);
+  }
+}
+
+/// Shortest text that reads back as the same number.
+void append(std::string& text, double value) {
+  std::array<char, 32> digits{};
+  const auto end = std::to_chars(digits.data(), digits.data() + digits.size(), value).ptr;
+  text.append(digits.data(), end);
+}
+
+void append_vector(std::string& text, double x, double y, double z) {
+  text += " (";
+  append(text, x);
+  text += ',';
+  append(text, y);
+  text += ',';
+  append(text, z);
+  text += ')';
+}
+
+std::string nrrd_header(const VolumeImage& image, std::string_view type, VolumeEncoding encoding) {
+  std::string text = "NRRD0004\n# written by kerf " KERF_VERSION "\ntype: ";
+  text += type;
+  text += "\ndimension: 3\nspace: left-posterior-superior\nsizes: ";
+  text += std::to_string(image.grid.nx) + ' ' + std::to_string(image.grid.ny) + ' ' +
+          std::to_string(image.grid.nz) + "\nspace directions:";
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const double s = image.spacing_mm[axis];
+    append_vector(text, image.direction[axis] * s, image.direction[3 + axis] * s,
+                  image.direction[6 + axis] * s);
+  }
+  text += "\nkinds: domain domain domain\nendian: little\nencoding: ";
+  text += encoding == VolumeEncoding::gzip ? "gzip" : "raw";
+  text += "\nspace origin:";
+  append_vector(text, image.origin_mm[0], image.origin_mm[1], image.origin_mm[2]);
+  text += "\n\n";
+  return text;
+}
+
+template <class T>
+void write_voxels(NewFile& file, const VolumeImage& image, const std::vector<T>& voxels,
+                  std::string_view type, VolumeEncoding encoding) {
+  const std::string header = nrrd_header(image, type, encoding);
+  file.write(header.data(), header.size());
+  const std::size_t size = voxels.size() * sizeof(T);
+  if (encoding == VolumeEncoding::gzip) {
+    write_gzip(file, voxels.data(), size);
+  } else {
+    file.write(voxels.data(), size);
+  }
+  file.close();
+}
+
+}  // namespace
+
+namespace {
+
+void check_extension(const fs::path& path) {
+  if (path.extension() != ".nrrd") {
+    throw SceneError(path.string() + ": kerf writes .nrrd only; give a name that ends in .nrrd");
+  }
+}
+
+}  // namespace
+
+fs::path labels_path(const fs::path& volume_path) {
+  return volume_path.parent_path() / (volume_path.stem().string() + "-labels.nrrd");
+}
+
+void check_volume_path(const fs::path& path) {
+  check_extension(path);
+  check_new_file(path);
+}
+
+void write_volume(const VolumeImage& image, const fs::path& path, VolumeEncoding encoding) {
+  check_extension(path);
+  const fs::path labels = labels_path(path);
+  NewFile density_file(path);
+  write_voxels(density_file, image, image.density, "uint16", encoding);
+  if (image.labels.empty()) {
+    density_file.commit();
+    std::error_code ignored;  // none there is the usual case
+    fs::remove(labels, ignored);
+    return;
+  }
+  NewFile labels_file(labels);
+  write_voxels(labels_file, image, image.labels, "uint8", encoding);
+  density_file.commit();
+  labels_file.commit();
+}
+
+}  // namespace kerf

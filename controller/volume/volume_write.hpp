@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+
+#include "controller/volume/volume_image.hpp"
+
+namespace kerf {
+
+enum class VolumeEncoding : std::uint8_t { gzip, raw };
+
+/// Where the labels of a volume file lie: `tooth.nrrd` -> `tooth-labels.nrrd`.
+[[nodiscard]] std::filesystem::path labels_path(const std::filesystem::path& volume_path);
+
+/// Writes a .nrrd of 16 bits and, where the image has labels, their file beside it; a label file
+/// left there by an earlier volume of this name is removed.
+///
+/// Both are written under temporary names first, so a full disk leaves the old files as they were.
+/// Throws SceneError.
+void write_volume(const VolumeImage& image, const std::filesystem::path& path,
+                  VolumeEncoding encoding = VolumeEncoding::gzip);
+
+/// Throws now what `write_volume` would throw for this path later. For long runs.
+void check_volume_path(const std::filesystem::path& path);
+
+}  // namespace kerf

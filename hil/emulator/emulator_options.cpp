@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "hil/emulator/emulator_options.hpp"
+
+#include <algorithm>
+#include <array>
+#include <string_view>
+
+#include "hil/devmodel/bus_cycle.hpp"
+#include "hil/hil_error.hpp"
+#include "shared/wire/wooden_constants.hpp"
+
+namespace kerf {
+namespace {
+
+constexpr double kMaxSeconds = 1e6;
+constexpr double kMaxInertiaKgM2 = 0.1;
+constexpr double kMaxModeHz = 1000;  // beyond, a step of 31 us no longer resolves it
+
+/// A finite number from `low` to `high`; unlike CLI::Range it refuses "nan".
+CLI::Validator between(double low, double high) {
+  const auto refuse = [low, high](const std::string& text) {
+    double value = 0;
+    const bool inside = CLI::detail::lexical_cast(text, value) && value >= low && value <= high;
+    return inside ? std::string()
+                  : text + " is not from " + CLI::detail::to_string(low) + " to " +
+                        CLI::detail::to_string(high);
+  };
+  return CLI::Validator(refuse, "", "");
+}
+
+void declare_front(CLI::App& app, EmulatorOptions& o) {
+  app.add_option("--front", o.front,
+                 "how it is reached: socket; udp; fuse, a device node; usbip (falcon) or uhid "
+                 "(woodenhaptics), "
+                 "in this kernel's own USB or HID stack, as root")
+      ->capture_default_str();
+  app.add_option("--socket", o.socket, "front socket: path of the SEQPACKET socket to serve");
+  app.add_option("--udp", o.udp, "front udp: [ADDRESS:]PORT to serve (address: 127.0.0.1)");
+  declare_bus(app, o.bus);
+  app.add_flag("--lockstep", o.lockstep, "no clock: one servo period per command received");
+  app.add_option("--rate", o.rate_hz, "servo rate for --lockstep, Hz; must divide 8000 (USB: 1000)")
+      ->capture_default_str();
+  app.add_option("--packet-cycles", o.packet_cycles,
+                 "in real time: bus cycles of 125 us from one look at the host to the next")
+      ->check(between(1, 800))
+      ->capture_default_str();
+  app.add_option("--priority", o.priority, "SCHED_FIFO priority; 0 = none")
+      ->check(between(0, 99))
+      ->capture_default_str();
+  app.add_option("--cpu", o.cpu, "core to run on (default: the last)")->check(between(0, 1023));
+  app.add_flag("--stay", o.stay, "wait for another client when one leaves");
+  app.add_option("--seconds", o.seconds, "device time to serve (default: no limit)")
+      ->check(between(0.0, kMaxSeconds));
+}
+
+void declare_device(CLI::App& app, EmulatorOptions& o) {
+  app.add_option("--joint-inertia", o.joint_inertia_kg_m2,
+                 "of each motor at its joint, kg m^2 (default: part of the tip's mass)")
+      ->check(between(0, kMaxInertiaKgM2));
+  app.add_option("--mode-hz", o.mode_hz, "structural mode of that inertia (default: rigid)")
+      ->check(between(0, kMaxModeHz));
+  app.add_flag("--drop-torque", o.drop_torque,
+               "omni, falcon: motors let go when the host is silent for 0.1 s (default: hold)");
+  app.add_flag("--pot-noise", o.pot_noise, "omni: noise in the low bits of the gimbal pots");
+  app.add_option("--packet-bytes", o.packet_bytes, "woodenhaptics: 14 (mbed) or 64 (Teensy)")
+      ->capture_default_str();
+  app.add_flag("--wireless-button", o.wireless_button,
+               "woodenhaptics: the hand's first button shows on encoder d");
+  app.add_option("--seed", o.seed, "of the noise")->capture_default_str();
+}
+
+template <std::size_t N>
+void check_known(const char* option, const std::string& value,
+                 const std::array<std::string_view, N>& known) {
+  if (std::find(known.begin(), known.end(), value) != known.end()) return;
+  std::string list;
+  for (const auto name : known) list += (list.empty() ? "" : ", ") + std::string(name);
+  throw HilError(std::string(option) + ": " + value + " is not known; use one of " + list);
+}
+
+void check_front(const EmulatorOptions& o) {
+  check_known("--front", o.front,
+              std::array<std::string_view, 5>{"socket", "udp", "fuse", "usbip", "uhid"});
+  if (o.front == "socket" && o.socket.empty()) {
+    throw HilError("--socket: no path; say where the socket shall be, or use --front udp");
+  }
+  if (o.front == "udp" && o.udp.empty()) {
+    throw HilError("--udp: no port; say [ADDRESS:]PORT, or use --front socket");
+  }
+  if (o.front == "fuse" && o.bus.mount.empty()) {
+    throw HilError("--mount: missing; name an empty folder for --front fuse");
+  }
+  const auto speaks_for = [&](const char* front, const char* device) {
+    if (o.front == front && o.personality != device) {
+      throw HilError(std::string("--front ") + front + ": not for " + o.personality +
+                     "; use --personality " + device + ", or another front");
+    }
+  };
+  speaks_for("usbip", "falcon");
+  speaks_for("uhid", "woodenhaptics");
+  const bool is_usb =
+      o.front == "usbip" || o.front == "uhid" || (o.front == "fuse" && o.personality != "omni");
+  if (is_usb && o.lockstep) {
+    throw HilError("--lockstep: the USB front runs by its own clock; use --front socket");
+  }
+  const int fastest = o.personality == "omni" ? kCyclesPerSecond : 1000;  // a bus cycle, a frame
+  if (o.rate_hz < 1 || fastest % o.rate_hz != 0) {
+    throw HilError("--rate: " + std::to_string(o.rate_hz) + " does not divide " +
+                   std::to_string(fastest) + ", the rate of the bus; use such as 500 or 1000");
+  }
+  if (o.lockstep && !o.fault.empty()) {
+    throw HilError(
+        "--fault: in lock-step a lost packet would stop both sides for ever; use the faults in "
+        "real time");
+  }
+}
+
+void check_device(const EmulatorOptions& o) {
+  const auto belongs_to = [&](bool given, const char* option, const char* owner) {
+    if (given && o.personality != owner) {
+      throw HilError(std::string(option) + ": " + o.personality +
+                     " has no such thing; leave it out, or use --personality " + owner);
+    }
+  };
+  belongs_to(o.pot_noise, "--pot-noise", "omni");
+  belongs_to(o.bus.firmware_runs, "--firmware-runs", "falcon");
+  belongs_to(o.wireless_button, "--wireless-button", "woodenhaptics");
+  belongs_to(o.packet_bytes != wooden::kPacketBytes, "--packet-bytes", "woodenhaptics");
+  if (o.packet_bytes != wooden::kPacketBytes && o.packet_bytes != wooden::kLongPacketBytes) {
+    throw HilError("--packet-bytes: " + std::to_string(o.packet_bytes) +
+                   " is no firmware's length; use 14 or 64");
+  }
+  if (o.drop_torque && o.personality == "woodenhaptics") {
+    throw HilError("--drop-torque: woodenhaptics lets go after 0.5 s anyway; leave it out");
+  }
+  if (o.mode_hz > 0 && o.joint_inertia_kg_m2 <= 0) {
+    throw HilError("--mode-hz: without inertia nothing rings; give --joint-inertia, such as 1e-4");
+  }
+}
+
+}  // namespace
+
+void declare(CLI::App& app, EmulatorOptions& o) {
+  app.set_version_flag("--version", "kerf-emulator " KERF_VERSION);
+  app.add_option("--personality", o.personality, "which device to be: omni, falcon, woodenhaptics")
+      ->capture_default_str();
+  app.add_flag("--describe", o.describe,
+               "print what a host has to be told of this unit (torque_scale), and end");
+  app.add_option("--hand", o.hand, "hand script (TOML); none: the arm stays in its rest pose");
+  app.add_option("--fault", o.fault,
+                 "fault script (TOML), for example hil/faults/late_reports.toml");
+  app.add_option("--unit-mm", o.unit_mm, "device mm per unit of the hand script")
+      ->check(between(1e-3, 100.0));
+  declare_front(app, o);
+  declare_device(app, o);
+  app.add_option("--report", o.report, "write what was seen as JSON");
+}
+
+void check(const EmulatorOptions& o) {
+  check_known("--personality", o.personality,
+              std::array<std::string_view, 3>{"omni", "falcon", "woodenhaptics"});
+  check_device(o);
+  if (!o.describe) check_front(o);
+}
+
+}  // namespace kerf

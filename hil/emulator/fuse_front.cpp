@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "hil/emulator/fuse_front.hpp"
+
+#include <ostream>
+#include <utility>
+
+#include "hil/front/firewire/firewire_node.hpp"
+#include "hil/front/fuse/fuse_mount.hpp"
+#include "hil/front/hid/hidraw_node.hpp"
+#include "hil/front/usb/usbfs_node.hpp"
+
+namespace kerf {
+namespace {
+
+/// Serves `node` as `mount`/`name`; `cycles()` since the begin.
+template <class Node, class Cycles>
+void serve_node(const BusService& service, const std::string& mount, const char* device,
+                const std::string& name, Node& node, Cycles cycles) {
+  FuseMount folder(mount);
+  folder.add(name, node);
+  service.out << "kerf-emulator: " << device << " at " << mount << '/' << name << std::endl;
+  folder.serve([&] { return service.goes_on(cycles(), node.left()); });
+  service.stats.wake = folder.lateness();
+}
+
+}  // namespace
+
+void serve_fuse(const BusService& service, const std::string& mount, const FirewireSettings& omni) {
+  FirewireNode node(omni, service.device);
+  serve_node(service, mount, "omni", "fw1", node, [&] { return node.bus().cycle() - kFirstCycle; });
+  service.stats.sent = node.bus().stats().reports;
+  service.stats.dropped = node.bus().stats().unheard;
+}
+
+void serve_fuse(const BusService& service, const std::string& mount,
+                const FtdiFalcon::Settings& falcon, std::vector<ScriptedUsbFault> script) {
+  UsbfsNode node(falcon, std::move(script), service.device);
+  serve_node(service, mount, "falcon", "usb", node, [&] { return node.chip().time().cycle(); });
+  service.stats.sent = node.chip().reports();
+  service.stats.dropped = node.chip().lost();
+}
+
+void serve_fuse(const BusService& service, const std::string& mount,
+                const WoodenHid::Settings& wooden) {
+  HidrawNode node(wooden, service.device);
+  serve_node(service, mount, "woodenhaptics", "hidraw0", node,
+             [&] { return node.arm().time().cycle(); });
+  service.stats.sent = node.arm().reports();
+  service.stats.dropped = node.lost();
+}
+
+}  // namespace kerf

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "hil/emulator/run_report.hpp"
+
+#include <array>
+#include <cstdio>
+
+#include <nlohmann/json.hpp>
+
+#include "hil/hil_error.hpp"
+#include "shared/posix/new_file.hpp"
+
+namespace kerf {
+namespace {
+
+double seconds_of(std::int64_t cycles) {
+  return static_cast<double>(cycles) / kCyclesPerSecond;
+}
+
+std::string hex(std::uint64_t value) {
+  std::array<char, 17> text{};
+  std::snprintf(text.data(), text.size(), "%016llx", static_cast<unsigned long long>(value));
+  return text.data();
+}
+
+}  // namespace
+
+void check_report(const std::string& file) {
+  try {
+    check_new_file(file);
+  } catch (const FileError& error) {
+    throw HilError(std::string("--report: ") + error.what());
+  }
+}
+
+void write_run_report(const std::string& file, const Emulator& emulator, std::uint64_t withheld,
+                      const FrontStats& front) {
+  const EmulatorStats& stats = emulator.stats();
+  const DeviceVec<double> tip = emulator.model().tip_mm();
+  nlohmann::ordered_json report;
+  report["personality"] = emulator.model().name();
+  report["seconds"] = seconds_of(stats.cycles);
+  report["packets_sent"] = front.sent;
+  report["packets_dropped"] = front.dropped;
+  report["packets_withheld"] = withheld;
+  report["commands_received"] = stats.commands;
+  report["commands_refused"] = stats.refused;
+  report["resyncs"] = front.resyncs;
+  report["wake_us"] = {{"p50", front.wake.percentile_us(0.5)},
+                       {"p99", front.wake.percentile_us(0.99)},
+                       {"max", front.wake.max_us()}};
+  report["peak_motor_force_n"] = stats.peak_motor_force_n;
+  report["calibrated"] = emulator.model().calibration() == Calibration::done;
+  report["docked"] = emulator.model().docked();
+  if (stats.undocked_at) {
+    report["undocked_at_s"] = seconds_of(*stats.undocked_at);
+  } else {
+    report["undocked_at_s"] = nullptr;
+  }
+  report["final_tip_mm"] = {tip.x, tip.y, tip.z};
+  report["report_hash"] = hex(stats.report_hash);
+
+  try {
+    write_new_file(file, report.dump(2) + "\n");
+  } catch (const FileError& error) {
+    throw HilError(std::string("--report: ") + error.what());
+  }
+}
+
+}  // namespace kerf

@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "lab/accuracy/command.hpp"
+
+#include <cstdio>
+#include <filesystem>
+#include <ostream>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+
+#include "controller/shell/progress_bar.hpp"
+#include "lab/accuracy/export.hpp"
+#include "lab/accuracy/page.hpp"
+#include "lab/accuracy/plot.hpp"
+#include "lab/accuracy/study.hpp"
+#include "lab/rig/lab_run.hpp"
+
+namespace kerf::accuracy {
+namespace {
+
+constexpr const char* kHead =
+    "knob          value              us p50    p99  force rms %  direction deg  tool loop\n";
+
+std::string line_of(const Entry& entry) {
+  char text[160];
+  std::snprintf(text, sizeof text, "%-13s %-16s %8.2f %6.2f %12.2f %14.3f %10.1e",
+                entry.knob.c_str(), entry.value.c_str(), entry.times.p50_ns / 1e3,
+                entry.times.p99_ns / 1e3, *entry.find("force_vs_theory_rms") * 100,
+                *entry.find("force_direction_rms"), *entry.find("loop_tool_rms"));
+  return text;
+}
+
+}  // namespace
+
+Command::Command(CLI::App& program)
+    : LabCommand(program, "accuracy", "each knob of the contact force against analytic shapes") {
+  app_->add_option("--report", report_, "write the figures as JSON")->type_name("FILE");
+  app_->add_option("--csv", csv_, "write the figures as a table")->type_name("FILE");
+  app_->add_option("--plot", plot_, "draw error against time as SVG")->type_name("FILE");
+  app_->add_option("--page", page_,
+                   "write the figures as a page (docs/accuracy.md), and the plot beside it unless "
+                   "--plot says where")
+      ->type_name("FILE");
+  app_->add_option("--cpu", core_, "core to run on (default: the last)")
+      ->check(CLI::Range(0, 1023));
+}
+
+int Command::run(std::ostream& out) const {
+  const std::filesystem::path plot = plot_.empty() && !page_.empty()
+                                         ? std::filesystem::path(page_).replace_extension(".svg")
+                                         : std::filesystem::path(plot_);
+  const LabOutput as_json("--report", report_);
+  const LabOutput as_csv("--csv", csv_);
+  const LabOutput as_page("--page", page_);
+  const LabOutput as_plot("--plot", plot.string());
+  LabOutput::check_distinct({&as_json, &as_csv, &as_page, &as_plot});
+  const int core = pin_lab(core_);
+  std::vector<Entry> entries;
+  {
+    const ProgressBar bar(true);
+    entries = study({}, [&](double share, const std::string& what) { bar.show(share, what); });
+  }
+  out << kHead;
+  for (const Entry& entry : entries) out << line_of(entry) << '\n';
+  as_json.write(json(entries, core));
+  as_csv.write(csv(entries));
+  if (!page_.empty()) {
+    const auto folder = std::filesystem::absolute(page_).parent_path();
+    as_page.write(page(entries, std::filesystem::absolute(plot).lexically_proximate(folder)));
+  }
+  if (!plot.empty()) as_plot.write(lab_svg(plot_script(entries)));
+  return 0;
+}
+
+}  // namespace kerf::accuracy

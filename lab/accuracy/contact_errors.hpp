@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <functional>
+
+#include "lab/accuracy/contact_case.hpp"
+#include "lab/accuracy/contact_method.hpp"
+#include "lab/accuracy/spread.hpp"
+
+namespace kerf::accuracy {
+
+/// What a method does wrong. Forces are shares of p0 pi R^2, works shares of the work that goes to
+/// and fro on the way.
+struct ContactErrors {
+  Spread theory;         ///< |F - F_theory|
+  Spread direction_deg;  ///< between the two, where theory has a tenth of full scale
+  Spread normal_deg;     ///< of one sample at the voxels on the face, against the true normal
+  Spread sample_loop;    ///< closed loops of one sample about a place on the face
+  Spread tool_loop;      ///< the same of the whole tool, about the contact
+  Spread step;           ///< |dF| per kStepMm along the face
+};
+
+inline constexpr double kLoopMm = 0.375;    ///< radius of the loops: 3 voxels of 0.125 mm
+inline constexpr double kStepMm = 0.00125;  ///< 0.01 of such a voxel
+
+/// How far the measurement goes.
+struct Effort {
+  int sample_loop_steps = 2000;
+  int tool_loop_steps = 500;
+  int line_steps = 300;
+  std::size_t normals = 4000;  ///< voxels of a case, at most
+};
+
+void add_errors(const ContactMethod& method, const ContactCase& at, const BallTool& tool,
+                const Effort& effort, ContactErrors& errors);
+
+/// |F - F_double| of the same contacts.
+void add_difference(const ContactMethod& method, const ContactMethod& truth, const ContactCase& at,
+                    const BallTool& tool, Spread& errors);
+
+using ForceAt = std::function<Point(Point)>;
+
+/// A circle that is tilted to the face: it rises along the normal as it goes along the face.
+struct TiltedLoop {
+  Point centre_mm, normal;
+
+  [[nodiscard]] Point place_mm(double turn) const;  ///< `turn` 0..1
+  /// |SUM dW| / SUM |dW|: zero for a force with a potential (haptics: no energy from nothing).
+  [[nodiscard]] double work(const ForceAt& force, int steps) const;
+};
+
+/// Standard deviation of the gradient, per axis, for white noise of deviation one in every voxel.
+[[nodiscard]] double noise_gain(const ContactChoice& choice, const BallTool& tool);
+
+/// One trilinear interpolation of random 16-bit corners against double, in steps of the corners;
+/// 8 bits of the result are kept. Not for float64, which is the truth.
+[[nodiscard]] Spread interpolation_error(Arithmetic arithmetic);
+
+}  // namespace kerf::accuracy

@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "lab/bench/layout_bench.hpp"
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <string>
+
+#include "controller/kernel/aligned.hpp"
+#include "controller/plan/aligned_tool.hpp"
+#include "controller/plan/tick_memory.hpp"
+#include "lab/rig/bench_scene.hpp"
+#include "lab/rig/tick_timer.hpp"
+
+namespace kerf {
+namespace {
+
+using namespace bench;
+
+constexpr int kSize = 16;  ///< of the ball
+constexpr std::int32_t kBrick = 8, kBrickVoxels = kBrick * kBrick * kBrick;
+
+/// A volume in bricks of 8^3, x fastest within and among them.
+class Bricks {
+ public:
+  Bricks(const VoxelGrid& grid, std::span<const Density> density)
+      : nx_((grid.nx + kBrick - 1) / kBrick), ny_((grid.ny + kBrick - 1) / kBrick) {
+    const std::int32_t nz = (grid.nz + kBrick - 1) / kBrick;
+    voxels_.resize(VoxelGrid{nx_, ny_, nz}.voxel_count() * kBrickVoxels);
+    for (std::int32_t z = 0; z < grid.nz; ++z) {
+      for (std::int32_t y = 0; y < grid.ny; ++y) {
+        for (std::int32_t x = 0; x < grid.nx; ++x) {
+          voxels_[row(x / kBrick, y, z) + static_cast<std::size_t>(x % kBrick)] =
+              density[grid.index(x, y, z)];
+        }
+      }
+    }
+  }
+
+  /// The bricks' rows that hold a box within the volume, whole, re-centred as the servo does:
+  /// nothing is shifted, which a tick would also have to do.
+  void copy_box(VoxelIndex origin, VoxelIndex size, std::int16_t* out) const {
+    const std::int32_t first = origin.x / kBrick, last = (origin.x + size.x - 1) / kBrick;
+    for (std::int32_t z = origin.z; z < origin.z + size.z; ++z) {
+      for (std::int32_t y = origin.y; y < origin.y + size.y; ++y) {
+        for (std::int32_t b = first; b <= last; ++b, out += kBrick) {
+          std::array<std::uint64_t, 2> part;
+          std::memcpy(part.data(), voxels_.data() + row(b, y, z), sizeof part);
+          for (std::uint64_t& half : part) half ^= 0x8000800080008000U;
+          std::memcpy(out, part.data(), sizeof part);
+        }
+      }
+    }
+  }
+
+ private:
+  [[nodiscard]] std::size_t row(std::int32_t brick_x, std::int32_t y, std::int32_t z) const {
+    const VoxelGrid bricks{nx_, ny_, 0};
+    return bricks.index(brick_x, y / kBrick, z / kBrick) * kBrickVoxels +
+           static_cast<std::size_t>((z % kBrick * kBrick + y % kBrick) * kBrick);
+  }
+
+  std::int32_t nx_, ny_;
+  std::vector<Density> voxels_;
+};
+
+class LayoutBench {
+ public:
+  explicit LayoutBench(const std::function<void(const KernelRow&)>& told)
+      : told_(told), set_(**kernel_sets()), tool_(tool_of(kSize, Shape::ball), kExactFarid, set_) {
+    memory_.hold(tool_.table().size, true);
+    bricks_.resize(memory_.bytes());
+  }
+
+  void copies() {
+    const VoxelGrid grid{256, 256, 161};
+    const auto density = ball_in(grid);
+    const Bricks bricks(grid, density);
+    const AlignedTable& table = tool_.table();
+    const BoxScratch scratch = memory_.view();
+    for (const bool cold : {false, true}) {
+      const int count = cold ? 200 : 4000;
+      const auto origin = [&](int i) -> VoxelIndex {
+        const Place p = around(grid, kSize, i, count);
+        const auto low = [](double at) { return static_cast<std::int32_t>(at) - 10; };
+        return {low(p[0]), low(p[1]), low(p[2])};
+      };
+      const std::string name = cold ? "copy/ball16/cold" : "copy/ball16";
+      baseline_ns_ = 0;
+      row(name, "linear", cold, count, [&](int i) {
+        set_.copy_box(table, grid, density.data(), origin(i), scratch);
+        use(scratch.box[100]);
+      });
+      row(name, "bricks", cold, count, [&](int i) {
+        bricks.copy_box(origin(i), table.box, bricks_.data());
+        use(bricks_[100]);
+      });
+    }
+  }
+
+  void sizes() {
+    constexpr int kCount = 1000;
+    std::array<double, 2> baseline_ns{};  // contact, mill: of the smallest volume
+    for (const VoxelGrid grid : {VoxelGrid{128, 128, 80}, {256, 256, 161}, {512, 512, 512}}) {
+      auto density = ball_in(grid);
+      const std::string size =
+          std::to_string(grid.nx) + "x" + std::to_string(grid.ny) + "x" + std::to_string(grid.nz);
+      const BoxScratch scratch = memory_.view();
+      const auto tick = [&](int i) {
+        return AlignedTick(set_, tool_.table(), scratch, grid, density,
+                           pose_of(around(grid, kSize, i, kCount), kUnturned));
+      };
+      std::vector<std::uint16_t> carry(static_cast<std::size_t>(tool_.table().row_lanes));
+      const auto rate = removal_rate<FixedNumbers>(1.0 / 65536, false);
+      baseline_ns_ = baseline_ns[0];
+      row("contact/ball16/" + size, set_.name, false, kCount,
+          [&](int i) { use(tick(i).contact().x); });
+      baseline_ns[0] = baseline_ns_;
+      baseline_ns_ = baseline_ns[1];
+      row("mill/ball16/" + size, set_.name, false, kCount, [&](int i) {
+        const AlignedTick at = tick(i);
+        use(at.contact().x);
+        use(at.mill(rate, carry).modification.x);
+      });
+      baseline_ns[1] = baseline_ns_;
+    }
+  }
+
+  [[nodiscard]] std::vector<KernelRow> rows() && { return std::move(rows_); }
+
+ private:
+  template <class Tick>
+  void row(const std::string& name, const char* way, bool cold, int count, Tick&& tick) {
+    const TickTimes times = time_ticks(
+        count,
+        [&] {
+          if (cold) sweep_cache();
+        },
+        tick);
+    if (baseline_ns_ == 0) baseline_ns_ = times.p50_ns;
+    rows_.push_back({name, "fixed", way, times.p50_ns, times.p99_ns, baseline_ns_,
+                     tool_.bytes() + memory_.bytes()});
+    told_(rows_.back());
+  }
+
+  const std::function<void(const KernelRow&)>& told_;
+  const KernelSet& set_;
+  AlignedTool tool_;
+  BoxMemory memory_;
+  std::vector<std::int16_t> bricks_;  ///< where bricks are copied to
+  double baseline_ns_ = 0;
+  std::vector<KernelRow> rows_;
+};
+
+}  // namespace
+
+std::vector<KernelRow> bench_layout(const std::function<void(const KernelRow&)>& told) {
+  LayoutBench bench(told);
+  bench.copies();
+  bench.sizes();
+  return std::move(bench).rows();
+}
+
+}  // namespace kerf

@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "lab/extremes/command.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <filesystem>
+#include <ostream>
+
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include "lab/extremes/comparison.hpp"
+#include "lab/extremes/hands.hpp"
+#include "lab/extremes/measures.hpp"
+#include "lab/extremes/page.hpp"
+#include "lab/extremes/plot.hpp"
+#include "lab/rig/lab_run.hpp"
+
+namespace kerf::extremes {
+namespace {
+
+/// What a run has found: the rows, and what the page draws.
+struct Findings {
+  std::vector<Row> rows;
+  Comparison comparison;
+  std::vector<HandRun> hands;
+};
+
+struct Group {
+  const char* name;
+  void (*measure)(const Effort&, const Told&, Findings&);
+};
+template <void (*kMeasure)(const Effort&, const Told&)>
+void rows_only(const Effort& effort, const Told& told, Findings&) {
+  kMeasure(effort, told);
+}
+constexpr std::array<Group, 8> kGroups{{
+    {"walls", rows_only<measure_walls>},
+    {"rests", rows_only<measure_rests>},
+    {"slides", rows_only<measure_slides>},
+    {"shapes", rows_only<measure_shapes>},
+    {"cutting", rows_only<measure_cutting>},
+    {"ticks", rows_only<measure_ticks>},
+    {"paper", [](const Effort& effort, const Told& told,
+                 Findings& findings) { findings.comparison = compare(effort, told); }},
+    {"hands", [](const Effort& effort, const Told& told,
+                 Findings& findings) { findings.hands = try_hands(effort, told); }},
+}};
+
+std::string limit_of(const std::optional<double>& limit) {
+  char text[32] = "-";
+  if (limit) std::snprintf(text, sizeof text, "%.4g", *limit);
+  return text;
+}
+
+std::string line_of(const Row& row) {
+  char text[192];
+  if (!row.skipped.empty()) {
+    std::snprintf(text, sizeof text, "%-8s %-52s skipped: %s", row.group.c_str(), row.name.c_str(),
+                  row.skipped.c_str());
+    return text;
+  }
+  std::snprintf(text, sizeof text, "%-8s %-52s %10.4g %-7s %8s %8s  %s", row.group.c_str(),
+                row.name.c_str(), row.value, row.unit.c_str(), limit_of(row.must).c_str(),
+                limit_of(row.aim).c_str(),
+                !row.must    ? ""
+                : row.pass() ? "pass"
+                             : "FAIL");
+  return text;
+}
+
+std::string json_of(const std::vector<Row>& rows) {
+  auto list = nlohmann::ordered_json::array();
+  const auto number = [](const std::optional<double>& limit) {
+    return limit ? nlohmann::ordered_json(*limit) : nlohmann::ordered_json(nullptr);
+  };
+  for (const Row& row : rows) {
+    list.push_back({{"group", row.group},
+                    {"name", row.name},
+                    {"value", row.skipped.empty() ? number(row.value) : number(std::nullopt)},
+                    {"unit", row.unit},
+                    {"limit", number(row.must)},
+                    {"aim", number(row.aim)},
+                    {"pass", row.pass()}});
+  }
+  return nlohmann::ordered_json{{"rows", list}}.dump(2) + "\n";
+}
+
+}  // namespace
+
+Command::Command(CLI::App& program)
+    : LabCommand(program, "extremes", "the swept contact against its limits, beside the paper's") {
+  std::vector<std::string> names;
+  for (const Group& group : kGroups) names.emplace_back(group.name);
+  CLI::Option* only = app_->add_option("--only", only_, "only these groups of rows");
+  only->check(CLI::IsMember(names))->delimiter(',')->type_name("GROUP,...");
+  app_->add_flag("--quick", quick_, "a hundredth of the cases");
+  app_->add_option("--report", report_, "write the rows as JSON")->type_name("FILE");
+  app_->add_option("--page", page_, "write all as a page (docs/contact.md), its plots beside it")
+      ->excludes(only)
+      ->type_name("FILE");
+  app_->add_option("--data", data_, "folder of real volumes (default: $KERF_DATA)")
+      ->envname("KERF_DATA")
+      ->type_name("DIR");
+  app_->add_option("--cpu", core_, "core to run on (default: the last)")
+      ->check(CLI::Range(0, 1023));
+  app_->footer("Exit codes: 0 every limit is kept, 1 one is not, 2 bad input or set-up.");
+}
+
+int Command::run(std::ostream& out) const {
+  const auto beside = [&](const char* end) {
+    return page_.empty() ? page_ : std::filesystem::path(page_).replace_extension(end).string();
+  };
+  const std::string plot = beside(".svg"), hands_plot = beside(".hands.svg");
+  const LabOutput as_json("--report", report_);
+  const LabOutput as_page("--page", page_);
+  const LabOutput as_plot("--page", plot);
+  const LabOutput as_hands_plot("--page", hands_plot);
+  LabOutput::check_distinct({&as_json, &as_page, &as_plot, &as_hands_plot});
+  static_cast<void>(pin_lab(core_));
+  Effort effort = quick_ ? Effort::quick() : Effort{};
+  effort.data = data_;
+  Findings findings;
+  out << "group    what                                                      value unit        "
+         "must "
+         "     aim\n";
+  const auto told = [&](Row row) {
+    out << line_of(row) << std::endl;
+    findings.rows.push_back(std::move(row));
+  };
+  for (const Group& group : kGroups) {
+    if (only_.empty() || std::ranges::find(only_, group.name) != only_.end()) {
+      group.measure(effort, told, findings);
+    }
+  }
+  as_json.write(json_of(findings.rows));
+  if (!page_.empty()) {
+    const auto name = [](const std::string& path) {
+      return std::filesystem::path(path).filename().string();
+    };
+    as_plot.write(lab_svg(plot_of(findings.comparison)));
+    as_hands_plot.write(lab_svg(plot_of(findings.hands)));
+    as_page.write(page(findings.rows, findings.comparison, name(plot), name(hands_plot)));
+  }
+  return std::ranges::all_of(findings.rows, &Row::pass) ? 0 : 1;
+}
+
+}  // namespace kerf::extremes

@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "lab/rig/lab_command.hpp"
+
+namespace kerf::extremes {
+
+/// `kerf-lab extremes`: the swept contact against its limits, and beside the paper's force.
+class Command final : public LabCommand {
+ public:
+  explicit Command(CLI::App& program);
+  [[nodiscard]] int run(std::ostream& out) const override;
+
+ private:
+  std::string report_, page_, data_;
+  std::vector<std::string> only_;
+  bool quick_ = false;
+  int core_ = -1;
+};
+
+}  // namespace kerf::extremes

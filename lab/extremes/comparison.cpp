@@ -1,0 +1,179 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "lab/extremes/comparison.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <string>
+
+#include "lab/extremes/paper_force.hpp"
+#include "lab/rig/bump_slide.hpp"
+
+namespace kerf::extremes {
+namespace {
+
+using N = FixedNumbers;
+
+constexpr double kRadius = 8;
+constexpr double kAbove = 12;    // a stroke begins so high over the face
+constexpr double kThrough = 11;  // and is through where the ball's centre is so far behind it
+constexpr double kMostMmPerS = 10000;
+constexpr double kLeastShare = 0.01;  // of the paper's largest force: less is not felt
+const double kNPerUnit = ForceSettings{}.stiffness_n_per_mm * kVoxelMm;
+
+/// Force along the face's normal with the ball's centre so high over the face, N.
+using ForceAt = std::function<double(double height)>;
+
+/// A wall, tilted, with both ways to feel it.
+class TwoWays {
+ public:
+  explicit TwoWays(double thickness)
+      : body_(blurred({66, 66, 66},
+                      [&](Point p) {
+                        const double height = frame_.of(p)[1];
+                        return thickness > 40 ? height
+                                              : std::abs(height + thickness / 2) - thickness / 2;
+                      })),
+        paper_(kRadius, body_),
+        led_(tool_of_units("ball", kRadius, 2 * kRadius), body_, at(kAbove)) {}
+
+  [[nodiscard]] double paper_n(double height) const {
+    return dot(paper_.at(at(height)), frame_.up);
+  }
+  [[nodiscard]] double proxy_n(double height) {
+    return kNPerUnit * dot(led_.tick(at(height)), frame_.up);
+  }
+  /// Takes the proxy back to where a stroke begins.
+  void lift() { led_.start(at(kAbove)); }
+
+ private:
+  [[nodiscard]] Point at(double height) const { return frame_.at(0, height, 0); }
+
+  Dice dice_{4};
+  Frame frame_{dice_, {32, 32, 32}};
+  Body body_;
+  PaperForce paper_;
+  Led<N> led_;
+};
+
+/// Whether one tick of a stroke is felt, the first with the ball behind the face included.
+bool felt(const ForceAt& force_n, double step, double phase, double least_n) {
+  for (double height = kAbove - phase * step;; height -= step) {
+    if (force_n(height) > least_n) return true;
+    if (height < -kThrough) return false;
+  }
+}
+
+/// Lowest of speeds 2 % apart at which some phase of the ticks is not felt.
+std::optional<double> lost_at(const ForceAt& force_n, const std::function<void()>& lift,
+                              double rate_hz, double least_n, const Effort& effort) {
+  for (double speed = 10; speed <= kMostMmPerS; speed *= 1.02) {
+    const double step = speed / rate_hz / kVoxelMm;
+    if (step < kAbove) continue;  // some tick finds the ball half in
+    for (int i = 0; i < effort.phases; ++i) {
+      lift();
+      if (!felt(force_n, step, double(i) / effort.phases, least_n)) return speed;
+    }
+  }
+  return std::nullopt;
+}
+
+void press(TwoWays& ways, Wall& wall) {
+  constexpr double kStep = 0.25, kDeepest = 30, kTouched = 0.1;
+  for (double height = kRadius + 1; height > kRadius - kDeepest; height -= kStep) {
+    const double depth = kRadius - height;
+    const Press press{depth * kVoxelMm, ways.paper_n(height), ways.proxy_n(height)};
+    wall.paper_most_n = std::max(wall.paper_most_n, press.paper_n);
+    const bool felt = press.paper_n > kLeastShare * wall.paper_most_n;
+    wall.paper_unfelt_mm += depth > kTouched && !felt ? kStep * kVoxelMm : 0;
+    wall.presses.push_back(press);
+  }
+}
+
+void stroke(const Effort& effort, TwoWays& ways, Wall& wall) {
+  const double least_n = kLeastShare * wall.paper_most_n;
+  for (const double rate_hz : {20.0, 50.0, 100.0, 200.0, 500.0, 1000.0}) {
+    const auto paper = [&](double height) { return ways.paper_n(height); };
+    const auto proxy = [&](double height) { return ways.proxy_n(height); };
+    wall.losses.push_back({rate_hz,
+                           lost_at(
+                               paper, [] {}, rate_hz, least_n, effort),
+                           lost_at(
+                               proxy, [&] { ways.lift(); }, rate_hz, least_n, effort)});
+  }
+}
+
+void tell(const Wall& wall, const Told& told) {
+  const auto row = [&](const std::string& what, double value, const char* unit,
+                       std::optional<double> must = std::nullopt) {
+    told({"paper", wall.name + ": " + what, value, unit, must, {}});
+  };
+  row("paper's largest force of a slow press", wall.paper_most_n, "N");
+  row("paper unfelt on a press of 3 mm", wall.paper_unfelt_mm, "mm");
+  for (const Loss& loss : wall.losses) {
+    const std::string rate = std::to_string(std::lround(loss.rate_hz)) + " Hz";
+    row("paper lost at " + rate + " from", loss.paper_mm_per_s.value_or(kMostMmPerS), "mm/s");
+    row("proxy lost at " + rate, loss.proxy_mm_per_s ? 1 : 0, "1", 0);
+  }
+}
+
+Slide slide_both() {
+  Dice dice(5);
+  const BumpSlide bumped;
+  const Bump bump(bumped, dice);
+  const Body body = bump.body();
+  const PaperForce paper(kRadius, body);
+  Led<N> led(tool_of_units("ball", kRadius, 2 * kRadius), body, bump.hand(-bump.end(), -2));
+  for (double depth = -2; depth < bumped.depth; depth += 0.1) {
+    led.tick(bump.hand(-bump.end(), depth));
+  }
+  Slide slide;
+  Roughness paper_steps, proxy_steps;
+  double paper_sum = 0, proxy_sum = 0, way_mm = 0;
+  for (double angle = -bump.end(); angle < bump.end(); angle += bump.angle_step()) {
+    const Point hand = bump.hand(angle, bumped.depth), up = bump.up(hand);
+    const Point old = paper.at(hand), now = led.tick(hand);
+    paper_steps.add(old);
+    proxy_steps.add(now);
+    slide.paper_degrees = std::max(slide.paper_degrees, degrees_between(old, up));
+    slide.proxy_degrees = std::max(slide.proxy_degrees, degrees_between(now, up));
+    slide.ticks.push_back({way_mm, length(old), length(now)});
+    paper_sum += length(old);
+    proxy_sum += length(now);
+    way_mm += bumped.step * kVoxelMm;
+  }
+  for (SlideTick& tick : slide.ticks) {
+    tick.paper *= double(slide.ticks.size()) / paper_sum;
+    tick.proxy *= double(slide.ticks.size()) / proxy_sum;
+  }
+  slide.paper_step = paper_steps.ratio();
+  slide.proxy_step = proxy_steps.ratio();
+  return slide;
+}
+
+void tell(const Slide& slide, const Told& told) {
+  const auto row = [&](const char* what, double value, const char* unit) {
+    told({"paper", std::string("slide over R 40: ") + what, value, unit, {}, {}});
+  };
+  row("paper's force step over the mean", 100 * slide.paper_step, "%");
+  row("proxy's force step over the mean", 100 * slide.proxy_step, "%");
+  row("paper's angle", slide.paper_degrees, "deg");
+  row("proxy's angle", slide.proxy_degrees, "deg");
+}
+
+}  // namespace
+
+Comparison compare(const Effort& effort, const Told& told) {
+  Comparison comparison;
+  for (Wall& wall : comparison.walls) {
+    TwoWays ways(wall.thickness);
+    press(ways, wall);
+    stroke(effort, ways, wall);
+    tell(wall, told);
+  }
+  comparison.slide = slide_both();
+  tell(comparison.slide, told);
+  return comparison;
+}
+
+}  // namespace kerf::extremes

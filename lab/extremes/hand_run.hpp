@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "controller/load/loaded_scene.hpp"
+#include "hil/devmodel/hand_script.hpp"
+
+namespace kerf::extremes {
+
+/// One tick of a hand with the motors on.
+struct HandTick {
+  double height_mm = 0;        ///< of the tip over the surface first met, in the scene
+  double proxy_height_mm = 0;  ///< of the tool as it is felt
+  std::array<double, 3> force_n{};
+  double removed_mm3 = 0;  ///< since the start
+  bool contact = false;
+  double compute_us = 0;  ///< of the servo step, ticks back to back
+};
+
+/// A scripted hand at an emulated Omni, its driver and the whole servo step in virtual time.
+struct HandRun {
+  std::string name;
+  double rate_hz = 1000;
+  std::vector<HandTick> ticks;
+  std::uint64_t faults = 0;  ///< ticks in which one was latched
+};
+
+/// `scene` is for an Omni; its torques are set to those of the emulated unit. The same arguments
+/// give the same run, but for its times; it has at least one tick. Throws HilError where the hand
+/// does not get to its script.
+[[nodiscard]] HandRun run_hand(LoadedScene scene, const HandScript& hand, double seconds);
+
+/// Force above a frequency, over the mean force, in windows of 128 ticks wholly in contact.
+struct Chatter {
+  double share = 0;  ///< of all windows together (Welch 1967); 0 where there is none
+  double worst = 0;  ///< of a single one
+  int windows = 0;
+};
+[[nodiscard]] Chatter chatter_of(const HandRun& run, double cutoff_hz);
+
+}  // namespace kerf::extremes

@@ -1,0 +1,164 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "lab/extremes/page.hpp"
+
+#include <algorithm>
+#include <cstdio>
+
+#include "lab/rig/lab_run.hpp"
+
+namespace kerf::extremes {
+namespace {
+
+constexpr const char* kAbout = R"(# Contact
+
+Made by `./kerf lab extremes --page docs/contact.md`; every figure comes from one run, nothing is typed by
+hand. But for the times of ticks a run repeats bit for bit. `--report` writes the rows as JSON, `--only` measures
+some groups of them, and the command exits with 1 where a limit is not kept.
+
+The swept proxy (`[force] model = "proxy"`) keeps the whole tool out of the solid and pulls the hand to it by a
+spring; the paper's force (`"paper"`) adds up the density's gradient where the tool is. Both are measured as the
+servo runs them: fixed point, the fastest kernels of this machine. A voxel is 0.1 mm, a tick 1 ms and the tool a
+ball of 16 voxels unless said; density rises over two voxels at a face. What is tested in fixed point and in double
+is listed in validation.md.
+
+)";
+
+constexpr const char* kCompared = R"(## The paper's force and the swept proxy
+
+![Both forces on the same motions](%s)
+
+A hand that presses on loses the paper's force. It grows with the area in touch, here to %s N, and ends where the
+ball is wholly inside; behind a wall of two voxels it pushes onward. Of a press of 3 mm it holds nothing back on %s mm
+in the thick wall and %s mm at the thin one. The proxy stays in front, and its force grows with the depth.
+
+A stroke whose step is wider than the zone of force can pass the face between two ticks. From these speeds on some
+phase of the ticks is unfelt; the proxy was tried up to the 10 m/s at which the supervisor stops every hand.
+
+| update rate | paper, %s | paper, %s | proxy, both |
+|---:|---:|---:|---:|
+%s
+On a slide over a smooth ball both are smooth: at 50 mm/s the force steps by %s %% (paper) and %s %% (proxy) of its
+mean, within %s and %s degrees of the normal.
+
+)";
+
+struct About {
+  const char* group;
+  const char* title;
+  const char* text;
+};
+constexpr About kGroups[] = {
+    {"walls", "Walls",
+     R"(Random steps of 0.1 to 10 m/s at a tilted wall, the cylinder and the bur of `scenes/fluted_bur.toml` turned at
+random too; no supervisor.)"},
+    {"rests", "Where a ball comes to rest",
+     R"(Against the ideal solid, tilted anyhow; on edges against the volume's own iso-surface, since trilinear
+density holds no sharp edge.)"},
+    {"slides", "Slides",
+     R"(The step is of the force from tick to tick over its mean; that of the direction alone is 1.04 % at R 40 and
+4.5 % at R 14, where the limit is 0.08 N or twice the mean. `CT` has edges blurred by a deviation of one voxel, and noise of 2 %.)"},
+    {"shapes", "Tools that are no balls",
+     R"(At rest on flats of any tilt and on sharp edges of 90 degrees, these against the volume's own iso-surface; and
+sliding at 50 mm/s over a ball of R 40, 2 deep. Limits are 1.5 times those of the ball, on CT too. There a rim
+or a point misses them: it touches in one place, where the noise of one voxel makes waves of the surface itself, and
+a ball's height and normal are the means of some fifty samples. `exact contact` is height and normal of
+the same iso-surface where the tool's close samples touch it at the ideal place, the normal over half a voxel: what
+a contact without any mean begins with.)"},
+    {"cutting", "Cutting by force",
+     R"(The whole servo with `[cut] model = "preston"`: a ball of radius 1 mm, led by hand over a flat; pressed on it
+with the same force, up to 1.2 N and back, whatever gives way; and sunk into a crown at the rate of enamel,
+the worst of nine places. `GE tooth` is a real one by CT, below `--data` or `$KERF_DATA`.)"},
+    {"ticks", "Ticks",
+     R"(On 256 x 256 x 161 voxels. The costliest tick of each tool is looked for among thousands, at flat, sharp, hollow
+and noisy solids, in a slot with a play of 0.1 voxels, in tissue just below the iso and, where its data are, at the
+GE tooth, with goals near and far and places looked for anew. Those that took longest are repeated from the same
+state, and the fastest repetition counts; where it was found is told.)"},
+    {"hands", "Hands",
+     R"(An emulated Omni, its driver and the whole servo in virtual time, `scenes/touch.toml`; `groove` and
+`cut_cavity` with `[cut] model = "preston"`. Force above 150 Hz
+is rms, by windows of 0.128 s wholly in contact. A count of an encoder is up to 0.06 mm, or 0.024 N.
+The second stab of `jerk` goes beside the crown.)"},
+};
+
+std::string number(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, value < 1000 ? "%.3g" : "%.0f", value);
+  return text;
+}
+
+std::string cell(const std::optional<double>& limit) {
+  return limit ? number(*limit) : "";
+}
+
+std::string table_of(const std::vector<Row>& rows, const std::string& group) {
+  std::string table = "| what | value | | must | aim | |\n|---|---:|---|---:|---:|---|\n";
+  for (const Row& row : rows) {
+    if (row.group != group) continue;
+    if (!row.skipped.empty()) {
+      table += "| " + row.name + " | | | " + cell(row.must) + " | " + cell(row.aim) +
+               " | skipped: " + row.skipped + " |\n";
+      continue;
+    }
+    const char* verdict = !row.must ? "" : !row.pass() ? "**missed**" : "kept";
+    table += "| " + row.name + " | " + number(row.value) + " | " +
+             (row.unit == "1" ? "" : row.unit) + " | " + cell(row.must) + " | " + cell(row.aim) +
+             " | " + verdict + " |\n";
+  }
+  return table + "\n";
+}
+
+std::string speed(const std::optional<double>& mm_per_s) {
+  return mm_per_s ? number(*mm_per_s) + " mm/s" : "never";
+}
+
+std::string compared(const Comparison& comparison, const std::string& plot) {
+  const Wall &thick = comparison.walls[0], &thin = comparison.walls[1];
+  std::string speeds;
+  for (std::size_t i = 0; i < thick.losses.size(); ++i) {
+    const Loss &at = thick.losses[i], &also = thin.losses[i];
+    speeds += "| " + number(at.rate_hz) + " Hz | " + speed(at.paper_mm_per_s) + " | " +
+              speed(also.paper_mm_per_s) + " | " +
+              speed(at.proxy_mm_per_s ? at.proxy_mm_per_s : also.proxy_mm_per_s) + " |\n";
+  }
+  const Slide& slide = comparison.slide;
+  char text[4096];
+  std::snprintf(text, sizeof text, kCompared, plot.c_str(), number(thick.paper_most_n).c_str(),
+                number(thick.paper_unfelt_mm).c_str(), number(thin.paper_unfelt_mm).c_str(),
+                thick.name.c_str(), thin.name.c_str(), speeds.c_str(),
+                number(100 * slide.paper_step).c_str(), number(100 * slide.proxy_step).c_str(),
+                number(slide.paper_degrees).c_str(), number(slide.proxy_degrees).c_str());
+  return text;
+}
+
+/// How many limits are kept, and which are not.
+std::string verdict(const std::vector<Row>& rows) {
+  const auto judged = std::ranges::count_if(rows, &Row::judged);
+  const auto missed = std::ranges::count_if(rows, [](const Row& row) { return !row.pass(); });
+  std::string text = "Of " + std::to_string(judged) + " limits " + std::to_string(judged - missed) +
+                     " are kept" + (missed > 0 ? "; missed are\n\n" : ".\n");
+  for (const Row& row : rows) {
+    if (row.pass()) continue;
+    text += "* " + row.group + ", " + row.name + ": " + number(row.value) + " " + row.unit +
+            " instead of " + cell(row.must) + "\n";
+  }
+  return text + "\n";
+}
+
+}  // namespace
+
+std::string page(const std::vector<Row>& rows, const Comparison& comparison,
+                 const std::string& plot, const std::string& hands_plot) {
+  std::string text =
+      kAbout + lab_provenance() + "\n\n" + verdict(rows) + compared(comparison, plot);
+  for (const About& about : kGroups) {
+    text += std::string("## ") + about.title + "\n\n" + about.text + "\n\n";
+    if (std::string(about.group) == "hands") {
+      text += "![Height and force of each hand](" + hands_plot + ")\n\n";
+    }
+    text += table_of(rows, about.group);
+  }
+  text.pop_back();
+  return text;
+}
+
+}  // namespace kerf::extremes

@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <string>
+#include <vector>
+
+#include "controller/kernel/point_shell/shell_sums.hpp"
+#include "lab/extremes/measures.hpp"
+#include "lab/rig/loft.hpp"
+#include "lab/rig/posed_tool.hpp"
+#include "lab/rig/rest.hpp"
+
+namespace kerf::extremes {
+namespace {
+
+using N = FixedNumbers;
+
+/// Points of a tool's whole surface, 0.15 units apart at most, its corners and rims among them.
+std::vector<Point> surface_points(const SceneTool& tool) {
+  constexpr double kPitch = 0.15;
+  std::vector<Point> points;
+  const auto steps = [](double way) { return std::max(1, int(std::ceil(way / kPitch))); };
+  for (const auto& triangle : tool.mesh.triangles) {
+    const Point a = tool.mesh.points_mm[triangle[0]], ab = tool.mesh.points_mm[triangle[1]] - a,
+                ac = tool.mesh.points_mm[triangle[2]] - a;
+    const int n = steps(std::max({length(ab), length(ac), length(ac - ab)}));
+    for (int i = 0; i <= n; ++i) {
+      for (int j = 0; j <= n - i; ++j) {
+        points.push_back(a + double(i) / n * ab + double(j) / n * ac);
+      }
+    }
+  }
+  if (!points.empty()) return points;
+  const auto profile = tool_profile(tool, 512);
+  for (std::size_t k = 1; k < profile.size(); ++k) {
+    const auto &a = profile[k - 1], &b = profile[k];
+    const int n = steps(std::hypot(b[0] - a[0], b[1] - a[1]));
+    for (int i = 0; i <= n; ++i) {
+      const double y = std::lerp(a[0], b[0], double(i) / n),
+                   radius = std::lerp(a[1], b[1], double(i) / n);
+      const int around = steps(2 * std::numbers::pi * radius);
+      for (int j = 0; j < around; ++j) {
+        const double angle = 2 * std::numbers::pi * j / around;
+        points.push_back({radius * std::cos(angle), y, radius * std::sin(angle)});
+      }
+    }
+  }
+  return points;
+}
+
+/// How far along `out` from `centre` the points leave the trilinear density's iso-surface; below 0:
+/// how far they are from it.
+double depth_of(const Body& body, const std::vector<Point>& points, Point centre, Point out) {
+  const ShellField field{body.grid, body.density.data(), density_scale(kIso), {}};
+  const auto solid_at = [&](double way) {
+    return std::ranges::any_of(points, [&](const Point& point) {
+      const Point p = centre + way * out + point;
+      const double place[3] = {p[0], p[1], p[2]};
+      return shell_sample<DoubleNumbers>(field, place).density > 0.5;
+    });
+  };
+  double inside = -1, outside = 1;
+  for (int step = 0; step < 14; ++step) {
+    const double middle = (inside + outside) / 2;
+    (solid_at(middle) ? inside : outside) = middle;
+  }
+  return (inside + outside) / 2;
+}
+
+}  // namespace
+
+void measure_shape_edges(const Effort& effort, const Told& told) {
+  struct Subject {
+    const char* name;
+    SceneTool tool;
+  };
+  for (const Subject& subject :
+       {Subject{"cylinder, any pose", tool_of_units("cylinder", 5, 16)},
+        Subject{"cone, any pose", tool_of_units("cone", 5, 16)},
+        Subject{"STL, square bar, any pose", mesh_of_units("bar", prism(6, 16, 4))}}) {
+    const std::vector<Point> surface = surface_points(subject.tool);
+    const SampledTool tool(subject.tool);
+    Dice dice(7);
+    double sum = 0, most = 0;
+    for (int k = 0; k < effort.tilts; ++k) {
+      const Frame frame(dice, {21, 21, 21});
+      const Axes axes = standing_on(dice.direction(), dice);
+      // The edge of 90 degrees lies where a tool about `frame.place` touches it.
+      const auto above = [&](Point way) {
+        return dot(way, frame.up) + std::abs(dot(way, frame.across));
+      };
+      std::vector<Point> near;
+      double lowest = 1e9;
+      for (const Point& point : surface) {
+        near.push_back(axes.to_world(point));
+        lowest = std::min(lowest, above(near.back()));
+      }
+      std::erase_if(near, [&](const Point& point) { return above(point) > lowest + 2.5; });
+      const Body body = blurred({44, 44, 44}, [&](Point p) {
+        return (above(p - frame.place) - lowest) * std::sqrt(0.5);
+      });
+      const Point rest = rest_of<N>(tool, body, frame.place, frame.up, axes.turn<N>(), 20);
+      const Point out = unit(rest - frame.at(0, -1, 0));  // from the hand
+      const double off = -depth_of(body, near, rest, out);
+      sum += off;
+      most = std::max(most, std::abs(off));
+    }
+    const auto row = [&](const char* what, double value) {
+      told({"shapes", std::string(subject.name) + what, value, "voxels", 0.18, 0.075});
+    };
+    row(": sharp edge, to the iso-surface: mean offset", std::abs(sum / effort.tilts));
+    row(": sharp edge, to the iso-surface: largest offset", most);
+  }
+}
+
+}  // namespace kerf::extremes

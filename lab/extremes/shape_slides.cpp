@@ -1,0 +1,162 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "lab/extremes/measures.hpp"
+#include "lab/rig/ct_edge.hpp"
+#include "lab/rig/exact_touch.hpp"
+#include "lab/rig/led.hpp"
+#include "lab/rig/loft.hpp"
+#include "lab/rig/posed_tool.hpp"
+
+namespace kerf::extremes {
+namespace {
+
+using N = FixedNumbers;
+
+constexpr double kBump = 40, kDepth = 2, kStep = 0.5;
+
+/// Where a tool touches the bump: its centre, and the bump's normal.
+struct Touch {
+  Point centre, normal;
+
+  [[nodiscard]] Point hand(double depth) const { return centre - depth * normal; }
+};
+
+/// The way of a tool that keeps its pose over the bump about `frame.place`, by hands a step apart:
+/// the normal turns, and the tool touches with the point that is farthest against it. Where that
+/// jumps, along an edge or over a face, the tool slides on with the same normal.
+std::vector<Touch> way_over(const Frame& frame, const Axes& axes, const Reach& reach) {
+  constexpr int kFine = 4000;
+  constexpr double kEnd = 0.175;  // rad to each side
+  const auto touch = [&](double angle) {
+    const Point normal = std::cos(angle) * frame.up + std::sin(angle) * frame.along;
+    const Point touching = axes.to_world(reach.farthest(axes.to_tool(-1 * normal)));
+    return Touch{frame.place + kBump * normal - touching, normal};
+  };
+  std::vector<Touch> way{touch(-kEnd)};
+  Touch before = way.front();
+  double walked = 0;
+  for (int i = 1; i <= kFine; ++i) {
+    const Touch next = touch(kEnd * (2.0 * i / kFine - 1));
+    const double gap = length(next.hand(kDepth) - before.hand(kDepth));
+    for (double to = kStep - walked; to <= gap; to += kStep) {
+      const double share = to / gap;
+      way.push_back({before.centre + share * (next.centre - before.centre),
+                     unit(before.normal + share * (next.normal - before.normal))});
+    }
+    walked = std::fmod(walked + gap, kStep);
+    before = next;
+  }
+  return way;
+}
+
+struct Figures {
+  double force_step = 0, degrees = 0, height_sd = 0;
+};
+
+/// One slide's forces over the stiffness and heights over the ideal place.
+class Course {
+ public:
+  void add(const Touch& touch, Point force, double height) {
+    roughness_.add(force);
+    degrees_ = std::max(degrees_, degrees_between(force, touch.normal));
+    sum_ += height;
+    squares_ += height * height;
+    ++count_;
+  }
+  void worsen(Figures& figures) const {
+    const double mean = sum_ / count_;
+    figures.force_step = std::max(figures.force_step, roughness_.ratio());
+    figures.degrees = std::max(figures.degrees, degrees_);
+    figures.height_sd =
+        std::max(figures.height_sd, std::sqrt(std::max(0.0, squares_ / count_ - mean * mean)));
+  }
+
+ private:
+  Roughness roughness_;
+  double degrees_ = 0, sum_ = 0, squares_ = 0;
+  int count_ = 0;
+};
+
+/// `share` of full density by signed distance. `exact`: what ExactTouch has on the same way.
+void slide(const SampledTool& tool, const Reach& reach, const std::function<double(double)>& share,
+           Dice& dice, Figures& figures, Figures* exact) {
+  Frame frame(dice, {28, 28, 28});
+  frame.place = frame.at(0, -4 - kBump, 0);
+  const Axes axes = standing_on(dice.direction(), dice);
+  const Body body =
+      body_of({60, 60, 60}, [&](Point p) { return share(length(p - frame.place) - kBump); });
+  const std::vector<Touch> way = way_over(frame, axes, reach);
+  const ToolTurn<N> turn = axes.turn<N>();
+  constexpr double kHigh = 20;  // the tool turns first
+  Led<N> led(tool, body, way.front().hand(-kHigh));
+  for (int i = 0; i < 100 && !(led.pose().turn == turn); ++i) {
+    led.tick(way.front().hand(-kHigh), turn);
+  }
+  for (double depth = -kHigh; depth < kDepth; depth += 0.1) led.tick(way.front().hand(depth), turn);
+  Course course;
+  for (const Touch& touch : way) {
+    const Point force = led.tick(touch.hand(kDepth), turn);
+    course.add(touch, force, dot(led.proxy() - touch.centre, touch.normal));
+  }
+  course.worsen(figures);
+  if (exact == nullptr) return;
+  const ExactTouch truth(tool, axes, body);
+  Course exact_course;
+  for (const Touch& touch : way) {
+    const double height = truth.height(touch.centre, touch.normal);
+    const Point normal = truth.normal(touch.centre, touch.normal);
+    exact_course.add(touch, (kDepth + height) * normal, height);
+  }
+  exact_course.worsen(*exact);
+}
+
+}  // namespace
+
+void measure_shape_slides(const Effort& effort, const Told& told) {
+  struct Limit {
+    std::optional<double> must, aim;
+  };
+  struct Limits {
+    Limit step, degrees, sd;
+  };
+  struct Subject {
+    const char* name;
+    SceneTool tool;
+  };
+  for (const Subject& subject :
+       {Subject{"cylinder, any pose", tool_of_units("cylinder", 5, 16)},
+        Subject{"cone, any pose", tool_of_units("cone", 5, 16)},
+        Subject{"STL, square bar, any pose", mesh_of_units("bar", prism(6, 16, 4))}}) {
+    const Reach reach(subject.tool);
+    const SampledTool tool(subject.tool);
+    const auto tell = [&](const std::string& name, const Figures& figures, const Limits& limits) {
+      const auto row = [&](const char* what, double value, const char* unit, const Limit& limit) {
+        told({"shapes", subject.name + name + what, value, unit, limit.must, limit.aim});
+      };
+      row(", force step over the mean", 100 * figures.force_step, "%", limits.step);
+      row(", angle", figures.degrees, "deg", limits.degrees);
+      row(", surface sd", figures.height_sd, "voxels", limits.sd);
+    };
+    const auto measure = [&](const std::function<double(double)>& share, Figures* exact) {
+      Dice dice(5);
+      Figures figures;
+      for (int k = 0; k < 2 * effort.slides; ++k) slide(tool, reach, share, dice, figures, exact);
+      return figures;
+    };
+    const auto clean = [](double distance) { return 0.5 - distance / 2; };
+    tell(": sliding", measure(clean, nullptr), {{3, 2.1}, {0.75, 0.45}, {0.0075, 0.003}});
+    CtEdge ct;
+    Figures exact;
+    tell(": sliding on CT with noise", measure(std::ref(ct), &exact),
+         {{4.5, 2.7}, {1.8, 1.35}, {0.03, 0.0225}});
+    tell(": exact contact on CT with noise", exact, {});
+  }
+}
+
+}  // namespace kerf::extremes

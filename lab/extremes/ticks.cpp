@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <string>
+#include <vector>
+
+#include "controller/servo/proxy_contact.hpp"
+#include "lab/accuracy/contact_method.hpp"
+#include "lab/extremes/hands.hpp"
+#include "lab/extremes/measures.hpp"
+#include "lab/extremes/shipped_bur.hpp"
+#include "lab/extremes/worst_tick.hpp"
+#include "lab/rig/bench_scene.hpp"
+#include "lab/rig/shell_rig.hpp"
+#include "lab/rig/tick_timer.hpp"
+
+namespace kerf::extremes {
+namespace {
+
+using N = FixedNumbers;
+
+constexpr VoxelGrid kGrid{256, 256, 161};
+constexpr double kRadius = 8;
+
+ProxyPose<N> goal_at(const bench::Place& p) {
+  return {place_of<N>({p[0], p[1], p[2]}), {}};
+}
+
+void measure_worst_ticks(const Effort& effort, const Told& told) {
+  struct Subject {
+    const char* name;
+    SceneTool tool;
+    WorstTick worst;
+  };
+  Subject subjects[] = {{"ball", tool_of_units("ball", kRadius, 2 * kRadius), {}},
+                        {"turning cylinder", tool_of_units("cylinder", 5, 16), {}},
+                        {"turning bur (STL)", shipped_bur(), {}}};
+  for (const Trap& trap : worst_traps(effort.data)) {
+    const Body body = trap.body();
+    for (Subject& subject : subjects) {
+      find_worst_tick(subject.tool, trap, body, 2 * effort.tick_count, subject.worst);
+    }
+  }
+  for (const Subject& subject : subjects) {
+    told({"ticks",
+          std::string("proxy, ") + subject.name + ", costliest tick found (" + subject.worst.trap +
+              ")",
+          subject.worst.us, "us", 60, 40});
+  }
+}
+
+/// The whole servo in the default demo, ticks back to back; of each tick the fastest of some runs,
+/// which are alike to the bit.
+void measure_cutting_ticks(const Effort& effort, const Told& told) {
+  const LoadedScene scene = shipped_scene("phantom", effort);
+  constexpr int kRuns = 4;
+  std::vector<double> us;
+  for (int i = 0; i < kRuns; ++i) {
+    const HandRun run = run_hand(scene, "cut_cavity", effort);
+    us.resize(run.ticks.size());
+    for (std::size_t t = 0; t < us.size(); ++t) {
+      us[t] = i == 0 ? run.ticks[t].compute_us : std::min(us[t], run.ticks[t].compute_us);
+    }
+  }
+  std::sort(us.begin(), us.end());
+  const auto at = [&](double share) {
+    return us[static_cast<std::size_t>(share * static_cast<double>(us.size() - 1))];
+  };
+  told({"ticks", "whole servo, default scene, cutting: p50", at(0.5), "us", {}, {}});
+  told({"ticks", "whole servo, default scene, cutting: p99.9", at(0.999), "us", 100, 50});
+}
+
+}  // namespace
+
+void measure_ticks(const Effort& effort, const Told& told) {
+  const auto row = [&](const char* name, double us, std::optional<double> must,
+                       std::optional<double> aim = std::nullopt) {
+    told({"ticks", name, us, "us", must, aim});
+  };
+  const Body ball{kGrid, bench::ball_in(kGrid)};
+  {
+    const SceneTool tool = tool_of_units("ball", kRadius, 2 * kRadius);
+    ShellRig<N> rig(tool, ball);
+    const ProxyPlan<N> plan{.ramp_per_tick = N::Real(1)};
+    ProxyState<N> state;
+    state.pose = {place_of<N>({200, 80, 128}), {}};
+    // Half a unit a tick: 50 mm/s.
+    const auto place = [&](int i) { return bench::around(kGrid, 16, i, 580); };
+    for (int i = 0; i < 40; ++i)
+      bench::use(follow(plan, state, rig.field(), goal_at(place(0))).probes);
+    const TickTimes times = time_ticks(
+        effort.tick_count, [] {},
+        [&](int i) { bench::use(follow(plan, state, rig.field(), goal_at(place(i))).probes); });
+    row("proxy, sliding at 50 mm/s: p50", times.p50_ns / 1e3, 15, 6);
+    row("proxy, sliding at 50 mm/s: p99", times.p99_ns / 1e3, std::nullopt);
+  }
+  {
+    const accuracy::AnalyticVolume volume{kGrid, 0.1, ball.density};
+    const auto paper = accuracy::contact_method(
+        {.storage = accuracy::Storage::aligned, .voxel_mm = volume.voxel_mm}, volume,
+        accuracy::ball_tool(0.8, 0.1));
+    const TickTimes times = time_ticks(
+        effort.tick_count, [] {},
+        [&](int i) {
+          const bench::Place p = bench::around(kGrid, 16, i, 580);
+          bench::use(static_cast<std::int64_t>(paper->tool_sum({p[0], p[1], p[2]}).x));
+        });
+    row("paper, sliding at 50 mm/s: p50", times.p50_ns / 1e3, std::nullopt);
+    row("paper, sliding at 50 mm/s: p99", times.p99_ns / 1e3, std::nullopt);
+  }
+  measure_worst_ticks(effort, told);
+  measure_cutting_ticks(effort, told);
+}
+
+}  // namespace kerf::extremes

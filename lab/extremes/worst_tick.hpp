@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "controller/load/loaded_scene.hpp"
+#include "lab/rig/body.hpp"
+
+namespace kerf::extremes {
+
+/// A body and a place at its surface, about which a hand looks for the tick that costs most.
+struct Trap {
+  std::string name;
+  std::function<Body()> body;  ///< made while it is needed: tens of MB
+  Point middle;
+  Density iso;
+};
+
+/// Solids that cost a probe or a sweep much: flat, sharp, hollow, hardly wider than the tool,
+/// noisy, and tissue that is felt everywhere and nowhere solid; and the tooth of a CT, where `data`
+/// has it. Throws HilError where that cannot be read.
+[[nodiscard]] std::vector<Trap> worst_traps(const std::filesystem::path& data);
+
+/// The costliest tick that was found.
+struct WorstTick {
+  double us = 0;
+  int probes = 0;
+  std::string trap;
+};
+
+/// Ticks of `follow` from a proxy that is placed or looks for a place, for goals near and far;
+/// those whose one run took longest are repeated, from the same state and so alike to the bit, and
+/// of each the fastest repetition counts: what other programs steal does not, what the input costs
+/// does.
+void find_worst_tick(const SceneTool& tool, const Trap& trap, const Body& body, int ticks,
+                     WorstTick& worst);
+
+}  // namespace kerf::extremes

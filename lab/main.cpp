@@ -1,0 +1,8 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <iostream>
+
+#include "lab/program.hpp"
+
+int main(int argc, char** argv) {
+  return kerf::run_lab(argc, argv, std::cout, std::cerr);
+}

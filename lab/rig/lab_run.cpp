@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "lab/rig/lab_run.hpp"
+
+#include <filesystem>
+#include <map>
+#include <utility>
+
+#include "hil/hil_error.hpp"
+#include "record/gnuplot.hpp"
+#include "record/record_error.hpp"
+#include "shared/posix/cores.hpp"
+#include "shared/posix/new_file.hpp"
+#include "shared/posix/page_part.hpp"
+#include "shared/posix/provenance.hpp"
+
+namespace kerf {
+namespace {
+
+#ifdef __clang__
+constexpr const char* kCompiler = "clang " __clang_version__;
+#else
+constexpr const char* kCompiler = "g++ " __VERSION__;
+#endif
+
+template <class Work>
+void guarded(const char* option, const Work& work) {
+  try {
+    work();
+  } catch (const FileError& error) {
+    throw HilError(std::string(option) + " " + error.what());
+  }
+}
+
+}  // namespace
+
+int pin_lab(int core) {
+  if (core < 0) core = allowed_cores().back();
+  if (pin_to_core(core) != 0) {
+    throw HilError("--cpu " + std::to_string(core) + ": not a core that this process may use");
+  }
+  return core;
+}
+
+std::string lab_provenance() {
+  return today() + ", " + processor_name() + ", " + kCompiler +
+         " " KERF_FLAGS " (kernels of an instruction set always -O3).";
+}
+
+std::string lab_svg(const std::string& script) {
+  try {
+    return gnuplot_svg(script);
+  } catch (const RecordError& error) {
+    throw HilError(error.what());
+  } catch (const FileError& error) {
+    throw HilError(error.what());
+  }
+}
+
+LabOutput::LabOutput(const char* option, std::string path)
+    : option_(option), path_(std::move(path)) {
+  if (!path_.empty()) guarded(option_, [&] { check_new_file(path_); });
+}
+
+void LabOutput::write(const std::string& text) const {
+  if (!path_.empty()) guarded(option_, [&] { write_new_file(path_, text); });
+}
+
+void LabOutput::write_part(const char* name, const std::string& text) const {
+  if (!path_.empty()) guarded(option_, [&] { write_page_part(path_, name, text); });
+}
+
+void LabOutput::check_distinct(std::initializer_list<const LabOutput*> outputs) {
+  std::map<std::filesystem::path, const char*> options;
+  for (const LabOutput* output : outputs) {
+    if (output->path_.empty()) continue;
+    const auto file = std::filesystem::weakly_canonical(std::filesystem::absolute(output->path_));
+    const auto [other, is_new] = options.emplace(file, output->option_);
+    if (is_new) continue;
+    throw HilError(std::string(output->option_) + " " + output->path_ + ": " + other->second +
+                   " writes there, too; give each a file of its own");
+  }
+}
+
+}  // namespace kerf

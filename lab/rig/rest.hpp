@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "lab/rig/led.hpp"
+
+namespace kerf::extremes {
+
+/// F9: where a tool comes to rest that a hand presses from `off` units above `at` to one below it,
+/// against `up`, in 20 ticks.
+template <class N>
+[[nodiscard]] Point rest_of(const SampledTool& tool, const Body& body, Point at, Point up,
+                            const ToolTurn<N>& turn = {}, double off = 1.5) {
+  Led<N> led(tool, body, at + off * up);
+  constexpr int kTicks = 20;
+  for (int i = 0; i <= kTicks; ++i) led.tick(at + (off - (off + 1) * i / kTicks) * up, turn);
+  return led.proxy();
+}
+
+}  // namespace kerf::extremes

@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <deque>
+#include <optional>
+#include <vector>
+
+#include "controller/kernel/proxy/proxy_sweep.hpp"
+#include "controller/kernel/proxy/shell_probe.hpp"
+#include "controller/plan/free_brick_map.hpp"
+#include "controller/plan/shell_tool.hpp"
+#include "controller/tool/surface_samples.hpp"
+#include "controller/tool/tool_shapes.hpp"
+#include "lab/rig/body.hpp"
+
+namespace kerf::extremes {
+
+inline constexpr Density kIso = 32768;
+
+/// A tool of voxels of 1 mm, so that mm are units.
+[[nodiscard]] inline SceneTool tool_of_units(const char* shape, double radius, double length) {
+  return make_tool(shape, shape, {.pitch_mm = 1, .radius_mm = radius, .length_mm = length});
+}
+
+/// The samples of a tool in units: of a mesh they take some 0.4 seconds.
+struct SampledTool {
+  std::vector<Point> samples, close;
+  bool round = false;
+
+  SampledTool(const SceneTool& tool)  // NOLINT(google-explicit-constructor): a tool is one
+      : samples(surface_samples(tool, 1.0)), close(close_samples(tool, 1.0)), round(tool.round) {}
+};
+
+/// A volume whose voxels are units, at the origin of contact space.
+template <class N>
+[[nodiscard]] ContactFrame<N> plain_frame() {
+  ContactFrame<N> frame;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    frame.voxel_from_contact.row[axis][axis] = typename N::Ratio(1);
+  }
+  return frame;
+}
+
+/// One tool among bodies, felt by the servo's own probe; unless said on the fastest kernels of this
+/// machine. The bodies stay the caller's.
+template <class N>
+class ShellRig {
+ public:
+  explicit ShellRig(const SampledTool& tool, const KernelSet& kernels = **kernel_sets())
+      : kernels_(kernels), tool_(tool.samples, tool.round, tool.close), shell_(tool_.shell()) {}
+  ShellRig(const SampledTool& tool, const Body& body) : ShellRig(tool) {
+    add(body, plain_frame<N>());
+  }
+  ShellRig(const ShellRig&) = delete;
+  ShellRig& operator=(const ShellRig&) = delete;
+
+  void add(const Body& body, const ContactFrame<N>& frame, Density iso = kIso) {
+    constexpr Density kFeltShare = 8;  // what is fainter than this part of the iso is not felt
+    maps_.emplace_back(body.grid, body.density, static_cast<Density>(iso / kFeltShare));
+    memories_.emplace_back().hold(shell_);
+    volumes_.push_back({{body.grid, body.density.data(), density_scale(iso), maps_.back().bricks()},
+                        frame,
+                        memories_.back().places()});
+    probe_.emplace(kernels_, shell_, volumes_);
+    probe_->turn({});
+  }
+
+  /// What a sweep asks.
+  [[nodiscard]] ShellProbe<N>& field() { return *probe_; }
+  [[nodiscard]] const ShellProbe<N>& field() const { return *probe_; }
+  /// Half the sine of a turn that a sweep may make at once: see `turn_step_of`.
+  [[nodiscard]] typename N::Unit turn_step() const {
+    const double reach = std::max(1.0, static_cast<double>(shell_.reach));
+    return typename N::Unit(shell_.table.round ? 0 : turn_step_of(reach));
+  }
+
+ private:
+  const KernelSet& kernels_;
+  ShellTool<N> tool_;
+  Shell<N> shell_;
+  std::deque<FreeBrickMap> maps_;
+  std::deque<ShellMemory<N>> memories_;
+  std::vector<ShellVolume<N>> volumes_;
+  std::optional<ShellProbe<N>> probe_;
+};
+
+}  // namespace kerf::extremes

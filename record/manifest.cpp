@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "record/manifest.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <fstream>
+
+#include <nlohmann/json.hpp>
+
+#include "record/record_error.hpp"
+#include "shared/posix/new_file.hpp"
+#include "shared/segment/layout_table.hpp"
+
+namespace kerf {
+
+std::string hex64(std::uint64_t value) {
+  char text[17];
+  std::snprintf(text, sizeof text, "%016llx", static_cast<unsigned long long>(value));
+  return text;
+}
+
+void write_whole(const std::filesystem::path& path, std::string_view text) {
+  NewFile file(path);
+  file.write(text.data(), text.size());
+  file.close();
+  file.commit();
+}
+
+void write_manifest(const std::filesystem::path& folder, const SegmentInfo& info,
+                    const Recorder& recorder, std::uint64_t rows, std::string_view end_reason) {
+  nlohmann::ordered_json manifest;
+  manifest["kerf"] = KERF_VERSION;
+  manifest["compiler"] = __VERSION__;
+  manifest["build_id"] = info.build_id;
+  manifest["abi_hash"] = hex64(kAbiHash);
+  manifest["session_id"] = hex64(info.session_id);
+  manifest["config_hash"] = hex64(info.config_hash);
+  manifest["tick_ns"] = info.tick_ns;
+  manifest["start_ns"] = info.start_ns;
+  manifest["scene"] = kSceneName;
+  for (const SegmentVolumeInfo& volume : info.volumes) {
+    manifest["volumes"].push_back({{"size_vox", {volume.grid.nx, volume.grid.ny, volume.grid.nz}},
+                                   {"spacing_mm", volume.spacing_mm},
+                                   {"initial_hash", hex64(volume.initial_hash)}});
+  }
+  manifest["rows"] = rows;
+  manifest["lost_ticks"] = recorder.lost();
+  manifest["missed_before_start"] = recorder.missed_before_start();
+  manifest["gaps"] = nlohmann::ordered_json::array();
+  for (const RecordGap& gap : recorder.gaps()) {
+    manifest["gaps"].push_back({{"first_index", gap.first_index}, {"count", gap.count}});
+  }
+  manifest["end_reason"] = end_reason;
+  // A build id or scene text of another encoding must not stop a recording.
+  constexpr auto kReplace = nlohmann::ordered_json::error_handler_t::replace;
+  write_whole(folder / kManifestName, manifest.dump(2, ' ', false, kReplace) + "\n");
+}
+
+Manifest read_manifest(const std::filesystem::path& folder) {
+  const std::filesystem::path path = folder / kManifestName;
+  std::ifstream file(path);
+  if (!file) {
+    throw RecordError(path.string() + ": cannot be read; give the folder of a recording");
+  }
+  Manifest out;
+  try {
+    const nlohmann::json json = nlohmann::json::parse(file);
+    out.tick_ns = json.at("tick_ns").get<std::uint32_t>();
+    out.end_reason = json.at("end_reason").get<std::string>();
+    for (const nlohmann::json& volume : json.at("volumes")) {
+      const auto spacing = volume.at("spacing_mm").get<std::array<double, 3>>();
+      out.voxel_mm3.push_back(spacing[0] * spacing[1] * spacing[2]);
+    }
+  } catch (const nlohmann::json::exception&) {
+    throw RecordError(path.string() + ": not a manifest of this version; record it again");
+  }
+  const auto positive = [](double mm3) { return std::isfinite(mm3) && mm3 > 0; };
+  if (out.tick_ns == 0 || out.voxel_mm3.empty() ||
+      !std::all_of(out.voxel_mm3.begin(), out.voxel_mm3.end(), positive)) {
+    throw RecordError(path.string() + ": tick or spacing is not positive; record it again");
+  }
+  return out;
+}
+
+}  // namespace kerf

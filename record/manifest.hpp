@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "record/recorder.hpp"
+
+namespace kerf {
+
+inline constexpr std::string_view kTickLogName = "ticks.npy";
+inline constexpr std::string_view kManifestName = "manifest.json";
+inline constexpr std::string_view kSceneName = "scene.json";
+
+/// What a log needs beside its rows.
+struct Manifest {
+  std::uint32_t tick_ns = 0;
+  std::vector<double> voxel_mm3;  ///< per volume
+  std::string end_reason;
+};
+
+/// Writes manifest.json, whole or not at all.
+void write_manifest(const std::filesystem::path& folder, const SegmentInfo& info,
+                    const Recorder& recorder, std::uint64_t rows, std::string_view end_reason);
+
+/// Throws `RecordError` where it is missing or holds no such values.
+[[nodiscard]] Manifest read_manifest(const std::filesystem::path& folder);
+
+/// Writes a text file, whole or not at all.
+void write_whole(const std::filesystem::path& path, std::string_view text);
+
+/// 16 hex digits.
+[[nodiscard]] std::string hex64(std::uint64_t value);
+
+}  // namespace kerf

@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "record/plot.hpp"
+
+#include <array>
+#include <cmath>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "record/envelope.hpp"
+#include "record/gnuplot.hpp"
+#include "record/manifest.hpp"
+#include "record/record_error.hpp"
+#include "record/tick_figures.hpp"
+#include "record/tick_log.hpp"
+
+namespace kerf {
+namespace {
+
+constexpr std::size_t kMaxPoints = 4000;  // twice the pixels across a wide screen
+
+// Colours of Okabe and Ito, which differ for every kind of colour vision. The commanded force lies
+// broad under the contact force that it mostly follows.
+constexpr std::string_view kStyle = R"(
+set encoding utf8
+set terminal svg size 960,640 dynamic font 'Helvetica,13' background rgb 'white' linewidth 1.2
+set grid back linecolor rgb '#dddddd' linetype 1 linewidth 0.5
+set border 3 linecolor rgb '#555555'
+set tics nomirror out textcolor rgb '#333333'
+set lmargin at screen 0.10
+set rmargin at screen 0.91
+set multiplot
+)";
+constexpr std::string_view kPanels = R"(
+set tmargin at screen 0.93
+set bmargin at screen 0.56
+set key at screen 0.09, 0.97 left horizontal Left reverse samplen 2 textcolor rgb '#333333'
+set format x ''
+set yrange [0:0.01<*]
+set ylabel 'force (N)'
+plot $commanded with lines linecolor rgb '#E69F00' linewidth 3 title 'commanded', \
+     $contact with lines linecolor rgb '#0072B2' title 'contact', \
+     $modification with lines linecolor rgb '#009E73' title 'modification'
+set tmargin at screen 0.46
+set bmargin at screen 0.10
+set key at screen 0.09, 0.50
+set format x '%g'
+set xlabel 'time (s)'
+set ylabel 'penetration (mm)'
+set y2label 'removed (mm³)'
+set y2range [0:0.01<*]
+set border 11
+set y2tics nomirror out textcolor rgb '#333333'
+plot $penetration with lines linecolor rgb '#0072B2' title 'penetration', \
+     $removed axes x1y2 with lines linecolor rgb '#D55E00' linewidth 1.6 title 'removed volume'
+unset multiplot
+)";
+
+struct Curve {
+  const char* name;
+  Envelope envelope;
+};
+
+[[nodiscard]] std::string gnuplot_script(const std::filesystem::path& folder) {
+  const Manifest manifest = read_manifest(folder);
+  TickLogReader log(folder / kTickLogName);
+  if (log.rows() == 0) {
+    throw RecordError((folder / kTickLogName).string() + ": 0 rows; nothing to plot");
+  }
+  const Envelope empty(log.rows(), kMaxPoints);
+  std::array<Curve, 5> curves{{{"contact", empty},
+                               {"modification", empty},
+                               {"commanded", empty},
+                               {"penetration", empty},
+                               {"removed", empty}}};
+  double removed = 0;
+  double end_s = 0;
+  std::uint64_t first_tick = 0;
+  log.for_each([&](const TickRecord& record) {
+    if (first_tick == 0) first_tick = record.tick;
+    end_s = static_cast<double>(record.tick - first_tick) * manifest.tick_ns * 1e-9;
+    removed += removed_mm3(record, manifest.voxel_mm3);
+    if (record.stale != 0) return;  // nothing was felt in it; the curves go on to the next tick
+    const std::array<double, 5> values{
+        magnitude(record.contact_force_n), magnitude(record.modification_force_n),
+        magnitude(record.commanded_force_n), double{record.penetration_mm}, removed};
+    for (std::size_t i = 0; i < curves.size(); ++i) {
+      // A number that is none would stop the plot; it shows as a gap at zero and in the log.
+      curves[i].envelope.add(end_s, std::isfinite(values[i]) ? values[i] : 0);
+    }
+  });
+  std::ostringstream script;
+  script.precision(9);
+  script << kStyle << "set xrange [0:" << end_s + manifest.tick_ns * 1e-9 << "]\n";
+  for (Curve& curve : curves) {
+    script << '$' << curve.name << " << EOD\n";
+    for (const Envelope::Point& p : curve.envelope.points()) script << p.x << ' ' << p.y << '\n';
+    script << "EOD\n";
+  }
+  script << kPanels;
+  return script.str();
+}
+
+}  // namespace
+
+void plot_forces(const std::filesystem::path& folder, const std::filesystem::path& svg) {
+  write_whole(svg, gnuplot_svg(gnuplot_script(folder)));
+}
+
+}  // namespace kerf

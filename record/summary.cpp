@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "record/summary.hpp"
+
+#include <algorithm>
+#include <iomanip>
+#include <sstream>
+#include <utility>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "record/manifest.hpp"
+#include "record/tick_figures.hpp"
+#include "record/tick_log.hpp"
+
+namespace kerf {
+namespace {
+
+// The one list of figures: name, value. Text and JSON both come from it.
+[[nodiscard]] nlohmann::ordered_json figures(const RecordSummary& s) {
+  return {{"rows", s.rows},
+          {"first_tick", s.first_tick},
+          {"last_tick", s.last_tick},
+          {"seconds", s.seconds},
+          {"lost_ticks", s.lost_ticks},
+          {"contact_ticks", s.contact_ticks},
+          {"stale_ticks", s.stale_ticks},
+          {"faults", s.faults},
+          {"missed_deadlines", s.missed_deadlines},
+          {"peak_force_n", s.peak_force_n},
+          {"deepest_mm", s.deepest_mm},
+          {"removed_mm3", s.removed_mm3},
+          {"end_reason", s.end_reason}};
+}
+
+}  // namespace
+
+RecordSummary summarise(const std::filesystem::path& folder) {
+  const Manifest manifest = read_manifest(folder);
+  TickLogReader log(folder / kTickLogName);
+  RecordSummary out;
+  out.rows = log.rows();
+  out.end_reason = manifest.end_reason;
+  std::uint64_t next_seq = 0;
+  std::uint32_t fault = 0;
+  log.for_each([&](const TickRecord& record) {
+    if (next_seq == 0) {
+      out.first_tick = record.tick;
+    } else if (record.seq > next_seq) {
+      out.lost_ticks += (record.seq - next_seq) / 2;
+    }
+    next_seq = record.seq + 2;
+    out.last_tick = record.tick;
+    out.contact_ticks += (record.flags & kFlagContact) != 0 ? 1 : 0;
+    out.stale_ticks += (record.flags & kFlagStaleInput) != 0 ? 1 : 0;
+    out.faults += record.fault != 0 && record.fault != fault ? 1 : 0;
+    fault = record.fault;
+    out.missed_deadlines = std::max(out.missed_deadlines, record.missed_deadlines);
+    out.peak_force_n = std::max(out.peak_force_n, magnitude(record.commanded_force_n));
+    out.deepest_mm = std::max(out.deepest_mm, double{record.penetration_mm});
+    out.removed_mm3 += removed_mm3(record, manifest.voxel_mm3);
+  });
+  if (out.rows != 0) {
+    out.seconds = static_cast<double>(out.last_tick - out.first_tick + 1) * manifest.tick_ns * 1e-9;
+  }
+  return out;
+}
+
+std::string to_text(const RecordSummary& summary) {
+  std::ostringstream text;
+  const nlohmann::ordered_json list = figures(summary);
+  for (const auto& [name, value] : list.items()) {
+    text << std::left << std::setw(18) << name;
+    if (value.is_string()) {
+      text << value.get<std::string>();
+    } else if (value.is_number_float()) {
+      text << std::setprecision(6) << value.get<double>();
+    } else {
+      text << value.get<std::uint64_t>();
+    }
+    text << '\n';
+  }
+  return text.str();
+}
+
+std::string to_json(const RecordSummary& summary) {
+  return figures(summary).dump(2) + "\n";
+}
+
+}  // namespace kerf

@@ -1,0 +1,335 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "controller/load/scene_load.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <numbers>
+#include <string>
+#include <vector>
+
+#include <doctest/doctest.h>
+
+#include "controller/load/scene_place.hpp"
+#include "controller/plan/compile.hpp"
+#include "lab/rig/loft.hpp"
+#include "tests/scene/support.hpp"
+#include "tests/tool/stl_support.hpp"
+
+namespace {
+
+// A flat block of 20 x 20 x 10 voxels in air.
+constexpr kerf::VoxelGrid kGrid{30, 30, 24};
+constexpr kerf::VoxelBox kBlock{{5, 5, 7}, {25, 25, 17}};
+
+/// A scene with one block of the given voxel edge, and the lines that follow.
+std::filesystem::path block_scene(const kerf::test::TempFolder& folder, double edge_mm,
+                                  const std::string& lines) {
+  static_cast<void>(
+      folder.write("block.nrrd", kerf::test::nrrd(kGrid, {edge_mm, edge_mm, edge_mm},
+                                                  kerf::test::block(kGrid, kBlock, 1000))));
+  return folder.write("scene.toml", "[[volume]]\nfile = \"block.nrrd\"\n" + lines);
+}
+
+const std::string kBall = "[[tool]]\nshape = \"ball\"\nsize_vox = 8\n";
+
+std::string load_error(const std::filesystem::path& scene,
+                       const kerf::SceneOverrides& overrides = {}) {
+  return kerf::test::error_of([&] { static_cast<void>(kerf::load_scene(scene, overrides)); });
+}
+
+bool has(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
+
+}  // namespace
+
+TEST_CASE("all scenes of the project load") {
+  int count = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(KERF_SCENES_DIR)) {
+    if (entry.path().extension() != ".toml") continue;
+    CAPTURE(entry.path());
+    ++count;
+    const kerf::LoadedScene scene =
+        kerf::load_scene(entry.path(), {.phantom_size = kerf::VoxelGrid{64, 64, 40}});
+    CHECK_FALSE(scene.device.torque_scale);  // whose motors they move, they cannot know
+    CHECK(std::filesystem::exists(scene.hand_script));
+    CHECK(scene.device.offset_mm[1] > 2);  // the crown's top, well above the middle of the tooth
+  }
+  CHECK(count >= 4);
+}
+
+TEST_CASE("the default scene is what the hand scripts were written for") {
+  const kerf::LoadedScene scene =
+      kerf::load_scene(std::filesystem::path(KERF_SCENES_DIR) / "phantom.toml");
+  CHECK(scene.volumes.at(0).image.spacing_mm == std::array<double, 3>{0.125, 0.125, 0.125});
+  CHECK(scene.tools.at(0).radius_mm == 1.0);
+  CHECK(scene.tools.at(0).offsets.size() == 2176);
+  CHECK(scene.tools.at(1).offsets.size() == 552);
+  CHECK(kerf::hand_unit_mm(scene) == 1.0);
+  CHECK(kerf::device_stiffness_n_per_mm(scene) == 0.4);
+  CHECK(scene.volumes.at(0).image.labels.size() == scene.volumes.at(0).image.density.size());
+}
+
+TEST_CASE("a volume is windowed, thresholded, cropped and stood up around the origin") {
+  const kerf::test::TempFolder folder;
+  const kerf::LoadedScene scene = kerf::load_scene(block_scene(folder, 0.5, kBall));
+  const kerf::SceneVolume& volume = scene.volumes.at(0);
+  CHECK(volume.name == "block");
+  CHECK(volume.image.grid == kerf::VoxelGrid{26, 26, 16});  // the block and three voxels around
+  CHECK(*std::max_element(volume.image.density.begin(), volume.image.density.end()) == 65535);
+  CHECK(volume.iso > 0);  // between air and block, where Otsu puts it
+  const kerf::WorldBox box = kerf::world_box(volume);
+  CHECK(box.hi_mm[0] == doctest::Approx(6.5));
+  CHECK(box.hi_mm[1] == doctest::Approx(4.0));  // z of the file is up
+  CHECK(box.lo_mm[1] == doctest::Approx(-4.0));
+  CHECK(box.hi_mm[2] == doctest::Approx(6.5));
+  CHECK(scene.tools.at(0).pitch_mm == 0.5);  // the voxel edge
+}
+
+TEST_CASE("the device origin is put on the first surface unless the scene says where") {
+  const kerf::test::TempFolder folder;
+  const kerf::LoadedScene found = kerf::load_scene(
+      block_scene(folder, 0.5, "iso = 0.5\npose = { position_mm = [7, 8, 9] }\n" + kBall));
+  // Half density lies half-way between the block's last voxel and air: 10 voxels are 5 mm.
+  CHECK(found.device.offset_mm[0] == doctest::Approx(7));
+  CHECK(found.device.offset_mm[1] == doctest::Approx(8 + 2.5).epsilon(0.001));
+  CHECK(found.device.offset_mm[2] == doctest::Approx(9));
+  const kerf::LoadedScene given =
+      kerf::load_scene(block_scene(folder, 0.5, kBall + "[device]\noffset_mm = [1, 2, 3]\n"));
+  CHECK(given.device.offset_mm == std::array<double, 3>{1, 2, 3});
+}
+
+TEST_CASE("the first solid volume is touched, not what is only seen") {
+  const kerf::test::TempFolder folder;
+  const kerf::LoadedScene scene = kerf::load_scene(block_scene(
+      folder, 0.5,
+      "solid = false\n[[volume]]\nname = \"felt\"\nfile = \"block.nrrd\"\nspacing_mm = 0.25\n"
+      "pose = { position_mm = [20, 0, 0] }\n" +
+          kBall));
+  CHECK(scene.device.offset_mm[0] == doctest::Approx(20));
+  CHECK(scene.tools.at(0).pitch_mm == 0.25);
+}
+
+TEST_CASE("a volume from the command line is fitted to the hand") {
+  const kerf::test::TempFolder folder;
+  const std::string lines =
+      "[[volume]]\nfile = \"phantom\"\n[[tool]]\nshape = \"ball\"\nsize_vox = 8\n[[tool]]\n"
+      "shape = \"cylinder\"\nradius_mm = 0.5\nlength_mm = 1\n[device]\noffset_mm = [9, 9, 9]\n";
+  for (const double edge_mm : {0.05, 0.5, 3.0}) {
+    CAPTURE(edge_mm);
+    static_cast<void>(block_scene(folder, edge_mm, kBall));
+    const auto base = folder.write("base.toml", lines + "[force]\nmodel = \"paper\"\n");
+    kerf::SceneOverrides overrides;
+    overrides.volume_file = base.parent_path() / "block.nrrd";
+    const kerf::LoadedScene scene = kerf::load_scene(base, overrides);
+
+    const kerf::WorldBox box = kerf::world_box(scene.volumes.at(0));
+    const double scale = scene.device.workspace_scale;
+    double fill = 0;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const double device_mm = (box.hi_mm[axis] - box.lo_mm[axis]) / scale;
+      CHECK(device_mm <= kerf::kWorkspaceMm[axis] * (1 + 1e-12));
+      fill = std::max(fill, device_mm / kerf::kWorkspaceMm[axis]);
+    }
+    CHECK(fill == doctest::Approx(1));  // as large as fits
+    CHECK(scene.device.offset_mm[1] == doctest::Approx(5 * edge_mm).epsilon(0.2));
+
+    // Sizes in voxels stay, sizes in mm were written for the phantom's 0.125 mm.
+    CHECK(scene.tools.at(0).size_vox == std::array<std::int32_t, 3>{8, 8, 8});
+    CHECK(scene.tools.at(0).radius_mm == doctest::Approx(4 * edge_mm));
+    CHECK(scene.tools.at(1).radius_mm == doctest::Approx(4 * edge_mm));
+    CHECK(scene.tools.at(1).length_mm == doctest::Approx(8 * edge_mm));
+
+    // The hand feels the default scene's stiffness, and its script grows with the tool.
+    CHECK(kerf::device_stiffness_n_per_mm(scene) == doctest::Approx(2 * std::numbers::pi * 0.06));
+    CHECK(scene.cut.p1_n_per_mm2 == doctest::Approx(scene.force.p0_n_per_mm2));
+    CHECK(kerf::hand_unit_mm(scene) == doctest::Approx(4 * edge_mm / scale));
+  }
+}
+
+TEST_CASE("a press cuts the same share of the tool's volume in a volume of the command line") {
+  const kerf::test::TempFolder folder;
+  constexpr double kEdgeMm = 0.5, kGrown = 4;  // over the phantom's voxels
+  static_cast<void>(block_scene(folder, kEdgeMm, kBall));
+  const auto base = folder.write("base.toml", "[[volume]]\nfile = \"phantom\"\n" + kBall);
+  kerf::SceneOverrides overrides;
+  overrides.volume_file = base.parent_path() / "block.nrrd";
+  const kerf::LoadedScene fitted = kerf::load_scene(base, overrides);
+  const kerf::LoadedScene plain;
+  const double scale = fitted.device.workspace_scale;
+
+  // Of a hand's newton, over the threshold: tool volumes per second.
+  const auto share = [](const kerf::LoadedScene& scene, double device_n) {
+    const double force_n = device_n / scene.device.workspace_scale - scene.cut.threshold_n;
+    return scene.cut.machinability_mm3_per_s_n * force_n;
+  };
+  CHECK(share(fitted, 0.3) / (kGrown * kGrown * kGrown) == doctest::Approx(share(plain, 0.3)));
+  // Torque goes with force and radius, and the run-up with inertia over torque.
+  CHECK(fitted.spindle.stall_torque_n_mm * scale / kGrown ==
+        doctest::Approx(plain.spindle.stall_torque_n_mm));
+  CHECK(fitted.spindle.inertia_g_mm2 / fitted.spindle.stall_torque_n_mm ==
+        doctest::Approx(plain.spindle.inertia_g_mm2 / plain.spindle.stall_torque_n_mm));
+  CHECK(kerf::device_stiffness_n_per_mm(fitted) == kerf::device_stiffness_n_per_mm(plain));
+}
+
+TEST_CASE("power is kept between hand and scene: F dx is the same on both sides") {
+  // K_device = s^2 K_scene: twice the scale, a quarter of p0, the same stiffness at the hand.
+  kerf::LoadedScene scene;
+  scene.force.model = kerf::ForceModel::paper;
+  scene.tools.emplace_back();
+  const double at_one = kerf::device_stiffness_n_per_mm(scene);
+  scene.device.workspace_scale = 2;
+  scene.force.p0_n_per_mm2 /= 4;
+  CHECK(kerf::device_stiffness_n_per_mm(scene) == doctest::Approx(at_one));
+  CHECK(kerf::hand_unit_mm(scene) == 0.5);
+}
+
+TEST_CASE("options of the command line change the scene") {
+  const kerf::test::TempFolder folder;
+  const auto path =
+      block_scene(folder, 0.5, kBall + "[cut]\nmodel = \"overlap\"\nrate_per_s = \"1/T\"\n");
+  kerf::SceneOverrides overrides;
+  overrides.rate_hz = 4000;
+  overrides.numeric = kerf::NumericKind::float32;
+  overrides.spacing_mm = {0.2, 0.3, 0.4};
+  overrides.window = {0, 2000};
+  const kerf::LoadedScene scene = kerf::load_scene(path, overrides);
+  CHECK(scene.servo.rate_hz == 4000);
+  CHECK(scene.cut.rate_per_s == 4000);  // the paper's step follows the rate
+  CHECK(scene.servo.numeric == kerf::NumericKind::float32);
+  CHECK(scene.volumes.at(0).image.spacing_mm == std::array<double, 3>{0.2, 0.3, 0.4});
+  const auto& density = scene.volumes.at(0).image.density;
+  CHECK(*std::max_element(density.begin(), density.end()) == 32768);  // 1000 of 2000
+  CHECK(kerf::load_scene(path).cut.rate_per_s == 1000);
+}
+
+TEST_CASE("bad options are refused in one line") {
+  const kerf::test::TempFolder folder;
+  const auto path = block_scene(folder, 0.5, kBall);
+  CHECK(has(load_error(path, {.rate_hz = 10}), "--rate 10 is out of range; use 250 to 8000"));
+  CHECK(has(load_error(path, {.window = std::array{3.0, 3.0}}), "--window is empty"));
+  CHECK(has(load_error(path, {.spacing_mm = std::array{0.0, 1.0, 1.0}}), "--spacing"));
+  const auto phantom = folder.write("p.toml", "[[volume]]\nfile = \"phantom\"\n" + kBall);
+  CHECK(has(load_error(phantom, {.spacing_mm = std::array{1.0, 1.0, 1.0}}),
+            "--spacing: the phantom"));
+  kerf::SceneOverrides missing;
+  missing.volume_file = "/nowhere/ct.nrrd";
+  CHECK(load_error(phantom, missing).rfind("--volume: ", 0) == 0);
+}
+
+TEST_CASE("a volume that cannot be used is reported with the line that names it") {
+  const kerf::test::TempFolder folder;
+  const auto missing = folder.write("m.toml", "\n[[volume]]\nfile = \"gone.nrrd\"\n" + kBall);
+  CHECK(has(load_error(missing), "m.toml:3: "));
+  CHECK(has(load_error(missing), "gone.nrrd"));
+
+  static_cast<void>(
+      folder.write("cut.nrrd", kerf::test::nrrd(kGrid, {1, 1, 1}, std::vector<kerf::Density>(10))));
+  const auto truncated = folder.write("t.toml", "[[volume]]\nfile = \"cut.nrrd\"\n" + kBall);
+  CHECK(has(load_error(truncated), "t.toml:2: "));
+
+  const auto nothing = block_scene(folder, 0.5, "window = [5000, 6000]\niso = 0.5\n" + kBall);
+  CHECK(has(load_error(nothing), "scene.toml:2: "));
+
+  const auto far = block_scene(folder, 0.5, "pose = { position_mm = [9999, 0, 0] }\n" + kBall);
+  CHECK(has(load_error(far), "mm from the origin"));
+  for (const auto& path : {missing, truncated, nothing, far}) {
+    CHECK(load_error(path).find('\n') == std::string::npos);
+  }
+}
+
+TEST_CASE("a tool that does not suit the volume is reported with its line and the numbers") {
+  const kerf::test::TempFolder folder;
+  const auto error_with = [&](const std::string& lines) {
+    return load_error(block_scene(folder, 0.125, "[[tool]]\n" + lines));
+  };
+  CHECK(has(error_with("shape = \"ball\"\nradius_mm = 0.02\n"),
+            "scene.toml:5: tool.radius_mm = 0.02 is below half a voxel (0.0625); use a larger "
+            "radius or a finer volume"));
+  CHECK(has(error_with("shape = \"ball\"\nsize_vox = 65\n"),
+            "scene.toml:5: tool.size_vox = 65 makes a tool of 65 samples along a side, above the "
+            "limit of 64"));
+  CHECK(has(error_with("shape = \"ball\"\nradius_mm = 999\n"), "above the limit of 64"));
+  CHECK(
+      has(error_with("shape = \"cylinder\"\nradius_mm = 0.5\nlength_mm = 9\n"),
+          "makes a tool of 72 samples along its length, above the limit of 64; use a smaller tool "
+          "or a coarser volume"));
+  CHECK(
+      has(error_with("shape = \"ball\"\nradius_mm = 1\npitch_mm = 0.01\n"),
+          "makes a tool of 201 samples along a side, above the limit of 64; use a smaller tool or "
+          "a coarser pitch"));
+  CHECK(
+      has(error_with("shape = \"ball\"\nsize_vox = 16\npitch_mm = 0.001\n"),
+          "scene.toml:5: tool.size_vox = 16 makes a tool of 0.016 mm, below a voxel (0.125); use a "
+          "larger one or a larger pitch_mm"));
+  CHECK(
+      has(error_with("shape = \"ball\"\nsize_vox = 30\n"),
+          "scene.toml:5: tool.size_vox = 30 makes a tool of 3.75 mm, larger than the volume (3.25 "
+          "mm); use a smaller tool"));
+  CHECK(has(error_with("shape = \"ball\"\nsize_vox = 8\npitch_mm = 0.2\n"),
+            "scene.toml:6: tool.pitch_mm = 0.2 is above the smallest voxel edge and leaves gaps; "
+            "use at most 0.125"));
+}
+
+TEST_CASE("a mesh that does not suit the volume is reported with what to do about it") {
+  const kerf::test::TempFolder folder;
+  const auto error_of = [&](std::vector<kerf::LooseTriangle> triangles, double aside,
+                            const char* lines) {
+    for (kerf::LooseTriangle& t : triangles) {
+      for (auto& corner : t) corner[2] += static_cast<float>(aside);
+    }
+    static_cast<void>(folder.write("bur.stl", kerf::test::text_stl(triangles)));
+    return load_error(block_scene(
+        folder, 0.125, "[[tool]]\nshape = \"stl\"\nfile = \"bur.stl\"\n" + std::string(lines)));
+  };
+  const auto bar = kerf::extremes::prism(0.5, 1, 4);
+  CHECK(error_of(bar, 0, "").empty());
+  CHECK(error_of(bar, 0.4, "").empty());  // askew, but around its axis
+  CHECK(has(
+      error_of(bar, 2, ""),
+      "scene.toml:5: tool.file = \"bur.stl\" lies beside its axis, the file's y: z goes from "));
+  CHECK(has(error_of(bar, 2, ""), " mm; move the mesh so that the spindle's axis is at x = z = 0"));
+  CHECK(has(error_of(bar, 0, "scale = 30\n"),
+            " samples along a side, above the limit of 64; use a smaller scale (mm per unit of the "
+            "file) or a coarser volume"));
+  CHECK(has(error_of(bar, 0, "scale = 5\n"), " mm); use a smaller scale"));
+  // What was computed is told in six digits.
+  CHECK(has(error_of(bar, 0, "scale = 0.1\n"), "reaches less than half a voxel (0.0625 mm)"));
+}
+
+TEST_CASE("a tool with more surface than contact can read is reported with the scene and count") {
+  const kerf::test::TempFolder folder;
+  kerf::LoadedScene scene =
+      kerf::load_scene(block_scene(folder, 0.125, "[[tool]]\nshape = \"ball\"\nradius_mm = 1.5\n"));
+  scene.tools[0].radius_mm = 150;
+  scene.tools[0].length_mm = 300;
+  const std::string error =
+      kerf::test::error_of([&] { static_cast<void>(kerf::plan_scene(scene)); });
+  CAPTURE(error);
+  CHECK(has(error, "scene.toml: tool 'ball 1.5 mm': "));
+  CHECK_FALSE(has(error, "e+"));
+}
+
+TEST_CASE("real volumes load with any scene, by their size in voxels") {
+  const char* data = std::getenv("KERF_DATA");
+  if (data == nullptr) {
+    MESSAGE(
+        "skipped without KERF_DATA: ge_tooth_16bit/tooth.nhdr, ct_spine_pelvis/example_ct.nii.gz");
+    return;
+  }
+  const auto scene_path = std::filesystem::path(KERF_SCENES_DIR) / "phantom.toml";
+  for (const std::string file :
+       {"ge_tooth_16bit/tooth.nhdr", "ct_spine_pelvis/example_ct.nii.gz"}) {
+    CAPTURE(file);
+    kerf::SceneOverrides overrides;
+    overrides.volume_file = std::filesystem::path(data) / file;
+    const kerf::LoadedScene scene = kerf::load_scene(scene_path, overrides);
+    CHECK(scene.tools.at(0).offsets.size() == 2176);
+    MESSAGE(file << ": scale " << scene.device.workspace_scale << ", iso " << scene.volumes[0].iso
+                 << ", offset y " << scene.device.offset_mm[1] << ", hand unit "
+                 << kerf::hand_unit_mm(scene) << ", machinability "
+                 << scene.cut.machinability_mm3_per_s_n);
+  }
+}

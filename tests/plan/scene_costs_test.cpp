@@ -1,0 +1,409 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a scene is said to cost, against counts of what is really done and really there.
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <cstdlib>
+#include <set>
+#include <string>
+#include <vector>
+
+#include <doctest/doctest.h>
+
+#include "controller/kernel/contact.hpp"
+#include "controller/kernel/overlap.hpp"
+#include "controller/kernel/splat.hpp"
+#include "controller/plan/aligned_tool.hpp"
+#include "controller/plan/cost/work_budget.hpp"
+#include "controller/plan/plan_cost.hpp"
+#include "controller/plan/sample_tool.hpp"
+#include "controller/plan/stage_timing.hpp"
+#include "controller/plan/tick_memory.hpp"
+#include "controller/scene/scene_file.hpp"
+#include "tests/plan/costs_support.hpp"
+
+using namespace kerf;
+using namespace kerf::test;
+
+namespace {
+
+std::uint64_t operations(const PlanCost& cost, const std::string& stage) {
+  for (const StageCost& s : cost.stages) {
+    if (s.stage == stage) return s.operations;
+  }
+  return 0;
+}
+
+/// A sum that counts the products which it was made of.
+struct Counted {
+  static inline std::uint64_t products = 0;
+  Counted() = default;
+  explicit Counted(double) {}
+  friend Counted operator*(Counted, Counted) {
+    ++products;
+    return {};
+  }
+  Counted& operator+=(Counted) { return *this; }
+};
+struct CountingNumbers : DoubleNumbers {
+  using Sum = Counted;
+};
+
+std::set<std::string> names(const std::vector<ArrayBytes>& arrays) {
+  std::set<std::string> set;
+  for (const ArrayBytes& array : arrays) {
+    CHECK(array.bytes > 0);
+    set.insert(array.name);
+  }
+  return set;
+}
+
+}  // namespace
+
+TEST_CASE("the voxels that a tick copies are those that are written") {
+  const std::vector<Density> air(std::size_t{64} * 64 * 64, 7);
+  for (const int size : {3, 10, 16}) {
+    const SceneTool tool = ball(size);
+    const AlignedTool aligned(tool.offsets, kExactFarid, kScalarSet);
+    BoxMemory memory;
+    memory.hold(aligned.table().size, false);
+    const BoxScratch scratch = memory.view();
+    const std::size_t room = box_scratch_size(aligned.table().size).box;
+    std::fill_n(scratch.box, room, std::int16_t{1});
+    kScalarSet.copy_box(aligned.table(), {64, 64, 64}, air.data(), {20, 20, 20}, scratch);
+    const auto written = std::count(scratch.box, scratch.box + room, std::int16_t(7 - 32768));
+    CHECK(operations(aligned_cost(aligned.table(), kScalarSet, CutModel::none), "copy") ==
+          static_cast<std::uint64_t>(written));
+  }
+}
+
+TEST_CASE("the multiply-adds of a correlation are those of its chunks, and cover the table") {
+  for (auto set = kernel_sets(); *set != nullptr; ++set) {
+    for (const int size : {3, 10, 16, 40}) {
+      const SceneTool tool = ball(size);
+      const AlignedTool aligned(tool.offsets, kExactFarid, **set);
+      const AlignedTable& table = aligned.table();
+      std::uint64_t visited = 0, filled = 0;  // table entries, as the kernel walks over them
+      for (std::size_t list = 0; list < 3; ++list) {
+        for (std::int32_t i = 0; i < table.chunk_count[list]; ++i) {
+          const std::int16_t* run = table.vectors + table.chunks[list][i].vector;
+          const std::int32_t entries = (table.fused ? 6 : 2) * table.lanes;
+          for (std::int32_t entry = 0; entry < entries; ++entry, ++visited) {
+            if (run[entry] != 0) ++filled;
+          }
+        }
+      }
+      const PlanCost cost = aligned_cost(table, **set, CutModel::overlap_exact);
+      CHECK(operations(cost, "contact") == 8 * visited);
+      CHECK(filled > visited / 4);  // the lists leave the zeros out, else the count were idle
+
+      std::uint64_t mill = 0;  // the loops of the kernel, one count an entry and operation
+      for (std::int32_t z = 0; z <= table.size.z; ++z) {
+        for (std::int32_t y = 0; y <= table.size.y + 4; ++y) {
+          for (std::int32_t x = 0; x < table.row_lanes; ++x) {
+            mill += 5 + 5;                          // along z: smooth and slope
+            if (y > table.size.y) continue;         // rows of ratios
+            mill += 8 + (5 + 5) + (5 + 5 + 5) + 3;  // masks, x, y, products
+            mill += 1;                              // removal
+          }
+        }
+      }
+      CHECK(operations(cost, "mill") == mill);
+      const auto edge = static_cast<std::uint64_t>(size) + 1;
+      CHECK(operations(cost, "bend") == edge * edge * edge);
+      CHECK(operations(aligned_cost(table, **set, CutModel::overlap), "bend") == 0);
+      CHECK(operations(aligned_cost(table, **set, CutModel::none), "mill") == 0);
+    }
+  }
+}
+
+TEST_CASE("the corners that a contact visits are the products of its sum") {
+  const SceneVolume block = full_block(64);
+  const std::vector<Gradient<CountingNumbers>> field(block.image.density.size());
+  for (const SceneTool& tool : {shape("cone", 0.6, 2), shape("wheel", 1, 0.5)}) {
+    ToolPose<CountingNumbers> pose;
+    pose.centre_vox = {32.3, 31.8, 30.5};
+    for (std::size_t i = 0; i < 3; ++i) pose.step[i][i] = 1;
+    Counted::products = 0;
+    static_cast<void>(contact_sum<CountingNumbers>(
+        block.image.grid, std::span<const Gradient<CountingNumbers>>(field), tool.offsets, pose));
+    CHECK(3 * operations(gather_cost(NumericKind::fixed, kScalarSet, tool, block, CutModel::none),
+                         "contact") ==
+          Counted::products);
+  }
+}
+
+TEST_CASE("a splatting tick does no more than it is said to, in any pose and any volume") {
+  std::srand(4);
+  for (const int edge : {64, 8}) {  // wider than the tool, and narrower
+    SceneVolume block = full_block(edge);
+    for (const SceneTool& tool :
+         {shape("cylinder", 0.5, 4), shape("wheel", 1, 0.5), shape("flame", 0.6, 3)}) {
+      const SampleTool samples(tool.offsets, SampleOrder::scattered);
+      SplatMemory memory;
+      const std::size_t width = overlap_width(tool.size_vox, kVoxelMm, kVoxelMm);
+      memory.hold({width, width, width}, tool.offsets.size());
+      const SplatScratch scratch = memory.view();
+      const PlanCost cost = splat_cost(kScalarSet, tool, block, CutModel::overlap_exact);
+      CHECK(operations(cost, "place") == 9 * tool.offsets.size());
+      CHECK(operations(cost, "splat") == 8 * tool.offsets.size());
+      const std::array loops{"copy", "press", "bend", "cut"};
+      std::array<std::uint64_t, 4> most{};
+      for (int i = 0; i < 2000; ++i) {
+        ToolPose<FixedNumbers> pose;
+        pose.centre_vox = {Q16(edge / 2.0 + i % 7 * 0.13), Q16(edge / 2.0 + i % 11 * 0.09),
+                           Q16(edge / 2.0)};
+        const Matrix turn = random_turn();
+        for (std::size_t a = 0; a < 3; ++a) {
+          for (std::size_t b = 0; b < 3; ++b) pose.step[a][b] = step_of<FixedNumbers>(turn[a][b]);
+        }
+        const SplatTick tick(kScalarSet, samples.table(), kExactFarid, scratch, block.image.grid,
+                             block.image.density, pose);
+        const TickBox& box = tick.box();
+        const auto product = [](std::int32_t x, std::int32_t y, std::int32_t z) {
+          return static_cast<std::uint64_t>(x) * static_cast<std::uint64_t>(y) *
+                 static_cast<std::uint64_t>(z);
+        };
+        const std::int32_t x = box.size.x + 1, y = box.size.y + 1, z = box.size.z + 1;
+        const std::array done{product(box.box.x, box.box.y, box.box.z),
+                              8 * product(box.row_lanes, y, z), product(x, y, z),
+                              product(box.row_lanes, y, z)};
+        for (std::size_t k = 0; k < done.size(); ++k) most[k] = std::max(most[k], done[k]);
+      }
+      CAPTURE(tool.name);
+      for (std::size_t k = 0; k < most.size(); ++k) {
+        CAPTURE(loops[k]);
+        CHECK(most[k] <= operations(cost, loops[k]));
+        CHECK(static_cast<double>(most[k]) > 0.7 * static_cast<double>(operations(cost, loops[k])));
+      }
+    }
+  }
+}
+
+TEST_CASE("a gathering tick that cuts works on no more voxels than it is said to") {
+  const auto voxels = [](const VoxelBox& box) {
+    const VoxelIndex size = box.extent();
+    return VoxelGrid{size.x, size.y, size.z}.voxel_count();
+  };
+  std::srand(3);
+  for (const int edge : {64, 8}) {
+    const SceneVolume block = full_block(edge);
+    for (const SceneTool& tool : {shape("cylinder", 0.5, 4), shape("wheel", 1.5, 0.8),
+                                  shape("flame", 0.6, 3), shape("cylinder", 1, 2)}) {
+      const PlanCost cost =
+          gather_cost(NumericKind::float64, kScalarSet, tool, block, CutModel::overlap);
+      // A sample's place twice, its weights and their sums; the rest of `overlap` are voxels.
+      const std::uint64_t spread = (2 * 9 + 2 * 8) * tool.offsets.size();
+      std::vector<double> memory(std::size_t{50} * 50 * 50);
+      std::uint64_t overlapped = 0, cut = 0, refreshed = 0;
+      for (int i = 0; i < 3000; ++i) {
+        ToolPose<DoubleNumbers> pose;
+        pose.centre_vox = {edge / 2.0 + i % 7 * 0.13, edge / 2.0 + i % 11 * 0.09, edge / 2.0};
+        pose.step = random_turn();
+        OverlapBox<DoubleNumbers> box{memory, {}, 0};
+        const VoxelBox inside =
+            overlap<DoubleNumbers>(block.image.grid, tool.offsets, pose, 1, box);
+        overlapped = std::max(overlapped, voxels(box.box));
+        cut = std::max(cut, voxels(inside));
+        refreshed = std::max(refreshed,
+                             voxels(inside.grown(kGradientReach).clipped(block.image.grid.box())));
+      }
+      CAPTURE(tool.name);
+      CAPTURE(edge);
+      CHECK(spread + overlapped <= operations(cost, "overlap"));
+      CHECK(cut <= operations(cost, "modification"));
+      CHECK(cut <= operations(cost, "removal"));
+      CHECK(refreshed <= operations(cost, "refresh"));
+      CHECK(double(cut) > 0.7 * double(operations(cost, "removal")));
+    }
+  }
+}
+
+TEST_CASE("a scene is planned with what the servo allows the probes of a tick") {
+  ShellTable<FixedNumbers> shell;
+  shell.count = 500;
+  shell.groups = 32;
+  shell.round = true;
+  CHECK(probe_work(shell, 2).probe == 2 * (512 + 128));
+  CHECK(probe_work(shell, 2).closer == 2 * (96 + 128 + 256));
+  CHECK(probe_work(shell, 2).turn == 2 * 62);
+  shell.round = false;
+  CHECK(probe_work(shell, 1).probe == 512 + 128);
+  CHECK(probe_work(shell, 1).closer == 2 * (128 + 2 * 256) + 2 * (128 + 64));
+  const auto most = [](std::int64_t probe, std::int64_t closer, std::int64_t turn) {
+    return ProbeWork{probe, closer, turn}.most();
+  };
+  CHECK(most(300, 100, 50) == 32 * 400 + 13 * 50);
+  CHECK(most(900, 100, 90) == 18000);
+  CHECK(most(2000, 200, 200) == 12 * 2200);
+  CHECK(most(900, 3200, 90) == 18000 + 990);
+
+  LoadedScene scene = half_space_scene(48);
+  scene.tools = {shape("wheel", 2, 1)};
+  const auto probes_of = [&] {
+    return operations(plan_scene(scene)->costs().ticks.front().cost, "probes");
+  };
+  const std::uint64_t alone = probes_of();
+  scene.volumes.push_back(scene.volumes.front());
+  scene.volumes.back().name = "other";
+  CHECK(2 * probes_of() >= alone);  // of both together
+  CHECK(probes_of() <= alone);
+}
+
+TEST_CASE("every stage of every plan has a price, on machines of all kinds") {
+  const SceneVolume block = full_block(32);
+  const SceneTool cone = shape("cone", 0.6, 2);
+  for (const char* name : {"avx512", "avx2", "neon", "scalar"}) {
+    KernelSet set = kScalarSet;  // prices go by name
+    set.name = name;
+    const AlignedTool aligned(ball(10).offsets, kExactFarid, set);
+    for (const CutModel cut :
+         {CutModel::none, CutModel::overlap, CutModel::overlap_exact, CutModel::preston}) {
+      CHECK(work_us(aligned_cost(aligned.table(), set, cut)) > 0);
+      CHECK(work_us(splat_cost(set, cone, block, cut)) > 0);
+      const bool gathers = cut == CutModel::none;  // fixed point, where nothing is cut
+      if (gathers) CHECK(work_us(gather_cost(NumericKind::fixed, set, cone, block, cut)) > 0);
+      CHECK(work_us(gather_cost(NumericKind::float32, set, cone, block, cut)) > 0);
+      CHECK(work_us(gather_cost(NumericKind::float64, set, cone, block, cut)) > 0);
+    }
+  }
+}
+
+TEST_CASE("every stage is timed, and does there no more than it is said to") {
+  for (const auto numeric : {NumericKind::fixed, NumericKind::float32, NumericKind::float64}) {
+    for (const auto cut :
+         {CutModel::none, CutModel::overlap, CutModel::overlap_exact, CutModel::preston}) {
+      LoadedScene scene = half_space_scene(48);
+      if (cut != CutModel::preston) scene.force.model = ForceModel::paper;
+      scene.tools.push_back(shape("cone", 0.6, 2));
+      scene.cut.model = cut;
+      scene.cut.rate_per_s = 0;  // timed all the same
+      scene.servo.numeric = numeric;
+      const auto servo = compile(scene);
+      const auto& ticks = servo->costs().ticks;
+      REQUIRE(ticks.size() == 2);
+      for (std::size_t i = 0; i < ticks.size(); ++i) {
+        const std::vector<StageCost>& stages = ticks[i].cost.stages;
+        const std::vector<StageTime> timed = servo->time_stages(i);
+        REQUIRE(timed.size() == stages.size());
+        for (std::size_t s = 0; s < stages.size(); ++s) {
+          CAPTURE(stages[s].stage);
+          CHECK(timed[s].operations > 0);
+          CHECK(timed[s].operations <= stages[s].operations);
+        }
+      }
+    }
+  }
+}
+
+TEST_CASE("a tool is timed where it has most density around it, wherever its centre is") {
+  // Only the lower half along y is full, and the tool lies wholly above its centre.
+  const SceneVolume half = volume_of(64, kVoxelMm, [](double, double y, double) { return y; });
+  const VoxelIndex at =
+      densest_place(half.image.grid, half.image.density, {{-3, 4, -3}, {4, 20, 4}});
+  const auto full = [&](std::int32_t y) {
+    return half.image.grid.contains({at.x, y, at.z}) &&
+           half.image.density[half.image.grid.index(at.x, y, at.z)] != 0;
+  };
+  CHECK(full(at.y + 5));
+  CHECK(full(at.y + 18));
+}
+
+TEST_CASE("a scene above the budget is refused on one line, and fits at a lower rate") {
+  LoadedScene scene = paper_scene(48);
+  scene.path = "scenes/x.toml";
+  scene.cut.model = CutModel::overlap;
+  scene.tools.push_back(shape("cylinder", 2, 4));
+  scene.tools.back().name = "stub";
+  scene.servo.rate_hz = 8000;
+  const std::string line = over_budget(scene, plan_scene(scene)->costs());
+  CHECK(line.find("scenes/x.toml: tool stub: up to ") == 0);
+  CHECK(line.find(" by plan splat/") != std::string::npos);
+  CHECK(line.find(" us of work a tick, most of it press (") != std::string::npos);
+  const double stub_us = work_us(plan_scene(scene)->costs(), 1);
+  const int highest_hz = highest_rate_hz(stub_us);
+  CHECK(line.find(", above the 62.5 us that are half a tick at 8000 Hz; use --rate " +
+                  std::to_string(highest_hz) +
+                  " or lower, a smaller tool, or a round or unturned tool on the volume's "
+                  "lattice") != std::string::npos);
+  CHECK(line.find('\n') == std::string::npos);
+  scene.servo.rate_hz = highest_hz;
+  CHECK(over_budget(scene, plan_scene(scene)->costs()).empty());
+  scene.servo.rate_hz = highest_hz + 1;
+  CHECK_FALSE(over_budget(scene, plan_scene(scene)->costs()).empty());
+  // Of several the costliest decides, wherever it stands; the others are named.
+  scene.servo.rate_hz = 8000;
+  scene.tools.push_back(shape("cylinder", 2.5, 5));
+  scene.tools.back().name = "stump";
+  const std::string two = over_budget(scene, plan_scene(scene)->costs());
+  CHECK(two.find("scenes/x.toml: tool stump: ") == 0);
+  CHECK(two.find(" a smaller tool (too dear as well: stub), or a round") != std::string::npos);
+  scene.tools.pop_back();
+  scene.tools.pop_back();
+  CHECK(over_budget(scene, plan_scene(scene)->costs()).empty());
+  // What fits one volume need not fit two: the refusal names both.
+  scene.tools.push_back(shape("cylinder", 0.5, 2));
+  const double alone_us = work_us(plan_scene(scene)->costs(), 1);
+  scene.servo.rate_hz = static_cast<int>(1e6 * kBudgetShare / (1.5 * alone_us));
+  CHECK(over_budget(scene, plan_scene(scene)->costs()).empty());
+  scene.volumes.push_back(scene.volumes.front());
+  scene.volumes.back().name = "other";
+  const SceneCosts both = plan_scene(scene)->costs();
+  const std::string why = over_budget(scene, both);
+  CHECK(why.find(" in test ") != std::string::npos);
+  CHECK(why.find(", in other ") != std::string::npos);
+  CHECK(work_us(both, 1) == doctest::Approx(2 * alone_us));
+  scene.volumes.pop_back();
+  scene.tools.pop_back();
+  scene.tools.push_back(shape("cylinder", 0.5, 1));
+  scene.servo.rate_hz = 250;
+  CHECK(over_budget(scene, plan_scene(scene)->costs()).empty());
+}
+
+TEST_CASE("where probes cost most no other plan is advised, and in floating point other numbers") {
+  LoadedScene scene = half_space_scene(48);
+  scene.path = "scenes/x.toml";
+  scene.tools = {shape("wheel", 2, 1)};
+  scene.servo.rate_hz = 8000;
+  const auto refusal = [&] { return over_budget(scene, plan_scene(scene)->costs()); };
+  CHECK(refusal().find(" most of it probes (") != std::string::npos);
+  CHECK(refusal().ends_with(" or lower, or a smaller tool"));
+  scene.servo.numeric = NumericKind::float64;
+  CHECK(refusal().ends_with(" or lower, a smaller tool, or fixed numbers"));
+  CHECK(highest_rate_hz(10) == kMaxRateHz);
+  CHECK(highest_rate_hz(200) == 2500);
+  CHECK(highest_rate_hz(2001) == 0);  // 249.9 Hz are not offered
+}
+
+TEST_CASE("a scene holds the arrays that it names, and no others") {
+  using Names = std::set<std::string>;
+  const auto arrays_of = [](LoadedScene scene) { return names(compile(scene)->costs().arrays); };
+  LoadedScene touch = paper_scene(32);
+  CHECK(arrays_of(touch) ==
+        Names{"density of test", "samples of ball", "table of ball", "box", "columns inside"});
+  LoadedScene cut = touch;
+  cut.cut.model = CutModel::overlap;
+  CHECK(arrays_of(cut) == Names{"density of test", "carry of test", "samples of ball",
+                                "table of ball", "box", "columns inside", "overlap ratios",
+                                "filtered rows", "live rows"});
+  LoadedScene odd = touch;
+  odd.tools = {shape("cone", 0.6, 2)};
+  CHECK(arrays_of(odd) ==
+        Names{"density of test", "gradient of test", "samples of cone", "ordered samples of cone"});
+  LoadedScene odd_cut = odd;
+  odd_cut.cut.model = CutModel::overlap;
+  odd_cut.volumes[0].image.labels.assign(odd_cut.volumes[0].image.density.size(), 1);
+  CHECK(arrays_of(odd_cut) ==
+        Names{"density of test", "labels of test", "carry of test", "samples of cone",
+              "ordered samples of cone", "box", "columns inside", "overlap ratios", "filtered rows",
+              "live rows", "sample places", "overlap sums", "rest rows", "live rest rows"});
+  LoadedScene floating = odd_cut;
+  floating.servo.numeric = NumericKind::float64;
+  CHECK(arrays_of(floating) == Names{"density of test", "labels of test", "gradient of test",
+                                     "carry of test", "samples of cone", "overlap box",
+                                     "refresh planes"});
+  odd_cut.tools[0].turns = false;
+  const Names unturned = arrays_of(odd_cut);
+  CHECK(unturned.count("ordered samples of cone") == 0);
+  CHECK(unturned.count("table of cone") == 1);
+}

@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: Apache-2.0
+// The rates that the README promises of each shipped scene, against what the budget takes.
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <string>
+#include <vector>
+
+#include <doctest/doctest.h>
+
+#include "controller/load/scene_load.hpp"
+#include "controller/plan/compile.hpp"
+#include "controller/plan/cost/work_budget.hpp"
+
+using namespace kerf;
+
+namespace {
+
+namespace fs = std::filesystem;
+
+const fs::path kScenes = KERF_SCENES_DIR;
+
+/// Cells of a row of a Markdown table, without blanks and backquotes; none of another line.
+std::vector<std::string> cells_of(const std::string& line) {
+  std::vector<std::string> cells;
+  if (!line.starts_with("|")) return cells;
+  for (const char c : line) {
+    if (c == '|') cells.emplace_back();
+    if (c != '|' && c != ' ' && c != '`') cells.back() += c;
+  }
+  cells.pop_back();  // behind the last bar
+  return cells;
+}
+
+/// kHz by scene, then by name of a kernel set.
+using Promises = std::map<std::string, std::map<std::string, double>>;
+
+Promises read_promises() {
+  std::ifstream file(kScenes.parent_path() / "README.md");
+  std::vector<std::string> sets;
+  Promises promises;
+  for (std::string line; std::getline(file, line);) {
+    const std::vector<std::string> cells = cells_of(line);
+    if (cells.size() < 2) {
+      sets.clear();
+    } else if (cells[0] == "kHz") {
+      sets = cells;
+    } else if (!sets.empty() && cells[0].ends_with(".toml")) {
+      REQUIRE(cells.size() == sets.size());
+      for (std::size_t i = 1; i < cells.size(); ++i) {
+        promises[cells[0]][sets[i]] = std::stod(cells[i]);
+      }
+    }
+  }
+  return promises;
+}
+
+}  // namespace
+
+TEST_CASE("each shipped scene is taken at the rates that the README says, refused at the next") {
+  const Promises promises = read_promises();
+  std::size_t scenes = 0;
+  for (const auto& entry : fs::directory_iterator(kScenes)) {
+    if (entry.path().extension() != ".toml") continue;
+    ++scenes;
+    const std::string name = "scenes/" + entry.path().filename().string();
+    CAPTURE(name);
+    REQUIRE(promises.contains(name));
+    LoadedScene scene = load_scene(entry.path());
+    for (auto set = kernel_sets(); *set != nullptr; ++set) {
+      const auto promised = promises.at(name).find((*set)->name);
+      if (promised == promises.at(name).end()) continue;  // NEON's prices are guesses
+      CAPTURE(promised->first);
+      const auto servo = plan_scene(scene, **set);
+      for (const double khz : {0.5, 1.0, 2.0, 4.0, 8.0}) {
+        CAPTURE(khz);
+        scene.servo.rate_hz = static_cast<int>(1000 * khz);
+        CHECK(over_budget(scene, servo->costs()).empty() == (khz <= promised->second));
+      }
+    }
+  }
+  CHECK(promises.size() == scenes);
+}
+
+TEST_CASE("the fast scene cuts at 8 kHz, the default scene's tools run at 4 kHz") {
+  const Promises promises = read_promises();
+  for (const char* set : {"avx512", "avx2"}) {
+    CHECK(promises.at("scenes/fast.toml").at(set) == 8);
+    CHECK(promises.at("scenes/phantom.toml").at(set) == 4);
+  }
+  CHECK(load_scene(kScenes / "fast.toml", {.phantom_size = VoxelGrid{64, 64, 40}}).servo.rate_hz ==
+        8000);
+}

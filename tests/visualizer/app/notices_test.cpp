@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "visualizer/app/notices.hpp"
+
+#include <doctest/doctest.h>
+
+using namespace kerf;
+
+namespace {
+
+/// The banner of a picture at `now`.
+OverlayFigures shown(const Notices& notices, Notices::Clock::time_point now, bool hidden = false) {
+  OverlayFigures figures;
+  figures.banner = "stale";
+  figures.hidden = hidden;
+  notices.show(figures, now);
+  return figures;
+}
+
+}  // namespace
+
+TEST_CASE("the last notice takes the banner for a while, then what was there is back") {
+  const Notices::Clock::time_point start{};
+  const auto later = start + std::chrono::hours(1);
+  Notices notices;
+  CHECK(shown(notices, later).banner == "stale");
+  notices.say({"screenshot: a.png"}, later);
+  notices.say({"screenshot: b.png"}, later);
+  CHECK(shown(notices, later).banner == "screenshot: b.png");
+  CHECK_FALSE(shown(notices, later).alarm);
+  CHECK(shown(notices, later + Notices::kShownFor).banner == "stale");
+  notices.clear();
+  CHECK(shown(notices, later).banner == "stale");
+}
+
+TEST_CASE("with the panels hidden a notice shows only where it is a problem") {
+  const auto now = Notices::Clock::time_point{} + std::chrono::hours(1);
+  Notices notices;
+  notices.say({"surface: a.ply"}, now);
+  CHECK(shown(notices, now, true).banner == "stale");
+  notices.say({"a.ply: no room", true}, now);
+  CHECK(shown(notices, now, true).banner == "a.ply: no room");
+  CHECK(shown(notices, now, true).alarm);
+}

@@ -1,0 +1,150 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "visualizer/app/options.hpp"
+
+#include <initializer_list>
+#include <string>
+#include <vector>
+
+#include <doctest/doctest.h>
+#include <rapidcheck.h>
+
+#include "visualizer/error.hpp"
+#include "visualizer/render/renderer_choice.hpp"
+
+using namespace kerf;
+
+namespace {
+
+std::optional<VisualizerOptions> parse(std::initializer_list<const char*> arguments) {
+  std::vector<const char*> argv{"kerf-visualizer"};
+  argv.insert(argv.end(), arguments);
+  return parse_options(static_cast<int>(argv.size()), argv.data());
+}
+
+}  // namespace
+
+TEST_CASE("the command line of the demo is understood") {
+  const auto options =
+      parse({"--name", "demo", "--headless", "--frames", "12", "--every-ticks", "800", "--out", "o",
+             "--size", "640x480", "--report", "r.json", "--cpu", "0,1", "--export", "m.ply"});
+  REQUIRE(options);
+  CHECK(options->name == "demo");
+  CHECK(options->headless);
+  CHECK(options->frames == 12);
+  CHECK(options->every_ticks == 800);
+  CHECK(options->size == PictureSize{640, 480});
+  CHECK(options->report == "r.json");
+  CHECK(options->mesh == "m.ply");
+  CHECK(options->cpus == std::vector<int>{0, 1});
+}
+
+TEST_CASE("a size that is none is refused with the limits") {
+  for (const char* text : {"", "x", "640", "640x", "x480", "0x10", "640x480x2", "-1x5", "8193x1",
+                           "64 x64", "99999999999x1"}) {
+    CAPTURE(text);
+    CHECK_THROWS_AS(parse({"--size", text}), VisualizerError);
+  }
+  CHECK(parse_size("1x8192") == PictureSize{1, 8192});
+  CHECK(rc::check([](const std::string& text) {
+    try {
+      const PictureSize size = parse_size(text);
+      RC_ASSERT(text == std::to_string(size.width) + "x" + std::to_string(size.height));
+    } catch (const VisualizerError&) {
+    }
+  }));
+}
+
+TEST_CASE("the gradient and a tool of voxels are part of the first look") {
+  CHECK(first_look(*parse({})).gradient == Gradient::corners);
+  CHECK_FALSE(first_look(*parse({})).voxel_tool);
+  const Look look = first_look(*parse({"--gradient", "farid5", "--voxel-tool"}));
+  CHECK(look.gradient == Gradient::farid5);
+  CHECK(look.voxel_tool);
+  CHECK_THROWS_WITH_AS(parse({"--gradient", "sobel"}),
+                       "--gradient: sobel is unknown; known: central, corners, farid5",
+                       VisualizerError);
+}
+
+TEST_CASE("an unknown renderer is refused and the known ones are named") {
+  CHECK_THROWS_WITH_AS(parse({"--renderer", "voxels"}),
+                       doctest::Contains("--renderer: voxels is unknown; known: iso"),
+                       VisualizerError);
+}
+
+TEST_CASE("each volume may have a renderer of its own, and one kind of them looks into volumes") {
+  CHECK(first_look(*parse({"--renderer", "surface,blend"})).renderer == "surface,blend");
+  CHECK_THROWS_WITH_AS(parse({"--renderer", "surface,"}),
+                       doctest::Contains("--renderer:  is unknown; known: iso"), VisualizerError);
+  CHECK_THROWS_WITH_AS(parse({"--renderer", "blend,iso,slices"}),
+                       "--renderer: blend,iso,slices: blend and slices do not mix where volumes "
+                       "intersect; take one of them for both",
+                       VisualizerError);
+  using Kinds = std::vector<std::string>;
+  CHECK(renderer_of_each("cast", 3) == Kinds{"cast", "cast", "cast"});
+  CHECK(renderer_of_each("cast,blend", 2) == Kinds{"cast", "blend"});
+  CHECK_THROWS_WITH_AS(static_cast<void>(renderer_of_each("cast,blend", 1)),
+                       "--renderer: cast,blend is for 2 volumes, and the scene has 1; name one for "
+                       "all or one for each",
+                       VisualizerError);
+}
+
+TEST_CASE("a choice for one volume leaves the others, but what is looked into has one renderer") {
+  CHECK(with_renderer("iso", 2, 1, "blend") == "iso,blend");
+  CHECK(with_renderer("iso,blend", 2, 0, "blend") == "blend");
+  CHECK(with_renderer("blend,cast,blend", 3, 0, "slices") == "slices,cast,slices");
+  CHECK(with_renderer("blend", 1, 0, "cast") == "cast");
+  CHECK(next_renderer("iso,blend") == "blend");
+  CHECK(next_renderer("cast-blend") == "iso");
+  CHECK(next_renderer("iso", 2, 1) == "iso,blend");
+  CHECK(next_renderer("surface,blend", 2, 1) == "surface");
+}
+
+TEST_CASE("every mistake on the command line is one line") {
+  for (const auto& arguments :
+       std::initializer_list<std::initializer_list<const char*>>{{"--frames", "0"},
+                                                                 {"--frames", "many"},
+                                                                 {"--wait", "-1"},
+                                                                 {"--nonsense"},
+                                                                 {"--cpu", "a"},
+                                                                 {"--every-ticks", "0"},
+                                                                 {"stray"},
+                                                                 {"--eyes", "wide"},
+                                                                 {"--fps", "0"},
+                                                                 {"--fps", "241"},
+                                                                 {"--stereo=7"},
+                                                                 {"--headless=no"},
+                                                                 {"--frames", "2.5"},
+                                                                 {"--transfer", "/tmp"},
+                                                                 {"--record"},
+                                                                 {"--transfer", "/nowhere/t.toml"},
+                                                                 {"--transfer", "/dev/null"},
+                                                                 {"--convergence", "0"},
+                                                                 {"--convergence", "nan"},
+                                                                 {"--seconds", "nan"},
+                                                                 {"--seconds"}}) {
+    try {
+      static_cast<void>(parse(arguments));
+      FAIL("accepted");
+    } catch (const VisualizerError& problem) {
+      CHECK(std::string(problem.what()).find('\n') == std::string::npos);
+    }
+  }
+}
+
+TEST_CASE("beside a video there are pictures only where they are asked for") {
+  CHECK(parse({"--headless"})->frames == 10);
+  CHECK(parse({"--headless", "--record", "-"})->frames == 0);
+  CHECK(parse({"--headless", "--record", "v.y4m", "--frames", "3"})->frames == 3);
+}
+
+TEST_CASE("the bench draws as large as the paper unless told otherwise, and alone writes a page") {
+  CHECK(parse({"--bench"})->size == PictureSize{512, 512});
+  CHECK(parse({"--bench", "--page", "p.md"})->page == "p.md");
+  CHECK(parse({"--bench", "--size", "64x48"})->size == PictureSize{64, 48});
+  CHECK_THROWS_WITH_AS(parse({"--page", "p.md"}), doctest::Contains("--bench"), VisualizerError);
+}
+
+TEST_CASE("a folder in the place of a file of opacities is called a folder") {
+  CHECK_THROWS_WITH_AS(parse({"--transfer", "/tmp"}), "/tmp: is a folder; name a file in it",
+                       VisualizerError);
+}

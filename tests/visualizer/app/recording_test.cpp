@@ -1,0 +1,211 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "visualizer/app/recording.hpp"
+
+#include <array>
+#include <cmath>
+#include <csignal>
+#include <filesystem>
+#include <fstream>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <doctest/doctest.h>
+#include <fcntl.h>
+#include <rapidcheck.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "shared/posix/new_file.hpp"
+#include "tests/visualizer/gl/gl_fixture.hpp"
+#include "visualizer/app/yuv.hpp"
+
+using namespace kerf;
+using namespace kerf::test;
+namespace fs = std::filesystem;
+
+namespace {
+
+struct Place {
+  fs::path path = fs::temp_directory_path() / ("kerf-video-" + std::to_string(::getpid()));
+  Place() { fs::create_directories(path); }
+  ~Place() { fs::remove_all(path); }
+};
+
+using Bytes = std::vector<std::uint8_t>;
+
+/// As a player shows it: BT.709, limited range.
+std::array<double, 3> rgb_of(double y, double cb, double cr) {
+  const double luma = (y - 16.0) / 219.0;
+  const double blue = (cb - 128.0) / 224.0 * 1.8556;
+  const double red = (cr - 128.0) / 224.0 * 1.5748;
+  const double r = luma + red;
+  const double b = luma + blue;
+  return {255.0 * r, 255.0 * (luma - 0.2126 * r - 0.0722 * b) / 0.7152, 255.0 * b};
+}
+
+struct Video {
+  std::string header;
+  std::vector<Bytes> frames;
+};
+
+Video read_back(const fs::path& file, PictureSize size) {
+  std::ifstream stream(file, std::ios::binary);
+  Video video;
+  std::getline(stream, video.header);
+  const auto half = [](int side) { return static_cast<std::size_t>((side + 1) / 2); };
+  const std::size_t bytes =
+      static_cast<std::size_t>(size.width) * static_cast<std::size_t>(size.height) +
+      2 * half(size.width) * half(size.height);
+  for (std::string mark; std::getline(stream, mark);) {
+    REQUIRE(mark == "FRAME");
+    Bytes frame(bytes);
+    REQUIRE(
+        stream.read(reinterpret_cast<char*>(frame.data()), static_cast<std::streamsize>(bytes)));
+    video.frames.push_back(frame);
+  }
+  return video;
+}
+
+void paint(const RenderTarget& target, float brightness) {
+  const float colour[4] = {brightness, brightness, brightness, 1.0F};
+  glClearNamedFramebufferfv(target.framebuffer(), GL_COLOR, 0, colour);
+}
+
+/// The one line of what `act` throws; empty where it does not.
+template <typename Act>
+std::string problem_of(const Act& act) {
+  try {
+    act();
+  } catch (const FileError& problem) {
+    return problem.what();
+  }
+  return {};
+}
+
+}  // namespace
+
+TEST_CASE("a player that decodes BT.709 in limited range shows the colours that were drawn") {
+  CHECK(rc::check([] {
+    const PictureSize size{*rc::gen::inRange(1, 8), *rc::gen::inRange(1, 8)};
+    const std::array<int, 3> colour{*rc::gen::inRange(0, 256), *rc::gen::inRange(0, 256),
+                                    *rc::gen::inRange(0, 256)};
+    const auto pixels = static_cast<std::size_t>(size.width * size.height);
+    Bytes rgb, yuv;
+    for (std::size_t i = 0; i < 3 * pixels; ++i) {
+      rgb.push_back(static_cast<std::uint8_t>(colour[i % 3]));
+    }
+    fill_yuv420(size, rgb, yuv);
+    const std::size_t squares = (yuv.size() - pixels) / 2;
+    // Half a step of each of the three values.
+    constexpr std::array kMost{0.6 + 0.5 * 1.8, 0.6 + 0.5 * 0.8, 0.6 + 0.5 * 2.2};
+    for (std::size_t i = 0; i < pixels; ++i) {
+      const std::size_t square = i % squares;
+      const auto seen = rgb_of(yuv[i], yuv[pixels + square], yuv[pixels + squares + square]);
+      for (std::size_t c = 0; c < 3; ++c) RC_ASSERT(std::abs(seen[c] - colour[c]) <= kMost[c]);
+    }
+  }));
+  Bytes yuv;
+  fill_yuv420({2, 1}, Bytes{255, 255, 255, 0, 0, 0}, yuv);
+  CHECK(yuv == Bytes{235, 16, 128, 128});  // white and black are the ends of the range
+}
+
+TEST_CASE("colour differences are those of the mean of their square, also at an odd side") {
+  Bytes yuv;
+  fill_yuv420({3, 1}, Bytes{0, 0, 255, 0, 0, 0, 0, 0, 255}, yuv);
+  REQUIRE(yuv.size() == 3 + 2 * 2);
+  CHECK(yuv[3] == 184);  // half blue: 128 + 112 / 2
+  CHECK(yuv[4] == 240);  // the last column stands for two
+}
+
+TEST_CASE("a video plays in true time whenever pictures come") {
+  if (!have_gl()) return;
+  const Place place;
+  const PictureSize size{5, 3};
+  const RenderTarget target(size);
+  const fs::path file = place.path / "a.y4m";
+  {
+    Recording recording(file.string(), size, 60);
+    const auto at = [&](double servo_s, float brightness) {
+      paint(target, brightness);
+      recording.add(target, servo_s);
+    };
+    at(7.0, 0.0F);    // frame 0
+    at(7.010, 0.2F);  // too early
+    CHECK(recording.due_in_s(7.010) == doctest::Approx(1.0 / 60.0 - 0.010));
+    at(7.017, 0.4F);        // frame 1
+    at(7.0835, 0.6F);       // late: frames 2 to 5
+    at(0.5, 0.8F);          // another controller: no time has passed
+    at(0.5 + 0.017, 1.0F);  // frame 6
+    CHECK(recording.file().frames() == 7);
+  }
+  const Video video = read_back(file, size);
+  CHECK(video.header == "YUV4MPEG2 W5 H3 F60:1 Ip A1:1 C420jpeg XCOLORRANGE=LIMITED");
+  std::vector<int> luma;
+  for (const Bytes& frame : video.frames) luma.push_back(frame[0]);
+  CHECK(luma == std::vector<int>{16, 104, 147, 147, 147, 147, 235});
+}
+
+TEST_CASE("a picture of another size ends the video, and the picture goes on") {
+  if (!have_gl()) return;
+  const Place place;
+  const fs::path file = place.path / "a.y4m";
+  std::optional<Recording> recording(std::in_place, file.string(), PictureSize{4, 4}, 30);
+  CHECK_FALSE(film(recording, RenderTarget({4, 4}), 0.0));
+  CHECK(recording);
+  const auto problem = film(recording, RenderTarget({6, 4}), 1.0);
+  REQUIRE(problem);
+  CHECK(problem->find("another size") != std::string::npos);
+  CHECK_FALSE(recording);
+  CHECK_FALSE(film(recording, RenderTarget({6, 4}), 1.0));  // nothing to do
+  CHECK(read_back(file, {4, 4}).frames.size() == 1);
+}
+
+TEST_CASE("a full disk leaves whole frames and says so in one line") {
+  const Place place;
+  const PictureSize size{64, 64};
+  const Bytes frame(64 * 64 * 3 / 2, 100);
+  const fs::path file = place.path / "a.y4m";
+  rlimit before{};
+  getrlimit(RLIMIT_FSIZE, &before);
+  const auto on_too_large = std::signal(SIGXFSZ, SIG_IGN);
+  const rlimit small{20'000, before.rlim_max};
+  setrlimit(RLIMIT_FSIZE, &small);
+  const std::string problem = problem_of([&] {
+    VideoFile video(file.string(), size, 60);
+    while (true) video.write_frame(frame);
+  });
+  setrlimit(RLIMIT_FSIZE, &before);
+  std::signal(SIGXFSZ, on_too_large);
+  CHECK(problem == "video " + file.string() +
+                       ": File too large; name a place with room (3 frames are written)");
+  CHECK(read_back(file, size).frames.size() == 3);
+  CHECK(problem_of([&] { VideoFile("/dev/full", size, 60); }).find("No space left") !=
+        std::string::npos);
+  CHECK(problem_of([&] {
+          VideoFile((place.path / "none" / "a.y4m").string(), size, 60);
+        }).find("name a place that can be written") != std::string::npos);
+}
+
+TEST_CASE("a reader that is not there, goes away or takes nothing is told in one line") {
+  const Place place;
+  const PictureSize size{256, 256};
+  const Bytes frame(256 * 256 * 3 / 2, 100);
+  const std::string pipe = (place.path / "pipe").string();
+  REQUIRE(mkfifo(pipe.c_str(), 0600) == 0);
+  CHECK(problem_of([&] { VideoFile(pipe, size, 60); }).find("start the reader first") !=
+        std::string::npos);
+  int reader = open(pipe.c_str(), O_RDONLY | O_NONBLOCK);
+  {
+    VideoFile video(pipe, size, 60);
+    CHECK(problem_of([&] { video.write_frame(frame); }).find("takes nothing any more") !=
+          std::string::npos);
+  }
+  close(reader);
+  reader = open(pipe.c_str(), O_RDONLY | O_NONBLOCK);  // empty again
+  VideoFile video(pipe, size, 60);
+  close(reader);
+  CHECK(problem_of([&] { video.write_frame(frame); }).find("its reader has gone") !=
+        std::string::npos);
+}

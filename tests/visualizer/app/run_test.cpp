@@ -1,0 +1,389 @@
+// SPDX-License-Identifier: Apache-2.0
+// A whole headless run against a segment that this process writes.
+#include "visualizer/app/run.hpp"
+
+#include <chrono>
+#include <cmath>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <future>
+#include <iterator>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <thread>
+#include <vector>
+
+#include <doctest/doctest.h>
+#include <nlohmann/json.hpp>
+#include <unistd.h>
+
+#include "shared/posix/new_file.hpp"
+#include "shared/segment/hand_over.hpp"
+#include "visualizer/error.hpp"
+#include "visualizer/gl/context.hpp"
+#include "visualizer/render/renderer.hpp"
+#include "visualizer/view/session.hpp"
+
+using namespace kerf;
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr VoxelGrid kGrid{32, 32, 32};
+constexpr const char* kScene = R"({
+  "volumes": [{"name": "block", "solid": true}],
+  "tools": [{"name": "ball", "profile": [[-1, 0], [0, 1], [1, 0]]}],
+  "materials": [{"name": "none", "iso": 0, "colour": [0, 0, 0]},
+                {"name": "bone", "iso": 0.3, "colour": [0.8, 0.7, 0.5]}]})";
+
+bool have_gl() {
+  try {
+    static_cast<void>(make_headless_context());
+    return true;
+  } catch (const VisualizerError&) {
+    MESSAGE("skipped: there is no OpenGL 4.5 context here");
+    return false;
+  }
+}
+
+/// A private place for sockets and files.
+struct Place {
+  fs::path path = fs::temp_directory_path() / ("kerf-run-" + std::to_string(::getpid()));
+  Place() {
+    fs::remove_all(path);
+    fs::create_directories(path);
+    setenv("XDG_RUNTIME_DIR", path.c_str(), 1);
+  }
+  ~Place() { fs::remove_all(path); }
+  Place(const Place&) = delete;
+  Place& operator=(const Place&) = delete;
+
+  [[nodiscard]] VisualizerOptions options() const {
+    VisualizerOptions options;
+    options.name = "test";
+    options.headless = true;
+    options.size = {96, 72};
+    options.frames = 4;
+    options.every_ticks = 50;
+    options.wait_s = 5.0;
+    options.out = path / "out";
+    options.report = path / "report.json";
+    return options;
+  }
+};
+
+/// A controller that mills a groove into a solid block, a slab further each tick.
+class Miller {
+ public:
+  Miller() : writer_(SegmentWriter::create(spec())), server_(std::in_place, "test", writer_) {
+    writer_.set_lifecycle(Lifecycle::run);
+  }
+
+  /// Ticks as fast as a servo, to `last`; the groove gets a layer deeper every eight ticks.
+  void run_to(Tick last) {
+    while (tick_ < last) {
+      ++tick_;
+      writer_.begin_tick(tick_);
+      const auto top = static_cast<std::int32_t>(31 - tick_ / 8 % 24);
+      const VoxelBox box{{8, 8, top}, {24, 24, top + 1}};
+      std::uint32_t removed = 0;
+      for (int y = box.lo.y; y < box.hi.y; ++y) {
+        for (int x = box.lo.x; x < box.hi.x; ++x) {
+          Density& density = density_[kGrid.index(x, y, top)];
+          removed += density;
+          density = 0;
+        }
+      }
+      writer_.publish_box(0, density_, box, removed);
+      TickRecord record{};
+      record.tick = tick_;
+      record.start_ns = now_ns();
+      record.flags = kFlagStarted;
+      record.position_mm[1] = 20.0;
+      record.orientation[3] = 1.0F;
+      record.commanded_force_n[1] = 1.0F;
+      writer_.publish_state(record);
+      writer_.end_tick(record.start_ns);
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+  }
+  void say(Lifecycle lifecycle) { writer_.set_lifecycle(lifecycle); }
+  void vanish() { server_.reset(); }
+
+ private:
+  static std::uint64_t now_ns() {
+    return static_cast<std::uint64_t>(std::chrono::steady_clock::now().time_since_epoch().count());
+  }
+  SegmentSpec spec() {
+    density_.assign(kGrid.voxel_count(), 50000);
+    SegmentVolumeSpec volume;
+    volume.grid = kGrid;
+    volume.density = density_;
+    SegmentSpec spec;
+    spec.volumes = {volume};
+    spec.scene_json = kScene;
+    return spec;
+  }
+
+  std::vector<Density> density_;
+  Tick tick_ = 0;
+  SegmentWriter writer_;
+  std::optional<SegmentServer> server_;
+};
+
+/// A busy machine may take long over a picture; a minute is not busy but broken.
+bool appears(const fs::path& file) {
+  for (int tries = 0; tries < 6000 && !fs::exists(file); ++tries) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  return fs::exists(file);
+}
+
+std::string contents(const fs::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+}  // namespace
+
+TEST_CASE("a headless run writes its pictures, follows the milling and ends with the controller") {
+  if (!have_gl()) return;
+  const Place place;
+  const VisualizerOptions options = place.options();
+  // The visualizer is started first and waits.
+  auto code = std::async(std::launch::async, [&] { return run_headless(options); });
+  std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  Miller miller;
+  // Ticks count from the first armed one, tick 1.
+  for (const int picture : {1, 2, 3}) {
+    miller.run_to(static_cast<Tick>(50 * picture + 1));
+    REQUIRE(appears(options.out / ("frame-000" + std::to_string(picture) + ".png")));
+  }
+  miller.run_to(180);
+  miller.say(Lifecycle::clean_end);
+  CHECK(code.get() == 0);
+
+  for (int i = 1; i <= 4; ++i) {
+    CAPTURE(i);
+    CHECK(contents(options.out / ("frame-000" + std::to_string(i) + ".png")).substr(1, 3) == "PNG");
+  }
+  CHECK_FALSE(fs::exists(options.out / "frame-0005.png"));
+  CHECK(contents(options.out / "frame-0001.png") != contents(options.out / "frame-0004.png"));
+  const auto report = nlohmann::json::parse(contents(*options.report));
+  CHECK(report["clean_end"] == true);
+  CHECK(report["frames"] == 4);
+  CHECK(report["bricks_uploaded"] > 64);  // all of them once, then what changed
+  CHECK(report["gl_renderer"] != "");
+  CHECK(report["cpu_ms"]["p50"] > 0.0);
+  // Each picture but the last is 50 ticks of a millisecond after the one before, and a cut comes
+  // every eight.
+  CHECK(report["latency_ms"]["p50"] > 1.0);
+  CHECK(report["latency_ms"]["p99"] >= report["latency_ms"]["p50"]);
+}
+
+TEST_CASE("a headless video plays in the servo's time, to the end of the run") {
+  if (!have_gl()) return;
+  const Place place;
+  VisualizerOptions options = place.options();
+  options.frames = 0;
+  options.record = (place.path / "a.y4m").string();
+  options.video_hz = 50;
+  Miller miller;
+  miller.run_to(1);
+  auto code = std::async(std::launch::async, [&] { return run_headless(options); });
+  const std::size_t frame = 6 + 96 * 72 * 3 / 2;
+  // The first frame shows the first tick.
+  const auto begun = [&] {
+    return fs::exists(*options.record) && fs::file_size(*options.record) > frame;
+  };
+  for (int tries = 0; tries < 6000 && !begun(); ++tries) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  miller.run_to(400);
+  miller.say(Lifecycle::clean_end);
+  CHECK(code.get() == 0);
+  const std::string video = contents(*options.record);
+  const std::size_t header = video.find('\n') + 1;
+  CHECK((video.size() - header) % frame == 0);
+  const std::size_t frames = (video.size() - header) / frame;
+  CHECK(frames == 20);  // 399 ticks of a millisecond, the first one included
+  CHECK(video.substr(header, frame) != video.substr(video.size() - frame));
+  CHECK_FALSE(fs::exists(options.out));  // no pictures
+  options.record = "/dev/full";
+  CHECK_THROWS_AS(static_cast<void>(run_headless(options)), FileError);
+}
+
+TEST_CASE("a session tells once when the oldest new removal was, and nothing from before it") {
+  const Place place;
+  Miller miller;
+  miller.run_to(20);  // cuts in ticks 1, 8 and 16
+  Session session("test");
+  CHECK_FALSE(session.take_oldest_removal());
+  miller.run_to(22);
+  session.poll();
+  CHECK_FALSE(session.take_oldest_removal());
+  miller.run_to(23);
+  const auto before = std::chrono::steady_clock::now();
+  miller.run_to(24);  // the next cut
+  const auto after_first = std::chrono::steady_clock::now();
+  CHECK_FALSE(session.take_oldest_removal());  // not polled
+  miller.run_to(32);                           // and one more
+  session.poll();
+  session.poll();  // what an earlier poll brought stays
+  const auto removal = session.take_oldest_removal();
+  REQUIRE(removal);
+  CHECK(*removal >= before);
+  CHECK(*removal < after_first);
+  CHECK_FALSE(session.take_oldest_removal());
+}
+
+TEST_CASE("a controller that vanishes or faults is shown in its last state, and the code says so") {
+  if (!have_gl()) return;
+  for (const bool fault : {false, true}) {
+    const Place place;
+    Miller miller;
+    auto code = std::async(std::launch::async, [&] { return run_headless(place.options()); });
+    miller.run_to(51);
+    REQUIRE(appears(place.options().out / "frame-0001.png"));
+    miller.run_to(70);
+    if (fault) {
+      miller.say(Lifecycle::fault);
+    } else {
+      miller.vanish();
+    }
+    CHECK(code.get() == 1);
+    CHECK(fs::exists(place.options().out / "frame-0002.png"));
+  }
+}
+
+TEST_CASE("every renderer draws a session") {
+  if (!have_gl()) return;
+  const Place place;
+  Miller miller;
+  miller.run_to(20);
+  miller.say(Lifecycle::clean_end);
+  std::vector<std::string> pictures;
+  for (const std::string_view kind : renderer_kinds()) {
+    const std::string renderer(kind);
+    CAPTURE(renderer);
+    VisualizerOptions options = place.options();
+    options.renderer = renderer;
+    options.out = place.path / renderer;
+    CHECK(run_headless(options) == 0);
+    pictures.push_back(contents(options.out / "frame-0001.png"));
+    CHECK(pictures.back().size() > 500);
+  }
+  CHECK(pictures[0] != pictures[1]);
+  VisualizerOptions options = place.options();
+  options.renderer = "surface,blend";
+  CHECK_THROWS_WITH_AS(static_cast<void>(run_headless(options)),
+                       doctest::Contains("surface,blend is for 2 volumes, and the scene has 1"),
+                       VisualizerError);
+}
+
+TEST_CASE("a visualizer that joins late shows the picture of one that was there all the time") {
+  if (!have_gl()) return;
+  const Place place;
+  Miller miller;
+  VisualizerOptions options = place.options();
+  options.every_ticks = 100'000;  // only the final state
+  VisualizerOptions late = options;
+  late.out = place.path / "late";
+  auto first = std::async(std::launch::async, [&] { return run_headless(options); });
+  std::this_thread::sleep_for(std::chrono::milliseconds(400));
+  miller.run_to(100);
+  miller.say(Lifecycle::clean_end);
+  CHECK(first.get() == 0);
+  CHECK(run_headless(late) == 0);
+  const std::string picture = contents(options.out / "frame-0001.png");
+  CHECK(picture.size() > 500);
+  CHECK(contents(late.out / "frame-0001.png") == picture);
+}
+
+TEST_CASE("a headless run exports the final surface, drawn by the surface renderer") {
+  if (!have_gl()) return;
+  const Place place;
+  Miller miller;
+  VisualizerOptions options = place.options();
+  options.renderer = "surface";
+  options.mesh = place.path / "block.stl";
+  auto code = std::async(std::launch::async, [&] { return run_headless(options); });
+  miller.run_to(51);
+  REQUIRE(appears(options.out / "frame-0001.png"));
+  miller.run_to(170);
+  miller.say(Lifecycle::clean_end);
+  CHECK(code.get() == 0);
+  CHECK(contents(options.out / "frame-0001.png") != contents(options.out / "frame-0004.png"));
+  const std::string stl = contents(*options.mesh);
+  REQUIRE(stl.size() > 84);
+  std::uint32_t triangles = 0;
+  std::memcpy(&triangles, &stl[80], sizeof(triangles));
+  CHECK(triangles > 12'000);  // the block's six faces and the groove's
+  CHECK(stl.size() == 84 + 50 * std::size_t{triangles});
+}
+
+TEST_CASE("a sheet at the end of a headless run shows the opacities of --transfer") {
+  if (!have_gl()) return;
+  const Place place;
+  Miller miller;
+  miller.run_to(60);
+  miller.say(Lifecycle::clean_end);
+  std::vector<std::string> sheets;
+  for (const double opacity : {1.0, 0.01}) {
+    VisualizerOptions options = place.options();
+    options.sheet = place.path / "sheet.png";
+    options.transfer = "named in messages only";
+    options.opacities = {{"bone", opacity}};
+    CHECK(run_headless(options) == 0);
+    sheets.push_back(contents(*options.sheet));
+    CHECK(sheets.back().substr(1, 3) == "PNG");
+  }
+  CHECK(sheets[0] != sheets[1]);
+}
+
+TEST_CASE("an export that cannot work is refused before anything is drawn") {
+  const Place place;
+  VisualizerOptions options = place.options();
+  options.mesh = place.path / "block.obj";
+  CHECK_THROWS_AS(static_cast<void>(run_headless(options)), VisualizerError);
+}
+
+TEST_CASE("a report that cannot be written is refused before anything is drawn") {
+  const Place place;
+  VisualizerOptions options = place.options();
+  options.report = place.path / "none" / "report.json";
+  CHECK_THROWS_AS(static_cast<void>(run_headless(options)), FileError);
+  CHECK_THROWS_AS(static_cast<void>(run_window(options)), FileError);
+}
+
+TEST_CASE("a video alone ends when its time is over") {
+  if (!have_gl()) return;
+  const Place place;
+  VisualizerOptions options = place.options();
+  options.frames = 0;
+  options.every_ticks.reset();
+  options.seconds = 0.1;
+  options.record = (place.path / "a.y4m").string();
+  Miller miller;
+  miller.run_to(1);
+  CHECK(run_headless(options) == 0);
+  CHECK(contents(*options.record).find("FRAME") != std::string::npos);
+}
+
+TEST_CASE("without a controller the run gives up after its wait, in one line") {
+  if (!have_gl()) return;
+  const Place place;
+  VisualizerOptions options = place.options();
+  options.wait_s = 0.1;
+  CHECK_THROWS_AS(static_cast<void>(run_headless(options)), SegmentError);
+}
+
+TEST_CASE("a folder that cannot be written is refused before anything is drawn") {
+  const Place place;
+  VisualizerOptions options = place.options();
+  options.out = "/dev/null/out";
+  CHECK_THROWS_AS(static_cast<void>(run_headless(options)), VisualizerError);
+}

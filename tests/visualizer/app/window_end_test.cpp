@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: Apache-2.0
+// A window while nothing happens, and when what it stands on goes away.
+#include <chrono>
+#include <csignal>
+#include <filesystem>
+#include <fstream>
+#include <future>
+#include <string>
+
+#include <doctest/doctest.h>
+#include <epoxy/gl.h>
+#include <nlohmann/json.hpp>
+
+#include "tests/programs/process.hpp"
+#include "tests/visualizer/app/window_fixture.hpp"
+#include "visualizer/app/run.hpp"
+#include "visualizer/error.hpp"
+#include "visualizer/gl/window.hpp"
+
+using namespace kerf;
+using namespace kerf::test;
+namespace fs = std::filesystem;
+
+TEST_CASE("before a hand that is still most frames of a window draw nothing") {
+  if (!have("Xvfb")) return;
+  const Screen screen;
+  Controller controller;
+  VisualizerOptions options;
+  options.name = "test";
+  options.size = {160, 120};
+  options.seconds = 2.0;
+  options.report = screen.folder / "report.json";
+  auto code = std::async(std::launch::async, [&] { return run_window(options); });
+  while (code.wait_for(std::chrono::milliseconds(1)) != std::future_status::ready) {
+    controller.tick();
+  }
+  CHECK(code.get() == 0);
+  const auto report = nlohmann::json::parse(std::ifstream(*options.report));
+  CHECK(report["frames"] > 0);
+  CHECK(report["rest_frames"] > report["frames"]);
+}
+
+TEST_CASE("a GL error in a window fails the test that makes it" * doctest::should_fail()) {
+  if (!have("Xvfb")) FAIL("no screen: nothing to see, and this test has to fail");
+  const Screen screen;
+  const Window window({64, 64}, Window::Visibility::hidden);
+  glEnable(GL_INVALID_ENUM);
+}
+
+TEST_CASE("a window whose GL context is lost ends with one line") {
+  if (!have("Xvfb")) return;
+  const Screen screen;
+  const Controller controller;
+  VisualizerOptions options;
+  options.name = "test";
+  options.seconds = 100.0;
+  // No test can reset a graphics card: the driver's answer is put in its place.
+  const auto driver = glGetGraphicsResetStatus;
+  glGetGraphicsResetStatus = []() -> GLenum { return GL_INNOCENT_CONTEXT_RESET; };
+  CHECK_THROWS_WITH_AS(static_cast<void>(run_window(options)),
+                       "OpenGL: the graphics card was reset by another program and its memory is "
+                       "lost; start kerf-visualizer again",
+                       VisualizerError);
+  glGetGraphicsResetStatus = driver;
+}
+
+TEST_CASE("when the X server dies the window ends with one line, and the controller goes on") {
+  if (!have("Xvfb") || !have("xdotool")) return;
+  for (const int signal : {SIGTERM, SIGKILL}) {
+    CAPTURE(signal);
+    Screen screen;
+    Controller controller;
+    Process window({KERF_TEST_BIN "/kerf-visualizer", "--name", "test"}, screen.folder / "said");
+    act("search --sync --onlyvisible --name 'kerf: test'");
+    screen.end(signal);
+    CHECK(window.wait() == 2);
+    CHECK(window.output() ==
+          "kerf-visualizer: window: the X server is gone; the controller goes on, so start "
+          "kerf-visualizer again on another screen or with --headless --out DIR\n");
+    controller.tick();
+    VisualizerOptions options;
+    options.name = "test";
+    options.headless = true;
+    options.frames = 1;
+    options.seconds = 0.5;
+    options.size = {64, 48};
+    options.out = screen.folder / "later";
+    CHECK(run_headless(options) == 0);
+    CHECK(fs::exists(options.out / "frame-0001.png"));
+  }
+}

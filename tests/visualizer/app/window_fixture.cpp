@@ -1,0 +1,222 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/visualizer/app/window_fixture.hpp"
+
+#include <chrono>
+#include <csignal>
+#include <cstdlib>
+#include <fstream>
+#include <thread>
+
+#include <doctest/doctest.h>
+#include <fcntl.h>
+#include <sys/wait.h>
+
+#include "visualizer/app/run.hpp"
+// After all others: it defines plain words.
+#include <X11/Xlib.h>
+#include <X11/Xutil.h>
+
+namespace kerf::test {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr const char* kScene = R"({
+  "volumes": [%],
+  "tools": [{"name": "ball", "profile": [[-1, 0], [0, 1], [1, 0]]},
+            {"name": "pin", "profile": [[0, 0], [1, 1]]}],
+  "materials": [{"name": "none", "iso": 0, "colour": [0, 0, 0]},
+                {"name": "bone", "iso": 0.3, "colour": [0.8, 0.7, 0.5]}]})";
+constexpr VoxelGrid kGrid{32, 24, 16};
+
+SegmentSpec blocks_of(std::vector<Density>& density, int blocks) {
+  density.assign(kGrid.voxel_count(), 50'000);
+  SegmentSpec spec;
+  std::string names;
+  for (int i = 0; i < blocks; ++i) {
+    names +=
+        i == 0 ? R"({"name": "block", "solid": true})" : R"(, {"name": "other", "solid": true})";
+    SegmentVolumeSpec& volume = spec.volumes.emplace_back();
+    volume.grid = kGrid;
+    volume.origin_mm = {0.0, 20.0 * i, 0.0};  // they overlap
+    volume.density = density;
+  }
+  spec.scene_json = kScene;
+  spec.scene_json.replace(spec.scene_json.find('%'), 1, names);
+  return spec;
+}
+
+std::uint64_t now_ns() {
+  return static_cast<std::uint64_t>(std::chrono::steady_clock::now().time_since_epoch().count());
+}
+
+/// What `User::look` takes of a picture.
+std::vector<std::uint8_t> middle_of(const RgbPicture& picture) {
+  const auto width = static_cast<std::size_t>(picture.size.width);
+  const auto height = static_cast<std::size_t>(picture.size.height);
+  std::vector<std::uint8_t> middle;
+  for (std::size_t y = height / 4; y < height * 3 / 4; ++y) {
+    const auto row = picture.rgb.begin() + static_cast<std::ptrdiff_t>(y * width * 3);
+    middle.insert(middle.end(), row + picture.size.width * 3 * 5 / 9,
+                  row + picture.size.width * 3 * 8 / 9);
+  }
+  return middle;
+}
+
+void send(const std::string& events) {
+  // Where xdotool itself could not be started nothing was sent: that says nothing of the window.
+  constexpr int kNotStarted = 127;
+  int status = 0;
+  for (int tries = 0; tries < 3; ++tries) {
+    status = std::system(("xdotool " + events + " >/dev/null").c_str());
+    if (!WIFEXITED(status) || WEXITSTATUS(status) != kNotStarted) break;
+    std::this_thread::sleep_for(std::chrono::milliseconds(300));
+  }
+  CAPTURE(events);
+  REQUIRE(status == 0);
+}
+
+/// Until the window and its screen show what was sent.
+void let_it_show() {
+  std::this_thread::sleep_for(std::chrono::milliseconds(300));
+}
+
+/// The upper left corner of the screen that DISPLAY names.
+RgbPicture read_screen(PictureSize size) {
+  Display* const display = XOpenDisplay(nullptr);
+  REQUIRE(display != nullptr);
+  XImage* const image =
+      XGetImage(display, DefaultRootWindow(display), 0, 0, static_cast<unsigned>(size.width),
+                static_cast<unsigned>(size.height), AllPlanes, ZPixmap);
+  REQUIRE(image != nullptr);
+  RgbPicture picture{size, {}};
+  for (int y = 0; y < size.height; ++y) {
+    for (int x = 0; x < size.width; ++x) {
+      const unsigned long pixel = XGetPixel(image, x, y);
+      for (const int shift : {16, 8, 0}) {
+        picture.rgb.push_back(static_cast<std::uint8_t>(pixel >> shift));
+      }
+    }
+  }
+  XDestroyImage(image);
+  XCloseDisplay(display);
+  return picture;
+}
+
+}  // namespace
+
+bool have(const char* program) {
+  const std::string command = std::string("command -v ") + program + " >/dev/null 2>&1";
+  if (std::system(command.c_str()) == 0) return true;
+  MESSAGE("skipped: " << std::string(program)
+                      << " is not installed (.ci/packages.txt, group check)");
+  return false;
+}
+
+Screen::Screen() {
+  int ready[2];
+  REQUIRE(pipe(ready) == 0);
+  server_ = fork();
+  if (server_ == 0) {
+    const std::string to = std::to_string(ready[1]);
+    const int quiet = open("/dev/null", O_WRONLY);
+    dup2(quiet, STDERR_FILENO);
+    execlp("Xvfb", "Xvfb", "-displayfd", to.c_str(), "-screen", "0", "800x600x24", "-nolisten",
+           "tcp", static_cast<char*>(nullptr));
+    _exit(127);
+  }
+  close(ready[1]);
+  std::string number;
+  for (char digit = 0; read(ready[0], &digit, 1) == 1 && digit != '\n';) number += digit;
+  close(ready[0]);
+  REQUIRE_FALSE(number.empty());
+  fs::remove_all(folder);
+  fs::create_directories(folder);
+  setenv("DISPLAY", (":" + number).c_str(), 1);
+  setenv("XDG_RUNTIME_DIR", folder.c_str(), 1);
+}
+
+Screen::~Screen() {
+  end(SIGTERM);
+  fs::remove_all(folder);
+}
+
+void Screen::end(int signal) {
+  if (server_ < 0) return;
+  kill(server_, signal);
+  waitpid(server_, nullptr, 0);
+  server_ = -1;
+}
+
+Controller::Controller(int blocks)
+    : writer_(SegmentWriter::create(blocks_of(density_, blocks))),
+      server_("test", writer_, {.tools = 2}) {
+  writer_.set_lifecycle(Lifecycle::run);
+}
+
+void Controller::tick() {
+  writer_.begin_tick(++now_);
+  TickRecord record{};
+  record.tick = now_;
+  record.start_ns = now_ns();
+  record.orientation[3] = 1.0F;
+  writer_.publish_state(record);
+  writer_.end_tick(record.start_ns);
+}
+
+std::vector<std::uint64_t> Controller::asked_tools() {
+  std::vector<std::uint64_t> tools;
+  while (const auto command = server_.take_command()) tools.push_back(command->argument);
+  return tools;
+}
+
+void act(const std::string& events) {
+  send(events);
+  let_it_show();
+}
+
+User::User(const fs::path& folder, int blocks)
+    : out_(folder / "out"), report_(folder / "report.json"), controller_(blocks) {
+  VisualizerOptions options;
+  options.name = "test";
+  options.size = {480, 360};
+  options.out = out_;
+  options.report = report_;
+  options.seconds = 100.0;  // a test that hangs ends
+  code_ = std::async(std::launch::async, [options] { return run_window(options); });
+  act("search --sync --onlyvisible --name 'kerf: test' mousemove 300 180");
+}
+
+RgbPicture User::whole() {
+  const fs::path file = out_ / "kerf-0001.png";
+  send("key s");
+  for (int tries = 0; tries < 3000 && !fs::exists(file); ++tries) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  const auto picture = read_png(file);
+  REQUIRE(picture);
+  fs::remove(file);
+  return *picture;
+}
+
+std::vector<std::uint8_t> User::look() {
+  return middle_of(whole());
+}
+
+std::vector<std::uint8_t> User::look_at_screen() {
+  const PictureSize size = whole().size;
+  let_it_show();
+  return middle_of(read_screen(size));
+}
+
+int User::quit() {
+  send("key q");
+  return code_.get();
+}
+
+nlohmann::json User::report() const {
+  return nlohmann::json::parse(std::ifstream(report_));
+}
+
+}  // namespace kerf::test

@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <future>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+#include <unistd.h>
+
+#include "shared/segment/hand_over.hpp"
+#include "shared/segment/writer.hpp"
+#include "tests/visualizer/render/rgb_picture.hpp"
+
+namespace kerf::test {
+
+/// Whether a program is installed; else says that a test is skipped.
+[[nodiscard]] bool have(const char* program);
+
+/// A screen that nobody sees, and a private folder.
+class Screen {
+ public:
+  Screen();
+  ~Screen();
+  Screen(const Screen&) = delete;
+  Screen& operator=(const Screen&) = delete;
+  void end(int signal);
+
+  const std::filesystem::path folder =
+      std::filesystem::temp_directory_path() / ("kerf-window-" + std::to_string(::getpid()));
+
+ private:
+  pid_t server_ = -1;
+};
+
+/// A controller of the name "test" that shows one block, or two beside one another, and has two
+/// tools.
+class Controller {
+ public:
+  explicit Controller(int blocks = 1);
+  void tick();
+  /// What the window asked for since the last call.
+  std::vector<std::uint64_t> asked_tools();
+  void say(Lifecycle lifecycle) { writer_.set_lifecycle(lifecycle); }
+
+ private:
+  std::vector<Density> density_;
+  SegmentWriter writer_;
+  SegmentServer server_;
+  Tick now_ = 0;
+};
+
+/// Real events at the screen that DISPLAY names, and the time in which a window shows what they do.
+void act(const std::string& events);
+
+/// A window, and a user before it.
+class User {
+ public:
+  explicit User(const std::filesystem::path& folder, int blocks = 1);
+
+  /// The window with its panels.
+  RgbPicture whole();
+  /// The middle of it, where no panel is.
+  std::vector<std::uint8_t> look();
+  /// The same as it stands on the screen, whose upper left corner the window is in.
+  std::vector<std::uint8_t> look_at_screen();
+
+  int quit();
+  [[nodiscard]] const std::filesystem::path& out() const { return out_; }
+  [[nodiscard]] Controller& controller() { return controller_; }
+  [[nodiscard]] nlohmann::json report() const;
+
+ private:
+  std::filesystem::path out_, report_;
+  Controller controller_;
+  std::future<int> code_;
+};
+
+}  // namespace kerf::test

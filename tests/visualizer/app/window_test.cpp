@@ -1,0 +1,231 @@
+// SPDX-License-Identifier: Apache-2.0
+// The window on a screen of its own (Xvfb), worked with real key and mouse events (xdotool).
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include <doctest/doctest.h>
+
+#include "tests/visualizer/app/window_fixture.hpp"
+#include "visualizer/view/transfer_file.hpp"
+
+using namespace kerf;
+using namespace kerf::test;
+namespace fs = std::filesystem;
+
+namespace {
+
+/// Pixels of a warning's ground.
+int warning_pixels(const RgbPicture& picture) {
+  int count = 0;
+  for (std::size_t i = 0; i < picture.rgb.size(); i += 3) {
+    const int red = picture.rgb[i], green = picture.rgb[i + 1], blue = picture.rgb[i + 2];
+    count += red > 100 && red < 140 && green > 40 && green < 75 && blue < 25 ? 1 : 0;
+  }
+  return count;
+}
+
+}  // namespace
+
+TEST_CASE("keys and mouse work the window") {
+  if (!have("Xvfb") || !have("xdotool")) return;
+  const Screen screen;
+  User user(screen.folder);
+  const auto first = user.look();
+  CHECK(user.look() == first);
+
+  SUBCASE("v takes the next renderer") {
+    act("key v");
+    CHECK(user.look() != first);
+    CHECK(user.quit() == 0);
+    CHECK(user.report()["renderer"] == "blend");
+  }
+  SUBCASE("c cuts the volumes open and closes them again") {
+    act("key c");
+    CHECK(user.look() != first);
+    act("key c");
+    CHECK(user.look() == first);
+    CHECK(user.quit() == 0);
+  }
+  SUBCASE("a drag turns, r turns back, the wheel zooms") {
+    act("mousedown 1 mousemove 360 200 sleep 0.2 mouseup 1");
+    CHECK(user.look() != first);
+    act("key r");
+    CHECK(user.look() == first);
+    act("click 4");
+    CHECK(user.look() != first);
+    CHECK(user.quit() == 0);
+  }
+  SUBCASE("a drag with shift, or with the middle button, moves") {
+    act("keydown shift mousedown 1 mousemove 340 200 sleep 0.2 mouseup 1 keyup shift");
+    const auto shifted = user.look();
+    CHECK(shifted != first);
+    act("key r mousemove 300 180");
+    CHECK(user.look() == first);
+    act("mousedown 2 mousemove 340 200 sleep 0.2 mouseup 2");
+    CHECK(user.look() == shifted);
+    CHECK(user.quit() == 0);
+  }
+  SUBCASE("a digit asks the controller for that tool, where there is one") {
+    act("key 2 key 9");
+    CHECK(user.controller().asked_tools() == std::vector<std::uint64_t>{1});
+    CHECK(user.quit() == 0);
+  }
+  SUBCASE("e exports the surface") {
+    act("key e");
+    CHECK(user.quit() == 0);
+    CHECK(fs::file_size(user.out() / "kerf-0001.ply") > 1000);
+  }
+  SUBCASE("h shows the keys, then no panel at all, then what was there") {
+    const auto panels = user.whole().rgb;
+    act("key h");
+    const auto keys = user.whole().rgb;
+    CHECK(keys != panels);
+    act("key h");
+    const auto nothing = user.whole().rgb;
+    CHECK(nothing != keys);
+    CHECK(nothing != panels);
+    act("key h");
+    CHECK(user.whole().rgb != nothing);
+    CHECK(user.quit() == 0);
+  }
+  SUBCASE("a drag that begins on the controls does not turn") {
+    act("mousemove 190 330 sleep 0.2 mousedown 1 sleep 0.2 mousemove 300 100 sleep 0.2 mouseup 1 "
+        "mousemove 300 180");
+    const auto after = user.look();
+    CHECK(user.quit() == 0);
+    CHECK(after == first);
+  }
+  SUBCASE("t shows two eyes side by side, and one again") {
+    act("key t");
+    CHECK(user.look() != first);
+    act("key t");
+    CHECK(user.look() == first);
+    CHECK(user.quit() == 0);
+  }
+  SUBCASE("a slider changes an opacity while it is dragged, and w writes it") {
+    act("key v");
+    const auto blended = user.look();
+    act("mousemove 131 284 sleep 0.2 mousedown 1 sleep 0.2 mousemove 60 284 sleep 0.2");
+    CHECK(user.look() != blended);
+    act("mouseup 1 mousemove 300 180 key w");
+    CHECK(user.quit() == 0);
+    const Opacities written = read_transfer(user.out() / "kerf-0001.toml");
+    REQUIRE(written.size() == 1);
+    CHECK(written.at("bone") < 0.1);
+  }
+  SUBCASE("m films until m") {
+    act("key m sleep 0.3 key m");
+    CHECK(user.quit() == 0);
+    std::ifstream video(user.out() / "kerf-0001.y4m", std::ios::binary);
+    std::string line;
+    std::getline(video, line);
+    CHECK(line.find("YUV4MPEG2 W480 H360 F60:1 ") == 0);
+    std::getline(video, line);
+    CHECK(line == "FRAME");
+  }
+  SUBCASE("every panel may be shown") {
+    act("key p key h sleep 0.2 key p key h");
+    CHECK(user.look() == first);
+    CHECK(user.quit() == 0);
+  }
+  const std::string window = "search --name 'kerf: test' ";
+  SUBCASE("a window of one pixel, or of nothing on a side, comes back whole") {
+    for (const char* size : {"1 1", "0 0", "1 360", "480 1"}) act(window + "windowsize " + size);
+    act(window + "windowsize 480 360");
+    act("mousemove 300 180");
+    CHECK(user.look() == first);
+    CHECK(user.look_at_screen() == first);
+    CHECK(user.quit() == 0);
+  }
+  SUBCASE("a window of another size fills the screen with a picture of that size") {
+    CHECK(user.look_at_screen() == first);
+    for (const char* size : {"360 270", "600 450"}) {
+      act(window + "windowsize " + size);
+      const auto seen = user.look();
+      CHECK(seen.size() != first.size());
+      CHECK(user.look_at_screen() == seen);
+    }
+    CHECK(user.quit() == 0);
+  }
+  SUBCASE("a window that is minimised and restored shows what it showed, and still follows keys") {
+    for (int times = 0; times < 3; ++times) {
+      act(window + "windowunmap");
+      act(window + "windowmap");
+    }
+    act("mousemove 300 180");
+    CHECK(user.look() == first);
+    act("key v");
+    CHECK(user.look() != first);
+    CHECK(user.quit() == 0);
+  }
+}
+
+TEST_CASE("nothing covers a warning, whatever else is shown and in a small window too") {
+  if (!have("Xvfb") || !have("xdotool")) return;
+  const Screen screen;
+  User user(screen.folder);
+  constexpr int kMostOfIt = 5'000;  // of the ground of "stale: no news from the servo"
+  CHECK(warning_pixels(user.whole()) > kMostOfIt);
+  act("mousemove 100 310 sleep 0.2 mousedown 1 sleep 0.2 mouseup 1");  // the controls, to the front
+  CHECK(warning_pixels(user.whole()) > kMostOfIt);
+  act("key h");
+  CHECK(warning_pixels(user.whole()) > kMostOfIt);
+  act("search --name 'kerf: test' windowsize 300 360");
+  CHECK(warning_pixels(user.whole()) > kMostOfIt);
+  CHECK(user.quit() == 0);
+}
+
+TEST_CASE("each of two volumes takes its own renderer, by keys and by its list") {
+  if (!have("Xvfb") || !have("xdotool")) return;
+  const Screen screen;
+  User user(screen.folder, 2);
+  const auto first = user.look();
+  SUBCASE("b says which one v is for, and then that it is for all again") {
+    act("key b key b key v");  // the second
+    const auto mixed = user.look();
+    CHECK(mixed != first);
+    act("key b key v key v key v key v key v key v");
+    CHECK(user.look() == first);
+    act("key b key b key v");
+    CHECK(user.look() == mixed);
+    CHECK(user.quit() == 0);
+    CHECK(user.report()["renderer"] == "iso,blend");
+  }
+  SUBCASE("its list in the panel") {
+    const auto click = [](const std::string& at) {
+      act("mousemove " + at + " sleep 0.2 mousedown 1 sleep 0.2 mouseup 1");
+    };
+    click("90 238");  // the second one's,
+    click("45 145");  // and in it blend
+    act("mousemove 300 180");
+    CHECK(user.look() != first);
+    CHECK(user.quit() == 0);
+    CHECK(user.report()["renderer"] == "iso,blend");
+  }
+}
+
+TEST_CASE("the exit code of a window tells how the controller ended, and a video cut short") {
+  if (!have("Xvfb") || !have("xdotool")) return;
+  const Screen screen;
+  User user(screen.folder);
+  SUBCASE("cleanly") {
+    user.controller().say(Lifecycle::clean_end);
+    CHECK(user.quit() == 0);
+  }
+  SUBCASE("by a fault") {
+    user.controller().say(Lifecycle::fault);
+    CHECK(user.quit() == 1);
+  }
+  SUBCASE("a window that changes its size ends the video") {
+    act("key m");
+    act("search --name 'kerf: test' windowsize 400 300");
+    CHECK(user.quit() == 1);
+  }
+  SUBCASE("a video that the user ends is whole") {
+    act("key m sleep 0.3 key m");
+    act("search --name 'kerf: test' windowsize 400 300");
+    CHECK(user.quit() == 0);
+  }
+}

@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <set>
+
+#include <doctest/doctest.h>
+#include <nlohmann/json.hpp>
+
+#include "shared/posix/page_part.hpp"
+#include "tests/visualizer/gl/gl_fixture.hpp"
+#include "visualizer/bench/bench_tooth.hpp"
+#include "visualizer/bench/picture_page.hpp"
+
+using namespace kerf;
+
+namespace {
+
+std::size_t solid_voxels(const BenchTooth& tooth) {
+  return static_cast<std::size_t>(
+      std::count_if(tooth.density().begin(), tooth.density().end(),
+                    [&](Density density) { return density >= tooth.view().iso; }));
+}
+
+}  // namespace
+
+TEST_CASE("the made-up tooth is as large as the paper's, and a crop takes only air away") {
+  for (const VoxelGrid& padded : {VoxelGrid{128, 128, 80}, VoxelGrid{256, 256, 161}}) {
+    const BenchTooth tooth(padded, false);
+    const BenchTooth cropped(padded, true);
+    CHECK(solid_voxels(cropped) == solid_voxels(tooth));
+    CHECK(cropped.looked_at() == tooth.looked_at());
+    CHECK(cropped.looked_at() == cropped.view().corners());
+    // The paper's crops are 47x42x80 and 93x82x159.
+    const VoxelGrid& grid = cropped.view().bricks.grid;
+    CHECK(grid.nx == doctest::Approx(0.365 * padded.nx).epsilon(0.05));
+    CHECK(grid.ny == doctest::Approx(0.325 * padded.ny).epsilon(0.05));
+    CHECK(grid.nz == doctest::Approx(padded.nz).epsilon(0.03));
+  }
+}
+
+TEST_CASE("each cut takes material away, within the bricks that it names") {
+  constexpr int kCuts = 12;  // a subject of the bench takes 11 at most
+  for (const int diameter : {10, 16}) {
+    BenchTooth tooth({128, 128, 80}, true);
+    for (int i = 0; i < kCuts; ++i) {
+      CAPTURE(i);
+      const std::vector<Density> before = tooth.density();
+      const BenchCut cut = tooth.cut(diameter);
+      const std::set<std::uint32_t> named(cut.bricks.begin(), cut.bricks.end());
+      CHECK(named.size() == cut.bricks.size());
+      const auto in_a_box = [&](VoxelIndex voxel) {
+        return std::any_of(cut.differs.begin(), cut.differs.end(),
+                           [&](const VoxelBox& box) { return box.contains(voxel); });
+      };
+      std::size_t beside = 0;
+      const BrickGrid& bricks = tooth.view().bricks;
+      std::set<std::uint32_t> differ;
+      for (std::uint32_t id = 0; id < bricks.count(); ++id) {
+        const VoxelBox box = bricks.voxels(id);
+        for (int z = box.lo.z; z < box.hi.z; ++z) {
+          for (int y = box.lo.y; y < box.hi.y; ++y) {
+            for (int x = box.lo.x; x < box.hi.x; ++x) {
+              const std::size_t at = bricks.grid.index(x, y, z);
+              if (tooth.density()[at] == before[at]) continue;
+              differ.insert(id);
+              beside += in_a_box({x, y, z}) ? 0 : 1;
+            }
+          }
+        }
+      }
+      CHECK_FALSE(differ.empty());
+      CHECK(beside == 0);
+      CHECK(std::includes(named.begin(), named.end(), differ.begin(), differ.end()));
+    }
+  }
+}
+
+TEST_CASE("the bench's table has a line for each subject, beside the paper's figure") {
+  const VoxelGrid large{256, 256, 161};
+  const auto row = [&](const char* renderer, int tool, bool partial, double wall_ms) {
+    return PictureRow{.renderer = renderer,
+                      .volume = large,
+                      .tool = tool,
+                      .modifying = tool > 0,
+                      .partial = partial,
+                      .cpu_ms = 2.0 * wall_ms,
+                      .wall_ms_p50 = wall_ms,
+                      .wall_ms_p99 = wall_ms};
+  };
+  const std::vector<PictureRow> rows{row("iso", 0, false, 50.0), row("iso", 16, true, 4.0),
+                                     row("cast", 0, false, 8.0)};
+  const std::string table = picture_table(rows);
+  CHECK(table.find(
+            "| iso | 256x256x161 | 20.0 | - | - | - | 250 | 100 | - | 8.0 | GPU iso 6 / 6 |") !=
+        std::string::npos);
+  CHECK(table.find("| cast | 256x256x161 | 125 | - | - | - | - | 16.0 | - | - | - |") !=
+        std::string::npos);
+  CHECK(std::count(table.begin(), table.end(), '\n') == 4);
+
+  const PictureFigures figures{.rows = rows,
+                               .gradients = {{Gradient::corners, 0.5, 1.25}},
+                               .gl_renderer = "a driver",
+                               .size = {512, 512},
+                               .cores = 2};
+  const auto report = nlohmann::json::parse(picture_report(figures));
+  CHECK(report["gl_renderer"] == "a driver");
+  CHECK(report["rows"].size() == 3);
+  CHECK(report["rows"][1]["volume"] == "256x256x161");
+  CHECK(report["rows"][1]["gradient"] == "corners");
+  CHECK(report["rows"][1]["modifying"] == true);
+  CHECK(report["rows"][1]["partial"] == true);
+  CHECK(report["rows"][1]["fps"] == doctest::Approx(250.0));
+  CHECK(report["gradients"][0]["noisy_angle_deg"] == 1.25);
+  const std::string page = picture_page(figures);
+  CHECK(page.find("gl: a driver") != std::string::npos);
+  CHECK(page.find("| corners | 0.50 | 1.25 | 100 | - | 8.0 |") != std::string::npos);
+}
+
+TEST_CASE("the bench's summary has a line for each renderer on the paper's padded tooth") {
+  const auto row = [&](int edge, bool cropped, int tool, bool partial, double cpu_ms) {
+    return PictureRow{.renderer = "cast",
+                      .volume = {edge, edge, edge},
+                      .tool = tool,
+                      .cropped = cropped,
+                      .partial = partial,
+                      .cpu_ms = cpu_ms,
+                      .wall_ms_p50 = cpu_ms};
+  };
+  const PictureFigures figures{
+      .rows = {row(128, false, 0, false, 1.0), row(256, false, 0, false, 8.0),
+               row(256, false, 16, false, 9.0), row(256, false, 16, true, 0.5),
+               row(256, true, 0, false, 3.0)},
+      .gradients = {},
+      .gl_renderer = "a driver",
+      .size = {512, 512}};
+  const std::string summary = picture_summary(figures);
+  CHECK(summary.find("| cast | 125 | 2000 | 8.0 | 0.5 | 1/18.0 | - |\n") != std::string::npos);
+  CHECK(summary.find("gl: a driver") != std::string::npos);
+  CHECK(summary.find("docs/pictures.md") != std::string::npos);
+  CHECK(summary.find("| cast |", summary.find("| cast |") + 1) == std::string::npos);
+}
+
+TEST_CASE("each program replaces its own part of a page and leaves the others") {
+  const std::string first = with_part("", "a", "one\n");
+  const std::string both = with_part(first, "b", "two\n");
+  CHECK(first == "<!-- begin a -->\none\n<!-- end a -->\n");
+  CHECK(both.starts_with(first));
+  CHECK(with_part(both, "a", "one\n") == both);
+  CHECK(with_part(with_part(both, "a", "more\n"), "a", "one\n") == both);
+  CHECK(with_part("by hand\n", "a", "") == "by hand\n\n<!-- begin a -->\n<!-- end a -->\n");
+}
+
+TEST_CASE("on an antialiased ball the widest gradient has the least angle, with noise too") {
+  if (!kerf::test::have_gl()) return;
+  const std::vector<GradientRow> rows = measure_gradients();
+  REQUIRE(rows.size() == kGradientNames.size());
+  const GradientRow& widest = rows.back();
+  CHECK(widest.gradient == Gradient::farid5);
+  CHECK(widest.angle_deg < 0.3);
+  CHECK(widest.noisy_angle_deg < 0.6);
+  for (const GradientRow& row : rows) {
+    CHECK(row.angle_deg >= widest.angle_deg);
+    CHECK(row.noisy_angle_deg >= widest.noisy_angle_deg);
+    CHECK(row.noisy_angle_deg > row.angle_deg);
+  }
+}

@@ -1,0 +1,396 @@
+// SPDX-License-Identifier: Apache-2.0
+// The ray caster on the processor, without any GL: against analytic bodies, and against itself.
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cmath>
+#include <random>
+
+#include <doctest/doctest.h>
+#include <glm/gtc/matrix_transform.hpp>
+
+#include "tests/visualizer/gl/gl_fixture.hpp"
+#include "tests/visualizer/render/exact_body.hpp"
+#include "visualizer/cast/caster.hpp"
+#include "visualizer/error.hpp"
+
+using namespace kerf;
+using namespace kerf::test;
+
+namespace {
+
+constexpr PictureSize kSize{101, 83};  // no multiple of a packet, a block or a tile
+
+struct Cast {
+  CastPicture picture;
+  std::vector<float> normals;
+};
+
+Cast cast(Caster& caster, const View& view) {
+  Cast cast;
+  cast.picture.resize(kSize.width, kSize.height);
+  cast.normals.resize(3 * cast.picture.depth.size());
+  caster.draw(view, cast.picture.whole(), cast.picture, {}, cast.normals);
+  return cast;
+}
+
+/// Translucent: a tenth and a third of opacity over a voxel edge.
+CastMatter matter(std::span<const MaterialView> materials = {}) {
+  CastMatter made{.materials = make_palette(materials), .empty = 0.2, .full = 0.5};
+  for (glm::vec4& material : made.materials[0]) material.w = 0.1F;
+  for (glm::vec4& material : made.materials[1]) material.w = 0.33F;
+  return made;
+}
+
+Caster caster_of(std::initializer_list<const TestVolume*> volumes,
+                 const Caster::Options& options = {}) {
+  SceneView scene;
+  std::vector<CastContent> contents;
+  for (const TestVolume* volume : volumes) {
+    scene.volumes.push_back(volume->view);
+    contents.push_back({volume->density, {}, matter()});
+  }
+  return {scene, contents, options};
+}
+
+Caster::Options blending(float step_vox = 0.75F) {
+  Caster::Options options;
+  options.mode = CastMode::blend;
+  options.step_vox = step_vox;
+  return options;
+}
+
+struct Errors {
+  double depth_mm = 0.0;  ///< root mean square
+  double normal = 0.0;
+  int hits = 0;
+};
+
+Errors errors_at(const Distance& distance, double spacing_mm) {
+  const int n = static_cast<int>(std::lround(12.0 / spacing_mm)) + 1;
+  const VoxelGrid grid{n, n, n};
+  const TestVolume volume(grid, centred(grid, glm::dvec3(spacing_mm)), body(distance, 3.0));
+  Caster caster = caster_of({&volume});
+  const View view = look_at({7, 15, 19}, {}, 15, 40);
+  const Cast drawn = cast(caster, view);
+  Errors errors;
+  for (int y = 0; y < kSize.height; ++y) {
+    for (int x = 0; x < kSize.width; ++x) {
+      const PixelRay ray = pixel_ray(view, kSize, x, y);
+      const auto exact = exact_mm(distance, ray);
+      if (!exact) continue;
+      const glm::dvec3 normal = slope_of(distance, ray.origin_mm + *exact * ray.direction);
+      if (-glm::dot(normal, glm::normalize(ray.direction)) < kLeastFacing) continue;
+      const auto at = static_cast<std::size_t>((kSize.height - 1 - y) * kSize.width + x);
+      REQUIRE(drawn.picture.depth[at] < 1.0F);
+      const double off =
+          eye_distance_mm(static_cast<double>(drawn.picture.depth[at]), view) - *exact;
+      const glm::dvec3 seen(drawn.normals[3 * at], drawn.normals[3 * at + 1],
+                            drawn.normals[3 * at + 2]);
+      const glm::dvec3 wanted(view.eye_from_world * glm::dvec4(normal, 0.0));
+      errors.depth_mm += off * off;
+      errors.normal += glm::dot(seen - wanted, seen - wanted);
+      ++errors.hits;
+    }
+  }
+  errors.depth_mm = std::sqrt(errors.depth_mm / errors.hits);
+  errors.normal = std::sqrt(errors.normal / errors.hits);
+  return errors;
+}
+
+/// A heap of balls: silhouettes, gaps and self-occlusion; two labels and some without.
+struct Heap {
+  explicit Heap(unsigned seed) : volume(make(seed)) {
+    for (std::size_t i = 0; i < volume.density.size(); ++i) {
+      labels.push_back(static_cast<Label>(volume.density[i] == 0 ? 0 : i / 700 % 3));
+    }
+  }
+  static TestVolume make(unsigned seed) {
+    const VoxelGrid grid{61, 44, 37};
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> place(-4.0, 4.0);
+    std::vector<glm::dvec3> centres(25);
+    for (glm::dvec3& centre : centres) {
+      for (int axis = 0; axis < 3; ++axis) centre[axis] = place(random);
+    }
+    return {grid, centred(grid, {0.2, 0.25, 0.22}), [&](glm::dvec3 at) {
+              double most = 0.0;
+              for (const glm::dvec3& c : centres) most = std::max(most, ball(c, 0.8, 0.6)(at));
+              return most;
+            }};
+  }
+  TestVolume volume;
+  std::vector<Label> labels;
+};
+
+const std::array<View, 3> kViews{look_at({14, 9, 20}, {}, 10, 40),
+                                 look_at({0.1, 0.2, 0.3}, {5, 2, 1}, 0.05, 30),
+                                 look_at({-9, 9, 9}, {}, 5, 15)};
+
+}  // namespace
+
+TEST_CASE("N12: depth and normals of a ball and a torus are of second order in the voxel") {
+  for (const Distance& distance : {Distance(ball_distance), Distance(torus_distance)}) {
+    const Errors coarse = errors_at(distance, 0.4);
+    const Errors middle = errors_at(distance, 0.2);
+    const Errors fine = errors_at(distance, 0.1);
+    CHECK(coarse.hits > 500);
+    for (const double ratio : {coarse.depth_mm / middle.depth_mm, middle.depth_mm / fine.depth_mm,
+                               coarse.normal / middle.normal, middle.normal / fine.normal}) {
+      CHECK(std::log2(ratio) > 1.8);
+      CHECK(std::log2(ratio) < 2.2);
+    }
+    CHECK(fine.depth_mm < 0.02 * 0.1);
+  }
+}
+
+TEST_CASE("every instruction set gives the bits of one ray at a time") {
+  const Heap a(7);
+  Heap b(8);
+  b.volume.view.world_from_voxel =
+      glm::rotate(glm::dmat4(1.0), 0.4, glm::dvec3(0, 1, 0)) * b.volume.view.world_from_voxel;
+  SceneView scene;
+  scene.volumes = {a.volume.view, b.volume.view};
+  scene.materials = {
+      {"none", 0.0, {}}, {"one", 0.3, {0.8, 0.6, 0.3}}, {"two", 0.7, {0.3, 0.6, 0.8}}};
+  const std::array<CastContent, 2> contents{{{a.volume.density, a.labels, matter(scene.materials)},
+                                             {b.volume.density, {}, matter(scene.materials)}}};
+  for (const CastMode mode : {CastMode::iso, CastMode::blend}) {
+    Caster::Options options = blending();
+    options.mode = mode;
+    options.kernels = &kCastScalar;
+    Caster plain(scene, contents, options);
+    for (const CastKernels* const* set = cast_kernels(); *set != nullptr; ++set) {
+      CAPTURE((*set)->name);
+      options.kernels = *set;
+      Caster caster(scene, contents, options);
+      for (const View& view : kViews) {
+        const Cast wanted = cast(plain, view);
+        const Cast drawn = cast(caster, view);
+        CHECK(drawn.picture.rgba == wanted.picture.rgba);
+        CHECK(drawn.picture.depth == wanted.picture.depth);
+        CHECK(drawn.normals == wanted.normals);
+        CHECK(*std::ranges::min_element(wanted.picture.depth) < 1.0F);
+      }
+    }
+  }
+}
+
+TEST_CASE("a rectangle has the pixels of the whole picture and touches no other") {
+  const Heap heap(9);
+  for (const CastMode mode : {CastMode::iso, CastMode::blend}) {
+    Caster::Options options = blending();
+    options.mode = mode;
+    Caster caster = caster_of({&heap.volume}, options);
+    const CastPicture whole = cast(caster, kViews[0]).picture;
+    std::mt19937 random(3);
+    const auto pick = [&](int n) { return std::uniform_int_distribution<int>(0, n)(random); };
+    for (int i = 0; i < 30; ++i) {
+      PixelRect rect{pick(kSize.width), pick(kSize.height), pick(kSize.width), pick(kSize.height)};
+      if (rect.x1 < rect.x0) std::swap(rect.x0, rect.x1);
+      if (rect.y1 < rect.y0) std::swap(rect.y0, rect.y1);
+      CastPicture part;
+      part.resize(kSize.width, kSize.height);
+      constexpr std::uint32_t kUntouched = 0x12345678;
+      std::ranges::fill(part.rgba, kUntouched);
+      caster.draw(kViews[0], rect, part);
+      std::size_t wrong = 0;
+      for (std::size_t p = 0; p < part.rgba.size(); ++p) {
+        const auto x = static_cast<int>(p) % kSize.width;
+        const auto y = static_cast<int>(p) / kSize.width;
+        const bool in = x >= rect.x0 && x < rect.x1 && y >= rect.y0 && y < rect.y1;
+        wrong += part.rgba[p] != (in ? whole.rgba[p] : kUntouched) ? 1 : 0;
+        wrong += part.depth[p] != (in ? whole.depth[p] : 1.0F) ? 1 : 0;
+      }
+      CHECK(wrong == 0);
+    }
+  }
+}
+
+TEST_CASE("after random cuts, taking the changed bricks equals a fresh start pixel by pixel") {
+  for (const CastMode mode : {CastMode::iso, CastMode::blend}) {
+    const VoxelGrid grid{43, 37, 50};
+    TestVolume volume(grid, centred(grid, glm::dvec3(0.25)), ball({}, 4.4, 0.5));
+    Caster::Options options = blending();
+    options.mode = mode;
+    Caster edited = caster_of({&volume}, options);
+    const View view = look_at({9, 14, 17}, {}, 15, 35);
+    std::mt19937 random(11);
+    const auto pick = [&](int n) { return std::uniform_int_distribution<int>(0, n - 1)(random); };
+    for (int cut = 0; cut < 40; ++cut) {
+      const VoxelIndex at{pick(grid.nx), pick(grid.ny), pick(grid.nz)};
+      const VoxelBox box =
+          VoxelBox{at, {at.x + 1, at.y + 1, at.z + 1}}.grown(2 + pick(6)).clipped(grid.box());
+      for (int z = box.lo.z; z < box.hi.z; ++z) {
+        for (int y = box.lo.y; y < box.hi.y; ++y) {
+          for (int x = box.lo.x; x < box.hi.x; ++x) {
+            // Grows back in every third cut: cells become active again too.
+            volume.density[grid.index(x, y, z)] = cut % 3 == 2 ? 60000 : 0;
+          }
+        }
+      }
+      edited.update(0, volume.density, bricks_in(volume.view.bricks, box));
+      Caster fresh = caster_of({&volume}, options);
+      const CastPicture a = cast(edited, view).picture;
+      const CastPicture b = cast(fresh, view).picture;
+      CHECK(a.rgba == b.rgba);
+      CHECK(a.depth == b.depth);
+    }
+  }
+}
+
+TEST_CASE("of two intersecting volumes the analytically nearer surface is seen") {
+  const VoxelGrid grid{60, 60, 60};
+  const glm::dvec3 left{-1.5, 0, 0};
+  const glm::dvec3 right{1.5, 0, 0.4};
+  const TestVolume a(grid, centred(grid, glm::dvec3(0.15), left), ball(left, 3.0, 0.4));
+  const TestVolume b(grid, centred(grid, glm::dvec3(0.15), right), ball(right, 3.0, 0.4));
+  Caster ab = caster_of({&a, &b});
+  Caster ba = caster_of({&b, &a});
+  int compared = 0;
+  double worst_mm = 0.0;
+  for (int turn = 0; compared < 10'000; ++turn) {
+    const double angle = 0.61 * turn;
+    const View view = look_at({25 * std::sin(angle), 6, 25 * std::cos(angle)}, {}, 15, 40);
+    const CastPicture drawn = cast(ab, view).picture;
+    CHECK(drawn.depth == cast(ba, view).picture.depth);
+    const auto exact = [&](const PixelRay& ray, double radius_mm) {
+      return exact_mm(
+          [&](glm::dvec3 at) {
+            return std::min(glm::length(at - left), glm::length(at - right)) - radius_mm;
+          },
+          ray);
+    };
+    for (int y = 0; y < kSize.height; ++y) {
+      for (int x = 0; x < kSize.width; ++x) {
+        const PixelRay ray = pixel_ray(view, kSize, x, y);
+        const auto inner = exact(ray, 2.9);
+        const auto nearest = exact(ray, 3.0);
+        // Not at the rims: there a tenth of a voxel decides.
+        if (!inner || *inner - *nearest > 0.2) continue;
+        const auto at = static_cast<std::size_t>((kSize.height - 1 - y) * kSize.width + x);
+        const double seen_mm = eye_distance_mm(static_cast<double>(drawn.depth[at]), view);
+        worst_mm = std::max(worst_mm, std::abs(seen_mm - *nearest));
+        ++compared;
+      }
+    }
+  }
+  CHECK(worst_mm < 0.25 * 0.15);
+}
+
+TEST_CASE("a clip plane cuts a face into a ball, and takes away what is before it") {
+  const VoxelGrid grid{40, 40, 40};
+  const TestVolume volume(grid, centred(grid, glm::dvec3(0.25)), ball({}, 4.0, 0.5));
+  View view = look_at({0, 0, 30}, {}, 15, 45);
+  view.shown = {0, 0, -1, 1.5};  // z <= 1.5 mm
+  Caster caster = caster_of({&volume});
+  const Cast drawn = cast(caster, view);
+  const std::size_t middle = drawn.picture.depth.size() / 2;
+  CHECK(eye_distance_mm(static_cast<double>(drawn.picture.depth[middle]), view) ==
+        doctest::Approx(28.5).epsilon(1e-5));
+  CHECK(drawn.normals[3 * middle + 2] == doctest::Approx(1.0));
+  view.shown = {0, 0, -1, -4.5};
+  const Cast nothing = cast(caster, view);
+  CHECK(*std::ranges::min_element(nothing.picture.depth) == 1.0F);
+}
+
+TEST_CASE("the opacity of blend hardly depends on the step") {
+  const VoxelGrid grid{40, 40, 40};
+  const TestVolume volume(grid, centred(grid, glm::dvec3(0.25)), ball({}, 4.0, 2.0));
+  const View view = look_at({9, 14, 17}, {}, 15, 35);
+  const auto drawn = [&](float step_vox) {
+    Caster caster = caster_of({&volume}, blending(step_vox));
+    return cast(caster, view).picture;
+  };
+  const CastPicture exact = drawn(0.75F / 16);
+  const auto worst = [&](const CastPicture& picture) {
+    int worst = 0;
+    for (std::size_t i = 0; i < picture.rgba.size(); ++i) {
+      const auto alpha = [](std::uint32_t rgba) { return static_cast<int>(rgba >> 24); };
+      worst = std::max(worst, std::abs(alpha(picture.rgba[i]) - alpha(exact.rgba[i])));
+    }
+    return worst;
+  };
+  CHECK(worst(drawn(0.75F)) <= 8);
+  CHECK(worst(drawn(0.75F / 4)) <= 2);
+}
+
+TEST_CASE(
+    "blend gathers all between the near and the far plane, also where they cut through solid") {
+  const VoxelGrid grid{40, 40, 40};
+  constexpr double kEdgeMm = 0.25;
+  constexpr double kEyeMm = 30.0;
+  const TestVolume block(grid, centred(grid, glm::dvec3(kEdgeMm)), [](glm::dvec3) { return 1.0; });
+  // Beyond the last centres the density falls to nothing over an edge, of which `matter` shows
+  // 0.65.
+  constexpr double kHalfMm = 19.5 * kEdgeMm + 0.65 * kEdgeMm;
+  constexpr double kSafeMm = 4.5;  // from the axis: no ray passes a side
+  for (const auto& [near_mm, far_mm] :
+       {std::pair{20.0, 26.7}, {26.7, 28.9}, {29.9, 30.1}, {33.1, 40.0}}) {
+    CAPTURE(near_mm);
+    const View view = look_at({0, 0, kEyeMm}, {}, near_mm, far_mm);
+    Caster caster = caster_of({&block}, blending());
+    const Cast drawn = cast(caster, view);
+    const double begin_mm = std::max(near_mm, kEyeMm - kHalfMm);
+    const double end_mm = std::min(far_mm, kEyeMm + kHalfMm);
+    int compared = 0;
+    int wrong = 0;
+    for (int y = 0; y < kSize.height; ++y) {
+      for (int x = 0; x < kSize.width; ++x) {
+        const glm::dvec3 along = pixel_ray(view, kSize, x, y).direction;
+        if (std::max(std::abs(along.x), std::abs(along.y)) * end_mm > kSafeMm) continue;
+        const double edges = (end_mm - begin_mm) * glm::length(along) / kEdgeMm;
+        const double opacity = std::min((1.0 - std::pow(1.0 - 0.1, edges)) / 0.98, 1.0);
+        const auto at = static_cast<std::size_t>((kSize.height - 1 - y) * kSize.width + x);
+        wrong += std::abs((drawn.picture.rgba[at] >> 24) - 255.0 * opacity) > 1.0 ? 1 : 0;
+        wrong += std::abs(eye_distance_mm(static_cast<double>(drawn.picture.depth[at]), view) -
+                          begin_mm) > 0.15 * kEdgeMm
+                     ? 1
+                     : 0;
+        ++compared;
+      }
+    }
+    CHECK(compared > 1'500);
+    CHECK(wrong == 0);
+  }
+}
+
+TEST_CASE("blend ends its rays at the depth that it is given") {
+  const VoxelGrid grid{40, 40, 40};
+  const TestVolume volume(grid, centred(grid, glm::dvec3(0.25)), ball({}, 4.0, 0.5));
+  const View view = look_at({0, 0, 30}, {}, 15, 45);
+  Caster caster = caster_of({&volume}, blending());
+  CastPicture picture;
+  picture.resize(kSize.width, kSize.height);
+  const std::size_t middle = picture.depth.size() / 2;
+  const auto opacity_before = [&](double z_mm) {
+    const std::vector<float> end(
+        picture.depth.size(),
+        static_cast<float>(window_depth(30.0 - z_mm, view.near_mm, view.far_mm)));
+    caster.draw(view, picture.whole(), picture, end);
+    return picture.rgba[middle] >> 24;
+  };
+  CHECK(opacity_before(4.5) == 0);
+  CHECK(opacity_before(3.0) > 0);
+  CHECK(opacity_before(3.0) < opacity_before(2.0));
+  CHECK(opacity_before(-10.0) >= 245);
+}
+
+TEST_CASE("more volumes than the ray caster takes are refused, and the number is named") {
+  const VoxelGrid grid{2, 2, 2};
+  const TestVolume one(grid, glm::dmat4(1.0), [](glm::dvec3) { return 0.0; });
+  CHECK_THROWS_WITH_AS(caster_of({&one, &one, &one, &one, &one, &one, &one, &one, &one}),
+                       "scene: 9 volumes, and the ray caster takes 8; use --renderer iso",
+                       VisualizerError);
+}
+
+TEST_CASE("a pool does each piece once, with any number of workers, again and again") {
+  for (const int workers : {0, 1, 3}) {
+    TilePool pool(workers);
+    for (int round = 0; round < 200; ++round) {
+      std::array<std::atomic<int>, 57> done{};
+      pool.run(done.size(), [&](std::uint32_t i) { ++done[i]; });
+      CHECK(std::ranges::all_of(done, [](const auto& count) { return count == 1; }));
+    }
+  }
+}

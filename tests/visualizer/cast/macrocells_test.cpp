@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "visualizer/cast/macrocells.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include <doctest/doctest.h>
+#include <rapidcheck.h>
+
+#include "shared/segment/brick_grid.hpp"
+
+using namespace kerf;
+
+namespace {
+
+std::vector<Density> random_density(const VoxelGrid& grid) {
+  const auto values =
+      *rc::gen::container<std::vector<Density>>(97, rc::gen::inRange<Density>(0, 65535));
+  std::vector<Density> density(grid.voxel_count());
+  for (std::size_t i = 0; i < density.size(); ++i) density[i] = values[i * 31 % values.size()];
+  return density;
+}
+
+VoxelGrid random_grid() {
+  const auto edge = rc::gen::inRange(1, 20);
+  return {*edge, *edge, *edge};
+}
+
+/// Trilinear, with air outside, as the texture unit samples.
+double sample(const VoxelGrid& grid, const std::vector<Density>& density,
+              std::array<double, 3> at) {
+  double sum = 0.0;
+  for (int corner = 0; corner < 8; ++corner) {
+    VoxelIndex v;
+    double weight = 1.0;
+    const auto along = [&](double x, int bit) {
+      const double low = std::floor(x);
+      weight *= bit != 0 ? x - low : 1.0 - (x - low);
+      return static_cast<std::int32_t>(low) + bit;
+    };
+    v.x = along(at[0], corner & 1);
+    v.y = along(at[1], corner >> 1 & 1);
+    v.z = along(at[2], corner >> 2);
+    if (grid.contains(v)) sum += weight * density[grid.index(v.x, v.y, v.z)];
+  }
+  return sum;
+}
+
+}  // namespace
+
+TEST_CASE("no sample in a cell is above the cell's maximum, in and around the volume") {
+  CHECK(rc::check([] {
+    const VoxelGrid grid = random_grid();
+    const auto density = random_density(grid);
+    const std::int32_t edge = *rc::gen::element(2, 4, 8);
+    const Macrocells cells(grid, density, 1, edge);
+    const auto unit = rc::gen::inRange(0, 1001);
+    const auto coordinate = [&](int n) { return -1.0 + *unit * 1e-3 * (n + 1); };
+    const std::array<double, 3> at{coordinate(grid.nx), coordinate(grid.ny), coordinate(grid.nz)};
+    const auto cell = [&](double v) { return static_cast<std::int32_t>((v + 1.0) / edge); };
+    const VoxelIndex index{cell(at[0]), cell(at[1]), cell(at[2])};
+    RC_ASSERT(cells.grid().contains(index));
+    const double highest = cells.maxima()[cells.grid().index(index.x, index.y, index.z)];
+    RC_ASSERT(sample(grid, density, at) <= highest + 1e-6);
+  }));
+}
+
+TEST_CASE("cells kept up by changed bricks equal cells made anew") {
+  CHECK(rc::check([] {
+    const VoxelGrid grid = random_grid();
+    const Density iso = *rc::gen::inRange<Density>(1, 65535);
+    auto density = random_density(grid);
+    const std::int32_t edge = *rc::gen::element(2, 4, 8);
+    Macrocells kept(grid, density, iso, edge);
+    const BrickGrid bricks = BrickGrid::of(grid);
+    const auto id = *rc::gen::inRange(0U, bricks.count());
+    const Density value = *rc::gen::arbitrary<Density>();
+    const VoxelBox box = bricks.voxels(id);
+    for (int z = box.lo.z; z < box.hi.z; ++z) {
+      for (int y = box.lo.y; y < box.hi.y; ++y) {
+        for (int x = box.lo.x; x < box.hi.x; ++x) density[grid.index(x, y, z)] = value;
+      }
+    }
+    const std::vector<std::uint8_t> before(kept.active().begin(), kept.active().end());
+    const VoxelBox flipped = kept.update_bricks(bricks, {&id, 1}, density);
+    const Macrocells made(grid, density, iso, edge);
+    RC_ASSERT(std::ranges::equal(kept.maxima(), made.maxima()));
+    RC_ASSERT(std::ranges::equal(kept.active(), made.active()));
+    VoxelBox others;
+    for (std::size_t i = 0; i < before.size(); ++i) {
+      if (kept.active()[i] == before[i]) continue;
+      const VoxelGrid& n = kept.grid();
+      const auto at = static_cast<int>(i);
+      const VoxelIndex cell{at % n.nx, at / n.nx % n.ny, at / n.nx / n.ny};
+      others = others.united({cell, {cell.x + 1, cell.y + 1, cell.z + 1}});
+    }
+    RC_ASSERT(flipped == others);
+  }));
+}
+
+TEST_CASE("a line through the cells crosses as many faces inwards as outwards") {
+  CHECK(rc::check([] {
+    const VoxelGrid grid = random_grid();
+    const auto density = random_density(grid);
+    const Macrocells cells(grid, density, *rc::gen::inRange<Density>(60000, 65535));
+    std::map<std::array<std::uint16_t, 3>, int>
+        balance;  // of a line: axis and the other two places
+    for (const auto& [x, y, z, face] : cells.boundary_faces()) {
+      const auto axis = static_cast<std::uint16_t>(face / 2);
+      const std::array<std::uint16_t, 3> place{x, y, z};
+      balance[{axis, place[(axis + 1U) % 3], place[(axis + 2U) % 3]}] += face % 2 == 0 ? 1 : -1;
+    }
+    for (const auto& [line, sum] : balance) RC_ASSERT(sum == 0);
+  }));
+}

@@ -1,0 +1,394 @@
+// SPDX-License-Identifier: Apache-2.0
+// Partial redraw: the same pixels as drawing everything, for every renderer.
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <optional>
+#include <random>
+#include <string>
+#include <vector>
+
+#include <doctest/doctest.h>
+#include <unistd.h>
+
+#include "shared/segment/hand_over.hpp"
+#include "shared/segment/writer.hpp"
+#include "tests/visualizer/gl/gl_fixture.hpp"
+#include "visualizer/app/picture.hpp"
+#include "visualizer/error.hpp"
+#include "visualizer/render/renderer_choice.hpp"
+#include "visualizer/view/screen_bounds.hpp"
+
+using namespace kerf;
+using namespace kerf::test;
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr const char* kScene = R"({
+  "volumes": [{"name": "upper", "solid": true}, {"name": "lower", "solid": true}],
+  "tools": [{"name": "ball", "profile": [[-2, 0], [-1.4, 1.4], [0, 2], [1.4, 1.4], [2, 0]]},
+            {"name": "pin", "profile": [[0, 0], [0.5, 0.8], [6, 0.8]]}],
+  "materials": [{"name": "none", "iso": 0, "colour": [0, 0, 0]},
+                {"name": "dentin", "iso": 0.3, "colour": [0.8, 0.7, 0.5]},
+                {"name": "enamel", "iso": 0.7, "colour": [0.9, 0.9, 0.85]}]})";
+
+/// A controller in this process with two volumes that stand across each other.
+class Controller {
+ public:
+  Controller() : writer_(SegmentWriter::create(spec())), server_("redraw", writer_) {
+    writer_.set_lifecycle(Lifecycle::run);
+    move({});
+  }
+
+  /// Cuts a box of volume `v` to `left` of its density.
+  void cut(std::size_t v, const VoxelBox& box, double left) {
+    begin();
+    const VoxelGrid& grid = writer_grid(v);
+    std::vector<Density>& density = density_[v];
+    std::uint32_t removed = 0;
+    const VoxelBox inside = box.clipped(grid.box());
+    for (int z = inside.lo.z; z < inside.hi.z; ++z) {
+      for (int y = inside.lo.y; y < inside.hi.y; ++y) {
+        for (int x = inside.lo.x; x < inside.hi.x; ++x) {
+          Density& at = density[grid.index(x, y, z)];
+          const auto now = static_cast<Density>(at * left);
+          removed += static_cast<std::uint32_t>(at - now);
+          at = now;
+        }
+      }
+    }
+    if (!inside.empty()) writer_.publish_box(v, density, inside, removed);
+    end();
+  }
+  void move(const Hand& hand) {
+    hand_ = hand;
+    begin();
+    end();
+  }
+
+ private:
+  static constexpr VoxelGrid kUpper{40, 32, 28};
+  static constexpr VoxelGrid kLower{24, 48, 30};
+  static const VoxelGrid& writer_grid(std::size_t v) { return v == 0 ? kUpper : kLower; }
+
+  SegmentSpec spec() {
+    SegmentSpec spec;
+    spec.scene_json = kScene;
+    for (std::size_t v = 0; v < 2; ++v) {
+      const VoxelGrid& grid = writer_grid(v);
+      std::vector<Density>& density = density_[v];
+      for (int z = 0; z < grid.nz; ++z) {
+        for (int y = 0; y < grid.ny; ++y) {
+          for (int x = 0; x < grid.nx; ++x) {
+            // A comb, whose teeth darken each other over gaps of ten voxels.
+            const bool gap = y > 6 && x % 16 >= 6;
+            const bool border = x < 2 || y < 2 || z < 2 || x > grid.nx - 3 || z > grid.nz - 3;
+            density.push_back(gap || border ? Density{0} : Density(y > 20 ? 65535 : 39'000));
+          }
+        }
+      }
+      SegmentVolumeSpec& volume = spec.volumes.emplace_back();
+      volume.grid = grid;
+      volume.spacing_mm = {0.5, 0.5, v == 0 ? 0.5 : 0.7};
+      volume.origin_mm = {v == 0 ? -10.0 : -4.0, -8.0, -7.0 + 3.0 * static_cast<double>(v)};
+      if (v == 1) volume.orientation = {0.0F, 0.0F, 0.3826834F, 0.9238795F};
+      volume.iso = 29'000;
+      volume.density = density;
+    }
+    return spec;
+  }
+  void begin() { writer_.begin_tick(++now_); }
+  void end() {
+    TickRecord record{};
+    record.tick = now_;
+    record.flags = kFlagStarted;
+    for (int i = 0; i < 3; ++i) {
+      record.position_mm[i] = hand_.tip_mm[i];
+      record.commanded_force_n[i] = static_cast<float>(hand_.force_n[i]);
+    }
+    for (int i = 0; i < 4; ++i) record.orientation[i] = static_cast<float>(hand_.orientation[i]);
+    record.active_tool = hand_.tool;
+    writer_.publish_state(record);
+    writer_.end_tick(0);
+  }
+
+  std::vector<Density> density_[2];
+  SegmentWriter writer_;
+  SegmentServer server_;
+  Hand hand_;
+  Tick now_ = 0;
+};
+
+#ifdef KERF_FEWER_CASES
+constexpr int kEdits = 40;
+#else
+constexpr int kEdits = 200;
+#endif
+
+/// A private folder for the controller's socket.
+struct Place {
+  fs::path path = fs::temp_directory_path() / ("kerf-redraw-" + std::to_string(::getpid()));
+  Place() {
+    fs::create_directories(path);
+    setenv("XDG_RUNTIME_DIR", path.c_str(), 1);
+  }
+  ~Place() { fs::remove_all(path); }
+};
+
+/// Changes volumes, hand and camera at random, and compares each part that was drawn again with
+/// drawing everything.
+void check_parts(const Look& look, PictureSize size, int edits) {
+  std::mt19937 random(3);
+  const auto below = [&](int n) { return static_cast<int>(random() % static_cast<unsigned>(n)); };
+  Controller controller;
+  Session session("redraw");
+  session.poll();
+  Picture picture(session, look, 4.0 / 3.0);
+  const RenderTarget target(size);
+  const OverlayFigures figures;
+  static_cast<void>(picture.draw(session, figures, target));
+  const bool coarse = look.renderer.find("slices") != std::string::npos;  // while something moves
+  double redrawn = 0;
+  int parts = 0;
+  for (int edit = 0; edit < edits; ++edit) {
+    if (edit % 3 != 2) {
+      const VoxelIndex at{below(36), below(40), below(26)};
+      const int edge = 1 + below(9);
+      controller.cut(static_cast<std::size_t>(below(2)),
+                     {at, {at.x + edge, at.y + edge, at.z + edge}}, 0.25 * below(3));
+    }
+    if (edit % 4 == 3) {
+      Hand hand;
+      hand.tip_mm = {below(20) - 10.0, below(16) - 6.0, below(12) - 4.0};
+      hand.tool = static_cast<std::uint32_t>(below(2));
+      if (below(2) == 0) hand.force_n = {0.1 * below(20), 0.3, -0.2};
+      controller.move(hand);
+    }
+    if (edit % 10 == 9) picture.camera().orbit(0.05, 0.01);
+    session.poll();
+    picture.update(session);
+    const Redrawn part = picture.draw(session, figures, target);
+    if (edit % 10 == 9 || edit % 4 == 3) {  // comes to rest
+      CHECK(picture.draw(session, figures, target).any == coarse);
+    }
+    const auto seen = target.read_rgb();
+    if (edit % 10 != 9) {
+      redrawn += part.share;
+      ++parts;
+    }
+    picture.redraw_all();
+    CHECK(picture.draw(session, figures, target).share == 1.0);
+    const bool same = seen == target.read_rgb();
+    CAPTURE(edit);
+    REQUIRE(same);
+    // At rest nothing is drawn.
+    session.poll();
+    picture.update(session);
+    CHECK_FALSE(picture.draw(session, figures, target).any);
+  }
+  // One sees into the volume and the tool in it; of the other, what is hidden stays.
+  const std::vector<std::string> kinds = renderer_of_each(look.renderer, 2);
+  const bool opaque = std::none_of(kinds.begin(), kinds.end(), is_translucent);
+  const bool wide = look.stereo.on || look.voxel_tool || look.gradient != Gradient::corners;
+  CHECK(redrawn / parts < (wide ? 0.6 : opaque ? 0.08 : 0.2));
+}
+
+}  // namespace
+
+TEST_CASE("after any change the part that is drawn again makes the picture of drawing everything") {
+  if (!have_gl()) return;
+  const Place place;
+  for (const std::string_view kind : renderer_kinds()) {
+    CAPTURE(std::string(kind));
+    // What software GL draws slowly is small: to draw everything is most of the time.
+    const bool slow = kind == "blend" || kind == "slices";
+    check_parts({.renderer = std::string(kind)}, slow ? PictureSize{96, 72} : PictureSize{160, 120},
+                kEdits);
+    check_parts({.renderer = std::string(kind),
+                 .clip = {.on = true, .axis = 2, .at = 0.6},  // towards the camera
+                 .stereo = {.on = true}},
+                {161, 80}, kEdits / 10);
+  }
+}
+
+TEST_CASE("so it does where each volume has a renderer of its own") {
+  if (!have_gl()) return;
+  const Place place;
+  for (const char* choice : {"surface,blend", "cast-blend,iso", "slices,cast", "cast,surface"}) {
+    CAPTURE(choice);
+    check_parts({.renderer = choice}, {96, 72}, kEdits / 4);
+    check_parts({.renderer = choice, .voxel_tool = true}, {96, 72}, kEdits / 20);
+  }
+}
+
+TEST_CASE("slices are fewer around a tool that moves, and all of them once it rests") {
+  if (!have_gl()) return;
+  const Place place;
+  for (const bool voxel_tool : {false, true}) {
+    Controller controller;
+    Session session("redraw");
+    session.poll();
+    Picture picture(session, {.renderer = "slices", .voxel_tool = voxel_tool}, 4.0 / 3.0);
+    const RenderTarget target({160, 120});
+    static_cast<void>(picture.draw(session, {}, target));
+    std::vector<std::uint8_t> moving;
+    for (const double x_mm : {-2.0, 0.0, 2.0}) {
+      controller.move({.tip_mm = {x_mm, 6.0, 4.0}});
+      session.poll();
+      const double share = picture.draw(session, {}, target).share;
+      CHECK(share > 0.0);
+      CHECK(share < 0.5);
+      moving = target.read_rgb();
+    }
+    // A force that changes is no motion.
+    controller.move({.tip_mm = {2.0, 6.0, 4.0}, .force_n = {0.0, 0.01, 0.0}});
+    session.poll();
+    CHECK(picture.draw(session, {}, target).any);
+    const auto rest = target.read_rgb();
+    CHECK(rest != moving);
+    CHECK_FALSE(picture.draw(session, {}, target).any);
+    picture.redraw_all();
+    static_cast<void>(picture.draw(session, {}, target));
+    CHECK(rest == target.read_rgb());
+  }
+}
+
+TEST_CASE("so it does after more changes than are told apart") {
+  if (!have_gl()) return;
+  const Place place;
+  for (const char* kind : {"surface", "cast"}) {
+    CAPTURE(std::string(kind));
+    std::mt19937 random(3);
+    const auto below = [&](int n) { return static_cast<int>(random() % static_cast<unsigned>(n)); };
+    Controller controller;
+    Session session("redraw");
+    session.poll();
+    Picture picture(session, {.renderer = kind}, 4.0 / 3.0);
+    const RenderTarget target({96, 72});
+    static_cast<void>(picture.draw(session, {}, target));
+    for (int cut = 0; cut < 400; ++cut) {
+      const VoxelIndex at{below(40), below(40), below(28)};
+      controller.cut(static_cast<std::size_t>(below(2)), {at, {at.x + 9, at.y + 9, at.z + 9}}, 0.9);
+      session.poll();
+      picture.update(session);
+    }
+    static_cast<void>(picture.draw(session, {}, target));
+    const auto seen = target.read_rgb();
+    picture.redraw_all();
+    static_cast<void>(picture.draw(session, {}, target));
+    const bool same = seen == target.read_rgb();
+    CHECK(same);
+  }
+}
+
+TEST_CASE("so it does with any gradient") {
+  if (!have_gl()) return;
+  const Place place;
+  for (const Gradient gradient : {Gradient::central, Gradient::farid5}) {
+    check_parts({.renderer = "iso", .gradient = gradient}, {96, 72}, kEdits / 4);
+  }
+  for (const char* kind : {"surface", "blend", "slices"}) {
+    CAPTURE(std::string(kind));
+    check_parts({.renderer = kind, .gradient = Gradient::farid5}, {96, 72}, kEdits / 20);
+  }
+}
+
+TEST_CASE("so it does with a tool of voxels") {
+  if (!have_gl()) return;
+  const Place place;
+  for (const std::string_view kind : renderer_kinds()) {
+    CAPTURE(std::string(kind));
+    check_parts({.renderer = std::string(kind), .voxel_tool = true}, {96, 72}, kEdits / 10);
+  }
+}
+
+TEST_CASE("a changed look shows the picture of one that had it from the start") {
+  if (!have_gl()) return;
+  const Place place;
+  Controller controller;
+  Session session("redraw");
+  session.poll();
+  const RenderTarget target({160, 120});
+  const auto drawn = [&](Picture& picture) {
+    static_cast<void>(picture.draw(session, {}, target));
+    return target.read_rgb();
+  };
+  Look clipped{.renderer = "iso"};
+  clipped.clip = {.on = true, .axis = 0, .at = 0.4};
+  for (const Look& look : {Look{.renderer = "blend"}, Look{.renderer = "surface,blend"},
+                           Look{.renderer = "iso", .iso = 0.7}, clipped}) {
+    std::vector<std::uint8_t> changed;
+    {
+      Picture picture(session, {.renderer = "iso"}, 4.0 / 3.0);
+      const auto before = drawn(picture);
+      picture.set_look(session, look);
+      changed = drawn(picture);
+      CHECK(changed != before);
+      CHECK_THROWS_AS(picture.set_look(session, {.renderer = "voxels"}), VisualizerError);
+      CHECK(picture.look() == look);
+    }
+    Picture fresh(session, look, 4.0 / 3.0);
+    const bool same = drawn(fresh) == changed;
+    CHECK(same);
+  }
+}
+
+TEST_CASE("the first view shows every volume, in the middle of the picture") {
+  if (!have_gl()) return;
+  const Place place;
+  Controller controller;
+  Session session("redraw");
+  session.poll();
+  Picture picture(session, {.renderer = "iso"}, 1.0);
+  const View view = picture.camera().view(1.0, picture.camera().radius_mm());
+  for (const VolumeView& volume : session.scene().volumes) {
+    const BoxCorners box = volume.corners();
+    // A box's corners may lie outside, where there is hardly ever anything; its faces do not.
+    const glm::dvec3 middle = 0.5 * (box.front() + box.back());
+    for (const std::size_t along : {1U, 2U, 4U}) {
+      for (const double side : {-0.5, 0.5}) {
+        const glm::dvec3 face = middle + side * (box[along] - box[0]);
+        const glm::dvec4 clip = view.clip_from_eye() * view.eye_from_world * glm::dvec4(face, 1.0);
+        CHECK(std::max(std::abs(clip.x), std::abs(clip.y)) < clip.w);
+      }
+    }
+  }
+}
+
+TEST_CASE("a target made anew in the place of another, a column narrower, is drawn whole") {
+  if (!have_gl()) return;
+  const Place place;
+  Controller controller;
+  Session session("redraw");
+  session.poll();
+  Picture picture(session, {.renderer = "iso", .stereo = {.on = true}}, 4.0 / 3.0);
+  std::optional<RenderTarget> target(std::in_place, PictureSize{161, 80});
+  static_cast<void>(picture.draw(session, {}, *target));
+  target.emplace(PictureSize{160, 80});
+  static_cast<void>(picture.draw(session, {}, *target));
+  const auto seen = target->read_rgb();
+  picture.redraw_all();
+  static_cast<void>(picture.draw(session, {}, *target));
+  const bool same = seen == target->read_rgb();
+  CHECK(same);
+}
+
+TEST_CASE("bounds on the screen hold all that is inside a box, and the whole screen near the eye") {
+  const View view = look_at({0, 0, 10}, {0, 0, 0}, 1, 100);
+  const PictureSize size{200, 100};
+  std::vector<glm::dvec3> corners{{-0.5, -0.5, -0.5}, {0.5, 0.5, 0.5}};
+  View wide = view;
+  wide.aspect = 2.0;
+  const PixelRect bounds = screen_bounds(corners, wide, size);
+  CHECK(bounds.x0 > 60);
+  CHECK(bounds.x1 < 140);
+  CHECK(bounds.y0 >= 0);
+  CHECK(bounds.y1 <= 100);
+  CHECK(bounds.x0 + bounds.x1 == doctest::Approx(200).epsilon(0.05));
+  corners.emplace_back(0, 0, 9.5);
+  CHECK(screen_bounds(corners, wide, size) == PixelRect{0, 0, 200, 100});
+  corners = {{100, 0, 0}, {101, 1, 1}};
+  CHECK(screen_bounds(corners, wide, size).empty());
+}

@@ -1,0 +1,173 @@
+// SPDX-License-Identifier: Apache-2.0
+// What every renderer leaves out on demand: what the clip plane takes, what is outside a rectangle.
+#include <cmath>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <doctest/doctest.h>
+
+#include "tests/visualizer/gl/gl_fixture.hpp"
+#include "tests/visualizer/render/renderer_fixture.hpp"
+
+using namespace kerf;
+using namespace kerf::test;
+
+TEST_CASE("the clip plane leaves a face where it cuts through solid, and nothing before it") {
+  if (!have_gl()) return;
+  const VoxelGrid grid{40, 40, 40};
+  const TestVolume volume(grid, centred(grid, glm::dvec3(0.25)), ball({}, 3.5, 0.5));
+  const VolumeContent content = volume.content();
+  View view = look_at({0, 0, 30}, {}, 20, 40);
+  view.shown = {0, 0, -1, 1.03};  // z <= 1.03 mm
+  for (const std::string_view kind : renderer_kinds()) {
+    CAPTURE(std::string(kind));
+    const auto renderer = make_renderer(kind, scene_of({&volume}), {&content, 1});
+    renderer->set_cut_open(true, {&content, 1});
+    const Drawn drawn = draw(*renderer, view, RenderTarget(kTestSize));
+    const std::size_t middle = pixel_at(48, 48);
+    CHECK(eye_distance_mm(static_cast<double>(drawn.depth[middle]), view) ==
+          doctest::Approx(28.97).epsilon(1e-5));
+    CHECK(drawn.rgb[3 * middle] > 60);  // lit
+    for (const float depth : drawn.depth) {
+      CHECK(eye_distance_mm(static_cast<double>(depth), view) > 28.969);
+    }
+  }
+}
+
+TEST_CASE("iso, surface and cast show the same face in the clip plane, also after a cut") {
+  if (!have_gl()) return;
+  const VoxelGrid grid{48, 40, 36};
+  // A soft core, which colours a part of the face.
+  TestVolume volume(grid, centred(grid, {0.2, 0.25, 0.3}), [](glm::dvec3 at) {
+    return ball({}, 3.5, 0.5)(at) - 0.4 * ball({0.5, 0.3, 0.0}, 1.2, 0.5)(at);
+  });
+  SceneView scene = scene_of({&volume});
+  scene.materials = {
+      {"none", 0.0, {0, 0, 0}}, {"dentin", 0.4, {0.8, 0.2, 0.1}}, {"enamel", 0.8, {0.2, 0.3, 0.9}}};
+  const VolumeContent content = volume.content();
+  View view = look_at({9, 12, 30}, {}, 20, 45);
+  view.shown = {0.0, -0.6, -0.8, 0.3};
+  const RenderTarget target(kTestSize);
+  std::vector<std::unique_ptr<Renderer>> renderers;
+  for (const char* kind : {"iso", "surface", "cast"}) {
+    renderers.push_back(make_renderer(kind, scene, {&content, 1}));
+    renderers.back()->set_cut_open(true, {&content, 1});
+  }
+  const VoxelBox cut{{20, 14, 14}, {31, 22, 30}};
+  for (const bool after : {false, true}) {
+    if (after) {
+      for (int z = cut.lo.z; z < cut.hi.z; ++z) {
+        for (int y = cut.lo.y; y < cut.hi.y; ++y) {
+          for (int x = cut.lo.x; x < cut.hi.x; ++x) volume.density[grid.index(x, y, z)] = 0;
+        }
+      }
+      const auto changed = bricks_in(volume.view.bricks, cut);
+      for (const auto& renderer : renderers) renderer->update(0, volume.density, changed);
+    }
+    const Drawn iso = draw(*renderers[0], view, target);
+    for (std::size_t other : {1U, 2U}) {
+      const Drawn drawn = draw(*renderers[other], view, target);
+      int face = 0, same = 0;
+      for (int y = 0; y < kTestSize.height; ++y) {
+        for (int x = 0; x < kTestSize.width; ++x) {
+          const std::size_t at = pixel_at(x, y);
+          const PixelRay ray = pixel_ray(view, kTestSize, x, y);
+          const auto eye_mm = eye_distance_mm(static_cast<double>(iso.depth[at]), view);
+          const glm::dvec4 hit(ray.origin_mm + eye_mm * ray.direction, 1.0);
+          if (std::abs(glm::dot(view.shown, hit)) > 1e-3) continue;
+          ++face;
+          bool equal = std::abs(drawn.depth[at] - iso.depth[at]) < 1e-6F;
+          for (std::size_t c = 3 * at; c < 3 * at + 3; ++c) {
+            equal = equal && std::abs(drawn.rgb[c] - iso.rgb[c]) <= 3;
+          }
+          if (equal) ++same;
+        }
+      }
+      CAPTURE(after);
+      CAPTURE(other);
+      CHECK(face > 1000);
+      CHECK(same >= face * 0.995);
+    }
+  }
+}
+
+TEST_CASE("a face in the clip plane has the colour of what lies in it, not behind it") {
+  if (!have_gl()) return;
+  const VoxelGrid grid{32, 32, 32};
+  const TestVolume volume(grid, centred(grid, glm::dvec3(0.25)),
+                          [](glm::dvec3 at) { return at.z > 1.0 ? 0.5 : 1.0; });
+  SceneView scene = scene_of({&volume});
+  scene.volumes[0].iso = 20'000;
+  scene.materials = {
+      {"none", 0.0, {0, 0, 0}}, {"red", 0.3, {0.8, 0.1, 0.1}}, {"blue", 0.8, {0.1, 0.1, 0.8}}};
+  const VolumeContent content = volume.content();
+  View view = look_at({0, 0, 30}, {}, 20, 40);
+  for (const char* kind : {"iso", "surface", "cast"}) {
+    CAPTURE(std::string(kind));
+    const auto renderer = make_renderer(kind, scene, {&content, 1});
+    renderer->set_cut_open(true, {&content, 1});
+    const std::size_t middle = 3 * pixel_at(48, 48);
+    view.shown = {0, 0, -1, 1.125};  // through the last red voxels
+    const Drawn red = draw(*renderer, view, RenderTarget(kTestSize));
+    CHECK(red.rgb[middle] > 2 * red.rgb[middle + 2]);
+    view.shown = {0, 0, -1, 0.875};
+    const Drawn blue = draw(*renderer, view, RenderTarget(kTestSize));
+    CHECK(blue.rgb[middle + 2] > 2 * blue.rgb[middle]);
+  }
+}
+
+TEST_CASE("a plane beyond a volume hides it whole, one on its near side nothing") {
+  if (!have_gl()) return;
+  const VoxelGrid grid{24, 24, 24};
+  const TestVolume volume(grid, centred(grid, glm::dvec3(0.25)), ball({}, 2.0, 0.5));
+  const VolumeContent content = volume.content();
+  const View all = look_at({5, 7, 28}, {}, 20, 40);
+  const RenderTarget target(kTestSize);
+  for (const std::string_view kind : renderer_kinds()) {
+    CAPTURE(std::string(kind));
+    const auto renderer = make_renderer(kind, scene_of({&volume}), {&content, 1});
+    const Drawn whole = draw(*renderer, all, target);
+    renderer->set_cut_open(true, {&content, 1});
+    View view = all;
+    view.shown = {1, 0, 0, 4.0};
+    CHECK(draw(*renderer, view, target).rgb == whole.rgb);
+    view.shown = {1, 0, 0, -4.0};
+    for (const float depth : draw(*renderer, view, target).depth) CHECK(depth == 1.0F);
+  }
+}
+
+TEST_CASE(
+    "within a part of the target the pixels are those of the whole picture, the others stay") {
+  if (!have_gl()) return;
+  const TestVolume volume = heap_of_balls();
+  const VolumeContent content = volume.content();
+  const View view = look_at({14, 9, 20}, {}, 10, 40);
+  RenderTarget target(kTestSize);
+  constexpr int kLeft = 31, kBottom = 22, kWide = 37, kHigh = 41;
+  for (const std::string_view kind : renderer_kinds()) {
+    CAPTURE(std::string(kind));
+    const auto renderer = make_renderer(kind, scene_of({&volume}), {&content, 1});
+    const Drawn whole = draw(*renderer, view, target);
+    target.bind();
+    glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
+    target.restrict_to({kLeft, kBottom, kLeft + kWide, kBottom + kHigh});
+    renderer->draw(view, target);
+    target.restrict_to(target.all());
+    const auto rgb = target.read_rgb();
+    const auto depth = target.read_depth();
+    int wrong = 0;
+    for (int y = 0; y < kTestSize.height; ++y) {
+      for (int x = 0; x < kTestSize.width; ++x) {
+        const int up = kTestSize.height - 1 - y;
+        const bool inside =
+            x >= kLeft && x < kLeft + kWide && up >= kBottom && up < kBottom + kHigh;
+        const std::size_t at = pixel_at(x, y);
+        wrong += depth[at] != (inside ? whole.depth[at] : 1.0F) ? 1 : 0;
+        wrong += rgb[3 * at] != (inside ? whole.rgb[3 * at] : 0) ? 1 : 0;
+      }
+    }
+    CHECK(wrong == 0);
+  }
+}

@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "visualizer/view/camera.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include <doctest/doctest.h>
+#include <rapidcheck.h>
+
+using namespace kerf;
+
+namespace {
+
+BoxCorners box(glm::dvec3 lo, glm::dvec3 hi) {
+  BoxCorners corners;
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    corners[i] = {(i & 1) != 0 ? hi.x : lo.x, (i & 2) != 0 ? hi.y : lo.y,
+                  (i & 4) != 0 ? hi.z : lo.z};
+  }
+  return corners;
+}
+
+glm::dvec3 ndc(const View& view, glm::dvec3 world_mm) {
+  const glm::dvec4 clip = view.clip_from_eye() * view.eye_from_world * glm::dvec4(world_mm, 1.0);
+  return glm::dvec3(clip) / clip.w;
+}
+
+}  // namespace
+
+TEST_CASE("equation (1) is the depth of the projection matrix at every distance") {
+  CHECK(rc::check([] {
+    View view;
+    view.near_mm = *rc::gen::inRange(1, 10'000) * 1e-3;
+    view.far_mm = view.near_mm * (1.0 + *rc::gen::inRange(1, 10'000) * 1e-2);
+    const double share = *rc::gen::inRange(0, 1001) * 1e-3;
+    const double eye_mm = view.near_mm + share * (view.far_mm - view.near_mm);
+    const glm::dvec4 clip = view.clip_from_eye() * glm::dvec4(0.3, -0.2, -eye_mm, 1.0);
+    const double depth = window_depth(eye_mm, view.near_mm, view.far_mm);
+    RC_ASSERT(std::abs(depth - 0.5 * (clip.z / clip.w + 1.0)) < 1e-9);
+  }));
+  CHECK(window_depth(2.0, 2.0, 50.0) == doctest::Approx(0.0));
+  CHECK(window_depth(50.0, 2.0, 50.0) == doctest::Approx(1.0));
+}
+
+TEST_CASE("a framed box lies between near and far with its middle in the middle of the picture") {
+  CHECK(rc::check([] {
+    const auto mm = [](int from) { return rc::gen::inRange(from, 400); };
+    const glm::dvec3 lo{*mm(-400), *mm(-400), *mm(-400)};
+    const glm::dvec3 hi = lo + glm::dvec3{*mm(1), *mm(1), *mm(1)};
+    const double aspect = *rc::gen::inRange(2, 40) * 0.1;
+    OrbitCamera camera;
+    camera.frame(box(lo, hi), aspect);
+    const View view = camera.view(aspect, 0.5 * glm::length(hi - lo));
+    for (const glm::dvec3& corner : box(lo, hi)) {
+      const glm::dvec3 at = ndc(view, corner);
+      RC_ASSERT(std::abs(at.z) <= 1.0 + 1e-9);
+      RC_ASSERT(std::max(std::abs(at.x), std::abs(at.y)) < 1.4);
+    }
+    const glm::dvec3 middle = ndc(view, 0.5 * (lo + hi));
+    RC_ASSERT(std::hypot(middle.x, middle.y) < 1e-9);
+  }));
+}
+
+TEST_CASE("of two boxes far apart both are framed, as one box around both would be") {
+  const BoxCorners left = box({-30, -2, -2}, {-25, 3, 2});
+  const BoxCorners right = box({20, -1, -4}, {26, 4, 1});
+  std::vector<glm::dvec3> both(left.begin(), left.end());
+  both.insert(both.end(), right.begin(), right.end());
+  OrbitCamera camera;
+  camera.frame(both, 1.5);
+  CHECK(camera.radius_mm() == doctest::Approx(glm::length(glm::dvec3(28, 3, 3))).epsilon(0.05));
+  const View view = camera.view(1.5, camera.radius_mm());
+  double widest = 0.0;
+  for (const glm::dvec3& corner : both) widest = std::max(widest, std::abs(ndc(view, corner).x));
+  CHECK(widest > 0.8);
+  CHECK(widest < 1.2);
+}
+
+TEST_CASE("whatever the user drags, the view stays a rigid one with near before far") {
+  CHECK(rc::check([](const std::vector<std::array<int, 3>>& drags) {
+    OrbitCamera camera;
+    camera.frame(box({-5, -5, -5}, {5, 9, 5}), 1.5);
+    for (const auto& [kind, a, b] : drags) {
+      const double x = (a % 4000) * 1e-2;
+      const double y = (b % 4000) * 1e-2;
+      if (kind % 3 == 0) camera.orbit(x, y);
+      if (kind % 3 == 1) camera.pan(x, y);
+      if (kind % 3 == 2) camera.zoom(x);
+    }
+    const View view = camera.view(1.5, 20.0);
+    const glm::dmat3 turn(view.eye_from_world);
+    RC_ASSERT(std::abs(glm::determinant(turn) - 1.0) < 1e-9);
+    RC_ASSERT(view.near_mm > 0.0);
+    RC_ASSERT(view.far_mm > view.near_mm);
+  }));
+}
+
+TEST_CASE("dragging to the right moves what is in the middle to the right") {
+  OrbitCamera camera;
+  camera.frame(box({-5, -5, -5}, {5, 5, 5}), 1.0);
+  camera.pan(0.1, 0.0);
+  CHECK(ndc(camera.view(1.0, 9.0), {0, 0, 0}).x == doctest::Approx(0.2));  // of half the height
+  camera.frame(box({-5, -5, -5}, {5, 5, 5}), 1.0);
+  camera.orbit(0.05, 0.0);
+  const View view = camera.view(1.0, 9.0);
+  const glm::dvec3 towards_eye(glm::transpose(glm::dmat3(view.eye_from_world)) *
+                               glm::dvec3(0, 0, 3));
+  OrbitCamera still;
+  still.frame(box({-5, -5, -5}, {5, 5, 5}), 1.0);
+  const View before = still.view(1.0, 9.0);
+  const glm::dvec3 front(glm::transpose(glm::dmat3(before.eye_from_world)) * glm::dvec3(0, 0, 3));
+  CHECK(ndc(view, front).x > 0.0);  // the point that was in front has gone right
+  CHECK(ndc(view, towards_eye).x == doctest::Approx(0.0));
+}

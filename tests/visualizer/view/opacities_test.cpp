@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: Apache-2.0
+// Opacities that a user chose: their file, and the pictures that show them.
+#include <array>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include <doctest/doctest.h>
+#include <rapidcheck.h>
+#include <unistd.h>
+
+#include "tests/visualizer/gl/gl_fixture.hpp"
+#include "tests/visualizer/render/renderer_fixture.hpp"
+#include "visualizer/error.hpp"
+#include "visualizer/view/transfer_file.hpp"
+#include "visualizer/view/transfer_function.hpp"
+
+using namespace kerf;
+using namespace kerf::test;
+namespace fs = std::filesystem;
+
+namespace {
+
+const std::vector<MaterialView> kTooth{{"none", 0.0, {0, 0, 0}},
+                                       {"enamel", 0.81, {1, 1, 1}},
+                                       {"dentin", 0.45, {0, 1, 0}},
+                                       {"pulp", 0.14, {1, 0, 0}}};
+
+std::string refusal_of(std::string_view text) {
+  try {
+    static_cast<void>(parse_transfer(text, "t.toml"));
+  } catch (const VisualizerError& problem) {
+    return problem.what();
+  }
+  return "accepted";
+}
+
+}  // namespace
+
+TEST_CASE("opacities come back from a file as they went, whatever a material is called") {
+  const fs::path file =
+      fs::temp_directory_path() / ("kerf-opacities-" + std::to_string(::getpid()) + ".toml");
+  CHECK(rc::check([&](const std::vector<std::string>& names) {
+    Opacities opacities{{"enamel", 0.125}, {"tooth \"36\"", 1.0}, {"", 0.0}};
+    for (std::string name : names) {
+      for (char& c : name) c = static_cast<char>(' ' + static_cast<unsigned char>(c) % 95);
+      opacities[name] = *rc::gen::inRange(0, 1001) / 1000.0;
+    }
+    write_transfer(file, opacities);
+    RC_ASSERT(read_transfer(file) == opacities);
+  }));
+  fs::remove(file);
+  CHECK(parse_transfer("[opacity]\n", "t.toml").empty());
+  CHECK(parse_transfer("opacity = {pulp = 1}", "t.toml") == Opacities{{"pulp", 1.0}});
+}
+
+TEST_CASE("a bad transfer function is refused in one line: place, value, way out") {
+  CHECK(refusal_of("") == "t.toml: there is no table [opacity]; write one");
+  CHECK(refusal_of("[opacity]\nenamel = 1.5") ==
+        "t.toml:2: opacity.enamel = 1.5 is no opacity; give a number from 0 to 1");
+  CHECK(refusal_of("[opacity]\nenamel = \"a\\nb\"").find("\n") == std::string::npos);
+  CHECK(refusal_of("[opacity]\nenamel = nan").find("nan is no opacity") != std::string::npos);
+  CHECK(refusal_of("[opacity]\n\nenamel = []").find("t.toml:3: ") == 0);
+  CHECK(refusal_of("opacity = 1").find("known is the table [opacity]") != std::string::npos);
+  CHECK(refusal_of("[opacity]\n[colour]") ==
+        "t.toml:2: colour is not known here; known is the table [opacity]");
+  CHECK(refusal_of("[!]").find("correct the TOML syntax") != std::string::npos);
+  SceneView scene;
+  scene.materials = kTooth;
+  check_materials({{"pulp", 0.5}}, scene, "t.toml");
+  CHECK_THROWS_WITH_AS(
+      check_materials({{"none", 0.5}}, scene, "t.toml"),
+      "t.toml: opacity.none is no material of this scene; it has enamel, dentin, pulp",
+      VisualizerError);
+}
+
+TEST_CASE("whatever a file holds, it gives opacities from 0 to 1 or one line") {
+  const std::array<std::string, 12> kPieces{"[opacity]", "enamel", "=", "0.3",   "\n",   "[",
+                                            "]",         "\"",     "{", "1e999", "# \t", "\xff"};
+  CHECK(rc::check([&](const std::string& noise) {
+    const auto picks = *rc::gen::container<std::vector<std::size_t>>(
+        rc::gen::inRange(std::size_t{0}, kPieces.size() + 1));
+    std::string text = "[opacity]\n";
+    for (const std::size_t pick : picks) text += pick < kPieces.size() ? kPieces[pick] : noise;
+    try {
+      for (const auto& [material, opacity] : parse_transfer(text, "t.toml")) {
+        RC_ASSERT(opacity >= 0.0);
+        RC_ASSERT(opacity <= 1.0);
+      }
+    } catch (const VisualizerError& problem) {
+      RC_ASSERT(std::string(problem.what()).find('\n') == std::string::npos);
+    }
+  }));
+}
+
+TEST_CASE("a material has the opacity that was chosen, the others the one by their hardness") {
+  std::vector<MaterialView> materials = kTooth;
+  materials[2].opacity = 0.7;
+  const Palette before = make_palette(kTooth);
+  const Palette after = make_palette(materials);
+  CHECK(after[1][2].a == doctest::Approx(0.7));
+  CHECK(after[1][1] == before[1][1]);
+  CHECK(after[1][3] == before[1][3]);
+  CHECK(after[0][140].a == doctest::Approx(0.7));  // dentin by density
+  for (std::size_t m = 1; m < kTooth.size(); ++m) {
+    CHECK(static_cast<double>(before[1][m].a) == doctest::Approx(default_opacity(kTooth, m)));
+  }
+}
+
+TEST_CASE("new opacities make the picture of a renderer that had them from the start") {
+  if (!have_gl()) return;
+  const VoxelGrid grid{30, 26, 24};
+  const TestVolume volume(grid, centred(grid, glm::dvec3(0.3)), ball({}, 3.0, 1.5));
+  std::vector<Label> labels;
+  for (const Density density : volume.density) {
+    labels.push_back(density < 9000 ? Label{0} : density < 50'000 ? Label{2} : Label{1});
+  }
+  SceneView scene = scene_of({&volume});
+  scene.materials = kTooth;
+  SceneView changed = scene;
+  changed.materials[1].opacity = 0.02;
+  changed.materials[2].opacity = 0.9;
+  const View view = look_at({6, 7, 17}, {}, 8, 35);
+  const RenderTarget target(kTestSize);
+  for (const bool labelled : {false, true}) {
+    const VolumeContent content{volume.density,
+                                labelled ? std::span<const Label>(labels) : std::span<Label>()};
+    for (const std::string_view kind : renderer_kinds()) {
+      CAPTURE(std::string(kind));
+      CAPTURE(labelled);
+      const auto renderer = make_renderer(kind, scene, {&content, 1});
+      const Drawn before = draw(*renderer, view, target);
+      renderer->set_opacities(changed.materials, {&content, 1});
+      const Drawn after = draw(*renderer, view, target);
+      CHECK((after.rgb == before.rgb) != renderer->translucent());
+      const auto fresh = make_renderer(kind, changed, {&content, 1});
+      const bool same = draw(*fresh, view, target).rgb == after.rgb;
+      CHECK(same);
+      renderer->set_opacities(scene.materials, {&content, 1});
+      const bool back = draw(*renderer, view, target).rgb == before.rgb;
+      CHECK(back);
+    }
+  }
+}

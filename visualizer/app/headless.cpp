@@ -1,0 +1,154 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cstdio>
+#include <optional>
+#include <thread>
+
+#include "shared/posix/new_file.hpp"
+#include "visualizer/app/contact_sheet.hpp"
+#include "visualizer/app/cpu_placement.hpp"
+#include "visualizer/app/export_surface.hpp"
+#include "visualizer/app/frame_schedule.hpp"
+#include "visualizer/app/picture.hpp"
+#include "visualizer/app/recording.hpp"
+#include "visualizer/app/run.hpp"
+#include "visualizer/gl/context.hpp"
+#include "visualizer/view/file_out.hpp"
+#include "visualizer/view/frame_report.hpp"
+#include "visualizer/view/stop_signal.hpp"
+#include "visualizer/view/transfer_file.hpp"
+
+namespace kerf {
+
+namespace {
+
+constexpr auto kIdle = std::chrono::milliseconds(2);  // two ticks: a picture is at most that late
+constexpr auto kShort = std::chrono::microseconds(100);  // where the next tick is due
+constexpr double kMsPerS = 1e3;
+
+std::filesystem::path frame_file(const std::filesystem::path& folder, std::uint32_t number) {
+  std::array<char, 32> name{};
+  std::snprintf(name.data(), name.size(), "frame-%04u.png", number);
+  return folder / name.data();
+}
+
+/// Draws the session as it is and measures that.
+class FrameTaker {
+ public:
+  FrameTaker(Picture& picture, PictureSize size, FrameReport& report)
+      : picture_(picture), target_(size), report_(report) {}
+
+  void draw(Session& session) {
+    figures_ = overlay_figures(session);
+    draw_measured(picture_, session, figures_, target_, report_);
+  }
+  [[nodiscard]] const RenderTarget& target() const noexcept { return target_; }
+  /// What was drawn last, as it looks at rest: a still shows nothing coarsely.
+  void write(const Session& session, const std::filesystem::path& file) {
+    static_cast<void>(picture_.draw(session, figures_, target_));
+    write_png(file, target_.size(), target_.read_rgb());
+  }
+
+ private:
+  Picture& picture_;
+  RenderTarget target_;
+  FrameReport& report_;
+  OverlayFigures figures_;
+};
+
+void tell(const VisualizerOptions& options, const FrameSchedule& schedule,
+          const std::optional<Recording>& recording, const FrameReport& report) {
+  if (schedule.taken() > 0) {
+    std::printf("%u pictures in %s, ", schedule.taken(), options.out.c_str());
+  }
+  if (recording) {
+    const VideoFile& video = recording->file();
+    std::printf("%ju frames in %s, ", std::uintmax_t{video.frames()}, video.path().c_str());
+  }
+  std::printf("%.1f cpu ms each (%s)\n", percentile(report.cpu_ms, 0.5),
+              report.gl_renderer.c_str());
+}
+
+}  // namespace
+
+int run_headless(const VisualizerOptions& options) {
+  place_process(options.cpus);
+  if (options.frames > 0) make_folder(options.out);
+  if (options.mesh) check_export(*options.mesh);
+  for (const auto& file : {options.sheet, options.report}) {
+    if (file) check_new_file(*file);
+  }
+  const auto context = make_headless_context();
+  const GlDriver driver = query_gl_driver();
+  FrameReport report{.renderer = options.renderer,
+                     .gl_renderer = driver.renderer,
+                     .context = to_string(context->kind()),
+                     .width = options.size.width,
+                     .height = options.size.height};
+
+  Session session = Session::attach(options.name, std::chrono::duration<double>(options.wait_s));
+  if (options.transfer) {
+    check_materials(options.opacities, session.scene(), options.transfer->string());
+  }
+  report.attach_ms = session.attach_ms();
+  const Stopwatch since_attached;
+  const double aspect = static_cast<double>(options.size.width) / options.size.height;
+  Picture picture(session, first_look(options), aspect);
+  FrameTaker taker(picture, options.size, report);
+  taker.draw(session);  // not kept: the driver compiles shaders at their first use
+  if (options.attached) write_new_file(*options.attached, "");
+  report.late_join_ms = since_attached.wall_ms();
+  report.cpu_ms.clear();
+  report.wall_ms.clear();
+  report.redrawn.clear();
+  report.latency_ms.clear();
+
+  std::optional<Recording> recording;
+  if (options.record) recording.emplace(*options.record, options.size, options.video_hz);
+  FrameSchedule schedule(options.frames, options.every_ticks.value_or(ticks_between(
+                                             options.frames, options.seconds, session.tick_ns())));
+  bool over = false;
+  while (!over && (recording || !schedule.complete())) {
+    over = session.ended() || stop_requested() ||
+           (options.seconds && since_attached.wall_ms() >= *options.seconds * kMsPerS);
+    session.poll();
+    picture.update(session);
+    const auto ticks = session.ticks_since_armed();
+    const bool filmed = recording && ticks && recording->due(session.servo_s());
+    if (filmed || (over ? schedule.final_due(ticks) : schedule.due(ticks))) taker.draw(session);
+    if (filmed) {
+      const auto problem = film(recording, taker.target(), session.servo_s());
+      if (problem) std::fprintf(stderr, "kerf-visualizer: %s\n", problem->c_str());
+    }
+    while (over ? schedule.final_due(ticks) : schedule.due(ticks)) {
+      taker.write(session, frame_file(options.out, schedule.take(ticks)));
+      if (!over) break;  // late pictures show the present, each its own
+    }
+    if (over) continue;
+    std::chrono::duration<double> pause = kIdle;
+    if (recording && ticks) {
+      // A frame begins when the tick that it waits for is out, not up to a pause later: its delay
+      // counts as latency.
+      const std::chrono::duration<double> due(recording->due_in_s(session.servo_s()) -
+                                              session.record_age_s());
+      pause = std::clamp<std::chrono::duration<double>>(due, kShort, kIdle);
+    }
+    std::this_thread::sleep_for(pause);
+  }
+
+  if (options.mesh) export_surface(*options.mesh, session.scene(), session.contents());
+  if (options.sheet) {
+    std::optional<Hand> hand;
+    if (session.latest()) hand = hand_of(*session.latest());
+    write_contact_sheet(*options.sheet, picture.shown_scene(), session.contents(), hand);
+  }
+  report.bricks_uploaded = picture.bricks_uploaded();
+  report.clean_end = session.ended_cleanly();
+  if (options.report) report.write(*options.report);
+  tell(options, schedule, recording, report);
+  return exit_code(session, options.record && !recording);
+}
+
+}  // namespace kerf

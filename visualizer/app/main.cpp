@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cstdio>
+#include <exception>
+
+#include "visualizer/app/run.hpp"
+#include "visualizer/error.hpp"
+#include "visualizer/gl/window.hpp"
+#include "visualizer/view/stop_signal.hpp"
+
+int main(int argc, char** argv) {
+  try {
+    const auto options = kerf::parse_options(argc, argv);
+    if (!options) return 0;
+    kerf::catch_stop_signals();
+    if (options->bench) return kerf::run_bench(*options);
+    if (options->headless) return kerf::run_headless(*options);
+    if (!kerf::Window::has_screen()) {
+      throw kerf::VisualizerError(
+          "window: neither DISPLAY nor WAYLAND_DISPLAY is set; use "
+          "--headless --out DIR for pictures without a screen");
+    }
+    return kerf::run_window(*options);
+  } catch (const std::exception& problem) {
+    std::fprintf(stderr, "kerf-visualizer: %s\n", problem.what());
+    return 2;
+  }
+}

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "visualizer/gl/target.hpp"
+#include "visualizer/view/look.hpp"
+
+namespace kerf {
+
+/// The command line of kerf-visualizer.
+struct VisualizerOptions {
+  std::string name = "kerf";     ///< of the controller
+  std::string renderer = "iso";  ///< of all volumes, or of each: renderer_choice.hpp
+  Gradient gradient = Gradient::corners;
+  Stereo stereo;
+  bool voxel_tool = false;
+  Opacities opacities;  ///< of `transfer`
+  PictureSize size{800, 600};
+  bool headless = false;
+  std::uint32_t frames = 10;  ///< headless: this many pictures; beside a video none by default
+  std::optional<std::uint64_t> every_ticks;  ///< headless: default once a second of servo time
+  std::filesystem::path out = ".";           ///< pictures, screenshots
+  std::optional<double> seconds;             ///< ends after this time; default: with the controller
+  double wait_s = 10.0;                      ///< for the controller to appear
+  std::optional<std::filesystem::path> attached;  ///< --attached: made once it is shown
+  std::optional<std::string> record;              ///< video: a file, a pipe, or "-" for stdout
+  int video_hz = 60;                              ///< its frames per second of servo time
+  std::optional<std::filesystem::path> transfer;  ///< opacities, TOML
+  std::vector<int> cpus;                          ///< empty: all but the last one
+  std::optional<std::filesystem::path> mesh;      ///< --export: .stl or .ply
+  std::optional<std::filesystem::path> sheet;     ///< headless: the final state by every renderer
+  std::optional<std::filesystem::path> report;
+  bool bench = false;                            ///< no controller: what pictures cost here
+  std::optional<std::filesystem::path> page;     ///< bench: as Markdown
+  std::optional<std::filesystem::path> summary;  ///< bench: as a part of a page
+};
+
+/// What pictures look like at first.
+[[nodiscard]] Look first_look(const VisualizerOptions& options);
+
+/// "WxH"; throws VisualizerError.
+[[nodiscard]] PictureSize parse_size(const std::string& text);
+
+/// Throws VisualizerError for a value that cannot be used, and nothing else: `--help` and
+/// `--version` print and give no options.
+[[nodiscard]] std::optional<VisualizerOptions> parse_options(int argc, const char* const* argv);
+
+}  // namespace kerf

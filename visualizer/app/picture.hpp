@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "visualizer/app/overlay.hpp"
+#include "visualizer/compose/eye_layers.hpp"
+#include "visualizer/view/camera.hpp"
+#include "visualizer/view/frame_report.hpp"
+#include "visualizer/view/look.hpp"
+#include "visualizer/view/session.hpp"
+
+namespace kerf {
+
+/// What a call of `Picture::draw` did.
+struct Redrawn {
+  bool any = false;    ///< false: nothing had changed, nothing was drawn
+  double share = 0.0;  ///< of the picture's pixels: where volumes were drawn again
+};
+
+/// Everything that is seen of one session: backdrop, volumes, tool, force arrow, panel.
+///
+/// Made after the first `poll` of its session, which is uploaded whole; later only what changed.
+class Picture {
+ public:
+  Picture(const Session& session, const Look& look, double aspect);
+
+  /// Uploads the bricks that the last `poll` changed. Call once after each `poll`.
+  void update(const Session& session);
+
+  /// Draws the present state, for one eye or for two side by side, into `target`; its depth is not
+  /// used. `target` holds what the last call left there, and so do the layers of the picture: while
+  /// the camera rests only the part of the screen is drawn again where bricks changed or where the
+  /// tool was or is. The result is that of drawing everything.
+  Redrawn draw(const Session& session, const OverlayFigures& figures, const RenderTarget& target);
+  /// The next `draw` draws everything.
+  void redraw_all() noexcept { eyes_.clear(); }
+
+  [[nodiscard]] const Look& look() const noexcept { return look_; }
+  /// From the next `draw` on. Another renderer or iso value uploads all volumes again, an opacity
+  /// only the materials. Throws VisualizerError where the renderer cannot show them; the look stays
+  /// then.
+  void set_look(const Session& session, const Look& look);
+  /// The scene with the iso values and opacities of the look.
+  [[nodiscard]] SceneView shown_scene() const;
+  /// Of all materials, their own or chosen.
+  [[nodiscard]] Opacities opacities() const;
+  /// For `OverlayFigures::controls`.
+  [[nodiscard]] LookControls controls() const;
+  /// The mouse over the panels: see `Overlay::handle`.
+  bool handle(const Pointer& pointer, OverlayFigures& figures, PictureSize size);
+
+  [[nodiscard]] OrbitCamera& camera() noexcept { return camera_; }
+  void reset_camera(double aspect);
+  [[nodiscard]] std::uint64_t bricks_uploaded() const noexcept { return bricks_uploaded_; }
+
+ private:
+  /// The same of another look.
+  [[nodiscard]] SceneView scene_in(const Look& look) const;
+  [[nodiscard]] std::unique_ptr<ScenePainter> painter_for(const Session& session, const Look& look);
+  /// `View::shown` of the clip plane.
+  [[nodiscard]] glm::dvec4 shown_half() const;
+  /// Of one eye in a picture of `size`.
+  [[nodiscard]] PictureSize eye_size(PictureSize size) const noexcept;
+  /// Of each eye, from the left.
+  [[nodiscard]] std::vector<View> views(PictureSize size) const;
+
+  SceneView scene_;
+  Look look_;
+  std::uint64_t bricks_uploaded_ = 0;
+  std::unique_ptr<ScenePainter> painter_;  ///< making it counts bricks
+  OrbitCamera camera_;
+  glm::dvec3 low_mm_{0, 0, 0}, high_mm_{0, 0, 0};  ///< the box of all volumes
+  ScreenPasses passes_;
+  std::vector<EyeLayers> eyes_;  ///< empty: draw everything
+  Overlay overlay_;
+  OverlayFigures shown_figures_;
+  GLuint shown_in_ = 0;     ///< framebuffer, whose name may be given to a later one
+  PictureSize shown_size_;  ///< of all of it
+  PixelRect shown_panels_;  ///< of each eye
+};
+
+/// `Picture::draw`, complete when it returns, with its times and what it did in the report;
+/// takes the session's oldest removal for the latency.
+Redrawn draw_measured(Picture& picture, Session& session, const OverlayFigures& figures,
+                      const RenderTarget& target, FrameReport& report);
+
+/// The figures of the panel as the session stands; the caller adds what it alone knows.
+[[nodiscard]] OverlayFigures overlay_figures(const Session& session);
+
+}  // namespace kerf

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "visualizer/app/options.hpp"
+
+namespace kerf {
+
+class Session;
+
+/// 0 where the controller still runs or ended cleanly, 1 where it went away without a word, which
+/// is told on stderr, or where a video is cut short.
+[[nodiscard]] int exit_code(const Session& session, bool video_is_cut);
+
+/// Follows one run of a controller and writes frame-0001.png and so on into `options.out`; the last
+/// one shows the final state. A video goes on to the end of the run. Returns the `exit_code`;
+/// throws VisualizerError, FileError or SegmentError for bad input or set-up.
+[[nodiscard]] int run_headless(const VisualizerOptions& options);
+
+/// The window; follows restarted controllers too. Returns the `exit_code` when the user closes it
+/// or the time is over; the video of a window that changes its size is cut short. Throws as above.
+[[nodiscard]] int run_window(const VisualizerOptions& options);
+
+/// Times every renderer on a volume of its own, without a controller: a table on stdout, all
+/// figures as JSON in `options.report`, a page in `options.page`, the short of it as a part of
+/// `options.summary`. Returns 1 where it was stopped.
+/// Throws VisualizerError or FileError for bad set-up.
+[[nodiscard]] int run_bench(const VisualizerOptions& options);
+
+}  // namespace kerf

@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "visualizer/compose/mesh_painter.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+#include <glm/gtc/matrix_inverse.hpp>
+#include <glm/gtc/matrix_transform.hpp>
+
+namespace kerf {
+
+namespace {
+
+/// Axes with y along `direction`, moved to `at`.
+glm::dmat4 along(const glm::dvec3& at, const glm::dvec3& direction) {
+  const glm::dvec3 y = glm::normalize(direction);
+  const glm::dvec3 other = std::abs(y.x) < 0.9 ? glm::dvec3(1, 0, 0) : glm::dvec3(0, 0, 1);
+  const glm::dvec3 x = glm::normalize(glm::cross(y, other));
+  return {glm::dvec4(x, 0.0), glm::dvec4(y, 0.0), glm::dvec4(glm::cross(x, y), 0.0),
+          glm::dvec4(at, 1.0)};
+}
+
+}  // namespace
+
+GpuMesh::GpuMesh(const Mesh& mesh) : indices_(static_cast<GLsizei>(mesh.triangles.size())) {
+  glNamedBufferData(vertices_.id(),
+                    static_cast<GLsizeiptr>(mesh.vertices.size() * sizeof(Mesh::Vertex)),
+                    mesh.vertices.data(), GL_STATIC_DRAW);
+  glNamedBufferData(triangles_.id(),
+                    static_cast<GLsizeiptr>(mesh.triangles.size() * sizeof(std::uint32_t)),
+                    mesh.triangles.data(), GL_STATIC_DRAW);
+  glVertexArrayVertexBuffer(array_.id(), 0, vertices_.id(), 0, sizeof(Mesh::Vertex));
+  glVertexArrayElementBuffer(array_.id(), triangles_.id());
+  constexpr GLuint kNormalOffset = offsetof(Mesh::Vertex, normal);
+  for (const GLuint attribute : {0U, 1U}) {
+    glEnableVertexArrayAttrib(array_.id(), attribute);
+    glVertexArrayAttribFormat(array_.id(), attribute, 3, GL_FLOAT, GL_FALSE,
+                              attribute * kNormalOffset);
+    glVertexArrayAttribBinding(array_.id(), attribute, 0);
+  }
+}
+
+void GpuMesh::draw() const {
+  glBindVertexArray(array_.id());
+  glDrawElements(GL_TRIANGLES, indices_, GL_UNSIGNED_INT, nullptr);
+}
+
+void MeshPainter::use_program(const glm::dmat4& world_from_mesh, const Paint& paint, float opacity,
+                              const View& view) {
+  const GlProgram& program = paint.metal ? metal_ : plain_;
+  const glm::dmat4 eye_from_mesh = view.eye_from_world * world_from_mesh;
+  program.set("u_eye_from_mesh", glm::mat4(eye_from_mesh));
+  program.set("u_eye_from_mesh_normal",
+              glm::mat3(glm::inverseTranspose(glm::dmat3(eye_from_mesh))));
+  program.set("u_clip_from_eye", glm::mat4(view.clip_from_eye()));
+  program.set("u_colour", paint.colour);
+  program.set("u_opacity", opacity);
+  program.set("u_up_eye", glm::vec3(view.eye_from_world * glm::dvec4(0, 1, 0, 0)));
+  program.use();
+}
+
+void MeshPainter::draw(const GpuMesh& mesh, const glm::dmat4& world_from_mesh, const Paint& paint,
+                       const View& view, const RenderTarget& target) {
+  target.bind();
+  glEnable(GL_DEPTH_TEST);
+  glDepthFunc(GL_LESS);
+  glEnable(GL_CULL_FACE);
+  glDisable(GL_BLEND);
+  use_program(world_from_mesh, paint, 1.0F, view);
+  mesh.draw();  // once within the bounds: beside the parts it is there already, at the same depth
+  glDisable(GL_CULL_FACE);
+}
+
+void MeshPainter::draw_arrow(const glm::dvec3& foot_mm, const glm::dvec3& arrow_mm,
+                             double thickness_mm, const Paint& paint, const View& view,
+                             const RenderTarget& target) {
+  const double length = glm::length(arrow_mm);
+  if (!(length > 0.0)) return;
+  const double head = std::min(length, 4.0 * thickness_mm);
+  const glm::dmat4 axis = along(foot_mm, arrow_mm);
+  const glm::dmat4 shaft =
+      glm::scale(axis, glm::dvec3(thickness_mm, length - 0.9 * head, thickness_mm));
+  const glm::dmat4 tip = glm::scale(glm::translate(axis, glm::dvec3(0.0, length - head, 0.0)),
+                                    glm::dvec3(2.2 * thickness_mm, head, 2.2 * thickness_mm));
+
+  constexpr float kFaint = 0.30F;
+  target.bind();
+  glEnable(GL_BLEND);
+  glBlendFuncSeparate(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA, GL_ZERO, GL_ONE);
+  glEnable(GL_DEPTH_TEST);
+  glDepthFunc(GL_GREATER);
+  glDepthMask(GL_FALSE);
+  glEnable(GL_CULL_FACE);
+  use_program(shaft, paint, kFaint, view);
+  target.for_parts([&] { cylinder_.draw(); });
+  use_program(tip, paint, kFaint, view);
+  target.for_parts([&] { cone_.draw(); });
+  glDepthMask(GL_TRUE);
+  glDepthFunc(GL_LESS);
+  draw(cylinder_, shaft, paint, view, target);
+  draw(cone_, tip, paint, view, target);
+}
+
+}  // namespace kerf

@@ -1,0 +1,180 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "visualizer/compose/stale_volume.hpp"
+
+#include <algorithm>
+#include <array>
+
+#include <glm/gtc/matrix_inverse.hpp>
+#include <glm/gtc/matrix_transform.hpp>
+
+#include "visualizer/cast/cast_eye.hpp"
+#include "visualizer/compose/stale_triangles.hpp"
+#include "visualizer/render/changed_cells.hpp"
+#include "visualizer/view/screen_bounds.hpp"
+
+namespace kerf {
+
+namespace {
+
+constexpr std::size_t kMostBoxes = 8192;       // some cuts between two pictures; more count as one
+constexpr std::size_t kMostTriangles = 32768;  // likewise
+// Voxels around boxes that are looked at together: a cut. Between boxes far apart is only air, and
+// in a larger one little to be left out.
+constexpr std::size_t kMostTogether = 64 * 64 * 64;
+
+VoxelBox united(std::span<const VoxelBox> boxes) {
+  VoxelBox all;
+  for (const VoxelBox& box : boxes) all = all.united(box);
+  return all;
+}
+
+void add_to(std::vector<VoxelBox>& boxes, std::span<const VoxelBox> more) {
+  boxes.insert(boxes.end(), more.begin(), more.end());
+  if (boxes.size() > kMostBoxes) boxes = {united(boxes)};
+}
+
+VoxelBox voxels_around(std::span<const FineTriangle> triangles) {
+  VoxelBox all;
+  for (const FineTriangle& triangle : triangles) {
+    for (const FinePoint& corner : triangle) {
+      const VoxelIndex v = VolumeSamples::voxel_below(corner);
+      all = all.united({v, {v.x + 2, v.y + 2, v.z + 2}});
+    }
+  }
+  return all;
+}
+
+std::size_t voxels_in(const VoxelBox& box) {
+  const VoxelIndex extent = box.extent();
+  return VoxelGrid{extent.x, extent.y, extent.z}.voxel_count();
+}
+
+/// Boxes that lie together.
+std::vector<std::vector<VoxelBox>> clusters_of(std::span<const VoxelBox> boxes) {
+  std::vector<std::vector<VoxelBox>> clusters;
+  std::vector<VoxelBox> around;
+  for (const VoxelBox& box : boxes) {
+    std::size_t at = 0;
+    while (at < around.size() && voxels_in(around[at].united(box)) > kMostTogether) ++at;
+    if (at == around.size()) {
+      around.emplace_back();
+      clusters.emplace_back();
+    }
+    around[at] = around[at].united(box);
+    clusters[at].push_back(box);
+  }
+  return clusters;
+}
+
+/// The pixels whose rays may pass a box in voxel coordinates.
+PixelRect pixels_of(const glm::dvec3& low, const glm::dvec3& high, const VolumeView& volume,
+                    const View& view, PictureSize size) {
+  std::array<glm::dvec3, 8> corners;
+  for (unsigned c = 0; c < corners.size(); ++c) {
+    const glm::dvec4 corner((c & 1) != 0 ? high.x : low.x, (c & 2) != 0 ? high.y : low.y,
+                            (c & 4) != 0 ? high.z : low.z, 1.0);
+    corners[c] = glm::dvec3(volume.world_from_voxel * corner);
+  }
+  return screen_bounds(corners, view, size);
+}
+
+/// A change in a volume, as one view sees it.
+ChangeJob change_job(const ChangedCells& cells, const VolumeView& volume, const View& view,
+                     PictureSize size) {
+  const glm::dmat4 eye_from_cell =
+      view.eye_from_world * glm::translate(volume.world_from_voxel, cells.low());
+  const glm::dmat4 cell_from_eye = glm::affineInverse(eye_from_cell);
+  ChangeJob job;
+  job.eye = cast_eye(view, size.width, size.height);
+  put(job.origin, glm::dvec3(cell_from_eye[3]));
+  put(job.from_eye, glm::dmat3(cell_from_eye));
+  cells.put(job);
+  return job;
+}
+
+/// What lets its surface feel the change: all of `density`.
+void put_density(ChangeJob& job, const ChangedCells& cells, const VolumeView& volume,
+                 std::span<const Density> density, const View& view) {
+  const VoxelGrid& grid = volume.bricks.grid;
+  job.density = density.data();
+  job.extent[0] = grid.nx;
+  job.extent[1] = grid.ny;
+  job.extent[2] = grid.nz;
+  put(job.first_voxel, -cells.low());
+  const glm::dmat4 eye_from_voxel = view.eye_from_world * volume.world_from_voxel;
+  const glm::dvec3 half = 0.5 * (cells.high() - cells.low());
+  put(job.centre_mm, glm::dvec3(eye_from_voxel * glm::dvec4(cells.low() + half, 1.0)));
+  double edge_mm = 0.0;
+  for (int axis = 0; axis < 3; ++axis) {
+    put(job.half_mm[axis], half[axis] * glm::dvec3(eye_from_voxel[axis]));
+    edge_mm = std::max(edge_mm, glm::length(glm::dvec3(eye_from_voxel[axis])));
+  }
+  job.edge_mm = static_cast<float>(edge_mm);
+}
+
+/// Marks those of `within` that are not yet and of which `is_stale` says so.
+template <class IsStale>
+void mark_where(StaleTiles& tiles, const PixelRect& within, const IsStale& is_stale) {
+  for (int y = within.y0; y < within.y1; ++y) {
+    for (int x = within.x0; x < within.x1; ++x) {
+      if (!tiles.marked(x, y) && is_stale(tiles.pixels_of({x, y, x + 1, y + 1}))) tiles.mark(x, y);
+    }
+  }
+}
+
+}  // namespace
+
+void StaleVolume::add(const Renderer& renderer, std::size_t index,
+                      std::span<const VoxelBox> differs) {
+  add_to(changed_, renderer.looks_different(index, differs));
+  const auto triangles = renderer.different_triangles(index);
+  triangles_.insert(triangles_.end(), triangles.begin(), triangles.end());
+  if (triangles_.size() <= kMostTriangles) return;
+  add_to(changed_, std::array{voxels_around(triangles_)});
+  triangles_.clear();
+}
+
+void StaleVolume::clear() {
+  changed_.clear();
+  triangles_.clear();
+}
+
+void StaleVolume::mark(StaleTiles& tiles, const Renderer& renderer, const VolumeView& volume,
+                       std::span<const Density> density, const View& view,
+                       const RenderTarget& kept) const {
+  if (!triangles_.empty()) {
+    const glm::dmat4 clip_from_voxel =
+        view.clip_from_eye() * view.eye_from_world * volume.world_from_voxel;
+    mark_triangles(tiles, triangles_, clip_from_voxel, kept);
+  }
+  const SightReach reach = renderer.reach();
+  const CastKernels& kernels = *cast_kernels()[0];
+  const double feels_vox = reach.feels_ahead ? kLongestFeelerVox : 0.0;
+  const auto pixels_around = [&](const glm::dvec3& low, const glm::dvec3& high, double vox) {
+    return pixels_of(low - vox, high + vox, volume, view, kept.size());
+  };
+  for (const std::vector<VoxelBox>& together : clusters_of(changed_)) {
+    if (const auto& [lo, hi] = together.front(); voxels_in({lo, hi}) > kMostTogether) {
+      const double around_vox = 0.5 * std::max(reach.along, reach.at_end) + feels_vox;
+      tiles.mark(pixels_around({lo.x, lo.y, lo.z}, {hi.x, hi.y, hi.z}, around_vox));
+      continue;
+    }
+    const ChangedCells cells(together, reach);
+    const PixelRect passing = tiles.tiles_of(pixels_around(cells.low(), cells.high(), 0.0));
+    const PixelRect all = tiles.tiles_of(pixels_around(cells.low(), cells.high(), feels_vox));
+    if (all.empty()) continue;
+    ChangeJob job = change_job(cells, volume, view, kept.size());
+    std::vector<float> depth;
+    if (!renderer.translucent()) {
+      job.window = tiles.pixels_of(all);
+      depth = kept.read_depth(job.window);
+      job.depth = depth.data();
+    }
+    mark_where(tiles, passing, [&](const PixelRect& tile) { return kernels.meets(job, tile); });
+    if (!reach.feels_ahead) continue;
+    put_density(job, cells, volume, density, view);
+    mark_where(tiles, all, [&](const PixelRect& tile) { return kernels.feels(job, tile); });
+  }
+}
+
+}  // namespace kerf

@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <limits>
+#include <optional>
+#include <vector>
+
+#include "visualizer/compose/hand_painter.hpp"
+#include "visualizer/compose/mesh.hpp"
+#include "visualizer/view/scene_view.hpp"
+
+namespace kerf {
+
+/// The tool in the hand as a volume of voxels: a volume of the scene like any other, which moves.
+///
+/// Its density falls over two voxels across the tool's surface and is one half on it. One grid
+/// holds each of the scene's tools, so that to change it is to change voxels. The voxels are as
+/// fine as those of the main volume, but at most 512 along the tool.
+class ToolVolume {
+ public:
+  /// Throws VisualizerError where the scene has no tool with an extent, or no room for a material.
+  explicit ToolVolume(const SceneView& scene);
+
+  /// The scene with this volume as its last and with its material; the others keep their looks.
+  [[nodiscard]] SceneView added_to(const SceneView& scene) const;
+  [[nodiscard]] VolumeContent content() const { return {density_, labels_}; }
+
+  /// Fills in this tool; air where the scene has fewer. False where it is the one that is there.
+  bool take(std::uint32_t tool);
+  [[nodiscard]] glm::dmat4 world_from_voxel(const Hand& hand) const;
+  /// A box around all that the tool of the hand shows; none where that is nothing.
+  [[nodiscard]] std::optional<BoxCorners> corners(const Hand& hand) const;
+  /// All of them.
+  [[nodiscard]] std::vector<std::uint32_t> bricks() const;
+
+ private:
+  /// A box about the axis of the tool.
+  struct Extent {
+    double low_mm = std::numeric_limits<double>::max(), high_mm = -low_mm, radius_mm = 0.0;
+    void add(double y_mm, double out_mm) {
+      low_mm = std::min(low_mm, y_mm);
+      high_mm = std::max(high_mm, y_mm);
+      radius_mm = std::max(radius_mm, out_mm);
+    }
+  };
+  /// What a tool is made of: what is swept about its axis, and a mesh.
+  struct Parts {
+    Outlines outlines;
+    Facets facets;
+  };
+  void fill(const Parts& parts);
+
+  std::vector<Parts> tools_;
+  std::vector<Extent> extents_;  ///< by tool
+  double edge_mm_ = 0.0;         ///< of a voxel
+  glm::dvec3 first_mm_{0.0};     ///< its first voxel, from the tip
+  VoxelGrid grid_;
+  Label label_ = 0;
+  std::optional<std::uint32_t> held_{};
+  std::vector<Density> density_;
+  std::vector<Label> labels_;
+};
+
+}  // namespace kerf

@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "visualizer/render/cast_renderer.hpp"
+
+#include "visualizer/view/screen_bounds.hpp"
+#include "visualizer/view/transfer_function.hpp"
+
+namespace kerf {
+
+namespace {
+
+std::vector<CastContent> cast_contents(const SceneView& scene,
+                                       std::span<const VolumeContent> contents) {
+  std::vector<CastContent> all;
+  for (std::size_t i = 0; i < contents.size(); ++i) {
+    const TransferFunction look = make_transfer_function(scene, i, contents[i]);
+    all.push_back({contents[i].density,
+                   contents[i].labels,
+                   {.materials = look.materials, .empty = look.empty, .full = look.full}});
+  }
+  return all;
+}
+
+Caster::Options cast_options(CastMode mode) {
+  Caster::Options options;
+  options.mode = mode;
+  if (mode == CastMode::blend) options.step_vox = 1.0F;
+  return options;
+}
+
+std::size_t first_pixel(const PixelRect& rect, std::int32_t width) {
+  return static_cast<std::size_t>(rect.y0) * static_cast<std::size_t>(width) +
+         static_cast<std::size_t>(rect.x0);
+}
+
+}  // namespace
+
+CastRenderer::CastRenderer(const SceneView& scene, std::span<const VolumeContent> contents,
+                           CastMode mode)
+    : mode_(mode), caster_(scene, cast_contents(scene, contents), cast_options(mode)) {
+  program_.set("u_colour", 0);
+  program_.set("u_depth", 1);
+}
+
+void CastRenderer::update(std::size_t volume, std::span<const Density> density,
+                          std::span<const std::uint32_t> changed) {
+  caster_.update(volume, density, changed);
+}
+
+void CastRenderer::place(std::size_t volume, const glm::dmat4& world_from_voxel) {
+  caster_.place(volume, world_from_voxel);
+}
+
+void CastRenderer::set_opacities(std::span<const MaterialView> materials,
+                                 std::span<const VolumeContent> /*contents*/) {
+  caster_.set_materials(make_palette(materials));
+}
+
+CastRenderer::Frame::Frame(PictureSize size) {
+  picture.resize(size.width, size.height);
+  end_depth.resize(picture.depth.size());
+  glTextureStorage2D(colour.id(), 1, GL_RGBA8, size.width, size.height);
+  glTextureStorage2D(depth.id(), 1, GL_R32F, size.width, size.height);
+  for (const GlTexture2D* texture : {&colour, &depth}) {
+    glTextureParameteri(texture->id(), GL_TEXTURE_MIN_FILTER, GL_NEAREST);
+    glTextureParameteri(texture->id(), GL_TEXTURE_MAG_FILTER, GL_NEAREST);
+  }
+}
+
+void CastRenderer::draw(const View& view, const RenderTarget& target) {
+  const PictureSize size = target.size();
+  if (!frame_ || frame_->picture.width != size.width || frame_->picture.height != size.height) {
+    frame_.emplace(size);
+  }
+  const PixelRect volumes = bounds(view, size);
+  parts_.clear();
+  PixelRect drawn;
+  for (const PixelRect& part : target.parts()) {
+    const PixelRect shows = part.clipped(volumes);
+    if (shows.empty()) continue;
+    parts_.push_back(shows);
+    drawn = drawn.united(shows);
+  }
+  if (parts_.empty()) return;
+  const bool ends_at_target = mode_ == CastMode::blend;
+  if (ends_at_target) read_end_depth(target, drawn);
+  caster_.draw(view, parts_, frame_->picture,
+               ends_at_target ? std::span<const float>(frame_->end_depth) : std::span<float>());
+  upload(drawn);
+  show(target);
+}
+
+PixelRect CastRenderer::bounds(const View& view, PictureSize size) const {
+  PixelRect bounds;
+  for (const BoxCorners& body : caster_.bodies()) {
+    bounds = bounds.united(screen_bounds(body, view, size));
+  }
+  return bounds;
+}
+
+void CastRenderer::read_end_depth(const RenderTarget& target, const PixelRect& rect) {
+  const std::int32_t width = frame_->picture.width;
+  glBindFramebuffer(GL_READ_FRAMEBUFFER, target.framebuffer());
+  glPixelStorei(GL_PACK_ALIGNMENT, 4);
+  glPixelStorei(GL_PACK_ROW_LENGTH, width);
+  glReadPixels(rect.x0, rect.y0, rect.x1 - rect.x0, rect.y1 - rect.y0, GL_DEPTH_COMPONENT, GL_FLOAT,
+               frame_->end_depth.data() + first_pixel(rect, width));
+  glPixelStorei(GL_PACK_ROW_LENGTH, 0);
+}
+
+void CastRenderer::upload(const PixelRect& rect) {
+  const CastPicture& picture = frame_->picture;
+  const std::size_t first = first_pixel(rect, picture.width);
+  const GLsizei wide = rect.x1 - rect.x0;
+  const GLsizei high = rect.y1 - rect.y0;
+  glPixelStorei(GL_UNPACK_ALIGNMENT, 4);
+  glPixelStorei(GL_UNPACK_ROW_LENGTH, picture.width);
+  glTextureSubImage2D(frame_->colour.id(), 0, rect.x0, rect.y0, wide, high, GL_RGBA,
+                      GL_UNSIGNED_BYTE, picture.rgba.data() + first);
+  glTextureSubImage2D(frame_->depth.id(), 0, rect.x0, rect.y0, wide, high, GL_RED, GL_FLOAT,
+                      picture.depth.data() + first);
+  glPixelStorei(GL_UNPACK_ROW_LENGTH, 0);
+}
+
+void CastRenderer::show(const RenderTarget& target) {
+  target.bind();
+  glBindTextureUnit(0, frame_->colour.id());
+  glBindTextureUnit(1, frame_->depth.id());
+  glBindVertexArray(no_vertices_.id());
+  program_.use();
+  glEnable(GL_DEPTH_TEST);
+  glDepthFunc(GL_LESS);
+  if (mode_ == CastMode::blend) {
+    glEnable(GL_BLEND);
+    glBlendFuncSeparate(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA, GL_ONE, GL_ONE_MINUS_SRC_ALPHA);
+  } else {
+    glDisable(GL_BLEND);
+  }
+  target.for_parts(parts_, [] { glDrawArrays(GL_TRIANGLES, 0, 3); });
+}
+
+}  // namespace kerf

@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "visualizer/cast/caster.hpp"
+#include "visualizer/gl/program.hpp"
+#include "visualizer/render/renderer.hpp"
+
+namespace kerf {
+
+/// Hands the pictures of `Caster` to GL. Only the target's parts, and of them what can show
+/// anything, are cast.
+///
+/// Iso goes under the depth test of the target. Blend ends its rays at what is in the target, lies
+/// over it, and sets depth where enough of it has gathered to hide what comes later.
+class CastRenderer final : public Renderer {
+ public:
+  CastRenderer(const SceneView& scene, std::span<const VolumeContent> contents, CastMode mode);
+
+  void update(std::size_t volume, std::span<const Density> density,
+              std::span<const std::uint32_t> changed) override;
+  void place(std::size_t volume, const glm::dmat4& world_from_voxel) override;
+  void set_opacities(std::span<const MaterialView> materials,
+                     std::span<const VolumeContent> contents) override;
+  void draw(const View& view, const RenderTarget& target) override;
+  [[nodiscard]] bool takes_gradient() const noexcept override { return false; }
+  [[nodiscard]] bool translucent() const noexcept override { return mode_ == CastMode::blend; }
+
+ private:
+  /// The picture on both sides.
+  struct Frame {
+    explicit Frame(PictureSize size);
+    CastPicture picture;
+    std::vector<float> end_depth;
+    GlTexture2D colour = GlTexture2D::create();
+    GlTexture2D depth = GlTexture2D::create();
+  };
+
+  /// Pixels that may show anything of the volumes.
+  [[nodiscard]] PixelRect bounds(const View& view, PictureSize size) const;
+  void read_end_depth(const RenderTarget& target, const PixelRect& rect);
+  void upload(const PixelRect& rect);
+  void show(const RenderTarget& target);
+
+  CastMode mode_;
+  Caster caster_;
+  GlProgram program_{"screen.vert", "cast.frag"};
+  GlVertexArray no_vertices_ = GlVertexArray::create();
+  std::optional<Frame> frame_;
+  std::vector<PixelRect> parts_;  ///< that are cast in this frame
+};
+
+}  // namespace kerf

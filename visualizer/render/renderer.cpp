@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "visualizer/render/renderer.hpp"
+
+#include <algorithm>
+#include <array>
+#include <string>
+
+#include "visualizer/error.hpp"
+#include "visualizer/render/blend_renderer.hpp"
+#include "visualizer/render/cast_renderer.hpp"
+#include "visualizer/render/iso_renderer.hpp"
+#include "visualizer/render/slices_renderer.hpp"
+#include "visualizer/render/surface_renderer.hpp"
+
+namespace kerf {
+
+namespace {
+
+template <class Made>
+std::unique_ptr<Renderer> make(const SceneView& scene, std::span<const VolumeContent> contents) {
+  return std::make_unique<Made>(scene, contents);
+}
+
+using Make = std::unique_ptr<Renderer> (*)(const SceneView&, std::span<const VolumeContent>);
+
+struct Kind {
+  std::string_view name;
+  Make make;
+  bool translucent;
+};
+
+template <CastMode mode>
+std::unique_ptr<Renderer> make_cast(const SceneView& scene,
+                                    std::span<const VolumeContent> contents) {
+  return std::make_unique<CastRenderer>(scene, contents, mode);
+}
+
+constexpr auto kKinds = std::to_array<Kind>({
+    {"iso", make<IsoRenderer>, false},
+    {"blend", make<BlendRenderer>, true},
+    {"surface", make<SurfaceRenderer>, false},
+    {"slices", make<SlicesRenderer>, true},
+    {"cast", make_cast<CastMode::iso>, false},
+    {"cast-blend", make_cast<CastMode::blend>, true},
+});
+
+const Kind& find_kind(std::string_view name) {
+  const auto found = std::find_if(kKinds.begin(), kKinds.end(),
+                                  [&](const Kind& kind) { return kind.name == name; });
+  if (found != kKinds.end()) return *found;
+  throw VisualizerError("--renderer: " + std::string(name) +
+                        " is unknown; known: " + known_renderers());
+}
+
+// A density is interpolated between two voxels (1 edge), a surface has its gradient from a cube two
+// voxels wide (2).
+constexpr SightReach kSurfaceReach{.along = 3, .at_end = 5, .feels_ahead = true};
+// A sample within takes its material from 1.5 edges up the gradient (matter.frag), or its gradient
+// from five voxels along each axis (3).
+constexpr SightReach kMatterReach{.along = 6}, kWideMatterReach{.along = 7};
+
+}  // namespace
+
+std::vector<VoxelBox> Renderer::looks_different(std::size_t /*volume*/,
+                                                std::span<const VoxelBox> differs) const {
+  return {differs.begin(), differs.end()};
+}
+
+SightReach Renderer::reach() const noexcept {
+  if (!translucent()) return kSurfaceReach;
+  return takes_gradient() ? kWideMatterReach : kMatterReach;
+}
+
+std::unique_ptr<Renderer> make_renderer(std::string_view kind, const SceneView& scene,
+                                        std::span<const VolumeContent> contents) {
+  return find_kind(kind).make(scene, contents);
+}
+
+std::vector<std::string_view> renderer_kinds() {
+  std::vector<std::string_view> names;
+  for (const Kind& kind : kKinds) names.push_back(kind.name);
+  return names;
+}
+
+std::string known_renderers() {
+  std::string known;
+  for (const Kind& kind : kKinds) known += (known.empty() ? "" : ", ") + std::string(kind.name);
+  return known;
+}
+
+bool is_translucent(std::string_view kind) {
+  return find_kind(kind).translucent;
+}
+
+}  // namespace kerf

@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "visualizer/gl/target.hpp"
+#include "visualizer/surface/volume_samples.hpp"
+#include "visualizer/view/camera.hpp"
+#include "visualizer/view/scene_view.hpp"
+#include "visualizer/view/sight_reach.hpp"
+
+namespace kerf {
+
+/// Draws the volumes of one session. Every renderer writes colour and true depth (equation (1)), so
+/// several volumes, the tool and other meshes hide one another as they should.
+///
+/// Lives and is called on the thread whose GL context is current.
+class Renderer {
+ public:
+  virtual ~Renderer() = default;
+
+  /// Brick ids `changed` of a volume differ from what was drawn last; `density` is all of it.
+  virtual void update(std::size_t volume, std::span<const Density> density,
+                      std::span<const std::uint32_t> changed) = 0;
+  /// A volume lies elsewhere now; its voxels keep their edges.
+  virtual void place(std::size_t volume, const glm::dmat4& world_from_voxel) = 0;
+  /// The materials have other opacities, and are else what they were. Renderers of iso-surfaces
+  /// show none. `contents` is all of the volumes.
+  virtual void set_opacities(std::span<const MaterialView> /*materials*/,
+                             std::span<const VolumeContent> /*contents*/) {}
+  /// Views have a clip plane from now on, or none any more. Renderers that hold no voxels cut no
+  /// faces without being told; what they hold for that costs memory, and each update a little.
+  /// `contents` is all of the volumes. Throws VisualizerError where the driver cannot hold them.
+  virtual void set_cut_open(bool /*open*/, std::span<const VolumeContent> /*contents*/) {}
+  /// While camera or objects move, a renderer may draw more coarsely; at rest it is exact.
+  virtual void set_moving(bool /*moving*/) {}
+  /// It does draw more coarsely then.
+  [[nodiscard]] virtual bool coarse_while_moving() const noexcept { return false; }
+  /// Draws over what is in `target`, under its depth test, within its part. Opaque things come
+  /// first: some renderers look through.
+  virtual void draw(const View& view, const RenderTarget& target) = 0;
+  /// Boxes of all voxels of a volume that may make a ray look different since its last `update`,
+  /// which changed densities in `differs`; rays farther off than `reach` show what they showed.
+  [[nodiscard]] virtual std::vector<VoxelBox> looks_different(
+      std::size_t volume, std::span<const VoxelBox> differs) const;
+  [[nodiscard]] virtual SightReach reach() const noexcept;
+  /// The same of a renderer that draws a mesh: triangles that came, went or look different; rays
+  /// that meet none of them show what they showed.
+  [[nodiscard]] virtual std::span<const FineTriangle> different_triangles(
+      std::size_t /*volume*/) const {
+    return {};
+  }
+  /// Shades from the gradient that the scene names; else always from `Gradient::corners`.
+  [[nodiscard]] virtual bool takes_gradient() const noexcept { return true; }
+  /// Lets what lies behind a surface shine through, so that it must be drawn before.
+  [[nodiscard]] virtual bool translucent() const noexcept { return false; }
+};
+
+/// `kind` as on the command line; throws VisualizerError for an unknown one and names the known.
+[[nodiscard]] std::unique_ptr<Renderer> make_renderer(std::string_view kind, const SceneView& scene,
+                                                      std::span<const VolumeContent> contents);
+
+/// All that `make_renderer` knows.
+[[nodiscard]] std::vector<std::string_view> renderer_kinds();
+/// Every kind, as on the command line: "iso, blend, ...".
+[[nodiscard]] std::string known_renderers();
+
+/// `Renderer::translucent` of a kind. Throws as `make_renderer` does; needs no GL context.
+[[nodiscard]] bool is_translucent(std::string_view kind);
+
+}  // namespace kerf

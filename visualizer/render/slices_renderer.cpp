@@ -1,0 +1,152 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "visualizer/render/slices_renderer.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "visualizer/render/slice_polygons.hpp"
+#include "visualizer/render/view_uniforms.hpp"
+
+namespace kerf {
+
+namespace {
+
+SceneView with_volume(const SceneView& scene, std::size_t volume) {
+  SceneView one = scene;
+  one.volumes = {scene.volumes[volume]};
+  return one;
+}
+
+/// The active cells in eye space, and `margin_mm` around them.
+BoxCorners active_corners(const CellsOnGpu& cells, const View& view, double margin_mm) {
+  const VoxelBox& box = cells.active_box();
+  const glm::dmat4 eye_from_cell = view.eye_from_world * cells.world_from_cell();
+  BoxCorners corners;
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    glm::dvec3 at((i & 1) != 0 ? box.hi.x : box.lo.x, (i & 2) != 0 ? box.hi.y : box.lo.y,
+                  (i & 4) != 0 ? box.hi.z : box.lo.z);
+    for (int axis = 0; axis < 3; ++axis) {
+      const double margin = margin_mm / glm::length(eye_from_cell[axis]);
+      at[axis] += (i >> axis & 1) != 0 ? margin : -margin;
+    }
+    corners[i] = glm::dvec3(eye_from_cell * glm::dvec4(at, 1.0));
+  }
+  return corners;
+}
+
+}  // namespace
+
+SlicesRenderer::Sliced::Sliced(const SceneView& scene, const VolumeContent& content)
+    : volume(scene, {&content, 1}, true),
+      program(
+          {"slices.vert", "slices.frag", "matter.frag", "ray.frag", "lighting.frag", "depth.frag"},
+          volume.defines()) {
+  volume.set_constants(program);
+  program.set("u_opaque_depth", static_cast<int>(volume.free_unit()));
+}
+
+SlicesRenderer::SlicesRenderer(const SceneView& scene, std::span<const VolumeContent> contents,
+                               Options options)
+    : options_(options) {
+  for (std::size_t v = 0; v < scene.volumes.size(); ++v) {
+    volumes_.push_back(std::make_unique<Sliced>(with_volume(scene, v), contents[v]));
+    const double edge_mm = volumes_.back()->volume.edge_mm();
+    edge_mm_ = v == 0 ? edge_mm : std::min(edge_mm_, edge_mm);
+  }
+  glVertexArrayVertexBuffer(array_.id(), 0, buffer_.id(), 0, sizeof(glm::vec3));
+  glEnableVertexArrayAttrib(array_.id(), 0);
+  glVertexArrayAttribFormat(array_.id(), 0, 3, GL_FLOAT, GL_FALSE, 0);
+}
+
+void SlicesRenderer::update(std::size_t volume, std::span<const Density> density,
+                            std::span<const std::uint32_t> changed) {
+  volumes_[volume]->volume.update(0, density, changed);
+}
+
+void SlicesRenderer::place(std::size_t volume, const glm::dmat4& world_from_voxel) {
+  volumes_[volume]->volume.place(0, world_from_voxel);
+}
+
+void SlicesRenderer::set_opacities(std::span<const MaterialView> materials,
+                                   std::span<const VolumeContent> contents) {
+  for (std::size_t v = 0; v < volumes_.size(); ++v) {
+    volumes_[v]->volume.set_opacities(materials, contents.subspan(v, 1));
+  }
+}
+
+void SlicesRenderer::cut_volume(std::size_t volume, const View& view, double step_mm) {
+  // A slice shows what lies up to a step before it, along rays that lean.
+  constexpr double kMarginSteps = 2.0;
+  const CellsOnGpu& cells = volumes_[volume]->volume.volumes().front().cells();
+  if (cells.active_box().empty()) return;
+  const BoxCorners corners = active_corners(cells, view, kMarginSteps * step_mm);
+  double nearest_mm = view.far_mm;
+  double farthest_mm = view.near_mm;
+  for (const glm::dvec3& corner : corners) {
+    nearest_mm = std::min(nearest_mm, -corner.z);
+    farthest_mm = std::max(farthest_mm, -corner.z);
+  }
+  const int first = static_cast<int>(std::ceil(std::max(nearest_mm, view.near_mm) / step_mm));
+  const int last = static_cast<int>(std::min(farthest_mm, view.far_mm + step_mm) / step_mm);
+  for (int slice = first; slice <= last; ++slice) {
+    const auto polygon = cut_box(corners, slice * step_mm);
+    if (polygon.size() < 3) continue;
+    cuts_.push_back({slice, volume, static_cast<GLint>(vertices_.size()),
+                     static_cast<GLsizei>(polygon.size())});
+    for (const glm::dvec2& at : polygon) vertices_.emplace_back(at, slice);
+  }
+}
+
+void SlicesRenderer::draw(const View& view, const RenderTarget& target) {
+  const double step_mm =
+      edge_mm_ * static_cast<double>(moving_ ? options_.moving_step_vox : options_.step_vox);
+  vertices_.clear();
+  cuts_.clear();
+  for (std::size_t v = 0; v < volumes_.size(); ++v) cut_volume(v, view, step_mm);
+  std::stable_sort(cuts_.begin(), cuts_.end(),
+                   [](const Cut& a, const Cut& b) { return a.slice > b.slice; });
+  glNamedBufferData(buffer_.id(), static_cast<GLsizeiptr>(vertices_.size() * sizeof(glm::vec3)),
+                    vertices_.data(), GL_STREAM_DRAW);
+
+  layer_.begin(target);
+  for (const auto& sliced : volumes_) {
+    set_view(sliced->program, view);
+    sliced->program.set("u_clip_from_eye", glm::mat4(view.clip_from_eye()));
+    sliced->program.set("u_step_mm", static_cast<float>(step_mm));
+  }
+  glBindTextureUnit(volumes_.front()->volume.free_unit(), target.depth_texture());
+  glBindVertexArray(array_.id());
+  // Over what is there, and the depth of the nearest.
+  glEnable(GL_BLEND);
+  glBlendFunc(GL_ONE, GL_ONE_MINUS_SRC_ALPHA);
+  glBlendEquationi(1, GL_MIN);
+  glEnable(GL_DEPTH_CLAMP);  // a slice before the near plane shows what lies behind it
+  draw_cuts(view, target);
+  glDisable(GL_DEPTH_CLAMP);
+  glBlendEquationi(1, GL_FUNC_ADD);
+  layer_.finish(target);
+}
+
+void SlicesRenderer::draw_cuts(const View& view, const RenderTarget& target) const {
+  // As many slices in one call as are of one volume.
+  for (auto begin = cuts_.begin(); begin != cuts_.end();) {
+    const Sliced& sliced = *volumes_[begin->volume];
+    const auto end = std::find_if(begin, cuts_.end(),
+                                  [&](const Cut& cut) { return cut.volume != begin->volume; });
+    std::vector<GLint> firsts;
+    std::vector<GLsizei> counts;
+    std::for_each(begin, end, [&](const Cut& cut) {
+      firsts.push_back(cut.first);
+      counts.push_back(cut.count);
+    });
+    sliced.volume.bind(sliced.program, view);
+    sliced.program.use();
+    target.for_parts([&] {
+      glMultiDrawArrays(GL_TRIANGLE_FAN, firsts.data(), counts.data(),
+                        static_cast<GLsizei>(firsts.size()));
+    });
+    begin = end;
+  }
+}
+
+}  // namespace kerf

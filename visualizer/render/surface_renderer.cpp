@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "visualizer/render/surface_renderer.hpp"
+
+#include <optional>
+#include <utility>
+
+#include <glm/gtc/matrix_inverse.hpp>
+
+#include "visualizer/render/view_uniforms.hpp"
+
+namespace kerf {
+
+namespace {
+
+/// The parts of the target that may be drawn, in normalised device coordinates.
+std::vector<Sight::Part> drawn_parts(const RenderTarget& target) {
+  const glm::dvec2 per_pixel = 2.0 / glm::dvec2(target.size().width, target.size().height);
+  std::vector<Sight::Part> parts;
+  for (const PixelRect& part : target.parts()) {
+    parts.push_back({glm::dvec2(part.x0, part.y0) * per_pixel - 1.0,
+                     glm::dvec2(part.x1, part.y1) * per_pixel - 1.0});
+  }
+  return parts;
+}
+
+}  // namespace
+
+SurfaceRenderer::SurfaceRenderer(const SceneView& scene, std::span<const VolumeContent> contents)
+    : scene_(scene) {
+  volumes_.reserve(scene.volumes.size());
+  for (std::size_t i = 0; i < scene.volumes.size(); ++i) {
+    const VolumeView& view = scene.volumes[i];
+    VolumeSurface surface(view, scene.materials, contents[i].density, contents[i].labels,
+                          scene.gradient);
+    SurfaceOnGpu gpu(surface);
+    volumes_.push_back({std::move(surface), std::move(gpu)});
+  }
+}
+
+void SurfaceRenderer::update(std::size_t volume, std::span<const Density> density,
+                             std::span<const std::uint32_t> changed) {
+  Volume& of = volumes_[volume];
+  of.gpu.update(of.surface, of.surface.update(density, changed));
+  if (faces_) faces_->update(volume, density, changed);
+}
+
+void SurfaceRenderer::place(std::size_t volume, const glm::dmat4& world_from_voxel) {
+  scene_.volumes[volume].world_from_voxel = world_from_voxel;
+  if (faces_) faces_->place(volume, world_from_voxel);
+}
+
+void SurfaceRenderer::set_cut_open(bool open, std::span<const VolumeContent> contents) {
+  faces_.reset();
+  if (open) faces_.emplace(scene_, contents);
+}
+
+std::vector<VoxelBox> SurfaceRenderer::looks_different(std::size_t volume,
+                                                       std::span<const VoxelBox> differs) const {
+  if (!faces_) return {};
+  return Renderer::looks_different(volume, differs);
+}
+
+void SurfaceRenderer::draw(const View& view, const RenderTarget& target) {
+  target.bind();
+  glEnable(GL_DEPTH_TEST);
+  glDepthFunc(GL_LESS);
+  const bool opened = view.shown != View{}.shown;
+  (opened ? glDisable : glEnable)(GL_CULL_FACE);
+  if (opened) glEnable(GL_CLIP_DISTANCE0);
+  glDisable(GL_BLEND);
+  program_.set("u_clip_from_eye", glm::mat4(view.clip_from_eye()));
+  set_view(program_, view);
+  program_.use();
+  const std::vector<Sight::Part> parts = drawn_parts(target);
+  for (std::size_t v = 0; v < volumes_.size(); ++v) {
+    Volume& volume = volumes_[v];
+    const glm::dmat4 eye_from_voxel = view.eye_from_world * scene_.volumes[v].world_from_voxel;
+    program_.set("u_eye_from_voxel", glm::mat4(eye_from_voxel));
+    program_.set("u_eye_from_voxel_normal",
+                 glm::mat3(glm::inverseTranspose(glm::dmat3(eye_from_voxel))));
+    std::optional<glm::dvec3> eye_voxel;
+    if (!opened) eye_voxel = glm::dvec3(glm::affineInverse(eye_from_voxel)[3]);
+    volume.gpu.draw(volume.surface, Sight(view.clip_from_eye() * eye_from_voxel, eye_voxel, parts));
+  }
+  glDisable(GL_CULL_FACE);
+  glDisable(GL_CLIP_DISTANCE0);
+  if (opened && faces_) faces_->draw(view, target);
+}
+
+}  // namespace kerf

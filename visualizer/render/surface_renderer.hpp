@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "visualizer/gl/program.hpp"
+#include "visualizer/render/renderer.hpp"
+#include "visualizer/render/section_faces.hpp"
+#include "visualizer/surface/surface_on_gpu.hpp"
+#include "visualizer/surface/volume_surface.hpp"
+
+namespace kerf {
+
+/// Iso-surfaces as meshes: marching cubes on the CPU, again only around what changed; the GPU draws
+/// triangles and never sees the volume.
+///
+/// A clip plane opens the shell that a mesh is. While volumes are cut open they are textures too,
+/// from which the face in the plane is drawn.
+///
+/// Honours the GL scissor: blocks beside it are not drawn at all.
+class SurfaceRenderer final : public Renderer {
+ public:
+  SurfaceRenderer(const SceneView& scene, std::span<const VolumeContent> contents);
+
+  void update(std::size_t volume, std::span<const Density> density,
+              std::span<const std::uint32_t> changed) override;
+  void place(std::size_t volume, const glm::dmat4& world_from_voxel) override;
+  void set_cut_open(bool open, std::span<const VolumeContent> contents) override;
+  void draw(const View& view, const RenderTarget& target) override;
+  /// Triangles tell, but of the faces in the plane.
+  [[nodiscard]] std::vector<VoxelBox> looks_different(
+      std::size_t volume, std::span<const VoxelBox> differs) const override;
+  [[nodiscard]] std::span<const FineTriangle> different_triangles(
+      std::size_t volume) const override {
+    return volumes_[volume].surface.different_triangles();
+  }
+
+ private:
+  struct Volume {
+    VolumeSurface surface;
+    SurfaceOnGpu gpu;
+  };
+
+  SceneView scene_;  ///< its volumes where they are now
+  GlProgram program_{"surface.vert", "surface.frag", "lighting.frag"};
+  std::vector<Volume> volumes_;
+  std::optional<SectionFaces> faces_;  ///< while volumes are cut open
+};
+
+}  // namespace kerf

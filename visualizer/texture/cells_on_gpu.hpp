@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "visualizer/gl/names.hpp"
+#include "visualizer/texture/cell_faces.hpp"
+#include "visualizer/view/scene_view.hpp"
+
+namespace kerf {
+
+/// The macrocells of one volume on the GPU: which are active, and the faces around those; whole
+/// once, then only what changed.
+class CellsOnGpu {
+ public:
+  /// Cells that hold a density of at least `threshold` are active.
+  CellsOnGpu(const VolumeView& volume, std::span<const Density> density, Density threshold);
+
+  /// Bricks `changed` of `density` (the whole volume) differ.
+  void update_bricks(std::span<const Density> density, std::span<const std::uint32_t> changed);
+
+  /// See `Renderer::place`.
+  void place(const glm::dmat4& world_from_voxel);
+
+  /// The texture: 1 in active cells.
+  void bind(GLuint unit) const { glBindTextureUnit(unit, active_.id()); }
+  /// Draws the faces around the active cells with the program in use; attribute 0 is a face.
+  void draw_faces() const;
+
+  [[nodiscard]] const glm::dmat4& world_from_cell() const noexcept { return world_from_cell_; }
+  /// In cells, the smallest box that holds every active one.
+  [[nodiscard]] const VoxelBox& active_box() const noexcept { return active_box_; }
+
+ private:
+  void upload_active(const VoxelBox& cells);
+  void upload_faces(std::span<const CellFaces::Run> runs);
+
+  BrickGrid bricks_;
+  glm::dmat4 world_from_cell_{1.0};
+  Macrocells cells_;
+  CellFaces faces_;
+  VoxelBox active_box_;
+  GlTexture3D active_ = GlTexture3D::create();
+  GlBuffer face_buffer_ = GlBuffer::create();
+  GlVertexArray face_array_ = GlVertexArray::create();
+};
+
+}  // namespace kerf

@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "visualizer/view/scene_view.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include <glm/gtc/matrix_transform.hpp>
+#include <glm/gtc/quaternion.hpp>
+#include <nlohmann/json.hpp>
+
+#include "visualizer/error.hpp"
+
+namespace kerf {
+
+namespace {
+
+using nlohmann::json;
+
+constexpr std::size_t kMaxProfilePoints = 4096;  // a mesh of some 10^5 triangles
+
+constexpr std::size_t kMaxTriangles = 65536;  // as the controller takes them
+
+void read_profile(const json& text, ToolView& tool) {
+  for (const json& point : text) {
+    const auto at = point.get<std::array<double, 2>>();
+    if (!std::isfinite(at[0]) || !std::isfinite(at[1]) || at[1] < 0.0) {
+      throw VisualizerError("segment scene: tool " + tool.name +
+                            " has a profile point that is no height and radius; restart the "
+                            "controller");
+    }
+    tool.radius_mm = std::max(tool.radius_mm, at[1]);
+    tool.profile_mm.push_back(at);
+  }
+  if (tool.profile_mm.size() > kMaxProfilePoints) {
+    throw VisualizerError("segment scene: tool " + tool.name + " has " +
+                          std::to_string(tool.profile_mm.size()) + " profile points; at most " +
+                          std::to_string(kMaxProfilePoints));
+  }
+}
+
+void read_facets(const json& text, ToolView& tool) {
+  Facets& facets = tool.facets;
+  text.at("points_mm").get_to(facets.points_mm);
+  text.at("triangles").get_to(facets.triangles);
+  const std::size_t points = facets.points_mm.size();
+  const bool is_mesh =
+      !facets.triangles.empty() && facets.triangles.size() <= kMaxTriangles &&
+      std::ranges::all_of(facets.points_mm,
+                          [](const auto& p) {
+                            return std::ranges::all_of(p,
+                                                       [](double x) { return std::isfinite(x); });
+                          }) &&
+      std::ranges::all_of(facets.triangles, [points](const auto& t) {
+        return std::ranges::all_of(t, [points](std::uint32_t corner) { return corner < points; });
+      });
+  if (!is_mesh) {
+    throw VisualizerError("segment scene: tool " + tool.name + " has a mesh that is none, of " +
+                          std::to_string(points) + " points and " +
+                          std::to_string(facets.triangles.size()) +
+                          " triangles; restart the controller");
+  }
+  for (const auto& [x, y, z] : facets.points_mm) {
+    tool.radius_mm = std::max(tool.radius_mm, std::hypot(x, z));
+  }
+}
+
+ToolView tool_view(const json& text) {
+  ToolView tool;
+  tool.name = text.at("name").get<std::string>();
+  if (text.contains("mesh")) {
+    read_facets(text.at("mesh"), tool);
+  } else {
+    read_profile(text.at("profile"), tool);
+  }
+  return tool;
+}
+
+MaterialView material_view(const json& text) {
+  const auto colour = text.at("colour").get<std::array<double, 3>>();
+  return {.name = text.at("name").get<std::string>(),
+          .iso = text.at("iso").get<double>(),
+          .colour = {colour[0], colour[1], colour[2]}};
+}
+
+VolumeView volume_view(const SegmentVolumeInfo& info) {
+  const auto& q = info.orientation;
+  const auto& o = info.origin_mm;
+  const auto& s = info.spacing_mm;
+  VolumeView volume;
+  volume.bricks = info.bricks;
+  volume.world_from_voxel =
+      glm::scale(rigid({o[0], o[1], o[2]}, {q[0], q[1], q[2], q[3]}), glm::dvec3(s[0], s[1], s[2]));
+  // Iso 0 would make the air around a volume solid.
+  volume.iso = static_cast<Density>(std::clamp<std::uint32_t>(info.iso, 1, 65535));
+  return volume;
+}
+
+}  // namespace
+
+glm::dmat4 rigid(const glm::dvec3& position_mm, const glm::dvec4& q) {
+  const glm::dquat rotation(q.w, q.x, q.y, q.z);
+  const double length = glm::length(rotation);
+  glm::dmat4 pose = length > 0.0 ? glm::mat4_cast(rotation / length) : glm::dmat4(1.0);
+  pose[3] = glm::dvec4(position_mm, 1.0);
+  return pose;
+}
+
+BoxCorners VolumeView::corners() const {
+  const VoxelGrid& n = bricks.grid;
+  BoxCorners corners;
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    const glm::dvec4 voxel((i & 1) != 0 ? n.nx - 0.5 : -0.5, (i & 2) != 0 ? n.ny - 0.5 : -0.5,
+                           (i & 4) != 0 ? n.nz - 0.5 : -0.5, 1.0);
+    corners[i] = glm::dvec3(world_from_voxel * voxel);
+  }
+  return corners;
+}
+
+double VolumeView::radius_mm() const {
+  const BoxCorners box = corners();
+  return 0.5 * glm::length(box.back() - box.front());
+}
+
+std::vector<glm::dvec3> SceneView::corners() const {
+  std::vector<glm::dvec3> all;
+  for (const VolumeView& volume : volumes) {
+    const BoxCorners box = volume.corners();
+    all.insert(all.end(), box.begin(), box.end());
+  }
+  return all;
+}
+
+const VolumeView& SceneView::main_volume() const {
+  const auto solid = std::find_if(volumes.begin(), volumes.end(),
+                                  [](const VolumeView& volume) { return volume.solid; });
+  return solid != volumes.end() ? *solid : volumes.front();
+}
+
+SceneView scene_view(const SegmentInfo& segment) {
+  SceneView scene;
+  for (const SegmentVolumeInfo& info : segment.volumes) scene.volumes.push_back(volume_view(info));
+  try {
+    const json text = json::parse(segment.scene_json);
+    const json& volumes = text.at("volumes");
+    for (std::size_t i = 0; i < scene.volumes.size() && i < volumes.size(); ++i) {
+      scene.volumes[i].name = volumes[i].at("name").get<std::string>();
+      scene.volumes[i].solid = volumes[i].at("solid").get<bool>();
+    }
+    for (const json& tool : text.at("tools")) scene.tools.push_back(tool_view(tool));
+    for (const json& one : text.at("materials")) scene.materials.push_back(material_view(one));
+  } catch (const json::exception& problem) {
+    throw VisualizerError("segment scene: " + std::string(problem.what()) +
+                          "; start controller and visualizer of one version");
+  }
+  return scene;
+}
+
+}  // namespace kerf

@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "shared/segment/hand_over.hpp"
+#include "visualizer/view/frame_report.hpp"
+#include "visualizer/view/scene_view.hpp"
+
+namespace kerf {
+
+/// One run of a controller as the eye follows it: a connection and private copies of the volumes.
+///
+/// State-based: `poll` brings everything up to the present however long ago the last one was, so
+/// late join, a slow picture and a restarted visualizer are one case. Never waits for the
+/// controller. One thread.
+class Session {
+ public:
+  /// Throws SegmentError where there is no controller of that name or it speaks another version.
+  explicit Session(std::string_view name);
+
+  /// Tries again until a controller of that name lets it in; throws the last reason once `wait` is
+  /// over.
+  [[nodiscard]] static Session attach(std::string_view name, std::chrono::duration<double> wait);
+
+  /// Copies the bricks that changed and reads the records that came since.
+  void poll();
+
+  [[nodiscard]] const SceneView& scene() const noexcept { return scene_; }
+  [[nodiscard]] std::vector<VolumeContent> contents() const;
+  /// Bricks of a volume that the last `poll` changed.
+  [[nodiscard]] const VolumeSnapshot& snapshot(std::size_t volume) const;
+
+  /// The newest record; none before the first tick.
+  [[nodiscard]] const std::optional<TickRecord>& latest() const noexcept { return latest_; }
+  /// Ticks since the device was armed; none before.
+  [[nodiscard]] std::optional<std::uint64_t> ticks_since_armed() const noexcept;
+  [[nodiscard]] std::optional<double> tick_rate_hz() const;
+  [[nodiscard]] double removed_mm3() const noexcept { return removed_mm3_; }
+  [[nodiscard]] bool joined_late() const noexcept { return joined_late_; }
+  [[nodiscard]] std::optional<double> data_age_ms() const;
+  /// When the oldest of the ticks began that removed material whose bricks came with a `poll` since
+  /// the last call. None where no such tick; what was removed before the session began does not
+  /// count.
+  std::optional<std::chrono::steady_clock::time_point> take_oldest_removal();
+  [[nodiscard]] std::uint32_t tick_ns() const noexcept;
+  /// The servo's own time at the newest record: its ticks times their length. 0 before the first.
+  [[nodiscard]] double servo_s() const noexcept;
+  /// Since the tick of the newest record began; 0 before the first.
+  [[nodiscard]] double record_age_s() const noexcept;
+  /// From asking for the controller to the first complete volumes.
+  [[nodiscard]] double attach_ms() const noexcept { return attach_ms_; }
+
+  /// True once the controller has said that it ends, or has gone. Nothing changes after that: one
+  /// more `poll` has the final state.
+  [[nodiscard]] bool ended() const noexcept;
+  /// It said so, and it was no fault.
+  [[nodiscard]] bool ended_cleanly() const noexcept;
+
+  /// False where the controller refuses, is busy or has gone.
+  bool select_tool(std::uint32_t index);
+
+ private:
+  void read_states();
+  void read_removals();
+  void note_arrivals();
+  [[nodiscard]] std::uint64_t began_ns(const DirtyRecord& removal) const;
+
+  Stopwatch began_;
+  SegmentConnection connection_;
+  SceneView scene_;
+  std::vector<VolumeSnapshot> snapshots_;
+  std::optional<TickRecord> latest_;
+  std::optional<Tick> armed_;
+  std::uint64_t next_state_ = 0;  ///< index of the first record not read yet
+  std::uint64_t next_removal_ = 0;
+  std::vector<DirtyRecord> on_the_way_;  ///< removals whose bricks no snapshot holds yet
+  std::optional<std::uint64_t> oldest_removal_ns_;
+  double removed_mm3_ = 0.0;
+  bool joined_late_ = false;
+  double attach_ms_ = 0.0;
+};
+
+}  // namespace kerf

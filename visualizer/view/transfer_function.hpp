@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <span>
+
+#include <glm/glm.hpp>
+
+#include "visualizer/view/palette.hpp"
+#include "visualizer/view/scene_view.hpp"
+
+namespace kerf {
+
+/// What a voxel looks like in the translucent renderers; plain data, the same for all of them.
+///
+/// A sample of density d has the colour of its material (by label where it has one, else by
+/// density) and the opacity
+///
+///     1 - (1 - a)^(p * s / s0),   p = clamp((d - empty) / (full - empty), 0, 1)
+///
+/// over a length s, where a is the material's opacity over s0, one voxel edge (the shortest, where
+/// they differ). The exponent makes the picture independent of the step; p lets a border fade
+/// in, and material that is milled away fade out.
+struct TransferFunction {
+  /// Linear colour, and a in the fourth place: row 0 by density (entry i is density i/255), row 1
+  /// by label.
+  Palette materials{};
+  double empty = 0.0;  ///< density up to which nothing is seen
+  double full = 1.0;   ///< density from which the material is seen whole
+
+  /// p of a density.
+  [[nodiscard]] double presence(double density) const noexcept;
+  /// No voxel below this density is seen, though densities are rounded to 8 bits on the way.
+  [[nodiscard]] Density lowest_seen() const noexcept;
+};
+
+/// The least opacity over one voxel edge that counts as something: less makes no difference on a
+/// screen. The first sample that reaches it gives the depth of a pixel.
+inline constexpr double kLeastOpacity = 1.0 / 255.0;
+
+/// Made from materials: the softer, the more opaque, so that dentin shows under enamel and pulp
+/// in a cut. A volume with labels fades in up to its softest material; one without from `air` on,
+/// up to `iso`, because air and noise have densities too.
+[[nodiscard]] TransferFunction make_transfer_function(std::span<const MaterialView> materials,
+                                                      Density iso, bool has_labels,
+                                                      Density air = 0);
+/// That of one volume of a scene, whose air is what most of it has below the iso density.
+[[nodiscard]] TransferFunction make_transfer_function(const SceneView& scene, std::size_t volume,
+                                                      const VolumeContent& content);
+
+/// The median of the densities below `iso`, rounded down to 8 bits; 0 where there are none. A CT
+/// has its own value for air, far above the lowest one, as the paper's tooth: 0.3 of the highest.
+[[nodiscard]] Density air_level(std::span<const Density> density, Density iso);
+
+}  // namespace kerf
