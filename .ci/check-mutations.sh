@@ -17,11 +17,11 @@ controller/kernel/gradient.hpp | rounding of a gradient | s/round_shift\(sum, sh
 controller/kernel/gradient.hpp | reach of a refresh one short | s/changed\.grown\(kGradientReach\)/changed.grown(1)/
 controller/kernel/trilinear.hpp | rounding of a weight product | s/round_shift\(std::int64_t\{a\} \* b, 15\)/std::int64_t{a} * b >> 15/
 controller/kernel/trilinear.hpp | rounding of a cell's weight | s/0xffff\) \+ 1\) >> 1/0xffff)) >> 1/
-controller/kernel/trilinear.hpp | rounding of a lerp | s/round_shift\(way \* w, 15\)/(way * w >> 15)/
+controller/kernel/trilinear.hpp | rounding of a lerp | s/round_shift\(difference \* w, 15\)/(difference * w >> 15)/
 controller/kernel/trilinear.hpp | a weight's sign | s/w\.y - w\.z \+ yz/w.y - w.z - yz/
 controller/kernel/trilinear.hpp | border: cells at 0 left out | s/return low\.x >= 0 \&\&/return low.x > 0 \&\&/
 controller/kernel/trilinear.hpp | border: a cell at -1 touches nothing | s/return low\.x >= -1 \&\&/return low.x >= 0 \&\&/
-controller/kernel/tool_pose.hpp | rounding of a sample's position | s/round_shift\(way, 5\)/(way >> 5)/
+controller/kernel/tool_pose.hpp | rounding of a sample's position | s/round_shift\(rotated, 5\)/(rotated >> 5)/
 controller/kernel/overlap.hpp | rounding of a scaled overlap | s/round_shift\(std::int64_t\{sum\} \* volume_ratio, 20\)/(std::int64_t{sum} * volume_ratio >> 20)/
 controller/kernel/overlap.hpp | the carry's first lane | s/lowest_x - 2/lowest_x - 1/
 controller/kernel/milling.hpp | shift of a loss | s/product >> \(rate\.exponent - 1\)/product >> rate.exponent/

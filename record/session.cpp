@@ -94,17 +94,17 @@ int record_session(const RecorderOptions& options, const std::atomic<bool>& stop
   Recorder recorder(reader, log);
   write_manifest(options.out, reader.info(), recorder, 0, "running");
 
-  std::uint64_t told_lost = 0;
+  std::uint64_t reported_lost = 0;
   auto next_sync = Clock::now() + kSyncPeriod;
   bool ended = false;
   while (!ended) {
     // Asked before the poll: what was published until then is recorded by it.
     ended = stop || is_final(reader.lifecycle()) || !connection.alive();
     const std::uint64_t got = recorder.poll();
-    if (recorder.lost() != told_lost) {
-      std::cerr << "kerf-recorder: GAP: " << recorder.lost() - told_lost
+    if (recorder.lost() != reported_lost) {
+      std::cerr << "kerf-recorder: GAP: " << recorder.lost() - reported_lost
                 << " ticks overwritten before they were read\n";
-      told_lost = recorder.lost();
+      reported_lost = recorder.lost();
     }
     if (Clock::now() >= next_sync) {
       log.sync();

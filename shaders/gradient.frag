@@ -3,7 +3,7 @@
 // Direction of the density gradient, per voxel edge: one of three, chosen by a define. From samples
 // on the fly, or from what was worked out for each voxel (visualizer/view/gradient.hpp).
 
-uniform sampler3D u_density;   // 0..1, inside a shell of air one voxel thick
+uniform sampler3D u_density;   // 0..1, inside a border of air one voxel thick
 uniform vec3 u_texels;         // its extent
 
 #if defined(KERF_GRADIENT_FARID5)

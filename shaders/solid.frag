@@ -2,7 +2,7 @@
 #version 450 core
 // What a volume with an iso-surface is made of at a place.
 
-uniform sampler3D u_density;   // 0..1, inside a shell of air one voxel thick
+uniform sampler3D u_density;   // 0..1, inside a border of air one voxel thick
 uniform usampler3D u_label;    // the same extent; 0 = none
 uniform sampler2D u_palette;   // linear colour: row 0 by density, row 1 by label
 uniform vec3 u_texels;         // extent of u_density

@@ -7,7 +7,7 @@
 #include "controller/kernel/aligned_table.hpp"
 #include "controller/kernel/cover_table.hpp"
 #include "controller/kernel/point_shell/close_sums.hpp"
-#include "controller/kernel/point_shell/shell_table.hpp"
+#include "controller/kernel/point_shell/point_table.hpp"
 #include "controller/kernel/sample_table.hpp"
 #include "controller/kernel/splat_table.hpp"
 #include "shared/volume/voxel_grid.hpp"
@@ -69,17 +69,17 @@ struct KernelSet {
                       std::uint64_t* weight_by_material) noexcept;
   void (*take_steps)(const CoverSpend&, CoveredGroup* list, std::int32_t count, Density*,
                      std::int64_t entries, CoverTaken&) noexcept;
-  /// The swept contact: `place_shell`, `shell_sums` and `read_shell` of a tool's surface samples.
-  void (*place_shell)(const ShellTable<FixedNumbers>&, const ShellStep<FixedNumbers>&,
-                      const ShellPlaces<FixedNumbers>&) noexcept;
-  void (*sum_shell)(const ShellTable<FixedNumbers>&, const ShellPlaces<FixedNumbers>&,
-                    const std::int32_t (&centre)[3], const ShellField&,
-                    ShellSums<FixedNumbers>&) noexcept;
-  void (*read_shell)(const ShellPlaces<FixedNumbers>&, std::int32_t count,
-                     const std::int32_t (&centre)[3], const ShellField&,
-                     std::int32_t* density) noexcept;
+  /// The swept contact: `place_points`, `point_sums` and `read_points` of a tool's surface samples.
+  void (*place_points)(const PointTable<FixedNumbers>&, const PointStep<FixedNumbers>&,
+                       const PointPlaces<FixedNumbers>&) noexcept;
+  void (*sum_points)(const PointTable<FixedNumbers>&, const PointPlaces<FixedNumbers>&,
+                     const std::int32_t (&centre)[3], const DensityField&,
+                     PointSums<FixedNumbers>&) noexcept;
+  void (*read_points)(const PointPlaces<FixedNumbers>&, std::int32_t count,
+                      const std::int32_t (&centre)[3], const DensityField&,
+                      std::int32_t* density) noexcept;
   /// `close_sums`.
-  void (*sum_close)(const ShellTable<FixedNumbers>&, const std::int32_t* density,
+  void (*sum_close)(const PointTable<FixedNumbers>&, const std::int32_t* density,
                     CloseSums<FixedNumbers>&) noexcept;
 };
 

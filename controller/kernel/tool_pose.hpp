@@ -40,19 +40,19 @@ template <class N>
   const auto along = [&](Real centre, const std::array<typename N::Step, 3>& step) {
     if constexpr (N::kIsFixed) {
       constexpr std::int64_t kLimit = std::int64_t{kPositionLimitVox} << Real::kFractionBits;
-      const std::int64_t way = std::int64_t{step[0]} * offset[0] +
-                               std::int64_t{step[1]} * offset[1] +
-                               std::int64_t{step[2]} * offset[2];
+      const std::int64_t rotated = std::int64_t{step[0]} * offset[0] +
+                                   std::int64_t{step[1]} * offset[1] +
+                                   std::int64_t{step[2]} * offset[2];
       // 20 fraction bits times half pitches: 21 bits down to 16.
-      const std::int64_t place = centre.raw() + round_shift(way, 5);
+      const std::int64_t place = centre.raw() + round_shift(rotated, 5);
       return Real::from_raw(static_cast<std::int32_t>(place < -kLimit  ? -kLimit
                                                       : place > kLimit ? kLimit
                                                                        : place));
     } else {
       constexpr Real kLimit = Real(kPositionLimitVox);
-      const Real way =
+      const Real rotated =
           step[0] * Real(offset[0]) + step[1] * Real(offset[1]) + step[2] * Real(offset[2]);
-      const Real place = centre + way * Real(0.5);
+      const Real place = centre + rotated * Real(0.5);
       return place > -kLimit ? (place < kLimit ? place : kLimit) : -kLimit;
     }
   };

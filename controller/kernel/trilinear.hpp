@@ -87,8 +87,8 @@ template <class N>
 template <class N, class Value>
 [[nodiscard]] constexpr Value lerp(Value a, Value b, typename N::Weight w) noexcept {
   if constexpr (N::kIsFixed) {
-    const std::int64_t way = std::int64_t{b} - std::int64_t{a};
-    return static_cast<Value>(a + round_shift(way * w, 15));
+    const std::int64_t difference = std::int64_t{b} - std::int64_t{a};
+    return static_cast<Value>(a + round_shift(difference * w, 15));
   } else {
     return a + (b - a) * w;
   }

@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "controller/kernel/proxy/shell_closeup.hpp"
+#include "controller/kernel/proxy/contact_closeup.hpp"
 
 namespace kerf {
 
@@ -24,11 +24,11 @@ class CloseCells {
   [[nodiscard]] std::size_t bytes() const noexcept;
 
  private:
-  std::array<std::vector<ShellNumber<N>>, 3> lever_;
+  std::array<std::vector<PointNumber<N>>, 3> offset_;
   std::vector<std::int32_t> first_;
   std::array<std::int32_t, 3> cells_{};
-  std::array<ShellNumber<N>, 3> low_{};
-  ShellNumber<N> edge_{};
+  std::array<PointNumber<N>, 3> low_{};
+  PointNumber<N> edge_{};
 };
 
 }  // namespace kerf

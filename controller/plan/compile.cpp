@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "controller/kernel/proxy/probe_work.hpp"
+#include "controller/kernel/proxy/query_work.hpp"
 #include "controller/plan/aligned_tool.hpp"
 #include "controller/plan/plan_choice.hpp"
 #include "controller/plan/plan_contact.hpp"
@@ -130,8 +130,8 @@ class SceneIn final : public CompiledScene {
   }
 
   /// Of one volume, rounded up.
-  [[nodiscard]] std::uint64_t most_samples(const Shell<N>& shell) const {
-    const std::int64_t all = probe_work(shell.table, plan_.volume_count).most();
+  [[nodiscard]] std::uint64_t most_samples(const PointShell<N>& shell) const {
+    const std::int64_t all = query_work(shell.table, plan_.volume_count).most();
     return (static_cast<std::uint64_t>(all) + plan_.volume_count - 1) / plan_.volume_count;
   }
 

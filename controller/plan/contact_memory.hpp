@@ -11,7 +11,7 @@
 
 #include "controller/plan/free_brick_map.hpp"
 #include "controller/plan/plan_contact.hpp"
-#include "controller/plan/shell_tool.hpp"
+#include "controller/plan/tool_points.hpp"
 #include "controller/scene/scene_error.hpp"
 #include "controller/servo/servo_state.hpp"
 #include "controller/tool/surface_samples.hpp"
@@ -24,7 +24,7 @@ template <class N>
 class ContactMemory {
  public:
   /// Samples of a tool's surface; they stay where they are.
-  Shell<N> hold_shell(const LoadedScene& scene, const SceneTool& tool) {
+  PointShell<N> hold_shell(const LoadedScene& scene, const SceneTool& tool) {
     const double unit_mm = contact_unit_mm(scene);
     const auto in_units = [unit_mm](std::vector<std::array<double, 3>> samples) {
       for (auto& sample : samples) {
@@ -35,8 +35,8 @@ class ContactMemory {
     const auto samples = in_units(samples_of(scene, tool, unit_mm));
     const auto close = in_units(close_samples(tool, unit_mm));
     const auto& held =
-        tools_.emplace_back(tool.name, ShellTool<N>(samples, tool.round, close)).second;
-    for (ShellMemory<N>& places : places_) places.hold(held.shell());
+        tools_.emplace_back(tool.name, ToolPoints<N>(samples, tool.round, close)).second;
+    for (PlaceMemory<N>& places : places_) places.hold(held.shell());
     return held.shell();
   }
 
@@ -83,10 +83,10 @@ class ContactMemory {
     }
   }
 
-  std::vector<std::pair<std::string, ShellTool<N>>> tools_;
+  std::vector<std::pair<std::string, ToolPoints<N>>> tools_;
   std::vector<std::string> names_;  ///< by volume of the plan
   std::vector<std::size_t> map_bytes_;
-  std::vector<ShellMemory<N>> places_;
+  std::vector<PlaceMemory<N>> places_;
   std::vector<FreeBrickMap> maps_;
 };
 

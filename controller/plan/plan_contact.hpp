@@ -97,7 +97,7 @@ template <class N>
 /// How the proxy of a tool whose surface is `shell` moves.
 template <class N>
 [[nodiscard]] ProxyPlan<N> plan_proxy(const LoadedScene& scene, const SceneTool& tool,
-                                      const Shell<N>& shell) {
+                                      const PointShell<N>& shell) {
   constexpr double kRampNPerMs = 0.1;  // after a start inside of the solid: haptics-science 3.4
   const double n_per_unit =
       scene.force.stiffness_n_per_mm * contact_unit_mm(scene) / scene.device.workspace_scale;

@@ -29,7 +29,7 @@ std::uint64_t rows_of(VoxelIndex size) {
   return (count(size.y) + 1) * (count(size.z) + 1);
 }
 
-std::string way_of(Plan plan, std::string_view runs_it) {
+std::string variant_of(Plan plan, std::string_view runs_it) {
   return std::string(name_of(plan)) + "/" + std::string(runs_it);
 }
 
@@ -71,7 +71,7 @@ std::vector<StageCost> most_over(const std::vector<VoxelIndex>& sizes, StagesOf 
 }  // namespace
 
 PlanCost aligned_cost(const AlignedTable& table, const KernelSet& kernels, CutModel cut) {
-  PlanCost cost{way_of(Plan::aligned, kernels.name), {}};
+  PlanCost cost{variant_of(Plan::aligned, kernels.name), {}};
   cost.stages = {{"copy", voxels_of(table.box)}, {"contact", correlation_operations(table)}};
   if (cut == CutModel::none) return cost;
   if (cut == CutModel::preston) {
@@ -112,7 +112,7 @@ std::vector<StageCost> splat_stages(std::uint64_t samples, VoxelIndex size, std:
 
 PlanCost splat_cost(const KernelSet& kernels, const SceneTool& tool, const SceneVolume& volume,
                     CutModel cut) {
-  PlanCost cost{way_of(Plan::splat, kernels.name),
+  PlanCost cost{variant_of(Plan::splat, kernels.name),
                 most_over(box_sizes(tool, volume), [&](VoxelIndex size) {
                   return splat_stages(tool.offsets.size(), size, rows_of(size), cut);
                 })};
@@ -151,15 +151,16 @@ PlanCost gather_cost(NumericKind numeric, const KernelSet& kernels, const SceneT
     return gather_stages(tool.offsets.size(), boxes, cut);
   };
   PlanCost cost{
-      way_of(Plan::gather, numeric == NumericKind::fixed ? kernels.name : word_of(numeric)),
+      variant_of(Plan::gather, numeric == NumericKind::fixed ? kernels.name : word_of(numeric)),
       most_over(box_sizes(tool, volume), stages_of)};
   if (cut == CutModel::preston) add_force_stages(most_covered(tool, volume), cost.stages);
   return cost;
 }
 
 PlanCost surface_cost(NumericKind numeric, const KernelSet& kernels) {
-  return {way_of(Plan::surface, numeric == NumericKind::fixed ? kernels.name : word_of(numeric)),
-          {}};
+  return {
+      variant_of(Plan::surface, numeric == NumericKind::fixed ? kernels.name : word_of(numeric)),
+      {}};
 }
 
 void sweep_instead(std::uint64_t samples, std::vector<StageCost>& stages) {

@@ -71,7 +71,7 @@ void add_force_stages(std::uint64_t covered, std::vector<StageCost>& stages);
 
 /// Where the swept proxy is felt: instead of `contact`, before all else,
 /// probes  samples that are read, and what is counted like them: a volume's share of what a tick
-///         may spend in all of them (probe_work.hpp)
+///         may spend in all of them (query_work.hpp)
 void sweep_instead(std::uint64_t samples, std::vector<StageCost>& stages);
 
 /// Voxels that the stages of `gather` work on.

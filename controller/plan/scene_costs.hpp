@@ -25,7 +25,7 @@ struct StageTime {
 
 /// The ticks of one tool in one volume.
 struct PlanCost {
-  std::string way;  ///< plan and what runs it: "aligned/avx512", "gather/double"
+  std::string variant;  ///< plan and what runs it: "aligned/avx512", "gather/double"
   std::vector<StageCost> stages;
 };
 

@@ -82,7 +82,7 @@ template <class N>
 [[nodiscard]] inline VoxelIndex densest_place(const VoxelGrid& grid,
                                               std::span<const Density> density,
                                               const VoxelBox& reach) {
-  constexpr std::int32_t kPlaces = 12, kProbes = 8;  // along each axis
+  constexpr std::int32_t kPlaces = 12, kTrials = 8;  // along each axis
   const auto along = [](std::int32_t lo, std::int32_t hi, std::int32_t i, std::int32_t n) {
     return lo + (hi - lo) * (2 * i + 1) / (2 * n);
   };
@@ -95,9 +95,9 @@ template <class N>
   for (std::int32_t place = 0; place < kPlaces * kPlaces * kPlaces; ++place) {
     const VoxelIndex at = spread(grid.box(), place, kPlaces);
     int full = 0;
-    for (std::int32_t probe = 0; probe < kProbes * kProbes * kProbes; ++probe) {
-      const VoxelIndex way = spread(reach, probe, kProbes);
-      const VoxelIndex v{at.x + way.x, at.y + way.y, at.z + way.z};
+    for (std::int32_t query = 0; query < kTrials * kTrials * kTrials; ++query) {
+      const VoxelIndex offset = spread(reach, query, kTrials);
+      const VoxelIndex v{at.x + offset.x, at.y + offset.y, at.z + offset.z};
       if (grid.contains(v) && density[grid.index(v.x, v.y, v.z)] != 0) ++full;
     }
     if (full <= most) continue;
@@ -123,23 +123,23 @@ template <class N>
 /// Probes with the tool's centre at a place in volume `v` alone, as many as `samples` are enough
 /// for. Inside of the solid no closer look is taken. Returns what they cost.
 template <class N>
-std::uint64_t probe_often(const ServoPlan<N>& plan, const ServoState<N>& state,
-                          const Shell<N>& shell, std::size_t v,
+std::uint64_t query_often(const ServoPlan<N>& plan, const ServoState<N>& state,
+                          const PointShell<N>& shell, std::size_t v,
                           VoxelVec<typename N::Real> centre_vox, std::uint64_t samples) {
-  ShellVolume<N> volume = state.contact.volumes[v];
+  ContactVolume<N> volume = state.contact.volumes[v];
   volume.frame = {};  // contact space is the volume's
   for (std::size_t i = 0; i < 3; ++i)
     volume.frame.voxel_from_contact.row[i][i] = typename N::Ratio(1);
-  ShellProbe<N> probe(*plan.kernels, shell, std::span(&volume, 1));
-  const std::int64_t enough = static_cast<std::int64_t>(samples) - probe.work().probe;
-  probe.begin_tick();
-  probe.turn({});
+  ContactQuery<N> query(*plan.kernels, shell, std::span(&volume, 1));
+  const std::int64_t enough = static_cast<std::int64_t>(samples) - query.work().query;
+  query.begin_tick();
+  query.turn({});
   std::int64_t before = 0;
   do {
-    before = probe.spent();
-    static_cast<void>(probe.probe(relabel<ContactSpace>(centre_vox)));
-  } while (probe.spent() <= enough && probe.spent() > before);
-  return static_cast<std::uint64_t>(probe.spent());
+    before = query.spent();
+    static_cast<void>(query.query(relabel<ContactSpace>(centre_vox)));
+  } while (query.spent() <= enough && query.spent() > before);
+  return static_cast<std::uint64_t>(query.spent());
 }
 
 /// Each stage of tool `t` in volume `v` of the plan, whose `bounds` are given: the tool where the
@@ -164,8 +164,8 @@ template <class N>
   const ForceCutPlan<N>& by_force = plan.force_cut;
   std::vector<StageCost> done = std::move(bounds);           // `aligned` does no less but probes
   if (by_force.on) done.resize(done.size() - kForceStages);  // but for what the tool covers
-  const std::uint64_t most_probed = done.front().operations;
-  std::uint64_t probed = 0;
+  const std::uint64_t most_queried = done.front().operations;
+  std::uint64_t queried = 0;
   std::size_t listed = 0;
   const auto list_and_spend = [&]<class Overlap>(const Overlap& overlap) {
     using Real = typename N::Real;
@@ -191,9 +191,9 @@ template <class N>
     pose.centre_vox = {Real(place.x + 0.002 * i), Real(place.y + 0.3), Real(place.z + 0.4)};
     laps.begin();
     if (plan.contact.swept) {
-      probed = probe_often(plan, state, tool.swept.shell, v, pose.centre_vox, most_probed);
-      laps.end_stage(static_cast<std::int64_t>(probed));
-      done.front().operations = probed;
+      queried = query_often(plan, state, tool.swept.shell, v, pose.centre_vox, most_queried);
+      laps.end_stage(static_cast<std::int64_t>(queried));
+      done.front().operations = queried;
       if (in_volume.plan == Plan::surface) continue;
     }
     if constexpr (N::kIsFixed) {
@@ -242,7 +242,7 @@ template <class N>
         const std::ptrdiff_t rows = std::ptrdiff_t{box.size.y + 1} * (box.size.z + 1);
         const auto touched = static_cast<std::uint64_t>(std::count(live, live + rows, 1));
         done = splat_stages(tool.offsets.size(), box.size, touched, cut);
-        if (plan.contact.swept) sweep_instead(probed, done);
+        if (plan.contact.swept) sweep_instead(queried, done);
         continue;
       }
       laps.end_stage(gathered_contact(*plan.kernels, tool.samples, volume.grid, gradient, pose).x);
@@ -260,7 +260,7 @@ template <class N>
     if (by_force.on) {
       list_and_spend(state.overlap);
       done = gather_stages(tool.offsets.size(), boxes, cut);
-      sweep_instead(probed, done);
+      sweep_instead(queried, done);
       continue;
     }
     laps.end_stage(static_cast<std::int64_t>(
@@ -274,7 +274,7 @@ template <class N>
     boxes.refreshed =
         voxels_in(removed.changed.grown(kGradientReach).clipped(volume.grid.box()).extent());
     done = gather_stages(tool.offsets.size(), boxes, cut);
-    if (plan.contact.swept) sweep_instead(probed, done);
+    if (plan.contact.swept) sweep_instead(queried, done);
   }
   if (by_force.on) add_force_stages(listed, done);
   std::vector<StageTime> times;

@@ -3,8 +3,8 @@
 
 #include <array>
 
+#include "controller/kernel/proxy/contact_query.hpp"
 #include "controller/kernel/proxy/contact_space.hpp"
-#include "controller/kernel/proxy/shell_probe.hpp"
 #include "controller/servo/coupling.hpp"
 #include "controller/servo/proxy_contact.hpp"
 #include "controller/servo/servo_limits.hpp"
@@ -26,14 +26,14 @@ struct ContactPlan {
 /// A tool's surface and how its proxy moves.
 template <class N>
 struct SweptTool {
-  Shell<N> shell;
+  PointShell<N> shell;
   ProxyPlan<N> proxy;
 };
 
 /// The part that changes; places belong to the compiled scene.
 template <class N>
 struct ContactState {
-  std::array<ShellVolume<N>, kMaxVolumes> volumes{};  ///< by index of the plan's volumes
+  std::array<ContactVolume<N>, kMaxVolumes> volumes{};  ///< by index of the plan's volumes
   ProxyState<N> proxy;
 };
 

@@ -37,8 +37,8 @@ struct ProxyContact {
   ContactVec<typename N::Real> spring{};  ///< force over stiffness: from goal to proxy, units
   ContactVec<typename N::Unit> normal{};  ///< mean of what presses, out of the solid; 0 in air
   /// Torque about the tool's centre over the length of the force, units.
-  ContactVec<typename N::Real> lever{};
-  std::int32_t probes = 0;
+  ContactVec<typename N::Real> moment_arm{};
+  std::int32_t queries = 0;
   bool turned = true;  ///< the tool has the orientation of the goal
 };
 
@@ -49,7 +49,7 @@ inline constexpr double kLostDepth = 1;  // units
 /// do. Of what it cannot hold of the spring, planes do that the sweep has not found: in a groove of
 /// the tool's own shape it knows but one of many at a time. Nothing holds it `on_its_way`.
 template <class N>
-constexpr void add_loads(const Swept<N>& swept, typename N::Unit friction, bool on_its_way,
+constexpr void add_loads(const Swept<N>& swept, typename N::Unit friction, bool moving,
                          ProxyContact<N>& contact) noexcept {
   using Real = typename N::Real;
   const Real length = norm(contact.spring);
@@ -59,26 +59,26 @@ constexpr void add_loads(const Swept<N>& swept, typename N::Unit friction, bool 
   for (std::size_t i = 0; i < swept.planes.count; ++i) whole = whole + swept.slide.load[i];
   if (whole < Real(1e-3)) return;
   for (std::size_t i = 0; i < swept.planes.count; ++i) {
-    const Plane<N>& plane = swept.planes.plane[i];
+    const ConstraintPlane<N>& plane = swept.planes.plane[i];
     const Real load = swept.slide.load[i];
     pressed = pressed + times<N>(plane.normal, load);
     arm = arm + part_of<N>(plane.arm, share<N>(load, whole));
-    contact.lever = contact.lever + moment<N>(plane.arm, plane.normal) * (load / length);
+    contact.moment_arm = contact.moment_arm + moment<N>(plane.arm, plane.normal) * (load / length);
   }
   const ContactVec<Real> along_faces = contact.spring - pressed;
   const Real rubbed = norm(along_faces);
   const Real held = multiply<Real>(friction, norm(pressed));
-  if (rubbed > held && !on_its_way)
+  if (rubbed > held && !moving)
     pressed = pressed + part_of<N>(along_faces, share<N>(rubbed - held, rubbed));
   contact.normal = direction_of<N>(pressed);
-  contact.lever = contact.lever + moment<N>(arm, direction_of<N>(along_faces)) *
-                                      (std::min(rubbed, length) / length);
+  contact.moment_arm = contact.moment_arm + moment<N>(arm, direction_of<N>(along_faces)) *
+                                                (std::min(rubbed, length) / length);
 }
 
 /// One tick of the swept contact: the proxy follows `goal`, and its spring tells the force.
 ///
-/// Servo thread; pure but for `state`. At most 32 probes, or 14 while a place is looked for. A goal
-/// that is not finite changes nothing and gives no force; one that is far is brought within
+/// Servo thread; pure but for `state`. At most 32 queries, or 14 while a place is looked for. A
+/// goal that is not finite changes nothing and gives no force; one that is far is brought within
 /// kContactLimit. No force before the proxy is placed.
 template <class N, ContactField<N> Field>
 constexpr ProxyContact<N> follow(const ProxyPlan<N>& plan, ProxyState<N>& state, Field& field,
@@ -107,7 +107,7 @@ constexpr ProxyContact<N> follow(const ProxyPlan<N>& plan, ProxyState<N>& state,
   const Swept<N> swept =
       ProxySweep<N, Field>(field, state.pose, plan.friction, plan.turn_step).tick(goal);
   contact.pose = state.pose;
-  contact.probes = swept.probes;
+  contact.queries = swept.queries;
   contact.turned = swept.turned;
   if (swept.buried || swept.depth > Real(kLostDepth)) {
     state = {};
@@ -116,8 +116,8 @@ constexpr ProxyContact<N> follow(const ProxyPlan<N>& plan, ProxyState<N>& state,
   }
   contact.spring = state.pose.centre - goal.centre;
   // After a whole step it may only lag, for want of work.
-  const bool on_its_way = norm(state.pose.centre - from) >= Real(SweepRules::kStep);
-  add_loads(swept, plan.friction, on_its_way, contact);
+  const bool moving = norm(state.pose.centre - from) >= Real(SweepRules::kStep);
+  add_loads(swept, plan.friction, moving, contact);
   if (state.ramping) {
     state.longest = state.longest + plan.ramp_per_tick;
     const Real length = norm(contact.spring);

@@ -54,7 +54,7 @@ struct ServoOutput {
   Fault fault = Fault::none;
   bool started = false;    ///< was armed and taken in hand at least once: ticks count
   bool stale = false;      ///< no fresh report in this tick
-  bool saturated = false;  ///< force, slew, thermal or motor limit was active
+  bool clamped = false;    ///< force, slew, thermal or motor limit was active
   bool contact = false;    ///< commanded force above 0.01 N
   bool forbidden = false;  ///< the tool presses on a forbidden material
 

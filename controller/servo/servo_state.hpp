@@ -64,8 +64,8 @@ struct ServoState {
   std::uint32_t active_tool = 0;
   bool hold = false;  ///< asked by command: force 0, nothing is cut
 
-  Levers<N> lever_mm;      ///< of the last good report
-  DeviceVec<Real> tip_mm;  ///< device port
+  JacobianTransposed<N> jacobian_t_mm;  ///< of the last good report
+  DeviceVec<Real> tip_mm;               ///< device port
   Rotation<N> rotation = identity_rotation<N>();
   bool tip_known = false;  ///< false before the first report
   VelocityWindow<N> velocity;

@@ -166,7 +166,7 @@ Sensed<N> sense(const ServoPlan<N>& plan, ServoState<N>& state,
   seen.finite = all_finite(sensed.pose.arm.tip_mm);
   sensed.usable = seen.fresh && seen.finite;
   if (sensed.usable) {
-    state.lever_mm = sensed.pose.arm.lever_mm;
+    state.jacobian_t_mm = sensed.pose.arm.jacobian_t_mm;
     const std::uint32_t gap = state.supervisor.stale_ticks + 1;
     seen.overspeed = move_tip(plan, state, sensed.pose, gap) && !report.parked;
   }
@@ -245,13 +245,13 @@ void drive(const ServoPlan<N>& plan, ServoState<N>& state, DeviceVec<typename N:
   }
   const DeviceVec<Real> limited_n =
       limited_force(plan.limits, state.thermal, wanted_n, state.force_n);
-  const MotorCommand<N> motors = motor_command(plan, state.lever_mm * limited_n);
+  const MotorCommand<N> motors = motor_command(plan, state.jacobian_t_mm * limited_n);
   out.motor_counts = motors.counts;
   state.force_n = {multiply<Real>(motors.share, limited_n.x),
                    multiply<Real>(motors.share, limited_n.y),
                    multiply<Real>(motors.share, limited_n.z)};
-  out.saturated = !(state.force_n == wanted_n);
-  const JointVec<Real> torque_n_mm = state.lever_mm * state.force_n;
+  out.clamped = !(state.force_n == wanted_n);
+  const JointVec<Real> torque_n_mm = state.jacobian_t_mm * state.force_n;
   out.torque_n_mm = {as_double(torque_n_mm.x), as_double(torque_n_mm.y), as_double(torque_n_mm.z)};
 }
 

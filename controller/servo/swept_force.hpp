@@ -19,7 +19,7 @@ struct SweptForce {
 };
 
 /// The proxy of the active tool follows the hand; the coupling pulls the hand to it. A tool that is
-/// round, or that does not turn, keeps the world's axes. Servo thread; at most 32 probes.
+/// round, or that does not turn, keeps the world's axes. Servo thread; at most 32 queries.
 template <class N>
 [[nodiscard]] SweptForce<N> feel_swept(const ServoPlan<N>& plan, ServoState<N>& state,
                                        WorldVec<typename N::Real> tip_mm,
@@ -36,8 +36,8 @@ template <class N>
   ProxyPose<N> goal;
   goal.centre = scaled(relabel<ContactSpace>(tip_mm - contact.origin_mm), contact.units_per_mm);
   if (tool.turns && !tool.round) goal.turn = turn_of<N>(rotation.row);
-  ShellProbe<N> field(*plan.kernels, tool.swept.shell,
-                      std::span(state.contact.volumes).first(plan.volume_count));
+  ContactQuery<N> field(*plan.kernels, tool.swept.shell,
+                        std::span(state.contact.volumes).first(plan.volume_count));
   field.begin_tick();
   const ProxyContact<N> felt = follow<N>(tool.swept.proxy, state.contact.proxy, field, goal);
 
@@ -51,7 +51,7 @@ template <class N>
   if (tool.turns && !tool.round) out.tool.rotation = {rows_of(felt.pose.turn)};
   out.tool.normal = relabel<WorldSpace>(felt.normal);
   out.torque_n_mm =
-      relabel<DeviceSpace>(scaled(felt.lever, contact.device_mm_per_unit)) * norm(out.force_n);
+      relabel<DeviceSpace>(scaled(felt.moment_arm, contact.device_mm_per_unit)) * norm(out.force_n);
   return out;
 }
 

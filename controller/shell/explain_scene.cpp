@@ -24,9 +24,9 @@ void explain_scene(const ControllerOptions& options, LoadedScene& scene, Compile
   const SegmentPlan segment = plan_segment(segment_spec(scene, canonical_json(scene), 0));
   check_memory(scene, servo.costs(), 0);
   servo.take(scene);
-  const Explanation told = explain(scene, servo, segment, calibration);
-  std::fputs(explanation_text(told).c_str(), stdout);
-  if (!options.report.empty()) write_new_file(options.report, explanation_json(told));
+  const Explanation explanation = explain(scene, servo, segment, calibration);
+  std::fputs(explanation_text(explanation).c_str(), stdout);
+  if (!options.report.empty()) write_new_file(options.report, explanation_json(explanation));
   const std::string refusal = over_budget(scene, servo.costs());
   if (!refusal.empty()) throw std::runtime_error(refusal);
 }

@@ -28,7 +28,7 @@ std::uint32_t flags_of(const DeviceReport& report, const ServoOutput& output) no
   set(report.button2, kFlagButton2);
   set(report.parked, kFlagParked);
   set(output.contact, kFlagContact);
-  set(output.saturated, kFlagClamped);
+  set(output.clamped, kFlagClamped);
   set(output.stale, kFlagStaleInput);
   set(output.fault != Fault::none, kFlagDeviceFault);
   set(output.motors_on, kFlagMotorsOn);

@@ -198,11 +198,11 @@ std::vector<Point> rim_samples(const ToolMesh& mesh, double pitch_mm) {
   std::vector<int> meeting(mesh.points_mm.size());
   std::vector<Point> inward(mesh.points_mm.size());
   for (const Rim& rim : rims) {
-    const Point way = vec3::unit(vec3::minus(mesh.points_mm[rim.b], mesh.points_mm[rim.a]));
+    const Point direction = vec3::unit(vec3::minus(mesh.points_mm[rim.b], mesh.points_mm[rim.a]));
     ++meeting[rim.a];
     ++meeting[rim.b];
-    inward[rim.a] = vec3::add(inward[rim.a], way);
-    inward[rim.b] = vec3::minus(inward[rim.b], way);
+    inward[rim.a] = vec3::add(inward[rim.a], direction);
+    inward[rim.b] = vec3::minus(inward[rim.b], direction);
   }
   std::vector<bool> is_end = points_of(mesh);
   ApartSamples samples(kNearest * pitch_mm);

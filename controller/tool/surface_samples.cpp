@@ -8,8 +8,8 @@
 #include <span>
 #include <sstream>
 
-#include "controller/kernel/point_shell/shell_table.hpp"
-#include "controller/kernel/proxy/shell_closeup.hpp"
+#include "controller/kernel/point_shell/point_table.hpp"
+#include "controller/kernel/proxy/contact_closeup.hpp"
 #include "controller/scene/scene_error.hpp"
 #include "controller/tool/mesh_surface.hpp"
 #include "controller/tool/tool_shapes.hpp"
@@ -17,7 +17,7 @@
 namespace kerf {
 namespace {
 
-static_assert(kMaxSurfaceSamples * 1.02 < kMaxShellSamples);  // rings are rounded to whole samples
+static_assert(kMaxSurfaceSamples * 1.02 < kMaxShellPoints);  // rings are rounded to whole samples
 
 constexpr int kProfileSteps = 2048;  // no corner but the shape's own turns by more than 0.1 deg
 constexpr double kRimAngle = 0.2;    // rad
@@ -99,12 +99,12 @@ class RingSampler {
     return pitch_mm_ / std::sqrt(std::numbers::pi * slope);  // a cone of the area pitch^2
   }
 
-  void add_ring(std::span<const std::array<double, 2>> part, double way_mm, double distance_mm) {
+  void add_ring(std::span<const std::array<double, 2>> part, double arc_mm, double distance_mm) {
     std::size_t k = 1;
-    for (; k + 1 < part.size() && way_mm > length_of(part[k - 1], part[k]); ++k) {
-      way_mm -= length_of(part[k - 1], part[k]);
+    for (; k + 1 < part.size() && arc_mm > length_of(part[k - 1], part[k]); ++k) {
+      arc_mm -= length_of(part[k - 1], part[k]);
     }
-    const double share = way_mm / length_of(part[k - 1], part[k]);
+    const double share = arc_mm / length_of(part[k - 1], part[k]);
     const double y_mm = std::lerp(part[k - 1][0], part[k][0], share);
     const double radius_mm = std::lerp(part[k - 1][1], part[k][1], share);
     const double area_mm2 = 2 * std::numbers::pi * radius_mm * distance_mm;

@@ -44,7 +44,7 @@ inline constexpr int kMaxSurfaceSamples = 8000;
                                                                  double unit_mm);
 
 /// Samples kClosePitch units apart of a tool that is no ball, in the same way, for a closer look at
-/// a contact (shell_closeup.hpp). None of a ball. Load time.
+/// a contact (contact_closeup.hpp). None of a ball. Load time.
 [[nodiscard]] std::vector<std::array<double, 3>> close_samples(const SceneTool& tool,
                                                                double unit_mm);
 

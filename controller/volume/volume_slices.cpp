@@ -16,9 +16,9 @@ double slice_distance(const std::filesystem::path& folder, const std::vector<Sli
       (slices.back().depth_mm - slices.front().depth_mm) / static_cast<double>(slices.size() - 1);
   const double slack_mm = std::max(0.02 * step, 1e-3);  // positions are rounded in the files
   for (std::size_t i = 1; i < slices.size(); ++i) {
-    const Place way = minus(slices[i].origin_mm, slices[i - 1].origin_mm);
-    const double depth = dot(way, normal);
-    const Place aside = minus(way, scaled(normal, depth));
+    const Place apart = minus(slices[i].origin_mm, slices[i - 1].origin_mm);
+    const double depth = dot(apart, normal);
+    const Place aside = minus(apart, scaled(normal, depth));
     if (std::abs(depth - step) > slack_mm) {
       std::ostringstream text;
       text << folder.string() << ": " << depth << " mm before slice "

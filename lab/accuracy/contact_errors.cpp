@@ -64,10 +64,10 @@ void add_normals(const ContactMethod& method, const ContactCase& at, std::size_t
 
 /// Steps along the face: where nothing but the sampling changes the force, all of it is error.
 void add_steps(const ForceAt& force, const Contact& contact, int count, Spread& errors) {
-  const Point way = along_face(contact.normal)[0] * kStepMm;
+  const Point step = along_face(contact.normal)[0] * kStepMm;
   Point before = force(contact.centre_mm);
   for (int i = 1; i <= count; ++i) {
-    const Point now = force(contact.centre_mm + i * way);
+    const Point now = force(contact.centre_mm + i * step);
     errors.add(norm(now - before));
     before = now;
   }

@@ -159,9 +159,9 @@ const double* Entry::find(std::string_view metric, std::string_view shape) const
   return nullptr;
 }
 
-std::vector<Entry> study(const Plan& plan,
-                         const std::function<void(double share, const std::string& what)>& told) {
-  told(0, "contacts");
+std::vector<Entry> study(
+    const Plan& plan, const std::function<void(double share, const std::string& what)>& progress) {
+  progress(0, "contacts");
   const Subjects touched(plan.contacts, plan.walks);
   const std::vector<Variant> list = variants();
   std::optional<double> voxel_mm;
@@ -169,8 +169,8 @@ std::vector<Entry> study(const Plan& plan,
   std::optional<Entry> standard;  // the one that every knob has
   std::vector<Entry> entries;
   for (const Variant& variant : list) {
-    told(static_cast<double>(entries.size()) / static_cast<double>(list.size()),
-         std::string(variant.knob) + " " + variant.value);
+    progress(static_cast<double>(entries.size()) / static_cast<double>(list.size()),
+             std::string(variant.knob) + " " + variant.value);
     const bool is_standard = variant.choice == ContactChoice{};
     Entry entry;
     if (is_standard && standard) {

@@ -44,6 +44,6 @@ struct Plan {
 
 /// `told` hears how far it is (0..1) and what is measured now.
 [[nodiscard]] std::vector<Entry> study(
-    const Plan& plan, const std::function<void(double share, const std::string& what)>& told);
+    const Plan& plan, const std::function<void(double share, const std::string& what)>& progress);
 
 }  // namespace kerf::accuracy

@@ -11,7 +11,7 @@
 #include "lab/bench/kernel_bench.hpp"
 #include "lab/bench/layout_bench.hpp"
 #include "lab/bench/performance_page.hpp"
-#include "lab/bench/probe_bench.hpp"
+#include "lab/bench/query_bench.hpp"
 #include "lab/rig/lab_run.hpp"
 
 namespace kerf {
@@ -40,12 +40,12 @@ nlohmann::ordered_json json_of(const std::vector<KernelRow>& rows) {
   return list;
 }
 
-std::string json_of(const std::vector<KernelRow>& rows, const std::vector<KernelRow>& probes,
+std::string json_of(const std::vector<KernelRow>& rows, const std::vector<KernelRow>& queries,
                     const std::vector<KernelRow>& layout, int core) {
   nlohmann::ordered_json report;
   report["core"] = core;
   report["rows"] = json_of(rows);
-  report["probes"] = json_of(probes);
+  report["probes"] = json_of(queries);
   report["layout"] = json_of(layout);
   return report.dump(2) + "\n";
 }
@@ -71,12 +71,12 @@ int BenchCommand::run(std::ostream& out) const {
   out << "ns a tick on core " << core << "; 256 x 256 x 161 voxels; ratio to the paper's form\n"
       << "tick                     number way               p50        p99    ratio        "
          "bytes\n";
-  const auto told = [&](const KernelRow& row) { out << line_of(row) << std::endl; };
-  const auto rows = bench_kernels(told);
-  const auto probes = bench_probes(told);
-  const auto layout = bench_layout(told);
-  as_json.write(json_of(rows, probes, layout, core));
-  as_page.write_part("kernels", performance_page(rows, probes, layout));
+  const auto add_row = [&](const KernelRow& row) { out << line_of(row) << std::endl; };
+  const auto rows = bench_kernels(add_row);
+  const auto queries = bench_queries(add_row);
+  const auto layout = bench_layout(add_row);
+  as_json.write(json_of(rows, queries, layout, core));
+  as_page.write_part("kernels", performance_page(rows, queries, layout));
   return 0;
 }
 

@@ -69,7 +69,7 @@ constexpr std::size_t kGatherBytes = sizeof(Gradient<Numbers>);
 
 class Bench {
  public:
-  explicit Bench(const std::function<void(const KernelRow&)>& told) : told_(told) {}
+  explicit Bench(const std::function<void(const KernelRow&)>& add_row) : add_row_(add_row) {}
 
   void contact(const std::vector<Density>& density, const PaperVolume& paper,
                std::span<const Gradient<Numbers>> field, const Ticks& ticks) {
@@ -238,10 +238,10 @@ class Bench {
     if (baseline_p50_ns_ == 0) baseline_p50_ns_ = times.p50_ns;  // the paper is the first row
     rows_.push_back(
         {ticks_->name, numeric, isa, times.p50_ns, times.p99_ns, baseline_p50_ns_, bytes});
-    told_(rows_.back());
+    add_row_(rows_.back());
   }
 
-  const std::function<void(const KernelRow&)>& told_;
+  const std::function<void(const KernelRow&)>& add_row_;
   const Ticks* ticks_ = nullptr;
   double baseline_p50_ns_ = 0;
   std::vector<KernelRow> rows_;
@@ -254,8 +254,8 @@ std::function<Place(int)> orbit(int size, int count) {
 
 }  // namespace
 
-std::vector<KernelRow> bench_kernels(const std::function<void(const KernelRow&)>& told) {
-  Bench bench(told);
+std::vector<KernelRow> bench_kernels(const std::function<void(const KernelRow&)>& add_row) {
+  Bench bench(add_row);
   {
     const auto density = ball_in(kGrid);
     const PaperVolume paper(kGrid, density);

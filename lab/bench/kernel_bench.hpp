@@ -23,6 +23,6 @@ struct KernelRow {
 /// Times the servo's kernels against the paper's form on 256 x 256 x 161 voxels, in this process on
 /// this core. `told` hears each row as it is ready. Takes about a minute.
 [[nodiscard]] std::vector<KernelRow> bench_kernels(
-    const std::function<void(const KernelRow&)>& told);
+    const std::function<void(const KernelRow&)>& add_row);
 
 }  // namespace kerf

@@ -67,8 +67,10 @@ class Bricks {
 
 class LayoutBench {
  public:
-  explicit LayoutBench(const std::function<void(const KernelRow&)>& told)
-      : told_(told), set_(**kernel_sets()), tool_(tool_of(kSize, Shape::ball), kExactFarid, set_) {
+  explicit LayoutBench(const std::function<void(const KernelRow&)>& add_row)
+      : add_row_(add_row),
+        set_(**kernel_sets()),
+        tool_(tool_of(kSize, Shape::ball), kExactFarid, set_) {
     memory_.hold(tool_.table().size, true);
     bricks_.resize(memory_.bytes());
   }
@@ -131,7 +133,7 @@ class LayoutBench {
 
  private:
   template <class Tick>
-  void row(const std::string& name, const char* way, bool cold, int count, Tick&& tick) {
+  void row(const std::string& name, const char* kernels, bool cold, int count, Tick&& tick) {
     const TickTimes times = time_ticks(
         count,
         [&] {
@@ -139,12 +141,12 @@ class LayoutBench {
         },
         tick);
     if (baseline_ns_ == 0) baseline_ns_ = times.p50_ns;
-    rows_.push_back({name, "fixed", way, times.p50_ns, times.p99_ns, baseline_ns_,
+    rows_.push_back({name, "fixed", kernels, times.p50_ns, times.p99_ns, baseline_ns_,
                      tool_.bytes() + memory_.bytes()});
-    told_(rows_.back());
+    add_row_(rows_.back());
   }
 
-  const std::function<void(const KernelRow&)>& told_;
+  const std::function<void(const KernelRow&)>& add_row_;
   const KernelSet& set_;
   AlignedTool tool_;
   BoxMemory memory_;
@@ -155,8 +157,8 @@ class LayoutBench {
 
 }  // namespace
 
-std::vector<KernelRow> bench_layout(const std::function<void(const KernelRow&)>& told) {
-  LayoutBench bench(told);
+std::vector<KernelRow> bench_layout(const std::function<void(const KernelRow&)>& add_row) {
+  LayoutBench bench(add_row);
   bench.copies();
   bench.sizes();
   return std::move(bench).rows();

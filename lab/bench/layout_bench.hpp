@@ -13,6 +13,6 @@ namespace kerf {
 /// (the baseline is the linear copy), and contact and milling in volumes from 128 x 128 x 80 to
 /// 512^3 (the baseline is the smallest).
 [[nodiscard]] std::vector<KernelRow> bench_layout(
-    const std::function<void(const KernelRow&)>& told);
+    const std::function<void(const KernelRow&)>& add_row);
 
 }  // namespace kerf

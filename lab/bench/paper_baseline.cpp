@@ -86,13 +86,13 @@ void PaperVolume::refresh(const VoxelBox& box) {
 }
 
 PaperVolume::Sample PaperVolume::sample_of(const ToolOffset& offset, const PaperPose& pose) {
-  const std::array<float, 3> way{0.5F * static_cast<float>(offset[0]),
-                                 0.5F * static_cast<float>(offset[1]),
-                                 0.5F * static_cast<float>(offset[2])};
+  const std::array<float, 3> from_centre{0.5F * static_cast<float>(offset[0]),
+                                         0.5F * static_cast<float>(offset[1]),
+                                         0.5F * static_cast<float>(offset[2])};
   std::array<float, 3> at{};
   for (std::size_t i = 0; i < 3; ++i) {
-    at[i] = pose.centre_vox[i] + pose.rotation[i][0] * way[0] + pose.rotation[i][1] * way[1] +
-            pose.rotation[i][2] * way[2];
+    at[i] = pose.centre_vox[i] + pose.rotation[i][0] * from_centre[0] +
+            pose.rotation[i][1] * from_centre[1] + pose.rotation[i][2] * from_centre[2];
   }
   const VoxelIndex low{floor_of(at[0]), floor_of(at[1]), floor_of(at[2])};
   return {low, weights_of({at[0] - static_cast<float>(low.x), at[1] - static_cast<float>(low.y),

@@ -23,7 +23,7 @@ two bytes a voxel.
 
 )";
 
-constexpr const char* kAboutProbes = R"(
+constexpr const char* kAboutQueries = R"(
 ## A probe of the swept contact
 
 What a tool feels at one place, read at samples of its surface: a ball of radius 8 voxels (805 samples)
@@ -59,9 +59,9 @@ std::string table_of(const std::vector<KernelRow>& rows) {
 }  // namespace
 
 std::string performance_page(const std::vector<KernelRow>& rows,
-                             const std::vector<KernelRow>& probes,
+                             const std::vector<KernelRow>& queries,
                              const std::vector<KernelRow>& layout) {
-  return kAbout + lab_provenance() + "\n\n" + table_of(rows) + kAboutProbes + table_of(probes) +
+  return kAbout + lab_provenance() + "\n\n" + table_of(rows) + kAboutQueries + table_of(queries) +
          kAboutLayout + table_of(layout);
 }
 

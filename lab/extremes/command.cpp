@@ -29,11 +29,11 @@ struct Findings {
 
 struct Group {
   const char* name;
-  void (*measure)(const Effort&, const Told&, Findings&);
+  void (*measure)(const Effort&, const RowSink&, Findings&);
 };
-template <void (*kMeasure)(const Effort&, const Told&)>
-void rows_only(const Effort& effort, const Told& told, Findings&) {
-  kMeasure(effort, told);
+template <void (*kMeasure)(const Effort&, const RowSink&)>
+void rows_only(const Effort& effort, const RowSink& add_row, Findings&) {
+  kMeasure(effort, add_row);
 }
 constexpr std::array<Group, 8> kGroups{{
     {"walls", rows_only<measure_walls>},
@@ -42,10 +42,10 @@ constexpr std::array<Group, 8> kGroups{{
     {"shapes", rows_only<measure_shapes>},
     {"cutting", rows_only<measure_cutting>},
     {"ticks", rows_only<measure_ticks>},
-    {"paper", [](const Effort& effort, const Told& told,
-                 Findings& findings) { findings.comparison = compare(effort, told); }},
-    {"hands", [](const Effort& effort, const Told& told,
-                 Findings& findings) { findings.hands = try_hands(effort, told); }},
+    {"paper", [](const Effort& effort, const RowSink& add_row,
+                 Findings& findings) { findings.comparison = compare(effort, add_row); }},
+    {"hands", [](const Effort& effort, const RowSink& add_row,
+                 Findings& findings) { findings.hands = try_hands(effort, add_row); }},
 }};
 
 std::string limit_of(const std::optional<double>& limit) {
@@ -125,13 +125,13 @@ int Command::run(std::ostream& out) const {
   out << "group    what                                                      value unit        "
          "must "
          "     aim\n";
-  const auto told = [&](Row row) {
+  const auto add_row = [&](Row row) {
     out << line_of(row) << std::endl;
     findings.rows.push_back(std::move(row));
   };
   for (const Group& group : kGroups) {
     if (only_.empty() || std::ranges::find(only_, group.name) != only_.end()) {
-      group.measure(effort, told, findings);
+      group.measure(effort, add_row, findings);
     }
   }
   as_json.write(json_of(findings.rows));

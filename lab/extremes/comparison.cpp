@@ -25,9 +25,9 @@ const double kNPerUnit = ForceSettings{}.stiffness_n_per_mm * kVoxelMm;
 using ForceAt = std::function<double(double height)>;
 
 /// A wall, tilted, with both ways to feel it.
-class TwoWays {
+class TwoModels {
  public:
-  explicit TwoWays(double thickness)
+  explicit TwoModels(double thickness)
       : body_(blurred({66, 66, 66},
                       [&](Point p) {
                         const double height = frame_.of(p)[1];
@@ -35,16 +35,16 @@ class TwoWays {
                                               : std::abs(height + thickness / 2) - thickness / 2;
                       })),
         paper_(kRadius, body_),
-        led_(tool_of_units("ball", kRadius, 2 * kRadius), body_, at(kAbove)) {}
+        guided_(tool_of_units("ball", kRadius, 2 * kRadius), body_, at(kAbove)) {}
 
   [[nodiscard]] double paper_n(double height) const {
     return dot(paper_.at(at(height)), frame_.up);
   }
   [[nodiscard]] double proxy_n(double height) {
-    return kNPerUnit * dot(led_.tick(at(height)), frame_.up);
+    return kNPerUnit * dot(guided_.tick(at(height)), frame_.up);
   }
   /// Takes the proxy back to where a stroke begins.
-  void lift() { led_.start(at(kAbove)); }
+  void lift() { guided_.start(at(kAbove)); }
 
  private:
   [[nodiscard]] Point at(double height) const { return frame_.at(0, height, 0); }
@@ -53,7 +53,7 @@ class TwoWays {
   Frame frame_{dice_, {32, 32, 32}};
   Body body_;
   PaperForce paper_;
-  Led<N> led_;
+  GuidedTool<N> guided_;
 };
 
 /// Whether one tick of a stroke is felt, the first with the ball behind the face included.
@@ -78,11 +78,11 @@ std::optional<double> lost_at(const ForceAt& force_n, const std::function<void()
   return std::nullopt;
 }
 
-void press(TwoWays& ways, Wall& wall) {
+void press(TwoModels& models, Wall& wall) {
   constexpr double kStep = 0.25, kDeepest = 30, kTouched = 0.1;
   for (double height = kRadius + 1; height > kRadius - kDeepest; height -= kStep) {
     const double depth = kRadius - height;
-    const Press press{depth * kVoxelMm, ways.paper_n(height), ways.proxy_n(height)};
+    const Press press{depth * kVoxelMm, models.paper_n(height), models.proxy_n(height)};
     wall.paper_most_n = std::max(wall.paper_most_n, press.paper_n);
     const bool felt = press.paper_n > kLeastShare * wall.paper_most_n;
     wall.paper_unfelt_mm += depth > kTouched && !felt ? kStep * kVoxelMm : 0;
@@ -90,23 +90,23 @@ void press(TwoWays& ways, Wall& wall) {
   }
 }
 
-void stroke(const Effort& effort, TwoWays& ways, Wall& wall) {
+void stroke(const Effort& effort, TwoModels& models, Wall& wall) {
   const double least_n = kLeastShare * wall.paper_most_n;
   for (const double rate_hz : {20.0, 50.0, 100.0, 200.0, 500.0, 1000.0}) {
-    const auto paper = [&](double height) { return ways.paper_n(height); };
-    const auto proxy = [&](double height) { return ways.proxy_n(height); };
+    const auto paper = [&](double height) { return models.paper_n(height); };
+    const auto proxy = [&](double height) { return models.proxy_n(height); };
     wall.losses.push_back({rate_hz,
                            lost_at(
                                paper, [] {}, rate_hz, least_n, effort),
                            lost_at(
-                               proxy, [&] { ways.lift(); }, rate_hz, least_n, effort)});
+                               proxy, [&] { models.lift(); }, rate_hz, least_n, effort)});
   }
 }
 
-void tell(const Wall& wall, const Told& told) {
+void tell(const Wall& wall, const RowSink& add_row) {
   const auto row = [&](const std::string& what, double value, const char* unit,
                        std::optional<double> must = std::nullopt) {
-    told({"paper", wall.name + ": " + what, value, unit, must, {}});
+    add_row({"paper", wall.name + ": " + what, value, unit, must, {}});
   };
   row("paper's largest force of a slow press", wall.paper_most_n, "N");
   row("paper unfelt on a press of 3 mm", wall.paper_unfelt_mm, "mm");
@@ -123,24 +123,25 @@ Slide slide_both() {
   const Bump bump(bumped, dice);
   const Body body = bump.body();
   const PaperForce paper(kRadius, body);
-  Led<N> led(tool_of_units("ball", kRadius, 2 * kRadius), body, bump.hand(-bump.end(), -2));
+  GuidedTool<N> guided(tool_of_units("ball", kRadius, 2 * kRadius), body,
+                       bump.hand(-bump.end(), -2));
   for (double depth = -2; depth < bumped.depth; depth += 0.1) {
-    led.tick(bump.hand(-bump.end(), depth));
+    guided.tick(bump.hand(-bump.end(), depth));
   }
   Slide slide;
   Roughness paper_steps, proxy_steps;
-  double paper_sum = 0, proxy_sum = 0, way_mm = 0;
+  double paper_sum = 0, proxy_sum = 0, travel_mm = 0;
   for (double angle = -bump.end(); angle < bump.end(); angle += bump.angle_step()) {
     const Point hand = bump.hand(angle, bumped.depth), up = bump.up(hand);
-    const Point old = paper.at(hand), now = led.tick(hand);
+    const Point old = paper.at(hand), now = guided.tick(hand);
     paper_steps.add(old);
     proxy_steps.add(now);
     slide.paper_degrees = std::max(slide.paper_degrees, degrees_between(old, up));
     slide.proxy_degrees = std::max(slide.proxy_degrees, degrees_between(now, up));
-    slide.ticks.push_back({way_mm, length(old), length(now)});
+    slide.ticks.push_back({travel_mm, length(old), length(now)});
     paper_sum += length(old);
     proxy_sum += length(now);
-    way_mm += bumped.step * kVoxelMm;
+    travel_mm += bumped.step * kVoxelMm;
   }
   for (SlideTick& tick : slide.ticks) {
     tick.paper *= double(slide.ticks.size()) / paper_sum;
@@ -151,9 +152,9 @@ Slide slide_both() {
   return slide;
 }
 
-void tell(const Slide& slide, const Told& told) {
+void tell(const Slide& slide, const RowSink& add_row) {
   const auto row = [&](const char* what, double value, const char* unit) {
-    told({"paper", std::string("slide over R 40: ") + what, value, unit, {}, {}});
+    add_row({"paper", std::string("slide over R 40: ") + what, value, unit, {}, {}});
   };
   row("paper's force step over the mean", 100 * slide.paper_step, "%");
   row("proxy's force step over the mean", 100 * slide.proxy_step, "%");
@@ -163,16 +164,16 @@ void tell(const Slide& slide, const Told& told) {
 
 }  // namespace
 
-Comparison compare(const Effort& effort, const Told& told) {
+Comparison compare(const Effort& effort, const RowSink& add_row) {
   Comparison comparison;
   for (Wall& wall : comparison.walls) {
-    TwoWays ways(wall.thickness);
-    press(ways, wall);
-    stroke(effort, ways, wall);
-    tell(wall, told);
+    TwoModels models(wall.thickness);
+    press(models, wall);
+    stroke(effort, models, wall);
+    tell(wall, add_row);
   }
   comparison.slide = slide_both();
-  tell(comparison.slide, told);
+  tell(comparison.slide, add_row);
   return comparison;
 }
 

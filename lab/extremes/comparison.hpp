@@ -30,7 +30,7 @@ struct Wall {
 
 /// Both forces along one slide over a bump, over their means.
 struct SlideTick {
-  double way_mm, paper, proxy;
+  double travel_mm, paper, proxy;
 };
 struct Slide {
   std::vector<SlideTick> ticks;
@@ -45,6 +45,6 @@ struct Comparison {
   Slide slide;
 };
 
-[[nodiscard]] Comparison compare(const Effort& effort, const Told& told);
+[[nodiscard]] Comparison compare(const Effort& effort, const RowSink& add_row);
 
 }  // namespace kerf::extremes

@@ -17,8 +17,8 @@
 #include "controller/volume/volume_io.hpp"
 #include "hil/hil_error.hpp"
 #include "lab/extremes/measures.hpp"
+#include "lab/rig/contact_rig.hpp"
 #include "lab/rig/miller.hpp"
-#include "lab/rig/shell_rig.hpp"
 
 namespace kerf::extremes {
 namespace {
@@ -112,7 +112,7 @@ LoadedScene tooth_crown(const std::filesystem::path& file, const Matrix3& standi
   return scene;
 }
 
-void measure_teeth(const Effort& effort, const Told& told) {
+void measure_teeth(const Effort& effort, const RowSink& add_row) {
   struct Tooth {
     const char* name;
     const char* file;
@@ -137,23 +137,23 @@ void measure_teeth(const Effort& effort, const Told& told) {
     } catch (const SceneError& error) {
       throw HilError(error.what());
     }
-    told(std::move(row));
+    add_row(std::move(row));
   }
 }
 
 }  // namespace
 
-void measure_cutting(const Effort& effort, const Told& told) {
+void measure_cutting(const Effort& effort, const RowSink& add_row) {
   for (const double voxel_mm : {0.0625, 0.125, 0.25}) {
     char name[80];
     std::snprintf(name, sizeof name, "removed against the integral of G F, voxels of %g mm",
                   voxel_mm);
-    told({"cutting", name, balance_error(voxel_mm), "1", 1e-6, {}});
+    add_row({"cutting", name, balance_error(voxel_mm), "1", 1e-6, {}});
   }
   const double usual_mm3 = removed_at(1000, kVoxelMm);
   const auto against_usual = [&](const std::string& by, int rate_hz, double voxel_mm) {
-    told({"cutting", "removed by the same force " + by,
-          100 * std::abs(removed_at(rate_hz, voxel_mm) / usual_mm3 - 1), "%", 3, 1});
+    add_row({"cutting", "removed by the same force " + by,
+             100 * std::abs(removed_at(rate_hz, voxel_mm) / usual_mm3 - 1), "%", 3, 1});
   };
   for (const int rate_hz : {250, 500, 2000, 4000, 8000}) {
     against_usual("at " + std::to_string(rate_hz) + " Hz, against 1 kHz", rate_hz, kVoxelMm);
@@ -163,9 +163,9 @@ void measure_cutting(const Effort& effort, const Told& told) {
     std::snprintf(by, sizeof by, "in voxels of %g mm, against 0.125", voxel_mm);
     against_usual(by, 1000, voxel_mm);
   }
-  told({"cutting", "milling into the phantom, force step over the mean",
-        100 * milling_step(phantom_crown()), "%", 2, 1.5});
-  measure_teeth(effort, told);
+  add_row({"cutting", "milling into the phantom, force step over the mean",
+           100 * milling_step(phantom_crown()), "%", 2, 1.5});
+  measure_teeth(effort, add_row);
 }
 
 }  // namespace kerf::extremes

@@ -15,7 +15,7 @@
 namespace kerf::extremes {
 namespace {
 
-void tell(const HandRun& run, const Told& told) {
+void tell(const HandRun& run, const RowSink& add_row) {
   double peak_n = 0, step_n = 0;
   std::size_t contact = 0;
   const HandTick* before = nullptr;
@@ -29,7 +29,7 @@ void tell(const HandRun& run, const Told& told) {
   const Chatter chatter = chatter_of(run, kChatterHz);
   const auto row = [&](const char* what, double value, const char* unit,
                        std::optional<double> must = std::nullopt) {
-    told({"hands", run.name + what, value, unit, must, {}});
+    add_row({"hands", run.name + what, value, unit, must, {}});
   };
   row(": in contact", 100 * double(contact) / double(run.ticks.size()), "%");
   row(": peak force", peak_n, "N");
@@ -65,13 +65,13 @@ HandRun run_hand(const LoadedScene& scene, const std::string& name, const Effort
   return run;
 }
 
-std::vector<HandRun> try_hands(const Effort& effort, const Told& told) {
+std::vector<HandRun> try_hands(const Effort& effort, const RowSink& add_row) {
   const LoadedScene feeling = hand_scene(effort, CutModel::none);
   const LoadedScene cutting = hand_scene(effort, CutModel::preston);
   std::vector<HandRun> runs;
   const auto run = [&](const LoadedScene& scene, const char* name) {
     runs.push_back(run_hand(scene, name, effort));
-    tell(runs.back(), told);
+    tell(runs.back(), add_row);
   };
   run(feeling, "touch");
   run(feeling, "slide");

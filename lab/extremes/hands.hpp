@@ -21,6 +21,6 @@ inline constexpr double kChatterHz = 150;
                                const Effort& effort);
 
 /// Five hands at an emulated Omni, two of which cut: no chatter in the contact.
-[[nodiscard]] std::vector<HandRun> try_hands(const Effort& effort, const Told& told);
+[[nodiscard]] std::vector<HandRun> try_hands(const Effort& effort, const RowSink& add_row);
 
 }  // namespace kerf::extremes

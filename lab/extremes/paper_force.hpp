@@ -5,7 +5,7 @@
 
 #include "controller/load/loaded_scene.hpp"
 #include "lab/accuracy/contact_method.hpp"
-#include "lab/rig/shell_rig.hpp"
+#include "lab/rig/contact_rig.hpp"
 
 namespace kerf::extremes {
 

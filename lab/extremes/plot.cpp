@@ -60,7 +60,7 @@ void draw_losses(std::ostream& script, const std::vector<Wall>& walls) {
 
 void draw(std::ostream& script, const Slide& slide) {
   data(script, "slide", slide.ticks, [&](const SlideTick& at) {
-    script << at.way_mm << ' ' << at.paper << ' ' << at.proxy << '\n';
+    script << at.travel_mm << ' ' << at.paper << ' ' << at.proxy << '\n';
   });
   script << "set title 'slide over a ball of R 40 voxels, 2 deep, 50 mm/s'\n"
             "set xlabel 'way (mm)'\nset ylabel 'force over its mean'\nset yrange [0.98:1.02]\n"

@@ -4,7 +4,7 @@
 #include <functional>
 #include <numbers>
 
-#include "controller/kernel/point_shell/shell_sums.hpp"
+#include "controller/kernel/point_shell/point_sums.hpp"
 #include "lab/extremes/measures.hpp"
 #include "lab/rig/rest.hpp"
 
@@ -39,10 +39,10 @@ double edge(Point p) {
 /// Distance from `centre` to the iso-surface of the trilinear density, along the nearest of many
 /// rays.
 double iso_distance(const Body& body, Point centre) {
-  const ShellField field{body.grid, body.density.data(), density_scale(kIso), {}};
+  const DensityField field{body.grid, body.density.data(), density_scale(kIso), {}};
   const auto inside = [&](Point p) {
     const double place[3] = {p[0], p[1], p[2]};
-    return shell_sample<DoubleNumbers>(field, place).density - 0.5;
+    return point_sample<DoubleNumbers>(field, place).density - 0.5;
   };
   constexpr int kRays = 8000;
   constexpr double kFrom = kRadius - 1.5, kTo = kRadius + 2, kStep = 0.05;
@@ -50,10 +50,10 @@ double iso_distance(const Body& body, Point centre) {
   for (int i = 0; i < kRays; ++i) {
     const double z = 1 - (2 * i + 1.0) / kRays, r = std::sqrt(1 - z * z);
     const double turn = i * std::numbers::pi * (3 - std::sqrt(5.0));
-    const Point way{r * std::cos(turn), r * std::sin(turn), z};
-    double before = inside(centre + kFrom * way);
+    const Point direction{r * std::cos(turn), r * std::sin(turn), z};
+    double before = inside(centre + kFrom * direction);
     for (double at = kFrom; at < nearest; at += kStep) {
-      const double now = inside(centre + (at + kStep) * way);
+      const double now = inside(centre + (at + kStep) * direction);
       if (now >= 0) {
         nearest = std::min(nearest, before >= 0 ? at : at + kStep * before / (before - now));
         break;
@@ -66,7 +66,7 @@ double iso_distance(const Body& body, Point centre) {
 
 }  // namespace
 
-void measure_rests(const Effort& effort, const Told& told) {
+void measure_rests(const Effort& effort, const RowSink& add_row) {
   const SampledTool ball(tool_of_units("ball", kRadius, 2 * kRadius));
   const auto placed = [&](const Solid& solid, const auto& measured) {
     Dice dice(6);
@@ -91,9 +91,9 @@ void measure_rests(const Effort& effort, const Told& told) {
       sum += off;
       most = std::max(most, std::abs(off));
     });
-    told({"rests", std::string(name) + ": mean offset", std::abs(sum / effort.tilts), "voxels",
-          0.05, 0.02});
-    told({"rests", std::string(name) + ": largest offset", most, "voxels", 0.05, 0.02});
+    add_row({"rests", std::string(name) + ": mean offset", std::abs(sum / effort.tilts), "voxels",
+             0.05, 0.02});
+    add_row({"rests", std::string(name) + ": largest offset", most, "voxels", 0.05, 0.02});
   }
   double sum = 0, most = 0;
   placed(edge, [&](const Frame& frame, const Body& body, Dice& dice) {
@@ -105,9 +105,9 @@ void measure_rests(const Effort& effort, const Told& told) {
     sum += off;
     most = std::max(most, std::abs(off));
   });
-  told({"rests", "sharp edge, to the iso-surface: mean offset", std::abs(sum / effort.tilts),
-        "voxels", 0.12, 0.05});
-  told({"rests", "sharp edge, to the iso-surface: largest offset", most, "voxels", 0.12, 0.05});
+  add_row({"rests", "sharp edge, to the iso-surface: mean offset", std::abs(sum / effort.tilts),
+           "voxels", 0.12, 0.05});
+  add_row({"rests", "sharp edge, to the iso-surface: largest offset", most, "voxels", 0.12, 0.05});
 }
 
 }  // namespace kerf::extremes

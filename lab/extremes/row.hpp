@@ -25,7 +25,7 @@ struct Row {
 };
 
 /// Takes the rows as they are measured.
-using Told = std::function<void(Row)>;
+using RowSink = std::function<void(Row)>;
 
 /// How much is measured: the whole takes about a minute.
 struct Effort {

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "controller/kernel/point_shell/shell_sums.hpp"
+#include "controller/kernel/point_shell/point_sums.hpp"
 #include "lab/extremes/measures.hpp"
 #include "lab/rig/loft.hpp"
 #include "lab/rig/posed_tool.hpp"
@@ -20,7 +20,7 @@ using N = FixedNumbers;
 std::vector<Point> surface_points(const SceneTool& tool) {
   constexpr double kPitch = 0.15;
   std::vector<Point> points;
-  const auto steps = [](double way) { return std::max(1, int(std::ceil(way / kPitch))); };
+  const auto steps = [](double along) { return std::max(1, int(std::ceil(along / kPitch))); };
   for (const auto& triangle : tool.mesh.triangles) {
     const Point a = tool.mesh.points_mm[triangle[0]], ab = tool.mesh.points_mm[triangle[1]] - a,
                 ac = tool.mesh.points_mm[triangle[2]] - a;
@@ -52,12 +52,12 @@ std::vector<Point> surface_points(const SceneTool& tool) {
 /// How far along `out` from `centre` the points leave the trilinear density's iso-surface; below 0:
 /// how far they are from it.
 double depth_of(const Body& body, const std::vector<Point>& points, Point centre, Point out) {
-  const ShellField field{body.grid, body.density.data(), density_scale(kIso), {}};
-  const auto solid_at = [&](double way) {
+  const DensityField field{body.grid, body.density.data(), density_scale(kIso), {}};
+  const auto solid_at = [&](double along) {
     return std::ranges::any_of(points, [&](const Point& point) {
-      const Point p = centre + way * out + point;
+      const Point p = centre + along * out + point;
       const double place[3] = {p[0], p[1], p[2]};
-      return shell_sample<DoubleNumbers>(field, place).density > 0.5;
+      return point_sample<DoubleNumbers>(field, place).density > 0.5;
     });
   };
   double inside = -1, outside = 1;
@@ -70,7 +70,7 @@ double depth_of(const Body& body, const std::vector<Point>& points, Point centre
 
 }  // namespace
 
-void measure_shape_edges(const Effort& effort, const Told& told) {
+void measure_shape_edges(const Effort& effort, const RowSink& add_row) {
   struct Subject {
     const char* name;
     SceneTool tool;
@@ -87,8 +87,8 @@ void measure_shape_edges(const Effort& effort, const Told& told) {
       const Frame frame(dice, {21, 21, 21});
       const Axes axes = standing_on(dice.direction(), dice);
       // The edge of 90 degrees lies where a tool about `frame.place` touches it.
-      const auto above = [&](Point way) {
-        return dot(way, frame.up) + std::abs(dot(way, frame.across));
+      const auto above = [&](Point along) {
+        return dot(along, frame.up) + std::abs(dot(along, frame.across));
       };
       std::vector<Point> near;
       double lowest = 1e9;
@@ -107,7 +107,7 @@ void measure_shape_edges(const Effort& effort, const Told& told) {
       most = std::max(most, std::abs(off));
     }
     const auto row = [&](const char* what, double value) {
-      told({"shapes", std::string(subject.name) + what, value, "voxels", 0.18, 0.075});
+      add_row({"shapes", std::string(subject.name) + what, value, "voxels", 0.18, 0.075});
     };
     row(": sharp edge, to the iso-surface: mean offset", std::abs(sum / effort.tilts));
     row(": sharp edge, to the iso-surface: largest offset", most);

@@ -9,7 +9,7 @@
 #include "lab/extremes/measures.hpp"
 #include "lab/rig/ct_edge.hpp"
 #include "lab/rig/exact_touch.hpp"
-#include "lab/rig/led.hpp"
+#include "lab/rig/guided_tool.hpp"
 #include "lab/rig/loft.hpp"
 #include "lab/rig/posed_tool.hpp"
 
@@ -30,7 +30,7 @@ struct Touch {
 /// The way of a tool that keeps its pose over the bump about `frame.place`, by hands a step apart:
 /// the normal turns, and the tool touches with the point that is farthest against it. Where that
 /// jumps, along an edge or over a face, the tool slides on with the same normal.
-std::vector<Touch> way_over(const Frame& frame, const Axes& axes, const Reach& reach) {
+std::vector<Touch> path_over(const Frame& frame, const Axes& axes, const Reach& reach) {
   constexpr int kFine = 4000;
   constexpr double kEnd = 0.175;  // rad to each side
   const auto touch = [&](double angle) {
@@ -38,21 +38,21 @@ std::vector<Touch> way_over(const Frame& frame, const Axes& axes, const Reach& r
     const Point touching = axes.to_world(reach.farthest(axes.to_tool(-1 * normal)));
     return Touch{frame.place + kBump * normal - touching, normal};
   };
-  std::vector<Touch> way{touch(-kEnd)};
-  Touch before = way.front();
+  std::vector<Touch> path{touch(-kEnd)};
+  Touch before = path.front();
   double walked = 0;
   for (int i = 1; i <= kFine; ++i) {
     const Touch next = touch(kEnd * (2.0 * i / kFine - 1));
     const double gap = length(next.hand(kDepth) - before.hand(kDepth));
     for (double to = kStep - walked; to <= gap; to += kStep) {
       const double share = to / gap;
-      way.push_back({before.centre + share * (next.centre - before.centre),
-                     unit(before.normal + share * (next.normal - before.normal))});
+      path.push_back({before.centre + share * (next.centre - before.centre),
+                      unit(before.normal + share * (next.normal - before.normal))});
     }
     walked = std::fmod(walked + gap, kStep);
     before = next;
   }
-  return way;
+  return path;
 }
 
 struct Figures {
@@ -91,24 +91,25 @@ void slide(const SampledTool& tool, const Reach& reach, const std::function<doub
   const Axes axes = standing_on(dice.direction(), dice);
   const Body body =
       body_of({60, 60, 60}, [&](Point p) { return share(length(p - frame.place) - kBump); });
-  const std::vector<Touch> way = way_over(frame, axes, reach);
+  const std::vector<Touch> path = path_over(frame, axes, reach);
   const ToolTurn<N> turn = axes.turn<N>();
   constexpr double kHigh = 20;  // the tool turns first
-  Led<N> led(tool, body, way.front().hand(-kHigh));
-  for (int i = 0; i < 100 && !(led.pose().turn == turn); ++i) {
-    led.tick(way.front().hand(-kHigh), turn);
+  GuidedTool<N> guided(tool, body, path.front().hand(-kHigh));
+  for (int i = 0; i < 100 && !(guided.pose().turn == turn); ++i) {
+    guided.tick(path.front().hand(-kHigh), turn);
   }
-  for (double depth = -kHigh; depth < kDepth; depth += 0.1) led.tick(way.front().hand(depth), turn);
+  for (double depth = -kHigh; depth < kDepth; depth += 0.1)
+    guided.tick(path.front().hand(depth), turn);
   Course course;
-  for (const Touch& touch : way) {
-    const Point force = led.tick(touch.hand(kDepth), turn);
-    course.add(touch, force, dot(led.proxy() - touch.centre, touch.normal));
+  for (const Touch& touch : path) {
+    const Point force = guided.tick(touch.hand(kDepth), turn);
+    course.add(touch, force, dot(guided.proxy() - touch.centre, touch.normal));
   }
   course.worsen(figures);
   if (exact == nullptr) return;
   const ExactTouch truth(tool, axes, body);
   Course exact_course;
-  for (const Touch& touch : way) {
+  for (const Touch& touch : path) {
     const double height = truth.height(touch.centre, touch.normal);
     const Point normal = truth.normal(touch.centre, touch.normal);
     exact_course.add(touch, (kDepth + height) * normal, height);
@@ -118,7 +119,7 @@ void slide(const SampledTool& tool, const Reach& reach, const std::function<doub
 
 }  // namespace
 
-void measure_shape_slides(const Effort& effort, const Told& told) {
+void measure_shape_slides(const Effort& effort, const RowSink& add_row) {
   struct Limit {
     std::optional<double> must, aim;
   };
@@ -137,7 +138,7 @@ void measure_shape_slides(const Effort& effort, const Told& told) {
     const SampledTool tool(subject.tool);
     const auto tell = [&](const std::string& name, const Figures& figures, const Limits& limits) {
       const auto row = [&](const char* what, double value, const char* unit, const Limit& limit) {
-        told({"shapes", subject.name + name + what, value, unit, limit.must, limit.aim});
+        add_row({"shapes", subject.name + name + what, value, unit, limit.must, limit.aim});
       };
       row(", force step over the mean", 100 * figures.force_step, "%", limits.step);
       row(", angle", figures.degrees, "deg", limits.degrees);

@@ -20,7 +20,7 @@ enum class Pose { any, upright, lying };
 
 }  // namespace
 
-void measure_shapes(const Effort& effort, const Told& told) {
+void measure_shapes(const Effort& effort, const RowSink& add_row) {
   struct Subject {
     const char* name;
     SceneTool tool;
@@ -60,14 +60,14 @@ void measure_shapes(const Effort& effort, const Told& told) {
     }
     const auto row = [&](const char* what, double value, const char* unit, double must,
                          double aim) {
-      told({"shapes", std::string(subject.name) + what, value, unit, must, aim});
+      add_row({"shapes", std::string(subject.name) + what, value, unit, must, aim});
     };
     row(": mean offset", std::abs(sum / effort.tilts), "voxels", kOffset, kOffsetAim);
     row(": largest offset", most, "voxels", kOffset, kOffsetAim);
     row(": angle", degrees, "deg", kDegrees, kDegreesAim);
   }
-  measure_shape_edges(effort, told);
-  measure_shape_slides(effort, told);
+  measure_shape_edges(effort, add_row);
+  measure_shape_slides(effort, add_row);
 }
 
 }  // namespace kerf::extremes

@@ -7,7 +7,7 @@
 #include "lab/rig/ct_edge.hpp"
 
 namespace kerf::extremes {
-void measure_slides(const Effort& effort, const Told& told) {
+void measure_slides(const Effort& effort, const RowSink& add_row) {
   struct Limits {
     double must, aim;
   };
@@ -35,8 +35,8 @@ void measure_slides(const Effort& effort, const Told& told) {
     }
     const auto row = [&](const char* what, double value, const char* unit, double scale,
                          const Limits& limits) {
-      told({"slides", subject.name + what, value * scale, unit, limits.must * scale,
-            limits.aim * scale});
+      add_row({"slides", subject.name + what, value * scale, unit, limits.must * scale,
+               limits.aim * scale});
     };
     row(": force step over the mean", figures.force_step, "%", 100, subject.step);
     row(": angle", figures.degrees, "deg", 1, subject.degrees);

@@ -10,7 +10,7 @@
 #include "lab/extremes/shipped_bur.hpp"
 #include "lab/extremes/worst_tick.hpp"
 #include "lab/rig/bench_scene.hpp"
-#include "lab/rig/shell_rig.hpp"
+#include "lab/rig/contact_rig.hpp"
 #include "lab/rig/tick_timer.hpp"
 
 namespace kerf::extremes {
@@ -25,7 +25,7 @@ ProxyPose<N> goal_at(const bench::Place& p) {
   return {place_of<N>({p[0], p[1], p[2]}), {}};
 }
 
-void measure_worst_ticks(const Effort& effort, const Told& told) {
+void measure_worst_ticks(const Effort& effort, const RowSink& add_row) {
   struct Subject {
     const char* name;
     SceneTool tool;
@@ -41,16 +41,16 @@ void measure_worst_ticks(const Effort& effort, const Told& told) {
     }
   }
   for (const Subject& subject : subjects) {
-    told({"ticks",
-          std::string("proxy, ") + subject.name + ", costliest tick found (" + subject.worst.trap +
-              ")",
-          subject.worst.us, "us", 60, 40});
+    add_row({"ticks",
+             std::string("proxy, ") + subject.name + ", costliest tick found (" +
+                 subject.worst.trap + ")",
+             subject.worst.us, "us", 60, 40});
   }
 }
 
 /// The whole servo in the default demo, ticks back to back; of each tick the fastest of some runs,
 /// which are alike to the bit.
-void measure_cutting_ticks(const Effort& effort, const Told& told) {
+void measure_cutting_ticks(const Effort& effort, const RowSink& add_row) {
   const LoadedScene scene = shipped_scene("phantom", effort);
   constexpr int kRuns = 4;
   std::vector<double> us;
@@ -65,31 +65,31 @@ void measure_cutting_ticks(const Effort& effort, const Told& told) {
   const auto at = [&](double share) {
     return us[static_cast<std::size_t>(share * static_cast<double>(us.size() - 1))];
   };
-  told({"ticks", "whole servo, default scene, cutting: p50", at(0.5), "us", {}, {}});
-  told({"ticks", "whole servo, default scene, cutting: p99.9", at(0.999), "us", 100, 50});
+  add_row({"ticks", "whole servo, default scene, cutting: p50", at(0.5), "us", {}, {}});
+  add_row({"ticks", "whole servo, default scene, cutting: p99.9", at(0.999), "us", 100, 50});
 }
 
 }  // namespace
 
-void measure_ticks(const Effort& effort, const Told& told) {
+void measure_ticks(const Effort& effort, const RowSink& add_row) {
   const auto row = [&](const char* name, double us, std::optional<double> must,
                        std::optional<double> aim = std::nullopt) {
-    told({"ticks", name, us, "us", must, aim});
+    add_row({"ticks", name, us, "us", must, aim});
   };
   const Body ball{kGrid, bench::ball_in(kGrid)};
   {
     const SceneTool tool = tool_of_units("ball", kRadius, 2 * kRadius);
-    ShellRig<N> rig(tool, ball);
+    ContactRig<N> rig(tool, ball);
     const ProxyPlan<N> plan{.ramp_per_tick = N::Real(1)};
     ProxyState<N> state;
     state.pose = {place_of<N>({200, 80, 128}), {}};
     // Half a unit a tick: 50 mm/s.
     const auto place = [&](int i) { return bench::around(kGrid, 16, i, 580); };
     for (int i = 0; i < 40; ++i)
-      bench::use(follow(plan, state, rig.field(), goal_at(place(0))).probes);
+      bench::use(follow(plan, state, rig.field(), goal_at(place(0))).queries);
     const TickTimes times = time_ticks(
         effort.tick_count, [] {},
-        [&](int i) { bench::use(follow(plan, state, rig.field(), goal_at(place(i))).probes); });
+        [&](int i) { bench::use(follow(plan, state, rig.field(), goal_at(place(i))).queries); });
     row("proxy, sliding at 50 mm/s: p50", times.p50_ns / 1e3, 15, 6);
     row("proxy, sliding at 50 mm/s: p99", times.p99_ns / 1e3, std::nullopt);
   }
@@ -107,8 +107,8 @@ void measure_ticks(const Effort& effort, const Told& told) {
     row("paper, sliding at 50 mm/s: p50", times.p50_ns / 1e3, std::nullopt);
     row("paper, sliding at 50 mm/s: p99", times.p99_ns / 1e3, std::nullopt);
   }
-  measure_worst_ticks(effort, told);
-  measure_cutting_ticks(effort, told);
+  measure_worst_ticks(effort, add_row);
+  measure_cutting_ticks(effort, add_row);
 }
 
 }  // namespace kerf::extremes

@@ -5,7 +5,7 @@
 
 namespace kerf::extremes {
 
-void measure_walls(const Effort& effort, const Told& told) {
+void measure_walls(const Effort& effort, const RowSink& add_row) {
   constexpr int kTicksPerWall = 500;
   struct Subject {
     const char* name;
@@ -31,14 +31,14 @@ void measure_walls(const Effort& effort, const Told& told) {
     const std::string name = subject.name;
     const auto row = [&](const char* what, double value, const char* unit,
                          std::optional<double> must, std::optional<double> aim = std::nullopt) {
-      told({"walls", name + what, value, unit, must, aim});
+      add_row({"walls", name + what, value, unit, must, aim});
     };
     row(": ticks", double(seen.ticks), "ticks", std::nullopt);
     row(": ticks with the hand behind", double(seen.behind), "ticks", std::nullopt);
     row(": crossings", double(seen.crossed), "ticks", 0);
     row(": without force behind the face", double(seen.unfelt), "ticks", 0);
     row(": sunk", seen.deepest, "voxels", subject.deepest);
-    row(": probes in a tick", seen.most_probes, "1", SweepRules::kMaxProbes);
+    row(": probes in a tick", seen.most_queries, "1", SweepRules::kMaxQueries);
   }
 }
 

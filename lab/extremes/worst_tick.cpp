@@ -7,7 +7,7 @@
 
 #include "controller/servo/proxy_contact.hpp"
 #include "lab/rig/bench_scene.hpp"
-#include "lab/rig/shell_rig.hpp"
+#include "lab/rig/contact_rig.hpp"
 
 namespace kerf::extremes {
 namespace {
@@ -18,7 +18,7 @@ struct Tick {
   ProxyState<N> from;
   ProxyPose<N> goal;
   double ns = 0;
-  std::int32_t probes = 0;
+  std::int32_t queries = 0;
 };
 
 class Stopwatch {
@@ -42,14 +42,14 @@ class Stopwatch {
       bench::use(felt.spring.x.raw());
       const double ns = std::chrono::duration<double, std::nano>(Clock::now() - start).count();
       fastest_ns = std::min(fastest_ns, ns);
-      tick.probes = felt.probes;
+      tick.queries = felt.queries;
     }
     tick.ns = fastest_ns;
     return after;
   }
 
  private:
-  ShellRig<N> rig_;
+  ContactRig<N> rig_;
   ProxyPlan<N> plan_;
 };
 
@@ -106,7 +106,7 @@ void find_worst_tick(const SceneTool& tool, const Trap& trap, const Body& body, 
     }
   }
   for (const Tick& tick : tried) {
-    if (tick.ns / 1e3 > worst.us) worst = {tick.ns / 1e3, tick.probes, trap.name};
+    if (tick.ns / 1e3 > worst.us) worst = {tick.ns / 1e3, tick.queries, trap.name};
   }
 }
 

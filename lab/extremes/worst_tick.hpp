@@ -19,7 +19,7 @@ struct Trap {
   Density iso;
 };
 
-/// Solids that cost a probe or a sweep much: flat, sharp, hollow, hardly wider than the tool,
+/// Solids that cost a query or a sweep much: flat, sharp, hollow, hardly wider than the tool,
 /// noisy, and tissue that is felt everywhere and nowhere solid; and the tooth of a CT, where `data`
 /// has it. Throws HilError where that cannot be read.
 [[nodiscard]] std::vector<Trap> worst_traps(const std::filesystem::path& data);
@@ -27,7 +27,7 @@ struct Trap {
 /// The costliest tick that was found.
 struct WorstTick {
   double us = 0;
-  int probes = 0;
+  int queries = 0;
   std::string trap;
 };
 

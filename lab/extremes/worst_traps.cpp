@@ -6,7 +6,7 @@
 #include "controller/volume/volume_io.hpp"
 #include "hil/hil_error.hpp"
 #include "lab/extremes/worst_tick.hpp"
-#include "lab/rig/shell_rig.hpp"
+#include "lab/rig/contact_rig.hpp"
 
 namespace kerf::extremes {
 namespace {

@@ -17,7 +17,7 @@ constexpr double kReportMs = 1;     // from one report to the next, of the slowe
 // A step of the converters is 0.4 to 5 mN at the tip, and the watch is on the outside of them.
 constexpr double kStepN = 0.01;
 constexpr double kDeviceShare = 1.03;  // the tip moves on while a command is under way
-constexpr std::size_t kTold = 4;
+constexpr std::size_t kMaxListed = 4;
 
 double length(const std::array<double, 3>& v) noexcept {
   return std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
@@ -42,7 +42,7 @@ void Contract::check(bool kept, double time_ms, const char* rule, double value, 
 
 void Contract::broken(double time_ms, const std::string& what) {
   ++outcome_.violation_count;
-  if (outcome_.violations.size() >= kTold) return;
+  if (outcome_.violations.size() >= kMaxListed) return;
   char time[24];
   std::snprintf(time, sizeof time, "%.3f s: ", time_ms / 1000);
   outcome_.violations.emplace_back(time + what);

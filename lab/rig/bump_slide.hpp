@@ -5,7 +5,7 @@
 #include <cmath>
 #include <functional>
 
-#include "lab/rig/led.hpp"
+#include "lab/rig/guided_tool.hpp"
 
 namespace kerf::extremes {
 
@@ -24,7 +24,7 @@ struct SlideFigures {
   double degrees = 0;     ///< between force and normal
   double height_sd = 0;   ///< of the proxy about its mean height
   double height = 0;      ///< of the proxy over where the ball should be: its mean's magnitude
-  int probes = 0;         ///< in a tick
+  int queries = 0;        ///< in a tick
 };
 
 inline constexpr double kSlideRadius = 8;
@@ -59,20 +59,20 @@ template <class N>
 void slide_over(const BumpSlide& slide, Dice& dice, SlideFigures& figures) {
   const Bump bump(slide, dice);
   const Body body = bump.body();
-  Led<N> led(tool_of_units("ball", kSlideRadius, 2 * kSlideRadius), body,
-             bump.hand(-bump.end(), -2));
+  GuidedTool<N> guided(tool_of_units("ball", kSlideRadius, 2 * kSlideRadius), body,
+                       bump.hand(-bump.end(), -2));
   for (double depth = -2; depth < slide.depth; depth += 0.1) {
-    led.tick(bump.hand(-bump.end(), depth));
+    guided.tick(bump.hand(-bump.end(), depth));
   }
   Roughness roughness;
   double sum = 0, squares = 0;
   int count = 0;
   for (double angle = -bump.end(); angle < bump.end(); angle += bump.angle_step()) {
     const Point hand = bump.hand(angle, slide.depth);
-    const Point force = led.tick(hand);
+    const Point force = guided.tick(hand);
     roughness.add(force);
     figures.degrees = std::max(figures.degrees, degrees_between(force, bump.up(hand)));
-    const double off = bump.height(led.proxy()) - kSlideRadius;
+    const double off = bump.height(guided.proxy()) - kSlideRadius;
     sum += off;
     squares += off * off;
     ++count;
@@ -82,7 +82,7 @@ void slide_over(const BumpSlide& slide, Dice& dice, SlideFigures& figures) {
   figures.height = std::max(figures.height, std::abs(mean));
   figures.height_sd =
       std::max(figures.height_sd, std::sqrt(std::max(0.0, squares / count - mean * mean)));
-  figures.probes = std::max(figures.probes, led.most_probes());
+  figures.queries = std::max(figures.queries, guided.most_queries());
 }
 
 }  // namespace kerf::extremes

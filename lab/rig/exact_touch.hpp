@@ -5,10 +5,10 @@
 #include <cmath>
 #include <vector>
 
-#include "controller/kernel/point_shell/shell_sums.hpp"
+#include "controller/kernel/point_shell/point_sums.hpp"
 #include "lab/rig/body.hpp"
+#include "lab/rig/contact_rig.hpp"
 #include "lab/rig/posed_tool.hpp"
-#include "lab/rig/shell_rig.hpp"
 
 namespace kerf::extremes {
 
@@ -44,8 +44,9 @@ class ExactTouch {
     constexpr double kAway = 0.5;
     const Point along = unit(cross(up, std::abs(up[0]) < 0.7 ? Point{1, 0, 0} : Point{0, 1, 0}));
     const Point across = cross(up, along);
-    const auto slope = [&](Point way) {
-      return (height(centre + kAway * way, up) - height(centre - kAway * way, up)) / (2 * kAway);
+    const auto slope = [&](Point direction) {
+      return (height(centre + kAway * direction, up) - height(centre - kAway * direction, up)) /
+             (2 * kAway);
     };
     return unit(up - slope(along) * along - slope(across) * across);
   }
@@ -54,10 +55,10 @@ class ExactTouch {
   static constexpr double kRange = 0.5;  // units
 
   [[nodiscard]] double density(Point place) const {
-    return shell_sample<DoubleNumbers>(field_, {place[0], place[1], place[2]}).density;
+    return point_sample<DoubleNumbers>(field_, {place[0], place[1], place[2]}).density;
   }
 
-  ShellField field_;
+  DensityField field_;
   std::vector<Point> samples_;
 };
 

@@ -7,7 +7,7 @@
 #include <numbers>
 #include <random>
 
-#include "controller/kernel/proxy/plane.hpp"
+#include "controller/kernel/proxy/constraint_plane.hpp"
 #include "controller/kernel/proxy/tool_turn.hpp"
 
 /// Places, directions and turns in plain double, and random ones. Lengths in units of contact
@@ -58,7 +58,7 @@ ContactVec<typename N::Unit> normal_of(Point p) {
 }
 
 template <class N>
-Point normal_of(const Plane<N>& plane) {
+Point normal_of(const ConstraintPlane<N>& plane) {
   return {double(plane.normal.x), double(plane.normal.y), double(plane.normal.z)};
 }
 
@@ -101,8 +101,8 @@ struct Frame {
         across(cross(up, along)) {}
   /// Coordinates in the frame.
   [[nodiscard]] Point of(Point p) const {
-    const Point way = p - place;
-    return {dot(along, way), dot(up, way), dot(across, way)};
+    const Point offset = p - place;
+    return {dot(along, offset), dot(up, offset), dot(across, offset)};
   }
   [[nodiscard]] Point at(double x, double y, double z) const {
     return place + x * along + y * up + z * across;

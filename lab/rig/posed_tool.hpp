@@ -46,9 +46,9 @@ class Reach {
     Point best{};
     double most = -1e9;
     const auto take = [&](const Point& point) {
-      const double way = dot(point, direction);
-      if (way > most) {
-        most = way;
+      const double support = dot(point, direction);
+      if (support > most) {
+        most = support;
         best = point;
       }
     };

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "lab/rig/led.hpp"
+#include "lab/rig/guided_tool.hpp"
 
 namespace kerf::extremes {
 
@@ -10,10 +10,10 @@ namespace kerf::extremes {
 template <class N>
 [[nodiscard]] Point rest_of(const SampledTool& tool, const Body& body, Point at, Point up,
                             const ToolTurn<N>& turn = {}, double off = 1.5) {
-  Led<N> led(tool, body, at + off * up);
+  GuidedTool<N> guided(tool, body, at + off * up);
   constexpr int kTicks = 20;
-  for (int i = 0; i <= kTicks; ++i) led.tick(at + (off - (off + 1) * i / kTicks) * up, turn);
-  return led.proxy();
+  for (int i = 0; i <= kTicks; ++i) guided.tick(at + (off - (off + 1) * i / kTicks) * up, turn);
+  return guided.proxy();
 }
 
 }  // namespace kerf::extremes

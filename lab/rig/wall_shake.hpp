@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "lab/rig/led.hpp"
+#include "lab/rig/guided_tool.hpp"
 
 namespace kerf::extremes {
 
@@ -51,7 +51,7 @@ struct Shaken {
   long unfelt = 0;       ///< of these: without force
   long crossed = 0;      ///< with the proxy's centre behind the face
   long turned_late = 0;  ///< with less turn than the hand's
-  int most_probes = 0;
+  int most_queries = 0;
   double deepest = 0;       ///< of the proxy below the face
   double longest_jump = 0;  ///< of the proxy in a tick
 };
@@ -69,24 +69,24 @@ void shake(double thickness, const ShakenTool& tool, const SampledTool& made, in
   });
   Point hand = frame.at(0, tool.reach() + 3, 0);
   ToolTurn<N> turn;
-  Led<N> led(made, wall, hand);
+  GuidedTool<N> guided(made, wall, hand);
   for (int i = 0; i < ticks; ++i) {
     hand = hand + std::pow(10.0, dice.uniform(0, 2)) * dice.direction();
     const Point h = frame.of(hand);
     const double aside = std::max(1.0, std::hypot(h[0], h[2]) / 10);  // stay inside of the volume
     hand = frame.at(h[0] / aside, std::clamp(h[1], -14.0, 14.0), h[2] / aside);
     turn = compose(dice.turn<N>(i % 3 == 0 ? 3 : dice.uniform(0, 0.2)), turn);
-    const Point before = led.proxy();
-    const double spring = length(led.tick(hand, turn));
+    const Point before = guided.proxy();
+    const double spring = length(guided.tick(hand, turn));
 
-    const double below = tool.reach_below(led.pose().turn, frame.up);
-    const double height = frame.of(led.proxy())[1];
+    const double below = tool.reach_below(guided.pose().turn, frame.up);
+    const double height = frame.of(guided.proxy())[1];
     ++seen.ticks;
-    seen.most_probes = std::max(seen.most_probes, led.swept().probes);
+    seen.most_queries = std::max(seen.most_queries, guided.swept().queries);
     seen.deepest = std::max(seen.deepest, below - height);
-    seen.longest_jump = std::max(seen.longest_jump, length(led.proxy() - before));
+    seen.longest_jump = std::max(seen.longest_jump, length(guided.proxy() - before));
     seen.crossed += height < 0 ? 1 : 0;
-    seen.turned_late += led.swept().turned ? 0 : 1;
+    seen.turned_late += guided.swept().turned ? 0 : 1;
     if (frame.of(hand)[1] < below - 0.1) {
       ++seen.behind;
       seen.unfelt += spring < 0.05 ? 1 : 0;

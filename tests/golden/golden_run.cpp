@@ -174,7 +174,7 @@ GoldenRun golden_run(GoldenScene which, NumericKind numeric, const KernelSet& ke
     run.contact_ticks += out.contact ? 1 : 0;
     run.late_contact_ticks += out.contact && tick >= ticks * 3 / 4 ? 1 : 0;
     run.stale_ticks += out.stale ? 1 : 0;
-    run.limited_ticks += out.saturated ? 1 : 0;
+    run.limited_ticks += out.clamped ? 1 : 0;
     run.motor_ticks += out.motors_on ? 1 : 0;
     const bool is_new = out.fault != last.fault;
     run.stale_faults += is_new && out.fault == Fault::stale_input ? 1 : 0;

@@ -15,10 +15,10 @@
 #include <doctest/doctest.h>
 
 #include "controller/kernel/kernel_set.hpp"
-#include "controller/kernel/proxy/shell_closeup.hpp"
+#include "controller/kernel/proxy/contact_closeup.hpp"
 #include "controller/plan/close_cells.hpp"
 #include "tests/kernel/case_count.hpp"
-#include "tests/kernel/shell_support.hpp"
+#include "tests/kernel/contact_support.hpp"
 
 using namespace kerf;
 using namespace kerf::test;
@@ -28,7 +28,7 @@ namespace {
 using Samples = CloseSamples<FixedNumbers>;
 
 bool same(const PowerSums<FixedNumbers>& a, const PowerSums<FixedNumbers>& b) {
-  return a.weight == b.weight && a.density == b.density && std::ranges::equal(a.lever, b.lever);
+  return a.weight == b.weight && a.density == b.density && std::ranges::equal(a.offset, b.offset);
 }
 
 /// Samples `pitch` apart on both faces of a plate across z.
@@ -52,11 +52,11 @@ double reach_of(const std::vector<Point>& points) {
 std::unique_ptr<Samples> taken(const CloseCells<FixedNumbers>& cells, double reach,
                                const Point& at) {
   auto samples = std::make_unique<Samples>();
-  std::int32_t lever[3] = {};
+  std::int32_t offset[3] = {};
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    lever[axis] = static_cast<std::int32_t>(std::lround(32768 * at[axis] / reach));
+    offset[axis] = static_cast<std::int32_t>(std::lround(32768 * at[axis] / reach));
   }
-  samples->take(cells.table(), lever);
+  samples->take(cells.table(), offset);
   return samples;
 }
 
@@ -72,11 +72,11 @@ TEST_CASE("every instruction set sums close samples to the bit") {
     const double least = i % 2 == 0 ? 0 : 0.9 * most;
     for (std::size_t k = 0; k < kMostClose; ++k) {
       samples->density[k] = static_cast<std::int32_t>(std::min(32767.0, dice.uniform(least, most)));
-      for (auto& lever : samples->lever) {
-        lever[k] = i % 7 == 0 ? -32768 : static_cast<std::int32_t>(dice.uniform(-32768, 32768));
+      for (auto& offset : samples->offset) {
+        offset[k] = i % 7 == 0 ? -32768 : static_cast<std::int32_t>(dice.uniform(-32768, 32768));
       }
     }
-    const ShellTable<FixedNumbers> table = samples->table();
+    const PointTable<FixedNumbers> table = samples->table();
     samples->fade(table);
     const auto truth = close_sums<FixedNumbers>(table, samples->density.data());
     felt += truth.low.weight > 0 ? 1 : 0;
@@ -95,7 +95,7 @@ TEST_CASE("every instruction set sums close samples to the bit") {
 
 TEST_CASE_TEMPLATE("the sums tell height and place of a peak between the samples", N, FixedNumbers,
                    DoubleNumbers) {
-  using Number = ShellNumber<N>;
+  using Number = PointNumber<N>;
   const double one = N::kIsFixed ? 32768 : 1;
   CloseSamples<N> samples;
   for (const double off : {0.0, 0.1, 0.17}) {
@@ -108,18 +108,18 @@ TEST_CASE_TEMPLATE("the sums tell height and place of a peak between the samples
         const double fall = 0.05 * ((at[0] - off) * (at[0] - off) + at[2] * at[2]);
         samples.density[k] = static_cast<Number>(one * std::max(0.0, 0.5 - fall));
         for (std::size_t axis = 0; axis < 3; ++axis) {
-          samples.lever[axis][k] = static_cast<Number>(one * at[axis] / 8);
+          samples.offset[axis][k] = static_cast<Number>(one * at[axis] / 8);
         }
       }
     }
-    const ShellTable<N> table = samples.table();
+    const PointTable<N> table = samples.table();
     samples.fade(table);
     const Closeup<N> seen = peak_of(close_sums<N>(table, samples.density.data()));
     CAPTURE(off);
     CHECK(double(seen.height) == doctest::Approx(0.5).epsilon(0.003));
-    CHECK(std::abs(8 * double(seen.lever[0]) - off) < 0.01);
-    CHECK(8 * double(seen.lever[1]) == doctest::Approx(0.5).epsilon(0.001));
-    CHECK(std::abs(8 * double(seen.lever[2])) < 0.01);
+    CHECK(std::abs(8 * double(seen.offset[0]) - off) < 0.01);
+    CHECK(8 * double(seen.offset[1]) == doctest::Approx(0.5).epsilon(0.001));
+    CHECK(std::abs(8 * double(seen.offset[2])) < 0.01);
   }
 }
 
@@ -136,9 +136,9 @@ TEST_CASE("a closer look takes all samples around a place, and of too many a par
       CAPTURE(at[0]);
       CHECK(samples->count > 0);
       CHECK(samples->count <= kMostClose);
-      const auto levers =
-          std::span(samples->lever[2]).first(static_cast<std::size_t>(samples->count));
-      const auto above = std::ranges::count_if(levers, [](std::int32_t z) { return z > 0; });
+      const auto offsets =
+          std::span(samples->offset[2]).first(static_cast<std::size_t>(samples->count));
+      const auto above = std::ranges::count_if(offsets, [](std::int32_t z) { return z > 0; });
       CHECK(std::abs(double(above) / samples->count - 0.5) < 0.02);
     }
   }
@@ -150,7 +150,8 @@ TEST_CASE("a closer look takes all samples around a place, and of too many a par
   const auto samples = taken(cells, reach, at);
   int within = 0;
   for (std::size_t k = 0; k < static_cast<std::size_t>(samples->count); ++k) {
-    const double x = samples->lever[0][k] * reach / 32768, y = samples->lever[1][k] * reach / 32768;
+    const double x = samples->offset[0][k] * reach / 32768,
+                 y = samples->offset[1][k] * reach / 32768;
     const double far = std::max(std::abs(x - at[0]), std::abs(y - at[1]));
     CHECK(far < kCloseRadius + kCloseCell + 0.01);
     within += far < kCloseRadius - 0.01 ? 1 : 0;

@@ -14,8 +14,8 @@
 #include "lab/extremes/page.hpp"
 #include "lab/extremes/worst_tick.hpp"
 #include "lab/program.hpp"
+#include "lab/rig/contact_rig.hpp"
 #include "lab/rig/exact_touch.hpp"
-#include "lab/rig/shell_rig.hpp"
 
 using namespace kerf::extremes;
 
@@ -105,7 +105,7 @@ TEST_CASE("the costliest tick is told with its place; a body out of reach keeps 
   find_worst_tick(ball, flat, solid, 200, worst);
   CHECK(worst.us > 0);
   CHECK(worst.trap == "flat");
-  CHECK(worst.probes <= kerf::SweepRules::kMaxProbes);
+  CHECK(worst.queries <= kerf::SweepRules::kMaxQueries);
   worst.us = 1e9;
   find_worst_tick(ball, {"air", {}, {1000, 20, 20}, kIso}, solid, 200, worst);
   CHECK(worst.trap == "flat");

@@ -77,23 +77,23 @@ TEST_CASE("the segment's parts fill it, and only what the scene names is there")
 }
 
 TEST_CASE("an explanation is told in text and JSON with the same figures") {
-  Explanation told;
-  told.scene = "scenes/x.toml";
-  told.numeric = "fixed";
-  told.cut = "none";
-  told.budget_us = 500;
+  Explanation explanation;
+  explanation.scene = "scenes/x.toml";
+  explanation.numeric = "fixed";
+  explanation.cut = "none";
+  explanation.budget_us = 500;
   for (const char* volume : {"tooth", "filling"}) {
-    told.ticks.push_back(
+    explanation.ticks.push_back(
         {"ball", volume, "aligned/scalar", "round", {{{"copy", 4000}, 5.0, 3000, 2.0, 2.25}}});
   }
-  told.arrays = {{"density of tooth", 3 << 20, true}, {"carry of tooth", 64, false}};
-  const std::string text = explanation_text(told);
+  explanation.arrays = {{"density of tooth", 3 << 20, true}, {"carry of tooth", 64, false}};
+  const std::string text = explanation_text(explanation);
   CHECK(text.find("ball in tooth: aligned/scalar (round)") != std::string::npos);
   CHECK(text.find("3.0 MiB") != std::string::npos);
   CHECK(text.find("64 B") != std::string::npos);
   CHECK(text.find("at most 500.0 us: half a tick at 1000 Hz") != std::string::npos);
   CHECK(text.find("10.0 us     2.0 %") != std::string::npos);  // both volumes
-  const auto json = nlohmann::json::parse(explanation_json(told));
+  const auto json = nlohmann::json::parse(explanation_json(explanation));
   CHECK(json["ticks"][0]["stages"][0]["operations"] == 4000);
   CHECK(json["ticks"][0]["stages"][0]["timed_operations"] == 3000);
   CHECK(json["ticks"][0]["predicted_us"] == 2.0);
@@ -101,6 +101,6 @@ TEST_CASE("an explanation is told in text and JSON with the same figures") {
   CHECK(json["tools"].size() == 1);
   CHECK(json["tools"][0]["work_us"] == 10.0);
   CHECK(json["total_bytes"] == (3 << 20) + 64);
-  told.ticks[0].stages[0].predicted_us.reset();
-  CHECK(nlohmann::json::parse(explanation_json(told))["ticks"][0]["predicted_us"].is_null());
+  explanation.ticks[0].stages[0].predicted_us.reset();
+  CHECK(nlohmann::json::parse(explanation_json(explanation))["ticks"][0]["predicted_us"].is_null());
 }

@@ -220,18 +220,18 @@ TEST_CASE("a gathering tick that cuts works on no more voxels than it is said to
 }
 
 TEST_CASE("a scene is planned with what the servo allows the probes of a tick") {
-  ShellTable<FixedNumbers> shell;
+  PointTable<FixedNumbers> shell;
   shell.count = 500;
   shell.groups = 32;
   shell.round = true;
-  CHECK(probe_work(shell, 2).probe == 2 * (512 + 128));
-  CHECK(probe_work(shell, 2).closer == 2 * (96 + 128 + 256));
-  CHECK(probe_work(shell, 2).turn == 2 * 62);
+  CHECK(query_work(shell, 2).query == 2 * (512 + 128));
+  CHECK(query_work(shell, 2).closer == 2 * (96 + 128 + 256));
+  CHECK(query_work(shell, 2).turn == 2 * 62);
   shell.round = false;
-  CHECK(probe_work(shell, 1).probe == 512 + 128);
-  CHECK(probe_work(shell, 1).closer == 2 * (128 + 2 * 256) + 2 * (128 + 64));
-  const auto most = [](std::int64_t probe, std::int64_t closer, std::int64_t turn) {
-    return ProbeWork{probe, closer, turn}.most();
+  CHECK(query_work(shell, 1).query == 512 + 128);
+  CHECK(query_work(shell, 1).closer == 2 * (128 + 2 * 256) + 2 * (128 + 64));
+  const auto most = [](std::int64_t query, std::int64_t closer, std::int64_t turn) {
+    return QueryWork{query, closer, turn}.most();
   };
   CHECK(most(300, 100, 50) == 32 * 400 + 13 * 50);
   CHECK(most(900, 100, 90) == 18000);
@@ -240,14 +240,14 @@ TEST_CASE("a scene is planned with what the servo allows the probes of a tick") 
 
   LoadedScene scene = half_space_scene(48);
   scene.tools = {shape("wheel", 2, 1)};
-  const auto probes_of = [&] {
+  const auto queries_of = [&] {
     return operations(plan_scene(scene)->costs().ticks.front().cost, "probes");
   };
-  const std::uint64_t alone = probes_of();
+  const std::uint64_t alone = queries_of();
   scene.volumes.push_back(scene.volumes.front());
   scene.volumes.back().name = "other";
-  CHECK(2 * probes_of() >= alone);  // of both together
-  CHECK(probes_of() <= alone);
+  CHECK(2 * queries_of() >= alone);  // of both together
+  CHECK(queries_of() <= alone);
 }
 
 TEST_CASE("every stage of every plan has a price, on machines of all kinds") {

@@ -5,7 +5,7 @@
 
 #include <doctest/doctest.h>
 
-#include "controller/kernel/proxy/shell_cap.hpp"
+#include "controller/kernel/proxy/ball_cap.hpp"
 #include "tests/proxy/solid_field.hpp"
 
 using namespace kerf;
@@ -13,7 +13,7 @@ using namespace kerf::test;
 
 TEST_CASE_TEMPLATE("a cap lies on its ball, wherever it is laid", N, FixedNumbers, DoubleNumbers) {
   constexpr double kBall = 8, kOne = N::kIsFixed ? 32768 : 1;
-  const auto& lever = kCapArrays<N>.lever;
+  const auto& offset = kCapArrays<N>.offset;
   Dice dice(3);
   for (int k = 0; k < 50; ++k) {
     const Point out = k < 2 ? Point{0, 0, k == 0 ? 1.0 : -1.0} : dice.direction();
@@ -23,7 +23,7 @@ TEST_CASE_TEMPLATE("a cap lies on its ball, wherever it is laid", N, FixedNumber
       Point at = kBall * out;
       for (std::size_t a = 0; a < 3; ++a) {
         for (std::size_t b = 0; b < 3; ++b) {
-          at[a] += kCapRadius * double(rows[a][b]) * double(lever[b][i]) / kOne;
+          at[a] += kCapRadius * double(rows[a][b]) * double(offset[b][i]) / kOne;
         }
       }
       CHECK(std::abs(length(at) - kBall) < 0.03);
@@ -37,7 +37,7 @@ TEST_CASE_TEMPLATE("a cap counts on edges, and not on flats", N, FixedNumbers, D
   constexpr double kCount = 805, kHeight = 0.5, kSlope = 0.5, kBall = 8;
   const auto sharp = [&](double share) {
     const double weight = share * kCount * std::pow(kHeight, 5) / (10 * kSlope * kBall);
-    ShellSums<N> sums;
+    PointSums<N> sums;
     sums.weight = static_cast<typename N::Sum>(weight * (N::kIsFixed ? 1 << 24 : 1));
     return double(sharpness(sums, 805, Ratio(kHeight), Ratio(kSlope), typename N::Real(kBall)));
   };

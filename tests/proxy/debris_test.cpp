@@ -7,7 +7,7 @@
 #include <doctest/doctest.h>
 
 #include "controller/kernel/proxy/proxy_sweep.hpp"
-#include "tests/kernel/shell_support.hpp"
+#include "tests/kernel/contact_support.hpp"
 
 using namespace kerf;
 using namespace kerf::test;
@@ -29,14 +29,14 @@ Tally pushed_at_bits(double bit_radius, int bits) {
   for (int i = 0; i < bits; ++i) {
     const Point bit =
         Point{20, 20, 20} + Point{dice.uniform(0, 1), dice.uniform(0, 1), dice.uniform(0, 1)};
-    const Point way = dice.direction(), start = bit - 12 * way;
+    const Point direction = dice.direction(), start = bit - 12 * direction;
     const TestVolume volume =
         blurred({41, 41, 41}, [&](Point p) { return length(p - bit) - bit_radius; });
-    ShellRig<N> rig(tool_of_units("ball", kRadius, 2 * kRadius), volume);
+    ContactRig<N> rig(tool_of_units("ball", kRadius, 2 * kRadius), volume);
     ProxyPose<N> pose{place_of<N>(start), {}};
     const auto spring = [&](double gone) {
-      const Point hand = start + gone * way;
-      ProxySweep<N, ShellProbe<N>>(rig.field(), pose, {}, {}).tick({place_of<N>(hand), {}});
+      const Point hand = start + gone * direction;
+      ProxySweep<N, ContactQuery<N>>(rig.field(), pose, {}, {}).tick({place_of<N>(hand), {}});
       return length(point_of<N>(pose.centre) - hand);
     };
     for (double gone = 0; gone < 9; gone += 0.1) spring(gone);

@@ -15,14 +15,14 @@ class FlatField {
  public:
   explicit FlatField(Point up, Point arm = {}) : up_(up), arm_(arm) {}
 
-  Probe<N> probe(ContactVec<typename N::Real> at) {
-    Probe<N> probe;
+  Contacts<N> query(ContactVec<typename N::Real> at) {
+    Contacts<N> felt;
     const double height = dot(up_, point_of<N>(at) + turned_arm());
-    if (height > 1) return probe;
-    probe.depth = typename N::Real(-height);
-    probe.count = 1;
-    probe.plane[0] = {normal_of<N>(up_), probe.depth, place_of<N>(turned_arm())};
-    return probe;
+    if (height > 1) return felt;
+    felt.depth = typename N::Real(-height);
+    felt.count = 1;
+    felt.plane[0] = {normal_of<N>(up_), felt.depth, place_of<N>(turned_arm())};
+    return felt;
   }
   [[nodiscard]] bool half_spent() const { return false; }
   [[nodiscard]] typename N::Real free_distance(ContactVec<typename N::Real> at) const {

@@ -7,7 +7,7 @@
 
 #include <doctest/doctest.h>
 
-#include "lab/rig/led.hpp"
+#include "lab/rig/guided_tool.hpp"
 
 using namespace kerf;
 using namespace kerf::extremes;
@@ -45,14 +45,14 @@ struct Twist {
 template <class N>
 int ticks_out(const SampledTool& tool, const Body& body, double half, const Twist& twist,
               int at_most) {
-  Led<N> led(tool, body, {twist.middle, kBottom, twist.middle});
+  GuidedTool<N> guided(tool, body, {twist.middle, kBottom, twist.middle});
   int tick = 0, out = 0;
   const auto pull = [&](double height) {
     const auto spin = about<N>(1, std::remainder(twist.spin_rad * tick++, 4 * std::numbers::pi));
-    led.tick({twist.middle, height, twist.middle}, compose(about<N>(0, twist.tilt_rad), spin));
+    guided.tick({twist.middle, height, twist.middle}, compose(about<N>(0, twist.tilt_rad), spin));
   };
   while (tick < 50) pull(kBottom);
-  while (out < at_most && led.proxy()[1] - half < kTop + 3) {
+  while (out < at_most && guided.proxy()[1] - half < kTop + 3) {
     pull(std::min(kBottom + 0.2 * ++out, 90.0));
   }
   return out;

@@ -6,7 +6,7 @@
 
 #include <doctest/doctest.h>
 
-#include "tests/kernel/shell_support.hpp"
+#include "tests/kernel/contact_support.hpp"
 #include "tests/proxy/flat_field.hpp"
 
 using namespace kerf;
@@ -32,12 +32,12 @@ TestVolume block() {
   });
 }
 
-/// Counts the probes.
+/// Counts the queries.
 template <class N>
 struct CountedField {
-  Probe<N> probe(ContactVec<typename N::Real> q) {
-    ++probes;
-    return field.probe(q);
+  Contacts<N> query(ContactVec<typename N::Real> q) {
+    ++queries;
+    return field.query(q);
   }
   [[nodiscard]] bool half_spent() const { return field.half_spent(); }
   typename N::Real free_distance(ContactVec<typename N::Real> q) const {
@@ -45,8 +45,8 @@ struct CountedField {
   }
   void turn(const ToolTurn<N>& turn) { field.turn(turn); }
 
-  ShellProbe<N>& field;
-  int probes = 0;
+  ContactQuery<N>& field;
+  int queries = 0;
 };
 
 template <class N>
@@ -59,7 +59,7 @@ ProxyPose<N> pose_of(Point place) {
 TEST_CASE_TEMPLATE("a contact tells spring, normal and no torque of a ball", N, FixedNumbers,
                    DoubleNumbers) {
   const TestVolume volume = block();
-  ShellRig<N> rig(kBall, volume);
+  ContactRig<N> rig(kBall, volume);
   ProxyState<N> state;
   CHECK(follow(plan<N>(), state, rig.field(), pose_of<N>({30, 40, 30})).placing == Placing::placed);
   ProxyContact<N> contact;
@@ -68,7 +68,7 @@ TEST_CASE_TEMPLATE("a contact tells spring, normal and no torque of a ball", N, 
   }
   CHECK(point_of<N>(contact.spring)[1] == doctest::Approx(38 - 35.5).epsilon(0.02));
   CHECK(double(contact.normal.y) == doctest::Approx(1));
-  CHECK(length(point_of<N>(contact.lever)) < 0.05);
+  CHECK(length(point_of<N>(contact.moment_arm)) < 0.05);
 }
 
 TEST_CASE_TEMPLATE("a contact beside the centre turns the tool about its tip", N, FixedNumbers,
@@ -79,7 +79,7 @@ TEST_CASE_TEMPLATE("a contact beside the centre turns the tool about its tip", N
   const auto contact = follow(plan<N>(), state, field, pose_of<N>({0, -1, 0}));
   CHECK(point_of<N>(contact.spring)[1] == doctest::Approx(2).epsilon(0.01));
   // (3, -1, 0) x (0, 1, 0)
-  CHECK(length(point_of<N>(contact.lever) - Point{0, 0, 3}) < 1e-3);
+  CHECK(length(point_of<N>(contact.moment_arm) - Point{0, 0, 3}) < 1e-3);
 }
 
 TEST_CASE_TEMPLATE("friction turns a ball backwards", N, FixedNumbers, DoubleNumbers) {
@@ -94,7 +94,7 @@ TEST_CASE_TEMPLATE("friction turns a ball backwards", N, FixedNumbers, DoubleNum
   CHECK(spring[0] / spring[1] == doctest::Approx(-0.5).epsilon(0.03));
   CHECK(double(contact.normal.y) == doctest::Approx(1));
   // arm x force = (0, -4, 0) x (-1, 2, 0) = (0, 0, -4), over a force of sqrt(5)
-  CHECK(length(point_of<N>(contact.lever) - Point{0, 0, -4 / std::sqrt(5.0)}) < 0.05);
+  CHECK(length(point_of<N>(contact.moment_arm) - Point{0, 0, -4 / std::sqrt(5.0)}) < 0.05);
 }
 
 TEST_CASE_TEMPLATE("a tool that lags is pressed by what it slides on, not by its way", N,
@@ -134,7 +134,7 @@ TEST_CASE_TEMPLATE("a tool with no room to turn keeps its orientation, and follo
   // A bar of 16 in a shaft 12 wide whose walls go on forever upwards.
   const TestVolume volume =
       blurred({70, 70, 70}, [](Point p) { return 6 - std::hypot(p[0] - 35, p[2] - 35); });
-  ShellRig<N> rig(tool_of_units("cylinder", 5, 16), volume);
+  ContactRig<N> rig(tool_of_units("cylinder", 5, 16), volume);
   ProxyState<N> state;
   const auto turning = plan<N>(0, turn_step_of(9.5));
   ProxyPose<N> goal = pose_of<N>({35, 35, 35});
@@ -154,7 +154,7 @@ TEST_CASE_TEMPLATE("a tool with no room to turn keeps its orientation, and follo
 TEST_CASE_TEMPLATE("a start inside of the solid ends outside, by a force that grows", N,
                    FixedNumbers, DoubleNumbers) {
   const TestVolume volume = block();
-  ShellRig<N> rig(kBall, volume);
+  ContactRig<N> rig(kBall, volume);
   CountedField<N> field{rig.field()};
   ProxyState<N> state;
   const auto goal = pose_of<N>({30, 22, 30});  // 16 deep
@@ -162,9 +162,9 @@ TEST_CASE_TEMPLATE("a start inside of the solid ends outside, by a force that gr
   int searched = 0;
   ProxyContact<N> contact;
   for (int i = 0; i < 200; ++i) {
-    field.probes = 0;
+    field.queries = 0;
     contact = follow(plan<N>(), state, field, goal);
-    CHECK(field.probes <= SweepRules::kMaxProbes);
+    CHECK(field.queries <= SweepRules::kMaxQueries);
     const double now = length(point_of<N>(contact.spring));
     CHECK(now <= felt + 0.25 + 1e-3);
     CHECK((contact.placing == Placing::placed || now == 0));
@@ -194,7 +194,7 @@ TEST_CASE_TEMPLATE("a volume that fills up around the tool starts the search aga
                    FixedNumbers, DoubleNumbers) {
   const TestVolume full = block();
   TestVolume volume = full;
-  ShellRig<N> rig(kBall, volume);  // its map of what is free knows the full block
+  ContactRig<N> rig(kBall, volume);  // its map of what is free knows the full block
   std::fill(volume.density.begin(), volume.density.end(), Density{0});
   ProxyState<N> state;
   const auto goal = pose_of<N>({30, 31, 30});
@@ -241,7 +241,7 @@ TEST_CASE_TEMPLATE("a far goal is bounded work and a finite force", N, FixedNumb
       const auto goal = pose_of<N>({side * far, -far, far});
       for (int i = 0; i < 3; ++i) {
         const auto contact = follow(plan<N>(0.3), state, field, goal);
-        CHECK(contact.probes <= SweepRules::kMaxProbes);
+        CHECK(contact.queries <= SweepRules::kMaxQueries);
         CHECK(point_of<N>(contact.pose.centre)[1] > -0.011);
         CHECK(length(point_of<N>(contact.spring)) < 15000);
         CHECK(length(point_of<N>(contact.spring)) > 8000);

@@ -47,15 +47,15 @@ LoopGain gain_in_a_crease(double friction, int loops) {
     const double rest = kRadius * std::sqrt(2.0);
     const Point middle = frame.at(0, rest - 3, 0), one = dice.direction(),
                 other = unit(cross(one, dice.direction()));
-    Led<N> led(kBall, volume, frame.at(0, rest + 3, 0), friction);
-    for (int i = 0; i < 60; ++i) led.tick(middle + (6 - 0.1 * i) * frame.up);
+    GuidedTool<N> guided(kBall, volume, frame.at(0, rest + 3, 0), friction);
+    for (int i = 0; i < 60; ++i) guided.tick(middle + (6 - 0.1 * i) * frame.up);
     constexpr int kTicks = 250;
     double work = 0, moved = 0;
-    Point last_hand = middle + 2 * one, last_force = led.tick(last_hand);
+    Point last_hand = middle + 2 * one, last_force = guided.tick(last_hand);
     for (int i = 1; i <= 2 * kTicks; ++i) {
       const double phase = 2 * std::numbers::pi * i / kTicks;
       const Point hand = middle + 2 * std::cos(phase) * one + 2 * std::sin(phase) * other;
-      const Point force = led.tick(hand);
+      const Point force = guided.tick(hand);
       const double part = dot(force + last_force, hand - last_hand) / 2;
       if (i > kTicks) {
         work += part;
@@ -91,7 +91,7 @@ TEST_CASE_TEMPLATE("force is smooth over bumps", N, FixedNumbers, DoubleNumbers)
                                   << figures.degrees << " degrees");
     CHECK(figures.force_step < row.limit);
     CHECK(figures.degrees < 0.5);
-    CHECK(figures.probes <= 8);
+    CHECK(figures.queries <= 8);
   }
 }
 
@@ -101,8 +101,8 @@ TEST_CASE("on one motion fixed point feels what double feels") {
   const Bump bump(slide, dice);
   const Body body = bump.body();
   const Point above = bump.hand(-bump.end(), -2);
-  Led<FixedNumbers> fixed(kBall, body, above);
-  Led<DoubleNumbers> exact(kBall, body, above);
+  GuidedTool<FixedNumbers> fixed(kBall, body, above);
+  GuidedTool<DoubleNumbers> exact(kBall, body, above);
   double squares = 0, most = 0, mean = 0;
   int count = 0;
   const auto follow = [&](Point hand) {
@@ -153,19 +153,19 @@ TEST_CASE_TEMPLATE("a ball follows a slot with play, with hardly any and with no
       Dice dice(7);
       const double start = radius > kRadius ? radius + 4 : 0.2;
       double force_step = 0, behind = 0, pulled = 0, held = 0;
-      int probes = 0;
+      int queries = 0;
       for (int k = 0; k < 2; ++k) {
         const Frame frame(dice, {40, 40, 40});
         const Body volume = slot(frame, radius);
-        Led<N> led(kBall, volume, frame.at(-12, start, 0));
+        GuidedTool<N> guided(kBall, volume, frame.at(-12, start, 0));
         const auto tick = [&](Point hand) {
-          const Point force = led.tick(hand);
-          probes = std::max(probes, led.swept().probes);
+          const Point force = guided.tick(hand);
+          queries = std::max(queries, guided.swept().queries);
           return force;
         };
         for (int i = 0; i <= 50; ++i) {
           const double in = i / 50.0;
-          led.tick(frame.at(-12, start * (1 - in) - 2 * in, aside * in));
+          guided.tick(frame.at(-12, start * (1 - in) - 2 * in, aside * in));
         }
         for (double x = -12; x < -10; x += 0.2) tick(frame.at(x, -2, aside));
         Roughness roughness;
@@ -184,9 +184,9 @@ TEST_CASE_TEMPLATE("a ball follows a slot with play, with hardly any and with no
       }
       MESSAGE(std::string(N::kName)
               << ", slot of " << radius << ", pushed aside by " << aside << ": force steps by "
-              << 100 * force_step << " %, " << behind << " units behind, " << probes
+              << 100 * force_step << " %, " << behind << " units behind, " << queries
               << " probes at most; " << pulled << " units of force on the way out");
-      if (radius > kRadius) CHECK(probes <= 12);
+      if (radius > kRadius) CHECK(queries <= 12);
       CHECK(force_step < 0.02);
       CHECK(behind < 0.02);
       CHECK(pulled < 1);

@@ -19,14 +19,14 @@ class SolidField {
  public:
   SolidField(double radius, Nearest nearest) : radius_(radius), nearest_(std::move(nearest)) {}
 
-  Probe<N> probe(ContactVec<typename N::Real> at) {
+  Contacts<N> query(ContactVec<typename N::Real> at) {
     const auto [height, normal] = nearest_(point_of<N>(at));
-    Probe<N> probe;
-    if (height - radius_ > 1) return probe;
-    probe.depth = typename N::Real(std::min(1.0, radius_ - height));
-    probe.count = 1;
-    probe.plane[0] = {normal_of<N>(normal), probe.depth, place_of<N>(-radius_ * normal)};
-    return probe;
+    Contacts<N> felt;
+    if (height - radius_ > 1) return felt;
+    felt.depth = typename N::Real(std::min(1.0, radius_ - height));
+    felt.count = 1;
+    felt.plane[0] = {normal_of<N>(normal), felt.depth, place_of<N>(-radius_ * normal)};
+    return felt;
   }
   [[nodiscard]] bool half_spent() const { return false; }
   [[nodiscard]] typename N::Real free_distance(ContactVec<typename N::Real> at) const {

@@ -28,7 +28,7 @@ Shaken shaken(double wall, const ShakenTool& tool) {
                                 << tally.ticks << " ticks, " << tally.behind << " behind the face, "
                                 << tally.crossed << " crossings, " << tally.unfelt
                                 << " without force, " << tally.deepest << " units sunk at most, "
-                                << tally.most_probes << " probes at most");
+                                << tally.most_queries << " probes at most");
   return tally;
 }
 
@@ -42,8 +42,8 @@ TEST_CASE_TEMPLATE("no ball goes through a wall at any speed, or behind it witho
     CHECK(tally.unfelt == 0);
     CHECK(2 * tally.behind > tally.ticks);
     CHECK(tally.deepest < 0.05);
-    CHECK(tally.most_probes <= SweepRules::kMaxProbes);
-    CHECK(tally.longest_jump < SweepRules::kMaxProbes * SweepRules::kStep);
+    CHECK(tally.most_queries <= SweepRules::kMaxQueries);
+    CHECK(tally.longest_jump < SweepRules::kMaxQueries * SweepRules::kStep);
   }
 }
 
@@ -55,7 +55,7 @@ TEST_CASE_TEMPLATE("no turning cylinder goes through a wall at any speed, or is 
     CHECK(tally.unfelt == 0);
     CHECK(2 * tally.behind > tally.ticks);
     CHECK(tally.deepest < 0.1);
-    CHECK(tally.most_probes <= SweepRules::kMaxProbes);
+    CHECK(tally.most_queries <= SweepRules::kMaxQueries);
     CHECK(tally.turned_late > 0);
   }
 }

@@ -2,7 +2,7 @@
 // Fixed point goes where double goes. Each tick starts both at the same place and leads both to the
 // same goal. Nearly all end within a thousandth of a unit of each other. Where a decision lies on
 // its threshold one of them may take a step more: then both are within the stop rule of the same
-// place, but for ticks that ran out of probes on the way.
+// place, but for ticks that ran out of queries on the way.
 #include <cmath>
 #include <string>
 
@@ -19,8 +19,8 @@ namespace {
 using Face = std::pair<double, Point>;  ///< height above the face, its normal
 
 struct Tally {
-  long ticks = 0, otherwise = 0, out_of_probes = 0;
-  double apart = 0;  ///< at most, of the ticks that had probes left
+  long ticks = 0, otherwise = 0, out_of_queries = 0;
+  double apart = 0;  ///< at most, of the ticks that had queries left
 };
 
 template <class Nearest>
@@ -45,8 +45,8 @@ Tally led_alike(const Nearest& nearest, double friction, int ticks) {
     const double apart = length(point_of<F>(fixed.centre) - point_of<D>(twin.centre));
     ++tally.ticks;
     tally.otherwise += apart > 1e-3 ? 1 : 0;
-    if (std::max(a.probes, b.probes) == SweepRules::kMaxProbes) {
-      ++tally.out_of_probes;
+    if (std::max(a.queries, b.queries) == SweepRules::kMaxQueries) {
+      ++tally.out_of_queries;
     } else {
       tally.apart = std::max(tally.apart, apart);
     }
@@ -59,12 +59,12 @@ Face flat(Point p) {
 }
 /// Its centre is below every goal: beyond a centre two near ways lead to two far places.
 Face bump(Point p) {
-  const Point way = p + Point{0, 40, 0};
-  return {length(way) - 40, unit(way)};
+  const Point offset = p + Point{0, 40, 0};
+  return {length(offset) - 40, unit(offset)};
 }
 Face bowl(Point p) {
-  const Point way = Point{0, 32, 0} - p;
-  return {40 - length(way), length(way) > 0 ? unit(way) : Point{0, 1, 0}};
+  const Point offset = Point{0, 32, 0} - p;
+  return {40 - length(offset), length(offset) > 0 ? unit(offset) : Point{0, 1, 0}};
 }
 Face crease(Point p) {
   const double half = std::sqrt(0.5), side = p[2] < 0 ? 1 : -1;
@@ -92,11 +92,11 @@ TEST_CASE("fixed point goes where double goes") {
       const Tally tally = led_alike(nearest, friction, kTicks);
       MESSAGE(std::string(name) << ", friction " << friction << ": " << tally.otherwise << " of "
                                 << tally.ticks << " ticks more than 0.001 units apart, "
-                                << tally.apart << " at most, " << tally.out_of_probes
+                                << tally.apart << " at most, " << tally.out_of_queries
                                 << " out of probes");
       CHECK(tally.otherwise * 400 < tally.ticks);
       CHECK(tally.apart < SweepRules::kArrived + 1e-3);
-      CHECK(tally.out_of_probes * 20 < tally.ticks);
+      CHECK(tally.out_of_queries * 20 < tally.ticks);
     }
   }
 }

@@ -112,7 +112,7 @@ TEST_CASE_TEMPLATE("levers are the Jacobian, by differences of the closed form",
                    DoubleNumbers) {
   constexpr double kStepMm = 1e-3;
   const int places = over_the_workspace([&](const Point& tip, const auto& angles) {
-    const auto levers = pose_at<N>(angles).lever_mm;
+    const auto jacobian_t = pose_at<N>(angles).jacobian_t_mm;
     // d tip = SUM_i row_i^T d angle_i: the columns of J are the rows of the levers.
     for (std::size_t axis = 0; axis < 3; ++axis) {
       Point ahead = tip, behind = tip;
@@ -125,7 +125,7 @@ TEST_CASE_TEMPLATE("levers are the Jacobian, by differences of the closed form",
         double moved = 0;
         for (std::size_t i = 0; i < 3; ++i) {
           const double turned = ((*later)[i] - (*earlier)[i]) / (2 * kStepMm);
-          moved += double(levers.row[i][along]) * turned;
+          moved += double(jacobian_t.row[i][along]) * turned;
         }
         REQUIRE(std::abs(moved - (along == axis ? 1.0 : 0.0)) < 2e-4);
       }

@@ -76,8 +76,8 @@ TEST_CASE_TEMPLATE("torques push the tip with the commanded force, by the emulat
     const auto component = [] { return *rc::gen::inRange(-3000, 3001) / 1000.0; };
     const DeviceVec<double> force{component(), component(), component()};
     using Real = typename N::Real;
-    const auto torque =
-        omni_pose<N>(q).lever_mm * DeviceVec<Real>{Real(force.x), Real(force.y), Real(force.z)};
+    const auto torque = omni_pose<N>(q).jacobian_t_mm *
+                        DeviceVec<Real>{Real(force.x), Real(force.y), Real(force.z)};
     const auto felt = arm.tip_force_n(q, {double(torque.x), double(torque.y), double(torque.z)});
     RC_ASSERT(std::abs(felt.x - force.x) < 2e-3);
     RC_ASSERT(std::abs(felt.y - force.y) < 2e-3);

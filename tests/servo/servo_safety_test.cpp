@@ -95,7 +95,7 @@ TEST_CASE("a force beyond the motors keeps its direction, and what was sent is w
   scene.device.torque_scale = std::array{0.01, 0.01, 0.01};  // the range ends at 20 N mm
   ArmedServo armed(scene);
   const ServoOutput out = armed.settled(0.2, 0.3, 0.2);
-  CHECK(out.saturated);
+  CHECK(out.clamped);
   CHECK(length(out.force_n) < 1);
   int largest = 0;
   for (std::size_t i = 0; i < 3; ++i) {

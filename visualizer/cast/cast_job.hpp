@@ -26,7 +26,7 @@ struct CastBlock {
 /// One volume as the cast kernels see it: plain pointers, because their files are compiled for
 /// instruction sets that other machines lack, and no inline function may be shared with them.
 ///
-/// Places are in voxel edges, counted from the shell of air: voxel v is at v + 1.
+/// Places are in voxel edges, counted from the border of air: voxel v is at v + 1.
 struct CastVolumeJob {
   const std::uint32_t* density = nullptr;   ///< `PairedRows`
   const std::uint16_t* labels = nullptr;    ///< `PairedRows`, or none
@@ -36,7 +36,7 @@ struct CastVolumeJob {
   std::int32_t row = 0, plane = 0;          ///< of density and labels, in entries
   std::int32_t gradient_plane = 0;          ///< its rows are as long as the others
   std::int32_t cell_row = 0, cell_plane = 0;
-  float last[3] = {};         ///< a hair before the far side of the shell
+  float last[3] = {};         ///< a hair before the far side of the border
   float origin[3] = {};       ///< the eye
   float from_eye[3][3] = {};  ///< [to][from]: mm of eye space to voxel edges
   float edge_mm = 1.0F;       ///< the shortest: opacities of blend hold over it

@@ -17,7 +17,7 @@ namespace kerf {
 namespace {
 
 constexpr float kMost = 0.996F;  // opacity: 1 has no finite extinction
-constexpr double kShell = 1.0;   // voxels of air around the volume: voxel v is at v + 1
+constexpr double kBorder = 1.0;  // voxels of air around the volume: voxel v is at v + 1
 
 /// Samples below show nothing.
 Density least_visible(CastMode mode, const VolumeView& volume, const CastMatter& matter) {
@@ -79,7 +79,7 @@ std::optional<BoxCorners> CastVolume::body() const {
   for (std::size_t i = 0; i < corners.size(); ++i) {
     const glm::ivec3 cell((i & 1) != 0 ? high.x : low.x, (i & 2) != 0 ? high.y : low.y,
                           (i & 4) != 0 ? high.z : low.z);
-    const glm::dvec3 voxel = glm::dvec3(kCastCellVox * cell) - kShell;
+    const glm::dvec3 voxel = glm::dvec3(kCastCellVox * cell) - kBorder;
     corners[i] = glm::dvec3(world_from_voxel_ * glm::dvec4(voxel, 1.0));
   }
   return corners;
@@ -155,11 +155,11 @@ bool CastVolume::near_plane_is_inside(const View& view, const glm::dmat4& world_
 
 CastVolumeJob CastVolume::job(const View& view, std::int32_t width, std::int32_t height,
                               const PixelRect& part) {
-  const glm::dmat4 world_from_shell = glm::translate(world_from_voxel_, glm::dvec3(-kShell));
-  const glm::dmat4 world_from_cell = glm::scale(world_from_shell, glm::dvec3(kCastCellVox));
+  const glm::dmat4 world_from_border = glm::translate(world_from_voxel_, glm::dvec3(-kBorder));
+  const glm::dmat4 world_from_cell = glm::scale(world_from_border, glm::dvec3(kCastCellVox));
   blocks_.draw(outer_cells_, near_plane_is_inside(view, world_from_cell), world_from_cell, view,
                width, height, part);
-  const glm::dmat4 place_from_eye = glm::affineInverse(view.eye_from_world * world_from_shell);
+  const glm::dmat4 place_from_eye = glm::affineInverse(view.eye_from_world * world_from_border);
   const VoxelGrid& grid = bricks_.grid;
   const glm::ivec3 extent(grid.nx, grid.ny, grid.nz);
   CastVolumeJob job;

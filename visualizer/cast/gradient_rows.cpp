@@ -40,7 +40,7 @@ void GradientRows::update(const VoxelBox& box, const Densities& density) {
 
 void GradientRows::fill_row(std::int32_t y, std::int32_t z, const VoxelBox& box,
                             const Densities& density) {
-  // In shell coordinates voxel y is y + 1: the row before begins at y, and row y + 1 pairs that
+  // In border coordinates voxel y is y + 1: the row before begins at y, and row y + 1 pairs that
   // voxel with the one after.
   const auto at = [&](std::int32_t row, std::int32_t plane) {
     return density.data() + static_cast<std::ptrdiff_t>(plane) * density.plane() +

@@ -10,7 +10,7 @@ namespace kerf {
 
 /// The density gradient at each voxel, for rays that need it often: differences over two voxel
 /// edges along one axis, means of four along the others, as iso.frag takes them. Interpolated they
-/// are the gradient of that cube at any place, but for their 8 bits. In a shell of none, as the
+/// are the gradient of that cube at any place, but for their 8 bits. In a border of none, as the
 /// density: voxel v is at v + 1.
 ///
 ///     entry = byte x | byte y << 8 | byte z << 16,   byte = 128 + 127 * difference

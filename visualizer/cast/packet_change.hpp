@@ -27,7 +27,7 @@ inline M marked(const ChangeJob& job, Vec3 p, std::uint8_t mark) {
 }
 
 /// From the cells to `p`, 0 within.
-inline Vec3 way_off(const ChangeJob& job, Vec3 p) {
+inline Vec3 offset_from(const ChangeJob& job, Vec3 p) {
   const auto beside = [](F at, float size) {
     return positive(Simd::max(-at, at - Simd::set(size)));
   };
@@ -36,7 +36,7 @@ inline Vec3 way_off(const ChangeJob& job, Vec3 p) {
 
 /// Whether one of `points` is in a cell with `mark`.
 inline bool any_marked(const ChangeJob& job, Vec3 p, M points, std::uint8_t mark) {
-  const Vec3 off = way_off(job, p);
+  const Vec3 off = offset_from(job, p);
   const M within = Simd::but_not(points, Simd::less(Simd::set(0.0F), dot(off, off)));
   return Simd::any(within) && Simd::any(Simd::both(within, marked(job, p, mark)));
 }
@@ -60,8 +60,8 @@ inline bool pass_a_mark(const ChangeJob& job, const VolumeRays& rays, M alive) {
   return Simd::any(alive);  // so far away that its steps are lost in rounding
 }
 
-/// As `gradient_at`, from densities without a shell; only in lanes that are inside, the others have
-/// any.
+/// As `gradient_at`, from densities without a border; only in lanes that are inside, the others
+/// have any.
 inline Vec3 plain_gradient_at(const ChangeJob& job, Vec3 voxel) {
   const auto low = [](F at, std::int32_t extent) {
     return Simd::to_int(
@@ -153,7 +153,7 @@ inline bool packet_feels(const ChangeJob& job, const Packet& packet) {
   const Vec3 eye = eye_directions(job.eye, packet);
   const Ends ends = ends_of(job, packet);
   const Vec3 p = vec3(job.origin) + ends.t * transformed(job.from_eye, eye);
-  const Vec3 off = way_off(job, p);
+  const Vec3 off = offset_from(job, p);
   const F reach = Simd::set(kLongestFeelerVox);
   M near = Simd::both(ends.there, Simd::less(dot(off, off), reach * reach));
   if (!Simd::any(near)) return false;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // For the files that define `Simd` only: how a packet of rays samples a volume and passes over its
-// empty cells. Places are in voxel edges from the shell (`CastVolumeJob`).
+// empty cells. Places are in voxel edges from the border (`CastVolumeJob`).
 #pragma once
 
 #include "visualizer/cast/packet_math.hpp"
@@ -14,7 +14,7 @@ struct CellPlace {
   Vec3 share;
 };
 
-/// Beyond the shell everything is as on it: air.
+/// Beyond the border everything is as on it: air.
 inline Vec3 within(const CastVolumeJob& volume, Vec3 p) {
   return {Simd::min(positive(p.x), Simd::set(volume.last[0])),
           Simd::min(positive(p.y), Simd::set(volume.last[1])),
@@ -65,7 +65,7 @@ inline F density_at(const CastVolumeJob& volume, Vec3 p) {
 /// cells.
 inline Vec3 gradient_at(const CastVolumeJob& volume, Vec3 p) {
   const F one = Simd::set(1.0F);
-  const auto inner = [&](F x, float last) {  // the whole cube is inside the shell
+  const auto inner = [&](F x, float last) {  // the whole cube is inside the border
     return Simd::max(Simd::min(x, Simd::set(last - 1.0F)), one);
   };
   const CellPlace middle = cell_place(

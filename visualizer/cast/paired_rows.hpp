@@ -10,9 +10,9 @@
 
 namespace kerf {
 
-/// A volume for trilinear sampling: in a shell of air one voxel thick, and each voxel together with
-/// the next one in y, so that one load of two entries brings four corners of a cell. That costs
-/// twice the memory and halves the loads, which set the pace of a ray caster.
+/// A volume for trilinear sampling: in a border of air one voxel thick, and each voxel together
+/// with the next one in y, so that one load of two entries brings four corners of a cell. That
+/// costs twice the memory and halves the loads, which set the pace of a ray caster.
 ///
 ///     entry (x, y, z) = voxel (x-1, y-1, z-1) | voxel (x-1, y, z-1) << bits of a voxel
 template <class Voxel, class Entry>
@@ -25,7 +25,7 @@ class PairedRows {
 
   /// What a volume of this extent takes.
   [[nodiscard]] static std::size_t entry_count(VoxelGrid grid) {
-    // One plane of air beyond the shell, for cubes around its last voxels, and a little more: a
+    // One plane of air beyond the border, for cubes around its last voxels, and a little more: a
     // load may read beyond its last entry.
     return static_cast<std::size_t>(grid.nx + 2) * static_cast<std::size_t>(grid.ny + 1) *
                static_cast<std::size_t>(grid.nz + 3) +

@@ -75,7 +75,7 @@ void HandPainter::draw_tool(const Hand& hand, const View& view, const RenderTarg
 void HandPainter::draw_force(const Hand& hand, const View& view, const RenderTarget& target) {
   const Arrow arrow = arrow_of(hand);
   if (arrow.thickness_mm == 0.0) return;
-  painter_.draw_arrow(arrow.foot_mm, arrow.way_mm, arrow.thickness_mm, kForce, view, target);
+  painter_.draw_arrow(arrow.foot_mm, arrow.shaft_mm, arrow.thickness_mm, kForce, view, target);
 }
 
 std::vector<PixelRect> HandPainter::bounds(const Hand& hand, const View& view,
@@ -97,8 +97,8 @@ std::vector<PixelRect> HandPainter::bounds(const Hand& hand, const View& view,
   if (arrow.thickness_mm == 0.0) return bounds;
   const double around_mm = kArrowHeadRadii * arrow.thickness_mm;
   for (int piece = 0; piece < kPieces; ++piece) {
-    const glm::dvec3 from = arrow.foot_mm + arrow.way_mm * (static_cast<double>(piece) / kPieces);
-    const glm::dvec3 to = arrow.foot_mm + arrow.way_mm * ((piece + 1.0) / kPieces);
+    const glm::dvec3 from = arrow.foot_mm + arrow.shaft_mm * (static_cast<double>(piece) / kPieces);
+    const glm::dvec3 to = arrow.foot_mm + arrow.shaft_mm * ((piece + 1.0) / kPieces);
     bounds.push_back(screen_bounds(
         corners_of(glm::min(from, to) - around_mm, glm::max(from, to) + around_mm), view, size));
   }

@@ -49,7 +49,7 @@ class HandPainter {
     double radius_mm;
   };
   struct Arrow {
-    glm::dvec3 foot_mm, way_mm;
+    glm::dvec3 foot_mm, shaft_mm;
     double thickness_mm;
   };
   [[nodiscard]] Arrow arrow_of(const Hand& hand) const;

@@ -14,9 +14,9 @@ struct TexelFormat {
   GLenum filter;
 };
 
-inline constexpr int kShell = 1;  ///< voxels of air around a volume
+inline constexpr int kBorder = 1;  ///< voxels of air around a volume
 
-/// One value per voxel as a 3D texture inside a shell of air one voxel thick, so voxel v has texel
+/// One value per voxel as a 3D texture inside a border of air one voxel thick, so voxel v has texel
 /// coordinate v + 1.5: surfaces close at the volume's border, and no border colour is needed.
 class VoxelTexture {
  public:
@@ -51,7 +51,7 @@ void for_each_layer(const VoxelGrid& grid, const Take& take) {
 [[nodiscard]] glm::dmat4 world_from_texture(const glm::dmat4& world_from_voxel,
                                             const VoxelGrid& grid);
 
-/// Throws VisualizerError where the volume with its shell is beyond `max_texture_size`.
+/// Throws VisualizerError where the volume with its border is beyond `max_texture_size`.
 void check_extent(const VolumeView& volume, int max_texture_size);
 
 }  // namespace kerf

@@ -122,7 +122,7 @@ FirewireReceiver::Packet FirewireReceiver::next() noexcept {
 int FirewireTransmitter::start(FirewireFile& file, std::int32_t channel,
                                std::span<const std::uint8_t> first) noexcept {
   entries_.store(0, std::memory_order_relaxed);
-  drained_at_ = told_ = 0;
+  drained_at_ = sent_out_ = 0;
   lead_ = -1;
   if (const int error = create(file, FW_CDEV_ISO_CONTEXT_TRANSMIT, channel, 4); error < 0) {
     return error;
@@ -160,9 +160,9 @@ bool FirewireTransmitter::send(FirewireFile& file, std::span<const std::uint8_t>
 void FirewireTransmitter::take(std::span<const std::uint8_t> event) noexcept {
   const auto stamps = headers_of(event);
   if (stamps.size() < 4) return;
-  told_ += stamps.size() / 4;
+  sent_out_ += stamps.size() / 4;
   const std::int32_t cycle = cycle_of_stamp(big_endian(stamps.last(4)));
-  delay(wrapped(cycle - static_cast<std::int64_t>(told_ - 1)));
+  delay(wrapped(cycle - static_cast<std::int64_t>(sent_out_ - 1)));
 }
 
 /// Takes a lead over when it is later than the one that is known.

@@ -98,7 +98,7 @@ class FirewireTransmitter {
 
   std::atomic<std::uint64_t> entries_{0};  ///< queued so far
   std::uint64_t drained_at_ = 0;
-  std::uint64_t told_ = 0;  ///< entries that are known to have gone out
+  std::uint64_t sent_out_ = 0;  ///< entries that are known to have gone out
   /// Cycle of an entry less its number, 0..63999; it only grows, whenever the queue runs dry. -1:
   /// not known.
   std::atomic<std::int32_t> lead_{-1};

@@ -79,11 +79,11 @@ std::optional<std::size_t> identify(const std::string& where, const std::string&
                       (errno == EACCES ? kGiveRight : "; name the node of the arm"));
   }
   hidraw_devinfo about{};
-  const bool told = ioctl(fd, HIDIOCGRAWINFO, &about) >= 0;
+  const bool known = ioctl(fd, HIDIOCGRAWINFO, &about) >= 0;
   close(fd);
-  const auto bytes = told ? packet_bytes_of(static_cast<std::uint16_t>(about.vendor),
-                                            static_cast<std::uint16_t>(about.product))
-                          : std::nullopt;
+  const auto bytes = known ? packet_bytes_of(static_cast<std::uint16_t>(about.vendor),
+                                             static_cast<std::uint16_t>(about.product))
+                           : std::nullopt;
   if (!bytes) {
     refuse(where, node + " is another device than the arm (1234:0006 or 16c0:0486); see lsusb");
   }

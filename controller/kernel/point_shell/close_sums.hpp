@@ -5,30 +5,30 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "controller/kernel/point_shell/shell_sums.hpp"
-#include "controller/kernel/point_shell/shell_table.hpp"
+#include "controller/kernel/point_shell/point_sums.hpp"
+#include "controller/kernel/point_shell/point_table.hpp"
 
 namespace kerf {
 
 /// Sums over samples, weighted with a power p of t: their density over the highest. Fixed: t, its
-/// powers and levers in Q15.
+/// powers and offsets in Q15.
 template <class N>
 struct PowerSums {
-  typename N::Sum weight{}, density{}, lever[3]{};  ///< SUM t^p, SUM t^p t, SUM t^p lever
+  typename N::Sum weight{}, density{}, offset[3]{};  ///< SUM t^p, SUM t^p t, SUM t^p offset
 };
 
-/// What a closeup (shell_closeup.hpp) sums over its samples; nothing where all are faint.
+/// What a closeup (contact_closeup.hpp) sums over its samples; nothing where all are faint.
 template <class N>
 struct CloseSums {
   static constexpr int kLowPower = 32, kHighPower = 64;
 
-  ShellNumber<N> top{};  ///< density of the highest
+  PointNumber<N> top{};  ///< density of the highest
   PowerSums<N> low, high;
 };
 
 /// In fixed each product is of 32 unsigned bits.
 template <class N>
-[[nodiscard]] constexpr ShellNumber<N> close_square(ShellNumber<N> t) noexcept {
+[[nodiscard]] constexpr PointNumber<N> close_square(PointNumber<N> t) noexcept {
   if constexpr (N::kIsFixed) {
     return (t * t + (1 << 14)) >> 15;
   } else {
@@ -38,9 +38,9 @@ template <class N>
 
 /// The sums that define those of every set, over the table's samples with these densities.
 template <class N>
-[[nodiscard]] constexpr CloseSums<N> close_sums(const ShellTable<N>& table,
-                                                const ShellNumber<N>* density) noexcept {
-  using Number = ShellNumber<N>;
+[[nodiscard]] constexpr CloseSums<N> close_sums(const PointTable<N>& table,
+                                                const PointNumber<N>* density) noexcept {
+  using Number = PointNumber<N>;
   CloseSums<N> sums;
   for (std::int32_t i = 0; i < table.count; ++i) sums.top = std::max(sums.top, density[i]);
   if (sums.top < kFaintest<N>) return sums;
@@ -49,7 +49,7 @@ template <class N>
     to.weight += power;
     to.density += Sum(power) * t;
     for (std::size_t axis = 0; axis < 3; ++axis)
-      to.lever[axis] += Sum(power) * table.lever[axis][i];
+      to.offset[axis] += Sum(power) * table.offset[axis][i];
   };
   const auto share = [&sums](Number of) {
     if constexpr (N::kIsFixed) {

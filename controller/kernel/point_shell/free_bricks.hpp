@@ -7,7 +7,7 @@
 
 namespace kerf {
 
-/// Voxels along the edge of a brick of the free-space map. Smaller ones let probes leave out more
+/// Voxels along the edge of a brick of the free-space map. Smaller ones let queries leave out more
 /// of their samples: of a ball of radius 8 that slides, 36 % against 15 % with bricks of 4.
 inline constexpr std::int32_t kFreeBrick = 2;
 

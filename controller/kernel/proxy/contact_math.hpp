@@ -58,13 +58,13 @@ template <class N>
 
 /// way / turn, turn > 0: the radius of an arc. Fixed: rounds toward 0, saturates.
 template <class N>
-[[nodiscard]] constexpr typename N::Real quotient(typename N::Real way,
+[[nodiscard]] constexpr typename N::Real quotient(typename N::Real length,
                                                   typename N::Unit turn) noexcept {
   if constexpr (N::kIsFixed) {
     constexpr std::int64_t kOne = std::int64_t{1} << N::Unit::kFractionBits;
-    return N::Real::from_raw(saturate_i32(way.raw() * kOne / turn.raw()));
+    return N::Real::from_raw(saturate_i32(length.raw() * kOne / turn.raw()));
   } else {
-    return way / turn;
+    return length / turn;
   }
 }
 
@@ -88,7 +88,7 @@ template <class N>
   return {v.x / length, v.y / length, v.z / length};
 }
 
-/// Moment of the unit force `direction` at `arm`: a lever in units.
+/// Moment of the unit force `direction` at `arm`: an offset in units.
 template <class N>
 [[nodiscard]] constexpr ContactVec<typename N::Real> moment(
     ContactVec<typename N::Real> arm, ContactVec<typename N::Unit> direction) noexcept {

@@ -15,7 +15,7 @@ enum class Placing : std::uint8_t { searching, placed, refused };
 /// there the sweep slides to the place nearest to the goal. With nothing free within kReach the
 /// tool is refused until its own goal is free.
 ///
-/// At most 14 probes a tick. Only the tool's surface is felt, so what lies wholly inside of the
+/// At most 14 queries a tick. Only the tool's surface is felt, so what lies wholly inside of the
 /// tool does not count as solid here.
 template <class N>
 class StartSearch {
@@ -36,8 +36,8 @@ class StartSearch {
     if (!halfway_) ++distance_;
     halfway_ = !halfway_;
     // The 14th is no way at all.
-    for (int way = halfway_ ? 0 : 14, end = way + 13; way < end; ++way) {
-      const Place centre = goal.centre + step(way);
+    for (int direction = halfway_ ? 0 : 14, end = direction + 13; direction < end; ++direction) {
+      const Place centre = goal.centre + step(direction);
       if (is_free(field, centre)) {
         pose = {centre, goal.turn};
         return Placing::placed;
@@ -49,13 +49,13 @@ class StartSearch {
  private:
   template <ContactField<N> Field>
   [[nodiscard]] static constexpr bool is_free(Field& field, Place centre) noexcept {
-    const Probe<N> felt = field.probe(centre);
+    const Contacts<N> felt = field.query(centre);
     return !felt.buried && felt.depth <= Real(SweepRules::kTolerance);
   }
   /// `distance_` along the way-th of the 27 directions of a 3x3x3 cube.
-  [[nodiscard]] constexpr Place step(int way) const noexcept {
+  [[nodiscard]] constexpr Place step(int direction) const noexcept {
     constexpr double kPerAxis[4] = {0, 1, 0.7071067811865476, 0.5773502691896258};
-    const int x = way % 3 - 1, y = way / 3 % 3 - 1, z = way / 9 - 1;
+    const int x = direction % 3 - 1, y = direction / 3 % 3 - 1, z = direction / 9 - 1;
     const Real part = Real(distance_) * static_cast<Real>(kPerAxis[x * x + y * y + z * z]);
     return {Real(x) * part, Real(y) * part, Real(z) * part};
   }

@@ -5,22 +5,22 @@
 #include <concepts>
 #include <cstdint>
 
-#include "controller/kernel/proxy/bowl.hpp"
-#include "controller/kernel/proxy/plane_bundle.hpp"
+#include "controller/kernel/proxy/constraint_set.hpp"
+#include "controller/kernel/proxy/curvature.hpp"
 #include "controller/kernel/proxy/tool_turn.hpp"
 
 namespace kerf {
 
 /// What the sweep asks of tool and volumes.
 ///
-///   probe(q)          what the tool feels with its centre at q
+///   query(q)          what the tool feels with its centre at q
 ///   free_distance(q)  how far the centre may go from q in any direction and feel nothing; a lower
 ///                     bound, 0 if unknown
-///   turn(t)           the orientation of the tool in every probe from now on
-///   half_spent()      half of the tick's probes is spent: the rest is the move's
+///   turn(t)           the orientation of the tool in every query from now on
+///   half_spent()      half of the tick's queries is spent: the rest is the move's
 template <class F, class N>
 concept ContactField = requires(F field, ContactVec<typename N::Real> q, ToolTurn<N> turn) {
-  { field.probe(q) } -> std::convertible_to<Probe<N>>;
+  { field.query(q) } -> std::convertible_to<Contacts<N>>;
   { field.free_distance(q) } -> std::convertible_to<typename N::Real>;
   field.turn(turn);
   { field.half_spent() } -> std::convertible_to<bool>;
@@ -28,28 +28,28 @@ concept ContactField = requires(F field, ContactVec<typename N::Real> q, ToolTur
 
 /// Units of contact space; sources: contact.md 3, where not given.
 struct SweepRules {
-  static constexpr std::int32_t kMaxProbes = 32;
-  static constexpr std::int32_t kMaxTurnProbes = 12;  ///< and its pushes; the rest is the move's
-  static constexpr double kTolerance = 0.01;          ///< a place this deep is allowed
-  static constexpr double kTurnTolerance = 0.005;     ///< for a turn, which leaves the move a play
-  static constexpr double kNoMove = 0.002;            ///< a shorter way from rest is none
-  static constexpr double kArrived = 0.004;           ///< after a step this near is there
-  /// Longest way of any sample between two probes. The middle of the thinnest wall, 2 units, is one
-  /// unit deep: beyond it density falls again, and its gradient shows the way through.
+  static constexpr std::int32_t kMaxQueries = 32;
+  static constexpr std::int32_t kMaxTurnQueries = 12;  ///< and its pushes; the rest is the move's
+  static constexpr double kTolerance = 0.01;           ///< a place this deep is allowed
+  static constexpr double kTurnTolerance = 0.005;      ///< for a turn, which leaves the move a play
+  static constexpr double kNoMove = 0.002;             ///< a shorter way from rest is none
+  static constexpr double kArrived = 0.004;            ///< after a step this near is there
+  /// Longest way of any sample between two queries. The middle of the thinnest wall, 2 units, is
+  /// one unit deep: beyond it density falls again, and its gradient shows the way through.
   static constexpr double kStep = 0.875;
   static constexpr double kGain = 0.001;    ///< a step this much nearer to the goal is kept
   static constexpr double kResidual = 0.8;  ///< share of the way that a step may leave
   static constexpr double kEased = 0.5;     ///< share of a step to which a bowl shortens the next
   static constexpr double kShrink = 0.4;
   /// Share of a step below which the proxy rather lags. What a tool has milled leaves it a play of
-  /// hundredths of a unit, where longer steps only meet the other wall: for kFineProbes it may try
+  /// hundredths of a unit, where longer steps only meet the other wall: for kFineQueries it may try
   /// finer ones.
   static constexpr double kShortest = 0.1;
   static constexpr double kFinest = 0.02;
-  static constexpr std::int32_t kFineProbes = 14;
-  static constexpr std::int32_t kStillProbes = 24;  ///< without a nearer place the tool stays
-  static constexpr double kPush = 0.5;              ///< longest correction of one push
-  /// Where a push from one wall leads into another, or the tick has no probe left to see whether it
+  static constexpr std::int32_t kFineQueries = 14;
+  static constexpr std::int32_t kStillQueries = 24;  ///< without a nearer place the tool stays
+  static constexpr double kPush = 0.5;               ///< longest correction of one push
+  /// Where a push from one wall leads into another, or the tick has no query left to see whether it
   /// does, the tool may be this deep in the first.
   /// What two opposite faces read differs by some hundredths from place to place, and a tool that
   /// is turned until both hold it would stay there whatever the hand does: 4 % of tools that spin
@@ -79,18 +79,18 @@ struct ProxyPose {
 /// What one tick of the sweep found.
 template <class N>
 struct Swept {
-  PlaneBundle<N> planes;  ///< that hold the proxy, depths from its centre
-  Slide<N> slide;         ///< of the way from the proxy to its goal: loads in units of way
-  std::int32_t probes = 0;
+  ConstraintSet<N> planes;  ///< that hold the proxy, depths from its centre
+  Slide<N> slide;           ///< of the way from the proxy to its goal: loads in units of way
+  std::int32_t queries = 0;
   bool turned = true;  ///< the tool has the orientation that was asked
   typename N::Real depth{-1};
   bool buried = false;  ///< nothing to push against: the start rule is needed
 };
 
 /// One tick of the proxy: from a pose that the solid allows towards a goal, in steps that no sample
-/// of the tool makes longer than kStep, each probed; longer ones only where nothing can be felt.
-/// Out of probes, or of ideas, the proxy lags; it never jumps, so a wall of 2 units holds it at any
-/// speed.
+/// of the tool makes longer than kStep, each queried; longer ones only where nothing can be felt.
+/// Out of queries, or of ideas, the proxy lags; it never jumps, so a wall of 2 units holds it at
+/// any speed.
 ///
 /// The orientation goes first and the centre gives way to it: a stylus without torque motors turns
 /// the tool whatever the tooth says. Where no centre allows a turn, the orientation lags too.
@@ -98,7 +98,7 @@ struct Swept {
 /// From a place that the solid allows the tool does not go farther from its goal, but by kAstray:
 /// in a groove of its own shape planes that hop about would lead it on and on.
 ///
-/// At most kMaxProbes calls of `probe`. Coordinates within +-kContactLimit.
+/// At most kMaxQueries calls of `query`. Coordinates within +-kContactLimit.
 ///
 /// Limits: a loose bit of material less than 1.5 units across may slip in between the samples of
 /// the tool. What is wholly inside is not felt until the tool leaves it; from 2 units on it then
@@ -117,9 +117,9 @@ class ProxySweep {
 
   constexpr Swept<N> tick(const ProxyPose<N>& goal) noexcept {
     here_ = turn_to(goal.turn);
-    held_by_ = bundle_of(here_);
+    held_by_ = constraints_of(here_);
     const Slide<N> slide = move_to(goal.centre);
-    return {held_by_, slide, probes_, pose_.turn == goal.turn, here_.depth, here_.buried};
+    return {held_by_, slide, queries_, pose_.turn == goal.turn, here_.depth, here_.buried};
   }
 
  private:
@@ -127,50 +127,51 @@ class ProxySweep {
   /// planes it met on the way; and what it felt before the pushes.
   struct Trial {
     Place centre;
-    Probe<N> felt;
-    PlaneBundle<N> planes;
-    Probe<N> first;
+    Contacts<N> felt;
+    ConstraintSet<N> planes;
+    Contacts<N> first;
     bool allowed = false;  ///< the tool may go there
   };
   enum class Trying { turn, move };
 
-  constexpr Probe<N> look(Place centre) noexcept {
-    ++probes_;
-    return field_.probe(centre);
+  constexpr Contacts<N> look(Place centre) noexcept {
+    ++queries_;
+    return field_.query(centre);
   }
   [[nodiscard]] constexpr bool may_look() const noexcept {
-    return probes_ < SweepRules::kMaxProbes;
+    return queries_ < SweepRules::kMaxQueries;
   }
   /// No deeper than where walls hold the tool: it need not get out.
-  [[nodiscard]] static constexpr bool allows_rest(const Probe<N>& felt) noexcept {
+  [[nodiscard]] static constexpr bool allows_rest(const Contacts<N>& felt) noexcept {
     return !felt.buried && felt.depth <= Real(SweepRules::kWedged);
   }
   /// Within the tolerance, or no deeper than the tool is where it is too deep already.
-  [[nodiscard]] constexpr bool allows(const Probe<N>& felt, Real tolerance) const noexcept {
+  [[nodiscard]] constexpr bool allows(const Contacts<N>& felt, Real tolerance) const noexcept {
     return !felt.buried && felt.depth <= std::max(tolerance, here_.depth);
   }
 
   /// A push out of what was felt first led into another wall, or was not seen.
-  [[nodiscard]] static constexpr bool meets_another(const Probe<N>& first,
-                                                    const Probe<N>& pushed) noexcept {
+  [[nodiscard]] static constexpr bool meets_another(const Contacts<N>& first,
+                                                    const Contacts<N>& pushed) noexcept {
     if (first.count == 0 || pushed.count == 0) return true;
     return dot(first.plane[0].normal, pushed.plane[0].normal) < Unit(kFalseCreaseCosine);
   }
 
   /// How to go on from a place.
   struct Route {
-    Slide<N> slide;  ///< under the planes alone
-    Place way;       ///< that friction leaves of it
+    Slide<N> slide;      ///< under the planes alone
+    Place displacement;  ///< that friction leaves of it
     Real length;
   };
 
   /// Coulomb: across the direction that presses the tool sticks while its way is within friction
   /// times the load, and else slides that much less. Towards the planes nothing rubs.
-  [[nodiscard]] constexpr Route route(const PlaneBundle<N>& planes, Place way) const noexcept {
-    const Slide<N> slide = nearest(planes, way);
+  [[nodiscard]] constexpr Route route(const ConstraintSet<N>& planes,
+                                      Place displacement) const noexcept {
+    const Slide<N> slide = nearest(planes, displacement);
     const Place& move = slide.move;
     if (friction_ <= Unit(0) || planes.count == 0) return {slide, move, norm(move)};
-    const Place pressed = move - way;
+    const Place pressed = move - displacement;
     const auto normal = direction_of<N>(pressed);
     const Place closing = times<N>(normal, along<N>(normal, move));
     const Place rubbing = move - closing;
@@ -184,15 +185,15 @@ class ProxySweep {
   /// Looks at a place `moved` from where the depths of `known` count, and where the tool is deeper
   /// there than is allowed pushes it out: twice at most. A turn begins no push in the second half
   /// of the tick.
-  constexpr Trial attempt(Trying what, Place centre, const PlaneBundle<N>& known,
+  constexpr Trial attempt(Trying what, Place centre, const ConstraintSet<N>& known,
                           Place moved) noexcept {
     const bool turns = what == Trying::turn;
     const auto tolerance =
         static_cast<Real>(turns ? SweepRules::kTurnTolerance : SweepRules::kTolerance);
-    const Probe<N> first = look(centre);
-    Trial trial{centre, first, bundle_of(first), first};
+    const Contacts<N> first = look(centre);
+    Trial trial{centre, first, constraints_of(first), first};
     keep(trial.planes, known, moved);
-    const PlaneBundle<N> unpushed = trial.planes;
+    const ConstraintSet<N> unpushed = trial.planes;
     Place pushed{};
     for (int push = 0; push < 2; ++push) {
       if (allows(trial.felt, tolerance) || trial.felt.count == 0 || !may_look()) break;
@@ -203,19 +204,19 @@ class ProxySweep {
       pushed = pushed + nearest(trial.planes, {}).move;
       trial.centre = centre + pushed;
       trial.felt = look(trial.centre);
-      trial.planes = bundle_of(trial.felt);
+      trial.planes = constraints_of(trial.felt);
       keep(trial.planes, known, moved + pushed);
     }
     trial.allowed = allows(trial.felt, tolerance);
     if (!turns && !trial.allowed && allows_rest(first) && meets_another(first, trial.felt)) {
       return {centre, first, unpushed, first, true};
     }
-    keep(trial.planes, bundle_of(first), pushed);
+    keep(trial.planes, constraints_of(first), pushed);
     return trial;
   }
 
   /// Turns towards `goal` while places are found that allow it, and says what the tool feels then.
-  constexpr Probe<N> turn_to(const ToolTurn<N>& goal) noexcept {
+  constexpr Contacts<N> turn_to(const ToolTurn<N>& goal) noexcept {
     if (turn_step_ <= Unit(0)) {
       pose_.turn = goal;
       field_.turn(goal);
@@ -223,7 +224,8 @@ class ProxySweep {
     }
     Unit step = turn_step_;
     bool known = false;
-    while (!(pose_.turn == goal) && probes_ < SweepRules::kMaxTurnProbes && !field_.half_spent()) {
+    while (!(pose_.turn == goal) && queries_ < SweepRules::kMaxTurnQueries &&
+           !field_.half_spent()) {
       const ToolTurn<N> next = turned_towards(pose_.turn, goal, step);
       field_.turn(next);
       const Trial trial = attempt(Trying::turn, pose_.centre, {}, {});
@@ -242,11 +244,11 @@ class ProxySweep {
   }
 
   /// The route from a place whose deepest plane stands first, in a bowl.
-  [[nodiscard]] constexpr Route route(const PlaneBundle<N>& planes, Place way,
-                                      const Bowl<N>& bowl) const noexcept {
-    Route onward = route(planes, way);
-    onward.way = bowl.eased(onward.way, onward.slide.load[0]);
-    onward.length = norm(onward.way);
+  [[nodiscard]] constexpr Route route(const ConstraintSet<N>& planes, Place displacement,
+                                      const CurvatureEstimate<N>& curvature) const noexcept {
+    Route onward = route(planes, displacement);
+    onward.displacement = curvature.eased(onward.displacement, onward.slide.load[0]);
+    onward.length = norm(onward.displacement);
     return onward;
   }
 
@@ -256,7 +258,7 @@ class ProxySweep {
   /// of the last place.
   constexpr Slide<N> move_to(Place goal) noexcept {
     Unit shrink(1);
-    Bowl<N> bowl;
+    CurvatureEstimate<N> curvature;
     Route onward = route(held_by_, goal - pose_.centre);
     // Farther than any way, while the tool has to get out of the solid.
     Real nearest_yet = allows_rest(here_) ? norm(goal - pose_.centre) : Real(4 * kContactLimit);
@@ -267,11 +269,11 @@ class ProxySweep {
       auto step = Real(SweepRules::kStep);
       if (here_.count == 0) step = std::max(step, field_.free_distance(from));
       const Unit capped = step < onward.length ? share<N>(step, onward.length) : Unit(1);
-      const Place moved = part_of<N>(onward.way, shrink * capped);
+      const Place moved = part_of<N>(onward.displacement, shrink * capped);
       const Trial trial = attempt(Trying::move, from + moved, held_by_, moved);
-      bowl.learn(here_, trial.felt, trial.centre - from);
+      curvature.learn(here_, trial.felt, trial.centre - from);
       if (trial.allowed) {
-        const Route next = route(trial.planes, goal - trial.centre, bowl);
+        const Route next = route(trial.planes, goal - trial.centre, curvature);
         const Real distance = norm(goal - trial.centre);
         const bool strays = distance > nearest_yet + Real(SweepRules::kAstray);
         const bool leads = next.length < multiply<Real>(Unit(SweepRules::kResidual), onward.length);
@@ -287,13 +289,13 @@ class ProxySweep {
         }
       }
       const bool learned = learn(held_by_, trial.first, moved);
-      const Route again = route(held_by_, goal - from, bowl);
+      const Route again = route(held_by_, goal - from, curvature);
       if (learned || again.length < multiply<Real>(Unit(SweepRules::kEased), norm(moved))) {
         onward = again;
       } else {
         shrink = shrink * Unit(SweepRules::kShrink);
-        if (probes_ >= SweepRules::kStillProbes && nearest_yet >= closer) break;
-        const bool fine = probes_ <= SweepRules::kFineProbes;
+        if (queries_ >= SweepRules::kStillQueries && nearest_yet >= closer) break;
+        const bool fine = queries_ <= SweepRules::kFineQueries;
         if (shrink < Unit(fine ? SweepRules::kFinest : SweepRules::kShortest)) break;
       }
     }
@@ -304,9 +306,9 @@ class ProxySweep {
   ProxyPose<N>& pose_;
   Unit friction_;
   Unit turn_step_;
-  Probe<N> here_{};
-  PlaneBundle<N> held_by_{};
-  std::int32_t probes_ = 0;
+  Contacts<N> here_{};
+  ConstraintSet<N> held_by_{};
+  std::int32_t queries_ = 0;
 };
 
 }  // namespace kerf

@@ -195,7 +195,7 @@ struct Simd {
 #include "controller/kernel/sets/cover_lanes_vector.hpp"
 #include "controller/kernel/sets/cover_loops.hpp"
 #include "controller/kernel/sets/gather_vector.hpp"
-#include "controller/kernel/sets/shell_vector.hpp"
+#include "controller/kernel/sets/point_vector.hpp"
 #include "controller/kernel/sets/splat_loops.hpp"
 
 namespace kerf {
@@ -216,9 +216,9 @@ const KernelSet kAvx2Set{"avx2",
                          weigh_row,
                          weigh_again,
                          take_steps,
-                         place_shell_samples,
-                         sum_shell_samples,
-                         read_shell_samples,
+                         place_point_samples,
+                         sum_point_samples,
+                         read_point_samples,
                          sum_close_samples};
 
 }  // namespace kerf

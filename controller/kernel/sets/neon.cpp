@@ -99,7 +99,7 @@ struct Simd {
 #include "controller/kernel/sets/cover_lanes.hpp"
 #include "controller/kernel/sets/cover_loops.hpp"
 #include "controller/kernel/sets/gather_loops.hpp"
-#include "controller/kernel/sets/shell_loops.hpp"
+#include "controller/kernel/sets/point_loops.hpp"
 #include "controller/kernel/sets/splat_loops.hpp"
 
 namespace kerf {
@@ -120,9 +120,9 @@ const KernelSet kNeonSet{"neon",
                          weigh_row,
                          weigh_again,
                          take_steps,
-                         place_shell_samples,
-                         sum_shell_samples,
-                         read_shell_samples,
+                         place_point_samples,
+                         sum_point_samples,
+                         read_point_samples,
                          sum_close_samples};
 
 }  // namespace kerf

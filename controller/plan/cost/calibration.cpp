@@ -23,8 +23,8 @@
 namespace kerf {
 namespace {
 
-std::string key_of(const std::string& way, const StageCost& stage) {
-  return way + "/" + stage.stage;
+std::string key_of(const std::string& variant, const StageCost& stage) {
+  return variant + "/" + stage.stage;
 }
 
 /// A solid block and tools of several sizes, of every plan that `numeric` has with these models.
@@ -75,8 +75,8 @@ Calibration stored_calibration(const std::filesystem::path& path, const SceneCos
   }
   for (const TickCost& tick : costs.ticks) {
     for (const StageCost& stage : tick.cost.stages) {
-      if (calibration.stage_us(tick.cost.way, stage)) continue;
-      throw std::runtime_error("has no price for " + key_of(tick.cost.way, stage));
+      if (calibration.stage_us(tick.cost.variant, stage)) continue;
+      throw std::runtime_error("has no price for " + key_of(tick.cost.variant, stage));
     }
   }
   return calibration;
@@ -103,8 +103,9 @@ void store_calibration(const std::filesystem::path& path, const Calibration& cal
 
 }  // namespace
 
-std::optional<double> Calibration::stage_us(const std::string& way, const StageCost& stage) const {
-  const auto price = price_ns.find(key_of(way, stage));
+std::optional<double> Calibration::stage_us(const std::string& variant,
+                                            const StageCost& stage) const {
+  const auto price = price_ns.find(key_of(variant, stage));
   if (price == price_ns.end()) return std::nullopt;
   return static_cast<double>(stage.operations) * price->second / 1000;
 }
@@ -135,7 +136,7 @@ Calibration measure_calibration() {
       const std::vector<StageTime> timed = servo->time_stages(i);
       for (std::size_t s = 0; s < timed.size(); ++s) {
         // The clock may be coarser than a stage: a price is positive.
-        prices[key_of(ticks[i].cost.way, ticks[i].cost.stages[s])].push_back(
+        prices[key_of(ticks[i].cost.variant, ticks[i].cost.stages[s])].push_back(
             std::max(timed[s].us * 1000 / static_cast<double>(timed[s].operations), 1e-6));
       }
     }

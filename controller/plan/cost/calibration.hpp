@@ -17,7 +17,7 @@ struct Calibration {
   std::map<std::string, double> price_ns;  ///< by "way/stage": "aligned/avx512/copy"
 
   /// Predicted us of a stage of the plan `way`; nothing where a price is missing.
-  [[nodiscard]] std::optional<double> stage_us(const std::string& way,
+  [[nodiscard]] std::optional<double> stage_us(const std::string& variant,
                                                const StageCost& stage) const;
 };
 

@@ -78,7 +78,7 @@ std::string memory_line(const std::string& name, std::uint64_t bytes) {
 
 std::string tick_text(const ExplainedTick& tick) {
   std::string text =
-      "\n" + tick.tool + " in " + tick.volume + ": " + tick.way + " (" + tick.why + ")\n";
+      "\n" + tick.tool + " in " + tick.volume + ": " + tick.variant + " (" + tick.why + ")\n";
   for (const ExplainedStage& stage : tick.stages) text += stage_line(stage);
   return text + stage_line(sum_of(tick));
 }
@@ -122,31 +122,33 @@ std::vector<ArrayBytes> segment_arrays(const SegmentPlan& plan, const LoadedScen
 Explanation explain(const LoadedScene& scene, CompiledScene& servo, const SegmentPlan& segment,
                     const Calibration& calibration) {
   const SceneCosts& costs = servo.costs();
-  Explanation told{.scene = scene.path,
-                   .numeric = std::string(word_of(scene.servo.numeric)),
-                   .cut = std::string(word_of(scene.cut.model)),
-                   .machine = calibration.machine,
-                   .rate_hz = scene.servo.rate_hz,
-                   .budget_us = work_budget_us(scene),
-                   .ticks = {},
-                   .arrays = costs.arrays};
-  for (ArrayBytes& array : segment_arrays(segment, scene)) told.arrays.push_back(std::move(array));
+  Explanation explanation{.scene = scene.path,
+                          .numeric = std::string(word_of(scene.servo.numeric)),
+                          .cut = std::string(word_of(scene.cut.model)),
+                          .machine = calibration.machine,
+                          .rate_hz = scene.servo.rate_hz,
+                          .budget_us = work_budget_us(scene),
+                          .ticks = {},
+                          .arrays = costs.arrays};
+  for (ArrayBytes& array : segment_arrays(segment, scene))
+    explanation.arrays.push_back(std::move(array));
   for (std::size_t i = 0; i < costs.ticks.size(); ++i) {
     const TickCost& tick = costs.ticks[i];
-    ExplainedTick& out = told.ticks.emplace_back();
+    ExplainedTick& out = explanation.ticks.emplace_back();
     out.tool = scene.tools[tick.tool].name;
     out.volume = scene.volumes[tick.volume].name;
-    out.way = tick.cost.way;
+    out.variant = tick.cost.variant;
     out.why = tick.choice.why;
     const std::vector<StageTime> timed = servo.time_stages(i);
     for (std::size_t s = 0; s < timed.size(); ++s) {
       const StageCost& stage = tick.cost.stages[s];
-      out.stages.push_back({stage, work_us(tick.cost, stage), timed[s].operations,
-                            calibration.stage_us(tick.cost.way, {stage.stage, timed[s].operations}),
-                            timed[s].us});
+      out.stages.push_back(
+          {stage, work_us(tick.cost, stage), timed[s].operations,
+           calibration.stage_us(tick.cost.variant, {stage.stage, timed[s].operations}),
+           timed[s].us});
     }
   }
-  return told;
+  return explanation;
 }
 
 std::string explanation_text(const Explanation& e) {
@@ -182,7 +184,7 @@ std::string explanation_json(const Explanation& e) {
     const ExplainedStage sum = sum_of(tick);
     ticks.push_back({{"tool", tick.tool},
                      {"volume", tick.volume},
-                     {"plan", tick.way},
+                     {"plan", tick.variant},
                      {"why", tick.why},
                      {"operations", sum.cost.operations},
                      {"work_us", sum.work_us},

@@ -27,7 +27,7 @@ struct ExplainedStage {
 
 /// One tool in one volume.
 struct ExplainedTick {
-  std::string tool, volume, way, why;
+  std::string tool, volume, variant, why;
   std::vector<ExplainedStage> stages;
 };
 

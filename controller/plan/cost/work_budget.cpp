@@ -13,7 +13,7 @@ namespace kerf {
 namespace {
 
 struct Price {
-  std::string_view way, stage;
+  std::string_view variant, stage;
   double ns;
 };
 
@@ -118,16 +118,18 @@ std::string us_text(double us) {
 
 }  // namespace
 
-double reference_price_ns(std::string_view way, std::string_view stage) {
+double reference_price_ns(std::string_view variant, std::string_view stage) {
   const auto* const price = std::find_if(kPrices.begin(), kPrices.end(), [&](const Price& p) {
-    return p.stage == stage && (p.way == way || p.way == way.substr(way.find('/') + 1));
+    return p.stage == stage &&
+           (p.variant == variant || p.variant == variant.substr(variant.find('/') + 1));
   });
   if (price != kPrices.end()) return price->ns;
-  throw std::logic_error("no price for " + std::string(way) + " " + std::string(stage));
+  throw std::logic_error("no price for " + std::string(variant) + " " + std::string(stage));
 }
 
 double work_us(const PlanCost& cost, const StageCost& stage) {
-  return static_cast<double>(stage.operations) * reference_price_ns(cost.way, stage.stage) / 1000;
+  return static_cast<double>(stage.operations) * reference_price_ns(cost.variant, stage.stage) /
+         1000;
 }
 
 double work_us(const PlanCost& cost) {
@@ -169,7 +171,7 @@ std::string over_budget(const LoadedScene& scene, const SceneCosts& costs) {
   for (const TickCost& tick : costs.ticks) {
     if (tick.tool != tool) continue;
     parts += ", in " + scene.volumes[tick.volume].name + " " + us_text(work_us(tick.cost)) +
-             " by plan " + tick.cost.way + " (" + tick.choice.why + ")";
+             " by plan " + tick.cost.variant + " (" + tick.choice.why + ")";
     may_align = may_align || tick.choice.plan == Plan::splat || tick.choice.plan == Plan::gather;
     for (const StageCost& stage : tick.cost.stages) {
       const double us = work_us(tick.cost, stage);

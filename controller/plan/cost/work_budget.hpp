@@ -20,7 +20,7 @@ namespace kerf {
 ///
 /// `probes` are priced by the costliest ticks that `kerf lab extremes` finds, of tools of 500 to
 /// 1100 samples, and by probes inside of the solid, as `time_stages` has them.
-[[nodiscard]] double reference_price_ns(std::string_view way, std::string_view stage);
+[[nodiscard]] double reference_price_ns(std::string_view variant, std::string_view stage);
 
 /// Half of a tick: a machine half as fast as the reference still ends its ticks in time, and on the
 /// reference the other half is there for the device, the eyes and what else runs on the core.

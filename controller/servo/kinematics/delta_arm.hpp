@@ -136,10 +136,11 @@ template <class N>
   pose.tip_mm = {grip.x, grip.y, grip.z - arm.origin_depth_mm};
   for (std::size_t i = 0; i < 3; ++i) {
     const Unit out = arm.azimuth[i].cosine * legs[i].rod.x + arm.azimuth[i].sine * legs[i].rod.y;
-    const Unit along_way = crank[i].cosine * legs[i].rod.z - crank[i].sine * out;
-    const Real arm_mm = multiply<Real>(along_way, arm.crank_mm);
-    pose.lever_mm.row[i] = {multiply<Real>(dual[i].x, arm_mm), multiply<Real>(dual[i].y, arm_mm),
-                            multiply<Real>(dual[i].z, arm_mm)};
+    const Unit along_motion = crank[i].cosine * legs[i].rod.z - crank[i].sine * out;
+    const Real arm_mm = multiply<Real>(along_motion, arm.crank_mm);
+    pose.jacobian_t_mm.row[i] = {multiply<Real>(dual[i].x, arm_mm),
+                                 multiply<Real>(dual[i].y, arm_mm),
+                                 multiply<Real>(dual[i].z, arm_mm)};
   }
   return pose;
 }

@@ -47,7 +47,7 @@ template <class N>
   pose.tip_mm = {-multiply<Real>(turret.sine, reach),
                  thigh_up - forearm_down + arm.origin_height_mm,
                  multiply<Real>(turret.cosine, reach) - arm.origin_depth_mm};
-  pose.lever_mm.row = {
+  pose.jacobian_t_mm.row = {
       {{-multiply<Real>(turret.cosine, reach), Real(0), -multiply<Real>(turret.sine, reach)},
        {multiply<Real>(turret.sine, thigh_up), thigh_out, -multiply<Real>(turret.cosine, thigh_up)},
        {-multiply<Real>(turret.sine, forearm_down), forearm_out,

@@ -89,10 +89,10 @@ std::optional<FuseAnswer> HidrawNode::ioctl(FuseOpen id, const FuseIoctl& call) 
   const auto descriptor = arm_.report_descriptor();
   if (call.command == HIDIOCGRDESCSIZE) return say(static_cast<std::int32_t>(descriptor.size()));
   if (call.command == HIDIOCGRDESC) {
-    hidraw_report_descriptor told{};
-    told.size = static_cast<std::uint32_t>(descriptor.size());
-    std::ranges::copy(descriptor, told.value);
-    return say(told);
+    hidraw_report_descriptor answer{};
+    answer.size = static_cast<std::uint32_t>(descriptor.size());
+    std::ranges::copy(descriptor, answer.value);
+    return say(answer);
   }
   if (call.command == HIDIOCGRAWINFO) {
     return say(hidraw_devinfo{BUS_USB, static_cast<std::int16_t>(arm_.vendor_id()),

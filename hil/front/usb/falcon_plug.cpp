@@ -20,8 +20,8 @@ void FalconPlug::catch_up(UsbHost& host) {
                    host.complete_read(packet.size() <= room ? 0 : -EOVERFLOW, part);
                  });
   script_.run(chip_.time().cycle(), [&](UsbFault fault) { strike(fault, host); });
-  if (halt_ == Halt::untold && present_ && host.room()) {
-    halt_ = Halt::told;
+  if (halt_ == Halt::unreported && present_ && host.room()) {
+    halt_ = Halt::reported;
     host.complete_read(-EPIPE, {});
   }
 }
@@ -41,7 +41,7 @@ bool FalconPlug::clear_halt(unsigned endpoint) noexcept {
 void FalconPlug::strike(UsbFault fault, UsbHost& host) {
   switch (fault) {
     case UsbFault::stall:
-      if (halt_ == Halt::none) halt_ = Halt::untold;
+      if (halt_ == Halt::none) halt_ = Halt::unreported;
       return;
     case UsbFault::split:
       return chip_.slow_down(kUsbFaultFrames);

@@ -49,7 +49,7 @@ class FalconPlug {
 
  private:
   /// Of the endpoint that is read: the first read that meets it ends with -EPIPE, later ones wait.
-  enum class Halt { none, untold, told };
+  enum class Halt { none, unreported, reported };
   void strike(UsbFault fault, UsbHost& host);
 
   FtdiFalcon chip_;

@@ -129,7 +129,7 @@ class EchoDevice final : public kerf::PacketDevice {
 
 constexpr std::int64_t kLateNs = 5'000'000;     // of an answer: worth a line
 constexpr std::int64_t kGiveUpNs = 20'000'000;  // and then it is waited for no more
-constexpr int kTold = 12;
+constexpr int kMaxListed = 12;
 
 /// By tick; 0: never.
 using Times = std::vector<std::int64_t>;
@@ -152,7 +152,7 @@ int lost_by_us(const Times& sent_ns, const Times& got_ns, const EchoDevice<Wire>
     if (!is_lost && got_ns[i] - sent_ns[i] < kLateNs) continue;
     const std::int64_t to_ns = is_lost ? sent_ns[i] + kGiveUpNs : got_ns[i];
     if (is_lost && !seen.machine.core_was_taken(sent_ns[i], to_ns)) ++ours;
-    if (++late > kTold) continue;
+    if (++late > kMaxListed) continue;
     const auto after = [&](std::int64_t at_ns) {
       return at_ns == 0 ? "never" : std::to_string((at_ns - sent_ns[i]) / 1'000'000);
     };

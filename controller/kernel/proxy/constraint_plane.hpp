@@ -16,23 +16,24 @@ inline constexpr std::size_t kMaxPlanes = 3;
 /// What one contact asks of a tool whose centre is at q: it may move to x where
 /// normal . (x - q) >= depth.
 template <class N>
-struct Plane {
+struct ConstraintPlane {
   ContactVec<typename N::Unit> normal{};  ///< out of the solid, length 1
   typename N::Real depth{};               ///< units; above 0: the tool is in too deep
   ContactVec<typename N::Real> arm{};     ///< from the tool's centre to the contact, units
 
-  friend constexpr bool operator==(const Plane&, const Plane&) noexcept = default;
+  friend constexpr bool operator==(const ConstraintPlane&,
+                                   const ConstraintPlane&) noexcept = default;
 };
 
 /// What the tool feels at one place: `count` planes, the deepest first.
 template <class N>
-struct Probe {
+struct Contacts {
   typename N::Real depth{-1};  ///< the largest of the planes' depths; -1 where nothing is near
   std::int32_t count = 0;
-  std::array<Plane<N>, kMaxPlanes> plane{};
+  std::array<ConstraintPlane<N>, kMaxPlanes> plane{};
   bool buried = false;  ///< full density all round: no slope, no normal, no plane
 
-  friend constexpr bool operator==(const Probe&, const Probe&) noexcept = default;
+  friend constexpr bool operator==(const Contacts&, const Contacts&) noexcept = default;
 };
 
 }  // namespace kerf

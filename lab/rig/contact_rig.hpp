@@ -7,10 +7,10 @@
 #include <optional>
 #include <vector>
 
+#include "controller/kernel/proxy/contact_query.hpp"
 #include "controller/kernel/proxy/proxy_sweep.hpp"
-#include "controller/kernel/proxy/shell_probe.hpp"
 #include "controller/plan/free_brick_map.hpp"
-#include "controller/plan/shell_tool.hpp"
+#include "controller/plan/tool_points.hpp"
 #include "controller/tool/surface_samples.hpp"
 #include "controller/tool/tool_shapes.hpp"
 #include "lab/rig/body.hpp"
@@ -43,18 +43,18 @@ template <class N>
   return frame;
 }
 
-/// One tool among bodies, felt by the servo's own probe; unless said on the fastest kernels of this
+/// One tool among bodies, felt by the servo's own query; unless said on the fastest kernels of this
 /// machine. The bodies stay the caller's.
 template <class N>
-class ShellRig {
+class ContactRig {
  public:
-  explicit ShellRig(const SampledTool& tool, const KernelSet& kernels = **kernel_sets())
+  explicit ContactRig(const SampledTool& tool, const KernelSet& kernels = **kernel_sets())
       : kernels_(kernels), tool_(tool.samples, tool.round, tool.close), shell_(tool_.shell()) {}
-  ShellRig(const SampledTool& tool, const Body& body) : ShellRig(tool) {
+  ContactRig(const SampledTool& tool, const Body& body) : ContactRig(tool) {
     add(body, plain_frame<N>());
   }
-  ShellRig(const ShellRig&) = delete;
-  ShellRig& operator=(const ShellRig&) = delete;
+  ContactRig(const ContactRig&) = delete;
+  ContactRig& operator=(const ContactRig&) = delete;
 
   void add(const Body& body, const ContactFrame<N>& frame, Density iso = kIso) {
     constexpr Density kFeltShare = 8;  // what is fainter than this part of the iso is not felt
@@ -63,13 +63,13 @@ class ShellRig {
     volumes_.push_back({{body.grid, body.density.data(), density_scale(iso), maps_.back().bricks()},
                         frame,
                         memories_.back().places()});
-    probe_.emplace(kernels_, shell_, volumes_);
-    probe_->turn({});
+    query_.emplace(kernels_, shell_, volumes_);
+    query_->turn({});
   }
 
   /// What a sweep asks.
-  [[nodiscard]] ShellProbe<N>& field() { return *probe_; }
-  [[nodiscard]] const ShellProbe<N>& field() const { return *probe_; }
+  [[nodiscard]] ContactQuery<N>& field() { return *query_; }
+  [[nodiscard]] const ContactQuery<N>& field() const { return *query_; }
   /// Half the sine of a turn that a sweep may make at once: see `turn_step_of`.
   [[nodiscard]] typename N::Unit turn_step() const {
     const double reach = std::max(1.0, static_cast<double>(shell_.reach));
@@ -78,12 +78,12 @@ class ShellRig {
 
  private:
   const KernelSet& kernels_;
-  ShellTool<N> tool_;
-  Shell<N> shell_;
+  ToolPoints<N> tool_;
+  PointShell<N> shell_;
   std::deque<FreeBrickMap> maps_;
-  std::deque<ShellMemory<N>> memories_;
-  std::vector<ShellVolume<N>> volumes_;
-  std::optional<ShellProbe<N>> probe_;
+  std::deque<PlaceMemory<N>> memories_;
+  std::vector<ContactVolume<N>> volumes_;
+  std::optional<ContactQuery<N>> query_;
 };
 
 }  // namespace kerf::extremes

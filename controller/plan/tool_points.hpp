@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "controller/kernel/proxy/shell_probe.hpp"
+#include "controller/kernel/proxy/contact_query.hpp"
 #include "controller/plan/close_cells.hpp"
 
 namespace kerf {
@@ -15,15 +15,15 @@ namespace kerf {
 /// Owner of one tool's surface samples for the swept contact. Load time; moving it keeps the shell
 /// valid. In FixedNumbers, FloatNumbers and DoubleNumbers.
 template <class N>
-class ShellTool {
+class ToolPoints {
  public:
   /// `samples_units`: from the tool's centre, in contact units; they are sorted into groups that
   /// lie together. `round`: they are those of a ball. `close_units`: the close samples of another
   /// shape; without them there is no closer look at its contacts.
-  ShellTool(std::span<const std::array<double, 3>> samples_units, bool round,
-            std::span<const std::array<double, 3>> close_units = {});
+  ToolPoints(std::span<const std::array<double, 3>> samples_units, bool round,
+             std::span<const std::array<double, 3>> close_units = {});
 
-  [[nodiscard]] Shell<N> shell() const noexcept;
+  [[nodiscard]] PointShell<N> shell() const noexcept;
   [[nodiscard]] std::size_t bytes() const noexcept;
 
  private:
@@ -31,7 +31,7 @@ class ShellTool {
   /// more when it is turned.
   [[nodiscard]] double rounding() const noexcept { return 4 * reach_ / 32768 + 0.001; }
 
-  std::array<std::vector<ShellNumber<N>>, 3> lever_, middle_;
+  std::array<std::vector<PointNumber<N>>, 3> offset_, middle_;
   std::vector<std::uint8_t> bricks_;
   std::size_t count_;
   double reach_;
@@ -41,15 +41,15 @@ class ShellTool {
 
 /// Memory for the places of the widest of several tools in one volume.
 template <class N>
-class ShellMemory {
+class PlaceMemory {
  public:
-  void hold(const Shell<N>& shell);
+  void hold(const PointShell<N>& shell);
 
-  [[nodiscard]] ShellPlaces<N> places() noexcept;
+  [[nodiscard]] PointPlaces<N> places() noexcept;
   [[nodiscard]] std::size_t bytes() const noexcept;
 
  private:
-  std::array<std::vector<ShellNumber<N>>, 3> offset_, middle_;
+  std::array<std::vector<PointNumber<N>>, 3> offset_vox_, middle_;
 };
 
 }  // namespace kerf

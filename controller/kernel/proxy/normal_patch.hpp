@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <cstddef>
 
+#include "controller/kernel/proxy/contact_peak.hpp"
 #include "controller/kernel/proxy/contact_space.hpp"
-#include "controller/kernel/proxy/shell_peak.hpp"
-#include "controller/kernel/proxy/shell_spiral.hpp"
+#include "controller/kernel/proxy/spiral_points.hpp"
 #include "controller/kernel/proxy/tool_turn.hpp"
 #include "shared/numeric/fixed.hpp"
 
@@ -21,7 +21,7 @@ namespace kerf {
 /// it without a jump. A radius of 2 units reaches too far over curved faces (0.8 degrees off on a
 /// bump of 40 instead of 0.65); 32 samples are as good on it, but the force steps by 2.2 % of its
 /// mean instead of 1.8.
-inline constexpr std::size_t kPatchSamples = 4 * kShellGroup;
+inline constexpr std::size_t kPatchSamples = 4 * kPointGroup;
 inline constexpr double kPatchRadius = 1.5;
 
 /// Where the tool touches two faces that look different ways, as the walls of a slot, the mean
@@ -55,7 +55,7 @@ template <class N>
 /// 1 where few of a tool's own samples touch, 0 from kWide on. Each counts by its weight over that
 /// of the highest.
 template <class N>
-[[nodiscard]] constexpr typename N::Unit narrowness(const ShellSums<N>& sums,
+[[nodiscard]] constexpr typename N::Unit narrowness(const PointSums<N>& sums,
                                                     typename N::Ratio top) noexcept {
   using Unit = typename N::Unit;
   using Ratio = typename N::Ratio;

@@ -5,24 +5,24 @@
 #include <cstdint>
 
 #include "controller/kernel/point_shell/close_sums.hpp"
-#include "controller/kernel/point_shell/shell_sums.hpp"
-#include "controller/kernel/sets/shell_places.hpp"
+#include "controller/kernel/point_shell/point_sums.hpp"
+#include "controller/kernel/sets/point_places.hpp"
 
-// Sums of a shell for AVX2 and AVX-512, in the bits of shell_sums.hpp; `Simd` as in box_vector.hpp.
+// Sums of a shell for AVX2 and AVX-512, in the bits of point_sums.hpp; `Simd` as in box_vector.hpp.
 // A sample is a 32-bit entry; where densities meet, its halves are the voxels x and x + 1.
 
 namespace kerf {
 namespace {
 
-constexpr std::int32_t kShellLanes = kLanes / 2;
+constexpr std::int32_t kPointLanes = kLanes / 2;
 constexpr int kSampleBits = 13;
-static_assert(kMaxShellSamples == 1 << kSampleBits);
+static_assert(kMaxShellPoints == 1 << kSampleBits);
 
 /// 64-bit sums of products of 32-bit entries, even and odd ones together.
-struct ShellWeights {
+struct PointWeights {
   V even, odd;
 
-  explicit ShellWeights(V weight) noexcept : even(weight), odd(Simd::odd32(weight)) {}
+  explicit PointWeights(V weight) noexcept : even(weight), odd(Simd::odd32(weight)) {}
   [[gnu::always_inline]] void count(V& sum) const noexcept {
     sum = Simd::add64(Simd::add64(sum, Simd::low32(even)), odd);
   }
@@ -32,22 +32,22 @@ struct ShellWeights {
   }
 };
 
-struct ShellVectors {
+struct PointVectors {
   V weight = Simd::zero(), density = Simd::zero(), square = Simd::zero();
-  V rise[3] = {Simd::zero(), Simd::zero(), Simd::zero()};
-  V lever[3] = {Simd::zero(), Simd::zero(), Simd::zero()};
-  V high = Simd::zero(), high_lever[3] = {Simd::zero(), Simd::zero(), Simd::zero()};
+  V gradient[3] = {Simd::zero(), Simd::zero(), Simd::zero()};
+  V offset[3] = {Simd::zero(), Simd::zero(), Simd::zero()};
+  V high = Simd::zero(), high_offset[3] = {Simd::zero(), Simd::zero(), Simd::zero()};
   V top = Simd::zero();  ///< r 2^kSampleBits + sample
   V solid = Simd::zero();
-  V full_lever[3] = {Simd::zero(), Simd::zero(), Simd::zero()};  ///< of vectors of full density
-  std::int32_t full = 0;                                         ///< samples in such vectors
+  V full_offset[3] = {Simd::zero(), Simd::zero(), Simd::zero()};  ///< of vectors of full density
+  std::int32_t full = 0;                                          ///< samples in such vectors
   std::int32_t read = 0;
 };
 
-/// One sample of full density whose lever is (1, 0, 0).
+/// One sample of full density whose offset is (1, 0, 0).
 template <bool kRound>
-inline constexpr ShellSums<FixedNumbers> kFullSample = [] {
-  ShellSums<FixedNumbers> sums;
+inline constexpr PointSums<FixedNumbers> kFullSample = [] {
+  PointSums<FixedNumbers> sums;
   add_sample<FixedNumbers>(sums, 0, {32767, {}}, {1, 0, 0}, kRound);
   return sums;
 }();
@@ -63,38 +63,39 @@ inline constexpr ShellSums<FixedNumbers> kFullSample = [] {
 }
 
 /// Where the cells of some samples are.
-struct ShellCells {
-  alignas(64) std::uint32_t voxel[kShellLanes];  ///< index of the low corner, 0 outside
+struct PointCells {
+  alignas(64) std::uint32_t voxel[kPointLanes];  ///< index of the low corner, 0 outside
   V inside;   ///< all ones inside; not set where all are known to be
   V x, y, z;  ///< how far in: weights of `blend_halves`, then twice 16 bits
 };
 
 /// Vectors of samples that take each step together. A sample's steps wait for each other, some 150
 /// cycles in all, and no core looks far enough ahead to begin the next one meanwhile.
-struct ShellBlock {
+struct PointBlock {
   static constexpr std::int32_t kMost = 16;
 
   std::int32_t count = 0;
   std::int32_t first[kMost];  ///< sample of each vector
-  ShellCells cell[kMost];
+  PointCells cell[kMost];
   V corner[kMost][4];
 };
 
 /// `kInside`: all are known to be in the volume.
 template <bool kInside>
-[[gnu::always_inline]] inline ShellCells shell_cells(const ShellPlaces<FixedNumbers>& places,
+[[gnu::always_inline]] inline PointCells point_cells(const PointPlaces<FixedNumbers>& places,
                                                      const std::int32_t (&centre)[3],
                                                      const VoxelGrid& grid,
                                                      std::int32_t first) noexcept {
   V low[3], in[3];
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    const V at = Simd::add32(Simd::load(places.offset[axis] + first), Simd::set32(centre[axis]));
+    const V at =
+        Simd::add32(Simd::load(places.offset_vox[axis] + first), Simd::set32(centre[axis]));
     low[axis] = Simd::sra32<16>(at);
     in[axis] = Simd::srl32<1>(Simd::bit_and(at, Simd::set32(0xffff)));
   }
   const V row = Simd::add32(low[1], Simd::multiply32(low[2], Simd::set32(grid.ny)));
   V voxel = Simd::add32(low[0], Simd::multiply32(row, Simd::set32(grid.nx)));
-  ShellCells cells;
+  PointCells cells;
   cells.x = Simd::sub32(Simd::bit_or(in[0], Simd::set32(0x8000)), Simd::sll32<16>(in[0]));
   cells.y = Simd::bit_or(in[1], Simd::sll32<16>(in[1]));
   cells.z = Simd::bit_or(in[2], Simd::sll32<16>(in[2]));
@@ -112,7 +113,7 @@ template <bool kInside>
 }
 
 /// Densities over 2 at (y, z), (y + 1, z), (y, z + 1), (y + 1, z + 1) of each cell.
-[[gnu::always_inline]] inline void read_corners(const ShellField& field, const ShellCells& cell,
+[[gnu::always_inline]] inline void read_corners(const DensityField& field, const PointCells& cell,
                                                 V (&corner)[4]) noexcept {
   const std::ptrdiff_t row = field.grid.nx, plane = row * field.grid.ny;
   const auto read = [&](std::ptrdiff_t offset) {
@@ -126,7 +127,7 @@ template <bool kInside>
 
 /// The density of contact, not clipped, from both halves of the cell along x.
 template <bool kInside>
-[[gnu::always_inline]] inline V scaled_density(V at, const ShellCells& cell,
+[[gnu::always_inline]] inline V scaled_density(V at, const PointCells& cell,
                                                const DensityScale& scale) noexcept {
   V read = blend_halves(at, cell.x);
   if constexpr (!kInside) read = Simd::bit_and(read, cell.inside);
@@ -134,12 +135,12 @@ template <bool kInside>
                      scale.shift);
 }
 
-/// `shell_sample` and `add_sample` of kShellLanes samples.
+/// `point_sample` and `add_sample` of kPointLanes samples.
 template <bool kRound, bool kInside>
-[[gnu::always_inline]] inline void add_samples(const ShellTable<FixedNumbers>& table,
+[[gnu::always_inline]] inline void add_samples(const PointTable<FixedNumbers>& table,
                                                const DensityScale& scale, std::int32_t first,
-                                               const ShellCells& cell, const V (&corner)[4],
-                                               ShellVectors& sums) noexcept {
+                                               const PointCells& cell, const V (&corner)[4],
+                                               PointVectors& sums) noexcept {
   const V c00 = corner[0], c10 = corner[1], c01 = corner[2], c11 = corner[3];
   const V near_z = blend16(c00, c10, cell.y), far_z = blend16(c01, c11, cell.y);
   const V at = blend16(near_z, far_z, cell.z);
@@ -150,10 +151,10 @@ template <bool kRound, bool kInside>
   if (!Simd::any(open)) {  // deep inside
     sums.top = Simd::max32(sums.top, Simd::bit_or(Simd::set32(32767 << kSampleBits), sample));
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      sums.full_lever[axis] =
-          Simd::add32(sums.full_lever[axis], Simd::load(table.lever[axis] + first));
+      sums.full_offset[axis] =
+          Simd::add32(sums.full_offset[axis], Simd::load(table.offset[axis] + first));
     }
-    sums.full += kShellLanes;
+    sums.full += kPointLanes;
     return;
   }
   const V strong = Simd::sra32<31>(Simd::sub32(Simd::set32(2047), scaled));
@@ -167,7 +168,7 @@ template <bool kRound, bool kInside>
     w = Simd::multiply32(Simd::srl32<16>(Simd::add32(r4, Simd::set32(1 << 15))), r2);
   }
   w = Simd::srl32<8>(w);
-  const ShellWeights weights(w);
+  const PointWeights weights(w);
   weights.count(sums.weight);
   weights.add(sums.density, r);
   if constexpr (!kRound) weights.add(sums.square, r2);
@@ -176,15 +177,15 @@ template <bool kRound, bool kInside>
     r3 = Simd::srl32<6>(Simd::multiply_pairs(Simd::srl32<1>(r2), r));
     lift = Simd::srl32<8>(Simd::multiply32(Simd::srl32<8>(r3), r2));
   }
-  const ShellWeights lifts(lift);
+  const PointWeights lifts(lift);
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    lifts.add(sums.lever[axis], Simd::load(table.lever[axis] + first));
+    lifts.add(sums.offset[axis], Simd::load(table.offset[axis] + first));
   }
   if constexpr (!kRound) {
-    const ShellWeights highs(Simd::srl32<8>(Simd::multiply32(Simd::srl32<8>(w), r2)));
+    const PointWeights highs(Simd::srl32<8>(Simd::multiply32(Simd::srl32<8>(w), r2)));
     highs.count(sums.high);
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      highs.add(sums.high_lever[axis], Simd::load(table.lever[axis] + first));
+      highs.add(sums.high_offset[axis], Simd::load(table.offset[axis] + first));
     }
   }
   const V marked = Simd::bit_or(Simd::sll32<kSampleBits>(r), Simd::bit_and(sample, strong));
@@ -199,18 +200,18 @@ template <bool kRound, bool kInside>
   const V slope[3] = {Simd::multiply_pairs(at, Simd::pair16(-1, 1)),
                       blend_halves(Simd::sub16(far_y, near_y), cell.x),
                       blend_halves(Simd::sub16(far_z, near_z), cell.x)};
-  const ShellWeights pulls(v);
-  for (std::size_t axis = 0; axis < 3; ++axis) pulls.add(sums.rise[axis], slope[axis]);
+  const PointWeights pulls(v);
+  for (std::size_t axis = 0; axis < 3; ++axis) pulls.add(sums.gradient[axis], slope[axis]);
 }
 
 template <bool kRound, bool kInside>
-[[gnu::always_inline]] inline void add_block(const ShellTable<FixedNumbers>& table,
-                                             const ShellPlaces<FixedNumbers>& places,
+[[gnu::always_inline]] inline void add_block(const PointTable<FixedNumbers>& table,
+                                             const PointPlaces<FixedNumbers>& places,
                                              const std::int32_t (&centre)[3],
-                                             const ShellField& field, ShellBlock& block,
-                                             ShellVectors& sums) noexcept {
+                                             const DensityField& field, PointBlock& block,
+                                             PointVectors& sums) noexcept {
   for (std::int32_t k = 0; k < block.count; ++k) {
-    block.cell[k] = shell_cells<kInside>(places, centre, field.grid, block.first[k]);
+    block.cell[k] = point_cells<kInside>(places, centre, field.grid, block.first[k]);
   }
   for (std::int32_t k = 0; k < block.count; ++k) {
     read_corners(field, block.cell[k], block.corner[k]);
@@ -224,23 +225,23 @@ template <bool kRound, bool kInside>
 
 /// Groups from `group` to `end`, but those in free space.
 template <bool kRound, bool kInside>
-[[gnu::always_inline]] inline void add_groups(const ShellTable<FixedNumbers>& table,
-                                              const ShellPlaces<FixedNumbers>& places,
+[[gnu::always_inline]] inline void add_groups(const PointTable<FixedNumbers>& table,
+                                              const PointPlaces<FixedNumbers>& places,
                                               const std::int32_t (&centre)[3],
-                                              const ShellField& field, std::int32_t group,
-                                              std::int32_t end, ShellVectors& sums) noexcept {
-  ShellBlock block;
+                                              const DensityField& field, std::int32_t group,
+                                              std::int32_t end, PointVectors& sums) noexcept {
+  PointBlock block;
   for (; group < end; ++group) {
     if (field.free.at((centre[0] + places.middle[0][group]) >> 16,
                       (centre[1] + places.middle[1][group]) >> 16,
                       (centre[2] + places.middle[2][group]) >> 16) >= table.bricks[group]) {
       continue;
     }
-    sums.read += kShellGroup;
-    for (std::int32_t i = 0; i < kShellGroup; i += kShellLanes) {
-      block.first[block.count++] = group * kShellGroup + i;
+    sums.read += kPointGroup;
+    for (std::int32_t i = 0; i < kPointGroup; i += kPointLanes) {
+      block.first[block.count++] = group * kPointGroup + i;
     }
-    if (block.count == ShellBlock::kMost) {
+    if (block.count == PointBlock::kMost) {
       add_block<kRound, kInside>(table, places, centre, field, block, sums);
     }
   }
@@ -249,7 +250,7 @@ template <bool kRound, bool kInside>
 
 /// Of the 32-bit entries.
 inline std::int32_t sum32(V entries) noexcept {
-  alignas(64) std::int32_t lane[kShellLanes];
+  alignas(64) std::int32_t lane[kPointLanes];
   Simd::store(lane, entries);
   std::int32_t sum = 0;
   for (const std::int32_t entry : lane) sum += entry;
@@ -258,7 +259,7 @@ inline std::int32_t sum32(V entries) noexcept {
 
 /// Of 32-bit entries that are not negative.
 inline std::int32_t highest32(V entries) noexcept {
-  alignas(64) std::int32_t lane[kShellLanes];
+  alignas(64) std::int32_t lane[kPointLanes];
   Simd::store(lane, entries);
   std::int32_t highest = 0;
   for (const std::int32_t entry : lane) highest = entry > highest ? entry : highest;
@@ -268,38 +269,39 @@ inline std::int32_t highest32(V entries) noexcept {
 /// `kInside`: the whole tool is. What fills the last group up is not, so that one is read with
 /// care.
 template <bool kRound, bool kInside>
-[[gnu::always_inline]] inline void sum_shell_by(const ShellTable<FixedNumbers>& table,
-                                                const ShellPlaces<FixedNumbers>& places,
-                                                const std::int32_t (&centre)[3],
-                                                const ShellField& field,
-                                                ShellSums<FixedNumbers>& out) noexcept {
-  ShellVectors sums;
-  const std::int32_t whole = kInside ? table.count / kShellGroup : 0;
+[[gnu::always_inline]] inline void sum_points_by(const PointTable<FixedNumbers>& table,
+                                                 const PointPlaces<FixedNumbers>& places,
+                                                 const std::int32_t (&centre)[3],
+                                                 const DensityField& field,
+                                                 PointSums<FixedNumbers>& out) noexcept {
+  PointVectors sums;
+  const std::int32_t whole = kInside ? table.count / kPointGroup : 0;
   if constexpr (kInside) {
     add_groups<kRound, true>(table, places, centre, field, 0, whole, sums);
   }
   add_groups<kRound, false>(table, places, centre, field, whole, table.groups, sums);
-  constexpr const ShellSums<FixedNumbers>& kFull = kFullSample<kRound>;
+  constexpr const PointSums<FixedNumbers>& kFull = kFullSample<kRound>;
   out.weight = Simd::sum64(sums.weight) + sums.full * kFull.weight;
   out.density = Simd::sum64(sums.density) + sums.full * kFull.density;
   out.square = Simd::sum64(sums.square) + sums.full * kFull.square;
   out.high = Simd::sum64(sums.high) + sums.full * kFull.high;
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    out.rise[axis] = Simd::sum64(sums.rise[axis]);
-    const std::int64_t full_lever = sum32(sums.full_lever[axis]);
-    out.lever[axis] = Simd::sum64(sums.lever[axis]) + kFull.lever[0] * full_lever;
-    out.high_lever[axis] = Simd::sum64(sums.high_lever[axis]) + kFull.high_lever[0] * full_lever;
+    out.gradient[axis] = Simd::sum64(sums.gradient[axis]);
+    const std::int64_t full_offset = sum32(sums.full_offset[axis]);
+    out.offset[axis] = Simd::sum64(sums.offset[axis]) + kFull.offset[0] * full_offset;
+    out.high_offset[axis] =
+        Simd::sum64(sums.high_offset[axis]) + kFull.high_offset[0] * full_offset;
   }
   const std::int32_t highest = highest32(sums.top);
   out.top = highest >> kSampleBits;
-  out.top_sample = highest & (kMaxShellSamples - 1);
+  out.top_sample = highest & (kMaxShellPoints - 1);
   out.solid = sum32(sums.solid) + sums.full;
   out.read = sums.read;
 }
 
-void sum_shell_samples(const ShellTable<FixedNumbers>& table,
-                       const ShellPlaces<FixedNumbers>& places, const std::int32_t (&centre)[3],
-                       const ShellField& field, ShellSums<FixedNumbers>& sums) noexcept {
+void sum_point_samples(const PointTable<FixedNumbers>& table,
+                       const PointPlaces<FixedNumbers>& places, const std::int32_t (&centre)[3],
+                       const DensityField& field, PointSums<FixedNumbers>& sums) noexcept {
   const std::int32_t size[3] = {field.grid.nx, field.grid.ny, field.grid.nz};
   bool has_cells = true, inside = true;
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -310,23 +312,23 @@ void sum_shell_samples(const ShellTable<FixedNumbers>& table,
   if (!has_cells) {  // no voxel that a sample outside could read in its place
     sums = {};
   } else if (table.round) {
-    inside ? sum_shell_by<true, true>(table, places, centre, field, sums)
-           : sum_shell_by<true, false>(table, places, centre, field, sums);
+    inside ? sum_points_by<true, true>(table, places, centre, field, sums)
+           : sum_points_by<true, false>(table, places, centre, field, sums);
   } else {
-    inside ? sum_shell_by<false, true>(table, places, centre, field, sums)
-           : sum_shell_by<false, false>(table, places, centre, field, sums);
+    inside ? sum_points_by<false, true>(table, places, centre, field, sums)
+           : sum_points_by<false, false>(table, places, centre, field, sums);
   }
 }
 
-void read_shell_samples(const ShellPlaces<FixedNumbers>& places, std::int32_t count,
-                        const std::int32_t (&centre)[3], const ShellField& field,
+void read_point_samples(const PointPlaces<FixedNumbers>& places, std::int32_t count,
+                        const std::int32_t (&centre)[3], const DensityField& field,
                         std::int32_t* density) noexcept {
   const VoxelGrid& grid = field.grid;
   const bool has_cells = grid.nx > 1 && grid.ny > 1 && grid.nz > 1;
-  for (std::int32_t i = 0; i < count; i += kShellLanes) {
+  for (std::int32_t i = 0; i < count; i += kPointLanes) {
     V scaled = Simd::zero();
     if (has_cells) {
-      const ShellCells cell = shell_cells<false>(places, centre, grid, i);
+      const PointCells cell = point_cells<false>(places, centre, grid, i);
       V corner[4];
       read_corners(field, cell, corner);
       const V near_z = blend16(corner[0], corner[1], cell.y),
@@ -340,26 +342,26 @@ void read_shell_samples(const ShellPlaces<FixedNumbers>& places, std::int32_t co
 /// Of 64-bit entries.
 struct PowerVectors {
   V weight = Simd::zero(), density = Simd::zero();
-  V lever[3] = {Simd::zero(), Simd::zero(), Simd::zero()};
+  V offset[3] = {Simd::zero(), Simd::zero(), Simd::zero()};
 
   [[gnu::always_inline]] void add(V power, V t, const V (&at)[3]) noexcept {
-    const ShellWeights weights(power);
+    const PointWeights weights(power);
     weights.count(weight);
     weights.add(density, t);
-    for (std::size_t axis = 0; axis < 3; ++axis) weights.add(lever[axis], at[axis]);
+    for (std::size_t axis = 0; axis < 3; ++axis) weights.add(offset[axis], at[axis]);
   }
   [[nodiscard]] PowerSums<FixedNumbers> sums() const noexcept {
     return {Simd::sum64(weight),
             Simd::sum64(density),
-            {Simd::sum64(lever[0]), Simd::sum64(lever[1]), Simd::sum64(lever[2])}};
+            {Simd::sum64(offset[0]), Simd::sum64(offset[1]), Simd::sum64(offset[2])}};
   }
 };
 
-void sum_close_samples(const ShellTable<FixedNumbers>& table, const std::int32_t* density,
+void sum_close_samples(const PointTable<FixedNumbers>& table, const std::int32_t* density,
                        CloseSums<FixedNumbers>& sums) noexcept {
   sums = {};
   V top = Simd::zero();
-  for (std::int32_t i = 0; i < table.count; i += kShellLanes) {
+  for (std::int32_t i = 0; i < table.count; i += kPointLanes) {
     top = Simd::max32(top, Simd::load(density + i));
   }
   sums.top = highest32(top);
@@ -370,14 +372,14 @@ void sum_close_samples(const ShellTable<FixedNumbers>& table, const std::int32_t
     return Simd::srl32<15>(Simd::add32(Simd::multiply32(t, t), Simd::set32(1 << 14)));
   };
   PowerVectors low, high;
-  for (std::int32_t i = 0; i < table.count; i += kShellLanes) {
+  for (std::int32_t i = 0; i < table.count; i += kPointLanes) {
     const V t = Simd::srl32<16>(Simd::multiply32(Simd::load(density + i), over_top));
     V power = t;
     for (int p = 1; p < CloseSums<FixedNumbers>::kLowPower; p *= 2) power = square(power);
-    const V lever[3] = {Simd::load(table.lever[0] + i), Simd::load(table.lever[1] + i),
-                        Simd::load(table.lever[2] + i)};
-    low.add(power, t, lever);
-    high.add(square(power), t, lever);
+    const V offset[3] = {Simd::load(table.offset[0] + i), Simd::load(table.offset[1] + i),
+                         Simd::load(table.offset[2] + i)};
+    low.add(power, t, offset);
+    high.add(square(power), t, offset);
   }
   sums.low = low.sums();
   sums.high = high.sums();

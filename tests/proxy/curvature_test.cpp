@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What steps tell of a bowl, against hollows whose bottom is known.
-#include "controller/kernel/proxy/bowl.hpp"
+#include "controller/kernel/proxy/curvature.hpp"
 
 #include <cmath>
 #include <vector>
@@ -31,27 +31,27 @@ Point minus(Point a, Point b) {
 
 /// What is known after steps from each place to the next.
 template <class N, class Field>
-Bowl<N> learned(Field field, const std::vector<Point>& places) {
-  Bowl<N> bowl;
+CurvatureEstimate<N> learned(Field field, const std::vector<Point>& places) {
+  CurvatureEstimate<N> curvature;
   for (std::size_t i = 1; i < places.size(); ++i) {
-    bowl.learn(field.probe(place_of<N>(places[i - 1])), field.probe(place_of<N>(places[i])),
-               place_of<N>(minus(places[i], places[i - 1])));
+    curvature.learn(field.query(place_of<N>(places[i - 1])), field.query(place_of<N>(places[i])),
+                    place_of<N>(minus(places[i], places[i - 1])));
   }
-  return bowl;
+  return curvature;
 }
 
 template <class N>
-bool eases(const Bowl<N>& bowl) {
+bool eases(const CurvatureEstimate<N>& curvature) {
   const auto step = place_of<N>({0.3, 0.2, -0.1});
-  return bowl.eased(step, typename N::Real(2)) != step;
+  return curvature.eased(step, typename N::Real(2)) != step;
 }
 
 /// Where a step ends from `from` under a load of 2 straight down.
 template <class N, class Field>
-Point end_of_step(Field field, const Bowl<N>& bowl, double play, Point from) {
-  const auto slide = nearest(bundle_of(field.probe(place_of<N>(from))),
+Point end_of_step(Field field, const CurvatureEstimate<N>& curvature, double play, Point from) {
+  const auto slide = nearest(constraints_of(field.query(place_of<N>(from))),
                              place_of<N>(minus({0, -play - 2, 0}, from)));
-  return from + point_of<N>(bowl.eased(slide.move, slide.load[0]));
+  return from + point_of<N>(curvature.eased(slide.move, slide.load[0]));
 }
 
 }  // namespace
@@ -61,8 +61,8 @@ TEST_CASE_TEMPLATE("an eased step ends at the bottom of its bowl", N, FixedNumbe
   for (const double play : {0.1, 0.5, 3.0}) {
     CAPTURE(play);
     const Point from = on(play, 0.1);
-    const auto bowl = learned<N>(hollow<N>(play), {on(play, 0.4), from});
-    CHECK(std::abs(end_of_step(hollow<N>(play), bowl, play, from)[0]) < 0.1 * 0.2);
+    const auto curvature = learned<N>(hollow<N>(play), {on(play, 0.4), from});
+    CHECK(std::abs(end_of_step(hollow<N>(play), curvature, play, from)[0]) < 0.1 * 0.2);
   }
 }
 
@@ -86,8 +86,8 @@ TEST_CASE_TEMPLATE("two steps tell of both directions", N, FixedNumbers, DoubleN
 TEST_CASE("short steps in a wide bowl tell fixed point what they tell double") {
   constexpr double kPlay = 32, kLoad = 28, kTurn = 0.0005;
   const auto eased = [&]<class N>(N) {
-    const auto bowl = learned<N>(hollow<N>(kPlay), {on(kPlay, 0.1 + kTurn), on(kPlay, 0.1)});
-    return point_of<N>(bowl.eased(place_of<N>({0.3, 0.2, -0.1}), typename N::Real(kLoad)));
+    const auto curvature = learned<N>(hollow<N>(kPlay), {on(kPlay, 0.1 + kTurn), on(kPlay, 0.1)});
+    return point_of<N>(curvature.eased(place_of<N>({0.3, 0.2, -0.1}), typename N::Real(kLoad)));
   };
   CHECK(length(minus(eased(FixedNumbers{}), eased(DoubleNumbers{}))) < 1e-3);
 }
@@ -104,9 +104,9 @@ TEST_CASE_TEMPLATE("a slot leaves the way along it", N, FixedNumbers, DoubleNumb
     p[2] = z;
     return p;
   };
-  const auto bowl = learned<N>(slot, {along(0.4, 0), along(0.2, 0.2), along(0.1, 0.3)});
-  const auto way = place_of<N>({0, 0, 0.4});
-  CHECK(norm(bowl.eased(way, typename N::Real(2)) - way) < typename N::Real(0.01));
+  const auto curvature = learned<N>(slot, {along(0.4, 0), along(0.2, 0.2), along(0.1, 0.3)});
+  const auto step = place_of<N>({0, 0, 0.4});
+  CHECK(norm(curvature.eased(step, typename N::Real(2)) - step) < typename N::Real(0.01));
 }
 
 TEST_CASE_TEMPLATE("bumps, two walls, air and no step are no bowls", N, FixedNumbers,
@@ -116,15 +116,15 @@ TEST_CASE_TEMPLATE("bumps, two walls, air and no step are no bowls", N, FixedNum
   CHECK_FALSE(eases(learned<N>(field, {on(0.5, -0.4), on(0.5, 0.4)})));  // 46 degrees
   CHECK_FALSE(eases(learned<N>(field, {on(0.5, 0.2), on(0.5, 0.215)})));
   auto looks = field;
-  const auto left = looks.probe(place_of<N>(on(0.5, -0.2)));
-  const auto right = looks.probe(place_of<N>(on(0.5, 0.2)));
-  const auto told = [&](const Probe<N>& before, const Probe<N>& after) {
-    Bowl<N> bowl;
-    bowl.learn(before, after, place_of<N>({0.1, 0, 0}));
-    return eases(bowl);
+  const auto left = looks.query(place_of<N>(on(0.5, -0.2)));
+  const auto right = looks.query(place_of<N>(on(0.5, 0.2)));
+  const auto told = [&](const Contacts<N>& before, const Contacts<N>& after) {
+    CurvatureEstimate<N> curvature;
+    curvature.learn(before, after, place_of<N>({0.1, 0, 0}));
+    return eases(curvature);
   };
   CHECK(told(left, right));
   CHECK_FALSE(told(right, left));  // the normals turn apart
   CHECK_FALSE(told(left, left));
-  CHECK_FALSE(told(left, Probe<N>{}));
+  CHECK_FALSE(told(left, Contacts<N>{}));
 }

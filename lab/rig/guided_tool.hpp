@@ -4,23 +4,23 @@
 #include <algorithm>
 
 #include "controller/kernel/proxy/proxy_sweep.hpp"
-#include "lab/rig/shell_rig.hpp"
+#include "lab/rig/contact_rig.hpp"
 
 namespace kerf::extremes {
 
 /// A tool in a body, led by a hand that goes where it wants: open loop.
 template <class N>
-class Led {
+class GuidedTool {
  public:
-  Led(const SampledTool& tool, const Body& body, Point start, double friction = 0)
+  GuidedTool(const SampledTool& tool, const Body& body, Point start, double friction = 0)
       : rig_(tool, body), pose_{place_of<N>(start), {}}, friction_(friction) {}
 
   /// The spring from the hand to the proxy: the force over the stiffness.
   Point tick(Point hand, const ToolTurn<N>& turn = {}) {
     rig_.field().begin_tick();
-    swept_ = ProxySweep<N, ShellProbe<N>>(rig_.field(), pose_, friction_, rig_.turn_step())
+    swept_ = ProxySweep<N, ContactQuery<N>>(rig_.field(), pose_, friction_, rig_.turn_step())
                  .tick({place_of<N>(hand), turn});
-    most_probes_ = std::max(most_probes_, swept_.probes);
+    most_queries_ = std::max(most_queries_, swept_.queries);
     return proxy() - hand;
   }
 
@@ -30,14 +30,14 @@ class Led {
   [[nodiscard]] Point proxy() const { return point_of<N>(pose_.centre); }
   [[nodiscard]] const ProxyPose<N>& pose() const { return pose_; }
   [[nodiscard]] const Swept<N>& swept() const { return swept_; }
-  [[nodiscard]] std::int32_t most_probes() const { return most_probes_; }
+  [[nodiscard]] std::int32_t most_queries() const { return most_queries_; }
 
  private:
-  ShellRig<N> rig_;
+  ContactRig<N> rig_;
   ProxyPose<N> pose_;
   typename N::Unit friction_;
   Swept<N> swept_;
-  std::int32_t most_probes_ = 0;
+  std::int32_t most_queries_ = 0;
 };
 
 /// Largest step of a force from tick to tick over its mean.

@@ -1,18 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/plan/shell_tool.hpp"
+#include "controller/plan/tool_points.hpp"
 
 #include <algorithm>
 #include <cassert>
 #include <cmath>
 
-#include "controller/plan/lever_of.hpp"
+#include "controller/plan/sample_offset.hpp"
 
 namespace kerf {
 namespace {
 
 using Point = std::array<double, 3>;
 
-constexpr std::size_t kGroup = kShellGroup;
+constexpr std::size_t kGroup = kPointGroup;
 
 struct Bounds {
   Point low, high;
@@ -59,27 +59,28 @@ double reach_of(std::span<const Point> samples, std::span<const Point> close) {
 }  // namespace
 
 template <class N>
-ShellTool<N>::ShellTool(std::span<const Point> samples_units, bool round,
-                        std::span<const Point> close_units)
+ToolPoints<N>::ToolPoints(std::span<const Point> samples_units, bool round,
+                          std::span<const Point> close_units)
     : count_(samples_units.size()),
       reach_(reach_of(samples_units, close_units)),
       round_(round),
       close_(close_units, reach_) {
-  assert(!samples_units.empty() && samples_units.size() <= kMaxShellSamples);
+  assert(!samples_units.empty() && samples_units.size() <= kMaxShellPoints);
   std::vector<Point> points(samples_units.begin(), samples_units.end());
   group_together(points);
   const auto add = [this](auto& to, const Point& p) {
-    for (std::size_t axis = 0; axis < 3; ++axis) to[axis].push_back(lever_of<N>(p[axis] / reach_));
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      to[axis].push_back(sample_offset<N>(p[axis] / reach_));
   };
-  for (const Point& p : points) add(lever_, p);
-  while (lever_[0].size() % kGroup != 0) add(lever_, {});
+  for (const Point& p : points) add(offset_, p);
+  while (offset_[0].size() % kGroup != 0) add(offset_, {});
   for (std::size_t first = 0; first < count_; first += kGroup) {
     const std::span<const Point> group(points.data() + first, std::min(kGroup, count_ - first));
     const Bounds b = bounds_of(group);
     Point middle{};
     for (std::size_t axis = 0; axis < 3; ++axis) middle[axis] = (b.low[axis] + b.high[axis]) / 2;
     const double out = distance(middle, {});
-    // No lever is beyond the reach: 31 bits would not hold its place.
+    // No offset is beyond the reach: 31 bits would not hold its place.
     for (double& part : middle) part *= reach_ / std::max(out, reach_);
     double radius = 0;
     for (const Point& p : group) radius = std::max(radius, distance(p, middle));
@@ -89,10 +90,10 @@ ShellTool<N>::ShellTool(std::span<const Point> samples_units, bool round,
 }
 
 template <class N>
-Shell<N> ShellTool<N>::shell() const noexcept {
-  Shell<N> shell;
+PointShell<N> ToolPoints<N>::shell() const noexcept {
+  PointShell<N> shell;
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    shell.table.lever[axis] = lever_[axis].data();
+    shell.table.offset[axis] = offset_[axis].data();
     shell.table.middle[axis] = middle_[axis].data();
   }
   shell.table.bricks = bricks_.data();
@@ -104,43 +105,43 @@ Shell<N> ShellTool<N>::shell() const noexcept {
   // No voxel's edge is shorter than a unit; a little for roundings.
   const double longest = reach_ + rounding();
   shell.table.reach =
-      static_cast<ShellNumber<N>>(N::kIsFixed ? std::ceil(longest * 65536) : longest);
+      static_cast<PointNumber<N>>(N::kIsFixed ? std::ceil(longest * 65536) : longest);
   shell.step_bits = 16;
   while (std::ldexp(reach_, shell.step_bits) > 65000) --shell.step_bits;
   return shell;
 }
 
 template <class N>
-std::size_t ShellTool<N>::bytes() const noexcept {
-  return 3 * (lever_[0].size() + middle_[0].size()) * sizeof(ShellNumber<N>) + bricks_.size() +
+std::size_t ToolPoints<N>::bytes() const noexcept {
+  return 3 * (offset_[0].size() + middle_[0].size()) * sizeof(PointNumber<N>) + bricks_.size() +
          close_.bytes();
 }
 
 template <class N>
-void ShellMemory<N>::hold(const Shell<N>& shell) {
+void PlaceMemory<N>::hold(const PointShell<N>& shell) {
   const auto groups = static_cast<std::size_t>(shell.table.groups);
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    offset_[axis].resize(std::max(offset_[axis].size(), groups * kGroup));
+    offset_vox_[axis].resize(std::max(offset_vox_[axis].size(), groups * kGroup));
     middle_[axis].resize(std::max(middle_[axis].size(), groups));
   }
 }
 
 template <class N>
-ShellPlaces<N> ShellMemory<N>::places() noexcept {
-  return {{offset_[0].data(), offset_[1].data(), offset_[2].data()},
+PointPlaces<N> PlaceMemory<N>::places() noexcept {
+  return {{offset_vox_[0].data(), offset_vox_[1].data(), offset_vox_[2].data()},
           {middle_[0].data(), middle_[1].data(), middle_[2].data()}};
 }
 
 template <class N>
-std::size_t ShellMemory<N>::bytes() const noexcept {
-  return 3 * (offset_[0].size() + middle_[0].size()) * sizeof(ShellNumber<N>);
+std::size_t PlaceMemory<N>::bytes() const noexcept {
+  return 3 * (offset_vox_[0].size() + middle_[0].size()) * sizeof(PointNumber<N>);
 }
 
-template class ShellTool<FixedNumbers>;
-template class ShellTool<FloatNumbers>;
-template class ShellTool<DoubleNumbers>;
-template class ShellMemory<FixedNumbers>;
-template class ShellMemory<FloatNumbers>;
-template class ShellMemory<DoubleNumbers>;
+template class ToolPoints<FixedNumbers>;
+template class ToolPoints<FloatNumbers>;
+template class ToolPoints<DoubleNumbers>;
+template class PlaceMemory<FixedNumbers>;
+template class PlaceMemory<FloatNumbers>;
+template class PlaceMemory<DoubleNumbers>;
 
 }  // namespace kerf

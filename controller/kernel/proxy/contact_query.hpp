@@ -9,88 +9,88 @@
 #include <span>
 
 #include "controller/kernel/kernel_set.hpp"
-#include "controller/kernel/point_shell/shell_sums.hpp"
-#include "controller/kernel/point_shell/shell_table.hpp"
+#include "controller/kernel/point_shell/point_sums.hpp"
+#include "controller/kernel/point_shell/point_table.hpp"
+#include "controller/kernel/proxy/ball_cap.hpp"
+#include "controller/kernel/proxy/constraint_plane.hpp"
+#include "controller/kernel/proxy/contact_closeup.hpp"
 #include "controller/kernel/proxy/contact_math.hpp"
-#include "controller/kernel/proxy/plane.hpp"
-#include "controller/kernel/proxy/probe_work.hpp"
-#include "controller/kernel/proxy/shell_cap.hpp"
-#include "controller/kernel/proxy/shell_closeup.hpp"
-#include "controller/kernel/proxy/shell_patch.hpp"
-#include "controller/kernel/proxy/shell_peak.hpp"
-#include "controller/kernel/proxy/shell_spiral.hpp"
+#include "controller/kernel/proxy/contact_peak.hpp"
+#include "controller/kernel/proxy/normal_patch.hpp"
+#include "controller/kernel/proxy/query_work.hpp"
+#include "controller/kernel/proxy/spiral_points.hpp"
 #include "controller/kernel/proxy/tool_turn.hpp"
 
 namespace kerf {
 
 /// A tool as contact sees it: samples on its surface.
 template <class N>
-struct Shell {
-  ShellTable<N> table;
+struct PointShell {
+  PointTable<N> table;
   CloseTable<N> close;         ///< none of a ball
   typename N::Real reach{};    ///< units from the centre to the farthest sample
-  std::int32_t step_bits = 0;  ///< fraction bits of ShellStep's rows: reach 2^step_bits < 2^16
+  std::int32_t step_bits = 0;  ///< fraction bits of PointStep's rows: reach 2^step_bits < 2^16
 };
 
 /// One solid volume with room for the tool's places in it; `places` belongs to the servo's memory.
 template <class N>
-struct ShellVolume {
-  ShellField field;
+struct ContactVolume {
+  DensityField field;
   ContactFrame<N> frame;
-  ShellPlaces<N> places;
+  PointPlaces<N> places;
 };
 
 /// What a tool feels among the solid volumes of a scene: the ContactField of the sweep.
 ///
-/// `turn` first, then any number of probes with this orientation; a tool that does not turn needs
-/// it once. A probe reads at most all samples of the shell in every volume: those in free space are
+/// `turn` first, then any number of queries with this orientation; a tool that does not turn needs
+/// it once. A query reads at most all samples of the shell in every volume: those in free space are
 /// left out. Where a volume's contact is near rest a closer look is added: at a ball's two caps, or
-/// at other tools' close samples and a patch of the volume; `probe_work` counts both. In fixed all
+/// at other tools' close samples and a patch of the volume; `query_work` counts both. In fixed all
 /// kernels give the same bits. Servo thread; no heap.
 ///
-/// What a tick may cost is counted in samples: where tissue or noise is felt on all sides, a probe
-/// is twice as dear as at a face. Once the count of `begin_tick` is spent, probes answer `buried`
+/// What a tick may cost is counted in samples: where tissue or noise is felt on all sides, a query
+/// is twice as dear as at a face. Once the count of `begin_tick` is spent, queries answer `buried`
 /// unseen, and a sweep stays at the last place that it found (SweepRules::kWedged); but the first
-/// probe after a turn is always answered.
+/// query after a turn is always answered.
 template <class N>
-class ShellProbe {
+class ContactQuery {
  public:
   using Real = typename N::Real;
 
   /// `kernels` serve fixed point alone.
-  ShellProbe(const KernelSet& kernels, const Shell<N>& shell,
-             std::span<const ShellVolume<N>> volumes) noexcept
+  ContactQuery(const KernelSet& kernels, const PointShell<N>& shell,
+               std::span<const ContactVolume<N>> volumes) noexcept
       : kernels_(kernels),
         shell_(shell),
         volumes_(volumes),
-        work_(probe_work(shell.table, volumes.size())) {}
+        work_(query_work(shell.table, volumes.size())) {}
 
   /// From the tool's axes to those of the world.
   void turn(const ToolTurn<N>& turn) noexcept {
     rows_ = rows_of(turn);
     turned_ = true;
     left_ -= work_.turn;
-    for (const ShellVolume<N>& volume : volumes_) {
+    for (const ContactVolume<N>& volume : volumes_) {
       place(shell_, rows_, volume.frame, volume.places);
     }
   }
 
-  /// The probes from now on are those of one tick; before the first, nothing is counted.
+  /// The queries from now on are those of one tick; before the first, nothing is counted.
   void begin_tick() noexcept { left_ = work_.budget(); }
-  [[nodiscard]] const ProbeWork& work() const noexcept { return work_; }
+  [[nodiscard]] const QueryWork& work() const noexcept { return work_; }
   /// See ContactField.
   [[nodiscard]] bool half_spent() const noexcept { return left_ <= work_.budget() / 2; }
   /// Since then, counted as `work` is.
   [[nodiscard]] std::int64_t spent() const noexcept { return work_.budget() - left_; }
 
   /// The tool's centre at `q`: at most one plane a volume, the deepest three.
-  [[nodiscard]] Probe<N> probe(ContactVec<Real> q) const noexcept {
-    Probe<N> felt;
-    felt.buried = left_ < work_.probe + work_.closer && !turned_;
+  [[nodiscard]] Contacts<N> query(ContactVec<Real> q) const noexcept {
+    Contacts<N> felt;
+    felt.buried = left_ < work_.query + work_.closer && !turned_;
     if (felt.buried) return felt;
     turned_ = false;
-    const bool closer = left_ >= work_.probe + work_.closer;
-    for (const ShellVolume<N>& volume : volumes_) feel(volume, q, closer, felt);
+    const bool closer = left_ >= work_.query + work_.closer;
+    for (const ContactVolume<N>& volume : volumes_) feel(volume, q, closer, felt);
     if (felt.count > 0) felt.depth = std::max(felt.depth, felt.plane[0].depth);
     return felt;
   }
@@ -100,7 +100,7 @@ class ShellProbe {
     // A sample reads one voxel further, and half a unit is for roundings.
     const Real own = shell_.reach + Real(1.5);
     Real free(kContactLimit);
-    for (const ShellVolume<N>& volume : volumes_) {
+    for (const ContactVolume<N>& volume : volumes_) {
       const VoxelVec<Real> at = place_of(volume, q);
       const std::int32_t x = whole(at.x), y = whole(at.y), z = whole(at.z);
       const VoxelGrid& grid = volume.field.grid;
@@ -122,23 +122,23 @@ class ShellProbe {
       return static_cast<std::int32_t>(x < Real(0) ? x - Real(1) : x);
     }
   }
-  [[nodiscard]] static ShellNumber<N> number_of(Real x) noexcept {
+  [[nodiscard]] static PointNumber<N> number_of(Real x) noexcept {
     if constexpr (N::kIsFixed) {
       return x.raw();
     } else {
       return x;
     }
   }
-  [[nodiscard]] static VoxelVec<Real> place_of(const ShellVolume<N>& volume,
+  [[nodiscard]] static VoxelVec<Real> place_of(const ContactVolume<N>& volume,
                                                ContactVec<Real> q) noexcept {
     return volume.frame.voxel_from_contact * q + volume.frame.origin_vox;
   }
 
-  /// How the levers of a shell become voxels whose axes `rows` takes to those of the world.
-  [[nodiscard]] static ShellStep<N> step_of(const Shell<N>& shell, const TurnRows<N>& rows,
+  /// How the offsets of a shell become voxels whose axes `rows` takes to those of the world.
+  [[nodiscard]] static PointStep<N> step_of(const PointShell<N>& shell, const TurnRows<N>& rows,
                                             const ContactFrame<N>& frame) noexcept {
-    ShellStep<N> step;
-    step.shift = 15 + shell.step_bits - 16;  // from levers times rows to Q15.16
+    PointStep<N> step;
+    step.shift = 15 + shell.step_bits - 16;  // from offsets times rows to Q15.16
     for (std::size_t i = 0; i < 3; ++i) {
       const auto& m = frame.voxel_from_contact.row[i];
       for (std::size_t j = 0; j < 3; ++j) {
@@ -159,30 +159,30 @@ class ShellProbe {
     return step;
   }
 
-  void place(const Shell<N>& shell, const TurnRows<N>& rows, const ContactFrame<N>& frame,
-             const ShellPlaces<N>& places) const noexcept {
-    const ShellStep<N> step = step_of(shell, rows, frame);
+  void place(const PointShell<N>& shell, const TurnRows<N>& rows, const ContactFrame<N>& frame,
+             const PointPlaces<N>& places) const noexcept {
+    const PointStep<N> step = step_of(shell, rows, frame);
     if constexpr (N::kIsFixed) {
-      kernels_.place_shell(shell.table, step, places);
+      kernels_.place_points(shell.table, step, places);
     } else {
-      place_shell(shell.table, step, places);
+      place_points(shell.table, step, places);
     }
   }
 
   /// Adds this volume's plane in the order of depths, by a closer look where it is near rest.
-  void feel(const ShellVolume<N>& volume, ContactVec<Real> q, bool closer,
-            Probe<N>& felt) const noexcept {
+  void feel(const ContactVolume<N>& volume, ContactVec<Real> q, bool closer,
+            Contacts<N>& felt) const noexcept {
     const VoxelVec<Real> at = place_of(volume, q);
     const Real margin = shell_.reach + Real(1);
     const auto near = [&](Real x, std::int32_t n) { return x > -margin && x < Real(n) + margin; };
     const VoxelGrid& grid = volume.field.grid;
     if (!near(at.x, grid.nx) || !near(at.y, grid.ny) || !near(at.z, grid.nz)) return;
 
-    const ShellSums<N> sums = sums_at(volume.field, shell_.table, volume.places, at);
+    const PointSums<N> sums = sums_at(volume.field, shell_.table, volume.places, at);
     if (sums.weight <= typename N::Sum(0)) return;
     const bool round = shell_.table.round;
-    const auto means = shell_means<N>(sums, volume.field.scale, volume.frame, rows_, round);
-    Plane<N> plane = plane_of<N>(means, shell_.reach, round);
+    const auto means = point_means<N>(sums, volume.field.scale, volume.frame, rows_, round);
+    ConstraintPlane<N> plane = plane_of<N>(means, shell_.reach, round);
     if (closer) {
       if (round && plane.depth < Real(kCapBelow) && -plane.depth < Real(kCapAbove)) {
         plane.depth = depth_around(volume, at, sums, means, plane);
@@ -211,40 +211,40 @@ class ShellProbe {
 
   /// The plane by the close samples around the peak, and by a patch of the volume around where they
   /// show it.
-  void look_again(const ShellVolume<N>& volume, VoxelVec<Real> at, const ShellSums<N>& sums,
-                  const ShellMeans<N>& means, Plane<N>& plane) const noexcept {
+  void look_again(const ContactVolume<N>& volume, VoxelVec<Real> at, const PointSums<N>& sums,
+                  const PointMeans<N>& means, ConstraintPlane<N>& plane) const noexcept {
     if (shell_.close.first == nullptr) return;
     using Unit = typename N::Unit;
     using Ratio = typename N::Ratio;
-    ShellNumber<N> peak[3] = {};
-    peak_lever(sums, fall_of(means), peak);
+    PointNumber<N> peak[3] = {};
+    peak_offset(sums, fall_of(means), peak);
     Closeup<N> seen = look_closely_at(volume, at, peak);
     Ratio height = seen.height;
     // The highest sample of the shell may not be among what was seen: the tool touches twice.
     const auto share = falling_share<N>(Unit(means.top - seen.top), 0.06, 0.02);
     if (share < Unit(1)) {
       const auto top = static_cast<std::size_t>(sums.top_sample);
-      const auto& lever = shell_.table.lever;
+      const auto& offset = shell_.table.offset;
       const Closeup<N> other =
-          look_closely_at(volume, at, {lever[0][top], lever[1][top], lever[2][top]});
+          look_closely_at(volume, at, {offset[0][top], offset[1][top], offset[2][top]});
       height = other.height + multiply<Ratio>(share, height - other.height);
       if (share <= Unit(0)) seen = other;
     }
-    const auto lever = turned_lever<N>(seen.lever, rows_);
-    const ContactVec<Real> arm{multiply<Real>(lever.x, shell_.reach),
-                               multiply<Real>(lever.y, shell_.reach),
-                               multiply<Real>(lever.z, shell_.reach)};
+    const auto offset = turned_offset<N>(seen.offset, rows_);
+    const ContactVec<Real> arm{multiply<Real>(offset.x, shell_.reach),
+                               multiply<Real>(offset.y, shell_.reach),
+                               multiply<Real>(offset.z, shell_.reach)};
     const VoxelVec<Real> middle = at + volume.frame.voxel_from_contact * arm;
     // The first patch lies askew, as its normal is that of the middle.
-    auto rise = patch_rise(volume, middle, plane.normal);
-    rise = patch_rise(volume, middle, direction<N>(-rise));
-    const auto normal = direction<N>(-rise);
+    auto gradient = patch_gradient(volume, middle, plane.normal);
+    gradient = patch_gradient(volume, middle, direction<N>(-gradient));
+    const auto normal = direction<N>(-gradient);
     // Where the shell rises far less than the patch, it touches faces that look another way.
-    const Ratio steep = norm(rise);
+    const Ratio steep = norm(gradient);
     if (steep < Ratio(0.01)) return;
-    const Ratio along =
-        -(multiply<Ratio>(means.rise.x, normal.x) + multiply<Ratio>(means.rise.y, normal.y) +
-          multiply<Ratio>(means.rise.z, normal.z));
+    const Ratio along = -(multiply<Ratio>(means.gradient.x, normal.x) +
+                          multiply<Ratio>(means.gradient.y, normal.y) +
+                          multiply<Ratio>(means.gradient.z, normal.z));
     const Unit alike =
         Unit(1) -
         falling_share<N>(Unit(std::clamp(along / steep, Ratio(0), Ratio(1))), kAlike, kUnlike);
@@ -256,65 +256,65 @@ class ShellProbe {
     plane.normal = between<N>(plane.normal, normal, counts);
   }
 
-  [[nodiscard]] Closeup<N> look_closely_at(const ShellVolume<N>& volume, VoxelVec<Real> at,
-                                           const ShellNumber<N> (&lever)[3]) const noexcept {
+  [[nodiscard]] Closeup<N> look_closely_at(const ContactVolume<N>& volume, VoxelVec<Real> at,
+                                           const PointNumber<N> (&offset)[3]) const noexcept {
     CloseSamples<N> samples;
-    samples.take(shell_.close, lever);
-    const ShellTable<N> table = samples.table();
-    const ShellPlaces<N> places = samples.places();
-    const ShellStep<N> step = step_of(shell_, rows_, volume.frame);
-    const ShellNumber<N> centre[3] = {number_of(at.x), number_of(at.y), number_of(at.z)};
+    samples.take(shell_.close, offset);
+    const PointTable<N> table = samples.table();
+    const PointPlaces<N> places = samples.places();
+    const PointStep<N> step = step_of(shell_, rows_, volume.frame);
+    const PointNumber<N> centre[3] = {number_of(at.x), number_of(at.y), number_of(at.z)};
     CloseSums<N> sums;
     if constexpr (N::kIsFixed) {
-      kernels_.place_shell(table, step, places);
-      kernels_.read_shell(places, table.count, centre, volume.field, samples.density.data());
+      kernels_.place_points(table, step, places);
+      kernels_.read_points(places, table.count, centre, volume.field, samples.density.data());
       samples.fade(table);
       kernels_.sum_close(table, samples.density.data(), sums);
     } else {
-      place_shell(table, step, places);
-      read_shell<N>(places, table.count, centre, volume.field, samples.density.data());
+      place_points(table, step, places);
+      read_points<N>(places, table.count, centre, volume.field, samples.density.data());
       samples.fade(table);
       sums = close_sums<N>(table, samples.density.data());
     }
-    left_ -= ProbeWork::kLookSamples + ProbeWork::kCloseSamples * table.count;
+    left_ -= QueryWork::kLookSamples + QueryWork::kCloseSamples * table.count;
     return peak_of(sums);
   }
 
   /// The mean gradient of a patch across `normal`.
-  [[nodiscard]] ContactVec<typename N::Ratio> patch_rise(
-      const ShellVolume<N>& volume, VoxelVec<Real> middle,
+  [[nodiscard]] ContactVec<typename N::Ratio> patch_gradient(
+      const ContactVolume<N>& volume, VoxelVec<Real> middle,
       ContactVec<typename N::Unit> normal) const noexcept {
-    constexpr Shell<N> kPatch{kPatchArrays<N>.table(), {}, Real(kPatchRadius), 15};
+    constexpr PointShell<N> kPatch{kPatchArrays<N>.table(), {}, Real(kPatchRadius), 15};
     SpiralPlaces<N, kPatchSamples> memory;
-    const ShellPlaces<N> places = memory.places();
+    const PointPlaces<N> places = memory.places();
     place(kPatch, flattened<N>(normal), volume.frame, places);
-    const ShellSums<N> patch = sums_at(volume.field, kPatch.table, places, middle);
+    const PointSums<N> patch = sums_at(volume.field, kPatch.table, places, middle);
     if (patch.weight <= typename N::Sum(0)) return {};
-    return mean_rise<N>(patch, volume.field.scale, volume.frame);
+    return mean_gradient<N>(patch, volume.field.scale, volume.frame);
   }
 
   /// A ball's depth with the height of its caps around the middle of the contact, where it is
   /// sharp.
-  [[nodiscard]] Real depth_around(const ShellVolume<N>& volume, VoxelVec<Real> at,
-                                  const ShellSums<N>& sums, const ShellMeans<N>& means,
-                                  const Plane<N>& plane) const noexcept {
+  [[nodiscard]] Real depth_around(const ContactVolume<N>& volume, VoxelVec<Real> at,
+                                  const PointSums<N>& sums, const PointMeans<N>& means,
+                                  const ConstraintPlane<N>& plane) const noexcept {
     using Ratio = typename N::Ratio;
     using Unit = typename N::Unit;
     const Ratio height = peak_height(means, true), slope = slope_along(means, plane.normal, true);
     const Unit sharp = sharpness(sums, shell_.table.count, height, slope, shell_.reach);
-    const auto out = direction<N>(means.lever);
+    const auto out = direction<N>(means.offset);
     if (sharp <= Unit(0) || out == decltype(out){}) return plane.depth;
     const Real half = multiply<Real>(shell_.reach, Unit(0.5));
     const Real wide = std::min(Real(kCapRadius), half),
                narrow = std::min(Real(kSummitRadius), half);
-    const ShellMeans<N> found = cap_means(volume, at, out, kCapArrays<N>, wide);
+    const PointMeans<N> found = cap_means(volume, at, out, kCapArrays<N>, wide);
     const Unit share(wide / shell_.reach);
     const auto moved = [&](Unit from, Ratio by) {
       return Ratio(from) + multiply<Ratio>(share, by);
     };
     const auto up = direction<N>(ContactVec<Ratio>{
-        moved(out.x, found.lever.x), moved(out.y, found.lever.y), moved(out.z, found.lever.z)});
-    const ShellMeans<N> near = cap_means(volume, at, up, kSummitArrays<N>, narrow);
+        moved(out.x, found.offset.x), moved(out.y, found.offset.y), moved(out.z, found.offset.z)});
+    const PointMeans<N> near = cap_means(volume, at, up, kSummitArrays<N>, narrow);
     if (near.density <= Ratio(0)) return plane.depth;
     const Ratio summit = peak_height(near, false);
     return depth_of<N>(height + multiply<Ratio>(sharp, summit - height), slope) +
@@ -323,42 +323,42 @@ class ShellProbe {
 
   /// Of a cap in the direction `out` from a ball's centre; 0 where it feels nothing.
   template <std::size_t kCount>
-  [[nodiscard]] ShellMeans<N> cap_means(const ShellVolume<N>& volume, VoxelVec<Real> at,
+  [[nodiscard]] PointMeans<N> cap_means(const ContactVolume<N>& volume, VoxelVec<Real> at,
                                         ContactVec<typename N::Unit> out,
                                         const SpiralArrays<N, kCount>& arrays,
                                         Real radius) const noexcept {
-    const Shell<N> cap{arrays.table(), {}, radius, 14};
+    const PointShell<N> cap{arrays.table(), {}, radius, 14};
     SpiralPlaces<N, kCount> memory;
-    const ShellPlaces<N> places = memory.places();
+    const PointPlaces<N> places = memory.places();
     const TurnRows<N> rows = cap_rows<N>(out, radius, shell_.reach);
     place(cap, rows, volume.frame, places);
     const VoxelVec<Real> top = at + volume.frame.voxel_from_contact * times<N>(out, shell_.reach);
-    const ShellSums<N> sums = sums_at(volume.field, cap.table, places, top);
+    const PointSums<N> sums = sums_at(volume.field, cap.table, places, top);
     if (sums.weight <= typename N::Sum(0)) return {};
-    return shell_means<N>(sums, volume.field.scale, volume.frame, rows, false);
+    return point_means<N>(sums, volume.field.scale, volume.frame, rows, false);
   }
 
-  [[nodiscard]] ShellSums<N> sums_at(const ShellField& field, const ShellTable<N>& table,
-                                     const ShellPlaces<N>& places,
+  [[nodiscard]] PointSums<N> sums_at(const DensityField& field, const PointTable<N>& table,
+                                     const PointPlaces<N>& places,
                                      VoxelVec<Real> at) const noexcept {
-    const ShellNumber<N> centre[3] = {number_of(at.x), number_of(at.y), number_of(at.z)};
-    ShellSums<N> sums;
+    const PointNumber<N> centre[3] = {number_of(at.x), number_of(at.y), number_of(at.z)};
+    PointSums<N> sums;
     if constexpr (N::kIsFixed) {
-      kernels_.sum_shell(table, places, centre, field, sums);
+      kernels_.sum_points(table, places, centre, field, sums);
     } else {
-      sums = shell_sums<N>(table, places, centre, field);
+      sums = point_sums<N>(table, places, centre, field);
     }
-    left_ -= ProbeWork::kLookSamples + sums.read;
+    left_ -= QueryWork::kLookSamples + sums.read;
     return sums;
   }
 
   const KernelSet& kernels_;
-  const Shell<N>& shell_;
-  std::span<const ShellVolume<N>> volumes_;
-  ProbeWork work_;
+  const PointShell<N>& shell_;
+  std::span<const ContactVolume<N>> volumes_;
+  QueryWork work_;
   TurnRows<N> rows_{};
   mutable std::int64_t left_ = std::numeric_limits<std::int64_t>::max();  ///< of the tick's samples
-  mutable bool turned_ = false;                                           ///< and not probed since
+  mutable bool turned_ = false;                                           ///< and not queried since
 };
 
 }  // namespace kerf

@@ -7,9 +7,9 @@
 #include <cstdint>
 
 #include "controller/kernel/point_shell/close_sums.hpp"
-#include "controller/kernel/point_shell/shell_sums.hpp"
-#include "controller/kernel/point_shell/shell_table.hpp"
-#include "controller/kernel/proxy/shell_peak.hpp"
+#include "controller/kernel/point_shell/point_sums.hpp"
+#include "controller/kernel/point_shell/point_table.hpp"
+#include "controller/kernel/proxy/contact_peak.hpp"
 
 namespace kerf {
 
@@ -31,32 +31,32 @@ inline constexpr std::int32_t kMostInCell = 32;
 /// the maker's memory. A ball has none.
 template <class N>
 struct CloseTable {
-  const ShellNumber<N>* lever[3] = {};  ///< from the tool's centre, over its reach; Q0.15
-  const std::int32_t* first = nullptr;  ///< sample of each cell, then the end of the last; or none
-  std::int32_t cells[3] = {};           ///< along the axes
-  ShellNumber<N> low[3] = {};           ///< lever at which the first cell begins
-  ShellNumber<N> edge{};                ///< kCloseCell over the reach
+  const PointNumber<N>* offset[3] = {};  ///< from the tool's centre, over its reach; Q0.15
+  const std::int32_t* first = nullptr;   ///< sample of each cell, then the end of the last; or none
+  std::int32_t cells[3] = {};            ///< along the axes
+  PointNumber<N> low[3] = {};            ///< offset at which the first cell begins
+  PointNumber<N> edge{};                 ///< kCloseCell over the reach
 };
 
-/// The close samples around a contact: their levers, places and densities, as whole vectors.
+/// The close samples around a contact: their offsets, places and densities, as whole vectors.
 template <class N>
 struct CloseSamples {
-  using Array = std::array<ShellNumber<N>, kMostClose>;
-  static_assert(kMostClose % kShellGroup == 0);
+  using Array = std::array<PointNumber<N>, kMostClose>;
+  static_assert(kMostClose % kPointGroup == 0);
 
-  std::array<Array, 3> lever, offset;
+  std::array<Array, 3> offset, offset_vox;
   Array density;
   std::int32_t count = 0;
 
-  /// Those of the cells around `middle`, a lever; of too many kMostClose that are spread evenly.
-  constexpr void take(const CloseTable<N>& table, const ShellNumber<N> (&middle)[3]) noexcept {
+  /// Those of the cells around `middle`, an offset; of too many kMostClose that are spread evenly.
+  constexpr void take(const CloseTable<N>& table, const PointNumber<N> (&middle)[3]) noexcept {
     constexpr auto kReach = static_cast<std::int32_t>(kCloseRadius / kCloseCell);
-    using Number = ShellNumber<N>;
+    using Number = PointNumber<N>;
     std::int32_t from[3] = {}, to[3] = {};  // cells
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      const Number way = std::max(Number(0), middle[axis] - table.low[axis]);
+      const Number from_low = std::max(Number(0), middle[axis] - table.low[axis]);
       const std::int32_t cell =
-          std::min(static_cast<std::int32_t>(way / table.edge), table.cells[axis]);
+          std::min(static_cast<std::int32_t>(from_low / table.edge), table.cells[axis]);
       from[axis] = std::max(0, cell - kReach);
       to[axis] = std::min(cell + kReach + 1, table.cells[axis]);
     }
@@ -76,7 +76,7 @@ struct CloseSamples {
       const std::int32_t more = end - first;
       if (all <= kMostClose) {
         for (std::size_t axis = 0; axis < 3; ++axis) {
-          std::copy_n(table.lever[axis] + first, more, lever[axis].data() + count);
+          std::copy_n(table.offset[axis] + first, more, offset[axis].data() + count);
         }
         count += more;
         return;
@@ -86,26 +86,27 @@ struct CloseSamples {
         if (at >= more) break;
         const auto slot = static_cast<std::size_t>(count);
         for (std::size_t axis = 0; axis < 3; ++axis)
-          lever[axis][slot] = table.lever[axis][first + at];
+          offset[axis][slot] = table.offset[axis][first + at];
       }
       seen += more;
     });
   }
   /// Whole vectors of them; what fills the last up is no sample: `fade` it once all are read.
-  [[nodiscard]] constexpr ShellTable<N> table() noexcept {
-    ShellTable<N> table;
-    table.count = (count + kShellGroup - 1) / kShellGroup * kShellGroup;
+  [[nodiscard]] constexpr PointTable<N> table() noexcept {
+    PointTable<N> table;
+    table.count = (count + kPointGroup - 1) / kPointGroup * kPointGroup;
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      std::fill(lever[axis].begin() + count, lever[axis].begin() + table.count, ShellNumber<N>(0));
-      table.lever[axis] = lever[axis].data();
+      std::fill(offset[axis].begin() + count, offset[axis].begin() + table.count,
+                PointNumber<N>(0));
+      table.offset[axis] = offset[axis].data();
     }
     return table;
   }
-  constexpr void fade(const ShellTable<N>& table) noexcept {
-    std::fill(density.begin() + count, density.begin() + table.count, ShellNumber<N>(0));
+  constexpr void fade(const PointTable<N>& table) noexcept {
+    std::fill(density.begin() + count, density.begin() + table.count, PointNumber<N>(0));
   }
-  [[nodiscard]] constexpr ShellPlaces<N> places() noexcept {
-    return {{offset[0].data(), offset[1].data(), offset[2].data()}, {}};
+  [[nodiscard]] constexpr PointPlaces<N> places() noexcept {
+    return {{offset_vox[0].data(), offset_vox[1].data(), offset_vox[2].data()}, {}};
   }
 };
 
@@ -113,37 +114,37 @@ struct CloseSamples {
 template <class N>
 struct Closeup {
   typename N::Ratio height{};
-  typename N::Ratio lever[3]{};  ///< from the tool's centre to the peak, over the reach; its axes
-  typename N::Ratio top{};       ///< density of the highest sample
+  typename N::Ratio offset[3]{};  ///< from the tool's centre to the peak, over the reach; its axes
+  typename N::Ratio top{};        ///< density of the highest sample
 };
 
-/// Where about the peak is: its lever in the tool's axes, from the shell's sums. Beside a rim or a
+/// Where about the peak is: its offset in the tool's axes, from the shell's sums. Beside a rim or a
 /// point density falls to one side, and means of places weighted with its powers 6 and 8 are off by
 /// shares of 1 / (7 + e) and 1 / (9 + e).
 template <class N>
-constexpr void peak_lever(const ShellSums<N>& sums, typename N::Ratio e,
-                          ShellNumber<N> (&lever)[3]) noexcept {
+constexpr void peak_offset(const PointSums<N>& sums, typename N::Ratio e,
+                           PointNumber<N> (&offset)[3]) noexcept {
   using Ratio = typename N::Ratio;
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    Ratio peak = mean_of<N>(sums.lever[axis], sums.weight, 9);
+    Ratio peak = mean_of<N>(sums.offset[axis], sums.weight, 9);
     if (sums.high > typename N::Sum(0)) {
       const Ratio near = peak;
-      peak = mean_of<N>(sums.high_lever[axis], sums.high, 9);
+      peak = mean_of<N>(sums.high_offset[axis], sums.high, 9);
       peak = peak + (peak - near) * ((Ratio(7) + e) / Ratio(2));
     }
     if constexpr (N::kIsFixed) {
-      lever[axis] = peak.raw() >> 9;
+      offset[axis] = peak.raw() >> 9;
     } else {
-      lever[axis] = peak;
+      offset[axis] = peak;
     }
   }
 }
 
 /// The peak of density over a tool's surface, from the sums over its close samples.
 ///
-/// As in shell_peak.hpp the mean of the height, weighted with its power p, is the summit's times
+/// As in contact_peak.hpp the mean of the height, weighted with its power p, is the summit's times
 /// (p + 1) / (p + 1 + e). With p = 32 and 64 two such means tell e and the summit. They also tell
-/// where it is, as in peak_lever.
+/// where it is, as in peak_offset.
 template <class N>
 [[nodiscard]] constexpr Closeup<N> peak_of(const CloseSums<N>& sums) noexcept {
   using Ratio = typename N::Ratio;
@@ -166,9 +167,9 @@ template <class N>
   }
   found.height = found.top * summit;
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    const Ratio near = mean(sums.low, sums.low.lever[axis]),
-                peak = mean(sums.high, sums.high.lever[axis]);
-    found.lever[axis] = peak + (peak - near) * ((Ratio(kLowOne) + e) / Ratio(kHighOne - kLowOne));
+    const Ratio near = mean(sums.low, sums.low.offset[axis]),
+                peak = mean(sums.high, sums.high.offset[axis]);
+    found.offset[axis] = peak + (peak - near) * ((Ratio(kLowOne) + e) / Ratio(kHighOne - kLowOne));
   }
   return found;
 }

@@ -3,9 +3,9 @@
 
 #include <algorithm>
 
+#include "controller/kernel/proxy/constraint_plane.hpp"
+#include "controller/kernel/proxy/constraint_set.hpp"
 #include "controller/kernel/proxy/contact_math.hpp"
-#include "controller/kernel/proxy/plane.hpp"
-#include "controller/kernel/proxy/plane_bundle.hpp"
 
 namespace kerf {
 
@@ -28,7 +28,7 @@ struct Curve {
 /// turns a step of the hand of 0.01 into a swing of 0.2. And what a tool has milled with a
 /// wandering hand is a bowl along both directions of its plane.
 template <class N>
-class Bowl {
+class CurvatureEstimate {
   using Real = typename N::Real;
   using Unit = typename N::Unit;
   using Place = ContactVec<Real>;
@@ -38,7 +38,7 @@ class Bowl {
   /// What the deepest planes of two places tell, the second `moved` from the first. Planes that are
   /// unlike are two walls. Where the normals turn away from each other there is a bump: its steps
   /// fall short, and are left alone.
-  constexpr void learn(const Probe<N>& before, const Probe<N>& after, Place moved) noexcept {
+  constexpr void learn(const Contacts<N>& before, const Contacts<N>& after, Place moved) noexcept {
     constexpr double kTelling = 0.01;  // units: over less noise turns a normal as much
     if (before.count == 0 || after.count == 0) return forget();
     const auto& from = before.plane[0].normal;
@@ -57,19 +57,19 @@ class Bowl {
   }
 
   /// The way of a step that ends where the load presses straight: Newton's, with this curvature.
-  [[nodiscard]] constexpr Place eased(Place way, Real load) const noexcept {
-    if (!first_.known() || load <= Real(0)) return way;
+  [[nodiscard]] constexpr Place eased(Place step, Real load) const noexcept {
+    if (!first_.known() || load <= Real(0)) return step;
     const Unit p = share<N>(load, load + first_.radius);
-    const Real a = along<N>(first_.across, way);
-    if (!second_.known()) return way - times<N>(first_.across, multiply<Real>(p, a));
+    const Real a = along<N>(first_.across, step);
+    if (!second_.known()) return step - times<N>(first_.across, multiply<Real>(p, a));
     const Unit q = share<N>(load, load + second_.radius);
-    const Real b = along<N>(second_.across, way);
+    const Real b = along<N>(second_.across, step);
     const Unit mixed = dot(first_.across, second_.across);
     const Real whole(Unit(1) - mixed * p * (mixed * q));
-    if (whole < Real(0.02)) return way - times<N>(second_.across, multiply<Real>(q, b));
+    if (whole < Real(0.02)) return step - times<N>(second_.across, multiply<Real>(q, b));
     const Real one = multiply<Real>(p, a - multiply<Real>(mixed * q, b)) / whole;
     const Real two = multiply<Real>(q, b - multiply<Real>(mixed * p, a)) / whole;
-    return way - times<N>(first_.across, one) - times<N>(second_.across, two);
+    return step - times<N>(first_.across, one) - times<N>(second_.across, two);
   }
 
  private:
@@ -86,8 +86,8 @@ class Bowl {
   }
   /// At most a radian.
   static constexpr Turn turn_of_normal(const Curve<N>& curve, Place moved) noexcept {
-    const Real way = std::clamp(along<N>(curve.across, moved), -curve.radius, curve.radius);
-    const Unit turn = share<N>(way, curve.radius);
+    const Real step = std::clamp(along<N>(curve.across, moved), -curve.radius, curve.radius);
+    const Unit turn = share<N>(step, curve.radius);
     return {curve.across.x * turn, curve.across.y * turn, curve.across.z * turn};
   }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The shell's sums: every instruction set against their definition, bit for bit.
-#include "controller/kernel/point_shell/shell_sums.hpp"
+#include "controller/kernel/point_shell/point_sums.hpp"
 
 #include <array>
 #include <cstddef>
@@ -11,19 +11,19 @@
 #include <doctest/doctest.h>
 
 #include "tests/kernel/case_count.hpp"
-#include "tests/kernel/shell_support.hpp"
+#include "tests/kernel/contact_support.hpp"
 
 using namespace kerf;
 using namespace kerf::test;
 
 namespace {
 
-using Sums = ShellSums<FixedNumbers>;
+using Sums = PointSums<FixedNumbers>;
 
 bool same(const Sums& a, const Sums& b) {
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    if (a.rise[axis] != b.rise[axis] || a.lever[axis] != b.lever[axis] ||
-        a.high_lever[axis] != b.high_lever[axis]) {
+    if (a.gradient[axis] != b.gradient[axis] || a.offset[axis] != b.offset[axis] ||
+        a.high_offset[axis] != b.high_offset[axis]) {
       return false;
     }
   }
@@ -32,11 +32,11 @@ bool same(const Sums& a, const Sums& b) {
 }
 
 /// Some samples of a sphere, the last group not full.
-ShellTool<FixedNumbers> some_shell(int count, double radius, bool round) {
+ToolPoints<FixedNumbers> some_shell(int count, double radius, bool round) {
   Dice dice(static_cast<std::uint32_t>(count));
   std::vector<Point> samples;
   for (int i = 0; i < count; ++i) samples.push_back(radius * dice.direction());
-  return ShellTool<FixedNumbers>(samples, round);
+  return ToolPoints<FixedNumbers>(samples, round);
 }
 
 /// Any densities, or walls of them between air.
@@ -57,10 +57,10 @@ TestVolume hard_field(const VoxelGrid& grid, int kind, Dice& dice) {
   });
 }
 
-ShellStep<FixedNumbers> any_step(const Shell<FixedNumbers>& shell, Dice& dice) {
+PointStep<FixedNumbers> any_step(const PointShell<FixedNumbers>& shell, Dice& dice) {
   const std::array<Point, 3> rotation = turned_to(dice.direction(), dice);
   const double stretch = std::ldexp(double(shell.reach), shell.step_bits) * dice.uniform(0.2, 1);
-  ShellStep<FixedNumbers> step;
+  PointStep<FixedNumbers> step;
   step.shift = shell.step_bits - 1;
   for (std::size_t i = 0; i < 3; ++i) {
     for (std::size_t j = 0; j < 3; ++j) {
@@ -80,21 +80,21 @@ TEST_CASE("every instruction set sums a shell to the bit, wherever it is") {
       const TestVolume volume = hard_field(grid, kind, dice);
       for (const int count : {1, 16, 47, 96}) {
         const bool round = count % 2 == 0;
-        const ShellTool<FixedNumbers> tool = some_shell(count, count == 1 ? 0.5 : 4.5, round);
-        const Shell<FixedNumbers> shell = tool.shell();
-        ShellMemory<FixedNumbers> memory, truth_memory;
+        const ToolPoints<FixedNumbers> tool = some_shell(count, count == 1 ? 0.5 : 4.5, round);
+        const PointShell<FixedNumbers> shell = tool.shell();
+        PlaceMemory<FixedNumbers> memory, truth_memory;
         memory.hold(shell);
         truth_memory.hold(shell);
-        const std::int32_t whole = count / kShellGroup * kShellGroup;  // groups to be read
+        const std::int32_t whole = count / kPointGroup * kPointGroup;  // groups to be read
         const auto room = static_cast<std::size_t>(whole);
         const Density iso = kind == 2 ? 65535 : static_cast<Density>(dice.uniform(1, 65536));
-        const ShellField all{grid, volume.density.data(), density_scale(iso), {}};
+        const DensityField all{grid, volume.density.data(), density_scale(iso), {}};
         const FreeBrickMap map(grid, volume.density, 1);
-        ShellField field = all;
+        DensityField field = all;
         field.free = map.bricks();
         for (int i = 0; i < cases(1250); ++i) {
-          const ShellStep<FixedNumbers> step = any_step(shell, dice);
-          place_shell<FixedNumbers>(shell.table, step, truth_memory.places());
+          const PointStep<FixedNumbers> step = any_step(shell, dice);
+          place_points<FixedNumbers>(shell.table, step, truth_memory.places());
           const double out = i % 3 == 0 ? 7 : -1;  // across the border, or inside
           const Q16 at[3] = {Q16(dice.uniform(-out, grid.nx + out)),
                              Q16(dice.uniform(-out, grid.ny + out)),
@@ -104,21 +104,21 @@ TEST_CASE("every instruction set sums a shell to the bit, wherever it is") {
           if (i % 4 == 2) centre[1] &= ~0xffff;
           // Every group read, against every set with groups left out.
           const Sums truth =
-              shell_sums<FixedNumbers>(shell.table, truth_memory.places(), centre, all);
+              point_sums<FixedNumbers>(shell.table, truth_memory.places(), centre, all);
           const std::int32_t looked_at =
-              shell_sums<FixedNumbers>(shell.table, truth_memory.places(), centre, field).read;
+              point_sums<FixedNumbers>(shell.table, truth_memory.places(), centre, field).read;
           felt += truth.weight != 0 ? 1 : 0;
           skipped += kind == 4 && truth.weight == 0 ? 1 : 0;
           for (auto set = kernel_sets(); *set != nullptr; ++set) {
-            (*set)->place_shell(shell.table, step, memory.places());
+            (*set)->place_points(shell.table, step, memory.places());
             Sums sums;
             sums.weight = sums.square = sums.high = sums.top = -1;  // left over from before
-            (*set)->sum_shell(shell.table, memory.places(), centre, field, sums);
+            (*set)->sum_points(shell.table, memory.places(), centre, field, sums);
             const bool alike = same(sums, truth) && sums.read == looked_at;
             std::vector<std::int32_t> read(room), truly_read(room);
-            (*set)->read_shell(memory.places(), whole, centre, field, read.data());
-            read_shell<FixedNumbers>(truth_memory.places(), whole, centre, field,
-                                     truly_read.data());
+            (*set)->read_points(memory.places(), whole, centre, field, read.data());
+            read_points<FixedNumbers>(truth_memory.places(), whole, centre, field,
+                                      truly_read.data());
             if (!alike || read != truly_read) {
               INFO(std::string((*set)->name), ", ", count, " samples, kind ", kind, ", case ", i);
               REQUIRE(alike);
@@ -134,8 +134,8 @@ TEST_CASE("every instruction set sums a shell to the bit, wherever it is") {
 }
 
 TEST_CASE("the largest shell deep in the densest volume stays within the sums' range") {
-  const ShellTool<FixedNumbers> tool = some_shell(kMaxShellSamples, 60, false);
-  const Shell<FixedNumbers> shell = tool.shell();
+  const ToolPoints<FixedNumbers> tool = some_shell(kMaxShellPoints, 60, false);
+  const PointShell<FixedNumbers> shell = tool.shell();
   // Full density in every second voxel of x: the steepest gradient and, at its voxels, r = 1.
   const VoxelGrid grid{130, 130, 130};
   for (const bool striped : {false, true}) {
@@ -143,43 +143,43 @@ TEST_CASE("the largest shell deep in the densest volume stays within the sums' r
       return striped && x % 2 == 0 ? 0 : 65535;
     });
     for (auto set = kernel_sets(); *set != nullptr; ++set) {
-      ShellMemory<FixedNumbers> memory;
+      PlaceMemory<FixedNumbers> memory;
       memory.hold(shell);
-      ShellStep<FixedNumbers> step;
+      PointStep<FixedNumbers> step;
       step.shift = shell.step_bits - 1;
       for (std::size_t axis = 0; axis < 3; ++axis) {
         step.row[axis][axis] = static_cast<std::int32_t>(
             std::lround(std::ldexp(double(shell.reach), shell.step_bits)));
       }
-      (*set)->place_shell(shell.table, step, memory.places());
+      (*set)->place_points(shell.table, step, memory.places());
       const std::int32_t centre[3] = {65 << 16, 65 << 16, 65 << 16};
-      const ShellField field{grid, volume.density.data(), density_scale(32768), {}};
+      const DensityField field{grid, volume.density.data(), density_scale(32768), {}};
       Sums sums;
-      (*set)->sum_shell(shell.table, memory.places(), centre, field, sums);
+      (*set)->sum_points(shell.table, memory.places(), centre, field, sums);
       CAPTURE(std::string((*set)->name));
       CHECK(sums.weight > 0);
       CHECK(sums.density > 0);
       CHECK(sums.square < std::int64_t{1} << 53);
       CHECK(sums.top <= 32767);
-      if (!striped) CHECK(sums.solid == kMaxShellSamples);
+      if (!striped) CHECK(sums.solid == kMaxShellPoints);
     }
   }
 }
 
 TEST_CASE("a volume without a cell is not felt") {
-  const ShellTool<FixedNumbers> tool = some_shell(40, 3, true);
-  const Shell<FixedNumbers> shell = tool.shell();
+  const ToolPoints<FixedNumbers> tool = some_shell(40, 3, true);
+  const PointShell<FixedNumbers> shell = tool.shell();
   for (const VoxelGrid grid : {VoxelGrid{1, 5, 5}, {5, 1, 5}, {5, 5, 1}}) {
     const TestVolume volume = filled(grid, 65535);
     for (auto set = kernel_sets(); *set != nullptr; ++set) {
-      ShellMemory<FixedNumbers> memory;
+      PlaceMemory<FixedNumbers> memory;
       memory.hold(shell);
       Dice dice(1);
-      (*set)->place_shell(shell.table, any_step(shell, dice), memory.places());
+      (*set)->place_points(shell.table, any_step(shell, dice), memory.places());
       const std::int32_t centre[3] = {0, 2 << 16, 2 << 16};
       Sums sums;
-      (*set)->sum_shell(shell.table, memory.places(), centre,
-                        {grid, volume.density.data(), density_scale(32768), {}}, sums);
+      (*set)->sum_points(shell.table, memory.places(), centre,
+                         {grid, volume.density.data(), density_scale(32768), {}}, sums);
       CHECK(sums.weight == 0);
     }
   }

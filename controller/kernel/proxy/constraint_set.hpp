@@ -7,16 +7,16 @@
 #include <cstdint>
 #include <type_traits>
 
+#include "controller/kernel/proxy/constraint_plane.hpp"
 #include "controller/kernel/proxy/contact_math.hpp"
-#include "controller/kernel/proxy/plane.hpp"
 
 namespace kerf {
 
 /// The planes that hold the tool, their depths counted from where its centre is now.
 template <class N>
-struct PlaneBundle {
+struct ConstraintSet {
   std::size_t count = 0;
-  std::array<Plane<N>, kMaxPlanes> plane{};
+  std::array<ConstraintPlane<N>, kMaxPlanes> plane{};
 };
 
 /// Where a tool goes that is asked to move by `way`: `move = way + SUM load_i normal_i`.
@@ -91,15 +91,15 @@ class Loads {
 /// Any |way| of 16384 units at most; eight sets at most, and four and two without the oldest.
 /// Fixed: within 4 steps of each plane for a way of some units.
 template <class N>
-[[nodiscard]] constexpr Slide<N> nearest(const PlaneBundle<N>& planes,
-                                         ContactVec<typename N::Real> way) noexcept {
+[[nodiscard]] constexpr Slide<N> nearest(const ConstraintSet<N>& planes,
+                                         ContactVec<typename N::Real> displacement) noexcept {
   using Real = typename N::Real;
   using Unit = typename N::Unit;
   constexpr auto kTouching = Real(1.0 / 16384);  // 4 steps of Q15.16
   typename Loads<N>::Products products{};
   typename Loads<N>::Needs need{};
   for (std::size_t i = 0; i < planes.count; ++i) {
-    need[i] = planes.plane[i].depth - along<N>(planes.plane[i].normal, way);
+    need[i] = planes.plane[i].depth - along<N>(planes.plane[i].normal, displacement);
     products[i][i] = Unit(1);
     for (std::size_t j = 0; j < i; ++j) {
       products[i][j] = products[j][i] = dot(planes.plane[i].normal, planes.plane[j].normal);
@@ -107,7 +107,7 @@ template <class N>
   }
   for (std::size_t count = planes.count; count > 0; --count) {
     for (unsigned set = 0; set < 1U << count; ++set) {
-      Slide<N> slide{way};
+      Slide<N> slide{displacement};
       if (set == 7) {
         if (!Loads<N>::of_three(products, need, slide.load)) continue;
       } else if (set != 0) {
@@ -122,22 +122,22 @@ template <class N>
         slide.move = slide.move + times<N>(planes.plane[i].normal, slide.load[i]);
       }
       for (std::size_t i = 0; i < count; ++i) {
-        const Plane<N>& plane = planes.plane[i];
+        const ConstraintPlane<N>& plane = planes.plane[i];
         allowed = allowed && along<N>(plane.normal, slide.move) >= plane.depth - kTouching;
       }
       if (allowed) return slide;
     }
   }
-  return {way};
+  return {displacement};
 }
 
 /// Planes closer than this are one face seen from two places: on a bump they would look like a
-/// crease, and in a hollow bowl.hpp knows better how it goes on between them. (With 15 degrees a
-/// slot with a play of 0.1 units lets the tool rest between two places up to 0.05 units apart.)
+/// crease, and in a hollow curvature.hpp knows better how it goes on between them. (With 15 degrees
+/// a slot with a play of 0.1 units lets the tool rest between two places up to 0.05 units apart.)
 inline constexpr double kFalseCreaseCosine = 0.7071067811865476;  // 45 degrees
 
 template <class N>
-[[nodiscard]] constexpr bool has_plane_like(const PlaneBundle<N>& planes,
+[[nodiscard]] constexpr bool has_plane_like(const ConstraintSet<N>& planes,
                                             ContactVec<typename N::Unit> normal) noexcept {
   for (std::size_t i = 0; i < planes.count; ++i) {
     if (dot(planes.plane[i].normal, normal) > typename N::Unit(kFalseCreaseCosine)) return true;
@@ -146,41 +146,42 @@ template <class N>
 }
 
 template <class N>
-[[nodiscard]] constexpr PlaneBundle<N> bundle_of(const Probe<N>& probe) noexcept {
-  return {static_cast<std::size_t>(probe.count), probe.plane};
+[[nodiscard]] constexpr ConstraintSet<N> constraints_of(const Contacts<N>& felt) noexcept {
+  return {static_cast<std::size_t>(felt.count), felt.plane};
 }
 
 /// Adds planes of a place `moved` before while there is room, if they are unlike and still near:
 /// between 0.5 units out of reach and 0.3 units deep.
 template <class N>
-constexpr void keep(PlaneBundle<N>& bundle, const PlaneBundle<N>& older,
+constexpr void keep(ConstraintSet<N>& constraints, const ConstraintSet<N>& older,
                     ContactVec<typename N::Real> moved) noexcept {
   using Real = typename N::Real;
-  for (std::size_t i = 0; i < older.count && bundle.count < kMaxPlanes; ++i) {
-    Plane<N> plane = older.plane[i];
+  for (std::size_t i = 0; i < older.count && constraints.count < kMaxPlanes; ++i) {
+    ConstraintPlane<N> plane = older.plane[i];
     plane.depth = plane.depth - along<N>(plane.normal, moved);
     const bool near = plane.depth > Real(-0.5) && plane.depth < Real(0.3);
-    if (near && !has_plane_like(bundle, plane.normal)) bundle.plane[bundle.count++] = plane;
+    if (near && !has_plane_like(constraints, plane.normal))
+      constraints.plane[constraints.count++] = plane;
   }
 }
 
 /// Adds those planes of a place that turned out too deep which hold the tool already where it is,
 /// `way` before: within 0.02 units. Returns whether there was one.
 template <class N>
-[[nodiscard]] constexpr bool learn(PlaneBundle<N>& bundle, const Probe<N>& seen,
-                                   ContactVec<typename N::Real> way) noexcept {
+[[nodiscard]] constexpr bool learn(ConstraintSet<N>& constraints, const Contacts<N>& seen,
+                                   ContactVec<typename N::Real> displacement) noexcept {
   using Real = typename N::Real;
   constexpr auto kNear = Real(0.02);
-  const std::size_t before = bundle.count;
+  const std::size_t before = constraints.count;
   for (std::size_t i = 0; i < static_cast<std::size_t>(seen.count); ++i) {
-    Plane<N> plane = seen.plane[i];
-    if (bundle.count == kMaxPlanes || plane.depth < -kNear) break;
-    plane.depth = plane.depth + along<N>(plane.normal, way);
-    if (plane.depth < kNear && !has_plane_like(bundle, plane.normal)) {
-      bundle.plane[bundle.count++] = plane;
+    ConstraintPlane<N> plane = seen.plane[i];
+    if (constraints.count == kMaxPlanes || plane.depth < -kNear) break;
+    plane.depth = plane.depth + along<N>(plane.normal, displacement);
+    if (plane.depth < kNear && !has_plane_like(constraints, plane.normal)) {
+      constraints.plane[constraints.count++] = plane;
     }
   }
-  return bundle.count > before;
+  return constraints.count > before;
 }
 
 }  // namespace kerf

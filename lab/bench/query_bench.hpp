@@ -8,10 +8,10 @@
 
 namespace kerf {
 
-/// Times one probe of the swept contact, and one turn of its tool, on 256 x 256 x 161 voxels, in
+/// Times one query of the swept contact, and one turn of its tool, on 256 x 256 x 161 voxels, in
 /// this process on this core. The paper has no such thing: ratios divide the plain loop's time.
 /// Takes some seconds.
-[[nodiscard]] std::vector<KernelRow> bench_probes(
-    const std::function<void(const KernelRow&)>& told);
+[[nodiscard]] std::vector<KernelRow> bench_queries(
+    const std::function<void(const KernelRow&)>& add_row);
 
 }  // namespace kerf

@@ -6,7 +6,7 @@
 #include <cstdint>
 
 #include "controller/kernel/point_shell/free_bricks.hpp"
-#include "controller/kernel/point_shell/shell_table.hpp"
+#include "controller/kernel/point_shell/point_table.hpp"
 
 namespace kerf {
 
@@ -14,11 +14,11 @@ namespace kerf {
 /// it is laid out anew for each.
 template <class N, std::size_t kCount>
 struct SpiralArrays {
-  static constexpr std::size_t kGroups = kCount / kShellGroup;
-  static_assert(kGroups * kShellGroup == kCount);
+  static constexpr std::size_t kGroups = kCount / kPointGroup;
+  static_assert(kGroups * kPointGroup == kCount);
 
-  std::array<std::array<ShellNumber<N>, kCount>, 3> lever{};
-  std::array<ShellNumber<N>, kGroups> middle{};
+  std::array<std::array<PointNumber<N>, kCount>, 3> offset{};
+  std::array<PointNumber<N>, kGroups> middle{};
   std::array<std::uint8_t, kGroups> bricks{};
   double reach{};
 
@@ -37,7 +37,7 @@ struct SpiralArrays {
       const Place place = place_of(i);
       const double at[3] = {place.across * cosine, place.along, place.across * sine};
       for (std::size_t axis = 0; axis < 3; ++axis) {
-        lever[axis][i] = static_cast<ShellNumber<N>>(kOne * at[axis]);
+        offset[axis][i] = static_cast<PointNumber<N>>(kOne * at[axis]);
       }
       const double turned = cosine * kCosine - sine * kSine;
       sine = sine * kCosine + cosine * kSine;
@@ -47,16 +47,16 @@ struct SpiralArrays {
   }
 
   /// No voxel's edge is shorter than a unit, so `reach` holds in voxels.
-  [[nodiscard]] constexpr ShellTable<N> table() const noexcept {
-    ShellTable<N> table;
+  [[nodiscard]] constexpr PointTable<N> table() const noexcept {
+    PointTable<N> table;
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      table.lever[axis] = lever[axis].data();
+      table.offset[axis] = offset[axis].data();
       table.middle[axis] = middle.data();
     }
     table.bricks = bricks.data();
     table.count = static_cast<std::int32_t>(kCount);
     table.groups = static_cast<std::int32_t>(kGroups);
-    table.reach = static_cast<ShellNumber<N>>(reach * (N::kIsFixed ? 65536 : 1));
+    table.reach = static_cast<PointNumber<N>>(reach * (N::kIsFixed ? 65536 : 1));
     return table;
   }
 };
@@ -64,11 +64,11 @@ struct SpiralArrays {
 /// Memory of the places of a spiral.
 template <class N, std::size_t kCount>
 struct SpiralPlaces {
-  std::array<std::array<ShellNumber<N>, kCount>, 3> offset;
-  std::array<std::array<ShellNumber<N>, SpiralArrays<N, kCount>::kGroups>, 3> middle;
+  std::array<std::array<PointNumber<N>, kCount>, 3> offset_vox;
+  std::array<std::array<PointNumber<N>, SpiralArrays<N, kCount>::kGroups>, 3> middle;
 
-  [[nodiscard]] ShellPlaces<N> places() noexcept {
-    return {{offset[0].data(), offset[1].data(), offset[2].data()},
+  [[nodiscard]] PointPlaces<N> places() noexcept {
+    return {{offset_vox[0].data(), offset_vox[1].data(), offset_vox[2].data()},
             {middle[0].data(), middle[1].data(), middle[2].data()}};
   }
 };

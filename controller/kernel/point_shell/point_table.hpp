@@ -13,33 +13,33 @@ namespace kerf {
 
 /// A number of the shell's kernels; in fixed a plain integer, in the format that is told with it.
 template <class N>
-using ShellNumber = typename N::Weight;
+using PointNumber = typename N::Weight;
 
-inline constexpr std::int32_t kShellGroup =
+inline constexpr std::int32_t kPointGroup =
     16;  ///< samples that lie together; counts are multiples
-inline constexpr std::int32_t kMaxShellSamples = 8192;  ///< sums then fit 53 bits
+inline constexpr std::int32_t kMaxShellPoints = 8192;  ///< sums then fit 53 bits
 
 /// A tool's samples, axis by axis in the tool's axes. Made at load
-/// (controller/plan/shell_tool.hpp) and points into the maker's memory.
+/// (controller/plan/tool_points.hpp) and points into the maker's memory.
 template <class N>
-struct ShellTable {
-  const ShellNumber<N>* lever[3] = {};   ///< from the tool's centre, over its reach; Q0.15
-  const ShellNumber<N>* middle[3] = {};  ///< of each group, the same
+struct PointTable {
+  const PointNumber<N>* offset[3] = {};  ///< from the tool's centre, over its reach; Q0.15
+  const PointNumber<N>* middle[3] = {};  ///< of each group, the same
   const std::uint8_t* bricks = nullptr;  ///< `free_bricks_for` each group
   std::int32_t count = 0;                ///< of samples
   std::int32_t groups = 0;
-  bool round = false;      ///< a ball: the lever is the normal
-  ShellNumber<N> reach{};  ///< no offset of a sample is longer; voxels, Q15.16
+  bool round = false;      ///< a ball: the offset is the normal
+  PointNumber<N> reach{};  ///< no offset of a sample is longer; voxels, Q15.16
 };
 
-/// The step from levers to voxels of one volume: offset_i = (SUM_k row[i][k] lever[k]) 2^-shift in
-/// Q15.16, rounded half up. In fixed |row[i]| <= 65000 and |lever| <= 2^15, but for their
-/// roundings, so no sum leaves 31 bits. A ball's caps have levers of up to 1.42 times that, but
+/// The step from offsets to voxels of one volume: offset_i = (SUM_k row[i][k] offset[k]) 2^-shift
+/// in Q15.16, rounded half up. In fixed |row[i]| <= 65000 and |offset| <= 2^15, but for their
+/// roundings, so no sum leaves 31 bits. A ball's caps have offsets of up to 1.42 times that, but
 /// rows of 53248 at most, made so that no offset is above 1.04 radii. In floating point there is no
 /// shift.
 template <class N>
-struct ShellStep {
-  ShellNumber<N> row[3][3] = {};
+struct PointStep {
+  PointNumber<N> row[3][3] = {};
   std::int32_t shift = 1;
 };
 
@@ -48,9 +48,9 @@ inline constexpr std::int32_t kNoSampleVox = 1 << 14;
 
 /// A turned tool in one volume, in voxels; Q15.16. As long as the table's arrays.
 template <class N>
-struct ShellPlaces {
-  ShellNumber<N>* offset[3] = {};  ///< of the samples from the centre
-  ShellNumber<N>* middle[3] = {};  ///< of the groups
+struct PointPlaces {
+  PointNumber<N>* offset_vox[3] = {};  ///< of the samples from the centre
+  PointNumber<N>* middle[3] = {};      ///< of the groups
 };
 
 /// Takes densities to those of contact, in which the iso-surface is at 1/2:
@@ -77,7 +77,7 @@ template <class S>
 }
 
 /// What the shell reads in one volume; `density` changes as material is cut.
-struct ShellField {
+struct DensityField {
   VoxelGrid grid;
   const Density* density = nullptr;
   DensityScale scale;
@@ -85,22 +85,22 @@ struct ShellField {
 };
 
 /// Sums over the samples, r the density of contact, w = r^p, p = 4 for balls and 6 for the rest.
-/// v = w, but 3 w - w / r for balls: half the derivative of their peak (shell_peak.hpp) where it is
-/// at the iso, but for SUM w. Levers are weighted with u = w, but w r for balls: where density
+/// v = w, but 3 w - w / r for balls: half the derivative of their peak (contact_peak.hpp) where it
+/// is at the iso, but for SUM w. Offsets are weighted with u = w, but w r for balls: where density
 /// begins trilinear reads are raised, and over a normal near an axis of the voxels, whose layers
 /// cross the contact in bands, that would tilt a ball's normal. In fixed r is Q15, the weights are
-/// Q24, gradients are in the volume's densities over 2, levers in Q0.15. Exact, so that no order
+/// Q24, gradients are in the volume's densities over 2, offsets in Q0.15. Exact, so that no order
 /// and no instruction set matters: |sum| < 2^53.
 template <class N>
-struct ShellSums {
-  typename N::Sum weight{};       ///< SUM w
-  typename N::Sum density{};      ///< SUM w r
-  typename N::Sum square{};       ///< SUM w r^2, r^2 in Q16; 0 for balls
-  typename N::Sum rise[3] = {};   ///< SUM v grad, voxel axes
-  typename N::Sum lever[3] = {};  ///< SUM u lever
-  typename N::Sum high{};         ///< SUM w r^2, which weights `high_lever`; 0 for balls
-  typename N::Sum high_lever[3] = {};
-  ShellNumber<N> top{};         ///< the largest r
+struct PointSums {
+  typename N::Sum weight{};          ///< SUM w
+  typename N::Sum density{};         ///< SUM w r
+  typename N::Sum square{};          ///< SUM w r^2, r^2 in Q16; 0 for balls
+  typename N::Sum gradient[3] = {};  ///< SUM v grad, voxel axes
+  typename N::Sum offset[3] = {};    ///< SUM u offset
+  typename N::Sum high{};            ///< SUM w r^2, which weights `high_offset`; 0 for balls
+  typename N::Sum high_offset[3] = {};
+  PointNumber<N> top{};         ///< the largest r
   std::int32_t top_sample = 0;  ///< the last sample that has it
   std::int32_t solid = 0;       ///< samples in the solid, r >= 1/2
   std::int32_t read = 0;        ///< samples that were looked at, by whole groups

@@ -3,17 +3,17 @@
 
 #include <cmath>
 
-#include "controller/kernel/point_shell/shell_table.hpp"
+#include "controller/kernel/point_shell/point_table.hpp"
 
 namespace kerf {
 
 /// A share of the tool's reach as the shell's tables hold it; fixed: Q0.15.
 template <class N>
-[[nodiscard]] ShellNumber<N> lever_of(double share) {
+[[nodiscard]] PointNumber<N> sample_offset(double share) {
   if constexpr (N::kIsFixed) {
-    return static_cast<ShellNumber<N>>(std::lround(share * 32768));
+    return static_cast<PointNumber<N>>(std::lround(share * 32768));
   } else {
-    return static_cast<ShellNumber<N>>(share);
+    return static_cast<PointNumber<N>>(share);
   }
 }
 

@@ -9,7 +9,7 @@
 #include <doctest/doctest.h>
 
 #include "controller/kernel/proxy/proxy_sweep.hpp"
-#include "tests/kernel/shell_support.hpp"
+#include "tests/kernel/contact_support.hpp"
 
 using namespace kerf;
 using namespace kerf::test;
@@ -31,8 +31,8 @@ ContactFrame<N> frame_of(const std::array<Point, 3>& rotation, const Point& edge
   return frame;
 }
 
-static_assert(ContactField<ShellProbe<FixedNumbers>, FixedNumbers>);
-static_assert(ContactField<ShellProbe<DoubleNumbers>, DoubleNumbers>);
+static_assert(ContactField<ContactQuery<FixedNumbers>, FixedNumbers>);
+static_assert(ContactField<ContactQuery<DoubleNumbers>, DoubleNumbers>);
 
 const SceneTool kBall = tool_of_units("ball", 8, 16);
 
@@ -58,12 +58,12 @@ TEST_CASE_TEMPLATE("turned volumes of long voxels feel like upright ones", N, Fi
       return height;
     };
     const TestVolume volume = blurred({30, 30, 30}, height, 4);
-    ProbeRig<N> rig(tool);
+    QueryRig<N> rig(tool);
     rig.add(volume, frame_of<N>(axes, edge, {14.5, 14.5, 14.5}));
     rig.turn(turned_to(tool_axis, dice));
     const double offset = rig.rest({0, 0, 0}, n);
     CHECK(std::abs(offset) < 0.09);
-    const Probe<N> felt = rig.at(offset * n);
+    const Contacts<N> felt = rig.at(offset * n);
     REQUIRE(felt.count == 1);
     CHECK(degrees_between(normal_of(felt.plane[0]), n) < 1.5);
     CHECK(std::abs(double(felt.depth)) < 0.01);
@@ -78,18 +78,18 @@ TEST_CASE_TEMPLATE("each volume gives a plane, the deepest three are kept in ord
   const Point towards[] = {{0, 0, 1}, {0, 1, 0}, {1, 0, 0}, {0, 0, -1}};
   const double deep[] = {0.1, 0.4, 0.2, 0.3};
   std::array<TestVolume, 4> volumes;
-  ProbeRig<N> rig(kBall);
+  QueryRig<N> rig(kBall);
   for (std::size_t i = 0; i < 4; ++i) {
     volumes[i] = blurred({28, 28, 28}, [&](const Point& x) {
       return dot(towards[i], x - Point{13.5, 13.5, 13.5}) + 8 - deep[i];
     });
     rig.add(volumes[i], plain_frame<N>());
-    const Probe<N> felt = rig.at({13.5, 13.5, 13.5});
+    const Contacts<N> felt = rig.at({13.5, 13.5, 13.5});
     CHECK(felt.count == static_cast<int>(std::min<std::size_t>(i + 1, 3)));
     CHECK(felt.depth == felt.plane[0].depth);
     CHECK_FALSE(felt.buried);
   }
-  const Probe<N> felt = rig.at({13.5, 13.5, 13.5});
+  const Contacts<N> felt = rig.at({13.5, 13.5, 13.5});
   const std::size_t order[] = {1, 3, 2};
   for (std::size_t i = 0; i < 3; ++i) {
     CHECK(double(felt.plane[i].depth) == doctest::Approx(deep[order[i]]).epsilon(0.2));
@@ -101,8 +101,8 @@ TEST_CASE_TEMPLATE("a tool deep in the solid is buried and has no plane", N, Fix
                    DoubleNumbers) {
   const TestVolume volume = blurred({40, 40, 60}, [](const Point& x) { return x[2] - 50; });
   for (const SceneTool& tool : {kBall, tool_of_units("cone", 6, 18)}) {
-    const ProbeRig<N> rig(tool, volume);
-    const Probe<N> felt = rig.at({20, 20, 20});
+    const QueryRig<N> rig(tool, volume);
+    const Contacts<N> felt = rig.at({20, 20, 20});
     CHECK(felt.buried);
     CHECK(felt.count == 0);
     CHECK(felt.depth > typename N::Real(0.5));
@@ -112,12 +112,12 @@ TEST_CASE_TEMPLATE("a tool deep in the solid is buried and has no plane", N, Fix
 
 TEST_CASE_TEMPLATE("far from every volume nothing is felt", N, FixedNumbers, DoubleNumbers) {
   const TestVolume volume = filled({12, 12, 12}, 65535);
-  const ProbeRig<N> rig(kBall, volume);
+  const QueryRig<N> rig(kBall, volume);
   for (const double far : {-8192.0, -30.0, 30.0, 8192.0}) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
       Point q{6, 6, 6};
       q[axis] = far;
-      const Probe<N> felt = rig.at(q);
+      const Contacts<N> felt = rig.at(q);
       CHECK(felt.count == 0);
       CHECK(felt.depth == typename N::Real(-1));
       CHECK(rig.free_distance(q) > std::abs(far) - 24);
@@ -133,7 +133,7 @@ TEST_CASE_TEMPLATE("within the free distance a tool feels nothing", N, FixedNumb
   const TestVolume volume = blurred({60, 50, 60}, [](const Point& x) {
     return length(x - Point{20, 25, 20}) - 6;
   });
-  const ProbeRig<N> rig(tool_of_units("ball", 3, 6), volume);
+  const QueryRig<N> rig(tool_of_units("ball", 3, 6), volume);
   int free = 0;
   for (int i = 0; i < 2000; ++i) {
     const Point q{dice.uniform(-20, 80), dice.uniform(-20, 70), dice.uniform(-20, 80)};
@@ -148,7 +148,7 @@ TEST_CASE_TEMPLATE("within the free distance a tool feels nothing", N, FixedNumb
 TEST_CASE_TEMPLATE("a lone high sample lifts the peak of many low ones", N, FixedNumbers,
                    DoubleNumbers) {
   using Ratio = typename N::Ratio;
-  ShellMeans<N> means;
+  PointMeans<N> means;
   means.density = Ratio(0.2);
   means.square = Ratio(0.04);
   means.top = Ratio(0.3);
@@ -165,7 +165,7 @@ TEST_CASE_TEMPLATE("the height of a peak does not depend on its dimension", N, F
   for (const double e : {0.0, 0.5, 1.0, 1.5, 2.0}) {
     // Means of h and h^2 with weights h^6 where heights are as frequent as (H - h)^(e - 1).
     const double height = 0.5, mean = height * 7 / (7 + e);
-    ShellMeans<N> means;
+    PointMeans<N> means;
     means.density = Ratio(mean);
     means.square = Ratio(mean * height * 8 / (8 + e));
     means.top = Ratio(height);
@@ -179,21 +179,21 @@ TEST_CASE_TEMPLATE(
   // Felt on all sides, solid nowhere: the dearest that there is.
   const TestVolume tissue = blurred({40, 40, 40}, [](Point p) { return 0.2 + 0.01 * (p[1] - 20); });
   for (const SceneTool& tool : {kBall, tool_of_units("cylinder", 5, 16)}) {
-    ProbeRig<N> rig(tool);
+    QueryRig<N> rig(tool);
     rig.add(tissue, plain_frame<N>());
     const Point middle{20, 20, 20};
     const auto answered = [&] {
-      int probes = 0;
-      while (probes < 100 && !rig.at(middle).buried) ++probes;
-      return probes;
+      int queries = 0;
+      while (queries < 100 && !rig.at(middle).buried) ++queries;
+      return queries;
     };
     CHECK(answered() == 100);  // nothing is counted before the first tick
     for (int tick = 0; tick < 3; ++tick) {
       rig.field().begin_tick();
-      const int probes = answered();
-      // A cylinder's have closer looks, which cost as much as two probes.
-      CHECK(probes >= (tool.round ? ProbeWork::kLeastProbes : 8));
-      CHECK(probes <= 25);
+      const int queries = answered();
+      // A cylinder's have closer looks, which cost as much as two queries.
+      CHECK(queries >= (tool.round ? QueryWork::kLeastQueries : 8));
+      CHECK(queries <= 25);
     }
     rig.field().turn({});
     CHECK(answered() == 1);
@@ -207,13 +207,14 @@ TEST_CASE_TEMPLATE("all volumes of a probe are looked at alike, while the tick h
   for (int pose = 0; pose < 20; ++pose) {
     const Point n = dice.direction(), top{20, 20, 20};
     const TestVolume flat = blurred({40, 40, 40}, [&](Point p) { return dot(p - top, n); });
-    ShellRig<N> rig(cylinder);
+    ContactRig<N> rig(cylinder);
     for (int copy = 0; copy < 3; ++copy) rig.add(flat, plain_frame<N>());
     rig.field().turn(dice.turn<N>(dice.uniform(0, 3)));
     const auto place = place_of<N>(top + dice.uniform(4, 8) * n);
     rig.field().begin_tick();
     rig.field().turn(dice.turn<N>(0));
-    for (Probe<N> felt = rig.field().probe(place); !felt.buried; felt = rig.field().probe(place)) {
+    for (Contacts<N> felt = rig.field().query(place); !felt.buried;
+         felt = rig.field().query(place)) {
       for (std::int32_t k = 1; k < felt.count; ++k) {
         CHECK(felt.plane[static_cast<std::size_t>(k)].depth == felt.plane[0].depth);
         CHECK(felt.plane[static_cast<std::size_t>(k)].normal == felt.plane[0].normal);
@@ -228,9 +229,9 @@ TEST_CASE_TEMPLATE("no tick of a sweep spends more than a scene is planned with"
   const Point middle{30, 30, 30};
   for (const SceneTool& tool :
        {kBall, tool_of_units("cylinder", 5, 16), tool_of_units("cylinder", 10, 30)}) {
-    ShellRig<N> rig(tool);
+    ContactRig<N> rig(tool);
     rig.add(tissue, plain_frame<N>());
-    const ProbeWork work = rig.field().work();
+    const QueryWork work = rig.field().work();
     Dice dice(7);
     std::int64_t most = 0;
     for (int tick = 0; tick < 300; ++tick) {
@@ -238,7 +239,7 @@ TEST_CASE_TEMPLATE("no tick of a sweep spends more than a scene is planned with"
       const ProxyPose<N> goal{place_of<N>(middle + dice.uniform(1, 30) * dice.direction()),
                               dice.turn<N>(dice.uniform(0, 3))};
       rig.field().begin_tick();
-      ProxySweep<N, ShellProbe<N>>(rig.field(), pose, {}, rig.turn_step()).tick(goal);
+      ProxySweep<N, ContactQuery<N>>(rig.field(), pose, {}, rig.turn_step()).tick(goal);
       most = std::max(most, rig.field().spent());
     }
     CHECK(most <= work.most());

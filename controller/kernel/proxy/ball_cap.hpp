@@ -5,9 +5,9 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "controller/kernel/proxy/contact_peak.hpp"
 #include "controller/kernel/proxy/contact_space.hpp"
-#include "controller/kernel/proxy/shell_peak.hpp"
-#include "controller/kernel/proxy/shell_spiral.hpp"
+#include "controller/kernel/proxy/spiral_points.hpp"
 #include "controller/kernel/proxy/tool_turn.hpp"
 #include "shared/numeric/fixed.hpp"
 
@@ -21,7 +21,7 @@ namespace kerf {
 /// (peak_height) and a little, since no sample is at the summit. On 1000 edges of 90 degrees a ball
 /// of 8 rests within 0.114 units of the iso-surface; with the wide cap alone within 0.2. By the
 /// highest sample instead the force would step by 14 % where the ball slides along an edge, not 3.
-inline constexpr std::size_t kCapSamples = 6 * kShellGroup, kSummitSamples = 8 * kShellGroup;
+inline constexpr std::size_t kCapSamples = 6 * kPointGroup, kSummitSamples = 8 * kPointGroup;
 inline constexpr double kCapRadius = 3.25;  ///< units; half the ball's where that is less
 inline constexpr double kSummitRadius = 1.25;
 inline constexpr double kSummitAbove = 0.1;  ///< units: of the summit over what its samples tell
@@ -70,7 +70,7 @@ template <class N>
 /// at a height of 0.08 it is 1.4 of them (slope 0.5, reach 8), so there they count wholly or not
 /// at all. The depth is 0.16 units then, 0.01 N in the default scene.
 template <class N>
-[[nodiscard]] constexpr typename N::Unit sharpness(const ShellSums<N>& sums, std::int32_t count,
+[[nodiscard]] constexpr typename N::Unit sharpness(const PointSums<N>& sums, std::int32_t count,
                                                    typename N::Ratio height,
                                                    typename N::Ratio slope,
                                                    typename N::Real reach) noexcept {

@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "controller/kernel/point_shell/shell_table.hpp"
+#include "controller/kernel/point_shell/point_table.hpp"
 #include "shared/volume/voxel_grid.hpp"
 
 namespace kerf {
@@ -12,20 +12,20 @@ namespace kerf {
 /// What one sample reads: density of contact in 0..1 (fixed: 0..32767), and its gradient in voxel
 /// axes; in fixed that of the volume's densities over 2, before `DensityScale`.
 template <class N>
-struct ShellSample {
-  ShellNumber<N> density{};
-  ShellNumber<N> gradient[3] = {};
+struct PointSample {
+  PointNumber<N> density{};
+  PointNumber<N> gradient[3] = {};
 };
 
 /// Fainter samples weigh nothing: below 1/16. They are noise, and w has no bits left for them.
 template <class N>
-inline constexpr ShellNumber<N> kFaintest = N::kIsFixed ? ShellNumber<N>(2048)
-                                                        : ShellNumber<N>(0.0625);
+inline constexpr PointNumber<N> kFaintest = N::kIsFixed ? PointNumber<N>(2048)
+                                                        : PointNumber<N>(0.0625);
 
 /// a + (b - a) w; fixed: w in Q0.15, rounded half up.
 template <class N>
-[[nodiscard]] constexpr ShellNumber<N> shell_lerp(ShellNumber<N> a, ShellNumber<N> b,
-                                                  ShellNumber<N> w) noexcept {
+[[nodiscard]] constexpr PointNumber<N> point_lerp(PointNumber<N> a, PointNumber<N> b,
+                                                  PointNumber<N> w) noexcept {
   if constexpr (N::kIsFixed) {
     return a + (((b - a) * w + (1 << 14)) >> 15);
   } else {
@@ -40,9 +40,9 @@ template <class N>
 /// exact value. Differences are 16 bits, products 31. Where the density is clipped at 1 it has no
 /// gradient.
 template <class N>
-[[nodiscard]] constexpr ShellSample<N> shell_sample(const ShellField& field,
-                                                    const ShellNumber<N> (&place)[3]) noexcept {
-  using S = ShellNumber<N>;
+[[nodiscard]] constexpr PointSample<N> point_sample(const DensityField& field,
+                                                    const PointNumber<N> (&place)[3]) noexcept {
+  using S = PointNumber<N>;
   std::int32_t low[3] = {};
   S w[3] = {};
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -63,7 +63,7 @@ template <class N>
   const Density* voxel = field.density + grid.index(low[0], low[1], low[2]);
   const auto row = static_cast<std::size_t>(grid.nx);
   const std::size_t plane = row * static_cast<std::size_t>(grid.ny);
-  const auto blend = [](S a, S b, S t) { return shell_lerp<N>(a, b, t); };
+  const auto blend = [](S a, S b, S t) { return point_lerp<N>(a, b, t); };
   S at[2], along_y[2], along_z[2];  // by the x of the corner
   for (std::size_t x = 0; x < 2; ++x) {
     const auto corner = [&](std::size_t y, std::size_t z) {
@@ -78,7 +78,7 @@ template <class N>
     along_y[x] = far_y - near_y;
     along_z[x] = far_z - near_z;
   }
-  ShellSample<N> sample;
+  PointSample<N> sample;
   const S read = blend(at[0], at[1], w[0]);
   sample.gradient[0] = at[1] - at[0];
   sample.gradient[1] = blend(along_y[0], along_y[1], w[0]);
@@ -102,10 +102,10 @@ template <class N>
 /// Adds sample i. Fixed: r^2 in Q16, r^3 and the weights in Q24, each product of 32 unsigned
 /// bits.
 template <class N>
-constexpr void add_sample(ShellSums<N>& sums, std::int32_t i, const ShellSample<N>& sample,
-                          const ShellNumber<N> (&lever)[3], bool round) noexcept {
+constexpr void add_sample(PointSums<N>& sums, std::int32_t i, const PointSample<N>& sample,
+                          const PointNumber<N> (&offset)[3], bool round) noexcept {
   using Sum = typename N::Sum;
-  const ShellNumber<N> r = sample.density;
+  const PointNumber<N> r = sample.density;
   if (r < kFaintest<N>) return;
   Sum square{}, weight{}, pull{}, lift{};  // r^2, w, v, u
   if constexpr (N::kIsFixed) {
@@ -123,13 +123,13 @@ constexpr void add_sample(ShellSums<N>& sums, std::int32_t i, const ShellSample<
     weight = round ? square * square : square * square * square;
     pull = round ? Sum(3) * weight - square * r : weight;
     lift = round ? weight * r : weight;
-    sums.solid += r >= ShellNumber<N>(0.5) ? 1 : 0;
+    sums.solid += r >= PointNumber<N>(0.5) ? 1 : 0;
   }
   sums.weight += weight;
   sums.density += weight * r;
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    sums.rise[axis] += pull * sample.gradient[axis];
-    sums.lever[axis] += lift * lever[axis];
+    sums.gradient[axis] += pull * sample.gradient[axis];
+    sums.offset[axis] += lift * offset[axis];
   }
   if (r >= sums.top) {
     sums.top = r;
@@ -140,77 +140,78 @@ constexpr void add_sample(ShellSums<N>& sums, std::int32_t i, const ShellSample<
   Sum high = weight * square;
   if constexpr (N::kIsFixed) high = (weight >> 8) * square >> 8;
   sums.high += high;
-  for (std::size_t axis = 0; axis < 3; ++axis) sums.high_lever[axis] += high * lever[axis];
+  for (std::size_t axis = 0; axis < 3; ++axis) sums.high_offset[axis] += high * offset[axis];
 }
 
-/// One offset: see ShellStep.
+/// One offset: see PointStep.
 template <class N>
-[[nodiscard]] constexpr ShellNumber<N> shell_offset(const ShellStep<N>& step, std::size_t axis,
-                                                    const ShellNumber<N> (&lever)[3]) noexcept {
+[[nodiscard]] constexpr PointNumber<N> point_offset(const PointStep<N>& step, std::size_t axis,
+                                                    const PointNumber<N> (&offset)[3]) noexcept {
   const auto& row = step.row[axis];
-  const ShellNumber<N> way = row[0] * lever[0] + row[1] * lever[1] + row[2] * lever[2];
+  const PointNumber<N> turned = row[0] * offset[0] + row[1] * offset[1] + row[2] * offset[2];
   if constexpr (N::kIsFixed) {
-    return (way + (1 << (step.shift - 1))) >> step.shift;
+    return (turned + (1 << (step.shift - 1))) >> step.shift;
   } else {
-    return way;
+    return turned;
   }
 }
 
 template <class N>
-constexpr void place_shell(const ShellTable<N>& table, const ShellStep<N>& step,
-                           const ShellPlaces<N>& places) noexcept {
+constexpr void place_points(const PointTable<N>& table, const PointStep<N>& step,
+                            const PointPlaces<N>& places) noexcept {
   const auto place = [&step](const auto& from, const auto& to, std::int32_t count) {
     for (std::int32_t i = 0; i < count; ++i) {
-      const ShellNumber<N> lever[3] = {from[0][i], from[1][i], from[2][i]};
-      for (std::size_t axis = 0; axis < 3; ++axis) to[axis][i] = shell_offset<N>(step, axis, lever);
+      const PointNumber<N> offset[3] = {from[0][i], from[1][i], from[2][i]};
+      for (std::size_t axis = 0; axis < 3; ++axis)
+        to[axis][i] = point_offset<N>(step, axis, offset);
     }
   };
-  place(table.lever, places.offset, table.count);
+  place(table.offset, places.offset_vox, table.count);
   place(table.middle, places.middle, table.groups);
-  constexpr ShellNumber<N> kNone(N::kIsFixed ? kNoSampleVox << 16 : kNoSampleVox);
-  for (std::int32_t i = table.count; i < table.groups * kShellGroup; ++i) {
-    places.offset[0][i] = kNone;
+  constexpr PointNumber<N> kNone(N::kIsFixed ? kNoSampleVox << 16 : kNoSampleVox);
+  for (std::int32_t i = table.count; i < table.groups * kPointGroup; ++i) {
+    places.offset_vox[0][i] = kNone;
   }
 }
 
-/// The densities of so many samples, a multiple of kShellGroup.
+/// The densities of so many samples, a multiple of kPointGroup.
 template <class N>
-constexpr void read_shell(const ShellPlaces<N>& places, std::int32_t count,
-                          const ShellNumber<N> (&centre)[3], const ShellField& field,
-                          ShellNumber<N>* density) noexcept {
+constexpr void read_points(const PointPlaces<N>& places, std::int32_t count,
+                           const PointNumber<N> (&centre)[3], const DensityField& field,
+                           PointNumber<N>* density) noexcept {
   for (std::int32_t i = 0; i < count; ++i) {
-    const ShellNumber<N> place[3] = {centre[0] + places.offset[0][i],
-                                     centre[1] + places.offset[1][i],
-                                     centre[2] + places.offset[2][i]};
-    density[i] = shell_sample<N>(field, place).density;
+    const PointNumber<N> place[3] = {centre[0] + places.offset_vox[0][i],
+                                     centre[1] + places.offset_vox[1][i],
+                                     centre[2] + places.offset_vox[2][i]};
+    density[i] = point_sample<N>(field, place).density;
   }
 }
 
 /// All groups but those around which the volume is free: their densities are faint anyway. `centre`
 /// of the tool in voxels (fixed: Q15.16), near enough for all places to stay in range.
 template <class N>
-[[nodiscard]] constexpr ShellSums<N> shell_sums(const ShellTable<N>& table,
-                                                const ShellPlaces<N>& places,
-                                                const ShellNumber<N> (&centre)[3],
-                                                const ShellField& field) noexcept {
-  ShellSums<N> sums;
+[[nodiscard]] constexpr PointSums<N> point_sums(const PointTable<N>& table,
+                                                const PointPlaces<N>& places,
+                                                const PointNumber<N> (&centre)[3],
+                                                const DensityField& field) noexcept {
+  PointSums<N> sums;
   const VoxelGrid& grid = field.grid;
   if (grid.nx < 2 || grid.ny < 2 || grid.nz < 2) return sums;  // no cell
   for (std::int32_t group = 0; group < table.groups; ++group) {
     std::int32_t middle[3] = {};
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      const ShellNumber<N> at = centre[axis] + places.middle[axis][group];
+      const PointNumber<N> at = centre[axis] + places.middle[axis][group];
       middle[axis] =
           N::kIsFixed ? static_cast<std::int32_t>(at) >> 16 : static_cast<std::int32_t>(at);
     }
     if (field.free.at(middle[0], middle[1], middle[2]) >= table.bricks[group]) continue;
-    sums.read += kShellGroup;
-    for (std::int32_t i = group * kShellGroup; i < (group + 1) * kShellGroup; ++i) {
-      const ShellNumber<N> place[3] = {centre[0] + places.offset[0][i],
-                                       centre[1] + places.offset[1][i],
-                                       centre[2] + places.offset[2][i]};
-      const ShellNumber<N> lever[3] = {table.lever[0][i], table.lever[1][i], table.lever[2][i]};
-      add_sample<N>(sums, i, shell_sample<N>(field, place), lever, table.round);
+    sums.read += kPointGroup;
+    for (std::int32_t i = group * kPointGroup; i < (group + 1) * kPointGroup; ++i) {
+      const PointNumber<N> place[3] = {centre[0] + places.offset_vox[0][i],
+                                       centre[1] + places.offset_vox[1][i],
+                                       centre[2] + places.offset_vox[2][i]};
+      const PointNumber<N> offset[3] = {table.offset[0][i], table.offset[1][i], table.offset[2][i]};
+      add_sample<N>(sums, i, point_sample<N>(field, place), offset, table.round);
     }
   }
   return sums;

@@ -5,24 +5,24 @@
 #include <array>
 #include <cstdint>
 
-#include "controller/kernel/point_shell/shell_table.hpp"
+#include "controller/kernel/point_shell/point_table.hpp"
+#include "controller/kernel/proxy/constraint_plane.hpp"
 #include "controller/kernel/proxy/contact_space.hpp"
-#include "controller/kernel/proxy/plane.hpp"
 #include "controller/kernel/proxy/tool_turn.hpp"
 #include "shared/numeric/fixed.hpp"
 #include "shared/numeric/vec.hpp"
 
 namespace kerf {
 
-/// A ShellSums over its weight, in contact space. Ratio (Q7.24) holds them: only a gradient can
+/// A PointSums over its weight, in contact space. Ratio (Q7.24) holds them: only a gradient can
 /// saturate, in a volume whose iso is below 1 % of its range.
 template <class N>
-struct ShellMeans {
+struct PointMeans {
   using Ratio = typename N::Ratio;
 
   Ratio density{}, square{};
-  ContactVec<Ratio> rise{};   ///< gradient weighted with v, density per unit
-  ContactVec<Ratio> lever{};  ///< from the tool's centre, over its reach
+  ContactVec<Ratio> gradient{};  ///< gradient weighted with v, density per unit
+  ContactVec<Ratio> offset{};    ///< from the tool's centre, over its reach
   Ratio top{};
 };
 
@@ -35,7 +35,7 @@ struct ContactFrame {
 };
 
 /// A sum over its weight, which is above 0. `bits`: from the sum's fraction bits, less those of the
-/// weight, to 24. Fixed: numerators stay below 2^62 for kMaxShellSamples.
+/// weight, to 24. Fixed: numerators stay below 2^62 for kMaxShellPoints.
 template <class N>
 [[nodiscard]] constexpr typename N::Ratio mean_of(typename N::Sum sum, typename N::Sum weight,
                                                   [[maybe_unused]] int bits) noexcept {
@@ -48,8 +48,8 @@ template <class N>
 
 /// `rise` of the means alone.
 template <class N>
-[[nodiscard]] constexpr ContactVec<typename N::Ratio> mean_rise(
-    const ShellSums<N>& sums, const DensityScale& scale, const ContactFrame<N>& frame) noexcept {
+[[nodiscard]] constexpr ContactVec<typename N::Ratio> mean_gradient(
+    const PointSums<N>& sums, const DensityScale& scale, const ContactFrame<N>& frame) noexcept {
   using Ratio = typename N::Ratio;
   const auto along = [&](typename N::Sum part) {
     const Ratio unscaled = mean_of<N>(part, sums.weight, 9);
@@ -60,37 +60,38 @@ template <class N>
       return unscaled;
     }
   };
-  const VoxelVec<Ratio> voxels{along(sums.rise[0]), along(sums.rise[1]), along(sums.rise[2])};
+  const VoxelVec<Ratio> voxels{along(sums.gradient[0]), along(sums.gradient[1]),
+                               along(sums.gradient[2])};
   return transposed(frame.voxel_from_contact) * voxels;
 }
 
-/// A lever from the tool's axes to those of the world.
+/// An offset from the tool's axes to those of the world.
 template <class N>
-[[nodiscard]] constexpr ContactVec<typename N::Ratio> turned_lever(
-    const typename N::Ratio (&lever)[3], const TurnRows<N>& turn) noexcept {
+[[nodiscard]] constexpr ContactVec<typename N::Ratio> turned_offset(
+    const typename N::Ratio (&offset)[3], const TurnRows<N>& turn) noexcept {
   using Ratio = typename N::Ratio;
   const auto turned = [&](const std::array<typename N::Unit, 3>& row) {
-    return multiply<Ratio>(row[0], lever[0]) + multiply<Ratio>(row[1], lever[1]) +
-           multiply<Ratio>(row[2], lever[2]);
+    return multiply<Ratio>(row[0], offset[0]) + multiply<Ratio>(row[1], offset[1]) +
+           multiply<Ratio>(row[2], offset[2]);
   };
   return {turned(turn[0]), turned(turn[1]), turned(turn[2])};
 }
 
 template <class N>
-[[nodiscard]] constexpr ShellMeans<N> shell_means(const ShellSums<N>& sums,
+[[nodiscard]] constexpr PointMeans<N> point_means(const PointSums<N>& sums,
                                                   const DensityScale& scale,
                                                   const ContactFrame<N>& frame,
                                                   const TurnRows<N>& turn, bool round) noexcept {
   using Ratio = typename N::Ratio;
-  ShellMeans<N> means;
+  PointMeans<N> means;
   means.density = mean_of<N>(sums.density, sums.weight, 9);
   means.square = mean_of<N>(sums.square, sums.weight, 8);
-  means.rise = mean_rise(sums, scale, frame);
+  means.gradient = mean_gradient(sums, scale, frame);
   typename N::Sum lift = round ? sums.density : sums.weight;  // SUM u
   if constexpr (N::kIsFixed) lift >>= round ? 15 : 0;         // Q24 of Q39: 16 at least
-  const Ratio lever[3] = {mean_of<N>(sums.lever[0], lift, 9), mean_of<N>(sums.lever[1], lift, 9),
-                          mean_of<N>(sums.lever[2], lift, 9)};
-  means.lever = turned_lever<N>(lever, turn);
+  const Ratio offset[3] = {mean_of<N>(sums.offset[0], lift, 9), mean_of<N>(sums.offset[1], lift, 9),
+                           mean_of<N>(sums.offset[2], lift, 9)};
+  means.offset = turned_offset<N>(offset, turn);
   if constexpr (N::kIsFixed) {
     means.top = Ratio::from_raw(sums.top << 9);
   } else {
@@ -121,7 +122,7 @@ template <class N>
 /// e of a shape that is no ball, see peak_height, from its mean of h^2: over the square of the mean
 /// it is 8 (7 + e) / (7 (8 + e)).
 template <class N>
-[[nodiscard]] constexpr typename N::Ratio fall_of(const ShellMeans<N>& means) noexcept {
+[[nodiscard]] constexpr typename N::Ratio fall_of(const PointMeans<N>& means) noexcept {
   using Ratio = typename N::Ratio;
   const Ratio spread = std::max(Ratio(1), means.square / means.density / means.density);
   const Ratio rest = Ratio(8) - Ratio(7) * spread;
@@ -136,7 +137,7 @@ template <class N>
 /// falls. A ball touches in a point, e = 1. Any other shape may also touch in a line (1/2), in a
 /// face (0) or with a corner (2): there the mean of h^2 tells e.
 template <class N>
-[[nodiscard]] constexpr typename N::Ratio peak_height(const ShellMeans<N>& means,
+[[nodiscard]] constexpr typename N::Ratio peak_height(const PointMeans<N>& means,
                                                       bool round) noexcept {
   using Ratio = typename N::Ratio;
   // p = 4 gives 1.2. Where density begins trilinear reads are raised, and samples below 1/16 are
@@ -176,33 +177,35 @@ template <class N>
   return direction<N>(ContactVec<Ratio>{mixed(a.x, b.x), mixed(a.y, b.y), mixed(a.z, b.z)});
 }
 
-/// Minus the weighted lever reads no gradient and has no steps at the borders of cells, so it is a
+/// Minus the weighted offset reads no gradient and has no steps at the borders of cells, so it is a
 /// ball's normal, and the only one that a wall of two voxels leaves right: behind its middle the
-/// gradient points on. In a groove of the ball's own radius, however, the levers point out of its
+/// gradient points on. In a groove of the ball's own radius, however, the offsets point out of its
 /// bottom whichever wall the ball is in. There they are spread over half a turn and their mean is
 /// short, 2 / pi: from 0.85 to 0.7 of the reach, and from 20 to 50 degrees between the two, the
 /// derivative of the peak takes over. (From 30 to 60 the force steps by 5 % there instead of 2.)
 template <class N>
 [[nodiscard]] constexpr ContactVec<typename N::Unit> ball_normal(
-    const ShellMeans<N>& means, ContactVec<typename N::Unit> downhill) noexcept {
+    const PointMeans<N>& means, ContactVec<typename N::Unit> downhill) noexcept {
   using Unit = typename N::Unit;
   using Ratio = typename N::Ratio;
-  const ContactVec<Unit> lever = direction<N>(-means.lever);
-  const Unit spread = falling_share<N>(Unit(std::min(norm(means.lever), Ratio(1))), 0.85, 0.7);
-  const Unit share = spread * falling_share<N>(dot(lever, downhill), 0.9397, 0.6428);
-  if (share <= Unit{} || downhill == ContactVec<Unit>{}) return lever;
-  return between<N>(lever, downhill, share);
+  const ContactVec<Unit> offset = direction<N>(-means.offset);
+  const Unit spread = falling_share<N>(Unit(std::min(norm(means.offset), Ratio(1))), 0.85, 0.7);
+  const Unit share = spread * falling_share<N>(dot(offset, downhill), 0.9397, 0.6428);
+  if (share <= Unit{} || downhill == ContactVec<Unit>{}) return offset;
+  return between<N>(offset, downhill, share);
 }
 
 /// How density falls along a normal, per unit. v is half a ball's derivative.
 template <class N>
-[[nodiscard]] constexpr typename N::Ratio slope_along(const ShellMeans<N>& means,
+[[nodiscard]] constexpr typename N::Ratio slope_along(const PointMeans<N>& means,
                                                       ContactVec<typename N::Unit> normal,
                                                       bool round) noexcept {
   using Ratio = typename N::Ratio;
-  const auto along = [](Ratio rise, typename N::Unit n) { return multiply<Ratio>(rise, n); };
-  const Ratio uphill = -(along(means.rise.x, normal.x) + along(means.rise.y, normal.y) +
-                         along(means.rise.z, normal.z));
+  const auto along = [](Ratio gradient, typename N::Unit n) {
+    return multiply<Ratio>(gradient, n);
+  };
+  const Ratio uphill = -(along(means.gradient.x, normal.x) + along(means.gradient.y, normal.y) +
+                         along(means.gradient.z, normal.z));
   return std::clamp(round ? uphill + uphill : uphill, Ratio(kFlattestSlope), Ratio(kSteepestSlope));
 }
 
@@ -214,18 +217,18 @@ template <class N>
 
 /// The plane of one volume's contact by the shell's own samples. `reach` of the tool in units. The
 /// normal is of a ball `ball_normal`, of another shape the weighted gradient, which near rest is a
-/// first guess: a closer look corrects all three parts (shell_probe.hpp). None, of length 0, where
-/// the tool feels the same all round.
+/// first guess: a closer look corrects all three parts (contact_query.hpp). None, of length 0,
+/// where the tool feels the same all round.
 template <class N>
-[[nodiscard]] constexpr Plane<N> plane_of(const ShellMeans<N>& means, typename N::Real reach,
-                                          bool round) noexcept {
+[[nodiscard]] constexpr ConstraintPlane<N> plane_of(const PointMeans<N>& means,
+                                                    typename N::Real reach, bool round) noexcept {
   using Real = typename N::Real;
-  const auto downhill = direction<N>(-means.rise);
-  Plane<N> plane;
+  const auto downhill = direction<N>(-means.gradient);
+  ConstraintPlane<N> plane;
   plane.normal = round ? ball_normal<N>(means, downhill) : downhill;
   plane.depth = depth_of<N>(peak_height(means, round), slope_along(means, plane.normal, round));
-  plane.arm = {multiply<Real>(means.lever.x, reach), multiply<Real>(means.lever.y, reach),
-               multiply<Real>(means.lever.z, reach)};
+  plane.arm = {multiply<Real>(means.offset.x, reach), multiply<Real>(means.offset.y, reach),
+               multiply<Real>(means.offset.z, reach)};
   return plane;
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Where tools rest on bodies of known shape, and what they feel there. Edges over two voxels.
-#include "controller/kernel/proxy/shell_probe.hpp"
+#include "controller/kernel/proxy/contact_query.hpp"
 
 #include <array>
 #include <cmath>
@@ -9,7 +9,7 @@
 
 #include <doctest/doctest.h>
 
-#include "tests/kernel/shell_support.hpp"
+#include "tests/kernel/contact_support.hpp"
 
 using namespace kerf;
 using namespace kerf::test;
@@ -66,12 +66,12 @@ Rest rest_on(const Solid& body_under, int places) {
     const Point p = centre - body_under.rest * n;
     const TestVolume volume =
         blurred({28, 28, 28}, [&](const Point& x) { return body_under.distance(n, b, x - p); });
-    const ProbeRig<N> rig(ball, volume);
+    const QueryRig<N> rig(ball, volume);
     const double offset = rig.rest(centre, n);
     found.mean += offset / places;
     found.lowest = std::min(found.lowest, offset);
     found.highest = std::max(found.highest, offset);
-    const Probe<N> felt = rig.at(centre + offset * n);
+    const Contacts<N> felt = rig.at(centre + offset * n);
     REQUIRE(felt.count == 1);
     found.worst_angle_deg =
         std::max(found.worst_angle_deg, degrees_between(normal_of(felt.plane[0]), n));
@@ -124,7 +124,7 @@ TEST_CASE_TEMPLATE("sliding over a ball of 40 the height is steady and the norma
     const Point middle = Point{15.2, 15.4, 15.7} - (40 + kRadius) * n;
     const TestVolume volume =
         blurred({32, 32, 32}, [&](const Point& x) { return length(x - middle) - 40; });
-    const ProbeRig<N> rig(ball, volume);
+    const QueryRig<N> rig(ball, volume);
     double sum = 0, squares = 0, worst_deg = 0;
     constexpr int kSteps = 60;
     for (int i = 0; i < kSteps; ++i) {
@@ -134,7 +134,7 @@ TEST_CASE_TEMPLATE("sliding over a ball of 40 the height is steady and the norma
       const double height = rig.rest(q, radial, 0.2);
       sum += height;
       squares += height * height;
-      const Probe<N> felt = rig.at(q + height * radial);
+      const Contacts<N> felt = rig.at(q + height * radial);
       worst_deg = std::max(worst_deg, degrees_between(normal_of(felt.plane[0]), radial));
     }
     const double mean = sum / kSteps;
@@ -157,10 +157,10 @@ TEST_CASE("fixed point feels what double feels, on noise as well") {
       const TestVolume volume = blurred({32, 32, 32}, [&](const Point& x) {
         return dot(n, x - centre) + support - 0.3 + dice.uniform(-noise, noise);
       });
-      const ProbeRig<FixedNumbers> fixed(tool, volume);
-      const ProbeRig<DoubleNumbers> real(tool, volume);
-      const Probe<FixedNumbers> a = fixed.at(centre);
-      const Probe<DoubleNumbers> b = real.at(centre);
+      const QueryRig<FixedNumbers> fixed(tool, volume);
+      const QueryRig<DoubleNumbers> real(tool, volume);
+      const Contacts<FixedNumbers> a = fixed.at(centre);
+      const Contacts<DoubleNumbers> b = real.at(centre);
       REQUIRE(a.count == b.count);
       REQUIRE(b.count == 1);
       // Depth is height over a slope of 1/2: half of its difference is that of the height.
@@ -192,12 +192,12 @@ TEST_CASE_TEMPLATE("a turned cylinder rests on rim, side and face", N, FixedNumb
     const Point centre{15 + dice.uniform(0, 1), 15 + dice.uniform(0, 1), 15 + dice.uniform(0, 1)};
     const TestVolume volume =
         blurred({32, 32, 32}, [&](const Point& x) { return dot(n, x - centre) + support; });
-    ProbeRig<N> rig(cylinder, volume);
+    QueryRig<N> rig(cylinder, volume);
     rig.turn(turned_to(axis, dice));
     const double offset = rig.rest(centre, n);
     mean += offset / kPlaces;
     CHECK(std::abs(offset) < 0.075);
-    const Probe<N> felt = rig.at(centre + offset * n);
+    const Contacts<N> felt = rig.at(centre + offset * n);
     REQUIRE(felt.count == 1);
     CHECK(degrees_between(normal_of(felt.plane[0]), n) < 0.6);
     // The arm leads to the contact: as deep along n as the tool reaches.
@@ -233,13 +233,13 @@ TEST_CASE_TEMPLATE("every shape rests on planes whatever its pose", N, FixedNumb
       const Point centre{14 + dice.uniform(0, 1), 14 + dice.uniform(0, 1), 14 + dice.uniform(0, 1)};
       const TestVolume volume =
           blurred({30, 30, 30}, [&](const Point& x) { return dot(n, x - centre) + support; });
-      ProbeRig<N> rig(tool, volume);
+      QueryRig<N> rig(tool, volume);
       rig.turn(turned_to(axis, dice));
       const double offset = rig.rest(centre, n);
       CAPTURE(std::string(c.shape));
       CHECK(std::abs(offset) < 0.075);
       mean += offset / kPlaces;
-      const Probe<N> felt = rig.at(centre + offset * n);
+      const Contacts<N> felt = rig.at(centre + offset * n);
       REQUIRE(felt.count == 1);
       CHECK(degrees_between(normal_of(felt.plane[0]), n) < 0.6);
     }

@@ -4,7 +4,7 @@
 #include <array>
 #include <cstddef>
 
-#include "lab/rig/shell_rig.hpp"
+#include "lab/rig/contact_rig.hpp"
 #include "tests/kernel/support.hpp"
 
 /// Tools and bodies of known shape for the tests of the swept contact; all lengths in units.
@@ -29,12 +29,12 @@ inline std::array<Point, 3> turned_to(const Point& axis, Dice& dice) {
 
 /// A rig that answers for single places, without a sweep.
 template <class N>
-class ProbeRig : public ShellRig<N> {
+class QueryRig : public ContactRig<N> {
  public:
-  using ShellRig<N>::ShellRig;
+  using ContactRig<N>::ContactRig;
 
   void turn(const std::array<Point, 3>& rotation) { this->field().turn(tool_turn<N>(rotation)); }
-  [[nodiscard]] Probe<N> at(const Point& q) const { return this->field().probe(place_of<N>(q)); }
+  [[nodiscard]] Contacts<N> at(const Point& q) const { return this->field().query(place_of<N>(q)); }
   [[nodiscard]] double free_distance(const Point& q) const {
     return double(this->field().free_distance(place_of<N>(q)));
   }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/kernel/proxy/plane_bundle.hpp"
+#include "controller/kernel/proxy/constraint_set.hpp"
 
 #include <doctest/doctest.h>
 
@@ -17,24 +17,24 @@ constexpr double kStep = N::kIsFixed                     ? 0x1p-16
 
 /// One to three planes, no two closer than 15 degrees, that leave room at some place near.
 template <class N>
-PlaneBundle<N> random_bundle(Dice& dice) {
-  PlaneBundle<N> bundle;
+ConstraintSet<N> random_constraints(Dice& dice) {
+  ConstraintSet<N> constraints;
   const auto wanted = static_cast<std::size_t>(dice.uniform(1, 4));
   const Point room = dice.uniform(0, 0.5) * dice.direction();
-  while (bundle.count < wanted) {
+  while (constraints.count < wanted) {
     const Point normal = dice.direction();
-    if (has_plane_like(bundle, normal_of<N>(normal))) continue;
+    if (has_plane_like(constraints, normal_of<N>(normal))) continue;
     const double depth = dot(normal, room) - dice.uniform(0, 0.3);
-    bundle.plane[bundle.count++] = {normal_of<N>(normal), typename N::Real(depth), {}};
+    constraints.plane[constraints.count++] = {normal_of<N>(normal), typename N::Real(depth), {}};
   }
-  return bundle;
+  return constraints;
 }
 
 /// Dykstra's projections: slow, and in no way like the closed form.
 template <class N>
-Point projected(const PlaneBundle<N>& planes, Point way) {
+Point projected(const ConstraintSet<N>& planes, Point displacement) {
   std::array<Point, kMaxPlanes> correction{};
-  Point x = way;
+  Point x = displacement;
   for (int round = 0; round < 20'000; ++round) {
     for (std::size_t i = 0; i < planes.count; ++i) {
       const auto& n = planes.plane[i].normal;
@@ -49,17 +49,17 @@ Point projected(const PlaneBundle<N>& planes, Point way) {
 }
 
 template <class N>
-Plane<N> plane(Point normal, double depth) {
+ConstraintPlane<N> plane(Point normal, double depth) {
   return {normal_of<N>(unit(normal)), typename N::Real(depth), {}};
 }
 
 template <class N>
-Probe<N> felt(Plane<N> one) {
-  Probe<N> probe;
-  probe.depth = one.depth;
-  probe.count = 1;
-  probe.plane[0] = one;
-  return probe;
+Contacts<N> felt(ConstraintPlane<N> one) {
+  Contacts<N> found;
+  found.depth = one.depth;
+  found.count = 1;
+  found.plane[0] = one;
+  return found;
 }
 
 }  // namespace
@@ -69,10 +69,10 @@ TEST_CASE_TEMPLATE("a slide ends at the nearest place that its planes allow", N,
   Dice dice(1);
   int checked = 0;
   for (int i = 0; i < 300; ++i) {
-    const auto bundle = random_bundle<N>(dice);
-    const Point way = dice.uniform(0, 3) * dice.direction();
-    const Slide<N> slide = nearest(bundle, place_of<N>(way));
-    const Point truth = projected(bundle, way);
+    const auto constraints = random_constraints<N>(dice);
+    const Point displacement = dice.uniform(0, 3) * dice.direction();
+    const Slide<N> slide = nearest(constraints, place_of<N>(displacement));
+    const Point truth = projected(constraints, displacement);
     if (length(truth) > 10) continue;  // a cone too narrow for Dykstra
     CHECK(length(point_of<N>(slide.move) - truth) < 2e-3);
     ++checked;
@@ -85,12 +85,12 @@ TEST_CASE_TEMPLATE("planes push and never pull, and only where they are touched"
   using Real = typename N::Real;
   Dice dice(2);
   for (int i = 0; i < 20'000; ++i) {
-    const auto bundle = random_bundle<N>(dice);
-    const Point way = dice.uniform(0, 3) * dice.direction();
-    const Slide<N> slide = nearest(bundle, place_of<N>(way));
-    Point pushed = point_of<N>(slide.move) - way;
-    for (std::size_t k = 0; k < bundle.count; ++k) {
-      const auto& [normal, depth, arm] = bundle.plane[k];
+    const auto constraints = random_constraints<N>(dice);
+    const Point displacement = dice.uniform(0, 3) * dice.direction();
+    const Slide<N> slide = nearest(constraints, place_of<N>(displacement));
+    Point pushed = point_of<N>(slide.move) - displacement;
+    for (std::size_t k = 0; k < constraints.count; ++k) {
+      const auto& [normal, depth, arm] = constraints.plane[k];
       const double gap = double(along<N>(normal, slide.move) - depth);
       CHECK(gap >= -1e-4);
       CHECK(slide.load[k] >= Real(0));
@@ -105,7 +105,7 @@ TEST_CASE_TEMPLATE("planes push and never pull, and only where they are touched"
 
 TEST_CASE_TEMPLATE("a goal at the end of the range saturates nothing", N, FixedNumbers,
                    DoubleNumbers) {
-  PlaneBundle<N> floor;
+  ConstraintSet<N> floor;
   floor.plane[floor.count++] = plane<N>({0, 1, 0}, 0);
   const Slide<N> slide = nearest(floor, place_of<N>({16384, -16384, 16384}));
   CHECK(length(point_of<N>(slide.move) - Point{16384, 0, 16384}) < 1e-3);
@@ -114,7 +114,7 @@ TEST_CASE_TEMPLATE("a goal at the end of the range saturates nothing", N, FixedN
 
 TEST_CASE_TEMPLATE("where planes leave no room the oldest gives way", N, FixedNumbers, FloatNumbers,
                    DoubleNumbers) {
-  PlaneBundle<N> slot;
+  ConstraintSet<N> slot;
   slot.plane[slot.count++] = plane<N>({1, 0, 0}, 0.125);
   slot.plane[slot.count++] = plane<N>({0, 1, 0}, 0);
   slot.plane[slot.count++] = plane<N>({-1, 0, 0}, 0.125);
@@ -124,15 +124,15 @@ TEST_CASE_TEMPLATE("where planes leave no room the oldest gives way", N, FixedNu
 
 TEST_CASE_TEMPLATE("a plane seen before is kept while it is near and unlike the new ones", N,
                    FixedNumbers, DoubleNumbers) {
-  const auto merged = [](PlaneBundle<N> older, Point moved) {
-    auto bundle = bundle_of(felt<N>(plane<N>({0, 1, 0}, 0)));
-    keep(bundle, older, place_of<N>(moved));
-    return bundle;
+  const auto merged = [](ConstraintSet<N> older, Point moved) {
+    auto constraints = constraints_of(felt<N>(plane<N>({0, 1, 0}, 0)));
+    keep(constraints, older, place_of<N>(moved));
+    return constraints;
   };
   const auto older = [](Point normal, double depth) {
-    PlaneBundle<N> bundle;
-    bundle.plane[bundle.count++] = plane<N>(normal, depth);
-    return bundle;
+    ConstraintSet<N> constraints;
+    constraints.plane[constraints.count++] = plane<N>(normal, depth);
+    return constraints;
   };
   CHECK(merged(older({1, 0, 0}, 0), {}).count == 2);
   CHECK(merged(older({std::sin(0.77), std::cos(0.77), 0}, 0), {}).count == 1);
@@ -147,7 +147,7 @@ TEST_CASE_TEMPLATE("a plane seen before is kept while it is near and unlike the 
 
 TEST_CASE_TEMPLATE("a place that was too deep teaches the plane that it met", N, FixedNumbers,
                    DoubleNumbers) {
-  PlaneBundle<N> known;
+  ConstraintSet<N> known;
   known.plane[known.count++] = plane<N>({0, 1, 0}, 0);
   const auto met = felt<N>(plane<N>({1, 0, 0}, 0.5));
   CHECK(learn(known, met, place_of<N>({-0.5, 0, 0})));

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "lab/bench/probe_bench.hpp"
+#include "lab/bench/query_bench.hpp"
 
 #include <algorithm>
 #include <span>
 #include <string>
 #include <utility>
 
-#include "controller/kernel/proxy/shell_probe.hpp"
+#include "controller/kernel/proxy/contact_query.hpp"
 #include "controller/plan/free_brick_map.hpp"
-#include "controller/plan/shell_tool.hpp"
+#include "controller/plan/tool_points.hpp"
 #include "controller/tool/surface_samples.hpp"
 #include "controller/tool/tool_shapes.hpp"
 #include "lab/rig/bench_scene.hpp"
@@ -22,13 +22,13 @@ using namespace bench;
 constexpr VoxelGrid kGrid{256, 256, 161};
 constexpr int kTicks = 2000;
 
-/// A volume of voxels of one unit, ready to be probed.
+/// A volume of voxels of one unit, ready to be queried.
 struct Solid {
   explicit Solid(std::vector<Density> voxels)
       : density(std::move(voxels)), map(kGrid, density, 1) {}
 
-  [[nodiscard]] ShellVolume<FixedNumbers> seen_by(ShellMemory<FixedNumbers>& memory) const {
-    ShellVolume<FixedNumbers> volume;
+  [[nodiscard]] ContactVolume<FixedNumbers> seen_by(PlaceMemory<FixedNumbers>& memory) const {
+    ContactVolume<FixedNumbers> volume;
     volume.field = {kGrid, density.data(), density_scale(32768), map.bricks()};
     for (std::size_t axis = 0; axis < 3; ++axis) {
       volume.frame.voxel_from_contact.row[axis][axis] = FixedNumbers::Ratio(1);
@@ -45,62 +45,62 @@ ContactVec<Q16> unit_place(const Place& p) {
   return {Q16(p[0]), Q16(p[1]), Q16(p[2])};
 }
 
-class ProbeBench {
+class QueryBench {
  public:
-  explicit ProbeBench(const std::function<void(const KernelRow&)>& told) : told_(told) {}
+  explicit QueryBench(const std::function<void(const KernelRow&)>& add_row) : add_row_(add_row) {}
 
   void tool(const std::string& name, const char* shape, double radius, double length) {
     const SceneTool tool =
         make_tool(name, shape, {.pitch_mm = 1, .radius_mm = radius, .length_mm = length});
-    const ShellTool<FixedNumbers> samples(surface_samples(tool, 1), tool.round,
-                                          close_samples(tool, 1));
+    const ToolPoints<FixedNumbers> samples(surface_samples(tool, 1), tool.round,
+                                           close_samples(tool, 1));
     const auto slide = [](int i) { return around(kGrid, 16, i, kTicks); };
     const auto at_depth = [](double z) {
       return [z](int i) -> Place { return {24 + 0.05 * i, 128.3, z}; };
     };
-    probes("probe/" + name + "/slide", samples, ball_, slide);
-    probes("probe/" + name + "/half", samples, half_, at_depth(96.6));
-    probes("probe/" + name + "/immersed", samples, half_, at_depth(66.8));
+    queries("probe/" + name + "/slide", samples, ball_, slide);
+    queries("probe/" + name + "/half", samples, half_, at_depth(96.6));
+    queries("probe/" + name + "/immersed", samples, half_, at_depth(66.8));
     rows("turn/" + name, samples, half_,
-         [](ShellProbe<FixedNumbers>& probe, int /*i*/) { probe.turn({}); });
+         [](ContactQuery<FixedNumbers>& query, int /*i*/) { query.turn({}); });
   }
 
   [[nodiscard]] std::vector<KernelRow> rows() && { return std::move(rows_); }
 
  private:
   template <class PlaceAt>
-  void probes(const std::string& name, const ShellTool<FixedNumbers>& samples, const Solid& solid,
-              PlaceAt&& place) {
-    rows(name, samples, solid, [&](const ShellProbe<FixedNumbers>& probe, int i) {
-      use(probe.probe(unit_place(place(i))).depth.raw());
+  void queries(const std::string& name, const ToolPoints<FixedNumbers>& samples, const Solid& solid,
+               PlaceAt&& place) {
+    rows(name, samples, solid, [&](const ContactQuery<FixedNumbers>& query, int i) {
+      use(query.query(unit_place(place(i))).depth.raw());
     });
   }
 
   /// One row for each instruction set, the plainest first.
   template <class Tick>
-  void rows(const std::string& name, const ShellTool<FixedNumbers>& samples, const Solid& solid,
+  void rows(const std::string& name, const ToolPoints<FixedNumbers>& samples, const Solid& solid,
             Tick&& tick) {
-    const Shell<FixedNumbers> shell = samples.shell();
-    ShellMemory<FixedNumbers> memory;
+    const PointShell<FixedNumbers> shell = samples.shell();
+    PlaceMemory<FixedNumbers> memory;
     memory.hold(shell);
-    const ShellVolume<FixedNumbers> volume = solid.seen_by(memory);
+    const ContactVolume<FixedNumbers> volume = solid.seen_by(memory);
     std::vector<const KernelSet*> sets;
     for (auto set = kernel_sets(); *set != nullptr; ++set) sets.push_back(*set);
     std::reverse(sets.begin(), sets.end());
     double plain_p50_ns = 0;
     for (const KernelSet* set : sets) {
-      ShellProbe<FixedNumbers> probe(*set, shell, std::span(&volume, 1));
-      probe.turn({});
+      ContactQuery<FixedNumbers> query(*set, shell, std::span(&volume, 1));
+      query.turn({});
       const TickTimes times = time_ticks(
-          kTicks, [] {}, [&](int i) { tick(probe, i); });
+          kTicks, [] {}, [&](int i) { tick(query, i); });
       if (plain_p50_ns == 0) plain_p50_ns = times.p50_ns;
       rows_.push_back({name, "fixed", set->name, times.p50_ns, times.p99_ns, plain_p50_ns,
                        samples.bytes() + memory.bytes() + solid.map.bytes()});
-      told_(rows_.back());
+      add_row_(rows_.back());
     }
   }
 
-  const std::function<void(const KernelRow&)>& told_;
+  const std::function<void(const KernelRow&)>& add_row_;
   Solid ball_{ball_in(kGrid)};
   Solid half_{densities(kGrid, [](double, double, double z) { return 161 * 0.6 - z; })};
   std::vector<KernelRow> rows_;
@@ -108,8 +108,8 @@ class ProbeBench {
 
 }  // namespace
 
-std::vector<KernelRow> bench_probes(const std::function<void(const KernelRow&)>& told) {
-  ProbeBench bench(told);
+std::vector<KernelRow> bench_queries(const std::function<void(const KernelRow&)>& add_row) {
+  QueryBench bench(add_row);
   bench.tool("ball16", "ball", 8, 16);
   bench.tool("cylinder", "cylinder", 5, 16);
   return std::move(bench).rows();

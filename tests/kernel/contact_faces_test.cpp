@@ -11,7 +11,7 @@
 
 #include "lab/rig/loft.hpp"
 #include "lab/rig/posed_tool.hpp"
-#include "tests/kernel/shell_support.hpp"
+#include "tests/kernel/contact_support.hpp"
 
 using namespace kerf;
 using namespace kerf::test;
@@ -50,7 +50,7 @@ TEST_CASE_TEMPLATE("either face of a thin tool touches a bump where it is, with 
       const Point up = dice.direction(), top{20, 20, 20};
       const TestVolume bump =
           blurred({40, 40, 40}, [&](Point p) { return length(p - top + kBump * up) - kBump; });
-      ShellRig<N> rig(tool, bump);
+      ContactRig<N> rig(tool, bump);
       const Axes axes = facing(axis, sign, up, dice);
       rig.field().turn(axes.turn<N>());
       double turned = 0, beside = 0;
@@ -60,7 +60,7 @@ TEST_CASE_TEMPLATE("either face of a thin tool touches a bump where it is, with 
         touching[(axis + 1) % 3] = dice.uniform(-4, 4);
         touching[(axis + 2) % 3] = dice.uniform(-4, 4);
         const Point centre = top - axes.to_world(touching) + dice.uniform(-0.05, 0.05) * up;
-        const Probe<N> felt = rig.field().probe(place_of<N>(centre));
+        const Contacts<N> felt = rig.field().query(place_of<N>(centre));
         REQUIRE(felt.count == 1);
         turned = std::max(turned, degrees_between(normal_of(felt.plane[0]), up));
         beside = std::max(beside, length(axes.to_tool(point_of<N>(felt.plane[0].arm)) - touching));
@@ -84,13 +84,13 @@ TEST_CASE_TEMPLATE("a face that lies on a flat is held in its middle, on noise t
       const TestVolume flat = body_of({60, 60, 60}, [&](Point p) {
         return 0.5 - dot(p - top, up) / 2 + std::sqrt(3) * dice.uniform(-noise, noise);
       });
-      ShellRig<N> rig(tool, flat);
+      ContactRig<N> rig(tool, flat);
       const Axes axes = facing(1, -1, up, dice);
       rig.field().turn(axes.turn<N>());
       double turned = 0, beside = 0, steps = 0;
       Point last{};
       for (int i = 0; i < 200; ++i) {
-        const Probe<N> felt = rig.field().probe(place_of<N>(top + 8.0 * up + 0.01 * i * axes.x));
+        const Contacts<N> felt = rig.field().query(place_of<N>(top + 8.0 * up + 0.01 * i * axes.x));
         REQUIRE(felt.count == 1);
         const Point arm = axes.to_tool(point_of<N>(felt.plane[0].arm));
         turned = std::max(turned, degrees_between(normal_of(felt.plane[0]), up));
@@ -110,8 +110,8 @@ TEST_CASE("no group of samples has its middle outside of the tool's reach") {
   // Levers beyond it would leave 31 bits on the way to places.
   for (double radius = 0.5; radius < 31; radius *= 1.007) {
     const SampledTool ball(tool_of_units("ball", radius, 2 * radius));
-    const ShellTool<FixedNumbers> tool(ball.samples, true);
-    const ShellTable<FixedNumbers> table = tool.shell().table;
+    const ToolPoints<FixedNumbers> tool(ball.samples, true);
+    const PointTable<FixedNumbers> table = tool.shell().table;
     double farthest = 0;
     for (std::int32_t group = 0; group < table.groups; ++group) {
       farthest = std::max(farthest, std::hypot(table.middle[0][group], table.middle[1][group],
