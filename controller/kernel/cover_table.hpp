@@ -8,28 +8,28 @@
 
 namespace kerf {
 
-// What kernels of any instruction set weigh and cut of the voxels under a tool: plain structs.
+// Plain structs for the kernels that weigh and cut the voxels under a tool (docs/theory.md 6.2).
 
 /// Materials that a cut can tell apart; a label beyond counts as the last of them.
 inline constexpr std::size_t kMaxCutMaterials = 64;
 
-/// Neighbours along x that lie together.
+/// Voxels of a group: neighbours along x.
 inline constexpr std::int32_t kCoverGroup = 16;
 
-/// Voxels of a row during one tick, of which the tool covers some; where it does not, `covered`
-/// and `weight` are 0 and the voxel may lie outside of the volume.
+/// A group of voxels, of which the tool covers some, during one tick. A voxel that it does not
+/// cover has `covered` and `weight` 0, and may lie outside of the volume.
 struct CoveredGroup {
   std::uint32_t covered[kCoverGroup];  ///< density that may still leave, 15 fraction bits
   std::uint32_t weight[kCoverGroup];   ///< times speed
   std::uint16_t speed[kCoverGroup];    ///< of the tool's surface over its rim's; 2^15 is 1
   Label material[kCoverGroup];         ///< below kMaxCutMaterials; all alike unless `mixed`
-  std::int64_t at;                     ///< entry of the volume of the first
-  std::int16_t place[3];               ///< of the first
+  std::int64_t at;                     ///< index of the first voxel in the volume
+  std::int16_t place[3];               ///< voxel of the first: x, y, z
   bool mixed;
 };
 
-/// A row of overlap ratios and what is to be known about its voxels. Arrays may be read up to the
-/// end of the last group, labels where there is an overlap.
+/// A row of overlap ratios and what weighing needs to know of its voxels. Arrays may be read to the
+/// end of the last group, labels only where the overlap is not 0.
 struct CoverRow {
   const std::int16_t* ratio = nullptr;    ///< minus the overlap, 2^15 is 1; 0 outside of the volume
   const std::int16_t* density = nullptr;  ///< less 2^15
@@ -44,13 +44,14 @@ struct CoverRow {
   std::int32_t slowest = 0;              ///< least speed
 };
 
-/// Sums over the voxels of a row; by number of the voxel, the first being 0. Exact.
+/// Sums over voxels; `covered_number` weights `covered` with the voxel's number, the first being 0.
+/// Exact.
 struct CoverSums {
   std::uint64_t covered, covered_number, weight, weight_speed;
 };
 
-/// How one budget is taken. A voxel of material m loses mantissa[m] 2^-shift[m] steps with 16
-/// fraction bits per weight; the shifts are 0..63.
+/// How one tick's budget is taken: a voxel of material m loses weight * mantissa[m] 2^-shift[m]
+/// density steps, with 16 fraction bits; the shifts are 0..63.
 struct CoverSpend {
   std::uint32_t mantissa[kMaxCutMaterials], shift[kMaxCutMaterials];
   std::uint16_t phase;           ///< of the rounding

@@ -13,7 +13,7 @@
 
 namespace kerf {
 
-// Cutting that follows force: Preston's law dh/dt = k p v over the contact (haptics-science 1.4).
+// Cutting that follows force: Preston's law dh/dt = k p v over the contact (docs/theory.md 6.2).
 //
 //   o_j = rho_j r_j        the part of voxel j that the tool covers
 //   w_j = o_j v_j          v_j the speed of the tool's surface there, over its rim's

@@ -16,7 +16,7 @@ namespace kerf {
 struct ToolSpace;  ///< mm in the tool's own frame: centre of the cutting head, shaft along +y
 
 /// Least speed of the tool's surface, of its rim's: abrasive grains at the pole of a ball still
-/// tear a little, and a flat end would otherwise never cut its middle (haptics-science 1.4).
+/// tear a little, and a flat end would otherwise never cut its middle (docs/theory.md 6.3).
 inline constexpr double kSpeedFloor = 0.08;
 
 /// Square roots of 0, 1/1024 .. 1 as weights of fixed point in the low halves, what is added up to

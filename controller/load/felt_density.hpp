@@ -14,7 +14,7 @@ inline constexpr int kMaterialEdgeVoxels = 3;
 /// scaled so that `felt_iso` becomes `iso`, the one at which the whole volume is felt, drawn and
 /// cropped, and held at full density above. A soft body then touches, and is cut, as a hard one of
 /// the same shape, and a wall between two of them has no gap. Its unlabelled edge is scaled along
-/// (contact.md 8: one map of densities each).
+/// (docs/theory.md 2.1).
 ///
 /// Nothing remembers the map: from here on the volume's densities are these, so a cut needs none.
 /// Materials without `felt_iso` keep theirs, and so does an image without labels. Load time.

@@ -98,7 +98,7 @@ template <class N>
 template <class N>
 [[nodiscard]] ProxyPlan<N> plan_proxy(const LoadedScene& scene, const SceneTool& tool,
                                       const PointShell<N>& shell) {
-  constexpr double kRampNPerMs = 0.1;  // after a start inside of the solid: haptics-science 3.4
+  constexpr double kRampNPerMs = 0.1;  // after a start inside of the solid: docs/theory.md 4.7
   const double n_per_unit =
       scene.force.stiffness_n_per_mm * contact_unit_mm(scene) / scene.device.workspace_scale;
   const bool turning = tool.turns && !tool.round;

@@ -12,7 +12,7 @@
 
 namespace kerf {
 
-/// Owner of one tool's surface samples for the swept contact. Load time; moving it keeps the shell
+/// Owner of one tool's point shell for the swept contact. Load time; moving it keeps the shell
 /// valid. In FixedNumbers, FloatNumbers and DoubleNumbers.
 template <class N>
 class ToolPoints {

@@ -28,7 +28,7 @@ inline constexpr std::size_t kMaxMaterials = 32;  // labels are small indices
 inline constexpr std::string_view kPhantomFile = "phantom";
 
 /// Removal rate of enamel per newton at the reference speed, mm^3/(s N): 0.067 to 0.108 of human
-/// enamel under a diamond bur at 50 to 80 g (haptics-science 1.5).
+/// enamel under a diamond bur at 50 to 80 g (docs/theory.md 6.6).
 inline constexpr double kEnamelMm3PerSN = 0.083;
 inline constexpr double kReferenceSpeedKrpm = 300;
 

@@ -12,7 +12,7 @@
 
 namespace kerf {
 
-/// Force by the swept proxy; constant during a run.
+/// How the proxy's spring becomes a force; constant during a run.
 template <class N>
 struct ContactPlan {
   bool swept = false;                      ///< else the paper's sums are felt

@@ -9,21 +9,21 @@
 
 namespace kerf {
 
-/// The virtual coupling between hand and proxy at the device port (Colgate 1995): the only stiff
-/// element of the loop, since the proxy has no mass.
+/// The virtual coupling between hand and proxy at the device port (docs/theory.md 5.1): the only
+/// stiff element of the loop, since the proxy has no mass.
 template <class N>
 struct Coupling {
   typename N::Ratio stiffness_n_per_mm{};
   typename N::Unit damping_ns_per_mm{};
 };
 
-/// The damper is full where the spring is this long. It grows with the spring up to there, as
-/// Hunt and Crossley (1975) have it, so that a hand that arrives fast feels no blow.
+/// The damper grows with the spring (Hunt and Crossley 1975) and is full where it is this long: a
+/// hand that arrives fast feels no blow.
 inline constexpr double kFullDampingMm = 0.1;
 
-/// F = d (K p - B min(1, p / kFullDampingMm) v.d), never against d: `spring_mm` from the hand to
-/// the proxy has length p and direction d, v is the hand's velocity in mm/s. Only motion along the
-/// spring is damped, so a tool that slides has no drag, and a hand that leaves is not held back.
+/// F = d max(0, K p - B min(1, p / kFullDampingMm) v.d). `spring_mm` leads from the hand to the
+/// proxy, its length is p, its direction d; v is the hand's velocity in mm/s. Only motion along the
+/// spring is damped: a tool that slides has no drag, and a hand that leaves is not held back.
 ///
 /// Fixed: saturates at the ends of the range; a spring shorter than 2^-16 mm gives nothing.
 template <class N>

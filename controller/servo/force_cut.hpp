@@ -18,7 +18,7 @@
 namespace kerf {
 
 // Cutting because of the force that the hand feels, in the same tick: after all limits, since what
-// the hand does not feel must not cut (haptics-science 1.4).
+// the hand does not feel must not cut (docs/theory.md 6.1).
 
 /// What one tick cut.
 template <class N>

@@ -13,12 +13,13 @@
 
 namespace kerf {
 
-/// The tool cuts this far inside of the surface that it rests on, so that the groove leaves it play
-/// (contact.md 6): units of contact space. The samples of an odd shape end up to 0.7 of a pitch
-/// inside of its surface, so that its rims may rest on matter that they do not cover; those of a
-/// ball that is given by its radius end there all round but at six poles of one sample each. While
-/// a tool finds less than its force would cut it reaches deeper, to the second figure, and then
-/// back, slowly: what it rests on now it will also rest on in a moment.
+/// The tool cuts kCutAdvance inside of the surface that it rests on, so that its groove leaves it
+/// play (docs/theory.md 6.3); units of contact space. While it finds less than its force would cut
+/// it reaches deeper, up to kDeepestAdvance, and then slowly back.
+///
+/// It may find less because its inner samples end inside of its surface, of an odd shape by up to
+/// 0.7 of a pitch: its rims then rest on matter that they do not cover. A ball that is given by its
+/// radius has samples at its surface at six poles alone.
 inline constexpr double kCutAdvance = 0.25, kDeepestAdvance = 1;
 
 /// Cutting by force; constant during a run. Arrays: by index of the plan's volumes.

@@ -9,24 +9,24 @@
 
 namespace kerf {
 
-/// What one tool needs of the scene for the swept contact; constant during a run.
+/// What the swept contact needs of one tool and the scene; constant during a run.
 template <class N>
 struct ProxyPlan {
   typename N::Unit friction{};   ///< Coulomb's coefficient, 0 to 1
-  typename N::Unit turn_step{};  ///< turn_step_of(reach), or 0: round, or keeps the world's axes
-  /// Growth of the spring after a start inside of the solid: 0.1 N/ms over the spring's stiffness.
+  typename N::Unit turn_step{};  ///< turn_step_of(reach); 0: round, or keeps the world's axes
+  /// How fast the spring may grow after a start inside of the solid: 0.1 N/ms over its stiffness.
   typename N::Real ramp_per_tick{};
 };
 
-/// What one tick hands to the next. A fresh state looks for a place; so does one that is reset, as
-/// after a jump of the device, a change of the tool or a volume that was filled again.
+/// What one tick hands to the next. A fresh state looks for a place. It is made afresh after a jump
+/// of the device, a change of the tool, and when a volume was filled again.
 template <class N>
 struct ProxyState {
   ProxyPose<N> pose;
   bool placed = false;
   StartSearch<N> search;
   bool ramping = false;
-  typename N::Real longest{};  ///< of the spring while it ramps
+  typename N::Real longest{};  ///< that the spring may be while it ramps, units
 };
 
 /// The contact of one tick.
@@ -34,20 +34,24 @@ template <class N>
 struct ProxyContact {
   Placing placing = Placing::searching;
   ProxyPose<N> pose;
-  ContactVec<typename N::Real> spring{};  ///< force over stiffness: from goal to proxy, units
-  ContactVec<typename N::Unit> normal{};  ///< mean of what presses, out of the solid; 0 in air
-  /// Torque about the tool's centre over the length of the force, units.
+  ContactVec<typename N::Real> spring{};  ///< from goal to proxy, units: force over stiffness
+  ContactVec<typename N::Unit>
+      normal{};  ///< of the whole pressing force, out of the solid; 0 in air
+  /// Torque about the tool's centre over the force's length, units.
   ContactVec<typename N::Real> moment_arm{};
   std::int32_t queries = 0;
   bool turned = true;  ///< the tool has the orientation of the goal
 };
 
-/// Deeper than this the tool did not get by moving: the solid changed, and the start rule applies.
+/// No tool gets deeper than this by moving: the solid has changed, and the tool starts anew.
 inline constexpr double kLostDepth = 1;  // units
 
-/// Sum of what presses, and its moment over the length of `spring`. Friction acts where the loads
-/// do. Of what it cannot hold of the spring, planes do that the sweep has not found: in a groove of
-/// the tool's own shape it knows but one of many at a time. Nothing holds it `on_its_way`.
+/// Sets the contact's normal and moment arm: the sum of what presses, and its moment over the
+/// length of the spring (docs/theory.md 5.3). Friction acts where the loads do.
+///
+/// What friction cannot hold of the spring is borne by planes that the sweep has not met: in a
+/// groove of the tool's own shape it meets one of many at a time. A tool that is still `moving` is
+/// not held there.
 template <class N>
 constexpr void add_loads(const Swept<N>& swept, typename N::Unit friction, bool moving,
                          ProxyContact<N>& contact) noexcept {
@@ -75,11 +79,12 @@ constexpr void add_loads(const Swept<N>& swept, typename N::Unit friction, bool 
                                                 (std::min(rubbed, length) / length);
 }
 
-/// One tick of the swept contact: the proxy follows `goal`, and its spring tells the force.
+/// One tick of the swept contact (docs/theory.md 4): the proxy follows `goal`, and the spring
+/// between them tells the force.
 ///
-/// Servo thread; pure but for `state`. At most 32 queries, or 14 while a place is looked for. A
-/// goal that is not finite changes nothing and gives no force; one that is far is brought within
-/// kContactLimit. No force before the proxy is placed.
+/// Servo thread; pure but for `state`. At most 32 queries, or 14 while a place is looked for.
+/// Before the proxy has a place there is no force. A goal that is not finite changes nothing and
+/// gives no force; a goal that is far is brought within kContactLimit.
 template <class N, ContactField<N> Field>
 constexpr ProxyContact<N> follow(const ProxyPlan<N>& plan, ProxyState<N>& state, Field& field,
                                  ProxyPose<N> goal) noexcept {
@@ -115,7 +120,7 @@ constexpr ProxyContact<N> follow(const ProxyPlan<N>& plan, ProxyState<N>& state,
     return contact;
   }
   contact.spring = state.pose.centre - goal.centre;
-  // After a whole step it may only lag, for want of work.
+  // After a whole step the proxy may only lag because the tick's work was spent.
   const bool moving = norm(state.pose.centre - from) >= Real(SweepRules::kStep);
   add_loads(swept, plan.friction, moving, contact);
   if (state.ramping) {

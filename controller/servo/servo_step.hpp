@@ -19,7 +19,8 @@ template <class N>
                                      const DeviceReport& report) noexcept;
 
 /// How far the active tool reaches into the solid along the contact force of the last tick, in mm;
-/// 0 without contact. For the eyes only, so the shell asks for it after the hand has its force.
+/// 0 without contact. For the eyes only, so the real-time shell asks for it after the hand has its
+/// force.
 template <class N>
 [[nodiscard]] double penetration_mm(const ServoPlan<N>& plan, const ServoState<N>& state) noexcept;
 

@@ -24,12 +24,12 @@ two bytes a voxel.
 )";
 
 constexpr const char* kAboutQueries = R"(
-## A probe of the swept contact
+## A query of the swept contact
 
 What a tool feels at one place, read at samples of its surface: a ball of radius 8 voxels (805 samples)
 and a cylinder of radius 5 and length 16 (658). `slide` dips 2 voxels into a ball of radius 40, `half`
 lies half in a flat solid, `immersed` wholly. `turn` places the samples anew. A tick takes 2 or 3
-probes while it slides and at most 32. The ratio divides the plain loop, which is `scalar`.
+queries while it slides and at most 32. The ratio divides the plain loop, which is `scalar`.
 
 )";
 

@@ -174,7 +174,7 @@ TEST_CASE_TEMPLATE("the height of a peak does not depend on its dimension", N, F
 }
 
 TEST_CASE_TEMPLATE(
-    "what the probes of a tick look at is bounded; the first after a turn is answered", N,
+    "what the queries of a tick look at is bounded; the first after a turn is answered", N,
     FixedNumbers, DoubleNumbers) {
   // Felt on all sides, solid nowhere: the dearest that there is.
   const TestVolume tissue = blurred({40, 40, 40}, [](Point p) { return 0.2 + 0.01 * (p[1] - 20); });
@@ -200,7 +200,7 @@ TEST_CASE_TEMPLATE(
   }
 }
 
-TEST_CASE_TEMPLATE("all volumes of a probe are looked at alike, while the tick has probes left", N,
+TEST_CASE_TEMPLATE("all volumes of a query are looked at alike, while the tick has some left", N,
                    FixedNumbers, DoubleNumbers) {
   const SampledTool cylinder(tool_of_units("cylinder", 5, 16));
   Dice dice(4);

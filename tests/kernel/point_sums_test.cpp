@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The shell's sums: every instruction set against their definition, bit for bit.
+// The point shell's sums: every instruction set against their definition, bit for bit.
 #include "controller/kernel/point_shell/point_sums.hpp"
 
 #include <array>
@@ -72,7 +72,7 @@ PointStep<FixedNumbers> any_step(const PointShell<FixedNumbers>& shell, Dice& di
 
 }  // namespace
 
-TEST_CASE("every instruction set sums a shell to the bit, wherever it is") {
+TEST_CASE("every instruction set sums a point shell to the bit, wherever it is") {
   Dice dice(1);
   int felt = 0, skipped = 0;
   for (const VoxelGrid grid : {VoxelGrid{33, 20, 18}, {2, 2, 2}, {9, 40, 3}, {60, 12, 12}}) {
@@ -133,7 +133,7 @@ TEST_CASE("every instruction set sums a shell to the bit, wherever it is") {
   CHECK(skipped > cases(1250));
 }
 
-TEST_CASE("the largest shell deep in the densest volume stays within the sums' range") {
+TEST_CASE("the largest point shell deep in the densest volume stays within the sums' range") {
   const ToolPoints<FixedNumbers> tool = some_shell(kMaxShellPoints, 60, false);
   const PointShell<FixedNumbers> shell = tool.shell();
   // Full density in every second voxel of x: the steepest gradient and, at its voxels, r = 1.

@@ -185,7 +185,7 @@ TEST_CASE_TEMPLATE("a ball follows a slot with play, with hardly any and with no
       MESSAGE(std::string(N::kName)
               << ", slot of " << radius << ", pushed aside by " << aside << ": force steps by "
               << 100 * force_step << " %, " << behind << " units behind, " << queries
-              << " probes at most; " << pulled << " units of force on the way out");
+              << " queries at most; " << pulled << " units of force on the way out");
       if (radius > kRadius) CHECK(queries <= 12);
       CHECK(force_step < 0.02);
       CHECK(behind < 0.02);

@@ -28,7 +28,7 @@ Shaken shaken(double wall, const ShakenTool& tool) {
                                 << tally.ticks << " ticks, " << tally.behind << " behind the face, "
                                 << tally.crossed << " crossings, " << tally.unfelt
                                 << " without force, " << tally.deepest << " units sunk at most, "
-                                << tally.most_queries << " probes at most");
+                                << tally.most_queries << " queries at most");
   return tally;
 }
 

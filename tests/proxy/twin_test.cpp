@@ -93,7 +93,7 @@ TEST_CASE("fixed point goes where double goes") {
       MESSAGE(std::string(name) << ", friction " << friction << ": " << tally.otherwise << " of "
                                 << tally.ticks << " ticks more than 0.001 units apart, "
                                 << tally.apart << " at most, " << tally.out_of_queries
-                                << " out of probes");
+                                << " out of queries");
       CHECK(tally.otherwise * 400 < tally.ticks);
       CHECK(tally.apart < SweepRules::kArrived + 1e-3);
       CHECK(tally.out_of_queries * 20 < tally.ticks);

@@ -108,12 +108,12 @@ TEST_CASE_TEMPLATE("forward kinematics undo the closed form everywhere in the wo
   CHECK(places > 1000);
 }
 
-TEST_CASE_TEMPLATE("levers are the Jacobian, by differences of the closed form", N, FixedNumbers,
+TEST_CASE_TEMPLATE("the Jacobian is right, by differences of the closed form", N, FixedNumbers,
                    DoubleNumbers) {
   constexpr double kStepMm = 1e-3;
   const int places = over_the_workspace([&](const Point& tip, const auto& angles) {
     const auto jacobian_t = pose_at<N>(angles).jacobian_t_mm;
-    // d tip = SUM_i row_i^T d angle_i: the columns of J are the rows of the levers.
+    // d tip = SUM_i row_i^T d angle_i: the columns of J are the rows of J^T.
     for (std::size_t axis = 0; axis < 3; ++axis) {
       Point ahead = tip, behind = tip;
       ahead[axis] += kStepMm;

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 # Writes the shader files as raw string literals, so that a binary runs from anywhere.
-# cmake -DOUTPUT=file.cpp -DSHADERS=a.vert,b.frag -P embed_shaders.cmake
+# cmake -DOUTPUT=FILE -DSHADERS=a.vert,b.frag -P embed_shaders.cmake
 string(REPLACE "," ";" SHADERS "${SHADERS}")
 set(entries "")
 foreach(shader ${SHADERS})

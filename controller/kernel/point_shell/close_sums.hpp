@@ -10,14 +10,14 @@
 
 namespace kerf {
 
-/// Sums over samples, weighted with a power p of t: their density over the highest. Fixed: t, its
-/// powers and offsets in Q15.
+/// Sums over samples, weighted with a power p of t, their density over the highest (docs/theory.md
+/// 3.5). Fixed: t, its powers and offsets in Q15.
 template <class N>
 struct PowerSums {
   typename N::Sum weight{}, density{}, offset[3]{};  ///< SUM t^p, SUM t^p t, SUM t^p offset
 };
 
-/// What a closeup (contact_closeup.hpp) sums over its samples; nothing where all are faint.
+/// What a closeup (contact_closeup.hpp) sums over its samples. All 0 where every sample is faint.
 template <class N>
 struct CloseSums {
   static constexpr int kLowPower = 32, kHighPower = 64;
@@ -26,7 +26,7 @@ struct CloseSums {
   PowerSums<N> low, high;
 };
 
-/// In fixed each product is of 32 unsigned bits.
+/// t^2. In fixed the product has 32 unsigned bits.
 template <class N>
 [[nodiscard]] constexpr PointNumber<N> close_square(PointNumber<N> t) noexcept {
   if constexpr (N::kIsFixed) {
@@ -36,7 +36,7 @@ template <class N>
   }
 }
 
-/// The sums that define those of every set, over the table's samples with these densities.
+/// Sums over the table's samples with these densities. The definition: every set has these bits.
 template <class N>
 [[nodiscard]] constexpr CloseSums<N> close_sums(const PointTable<N>& table,
                                                 const PointNumber<N>* density) noexcept {

@@ -7,15 +7,16 @@
 
 namespace kerf {
 
-/// Voxels along the edge of a brick of the free-space map. Smaller ones let queries leave out more
-/// of their samples: of a ball of radius 8 that slides, 36 % against 15 % with bricks of 4.
+/// Voxels along the edge of a brick of the free-space map. Smaller bricks let queries leave out
+/// more samples: of a sliding ball of radius 8 it is 36 %, with bricks of 4 it would be 15 %.
 inline constexpr std::int32_t kFreeBrick = 2;
 
-/// Where a volume has nothing that contact could feel: for each brick of voxels, the
-/// Chebyshev distance in bricks to the nearest one with density (0: has some itself, at most 255).
+/// Where a volume has nothing that contact could feel (docs/theory.md 2.3). Each brick of voxels
+/// has the Chebyshev distance, in bricks, to the nearest one with density: 0 if it has some itself,
+/// at most 255.
 ///
 /// Made at load (controller/plan/free_brick_map.hpp). Cutting only takes density away, so the map
-/// stays a lower bound for ever and nobody has to keep it up. Points into the maker's memory.
+/// is a lower bound for ever and needs no update. Points into the maker's memory.
 struct FreeBricks {
   VoxelGrid grid;                          ///< of bricks
   const std::uint8_t* distance = nullptr;  ///< none: nothing is known to be free

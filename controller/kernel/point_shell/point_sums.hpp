@@ -9,15 +9,16 @@
 
 namespace kerf {
 
-/// What one sample reads: density of contact in 0..1 (fixed: 0..32767), and its gradient in voxel
-/// axes; in fixed that of the volume's densities over 2, before `DensityScale`.
+/// What one sample reads: the density of contact, 0..1 (fixed: 0..32767), and its gradient along
+/// the voxel axes. The gradient of fixed is that of the volume's densities over 2, before
+/// `DensityScale`.
 template <class N>
 struct PointSample {
   PointNumber<N> density{};
   PointNumber<N> gradient[3] = {};
 };
 
-/// Fainter samples weigh nothing: below 1/16. They are noise, and w has no bits left for them.
+/// A sample below 1/16 weighs nothing: it is noise, and w has no bits left for it.
 template <class N>
 inline constexpr PointNumber<N> kFaintest = N::kIsFixed ? PointNumber<N>(2048)
                                                         : PointNumber<N>(0.0625);
@@ -33,12 +34,12 @@ template <class N>
   }
 }
 
-/// Reads the volume at a place in voxels (fixed: Q15.16). Trilinear, and nothing where one of the
-/// eight voxels would be outside: volumes have a guard of air.
+/// Reads the volume at a place in voxels (fixed: Q15.16), trilinear (docs/theory.md 2.2). Reads
+/// nothing where one of the eight voxels would be outside: volumes end in air. A density that is
+/// clipped at 1 has no gradient.
 ///
 /// Fixed keeps 15 bits of density and rounds at each of the three blends: within 2.5 steps of the
-/// exact value. Differences are 16 bits, products 31. Where the density is clipped at 1 it has no
-/// gradient.
+/// exact value. Differences have 16 bits, products 31.
 template <class N>
 [[nodiscard]] constexpr PointSample<N> point_sample(const DensityField& field,
                                                     const PointNumber<N> (&place)[3]) noexcept {
@@ -143,7 +144,7 @@ constexpr void add_sample(PointSums<N>& sums, std::int32_t i, const PointSample<
   for (std::size_t axis = 0; axis < 3; ++axis) sums.high_offset[axis] += high * offset[axis];
 }
 
-/// One offset: see PointStep.
+/// One axis of an offset in voxels: see PointStep.
 template <class N>
 [[nodiscard]] constexpr PointNumber<N> point_offset(const PointStep<N>& step, std::size_t axis,
                                                     const PointNumber<N> (&offset)[3]) noexcept {
@@ -174,7 +175,7 @@ constexpr void place_points(const PointTable<N>& table, const PointStep<N>& step
   }
 }
 
-/// The densities of so many samples, a multiple of kPointGroup.
+/// The densities of `count` samples, a multiple of kPointGroup.
 template <class N>
 constexpr void read_points(const PointPlaces<N>& places, std::int32_t count,
                            const PointNumber<N> (&centre)[3], const DensityField& field,
@@ -187,8 +188,8 @@ constexpr void read_points(const PointPlaces<N>& places, std::int32_t count,
   }
 }
 
-/// All groups but those around which the volume is free: their densities are faint anyway. `centre`
-/// of the tool in voxels (fixed: Q15.16), near enough for all places to stay in range.
+/// The sums of one query. Leaves out groups around which the volume is free: they would read air.
+/// `centre` of the tool is in voxels (fixed: Q15.16), near enough for all places to stay in range.
 template <class N>
 [[nodiscard]] constexpr PointSums<N> point_sums(const PointTable<N>& table,
                                                 const PointPlaces<N>& places,

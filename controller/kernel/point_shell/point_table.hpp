@@ -7,20 +7,19 @@
 #include "shared/numeric/numbers.hpp"
 #include "shared/volume/voxel_grid.hpp"
 
-// The shell: samples on the surface of a tool, which contact reads the density at
-// (contact.md 1). Plain structs that kernels of any instruction set take.
+// The point shell: samples on the surface of a tool, at which contact reads the density
+// (docs/theory.md 3.1). Plain structs, which kernels of every instruction set take.
 namespace kerf {
 
-/// A number of the shell's kernels; in fixed a plain integer, in the format that is told with it.
+/// A number of these kernels. In fixed it is a plain integer; its format is said where it stands.
 template <class N>
 using PointNumber = typename N::Weight;
 
-inline constexpr std::int32_t kPointGroup =
-    16;  ///< samples that lie together; counts are multiples
+inline constexpr std::int32_t kPointGroup = 16;        ///< samples that lie together
 inline constexpr std::int32_t kMaxShellPoints = 8192;  ///< sums then fit 53 bits
 
-/// A tool's samples, axis by axis in the tool's axes. Made at load
-/// (controller/plan/tool_points.hpp) and points into the maker's memory.
+/// A tool's samples, axis by axis in the tool's axes, padded to whole groups. Made at load
+/// (controller/plan/tool_points.hpp); points into the maker's memory.
 template <class N>
 struct PointTable {
   const PointNumber<N>* offset[3] = {};  ///< from the tool's centre, over its reach; Q0.15
@@ -32,11 +31,12 @@ struct PointTable {
   PointNumber<N> reach{};  ///< no offset of a sample is longer; voxels, Q15.16
 };
 
-/// The step from offsets to voxels of one volume: offset_i = (SUM_k row[i][k] offset[k]) 2^-shift
-/// in Q15.16, rounded half up. In fixed |row[i]| <= 65000 and |offset| <= 2^15, but for their
-/// roundings, so no sum leaves 31 bits. A ball's caps have offsets of up to 1.42 times that, but
-/// rows of 53248 at most, made so that no offset is above 1.04 radii. In floating point there is no
-/// shift.
+/// Takes offsets to voxels of one volume: offset_vox_i = (SUM_k row[i][k] offset[k]) 2^-shift in
+/// Q15.16, rounded half up. Floating point has no shift.
+///
+/// Range in fixed: |row[i]| <= 65000 and |offset| <= 2^15, but for their roundings, so no sum
+/// leaves 31 bits. A ball's caps have offsets of up to 1.42 * 2^15; their rows are at most 53248,
+/// made so that no result is above 1.04 radii.
 template <class N>
 struct PointStep {
   PointNumber<N> row[3][3] = {};
@@ -46,15 +46,15 @@ struct PointStep {
 /// Offset of what is no sample: beyond every volume, wherever the tool is near one; voxels.
 inline constexpr std::int32_t kNoSampleVox = 1 << 14;
 
-/// A turned tool in one volume, in voxels; Q15.16. As long as the table's arrays.
+/// A turned tool in the voxels of one volume; Q15.16. Arrays are as long as the table's.
 template <class N>
 struct PointPlaces {
   PointNumber<N>* offset_vox[3] = {};  ///< of the samples from the centre
   PointNumber<N>* middle[3] = {};      ///< of the groups
 };
 
-/// Takes densities to those of contact, in which the iso-surface is at 1/2:
-/// density / 2 * mantissa * 2^-shift, in 2^-15. `mantissa` has 16 bits.
+/// Takes densities to those of contact, in which the iso-surface is at 1/2 (docs/theory.md 2.1):
+/// density / 2 * mantissa * 2^-shift, in steps of 2^-15. `mantissa` has 16 bits.
 struct DensityScale {
   std::uint32_t mantissa = 32768;
   std::int32_t shift = 15;  ///< 0..16
@@ -76,7 +76,7 @@ template <class S>
   return S(scale.mantissa) / S(std::int32_t{1} << scale.shift);
 }
 
-/// What the shell reads in one volume; `density` changes as material is cut.
+/// The density of one volume as the point shell reads it; `density` changes as material is cut.
 struct DensityField {
   VoxelGrid grid;
   const Density* density = nullptr;
@@ -84,13 +84,17 @@ struct DensityField {
   FreeBricks free;
 };
 
-/// Sums over the samples, r the density of contact, w = r^p, p = 4 for balls and 6 for the rest.
-/// v = w, but 3 w - w / r for balls: half the derivative of their peak (contact_peak.hpp) where it
-/// is at the iso, but for SUM w. Offsets are weighted with u = w, but w r for balls: where density
-/// begins trilinear reads are raised, and over a normal near an axis of the voxels, whose layers
-/// cross the contact in bands, that would tilt a ball's normal. In fixed r is Q15, the weights are
-/// Q24, gradients are in the volume's densities over 2, offsets in Q0.15. Exact, so that no order
-/// and no instruction set matters: |sum| < 2^53.
+/// Sums over the samples of one query (docs/theory.md 3.2, 3.3). r is the density of contact and w
+/// = r^p, p = 4 for balls and 6 for other shapes. Two more weights are derived from w:
+///
+///   v  of gradients: w; for balls 3 w - w / r, half the derivative of their peak at the iso, times
+///      SUM w
+///   u  of offsets: w; for balls w r. Where density begins trilinear reads are raised, in bands
+///   where
+///      the normal is near an axis of the voxels, and with w they would tilt a ball's normal
+///
+/// In fixed r is Q15, weights are Q24, gradients are in the volume's densities over 2, offsets in
+/// Q0.15. All sums are exact, |sum| < 2^53, so no order and no instruction set matters.
 template <class N>
 struct PointSums {
   typename N::Sum weight{};          ///< SUM w

@@ -13,25 +13,28 @@
 
 namespace kerf {
 
-/// Samples on a ball around its contact, which a sharp edge needs for its height.
+/// Caps: more samples on a ball around its contact, for its height on a sharp edge (docs/theory.md
+/// 3.5).
 ///
-/// An edge touches in a strip about a unit wide, which holds few of the ball's samples; and its
-/// trilinear density has summits that are sharper than the edge. A wide cap finds the middle of
-/// what touches, a narrow one there, of samples 0.2 units apart, its height: that of any shape
-/// (peak_height) and a little, since no sample is at the summit. On 1000 edges of 90 degrees a ball
-/// of 8 rests within 0.114 units of the iso-surface; with the wide cap alone within 0.2. By the
-/// highest sample instead the force would step by 14 % where the ball slides along an edge, not 3.
+/// An edge touches in a strip about a unit wide, which holds few of the ball's own samples, and
+/// trilinear density has summits there that are sharper than the edge. A wide cap finds the middle
+/// of what touches. A narrow one around it, its samples 0.2 units apart, tells the height: by
+/// peak_height as of any shape, and a little more, since no sample is at the summit.
+///
+/// On 1000 edges of 90 degrees a ball of 8 rests within 0.114 units of the iso-surface, with the
+/// wide cap alone within 0.2. By the highest sample the force would step by 14 %, not 3, as it
+/// slides.
 inline constexpr std::size_t kCapSamples = 6 * kPointGroup, kSummitSamples = 8 * kPointGroup;
 inline constexpr double kCapRadius = 3.25;  ///< units; half the ball's where that is less
 inline constexpr double kSummitRadius = 1.25;
-inline constexpr double kSummitAbove = 0.1;  ///< units: of the summit over what its samples tell
+inline constexpr double kSummitAbove = 0.1;  ///< units: the summit is so far above its samples
 
-/// There are caps while the ball's own samples hold their peak to be so near, units: a summit may
-/// be 0.5 higher than they tell.
+/// Caps are read while the ball's own samples find it from so far above the surface to so far
+/// below, units: a summit may be 0.5 higher than they tell.
 inline constexpr double kCapAbove = 0.6;
 inline constexpr double kCapBelow = 0.1;
 
-/// Places (a, a^2 + b^2, b) of the unit disc, each with the same area.
+/// Samples (a, a^2 + b^2, b) over the unit disc, each for the same area.
 template <class N, std::size_t kCount>
 [[nodiscard]] constexpr SpiralArrays<N, kCount> cap_arrays(double radius) noexcept {
   return {radius + 0.1, [](std::size_t i) {
@@ -45,9 +48,9 @@ inline constexpr auto kCapArrays = cap_arrays<N, kCapSamples>(kCapRadius);
 template <class N>
 inline constexpr auto kSummitArrays = cap_arrays<N, kSummitSamples>(kSummitRadius);
 
-/// Rows that lay a cap of `radius` on a ball of `reach`, in the direction `out` from its centre,
-/// over its radius: two axes across (Duff et al. 2017), and how the ball falls from its tangent
-/// plane: by radius^2 / (2 reach) at the rim.
+/// Lays a cap of `radius` on a ball of `reach`, in the direction `out` from its centre. The
+/// columns, over the radius, are two axes across (Duff et al. 2017) and between them how the ball
+/// falls from its tangent plane: by radius^2 / (2 reach) at the rim.
 template <class N>
 [[nodiscard]] constexpr TurnRows<N> cap_rows(ContactVec<typename N::Unit> out,
                                              typename N::Real radius,
@@ -61,14 +64,15 @@ template <class N>
            {-(sign * out.x), fall * out.z, -out.y}}};
 }
 
-/// How far the caps count, 0..1, by the area in touch. On a flat of this slope it is what
-/// `count` r^4 sums to over a ball: SUM w = count height^5 / (10 slope reach). Half of it and more
-/// is no edge but a ball of 8 or larger, a flat or a crease, which the ball's own samples know
-/// better; from 0.35 it is an edge. (A ball of 6 has 0.43, edges of 90 degrees 0.15 to 0.4.)
+/// How far the caps count, 0..1, by the area in touch (docs/theory.md 3.5). On a flat of this slope
+/// a ball's weights sum to count height^5 / (10 slope reach). With half of that sum or more it is
+/// no edge: a body of radius 8 or larger, a flat or a crease, which the ball's own samples know
+/// better. With 0.35 or less it is one. (A body of radius 6 has 0.43, edges of 90 degrees 0.15 to
+/// 0.4.)
 ///
-/// Coarse where contact is faint: in fixed point the mean weight has steps of 2^-24, and of a flat
-/// at a height of 0.08 it is 1.4 of them (slope 0.5, reach 8), so there they count wholly or not
-/// at all. The depth is 0.16 units then, 0.01 N in the default scene.
+/// Coarse where contact is faint: in fixed point the mean weight has steps of 2^-24. At a height of
+/// 0.08 on a flat (slope 0.5, reach 8) it is 1.4 steps, so the caps count wholly or not at all.
+/// There the hand feels 0.01 N in the default scene.
 template <class N>
 [[nodiscard]] constexpr typename N::Unit sharpness(const PointSums<N>& sums, std::int32_t count,
                                                    typename N::Ratio height,

@@ -13,8 +13,8 @@ namespace kerf {
 /// Most planes that hold the tool at one place: a face, a crease, a corner.
 inline constexpr std::size_t kMaxPlanes = 3;
 
-/// What one contact asks of a tool whose centre is at q: it may move to x where
-/// normal . (x - q) >= depth.
+/// What one contact asks of a tool whose centre is at q: the centre may move to any x with normal .
+/// (x - q) >= depth (docs/theory.md 4.3).
 template <class N>
 struct ConstraintPlane {
   ContactVec<typename N::Unit> normal{};  ///< out of the solid, length 1
@@ -25,13 +25,13 @@ struct ConstraintPlane {
                                    const ConstraintPlane&) noexcept = default;
 };
 
-/// What the tool feels at one place: `count` planes, the deepest first.
+/// What one collision query finds: `count` planes, the deepest first.
 template <class N>
 struct Contacts {
   typename N::Real depth{-1};  ///< the largest of the planes' depths; -1 where nothing is near
   std::int32_t count = 0;
   std::array<ConstraintPlane<N>, kMaxPlanes> plane{};
-  bool buried = false;  ///< full density all round: no slope, no normal, no plane
+  bool buried = false;  ///< full density all round, or not looked at: no normal, no plane
 
   friend constexpr bool operator==(const Contacts&, const Contacts&) noexcept = default;
 };

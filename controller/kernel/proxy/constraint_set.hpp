@@ -12,24 +12,24 @@
 
 namespace kerf {
 
-/// The planes that hold the tool, their depths counted from where its centre is now.
+/// The planes that hold the tool. Their depths count from where its centre is now.
 template <class N>
 struct ConstraintSet {
   std::size_t count = 0;
   std::array<ConstraintPlane<N>, kMaxPlanes> plane{};
 };
 
-/// Where a tool goes that is asked to move by `way`: `move = way + SUM load_i normal_i`.
+/// Where a tool goes that is asked to move by d: `move` = d + SUM load_i normal_i.
 template <class N>
 struct Slide {
   ContactVec<typename N::Real> move{};
   std::array<typename N::Real, kMaxPlanes> load{};  ///< how hard each plane is pressed, units
 };
 
-/// How hard two or three planes are pressed that are all touched, by Cramer's rule: for each plane
-/// i SUM_j c_ij load_j = need_i, with c_ij the product of two normals (c_ii = 1) and need_i the way
-/// that plane i wants. False where the normals are too near to one line or plane: a determinant
-/// below 1e-3.
+/// The loads of two or three planes that are all touched, by Cramer's rule. For each plane i SUM_j
+/// c_ij load_j = need_i: c_ij is the product of two normals (c_ii = 1), need_i how far plane i
+/// wants the tool out. False where the normals nearly lie on one line or in one plane: a
+/// determinant below 1e-3.
 template <class N>
 class Loads {
   using Real = typename N::Real;
@@ -84,12 +84,13 @@ class Loads {
   }
 };
 
-/// The nearest place to `way` that all planes allow, found as the one set of touched planes whose
-/// loads push and whose place holds every plane. Where planes leave no place, as two walls of a
-/// slot without play, the oldest of them, which stands last, gives way to the others.
+/// The place nearest to `displacement` that all planes allow (docs/theory.md 4.3). Tries each set
+/// of touched planes; the answer is the one whose loads push and whose place keeps every plane.
+/// Where planes leave no place, as two walls of a slot without play, the oldest one is left out: it
+/// stands last.
 ///
-/// Any |way| of 16384 units at most; eight sets at most, and four and two without the oldest.
-/// Fixed: within 4 steps of each plane for a way of some units.
+/// |displacement| <= 16384 units. At most 8 + 4 + 2 sets. Fixed: within 4 steps of each plane where
+/// the displacement is some units long.
 template <class N>
 [[nodiscard]] constexpr Slide<N> nearest(const ConstraintSet<N>& planes,
                                          ContactVec<typename N::Real> displacement) noexcept {
@@ -131,9 +132,10 @@ template <class N>
   return {displacement};
 }
 
-/// Planes closer than this are one face seen from two places: on a bump they would look like a
-/// crease, and in a hollow curvature.hpp knows better how it goes on between them. (With 15 degrees
-/// a slot with a play of 0.1 units lets the tool rest between two places up to 0.05 units apart.)
+/// Two planes whose normals are nearer than this are one face, seen from two places. On a bump they
+/// would feign a crease; in a hollow curvature.hpp tells better how it goes on between them. (With
+/// 15 degrees a tool in a slot with a play of 0.1 units would rest at two places, up to 0.05 units
+/// apart.)
 inline constexpr double kFalseCreaseCosine = 0.7071067811865476;  // 45 degrees
 
 template <class N>
@@ -150,8 +152,9 @@ template <class N>
   return {static_cast<std::size_t>(felt.count), felt.plane};
 }
 
-/// Adds planes of a place `moved` before while there is room, if they are unlike and still near:
-/// between 0.5 units out of reach and 0.3 units deep.
+/// Adds `older` planes while there is room; their depths count from a place `moved` before this
+/// one. Takes those that are unlike all others and still near: from 0.5 units away to 0.3 units
+/// deep.
 template <class N>
 constexpr void keep(ConstraintSet<N>& constraints, const ConstraintSet<N>& older,
                     ContactVec<typename N::Real> moved) noexcept {
@@ -165,8 +168,8 @@ constexpr void keep(ConstraintSet<N>& constraints, const ConstraintSet<N>& older
   }
 }
 
-/// Adds those planes of a place that turned out too deep which hold the tool already where it is,
-/// `way` before: within 0.02 units. Returns whether there was one.
+/// Learns from a place that turned out too deep, `displacement` ahead: adds those of its planes
+/// that hold the tool already where it is, to 0.02 units. Returns whether there was one.
 template <class N>
 [[nodiscard]] constexpr bool learn(ConstraintSet<N>& constraints, const Contacts<N>& seen,
                                    ContactVec<typename N::Real> displacement) noexcept {

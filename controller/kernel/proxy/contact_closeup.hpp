@@ -13,32 +13,32 @@
 
 namespace kerf {
 
-/// So near to where the tool rests there is a closer look at the contact of a tool that is no ball.
-/// At an edge the shell's own samples hold the tool to be up to 0.4 higher than it is.
+/// The contact of a tool that is no ball gets a closer look so near to rest. At an edge the point
+/// shell's own samples find the tool up to 0.4 units higher than it is.
 inline constexpr double kCloseDepth = 0.4;  ///< units
 
-/// A closeup sees at least so far around a contact, and samples up to a cell farther.
+/// A closeup looks at least so far around a contact, units, and up to a cell farther.
 inline constexpr double kCloseRadius = 2;
 inline constexpr double kCloseCell = 1;          ///< units; edge of the cells of close samples
 inline constexpr double kClosePitch = 0.35;      ///< units between them
 inline constexpr std::int32_t kMostClose = 256;  ///< that a closeup reads; some 200 on a flat
 inline constexpr std::int32_t kMostInCell = 32;
 
-/// A tool's surface in samples that lie close together: the rim or the point of a tool on a sharp
-/// edge touches in less than the distance of the shell's own samples.
+/// A tool's surface in close samples: the rim or the point of a tool on a sharp edge touches in
+/// less than the spacing of the point shell's own samples.
 ///
-/// Sorted by cells, along x first. Made at load (controller/plan/close_cells.hpp) and points into
-/// the maker's memory. A ball has none.
+/// Sorted by cells, x fastest. Made at load (controller/plan/close_cells.hpp); points into the
+/// maker's memory. A ball has none.
 template <class N>
 struct CloseTable {
   const PointNumber<N>* offset[3] = {};  ///< from the tool's centre, over its reach; Q0.15
-  const std::int32_t* first = nullptr;   ///< sample of each cell, then the end of the last; or none
+  const std::int32_t* first = nullptr;   ///< sample of each cell, then the end; null: none
   std::int32_t cells[3] = {};            ///< along the axes
-  PointNumber<N> low[3] = {};            ///< offset at which the first cell begins
+  PointNumber<N> low[3] = {};            ///< offset where the first cell begins
   PointNumber<N> edge{};                 ///< kCloseCell over the reach
 };
 
-/// The close samples around a contact: their offsets, places and densities, as whole vectors.
+/// The close samples around a contact: offsets in the tool's axes and in voxels, and densities.
 template <class N>
 struct CloseSamples {
   using Array = std::array<PointNumber<N>, kMostClose>;
@@ -48,7 +48,8 @@ struct CloseSamples {
   Array density;
   std::int32_t count = 0;
 
-  /// Those of the cells around `middle`, an offset; of too many kMostClose that are spread evenly.
+  /// Takes the samples of the cells around the offset `middle`; of too many, kMostClose spread
+  /// evenly.
   constexpr void take(const CloseTable<N>& table, const PointNumber<N> (&middle)[3]) noexcept {
     constexpr auto kReach = static_cast<std::int32_t>(kCloseRadius / kCloseCell);
     using Number = PointNumber<N>;
@@ -91,7 +92,7 @@ struct CloseSamples {
       seen += more;
     });
   }
-  /// Whole vectors of them; what fills the last up is no sample: `fade` it once all are read.
+  /// As whole groups. What fills up the last one is no sample: `fade` it once all are read.
   [[nodiscard]] constexpr PointTable<N> table() noexcept {
     PointTable<N> table;
     table.count = (count + kPointGroup - 1) / kPointGroup * kPointGroup;
@@ -110,7 +111,7 @@ struct CloseSamples {
   }
 };
 
-/// What a look at a contact tells of its peak of density.
+/// What a closeup tells of the peak of density.
 template <class N>
 struct Closeup {
   typename N::Ratio height{};
@@ -118,9 +119,9 @@ struct Closeup {
   typename N::Ratio top{};        ///< density of the highest sample
 };
 
-/// Where about the peak is: its offset in the tool's axes, from the shell's sums. Beside a rim or a
-/// point density falls to one side, and means of places weighted with its powers 6 and 8 are off by
-/// shares of 1 / (7 + e) and 1 / (9 + e).
+/// Where about the peak is, as an offset in the tool's axes, from the point shell's sums. Beside a
+/// rim or a point density falls to one side only, so the mean places with powers 6 and 8 are off by
+/// shares of 1 / (7 + e) and 1 / (9 + e); the two extrapolate to the peak (docs/theory.md 3.5).
 template <class N>
 constexpr void peak_offset(const PointSums<N>& sums, typename N::Ratio e,
                            PointNumber<N> (&offset)[3]) noexcept {
@@ -140,11 +141,11 @@ constexpr void peak_offset(const PointSums<N>& sums, typename N::Ratio e,
   }
 }
 
-/// The peak of density over a tool's surface, from the sums over its close samples.
+/// The peak of density over a tool's surface, from the sums over its close samples (docs/theory.md
+/// 3.5).
 ///
-/// As in contact_peak.hpp the mean of the height, weighted with its power p, is the summit's times
-/// (p + 1) / (p + 1 + e). With p = 32 and 64 two such means tell e and the summit. They also tell
-/// where it is, as in peak_offset.
+/// The mean of the height, weighted with its power p, is the summit's times (p + 1) / (p + 1 + e).
+/// Two such means, with p = 32 and 64, tell e and the summit; and where it is, as in peak_offset.
 template <class N>
 [[nodiscard]] constexpr Closeup<N> peak_of(const CloseSums<N>& sums) noexcept {
   using Ratio = typename N::Ratio;

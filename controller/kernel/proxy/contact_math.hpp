@@ -8,7 +8,7 @@
 
 namespace kerf {
 
-/// No centre of a tool and no goal lies farther out on any axis, in units: ways between two stay
+/// No centre of a tool and no goal lies farther out on any axis, in units. So a displacement stays
 /// within 16384, where the products below have room.
 inline constexpr std::int32_t kContactLimit = 8192;
 
@@ -56,7 +56,7 @@ template <class N>
   }
 }
 
-/// way / turn, turn > 0: the radius of an arc. Fixed: rounds toward 0, saturates.
+/// length / turn, turn > 0: the radius of an arc. Fixed: rounds toward 0, saturates.
 template <class N>
 [[nodiscard]] constexpr typename N::Real quotient(typename N::Real length,
                                                   typename N::Unit turn) noexcept {
@@ -88,7 +88,7 @@ template <class N>
   return {v.x / length, v.y / length, v.z / length};
 }
 
-/// Moment of the unit force `direction` at `arm`: an offset in units.
+/// Moment of a unit force along `direction` that acts at `arm`: a moment arm in units.
 template <class N>
 [[nodiscard]] constexpr ContactVec<typename N::Real> moment(
     ContactVec<typename N::Real> arm, ContactVec<typename N::Unit> direction) noexcept {

@@ -14,28 +14,28 @@
 
 namespace kerf {
 
-/// A PointSums over its weight, in contact space. Ratio (Q7.24) holds them: only a gradient can
-/// saturate, in a volume whose iso is below 1 % of its range.
+/// The sums of a query over their weights, in contact space. Ratio (Q7.24) holds them; only a
+/// gradient can saturate, in a volume whose iso is below 1 % of its range.
 template <class N>
 struct PointMeans {
   using Ratio = typename N::Ratio;
 
   Ratio density{}, square{};
-  ContactVec<Ratio> gradient{};  ///< gradient weighted with v, density per unit
-  ContactVec<Ratio> offset{};    ///< from the tool's centre, over its reach
+  ContactVec<Ratio> gradient{};  ///< weighted with v, density per unit
+  ContactVec<Ratio> offset{};    ///< weighted with u, over the tool's reach
   Ratio top{};
 };
 
-/// How one volume lies in contact space: a place q is at voxel_from_contact * q + origin_vox. A
-/// voxel's edge is at least one unit, so no entry is above 1.
+/// How one volume lies in contact space: place q is at voxel_from_contact * q + origin_vox. A
+/// voxel's edge is at least one unit, so no entry of the matrix is above 1.
 template <class N>
 struct ContactFrame {
   Transform<typename N::Ratio, VoxelSpace, ContactSpace> voxel_from_contact{};
   VoxelVec<typename N::Real> origin_vox{};
 };
 
-/// A sum over its weight, which is above 0. `bits`: from the sum's fraction bits, less those of the
-/// weight, to 24. Fixed: numerators stay below 2^62 for kMaxShellPoints.
+/// sum / weight; the weight is above 0. `bits`: 24 less the sum's fraction bits, plus the weight's.
+/// Fixed: numerators stay below 2^62 for kMaxShellPoints.
 template <class N>
 [[nodiscard]] constexpr typename N::Ratio mean_of(typename N::Sum sum, typename N::Sum weight,
                                                   [[maybe_unused]] int bits) noexcept {
@@ -46,7 +46,7 @@ template <class N>
   }
 }
 
-/// `rise` of the means alone.
+/// `PointMeans::gradient` alone.
 template <class N>
 [[nodiscard]] constexpr ContactVec<typename N::Ratio> mean_gradient(
     const PointSums<N>& sums, const DensityScale& scale, const ContactFrame<N>& frame) noexcept {
@@ -65,7 +65,7 @@ template <class N>
   return transposed(frame.voxel_from_contact) * voxels;
 }
 
-/// An offset from the tool's axes to those of the world.
+/// Turns an offset from the tool's axes to those of the world.
 template <class N>
 [[nodiscard]] constexpr ContactVec<typename N::Ratio> turned_offset(
     const typename N::Ratio (&offset)[3], const TurnRows<N>& turn) noexcept {
@@ -100,7 +100,7 @@ template <class N>
   return means;
 }
 
-/// The direction of a vector, or none of one that is too short to have any.
+/// The direction of a vector; 0 where it is too short to have one.
 template <class N>
 [[nodiscard]] constexpr ContactVec<typename N::Unit> direction(
     ContactVec<typename N::Ratio> v) noexcept {
@@ -119,8 +119,8 @@ template <class N>
   }
 }
 
-/// e of a shape that is no ball, see peak_height, from its mean of h^2: over the square of the mean
-/// it is 8 (7 + e) / (7 (8 + e)).
+/// The exponent e of a shape that is no ball, from q = m2 / m1^2 = 8 (7 + e) / (7 (8 + e)), 0 to 2
+/// (docs/theory.md 3.2).
 template <class N>
 [[nodiscard]] constexpr typename N::Ratio fall_of(const PointMeans<N>& means) noexcept {
   using Ratio = typename N::Ratio;
@@ -130,33 +130,33 @@ template <class N>
                              : Ratio(2);
 }
 
-/// Height of the peak of density over the tool's surface, from its power sums (contact.md 1).
+/// Height of the peak of density over the tool's surface, from its power sums (docs/theory.md 3.2).
 ///
-/// Over a quadratic peak of height H the mean of h, weighted with h^p, is H (p + 1) / (p + 1 + e),
-/// whatever the curvatures and the number of samples; e is half the dimension over which the height
-/// falls. A ball touches in a point, e = 1. Any other shape may also touch in a line (1/2), in a
-/// face (0) or with a corner (2): there the mean of h^2 tells e.
+/// Over a quadratic peak of height H the mean of r, weighted with r^p, is H (p + 1) / (p + 1 + e),
+/// whatever the curvatures and the number of samples. e is half the number of dimensions over which
+/// r falls. A ball touches in a point, e = 1. Another shape may also touch in a line (1/2), in a
+/// face (0) or with a corner (2): there the mean of r^2 tells e.
 template <class N>
 [[nodiscard]] constexpr typename N::Ratio peak_height(const PointMeans<N>& means,
                                                       bool round) noexcept {
   using Ratio = typename N::Ratio;
-  // p = 4 gives 1.2. Where density begins trilinear reads are raised, and samples below 1/16 are
-  // left out: on planes the mean is 0.75 % low.
+  // p = 4 gives 1.2. But samples below 1/16 are left out, and trilinear reads are raised where
+  // density begins: on planes the mean is 0.75 % low.
   const Ratio factor = round ? static_cast<Ratio>(1.209) : Ratio(1) + fall_of(means) / Ratio(7);
-  // A lone spike is a peak of few samples: it may not rise far above the mean unseen.
+  // A lone spike has few samples and hardly moves the mean: it may not stand far above it unseen.
   constexpr auto kSpike = static_cast<Ratio>(0.2);
   const Ratio height = std::max(factor * means.density, means.top - kSpike);
-  // An edge or a point has its samples on it: there is no summit far above the highest of them.
+  // Samples lie on the tool's edges and points: no summit is far above the highest sample.
   constexpr auto kUnsampled = static_cast<Ratio>(0.03);
   return round ? height : std::min(height, means.top + kUnsampled);
 }
 
-/// Least and steepest slope that a depth is reckoned with, density per unit: flatter is noise, and
-/// no edge of a volume is steeper.
+/// Limits of the slope in a depth (docs/theory.md 3.3), density per unit: flatter is noise, steeper
+/// no face of a volume is.
 inline constexpr double kFlattestSlope = 0.2;
 inline constexpr double kSteepestSlope = 1.2;
 
-/// Share of the way from `from` to `to`, within 0 to 1; `to` lies below `from`.
+/// 0 where `value` is `from` or above, 1 where it is `to` or below, linear between; `to` < `from`.
 template <class N>
 [[nodiscard]] constexpr typename N::Unit falling_share(typename N::Unit value, double from,
                                                        double to) noexcept {
@@ -165,7 +165,7 @@ template <class N>
   return (top - std::clamp(value, bottom, top)) / (top - bottom);
 }
 
-/// The direction `share` of the way from one to another.
+/// The direction of (1 - share) a + share b.
 template <class N>
 [[nodiscard]] constexpr ContactVec<typename N::Unit> between(ContactVec<typename N::Unit> a,
                                                              ContactVec<typename N::Unit> b,
@@ -177,12 +177,15 @@ template <class N>
   return direction<N>(ContactVec<Ratio>{mixed(a.x, b.x), mixed(a.y, b.y), mixed(a.z, b.z)});
 }
 
-/// Minus the weighted offset reads no gradient and has no steps at the borders of cells, so it is a
-/// ball's normal, and the only one that a wall of two voxels leaves right: behind its middle the
-/// gradient points on. In a groove of the ball's own radius, however, the offsets point out of its
-/// bottom whichever wall the ball is in. There they are spread over half a turn and their mean is
-/// short, 2 / pi: from 0.85 to 0.7 of the reach, and from 20 to 50 degrees between the two, the
-/// derivative of the peak takes over. (From 30 to 60 the force steps by 5 % there instead of 2.)
+/// A ball's normal (docs/theory.md 3.4): minus the weighted mean offset. It reads no gradient, so
+/// it does not jump at the borders of cells; and it is right in a wall of two voxels, behind whose
+/// middle gradients point onward.
+///
+/// In a groove of the ball's own radius it points out of the bottom, whichever wall the ball is in.
+/// There the offsets spread over half a turn, and their mean is short: 2 / pi of the reach.
+/// `downhill`, the derivative of the peak, takes over as the mean falls from 0.85 to 0.7 of the
+/// reach and as the two directions part from 20 to 50 degrees. (With 30 to 60 the force steps by 5
+/// % there, not 2.)
 template <class N>
 [[nodiscard]] constexpr ContactVec<typename N::Unit> ball_normal(
     const PointMeans<N>& means, ContactVec<typename N::Unit> downhill) noexcept {
@@ -195,7 +198,7 @@ template <class N>
   return between<N>(offset, downhill, share);
 }
 
-/// How density falls along a normal, per unit. v is half a ball's derivative.
+/// How fast density falls along a normal, per unit (docs/theory.md 3.3). v holds half of a ball's.
 template <class N>
 [[nodiscard]] constexpr typename N::Ratio slope_along(const PointMeans<N>& means,
                                                       ContactVec<typename N::Unit> normal,
@@ -209,16 +212,16 @@ template <class N>
   return std::clamp(round ? uphill + uphill : uphill, Ratio(kFlattestSlope), Ratio(kSteepestSlope));
 }
 
+/// (H - 1/2) / slope: how deep the tool is in the solid, units.
 template <class N>
 [[nodiscard]] constexpr typename N::Real depth_of(typename N::Ratio height,
                                                   typename N::Ratio slope) noexcept {
   return typename N::Real((height - typename N::Ratio(0.5)) / slope);
 }
 
-/// The plane of one volume's contact by the shell's own samples. `reach` of the tool in units. The
-/// normal is of a ball `ball_normal`, of another shape the weighted gradient, which near rest is a
-/// first guess: a closer look corrects all three parts (contact_query.hpp). None, of length 0,
-/// where the tool feels the same all round.
+/// The constraint plane of one volume's contact, by the samples of the point shell alone. `reach`
+/// of the tool is in units. A closer look corrects it near rest (contact_query.hpp). Its normal is
+/// 0 where the tool feels the same all round.
 template <class N>
 [[nodiscard]] constexpr ConstraintPlane<N> plane_of(const PointMeans<N>& means,
                                                     typename N::Real reach, bool round) noexcept {

@@ -23,7 +23,7 @@
 
 namespace kerf {
 
-/// A tool as contact sees it: samples on its surface.
+/// A tool as contact sees it: its point shell and, of a shape that is no ball, close samples.
 template <class N>
 struct PointShell {
   PointTable<N> table;
@@ -32,7 +32,7 @@ struct PointShell {
   std::int32_t step_bits = 0;  ///< fraction bits of PointStep's rows: reach 2^step_bits < 2^16
 };
 
-/// One solid volume with room for the tool's places in it; `places` belongs to the servo's memory.
+/// One solid volume, and memory for the tool's places in it, which belongs to the servo.
 template <class N>
 struct ContactVolume {
   DensityField field;
@@ -40,18 +40,19 @@ struct ContactVolume {
   PointPlaces<N> places;
 };
 
-/// What a tool feels among the solid volumes of a scene: the ContactField of the sweep.
+/// Collision queries of one tool against the solid volumes of a scene: the ContactField of the
+/// sweep.
 ///
-/// `turn` first, then any number of queries with this orientation; a tool that does not turn needs
-/// it once. A query reads at most all samples of the shell in every volume: those in free space are
-/// left out. Where a volume's contact is near rest a closer look is added: at a ball's two caps, or
-/// at other tools' close samples and a patch of the volume; `query_work` counts both. In fixed all
-/// kernels give the same bits. Servo thread; no heap.
+/// Call `turn` first, then any number of queries with this orientation; a tool that does not turn
+/// needs it once. A query reads the samples of the point shell in every volume, but for those in
+/// free space. Near rest it takes a closer look (docs/theory.md 3.5): at a ball's two caps, or at
+/// another tool's close samples and a patch of the volume. In fixed all kernels give the same bits.
+/// Servo thread; no heap.
 ///
-/// What a tick may cost is counted in samples: where tissue or noise is felt on all sides, a query
-/// is twice as dear as at a face. Once the count of `begin_tick` is spent, queries answer `buried`
-/// unseen, and a sweep stays at the last place that it found (SweepRules::kWedged); but the first
-/// query after a turn is always answered.
+/// A tick's work is counted in samples (`query_work`), since a query among noise or soft tissue
+/// costs twice what one at a face does. Once the budget of `begin_tick` is spent, queries answer
+/// `buried` without a look, and a sweep stays at its last place. The first query after a turn is
+/// always answered.
 template <class N>
 class ContactQuery {
  public:
@@ -65,7 +66,7 @@ class ContactQuery {
         volumes_(volumes),
         work_(query_work(shell.table, volumes.size())) {}
 
-  /// From the tool's axes to those of the world.
+  /// Orients the tool in all queries from now on.
   void turn(const ToolTurn<N>& turn) noexcept {
     rows_ = rows_of(turn);
     turned_ = true;
@@ -75,15 +76,15 @@ class ContactQuery {
     }
   }
 
-  /// The queries from now on are those of one tick; before the first, nothing is counted.
+  /// Begins the budget of one tick. Before the first call nothing is counted.
   void begin_tick() noexcept { left_ = work_.budget(); }
   [[nodiscard]] const QueryWork& work() const noexcept { return work_; }
   /// See ContactField.
   [[nodiscard]] bool half_spent() const noexcept { return left_ <= work_.budget() / 2; }
-  /// Since then, counted as `work` is.
+  /// Work since `begin_tick`, in the samples of `work`.
   [[nodiscard]] std::int64_t spent() const noexcept { return work_.budget() - left_; }
 
-  /// The tool's centre at `q`: at most one plane a volume, the deepest three.
+  /// What the tool feels with its centre at `q`: at most one plane a volume, the deepest three.
   [[nodiscard]] Contacts<N> query(ContactVec<Real> q) const noexcept {
     Contacts<N> felt;
     felt.buried = left_ < work_.query + work_.closer && !turned_;
@@ -95,7 +96,7 @@ class ContactQuery {
     return felt;
   }
 
-  /// The tool's centre may move so far from `q` in any direction and feel nothing: a lower bound.
+  /// How far the centre may move from `q` in any direction and feel nothing: a lower bound.
   [[nodiscard]] Real free_distance(ContactVec<Real> q) const noexcept {
     // A sample reads one voxel further, and half a unit is for roundings.
     const Real own = shell_.reach + Real(1.5);
@@ -134,7 +135,7 @@ class ContactQuery {
     return volume.frame.voxel_from_contact * q + volume.frame.origin_vox;
   }
 
-  /// How the offsets of a shell become voxels whose axes `rows` takes to those of the world.
+  /// The matrix that takes a tool's offsets to voxels; `rows` turns them to the world's axes.
   [[nodiscard]] static PointStep<N> step_of(const PointShell<N>& shell, const TurnRows<N>& rows,
                                             const ContactFrame<N>& frame) noexcept {
     PointStep<N> step;
@@ -169,7 +170,7 @@ class ContactQuery {
     }
   }
 
-  /// Adds this volume's plane in the order of depths, by a closer look where it is near rest.
+  /// Adds this volume's plane, after a closer look where it is near rest; the deepest stand first.
   void feel(const ContactVolume<N>& volume, ContactVec<Real> q, bool closer,
             Contacts<N>& felt) const noexcept {
     const VoxelVec<Real> at = place_of(volume, q);
@@ -190,7 +191,7 @@ class ContactQuery {
         look_again(volume, at, sums, means, plane);
       }
     }
-    // Almost the whole surface is in the solid, or it feels the same all round.
+    // Nearly all samples are in the solid, or the tool feels the same all round.
     const ContactVec<typename N::Unit> none{};
     if (sums.solid >= shell_.table.count - shell_.table.count / 16 || plane.normal == none) {
       felt.buried = true;
@@ -209,8 +210,8 @@ class ContactQuery {
     felt.plane[slot] = plane;
   }
 
-  /// The plane by the close samples around the peak, and by a patch of the volume around where they
-  /// show it.
+  /// Corrects the plane of a tool that is no ball: by the close samples around the peak, then by a
+  /// patch of the volume around the place that they find.
   void look_again(const ContactVolume<N>& volume, VoxelVec<Real> at, const PointSums<N>& sums,
                   const PointMeans<N>& means, ConstraintPlane<N>& plane) const noexcept {
     if (shell_.close.first == nullptr) return;
@@ -220,7 +221,7 @@ class ContactQuery {
     peak_offset(sums, fall_of(means), peak);
     Closeup<N> seen = look_closely_at(volume, at, peak);
     Ratio height = seen.height;
-    // The highest sample of the shell may not be among what was seen: the tool touches twice.
+    // If the highest sample of the point shell was not among what was seen, the tool touches twice.
     const auto share = falling_share<N>(Unit(means.top - seen.top), 0.06, 0.02);
     if (share < Unit(1)) {
       const auto top = static_cast<std::size_t>(sums.top_sample);
@@ -239,7 +240,8 @@ class ContactQuery {
     auto gradient = patch_gradient(volume, middle, plane.normal);
     gradient = patch_gradient(volume, middle, direction<N>(-gradient));
     const auto normal = direction<N>(-gradient);
-    // Where the shell rises far less than the patch, it touches faces that look another way.
+    // Where the tool's own gradient is far less than the patch's, it touches faces that look
+    // elsewhere.
     const Ratio steep = norm(gradient);
     if (steep < Ratio(0.01)) return;
     const Ratio along = -(multiply<Ratio>(means.gradient.x, normal.x) +
@@ -280,7 +282,7 @@ class ContactQuery {
     return peak_of(sums);
   }
 
-  /// The mean gradient of a patch across `normal`.
+  /// The mean gradient over a patch that is flattened along `normal`.
   [[nodiscard]] ContactVec<typename N::Ratio> patch_gradient(
       const ContactVolume<N>& volume, VoxelVec<Real> middle,
       ContactVec<typename N::Unit> normal) const noexcept {
@@ -293,8 +295,7 @@ class ContactQuery {
     return mean_gradient<N>(patch, volume.field.scale, volume.frame);
   }
 
-  /// A ball's depth with the height of its caps around the middle of the contact, where it is
-  /// sharp.
+  /// A ball's depth by its caps around the middle of the contact, as far as the contact is sharp.
   [[nodiscard]] Real depth_around(const ContactVolume<N>& volume, VoxelVec<Real> at,
                                   const PointSums<N>& sums, const PointMeans<N>& means,
                                   const ConstraintPlane<N>& plane) const noexcept {
@@ -321,7 +322,7 @@ class ContactQuery {
            multiply<Real>(sharp, Real(kSummitAbove));
   }
 
-  /// Of a cap in the direction `out` from a ball's centre; 0 where it feels nothing.
+  /// Means over a cap in the direction `out` from a ball's centre; 0 where it feels nothing.
   template <std::size_t kCount>
   [[nodiscard]] PointMeans<N> cap_means(const ContactVolume<N>& volume, VoxelVec<Real> at,
                                         ContactVec<typename N::Unit> out,

@@ -5,8 +5,9 @@
 
 namespace kerf {
 
-/// Where the swept contact is solved: world axes, origin of the world, and one unit is the edge of
-/// the finest voxel of the scene's solid volumes. All lengths of contact.md ("voxels") are units.
+/// Where the swept contact is solved: axes and origin of the world; one unit is the edge of the
+/// finest voxel of the scene's solid volumes (docs/theory.md 1.2). docs/contact.md calls it a
+/// voxel.
 struct ContactSpace;
 
 template <class S>

@@ -9,9 +9,9 @@
 
 namespace kerf {
 
-/// How the solid curves around a tool that sits in a bowl or a slot hardly wider than itself: the
-/// places that its centre may take are a hollow, and over a step `moved` its normal turns by
-/// (across . moved) / radius along `across`. Of length 0: no bowl, or not known.
+/// How the solid curves around a tool in a bowl or a slot hardly wider than itself. The places that
+/// its centre may take form a hollow; over a step `moved` the normal turns by (across . moved) /
+/// radius along `across`. Radius 0: no bowl, or not known.
 template <class N>
 struct Curve {
   ContactVec<typename N::Unit> across{};
@@ -20,13 +20,13 @@ struct Curve {
   [[nodiscard]] constexpr bool known() const noexcept { return radius > typename N::Real(0); }
 };
 
-/// The curves of the last two steps, as the symmetric rank-one estimate of a curvature (Nocedal and
-/// Wright 2006, 6.2, with a memory of two).
+/// The curvature along the last two steps: a symmetric rank-one estimate with a memory of two
+/// (docs/theory.md 4.4; Nocedal and Wright 2006, section 6.2).
 ///
-/// A plane alone does not tell how far to go in a bowl. Where a load L presses on it, the way left
-/// falls by 1 + L / radius times the step along `across`: a slot with a play of a tenth of a voxel
-/// turns a step of the hand of 0.01 into a swing of 0.2. And what a tool has milled with a
-/// wandering hand is a bowl along both directions of its plane.
+/// A plane alone does not tell how far to go in a bowl. Under a load L the displacement that is
+/// left falls by 1 + L / radius times the step along `across`: a slot with a play of a tenth of a
+/// unit turns a step of the hand of 0.01 into a swing of 0.2. What a wandering hand has milled is a
+/// bowl along both directions of the plane, so two curves are kept.
 template <class N>
 class CurvatureEstimate {
   using Real = typename N::Real;
@@ -35,9 +35,9 @@ class CurvatureEstimate {
   using Turn = ContactVec<Unit>;  ///< of a normal: far less than a unit
 
  public:
-  /// What the deepest planes of two places tell, the second `moved` from the first. Planes that are
-  /// unlike are two walls. Where the normals turn away from each other there is a bump: its steps
-  /// fall short, and are left alone.
+  /// Learns from the deepest planes of two places, the second `moved` from the first. Unlike planes
+  /// are two walls: all is forgotten. Normals that part are a bump: its steps only fall short, and
+  /// stay as they are.
   constexpr void learn(const Contacts<N>& before, const Contacts<N>& after, Place moved) noexcept {
     constexpr double kTelling = 0.01;  // units: over less noise turns a normal as much
     if (before.count == 0 || after.count == 0) return forget();
@@ -56,7 +56,8 @@ class CurvatureEstimate {
     last_ = whole;
   }
 
-  /// The way of a step that ends where the load presses straight: Newton's, with this curvature.
+  /// Newton's step with this curvature: `step`, shortened so that it ends where the load presses
+  /// straight.
   [[nodiscard]] constexpr Place eased(Place step, Real load) const noexcept {
     if (!first_.known() || load <= Real(0)) return step;
     const Unit p = share<N>(load, load + first_.radius);

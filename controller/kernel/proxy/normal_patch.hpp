@@ -12,29 +12,32 @@
 
 namespace kerf {
 
-/// Samples of the volume around a contact, which tell its normal to a tool that is no ball.
+/// A patch: samples of the volume around a contact, for the normal of a tool that is no ball
+/// (docs/theory.md 3.5).
 ///
-/// What touches beside a rim or a point lies on one side of it, where a curved face has another
-/// normal; and the gradient of one cell is up to 2 degrees off, for trilinear density is bent where
-/// the ramp of a face ends. Over a disc around the peak, as wide as some cells, both even out. The
-/// samples lie on a sphere that is flattened along the normal that is known so far, and so follow
-/// it without a jump. A radius of 2 units reaches too far over curved faces (0.8 degrees off on a
-/// bump of 40 instead of 0.65); 32 samples are as good on it, but the force steps by 2.2 % of its
-/// mean instead of 1.8.
+/// The tool's own samples do not tell it. Beside a rim or a point they lie on one side, where a
+/// curved face has another normal; and the gradient of one cell is up to 2 degrees off, since
+/// trilinear density is bent where the ramp of a face ends. Over a disc of some cells around the
+/// peak both even out. The samples lie on a sphere that is flattened along the normal known so far,
+/// so they follow it without a jump.
+///
+/// With a radius of 2 units the normal on a bump of 40 is 0.8 degrees off, not 0.65. With 32
+/// samples it is as good, but the force steps by 2.2 % of its mean, not 1.8.
 inline constexpr std::size_t kPatchSamples = 4 * kPointGroup;
 inline constexpr double kPatchRadius = 1.5;
 
-/// Where the tool touches two faces that look different ways, as the walls of a slot, the mean
-/// gradient of its own samples is shorter along the patch's normal than that of the patch. From
-/// kAlike of it down to kUnlike the shell's plane, which leads between the two, takes over.
+/// Where the tool touches two faces that look in different directions, as the walls of a slot, the
+/// mean gradient of its own samples along the patch's normal is shorter than the patch's. As it
+/// falls from kAlike to kUnlike of that, the point shell's plane, which leads between the two,
+/// takes over.
 inline constexpr double kAlike = 0.85, kUnlike = 0.65;
 
-/// Of a tool's own samples so many touch, by their weights, where a patch tells the normal and the
-/// place of the contact; from kWide on the mean of so many does, which no voxel's noise turns by
-/// more than a third of a degree.
+/// While up to kNarrow of a tool's own samples touch, counted by weight, the patch tells the normal
+/// and the place of the contact. From kWide on their own mean does: of so many samples no voxel's
+/// noise turns it by more than a third of a degree.
 inline constexpr double kNarrow = 32, kWide = 64;
 
-/// Points of the unit sphere; a little more reach is for roundings.
+/// Points of the unit sphere. The reach has a little to spare for roundings.
 template <class N>
 inline constexpr SpiralArrays<N, kPatchSamples> kPatchArrays(kPatchRadius + 0.1, [](std::size_t i) {
   const double y = 1 - (2 * static_cast<double>(i) + 1) / kPatchSamples;
@@ -42,7 +45,7 @@ inline constexpr SpiralArrays<N, kPatchSamples> kPatchArrays(kPatchRadius + 0.1,
       static_cast<double>(square_root(Q30(1 - y * y))), y};
 });
 
-/// Takes away what is along a unit vector: 1 - n n^T.
+/// 1 - n n^T: takes away what lies along a unit vector.
 template <class N>
 [[nodiscard]] constexpr TurnRows<N> flattened(ContactVec<typename N::Unit> n) noexcept {
   using Unit = typename N::Unit;
@@ -52,8 +55,8 @@ template <class N>
            {-(n.x * n.z), -(n.y * n.z), one - n.z * n.z}}};
 }
 
-/// 1 where few of a tool's own samples touch, 0 from kWide on. Each counts by its weight over that
-/// of the highest.
+/// 1 up to kNarrow samples in touch, 0 from kWide on. A sample counts by its weight over that of
+/// the highest.
 template <class N>
 [[nodiscard]] constexpr typename N::Unit narrowness(const PointSums<N>& sums,
                                                     typename N::Ratio top) noexcept {

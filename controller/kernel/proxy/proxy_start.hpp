@@ -10,13 +10,13 @@ namespace kerf {
 /// Whether the proxy has a place, and if not whether one is still looked for.
 enum class Placing : std::uint8_t { searching, placed, refused };
 
-/// Finds the first place of a proxy: the goal if that is free, else the nearest free place in one
-/// of 26 directions from it, half of them in a tick and one unit farther out every second. From
-/// there the sweep slides to the place nearest to the goal. With nothing free within kReach the
-/// tool is refused until its own goal is free.
+/// Finds the first place of a proxy (docs/theory.md 4.7): the goal if that is free, else the
+/// nearest free place along 26 directions. Each tick tries half of them, every second tick one unit
+/// farther out. From there the sweep slides to the place nearest to the goal. With nothing free
+/// within kReach the tool is refused until its own goal is free.
 ///
-/// At most 14 queries a tick. Only the tool's surface is felt, so what lies wholly inside of the
-/// tool does not count as solid here.
+/// At most 14 queries a tick. Only the tool's surface is felt: what lies wholly inside of the tool
+/// does not count as solid here.
 template <class N>
 class StartSearch {
   using Real = typename N::Real;
@@ -35,7 +35,7 @@ class StartSearch {
     if (distance_ == kReach && !halfway_) return Placing::refused;
     if (!halfway_) ++distance_;
     halfway_ = !halfway_;
-    // The 14th is no way at all.
+    // Direction 13 is (0, 0, 0): none.
     for (int direction = halfway_ ? 0 : 14, end = direction + 13; direction < end; ++direction) {
       const Place centre = goal.centre + step(direction);
       if (is_free(field, centre)) {

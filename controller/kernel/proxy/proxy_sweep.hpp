@@ -16,8 +16,8 @@ namespace kerf {
 ///   query(q)          what the tool feels with its centre at q
 ///   free_distance(q)  how far the centre may go from q in any direction and feel nothing; a lower
 ///                     bound, 0 if unknown
-///   turn(t)           the orientation of the tool in every query from now on
-///   half_spent()      half of the tick's queries is spent: the rest is the move's
+///   turn(t)           sets the orientation of the tool for all queries from now on
+///   half_spent()      half of the tick's work is spent: the rest is the move's
 template <class F, class N>
 concept ContactField = requires(F field, ContactVec<typename N::Real> q, ToolTurn<N> turn) {
   { field.query(q) } -> std::convertible_to<Contacts<N>>;
@@ -26,48 +26,51 @@ concept ContactField = requires(F field, ContactVec<typename N::Real> q, ToolTur
   { field.half_spent() } -> std::convertible_to<bool>;
 };
 
-/// Units of contact space; sources: contact.md 3, where not given.
+/// Constants of the sweep (docs/theory.md 4.2 and after); lengths in units of contact space.
 struct SweepRules {
   static constexpr std::int32_t kMaxQueries = 32;
-  static constexpr std::int32_t kMaxTurnQueries = 12;  ///< and its pushes; the rest is the move's
-  static constexpr double kTolerance = 0.01;           ///< a place this deep is allowed
-  static constexpr double kTurnTolerance = 0.005;      ///< for a turn, which leaves the move a play
-  static constexpr double kNoMove = 0.002;             ///< a shorter way from rest is none
-  static constexpr double kArrived = 0.004;            ///< after a step this near is there
-  /// Longest way of any sample between two queries. The middle of the thinnest wall, 2 units, is
-  /// one unit deep: beyond it density falls again, and its gradient shows the way through.
+  static constexpr std::int32_t kMaxTurnQueries =
+      12;                                          ///< and a turn's pushes; the rest is the move's
+  static constexpr double kTolerance = 0.01;       ///< a place this deep is allowed
+  static constexpr double kTurnTolerance = 0.005;  ///< for a turn, which leaves the move a play
+  static constexpr double kNoMove = 0.002;         ///< from rest no shorter displacement is tried
+  static constexpr double kArrived = 0.004;        ///< after a step this near counts as there
+  /// Longest displacement of any sample between two queries. The middle of the thinnest wall, 2
+  /// units, is one unit deep: beyond it density falls again, and its gradient leads on through the
+  /// wall.
   static constexpr double kStep = 0.875;
   static constexpr double kGain = 0.001;    ///< a step this much nearer to the goal is kept
-  static constexpr double kResidual = 0.8;  ///< share of the way that a step may leave
-  static constexpr double kEased = 0.5;     ///< share of a step to which a bowl shortens the next
+  static constexpr double kResidual = 0.8;  ///< share of the displacement that a step may leave
+  static constexpr double kEased =
+      0.5;  ///< share of a failed step: a shorter next one is tried whole
   static constexpr double kShrink = 0.4;
   /// Share of a step below which the proxy rather lags. What a tool has milled leaves it a play of
-  /// hundredths of a unit, where longer steps only meet the other wall: for kFineQueries it may try
-  /// finer ones.
+  /// hundredths of a unit, where longer steps only meet the other wall: in its first kFineQueries
+  /// it may try steps down to kFinest.
   static constexpr double kShortest = 0.1;
   static constexpr double kFinest = 0.02;
   static constexpr std::int32_t kFineQueries = 14;
-  static constexpr std::int32_t kStillQueries = 24;  ///< without a nearer place the tool stays
-  static constexpr double kPush = 0.5;               ///< longest correction of one push
-  /// Where a push from one wall leads into another, or the tick has no query left to see whether it
-  /// does, the tool may be this deep in the first.
-  /// What two opposite faces read differs by some hundredths from place to place, and a tool that
-  /// is turned until both hold it would stay there whatever the hand does: 4 % of tools that spin
-  /// askew in slots did, with 0.03 still one in a thousand.
+  static constexpr std::int32_t kStillQueries =
+      24;                               ///< after so many without a nearer place the tool stays
+  static constexpr double kPush = 0.5;  ///< longest correction of one push
+  /// The tool may be this deep in one wall where a push out of it leads into another, or where no
+  /// query is left to see whether it does. What two opposite faces read differs by some hundredths
+  /// from place to place, and a tool that is turned until both hold it would stay whatever the hand
+  /// does: of tools that spin askew in slots 4 % did, with 0.03 still one in a thousand.
   static constexpr double kWedged = 0.05;
   /// No step ends so much farther from the goal than the nearest place of the tick. With more a
-  /// tool at rest wanders about on noise; allowed places differ by kTolerance in depth, and with
-  /// less than two of it a slot without play does not let the tool out.
+  /// tool at rest wanders about on noise. With less than two kTolerance, by which allowed places
+  /// differ in depth, a slot without play does not let the tool out.
   static constexpr double kAstray = 0.03;
 };
 
-/// Sine of half the angle that takes a sample `reach` units from the centre along kStep at most;
-/// reach >= 1. The arc is 2 reach asin(s), and asin(s) <= 1.0472 s up to 1/2.
+/// Sine of half the largest turn of one step (docs/theory.md 4.6): a sample `reach` units from the
+/// centre, reach >= 1, moves by kStep at most. Its arc is 2 reach asin(s), asin(s) <= 1.0472 s.
 [[nodiscard]] constexpr double turn_step_of(double reach) noexcept {
   return SweepRules::kStep / (2 * 1.0472 * reach);
 }
 
-/// Where the tool of the proxy is.
+/// Where the proxy is and how it is turned.
 template <class N>
 struct ProxyPose {
   ContactVec<typename N::Real> centre{};
@@ -79,30 +82,30 @@ struct ProxyPose {
 /// What one tick of the sweep found.
 template <class N>
 struct Swept {
-  ConstraintSet<N> planes;  ///< that hold the proxy, depths from its centre
-  Slide<N> slide;           ///< of the way from the proxy to its goal: loads in units of way
+  ConstraintSet<N> planes;  ///< that hold the proxy; depths from its centre
+  Slide<N> slide;           ///< of the displacement to the goal; loads in units
   std::int32_t queries = 0;
   bool turned = true;  ///< the tool has the orientation that was asked
   typename N::Real depth{-1};
   bool buried = false;  ///< nothing to push against: the start rule is needed
 };
 
-/// One tick of the proxy: from a pose that the solid allows towards a goal, in steps that no sample
-/// of the tool makes longer than kStep, each queried; longer ones only where nothing can be felt.
-/// Out of queries, or of ideas, the proxy lags; it never jumps, so a wall of 2 units holds it at
-/// any speed.
+/// One tick of the proxy (docs/theory.md 4): it moves from a pose that the solid allows towards a
+/// goal. No sample of the tool moves farther than kStep in one step, and each step ends with a
+/// query; longer steps are taken only where nothing can be felt. When its queries or its attempts
+/// are spent the proxy lags. It never jumps, so a wall of 2 units holds it at any speed.
 ///
 /// The orientation goes first and the centre gives way to it: a stylus without torque motors turns
 /// the tool whatever the tooth says. Where no centre allows a turn, the orientation lags too.
 ///
-/// From a place that the solid allows the tool does not go farther from its goal, but by kAstray:
-/// in a groove of its own shape planes that hop about would lead it on and on.
+/// From an allowed place the tool does not go farther from its goal, but by kAstray: in a groove of
+/// its own shape planes that change from query to query would lead it on and on.
 ///
 /// At most kMaxQueries calls of `query`. Coordinates within +-kContactLimit.
 ///
-/// Limits: a loose bit of material less than 1.5 units across may slip in between the samples of
-/// the tool. What is wholly inside is not felt until the tool leaves it; from 2 units on it then
-/// may hold the tool. Into a slot without any play the tool may not find its way.
+/// Limits: a loose bit of material less than 1.5 units across may slip in between the samples. What
+/// is wholly inside of the tool is not felt until the tool leaves it; from 2 units on it may then
+/// hold the tool. The tool may not find into a slot without any play.
 template <class N, ContactField<N> Field>
 class ProxySweep {
   using Real = typename N::Real;
@@ -110,8 +113,8 @@ class ProxySweep {
   using Place = ContactVec<Real>;
 
  public:
-  /// `friction`: Coulomb's coefficient, 0 to 1. `turn_step`: sine of half the angle that takes the
-  /// tool's farthest sample along kStep, 0 for a tool that does not turn or is round.
+  /// `friction`: Coulomb's coefficient, 0 to 1. `turn_step`: turn_step_of(reach), or 0 for a tool
+  /// that does not turn or is round.
   constexpr ProxySweep(Field& field, ProxyPose<N>& pose, Unit friction, Unit turn_step) noexcept
       : field_(field), pose_(pose), friction_(friction), turn_step_(turn_step) {}
 
@@ -124,7 +127,7 @@ class ProxySweep {
 
  private:
   /// A place that was tried: where the tool ended after the pushes, what it feels there and which
-  /// planes it met on the way; and what it felt before the pushes.
+  /// planes it met; `first` is what it felt before the pushes.
   struct Trial {
     Place centre;
     Contacts<N> felt;
@@ -141,7 +144,7 @@ class ProxySweep {
   [[nodiscard]] constexpr bool may_look() const noexcept {
     return queries_ < SweepRules::kMaxQueries;
   }
-  /// No deeper than where walls hold the tool: it need not get out.
+  /// No deeper than a wedged tool may be: it need not get out.
   [[nodiscard]] static constexpr bool allows_rest(const Contacts<N>& felt) noexcept {
     return !felt.buried && felt.depth <= Real(SweepRules::kWedged);
   }
@@ -164,8 +167,9 @@ class ProxySweep {
     Real length;
   };
 
-  /// Coulomb: across the direction that presses the tool sticks while its way is within friction
-  /// times the load, and else slides that much less. Towards the planes nothing rubs.
+  /// Coulomb's friction (docs/theory.md 4.5): across the pressing direction the tool sticks while
+  /// its displacement is at most friction times the load, and else slides that much less. Towards
+  /// the planes nothing rubs.
   [[nodiscard]] constexpr Route route(const ConstraintSet<N>& planes,
                                       Place displacement) const noexcept {
     const Slide<N> slide = nearest(planes, displacement);
@@ -182,9 +186,9 @@ class ProxySweep {
     return {slide, left, norm(left)};
   }
 
-  /// Looks at a place `moved` from where the depths of `known` count, and where the tool is deeper
-  /// there than is allowed pushes it out: twice at most. A turn begins no push in the second half
-  /// of the tick.
+  /// Looks at a place, `moved` from where the depths of `known` count. A tool that is too deep
+  /// there is pushed out, twice at most. A turn begins no push in the second half of the tick's
+  /// work.
   constexpr Trial attempt(Trying what, Place centre, const ConstraintSet<N>& known,
                           Place moved) noexcept {
     const bool turns = what == Trying::turn;
@@ -243,7 +247,7 @@ class ProxySweep {
     return known ? here_ : look(pose_.centre);
   }
 
-  /// The route from a place whose deepest plane stands first, in a bowl.
+  /// The route in a bowl, from a place whose deepest plane stands first.
   [[nodiscard]] constexpr Route route(const ConstraintSet<N>& planes, Place displacement,
                                       const CurvatureEstimate<N>& curvature) const noexcept {
     Route onward = route(planes, displacement);
@@ -253,14 +257,14 @@ class ProxySweep {
   }
 
   /// Moves towards `goal` while steps are found that the solid allows and that bring the tool
-  /// onward: judged by the way that is left under all planes known, not by the distance to the
-  /// goal, which would stick in creases and cycle in grooves, unless that grows. Returns the slide
-  /// of the last place.
+  /// onward: the displacement that is left under all known planes shrinks to kResidual, or the goal
+  /// comes nearer. By the distance to the goal alone the proxy would stick in creases and cycle in
+  /// grooves. Returns the slide of the last place.
   constexpr Slide<N> move_to(Place goal) noexcept {
     Unit shrink(1);
     CurvatureEstimate<N> curvature;
     Route onward = route(held_by_, goal - pose_.centre);
-    // Farther than any way, while the tool has to get out of the solid.
+    // Farther than any place, while the tool has to get out of the solid.
     Real nearest_yet = allows_rest(here_) ? norm(goal - pose_.centre) : Real(4 * kContactLimit);
     const Real closer = nearest_yet - Real(SweepRules::kGain);
     auto enough = Real(SweepRules::kNoMove);

@@ -13,28 +13,26 @@
 
 namespace kerf {
 
-/// What the queries of a tool cost in all volumes together, counted in samples that are read. The
-/// servo allows a tick so much (`ContactQuery::begin_tick`), and a scene is planned with it.
+/// What the queries of one tool cost in all volumes together, counted in samples that are read. It
+/// bounds a tick (`ContactQuery::begin_tick`, docs/theory.md 4.8), and a scene is planned with it.
 struct QueryWork {
-  /// A tick's, some 2.5 ns each. A tool of very many samples is allowed some queries of all of
-  /// them.
+  /// What a tick may read, some 2.5 ns each; a tool of very many samples may make kLeastQueries.
   static constexpr std::int64_t kTickSamples = 18000;
   static constexpr std::int64_t kLeastQueries = 12;
   static constexpr std::int64_t kLookSamples = 128;  ///< what a look costs besides those it reads
   static constexpr std::int64_t kCloseSamples = 2;   ///< what one of a closeup costs
 
-  std::int64_t query = 0;   ///< at most: all of the surface in every volume
-  std::int64_t closer = 0;  ///< at most, after that: closer looks
+  std::int64_t query = 0;   ///< one query at most: all samples in every volume
+  std::int64_t closer = 0;  ///< its closer looks at most
   std::int64_t turn = 0;    ///< to place all samples anew
 
-  /// No query begins in a tick that might go beyond, but for the first after a turn, which then is
-  /// without a closer look.
+  /// Of a tick. No query begins that might go beyond it, but for the first after a turn, which then
+  /// has no closer look.
   [[nodiscard]] constexpr std::int64_t budget() const noexcept {
     return std::max(kTickSamples, kLeastQueries * (query + turn));
   }
-  /// Of any tick of a sweep: the budget, and the look after the turns where their last queries may
-  /// take of the half that is the move's. A sweep of few samples ends before, with
-  /// the last query that it may take.
+  /// No tick of a sweep reads more: the budget, and one query after the turns, whose last ones may
+  /// reach into the move's half. A tool of few samples runs out of queries before.
   [[nodiscard]] constexpr std::int64_t most() const noexcept {
     constexpr std::int64_t kTurns = SweepRules::kMaxTurnQueries + 1;
     const std::int64_t after = 8 * (query + closer) > budget() ? turn + query : 0;
@@ -42,8 +40,8 @@ struct QueryWork {
   }
 };
 
-/// A closer look is at a ball's two caps (ball_cap.hpp), or twice at the close samples of another
-/// shape (contact_closeup.hpp) and twice at a patch (normal_patch.hpp).
+/// The work of a tool with this point shell. Its closer looks are a ball's two caps (ball_cap.hpp),
+/// or two closeups (contact_closeup.hpp) and two patches (normal_patch.hpp) of another shape.
 template <class N>
 [[nodiscard]] constexpr QueryWork query_work(const PointTable<N>& shell,
                                              std::size_t volumes) noexcept {

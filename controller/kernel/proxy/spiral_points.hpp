@@ -10,8 +10,8 @@
 
 namespace kerf {
 
-/// A small shell whose samples follow Fibonacci's spiral about the axis y, for a look at a contact;
-/// it is laid out anew for each.
+/// A small point shell whose samples follow Fibonacci's spiral about the axis y: the caps and
+/// patches of closer looks (docs/theory.md 3.5). It is laid out anew for each look.
 template <class N, std::size_t kCount>
 struct SpiralArrays {
   static constexpr std::size_t kGroups = kCount / kPointGroup;

@@ -8,7 +8,7 @@
 
 namespace kerf {
 
-/// How a tool is turned, from its own axes to those of the world: a quaternion of length 1.
+/// Orientation of a tool, from its own axes to those of the world: a unit quaternion.
 template <class N>
 struct ToolTurn {
   typename N::Unit x{}, y{}, z{}, w{1};

@@ -10,8 +10,10 @@
 namespace kerf {
 namespace {
 
-/// Where the group begins, the lanes from `lane` on being covered as `lanes` says: at the first
-/// that is, but so that it does not reach farther beyond the row's end than from `lane` on.
+/// Voxel of the row at which a group of kCoverGroup begins. Bit i of `lanes`, not 0, says whether
+/// the tool covers voxel `lane` + i. The group begins at the first covered voxel; near the end of
+/// the row it begins earlier, never before `lane`, so that it reaches no farther beyond the end
+/// than one from `lane` on would.
 [[gnu::always_inline]] inline std::int32_t group_begin(const CoverRow& row, std::int32_t lane,
                                                        std::uint32_t lanes) noexcept {
   const std::int32_t first = lane + __builtin_ctz(lanes), last = row.count - kCoverGroup;

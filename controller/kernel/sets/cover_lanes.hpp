@@ -6,14 +6,15 @@
 #include "controller/kernel/cover_table.hpp"
 #include "controller/kernel/sets/cover_begin.hpp"
 
-// What a group of voxels under the tool weighs and loses, as plain loops; cover_lanes_vector.hpp
-// has the same bits. Internal linkage, for the reason told at KernelSet.
+// What a group of voxels under the tool weighs and loses (docs/theory.md 6.2), as plain loops: the
+// definition. cover_lanes_vector.hpp has the same bits. Internal linkage, for the reason told at
+// KernelSet.
 
 namespace kerf {
 namespace {
 
-/// Place of a voxel along one axis, within a rim to each side: beyond it the speed is that of the
-/// rim. No product leaves 2^42.
+/// Place of voxel `number` along one axis beside the spindle, clamped to one rim radius (2^20) to
+/// each side: beyond it the speed is the rim's. No product leaves 2^42.
 [[gnu::always_inline]] inline std::int64_t place_beside(std::int64_t first, std::int64_t step,
                                                         std::int64_t number) noexcept {
   constexpr std::int64_t kRim = 1 << 20;
@@ -22,7 +23,8 @@ namespace {
   return above > kRim ? kRim : above;
 }
 
-/// Sets what the tool covers of the voxels from `lane` on; returns bits: where it is not 0.
+/// Sets how much the tool covers of kCoverGroup voxels from `lane` on. Bit i of the result: voxel i
+/// is covered.
 [[gnu::always_inline]] inline std::uint32_t cover_lanes(
     const CoverRow& row, std::int32_t lane, std::uint32_t (&covered)[kCoverGroup]) noexcept {
   std::uint32_t lanes = 0;
@@ -34,8 +36,9 @@ namespace {
   return lanes;
 }
 
-/// Weighs a group of the row from voxel `lane` on, which goes up to where the group begins; sums by
-/// number in the group. False, and nothing else is set, where the tool covers none of the voxels.
+/// Weighs the next group of the row from voxel `lane` on; `lane` moves up to where the group
+/// begins. `sums` are over the group, by number in it. False, and nothing is set, where the tool
+/// covers none of the kCoverGroup voxels from `lane` on.
 [[gnu::always_inline]] inline bool weigh_lanes(const CoverRow& row, std::int32_t& lane,
                                                CoveredGroup& group, CoverSums& sums) noexcept {
   std::uint32_t covered[kCoverGroup];
@@ -66,7 +69,7 @@ namespace {
   return true;
 }
 
-/// Takes from a group, whose densities are `rho`, what the prices of its materials say.
+/// Takes from the voxels of a group, densities `rho`, what `spend` allots to their materials.
 [[gnu::always_inline]] inline TakenLanes take_lanes(const CoverSpend& spend, CoveredGroup& group,
                                                     std::uint16_t (&rho)[kCoverGroup]) noexcept {
   TakenLanes taken{};

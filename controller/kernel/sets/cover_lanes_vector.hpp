@@ -7,13 +7,14 @@
 #include "controller/kernel/sets/box_vector.hpp"
 #include "controller/kernel/sets/cover_begin.hpp"
 
-// What a group of voxels under the tool weighs and loses, for AVX2 and AVX-512; cover_lanes.hpp
-// says it in plain loops. As box_vector.hpp.
+// What a group of voxels under the tool weighs and loses, for AVX2 and AVX-512, in the bits of
+// cover_lanes.hpp. `Simd` as in box_vector.hpp.
 
 namespace kerf {
 namespace {
 
-/// Places along one axis, within a rim to each side: beyond it the speed is that of the rim.
+/// Distances along one axis beside the spindle, at most one rim radius: beyond it the speed is the
+/// rim's.
 class PlacesBeside {
  public:
   /// `lane`: of the first; steps are at most kSteepestStep.

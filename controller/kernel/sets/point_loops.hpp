@@ -7,7 +7,7 @@
 #include "controller/kernel/point_shell/point_sums.hpp"
 #include "controller/kernel/sets/point_places.hpp"
 
-// Sums and densities of a shell as the plain loops that define them, for sets that need no
+// Sums and densities of a point shell as the plain loops that define them, for sets that need no
 // instruction that other machines lack.
 
 namespace kerf {

@@ -6,8 +6,8 @@
 
 #include "controller/kernel/point_shell/point_table.hpp"
 
-// Places of a shell as loops that a compiler turns into vectors, one text for every instruction
-// set; internal linkage, for the reason told at KernelSet.
+// Places of a point shell as loops that a compiler turns into vectors, one text for every
+// instruction set; internal linkage, for the reason told at KernelSet.
 
 namespace kerf {
 namespace {

@@ -8,8 +8,9 @@
 #include "controller/kernel/point_shell/point_sums.hpp"
 #include "controller/kernel/sets/point_places.hpp"
 
-// Sums of a shell for AVX2 and AVX-512, in the bits of point_sums.hpp; `Simd` as in box_vector.hpp.
-// A sample is a 32-bit entry; where densities meet, its halves are the voxels x and x + 1.
+// Sums of a point shell for AVX2 and AVX-512, in the bits of point_sums.hpp; `Simd` as in
+// box_vector.hpp. A sample is a 32-bit entry; where densities meet, its halves are the voxels x and
+// x + 1.
 
 namespace kerf {
 namespace {

@@ -104,7 +104,7 @@ template <class N>
 
 }  // namespace delta
 
-/// Tip and levers for three crank angles in rad, by Newton's method with a fixed number of steps.
+/// Tip and Jacobian for three crank angles in rad, by Newton's method with a fixed number of steps.
 /// Angles that no grip can have give some finite place (fixed point) or NaN (floating point).
 template <class N>
 [[nodiscard]] constexpr ForwardKinematics<N> delta_arm_pose(
@@ -122,7 +122,7 @@ template <class N>
       legs[i] = delta::leg_at<N>(arm, arm.azimuth[i], crank[i], grip);
     }
     dual = delta::dual_of<N>(legs);
-    if (step == delta::kSteps) break;  // the last round is for the levers alone
+    if (step == delta::kSteps) break;  // the last round is for the Jacobian alone
     for (std::size_t i = 0; i < 3; ++i) {
       grip = grip - DeviceVec<Real>{multiply<Real>(dual[i].x, legs[i].excess_mm),
                                     multiply<Real>(dual[i].y, legs[i].excess_mm),

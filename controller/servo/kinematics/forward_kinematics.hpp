@@ -10,8 +10,7 @@ namespace kerf {
 template <class N>
 using JacobianTransposed = Transform<typename N::Real, JointSpace, DeviceSpace>;
 
-/// What forward kinematics give: the tip in device mm (x right, y up, z to the user) and the levers
-/// there.
+/// What forward kinematics give: the tip in device mm (x right, y up, z to the user) and J^T there.
 template <class N>
 struct ForwardKinematics {
   DeviceVec<typename N::Real> tip_mm;
