@@ -9,23 +9,11 @@
 #include <nlohmann/json.hpp>
 
 #include "record/record_error.hpp"
+#include "shared/posix/hex64.hpp"
 #include "shared/posix/new_file.hpp"
 #include "shared/segment/layout_table.hpp"
 
 namespace kerf {
-
-std::string hex64(std::uint64_t value) {
-  char text[17];
-  std::snprintf(text, sizeof text, "%016llx", static_cast<unsigned long long>(value));
-  return text;
-}
-
-void write_whole(const std::filesystem::path& path, std::string_view text) {
-  NewFile file(path);
-  file.write(text.data(), text.size());
-  file.close();
-  file.commit();
-}
 
 void write_manifest(const std::filesystem::path& folder, const SegmentInfo& info,
                     const Recorder& recorder, std::uint64_t rows, std::string_view end_reason) {
@@ -54,7 +42,7 @@ void write_manifest(const std::filesystem::path& folder, const SegmentInfo& info
   manifest["end_reason"] = end_reason;
   // A build id or scene text of another encoding must not stop a recording.
   constexpr auto kReplace = nlohmann::ordered_json::error_handler_t::replace;
-  write_whole(folder / kManifestName, manifest.dump(2, ' ', false, kReplace) + "\n");
+  write_new_file(folder / kManifestName, manifest.dump(2, ' ', false, kReplace) + "\n");
 }
 
 Manifest read_manifest(const std::filesystem::path& folder) {

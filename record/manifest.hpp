@@ -29,10 +29,4 @@ void write_manifest(const std::filesystem::path& folder, const SegmentInfo& info
 /// Throws `RecordError` where it is missing or holds no such values.
 [[nodiscard]] Manifest read_manifest(const std::filesystem::path& folder);
 
-/// Writes a text file, whole or not at all.
-void write_whole(const std::filesystem::path& path, std::string_view text);
-
-/// 16 hex digits.
-[[nodiscard]] std::string hex64(std::uint64_t value);
-
 }  // namespace kerf

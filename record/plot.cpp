@@ -13,6 +13,7 @@
 #include "record/record_error.hpp"
 #include "record/tick_figures.hpp"
 #include "record/tick_log.hpp"
+#include "shared/posix/new_file.hpp"
 
 namespace kerf {
 namespace {
@@ -104,7 +105,7 @@ struct Curve {
 }  // namespace
 
 void plot_forces(const std::filesystem::path& folder, const std::filesystem::path& svg) {
-  write_whole(svg, gnuplot_svg(gnuplot_script(folder)));
+  write_new_file(svg, gnuplot_svg(gnuplot_script(folder)));
 }
 
 }  // namespace kerf

@@ -10,6 +10,7 @@
 #include "record/manifest.hpp"
 #include "record/plot.hpp"
 #include "record/summary.hpp"
+#include "shared/posix/new_file.hpp"
 
 namespace kerf {
 
@@ -43,7 +44,7 @@ int run_record(int argc, char** argv) {
   if (info->parsed()) {
     const RecordSummary summary = summarise(folder);
     std::cout << to_text(summary);
-    if (!report.empty()) write_whole(report, to_json(summary));
+    if (!report.empty()) write_new_file(report, to_json(summary));
   }
   if (plot->parsed()) plot_forces(folder, svg);
   if (table->parsed()) export_csv(folder, csv);

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <csignal>
 #include <exception>
 #include <iostream>
 
 #include "record/record_commands.hpp"
+#include "shared/posix/stop_signals.hpp"
 
 int main(int argc, char** argv) {
-  std::signal(SIGXFSZ, SIG_IGN);  // a file size limit is an error of write, not a death
+  kerf::make_signals_of_writes_errors();
   try {
     return kerf::run_record(argc, argv);
   } catch (const std::exception& error) {

@@ -8,30 +8,19 @@
 
 #include "controller/scene/scene_words.hpp"
 #include "controller/tool/tool_shapes.hpp"
+#include "shared/numeric/fnv1a.hpp"
+#include "shared/posix/hex64.hpp"
 
 namespace kerf {
 namespace {
 
 using nlohmann::json;
 
-constexpr std::uint64_t kFnvBasis = 0xcbf29ce484222325;
-constexpr std::uint64_t kFnvPrime = 0x100000001b3;
-
-std::uint64_t fnv1a_byte(std::uint64_t hash, std::uint8_t byte) {
-  return (hash ^ byte) * kFnvPrime;
-}
-
 std::string content_hash(const VolumeImage& image) {
-  std::uint64_t hash = kFnvBasis;
-  for (const Density density : image.density) {  // low byte first, whatever the machine
-    hash = fnv1a_byte(hash, static_cast<std::uint8_t>(density & 0xff));
-    hash = fnv1a_byte(hash, static_cast<std::uint8_t>(density >> 8));
-  }
-  for (const Label label : image.labels) hash = fnv1a_byte(hash, label);
-  std::string digits(16, '0');
-  for (std::size_t i = digits.size(); i-- > 0; hash >>= 4)
-    digits[i] = "0123456789abcdef"[hash & 15];
-  return digits;
+  std::uint64_t hash = kFnv1aBasis;
+  for (const Density density : image.density) hash = fnv1a_bytes(hash, density, sizeof density);
+  for (const Label label : image.labels) hash = fnv1a_step(hash, label);
+  return hex64(hash);
 }
 
 json volume_json(const SceneVolume& volume) {
@@ -144,12 +133,6 @@ std::string canonical_json(const LoadedScene& scene) {
   }
   // A path need not be UTF-8; what is not, is replaced.
   return root.dump(-1, ' ', false, json::error_handler_t::replace);
-}
-
-std::uint64_t fnv1a(std::string_view bytes) {
-  std::uint64_t hash = kFnvBasis;
-  for (const char byte : bytes) hash = fnv1a_byte(hash, static_cast<std::uint8_t>(byte));
-  return hash;
 }
 
 std::uint64_t config_hash(const LoadedScene& scene) {

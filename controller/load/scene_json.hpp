@@ -23,9 +23,6 @@ namespace kerf {
 ///              spindle where force cuts
 [[nodiscard]] std::string canonical_json(const LoadedScene& scene);
 
-/// FNV-1a of bytes, 64 bits.
-[[nodiscard]] std::uint64_t fnv1a(std::string_view bytes);
-
 /// Identity of everything that decides what a run does: fnv1a of `canonical_json`, which holds the
 /// hash of each volume's density and labels too.
 [[nodiscard]] std::uint64_t config_hash(const LoadedScene& scene);

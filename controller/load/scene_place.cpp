@@ -120,51 +120,6 @@ std::optional<Point3> nearest_solid_voxel(const SceneVolume& volume, const World
 
 }  // namespace
 
-Matrix3 rotation_of(const std::array<double, 4>& quaternion) {
-  const auto [x, y, z, w] = quaternion;
-  return {1 - 2 * (y * y + z * z), 2 * (x * y - z * w),     2 * (x * z + y * w),
-          2 * (x * y + z * w),     1 - 2 * (x * x + z * z), 2 * (y * z - x * w),
-          2 * (x * z - y * w),     2 * (y * z + x * w),     1 - 2 * (x * x + y * y)};
-}
-
-std::array<double, 4> quaternion_of(const Matrix3& m) {
-  // Four times the square of each component; the largest is safe to divide by.
-  const std::array<double, 4> square = {1 + m[0] - m[4] - m[8], 1 - m[0] + m[4] - m[8],
-                                        1 - m[0] - m[4] + m[8], 1 + m[0] + m[4] + m[8]};
-  const auto largest =
-      static_cast<std::size_t>(std::max_element(square.begin(), square.end()) - square.begin());
-  const double root = std::sqrt(square[largest]);
-  std::array<double, 4> q{};
-  if (largest == 0) q = {root, (m[1] + m[3]) / root, (m[2] + m[6]) / root, (m[7] - m[5]) / root};
-  if (largest == 1) q = {(m[1] + m[3]) / root, root, (m[5] + m[7]) / root, (m[2] - m[6]) / root};
-  if (largest == 2) q = {(m[2] + m[6]) / root, (m[5] + m[7]) / root, root, (m[3] - m[1]) / root};
-  if (largest == 3) q = {(m[7] - m[5]) / root, (m[2] - m[6]) / root, (m[3] - m[1]) / root, root};
-  // Not hypot: a square root has the same bits everywhere.
-  const double norm = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
-  const double scale = (q[3] < 0 ? -1.0 : 1.0) / norm;
-  for (double& component : q) component = component == 0 ? 0 : component * scale;  // no -0
-  return q;
-}
-
-Matrix3 product(const Matrix3& a, const Matrix3& b) {
-  Matrix3 m{};
-  for (std::size_t i = 0; i < 3; ++i) {
-    for (std::size_t j = 0; j < 3; ++j) {
-      m[3 * i + j] = a[3 * i] * b[j] + a[3 * i + 1] * b[3 + j] + a[3 * i + 2] * b[6 + j];
-    }
-  }
-  return m;
-}
-
-Point3 rotated(const Matrix3& rotation, const Point3& point) {
-  Point3 turned{};
-  for (std::size_t i = 0; i < 3; ++i) {
-    turned[i] = rotation[3 * i] * point[0] + rotation[3 * i + 1] * point[1] +
-                rotation[3 * i + 2] * point[2];
-  }
-  return turned;
-}
-
 Pose place_volume(const VolumeImage& image, const Matrix3& orientation, const Point3& middle_mm) {
   Pose pose;
   pose.orientation = quaternion_of(product(orientation, image.direction));

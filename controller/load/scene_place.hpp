@@ -1,20 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <array>
-
 #include "controller/load/loaded_scene.hpp"
+#include "shared/numeric/rotation.hpp"
 
 namespace kerf {
 
-using Matrix3 = std::array<double, 9>;  ///< row-major
-using Point3 = std::array<double, 3>;   ///< mm
-
-/// Rotation matrix of a unit quaternion (x, y, z, w), and back (w >= 0).
-[[nodiscard]] Matrix3 rotation_of(const std::array<double, 4>& quaternion);
-[[nodiscard]] std::array<double, 4> quaternion_of(const Matrix3& rotation);
-[[nodiscard]] Matrix3 product(const Matrix3& a, const Matrix3& b);
-[[nodiscard]] Point3 rotated(const Matrix3& rotation, const Point3& point);
+using Point3 = vec3::Vec;  ///< mm
 
 /// World from source when a scene gives no orientation: the source's z axis points up (world y), so
 /// that a scan of a standing patient stands: (x, y, z) -> (x, z, -y).

@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "controller/load/scene_place.hpp"
+#include "shared/numeric/rotation.hpp"
 #include "shared/numeric/vec.hpp"
 
 namespace kerf {

@@ -12,12 +12,12 @@
 #include "controller/servo/contact_plan.hpp"
 #include "controller/servo/force_cut_plan.hpp"
 #include "controller/servo/force_limits.hpp"
-#include "controller/servo/hash_chain.hpp"
 #include "controller/servo/kinematics/forward_kinematics.hpp"
 #include "controller/servo/kinematics/rotation.hpp"
 #include "controller/servo/servo_output.hpp"
 #include "controller/servo/supervisor.hpp"
 #include "controller/servo/velocity_window.hpp"
+#include "shared/numeric/fnv1a.hpp"
 
 namespace kerf {
 
@@ -76,7 +76,7 @@ struct ServoState {
   DeviceVec<Real> held_force_n;    ///< sent with the last good report: faded when reports stop
   ThermalState<N> thermal;
   typename N::Energy absorbed_mj{};
-  std::uint64_t output_hash = kHashSeed;
+  std::uint64_t output_hash = kFnv1aBasis;
 };
 
 }  // namespace kerf

@@ -9,8 +9,8 @@
 
 #include "controller/kernel/penetration.hpp"
 #include "controller/servo/device_pose.hpp"
-#include "controller/servo/hash_chain.hpp"
 #include "controller/servo/tool_forces.hpp"
+#include "shared/numeric/fnv1a.hpp"
 
 namespace kerf {
 namespace {
@@ -133,13 +133,13 @@ std::uint64_t hash_of(std::uint64_t hash, const ServoOutput& out,
     }
   };
   for (const std::int16_t m : out.motor_counts) {
-    hash = hash_word(hash, static_cast<std::uint16_t>(m));
+    hash = fnv1a_step(hash, static_cast<std::uint16_t>(m));
   }
-  hash = hash_word(hash, word(force_n.x));
-  hash = hash_word(hash, word(force_n.y));
-  hash = hash_word(hash, word(force_n.z));
-  hash = hash_word(hash, out.removed_steps);
-  return hash_word(hash, static_cast<std::uint64_t>(out.phase) << 1 | (out.motors_on ? 1U : 0U));
+  hash = fnv1a_step(hash, word(force_n.x));
+  hash = fnv1a_step(hash, word(force_n.y));
+  hash = fnv1a_step(hash, word(force_n.z));
+  hash = fnv1a_step(hash, out.removed_steps);
+  return fnv1a_step(hash, static_cast<std::uint64_t>(out.phase) << 1 | (out.motors_on ? 1U : 0U));
 }
 
 /// What the device told in this tick.

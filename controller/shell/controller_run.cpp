@@ -1,20 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "controller/shell/controller_run.hpp"
 
-#include <algorithm>
 #include <atomic>
-#include <chrono>
 #include <cmath>
 #include <cstdio>
-#include <exception>
 #include <filesystem>
 #include <memory>
-#include <optional>
 #include <stdexcept>
 #include <string>
-#include <thread>
-#include <utility>
-#include <vector>
 
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
@@ -26,18 +19,14 @@
 #include "controller/plan/compile.hpp"
 #include "controller/plan/cost/work_budget.hpp"
 #include "controller/scene/scene_words.hpp"
-#include "controller/shell/call_guard.hpp"
 #include "controller/shell/explain_scene.hpp"
-#include "controller/shell/motor_guard.hpp"
-#include "controller/shell/progress_bar.hpp"
-#include "controller/shell/publisher.hpp"
 #include "controller/shell/run_report.hpp"
+#include "controller/shell/run_threads.hpp"
 #include "controller/shell/scene_segment.hpp"
-#include "controller/shell/servo_loop.hpp"
-#include "controller/shell/stop_signals.hpp"
-#include "controller/shell/watchdog_thread.hpp"
 #include "controller/volume/volume_write.hpp"
+#include "shared/numeric/fnv1a.hpp"
 #include "shared/posix/new_file.hpp"
+#include "shared/posix/stop_signals.hpp"
 #include "shared/segment/segment_plan.hpp"
 #include "shared/volume/density_hash.hpp"
 
@@ -45,9 +34,7 @@ namespace kerf {
 namespace {
 
 constexpr int kPortPatienceMs = 5000;
-constexpr double kArmingPatienceS = 60;
 constexpr double kStableNPerMm = 0.7;  // CHAI3D's cap for the Omni; the design's for couplings
-constexpr std::chrono::milliseconds kLookPeriod{5};
 
 const char* text_of(EndReason end) {
   switch (end) {
@@ -73,16 +60,6 @@ std::string hand_lines(const LoadedScene& scene) {
          "\nrate_hz=" + std::to_string(scene.servo.rate_hz) + "\n";
 }
 
-/// Warns of each missing right, or refuses under --strict.
-void accept_rights(const std::vector<MissingRight>& missing, bool strict) {
-  for (const MissingRight& right : missing) {
-    if (strict) {
-      throw std::runtime_error("--strict: no " + right.what + "; without it " + right.effect);
-    }
-    spdlog::warn("no {}: {}", right.what, right.effect);
-  }
-}
-
 double removed_mm3(const LoadedScene& scene, const RunRecord& record) {
   double mm3 = 0;
   for (std::size_t v = 0; v < scene.volumes.size(); ++v) {
@@ -93,9 +70,9 @@ double removed_mm3(const LoadedScene& scene, const RunRecord& record) {
 }
 
 std::uint64_t hash_of_volumes(const LoadedScene& scene, const Servo& servo) {
-  std::uint64_t hash = kHashSeed;
+  std::uint64_t hash = kFnv1aBasis;
   for (std::size_t v = 0; v < scene.volumes.size(); ++v) {
-    hash = hash_word(hash, density_hash(servo.density(v)));
+    hash = fnv1a_step(hash, density_hash(servo.density(v)));
   }
   return hash;
 }
@@ -113,20 +90,6 @@ void write_final(const LoadedScene& scene, const Servo& servo, const std::filesy
                               path.extension().string());
     }
     write_volume(image, target);
-  }
-}
-
-/// Main thread while the servo runs: draws the progress bar.
-void show_progress(const LoopSignals& signals, const std::atomic<bool>& ended,
-                   const ControllerOptions& options, int rate_hz) {
-  const ProgressBar bar(options.progress);
-  while (!ended.load()) {
-    const double done_s = static_cast<double>(signals.armed_ticks.load()) / rate_hz;
-    char text[64];
-    std::snprintf(text, sizeof text, "%.1f s", done_s);
-    bar.show(options.seconds ? done_s / *options.seconds : 0,
-             done_s > 0 ? text : "waiting for the device to be parked at rest");
-    for (int i = 0; i < 10 && !ended.load(); ++i) std::this_thread::sleep_for(kLookPeriod);
   }
 }
 
@@ -207,97 +170,13 @@ RunReport new_report(const ControllerOptions& options, const LoadedScene& scene,
   return report;
 }
 
-LoopLimits limits_of(const ControllerOptions& options, double rate_hz) {
-  LoopLimits limits;
-  if (options.seconds) {
-    limits.armed_ticks = static_cast<std::uint64_t>(std::llround(*options.seconds * rate_hz));
-  }
-  limits.gone_ticks = static_cast<std::uint64_t>(2 * rate_hz);
-  limits.arming_ticks = static_cast<std::uint64_t>(kArmingPatienceS * rate_hz);
-  return limits;
-}
-
-/// What the threads of a run share.
-struct Run {
-  const ControllerOptions& options;
-  const std::string& port;  ///< as `--port` names it, `auto` resolved
-  int rate_hz;
-  SegmentWriter& segment;
-  SegmentServer& server;
-  Servo& servo;
-  DeviceDriver& device;
-  std::atomic<bool>& stop;
-  RunReport& report;
-};
-
-/// The servo thread from its first to its last tick. Throws where --strict misses a right.
-EndReason serve(const Run& run, LoopSignals& signals, CallGuard* calls) {
-  const ControllerOptions& options = run.options;
-  if (!options.virtual_time) {
-    const auto missing = become_real_time(options.real_time);
-    accept_rights(missing, options.real_time.strict);
-    auto& all = run.report.missing_rights;
-    all.insert(all.end(), missing.begin(), missing.end());
-  }
-  Publisher eyes(run.segment, run.servo);
-  RealTimeTicks real_time(kNsPerSecond / run.rate_hz, options.real_time.spin_us * 1000);
-  LockStepTicks lock_step(run.device);
-  TickSource& clock = options.virtual_time ? static_cast<TickSource&>(lock_step) : real_time;
-  if (calls != nullptr) calls->enter(run.port);
-  const EndReason end = run_servo(clock, run.device, run.servo, eyes, run.server,
-                                  limits_of(options, run.rate_hz), signals, run.report.record);
-  if (calls != nullptr) calls->leave();
-  return end;
-}
-
-/// The end as the guard knows it: what looked like a wish to stop may have been its own.
-EndReason end_by(const CallGuard& calls, EndReason end, RunReport& report) {
-  report.unexpected_call = calls.unexpected();
-  if (report.unexpected_call.empty()) return end;
-  spdlog::error("--guard: system call {} on the servo thread; motors off; keep it out of the loop",
-                report.unexpected_call);
-  report.record.add_fault(report.record.armed_at_tick + report.record.ticks, "unexpected_call");
-  return EndReason::unexpected_call;
-}
-
-/// Servo, watchdog and progress until the run is over; the motors are off afterwards.
-EndReason run_threads(const Run& run) {
-  LoopSignals signals{run.stop};
-  Watchdog watchdog(run.device, signals);
-  std::atomic<bool> ended{false};
-  EndReason end = EndReason::stopped;
-  std::exception_ptr failure;
-  std::optional<CallGuard> calls;
-  {
-    MotorGuard guard(run.device);
-    if (run.options.guard) calls.emplace(run.device, run.stop);
-    const std::jthread servo_thread([&] {
-      guard.guard_stack();
-      try {
-        end = serve(run, signals, calls ? &*calls : nullptr);
-      } catch (...) {
-        failure = std::current_exception();
-      }
-      ended = true;
-    });
-    std::jthread watching;
-    if (!run.options.virtual_time) {
-      watching = start_watchdog(watchdog, run.options.real_time);
-    }
-    show_progress(signals, ended, run.options, run.rate_hz);
-  }
-  run.report.watchdog_trips = watchdog.trips();
-  if (failure) std::rethrow_exception(failure);
-  return calls ? end_by(*calls, end, run.report) : end;
-}
-
 }  // namespace
 
 int run_controller(const ControllerOptions& options) {
   const std::int64_t began_ns = monotonic_ns();
   spdlog::set_default_logger(spdlog::stderr_color_mt("kerf-controller"));
   spdlog::set_pattern("kerf-controller: %^%l%$: %v");
-  std::atomic<bool>& stop = catch_stop_signals();
+  std::atomic<bool>& stop = catch_stop_and_pause_signals();
 
   LoadedScene scene = load_scene(options.scene, options.overrides);
   const std::unique_ptr<CompiledScene> servo = plan_scene(scene);

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <cstddef>
 
-#include "controller/load/scene_place.hpp"
 #include "shared/numeric/fixed.hpp"
+#include "shared/numeric/rotation.hpp"
 
 namespace kerf {
 namespace {
@@ -58,7 +58,7 @@ void Publisher::publish_volumes(const ServoOutput& output, TickRecord& record) n
     const std::span<const Density> density = servo_.density(v);
     const std::uint64_t hash = segment_.publish_box(
         v, density, box, static_cast<std::uint32_t>(output.removed_by_volume[v]));
-    removal_hash_ = hash_word(removal_hash_, hash);
+    removal_hash_ = fnv1a_step(removal_hash_, hash);
     record.dirty_volumes |= 1U << v;
     if (first_box.empty()) first_box = box;
   }

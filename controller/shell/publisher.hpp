@@ -6,9 +6,9 @@
 #include <span>
 
 #include "controller/servo/device_report.hpp"
-#include "controller/servo/hash_chain.hpp"
 #include "controller/servo/servo.hpp"
 #include "controller/servo/servo_output.hpp"
+#include "shared/numeric/fnv1a.hpp"
 #include "shared/segment/layout.hpp"
 #include "shared/segment/writer.hpp"
 
@@ -38,7 +38,7 @@ class Publisher {
 
   SegmentWriter& segment_;
   const Servo& servo_;
-  std::uint64_t removal_hash_ = kHashSeed;  ///< chain over the changed boxes
+  std::uint64_t removal_hash_ = kFnv1aBasis;  ///< chain over the changed boxes
 };
 
 }  // namespace kerf

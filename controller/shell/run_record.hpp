@@ -7,8 +7,8 @@
 #include <string>
 
 #include "controller/servo/servo_output.hpp"
-#include "controller/shell/histogram.hpp"
 #include "controller/shell/real_time.hpp"
+#include "shared/numeric/histogram.hpp"
 
 namespace kerf {
 

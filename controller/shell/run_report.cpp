@@ -7,15 +7,10 @@
 #include <nlohmann/json.hpp>
 
 #include "controller/servo/velocity_window.hpp"
+#include "shared/posix/hex64.hpp"
 
 namespace kerf {
 namespace {
-
-std::string hex(std::uint64_t value) {
-  char text[17];
-  std::snprintf(text, sizeof text, "%016llx", static_cast<unsigned long long>(value));
-  return text;
-}
 
 nlohmann::ordered_json percentiles(const Histogram& histogram) {
   return {{"p50", histogram.percentile_us(0.5)},
@@ -59,7 +54,7 @@ std::string report_json(const RunReport& report) {
       {"program", "kerf-controller"},
       {"version", KERF_VERSION},
       {"scene", report.scene},
-      {"config_hash", hex(report.config_hash)},
+      {"config_hash", hex64(report.config_hash)},
       {"device", report.device},
       {"numeric", report.numeric},
       {"rate_hz", report.rate_hz},
@@ -93,8 +88,8 @@ std::string report_json(const RunReport& report) {
       {"missing_rights", missing},
       {"load_s", report.load_s},
       {"start_to_force_ms", start_to_force_ms},
-      {"volume_hash", hex(report.volume_hash)},
-      {"output_hash", hex(r.output_hash)},
+      {"volume_hash", hex64(report.volume_hash)},
+      {"output_hash", hex64(r.output_hash)},
   };
   return json.dump(2) + "\n";
 }
@@ -121,8 +116,8 @@ std::string summary(const RunReport& report) {
                  report.allocations_counted ? "" : " (not counted under sanitizers)",
                  static_cast<long long>(r.faults_of_pages.minor),
                  static_cast<long long>(r.faults_of_pages.major));
-  text += format("  hashes     volume %s, output %s\n", hex(report.volume_hash).c_str(),
-                 hex(r.output_hash).c_str());
+  text += format("  hashes     volume %s, output %s\n", hex64(report.volume_hash).c_str(),
+                 hex64(r.output_hash).c_str());
   for (std::size_t i = 0; i < std::min(r.event_count, RunRecord::kMaxEvents); ++i) {
     text += format("  fault      %s at tick %llu\n", r.events[i].name,
                    static_cast<unsigned long long>(r.events[i].tick));

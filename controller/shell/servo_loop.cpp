@@ -6,13 +6,10 @@
 
 #include "controller/shell/allocation_counter.hpp"
 #include "controller/shell/clock.hpp"
+#include "shared/numeric/vec3.hpp"
 
 namespace kerf {
 namespace {
-
-double length(const std::array<double, 3>& v) noexcept {
-  return std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
-}
 
 ServoCommand servo_command(const Command& command) noexcept {
   switch (command.kind) {
@@ -44,7 +41,7 @@ class Bookkeeper {
     ++record_.ticks;
     record_.stale_ticks += output.stale ? 1 : 0;
     record_.contact_ticks += output.contact ? 1 : 0;
-    const double force_n = length(output.force_n);
+    const double force_n = vec3::length(output.force_n);
     record_.peak_force_n = std::max(record_.peak_force_n, force_n);
     if (record_.first_force_ns == 0 && output.motors_on && force_n > 0) {
       record_.first_force_ns = sent_ns;

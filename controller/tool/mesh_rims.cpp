@@ -16,6 +16,8 @@ namespace kerf {
 namespace {
 
 using Point = ToolMesh::Point;
+using vec3::doubled_area, vec3::dot, vec3::length, vec3::unit;
+using vec3::operator+, vec3::operator-, vec3::operator*;
 
 const double kCosRim = std::cos(20 * std::numbers::pi / 180);
 constexpr double kPointShare = 0.05;  // of the full angle, that a point lacks at least
@@ -38,14 +40,14 @@ struct Rim {
 
 /// Across the edge from a to b, into the face.
 Point inward_of(const Point& a, const Point& b, const Face& face) {
-  const Point along = vec3::unit(vec3::minus(b, a)), to = vec3::minus(face.opposite, a);
-  return vec3::unit(vec3::minus(to, vec3::scaled(along, vec3::dot(along, to))));
+  const Point along = unit(b - a), to = face.opposite - a;
+  return unit(to - dot(along, to) * along);
 }
 
 std::vector<Rim> rims_of(const ToolMesh& mesh) {
   std::map<std::pair<std::uint32_t, std::uint32_t>, std::vector<Face>> edges;
   for (const ToolMesh::Triangle& t : mesh.triangles) {
-    const Point normal = vec3::unit(vec3::doubled_area(mesh.corners(t)));
+    const Point normal = unit(doubled_area(mesh.corners(t)));
     for (std::size_t k = 0; k < 3; ++k) {
       edges[std::minmax(t[k], t[(k + 1) % 3])].push_back({normal, mesh.points_mm[t[(k + 2) % 3]]});
     }
@@ -54,10 +56,10 @@ std::vector<Rim> rims_of(const ToolMesh& mesh) {
   for (const auto& [edge, faces] : edges) {
     if (faces.size() != 2) continue;
     const Point &a = mesh.points_mm[edge.first], &b = mesh.points_mm[edge.second];
-    if (vec3::dot(faces[0].normal, faces[1].normal) > kCosRim) continue;
+    if (dot(faces[0].normal, faces[1].normal) > kCosRim) continue;
     const Point into = inward_of(a, b, faces[1]);
-    if (vec3::dot(faces[0].normal, into) >= 0) continue;  // a groove
-    rims.push_back({edge.first, edge.second, vec3::add(inward_of(a, b, faces[0]), into)});
+    if (dot(faces[0].normal, into) >= 0) continue;  // a groove
+    rims.push_back({edge.first, edge.second, inward_of(a, b, faces[0]) + into});
   }
   return rims;
 }
@@ -68,9 +70,9 @@ std::vector<bool> points_of(const ToolMesh& mesh) {
   for (const ToolMesh::Triangle& t : mesh.triangles) {
     const auto corner = mesh.corners(t);
     for (std::size_t k = 0; k < 3; ++k) {
-      const Point u = vec3::unit(vec3::minus(corner[(k + 1) % 3], corner[k]));
-      const Point v = vec3::unit(vec3::minus(corner[(k + 2) % 3], corner[k]));
-      angle[t[k]] += std::acos(std::clamp(vec3::dot(u, v), -1.0, 1.0));
+      const Point u = unit(corner[(k + 1) % 3] - corner[k]);
+      const Point v = unit(corner[(k + 2) % 3] - corner[k]);
+      angle[t[k]] += std::acos(std::clamp(dot(u, v), -1.0, 1.0));
     }
   }
   std::vector<bool> is_point(angle.size());
@@ -94,7 +96,7 @@ class ApartSamples {
           // A cell is as wide as the distance; it holds few.
           const auto [begin, end] = cells_.equal_range(cell);
           for (auto near = begin; near != end; ++near) {
-            if (vec3::length(vec3::minus(samples_[near->second], p)) < apart_mm_) return;
+            if (length(samples_[near->second] - p) < apart_mm_) return;
           }
         }
       }
@@ -160,7 +162,7 @@ class RimRows {
   }
 
   [[nodiscard]] double length_of(const Step& step) const {
-    return vec3::length(vec3::minus(mesh_.points_mm[step.to], mesh_.points_mm[step.from]));
+    return length(mesh_.points_mm[step.to] - mesh_.points_mm[step.from]);
   }
 
   /// Its ends have samples of their own.
@@ -177,8 +179,8 @@ class RimRows {
       for (; next < last && next * length_mm / count <= passed_mm + step_mm; ++next) {
         const double share = (next * length_mm / count - passed_mm) / step_mm;
         const Point &from = mesh_.points_mm[step.from], &to = mesh_.points_mm[step.to];
-        const Point on = vec3::add(vec3::scaled(from, 1 - share), vec3::scaled(to, share));
-        samples.add(vec3::add(on, vec3::scaled(rims_[step.rim].inward, kFromRim * pitch_mm)));
+        const Point on = (1 - share) * from + share * to;
+        samples.add(on + kFromRim * pitch_mm * rims_[step.rim].inward);
       }
       passed_mm += step_mm;
     }
@@ -198,18 +200,18 @@ std::vector<Point> rim_samples(const ToolMesh& mesh, double pitch_mm) {
   std::vector<int> meeting(mesh.points_mm.size());
   std::vector<Point> inward(mesh.points_mm.size());
   for (const Rim& rim : rims) {
-    const Point direction = vec3::unit(vec3::minus(mesh.points_mm[rim.b], mesh.points_mm[rim.a]));
+    const Point direction = unit(mesh.points_mm[rim.b] - mesh.points_mm[rim.a]);
     ++meeting[rim.a];
     ++meeting[rim.b];
-    inward[rim.a] = vec3::add(inward[rim.a], direction);
-    inward[rim.b] = vec3::minus(inward[rim.b], direction);
+    inward[rim.a] = inward[rim.a] + direction;
+    inward[rim.b] = inward[rim.b] - direction;
   }
   std::vector<bool> is_end = points_of(mesh);
   ApartSamples samples(kNearest * pitch_mm);
   for (std::size_t i = 0; i < is_end.size(); ++i) {
     is_end[i] = is_end[i] || (meeting[i] != 0 && meeting[i] != 2);
     if (!is_end[i]) continue;
-    samples.add(vec3::add(mesh.points_mm[i], vec3::scaled(inward[i], kFromPoint * pitch_mm)));
+    samples.add(mesh.points_mm[i] + kFromPoint * pitch_mm * inward[i]);
   }
   RimRows(mesh, rims, is_end).sample(pitch_mm, samples);
   return std::move(samples).samples();

@@ -15,6 +15,8 @@ namespace kerf {
 namespace {
 
 using Point = ToolMesh::Point;
+using vec3::doubled_area, vec3::dot, vec3::length, vec3::unit;
+using vec3::operator+, vec3::operator-, vec3::operator*;
 
 constexpr std::size_t kNone = std::numeric_limits<std::size_t>::max();
 
@@ -30,8 +32,8 @@ struct Site {
 };
 
 double squared_distance(const Point& a, const Point& b) {
-  const Point d = vec3::minus(a, b);
-  return vec3::dot(d, d);
+  const Point d = a - b;
+  return dot(d, d);
 }
 
 /// Even over the area: so many in all, within each triangle by an additive sequence.
@@ -43,17 +45,15 @@ std::vector<Dot> spread_dots(const ToolMesh& mesh, std::size_t count) {
   double passed_mm2 = 0, u = 0.5, v = 0.5;
   for (const ToolMesh::Triangle& t : mesh.triangles) {
     const auto corner = mesh.corners(t);
-    const Point doubled = vec3::doubled_area(corner);
-    passed_mm2 += vec3::length(doubled) / 2;
+    const Point doubled = doubled_area(corner);
+    passed_mm2 += length(doubled) / 2;
     for (; (static_cast<double>(dots.size()) + 0.5) * step_mm2 < passed_mm2;) {
       u += kFirst - std::floor(u + kFirst);
       v += kSecond - std::floor(v + kSecond);
       const bool beyond = u + v > 1;
       const double b = beyond ? 1 - u : u, c = beyond ? 1 - v : v;
       dots.push_back(
-          {vec3::add(corner[0], vec3::add(vec3::scaled(vec3::minus(corner[1], corner[0]), b),
-                                          vec3::scaled(vec3::minus(corner[2], corner[0]), c))),
-           vec3::unit(doubled)});
+          {corner[0] + (b * (corner[1] - corner[0]) + c * (corner[2] - corner[0])), unit(doubled)});
     }
   }
   return dots;
@@ -145,7 +145,7 @@ void begin_sites(std::span<Dot> dots, std::size_t count, std::vector<Site>& site
       high[i] = std::max(high[i], dot.at[i]);
     }
   }
-  const Point side = vec3::minus(high, low);
+  const Point side = high - low;
   const auto widest =
       static_cast<std::size_t>(std::max_element(side.begin(), side.end()) - side.begin());
   const std::size_t half = dots.size() * (count / 2) / count;
@@ -188,20 +188,20 @@ void relax(std::span<const Dot> dots, double distance_mm, std::vector<Site>& sit
   for (std::size_t d = 0; d < dots.size(); ++d) {
     owner[d] = grid.nearest(dots[d]);
     if (owner[d] == kNone) continue;
-    sum[owner[d]] = vec3::add(sum[owner[d]], dots[d].at);
+    sum[owner[d]] = sum[owner[d]] + dots[d].at;
     ++count[owner[d]];
   }
   for (std::size_t d = 0; d < dots.size(); ++d) {
     const std::size_t s = owner[d];
     if (s == kNone || sites[s].rim) continue;
-    const Point middle = vec3::scaled(sum[s], 1 / count[s]);
+    const Point middle = 1 / count[s] * sum[s];
     const double square = squared_distance(dots[d].at, middle);
     if (square >= least[s]) continue;
     least[s] = square;
     // Onto the plane of the dot that is nearest to the middle.
     const Point& normal = dots[d].normal;
-    const double above = vec3::dot(vec3::minus(middle, dots[d].at), normal);
-    sites[s].at = vec3::minus(middle, vec3::scaled(normal, above));
+    const double above = dot(middle - dots[d].at, normal);
+    sites[s].at = middle - above * normal;
     sites[s].normal = normal;
   }
 }
@@ -211,7 +211,7 @@ void relax(std::span<const Dot> dots, double distance_mm, std::vector<Site>& sit
 double surface_mm2(const ToolMesh& mesh) {
   double sum = 0;
   for (const ToolMesh::Triangle& t : mesh.triangles) {
-    sum += vec3::length(vec3::doubled_area(mesh.corners(t))) / 2;
+    sum += length(doubled_area(mesh.corners(t))) / 2;
   }
   return sum;
 }

@@ -15,6 +15,8 @@
 namespace kerf {
 namespace {
 
+using vec3::cross, vec3::dot, vec3::length, vec3::operator-, vec3::operator*;
+
 using Edge = std::pair<std::uint32_t, std::uint32_t>;  // lower corner first
 
 std::string text_of(const ToolMesh::Point& p) {
@@ -110,7 +112,7 @@ std::vector<Part> parts_of(const ToolMesh& mesh) {
         part.high[axis] = std::max(part.high[axis], p[axis]);
       }
     }
-    part.volume_mm3 += vec3::dot(corners[0], vec3::cross(corners[1], corners[2])) / 6;
+    part.volume_mm3 += dot(corners[0], cross(corners[1], corners[2])) / 6;
   }
   std::ranges::copy_if(by_first, std::back_inserter(parts),
                        [](const Part& part) { return !part.triangles.empty(); });
@@ -123,11 +125,10 @@ double winding(const ToolMesh& mesh, const Part& part, const ToolMesh::Point& at
   double half_angles = 0;
   for (const std::size_t t : part.triangles) {
     auto [a, b, c] = mesh.corners(mesh.triangles[t]);
-    a = vec3::minus(a, at), b = vec3::minus(b, at), c = vec3::minus(c, at);
-    const double la = vec3::length(a), lb = vec3::length(b), lc = vec3::length(c);
-    half_angles += std::atan2(
-        vec3::dot(a, vec3::cross(b, c)),
-        la * lb * lc + vec3::dot(a, b) * lc + vec3::dot(b, c) * la + vec3::dot(c, a) * lb);
+    a = a - at, b = b - at, c = c - at;
+    const double la = length(a), lb = length(b), lc = length(c);
+    half_angles += std::atan2(dot(a, cross(b, c)),
+                              la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb);
   }
   return half_angles / (2 * std::numbers::pi);
 }
@@ -199,7 +200,7 @@ ToolMesh join_triangles(std::span<const LooseTriangle> triangles, double scale,
       const auto [at, is_new] = known.try_emplace(loose[k], next);
       t[k] = at->second;
       if (is_new)
-        mesh.points_mm.push_back(vec3::scaled({loose[k][0], loose[k][1], loose[k][2]}, scale));
+        mesh.points_mm.push_back(scale * vec3::Vec{loose[k][0], loose[k][1], loose[k][2]});
     }
     if (t[0] != t[1] && t[1] != t[2] && t[2] != t[0]) mesh.triangles.push_back(t);
   }

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <cstddef>
 
+#include "shared/numeric/vec3.hpp"
+
 // Sizes follow textbook averages of the lower first molar: crown 11 x 10 x 7 mm, roots 12 mm.
 // x is mesial, y buccal, z occlusal. No libm besides sqrt, so the bits do not depend on the
 // machine.
@@ -32,10 +34,6 @@ double bump(double t) noexcept {
 double ramp(double lo, double hi, double x) noexcept {
   const double t = std::clamp((x - lo) / (hi - lo), 0.0, 1.0);
   return t * t * (3.0 - 2.0 * t);
-}
-
-double length(double x, double y, double z) noexcept {
-  return std::sqrt(x * x + y * y + z * z);
 }
 
 /// A smooth curve through knots over z (cubic Hermite, slopes from the neighbours), constant
@@ -120,7 +118,7 @@ double ridge_height(const Cusp& c, Point p, double slope, double radius) noexcep
   const double dy = c.ridge_y - c.y;
   const double along = ((p.x - c.x) * dx + (p.y - c.y) * dy) / (dx * dx + dy * dy);
   const double t = std::clamp(along, 0.0, 1.0);
-  const double side = length(p.x - c.x - t * dx, p.y - c.y - t * dy, radius);
+  const double side = vec3::length({p.x - c.x - t * dx, p.y - c.y - t * dy, radius});
   const double fall = t * t * (2.0 - t);  // level at the tip
   return c.height - c.drop * fall - slope * (side - radius);
 }
@@ -169,7 +167,7 @@ double root_field(const Root& root, Point p) noexcept {
   const double dx = p.x - root.axis_x(z);
   const double squeezed_y = p.y * a / b;
   const double furrow = root.hollow * bump(p.y / (0.6 * b)) * ramp(0.0, a, root.facing * dx);
-  return length(dx, squeezed_y, z - p.z) - a + furrow;
+  return vec3::length({dx, squeezed_y, z - p.z}) - a + furrow;
 }
 
 /// The neck and the stem down to where the roots part; an arch between them.
@@ -187,7 +185,7 @@ double rod(Point p, Point from, double from_radius, Point to, double to_radius) 
   const double along = ((p.x - from.x) * dx + (p.y - from.y) * dy + (p.z - from.z) * dz) /
                        (dx * dx + dy * dy + dz * dz);
   const double t = std::clamp(along, 0.0, 1.0);
-  return length(p.x - from.x - t * dx, p.y - from.y - t * dy, p.z - from.z - t * dz) -
+  return vec3::length({p.x - from.x - t * dx, p.y - from.y - t * dy, p.z - from.z - t * dz}) -
          (from_radius + t * (to_radius - from_radius));
 }
 
@@ -196,7 +194,7 @@ double pulp_chamber(Point p) noexcept {
   const double x = std::max(std::abs(p.x) - 1.7, 0.0);
   const double y = std::max(std::abs(p.y) - 1.2, 0.0);
   const double z = std::max(std::abs(p.z - 1.7) - 0.3, 0.0);
-  return length(x, y, z) - kRound;
+  return vec3::length({x, y, z}) - kRound;
 }
 
 /// A canal follows the axis of its root, `offset_y` beside it at the orifice and nearer below.
@@ -207,7 +205,7 @@ double canal(const Root& root, double offset_y, Point p) noexcept {
   const double t = (z - bottom) / (kTop - bottom);
   const double x = p.x - root.axis_x(z);
   const double y = p.y - offset_y * (0.3 + 0.7 * t);
-  return length(x, y, p.z - z) - (0.17 + 0.38 * t);
+  return vec3::length({x, y, p.z - z}) - (0.17 + 0.38 * t);
 }
 
 }  // namespace
@@ -246,7 +244,7 @@ double distance(Field field, Point p, double value) noexcept {
   const double gx = field({p.x + kStep, p.y, p.z}) - field({p.x - kStep, p.y, p.z});
   const double gy = field({p.x, p.y + kStep, p.z}) - field({p.x, p.y - kStep, p.z});
   const double gz = field({p.x, p.y, p.z + kStep}) - field({p.x, p.y, p.z - kStep});
-  const double slope = length(gx, gy, gz) / (2.0 * kStep);
+  const double slope = vec3::length({gx, gy, gz}) / (2.0 * kStep);
   return value / std::clamp(slope, kFlattest, kSteepest);
 }
 

@@ -81,35 +81,27 @@ void append(const void* from, std::size_t count, std::vector<float>& to) {
 
 void append_values(const fs::path& path, ImageIo::IOComponentEnum type, const void* from,
                    std::size_t count, std::vector<float>& to) {
-  switch (type) {
-    case ImageIo::UCHAR:
-      return append<unsigned char>(from, count, to);
-    case ImageIo::CHAR:
-      return append<signed char>(from, count, to);
-    case ImageIo::USHORT:
-      return append<unsigned short>(from, count, to);
-    case ImageIo::SHORT:
-      return append<short>(from, count, to);
-    case ImageIo::UINT:
-      return append<unsigned int>(from, count, to);
-    case ImageIo::INT:
-      return append<int>(from, count, to);
-    case ImageIo::ULONG:
-      return append<unsigned long>(from, count, to);
-    case ImageIo::LONG:
-      return append<long>(from, count, to);
-    case ImageIo::ULONGLONG:
-      return append<unsigned long long>(from, count, to);
-    case ImageIo::LONGLONG:
-      return append<long long>(from, count, to);
-    case ImageIo::FLOAT:
-      return append<float>(from, count, to);
-    case ImageIo::DOUBLE:
-      return append<double>(from, count, to);
-    default:
-      throw SceneError(path.string() + ": " + ImageIo::GetComponentTypeAsString(type) +
-                       " voxels; save it as integers of 8..32 bits or as floats");
+  struct Kind {
+    ImageIo::IOComponentEnum type;
+    void (*append)(const void*, std::size_t, std::vector<float>&);
+  };
+  constexpr Kind kKinds[] = {{ImageIo::UCHAR, append<unsigned char>},
+                             {ImageIo::CHAR, append<signed char>},
+                             {ImageIo::USHORT, append<unsigned short>},
+                             {ImageIo::SHORT, append<short>},
+                             {ImageIo::UINT, append<unsigned int>},
+                             {ImageIo::INT, append<int>},
+                             {ImageIo::ULONG, append<unsigned long>},
+                             {ImageIo::LONG, append<long>},
+                             {ImageIo::ULONGLONG, append<unsigned long long>},
+                             {ImageIo::LONGLONG, append<long long>},
+                             {ImageIo::FLOAT, append<float>},
+                             {ImageIo::DOUBLE, append<double>}};
+  for (const Kind& kind : kKinds) {
+    if (kind.type == type) return kind.append(from, count, to);
   }
+  throw SceneError(path.string() + ": " + ImageIo::GetComponentTypeAsString(type) +
+                   " voxels; save it as integers of 8..32 bits or as floats");
 }
 
 /// Reads the header; gives the three extents. More axes are fine where they hold one layer each.

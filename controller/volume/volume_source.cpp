@@ -21,8 +21,8 @@ void set_frame(const fs::path& path, Place x, Place y, Place z, SourceVolume& vo
     throw SceneError(path.string() +
                      ": its axes are not at right angles; resample it to a straight grid first");
   }
-  x = vec3::unit(x);
-  y = vec3::unit(minus(y, scaled(x, dot(x, y))));
+  x = unit(x);
+  y = unit(y - dot(x, y) * x);
   const Place right_handed = cross(x, y);
   if (dot(right_handed, z) < 0.0) {
     const std::size_t layer =
@@ -35,7 +35,7 @@ void set_frame(const fs::path& path, Place x, Place y, Place z, SourceVolume& vo
       std::swap_ranges(low, low + static_cast<std::ptrdiff_t>(layer), high);
     }
     const double depth_mm = volume.spacing_mm[2] * (volume.grid.nz - 1);
-    volume.origin_mm = minus(volume.origin_mm, scaled(right_handed, depth_mm));
+    volume.origin_mm = volume.origin_mm - depth_mm * right_handed;
   }
   volume.direction = {x[0], y[0], right_handed[0], x[1], y[1], right_handed[1],
                       x[2], y[2], right_handed[2]};

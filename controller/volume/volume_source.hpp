@@ -13,10 +13,8 @@
 namespace kerf::volume {
 
 using Place = vec3::Vec;
-using vec3::cross;
-using vec3::dot;
-using vec3::minus;
-using vec3::scaled;
+using vec3::cross, vec3::dot, vec3::length, vec3::unit;
+using vec3::operator-, vec3::operator*;
 
 /// Refuses sizes that are empty or above the limits.
 void set_grid(const std::filesystem::path& path, const std::array<std::int64_t, 3>& size,

@@ -92,11 +92,7 @@ void write_report(const VolumeInfo& info, const std::filesystem::path& path) {
       {"solid_box", {{"lo", corner(info.solid.lo)}, {"hi", corner(info.solid.hi)}}},
       {"solid_ratio", info.solid_ratio},
       {"histogram", info.histogram}};
-  const std::string text = report.dump(2) + "\n";
-  NewFile file(path);
-  file.write(text.data(), text.size());
-  file.close();
-  file.commit();
+  write_new_file(path, report.dump(2) + "\n");
 }
 
 }  // namespace kerf

@@ -10,15 +10,17 @@
 
 namespace kerf {
 
-/// A device on a bus, and how long it is served there.
+/// A device that is served on a bus, and when that ends: at a stop, at the limit of bus cycles, or
+/// once its client is gone.
 struct BusService {
   PacketDevice& device;
   const ServeLimits& limits;
-  bool stay = false;  ///< else only until the client that used it is gone
+  bool stay = false;  ///< go on when the client is gone
   FrontStats& stats;
-  std::ostream& out;  ///< hears where it is
+  std::ostream& out;  ///< is told where the device is
 
-  /// After so many bus cycles; `left`: the client that used it is gone.
+  /// Whether to serve on after `cycles` bus cycles; `left`: the client that used the device is
+  /// gone.
   [[nodiscard]] bool goes_on(std::int64_t cycles, bool left) const {
     stats.cycles = cycles;
     return !limits.stop.load(std::memory_order_relaxed) && (stay || !left) &&

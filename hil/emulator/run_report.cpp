@@ -1,12 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "hil/emulator/run_report.hpp"
 
-#include <array>
-#include <cstdio>
-
 #include <nlohmann/json.hpp>
 
 #include "hil/hil_error.hpp"
+#include "shared/posix/hex64.hpp"
 #include "shared/posix/new_file.hpp"
 
 namespace kerf {
@@ -14,12 +12,6 @@ namespace {
 
 double seconds_of(std::int64_t cycles) {
   return static_cast<double>(cycles) / kCyclesPerSecond;
-}
-
-std::string hex(std::uint64_t value) {
-  std::array<char, 17> text{};
-  std::snprintf(text.data(), text.size(), "%016llx", static_cast<unsigned long long>(value));
-  return text.data();
 }
 
 }  // namespace
@@ -57,7 +49,7 @@ void write_run_report(const std::string& file, const Emulator& emulator, std::ui
     report["undocked_at_s"] = nullptr;
   }
   report["final_tip_mm"] = {tip.x, tip.y, tip.z};
-  report["report_hash"] = hex(stats.report_hash);
+  report["report_hash"] = hex64(stats.report_hash);
 
   try {
     write_new_file(file, report.dump(2) + "\n");

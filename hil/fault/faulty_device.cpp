@@ -51,7 +51,7 @@ bool FaultyDevice::hits(Running& running, bool of_commands) noexcept {
 }
 
 bool FaultyDevice::send_on(std::span<const std::uint8_t> packet, bool of_commands,
-                           std::deque<Due>& queue) {
+                           std::deque<Due>& in_flight) {
   Due due{cycle_, Bytes(packet.begin(), packet.end())};
   if (!of_commands) break_sensors(due.bytes);
   bool twice = false;
@@ -85,8 +85,8 @@ bool FaultyDevice::send_on(std::span<const std::uint8_t> packet, bool of_command
     }
     if (due.bytes.empty()) return false;
   }
-  if (twice) queue.push_back(due);
-  queue.push_back(std::move(due));
+  if (twice) in_flight.push_back(due);
+  in_flight.push_back(std::move(due));
   return true;
 }
 

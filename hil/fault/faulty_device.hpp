@@ -54,7 +54,7 @@ class FaultyDevice final : public PacketDevice {
   /// Whether the running fault meets this packet of its stream.
   [[nodiscard]] bool hits(Running& running, bool of_commands) noexcept;
   /// False when a fault lets nothing of the packet arrive.
-  bool send_on(std::span<const std::uint8_t> packet, bool of_commands, std::deque<Due>& queue);
+  bool send_on(std::span<const std::uint8_t> packet, bool of_commands, std::deque<Due>& in_flight);
   void break_sensors(Bytes& packet);
   void step_clock() noexcept;
 

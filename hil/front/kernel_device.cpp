@@ -15,7 +15,7 @@ constexpr std::int64_t kStopCheckNs = 100'000'000;
 
 }  // namespace
 
-void serve_kernel(KernelDevice& device, const std::function<bool()>& goes_on, Lateness& lateness) {
+void serve_kernel(KernelDevice& device, const std::function<bool()>& goes_on, Histogram& lateness) {
   while (goes_on()) {
     const std::int64_t late_ns = monotonic_ns() - device.next_wake_ns();
     if (late_ns >= 0) {

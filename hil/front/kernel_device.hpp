@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <functional>
 
-#include "hil/front/lateness.hpp"
+#include "shared/numeric/histogram.hpp"
 
 namespace kerf {
 
@@ -24,6 +24,6 @@ class KernelDevice {
 
 /// Serves while `goes_on`, which is asked between two steps and at least every 100 ms. `lateness`
 /// records how late `wake` was called.
-void serve_kernel(KernelDevice& device, const std::function<bool()>& goes_on, Lateness& lateness);
+void serve_kernel(KernelDevice& device, const std::function<bool()>& goes_on, Histogram& lateness);
 
 }  // namespace kerf

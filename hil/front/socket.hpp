@@ -4,9 +4,9 @@
 #include <atomic>
 #include <cstdint>
 
-#include "hil/front/lateness.hpp"
 #include "hil/front/packet_device.hpp"
 #include "hil/front/packet_link.hpp"
+#include "shared/numeric/histogram.hpp"
 
 namespace kerf {
 
@@ -22,7 +22,7 @@ struct FrontStats {
   std::uint64_t dropped = 0;  ///< the client did not read
   std::uint64_t resyncs = 0;  ///< the process slept so long that time was skipped
   std::int64_t cycles = 0;
-  Lateness wake;
+  Histogram wake;
 };
 
 /// Serves one client in real time: every `packet_cycles` bus cycles, at absolute deadlines, the

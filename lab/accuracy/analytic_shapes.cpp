@@ -9,10 +9,6 @@
 namespace kerf::accuracy {
 namespace {
 
-Point unit(Point v) {
-  return v * (1 / norm(v));
-}
-
 std::int32_t middle_of(std::int32_t n) {
   return n / 2;
 }

@@ -13,6 +13,14 @@ namespace kerf::accuracy {
 
 using Point = WorldVec<double>;  ///< mm
 
+[[nodiscard]] inline Point cross(Point a, Point b) {
+  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+/// Of length 1; `v` is not zero.
+[[nodiscard]] inline Point unit(Point v) {
+  return v * (1 / norm(v));
+}
+
 /// A solid by its signed distance: negative inside, of slope one near the face.
 struct Layer {
   std::function<double(Point)> distance_mm;

@@ -18,15 +18,10 @@ double angle_deg(Point a, Point b) {
   return std::acos(std::clamp(cosine, -1.0, 1.0)) * 180 / std::numbers::pi;
 }
 
-Point cross(Point a, Point b) {
-  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
-}
-
 /// Two directions along the face, at right angles.
 std::array<Point, 2> along_face(Point normal) {
   const Point away = std::abs(normal.x) < 0.5 ? Point{1, 0, 0} : Point{0, 1, 0};
-  const Point first = cross(normal, away);
-  const Point a = first * (1 / norm(first));
+  const Point a = unit(cross(normal, away));
   return {a, cross(normal, a)};
 }
 

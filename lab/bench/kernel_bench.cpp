@@ -247,9 +247,10 @@ class Bench {
   std::vector<KernelRow> rows_;
 };
 
-/// On its way around the ball.
-std::function<Place(int)> orbit(int size, int count) {
-  return [size, count](int i) { return around(kGrid, size, i, count); };
+/// A tool of `size` voxels on its way around the ball.
+Ticks around_ball(const char* name, int size, Shape shape, int count) {
+  return {name, tool_of(size, shape), count,
+          [size, count](int i) { return around(kGrid, size, i, count); }};
 }
 
 }  // namespace
@@ -263,25 +264,19 @@ std::vector<KernelRow> bench_kernels(const std::function<void(const KernelRow&)>
     GradientScratch scratch;
     refresh_gradients<Numbers>(GradientKernel::farid, kGrid, density, kGrid.box(), field, scratch);
     const auto contact = [&](const Ticks& ticks) { bench.contact(density, paper, field, ticks); };
-    contact({"contact/ball16/any", tool_of(16, Shape::ball), 2000, orbit(16, 2000)});
-    contact({"contact/ball10/any", tool_of(10, Shape::ball), 2000, orbit(10, 2000)});
-    contact({.name = "contact/cube16/aligned",
-             .tool = tool_of(16, Shape::cube),
-             .count = 2000,
-             .place = orbit(16, 2000),
-             .turned = false});
-    contact({.name = "contact/cube16/any",
-             .tool = tool_of(16, Shape::cube),
-             .count = 2000,
-             .place = orbit(16, 2000),
-             .can_align = false});
-    contact({"contact/ball32/any", tool_of(32, Shape::ball), 400, orbit(32, 400)});
-    contact({"contact/ball64/any", tool_of(64, Shape::ball), 100, orbit(64, 100)});
-    contact({.name = "contact/ball16/cold",
-             .tool = tool_of(16, Shape::ball),
-             .count = 150,
-             .place = orbit(16, 150),
-             .cold = true});
+    contact(around_ball("contact/ball16/any", 16, Shape::ball, 2000));
+    contact(around_ball("contact/ball10/any", 10, Shape::ball, 2000));
+    Ticks cube = around_ball("contact/cube16/aligned", 16, Shape::cube, 2000);
+    cube.turned = false;
+    contact(cube);
+    cube = around_ball("contact/cube16/any", 16, Shape::cube, 2000);
+    cube.can_align = false;
+    contact(cube);
+    contact(around_ball("contact/ball32/any", 32, Shape::ball, 400));
+    contact(around_ball("contact/ball64/any", 64, Shape::ball, 100));
+    Ticks cold = around_ball("contact/ball16/cold", 16, Shape::ball, 150);
+    cold.cold = true;
+    contact(cold);
   }
   const auto density = densities(kGrid, [](double, double, double z) { return 161 * 0.6 - z; });
   for (const int size : {16, 10}) {

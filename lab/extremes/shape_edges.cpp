@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "controller/kernel/point_shell/point_sums.hpp"
+#include "lab/extremes/edged_tools.hpp"
 #include "lab/extremes/measures.hpp"
-#include "lab/rig/loft.hpp"
 #include "lab/rig/posed_tool.hpp"
 #include "lab/rig/rest.hpp"
 
@@ -71,14 +71,7 @@ double depth_of(const Body& body, const std::vector<Point>& points, Point centre
 }  // namespace
 
 void measure_shape_edges(const Effort& effort, const RowSink& add_row) {
-  struct Subject {
-    const char* name;
-    SceneTool tool;
-  };
-  for (const Subject& subject :
-       {Subject{"cylinder, any pose", tool_of_units("cylinder", 5, 16)},
-        Subject{"cone, any pose", tool_of_units("cone", 5, 16)},
-        Subject{"STL, square bar, any pose", mesh_of_units("bar", prism(6, 16, 4))}}) {
+  for (const EdgedTool& subject : edged_tools()) {
     const std::vector<Point> surface = surface_points(subject.tool);
     const SampledTool tool(subject.tool);
     Dice dice(7);

@@ -6,11 +6,11 @@
 #include <string>
 #include <vector>
 
+#include "lab/extremes/edged_tools.hpp"
 #include "lab/extremes/measures.hpp"
 #include "lab/rig/ct_edge.hpp"
 #include "lab/rig/exact_touch.hpp"
 #include "lab/rig/guided_tool.hpp"
-#include "lab/rig/loft.hpp"
 #include "lab/rig/posed_tool.hpp"
 
 namespace kerf::extremes {
@@ -126,14 +126,7 @@ void measure_shape_slides(const Effort& effort, const RowSink& add_row) {
   struct Limits {
     Limit step, degrees, sd;
   };
-  struct Subject {
-    const char* name;
-    SceneTool tool;
-  };
-  for (const Subject& subject :
-       {Subject{"cylinder, any pose", tool_of_units("cylinder", 5, 16)},
-        Subject{"cone, any pose", tool_of_units("cone", 5, 16)},
-        Subject{"STL, square bar, any pose", mesh_of_units("bar", prism(6, 16, 4))}}) {
+  for (const EdgedTool& subject : edged_tools()) {
     const Reach reach(subject.tool);
     const SampledTool tool(subject.tool);
     const auto tell = [&](const std::string& name, const Figures& figures, const Limits& limits) {

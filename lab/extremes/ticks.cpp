@@ -12,6 +12,7 @@
 #include "lab/rig/bench_scene.hpp"
 #include "lab/rig/contact_rig.hpp"
 #include "lab/rig/tick_timer.hpp"
+#include "shared/numeric/percentile.hpp"
 
 namespace kerf::extremes {
 namespace {
@@ -61,12 +62,9 @@ void measure_cutting_ticks(const Effort& effort, const RowSink& add_row) {
       us[t] = i == 0 ? run.ticks[t].compute_us : std::min(us[t], run.ticks[t].compute_us);
     }
   }
-  std::sort(us.begin(), us.end());
-  const auto at = [&](double share) {
-    return us[static_cast<std::size_t>(share * static_cast<double>(us.size() - 1))];
-  };
-  add_row({"ticks", "whole servo, default scene, cutting: p50", at(0.5), "us", {}, {}});
-  add_row({"ticks", "whole servo, default scene, cutting: p99.9", at(0.999), "us", 100, 50});
+  add_row({"ticks", "whole servo, default scene, cutting: p50", percentile(us, 0.5), "us", {}, {}});
+  add_row({"ticks", "whole servo, default scene, cutting: p99.9", percentile(us, 0.999), "us", 100,
+           50});
 }
 
 }  // namespace

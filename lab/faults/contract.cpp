@@ -6,6 +6,8 @@
 #include <cstddef>
 #include <cstdio>
 
+#include "shared/numeric/vec3.hpp"
+
 namespace kerf::faults {
 namespace {
 
@@ -18,10 +20,6 @@ constexpr double kReportMs = 1;     // from one report to the next, of the slowe
 constexpr double kStepN = 0.01;
 constexpr double kDeviceShare = 1.03;  // the tip moves on while a command is under way
 constexpr std::size_t kMaxListed = 4;
-
-double length(const std::array<double, 3>& v) noexcept {
-  return std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
-}
 
 /// From the begin of a fault at the device until the servo has latched `name`. A fault that the
 /// servo bears for a while begins for it with the report that first shows it, or that is missing.
@@ -49,7 +47,7 @@ void Contract::broken(double time_ms, const std::string& what) {
 }
 
 void Contract::tick(double time_ms, const ServoOutput& output) {
-  const double now_n = length(output.force_n);
+  const double now_n = vec3::length(output.force_n);
   const bool may_push = output.phase == Phase::ramping || output.phase == Phase::active;
   check(output.motors_on <= may_push, time_ms, "motors on in a phase that forbids it",
         static_cast<double>(output.phase), 0);

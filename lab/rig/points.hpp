@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <array>
 #include <cmath>
 #include <cstdint>
 #include <numbers>
@@ -9,34 +8,15 @@
 
 #include "controller/kernel/proxy/constraint_plane.hpp"
 #include "controller/kernel/proxy/tool_turn.hpp"
+#include "shared/numeric/vec3.hpp"
 
 /// Places, directions and turns in plain double, and random ones. Lengths in units of contact
 /// space.
 namespace kerf::extremes {
 
-using Point = std::array<double, 3>;
-
-inline Point operator+(Point a, Point b) {
-  return {a[0] + b[0], a[1] + b[1], a[2] + b[2]};
-}
-inline Point operator-(Point a, Point b) {
-  return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
-}
-inline Point operator*(double s, Point a) {
-  return {s * a[0], s * a[1], s * a[2]};
-}
-inline double dot(Point a, Point b) {
-  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-inline double length(Point a) {
-  return std::sqrt(dot(a, a));
-}
-inline Point unit(Point a) {
-  return 1 / length(a) * a;
-}
-inline Point cross(Point a, Point b) {
-  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
+using Point = vec3::Vec;
+using vec3::cross, vec3::dot, vec3::length, vec3::unit;
+using vec3::operator+, vec3::operator-, vec3::operator*;
 
 inline double degrees_between(Point a, Point b) {
   return std::atan2(length(cross(a, b)), dot(a, b)) * 180 / std::numbers::pi;

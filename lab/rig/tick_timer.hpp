@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <algorithm>
 #include <chrono>
 #include <cstddef>
 #include <vector>
+
+#include "shared/numeric/percentile.hpp"
 
 namespace kerf {
 
@@ -29,11 +30,7 @@ template <class Before, class Tick>
       ns.push_back(std::chrono::duration<double, std::nano>(Clock::now() - start).count());
     }
   }
-  std::sort(ns.begin(), ns.end());
-  const auto at = [&](double share) {
-    return ns[static_cast<std::size_t>(share * static_cast<double>(ns.size() - 1))];
-  };
-  return {at(0.5), at(0.99), ns.back()};
+  return {percentile(ns, 0.5), percentile(ns, 0.99), percentile(ns, 1)};
 }
 
 }  // namespace kerf

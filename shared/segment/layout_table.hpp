@@ -7,6 +7,7 @@
 #include <string_view>
 #include <type_traits>
 
+#include "shared/numeric/fnv1a.hpp"
 #include "shared/segment/layout.hpp"
 
 namespace kerf {
@@ -189,10 +190,8 @@ static_assert(kStaticHeaderBytes == 0x100);
 
 /// FNV-1a over the text "record.name:offset:type[count];" of every row.
 inline constexpr std::uint64_t kAbiHash = [] {
-  std::uint64_t hash = 0xcbf29ce484222325;
-  const auto add = [&hash](std::string_view text) {
-    for (const char c : text) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3;
-  };
+  std::uint64_t hash = kFnv1aBasis;
+  const auto add = [&hash](std::string_view text) { hash = fnv1a(text, hash); };
   const auto add_number = [&add](std::uint32_t number) {
     char digits[10] = {};
     std::size_t first = sizeof digits;

@@ -6,6 +6,7 @@
 #include <cstring>
 #include <string>
 
+#include "shared/posix/hex64.hpp"
 #include "shared/segment/layout_table.hpp"
 #include "shared/segment/reader.hpp"
 #include "shared/segment/shared_words.hpp"
@@ -14,12 +15,6 @@ namespace kerf {
 namespace {
 
 constexpr std::uint64_t kMaxRingSlots = 1U << 20;  // 17 min at 1 kHz; bounds what a reader trusts
-
-[[nodiscard]] std::string hex(std::uint64_t value) {
-  std::string text(16, '0');
-  for (std::size_t i = text.size(); i-- > 0; value >>= 4) text[i] = "0123456789abcdef"[value & 15];
-  return text;
-}
 
 [[noreturn]] void refuse(const std::string& field, const std::string& value,
                          const std::string& expected) {
@@ -125,7 +120,7 @@ void require_same_layout(std::uint32_t major, std::uint32_t minor, std::uint64_t
            text(kLayoutMajor, kLayoutMinor) + ": use programs of one build");
   }
   if (abi_hash != kAbiHash) {
-    refuse("abi hash", hex(abi_hash), hex(kAbiHash) + ": use programs of one build");
+    refuse("abi hash", hex64(abi_hash), hex64(kAbiHash) + ": use programs of one build");
   }
 }
 
@@ -134,7 +129,7 @@ SegmentInfo parse_segment(std::span<std::byte> segment) {
     refuse("size", std::to_string(segment.size()), "at least one page of header");
   }
   const std::uint64_t magic = shared_words::word(segment.data()).load(std::memory_order_acquire);
-  if (magic != kSegmentMagic) refuse("magic", hex(magic), hex(kSegmentMagic));
+  if (magic != kSegmentMagic) refuse("magic", hex64(magic), hex64(kSegmentMagic));
   SegmentHeader header{};
   std::memcpy(&header, segment.data(), kStaticHeaderBytes);
   require_same_layout(header.layout_major, header.layout_minor, header.abi_hash);

@@ -59,6 +59,5 @@ inline constexpr double kMaxForceN = 8.9;
 
 // Packets.
 inline constexpr std::size_t kPacketBytes = 16;  ///< both ways
-inline constexpr int kFramesPerSecond = 1000;    ///< at most one exchange per USB frame
 
 }  // namespace kerf::falcon

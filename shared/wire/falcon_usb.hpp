@@ -26,7 +26,7 @@ inline constexpr std::size_t kFtdiPacketBytes = 64;
 inline constexpr std::uint8_t kFtdiRequestType = 0x40;
 enum class FtdiRequest : std::uint8_t {
   reset = 0,  ///< value: kFtdiReset, kFtdiPurgeRx, kFtdiPurgeTx
-  modem = 1,  ///< value: kFtdiDtrLow ... kFtdiRtsHigh
+  modem = 1,  ///< value: kFtdiDtrLow ... kFtdiRtsLow
   flow = 2,
   baud = 3,    ///< value: divisor
   data = 4,    ///< value: kFtdi8N1
@@ -38,7 +38,6 @@ inline constexpr std::uint16_t kFtdiPurgeTx = 2;
 inline constexpr std::uint16_t kFtdiDtrLow = 0x0100;  // the upper byte says which line is meant
 inline constexpr std::uint16_t kFtdiDtrHigh = 0x0101;
 inline constexpr std::uint16_t kFtdiRtsLow = 0x0200;
-inline constexpr std::uint16_t kFtdiRtsHigh = 0x0202;
 inline constexpr std::uint16_t kFtdiNoFlowControl = 0;
 inline constexpr std::uint16_t kFtdi8N1 = 0x0008;
 

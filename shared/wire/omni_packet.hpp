@@ -73,14 +73,6 @@ inline constexpr std::uint16_t kReportMark = 0x001E;
 inline constexpr std::uint16_t kReportFlags = 0x1007;
 inline constexpr std::uint16_t kReportFw = 0x5746;
 
-/// Motor counts of a relative torque `u` in [-1, 1], the mapping of the open drivers:
-/// floor((u + 1) / 2 * 4095) - 0x7FF. Saturates; NaN gives 0.
-[[nodiscard]] constexpr std::int16_t motor_from_unit(double u) noexcept {
-  if (u != u) return 0;
-  const double word = (std::clamp(u, -1.0, 1.0) + 1.0) / 2.0 * kMotorWordMax;
-  return static_cast<std::int16_t>(static_cast<int>(word) - kMotorZero);
-}
-
 /// Gimbal angle of axis 0..2 (yaw, pitch, roll) in rad; a pair without signal gives the middle.
 [[nodiscard]] constexpr double gimbal_rad(std::size_t axis, std::uint16_t a,
                                           std::uint16_t b) noexcept {

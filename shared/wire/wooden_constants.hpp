@@ -39,21 +39,16 @@ inline constexpr std::array<double, 3> kRadPerCount{
 /// Of a, b, c in the pose in which the arm is calibrated: A = B = 0, C = pi/2.
 inline constexpr std::array<std::int16_t, 3> kHomeCounts{0, 0, 6000};
 
-/// Torque of a motor, N mm per A, by year of the plans. Positive current raises the count.
+/// Torque of a motor, N mm per A, by the plans of 2015. Positive current raises the count.
 inline constexpr std::array<double, 3> kTorqueNmmPerA2015{25.9, 25.9, 25.9};
-inline constexpr std::array<double, 3> kTorqueNmmPerA2019{321.0, 60.3, 60.3};
 inline constexpr int kMaxMilliamps = 2000;        ///< cap of the makers' host
 inline constexpr int kAmplifierMilliamps = 3000;  ///< at full duty of the firmware
 
-// The makers' limits.
+/// The makers' limit.
 inline constexpr double kMaxForceN = 5.0;
-inline constexpr double kMaxStiffnessNPerMm = 1.0;
-inline constexpr double kMaxDampingNsPerMm = 0.008;
-inline constexpr double kWorkspaceRadiusMm = 100.0;
 
 /// Without a report of the host for so long the firmware switches the amplifiers off.
 inline constexpr double kWatchdogS = 0.5;
-inline constexpr int kReportsPerSecond = 1000;  ///< bInterval 1
 
 // USB. mbed firmware: 14 bytes both ways; Teensy raw HID: 64 bytes both ways, the first 14 used.
 inline constexpr std::uint16_t kMbedVendorId = 0x1234;

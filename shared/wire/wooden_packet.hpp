@@ -63,9 +63,6 @@ inline constexpr int kButtonCounts = 10000;
 [[nodiscard]] constexpr bool wireless_button(std::int16_t encoder_d) noexcept {
   return encoder_d > kButtonCounts / 2;
 }
-[[nodiscard]] constexpr std::int16_t without_button(std::int16_t encoder_d) noexcept {
-  return static_cast<std::int16_t>(encoder_d - (wireless_button(encoder_d) ? kButtonCounts : 0));
-}
 
 /// Device side. Nothing unless these are the 14 or 64 bytes of a command; what comes after the
 /// first 14 is not looked at.

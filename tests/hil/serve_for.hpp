@@ -6,6 +6,7 @@
 #include <poll.h>
 
 #include "hil/front/kernel_device.hpp"
+#include "shared/numeric/histogram.hpp"
 #include "shared/posix/monotonic_clock.hpp"
 
 namespace kerf::test {
@@ -18,7 +19,7 @@ inline void serve_for(KernelDevice& device, int milliseconds) {
     pollfd asked{device.descriptor(), POLLIN, 0};
     return device.next_wake_ns() <= until_ns || poll(&asked, 1, 0) > 0;
   };
-  Lateness lateness;
+  Histogram lateness;
   serve_kernel(
       device, [&] { return monotonic_ns() < until_ns || owes(); }, lateness);
 }

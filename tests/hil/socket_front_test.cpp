@@ -11,7 +11,6 @@
 
 #include "hil/emulator/hand_script_file.hpp"
 #include "hil/front/emulator.hpp"
-#include "hil/front/lateness.hpp"
 #include "hil/front/real_time.hpp"
 #include "hil/front/seqpacket_server.hpp"
 #include "hil/front/socket.hpp"
@@ -202,18 +201,4 @@ TEST_CASE("a thread that gets no real-time right is told what it misses, without
   }).join();
   CHECK(none == "");
   CHECK(absent_core.find("no right to core 1000") == 0);
-}
-
-TEST_CASE("lateness percentiles are the order statistics of whole microseconds") {
-  kerf::Lateness late;
-  CHECK(late.max_us() == 0);
-  CHECK(late.percentile_us(0.99) == 0);
-  for (std::int64_t us = 1; us <= 100; ++us) late.record(us * 1000 + 999);
-  CHECK(late.percentile_us(0.5) == 50);
-  CHECK(late.percentile_us(0.99) == 99);
-  CHECK(late.max_us() == 100);
-  late.record(-5);
-  late.record(25'000'000);
-  CHECK(late.max_us() == 25'000);
-  CHECK(late.percentile_us(1.0) == 10'000);  // the last bucket
 }

@@ -3,23 +3,19 @@
 
 #include <bit>
 #include <cstdint>
-#include <iomanip>
-#include <sstream>
 #include <string>
 #include <type_traits>
 
+#include "shared/numeric/fnv1a.hpp"
 #include "shared/numeric/vec.hpp"
+#include "shared/posix/hex64.hpp"
 
 namespace kerf::test {
 
 /// FNV-1a, eight bytes at a time, low byte first.
 class Hash {
  public:
-  void add(std::uint64_t value) noexcept {
-    for (int byte = 0; byte < 8; ++byte) {
-      state_ = (state_ ^ (value >> (8 * byte) & 0xff)) * 0x100000001b3u;
-    }
-  }
+  void add(std::uint64_t value) noexcept { state_ = fnv1a_bytes(state_, value); }
   void add(double value) noexcept { add(std::bit_cast<std::uint64_t>(value)); }
   void add(std::int64_t value) noexcept { add(static_cast<std::uint64_t>(value)); }
   template <class Space, class S>
@@ -32,14 +28,10 @@ class Hash {
       }
     }
   }
-  [[nodiscard]] std::string hex() const {
-    std::ostringstream text;
-    text << std::hex << std::setw(16) << std::setfill('0') << state_;
-    return text.str();
-  }
+  [[nodiscard]] std::string hex() const { return hex64(state_); }
 
  private:
-  std::uint64_t state_ = 0xcbf29ce484222325u;
+  std::uint64_t state_ = kFnv1aBasis;
 };
 
 }  // namespace kerf::test

@@ -11,6 +11,7 @@
 
 #include "controller/scene/materials.hpp"
 #include "controller/tool/tool_shapes.hpp"
+#include "shared/numeric/fnv1a.hpp"
 #include "tests/scene/support.hpp"
 
 namespace {

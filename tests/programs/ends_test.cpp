@@ -57,14 +57,26 @@ TEST_CASE("kill -9 of the emulator: fault in the report, exit 1 after 2000 ticks
   CHECK_FALSE(connection.alive());
 }
 
-TEST_CASE("SIGINT and SIGTERM end in order: exit 0, a report, no socket left") {
-  for (const int signal : {SIGINT, SIGTERM}) {
+TEST_CASE("SIGINT, SIGTERM and SIGHUP end in order: exit 0, a report, no socket left") {
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
     Pair pair;
-    pair.start("touch.toml", {});
+    const auto report_of = [&](const char* name) { return (pair.folder / name).string(); };
+    pair.start("touch.toml", {}, {"--report", report_of("emulator.json")});
+    kerf::test::Process recorder(
+        {kerf::test::kBin + "/kerf-recorder", "--name", pair.name, "--out",
+         (pair.folder / "recording").string(), "--report", report_of("recorder.json")},
+        pair.folder / "recorder.log");
     REQUIRE(pair.ticks_within(20s));
-    pair.controller->signal(signal);
-    CHECK(pair.controller->wait() == 0);
+    REQUIRE(eventually(
+        [&] { return std::filesystem::exists(pair.folder / "recording/manifest.json"); }, 20s));
+    for (kerf::test::Process* program : {&recorder, &*pair.controller, &*pair.emulator}) {
+      program->signal(signal);
+      CHECK(program->wait() == 0);
+    }
     CHECK(pair.report()["end"] == "stopped");
+    CHECK(std::filesystem::exists(pair.folder / "emulator.json"));
+    CHECK(kerf::test::text_of(pair.folder / "recorder.json").find("\"stopped\"") !=
+          std::string::npos);
     CHECK_FALSE(std::filesystem::exists(kerf::segment_socket(pair.name)));
   }
 }

@@ -25,17 +25,13 @@ Point on(double play, double angle) {
   return {play * std::sin(angle), -play * std::cos(angle), 0};
 }
 
-Point minus(Point a, Point b) {
-  return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
-}
-
 /// What is known after steps from each place to the next.
 template <class N, class Field>
 CurvatureEstimate<N> learned(Field field, const std::vector<Point>& places) {
   CurvatureEstimate<N> curvature;
   for (std::size_t i = 1; i < places.size(); ++i) {
     curvature.learn(field.query(place_of<N>(places[i - 1])), field.query(place_of<N>(places[i])),
-                    place_of<N>(minus(places[i], places[i - 1])));
+                    place_of<N>(places[i] - places[i - 1]));
   }
   return curvature;
 }

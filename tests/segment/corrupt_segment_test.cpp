@@ -9,6 +9,7 @@
 #include <sys/mman.h>
 #include <unistd.h>
 
+#include "shared/posix/hex64.hpp"
 #include "shared/segment/layout_table.hpp"
 #include "shared/segment/reader.hpp"
 #include "tests/segment/segment_support.hpp"
@@ -117,11 +118,7 @@ TEST_CASE("another version names both versions, another layout both hashes") {
   forged.put(0x010, forged.good(0x010) ^ std::byte{1});
   const std::string error = forged.read_everything();
   CHECK(error.find("abi hash = ") != std::string::npos);
-  std::string hex;
-  for (std::uint64_t rest = kAbiHash; hex.size() < 16; rest >>= 4) {
-    hex.insert(hex.begin(), "0123456789abcdef"[rest & 15]);
-  }
-  CHECK(error.find("expected " + hex) != std::string::npos);
+  CHECK(error.find("expected " + hex64(kAbiHash)) != std::string::npos);
 }
 
 TEST_CASE("random bytes anywhere in the segment never crash or stall a reader") {

@@ -12,6 +12,7 @@
 #include "controller/load/loaded_scene.hpp"
 #include "controller/plan/compile.hpp"
 #include "lab/rig/fake_arm.hpp"
+#include "shared/numeric/vec3.hpp"
 
 namespace kerf::test {
 
@@ -83,9 +84,7 @@ inline LoadedScene paper_scene(int edge = 64) {
   return scene;
 }
 
-[[nodiscard]] inline double length(const std::array<double, 3>& v) {
-  return std::hypot(v[0], v[1], v[2]);
-}
+using vec3::length;
 
 /// A compiled scene under an arm that was docked and led to `start_mm`, in the air above the flat.
 struct ArmedServo {

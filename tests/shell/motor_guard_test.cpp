@@ -12,7 +12,7 @@
 #include <unistd.h>
 
 #include "controller/device/driver/omni_driver.hpp"
-#include "controller/shell/stop_signals.hpp"
+#include "shared/posix/stop_signals.hpp"
 #include "shared/wire/omni_packet.hpp"
 
 namespace {
@@ -43,7 +43,7 @@ kerf::OmniCommand last_command_of(WayOut way_out) {
     close(ends[0]);
     PairPort port(ends[1]);
     kerf::OmniDriver driver(port);
-    std::atomic<bool>& stop = kerf::catch_stop_signals();
+    std::atomic<bool>& stop = kerf::catch_stop_and_pause_signals();
     try {
       kerf::MotorGuard guard(driver);
       guard.guard_stack();

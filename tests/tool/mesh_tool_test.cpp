@@ -117,7 +117,7 @@ TEST_CASE("the surface of a mesh has even samples, rows of them along its rims")
     if (near >= 2) ++at_rims;
     for (std::size_t j = 0; j < samples.size(); ++j) {
       if (i == j) continue;
-      nearest[i] = std::min(nearest[i], vec3::length(vec3::minus(samples[i], samples[j])));
+      nearest[i] = std::min(nearest[i], vec3::length(vec3::operator-(samples[i], samples[j])));
     }
   }
   CHECK(away < 0.05);

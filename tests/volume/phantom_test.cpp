@@ -10,6 +10,7 @@
 #include "controller/scene/scene_error.hpp"
 #include "controller/volume/phantom_shape.hpp"
 #include "controller/volume/volume_density.hpp"
+#include "shared/numeric/fnv1a.hpp"
 #include "tests/volume/volume_files.hpp"
 
 using namespace kerf;
@@ -264,13 +265,9 @@ TEST_CASE("the enamel is thick over the cusps and thins out to nothing at the ne
 TEST_CASE("the phantom is the same bits on every machine") {
   // FNV-1a over density and labels of a small one: only + - * / and square roots go into it.
   const VolumeImage image = make_phantom({.grid = {64, 64, 40}});
-  std::uint64_t hash = 14695981039346656037ULL;
-  const auto feed = [&](unsigned byte) { hash = (hash ^ byte) * 1099511628211ULL; };
-  for (const Density d : image.density) {
-    feed(d & 0xFFU);
-    feed(static_cast<unsigned>(d >> 8));
-  }
-  for (const Label l : image.labels) feed(l);
+  std::uint64_t hash = kFnv1aBasis;
+  for (const Density d : image.density) hash = fnv1a_bytes(hash, d, 2);
+  for (const Label l : image.labels) hash = fnv1a_step(hash, l);
   CHECK(hash == 6934270975821157299ULL);
 }
 

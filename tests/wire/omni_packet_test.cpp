@@ -74,21 +74,6 @@ TEST_CASE("a cleared status bit means pressed or docked") {
   }
 }
 
-TEST_CASE("the DAC mapping of the open drivers is the floor of a 12-bit word") {
-  const auto word = [](double u) {
-    return kerf::omni::motor_from_unit(u) + kerf::omni::kMotorZero;
-  };
-  CHECK(word(-1.0) == 0x000);
-  CHECK(word(-0.5) == 0x3FF);
-  CHECK(word(0.0) == 0x7FF);
-  CHECK(word(0.5) == 0xBFF);
-  CHECK(word(1.0) == 0xFFF);
-  CHECK(word(-7.0) == 0x000);
-  CHECK(word(7.0) == 0xFFF);
-  CHECK(word(std::numeric_limits<double>::infinity()) == 0xFFF);
-  CHECK(word(std::nan("")) == 0x7FF);
-}
-
 TEST_CASE("gimbal angles follow the ratio of the two wipers") {
   CHECK(kerf::omni::gimbal_rad(0, 0x8000, 0x8000) == doctest::Approx(0.0));
   CHECK(kerf::omni::gimbal_rad(0, 0xFFFF, 0) == doctest::Approx(2.74));

@@ -93,6 +93,8 @@ class FirewirePort final : public PacketPort {
   void hear_resource(std::span<const std::uint8_t> event, bool allocated) noexcept;
   void close_if_gone() noexcept;
 
+  /// Which of the two resources an event is about.
+  static constexpr std::uint64_t kListen = 1, kTalk = 2;
   static constexpr std::size_t kEventBytes = 4096 + 64;  // a page of headers and their event
 
   FirewireOptions options_;

@@ -22,8 +22,8 @@
 #include "controller/shell/probe/probe_nodes.hpp"
 #include "controller/shell/probe/probe_view.hpp"
 #include "controller/shell/real_time.hpp"
-#include "controller/shell/stop_signals.hpp"
 #include "shared/posix/new_file.hpp"
+#include "shared/posix/stop_signals.hpp"
 
 namespace kerf {
 namespace {
@@ -206,7 +206,7 @@ int run_probe(const ControllerOptions& options) {
   if (!options.report.empty()) check_new_file(options.report);
   const int rate_hz = options.overrides.rate_hz.value_or(kDefaultRateHz);
   const DeviceSettings device = device_of(options);
-  std::atomic<bool>& stop = catch_stop_signals();
+  std::atomic<bool>& stop = catch_stop_and_pause_signals();
   const auto port = open_or_explain(options, device.personality, rate_hz, stop);
   const auto driver = make_driver(device.personality, *port);
   driver->start();

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <span>
 
+#include "shared/numeric/fnv1a.hpp"
+
 namespace kerf {
 namespace {
 
@@ -11,13 +13,6 @@ constexpr std::int64_t kRomCycles =
     kBusCyclesPerSecond / 2;  // a device's own reset: its ROM is read
 constexpr std::int64_t kGoneCycles = 2 * kBusCyclesPerSecond;  // until a lost device is given up
 constexpr std::uint32_t kOmniTag = 0;
-
-std::uint64_t fnv1a(std::uint64_t hash, std::uint64_t value) noexcept {
-  for (int i = 0; i < 8; ++i) {
-    hash = (hash ^ (value >> (8 * i) & 0xFF)) * 0x0000'0100'0000'01B3;
-  }
-  return hash;
-}
 
 }  // namespace
 
@@ -52,9 +47,9 @@ void FirewireBus::begin_cycle() {
     if (!context->settings().transmits) continue;
     const auto packet = context->transmit(cycle_);
     if (!packet) continue;
-    stats_.command_hash = fnv1a(stats_.command_hash, static_cast<std::uint64_t>(cycle_));
+    stats_.command_hash = fnv1a_bytes(stats_.command_hash, static_cast<std::uint64_t>(cycle_));
     for (const std::uint8_t byte : packet->bytes) {
-      stats_.command_hash = (stats_.command_hash ^ byte) * 0x0000'0100'0000'01B3;
+      stats_.command_hash = fnv1a_step(stats_.command_hash, byte);
     }
     const bool heard = present_ && registers_.streams() && packet->tag == kOmniTag &&
                        static_cast<int>(context->settings().channel) == registers_.listens_on();

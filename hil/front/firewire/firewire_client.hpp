@@ -38,11 +38,12 @@ class FirewireClient : public std::enable_shared_from_this<FirewireClient> {
   [[nodiscard]] EventQueue& events() noexcept { return events_; }
   [[nodiscard]] const std::optional<IsoContext>& context() const noexcept { return context_; }
 
-  /// After a bus reset: takes its channels and bandwidth again; who comes too late is told.
+  /// After a bus reset: claims its channels and bandwidth again. What is lost to another client is
+  /// told by an event.
   void reclaim_resources();
   /// Queues a BUS_RESET event where GET_INFO was called before.
   void tell_bus_reset();
-  /// -1 for none.
+  /// The lowest isochronous channel that it holds; -1 for none.
   [[nodiscard]] std::int32_t lowest_channel() const noexcept;
   /// From now on everything is ENODEV.
   void shut_down() noexcept { gone_ = true; }

@@ -25,7 +25,6 @@ class FirewireNode final : public FuseNode, private FirewireBus::Listener {
   FirewireNode(const FirewireSettings& settings, PacketDevice& device)
       : bus_(settings, device, *this) {}
 
-  void attach(FuseReplies& replies) noexcept override { replies_ = &replies; }
   [[nodiscard]] bool present() const noexcept override { return bus_.listed(); }
   [[nodiscard]] bool seekable() const noexcept override { return false; }
   void open(FuseOpen open) override;
@@ -67,7 +66,6 @@ class FirewireNode final : public FuseNode, private FirewireBus::Listener {
   [[nodiscard]] FuseAnswer take(Open& open, std::size_t size);
   void deliver();
 
-  FuseReplies* replies_ = nullptr;
   FirewireBus bus_;
   std::map<FuseOpen, Open> opens_;
   EventQueue::Bytes taken_;

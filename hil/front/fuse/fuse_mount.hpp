@@ -11,7 +11,7 @@
 
 #include "hil/front/fuse/fuse_channel.hpp"
 #include "hil/front/fuse/fuse_node.hpp"
-#include "hil/front/lateness.hpp"
+#include "shared/numeric/histogram.hpp"
 
 namespace kerf {
 
@@ -35,7 +35,7 @@ class FuseMount final : public FuseReplies {
   void wake_pollers(FuseOpen open) noexcept override;
 
   /// How late `FuseNode::wake` was called.
-  [[nodiscard]] const Lateness& lateness() const noexcept { return lateness_; }
+  [[nodiscard]] const Histogram& lateness() const noexcept { return lateness_; }
   [[nodiscard]] std::uint64_t requests() const noexcept { return requests_; }
 
  private:
@@ -75,7 +75,7 @@ class FuseMount final : public FuseReplies {
   std::map<FuseOpen, std::uint64_t> pollers_;  ///< who sleeps in poll(), by the kernel's name
   std::map<FuseRequest, Parked> parked_;
   std::uint64_t requests_ = 0;
-  Lateness lateness_;
+  Histogram lateness_;
 };
 
 }  // namespace kerf

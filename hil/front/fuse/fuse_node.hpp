@@ -25,11 +25,11 @@ struct FuseAnswer {
 /// One ioctl() of a client as it came: nothing in it can be trusted.
 struct FuseIoctl {
   FuseRequest request = 0;
-  pid_t thread = 0;                       ///< of the caller, whose memory pointers point into
-  std::uint32_t command = 0;              ///< the whole number: direction, size, type, nr
-  std::uint64_t argument = 0;             ///< as passed: a user address, or a plain number
-  std::span<const std::uint8_t> input{};  ///< what the number says travels in
-  std::size_t output_bytes = 0;           ///< what it says travels out
+  pid_t thread = 0;            ///< of the caller, whose memory pointers point into
+  std::uint32_t command = 0;   ///< the whole number: direction, size, type, nr (linux/ioctl.h)
+  std::uint64_t argument = 0;  ///< as passed: a user address, or a plain number
+  std::span<const std::uint8_t> input{};  ///< bytes that `command` says go in
+  std::size_t output_bytes = 0;           ///< room that `command` says comes back
 };
 
 /// How a node answers calls that it left open, and wakes those who sleep in poll().
@@ -50,7 +50,7 @@ class FuseNode {
   virtual ~FuseNode() = default;
 
   /// Before the first call.
-  virtual void attach(FuseReplies& replies) noexcept = 0;
+  void attach(FuseReplies& replies) noexcept { replies_ = &replies; }
   /// False: the name is not there, and cannot be opened.
   [[nodiscard]] virtual bool present() const noexcept = 0;
 
@@ -73,6 +73,9 @@ class FuseNode {
   /// When `wake` is due although nobody calls, CLOCK_MONOTONIC ns; INT64_MAX for never.
   [[nodiscard]] virtual std::int64_t next_wake_ns() const noexcept = 0;
   virtual void wake() = 0;
+
+ protected:
+  FuseReplies* replies_ = nullptr;
 };
 
 }  // namespace kerf

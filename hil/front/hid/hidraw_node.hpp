@@ -22,7 +22,6 @@ class HidrawNode final : public FuseNode, private HidHost {
  public:
   HidrawNode(const WoodenHid::Settings& settings, PacketDevice& device) : arm_(settings, device) {}
 
-  void attach(FuseReplies& replies) noexcept override { replies_ = &replies; }
   [[nodiscard]] bool present() const noexcept override { return arm_.present(); }
   void open(FuseOpen open) override;
   void release(FuseOpen open) override { opens_.erase(open); }
@@ -69,7 +68,6 @@ class HidrawNode final : public FuseNode, private HidHost {
   void take_writes(Open& open);
 
   WoodenHid arm_;
-  FuseReplies* replies_ = nullptr;
   std::map<FuseOpen, Open> opens_;
   Report taken_;
   std::vector<std::uint8_t> answer_;

@@ -26,7 +26,6 @@ class UsbfsNode final : public FuseNode, private UsbHost {
             PacketDevice& device)
       : plug_(settings, std::move(script), device) {}
 
-  void attach(FuseReplies& replies) noexcept override { replies_ = &replies; }
   [[nodiscard]] bool present() const noexcept override { return plug_.present(); }
   [[nodiscard]] bool seekable() const noexcept override { return true; }
   void open(FuseOpen open) override;
@@ -91,7 +90,6 @@ class UsbfsNode final : public FuseNode, private UsbHost {
   void take_writes(Open& open);
   void deliver();
 
-  FuseReplies* replies_ = nullptr;
   FalconPlug plug_;
   std::map<FuseOpen, Open> opens_;
   std::optional<FuseOpen> claimed_by_;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "record/session.hpp"
+#include "record/recorder_run.hpp"
 
 #include <chrono>
 #include <iostream>
@@ -12,6 +12,7 @@
 #include "record/manifest.hpp"
 #include "record/record_error.hpp"
 #include "record/recorder.hpp"
+#include "shared/posix/new_file.hpp"
 #include "shared/segment/hand_over.hpp"
 
 namespace kerf {
@@ -54,7 +55,7 @@ void write_report(const RecorderOptions& options, const Recorder& recorder, std:
                                          {"missed_before_start", recorder.missed_before_start()},
                                          {"largest_lag_ticks", recorder.largest_lag()},
                                          {"end_reason", end_reason}};
-  write_whole(options.report, report.dump(2) + "\n");
+  write_new_file(options.report, report.dump(2) + "\n");
 }
 
 }  // namespace
@@ -81,7 +82,7 @@ std::optional<int> parse_options(int argc, char** argv, RecorderOptions& options
   return std::nullopt;
 }
 
-int record_session(const RecorderOptions& options, const std::atomic<bool>& stop) {
+int run_recorder(const RecorderOptions& options, const std::atomic<bool>& stop) {
   const SegmentConnection connection = connect_within(options, stop);
   const SegmentReader& reader = connection.reader();
   std::error_code error;
@@ -90,7 +91,7 @@ int record_session(const RecorderOptions& options, const std::atomic<bool>& stop
     throw RecordError(options.out.string() + ": " + error.message() + "; choose another --out");
   }
   TickLogWriter log(options.out / kTickLogName);
-  write_whole(options.out / kSceneName, reader.info().scene_json);
+  write_new_file(options.out / kSceneName, reader.info().scene_json);
   Recorder recorder(reader, log);
   write_manifest(options.out, reader.info(), recorder, 0, "running");
 

@@ -23,6 +23,6 @@ struct RecorderOptions {
 /// Records the controller `options.name` into the folder `options.out` until it ends or `stop`:
 /// ticks.npy, scene.json, manifest.json. Returns the exit code: 0, or 1 under `strict` where ticks
 /// were lost. Bad input and a full disk throw.
-[[nodiscard]] int record_session(const RecorderOptions& options, const std::atomic<bool>& stop);
+[[nodiscard]] int run_recorder(const RecorderOptions& options, const std::atomic<bool>& stop);
 
 }  // namespace kerf

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/shell/histogram.hpp"
+#include "shared/numeric/histogram.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "record/session.hpp"
+#include "record/recorder_run.hpp"
 
 #include <array>
 #include <chrono>
@@ -45,7 +45,7 @@ TEST_CASE("a session is recorded whole and says how it ended") {
   constexpr Tick kTicks = 600;
   const std::atomic<bool> stop{false};
   int code = -1;
-  std::thread recorder([&] { code = record_session(options_for(folder), stop); });
+  std::thread recorder([&] { code = run_recorder(options_for(folder), stop); });
   for (Tick tick = 1; tick <= kTicks; ++tick) {
     publish_tick(writer, made_up_tick(tick, kTicks));
     if (tick % 10 == 0) std::this_thread::sleep_for(std::chrono::milliseconds(5));
@@ -85,7 +85,7 @@ TEST_CASE("SIGKILL of the controller loses none of its published ticks") {
     std::this_thread::sleep_for(std::chrono::milliseconds(700));
     kill(child, SIGKILL);
   });
-  const int code = record_session(options_for(folder), stop);
+  const int code = run_recorder(options_for(folder), stop);
   killer.join();
   REQUIRE(waitpid(child, nullptr, 0) == child);
   close(last[1]);
@@ -104,10 +104,10 @@ TEST_CASE("a recorder without a controller waits as long as it was told, then sa
   RecorderOptions options = options_for(folder);
   options.wait_s = 0.1;
   const std::atomic<bool> stop{false};
-  const std::string error = error_of([&] { static_cast<void>(record_session(options, stop)); });
+  const std::string error = error_of([&] { static_cast<void>(run_recorder(options, stop)); });
   CHECK(error.find("start kerf-controller") != std::string::npos);
   CHECK(!std::filesystem::exists(options.out));
   options.name = "a/b";
-  CHECK(error_of([&] { static_cast<void>(record_session(options, stop)); }).find("'a/b'") !=
+  CHECK(error_of([&] { static_cast<void>(run_recorder(options, stop)); }).find("'a/b'") !=
         std::string::npos);
 }

@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "controller/shell/run_threads.hpp"
+
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <exception>
+#include <optional>
+#include <stdexcept>
+#include <thread>
+
+#include <spdlog/spdlog.h>
+
+#include "controller/shell/call_guard.hpp"
+#include "controller/shell/motor_guard.hpp"
+#include "controller/shell/progress_bar.hpp"
+#include "controller/shell/publisher.hpp"
+#include "controller/shell/watchdog_thread.hpp"
+
+namespace kerf {
+namespace {
+
+constexpr double kArmingPatienceS = 60;
+constexpr std::chrono::milliseconds kLookPeriod{5};
+
+/// Main thread while the servo runs: draws the progress bar.
+void show_progress(const LoopSignals& signals, const std::atomic<bool>& ended,
+                   const ControllerOptions& options, int rate_hz) {
+  const ProgressBar bar(options.progress);
+  while (!ended.load()) {
+    const double done_s = static_cast<double>(signals.armed_ticks.load()) / rate_hz;
+    char text[64];
+    std::snprintf(text, sizeof text, "%.1f s", done_s);
+    bar.show(options.seconds ? done_s / *options.seconds : 0,
+             done_s > 0 ? text : "waiting for the device to be parked at rest");
+    for (int i = 0; i < 10 && !ended.load(); ++i) std::this_thread::sleep_for(kLookPeriod);
+  }
+}
+
+LoopLimits limits_of(const ControllerOptions& options, double rate_hz) {
+  LoopLimits limits;
+  if (options.seconds) {
+    limits.armed_ticks = static_cast<std::uint64_t>(std::llround(*options.seconds * rate_hz));
+  }
+  limits.gone_ticks = static_cast<std::uint64_t>(2 * rate_hz);
+  limits.arming_ticks = static_cast<std::uint64_t>(kArmingPatienceS * rate_hz);
+  return limits;
+}
+
+/// The servo thread from its first to its last tick. Throws where --strict misses a right.
+EndReason serve(const Run& run, LoopSignals& signals, CallGuard* calls) {
+  const ControllerOptions& options = run.options;
+  if (!options.virtual_time) {
+    const auto missing = become_real_time(options.real_time);
+    accept_rights(missing, options.real_time.strict);
+    auto& all = run.report.missing_rights;
+    all.insert(all.end(), missing.begin(), missing.end());
+  }
+  Publisher eyes(run.segment, run.servo);
+  RealTimeTicks real_time(kNsPerSecond / run.rate_hz, options.real_time.spin_us * 1000);
+  LockStepTicks lock_step(run.device);
+  TickSource& clock = options.virtual_time ? static_cast<TickSource&>(lock_step) : real_time;
+  if (calls != nullptr) calls->enter(run.port);
+  const EndReason end = run_servo(clock, run.device, run.servo, eyes, run.server,
+                                  limits_of(options, run.rate_hz), signals, run.report.record);
+  if (calls != nullptr) calls->leave();
+  return end;
+}
+
+/// The end as the guard knows it: what looked like a wish to stop may have been its own.
+EndReason end_by(const CallGuard& calls, EndReason end, RunReport& report) {
+  report.unexpected_call = calls.unexpected();
+  if (report.unexpected_call.empty()) return end;
+  spdlog::error("--guard: system call {} on the servo thread; motors off; keep it out of the loop",
+                report.unexpected_call);
+  report.record.add_fault(report.record.armed_at_tick + report.record.ticks, "unexpected_call");
+  return EndReason::unexpected_call;
+}
+
+}  // namespace
+
+void accept_rights(const std::vector<MissingRight>& missing, bool strict) {
+  for (const MissingRight& right : missing) {
+    if (strict) {
+      throw std::runtime_error("--strict: no " + right.what + "; without it " + right.effect);
+    }
+    spdlog::warn("no {}: {}", right.what, right.effect);
+  }
+}
+
+EndReason run_threads(const Run& run) {
+  LoopSignals signals{run.stop};
+  Watchdog watchdog(run.device, signals);
+  std::atomic<bool> ended{false};
+  EndReason end = EndReason::stopped;
+  std::exception_ptr failure;
+  std::optional<CallGuard> calls;
+  {
+    MotorGuard guard(run.device);
+    if (run.options.guard) calls.emplace(run.device, run.stop);
+    const std::jthread servo_thread([&] {
+      guard.guard_stack();
+      try {
+        end = serve(run, signals, calls ? &*calls : nullptr);
+      } catch (...) {
+        failure = std::current_exception();
+      }
+      ended = true;
+    });
+    std::jthread watching;
+    if (!run.options.virtual_time) {
+      watching = start_watchdog(watchdog, run.options.real_time);
+    }
+    show_progress(signals, ended, run.options, run.rate_hz);
+  }
+  run.report.watchdog_trips = watchdog.trips();
+  if (failure) std::rethrow_exception(failure);
+  return calls ? end_by(*calls, end, run.report) : end;
+}
+
+}  // namespace kerf
