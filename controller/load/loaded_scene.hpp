@@ -34,6 +34,8 @@ struct LoadedScene : SceneSettings {
   std::vector<SceneVolume> volumes;
   std::vector<SceneTool> tools;
   std::size_t active_tool = 0;
+  std::vector<VolumeSpec> volume_specs;  ///< as the file and the command line say them
+  std::vector<ToolSpec> tool_specs;      ///< the same, with the sizes in effect
 };
 
 }  // namespace kerf

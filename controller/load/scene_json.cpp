@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "controller/load/scene_json.hpp"
 
-#include <array>
+#include <string>
+#include <string_view>
+#include <type_traits>
 #include <utility>
+#include <variant>
 
 #include <nlohmann/json.hpp>
 
-#include "controller/scene/scene_words.hpp"
 #include "controller/tool/tool_shapes.hpp"
 #include "shared/numeric/fnv1a.hpp"
 #include "shared/posix/hex64.hpp"
@@ -58,78 +60,50 @@ json tool_json(const SceneTool& tool) {
   return object;
 }
 
-json material_json(const Material& material) {
-  json object = {{"name", material.name},
-                 {"iso", material.iso},
-                 {"machinability", material.machinability},
-                 {"colour", material.colour}};
-  if (material.forbidden) object["forbidden"] = true;
-  return object;
+json json_of(const TomlValue& value) {
+  const auto convert = [](const auto& held) -> json {
+    if constexpr (!std::is_same_v<decltype(held), const std::monostate&>) return held;
+    return nullptr;
+  };
+  return std::visit(convert, value);
 }
 
-json force_json(const ForceSettings& force) {
-  if (force.model == ForceModel::paper) {
-    return {{"model", word_of(force.model)}, {"p0_n_per_mm2", force.p0_n_per_mm2}};
+/// The keys of a table that their rows and the scene's models tell to readers; null where none is.
+json table_json(std::string_view table, SceneParts& parts, SceneKeys keys) {
+  json object;
+  SceneParts defaults;
+  for (const SceneKey& key : keys_of(table, keys)) {
+    const InJson told = key.more.json;
+    if (told == InJson::never || (told != InJson::always && !is_used(key, parts))) continue;
+    const TomlValue value = value_of(key, parts);
+    if (std::holds_alternative<std::monostate>(value)) continue;
+    if (told == InJson::if_changed && value == value_of(key, defaults)) continue;
+    object[std::string(name_in_table(key))] = json_of(value);
   }
-  return {{"model", word_of(force.model)},
-          {"stiffness_n_per_mm", force.stiffness_n_per_mm},
-          {"damping_ns_per_mm", force.damping_ns_per_mm},
-          {"friction", force.friction}};
-}
-
-/// What the model of cutting uses.
-json cut_json(const CutSettings& cut) {
-  json object = {{"model", word_of(cut.model)}};
-  if (cut.model == CutModel::preston) {
-    object["machinability_mm3_per_s_n"] = cut.machinability_mm3_per_s_n;
-    object["threshold_n"] = cut.threshold_n;
-    object["friction"] = cut.friction;
-  } else {
-    object["rate_per_s"] = cut.rate_per_s;
-    object["p1_n_per_mm2"] = cut.p1_n_per_mm2;
-  }
-  return object;
-}
-
-json device_json(const DeviceSettings& device) {
-  json object = {{"personality", kPersonalityWords[static_cast<std::size_t>(device.personality)]},
-                 {"workspace_scale", device.workspace_scale},
-                 {"offset_mm", device.offset_mm},
-                 {"dock_rad", device.dock_rad}};
-  if (device.torque_scale) object["torque_scale"] = *device.torque_scale;
   return object;
 }
 
 }  // namespace
 
-std::string canonical_json(const LoadedScene& scene) {
+std::string canonical_json(const LoadedScene& scene, SceneKeys keys) {
   json volumes = json::array();
   for (const SceneVolume& volume : scene.volumes) volumes.push_back(volume_json(volume));
   json tools = json::array();
   for (const SceneTool& tool : scene.tools) tools.push_back(tool_json(tool));
-  json materials = json::array();
-  for (const Material& material : scene.materials) materials.push_back(material_json(material));
-
   json root = {{"volumes", std::move(volumes)},
                {"tools", std::move(tools)},
                {"active_tool", scene.active_tool},
-               {"materials", std::move(materials)},
-               {"device", device_json(scene.device)},
-               {"force", force_json(scene.force)},
-               {"cut", cut_json(scene.cut)},
-               {"limits",
-                {{"force_n", scene.limits.force_n},
-                 {"continuous_force_n", scene.limits.continuous_force_n},
-                 {"slew_n_per_ms", scene.limits.slew_n_per_ms},
-                 {"speed_mm_per_s", scene.limits.speed_mm_per_s}}},
-               {"servo",
-                {{"rate_hz", scene.servo.rate_hz},
-                 {"numeric", word_of(scene.servo.numeric)},
-                 {"kernel", word_of(scene.servo.kernel)}}}};
-  if (scene.cut.model == CutModel::preston) {
-    root["spindle"] = {{"speed_krpm", scene.spindle.speed_krpm},
-                       {"stall_torque_n_mm", scene.spindle.stall_torque_n_mm},
-                       {"inertia_g_mm2", scene.spindle.inertia_g_mm2}};
+               {"materials", json::array()}};
+  SceneParts parts;
+  static_cast<SceneSettings&>(parts.scene) = scene;
+  for (const std::string_view table : names_below("", keys)) {
+    if (most_of(table) > 0) continue;
+    json object = table_json(table, parts, keys);
+    if (!object.is_null()) root[std::string(table)] = std::move(object);
+  }
+  for (const Material& material : scene.materials) {
+    parts.material = material;
+    root["materials"].push_back(table_json("material", parts, keys));
   }
   // A path need not be UTF-8; what is not, is replaced.
   return root.dump(-1, ' ', false, json::error_handler_t::replace);

@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "controller/load/loaded_scene.hpp"
+#include "controller/scene/scene_key.hpp"
 
 namespace kerf {
 
@@ -18,10 +19,11 @@ namespace kerf {
 ///   tools      [{name, shape, pitch_mm, radius_mm, length_mm, round, turns, size_vox,
 ///              offsets_half_pitch [x, y, z, x, y, z..], and what it looks like: profile
 ///              [[y_mm, radius_mm]..] or mesh {points_mm [[x, y, z]..], triangles [[a, b, c]..]}}]
-///   active_tool, materials [{name, iso, machinability, colour, and forbidden: true where it is}]
-///   device, force, cut, limits, servo  as their keys in the scene file, of the models that it has;
-///              spindle where force cuts
-[[nodiscard]] std::string canonical_json(const LoadedScene& scene);
+///   active_tool
+///   materials [..], device, force, cut, spindle, limits, servo  as the rows of the table of keys
+///   say
+///              (`InJson`), of the models that the scene has
+[[nodiscard]] std::string canonical_json(const LoadedScene& scene, SceneKeys keys = scene_keys());
 
 /// Identity of everything that decides what a run does: fnv1a of `canonical_json`, which holds the
 /// hash of each volume's density and labels too.

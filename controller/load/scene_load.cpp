@@ -199,7 +199,9 @@ LoadedScene load_scene(const std::filesystem::path& path, const SceneOverrides& 
   const std::optional<double> written_iso = spec.volumes.front().iso;
   apply_overrides(overrides, spec);
 
-  LoadedScene scene{SceneSettings(spec), {}, {}};
+  LoadedScene scene;
+  static_cast<SceneSettings&>(scene) = spec;
+  scene.volume_specs = spec.volumes;
   for (std::size_t i = 0; i < spec.volumes.size(); ++i) {
     const bool from_command_line = i == 0 && overrides.volume_file;
     scene.volumes.push_back(
@@ -217,6 +219,9 @@ LoadedScene load_scene(const std::filesystem::path& path, const SceneOverrides& 
   for (const ToolSpec& tool : spec.tools) {
     try {
       scene.tools.push_back(load_tool(tool, touched, path.parent_path()));
+      scene.tool_specs.push_back(tool);
+      scene.tool_specs.back().size.pitch_mm = scene.tools.back().pitch_mm;
+      scene.tool_specs.back().size.radius_mm = scene.tools.back().radius_mm;
     } catch (const SceneError&) {
       // A spare tool of the scene that does not fit a volume of --volume is nobody's mistake.
       if (!overrides.volume_file || scene.tools.empty()) throw;

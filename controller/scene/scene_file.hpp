@@ -5,12 +5,14 @@
 #include <string_view>
 
 #include "controller/scene/scene.hpp"
+#include "controller/scene/scene_key.hpp"
 
 namespace kerf {
 
 /// Reads TOML text. `path` is only used in messages and to resolve `script`. Throws SceneError, one
 /// line with the line number, for anything that is not a valid scene. Any thread; load time only.
-[[nodiscard]] Scene parse_scene(std::string_view text, const std::filesystem::path& path);
+[[nodiscard]] Scene parse_scene(std::string_view text, const std::filesystem::path& path,
+                                SceneKeys keys = scene_keys());
 
 /// Reads a scene file of at most 1 MiB.
 [[nodiscard]] Scene parse_scene_file(const std::filesystem::path& path);

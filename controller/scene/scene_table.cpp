@@ -2,218 +2,161 @@
 #include "controller/scene/scene_table.hpp"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
+#include <optional>
 #include <utility>
+#include <variant>
 
 #include "controller/scene/scene_text.hpp"
 
 namespace kerf {
 namespace {
 
-constexpr std::size_t kLongestValue = 60;  // characters of a value that a message repeats
 constexpr std::size_t kLongestText = 256;  // bytes of a name or a path
 
-/// The value as one would write it in the file.
-std::string written(const toml::node& node) {
-  if (const auto text = node.as_string()) return '"' + text->get() + '"';
-  if (const auto number = node.as_floating_point()) return number_text(number->get());
-  if (const auto number = node.as_integer()) return std::to_string(number->get());
-  if (const auto flag = node.as_boolean()) return flag->get() ? "true" : "false";
-  if (node.is_table()) return "{..}";
-  const toml::array* array = node.as_array();
-  if (array == nullptr) return "a date or time";
-  std::string list;
-  for (const toml::node& entry : *array) {
-    list += (list.empty() ? "" : ", ") + written(entry);
-    if (list.size() > kLongestValue) break;
+/// Takes the value that stands at a key into its slot, if it is of that type and allowed.
+struct Take {
+  const SceneKey& key;
+  const TomlNode& node;
+  const std::string place;  ///< `file:line: table.key = value`
+
+  void operator()(bool* into) const {
+    const bool* flag = std::get_if<bool>(&node.value);
+    if (flag == nullptr) refuse(place, " is not a switch; write true or false");
+    *into = *flag;
   }
-  return "[" + list + "]";
-}
-
-std::string shown(const toml::node& node) {
-  std::string line = one_line(written(node));
-  if (line.size() > kLongestValue) line = line.substr(0, kLongestValue) + "...";
-  return line;
-}
-
-std::string listed(std::span<const std::string_view> names) {
-  std::string list;
-  for (const std::string_view name : names) {
-    if (!list.empty()) list += ", ";
-    list += name;
+  void operator()(int* into) const {
+    const bool whole = std::holds_alternative<std::int64_t>(node.value);
+    if (!whole) refuse(place, " is not a whole number; write one");
+    *into = static_cast<int>(number(node));
   }
-  return list;
-}
-
-/// The unit that the end of a key tells, as ` (in mm)`.
-std::string unit_hint(std::string_view key) {
-  constexpr std::pair<std::string_view, std::string_view> kUnits[] = {
-      {"_mm_per_s", "mm/s"}, {"_n_per_mm2", "N/mm^2"},
-      {"_n_per_ms", "N/ms"}, {"_per_s", "1/s"},
-      {"_mm", "mm"},         {"_n", "N"},
-      {"_hz", "Hz"},         {"_rad", "rad"},
-      {"_vox", "voxels"}};
-  for (const auto& [ending, unit] : kUnits) {
-    if (key.ends_with(ending)) return " (in " + std::string(unit) + ")";
+  void operator()(double* into) const {
+    if (!is_word()) *into = number(node);
   }
-  return "";
-}
+  void operator()(std::string* into) const { *into = text(); }
+  template <class Choice>
+  void operator()(Choice* into) const {
+    const auto words = key.allowed.words;
+    *into = static_cast<Choice>(std::ranges::find(words, text()) - words.begin());
+  }
+  template <std::size_t N>
+  void operator()(std::array<double, N>* into) const {
+    const bool one = key.more.one_for_all && node.form != TomlNode::Form::array;
+    if (!one && (node.form != TomlNode::Form::array || node.entries.size() != N)) {
+      refuse(place, " is not a list of " + std::to_string(N) + " numbers; write " +
+                        (N == 2   ? "[a, b]"
+                         : N == 3 ? "[x, y, z]"
+                                  : "[x, y, z, w]"));
+    }
+    for (std::size_t i = 0; i < N; ++i) (*into)[i] = number(one ? node : node.entries[i]);
+  }
+  void operator()(VoxelGrid* into) const {
+    std::array<double, 3> sides{};
+    (*this)(&sides);
+    if (std::ranges::any_of(sides, [](double side) { return side != std::floor(side); })) {
+      refuse(place, " counts " + std::string(key.unit) + "; write whole numbers");
+    }
+    const auto side = [&](std::size_t axis) { return static_cast<std::int32_t>(sides[axis]); };
+    *into = {side(0), side(1), side(2)};
+  }
+  template <class T>
+  void operator()(std::optional<T>* into) const {
+    if (!is_word()) (*this)(&into->emplace());
+  }
 
-std::string unknown_key_advice(std::string_view key, std::string_view prefix,
-                               std::span<const std::string_view> known) {
-  const std::string_view near = nearest(key, known);
-  if (near.empty()) return "; known here: " + listed(known);
-  return "; did you mean " + std::string(prefix) + std::string(near) + unit_hint(near) + "?";
+ private:
+  /// One of the key's words, where any are given.
+  [[nodiscard]] std::string text() const {
+    const std::string* text = std::get_if<std::string>(&node.value);
+    if (text == nullptr) refuse(place, " is not text; put it in quotes");
+    if (text->empty() || text->size() > kLongestText || one_line(*text) != *text) {
+      refuse(place, " is not a usable text; write 1 to " + std::to_string(kLongestText) +
+                        " printable characters");
+    }
+    const auto words = key.allowed.words;
+    if (words.empty() || std::ranges::find(words, *text) != words.end()) return *text;
+    const std::string_view near = nearest(*text, words);
+    const std::string guess = near.empty() ? "" : "did you mean \"" + std::string(near) + "\"? ";
+    refuse(place, " is unknown; " + guess + "known: " + listed(words));
+  }
+  /// Whether a word stands for a number.
+  [[nodiscard]] bool is_word() const {
+    if (key.allowed.words.empty() || !std::holds_alternative<std::string>(node.value)) return false;
+    return !text().empty();
+  }
+  /// The number of `entry`: the value, or a part of it.
+  [[nodiscard]] double number(const TomlNode& entry) const {
+    const auto* whole = std::get_if<std::int64_t>(&entry.value);
+    const auto* real = std::get_if<double>(&entry.value);
+    if (whole == nullptr && real == nullptr) {
+      refuse(place, " is not a number; write one without quotes or unit");
+    }
+    const double number = whole != nullptr ? static_cast<double>(*whole) : *real;
+    const auto [lo, hi] = key.allowed.range;
+    if (number >= lo && number <= hi) return number;  // no nan is
+    refuse(place, " is out of range; use " + number_text(lo) + " to " + number_text(hi));
+  }
+};
+
+/// ` is of the model paper; leave it out, or set model = "paper"`.
+std::string refusal_of(const SceneCondition& condition) {
+  if (!condition.refusal.empty()) return std::string(condition.refusal);
+  const std::string name(condition.key.substr(condition.key.find('.') + 1)), word(condition.word);
+  return " is of the " + name + " " + word + "; leave it out, or set " + name + " = \"" + word +
+         '"';
 }
 
 }  // namespace
 
-SceneTable::SceneTable(const toml::table& table, std::string name, std::string file,
-                       std::span<const std::string_view> known_keys)
-    : table_(&table), name_(std::move(name)), file_(std::move(file)) {
-  const toml::key* first_unknown = nullptr;  // in the order of the file, not of the alphabet
-  for (const auto& [key, value] : table) {
-    if (std::find(known_keys.begin(), known_keys.end(), key.str()) != known_keys.end()) continue;
-    if (first_unknown == nullptr || key.source().begin < first_unknown->source().begin) {
-      first_unknown = &key;
+SceneTable::SceneTable(std::string name, std::string file, const TomlNode& node, SceneKeys keys)
+    : name_(std::move(name)), file_(std::move(file)), node_(&node), keys_(keys_of(name_, keys)) {}
+
+void SceneTable::read(SceneParts& parts) const {
+  for (const SceneKey& key : keys_) {
+    if (key.only_with.key.empty()) read(key, parts);
+  }
+}
+
+void SceneTable::read_conditional(SceneParts& parts) const {
+  for (const SceneKey& key : keys_) {
+    if (key.only_with.key.empty()) continue;
+    if (is_used(key, parts)) {
+      read(key, parts);
+    } else if (const std::string_view name = name_in_table(key); has(name)) {
+      refuse(place(name), refusal_of(key.only_with));
     }
   }
-  if (first_unknown == nullptr) return;
-  const auto at = first_unknown->source().begin;
-  const std::string prefix = name_.empty() ? "" : name_ + ".";
-  refuse(file_ + ":" + std::to_string(at.line) + ":" + std::to_string(at.column),
-         ": " + prefix + std::string(first_unknown->str()) + " is not a known key" +
-             unknown_key_advice(first_unknown->str(), prefix, known_keys));
 }
 
-const toml::node* SceneTable::find(std::string_view key) const {
-  return table_->get(key);
-}
-
-bool SceneTable::has(std::string_view key) const {
-  return find(key) != nullptr;
-}
-
-std::string SceneTable::where(std::string_view key) const {
-  return file_ + ":" + std::to_string(find(key)->source().begin.line);
-}
-
-std::string SceneTable::place(std::string_view key) const {
-  const std::string prefix = name_.empty() ? "" : name_ + ".";
-  return where(key) + ": " + prefix + std::string(key) + " = " + shown(*find(key));
-}
-
-std::string SceneTable::place() const {
-  return file_ + ":" + std::to_string(table_->source().begin.line) + ": " + name_;
-}
-
-double SceneTable::in_range(std::string_view key, const toml::node& node, Range range) const {
-  const std::optional<double> value = node.is_number() ? node.value<double>() : std::nullopt;
-  if (!value) refuse(place(key), " is not a number; write one without quotes or unit");
-  if (!(*value >= range.lo && *value <= range.hi)) {  // also refuses nan
-    refuse(place(key),
-           " is out of range; use " + number_text(range.lo) + " to " + number_text(range.hi));
+void SceneTable::read(const SceneKey& key, SceneParts& parts) const {
+  const std::string_view name = name_in_table(key);
+  const std::string form(key.more.required_as);
+  if (has(name)) {
+    std::visit(Take{key, *node_->find(name), place(name)}, key.at(parts));
+  } else if (!form.empty()) {
+    refuse(place(), " has no " + std::string(name) + "; write " + form);
   }
-  return *value;
-}
-
-std::optional<double> SceneTable::number(std::string_view key, Range range) const {
-  const toml::node* node = find(key);
-  if (node == nullptr) return std::nullopt;
-  return in_range(key, *node, range);
-}
-
-std::optional<std::int32_t> SceneTable::whole(std::string_view key, Range range) const {
-  const toml::node* node = find(key);
-  if (node == nullptr) return std::nullopt;
-  if (!node->is_integer()) refuse(place(key), " is not a whole number; write one");
-  return static_cast<std::int32_t>(in_range(key, *node, range));
-}
-
-std::optional<bool> SceneTable::flag(std::string_view key) const {
-  const toml::node* node = find(key);
-  if (node == nullptr) return std::nullopt;
-  if (!node->is_boolean()) refuse(place(key), " is not a switch; write true or false");
-  return node->value<bool>();
-}
-
-std::optional<std::string> SceneTable::text(std::string_view key) const {
-  const toml::node* node = find(key);
-  if (node == nullptr) return std::nullopt;
-  if (!node->is_string()) refuse(place(key), " is not text; put it in quotes");
-  std::string text = *node->value<std::string>();
-  if (text.empty() || text.size() > kLongestText || one_line(text) != text) {
-    refuse(place(key), " is not a usable text; write 1 to " + std::to_string(kLongestText) +
-                           " printable characters");
-  }
-  return text;
-}
-
-std::optional<std::size_t> SceneTable::choice(std::string_view key,
-                                              std::span<const std::string_view> choices) const {
-  const std::optional<std::string> word = text(key);
-  if (!word) return std::nullopt;
-  const auto found = std::find(choices.begin(), choices.end(), *word);
-  if (found == choices.end()) {
-    const std::string_view near = nearest(*word, choices);
-    const std::string guess = near.empty() ? "" : "did you mean \"" + std::string(near) + "\"? ";
-    refuse(place(key), " is unknown; " + guess + "known: " + listed(choices));
-  }
-  return static_cast<std::size_t>(found - choices.begin());
-}
-
-void SceneTable::read_numbers(std::string_view key, Range range, std::span<double> out) const {
-  const toml::array* array = find(key)->as_array();
-  if (array == nullptr || array->size() != out.size()) {
-    refuse(place(key), " is not a list of " + std::to_string(out.size()) + " numbers; write [" +
-                           (out.size() == 2   ? "a, b"
-                            : out.size() == 3 ? "x, y, z"
-                                              : "x, y, z, w") +
-                           "]");
-  }
-  for (std::size_t i = 0; i < out.size(); ++i) out[i] = in_range(key, *array->get(i), range);
-}
-
-bool SceneTable::is_array(std::string_view key) const {
-  const toml::node* node = find(key);
-  return node != nullptr && node->is_array();
 }
 
 bool SceneTable::is_text(std::string_view key) const {
-  const toml::node* node = find(key);
-  return node != nullptr && node->is_string();
+  return has(key) && std::holds_alternative<std::string>(node_->find(key)->value);
 }
 
-std::optional<SceneTable> SceneTable::table(std::string_view key,
-                                            std::span<const std::string_view> known) const {
-  const toml::node* node = find(key);
-  if (node == nullptr) return std::nullopt;
-  if (!node->is_table()) {
-    const std::string form =
-        name_.empty() ? "[" + std::string(key) + "]" : std::string(key) + " = { .. }";
-    refuse(place(key), " is not a table; write " + form);
-  }
-  const std::string name = name_.empty() ? std::string(key) : name_ + "." + std::string(key);
-  return SceneTable(*node->as_table(), name, file_, known);
+std::string SceneTable::where(std::string_view key) const {
+  return file_ + ":" + std::to_string(node_->find(key)->line);
 }
 
-std::vector<SceneTable> SceneTable::tables(std::string_view key,
-                                           std::span<const std::string_view> known,
-                                           std::size_t limit) const {
-  std::vector<SceneTable> list;
-  const toml::node* node = find(key);
-  if (node == nullptr) return list;
-  const toml::array* array = node->as_array();
-  if (array == nullptr || array->empty() || !array->is_homogeneous(toml::node_type::table)) {
-    refuse(place(key), " is not a list of tables; write [[" + std::string(key) + "]]");
-  }
-  if (array->size() > limit) {
-    refuse(place(key), " has " + std::to_string(array->size()) + " entries; use at most " +
-                           std::to_string(limit));
-  }
-  for (const toml::node& entry : *array) {
-    list.emplace_back(*entry.as_table(), std::string(key), file_, known);
-  }
-  return list;
+std::string SceneTable::place(std::string_view key) const {
+  return place_of(*node_->find(key), name_ + "." + std::string(key), file_);
+}
+
+std::string SceneTable::place() const {
+  return file_ + ":" + std::to_string(node_->line) + ": " + name_;
+}
+
+std::string place_of(const TomlNode& node, std::string_view name, const std::string& file) {
+  return file + ":" + std::to_string(node.line) + ": " + std::string(name) + " = " + shown(node);
 }
 
 }  // namespace kerf

@@ -59,6 +59,15 @@ std::string one_line(std::string_view text) {
   return line;
 }
 
+std::string listed(std::span<const std::string_view> names) {
+  std::string list;
+  for (const std::string_view name : names) {
+    if (!list.empty()) list += ", ";
+    list += name;
+  }
+  return list;
+}
+
 void refuse(std::string_view place, std::string_view what) {
   throw SceneError(one_line(std::string(place) + std::string(what)));
 }

@@ -16,6 +16,9 @@ namespace kerf {
 /// `text` on one line: control characters become blanks, and what is too long to read is cut.
 [[nodiscard]] std::string one_line(std::string_view text);
 
+/// `a, b, c`.
+[[nodiscard]] std::string listed(std::span<const std::string_view> names);
+
 /// Throws SceneError `place: what`, on one line.
 [[noreturn]] void refuse(std::string_view place, std::string_view what);
 

@@ -14,6 +14,7 @@
 
 #include "controller/device/port/open_port.hpp"
 #include "controller/scene/scene_file.hpp"
+#include "controller/scene/scene_page.hpp"
 #include "controller/scene/scene_words.hpp"
 
 namespace kerf {
@@ -116,7 +117,13 @@ std::optional<int> parse_options(int argc, const char* const* argv, ControllerOp
       ->capture_default_str();
   auto* check_flag = app.add_flag(
       "--check", options.check,
-      "load and check the scene, whether its rate fits too, print what it means, and end");
+      "load and check the scene, whether its rate fits too, print it and every setting, and end");
+  const auto print_page = [] {
+    std::cout << scene_keys_page();
+    throw CLI::Success();
+  };
+  app.add_flag_callback("--scene-keys", print_page,
+                        "print every key of a scene file as a page of Markdown, and end");
   auto* explain_flag =
       app.add_flag("--explain", options.explain,
                    "tell what the scene costs: plans, operations, time, memory; and end")

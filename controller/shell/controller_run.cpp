@@ -19,6 +19,7 @@
 #include "controller/plan/compile.hpp"
 #include "controller/plan/cost/work_budget.hpp"
 #include "controller/scene/scene_words.hpp"
+#include "controller/shell/check_scene.hpp"
 #include "controller/shell/explain_scene.hpp"
 #include "controller/shell/run_report.hpp"
 #include "controller/shell/run_threads.hpp"
@@ -50,14 +51,6 @@ const char* text_of(EndReason end) {
       break;
   }
   return "the device was never calibrated: nobody parked it at rest; see docs/devices.md";
-}
-
-/// What the demo script hands to the emulator.
-std::string hand_lines(const LoadedScene& scene) {
-  char unit[64];
-  std::snprintf(unit, sizeof unit, "%.9g", hand_unit_mm(scene));
-  return "hand_unit_mm=" + std::string(unit) + "\nhand_script=" + scene.hand_script +
-         "\nrate_hz=" + std::to_string(scene.servo.rate_hz) + "\n";
 }
 
 double removed_mm3(const LoadedScene& scene, const RunRecord& record) {
@@ -98,34 +91,6 @@ void check_budget(const ControllerOptions& options, const LoadedScene& scene,
                   const SceneCosts& costs) {
   const std::string refusal = options.virtual_time ? "" : over_budget(scene, costs);
   if (!refusal.empty()) throw std::runtime_error(refusal);
-}
-
-/// Whatever can be said without memory for the loop.
-int check_scene(const ControllerOptions& options, const LoadedScene& scene,
-                const SceneCosts& costs) {
-  std::printf("scene=%s\n", scene.path.c_str());
-  for (const SceneVolume& v : scene.volumes) {
-    const auto& g = v.image.grid;
-    const auto& h = v.image.spacing_mm;
-    std::printf("volume=%s %dx%dx%d spacing_mm=%g,%g,%g iso=%.4f solid=%d\n", v.name.c_str(), g.nx,
-                g.ny, g.nz, h[0], h[1], h[2], v.iso / kDensityMax, v.solid ? 1 : 0);
-  }
-  for (const SceneTool& t : scene.tools) {
-    std::printf("tool=%s %s samples=%zu pitch_mm=%g radius_mm=%g\n", t.name.c_str(),
-                t.shape.c_str(), t.offsets.size(), t.pitch_mm, t.radius_mm);
-  }
-  const auto& o = scene.device.offset_mm;
-  std::printf("workspace_scale=%g\noffset_mm=%g,%g,%g\n", scene.device.workspace_scale, o[0], o[1],
-              o[2]);
-  std::printf("force=%s\ncut=%s\n", std::string(word_of(scene.force.model)).c_str(),
-              std::string(word_of(scene.cut.model)).c_str());
-  std::printf("stiffness_at_device_n_per_mm=%g\n", device_stiffness_n_per_mm(scene));
-  const std::size_t costliest = costliest_tool(costs);
-  std::printf("costliest_tool=%s\nhighest_rate_hz=%d\n", scene.tools[costliest].name.c_str(),
-              highest_rate_hz(work_us(costs, costliest)));
-  std::fputs(hand_lines(scene).c_str(), stdout);
-  check_budget(options, scene, costs);
-  return 0;
 }
 
 /// Everything that can be known to go wrong, before the hand is moved.
@@ -180,7 +145,11 @@ int run_controller(const ControllerOptions& options) {
 
   LoadedScene scene = load_scene(options.scene, options.overrides);
   const std::unique_ptr<CompiledScene> servo = plan_scene(scene);
-  if (options.check) return check_scene(options, scene, servo->costs());
+  if (options.check) {
+    print_scene(scene, servo->costs());
+    check_budget(options, scene, servo->costs());
+    return 0;
+  }
   if (options.explain) {
     explain_scene(options, scene, *servo);
     return 0;

@@ -110,9 +110,9 @@ TEST_CASE("a key of another model of force or cutting is refused") {
   CHECK(error_after("[cut]\nrate_per_s = 8\n") ==
         "x.toml:7: cut.rate_per_s = 8 is of the model overlap; leave it out, or set model = "
         "\"overlap\"");
-  CHECK(
-      error_after(kOverlap + "[spindle]\nspeed_krpm = 100\n") ==
-      "x.toml:8: spindle turns nothing: only cut.model = \"preston\" has a spindle; leave it out");
+  CHECK(error_after(kOverlap + "[spindle]\nspeed_krpm = 100\n") ==
+        "x.toml:9: spindle.speed_krpm = 100 turns nothing: only cut.model = \"preston\" has a "
+        "spindle; leave it out");
   CHECK(error_after(kOverlap + "[[material]]\nname = \"pulp\"\nforbidden = true\n") ==
         "x.toml: material pulp is forbidden, and this cut.model cuts everything; set model = "
         "\"preston\", or leave forbidden out");

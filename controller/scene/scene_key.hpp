@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+#include "controller/scene/scene.hpp"
+#include "controller/scene/toml_tree.hpp"
+
+namespace kerf {
+
+/// What the rows point into: a scene, and the entry at hand of what stands in it several times.
+struct SceneParts {
+  Scene scene;
+  VolumeSpec volume;
+  ToolSpec tool;
+  Material material;
+};
+
+/// Where the value of a key lies; its type says what the key can hold.
+using SceneSlot =
+    std::variant<bool*, int*, double*, std::string*, std::array<double, 3>*, std::optional<int>*,
+                 std::optional<double>*, std::optional<std::array<double, 2>>*,
+                 std::optional<std::array<double, 3>>*, std::optional<std::array<double, 4>>*,
+                 std::optional<VoxelGrid>*, Personality*, ForceModel*, CutModel*, NumericKind*,
+                 GradientKernel*>;
+
+/// Both ends are allowed values.
+struct Range {
+  double lo = 0, hi = 0;
+};
+
+/// Numbers in `range`; texts among `words`, in the order of an enumeration. A number with words
+/// may also be one of these, and then keeps its default.
+struct Allowed {
+  Range range{};
+  std::span<const std::string_view> words{};
+};
+
+/// Which choice of another key gives a key a meaning: that it is `word`, or that it is not.
+struct SceneCondition {
+  std::string_view key{};  ///< `table.key`; empty: none is needed
+  std::string_view word{};
+  bool is = true;
+  std::string_view refusal{};  ///< what follows `table.key = value` else; empty: names the choice
+};
+
+/// Whether readers of the segment are told a key. All that they are told is part of the scene's
+/// identity (config_hash): a new key is told `if_changed`, so that the scenes of before keep
+/// theirs.
+enum class InJson : std::uint8_t { used, always, if_changed, never };
+
+/// What few rows say.
+struct KeyMore {
+  std::string_view default_text{};  ///< where the default is no plain value
+  std::string_view required_as{};   ///< where there is no default: how to write one
+  InJson json = InJson::used;       ///< of volumes and tools, what is loaded is told instead
+  bool one_for_all = false;         ///< one number stands for a list of equal ones
+};
+
+/// One row of the table of keys: all that is known of one key of a scene file. Reading, the answer
+/// to every mistake, the scene's JSON, `--check` and docs/scene-keys.md come from it.
+struct SceneKey {
+  std::string_view name;  ///< `table.key`
+  std::string_view unit;  ///< empty: a plain number, a text or a switch
+  SceneSlot (*at)(SceneParts&);
+  Allowed allowed;
+  std::string_view meaning;
+  SceneCondition only_with{};  ///< where it does not hold, the key is refused
+  KeyMore more{};
+};
+using SceneKeys = std::span<const SceneKey>;
+
+/// One table of a scene file.
+struct SceneTableRow {
+  std::string_view name;
+  std::size_t limit;  ///< of `[[name]]`, which may stand so often; 0: `[name]`, once
+  std::string_view meaning;
+};
+
+/// The table of keys, in the order of the reference page.
+[[nodiscard]] SceneKeys scene_keys();
+[[nodiscard]] std::span<const SceneTableRow> scene_tables();
+/// How often `[[table]]` may stand; 0: it is `[table]`.
+[[nodiscard]] std::size_t most_of(std::string_view table);
+
+/// The names that come next below `prefix` (empty, `table.` or `table.key.`), in the table's order.
+[[nodiscard]] std::vector<std::string_view> names_below(std::string_view prefix, SceneKeys keys);
+/// The rows of one table.
+[[nodiscard]] std::vector<SceneKey> keys_of(std::string_view table, SceneKeys keys);
+/// `table.key` without the table.
+[[nodiscard]] std::string_view name_in_table(const SceneKey& key);
+[[nodiscard]] bool is_used(const SceneKey& key, SceneParts& parts);
+/// The value of a key as a scene would write it; empty where none is given.
+[[nodiscard]] TomlValue value_of(const SceneKey& key, SceneParts& parts);
+
+}  // namespace kerf

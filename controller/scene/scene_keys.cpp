@@ -1,0 +1,213 @@
+// SPDX-License-Identifier: Apache-2.0
+// The table of keys. A new key is one row here, its member in scene.hpp, and its use; then
+// `kerf-controller --scene-keys > docs/scene-keys.md`.
+#include <tuple>
+
+#include "controller/scene/scene_key.hpp"
+#include "controller/scene/scene_words.hpp"
+#include "controller/servo/servo_limits.hpp"
+
+namespace kerf {
+namespace {
+
+/// The part of a scene that has the member.
+template <class Part, class T>
+Part& part_with(T Part::*, SceneParts& parts) {
+  Scene& scene = parts.scene;
+  return std::get<Part&>(std::tie(parts.volume, parts.tool, parts.tool.size, parts.material,
+                                  static_cast<SceneSettings&>(scene), scene.device, scene.force,
+                                  scene.cut, scene.spindle, scene.limits, scene.servo));
+}
+
+template <auto kMember>
+SceneSlot at(SceneParts& parts) {
+  return &(part_with(kMember, parts).*kMember);
+}
+
+using Words = std::span<const std::string_view>;
+
+constexpr Allowed between(double lo, double hi, Words or_words = {}) {
+  return {{lo, hi}, or_words};
+}
+constexpr Allowed one_of(Words words) {
+  return {{}, words};
+}
+
+constexpr std::string_view kIsoWords[] = {"otsu"};
+constexpr std::string_view kCutRateWords[] = {"1/T"};
+
+constexpr SceneCondition kPaper{"force.model", "paper"};
+constexpr SceneCondition kProxy{"force.model", "proxy"};
+constexpr SceneCondition kPreston{"cut.model", "preston"};
+constexpr SceneCondition kNoPreston{
+    "cut.model", "preston", false,
+    " is of the model overlap; leave it out, or set model = \"overlap\""};
+constexpr SceneCondition kSpindle{
+    "cut.model", "preston", true,
+    " turns nothing: only cut.model = \"preston\" has a spindle; leave it out"};
+constexpr SceneCondition kOmni{"device.personality", "omni"};
+constexpr SceneCondition kPhantom{"volume.file", kPhantomFile, true,
+                                  " only shapes the phantom; leave it out, a file has its own"};
+constexpr SceneCondition kNoPhantom{"volume.file", kPhantomFile, false,
+                                    " is given with the phantom, which has its own; leave it out"};
+constexpr SceneCondition kMesh{"tool.shape", kMeshShape};
+constexpr SceneCondition kNoMesh{
+    "tool.shape", kMeshShape, false,
+    " is given with a mesh, which has its own size; leave it out, or set scale (mm per unit of the "
+    "file)"};
+
+// Ranges are wide enough for any tooth, bone and device, narrow enough that a slip of the unit
+// shows. A row: key, unit, member, allowed values; meaning, condition, more.
+// clang-format off
+constexpr SceneKey kKeys[] = {
+    {"volume.name", "", at<&VolumeSpec::name>, {},
+     "tells it from others in pictures and reports", {}, {.default_text = "the file's"}},
+    {"volume.file", "", at<&VolumeSpec::file>, {},
+     "NRRD, MetaImage, NIfTI or a DICOM folder, from the scene's folder; or \"phantom\", a tooth",
+     {}, {.required_as = "file = \"phantom\" or a path"}},
+    {"volume.size", "voxels", at<&VolumeSpec::phantom_size>, between(16, 512),
+     "samples of the phantom along x, y and z; the tooth keeps its size",
+     kPhantom, {.default_text = "[256, 256, 161]"}},
+    {"volume.spacing_mm", "mm", at<&VolumeSpec::spacing_mm>, between(1e-4, 100),
+     "voxel edges along x, y and z; one number stands for all",
+     kNoPhantom, {.default_text = "the file's", .one_for_all = true}},
+    {"volume.window", "", at<&VolumeSpec::window>, between(-1e9, 1e9),
+     "source values of density 0 and 1", kNoPhantom, {.default_text = "all of the file's values"}},
+    {"volume.iso", "", at<&VolumeSpec::iso>, between(1e-4, 1, kIsoWords),
+     "density (0 to 1) of the surface; otsu: the threshold of Otsu, 1979"},
+    {"volume.crop", "", at<&VolumeSpec::crop>, {}, "cut away the air around it"},
+    {"volume.solid", "", at<&VolumeSpec::solid>, {}, "felt and cut; else only seen"},
+    {"volume.pose.position_mm", "mm", at<&VolumeSpec::position_mm>,
+     between(-kLargestWorldMm, kLargestWorldMm), "world place of the middle of its box"},
+    {"volume.pose.orientation", "", at<&VolumeSpec::orientation>, between(-1.01, 1.01),
+     "unit quaternion x, y, z, w that turns the source's axes to the world's",
+     {}, {.default_text = "the source's z is up"}},
+
+    {"tool.name", "", at<&ToolSpec::name>, {},
+     "tells it from others in pictures and reports",
+     {}, {.default_text = "shape and size, or the file's"}},
+    {"tool.shape", "", at<&ToolSpec::shape>, one_of(kShapeWords),
+     "a solid of revolution about y with its tip toward -y, or the mesh of a file",
+     {}, {.required_as = "shape = \"ball\" or another"}},
+    {"tool.radius_mm", "mm", at<&ToolSize::radius_mm>, between(1e-4, 1000),
+     "largest radius; either this or size_vox", kNoMesh, {.default_text = "none"}},
+    {"tool.size_vox", "voxels", at<&ToolSize::size_vox>, between(1, 10000),
+     "the head fills a cube of so many pitches", kNoMesh},
+    {"tool.length_mm", "mm", at<&ToolSize::length_mm>, between(1e-4, 1000),
+     "height of the head; not of a ball, nor with size_vox",
+     kNoMesh, {.default_text = "the shape's"}},
+    {"tool.file", "", at<&ToolSpec::file>, {},
+     "STL, from the scene's folder; it turns about its y",
+     kMesh, {.required_as = "file = \"bur.stl\""}},
+    {"tool.scale", "mm", at<&ToolSpec::scale>, between(1e-6, 1000), "of a unit of the file", kMesh},
+    {"tool.pitch_mm", "mm", at<&ToolSize::pitch_mm>, between(1e-4, 100),
+     "distance of the samples", {}, {.default_text = "the smallest voxel edge"}},
+    {"tool.turns", "", at<&ToolSpec::turns>, {}, "with the stylus; else it keeps the world's axes"},
+
+    {"material.name", "", at<&Material::name>, {},
+     "one of the table (enamel, dentin, pulp) to change, or a new one: its label is its place",
+     {}, {.required_as = "name = \"enamel\" or another"}},
+    {"material.iso", "", at<&Material::iso>, between(0, 1),
+     "density at which it is drawn", {}, {.default_text = "the material's, else 0.5"}},
+    {"material.felt_iso", "", at<&Material::felt_iso>, between(1e-4, 1),
+     "density at which it is felt (docs/cutting.md)",
+     {}, {.default_text = "volume.iso", .json = InJson::never}},
+    {"material.machinability", "", at<&Material::machinability>, between(0, 1000),
+     "removal rate over that of enamel", {}, {.default_text = "the material's, else 1"}},
+    {"material.forbidden", "", at<&Material::forbidden>, {},
+     "never cut by force; a press on it raises a flag", {}, {.json = InJson::if_changed}},
+    {"material.colour", "", at<&Material::colour>, between(0, 1),
+     "linear red, green and blue", {}, {.default_text = "the material's, else [0.9, 0.87, 0.8]"}},
+
+    {"device.personality", "", at<&DeviceSettings::personality>, one_of(kPersonalityWords),
+     "which device is held"},
+    {"device.workspace_scale", "", at<&DeviceSettings::workspace_scale>,
+     between(kMinWorkspaceScale, kMaxWorkspaceScale), "mm of the scene per mm of the hand"},
+    {"device.offset_mm", "mm", at<&DeviceSettings::offset_mm>,
+     between(-kLargestWorldMm, kLargestWorldMm),
+     "scene point under the device's origin", {}, {.default_text = "the first surface below +y"}},
+    {"device.torque_scale", "N mm", at<&DeviceSettings::torque_scale>,
+     between(-kMaxTorqueScale, kMaxTorqueScale),
+     "at each joint per motor count, at least 0.001; the sign is the motor's (docs/devices.md)",
+     {}, {.default_text = "the motors stay off"}},
+    {"device.dock_rad", "rad", at<&DeviceSettings::dock_rad>, between(-3.15, 3.15),
+     "joint angles in the inkwell", kOmni, {.json = InJson::always}},
+
+    {"force.model", "", at<&ForceSettings::model>, one_of(kForceModelWords),
+     "proxy: swept contact of the surface, coupled to the hand; paper: sum of gradients"},
+    {"force.p0_n_per_mm2", "N/mm^2", at<&ForceSettings::p0_n_per_mm2>, between(0, 1000),
+     "force per mm^2 of surface", kPaper},
+    {"force.stiffness_n_per_mm", "N/mm", at<&ForceSettings::stiffness_n_per_mm>, between(0.01, 0.7),
+     "of the coupling, at the device; beyond, an Omni trembles", kProxy},
+    {"force.damping_ns_per_mm", "N s/mm", at<&ForceSettings::damping_ns_per_mm>, between(0, 0.005),
+     "of the coupling, at the device", kProxy},
+    {"force.friction", "", at<&ForceSettings::friction>, between(0, 1),
+     "Coulomb coefficient of the tool on the surface", kProxy},
+
+    {"cut.model", "", at<&CutSettings::model>, one_of(kCutModelWords),
+     "preston: the force cuts; overlap: what is covered goes at a rate; overlap_exact: in any tick",
+     {}, {.default_text = "\"preston\"; with the paper's force \"overlap\""}},
+    {"cut.rate_per_s", "1/s", at<&CutSettings::rate_per_s>, between(0, 100000, kCutRateWords),
+     "share of what is covered that goes; 1/T: all of it in each tick, as in the paper",
+     kNoPreston},
+    {"cut.p1_n_per_mm2", "N/mm^2", at<&CutSettings::p1_n_per_mm2>, between(0, 1000),
+     "reaction per mm^2 of surface that goes", kNoPreston},
+    {"cut.machinability_mm3_per_s_n", "mm^3/(s N)", at<&CutSettings::machinability_mm3_per_s_n>,
+     between(1e-4, 100), "removal rate of enamel, and of what has no label", kPreston},
+    {"cut.threshold_n", "N", at<&CutSettings::threshold_n>, between(0, 3.3),
+     "force that cuts nothing yet", kPreston},
+    {"cut.friction", "", at<&CutSettings::friction>, between(0, 2),
+     "tangential over normal force of the bur", kPreston},
+
+    {"spindle.speed_krpm", "1000/min", at<&SpindleSettings::speed_krpm>, between(0, 500),
+     "without load; 0: it stands, and nothing is cut", kSpindle},
+    {"spindle.stall_torque_n_mm", "N mm", at<&SpindleSettings::stall_torque_n_mm>,
+     between(0.1, 1000), "at which it stands", kSpindle},
+    {"spindle.inertia_g_mm2", "g mm^2", at<&SpindleSettings::inertia_g_mm2>, between(0.01, 1000),
+     "of rotor and bur", kSpindle},
+
+    {"limits.force_n", "N", at<&LimitSettings::force_n>, between(0.01, 3.3),
+     "at the device; 3.3 is what an Omni can give"},
+    {"limits.continuous_force_n", "N", at<&LimitSettings::continuous_force_n>, between(0.01, 3.3),
+     "root mean square over time; at most force_n"},
+    {"limits.slew_n_per_ms", "N/ms", at<&LimitSettings::slew_n_per_ms>, between(0.001, 0.5),
+     "change of force; a larger jump is felt as a blow"},
+    {"limits.speed_mm_per_s", "mm/s", at<&LimitSettings::speed_mm_per_s>, between(1, 10000),
+     "of the hand; faster is a fault of the sensor"},
+
+    {"servo.rate_hz", "Hz", at<&ServoSettings::rate_hz>, between(kMinRateHz, kMaxRateHz),
+     "ticks per second"},
+    {"servo.numeric", "", at<&ServoSettings::numeric>, one_of(kNumericWords),
+     "numbers of the loop; fixed: the same bits on every machine"},
+    {"servo.kernel", "", at<&ServoSettings::kernel>, one_of(kGradientWords),
+     "how the gradient of density is estimated"},
+
+    {"hand.script", "", at<&SceneSettings::hand_script>, {},
+     "what the emulated hand does, from the scene's folder", {}, {.json = InJson::never}},
+};
+// clang-format on
+
+constexpr SceneTableRow kTables[] = {
+    {"volume", kMaxVolumes, "What is touched, cut and seen."},
+    {"tool", kMaxTools, "The first tool is in the hand at the start; a command changes it."},
+    {"material", kMaxMaterials, "What a label of a volume stands for."},
+    {"device", 0, "What is held, and where it is in the scene."},
+    {"force", 0, "How a touch becomes a force."},
+    {"cut", 0, "How material leaves (docs/cutting.md)."},
+    {"spindle", 0, "What turns the tool where force cuts; an air turbine."},
+    {"limits", 0, "What the hand is never given."},
+    {"servo", 0, "The loop."},
+    {"hand", 0, "Of the emulator."},
+};
+
+}  // namespace
+
+SceneKeys scene_keys() {
+  return kKeys;
+}
+
+std::span<const SceneTableRow> scene_tables() {
+  return kTables;
+}
+
+}  // namespace kerf

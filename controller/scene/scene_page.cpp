@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "controller/scene/scene_page.hpp"
+
+#include <algorithm>
+#include <array>
+#include <optional>
+#include <string_view>
+#include <variant>
+
+#include "controller/scene/scene_text.hpp"
+
+namespace kerf {
+namespace {
+
+constexpr std::string_view kHead =
+    "# Scene keys\n\n"
+    "Every key of a scene file (TOML). Made by `kerf-controller --scene-keys > "
+    "docs/scene-keys.md`\n"
+    "from the table in `controller/scene/scene_keys.cpp`; examples are in `scenes/`.\n";
+
+/// What may stand behind the equals sign, by the type of the slot.
+struct AllowedText {
+  const Allowed& allowed;
+
+  std::string operator()(const bool*) const { return "true, false"; }
+  std::string operator()(const int*) const { return "whole, " + range(); }
+  std::string operator()(const double*) const {
+    return range() + (allowed.words.empty() ? "" : ", or " + words());
+  }
+  template <class Text>
+  std::string operator()(const Text*) const {
+    return allowed.words.empty() ? "text" : words();
+  }
+  template <std::size_t N>
+  std::string operator()(const std::array<double, N>*) const {
+    return std::to_string(N) + " numbers, " + range();
+  }
+  std::string operator()(const VoxelGrid*) const { return "3 whole numbers, " + range(); }
+  template <class T>
+  std::string operator()(const std::optional<T>*) const {
+    return (*this)(static_cast<const T*>(nullptr));
+  }
+
+ private:
+  [[nodiscard]] std::string range() const {
+    return number_text(allowed.range.lo) + " to " + number_text(allowed.range.hi);
+  }
+  [[nodiscard]] std::string words() const {
+    std::string list;
+    for (const std::string_view word : allowed.words) {
+      list += (list.empty() ? "\"" : ", \"") + std::string(word) + '"';
+    }
+    return list;
+  }
+};
+
+std::string condition_text(const SceneCondition& condition) {
+  if (condition.key.empty()) return "";
+  return std::string(condition.is ? "; only with " : "; not with ") + std::string(condition.key) +
+         " = \"" + std::string(condition.word) + '"';
+}
+
+std::string row_of(const SceneKey& key) {
+  SceneParts parts;
+  std::string by_default(key.more.default_text);
+  if (by_default.empty()) by_default = written(value_of(key, parts));
+  if (!key.more.required_as.empty()) by_default = "required";
+  return "| `" + std::string(name_in_table(key)) + "` | " + std::string(key.unit) + " | " +
+         std::visit(AllowedText{key.allowed}, key.at(parts)) + " | " + by_default + " | " +
+         std::string(key.meaning) + condition_text(key.only_with) + " |\n";
+}
+
+/// The settings of the parts at hand.
+std::string lines_of(std::string_view table, SceneParts& parts, SceneKeys keys) {
+  std::string lines;
+  for (const SceneKey& key : keys_of(table, keys)) {
+    const std::string value = is_used(key, parts) ? written(value_of(key, parts)) : "";
+    if (!value.empty()) lines += std::string(key.name) + "=" + value + "\n";
+  }
+  return lines;
+}
+
+}  // namespace
+
+std::string scene_keys_page(SceneKeys keys) {
+  std::string page(kHead);
+  for (const std::string_view table : names_below("", keys)) {
+    const std::size_t limit = most_of(table);
+    const std::string name(table);
+    page += "\n## " +
+            (limit == 0 ? "[" + name + "]" : "[[" + name + "]], at most " + std::to_string(limit)) +
+            "\n\n";
+    const auto about = std::ranges::find(scene_tables(), table, &SceneTableRow::name);
+    if (about != scene_tables().end()) page += std::string(about->meaning) + "\n\n";
+    page += "| key | unit | value | default | meaning |\n|---|---|---|---|---|\n";
+    for (const SceneKey& key : keys_of(table, keys)) page += row_of(key);
+  }
+  return page;
+}
+
+std::string settings_text(const Scene& scene, SceneKeys keys) {
+  SceneParts parts{.scene = scene, .volume = {}, .tool = {}, .material = {}};
+  std::string text;
+  const auto add_each = [&](std::string_view table, const auto& list, auto& part) {
+    for (const auto& entry : list) {
+      part = entry;
+      text += lines_of(table, parts, keys);
+    }
+  };
+  for (const std::string_view table : names_below("", keys)) {
+    if (table == "volume") add_each(table, scene.volumes, parts.volume);
+    if (table == "tool") add_each(table, scene.tools, parts.tool);
+    if (table == "material") add_each(table, scene.materials, parts.material);
+    if (most_of(table) == 0) text += lines_of(table, parts, keys);
+  }
+  return text;
+}
+
+}  // namespace kerf

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+namespace kerf {
+
+/// One value as TOML writes it; empty: none, or one that no scene uses, such as a date.
+using TomlValue =
+    std::variant<std::monostate, bool, std::int64_t, double, std::string, std::vector<double>>;
+
+/// A value of a parsed file with its place, and what lies below it.
+struct TomlNode {
+  enum class Form : std::uint8_t { value, array, table };
+
+  std::string key;  ///< empty for the whole file and for an entry of an array
+  std::size_t key_line = 0, key_column = 0;
+  std::size_t line = 0;  ///< where the value begins
+  Form form = Form::table;
+  TomlValue value;                ///< of Form::value
+  std::vector<TomlNode> entries;  ///< of an array or a table, in the order of the file
+
+  /// What lies below a table at `key` or `key.key`; null where nothing does.
+  [[nodiscard]] const TomlNode* find(std::string_view path) const;
+};
+
+/// Throws SceneError `file:line:column: what; way out` where the text is no TOML. Load time.
+[[nodiscard]] TomlNode parse_toml(std::string_view text, const std::string& file);
+
+/// The value as one would write it in the file; empty for none.
+[[nodiscard]] std::string written(const TomlValue& value);
+/// The same of anything, cut where it is too long for a message.
+[[nodiscard]] std::string shown(const TomlNode& node);
+
+}  // namespace kerf

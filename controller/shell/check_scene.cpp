@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "controller/shell/check_scene.hpp"
+
+#include <cstdio>
+
+#include "controller/load/scene_load.hpp"
+#include "controller/plan/cost/work_budget.hpp"
+#include "controller/scene/scene_page.hpp"
+#include "controller/scene/scene_words.hpp"
+
+namespace kerf {
+
+std::string hand_lines(const LoadedScene& scene) {
+  char unit[64];
+  std::snprintf(unit, sizeof unit, "%.9g", hand_unit_mm(scene));
+  return "hand_unit_mm=" + std::string(unit) + "\nhand_script=" + scene.hand_script +
+         "\nrate_hz=" + std::to_string(scene.servo.rate_hz) + "\n";
+}
+
+void print_scene(const LoadedScene& scene, const SceneCosts& costs) {
+  std::printf("scene=%s\n", scene.path.c_str());
+  for (const SceneVolume& v : scene.volumes) {
+    const auto& g = v.image.grid;
+    const auto& h = v.image.spacing_mm;
+    std::printf("volume=%s %dx%dx%d spacing_mm=%g,%g,%g iso=%.4f solid=%d\n", v.name.c_str(), g.nx,
+                g.ny, g.nz, h[0], h[1], h[2], v.iso / kDensityMax, v.solid ? 1 : 0);
+  }
+  for (const SceneTool& t : scene.tools) {
+    std::printf("tool=%s %s samples=%zu pitch_mm=%g radius_mm=%g\n", t.name.c_str(),
+                t.shape.c_str(), t.offsets.size(), t.pitch_mm, t.radius_mm);
+  }
+  const auto& o = scene.device.offset_mm;
+  std::printf("workspace_scale=%g\noffset_mm=%g,%g,%g\n", scene.device.workspace_scale, o[0], o[1],
+              o[2]);
+  std::printf("force=%s\ncut=%s\n", std::string(word_of(scene.force.model)).c_str(),
+              std::string(word_of(scene.cut.model)).c_str());
+  std::printf("stiffness_at_device_n_per_mm=%g\n", device_stiffness_n_per_mm(scene));
+  const std::size_t costliest = costliest_tool(costs);
+  std::printf("costliest_tool=%s\nhighest_rate_hz=%d\n", scene.tools[costliest].name.c_str(),
+              highest_rate_hz(work_us(costs, costliest)));
+  std::fputs(hand_lines(scene).c_str(), stdout);
+  Scene settings;
+  static_cast<SceneSettings&>(settings) = scene;
+  settings.volumes = scene.volume_specs;
+  settings.tools = scene.tool_specs;
+  std::fputs(settings_text(settings).c_str(), stdout);
+}
+
+}  // namespace kerf

@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+
+#include "controller/load/loaded_scene.hpp"
+#include "controller/plan/scene_costs.hpp"
+
+namespace kerf {
+
+/// What the demo script hands to the emulator.
+[[nodiscard]] std::string hand_lines(const LoadedScene& scene);
+
+/// Prints what --check tells: whatever can be said without memory for the loop, one `name=value` a
+/// line, and then every setting in effect as `table.key=value`.
+void print_scene(const LoadedScene& scene, const SceneCosts& costs);
+
+}  // namespace kerf
