@@ -24,6 +24,7 @@ cited() {
     {
       read = prose($0)
       text = read
+      was_held = held
       if (held != "") {  # a citation that goes on in the next line
         sub(/^[ \t]*(\/\/\/?|#|\*)?[ \t]*/, "", text)
         text = held " " text
@@ -33,7 +34,7 @@ cited() {
         what = substr(text, RSTART, RLENGTH); text = substr(text, RSTART + RLENGTH)
         if (what ~ /\.md +[0-9]/) say("section", what)
         sub(/ .*/, "", what)
-        if (text !~ /^[A-Za-z0-9_{*]/) say("file", what)
+        if (what != was_held && text !~ /^[A-Za-z0-9_{*]/) say("file", what)
       }
       # A page without its end.
       if (match(read, /(^|[^a-z0-9-])[a-z]+-[a-z]+ [0-9]+\.[0-9]+/))
@@ -70,6 +71,7 @@ dangling=$({
     for (i = 1; i <= lines; ++i) {
       split(line[i], part, "\t")
       what = part[2]
+      if (seen[part[3] what]++) continue
       if (part[1] == "file") {
         sub(/^(\.\/|\/.*\/)/, "", what)
         if (!(what in ends)) print part[3] ": " what ": no such file"

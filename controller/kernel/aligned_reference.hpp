@@ -15,8 +15,8 @@
 
 namespace kerf {
 
-// The plan `aligned` by its definition, without tables: what every fast path must equal bit for
-// bit. Overlap and removal are those of overlap.hpp and milling.hpp. Fixed point only.
+// The definition of the plan `aligned` (docs/theory.md 7.6), without tables: every fast path has
+// these bits. Overlap and removal are those of overlap.hpp and milling.hpp. Fixed point only.
 
 /// The exact tap sum of a voxel, inside or outside the volume (density outside is 0): its gradient
 /// times 2^shift / factor. At most kMaxExactGradient.

@@ -13,7 +13,7 @@ namespace kerf {
 
 /// SUM over tool samples i of SUM over the corners c of its cell of w_ic g_c: the interpolated
 /// gradients added up, in density steps per voxel times kWeightOne. The paper's contact force is
-/// minus this, scaled by p0 a^3.
+/// minus this, scaled by p0 a^3 (docs/theory.md 7.1).
 ///
 /// A sample whose cell is not wholly inside the volume counts nothing. `field` holds one gradient
 /// per voxel. Fixed: nothing is rounded but the weights, so the order of samples does not matter;

@@ -10,21 +10,21 @@
 
 namespace kerf {
 
-// How a budget leaves the voxels that a tool covers.
-
-// The part of a step is rounded up or down by a phase that goes through the voxels and the ticks
-// along two irrational ways (those of the plastic number), so that it evens out in every voxel
-// and every tick. Rounding to the nearest would stall slow cutting.
+// How a budget leaves the voxels that a tool covers (docs/theory.md 6.2).
+//
+// A voxel loses whole density steps. Fractions are rounded up or down by a phase that advances by
+// one irrational number from voxel to voxel and by another from tick to tick (powers of the plastic
+// number), so that they even out along both. Rounding to the nearest would stall slow cutting.
 inline constexpr std::uint16_t kPhaseByVoxel = 49471, kPhaseByTick = 37345;  // of 2^16
 
-/// Density steps that left, by material, and where.
+/// Density steps that left, by material, and the box of voxels that changed: empty if none did.
 struct TakenSteps {
   ByMaterial<std::uint64_t> steps{};
   VoxelBox changed;
   bool full = false;  ///< some voxel had less to give than its part
 };
 
-/// Weights of what is still covered, by material.
+/// Weighs again what is still covered after a `take`.
 template <class N>
 constexpr void weigh_again(CoveredVoxels<N>& covered) noexcept {
   covered.weight = {};
@@ -36,7 +36,8 @@ constexpr void weigh_again(CoveredVoxels<N>& covered) noexcept {
 
 namespace detail {
 
-/// Whole density steps of `wanted` leave the voxel; `full` is set when it has not so much.
+/// Takes `wanted` steps, at most what is covered, from a voxel; returns how many whole ones left.
+/// Sets `full` where the voxel had less to give.
 template <class N>
 constexpr Density take_from(CoveredVoxel<N>& voxel, typename BudgetPerWeight<N>::Steps wanted,
                             std::uint16_t tick_phase, Density& rho, bool& full) noexcept {
@@ -63,7 +64,8 @@ constexpr Density take_from(CoveredVoxel<N>& voxel, typename BudgetPerWeight<N>:
 
 }  // namespace detail
 
-/// Takes what the weights of the voxels cost from the volume; `phase` of this tick's rounding.
+/// Takes from each voxel its weight times the `price` of its material, in density steps; `phase` is
+/// that of this tick's rounding.
 template <class N>
 constexpr TakenSteps take(CoveredVoxels<N>& covered, const ByMaterial<BudgetPerWeight<N>>& price,
                           std::uint16_t phase, std::span<Density> density) noexcept {

@@ -9,12 +9,12 @@
 
 namespace kerf {
 
-/// What the turning tool's surface does to hand and spindle: F_t = mu F_n against omega x r. Made
-/// by `cutting_friction`.
+/// What the turning tool's surface does to hand and spindle: F_t = mu F_n against omega x r
+/// (docs/theory.md 6.5). Made by `cutting_friction`.
 template <class N>
 struct FrictionPlan {
   typename N::Real coefficient{};  ///< F_t / F_n
-  typename N::Unit approach{};     ///< of the low-pass: part of the way done in one tick
+  typename N::Unit approach{};     ///< of the low-pass: share of the difference made up in a tick
 };
 
 /// Time constant of the low-pass, 32 Hz: slower than the steps that single voxels make, faster than
@@ -32,7 +32,7 @@ class CuttingFriction {
  public:
   using Real = typename N::Real;
 
-  /// A contact of `normal_force_n` whose surface moves as `drag` tells.
+  /// A contact of `normal_force_n` whose surface moves as `drag` says.
   constexpr void add(const FrictionPlan<N>& plan, Real normal_force_n,
                      const SurfaceDrag<N>& drag) noexcept {
     const Real friction_n = plan.coefficient * normal_force_n;

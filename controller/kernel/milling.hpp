@@ -18,7 +18,8 @@ namespace kerf {
 // Force comes first: `modification_sum` sees the density and the gradients from before the removal.
 
 /// SUM over voxels j with r_j > 0 and density > 0 of r_j G_j, G the stored gradient: in density
-/// steps per voxel times kWeightOne. The modification force is minus this, scaled by p1 V_voxel.
+/// steps per voxel times kWeightOne. The modification force is minus this, scaled by p1 V_voxel
+/// (docs/theory.md 7.4).
 ///
 /// Fixed: exact, 2^30 per voxel leaves room for 2^33 voxels. Floating: x, then y, then z.
 template <class N>

@@ -29,7 +29,7 @@ namespace kerf {
 template <class N>
 struct PrestonPlan {
   ByMaterial<ForceRate<N>> rate{};
-  ByMaterial<bool> forbidden{};   ///< never cut, and told when pressed upon
+  ByMaterial<bool> forbidden{};   ///< never cut; a press on it is reported
   std::span<const Label> labels;  ///< one per voxel, or empty
 };
 

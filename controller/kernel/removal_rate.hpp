@@ -10,8 +10,9 @@
 
 namespace kerf {
 
-/// What one tick removes of a voxel with overlap ratio r: the fraction r * min(1, kT), or
-/// 1 - exp(-r kT) in the exact form, whose result after a given time does not depend on the rate.
+/// What one tick removes of a voxel with overlap ratio r (docs/theory.md 7.5): the fraction r *
+/// min(1, kT), or 1 - exp(-r kT) in the exact form, whose result after a given time does not depend
+/// on the rate.
 ///
 /// Fixed: the fraction at r = 1 is `mantissa` 2^-(15 + exponent). The exact form bends r by a table
 /// of f(r) / f(1) with linear steps between 257 entries: within kT^2 / (8 * 256^2) / f(1) and two

@@ -8,18 +8,19 @@
 
 namespace kerf {
 
-/// The motor that turns the tool: J d(omega)/dt = tau_motor - tau_load, with the straight line of a
-/// turbine, tau_motor = tau_stall (1 - n / n_free). Constant during a run; made by `spindle_plan`.
+/// The motor that turns the tool (docs/theory.md 6.5): J d(omega)/dt = tau_motor - tau_load, with
+/// the straight line of a turbine, tau_motor = tau_stall (1 - n / n_free). Constant during a run;
+/// made by `spindle_plan`.
 template <class N>
 struct SpindlePlan {
   typename N::Unit free_ratio{};      ///< n_free / n_ref, below 2
   typename N::Real loads_per_n_mm{};  ///< 1 / tau_stall
-  typename N::Unit approach{};        ///< part of the way to the resting speed done in one tick
+  typename N::Unit approach{};  ///< share of the difference to the resting speed made up in a tick
 };
 
 /// `free_ratio` 0..1.9, positive torque in N mm; `run_up_s` = J omega_free / tau_stall is the time
-/// constant. The part 1 - exp(-T / run_up) of the way makes the speed after a given time the same
-/// at every rate. Load time.
+/// constant. A tick makes up 1 - exp(-T / run_up) of the difference, so the speed after a given
+/// time is the same at every rate. Load time.
 template <class N>
 [[nodiscard]] SpindlePlan<N> spindle_plan(double free_ratio, double stall_torque_n_mm,
                                           double run_up_s, double tick_s) {
@@ -35,7 +36,7 @@ struct SpindleState {
       load{};  ///< torque over the stall torque, 0..kMaxSpindleLoad; from 1 on it stalls
 };
 
-inline constexpr int kMaxSpindleLoad = 100;  ///< what is more is told as that
+inline constexpr int kMaxSpindleLoad = 100;  ///< a larger load counts as that
 
 /// One tick under a torque >= 0. The speed goes to n_free (1 - load), where motor and load agree,
 /// and stays at 0 when the load is more than the motor has: friction brakes, it does not turn back.

@@ -9,7 +9,7 @@
 
 namespace kerf {
 
-/// How the tool's surface moves over what it touches, averaged by the part covered. Burs turn
+/// Mean motion of the tool's surface over what it touches, weighted by the part covered. Burs turn
 /// clockwise as seen from the shaft, which lies along +y.
 template <class N>
 struct SurfaceDrag {

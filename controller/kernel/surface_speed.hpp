@@ -37,7 +37,7 @@ inline constexpr std::array<std::uint32_t, kRootSteps + 1> kSpeedRoots = [] {
 inline constexpr std::int64_t kSteepestStep = std::int64_t{64} << 20;
 
 /// Where voxels lie beside the spindle's axis, which is the tool's y, in rim radii: what speed the
-/// tool's surface has there, and which way it moves. Made once per tick, tool and volume.
+/// tool's surface has there, and in which direction it moves. Made once per tick, tool and volume.
 ///
 /// Fixed: places with 20 fraction bits from steps rounded once, so a place 100 voxels away is off
 /// by 1e-4 at most; speeds within 2e-4 of the rim's.
@@ -125,7 +125,7 @@ class SpindleFrame {
 
   [[nodiscard]] constexpr Sum beside(const std::array<Step, 3>& across,
                                      VoxelIndex v) const noexcept {
-    if constexpr (N::kIsFixed) {  // Q20 * Q16: steps up to 2^26, ways below 2^25
+    if constexpr (N::kIsFixed) {  // Q20 * Q16: steps up to 2^26, distances below 2^25
       const auto term = [](Step step, std::int32_t at, Q16 centre) {
         return std::int64_t{step} * ((std::int64_t{at} << 16) - centre.raw());
       };

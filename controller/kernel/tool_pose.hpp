@@ -15,10 +15,11 @@ namespace kerf {
 template <class N>
 using SumVec = VoxelVec<typename N::Sum>;
 
-/// Where the tool is in one volume: sample i lies at `centre_vox + step * offset_i / 2`.
+/// Where the tool is in one volume: sample i lies at `centre_vox + step * offset_i / 2`, since
+/// offsets are in half pitches.
 ///
-/// `step[a][b]` is the way along voxel axis a per tool pitch along tool axis b: rotation times
-/// pitch over spacing, Q11.20 in fixed. Made once per tick and volume.
+/// `step[a][b]` is the displacement along voxel axis a for one pitch along tool axis b: rotation
+/// times pitch over spacing, Q11.20 in fixed. Made once per tick and volume.
 template <class N>
 struct ToolPose {
   VoxelVec<typename N::Real> centre_vox;

@@ -7,7 +7,7 @@
 
 namespace kerf {
 
-/// A share of the tool's reach as the shell's tables hold it; fixed: Q0.15.
+/// An offset over the tool's reach, as PointTable holds it; fixed: Q0.15.
 template <class N>
 [[nodiscard]] PointNumber<N> sample_offset(double share) {
   if constexpr (N::kIsFixed) {

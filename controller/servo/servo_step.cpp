@@ -142,7 +142,7 @@ std::uint64_t hash_of(std::uint64_t hash, const ServoOutput& out,
   return fnv1a_step(hash, static_cast<std::uint64_t>(out.phase) << 1 | (out.motors_on ? 1U : 0U));
 }
 
-/// What the device told in this tick.
+/// What the device reported in this tick.
 template <class N>
 struct Sensed {
   DevicePose<N> pose;

@@ -10,8 +10,9 @@
 
 namespace kerf {
 
-/// Turns an exact sum of weighted gradients (voxel axes) into a force at the device port (N): one
-/// matrix that holds pressure, sample volume, voxel size, rotation and workspace scale.
+/// Turns an exact sum of weighted gradients (voxel axes; docs/theory.md 7) into a force at the
+/// device port (N): one matrix that holds pressure, sample volume, voxel size, rotation and
+/// workspace scale.
 ///
 /// Floating point: a plain matrix.
 template <class N>

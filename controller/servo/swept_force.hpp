@@ -14,12 +14,13 @@ template <class N>
 struct SweptForce {
   DeviceVec<typename N::Real> force_n;      ///< of the coupling, before any limit
   WorldVec<typename N::Real> offset_mm;     ///< from the hand's tip to the proxy's
-  DeviceVec<typename N::Real> torque_n_mm;  ///< about the tip, axes of the device
+  DeviceVec<typename N::Real> torque_n_mm;  ///< of the contact about the tool's centre
   ToolContact<N> tool;
 };
 
-/// The proxy of the active tool follows the hand; the coupling pulls the hand to it. A tool that is
-/// round, or that does not turn, keeps the world's axes. Servo thread; at most 32 queries.
+/// One tick: the proxy of the active tool follows the hand, the coupling pulls the hand to the
+/// proxy (docs/theory.md 4, 5.1). `rotation` turns the tool, unless it is round or keeps the
+/// world's axes. Servo thread; at most 32 queries; writes only `state.contact`.
 template <class N>
 [[nodiscard]] SweptForce<N> feel_swept(const ServoPlan<N>& plan, ServoState<N>& state,
                                        WorldVec<typename N::Real> tip_mm,

@@ -24,10 +24,10 @@ struct VelocityPlan {
 /// What reports call it.
 inline constexpr const char* kVelocityEstimator = "FOAW, best fit over at most 16 intervals";
 
-/// Velocity of the tip by first-order adaptive windowing (Janabi-Sharifi, Hayward, Chen 2000): on
-/// each axis the longest window of at most 16 intervals in which the line through the newest sample
-/// with the least-squares slope misses no sample by more than twice `noise_mm`: both the sample and
-/// the newest may be off by it, so a steady hand never shortens its window. Long windows keep the
+/// Velocity of the tip by first-order adaptive windowing (docs/theory.md 5.2): on each axis the
+/// longest window of at most 16 intervals in which the line through the newest sample with the
+/// least-squares slope misses no sample by more than twice `noise_mm`: both the sample and the
+/// newest may be off by it, so a steady hand never shortens its window. Long windows keep the
 /// encoder's steps out of the damping; short ones where the hand turns round keep the lag small.
 ///
 /// The slope over i intervals of samples y_k (newest) .. y_{k-i} is

@@ -120,23 +120,23 @@ half a voxel larger than the tool's, at steps of a quarter to a whole voxel: the
 constexpr const char* kAbout = R"(# Accuracy
 
 Made by `./kerf lab accuracy --page docs/accuracy.md`; every figure comes from one run, nothing is typed
-by hand. But for the times a run repeats bit for bit on one machine. `--csv` writes all figures, each
-metric on each shape; `--report` the same as JSON.
+by hand. On one machine a run repeats bit for bit, but for the times. `--csv` writes all figures, each metric on each
+shape; `--report` writes the same as JSON.
 
-One knob of the contact force is turned at a time. The others stay at the standard, in bold: Q15 weights,
-tool pitch = voxel, `farid` gradients stored as int16, trilinear, voxels of 0.125 mm in 128^3. A ball of
-0.625 mm radius touches six shapes, at 100 places each and at depths up to its radius: a plane at 100 tilts, a
+One setting of the paper's contact force (docs/theory.md 7.1) is changed at a time. The others stay at the standard,
+in bold: Q15 weights, tool pitch = voxel, `farid` gradients stored as int16, trilinear, voxels of 0.125 mm in 128^3. A
+ball of 0.625 mm radius touches six shapes, at 100 places each and at depths up to its radius: a plane at 100 tilts, a
 ball, a torus, a plate as thin as two voxels, a groove of 90 degrees, a ball of enamel around dentin.
 
 Truth is the shape itself with sharp faces: F = -p0 SURFINT rho n dA over the tool's surface, exact to 1e-4.
-Forces are shares of full scale, p0 pi R^2. `direction` is the angle to the force of theory, where
-that has a tenth of full scale. `loop` is |SUM dW| / SUM |dW| around tilted circles of 0.375 mm, of one
-sample or of the whole tool: what a static tooth gives or takes in a closed path, where it should give nothing.
-`rms` and `max` are over all shapes unless said otherwise. Times are of one tick of the tool without
-milling, `us p50` and `p99`, on the fastest kernels of this machine where the servo has them: Q15 in the plans
-`gather`, `aligned` and `splat`. Float and double are the servo's templates. Times in brackets are of plain text
-of the lab (Q8, Q12, splines, other interpolations than trilinear): it shows what these would give, not what
-they would cost, so compare them with no other time.
+Forces are shares of full scale, p0 pi R^2. `rms` and `max` are over all shapes unless said.
+
+* `direction`: the angle to the force of theory, where that has a tenth of full scale.
+* `loop`: |SUM dW| / SUM |dW| around tilted circles of 0.375 mm, of one sample or of the whole tool. It is the work that
+  a static tooth gives or takes on a closed path, and should be nothing.
+* `us p50`, `p99`: times of one tick of the tool without milling. Where the servo has fast kernels they run: Q15 in the
+  plans `gather`, `aligned` and `splat`. Float and double are the servo's templates. Times in brackets are of plain
+  loops of the lab (Q8, Q12, splines, other interpolations): compare them with no other time.
 
 )";
 

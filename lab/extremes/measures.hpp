@@ -7,7 +7,7 @@
 // in voxels of 0.1 mm and at 1 kHz unless said. All but the ticks' times repeat bit for bit.
 namespace kerf::extremes {
 
-/// F7: random motions at walls.
+/// F7 (docs/validation.md): random motions at walls.
 void measure_walls(const Effort& effort, const RowSink& add_row);
 /// F9: where a ball comes to rest, against the ideal solid, and on sharp edges against the volume's
 /// own iso-surface.

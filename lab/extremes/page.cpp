@@ -12,14 +12,14 @@ namespace {
 constexpr const char* kAbout = R"(# Contact
 
 Made by `./kerf lab extremes --page docs/contact.md`; every figure comes from one run, nothing is typed by
-hand. But for the times of ticks a run repeats bit for bit. `--report` writes the rows as JSON, `--only` measures
-some groups of them, and the command exits with 1 where a limit is not kept.
+hand. A run repeats bit for bit, but for the times of ticks. `--report` writes the rows as JSON, `--only` measures
+some groups of them. The command exits with 1 where a limit is not kept.
 
-The swept proxy (`[force] model = "proxy"`) keeps the whole tool out of the solid and pulls the hand to it by a
-spring; the paper's force (`"paper"`) adds up the density's gradient where the tool is. Both are measured as the
-servo runs them: fixed point, the fastest kernels of this machine. A voxel is 0.1 mm, a tick 1 ms and the tool a
-ball of 16 voxels unless said; density rises over two voxels at a face. What is tested in fixed point and in double
-is listed in validation.md.
+The swept proxy (`[force] model = "proxy"`) keeps the whole tool out of the solid, and a spring pulls the hand to
+it. The paper's force (`"paper"`) is the sum of the density's gradients inside of the tool. docs/theory.md derives
+both. They are measured as the servo runs them: in fixed point, by the fastest kernels of this machine. Unless said,
+a voxel is 0.1 mm, a tick 1 ms, the tool a ball of 16 voxels, and a face is a ramp of density over two voxels.
+docs/validation.md lists what is tested in fixed point and in double.
 
 )";
 
@@ -27,18 +27,19 @@ constexpr const char* kCompared = R"(## The paper's force and the swept proxy
 
 ![Both forces on the same motions](%s)
 
-A hand that presses on loses the paper's force. It grows with the area in touch, here to %s N, and ends where the
-ball is wholly inside; behind a wall of two voxels it pushes onward. Of a press of 3 mm it holds nothing back on %s mm
-in the thick wall and %s mm at the thin one. The proxy stays in front, and its force grows with the depth.
+The paper's force gives way to a hand that presses on. It grows with the area in touch, here to %s N, and ends where
+the ball is wholly inside; behind a wall of two voxels it pushes onward. A press of 3 mm meets no resistance along %s mm
+of it in the thick wall and %s mm at the thin one. The proxy stays in front, and its force grows with the depth.
 
-A stroke whose step is wider than the zone of force can pass the face between two ticks. From these speeds on some
-phase of the ticks is unfelt; the proxy was tried up to the 10 m/s at which the supervisor stops every hand.
+A stroke whose step in a tick is longer than the zone of force can pass the face between two ticks. From the speeds
+below on that happens for some phase of the ticks. The proxy was tried up to 10 m/s, at which the supervisor stops
+every hand.
 
 | update rate | paper, %s | paper, %s | proxy, both |
 |---:|---:|---:|---:|
 %s
-On a slide over a smooth ball both are smooth: at 50 mm/s the force steps by %s %% (paper) and %s %% (proxy) of its
-mean, within %s and %s degrees of the normal.
+Both slide smoothly over a ball: at 50 mm/s the force changes by at most %s %% (paper) and %s %% (proxy) of its mean
+from tick to tick, and stays within %s and %s degrees of the normal.
 
 )";
 
@@ -49,35 +50,36 @@ struct About {
 };
 constexpr About kGroups[] = {
     {"walls", "Walls",
-     R"(Random steps of 0.1 to 10 m/s at a tilted wall, the cylinder and the bur of `scenes/fluted_bur.toml` turned at
-random too; no supervisor.)"},
+     R"(A hand makes random steps of 0.1 to 10 m/s at a tilted wall. The cylinder and the bur of `scenes/fluted_bur.toml` are
+also turned at random. There is no supervisor. A probe is one collision query.)"},
     {"rests", "Where a ball comes to rest",
-     R"(Against the ideal solid, tilted anyhow; on edges against the volume's own iso-surface, since trilinear
-density holds no sharp edge.)"},
+     R"(Offsets from the ideal solid at random tilts. On edges from the volume's own iso-surface, since trilinear density
+holds no sharp edge.)"},
     {"slides", "Slides",
-     R"(The step is of the force from tick to tick over its mean; that of the direction alone is 1.04 % at R 40 and
-4.5 % at R 14, where the limit is 0.08 N or twice the mean. `CT` has edges blurred by a deviation of one voxel, and noise of 2 %.)"},
+     R"(The step is the change of the force from tick to tick over its mean. The turning of the normal alone makes 1.04 % at
+R 40 and 4.5 % at R 14; there the limit is 0.08 N or twice the mean. `CT` has edges blurred by a deviation of one voxel,
+and noise of 2 %.)"},
     {"shapes", "Tools that are no balls",
-     R"(At rest on flats of any tilt and on sharp edges of 90 degrees, these against the volume's own iso-surface; and
-sliding at 50 mm/s over a ball of R 40, 2 deep. Limits are 1.5 times those of the ball, on CT too. There a rim
-or a point misses them: it touches in one place, where the noise of one voxel makes waves of the surface itself, and
-a ball's height and normal are the means of some fifty samples. `exact contact` is height and normal of
-the same iso-surface where the tool's close samples touch it at the ideal place, the normal over half a voxel: what
-a contact without any mean begins with.)"},
+     R"(At rest on flats of any tilt and on sharp edges of 90 degrees, the edges against the volume's own iso-surface; and
+sliding at 50 mm/s over a ball of R 40, 2 voxels deep. Limits are 1.5 times those of the ball.
+
+On CT with noise a rim or a point misses them. It touches in one place, where the noise of one voxel makes waves of
+the surface itself; a ball's height and normal are means of some fifty samples. `exact contact` shows that surface:
+height and normal of the iso-surface where the tool's close samples touch it at the ideal place, the normal over half a
+voxel. A contact without any mean would feel this.)"},
     {"cutting", "Cutting by force",
-     R"(The whole servo with `[cut] model = "preston"`: a ball of radius 1 mm, led by hand over a flat; pressed on it
-with the same force, up to 1.2 N and back, whatever gives way; and sunk into a crown at the rate of enamel,
-the worst of nine places. `GE tooth` is a real one by CT, below `--data` or `$KERF_DATA`.)"},
+     R"(The whole servo with `[cut] model = "preston"` and a ball of radius 1 mm. It is led by hand over a flat; pressed on it
+with a force that goes up to 1.2 N and back, however far the flat gives way; and sunk into a crown at the rate of
+enamel, at the worst of nine places. `GE tooth` is a real tooth by CT, below `--data` or `$KERF_DATA`.)"},
     {"ticks", "Ticks",
-     R"(On 256 x 256 x 161 voxels. The costliest tick of each tool is looked for among thousands, at flat, sharp, hollow
-and noisy solids, in a slot with a play of 0.1 voxels, in tissue just below the iso and, where its data are, at the
-GE tooth, with goals near and far and places looked for anew. Those that took longest are repeated from the same
-state, and the fastest repetition counts; where it was found is told.)"},
+     R"(On 256 x 256 x 161 voxels. The costliest tick of each tool is searched among thousands: at flat, sharp, hollow and
+noisy solids, in a slot with a play of 0.1 voxels, in tissue just below the iso and, where its data are, at the GE
+tooth; with goals near and far, and from the start search. The ticks that took longest are repeated from the same
+state, and the fastest repetition counts. The row says where the tick was found.)"},
     {"hands", "Hands",
-     R"(An emulated Omni, its driver and the whole servo in virtual time, `scenes/touch.toml`; `groove` and
-`cut_cavity` with `[cut] model = "preston"`. Force above 150 Hz
-is rms, by windows of 0.128 s wholly in contact. A count of an encoder is up to 0.06 mm, or 0.024 N.
-The second stab of `jerk` goes beside the crown.)"},
+     R"(An emulated Omni, its driver and the whole servo in virtual time, with `scenes/touch.toml`; `groove` and `cut_cavity`
+have `[cut] model = "preston"`. Force above 150 Hz is the rms over windows of 0.128 s that are wholly in contact. One
+count of an encoder is up to 0.06 mm, or 0.024 N. The second stab of `jerk` misses the crown.)"},
 };
 
 std::string number(double value) {

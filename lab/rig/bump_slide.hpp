@@ -29,7 +29,7 @@ struct SlideFigures {
 
 inline constexpr double kSlideRadius = 8;
 
-/// A bump in a cube of 60, turned any way, and the hand's way over it.
+/// A bump in a cube of 60, turned at random, and the path of the hand over it.
 class Bump {
  public:
   Bump(const BumpSlide& slide, Dice& dice) : slide_(slide), frame_(dice, {28, 28, 28}) {
@@ -45,7 +45,7 @@ class Bump {
     const double r = slide_.bump + kSlideRadius - depth;
     return frame_.at(r * std::sin(angle), r * std::cos(angle), 0);
   }
-  /// Angles from -end to end, `step` apart on the way of the ball's centre.
+  /// Angles from -end to end, `step` apart on the path of the ball's centre.
   [[nodiscard]] double end() const { return std::min(0.6, 7 / slide_.bump); }
   [[nodiscard]] double angle_step() const { return slide_.step / (slide_.bump + kSlideRadius); }
 

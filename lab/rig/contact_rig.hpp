@@ -43,8 +43,8 @@ template <class N>
   return frame;
 }
 
-/// One tool among bodies, felt by the servo's own query; unless said on the fastest kernels of this
-/// machine. The bodies stay the caller's.
+/// One tool among bodies, felt by the servo's own collision query: on the fastest kernels of this
+/// machine unless said. The caller keeps the bodies.
 template <class N>
 class ContactRig {
  public:
@@ -57,7 +57,7 @@ class ContactRig {
   ContactRig& operator=(const ContactRig&) = delete;
 
   void add(const Body& body, const ContactFrame<N>& frame, Density iso = kIso) {
-    constexpr Density kFeltShare = 8;  // what is fainter than this part of the iso is not felt
+    constexpr Density kFeltShare = 8;  // a density below this part of the iso is not felt
     maps_.emplace_back(body.grid, body.density, static_cast<Density>(iso / kFeltShare));
     memories_.emplace_back().hold(shell_);
     volumes_.push_back({{body.grid, body.density.data(), density_scale(iso), maps_.back().bricks()},

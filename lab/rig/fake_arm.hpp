@@ -52,7 +52,7 @@ inline constexpr int kDockTicks = 60;  ///< enough rest in the inkwell to be cal
 /// Docks, leaves the inkwell, waits there until the force is faded in.
 inline void arm_at(Servo& servo, FakeArm& arm, double x_mm, double y_mm, double z_mm) {
   for (int tick = 0; tick < kDockTicks; ++tick) static_cast<void>(servo.step(arm.docked()));
-  // The way from the inkwell is slow enough for the speed limit: held far away, then close.
+  // The move from the inkwell is slow enough for the speed limit: held far away, then close.
   constexpr int kSteps = 200;
   const OmniArm geometry;
   const auto& d = omni::kDockRad;

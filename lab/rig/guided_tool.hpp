@@ -8,7 +8,7 @@
 
 namespace kerf::extremes {
 
-/// A tool in a body, led by a hand that goes where it wants: open loop.
+/// A tool in a body, guided open loop: the hand goes where it wants, whatever the force.
 template <class N>
 class GuidedTool {
  public:

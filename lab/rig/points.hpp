@@ -70,7 +70,7 @@ class Dice {
   std::mt19937_64 random_;
 };
 
-/// A place and three directions at right angles: a measurement turned any way.
+/// A place and three directions at right angles: a measurement turned at random.
 struct Frame {
   Point place, up, along, across;
 

@@ -17,7 +17,8 @@ struct PowerSums {
   typename N::Sum weight{}, density{}, offset[3]{};  ///< SUM t^p, SUM t^p t, SUM t^p offset
 };
 
-/// What a closeup (contact_closeup.hpp) sums over its samples. All 0 where every sample is faint.
+/// What a closeup (contact_closeup.hpp) sums over its samples. Where every sample is faint only
+/// `top` is set.
 template <class N>
 struct CloseSums {
   static constexpr int kLowPower = 32, kHighPower = 64;

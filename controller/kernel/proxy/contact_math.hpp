@@ -68,7 +68,7 @@ template <class N>
   }
 }
 
-/// The direction of a vector; none of one that is shorter than a few steps of Q15.16.
+/// The direction of a vector; 0 where it is shorter than 1e-4, some steps of Q15.16.
 template <class N>
 [[nodiscard]] constexpr ContactVec<typename N::Unit> direction_of(
     ContactVec<typename N::Real> v) noexcept {
@@ -78,7 +78,7 @@ template <class N>
   return {share<N>(v.x, length), share<N>(v.y, length), share<N>(v.z, length)};
 }
 
-/// The direction of a small turn; none below 1e-6.
+/// The direction of a small turn; 0 below 1e-6.
 template <class N>
 [[nodiscard]] constexpr ContactVec<typename N::Unit> direction_of_turn(
     ContactVec<typename N::Unit> v) noexcept {

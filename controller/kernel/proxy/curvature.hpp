@@ -74,7 +74,8 @@ class CurvatureEstimate {
   }
 
  private:
-  static constexpr double kSkew = 0.3;  ///< cosine to a step above which the rest of a turn tells
+  static constexpr double kSkew =
+      0.3;  ///< least cosine to the step at which the rest of a turn counts
 
   constexpr void forget() noexcept { first_ = second_ = last_ = {}; }
 

@@ -52,7 +52,7 @@ class StartSearch {
     const Contacts<N> felt = field.query(centre);
     return !felt.buried && felt.depth <= Real(SweepRules::kTolerance);
   }
-  /// `distance_` along the way-th of the 27 directions of a 3x3x3 cube.
+  /// `distance_` along one of the 27 directions of a 3x3x3 cube, by number.
   [[nodiscard]] constexpr Place step(int direction) const noexcept {
     constexpr double kPerAxis[4] = {0, 1, 0.7071067811865476, 0.5773502691896258};
     const int x = direction % 3 - 1, y = direction / 3 % 3 - 1, z = direction / 9 - 1;

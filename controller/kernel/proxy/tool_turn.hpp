@@ -81,8 +81,8 @@ template <class N>
   return {xz / z, yz / z, z, wz / z};
 }
 
-/// From `now` the short way to `goal`, by at most twice the angle whose sine is `half_sine` (0 to
-/// 1/2). Arrives exactly.
+/// From `now` along the shorter arc towards `goal`, by at most twice the angle whose sine is
+/// `half_sine` (0 to 1/2). Arrives exactly.
 template <class N>
 [[nodiscard]] constexpr ToolTurn<N> turned_towards(const ToolTurn<N>& now, const ToolTurn<N>& goal,
                                                    typename N::Unit half_sine) noexcept {

@@ -5,7 +5,7 @@
 
 #include "controller/kernel/cover_table.hpp"
 
-// Internal linkage, for the reason told at KernelSet.
+// Internal linkage, for the reason given at KernelSet.
 
 namespace kerf {
 namespace {

@@ -7,7 +7,7 @@
 #include "controller/kernel/sets/cover_begin.hpp"
 
 // What a group of voxels under the tool weighs and loses (docs/theory.md 6.2), as plain loops: the
-// definition. cover_lanes_vector.hpp has the same bits. Internal linkage, for the reason told at
+// definition. cover_lanes_vector.hpp has the same bits. Internal linkage, for the reason given at
 // KernelSet.
 
 namespace kerf {

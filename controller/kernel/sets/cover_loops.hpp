@@ -9,7 +9,7 @@
 
 // Weighing and cutting what a tool covers, with the bits of `covered_voxels` and of the list's
 // `take`: one text for every instruction set, as loops that a compiler turns into vectors. Included
-// after the set's `weigh_lanes` and `take_lanes`; internal linkage, for the reason told at
+// after the set's `weigh_lanes` and `take_lanes`; internal linkage, for the reason given at
 // KernelSet.
 
 namespace kerf {

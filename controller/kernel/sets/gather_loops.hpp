@@ -7,8 +7,7 @@
 #include "controller/kernel/sets/sample_place.hpp"
 #include "shared/volume/voxel_grid.hpp"
 
-// Contact of the plan `gather` as plain loops; internal linkage, for the reason told at
-// KernelSet.
+// Contact of the plan `gather` as plain loops; internal linkage, for the reason given at KernelSet.
 
 namespace kerf {
 namespace {

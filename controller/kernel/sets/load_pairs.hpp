@@ -7,7 +7,7 @@
 #include <immintrin.h>
 
 // Pairs of densities from anywhere, for AVX2 and AVX-512, by single loads: a gather takes twice as
-// long on Zen 4. Internal linkage, for the reason told at KernelSet.
+// long on Zen 4. Internal linkage, for the reason given at KernelSet.
 
 namespace kerf {
 namespace {

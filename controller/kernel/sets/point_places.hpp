@@ -7,7 +7,7 @@
 #include "controller/kernel/point_shell/point_table.hpp"
 
 // Places of a point shell as loops that a compiler turns into vectors, one text for every
-// instruction set; internal linkage, for the reason told at KernelSet.
+// instruction set; internal linkage, for the reason given at KernelSet.
 
 namespace kerf {
 namespace {

@@ -8,7 +8,7 @@
 
 // Places and weights of samples as loops that a compiler turns into vectors. Included by the
 // translation units of the instruction sets only; all of it has internal linkage, for the reason
-// told at KernelSet.
+// given at KernelSet.
 
 namespace kerf {
 namespace {

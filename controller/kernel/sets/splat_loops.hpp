@@ -10,7 +10,7 @@
 
 // The plan `splat` as loops that a compiler turns into vectors, one text for every instruction set.
 // Included after the set's own `filter_z`, `press_row` and `RowSums`; internal linkage, for the
-// reason told at KernelSet.
+// reason given at KernelSet.
 
 namespace kerf {
 namespace {

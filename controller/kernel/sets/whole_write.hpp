@@ -4,8 +4,8 @@
 #include <cstddef>
 #include <cstdint>
 
-// For instruction sets that cannot store a vector in part. Internal linkage, for the reason told at
-// KernelSet.
+// For instruction sets that cannot store a vector in part. Internal linkage, for the reason given
+// at KernelSet.
 
 namespace kerf {
 namespace {

@@ -131,7 +131,7 @@ template <class N>
   }
 
   // A rod bears force along itself only: with f_i its force, F = SUM f_i rod_i, so f_i = g_i . F;
-  // and it pulls its crank with the part of rod_i along the knee's way.
+  // and it pulls its crank with the part of rod_i along the knee's motion.
   ForwardKinematics<N> pose;
   pose.tip_mm = {grip.x, grip.y, grip.z - arm.origin_depth_mm};
   for (std::size_t i = 0; i < 3; ++i) {
