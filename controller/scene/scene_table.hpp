@@ -9,7 +9,7 @@
 #include <string_view>
 #include <vector>
 
-#include "controller/scene/toml.hpp"
+#include "shared/text/toml.hpp"
 
 namespace kerf {
 
