@@ -9,7 +9,7 @@ cd "${1:-$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/..}"
 # two folders can include each other. The programs meet only in shared; lab alone, which measures,
 # also includes controller, record and hil. A folder that is missing here is refused.
 rooms='
-shared/numeric shared/volume shared/wire shared/posix shared/segment
+shared/numeric shared/volume shared/wire shared/posix shared/text shared/segment
 
 controller/kernel/point_shell controller/kernel controller/kernel/proxy controller/kernel/sets
 controller/servo/kinematics controller/servo

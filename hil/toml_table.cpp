@@ -34,12 +34,11 @@ double TomlTable::checked(const toml::node& node, const std::string& key, Range 
 }
 
 toml::table parse_toml(std::string_view text, const std::string& place) {
-  try {
-    return toml::parse(text);
-  } catch (const toml::parse_error& error) {
-    throw HilError(place + ":" + std::to_string(error.source().begin.line) + ": " +
-                   std::string(error.description()) + "; correct the TOML");
-  }
+  toml::parse_result parsed = toml::parse(text);
+  if (parsed) return std::move(parsed).table();
+  const toml::parse_error& error = parsed.error();
+  throw HilError(place + ":" + std::to_string(error.source().begin.line) + ": " +
+                 std::string(error.description()) + "; correct the TOML");
 }
 
 const toml::array& tables_of(const toml::table& file, std::string_view key, std::size_t most,

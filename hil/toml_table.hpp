@@ -11,12 +11,8 @@
 #include <string_view>
 #include <utility>
 
-// Debian's toml++ 3.3.0 asserts that a table header begins with a key before it has looked: `[!]`
-// would end the program. The check behind the assertion reports it properly.
-#define TOML_ASSERT(expr) static_cast<void>(0)
-#include <toml++/toml.h>
-
 #include "hil/hil_error.hpp"
+#include "shared/text/toml.hpp"
 
 namespace kerf {
 

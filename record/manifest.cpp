@@ -5,19 +5,19 @@
 #include <cmath>
 #include <cstdio>
 #include <fstream>
-
-#include <nlohmann/json.hpp>
+#include <iterator>
 
 #include "record/record_error.hpp"
 #include "shared/posix/hex64.hpp"
 #include "shared/posix/new_file.hpp"
 #include "shared/segment/layout_table.hpp"
+#include "shared/text/json.hpp"
 
 namespace kerf {
 
 void write_manifest(const std::filesystem::path& folder, const SegmentInfo& info,
                     const Recorder& recorder, std::uint64_t rows, std::string_view end_reason) {
-  nlohmann::ordered_json manifest;
+  Json manifest;
   manifest["kerf"] = KERF_VERSION;
   manifest["compiler"] = __VERSION__;
   manifest["build_id"] = info.build_id;
@@ -28,21 +28,20 @@ void write_manifest(const std::filesystem::path& folder, const SegmentInfo& info
   manifest["start_ns"] = info.start_ns;
   manifest["scene"] = kSceneName;
   for (const SegmentVolumeInfo& volume : info.volumes) {
-    manifest["volumes"].push_back({{"size_vox", {volume.grid.nx, volume.grid.ny, volume.grid.nz}},
-                                   {"spacing_mm", volume.spacing_mm},
-                                   {"initial_hash", hex64(volume.initial_hash)}});
+    manifest["volumes"].push_back(
+        {{"size_vox", std::array{volume.grid.nx, volume.grid.ny, volume.grid.nz}},
+         {"spacing_mm", volume.spacing_mm},
+         {"initial_hash", hex64(volume.initial_hash)}});
   }
   manifest["rows"] = rows;
   manifest["lost_ticks"] = recorder.lost();
   manifest["missed_before_start"] = recorder.missed_before_start();
-  manifest["gaps"] = nlohmann::ordered_json::array();
+  manifest["gaps"] = Json::List{};
   for (const RecordGap& gap : recorder.gaps()) {
     manifest["gaps"].push_back({{"first_index", gap.first_index}, {"count", gap.count}});
   }
   manifest["end_reason"] = end_reason;
-  // A build id or scene text of another encoding must not stop a recording.
-  constexpr auto kReplace = nlohmann::ordered_json::error_handler_t::replace;
-  write_new_file(folder / kManifestName, manifest.dump(2, ' ', false, kReplace) + "\n");
+  write_new_file(folder / kManifestName, manifest.document());
 }
 
 Manifest read_manifest(const std::filesystem::path& folder) {
@@ -53,14 +52,15 @@ Manifest read_manifest(const std::filesystem::path& folder) {
   }
   Manifest out;
   try {
-    const nlohmann::json json = nlohmann::json::parse(file);
+    const std::string text{std::istreambuf_iterator<char>(file), {}};
+    const Json json = Json::parse(text);
     out.tick_ns = json.at("tick_ns").get<std::uint32_t>();
     out.end_reason = json.at("end_reason").get<std::string>();
-    for (const nlohmann::json& volume : json.at("volumes")) {
+    for (const Json& volume : json.at("volumes")) {
       const auto spacing = volume.at("spacing_mm").get<std::array<double, 3>>();
       out.voxel_mm3.push_back(spacing[0] * spacing[1] * spacing[2]);
     }
-  } catch (const nlohmann::json::exception&) {
+  } catch (const JsonError&) {
     throw RecordError(path.string() + ": not a manifest of this version; record it again");
   }
   const auto positive = [](double mm3) { return std::isfinite(mm3) && mm3 > 0; };

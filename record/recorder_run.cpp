@@ -6,14 +6,13 @@
 #include <system_error>
 #include <thread>
 
-#include <CLI/CLI.hpp>
-#include <nlohmann/json.hpp>
-
 #include "record/manifest.hpp"
 #include "record/record_error.hpp"
 #include "record/recorder.hpp"
 #include "shared/posix/new_file.hpp"
 #include "shared/segment/hand_over.hpp"
+#include "shared/text/command_line.hpp"
+#include "shared/text/json.hpp"
 
 namespace kerf {
 namespace {
@@ -49,34 +48,31 @@ constexpr auto kConnectPeriod = std::chrono::milliseconds(50);
 
 void write_report(const RecorderOptions& options, const Recorder& recorder, std::uint64_t rows,
                   std::string_view end_reason) {
-  const nlohmann::ordered_json report = {{"rows", rows},
-                                         {"lost_ticks", recorder.lost()},
-                                         {"gaps", recorder.gaps().size()},
-                                         {"missed_before_start", recorder.missed_before_start()},
-                                         {"largest_lag_ticks", recorder.largest_lag()},
-                                         {"end_reason", end_reason}};
-  write_new_file(options.report, report.dump(2) + "\n");
+  const Json report = {{"rows", rows},
+                       {"lost_ticks", recorder.lost()},
+                       {"gaps", recorder.gaps().size()},
+                       {"missed_before_start", recorder.missed_before_start()},
+                       {"largest_lag_ticks", recorder.largest_lag()},
+                       {"end_reason", end_reason}};
+  write_new_file(options.report, report.document());
 }
 
 }  // namespace
 
 std::optional<int> parse_options(int argc, char** argv, RecorderOptions& options) {
-  CLI::App app{"Logs every tick of a running kerf-controller into a folder."};
-  app.add_option("--name", options.name, "name of the controller")->capture_default_str();
-  app.add_option("--out", options.out, "folder for ticks.npy, scene.json, manifest.json")
-      ->required();
-  app.add_option("--wait", options.wait_s, "seconds to wait for the controller")
-      ->check(CLI::Range(0.0, 86400.0))
-      ->capture_default_str();
-  app.add_flag("--strict", options.strict, "exit 1 where ticks were lost");
-  app.add_option("--report", options.report, "write the figures as JSON");
-  app.set_version_flag("--version", KERF_VERSION);
+  CommandLine app("Logs every tick of a running kerf-controller into a folder.", "kerf-recorder",
+                  KERF_VERSION);
+  app.option("--name", options.name, "name of the controller").shows_default();
+  app.option("--out", options.out, "folder for ticks.npy, scene.json, manifest.json").required();
+  app.option("--wait", options.wait_s, "seconds to wait for the controller")
+      .within(0, 86400)
+      .shows_default();
+  app.flag("--strict", options.strict, "exit 1 where ticks were lost");
+  app.option("--report", options.report, "write the figures as JSON");
   try {
-    app.parse(argc, argv);
-  } catch (const CLI::Success& done) {
-    return app.exit(done);
-  } catch (const CLI::ParseError& error) {
-    std::cerr << "kerf-recorder: " << error.what() << "; see --help\n";
+    if (!app.parse(argc, argv, std::cout)) return 0;
+  } catch (const UsageError& error) {
+    std::cerr << "kerf-recorder: " << error.what() << '\n';
     return 2;
   }
   return std::nullopt;

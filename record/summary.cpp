@@ -7,17 +7,16 @@
 #include <utility>
 #include <vector>
 
-#include <nlohmann/json.hpp>
-
 #include "record/manifest.hpp"
 #include "record/tick_figures.hpp"
 #include "record/tick_log.hpp"
+#include "shared/text/json.hpp"
 
 namespace kerf {
 namespace {
 
 // The one list of figures: name, value. Text and JSON both come from it.
-[[nodiscard]] nlohmann::ordered_json figures(const RecordSummary& s) {
+[[nodiscard]] Json figures(const RecordSummary& s) {
   return {{"rows", s.rows},
           {"first_tick", s.first_tick},
           {"last_tick", s.last_tick},
@@ -68,12 +67,12 @@ RecordSummary summarise(const std::filesystem::path& folder) {
 
 std::string to_text(const RecordSummary& summary) {
   std::ostringstream text;
-  const nlohmann::ordered_json list = figures(summary);
-  for (const auto& [name, value] : list.items()) {
+  const Json list = figures(summary);
+  for (const auto& [name, value] : list.members()) {
     text << std::left << std::setw(18) << name;
-    if (value.is_string()) {
+    if (value.is_text()) {
       text << value.get<std::string>();
-    } else if (value.is_number_float()) {
+    } else if (value.is_fraction()) {
       text << std::setprecision(6) << value.get<double>();
     } else {
       text << value.get<std::uint64_t>();
@@ -84,7 +83,7 @@ std::string to_text(const RecordSummary& summary) {
 }
 
 std::string to_json(const RecordSummary& summary) {
-  return figures(summary).dump(2) + "\n";
+  return figures(summary).document();
 }
 
 }  // namespace kerf

@@ -10,12 +10,11 @@
 #include <string_view>
 #include <vector>
 
-#include <CLI/CLI.hpp>
-
 #include "controller/device/port/open_port.hpp"
 #include "controller/scene/scene_file.hpp"
 #include "controller/scene/scene_page.hpp"
 #include "controller/scene/scene_words.hpp"
+#include "shared/text/command_line.hpp"
 
 namespace kerf {
 namespace {
@@ -45,10 +44,8 @@ std::ptrdiff_t index_of(const std::array<std::string_view, N>& words, const std:
 }  // namespace
 
 std::optional<int> parse_options(int argc, const char* const* argv, ControllerOptions& options) {
-  CLI::App app{kAbout, "kerf-controller"};
+  CommandLine app(kAbout, "kerf-controller", "kerf-controller " KERF_VERSION);
   app.footer(kExitCodes);
-  app.set_version_flag("--version", std::string("kerf-controller ") + KERF_VERSION);
-  app.get_formatter()->column_width(34);
 
   std::string volume;
   std::vector<double> spacing_mm;
@@ -57,108 +54,102 @@ std::optional<int> parse_options(int argc, const char* const* argv, ControllerOp
   std::string numeric;
   std::string device;
   std::vector<double> torque_scale;
-  app.add_option("--scene", options.scene, "scene file (TOML)")->type_name("FILE");
-  auto* volume_option =
-      app.add_option("--volume", volume,
-                     "replace the first volume: NRRD, MetaImage, NIfTI, DICOM folder")
-          ->type_name("FILE");
-  auto* spacing_option = app.add_option("--spacing", spacing_mm,
-                                        "voxel size of that volume in mm: one number or three")
-                             ->delimiter(',')
-                             ->expected(1, 3)
-
-                             ->type_name("A[,B,C]");
-  auto* window_option =
-      app.add_option("--window", window, "source values shown as air and as densest")
-          ->delimiter(',')
-          ->expected(2)
-          ->type_name("LO,HI");
-  auto* device_option = app.add_option("--device", device, "what is held, instead of the scene's")
-                            ->check(CLI::IsMember(words_of(kPersonalityWords)))
-                            ->type_name("NAME");
-  auto* torque_option = app.add_option("--torque-scale", torque_scale,
-                                       "N mm at the joint per motor count, instead of the scene's")
-                            ->delimiter(',')
-                            ->expected(3)
-                            ->check(CLI::Range(-kMaxTorqueScale, kMaxTorqueScale))
-                            ->type_name("A,B,C");
-  app.add_option("--port", options.port,
-                 "where the device is: auto; fw, usb or hid, each [:NODE or :SERIAL]; usb also "
-                 "[,firmware=FILE]; socket:PATH or udp:[ADDRESS:]PORT of kerf-emulator")
-      ->type_name("PORT");
+  app.option("--scene", options.scene, "scene file (TOML)").shown_as("FILE");
+  const Option volume_option =
+      app.option("--volume", volume,
+                 "replace the first volume: NRRD, MetaImage, NIfTI, DICOM folder")
+          .shown_as("FILE");
+  const Option spacing_option =
+      app.option("--spacing", spacing_mm, "voxel size of that volume in mm: one number or three")
+          .values(1, 3)
+          .shown_as("A[,B,C]");
+  const Option window_option =
+      app.option("--window", window, "source values shown as air and as densest")
+          .values(2, 2)
+          .shown_as("LO,HI");
+  const Option device_option =
+      app.option("--device", device, "what is held, instead of the scene's")
+          .one_of(words_of(kPersonalityWords))
+          .shown_as("NAME");
+  const Option torque_option =
+      app.option("--torque-scale", torque_scale,
+                 "N mm at the joint per motor count, instead of the scene's")
+          .values(3, 3)
+          .within(-kMaxTorqueScale, kMaxTorqueScale)
+          .shown_as("A,B,C");
+  app.option("--port", options.port,
+             "where the device is: auto; fw, usb or hid, each [:NODE or :SERIAL]; usb also "
+             "[,firmware=FILE]; socket:PATH or udp:[ADDRESS:]PORT of kerf-emulator")
+      .shown_as("PORT");
   constexpr double kLongestS = 1e7;  // 115 days
-  app.add_option("--seconds", options.seconds,
-                 "end after this much servo time, counted from arming; of --probe, from its start")
-      ->check(CLI::Range(0.01, kLongestS))
-      ->type_name("S");
-  auto* rate_option = app.add_option("--rate", rate_hz, "servo rate, instead of the scene's")
-                          ->check(CLI::Range(250, 8000))
-                          ->type_name("HZ");
-  auto* numeric_option =
-      app.add_option("--numeric", numeric, "numbers of the loop, instead of the scene's")
-          ->check(CLI::IsMember(words_of(kNumericWords)));
-  app.add_option("--name", options.name, "name under which readers find the segment")
-      ->capture_default_str();
-  app.add_flag("--virtual", options.virtual_time,
-               "lock-step with the device, no clock: the same input gives the same bits");
-  app.add_flag("--strict", options.real_time.strict,
-               "refuse to start without every real-time right");
-  app.add_flag("--guard", options.guard,
-               "an unexpected system call of the servo thread switches the motors off and ends it");
-  app.add_option("--cpu", options.real_time.cpu, "core of the servo thread (default: the last)")
-      ->check(CLI::Range(0, 1023))
-      ->type_name("N");
-  app.add_option("--priority", options.real_time.priority, "SCHED_FIFO priority")
-      ->check(CLI::Range(1, 99))
-      ->capture_default_str();
-  app.add_option("--spin-us", options.real_time.spin_us,
-                 "spin this long before each deadline instead of sleeping to it")
-      ->check(CLI::Range(0, 900))
-      ->capture_default_str();
-  auto* check_flag = app.add_flag(
+  app.option("--seconds", options.seconds,
+             "end after this much servo time, counted from arming; of --probe, from its start")
+      .within(0.01, kLongestS)
+      .shown_as("S");
+  const Option rate_option = app.option("--rate", rate_hz, "servo rate, instead of the scene's")
+                                 .within(250, 8000)
+                                 .shown_as("HZ");
+  const Option numeric_option =
+      app.option("--numeric", numeric, "numbers of the loop, instead of the scene's")
+          .one_of(words_of(kNumericWords));
+  app.option("--name", options.name, "name under which readers find the segment").shows_default();
+  app.flag("--virtual", options.virtual_time,
+           "lock-step with the device, no clock: the same input gives the same bits");
+  app.flag("--strict", options.real_time.strict, "refuse to start without every real-time right");
+  app.flag("--guard", options.guard,
+           "an unexpected system call of the servo thread switches the motors off and ends it");
+  app.option("--cpu", options.real_time.cpu, "core of the servo thread (default: the last)")
+      .within(0, 1023)
+      .shown_as("N");
+  app.option("--priority", options.real_time.priority, "SCHED_FIFO priority")
+      .within(1, 99)
+      .shows_default();
+  app.option("--spin-us", options.real_time.spin_us,
+             "spin this long before each deadline instead of sleeping to it")
+      .within(0, 900)
+      .shows_default();
+  const Option check_flag = app.flag(
       "--check", options.check,
       "load and check the scene, whether its rate fits too, print it and every setting, and end");
-  const auto print_page = [] {
-    std::cout << scene_keys_page();
-    throw CLI::Success();
-  };
-  app.add_flag_callback("--scene-keys", print_page,
-                        "print every key of a scene file as a page of Markdown, and end");
-  auto* explain_flag =
-      app.add_flag("--explain", options.explain,
-                   "tell what the scene costs: plans, operations, time, memory; and end")
-          ->excludes(check_flag);
-  app.add_flag("--calibrate", options.calibrate,
-               "with --explain: measure anew what an operation costs on this machine")
-      ->needs(explain_flag);
-  app.add_flag("--probe", options.probe,
-               "no scene needed: show what the device says, its motors off; without --port, what "
-               "is connected and what is missing")
-      ->excludes(check_flag)
-      ->excludes(explain_flag);
-  app.add_flag("--progress", options.progress, "show a progress bar on a terminal");
-  app.add_option("--report", options.report,
-                 "write the figures of the run, or of --explain, as JSON")
-      ->type_name("FILE");
-  app.add_option("--final", options.final_volume, "write the volume as it is at the end (.nrrd)")
-      ->type_name("FILE");
-  app.add_option("--emulator-args", options.emulator_args,
-                 "write hand_unit_mm, hand_script and rate_hz once the scene is loaded")
-      ->type_name("FILE");
+  bool scene_keys = false;
+  app.flag("--scene-keys", scene_keys,
+           "print every key of a scene file as a page of Markdown, and end");
+  const Option explain_flag =
+      app.flag("--explain", options.explain,
+               "tell what the scene costs: plans, operations, time, memory; and end")
+          .excludes(check_flag);
+  app.flag("--calibrate", options.calibrate,
+           "with --explain: measure anew what an operation costs on this machine")
+      .needs(explain_flag);
+  app.flag("--probe", options.probe,
+           "no scene needed: show what the device says, its motors off; without --port, what "
+           "is connected and what is missing")
+      .excludes(check_flag)
+      .excludes(explain_flag);
+  app.flag("--progress", options.progress, "show a progress bar on a terminal");
+  app.option("--report", options.report, "write the figures of the run, or of --explain, as JSON")
+      .shown_as("FILE");
+  app.option("--final", options.final_volume, "write the volume as it is at the end (.nrrd)")
+      .shown_as("FILE");
+  app.option("--emulator-args", options.emulator_args,
+             "write hand_unit_mm, hand_script and rate_hz once the scene is loaded")
+      .shown_as("FILE");
 
   try {
-    app.parse(argc, argv);
-  } catch (const CLI::Success& success) {  // --help, --version
-    return app.exit(success);
-  } catch (const CLI::ParseError& error) {
-    std::cerr << "kerf-controller: " << error.what() << "; see kerf-controller --help\n";
+    if (!app.parse(argc, argv, std::cout)) return 0;
+  } catch (const UsageError& error) {
+    std::cerr << "kerf-controller: " << error.what() << '\n';
     return 2;
+  }
+  if (scene_keys) {
+    std::cout << scene_keys_page();
+    return 0;
   }
   const auto refuse = [](const std::string& line) {
     std::cerr << "kerf-controller: " << line << '\n';
     return 2;
   };
-  if (*spacing_option && spacing_mm.size() == 2) {
+  if (spacing_option.given() && spacing_mm.size() == 2) {
     return refuse("--spacing has 2 numbers; give one for all axes, or three");
   }
   for (const double edge_mm : spacing_mm) {
@@ -173,7 +164,7 @@ std::optional<int> parse_options(int argc, const char* const* argv, ControllerOp
   if (options.scene.empty() && !options.probe) {
     return refuse("--scene is missing; try scenes/phantom.toml");
   }
-  if (options.probe && !options.port.empty() && options.scene.empty() && !*device_option) {
+  if (options.probe && !options.port.empty() && options.scene.empty() && !device_option.given()) {
     return refuse("--probe: which device? give --device, or a --scene that says it");
   }
   const bool runs = !options.check && !options.explain && !options.probe;
@@ -187,15 +178,15 @@ std::optional<int> parse_options(int argc, const char* const* argv, ControllerOp
       return refuse(error.what());
     }
   }
-  if (*volume_option) options.overrides.volume_file = volume;
-  if (*spacing_option) options.overrides.spacing_mm = three_of(spacing_mm);
-  if (*window_option) options.overrides.window = std::array{window[0], window[1]};
-  if (*rate_option) options.overrides.rate_hz = rate_hz;
-  if (*numeric_option) {
+  if (volume_option.given()) options.overrides.volume_file = volume;
+  if (spacing_option.given()) options.overrides.spacing_mm = three_of(spacing_mm);
+  if (window_option.given()) options.overrides.window = std::array{window[0], window[1]};
+  if (rate_option.given()) options.overrides.rate_hz = rate_hz;
+  if (numeric_option.given()) {
     options.overrides.numeric = static_cast<NumericKind>(index_of(kNumericWords, numeric));
   }
-  if (*torque_option) options.overrides.torque_scale = three_of(torque_scale);
-  if (*device_option) {
+  if (torque_option.given()) options.overrides.torque_scale = three_of(torque_scale);
+  if (device_option.given()) {
     options.overrides.personality = static_cast<Personality>(index_of(kPersonalityWords, device));
   }
   return std::nullopt;

@@ -4,15 +4,14 @@
 #include <algorithm>
 #include <cstdio>
 
-#include <nlohmann/json.hpp>
-
 #include "controller/servo/velocity_window.hpp"
 #include "shared/posix/hex64.hpp"
+#include "shared/text/json.hpp"
 
 namespace kerf {
 namespace {
 
-nlohmann::ordered_json percentiles(const Histogram& histogram) {
+Json percentiles(const Histogram& histogram) {
   return {{"p50", histogram.percentile_us(0.5)},
           {"p99", histogram.percentile_us(0.99)},
           {"p999", histogram.percentile_us(0.999)},
@@ -38,19 +37,17 @@ std::string format(const char* pattern, Values... values) {
 
 std::string report_json(const RunReport& report) {
   const RunRecord& r = report.record;
-  nlohmann::ordered_json events = nlohmann::ordered_json::array();
+  Json events = Json::List{};
   for (std::size_t i = 0; i < std::min(r.event_count, RunRecord::kMaxEvents); ++i) {
     events.push_back({{"tick", r.events[i].tick}, {"name", r.events[i].name}});
   }
-  nlohmann::ordered_json missing = nlohmann::ordered_json::array();
+  Json missing = Json::List{};
   for (const MissingRight& right : report.missing_rights) {
     missing.push_back({{"what", right.what}, {"effect", right.effect}});
   }
-  nlohmann::ordered_json link = nlohmann::ordered_json::object();
+  Json link = Json::Members{};
   for (const LinkCounter& counter : report.link) link[counter.name] = counter.value;
-  nlohmann::ordered_json start_to_force_ms;  // null where there was none
-  if (report.start_to_force_ms) start_to_force_ms = *report.start_to_force_ms;
-  const nlohmann::ordered_json json{
+  const Json json{
       {"program", "kerf-controller"},
       {"version", KERF_VERSION},
       {"scene", report.scene},
@@ -87,11 +84,11 @@ std::string report_json(const RunReport& report) {
       {"link", link},
       {"missing_rights", missing},
       {"load_s", report.load_s},
-      {"start_to_force_ms", start_to_force_ms},
+      {"start_to_force_ms", report.start_to_force_ms},
       {"volume_hash", hex64(report.volume_hash)},
       {"output_hash", hex64(r.output_hash)},
   };
-  return json.dump(2) + "\n";
+  return json.document();
 }
 
 std::string summary(const RunReport& report) {

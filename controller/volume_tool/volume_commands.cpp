@@ -2,7 +2,6 @@
 #include "controller/volume_tool/volume_commands.hpp"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <exception>
 #include <iomanip>
@@ -10,8 +9,6 @@
 #include <sstream>
 #include <string>
 #include <string_view>
-
-#include <CLI/CLI.hpp>
 
 #include "controller/scene/scene_error.hpp"
 #include "controller/volume/phantom.hpp"
@@ -21,19 +18,16 @@
 #include "controller/volume/volume_resample.hpp"
 #include "controller/volume/volume_write.hpp"
 #include "controller/volume_tool/volume_info.hpp"
+#include "shared/text/command_line.hpp"
+#include "shared/text/number.hpp"
 
 namespace kerf {
 namespace {
 
-/// The whole of `text` as a number, or SceneError that names the option.
+/// SceneError that names the option where `text` is no number.
 double number(const std::string& option, std::string_view text) {
-  double value = 0;
-  const auto result = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (result.ec != std::errc{} || result.ptr != text.data() + text.size() ||
-      !std::isfinite(value)) {
-    throw SceneError(option + ": '" + std::string(text) + "' is not a number; see --help");
-  }
-  return value;
+  if (const auto value = number_in(text)) return *value;
+  throw SceneError(option + ": '" + std::string(text) + "' is not a number; see --help");
 }
 
 std::vector<double> numbers(const std::string& option, const std::string& text, char separator) {
@@ -75,16 +69,16 @@ VoxelGrid grid_from(const std::string& text) {
 struct Source {
   std::string file, spacing, window;
 
-  void add_to(CLI::App& command, bool with_spacing) {
-    command.add_option("file", file, "volume file, or folder with a DICOM series")
-        ->required()
-        ->type_name("FILE");
+  void add_to(Arguments& command, bool with_spacing) {
+    command.option("file", file, "volume file, or folder with a DICOM series")
+        .required()
+        .shown_as("FILE");
     if (with_spacing) {
-      command.add_option("--spacing", spacing, "mm per voxel, in place of the file's")
-          ->type_name("A[,B,C]");
+      command.option("--spacing", spacing, "mm per voxel, in place of the file's")
+          .shown_as("A[,B,C]");
     }
-    command.add_option("--window", window, "values that become density 0 and 1 (default: all)")
-        ->type_name("LO,HI");
+    command.option("--window", window, "values that become density 0 and 1 (default: all)")
+        .shown_as("LO,HI");
   }
   [[nodiscard]] SourceVolume read(bool allow_missing_spacing = false) const {
     ReadOptions options;
@@ -107,9 +101,9 @@ struct Target {
   std::string file;
   bool raw = false;
 
-  void add_to(CLI::App& command) {
-    command.add_option("--out", file, "file to write")->required()->type_name("OUT.nrrd");
-    command.add_flag("--raw", raw, "write without compression");
+  void add_to(Arguments& command) {
+    command.option("--out", file, "file to write").required().shown_as("OUT.nrrd");
+    command.flag("--raw", raw, "write without compression");
   }
   void write(const VolumeImage& image, std::ostream& out) const {
     write_volume(image, file, raw ? VolumeEncoding::raw : VolumeEncoding::gzip);
@@ -125,58 +119,52 @@ struct Commands {
   std::string report, resample_spacing, size = "256x256x161";
   double iso = -1.0;
   std::int32_t guard = kGuardVoxels;
-  CLI::App* info = nullptr;
-  CLI::App* import = nullptr;
-  CLI::App* crop = nullptr;
-  CLI::App* resample = nullptr;
-  CLI::App* phantom = nullptr;
+  Arguments info, import, crop, resample, phantom;
 
-  void add_to(CLI::App& app) {
-    info = app.add_subcommand("info", "print size, spacing, values and what is solid");
-    source.add_to(*info, true);
-    info->add_option("--report", report, "write the same figures as JSON")->type_name("FILE");
+  explicit Commands(Arguments& app)
+      : info(app.command("info", "print size, spacing, values and what is solid")),
+        import(app.command("import", "convert any readable volume to a .nrrd of densities")),
+        crop(app.command("crop", "cut to the tightest box around what is solid, plus a guard")),
+        resample(app.command("resample", "change the voxel size")),
+        phantom(app.command("phantom", "make the procedural molar")) {
+    source.add_to(info, true);
+    info.option("--report", report, "write the same figures as JSON").shown_as("FILE");
 
-    import = app.add_subcommand("import", "convert any readable volume to a .nrrd of densities");
-    source.add_to(*import, true);
-    target.add_to(*import);
+    source.add_to(import, true);
+    target.add_to(import);
 
-    crop = app.add_subcommand("crop", "cut to the tightest box around what is solid, plus a guard");
-    source.add_to(*crop, true);
-    target.add_to(*crop);
-    crop->add_option("--iso", iso, "density from which a voxel is solid (default: Otsu)")
-        ->check(CLI::Range(0.0, 1.0));
-    crop->add_option("--guard", guard, "voxels kept around it")
-        ->capture_default_str()
-        ->check(CLI::Range(0, 64));
+    source.add_to(crop, true);
+    target.add_to(crop);
+    crop.option("--iso", iso, "density from which a voxel is solid (default: Otsu)")
+        .within(0.0, 1.0);
+    crop.option("--guard", guard, "voxels kept around it").within(0, 64).shows_default();
 
-    resample = app.add_subcommand("resample", "change the voxel size");
-    source.add_to(*resample, false);
-    target.add_to(*resample);
-    resample->add_option("--spacing", resample_spacing, "new mm per voxel")
-        ->required()
-        ->type_name("A[,B,C]");
+    source.add_to(resample, false);
+    target.add_to(resample);
+    resample.option("--spacing", resample_spacing, "new mm per voxel")
+        .required()
+        .shown_as("A[,B,C]");
 
-    phantom = app.add_subcommand("phantom", "make the procedural molar");
-    phantom->add_option("--size", size, "voxels; its size in mm stays")
-        ->capture_default_str()
-        ->type_name("NXxNYxNZ");
-    target.add_to(*phantom);
+    phantom.option("--size", size, "voxels; its size in mm stays")
+        .shows_default()
+        .shown_as("NXxNYxNZ");
+    target.add_to(phantom);
   }
 
   void run(std::ostream& out) const {
-    if (info->parsed()) {
+    if (info.chosen()) {
       const SourceVolume volume = source.read(true);
       const VolumeInfo figures = describe(source.file, volume, source.window_for(volume));
       print(figures, out);
       if (!report.empty()) write_report(figures, report);
-    } else if (import->parsed()) {
+    } else if (import.chosen()) {
       target.write(source.image(), out);
-    } else if (crop->parsed()) {
+    } else if (crop.chosen()) {
       const VolumeImage image = source.image();
       const Density threshold =
           iso < 0.0 ? otsu_threshold(image) : static_cast<Density>(std::lround(iso * kDensityMax));
       target.write(crop_to_solid(image, threshold, guard), out);
-    } else if (resample->parsed()) {
+    } else if (resample.chosen()) {
       target.write(kerf::resample(source.image(), spacing_from(resample_spacing)), out);
     } else {
       PhantomSpec spec;
@@ -186,7 +174,7 @@ struct Commands {
   }
 };
 
-/// CLI11 breaks some of its messages into lines.
+/// Some messages of libraries have several lines.
 std::string one_line(std::string text) {
   std::replace(text.begin(), text.end(), '\n', ' ');
   return text;
@@ -195,25 +183,16 @@ std::string one_line(std::string text) {
 }  // namespace
 
 int run_volume_tool(int argc, const char* const* argv, std::ostream& out, std::ostream& err) {
-  CLI::App app("Inspect, import, crop and resample volumes; make the molar phantom.",
-               "kerf-volume");
-  app.set_version_flag("--version", KERF_VERSION);
-  app.require_subcommand(0, 1);
-  Commands commands;
-  commands.add_to(app);
+  CommandLine app("Inspect, import, crop and resample volumes; make the molar phantom.",
+                  "kerf-volume", KERF_VERSION);
+  Commands commands(app);
   try {
-    app.parse(argc, argv);
-    if (app.get_subcommands().empty()) throw CLI::RequiredError("a command");
-    commands.run(out);
+    if (app.parse(argc, argv, out)) commands.run(out);
     return 0;
-  } catch (const CLI::Success& request) {  // --help, --version
-    return app.exit(request, out, err);
-  } catch (const CLI::ParseError& error) {
-    err << "kerf-volume: " << one_line(error.what()) << "; see --help\n";
   } catch (const std::exception& error) {
     err << "kerf-volume: " << one_line(error.what()) << '\n';
+    return 2;
   }
-  return 2;
 }
 
 }  // namespace kerf

@@ -6,9 +6,8 @@
 #include <iomanip>
 #include <ostream>
 
-#include <nlohmann/json.hpp>
-
 #include "shared/posix/new_file.hpp"
+#include "shared/text/json.hpp"
 
 namespace kerf {
 namespace {
@@ -76,23 +75,22 @@ void print(const VolumeInfo& info, std::ostream& out) {
 }
 
 void write_report(const VolumeInfo& info, const std::filesystem::path& path) {
-  const auto corner = [](VoxelIndex v) { return nlohmann::json{v.x, v.y, v.z}; };
-  nlohmann::json report{
-      {"file", info.file},
-      {"size_vox", {info.grid.nx, info.grid.ny, info.grid.nz}},
-      {"has_spacing", info.has_spacing},
-      {"spacing_mm", info.spacing_mm},
-      {"origin_mm", info.origin_mm},
-      {"direction", info.direction},
-      {"min", info.min},
-      {"max", info.max},
-      {"window", {info.window.lo, info.window.hi}},
-      {"otsu_value", info.otsu_value},
-      {"otsu_density", info.otsu / kDensityMax},
-      {"solid_box", {{"lo", corner(info.solid.lo)}, {"hi", corner(info.solid.hi)}}},
-      {"solid_ratio", info.solid_ratio},
-      {"histogram", info.histogram}};
-  write_new_file(path, report.dump(2) + "\n");
+  const auto corner = [](VoxelIndex v) { return std::array{v.x, v.y, v.z}; };
+  const Json report{{"direction", info.direction},
+                    {"file", info.file},
+                    {"has_spacing", info.has_spacing},
+                    {"histogram", info.histogram},
+                    {"max", info.max},
+                    {"min", info.min},
+                    {"origin_mm", info.origin_mm},
+                    {"otsu_density", info.otsu / kDensityMax},
+                    {"otsu_value", info.otsu_value},
+                    {"size_vox", std::array{info.grid.nx, info.grid.ny, info.grid.nz}},
+                    {"solid_box", {{"hi", corner(info.solid.hi)}, {"lo", corner(info.solid.lo)}}},
+                    {"solid_ratio", info.solid_ratio},
+                    {"spacing_mm", info.spacing_mm},
+                    {"window", std::array{info.window.lo, info.window.hi}}};
+  write_new_file(path, report.document());
 }
 
 }  // namespace kerf

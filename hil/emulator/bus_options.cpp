@@ -7,9 +7,8 @@
 #include <string_view>
 #include <utility>
 
-#include <CLI/CLI.hpp>
-
 #include "hil/hil_error.hpp"
+#include "shared/text/number.hpp"
 
 namespace kerf {
 namespace {
@@ -34,14 +33,12 @@ template <class Fault, std::size_t N>
 std::pair<std::int64_t, Fault> parse_fault(const std::string& text,
                                            const FaultWord<Fault> (&words)[N]) {
   const std::size_t colon = text.find(':');
-  double seconds = 0;
-  const bool timed = colon != std::string::npos &&
-                     CLI::detail::lexical_cast(text.substr(0, colon), seconds) && seconds >= 0 &&
-                     seconds < 1e6;
+  const auto seconds = number_in(std::string_view(text).substr(0, colon));
+  const bool timed = colon != std::string::npos && seconds && *seconds >= 0 && *seconds < 1e6;
   const std::string word = timed ? text.substr(colon + 1) : "";
   const auto* found = std::ranges::find(words, word, &FaultWord<Fault>::word);
   if (found != std::end(words)) {
-    return {std::llround(seconds * static_cast<double>(kBusCyclesPerSecond)), found->fault};
+    return {std::llround(*seconds * static_cast<double>(kBusCyclesPerSecond)), found->fault};
   }
   std::string known;
   for (const auto& one : words) known += (known.empty() ? "" : ", ") + std::string(one.word);
@@ -50,23 +47,22 @@ std::pair<std::int64_t, Fault> parse_fault(const std::string& text,
 
 }  // namespace
 
-void declare_bus(CLI::App& app, BusOptions& o) {
-  app.add_option("--mount", o.mount,
-                 "front fuse: folder in which the node appears: fw1, usb or hidraw0");
-  app.add_option("--packet-hz", o.packet_hz, "front fuse: packets of the omni, 8000 or 1000")
-      ->check(CLI::IsMember({8000, 1000}))
-      ->capture_default_str();
-  app.add_option("--drift-ppm", o.drift_ppm, "front fuse: how much slower the omni's bus runs")
-      ->check(CLI::Range(-1000.0, 1000.0));
-  app.add_flag("--reset-stops-stream", o.reset_stops_stream,
-               "front fuse: in a bus reset the omni forgets its channels and stops");
-  app.add_flag("--firmware-runs", o.firmware_runs,
-               "fronts fuse, usbip: the falcon was started before (default: it waits for its "
-               "firmware)");
-  app.add_option(
-      "--bus-fault", o.faults,
-      "fronts fuse, usbip, uhid: SECONDS:KIND, repeatable; vanish, back; omni: reset, "
-      "device-reset, steal; falcon: stall, split; falcon and woodenhaptics on fuse: deaf");
+void declare_bus(Arguments& app, BusOptions& o) {
+  app.option("--mount", o.mount,
+             "front fuse: folder in which the node appears: fw1, usb or hidraw0");
+  app.option("--packet-hz", o.packet_hz, "front fuse: packets of the omni, 8000 or 1000")
+      .one_of({"8000", "1000"})
+      .shows_default();
+  app.option("--drift-ppm", o.drift_ppm, "front fuse: how much slower the omni's bus runs")
+      .within(-1000, 1000);
+  app.flag("--reset-stops-stream", o.reset_stops_stream,
+           "front fuse: in a bus reset the omni forgets its channels and stops");
+  app.flag("--firmware-runs", o.firmware_runs,
+           "fronts fuse, usbip: the falcon was started before (default: it waits for its "
+           "firmware)");
+  app.option("--bus-fault", o.faults,
+             "fronts fuse, usbip, uhid: SECONDS:KIND, repeatable; vanish, back; omni: reset, "
+             "device-reset, steal; falcon: stall, split; falcon and woodenhaptics on fuse: deaf");
 }
 
 FirewireSettings firewire_settings(const BusOptions& o, int lockstep_hz) {

@@ -6,10 +6,7 @@
 
 #include "hil/front/firewire/firewire_bus.hpp"
 #include "hil/front/usb/usb_fault.hpp"
-
-namespace CLI {
-class App;
-}
+#include "shared/text/command_line.hpp"
 
 namespace kerf {
 
@@ -23,7 +20,7 @@ struct BusOptions {
   std::vector<std::string> faults;  ///< SECONDS:KIND
 };
 
-void declare_bus(CLI::App& app, BusOptions& options);
+void declare_bus(Arguments& app, BusOptions& options);
 
 /// Throws `HilError` for what no bus can be. `lockstep_hz`: servo rate in lock-step, 0 = real time.
 [[nodiscard]] FirewireSettings firewire_settings(const BusOptions& options, int lockstep_hz);

@@ -16,57 +16,45 @@ constexpr double kMaxSeconds = 1e6;
 constexpr double kMaxInertiaKgM2 = 0.1;
 constexpr double kMaxModeHz = 1000;  // beyond, a step of 31 us no longer resolves it
 
-/// A finite number from `low` to `high`; unlike CLI::Range it refuses "nan".
-CLI::Validator between(double low, double high) {
-  const auto refuse = [low, high](const std::string& text) {
-    double value = 0;
-    const bool inside = CLI::detail::lexical_cast(text, value) && value >= low && value <= high;
-    return inside ? std::string()
-                  : text + " is not from " + CLI::detail::to_string(low) + " to " +
-                        CLI::detail::to_string(high);
-  };
-  return CLI::Validator(refuse, "", "");
-}
-
-void declare_front(CLI::App& app, EmulatorOptions& o) {
-  app.add_option("--front", o.front,
-                 "how it is reached: socket; udp; fuse, a device node; usbip (falcon) or uhid "
-                 "(woodenhaptics), "
-                 "in this kernel's own USB or HID stack, as root")
-      ->capture_default_str();
-  app.add_option("--socket", o.socket, "front socket: path of the SEQPACKET socket to serve");
-  app.add_option("--udp", o.udp, "front udp: [ADDRESS:]PORT to serve (address: 127.0.0.1)");
+void declare_front(Arguments& app, EmulatorOptions& o) {
+  app.option("--front", o.front,
+             "how it is reached: socket; udp; fuse, a device node; usbip (falcon) or uhid "
+             "(woodenhaptics), "
+             "in this kernel's own USB or HID stack, as root")
+      .shows_default();
+  app.option("--socket", o.socket, "front socket: path of the SEQPACKET socket to serve");
+  app.option("--udp", o.udp, "front udp: [ADDRESS:]PORT to serve (address: 127.0.0.1)");
   declare_bus(app, o.bus);
-  app.add_flag("--lockstep", o.lockstep, "no clock: one servo period per command received");
-  app.add_option("--rate", o.rate_hz, "servo rate for --lockstep, Hz; must divide 8000 (USB: 1000)")
-      ->capture_default_str();
-  app.add_option("--packet-cycles", o.packet_cycles,
-                 "in real time: bus cycles of 125 us from one look at the host to the next")
-      ->check(between(1, 800))
-      ->capture_default_str();
-  app.add_option("--priority", o.priority, "SCHED_FIFO priority; 0 = none")
-      ->check(between(0, 99))
-      ->capture_default_str();
-  app.add_option("--cpu", o.cpu, "core to run on (default: the last)")->check(between(0, 1023));
-  app.add_flag("--stay", o.stay, "wait for another client when one leaves");
-  app.add_option("--seconds", o.seconds, "device time to serve (default: no limit)")
-      ->check(between(0.0, kMaxSeconds));
+  app.flag("--lockstep", o.lockstep, "no clock: one servo period per command received");
+  app.option("--rate", o.rate_hz, "servo rate for --lockstep, Hz; must divide 8000 (USB: 1000)")
+      .shows_default();
+  app.option("--packet-cycles", o.packet_cycles,
+             "in real time: bus cycles of 125 us from one look at the host to the next")
+      .within(1, 800)
+      .shows_default();
+  app.option("--priority", o.priority, "SCHED_FIFO priority; 0 = none")
+      .within(0, 99)
+      .shows_default();
+  app.option("--cpu", o.cpu, "core to run on (default: the last)").within(0, 1023);
+  app.flag("--stay", o.stay, "wait for another client when one leaves");
+  app.option("--seconds", o.seconds, "device time to serve (default: no limit)")
+      .within(0.0, kMaxSeconds);
 }
 
-void declare_device(CLI::App& app, EmulatorOptions& o) {
-  app.add_option("--joint-inertia", o.joint_inertia_kg_m2,
-                 "of each motor at its joint, kg m^2 (default: part of the tip's mass)")
-      ->check(between(0, kMaxInertiaKgM2));
-  app.add_option("--mode-hz", o.mode_hz, "structural mode of that inertia (default: rigid)")
-      ->check(between(0, kMaxModeHz));
-  app.add_flag("--drop-torque", o.drop_torque,
-               "omni, falcon: motors let go when the host is silent for 0.1 s (default: hold)");
-  app.add_flag("--pot-noise", o.pot_noise, "omni: noise in the low bits of the gimbal pots");
-  app.add_option("--packet-bytes", o.packet_bytes, "woodenhaptics: 14 (mbed) or 64 (Teensy)")
-      ->capture_default_str();
-  app.add_flag("--wireless-button", o.wireless_button,
-               "woodenhaptics: the hand's first button shows on encoder d");
-  app.add_option("--seed", o.seed, "of the noise")->capture_default_str();
+void declare_device(Arguments& app, EmulatorOptions& o) {
+  app.option("--joint-inertia", o.joint_inertia_kg_m2,
+             "of each motor at its joint, kg m^2 (default: part of the tip's mass)")
+      .within(0, kMaxInertiaKgM2);
+  app.option("--mode-hz", o.mode_hz, "structural mode of that inertia (default: rigid)")
+      .within(0, kMaxModeHz);
+  app.flag("--drop-torque", o.drop_torque,
+           "omni, falcon: motors let go when the host is silent for 0.1 s (default: hold)");
+  app.flag("--pot-noise", o.pot_noise, "omni: noise in the low bits of the gimbal pots");
+  app.option("--packet-bytes", o.packet_bytes, "woodenhaptics: 14 (mbed) or 64 (Teensy)")
+      .shows_default();
+  app.flag("--wireless-button", o.wireless_button,
+           "woodenhaptics: the hand's first button shows on encoder d");
+  app.option("--seed", o.seed, "of the noise").shows_default();
 }
 
 template <std::size_t N>
@@ -140,20 +128,17 @@ void check_device(const EmulatorOptions& o) {
 
 }  // namespace
 
-void declare(CLI::App& app, EmulatorOptions& o) {
-  app.set_version_flag("--version", "kerf-emulator " KERF_VERSION);
-  app.add_option("--personality", o.personality, "which device to be: omni, falcon, woodenhaptics")
-      ->capture_default_str();
-  app.add_flag("--describe", o.describe,
-               "print what a host has to be told of this unit (torque_scale), and end");
-  app.add_option("--hand", o.hand, "hand script (TOML); none: the arm stays in its rest pose");
-  app.add_option("--fault", o.fault,
-                 "fault script (TOML), for example hil/faults/late_reports.toml");
-  app.add_option("--unit-mm", o.unit_mm, "device mm per unit of the hand script")
-      ->check(between(1e-3, 100.0));
+void declare(Arguments& app, EmulatorOptions& o) {
+  app.option("--personality", o.personality, "which device to be: omni, falcon, woodenhaptics")
+      .shows_default();
+  app.flag("--describe", o.describe,
+           "print what a host has to be told of this unit (torque_scale), and end");
+  app.option("--hand", o.hand, "hand script (TOML); none: the arm stays in its rest pose");
+  app.option("--fault", o.fault, "fault script (TOML), for example hil/faults/late_reports.toml");
+  app.option("--unit-mm", o.unit_mm, "device mm per unit of the hand script").within(1e-3, 100.0);
   declare_front(app, o);
   declare_device(app, o);
-  app.add_option("--report", o.report, "write what was seen as JSON");
+  app.option("--report", o.report, "write what was seen as JSON");
 }
 
 void check(const EmulatorOptions& o) {

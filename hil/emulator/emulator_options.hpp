@@ -6,9 +6,8 @@
 #include <optional>
 #include <string>
 
-#include <CLI/CLI.hpp>
-
 #include "hil/emulator/bus_options.hpp"
+#include "shared/text/command_line.hpp"
 
 namespace kerf {
 
@@ -41,7 +40,7 @@ struct EmulatorOptions {
 };
 
 /// Tells `app` about all options. What `options` holds then is checked one by one only.
-void declare(CLI::App& app, EmulatorOptions& options);
+void declare(Arguments& app, EmulatorOptions& options);
 
 /// Throws `HilError` for options that do not fit together.
 void check(const EmulatorOptions& options);

@@ -9,8 +9,6 @@
 #include <string>
 #include <utility>
 
-#include <CLI/CLI.hpp>
-
 #include "hil/devmodel/falcon_model.hpp"
 #include "hil/devmodel/omni_model.hpp"
 #include "hil/devmodel/wooden_model.hpp"
@@ -27,6 +25,7 @@
 #include "hil/front/socket.hpp"
 #include "hil/front/udp_server.hpp"
 #include "hil/hil_error.hpp"
+#include "shared/text/command_line.hpp"
 
 namespace kerf {
 namespace {
@@ -156,10 +155,11 @@ void serve(const EmulatorOptions& o, const std::atomic<bool>& stop, std::ostream
 int run_emulator(int argc, const char* const* argv, const std::atomic<bool>& stop,
                  std::ostream& out, std::ostream& err) {
   EmulatorOptions options;
-  CLI::App app("Is the haptic device: wire bytes, mechanics, hand and faults.", "kerf-emulator");
+  CommandLine app("Is the haptic device: wire bytes, mechanics, hand and faults.", "kerf-emulator",
+                  "kerf-emulator " KERF_VERSION);
   declare(app, options);
   try {
-    app.parse(argc, argv);
+    if (!app.parse(argc, argv, out)) return 0;
     check(options);
     if (options.describe) {
       describe(options, out);
@@ -167,10 +167,8 @@ int run_emulator(int argc, const char* const* argv, const std::atomic<bool>& sto
       serve(options, stop, out, err);
     }
     return 0;
-  } catch (const CLI::Success& wanted) {  // --help, --version
-    return app.exit(wanted, out, err);
-  } catch (const CLI::ParseError& error) {
-    err << "kerf-emulator: " << error.what() << "; see --help\n";
+  } catch (const UsageError& error) {
+    err << "kerf-emulator: " << error.what() << '\n';
   } catch (const HilError& error) {
     err << "kerf-emulator: " << error.what() << '\n';
   }

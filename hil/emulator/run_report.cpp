@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "hil/emulator/run_report.hpp"
 
-#include <nlohmann/json.hpp>
+#include <array>
 
 #include "hil/hil_error.hpp"
 #include "shared/posix/hex64.hpp"
 #include "shared/posix/new_file.hpp"
+#include "shared/text/json.hpp"
 
 namespace kerf {
 namespace {
@@ -28,7 +29,7 @@ void write_run_report(const std::string& file, const Emulator& emulator, std::ui
                       const FrontStats& front) {
   const EmulatorStats& stats = emulator.stats();
   const DeviceVec<double> tip = emulator.model().tip_mm();
-  nlohmann::ordered_json report;
+  Json report;
   report["personality"] = emulator.model().name();
   report["seconds"] = seconds_of(stats.cycles);
   report["packets_sent"] = front.sent;
@@ -43,16 +44,12 @@ void write_run_report(const std::string& file, const Emulator& emulator, std::ui
   report["peak_motor_force_n"] = stats.peak_motor_force_n;
   report["calibrated"] = emulator.model().calibration() == Calibration::done;
   report["docked"] = emulator.model().docked();
-  if (stats.undocked_at) {
-    report["undocked_at_s"] = seconds_of(*stats.undocked_at);
-  } else {
-    report["undocked_at_s"] = nullptr;
-  }
-  report["final_tip_mm"] = {tip.x, tip.y, tip.z};
+  report["undocked_at_s"] = stats.undocked_at ? Json(seconds_of(*stats.undocked_at)) : nullptr;
+  report["final_tip_mm"] = std::array{tip.x, tip.y, tip.z};
   report["report_hash"] = hex64(stats.report_hash);
 
   try {
-    write_new_file(file, report.dump(2) + "\n");
+    write_new_file(file, report.document());
   } catch (const FileError& error) {
     throw HilError(std::string("--report: ") + error.what());
   }

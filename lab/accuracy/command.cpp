@@ -6,8 +6,6 @@
 #include <ostream>
 #include <vector>
 
-#include <CLI/CLI.hpp>
-
 #include "controller/shell/progress_bar.hpp"
 #include "lab/accuracy/export.hpp"
 #include "lab/accuracy/page.hpp"
@@ -32,17 +30,16 @@ std::string line_of(const Entry& entry) {
 
 }  // namespace
 
-Command::Command(CLI::App& program)
+Command::Command(Arguments& program)
     : LabCommand(program, "accuracy", "each knob of the contact force against analytic shapes") {
-  app_->add_option("--report", report_, "write the figures as JSON")->type_name("FILE");
-  app_->add_option("--csv", csv_, "write the figures as a table")->type_name("FILE");
-  app_->add_option("--plot", plot_, "draw error against time as SVG")->type_name("FILE");
-  app_->add_option("--page", page_,
-                   "write the figures as a page (docs/accuracy.md), and the plot beside it unless "
-                   "--plot says where")
-      ->type_name("FILE");
-  app_->add_option("--cpu", core_, "core to run on (default: the last)")
-      ->check(CLI::Range(0, 1023));
+  app_.option("--report", report_, "write the figures as JSON").shown_as("FILE");
+  app_.option("--csv", csv_, "write the figures as a table").shown_as("FILE");
+  app_.option("--plot", plot_, "draw error against time as SVG").shown_as("FILE");
+  app_.option("--page", page_,
+              "write the figures as a page (docs/accuracy.md), and the plot beside it unless "
+              "--plot says where")
+      .shown_as("FILE");
+  app_.option("--cpu", core_, "core to run on (default: the last)").within(0, 1023);
 }
 
 int Command::run(std::ostream& out) const {

@@ -10,7 +10,7 @@ namespace kerf::accuracy {
 /// `kerf-lab accuracy`: each knob of the contact force against analytic shapes.
 class Command final : public LabCommand {
  public:
-  explicit Command(CLI::App& program);
+  explicit Command(Arguments& program);
   [[nodiscard]] int run(std::ostream& out) const override;
 
  private:

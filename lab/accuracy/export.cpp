@@ -3,7 +3,7 @@
 
 #include <cstdio>
 
-#include <nlohmann/json.hpp>
+#include "shared/text/json.hpp"
 
 namespace kerf::accuracy {
 
@@ -24,9 +24,9 @@ std::string csv(const std::vector<Entry>& entries) {
 }
 
 std::string json(const std::vector<Entry>& entries, int core) {
-  nlohmann::ordered_json report;
+  Json report;
   report["core"] = core;
-  report["rows"] = nlohmann::ordered_json::array();
+  report["rows"] = Json::List{};
   for (const Entry& entry : entries) {
     for (const Figure& figure : entry.figures) {
       report["rows"].push_back({{"knob", entry.knob},
@@ -40,7 +40,7 @@ std::string json(const std::vector<Entry>& entries, int core) {
                                 {"us_max", entry.times.max_ns / 1e3}});
     }
   }
-  return report.dump(2) + "\n";
+  return report.document();
 }
 
 }  // namespace kerf::accuracy

@@ -10,7 +10,7 @@ namespace kerf {
 /// `kerf-lab bench`: the servo's kernels against the paper's form.
 class BenchCommand final : public LabCommand {
  public:
-  explicit BenchCommand(CLI::App& program);
+  explicit BenchCommand(Arguments& program);
   [[nodiscard]] int run(std::ostream& out) const override;
 
  private:

@@ -7,15 +7,13 @@
 #include <filesystem>
 #include <ostream>
 
-#include <CLI/CLI.hpp>
-#include <nlohmann/json.hpp>
-
 #include "lab/extremes/comparison.hpp"
 #include "lab/extremes/hands.hpp"
 #include "lab/extremes/measures.hpp"
 #include "lab/extremes/page.hpp"
 #include "lab/extremes/plot.hpp"
 #include "lab/rig/lab_run.hpp"
+#include "shared/text/json.hpp"
 
 namespace kerf::extremes {
 namespace {
@@ -71,41 +69,37 @@ std::string line_of(const Row& row) {
 }
 
 std::string json_of(const std::vector<Row>& rows) {
-  auto list = nlohmann::ordered_json::array();
-  const auto number = [](const std::optional<double>& limit) {
-    return limit ? nlohmann::ordered_json(*limit) : nlohmann::ordered_json(nullptr);
-  };
+  Json list = Json::List{};
   for (const Row& row : rows) {
     list.push_back({{"group", row.group},
                     {"name", row.name},
-                    {"value", row.skipped.empty() ? number(row.value) : number(std::nullopt)},
+                    {"value", row.skipped.empty() ? Json(row.value) : nullptr},
                     {"unit", row.unit},
-                    {"limit", number(row.must)},
-                    {"aim", number(row.aim)},
+                    {"limit", row.must},
+                    {"aim", row.aim},
                     {"pass", row.pass()}});
   }
-  return nlohmann::ordered_json{{"rows", list}}.dump(2) + "\n";
+  return Json{{"rows", list}}.document();
 }
 
 }  // namespace
 
-Command::Command(CLI::App& program)
+Command::Command(Arguments& program)
     : LabCommand(program, "extremes", "the swept contact against its limits, beside the paper's") {
   std::vector<std::string> names;
   for (const Group& group : kGroups) names.emplace_back(group.name);
-  CLI::Option* only = app_->add_option("--only", only_, "only these groups of rows");
-  only->check(CLI::IsMember(names))->delimiter(',')->type_name("GROUP,...");
-  app_->add_flag("--quick", quick_, "a hundredth of the cases");
-  app_->add_option("--report", report_, "write the rows as JSON")->type_name("FILE");
-  app_->add_option("--page", page_, "write all as a page (docs/contact.md), its plots beside it")
-      ->excludes(only)
-      ->type_name("FILE");
-  app_->add_option("--data", data_, "folder of real volumes (default: $KERF_DATA)")
-      ->envname("KERF_DATA")
-      ->type_name("DIR");
-  app_->add_option("--cpu", core_, "core to run on (default: the last)")
-      ->check(CLI::Range(0, 1023));
-  app_->footer("Exit codes: 0 every limit is kept, 1 one is not, 2 bad input or set-up.");
+  Option only = app_.option("--only", only_, "only these groups of rows");
+  only.one_of(names).split_at_commas().shown_as("GROUP,...");
+  app_.flag("--quick", quick_, "a hundredth of the cases");
+  app_.option("--report", report_, "write the rows as JSON").shown_as("FILE");
+  app_.option("--page", page_, "write all as a page (docs/contact.md), its plots beside it")
+      .excludes(only)
+      .shown_as("FILE");
+  app_.option("--data", data_, "folder of real volumes (default: $KERF_DATA)")
+      .from_environment("KERF_DATA")
+      .shown_as("DIR");
+  app_.option("--cpu", core_, "core to run on (default: the last)").within(0, 1023);
+  app_.footer("Exit codes: 0 every limit is kept, 1 one is not, 2 bad input or set-up.");
 }
 
 int Command::run(std::ostream& out) const {

@@ -11,7 +11,7 @@ namespace kerf::extremes {
 /// `kerf-lab extremes`: the swept contact against its limits, and beside the paper's force.
 class Command final : public LabCommand {
  public:
-  explicit Command(CLI::App& program);
+  explicit Command(Arguments& program);
   [[nodiscard]] int run(std::ostream& out) const override;
 
  private:

@@ -11,9 +11,6 @@
 #include <thread>
 #include <utility>
 
-#include <CLI/CLI.hpp>
-#include <nlohmann/json.hpp>
-
 #include "controller/load/scene_load.hpp"
 #include "controller/scene/scene_error.hpp"
 #include "hil/devmodel/falcon_model.hpp"
@@ -24,6 +21,7 @@
 #include "hil/hil_error.hpp"
 #include "lab/faults/fault_run.hpp"
 #include "lab/rig/lab_run.hpp"
+#include "shared/text/json.hpp"
 
 namespace kerf::faults {
 namespace {
@@ -116,7 +114,7 @@ std::string line_of(const Row& row) {
   return text;
 }
 
-nlohmann::ordered_json json_of(const Row& row) {
+Json json_of(const Row& row) {
   return {{"device", row.device},
           {"script", row.script},
           {"runs", row.runs},
@@ -135,25 +133,25 @@ nlohmann::ordered_json json_of(const Row& row) {
 
 }  // namespace
 
-Command::Command(CLI::App& program)
+Command::Command(Arguments& program)
     : LabCommand(program, "faults", "every device and fault against the safety contract") {
   for (const std::string_view word : kPersonalityWords) devices_.emplace_back(word);
-  app_->add_option("--device", devices_, "only these")
-      ->check(CLI::IsMember(devices_))
-      ->delimiter(',')
-      ->type_name("NAME,...");
-  app_->add_option("--scripts", scripts_, "fault script, or folder of them")->capture_default_str();
-  app_->add_option("--seeds", seeds_, "runs of each script, each with its own random numbers")
-      ->check(CLI::Range(1, 100000))
-      ->capture_default_str();
-  app_->add_option("--random", random_, "1: faults at random as well, another set for each seed")
-      ->check(CLI::Range(0, 1))
-      ->capture_default_str();
-  app_->add_option("--scene", scene_, "what is touched")->capture_default_str();
-  app_->add_option("--hand", hand_, "how")->capture_default_str();
-  app_->add_option("--rate", rate_hz_, "of the servo, Hz; must divide 8000")->capture_default_str();
-  app_->add_option("--report", report_, "write the figures as JSON")->type_name("FILE");
-  app_->footer("Exit codes: 0 the contract holds, 1 it was broken, 2 bad input or set-up.");
+  app_.option("--device", devices_, "only these")
+      .one_of(devices_)
+      .split_at_commas()
+      .shown_as("NAME,...");
+  app_.option("--scripts", scripts_, "fault script, or folder of them").shows_default();
+  app_.option("--seeds", seeds_, "runs of each script, each with its own random numbers")
+      .within(1, 100000)
+      .shows_default();
+  app_.option("--random", random_, "1: faults at random as well, another set for each seed")
+      .within(0, 1)
+      .shows_default();
+  app_.option("--scene", scene_, "what is touched").shows_default();
+  app_.option("--hand", hand_, "how").shows_default();
+  app_.option("--rate", rate_hz_, "of the servo, Hz; must divide 8000").shows_default();
+  app_.option("--report", report_, "write the figures as JSON").shown_as("FILE");
+  app_.footer("Exit codes: 0 the contract holds, 1 it was broken, 2 bad input or set-up.");
 }
 
 int Command::run(std::ostream& out) const {
@@ -168,7 +166,7 @@ int Command::run(std::ostream& out) const {
 
   out << "device         script              runs  faults latched latch ms on again  peak N   tip N"
          "    N/ms off ms broken\n";
-  auto rows = nlohmann::ordered_json::array();
+  Json rows = Json::List{};
   std::uint64_t broken = 0;
   for (const std::string& device : devices_) {
     SceneOverrides overrides;
@@ -203,7 +201,7 @@ int Command::run(std::ostream& out) const {
       rows.push_back(json_of(row));
     }
   }
-  report.write(nlohmann::ordered_json{{"rows", rows}, {"violations", broken}}.dump(2) + "\n");
+  report.write(Json{{"rows", rows}, {"violations", broken}}.document());
   return broken == 0 ? 0 : 1;
 }
 

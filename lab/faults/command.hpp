@@ -11,7 +11,7 @@ namespace kerf::faults {
 /// `kerf-lab faults`: every device, every fault script and every seed against the safety contract.
 class Command final : public LabCommand {
  public:
-  explicit Command(CLI::App& program);
+  explicit Command(Arguments& program);
   [[nodiscard]] int run(std::ostream& out) const override;
 
  private:

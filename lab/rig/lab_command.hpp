@@ -3,9 +3,7 @@
 
 #include <iosfwd>
 
-namespace CLI {  // NOLINT(readability-identifier-naming): the library's name
-class App;
-}
+#include "shared/text/command_line.hpp"
 
 namespace kerf {
 
@@ -23,9 +21,9 @@ class LabCommand {
   [[nodiscard]] virtual int run(std::ostream& out) const = 0;
 
  protected:
-  LabCommand(CLI::App& program, const char* name, const char* about);
+  LabCommand(Arguments& program, const char* name, const char* about);
 
-  CLI::App* app_;
+  Arguments app_;
 };
 
 }  // namespace kerf

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
+
 #include "controller/kernel/proxy/tool_turn.hpp"
 #include "lab/rig/points.hpp"
 

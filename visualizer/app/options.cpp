@@ -8,8 +8,7 @@
 #include <sstream>
 #include <string_view>
 
-#include <CLI/CLI.hpp>
-
+#include "shared/text/command_line.hpp"
 #include "visualizer/app/keys.hpp"
 #include "visualizer/error.hpp"
 #include "visualizer/render/renderer.hpp"
@@ -22,12 +21,6 @@ namespace {
 
 constexpr const char* kBenchSize = "512x512";  // the paper's
 
-/// CLI11 explains over several lines; a user wants one.
-std::string one_line(std::string text) {
-  std::replace(text.begin(), text.end(), '\n', ' ');
-  return text;
-}
-
 std::string footer() {
   std::ostringstream text;
   text << "In the window (files go to --out):\n";
@@ -38,23 +31,6 @@ std::string footer() {
   text << "Exit codes: 0 fine, 1 the controller did not end cleanly or a video is cut short, 2 bad "
           "input or set-up, or the screen or the graphics card is gone.";
   return text.str();
-}
-
-std::string limits(double lowest, double highest) {
-  std::ostringstream text;
-  text << std::setprecision(15) << "[" << lowest << " - " << highest << "]";
-  return text.str();
-}
-
-/// CLI::Range takes "nan" for a number in any range, and names the type once more.
-CLI::Validator range(double lowest, double highest) {
-  const auto check = [=](const std::string& text) {
-    double value = 0.0;
-    const bool inside =
-        CLI::detail::lexical_cast(text, value) && value >= lowest && value <= highest;
-    return inside ? std::string() : text + " is no number in " + limits(lowest, highest);
-  };
-  return {check, limits(lowest, highest)};
 }
 
 }  // namespace
@@ -89,99 +65,91 @@ std::optional<VisualizerOptions> parse_options(int argc, const char* const* argv
   VisualizerOptions options;
   std::string size = "800x600";
   std::string gradient(kGradientNames[static_cast<std::size_t>(options.gradient)]);
-  CLI::App app("Shows what a kerf-controller feels and mills, in a window or as PNG pictures.",
-               "kerf-visualizer");
+  CommandLine app("Shows what a kerf-controller feels and mills, in a window or as PNG pictures.",
+                  "kerf-visualizer", "kerf-visualizer " KERF_VERSION);
   app.footer(footer());
-  app.set_version_flag("--version", std::string("kerf-visualizer " KERF_VERSION));
-  app.add_option("--name", options.name, "the controller's name")->capture_default_str();
-  app.add_option("--renderer", options.renderer,
-                 "how volumes are drawn: " + known_renderers() +
-                     "; with commas one for each volume, such as surface,blend")
-      ->type_name("KIND[,KIND...]")
-      ->capture_default_str();
-  app.add_option("--gradient", gradient,
-                 "what iso, surface, blend and slices shade from: central (two voxels), corners "
-                 "(2x2x2 means) or farid5 (5x5x5, 8 more bytes a voxel in iso); cast always "
-                 "corners")
-      ->capture_default_str();
-  app.add_option("--size", size, "width and height in pixels")
-      ->type_name("WxH")
-      ->capture_default_str();
-  app.add_option(
-         "--transfer", options.transfer,
-         "opacity of each material, TOML, for blend, slices and cast-blend; in the window w "
-         "writes it")
-      ->type_name("FILE");
-  app.add_flag("--voxel-tool", options.voxel_tool,
-               "the tool as a volume of voxels, which the renderer draws as it does the others and "
-               "the clip plane cuts too")
-      ->disable_flag_override();
-  app.add_flag("--stereo", options.stereo.on, "two eyes side by side, each in half the width")
-      ->disable_flag_override();
-  app.add_option("--eyes", options.stereo.eyes_mm,
-                 "stereo: mm between the eyes; negative: crossed (default: 1/30 of --convergence)")
-      ->check(range(-1e3, 1e3));
-  app.add_option("--convergence", options.stereo.convergence_mm,
-                 "stereo: mm to what lies in the screen (default: to where the camera looks)")
-      ->check(range(1.0, 1e6));
-  auto* headless = app.add_flag("--headless", options.headless, "no window: pictures into --out")
-                       ->disable_flag_override();
-  app.add_option("--frames", options.frames, "headless: number of pictures")
-      ->check(range(1, 9999))
-      ->capture_default_str();
-  app.add_option("--every-ticks", options.every_ticks,
-                 "headless: servo ticks between pictures (default: one second)")
-      ->check(range(1.0, 0x1p40));
-  app.add_option("--out", options.out, "folder for pictures and screenshots")
-      ->type_name("DIR")
-      ->capture_default_str();
-  app.add_option("--seconds", options.seconds, "end after this time")->check(range(0.0, 1e6));
-  app.add_option("--wait", options.wait_s, "seconds to wait for the controller")
-      ->check(range(0.0, 1e6))
-      ->capture_default_str();
-  app.add_option("--attached", options.attached,
-                 "make this empty file once the controller is shown: a short run may begin")
-      ->type_name("FILE");
-  app.add_option("--cpu", options.cpus, "cores to run on, e.g. 0,1 (default: all but the last)")
-      ->delimiter(',')
-      ->check(range(0, 1023));
-  app.add_option("--export", options.mesh,
-                 "surface of all solid volumes as a closed mesh in mm, FILE.stl or FILE.ply (with "
-                 "colours): headless at the end, in the window with e")
-      ->type_name("FILE");
-  app.add_option("--sheet", options.sheet,
-                 "headless: at the end one PNG with the final state by every renderer")
-      ->type_name("FILE")
-      ->needs(headless);
-  auto* record = app.add_option("--record", options.record,
-                                "raw video in true time (y4m): a file, a pipe, or - for stdout; "
-                                "headless without pictures unless --frames")
-                     ->type_name("FILE");
-  app.add_option("--fps", options.video_hz, "record: frames per second of servo time")
-      ->check(range(1, 240))
-      ->capture_default_str();
-  app.add_option("--report", options.report, "write times and counts to this JSON file")
-      ->type_name("FILE");
-  auto* bench = app.add_flag("--bench", options.bench,
-                             "time every renderer, without a controller (512x512 unless --size)")
-                    ->disable_flag_override();
-  app.add_option("--page", options.page, "bench: write the table to this Markdown file")
-      ->type_name("FILE")
-      ->needs(bench);
-  app.add_option("--summary", options.summary,
-                 "bench: write a short table as its part of this Markdown file")
-      ->type_name("FILE")
-      ->needs(bench);
+  app.option("--name", options.name, "the controller's name").shows_default();
+  app.option("--renderer", options.renderer,
+             "how volumes are drawn: " + known_renderers() +
+                 "; with commas one for each volume, such as surface,blend")
+      .shown_as("KIND[,KIND...]")
+      .shows_default();
+  app.option("--gradient", gradient,
+             "what iso, surface, blend and slices shade from: central (two voxels), corners "
+             "(2x2x2 means) or farid5 (5x5x5, 8 more bytes a voxel in iso); cast always "
+             "corners")
+      .shows_default();
+  const Option sized =
+      app.option("--size", size, "width and height in pixels").shown_as("WxH").shows_default();
+  app.option("--transfer", options.transfer,
+             "opacity of each material, TOML, for blend, slices and cast-blend; in the window w "
+             "writes it")
+      .shown_as("FILE");
+  app.flag("--voxel-tool", options.voxel_tool,
+           "the tool as a volume of voxels, which the renderer draws as it does the others and "
+           "the clip plane cuts too");
+  app.flag("--stereo", options.stereo.on, "two eyes side by side, each in half the width");
+  app.option("--eyes", options.stereo.eyes_mm,
+             "stereo: mm between the eyes; negative: crossed (default: 1/30 of --convergence)")
+      .within(-1e3, 1e3);
+  app.option("--convergence", options.stereo.convergence_mm,
+             "stereo: mm to what lies in the screen (default: to where the camera looks)")
+      .within(1.0, 1e6);
+  const Option headless =
+      app.flag("--headless", options.headless, "no window: pictures into --out");
+  const Option frames = app.option("--frames", options.frames, "headless: number of pictures")
+                            .within(1, 9999)
+                            .shows_default();
+  app.option("--every-ticks", options.every_ticks,
+             "headless: servo ticks between pictures (default: one second)")
+      .within(1.0, 0x1p40);
+  app.option("--out", options.out, "folder for pictures and screenshots")
+      .shown_as("DIR")
+      .shows_default();
+  app.option("--seconds", options.seconds, "end after this time").within(0.0, 1e6);
+  app.option("--wait", options.wait_s, "seconds to wait for the controller")
+      .within(0.0, 1e6)
+      .shows_default();
+  app.option("--attached", options.attached,
+             "make this empty file once the controller is shown: a short run may begin")
+      .shown_as("FILE");
+  app.option("--cpu", options.cpus, "cores to run on, e.g. 0,1 (default: all but the last)")
+      .split_at_commas()
+      .within(0, 1023);
+  app.option("--export", options.mesh,
+             "surface of all solid volumes as a closed mesh in mm, FILE.stl or FILE.ply (with "
+             "colours): headless at the end, in the window with e")
+      .shown_as("FILE");
+  app.option("--sheet", options.sheet,
+             "headless: at the end one PNG with the final state by every renderer")
+      .shown_as("FILE")
+      .needs(headless);
+  const Option record = app.option("--record", options.record,
+                                   "raw video in true time (y4m): a file, a pipe, or - for stdout; "
+                                   "headless without pictures unless --frames")
+                            .shown_as("FILE");
+  app.option("--fps", options.video_hz, "record: frames per second of servo time")
+      .within(1, 240)
+      .shows_default();
+  app.option("--report", options.report, "write times and counts to this JSON file")
+      .shown_as("FILE");
+  const Option bench =
+      app.flag("--bench", options.bench,
+               "time every renderer, without a controller (512x512 unless --size)");
+  app.option("--page", options.page, "bench: write the table to this Markdown file")
+      .shown_as("FILE")
+      .needs(bench);
+  app.option("--summary", options.summary,
+             "bench: write a short table as its part of this Markdown file")
+      .shown_as("FILE")
+      .needs(bench);
   try {
-    app.parse(argc, argv);
-  } catch (const CLI::Success& asked) {  // --help, --version
-    app.exit(asked, std::cout, std::cerr);
-    return std::nullopt;
-  } catch (const CLI::ParseError& problem) {
-    throw VisualizerError(one_line(problem.what()) + "; see --help");
+    if (!app.parse(argc, argv, std::cout)) return std::nullopt;
+  } catch (const UsageError& problem) {
+    throw VisualizerError(problem.what());
   }
-  if (*record && app.count("--frames") == 0) options.frames = 0;
-  if (options.bench && app.count("--size") == 0) size = kBenchSize;
+  if (record.given() && !frames.given()) options.frames = 0;
+  if (options.bench && !sized.given()) size = kBenchSize;
   options.size = parse_size(size);
   check_renderers(options.renderer);
   options.gradient = gradient_named(gradient);

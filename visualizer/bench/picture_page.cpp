@@ -6,9 +6,8 @@
 #include <cstdio>
 #include <string_view>
 
-#include <nlohmann/json.hpp>
-
 #include "shared/posix/provenance.hpp"
+#include "shared/text/json.hpp"
 
 namespace kerf {
 
@@ -186,7 +185,7 @@ std::string picture_summary(const PictureFigures& figures) {
 }
 
 std::string picture_report(const PictureFigures& figures) {
-  nlohmann::ordered_json rows = nlohmann::ordered_json::array();
+  Json rows = Json::List{};
   for (const PictureRow& row : figures.rows) {
     rows.push_back({{"renderer", row.renderer},
                     {"gradient", kGradientNames[static_cast<std::size_t>(row.gradient)]},
@@ -200,20 +199,20 @@ std::string picture_report(const PictureFigures& figures) {
                     {"wall_ms_p50", row.wall_ms_p50},
                     {"wall_ms_p99", row.wall_ms_p99}});
   }
-  nlohmann::ordered_json gradients = nlohmann::ordered_json::array();
+  Json gradients = Json::List{};
   for (const GradientRow& row : figures.gradients) {
     gradients.push_back({{"gradient", kGradientNames[static_cast<std::size_t>(row.gradient)]},
                          {"angle_deg", row.angle_deg},
                          {"noisy_angle_deg", row.noisy_angle_deg}});
   }
-  const nlohmann::ordered_json report{{"gl_renderer", figures.gl_renderer},
-                                      {"processor", processor_name()},
-                                      {"cores", figures.cores},
-                                      {"width", figures.size.width},
-                                      {"height", figures.size.height},
-                                      {"rows", std::move(rows)},
-                                      {"gradients", std::move(gradients)}};
-  return report.dump(2) + "\n";
+  const Json report{{"gl_renderer", figures.gl_renderer},
+                    {"processor", processor_name()},
+                    {"cores", figures.cores},
+                    {"width", figures.size.width},
+                    {"height", figures.size.height},
+                    {"rows", std::move(rows)},
+                    {"gradients", std::move(gradients)}};
+  return report.document();
 }
 
 }  // namespace kerf

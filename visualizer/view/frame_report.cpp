@@ -5,8 +5,7 @@
 #include <cmath>
 #include <ctime>
 
-#include <nlohmann/json.hpp>
-
+#include "shared/text/json.hpp"
 #include "visualizer/view/file_out.hpp"
 
 namespace kerf {
@@ -22,7 +21,7 @@ std::int64_t process_cpu_ns() {
   return std::int64_t{time.tv_sec} * kNsPerS + std::int64_t{time.tv_nsec};
 }
 
-nlohmann::ordered_json spread(const std::vector<double>& values) {
+Json spread(const std::vector<double>& values) {
   return {{"p50", percentile(values, 0.50)},
           {"p99", percentile(values, 0.99)},
           {"max", percentile(values, 1.0)}};
@@ -51,16 +50,15 @@ double percentile(std::vector<double> values, double share) {
 }
 
 void FrameReport::write(const std::filesystem::path& file) const {
-  const nlohmann::ordered_json report{
-      {"renderer", renderer},       {"gl_renderer", gl_renderer},
-      {"context", context},         {"width", width},
-      {"height", height},           {"frames", wall_ms.size()},
-      {"cpu_ms", spread(cpu_ms)},   {"wall_ms", spread(wall_ms)},
-      {"redrawn", spread(redrawn)}, {"latency_ms", spread(latency_ms)},
-      {"rest_frames", rest_frames}, {"bricks_uploaded", bricks_uploaded},
-      {"attach_ms", attach_ms},     {"late_join_ms", late_join_ms},
-      {"clean_end", clean_end}};
-  const std::string text = report.dump(2) + "\n";
+  const Json report{{"renderer", renderer},       {"gl_renderer", gl_renderer},
+                    {"context", context},         {"width", width},
+                    {"height", height},           {"frames", wall_ms.size()},
+                    {"cpu_ms", spread(cpu_ms)},   {"wall_ms", spread(wall_ms)},
+                    {"redrawn", spread(redrawn)}, {"latency_ms", spread(latency_ms)},
+                    {"rest_frames", rest_frames}, {"bricks_uploaded", bricks_uploaded},
+                    {"attach_ms", attach_ms},     {"late_join_ms", late_join_ms},
+                    {"clean_end", clean_end}};
+  const std::string text = report.document();
   write_file(file, {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()});
 }
 

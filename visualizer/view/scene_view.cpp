@@ -6,22 +6,20 @@
 
 #include <glm/gtc/matrix_transform.hpp>
 #include <glm/gtc/quaternion.hpp>
-#include <nlohmann/json.hpp>
 
+#include "shared/text/json.hpp"
 #include "visualizer/error.hpp"
 
 namespace kerf {
 
 namespace {
 
-using nlohmann::json;
-
 constexpr std::size_t kMaxProfilePoints = 4096;  // a mesh of some 10^5 triangles
 
 constexpr std::size_t kMaxTriangles = 65536;  // as the controller takes them
 
-void read_profile(const json& text, ToolView& tool) {
-  for (const json& point : text) {
+void read_profile(const Json& text, ToolView& tool) {
+  for (const Json& point : text) {
     const auto at = point.get<std::array<double, 2>>();
     if (!std::isfinite(at[0]) || !std::isfinite(at[1]) || at[1] < 0.0) {
       throw VisualizerError("segment scene: tool " + tool.name +
@@ -38,10 +36,10 @@ void read_profile(const json& text, ToolView& tool) {
   }
 }
 
-void read_facets(const json& text, ToolView& tool) {
+void read_facets(const Json& text, ToolView& tool) {
   Facets& facets = tool.facets;
-  text.at("points_mm").get_to(facets.points_mm);
-  text.at("triangles").get_to(facets.triangles);
+  facets.points_mm = text.at("points_mm").get<decltype(facets.points_mm)>();
+  facets.triangles = text.at("triangles").get<decltype(facets.triangles)>();
   const std::size_t points = facets.points_mm.size();
   const bool is_mesh =
       !facets.triangles.empty() && facets.triangles.size() <= kMaxTriangles &&
@@ -64,7 +62,7 @@ void read_facets(const json& text, ToolView& tool) {
   }
 }
 
-ToolView tool_view(const json& text) {
+ToolView tool_view(const Json& text) {
   ToolView tool;
   tool.name = text.at("name").get<std::string>();
   if (text.contains("mesh")) {
@@ -75,7 +73,7 @@ ToolView tool_view(const json& text) {
   return tool;
 }
 
-MaterialView material_view(const json& text) {
+MaterialView material_view(const Json& text) {
   const auto colour = text.at("colour").get<std::array<double, 3>>();
   return {.name = text.at("name").get<std::string>(),
           .iso = text.at("iso").get<double>(),
@@ -140,15 +138,15 @@ SceneView scene_view(const SegmentInfo& segment) {
   SceneView scene;
   for (const SegmentVolumeInfo& info : segment.volumes) scene.volumes.push_back(volume_view(info));
   try {
-    const json text = json::parse(segment.scene_json);
-    const json& volumes = text.at("volumes");
+    const Json text = Json::parse(segment.scene_json);
+    const Json& volumes = text.at("volumes");
     for (std::size_t i = 0; i < scene.volumes.size() && i < volumes.size(); ++i) {
-      scene.volumes[i].name = volumes[i].at("name").get<std::string>();
-      scene.volumes[i].solid = volumes[i].at("solid").get<bool>();
+      scene.volumes[i].name = volumes.at(i).at("name").get<std::string>();
+      scene.volumes[i].solid = volumes.at(i).at("solid").get<bool>();
     }
-    for (const json& tool : text.at("tools")) scene.tools.push_back(tool_view(tool));
-    for (const json& one : text.at("materials")) scene.materials.push_back(material_view(one));
-  } catch (const json::exception& problem) {
+    for (const Json& tool : text.at("tools")) scene.tools.push_back(tool_view(tool));
+    for (const Json& one : text.at("materials")) scene.materials.push_back(material_view(one));
+  } catch (const JsonError& problem) {
     throw VisualizerError("segment scene: " + std::string(problem.what()) +
                           "; start controller and visualizer of one version");
   }

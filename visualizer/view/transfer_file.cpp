@@ -8,18 +8,9 @@
 #include <string>
 #include <system_error>
 
-#include <nlohmann/json.hpp>
-
-// Debian's toml++ 3.3.0 asserts that a table header begins with a key before it has looked: `[!]`
-// would end the program instead of being refused. (With NDEBUG assertions become assumptions.)
-#pragma push_macro("NDEBUG")
-#undef NDEBUG
-#define TOML_ASSERT(expr) static_cast<void>(0)
-#define TOML_EXCEPTIONS 0
-#include <toml++/toml.h>
-#pragma pop_macro("NDEBUG")
-
 #include "shared/posix/new_file.hpp"
+#include "shared/text/json.hpp"
+#include "shared/text/toml.hpp"
 #include "visualizer/error.hpp"
 
 namespace kerf {
@@ -100,7 +91,7 @@ void write_transfer(const std::filesystem::path& file, const Opacities& opacitie
       << "# Opacity over one voxel edge, by material: kerf-visualizer --transfer FILE\n[opacity]\n";
   for (const auto& [material, opacity] : opacities) {
     // A quoted key of TOML is a string of JSON; toml++ itself leaves quotes in keys as they are.
-    text << nlohmann::json(material).dump() << " = " << opacity << "\n";
+    text << Json(material).canonical() << " = " << opacity << "\n";
   }
   write_new_file(file, text.str());
 }

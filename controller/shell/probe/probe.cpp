@@ -10,7 +10,6 @@
 #include <string>
 #include <vector>
 
-#include <nlohmann/json.hpp>
 #include <unistd.h>
 
 #include "controller/device/driver/make_driver.hpp"
@@ -24,6 +23,7 @@
 #include "controller/shell/real_time.hpp"
 #include "shared/posix/new_file.hpp"
 #include "shared/posix/stop_signals.hpp"
+#include "shared/text/json.hpp"
 
 namespace kerf {
 namespace {
@@ -121,8 +121,8 @@ void watch(DeviceDriver& driver, const PacketPort& port, ProbeView& view, std::u
   live.end();
 }
 
-nlohmann::ordered_json json_of(const std::vector<Lack>& lacks) {
-  auto list = nlohmann::ordered_json::array();
+Json json_of(const std::vector<Lack>& lacks) {
+  Json list = Json::List{};
   for (const Lack& lack : lacks) list.push_back({{"what", lack.what}, {"cure", lack.cure}});
   return list;
 }
@@ -151,7 +151,7 @@ int look_around(const ControllerOptions& options) {
   auto lacks = lacks_of_nodes(options.overrides.personality, nodes);
   const auto rights = lacks_of_rights();
   lacks.insert(lacks.end(), rights.begin(), rights.end());
-  auto devices = nlohmann::ordered_json::array();
+  Json devices = Json::List{};
   for (const DeviceNode& node : nodes) {
     std::printf("found    %s at %s\n", word_of(node.personality).c_str(), node.path.c_str());
     devices.push_back({{"device", word_of(node.personality)},
@@ -162,20 +162,20 @@ int look_around(const ControllerOptions& options) {
   if (rights.empty()) std::puts("found    real-time priority and locked memory");
   print(lacks);
   if (!options.report.empty()) {
-    const nlohmann::ordered_json json{{"program", "kerf-controller --probe"},
-                                      {"version", KERF_VERSION},
-                                      {"devices", devices},
-                                      {"missing", json_of(lacks)}};
-    write_new_file(options.report, json.dump(2) + "\n");
+    const Json json{{"program", "kerf-controller --probe"},
+                    {"version", KERF_VERSION},
+                    {"devices", devices},
+                    {"missing", json_of(lacks)}};
+    write_new_file(options.report, json.document());
   }
   return 0;
 }
 
-nlohmann::ordered_json report_of(const ControllerOptions& options, const DeviceSettings& device,
-                                 const PacketPort& port, const DeviceDriver& driver,
-                                 const ProbeView& view, int rate_hz) {
+Json report_of(const ControllerOptions& options, const DeviceSettings& device,
+               const PacketPort& port, const DeviceDriver& driver, const ProbeView& view,
+               int rate_hz) {
   const ProbeView::Seen& seen = view.seen();
-  nlohmann::ordered_json link = nlohmann::ordered_json::object();
+  Json link = Json::Members{};
   for (const LinkCounter& counter : port.counters()) link[counter.name] = counter.value;
   const double seconds = static_cast<double>(seen.ticks) / rate_hz;
   return {{"program", "kerf-controller --probe"},
@@ -196,7 +196,7 @@ nlohmann::ordered_json report_of(const ControllerOptions& options, const DeviceS
           {"parked", seen.parked},
           {"homed", seen.homed},
           {"calibrated", seen.calibrated},
-          {"tip_mm", seen.calibrated ? nlohmann::ordered_json(view.tip_mm()) : nullptr}};
+          {"tip_mm", seen.calibrated ? Json(view.tip_mm()) : nullptr}};
 }
 
 }  // namespace
@@ -230,7 +230,7 @@ int run_probe(const ControllerOptions& options) {
   if (!options.report.empty()) {
     auto json = report_of(options, device, *port, *driver, view, rate_hz);
     json["missing"] = json_of(lacks);
-    write_new_file(options.report, json.dump(2) + "\n");
+    write_new_file(options.report, json.document());
   }
   return view.seen().reports > 0 ? 0 : 1;
 }

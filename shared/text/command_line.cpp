@@ -1,0 +1,151 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "shared/text/command_line.hpp"
+
+#include <algorithm>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <sstream>
+
+#include <CLI/CLI.hpp>
+
+#include "shared/text/number.hpp"
+
+namespace kerf {
+namespace {
+
+/// CLI::Range takes "nan" for a number in any range, and names the type once more.
+CLI::Validator range(double lowest, double highest) {
+  std::ostringstream limits;
+  limits.precision(15);
+  limits << "[" << lowest << " - " << highest << "]";
+  const auto check = [=, limits = limits.str()](const std::string& text) {
+    const auto value = number_in(text);
+    return value && *value >= lowest && *value <= highest ? std::string()
+                                                          : text + " is no number in " + limits;
+  };
+  return {check, limits.str()};
+}
+
+/// CLI::IsMember for words; as a template of the library it costs seconds to compile.
+CLI::Validator member(std::vector<std::string> words) {
+  std::string known;
+  for (const std::string& word : words) known += (known.empty() ? "" : ",") + word;
+  known = "{" + known + "}";
+  const auto check = [words = std::move(words), known](const std::string& text) {
+    const bool found = std::ranges::find(words, text) != words.end();
+    return found ? std::string() : text + " not in " + known;
+  };
+  return {check, known};
+}
+
+/// The library explains over several lines; a user wants one.
+std::string one_line(std::string text) {
+  std::ranges::replace(text, '\n', ' ');
+  return text;
+}
+
+}  // namespace
+
+Option& Option::shown_as(const char* word) {
+  option_->type_name(word);
+  return *this;
+}
+Option& Option::shows_default() {
+  option_->capture_default_str();
+  return *this;
+}
+Option& Option::required() {
+  option_->required();
+  return *this;
+}
+Option& Option::within(double lowest, double highest) {
+  option_->check(range(lowest, highest));
+  return *this;
+}
+Option& Option::one_of(std::vector<std::string> words) {
+  option_->check(member(std::move(words)));
+  return *this;
+}
+Option& Option::values(int fewest, int most) {
+  option_->delimiter(',')->expected(fewest, most);
+  return *this;
+}
+Option& Option::split_at_commas() {
+  option_->delimiter(',');
+  return *this;
+}
+Option& Option::needs(Option other) {
+  option_->needs(other.option_);
+  return *this;
+}
+Option& Option::excludes(Option other) {
+  option_->excludes(other.option_);
+  return *this;
+}
+Option& Option::from_environment(const char* name) {
+  option_->envname(name);
+  return *this;
+}
+bool Option::given() const {
+  return option_->count() > 0;
+}
+
+template <class T>
+Option Arguments::option(const char* name, T& value, const std::string& meaning) {
+  return Option(app_->add_option(name, value, meaning));
+}
+template Option Arguments::option(const char*, int&, const std::string&);
+template Option Arguments::option(const char*, std::int64_t&, const std::string&);
+template Option Arguments::option(const char*, std::uint32_t&, const std::string&);
+template Option Arguments::option(const char*, std::uint64_t&, const std::string&);
+template Option Arguments::option(const char*, double&, const std::string&);
+template Option Arguments::option(const char*, std::string&, const std::string&);
+template Option Arguments::option(const char*, std::filesystem::path&, const std::string&);
+template Option Arguments::option(const char*, std::optional<double>&, const std::string&);
+template Option Arguments::option(const char*, std::optional<std::string>&, const std::string&);
+template Option Arguments::option(const char*, std::optional<std::filesystem::path>&,
+                                  const std::string&);
+template Option Arguments::option(const char*, std::vector<int>&, const std::string&);
+template Option Arguments::option(const char*, std::vector<double>&, const std::string&);
+template Option Arguments::option(const char*, std::vector<std::string>&, const std::string&);
+
+Option Arguments::flag(const char* name, bool& value, const std::string& meaning) {
+  return Option(app_->add_flag(name, value, meaning)->disable_flag_override());
+}
+
+Arguments Arguments::command(const char* name, const char* about) {
+  app_->require_subcommand(1);
+  return Arguments(app_->add_subcommand(name, about));
+}
+
+void Arguments::footer(const std::string& text) {
+  app_->footer(text);
+}
+
+bool Arguments::chosen() const {
+  return app_->parsed();
+}
+
+CommandLine::CommandLine(const std::string& about, const std::string& program,
+                         const std::string& version)
+    : Arguments(nullptr), owned_(std::make_unique<CLI::App>(about, program)) {
+  app_ = owned_.get();
+  app_->set_version_flag("--version", version);
+}
+
+CommandLine::~CommandLine() = default;
+
+bool CommandLine::parse(int argc, const char* const* argv, std::ostream& out) {
+  try {
+    app_->parse(argc, argv);
+    return true;
+  } catch (const CLI::Success& asked) {  // --help, --version
+    app_->exit(asked, out, out);
+    return false;
+  } catch (const CLI::ParseError& error) {
+    throw UsageError(one_line(error.what()) + "; see --help");
+  }
+}
+
+}  // namespace kerf

@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <iosfwd>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace CLI {  // NOLINT(readability-identifier-naming): the library's name
+class App;
+class Option;
+}  // namespace CLI
+
+namespace kerf {
+
+/// Arguments that nobody declared, or a value that an option cannot take: one line.
+struct UsageError : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+/// One declared option or flag. Small: a name for what the command line owns.
+class Option {
+ public:
+  explicit Option(CLI::Option* option) : option_(option) {}
+
+  /// The word that stands for the value in --help.
+  Option& shown_as(const char* word);
+  /// Shows in --help what the variable holds now.
+  Option& shows_default();
+  Option& required();
+  /// Only numbers from `lowest` to `highest`; "nan" is none.
+  Option& within(double lowest, double highest);
+  Option& one_of(std::vector<std::string> words);
+  /// Of a list: how many values, separated by commas in one argument.
+  Option& values(int fewest, int most);
+  /// Of a list: any number of values, separated by commas.
+  Option& split_at_commas();
+  Option& needs(Option other);
+  Option& excludes(Option other);
+  /// Taken from the environment where the arguments do not give it.
+  Option& from_environment(const char* name);
+
+  /// After parsing.
+  [[nodiscard]] bool given() const;
+
+ private:
+  CLI::Option* option_;
+};
+
+/// A program or one of its commands: what it takes. Small: a name for what the command line owns.
+/// Variables are filled while parsing and must live until then.
+class Arguments {
+ public:
+  /// `name` without dashes takes the argument of that place. `T`: int, std::int64_t,
+  /// std::uint32_t, std::uint64_t, double, std::string, std::filesystem::path, std::optional of
+  /// double, string or path, or std::vector of int, double or string.
+  template <class T>
+  Option option(const char* name, T& value, const std::string& meaning);
+  /// Takes no value; true when given.
+  Option flag(const char* name, bool& value, const std::string& meaning);
+  /// Has the footer that its program has so far. A program with commands needs one of them.
+  Arguments command(const char* name, const char* about);
+  /// The last lines of --help.
+  void footer(const std::string& text);
+
+  /// After parsing.
+  [[nodiscard]] bool chosen() const;
+
+ protected:
+  explicit Arguments(CLI::App* app) : app_(app) {}
+
+  CLI::App* app_;
+};
+
+/// The command line of a program: declare, then parse once.
+class CommandLine : public Arguments {
+ public:
+  /// `version` is what --version prints.
+  CommandLine(const std::string& about, const std::string& program, const std::string& version);
+  ~CommandLine();
+  CommandLine(const CommandLine&) = delete;
+  CommandLine& operator=(const CommandLine&) = delete;
+
+  /// False: help or version was asked for, and stands on `out`. Throws `UsageError`.
+  [[nodiscard]] bool parse(int argc, const char* const* argv, std::ostream& out);
+
+ private:
+  std::unique_ptr<CLI::App> owned_;
+};
+
+}  // namespace kerf
