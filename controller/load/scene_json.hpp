@@ -20,9 +20,8 @@ namespace kerf {
 ///              offsets_half_pitch [x, y, z, x, y, z..], and what it looks like: profile
 ///              [[y_mm, radius_mm]..] or mesh {points_mm [[x, y, z]..], triangles [[a, b, c]..]}}]
 ///   active_tool
-///   materials [..], device, force, cut, spindle, limits, servo  as the rows of the table of keys
-///   say
-///              (`InJson`), of the models that the scene has
+///   materials [..], scene, device, force, cut, spindle, limits, servo  as the rows of the table of
+///              keys say (`InJson`), of the models that the scene has
 [[nodiscard]] std::string canonical_json(const LoadedScene& scene, SceneKeys keys = scene_keys());
 
 /// Identity of everything that decides what a run does: fnv1a of `canonical_json`, which holds the

@@ -103,6 +103,7 @@ struct ServoSettings {
 /// What a scene says of everything but volumes and tools; the same before and after loading.
 struct SceneSettings {
   std::string path;
+  std::string title;  ///< [scene] title; empty: none
   std::vector<Material> materials;
   DeviceSettings device;
   ForceSettings force;

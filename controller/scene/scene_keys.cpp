@@ -60,6 +60,9 @@ constexpr SceneCondition kNoMesh{
 // shows. A row: key, unit, member, allowed values; meaning, condition, more.
 // clang-format off
 constexpr SceneKey kKeys[] = {
+    {"scene.title", "", at<&SceneSettings::title>, {},
+     "what it shows, in a few words; readers of the segment are told"},
+
     {"volume.name", "", at<&VolumeSpec::name>, {},
      "tells it from others in pictures and reports", {}, {.default_text = "the file's"}},
     {"volume.file", "", at<&VolumeSpec::file>, {},
@@ -188,6 +191,7 @@ constexpr SceneKey kKeys[] = {
 // clang-format on
 
 constexpr SceneTableRow kTables[] = {
+    {"scene", 0, "The scene as a whole."},
     {"volume", kMaxVolumes, "What is touched, cut and seen."},
     {"tool", kMaxTools, "The first tool is in the hand at the start; a command changes it."},
     {"material", kMaxMaterials, "What a label of a volume stands for."},

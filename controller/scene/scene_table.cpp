@@ -156,7 +156,7 @@ std::string SceneTable::place() const {
 }
 
 std::string place_of(const TomlNode& node, std::string_view name, const std::string& file) {
-  return file + ":" + std::to_string(node.line) + ": " + std::string(name) + " = " + shown(node);
+  return file + ":" + std::to_string(node.line) + ": " + std::string(name) + " = " + node.shown;
 }
 
 }  // namespace kerf

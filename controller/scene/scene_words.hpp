@@ -29,9 +29,5 @@ inline constexpr std::array<std::string_view, 3> kGradientWords = {"central", "s
 [[nodiscard]] constexpr std::string_view word_of(GradientKernel kernel) {
   return kGradientWords.at(static_cast<std::size_t>(kernel));
 }
-static_assert(word_of(ForceModel::proxy) == "proxy");
-static_assert(word_of(CutModel::preston) == "preston");
-static_assert(word_of(NumericKind::float64) == "double");
-static_assert(word_of(GradientKernel::farid) == "farid");
 
 }  // namespace kerf

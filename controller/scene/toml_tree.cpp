@@ -20,6 +20,8 @@
 namespace kerf {
 namespace {
 
+constexpr std::size_t kLongestShown = 60;  // characters of a value that a message repeats
+
 TomlNode node_of(const toml::node& from) {
   TomlNode to;
   to.line = from.source().begin.line;
@@ -34,33 +36,27 @@ TomlNode node_of(const toml::node& from) {
     std::ranges::stable_sort(to.entries, {}, [](const TomlNode& entry) {
       return std::pair(entry.key_line, entry.key_column);
     });
+    to.shown = "{..}";
   } else if (const toml::array* array = from.as_array()) {
     to.form = TomlNode::Form::array;
-    for (const toml::node& entry : *array) to.entries.push_back(node_of(entry));
+    for (const toml::node& entry : *array) {
+      to.entries.push_back(node_of(entry));
+      if (to.shown.size() <= kLongestShown) {
+        to.shown += (to.shown.empty() ? "[" : ", ") + to.entries.back().shown;
+      }
+    }
+    to.shown += to.shown.empty() ? "[]" : "]";
   } else {
     to.form = TomlNode::Form::value;
     if (const auto flag = from.as_boolean()) to.value = flag->get();
     if (const auto whole = from.as_integer()) to.value = whole->get();
     if (const auto number = from.as_floating_point()) to.value = number->get();
     if (const auto text = from.as_string()) to.value = text->get();
+    to.shown = one_line(written(to.value));
+    if (to.shown.empty()) to.shown = "a date or time";
   }
+  if (to.shown.size() > kLongestShown) to.shown = to.shown.substr(0, kLongestShown) + "...";
   return to;
-}
-
-constexpr std::size_t kLongestValue = 60;  // characters of a value that a message repeats
-
-std::string text_of(const TomlNode& node) {
-  if (node.form == TomlNode::Form::table) return "{..}";
-  if (node.form == TomlNode::Form::value) {
-    const std::string text = written(node.value);
-    return text.empty() ? "a date or time" : text;
-  }
-  std::string list;
-  for (const TomlNode& entry : node.entries) {
-    list += (list.empty() ? "" : ", ") + text_of(entry);
-    if (list.size() > kLongestValue) break;
-  }
-  return "[" + list + "]";
 }
 
 }  // namespace
@@ -96,12 +92,6 @@ std::string written(const TomlValue& value) {
     }
   };
   return std::visit(text, value);
-}
-
-std::string shown(const TomlNode& node) {
-  std::string line = one_line(text_of(node));
-  if (line.size() > kLongestValue) line = line.substr(0, kLongestValue) + "...";
-  return line;
 }
 
 }  // namespace kerf

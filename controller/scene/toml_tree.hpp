@@ -21,6 +21,7 @@ struct TomlNode {
   std::string key;  ///< empty for the whole file and for an entry of an array
   std::size_t key_line = 0, key_column = 0;
   std::size_t line = 0;  ///< where the value begins
+  std::string shown;     ///< the value as messages repeat it: on one line, cut where it is long
   Form form = Form::table;
   TomlValue value;                ///< of Form::value
   std::vector<TomlNode> entries;  ///< of an array or a table, in the order of the file
@@ -34,7 +35,5 @@ struct TomlNode {
 
 /// The value as one would write it in the file; empty for none.
 [[nodiscard]] std::string written(const TomlValue& value);
-/// The same of anything, cut where it is too long for a message.
-[[nodiscard]] std::string shown(const TomlNode& node);
 
 }  // namespace kerf

@@ -82,6 +82,13 @@ TEST_CASE("the JSON is canonical: one line, sorted keys, and the same after a ro
   CHECK(text.rfind("{\"active_tool\":1,\"cut\":{\"friction\":", 0) == 0);
 }
 
+TEST_CASE("a title is told, and changes nothing for the scenes without one") {
+  kerf::LoadedScene scene = small_scene();
+  CHECK_FALSE(json::parse(kerf::canonical_json(scene)).contains("scene"));
+  scene.title = "a block";
+  CHECK(json::parse(kerf::canonical_json(scene)).at("scene").at("title") == "a block");
+}
+
 TEST_CASE("where a scene lies does not change its identity, anything in it does") {
   const std::uint64_t hash = kerf::config_hash(small_scene());
   kerf::LoadedScene moved = small_scene();

@@ -75,6 +75,7 @@ TEST_CASE("the smallest scene takes every default") {
 
 TEST_CASE("every key reaches its place") {
   const kerf::Scene scene = parse(R"(
+    scene.title = "a jaw"
     [[volume]]
     file = "ct/a.nrrd"
     name = "jaw"
@@ -128,7 +129,8 @@ TEST_CASE("every key reaches its place") {
     script = "hands/touch.toml"
   )");
   const kerf::VolumeSpec& jaw = scene.volumes.at(0);
-  CHECK(jaw.where == "scenes/x.toml:3");
+  CHECK(scene.title == "a jaw");
+  CHECK(jaw.where == "scenes/x.toml:4");
   CHECK(jaw.name == "jaw");
   CHECK(jaw.spacing_mm == std::array<double, 3>{0.1, 0.2, 0.3});
   CHECK(jaw.window == std::array<double, 2>{-100, 900});

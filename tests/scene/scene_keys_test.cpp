@@ -1,0 +1,351 @@
+// SPDX-License-Identifier: Apache-2.0
+// Every row of the table of keys, by tests that are made from it: what it allows is read, and every
+// slip has its answer of one line.
+#include <cmath>
+#include <fstream>
+#include <iterator>
+#include <limits>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include <doctest/doctest.h>
+
+#include "controller/load/scene_json.hpp"
+#include "controller/scene/scene_file.hpp"
+#include "controller/scene/scene_key.hpp"
+#include "controller/scene/scene_page.hpp"
+#include "controller/scene/scene_text.hpp"
+#include "controller/volume/phantom.hpp"
+#include "tests/scene/scene_lines.hpp"
+#include "tests/scene/support.hpp"
+
+using namespace kerf;
+using test::scene_for;
+using test::SceneLines;
+
+namespace {
+
+std::string error_of(const std::string& text, SceneKeys keys = scene_keys()) {
+  return test::error_of([&] { static_cast<void>(parse_scene(text, "x.toml", keys)); });
+}
+
+std::string in_quotes(std::string_view word) {
+  return '"' + std::string(word) + '"';
+}
+
+std::string list_of(const std::vector<double>& numbers) {
+  return written(TomlValue{numbers});
+}
+
+/// A value that a key may not have, and what is said of it.
+struct Wrong {
+  std::string value;
+  std::string says;
+};
+
+constexpr double kInf = std::numeric_limits<double>::infinity();
+const std::string kNoNumber = " is not a number; write one without quotes or unit";
+
+/// Values that are allowed, the ends of the range among them, and values that are not: by the type
+/// of the slot.
+struct Samples {
+  const SceneKey& key;
+  std::vector<std::string> right;
+  std::vector<Wrong> wrong;
+
+  void operator()(const bool*) {
+    right = {"true", "false"};
+    for (const char* value : {"1", "\"true\"", "[true]"})
+      wrong.push_back({value, " is not a switch"});
+  }
+  void operator()(const int*) {
+    const auto [lo, hi] = key.allowed.range;
+    right = {number_text(lo), number_text(hi)};
+    for (const double out : {lo - 1, hi + 1, -1e9, 1e9}) {
+      wrong.push_back({std::to_string(std::llround(out)), " is out of range; use "});
+    }
+    for (const char* value : {"100.5", "nan", "inf", "\"100\"", "true", "[100]", "1979-05-27"}) {
+      wrong.push_back({value, " is not a whole number; write one"});
+    }
+  }
+  void operator()(const double*) {
+    const auto [lo, hi] = key.allowed.range;
+    right = {number_text(lo), number_text(hi)};
+    for (const std::string_view word : key.allowed.words) right.push_back(in_quotes(word));
+    for (const std::string& value : outside()) wrong.push_back({value, " is out of range; use "});
+    for (const char* value : {"true", "[1]", "{}", "1979-05-27"})
+      wrong.push_back({value, kNoNumber});
+    wrong.push_back({"\"zzz\"", key.allowed.words.empty() ? kNoNumber : " is unknown; "});
+  }
+  template <class Text>
+  void operator()(const Text*) {
+    for (const std::string_view word : key.allowed.words) right.push_back(in_quotes(word));
+    if (key.allowed.words.empty()) right = {"\"abc\""};
+    if (!key.allowed.words.empty()) wrong = {{"\"zzz\"", " is unknown; "}};
+    wrong.push_back({"\"\"", " is not a usable text; "});
+    wrong.push_back({in_quotes(std::string(257, 'a')), " is not a usable text; "});
+    for (const char* value : {"3", "true", "[\"a\"]", "{}"}) {
+      wrong.push_back({value, " is not text; put it in quotes"});
+    }
+  }
+  template <std::size_t N>
+  void operator()(const std::array<double, N>*) {
+    const auto [lo, hi] = key.allowed.range;
+    std::vector<double> numbers(N, hi);
+    if (key.name == "volume.window") numbers = {lo, hi};                // rises
+    if (key.name == "volume.pose.orientation") numbers = {1, 0, 0, 0};  // of length one
+    right = {list_of(numbers)};
+    if (N == 3) right.push_back(list_of({lo, lo, lo}));
+    if (key.more.one_for_all) right.push_back(number_text(lo));
+    for (const std::string& value : outside()) {
+      std::string list = list_of(std::vector<double>(N - 1, hi));
+      list.insert(list.size() - 1, ", " + value);
+      wrong.push_back({list, " is out of range; use "});
+    }
+    const std::string form = " is not a list of " + std::to_string(N) + " numbers; write [";
+    for (const std::size_t count : {N - 1, N + 1}) {
+      wrong.push_back({list_of(std::vector<double>(count, hi)), form});
+    }
+    wrong.push_back({"[]", form});
+    wrong.push_back({"\"zzz\"", key.more.one_for_all ? kNoNumber : form});
+    std::string mixed = list_of(std::vector<double>(N - 1, hi));
+    wrong.push_back({mixed.insert(mixed.size() - 1, ", true"), kNoNumber});
+  }
+  void operator()(const VoxelGrid*) {
+    (*this)(static_cast<std::array<double, 3>*>(nullptr));
+    wrong.push_back({"[64, 64.5, 64]", " counts voxels; write whole numbers"});
+  }
+  template <class T>
+  void operator()(const std::optional<T>*) {
+    (*this)(static_cast<const T*>(nullptr));
+  }
+
+ private:
+  [[nodiscard]] std::vector<std::string> outside() const {
+    const auto [lo, hi] = key.allowed.range;
+    return {number_text(std::nextafter(lo, -kInf)), number_text(std::nextafter(hi, kInf)), "nan",
+            "inf", "-inf"};
+  }
+};
+
+Samples samples_of(const SceneKey& key) {
+  SceneParts parts;
+  Samples samples{key, {}, {}};
+  std::visit([&](const auto* slot) { samples(slot); }, key.at(parts));
+  return samples;
+}
+
+/// One line that begins with `x.toml:LINE: name = ` and tells a way out.
+void must_answer(const std::string& error, const SceneLines& lines, const SceneKey& key,
+                 const std::string& says) {
+  CAPTURE(error);
+  CAPTURE(says);
+  CHECK(error.rfind("x.toml:" + std::to_string(lines.line_of(key.name)) + ": " +
+                        std::string(key.name) + " = ",
+                    0) == 0);
+  CHECK(error.find(says) != std::string::npos);
+  CHECK(error.find("; ") != std::string::npos);
+  CHECK(error.find('\n') == std::string::npos);
+}
+
+}  // namespace
+
+TEST_CASE("every row: what it allows is read, both ends of its range too") {
+  for (const SceneKey& key : scene_keys()) {
+    for (const std::string& value : samples_of(key).right) {
+      SceneLines lines = scene_for(key).set(key.name, value);
+      if (value == in_quotes(kMeshShape)) lines.set("tool.file", "\"a.stl\"").drop("tool.size_vox");
+      // Something must be solid.
+      const std::string second = "[[volume]]\nname = \"second\"\nfile = \"phantom\"\n";
+      CAPTURE(lines.text());
+      CHECK(error_of(lines.text() + second).empty());
+    }
+  }
+}
+
+TEST_CASE("every row: a wrong value has its answer with line, key, value and a way out") {
+  std::size_t count = 0;
+  for (const SceneKey& key : scene_keys()) {
+    for (const Wrong& wrong : samples_of(key).wrong) {
+      const SceneLines lines = scene_for(key).set(key.name, wrong.value);
+      CAPTURE(lines.text());
+      must_answer(error_of(lines.text()), lines, key, wrong.says);
+      ++count;
+    }
+  }
+  CHECK(count > 400);
+}
+
+TEST_CASE("every row: its default is allowed") {
+  SceneParts defaults;
+  for (const SceneKey& key : scene_keys()) {
+    CAPTURE(key.name);
+    const TomlValue value = value_of(key, defaults);
+    const auto allowed = [&](double number) {
+      return number >= key.allowed.range.lo && number <= key.allowed.range.hi;
+    };
+    if (const auto* number = std::get_if<double>(&value)) CHECK(allowed(*number));
+    if (const auto* whole = std::get_if<std::int64_t>(&value)) CHECK(allowed(double(*whole)));
+    // No torque per count at all keeps the motors off.
+    if (const auto* numbers = std::get_if<std::vector<double>>(&value)) {
+      CHECK(std::ranges::all_of(*numbers, allowed));
+    }
+    CHECK((key.allowed.words.empty() || !key.more.required_as.empty() ||
+           !std::holds_alternative<std::monostate>(value)));
+  }
+}
+
+TEST_CASE("every row: a key that the scene's choices leave no meaning is refused") {
+  for (const SceneKey& key : scene_keys()) {
+    if (key.only_with.key.empty()) continue;
+    const SceneLines lines = scene_for(key, false).set(key.name, samples_of(key).right.front());
+    CAPTURE(lines.text());
+    must_answer(error_of(lines.text()), lines, key, "; leave it out");
+  }
+}
+
+TEST_CASE("every row: a key without a default is asked for") {
+  std::size_t count = 0;
+  for (const SceneKey& key : scene_keys()) {
+    if (key.more.required_as.empty()) continue;
+    SceneLines lines = scene_for(key).drop(key.name);
+    const std::string table(key.name.substr(0, key.name.find('.')));
+    if (table == "material") lines.set("material.iso", "0.5");
+    if (key.name == "volume.file") lines.set("volume.crop", "true");
+    CAPTURE(lines.text());
+    const std::string says = table + " has no " + std::string(name_in_table(key)) + "; write ";
+    CHECK(error_of(lines.text()).find(says) != std::string::npos);
+    ++count;
+  }
+  CHECK(count == 4);
+}
+
+TEST_CASE("every row: a key with any one letter wrong is answered with the key") {
+  for (const SceneKey& key : scene_keys()) {
+    const std::string value = samples_of(key).right.front();
+    const std::size_t last = key.name.rfind('.') + 1;
+    for (std::size_t at = last; at < key.name.size(); ++at) {
+      std::string slip(key.name);
+      slip[at] = slip[at] == 'q' ? 'z' : 'q';
+      const SceneLines lines = scene_for(key).set(slip, value);
+      const std::string error = error_of(lines.text());
+      CAPTURE(error);
+      CHECK(error.rfind("x.toml:" + std::to_string(lines.line_of(slip)) + ":", 0) == 0);
+      const std::string unit = key.unit.empty() ? "" : " (in " + std::string(key.unit) + ")";
+      CHECK(error.find(slip + " is not a known key; did you mean " + std::string(key.name) + unit +
+                       "?") != std::string::npos);
+    }
+  }
+}
+
+TEST_CASE("every row: a key in another table is told where it belongs") {
+  for (const SceneKey& key : scene_keys()) {
+    const std::string name(key.name.substr(key.name.rfind('.') + 1));
+    for (const std::string_view table : names_below("", scene_keys())) {
+      const auto known = names_below(std::string(table) + ".", scene_keys());
+      if (std::ranges::find(known, name) != known.end()) continue;
+      const std::string misplaced = std::string(table) + "." + name;
+      const std::string error =
+          error_of(scene_for(key).set("material.name", "\"wax\"").set(misplaced, "1").text());
+      CAPTURE(error);
+      CHECK(error.find(misplaced + " is not a known key; did you mean ") != std::string::npos);
+      CHECK(error.find(key.name) != std::string::npos);
+    }
+    const std::string bare = error_of(name + " = 1\n" + scene_for(key).text());
+    CHECK(bare.find("x.toml:1:1: " + name + " is not a known key; did you mean ") == 0);
+    CHECK(bare.find(key.name) != std::string::npos);
+  }
+}
+
+TEST_CASE("every row: a key that stands twice is one line with line and column") {
+  for (const SceneKey& key : scene_keys()) {
+    const SceneLines lines = scene_for(key).set(key.name, samples_of(key).right.front());
+    std::istringstream text(lines.text());
+    std::string doubled, line;
+    for (long at = 1; std::getline(text, line); ++at) {
+      doubled += line + "\n";
+      if (at == lines.line_of(key.name)) doubled += line + "\n";
+    }
+    const std::string error = error_of(doubled);
+    CAPTURE(error);
+    CHECK(error.rfind("x.toml:" + std::to_string(lines.line_of(key.name) + 1) + ":", 0) == 0);
+    CHECK(error.find("; correct the TOML syntax here") != std::string::npos);
+    CHECK(error.find('\n') == std::string::npos);
+  }
+}
+
+TEST_CASE("a quoted name with a dot is no key") {
+  CHECK(error_of("\"force.friction\" = 0.5\n").find("is not a known key") != std::string::npos);
+  CHECK(error_of("[[volume]]\nfile = \"a\"\n\"pose.position_mm\" = [1, 2, 3]\n")
+            .find("is not a known key") != std::string::npos);
+}
+
+TEST_CASE("every row: the unit is the one that its name tells") {
+  constexpr std::pair<std::string_view, std::string_view> kUnits[] = {{"_n_per_mm2", "N/mm^2"},
+                                                                      {"_ns_per_mm", "N s/mm"},
+                                                                      {"_n_per_mm", "N/mm"},
+                                                                      {"_mm_per_s", "mm/s"},
+                                                                      {"_n_per_ms", "N/ms"},
+                                                                      {"_per_s_n", "mm^3/(s N)"},
+                                                                      {"_per_s", "1/s"},
+                                                                      {"_n_mm", "N mm"},
+                                                                      {"_g_mm2", "g mm^2"},
+                                                                      {"_krpm", "1000/min"},
+                                                                      {"_mm", "mm"},
+                                                                      {"_n", "N"},
+                                                                      {"_hz", "Hz"},
+                                                                      {"_rad", "rad"},
+                                                                      {"_vox", "voxels"}};
+  for (const SceneKey& key : scene_keys()) {
+    const auto unit = std::ranges::find_if(
+        kUnits, [&](const auto& pair) { return key.name.ends_with(pair.first); });
+    CAPTURE(key.name);
+    if (unit != std::end(kUnits)) CHECK(key.unit == unit->second);
+  }
+}
+
+TEST_CASE("docs/scene-keys.md is what the table says") {
+  std::ifstream file(KERF_DOCS "/scene-keys.md", std::ios::binary);
+  const std::string page{std::istreambuf_iterator<char>(file), {}};
+  INFO("renew it: kerf-controller --scene-keys > docs/scene-keys.md");
+  CHECK((page == scene_keys_page()));
+  const VoxelGrid grid = PhantomSpec{}.grid;
+  const double sides[] = {double(grid.nx), double(grid.ny), double(grid.nz)};
+  const auto size = std::ranges::find(scene_keys(), "volume.size", &SceneKey::name);
+  CHECK(size->more.default_text == list_of({std::begin(sides), std::end(sides)}));
+}
+
+TEST_CASE("a new row alone brings a key: it is read, checked, told, printed and explained") {
+  static double grip_n = 1;
+  std::vector<SceneKey> keys(scene_keys().begin(), scene_keys().end());
+  keys.push_back({"limits.grip_n",
+                  "N",
+                  [](SceneParts&) -> SceneSlot { return &grip_n; },
+                  {{0.5, 9}, {}},
+                  "how hard the hand holds",
+                  {"force.model", "proxy"}});
+  const SceneLines lines = scene_for(keys.back()).set("limits.grip_n", "2.5");
+  CHECK(
+      error_of(lines.text(keys)).find(": limits.grip_n is not a known key; known here: force_n") !=
+      std::string::npos);
+  const Scene scene = parse_scene(lines.text(keys), "x.toml", keys);
+  CHECK(grip_n == 2.5);
+  CHECK(settings_text(scene, keys).find("\nlimits.grip_n=2.5\n") != std::string::npos);
+  LoadedScene loaded;
+  CHECK(canonical_json(loaded, keys).find("\"grip_n\":2.5,") != std::string::npos);
+  CHECK(scene_keys_page(keys).find("| `grip_n` | N | 0.5 to 9 | 2.5 | how hard the hand holds; "
+                                   "only with force.model = \"proxy\" |\n") != std::string::npos);
+
+  const auto answer = [&](const std::string& key, const std::string& value) {
+    return error_of(scene_for(keys.back()).set(key, value).text(keys), keys);
+  };
+  CHECK(answer("limits.grip_n", "10").find("limits.grip_n = 10 is out of range; use 0.5 to 9") !=
+        std::string::npos);
+  CHECK(answer("limits.grip", "1").find("did you mean limits.grip_n (in N)?") != std::string::npos);
+  CHECK(answer("cut.grip_n", "1").find("did you mean limits.grip_n (in N)?") != std::string::npos);
+  const std::string paper =
+      error_of(scene_for(keys.back(), false).set("limits.grip_n", "1").text(keys), keys);
+  CHECK(paper.find("limits.grip_n = 1 is of the model proxy; leave it out, or set model = "
+                   "\"proxy\"") != std::string::npos);
+}
