@@ -4,15 +4,12 @@
 #include <array>
 #include <utility>
 
-#include <nlohmann/json.hpp>
-
 #include "controller/scene/scene_words.hpp"
 #include "controller/tool/tool_shapes.hpp"
+#include "shared/text/json.hpp"
 
 namespace kerf {
 namespace {
-
-using nlohmann::json;
 
 constexpr std::uint64_t kFnvBasis = 0xcbf29ce484222325;
 constexpr std::uint64_t kFnvPrime = 0x100000001b3;
@@ -34,25 +31,25 @@ std::string content_hash(const VolumeImage& image) {
   return digits;
 }
 
-json volume_json(const SceneVolume& volume) {
+Json volume_json(const SceneVolume& volume) {
   const VoxelGrid& grid = volume.image.grid;
   return {{"name", volume.name},
           {"file", volume.file},
           {"iso", volume.iso},
           {"solid", volume.solid},
           {"spacing_mm", volume.image.spacing_mm},
-          {"grid", {grid.nx, grid.ny, grid.nz}},
+          {"grid", std::array{grid.nx, grid.ny, grid.nz}},
           {"pose",
            {{"position_mm", volume.pose.position_mm}, {"orientation", volume.pose.orientation}}},
           {"density_hash", content_hash(volume.image)}};
 }
 
-json tool_json(const SceneTool& tool) {
-  json offsets = json::array();
+Json tool_json(const SceneTool& tool) {
+  Json offsets = Json::List{};
   for (const ToolOffset& offset : tool.offsets) {
     for (const std::int16_t component : offset) offsets.push_back(component);
   }
-  json object = {{"name", tool.name},
+  Json object = {{"name", tool.name},
                  {"shape", tool.shape},
                  {"pitch_mm", tool.pitch_mm},
                  {"radius_mm", tool.radius_mm},
@@ -69,8 +66,8 @@ json tool_json(const SceneTool& tool) {
   return object;
 }
 
-json material_json(const Material& material) {
-  json object = {{"name", material.name},
+Json material_json(const Material& material) {
+  Json object = {{"name", material.name},
                  {"iso", material.iso},
                  {"machinability", material.machinability},
                  {"colour", material.colour}};
@@ -78,7 +75,7 @@ json material_json(const Material& material) {
   return object;
 }
 
-json force_json(const ForceSettings& force) {
+Json force_json(const ForceSettings& force) {
   if (force.model == ForceModel::paper) {
     return {{"model", word_of(force.model)}, {"p0_n_per_mm2", force.p0_n_per_mm2}};
   }
@@ -89,8 +86,8 @@ json force_json(const ForceSettings& force) {
 }
 
 /// What the model of cutting uses.
-json cut_json(const CutSettings& cut) {
-  json object = {{"model", word_of(cut.model)}};
+Json cut_json(const CutSettings& cut) {
+  Json object = {{"model", word_of(cut.model)}};
   if (cut.model == CutModel::preston) {
     object["machinability_mm3_per_s_n"] = cut.machinability_mm3_per_s_n;
     object["threshold_n"] = cut.threshold_n;
@@ -102,8 +99,8 @@ json cut_json(const CutSettings& cut) {
   return object;
 }
 
-json device_json(const DeviceSettings& device) {
-  json object = {{"personality", kPersonalityWords[static_cast<std::size_t>(device.personality)]},
+Json device_json(const DeviceSettings& device) {
+  Json object = {{"personality", kPersonalityWords[static_cast<std::size_t>(device.personality)]},
                  {"workspace_scale", device.workspace_scale},
                  {"offset_mm", device.offset_mm},
                  {"dock_rad", device.dock_rad}};
@@ -114,14 +111,14 @@ json device_json(const DeviceSettings& device) {
 }  // namespace
 
 std::string canonical_json(const LoadedScene& scene) {
-  json volumes = json::array();
+  Json volumes = Json::List{};
   for (const SceneVolume& volume : scene.volumes) volumes.push_back(volume_json(volume));
-  json tools = json::array();
+  Json tools = Json::List{};
   for (const SceneTool& tool : scene.tools) tools.push_back(tool_json(tool));
-  json materials = json::array();
+  Json materials = Json::List{};
   for (const Material& material : scene.materials) materials.push_back(material_json(material));
 
-  json root = {{"volumes", std::move(volumes)},
+  Json root = {{"volumes", std::move(volumes)},
                {"tools", std::move(tools)},
                {"active_tool", scene.active_tool},
                {"materials", std::move(materials)},
@@ -142,8 +139,7 @@ std::string canonical_json(const LoadedScene& scene) {
                        {"stall_torque_n_mm", scene.spindle.stall_torque_n_mm},
                        {"inertia_g_mm2", scene.spindle.inertia_g_mm2}};
   }
-  // A path need not be UTF-8; what is not, is replaced.
-  return root.dump(-1, ' ', false, json::error_handler_t::replace);
+  return root.canonical();
 }
 
 std::uint64_t fnv1a(std::string_view bytes) {

@@ -16,9 +16,6 @@
 #include <utility>
 #include <vector>
 
-#include <spdlog/sinks/stdout_color_sinks.h>
-#include <spdlog/spdlog.h>
-
 #include "controller/device/driver/make_driver.hpp"
 #include "controller/device/port/open_port.hpp"
 #include "controller/load/scene_json.hpp"
@@ -28,6 +25,7 @@
 #include "controller/scene/scene_words.hpp"
 #include "controller/shell/call_guard.hpp"
 #include "controller/shell/explain_scene.hpp"
+#include "controller/shell/log_line.hpp"
 #include "controller/shell/motor_guard.hpp"
 #include "controller/shell/progress_bar.hpp"
 #include "controller/shell/publisher.hpp"
@@ -79,7 +77,7 @@ void accept_rights(const std::vector<MissingRight>& missing, bool strict) {
     if (strict) {
       throw std::runtime_error("--strict: no " + right.what + "; without it " + right.effect);
     }
-    spdlog::warn("no {}: {}", right.what, right.effect);
+    log_warning("no " + right.what + ": " + right.effect);
   }
 }
 
@@ -178,16 +176,17 @@ void check_run(const ControllerOptions& options, const LoadedScene& scene,
   if (!options.final_volume.empty()) check_volume_path(options.final_volume);
   if (const double stiffness = device_stiffness_n_per_mm(scene); stiffness > kStableNPerMm) {
     const bool paper = scene.force.model == ForceModel::paper;
-    spdlog::warn(
-        "contact is {:.3g} N/mm stiff at the device, an Omni bears {}: it will tremble; {}",
-        stiffness, kStableNPerMm,
-        paper ? "lower force.p0_n_per_mm2" : "lower force.stiffness_n_per_mm");
+    char text[160];
+    std::snprintf(text, sizeof text,
+                  "contact is %.3g N/mm stiff at the device, an Omni bears %.3g: it will tremble; "
+                  "lower force.%s",
+                  stiffness, kStableNPerMm, paper ? "p0_n_per_mm2" : "stiffness_n_per_mm");
+    log_warning(text);
   }
   if (!scene.device.torque_scale) {
-    spdlog::warn(
-        "device.torque_scale is not set for {}: the motors stay off; measure it, and write "
-        "device.personality beside it",
-        kPersonalityWords[static_cast<std::size_t>(scene.device.personality)]);
+    const auto kind = static_cast<std::size_t>(scene.device.personality);
+    log_warning("device.torque_scale is not set for " + std::string(kPersonalityWords[kind]) +
+                ": the motors stay off; measure it, and write device.personality beside it");
   }
 }
 
@@ -254,8 +253,8 @@ EndReason serve(const Run& run, LoopSignals& signals, CallGuard* calls) {
 EndReason end_by(const CallGuard& calls, EndReason end, RunReport& report) {
   report.unexpected_call = calls.unexpected();
   if (report.unexpected_call.empty()) return end;
-  spdlog::error("--guard: system call {} on the servo thread; motors off; keep it out of the loop",
-                report.unexpected_call);
+  log_error("--guard: system call " + report.unexpected_call +
+            " on the servo thread; motors off; keep it out of the loop");
   report.record.add_fault(report.record.armed_at_tick + report.record.ticks, "unexpected_call");
   return EndReason::unexpected_call;
 }
@@ -295,8 +294,6 @@ EndReason run_threads(const Run& run) {
 
 int run_controller(const ControllerOptions& options) {
   const std::int64_t began_ns = monotonic_ns();
-  spdlog::set_default_logger(spdlog::stderr_color_mt("kerf-controller"));
-  spdlog::set_pattern("kerf-controller: %^%l%$: %v");
   std::atomic<bool>& stop = catch_stop_signals();
 
   LoadedScene scene = load_scene(options.scene, options.overrides);
