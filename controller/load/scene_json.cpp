@@ -7,16 +7,13 @@
 #include <utility>
 #include <variant>
 
-#include <nlohmann/json.hpp>
-
 #include "controller/tool/tool_shapes.hpp"
 #include "shared/numeric/fnv1a.hpp"
 #include "shared/posix/hex64.hpp"
+#include "shared/text/json.hpp"
 
 namespace kerf {
 namespace {
-
-using nlohmann::json;
 
 std::string content_hash(const VolumeImage& image) {
   std::uint64_t hash = kFnv1aBasis;
@@ -25,25 +22,25 @@ std::string content_hash(const VolumeImage& image) {
   return hex64(hash);
 }
 
-json volume_json(const SceneVolume& volume) {
+Json volume_json(const SceneVolume& volume) {
   const VoxelGrid& grid = volume.image.grid;
   return {{"name", volume.name},
           {"file", volume.file},
           {"iso", volume.iso},
           {"solid", volume.solid},
           {"spacing_mm", volume.image.spacing_mm},
-          {"grid", {grid.nx, grid.ny, grid.nz}},
+          {"grid", std::array{grid.nx, grid.ny, grid.nz}},
           {"pose",
            {{"position_mm", volume.pose.position_mm}, {"orientation", volume.pose.orientation}}},
           {"density_hash", content_hash(volume.image)}};
 }
 
-json tool_json(const SceneTool& tool) {
-  json offsets = json::array();
+Json tool_json(const SceneTool& tool) {
+  Json offsets = Json::List{};
   for (const ToolOffset& offset : tool.offsets) {
     for (const std::int16_t component : offset) offsets.push_back(component);
   }
-  json object = {{"name", tool.name},
+  Json object = {{"name", tool.name},
                  {"shape", tool.shape},
                  {"pitch_mm", tool.pitch_mm},
                  {"radius_mm", tool.radius_mm},
@@ -60,8 +57,8 @@ json tool_json(const SceneTool& tool) {
   return object;
 }
 
-json json_of(const TomlValue& value) {
-  const auto convert = [](const auto& held) -> json {
+Json json_of(const TomlValue& value) {
+  const auto convert = [](const auto& held) -> Json {
     if constexpr (!std::is_same_v<decltype(held), const std::monostate&>) return held;
     return nullptr;
   };
@@ -69,8 +66,8 @@ json json_of(const TomlValue& value) {
 }
 
 /// The keys of a table that their rows and the scene's models tell to readers; null where none is.
-json table_json(std::string_view table, SceneParts& parts, SceneKeys keys) {
-  json object;
+Json table_json(std::string_view table, SceneParts& parts, SceneKeys keys) {
+  Json object;
   SceneParts defaults;
   for (const SceneKey& key : keys_of(table, keys)) {
     const InJson told = key.more.json;
@@ -78,7 +75,7 @@ json table_json(std::string_view table, SceneParts& parts, SceneKeys keys) {
     const TomlValue value = value_of(key, parts);
     if (std::holds_alternative<std::monostate>(value)) continue;
     if (told == InJson::if_changed && value == value_of(key, defaults)) continue;
-    object[std::string(name_in_table(key))] = json_of(value);
+    object[name_in_table(key)] = json_of(value);
   }
   return object;
 }
@@ -86,27 +83,26 @@ json table_json(std::string_view table, SceneParts& parts, SceneKeys keys) {
 }  // namespace
 
 std::string canonical_json(const LoadedScene& scene, SceneKeys keys) {
-  json volumes = json::array();
+  Json volumes = Json::List{};
   for (const SceneVolume& volume : scene.volumes) volumes.push_back(volume_json(volume));
-  json tools = json::array();
+  Json tools = Json::List{};
   for (const SceneTool& tool : scene.tools) tools.push_back(tool_json(tool));
-  json root = {{"volumes", std::move(volumes)},
+  Json root = {{"volumes", std::move(volumes)},
                {"tools", std::move(tools)},
                {"active_tool", scene.active_tool},
-               {"materials", json::array()}};
+               {"materials", Json::List{}}};
   SceneParts parts;
   static_cast<SceneSettings&>(parts.scene) = scene;
   for (const std::string_view table : names_below("", keys)) {
     if (most_of(table) > 0) continue;
-    json object = table_json(table, parts, keys);
-    if (!object.is_null()) root[std::string(table)] = std::move(object);
+    Json object = table_json(table, parts, keys);
+    if (!object.is_null()) root[table] = std::move(object);
   }
   for (const Material& material : scene.materials) {
     parts.material = material;
     root["materials"].push_back(table_json("material", parts, keys));
   }
-  // A path need not be UTF-8; what is not, is replaced.
-  return root.dump(-1, ' ', false, json::error_handler_t::replace);
+  return root.canonical();
 }
 
 std::uint64_t config_hash(const LoadedScene& scene) {

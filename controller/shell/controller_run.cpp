@@ -9,9 +9,6 @@
 #include <stdexcept>
 #include <string>
 
-#include <spdlog/sinks/stdout_color_sinks.h>
-#include <spdlog/spdlog.h>
-
 #include "controller/device/driver/make_driver.hpp"
 #include "controller/device/port/open_port.hpp"
 #include "controller/load/scene_json.hpp"
@@ -21,6 +18,7 @@
 #include "controller/scene/scene_words.hpp"
 #include "controller/shell/check_scene.hpp"
 #include "controller/shell/explain_scene.hpp"
+#include "controller/shell/log_line.hpp"
 #include "controller/shell/run_report.hpp"
 #include "controller/shell/run_threads.hpp"
 #include "controller/shell/scene_segment.hpp"
@@ -106,16 +104,17 @@ void check_run(const ControllerOptions& options, const LoadedScene& scene,
   if (!options.final_volume.empty()) check_volume_path(options.final_volume);
   if (const double stiffness = device_stiffness_n_per_mm(scene); stiffness > kStableNPerMm) {
     const bool paper = scene.force.model == ForceModel::paper;
-    spdlog::warn(
-        "contact is {:.3g} N/mm stiff at the device, an Omni bears {}: it will tremble; {}",
-        stiffness, kStableNPerMm,
-        paper ? "lower force.p0_n_per_mm2" : "lower force.stiffness_n_per_mm");
+    char text[160];
+    std::snprintf(text, sizeof text,
+                  "contact is %.3g N/mm stiff at the device, an Omni bears %.3g: it will tremble; "
+                  "lower force.%s",
+                  stiffness, kStableNPerMm, paper ? "p0_n_per_mm2" : "stiffness_n_per_mm");
+    log_warning(text);
   }
   if (!scene.device.torque_scale) {
-    spdlog::warn(
-        "device.torque_scale is not set for {}: the motors stay off; measure it, and write "
-        "device.personality beside it",
-        kPersonalityWords[static_cast<std::size_t>(scene.device.personality)]);
+    const auto kind = static_cast<std::size_t>(scene.device.personality);
+    log_warning("device.torque_scale is not set for " + std::string(kPersonalityWords[kind]) +
+                ": the motors stay off; measure it, and write device.personality beside it");
   }
 }
 
@@ -139,8 +138,6 @@ RunReport new_report(const ControllerOptions& options, const LoadedScene& scene,
 
 int run_controller(const ControllerOptions& options) {
   const std::int64_t began_ns = monotonic_ns();
-  spdlog::set_default_logger(spdlog::stderr_color_mt("kerf-controller"));
-  spdlog::set_pattern("kerf-controller: %^%l%$: %v");
   std::atomic<bool>& stop = catch_stop_and_pause_signals();
 
   LoadedScene scene = load_scene(options.scene, options.overrides);

@@ -9,9 +9,8 @@
 #include <stdexcept>
 #include <thread>
 
-#include <spdlog/spdlog.h>
-
 #include "controller/shell/call_guard.hpp"
+#include "controller/shell/log_line.hpp"
 #include "controller/shell/motor_guard.hpp"
 #include "controller/shell/progress_bar.hpp"
 #include "controller/shell/publisher.hpp"
@@ -71,8 +70,8 @@ EndReason serve(const Run& run, LoopSignals& signals, CallGuard* calls) {
 EndReason end_by(const CallGuard& calls, EndReason end, RunReport& report) {
   report.unexpected_call = calls.unexpected();
   if (report.unexpected_call.empty()) return end;
-  spdlog::error("--guard: system call {} on the servo thread; motors off; keep it out of the loop",
-                report.unexpected_call);
+  log_error("--guard: system call " + report.unexpected_call +
+            " on the servo thread; motors off; keep it out of the loop");
   report.record.add_fault(report.record.armed_at_tick + report.record.ticks, "unexpected_call");
   return EndReason::unexpected_call;
 }
@@ -84,7 +83,7 @@ void accept_rights(const std::vector<MissingRight>& missing, bool strict) {
     if (strict) {
       throw std::runtime_error("--strict: no " + right.what + "; without it " + right.effect);
     }
-    spdlog::warn("no {}: {}", right.what, right.effect);
+    log_warning("no " + right.what + ": " + right.effect);
   }
 }
 

@@ -2,10 +2,13 @@
 #include "shared/text/command_line.hpp"
 
 #include <algorithm>
+#include <charconv>
+#include <concepts>
 #include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <sstream>
+#include <system_error>
 
 #include <CLI/CLI.hpp>
 
@@ -43,6 +46,69 @@ CLI::Validator member(std::vector<std::string> words) {
 std::string one_line(std::string text) {
   std::ranges::replace(text, '\n', ' ');
   return text;
+}
+
+// What an option takes from its arguments and shows of its variable. The library's own conversions
+// are templates that cost a second for each type.
+bool take(const std::string& text, std::string& value) {
+  value = text;
+  return true;
+}
+bool take(const std::string& text, std::filesystem::path& value) {
+  value = text;
+  return true;
+}
+bool take(const std::string& text, double& value) {
+  const auto number = number_in(text);
+  if (number) value = *number;
+  return number.has_value();
+}
+template <std::integral T>
+bool take(const std::string& text, T& value) {
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  return error == std::errc{} && end == text.data() + text.size();
+}
+
+template <class T>
+struct Taken {  // a single value
+  using Value = T;
+  static constexpr bool kList = false;
+  static bool take_all(const CLI::results_t& given, T& value) { return take(given.front(), value); }
+};
+template <class T>
+struct Taken<std::optional<T>> : Taken<T> {
+  static bool take_all(const CLI::results_t& given, std::optional<T>& value) {
+    return take(given.front(), value.emplace());
+  }
+};
+template <class T>
+struct Taken<std::vector<T>> : Taken<T> {
+  static constexpr bool kList = true;
+  static bool take_all(const CLI::results_t& given, std::vector<T>& values) {
+    values.assign(given.size(), T());
+    std::size_t next = 0;
+    return std::ranges::all_of(given, [&](const auto& text) { return take(text, values[next++]); });
+  }
+};
+
+template <class T>
+constexpr const char* type_word() {
+  if (std::unsigned_integral<T>) return "UINT";
+  if (std::integral<T>) return "INT";
+  return std::floating_point<T> ? "FLOAT" : "TEXT";
+}
+
+/// As --help shows a default.
+std::string shown(const auto& value) {
+  if constexpr (std::convertible_to<decltype(value), std::string>) {
+    return value;
+  } else if constexpr (requires(std::ostringstream & out) { out << value; }) {
+    std::ostringstream text;
+    text << value;
+    return text.str();
+  } else {
+    return "";
+  }
 }
 
 }  // namespace
@@ -93,7 +159,12 @@ bool Option::given() const {
 
 template <class T>
 Option Arguments::option(const char* name, T& value, const std::string& meaning) {
-  return Option(app_->add_option(name, value, meaning));
+  auto* option = app_->add_option(
+      name, [&value](const CLI::results_t& given) { return Taken<T>::take_all(given, value); },
+      meaning, false, [&value] { return shown(value); });
+  option->type_name(type_word<typename Taken<T>::Value>());
+  if (Taken<T>::kList) option->expected(1, CLI::detail::expected_max_vector_size);
+  return Option(option);
 }
 template Option Arguments::option(const char*, int&, const std::string&);
 template Option Arguments::option(const char*, std::int64_t&, const std::string&);
@@ -102,6 +173,7 @@ template Option Arguments::option(const char*, std::uint64_t&, const std::string
 template Option Arguments::option(const char*, double&, const std::string&);
 template Option Arguments::option(const char*, std::string&, const std::string&);
 template Option Arguments::option(const char*, std::filesystem::path&, const std::string&);
+template Option Arguments::option(const char*, std::optional<std::uint64_t>&, const std::string&);
 template Option Arguments::option(const char*, std::optional<double>&, const std::string&);
 template Option Arguments::option(const char*, std::optional<std::string>&, const std::string&);
 template Option Arguments::option(const char*, std::optional<std::filesystem::path>&,
@@ -111,7 +183,9 @@ template Option Arguments::option(const char*, std::vector<double>&, const std::
 template Option Arguments::option(const char*, std::vector<std::string>&, const std::string&);
 
 Option Arguments::flag(const char* name, bool& value, const std::string& meaning) {
-  return Option(app_->add_flag(name, value, meaning)->disable_flag_override());
+  auto* flag = app_->add_flag_callback(
+      name, [&value] { value = true; }, meaning);
+  return Option(flag->disable_flag_override());
 }
 
 Arguments Arguments::command(const char* name, const char* about) {
@@ -143,6 +217,10 @@ bool CommandLine::parse(int argc, const char* const* argv, std::ostream& out) {
   } catch (const CLI::Success& asked) {  // --help, --version
     app_->exit(asked, out, out);
     return false;
+  } catch (const CLI::RequiredError& error) {  // a misspelt command is no missing one
+    const std::vector<std::string> surplus = app_->remaining();
+    const CLI::ExtrasError unexpected(surplus);
+    throw UsageError(one_line(surplus.empty() ? error.what() : unexpected.what()) + "; see --help");
   } catch (const CLI::ParseError& error) {
     throw UsageError(one_line(error.what()) + "; see --help");
   }

@@ -54,7 +54,7 @@ class Arguments {
  public:
   /// `name` without dashes takes the argument of that place. `T`: int, std::int64_t,
   /// std::uint32_t, std::uint64_t, double, std::string, std::filesystem::path, std::optional of
-  /// double, string or path, or std::vector of int, double or string.
+  /// std::uint64_t, double, string or path, or std::vector of int, double or string.
   template <class T>
   Option option(const char* name, T& value, const std::string& meaning);
   /// Takes no value; true when given.

@@ -8,25 +8,28 @@
 namespace kerf {
 namespace {
 
-using nlohmann::json;
 using nlohmann::ordered_json;
 
 constexpr int kMostLevels = 64;
 
-/// `Library`: ordered_json, or json, which sorts the members.
-template <class Library>
-Library to_library(const Json& from) {
-  return from.visit([](const auto& held) -> Library {
+ordered_json to_library(const Json& from, bool sorted) {
+  return from.visit([sorted](const auto& held) -> ordered_json {
     using T = std::decay_t<decltype(held)>;
     if constexpr (std::same_as<T, std::monostate>) {
       return nullptr;
     } else if constexpr (std::same_as<T, Json::List>) {
-      Library list = Library::array();
-      for (const Json& value : held) list.push_back(to_library<Library>(value));
+      ordered_json list = ordered_json::array();
+      for (const Json& value : held) list.push_back(to_library(value, sorted));
       return list;
     } else if constexpr (std::same_as<T, Json::Members>) {
-      Library object = Library::object();
-      for (const auto& [key, value] : held) object[key] = to_library<Library>(value);
+      std::vector<const Json::Member*> members;
+      for (const Json::Member& member : held) members.push_back(&member);
+      const auto key = [](const Json::Member* member) -> auto& {
+        return member->key;
+      };
+      if (sorted) std::ranges::sort(members, {}, key);
+      ordered_json object = ordered_json::object();
+      for (const auto* member : members) object[member->key] = to_library(member->value, sorted);
       return object;
     } else {
       return held;
@@ -34,7 +37,12 @@ Library to_library(const Json& from) {
   });
 }
 
-Json from_library(const json& from, int levels_left) {
+std::string written(const ordered_json& value, int indent) {
+  // A build id or a path of another encoding must not stop a report.
+  return value.dump(indent, ' ', false, ordered_json::error_handler_t::replace);
+}
+
+Json from_library(const ordered_json& from, int levels_left) {
   if (levels_left == 0) throw JsonError("nested too deep");
   if (from.is_boolean()) return from.get<bool>();
   if (from.is_number_unsigned()) return from.get<std::uint64_t>();
@@ -44,7 +52,7 @@ Json from_library(const json& from, int levels_left) {
   if (from.is_null()) return nullptr;
   if (from.is_array()) {
     Json::List list;
-    for (const json& value : from) list.push_back(from_library(value, levels_left - 1));
+    for (const ordered_json& value : from) list.push_back(from_library(value, levels_left - 1));
     return list;
   }
   Json::Members members;
@@ -65,9 +73,6 @@ template <class Members>
 auto find(Members& members, std::string_view key) {
   return std::ranges::find(members, key, &Json::Member::key);
 }
-
-// A build id or a path of another encoding must not stop a report.
-constexpr auto kReplace = ordered_json::error_handler_t::replace;
 
 }  // namespace
 
@@ -184,17 +189,17 @@ bool Json::is_fraction() const noexcept {
 }
 
 std::string Json::document() const {
-  return to_library<ordered_json>(*this).dump(2, ' ', false, kReplace) + "\n";
+  return written(to_library(*this, false), 2) + "\n";
 }
 
 std::string Json::canonical() const {
-  return to_library<json>(*this).dump(-1, ' ', false, json::error_handler_t::replace);
+  return written(to_library(*this, true), -1);
 }
 
 Json Json::parse(std::string_view text) {
   try {
-    return from_library(json::parse(text), kMostLevels);
-  } catch (const json::exception& error) {
+    return from_library(ordered_json::parse(text), kMostLevels);
+  } catch (const ordered_json::exception& error) {
     throw JsonError(error.what());
   }
 }

@@ -141,7 +141,7 @@ TEST_CASE("bad input is refused in one line that names the option") {
         Refusal{{"--words", "three"}, "--words: three not in {one,two}"},
         Refusal{{"--flag"}, "--flag requires --whole"},
         Refusal{{"--flag", "--whole", "1", "--other"}, "excludes"},
-        Refusal{{"--flag=true", "--whole", "1"}, "--flag"}}) {
+        Refusal{{"--flag=false", "--whole", "1"}, "flag was given a disallowed flag override"}}) {
     const std::string said = parse(arguments);
     CAPTURE(said);
     CHECK(said.find(why) != std::string::npos);
@@ -165,6 +165,7 @@ TEST_CASE("a program with commands needs one, which has its own options and the 
   CHECK(run({"show", "a"}) == "show a");
   CHECK(run({"hide"}) == "hide");
   CHECK(run({}) == "A subcommand is required; see --help");
+  CHECK(run({"shew"}) == "The following argument was not expected: shew; see --help");
   CHECK(run({"show"}) == "FILE is required; see --help");
   CHECK(run({"hide", "a"}).find("not expected: a; see --help") != std::string::npos);
   CHECK(run({"show", "--help"}).find("shows\nUsage: kerf-commands show [OPTIONS] FILE") == 0);

@@ -5,20 +5,19 @@
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
+#include <iostream>
 #include <iterator>
 #include <stdexcept>
 #include <system_error>
 #include <utility>
 #include <vector>
 
-#include <nlohmann/json.hpp>
-#include <spdlog/spdlog.h>
-
 #include "controller/plan/compile.hpp"
 #include "controller/plan/plan_cost.hpp"
 #include "controller/tool/tool_shapes.hpp"
 #include "shared/posix/new_file.hpp"
 #include "shared/posix/provenance.hpp"
+#include "shared/text/json.hpp"
 
 namespace kerf {
 namespace {
@@ -85,7 +84,8 @@ Calibration stored_calibration(const std::filesystem::path& path, const SceneCos
 /// Keeps it for the next time, or warns.
 void store_calibration(const std::filesystem::path& path, const Calibration& calibration) {
   const auto warn = [](const std::string& reason) {
-    spdlog::warn("{}; the calibration is not kept: set XDG_CACHE_HOME to a folder for it", reason);
+    std::cerr << "kerf-controller: warning: " << reason
+              << "; the calibration is not kept: set XDG_CACHE_HOME to a folder for it\n";
   };
   const std::filesystem::path folder = path.parent_path();
   std::error_code error;
@@ -157,31 +157,39 @@ std::filesystem::path calibration_path() {
 }
 
 std::string calibration_json(const Calibration& calibration) {
-  const nlohmann::ordered_json json{{"program", "kerf-controller"},
-                                    {"version", KERF_VERSION},
-                                    {"counts", kCountsRevision},
-                                    {"machine", calibration.machine},
-                                    {"ns_per_operation", calibration.price_ns}};
-  return json.dump(2) + "\n";
+  Json prices = Json::Members{};
+  for (const auto& [key, price] : calibration.price_ns) prices[key] = price;
+  return Json{{"program", "kerf-controller"},
+              {"version", KERF_VERSION},
+              {"counts", kCountsRevision},
+              {"machine", calibration.machine},
+              {"ns_per_operation", std::move(prices)}}
+      .document();
 }
 
 Calibration parse_calibration(const std::string& text) {
-  const auto json = nlohmann::json::parse(text, nullptr, false);
-  if (!json.is_object() || !json.contains("ns_per_operation") || !json.contains("machine") ||
-      !json["ns_per_operation"].is_object() || !json["machine"].is_string()) {
+  Json json;
+  Calibration calibration;
+  try {
+    json = Json::parse(text);
+    calibration.machine = json.at("machine").get<std::string>();
+    static_cast<void>(json.at("ns_per_operation").members());
+  } catch (const JsonError&) {
     throw std::runtime_error("is no calibration");
   }
-  if (json.value("version", nlohmann::json()) != KERF_VERSION ||
-      json.value("counts", nlohmann::json()) != kCountsRevision) {
+  if (json["version"].canonical() != Json(KERF_VERSION).canonical() ||
+      json["counts"].canonical() != Json(kCountsRevision).canonical()) {
     throw std::runtime_error("is of another version");
   }
-  Calibration calibration{json["machine"], {}};
-  for (const auto& [key, price] : json["ns_per_operation"].items()) {
+  for (const auto& [key, price] : json.at("ns_per_operation").members()) {
     constexpr double kMostNs = 1e6;
-    if (!price.is_number() || !(price.get<double>() > 0) || !(price.get<double>() < kMostNs)) {
-      throw std::runtime_error("has no price for " + key);
+    double ns = 0;
+    try {
+      ns = price.get<double>();
+    } catch (const JsonError&) {
     }
-    calibration.price_ns[key] = price.get<double>();
+    if (!(ns > 0 && ns < kMostNs)) throw std::runtime_error("has no price for " + key);
+    calibration.price_ns[key] = ns;
   }
   return calibration;
 }
@@ -193,7 +201,8 @@ Calibration calibration_of_machine(const std::filesystem::path& path, bool renew
     try {
       return stored_calibration(path, costs);
     } catch (const std::exception& error) {
-      spdlog::warn("{}: {}; measured anew", path.string(), error.what());
+      std::cerr << "kerf-controller: warning: " << path.string() << ": " << error.what()
+                << "; measured anew\n";
     }
   }
   Calibration calibration = measure_calibration();

@@ -6,10 +6,9 @@
 #include <cstdio>
 #include <utility>
 
-#include <nlohmann/json.hpp>
-
 #include "controller/plan/cost/work_budget.hpp"
 #include "controller/scene/scene_words.hpp"
+#include "shared/text/json.hpp"
 
 namespace kerf {
 namespace {
@@ -168,17 +167,15 @@ std::string explanation_text(const Explanation& e) {
 }
 
 std::string explanation_json(const Explanation& e) {
-  using Json = nlohmann::ordered_json;
-  const auto number_or_null = [](std::optional<double> us) { return us ? Json(*us) : Json(); };
-  Json ticks = Json::array();
+  Json ticks = Json::List{};
   for (const ExplainedTick& tick : e.ticks) {
-    Json stages = Json::array();
+    Json stages = Json::List{};
     for (const ExplainedStage& stage : tick.stages) {
       stages.push_back({{"stage", stage.cost.stage},
                         {"operations", stage.cost.operations},
                         {"work_us", stage.work_us},
                         {"timed_operations", stage.timed_operations},
-                        {"predicted_us", number_or_null(stage.predicted_us)},
+                        {"predicted_us", stage.predicted_us},
                         {"measured_us", stage.measured_us}});
     }
     const ExplainedStage sum = sum_of(tick);
@@ -189,16 +186,16 @@ std::string explanation_json(const Explanation& e) {
                      {"operations", sum.cost.operations},
                      {"work_us", sum.work_us},
                      {"timed_operations", sum.timed_operations},
-                     {"predicted_us", number_or_null(sum.predicted_us)},
+                     {"predicted_us", sum.predicted_us},
                      {"measured_us", sum.measured_us},
                      {"stages", stages}});
   }
-  Json tools = Json::array();
+  Json tools = Json::List{};
   for (const ToolWork& work : works_of(e)) {
     tools.push_back(
         {{"tool", work.tool}, {"work_us", work.us}, {"highest_rate_hz", highest_rate_hz(work.us)}});
   }
-  Json arrays = Json::array();
+  Json arrays = Json::List{};
   for (const ArrayBytes& array : e.arrays) {
     arrays.push_back({{"name", array.name}, {"bytes", array.bytes}});
   }
@@ -214,7 +211,7 @@ std::string explanation_json(const Explanation& e) {
                   {"ticks", ticks},
                   {"arrays", arrays},
                   {"total_bytes", total_bytes(e)}};
-  return json.dump(2) + "\n";
+  return json.document();
 }
 
 }  // namespace kerf

@@ -1,0 +1,72 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+# Every header stands alone, though the build has precompiled headers of the standard library, which
+# hide a forgotten include. First by text: a header that names something of such a standard header
+# includes it, itself or by a header of ours. Then each header is compiled as the only line of a file;
+# what the text has shown to be included is precompiled here, too: a quarter of the time.
+#     .ci/check-headers.sh [ROOT]      another tree, for the check of this check
+set -euo pipefail
+cd "${1:-$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/..}"
+mapfile -t headers < <(find shared controller record hil lab visualizer tests -name '*.hpp' | sort)
+
+# As in CMakeLists.txt; of each, the names by which a header shows that it needs it.
+needs='
+algorithm  (sort|stable_sort|find|find_if|min|max|clamp|copy|fill|any_of|all_of|none_of|count_if|min_element|max_element|nth_element|lower_bound|upper_bound|transform|replace|reverse|equal|ranges::(sort|find|any_of|all_of|copy|fill|count|max|min|max_element|min_element))\(
+array      (array\b|to_array)
+atomic     (atomic|memory_order)
+chrono     chrono::
+cmath      (abs|fabs|sqrt|hypot|floor|ceil|round|lround|llround|pow|exp|log|log2|log10|sin|cos|tan|asin|acos|atan|atan2|isfinite|isnan|fmod|cbrt)\(
+cstdint    u?int(8|16|32|64)_t\b
+filesystem filesystem::
+fstream    [io]?fstream\b
+functional (function|ref|cref|bind|hash|less|greater|plus)[<(]
+memory     (unique_ptr|shared_ptr|weak_ptr|make_unique|make_shared|addressof)\b
+optional   (optional|nullopt)\b
+random     (mt19937|mt19937_64|uniform_\w+_distribution|normal_distribution|random_device)\b
+span       span\b
+sstream    [io]?stringstream\b
+string     (string\b|to_string|getline)
+thread     (thread\b|jthread|this_thread::)
+vector     vector\b'
+
+by_text() {
+  perl -e '
+    my ($needs, @headers) = @ARGV;
+    my (%text, %seen);
+    for my $file (@headers) { local $/; open my $in, "<", $file or die; $text{$file} = <$in>; }
+    sub closure {  # of one header: each standard header that it includes, in the end
+      my ($file, $into) = @_;
+      return if $into->{$file}++;
+      $into->{$1} = 1 while ($text{$file} // "") =~ /^#include <([^>]+)>/mg;
+      my @below = ($text{$file} // "") =~ /^#include "([^"]+)"/mg;
+      closure($_, $into) for @below;
+    }
+    for my $file (@headers) {
+      my (%has, $code);
+      closure($file, \%has);
+      ($code = $text{$file}) =~ s{//[^\n]*}{}g;
+      for (split /\n/, $needs) {
+        my ($header, $names) = split " ", $_, 2 or next;
+        next if $has{$header} or $code !~ /\bstd::($names)/;
+        print "$file: std::$1 without <$header>\n";
+      }
+    }' "$needs" "${headers[@]}"
+}
+forgotten=$(by_text)
+if [[ -n $forgotten ]]; then
+  echo "$forgotten"
+  echo "check-headers: include what the lines above name" >&2
+  exit 1
+fi
+
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+compiler="clang++-16 -std=c++20 -I. -DKERF_VERSION=\"\" $(pkg-config --cflags epoxy imgui glfw3)"
+awk 'NF { print "#include <" $1 ">" }' <<<"$needs" >"$work/standard.hpp"
+$compiler -x c++-header "$work/standard.hpp" -o "$work/standard.pch"
+# Tests may lean on nothing else either.
+failed=0
+printf '%s\n' "${headers[@]}" | xargs -P "$(nproc)" -I{} sh -c \
+  "echo '#include \"{}\"' | $compiler -include-pch $work/standard.pch -fsyntax-only -x c++ - ||
+   { echo 'check-headers: {}: does not stand alone' >&2; exit 1; }" || failed=1
+exit "$failed"
