@@ -48,23 +48,24 @@ enum class ForceModel : std::uint8_t {
 };
 enum class CutModel : std::uint8_t { none, overlap, overlap_exact, preston };
 
+// The tables of a scene file. What a member means, its unit and range: scene_keys.cpp.
+
 /// [device]
 struct DeviceSettings {
   Personality personality = Personality::omni;
-  double workspace_scale = 1.0;              ///< x_scene = scale * x_device
-  std::array<double, 3> offset_mm{0, 0, 0};  ///< scene point under the device origin
-  std::optional<std::array<double, 3>>
-      torque_scale;  ///< N mm at the joint per motor count; none: off
-  std::array<double, 3> dock_rad{0.0, 0.23, -0.37};  ///< of the Omni: joint angles in the inkwell
+  double workspace_scale = 1.0;  ///< x_scene = scale * x_device
+  std::array<double, 3> offset_mm{0, 0, 0};
+  std::optional<std::array<double, 3>> torque_scale;  ///< none: the motors stay off
+  std::array<double, 3> dock_rad{0.0, 0.23, -0.37};
 };
 
 /// [force]
 struct ForceSettings {
   ForceModel model = ForceModel::proxy;
-  double p0_n_per_mm2 = 0.06;        ///< of the paper's force
-  double stiffness_n_per_mm = 0.4;   ///< of the coupling to the proxy, at the device port
-  double damping_ns_per_mm = 0.002;  ///< the same
-  double friction = 0.0;             ///< Coulomb coefficient of the proxy on the surface
+  double p0_n_per_mm2 = 0.06;
+  double stiffness_n_per_mm = 0.4;
+  double damping_ns_per_mm = 0.002;
+  double friction = 0.0;
 };
 
 /// [cut]
@@ -73,22 +74,22 @@ struct CutSettings {
   double rate_per_s = 20.0;  ///< k; 1/T is the paper's own step
   double p1_n_per_mm2 = 0.06;
   // Of the model preston:
-  double machinability_mm3_per_s_n = kEnamelMm3PerSN;  ///< of what has no label, too
-  double threshold_n = 0.05;                           ///< force that cuts nothing yet
-  double friction = 0.5;                               ///< tangential over normal force
+  double machinability_mm3_per_s_n = kEnamelMm3PerSN;
+  double threshold_n = 0.05;
+  double friction = 0.5;
 };
 
 /// [spindle]: turns the tool in the model preston; an air turbine.
 struct SpindleSettings {
-  double speed_krpm = kReferenceSpeedKrpm;  ///< without load
+  double speed_krpm = kReferenceSpeedKrpm;
   double stall_torque_n_mm = 3.0;  ///< tuned: a turbine loses a tenth of its speed in a deep cut
-  double inertia_g_mm2 = 4.5;      ///< of rotor and bur
+  double inertia_g_mm2 = 4.5;
 };
 
 /// [limits]
 struct LimitSettings {
   double force_n = 3.3;
-  double continuous_force_n = 0.88;  ///< RMS budget
+  double continuous_force_n = 0.88;
   double slew_n_per_ms = 0.5;
   double speed_mm_per_s = 10000.0;
 };

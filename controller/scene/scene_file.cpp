@@ -32,8 +32,9 @@ struct SceneTables {
   [[nodiscard]] std::vector<SceneTable> all(std::string_view name) const {
     std::vector<SceneTable> tables;
     if (const TomlNode* list = root.find(name)) {
-      for (const TomlNode& node : list->entries)
+      for (const TomlNode& node : list->entries) {
         tables.emplace_back(std::string(name), file, node, keys);
+      }
     }
     return tables;
   }
@@ -71,6 +72,7 @@ void read_lists(const SceneTables& tables, SceneParts& parts) {
     Material& material = material_named(table, parts.material.name, scene.materials);
     parts.material = material;
     table.read(parts);
+    table.read_conditional(parts);
     material = parts.material;
   }
 }

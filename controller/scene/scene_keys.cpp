@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The table of keys. A new key is one row here, its member in scene.hpp, and its use; then
-// `kerf-controller --scene-keys > docs/scene-keys.md`.
+// `./kerf controller --scene-keys > docs/scene-keys.md`.
 #include <tuple>
 
 #include "controller/scene/scene_key.hpp"

@@ -14,9 +14,10 @@ namespace {
 
 constexpr std::string_view kHead =
     "# Scene keys\n\n"
-    "Every key of a scene file (TOML). Made by `kerf-controller --scene-keys > "
-    "docs/scene-keys.md`\n"
-    "from the table in `controller/scene/scene_keys.cpp`; examples are in `scenes/`.\n";
+    "Every key of a scene file (TOML), from the table in `controller/scene/scene_keys.cpp`. "
+    "Examples\n"
+    "are in `scenes/`. This page is made by\n\n"
+    "    ./kerf controller --scene-keys > docs/scene-keys.md\n";
 
 /// What may stand behind the equals sign, by the type of the slot.
 struct AllowedText {

@@ -275,6 +275,30 @@ TEST_CASE("every row: a key that stands twice is one line with line and column")
   }
 }
 
+TEST_CASE("every table: one of another form is answered with the right one") {
+  for (const std::string_view row : names_below("", scene_keys())) {
+    const std::string table(row);
+    const bool list = most_of(table) > 0;
+    const std::string says = list ? " is not a list of tables; write [[" + table + "]]"
+                                  : " is not a table; write [" + table + "]";
+    const std::string head = "x.toml:1: " + table + " = ";
+    CHECK(error_of(table + " = 3\n") == head + "3" + says);
+    CHECK(error_of((list ? "[" + table + "]" : "[[" + table + "]]") + "\n") ==
+          head + (list ? "{..}" : "[{..}]") + says);
+  }
+}
+
+TEST_CASE("the settings in effect: of the models that the scene has, in the table's order") {
+  const std::string text = settings_text(parse_scene(
+      SceneLines().set("tool.size_vox", "16").set("force.model", "\"paper\"").text(), "x.toml"));
+  CHECK(text.rfind("volume.name=\"phantom\"\nvolume.file=\"phantom\"\nvolume.iso=\"otsu\"\n", 0) ==
+        0);
+  CHECK(text.find("\nforce.model=\"paper\"\nforce.p0_n_per_mm2=0.06\ncut.model=\"overlap\"\n") !=
+        std::string::npos);
+  CHECK(text.find("stiffness_n_per_mm") == std::string::npos);
+  CHECK(text.find("spindle.") == std::string::npos);
+}
+
 TEST_CASE("a quoted name with a dot is no key") {
   CHECK(error_of("\"force.friction\" = 0.5\n").find("is not a known key") != std::string::npos);
   CHECK(error_of("[[volume]]\nfile = \"a\"\n\"pose.position_mm\" = [1, 2, 3]\n")
@@ -308,7 +332,7 @@ TEST_CASE("every row: the unit is the one that its name tells") {
 TEST_CASE("docs/scene-keys.md is what the table says") {
   std::ifstream file(KERF_DOCS "/scene-keys.md", std::ios::binary);
   const std::string page{std::istreambuf_iterator<char>(file), {}};
-  INFO("renew it: kerf-controller --scene-keys > docs/scene-keys.md");
+  INFO("renew it: ./kerf controller --scene-keys > docs/scene-keys.md");
   CHECK((page == scene_keys_page()));
   const VoxelGrid grid = PhantomSpec{}.grid;
   const double sides[] = {double(grid.nx), double(grid.ny), double(grid.nz)};
