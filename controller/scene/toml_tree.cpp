@@ -6,16 +6,7 @@
 #include <utility>
 
 #include "controller/scene/scene_text.hpp"
-
-// The one place of the controller that sees toml++. Debian's 3.3.0 asserts that a table header
-// begins with a letter of a key before it has looked: `[!]` in a file would end the program. The
-// check behind the assertion reports that properly, so assertions are off here, in every build type
-// (with NDEBUG they would become assumptions). Without exceptions the parser lives in a namespace
-// of its own, so another file that includes toml++ as it comes does not bring the assertion back.
-#undef NDEBUG
-#define TOML_ASSERT(expr) static_cast<void>(0)
-#define TOML_EXCEPTIONS 0
-#include <toml++/toml.h>
+#include "shared/text/toml.hpp"
 
 namespace kerf {
 namespace {
