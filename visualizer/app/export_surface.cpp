@@ -3,12 +3,12 @@
 
 #include <algorithm>
 #include <array>
+#include <string>
 #include <string_view>
 
 #include "shared/posix/new_file.hpp"
 #include "visualizer/error.hpp"
 #include "visualizer/surface/mesh_file.hpp"
-#include "visualizer/view/file_out.hpp"
 
 namespace kerf {
 
@@ -16,7 +16,7 @@ namespace {
 
 struct Format {
   std::string_view ending;
-  std::vector<std::uint8_t> (*bytes)(const ClosedMesh&);
+  std::string (*bytes)(const ClosedMesh&);
 };
 constexpr auto kFormats = std::to_array<Format>({{".stl", stl_bytes}, {".ply", ply_bytes}});
 
@@ -47,7 +47,7 @@ void export_surface(const std::filesystem::path& file, const SceneView& scene,
     mesh.append(VolumeSurface(volume, scene.materials, contents[i].density, contents[i].labels),
                 volume.world_from_voxel);
   }
-  write_file(file, format.bytes(mesh));
+  write_new_file(file, format.bytes(mesh));
 }
 
 }  // namespace kerf

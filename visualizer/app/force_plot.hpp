@@ -8,8 +8,8 @@
 
 namespace kerf {
 
-/// Force and depth of the tool over the last five seconds of servo time, as the pictures met them:
-/// one point per picture, of the newest tick then.
+/// Commanded force and depth of the tool over the last five seconds of the machine's clock. One
+/// point per picture: the newest tick at that time.
 class ForcePlot {
  public:
   static constexpr double kSpanS = 5.0;

@@ -6,18 +6,19 @@
 #include <optional>
 #include <thread>
 
+#include "shared/numeric/percentile.hpp"
 #include "shared/posix/new_file.hpp"
+#include "shared/posix/stop_signals.hpp"
 #include "visualizer/app/contact_sheet.hpp"
 #include "visualizer/app/cpu_placement.hpp"
 #include "visualizer/app/export_surface.hpp"
+#include "visualizer/app/film.hpp"
 #include "visualizer/app/frame_schedule.hpp"
 #include "visualizer/app/picture.hpp"
-#include "visualizer/app/recording.hpp"
 #include "visualizer/app/run.hpp"
 #include "visualizer/gl/context.hpp"
 #include "visualizer/view/file_out.hpp"
 #include "visualizer/view/frame_report.hpp"
-#include "visualizer/view/stop_signal.hpp"
 #include "visualizer/view/transfer_file.hpp"
 
 namespace kerf {
@@ -59,16 +60,16 @@ class FrameTaker {
 };
 
 void tell(const VisualizerOptions& options, const FrameSchedule& schedule,
-          const std::optional<Recording>& recording, const FrameReport& report) {
+          const std::optional<Film>& film, const FrameReport& report) {
   if (schedule.taken() > 0) {
     std::printf("%u pictures in %s, ", schedule.taken(), options.out.c_str());
   }
-  if (recording) {
-    const VideoFile& video = recording->file();
+  if (film) {
+    const VideoFile& video = film->file();
     std::printf("%ju frames in %s, ", std::uintmax_t{video.frames()}, video.path().c_str());
   }
-  std::printf("%.1f cpu ms each (%s)\n", percentile(report.cpu_ms, 0.5),
-              report.gl_renderer.c_str());
+  std::vector<double> cpu_ms = report.cpu_ms;
+  std::printf("%.1f cpu ms each (%s)\n", percentile(cpu_ms, 0.5), report.gl_renderer.c_str());
 }
 
 }  // namespace
@@ -105,21 +106,21 @@ int run_headless(const VisualizerOptions& options) {
   report.redrawn.clear();
   report.latency_ms.clear();
 
-  std::optional<Recording> recording;
-  if (options.record) recording.emplace(*options.record, options.size, options.video_hz);
+  std::optional<Film> film;
+  if (options.record) film.emplace(*options.record, options.size, options.video_hz);
   FrameSchedule schedule(options.frames, options.every_ticks.value_or(ticks_between(
                                              options.frames, options.seconds, session.tick_ns())));
   bool over = false;
-  while (!over && (recording || !schedule.complete())) {
+  while (!over && (film || !schedule.complete())) {
     over = session.ended() || stop_requested() ||
            (options.seconds && since_attached.wall_ms() >= *options.seconds * kMsPerS);
     session.poll();
     picture.update(session);
     const auto ticks = session.ticks_since_armed();
-    const bool filmed = recording && ticks && recording->due(session.servo_s());
+    const bool filmed = film && ticks && film->due(session.servo_s());
     if (filmed || (over ? schedule.final_due(ticks) : schedule.due(ticks))) taker.draw(session);
     if (filmed) {
-      const auto problem = film(recording, taker.target(), session.servo_s());
+      const auto problem = add_frame(film, taker.target(), session.servo_s());
       if (problem) std::fprintf(stderr, "kerf-visualizer: %s\n", problem->c_str());
     }
     while (over ? schedule.final_due(ticks) : schedule.due(ticks)) {
@@ -128,10 +129,10 @@ int run_headless(const VisualizerOptions& options) {
     }
     if (over) continue;
     std::chrono::duration<double> pause = kIdle;
-    if (recording && ticks) {
+    if (film && ticks) {
       // A frame begins when the tick that it waits for is out, not up to a pause later: its delay
       // counts as latency.
-      const std::chrono::duration<double> due(recording->due_in_s(session.servo_s()) -
+      const std::chrono::duration<double> due(film->due_in_s(session.servo_s()) -
                                               session.record_age_s());
       pause = std::clamp<std::chrono::duration<double>>(due, kShort, kIdle);
     }
@@ -147,8 +148,8 @@ int run_headless(const VisualizerOptions& options) {
   report.bricks_uploaded = picture.bricks_uploaded();
   report.clean_end = session.ended_cleanly();
   if (options.report) report.write(*options.report);
-  tell(options, schedule, recording, report);
-  return exit_code(session, options.record && !recording);
+  tell(options, schedule, film, report);
+  return exit_code(session, options.record && !film);
 }
 
 }  // namespace kerf

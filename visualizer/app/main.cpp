@@ -2,10 +2,10 @@
 #include <cstdio>
 #include <exception>
 
+#include "shared/posix/stop_signals.hpp"
 #include "visualizer/app/run.hpp"
 #include "visualizer/error.hpp"
 #include "visualizer/gl/window.hpp"
-#include "visualizer/view/stop_signal.hpp"
 
 int main(int argc, char** argv) {
   try {

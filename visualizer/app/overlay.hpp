@@ -7,24 +7,11 @@
 #include <vector>
 
 #include "visualizer/app/force_plot.hpp"
+#include "visualizer/app/look_panel.hpp"
 #include "visualizer/gl/pointer.hpp"
 #include "visualizer/gl/target.hpp"
-#include "visualizer/view/look.hpp"
 
 namespace kerf {
-
-/// What the controls show, and the look that they change.
-struct LookControls {
-  Look look;
-  double own_iso = 0.5;                ///< of the main volume, 0..1: where the look has none
-  std::vector<std::string> volumes{};  ///< their names
-  bool has_iso = false;                ///< a volume shows its iso-surface
-  bool takes_gradient = false;         ///< a renderer shades by the look's
-  Opacities opacities{};               ///< of all materials, as they are; empty: not shown
-  bool write = false;                  ///< the user asks for a file with them
-  std::optional<Pointer> over{};       ///< the mouse, while it is over them
-  friend bool operator==(const LookControls&, const LookControls&) noexcept = default;
-};
 
 /// What the panel in the corner says.
 struct OverlayFigures {
@@ -69,9 +56,8 @@ class Overlay {
 
  private:
   void lay_out(OverlayFigures& figures, PictureSize size);
-  void look_controls(LookControls& controls);
 
-  std::optional<float> dragged_iso_;  ///< taken over when the drag ends: all is drawn anew then
+  LookPanel look_panel_;
 };
 
 }  // namespace kerf

@@ -45,17 +45,16 @@ Notice take_screenshot(const VisualizerOptions& options, const RenderTarget& tar
   });
 }
 
-Notice toggle_recording(const VisualizerOptions& options, PictureSize size,
-                        std::optional<Recording>& recording) {
-  if (recording) {
-    const VideoFile& file = recording->file();
+Notice toggle_film(const VisualizerOptions& options, PictureSize size, std::optional<Film>& film) {
+  if (film) {
+    const VideoFile& file = film->file();
     const Notice ended{"video: " + file.path() + ": " + std::to_string(file.frames()) + " frames"};
-    recording.reset();
+    film.reset();
     return ended;
   }
   return write_for_user("video begins", [&] {
     const std::filesystem::path file = unused_file(options.out, ".y4m");
-    recording.emplace(file.string(), size, options.video_hz);
+    film.emplace(file.string(), size, options.video_hz);
     return file;
   });
 }

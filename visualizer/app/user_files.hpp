@@ -3,10 +3,10 @@
 
 #include <optional>
 
+#include "visualizer/app/film.hpp"
 #include "visualizer/app/notices.hpp"
 #include "visualizer/app/options.hpp"
 #include "visualizer/app/picture.hpp"
-#include "visualizer/app/recording.hpp"
 
 namespace kerf {
 
@@ -16,8 +16,8 @@ namespace kerf {
 [[nodiscard]] Notice take_screenshot(const VisualizerOptions& options, const RenderTarget& target);
 
 /// Begins a video in a new file, or ends the one that runs.
-[[nodiscard]] Notice toggle_recording(const VisualizerOptions& options, PictureSize size,
-                                      std::optional<Recording>& recording);
+[[nodiscard]] Notice toggle_film(const VisualizerOptions& options, PictureSize size,
+                                 std::optional<Film>& film);
 
 /// Where --transfer read them, or in a new file.
 [[nodiscard]] Notice write_opacities(const VisualizerOptions& options, const Picture& picture);

@@ -14,8 +14,8 @@ struct BenchCut {
   std::vector<VoxelBox> differs;      ///< `VolumeSnapshot::differs`
 };
 
-/// A made-up molar for timing pictures: crown with four cusps, two roots, enamel over dentin by
-/// density. It is as high as the grid and fills of it what the paper's padded tooth does.
+/// A synthetic molar for timing pictures: a crown with four cusps, two roots, enamel denser than
+/// dentin. It is as high as the grid, and fills the same share of it as the paper's padded tooth.
 class BenchTooth {
  public:
   /// `cropped`: without the air around; the voxels are the same.

@@ -63,12 +63,12 @@ double angle_deg(Gradient gradient, const std::vector<Density>& density) {
     for (int x = 0; x < kSize.width; ++x) {
       const glm::dvec2 ndc((2.0 * x + 1.0) / kSize.width - 1.0,
                            1.0 - (2.0 * y + 1.0) / kSize.height);
-      const glm::dvec3 direction = glm::normalize(glm::dvec3(ndc * view.tan_half_height, -1.0));
-      const double middle = glm::dot(direction, centre);
+      const glm::dvec3 ray = glm::normalize(glm::dvec3(ndc * view.tan_half_height, -1.0));
+      const double middle = glm::dot(ray, centre);
       const double inside = kRadius * kRadius - glm::dot(centre, centre) + middle * middle;
       if (inside < 0.0) continue;
-      const glm::dvec3 normal = ((middle - std::sqrt(inside)) * direction - centre) / kRadius;
-      if (-glm::dot(normal, direction) < kLeastFacing) continue;
+      const glm::dvec3 normal = ((middle - std::sqrt(inside)) * ray - centre) / kRadius;
+      if (-glm::dot(normal, ray) < kLeastFacing) continue;
       const glm::dvec3 seen = shown_normal(&rgb[3 * static_cast<std::size_t>(y * kSize.width + x)]);
       const double angle = 2.0 * std::asin(0.5 * std::min(glm::length(seen - normal), 2.0));
       sum += angle * angle;

@@ -3,11 +3,12 @@
 
 #include <array>
 
+#include "shared/numeric/percentile.hpp"
+#include "shared/posix/stop_signals.hpp"
 #include "visualizer/bench/bench_tooth.hpp"
 #include "visualizer/compose/stale_volume.hpp"
 #include "visualizer/render/renderer.hpp"
 #include "visualizer/view/frame_report.hpp"
-#include "visualizer/view/stop_signal.hpp"
 
 namespace kerf {
 

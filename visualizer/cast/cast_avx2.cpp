@@ -13,11 +13,11 @@ using Simd = Twice<Avx2>;
 }  // namespace kerf
 
 #include "visualizer/cast/packet_blend.hpp"
-#include "visualizer/cast/packet_change.hpp"
+#include "visualizer/cast/packet_dirty.hpp"
 #include "visualizer/cast/packet_iso.hpp"
 
 namespace kerf {
 
-const CastKernels kCastAvx2{"avx2", cast_iso, cast_blend, cast_meets, cast_feels};
+const CastKernels kCastAvx2{"avx2", cast_iso, cast_blend, cast_rays_touch, cast_shading_touches};
 
 }  // namespace kerf

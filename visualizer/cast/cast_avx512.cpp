@@ -31,11 +31,12 @@ struct Simd : Avx512 {
 }  // namespace kerf
 
 #include "visualizer/cast/packet_blend.hpp"
-#include "visualizer/cast/packet_change.hpp"
+#include "visualizer/cast/packet_dirty.hpp"
 #include "visualizer/cast/packet_iso.hpp"
 
 namespace kerf {
 
-const CastKernels kCastAvx512{"avx512", cast_iso, cast_blend, cast_meets, cast_feels};
+const CastKernels kCastAvx512{"avx512", cast_iso, cast_blend, cast_rays_touch,
+                              cast_shading_touches};
 
 }  // namespace kerf

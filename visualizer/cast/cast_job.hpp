@@ -77,7 +77,7 @@ struct CastJob {
   float key_light[3] = {}, fill_light[3] = {}, up[3] = {};  ///< unit vectors in eye space
 };
 
-struct ChangeJob;
+struct DirtyJob;
 
 /// The kernels of one instruction set. All sets give the same bits: every ray is computed by
 /// itself, with the same operations in the same order, whatever packet it travels in.
@@ -85,10 +85,10 @@ struct CastKernels {
   const char* name;
   void (*iso)(const CastJob& job, const PixelRect& rect);
   void (*blend)(const CastJob& job, const PixelRect& rect);
-  /// Whether a ray of `rect` passes a marked cell, or ends in one.
-  bool (*meets)(const ChangeJob& job, const PixelRect& rect);
-  /// Whether the shading of the surface there reaches one.
-  bool (*feels)(const ChangeJob& job, const PixelRect& rect);
+  /// Whether a ray of `rect` crosses a dirty cell, or ends in one.
+  bool (*rays_touch)(const DirtyJob& job, const PixelRect& rect);
+  /// Whether the shading of a surface point in `rect` samples a dirty cell.
+  bool (*shading_touches)(const DirtyJob& job, const PixelRect& rect);
 };
 
 /// What this machine can run, the fastest first; ends with the scalar set and a null.

@@ -9,29 +9,29 @@
 
 namespace kerf {
 
-/// Which tiles of a picture must be drawn again. Tiles of 4x4 pixels, in which the
-/// ray caster and a software GL shade.
+/// The damage of a picture: the tiles that must be drawn again. A tile has 4x4 pixels, as the ray
+/// caster and a software GL shade them. Rows count from the bottom up, as GL has them.
 class StaleTiles {
  public:
   static constexpr int kEdge = 4;
 
   explicit StaleTiles(PictureSize size);
 
-  /// The tiles, counted in tiles, that `pixels` touch; clipped to the picture.
+  /// The tiles that `pixels` touch, as a rectangle in tiles; clipped to the picture.
   [[nodiscard]] PixelRect tiles_of(const PixelRect& pixels) const;
-  /// The pixels of some tiles that exist.
+  /// The pixels of `tiles`, clipped to the picture.
   [[nodiscard]] PixelRect pixels_of(const PixelRect& tiles) const;
 
-  /// All that `pixels` touch.
+  /// Marks every tile that `pixels` touch.
   void mark(const PixelRect& pixels);
   void mark(int x, int y) { marked_[at(x, y)] = 1; }
-  /// All that are marked in `other`, of the same picture.
+  /// Marks what is marked in `other`, which has the same size.
   void mark(const StaleTiles& other);
   void clear();
   [[nodiscard]] bool marked(int x, int y) const { return marked_[at(x, y)] != 0; }
 
-  /// Rectangles of pixels, apart from one another, that cover the marked tiles, and of others a few
-  /// where that saves rectangles: each costs a draw call.
+  /// Rectangles of pixels that do not overlap and cover the marked tiles. Each costs a draw call,
+  /// so a rectangle takes in a few clean tiles where that saves another rectangle.
   [[nodiscard]] std::vector<PixelRect> rects() const;
 
  private:

@@ -11,9 +11,10 @@
 
 namespace kerf {
 
-/// Marks the tiles of which pixels show one of `triangles`, or would if it was there: those that
-/// `kept`, a picture with its depth, hides behind something nearer are left out. Exact but for what
-/// a GPU rounds: a pixel shows a triangle only where its centre lies within.
+/// Marks the tiles in which one of `triangles` may cover the centre of a pixel. A triangle that
+/// came and one that went count alike. A tile stays clean where the depth of `kept`, the last
+/// picture, is everywhere nearer than the triangle. Marks a little more than needed, never less: a
+/// GPU rounds.
 void mark_triangles(StaleTiles& tiles, std::span<const FineTriangle> triangles,
                     const glm::dmat4& clip_from_voxel, const RenderTarget& kept);
 

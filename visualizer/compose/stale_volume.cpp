@@ -9,7 +9,7 @@
 
 #include "visualizer/cast/cast_eye.hpp"
 #include "visualizer/compose/stale_triangles.hpp"
-#include "visualizer/render/changed_cells.hpp"
+#include "visualizer/render/dirty_cells.hpp"
 #include "visualizer/view/screen_bounds.hpp"
 
 namespace kerf {
@@ -78,13 +78,13 @@ PixelRect pixels_of(const glm::dvec3& low, const glm::dvec3& high, const VolumeV
   return screen_bounds(corners, view, size);
 }
 
-/// A change in a volume, as one view sees it.
-ChangeJob change_job(const ChangedCells& cells, const VolumeView& volume, const View& view,
-                     PictureSize size) {
+/// The dirty cells of a volume, as one view sees them.
+DirtyJob dirty_job(const DirtyCells& cells, const VolumeView& volume, const View& view,
+                   PictureSize size) {
   const glm::dmat4 eye_from_cell =
       view.eye_from_world * glm::translate(volume.world_from_voxel, cells.low());
   const glm::dmat4 cell_from_eye = glm::affineInverse(eye_from_cell);
-  ChangeJob job;
+  DirtyJob job;
   job.eye = cast_eye(view, size.width, size.height);
   put(job.origin, glm::dvec3(cell_from_eye[3]));
   put(job.from_eye, glm::dmat3(cell_from_eye));
@@ -92,8 +92,8 @@ ChangeJob change_job(const ChangedCells& cells, const VolumeView& volume, const 
   return job;
 }
 
-/// What lets its surface feel the change: all of `density`.
-void put_density(ChangeJob& job, const ChangedCells& cells, const VolumeView& volume,
+/// Adds the volume itself, for surfaces whose shading samples it.
+void put_density(DirtyJob& job, const DirtyCells& cells, const VolumeView& volume,
                  std::span<const Density> density, const View& view) {
   const VoxelGrid& grid = volume.bricks.grid;
   job.density = density.data();
@@ -126,8 +126,8 @@ void mark_where(StaleTiles& tiles, const PixelRect& within, const IsStale& is_st
 
 void StaleVolume::add(const Renderer& renderer, std::size_t index,
                       std::span<const VoxelBox> differs) {
-  add_to(changed_, renderer.looks_different(index, differs));
-  const auto triangles = renderer.different_triangles(index);
+  add_to(changed_, renderer.dirty_voxels(index, differs));
+  const auto triangles = renderer.dirty_triangles(index);
   triangles_.insert(triangles_.end(), triangles.begin(), triangles.end());
   if (triangles_.size() <= kMostTriangles) return;
   add_to(changed_, std::array{voxels_around(triangles_)});
@@ -147,33 +147,35 @@ void StaleVolume::mark(StaleTiles& tiles, const Renderer& renderer, const Volume
         view.clip_from_eye() * view.eye_from_world * volume.world_from_voxel;
     mark_triangles(tiles, triangles_, clip_from_voxel, kept);
   }
-  const SightReach reach = renderer.reach();
+  const RayFootprint footprint = renderer.footprint();
   const CastKernels& kernels = *cast_kernels()[0];
-  const double feels_vox = reach.feels_ahead ? kLongestFeelerVox : 0.0;
+  const double taps_vox = footprint.taps_normal ? kLongestTapVox : 0.0;
   const auto pixels_around = [&](const glm::dvec3& low, const glm::dvec3& high, double vox) {
     return pixels_of(low - vox, high + vox, volume, view, kept.size());
   };
   for (const std::vector<VoxelBox>& together : clusters_of(changed_)) {
     if (const auto& [lo, hi] = together.front(); voxels_in({lo, hi}) > kMostTogether) {
-      const double around_vox = 0.5 * std::max(reach.along, reach.at_end) + feels_vox;
+      const double around_vox = 0.5 * std::max(footprint.along, footprint.at_end) + taps_vox;
       tiles.mark(pixels_around({lo.x, lo.y, lo.z}, {hi.x, hi.y, hi.z}, around_vox));
       continue;
     }
-    const ChangedCells cells(together, reach);
+    const DirtyCells cells(together, footprint);
     const PixelRect passing = tiles.tiles_of(pixels_around(cells.low(), cells.high(), 0.0));
-    const PixelRect all = tiles.tiles_of(pixels_around(cells.low(), cells.high(), feels_vox));
+    const PixelRect all = tiles.tiles_of(pixels_around(cells.low(), cells.high(), taps_vox));
     if (all.empty()) continue;
-    ChangeJob job = change_job(cells, volume, view, kept.size());
+    DirtyJob job = dirty_job(cells, volume, view, kept.size());
     std::vector<float> depth;
     if (!renderer.translucent()) {
       job.window = tiles.pixels_of(all);
       depth = kept.read_depth(job.window);
       job.depth = depth.data();
     }
-    mark_where(tiles, passing, [&](const PixelRect& tile) { return kernels.meets(job, tile); });
-    if (!reach.feels_ahead) continue;
+    mark_where(tiles, passing,
+               [&](const PixelRect& tile) { return kernels.rays_touch(job, tile); });
+    if (!footprint.taps_normal) continue;
     put_density(job, cells, volume, density, view);
-    mark_where(tiles, all, [&](const PixelRect& tile) { return kernels.feels(job, tile); });
+    mark_where(tiles, all,
+               [&](const PixelRect& tile) { return kernels.shading_touches(job, tile); });
   }
 }
 

@@ -9,22 +9,25 @@
 
 namespace kerf {
 
-/// What has changed in one volume since a picture of it was drawn, and which tiles that leaves
-/// stale; the others would come out the same, bit by bit.
+/// Collects the dirty voxels and triangles of one volume, and tells which tiles of its last picture
+/// they make stale. All other tiles would be drawn with the same bits again.
+///
+/// Call `add` after each update of the renderer, `mark` before a picture, `clear` after it.
 class StaleVolume {
  public:
-  /// Takes what the last `update` of volume `index` changed: densities in `differs`.
+  /// Takes what the renderer's last `update` of volume `index` made dirty. `differs` holds every
+  /// voxel whose density changed.
   void add(const Renderer& renderer, std::size_t index, std::span<const VoxelBox> differs);
   void clear();
 
-  /// `density` is all of the volume as it is now; `kept` holds the picture of the opaque
-  /// volumes alone, with its depth.
+  /// Marks the stale tiles of `kept`, the last picture of the opaque volumes with its depth.
+  /// `density` is all of the volume, as it is now.
   void mark(StaleTiles& tiles, const Renderer& renderer, const VolumeView& volume,
             std::span<const Density> density, const View& view, const RenderTarget& kept) const;
 
  private:
-  std::vector<VoxelBox> changed_;        ///< `Renderer::looks_different`
-  std::vector<FineTriangle> triangles_;  ///< `Renderer::different_triangles`
+  std::vector<VoxelBox> changed_;        ///< `Renderer::dirty_voxels`
+  std::vector<FineTriangle> triangles_;  ///< `Renderer::dirty_triangles`
 };
 
 }  // namespace kerf

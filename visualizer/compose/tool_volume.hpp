@@ -14,9 +14,9 @@ namespace kerf {
 
 /// The tool in the hand as a volume of voxels: a volume of the scene like any other, which moves.
 ///
-/// Its density falls over two voxels across the tool's surface and is one half on it. One grid
-/// holds each of the scene's tools, so that to change it is to change voxels. The voxels are as
-/// fine as those of the main volume, but at most 512 along the tool.
+/// The density falls over two voxels across the tool's surface and is one half on it. One grid has
+/// room for every tool of the scene: another tool means other voxels. A voxel is as large as one of
+/// the main volume, or larger where a tool would be longer than 512 voxels.
 class ToolVolume {
  public:
   /// Throws VisualizerError where the scene has no tool with an extent, or no room for a material.
@@ -26,12 +26,13 @@ class ToolVolume {
   [[nodiscard]] SceneView added_to(const SceneView& scene) const;
   [[nodiscard]] VolumeContent content() const { return {density_, labels_}; }
 
-  /// Fills in this tool; air where the scene has fewer. False where it is the one that is there.
+  /// Writes the voxels of tool `tool`; air where the scene has no such tool. False where they are
+  /// the voxels already.
   bool take(std::uint32_t tool);
   [[nodiscard]] glm::dmat4 world_from_voxel(const Hand& hand) const;
-  /// A box around all that the tool of the hand shows; none where that is nothing.
+  /// A box in the world around the voxels of the hand's tool; none where the tool has none.
   [[nodiscard]] std::optional<BoxCorners> corners(const Hand& hand) const;
-  /// All of them.
+  /// The ids of all bricks of the volume.
   [[nodiscard]] std::vector<std::uint32_t> bricks() const;
 
  private:

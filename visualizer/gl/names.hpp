@@ -36,30 +36,17 @@ class GlName {
 
 // The GL loader's functions are pointers filled at run time, so they are named through these.
 namespace gl_calls {
+template <auto& Create>
+void create(GLuint* id) {
+  Create(1, id);
+}
+template <auto& Destroy>
+void destroy(const GLuint* id) {
+  Destroy(1, id);
+}
 template <GLenum Target>
 void create_texture(GLuint* id) {
   glCreateTextures(Target, 1, id);
-}
-inline void destroy_texture(const GLuint* id) {
-  glDeleteTextures(1, id);
-}
-inline void create_buffer(GLuint* id) {
-  glCreateBuffers(1, id);
-}
-inline void destroy_buffer(const GLuint* id) {
-  glDeleteBuffers(1, id);
-}
-inline void create_vertex_array(GLuint* id) {
-  glCreateVertexArrays(1, id);
-}
-inline void destroy_vertex_array(const GLuint* id) {
-  glDeleteVertexArrays(1, id);
-}
-inline void create_framebuffer(GLuint* id) {
-  glCreateFramebuffers(1, id);
-}
-inline void destroy_framebuffer(const GLuint* id) {
-  glDeleteFramebuffers(1, id);
 }
 inline void create_program(GLuint* id) {
   *id = glCreateProgram();
@@ -70,13 +57,15 @@ inline void destroy_program(const GLuint* id) {
 }  // namespace gl_calls
 
 template <GLenum Target>
-using GlTexture = GlName<gl_calls::create_texture<Target>, gl_calls::destroy_texture>;
+using GlTexture = GlName<gl_calls::create_texture<Target>, gl_calls::destroy<glDeleteTextures>>;
 using GlTexture2D = GlTexture<GL_TEXTURE_2D>;
 using GlTexture2DArray = GlTexture<GL_TEXTURE_2D_ARRAY>;
 using GlTexture3D = GlTexture<GL_TEXTURE_3D>;
-using GlBuffer = GlName<gl_calls::create_buffer, gl_calls::destroy_buffer>;
-using GlVertexArray = GlName<gl_calls::create_vertex_array, gl_calls::destroy_vertex_array>;
-using GlFramebuffer = GlName<gl_calls::create_framebuffer, gl_calls::destroy_framebuffer>;
+using GlBuffer = GlName<gl_calls::create<glCreateBuffers>, gl_calls::destroy<glDeleteBuffers>>;
+using GlVertexArray =
+    GlName<gl_calls::create<glCreateVertexArrays>, gl_calls::destroy<glDeleteVertexArrays>>;
+using GlFramebuffer =
+    GlName<gl_calls::create<glCreateFramebuffers>, gl_calls::destroy<glDeleteFramebuffers>>;
 using GlProgramName = GlName<gl_calls::create_program, gl_calls::destroy_program>;
 
 }  // namespace kerf

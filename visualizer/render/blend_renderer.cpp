@@ -18,20 +18,6 @@ BlendRenderer::BlendRenderer(const SceneView& scene, std::span<const VolumeConte
   cast_program_.set("u_step_mm", options.step_vox * static_cast<float>(volumes_.edge_mm()));
 }
 
-void BlendRenderer::update(std::size_t volume, std::span<const Density> density,
-                           std::span<const std::uint32_t> changed) {
-  volumes_.update(volume, density, changed);
-}
-
-void BlendRenderer::place(std::size_t volume, const glm::dmat4& world_from_voxel) {
-  volumes_.place(volume, world_from_voxel);
-}
-
-void BlendRenderer::set_opacities(std::span<const MaterialView> materials,
-                                  std::span<const VolumeContent> contents) {
-  volumes_.set_opacities(materials, contents);
-}
-
 void BlendRenderer::draw(const View& view, const RenderTarget& target) {
   int layer = 0;
   for (const TranslucentVolume& volume : volumes_.volumes()) {

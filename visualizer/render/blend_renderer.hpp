@@ -26,10 +26,16 @@ class BlendRenderer final : public Renderer {
   BlendRenderer(const SceneView& scene, std::span<const VolumeContent> contents, Options options);
 
   void update(std::size_t volume, std::span<const Density> density,
-              std::span<const std::uint32_t> changed) override;
-  void place(std::size_t volume, const glm::dmat4& world_from_voxel) override;
+              std::span<const std::uint32_t> changed) override {
+    volumes_.update(volume, density, changed);
+  }
+  void place(std::size_t volume, const glm::dmat4& world_from_voxel) override {
+    volumes_.place(volume, world_from_voxel);
+  }
   void set_opacities(std::span<const MaterialView> materials,
-                     std::span<const VolumeContent> contents) override;
+                     std::span<const VolumeContent> contents) override {
+    volumes_.set_opacities(materials, contents);
+  }
   void draw(const View& view, const RenderTarget& target) override;
   [[nodiscard]] bool translucent() const noexcept override { return true; }
 

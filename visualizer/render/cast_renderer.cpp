@@ -41,15 +41,6 @@ CastRenderer::CastRenderer(const SceneView& scene, std::span<const VolumeContent
   program_.set("u_depth", 1);
 }
 
-void CastRenderer::update(std::size_t volume, std::span<const Density> density,
-                          std::span<const std::uint32_t> changed) {
-  caster_.update(volume, density, changed);
-}
-
-void CastRenderer::place(std::size_t volume, const glm::dmat4& world_from_voxel) {
-  caster_.place(volume, world_from_voxel);
-}
-
 void CastRenderer::set_opacities(std::span<const MaterialView> materials,
                                  std::span<const VolumeContent> /*contents*/) {
   caster_.set_materials(make_palette(materials));

@@ -20,8 +20,12 @@ class CastRenderer final : public Renderer {
   CastRenderer(const SceneView& scene, std::span<const VolumeContent> contents, CastMode mode);
 
   void update(std::size_t volume, std::span<const Density> density,
-              std::span<const std::uint32_t> changed) override;
-  void place(std::size_t volume, const glm::dmat4& world_from_voxel) override;
+              std::span<const std::uint32_t> changed) override {
+    caster_.update(volume, density, changed);
+  }
+  void place(std::size_t volume, const glm::dmat4& world_from_voxel) override {
+    caster_.place(volume, world_from_voxel);
+  }
   void set_opacities(std::span<const MaterialView> materials,
                      std::span<const VolumeContent> contents) override;
   void draw(const View& view, const RenderTarget& target) override;

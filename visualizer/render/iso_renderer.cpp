@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "visualizer/render/iso_renderer.hpp"
 
-#include "visualizer/cast/change_job.hpp"
+#include "visualizer/cast/dirty_job.hpp"
 #include "visualizer/gl/context.hpp"
 #include "visualizer/render/view_uniforms.hpp"
 
@@ -46,24 +46,15 @@ IsoRenderer::IsoRenderer(const SceneView& scene, std::span<const VolumeContent> 
   cast_program_.set("u_step_vox", options.step_vox);
 }
 
-void IsoRenderer::update(std::size_t volume, std::span<const Density> density,
-                         std::span<const std::uint32_t> changed) {
-  volumes_[volume].update_bricks(density, changed);
-}
-
-void IsoRenderer::place(std::size_t volume, const glm::dmat4& world_from_voxel) {
-  volumes_[volume].place(world_from_voxel);
-}
-
-SightReach IsoRenderer::reach() const noexcept {
-  SightReach reach = Renderer::reach();
+RayFootprint IsoRenderer::footprint() const noexcept {
+  RayFootprint footprint = Renderer::footprint();
   if (gradient_ != Gradient::corners) {
-    // The kernels know where the normals of one gradient point; of others a feeler may be anywhere,
+    // The kernels know where the normals of one gradient point; of others a tap may be anywhere,
     // and a density is interpolated between two voxels.
-    reach.at_end = static_cast<int>(2.0F * (kLongestFeelerVox + 1.0F)) + 1;
-    reach.feels_ahead = false;
+    footprint.at_end = static_cast<int>(2.0F * (kLongestTapVox + 1.0F)) + 1;
+    footprint.taps_normal = false;
   }
-  return reach;
+  return footprint;
 }
 
 void IsoRenderer::draw(const View& view, const RenderTarget& target) {

@@ -29,10 +29,14 @@ class IsoRenderer final : public Renderer {
   IsoRenderer(const SceneView& scene, std::span<const VolumeContent> contents, Options options);
 
   void update(std::size_t volume, std::span<const Density> density,
-              std::span<const std::uint32_t> changed) override;
-  void place(std::size_t volume, const glm::dmat4& world_from_voxel) override;
+              std::span<const std::uint32_t> changed) override {
+    volumes_[volume].update_bricks(density, changed);
+  }
+  void place(std::size_t volume, const glm::dmat4& world_from_voxel) override {
+    volumes_[volume].place(world_from_voxel);
+  }
   void draw(const View& view, const RenderTarget& target) override;
-  [[nodiscard]] SightReach reach() const noexcept override;
+  [[nodiscard]] RayFootprint footprint() const noexcept override;
 
  private:
   void cast_rays(const VolumeOnGpu& volume, const View& view, const RenderTarget& target);

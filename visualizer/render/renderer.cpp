@@ -54,21 +54,21 @@ const Kind& find_kind(std::string_view name) {
 
 // A density is interpolated between two voxels (1 edge), a surface has its gradient from a cube two
 // voxels wide (2).
-constexpr SightReach kSurfaceReach{.along = 3, .at_end = 5, .feels_ahead = true};
+constexpr RayFootprint kSurfaceFootprint{.along = 3, .at_end = 5, .taps_normal = true};
 // A sample within takes its material from 1.5 edges up the gradient (matter.frag), or its gradient
 // from five voxels along each axis (3).
-constexpr SightReach kMatterReach{.along = 6}, kWideMatterReach{.along = 7};
+constexpr RayFootprint kMatterFootprint{.along = 6}, kWideMatterFootprint{.along = 7};
 
 }  // namespace
 
-std::vector<VoxelBox> Renderer::looks_different(std::size_t /*volume*/,
-                                                std::span<const VoxelBox> differs) const {
+std::vector<VoxelBox> Renderer::dirty_voxels(std::size_t /*volume*/,
+                                             std::span<const VoxelBox> differs) const {
   return {differs.begin(), differs.end()};
 }
 
-SightReach Renderer::reach() const noexcept {
-  if (!translucent()) return kSurfaceReach;
-  return takes_gradient() ? kWideMatterReach : kMatterReach;
+RayFootprint Renderer::footprint() const noexcept {
+  if (!translucent()) return kSurfaceFootprint;
+  return takes_gradient() ? kWideMatterFootprint : kMatterFootprint;
 }
 
 std::unique_ptr<Renderer> make_renderer(std::string_view kind, const SceneView& scene,

@@ -11,8 +11,8 @@
 #include "visualizer/gl/target.hpp"
 #include "visualizer/surface/volume_samples.hpp"
 #include "visualizer/view/camera.hpp"
+#include "visualizer/view/ray_footprint.hpp"
 #include "visualizer/view/scene_view.hpp"
-#include "visualizer/view/sight_reach.hpp"
 
 namespace kerf {
 
@@ -44,14 +44,14 @@ class Renderer {
   /// Draws over what is in `target`, under its depth test, within its part. Opaque things come
   /// first: some renderers look through.
   virtual void draw(const View& view, const RenderTarget& target) = 0;
-  /// Boxes of all voxels of a volume that may make a ray look different since its last `update`,
-  /// which changed densities in `differs`; rays farther off than `reach` show what they showed.
-  [[nodiscard]] virtual std::vector<VoxelBox> looks_different(
-      std::size_t volume, std::span<const VoxelBox> differs) const;
-  [[nodiscard]] virtual SightReach reach() const noexcept;
-  /// The same of a renderer that draws a mesh: triangles that came, went or look different; rays
-  /// that meet none of them show what they showed.
-  [[nodiscard]] virtual std::span<const FineTriangle> different_triangles(
+  /// The dirty region of a volume after its last `update`, which changed densities in `differs`: a
+  /// ray whose footprint meets none of these boxes keeps its colour.
+  [[nodiscard]] virtual std::vector<VoxelBox> dirty_voxels(std::size_t volume,
+                                                           std::span<const VoxelBox> differs) const;
+  [[nodiscard]] virtual RayFootprint footprint() const noexcept;
+  /// The same for a renderer that draws a mesh: the triangles that came, went or changed colour. A
+  /// ray that hits none of them keeps its colour.
+  [[nodiscard]] virtual std::span<const FineTriangle> dirty_triangles(
       std::size_t /*volume*/) const {
     return {};
   }

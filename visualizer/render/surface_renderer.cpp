@@ -13,9 +13,9 @@ namespace kerf {
 namespace {
 
 /// The parts of the target that may be drawn, in normalised device coordinates.
-std::vector<Sight::Part> drawn_parts(const RenderTarget& target) {
+std::vector<FrustumCulling::Part> drawn_parts(const RenderTarget& target) {
   const glm::dvec2 per_pixel = 2.0 / glm::dvec2(target.size().width, target.size().height);
-  std::vector<Sight::Part> parts;
+  std::vector<FrustumCulling::Part> parts;
   for (const PixelRect& part : target.parts()) {
     parts.push_back({glm::dvec2(part.x0, part.y0) * per_pixel - 1.0,
                      glm::dvec2(part.x1, part.y1) * per_pixel - 1.0});
@@ -54,10 +54,10 @@ void SurfaceRenderer::set_cut_open(bool open, std::span<const VolumeContent> con
   if (open) faces_.emplace(scene_, contents);
 }
 
-std::vector<VoxelBox> SurfaceRenderer::looks_different(std::size_t volume,
-                                                       std::span<const VoxelBox> differs) const {
+std::vector<VoxelBox> SurfaceRenderer::dirty_voxels(std::size_t volume,
+                                                    std::span<const VoxelBox> differs) const {
   if (!faces_) return {};
-  return Renderer::looks_different(volume, differs);
+  return Renderer::dirty_voxels(volume, differs);
 }
 
 void SurfaceRenderer::draw(const View& view, const RenderTarget& target) {
@@ -71,7 +71,7 @@ void SurfaceRenderer::draw(const View& view, const RenderTarget& target) {
   program_.set("u_clip_from_eye", glm::mat4(view.clip_from_eye()));
   set_view(program_, view);
   program_.use();
-  const std::vector<Sight::Part> parts = drawn_parts(target);
+  const std::vector<FrustumCulling::Part> parts = drawn_parts(target);
   for (std::size_t v = 0; v < volumes_.size(); ++v) {
     Volume& volume = volumes_[v];
     const glm::dmat4 eye_from_voxel = view.eye_from_world * scene_.volumes[v].world_from_voxel;
@@ -80,7 +80,8 @@ void SurfaceRenderer::draw(const View& view, const RenderTarget& target) {
                  glm::mat3(glm::inverseTranspose(glm::dmat3(eye_from_voxel))));
     std::optional<glm::dvec3> eye_voxel;
     if (!opened) eye_voxel = glm::dvec3(glm::affineInverse(eye_from_voxel)[3]);
-    volume.gpu.draw(volume.surface, Sight(view.clip_from_eye() * eye_from_voxel, eye_voxel, parts));
+    volume.gpu.draw(volume.surface,
+                    FrustumCulling(view.clip_from_eye() * eye_from_voxel, eye_voxel, parts));
   }
   glDisable(GL_CULL_FACE);
   glDisable(GL_CLIP_DISTANCE0);

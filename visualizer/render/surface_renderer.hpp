@@ -29,11 +29,10 @@ class SurfaceRenderer final : public Renderer {
   void set_cut_open(bool open, std::span<const VolumeContent> contents) override;
   void draw(const View& view, const RenderTarget& target) override;
   /// Triangles tell, but of the faces in the plane.
-  [[nodiscard]] std::vector<VoxelBox> looks_different(
+  [[nodiscard]] std::vector<VoxelBox> dirty_voxels(
       std::size_t volume, std::span<const VoxelBox> differs) const override;
-  [[nodiscard]] std::span<const FineTriangle> different_triangles(
-      std::size_t volume) const override {
-    return volumes_[volume].surface.different_triangles();
+  [[nodiscard]] std::span<const FineTriangle> dirty_triangles(std::size_t volume) const override {
+    return volumes_[volume].surface.dirty_triangles();
   }
 
  private:

@@ -157,7 +157,7 @@ unsigned place_in_order(const SurfaceVertex& vertex) {
 
 }  // namespace
 
-void DifferentCells::add(const SurfaceVertex& vertex) noexcept {
+void DirtyMeshCells::add(const SurfaceVertex& vertex) noexcept {
   // By axis the first and the last cell; along the edge both are the same.
   std::array<unsigned, 3> first{}, last{};
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -171,11 +171,11 @@ void DifferentCells::add(const SurfaceVertex& vertex) noexcept {
   }
 }
 
-bool DifferentCells::any() const noexcept {
-  return rows_ != DifferentCells{}.rows_;
+bool DirtyMeshCells::any() const noexcept {
+  return rows_ != DirtyMeshCells{}.rows_;
 }
 
-void DifferentCells::append_triangles(const BlockMesh& mesh, VoxelIndex block,
+void DirtyMeshCells::append_triangles(const BlockMesh& mesh, VoxelIndex block,
                                       std::vector<FineTriangle>& to) const {
   if (!any()) return;
   const VoxelIndex start = block_start(block);
@@ -193,8 +193,8 @@ void DifferentCells::append_triangles(const BlockMesh& mesh, VoxelIndex block,
   }
 }
 
-DifferentCells difference(const BlockMesh& before, const BlockMesh& now) {
-  DifferentCells cells;
+DirtyMeshCells difference(const BlockMesh& before, const BlockMesh& now) {
+  DirtyMeshCells cells;
   if (before == now) return cells;
   // Vertices come and go; those of both have the same order.
   auto old = before.vertices.begin();

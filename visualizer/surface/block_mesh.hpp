@@ -63,8 +63,8 @@ struct SurfaceSource {
   Gradient gradient = Gradient::corners;  ///< of the normals
 };
 
-/// Cells of a block in which triangles came, went or look different.
-class DifferentCells {
+/// The dirty cells of a block's mesh: triangles in them came, went or changed colour.
+class DirtyMeshCells {
  public:
   /// The cells around the edge that this vertex stands on.
   void add(const SurfaceVertex& vertex) noexcept;
@@ -78,8 +78,8 @@ class DifferentCells {
   std::array<std::array<std::uint8_t, kBlockEdge>, kBlockEdge> rows_{};
 };
 
-/// Where two meshes of a block differ.
-[[nodiscard]] DifferentCells difference(const BlockMesh& before, const BlockMesh& now);
+/// The cells in which two meshes of one block differ.
+[[nodiscard]] DirtyMeshCells difference(const BlockMesh& before, const BlockMesh& now);
 
 /// A pure function of the volume; any thread. Positions and triangles depend on the block's own
 /// voxels, the rest of a vertex on the voxels around it: see SurfaceLook.

@@ -14,14 +14,14 @@ static_assert(std::endian::native == std::endian::little, "mesh files are little
 static_assert(sizeof(glm::vec3) == 3 * sizeof(float));
 
 template <typename T>
-void append(std::vector<std::uint8_t>& bytes, const T& value) {
+void append(std::string& bytes, const T& value) {
   const std::size_t at = bytes.size();
   bytes.resize(at + sizeof(T));
   std::memcpy(&bytes[at], &value, sizeof(T));
 }
 
-void append(std::vector<std::uint8_t>& bytes, const std::string& text) {
-  bytes.insert(bytes.end(), text.begin(), text.end());
+void append(std::string& bytes, const std::string& text) {
+  bytes += text;
 }
 
 std::uint8_t srgb8(float linear) {
@@ -33,12 +33,12 @@ std::uint8_t srgb8(float linear) {
 
 }  // namespace
 
-std::vector<std::uint8_t> stl_bytes(const ClosedMesh& mesh) {
+std::string stl_bytes(const ClosedMesh& mesh) {
   constexpr std::size_t kHeader = 80;
   constexpr std::size_t kTriangle = 50;
   std::string header = "kerf " KERF_VERSION ", mm";  // must not begin with "solid": that is text
   header.resize(kHeader, ' ');
-  std::vector<std::uint8_t> bytes;
+  std::string bytes;
   bytes.reserve(kHeader + sizeof(std::uint32_t) + kTriangle * mesh.triangles.size());
   append(bytes, header);
   append(bytes, static_cast<std::uint32_t>(mesh.triangles.size()));
@@ -56,8 +56,8 @@ std::vector<std::uint8_t> stl_bytes(const ClosedMesh& mesh) {
   return bytes;
 }
 
-std::vector<std::uint8_t> ply_bytes(const ClosedMesh& mesh) {
-  std::vector<std::uint8_t> bytes;
+std::string ply_bytes(const ClosedMesh& mesh) {
+  std::string bytes;
   constexpr std::size_t kVertex = 2 * sizeof(glm::vec3) + 3;
   constexpr std::size_t kFace = 1 + 3 * sizeof(std::uint32_t);
   bytes.reserve(512 + kVertex * mesh.vertices.size() + kFace * mesh.triangles.size());

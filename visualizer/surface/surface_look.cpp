@@ -13,11 +13,11 @@ constexpr int kFullDepthQuarters = 10;  // 2.5: past the border
 // Soft tissue that lies on the surface, too thin for iso, coats it until it is milled away.
 constexpr int kCoatDensity = static_cast<int>(0.14 * kDensityMax);
 
-struct Feeler {
+struct Tap {
   int quarters;  ///< of a voxel, outwards
   float weight;
 };
-constexpr auto kFeelers = std::to_array<Feeler>({{10, 0.30F}, {24, 0.30F}, {48, 0.25F}});
+constexpr auto kTaps = std::to_array<Tap>({{10, 0.30F}, {24, 0.30F}, {48, 0.25F}});
 
 constexpr FinePoint stepped(FinePoint at, FinePoint inward, int quarters) {
   return at + (inward * quarters >> 2);
@@ -79,18 +79,17 @@ glm::vec3 SurfaceLook::colour(const VolumeSamples& volume, FinePoint at, FinePoi
 
 float SurfaceLook::openness(const VolumeSamples& volume, FinePoint at, FinePoint inward) const {
   float open = 1.0F;
-  for (const Feeler& feeler : kFeelers) {
-    const auto density =
-        static_cast<float>(volume.density_at(stepped(at, inward, -feeler.quarters)));
-    open -= feeler.weight * std::min(density * share_of_iso_, 1.0F);
+  for (const Tap& tap : kTaps) {
+    const auto density = static_cast<float>(volume.density_at(stepped(at, inward, -tap.quarters)));
+    open -= tap.weight * std::min(density * share_of_iso_, 1.0F);
   }
   return open;
 }
 
 bool SurfaceLook::openness_depends_on(const VoxelBox& box, FinePoint at, FinePoint inward) {
   const VoxelBox cells{{box.lo.x - 1, box.lo.y - 1, box.lo.z - 1}, box.hi};
-  return std::any_of(kFeelers.begin(), kFeelers.end(), [&](const Feeler& feeler) {
-    return cells.contains(VolumeSamples::voxel_below(stepped(at, inward, -feeler.quarters)));
+  return std::any_of(kTaps.begin(), kTaps.end(), [&](const Tap& tap) {
+    return cells.contains(VolumeSamples::voxel_below(stepped(at, inward, -tap.quarters)));
   });
 }
 

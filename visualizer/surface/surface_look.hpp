@@ -10,13 +10,13 @@
 
 namespace kerf {
 
-/// What a point of the surface looks like before light falls on it: the same materials and the same
-/// shade in cavities as `iso` draws (shaders/iso.frag), worked out once for each vertex.
+/// Material colour and ambient occlusion of points on a surface, computed once for each vertex: the
+/// same that `iso` draws in each pixel (shaders/iso.frag). Light is added later, by the shader.
 ///
 /// `inward` is the step of one voxel edge from the surface into the solid, along the normal.
 class SurfaceLook {
  public:
-  /// Voxels that a colour, or the openness, depends on are at most so far from their point.
+  /// A voxel farther from a point than this has no influence on its colour, or its openness.
   static constexpr int kColourReachVox = 4;
   static constexpr int kOpennessReachVox = 13;
 

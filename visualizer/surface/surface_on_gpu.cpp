@@ -107,19 +107,20 @@ void SurfaceOnGpu::grow() {
   }
 }
 
-void SurfaceOnGpu::look_from(const VolumeSurface& surface, const Sight& sight) {
+void SurfaceOnGpu::look_from(const VolumeSurface& surface, const FrustumCulling& culling) {
   seen_.clear();
   for (const std::uint32_t id : filled_) {
-    const Sight::Shown shown = sight.shown(parts_[id].bounds);
-    if (shown == Sight::Shown::nothing) continue;
-    seen_.push_back({sight.distance_2(surface.block(id)), id, shown == Sight::Shown::all});
+    const FrustumCulling::Visible shown = culling.visible(parts_[id].bounds);
+    if (shown == FrustumCulling::Visible::nothing) continue;
+    seen_.push_back(
+        {culling.distance_2(surface.block(id)), id, shown == FrustumCulling::Visible::all});
   }
   // What is hidden by then costs no light. The places of blocks never change, nor does their order.
   std::sort(seen_.begin(), seen_.end());
 }
 
-void SurfaceOnGpu::draw(const VolumeSurface& surface, const Sight& sight) {
-  look_from(surface, sight);
+void SurfaceOnGpu::draw(const VolumeSurface& surface, const FrustumCulling& culling) {
+  look_from(surface, culling);
   commands_.clear();
   picked_.clear();
   of_picked_.clear();
@@ -129,7 +130,7 @@ void SurfaceOnGpu::draw(const VolumeSurface& surface, const Sight& sight) {
                     id};
     if (!all) {
       const std::size_t before = picked_.size();
-      sight.append_seen(surface.meshes()[id], part.bounds, surface.block(id), picked_);
+      culling.append_visible(surface.meshes()[id], part.bounds, surface.block(id), picked_);
       if (picked_.size() == before) continue;
       command.indices = static_cast<std::uint32_t>(picked_.size() - before) * kIndices;
       command.first_index = static_cast<std::uint32_t>(before) * kIndices;

@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "visualizer/gl/names.hpp"
+#include "visualizer/surface/frustum_culling.hpp"
 #include "visualizer/surface/range_pool.hpp"
-#include "visualizer/surface/sight.hpp"
 #include "visualizer/surface/volume_surface.hpp"
 
 namespace kerf {
@@ -27,7 +27,7 @@ class GrowingBuffer {
 /// The meshes of one volume in the memory of the GPU: all vertices in one buffer, all triangles in
 /// another, drawn by one call.
 ///
-/// Of a block that shows only in parts of the picture the triangles in sight are picked and
+/// Of a block that is only partly visible the visible triangles are picked and
 /// uploaded at each draw: to pick one costs far less than to draw it in software.
 class SurfaceOnGpu {
  public:
@@ -36,9 +36,9 @@ class SurfaceOnGpu {
   /// Uploads these blocks again, and nothing else.
   void update(const VolumeSurface& surface, std::span<const std::uint32_t> blocks);
 
-  /// Draws what may be in sight of the surface that was uploaded last, with the program in use;
+  /// Draws what may be visible of the surface that was uploaded last, with the program in use;
   /// attributes as in surface.vert.
-  void draw(const VolumeSurface& surface, const Sight& sight);
+  void draw(const VolumeSurface& surface, const FrustumCulling& culling);
 
  private:
   struct Part {
@@ -52,7 +52,7 @@ class SurfaceOnGpu {
     std::uint32_t indices, instances, first_index, base_vertex, base_instance;
   };
 
-  /// A block in sight; all of it, or some.
+  /// A block that is visible; all of it, or some.
   struct Seen {
     float distance_2;
     std::uint32_t id;
@@ -60,7 +60,7 @@ class SurfaceOnGpu {
     auto operator<=>(const Seen&) const = default;
   };
 
-  void look_from(const VolumeSurface& surface, const Sight& sight);
+  void look_from(const VolumeSurface& surface, const FrustumCulling& culling);
   /// Room for all that the pools hold.
   void grow();
   /// And lets the commands of `of_picked_` read from there.

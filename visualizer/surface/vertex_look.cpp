@@ -110,13 +110,13 @@ void dress(SurfaceVertex& vertex, const SurfaceSource& source, VoxelIndex start,
   vertex.openness = unit16(source.look->openness(source.volume, at, inward));
 }
 
-DifferentCells update_look(const SurfaceSource& source, VoxelIndex block, const VoxelBox& changed,
+DirtyMeshCells update_look(const SurfaceSource& source, VoxelIndex block, const VoxelBox& changed,
                            BlockMesh& mesh) {
   const VoxelIndex start = block_start(block);
   const VoxelBox colours = changed.grown(SurfaceLook::kColourReachVox);
   const VoxelBox all = changed.grown(SurfaceLook::kOpennessReachVox);
   std::optional<Neighbourhood> near;
-  DifferentCells cells;
+  DirtyMeshCells cells;
   for (SurfaceVertex& vertex : mesh.vertices) {
     const SurfaceVertex before = vertex;
     const FinePoint at = fine_place(vertex, start);

@@ -6,14 +6,15 @@
 
 namespace kerf {
 
-/// Fills in all but the position of a vertex of the block that starts at `start`; `near` is its
-/// neighbourhood. A pure function of position and volume.
+/// Computes normal, colour and openness of a vertex from its position and the volume. The vertex
+/// belongs to the block that starts at `start`; `near` is that block's neighbourhood. Pure.
 void dress(SurfaceVertex& vertex, const SurfaceSource& source, VoxelIndex start,
            const Neighbourhood& near);
 
-/// What `extract_block` would give when only voxels in `changed` are others, and none of the
-/// block's own: dresses those vertices again that depend on them. Returns where it looks different.
-DifferentCells update_look(const SurfaceSource& source, VoxelIndex block, const VoxelBox& changed,
+/// Brings the mesh of a block up to date after a change of densities in `changed` that touches none
+/// of the block's own voxels: positions stay, and the vertices that depend on `changed` are
+/// computed again. The result is that of `extract_block`. Returns the cells whose colours changed.
+DirtyMeshCells update_look(const SurfaceSource& source, VoxelIndex block, const VoxelBox& changed,
                            BlockMesh& mesh);
 
 }  // namespace kerf

@@ -118,23 +118,23 @@ std::span<const std::uint32_t> VolumeSurface::update(std::span<const Density> de
   }
   std::sort(marked_.begin(), marked_.end());
   different_.clear();
-  different_triangles_.clear();
+  dirty_triangles_.clear();
   const SurfaceSource from = source();
   for (const std::uint32_t id : marked_) {
     BlockMesh& mesh = meshes_[id];
     const Work work = std::exchange(work_[id], Work::none);
     if (work == Work::look && mesh.vertices.empty()) continue;
-    DifferentCells cells;
+    DirtyMeshCells cells;
     if (work == Work::look) {
       cells = update_look(from, block(id), all, mesh);
     } else {
       BlockMesh now = extract_block(from, block(id));
       cells = difference(mesh, now);
-      cells.append_triangles(mesh, block(id), different_triangles_);
+      cells.append_triangles(mesh, block(id), dirty_triangles_);
       mesh = std::move(now);
     }
     if (!cells.any()) continue;
-    cells.append_triangles(mesh, block(id), different_triangles_);
+    cells.append_triangles(mesh, block(id), dirty_triangles_);
     different_.push_back(id);
   }
   marked_.clear();

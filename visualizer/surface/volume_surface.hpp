@@ -32,8 +32,8 @@ class VolumeSurface {
 
   /// What the last `update` took away, made, or gave another look: all triangles of the cells in
   /// which there is any, as they were and as they are.
-  [[nodiscard]] std::span<const FineTriangle> different_triangles() const noexcept {
-    return different_triangles_;
+  [[nodiscard]] std::span<const FineTriangle> dirty_triangles() const noexcept {
+    return dirty_triangles_;
   }
 
   [[nodiscard]] const VoxelGrid& blocks() const noexcept { return blocks_; }
@@ -61,7 +61,7 @@ class VolumeSurface {
   std::vector<Work> work_;                ///< by block; all none between calls
   std::vector<std::uint32_t> marked_;     ///< blocks with work
   std::vector<std::uint32_t> different_;  ///< what the last update returned
-  std::vector<FineTriangle> different_triangles_;
+  std::vector<FineTriangle> dirty_triangles_;
 };
 
 }  // namespace kerf

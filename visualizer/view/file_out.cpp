@@ -3,7 +3,6 @@
 
 #include <string>
 #include <system_error>
-#include <vector>
 
 #include <png.h>
 
@@ -12,13 +11,6 @@
 
 namespace kerf {
 
-void write_file(const std::filesystem::path& path, std::span<const std::uint8_t> bytes) {
-  NewFile file(path);
-  file.write(bytes.data(), bytes.size());
-  file.close();
-  file.commit();
-}
-
 void write_png(const std::filesystem::path& path, PictureSize size,
                std::span<const std::uint8_t> rgb) {
   png_image image{};
@@ -26,13 +18,13 @@ void write_png(const std::filesystem::path& path, PictureSize size,
   image.width = static_cast<png_uint_32>(size.width);
   image.height = static_cast<png_uint_32>(size.height);
   image.format = PNG_FORMAT_RGB;
-  std::vector<std::uint8_t> bytes(PNG_IMAGE_PNG_SIZE_MAX(image));
+  std::string bytes(PNG_IMAGE_PNG_SIZE_MAX(image), '\0');
   png_alloc_size_t length = bytes.size();
   if (png_image_write_to_memory(&image, bytes.data(), &length, 0, rgb.data(), 0, nullptr) == 0) {
     throw VisualizerError(path.string() + ": " + image.message);
   }
   bytes.resize(length);
-  write_file(path, bytes);
+  write_new_file(path, bytes);
 }
 
 void make_folder(const std::filesystem::path& folder) {

@@ -9,10 +9,7 @@
 
 namespace kerf {
 
-/// Writes a whole file or none. Throws FileError with the system's reason.
-void write_file(const std::filesystem::path& path, std::span<const std::uint8_t> bytes);
-
-/// `rgb` as in RenderTarget::read_rgb, 8-bit sRGB PNG, through `write_file`.
+/// `rgb` as in RenderTarget::read_rgb, 8-bit sRGB PNG, as one new file. Throws FileError.
 void write_png(const std::filesystem::path& path, PictureSize size,
                std::span<const std::uint8_t> rgb);
 

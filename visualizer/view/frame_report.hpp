@@ -22,9 +22,6 @@ class Stopwatch {
   std::int64_t cpu_ns_;
 };
 
-/// Nearest-rank percentile, `share` in 0..1; 0 for nothing.
-[[nodiscard]] double percentile(std::vector<double> values, double share);
-
 /// What a run measured; times in ms, per drawn frame. A frame in which nothing had changed is a
 /// rest frame: nothing is drawn for it.
 struct FrameReport {
@@ -46,7 +43,7 @@ struct FrameReport {
   /// drawing that frame; of frames that showed none, nothing.
   std::vector<double> latency_ms{};
 
-  /// As JSON, whole or not at all; throws VisualizerError.
+  /// As JSON, whole or not at all; throws FileError.
   void write(const std::filesystem::path& file) const;
 };
 

@@ -52,8 +52,8 @@ Field filtered(Field& from) {
       for (std::int32_t x = 0; x < n.x; ++x) {
         float sum = kTaps[kMiddle] * in[x];
         for (std::size_t i = 1; i <= std::size_t{kReach}; ++i) {
-          const std::ptrdiff_t step = static_cast<std::ptrdiff_t>(i) * stride;
-          sum += kTaps[kMiddle + i] * in[x + step] + kTaps[kMiddle - i] * in[x - step];
+          const std::ptrdiff_t offset = static_cast<std::ptrdiff_t>(i) * stride;
+          sum += kTaps[kMiddle + i] * in[x + offset] + kTaps[kMiddle - i] * in[x - offset];
         }
         out[x] = sum;
       }

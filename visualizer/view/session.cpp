@@ -6,7 +6,7 @@
 #include <thread>
 #include <utility>
 
-#include "visualizer/view/stop_signal.hpp"
+#include "shared/posix/stop_signals.hpp"
 
 namespace kerf {
 

@@ -216,19 +216,9 @@ TEST_CASE("after random cuts, taking the changed bricks equals a fresh start pix
     Caster edited = caster_of({&volume}, options);
     const View view = look_at({9, 14, 17}, {}, 15, 35);
     std::mt19937 random(11);
-    const auto pick = [&](int n) { return std::uniform_int_distribution<int>(0, n - 1)(random); };
     for (int cut = 0; cut < 40; ++cut) {
-      const VoxelIndex at{pick(grid.nx), pick(grid.ny), pick(grid.nz)};
-      const VoxelBox box =
-          VoxelBox{at, {at.x + 1, at.y + 1, at.z + 1}}.grown(2 + pick(6)).clipped(grid.box());
-      for (int z = box.lo.z; z < box.hi.z; ++z) {
-        for (int y = box.lo.y; y < box.hi.y; ++y) {
-          for (int x = box.lo.x; x < box.hi.x; ++x) {
-            // Grows back in every third cut: cells become active again too.
-            volume.density[grid.index(x, y, z)] = cut % 3 == 2 ? 60000 : 0;
-          }
-        }
-      }
+      // Grows back in every third cut: cells become active again too.
+      const VoxelBox box = fill_random_box(volume, cut % 3 == 2 ? 60000 : 0, random);
       edited.update(0, volume.density, bricks_in(volume.view.bricks, box));
       Caster fresh = caster_of({&volume}, options);
       const CastPicture a = cast(edited, view).picture;

@@ -62,6 +62,20 @@ std::vector<std::uint32_t> bricks_in(const BrickGrid& grid, const VoxelBox& box)
   return ids;
 }
 
+VoxelBox fill_random_box(TestVolume& volume, Density density, std::mt19937& random) {
+  const auto pick = [&](int n) { return std::uniform_int_distribution<int>(0, n - 1)(random); };
+  const VoxelGrid& grid = volume.view.bricks.grid;
+  const VoxelIndex at{pick(grid.nx), pick(grid.ny), pick(grid.nz)};
+  const VoxelBox box =
+      VoxelBox{at, {at.x + 1, at.y + 1, at.z + 1}}.grown(2 + pick(6)).clipped(grid.box());
+  for (int z = box.lo.z; z < box.hi.z; ++z) {
+    for (int y = box.lo.y; y < box.hi.y; ++y) {
+      std::fill_n(&volume.density[grid.index(box.lo.x, y, z)], box.extent().x, density);
+    }
+  }
+  return box;
+}
+
 double eye_distance_mm(double window_depth, const View& view) {
   const double f = view.far_mm;
   const double n = view.near_mm;

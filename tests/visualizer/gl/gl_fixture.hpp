@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <random>
 #include <vector>
 
 #include "visualizer/render/iso_renderer.hpp"
@@ -45,6 +46,9 @@ struct PixelRay {
 
 /// Bricks that a box of voxels touches.
 [[nodiscard]] std::vector<std::uint32_t> bricks_in(const BrickGrid& grid, const VoxelBox& box);
+
+/// Sets a small box of voxels anywhere in the volume to `density`; returns the box.
+VoxelBox fill_random_box(TestVolume& volume, Density density, std::mt19937& random);
 
 struct Drawn {
   std::vector<std::uint8_t> rgb;

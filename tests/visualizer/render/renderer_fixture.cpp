@@ -119,30 +119,11 @@ void check_updates(const MakeRenderer& make) {
   const View view = look_at({9, 14, 17}, {}, 15, 35);
   const Drawn whole = draw(*edited, view, target);
   std::mt19937 random(11);
-  const auto pick = [&](int n) { return std::uniform_int_distribution<int>(0, n - 1)(random); };
   Drawn last = whole;
   for (int cut = 0; cut < 12; ++cut) {
-    const VoxelIndex at{pick(grid.nx), pick(grid.ny), pick(grid.nz)};
-    const VoxelBox box =
-        VoxelBox{at, {at.x + 1, at.y + 1, at.z + 1}}.grown(2 + pick(6)).clipped(grid.box());
-    for (int z = box.lo.z; z < box.hi.z; ++z) {
-      for (int y = box.lo.y; y < box.hi.y; ++y) {
-        for (int x = box.lo.x; x < box.hi.x; ++x) {
-          // Grows back in every third cut: cells become active again too.
-          volume.density[grid.index(x, y, z)] = cut % 3 == 2 ? 60000 : 0;
-        }
-      }
-    }
-    std::vector<std::uint32_t> changed;
-    const VoxelBox bricks = volume.view.bricks.bricks_of(box);
-    for (int z = bricks.lo.z; z < bricks.hi.z; ++z) {
-      for (int y = bricks.lo.y; y < bricks.hi.y; ++y) {
-        for (int x = bricks.lo.x; x < bricks.hi.x; ++x) {
-          changed.push_back(volume.view.bricks.id({x, y, z}));
-        }
-      }
-    }
-    edited->update(0, volume.density, changed);
+    // Grows back in every third cut: cells become active again too.
+    const VoxelBox box = fill_random_box(volume, cut % 3 == 2 ? 60000 : 0, random);
+    edited->update(0, volume.density, bricks_in(volume.view.bricks, box));
     content = volume.content();
     const auto fresh = make(scene, {&content, 1});
     last = draw(*edited, view, target);

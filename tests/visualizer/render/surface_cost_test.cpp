@@ -11,6 +11,7 @@
 
 #include <doctest/doctest.h>
 
+#include "shared/numeric/percentile.hpp"
 #include "tests/visualizer/gl/gl_fixture.hpp"
 #include "visualizer/surface/volume_surface.hpp"
 #include "visualizer/view/frame_report.hpp"

@@ -249,9 +249,9 @@ TEST_CASE("a surface tells of changed voxels while a plane cuts it open, else of
   const VolumeContent content = volume.content();
   const auto renderer = make_renderer("surface", scene_of({&volume}), {&content, 1});
   const std::vector<VoxelBox> differs{{{8, 8, 8}, {12, 13, 14}}};
-  CHECK(renderer->looks_different(0, differs).empty());
+  CHECK(renderer->dirty_voxels(0, differs).empty());
   renderer->set_cut_open(true, {&content, 1});
-  CHECK(renderer->looks_different(0, differs) == differs);
+  CHECK(renderer->dirty_voxels(0, differs) == differs);
   renderer->set_cut_open(false, {&content, 1});
-  CHECK(renderer->looks_different(0, differs).empty());
+  CHECK(renderer->dirty_voxels(0, differs).empty());
 }

@@ -166,11 +166,10 @@ TEST_CASE("after rough edits an update equals a fresh mesh, coloured by labels o
         really.push_back(id);
         for (const auto& [one, other] : {std::pair(&before[id], &surface.meshes()[id]),
                                          std::pair(&surface.meshes()[id], &before[id])}) {
-          triangles_untold +=
-              untold(*one, *other, surface.block(id), surface.different_triangles());
+          triangles_untold += untold(*one, *other, surface.block(id), surface.dirty_triangles());
         }
       }
-      triangles_told = std::max(triangles_told, surface.different_triangles().size());
+      triangles_told = std::max(triangles_told, surface.dirty_triangles().size());
       told_wrong += std::equal(told.begin(), told.end(), really.begin(), really.end()) ? 0 : 1;
     }
     CHECK(wrong == 0);

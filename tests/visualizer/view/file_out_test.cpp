@@ -72,11 +72,10 @@ TEST_CASE("a PNG holds exactly the pixels that were written") {
 TEST_CASE("a disk that fills up leaves the old file and nothing else, and one line says so") {
   const TemporaryFolder folder;
   const fs::path file = folder.path / "report.json";
-  const std::vector<std::uint8_t> old(10, 'o');
-  write_file(file, old);
+  write_new_file(file, "oooooooooo");
   {
     const SmallDisk disk(100);
-    CHECK_THROWS_AS(write_file(file, std::vector<std::uint8_t>(500, 'n')), FileError);
+    CHECK_THROWS_AS(write_new_file(file, std::string(500, 'n')), FileError);
   }
   std::ifstream stream(file, std::ios::binary);
   CHECK(std::string(std::istreambuf_iterator<char>(stream), {}) == "oooooooooo");
@@ -84,8 +83,7 @@ TEST_CASE("a disk that fills up leaves the old file and nothing else, and one li
 }
 
 TEST_CASE("a place that cannot be written is named") {
-  const std::vector<std::uint8_t> bytes(1, 'x');
-  CHECK_THROWS_WITH_AS(write_file("/nonexistent/a.png", bytes),
+  CHECK_THROWS_WITH_AS(write_new_file("/nonexistent/a.png", "x"),
                        doctest::Contains("/nonexistent/a.png: cannot be written"), FileError);
   CHECK_THROWS_AS(make_folder("/dev/null/folder"), VisualizerError);
 }

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// For the files that define `Simd` only: whether a packet of rays can show a change in a volume.
+// For the files that define `Simd` only: tests packets of rays against the dirty cells of a volume.
 //
-// A ray shows what it showed unless it passes a marked cell before it ends, ends in one that is
-// marked for that, or ends on a surface whose shading reaches such a cell.
+// The colour of a ray can change in three ways: the ray crosses a cell marked `kDirtyAlong`, it
+// ends in a cell marked `kDirtyAtEnd`, or it ends on a surface whose shading samples a dirty cell.
+// A ray of which none is true keeps its colour, bit by bit.
 #pragma once
 
-#include "visualizer/cast/change_job.hpp"
+#include "visualizer/cast/dirty_job.hpp"
 #include "visualizer/cast/packet_pixels.hpp"
 #include "visualizer/cast/packet_shading.hpp"
 
@@ -16,8 +17,8 @@ inline F absolute(F a) {
   return Simd::max(a, -a);
 }
 
-/// Which of the places have `mark`; the nearest cell stands for what lies beside.
-inline M marked(const ChangeJob& job, Vec3 p, std::uint8_t mark) {
+/// The places whose cell has `mark`. A place outside of the grid counts as its nearest cell.
+inline M marked(const DirtyJob& job, Vec3 p, std::uint8_t mark) {
   const auto cell = [](F at, float last) {
     return Simd::to_int(Simd::min(positive(at), Simd::set(last)));
   };
@@ -26,17 +27,17 @@ inline M marked(const ChangeJob& job, Vec3 p, std::uint8_t mark) {
   return Simd::but_not(Simd::all(), Simd::equal(Simd::gather_bytes<1>(job.cells, at) & mark, I{}));
 }
 
-/// From the cells to `p`, 0 within.
-inline Vec3 offset_from(const ChangeJob& job, Vec3 p) {
+/// The distance of `p` from the grid on each axis; 0 inside.
+inline Vec3 outside_by(const DirtyJob& job, Vec3 p) {
   const auto beside = [](F at, float size) {
     return positive(Simd::max(-at, at - Simd::set(size)));
   };
   return {beside(p.x, job.size[0]), beside(p.y, job.size[1]), beside(p.z, job.size[2])};
 }
 
-/// Whether one of `points` is in a cell with `mark`.
-inline bool any_marked(const ChangeJob& job, Vec3 p, M points, std::uint8_t mark) {
-  const Vec3 off = offset_from(job, p);
+/// Whether one of the lanes `points` lies in a cell with `mark`.
+inline bool any_marked(const DirtyJob& job, Vec3 p, M points, std::uint8_t mark) {
+  const Vec3 off = outside_by(job, p);
   const M within = Simd::but_not(points, Simd::less(Simd::set(0.0F), dot(off, off)));
   return Simd::any(within) && Simd::any(Simd::both(within, marked(job, p, mark)));
 }
@@ -45,24 +46,24 @@ inline F longest_part(Vec3 a) {
   return Simd::max(Simd::max(absolute(a.x), absolute(a.y)), absolute(a.z));
 }
 
-/// Whether a ray of `alive` passes a mark.
-inline bool pass_a_mark(const ChangeJob& job, const VolumeRays& rays, M alive) {
+/// Whether a ray of the lanes `alive` crosses a cell marked `kDirtyAlong`.
+inline bool crosses_dirty_cell(const DirtyJob& job, const VolumeRays& rays, M alive) {
   const F step_mm = Simd::set(job.step_vox) / longest_part(rays.direction);
-  // Half a step more: each place on a ray is so near to a look.
+  // Half a step more: no place on a ray is farther than that from a test.
   const F end_mm = rays.end_mm + Simd::set(0.5F) * step_mm;
   alive = Simd::both(alive, Simd::less(rays.begin_mm, rays.end_mm));
-  for (std::int32_t look = 0; look < job.most_looks && Simd::any(alive); ++look) {
-    const F t = rays.begin_mm + Simd::set(static_cast<float>(look)) * step_mm;
+  for (std::int32_t test = 0; test < job.most_tests && Simd::any(alive); ++test) {
+    const F t = rays.begin_mm + Simd::set(static_cast<float>(test)) * step_mm;
     const Vec3 p = rays.origin + t * rays.direction;
-    if (Simd::any(Simd::both(alive, marked(job, p, kChangedAlong)))) return true;
+    if (Simd::any(Simd::both(alive, marked(job, p, kDirtyAlong)))) return true;
     alive = Simd::both(alive, Simd::less(t + step_mm, end_mm));
   }
   return Simd::any(alive);  // so far away that its steps are lost in rounding
 }
 
-/// As `gradient_at`, from densities without a border; only in lanes that are inside, the others
-/// have any.
-inline Vec3 plain_gradient_at(const ChangeJob& job, Vec3 voxel) {
+/// `gradient_at` for a volume without a border of air around it. The value is right only in lanes
+/// that `is_inside` names.
+inline Vec3 plain_gradient_at(const DirtyJob& job, Vec3 voxel) {
   const auto low = [](F at, std::int32_t extent) {
     return Simd::to_int(
         Simd::max(Simd::min(at, Simd::set(static_cast<float>(extent - 3))), Simd::set(1.0F)));
@@ -104,8 +105,8 @@ inline Vec3 plain_gradient_at(const ChangeJob& job, Vec3 voxel) {
               mix(sums[2], sums[3], share.z) - mix(sums[0], sums[1], share.z)};
 }
 
-/// Whether the cube around a place is in the volume.
-inline M is_inside(const ChangeJob& job, Vec3 voxel) {
+/// The lanes in which all voxels that the gradient at `voxel` takes are in the volume.
+inline M is_inside(const DirtyJob& job, Vec3 voxel) {
   const auto along = [](F at, std::int32_t extent) {
     return Simd::but_not(Simd::less(at, Simd::set(static_cast<float>(extent - 2))),
                          Simd::less(at, Simd::set(1.0F)));
@@ -114,13 +115,13 @@ inline M is_inside(const ChangeJob& job, Vec3 voxel) {
                     Simd::both(along(voxel.y, job.extent[1]), along(voxel.z, job.extent[2])));
 }
 
-/// Where the rays of a packet end.
+/// Where the rays of a packet end, by the depth of the last picture.
 struct Ends {
-  M there;  ///< where they hit something
-  F t;      ///< along the view axis; far away where they hit nothing
+  M there;  ///< the rays that hit something
+  F t;      ///< mm along the view axis; far away for the others
 };
 
-inline Ends ends_of(const ChangeJob& job, const Packet& packet) {
+inline Ends ends_of(const DirtyJob& job, const Packet& packet) {
   const std::int32_t row = job.window.x1 - job.window.x0;
   const std::int64_t first =
       std::int64_t{packet.y - job.window.y0} * row + packet.x - job.window.x0;
@@ -129,7 +130,8 @@ inline Ends ends_of(const ChangeJob& job, const Packet& packet) {
           Simd::set(job.eye.depth_slope) / (Simd::set(job.eye.depth_far) - depth)};
 }
 
-inline bool packet_meets(const ChangeJob& job, const Packet& packet) {
+/// Whether a ray of the packet crosses a dirty cell or ends in one.
+inline bool packet_rays_touch(const DirtyJob& job, const Packet& packet) {
   const Vec3 eye = eye_directions(job.eye, packet);
   const Shown shown = shown_of(job.eye, eye);
   VolumeRays rays;
@@ -140,29 +142,29 @@ inline bool packet_meets(const ChangeJob& job, const Packet& packet) {
   Ends ends{Simd::none(), shown.end_mm};
   if (job.depth != nullptr) {
     ends = ends_of(job, packet);
-    // What is found at a sample stands before it: a ray looks up to a step farther.
+    // A hit lies before the sample that found it: the ray took samples up to a step behind.
     rays.end_mm = Simd::min(shown.end_mm, ends.t + Simd::set(1.0F) / longest_part(rays.direction));
   }
   clip_to(job.size, rays);
-  if (pass_a_mark(job, rays, drawn_lanes(packet))) return true;
-  return any_marked(job, rays.origin + ends.t * rays.direction, ends.there, kChangedAtEnd);
+  if (crosses_dirty_cell(job, rays, drawn_lanes(packet))) return true;
+  return any_marked(job, rays.origin + ends.t * rays.direction, ends.there, kDirtyAtEnd);
 }
 
-/// Whether the shading of the points at which rays end reaches a mark.
-inline bool packet_feels(const ChangeJob& job, const Packet& packet) {
+/// Whether the shading of a point at which a ray ends samples a dirty cell.
+inline bool packet_shading_touches(const DirtyJob& job, const Packet& packet) {
   const Vec3 eye = eye_directions(job.eye, packet);
   const Ends ends = ends_of(job, packet);
   const Vec3 p = vec3(job.origin) + ends.t * transformed(job.from_eye, eye);
-  const Vec3 off = offset_from(job, p);
-  const F reach = Simd::set(kLongestFeelerVox);
+  const Vec3 off = outside_by(job, p);
+  const F reach = Simd::set(kLongestTapVox);
   M near = Simd::both(ends.there, Simd::less(dot(off, off), reach * reach));
   if (!Simd::any(near)) return false;
-  // Normals are turned towards the eye: what a point feels lies before it, or a little behind. Both
-  // sides up to a factor that is the ray's.
+  // Normals are turned towards the eye, so samples lie before the point, or a little behind it.
+  // Both sides of the comparison have one factor, that of the ray.
   const F length_2 = dot(eye, eye);
   F nearest = dot(vec3(job.centre_mm), eye);
   for (const auto& half : job.half_mm) nearest = nearest - absolute(dot(vec3(half), eye));
-  const F behind = Simd::set(-kFeelersVox[0] * job.edge_mm) * Simd::sqrt(length_2);
+  const F behind = Simd::set(-kShadingTapsVox[0] * job.edge_mm) * Simd::sqrt(length_2);
   near = Simd::but_not(near, Simd::less(ends.t * length_2 + behind, nearest));
   if (!Simd::any(near)) return false;
 
@@ -175,29 +177,29 @@ inline bool packet_feels(const ChangeJob& job, const Packet& packet) {
   if (!Simd::any(known)) return true;
   const Vec3 gradient = plain_gradient_at(job, voxel);
   // A texture unit may filter with 8 bits of weight: on this steep a slope (of 4, from air to full
-  // density) the normal of a shader is off by less than 1/24, half a voxel at the end of a feeler.
+  // density) the normal of a shader is off by less than 1/24, half a voxel at the farthest sample.
   const F least_slope = Simd::set(0.5F);
   known = Simd::but_not(known, Simd::less(dot(gradient, gradient), least_slope * least_slope));
   if (Simd::any(Simd::but_not(near, known))) return true;
   const Vec3 inward = facing_of(job.from_eye, gradient, -normalized(eye)).inward;
-  for (const float reach_vox : kFeelersVox) {
-    if (any_marked(job, p - Simd::set(reach_vox) * inward, known, kChangedAlong)) return true;
+  for (const float reach_vox : kShadingTapsVox) {
+    if (any_marked(job, p - Simd::set(reach_vox) * inward, known, kDirtyAlong)) return true;
   }
   return false;
 }
 
-bool cast_meets(const ChangeJob& job, const PixelRect& rect) {
-  bool meets = false;
+bool cast_rays_touch(const DirtyJob& job, const PixelRect& rect) {
+  bool touch = false;
   for_packets(job.eye, rect,
-              [&](const Packet& packet) { meets = meets || packet_meets(job, packet); });
-  return meets;
+              [&](const Packet& packet) { touch = touch || packet_rays_touch(job, packet); });
+  return touch;
 }
 
-bool cast_feels(const ChangeJob& job, const PixelRect& rect) {
-  bool feels = false;
+bool cast_shading_touches(const DirtyJob& job, const PixelRect& rect) {
+  bool touch = false;
   for_packets(job.eye, rect,
-              [&](const Packet& packet) { feels = feels || packet_feels(job, packet); });
-  return feels;
+              [&](const Packet& packet) { touch = touch || packet_shading_touches(job, packet); });
+  return touch;
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "visualizer/app/recording.hpp"
+#include "visualizer/app/film.hpp"
 
 #include <array>
 #include <cmath>
@@ -126,19 +126,19 @@ TEST_CASE("a video plays in true time whenever pictures come") {
   const RenderTarget target(size);
   const fs::path file = place.path / "a.y4m";
   {
-    Recording recording(file.string(), size, 60);
+    Film film(file.string(), size, 60);
     const auto at = [&](double servo_s, float brightness) {
       paint(target, brightness);
-      recording.add(target, servo_s);
+      film.add(target, servo_s);
     };
     at(7.0, 0.0F);    // frame 0
     at(7.010, 0.2F);  // too early
-    CHECK(recording.due_in_s(7.010) == doctest::Approx(1.0 / 60.0 - 0.010));
+    CHECK(film.due_in_s(7.010) == doctest::Approx(1.0 / 60.0 - 0.010));
     at(7.017, 0.4F);        // frame 1
     at(7.0835, 0.6F);       // late: frames 2 to 5
     at(0.5, 0.8F);          // another controller: no time has passed
     at(0.5 + 0.017, 1.0F);  // frame 6
-    CHECK(recording.file().frames() == 7);
+    CHECK(film.file().frames() == 7);
   }
   const Video video = read_back(file, size);
   CHECK(video.header == "YUV4MPEG2 W5 H3 F60:1 Ip A1:1 C420jpeg XCOLORRANGE=LIMITED");
@@ -151,14 +151,14 @@ TEST_CASE("a picture of another size ends the video, and the picture goes on") {
   if (!have_gl()) return;
   const Place place;
   const fs::path file = place.path / "a.y4m";
-  std::optional<Recording> recording(std::in_place, file.string(), PictureSize{4, 4}, 30);
-  CHECK_FALSE(film(recording, RenderTarget({4, 4}), 0.0));
-  CHECK(recording);
-  const auto problem = film(recording, RenderTarget({6, 4}), 1.0);
+  std::optional<Film> film(std::in_place, file.string(), PictureSize{4, 4}, 30);
+  CHECK_FALSE(add_frame(film, RenderTarget({4, 4}), 0.0));
+  CHECK(film);
+  const auto problem = add_frame(film, RenderTarget({6, 4}), 1.0);
   REQUIRE(problem);
   CHECK(problem->find("another size") != std::string::npos);
-  CHECK_FALSE(recording);
-  CHECK_FALSE(film(recording, RenderTarget({6, 4}), 1.0));  // nothing to do
+  CHECK_FALSE(film);
+  CHECK_FALSE(add_frame(film, RenderTarget({6, 4}), 1.0));  // nothing to do
   CHECK(read_back(file, {4, 4}).frames.size() == 1);
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Which rays a change in a volume can reach, without any GL.
-#include "visualizer/render/changed_cells.hpp"
+#include "visualizer/render/dirty_cells.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -20,7 +20,7 @@ namespace {
 
 constexpr PictureSize kSize{61, 47};  // no multiple of a packet
 constexpr VoxelGrid kGrid{40, 36, 32};
-constexpr SightReach kReach{.along = 3, .at_end = 5, .feels_ahead = true};
+constexpr RayFootprint kReach{.along = 3, .at_end = 5, .taps_normal = true};
 
 /// A ball whose surface looks into a hollow, seen by an eye 60 voxel edges, here mm, away.
 struct LoadedScene {
@@ -64,10 +64,10 @@ struct LoadedScene {
   }
 };
 
-ChangeJob job_of(const LoadedScene& scene, const ChangedCells& cells) {
+DirtyJob job_of(const LoadedScene& scene, const DirtyCells& cells) {
   const glm::dmat4 eye_from_cell = glm::translate(scene.view.eye_from_world, cells.low());
   const glm::dmat4 cell_from_eye = glm::inverse(eye_from_cell);
-  ChangeJob job;
+  DirtyJob job;
   job.eye = cast_eye(scene.view, kSize.width, kSize.height);
   put(job.origin, glm::dvec3(cell_from_eye[3]));
   put(job.from_eye, glm::dmat3(cell_from_eye));
@@ -108,8 +108,8 @@ TEST_CASE("a ray that passes a changed voxel before it ends is found, one far of
   int met = 0, passed_by = 0;
   for (int round = 0; round < 20; ++round) {
     const std::vector<VoxelBox> boxes{random_box(random), random_box(random)};
-    const ChangedCells cells(boxes, kReach);
-    const ChangeJob job = job_of(scene, cells);
+    const DirtyCells cells(boxes, kReach);
+    const DirtyJob job = job_of(scene, cells);
     for (int i = 0; i < 500; ++i) {
       const int x = static_cast<int>(random() % kSize.width);
       const int y = static_cast<int>(random() % kSize.height);
@@ -123,7 +123,7 @@ TEST_CASE("a ray that passes a changed voxel before it ends is found, one far of
         }
         return false;
       };
-      const bool meets = cast_kernels()[0]->meets(job, {x, y, x + 1, y + 1});
+      const bool meets = cast_kernels()[0]->rays_touch(job, {x, y, x + 1, y + 1});
       if (passes(1.0, end_mm)) {
         ++met;
         CHECK(meets);
@@ -143,20 +143,20 @@ TEST_CASE("every instruction set finds the rays that one at a time finds") {
   int met = 0, felt = 0;
   for (int round = 0; round < 20; ++round) {
     const std::vector<VoxelBox> boxes{random_box(random), random_box(random)};
-    const ChangedCells cells(boxes, kReach);
-    const ChangeJob job = job_of(scene, cells);
+    const DirtyCells cells(boxes, kReach);
+    const DirtyJob job = job_of(scene, cells);
     for (int y = 0; y < kSize.height; y += 4) {
       for (int x = 0; x < kSize.width; x += 4) {
         const PixelRect tile =
             PixelRect{x, y, x + 4, y + 4}.clipped({0, 0, kSize.width, kSize.height});
-        const bool meets = kCastScalar.meets(job, tile);
-        const bool feels = kCastScalar.feels(job, tile);
+        const bool meets = kCastScalar.rays_touch(job, tile);
+        const bool feels = kCastScalar.shading_touches(job, tile);
         met += meets ? 1 : 0;
         felt += feels && !meets ? 1 : 0;
         for (const CastKernels* const* set = cast_kernels(); *set != nullptr; ++set) {
           CAPTURE((*set)->name);
-          CHECK((*set)->meets(job, tile) == meets);
-          CHECK((*set)->feels(job, tile) == feels);
+          CHECK((*set)->rays_touch(job, tile) == meets);
+          CHECK((*set)->shading_touches(job, tile) == feels);
         }
       }
     }

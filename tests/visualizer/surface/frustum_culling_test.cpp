@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Which triangles of a block are drawn through parts of the picture.
-#include "visualizer/surface/sight.hpp"
+#include "visualizer/surface/frustum_culling.hpp"
 
 #include <algorithm>
 
@@ -18,16 +18,17 @@ TEST_CASE("of a block those triangles are picked that touch a part of the pictur
   const View view = look_at({7, 9, 12}, {}, 1, 40);
   const glm::dmat4 clip_from_voxel =
       view.clip_from_eye() * view.eye_from_world * volume.view.world_from_voxel;
-  const std::vector<Sight::Part> parts{{{-0.1, -0.2}, {0.05, -0.05}}, {{0.1, 0.0}, {0.2, 0.25}}};
-  const Sight sight(clip_from_voxel, std::nullopt, parts);
+  const std::vector<FrustumCulling::Part> parts{{{-0.1, -0.2}, {0.05, -0.05}},
+                                                {{0.1, 0.0}, {0.2, 0.25}}};
+  const FrustumCulling culling(clip_from_voxel, std::nullopt, parts);
   int missed = 0, picked_for_nothing = 0;
   std::size_t picked = 0;
   for (std::uint32_t id = 0; id < surface.meshes().size(); ++id) {
     const BlockMesh& mesh = surface.meshes()[id];
     const BlockBounds bounds = bounds_of(mesh, surface.block(id));
     std::vector<BlockTriangle> seen;
-    if (sight.shown(bounds) != Sight::Shown::nothing) {
-      sight.append_seen(mesh, bounds, surface.block(id), seen);
+    if (culling.visible(bounds) != FrustumCulling::Visible::nothing) {
+      culling.append_visible(mesh, bounds, surface.block(id), seen);
     }
     picked += seen.size();
     for (const BlockTriangle& triangle : mesh.triangles) {
@@ -42,17 +43,18 @@ TEST_CASE("of a block those triangles are picked that touch a part of the pictur
       const glm::dvec2 high = glm::max(corner[0], glm::max(corner[1], corner[2]));
       const glm::dvec2 middle = (corner[0] + corner[1] + corner[2]) / 3.0;
       const auto within = [&](const glm::dvec2& at) {
-        return std::any_of(parts.begin(), parts.end(), [&](const Sight::Part& part) {
+        return std::any_of(parts.begin(), parts.end(), [&](const FrustumCulling::Part& part) {
           return part.lo.x < at.x && at.x < part.hi.x && part.lo.y < at.y && at.y < part.hi.y;
         });
       };
       const bool touches =
           within(middle) || std::any_of(std::begin(corner), std::end(corner), within);
       constexpr double kSpare = 0.01;  // far less than a voxel is high here
-      const bool far_off = std::all_of(parts.begin(), parts.end(), [&](const Sight::Part& part) {
-        return glm::any(glm::lessThan(high, part.lo - kSpare)) ||
-               glm::any(glm::greaterThan(low, part.hi + kSpare));
-      });
+      const bool far_off =
+          std::all_of(parts.begin(), parts.end(), [&](const FrustumCulling::Part& part) {
+            return glm::any(glm::lessThan(high, part.lo - kSpare)) ||
+                   glm::any(glm::greaterThan(low, part.hi + kSpare));
+          });
       const bool is_picked = std::find(seen.begin(), seen.end(), triangle) != seen.end();
       missed += touches && !is_picked ? 1 : 0;
       picked_for_nothing += far_off && is_picked ? 1 : 0;

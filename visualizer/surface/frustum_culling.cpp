@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "visualizer/surface/sight.hpp"
+#include "visualizer/surface/frustum_culling.hpp"
 
 #include <algorithm>
 #include <cstddef>
@@ -27,7 +27,7 @@ bool within(const glm::vec4& plane, const BlockBounds& block) {
   return inside_vox(plane, block) > reach_vox(plane, block);
 }
 
-/// Whether all triangles are seen from behind, wherever in the box they lie.
+/// Whether all triangles are visible from behind, wherever in the box they lie.
 bool faces_away(const glm::vec3& eye, const BlockBounds& block) {
   constexpr float kSlack = 0.01F;  // of the distance
   const glm::vec3 to_eye = eye - block.centre;
@@ -93,8 +93,9 @@ class PlanesBeyond {
 
 }  // namespace
 
-Sight::Sight(const glm::dmat4& clip_from_voxel, const std::optional<glm::dvec3>& eye_voxel,
-             std::span<const Part> parts)
+FrustumCulling::FrustumCulling(const glm::dmat4& clip_from_voxel,
+                               const std::optional<glm::dvec3>& eye_voxel,
+                               std::span<const Part> parts)
     : eye_(eye_voxel) {
   // A point shows where w*lo <= x <= w*hi and so on (Gribb and Hartmann 2001).
   const glm::dmat4 rows = glm::transpose(clip_from_voxel);
@@ -114,34 +115,34 @@ Sight::Sight(const glm::dmat4& clip_from_voxel, const std::optional<glm::dvec3>&
   around_ = planes(around);
 }
 
-Sight::Shown Sight::shown(const BlockBounds& block) const {
+FrustumCulling::Visible FrustumCulling::visible(const BlockBounds& block) const {
   const auto is_beyond = [&](const glm::vec4& plane) { return beyond(plane, block); };
   const auto is_within = [&](const glm::vec4& plane) { return within(plane, block); };
   if (std::any_of(around_.begin(), around_.end(), is_beyond) ||
       std::any_of(near_far_.begin(), near_far_.end(), is_beyond)) {
-    return Shown::nothing;
+    return Visible::nothing;
   }
-  Shown most = Shown::nothing;
+  Visible most = Visible::nothing;
   for (const Planes& part : parts_) {
     if (std::any_of(part.begin(), part.end(), is_beyond)) continue;
-    most = Shown::some;
+    most = Visible::some;
     if (std::all_of(part.begin(), part.end(), is_within)) {
-      most = Shown::all;
+      most = Visible::all;
       break;
     }
   }
-  return eye_ && faces_away(*eye_, block) ? Shown::nothing : most;
+  return eye_ && faces_away(*eye_, block) ? Visible::nothing : most;
 }
 
-float Sight::distance_2(VoxelIndex block) const {
+float FrustumCulling::distance_2(VoxelIndex block) const {
   if (!eye_) return 0.0F;
   const VoxelIndex start = block_start(block);
   const glm::vec3 off = glm::vec3(start.x, start.y, start.z) + 0.5F * kBlockEdge - *eye_;
   return glm::dot(off, off);
 }
 
-void Sight::append_seen(const BlockMesh& mesh, const BlockBounds& bounds, VoxelIndex block,
-                        std::vector<BlockTriangle>& seen) const {
+void FrustumCulling::append_visible(const BlockMesh& mesh, const BlockBounds& bounds,
+                                    VoxelIndex block, std::vector<BlockTriangle>& visible) const {
   constexpr std::size_t kMostParts = 8;
   std::array<Planes, kMostParts> parts;
   std::size_t count = 0;
@@ -151,21 +152,21 @@ void Sight::append_seen(const BlockMesh& mesh, const BlockBounds& bounds, VoxelI
       continue;
     }
     if (count == kMostParts) {  // rarely: to draw more than must be is right too
-      seen.insert(seen.end(), mesh.triangles.begin(), mesh.triangles.end());
+      visible.insert(visible.end(), mesh.triangles.begin(), mesh.triangles.end());
       return;
     }
     std::transform(part.begin(), part.end(), parts[count++].begin(),
                    [&](const glm::vec4& plane) { return seen_from(block_start(block), plane); });
   }
   const PlanesBeyond beyond_planes(mesh.vertices, {parts.data(), count});
-  const std::size_t before = seen.size();
-  seen.resize(before + mesh.triangles.size());
-  auto next = seen.begin() + static_cast<std::ptrdiff_t>(before);
+  const std::size_t before = visible.size();
+  visible.resize(before + mesh.triangles.size());
+  auto next = visible.begin() + static_cast<std::ptrdiff_t>(before);
   for (const BlockTriangle& triangle : mesh.triangles) {
     *next = triangle;
     next += beyond_planes.hide(triangle) ? 0 : 1;  // no branch: half of them are, at random
   }
-  seen.erase(next, seen.end());
+  visible.erase(next, visible.end());
 }
 
 }  // namespace kerf

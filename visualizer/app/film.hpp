@@ -10,12 +10,12 @@
 
 namespace kerf {
 
-/// Films what is drawn, at a fixed rate of the servo's clock, so that the video plays in true time:
-/// a late picture fills the frames that it missed, and one that comes too early is left out.
-class Recording {
+/// A video of what is drawn, with a fixed frame rate in the servo's time, so that it plays in true
+/// time: a late picture fills the frames that it missed, and one that comes too early is left out.
+class Film {
  public:
   /// Throws FileError.
-  Recording(const std::string& path, PictureSize size, int frames_per_s);
+  Film(const std::string& path, PictureSize size, int frames_per_s);
 
   /// Seconds of the servo's clock until `add` writes the next frame; not positive: at once.
   [[nodiscard]] double due_in_s(double servo_s) const noexcept;
@@ -36,9 +36,9 @@ class Recording {
   std::vector<std::uint8_t> yuv_;
 };
 
-/// Films `target`, where there is a recording. One that fails ends, and the reason is returned; the
-/// picture goes on.
-[[nodiscard]] std::optional<std::string> film(std::optional<Recording>& recording,
-                                              const RenderTarget& target, double servo_s);
+/// Adds `target` to the film, where there is one. A film that fails ends, and the reason is
+/// returned; the picture goes on.
+[[nodiscard]] std::optional<std::string> add_frame(std::optional<Film>& film,
+                                                   const RenderTarget& target, double servo_s);
 
 }  // namespace kerf

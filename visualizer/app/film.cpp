@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "visualizer/app/recording.hpp"
+#include "visualizer/app/film.hpp"
 
 #include <algorithm>
 
@@ -8,18 +8,18 @@
 
 namespace kerf {
 
-Recording::Recording(const std::string& path, PictureSize size, int frames_per_s)
+Film::Film(const std::string& path, PictureSize size, int frames_per_s)
     : file_(path, size, frames_per_s), frames_per_s_(frames_per_s) {}
 
-double Recording::filmed_s(double servo_s) const noexcept {
+double Film::filmed_s(double servo_s) const noexcept {
   return servo_s_ < 0.0 ? 0.0 : filmed_s_ + std::max(servo_s - servo_s_, 0.0);
 }
 
-double Recording::due_in_s(double servo_s) const noexcept {
+double Film::due_in_s(double servo_s) const noexcept {
   return static_cast<double>(file_.frames()) / frames_per_s_ - filmed_s(servo_s);
 }
 
-void Recording::add(const RenderTarget& target, double servo_s) {
+void Film::add(const RenderTarget& target, double servo_s) {
   if (target.size() != file_.size()) {
     throw FileError("video " + file_.path() + ": ends with " + std::to_string(file_.frames()) +
                     " frames, because the picture has another size; begin another one");
@@ -31,14 +31,14 @@ void Recording::add(const RenderTarget& target, double servo_s) {
   while (due(servo_s)) file_.write_frame(yuv_);
 }
 
-std::optional<std::string> film(std::optional<Recording>& recording, const RenderTarget& target,
-                                double servo_s) {
-  if (!recording) return std::nullopt;
+std::optional<std::string> add_frame(std::optional<Film>& film, const RenderTarget& target,
+                                     double servo_s) {
+  if (!film) return std::nullopt;
   try {
-    recording->add(target, servo_s);
+    film->add(target, servo_s);
     return std::nullopt;
   } catch (const FileError& problem) {
-    recording.reset();
+    film.reset();
     return problem.what();
   }
 }

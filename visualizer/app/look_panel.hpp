@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "visualizer/gl/pointer.hpp"
+#include "visualizer/view/look.hpp"
+
+namespace kerf {
+
+/// What the controls show, and the look that they change.
+struct LookControls {
+  Look look;
+  double own_iso = 0.5;                ///< of the main volume, 0..1: where the look has none
+  std::vector<std::string> volumes{};  ///< their names
+  bool has_iso = false;                ///< a volume shows its iso-surface
+  bool takes_gradient = false;         ///< a renderer shades by the look's
+  Opacities opacities{};               ///< of all materials, as they are; empty: not shown
+  bool write = false;                  ///< the user asks for a file with them
+  std::optional<Pointer> over{};       ///< the mouse, while it is over them
+  friend bool operator==(const LookControls&, const LookControls&) noexcept = default;
+};
+
+/// The controls of the look, which the mouse moves: renderers, gradient, iso value, opacities, clip
+/// plane, stereo, voxel tool. Lower left corner.
+class LookPanel {
+ public:
+  /// Between ImGui::NewFrame and ImGui::Render. Takes the mouse's changes over into `controls`.
+  /// Returns the x at which the panel ends, in pixels, in a picture `height` pixels high.
+  float draw(LookControls& controls, float height);
+
+ private:
+  void choose_iso(LookControls& controls);
+
+  std::optional<float> dragged_iso_;  ///< taken over when the drag ends: all is drawn anew then
+};
+
+/// `value` to the nearest multiple of `step`.
+[[nodiscard]] double rounded_to(double step, double value);
+
+}  // namespace kerf

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+
+#include "visualizer/app/notices.hpp"
+#include "visualizer/app/picture.hpp"
+#include "visualizer/gl/window.hpp"
+#include "visualizer/view/session.hpp"
+
+namespace kerf {
+
+/// Gives the picture another look. Where its renderer cannot show these volumes, the picture keeps
+/// its look and a notice says why.
+void change_look(Picture& picture, const Session& session, const Look& look, Notices& notices);
+
+/// What the keys of a window have switched, and what they have asked for. Who does what was asked
+/// sets it back to false.
+struct WindowKeys {
+  bool help = false;
+  bool hidden = false;  ///< the panels
+  bool plot = false;
+  bool screenshot = false;
+  bool mesh = false;    ///< export the surface
+  bool write = false;   ///< write the opacities
+  bool film = false;    ///< begin a film, or end it
+  std::size_t one = 0;  ///< volume that v is for, counted from 1; 0: all
+
+  /// Takes the keys of `input`: the camera and the look of `picture`, and the tool, follow at once.
+  /// True when the user wants to leave.
+  bool apply(const WindowInput& input, Session& session, Picture& picture, double aspect,
+             Notices& notices);
+};
+
+}  // namespace kerf
