@@ -45,8 +45,9 @@ Json json_of(const std::vector<KernelRow>& rows) {
   return list;
 }
 
-std::string json_of(const std::vector<KernelRow>& rows, const std::vector<KernelRow>& queries,
-                    const std::vector<KernelRow>& layout, int core) {
+[[maybe_unused]] std::string json_of(const std::vector<KernelRow>& rows,
+                                     const std::vector<KernelRow>& queries,
+                                     const std::vector<KernelRow>& layout, int core) {
   Json report;
   report["core"] = core;
   report["rows"] = json_of(rows);
