@@ -46,7 +46,7 @@ bool eases(const CurvatureEstimate<N>& curvature) {
 template <class N, class Field>
 Point end_of_step(Field field, const CurvatureEstimate<N>& curvature, double play, Point from) {
   const auto slide = nearest(constraints_of(field.query(place_of<N>(from))),
-                             place_of<N>(minus({0, -play - 2, 0}, from)));
+                             place_of<N>(Point{0, -play - 2, 0} - from));
   return from + point_of<N>(curvature.eased(slide.move, slide.load[0]));
 }
 
@@ -85,7 +85,7 @@ TEST_CASE("short steps in a wide bowl tell fixed point what they tell double") {
     const auto curvature = learned<N>(hollow<N>(kPlay), {on(kPlay, 0.1 + kTurn), on(kPlay, 0.1)});
     return point_of<N>(curvature.eased(place_of<N>({0.3, 0.2, -0.1}), typename N::Real(kLoad)));
   };
-  CHECK(length(minus(eased(FixedNumbers{}), eased(DoubleNumbers{}))) < 1e-3);
+  CHECK(length(eased(FixedNumbers{}) - eased(DoubleNumbers{})) < 1e-3);
 }
 
 TEST_CASE_TEMPLATE("a slot leaves the way along it", N, FixedNumbers, DoubleNumbers) {
