@@ -119,11 +119,8 @@ std::optional<int> parse_options(int argc, const char* const* argv, ControllerOp
       "load and check the scene, whether its rate fits too, print what it means, and end");
   auto* explain_flag =
       app.add_flag("--explain", options.explain,
-                   "tell what the scene costs: plans, operations, time, memory; and end")
+                   "tell what the scene costs: methods, operations, time, memory; and end")
           ->excludes(check_flag);
-  app.add_flag("--calibrate", options.calibrate,
-               "with --explain: measure anew what an operation costs on this machine")
-      ->needs(explain_flag);
   app.add_flag("--probe", options.probe,
                "no scene needed: show what the device says, its motors off; without --port, what "
                "is connected and what is missing")

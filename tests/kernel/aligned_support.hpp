@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "controller/kernel/aligned.hpp"
-#include "controller/plan/aligned_tool.hpp"
-#include "controller/plan/tick_memory.hpp"
+#include "controller/plan/tables/aligned_tool.hpp"
+#include "controller/plan/tables/tick_memory.hpp"
 #include "tests/kernel/exact_field.hpp"
 
 /// Volumes, tools and the two ways to compute one tick of the plan `aligned`.

@@ -8,7 +8,7 @@
 
 #include <doctest/doctest.h>
 
-#include "controller/plan/aligned_tool.hpp"
+#include "controller/plan/tables/aligned_tool.hpp"
 #include "tests/kernel/exact_field.hpp"
 
 using namespace kerf;

@@ -10,7 +10,7 @@
 
 #include <doctest/doctest.h>
 
-#include "controller/plan/sample_tool.hpp"
+#include "controller/plan/tables/sample_tool.hpp"
 #include "tests/kernel/aligned_support.hpp"
 #include "tests/kernel/case_count.hpp"
 

@@ -10,7 +10,7 @@
 
 #include "controller/kernel/covered_groups.hpp"
 #include "controller/kernel/splat.hpp"
-#include "controller/plan/sample_tool.hpp"
+#include "controller/plan/tables/sample_tool.hpp"
 #include "tests/kernel/aligned_support.hpp"
 #include "tests/kernel/preston_support.hpp"
 
