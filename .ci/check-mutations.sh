@@ -56,8 +56,8 @@ controller/kernel/sets/splat_loops.hpp | rounding of a scaled overlap | s/ \+ \(
 controller/kernel/sets/splat_loops.hpp | air is felt | s/density\[x\] == INT16_MIN \? 0 : covered/covered/
 controller/kernel/sets/splat_loops.hpp | what lies beyond a full voxel is lost | s/sums\[x\] - covered : sums/0 : sums/
 controller/kernel/splat.hpp | the box lies one voxel off | s/low\.y - kGradientReach/low.y - 1/
-controller/plan/aligned_tool.cpp | the flush bound is twice too large | s/\(2 \* largest \* 32768\)/(largest * 32768)/
-controller/plan/aligned_tool.cpp | a mask's lane off by one | s/static_cast<std::size_t>\(v\.x\) \+ 2 \+ moved/static_cast<std::size_t>(v.x) + 1 + moved/
+controller/plan/tables/aligned_tool.cpp | the flush bound is twice too large | s/\(2 \* largest \* 32768\)/(largest * 32768)/
+controller/plan/tables/aligned_tool.cpp | a mask's lane off by one | s/static_cast<std::size_t>\(v\.x\) \+ 2 \+ moved/static_cast<std::size_t>(v.x) + 1 + moved/
 LIST
 }
 

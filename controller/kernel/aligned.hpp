@@ -16,7 +16,7 @@
 
 namespace kerf {
 
-/// One tick of the plan `aligned` on one volume: `contact` first, then `mill` of the same place.
+/// One tick of the method `aligned` on one volume: `contact` first, then `mill` of the same place.
 ///
 /// Gives the bits of aligned_reference.hpp, overlap.hpp and milling.hpp, whatever the kernels. Work
 /// is bounded by the tool's box and does not depend on pose or content. Servo thread; no heap.

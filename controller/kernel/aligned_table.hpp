@@ -9,7 +9,7 @@
 
 namespace kerf {
 
-// The plan `aligned`: the tool's voxels lie on a lattice as fine as the volume's and are not
+// The method `aligned`: the tool's voxels lie on a lattice as fine as the volume's and are not
 // turned, so all samples share one place within their cells. The sum of interpolated gradients is
 // then a correlation of the density with a fixed table, S' = tool mask convolved with the gradient
 // taps, at the eight corners of one cell. Nothing but the density is stored, nothing is refreshed.
@@ -27,7 +27,7 @@ struct AlignedChunk {
 };
 
 /// What the aligned plan holds of one tool, for kernels of one vector width. Made at load time
-/// (controller/plan/aligned_tool.hpp), constant afterwards; points into the maker's memory.
+/// (controller/plan/tables/aligned_tool.hpp), constant afterwards; points into the maker's memory.
 ///
 /// A table entry has up to 18 bits and is kept as 512 hi + lo, both in 16 bits. A run is `lanes`
 /// entries lo, then `lanes` entries hi; with `fused` axes x, y, z follow each other in one run.

@@ -47,12 +47,12 @@ struct KernelSet {
   /// Takes from the volume what the ratios say; `carry` has row_lanes entries.
   BoxCut (*cut)(const TickBox&, const CutRate&, const VoxelGrid&, Density*, VoxelIndex origin,
                 const BoxScratch&, std::uint16_t* carry) noexcept;
-  /// Contact of the plan `gather`: `contact_sum` over a field of three 16-bit parts a voxel, which
-  /// goes on for kFieldPad voxels.
+  /// Contact of the method `gather`: `contact_sum` over a field of three 16-bit parts a voxel,
+  /// which goes on for kFieldPad voxels.
   void (*gather)(const SampleTable&, const SamplePose&, const VoxelGrid&, const std::int16_t* field,
                  std::int64_t (&sum)[3]) noexcept;
-  /// Plan `splat`: places of the samples, then their sums, then both sums of gradients; the ratios
-  /// are left for `cut`.
+  /// Method `splat`: places of the samples, then their sums, then both sums of gradients; the
+  /// ratios are left for `cut`.
   void (*place)(const SampleTable&, const SamplePose&, const SplatScratch&, VoxelIndex& lowest,
                 VoxelIndex& highest) noexcept;
   void (*splat)(const SampleTable&, const TickBox&, VoxelIndex origin,

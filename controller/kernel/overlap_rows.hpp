@@ -10,7 +10,7 @@
 
 namespace kerf {
 
-/// The overlap ratios that `press` of the plans `aligned` and `splat` left in the scratch, until
+/// The overlap ratios that `press` of the methods `aligned` and `splat` left in the scratch, until
 /// the next tick uses it; nothing where the tool is away from the volume.
 struct BoxOverlap {
   const TickBox* box = nullptr;

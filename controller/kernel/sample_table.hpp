@@ -7,7 +7,7 @@
 namespace kerf {
 
 /// A tool's samples for kernels of any vector width: offsets in half pitches, axis by axis. Made at
-/// load (controller/plan/sample_tool.hpp); points into the maker's memory. Each array goes on to a
+/// load (controller/plan/tables/sample_tool.hpp); points into the maker's memory. Each array goes on to a
 /// whole number of `kSampleGroup` with copies of a sample, which no kernel may count.
 struct SampleTable {
   const std::int32_t* offset[3] = {};

@@ -12,7 +12,7 @@
 
 namespace kerf {
 
-/// One tick of the plan `splat` on one volume, stage by stage in this order: `copy`, `splat`,
+/// One tick of the method `splat` on one volume, stage by stage in this order: `copy`, `splat`,
 /// `press`, `cut`. `splat_tick` runs them all.
 ///
 /// Gives the bits of splat_reference.hpp, overlap.hpp and milling.hpp, whatever the kernels. Work
@@ -84,7 +84,7 @@ class SplatTick {
   bool near_ = false;
 };
 
-/// What one tick of the plan `splat` feels and takes.
+/// What one tick of the method `splat` feels and takes.
 struct SplatOutcome {
   SplatTick::Felt felt;
   Removed removed;

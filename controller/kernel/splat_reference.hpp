@@ -9,7 +9,7 @@
 
 namespace kerf {
 
-// The plan `splat` by its definition. Its modification sum is `exact_modification_sum`, overlap
+// The method `splat` by its definition. Its modification sum is `exact_modification_sum`, overlap
 // and removal are those of overlap.hpp and milling.hpp. Fixed point only.
 
 /// SUM over samples i of SUM over the corners c of its cell of w_ic times the exact gradient, in

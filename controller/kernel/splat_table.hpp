@@ -9,7 +9,7 @@
 
 namespace kerf {
 
-// The plan `splat`: any pose of any shape, in scenes that cut. Each sample adds its eight weights
+// The method `splat`: any pose of any shape, in scenes that cut. Each sample adds its eight weights
 // to the voxels of its cell; the sums R_j are all that the forces and the removal need of the tool.
 // Contact is SUM_j R_j G_j, since the sum of interpolated gradients may be added up voxel by voxel.
 // Nothing but the density is stored, nothing is refreshed after a cut.
@@ -18,7 +18,7 @@ namespace kerf {
 /// bits.
 inline constexpr double kMaxSplatDensity = 512.0;
 
-/// Working memory of one tick of the plan `splat`; any contents.
+/// Working memory of one tick of the method `splat`; any contents.
 struct SplatScratch {
   BoxScratch tick;               ///< box, ratios, filter and live rows
   std::int32_t* place[3] = {};   ///< of each sample, Q15.16 voxels

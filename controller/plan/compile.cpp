@@ -9,16 +9,15 @@
 #include <vector>
 
 #include "controller/kernel/proxy/query_work.hpp"
-#include "controller/plan/aligned_tool.hpp"
-#include "controller/plan/plan_choice.hpp"
+#include "controller/plan/method/methods.hpp"
 #include "controller/plan/plan_contact.hpp"
-#include "controller/plan/plan_cost.hpp"
 #include "controller/plan/plan_device.hpp"
 #include "controller/plan/plan_preston.hpp"
 #include "controller/plan/plan_tools.hpp"
 #include "controller/plan/plan_volumes.hpp"
 #include "controller/plan/servo_memory.hpp"
-#include "controller/plan/stage_timing.hpp"
+#include "controller/plan/tables/aligned_tool.hpp"
+#include "controller/plan/tick_timing.hpp"
 #include "controller/scene/scene_error.hpp"
 #include "controller/servo/servo_step.hpp"
 
@@ -28,8 +27,7 @@ namespace {
 template <class N>
 class SceneIn final : public CompiledScene {
  public:
-  SceneIn(const LoadedScene& scene, const KernelSet& kernels)
-      : cut_(scene.cut.model), memory_(scene) {
+  SceneIn(const LoadedScene& scene, const KernelSet& kernels) : memory_(scene) {
     plan_device(scene.device, plan_);
     plan_limits(scene, plan_);
     plan_.kernel = scene.servo.kernel;
@@ -55,9 +53,12 @@ class SceneIn final : public CompiledScene {
 
   void take(LoadedScene& scene) override { memory_.take(scene, plan_, state_); }
   [[nodiscard]] const SceneCosts& costs() const noexcept override { return costs_; }
-  [[nodiscard]] std::vector<StageTime> time_stages(std::size_t tick) override {
-    return kerf::time_stages(plan_, state_, tick / plan_.volume_count, tick % plan_.volume_count,
-                             cut_, costs_.ticks[tick].cost.stages);
+  [[nodiscard]] TickTime time_tick(std::size_t tick) override {
+    const TickCost& cost = costs_.ticks[tick];
+    const WorstTick worst =
+        WorstDrive<N>(plan_, state_, tick / plan_.volume_count, tick % plan_.volume_count).time();
+    return {worst.median_us, worst.p99_us,
+            tick_stages(*cost.choice.method, cost.shape, worst.box, worst.queried, worst.covered)};
   }
 
   ServoOutput step(const DeviceReport& report) noexcept override {
@@ -87,55 +88,28 @@ class SceneIn final : public CompiledScene {
       plan.swept.shell = memory_.contact().hold_shell(scene, tool);
       plan.swept.proxy = plan_proxy(scene, tool, plan.swept.shell);
     }
-    const AlignedTable* table = nullptr;  // of the last volume that could use one
-    LatticeTurn turn{};
     for (std::size_t v = 0; v < plan_.volume_count; ++v) {
       const std::size_t scene_index = plan_.volumes[v].scene_index;
-      const SceneVolume& volume = scene.volumes[scene_index];
-      if (plan_.force_cut.on) memory_.force_cut().hold(tool, volume, v);
-      const PlanChoice choice = choose_plan(scene, tool, volume);
-      PlanCost cost;
-      switch (choice.plan) {
-        case Plan::aligned:
-          if (table == nullptr || turn != choice.turn) {
-            turn = choice.turn;
-            table = &memory_.hold_table(tool, turn, scene.servo.kernel, *plan_.kernels);
-          }
-          memory_.hold_aligned(v, *table);
-          cost = aligned_cost(*table, *plan_.kernels, scene.cut.model);
-          break;
-        case Plan::gather:
-          memory_.hold_gather(tool, volume, v);
-          cost = gather_cost(scene.servo.numeric, *plan_.kernels, tool, volume, scene.cut.model);
-          break;
-        case Plan::splat:
-          memory_.hold_splat(tool, volume, v);
-          cost = splat_cost(*plan_.kernels, tool, volume, scene.cut.model);
-          break;
-        case Plan::surface:
-          cost = surface_cost(scene.servo.numeric, *plan_.kernels);
-          break;
-      }
-      if (plan_.contact.swept) sweep_instead(most_samples(plan.swept.shell), cost.stages);
-      if constexpr (N::kIsFixed) {
-        const bool any_pose = choice.plan == Plan::gather || choice.plan == Plan::splat;
-        if (any_pose && plan.samples.count == 0) {
-          plan.samples = memory_.hold_sample_table(tool);
-        }
-      }
-      plan.in_volume[v] = plan_tool<N>(scene, tool, volume, choice.plan,
-                                       choice.plan == Plan::aligned ? table : nullptr);
-      costs_.ticks.push_back({plan_.tool_count - 1, scene_index, choice, std::move(cost)});
+      const ToolCase in{scene, tool, scene.volumes[scene_index], *plan_.kernels};
+      if (plan_.force_cut.on) memory_.force_cut().hold(in, v);
+      const MethodChoice choice = choose_method(in);
+      const AlignedTable* table = choice.method->hold(in, v, memory_.methods());
+      plan.in_volume[v] = plan_tool<N>(in, *choice.method, table);
+      const TickShape shape = tick_shape(in, table);
+      costs_.ticks.push_back(
+          {plan_.tool_count - 1, scene_index, choice, shape,
+           most_stages(*choice.method, shape, in, most_samples(plan.swept.shell))});
     }
+    plan.samples = memory_.methods().samples_of(tool);
   }
 
   /// Of one volume, rounded up.
   [[nodiscard]] std::uint64_t most_samples(const PointShell<N>& shell) const {
+    if (!plan_.contact.swept) return 0;
     const std::int64_t all = query_work(shell.table, plan_.volume_count).most();
     return (static_cast<std::uint64_t>(all) + plan_.volume_count - 1) / plan_.volume_count;
   }
 
-  CutModel cut_;
   ServoPlan<N> plan_;
   ServoState<N> state_;
   std::vector<VoxelGrid> grids_;  ///< by volume of the scene

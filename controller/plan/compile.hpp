@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <memory>
-#include <vector>
 
 #include "controller/kernel/kernel_set.hpp"
 #include "controller/load/loaded_scene.hpp"
@@ -13,8 +13,8 @@ namespace kerf {
 
 /// A scene turned into plan and memory of the servo step, in the numbers that the scene asks for.
 ///
-/// Each tool has one plan in each solid volume (`choose_plan`). The costs are known at once; the
-/// memory exists after `take`, and nothing is allocated after that.
+/// Each tool has one method in each solid volume (`choose_method`). The costs are known at once;
+/// the memory exists after `take`, and nothing is allocated after that.
 class CompiledScene : public Servo {
  public:
   [[nodiscard]] virtual const SceneCosts& costs() const noexcept = 0;
@@ -23,10 +23,10 @@ class CompiledScene : public Servo {
   /// rest. Once, before the first step; `scene` is the one that was compiled.
   virtual void take(LoadedScene& scene) = 0;
 
-  /// Each stage of `costs().ticks[tick]` timed on the volume as it is, with a tool that is inside
-  /// the densest part and turned as unfavourably as it can be. Cuts where the scene cuts:
-  /// only for a servo that will not be stepped. After `take`; takes about 250 ticks.
-  [[nodiscard]] virtual std::vector<StageTime> time_stages(std::size_t tick) = 0;
+  /// `costs().ticks[tick]` as the servo step computes it, at its worst (tick_timing.hpp). Cuts
+  /// where the scene cuts: only for a servo that will not be stepped. After `take`; takes 250
+  /// ticks.
+  [[nodiscard]] virtual TickTime time_tick(std::size_t tick) = 0;
 };
 
 /// Plans, tables and costs of a checked scene; no array of the size of a volume is made. Throws

@@ -9,9 +9,10 @@
 #include <utility>
 #include <vector>
 
-#include "controller/plan/free_brick_map.hpp"
 #include "controller/plan/plan_contact.hpp"
-#include "controller/plan/tool_points.hpp"
+#include "controller/plan/tables/array_bytes.hpp"
+#include "controller/plan/tables/free_brick_map.hpp"
+#include "controller/plan/tables/tool_points.hpp"
 #include "controller/scene/scene_error.hpp"
 #include "controller/servo/servo_state.hpp"
 #include "controller/tool/surface_samples.hpp"

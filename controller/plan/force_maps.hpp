@@ -6,35 +6,11 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "controller/kernel/aligned_table.hpp"
-#include "controller/kernel/wide_sum.hpp"
-#include "controller/plan/matrices.hpp"
+#include "controller/plan/method/matrices.hpp"
+#include "controller/plan/method/sum_unit.hpp"
 #include "controller/servo/sum_to_force.hpp"
 
 namespace kerf {
-
-/// What an exact integer sum holds.
-struct SumUnit {
-  double steps;    ///< density steps per voxel edge in one unit
-  double largest;  ///< bound of the sum, in units
-};
-
-/// Sums of stored gradients times weights of 2^15; `terms` bounds the number of full weights.
-[[nodiscard]] inline SumUnit gathered_sum(double terms) {
-  return {std::ldexp(1.0, -15), std::ldexp(std::max(terms, 1.0), 30)};
-}
-
-/// Contact sums of the plan `aligned` have 8 kept bits.
-[[nodiscard]] inline SumUnit aligned_contact_unit(double samples) {
-  return {std::ldexp(1.0, -kAlignedKeptBits),
-          std::ldexp(std::max(samples, 1.0), 15 + kAlignedKeptBits)};
-}
-/// Sums of exact gradients times weights of 2^15, as far as `sum_shift` keeps them.
-[[nodiscard]] inline SumUnit exact_sum_unit(const ExactTaps& taps, std::size_t samples) {
-  const int bits = 15 - sum_shift(samples);
-  return {std::ldexp(taps.factor, -taps.shift - bits),
-          std::ldexp(static_cast<double>(samples) * static_cast<double>(kMaxExactGradient), bits)};
-}
 
 /// Smallest n with 2^n >= x; exact, unlike a logarithm, whose last bit differs between machines.
 [[nodiscard]] inline int bits_of(double x) {

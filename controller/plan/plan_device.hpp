@@ -8,7 +8,7 @@
 #include <cstdint>
 
 #include "controller/load/loaded_scene.hpp"
-#include "controller/plan/matrices.hpp"
+#include "controller/plan/method/matrices.hpp"
 #include "controller/servo/servo_plan.hpp"
 #include "shared/wire/falcon_constants.hpp"
 #include "shared/wire/omni_constants.hpp"

@@ -7,7 +7,7 @@
 #include <numbers>
 
 #include "controller/load/loaded_scene.hpp"
-#include "controller/plan/matrices.hpp"
+#include "controller/plan/method/matrices.hpp"
 #include "controller/servo/servo_plan.hpp"
 
 namespace kerf {

@@ -3,29 +3,28 @@
 
 #include <cstddef>
 
-#include "controller/load/loaded_scene.hpp"
-#include "controller/plan/aligned_tool.hpp"
+#include "controller/kernel/aligned_table.hpp"
 #include "controller/plan/force_maps.hpp"
-#include "controller/plan/lattice.hpp"
-#include "controller/plan/matrices.hpp"
+#include "controller/plan/method/lattice.hpp"
+#include "controller/plan/method/matrices.hpp"
+#include "controller/plan/method/tool_method.hpp"
 #include "controller/plan/plan_preston.hpp"
 #include "controller/servo/servo_plan.hpp"
 
 namespace kerf {
 
-/// Steps and forces of one tool in one volume; `table` is the tool's for the plan `aligned`.
+/// Steps and forces of one tool in one volume, as its method wants them; `table` is that of the
+/// method `aligned`.
 template <class N>
-[[nodiscard]] ToolInVolume<N> plan_tool(const LoadedScene& scene, const SceneTool& tool,
-                                        const SceneVolume& volume, Plan plan,
+[[nodiscard]] ToolInVolume<N> plan_tool(const ToolCase& what, const ToolMethod& method,
                                         const AlignedTable* table) {
+  const auto& [scene, tool, volume, kernels] = what;
   const auto& h = volume.image.spacing_mm;
   const double a = tool.pitch_mm;
   const double voxel_mm3 = h[0] * h[1] * h[2];
-  const std::size_t samples = tool.offsets.size();
-  const auto terms = static_cast<double>(samples);
   const Matrix rotation = matrix_of(volume.pose.orientation);
   ToolInVolume<N> in;
-  in.plan = plan;
+  in.method = method.step;
   in.aligned = table;
   in.voxel_from_pitch = rounded<typename N::Ratio, VoxelSpace, WorldSpace>(
       into_volume(rotation, {a / h[0], a / h[1], a / h[2]}));
@@ -46,15 +45,9 @@ template <class N>
     }
     return m;
   };
-  const SumUnit exact = exact_sum_unit(exact_taps(scene.servo.kernel), samples);
-  SumUnit contact = gathered_sum(terms);
-  // Each voxel counts at most once, and the tool touches at most eight voxels per sample.
-  SumUnit modification = gathered_sum(8 * terms);
-  if (plan == Plan::aligned) contact = aligned_contact_unit(terms);
-  if (plan == Plan::splat) contact = exact;
-  if (plan != Plan::gather) modification = exact;
-  in.contact = sum_to_force<N>(newtons(scene.force.p0_n_per_mm2 * a * a * a), contact);
-  in.modification = sum_to_force<N>(newtons(scene.cut.p1_n_per_mm2 * voxel_mm3), modification);
+  const SumUnits sums = method.sums(scene, tool.offsets.size());
+  in.contact = sum_to_force<N>(newtons(scene.force.p0_n_per_mm2 * a * a * a), sums.contact);
+  in.modification = sum_to_force<N>(newtons(scene.cut.p1_n_per_mm2 * voxel_mm3), sums.modification);
   return in;
 }
 

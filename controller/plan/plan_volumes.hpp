@@ -6,7 +6,7 @@
 #include <string>
 
 #include "controller/load/loaded_scene.hpp"
-#include "controller/plan/matrices.hpp"
+#include "controller/plan/method/matrices.hpp"
 #include "controller/scene/scene_error.hpp"
 #include "controller/servo/servo_plan.hpp"
 

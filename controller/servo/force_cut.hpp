@@ -6,11 +6,8 @@
 #include <cstddef>
 #include <span>
 
-#include "controller/kernel/aligned.hpp"
-#include "controller/kernel/overlap.hpp"
-#include "controller/kernel/overlap_rows.hpp"
 #include "controller/kernel/proxy/contact_math.hpp"
-#include "controller/kernel/splat.hpp"
+#include "controller/servo/method_step.hpp"
 #include "controller/servo/servo_plan.hpp"
 #include "controller/servo/servo_state.hpp"
 #include "controller/servo/tool_contact.hpp"
@@ -54,34 +51,21 @@ template <class N>
   const VolumePlan<N>& volume = plan.volumes[v];
   const ToolPlan<N>& tool = plan.tools[state.active_tool];
   const ToolInVolume<N>& in_volume = tool.in_volume[v];
-  const std::span<Density> density = state.volumes[v].density;
-  const ToolPose<N> pose = tool_pose(volume, tool, in_volume, centre_mm, at.rotation);
-  const SpindleFrame<N> frame(pose.centre_vox, in_volume.rims_from_voxel,
+  const VolumeTick<N> tick{plan, state, v,
+                           tool_pose(volume, tool, in_volume, centre_mm, at.rotation)};
+  const SpindleFrame<N> frame(tick.pose.centre_vox, in_volume.rims_from_voxel,
                               spindle_axes(tool, state, at));
   const std::span<const Label> labels = plan.force_cut.volume[v].labels;
   const std::span<CoveredEntry<N>> memory = state.force_cut.list[v];
-  if constexpr (N::kIsFixed) {
-    const auto listed = [&](const BoxOverlap& overlap) {
+  const auto weigh = [&](const auto& overlap) -> Covered<N> {
+    if constexpr (N::kIsFixed) {
       return covered_groups(*plan.kernels, volume.grid, labels, overlap, frame, memory);
-    };
-    if (in_volume.plan == Plan::aligned) {
-      const AlignedTick tick(*plan.kernels, *in_volume.aligned, state.scratch.tick, volume.grid,
-                             density, pose);
-      tick.cover();
-      return listed(tick.overlap());
+    } else {
+      return covered_voxels<N>(volume.grid, std::span<const Density>(tick.memory().density), labels,
+                               overlap, frame, memory);
     }
-    const SplatTick tick(*plan.kernels, tool.samples, *plan.taps, state.scratch, volume.grid,
-                         density, pose);
-    tick.copy();
-    tick.splat();
-    tick.cover(in_volume.overlap_ratio);
-    return listed(tick.overlap());
-  } else {
-    static_cast<void>(
-        overlap<N>(volume.grid, tool.offsets, pose, in_volume.overlap_ratio, state.overlap));
-    return covered_voxels<N>(volume.grid, std::span<const Density>(density), labels, state.overlap,
-                             frame, memory);
-  }
+  };
+  return by_method<N>(in_volume.method, [&](auto step) { return step.cover(tick, weigh); });
 }
 
 /// Deals a press of `cut.press_n` out over the volumes, by the part of each that the tool covers,

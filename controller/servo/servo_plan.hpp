@@ -36,28 +36,14 @@ struct VolumePlan {
   typename N::Real largest_spacing_mm{};
 };
 
-/// How contact and cut of one tool in one volume are computed. Fixed point knows all three; float
-/// and double gather, whether they cut or not.
-enum class Plan : std::uint8_t {
+/// How contact and cut of one tool in one volume are computed. Each has a step (method_step.hpp)
+/// and a file of its own for load time (controller/plan/method).
+enum class Method : std::uint8_t {
   aligned,  ///< a correlation of the density with one table (controller/kernel/aligned_table.hpp)
   gather,   ///< stored gradients, weighted at every sample (controller/kernel/contact.hpp)
   splat,    ///< weights added up in the volume (controller/kernel/splat_table.hpp)
   surface,  ///< none of them: the swept proxy feels, and nothing is cut
 };
-
-[[nodiscard]] constexpr const char* name_of(Plan plan) noexcept {
-  switch (plan) {
-    case Plan::aligned:
-      return "aligned";
-    case Plan::splat:
-      return "splat";
-    case Plan::surface:
-      return "surface";
-    case Plan::gather:
-      break;
-  }
-  return "gather";
-}
 
 /// What one tool needs in one volume.
 template <class N>
@@ -67,9 +53,9 @@ struct ToolInVolume {
   std::array<std::array<typename N::Step, 3>, 3>
       unturned_step{};               ///< of a tool that keeps its axes
   typename N::Step overlap_ratio{};  ///< a^3 / V_voxel
-  Plan plan = Plan::gather;
-  const AlignedTable* aligned = nullptr;  ///< of the plan `aligned`
-  // Of the plan's own sums:
+  Method method = Method::gather;
+  const AlignedTable* aligned = nullptr;  ///< of the method `aligned`
+  // Of the method's own sums:
   SumToForce<N> contact;  ///< F_c = -p0 a^3 SUM grad (docs/theory.md 7.1), times workspace scale
   SumToForce<N> modification;  ///< F_m = -p1 V_voxel SUM r grad (docs/theory.md 7.4), scaled alike
   /// Where force cuts: from voxel edges to rim radii along the world's axes, for a `SpindleFrame`.
@@ -79,7 +65,7 @@ struct ToolInVolume {
 template <class N>
 struct ToolPlan {
   std::span<const ToolOffset> offsets;
-  SampleTable samples;  ///< the same for the plans `gather` and `splat` in fixed point
+  SampleTable samples;  ///< the same for the methods `gather` and `splat` in fixed point
   /// A round tool has the same samples in every orientation: they keep the volume's axes.
   bool round = false;
   bool turns = true;          ///< with the stylus; else the tool keeps the world's axes
@@ -97,7 +83,7 @@ struct ServoPlan {
   std::array<ToolPlan<N>, kMaxTools> tools{};
 
   GradientKernel kernel = GradientKernel::farid;
-  const ExactTaps* taps = nullptr;     ///< of the kernel, for the plan `splat`
+  const ExactTaps* taps = nullptr;     ///< of the kernel, for the method `splat`
   const KernelSet* kernels = nullptr;  ///< what this machine runs
   ContactPlan<N> contact;
   bool cutting = false;  ///< by overlap, whatever the force

@@ -53,7 +53,7 @@ struct ServoState {
   std::array<VolumeState<N>, kMaxVolumes> volumes{};
   OverlapBox<N> overlap;  ///< scratch of one tick, as is the next
   GradientScratch* gradient_scratch = nullptr;
-  SplatScratch scratch;  ///< the plan `aligned` uses its inner part
+  SplatScratch scratch;  ///< the method `aligned` uses its inner part
 
   ContactState<N> contact;     ///< of the swept proxy
   ForceCutState<N> force_cut;  ///< of cutting by force

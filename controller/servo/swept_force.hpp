@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <span>
 
 #include "controller/servo/servo_plan.hpp"
@@ -16,6 +17,7 @@ struct SweptForce {
   WorldVec<typename N::Real> offset_mm;     ///< from the hand's tip to the proxy's
   DeviceVec<typename N::Real> torque_n_mm;  ///< of the contact about the tool's centre
   ToolContact<N> tool;
+  std::int64_t queried = 0;  ///< samples that it took, as query_work.hpp counts
 };
 
 /// One tick: the proxy of the active tool follows the hand, the coupling pulls the hand to the
@@ -53,6 +55,7 @@ template <class N>
   out.tool.normal = relabel<WorldSpace>(felt.normal);
   out.torque_n_mm =
       relabel<DeviceSpace>(scaled(felt.moment_arm, contact.device_mm_per_unit)) * norm(out.force_n);
+  out.queried = field.spent();
   return out;
 }
 

@@ -116,11 +116,8 @@ std::optional<int> parse_options(int argc, const char* const* argv, ControllerOp
            "print every key of a scene file as a page of Markdown, and end");
   const Option explain_flag =
       app.flag("--explain", options.explain,
-               "tell what the scene costs: plans, operations, time, memory; and end")
+               "tell what the scene costs: methods, operations, time, memory; and end")
           .excludes(check_flag);
-  app.flag("--calibrate", options.calibrate,
-           "with --explain: measure anew what an operation costs on this machine")
-      .needs(explain_flag);
   app.flag("--probe", options.probe,
            "no scene needed: show what the device says, its motors off; without --port, what "
            "is connected and what is missing")

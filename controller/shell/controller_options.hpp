@@ -20,7 +20,6 @@ struct ControllerOptions {
   bool virtual_time = false;
   bool check = false;
   bool explain = false;
-  bool calibrate = false;
   bool probe = false;
   bool guard = false;
   bool progress = false;

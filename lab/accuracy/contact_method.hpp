@@ -22,13 +22,13 @@ enum class Arithmetic : std::uint8_t {
 };
 enum class Interpolation : std::uint8_t { nearest, trilinear, quadratic, cubic };
 enum class Storage : std::uint8_t {
-  gradients,  ///< kept for every voxel, as in the plan `gather`
-  aligned,    ///< none: the plan `aligned`
-  splat,      ///< none: the plan `splat`
+  gradients,  ///< kept for every voxel, as in the method `gather`
+  aligned,    ///< none: the method `aligned`
+  splat,      ///< none: the method `splat`
   spline,     ///< none: the derivative of the density's B-spline, quadratic or cubic
 };
 
-/// One way to compute the contact force. In fixed point the servo's plans `gather`, `aligned` and
+/// One way to compute the contact force. In fixed point the servo's methods `gather`, `aligned` and
 /// `splat` run with their kernels, float32 and float64 are the servo's templates; all else is plain
 /// text of the lab: the interpolations in double, the coarse weights through the servo's own lerp.
 struct ContactChoice {

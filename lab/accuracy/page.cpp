@@ -37,7 +37,7 @@ of white noise of deviation one.)",
           {"storage",
            R"(## What is stored beside the density
 
-Int16 gradients are the servo's plan `gather`, `aligned` its plan for round tools, `splat` that for any
+Int16 gradients are the servo's method `gather`, `aligned` its plan for round tools, `splat` that for any
 tool in scenes that cut (its time holds the modification force, too). `spline 2` and `spline 3` are the
 exact derivative of the density's quadratic and cubic B-spline: their accuracy is the reference, their
 time is not. The last row has voxels half as wide: compare it with that of `gather` in "Voxel edge".)",
@@ -135,7 +135,7 @@ Forces are shares of full scale, p0 pi R^2. `rms` and `max` are over all shapes 
 * `loop`: |SUM dW| / SUM |dW| around tilted circles of 0.375 mm, of one sample or of the whole tool. It is the work that
   a static tooth gives or takes on a closed path, and should be nothing.
 * `us p50`, `p99`: times of one tick of the tool without milling. Where the servo has fast kernels they run: Q15 in the
-  plans `gather`, `aligned` and `splat`. Float and double are the servo's templates. Times in brackets are of plain
+  methods `gather`, `aligned` and `splat`. Float and double are the servo's templates. Times in brackets are of plain
   loops of the lab (Q8, Q12, splines, other interpolations): compare them with no other time.
 
 )";

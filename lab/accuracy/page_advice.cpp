@@ -54,7 +54,7 @@ std::string page_advice(const std::vector<Entry>& entries) {
   constexpr const char* kAlignedFine = "aligned 0.0625 mm";
   std::string text = "## What to choose\n\n";
   text += filled(
-      R"(* A round tool: the plan `aligned`, {} us a tick, at most {} ppm of full scale away from double. Nothing is
+      R"(* A round tool: the method `aligned`, {} us a tick, at most {} ppm of full scale away from double. Nothing is
   stored, so a cut refreshes nothing.
 * Any other tool: `gather` ({} us, at most {} ppm, {} bytes a voxel), and `splat` where the scene cuts ({} us,
   at most {} ppm, nothing stored).
@@ -95,7 +95,7 @@ std::string page_advice(const std::vector<Entry>& entries) {
       {c.of("nearest", kStep), c.of("trilinear", kStep)});
   text += filled(
       R"(* Most of the error of theory is blur, by the kernel and by the ramp of one voxel at each face. Voxels of
-  0.0625 mm instead of 0.125 mm take {} times as long in the plan `gather` and bring {} instead of {} %.
+  0.0625 mm instead of 0.125 mm take {} times as long in the method `gather` and bring {} instead of {} %.
 )",
       {c.times("0.0625 mm", "0.125 mm"), c.of("0.0625 mm", kTheory), c.of("0.125 mm", kTheory)});
   return text + "\n";

@@ -9,9 +9,9 @@
 #include "controller/kernel/gather.hpp"
 #include "controller/kernel/overlap.hpp"
 #include "controller/kernel/splat.hpp"
-#include "controller/plan/aligned_tool.hpp"
-#include "controller/plan/sample_tool.hpp"
-#include "controller/plan/tick_memory.hpp"
+#include "controller/plan/tables/aligned_tool.hpp"
+#include "controller/plan/tables/sample_tool.hpp"
+#include "controller/plan/tables/tick_memory.hpp"
 #include "lab/accuracy/method_parts.hpp"
 
 // The servo's plans in fixed point, each with the fastest kernels of this machine.

@@ -43,7 +43,7 @@ class FromField final : public ContactMethod {
   SumOf sum_of_;
 };
 
-/// The servo's plan `gather` by its definition; fixed point has kernels for it.
+/// The servo's method `gather` by its definition; fixed point has kernels for it.
 template <class N>
 struct Gather {
   Voxels operator()(const VoxelGrid& grid, std::span<const Gradient<N>> field, Offsets offsets,

@@ -24,7 +24,7 @@ struct Figure {
 struct Entry {
   std::string knob, value;
   bool standard =
-      false;  ///< what the servo runs without the plan `aligned`: one measurement, in each knob
+      false;  ///< what the servo runs without the method `aligned`: one measurement, in each knob
   TickTimes times;
   std::vector<Figure> figures;
   bool plain = false;  ///< text of the lab: its times are not those of kernels

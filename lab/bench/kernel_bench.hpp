@@ -12,7 +12,7 @@ namespace kerf {
 struct KernelRow {
   std::string name;     ///< contact/ball16/any
   std::string numeric;  ///< float (the paper) or fixed
-  std::string isa;      ///< paper, reference (plan `gather`, plain templates), scalar, avx2, avx512
+  std::string isa;  ///< paper, reference (method `gather`, plain templates), scalar, avx2, avx512
   double p50_ns = 0, p99_ns = 0;
   double baseline_p50_ns = 0;  ///< in this run, the same tick: the paper's form where it has one
   std::size_t bytes = 0;       ///< memory of the tick beyond two bytes a voxel

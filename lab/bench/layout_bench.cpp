@@ -8,8 +8,8 @@
 #include <string>
 
 #include "controller/kernel/aligned.hpp"
-#include "controller/plan/aligned_tool.hpp"
-#include "controller/plan/tick_memory.hpp"
+#include "controller/plan/tables/aligned_tool.hpp"
+#include "controller/plan/tables/tick_memory.hpp"
 #include "lab/rig/bench_scene.hpp"
 #include "lab/rig/tick_timer.hpp"
 

@@ -17,8 +17,8 @@ One tick of the servo's kernels on 256 x 256 x 161 voxels, the worst place of ea
 from tick to tick. `paper` is the paper's own form at -O2: an array of structures with the stored float
 gradient, and a dense 5x5x5 refresh of what a cut changed; ratios divide its time. `reference` is the
 plain fixed-point text with stored gradients. `scalar`, `avx2` and `avx512` are the servo's kernels,
-which give the same bits on each: the plan `aligned` for unturned tools, and for tools in any pose
-(`any`) the plan `gather` for contact and `splat` for milling. `bytes` is what the tick needs beyond
+which give the same bits on each: the method `aligned` for unturned tools, and for tools in any pose
+(`any`) the method `gather` for contact and `splat` for milling. `bytes` is what the tick needs beyond
 two bytes a voxel.
 
 )";

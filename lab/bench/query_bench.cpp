@@ -7,8 +7,8 @@
 #include <utility>
 
 #include "controller/kernel/proxy/contact_query.hpp"
-#include "controller/plan/free_brick_map.hpp"
-#include "controller/plan/tool_points.hpp"
+#include "controller/plan/tables/free_brick_map.hpp"
+#include "controller/plan/tables/tool_points.hpp"
 #include "controller/tool/surface_samples.hpp"
 #include "controller/tool/tool_shapes.hpp"
 #include "lab/rig/bench_scene.hpp"

@@ -156,7 +156,7 @@ GoldenRun golden_run(GoldenScene which, NumericKind numeric, const KernelSet& ke
   const std::unique_ptr<CompiledScene> servo = compile(scene, kernels);
 
   GoldenRun run;
-  for (const TickCost& pair : servo->costs().ticks) run.plans.insert(pair.choice.plan);
+  for (const TickCost& pair : servo->costs().ticks) run.methods.insert(pair.choice.method->step);
   Hash hash, volume_hash;
   ServoOutput last;
   for (std::int32_t tick = 0; tick < ticks; ++tick) {

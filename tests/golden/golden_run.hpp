@@ -14,8 +14,8 @@ namespace kerf::test {
 
 /// Two volumes, one that the tools' lattices fit and one that none fits.
 enum class GoldenScene : std::uint8_t {
-  mill,  ///< cuts for 20 s: in fixed point the plans `aligned` and `splat`
-  feel,  ///< cuts nothing, turns tools without symmetry for 3 s: the plan `gather`
+  mill,  ///< cuts for 20 s: in fixed point the methods `aligned` and `splat`
+  feel,  ///< cuts nothing, turns tools without symmetry for 3 s: the method `gather`
   sweep  ///< feels by the swept proxy and cuts by its force for 3 s: a ball, a shaft that turns
 };
 [[nodiscard]] constexpr const char* name_of(GoldenScene scene) noexcept {
@@ -35,7 +35,7 @@ struct GoldenRun {
   std::int32_t forbidden_ticks = 0;
   std::int32_t stale_faults = 0, speed_faults = 0, outings = 0;  ///< outings: force fades in
   std::uint64_t removed_steps[2] = {};                           ///< by volume
-  std::set<Plan> plans;                                          ///< of all tools in all volumes
+  std::set<Method> methods;                                      ///< of all tools in all volumes
 };
 
 /// A compiled scene in virtual time, under a hand that loses reports, runs into two faults and

@@ -41,7 +41,7 @@ void check_rich(const GoldenRun& run) {
 
 /// The same for the short scene: it is there for the contact of tools that turn.
 void check_felt(const GoldenRun& run) {
-  CHECK(run.plans == std::set{Plan::gather});
+  CHECK(run.methods == std::set{Method::gather});
   CHECK(run.contact_ticks > 1'000);
   CHECK(run.late_contact_ticks > 400);
   CHECK(run.motor_ticks > 2'000);
@@ -56,7 +56,7 @@ TEST_CASE("20 s of milling in fixed point end in the known bits on every instruc
     CAPTURE(std::string((*set)->name));
     CHECK(run.hash == "20aa3af7ffd40896");
     CHECK(run.volume_hash == "74b9e6fd06a55a59");
-    CHECK(run.plans == std::set{Plan::aligned, Plan::splat});
+    CHECK(run.methods == std::set{Method::aligned, Method::splat});
     check_rich(run);
   }
 }
@@ -100,7 +100,7 @@ TEST_CASE("3 s of cutting by the proxy's force end in the known bits on every in
     CAPTURE(std::string((*set)->name));
     CHECK(run.hash == "81188be910cf29a9");
     CHECK(run.volume_hash == "1fe43dc23b11c375");
-    CHECK(run.plans == std::set{Plan::aligned, Plan::splat});
+    CHECK(run.methods == std::set{Method::aligned, Method::splat});
     for (const std::uint64_t steps : run.removed_steps) CHECK(steps > 1'000'000);
     CHECK(run.forbidden_ticks > 50);
     CHECK(run.contact_ticks > 1'000);

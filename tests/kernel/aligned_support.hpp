@@ -10,11 +10,11 @@
 #include <vector>
 
 #include "controller/kernel/aligned.hpp"
-#include "controller/plan/aligned_tool.hpp"
-#include "controller/plan/tick_memory.hpp"
+#include "controller/plan/tables/aligned_tool.hpp"
+#include "controller/plan/tables/tick_memory.hpp"
 #include "tests/kernel/exact_field.hpp"
 
-/// Volumes, tools and the two ways to compute one tick of the plan `aligned`.
+/// Volumes, tools and the two ways to compute one tick of the method `aligned`.
 namespace kerf::test {
 
 /// About half the voxels of a box: full of holes, and not centred.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Every instruction set against the definitions of the plan `aligned`, bit for bit.
+// Every instruction set against the definitions of the method `aligned`, bit for bit.
 #include <array>
 #include <cstdlib>
 #include <random>

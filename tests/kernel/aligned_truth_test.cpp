@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The definitions of the plan `aligned` against double precision and the plan `gather`.
+// The definitions of the method `aligned` against double precision and the method `gather`.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -8,7 +8,7 @@
 
 #include <doctest/doctest.h>
 
-#include "controller/plan/aligned_tool.hpp"
+#include "controller/plan/tables/aligned_tool.hpp"
 #include "tests/kernel/exact_field.hpp"
 
 using namespace kerf;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Contact of the plan `gather`: every instruction set against `contact_sum`, bit for bit.
+// Contact of the method `gather`: every instruction set against `contact_sum`, bit for bit.
 #include "controller/kernel/gather.hpp"
 
 #include <array>
@@ -10,7 +10,7 @@
 
 #include <doctest/doctest.h>
 
-#include "controller/plan/sample_tool.hpp"
+#include "controller/plan/tables/sample_tool.hpp"
 #include "tests/kernel/aligned_support.hpp"
 #include "tests/kernel/case_count.hpp"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Cutting by force from the ratios that the plans `aligned` and `splat` leave: the bits of the
+// Cutting by force from the ratios that the methods `aligned` and `splat` leave: the bits of the
 // plain overlap, on every instruction set.
 #include <random>
 #include <string>
@@ -10,7 +10,7 @@
 
 #include "controller/kernel/covered_groups.hpp"
 #include "controller/kernel/splat.hpp"
-#include "controller/plan/sample_tool.hpp"
+#include "controller/plan/tables/sample_tool.hpp"
 #include "tests/kernel/aligned_support.hpp"
 #include "tests/kernel/preston_support.hpp"
 

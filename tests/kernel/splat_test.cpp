@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The plan `splat`: every instruction set against its definition, bit for bit.
+// The method `splat`: every instruction set against its definition, bit for bit.
 #include "controller/kernel/splat.hpp"
 
 #include <array>
@@ -11,8 +11,8 @@
 #include <doctest/doctest.h>
 
 #include "controller/kernel/splat_reference.hpp"
-#include "controller/plan/sample_tool.hpp"
-#include "controller/plan/tick_memory.hpp"
+#include "controller/plan/tables/sample_tool.hpp"
+#include "controller/plan/tables/tick_memory.hpp"
 #include "tests/kernel/aligned_support.hpp"
 #include "tests/kernel/case_count.hpp"
 #include "tests/kernel/hash.hpp"

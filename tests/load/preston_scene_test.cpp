@@ -9,7 +9,7 @@
 
 #include "controller/load/scene_json.hpp"
 #include "controller/plan/compile.hpp"
-#include "controller/plan/covered_bound.hpp"
+#include "controller/plan/method/covered_bound.hpp"
 #include "controller/plan/plan_preston.hpp"
 #include "controller/scene/materials.hpp"
 #include "controller/scene/scene_file.hpp"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // How much a tool is said to cover, against what it does.
-#include "controller/plan/covered_bound.hpp"
+#include "controller/plan/method/covered_bound.hpp"
 
 #include <algorithm>
 #include <cstddef>
@@ -14,9 +14,9 @@
 #include "controller/kernel/covered_groups.hpp"
 #include "controller/kernel/overlap.hpp"
 #include "controller/kernel/splat.hpp"
-#include "controller/plan/aligned_tool.hpp"
-#include "controller/plan/sample_tool.hpp"
-#include "controller/plan/tick_memory.hpp"
+#include "controller/plan/tables/aligned_tool.hpp"
+#include "controller/plan/tables/sample_tool.hpp"
+#include "controller/plan/tables/tick_memory.hpp"
 #include "tests/plan/costs_support.hpp"
 
 using namespace kerf;
@@ -83,16 +83,6 @@ TEST_CASE("a tool covers no more groups than it is said to, in any pose") {
     CHECK(most <= most_groups(tool, block));
     CHECK(most > most_groups(tool, block) / 5);
   }
-}
-
-TEST_CASE("of a tool on the latticethe covered voxels are counted") {
-  const auto covered_by = [](int size) {
-    const AlignedTool aligned(ball(size).offsets, kExactFarid, kScalarSet);
-    return most_covered(aligned.table());
-  };
-  CHECK(covered_by(1) == 8);   // the corners of one cell
-  CHECK(covered_by(2) == 27);  // of a cube of 2 x 2 x 2
-  CHECK(covered_by(16) < 17 * 17 * 17 * 2 / 3);
 }
 
 TEST_CASE("of a tool on the lattice the covered groups are counted") {

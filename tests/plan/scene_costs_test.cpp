@@ -5,7 +5,9 @@
 #include <cstdint>
 #include <cstdlib>
 #include <set>
+#include <stdexcept>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <doctest/doctest.h>
@@ -13,12 +15,12 @@
 #include "controller/kernel/contact.hpp"
 #include "controller/kernel/overlap.hpp"
 #include "controller/kernel/splat.hpp"
-#include "controller/plan/aligned_tool.hpp"
 #include "controller/plan/cost/work_budget.hpp"
-#include "controller/plan/plan_cost.hpp"
-#include "controller/plan/sample_tool.hpp"
-#include "controller/plan/stage_timing.hpp"
-#include "controller/plan/tick_memory.hpp"
+#include "controller/plan/method/methods.hpp"
+#include "controller/plan/tables/aligned_tool.hpp"
+#include "controller/plan/tables/sample_tool.hpp"
+#include "controller/plan/tables/tick_memory.hpp"
+#include "controller/plan/tick_timing.hpp"
 #include "controller/scene/scene_file.hpp"
 #include "tests/plan/costs_support.hpp"
 
@@ -27,11 +29,27 @@ using namespace kerf::test;
 
 namespace {
 
-std::uint64_t operations(const PlanCost& cost, const std::string& stage) {
-  for (const StageCost& s : cost.stages) {
+std::uint64_t operations(const std::vector<StageCost>& stages, const std::string& stage) {
+  for (const StageCost& s : stages) {
     if (s.stage == stage) return s.operations;
   }
   return 0;
+}
+
+/// What a method counts of a tool with this table.
+std::vector<StageCost> aligned_stages(const AlignedTable& table, const KernelSet& kernels,
+                                      CutModel cut) {
+  return aligned_method().stages({.cut = cut, .runs_it = kernels.name, .table = &table}, {});
+}
+
+/// What a method counts of a tool in a volume, in any pose.
+std::vector<StageCost> any_pose_stages(const ToolMethod& method, std::string_view runs_it,
+                                       const SceneTool& tool, const SceneVolume& volume,
+                                       CutModel cut) {
+  const LoadedScene scene;
+  const TickShape shape{
+      .samples = tool.offsets.size(), .grid = volume.image.grid, .cut = cut, .runs_it = runs_it};
+  return most_stages(method, shape, {scene, tool, volume, kScalarSet}, 0);
 }
 
 /// A sum that counts the products which it was made of.
@@ -72,7 +90,7 @@ TEST_CASE("the voxels that a tick copies are those that are written") {
     std::fill_n(scratch.box, room, std::int16_t{1});
     kScalarSet.copy_box(aligned.table(), {64, 64, 64}, air.data(), {20, 20, 20}, scratch);
     const auto written = std::count(scratch.box, scratch.box + room, std::int16_t(7 - 32768));
-    CHECK(operations(aligned_cost(aligned.table(), kScalarSet, CutModel::none), "copy") ==
+    CHECK(operations(aligned_stages(aligned.table(), kScalarSet, CutModel::none), "copy") ==
           static_cast<std::uint64_t>(written));
   }
 }
@@ -93,7 +111,7 @@ TEST_CASE("the multiply-adds of a correlation are those of its chunks, and cover
           }
         }
       }
-      const PlanCost cost = aligned_cost(table, **set, CutModel::overlap_exact);
+      const std::vector<StageCost> cost = aligned_stages(table, **set, CutModel::overlap_exact);
       CHECK(operations(cost, "contact") == 8 * visited);
       CHECK(filled > visited / 4);  // the lists leave the zeros out, else the count were idle
 
@@ -111,8 +129,8 @@ TEST_CASE("the multiply-adds of a correlation are those of its chunks, and cover
       CHECK(operations(cost, "mill") == mill);
       const auto edge = static_cast<std::uint64_t>(size) + 1;
       CHECK(operations(cost, "bend") == edge * edge * edge);
-      CHECK(operations(aligned_cost(table, **set, CutModel::overlap), "bend") == 0);
-      CHECK(operations(aligned_cost(table, **set, CutModel::none), "mill") == 0);
+      CHECK(operations(aligned_stages(table, **set, CutModel::overlap), "bend") == 0);
+      CHECK(operations(aligned_stages(table, **set, CutModel::none), "mill") == 0);
     }
   }
 }
@@ -127,7 +145,7 @@ TEST_CASE("the corners that a contact visits are the products of its sum") {
     Counted::products = 0;
     static_cast<void>(contact_sum<CountingNumbers>(
         block.image.grid, std::span<const Gradient<CountingNumbers>>(field), tool.offsets, pose));
-    CHECK(3 * operations(gather_cost(NumericKind::fixed, kScalarSet, tool, block, CutModel::none),
+    CHECK(3 * operations(any_pose_stages(gather_method(), "scalar", tool, block, CutModel::none),
                          "contact") ==
           Counted::products);
   }
@@ -144,7 +162,8 @@ TEST_CASE("a splatting tick does no more than it is said to, in any pose and any
       const std::size_t width = overlap_width(tool.size_vox, kVoxelMm, kVoxelMm);
       memory.hold({width, width, width}, tool.offsets.size());
       const SplatScratch scratch = memory.view();
-      const PlanCost cost = splat_cost(kScalarSet, tool, block, CutModel::overlap_exact);
+      const std::vector<StageCost> cost =
+          any_pose_stages(splat_method(), "scalar", tool, block, CutModel::overlap_exact);
       CHECK(operations(cost, "place") == 9 * tool.offsets.size());
       CHECK(operations(cost, "splat") == 8 * tool.offsets.size());
       const std::array loops{"copy", "press", "bend", "cut"};
@@ -190,8 +209,8 @@ TEST_CASE("a gathering tick that cuts works on no more voxels than it is said to
     const SceneVolume block = full_block(edge);
     for (const SceneTool& tool : {shape("cylinder", 0.5, 4), shape("wheel", 1.5, 0.8),
                                   shape("flame", 0.6, 3), shape("cylinder", 1, 2)}) {
-      const PlanCost cost =
-          gather_cost(NumericKind::float64, kScalarSet, tool, block, CutModel::overlap);
+      const std::vector<StageCost> cost =
+          any_pose_stages(gather_method(), "double", tool, block, CutModel::overlap);
       // A sample's place twice, its weights and their sums; the rest of `overlap` are voxels.
       const std::uint64_t spread = (2 * 9 + 2 * 8) * tool.offsets.size();
       std::vector<double> memory(std::size_t{50} * 50 * 50);
@@ -241,7 +260,7 @@ TEST_CASE("a scene is planned with what the servo allows the probes of a tick") 
   LoadedScene scene = half_space_scene(48);
   scene.tools = {shape("wheel", 2, 1)};
   const auto queries_of = [&] {
-    return operations(plan_scene(scene)->costs().ticks.front().cost, "probes");
+    return operations(plan_scene(scene)->costs().ticks.front().stages, "probes");
   };
   const std::uint64_t alone = queries_of();
   scene.volumes.push_back(scene.volumes.front());
@@ -250,7 +269,7 @@ TEST_CASE("a scene is planned with what the servo allows the probes of a tick") 
   CHECK(queries_of() <= alone);
 }
 
-TEST_CASE("every stage of every plan has a price, on machines of all kinds") {
+TEST_CASE("every stage of every method has a price, on machines of all kinds") {
   const SceneVolume block = full_block(32);
   const SceneTool cone = shape("cone", 0.6, 2);
   for (const char* name : {"avx512", "avx2", "neon", "scalar"}) {
@@ -259,37 +278,53 @@ TEST_CASE("every stage of every plan has a price, on machines of all kinds") {
     const AlignedTool aligned(ball(10).offsets, kExactFarid, set);
     for (const CutModel cut :
          {CutModel::none, CutModel::overlap, CutModel::overlap_exact, CutModel::preston}) {
-      CHECK(work_us(aligned_cost(aligned.table(), set, cut)) > 0);
-      CHECK(work_us(splat_cost(set, cone, block, cut)) > 0);
-      const bool gathers = cut == CutModel::none;  // fixed point, where nothing is cut
-      if (gathers) CHECK(work_us(gather_cost(NumericKind::fixed, set, cone, block, cut)) > 0);
-      CHECK(work_us(gather_cost(NumericKind::float32, set, cone, block, cut)) > 0);
-      CHECK(work_us(gather_cost(NumericKind::float64, set, cone, block, cut)) > 0);
+      CHECK(work_us(aligned_stages(aligned.table(), set, cut)) > 0);
+      const auto work = [&](const ToolMethod& method, const char* runs_it) {
+        return work_us(any_pose_stages(method, runs_it, cone, block, cut));
+      };
+      CHECK(work(splat_method(), name) > 0);
+      if (cut == CutModel::none) CHECK(work(gather_method(), name) > 0);  // fixed point
+      CHECK(work(gather_method(), "float") > 0);
+      CHECK(work(gather_method(), "double") > 0);
     }
   }
+  for (const char* name : {"avx512", "avx2", "neon", "scalar", "float", "double"}) {
+    CHECK(work_us(probe_stage(1, name)) > 0);
+  }
+  CHECK_THROWS_AS(static_cast<void>(probe_stage(1, "abacus")), std::logic_error);
 }
 
-TEST_CASE("every stage is timed, and does there no more than it is said to") {
+TEST_CASE("the servo's own tick is timed, and does there no more than it is said to") {
   for (const auto numeric : {NumericKind::fixed, NumericKind::float32, NumericKind::float64}) {
-    for (const auto cut :
-         {CutModel::none, CutModel::overlap, CutModel::overlap_exact, CutModel::preston}) {
-      LoadedScene scene = half_space_scene(48);
-      if (cut != CutModel::preston) scene.force.model = ForceModel::paper;
-      scene.tools.push_back(shape("cone", 0.6, 2));
-      scene.cut.model = cut;
-      scene.cut.rate_per_s = 0;  // timed all the same
-      scene.servo.numeric = numeric;
-      const auto servo = compile(scene);
-      const auto& ticks = servo->costs().ticks;
-      REQUIRE(ticks.size() == 2);
-      for (std::size_t i = 0; i < ticks.size(); ++i) {
-        const std::vector<StageCost>& stages = ticks[i].cost.stages;
-        const std::vector<StageTime> timed = servo->time_stages(i);
-        REQUIRE(timed.size() == stages.size());
-        for (std::size_t s = 0; s < stages.size(); ++s) {
-          CAPTURE(stages[s].stage);
-          CHECK(timed[s].operations > 0);
-          CHECK(timed[s].operations <= stages[s].operations);
+    for (const auto force : {ForceModel::paper, ForceModel::proxy}) {
+      for (const auto cut :
+           {CutModel::none, CutModel::overlap, CutModel::overlap_exact, CutModel::preston}) {
+        if (cut == CutModel::preston && force == ForceModel::paper) continue;
+        LoadedScene scene = half_space_scene(48);
+        scene.force.model = force;
+        scene.tools.push_back(shape("cone", 0.6, 2));
+        scene.cut.model = cut;
+        scene.cut.rate_per_s = 0;  // timed all the same
+        scene.servo.numeric = numeric;
+        const auto servo = compile(scene);
+        const auto& ticks = servo->costs().ticks;
+        REQUIRE(ticks.size() == 2);
+        for (std::size_t i = 0; i < ticks.size(); ++i) {
+          CAPTURE(ticks[i].variant());
+          const std::vector<StageCost>& most = ticks[i].stages;
+          const TickTime timed = servo->time_tick(i);
+          CHECK(timed.median_us > 0);
+          CHECK(timed.p99_us >= timed.median_us);
+          REQUIRE(timed.stages.size() == most.size());
+          for (std::size_t s = 0; s < most.size(); ++s) {
+            CAPTURE(most[s].stage);
+            CHECK(std::string(timed.stages[s].stage) == most[s].stage);
+            CHECK(timed.stages[s].operations > 0);
+            CHECK(timed.stages[s].operations <= most[s].operations);
+          }
+          // The drive is no idle one: it finds its way to where the probes cost most.
+          if (force == ForceModel::proxy)
+            CHECK(2 * timed.stages[0].operations > most[0].operations);
         }
       }
     }

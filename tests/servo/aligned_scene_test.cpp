@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The plan `aligned` inside the servo step: the forces of double, whatever plan each tool has.
+// The method `aligned` inside the servo step: the forces of double, whatever method each tool has.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -10,7 +10,7 @@
 
 #include <doctest/doctest.h>
 
-#include "controller/plan/plan_choice.hpp"
+#include "controller/plan/method/methods.hpp"
 #include "controller/scene/scene_error.hpp"
 #include "controller/tool/tool_shapes.hpp"
 #include "tests/servo/support.hpp"
@@ -19,6 +19,10 @@ using namespace kerf;
 using namespace kerf::test;
 
 namespace {
+
+Method method_of(const LoadedScene& scene, const SceneTool& tool, const SceneVolume& volume) {
+  return choose_method({scene, tool, volume, kScalarSet}).method->step;
+}
 
 constexpr double kFullScaleN = 0.06 * std::numbers::pi;  // the peak of p0 pi R^2
 
@@ -132,10 +136,10 @@ TEST_CASE("a tool that does not turn runs aligned in a standing volume, and igno
   };
   const LoadedScene unturned = scene_of(false), turning = scene_of(true);
   const SceneVolume& volume = unturned.volumes[0];
-  REQUIRE(choose_plan(unturned, unturned.tools[0], volume).plan == Plan::aligned);
-  REQUIRE(choose_plan(turning, turning.tools[0], volume).plan == Plan::splat);
+  REQUIRE(method_of(unturned, unturned.tools[0], volume) == Method::aligned);
+  REQUIRE(method_of(turning, turning.tools[0], volume) == Method::splat);
 
-  for (const bool turns : {false, true}) {  // by the plan `aligned`, by the plan `splat`
+  for (const bool turns : {false, true}) {  // by the method `aligned`, by the method `splat`
     Pair pair([&] { return scene_of(turns); });
     double deepest_n = 0;
     for (int i = 0; i < 40; ++i) {
@@ -154,7 +158,7 @@ TEST_CASE("a tool that does not turn runs aligned in a standing volume, and igno
 TEST_CASE("a tool that no sum of fixed-point numbers can hold is refused with a way out") {
   const auto refusal = [](const LoadedScene& scene) -> std::string {
     try {
-      static_cast<void>(choose_plan(scene, scene.tools[0], scene.volumes[0]));
+      static_cast<void>(method_of(scene, scene.tools[0], scene.volumes[0]));
     } catch (const SceneError& error) {
       return error.what();
     }
@@ -188,8 +192,8 @@ TEST_CASE("an unturned tool needs the volume's axes to be the world's") {
   scene.tools[1].turns = false;
   scene.volumes[0].pose.orientation = {0, 0, std::sin(0.1), std::cos(0.1)};
   const SceneVolume& volume = scene.volumes[0];
-  CHECK(choose_plan(scene, scene.tools[0], volume).plan == Plan::aligned);  // round
-  CHECK(choose_plan(scene, scene.tools[1], volume).plan == Plan::splat);
+  CHECK(method_of(scene, scene.tools[0], volume) == Method::aligned);  // round
+  CHECK(method_of(scene, scene.tools[1], volume) == Method::splat);
   scene.cut.model = CutModel::none;
-  CHECK(choose_plan(scene, scene.tools[1], volume).plan == Plan::gather);
+  CHECK(method_of(scene, scene.tools[1], volume) == Method::gather);
 }

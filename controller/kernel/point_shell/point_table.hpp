@@ -19,7 +19,7 @@ inline constexpr std::int32_t kPointGroup = 16;        ///< samples that lie tog
 inline constexpr std::int32_t kMaxShellPoints = 8192;  ///< sums then fit 53 bits
 
 /// A tool's samples, axis by axis in the tool's axes, padded to whole groups. Made at load
-/// (controller/plan/tool_points.hpp); points into the maker's memory.
+/// (controller/plan/tables/tool_points.hpp); points into the maker's memory.
 template <class N>
 struct PointTable {
   const PointNumber<N>* offset[3] = {};  ///< from the tool's centre, over its reach; Q0.15

@@ -6,9 +6,9 @@
 
 #include "controller/kernel/kernel_set.hpp"
 
-// What the plans `aligned` and `splat` do with their box of voxels, one text for AVX2, AVX-512 and
-// NEON. Included only by their translation units, each of which defines `Simd`: a vector type V and
-// its operations. All of it has internal linkage, for the reason given at KernelSet.
+// What the methods `aligned` and `splat` do with their box of voxels, one text for AVX2, AVX-512
+// and NEON. Included only by their translation units, each of which defines `Simd`: a vector type V
+// and its operations. All of it has internal linkage, for the reason given at KernelSet.
 
 namespace kerf {
 namespace {

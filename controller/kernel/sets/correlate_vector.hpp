@@ -6,7 +6,7 @@
 
 #include "controller/kernel/sets/box_vector.hpp"
 
-// The vector kernels of the plan `aligned`: correlation and overlap by tables. As box_vector.hpp.
+// The vector kernels of the method `aligned`: correlation and overlap by tables. As box_vector.hpp.
 
 namespace kerf {
 namespace {

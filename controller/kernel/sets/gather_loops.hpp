@@ -7,7 +7,8 @@
 #include "controller/kernel/sets/sample_place.hpp"
 #include "shared/volume/voxel_grid.hpp"
 
-// Contact of the plan `gather` as plain loops; internal linkage, for the reason given at KernelSet.
+// Contact of the method `gather` as plain loops; internal linkage, for the reason given at
+// KernelSet.
 
 namespace kerf {
 namespace {

@@ -7,7 +7,7 @@
 #include "controller/kernel/sets/sample_place.hpp"
 #include "shared/volume/voxel_grid.hpp"
 
-// Contact of the plan `gather` for AVX2 and AVX-512; `Simd` as in box_vector.hpp.
+// Contact of the method `gather` for AVX2 and AVX-512; `Simd` as in box_vector.hpp.
 
 namespace kerf {
 namespace {

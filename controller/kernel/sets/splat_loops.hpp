@@ -8,9 +8,9 @@
 #include "controller/kernel/sets/sample_place.hpp"
 #include "controller/kernel/splat_table.hpp"
 
-// The plan `splat` as loops that a compiler turns into vectors, one text for every instruction set.
-// Included after the set's own `filter_z`, `press_row` and `RowSums`; internal linkage, for the
-// reason given at KernelSet.
+// The method `splat` as loops that a compiler turns into vectors, one text for every instruction
+// set. Included after the set's own `filter_z`, `press_row` and `RowSums`; internal linkage, for
+// the reason given at KernelSet.
 
 namespace kerf {
 namespace {

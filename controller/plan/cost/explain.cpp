@@ -2,32 +2,25 @@
 #include "controller/plan/cost/explain.hpp"
 
 #include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <cstdio>
 #include <utility>
 
 #include "controller/plan/cost/work_budget.hpp"
 #include "controller/scene/scene_words.hpp"
+#include "shared/posix/provenance.hpp"
 #include "shared/text/json.hpp"
 
 namespace kerf {
 namespace {
 
-/// Both predictions, or none.
-std::optional<double> sum_of(std::optional<double> a, std::optional<double> b) {
-  return a && b ? std::optional(*a + *b) : std::nullopt;
+std::uint64_t operations(const StageCost& stage) {
+  return stage.operations;
 }
-
-/// The stages of a tick in one.
-ExplainedStage sum_of(const ExplainedTick& tick) {
-  ExplainedStage sum{{"tick", 0}, 0, 0, 0.0, 0};
-  for (const ExplainedStage& stage : tick.stages) {
-    sum.cost.operations += stage.cost.operations;
-    sum.work_us += stage.work_us;
-    sum.timed_operations += stage.timed_operations;
-    sum.predicted_us = sum_of(sum.predicted_us, stage.predicted_us);
-    sum.measured_us += stage.measured_us;
-  }
+std::uint64_t operations(const std::vector<StageCost>& stages) {
+  std::uint64_t sum = 0;
+  for (const StageCost& stage : stages) sum += stage.operations;
   return sum;
 }
 
@@ -40,7 +33,7 @@ std::vector<ToolWork> works_of(const Explanation& explanation) {
   std::vector<ToolWork> works;
   for (const ExplainedTick& tick : explanation.ticks) {
     if (works.empty() || works.back().tool != tick.tool) works.push_back({tick.tool, 0});
-    works.back().us += sum_of(tick).work_us;
+    works.back().us += work_us(tick.most);
   }
   return works;
 }
@@ -58,12 +51,14 @@ std::string format(const char* pattern, Values... values) {
   return text;
 }
 
-std::string stage_line(const ExplainedStage& stage) {
-  const auto count = [](std::uint64_t n) { return static_cast<unsigned long long>(n); };
-  return format("  %-14s%12llu%12.2f%12llu", stage.cost.stage, count(stage.cost.operations),
-                stage.work_us, count(stage.timed_operations)) +
-         (stage.predicted_us ? format("%14.2f", *stage.predicted_us) : format("%14s", "-")) +
-         format("%14.2f\n", stage.measured_us);
+/// Of a stage, or of a whole tick.
+template <class Work>
+std::string work_line(const char* name, const Work& most, const Work& timed, double factor) {
+  const auto count = [](const Work& work) {
+    return static_cast<unsigned long long>(operations(work));
+  };
+  return format("  %-14s%12llu%12.2f%12llu%14.2f", name, count(most), work_us(most), count(timed),
+                factor * work_us(timed));
 }
 
 /// Bytes, KiB or MiB, whichever reads best.
@@ -75,11 +70,14 @@ std::string memory_line(const std::string& name, std::uint64_t bytes) {
                 mega ? "MiB" : (kilo ? "KiB" : "B"));
 }
 
-std::string tick_text(const ExplainedTick& tick) {
+std::string tick_text(const ExplainedTick& tick, double factor) {
   std::string text =
       "\n" + tick.tool + " in " + tick.volume + ": " + tick.variant + " (" + tick.why + ")\n";
-  for (const ExplainedStage& stage : tick.stages) text += stage_line(stage);
-  return text + stage_line(sum_of(tick));
+  for (std::size_t s = 0; s < tick.most.size(); ++s) {
+    text += work_line(tick.most[s].stage, tick.most[s], tick.time.stages[s], factor) + "\n";
+  }
+  return text + work_line("tick", tick.most, tick.time.stages, factor) +
+         format("%14.2f%10.2f\n", tick.time.median_us, tick.time.p99_us);
 }
 
 std::string budget_text(const Explanation& e) {
@@ -118,47 +116,42 @@ std::vector<ArrayBytes> segment_arrays(const SegmentPlan& plan, const LoadedScen
   return arrays;
 }
 
-Explanation explain(const LoadedScene& scene, CompiledScene& servo, const SegmentPlan& segment,
-                    const Calibration& calibration) {
+Explanation explain(const LoadedScene& scene, CompiledScene& servo, const SegmentPlan& segment) {
   const SceneCosts& costs = servo.costs();
   Explanation explanation{.scene = scene.path,
                           .numeric = std::string(word_of(scene.servo.numeric)),
                           .cut = std::string(word_of(scene.cut.model)),
-                          .machine = calibration.machine,
+                          .machine = processor_name(),
                           .rate_hz = scene.servo.rate_hz,
                           .budget_us = work_budget_us(scene),
                           .ticks = {},
                           .arrays = costs.arrays};
   for (ArrayBytes& array : segment_arrays(segment, scene))
     explanation.arrays.push_back(std::move(array));
+  double measured_us = 0, timed_us = 0;
   for (std::size_t i = 0; i < costs.ticks.size(); ++i) {
     const TickCost& tick = costs.ticks[i];
-    ExplainedTick& out = explanation.ticks.emplace_back();
-    out.tool = scene.tools[tick.tool].name;
-    out.volume = scene.volumes[tick.volume].name;
-    out.variant = tick.cost.variant;
-    out.why = tick.choice.why;
-    const std::vector<StageTime> timed = servo.time_stages(i);
-    for (std::size_t s = 0; s < timed.size(); ++s) {
-      const StageCost& stage = tick.cost.stages[s];
-      out.stages.push_back(
-          {stage, work_us(tick.cost, stage), timed[s].operations,
-           calibration.stage_us(tick.cost.variant, {stage.stage, timed[s].operations}),
-           timed[s].us});
-    }
+    const TickTime time = servo.time_tick(i);
+    measured_us += time.median_us;
+    timed_us += work_us(time.stages);
+    explanation.ticks.push_back({scene.tools[tick.tool].name, scene.volumes[tick.volume].name,
+                                 tick.variant(), tick.choice.why, tick.stages, time});
   }
+  explanation.machine_factor = measured_us / timed_us;
   return explanation;
 }
 
 std::string explanation_text(const Explanation& e) {
   std::string text = e.scene + ": " + std::to_string(e.rate_hz) + " Hz, " + e.numeric +
                      " numbers, cut " + e.cut + "\n\n";
-  text += format("  %-14s%12s%12s%12s%14s%14s\n", "", "at most", "work us", "timed", "predicted us",
-                 "measured us");
-  for (const ExplainedTick& tick : e.ticks) text += tick_text(tick);
+  text += format("  %-14s%12s%12s%12s%14s%14s%10s\n", "", "at most", "work us", "timed",
+                 "predicted us", "measured us", "p99");
+  for (const ExplainedTick& tick : e.ticks) text += tick_text(tick, e.machine_factor);
   text +=
       "\nat most: operations of any tick; work: their price on the reference machine\n"
-      "timed: operations inside the densest part; predicted, measured: of them on this machine\n";
+      "timed: operations of a tick at its worst; predicted: their price, times " +
+      format("%.2f for this machine\n", e.machine_factor) +
+      "measured: median and p99 of that tick, as the servo computes it\n";
   text += budget_text(e);
   text += "\nmemory\n";
   for (const ArrayBytes& array : e.arrays) text += memory_line(array.name, array.bytes);
@@ -167,28 +160,28 @@ std::string explanation_text(const Explanation& e) {
 }
 
 std::string explanation_json(const Explanation& e) {
+  const auto figures = [&](Json json, const auto& most, const auto& timed) {
+    json["operations"] = operations(most);
+    json["work_us"] = work_us(most);
+    json["timed_operations"] = operations(timed);
+    json["predicted_us"] = e.machine_factor * work_us(timed);
+    return json;
+  };
   Json ticks = Json::List{};
   for (const ExplainedTick& tick : e.ticks) {
+    const std::vector<StageCost>& timed = tick.time.stages;
     Json stages = Json::List{};
-    for (const ExplainedStage& stage : tick.stages) {
-      stages.push_back({{"stage", stage.cost.stage},
-                        {"operations", stage.cost.operations},
-                        {"work_us", stage.work_us},
-                        {"timed_operations", stage.timed_operations},
-                        {"predicted_us", stage.predicted_us},
-                        {"measured_us", stage.measured_us}});
+    for (std::size_t s = 0; s < tick.most.size(); ++s) {
+      stages.push_back(figures({{"stage", tick.most[s].stage}}, tick.most[s], timed[s]));
     }
-    const ExplainedStage sum = sum_of(tick);
-    ticks.push_back({{"tool", tick.tool},
-                     {"volume", tick.volume},
-                     {"plan", tick.variant},
-                     {"why", tick.why},
-                     {"operations", sum.cost.operations},
-                     {"work_us", sum.work_us},
-                     {"timed_operations", sum.timed_operations},
-                     {"predicted_us", sum.predicted_us},
-                     {"measured_us", sum.measured_us},
-                     {"stages", stages}});
+    ticks.push_back(figures({{"tool", tick.tool},
+                             {"volume", tick.volume},
+                             {"plan", tick.variant},
+                             {"why", tick.why},
+                             {"measured_us", tick.time.median_us},
+                             {"measured_p99_us", tick.time.p99_us},
+                             {"stages", stages}},
+                            tick.most, timed));
   }
   Json tools = Json::List{};
   for (const ToolWork& work : works_of(e)) {
@@ -206,6 +199,7 @@ std::string explanation_json(const Explanation& e) {
                   {"numeric", e.numeric},
                   {"cut", e.cut},
                   {"machine", e.machine},
+                  {"machine_factor", e.machine_factor},
                   {"budget_us", e.budget_us},
                   {"tools", tools},
                   {"ticks", ticks},

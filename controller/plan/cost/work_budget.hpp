@@ -3,7 +3,6 @@
 
 #include <cstddef>
 #include <string>
-#include <string_view>
 
 #include "controller/load/loaded_scene.hpp"
 #include "controller/plan/scene_costs.hpp"
@@ -11,25 +10,13 @@
 namespace kerf {
 
 // Which scenes are too dear. Decided from counts of operations and from prices that are constants,
-// so that the same scene is taken or refused in every run, however busy the machine is. Predictions
-// of time for a person come from a calibration instead (controller/plan/cost/calibration.hpp).
-
-/// Price of one operation in ns on the reference machine, a core of 2024 at 4.4 GHz; rounded up
-/// from the dearest of the calibration's tools that `time_stages` gave there, but for NEON, which
-/// is guessed. Every stage of every plan has one.
-///
-/// `probes` are priced by the costliest ticks that `kerf lab extremes` finds, of tools of 500 to
-/// 1100 samples, and by probes inside of the solid, as `time_stages` has them.
-[[nodiscard]] double reference_price_ns(std::string_view variant, std::string_view stage);
+// so that the same scene is taken or refused in every run, however busy the machine is.
 
 /// Half of a tick: a machine half as fast as the reference still ends its ticks in time, and on the
 /// reference the other half is there for the device, the eyes and what else runs on the core.
 inline constexpr double kBudgetShare = 0.5;
 
-/// Work of a stage, of one tick of one tool in one volume, and of that tool in all volumes: us on
-/// the reference machine.
-[[nodiscard]] double work_us(const PlanCost& cost, const StageCost& stage);
-[[nodiscard]] double work_us(const PlanCost& cost);
+/// Work of one tick of a tool in all volumes: us on the reference machine.
 [[nodiscard]] double work_us(const SceneCosts& costs, std::size_t tool);
 
 /// The budget of a tick in the same unit.

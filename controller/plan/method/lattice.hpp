@@ -9,7 +9,7 @@
 
 #include "controller/kernel/tool_offset.hpp"
 #include "controller/load/loaded_scene.hpp"
-#include "controller/plan/matrices.hpp"
+#include "controller/plan/method/matrices.hpp"
 
 namespace kerf {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/plan/covered_bound.hpp"
+#include "controller/plan/method/covered_bound.hpp"
 
 #include <algorithm>
 #include <bit>
@@ -8,7 +8,7 @@
 #include <numbers>
 
 #include "controller/kernel/cover_table.hpp"
-#include "controller/plan/turned_box.hpp"
+#include "controller/plan/method/turned_box.hpp"
 #include "shared/volume/voxel_grid.hpp"
 
 namespace kerf {
@@ -103,14 +103,6 @@ std::size_t most_covered(const SceneTool& tool, const SceneVolume& volume) {
   const auto& h = volume.image.spacing_mm;
   const double by_hull = GrownHull(tool, volume).volume(1.0 / 3) / (h[0] * h[1] * h[2]);
   return std::min(by_box, static_cast<std::size_t>(by_hull));
-}
-
-std::size_t most_covered(const AlignedTable& table) {
-  std::size_t covered = 0;
-  each_covered_word(table, [&](std::int32_t, std::uint32_t bits) {
-    covered += static_cast<std::size_t>(std::popcount(bits));
-  });
-  return covered;
 }
 
 std::size_t most_groups(const SceneTool& tool, const SceneVolume& volume) {

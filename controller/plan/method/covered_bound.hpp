@@ -22,11 +22,9 @@ namespace kerf {
 /// counts.
 [[nodiscard]] std::size_t most_covered(const SceneTool& tool, const SceneVolume& volume);
 
-/// By a tool of the plan `aligned`, whose samples share one place within their cells: exact where
-/// they lie on no voxel's middle along any axis.
-[[nodiscard]] std::size_t most_covered(const AlignedTable& table);
-
-/// How many groups of kCoverGroup neighbours those voxels lie in, the same two ways.
+/// How many groups of kCoverGroup neighbours those voxels lie in; by the table of a tool of the
+/// method `aligned`, whose samples share one place within their cells, exact where they lie on no
+/// voxel's middle along any axis.
 ///
 /// Groups begin at a covered voxel, so a row that spans w voxels has (w + 15) / 16 at most. The
 /// rows are no more than the shadow of the grown hull along x has room for, and their spans

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/plan/aligned_tool.hpp"
+#include "controller/plan/tables/aligned_tool.hpp"
 
 #include <algorithm>
 #include <cstdlib>

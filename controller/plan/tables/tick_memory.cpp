@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/plan/tick_memory.hpp"
+#include "controller/plan/tables/tick_memory.hpp"
 
 namespace kerf {
 

@@ -14,14 +14,14 @@
 
 namespace kerf {
 
-/// True when the plan `aligned` can hold these samples: on one lattice of whole pitches, no two at
-/// the same place, at most kMaxAlignedEdge along each axis, at least one.
+/// True when the method `aligned` can hold these samples: on one lattice of whole pitches, no two
+/// at the same place, at most kMaxAlignedEdge along each axis, at least one.
 [[nodiscard]] bool can_align(std::span<const ToolOffset> offsets);
 
 /// The taps of a gradient kernel as exact sums take them.
 [[nodiscard]] const ExactTaps& exact_taps(GradientKernel kernel);
 
-/// Owner of one tool's table for the plan `aligned`. Load time; moving it keeps the table valid.
+/// Owner of one tool's table for the method `aligned`. Load time; moving it keeps the table valid.
 class AlignedTool {
  public:
   /// Requires `can_align(offsets)`.

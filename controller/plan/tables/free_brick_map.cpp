@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/plan/free_brick_map.hpp"
+#include "controller/plan/tables/free_brick_map.hpp"
 
 #include <algorithm>
 

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/plan/tool_points.hpp"
+#include "controller/plan/tables/tool_points.hpp"
 
 #include <algorithm>
 #include <cassert>
 #include <cmath>
 
-#include "controller/plan/sample_offset.hpp"
+#include "controller/plan/tables/sample_offset.hpp"
 
 namespace kerf {
 namespace {

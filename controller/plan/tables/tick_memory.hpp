@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "controller/kernel/splat_table.hpp"
-#include "controller/plan/scene_costs.hpp"
+#include "controller/plan/tables/array_bytes.hpp"
 
 namespace kerf {
 
@@ -26,13 +26,13 @@ class BoxMemory {
   std::vector<std::uint8_t> live_;
 };
 
-/// Owner of the working memory of the plan `splat`, which all tools share. Load time.
+/// Owner of the working memory of the method `splat`, which all tools share. Load time.
 class SplatMemory {
  public:
   /// Makes room for a tool that cuts and whose samples touch at most `width_vox` voxels along each
   /// axis, in any orientation (`overlap_width`).
   void hold(const std::array<std::size_t, 3>& width_vox, std::size_t samples);
-  /// The part that the plan `aligned` uses.
+  /// The part that the method `aligned` uses.
   [[nodiscard]] BoxMemory& tick() noexcept { return tick_; }
   [[nodiscard]] SplatScratch view() noexcept;
   /// All arrays by name.

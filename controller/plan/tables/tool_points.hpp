@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "controller/kernel/proxy/contact_query.hpp"
-#include "controller/plan/close_cells.hpp"
+#include "controller/plan/tables/close_cells.hpp"
 
 namespace kerf {
 

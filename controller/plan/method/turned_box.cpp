@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/plan/turned_box.hpp"
+#include "controller/plan/method/turned_box.hpp"
 
 #include <algorithm>
 #include <array>
@@ -11,7 +11,7 @@
 #include <span>
 #include <tuple>
 
-#include "controller/plan/lattice.hpp"
+#include "controller/plan/method/lattice.hpp"
 
 namespace kerf {
 namespace {

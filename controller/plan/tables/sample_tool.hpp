@@ -18,7 +18,7 @@ enum class SampleOrder {
   scattered,  ///< neighbours are far apart: no addition waits for the one before it
 };
 
-/// Owner of one tool's samples for the plans `gather` and `splat`. Load time; moving it keeps the
+/// Owner of one tool's samples for the methods `gather` and `splat`. Load time; moving it keeps the
 /// table valid.
 class SampleTool {
  public:

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/plan/close_cells.hpp"
+#include "controller/plan/tables/close_cells.hpp"
 
 #include <algorithm>
 
-#include "controller/plan/sample_offset.hpp"
+#include "controller/plan/tables/sample_offset.hpp"
 
 namespace kerf {
 

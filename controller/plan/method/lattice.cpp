@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/plan/lattice.hpp"
+#include "controller/plan/method/lattice.hpp"
 
 #include <algorithm>
 #include <cstddef>

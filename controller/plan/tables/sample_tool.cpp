@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/plan/sample_tool.hpp"
+#include "controller/plan/tables/sample_tool.hpp"
 
 #include <numeric>
 

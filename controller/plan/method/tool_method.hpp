@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "controller/kernel/aligned_table.hpp"
+#include "controller/kernel/kernel_set.hpp"
+#include "controller/kernel/sample_table.hpp"
+#include "controller/load/loaded_scene.hpp"
+#include "controller/plan/method/method_memory.hpp"
+#include "controller/plan/method/stage_cost.hpp"
+#include "controller/plan/method/sum_unit.hpp"
+#include "controller/servo/servo_plan.hpp"
+
+namespace kerf {
+
+/// A tool in a solid volume of a scene, and the kernels that run the loop.
+struct ToolCase {
+  const LoadedScene& scene;
+  const SceneTool& tool;
+  const SceneVolume& volume;
+  const KernelSet& kernels;
+};
+
+/// What the operations of a tick depend on, besides the box that the tool fills.
+struct TickShape {
+  std::size_t samples = 0;
+  VoxelGrid grid{};
+  CutModel cut = CutModel::none;
+  bool swept = false;                   ///< the proxy is felt, so a method has no `contact`
+  std::string_view runs_it;             ///< name of the kernels, or "float" or "double"
+  const AlignedTable* table = nullptr;  ///< of the method `aligned`
+};
+
+/// One way to compute contact and cut of a tool in a volume, as load time knows it: when it serves,
+/// what memory it takes and what it costs. Its step is in controller/servo (method_step.hpp).
+///
+/// A new method is a file that defines one of these, its line in methods.cpp, and its step. What it
+/// does not say is that of a method that does nothing in a tick.
+class ToolMethod {
+ public:
+  Method step;
+  const char* name;
+  /// What would let a cheaper method serve, for a person; empty where there is none.
+  const char* advice;
+
+  /// Why it serves; nothing where it does not. The scene alone decides, never the machine. Throws
+  /// SceneError for a tool that its integers cannot hold.
+  [[nodiscard]] virtual std::optional<std::string> serves(const ToolCase& in) const = 0;
+
+  /// Tells `memory` what its step needs in volume `v` of the plan; returns the table of the method
+  /// `aligned`, for others none.
+  virtual const AlignedTable* hold(const ToolCase& /*in*/, std::size_t /*v*/,
+                                   MethodMemory& /*memory*/) const {
+    return nullptr;
+  }
+
+  /// What its step's sums count.
+  [[nodiscard]] virtual SumUnits sums(const LoadedScene& /*scene*/, std::size_t /*samples*/) const {
+    return {gathered_sum(1), gathered_sum(1)};
+  }
+
+  /// Its own stages in a tick in which the cells of all samples lie in a box of this size, in low
+  /// corners as TickBox::size, whatever the speed and the content. The box may be larger than the
+  /// volume.
+  [[nodiscard]] virtual std::vector<StageCost> stages(const TickShape& /*shape*/,
+                                                      VoxelIndex /*box*/) const {
+    return {};
+  }
+
+ protected:
+  constexpr ToolMethod(Method step, const char* name, const char* advice) noexcept
+      : step(step), name(name), advice(advice) {}
+  ~ToolMethod() = default;
+};
+
+}  // namespace kerf
