@@ -118,7 +118,7 @@ Scene read_scene(const TomlNode& root, const std::filesystem::path& path, SceneK
 }  // namespace
 
 Scene parse_scene(std::string_view text, const std::filesystem::path& path, SceneKeys keys) {
-  return read_scene(parse_toml(text, path.string()), path, keys);
+  return read_scene(parse_toml_tree(text, path.string()), path, keys);
 }
 
 Scene parse_scene_file(const std::filesystem::path& path) {

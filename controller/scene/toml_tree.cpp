@@ -59,7 +59,7 @@ const TomlNode* TomlNode::find(std::string_view path) const {
   return dot == path.npos ? &*found : found->find(path.substr(dot + 1));
 }
 
-TomlNode parse_toml(std::string_view text, const std::string& file) {
+TomlNode parse_toml_tree(std::string_view text, const std::string& file) {
   const toml::parse_result parsed = toml::parse(text, file);
   if (parsed) return node_of(parsed.table());
   const toml::parse_error& error = parsed.error();

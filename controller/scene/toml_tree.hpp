@@ -31,7 +31,7 @@ struct TomlNode {
 };
 
 /// Throws SceneError `file:line:column: what; way out` where the text is no TOML. Load time.
-[[nodiscard]] TomlNode parse_toml(std::string_view text, const std::string& file);
+[[nodiscard]] TomlNode parse_toml_tree(std::string_view text, const std::string& file);
 
 /// The value as one would write it in the file; empty for none.
 [[nodiscard]] std::string written(const TomlValue& value);
