@@ -186,7 +186,7 @@ TEST_CASE("a scene loads a mesh from beside its file, and tells what is wrong wi
             ":6: tool.radius_mm = 1 is given with a mesh, which has its own size; leave it "
             "out, or set scale (mm per unit of the file)");
   CHECK(error("shape = \"ball\"\nsize_vox = 4\nfile = \"bur.stl\"\n")
-            .find("tool.file = \"bur.stl\" is of shape = \"stl\"") != std::string::npos);
+            .find("tool.file = \"bur.stl\" is of the shape stl") != std::string::npos);
   CHECK(error("shape = \"stl\"\nfile = \"bur.stl\"\nscale = 10\n")
             .find("tool.file = \"bur.stl\" makes a tool of 100 samples along a side") !=
         std::string::npos);
