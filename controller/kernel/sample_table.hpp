@@ -7,8 +7,8 @@
 namespace kerf {
 
 /// A tool's samples for kernels of any vector width: offsets in half pitches, axis by axis. Made at
-/// load (controller/plan/tables/sample_tool.hpp); points into the maker's memory. Each array goes on to a
-/// whole number of `kSampleGroup` with copies of a sample, which no kernel may count.
+/// load (controller/plan/tables/sample_tool.hpp); points into the maker's memory. Each array goes
+/// on to a whole number of `kSampleGroup` with copies of a sample, which no kernel may count.
 struct SampleTable {
   const std::int32_t* offset[3] = {};
   std::int32_t count = 0;

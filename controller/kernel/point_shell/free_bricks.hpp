@@ -15,8 +15,8 @@ inline constexpr std::int32_t kFreeBrick = 2;
 /// has the Chebyshev distance, in bricks, to the nearest one with density: 0 if it has some itself,
 /// at most 255.
 ///
-/// Made at load (controller/plan/tables/free_brick_map.hpp). Cutting only takes density away, so the map
-/// is a lower bound for ever and needs no update. Points into the maker's memory.
+/// Made at load (controller/plan/tables/free_brick_map.hpp). Cutting only takes density away, so
+/// the map is a lower bound for ever and needs no update. Points into the maker's memory.
 struct FreeBricks {
   VoxelGrid grid;                          ///< of bricks
   const std::uint8_t* distance = nullptr;  ///< none: nothing is known to be free

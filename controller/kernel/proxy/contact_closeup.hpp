@@ -27,8 +27,8 @@ inline constexpr std::int32_t kMostInCell = 32;
 /// A tool's surface in close samples: the rim or the point of a tool on a sharp edge touches in
 /// less than the spacing of the point shell's own samples.
 ///
-/// Sorted by cells, x fastest. Made at load (controller/plan/tables/close_cells.hpp); points into the
-/// maker's memory. A ball has none.
+/// Sorted by cells, x fastest. Made at load (controller/plan/tables/close_cells.hpp); points into
+/// the maker's memory. A ball has none.
 template <class N>
 struct CloseTable {
   const PointNumber<N>* offset[3] = {};  ///< from the tool's centre, over its reach; Q0.15
