@@ -28,7 +28,7 @@ struct Take {
   }
   void operator()(int* into) const {
     const bool whole = std::holds_alternative<std::int64_t>(node.value);
-    if (!whole) refuse(place, " is not a whole number; write one");
+    if (!whole) refuse(place, " is not a whole number; write one without point or exponent");
     *into = static_cast<int>(number(node));
   }
   void operator()(double* into) const {

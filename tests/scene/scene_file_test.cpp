@@ -189,9 +189,11 @@ TEST_CASE("of several unknown keys the first in the file is reported") {
 
 TEST_CASE("a value of the wrong type is reported with its line") {
   CHECK(error_after("[servo]\nrate_hz = \"fast\"\n") ==
-        "scenes/x.toml:7: servo.rate_hz = \"fast\" is not a whole number; write one");
+        "scenes/x.toml:7: servo.rate_hz = \"fast\" is not a whole number; write one without point "
+        "or exponent");
   CHECK(error_after("[servo]\nrate_hz = 1000.5\n") ==
-        "scenes/x.toml:7: servo.rate_hz = 1000.5 is not a whole number; write one");
+        "scenes/x.toml:7: servo.rate_hz = 1000.5 is not a whole number; write one without point or "
+        "exponent");
   CHECK(error_after("[limits]\nforce_n = \"3 N\"\n") ==
         "scenes/x.toml:7: limits.force_n = \"3 N\" is not a number; write one without quotes or "
         "unit");

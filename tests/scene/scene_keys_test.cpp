@@ -66,7 +66,7 @@ struct Samples {
       wrong.push_back({std::to_string(std::llround(out)), " is out of range; use "});
     }
     for (const char* value : {"100.5", "nan", "inf", "\"100\"", "true", "[100]", "1979-05-27"}) {
-      wrong.push_back({value, " is not a whole number; write one"});
+      wrong.push_back({value, " is not a whole number; write one without point or exponent"});
     }
   }
   void operator()(const double*) {
