@@ -19,15 +19,18 @@ namespace {
 
 /// CLI::Range takes "nan" for a number in any range, and names the type once more.
 CLI::Validator range(double lowest, double highest) {
-  std::ostringstream limits;
-  limits.precision(15);
-  limits << "[" << lowest << " - " << highest << "]";
-  const auto check = [=, limits = limits.str()](const std::string& text) {
-    const auto value = number_in(text);
-    return value && *value >= lowest && *value <= highest ? std::string()
-                                                          : text + " is no number in " + limits;
+  const auto limits = [=](const char* between) {
+    std::ostringstream text;
+    text.precision(15);
+    text << lowest << between << highest;
+    return text.str();
   };
-  return {check, limits.str()};
+  const auto check = [=, limits = limits(" to ")](const std::string& text) {
+    const auto value = number_in(text);
+    if (value && *value >= lowest && *value <= highest) return std::string();
+    return text + " is not a number in the range " + limits;
+  };
+  return {check, "[" + limits(" - ") + "]"};
 }
 
 /// CLI::IsMember for words; as a template of the library it costs seconds to compile.
