@@ -20,7 +20,7 @@ std::string text_of(double value) {
 
 }  // namespace
 
-double TomlTable::checked(const toml::node& node, const std::string& key, Range range) const {
+double TomlTable::checked(const toml::node& node, const std::string& key, TomlRange range) const {
   if (!node.is_number()) fail(node, key, ": not a number; write one");
   const double value = *node.value<double>();
   const bool inside = std::isfinite(value) && value <= range.high &&

@@ -17,7 +17,7 @@
 namespace kerf {
 
 /// A range and how to say it.
-struct Range {
+struct TomlRange {
   double low;
   double high;
   bool above_low = false;  ///< `low` itself is refused
@@ -49,14 +49,14 @@ class TomlTable {
 
   [[nodiscard]] bool has(std::string_view key) const { return table_.contains(key); }
 
-  [[nodiscard]] double number(std::string_view key, double otherwise, Range range) const {
+  [[nodiscard]] double number(std::string_view key, double otherwise, TomlRange range) const {
     const toml::node* node = table_.get(key);
     return node == nullptr ? otherwise : checked(*node, std::string(key), range);
   }
 
   template <std::size_t N>
   [[nodiscard]] std::array<double, N> numbers(std::string_view key, std::array<double, N> otherwise,
-                                              Range range) const {
+                                              TomlRange range) const {
     const toml::node* node = table_.get(key);
     if (node == nullptr) return otherwise;
     const toml::array* list = node->as_array();
@@ -88,7 +88,8 @@ class TomlTable {
   }
 
  private:
-  [[nodiscard]] double checked(const toml::node& node, const std::string& key, Range range) const;
+  [[nodiscard]] double checked(const toml::node& node, const std::string& key,
+                               TomlRange range) const;
 
   const toml::table& table_;
   std::string place_;

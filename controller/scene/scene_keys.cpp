@@ -148,7 +148,7 @@ constexpr SceneKey kKeys[] = {
      "Coulomb coefficient of the tool on the surface", kProxy},
 
     {"cut.model", "", at<&CutSettings::model>, one_of(kCutModelWords),
-     "preston: the force cuts; overlap: what is covered goes at a rate; overlap_exact: in any tick",
+     "preston: the force cuts; overlap: what is covered goes at a rate; overlap_exact: the same at any rate",
      {}, {.default_text = "\"preston\"; with the paper's force \"overlap\""}},
     {"cut.rate_per_s", "1/s", at<&CutSettings::rate_per_s>, between(0, 100000, kCutRateWords),
      "share of what is covered that goes; 1/T: all of it in each tick, as in the paper",

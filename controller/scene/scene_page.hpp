@@ -11,7 +11,7 @@ namespace kerf {
 [[nodiscard]] std::string scene_keys_page(SceneKeys keys = scene_keys());
 
 /// Every setting in effect, one line `table.key=value` each, values as a scene writes them. A key
-/// that the scene's choices leave no meaning, or that has no value, is left out.
+/// that the scene would refuse, or that has no value, is left out.
 [[nodiscard]] std::string settings_text(const Scene& scene, SceneKeys keys = scene_keys());
 
 }  // namespace kerf

@@ -20,9 +20,9 @@ constexpr double kMaxTurns = 10'000;
 constexpr double kMaxUnitMm = 100;
 constexpr double kMaxDegrees = 360;
 
-constexpr Range kLength{-kMaxLength, kMaxLength};
-constexpr Range kSize{0, kMaxLength};
-constexpr Range kSeconds{0, kMaxSeconds, true};
+constexpr TomlRange kLength{-kMaxLength, kMaxLength};
+constexpr TomlRange kSize{0, kMaxLength};
+constexpr TomlRange kSeconds{0, kMaxSeconds, true};
 
 HandStep step_of(const TomlTable& table) {
   table.allow_only({"move_mm", "hold", "circle_mm", "zigzag_mm", "seconds", "ease", "turns",

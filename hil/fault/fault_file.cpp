@@ -30,7 +30,7 @@ bool has_ms(FaultKind kind) {
   return kind == FaultKind::delay || kind == FaultKind::host_late;
 }
 
-int whole(const TomlTable& table, std::string_view key, int otherwise, Range range) {
+int whole(const TomlTable& table, std::string_view key, int otherwise, TomlRange range) {
   const double value = table.number(key, otherwise, range);
   if (value != std::floor(value)) {
     table.fail(": " + std::string(key) + " is not whole; use a whole number");

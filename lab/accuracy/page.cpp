@@ -37,7 +37,7 @@ of white noise of deviation one.)",
           {"storage",
            R"(## What is stored beside the density
 
-Int16 gradients are the servo's method `gather`, `aligned` its plan for round tools, `splat` that for any
+Int16 gradients are the servo's method `gather`, `aligned` its method for round tools, `splat` that for any
 tool in scenes that cut (its time holds the modification force, too). `spline 2` and `spline 3` are the
 exact derivative of the density's quadratic and cubic B-spline: their accuracy is the reference, their
 time is not. The last row has voxels half as wide: compare it with that of `gather` in "Voxel edge".)",

@@ -90,8 +90,7 @@ struct DensityField {
 ///   v  of gradients: w; for balls 3 w - w / r, half the derivative of their peak at the iso, times
 ///      SUM w
 ///   u  of offsets: w; for balls w r. Where density begins trilinear reads are raised, in bands
-///   where
-///      the normal is near an axis of the voxels, and with w they would tilt a ball's normal
+///      where the normal is near an axis of the voxels, and with w they would tilt a ball's normal
 ///
 /// In fixed r is Q15, weights are Q24, gradients are in the volume's densities over 2, offsets in
 /// Q0.15. All sums are exact, |sum| < 2^53, so no order and no instruction set matters.

@@ -150,7 +150,7 @@ std::string explanation_text(const Explanation& e) {
   text +=
       "\nat most: operations of any tick; work: their price on the reference machine\n"
       "timed: operations of a tick at its worst; predicted: their price, times " +
-      format("%.2f for this machine\n", e.machine_factor) +
+      format("%.2f, which fits these ticks on this machine\n", e.machine_factor) +
       "measured: median and p99 of that tick, as the servo computes it\n";
   text += budget_text(e);
   text += "\nmemory\n";
