@@ -41,42 +41,34 @@ std::ptrdiff_t index_of(const std::array<std::string_view, N>& words, const std:
   return std::ranges::find(words, word) - words.begin();
 }
 
-}  // namespace
-
-std::optional<int> parse_options(int argc, const char* const* argv, ControllerOptions& options) {
-  CommandLine app(kAbout, "kerf-controller", "kerf-controller " KERF_VERSION);
-  app.footer(kExitCodes);
-
-  std::string volume;
-  std::vector<double> spacing_mm;
-  std::vector<double> window;
+/// Values of options that belong to the scene, as they are written; empty where they are not given.
+struct Raw {
+  std::vector<double> spacing_mm, window, torque_scale;
   int rate_hz = 0;
-  std::string numeric;
-  std::string device;
-  std::vector<double> torque_scale;
+  std::string numeric, device;
+  bool scene_keys = false;
+};
+
+/// What is touched, held and run.
+void declare_scene_options(Arguments& app, ControllerOptions& options, Raw& raw) {
   app.option("--scene", options.scene, "scene file (TOML)").shown_as("FILE");
-  const Option volume_option =
-      app.option("--volume", volume,
-                 "replace the first volume: NRRD, MetaImage, NIfTI, DICOM folder")
-          .shown_as("FILE");
-  const Option spacing_option =
-      app.option("--spacing", spacing_mm, "voxel size of that volume in mm: one number or three")
-          .values(1, 3)
-          .shown_as("A[,B,C]");
-  const Option window_option =
-      app.option("--window", window, "source values shown as air and as densest")
-          .values(2, 2)
-          .shown_as("LO,HI");
-  const Option device_option =
-      app.option("--device", device, "what is held, instead of the scene's")
-          .one_of(words_of(kPersonalityWords))
-          .shown_as("NAME");
-  const Option torque_option =
-      app.option("--torque-scale", torque_scale,
-                 "N mm at the joint per motor count, instead of the scene's")
-          .values(3, 3)
-          .within(-kMaxTorqueScale, kMaxTorqueScale)
-          .shown_as("A,B,C");
+  app.option("--volume", options.overrides.volume_file,
+             "replace the first volume: NRRD, MetaImage, NIfTI, DICOM folder")
+      .shown_as("FILE");
+  app.option("--spacing", raw.spacing_mm, "voxel size of that volume in mm: one number or three")
+      .values(1, 3)
+      .shown_as("A[,B,C]");
+  app.option("--window", raw.window, "source values shown as air and as densest")
+      .values(2, 2)
+      .shown_as("LO,HI");
+  app.option("--device", raw.device, "what is held, instead of the scene's")
+      .one_of(words_of(kPersonalityWords))
+      .shown_as("NAME");
+  app.option("--torque-scale", raw.torque_scale,
+             "N mm at the joint per motor count, instead of the scene's")
+      .values(3, 3)
+      .within(-kMaxTorqueScale, kMaxTorqueScale)
+      .shown_as("A,B,C");
   app.option("--port", options.port,
              "where the device is: auto; fw, usb or hid, each [:NODE or :SERIAL]; usb also "
              "[,firmware=FILE]; socket:PATH or udp:[ADDRESS:]PORT of kerf-emulator")
@@ -86,12 +78,15 @@ std::optional<int> parse_options(int argc, const char* const* argv, ControllerOp
              "end after this much servo time, counted from arming; of --probe, from its start")
       .within(0.01, kLongestS)
       .shown_as("S");
-  const Option rate_option = app.option("--rate", rate_hz, "servo rate, instead of the scene's")
-                                 .within(250, 8000)
-                                 .shown_as("HZ");
-  const Option numeric_option =
-      app.option("--numeric", numeric, "numbers of the loop, instead of the scene's")
-          .one_of(words_of(kNumericWords));
+  app.option("--rate", raw.rate_hz, "servo rate, instead of the scene's")
+      .within(250, 8000)
+      .shown_as("HZ");
+  app.option("--numeric", raw.numeric, "numbers of the loop, instead of the scene's")
+      .one_of(words_of(kNumericWords));
+}
+
+/// How it runs, and what else can be asked.
+void declare_run_options(Arguments& app, ControllerOptions& options, Raw& raw) {
   app.option("--name", options.name, "name under which readers find the segment").shows_default();
   app.flag("--virtual", options.virtual_time,
            "lock-step with the device, no clock: the same input gives the same bits");
@@ -111,8 +106,7 @@ std::optional<int> parse_options(int argc, const char* const* argv, ControllerOp
   const Option check_flag = app.flag(
       "--check", options.check,
       "load and check the scene, whether its rate fits too, print it and every setting, and end");
-  bool scene_keys = false;
-  app.flag("--scene-keys", scene_keys,
+  app.flag("--scene-keys", raw.scene_keys,
            "print every key of a scene file as a page of Markdown, and end");
   const Option explain_flag =
       app.flag("--explain", options.explain,
@@ -131,61 +125,76 @@ std::optional<int> parse_options(int argc, const char* const* argv, ControllerOp
   app.option("--emulator-args", options.emulator_args,
              "write hand_unit_mm, hand_script and rate_hz once the scene is loaded")
       .shown_as("FILE");
+}
 
-  try {
-    if (!app.parse(argc, argv, std::cout)) return 0;
-  } catch (const UsageError& error) {
-    std::cerr << "kerf-controller: " << error.what() << '\n';
-    return 2;
+/// What is wrong with the options together; empty: nothing.
+std::string wrong_with(const ControllerOptions& options, const Raw& raw) {
+  if (raw.spacing_mm.size() == 2) {
+    return "--spacing has 2 numbers; give one for all axes, or three";
   }
-  if (scene_keys) {
-    std::cout << scene_keys_page();
-    return 0;
+  for (const double edge_mm : raw.spacing_mm) {
+    if (!(edge_mm > 0)) return "--spacing: a voxel edge is above 0 mm, for example 0.125";
   }
-  const auto refuse = [](const std::string& line) {
-    std::cerr << "kerf-controller: " << line << '\n';
-    return 2;
-  };
-  if (spacing_option.given() && spacing_mm.size() == 2) {
-    return refuse("--spacing has 2 numbers; give one for all axes, or three");
-  }
-  for (const double edge_mm : spacing_mm) {
-    if (!(edge_mm > 0)) return refuse("--spacing: a voxel edge is above 0 mm, for example 0.125");
-  }
-  for (const double scale : torque_scale) {
+  for (const double scale : raw.torque_scale) {
     if (std::abs(scale) < kMinTorqueScale) {
-      return refuse(
-          "--torque-scale is below 0.001 N mm per count; leave it out to keep the motors off");
+      return "--torque-scale is below 0.001 N mm per count; leave it out to keep the motors off";
     }
   }
   if (options.scene.empty() && !options.probe) {
-    return refuse("--scene is missing; try scenes/phantom.toml");
+    return "--scene is missing; try scenes/phantom.toml";
   }
-  if (options.probe && !options.port.empty() && options.scene.empty() && !device_option.given()) {
-    return refuse("--probe: which device? give --device, or a --scene that says it");
+  if (options.probe && !options.port.empty() && options.scene.empty() && raw.device.empty()) {
+    return "--probe: which device? give --device, or a --scene that says it";
   }
   const bool runs = !options.check && !options.explain && !options.probe;
   if (runs && options.port.empty()) {
-    return refuse("--port is missing; give auto, or socket:PATH, where kerf-emulator listens");
+    return "--port is missing; give auto, or socket:PATH, where kerf-emulator listens";
   }
-  if (!options.port.empty()) {
-    try {
-      check_port(options.port);
-    } catch (const std::runtime_error& error) {
-      return refuse(error.what());
+  try {
+    if (!options.port.empty()) check_port(options.port);
+  } catch (const std::runtime_error& error) {
+    return error.what();
+  }
+  return "";
+}
+
+void override_scene(const Raw& raw, SceneOverrides& scene) {
+  if (!raw.spacing_mm.empty()) scene.spacing_mm = three_of(raw.spacing_mm);
+  if (!raw.window.empty()) scene.window = std::array{raw.window[0], raw.window[1]};
+  if (raw.rate_hz != 0) scene.rate_hz = raw.rate_hz;
+  if (!raw.numeric.empty()) {
+    scene.numeric = static_cast<NumericKind>(index_of(kNumericWords, raw.numeric));
+  }
+  if (!raw.torque_scale.empty()) scene.torque_scale = three_of(raw.torque_scale);
+  if (!raw.device.empty()) {
+    scene.personality = static_cast<Personality>(index_of(kPersonalityWords, raw.device));
+  }
+}
+
+}  // namespace
+
+std::optional<int> parse_options(int argc, const char* const* argv, ControllerOptions& options) {
+  CommandLine app(kAbout, "kerf-controller", "kerf-controller " KERF_VERSION);
+  app.footer(kExitCodes);
+  Raw raw;
+  declare_scene_options(app, options, raw);
+  declare_run_options(app, options, raw);
+  std::string wrong;
+  try {
+    if (!app.parse(argc, argv, std::cout)) return 0;
+    if (raw.scene_keys) {
+      std::cout << scene_keys_page();
+      return 0;
     }
+    wrong = wrong_with(options, raw);
+  } catch (const UsageError& error) {
+    wrong = error.what();
   }
-  if (volume_option.given()) options.overrides.volume_file = volume;
-  if (spacing_option.given()) options.overrides.spacing_mm = three_of(spacing_mm);
-  if (window_option.given()) options.overrides.window = std::array{window[0], window[1]};
-  if (rate_option.given()) options.overrides.rate_hz = rate_hz;
-  if (numeric_option.given()) {
-    options.overrides.numeric = static_cast<NumericKind>(index_of(kNumericWords, numeric));
+  if (!wrong.empty()) {
+    std::cerr << "kerf-controller: " << wrong << '\n';
+    return 2;
   }
-  if (torque_option.given()) options.overrides.torque_scale = three_of(torque_scale);
-  if (device_option.given()) {
-    options.overrides.personality = static_cast<Personality>(index_of(kPersonalityWords, device));
-  }
+  override_scene(raw, options.overrides);
   return std::nullopt;
 }
 
