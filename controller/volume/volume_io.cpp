@@ -30,7 +30,7 @@
 // NrrdIO forgets memory where it refuses a file; that is its own to mend.
 extern "C" const char* __lsan_default_suppressions();   // NOLINT(bugprone-reserved-identifier)
 extern "C" const char* __lsan_default_suppressions() {  // NOLINT(bugprone-reserved-identifier)
-  return "leak:libITKNrrdIO\n";
+  return "leak:libITKNrrdIO\nleak:libITKMetaIO\n";
 }
 #endif
 
