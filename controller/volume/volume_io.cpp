@@ -27,7 +27,7 @@
 // size is checked before memory is taken, and no type is instantiated twelve times.
 
 #ifdef KERF_SANITIZED
-// NrrdIO forgets memory where it refuses a file; that is its own to mend.
+// NrrdIO and MetaIO forget memory where they refuse a file; that is their own to mend.
 extern "C" const char* __lsan_default_suppressions();   // NOLINT(bugprone-reserved-identifier)
 extern "C" const char* __lsan_default_suppressions() {  // NOLINT(bugprone-reserved-identifier)
   return "leak:libITKNrrdIO\nleak:libITKMetaIO\n";
