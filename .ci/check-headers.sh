@@ -61,8 +61,8 @@ fi
 
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
-compiler="clang++-16 -std=c++20 -I. -DKERF_VERSION=\"\" $(pkg-config --cflags epoxy imgui glfw3)"
-awk 'NF { print "#include <" $1 ">" }' <<<"$needs" >"$work/standard.hpp"
+compiler="clang++-16 -std=c++20 -I. $(pkg-config --cflags epoxy imgui glfw3)"
+awk 'BEGIN { print "#define KERF_VERSION \"\"" } NF { print "#include <" $1 ">" }' <<<"$needs" >"$work/standard.hpp"
 $compiler -x c++-header "$work/standard.hpp" -o "$work/standard.pch"
 # Tests may lean on nothing else either.
 failed=0
