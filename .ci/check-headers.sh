@@ -64,9 +64,11 @@ trap 'rm -rf "$work"' EXIT
 compiler="clang++-16 -std=c++20 -I. $(pkg-config --cflags epoxy imgui glfw3)"
 awk 'BEGIN { print "#define KERF_VERSION \"\"" } NF { print "#include <" $1 ">" }' <<<"$needs" >"$work/standard.hpp"
 $compiler -x c++-header "$work/standard.hpp" -o "$work/standard.pch"
-# Tests may lean on nothing else either.
+# Not compiled: parts of a kernel, whose including file says first which vectors they mean, and what
+# tests share, which CMake gives names of folders.
+parts='^tests/|^controller/kernel/sets/.*_(vector|loops)\.hpp$|^visualizer/cast/packet_'
 failed=0
-printf '%s\n' "${headers[@]}" | xargs -P "$(nproc)" -I{} sh -c \
+printf '%s\n' "${headers[@]}" | grep -vE "$parts" | xargs -P "$(nproc)" -I{} sh -c \
   "echo '#include \"{}\"' | $compiler -include-pch $work/standard.pch -fsyntax-only -x c++ - ||
    { echo 'check-headers: {}: does not stand alone' >&2; exit 1; }" || failed=1
 exit "$failed"

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstddef>
 
+#include "controller/kernel/exact_taps.hpp"
 #include "controller/kernel/gradient.hpp"
 #include "controller/kernel/wide_sum.hpp"
 
