@@ -52,7 +52,7 @@ TEST_CASE("the segment's parts fill it, and only what the scene names is there")
   }
 }
 
-TEST_CASE("what is predicted of a scene's ticks adds up to what was measured") {
+TEST_CASE("one factor, fitted to a scene's ticks, makes their work add up to what was measured") {
   LoadedScene scene = test::half_space_scene(48);
   scene.cut.model = CutModel::preston;
   scene.tools.push_back(test::ball(10));
