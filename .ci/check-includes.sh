@@ -20,8 +20,8 @@ controller/shell controller/shell/probe controller
 
 record
 
-hil hil/devmodel hil/front hil/front/fuse hil/front/firewire hil/front/usb hil/front/hid
-hil/front/uhid hil/front/usbip hil/fault hil/emulator
+hil hil/devmodel hil/front hil/front/fuse hil/front/firewire hil/front/usb hil/front/uhid
+hil/front/usbip hil/script hil/fault hil/program
 
 lab/rig lab/accuracy lab/extremes lab/faults lab/bench lab
 

@@ -11,8 +11,8 @@
 
 #include "controller/kernel/gradient.hpp"
 #include "controller/scene/tool_size.hpp"
-#include "controller/servo/personality.hpp"
 #include "shared/volume/voxel_grid.hpp"
+#include "shared/wire/personality.hpp"
 
 namespace kerf {
 

@@ -5,7 +5,7 @@
 
 #include "controller/scene/scene_key.hpp"
 #include "controller/scene/scene_words.hpp"
-#include "controller/servo/servo_limits.hpp"
+#include "shared/volume/scene_limits.hpp"
 
 namespace kerf {
 namespace {

@@ -7,8 +7,8 @@
 #include "controller/kernel/proxy/contact_space.hpp"
 #include "controller/servo/coupling.hpp"
 #include "controller/servo/proxy_contact.hpp"
-#include "controller/servo/servo_limits.hpp"
 #include "shared/numeric/vec.hpp"
+#include "shared/volume/scene_limits.hpp"
 
 namespace kerf {
 

@@ -7,7 +7,7 @@
 
 #include "controller/servo/kinematics/delta_arm.hpp"
 #include "controller/servo/kinematics/serial_arm.hpp"
-#include "controller/servo/personality.hpp"
+#include "shared/wire/personality.hpp"
 
 namespace kerf {
 

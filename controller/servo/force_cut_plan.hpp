@@ -9,7 +9,7 @@
 #include "controller/kernel/cutting_friction.hpp"
 #include "controller/kernel/preston.hpp"
 #include "controller/kernel/spindle.hpp"
-#include "controller/servo/servo_limits.hpp"
+#include "shared/volume/scene_limits.hpp"
 
 namespace kerf {
 

@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "controller/servo/servo_limits.hpp"
+#include "shared/volume/scene_limits.hpp"
 #include "shared/volume/voxel_grid.hpp"
 
 namespace kerf {

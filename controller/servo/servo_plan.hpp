@@ -14,10 +14,10 @@
 #include "controller/servo/device_plan.hpp"
 #include "controller/servo/force_cut_plan.hpp"
 #include "controller/servo/force_limits.hpp"
-#include "controller/servo/servo_limits.hpp"
 #include "controller/servo/sum_to_force.hpp"
 #include "controller/servo/supervisor.hpp"
 #include "controller/servo/velocity_window.hpp"
+#include "shared/volume/scene_limits.hpp"
 #include "shared/volume/voxel_grid.hpp"
 
 namespace kerf {

@@ -12,9 +12,9 @@
 #include "controller/shell/call_guard.hpp"
 #include "controller/shell/log_line.hpp"
 #include "controller/shell/motor_guard.hpp"
-#include "controller/shell/progress_bar.hpp"
 #include "controller/shell/publisher.hpp"
 #include "controller/shell/watchdog_thread.hpp"
+#include "shared/posix/progress_bar.hpp"
 
 namespace kerf {
 namespace {

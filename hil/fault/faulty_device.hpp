@@ -10,10 +10,10 @@
 #include <span>
 #include <vector>
 
-#include "hil/fault/fault_script.hpp"
+#include "hil/devmodel/emulator.hpp"
+#include "hil/devmodel/packet_device.hpp"
 #include "hil/fault/readings.hpp"
-#include "hil/front/emulator.hpp"
-#include "hil/front/packet_device.hpp"
+#include "hil/script/fault_script.hpp"
 
 namespace kerf {
 

@@ -4,7 +4,7 @@
 #include <atomic>
 #include <cstdint>
 
-#include "hil/front/packet_device.hpp"
+#include "hil/devmodel/packet_device.hpp"
 #include "hil/front/packet_link.hpp"
 #include "shared/numeric/histogram.hpp"
 

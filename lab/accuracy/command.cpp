@@ -6,12 +6,12 @@
 #include <ostream>
 #include <vector>
 
-#include "controller/shell/progress_bar.hpp"
 #include "lab/accuracy/export.hpp"
 #include "lab/accuracy/page.hpp"
 #include "lab/accuracy/plot.hpp"
 #include "lab/accuracy/study.hpp"
 #include "lab/rig/lab_run.hpp"
+#include "shared/posix/progress_bar.hpp"
 
 namespace kerf::accuracy {
 namespace {

@@ -8,8 +8,8 @@
 
 #include "controller/load/scene_load.hpp"
 #include "controller/scene/scene_error.hpp"
-#include "hil/emulator/hand_script_file.hpp"
 #include "hil/hil_error.hpp"
+#include "hil/script/hand_script_file.hpp"
 #include "lab/rig/points.hpp"
 
 namespace kerf::extremes {

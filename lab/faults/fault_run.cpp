@@ -11,11 +11,11 @@
 #include "controller/shell/servo_loop.hpp"
 #include "controller/shell/watchdog.hpp"
 #include "hil/devmodel/bus_cycle.hpp"
+#include "hil/devmodel/emulator.hpp"
 #include "hil/devmodel/falcon_model.hpp"
 #include "hil/devmodel/omni_model.hpp"
 #include "hil/devmodel/wooden_model.hpp"
 #include "hil/fault/faulty_device.hpp"
-#include "hil/front/emulator.hpp"
 #include "lab/faults/contract.hpp"
 #include "lab/rig/direct_port.hpp"
 

@@ -7,7 +7,7 @@
 
 #include "controller/load/loaded_scene.hpp"
 #include "hil/devmodel/hand_script.hpp"
-#include "hil/fault/fault_script.hpp"
+#include "hil/script/fault_script.hpp"
 
 namespace kerf::faults {
 

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "controller/device/port/packet_port.hpp"
-#include "hil/front/packet_device.hpp"
+#include "hil/devmodel/packet_device.hpp"
 
 namespace kerf {
 

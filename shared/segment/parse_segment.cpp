@@ -10,6 +10,7 @@
 #include "shared/segment/layout_table.hpp"
 #include "shared/segment/reader.hpp"
 #include "shared/segment/shared_words.hpp"
+#include "shared/volume/scene_limits.hpp"
 
 namespace kerf {
 namespace {
@@ -37,8 +38,8 @@ void check_header(const SegmentHeader& header, std::uint64_t bytes) {
   require(header.total_bytes == bytes, "total_bytes", header.total_bytes,
           std::to_string(bytes) + ", the size of the memory");
   require(header.tick_ns != 0, "tick_ns", header.tick_ns, "at least 1");
-  require(header.volume_count >= 1 && header.volume_count <= kMaxSegmentVolumes, "volume_count",
-          header.volume_count, "1 to " + std::to_string(kMaxSegmentVolumes));
+  require(header.volume_count >= 1 && header.volume_count <= kMaxVolumes, "volume_count",
+          header.volume_count, "1 to " + std::to_string(kMaxVolumes));
   require(inside(header.off_volume_table, header.volume_count, sizeof(VolumeDescriptor), bytes),
           "off_volume_table", header.off_volume_table, "a table inside the memory");
   const auto check_ring = [bytes](const std::string& name, std::uint64_t offset,

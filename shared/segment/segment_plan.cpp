@@ -7,6 +7,7 @@
 #include <string>
 
 #include "shared/segment/layout_table.hpp"
+#include "shared/volume/scene_limits.hpp"
 
 namespace kerf {
 namespace {
@@ -68,9 +69,9 @@ VolumeDescriptor describe(const SegmentVolumeSpec& volume) {
 }  // namespace
 
 SegmentPlan plan_segment(const SegmentSpec& spec) {
-  if (spec.volumes.empty() || spec.volumes.size() > kMaxSegmentVolumes) {
+  if (spec.volumes.empty() || spec.volumes.size() > kMaxVolumes) {
     throw SegmentError("segment: " + std::to_string(spec.volumes.size()) +
-                       " volumes; a scene has 1 to " + std::to_string(kMaxSegmentVolumes));
+                       " volumes; a scene has 1 to " + std::to_string(kMaxVolumes));
   }
   if (spec.scene_json.size() > kMaxSceneBytes) {
     throw SegmentError("segment: scene of " + std::to_string(spec.scene_json.size()) +

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "hil/emulator/hand_script_file.hpp"
 #include "hil/hil_error.hpp"
+#include "hil/script/hand_script_file.hpp"
 #include "tests/fuzz/text_fuzz.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

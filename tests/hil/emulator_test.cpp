@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "hil/front/emulator.hpp"
+#include "hil/devmodel/emulator.hpp"
 
 #include <array>
 #include <cmath>
@@ -11,7 +11,7 @@
 #include <doctest/doctest.h>
 
 #include "hil/devmodel/falcon_model.hpp"
-#include "hil/emulator/hand_script_file.hpp"
+#include "hil/script/hand_script_file.hpp"
 #include "shared/wire/falcon_packet.hpp"
 
 namespace {

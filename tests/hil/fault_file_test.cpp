@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "hil/fault/fault_file.hpp"
+#include "hil/script/fault_file.hpp"
 
 #include <string>
 

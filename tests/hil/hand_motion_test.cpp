@@ -8,7 +8,7 @@
 #include <doctest/doctest.h>
 
 #include "hil/devmodel/omni_model.hpp"
-#include "hil/emulator/hand_script_file.hpp"
+#include "hil/script/hand_script_file.hpp"
 
 namespace {
 

@@ -7,8 +7,8 @@
 #include <doctest/doctest.h>
 #include <unistd.h>
 
-#include "hil/emulator/hand_script_file.hpp"
 #include "hil/hil_error.hpp"
+#include "hil/script/hand_script_file.hpp"
 
 namespace {
 

@@ -13,11 +13,11 @@
 #include <doctest/doctest.h>
 #include <rapidcheck.h>
 
+#include "hil/devmodel/emulator.hpp"
 #include "hil/devmodel/falcon_model.hpp"
 #include "hil/devmodel/omni_model.hpp"
 #include "hil/devmodel/wooden_model.hpp"
-#include "hil/emulator/hand_script_file.hpp"
-#include "hil/front/emulator.hpp"
+#include "hil/script/hand_script_file.hpp"
 #include "tests/hil/model_runs.hpp"
 
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "hil/emulator/program.hpp"
+#include "hil/program/program.hpp"
 
 #include <atomic>
 #include <filesystem>

@@ -15,8 +15,8 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include "hil/devmodel/emulator.hpp"
 #include "hil/devmodel/falcon_model.hpp"
-#include "hil/front/emulator.hpp"
 #include "hil/front/socket.hpp"
 #include "hil/front/udp_server.hpp"
 #include "hil/hil_error.hpp"

@@ -16,8 +16,8 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include "hil/devmodel/emulator.hpp"
 #include "hil/devmodel/wooden_model.hpp"
-#include "hil/front/emulator.hpp"
 #include "hil/front/uhid/uhid_arm.hpp"
 #include "shared/wire/wooden_packet.hpp"
 #include "tests/hil/serve_for.hpp"

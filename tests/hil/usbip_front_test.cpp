@@ -16,8 +16,8 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include "hil/devmodel/emulator.hpp"
 #include "hil/devmodel/falcon_model.hpp"
-#include "hil/front/emulator.hpp"
 #include "hil/front/usbip/usbip_falcon.hpp"
 #include "shared/wire/falcon_packet.hpp"
 #include "tests/hil/serve_for.hpp"

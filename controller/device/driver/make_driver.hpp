@@ -4,7 +4,7 @@
 #include <memory>
 
 #include "controller/device/driver/device_driver.hpp"
-#include "controller/servo/personality.hpp"
+#include "shared/wire/personality.hpp"
 
 namespace kerf {
 

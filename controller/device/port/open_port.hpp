@@ -6,7 +6,7 @@
 #include <string>
 
 #include "controller/device/port/packet_port.hpp"
-#include "controller/servo/personality.hpp"
+#include "shared/wire/personality.hpp"
 
 namespace kerf {
 

@@ -15,7 +15,7 @@
 #include "controller/plan/tables/aligned_tool.hpp"
 #include "controller/plan/tables/sample_tool.hpp"
 #include "controller/plan/tables/tick_memory.hpp"
-#include "controller/servo/servo_limits.hpp"
+#include "shared/volume/scene_limits.hpp"
 
 namespace kerf {
 

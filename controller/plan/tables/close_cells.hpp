@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "controller/kernel/proxy/contact_closeup.hpp"
+#include "controller/kernel/point_shell/close_table.hpp"
 
 namespace kerf {
 

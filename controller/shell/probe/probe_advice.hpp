@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "controller/servo/personality.hpp"
 #include "controller/shell/probe/probe_nodes.hpp"
+#include "shared/wire/personality.hpp"
 
 namespace kerf {
 

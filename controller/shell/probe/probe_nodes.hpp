@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "controller/servo/personality.hpp"
+#include "shared/wire/personality.hpp"
 
 namespace kerf {
 

@@ -5,12 +5,12 @@
 #include <span>
 #include <vector>
 
+#include "hil/devmodel/packet_device.hpp"
 #include "hil/front/firewire/agenda.hpp"
 #include "hil/front/firewire/bus_clock.hpp"
 #include "hil/front/firewire/iso_context.hpp"
 #include "hil/front/firewire/iso_resources.hpp"
 #include "hil/front/firewire/omni_registers.hpp"
-#include "hil/front/packet_device.hpp"
 
 namespace kerf {
 

@@ -4,8 +4,8 @@
 #include <cstdint>
 #include <span>
 
-#include "hil/front/hid/wooden_hid.hpp"
 #include "hil/front/kernel_device.hpp"
+#include "hil/front/usb/wooden_hid.hpp"
 
 namespace kerf {
 

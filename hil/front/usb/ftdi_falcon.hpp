@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "hil/front/packet_device.hpp"
+#include "hil/devmodel/packet_device.hpp"
 #include "hil/front/usb/falcon_boot_loader.hpp"
 #include "hil/front/usb/usb_setup.hpp"
 #include "hil/front/usb/usb_time.hpp"

@@ -4,7 +4,7 @@
 #include <cstdint>
 
 #include "hil/devmodel/bus_cycle.hpp"
-#include "hil/front/packet_device.hpp"
+#include "hil/devmodel/packet_device.hpp"
 #include "shared/posix/monotonic_clock.hpp"
 
 namespace kerf {

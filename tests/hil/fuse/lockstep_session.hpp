@@ -6,7 +6,7 @@
 
 #include "controller/device/driver/omni_driver.hpp"
 #include "controller/device/port/firewire_port.hpp"
-#include "hil/emulator/hand_script_file.hpp"
+#include "hil/script/hand_script_file.hpp"
 #include "tests/hil/fuse/mounted_node.hpp"
 #include "tests/servo/support.hpp"
 

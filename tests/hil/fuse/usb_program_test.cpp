@@ -10,7 +10,7 @@
 #include <doctest/doctest.h>
 
 #include "controller/device/port/open_port.hpp"
-#include "hil/emulator/program.hpp"
+#include "hil/program/program.hpp"
 #include "shared/wire/falcon_packet.hpp"
 #include "shared/wire/wooden_packet.hpp"
 #include "tests/hil/fuse/mounted_node.hpp"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "hil/emulator/bus_options.hpp"
+#include "hil/program/bus_options.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "hil/emulator/emulator_options.hpp"
+#include "hil/program/emulator_options.hpp"
 
 #include <algorithm>
 #include <array>
@@ -8,6 +8,7 @@
 #include "hil/devmodel/bus_cycle.hpp"
 #include "hil/hil_error.hpp"
 #include "shared/wire/wooden_constants.hpp"
+#include "shared/wire/personality.hpp"
 
 namespace kerf {
 namespace {
@@ -143,7 +144,7 @@ void declare(Arguments& app, EmulatorOptions& o) {
 
 void check(const EmulatorOptions& o) {
   check_known("--personality", o.personality,
-              std::array<std::string_view, 3>{"omni", "falcon", "woodenhaptics"});
+              kPersonalityWords);
   check_device(o);
   if (!o.describe) check_front(o);
 }

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "hil/fault/fault_file.hpp"
+#include "hil/script/fault_file.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <random>
 
-#include "hil/toml_table.hpp"
+#include "hil/script/toml_table.hpp"
 
 namespace kerf {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "hil/emulator/run_report.hpp"
+#include "hil/program/run_report.hpp"
 
 #include <array>
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <string_view>
 
-#include "hil/fault/fault_script.hpp"
+#include "hil/script/fault_script.hpp"
 
 namespace kerf {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "hil/emulator/program.hpp"
+#include "hil/program/program.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -9,22 +9,22 @@
 #include <string>
 #include <utility>
 
+#include "hil/devmodel/emulator.hpp"
 #include "hil/devmodel/falcon_model.hpp"
 #include "hil/devmodel/omni_model.hpp"
 #include "hil/devmodel/wooden_model.hpp"
-#include "hil/emulator/emulator_options.hpp"
-#include "hil/emulator/fuse_front.hpp"
-#include "hil/emulator/hand_script_file.hpp"
-#include "hil/emulator/kernel_front.hpp"
-#include "hil/emulator/run_report.hpp"
-#include "hil/fault/fault_file.hpp"
 #include "hil/fault/faulty_device.hpp"
-#include "hil/front/emulator.hpp"
 #include "hil/front/real_time.hpp"
 #include "hil/front/seqpacket_server.hpp"
 #include "hil/front/socket.hpp"
 #include "hil/front/udp_server.hpp"
 #include "hil/hil_error.hpp"
+#include "hil/program/emulator_options.hpp"
+#include "hil/program/fuse_front.hpp"
+#include "hil/program/kernel_front.hpp"
+#include "hil/program/run_report.hpp"
+#include "hil/script/fault_file.hpp"
+#include "hil/script/hand_script_file.hpp"
 #include "shared/text/command_line.hpp"
 
 namespace kerf {

@@ -6,7 +6,7 @@
 #include <optional>
 #include <string>
 
-#include "hil/emulator/bus_options.hpp"
+#include "hil/program/bus_options.hpp"
 #include "shared/text/command_line.hpp"
 
 namespace kerf {

@@ -12,7 +12,7 @@
 #include "hil/devmodel/hand_motion.hpp"
 #include "hil/devmodel/hand_script.hpp"
 #include "hil/devmodel/omni_model.hpp"
-#include "hil/front/packet_device.hpp"
+#include "hil/devmodel/packet_device.hpp"
 
 namespace kerf {
 

@@ -4,11 +4,11 @@
 #include <string>
 #include <vector>
 
-#include "hil/emulator/bus_service.hpp"
 #include "hil/front/firewire/firewire_bus.hpp"
-#include "hil/front/hid/wooden_hid.hpp"
 #include "hil/front/usb/ftdi_falcon.hpp"
 #include "hil/front/usb/usb_fault.hpp"
+#include "hil/front/usb/wooden_hid.hpp"
+#include "hil/program/bus_service.hpp"
 
 namespace kerf {
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <iostream>
 
-#include "hil/emulator/program.hpp"
+#include "hil/program/program.hpp"
 #include "shared/posix/stop_signals.hpp"
 
 int main(int argc, char** argv) {

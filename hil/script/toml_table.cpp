@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "hil/toml_table.hpp"
+#include "hil/script/toml_table.hpp"
 
 #include <cmath>
 #include <fstream>

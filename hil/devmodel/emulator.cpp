@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "hil/front/emulator.hpp"
+#include "hil/devmodel/emulator.hpp"
 
 #include <algorithm>
 

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <iosfwd>
 
-#include "hil/front/packet_device.hpp"
+#include "hil/devmodel/packet_device.hpp"
 #include "hil/front/socket.hpp"
 
 namespace kerf {

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "hil/emulator/fuse_front.hpp"
+#include "hil/program/fuse_front.hpp"
 
 #include <ostream>
 #include <utility>
 
 #include "hil/front/firewire/firewire_node.hpp"
 #include "hil/front/fuse/fuse_mount.hpp"
-#include "hil/front/hid/hidraw_node.hpp"
+#include "hil/front/usb/hidraw_node.hpp"
 #include "hil/front/usb/usbfs_node.hpp"
 
 namespace kerf {

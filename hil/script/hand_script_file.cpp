@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "hil/emulator/hand_script_file.hpp"
+#include "hil/script/hand_script_file.hpp"
 
 #include <array>
 #include <cmath>
 #include <string>
 #include <string_view>
 
-#include "hil/toml_table.hpp"
+#include "hil/script/toml_table.hpp"
 #include "shared/wire/omni_constants.hpp"
 
 namespace kerf {

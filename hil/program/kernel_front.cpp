@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "hil/emulator/kernel_front.hpp"
+#include "hil/program/kernel_front.hpp"
 
 #include <ostream>
 #include <utility>

@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "hil/front/packet_device.hpp"
+#include "hil/devmodel/packet_device.hpp"
 #include "hil/front/usb/usb_fault.hpp"
 #include "hil/front/usb/usb_time.hpp"
 #include "shared/wire/wooden_constants.hpp"

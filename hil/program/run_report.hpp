@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <string>
 
-#include "hil/front/emulator.hpp"
+#include "hil/devmodel/emulator.hpp"
 #include "hil/front/socket.hpp"
 
 namespace kerf {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "hil/front/hid/hidraw_node.hpp"
+#include "hil/front/usb/hidraw_node.hpp"
 
 #include <algorithm>
 #include <cerrno>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "hil/front/hid/wooden_hid.hpp"
+#include "hil/front/usb/wooden_hid.hpp"
 
 namespace kerf {
 

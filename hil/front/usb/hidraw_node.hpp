@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "hil/front/fuse/fuse_node.hpp"
-#include "hil/front/hid/wooden_hid.hpp"
+#include "hil/front/usb/wooden_hid.hpp"
 
 namespace kerf {
 
