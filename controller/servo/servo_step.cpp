@@ -9,6 +9,7 @@
 
 #include "controller/kernel/penetration.hpp"
 #include "controller/servo/device_pose.hpp"
+#include "controller/servo/force_cut.hpp"
 #include "controller/servo/tool_forces.hpp"
 #include "shared/numeric/fnv1a.hpp"
 

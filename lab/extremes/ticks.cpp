@@ -83,11 +83,10 @@ void measure_ticks(const Effort& effort, const RowSink& add_row) {
     state.pose = {place_of<N>({200, 80, 128}), {}};
     // Half a unit a tick: 50 mm/s.
     const auto place = [&](int i) { return bench::around(kGrid, 16, i, 580); };
-    for (int i = 0; i < 40; ++i)
-      bench::use(follow(plan, state, rig.field(), goal_at(place(0))).queries);
+    for (int i = 0; i < 40; ++i) bench::use(rig.follow(plan, state, goal_at(place(0))).queries);
     const TickTimes times = time_ticks(
         effort.tick_count, [] {},
-        [&](int i) { bench::use(follow(plan, state, rig.field(), goal_at(place(i))).queries); });
+        [&](int i) { bench::use(rig.follow(plan, state, goal_at(place(i))).queries); });
     row("proxy, sliding at 50 mm/s: p50", times.p50_ns / 1e3, 15, 6);
     row("proxy, sliding at 50 mm/s: p99", times.p99_ns / 1e3, std::nullopt);
   }

@@ -38,7 +38,7 @@ class Stopwatch {
       after = tick.from;
       rig_.field().begin_tick();
       const auto start = Clock::now();
-      const ProxyContact<N> felt = follow(plan_, after, rig_.field(), tick.goal);
+      const ProxyContact<N> felt = rig_.follow(plan_, after, tick.goal);
       bench::use(felt.spring.x.raw());
       const double ns = std::chrono::duration<double, std::nano>(Clock::now() - start).count();
       fastest_ns = std::min(fastest_ns, ns);

@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "controller/kernel/proxy/contact_query.hpp"
-#include "controller/kernel/proxy/proxy_sweep.hpp"
 #include "controller/plan/tables/free_brick_map.hpp"
 #include "controller/plan/tables/tool_points.hpp"
+#include "controller/servo/proxy_contact.hpp"
 #include "controller/tool/surface_samples.hpp"
 #include "controller/tool/tool_shapes.hpp"
 #include "lab/rig/body.hpp"
@@ -48,24 +48,14 @@ template <class N>
 template <class N>
 class ContactRig {
  public:
-  explicit ContactRig(const SampledTool& tool, const KernelSet& kernels = **kernel_sets())
-      : kernels_(kernels), tool_(tool.samples, tool.round, tool.close), shell_(tool_.shell()) {}
-  ContactRig(const SampledTool& tool, const Body& body) : ContactRig(tool) {
-    add(body, plain_frame<N>());
-  }
+  explicit ContactRig(const SampledTool& tool, const KernelSet& kernels = **kernel_sets());
+  ContactRig(const SampledTool& tool, const Body& body);
   ContactRig(const ContactRig&) = delete;
   ContactRig& operator=(const ContactRig&) = delete;
 
-  void add(const Body& body, const ContactFrame<N>& frame, Density iso = kIso) {
-    constexpr Density kFeltShare = 8;  // a density below this part of the iso is not felt
-    maps_.emplace_back(body.grid, body.density, static_cast<Density>(iso / kFeltShare));
-    memories_.emplace_back().hold(shell_);
-    volumes_.push_back({{body.grid, body.density.data(), density_scale(iso), maps_.back().bricks()},
-                        frame,
-                        memories_.back().places()});
-    query_.emplace(kernels_, shell_, volumes_);
-    query_->turn({});
-  }
+  void add(const Body& body, const ContactFrame<N>& frame, Density iso = kIso);
+  /// One tick of the swept contact, as in the servo.
+  ProxyContact<N> follow(const ProxyPlan<N>& plan, ProxyState<N>& state, const ProxyPose<N>& goal);
 
   /// What a sweep asks.
   [[nodiscard]] ContactQuery<N>& field() { return *query_; }

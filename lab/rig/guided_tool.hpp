@@ -12,17 +12,10 @@ namespace kerf::extremes {
 template <class N>
 class GuidedTool {
  public:
-  GuidedTool(const SampledTool& tool, const Body& body, Point start, double friction = 0)
-      : rig_(tool, body), pose_{place_of<N>(start), {}}, friction_(friction) {}
+  GuidedTool(const SampledTool& tool, const Body& body, Point start, double friction = 0);
 
   /// The spring from the hand to the proxy: the force over the stiffness.
-  Point tick(Point hand, const ToolTurn<N>& turn = {}) {
-    rig_.field().begin_tick();
-    swept_ = ProxySweep<N, ContactQuery<N>>(rig_.field(), pose_, friction_, rig_.turn_step())
-                 .tick({place_of<N>(hand), turn});
-    most_queries_ = std::max(most_queries_, swept_.queries);
-    return proxy() - hand;
-  }
+  Point tick(Point hand, const ToolTurn<N>& turn = {});
 
   /// Takes the proxy to a place that is free.
   void start(Point at) { pose_.centre = place_of<N>(at); }

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "lab/rig/contact_rig.hpp"
+
+namespace kerf::extremes {
+
+template <class N>
+ContactRig<N>::ContactRig(const SampledTool& tool, const KernelSet& kernels)
+    : kernels_(kernels), tool_(tool.samples, tool.round, tool.close), shell_(tool_.shell()) {}
+
+template <class N>
+ContactRig<N>::ContactRig(const SampledTool& tool, const Body& body) : ContactRig(tool) {
+  add(body, plain_frame<N>());
+}
+
+template <class N>
+void ContactRig<N>::add(const Body& body, const ContactFrame<N>& frame, Density iso) {
+  constexpr Density kFeltShare = 8;  // a density below this part of the iso is not felt
+  maps_.emplace_back(body.grid, body.density, static_cast<Density>(iso / kFeltShare));
+  memories_.emplace_back().hold(shell_);
+  volumes_.push_back({{body.grid, body.density.data(), density_scale(iso), maps_.back().bricks()},
+                      frame,
+                      memories_.back().places()});
+  query_.emplace(kernels_, shell_, volumes_);
+  query_->turn({});
+}
+
+template <class N>
+ProxyContact<N> ContactRig<N>::follow(const ProxyPlan<N>& plan, ProxyState<N>& state,
+                                      const ProxyPose<N>& goal) {
+  return kerf::follow(plan, state, *query_, goal);
+}
+
+template class ContactRig<FixedNumbers>;
+template class ContactRig<FloatNumbers>;
+template class ContactRig<DoubleNumbers>;
+
+}  // namespace kerf::extremes
