@@ -2,10 +2,10 @@
 #pragma once
 
 #include <array>
-#include <cstddef>
 #include <cstdint>
 
 #include "controller/kernel/tick_box.hpp"
+#include "shared/numeric/fixed.hpp"
 
 namespace kerf {
 
@@ -43,5 +43,11 @@ struct AlignedTable : TickBox {
   /// z = -1 .. size.z, each row twice: moved by two lanes (cell corner x = 0) and by three.
   const std::uint32_t* mask = nullptr;
 };
+
+/// From the exact tap sum of one corner of the method `aligned` to density steps per voxel times
+/// 2^8, rounded half up.
+[[nodiscard]] constexpr std::int64_t kept_bits(const ExactTaps& taps, std::int64_t sum) noexcept {
+  return round_shift(taps.factor * sum, taps.shift - kAlignedKeptBits);
+}
 
 }  // namespace kerf

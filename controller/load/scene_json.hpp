@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <cstdint>
 #include <string>
-#include <string_view>
 
 #include "controller/load/loaded_scene.hpp"
 #include "controller/scene/scene_key.hpp"
@@ -23,9 +21,5 @@ namespace kerf {
 ///   materials [..], scene, device, force, cut, spindle, limits, servo  as the rows of the table of
 ///              keys say (`InJson`), of the models that the scene has
 [[nodiscard]] std::string canonical_json(const LoadedScene& scene, SceneKeys keys = scene_keys());
-
-/// Identity of everything that decides what a run does: fnv1a of `canonical_json`, which holds the
-/// hash of each volume's density and labels too.
-[[nodiscard]] std::uint64_t config_hash(const LoadedScene& scene);
 
 }  // namespace kerf

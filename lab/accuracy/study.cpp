@@ -2,7 +2,6 @@
 #include "lab/accuracy/study.hpp"
 
 #include <cmath>
-#include <memory>
 #include <optional>
 #include <utility>
 

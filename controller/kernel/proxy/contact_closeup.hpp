@@ -7,7 +7,6 @@
 #include <cstdint>
 
 #include "controller/kernel/point_shell/close_sums.hpp"
-#include "controller/kernel/point_shell/close_table.hpp"
 #include "controller/kernel/point_shell/point_sums.hpp"
 #include "controller/kernel/point_shell/point_table.hpp"
 #include "controller/kernel/proxy/contact_peak.hpp"

@@ -7,7 +7,6 @@
 
 #include "controller/kernel/point_shell/point_table.hpp"
 #include "controller/kernel/proxy/constraint_plane.hpp"
-#include "controller/kernel/proxy/contact_space.hpp"
 #include "controller/kernel/proxy/tool_turn.hpp"
 #include "shared/numeric/fixed.hpp"
 #include "shared/numeric/vec.hpp"
@@ -177,15 +176,10 @@ template <class N>
   return direction<N>(ContactVec<Ratio>{mixed(a.x, b.x), mixed(a.y, b.y), mixed(a.z, b.z)});
 }
 
-/// A ball's normal (docs/theory.md 3.4): minus the weighted mean offset. It reads no gradient, so
-/// it does not jump at the borders of cells; and it is right in a wall of two voxels, behind whose
-/// middle gradients point onward.
-///
-/// In a groove of the ball's own radius it points out of the bottom, whichever wall the ball is in.
-/// There the offsets spread over half a turn, and their mean is short: 2 / pi of the reach.
-/// `downhill`, the derivative of the peak, takes over as the mean falls from 0.85 to 0.7 of the
-/// reach and as the two directions part from 20 to 50 degrees. (With 30 to 60 the force steps by 5
-/// % there, not 2.)
+/// A ball's normal (docs/theory.md 3.4): minus the weighted mean offset. In a groove of the ball's
+/// own radius that points out of the bottom, whichever wall the ball is in: `downhill`, the
+/// derivative of the peak, takes over as the mean falls from 0.85 to 0.7 of the reach and as the
+/// two directions part from 20 to 50 degrees. (With 30 to 60 the force steps by 5 % there, not 2.)
 template <class N>
 [[nodiscard]] constexpr ContactVec<typename N::Unit> ball_normal(
     const PointMeans<N>& means, ContactVec<typename N::Unit> downhill) noexcept {
