@@ -9,8 +9,8 @@
 
 #include "lab/extremes/comparison.hpp"
 #include "lab/extremes/hands.hpp"
+#include "lab/extremes/measures.hpp"
 #include "lab/extremes/page.hpp"
-#include "lab/extremes/row.hpp"
 #include "lab/rig/lab_run.hpp"
 #include "record/gnuplot.hpp"
 #include "shared/text/json.hpp"

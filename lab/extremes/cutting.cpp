@@ -14,7 +14,7 @@
 #include "controller/volume/volume_crop.hpp"
 #include "controller/volume/volume_density.hpp"
 #include "controller/volume/volume_io.hpp"
-#include "lab/extremes/row.hpp"
+#include "lab/extremes/measures.hpp"
 #include "lab/rig/contact_rig.hpp"
 #include "lab/rig/miller.hpp"
 

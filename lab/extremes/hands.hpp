@@ -8,7 +8,7 @@
 
 #include "controller/load/loaded_scene.hpp"
 #include "hil/devmodel/hand_script.hpp"
-#include "lab/extremes/row.hpp"
+#include "lab/extremes/measures.hpp"
 
 namespace kerf::extremes {
 

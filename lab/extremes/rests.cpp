@@ -5,7 +5,7 @@
 #include <numbers>
 
 #include "controller/kernel/point_shell/point_sums.hpp"
-#include "lab/extremes/row.hpp"
+#include "lab/extremes/measures.hpp"
 #include "lab/rig/rest.hpp"
 
 namespace kerf::extremes {

@@ -7,7 +7,7 @@
 
 #include "controller/kernel/point_shell/point_sums.hpp"
 #include "lab/extremes/measured_tools.hpp"
-#include "lab/extremes/row.hpp"
+#include "lab/extremes/measures.hpp"
 #include "lab/rig/posed_tool.hpp"
 #include "lab/rig/rest.hpp"
 

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "lab/extremes/measured_tools.hpp"
-#include "lab/extremes/row.hpp"
+#include "lab/extremes/measures.hpp"
 #include "lab/rig/exact_touch.hpp"
 #include "lab/rig/guided_tool.hpp"
 #include "lab/rig/points.hpp"

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <string>
 
-#include "lab/extremes/row.hpp"
+#include "lab/extremes/measures.hpp"
 #include "lab/rig/loft.hpp"
 #include "lab/rig/posed_tool.hpp"
 #include "lab/rig/rest.hpp"

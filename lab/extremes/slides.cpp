@@ -2,7 +2,7 @@
 #include <functional>
 #include <string>
 
-#include "lab/extremes/row.hpp"
+#include "lab/extremes/measures.hpp"
 #include "lab/rig/bump_slide.hpp"
 #include "lab/rig/points.hpp"
 

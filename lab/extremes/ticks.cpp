@@ -7,7 +7,7 @@
 #include "lab/accuracy/contact_method.hpp"
 #include "lab/extremes/hands.hpp"
 #include "lab/extremes/measured_tools.hpp"
-#include "lab/extremes/row.hpp"
+#include "lab/extremes/measures.hpp"
 #include "lab/extremes/worst_tick.hpp"
 #include "lab/rig/bench_scene.hpp"
 #include "lab/rig/contact_rig.hpp"
