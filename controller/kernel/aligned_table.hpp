@@ -9,10 +9,8 @@
 
 namespace kerf {
 
-// The method `aligned`: the tool's voxels lie on a lattice as fine as the volume's and are not
-// turned, so all samples share one place within their cells. The sum of interpolated gradients is
-// then a correlation of the density with a fixed table, S' = tool mask convolved with the gradient
-// taps, at the eight corners of one cell. Nothing but the density is stored, nothing is refreshed.
+// The method `aligned` (docs/theory.md 7.6): the tool's voxels lie on a lattice as fine as the
+// volume's and are not turned. Nothing but the density is stored, nothing is refreshed.
 
 /// Fraction bits that contact sums keep.
 inline constexpr int kAlignedKeptBits = 8;

@@ -28,10 +28,9 @@ struct SamplePose {
 /// stays within 2^31, and 32-bit arithmetic gives the place that `sample_position` gives.
 inline constexpr std::int32_t kSampleReachVox = 1000;
 
-// The method `splat`: any pose of any shape, in scenes that cut. Each sample adds its eight weights
-// to the voxels of its cell; the sums R_j are all that the forces and the removal need of the tool.
-// Contact is SUM_j R_j G_j, since the sum of interpolated gradients may be added up voxel by voxel.
-// Nothing but the density is stored, nothing is refreshed after a cut.
+// The method `splat` (docs/theory.md 7.6): any pose of any shape, in scenes that cut. The sums R_j
+// of the samples' weights are all that the forces and the removal need of the tool. Nothing but the
+// density is stored, nothing is refreshed after a cut.
 
 /// Samples per voxel that a sum can hold: 2^24 of weights of 2^15, so that 5 taps of it fit 32
 /// bits.

@@ -130,11 +130,8 @@ template <class N>
 }
 
 /// Height of the peak of density over the tool's surface, from its power sums (docs/theory.md 3.2).
-///
-/// Over a quadratic peak of height H the mean of r, weighted with r^p, is H (p + 1) / (p + 1 + e),
-/// whatever the curvatures and the number of samples. e is half the number of dimensions over which
-/// r falls. A ball touches in a point, e = 1. Another shape may also touch in a line (1/2), in a
-/// face (0) or with a corner (2): there the mean of r^2 tells e.
+/// e is half the number of dimensions over which r falls: 1 for a ball; of another shape the mean
+/// of r^2 tells it.
 template <class N>
 [[nodiscard]] constexpr typename N::Ratio peak_height(const PointMeans<N>& means,
                                                       bool round) noexcept {
