@@ -30,8 +30,8 @@ controller/kernel/milling.hpp | the carry is not kept | s/owed = static_cast<std
 controller/kernel/milling.hpp | air is felt | s/ \|\| density\[at\] == 0\) continue/) continue/
 controller/kernel/removal_rate.hpp | rounding of a bent ratio | s/\(ratio & 127\) \+ 64\) >> 7/(ratio \& 127)) >> 7/
 controller/kernel/penetration.hpp | rounding to the nearest voxel | s/round_shift\(at\.raw\(\), 16\)/at.raw() >> 16/
-controller/kernel/aligned_corner.hpp | rounding of the kept bits | s/round_shift\(taps\.factor \* sum, taps\.shift - kAlignedKeptBits\)/taps.factor * sum >> (taps.shift - kAlignedKeptBits)/
-controller/kernel/aligned_reference.hpp | the definition loses the last tap | s/for \(std::int32_t i = 0; i < 5; \+\+i\)/for (std::int32_t i = 0; i < 4; ++i)/
+controller/kernel/aligned_table.hpp | rounding of the kept bits | s/round_shift\(taps\.factor \* sum, taps\.shift - kAlignedKeptBits\)/taps.factor * sum >> (taps.shift - kAlignedKeptBits)/
+tests/kernel/definitions.hpp | the definition loses the last tap | s/for \(std::int32_t i = 0; i < 5; \+\+i\)/for (std::int32_t i = 0; i < 4; ++i)/
 controller/kernel/aligned.hpp | the box lies one voxel off | s/cell\.low\.y - kGradientReach/cell.low.y - 1/
 controller/kernel/sets/scalar.cpp | a sign in the x filter | s/across -= taps/across += taps/
 controller/kernel/sets/scalar.cpp | a mask row off by one | s/row = \(z \+ 1 - /row = (z - /
@@ -46,7 +46,7 @@ controller/kernel/sets/avx512.cpp | the carry-out counts equality | s/_mm512_cmp
 controller/kernel/sets/avx512.cpp | the mask of a loss is whole | s/density \+ begin, lost, sub16/density + begin, ~0u, sub16/
 controller/kernel/sets/avx512.cpp | sums no longer in registers | s/__asm__\("vpdpwssd.*/sum = _mm512_dpwssd_epi32(sum, a, b);/
 controller/kernel/exact_taps.hpp | a tap of exact sums: central 32 -> 31 | s/\{0, 0, 32, 0, 0\}/{0, 0, 31, 0, 0}/
-controller/kernel/wide_sum.hpp | the low parts of a wide sum are lost | s/high \+ \(low >> shift\)/high/
+controller/kernel/exact_taps.hpp | the low parts of a wide sum are lost | s/high \+ \(low >> shift\)/high/
 controller/kernel/sets/sample_place.hpp | rounding of a sample's place | s/z\[i\] \+ 16\) >> 5/z[i]) >> 5/
 controller/kernel/sets/sample_place.hpp | rounding of a weight product | s/wy \* wz \+ kHalf/wy * wz/
 controller/kernel/sets/gather_vector.hpp | border: one cell too many | s/grid\.nx - 2\)/grid.nx - 1)/

@@ -2,9 +2,9 @@
 #include "lab/program.hpp"
 
 #include <array>
+#include <exception>
 #include <ostream>
 
-#include "hil/hil_error.hpp"
 #include "lab/accuracy/command.hpp"
 #include "lab/bench/bench_command.hpp"
 #include "lab/extremes/command.hpp"
@@ -26,10 +26,7 @@ int run_lab(int argc, const char* const* argv, std::ostream& out, std::ostream& 
     for (const LabCommand* command : commands) {
       if (command->chosen()) return command->run(out);
     }
-  } catch (const UsageError& error) {
-    err << "kerf-lab: " << error.what() << '\n';
-    return 2;
-  } catch (const HilError& error) {
+  } catch (const std::exception& error) {
     err << "kerf-lab: " << error.what() << '\n';
     return 2;
   }

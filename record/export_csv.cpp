@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "record/export_csv.hpp"
-
 #include <charconv>
 #include <cstring>
 #include <string>
 #include <string_view>
 
 #include "record/manifest.hpp"
+#include "record/summary.hpp"
 #include "record/tick_log.hpp"
 #include "shared/posix/new_file.hpp"
 #include "shared/segment/layout_table.hpp"

@@ -1,17 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "record/plot.hpp"
-
 #include <array>
 #include <cmath>
 #include <sstream>
 #include <string>
-#include <vector>
 
 #include "record/envelope.hpp"
 #include "record/gnuplot.hpp"
 #include "record/manifest.hpp"
 #include "record/record_error.hpp"
-#include "record/tick_figures.hpp"
+#include "record/summary.hpp"
 #include "record/tick_log.hpp"
 #include "shared/posix/new_file.hpp"
 

@@ -1,9 +1,47 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <exception>
+#include <filesystem>
 #include <iostream>
 
-#include "record/record_commands.hpp"
+#include "record/summary.hpp"
+#include "shared/posix/new_file.hpp"
 #include "shared/posix/stop_signals.hpp"
+#include "shared/text/command_line.hpp"
+
+namespace kerf {
+namespace {
+
+/// `info DIR`, `plot DIR --out FILE.svg`, `export DIR --csv FILE`. Bad input throws.
+int run_record(int argc, char** argv) {
+  CommandLine app("Looks at what kerf-recorder wrote.", "kerf-record", KERF_VERSION);
+  std::filesystem::path folder;
+  std::filesystem::path report;
+  std::filesystem::path svg;
+  std::filesystem::path csv;
+  const auto add_command = [&](const char* name, const char* what) {
+    Arguments command = app.command(name, what);
+    command.option("DIR", folder, "folder of a recording").required();
+    return command;
+  };
+  Arguments info = add_command("info", "length, losses, forces, removed volume");
+  info.option("--report", report, "write the figures as JSON");
+  Arguments plot = add_command("plot", "forces and penetration over time, as SVG");
+  plot.option("--out", svg, "the SVG file").required();
+  Arguments table = add_command("export", "every tick as a line of text");
+  table.option("--csv", csv, "the CSV file").required();
+  if (!app.parse(argc, argv, std::cout)) return 0;
+  if (info.chosen()) {
+    const RecordSummary summary = summarise(folder);
+    std::cout << to_text(summary);
+    if (!report.empty()) write_new_file(report, to_json(summary));
+  }
+  if (plot.chosen()) plot_forces(folder, svg);
+  if (table.chosen()) export_csv(folder, csv);
+  return 0;
+}
+
+}  // namespace
+}  // namespace kerf
 
 int main(int argc, char** argv) {
   kerf::make_signals_of_writes_errors();

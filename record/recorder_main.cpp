@@ -6,9 +6,9 @@
 #include "shared/posix/stop_signals.hpp"
 
 int main(int argc, char** argv) {
-  kerf::RecorderOptions options;
-  if (const auto code = kerf::parse_options(argc, argv, options)) return *code;
   try {
+    kerf::RecorderOptions options;
+    if (!kerf::parse_options(argc, argv, options)) return 0;
     return kerf::run_recorder(options, kerf::catch_stop_signals());
   } catch (const std::exception& error) {
     std::cerr << "kerf-recorder: " << error.what() << '\n';

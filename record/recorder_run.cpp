@@ -59,7 +59,7 @@ void write_report(const RecorderOptions& options, const Recorder& recorder, std:
 
 }  // namespace
 
-std::optional<int> parse_options(int argc, char** argv, RecorderOptions& options) {
+bool parse_options(int argc, char** argv, RecorderOptions& options) {
   CommandLine app("Logs every tick of a running kerf-controller into a folder.", "kerf-recorder",
                   KERF_VERSION);
   app.option("--name", options.name, "name of the controller").shows_default();
@@ -69,13 +69,7 @@ std::optional<int> parse_options(int argc, char** argv, RecorderOptions& options
       .shows_default();
   app.flag("--strict", options.strict, "exit 1 where ticks were lost");
   app.option("--report", options.report, "write the figures as JSON");
-  try {
-    if (!app.parse(argc, argv, std::cout)) return 0;
-  } catch (const UsageError& error) {
-    std::cerr << "kerf-recorder: " << error.what() << '\n';
-    return 2;
-  }
-  return std::nullopt;
+  return app.parse(argc, argv, std::cout);
 }
 
 int run_recorder(const RecorderOptions& options, const std::atomic<bool>& stop) {

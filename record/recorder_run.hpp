@@ -2,9 +2,7 @@
 #pragma once
 
 #include <atomic>
-#include <cstdint>
 #include <filesystem>
-#include <optional>
 #include <string>
 
 namespace kerf {
@@ -17,8 +15,8 @@ struct RecorderOptions {
   std::filesystem::path report;  ///< empty: none
 };
 
-/// Exit code where the command line already decided (help, version, bad options), else none.
-[[nodiscard]] std::optional<int> parse_options(int argc, char** argv, RecorderOptions& options);
+/// False where help or version was asked for, and shown. Throws `UsageError`.
+[[nodiscard]] bool parse_options(int argc, char** argv, RecorderOptions& options);
 
 /// Records the controller `options.name` into the folder `options.out` until it ends or `stop`:
 /// ticks.npy, scene.json, manifest.json. Returns the exit code: 0, or 1 under `strict` where ticks

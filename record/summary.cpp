@@ -4,11 +4,8 @@
 #include <algorithm>
 #include <iomanip>
 #include <sstream>
-#include <utility>
-#include <vector>
 
 #include "record/manifest.hpp"
-#include "record/tick_figures.hpp"
 #include "record/tick_log.hpp"
 #include "shared/text/json.hpp"
 

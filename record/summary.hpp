@@ -33,4 +33,15 @@ struct RecordSummary {
 /// The same figures as JSON.
 [[nodiscard]] std::string to_json(const RecordSummary& summary);
 
+/// Writes every row of the recording in `folder` as CSV, whole or not at all: one column per number
+/// (`position_mm_0` ...), floats in the shortest form that reads back to the same bits. Throws
+/// `RecordError`, or `SceneError` where the file cannot be written.
+void export_csv(const std::filesystem::path& folder, const std::filesystem::path& csv);
+
+/// Draws the recording in `folder` as an SVG of two panels over time: force magnitudes in N, and
+/// penetration in mm with removed volume in mm^3. At most 4000 points per curve, every peak kept.
+///
+/// Runs gnuplot. The file appears whole or not at all. Throws `RecordError`.
+void plot_forces(const std::filesystem::path& folder, const std::filesystem::path& svg);
+
 }  // namespace kerf

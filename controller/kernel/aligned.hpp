@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <span>
 
-#include "controller/kernel/aligned_corner.hpp"
+#include "controller/kernel/aligned_table.hpp"
 #include "controller/kernel/cut.hpp"
 #include "controller/kernel/kernel_set.hpp"
 #include "controller/kernel/overlap_rows.hpp"
@@ -18,8 +18,9 @@ namespace kerf {
 
 /// One tick of the method `aligned` on one volume: `contact` first, then `mill` of the same place.
 ///
-/// Gives the bits of aligned_reference.hpp, overlap.hpp and milling.hpp, whatever the kernels. Work
-/// is bounded by the tool's box and does not depend on pose or content. Servo thread; no heap.
+/// Gives the bits of tests/kernel/definitions.hpp, overlap.hpp and milling.hpp, whatever the
+/// kernels. Work is bounded by the tool's box and does not depend on pose or content. Servo thread;
+/// no heap.
 class AlignedTick {
  public:
   /// `table` was made for `kernels`; `scratch` has at least the table's sizes. The tool must be

@@ -2,17 +2,15 @@
 #pragma once
 
 #include <array>
-#include <cstddef>
 #include <cstdint>
 
 #include "controller/kernel/tick_box.hpp"
+#include "shared/numeric/fixed.hpp"
 
 namespace kerf {
 
-// The method `aligned`: the tool's voxels lie on a lattice as fine as the volume's and are not
-// turned, so all samples share one place within their cells. The sum of interpolated gradients is
-// then a correlation of the density with a fixed table, S' = tool mask convolved with the gradient
-// taps, at the eight corners of one cell. Nothing but the density is stored, nothing is refreshed.
+// The method `aligned` (docs/theory.md 7.6): the tool's voxels lie on a lattice as fine as the
+// volume's and are not turned. Nothing but the density is stored, nothing is refreshed.
 
 /// Fraction bits that contact sums keep.
 inline constexpr int kAlignedKeptBits = 8;
@@ -43,5 +41,11 @@ struct AlignedTable : TickBox {
   /// z = -1 .. size.z, each row twice: moved by two lanes (cell corner x = 0) and by three.
   const std::uint32_t* mask = nullptr;
 };
+
+/// From the exact tap sum of one corner of the method `aligned` to density steps per voxel times
+/// 2^8, rounded half up.
+[[nodiscard]] constexpr std::int64_t kept_bits(const ExactTaps& taps, std::int64_t sum) noexcept {
+  return round_shift(taps.factor * sum, taps.shift - kAlignedKeptBits);
+}
 
 }  // namespace kerf

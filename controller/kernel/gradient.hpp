@@ -64,34 +64,6 @@ template <class N>
   }
 }
 
-/// The gradient of one voxel as the plain sum over 5x5x5 densities: the definition. Density outside
-/// the volume is 0. Slow; `refresh_gradients` gives the same bits.
-template <class N>
-[[nodiscard]] constexpr Gradient<N> gradient_dense(GradientKernel kernel, const VoxelGrid& grid,
-                                                   std::span<const Density> density,
-                                                   VoxelIndex at) noexcept {
-  const GradientTaps tap = taps(kernel);
-  std::int64_t x = 0, y = 0, z = 0;
-  for (std::int32_t k = 0; k < 5; ++k) {
-    for (std::int32_t j = 0; j < 5; ++j) {
-      for (std::int32_t i = 0; i < 5; ++i) {
-        const VoxelIndex v{at.x + i - kGradientReach, at.y + j - kGradientReach,
-                           at.z + k - kGradientReach};
-        if (!grid.contains(v)) continue;
-        const auto a = static_cast<std::size_t>(i);
-        const auto b = static_cast<std::size_t>(j);
-        const auto c = static_cast<std::size_t>(k);
-        const std::int64_t rho = density[grid.index(v.x, v.y, v.z)];
-        x += rho * tap.slope[a] * tap.smooth[b] * tap.smooth[c];
-        y += rho * tap.smooth[a] * tap.slope[b] * tap.smooth[c];
-        z += rho * tap.smooth[a] * tap.smooth[b] * tap.slope[c];
-      }
-    }
-  }
-  return {gradient_from_sum<N>(x, tap.shift), gradient_from_sum<N>(y, tap.shift),
-          gradient_from_sum<N>(z, tap.shift)};
-}
-
 /// Working memory of `refresh_gradients`: 70 800 bytes whatever the box. Caller-owned, any
 /// contents.
 struct GradientScratch {
@@ -195,8 +167,8 @@ constexpr void store_plane(const GradientTaps& tap, const VoxelGrid& grid, const
 /// kGradientReach and clipped to the volume. `grid.box()` makes the whole field.
 ///
 /// Separable, tile by tile, marching along z; the intermediate sums are exact, so the bits are
-/// those of `gradient_dense`. Bounded by the box; an empty box does nothing. `field` and `density`
-/// hold one entry per voxel.
+/// those of the plain sum over 5x5x5 densities. Bounded by the box; an empty box does nothing.
+/// `field` and `density` hold one entry per voxel.
 template <class N>
 constexpr void refresh_gradients(GradientKernel kernel, const VoxelGrid& grid,
                                  std::span<const Density> density, const VoxelBox& changed,

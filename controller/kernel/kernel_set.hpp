@@ -8,7 +8,6 @@
 #include "controller/kernel/cover_table.hpp"
 #include "controller/kernel/point_shell/close_sums.hpp"
 #include "controller/kernel/point_shell/point_table.hpp"
-#include "controller/kernel/sample_table.hpp"
 #include "controller/kernel/splat_table.hpp"
 #include "shared/volume/voxel_grid.hpp"
 

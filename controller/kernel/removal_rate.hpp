@@ -3,7 +3,6 @@
 
 #include <array>
 #include <cstddef>
-#include <cstdint>
 
 #include "controller/kernel/decay.hpp"
 #include "shared/numeric/numbers.hpp"

@@ -15,9 +15,9 @@ namespace kerf {
 /// One tick of the method `splat` on one volume, stage by stage in this order: `copy`, `splat`,
 /// `press`, `cut`. `splat_tick` runs them all.
 ///
-/// Gives the bits of splat_reference.hpp, overlap.hpp and milling.hpp, whatever the kernels. Work
-/// is bounded by the samples and by the box that holds the tool in any orientation, for which
-/// `scratch` has room. Far from the volume nothing is done. Servo thread; no heap.
+/// Gives the bits of tests/kernel/definitions.hpp, overlap.hpp and milling.hpp, whatever the
+/// kernels. Work is bounded by the samples and by the box that holds the tool in any orientation,
+/// for which `scratch` has room. Far from the volume nothing is done. Servo thread; no heap.
 class SplatTick {
  public:
   struct Felt {

@@ -4,15 +4,33 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "controller/kernel/sample_table.hpp"
 #include "controller/kernel/tick_box.hpp"
 
 namespace kerf {
 
-// The method `splat`: any pose of any shape, in scenes that cut. Each sample adds its eight weights
-// to the voxels of its cell; the sums R_j are all that the forces and the removal need of the tool.
-// Contact is SUM_j R_j G_j, since the sum of interpolated gradients may be added up voxel by voxel.
-// Nothing but the density is stored, nothing is refreshed after a cut.
+/// A tool's samples for kernels of any vector width: offsets in half pitches, axis by axis. Made at
+/// load (controller/plan/tables/sample_tool.hpp); points into the maker's memory. Each array goes
+/// on to a whole number of `kSampleGroup` with copies of a sample, which no kernel may count.
+struct SampleTable {
+  const std::int32_t* offset[3] = {};
+  std::int32_t count = 0;
+};
+
+inline constexpr std::int32_t kSampleGroup = 16;
+
+/// `ToolPose<FixedNumbers>` in plain integers: centre Q15.16 voxels, step Q11.20.
+struct SamplePose {
+  std::int32_t centre[3];
+  std::int32_t step[3][3];
+};
+
+/// No sample may be farther from the centre than this in any orientation: step times offset then
+/// stays within 2^31, and 32-bit arithmetic gives the place that `sample_position` gives.
+inline constexpr std::int32_t kSampleReachVox = 1000;
+
+// The method `splat` (docs/theory.md 7.6): any pose of any shape, in scenes that cut. The sums R_j
+// of the samples' weights are all that the forces and the removal need of the tool. Nothing but the
+// density is stored, nothing is refreshed after a cut.
 
 /// Samples per voxel that a sum can hold: 2^24 of weights of 2^15, so that 5 taps of it fit 32
 /// bits.

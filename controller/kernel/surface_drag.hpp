@@ -2,7 +2,6 @@
 #pragma once
 
 #include <algorithm>
-#include <cstdint>
 
 #include "controller/kernel/preston_budget.hpp"
 #include "controller/kernel/surface_speed.hpp"

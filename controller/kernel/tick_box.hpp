@@ -22,7 +22,7 @@ struct TickBox {
   VoxelIndex box;   ///< size + kBoxMargin: pitch and plane of the copy, one stream
   ExactTaps taps{};
   std::int32_t row_lanes = 0;  ///< box.x rounded up to 32: entries in a row of ratios
-  int sum_shift = 0;           ///< of sums of exact gradients: wide_sum.hpp
+  int sum_shift = 0;           ///< of sums of exact gradients: exact_taps.hpp
 };
 
 /// Voxels of a plane of cells, at most: the sum over it of exact gradients, each times a weight of

@@ -2,14 +2,16 @@
 #pragma once
 
 #include <array>
-#include <cstddef>
 #include <cstdint>
 
-#include "controller/kernel/tool_offset.hpp"
 #include "shared/numeric/numbers.hpp"
 #include "shared/numeric/vec.hpp"
 
 namespace kerf {
+
+/// Offset of a tool voxel from the tool centre in half pitches, so that even and odd grids are both
+/// exact: position = offset * pitch / 2.
+using ToolOffset = std::array<std::int16_t, 3>;
 
 /// A sum over samples or voxels, one component per voxel axis; never saturates.
 template <class N>

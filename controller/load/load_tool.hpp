@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "controller/load/loaded_scene.hpp"
-#include "controller/scene/scene_file.hpp"
 
 namespace kerf {
 

@@ -105,8 +105,4 @@ std::string canonical_json(const LoadedScene& scene, SceneKeys keys) {
   return root.canonical();
 }
 
-std::uint64_t config_hash(const LoadedScene& scene) {
-  return fnv1a(canonical_json(scene));
-}
-
 }  // namespace kerf

@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <cstdint>
 #include <string>
-#include <string_view>
 
 #include "controller/load/loaded_scene.hpp"
 #include "controller/scene/scene_key.hpp"
@@ -12,7 +10,8 @@ namespace kerf {
 
 /// The scene as readers of the segment and of recordings get it: JSON text on one line, keys
 /// sorted, numbers as a short text that reads back equal. The same scene gives the same text
-/// on every machine, so its path is left out and a volume's `file` stands as the scene wrote it.
+/// on every machine, so its path is left out and a volume's `file` stands as the scene wrote it;
+/// fnv1a of it is the identity of all that decides what a run does.
 ///
 ///   volumes    [{name, file, iso (u16), solid, spacing_mm, grid, pose {position_mm, orientation},
 ///              density_hash}]
@@ -23,9 +22,5 @@ namespace kerf {
 ///   materials [..], scene, device, force, cut, spindle, limits, servo  as the rows of the table of
 ///              keys say (`InJson`), of the models that the scene has
 [[nodiscard]] std::string canonical_json(const LoadedScene& scene, SceneKeys keys = scene_keys());
-
-/// Identity of everything that decides what a run does: fnv1a of `canonical_json`, which holds the
-/// hash of each volume's density and labels too.
-[[nodiscard]] std::uint64_t config_hash(const LoadedScene& scene);
 
 }  // namespace kerf

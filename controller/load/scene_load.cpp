@@ -6,7 +6,6 @@
 #include <numbers>
 #include <optional>
 #include <string>
-#include <utility>
 
 #include "controller/load/felt_density.hpp"
 #include "controller/load/load_tool.hpp"

@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "controller/plan/plan_contact.hpp"
-#include "controller/plan/tables/array_bytes.hpp"
 #include "controller/plan/tables/free_brick_map.hpp"
+#include "controller/plan/tables/tick_memory.hpp"
 #include "controller/plan/tables/tool_points.hpp"
 #include "controller/scene/scene_error.hpp"
 #include "controller/servo/servo_state.hpp"

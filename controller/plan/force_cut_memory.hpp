@@ -8,7 +8,7 @@
 
 #include "controller/load/loaded_scene.hpp"
 #include "controller/plan/method/methods.hpp"
-#include "controller/plan/tables/array_bytes.hpp"
+#include "controller/plan/tables/tick_memory.hpp"
 #include "controller/servo/servo_plan.hpp"
 #include "controller/servo/servo_state.hpp"
 

@@ -6,7 +6,6 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
-#include <string>
 
 #include "controller/load/loaded_scene.hpp"
 #include "controller/plan/method/matrices.hpp"

@@ -14,8 +14,8 @@ namespace kerf {
 
 // What a scene says about cutting by force, in the loop's numbers. Load time only.
 
-/// How force cuts `volume`. Matter without a label, and a volume without labels, is cut as enamel.
-/// The labels stay the volume's: it must outlive the plan.
+/// How force cuts `volume`, without its labels. Matter without a label, and a volume without
+/// labels, is cut as enamel.
 template <class N>
 [[nodiscard]] PrestonPlan<N> plan_preston(const LoadedScene& scene, const SceneVolume& volume) {
   const auto& h = volume.image.spacing_mm;
@@ -28,7 +28,6 @@ template <class N>
     plan.forbidden[m] = material.forbidden;
     if (!material.forbidden) plan.rate[m] = force_rate<N>(enamel * material.machinability);
   }
-  plan.labels = volume.image.labels;
   return plan;
 }
 
@@ -78,7 +77,6 @@ template <class N>
     const auto& h = volume.image.spacing_mm;
     voxel_mm3[v] = h[0] * h[1] * h[2];
     cut.volume[v] = plan_preston<N>(scene, volume);
-    cut.volume[v].labels = {};
   }
   const double largest = *std::max_element(voxel_mm3.begin(), voxel_mm3.end());
   for (std::size_t v = 0; v < plan.volume_count; ++v) {

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "controller/plan/method/methods.hpp"
-#include "controller/plan/tables/array_bytes.hpp"
+#include "controller/plan/tables/tick_memory.hpp"
 
 namespace kerf {
 

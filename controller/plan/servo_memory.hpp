@@ -13,7 +13,7 @@
 #include "controller/plan/contact_memory.hpp"
 #include "controller/plan/force_cut_memory.hpp"
 #include "controller/plan/method/method_memory.hpp"
-#include "controller/plan/tables/array_bytes.hpp"
+#include "controller/plan/tables/tick_memory.hpp"
 #include "controller/servo/servo_plan.hpp"
 #include "controller/servo/servo_state.hpp"
 

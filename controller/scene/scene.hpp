@@ -5,16 +5,39 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "controller/kernel/gradient.hpp"
-#include "controller/scene/tool_size.hpp"
 #include "shared/volume/voxel_grid.hpp"
 #include "shared/wire/personality.hpp"
 
 namespace kerf {
+
+/// The shapes a [[tool]] can have, its tip (the lowest point of the head) toward -y and the shaft
+/// toward +y. All but the mesh are solids of revolution about the y axis:
+///
+///   ball           a sphere
+///   cylinder       flat at both ends
+///   cone           pointed at the tip, widest at the shaft
+///   inverted_cone  widest at the tip, 0.6 of that at the shaft
+///   flame          a pointed ogive up to 0.6 of the length, then drawn in to half at the shaft
+///   wheel          a flat disc whose rim is half of a torus as thick as the disc
+///   stl            the mesh of a file
+inline constexpr std::string_view kMeshShape = "stl";
+inline constexpr std::array<std::string_view, 7> kShapeWords = {
+    "ball", "cylinder", "cone", "inverted_cone", "flame", "wheel", kMeshShape};
+inline constexpr auto kToolShapes = std::span(kShapeWords).first<6>();  ///< of revolution
+
+/// What the scene says about the size of one tool; all in mm unless counted in pitches.
+struct ToolSize {
+  double pitch_mm = 0.125;                 ///< distance of the samples
+  double radius_mm = 1.0;                  ///< largest radius; used when `size_vox` is empty
+  std::optional<double> length_mm{};       ///< height of the head; not for a ball
+  std::optional<std::int32_t> size_vox{};  ///< the head fills a cube of so many pitches
+};
 
 inline constexpr double kMinWorkspaceScale = 0.01, kMaxWorkspaceScale = 100;
 inline constexpr double kLargestWorldMm = 10000;  ///< a third of the range of the loop's numbers
@@ -150,5 +173,26 @@ struct Scene : SceneSettings {
   bool offset_given = false;     ///< else the device origin is put on the first surface
   bool cut_in_one_tick = false;  ///< rate_per_s = "1/T", the paper's own step
 };
+
+// The words of a scene for the values of an enumeration, in its order: one list for reading a scene
+// and for writing its JSON.
+inline constexpr std::array<std::string_view, 2> kForceModelWords = {"paper", "proxy"};
+inline constexpr std::array<std::string_view, 4> kCutModelWords = {"none", "overlap",
+                                                                   "overlap_exact", "preston"};
+inline constexpr std::array<std::string_view, 3> kNumericWords = {"fixed", "float", "double"};
+inline constexpr std::array<std::string_view, 3> kGradientWords = {"central", "sobel5", "farid"};
+
+[[nodiscard]] constexpr std::string_view word_of(ForceModel model) {
+  return kForceModelWords.at(static_cast<std::size_t>(model));
+}
+[[nodiscard]] constexpr std::string_view word_of(CutModel model) {
+  return kCutModelWords.at(static_cast<std::size_t>(model));
+}
+[[nodiscard]] constexpr std::string_view word_of(NumericKind numeric) {
+  return kNumericWords.at(static_cast<std::size_t>(numeric));
+}
+[[nodiscard]] constexpr std::string_view word_of(GradientKernel kernel) {
+  return kGradientWords.at(static_cast<std::size_t>(kernel));
+}
 
 }  // namespace kerf

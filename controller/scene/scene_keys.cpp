@@ -3,8 +3,8 @@
 // `./kerf controller --scene-keys > docs/scene-keys.md`.
 #include <tuple>
 
+#include "controller/scene/scene.hpp"
 #include "controller/scene/scene_key.hpp"
-#include "controller/scene/scene_words.hpp"
 #include "shared/volume/scene_limits.hpp"
 
 namespace kerf {

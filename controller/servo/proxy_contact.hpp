@@ -49,9 +49,8 @@ inline constexpr double kLostDepth = 1;  // units
 /// Sets the contact's normal and moment arm: the sum of what presses, and its moment over the
 /// length of the spring (docs/theory.md 5.3). Friction acts where the loads do.
 ///
-/// What friction cannot hold of the spring is borne by planes that the sweep has not met: in a
-/// groove of the tool's own shape it meets one of many at a time. A tool that is still `moving` is
-/// not held there.
+/// What friction cannot hold of the spring is borne by planes that the sweep has not met (4.5). A
+/// tool that is still `moving` is not held there.
 template <class N>
 constexpr void add_loads(const Swept<N>& swept, typename N::Unit friction, bool moving,
                          ProxyContact<N>& contact) noexcept {

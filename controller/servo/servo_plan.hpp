@@ -9,7 +9,7 @@
 #include "controller/kernel/gradient.hpp"
 #include "controller/kernel/kernel_set.hpp"
 #include "controller/kernel/milling.hpp"
-#include "controller/kernel/tool_offset.hpp"
+#include "controller/kernel/tool_pose.hpp"
 #include "controller/servo/contact_plan.hpp"
 #include "controller/servo/device_plan.hpp"
 #include "controller/servo/force_cut_plan.hpp"

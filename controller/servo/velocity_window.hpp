@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -25,14 +24,9 @@ struct VelocityPlan {
 inline constexpr const char* kVelocityEstimator = "FOAW, best fit over at most 16 intervals";
 
 /// Velocity of the tip by first-order adaptive windowing (docs/theory.md 5.2): on each axis the
-/// longest window of at most 16 intervals in which the line through the newest sample with the
-/// least-squares slope misses no sample by more than twice `noise_mm`: both the sample and the
-/// newest may be off by it, so a steady hand never shortens its window. Long windows keep the
-/// encoder's steps out of the damping; short ones where the hand turns round keep the lag small.
-///
-/// The slope over i intervals of samples y_k (newest) .. y_{k-i} is
-/// 6 SUM_l (i - 2 l) y_{k-l} / (i (i+1) (i+2)) per interval. Servo thread; 120 comparisons an axis
-/// at most; no heap.
+/// longest window of at most 16 intervals whose line misses no sample by more than twice
+/// `noise_mm`: both the sample and the newest may be off by it, so a steady hand never shortens its
+/// window. Servo thread; 120 comparisons an axis at most; no heap.
 template <class N>
 class VelocityWindow {
  public:

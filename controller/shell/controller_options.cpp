@@ -11,9 +11,8 @@
 #include <vector>
 
 #include "controller/device/port/open_port.hpp"
-#include "controller/scene/scene_file.hpp"
+#include "controller/scene/scene.hpp"
 #include "controller/scene/scene_page.hpp"
-#include "controller/scene/scene_words.hpp"
 #include "shared/text/command_line.hpp"
 
 namespace kerf {

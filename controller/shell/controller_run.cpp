@@ -2,22 +2,20 @@
 #include "controller/shell/controller_run.hpp"
 
 #include <atomic>
-#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
 #include <stdexcept>
 #include <string>
 
-#include "controller/device/driver/make_driver.hpp"
+#include "controller/device/driver/device_driver.hpp"
 #include "controller/device/port/open_port.hpp"
 #include "controller/load/scene_json.hpp"
 #include "controller/load/scene_load.hpp"
 #include "controller/plan/compile.hpp"
 #include "controller/plan/cost/work_budget.hpp"
-#include "controller/scene/scene_words.hpp"
+#include "controller/scene/scene.hpp"
 #include "controller/shell/check_scene.hpp"
-#include "controller/shell/explain_scene.hpp"
 #include "controller/shell/log_line.hpp"
 #include "controller/shell/run_report.hpp"
 #include "controller/shell/run_threads.hpp"

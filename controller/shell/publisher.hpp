@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <array>
 #include <cstdint>
-#include <span>
 
 #include "controller/servo/device_report.hpp"
 #include "controller/servo/servo.hpp"

@@ -4,7 +4,6 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <string>
 
 #include "controller/servo/servo_output.hpp"
 #include "controller/shell/real_time.hpp"

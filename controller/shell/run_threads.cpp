@@ -13,7 +13,7 @@
 #include "controller/shell/log_line.hpp"
 #include "controller/shell/motor_guard.hpp"
 #include "controller/shell/publisher.hpp"
-#include "controller/shell/watchdog_thread.hpp"
+#include "controller/shell/watchdog.hpp"
 #include "shared/posix/progress_bar.hpp"
 
 namespace kerf {

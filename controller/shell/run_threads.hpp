@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "controller/device/driver/device_driver.hpp"
-#include "controller/plan/compile.hpp"
 #include "controller/shell/controller_options.hpp"
 #include "controller/shell/run_report.hpp"
 #include "controller/shell/servo_loop.hpp"

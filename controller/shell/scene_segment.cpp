@@ -2,11 +2,28 @@
 #include "controller/shell/scene_segment.hpp"
 
 #include <cstddef>
+#include <fstream>
+#include <limits>
+#include <optional>
 #include <stdexcept>
 
-#include "shared/posix/memory.hpp"
-
 namespace kerf {
+namespace {
+
+/// Bytes that programs can still take before the system runs out, by the kernel's own estimate
+/// (MemAvailable); nothing where it does not tell.
+std::optional<std::uint64_t> available_memory() {
+  std::ifstream table("/proc/meminfo");
+  std::string name;
+  std::uint64_t kib = 0;
+  while (table >> name >> kib) {
+    if (name == "MemAvailable:") return kib << 10;
+    table.ignore(std::numeric_limits<std::streamsize>::max(), '\n');
+  }
+  return std::nullopt;
+}
+
+}  // namespace
 
 SegmentSpec segment_spec(const LoadedScene& scene, const std::string& json, std::uint64_t hash) {
   SegmentSpec spec;

@@ -2,7 +2,6 @@
 #include "controller/shell/servo_loop.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 #include "controller/shell/allocation_counter.hpp"
 #include "controller/shell/clock.hpp"

@@ -2,8 +2,10 @@
 #pragma once
 
 #include <cstdint>
+#include <thread>
 
 #include "controller/device/driver/device_driver.hpp"
+#include "controller/shell/real_time.hpp"
 #include "controller/shell/servo_loop.hpp"
 
 namespace kerf {
@@ -41,5 +43,11 @@ class Watchdog {
   bool tripped_ = false;
   std::uint64_t trips_ = 0;
 };
+
+/// Starts the thread that looks every 5 ms, until the jthread is gone: above the servo, so that the
+/// servo itself cannot keep it from looking, and on any core but the servo's, so that what takes
+/// that core away does not take the watchdog too. With one core, or without the rights, as well as
+/// it can.
+[[nodiscard]] std::jthread start_watchdog(Watchdog& watchdog, const RealTimeOptions& servo);
 
 }  // namespace kerf

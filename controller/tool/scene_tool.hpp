@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "controller/kernel/tool_offset.hpp"
+#include "controller/kernel/tool_pose.hpp"
 #include "controller/tool/tool_mesh.hpp"
 
 namespace kerf {

@@ -8,7 +8,7 @@
 #include <string_view>
 #include <vector>
 
-#include "controller/scene/tool_size.hpp"
+#include "controller/scene/scene.hpp"
 #include "controller/tool/scene_tool.hpp"
 
 namespace kerf {

@@ -28,10 +28,7 @@ VolumeImage apply_window(const SourceVolume& source, Window window) {
     throw SceneError(text.str());
   }
   VolumeImage image;
-  image.grid = source.grid;
-  image.spacing_mm = source.spacing_mm;
-  image.origin_mm = source.origin_mm;
-  image.direction = source.direction;
+  static_cast<VolumeFrame&>(image) = source;
   image.density.resize(source.values.size());
   const double scale = kDensityMax / width;
   std::transform(source.values.begin(), source.values.end(), image.density.begin(), [&](float v) {

@@ -19,7 +19,6 @@
 #include "controller/scene/scene_error.hpp"
 #include "controller/volume/library_messages.hpp"
 #include "controller/volume/volume_header.hpp"
-#include "controller/volume/volume_slices.hpp"
 #include "controller/volume/volume_source.hpp"
 #include "controller/volume/volume_write.hpp"
 

@@ -12,14 +12,9 @@ namespace kerf {
 
 /// A volume as its file holds it: values in the file's own units (often HU), x fastest.
 ///
-/// Frame as in VolumeImage: LPS for the medical formats, the file's own where it names none.
-/// `direction` is a proper rotation: a mirrored file is read with its last axis reversed, so the
-/// picture is the same and the axes are right-handed.
-struct SourceVolume {
-  VoxelGrid grid;
-  std::array<double, 3> spacing_mm{1, 1, 1};
-  std::array<double, 3> origin_mm{0, 0, 0};
-  std::array<double, 9> direction{1, 0, 0, 0, 1, 0, 0, 0, 1};
+/// The frame is LPS for the medical formats, the file's own where it names none. A mirrored file is
+/// read with its last axis reversed, so the picture is the same and the axes are right-handed.
+struct SourceVolume : VolumeFrame {
   bool has_spacing = true;  ///< false: neither the file nor the options name one; 1 mm stands in
   std::vector<float> values;
   double min = 0, max = 0;

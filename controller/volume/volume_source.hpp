@@ -4,12 +4,14 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <vector>
 
 #include "controller/volume/volume_io.hpp"
 #include "shared/numeric/vec3.hpp"
 
 /// The steps that fill a SourceVolume, whatever library read the file. Each checks what it sets and
 /// throws SceneError with `path` as the place.
+
 namespace kerf::volume {
 
 using Place = vec3::Vec;
@@ -31,5 +33,17 @@ void set_range(const std::filesystem::path& path, SourceVolume& volume);
 /// left-handed file has its last axis reversed: same picture, right-handed axes. After the values,
 /// the spacing and the origin.
 void set_frame(const std::filesystem::path& path, Place x, Place y, Place z, SourceVolume& volume);
+
+/// One slice of a DICOM series and where it lies along the normal.
+struct Slice {
+  std::filesystem::path file;
+  Place origin_mm;
+  double depth_mm;
+};
+
+/// The common distance along `normal`, mm, of two slices or more in the order of their depths.
+/// Refuses gaps and a slanted stack: throws SceneError with `folder` as the place.
+[[nodiscard]] double slice_distance(const std::filesystem::path& folder,
+                                    const std::vector<Slice>& slices, const Place& normal);
 
 }  // namespace kerf::volume

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <exception>
-#include <iomanip>
 #include <ostream>
 #include <sstream>
 #include <string>

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iomanip>
 #include <ostream>
 
 #include "shared/posix/new_file.hpp"
@@ -30,12 +29,9 @@ std::string bars(const VolumeInfo& info) {
 VolumeInfo describe(const std::string& file, const SourceVolume& volume, Window window) {
   const VolumeImage image = apply_window(volume, window);
   VolumeInfo info;
+  static_cast<VolumeFrame&>(info) = volume;
   info.file = file;
-  info.grid = volume.grid;
-  info.spacing_mm = volume.spacing_mm;
   info.has_spacing = volume.has_spacing;
-  info.origin_mm = volume.origin_mm;
-  info.direction = volume.direction;
   info.min = volume.min;
   info.max = volume.max;
   info.window = window;

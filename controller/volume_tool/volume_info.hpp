@@ -13,15 +13,11 @@
 namespace kerf {
 
 /// The figures of `kerf-volume info`.
-struct VolumeInfo {
+struct VolumeInfo : VolumeFrame {
   static constexpr std::size_t kHistogramBins = 64;
 
   std::string file;
-  VoxelGrid grid;
-  std::array<double, 3> spacing_mm{};
   bool has_spacing = true;
-  std::array<double, 3> origin_mm{};
-  std::array<double, 9> direction{};
   double min = 0, max = 0;  ///< values of the file
   Window window;
   Density otsu = 0;

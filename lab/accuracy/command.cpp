@@ -6,11 +6,10 @@
 #include <ostream>
 #include <vector>
 
-#include "lab/accuracy/export.hpp"
 #include "lab/accuracy/page.hpp"
-#include "lab/accuracy/plot.hpp"
 #include "lab/accuracy/study.hpp"
 #include "lab/rig/lab_run.hpp"
+#include "record/gnuplot.hpp"
 #include "shared/posix/progress_bar.hpp"
 
 namespace kerf::accuracy {
@@ -65,7 +64,7 @@ int Command::run(std::ostream& out) const {
     const auto folder = std::filesystem::absolute(page_).parent_path();
     as_page.write(page(entries, std::filesystem::absolute(plot).lexically_proximate(folder)));
   }
-  if (!plot.empty()) as_plot.write(lab_svg(plot_script(entries)));
+  if (!plot.empty()) as_plot.write(gnuplot_svg(plot_script(entries)));
   return 0;
 }
 

@@ -8,7 +8,7 @@
 #include <random>
 
 #include "controller/kernel/trilinear.hpp"
-#include "lab/accuracy/coarse_weights.hpp"
+#include "lab/accuracy/method_parts.hpp"
 
 namespace kerf::accuracy {
 namespace {

@@ -1,13 +1,39 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
 #include <functional>
 
-#include "lab/accuracy/contact_case.hpp"
 #include "lab/accuracy/contact_method.hpp"
-#include "lab/accuracy/spread.hpp"
+#include "lab/accuracy/subjects.hpp"
 
 namespace kerf::accuracy {
+
+/// Errors of many cases: their root mean square and the largest.
+class Spread {
+ public:
+  void add(double error) noexcept {
+    square_ += error * error;
+    worst_ = std::max(worst_, std::abs(error));
+    ++count_;
+  }
+  void add(const Spread& other) noexcept {
+    square_ += other.square_;
+    worst_ = std::max(worst_, other.worst_);
+    count_ += other.count_;
+  }
+  [[nodiscard]] double rms() const noexcept {
+    return count_ == 0 ? 0 : std::sqrt(square_ / static_cast<double>(count_));
+  }
+  [[nodiscard]] double worst() const noexcept { return worst_; }
+  [[nodiscard]] std::size_t count() const noexcept { return count_; }
+
+ private:
+  double square_ = 0, worst_ = 0;
+  std::size_t count_ = 0;
+};
 
 /// What a method does wrong. Forces are shares of p0 pi R^2, works shares of the work that goes to
 /// and fro on the way.

@@ -5,8 +5,8 @@
 #include <utility>
 
 #include "controller/tool/tool_shapes.hpp"
-#include "lab/accuracy/density_spline.hpp"
 #include "lab/accuracy/servo_plans.hpp"
+#include "lab/accuracy/spline.hpp"
 #include "lab/accuracy/stored_gradients.hpp"
 
 namespace kerf::accuracy {

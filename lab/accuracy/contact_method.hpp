@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "controller/kernel/gradient.hpp"
-#include "controller/kernel/tool_offset.hpp"
+#include "controller/kernel/tool_pose.hpp"
 #include "lab/accuracy/analytic_shapes.hpp"
 
 namespace kerf::accuracy {

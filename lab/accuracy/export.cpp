@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "lab/accuracy/export.hpp"
-
 #include <cstdio>
 
+#include "lab/accuracy/page.hpp"
 #include "shared/text/json.hpp"
 
 namespace kerf::accuracy {

@@ -10,8 +10,11 @@
 #include "controller/kernel/gradient.hpp"
 #include "controller/kernel/tool_pose.hpp"
 #include "lab/accuracy/contact_method.hpp"
+#include "shared/numeric/numbers.hpp"
+#include "shared/numeric/vec.hpp"
 
 // What the contact methods share.
+
 namespace kerf::accuracy {
 
 using Voxels = VoxelVec<double>;
@@ -49,6 +52,18 @@ std::vector<Gradient<N>> field_of(GradientKernel kernel, const AnalyticVolume& v
   GradientScratch scratch;
   refresh_gradients<N>(kernel, volume.grid, volume.density, volume.grid.box(), field, scratch);
   return field;
+}
+
+/// Q0.15 weights rounded half up to `Bits` fraction bits, still in Q0.15: the servo's lerp gives
+/// with them the bits that a lerp of `Bits` would give.
+template <int Bits>
+[[nodiscard]] constexpr VoxelVec<FixedNumbers::Weight> coarse_weights(
+    VoxelVec<FixedNumbers::Weight> w) noexcept {
+  constexpr int kDropped = 15 - Bits;
+  const auto coarse = [](FixedNumbers::Weight v) {
+    return static_cast<FixedNumbers::Weight>(round_shift(v, kDropped)) * (1 << kDropped);
+  };
+  return {coarse(w.x), coarse(w.y), coarse(w.z)};
 }
 
 }  // namespace kerf::accuracy

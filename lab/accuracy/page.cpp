@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "lab/accuracy/page.hpp"
 
-#include "lab/accuracy/page_advice.hpp"
 #include "lab/accuracy/page_column.hpp"
 #include "lab/rig/lab_run.hpp"
 

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "lab/accuracy/page_advice.hpp"
 
 #include <initializer_list>
 #include <string_view>

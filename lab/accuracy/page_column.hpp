@@ -1,19 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <cstdio>
 #include <string>
+#include <vector>
 
 #include "lab/accuracy/study.hpp"
+#include "lab/rig/lab_run.hpp"
 
 namespace kerf::accuracy {
-
-/// Three digits, as the page shows every figure.
-[[nodiscard]] inline std::string page_number(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, value >= 1000 ? "%.0f" : "%.3g", value);
-  return text;
-}
 
 /// What a table or a sentence shows: a metric of a shape, scaled to what the title says.
 struct PageColumn {
@@ -49,5 +43,9 @@ inline constexpr PageColumn kMemory{"bytes a voxel", "memory", 1, "any"};
 inline constexpr PageColumn kSamples{"samples", "samples", 1, "any"};
 inline constexpr PageColumn kOrder{"order", "order"};
 }  // namespace column
+
+/// The page's part that says what to choose when: fixed sentences, figures of this run. Needs every
+/// choice of a whole study.
+[[nodiscard]] std::string page_advice(const std::vector<Entry>& entries);
 
 }  // namespace kerf::accuracy

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "lab/accuracy/plot.hpp"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -8,6 +6,7 @@
 #include <sstream>
 
 #include "lab/accuracy/label_places.hpp"
+#include "lab/accuracy/page.hpp"
 
 namespace kerf::accuracy {
 namespace {

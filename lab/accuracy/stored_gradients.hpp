@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "controller/kernel/contact.hpp"
-#include "lab/accuracy/coarse_weights.hpp"
 #include "lab/accuracy/method_parts.hpp"
 #include "lab/accuracy/spline.hpp"
 

@@ -2,7 +2,6 @@
 #include "lab/accuracy/study.hpp"
 
 #include <cmath>
-#include <memory>
 #include <optional>
 #include <utility>
 
@@ -53,30 +52,23 @@ std::vector<Variant> variants() {
   };
 }
 
-class FigureList {
- public:
-  void add(const std::string& shape, const std::string& metric, double figure, const char* unit) {
-    figures_.push_back({shape, metric, figure, unit});
-  }
-  void add(const std::string& shape, const std::string& metric, const Spread& spread,
-           const char* unit) {
-    if (spread.count() == 0) return;
-    add(shape, metric + "_rms", spread.rms(), unit);
-    add(shape, metric + "_max", spread.worst(), unit);
-  }
-  void add(const std::string& shape, const ContactErrors& errors) {
-    add(shape, "force_vs_theory", errors.theory, "full scale");
-    add(shape, "force_direction", errors.direction_deg, "deg");
-    add(shape, "normal", errors.normal_deg, "deg");
-    add(shape, "loop_sample", errors.sample_loop, "work share");
-    add(shape, "loop_tool", errors.tool_loop, "work share");
-    add(shape, "step", errors.step, "full scale");
-  }
-  [[nodiscard]] std::vector<Figure> take() && { return std::move(figures_); }
+using Figures = std::vector<Figure>;
 
- private:
-  std::vector<Figure> figures_;
-};
+void add(Figures& figures, const std::string& shape, const std::string& metric,
+         const Spread& spread, const char* unit) {
+  if (spread.count() == 0) return;
+  figures.push_back({shape, metric + "_rms", spread.rms(), unit});
+  figures.push_back({shape, metric + "_max", spread.worst(), unit});
+}
+
+void add(Figures& figures, const std::string& shape, const ContactErrors& errors) {
+  add(figures, shape, "force_vs_theory", errors.theory, "full scale");
+  add(figures, shape, "force_direction", errors.direction_deg, "deg");
+  add(figures, shape, "normal", errors.normal_deg, "deg");
+  add(figures, shape, "loop_sample", errors.sample_loop, "work share");
+  add(figures, shape, "loop_tool", errors.tool_loop, "work share");
+  add(figures, shape, "step", errors.step, "full scale");
+}
 
 /// Ticks on the ball along a loop, as a hand moves: from place to near place.
 TickTimes time_contact(const ContactMethod& method, const ContactCase& at, int ticks) {
@@ -94,7 +86,7 @@ Entry measured(const Variant& variant, const std::vector<Subject>& subjects, con
   const ContactChoice& choice = variant.choice;
   const BallTool tool = ball_tool(kToolMm, choice.pitch_vox * choice.voxel_mm);
   Entry entry;
-  FigureList figures;
+  Figures& figures = entry.figures;
   ContactErrors all;
   Spread all_differences;
   for (const Subject& subject : subjects) {
@@ -109,13 +101,13 @@ Entry measured(const Variant& variant, const std::vector<Subject>& subjects, con
       }
       if (subject.name == "ball") {
         entry.times = time_contact(*method, at, plan.ticks);
-        figures.add("any", "memory", static_cast<double>(method->bytes_per_voxel()),
-                    "bytes a voxel");
-        figures.add("any", "samples", static_cast<double>(tool.offsets.size()), "1");
+        figures.push_back(
+            {"any", "memory", static_cast<double>(method->bytes_per_voxel()), "bytes a voxel"});
+        figures.push_back({"any", "samples", static_cast<double>(tool.offsets.size()), "1"});
       }
     }
-    figures.add(subject.name, errors);
-    figures.add(subject.name, "force_vs_double", differences, "full scale");
+    add(figures, subject.name, errors);
+    add(figures, subject.name, "force_vs_double", differences, "full scale");
     all.theory.add(errors.theory);
     all.direction_deg.add(errors.direction_deg);
     all.normal_deg.add(errors.normal_deg);
@@ -124,13 +116,12 @@ Entry measured(const Variant& variant, const std::vector<Subject>& subjects, con
     all.step.add(errors.step);
     all_differences.add(differences);
   }
-  figures.add("all", all);
-  figures.add("all", "force_vs_double", all_differences, "full scale");
-  figures.add("noise", "noise_gain", noise_gain(choice, tool), "1/voxel");
+  add(figures, "all", all);
+  add(figures, "all", "force_vs_double", all_differences, "full scale");
+  figures.push_back({"noise", "noise_gain", noise_gain(choice, tool), "1/voxel"});
   if (choice.storage == Storage::gradients && choice.interpolation == Interpolation::trilinear) {
-    figures.add("corners", "interpolation", interpolation_error(choice.arithmetic), "steps");
+    add(figures, "corners", "interpolation", interpolation_error(choice.arithmetic), "steps");
   }
-  entry.figures = std::move(figures).take();
   return entry;
 }
 

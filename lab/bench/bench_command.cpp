@@ -7,9 +7,6 @@
 
 #include "hil/hil_error.hpp"
 #include "lab/bench/kernel_bench.hpp"
-#include "lab/bench/layout_bench.hpp"
-#include "lab/bench/performance_page.hpp"
-#include "lab/bench/query_bench.hpp"
 #include "lab/rig/lab_run.hpp"
 #include "shared/text/json.hpp"
 

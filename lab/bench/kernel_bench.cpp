@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "lab/bench/kernel_bench.hpp"
 
-#include <array>
 #include <cmath>
 #include <cstdint>
 #include <numbers>
@@ -138,7 +137,7 @@ class Bench {
       std::vector<Density> volume = density;
       std::vector<std::uint16_t> carry(kWidest + 32);
       const SplatScratch scratch = memory.view();
-      row("fixed", (*set)->name, samples.bytes() + memory.bytes(), [&](int i) {
+      row("fixed", (*set)->name, samples.bytes() + total_bytes(memory.arrays()), [&](int i) {
         const auto pose = pose_of(ticks.place(i), turn(i));
         const SplatOutcome out = splat_tick(**set, samples.table(), kExactFarid, scratch, kGrid,
                                             volume, pose, Numbers::kStepOne, rate, carry);
@@ -224,7 +223,7 @@ class Bench {
       const AlignedTool tool(ticks_->tool, kExactFarid, **set);
       BoxMemory memory;
       memory.hold(tool.table().size, mills);
-      run(**set, tool.table(), memory.view(), tool.bytes() + memory.bytes());
+      run(**set, tool.table(), memory.view(), tool.bytes() + total_bytes(memory.arrays()));
     }
   }
 

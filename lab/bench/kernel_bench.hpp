@@ -25,4 +25,23 @@ struct KernelRow {
 [[nodiscard]] std::vector<KernelRow> bench_kernels(
     const std::function<void(const KernelRow&)>& add_row);
 
+/// What the volume's place in memory costs a tick of the 16-voxel ball: the copy of its box out of
+/// a linear volume and out of bricks of 8^3 voxels, warm and with the caches swept before each tick
+/// (the baseline is the linear copy), and contact and milling in volumes from 128 x 128 x 80 to
+/// 512^3 (the baseline is the smallest).
+[[nodiscard]] std::vector<KernelRow> bench_layout(
+    const std::function<void(const KernelRow&)>& add_row);
+
+/// Times one query of the swept contact, and one turn of its tool, on 256 x 256 x 161 voxels, in
+/// this process on this core. The paper has no such thing: ratios divide the plain loop's time.
+/// Takes some seconds.
+[[nodiscard]] std::vector<KernelRow> bench_queries(
+    const std::function<void(const KernelRow&)>& add_row);
+
+/// The part of `docs/performance.md` on kernels: the figures of one run with the machine, the
+/// compiler, the day and the command that made them. Markdown.
+[[nodiscard]] std::string performance_page(const std::vector<KernelRow>& rows,
+                                           const std::vector<KernelRow>& queries,
+                                           const std::vector<KernelRow>& layout);
+
 }  // namespace kerf

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "lab/bench/layout_bench.hpp"
-
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -10,6 +8,7 @@
 #include "controller/kernel/aligned.hpp"
 #include "controller/plan/tables/aligned_tool.hpp"
 #include "controller/plan/tables/tick_memory.hpp"
+#include "lab/bench/kernel_bench.hpp"
 #include "lab/rig/bench_scene.hpp"
 #include "lab/rig/tick_timer.hpp"
 
@@ -72,7 +71,7 @@ class LayoutBench {
         set_(**kernel_sets()),
         tool_(tool_of(kSize, Shape::ball), kExactFarid, set_) {
     memory_.hold(tool_.table().size, true);
-    bricks_.resize(memory_.bytes());
+    bricks_.resize(total_bytes(memory_.arrays()));
   }
 
   void copies() {
@@ -142,7 +141,7 @@ class LayoutBench {
         tick);
     if (baseline_ns_ == 0) baseline_ns_ = times.p50_ns;
     rows_.push_back({name, "fixed", kernels, times.p50_ns, times.p99_ns, baseline_ns_,
-                     tool_.bytes() + memory_.bytes()});
+                     tool_.bytes() + total_bytes(memory_.arrays())});
     add_row_(rows_.back());
   }
 

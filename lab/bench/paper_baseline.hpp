@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "controller/kernel/tool_offset.hpp"
+#include "controller/kernel/tool_pose.hpp"
 #include "shared/volume/voxel_grid.hpp"
 
 namespace kerf {

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "lab/bench/performance_page.hpp"
-
 #include <cstdio>
 
+#include "lab/bench/kernel_bench.hpp"
 #include "lab/rig/lab_run.hpp"
 
 namespace kerf {

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "lab/bench/query_bench.hpp"
-
 #include <algorithm>
 #include <span>
 #include <string>
@@ -11,6 +9,7 @@
 #include "controller/plan/tables/tool_points.hpp"
 #include "controller/tool/surface_samples.hpp"
 #include "controller/tool/tool_shapes.hpp"
+#include "lab/bench/kernel_bench.hpp"
 #include "lab/rig/bench_scene.hpp"
 #include "lab/rig/tick_timer.hpp"
 

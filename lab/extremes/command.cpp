@@ -11,8 +11,8 @@
 #include "lab/extremes/hands.hpp"
 #include "lab/extremes/measures.hpp"
 #include "lab/extremes/page.hpp"
-#include "lab/extremes/plot.hpp"
 #include "lab/rig/lab_run.hpp"
+#include "record/gnuplot.hpp"
 #include "shared/text/json.hpp"
 
 namespace kerf::extremes {
@@ -133,8 +133,8 @@ int Command::run(std::ostream& out) const {
     const auto name = [](const std::string& path) {
       return std::filesystem::path(path).filename().string();
     };
-    as_plot.write(lab_svg(plot_of(findings.comparison)));
-    as_hands_plot.write(lab_svg(plot_of(findings.hands)));
+    as_plot.write(gnuplot_svg(plot_of(findings.comparison)));
+    as_hands_plot.write(gnuplot_svg(plot_of(findings.hands)));
     as_page.write(page(findings.rows, findings.comparison, name(plot), name(hands_plot)));
   }
   return std::ranges::all_of(findings.rows, &Row::pass) ? 0 : 1;

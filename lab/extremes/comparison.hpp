@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "lab/extremes/row.hpp"
+#include "lab/extremes/measures.hpp"
 
 namespace kerf::extremes {
 

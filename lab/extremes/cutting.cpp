@@ -9,13 +9,11 @@
 #include <utility>
 
 #include "controller/load/scene_place.hpp"
-#include "controller/scene/scene_error.hpp"
 #include "controller/tool/tool_shapes.hpp"
 #include "controller/volume/phantom.hpp"
 #include "controller/volume/volume_crop.hpp"
 #include "controller/volume/volume_density.hpp"
 #include "controller/volume/volume_io.hpp"
-#include "hil/hil_error.hpp"
 #include "lab/extremes/measures.hpp"
 #include "lab/rig/contact_rig.hpp"
 #include "lab/rig/miller.hpp"
@@ -126,16 +124,12 @@ void measure_teeth(const Effort& effort, const RowSink& add_row) {
             0,         "%",
             2,         1.5};
     const std::filesystem::path file = effort.data / tooth.file;
-    try {
-      if (effort.data.empty()) {
-        row.skipped = "no --data";
-      } else if (!std::filesystem::exists(file)) {
-        row.skipped = std::string("no ") + tooth.file + " in --data";
-      } else {
-        row.value = 100 * milling_step(tooth_crown(file, tooth.standing));
-      }
-    } catch (const SceneError& error) {
-      throw HilError(error.what());
+    if (effort.data.empty()) {
+      row.skipped = "no --data";
+    } else if (!std::filesystem::exists(file)) {
+      row.skipped = std::string("no ") + tooth.file + " in --data";
+    } else {
+      row.value = 100 * milling_step(tooth_crown(file, tooth.standing));
     }
     add_row(std::move(row));
   }

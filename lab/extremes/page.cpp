@@ -82,14 +82,8 @@ have `[cut] model = "preston"`. Force above 150 Hz is the rms over windows of 0.
 count of an encoder is up to 0.06 mm, or 0.024 N. The second stab of `jerk` misses the crown.)"},
 };
 
-std::string number(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, value < 1000 ? "%.3g" : "%.0f", value);
-  return text;
-}
-
 std::string cell(const std::optional<double>& limit) {
-  return limit ? number(*limit) : "";
+  return limit ? page_number(*limit) : "";
 }
 
 std::string table_of(const std::vector<Row>& rows, const std::string& group) {
@@ -102,7 +96,7 @@ std::string table_of(const std::vector<Row>& rows, const std::string& group) {
       continue;
     }
     const char* verdict = !row.must ? "" : !row.pass() ? "**missed**" : "kept";
-    table += "| " + row.name + " | " + number(row.value) + " | " +
+    table += "| " + row.name + " | " + page_number(row.value) + " | " +
              (row.unit == "1" ? "" : row.unit) + " | " + cell(row.must) + " | " + cell(row.aim) +
              " | " + verdict + " |\n";
   }
@@ -110,7 +104,7 @@ std::string table_of(const std::vector<Row>& rows, const std::string& group) {
 }
 
 std::string speed(const std::optional<double>& mm_per_s) {
-  return mm_per_s ? number(*mm_per_s) + " mm/s" : "never";
+  return mm_per_s ? page_number(*mm_per_s) + " mm/s" : "never";
 }
 
 std::string compared(const Comparison& comparison, const std::string& plot) {
@@ -118,17 +112,18 @@ std::string compared(const Comparison& comparison, const std::string& plot) {
   std::string speeds;
   for (std::size_t i = 0; i < thick.losses.size(); ++i) {
     const Loss &at = thick.losses[i], &also = thin.losses[i];
-    speeds += "| " + number(at.rate_hz) + " Hz | " + speed(at.paper_mm_per_s) + " | " +
+    speeds += "| " + page_number(at.rate_hz) + " Hz | " + speed(at.paper_mm_per_s) + " | " +
               speed(also.paper_mm_per_s) + " | " +
               speed(at.proxy_mm_per_s ? at.proxy_mm_per_s : also.proxy_mm_per_s) + " |\n";
   }
   const Slide& slide = comparison.slide;
   char text[4096];
-  std::snprintf(text, sizeof text, kCompared, plot.c_str(), number(thick.paper_most_n).c_str(),
-                number(thick.paper_unfelt_mm).c_str(), number(thin.paper_unfelt_mm).c_str(),
-                thick.name.c_str(), thin.name.c_str(), speeds.c_str(),
-                number(100 * slide.paper_step).c_str(), number(100 * slide.proxy_step).c_str(),
-                number(slide.paper_degrees).c_str(), number(slide.proxy_degrees).c_str());
+  std::snprintf(text, sizeof text, kCompared, plot.c_str(), page_number(thick.paper_most_n).c_str(),
+                page_number(thick.paper_unfelt_mm).c_str(),
+                page_number(thin.paper_unfelt_mm).c_str(), thick.name.c_str(), thin.name.c_str(),
+                speeds.c_str(), page_number(100 * slide.paper_step).c_str(),
+                page_number(100 * slide.proxy_step).c_str(),
+                page_number(slide.paper_degrees).c_str(), page_number(slide.proxy_degrees).c_str());
   return text;
 }
 
@@ -140,7 +135,7 @@ std::string verdict(const std::vector<Row>& rows) {
                      " are kept" + (missed > 0 ? "; missed are\n\n" : ".\n");
   for (const Row& row : rows) {
     if (row.pass()) continue;
-    text += "* " + row.group + ", " + row.name + ": " + number(row.value) + " " + row.unit +
+    text += "* " + row.group + ", " + row.name + ": " + page_number(row.value) + " " + row.unit +
             " instead of " + cell(row.must) + "\n";
   }
   return text + "\n";

@@ -5,7 +5,8 @@
 #include <vector>
 
 #include "lab/extremes/comparison.hpp"
-#include "lab/extremes/row.hpp"
+#include "lab/extremes/hands.hpp"
+#include "lab/extremes/measures.hpp"
 
 namespace kerf::extremes {
 
@@ -13,5 +14,13 @@ namespace kerf::extremes {
 /// command that made them. `plot` and `hands_plot` are the pictures beside it. Markdown.
 [[nodiscard]] std::string page(const std::vector<Row>& rows, const Comparison& comparison,
                                const std::string& plot, const std::string& hands_plot);
+
+// Scripts for gnuplot that draw an SVG. Colours of Okabe and Ito, which differ for every kind of
+// colour vision; the paper is dashed as well.
+
+/// The paper's force and the swept proxy.
+[[nodiscard]] std::string plot_of(const Comparison& comparison);
+/// Height, force and removal of each hand.
+[[nodiscard]] std::string plot_of(const std::vector<HandRun>& hands);
 
 }  // namespace kerf::extremes

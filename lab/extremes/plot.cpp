@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "lab/extremes/plot.hpp"
-
 #include <algorithm>
 #include <cstddef>
 #include <sstream>
 
+#include "lab/extremes/page.hpp"
 #include "lab/rig/points.hpp"
 
 namespace kerf::extremes {

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "controller/kernel/point_shell/point_sums.hpp"
-#include "lab/extremes/edged_tools.hpp"
+#include "lab/extremes/measured_tools.hpp"
 #include "lab/extremes/measures.hpp"
 #include "lab/rig/posed_tool.hpp"
 #include "lab/rig/rest.hpp"

@@ -6,11 +6,11 @@
 #include <string>
 #include <vector>
 
-#include "lab/extremes/edged_tools.hpp"
+#include "lab/extremes/measured_tools.hpp"
 #include "lab/extremes/measures.hpp"
-#include "lab/rig/ct_edge.hpp"
 #include "lab/rig/exact_touch.hpp"
 #include "lab/rig/guided_tool.hpp"
+#include "lab/rig/points.hpp"
 #include "lab/rig/posed_tool.hpp"
 
 namespace kerf::extremes {

@@ -4,7 +4,7 @@
 
 #include "lab/extremes/measures.hpp"
 #include "lab/rig/bump_slide.hpp"
-#include "lab/rig/ct_edge.hpp"
+#include "lab/rig/points.hpp"
 
 namespace kerf::extremes {
 void measure_slides(const Effort& effort, const RowSink& add_row) {

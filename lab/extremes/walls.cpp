@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "lab/extremes/measured_tools.hpp"
 #include "lab/extremes/measures.hpp"
-#include "lab/extremes/shipped_bur.hpp"
 #include "lab/rig/wall_shake.hpp"
 
 namespace kerf::extremes {

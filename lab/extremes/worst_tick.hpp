@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "controller/load/loaded_scene.hpp"
+#include "controller/tool/scene_tool.hpp"
 #include "lab/rig/body.hpp"
 
 namespace kerf::extremes {
@@ -21,7 +21,7 @@ struct Trap {
 
 /// Solids that cost a query or a sweep much: flat, sharp, hollow, hardly wider than the tool,
 /// noisy, and tissue that is felt everywhere and nowhere solid; and the tooth of a CT, where `data`
-/// has it. Throws HilError where that cannot be read.
+/// has it. Throws SceneError where that cannot be read.
 [[nodiscard]] std::vector<Trap> worst_traps(const std::filesystem::path& data);
 
 /// The costliest tick that was found.

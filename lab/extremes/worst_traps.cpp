@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cmath>
 
-#include "controller/scene/scene_error.hpp"
 #include "controller/volume/volume_density.hpp"
 #include "controller/volume/volume_io.hpp"
-#include "hil/hil_error.hpp"
 #include "lab/extremes/worst_tick.hpp"
 #include "lab/rig/contact_rig.hpp"
 
@@ -37,20 +35,15 @@ Trap tissue(const char* name, double low, double high) {
 }
 
 Trap tooth(const std::filesystem::path& file) {
-  try {
-    const SourceVolume source = read_volume(file, {.spacing_mm = std::array{0.1, 0.1, 0.1}});
-    Body body;
-    VolumeImage image = apply_window(source, range_window(source));
-    const Density iso = otsu_threshold(image);
-    body = {image.grid, std::move(image.density)};
-    // Along the middle of its slices to the first solid voxel.
-    const std::int32_t x = body.grid.nx / 2, y = body.grid.ny / 2;
-    std::int32_t z = body.grid.nz - 1;
-    while (z > 0 && body.density[body.grid.index(x, y, z)] < iso) --z;
-    return {"tooth", [body] { return body; }, {double(x), double(y), double(z)}, iso};
-  } catch (const SceneError& error) {
-    throw HilError(error.what());
-  }
+  const SourceVolume source = read_volume(file, {.spacing_mm = std::array{0.1, 0.1, 0.1}});
+  VolumeImage image = apply_window(source, range_window(source));
+  const Density iso = otsu_threshold(image);
+  const Body body{image.grid, std::move(image.density)};
+  // Along the middle of its slices to the first solid voxel.
+  const std::int32_t x = body.grid.nx / 2, y = body.grid.ny / 2;
+  std::int32_t z = body.grid.nz - 1;
+  while (z > 0 && body.density[body.grid.index(x, y, z)] < iso) --z;
+  return {"tooth", [body] { return body; }, {double(x), double(y), double(z)}, iso};
 }
 
 }  // namespace

@@ -9,10 +9,8 @@
 #include <optional>
 #include <ostream>
 #include <thread>
-#include <utility>
 
 #include "controller/load/scene_load.hpp"
-#include "controller/scene/scene_error.hpp"
 #include "hil/devmodel/falcon_model.hpp"
 #include "hil/devmodel/omni_model.hpp"
 #include "hil/devmodel/wooden_model.hpp"
@@ -175,12 +173,7 @@ int Command::run(std::ostream& out) const {
     overrides.torque_scale = torque_scale_of(*overrides.personality);
     overrides.phantom_size = VoxelGrid{64, 64, 40};
     overrides.rate_hz = rate_hz_;
-    LoadedScene scene;
-    try {
-      scene = load_scene(scene_, overrides);
-    } catch (const SceneError& error) {
-      throw HilError(error.what());
-    }
+    const LoadedScene scene = load_scene(scene_, overrides);
     hand.unit_mm = hand_unit_mm(scene);
     const Subject subject{.scene = scene, .hand = hand};
 

@@ -2,7 +2,6 @@
 #include "lab/faults/contract.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <cstddef>
 #include <cstdio>
 

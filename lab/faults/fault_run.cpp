@@ -3,10 +3,9 @@
 
 #include <algorithm>
 #include <atomic>
-#include <cstddef>
 #include <memory>
 
-#include "controller/device/driver/make_driver.hpp"
+#include "controller/device/driver/device_driver.hpp"
 #include "controller/plan/compile.hpp"
 #include "controller/shell/servo_loop.hpp"
 #include "controller/shell/watchdog.hpp"

@@ -15,13 +15,14 @@ class LabCommand {
   LabCommand& operator=(const LabCommand&) = delete;
 
   /// After parsing.
-  [[nodiscard]] bool chosen() const;
+  [[nodiscard]] bool chosen() const { return app_.chosen(); }
   /// Measures, tells each row on `out`, writes the files. Returns 1 where a check failed, else 0.
-  /// Throws `HilError`.
+  /// Throws std::exception with one line.
   [[nodiscard]] virtual int run(std::ostream& out) const = 0;
 
  protected:
-  LabCommand(Arguments& program, const char* name, const char* about);
+  LabCommand(Arguments& program, const char* name, const char* about)
+      : app_(program.command(name, about)) {}
 
   Arguments app_;
 };

@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "lab/rig/lab_run.hpp"
 
+#include <cstdio>
 #include <filesystem>
 #include <map>
 #include <utility>
 
 #include "hil/hil_error.hpp"
-#include "record/gnuplot.hpp"
-#include "record/record_error.hpp"
 #include "shared/posix/cores.hpp"
 #include "shared/posix/new_file.hpp"
 #include "shared/posix/page_part.hpp"
@@ -46,14 +45,10 @@ std::string lab_provenance() {
          " " KERF_FLAGS " (kernels of an instruction set always -O3).";
 }
 
-std::string lab_svg(const std::string& script) {
-  try {
-    return gnuplot_svg(script);
-  } catch (const RecordError& error) {
-    throw HilError(error.what());
-  } catch (const FileError& error) {
-    throw HilError(error.what());
-  }
+std::string page_number(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, value < 1000 ? "%.3g" : "%.0f", value);
+  return text;
 }
 
 LabOutput::LabOutput(const char* option, std::string path)

@@ -13,8 +13,8 @@ int pin_lab(int core);
 /// Day, processor, compiler and its flags of a run, for the page that it writes. One line.
 [[nodiscard]] std::string lab_provenance();
 
-/// The picture that gnuplot draws for a script with `set terminal svg`. Throws `HilError`.
-[[nodiscard]] std::string lab_svg(const std::string& script);
+/// Three digits, or all before the point: how pages show their figures.
+[[nodiscard]] std::string page_number(double value);
 
 /// A file that is tried before the measurement, so that a wrong name costs nothing, and made after
 /// it, so that a run which is stopped leaves nothing behind. Does nothing for an empty path. Throws

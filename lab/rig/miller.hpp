@@ -71,15 +71,6 @@ class Miller {
   double removed_mm3_ = 0, fed_mm3_ = 0;
 };
 
-/// What a hand takes off a flat at height 0 in 0.2 s of a stroke down to 0.9 mm from it, mm^3.
-inline double removed_by_stroke(const LoadedScene& scene) {
-  Miller miller(scene);
-  for (int step = 0; step < 10; ++step) {
-    static_cast<void>(miller.hold({0.1 * step, 0.8 - 0.1 * step, 0}, 0.02));
-  }
-  return miller.removed_mm3();
-}
-
 /// What a hand takes off a flat at height 0 in half a second by a force of its own, up to 1.2 N and
 /// back whatever gives way, mm^3.
 inline double removed_by_press(const LoadedScene& scene) {

@@ -1,12 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <vector>
 
-#include "controller/load/loaded_scene.hpp"
 #include "controller/tool/tool_shapes.hpp"
 #include "lab/rig/points.hpp"
 

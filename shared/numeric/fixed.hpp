@@ -7,8 +7,6 @@
 #include <cstdint>
 #include <limits>
 
-#include "shared/numeric/scalar.hpp"
-
 namespace kerf {
 
 /// Narrows to 32 bits; a value outside the range becomes the nearest end of the range.
@@ -173,7 +171,5 @@ template <std::floating_point S>
 [[nodiscard]] constexpr bool is_finite(S x) noexcept {
   return x - x == S(0);
 }
-
-static_assert(Scalar<Q16> && Scalar<Q30> && Scalar<float> && Scalar<double>);
 
 }  // namespace kerf

@@ -5,7 +5,6 @@
 #include <cstdint>
 
 #include "shared/numeric/fixed.hpp"
-#include "shared/numeric/scalar.hpp"
 
 namespace kerf {
 

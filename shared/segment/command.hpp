@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <cstdint>
+#include <iterator>
 
 namespace kerf {
 
@@ -42,6 +45,18 @@ struct CommandLimits {
 };
 
 /// True where `command` may go to the servo.
-[[nodiscard]] bool is_valid(const Command& command, const CommandLimits& limits) noexcept;
+[[nodiscard]] inline bool is_valid(const Command& command, const CommandLimits& limits) noexcept {
+  if (!std::all_of(std::begin(command.value), std::end(command.value),
+                   [](double v) { return std::isfinite(v); })) {
+    return false;
+  }
+  switch (command.kind) {
+    case CommandKind::select_tool:
+      return command.argument < limits.tools;
+    case CommandKind::hold:
+      return command.argument <= 1;
+  }
+  return false;
+}
 
 }  // namespace kerf

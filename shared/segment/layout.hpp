@@ -154,8 +154,7 @@ struct TickRecord {
 inline constexpr std::uint32_t kFlagButton1 = 1U << 0;
 inline constexpr std::uint32_t kFlagButton2 = 1U << 1;
 inline constexpr std::uint32_t kFlagContact = 1U << 2;
-inline constexpr std::uint32_t kFlagSaturated = 1U << 3;  ///< a number met the end of its range
-inline constexpr std::uint32_t kFlagClamped = 1U << 4;    ///< force or slew limit was active
+inline constexpr std::uint32_t kFlagClamped = 1U << 4;  ///< force or slew limit was active
 inline constexpr std::uint32_t kFlagStaleInput = 1U << 5;
 inline constexpr std::uint32_t kFlagDeviceFault = 1U << 6;
 inline constexpr std::uint32_t kFlagMotorsOn = 1U << 7;

@@ -2,7 +2,6 @@
 #include "shared/segment/segment_memory.hpp"
 
 #include <cerrno>
-#include <ctime>
 #include <string>
 #include <utility>
 

@@ -73,14 +73,6 @@ inline constexpr std::uint16_t kReportMark = 0x001E;
 inline constexpr std::uint16_t kReportFlags = 0x1007;
 inline constexpr std::uint16_t kReportFw = 0x5746;
 
-/// Gimbal angle of axis 0..2 (yaw, pitch, roll) in rad; a pair without signal gives the middle.
-[[nodiscard]] constexpr double gimbal_rad(std::size_t axis, std::uint16_t a,
-                                          std::uint16_t b) noexcept {
-  const double sum = static_cast<double>(a) + b;
-  const double ratio = sum > 0 ? a / sum : 0.5;
-  return kGimbalSlopeRad[axis] * ratio + kGimbalOffsetRad[axis];
-}
-
 }  // namespace omni
 
 /// Host side.

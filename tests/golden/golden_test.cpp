@@ -9,7 +9,7 @@
 
 #include <doctest/doctest.h>
 
-#include "controller/scene/scene_words.hpp"
+#include "controller/scene/scene.hpp"
 #include "tests/golden/golden_run.hpp"
 
 using namespace kerf;

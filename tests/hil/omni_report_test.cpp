@@ -8,6 +8,7 @@
 #include <doctest/doctest.h>
 
 #include "hil/devmodel/omni_model.hpp"
+#include "shared/wire/omni_constants.hpp"
 #include "tests/hil/model_runs.hpp"
 
 namespace {
@@ -90,7 +91,8 @@ TEST_CASE("gimbal pots carry the orientation, and an upright shaft stays upright
   run(model, goal, kSecond);
   const auto report = model.next_report();
   const auto angle = [&](std::size_t axis) {
-    return kerf::omni::gimbal_rad(axis, report.pot_a[axis], report.pot_b[axis]);
+    const double a = report.pot_a[axis], b = report.pot_b[axis];
+    return kerf::omni::kGimbalSlopeRad[axis] * a / (a + b) + kerf::omni::kGimbalOffsetRad[axis];
   };
   constexpr double kPotStepRad = 5.48 / 65536;
   CHECK(std::abs(angle(0) - 0.3) < kPotStepRad);

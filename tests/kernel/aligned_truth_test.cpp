@@ -9,6 +9,7 @@
 #include <doctest/doctest.h>
 
 #include "controller/plan/tables/aligned_tool.hpp"
+#include "tests/kernel/definitions.hpp"
 #include "tests/kernel/exact_field.hpp"
 
 using namespace kerf;

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "controller/kernel/aligned_reference.hpp"
+#include "tests/kernel/definitions.hpp"
 #include "tests/kernel/support.hpp"
 
 namespace kerf::test {

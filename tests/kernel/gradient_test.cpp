@@ -9,6 +9,7 @@
 #include <doctest/doctest.h>
 #include <rapidcheck.h>
 
+#include "tests/kernel/definitions.hpp"
 #include "tests/kernel/support.hpp"
 
 using namespace kerf;

@@ -9,7 +9,7 @@
 
 #include <doctest/doctest.h>
 
-#include "controller/kernel/aligned_reference.hpp"
+#include "tests/kernel/definitions.hpp"
 #include "tests/kernel/support.hpp"
 
 using namespace kerf;

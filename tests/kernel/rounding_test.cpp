@@ -9,7 +9,7 @@
 
 #include <doctest/doctest.h>
 
-#include "controller/kernel/aligned_corner.hpp"
+#include "controller/kernel/aligned_table.hpp"
 #include "controller/kernel/gradient.hpp"
 #include "controller/kernel/overlap.hpp"
 #include "controller/kernel/removal_rate.hpp"

@@ -10,11 +10,11 @@
 
 #include <doctest/doctest.h>
 
-#include "controller/kernel/splat_reference.hpp"
 #include "controller/plan/tables/sample_tool.hpp"
 #include "controller/plan/tables/tick_memory.hpp"
 #include "tests/kernel/aligned_support.hpp"
 #include "tests/kernel/case_count.hpp"
+#include "tests/kernel/definitions.hpp"
 #include "tests/kernel/hash.hpp"
 
 using namespace kerf;

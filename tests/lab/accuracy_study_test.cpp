@@ -8,10 +8,8 @@
 
 #include <doctest/doctest.h>
 
-#include "lab/accuracy/export.hpp"
 #include "lab/accuracy/label_places.hpp"
 #include "lab/accuracy/page.hpp"
-#include "lab/accuracy/plot.hpp"
 #include "lab/accuracy/study.hpp"
 
 using namespace kerf::accuracy;

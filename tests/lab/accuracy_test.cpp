@@ -17,7 +17,6 @@ using namespace kerf::accuracy;
 
 namespace {
 
-constexpr double kVoxelMm = 0.125;
 constexpr double kPi = std::numbers::pi;
 
 BallTool five_voxels() {

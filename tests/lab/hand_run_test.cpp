@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "lab/extremes/hand_run.hpp"
-
 #include <cmath>
 #include <numbers>
 
 #include <doctest/doctest.h>
+
+#include "lab/extremes/hands.hpp"
 
 using namespace kerf::extremes;
 

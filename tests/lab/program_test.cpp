@@ -8,7 +8,7 @@
 
 #include <doctest/doctest.h>
 
-#include "lab/bench/performance_page.hpp"
+#include "lab/bench/kernel_bench.hpp"
 #include "lab/rig/lab_run.hpp"
 
 namespace {

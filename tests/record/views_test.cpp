@@ -3,9 +3,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "record/export_csv.hpp"
 #include "record/manifest.hpp"
-#include "record/plot.hpp"
 #include "record/summary.hpp"
 #include "tests/record/record_support.hpp"
 

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/servo/coupling.hpp"
-
 #include <array>
 #include <cstddef>
 #include <cstdint>
 
 #include <doctest/doctest.h>
 #include <rapidcheck.h>
+
+#include "controller/servo/contact_plan.hpp"
 
 using kerf::coupling_force;
 using kerf::DeviceVec;

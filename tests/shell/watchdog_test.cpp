@@ -9,7 +9,6 @@
 #include <sched.h>
 
 #include "controller/device/driver/omni_driver.hpp"
-#include "controller/shell/watchdog_thread.hpp"
 #include "shared/posix/cores.hpp"
 #include "shared/wire/omni_packet.hpp"
 

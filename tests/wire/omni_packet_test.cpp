@@ -74,14 +74,6 @@ TEST_CASE("a cleared status bit means pressed or docked") {
   }
 }
 
-TEST_CASE("gimbal angles follow the ratio of the two wipers") {
-  CHECK(kerf::omni::gimbal_rad(0, 0x8000, 0x8000) == doctest::Approx(0.0));
-  CHECK(kerf::omni::gimbal_rad(0, 0xFFFF, 0) == doctest::Approx(2.74));
-  CHECK(kerf::omni::gimbal_rad(1, 0xFFFF, 0) == doctest::Approx(-2.64));
-  CHECK(kerf::omni::gimbal_rad(2, 0, 0xFFFF) == doctest::Approx(-2.38));
-  CHECK(kerf::omni::gimbal_rad(1, 0, 0) == doctest::Approx(0.0));  // no signal
-}
-
 TEST_CASE("any report survives the wire") {
   CHECK(rc::check([](std::array<std::int16_t, 3> encoder, std::array<std::uint16_t, 3> a,
                      std::array<std::uint16_t, 3> b, bool button1, bool button2, bool docked,

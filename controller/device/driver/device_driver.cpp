@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "controller/device/driver/device_driver.hpp"
 
+#include "controller/device/driver/falcon_driver.hpp"
+#include "controller/device/driver/omni_driver.hpp"
+#include "controller/device/driver/wooden_driver.hpp"
+
 namespace kerf {
 
 DeviceReport DeviceDriver::read() noexcept {
@@ -45,6 +49,18 @@ bool DeviceDriver::release_for_good() noexcept {
   Packet packet;
   const std::size_t size = compose_release(packet);
   return port_.send_last(std::span(packet).first(size));
+}
+
+std::unique_ptr<DeviceDriver> make_driver(Personality personality, PacketPort& port) {
+  switch (personality) {
+    case Personality::falcon:
+      return std::make_unique<FalconDriver>(port);
+    case Personality::woodenhaptics:
+      return std::make_unique<WoodenDriver>(port);
+    case Personality::omni:
+      break;
+  }
+  return std::make_unique<OmniDriver>(port);
 }
 
 }  // namespace kerf

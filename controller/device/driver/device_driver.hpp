@@ -5,11 +5,13 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <span>
 
 #include "controller/device/port/packet_port.hpp"
 #include "controller/servo/device_report.hpp"
 #include "controller/servo/servo_output.hpp"
+#include "shared/wire/personality.hpp"
 
 namespace kerf {
 
@@ -72,5 +74,8 @@ class DeviceDriver {
   DeviceReport last_;
   std::uint64_t refused_ = 0;
 };
+
+/// The driver of a device; `port` outlives it.
+[[nodiscard]] std::unique_ptr<DeviceDriver> make_driver(Personality personality, PacketPort& port);
 
 }  // namespace kerf

@@ -8,10 +8,6 @@
 
 namespace kerf {
 
-void FalconDriver::start() noexcept {
-  static_cast<void>(release());
-}
-
 bool FalconDriver::take(std::span<const std::uint8_t> packet, DeviceReport& report) noexcept {
   const auto said = falcon::decode_report(packet);
   if (!said) return false;

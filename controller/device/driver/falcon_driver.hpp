@@ -13,7 +13,7 @@ class FalconDriver final : public DeviceDriver {
  public:
   using DeviceDriver::DeviceDriver;
 
-  void start() noexcept override;
+  void start() noexcept override { static_cast<void>(release()); }
 
  private:
   [[nodiscard]] bool take(std::span<const std::uint8_t> packet,

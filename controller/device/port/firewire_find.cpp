@@ -12,8 +12,8 @@
 
 #include <linux/firewire-cdev.h>
 
-#include "controller/device/port/absent_device.hpp"
 #include "controller/device/port/firewire_file.hpp"
+#include "controller/device/port/packet_port.hpp"
 #include "shared/wire/omni_constants.hpp"
 
 namespace kerf {

@@ -8,6 +8,8 @@
 #include <system_error>
 #include <thread>
 
+#include "shared/wire/omni_packet.hpp"
+
 namespace kerf {
 namespace {
 

@@ -13,7 +13,6 @@
 #include "controller/device/port/firewire_requests.hpp"
 #include "controller/device/port/firewire_streams.hpp"
 #include "controller/device/port/packet_port.hpp"
-#include "shared/wire/omni_packet.hpp"
 
 namespace kerf {
 

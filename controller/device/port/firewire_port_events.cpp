@@ -2,8 +2,8 @@
 // What the kernel tells a FirewirePort: received packets, bus resets, answers, resources.
 #include <linux/firewire-cdev.h>
 
-#include "controller/device/port/firewire_event.hpp"
 #include "controller/device/port/firewire_port.hpp"
+#include "controller/device/port/firewire_requests.hpp"
 
 namespace kerf {
 

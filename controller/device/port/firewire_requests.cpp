@@ -3,8 +3,6 @@
 
 #include <linux/firewire-cdev.h>
 
-#include "controller/device/port/firewire_event.hpp"
-
 namespace kerf {
 namespace {
 

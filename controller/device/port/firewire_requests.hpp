@@ -1,16 +1,33 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <optional>
 #include <span>
 #include <string>
 
+#include <linux/firewire-cdev.h>
+
 #include "controller/device/port/firewire_file.hpp"
 
 namespace kerf {
+
+/// Where the variable part of an event begins: events have padding behind it, so their size is not
+/// that of their fixed part.
+inline constexpr std::size_t kResponseDataAt = offsetof(fw_cdev_event_response, data);
+inline constexpr std::size_t kIsoHeadersAt = offsetof(fw_cdev_event_iso_interrupt, header);
+
+/// The fixed part of an event; what is missing of a short one is zero.
+template <class Event>
+[[nodiscard]] Event event_as(std::span<const std::uint8_t> bytes) noexcept {
+  Event event{};
+  std::memcpy(&event, bytes.data(), std::min(sizeof event, bytes.size()));
+  return event;
+}
 
 /// A channel and its bandwidth, asked for or given.
 struct FirewireClaim {

@@ -7,7 +7,7 @@
 
 #include <linux/firewire-cdev.h>
 
-#include "controller/device/port/firewire_event.hpp"
+#include "controller/device/port/firewire_requests.hpp"
 
 namespace kerf {
 namespace {

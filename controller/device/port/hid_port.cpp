@@ -16,7 +16,7 @@
 #include <sys/ioctl.h>
 #include <unistd.h>
 
-#include "controller/device/port/absent_device.hpp"
+#include "controller/device/port/packet_port.hpp"
 #include "shared/posix/cores.hpp"
 #include "shared/wire/wooden_constants.hpp"
 

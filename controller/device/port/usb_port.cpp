@@ -10,7 +10,7 @@
 #include <libusb-1.0/libusb.h>
 #include <unistd.h>
 
-#include "controller/device/port/absent_device.hpp"
+#include "controller/device/port/packet_port.hpp"
 #include "shared/posix/cores.hpp"
 #include "shared/posix/monotonic_clock.hpp"
 

@@ -5,8 +5,8 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "controller/kernel/proxy/constraint_plane.hpp"
 #include "controller/kernel/proxy/contact_peak.hpp"
-#include "controller/kernel/proxy/contact_space.hpp"
 #include "controller/kernel/proxy/spiral_points.hpp"
 #include "controller/kernel/proxy/tool_turn.hpp"
 #include "shared/numeric/fixed.hpp"
@@ -16,10 +16,9 @@ namespace kerf {
 /// Caps: more samples on a ball around its contact, for its height on a sharp edge (docs/theory.md
 /// 3.5).
 ///
-/// An edge touches in a strip about a unit wide, which holds few of the ball's own samples, and
-/// trilinear density has summits there that are sharper than the edge. A wide cap finds the middle
-/// of what touches. A narrow one around it, its samples 0.2 units apart, tells the height: by
-/// peak_height as of any shape, and a little more, since no sample is at the summit.
+/// A wide cap finds the middle of what touches. A narrow one around it, its samples 0.2 units
+/// apart, tells the height: by peak_height as of any shape, and a little more, since no sample is
+/// at the summit.
 ///
 /// On 1000 edges of 90 degrees a ball of 8 rests within 0.114 units of the iso-surface, with the
 /// wide cap alone within 0.2. By the highest sample the force would step by 14 %, not 3, as it
@@ -64,11 +63,9 @@ template <class N>
            {-(sign * out.x), fall * out.z, -out.y}}};
 }
 
-/// How far the caps count, 0..1, by the area in touch (docs/theory.md 3.5). On a flat of this slope
-/// a ball's weights sum to count height^5 / (10 slope reach). With half of that sum or more it is
-/// no edge: a body of radius 8 or larger, a flat or a crease, which the ball's own samples know
-/// better. With 0.35 or less it is one. (A body of radius 6 has 0.43, edges of 90 degrees 0.15 to
-/// 0.4.)
+/// How far the caps count, 0..1, by the area in touch over that on a flat (docs/theory.md 3.5).
+/// With half of it or more it is no edge: a body of radius 8 or larger, a flat or a crease. With
+/// 0.35 or less it is one. (A body of radius 6 has 0.43, edges of 90 degrees 0.15 to 0.4.)
 ///
 /// Coarse where contact is faint: in fixed point the mean weight has steps of 2^-24. At a height of
 /// 0.08 on a flat (slope 0.5, reach 8) it is 1.4 steps, so the caps count wholly or not at all.

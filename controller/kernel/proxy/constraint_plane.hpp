@@ -5,10 +5,18 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "controller/kernel/proxy/contact_space.hpp"
 #include "shared/numeric/numbers.hpp"
+#include "shared/numeric/vec.hpp"
 
 namespace kerf {
+
+/// Where the swept contact is solved: axes and origin of the world; one unit is the edge of the
+/// finest voxel of the scene's solid volumes (docs/theory.md 1.2). docs/contact.md calls it a
+/// voxel.
+struct ContactSpace;
+
+template <class S>
+using ContactVec = Vec<S, ContactSpace>;
 
 /// Most planes that hold the tool at one place: a face, a crease, a corner.
 inline constexpr std::size_t kMaxPlanes = 3;

@@ -84,10 +84,8 @@ class Loads {
   }
 };
 
-/// The place nearest to `displacement` that all planes allow (docs/theory.md 4.3). Tries each set
-/// of touched planes; the answer is the one whose loads push and whose place keeps every plane.
-/// Where planes leave no place, as two walls of a slot without play, the oldest one is left out: it
-/// stands last.
+/// The place nearest to `displacement` that all planes allow (docs/theory.md 4.3). Where planes
+/// leave no place, as two walls of a slot without play, the oldest one is left out: it stands last.
 ///
 /// |displacement| <= 16384 units. At most 8 + 4 + 2 sets. Fixed: within 4 steps of each plane where
 /// the displacement is some units long.

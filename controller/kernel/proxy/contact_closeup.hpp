@@ -7,7 +7,6 @@
 #include <cstdint>
 
 #include "controller/kernel/point_shell/close_sums.hpp"
-#include "controller/kernel/point_shell/close_table.hpp"
 #include "controller/kernel/point_shell/point_sums.hpp"
 #include "controller/kernel/point_shell/point_table.hpp"
 #include "controller/kernel/proxy/contact_peak.hpp"
@@ -121,11 +120,9 @@ constexpr void peak_offset(const PointSums<N>& sums, typename N::Ratio e,
   }
 }
 
-/// The peak of density over a tool's surface, from the sums over its close samples (docs/theory.md
-/// 3.5).
-///
-/// The mean of the height, weighted with its power p, is the summit's times (p + 1) / (p + 1 + e).
-/// Two such means, with p = 32 and 64, tell e and the summit; and where it is, as in peak_offset.
+/// The peak of density over a tool's surface, from the sums over its close samples: two means, with
+/// powers 32 and 64, tell e and the summit (docs/theory.md 3.5); and where it is, as in
+/// peak_offset.
 template <class N>
 [[nodiscard]] constexpr Closeup<N> peak_of(const CloseSums<N>& sums) noexcept {
   using Ratio = typename N::Ratio;

@@ -3,7 +3,7 @@
 
 #include <cstdint>
 
-#include "controller/kernel/proxy/contact_space.hpp"
+#include "controller/kernel/proxy/constraint_plane.hpp"
 #include "shared/numeric/numbers.hpp"
 
 namespace kerf {

@@ -7,7 +7,6 @@
 
 #include "controller/kernel/point_shell/point_table.hpp"
 #include "controller/kernel/proxy/constraint_plane.hpp"
-#include "controller/kernel/proxy/contact_space.hpp"
 #include "controller/kernel/proxy/tool_turn.hpp"
 #include "shared/numeric/fixed.hpp"
 #include "shared/numeric/vec.hpp"
@@ -131,11 +130,8 @@ template <class N>
 }
 
 /// Height of the peak of density over the tool's surface, from its power sums (docs/theory.md 3.2).
-///
-/// Over a quadratic peak of height H the mean of r, weighted with r^p, is H (p + 1) / (p + 1 + e),
-/// whatever the curvatures and the number of samples. e is half the number of dimensions over which
-/// r falls. A ball touches in a point, e = 1. Another shape may also touch in a line (1/2), in a
-/// face (0) or with a corner (2): there the mean of r^2 tells e.
+/// e is half the number of dimensions over which r falls: 1 for a ball; of another shape the mean
+/// of r^2 tells it.
 template <class N>
 [[nodiscard]] constexpr typename N::Ratio peak_height(const PointMeans<N>& means,
                                                       bool round) noexcept {
@@ -177,15 +173,10 @@ template <class N>
   return direction<N>(ContactVec<Ratio>{mixed(a.x, b.x), mixed(a.y, b.y), mixed(a.z, b.z)});
 }
 
-/// A ball's normal (docs/theory.md 3.4): minus the weighted mean offset. It reads no gradient, so
-/// it does not jump at the borders of cells; and it is right in a wall of two voxels, behind whose
-/// middle gradients point onward.
-///
-/// In a groove of the ball's own radius it points out of the bottom, whichever wall the ball is in.
-/// There the offsets spread over half a turn, and their mean is short: 2 / pi of the reach.
-/// `downhill`, the derivative of the peak, takes over as the mean falls from 0.85 to 0.7 of the
-/// reach and as the two directions part from 20 to 50 degrees. (With 30 to 60 the force steps by 5
-/// % there, not 2.)
+/// A ball's normal (docs/theory.md 3.4): minus the weighted mean offset. In a groove of the ball's
+/// own radius that points out of the bottom, whichever wall the ball is in: `downhill`, the
+/// derivative of the peak, takes over as the mean falls from 0.85 to 0.7 of the reach and as the
+/// two directions part from 20 to 50 degrees. (With 30 to 60 the force steps by 5 % there, not 2.)
 template <class N>
 [[nodiscard]] constexpr ContactVec<typename N::Unit> ball_normal(
     const PointMeans<N>& means, ContactVec<typename N::Unit> downhill) noexcept {

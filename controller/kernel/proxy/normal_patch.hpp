@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cstddef>
 
+#include "controller/kernel/proxy/constraint_plane.hpp"
 #include "controller/kernel/proxy/contact_peak.hpp"
-#include "controller/kernel/proxy/contact_space.hpp"
 #include "controller/kernel/proxy/spiral_points.hpp"
 #include "controller/kernel/proxy/tool_turn.hpp"
 #include "shared/numeric/fixed.hpp"

@@ -10,10 +10,8 @@ namespace kerf {
 /// Whether the proxy has a place, and if not whether one is still looked for.
 enum class Placing : std::uint8_t { searching, placed, refused };
 
-/// Finds the first place of a proxy (docs/theory.md 4.7): the goal if that is free, else the
-/// nearest free place along 26 directions. Each tick tries half of them, every second tick one unit
-/// farther out. From there the sweep slides to the place nearest to the goal. With nothing free
-/// within kReach the tool is refused until its own goal is free.
+/// Finds the first place of a proxy (docs/theory.md 4.7). Each tick tries half of the 26
+/// directions. With nothing free within kReach the tool is refused until its own goal is free.
 ///
 /// At most 14 queries a tick. Only the tool's surface is felt: what lies wholly inside of the tool
 /// does not count as solid here.

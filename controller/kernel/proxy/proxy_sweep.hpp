@@ -90,13 +90,9 @@ struct Swept {
   bool buried = false;  ///< nothing to push against: the start rule is needed
 };
 
-/// One tick of the proxy (docs/theory.md 4): it moves from a pose that the solid allows towards a
-/// goal. No sample of the tool moves farther than kStep in one step, and each step ends with a
-/// query; longer steps are taken only where nothing can be felt. When its queries or its attempts
-/// are spent the proxy lags. It never jumps, so a wall of 2 units holds it at any speed.
-///
-/// The orientation goes first and the centre gives way to it: a stylus without torque motors turns
-/// the tool whatever the tooth says. Where no centre allows a turn, the orientation lags too.
+/// One tick of the proxy (docs/theory.md 4.2, 4.6): it moves from a pose that the solid allows
+/// towards a goal, first the orientation, then the centre. When its queries or its attempts are
+/// spent it lags. It never jumps, so a wall of 2 units holds it at any speed.
 ///
 /// From an allowed place the tool does not go farther from its goal, but by kAstray: in a groove of
 /// its own shape planes that change from query to query would lead it on and on.

@@ -193,32 +193,12 @@ struct Simd {
 
 #include "controller/kernel/sets/correlate_vector.hpp"
 #include "controller/kernel/sets/cover_lanes_vector.hpp"
-#include "controller/kernel/sets/cover_loops.hpp"
 #include "controller/kernel/sets/gather_vector.hpp"
 #include "controller/kernel/sets/point_vector.hpp"
-#include "controller/kernel/sets/splat_loops.hpp"
+#include "controller/kernel/sets/the_set.hpp"
 
 namespace kerf {
 
-const KernelSet kAvx2Set{"avx2",
-                         Simd::kLanes,
-                         false,
-                         copy_box,
-                         correlate,
-                         press,
-                         cut,
-                         gather,
-                         place,
-                         splat,
-                         press_sums,
-                         cover,
-                         cover_sums,
-                         weigh_row,
-                         weigh_again,
-                         take_steps,
-                         place_point_samples,
-                         sum_point_samples,
-                         read_point_samples,
-                         sum_close_samples};
+const KernelSet kAvx2Set = the_set("avx2", false);
 
 }  // namespace kerf

@@ -175,32 +175,12 @@ struct Simd {
 
 #include "controller/kernel/sets/correlate_vector.hpp"
 #include "controller/kernel/sets/cover_lanes_vector.hpp"
-#include "controller/kernel/sets/cover_loops.hpp"
 #include "controller/kernel/sets/gather_vector.hpp"
 #include "controller/kernel/sets/point_vector.hpp"
-#include "controller/kernel/sets/splat_loops.hpp"
+#include "controller/kernel/sets/the_set.hpp"
 
 namespace kerf {
 
-const KernelSet kAvx512Set{"avx512",
-                           Simd::kLanes,
-                           true,
-                           copy_box,
-                           correlate,
-                           press,
-                           cut,
-                           gather,
-                           place,
-                           splat,
-                           press_sums,
-                           cover,
-                           cover_sums,
-                           weigh_row,
-                           weigh_again,
-                           take_steps,
-                           place_point_samples,
-                           sum_point_samples,
-                           read_point_samples,
-                           sum_close_samples};
+const KernelSet kAvx512Set = the_set("avx512", true);
 
 }  // namespace kerf

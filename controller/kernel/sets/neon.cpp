@@ -97,32 +97,11 @@ struct Simd {
 
 #include "controller/kernel/sets/correlate_vector.hpp"
 #include "controller/kernel/sets/cover_lanes.hpp"
-#include "controller/kernel/sets/cover_loops.hpp"
-#include "controller/kernel/sets/gather_loops.hpp"
-#include "controller/kernel/sets/point_loops.hpp"
-#include "controller/kernel/sets/splat_loops.hpp"
+#include "controller/kernel/sets/plain_loops.hpp"
+#include "controller/kernel/sets/the_set.hpp"
 
 namespace kerf {
 
-const KernelSet kNeonSet{"neon",
-                         Simd::kLanes,
-                         false,
-                         copy_box,
-                         correlate,
-                         press,
-                         cut,
-                         gather,
-                         place,
-                         splat,
-                         press_sums,
-                         cover,
-                         cover_sums,
-                         weigh_row,
-                         weigh_again,
-                         take_steps,
-                         place_point_samples,
-                         sum_point_samples,
-                         read_point_samples,
-                         sum_close_samples};
+const KernelSet kNeonSet = the_set("neon", false);
 
 }  // namespace kerf

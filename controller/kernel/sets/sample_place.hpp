@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
 
-#include "controller/kernel/sample_table.hpp"
+#include "controller/kernel/splat_table.hpp"
 
 // Places and weights of samples as loops that a compiler turns into vectors. Included by the
 // translation units of the instruction sets only; all of it has internal linkage, for the reason

@@ -201,32 +201,11 @@ BoxCut cut(const TickBox& tool, const CutRate& rate, const VoxelGrid& grid, Dens
 }  // namespace kerf
 
 #include "controller/kernel/sets/cover_lanes.hpp"
-#include "controller/kernel/sets/cover_loops.hpp"
-#include "controller/kernel/sets/gather_loops.hpp"
-#include "controller/kernel/sets/point_loops.hpp"
-#include "controller/kernel/sets/splat_loops.hpp"
+#include "controller/kernel/sets/plain_loops.hpp"
+#include "controller/kernel/sets/the_set.hpp"
 
 namespace kerf {
 
-const KernelSet kScalarSet{"scalar",
-                           kLanes,
-                           false,
-                           copy_box,
-                           correlate,
-                           press,
-                           cut,
-                           gather,
-                           place,
-                           splat,
-                           press_sums,
-                           cover,
-                           cover_sums,
-                           weigh_row,
-                           weigh_again,
-                           take_steps,
-                           place_point_samples,
-                           sum_point_samples,
-                           read_point_samples,
-                           sum_close_samples};
+const KernelSet kScalarSet = the_set("scalar", false);
 
 }  // namespace kerf

@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "controller/plan/cost/work_budget.hpp"
-#include "controller/scene/scene_words.hpp"
+#include "controller/scene/scene.hpp"
 #include "shared/posix/provenance.hpp"
 #include "shared/text/json.hpp"
 
@@ -36,12 +36,6 @@ std::vector<ToolWork> works_of(const Explanation& explanation) {
     works.back().us += work_us(tick.most);
   }
   return works;
-}
-
-std::uint64_t total_bytes(const Explanation& explanation) {
-  std::uint64_t sum = 0;
-  for (const ArrayBytes& array : explanation.arrays) sum += array.bytes;
-  return sum;
 }
 
 template <class... Values>
@@ -155,7 +149,7 @@ std::string explanation_text(const Explanation& e) {
   text += budget_text(e);
   text += "\nmemory\n";
   for (const ArrayBytes& array : e.arrays) text += memory_line(array.name, array.bytes);
-  text += memory_line("total", total_bytes(e));
+  text += memory_line("total", total_bytes(e.arrays));
   return text;
 }
 
@@ -204,7 +198,7 @@ std::string explanation_json(const Explanation& e) {
                   {"tools", tools},
                   {"ticks", ticks},
                   {"arrays", arrays},
-                  {"total_bytes", total_bytes(e)}};
+                  {"total_bytes", total_bytes(e.arrays)}};
   return json.document();
 }
 

@@ -5,15 +5,8 @@
 #include <cstdio>
 #include <string_view>
 
-#include "controller/scene/scene_file.hpp"
-
 namespace kerf {
 namespace {
-
-struct StageWork {
-  const char* stage = "";
-  double us = 0;
-};
 
 std::string us_text(double us) {
   char text[32];
@@ -51,15 +44,14 @@ std::string over_budget(const LoadedScene& scene, const SceneCosts& costs) {
   const double sum_us = work_us(costs, tool);
   if (sum_us <= budget_us) return {};
   std::string parts, others, advice;
-  StageWork most;
+  const StageCost* most = nullptr;
   for (const TickCost& tick : costs.ticks) {
     if (tick.tool != tool) continue;
     parts += ", in " + scene.volumes[tick.volume].name + " " + us_text(work_us(tick.stages)) +
              " by plan " + tick.variant() + " (" + tick.choice.why + ")";
     if (advice.empty()) advice = tick.choice.method->advice;
     for (const StageCost& stage : tick.stages) {
-      const double us = work_us(stage);
-      if (us > most.us) most = {stage.stage, us};
+      if (most == nullptr || work_us(stage) > work_us(*most)) most = &stage;
     }
   }
   for (std::size_t t = 0; t < scene.tools.size(); ++t) {
@@ -69,11 +61,11 @@ std::string over_budget(const LoadedScene& scene, const SceneCosts& costs) {
   const int rate_hz = highest_rate_hz(sum_us);
   const bool fixed = scene.servo.numeric == NumericKind::fixed;
   if (!fixed) advice = "fixed numbers";
-  if (fixed && std::string_view(most.stage) == "probes") advice.clear();
+  if (fixed && std::string_view(most->stage) == "probes") advice.clear();
   const std::string third = advice.empty() ? "" : ", or " + advice;
   return scene.path + ": tool " + scene.tools[tool].name + ": up to " + us_text(sum_us) +
-         " us of work a tick, most of it " + most.stage + " (" + us_text(most.us) + ")" + parts +
-         ", above the " + us_text(budget_us) + " us that are half a tick at " +
+         " us of work a tick, most of it " + most->stage + " (" + us_text(work_us(*most)) + ")" +
+         parts + ", above the " + us_text(budget_us) + " us that are half a tick at " +
          std::to_string(scene.servo.rate_hz) + " Hz; use " +
          (rate_hz == 0 ? "" : "--rate " + std::to_string(rate_hz) + " or lower, ") +
          (rate_hz != 0 && third.empty() ? "or " : "") + "a smaller tool" + others +

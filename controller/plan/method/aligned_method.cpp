@@ -2,8 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "controller/kernel/gradient.hpp"
-#include "controller/kernel/wide_sum.hpp"
+#include "controller/kernel/exact_taps.hpp"
 #include "controller/plan/method/any_pose.hpp"
 #include "controller/plan/method/lattice.hpp"
 #include "controller/plan/method/methods.hpp"

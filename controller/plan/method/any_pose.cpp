@@ -10,9 +10,9 @@
 #include "controller/kernel/splat_table.hpp"
 #include "controller/plan/method/lattice.hpp"
 #include "controller/plan/tables/aligned_tool.hpp"
+#include "controller/scene/scene.hpp"
 #include "controller/scene/scene_error.hpp"
 #include "controller/scene/scene_text.hpp"
-#include "controller/scene/scene_words.hpp"
 
 namespace kerf {
 namespace {

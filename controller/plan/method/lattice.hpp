@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "controller/kernel/tool_offset.hpp"
+#include "controller/kernel/tool_pose.hpp"
 #include "controller/load/loaded_scene.hpp"
 #include "controller/plan/method/matrices.hpp"
 

@@ -6,11 +6,9 @@
 #include <cstddef>
 #include <memory>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "controller/kernel/kernel_set.hpp"
-#include "controller/load/loaded_scene.hpp"
 #include "controller/plan/method/lattice.hpp"
 #include "controller/plan/tables/aligned_tool.hpp"
 #include "controller/plan/tables/sample_tool.hpp"

@@ -11,7 +11,6 @@
 namespace kerf {
 
 // One file each.
-[[nodiscard]] const ToolMethod& surface_method() noexcept;
 [[nodiscard]] const ToolMethod& aligned_method() noexcept;
 [[nodiscard]] const ToolMethod& splat_method() noexcept;
 [[nodiscard]] const ToolMethod& gather_method() noexcept;

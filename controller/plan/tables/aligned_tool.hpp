@@ -10,7 +10,7 @@
 #include "controller/kernel/aligned_table.hpp"
 #include "controller/kernel/gradient.hpp"
 #include "controller/kernel/kernel_set.hpp"
-#include "controller/kernel/tool_offset.hpp"
+#include "controller/kernel/tool_pose.hpp"
 
 namespace kerf {
 

@@ -3,8 +3,6 @@
 
 #include <algorithm>
 
-#include "controller/plan/tables/sample_offset.hpp"
-
 namespace kerf {
 
 template <class N>

@@ -2,14 +2,25 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
 
-#include "controller/kernel/point_shell/close_table.hpp"
+#include "controller/kernel/point_shell/point_table.hpp"
 
 namespace kerf {
+
+/// An offset over the tool's reach, as PointTable holds it; fixed: Q0.15.
+template <class N>
+[[nodiscard]] PointNumber<N> sample_offset(double share) {
+  if constexpr (N::kIsFixed) {
+    return static_cast<PointNumber<N>>(std::lround(share * 32768));
+  } else {
+    return static_cast<PointNumber<N>>(share);
+  }
+}
 
 /// Owner of a tool's close samples, sorted by cells. Load time; moving it keeps the table valid. In
 /// FixedNumbers, FloatNumbers and DoubleNumbers.

@@ -7,8 +7,8 @@
 #include <span>
 #include <vector>
 
-#include "controller/kernel/sample_table.hpp"
-#include "controller/kernel/tool_offset.hpp"
+#include "controller/kernel/splat_table.hpp"
+#include "controller/kernel/tool_pose.hpp"
 
 namespace kerf {
 

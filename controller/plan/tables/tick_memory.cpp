@@ -2,12 +2,22 @@
 #include "controller/plan/tables/tick_memory.hpp"
 
 namespace kerf {
+namespace {
+
+void grow(auto& memory, std::size_t entries) {
+  if (memory.size() < entries) memory.resize(entries);
+}
+
+}  // namespace
+
+std::uint64_t total_bytes(const std::vector<ArrayBytes>& arrays) {
+  std::uint64_t sum = 0;
+  for (const ArrayBytes& array : arrays) sum += array.bytes;
+  return sum;
+}
 
 void BoxMemory::hold(VoxelIndex tool_size, bool mills) {
   const BoxScratchSize need = box_scratch_size(tool_size);
-  const auto grow = [](auto& memory, std::size_t size) {
-    if (memory.size() < size) memory.resize(size);
-  };
   grow(box_, need.box);
   grow(inside_, need.inside);
   if (!mills) return;
@@ -28,21 +38,12 @@ std::vector<ArrayBytes> BoxMemory::arrays() const {
           named("filtered rows", filter_), named("live rows", live_)};
 }
 
-std::size_t BoxMemory::bytes() const {
-  std::size_t sum = 0;
-  for (const ArrayBytes& array : arrays()) sum += array.bytes;
-  return sum;
-}
-
 void SplatMemory::hold(const std::array<std::size_t, 3>& width_vox, std::size_t samples) {
   const auto cells = [&](std::size_t axis) {
     return static_cast<std::int32_t>(width_vox[axis]) - 1;
   };
   const VoxelIndex size{cells(0), cells(1), cells(2)};
   const SplatScratchSize need = splat_scratch_size(size, samples);
-  const auto grow = [](auto& memory, std::size_t entries) {
-    if (memory.size() < entries) memory.resize(entries);
-  };
   tick_.hold(size, true);
   for (auto& along : place_) grow(along, need.place);
   grow(sums_, need.sums);
@@ -68,12 +69,6 @@ std::vector<ArrayBytes> SplatMemory::arrays() const {
   add("rest rows", rest_[0], 2);
   add("live rest rows", rest_live_, 1);
   return list;
-}
-
-std::size_t SplatMemory::bytes() const {
-  std::size_t sum = 0;
-  for (const ArrayBytes& array : arrays()) sum += array.bytes;
-  return sum;
 }
 
 }  // namespace kerf

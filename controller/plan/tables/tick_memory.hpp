@@ -4,12 +4,20 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include "controller/kernel/splat_table.hpp"
-#include "controller/plan/tables/array_bytes.hpp"
 
 namespace kerf {
+
+/// An array of a compiled scene.
+struct ArrayBytes {
+  std::string name;
+  std::uint64_t bytes = 0;
+  bool taken = false;  ///< in memory already when the scene is planned
+};
+[[nodiscard]] std::uint64_t total_bytes(const std::vector<ArrayBytes>& arrays);
 
 /// Owner of the working memory that all tools share. Load time.
 class BoxMemory {
@@ -18,7 +26,6 @@ class BoxMemory {
   void hold(VoxelIndex tool_size, bool mills);
   [[nodiscard]] BoxScratch view() noexcept;
   [[nodiscard]] std::vector<ArrayBytes> arrays() const;
-  [[nodiscard]] std::size_t bytes() const;
 
  private:
   std::vector<std::int16_t> box_, ratio_, inside_;
@@ -37,7 +44,6 @@ class SplatMemory {
   [[nodiscard]] SplatScratch view() noexcept;
   /// All arrays by name.
   [[nodiscard]] std::vector<ArrayBytes> arrays() const;
-  [[nodiscard]] std::size_t bytes() const;
 
  private:
   BoxMemory tick_;

@@ -5,7 +5,7 @@
 #include <cassert>
 #include <cmath>
 
-#include "controller/plan/tables/sample_offset.hpp"
+#include "controller/plan/tables/close_cells.hpp"
 
 namespace kerf {
 namespace {

@@ -6,7 +6,7 @@
 #include <cstdint>
 
 #include "controller/servo/kinematics/forward_kinematics.hpp"
-#include "controller/servo/kinematics/trigonometry.hpp"
+#include "controller/servo/kinematics/rotation.hpp"
 #include "shared/numeric/vec.hpp"
 
 namespace kerf {

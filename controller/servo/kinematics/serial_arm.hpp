@@ -2,8 +2,7 @@
 #pragma once
 
 #include "controller/servo/kinematics/forward_kinematics.hpp"
-#include "controller/servo/kinematics/trigonometry.hpp"
-#include "shared/numeric/vec.hpp"
+#include "controller/servo/kinematics/rotation.hpp"
 
 namespace kerf {
 

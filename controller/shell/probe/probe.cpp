@@ -1,18 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "controller/shell/probe/probe.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <memory>
-#include <optional>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
 #include <unistd.h>
 
-#include "controller/device/driver/make_driver.hpp"
+#include "controller/device/driver/device_driver.hpp"
 #include "controller/device/port/open_port.hpp"
 #include "controller/scene/scene_file.hpp"
 #include "controller/shell/clock.hpp"

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <string>
 
-#include "controller/load/loaded_scene.hpp"
+#include "controller/scene/scene.hpp"
 #include "controller/servo/device_pose.hpp"
 #include "controller/servo/device_report.hpp"
 #include "shared/numeric/numbers.hpp"

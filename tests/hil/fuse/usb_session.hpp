@@ -12,7 +12,6 @@
 #include <vector>
 
 #include "controller/device/driver/device_driver.hpp"
-#include "controller/device/driver/make_driver.hpp"
 #include "controller/device/port/open_port.hpp"
 #include "hil/devmodel/falcon_model.hpp"
 #include "hil/devmodel/wooden_model.hpp"

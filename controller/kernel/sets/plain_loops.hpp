@@ -4,15 +4,37 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "controller/kernel/point_shell/close_sums.hpp"
+#include "controller/kernel/point_shell/point_sums.hpp"
+#include "controller/kernel/sets/point_places.hpp"
 #include "controller/kernel/sets/sample_place.hpp"
 #include "shared/volume/voxel_grid.hpp"
 
-// Contact of the method `gather` as plain loops; internal linkage, for the reason given at
-// KernelSet.
+// A point shell's sums and densities, and the contact of the method `gather`, as the plain loops
+// that define them: for sets that need no instruction that other machines lack. Internal linkage,
+// for the reason given at KernelSet.
 
 namespace kerf {
 namespace {
 
+void sum_point_samples(const PointTable<FixedNumbers>& table,
+                       const PointPlaces<FixedNumbers>& places, const std::int32_t (&centre)[3],
+                       const DensityField& field, PointSums<FixedNumbers>& sums) noexcept {
+  sums = point_sums<FixedNumbers>(table, places, centre, field);
+}
+
+void read_point_samples(const PointPlaces<FixedNumbers>& places, std::int32_t count,
+                        const std::int32_t (&centre)[3], const DensityField& field,
+                        std::int32_t* density) noexcept {
+  read_points<FixedNumbers>(places, count, centre, field, density);
+}
+
+void sum_close_samples(const PointTable<FixedNumbers>& table, const std::int32_t* density,
+                       CloseSums<FixedNumbers>& sums) noexcept {
+  sums = close_sums<FixedNumbers>(table, density);
+}
+
+/// `contact_sum` of a field of three 16-bit parts a voxel.
 void gather(const SampleTable& samples, const SamplePose& pose, const VoxelGrid& grid,
             const std::int16_t* field, std::int64_t (&sum)[3]) noexcept {
   sum[0] = sum[1] = sum[2] = 0;

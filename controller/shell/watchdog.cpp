@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/shell/watchdog_thread.hpp"
+#include "controller/shell/watchdog.hpp"
 
 #include <algorithm>
 #include <chrono>

@@ -6,14 +6,44 @@
 #include <cstdint>
 #include <span>
 
-#include "controller/kernel/aligned_corner.hpp"
 #include "controller/kernel/aligned_table.hpp"
 #include "controller/kernel/gradient.hpp"
 #include "controller/kernel/overlap.hpp"
 #include "controller/kernel/tool_pose.hpp"
 #include "controller/kernel/trilinear.hpp"
 
+// Gradients and the methods `aligned` and `splat` by their definitions, without tables: every fast
+// path has these bits.
+
 namespace kerf {
+
+/// The gradient of one voxel as the plain sum over 5x5x5 densities: density outside
+/// the volume is 0. Slow; `refresh_gradients` gives the same bits.
+template <class N>
+[[nodiscard]] constexpr Gradient<N> gradient_dense(GradientKernel kernel, const VoxelGrid& grid,
+                                                   std::span<const Density> density,
+                                                   VoxelIndex at) noexcept {
+  const GradientTaps tap = taps(kernel);
+  std::int64_t x = 0, y = 0, z = 0;
+  for (std::int32_t k = 0; k < 5; ++k) {
+    for (std::int32_t j = 0; j < 5; ++j) {
+      for (std::int32_t i = 0; i < 5; ++i) {
+        const VoxelIndex v{at.x + i - kGradientReach, at.y + j - kGradientReach,
+                           at.z + k - kGradientReach};
+        if (!grid.contains(v)) continue;
+        const auto a = static_cast<std::size_t>(i);
+        const auto b = static_cast<std::size_t>(j);
+        const auto c = static_cast<std::size_t>(k);
+        const std::int64_t rho = density[grid.index(v.x, v.y, v.z)];
+        x += rho * tap.slope[a] * tap.smooth[b] * tap.smooth[c];
+        y += rho * tap.smooth[a] * tap.slope[b] * tap.smooth[c];
+        z += rho * tap.smooth[a] * tap.smooth[b] * tap.slope[c];
+      }
+    }
+  }
+  return {gradient_from_sum<N>(x, tap.shift), gradient_from_sum<N>(y, tap.shift),
+          gradient_from_sum<N>(z, tap.shift)};
+}
 
 // The definition of the method `aligned` (docs/theory.md 7.6), without tables: every fast path has
 // these bits. Overlap and removal are those of overlap.hpp and milling.hpp. Fixed point only.
@@ -106,6 +136,33 @@ template <class GradientAt>
         if (ratio == 0 || density[grid.index(x, y, z)] == 0) continue;
         sum.add(ratio * gradient_at(VoxelIndex{x, y, z}), shift);
       }
+    }
+  }
+  return sum.over(shift);
+}
+
+// The method `splat` by its definition. Its modification sum is `exact_modification_sum`, overlap
+// and removal are those of overlap.hpp and milling.hpp. Fixed point only.
+
+/// SUM over samples i of SUM over the corners c of its cell of w_ic times the exact gradient, in
+/// density steps per voxel times 2^(15 - sum_shift) * 2^shift / factor. Nothing is rounded but the
+/// weights, and the sum once.
+/// Density outside the volume is 0; `gradient_at` is `gradient_exact` or a cache of it.
+template <class GradientAt>
+[[nodiscard]] constexpr SumVec<FixedNumbers> splat_contact_sum(
+    GradientAt&& gradient_at, std::span<const ToolOffset> offsets,
+    const ToolPose<FixedNumbers>& pose) noexcept {
+  const int shift = sum_shift(offsets.size());
+  WideSumVec sum;
+  for (const ToolOffset& offset : offsets) {
+    const auto cell = cell_at<FixedNumbers>(sample_position(pose, offset));
+    const auto weights = trilinear_weights<FixedNumbers>(cell.weight);
+    for (std::size_t c = 0; c < 8; ++c) {
+      const auto bit = [&](std::size_t axis) { return static_cast<std::int32_t>(c >> axis & 1); };
+      sum.add(std::int64_t{weights[c]} *
+                  gradient_at(
+                      VoxelIndex{cell.low.x + bit(0), cell.low.y + bit(1), cell.low.z + bit(2)}),
+              shift);
     }
   }
   return sum.over(shift);
