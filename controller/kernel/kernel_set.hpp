@@ -26,7 +26,7 @@ struct BoxCut {
   VoxelIndex lo, hi;
 };
 
-/// The stages of a tick, of every plan of fixed point, for one instruction set. All sets give the
+/// The stages of a tick, of every method of fixed point, for one instruction set. All sets give the
 /// same bits.
 ///
 /// Plain pointers and plain structs: these functions are compiled with instructions that other

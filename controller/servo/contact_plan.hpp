@@ -26,7 +26,7 @@ struct ContactPlan {
 /// A tool's surface and how its proxy moves.
 template <class N>
 struct SweptTool {
-  PointShell<N> shell;
+  PointShell<N> point_shell;
   ProxyPlan<N> proxy;
 };
 

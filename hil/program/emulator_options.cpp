@@ -7,8 +7,8 @@
 
 #include "hil/devmodel/bus_cycle.hpp"
 #include "hil/hil_error.hpp"
-#include "shared/wire/wooden_constants.hpp"
 #include "shared/wire/personality.hpp"
+#include "shared/wire/wooden_constants.hpp"
 
 namespace kerf {
 namespace {
@@ -143,8 +143,7 @@ void declare(Arguments& app, EmulatorOptions& o) {
 }
 
 void check(const EmulatorOptions& o) {
-  check_known("--personality", o.personality,
-              kPersonalityWords);
+  check_known("--personality", o.personality, kPersonalityWords);
   check_device(o);
   if (!o.describe) check_front(o);
 }

@@ -49,7 +49,9 @@ template <class N>
 class ContactRig {
  public:
   explicit ContactRig(const SampledTool& tool, const KernelSet& kernels = **kernel_sets())
-      : kernels_(kernels), tool_(tool.samples, tool.round, tool.close), shell_(tool_.shell()) {}
+      : kernels_(kernels),
+        tool_(tool.samples, tool.round, tool.close),
+        points_(tool_.point_shell()) {}
   ContactRig(const SampledTool& tool, const Body& body) : ContactRig(tool) {
     add(body, plain_frame<N>());
   }
@@ -59,11 +61,11 @@ class ContactRig {
   void add(const Body& body, const ContactFrame<N>& frame, Density iso = kIso) {
     constexpr Density kFeltShare = 8;  // a density below this part of the iso is not felt
     maps_.emplace_back(body.grid, body.density, static_cast<Density>(iso / kFeltShare));
-    memories_.emplace_back().hold(shell_);
+    memories_.emplace_back().hold(points_);
     volumes_.push_back({{body.grid, body.density.data(), density_scale(iso), maps_.back().bricks()},
                         frame,
                         memories_.back().places()});
-    query_.emplace(kernels_, shell_, volumes_);
+    query_.emplace(kernels_, points_, volumes_);
     query_->turn({});
   }
 
@@ -72,14 +74,14 @@ class ContactRig {
   [[nodiscard]] const ContactQuery<N>& field() const { return *query_; }
   /// Half the sine of a turn that a sweep may make at once: see `turn_step_of`.
   [[nodiscard]] typename N::Unit turn_step() const {
-    const double reach = std::max(1.0, static_cast<double>(shell_.reach));
-    return typename N::Unit(shell_.table.round ? 0 : turn_step_of(reach));
+    const double reach = std::max(1.0, static_cast<double>(points_.reach));
+    return typename N::Unit(points_.table.round ? 0 : turn_step_of(reach));
   }
 
  private:
   const KernelSet& kernels_;
   ToolPoints<N> tool_;
-  PointShell<N> shell_;
+  PointShell<N> points_;
   std::deque<FreeBrickMap> maps_;
   std::deque<PlaceMemory<N>> memories_;
   std::vector<ContactVolume<N>> volumes_;

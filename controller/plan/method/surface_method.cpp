@@ -4,7 +4,7 @@
 namespace kerf {
 namespace {
 
-/// The swept proxy is felt and nothing is cut: nothing is left to do but its probes.
+/// The swept proxy is felt and nothing is cut: nothing is left to do but its queries.
 class SurfaceMethod final : public ToolMethod {
  public:
   constexpr SurfaceMethod() noexcept : ToolMethod(Method::surface, "surface", "") {}
