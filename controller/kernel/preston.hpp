@@ -13,17 +13,16 @@
 
 namespace kerf {
 
-// Cutting that follows force: Preston's law dh/dt = k p v over the contact (docs/theory.md 6.2).
+// Cutting that follows force: Preston's law over the contact (docs/theory.md 6).
 //
-//   o_j = rho_j r_j        the part of voxel j that the tool covers
-//   w_j = o_j v_j          v_j the speed of the tool's surface there, over its rim's
-//   f_j = F_n w_j / SUM w  the part of the normal force that presses on it
-//   dV_j = G_j f_j n/n_ref T
+//   o_j = rho_j c_j                       the part of voxel j that the tool covers
+//   f_j = (F_n - F_0) o_j v_j / SUM o v   its part of the force (v_j: surface_speed.hpp)
+//   dV_j = G_j f_j omega/omega_ref T
 //
 // So a tool between two materials presses on both, and each leaves at its own rate G under its own
-// part of the force; in one material the volume per second is G F_n n/n_ref. What cannot be cut
-// carries its part of the force and stays. Over several volumes the sum of w goes through all of
-// them: each gets its share of the drive F_n n/n_ref (`cut_drive`).
+// part of the force; in one material the volume per second is G times the drive. What cannot be cut
+// carries its part of the force and stays. Over several volumes the sum goes through all of
+// them: each gets its share of the drive (F_n - F_0) omega/omega_ref (`cut_drive`).
 
 /// How force cuts one volume; constant during a run. Index: label, 0 where there are no labels.
 template <class N>

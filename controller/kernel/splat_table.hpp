@@ -10,9 +10,9 @@
 namespace kerf {
 
 // The method `splat`: any pose of any shape, in scenes that cut. Each sample adds its eight weights
-// to the voxels of its cell; the sums R_j are all that the forces and the removal need of the tool.
-// Contact is SUM_j R_j G_j, since the sum of interpolated gradients may be added up voxel by voxel.
-// Nothing but the density is stored, nothing is refreshed after a cut.
+// to the voxels of its cell; the sums PHI_j are all that the forces and the removal need of the
+// tool. Contact is SUM_j PHI_j grad rho_j, since the sum of interpolated gradients may be added up
+// voxel by voxel. Nothing but the density is stored, nothing is refreshed after a cut.
 
 /// Samples per voxel that a sum can hold: 2^24 of weights of 2^15, so that 5 taps of it fit 32
 /// bits.
@@ -22,7 +22,7 @@ inline constexpr double kMaxSplatDensity = 512.0;
 struct SplatScratch {
   BoxScratch tick;               ///< box, ratios, filter and live rows
   std::int32_t* place[3] = {};   ///< of each sample, Q15.16 voxels
-  std::int32_t* sums = nullptr;  ///< rows of row_lanes entries: R_j, weights of 2^15
+  std::int32_t* sums = nullptr;  ///< rows of row_lanes entries: PHI_j, weights of 2^15
   std::int16_t* rest[2] = {};    ///< one plane: minus the sums beyond the ratios, low 15 bits, high
   std::uint8_t* rest_live = nullptr;  ///< by row of the plane: which of the two are not all 0
 };

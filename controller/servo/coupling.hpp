@@ -21,9 +21,10 @@ struct Coupling {
 /// hand that arrives fast feels no blow.
 inline constexpr double kFullDampingMm = 0.1;
 
-/// F = d max(0, K p - B min(1, p / kFullDampingMm) v.d). `spring_mm` leads from the hand to the
-/// proxy, its length is p, its direction d; v is the hand's velocity in mm/s. Only motion along the
-/// spring is damped: a tool that slides has no drag, and a hand that leaves is not held back.
+/// F = u max(0, K delta - B min(1, delta / kFullDampingMm) v . u). `spring_mm` leads from the hand
+/// to the proxy, delta is its length, u its direction; v is the hand's velocity in mm/s. Only
+/// motion along the spring is damped: a tool that slides has no drag, and a hand that leaves is not
+/// held back.
 ///
 /// Fixed: saturates at the ends of the range; a spring shorter than 2^-16 mm gives nothing.
 template <class N>

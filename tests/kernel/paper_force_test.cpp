@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The paper's contact force against what it must be on a flat, by every method and number type: it
-// measures the area of the tool's cut with the face, F = p0 pi (2 R p - p^2) at depth p.
+// measures the area of the tool's cut with the face, F = p0 pi (2 R d - d^2) at depth d.
 #include <algorithm>
 #include <cmath>
 #include <numbers>

@@ -21,8 +21,8 @@ struct PointMeans {
   using Ratio = typename N::Ratio;
 
   Ratio density{}, square{};
-  ContactVec<Ratio> gradient{};  ///< weighted with v, density per unit
-  ContactVec<Ratio> offset{};    ///< weighted with u, over the tool's reach
+  ContactVec<Ratio> gradient{};  ///< weighted with w_g, density per unit
+  ContactVec<Ratio> offset{};    ///< weighted with w_x, over the tool's reach
   Ratio top{};
 };
 
@@ -87,7 +87,7 @@ template <class N>
   means.density = mean_of<N>(sums.density, sums.weight, 9);
   means.square = mean_of<N>(sums.square, sums.weight, 8);
   means.gradient = mean_gradient(sums, scale, frame);
-  typename N::Sum lift = round ? sums.density : sums.weight;  // SUM u
+  typename N::Sum lift = round ? sums.density : sums.weight;  // SUM w_x
   if constexpr (N::kIsFixed) lift >>= round ? 15 : 0;         // Q24 of Q39: 16 at least
   const Ratio offset[3] = {mean_of<N>(sums.offset[0], lift, 9), mean_of<N>(sums.offset[1], lift, 9),
                            mean_of<N>(sums.offset[2], lift, 9)};
@@ -119,7 +119,7 @@ template <class N>
   }
 }
 
-/// The exponent e of a shape that is no ball, from q = m2 / m1^2 = 8 (7 + e) / (7 (8 + e)), 0 to 2
+/// The exponent e of a shape that is no ball, from y = m2 / m1^2 = 8 (7 + e) / (7 (8 + e)), 0 to 2
 /// (docs/theory.md 3.2).
 template <class N>
 [[nodiscard]] constexpr typename N::Ratio fall_of(const PointMeans<N>& means) noexcept {
@@ -198,7 +198,8 @@ template <class N>
   return between<N>(offset, downhill, share);
 }
 
-/// How fast density falls along a normal, per unit (docs/theory.md 3.3). v holds half of a ball's.
+/// How fast density falls along a normal, per unit (docs/theory.md 3.3). w_g holds half of a
+/// ball's.
 template <class N>
 [[nodiscard]] constexpr typename N::Ratio slope_along(const PointMeans<N>& means,
                                                       ContactVec<typename N::Unit> normal,

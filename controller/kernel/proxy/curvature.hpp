@@ -23,10 +23,10 @@ struct Curve {
 /// The curvature along the last two steps: a symmetric rank-one estimate with a memory of two
 /// (docs/theory.md 4.4; Nocedal and Wright 2006, section 6.2).
 ///
-/// A plane alone does not tell how far to go in a bowl. Under a load L the displacement that is
-/// left falls by 1 + L / radius times the step along `across`: a slot with a play of a tenth of a
-/// unit turns a step of the hand of 0.01 into a swing of 0.2. What a wandering hand has milled is a
-/// bowl along both directions of the plane, so two curves are kept.
+/// A plane alone does not tell how far to go in a bowl. Under a load the displacement that is
+/// left falls by 1 + load / radius times the step along `across`: a slot with a play of a tenth of
+/// a unit turns a step of the hand of 0.01 into a swing of 0.2. What a wandering hand has milled is
+/// a bowl along both directions of the plane, so two curves are kept.
 template <class N>
 class CurvatureEstimate {
   using Real = typename N::Real;

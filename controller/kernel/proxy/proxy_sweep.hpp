@@ -64,8 +64,8 @@ struct SweepRules {
   static constexpr double kAstray = 0.03;
 };
 
-/// Sine of half the largest turn of one step (docs/theory.md 4.6): a sample `reach` units from the
-/// centre, reach >= 1, moves by kStep at most. Its arc is 2 reach asin(s), asin(s) <= 1.0472 s.
+/// Sine of half the largest turn theta of one step (docs/theory.md 4.6): a sample `reach` units
+/// from the centre, reach >= 1, moves by kStep at most, as theta / 2 <= 1.0472 sin(theta / 2).
 [[nodiscard]] constexpr double turn_step_of(double reach) noexcept {
   return SweepRules::kStep / (2 * 1.0472 * reach);
 }
