@@ -154,6 +154,7 @@ std::string what_is_wrong(const CLI::App& program, const CLI::ParseError& error)
   const std::vector<CLI::App*> chosen = program.get_subcommands();
   const CLI::App& app = chosen.empty() ? program : *chosen.front();
   if (program.remaining_size(true) > 0) return unexpected(program, chosen.empty() ? nullptr : &app);
+  if (chosen.empty() && program.get_require_subcommand_min() > 0) return "no command is given";
   if (dynamic_cast<const CLI::ArgumentMismatch*>(&error) == nullptr) return error.what();
   const std::string text = error.what(), name = text.substr(0, text.find_first_of(": "));
   const CLI::Option* option = app.get_option_no_throw(name);

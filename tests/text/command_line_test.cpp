@@ -167,7 +167,7 @@ TEST_CASE("a program with commands needs one, which has its own options and the 
   };
   CHECK(run({"show", "a"}) == "show a");
   CHECK(run({"hide"}) == "hide");
-  CHECK(run({}) == "A subcommand is required; see --help");
+  CHECK(run({}) == "no command is given; see --help");
   CHECK(run({"shew"}) == "shew is not known; did you mean show? see --help");
   CHECK(run({"show"}) == "FILE is required; see --help");
   CHECK(run({"--zzz", "a"}) == "--zzz is not known; see --help");

@@ -42,16 +42,16 @@ struct TickShape {
 ///
 /// A new method `x` needs, in the order in which the compiler and the linker ask for it:
 ///  1. `Method::x` in controller/servo/servo_plan.hpp;
-///  2. its step `XStep` in controller/servo/x_step.hpp, with `feel_and_cut` and `cover` as SplatStep
-///     has them, and its case in method_step.hpp;
-///  3. x_method.cpp in this folder: a class of this one and `x_method()`. What the class does not
-///     say is that of a method that does nothing in a tick. Every stage has a price for each kernel
-///     set that runs it (stage_cost.hpp);
-///  4. the declaration of `x_method()` in methods.hpp and its place in the list of methods.cpp,
-///     before every method that it shall be preferred to;
-///  5. x_method.cpp in controller/plan/CMakeLists.txt and in tests/golden/CMakeLists.txt.
-/// Tables and scratch of its own are held by MethodMemory, and `plan_tool` (plan_tools.hpp) hands them
-/// to its ToolInVolume.
+///  2. its step `XStep`, a header like splat_step.hpp with `feel_and_cut` and `cover`, and its case
+///     in method_step.hpp;
+///  3. a source file like splat_method.cpp: a class derived from this one, and `x_method()`. What
+///     the class does not say is that of a method that does nothing in a tick. Every stage has a
+///     price for each kernel set that runs it (stage_cost.hpp);
+///  4. the declaration of `x_method()` in methods.hpp, and its place in the list of methods.cpp:
+///     before every method that it is to be preferred to;
+///  5. the source file in controller/plan/CMakeLists.txt and in tests/golden/CMakeLists.txt.
+/// Tables and scratch of its own are held by MethodMemory, and `plan_tool` (plan_tools.hpp) hands
+/// them to its ToolInVolume.
 class ToolMethod {
  public:
   Method step;
