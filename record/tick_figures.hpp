@@ -10,6 +10,7 @@
 
 namespace kerf {
 
+/// Length of a vector of a record.
 [[nodiscard]] inline double magnitude(const float (&vector)[3]) noexcept {
   return std::sqrt(double{vector[0]} * vector[0] + double{vector[1]} * vector[1] +
                    double{vector[2]} * vector[2]);

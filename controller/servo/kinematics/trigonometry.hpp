@@ -5,6 +5,7 @@
 
 namespace kerf {
 
+/// Of one angle.
 template <class N>
 struct SineCosine {
   typename N::Unit sine, cosine;
