@@ -12,7 +12,7 @@
 
 namespace kerf {
 
-/// How the proxy's spring becomes a force; constant during a run.
+/// Where contact space lies, and how the proxy's spring becomes a force; constant during a run.
 template <class N>
 struct ContactPlan {
   bool swept = false;                      ///< else the paper's sums are felt
@@ -30,7 +30,7 @@ struct SweptTool {
   ProxyPlan<N> proxy;
 };
 
-/// The part that changes; places belong to the compiled scene.
+/// What one tick hands to the next; the memory of `volumes` belongs to the compiled scene.
 template <class N>
 struct ContactState {
   std::array<ContactVolume<N>, kMaxVolumes> volumes{};  ///< by index of the plan's volumes

@@ -62,6 +62,7 @@ struct ToolInVolume {
   Transform<typename N::Ratio, WorldSpace, VoxelSpace> rims_from_voxel;
 };
 
+/// A tool of the scene; constant during a run.
 template <class N>
 struct ToolPlan {
   std::span<const ToolOffset> offsets;

@@ -14,8 +14,8 @@
 
 namespace kerf {
 
-/// The contact of a tool that is no ball gets a closer look so near to rest. At an edge the point
-/// shell's own samples find the tool up to 0.4 units higher than it is.
+/// A tool that is no ball gets a closer look at its contact while it is at most so deep, or so
+/// high. At an edge the point shell's own samples find the tool up to 0.4 units higher than it is.
 inline constexpr double kCloseDepth = 0.4;  ///< units
 
 /// The close samples around a contact: offsets in the tool's axes and in voxels, and densities.
@@ -72,7 +72,8 @@ struct CloseSamples {
       seen += more;
     });
   }
-  /// As whole groups. What fills up the last one is no sample: `fade` it once all are read.
+  /// The samples in whole groups. What fills up the last group is no sample: call `fade` once all
+  /// densities are read.
   [[nodiscard]] constexpr PointTable<N> table() noexcept {
     PointTable<N> table;
     table.count = (count + kPointGroup - 1) / kPointGroup * kPointGroup;
@@ -99,9 +100,9 @@ struct Closeup {
   typename N::Ratio top{};        ///< density of the highest sample
 };
 
-/// Where about the peak is, as an offset in the tool's axes, from the point shell's sums. Beside a
-/// rim or a point density falls to one side only, so the mean places with powers 6 and 8 are off by
-/// shares of 1 / (7 + e) and 1 / (9 + e); the two extrapolate to the peak (docs/theory.md 3.5).
+/// Roughly where the peak is, as an offset in the tool's axes, from the point shell's sums. Beside
+/// a rim or a point density falls to one side only, so the mean places with powers 6 and 8 are off
+/// by shares of 1 / (7 + e) and 1 / (9 + e); the two extrapolate to the peak (docs/theory.md 3.5).
 template <class N>
 constexpr void peak_offset(const PointSums<N>& sums, typename N::Ratio e,
                            PointNumber<N> (&offset)[3]) noexcept {
@@ -124,8 +125,9 @@ constexpr void peak_offset(const PointSums<N>& sums, typename N::Ratio e,
 /// The peak of density over a tool's surface, from the sums over its close samples (docs/theory.md
 /// 3.5).
 ///
-/// The mean of the height, weighted with its power p, is the summit's times (p + 1) / (p + 1 + e).
-/// Two such means, with p = 32 and 64, tell e and the summit; and where it is, as in peak_offset.
+/// The mean of r, weighted with r^p, is the height of the peak times (p + 1) / (p + 1 + e). Two
+/// such means, with p = 32 and 64, tell e and the height. Two mean places tell the peak's, as in
+/// peak_offset.
 template <class N>
 [[nodiscard]] constexpr Closeup<N> peak_of(const CloseSums<N>& sums) noexcept {
   using Ratio = typename N::Ratio;

@@ -20,10 +20,10 @@ template <class N>
 struct PointMeans {
   using Ratio = typename N::Ratio;
 
-  Ratio density{}, square{};
+  Ratio density{}, square{};     ///< of r and of r^2, weighted with w
   ContactVec<Ratio> gradient{};  ///< weighted with w_g, density per unit
   ContactVec<Ratio> offset{};    ///< weighted with w_x, over the tool's reach
-  Ratio top{};
+  Ratio top{};                   ///< the largest r
 };
 
 /// How one volume lies in contact space: place q is at voxel_from_contact * q + origin_vox. A
@@ -77,6 +77,7 @@ template <class N>
   return {turned(turn[0]), turned(turn[1]), turned(turn[2])};
 }
 
+/// All means of a query; `turn` takes the mean offset from the tool's axes to the world's.
 template <class N>
 [[nodiscard]] constexpr PointMeans<N> point_means(const PointSums<N>& sums,
                                                   const DensityScale& scale,
@@ -151,8 +152,8 @@ template <class N>
   return round ? height : std::min(height, means.top + kUnsampled);
 }
 
-/// Limits of the slope in a depth (docs/theory.md 3.3), density per unit: flatter is noise, steeper
-/// no face of a volume is.
+/// Limits of the slope in a depth (docs/theory.md 3.3), density per unit: flatter is noise, and no
+/// face of a volume is steeper.
 inline constexpr double kFlattestSlope = 0.2;
 inline constexpr double kSteepestSlope = 1.2;
 

@@ -32,7 +32,7 @@ struct SweepRules {
   static constexpr std::int32_t kMaxTurnQueries =
       12;                                          ///< and a turn's pushes; the rest is the move's
   static constexpr double kTolerance = 0.01;       ///< a place this deep is allowed
-  static constexpr double kTurnTolerance = 0.005;  ///< for a turn, which leaves the move a play
+  static constexpr double kTurnTolerance = 0.005;  ///< of a turn: it leaves the move some play
   static constexpr double kNoMove = 0.002;         ///< from rest no shorter displacement is tried
   static constexpr double kArrived = 0.004;        ///< after a step this near counts as there
   /// Longest displacement of any sample between two queries. The middle of the thinnest wall, 2
@@ -42,8 +42,8 @@ struct SweepRules {
   static constexpr double kGain = 0.001;    ///< a step this much nearer to the goal is kept
   static constexpr double kResidual = 0.8;  ///< share of the displacement that a step may leave
   static constexpr double kEased =
-      0.5;  ///< share of a failed step: a shorter next one is tried whole
-  static constexpr double kShrink = 0.4;
+      0.5;  ///< a next step shorter than this share of a failed one is tried whole
+  static constexpr double kShrink = 0.4;  ///< of a failed step, for the next try
   /// Share of a step below which the proxy rather lags. What a tool has milled leaves it a play of
   /// hundredths of a unit, where longer steps only meet the other wall: in its first kFineQueries
   /// it may try steps down to kFinest.
@@ -98,8 +98,8 @@ struct Swept {
 /// The orientation goes first and the centre gives way to it: a stylus without torque motors turns
 /// the tool whatever the tooth says. Where no centre allows a turn, the orientation lags too.
 ///
-/// From an allowed place the tool does not go farther from its goal, but by kAstray: in a groove of
-/// its own shape planes that change from query to query would lead it on and on.
+/// From an allowed place the tool goes at most kAstray farther from its goal: in a groove of its
+/// own shape planes that change from query to query would lead it on and on.
 ///
 /// At most kMaxQueries calls of `query`. Coordinates within +-kContactLimit.
 ///
@@ -186,9 +186,9 @@ class ProxySweep {
     return {slide, left, norm(left)};
   }
 
-  /// Looks at a place, `moved` from where the depths of `known` count. A tool that is too deep
-  /// there is pushed out, twice at most. A turn begins no push in the second half of the tick's
-  /// work.
+  /// Looks at `centre`, which is `moved` from the place where the depths of `known` count. A tool
+  /// that is too deep there is pushed out, twice at most. A turn begins no push in the second half
+  /// of the tick's work.
   constexpr Trial attempt(Trying what, Place centre, const ConstraintSet<N>& known,
                           Place moved) noexcept {
     const bool turns = what == Trying::turn;
