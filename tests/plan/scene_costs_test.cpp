@@ -289,9 +289,9 @@ TEST_CASE("every stage of every method has a price, on machines of all kinds") {
     }
   }
   for (const char* name : {"avx512", "avx2", "neon", "scalar", "float", "double"}) {
-    CHECK(work_us(probe_stage(1, name)) > 0);
+    CHECK(work_us(query_stage(1, name)) > 0);
   }
-  CHECK_THROWS_AS(static_cast<void>(probe_stage(1, "abacus")), std::logic_error);
+  CHECK_THROWS_AS(static_cast<void>(query_stage(1, "abacus")), std::logic_error);
 }
 
 TEST_CASE("the servo's own tick is timed, and does there no more than it is said to") {

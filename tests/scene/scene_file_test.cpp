@@ -303,8 +303,8 @@ TEST_CASE("too many tools are refused") {
 }
 
 TEST_CASE("broken TOML is reported in one line with line and column") {
-  for (const char* broken : {"[servo\n", "a = \n", "\"\n", "a = 1\na = 2\n", "\xff\xfe\n",
-                             "[[volume]\n", "x = 0x\n", "s = \"\"\"never\nending", "[a]\n[a]\n"}) {
+  for (const char* broken : {"[servo\n", "a = \n", "\"\n", "\xff\xfe\n", "[[volume]\n", "x = 0x\n",
+                             "s = \"\"\"never\nending"}) {
     CAPTURE(broken);
     const std::string error = error_after(broken);
     CHECK(begins(error, "scenes/x.toml:"));
@@ -312,6 +312,11 @@ TEST_CASE("broken TOML is reported in one line with line and column") {
     CHECK(error.find("correct the TOML syntax here") != std::string::npos);
   }
   CHECK(begins(error_after("[servo\n"), "scenes/x.toml:6:7: "));
+  for (const char* doubled : {"a = 1\na = 2\n", "[a]\n[a]\n"}) {
+    CHECK(error_after(doubled).find(" existing ") != std::string::npos);
+    CHECK(error_after(doubled).ends_with("; leave one of the two out"));
+  }
+  CHECK(error_after("[device]\npersonality = omni\n").ends_with(": text stands in quotes"));
 }
 
 TEST_CASE("control characters never reach a message or a name") {
