@@ -159,10 +159,10 @@ std::string what_is_wrong(const CLI::App& program, const CLI::ParseError& error)
   const std::string text = error.what(), name = text.substr(0, text.find_first_of(": "));
   const CLI::Option* option = app.get_option_no_throw(name);
   if (option == nullptr) return "--" + name + " takes no value; leave out what follows the =";
-  return name +
-         (option->count() == 0 ? " has no value"
-                               : " has " + std::to_string(option->count()) + " values") +
-         "; give " + std::to_string(option->get_expected_min()) +
+  const std::size_t count = option->count();
+  return name + " has " + (count == 0 ? "no" : std::to_string(count)) +
+         (count > 1 ? " values" : " value") + "; give " +
+         std::to_string(option->get_expected_min()) +
          (option->get_expected_max() > option->get_expected_min() ? " or more" : "");
 }
 
