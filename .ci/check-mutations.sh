@@ -11,8 +11,8 @@ cd "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/.."
 mutations() {
   cat <<'LIST'
 controller/kernel/gradient.hpp | a tap: central -1 -> -2 | s/\{0, -1, 0, 1, 0\}/{0, -2, 0, 1, 0}/
-controller/kernel/gradient.hpp,controller/kernel/exact_taps.hpp | a tap in both plans: farid 55 -> 54 | s/\{5, 32, 55, 32, 5\}/{5, 32, 54, 32, 5}/
-controller/kernel/gradient.hpp,controller/kernel/exact_taps.hpp | a sign in both plans: sobel5 2 -> -2 | s/\{-1, -2, 0, 2, 1\}/{-1, -2, 0, -2, 1}/
+controller/kernel/gradient.hpp,controller/kernel/exact_taps.hpp | a tap in both tables: farid 55 -> 54 | s/\{5, 32, 55, 32, 5\}/{5, 32, 54, 32, 5}/
+controller/kernel/gradient.hpp,controller/kernel/exact_taps.hpp | a sign in both tables: sobel5 2 -> -2 | s/\{-1, -2, 0, 2, 1\}/{-1, -2, 0, -2, 1}/
 controller/kernel/gradient.hpp | rounding of a gradient | s/round_shift\(sum, shift\), kMax/sum >> shift, kMax/
 controller/kernel/gradient.hpp | reach of a refresh one short | s/changed\.grown\(kGradientReach\)/changed.grown(1)/
 controller/kernel/trilinear.hpp | rounding of a weight product | s/round_shift\(std::int64_t\{a\} \* b, 15\)/std::int64_t{a} * b >> 15/

@@ -7,6 +7,7 @@
 
 namespace kerf {
 
+/// What the command line of kerf-recorder asks for.
 struct RecorderOptions {
   std::string name = "kerf";
   std::filesystem::path out;

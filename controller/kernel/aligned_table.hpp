@@ -24,7 +24,7 @@ struct AlignedChunk {
   std::int32_t vector;  ///< entry of `AlignedTable::vectors` where its run begins
 };
 
-/// What the aligned plan holds of one tool, for kernels of one vector width. Made at load time
+/// What the method `aligned` holds of one tool, for kernels of one vector width. Made at load time
 /// (controller/plan/tables/aligned_tool.hpp), constant afterwards; points into the maker's memory.
 ///
 /// A table entry has up to 18 bits and is kept as 512 hi + lo, both in 16 bits. A run is `lanes`

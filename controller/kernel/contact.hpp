@@ -11,7 +11,7 @@
 
 namespace kerf {
 
-/// SUM over tool samples i of SUM over the corners c of its cell of w_ic g_c: the interpolated
+/// SUM over tool samples i of SUM over the corners j of its cell of phi_ij grad_j: the interpolated
 /// gradients added up, in density steps per voxel times kWeightOne. The paper's contact force is
 /// minus this, scaled by p0 a^3 (docs/theory.md 7.1).
 ///

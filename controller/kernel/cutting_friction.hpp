@@ -9,7 +9,7 @@
 
 namespace kerf {
 
-/// What the turning tool's surface does to hand and spindle: F_t = mu F_n against omega x r
+/// What the turning tool's surface does to hand and spindle: F_t = mu F_n against omega x arm
 /// (docs/theory.md 6.5). Made by `cutting_friction`.
 template <class N>
 struct FrictionPlan {

@@ -25,8 +25,8 @@ struct BoxCut {
   VoxelIndex lo, hi;
 };
 
-/// The stages of a tick, of every plan of fixed point, for one instruction set. All sets give the
-/// same bits.
+/// The inner loops of a tick in fixed point, for one instruction set: those of every method, of the
+/// cut by force and of the swept contact. All sets give the same bits.
 ///
 /// Plain pointers and plain structs: these functions are compiled with instructions that other
 /// machines lack, so nothing that the linker could share with other files may be inlined here.

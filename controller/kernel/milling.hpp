@@ -17,7 +17,7 @@ namespace kerf {
 // One tick of cutting, in this order: `overlap`, `modification_sum`, `remove`, `refresh_gradients`.
 // Force comes first: `modification_sum` sees the density and the gradients from before the removal.
 
-/// SUM over voxels j with r_j > 0 and density > 0 of r_j G_j, G the stored gradient: in density
+/// SUM over voxels j with c_j > 0 and density > 0 of c_j grad_j, the stored gradient: in density
 /// steps per voxel times kWeightOne. The modification force is minus this, scaled by p1 V_voxel
 /// (docs/theory.md 7.4).
 ///
@@ -86,13 +86,13 @@ template <class N>
 
 }  // namespace detail
 
-/// rho_j -= rho_j f(r_j) for every voxel of the overlap, f the fraction of `rate`; whole steps
+/// rho_j -= rho_j f(c_j) for every voxel of the overlap, f the fraction of `rate`; whole steps
 /// leave the volume, the rest waits in `carry` and joins the next voxel of the lane. Rows in z, y,
 /// x order.
 ///
-/// Fixed: w = r m >> 15, then rho w 2^-exponent with 16 fraction bits, cut off below; at most
+/// Fixed: f = c m >> 15, then rho f 2^-exponent with 16 fraction bits, cut off below; at most
 /// 0xffff0000 + 0xffff, so 32 unsigned bits hold it and the decrease never exceeds the density.
-/// kT = 1 and r = 1 remove everything. `carry` belongs to the tool's state, zero at first, at least
+/// kT = 1 and c = 1 remove everything. `carry` belongs to the tool's state, zero at first, at least
 /// `removal_lanes(width of the box)` long; with fewer lanes nothing is removed.
 template <class N>
 constexpr Removed remove(const VoxelGrid& grid, std::span<Density> density,

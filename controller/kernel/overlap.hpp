@@ -83,7 +83,7 @@ template <class N>
 
 }  // namespace detail
 
-/// r_j = min(1, volume_ratio * SUM over tool samples i of w_ij) for every voxel j that the tool
+/// c_j = min(1, volume_ratio * SUM over tool samples i of phi_ij) for every voxel j that the tool
 /// touches, before any density changes. `volume_ratio` is a^3 / V_voxel: pitch cubed over the
 /// volume of a voxel; kStepOne skips the product.
 ///

@@ -16,7 +16,7 @@ namespace kerf {
 // Cutting that follows force: Preston's law, shared among the voxels under the tool by what it
 // covers of them (o_j) times the speed of its surface there (w_j): docs/theory.md 6.2. What cannot
 // be cut carries its part of the force and stays. Over several volumes the sum of w goes through
-// all of them: each gets its share of the drive F_n n/n_ref (`cut_drive`).
+// all of them: each gets its share of the drive (F_n - F_0) omega/omega_ref (`cut_drive`).
 
 /// How force cuts one volume; constant during a run. Index: label, 0 where there are no labels.
 template <class N>

@@ -58,7 +58,7 @@ template <class N>
   }
 }
 
-/// What drives the cut: (F_n - threshold) n / n_ref in newtons, 0 below the threshold. Fixed: 24
+/// What drives the cut: (F_n - F_0) omega / omega_ref in newtons, 0 below the threshold. Fixed: 24
 /// fraction bits, at most 128 N.
 template <class N>
 [[nodiscard]] constexpr typename N::Sum cut_drive(typename N::Real normal_force_n,

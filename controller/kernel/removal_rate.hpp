@@ -9,12 +9,12 @@
 
 namespace kerf {
 
-/// What one tick removes of a voxel with overlap ratio r (docs/theory.md 7.5): the fraction r *
-/// min(1, kT), or 1 - exp(-r kT) in the exact form, whose result after a given time does not depend
+/// What one tick removes of a voxel with overlap c (docs/theory.md 7.5): the fraction c *
+/// min(1, kT), or 1 - exp(-c kT) in the exact form, whose result after a given time does not depend
 /// on the rate.
 ///
-/// Fixed: the fraction at r = 1 is `mantissa` 2^-(15 + exponent). The exact form bends r by a table
-/// of f(r) / f(1) with linear steps between 257 entries: within kT^2 / (8 * 256^2) / f(1) and two
+/// Fixed: the fraction at c = 1 is `mantissa` 2^-(15 + exponent). The exact form bends c by a table
+/// of f(c) / f(1) with linear steps between 257 entries: within kT^2 / (8 * 256^2) / f(1) and two
 /// weight steps, never falling. Made at load time by `removal_rate`.
 template <class N>
 struct RemovalRate {

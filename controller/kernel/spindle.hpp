@@ -8,17 +8,17 @@
 
 namespace kerf {
 
-/// The motor that turns the tool (docs/theory.md 6.5): J d(omega)/dt = tau_motor - tau_load, with
-/// the straight line of a turbine, tau_motor = tau_stall (1 - n / n_free). Constant during a run;
-/// made by `spindle_plan`.
+/// The motor that turns the tool (docs/theory.md 6.5): I d(omega)/dt = tau_motor - tau_load, with
+/// the straight line of a turbine, tau_motor = tau_stall (1 - omega / omega_free). Constant during
+/// a run; made by `spindle_plan`.
 template <class N>
 struct SpindlePlan {
-  typename N::Unit free_ratio{};      ///< n_free / n_ref, below 2
+  typename N::Unit free_ratio{};      ///< omega_free / omega_ref, below 2
   typename N::Real loads_per_n_mm{};  ///< 1 / tau_stall
   typename N::Unit approach{};  ///< share of the difference to the resting speed made up in a tick
 };
 
-/// `free_ratio` 0..1.9, positive torque in N mm; `run_up_s` = J omega_free / tau_stall is the time
+/// `free_ratio` 0..1.9, positive torque in N mm; `run_up_s` = I omega_free / tau_stall is the time
 /// constant. A tick makes up 1 - exp(-T / run_up) of the difference, so the speed after a given
 /// time is the same at every rate. Load time.
 template <class N>
@@ -31,16 +31,16 @@ template <class N>
 
 template <class N>
 struct SpindleState {
-  typename N::Unit ratio{};  ///< n / n_ref; 0 before it is switched on
+  typename N::Unit ratio{};  ///< omega / omega_ref; 0 before it is switched on
   typename N::Real
       load{};  ///< torque over the stall torque, 0..kMaxSpindleLoad; from 1 on it stalls
 };
 
 inline constexpr int kMaxSpindleLoad = 100;  ///< a larger load counts as that
 
-/// One tick under a torque >= 0. The speed goes to n_free (1 - load), where motor and load agree,
-/// and stays at 0 when the load is more than the motor has: friction brakes, it does not turn back.
-/// Switched off, the spindle is braked as fast as it runs up.
+/// One tick under a torque >= 0. The speed goes to omega_free (1 - load), where motor and load
+/// agree, and stays at 0 when the load is more than the motor has: friction brakes, it does not
+/// turn back. Switched off, the spindle is braked as fast as it runs up.
 ///
 /// Fixed: the speed rests within 2^-31 / `approach` of where it should. Servo thread.
 template <class N>

@@ -28,9 +28,9 @@ struct SamplePose {
 /// stays within 2^31, and 32-bit arithmetic gives the place that `sample_position` gives.
 inline constexpr std::int32_t kSampleReachVox = 1000;
 
-// The method `splat` (docs/theory.md 7.6): any pose of any shape, in scenes that cut. The sums R_j
-// of the samples' weights are all that the forces and the removal need of the tool. Nothing but the
-// density is stored, nothing is refreshed after a cut.
+// The method `splat` (docs/theory.md 7.6): any pose of any shape, in scenes that cut. The sums
+// PHI_j of the samples' weights are all that the forces and the removal need of the tool. Nothing
+// but the density is stored, nothing is refreshed after a cut.
 
 /// Samples per voxel that a sum can hold: 2^24 of weights of 2^15, so that 5 taps of it fit 32
 /// bits.
@@ -40,7 +40,7 @@ inline constexpr double kMaxSplatDensity = 512.0;
 struct SplatScratch {
   BoxScratch tick;               ///< box, ratios, filter and live rows
   std::int32_t* place[3] = {};   ///< of each sample, Q15.16 voxels
-  std::int32_t* sums = nullptr;  ///< rows of row_lanes entries: R_j, weights of 2^15
+  std::int32_t* sums = nullptr;  ///< rows of row_lanes entries: PHI_j, weights of 2^15
   std::int16_t* rest[2] = {};    ///< one plane: minus the sums beyond the ratios, low 15 bits, high
   std::uint8_t* rest_live = nullptr;  ///< by row of the plane: which of the two are not all 0
 };

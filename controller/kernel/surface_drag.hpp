@@ -19,9 +19,9 @@ struct SurfaceDrag {
 };
 
 /// That of a ball whose contact bears a load along `normal`, out of the solid, at `arm` from the
-/// axis on average. Whatever places bear it, SUM load_i r_i is -R times the load, so omega x r is
-/// known without them. Most of what a ball covers of its own bore bears nothing, and changes sides
-/// where the ball moves by a tenth of a voxel.
+/// axis on average. Whatever places bear it, SUM load_i arm_i is -R times the load, so omega x arm
+/// is known without them. Most of what a ball covers of its own bore bears nothing, and changes
+/// sides where the ball moves by a tenth of a voxel.
 template <class N>
 [[nodiscard]] constexpr SurfaceDrag<N> ball_drag(Vec<typename N::Unit, ToolSpace> normal,
                                                  typename N::Unit arm) noexcept {
@@ -52,7 +52,7 @@ class DragSums {
   constexpr void add(const Row& row, typename SpindleFrame<N>::Place first,
                      typename SpindleFrame<N>::Place step) noexcept {
     if (!(row.weight > 0)) return;
-    // omega x r with omega along -y.
+    // omega x arm with omega along -y.
     x_ -= moment(row, first.z, step.z);
     z_ += moment(row, first.x, step.x);
     weight_ += row.weight;

@@ -84,8 +84,8 @@ class SceneIn final : public CompiledScene {
     plan.rim_mm = typename N::Real(tool.radius_mm);
     plan.offsets = memory_.hold_samples(tool);
     if (plan_.contact.swept) {
-      plan.swept.shell = memory_.contact().hold_shell(scene, tool);
-      plan.swept.proxy = plan_proxy(scene, tool, plan.swept.shell);
+      plan.swept.point_shell = memory_.contact().hold_point_shell(scene, tool);
+      plan.swept.proxy = plan_proxy(scene, tool, plan.swept.point_shell);
     }
     for (std::size_t v = 0; v < plan_.volume_count; ++v) {
       const std::size_t scene_index = plan_.volumes[v].scene_index;
@@ -97,15 +97,15 @@ class SceneIn final : public CompiledScene {
       const TickShape shape = tick_shape(in, table);
       costs_.ticks.push_back(
           {plan_.tool_count - 1, scene_index, choice, shape,
-           most_stages(*choice.method, shape, in, most_samples(plan.swept.shell))});
+           most_stages(*choice.method, shape, in, most_samples(plan.swept.point_shell))});
     }
     plan.samples = memory_.methods().samples_of(tool);
   }
 
   /// Of one volume, rounded up.
-  [[nodiscard]] std::uint64_t most_samples(const PointShell<N>& shell) const {
+  [[nodiscard]] std::uint64_t most_samples(const PointShell<N>& point_shell) const {
     if (!plan_.contact.swept) return 0;
-    const std::int64_t all = query_work(shell.table, plan_.volume_count).most();
+    const std::int64_t all = query_work(point_shell.table, plan_.volume_count).most();
     return (static_cast<std::uint64_t>(all) + plan_.volume_count - 1) / plan_.volume_count;
   }
 

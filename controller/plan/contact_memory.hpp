@@ -25,7 +25,7 @@ template <class N>
 class ContactMemory {
  public:
   /// Samples of a tool's surface; they stay where they are.
-  PointShell<N> hold_shell(const LoadedScene& scene, const SceneTool& tool) {
+  PointShell<N> hold_point_shell(const LoadedScene& scene, const SceneTool& tool) {
     const double unit_mm = contact_unit_mm(scene);
     const auto in_units = [unit_mm](std::vector<std::array<double, 3>> samples) {
       for (auto& sample : samples) {
@@ -37,8 +37,8 @@ class ContactMemory {
     const auto close = in_units(close_samples(tool, unit_mm));
     const auto& held =
         tools_.emplace_back(tool.name, ToolPoints<N>(samples, tool.round, close)).second;
-    for (PlaceMemory<N>& places : places_) places.hold(held.shell());
-    return held.shell();
+    for (PlaceMemory<N>& places : places_) places.hold(held.point_shell());
+    return held.point_shell();
   }
 
   /// Room in one more volume of the plan.

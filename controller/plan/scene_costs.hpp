@@ -10,7 +10,7 @@
 
 namespace kerf {
 
-/// The ticks of one tool in one volume.
+/// What a tick of one tool costs in one volume, and why.
 struct TickCost {
   std::size_t tool = 0, volume = 0;  ///< by index of the scene
   MethodChoice choice;

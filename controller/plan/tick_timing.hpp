@@ -76,7 +76,7 @@ template <class N>
 struct WorstTick {
   double median_us = 0, p99_us = 0;
   VoxelIndex box;             ///< that held the tool's cells, in low corners
-  std::uint64_t queried = 0;  ///< samples of the probes, the median
+  std::uint64_t queried = 0;  ///< samples that its queries read, the median
   std::uint64_t covered = 0;  ///< what the last cut by force covered
 };
 
@@ -156,7 +156,7 @@ class WorstDrive {
 
   [[nodiscard]] Place hand(int i) const {
     if (!plan_->contact.swept) return world({dense_.x + 0.002 * i, dense_.y + 0.3, dense_.z + 0.4});
-    constexpr double kJumpVox = 15, kTurn = 1.1;  // of those tried, these made the most probes
+    constexpr double kJumpVox = 15, kTurn = 1.1;  // of those tried, these made the most queries
     const double angle = kTurn * i;
     return world({dense_.x + kJumpVox * std::cos(angle), dense_.y + kJumpVox * std::sin(angle),
                   dense_.z + kJumpVox * std::sin(0.7 * angle)});

@@ -16,6 +16,9 @@
 
 namespace kerf {
 
+// A scene file as values: what it says, checked, with the defaults of what it leaves out. No array
+// is read yet (controller/load). Limits first.
+
 /// The shapes a [[tool]] can have, its tip (the lowest point of the head) toward -y and the shaft
 /// toward +y. All but the mesh are solids of revolution about the y axis:
 ///
@@ -55,6 +58,7 @@ inline constexpr std::string_view kPhantomFile = "phantom";
 inline constexpr double kEnamelMm3PerSN = 0.083;
 inline constexpr double kReferenceSpeedKrpm = 300;
 
+/// A [[material]]; its place in the list is the label of its voxels.
 struct Material {
   std::string name;
   double iso = 0.5;                              ///< density, 0..1
@@ -64,11 +68,13 @@ struct Material {
   std::array<double, 3> colour{0.9, 0.87, 0.8};  ///< linear RGB, 0..1
 };
 
+/// The numbers of the loop.
 enum class NumericKind : std::uint8_t { fixed, float32, float64 };
 enum class ForceModel : std::uint8_t {
   paper,  ///< sum of gradients over the tool's samples
   proxy   ///< swept contact of the tool's surface, coupled to the hand
 };
+/// How material leaves (docs/cutting.md).
 enum class CutModel : std::uint8_t { none, overlap, overlap_exact, preston };
 
 // The tables of a scene file. What a member means, its unit and range: scene_keys.cpp.

@@ -5,6 +5,7 @@
 
 #include "controller/scene/scene_table.hpp"
 #include "controller/scene/scene_text.hpp"
+#include "shared/text/words.hpp"
 
 namespace kerf {
 namespace {

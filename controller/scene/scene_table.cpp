@@ -9,6 +9,7 @@
 #include <variant>
 
 #include "controller/scene/scene_text.hpp"
+#include "shared/text/words.hpp"
 
 namespace kerf {
 namespace {
@@ -76,9 +77,8 @@ struct Take {
     }
     const auto words = key.allowed.words;
     if (words.empty() || std::ranges::find(words, *text) != words.end()) return *text;
-    const std::string_view near = nearest(*text, words);
-    const std::string guess = near.empty() ? "" : "did you mean \"" + std::string(near) + "\"? ";
-    refuse(place, " is unknown; " + guess + "known: " + listed(words));
+    const auto [lo, hi] = key.allowed.range;
+    refuse(place, unknown_word(*text, words, "\"") + (lo < hi ? ", or " + range_text() : ""));
   }
   /// Whether a word stands for a number.
   [[nodiscard]] bool is_word() const {
@@ -95,7 +95,13 @@ struct Take {
     const double number = whole != nullptr ? static_cast<double>(*whole) : *real;
     const auto [lo, hi] = key.allowed.range;
     if (number >= lo && number <= hi) return number;  // no nan is
-    refuse(place, " is out of range; use " + number_text(lo) + " to " + number_text(hi));
+    std::string words;
+    for (const std::string_view word : key.allowed.words)
+      words += ", or \"" + std::string(word) + '"';
+    refuse(place, " is out of range; use " + range_text() + words);
+  }
+  [[nodiscard]] std::string range_text() const {
+    return number_text(key.allowed.range.lo) + " to " + number_text(key.allowed.range.hi);
   }
 };
 

@@ -65,7 +65,7 @@ TomlNode parse_toml_tree(std::string_view text, const std::string& file) {
   const toml::parse_error& error = parsed.error();
   const auto at = error.source().begin;
   refuse(file + ":" + std::to_string(at.line) + ":" + std::to_string(at.column),
-         ": " + std::string(error.description()) + "; correct the TOML syntax here");
+         ": " + toml_problem(error));
 }
 
 std::string written(const TomlValue& value) {

@@ -26,9 +26,10 @@ struct Coupling {
 /// hand that arrives fast feels no blow.
 inline constexpr double kFullDampingMm = 0.1;
 
-/// F = d max(0, K p - B min(1, p / kFullDampingMm) v.d). `spring_mm` leads from the hand to the
-/// proxy, its length is p, its direction d; v is the hand's velocity in mm/s. Only motion along the
-/// spring is damped: a tool that slides has no drag, and a hand that leaves is not held back.
+/// F = u max(0, K delta - B min(1, delta / kFullDampingMm) v . u). `spring_mm` leads from the hand
+/// to the proxy, delta is its length, u its direction; v is the hand's velocity in mm/s. Only
+/// motion along the spring is damped: a tool that slides has no drag, and a hand that leaves is not
+/// held back.
 ///
 /// Fixed: saturates at the ends of the range; a spring shorter than 2^-16 mm gives nothing.
 template <class N>
@@ -63,7 +64,7 @@ template <class N>
   return {component(spring_mm.x), component(spring_mm.y), component(spring_mm.z)};
 }
 
-/// How the proxy's spring becomes a force; constant during a run.
+/// Where contact space lies, and how the proxy's spring becomes a force; constant during a run.
 template <class N>
 struct ContactPlan {
   bool swept = false;                      ///< else the paper's sums are felt
@@ -77,11 +78,11 @@ struct ContactPlan {
 /// A tool's surface and how its proxy moves.
 template <class N>
 struct SweptTool {
-  PointShell<N> shell;
+  PointShell<N> point_shell;
   ProxyPlan<N> proxy;
 };
 
-/// The part that changes; places belong to the compiled scene.
+/// What one tick hands to the next; the memory of `volumes` belongs to the compiled scene.
 template <class N>
 struct ContactState {
   std::array<ContactVolume<N>, kMaxVolumes> volumes{};  ///< by index of the plan's volumes

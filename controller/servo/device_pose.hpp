@@ -45,6 +45,7 @@ inline bool follow_encoders(const DeviceReport& report, bool absolute, std::uint
   return true;
 }
 
+/// Takes the pots of this report into their means over GimbalFilter::kSamples reports.
 inline void follow_gimbal(const DeviceReport& report, GimbalFilter& filter) noexcept {
   auto& oldest = filter.ring[filter.next];
   for (std::size_t i = 0; i < 3; ++i) {

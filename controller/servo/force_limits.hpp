@@ -63,6 +63,7 @@ template <class N>
   return limits.continuous_n + (limits.peak_n - limits.continuous_n) * left;
 }
 
+/// One tick of the winding's heat under this force.
 template <class N>
 constexpr void heat_up(const ForceLimits<N>& limits, ThermalState<N>& state,
                        DeviceVec<typename N::Real> force_n) noexcept {
@@ -75,7 +76,8 @@ constexpr void heat_up(const ForceLimits<N>& limits, ThermalState<N>& state,
   }
 }
 
-/// Clamp (peak and thermal), then slew from the force of the last tick.
+/// Clamps the wanted force to peak and thermal limit, then its step from the force of the last
+/// tick; heats the winding by what is left, the force to send.
 template <class N>
 [[nodiscard]] constexpr DeviceVec<typename N::Real> limited_force(
     const ForceLimits<N>& limits, ThermalState<N>& thermal, DeviceVec<typename N::Real> wanted_n,

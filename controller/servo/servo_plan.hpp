@@ -57,11 +57,12 @@ struct ToolInVolume {
   const AlignedTable* aligned = nullptr;  ///< of the method `aligned`
   // Of the method's own sums:
   SumToForce<N> contact;  ///< F_c = -p0 a^3 SUM grad (docs/theory.md 7.1), times workspace scale
-  SumToForce<N> modification;  ///< F_m = -p1 V_voxel SUM r grad (docs/theory.md 7.4), scaled alike
+  SumToForce<N> modification;  ///< F_m = -p1 V_voxel SUM c grad (docs/theory.md 7.4), scaled alike
   /// Where force cuts: from voxel edges to rim radii along the world's axes, for a `SpindleFrame`.
   Transform<typename N::Ratio, WorldSpace, VoxelSpace> rims_from_voxel;
 };
 
+/// A tool of the scene; constant during a run.
 template <class N>
 struct ToolPlan {
   std::span<const ToolOffset> offsets;

@@ -11,9 +11,10 @@ namespace kerf {
 /// All physics of one tick, a pure function of its arguments: no clock, device, allocation, lock,
 /// system call or exception, and no loop without a bound known at load.
 ///
-/// sanitise report -> kinematics -> safety -> contact force from the volumes as they are -> cut
-/// because of that force -> limits -> joint torques. A report that is missing, or a pose that is
-/// not finite, holds the last force and then fades it; nothing is felt or cut meanwhile.
+/// sanitise report -> kinematics -> safety -> contact force from the volumes as they are, and the
+/// paper's cut by overlap -> limits -> joint torques -> cut by the force that was sent. A report
+/// that is missing, or a pose that is not finite, holds the last force and then fades it; nothing
+/// is felt or cut meanwhile.
 template <class N>
 [[nodiscard]] ServoOutput servo_step(const ServoPlan<N>& plan, ServoState<N>& state,
                                      const DeviceReport& report) noexcept;

@@ -39,7 +39,7 @@ template <class N>
   ProxyPose<N> goal;
   goal.centre = scaled(relabel<ContactSpace>(tip_mm - contact.origin_mm), contact.units_per_mm);
   if (tool.turns && !tool.round) goal.turn = turn_of<N>(rotation.row);
-  ContactQuery<N> field(*plan.kernels, tool.swept.shell,
+  ContactQuery<N> field(*plan.kernels, tool.swept.point_shell,
                         std::span(state.contact.volumes).first(plan.volume_count));
   field.begin_tick();
   const ProxyContact<N> felt = follow<N>(tool.swept.proxy, state.contact.proxy, field, goal);

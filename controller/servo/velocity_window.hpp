@@ -48,7 +48,7 @@ class VelocityWindow {
 
  private:
   static constexpr std::int32_t kRing = kIntervals * kMaxStride + 1;
-  /// Fixed: exact integers. A difference has 33 bits, 6 SUM 44, times l 48, times the denominator
+  /// Fixed: exact integers. A difference has 33 bits, 6 SUM 44, times j 48, times the denominator
   /// of the check, at most 16 * 17 * 18, 46.
   using Wide = std::conditional_t<N::kIsFixed, std::int64_t, Real>;
 
@@ -69,18 +69,18 @@ class VelocityWindow {
     std::array<Wide, kIntervals + 1> back{};  // newest - sample
     const Wide newest = at(0);
     Wide slope{}, slope_of{1};  // per interval: slope / slope_of
-    Wide sum{};                 // SUM_l back_l
-    Wide moment{};              // SUM_l l back_l
+    Wide sum{};                 // SUM_j back_j
+    Wide moment{};              // SUM_j j back_j
     for (std::int32_t i = 1; i <= kIntervals; ++i) {
       const auto n = static_cast<std::size_t>(i);
       back[n] = newest - at(i);
       sum += back[n];
       moment += Wide(i) * back[n];
-      // SUM_l (i - 2 l) y_{k-l} = SUM_l (2 l - i) back_l, as the weights add up to 0.
+      // SUM_j (i - 2 j) x_j = SUM_j (2 j - i) back_j, as the weights add up to 0.
       const Wide top = Wide(6) * (Wide(2) * moment - Wide(i) * sum);
       const Wide bottom = Wide(i) * Wide(i + 1) * Wide(i + 2);
-      for (std::int32_t l = 1; l <= i; ++l) {
-        const Wide miss = back[static_cast<std::size_t>(l)] * bottom - Wide(l) * top;
+      for (std::int32_t j = 1; j <= i; ++j) {
+        const Wide miss = back[static_cast<std::size_t>(j)] * bottom - Wide(j) * top;
         if (i > 1 && (miss > most * bottom || -miss > most * bottom)) {
           return per_second(plan, slope, slope_of);
         }

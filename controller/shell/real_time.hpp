@@ -7,6 +7,7 @@
 
 namespace kerf {
 
+/// What the servo thread asks of the system.
 struct RealTimeOptions {
   int priority = 80;         ///< SCHED_FIFO
   int cpu = -1;              ///< core of the servo thread; -1: the last one

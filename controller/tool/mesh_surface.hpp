@@ -8,6 +8,7 @@
 
 namespace kerf {
 
+/// Area of all triangles.
 [[nodiscard]] double surface_mm2(const ToolMesh& mesh);
 
 /// How evenly samples of a mesh lie: so many dots a sample stand for the surface, and so many

@@ -8,7 +8,6 @@
 #include <span>
 #include <sstream>
 
-#include "controller/kernel/point_shell/close_table.hpp"
 #include "controller/kernel/point_shell/point_table.hpp"
 #include "controller/scene/scene_error.hpp"
 #include "controller/tool/mesh_surface.hpp"

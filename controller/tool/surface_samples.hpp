@@ -25,7 +25,7 @@ inline constexpr double kShapeSamplePitch = 1.0;
 /// many.
 inline constexpr int kMinSurfaceSamples = 512;
 
-/// A probe reads each sample, some 2 ns of the tick's time apiece.
+/// A query reads each sample, some 2 ns of the tick's time apiece.
 inline constexpr int kMaxSurfaceSamples = 8000;
 
 /// Samples of a tool's surface, ends and rims included, in mm from its centre along its axes. Each

@@ -3,6 +3,7 @@
 
 namespace kerf::phantom {
 
+/// A place in the phantom.
 struct Point {
   double x, y, z;  ///< mm from the middle of the box: mesial, buccal, occlusal
 };

@@ -8,6 +8,7 @@
 
 namespace kerf {
 
+/// Whether the voxels of a file are compressed.
 enum class VolumeEncoding : std::uint8_t { gzip, raw };
 
 /// Where the labels of a volume file lie: `tooth.nrrd` -> `tooth-labels.nrrd`.

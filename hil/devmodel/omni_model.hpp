@@ -21,9 +21,9 @@ struct OmniParams : PlantParams {
   std::uint32_t seed = 1;
 };
 
-/// The PHANTOM Omni. It says something at any moment; what it does when host packets stop is not
-/// known, so both answers can be tested. Calibrated, for the hand, is a host that switches the
-/// motors or the steady light of the inkwell on.
+/// The PHANTOM Omni. It has a packet whenever one is asked for. What it does when host packets stop
+/// is not known, so both answers can be tested. The emulated hand takes the host for calibrated
+/// once it has switched the motors on, or the light of the inkwell to steady.
 class OmniModel final : public DeviceModel {
  public:
   explicit OmniModel(const OmniParams& params = {});

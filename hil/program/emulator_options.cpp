@@ -7,6 +7,7 @@
 
 #include "hil/devmodel/bus_cycle.hpp"
 #include "hil/hil_error.hpp"
+#include "shared/text/words.hpp"
 #include "shared/wire/personality.hpp"
 #include "shared/wire/wooden_constants.hpp"
 
@@ -62,9 +63,7 @@ template <std::size_t N>
 void check_known(const char* option, const std::string& value,
                  const std::array<std::string_view, N>& known) {
   if (std::find(known.begin(), known.end(), value) != known.end()) return;
-  std::string list;
-  for (const auto name : known) list += (list.empty() ? "" : ", ") + std::string(name);
-  throw HilError(std::string(option) + ": " + value + " is not known; use one of " + list);
+  throw HilError(std::string(option) + ": " + value + unknown_word(value, known));
 }
 
 void check_front(const EmulatorOptions& o) {

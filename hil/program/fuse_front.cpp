@@ -12,7 +12,7 @@
 namespace kerf {
 namespace {
 
-/// Serves `node` as `mount`/`name`; `cycles()` since the begin.
+/// Serves `node` as `mount`/`name`; `cycles()` since the start.
 template <class Node, class Cycles>
 void serve_node(const BusService& service, const std::string& mount, const char* device,
                 const std::string& name, Node& node, Cycles cycles) {

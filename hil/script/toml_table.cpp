@@ -38,7 +38,7 @@ toml::table parse_toml(std::string_view text, const std::string& place) {
   if (parsed) return std::move(parsed).table();
   const toml::parse_error& error = parsed.error();
   throw HilError(place + ":" + std::to_string(error.source().begin.line) + ": " +
-                 std::string(error.description()) + "; correct the TOML");
+                 toml_problem(error));
 }
 
 const toml::array& tables_of(const toml::table& file, std::string_view key, std::size_t most,

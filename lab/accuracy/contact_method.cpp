@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "controller/tool/tool_shapes.hpp"
-#include "lab/accuracy/servo_plans.hpp"
+#include "lab/accuracy/servo_methods.hpp"
 #include "lab/accuracy/spline.hpp"
 #include "lab/accuracy/stored_gradients.hpp"
 
@@ -33,9 +33,9 @@ BallTool ball_tool(double radius_mm, double pitch_mm) {
 std::unique_ptr<ContactMethod> contact_method(const ContactChoice& choice,
                                               const AnalyticVolume& volume, const BallTool& tool) {
   if (choice.storage == Storage::aligned) {
-    return std::make_unique<AlignedPlan>(choice, volume, tool);
+    return std::make_unique<AlignedMethod>(choice, volume, tool);
   }
-  if (choice.storage == Storage::splat) return std::make_unique<SplatPlan>(choice, volume, tool);
+  if (choice.storage == Storage::splat) return std::make_unique<SplatMethod>(choice, volume, tool);
   if (choice.storage == Storage::spline) {
     if (choice.interpolation == Interpolation::cubic) {
       return std::make_unique<DensitySpline<3>>(choice, volume, tool);
@@ -67,7 +67,7 @@ std::unique_ptr<ContactMethod> contact_method(const ContactChoice& choice,
     case Arithmetic::q15:
       break;
   }
-  return std::make_unique<GatherPlan>(choice, volume, tool);
+  return std::make_unique<GatherMethod>(choice, volume, tool);
 }
 
 Point force_share(const ContactMethod& method, const AnalyticVolume& volume, const BallTool& tool,

@@ -13,6 +13,8 @@
 
 namespace kerf::accuracy {
 
+// What an accuracy study varies.
+
 enum class Arithmetic : std::uint8_t {
   q8,       ///< trilinear weights of 8 bits: less than kerf keeps
   q12,      ///< of 12 bits

@@ -82,7 +82,7 @@ TickTimes time_contact(const ContactMethod& method, const ContactCase& at, int t
       });
 }
 
-Entry measured(const Variant& variant, const std::vector<Subject>& subjects, const Plan& plan) {
+Entry measured(const Variant& variant, const std::vector<Subject>& subjects, const Scope& scope) {
   const ContactChoice& choice = variant.choice;
   const BallTool tool = ball_tool(kToolMm, choice.pitch_vox * choice.voxel_mm);
   Entry entry;
@@ -94,13 +94,13 @@ Entry measured(const Variant& variant, const std::vector<Subject>& subjects, con
     Spread differences;
     for (const ContactCase& at : subject.cases) {
       const auto method = contact_method(choice, at.volume, tool);
-      add_errors(*method, at, tool, plan.effort, errors);
+      add_errors(*method, at, tool, scope.effort, errors);
       if (variant.against_double) {
         const auto truth = contact_method({.arithmetic = Arithmetic::float64}, at.volume, tool);
         add_difference(*method, *truth, at, tool, differences);
       }
       if (subject.name == "ball") {
-        entry.times = time_contact(*method, at, plan.ticks);
+        entry.times = time_contact(*method, at, scope.ticks);
         figures.push_back(
             {"any", "memory", static_cast<double>(method->bytes_per_voxel()), "bytes a voxel"});
         figures.push_back({"any", "samples", static_cast<double>(tool.offsets.size()), "1"});
@@ -151,9 +151,10 @@ const double* Entry::find(std::string_view metric, std::string_view shape) const
 }
 
 std::vector<Entry> study(
-    const Plan& plan, const std::function<void(double share, const std::string& what)>& progress) {
+    const Scope& scope,
+    const std::function<void(double share, const std::string& what)>& progress) {
   progress(0, "contacts");
-  const Subjects touched(plan.contacts, plan.walks);
+  const Subjects touched(scope.contacts, scope.walks);
   const std::vector<Variant> list = variants();
   std::optional<double> voxel_mm;
   std::vector<Subject> subjects;
@@ -169,10 +170,10 @@ std::vector<Entry> study(
     } else {
       if (voxel_mm != variant.choice.voxel_mm) {
         subjects = {};  // one set in memory at a time
-        subjects = touched.in_voxels(variant.choice.voxel_mm, plan.side_mm);
+        subjects = touched.in_voxels(variant.choice.voxel_mm, scope.side_mm);
         voxel_mm = variant.choice.voxel_mm;
       }
-      entry = measured(variant, subjects, plan);
+      entry = measured(variant, subjects, scope);
     }
     entry.knob = variant.knob;
     entry.value = variant.value;

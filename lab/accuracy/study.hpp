@@ -34,7 +34,7 @@ struct Entry {
 };
 
 /// How much is measured; the defaults take about a minute on one core.
-struct Plan {
+struct Scope {
   Effort effort;
   std::size_t contacts = 100;  ///< of each shape, and tilts of the plane
   std::size_t walks = 4;       ///< of each shape
@@ -44,6 +44,6 @@ struct Plan {
 
 /// `told` hears how far it is (0..1) and what is measured now.
 [[nodiscard]] std::vector<Entry> study(
-    const Plan& plan, const std::function<void(double share, const std::string& what)>& progress);
+    const Scope& scope, const std::function<void(double share, const std::string& what)>& progress);
 
 }  // namespace kerf::accuracy

@@ -48,7 +48,7 @@ Json json_of(const std::vector<KernelRow>& rows) {
   Json report;
   report["core"] = core;
   report["rows"] = json_of(rows);
-  report["probes"] = json_of(queries);
+  report["queries"] = json_of(queries);
   report["layout"] = json_of(layout);
   return report.document();
 }

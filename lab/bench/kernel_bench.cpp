@@ -44,7 +44,7 @@ struct Ticks {
   std::vector<ToolOffset> tool;
   int count;
   std::function<Place(int)> place;
-  bool turned = true;  ///< for the plans that can turn it
+  bool turned = true;  ///< for the methods that can turn it
   bool can_align = true;
   bool cold = false;
 };

@@ -57,9 +57,9 @@ class QueryBench {
     const auto at_depth = [](double z) {
       return [z](int i) -> Place { return {24 + 0.05 * i, 128.3, z}; };
     };
-    queries("probe/" + name + "/slide", samples, ball_, slide);
-    queries("probe/" + name + "/half", samples, half_, at_depth(96.6));
-    queries("probe/" + name + "/immersed", samples, half_, at_depth(66.8));
+    queries("query/" + name + "/slide", samples, ball_, slide);
+    queries("query/" + name + "/half", samples, half_, at_depth(96.6));
+    queries("query/" + name + "/immersed", samples, half_, at_depth(66.8));
     rows("turn/" + name, samples, half_,
          [](ContactQuery<FixedNumbers>& query, int /*i*/) { query.turn({}); });
   }
@@ -79,16 +79,16 @@ class QueryBench {
   template <class Tick>
   void rows(const std::string& name, const ToolPoints<FixedNumbers>& samples, const Solid& solid,
             Tick&& tick) {
-    const PointShell<FixedNumbers> shell = samples.shell();
+    const PointShell<FixedNumbers> point_shell = samples.point_shell();
     PlaceMemory<FixedNumbers> memory;
-    memory.hold(shell);
+    memory.hold(point_shell);
     const ContactVolume<FixedNumbers> volume = solid.seen_by(memory);
     std::vector<const KernelSet*> sets;
     for (auto set = kernel_sets(); *set != nullptr; ++set) sets.push_back(*set);
     std::reverse(sets.begin(), sets.end());
     double plain_p50_ns = 0;
     for (const KernelSet* set : sets) {
-      ContactQuery<FixedNumbers> query(*set, shell, std::span(&volume, 1));
+      ContactQuery<FixedNumbers> query(*set, point_shell, std::span(&volume, 1));
       query.turn({});
       const TickTimes times = time_ticks(
           kTicks, [] {}, [&](int i) { tick(query, i); });

@@ -15,7 +15,7 @@ namespace {
 
 constexpr double kVoxelMm = 0.1;
 
-/// The paper's force on a ball in a body of voxels of kVoxelMm, by the servo's plan for round
+/// The paper's force on a ball in a body of voxels of kVoxelMm, by the servo's method for round
 /// tools.
 class PaperForce {
  public:

@@ -51,7 +51,7 @@ struct About {
 constexpr About kGroups[] = {
     {"walls", "Walls",
      R"(A hand makes random steps of 0.1 to 10 m/s at a tilted wall. The cylinder and the bur of `scenes/fluted_bur.toml` are
-also turned at random. There is no supervisor. A probe is one collision query.)"},
+also turned at random. There is no supervisor.)"},
     {"rests", "Where a ball comes to rest",
      R"(Offsets from the ideal solid at random tilts. On edges from the volume's own iso-surface, since trilinear density
 holds no sharp edge.)"},

@@ -38,7 +38,7 @@ void measure_walls(const Effort& effort, const RowSink& add_row) {
     row(": crossings", double(seen.crossed), "ticks", 0);
     row(": without force behind the face", double(seen.unfelt), "ticks", 0);
     row(": sunk", seen.deepest, "voxels", subject.deepest);
-    row(": probes in a tick", seen.most_queries, "1", SweepRules::kMaxQueries);
+    row(": queries in a tick", seen.most_queries, "1", SweepRules::kMaxQueries);
   }
 }
 

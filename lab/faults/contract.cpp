@@ -20,7 +20,7 @@ constexpr double kStepN = 0.01;
 constexpr double kDeviceShare = 1.03;  // the tip moves on while a command is under way
 constexpr std::size_t kMaxListed = 4;
 
-/// From the begin of a fault at the device until the servo has latched `name`. A fault that the
+/// From the start of a fault at the device until the servo has latched `name`. A fault that the
 /// servo bears for a while begins for it with the report that first shows it, or that is missing.
 double latest_latch_ms(const std::string& name) {
   if (name == fault_name(Fault::stale_input)) return kZeroMs + kReportMs;

@@ -12,6 +12,7 @@
 /// Solids of known shape as volumes whose voxels are units, the first at the origin.
 namespace kerf::extremes {
 
+/// A volume of densities, and its size.
 struct Body {
   VoxelGrid grid;
   std::vector<Density> density;

@@ -54,7 +54,7 @@ class Bump {
   Frame frame_;
 };
 
-/// F8: slides once over the bump.
+/// F8 of docs/validation.md: slides once over the bump.
 template <class N>
 void slide_over(const BumpSlide& slide, Dice& dice, SlideFigures& figures) {
   const Bump bump(slide, dice);

@@ -5,7 +5,9 @@ namespace kerf::extremes {
 
 template <class N>
 ContactRig<N>::ContactRig(const SampledTool& tool, const KernelSet& kernels)
-    : kernels_(kernels), tool_(tool.samples, tool.round, tool.close), shell_(tool_.shell()) {}
+    : kernels_(kernels),
+      tool_(tool.samples, tool.round, tool.close),
+      points_(tool_.point_shell()) {}
 
 template <class N>
 ContactRig<N>::ContactRig(const SampledTool& tool, const Body& body) : ContactRig(tool) {
@@ -16,11 +18,11 @@ template <class N>
 void ContactRig<N>::add(const Body& body, const ContactFrame<N>& frame, Density iso) {
   constexpr Density kFeltShare = 8;  // a density below this part of the iso is not felt
   maps_.emplace_back(body.grid, body.density, static_cast<Density>(iso / kFeltShare));
-  memories_.emplace_back().hold(shell_);
+  memories_.emplace_back().hold(points_);
   volumes_.push_back({{body.grid, body.density.data(), density_scale(iso), maps_.back().bricks()},
                       frame,
                       memories_.back().places()});
-  query_.emplace(kernels_, shell_, volumes_);
+  query_.emplace(kernels_, points_, volumes_);
   query_->turn({});
 }
 

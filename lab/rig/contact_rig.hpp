@@ -62,14 +62,14 @@ class ContactRig {
   [[nodiscard]] const ContactQuery<N>& field() const { return *query_; }
   /// Half the sine of a turn that a sweep may make at once: see `turn_step_of`.
   [[nodiscard]] typename N::Unit turn_step() const {
-    const double reach = std::max(1.0, static_cast<double>(shell_.reach));
-    return typename N::Unit(shell_.table.round ? 0 : turn_step_of(reach));
+    const double reach = std::max(1.0, static_cast<double>(points_.reach));
+    return typename N::Unit(points_.table.round ? 0 : turn_step_of(reach));
   }
 
  private:
   const KernelSet& kernels_;
   ToolPoints<N> tool_;
-  PointShell<N> shell_;
+  PointShell<N> points_;
   std::deque<FreeBrickMap> maps_;
   std::deque<PlaceMemory<N>> memories_;
   std::vector<ContactVolume<N>> volumes_;

@@ -5,8 +5,8 @@
 
 namespace kerf::extremes {
 
-/// F9: where a tool comes to rest that a hand presses from `off` units above `at` to one below it,
-/// against `up`, in 20 ticks.
+/// F9 of docs/validation.md: where a tool comes to rest. In 20 ticks a hand presses it from `off`
+/// units above `at`, along `up`, to one unit below.
 template <class N>
 [[nodiscard]] Point rest_of(const SampledTool& tool, const Body& body, Point at, Point up,
                             const ToolTurn<N>& turn = {}, double off = 1.5) {

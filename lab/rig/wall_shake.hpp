@@ -56,9 +56,9 @@ struct Shaken {
   double longest_jump = 0;  ///< of the proxy in a tick
 };
 
-/// F7: a hand at the face of a wall of `thickness` units, tilted anyhow, goes random steps of 0.1
-/// to 10 m/s (at 0.1 mm a unit and 1 kHz), with small turns and large ones. No supervisor stops it.
-/// `made` is the tool's.
+/// F7 of docs/validation.md: a hand at the face of a wall of `thickness` units, tilted anyhow, goes
+/// random steps of 0.1 to 10 m/s (at 0.1 mm a unit and 1 kHz), with small turns and large ones. No
+/// supervisor stops it. `made` is the tool's.
 template <class N>
 void shake(double thickness, const ShakenTool& tool, const SampledTool& made, int ticks, Dice& dice,
            Shaken& seen) {

@@ -9,7 +9,8 @@
 
 namespace kerf {
 
-/// A line that grows on a terminal, and nothing anywhere else.
+/// A progress bar on stderr where it is wanted and stderr is a terminal; else it shows nothing. It
+/// goes when this does.
 class ProgressBar {
  public:
   explicit ProgressBar(bool wanted) noexcept : shown_(wanted && isatty(STDERR_FILENO) == 1) {}

@@ -10,6 +10,8 @@
 
 namespace kerf {
 
+// Bricks: the cubes of voxels in which a volume is mirrored and uploaded.
+
 inline constexpr std::int32_t kBrickLog2 = 3;
 inline constexpr std::int32_t kBrickEdge = 1 << kBrickLog2;
 inline constexpr std::size_t kBrickVoxels = 512;

@@ -8,6 +8,7 @@
 
 namespace kerf {
 
+/// What a reader may wish of the controller.
 enum class CommandKind : std::uint32_t {
   select_tool = 1,  ///< argument: index into the scene's tools
   hold = 2,         ///< argument: 1 stops cutting and force, 0 goes on
@@ -31,6 +32,7 @@ enum class ReplyStatus : std::uint32_t {
   refused = 2,   ///< unknown kind, argument out of range or value not finite
 };
 
+/// What the server answers at once.
 struct Reply {
   ReplyStatus status = ReplyStatus::refused;
   std::uint32_t index = 0;  ///< `Command::index`, as TickRecord::last_command will show it

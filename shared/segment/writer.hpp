@@ -19,6 +19,7 @@ namespace kerf {
 /// deadline.
 inline constexpr std::uint32_t kMaxBricksPerTick = 512;
 
+/// One volume, as readers are to see it at tick 0.
 struct SegmentVolumeSpec {
   VoxelGrid grid;  ///< each edge 1..65535
   std::array<double, 3> spacing_mm{1, 1, 1};
@@ -30,6 +31,7 @@ struct SegmentVolumeSpec {
   std::span<const Label> labels;     ///< empty, or one per voxel; copied by `create`
 };
 
+/// All that a segment is made from.
 struct SegmentSpec {
   std::vector<SegmentVolumeSpec> volumes;  ///< 1..8
   std::string scene_json;

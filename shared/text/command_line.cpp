@@ -13,6 +13,7 @@
 #include <CLI/CLI.hpp>
 
 #include "shared/text/number.hpp"
+#include "shared/text/words.hpp"
 
 namespace kerf {
 namespace {
@@ -37,12 +38,12 @@ CLI::Validator range(double lowest, double highest) {
 CLI::Validator member(std::vector<std::string> words) {
   std::string known;
   for (const std::string& word : words) known += (known.empty() ? "" : ",") + word;
-  known = "{" + known + "}";
-  const auto check = [words = std::move(words), known](const std::string& text) {
+  const auto check = [words = std::move(words)](const std::string& text) {
     const bool found = std::ranges::find(words, text) != words.end();
-    return found ? std::string() : text + " not in " + known;
+    const std::vector<std::string_view> views(words.begin(), words.end());
+    return found ? std::string() : text + unknown_word(text, views);
   };
-  return {check, known};
+  return {check, "{" + known + "}"};
 }
 
 /// The library explains over several lines; a user wants one.
@@ -94,11 +95,44 @@ struct Taken<std::vector<T>> : Taken<T> {
   }
 };
 
+/// What is wrong with a text that `take` refuses.
+template <class T>
+constexpr const char* not_taken() {
+  if (std::unsigned_integral<T>) return " is not a whole number from 0 on";
+  return std::integral<T> ? " is not a whole number" : " is not a number";
+}
+
 template <class T>
 constexpr const char* type_word() {
   if (std::unsigned_integral<T>) return "UINT";
   if (std::integral<T>) return "INT";
   return std::floating_point<T> ? "FLOAT" : "TEXT";
+}
+
+/// What is wrong with the arguments that nobody takes: the first option among them, else the first
+/// word. `chosen`: the command, where one was given.
+std::string unexpected(const CLI::App& program, const CLI::App* chosen) {
+  const std::vector<std::string> extra = program.remaining(true);
+  const auto option = std::ranges::find_if(extra, [](const auto& e) { return e.starts_with('-'); });
+  std::string word = option != extra.end() ? *option : extra.front();
+  word.resize(std::min(word.size(), word.find('=')));
+  std::vector<std::string> names;
+  const auto add_options = [&](const CLI::App& app) {
+    for (const CLI::Option* known : app.get_options()) names.push_back(known->get_name());
+  };
+  for (const CLI::App* command : program.get_subcommands([](const CLI::App*) { return true; })) {
+    if (command->get_option_no_throw(word) != nullptr) {
+      return word + " is an option of " + command->get_name() + "; write it after that word";
+    }
+    if (command == chosen) add_options(*command);
+    if (chosen == nullptr) names.push_back(command->get_name());
+  }
+  if (option == extra.end() && (chosen != nullptr || names.empty()))
+    return word + " is not expected";
+  add_options(program);
+  const std::vector<std::string_view> known(names.begin(), names.end());
+  const std::string_view near = nearest(word, known);
+  return word + " is not known" + (near.empty() ? "" : "; did you mean " + std::string(near) + "?");
 }
 
 /// As --help shows a default.
@@ -112,6 +146,24 @@ std::string shown(const auto& value) {
   } else {
     return "";
   }
+}
+
+/// The library's refusal; in our words where its own name no way out. A misspelt command is no
+/// missing one.
+std::string what_is_wrong(const CLI::App& program, const CLI::ParseError& error) {
+  const std::vector<CLI::App*> chosen = program.get_subcommands();
+  const CLI::App& app = chosen.empty() ? program : *chosen.front();
+  if (program.remaining_size(true) > 0) return unexpected(program, chosen.empty() ? nullptr : &app);
+  if (chosen.empty() && program.get_require_subcommand_min() > 0) return "no command is given";
+  if (dynamic_cast<const CLI::ArgumentMismatch*>(&error) == nullptr) return error.what();
+  const std::string text = error.what(), name = text.substr(0, text.find_first_of(": "));
+  const CLI::Option* option = app.get_option_no_throw(name);
+  if (option == nullptr) return "--" + name + " takes no value; leave out what follows the =";
+  const std::size_t count = option->count();
+  return name + " has " + (count == 0 ? "no" : std::to_string(count)) +
+         (count > 1 ? " values" : " value") + "; give " +
+         std::to_string(option->get_expected_min()) +
+         (option->get_expected_max() > option->get_expected_min() ? " or more" : "");
 }
 
 }  // namespace
@@ -162,9 +214,13 @@ bool Option::given() const {
 
 template <class T>
 Option Arguments::option(const char* name, T& value, const std::string& meaning) {
-  auto* option = app_->add_option(
-      name, [&value](const CLI::results_t& given) { return Taken<T>::take_all(given, value); },
-      meaning, false, [&value] { return shown(value); });
+  const auto take_all = [name, &value](const CLI::results_t& given) {
+    if (Taken<T>::take_all(given, value)) return true;
+    throw CLI::ValidationError(
+        name, CLI::detail::join(given, ",") + not_taken<typename Taken<T>::Value>());
+  };
+  auto* option =
+      app_->add_option(name, take_all, meaning, false, [&value] { return shown(value); });
   option->type_name(type_word<typename Taken<T>::Value>());
   if (Taken<T>::kList) option->expected(1, CLI::detail::expected_max_vector_size);
   return Option(option);
@@ -220,12 +276,9 @@ bool CommandLine::parse(int argc, const char* const* argv, std::ostream& out) {
   } catch (const CLI::Success& asked) {  // --help, --version
     app_->exit(asked, out, out);
     return false;
-  } catch (const CLI::RequiredError& error) {  // a misspelt command is no missing one
-    const std::vector<std::string> surplus = app_->remaining();
-    const CLI::ExtrasError unexpected(surplus);
-    throw UsageError(one_line(surplus.empty() ? error.what() : unexpected.what()) + "; see --help");
   } catch (const CLI::ParseError& error) {
-    throw UsageError(one_line(error.what()) + "; see --help");
+    const std::string wrong = one_line(what_is_wrong(*app_, error));
+    throw UsageError(wrong + (wrong.ends_with('?') ? " see --help" : "; see --help"));
   }
 }
 

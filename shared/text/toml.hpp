@@ -13,3 +13,12 @@
 #define TOML_EXCEPTIONS 0
 #include <toml++/toml.h>
 #pragma pop_macro("NDEBUG")
+
+#include <string>
+
+namespace kerf {
+
+/// `problem; way out` of text that is no TOML. May hold control characters of the text.
+[[nodiscard]] std::string toml_problem(const toml::parse_error& error);
+
+}  // namespace kerf

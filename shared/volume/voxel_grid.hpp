@@ -7,6 +7,7 @@
 
 namespace kerf {
 
+/// A voxel by its number along each axis, from 0.
 struct VoxelIndex {
   std::int32_t x = 0, y = 0, z = 0;
   friend constexpr bool operator==(VoxelIndex, VoxelIndex) noexcept = default;

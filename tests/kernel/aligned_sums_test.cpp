@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The exact sums of the method `aligned` at the ends of their ranges: 32-bit lanes that must be
-// widened in time, and tools as large as the plan takes.
+// widened in time, and tools as large as the method takes.
 #include <array>
 #include <cstdlib>
 #include <limits>

@@ -94,7 +94,7 @@ TEST_CASE("contact and modification sums are double's within 1.7e-4 of full scal
 }
 
 // N7
-TEST_CASE("the order of the samples does not change a sum of the plan aligned") {
+TEST_CASE("the order of the samples does not change a sum of the method aligned") {
   const TestVolume volume = random_volume({24, 22, 20}, 12);
   const ExactField field(kExactFarid, volume);
   auto tool = paper_ball(8);

@@ -119,7 +119,7 @@ struct WideSumVec {
   }
 };
 
-/// SUM over voxels j with r_j > 0 and density > 0 of r_j times the exact gradient, in density steps
+/// SUM over voxels j with c_j > 0 and density > 0 of c_j times the exact gradient, in density steps
 /// per voxel times 2^(15 - sum_shift) * 2^shift / factor; `samples` are those of the tool. The
 /// density is that from before the removal.
 template <class GradientAt>

@@ -8,7 +8,7 @@
 
 #include <doctest/doctest.h>
 
-#include "tests/kernel/plans.hpp"
+#include "tests/kernel/contact_methods.hpp"
 
 using namespace kerf;
 using namespace kerf::test;
@@ -61,17 +61,17 @@ class Loop {
 };
 
 /// |closed-loop work| / SUM |dW|, both added up over some loops.
-template <class Plan>
+template <class Method>
 double leak(GradientKernel kernel, std::span<const ToolOffset> tool, double height_vox, int loops) {
-  using N = typename Plan::Numbers;
+  using N = typename Method::Numbers;
   const TestVolume volume = ball();
-  const Plan plan(kernel, volume);
+  const Method method(kernel, volume);
   double leaked = 0, moved = 0;
   for (int n = 0; n < loops; ++n) {
     const Loop loop(n, loops, height_vox);
     double work = 0;
     for (int i = 0; i < kPoints; ++i) {
-      const Point force = plan.at(tool, pose_at<N>(loop.at(i)));
+      const Point force = method.at(tool, pose_at<N>(loop.at(i)));
       const Point before = loop.at(i - 1), after = loop.at(i + 1);
       double step = 0;
       for (std::size_t a = 0; a < 3; ++a) step -= force[a] * (after[a] - before[a]) / 2;
@@ -90,31 +90,31 @@ const std::vector<ToolOffset> kSample{{0, 0, 0}};
 
 // F5
 TEST_CASE_TEMPLATE("a sample led round a loop gets back no more than its gradient kernel allows",
-                   Plan, Gathered<FixedNumbers>, Gathered<DoubleNumbers>, Aligned) {
-  const double farid = leak<Plan>(GradientKernel::farid, kSample, kBallRadius, kManyLoops);
-  const double sobel = leak<Plan>(GradientKernel::sobel5, kSample, kBallRadius, kManyLoops);
-  MESSAGE(Plan::name() << ": farid " << farid << ", sobel5 " << sobel);
+                   Method, Gathered<FixedNumbers>, Gathered<DoubleNumbers>, Aligned) {
+  const double farid = leak<Method>(GradientKernel::farid, kSample, kBallRadius, kManyLoops);
+  const double sobel = leak<Method>(GradientKernel::sobel5, kSample, kBallRadius, kManyLoops);
+  MESSAGE(Method::name() << ": farid " << farid << ", sobel5 " << sobel);
   CHECK(farid <= 5e-3);
   CHECK(sobel <= 8e-3);
   CHECK(farid < sobel);
   CHECK(farid > 0);
 }
 
-TEST_CASE_TEMPLATE("a sample led round a loop gets back most with the central difference", Plan,
+TEST_CASE_TEMPLATE("a sample led round a loop gets back most with the central difference", Method,
                    Gathered<FixedNumbers>, Gathered<DoubleNumbers>, Aligned) {
-  const double central = leak<Plan>(GradientKernel::central, kSample, kBallRadius, kManyLoops);
-  MESSAGE(Plan::name() << ": central " << central);
+  const double central = leak<Method>(GradientKernel::central, kSample, kBallRadius, kManyLoops);
+  MESSAGE(Method::name() << ": central " << central);
   CHECK(central <= 8e-2);
-  CHECK(central > 3 * leak<Plan>(GradientKernel::farid, kSample, kBallRadius, kManyLoops));
+  CHECK(central > 3 * leak<Method>(GradientKernel::farid, kSample, kBallRadius, kManyLoops));
 }
 
-TEST_CASE_TEMPLATE("a ball led round a loop gets back less than a sample, for each kernel", Plan,
+TEST_CASE_TEMPLATE("a ball led round a loop gets back less than a sample, for each kernel", Method,
                    Gathered<FixedNumbers>, Gathered<DoubleNumbers>, Aligned) {
   const auto tool = odd_ball(5);
   const double touching = kBallRadius + kLoopRadius;  // at most 2 to 8 voxels deep
-  const double farid = leak<Plan>(GradientKernel::farid, tool, touching, 6);
-  const double sobel = leak<Plan>(GradientKernel::sobel5, tool, touching, 6);
-  MESSAGE(Plan::name() << ": farid " << farid << ", sobel5 " << sobel);
+  const double farid = leak<Method>(GradientKernel::farid, tool, touching, 6);
+  const double sobel = leak<Method>(GradientKernel::sobel5, tool, touching, 6);
+  MESSAGE(Method::name() << ": farid " << farid << ", sobel5 " << sobel);
   CHECK(farid <= 1.3e-3);
   CHECK(sobel <= 2.6e-3);
 }

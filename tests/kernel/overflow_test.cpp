@@ -64,7 +64,7 @@ TEST_CASE("the steepest volume's exact gradient is the bound that the sums are s
   CHECK(steepest == kMaxExactGradient);
 }
 
-TEST_CASE("a contact of the largest tool on the steepest gradient is exact in the plan aligned") {
+TEST_CASE("a contact of the largest tool on the steepest gradient is exact in the method aligned") {
   const auto steepest = [](VoxelIndex) {
     return SumVec<FixedNumbers>{kMaxExactGradient, -kMaxExactGradient, 0};
   };
@@ -85,7 +85,7 @@ TEST_CASE("a contact of the largest tool on the steepest gradient is exact in th
 }
 
 TEST_CASE(
-    "a modification force of the largest tool with unshifted sums is exact in the plan aligned") {
+    "a modification force of the largest tool with unshifted sums is exact in the method aligned") {
   const VoxelGrid grid{30, 30, 20};
   REQUIRE(grid.voxel_count() == kNarrowSumSamples);
   const FullCover full(grid);

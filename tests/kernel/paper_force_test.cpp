@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// The paper's contact force against what it must be on a flat, by every plan and number type: it
-// measures the area of the tool's cut with the face, F = p0 pi (2 R p - p^2) at depth p.
+// The paper's contact force against what it must be on a flat, by every method and number type: it
+// measures the area of the tool's cut with the face, F = p0 pi (2 R d - d^2) at depth d.
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 
 #include <doctest/doctest.h>
 
-#include "tests/kernel/plans.hpp"
+#include "tests/kernel/contact_methods.hpp"
 
 using namespace kerf;
 using namespace kerf::test;
@@ -29,10 +29,10 @@ double theory(double depth) {
 }
 
 /// F / p0 in voxel^2 of the ball, `depth` voxels deep in the half-space.
-template <class Plan>
-double force_at_depth(const Plan& plan, double depth) {
-  using N = typename Plan::Numbers;
-  return -plan.at(odd_ball(5), pose_at<N>({20, 20, 20 + kRadius - depth}))[2];
+template <class Method>
+double force_at_depth(const Method& method, double depth) {
+  using N = typename Method::Numbers;
+  return -method.at(odd_ball(5), pose_at<N>({20, 20, 20 + kRadius - depth}))[2];
 }
 
 /// The same with samples every `pitch_vox`.
@@ -46,27 +46,27 @@ double sampled_force(const TestVolume& volume, std::span<const Gradient<FixedNum
 
 }  // namespace
 
-#define KERF_ALL_PLANS \
+#define KERF_ALL_METHODS \
   Gathered<FixedNumbers>, Gathered<FloatNumbers>, Gathered<DoubleNumbers>, Aligned
 
 // F1
-TEST_CASE_TEMPLATE("a ball pressed into a flat feels its contact area", Plan, KERF_ALL_PLANS) {
+TEST_CASE_TEMPLATE("a ball pressed into a flat feels its contact area", Method, KERF_ALL_METHODS) {
   const TestVolume volume = half_space();
-  const Plan plan(GradientKernel::farid, volume);
+  const Method method(GradientKernel::farid, volume);
   const std::array<std::array<double, 2>, 3> expected = {{{1, 27.61}, {3, 62.43}, {5, 73.65}}};
   for (const auto& [depth, force] : expected) {
-    const double felt = force_at_depth(plan, depth);
+    const double felt = force_at_depth(method, depth);
     CHECK(felt == doctest::Approx(force).epsilon(0.001));
     CHECK(felt == doctest::Approx(theory(depth)).epsilon(0.07));
   }
 }
 
 // F2
-TEST_CASE_TEMPLATE("a tool wholly inside the material feels nothing", Plan, KERF_ALL_PLANS) {
+TEST_CASE_TEMPLATE("a tool wholly inside the material feels nothing", Method, KERF_ALL_METHODS) {
   const TestVolume volume = half_space();
-  const Plan plan(GradientKernel::farid, volume);
+  const Method method(GradientKernel::farid, volume);
   for (const double depth : {2 * kRadius + 3, 13.3, 14.0}) {
-    CHECK(std::abs(force_at_depth(plan, depth)) <= 1e-6);
+    CHECK(std::abs(force_at_depth(method, depth)) <= 1e-6);
   }
 }
 
@@ -74,13 +74,13 @@ TEST_CASE_TEMPLATE("a tool wholly inside the material feels nothing", Plan, KERF
 TEST_CASE_TEMPLATE(
     "the force peaks at a depth of one radius with K0 R / 2 and weakens beyond, as the paper's "
     "model does",
-    Plan, KERF_ALL_PLANS) {
+    Method, KERF_ALL_METHODS) {
   const TestVolume volume = half_space();
-  const Plan plan(GradientKernel::farid, volume);
+  const Method method(GradientKernel::farid, volume);
   constexpr double kStep = 0.25;
   double peak = 0, peak_depth = 0, before = 0;
   for (double depth = kStep; depth <= 2 * kRadius; depth += kStep) {
-    const double force = force_at_depth(plan, depth);
+    const double force = force_at_depth(method, depth);
     if (force > peak) {
       peak = force;
       peak_depth = depth;

@@ -57,11 +57,12 @@ TestVolume hard_field(const VoxelGrid& grid, int kind, Dice& dice) {
   });
 }
 
-PointStep<FixedNumbers> any_step(const PointShell<FixedNumbers>& shell, Dice& dice) {
+PointStep<FixedNumbers> any_step(const PointShell<FixedNumbers>& point_shell, Dice& dice) {
   const std::array<Point, 3> rotation = turned_to(dice.direction(), dice);
-  const double stretch = std::ldexp(double(shell.reach), shell.step_bits) * dice.uniform(0.2, 1);
+  const double stretch =
+      std::ldexp(double(point_shell.reach), point_shell.step_bits) * dice.uniform(0.2, 1);
   PointStep<FixedNumbers> step;
-  step.shift = shell.step_bits - 1;
+  step.shift = point_shell.step_bits - 1;
   for (std::size_t i = 0; i < 3; ++i) {
     for (std::size_t j = 0; j < 3; ++j) {
       step.row[i][j] = static_cast<std::int32_t>(std::lround(stretch * rotation[i][j]));
@@ -72,7 +73,7 @@ PointStep<FixedNumbers> any_step(const PointShell<FixedNumbers>& shell, Dice& di
 
 }  // namespace
 
-TEST_CASE("every instruction set sums a point shell to the bit, wherever it is") {
+TEST_CASE("every instruction set sums a point point_shell to the bit, wherever it is") {
   Dice dice(1);
   int felt = 0, skipped = 0;
   for (const VoxelGrid grid : {VoxelGrid{33, 20, 18}, {2, 2, 2}, {9, 40, 3}, {60, 12, 12}}) {
@@ -81,10 +82,10 @@ TEST_CASE("every instruction set sums a point shell to the bit, wherever it is")
       for (const int count : {1, 16, 47, 96}) {
         const bool round = count % 2 == 0;
         const ToolPoints<FixedNumbers> tool = some_shell(count, count == 1 ? 0.5 : 4.5, round);
-        const PointShell<FixedNumbers> shell = tool.shell();
+        const PointShell<FixedNumbers> point_shell = tool.point_shell();
         PlaceMemory<FixedNumbers> memory, truth_memory;
-        memory.hold(shell);
-        truth_memory.hold(shell);
+        memory.hold(point_shell);
+        truth_memory.hold(point_shell);
         const std::int32_t whole = count / kPointGroup * kPointGroup;  // groups to be read
         const auto room = static_cast<std::size_t>(whole);
         const Density iso = kind == 2 ? 65535 : static_cast<Density>(dice.uniform(1, 65536));
@@ -93,8 +94,8 @@ TEST_CASE("every instruction set sums a point shell to the bit, wherever it is")
         DensityField field = all;
         field.free = map.bricks();
         for (int i = 0; i < cases(1250); ++i) {
-          const PointStep<FixedNumbers> step = any_step(shell, dice);
-          place_points<FixedNumbers>(shell.table, step, truth_memory.places());
+          const PointStep<FixedNumbers> step = any_step(point_shell, dice);
+          place_points<FixedNumbers>(point_shell.table, step, truth_memory.places());
           const double out = i % 3 == 0 ? 7 : -1;  // across the border, or inside
           const Q16 at[3] = {Q16(dice.uniform(-out, grid.nx + out)),
                              Q16(dice.uniform(-out, grid.ny + out)),
@@ -104,16 +105,17 @@ TEST_CASE("every instruction set sums a point shell to the bit, wherever it is")
           if (i % 4 == 2) centre[1] &= ~0xffff;
           // Every group read, against every set with groups left out.
           const Sums truth =
-              point_sums<FixedNumbers>(shell.table, truth_memory.places(), centre, all);
+              point_sums<FixedNumbers>(point_shell.table, truth_memory.places(), centre, all);
           const std::int32_t looked_at =
-              point_sums<FixedNumbers>(shell.table, truth_memory.places(), centre, field).read;
+              point_sums<FixedNumbers>(point_shell.table, truth_memory.places(), centre, field)
+                  .read;
           felt += truth.weight != 0 ? 1 : 0;
           skipped += kind == 4 && truth.weight == 0 ? 1 : 0;
           for (auto set = kernel_sets(); *set != nullptr; ++set) {
-            (*set)->place_points(shell.table, step, memory.places());
+            (*set)->place_points(point_shell.table, step, memory.places());
             Sums sums;
             sums.weight = sums.square = sums.high = sums.top = -1;  // left over from before
-            (*set)->sum_points(shell.table, memory.places(), centre, field, sums);
+            (*set)->sum_points(point_shell.table, memory.places(), centre, field, sums);
             const bool alike = same(sums, truth) && sums.read == looked_at;
             std::vector<std::int32_t> read(room), truly_read(room);
             (*set)->read_points(memory.places(), whole, centre, field, read.data());
@@ -133,9 +135,9 @@ TEST_CASE("every instruction set sums a point shell to the bit, wherever it is")
   CHECK(skipped > cases(1250));
 }
 
-TEST_CASE("the largest point shell deep in the densest volume stays within the sums' range") {
+TEST_CASE("the largest point point_shell deep in the densest volume stays within the sums' range") {
   const ToolPoints<FixedNumbers> tool = some_shell(kMaxShellPoints, 60, false);
-  const PointShell<FixedNumbers> shell = tool.shell();
+  const PointShell<FixedNumbers> point_shell = tool.point_shell();
   // Full density in every second voxel of x: the steepest gradient and, at its voxels, r = 1.
   const VoxelGrid grid{130, 130, 130};
   for (const bool striped : {false, true}) {
@@ -144,18 +146,18 @@ TEST_CASE("the largest point shell deep in the densest volume stays within the s
     });
     for (auto set = kernel_sets(); *set != nullptr; ++set) {
       PlaceMemory<FixedNumbers> memory;
-      memory.hold(shell);
+      memory.hold(point_shell);
       PointStep<FixedNumbers> step;
-      step.shift = shell.step_bits - 1;
+      step.shift = point_shell.step_bits - 1;
       for (std::size_t axis = 0; axis < 3; ++axis) {
         step.row[axis][axis] = static_cast<std::int32_t>(
-            std::lround(std::ldexp(double(shell.reach), shell.step_bits)));
+            std::lround(std::ldexp(double(point_shell.reach), point_shell.step_bits)));
       }
-      (*set)->place_points(shell.table, step, memory.places());
+      (*set)->place_points(point_shell.table, step, memory.places());
       const std::int32_t centre[3] = {65 << 16, 65 << 16, 65 << 16};
       const DensityField field{grid, volume.density.data(), density_scale(32768), {}};
       Sums sums;
-      (*set)->sum_points(shell.table, memory.places(), centre, field, sums);
+      (*set)->sum_points(point_shell.table, memory.places(), centre, field, sums);
       CAPTURE(std::string((*set)->name));
       CHECK(sums.weight > 0);
       CHECK(sums.density > 0);
@@ -168,17 +170,17 @@ TEST_CASE("the largest point shell deep in the densest volume stays within the s
 
 TEST_CASE("a volume without a cell is not felt") {
   const ToolPoints<FixedNumbers> tool = some_shell(40, 3, true);
-  const PointShell<FixedNumbers> shell = tool.shell();
+  const PointShell<FixedNumbers> point_shell = tool.point_shell();
   for (const VoxelGrid grid : {VoxelGrid{1, 5, 5}, {5, 1, 5}, {5, 5, 1}}) {
     const TestVolume volume = filled(grid, 65535);
     for (auto set = kernel_sets(); *set != nullptr; ++set) {
       PlaceMemory<FixedNumbers> memory;
-      memory.hold(shell);
+      memory.hold(point_shell);
       Dice dice(1);
-      (*set)->place_points(shell.table, any_step(shell, dice), memory.places());
+      (*set)->place_points(point_shell.table, any_step(point_shell, dice), memory.places());
       const std::int32_t centre[3] = {0, 2 << 16, 2 << 16};
       Sums sums;
-      (*set)->sum_points(shell.table, memory.places(), centre,
+      (*set)->sum_points(point_shell.table, memory.places(), centre,
                          {grid, volume.density.data(), density_scale(32768), {}}, sums);
       CHECK(sums.weight == 0);
     }

@@ -16,7 +16,7 @@ using namespace kerf::accuracy;
 
 namespace {
 
-Plan small() {
+Scope small() {
   return {.effort = {.sample_loop_steps = 50, .tool_loop_steps = 8, .line_steps = 4, .normals = 50},
           .contacts = 4,
           .walks = 1,

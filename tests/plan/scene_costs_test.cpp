@@ -238,17 +238,17 @@ TEST_CASE("a gathering tick that cuts works on no more voxels than it is said to
   }
 }
 
-TEST_CASE("a scene is planned with what the servo allows the probes of a tick") {
-  PointTable<FixedNumbers> shell;
-  shell.count = 500;
-  shell.groups = 32;
-  shell.round = true;
-  CHECK(query_work(shell, 2).query == 2 * (512 + 128));
-  CHECK(query_work(shell, 2).closer == 2 * (96 + 128 + 256));
-  CHECK(query_work(shell, 2).turn == 2 * 62);
-  shell.round = false;
-  CHECK(query_work(shell, 1).query == 512 + 128);
-  CHECK(query_work(shell, 1).closer == 2 * (128 + 2 * 256) + 2 * (128 + 64));
+TEST_CASE("a scene is planned with what the servo allows the queries of a tick") {
+  PointTable<FixedNumbers> points;
+  points.count = 500;
+  points.groups = 32;
+  points.round = true;
+  CHECK(query_work(points, 2).query == 2 * (512 + 128));
+  CHECK(query_work(points, 2).closer == 2 * (96 + 128 + 256));
+  CHECK(query_work(points, 2).turn == 2 * 62);
+  points.round = false;
+  CHECK(query_work(points, 1).query == 512 + 128);
+  CHECK(query_work(points, 1).closer == 2 * (128 + 2 * 256) + 2 * (128 + 64));
   const auto most = [](std::int64_t query, std::int64_t closer, std::int64_t turn) {
     return QueryWork{query, closer, turn}.most();
   };
@@ -260,7 +260,7 @@ TEST_CASE("a scene is planned with what the servo allows the probes of a tick") 
   LoadedScene scene = half_space_scene(48);
   scene.tools = {shape("wheel", 2, 1)};
   const auto queries_of = [&] {
-    return operations(plan_scene(scene)->costs().ticks.front().stages, "probes");
+    return operations(plan_scene(scene)->costs().ticks.front().stages, "queries");
   };
   const std::uint64_t alone = queries_of();
   scene.volumes.push_back(scene.volumes.front());
@@ -289,9 +289,9 @@ TEST_CASE("every stage of every method has a price, on machines of all kinds") {
     }
   }
   for (const char* name : {"avx512", "avx2", "neon", "scalar", "float", "double"}) {
-    CHECK(work_us(probe_stage(1, name)) > 0);
+    CHECK(work_us(query_stage(1, name)) > 0);
   }
-  CHECK_THROWS_AS(static_cast<void>(probe_stage(1, "abacus")), std::logic_error);
+  CHECK_THROWS_AS(static_cast<void>(query_stage(1, "abacus")), std::logic_error);
 }
 
 TEST_CASE("the servo's own tick is timed, and does there no more than it is said to") {
@@ -322,7 +322,7 @@ TEST_CASE("the servo's own tick is timed, and does there no more than it is said
             CHECK(timed.stages[s].operations > 0);
             CHECK(timed.stages[s].operations <= most[s].operations);
           }
-          // The drive is no idle one: it finds its way to where the probes cost most.
+          // The drive is no idle one: it finds its way to where queries cost most.
           if (force == ForceModel::proxy)
             CHECK(2 * timed.stages[0].operations > most[0].operations);
         }
@@ -353,7 +353,7 @@ TEST_CASE("a scene above the budget is refused on one line, and fits at a lower 
   scene.servo.rate_hz = 8000;
   const std::string line = over_budget(scene, plan_scene(scene)->costs());
   CHECK(line.find("scenes/x.toml: tool stub: up to ") == 0);
-  CHECK(line.find(" by plan splat/") != std::string::npos);
+  CHECK(line.find(" by the method splat/") != std::string::npos);
   CHECK(line.find(" us of work a tick, most of it press (") != std::string::npos);
   const double stub_us = work_us(plan_scene(scene)->costs(), 1);
   const int highest_hz = highest_rate_hz(stub_us);
@@ -395,13 +395,14 @@ TEST_CASE("a scene above the budget is refused on one line, and fits at a lower 
   CHECK(over_budget(scene, plan_scene(scene)->costs()).empty());
 }
 
-TEST_CASE("where probes cost most no other plan is advised, and in floating point other numbers") {
+TEST_CASE(
+    "where queries cost most no other method is advised, and in floating point other numbers") {
   LoadedScene scene = half_space_scene(48);
   scene.path = "scenes/x.toml";
   scene.tools = {shape("wheel", 2, 1)};
   scene.servo.rate_hz = 8000;
   const auto refusal = [&] { return over_budget(scene, plan_scene(scene)->costs()); };
-  CHECK(refusal().find(" most of it probes (") != std::string::npos);
+  CHECK(refusal().find(" most of it queries (") != std::string::npos);
   CHECK(refusal().ends_with(" or lower, or a smaller tool"));
   scene.servo.numeric = NumericKind::float64;
   CHECK(refusal().ends_with(" or lower, a smaller tool, or fixed numbers"));

@@ -231,7 +231,7 @@ TEST_CASE("a value out of range is reported with its line and the range") {
   CHECK(begins(error_after("[limits]\nforce_n = 1\ncontinuous_force_n = 2\n"),
                "scenes/x.toml:8: limits.continuous_force_n = 2 is out of range; use 0.01 to 1"));
   CHECK(begins(error_with("file = \"phantom\"", "file = \"phantom\"\niso = 2"),
-               "scenes/x.toml:3: volume.iso = 2 is out of range"));
+               "scenes/x.toml:3: volume.iso = 2 is out of range; use 1e-04 to 1, or \"otsu\""));
   CHECK(begins(error_with("size_vox = 16", "size_vox = 0"),
                "scenes/x.toml:5: tool.size_vox = 0 is out of range"));
   CHECK(begins(error_with("size_vox = 16", "radius_mm = -1"),
@@ -251,7 +251,10 @@ TEST_CASE("a word that is not known is reported with those that are") {
   CHECK(begins(error_after("[cut]\nmodel = \"overlap\"\nrate_per_s = \"T\"\n"),
                "scenes/x.toml:8: cut.rate_per_s = \"T\" is unknown"));
   CHECK(begins(error_with("file = \"phantom\"", "file = \"phantom\"\niso = \"auto\""),
-               "scenes/x.toml:3: volume.iso = \"auto\" is unknown"));
+               "scenes/x.toml:3: volume.iso = \"auto\" is unknown; known: otsu, or 1e-04 to 1"));
+  CHECK(error_with("file = \"phantom\"", "file = \"phantom\"\niso = \"otzu\"") ==
+        "scenes/x.toml:3: volume.iso = \"otzu\" is unknown; did you mean \"otsu\"? known: otsu, "
+        "or 1e-04 to 1");
 }
 
 TEST_CASE("what contradicts itself or is missing is reported with its line") {
@@ -300,8 +303,8 @@ TEST_CASE("too many tools are refused") {
 }
 
 TEST_CASE("broken TOML is reported in one line with line and column") {
-  for (const char* broken : {"[servo\n", "a = \n", "\"\n", "a = 1\na = 2\n", "\xff\xfe\n",
-                             "[[volume]\n", "x = 0x\n", "s = \"\"\"never\nending", "[a]\n[a]\n"}) {
+  for (const char* broken : {"[servo\n", "a = \n", "\"\n", "\xff\xfe\n", "[[volume]\n", "x = 0x\n",
+                             "s = \"\"\"never\nending"}) {
     CAPTURE(broken);
     const std::string error = error_after(broken);
     CHECK(begins(error, "scenes/x.toml:"));
@@ -309,6 +312,11 @@ TEST_CASE("broken TOML is reported in one line with line and column") {
     CHECK(error.find("correct the TOML syntax here") != std::string::npos);
   }
   CHECK(begins(error_after("[servo\n"), "scenes/x.toml:6:7: "));
+  for (const char* doubled : {"a = 1\na = 2\n", "[a]\n[a]\n"}) {
+    CHECK(error_after(doubled).find(" existing ") != std::string::npos);
+    CHECK(error_after(doubled).ends_with("; leave one of the two out"));
+  }
+  CHECK(error_after("[device]\npersonality = omni\n").ends_with(": text stands in quotes"));
 }
 
 TEST_CASE("control characters never reach a message or a name") {

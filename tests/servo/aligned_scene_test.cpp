@@ -89,7 +89,7 @@ TEST_CASE("both forces of the first cutting tick are double's within 1.7e-4 of f
   }
 }
 
-TEST_CASE("tools of both plans feel what the other has cut") {
+TEST_CASE("tools of both methods feel what the other has cut") {
   Pair pair([] {
     LoadedScene scene = cutting_scene();
     scene.tools.push_back(ball(20, kVoxelMm / 2));  // finer than the volume: stored gradients
@@ -106,7 +106,7 @@ TEST_CASE("tools of both plans feel what the other has cut") {
   CHECK(deepest_n > 0.1 * kFullScaleN);
 }
 
-TEST_CASE("two volumes of different spacing each get their own plan") {
+TEST_CASE("two volumes of different spacing each get their own method") {
   Pair pair([] {
     LoadedScene scene = cutting_scene();
     scene.volumes.push_back(

@@ -19,7 +19,7 @@ using kerf::test::paper_scene;
 
 namespace {
 
-/// Ball of R = 1 mm at depth p in a flat: haptics literature, p0 pi (2 R p - p^2).
+/// Ball of R = 1 mm at depth d in a flat: haptics literature, p0 pi (2 R d - d^2).
 double theory_n(double p_mm) {
   return 0.06 * std::numbers::pi * (2 * p_mm - p_mm * p_mm);
 }

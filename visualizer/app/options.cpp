@@ -9,6 +9,7 @@
 #include <string_view>
 
 #include "shared/text/command_line.hpp"
+#include "shared/text/words.hpp"
 #include "visualizer/app/keys.hpp"
 #include "visualizer/error.hpp"
 #include "visualizer/render/renderer.hpp"
@@ -70,7 +71,7 @@ std::optional<VisualizerOptions> parse_options(int argc, const char* const* argv
   app.footer(footer());
   app.option("--name", options.name, "the controller's name").shows_default();
   app.option("--renderer", options.renderer,
-             "how volumes are drawn: " + known_renderers() +
+             "how volumes are drawn: " + listed(renderer_kinds()) +
                  "; with commas one for each volume, such as surface,blend")
       .shown_as("KIND[,KIND...]")
       .shows_default();

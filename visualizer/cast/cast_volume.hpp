@@ -17,6 +17,7 @@
 
 namespace kerf {
 
+/// Rays end at the iso-surface, or go on through what is translucent.
 enum class CastMode : std::uint8_t { iso, blend };
 
 /// What the voxels of a volume look like.
@@ -38,8 +39,7 @@ struct CastContent {
 /// A volume as the ray caster keeps it; whole once, then bricks only.
 class CastVolume {
  public:
-  /// Throws VisualizerError for a volume that the
-  /// kernels cannot address.
+  /// Throws VisualizerError for a volume that the kernels cannot address.
   CastVolume(const VolumeView& volume, const CastContent& content, CastMode mode);
 
   /// Takes bricks `changed` of `density` (the whole volume) and the cells they touch.

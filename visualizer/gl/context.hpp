@@ -7,6 +7,7 @@
 
 namespace kerf {
 
+/// How a context was made: without a screen by EGL, or by a window.
 enum class ContextKind : std::uint8_t { egl_surfaceless, egl_device, window };
 
 [[nodiscard]] const char* to_string(ContextKind kind) noexcept;

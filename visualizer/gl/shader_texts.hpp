@@ -6,6 +6,7 @@
 
 namespace kerf {
 
+/// One file of GLSL.
 struct ShaderText {
   std::string_view file;  ///< name in shaders/
   std::string_view text;

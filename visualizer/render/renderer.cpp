@@ -5,6 +5,7 @@
 #include <array>
 #include <string>
 
+#include "shared/text/words.hpp"
 #include "visualizer/error.hpp"
 #include "visualizer/render/blend_renderer.hpp"
 #include "visualizer/render/cast_renderer.hpp"
@@ -48,8 +49,7 @@ const Kind& find_kind(std::string_view name) {
   const auto found = std::find_if(kKinds.begin(), kKinds.end(),
                                   [&](const Kind& kind) { return kind.name == name; });
   if (found != kKinds.end()) return *found;
-  throw VisualizerError("--renderer: " + std::string(name) +
-                        " is unknown; known: " + known_renderers());
+  throw VisualizerError("--renderer: " + std::string(name) + unknown_word(name, renderer_kinds()));
 }
 
 // A density is interpolated between two voxels (1 edge), a surface has its gradient from a cube two
@@ -80,12 +80,6 @@ std::vector<std::string_view> renderer_kinds() {
   std::vector<std::string_view> names;
   for (const Kind& kind : kKinds) names.push_back(kind.name);
   return names;
-}
-
-std::string known_renderers() {
-  std::string known;
-  for (const Kind& kind : kKinds) known += (known.empty() ? "" : ", ") + std::string(kind.name);
-  return known;
 }
 
 bool is_translucent(std::string_view kind) {

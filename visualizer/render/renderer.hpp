@@ -67,8 +67,6 @@ class Renderer {
 
 /// All that `make_renderer` knows.
 [[nodiscard]] std::vector<std::string_view> renderer_kinds();
-/// Every kind, as on the command line: "iso, blend, ...".
-[[nodiscard]] std::string known_renderers();
 
 /// `Renderer::translucent` of a kind. Throws as `make_renderer` does; needs no GL context.
 [[nodiscard]] bool is_translucent(std::string_view kind);

@@ -11,7 +11,7 @@
 
 namespace kerf {
 
-inline constexpr int kPaletteWidth = 256;
+inline constexpr int kPaletteWidth = 256;  ///< entries of a row
 
 /// Linear colours in two rows: by density (entry i is density i/255; adjoining materials blend over
 /// a narrow band, so that their border is smooth on a cut), then by label. Material 0 is "none" and

@@ -40,10 +40,7 @@ std::string written(const toml::node& node) {
 
 Opacities parse_transfer(std::string_view text, const std::string& name) {
   const toml::parse_result parsed = toml::parse(text, name);
-  if (!parsed) {
-    const std::string problem(parsed.error().description());
-    refuse(name, parsed.error().source(), shown(problem) + "; correct the TOML syntax here");
-  }
+  if (!parsed) refuse(name, parsed.error().source(), shown(toml_problem(parsed.error())));
   for (const auto& [key, value] : parsed.table()) {
     if (key.str() == "opacity" && value.is_table()) continue;
     refuse(name, key.source(),

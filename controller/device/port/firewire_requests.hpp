@@ -35,11 +35,12 @@ struct FirewireClaim {
   std::int32_t channel = -1;  ///< -1: not given
 };
 
-/// The open through which the device's registers are reached and channels are claimed.
+/// One open file of the device's node, through which its registers are reached and channels are
+/// claimed.
 ///
-/// What is asked for here is answered by an event, also when it fails; a request that was made in
-/// an older generation of the bus fails with RCODE_GENERATION. Nothing allocates, throws or sleeps
-/// but where it says so.
+/// Every request is answered by an event that has its `closure`, a failed one too. A request made
+/// in an older generation of the bus fails with RCODE_GENERATION. Nothing allocates, throws or
+/// sleeps but where it says so.
 class FirewireRequests {
  public:
   [[nodiscard]] int open(const std::string& path) noexcept { return file_.open(path); }

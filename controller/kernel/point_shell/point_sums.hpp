@@ -108,7 +108,7 @@ constexpr void add_sample(PointSums<N>& sums, std::int32_t i, const PointSample<
   using Sum = typename N::Sum;
   const PointNumber<N> r = sample.density;
   if (r < kFaintest<N>) return;
-  Sum square{}, weight{}, pull{}, lift{};  // r^2, w, v, u
+  Sum square{}, weight{}, pull{}, lift{};  // r^2, w, w_g, w_x
   if constexpr (N::kIsFixed) {
     const auto density = static_cast<std::uint32_t>(r);
     const std::uint32_t r2 = (density * density + (1 << 13)) >> 14;

@@ -88,10 +88,11 @@ struct DensityField {
 /// Sums over the samples of one query (docs/theory.md 3.2, 3.3). r is the density of contact and w
 /// = r^p, p = 4 for balls and 6 for other shapes. Two more weights are derived from w:
 ///
-///   v  of gradients: w; for balls 3 w - w / r, half the derivative of their peak at the iso, times
-///      SUM w
-///   u  of offsets: w; for balls w r. Where density begins trilinear reads are raised, in bands
-///      where the normal is near an axis of the voxels, and with w they would tilt a ball's normal
+///   w_g  of gradients: w; for balls 3 w - w / r, half the derivative of their peak at the iso,
+///        times SUM w
+///   w_x  of offsets: w; for balls w r. Where density begins trilinear reads are raised, in bands
+///        where the normal is near an axis of the voxels, and with w they would tilt a ball's
+///        normal
 ///
 /// In fixed r is Q15, weights are Q24, gradients are in the volume's densities over 2, offsets in
 /// Q0.15. All sums are exact, |sum| < 2^53, so no order and no instruction set matters.
@@ -100,8 +101,8 @@ struct PointSums {
   typename N::Sum weight{};          ///< SUM w
   typename N::Sum density{};         ///< SUM w r
   typename N::Sum square{};          ///< SUM w r^2, r^2 in Q16; 0 for balls
-  typename N::Sum gradient[3] = {};  ///< SUM v grad, voxel axes
-  typename N::Sum offset[3] = {};    ///< SUM u offset
+  typename N::Sum gradient[3] = {};  ///< SUM w_g grad, voxel axes
+  typename N::Sum offset[3] = {};    ///< SUM w_x offset
   typename N::Sum high{};            ///< SUM w r^2, which weights `high_offset`; 0 for balls
   typename N::Sum high_offset[3] = {};
   PointNumber<N> top{};         ///< the largest r

@@ -28,12 +28,12 @@ inline constexpr double kCapRadius = 3.25;  ///< units; half the ball's where th
 inline constexpr double kSummitRadius = 1.25;
 inline constexpr double kSummitAbove = 0.1;  ///< units: the summit is so far above its samples
 
-/// Caps are read while the ball's own samples find it from so far above the surface to so far
-/// below, units: a summit may be 0.5 higher than they tell.
+/// Caps are read while the ball's own samples find it at most so far above the surface, or so far
+/// below it, units: a summit may be 0.5 higher than they tell.
 inline constexpr double kCapAbove = 0.6;
 inline constexpr double kCapBelow = 0.1;
 
-/// Samples (a, a^2 + b^2, b) over the unit disc, each for the same area.
+/// Samples (x, x^2 + z^2, z) over the unit disc, each for the same area.
 template <class N, std::size_t kCount>
 [[nodiscard]] constexpr SpiralArrays<N, kCount> cap_arrays(double radius) noexcept {
   return {radius + 0.1, [](std::size_t i) {

@@ -19,7 +19,7 @@ struct ConstraintSet {
   std::array<ConstraintPlane<N>, kMaxPlanes> plane{};
 };
 
-/// Where a tool goes that is asked to move by d: `move` = d + SUM load_i normal_i.
+/// Where a tool goes that is asked to move: `move` = displacement + SUM load_i normal_i.
 template <class N>
 struct Slide {
   ContactVec<typename N::Real> move{};

@@ -13,8 +13,8 @@
 
 namespace kerf {
 
-/// The contact of a tool that is no ball gets a closer look so near to rest. At an edge the point
-/// shell's own samples find the tool up to 0.4 units higher than it is.
+/// A tool that is no ball gets a closer look at its contact while it is at most so deep, or so
+/// high. At an edge the point shell's own samples find the tool up to 0.4 units higher than it is.
 inline constexpr double kCloseDepth = 0.4;  ///< units
 
 /// The close samples around a contact: offsets in the tool's axes and in voxels, and densities.
@@ -71,7 +71,8 @@ struct CloseSamples {
       seen += more;
     });
   }
-  /// As whole groups. What fills up the last one is no sample: `fade` it once all are read.
+  /// The samples in whole groups. What fills up the last group is no sample: call `fade` once all
+  /// densities are read.
   [[nodiscard]] constexpr PointTable<N> table() noexcept {
     PointTable<N> table;
     table.count = (count + kPointGroup - 1) / kPointGroup * kPointGroup;
@@ -98,9 +99,9 @@ struct Closeup {
   typename N::Ratio top{};        ///< density of the highest sample
 };
 
-/// Where about the peak is, as an offset in the tool's axes, from the point shell's sums. Beside a
-/// rim or a point density falls to one side only, so the mean places with powers 6 and 8 are off by
-/// shares of 1 / (7 + e) and 1 / (9 + e); the two extrapolate to the peak (docs/theory.md 3.5).
+/// Roughly where the peak is, as an offset in the tool's axes, from the point shell's sums. Beside
+/// a rim or a point density falls to one side only, so the mean places with powers 6 and 8 are off
+/// by shares of 1 / (7 + e) and 1 / (9 + e); the two extrapolate to the peak (docs/theory.md 3.5).
 template <class N>
 constexpr void peak_offset(const PointSums<N>& sums, typename N::Ratio e,
                            PointNumber<N> (&offset)[3]) noexcept {

@@ -19,10 +19,10 @@ template <class N>
 struct PointMeans {
   using Ratio = typename N::Ratio;
 
-  Ratio density{}, square{};
-  ContactVec<Ratio> gradient{};  ///< weighted with v, density per unit
-  ContactVec<Ratio> offset{};    ///< weighted with u, over the tool's reach
-  Ratio top{};
+  Ratio density{}, square{};     ///< of r and of r^2, weighted with w
+  ContactVec<Ratio> gradient{};  ///< weighted with w_g, density per unit
+  ContactVec<Ratio> offset{};    ///< weighted with w_x, over the tool's reach
+  Ratio top{};                   ///< the largest r
 };
 
 /// How one volume lies in contact space: place q is at voxel_from_contact * q + origin_vox. A
@@ -76,6 +76,7 @@ template <class N>
   return {turned(turn[0]), turned(turn[1]), turned(turn[2])};
 }
 
+/// All means of a query; `turn` takes the mean offset from the tool's axes to the world's.
 template <class N>
 [[nodiscard]] constexpr PointMeans<N> point_means(const PointSums<N>& sums,
                                                   const DensityScale& scale,
@@ -86,7 +87,7 @@ template <class N>
   means.density = mean_of<N>(sums.density, sums.weight, 9);
   means.square = mean_of<N>(sums.square, sums.weight, 8);
   means.gradient = mean_gradient(sums, scale, frame);
-  typename N::Sum lift = round ? sums.density : sums.weight;  // SUM u
+  typename N::Sum lift = round ? sums.density : sums.weight;  // SUM w_x
   if constexpr (N::kIsFixed) lift >>= round ? 15 : 0;         // Q24 of Q39: 16 at least
   const Ratio offset[3] = {mean_of<N>(sums.offset[0], lift, 9), mean_of<N>(sums.offset[1], lift, 9),
                            mean_of<N>(sums.offset[2], lift, 9)};
@@ -118,7 +119,7 @@ template <class N>
   }
 }
 
-/// The exponent e of a shape that is no ball, from q = m2 / m1^2 = 8 (7 + e) / (7 (8 + e)), 0 to 2
+/// The exponent e of a shape that is no ball, from y = m2 / m1^2 = 8 (7 + e) / (7 (8 + e)), 0 to 2
 /// (docs/theory.md 3.2).
 template <class N>
 [[nodiscard]] constexpr typename N::Ratio fall_of(const PointMeans<N>& means) noexcept {
@@ -147,8 +148,8 @@ template <class N>
   return round ? height : std::min(height, means.top + kUnsampled);
 }
 
-/// Limits of the slope in a depth (docs/theory.md 3.3), density per unit: flatter is noise, steeper
-/// no face of a volume is.
+/// Limits of the slope in a depth (docs/theory.md 3.3), density per unit: flatter is noise, and no
+/// face of a volume is steeper.
 inline constexpr double kFlattestSlope = 0.2;
 inline constexpr double kSteepestSlope = 1.2;
 
@@ -189,7 +190,8 @@ template <class N>
   return between<N>(offset, downhill, share);
 }
 
-/// How fast density falls along a normal, per unit (docs/theory.md 3.3). v holds half of a ball's.
+/// How fast density falls along a normal, per unit (docs/theory.md 3.3). w_g holds half of a
+/// ball's.
 template <class N>
 [[nodiscard]] constexpr typename N::Ratio slope_along(const PointMeans<N>& means,
                                                       ContactVec<typename N::Unit> normal,

@@ -58,12 +58,12 @@ class ContactQuery {
   using Real = typename N::Real;
 
   /// `kernels` serve fixed point alone.
-  ContactQuery(const KernelSet& kernels, const PointShell<N>& shell,
+  ContactQuery(const KernelSet& kernels, const PointShell<N>& points,
                std::span<const ContactVolume<N>> volumes) noexcept
       : kernels_(kernels),
-        shell_(shell),
+        points_(points),
         volumes_(volumes),
-        work_(query_work(shell.table, volumes.size())) {}
+        work_(query_work(points.table, volumes.size())) {}
 
   /// Orients the tool in all queries from now on.
   void turn(const ToolTurn<N>& turn) noexcept {
@@ -71,7 +71,7 @@ class ContactQuery {
     turned_ = true;
     left_ -= work_.turn;
     for (const ContactVolume<N>& volume : volumes_) {
-      place(shell_, rows_, volume.frame, volume.places);
+      place(points_, rows_, volume.frame, volume.places);
     }
   }
 
@@ -98,7 +98,7 @@ class ContactQuery {
   /// How far the centre may move from `q` in any direction and feel nothing: a lower bound.
   [[nodiscard]] Real free_distance(ContactVec<Real> q) const noexcept {
     // A sample reads one voxel further, and half a unit is for roundings.
-    const Real own = shell_.reach + Real(1.5);
+    const Real own = points_.reach + Real(1.5);
     Real free(kContactLimit);
     for (const ContactVolume<N>& volume : volumes_) {
       const VoxelVec<Real> at = place_of(volume, q);
@@ -135,10 +135,10 @@ class ContactQuery {
   }
 
   /// The matrix that takes a tool's offsets to voxels; `rows` turns them to the world's axes.
-  [[nodiscard]] static PointStep<N> step_of(const PointShell<N>& shell, const TurnRows<N>& rows,
+  [[nodiscard]] static PointStep<N> step_of(const PointShell<N>& points, const TurnRows<N>& rows,
                                             const ContactFrame<N>& frame) noexcept {
     PointStep<N> step;
-    step.shift = 15 + shell.step_bits - 16;  // from offsets times rows to Q15.16
+    step.shift = 15 + points.step_bits - 16;  // from offsets times rows to Q15.16
     for (std::size_t i = 0; i < 3; ++i) {
       const auto& m = frame.voxel_from_contact.row[i];
       for (std::size_t j = 0; j < 3; ++j) {
@@ -148,24 +148,24 @@ class ContactQuery {
             turned += std::int64_t{m[k].raw()} * rows[k][j].raw();
           }
           // Q30 times a reach in Q16: 2^30 2^22.
-          const std::int64_t reached = round_shift(turned, 24) * shell.reach.raw();
-          step.row[i][j] = static_cast<std::int32_t>(round_shift(reached, 46 - shell.step_bits));
+          const std::int64_t reached = round_shift(turned, 24) * points.reach.raw();
+          step.row[i][j] = static_cast<std::int32_t>(round_shift(reached, 46 - points.step_bits));
         } else {
           step.row[i][j] =
-              shell.reach * (m[0] * rows[0][j] + m[1] * rows[1][j] + m[2] * rows[2][j]);
+              points.reach * (m[0] * rows[0][j] + m[1] * rows[1][j] + m[2] * rows[2][j]);
         }
       }
     }
     return step;
   }
 
-  void place(const PointShell<N>& shell, const TurnRows<N>& rows, const ContactFrame<N>& frame,
+  void place(const PointShell<N>& points, const TurnRows<N>& rows, const ContactFrame<N>& frame,
              const PointPlaces<N>& places) const noexcept {
-    const PointStep<N> step = step_of(shell, rows, frame);
+    const PointStep<N> step = step_of(points, rows, frame);
     if constexpr (N::kIsFixed) {
-      kernels_.place_points(shell.table, step, places);
+      kernels_.place_points(points.table, step, places);
     } else {
-      place_points(shell.table, step, places);
+      place_points(points.table, step, places);
     }
   }
 
@@ -173,16 +173,16 @@ class ContactQuery {
   void feel(const ContactVolume<N>& volume, ContactVec<Real> q, bool closer,
             Contacts<N>& felt) const noexcept {
     const VoxelVec<Real> at = place_of(volume, q);
-    const Real margin = shell_.reach + Real(1);
+    const Real margin = points_.reach + Real(1);
     const auto near = [&](Real x, std::int32_t n) { return x > -margin && x < Real(n) + margin; };
     const VoxelGrid& grid = volume.field.grid;
     if (!near(at.x, grid.nx) || !near(at.y, grid.ny) || !near(at.z, grid.nz)) return;
 
-    const PointSums<N> sums = sums_at(volume.field, shell_.table, volume.places, at);
+    const PointSums<N> sums = sums_at(volume.field, points_.table, volume.places, at);
     if (sums.weight <= typename N::Sum(0)) return;
-    const bool round = shell_.table.round;
+    const bool round = points_.table.round;
     const auto means = point_means<N>(sums, volume.field.scale, volume.frame, rows_, round);
-    ConstraintPlane<N> plane = plane_of<N>(means, shell_.reach, round);
+    ConstraintPlane<N> plane = plane_of<N>(means, points_.reach, round);
     if (closer) {
       if (round && plane.depth < Real(kCapBelow) && -plane.depth < Real(kCapAbove)) {
         plane.depth = depth_around(volume, at, sums, means, plane);
@@ -192,7 +192,7 @@ class ContactQuery {
     }
     // Nearly all samples are in the solid, or the tool feels the same all round.
     const ContactVec<typename N::Unit> none{};
-    if (sums.solid >= shell_.table.count - shell_.table.count / 16 || plane.normal == none) {
+    if (sums.solid >= points_.table.count - points_.table.count / 16 || plane.normal == none) {
       felt.buried = true;
       felt.depth = std::max(felt.depth, plane.depth);
       return;
@@ -213,7 +213,7 @@ class ContactQuery {
   /// patch of the volume around the place that they find.
   void look_again(const ContactVolume<N>& volume, VoxelVec<Real> at, const PointSums<N>& sums,
                   const PointMeans<N>& means, ConstraintPlane<N>& plane) const noexcept {
-    if (shell_.close.first == nullptr) return;
+    if (points_.close.first == nullptr) return;
     using Unit = typename N::Unit;
     using Ratio = typename N::Ratio;
     PointNumber<N> peak[3] = {};
@@ -224,16 +224,16 @@ class ContactQuery {
     const auto share = falling_share<N>(Unit(means.top - seen.top), 0.06, 0.02);
     if (share < Unit(1)) {
       const auto top = static_cast<std::size_t>(sums.top_sample);
-      const auto& offset = shell_.table.offset;
+      const auto& offset = points_.table.offset;
       const Closeup<N> other =
           look_closely_at(volume, at, {offset[0][top], offset[1][top], offset[2][top]});
       height = other.height + multiply<Ratio>(share, height - other.height);
       if (share <= Unit(0)) seen = other;
     }
     const auto offset = turned_offset<N>(seen.offset, rows_);
-    const ContactVec<Real> arm{multiply<Real>(offset.x, shell_.reach),
-                               multiply<Real>(offset.y, shell_.reach),
-                               multiply<Real>(offset.z, shell_.reach)};
+    const ContactVec<Real> arm{multiply<Real>(offset.x, points_.reach),
+                               multiply<Real>(offset.y, points_.reach),
+                               multiply<Real>(offset.z, points_.reach)};
     const VoxelVec<Real> middle = at + volume.frame.voxel_from_contact * arm;
     // The first patch lies askew, as its normal is that of the middle.
     auto gradient = patch_gradient(volume, middle, plane.normal);
@@ -260,10 +260,10 @@ class ContactQuery {
   [[nodiscard]] Closeup<N> look_closely_at(const ContactVolume<N>& volume, VoxelVec<Real> at,
                                            const PointNumber<N> (&offset)[3]) const noexcept {
     CloseSamples<N> samples;
-    samples.take(shell_.close, offset);
+    samples.take(points_.close, offset);
     const PointTable<N> table = samples.table();
     const PointPlaces<N> places = samples.places();
-    const PointStep<N> step = step_of(shell_, rows_, volume.frame);
+    const PointStep<N> step = step_of(points_, rows_, volume.frame);
     const PointNumber<N> centre[3] = {number_of(at.x), number_of(at.y), number_of(at.z)};
     CloseSums<N> sums;
     if constexpr (N::kIsFixed) {
@@ -301,14 +301,14 @@ class ContactQuery {
     using Ratio = typename N::Ratio;
     using Unit = typename N::Unit;
     const Ratio height = peak_height(means, true), slope = slope_along(means, plane.normal, true);
-    const Unit sharp = sharpness(sums, shell_.table.count, height, slope, shell_.reach);
+    const Unit sharp = sharpness(sums, points_.table.count, height, slope, points_.reach);
     const auto out = direction<N>(means.offset);
     if (sharp <= Unit(0) || out == decltype(out){}) return plane.depth;
-    const Real half = multiply<Real>(shell_.reach, Unit(0.5));
+    const Real half = multiply<Real>(points_.reach, Unit(0.5));
     const Real wide = std::min(Real(kCapRadius), half),
                narrow = std::min(Real(kSummitRadius), half);
     const PointMeans<N> found = cap_means(volume, at, out, kCapArrays<N>, wide);
-    const Unit share(wide / shell_.reach);
+    const Unit share(wide / points_.reach);
     const auto moved = [&](Unit from, Ratio by) {
       return Ratio(from) + multiply<Ratio>(share, by);
     };
@@ -330,9 +330,9 @@ class ContactQuery {
     const PointShell<N> cap{arrays.table(), {}, radius, 14};
     SpiralPlaces<N, kCount> memory;
     const PointPlaces<N> places = memory.places();
-    const TurnRows<N> rows = cap_rows<N>(out, radius, shell_.reach);
+    const TurnRows<N> rows = cap_rows<N>(out, radius, points_.reach);
     place(cap, rows, volume.frame, places);
-    const VoxelVec<Real> top = at + volume.frame.voxel_from_contact * times<N>(out, shell_.reach);
+    const VoxelVec<Real> top = at + volume.frame.voxel_from_contact * times<N>(out, points_.reach);
     const PointSums<N> sums = sums_at(volume.field, cap.table, places, top);
     if (sums.weight <= typename N::Sum(0)) return {};
     return point_means<N>(sums, volume.field.scale, volume.frame, rows, false);
@@ -353,7 +353,7 @@ class ContactQuery {
   }
 
   const KernelSet& kernels_;
-  const PointShell<N>& shell_;
+  const PointShell<N>& points_;
   std::span<const ContactVolume<N>> volumes_;
   QueryWork work_;
   TurnRows<N> rows_{};

@@ -32,7 +32,7 @@ struct SweepRules {
   static constexpr std::int32_t kMaxTurnQueries =
       12;                                          ///< and a turn's pushes; the rest is the move's
   static constexpr double kTolerance = 0.01;       ///< a place this deep is allowed
-  static constexpr double kTurnTolerance = 0.005;  ///< for a turn, which leaves the move a play
+  static constexpr double kTurnTolerance = 0.005;  ///< of a turn: it leaves the move some play
   static constexpr double kNoMove = 0.002;         ///< from rest no shorter displacement is tried
   static constexpr double kArrived = 0.004;        ///< after a step this near counts as there
   /// Longest displacement of any sample between two queries. The middle of the thinnest wall, 2
@@ -42,8 +42,8 @@ struct SweepRules {
   static constexpr double kGain = 0.001;    ///< a step this much nearer to the goal is kept
   static constexpr double kResidual = 0.8;  ///< share of the displacement that a step may leave
   static constexpr double kEased =
-      0.5;  ///< share of a failed step: a shorter next one is tried whole
-  static constexpr double kShrink = 0.4;
+      0.5;  ///< a next step shorter than this share of a failed one is tried whole
+  static constexpr double kShrink = 0.4;  ///< of a failed step, for the next try
   /// Share of a step below which the proxy rather lags. What a tool has milled leaves it a play of
   /// hundredths of a unit, where longer steps only meet the other wall: in its first kFineQueries
   /// it may try steps down to kFinest.
@@ -64,8 +64,8 @@ struct SweepRules {
   static constexpr double kAstray = 0.03;
 };
 
-/// Sine of half the largest turn of one step (docs/theory.md 4.6): a sample `reach` units from the
-/// centre, reach >= 1, moves by kStep at most. Its arc is 2 reach asin(s), asin(s) <= 1.0472 s.
+/// Sine of half the largest turn theta of one step (docs/theory.md 4.6): a sample `reach` units
+/// from the centre, reach >= 1, moves by kStep at most, as theta / 2 <= 1.0472 sin(theta / 2).
 [[nodiscard]] constexpr double turn_step_of(double reach) noexcept {
   return SweepRules::kStep / (2 * 1.0472 * reach);
 }
@@ -94,8 +94,8 @@ struct Swept {
 /// towards a goal, first the orientation, then the centre. When its queries or its attempts are
 /// spent it lags. It never jumps, so a wall of 2 units holds it at any speed.
 ///
-/// From an allowed place the tool does not go farther from its goal, but by kAstray: in a groove of
-/// its own shape planes that change from query to query would lead it on and on.
+/// From an allowed place the tool goes at most kAstray farther from its goal: in a groove of its
+/// own shape planes that change from query to query would lead it on and on.
 ///
 /// At most kMaxQueries calls of `query`. Coordinates within +-kContactLimit.
 ///
@@ -182,9 +182,9 @@ class ProxySweep {
     return {slide, left, norm(left)};
   }
 
-  /// Looks at a place, `moved` from where the depths of `known` count. A tool that is too deep
-  /// there is pushed out, twice at most. A turn begins no push in the second half of the tick's
-  /// work.
+  /// Looks at `centre`, which is `moved` from the place where the depths of `known` count. A tool
+  /// that is too deep there is pushed out, twice at most. A turn begins no push in the second half
+  /// of the tick's work.
   constexpr Trial attempt(Trying what, Place centre, const ConstraintSet<N>& known,
                           Place moved) noexcept {
     const bool turns = what == Trying::turn;

@@ -43,15 +43,15 @@ struct QueryWork {
 /// The work of a tool with this point shell. Its closer looks are a ball's two caps (ball_cap.hpp),
 /// or two closeups (contact_closeup.hpp) and two patches (normal_patch.hpp) of another shape.
 template <class N>
-[[nodiscard]] constexpr QueryWork query_work(const PointTable<N>& shell,
+[[nodiscard]] constexpr QueryWork query_work(const PointTable<N>& point_shell,
                                              std::size_t volumes) noexcept {
   constexpr std::int64_t kLook = QueryWork::kLookSamples;
   constexpr std::int64_t kCloseup = kLook + QueryWork::kCloseSamples * kMostClose;
-  const std::int64_t closer = shell.round ? 2 * kLook + kCapSamples + kSummitSamples
-                                          : 2 * kCloseup + 2 * (kLook + kPatchSamples);
-  const std::int64_t query = std::int64_t{shell.groups} * kPointGroup + kLook;
+  const std::int64_t closer = point_shell.round ? 2 * kLook + kCapSamples + kSummitSamples
+                                                : 2 * kCloseup + 2 * (kLook + kPatchSamples);
+  const std::int64_t query = std::int64_t{point_shell.groups} * kPointGroup + kLook;
   const auto times = static_cast<std::int64_t>(volumes);
-  return {times * query, times * closer, times * (shell.count / 8)};
+  return {times * query, times * closer, times * (point_shell.count / 8)};
 }
 
 }  // namespace kerf

@@ -204,7 +204,7 @@ struct RowSums {
   }
 }
 
-/// What leaves each voxel of a vector: (rho * (r m >> 15) * 2^-exponent + owed) >> 16 with 32-bit
+/// What leaves each voxel of a vector: (rho * (c m >> 15) * 2^-exponent + owed) >> 16 with 32-bit
 /// intermediates held as two 16-bit halves. `owed` keeps the low half.
 [[gnu::always_inline]] inline V taken(V rho, V ratio, V mantissa, std::int32_t exponent,
                                       V& owed) noexcept {

@@ -47,7 +47,7 @@ void place(const SampleTable& samples, const SamplePose& pose, const SplatScratc
   std::memcpy(at, &sum, sizeof sum);
 }
 
-/// The sums R_j of all voxels of the box. The box holds the cells of all samples.
+/// The sums PHI_j of all voxels of the box. The box holds the cells of all samples.
 void splat(const SampleTable& samples, const TickBox& box, VoxelIndex origin,
            const SplatScratch& scratch) noexcept {
   const std::ptrdiff_t row = box.row_lanes, plane = row * (box.size.y + 1);
@@ -119,8 +119,8 @@ template <bool kUnit>
   return (any != 0 ? 1U : 0U) | (any_low != 0 ? 2U : 0U) | (any_high != 0 ? 4U : 0U);
 }
 
-/// Contact SUM R_j G_j and modification SUM r_j G_j of exact gradients, r_j the overlap ratios:
-/// they stay in the scratch for the removal.
+/// Contact SUM PHI_j grad_j and modification SUM c_j grad_j of exact gradients. The overlaps c_j
+/// stay in the scratch for the removal.
 template <bool kUnit>
 [[gnu::always_inline]] inline void press_sums_by(const TickBox& box, std::int32_t volume_ratio,
                                                  const SplatScratch& scratch,

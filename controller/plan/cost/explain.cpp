@@ -170,7 +170,7 @@ std::string explanation_json(const Explanation& e) {
     }
     ticks.push_back(figures({{"tool", tick.tool},
                              {"volume", tick.volume},
-                             {"plan", tick.variant},
+                             {"method", tick.variant},
                              {"why", tick.why},
                              {"measured_us", tick.time.median_us},
                              {"measured_p99_us", tick.time.p99_us},

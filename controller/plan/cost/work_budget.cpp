@@ -48,7 +48,7 @@ std::string over_budget(const LoadedScene& scene, const SceneCosts& costs) {
   for (const TickCost& tick : costs.ticks) {
     if (tick.tool != tool) continue;
     parts += ", in " + scene.volumes[tick.volume].name + " " + us_text(work_us(tick.stages)) +
-             " by plan " + tick.variant() + " (" + tick.choice.why + ")";
+             " by the method " + tick.variant() + " (" + tick.choice.why + ")";
     if (advice.empty()) advice = tick.choice.method->advice;
     for (const StageCost& stage : tick.stages) {
       if (most == nullptr || work_us(stage) > work_us(*most)) most = &stage;
@@ -61,7 +61,7 @@ std::string over_budget(const LoadedScene& scene, const SceneCosts& costs) {
   const int rate_hz = highest_rate_hz(sum_us);
   const bool fixed = scene.servo.numeric == NumericKind::fixed;
   if (!fixed) advice = "fixed numbers";
-  if (fixed && std::string_view(most->stage) == "probes") advice.clear();
+  if (fixed && std::string_view(most->stage) == "queries") advice.clear();
   const std::string third = advice.empty() ? "" : ", or " + advice;
   return scene.path + ": tool " + scene.tools[tool].name + ": up to " + us_text(sum_us) +
          " us of work a tick, most of it " + most->stage + " (" + us_text(work_us(*most)) + ")" +

@@ -14,7 +14,7 @@
 namespace kerf {
 namespace {
 
-/// The swept proxy is felt and nothing is cut: nothing is left to do but its probes.
+/// The swept proxy is felt and nothing is cut: nothing is left to do but its queries.
 class SurfaceMethod final : public ToolMethod {
  public:
   constexpr SurfaceMethod() noexcept : ToolMethod(Method::surface, "surface", "") {}
@@ -62,7 +62,7 @@ std::size_t most_listed(const ToolCase& in, const AlignedTable* table) {
 std::vector<StageCost> tick_stages(const ToolMethod& method, const TickShape& shape, VoxelIndex box,
                                    std::uint64_t queried, std::uint64_t covered) {
   std::vector<StageCost> stages = method.stages(shape, box);
-  if (shape.swept) stages.insert(stages.begin(), probe_stage(queried, shape.runs_it));
+  if (shape.swept) stages.insert(stages.begin(), query_stage(queried, shape.runs_it));
   if (shape.cut == CutModel::preston) add_force_stages(covered, shape.runs_it, stages);
   return stages;
 }

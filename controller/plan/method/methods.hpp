@@ -31,7 +31,7 @@ struct MethodChoice {
 /// Closer where the method `aligned` has its table.
 [[nodiscard]] std::size_t most_listed(const ToolCase& in, const AlignedTable* table);
 
-/// All stages of a tick in the order in which they run: probes, where the proxy is felt, the
+/// All stages of a tick in the order in which they run: queries, where the proxy is felt, the
 /// method's own, and the cut by force, where there is one.
 [[nodiscard]] std::vector<StageCost> tick_stages(const ToolMethod& method, const TickShape& shape,
                                                  VoxelIndex box, std::uint64_t queried,

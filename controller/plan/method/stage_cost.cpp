@@ -37,8 +37,8 @@ StageCost priced(const char* stage, std::uint64_t operations, const Prices& pric
   return {stage, operations, ns};
 }
 
-StageCost probe_stage(std::uint64_t samples, std::string_view runs_it) {
-  return priced("probes", samples, {2.4, 2.6, 9, 18, 19, 18}, runs_it);
+StageCost query_stage(std::uint64_t samples, std::string_view runs_it) {
+  return priced("queries", samples, {2.4, 2.6, 9, 18, 19, 18}, runs_it);
 }
 
 void add_force_stages(std::uint64_t covered, std::string_view runs_it,

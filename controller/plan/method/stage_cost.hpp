@@ -34,9 +34,9 @@ struct Prices {
 
 /// Where the swept proxy is felt: samples that are read, and what is counted like them
 /// (query_work.hpp). They cost the same beside every method. The price is that of the costliest
-/// ticks that `kerf lab extremes` finds, of tools of 500 to 1100 samples, and of probes inside of
+/// ticks that `kerf lab extremes` finds, of tools of 500 to 1100 samples, and of queries inside of
 /// the solid.
-[[nodiscard]] StageCost probe_stage(std::uint64_t samples, std::string_view runs_it);
+[[nodiscard]] StageCost query_stage(std::uint64_t samples, std::string_view runs_it);
 
 /// Where force cuts, `list` and `spend`, the same beside every method: groups of voxels that the
 /// tool covers (covered_bound.hpp), in float and double voxels, read with what they weigh; and the

@@ -90,25 +90,25 @@ ToolPoints<N>::ToolPoints(std::span<const Point> samples_units, bool round,
 }
 
 template <class N>
-PointShell<N> ToolPoints<N>::shell() const noexcept {
-  PointShell<N> shell;
+PointShell<N> ToolPoints<N>::point_shell() const noexcept {
+  PointShell<N> point_shell;
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    shell.table.offset[axis] = offset_[axis].data();
-    shell.table.middle[axis] = middle_[axis].data();
+    point_shell.table.offset[axis] = offset_[axis].data();
+    point_shell.table.middle[axis] = middle_[axis].data();
   }
-  shell.table.bricks = bricks_.data();
-  shell.table.count = static_cast<std::int32_t>(count_);
-  shell.table.groups = static_cast<std::int32_t>(bricks_.size());
-  shell.table.round = round_;
-  shell.close = close_.table();
-  shell.reach = typename N::Real(reach_);
+  point_shell.table.bricks = bricks_.data();
+  point_shell.table.count = static_cast<std::int32_t>(count_);
+  point_shell.table.groups = static_cast<std::int32_t>(bricks_.size());
+  point_shell.table.round = round_;
+  point_shell.close = close_.table();
+  point_shell.reach = typename N::Real(reach_);
   // No voxel's edge is shorter than a unit; a little for roundings.
   const double longest = reach_ + rounding();
-  shell.table.reach =
+  point_shell.table.reach =
       static_cast<PointNumber<N>>(N::kIsFixed ? std::ceil(longest * 65536) : longest);
-  shell.step_bits = 16;
-  while (std::ldexp(reach_, shell.step_bits) > 65000) --shell.step_bits;
-  return shell;
+  point_shell.step_bits = 16;
+  while (std::ldexp(reach_, point_shell.step_bits) > 65000) --point_shell.step_bits;
+  return point_shell;
 }
 
 template <class N>
@@ -118,8 +118,8 @@ std::size_t ToolPoints<N>::bytes() const noexcept {
 }
 
 template <class N>
-void PlaceMemory<N>::hold(const PointShell<N>& shell) {
-  const auto groups = static_cast<std::size_t>(shell.table.groups);
+void PlaceMemory<N>::hold(const PointShell<N>& point_shell) {
+  const auto groups = static_cast<std::size_t>(point_shell.table.groups);
   for (std::size_t axis = 0; axis < 3; ++axis) {
     offset_vox_[axis].resize(std::max(offset_vox_[axis].size(), groups * kGroup));
     middle_[axis].resize(std::max(middle_[axis].size(), groups));

@@ -23,7 +23,7 @@ class ToolPoints {
   ToolPoints(std::span<const std::array<double, 3>> samples_units, bool round,
              std::span<const std::array<double, 3>> close_units = {});
 
-  [[nodiscard]] PointShell<N> shell() const noexcept;
+  [[nodiscard]] PointShell<N> point_shell() const noexcept;
   [[nodiscard]] std::size_t bytes() const noexcept;
 
  private:
@@ -43,7 +43,7 @@ class ToolPoints {
 template <class N>
 class PlaceMemory {
  public:
-  void hold(const PointShell<N>& shell);
+  void hold(const PointShell<N>& point_shell);
 
   [[nodiscard]] PointPlaces<N> places() noexcept;
   [[nodiscard]] std::size_t bytes() const noexcept;

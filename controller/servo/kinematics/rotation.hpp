@@ -36,6 +36,7 @@ template <class N>
 
 struct ToolSpace;  ///< mm in the tool's own frame: centre of the cutting head, shaft along +y
 
+/// How the tool is turned: takes a direction of its own frame to the world.
 template <class N>
 using Rotation = Transform<typename N::Unit, WorldSpace, ToolSpace>;
 

@@ -21,7 +21,7 @@ class Agenda {
   [[nodiscard]] std::int64_t next() const noexcept {
     return entries_.empty() ? kNever : entries_.begin()->first;
   }
-  /// What is due up to and in `cycle`, also what that adds.
+  /// Does what is due up to and in `cycle`, in order; what these actions add too, if it is due.
   void run(std::int64_t cycle) {
     while (next() <= cycle) entries_.extract(entries_.begin()).mapped()();
   }

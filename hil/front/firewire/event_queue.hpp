@@ -12,7 +12,7 @@
 
 namespace kerf {
 
-/// Events of one open, oldest first, each as the bytes that one read() returns.
+/// Events of one open file, oldest first, each as the bytes that one read() returns.
 ///
 /// As in the kernel there is no bound: a client that does not read grows it for ever. The
 /// high-water mark shows that.

@@ -20,14 +20,16 @@ enum class BusFault : std::uint8_t {
   device_reset,  ///< the device itself does: clients hear of it half a second later
   steal,         ///< a reset in which another node takes the lowest channel that is in use
   vanish,        ///< the device is gone; clients hear of it after two seconds
-  back,          ///< and there again
+  back,          ///< the device is there again
 };
 
+/// A fault, and when it strikes.
 struct ScriptedFault {
-  std::int64_t cycle = 0;  ///< counted from the begin of the bus
+  std::int64_t cycle = 0;  ///< counted from the start of the bus
   BusFault fault = BusFault::reset;
 };
 
+/// How bus and device behave in one run.
 struct FirewireSettings {
   BusClock clock = BusClock::lock_step();
   int packet_cycles = 1;    ///< cycles per packet of the device: 1 = 8 kHz, 8 = 1 kHz
@@ -53,7 +55,7 @@ struct FirewireStats {
 /// resources, faults. Advances only when asked to catch up with its clock. One thread.
 class FirewireBus {
  public:
-  /// Who hears of what happened to all.
+  /// Hears of what concerns every client.
   class Listener {
    public:
     virtual ~Listener() = default;
@@ -87,8 +89,9 @@ class FirewireBus {
   [[nodiscard]] std::int64_t cycle() const noexcept { return cycle_; }
   [[nodiscard]] std::int64_t reset_cycle() const noexcept { return reset_cycle_; }
   [[nodiscard]] std::uint32_t generation() const noexcept { return generation_; }
-  /// On the bus; and known to the clients, who may hear two seconds later.
+  /// Whether the device is on the bus.
   [[nodiscard]] bool present() const noexcept { return present_; }
+  /// Whether clients take it to be there: they hear of a loss two seconds later.
   [[nodiscard]] bool listed() const noexcept { return listed_; }
   [[nodiscard]] OmniRegisters& registers() noexcept { return registers_; }
   [[nodiscard]] const OmniRegisters& registers() const noexcept { return registers_; }

@@ -19,8 +19,8 @@
 
 namespace kerf {
 
-/// One open of a FireWire node: the ioctls of linux/firewire-cdev.h with the errors of the kernel's
-/// core-cdev.c (6.1), and the events that this open has not read yet.
+/// One open file of a FireWire node: the ioctls of linux/firewire-cdev.h with the errors of the
+/// kernel's core-cdev.c (6.1), and the events that this open has not read yet.
 ///
 /// Not modelled, ENOSYS (of which FUSE makes ENOTTY): address ranges, PHY packets, descriptors of
 /// the configuration ROM, broadcasts, several channels in one context, resources for one

@@ -13,6 +13,7 @@
 
 namespace kerf {
 
+/// What a client asked for when it made the context.
 struct IsoSettings {
   bool transmits = false;
   std::uint32_t channel = 0;

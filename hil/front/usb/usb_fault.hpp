@@ -18,16 +18,17 @@ enum class UsbFault : std::uint8_t {
   back,    ///< plugged in again, without power having been lost
 };
 
-/// How long one lasts that passes by itself.
+/// How long a fault lasts that passes by itself: frames of 1 ms.
 inline constexpr int kUsbFaultFrames = 100;
 
+/// A fault, and when it strikes.
 struct ScriptedUsbFault {
-  std::int64_t cycle = 0;  ///< of 125 us, counted from the begin
+  std::int64_t cycle = 0;  ///< of 125 us, counted from the start
   UsbFault fault = UsbFault::vanish;
   const std::atomic<bool>* when = nullptr;  ///< and not before this is set; any thread may do so
 };
 
-/// Faults in the order of time.
+/// Plays faults, which are given in the order of time.
 class UsbFaultScript {
  public:
   explicit UsbFaultScript(std::vector<ScriptedUsbFault> faults) : faults_(std::move(faults)) {}

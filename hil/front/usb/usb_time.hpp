@@ -27,7 +27,7 @@ class UsbTime {
       if (cycle_ % kCyclesPerUsbFrame == 0) frame();
     }
   }
-  /// Since the begin, in cycles.
+  /// Since the start, in cycles.
   [[nodiscard]] std::int64_t cycle() const noexcept { return cycle_; }
   /// When the next frame begins, CLOCK_MONOTONIC.
   [[nodiscard]] std::int64_t next_frame_ns() const noexcept {

@@ -65,7 +65,7 @@ class UsbipFalcon final : public KernelDevice, private UsbHost {
   PlugIn plug_in_;
   int fd_;
   bool left_ = false;
-  std::vector<std::uint8_t> heard_;  ///< whole messages and the begin of one
+  std::vector<std::uint8_t> heard_;  ///< whole messages and the first part of one
   std::deque<Read> reads_;
 };
 

@@ -14,6 +14,7 @@ inline constexpr std::size_t kHeaderBytes = 48;
 inline constexpr std::size_t kSetupAt = 40;
 using Header = std::array<std::uint8_t, kHeaderBytes>;
 
+/// First word of a message: two that the host sends, and their answers.
 enum class Command : std::uint32_t { submit = 1, unlink = 2, submitted = 3, unlinked = 4 };
 
 /// What the host asks.

@@ -69,6 +69,9 @@ TEST_CASE("an unknown renderer is refused and the known ones are named") {
   CHECK_THROWS_WITH_AS(parse({"--renderer", "voxels"}),
                        doctest::Contains("--renderer: voxels is unknown; known: iso"),
                        VisualizerError);
+  CHECK_THROWS_WITH_AS(parse({"--renderer", "isoo"}),
+                       doctest::Contains("--renderer: isoo is unknown; did you mean iso? known:"),
+                       VisualizerError);
 }
 
 TEST_CASE("each volume may have a renderer of its own, and one kind of them looks into volumes") {

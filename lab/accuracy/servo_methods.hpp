@@ -14,13 +14,13 @@
 #include "controller/plan/tables/tick_memory.hpp"
 #include "lab/accuracy/method_parts.hpp"
 
-// The servo's plans in fixed point, each with the fastest kernels of this machine.
+// The servo's methods in fixed point, each with the fastest kernels of this machine.
 namespace kerf::accuracy {
 
 /// From stored gradients.
-class GatherPlan final : public ContactMethod {
+class GatherMethod final : public ContactMethod {
  public:
-  GatherPlan(const ContactChoice& choice, const AnalyticVolume& volume, const BallTool& tool)
+  GatherMethod(const ContactChoice& choice, const AnalyticVolume& volume, const BallTool& tool)
       : grid_(volume.grid),
         pitch_vox_(choice.pitch_vox),
         kernels_(**kernel_sets()),
@@ -51,9 +51,9 @@ class GatherPlan final : public ContactMethod {
 };
 
 /// From the density alone, for round tools on the volume's lattice.
-class AlignedPlan final : public ContactMethod {
+class AlignedMethod final : public ContactMethod {
  public:
-  AlignedPlan(const ContactChoice& choice, const AnalyticVolume& volume, const BallTool& tool)
+  AlignedMethod(const ContactChoice& choice, const AnalyticVolume& volume, const BallTool& tool)
       : grid_(volume.grid),
         density_(volume.density),
         kernels_(**kernel_sets()),
@@ -83,9 +83,9 @@ class AlignedPlan final : public ContactMethod {
 
 /// From the density alone, for any tool in any pose, as in scenes that cut. Its tick finds the
 /// modification force as well.
-class SplatPlan final : public ContactMethod {
+class SplatMethod final : public ContactMethod {
  public:
-  SplatPlan(const ContactChoice& choice, const AnalyticVolume& volume, const BallTool& tool)
+  SplatMethod(const ContactChoice& choice, const AnalyticVolume& volume, const BallTool& tool)
       : grid_(volume.grid),
         pitch_vox_(choice.pitch_vox),
         density_(volume.density),

@@ -103,7 +103,7 @@ std::vector<Label> labels_of(const VoxelGrid& grid, int kind) {
 
 }  // namespace
 
-TEST_CASE("every plan and instruction set cuts the same by force, inside and across borders") {
+TEST_CASE("every method and instruction set cuts the same by force, inside and across borders") {
   const auto tool = ragged_tool(9, 7, 8, 4);
   const SampleTool samples(tool, SampleOrder::scattered);
   SplatMemory splat_memory;

@@ -9,8 +9,8 @@
 #include "controller/plan/tables/aligned_tool.hpp"
 #include "tests/kernel/exact_field.hpp"
 
-/// The contact force of an unturned tool of the volume's pitch by each plan: SUM_i grad(rho /
-/// rho_max) per voxel, so minus it is F / p0 in voxel^2. One test body then serves all plans.
+/// The contact force of an unturned tool of the volume's pitch by each method: SUM_i grad(rho /
+/// rho_max) per voxel, so minus it is F / p0 in voxel^2. One test body then serves all methods.
 namespace kerf::test {
 
 /// Stored gradients and eight weights a sample.

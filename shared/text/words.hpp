@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <numeric>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+// Words that a person may write, for the answers to a wrong one.
+namespace kerf {
+
+/// Insertions, deletions and exchanges that turn one word into the other.
+[[nodiscard]] inline std::size_t edit_distance(std::string_view a, std::string_view b) {
+  std::vector<std::size_t> row(b.size() + 1);
+  std::iota(row.begin(), row.end(), std::size_t{0});
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    std::size_t diagonal = std::exchange(row[0], i + 1);
+    for (std::size_t j = 0; j < b.size(); ++j) {
+      const std::size_t exchanged = diagonal + (a[i] == b[j] ? 0 : 1);
+      diagonal = row[j + 1];
+      row[j + 1] = std::min({exchanged, diagonal + 1, row[j] + 1});
+    }
+  }
+  return row.back();
+}
+
+/// `a, b, c`.
+[[nodiscard]] inline std::string listed(std::span<const std::string_view> names) {
+  std::string list;
+  for (const std::string_view name : names) list.append(list.empty() ? "" : ", ").append(name);
+  return list;
+}
+
+/// The known name that `word` was probably meant to be: the same quantity in another unit
+/// (`radius_cm`, `radius` -> `radius_mm`), else the nearest in spelling; empty when none is near.
+[[nodiscard]] inline std::string_view nearest(std::string_view word,
+                                              std::span<const std::string_view> known) {
+  const auto quantity = [](std::string_view key) { return key.substr(0, key.find('_')); };
+  for (const std::string_view name : known) {
+    if (quantity(name) == quantity(word)) return name;
+  }
+  std::string_view best;
+  // Half of the letters must be right, else the guess would only mislead.
+  std::size_t best_distance = word.size() / 2 + 1;
+  for (const std::string_view name : known) {
+    const std::size_t distance = edit_distance(word, name);
+    if (distance < best_distance) {
+      best = name;
+      best_distance = distance;
+    }
+  }
+  return best;
+}
+
+/// ` is unknown; did you mean b? known: a, b, c`, each word in `quote`.
+[[nodiscard]] inline std::string unknown_word(std::string_view word,
+                                              std::span<const std::string_view> known,
+                                              std::string_view quote = "") {
+  std::string text = " is unknown; ";
+  if (const std::string_view near = nearest(word, known); !near.empty()) {
+    text.append("did you mean ").append(quote).append(near).append(quote).append("? ");
+  }
+  return text + "known: " + listed(known);
+}
+
+}  // namespace kerf
