@@ -13,10 +13,6 @@
 namespace kerf {
 namespace {
 
-bool is_control(char c) {
-  return static_cast<unsigned char>(c) < 0x20 || c == 0x7f;
-}
-
 /// Insertions, deletions and exchanges that turn one word into the other.
 std::size_t edit_distance(std::string_view a, std::string_view b) {
   std::vector<std::size_t> row(b.size() + 1);
@@ -38,34 +34,12 @@ std::string_view first_word(std::string_view key) {
 
 }  // namespace
 
-std::string number_text(double value) {
-  std::array<char, 32> buffer{};
-  const auto end = std::to_chars(buffer.data(), buffer.data() + buffer.size(), value);
-  return {buffer.data(), end.ptr};
-}
-
 std::string short_text(double value) {
   constexpr int kDigits = 6;
   std::array<char, 32> buffer{};
   const auto end = std::to_chars(buffer.data(), buffer.data() + buffer.size(), value,
                                  std::chars_format::general, kDigits);
   return {buffer.data(), end.ptr};
-}
-
-std::string one_line(std::string_view text) {
-  constexpr std::size_t kLongestLine = 400;
-  std::string line(text.substr(0, kLongestLine));
-  std::replace_if(line.begin(), line.end(), is_control, ' ');
-  return line;
-}
-
-std::string listed(std::span<const std::string_view> names) {
-  std::string list;
-  for (const std::string_view name : names) {
-    if (!list.empty()) list += ", ";
-    list += name;
-  }
-  return list;
 }
 
 void refuse(std::string_view place, std::string_view what) {

@@ -3,7 +3,7 @@
 
 #include "hil/devmodel/arm_pose.hpp"
 #include "hil/devmodel/bus_cycle.hpp"
-#include "hil/devmodel/hand_goal.hpp"
+#include "hil/devmodel/hand_script.hpp"
 #include "hil/devmodel/motor_chain.hpp"
 #include "hil/devmodel/plant_params.hpp"
 #include "hil/devmodel/rotors.hpp"

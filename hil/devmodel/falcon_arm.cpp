@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "hil/devmodel/solve.hpp"
+#include "hil/devmodel/arm_pose.hpp"
 
 namespace kerf {
 namespace {

@@ -5,7 +5,7 @@
 #include <array>
 #include <cmath>
 
-#include "hil/devmodel/solve.hpp"
+#include "hil/devmodel/arm_pose.hpp"
 
 namespace kerf {
 

@@ -3,6 +3,8 @@
 
 #include <array>
 
+#include <poll.h>
+
 #include "shared/posix/monotonic_clock.hpp"
 
 namespace kerf {
@@ -23,18 +25,24 @@ void send(PacketLink& client, PacketDevice& device, FrontStats& stats) noexcept 
   }
 }
 
-bool goes_on(const PacketLink& client, const ServeLimits& limits, const FrontStats& stats) {
-  return !client.closed() && !limits.stop.load(std::memory_order_relaxed) &&
-         (limits.cycles == 0 || stats.cycles < limits.cycles);
+}  // namespace
+
+bool readable(int fd, int timeout_ms) noexcept {
+  pollfd waiting{fd, POLLIN, 0};
+  return poll(&waiting, 1, timeout_ms) > 0;
 }
 
-}  // namespace
+std::span<const std::uint8_t> PacketLink::wait(std::span<std::uint8_t> buffer,
+                                               int timeout_ms) noexcept {
+  static_cast<void>(readable(fd_, timeout_ms));
+  return take(buffer);
+}
 
 void serve_real_time(PacketLink& client, PacketDevice& device, int packet_cycles,
                      const ServeLimits& limits, FrontStats& stats) {
   Buffer buffer;
   std::int64_t deadline_ns = monotonic_ns();
-  while (goes_on(client, limits, stats)) {
+  while (!client.closed() && !limits.reached(stats.cycles)) {
     deadline_ns += packet_cycles * kNsPerCycle;
     sleep_until_ns(deadline_ns);
     const std::int64_t late_ns = monotonic_ns() - deadline_ns;
@@ -58,7 +66,7 @@ void serve_lockstep(PacketLink& client, PacketDevice& device, int tick_cycles,
                     const ServeLimits& limits, FrontStats& stats) {
   Buffer buffer;
   send(client, device, stats);
-  while (goes_on(client, limits, stats)) {
+  while (!client.closed() && !limits.reached(stats.cycles)) {
     const auto packet = client.wait(buffer, kStopCheckMs);
     if (packet.empty()) continue;
     device.receive(packet);

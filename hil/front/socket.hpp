@@ -3,17 +3,50 @@
 
 #include <atomic>
 #include <cstdint>
+#include <span>
 
 #include "hil/devmodel/packet_device.hpp"
-#include "hil/front/packet_link.hpp"
 #include "shared/numeric/histogram.hpp"
 
 namespace kerf {
+
+/// The way to one host: whole packets, none merged. One thread.
+class PacketLink {
+ public:
+  enum class Sent : std::uint8_t { yes, full, closed };
+
+  virtual ~PacketLink() = default;
+
+  /// Oldest waiting packet into `buffer`; a longer one is cut. Empty when none waits, and then
+  /// `closed` tells whether the other end is gone. Never blocks.
+  [[nodiscard]] virtual std::span<const std::uint8_t> take(
+      std::span<std::uint8_t> buffer) noexcept = 0;
+  /// As `take`, but waits up to `timeout_ms` for a packet.
+  [[nodiscard]] std::span<const std::uint8_t> wait(std::span<std::uint8_t> buffer,
+                                                   int timeout_ms) noexcept;
+  /// Never blocks: `full` when the other end does not read.
+  [[nodiscard]] virtual Sent send(std::span<const std::uint8_t> packet) noexcept = 0;
+  [[nodiscard]] bool closed() const noexcept { return closed_; }
+
+ protected:
+  explicit PacketLink(int fd) noexcept : fd_(fd) {}
+
+  int fd_;  ///< of the socket
+  bool closed_ = false;
+};
+
+/// Whether something can be read from `fd` within the time.
+[[nodiscard]] bool readable(int fd, int timeout_ms) noexcept;
 
 /// What both ways of serving share.
 struct ServeLimits {
   std::int64_t cycles = 0;  ///< bus cycles to serve in all; 0 = until the client leaves
   const std::atomic<bool>& stop;
+
+  /// Whether that is all, after `served` bus cycles.
+  [[nodiscard]] bool reached(std::int64_t served) const noexcept {
+    return stop.load(std::memory_order_relaxed) || (cycles != 0 && served >= cycles);
+  }
 };
 
 /// What the front saw.

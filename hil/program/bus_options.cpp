@@ -4,11 +4,13 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <ranges>
 #include <string_view>
 #include <utility>
 
 #include "hil/hil_error.hpp"
 #include "shared/text/number.hpp"
+#include "shared/text/words.hpp"
 
 namespace kerf {
 namespace {
@@ -40,9 +42,8 @@ std::pair<std::int64_t, Fault> parse_fault(const std::string& text,
   if (found != std::end(words)) {
     return {std::llround(*seconds * static_cast<double>(kBusCyclesPerSecond)), found->fault};
   }
-  std::string known;
-  for (const auto& one : words) known += (known.empty() ? "" : ", ") + std::string(one.word);
-  throw HilError("--bus-fault: " + text + " is not SECONDS:KIND with one of " + known);
+  throw HilError("--bus-fault: " + text + " is not SECONDS:KIND with one of " +
+                 listed(words | std::views::transform(&FaultWord<Fault>::word)));
 }
 
 }  // namespace

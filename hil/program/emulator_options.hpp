@@ -8,12 +8,14 @@
 
 #include "hil/program/bus_options.hpp"
 #include "shared/text/command_line.hpp"
+#include "shared/wire/personality.hpp"
 
 namespace kerf {
 
 /// The command line of kerf-emulator.
 struct EmulatorOptions {
-  std::string personality = "omni";
+  std::string device = "omni";  ///< a word of kPersonalityWords
+  Personality personality{};    ///< the same, once checked
   bool describe = false;
   std::string front = "socket";
   std::string socket;
@@ -42,7 +44,7 @@ struct EmulatorOptions {
 /// Tells `app` about all options. What `options` holds then is checked one by one only.
 void declare(Arguments& app, EmulatorOptions& options);
 
-/// Throws `HilError` for options that do not fit together.
-void check(const EmulatorOptions& options);
+/// Finds the personality. Throws `HilError` for options that do not fit together.
+void check(EmulatorOptions& options);
 
 }  // namespace kerf

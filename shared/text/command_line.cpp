@@ -13,6 +13,7 @@
 #include <CLI/CLI.hpp>
 
 #include "shared/text/number.hpp"
+#include "shared/text/words.hpp"
 
 namespace kerf {
 namespace {
@@ -43,12 +44,6 @@ CLI::Validator member(std::vector<std::string> words) {
     return found ? std::string() : text + " not in " + known;
   };
   return {check, known};
-}
-
-/// The library explains over several lines; a user wants one.
-std::string one_line(std::string text) {
-  std::ranges::replace(text, '\n', ' ');
-  return text;
 }
 
 // What an option takes from its arguments and shows of its variable. The library's own conversions

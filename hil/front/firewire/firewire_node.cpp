@@ -47,11 +47,6 @@ std::optional<FuseAnswer> FirewireNode::read(FuseOpen id, FuseRequest request,
   return std::nullopt;
 }
 
-std::optional<FuseAnswer> FirewireNode::write(FuseOpen /*open*/, FuseRequest /*request*/,
-                                              std::span<const std::uint8_t> /*bytes*/) {
-  return FuseAnswer::fail(EINVAL);  // the kernel's node has no write()
-}
-
 std::optional<FuseAnswer> FirewireNode::ioctl(FuseOpen id, const FuseIoctl& call) {
   bus_.catch_up();
   const FuseAnswer answer = opens_.at(id).client->ioctl(call);

@@ -55,11 +55,6 @@ std::optional<FuseAnswer> UsbfsNode::read(FuseOpen open, FuseRequest /*request*/
   return FuseAnswer{.bytes = rest.first(std::min(size, rest.size()))};
 }
 
-std::optional<FuseAnswer> UsbfsNode::write(FuseOpen /*open*/, FuseRequest /*request*/,
-                                           std::span<const std::uint8_t> /*bytes*/) {
-  return FuseAnswer::fail(EINVAL);  // the kernel's node has no write()
-}
-
 std::optional<FuseAnswer> UsbfsNode::ioctl(FuseOpen id, const FuseIoctl& call) {
   catch_up();
   Open& open = opens_.at(id);

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "hil/front/usbip/vhci_hub.hpp"
-
 #include <array>
 #include <cerrno>
 #include <fstream>
@@ -13,6 +11,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include "hil/front/usbip/usbip_falcon.hpp"
 #include "hil/hil_error.hpp"
 
 namespace kerf {

@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "hil/program/fuse_front.hpp"
+#include "hil/program/bus_service.hpp"
 
 #include <ostream>
 #include <utility>
 
 #include "hil/front/firewire/firewire_node.hpp"
 #include "hil/front/fuse/fuse_mount.hpp"
+#include "hil/front/uhid/uhid_arm.hpp"
 #include "hil/front/usb/hidraw_node.hpp"
 #include "hil/front/usb/usbfs_node.hpp"
+#include "hil/front/usbip/usbip_falcon.hpp"
 
 namespace kerf {
 namespace {
@@ -47,6 +49,27 @@ void serve_fuse(const BusService& service, const std::string& mount,
              [&] { return node.arm().time().cycle(); });
   service.stats.sent = node.arm().reports();
   service.stats.dropped = node.lost();
+}
+
+void serve_usbip(const BusService& service, const FtdiFalcon::Settings& falcon,
+                 std::vector<ScriptedUsbFault> script) {
+  UsbipFalcon device(falcon, std::move(script), service.device, plug_into_vhci);
+  service.out << "kerf-emulator: falcon at a port of vhci_hcd" << std::endl;
+  const auto goes_on = [&] {  // a kernel that let go does not come back, even to one that stays
+    return !device.left() && service.goes_on(device.chip().time().cycle(), false);
+  };
+  serve_kernel(device, goes_on, service.stats.wake);
+  service.stats.sent = device.chip().reports();
+  service.stats.dropped = device.chip().lost();
+}
+
+void serve_uhid(const BusService& service, const WoodenHid::Settings& wooden) {
+  UhidArm device(open_uhid(), wooden, service.device);
+  service.out << "kerf-emulator: woodenhaptics at /dev/uhid" << std::endl;
+  const auto goes_on = [&] { return service.goes_on(device.arm().time().cycle(), device.left()); };
+  serve_kernel(device, goes_on, service.stats.wake);
+  service.stats.sent = device.arm().reports();
+  service.stats.dropped = device.lost();
 }
 
 }  // namespace kerf

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -23,6 +24,20 @@ struct UsbSetup {
     return static_cast<std::uint16_t>(b[at] | b[at + 1] << 8);
   };
   return {b[0], b[1], word(2), word(4), word(6)};
+}
+
+// What descriptors are written from.
+constexpr int low(std::uint16_t value) noexcept {
+  return value & 0xFF;
+}
+constexpr int high(std::uint16_t value) noexcept {
+  return value >> 8;
+}
+/// Each value is one byte, 0..255.
+template <class... Values>
+[[nodiscard]] constexpr std::array<std::uint8_t, sizeof...(Values)> usb_bytes(
+    Values... values) noexcept {
+  return {static_cast<std::uint8_t>(values)...};
 }
 
 }  // namespace kerf

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "hil/script/fault_file.hpp"
+#include "hil/script/fault_script.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <random>
 
-#include "hil/script/toml_table.hpp"
+#include "hil/script/script_table.hpp"
 
 namespace kerf {
 namespace {
@@ -30,7 +30,7 @@ bool has_ms(FaultKind kind) {
   return kind == FaultKind::delay || kind == FaultKind::host_late;
 }
 
-int whole(const TomlTable& table, std::string_view key, int otherwise, TomlRange range) {
+int whole(const ScriptTable& table, std::string_view key, int otherwise, ScriptRange range) {
   const double value = table.number(key, otherwise, range);
   if (value != std::floor(value)) {
     table.fail(": " + std::string(key) + " is not whole; use a whole number");
@@ -38,7 +38,7 @@ int whole(const TomlTable& table, std::string_view key, int otherwise, TomlRange
   return static_cast<int>(value);
 }
 
-DeviceFault fault_of(const TomlTable& table) {
+DeviceFault fault_of(const ScriptTable& table) {
   table.allow_only({"kind", "packets", "at_s", "for_s", "every", "axis", "counts", "ms"});
   if (!table.has("kind")) table.fail(": no kind; add one, for example kind = \"lose\"");
   const std::string word = table.word("kind", "", kFaultWords);
@@ -73,8 +73,8 @@ DeviceFault fault_of(const TomlTable& table) {
 }  // namespace
 
 FaultScript parse_fault_script(std::string_view text, const std::string& place) {
-  const toml::table file = parse_toml(text, place);
-  const TomlTable top(file, place, "");
+  const TomlNode file = parse_script(text, place);
+  const ScriptTable top(file, place, "");
   top.allow_only({"seed", "clock", "latches", "fault"});
   FaultScript script;
   constexpr double kMaxSeed = 4294967295.0;
@@ -82,14 +82,14 @@ FaultScript parse_fault_script(std::string_view text, const std::string& place) 
   const std::string clock = top.word("clock", "push", kFaultClockWords);
   script.clock = clock == "start" ? FaultClock::start : FaultClock::push;
   script.latches = top.word("latches", "", kLatchWords);
-  for (const toml::node& element : tables_of(file, "fault", kMaxFaults, place)) {
-    script.faults.push_back(fault_of(TomlTable(*element.as_table(), place, "fault")));
+  for (const TomlNode& fault : top.tables("fault", kMaxFaults)) {
+    script.faults.push_back(fault_of(ScriptTable(fault, place, "fault")));
   }
   return script;
 }
 
 FaultScript read_fault_script(const std::filesystem::path& file) {
-  return parse_fault_script(read_small_file(file, "hil/faults/lost_reports.toml"), file.string());
+  return parse_fault_script(read_script(file, "hil/faults/lost_reports.toml"), file.string());
 }
 
 FaultScript random_faults(std::uint32_t seed) {
