@@ -3,8 +3,8 @@
 
 #include <algorithm>
 #include <array>
-#include <string>
 
+#include "shared/text/words.hpp"
 #include "visualizer/error.hpp"
 #include "visualizer/render/blend_renderer.hpp"
 #include "visualizer/render/cast_renderer.hpp"
@@ -83,9 +83,7 @@ std::vector<std::string_view> renderer_kinds() {
 }
 
 std::string known_renderers() {
-  std::string known;
-  for (const Kind& kind : kKinds) known += (known.empty() ? "" : ", ") + std::string(kind.name);
-  return known;
+  return listed(renderer_kinds());
 }
 
 bool is_translucent(std::string_view kind) {

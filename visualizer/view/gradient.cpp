@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstddef>
 
+#include "shared/text/words.hpp"
 #include "visualizer/error.hpp"
 
 namespace kerf {
@@ -88,11 +89,8 @@ Gradient gradient_named(std::string_view name) {
   if (found != kGradientNames.end()) {
     return static_cast<Gradient>(found - kGradientNames.begin());
   }
-  std::string known;
-  for (const std::string_view one : kGradientNames) {
-    known += (known.empty() ? "" : ", ") + std::string(one);
-  }
-  throw VisualizerError("--gradient: " + std::string(name) + " is unknown; known: " + known);
+  throw VisualizerError("--gradient: " + std::string(name) +
+                        " is unknown; known: " + listed(kGradientNames));
 }
 
 void fill_gradients(Gradient kind, const VoxelGrid& grid, std::span<const Density> density,

@@ -1,14 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "visualizer/bench/gradient_rows.hpp"
+#include "visualizer/bench/normal_errors.hpp"
 
-#include <algorithm>
-#include <cmath>
 #include <numbers>
 #include <random>
 
 #include <glm/gtc/matrix_transform.hpp>
 
-#include "visualizer/bench/shown_normal.hpp"
 #include "visualizer/render/iso_renderer.hpp"
 
 namespace kerf {

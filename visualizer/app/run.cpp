@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "visualizer/app/cpu_placement.hpp"
+#include "visualizer/app/run.hpp"
 
+#include <chrono>
+#include <cstdio>
 #include <cstdlib>
 #include <string>
 
@@ -8,8 +10,24 @@
 
 #include "shared/posix/cores.hpp"
 #include "visualizer/error.hpp"
+#include "visualizer/view/session.hpp"
+#include "visualizer/view/transfer_file.hpp"
 
 namespace kerf {
+
+Session attach(const VisualizerOptions& options) {
+  Session session = Session::attach(options.name, std::chrono::duration<double>(options.wait_s));
+  if (options.transfer) {
+    check_materials(options.look.opacities, session.scene(), options.transfer->string());
+  }
+  return session;
+}
+
+int exit_code(const Session& session, bool video_is_cut) {
+  const bool lost = session.ended() && !session.ended_cleanly();
+  if (lost) std::fprintf(stderr, "kerf-visualizer: the controller went away without a clean end\n");
+  return lost || video_is_cut ? 1 : 0;
+}
 
 std::vector<int> place_process(std::span<const int> cpus) {
   std::vector<int> taken(cpus.begin(), cpus.end());
