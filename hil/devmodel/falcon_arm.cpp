@@ -4,8 +4,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "hil/devmodel/arm_pose.hpp"
-
 namespace kerf {
 namespace {
 

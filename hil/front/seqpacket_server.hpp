@@ -7,7 +7,7 @@
 #include <span>
 #include <string>
 
-#include "hil/front/socket.hpp"
+#include "hil/front/serving.hpp"
 
 namespace kerf {
 

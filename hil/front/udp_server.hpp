@@ -8,7 +8,7 @@
 
 #include <sys/socket.h>
 
-#include "hil/front/socket.hpp"
+#include "hil/front/serving.hpp"
 
 namespace kerf {
 

@@ -8,9 +8,9 @@
 
 #include "hil/devmodel/packet_device.hpp"
 #include "hil/front/firewire/firewire_bus.hpp"
-#include "hil/front/socket.hpp"
+#include "hil/front/serving.hpp"
 #include "hil/front/usb/ftdi_falcon.hpp"
-#include "hil/front/usb/usb_fault.hpp"
+#include "hil/front/usb/usb_device.hpp"
 #include "hil/front/usb/wooden_hid.hpp"
 
 namespace kerf {

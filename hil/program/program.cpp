@@ -7,16 +7,14 @@
 #include <optional>
 #include <ostream>
 #include <string>
-#include <utility>
 
 #include "hil/devmodel/emulator.hpp"
 #include "hil/devmodel/falcon_model.hpp"
 #include "hil/devmodel/omni_model.hpp"
 #include "hil/devmodel/wooden_model.hpp"
 #include "hil/fault/faulty_device.hpp"
-#include "hil/front/real_time.hpp"
 #include "hil/front/seqpacket_server.hpp"
-#include "hil/front/socket.hpp"
+#include "hil/front/serving.hpp"
 #include "hil/front/udp_server.hpp"
 #include "hil/hil_error.hpp"
 #include "hil/program/bus_service.hpp"

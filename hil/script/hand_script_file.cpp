@@ -3,8 +3,6 @@
 
 #include <array>
 #include <cmath>
-#include <string>
-#include <string_view>
 
 #include "hil/script/script_table.hpp"
 #include "shared/wire/omni_constants.hpp"

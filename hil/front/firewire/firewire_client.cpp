@@ -4,9 +4,6 @@
 #include <algorithm>
 #include <cerrno>
 #include <ctime>
-#include <vector>
-
-#include <linux/firewire-cdev.h>
 
 #include "hil/front/fuse/caller_memory.hpp"
 #include "hil/front/fuse/fuse_channel.hpp"

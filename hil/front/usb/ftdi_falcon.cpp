@@ -2,7 +2,6 @@
 #include "hil/front/usb/ftdi_falcon.hpp"
 
 #include <algorithm>
-#include <array>
 
 namespace kerf {
 namespace {

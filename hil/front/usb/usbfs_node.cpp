@@ -2,10 +2,8 @@
 #include "hil/front/usb/usbfs_node.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cerrno>
 #include <cstddef>
-#include <cstring>
 #include <limits>
 
 #include <linux/usbdevice_fs.h>

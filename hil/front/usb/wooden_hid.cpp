@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "hil/front/usb/wooden_hid.hpp"
 
-#include "hil/front/usb/usb_bytes.hpp"
-
 namespace kerf {
 
 std::uint16_t WoodenHid::vendor_id() const noexcept {

@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "hil/front/kernel_device.hpp"
+#include "hil/front/serving.hpp"
 #include "hil/front/usb/falcon_plug.hpp"
 #include "hil/front/usbip/usbip_message.hpp"
 

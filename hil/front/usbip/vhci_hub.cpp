@@ -2,7 +2,6 @@
 #include <array>
 #include <cerrno>
 #include <fstream>
-#include <limits>
 #include <sstream>
 #include <string>
 #include <system_error>

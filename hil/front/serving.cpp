@@ -1,10 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "hil/front/socket.hpp"
+#include "hil/front/serving.hpp"
 
+#include <algorithm>
 #include <array>
+#include <ctime>
+#include <system_error>
 
 #include <poll.h>
 
+#include "shared/posix/cores.hpp"
 #include "shared/posix/monotonic_clock.hpp"
 
 namespace kerf {
@@ -24,6 +28,8 @@ void send(PacketLink& client, PacketDevice& device, FrontStats& stats) noexcept 
     if (sent == PacketLink::Sent::full) ++stats.dropped;
   }
 }
+
+constexpr std::int64_t kStopCheckNs = 100'000'000;
 
 }  // namespace
 
@@ -74,6 +80,35 @@ void serve_lockstep(PacketLink& client, PacketDevice& device, int tick_cycles,
     stats.cycles += tick_cycles;
     send(client, device, stats);
   }
+}
+
+void serve_kernel(KernelDevice& device, const std::function<bool()>& goes_on, Histogram& lateness) {
+  while (goes_on()) {
+    const std::int64_t late_ns = monotonic_ns() - device.next_wake_ns();
+    if (late_ns >= 0) {
+      lateness.record(late_ns);
+      device.wake();
+    }
+    const std::int64_t patience_ns =
+        std::clamp<std::int64_t>(device.next_wake_ns() - monotonic_ns(), 0, kStopCheckNs);
+    const timespec patience{0, patience_ns};
+    pollfd asked{device.descriptor(), POLLIN, 0};
+    if (ppoll(&asked, 1, &patience, nullptr) > 0) device.answer();
+  }
+}
+
+std::string make_real_time(int priority, int cpu) {
+  if (priority <= 0) return {};
+  std::string missing;
+  const int core = cpu >= 0 ? cpu : allowed_cores().back();
+  if (pin_to_core(core) != 0) missing = "core " + std::to_string(core);
+  if (const int error = set_fifo(priority); error != 0) {
+    missing += (missing.empty() ? "" : " and ") + ("SCHED_FIFO " + std::to_string(priority)) +
+               " (" + std::generic_category().message(error) + ")";
+  }
+  if (missing.empty()) return {};
+  return "no right to " + missing + ": packets may be milliseconds late; run as root, set an " +
+         "rtprio limit, or say --priority 0";
 }
 
 }  // namespace kerf

@@ -3,7 +3,9 @@
 
 #include <atomic>
 #include <cstdint>
+#include <functional>
 #include <span>
+#include <string>
 
 #include "hil/devmodel/packet_device.hpp"
 #include "shared/numeric/histogram.hpp"
@@ -70,5 +72,28 @@ void serve_real_time(PacketLink& client, PacketDevice& device, int packet_cycles
 /// same host sees the same bytes.
 void serve_lockstep(PacketLink& client, PacketDevice& device, int tick_cycles,
                     const ServeLimits& limits, FrontStats& stats);
+
+/// A device that a kernel drives through one descriptor: requests come, answers and what the device
+/// says by itself go. One thread.
+class KernelDevice {
+ public:
+  virtual ~KernelDevice() = default;
+  /// Readable when the kernel asks; negative while the device is unplugged.
+  [[nodiscard]] virtual int descriptor() const noexcept = 0;
+  /// Takes what waits there, without waiting for more.
+  virtual void answer() = 0;
+  /// When `wake` is due although nobody asks, CLOCK_MONOTONIC ns.
+  [[nodiscard]] virtual std::int64_t next_wake_ns() const noexcept = 0;
+  virtual void wake() = 0;
+};
+
+/// Serves while `goes_on`, which is asked between two steps and at least every 100 ms. `lateness`
+/// records how late `wake` was called.
+void serve_kernel(KernelDevice& device, const std::function<bool()>& goes_on, Histogram& lateness);
+
+/// Gives the calling thread SCHED_FIFO `priority` (0: leave it as it is) on core `cpu` (negative:
+/// the last one, where the servo runs: a wake-up across cores costs far more than one on the same).
+/// Returns what is missing and what it costs as one line, or nothing.
+[[nodiscard]] std::string make_real_time(int priority, int cpu);
 
 }  // namespace kerf
