@@ -118,7 +118,12 @@ Scene read_scene(const TomlNode& root, const std::filesystem::path& path, SceneK
 }  // namespace
 
 Scene parse_scene(std::string_view text, const std::filesystem::path& path, SceneKeys keys) {
-  return read_scene(parse_toml_tree(text, path.string()), path, keys);
+  try {
+    return read_scene(parse_toml(text), path, keys);
+  } catch (const TomlError& error) {
+    refuse(path.string() + ":" + std::to_string(error.line) + ":" + std::to_string(error.column),
+           std::string(": ") + error.what());
+  }
 }
 
 Scene parse_scene_file(const std::filesystem::path& path) {

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "controller/scene/scene.hpp"
-#include "controller/scene/toml_tree.hpp"
+#include "shared/text/toml.hpp"
 
 namespace kerf {
 

@@ -87,14 +87,10 @@ struct Take {
   }
   /// The number of `entry`: the value, or a part of it.
   [[nodiscard]] double number(const TomlNode& entry) const {
-    const auto* whole = std::get_if<std::int64_t>(&entry.value);
-    const auto* real = std::get_if<double>(&entry.value);
-    if (whole == nullptr && real == nullptr) {
-      refuse(place, " is not a number; write one without quotes or unit");
-    }
-    const double number = whole != nullptr ? static_cast<double>(*whole) : *real;
+    const std::optional<double> number = entry.number();
+    if (!number) refuse(place, " is not a number; write one without quotes or unit");
     const auto [lo, hi] = key.allowed.range;
-    if (number >= lo && number <= hi) return number;  // no nan is
+    if (*number >= lo && *number <= hi) return *number;  // no nan is
     std::string words;
     for (const std::string_view word : key.allowed.words)
       words += ", or \"" + std::string(word) + '"';

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "controller/scene/scene_key.hpp"
-#include "controller/scene/toml_tree.hpp"
+#include "shared/text/toml.hpp"
 
 namespace kerf {
 

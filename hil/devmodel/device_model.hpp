@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <span>
 
 #include "hil/devmodel/arm_plant.hpp"
-#include "hil/devmodel/hand_goal.hpp"
-#include "hil/devmodel/hand_route.hpp"
+#include "hil/devmodel/hand_script.hpp"
 
 namespace kerf {
 
@@ -40,10 +38,7 @@ class DeviceModel {
   /// How a hand calibrates this device and gets to the start of its script.
   [[nodiscard]] virtual HandRoute route() const = 0;
   [[nodiscard]] virtual const PlantState& state() const noexcept = 0;
-  /// Torque of one motor count at each joint, N mm, without its sign: what a host has to be told
-  /// of a unit (`torque_scale` of a scene, `--torque-scale`).
-  [[nodiscard]] virtual std::array<double, 3> torque_scale() const noexcept = 0;
-
+  [[nodiscard]] virtual const PlantParams& params() const noexcept = 0;
   [[nodiscard]] DeviceVec<double> tip_mm() const noexcept { return state().pose.tip_mm; }
   [[nodiscard]] JointVec<double> joints_rad() const noexcept { return state().pose.q; }
   [[nodiscard]] DeviceVec<double> velocity_mm_per_s() const noexcept { return state().velocity; }

@@ -4,8 +4,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "hil/devmodel/solve.hpp"
-
 namespace kerf {
 namespace {
 

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <array>
-#include <cstddef>
 
 #include "hil/devmodel/arm_pose.hpp"
 #include "shared/wire/falcon_constants.hpp"

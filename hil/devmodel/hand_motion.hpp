@@ -6,8 +6,6 @@
 #include <cstdint>
 #include <vector>
 
-#include "hil/devmodel/hand_goal.hpp"
-#include "hil/devmodel/hand_route.hpp"
 #include "hil/devmodel/hand_script.hpp"
 #include "shared/numeric/vec.hpp"
 

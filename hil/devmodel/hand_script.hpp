@@ -7,6 +7,8 @@
 #include <optional>
 #include <vector>
 
+#include "shared/numeric/vec.hpp"
+
 namespace kerf {
 
 /// One thing the hand does for a while. Lengths in script units (`HandScript::unit_mm`), in the
@@ -40,6 +42,45 @@ struct HandScript {
   std::array<double, 3> start{0, 5, 0};  ///< first point above the surface
   std::vector<HandStep> steps;
   std::optional<std::size_t> repeat_from;  ///< after the last step go on here; none: stay
+};
+
+/// How a hand gets a device from rest to the start of a script. Device mm and seconds.
+struct HandRoute {
+  DeviceVec<double> rest_tip_mm;
+  /// Motions that calibrate the device. Empty: the hand stays at rest and presses the calibration
+  /// button, where there is one.
+  std::vector<HandStep> calibration;
+  /// Then straight up ...
+  double lift_mm = 0;  ///< 0: not at all
+  double lift_s = 0.15;
+  /// ... at this height or the start's, whichever is higher, over to this depth, clear of the
+  /// workpiece ...
+  double clear_y_mm = 15;
+  double clear_z_mm = 0;
+  double cross_s = 0.4;  ///< 0: not at all
+  /// ... and on to the start.
+  double approach_s = 0.25;
+};
+
+/// A smooth move.
+[[nodiscard]] inline HandStep hand_move(DeviceVec<double> to_mm, double seconds) {
+  HandStep step;
+  step.kind = HandStep::Kind::move;
+  step.seconds = seconds;
+  step.to = {to_mm.x, to_mm.y, to_mm.z};
+  return step;
+}
+
+/// What the hand wants during one bus cycle.
+struct HandGoal {
+  /// The arm rests (or shall come to rest) in its inkwell; one that has none, in its rest pose.
+  bool in_inkwell = true;
+  DeviceVec<double> target_mm;  ///< ignored in the inkwell
+  /// Gimbal yaw, pitch, roll in rad; the pitch counts from an upright shaft.
+  std::array<double, 3> orientation_rad{};
+  bool button1 = false;
+  bool button2 = false;
+  bool calibrate = false;  ///< presses the calibration button of a device that has one
 };
 
 }  // namespace kerf

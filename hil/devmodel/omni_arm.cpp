@@ -5,8 +5,6 @@
 #include <array>
 #include <cmath>
 
-#include "hil/devmodel/solve.hpp"
-
 namespace kerf {
 
 DeviceVec<double> OmniArm::tip_mm(JointVec<double> q) const noexcept {

@@ -41,9 +41,7 @@ class OmniModel final : public DeviceModel {
   [[nodiscard]] Calibration calibration() const noexcept override;
   [[nodiscard]] HandRoute route() const override;
   [[nodiscard]] const PlantState& state() const noexcept override { return plant_.state(); }
-  [[nodiscard]] std::array<double, 3> torque_scale() const noexcept override {
-    return params_.torque_scale();
-  }
+  [[nodiscard]] const PlantParams& params() const noexcept override { return params_; }
 
   [[nodiscard]] const OmniArm& arm() const noexcept { return plant_.arm(); }
   [[nodiscard]] DeviceVec<double> dock_tip_mm() const noexcept { return plant_.rest().tip_mm; }

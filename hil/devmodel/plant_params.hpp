@@ -37,6 +37,8 @@ struct PlantParams {
   double hand_damping_ns_per_mm = 0.005;
   double hand_mass_kg = 0.1;  ///< moves with the tip
 
+  /// Torque of one motor count at each joint, N mm, without its sign: what a host has to be told
+  /// of a unit (`torque_scale` of a scene, `--torque-scale`).
   [[nodiscard]] std::array<double, 3> torque_scale() const noexcept {
     const auto& t = torque_nmm_per_count;
     return {std::abs(t[0]), std::abs(t[1]), std::abs(t[2])};

@@ -3,7 +3,6 @@
 
 #include "hil/devmodel/arm_pose.hpp"
 #include "hil/devmodel/plant_params.hpp"
-#include "hil/devmodel/solve.hpp"
 
 namespace kerf {
 

@@ -48,9 +48,7 @@ class WoodenModel final : public DeviceModel {
   [[nodiscard]] Calibration calibration() const noexcept override;
   [[nodiscard]] HandRoute route() const override;
   [[nodiscard]] const PlantState& state() const noexcept override { return plant_.state(); }
-  [[nodiscard]] std::array<double, 3> torque_scale() const noexcept override {
-    return params_.torque_scale();
-  }
+  [[nodiscard]] const PlantParams& params() const noexcept override { return params_; }
 
   [[nodiscard]] const WoodenArm& arm() const noexcept { return plant_.arm(); }
 

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "hil/devmodel/bus_cycle.hpp"
+#include "hil/fault/readings.hpp"
 
 namespace kerf {
 namespace {

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <array>
-#include <cstddef>
 #include <cstdint>
 #include <deque>
 #include <optional>
@@ -12,7 +10,6 @@
 
 #include "hil/devmodel/emulator.hpp"
 #include "hil/devmodel/packet_device.hpp"
-#include "hil/fault/readings.hpp"
 #include "hil/script/fault_script.hpp"
 
 namespace kerf {

@@ -2,7 +2,6 @@
 #include "hil/fault/readings.hpp"
 
 #include <algorithm>
-#include <cstddef>
 
 #include "shared/wire/falcon_packet.hpp"
 #include "shared/wire/omni_packet.hpp"

@@ -6,7 +6,6 @@
 #include <cstring>
 #include <utility>
 
-#include <poll.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/un.h>
@@ -65,7 +64,9 @@ void check_path(const std::string& path) {
 }  // namespace
 
 SeqpacketLink::SeqpacketLink(SeqpacketLink&& other) noexcept
-    : fd_(std::exchange(other.fd_, -1)), closed_(other.closed_) {}
+    : PacketLink(std::exchange(other.fd_, -1)) {
+  closed_ = other.closed_;
+}
 
 SeqpacketLink::~SeqpacketLink() {
   if (fd_ >= 0) close(fd_);
@@ -76,12 +77,6 @@ std::span<const std::uint8_t> SeqpacketLink::take(std::span<std::uint8_t> buffer
   if (size > 0) return buffer.first(static_cast<std::size_t>(size));
   if (size == 0 || (errno != EAGAIN && errno != EINTR)) closed_ = true;
   return {};
-}
-
-std::span<const std::uint8_t> SeqpacketLink::wait(std::span<std::uint8_t> buffer,
-                                                  int timeout_ms) noexcept {
-  pollfd ready{fd_, POLLIN, 0};
-  return poll(&ready, 1, timeout_ms) > 0 ? take(buffer) : std::span<const std::uint8_t>{};
 }
 
 PacketLink::Sent SeqpacketLink::send(std::span<const std::uint8_t> packet) noexcept {
@@ -116,9 +111,8 @@ SeqpacketServer::~SeqpacketServer() {
 }
 
 std::optional<SeqpacketLink> SeqpacketServer::accept(const std::atomic<bool>& stop) {
-  pollfd waiting{fd_, POLLIN, 0};
   while (!stop.load(std::memory_order_relaxed)) {
-    if (poll(&waiting, 1, kStopCheckMs) <= 0) continue;
+    if (!readable(fd_, kStopCheckMs)) continue;
     const int client = accept4(fd_, nullptr, nullptr, SOCK_CLOEXEC);
     if (client >= 0) return SeqpacketLink(client);
   }

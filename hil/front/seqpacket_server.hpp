@@ -7,28 +7,21 @@
 #include <span>
 #include <string>
 
-#include "hil/front/packet_link.hpp"
+#include "hil/front/serving.hpp"
 
 namespace kerf {
 
 /// One end of a SEQPACKET Unix socket: whole packets, in order, none merged. Owns the descriptor.
 class SeqpacketLink final : public PacketLink {
  public:
-  explicit SeqpacketLink(int fd) noexcept : fd_(fd) {}
+  explicit SeqpacketLink(int fd) noexcept : PacketLink(fd) {}
   SeqpacketLink(SeqpacketLink&& other) noexcept;
   SeqpacketLink& operator=(SeqpacketLink&&) = delete;
   ~SeqpacketLink() override;
 
   [[nodiscard]] std::span<const std::uint8_t> take(
       std::span<std::uint8_t> buffer) noexcept override;
-  [[nodiscard]] std::span<const std::uint8_t> wait(std::span<std::uint8_t> buffer,
-                                                   int timeout_ms) noexcept override;
   [[nodiscard]] Sent send(std::span<const std::uint8_t> packet) noexcept override;
-  [[nodiscard]] bool closed() const noexcept override { return closed_; }
-
- private:
-  int fd_;
-  bool closed_ = false;
 };
 
 /// A listening socket at a path of the file system.

@@ -6,7 +6,6 @@
 #include <system_error>
 
 #include <netinet/in.h>
-#include <poll.h>
 #include <unistd.h>
 
 #include "hil/hil_error.hpp"
@@ -23,10 +22,6 @@ constexpr int kMaxStrangers = 64;                // datagrams of others, thrown 
 // The sockets API takes every address as a sockaddr.
 sockaddr* generic(sockaddr_storage& address) {
   return reinterpret_cast<sockaddr*>(&address);
-}
-bool readable(int fd, int timeout_ms) noexcept {
-  pollfd waiting{fd, POLLIN, 0};
-  return poll(&waiting, 1, timeout_ms) > 0;
 }
 
 [[noreturn]] void refuse(const std::string& where, const std::string& why) {
@@ -48,7 +43,7 @@ int bind_to(const std::string& where) {
 }  // namespace
 
 UdpLink::UdpLink(int fd, const sockaddr_storage& host, socklen_t host_bytes) noexcept
-    : fd_(fd), host_(host), host_bytes_(host_bytes), heard_ns_(monotonic_ns()) {}
+    : PacketLink(fd), host_(host), host_bytes_(host_bytes), heard_ns_(monotonic_ns()) {}
 
 std::span<const std::uint8_t> UdpLink::take(std::span<std::uint8_t> buffer) noexcept {
   for (int stranger = 0; stranger < kMaxStrangers; ++stranger) {
@@ -65,12 +60,6 @@ std::span<const std::uint8_t> UdpLink::take(std::span<std::uint8_t> buffer) noex
   }
   if (monotonic_ns() - heard_ns_ > kGoneNs) closed_ = true;
   return {};
-}
-
-std::span<const std::uint8_t> UdpLink::wait(std::span<std::uint8_t> buffer,
-                                            int timeout_ms) noexcept {
-  static_cast<void>(readable(fd_, timeout_ms));
-  return take(buffer);
 }
 
 PacketLink::Sent UdpLink::send(std::span<const std::uint8_t> packet) noexcept {

@@ -8,7 +8,7 @@
 
 #include <sys/socket.h>
 
-#include "hil/front/packet_link.hpp"
+#include "hil/front/serving.hpp"
 
 namespace kerf {
 
@@ -18,21 +18,17 @@ namespace kerf {
 /// makes good, in lock-step both sides would wait.
 class UdpLink final : public PacketLink {
  public:
+  /// `fd` is the server's.
   UdpLink(int fd, const sockaddr_storage& host, socklen_t host_bytes) noexcept;
 
   [[nodiscard]] std::span<const std::uint8_t> take(
       std::span<std::uint8_t> buffer) noexcept override;
-  [[nodiscard]] std::span<const std::uint8_t> wait(std::span<std::uint8_t> buffer,
-                                                   int timeout_ms) noexcept override;
   [[nodiscard]] Sent send(std::span<const std::uint8_t> packet) noexcept override;
-  [[nodiscard]] bool closed() const noexcept override { return closed_; }
 
  private:
-  int fd_;  ///< the server's
   sockaddr_storage host_;
   socklen_t host_bytes_;
   std::int64_t heard_ns_;
-  bool closed_ = false;
 };
 
 /// A UDP port that waits for hosts. Whoever reaches it may be the host, so it listens on this

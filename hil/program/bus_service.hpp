@@ -1,12 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <atomic>
 #include <cstdint>
 #include <iosfwd>
+#include <string>
+#include <vector>
 
 #include "hil/devmodel/packet_device.hpp"
-#include "hil/front/socket.hpp"
+#include "hil/front/firewire/firewire_bus.hpp"
+#include "hil/front/serving.hpp"
+#include "hil/front/usb/ftdi_falcon.hpp"
+#include "hil/front/usb/usb_device.hpp"
+#include "hil/front/usb/wooden_hid.hpp"
 
 namespace kerf {
 
@@ -23,9 +28,25 @@ struct BusService {
   /// gone.
   [[nodiscard]] bool goes_on(std::int64_t cycles, bool left) const {
     stats.cycles = cycles;
-    return !limits.stop.load(std::memory_order_relaxed) && (stay || !left) &&
-           (limits.cycles == 0 || cycles < limits.cycles);
+    return (stay || !left) && !limits.reached(cycles);
   }
 };
+
+// `--front fuse`: the device node of a device in the folder `mount`. Each throws `HilError` where
+// nothing can be mounted.
+void serve_fuse(const BusService& service, const std::string& mount, const FirewireSettings& omni);
+void serve_fuse(const BusService& service, const std::string& mount,
+                const FtdiFalcon::Settings& falcon, std::vector<ScriptedUsbFault> script);
+void serve_fuse(const BusService& service, const std::string& mount,
+                const WoodenHid::Settings& wooden);
+
+/// `--front usbip`: the Falcon at a virtual USB port of this machine's kernel. It stays until it is
+/// stopped or its time is over, because USB/IP does not tell when a program lets go. Throws
+/// `HilError` where the kernel cannot.
+void serve_usbip(const BusService& service, const FtdiFalcon::Settings& falcon,
+                 std::vector<ScriptedUsbFault> script);
+
+/// `--front uhid`: the WoodenHaptics arm in this machine's HID stack. Throws `HilError` likewise.
+void serve_uhid(const BusService& service, const WoodenHid::Settings& wooden);
 
 }  // namespace kerf

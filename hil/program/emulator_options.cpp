@@ -3,12 +3,15 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <ranges>
 #include <string_view>
+#include <utility>
 
 #include "hil/devmodel/bus_cycle.hpp"
 #include "hil/hil_error.hpp"
+#include "shared/text/number.hpp"
 #include "shared/text/words.hpp"
-#include "shared/wire/personality.hpp"
 #include "shared/wire/wooden_constants.hpp"
 
 namespace kerf {
@@ -59,16 +62,22 @@ void declare_device(Arguments& app, EmulatorOptions& o) {
   app.option("--seed", o.seed, "of the noise").shows_default();
 }
 
+/// Which of the known words `value` is.
 template <std::size_t N>
-void check_known(const char* option, const std::string& value,
-                 const std::array<std::string_view, N>& known) {
-  if (std::find(known.begin(), known.end(), value) != known.end()) return;
+std::size_t known_at(const char* option, const std::string& value,
+                     const std::array<std::string_view, N>& known) {
+  const auto* const found = std::ranges::find(known, value);
+  if (found != known.end()) return static_cast<std::size_t>(found - known.begin());
   throw HilError(std::string(option) + ": " + value + unknown_word(value, known));
 }
 
+std::string word(Personality personality) {
+  return std::string(kPersonalityWords[static_cast<std::size_t>(personality)]);
+}
+
 void check_front(const EmulatorOptions& o) {
-  check_known("--front", o.front,
-              std::array<std::string_view, 5>{"socket", "udp", "fuse", "usbip", "uhid"});
+  constexpr std::array<std::string_view, 5> kFronts{"socket", "udp", "fuse", "usbip", "uhid"};
+  known_at("--front", o.front, kFronts);
   if (o.front == "socket" && o.socket.empty()) {
     throw HilError("--socket: no path; say where the socket shall be, or use --front udp");
   }
@@ -78,20 +87,20 @@ void check_front(const EmulatorOptions& o) {
   if (o.front == "fuse" && o.bus.mount.empty()) {
     throw HilError("--mount: missing; name an empty folder for --front fuse");
   }
-  const auto speaks_for = [&](const char* front, const char* device) {
+  const auto speaks_for = [&](const char* front, Personality device) {
     if (o.front == front && o.personality != device) {
-      throw HilError(std::string("--front ") + front + ": not for " + o.personality +
-                     "; use --personality " + device + ", or another front");
+      throw HilError(std::string("--front ") + front + ": not for " + o.device +
+                     "; use --personality " + word(device) + ", or another front");
     }
   };
-  speaks_for("usbip", "falcon");
-  speaks_for("uhid", "woodenhaptics");
-  const bool is_usb =
-      o.front == "usbip" || o.front == "uhid" || (o.front == "fuse" && o.personality != "omni");
+  speaks_for("usbip", Personality::falcon);
+  speaks_for("uhid", Personality::woodenhaptics);
+  const bool is_omni = o.personality == Personality::omni;
+  const bool is_usb = o.front == "usbip" || o.front == "uhid" || (o.front == "fuse" && !is_omni);
   if (is_usb && o.lockstep) {
     throw HilError("--lockstep: the USB front runs by its own clock; use --front socket");
   }
-  const int fastest = o.personality == "omni" ? kCyclesPerSecond : 1000;  // a bus cycle, a frame
+  const int fastest = is_omni ? kCyclesPerSecond : 1000;  // a bus cycle, a frame
   if (o.rate_hz < 1 || fastest % o.rate_hz != 0) {
     throw HilError("--rate: " + std::to_string(o.rate_hz) + " does not divide " +
                    std::to_string(fastest) + ", the rate of the bus; use such as 500 or 1000");
@@ -104,21 +113,21 @@ void check_front(const EmulatorOptions& o) {
 }
 
 void check_device(const EmulatorOptions& o) {
-  const auto belongs_to = [&](bool given, const char* option, const char* owner) {
+  const auto belongs_to = [&](bool given, const char* option, Personality owner) {
     if (given && o.personality != owner) {
-      throw HilError(std::string(option) + ": " + o.personality +
-                     " has no such thing; leave it out, or use --personality " + owner);
+      throw HilError(std::string(option) + ": " + o.device +
+                     " has no such thing; leave it out, or use --personality " + word(owner));
     }
   };
-  belongs_to(o.pot_noise, "--pot-noise", "omni");
-  belongs_to(o.bus.firmware_runs, "--firmware-runs", "falcon");
-  belongs_to(o.wireless_button, "--wireless-button", "woodenhaptics");
-  belongs_to(o.packet_bytes != wooden::kPacketBytes, "--packet-bytes", "woodenhaptics");
+  belongs_to(o.pot_noise, "--pot-noise", Personality::omni);
+  belongs_to(o.bus.firmware_runs, "--firmware-runs", Personality::falcon);
+  belongs_to(o.wireless_button, "--wireless-button", Personality::woodenhaptics);
+  belongs_to(o.packet_bytes != wooden::kPacketBytes, "--packet-bytes", Personality::woodenhaptics);
   if (o.packet_bytes != wooden::kPacketBytes && o.packet_bytes != wooden::kLongPacketBytes) {
     throw HilError("--packet-bytes: " + std::to_string(o.packet_bytes) +
                    " is no firmware's length; use 14 or 64");
   }
-  if (o.drop_torque && o.personality == "woodenhaptics") {
+  if (o.drop_torque && o.personality == Personality::woodenhaptics) {
     throw HilError("--drop-torque: woodenhaptics lets go after 0.5 s anyway; leave it out");
   }
   if (o.mode_hz > 0 && o.joint_inertia_kg_m2 <= 0) {
@@ -126,10 +135,41 @@ void check_device(const EmulatorOptions& o) {
   }
 }
 
+template <class Fault>
+struct FaultWord {
+  std::string_view word;
+  Fault fault;
+};
+constexpr FaultWord<BusFault> kBusFaultWords[] = {
+    {"reset", BusFault::reset}, {"device-reset", BusFault::device_reset},
+    {"steal", BusFault::steal}, {"vanish", BusFault::vanish},
+    {"back", BusFault::back},
+};
+constexpr FaultWord<UsbFault> kUsbFaultWords[] = {
+    {"stall", UsbFault::stall},   {"split", UsbFault::split}, {"deaf", UsbFault::deaf},
+    {"vanish", UsbFault::vanish}, {"back", UsbFault::back},
+};
+
+/// SECONDS:KIND with one of the bus's words; the cycle, and which word it is.
+template <class Fault, std::size_t N>
+std::pair<std::int64_t, Fault> parse_fault(const std::string& text,
+                                           const FaultWord<Fault> (&words)[N]) {
+  const std::size_t colon = text.find(':');
+  const auto seconds = number_in(std::string_view(text).substr(0, colon));
+  const bool timed = colon != std::string::npos && seconds && *seconds >= 0 && *seconds < 1e6;
+  const std::string word = timed ? text.substr(colon + 1) : "";
+  const auto* found = std::ranges::find(words, word, &FaultWord<Fault>::word);
+  if (found != std::end(words)) {
+    return {std::llround(*seconds * static_cast<double>(kBusCyclesPerSecond)), found->fault};
+  }
+  throw HilError("--bus-fault: " + text + " is not SECONDS:KIND with one of " +
+                 listed(words | std::views::transform(&FaultWord<Fault>::word)));
+}
+
 }  // namespace
 
 void declare(Arguments& app, EmulatorOptions& o) {
-  app.option("--personality", o.personality, "which device to be: omni, falcon, woodenhaptics")
+  app.option("--personality", o.device, "which device to be: omni, falcon, woodenhaptics")
       .shows_default();
   app.flag("--describe", o.describe,
            "print what a host has to be told of this unit (torque_scale), and end");
@@ -141,10 +181,53 @@ void declare(Arguments& app, EmulatorOptions& o) {
   app.option("--report", o.report, "write what was seen as JSON");
 }
 
-void check(const EmulatorOptions& o) {
-  check_known("--personality", o.personality, kPersonalityWords);
+void check(EmulatorOptions& o) {
+  o.personality = static_cast<Personality>(known_at("--personality", o.device, kPersonalityWords));
   check_device(o);
   if (!o.describe) check_front(o);
+}
+
+void declare_bus(Arguments& app, BusOptions& o) {
+  app.option("--mount", o.mount,
+             "front fuse: folder in which the node appears: fw1, usb or hidraw0");
+  app.option("--packet-hz", o.packet_hz, "front fuse: packets of the omni, 8000 or 1000")
+      .one_of({"8000", "1000"})
+      .shows_default();
+  app.option("--drift-ppm", o.drift_ppm, "front fuse: how much slower the omni's bus runs")
+      .within(-1000, 1000);
+  app.flag("--reset-stops-stream", o.reset_stops_stream,
+           "front fuse: in a bus reset the omni forgets its channels and stops");
+  app.flag("--firmware-runs", o.firmware_runs,
+           "fronts fuse, usbip: the falcon was started before (default: it waits for its "
+           "firmware)");
+  app.option("--bus-fault", o.faults,
+             "fronts fuse, usbip, uhid: SECONDS:KIND, repeatable; vanish, back; omni: reset, "
+             "device-reset, steal; falcon: stall, split; falcon and woodenhaptics on fuse: deaf");
+}
+
+FirewireSettings firewire_settings(const BusOptions& o, int lockstep_hz) {
+  FirewireSettings settings;
+  settings.clock = lockstep_hz > 0 ? BusClock::lock_step() : BusClock::real_time(o.drift_ppm);
+  if (lockstep_hz > 0) {
+    settings.lockstep_cycles = static_cast<int>(kBusCyclesPerSecond) / lockstep_hz;
+  }
+  settings.packet_cycles = static_cast<int>(kBusCyclesPerSecond) / o.packet_hz;
+  settings.reset_stops_stream = o.reset_stops_stream;
+  for (const std::string& text : o.faults) {
+    const auto [cycle, fault] = parse_fault(text, kBusFaultWords);
+    settings.script.push_back({cycle, fault});
+  }
+  return settings;
+}
+
+std::vector<ScriptedUsbFault> usb_script(const BusOptions& o) {
+  std::vector<ScriptedUsbFault> script;
+  for (const std::string& text : o.faults) {
+    const auto [cycle, fault] = parse_fault(text, kUsbFaultWords);
+    script.push_back({cycle, fault});
+  }
+  std::ranges::stable_sort(script, {}, &ScriptedUsbFault::cycle);
+  return script;
 }
 
 }  // namespace kerf

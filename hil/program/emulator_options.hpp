@@ -5,15 +5,37 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
-#include "hil/program/bus_options.hpp"
+#include "hil/front/firewire/firewire_bus.hpp"
+#include "hil/front/usb/usb_device.hpp"
 #include "shared/text/command_line.hpp"
+#include "shared/wire/personality.hpp"
 
 namespace kerf {
 
+/// What the fronts that speak for a whole bus (fuse, usbip, uhid) take from the command line.
+struct BusOptions {
+  std::string mount;
+  int packet_hz = 8000;
+  double drift_ppm = 0;
+  bool reset_stops_stream = false;
+  bool firmware_runs = false;
+  std::vector<std::string> faults;  ///< SECONDS:KIND
+};
+
+void declare_bus(Arguments& app, BusOptions& options);
+
+/// Throws `HilError` for what no bus can be. `lockstep_hz`: servo rate in lock-step, 0 = real time.
+[[nodiscard]] FirewireSettings firewire_settings(const BusOptions& options, int lockstep_hz);
+
+/// The same for the other two devices' buses, which have no lock-step.
+[[nodiscard]] std::vector<ScriptedUsbFault> usb_script(const BusOptions& options);
+
 /// The command line of kerf-emulator.
 struct EmulatorOptions {
-  std::string personality = "omni";
+  std::string device = "omni";  ///< a word of kPersonalityWords
+  Personality personality{};    ///< the same, once checked
   bool describe = false;
   std::string front = "socket";
   std::string socket;
@@ -42,7 +64,7 @@ struct EmulatorOptions {
 /// Tells `app` about all options. What `options` holds then is checked one by one only.
 void declare(Arguments& app, EmulatorOptions& options);
 
-/// Throws `HilError` for options that do not fit together.
-void check(const EmulatorOptions& options);
+/// Finds the personality. Throws `HilError` for options that do not fit together.
+void check(EmulatorOptions& options);
 
 }  // namespace kerf

@@ -7,23 +7,20 @@
 #include <optional>
 #include <ostream>
 #include <string>
-#include <utility>
 
 #include "hil/devmodel/emulator.hpp"
 #include "hil/devmodel/falcon_model.hpp"
 #include "hil/devmodel/omni_model.hpp"
 #include "hil/devmodel/wooden_model.hpp"
 #include "hil/fault/faulty_device.hpp"
-#include "hil/front/real_time.hpp"
 #include "hil/front/seqpacket_server.hpp"
-#include "hil/front/socket.hpp"
+#include "hil/front/serving.hpp"
 #include "hil/front/udp_server.hpp"
 #include "hil/hil_error.hpp"
+#include "hil/program/bus_service.hpp"
 #include "hil/program/emulator_options.hpp"
-#include "hil/program/fuse_front.hpp"
-#include "hil/program/kernel_front.hpp"
 #include "hil/program/run_report.hpp"
-#include "hil/script/fault_file.hpp"
+#include "hil/script/fault_script.hpp"
 #include "hil/script/hand_script_file.hpp"
 #include "shared/text/command_line.hpp"
 
@@ -45,14 +42,17 @@ Params plant_of(const EmulatorOptions& o) {
 }
 
 std::unique_ptr<DeviceModel> make_device(const EmulatorOptions& o) {
-  if (o.personality == "falcon") {
-    return std::make_unique<FalconModel>(plant_of<FalconParams>(o));
-  }
-  if (o.personality == "woodenhaptics") {
-    auto params = plant_of<WoodenParams>(o);
-    params.packet_bytes = o.packet_bytes;
-    params.wireless_button = o.wireless_button;
-    return std::make_unique<WoodenModel>(params);
+  switch (o.personality) {
+    case Personality::falcon:
+      return std::make_unique<FalconModel>(plant_of<FalconParams>(o));
+    case Personality::woodenhaptics: {
+      auto params = plant_of<WoodenParams>(o);
+      params.packet_bytes = o.packet_bytes;
+      params.wireless_button = o.wireless_button;
+      return std::make_unique<WoodenModel>(params);
+    }
+    case Personality::omni:
+      break;
   }
   auto params = plant_of<OmniParams>(o);
   params.pot_noise = o.pot_noise;
@@ -61,7 +61,7 @@ std::unique_ptr<DeviceModel> make_device(const EmulatorOptions& o) {
 }
 
 void describe(const EmulatorOptions& o, std::ostream& out) {
-  const auto scale = make_device(o)->torque_scale();
+  const auto scale = make_device(o)->params().torque_scale();
   out << "torque_scale=" << scale[0] << ',' << scale[1] << ',' << scale[2] << '\n';
 }
 
@@ -90,7 +90,7 @@ template <class Server>
 void serve_clients(const EmulatorOptions& o, Server& server, const std::string& place,
                    PacketDevice& device, FrontStats& stats, const ServeLimits& limits,
                    std::ostream& out) {
-  out << "kerf-emulator: " << o.personality << " at " << place << std::endl;
+  out << "kerf-emulator: " << o.device << " at " << place << std::endl;
   do {
     auto client = server.accept(limits.stop);
     if (!client) break;
@@ -99,8 +99,7 @@ void serve_clients(const EmulatorOptions& o, Server& server, const std::string& 
     } else {
       serve_real_time(*client, device, o.packet_cycles, limits, stats);
     }
-  } while (o.stay && !limits.stop.load(std::memory_order_relaxed) &&
-           (limits.cycles == 0 || stats.cycles < limits.cycles));
+  } while (o.stay && !limits.reached(stats.cycles));
 }
 
 FtdiFalcon::Settings falcon_settings(const EmulatorOptions& o) {
@@ -112,12 +111,13 @@ WoodenHid::Settings wooden_settings(const EmulatorOptions& o) {
 }
 
 void serve_on_fuse(const EmulatorOptions& o, const BusService& service) {
-  if (o.personality == "falcon") {
-    serve_fuse(service, o.bus.mount, falcon_settings(o), usb_script(o.bus));
-  } else if (o.personality == "woodenhaptics") {
-    serve_fuse(service, o.bus.mount, wooden_settings(o));
-  } else {
-    serve_fuse(service, o.bus.mount, firewire_settings(o.bus, o.lockstep ? o.rate_hz : 0));
+  switch (o.personality) {
+    case Personality::omni:
+      return serve_fuse(service, o.bus.mount, firewire_settings(o.bus, o.lockstep ? o.rate_hz : 0));
+    case Personality::falcon:
+      return serve_fuse(service, o.bus.mount, falcon_settings(o), usb_script(o.bus));
+    case Personality::woodenhaptics:
+      return serve_fuse(service, o.bus.mount, wooden_settings(o));
   }
 }
 

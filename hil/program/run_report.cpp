@@ -15,14 +15,19 @@ double seconds_of(std::int64_t cycles) {
   return static_cast<double>(cycles) / kCyclesPerSecond;
 }
 
-}  // namespace
-
-void check_report(const std::string& file) {
+template <class Call>
+void or_refuse(const Call& call) {
   try {
-    check_new_file(file);
+    call();
   } catch (const FileError& error) {
     throw HilError(std::string("--report: ") + error.what());
   }
+}
+
+}  // namespace
+
+void check_report(const std::string& file) {
+  or_refuse([&] { check_new_file(file); });
 }
 
 void write_run_report(const std::string& file, const Emulator& emulator, std::uint64_t withheld,
@@ -48,11 +53,7 @@ void write_run_report(const std::string& file, const Emulator& emulator, std::ui
   report["final_tip_mm"] = std::array{tip.x, tip.y, tip.z};
   report["report_hash"] = hex64(stats.report_hash);
 
-  try {
-    write_new_file(file, report.document());
-  } catch (const FileError& error) {
-    throw HilError(std::string("--report: ") + error.what());
-  }
+  or_refuse([&] { write_new_file(file, report.document()); });
 }
 
 }  // namespace kerf

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "hil/devmodel/emulator.hpp"
-#include "hil/front/socket.hpp"
+#include "hil/front/serving.hpp"
 
 namespace kerf {
 

@@ -3,10 +3,8 @@
 
 #include <array>
 #include <cmath>
-#include <string>
-#include <string_view>
 
-#include "hil/script/toml_table.hpp"
+#include "hil/script/script_table.hpp"
 #include "shared/wire/omni_constants.hpp"
 
 namespace kerf {
@@ -20,11 +18,11 @@ constexpr double kMaxTurns = 10'000;
 constexpr double kMaxUnitMm = 100;
 constexpr double kMaxDegrees = 360;
 
-constexpr TomlRange kLength{-kMaxLength, kMaxLength};
-constexpr TomlRange kSize{0, kMaxLength};
-constexpr TomlRange kSeconds{0, kMaxSeconds, true};
+constexpr ScriptRange kLength{-kMaxLength, kMaxLength};
+constexpr ScriptRange kSize{0, kMaxLength};
+constexpr ScriptRange kSeconds{0, kMaxSeconds, true};
 
-HandStep step_of(const TomlTable& table) {
+HandStep step_of(const ScriptTable& table) {
   table.allow_only({"move_mm", "hold", "circle_mm", "zigzag_mm", "seconds", "ease", "turns",
                     "sink_mm", "button", "orientation_deg", "repeat"});
   HandStep step;
@@ -71,15 +69,15 @@ HandStep step_of(const TomlTable& table) {
 }  // namespace
 
 HandScript parse_hand_script(std::string_view text, const std::string& place) {
-  const toml::table file = parse_toml(text, place);
-  const TomlTable top(file, place, "");
+  const TomlNode file = parse_script(text, place);
+  const ScriptTable top(file, place, "");
   top.allow_only({"unit_mm", "start_mm", "step"});
   HandScript script;
   script.unit_mm = top.number("unit_mm", script.unit_mm, {0, kMaxUnitMm, true});
   script.start = top.numbers<3>("start_mm", script.start, kLength);
 
-  for (const toml::node& element : tables_of(file, "step", kMaxSteps, place)) {
-    const TomlTable table(*element.as_table(), place, "step");
+  for (const TomlNode& step : top.tables("step", kMaxSteps)) {
+    const ScriptTable table(step, place, "step");
     script.steps.push_back(step_of(table));
     if (!table.flag("repeat")) continue;
     if (script.repeat_from) table.fail(": a second repeat; only one step starts the repeat");
@@ -89,7 +87,7 @@ HandScript parse_hand_script(std::string_view text, const std::string& place) {
 }
 
 HandScript read_hand_script(const std::filesystem::path& file) {
-  return parse_hand_script(read_small_file(file, "scenes/hands/touch.toml"), file.string());
+  return parse_hand_script(read_script(file, "scenes/hands/touch.toml"), file.string());
 }
 
 }  // namespace kerf

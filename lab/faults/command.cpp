@@ -15,7 +15,7 @@
 #include "hil/devmodel/omni_model.hpp"
 #include "hil/devmodel/wooden_model.hpp"
 #include "hil/hil_error.hpp"
-#include "hil/script/fault_file.hpp"
+#include "hil/script/fault_script.hpp"
 #include "hil/script/hand_script_file.hpp"
 #include "lab/faults/fault_run.hpp"
 #include "lab/rig/lab_run.hpp"

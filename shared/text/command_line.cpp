@@ -46,12 +46,6 @@ CLI::Validator member(std::vector<std::string> words) {
   return {check, "{" + known + "}"};
 }
 
-/// The library explains over several lines; a user wants one.
-std::string one_line(std::string text) {
-  std::ranges::replace(text, '\n', ' ');
-  return text;
-}
-
 // What an option takes from its arguments and shows of its variable. The library's own conversions
 // are templates that cost a second for each type.
 bool take(const std::string& text, std::string& value) {

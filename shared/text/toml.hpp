@@ -1,24 +1,51 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-/// toml++ as scenes, scripts and transfer functions use it: without exceptions, its parser compiled
-/// once, in toml.cpp. Debian's 3.3.0 asserts that a table header begins with a letter of a key
-/// before it has looked: `[!]` in a file would end the program. The check behind the assertion
-/// reports that properly, so assertions are off here, in every build type (with NDEBUG they would
-/// become assumptions).
-#pragma push_macro("NDEBUG")
-#undef NDEBUG
-#define TOML_HEADER_ONLY 0
-#define TOML_ASSERT(expr) static_cast<void>(0)
-#define TOML_EXCEPTIONS 0
-#include <toml++/toml.h>
-#pragma pop_macro("NDEBUG")
-
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <stdexcept>
 #include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
 
 namespace kerf {
 
-/// `problem; way out` of text that is no TOML. May hold control characters of the text.
-[[nodiscard]] std::string toml_problem(const toml::parse_error& error);
+/// One value as TOML writes it; empty: none, or one that no file of ours uses, such as a date.
+using TomlValue =
+    std::variant<std::monostate, bool, std::int64_t, double, std::string, std::vector<double>>;
+
+/// A value of a parsed file with its place, and what lies below it.
+struct TomlNode {
+  enum class Form : std::uint8_t { value, array, table };
+
+  std::string key;  ///< empty for the whole file and for an entry of an array
+  std::size_t key_line = 0, key_column = 0;
+  std::size_t line = 0;  ///< where the value begins
+  std::string shown;     ///< the value as messages repeat it: on one line, cut where it is long
+  Form form = Form::table;
+  TomlValue value;                ///< of Form::value
+  std::vector<TomlNode> entries;  ///< of an array or a table, in the order of the file
+
+  /// What lies below a table at `key` or `key.key`; null where nothing does.
+  [[nodiscard]] const TomlNode* find(std::string_view path) const;
+  /// A whole number or a real one; nothing where the value is none.
+  [[nodiscard]] std::optional<double> number() const;
+};
+
+/// Text that is no TOML: `problem; way out`, and where the parser stopped. May hold control
+/// characters of the text.
+struct TomlError : std::runtime_error {
+  TomlError(const std::string& what, std::size_t at_line, std::size_t at_column)
+      : std::runtime_error(what), line(at_line), column(at_column) {}
+  std::size_t line, column;
+};
+
+/// Throws TomlError. Load time.
+[[nodiscard]] TomlNode parse_toml(std::string_view text);
+
+/// The value as one would write it in the file; empty for none.
+[[nodiscard]] std::string written(const TomlValue& value);
 
 }  // namespace kerf

@@ -13,6 +13,16 @@
 // Words that a person may write, for the answers to a wrong one.
 namespace kerf {
 
+/// `text` on one line, whatever it quotes of a user's file: control characters become blanks, and
+/// what is too long to read is cut.
+[[nodiscard]] inline std::string one_line(std::string_view text) {
+  constexpr std::size_t kLongestLine = 400;
+  std::string line(text.substr(0, kLongestLine));
+  const auto is_control = [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; };
+  std::replace_if(line.begin(), line.end(), is_control, ' ');
+  return line;
+}
+
 /// Insertions, deletions and exchanges that turn one word into the other.
 [[nodiscard]] inline std::size_t edit_distance(std::string_view a, std::string_view b) {
   std::vector<std::size_t> row(b.size() + 1);
@@ -29,9 +39,13 @@ namespace kerf {
 }
 
 /// `a, b, c`.
-[[nodiscard]] inline std::string listed(std::span<const std::string_view> names) {
+template <class Names>
+[[nodiscard]] std::string listed(const Names& names) {
   std::string list;
-  for (const std::string_view name : names) list.append(list.empty() ? "" : ", ").append(name);
+  for (const auto& name : names) {
+    if (!list.empty()) list += ", ";
+    list += name;
+  }
   return list;
 }
 

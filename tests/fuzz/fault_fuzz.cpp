@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "hil/hil_error.hpp"
-#include "hil/script/fault_file.hpp"
+#include "hil/script/fault_script.hpp"
 #include "tests/fuzz/text_fuzz.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

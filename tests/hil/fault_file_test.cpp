@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "hil/script/fault_file.hpp"
-
 #include <string>
 
 #include <doctest/doctest.h>
 
 #include "hil/hil_error.hpp"
+#include "hil/script/fault_script.hpp"
 
 using kerf::FaultKind;
 using kerf::parse_fault_script;

@@ -5,7 +5,7 @@
 
 #include <poll.h>
 
-#include "hil/front/kernel_device.hpp"
+#include "hil/front/serving.hpp"
 #include "shared/numeric/histogram.hpp"
 #include "shared/posix/monotonic_clock.hpp"
 

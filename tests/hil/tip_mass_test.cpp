@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "hil/devmodel/tip_mass.hpp"
-
 #include <cmath>
 
 #include <doctest/doctest.h>
+
+#include "hil/devmodel/arm_plant.hpp"
 
 namespace {
 

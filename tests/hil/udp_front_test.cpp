@@ -17,7 +17,7 @@
 
 #include "hil/devmodel/emulator.hpp"
 #include "hil/devmodel/falcon_model.hpp"
-#include "hil/front/socket.hpp"
+#include "hil/front/serving.hpp"
 #include "hil/front/udp_server.hpp"
 #include "hil/hil_error.hpp"
 #include "shared/posix/monotonic_clock.hpp"

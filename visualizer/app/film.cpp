@@ -4,7 +4,6 @@
 #include <algorithm>
 
 #include "shared/posix/new_file.hpp"
-#include "visualizer/app/yuv.hpp"
 
 namespace kerf {
 

@@ -10,16 +10,14 @@
 #include "shared/posix/new_file.hpp"
 #include "shared/posix/stop_signals.hpp"
 #include "visualizer/app/contact_sheet.hpp"
-#include "visualizer/app/cpu_placement.hpp"
-#include "visualizer/app/export_surface.hpp"
 #include "visualizer/app/film.hpp"
 #include "visualizer/app/frame_schedule.hpp"
 #include "visualizer/app/picture.hpp"
 #include "visualizer/app/run.hpp"
 #include "visualizer/gl/context.hpp"
+#include "visualizer/surface/mesh_file.hpp"
 #include "visualizer/view/file_out.hpp"
 #include "visualizer/view/frame_report.hpp"
-#include "visualizer/view/transfer_file.hpp"
 
 namespace kerf {
 
@@ -83,20 +81,17 @@ int run_headless(const VisualizerOptions& options) {
   }
   const auto context = make_headless_context();
   const GlDriver driver = query_gl_driver();
-  FrameReport report{.renderer = options.renderer,
+  FrameReport report{.renderer = options.look.renderer,
                      .gl_renderer = driver.renderer,
                      .context = to_string(context->kind()),
                      .width = options.size.width,
                      .height = options.size.height};
 
-  Session session = Session::attach(options.name, std::chrono::duration<double>(options.wait_s));
-  if (options.transfer) {
-    check_materials(options.opacities, session.scene(), options.transfer->string());
-  }
+  Session session = attach(options);
   report.attach_ms = session.attach_ms();
   const Stopwatch since_attached;
   const double aspect = static_cast<double>(options.size.width) / options.size.height;
-  Picture picture(session, first_look(options), aspect);
+  Picture picture(session, options.look, aspect);
   FrameTaker taker(picture, options.size, report);
   taker.draw(session);  // not kept: the driver compiles shaders at their first use
   if (options.attached) write_new_file(*options.attached, "");

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "visualizer/gl/pointer.hpp"
 #include "visualizer/view/look.hpp"
+#include "visualizer/view/pixel_rect.hpp"
 
 namespace kerf {
 

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "visualizer/app/options.hpp"
 
-#include <algorithm>
 #include <charconv>
 #include <iomanip>
 #include <iostream>
@@ -34,15 +33,76 @@ std::string footer() {
   return text.str();
 }
 
-}  // namespace
-
-Look first_look(const VisualizerOptions& options) {
-  return {.renderer = options.renderer,
-          .opacities = options.opacities,
-          .gradient = options.gradient,
-          .stereo = options.stereo,
-          .voxel_tool = options.voxel_tool};
+/// What pictures look like at first; `gradient` by its name.
+void declare_look(Arguments& app, VisualizerOptions& o, std::string& gradient) {
+  app.option("--renderer", o.look.renderer,
+             "how volumes are drawn: " + listed(renderer_kinds()) +
+                 "; with commas one for each volume, such as surface,blend")
+      .shown_as("KIND[,KIND...]")
+      .shows_default();
+  app.option("--gradient", gradient,
+             "what iso, surface, blend and slices shade from: central (two voxels), corners "
+             "(2x2x2 means) or farid5 (5x5x5, 8 more bytes a voxel in iso); cast always "
+             "corners")
+      .shows_default();
+  app.option("--transfer", o.transfer,
+             "opacity of each material, TOML, for blend, slices and cast-blend; in the window w "
+             "writes it")
+      .shown_as("FILE");
+  app.flag("--voxel-tool", o.look.voxel_tool,
+           "the tool as a volume of voxels, which the renderer draws as it does the others and "
+           "the clip plane cuts too");
+  app.flag("--stereo", o.look.stereo.on, "two eyes side by side, each in half the width");
+  app.option("--eyes", o.look.stereo.eyes_mm,
+             "stereo: mm between the eyes; negative: crossed (default: 1/30 of --convergence)")
+      .within(-1e3, 1e3);
+  app.option("--convergence", o.look.stereo.convergence_mm,
+             "stereo: mm to what lies in the screen (default: to where the camera looks)")
+      .within(1.0, 1e6);
 }
+
+/// How long a run is, and where.
+void declare_run(Arguments& app, VisualizerOptions& o) {
+  app.option("--seconds", o.seconds, "end after this time").within(0.0, 1e6);
+  app.option("--wait", o.wait_s, "seconds to wait for the controller")
+      .within(0.0, 1e6)
+      .shows_default();
+  app.option("--attached", o.attached,
+             "make this empty file once the controller is shown: a short run may begin")
+      .shown_as("FILE");
+  app.option("--cpu", o.cpus, "cores to run on, e.g. 0,1 (default: all but the last)")
+      .split_at_commas()
+      .within(0, 1023);
+}
+
+/// What is written beside pictures.
+void declare_files(Arguments& app, VisualizerOptions& o, const Option& headless) {
+  app.option("--export", o.mesh,
+             "surface of all solid volumes as a closed mesh in mm, FILE.stl or FILE.ply (with "
+             "colours): headless at the end, in the window with e")
+      .shown_as("FILE");
+  app.option("--sheet", o.sheet,
+             "headless: at the end one PNG with the final state by every renderer")
+      .shown_as("FILE")
+      .needs(headless);
+  app.option("--fps", o.video_hz, "record: frames per second of servo time")
+      .within(1, 240)
+      .shows_default();
+  app.option("--report", o.report, "write times and counts to this JSON file").shown_as("FILE");
+}
+
+void declare_bench(Arguments& app, VisualizerOptions& o) {
+  const Option bench = app.flag(
+      "--bench", o.bench, "time every renderer, without a controller (512x512 unless --size)");
+  app.option("--page", o.page, "bench: write the table to this Markdown file")
+      .shown_as("FILE")
+      .needs(bench);
+  app.option("--summary", o.summary, "bench: write a short table as its part of this Markdown file")
+      .shown_as("FILE")
+      .needs(bench);
+}
+
+}  // namespace
 
 PictureSize parse_size(const std::string& text) {
   const std::string_view all = text;
@@ -65,37 +125,14 @@ PictureSize parse_size(const std::string& text) {
 std::optional<VisualizerOptions> parse_options(int argc, const char* const* argv) {
   VisualizerOptions options;
   std::string size = "800x600";
-  std::string gradient(kGradientNames[static_cast<std::size_t>(options.gradient)]);
+  std::string gradient(name_of(options.look.gradient));
   CommandLine app("Shows what a kerf-controller feels and mills, in a window or as PNG pictures.",
                   "kerf-visualizer", "kerf-visualizer " KERF_VERSION);
   app.footer(footer());
   app.option("--name", options.name, "the controller's name").shows_default();
-  app.option("--renderer", options.renderer,
-             "how volumes are drawn: " + listed(renderer_kinds()) +
-                 "; with commas one for each volume, such as surface,blend")
-      .shown_as("KIND[,KIND...]")
-      .shows_default();
-  app.option("--gradient", gradient,
-             "what iso, surface, blend and slices shade from: central (two voxels), corners "
-             "(2x2x2 means) or farid5 (5x5x5, 8 more bytes a voxel in iso); cast always "
-             "corners")
-      .shows_default();
   const Option sized =
       app.option("--size", size, "width and height in pixels").shown_as("WxH").shows_default();
-  app.option("--transfer", options.transfer,
-             "opacity of each material, TOML, for blend, slices and cast-blend; in the window w "
-             "writes it")
-      .shown_as("FILE");
-  app.flag("--voxel-tool", options.voxel_tool,
-           "the tool as a volume of voxels, which the renderer draws as it does the others and "
-           "the clip plane cuts too");
-  app.flag("--stereo", options.stereo.on, "two eyes side by side, each in half the width");
-  app.option("--eyes", options.stereo.eyes_mm,
-             "stereo: mm between the eyes; negative: crossed (default: 1/30 of --convergence)")
-      .within(-1e3, 1e3);
-  app.option("--convergence", options.stereo.convergence_mm,
-             "stereo: mm to what lies in the screen (default: to where the camera looks)")
-      .within(1.0, 1e6);
+  declare_look(app, options, gradient);
   const Option headless =
       app.flag("--headless", options.headless, "no window: pictures into --out");
   const Option frames = app.option("--frames", options.frames, "headless: number of pictures")
@@ -107,43 +144,13 @@ std::optional<VisualizerOptions> parse_options(int argc, const char* const* argv
   app.option("--out", options.out, "folder for pictures and screenshots")
       .shown_as("DIR")
       .shows_default();
-  app.option("--seconds", options.seconds, "end after this time").within(0.0, 1e6);
-  app.option("--wait", options.wait_s, "seconds to wait for the controller")
-      .within(0.0, 1e6)
-      .shows_default();
-  app.option("--attached", options.attached,
-             "make this empty file once the controller is shown: a short run may begin")
-      .shown_as("FILE");
-  app.option("--cpu", options.cpus, "cores to run on, e.g. 0,1 (default: all but the last)")
-      .split_at_commas()
-      .within(0, 1023);
-  app.option("--export", options.mesh,
-             "surface of all solid volumes as a closed mesh in mm, FILE.stl or FILE.ply (with "
-             "colours): headless at the end, in the window with e")
-      .shown_as("FILE");
-  app.option("--sheet", options.sheet,
-             "headless: at the end one PNG with the final state by every renderer")
-      .shown_as("FILE")
-      .needs(headless);
+  declare_run(app, options);
   const Option record = app.option("--record", options.record,
                                    "raw video in true time (y4m): a file, a pipe, or - for stdout; "
                                    "headless without pictures unless --frames")
                             .shown_as("FILE");
-  app.option("--fps", options.video_hz, "record: frames per second of servo time")
-      .within(1, 240)
-      .shows_default();
-  app.option("--report", options.report, "write times and counts to this JSON file")
-      .shown_as("FILE");
-  const Option bench =
-      app.flag("--bench", options.bench,
-               "time every renderer, without a controller (512x512 unless --size)");
-  app.option("--page", options.page, "bench: write the table to this Markdown file")
-      .shown_as("FILE")
-      .needs(bench);
-  app.option("--summary", options.summary,
-             "bench: write a short table as its part of this Markdown file")
-      .shown_as("FILE")
-      .needs(bench);
+  declare_files(app, options, headless);
+  declare_bench(app, options);
   try {
     if (!app.parse(argc, argv, std::cout)) return std::nullopt;
   } catch (const UsageError& problem) {
@@ -152,9 +159,9 @@ std::optional<VisualizerOptions> parse_options(int argc, const char* const* argv
   if (record.given() && !frames.given()) options.frames = 0;
   if (options.bench && !sized.given()) size = kBenchSize;
   options.size = parse_size(size);
-  check_renderers(options.renderer);
-  options.gradient = gradient_named(gradient);
-  if (options.transfer) options.opacities = read_transfer(*options.transfer);
+  check_renderers(options.look.renderer);
+  options.look.gradient = gradient_named(gradient);
+  if (options.transfer) options.look.opacities = read_transfer(*options.transfer);
   return options;
 }
 

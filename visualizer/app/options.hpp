@@ -7,19 +7,15 @@
 #include <string>
 #include <vector>
 
-#include "visualizer/gl/target.hpp"
 #include "visualizer/view/look.hpp"
+#include "visualizer/view/pixel_rect.hpp"
 
 namespace kerf {
 
 /// The command line of kerf-visualizer.
 struct VisualizerOptions {
-  std::string name = "kerf";     ///< of the controller
-  std::string renderer = "iso";  ///< of all volumes, or of each: renderer_choice.hpp
-  Gradient gradient = Gradient::corners;
-  Stereo stereo;
-  bool voxel_tool = false;
-  Opacities opacities;  ///< of `transfer`
+  std::string name = "kerf";  ///< of the controller
+  Look look;                  ///< at first; its opacities are those of `transfer`
   PictureSize size{800, 600};
   bool headless = false;
   std::uint32_t frames = 10;  ///< headless: this many pictures; beside a video none by default
@@ -39,9 +35,6 @@ struct VisualizerOptions {
   std::optional<std::filesystem::path> page;     ///< bench: as Markdown
   std::optional<std::filesystem::path> summary;  ///< bench: as a part of a page
 };
-
-/// What pictures look like at first.
-[[nodiscard]] Look first_look(const VisualizerOptions& options);
 
 /// "WxH"; throws VisualizerError.
 [[nodiscard]] PictureSize parse_size(const std::string& text);

@@ -8,8 +8,8 @@
 
 #include "visualizer/app/force_plot.hpp"
 #include "visualizer/app/look_panel.hpp"
-#include "visualizer/gl/pointer.hpp"
 #include "visualizer/gl/target.hpp"
+#include "visualizer/view/pixel_rect.hpp"
 
 namespace kerf {
 

@@ -19,20 +19,13 @@ const ImVec4 kLimit{0.84F, 0.37F, 0.00F, 1.0F};
 constexpr double kLeastFullForceN = 0.5;
 constexpr double kLeastFullDepthMm = 0.1;
 
-void row(const char* label, const char* format, double value) {
+template <class Value>
+void row(const char* label, const char* format, Value value) {
   ImGui::TableNextRow();
   ImGui::TableNextColumn();
   ImGui::TextColored(kLabelColour, "%s", label);
   ImGui::TableNextColumn();
   ImGui::TextColored(kValueColour, format, value);
-}
-
-void row(const char* label, const std::string& value) {
-  ImGui::TableNextRow();
-  ImGui::TableNextColumn();
-  ImGui::TextColored(kLabelColour, "%s", label);
-  ImGui::TableNextColumn();
-  ImGui::TextColored(kValueColour, "%s", value.c_str());
 }
 
 void force_bar(const OverlayFigures& figures) {
@@ -83,13 +76,13 @@ void draw_figures(const OverlayFigures& figures) {
   }
   force_bar(figures);
   if (ImGui::BeginTable("rows", 2)) {
-    if (!figures.tool.empty()) row("tool", figures.tool);
+    if (!figures.tool.empty()) row("tool", "%s", figures.tool.c_str());
     row(figures.removed_is_partial ? "removed since joining" : "removed", "%.2f mm3",
         figures.removed_mm3);
     if (figures.tick_rate_hz) row("servo", "%.0f Hz", *figures.tick_rate_hz);
     if (figures.frame_rate_hz) row("picture", "%.0f /s", *figures.frame_rate_hz);
     if (figures.data_age_ms) row("data age", "%.1f ms", *figures.data_age_ms);
-    if (figures.filmed_frames) row("filmed", std::to_string(*figures.filmed_frames) + " frames");
+    if (figures.filmed_frames) row("filmed", "%ju frames", std::uintmax_t{*figures.filmed_frames});
     ImGui::EndTable();
   }
   if (!figures.plot.empty()) {
@@ -130,7 +123,7 @@ void draw_key_help(ImVec2 size) {
   ImGui::SetNextWindowBgAlpha(0.9F);  // many words over whatever is behind
   ImGui::Begin("keys", nullptr, kStillPanel);
   if (ImGui::BeginTable("keys", 2)) {
-    for (const auto& [key, meaning] : kKeys) row(key, std::string(meaning));
+    for (const auto& [key, meaning] : kKeys) row(key, "%s", meaning);
     ImGui::EndTable();
   }
   ImGui::End();

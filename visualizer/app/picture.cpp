@@ -6,8 +6,7 @@
 #include <cmath>
 
 #include "visualizer/gl/context.hpp"
-#include "visualizer/view/palette.hpp"
-#include "visualizer/view/stereo.hpp"
+#include "visualizer/view/transfer_function.hpp"
 
 namespace kerf {
 
@@ -82,7 +81,7 @@ void Picture::set_look(const Session& session, const Look& look) {
 LookControls Picture::controls() const {
   LookControls controls{.look = look_, .own_iso = scene_.main_volume().iso / kDensityMax};
   for (const VolumeView& volume : scene_.volumes) controls.volumes.push_back(volume.name);
-  controls.takes_gradient = painter_->renderers().take_gradient();
+  controls.takes_gradient = painter_->renderers().any(&Renderer::takes_gradient);
   controls.has_iso = painter_->renderers().any(ScenePainter::Layer::opaque);
   if (painter_->renderers().any(ScenePainter::Layer::translucent)) {
     controls.opacities = opacities();

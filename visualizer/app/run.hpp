@@ -1,11 +1,25 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <span>
+#include <vector>
+
 #include "visualizer/app/options.hpp"
 
 namespace kerf {
 
+/// Binds this process to the cores `cpus`. Where that is empty, binds it to all cores that it may
+/// use but the last one, which is the servo's; to the only one where there is one. Call before any
+/// other thread exists. Sets LP_NUM_THREADS, the number of threads of a software GL, unless it is
+/// set.
+///
+/// Returns the cores taken. Throws VisualizerError where one of `cpus` is not to be had.
+std::vector<int> place_process(std::span<const int> cpus);
+
 class Session;
+
+/// The session that the options name, whose materials those of --transfer are.
+[[nodiscard]] Session attach(const VisualizerOptions& options);
 
 /// 0 where the controller still runs or ended cleanly, 1 where it went away without a word, which
 /// is told on stderr, or where a video is cut short.

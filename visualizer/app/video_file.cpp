@@ -5,6 +5,7 @@
 #include <cerrno>
 #include <climits>
 #include <csignal>
+#include <cstddef>
 #include <cstring>
 #include <string_view>
 #include <utility>
@@ -32,6 +33,32 @@ int opened(const std::string& path) {
   }
   // Does not wait for the reader of a pipe.
   return open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NONBLOCK, 0666);
+}
+
+// Of BT.709, times the range of the result over 255, in 1/65536.
+constexpr int kBits = 16;
+constexpr double kOne = 1 << kBits;
+constexpr double kR = 0.2126, kG = 0.7152, kB = 0.0722;
+constexpr double kLuma = 219.0 / 255.0 * kOne;
+constexpr double kCb = 224.0 / 255.0 / 1.8556 * kOne;
+constexpr double kCr = 224.0 / 255.0 / 1.5748 * kOne;
+
+struct Weights {
+  std::int32_t r, g, b;
+};
+constexpr std::int32_t nearest(double x) {
+  return static_cast<std::int32_t>(x < 0.0 ? x - 0.5 : x + 0.5);
+}
+constexpr Weights kToY{nearest(kR * kLuma), nearest(kG* kLuma), nearest(kB* kLuma)};
+constexpr Weights kToCb{nearest(-kR * kCb), nearest(-kG* kCb), nearest((1.0 - kB) * kCb)};
+constexpr Weights kToCr{nearest((1.0 - kR) * kCr), nearest(-kG* kCr), nearest(-kB* kCr)};
+
+/// Of the mean of 2^`halvings` pixels, whose sums are given.
+std::uint8_t value(const Weights& weight, std::int32_t r, std::int32_t g, std::int32_t b,
+                   std::int32_t zero, int halvings) {
+  const std::int32_t sum = weight.r * r + weight.g * g + weight.b * b;
+  const int shift = kBits + halvings;
+  return static_cast<std::uint8_t>(zero + ((sum + (1 << (shift - 1))) >> shift));
 }
 
 }  // namespace
@@ -86,6 +113,35 @@ void VideoFile::write_frame(std::span<const std::uint8_t> yuv) {
   write(yuv);
   ++frames_;
   whole_bytes_ = written_bytes_;
+}
+
+void fill_yuv420(PictureSize size, std::span<const std::uint8_t> rgb,
+                 std::vector<std::uint8_t>& yuv) {
+  const auto width = static_cast<std::size_t>(size.width);
+  const auto height = static_cast<std::size_t>(size.height);
+  const std::size_t half_width = (width + 1) / 2;
+  const std::size_t half_height = (height + 1) / 2;
+  yuv.resize(width * height + 2 * half_width * half_height);
+  for (std::size_t i = 0; i < width * height; ++i) {
+    yuv[i] = value(kToY, rgb[3 * i], rgb[3 * i + 1], rgb[3 * i + 2], 16, 0);
+  }
+  std::uint8_t* cb = yuv.data() + width * height;
+  std::uint8_t* cr = cb + half_width * half_height;
+  for (std::size_t y = 0; y < height; y += 2) {
+    const std::uint8_t* const upper = rgb.data() + 3 * width * y;
+    const std::uint8_t* const lower = y + 1 < height ? upper + 3 * width : upper;
+    for (std::size_t x = 0; x < width; x += 2) {
+      const std::size_t left = 3 * x;
+      const std::size_t right = 3 * std::min(x + 1, width - 1);
+      const auto sum = [&](std::size_t colour) {
+        return upper[left + colour] + upper[right + colour] + lower[left + colour] +
+               lower[right + colour];
+      };
+      const std::int32_t r = sum(0), g = sum(1), b = sum(2);
+      *cb++ = value(kToCb, r, g, b, 128, 2);
+      *cr++ = value(kToCr, r, g, b, 128, 2);
+    }
+  }
 }
 
 }  // namespace kerf

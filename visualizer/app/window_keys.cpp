@@ -1,14 +1,44 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "visualizer/app/window_keys.hpp"
 
+#include <array>
 #include <chrono>
+#include <cstdio>
+#include <filesystem>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "visualizer/error.hpp"
 #include "visualizer/render/renderer_choice.hpp"
+#include "visualizer/surface/mesh_file.hpp"
+#include "visualizer/view/file_out.hpp"
+#include "visualizer/view/transfer_file.hpp"
 
 namespace kerf {
+namespace {
+
+/// kerf-0001 and so on in `folder`, which is made where it is missing.
+std::filesystem::path unused_file(const std::filesystem::path& folder, const char* ending) {
+  make_folder(folder);
+  for (int i = 1;; ++i) {
+    std::array<char, 32> name{};
+    std::snprintf(name.data(), name.size(), "kerf-%04d%s", i, ending);
+    if (!std::filesystem::exists(folder / name.data())) return folder / name.data();
+  }
+}
+
+/// `write` returns the file it wrote.
+template <typename Write>
+Notice write_for_user(const std::string& what, const Write& write) {
+  try {
+    return {what + ": " + write().string()};
+  } catch (const std::runtime_error& problem) {
+    return {problem.what(), true};
+  }
+}
+
+}  // namespace
 
 using Clock = std::chrono::steady_clock;
 
@@ -56,6 +86,46 @@ bool WindowKeys::apply(const WindowInput& input, Session& session, Picture& pict
   }
   change_look(picture, session, look, notices);
   return quit;
+}
+
+Notice take_screenshot(const VisualizerOptions& options, const RenderTarget& target) {
+  return write_for_user("screenshot", [&] {
+    const std::filesystem::path file = unused_file(options.out, ".png");
+    write_png(file, target.size(), target.read_rgb());
+    return file;
+  });
+}
+
+Notice toggle_film(const VisualizerOptions& options, PictureSize size, std::optional<Film>& film) {
+  if (film) {
+    const VideoFile& file = film->file();
+    const Notice ended{"video: " + file.path() + ": " + std::to_string(file.frames()) + " frames"};
+    film.reset();
+    return ended;
+  }
+  return write_for_user("video begins", [&] {
+    const std::filesystem::path file = unused_file(options.out, ".y4m");
+    film.emplace(file.string(), size, options.video_hz);
+    return file;
+  });
+}
+
+Notice write_opacities(const VisualizerOptions& options, const Picture& picture) {
+  return write_for_user("opacities", [&] {
+    const std::filesystem::path file =
+        options.transfer ? *options.transfer : unused_file(options.out, ".toml");
+    write_transfer(file, picture.opacities());
+    return file;
+  });
+}
+
+Notice export_mesh(const VisualizerOptions& options, const Session& session) {
+  return write_for_user("surface", [&] {
+    const std::filesystem::path file =
+        options.mesh ? *options.mesh : unused_file(options.out, ".ply");
+    export_surface(file, session.scene(), session.contents());
+    return file;
+  });
 }
 
 }  // namespace kerf

@@ -3,26 +3,21 @@
 #include <chrono>
 #include <limits>
 #include <optional>
-#include <string>
 #include <thread>
 #include <utility>
 
 #include "shared/posix/new_file.hpp"
 #include "shared/posix/stop_signals.hpp"
-#include "visualizer/app/cpu_placement.hpp"
-#include "visualizer/app/export_surface.hpp"
 #include "visualizer/app/film.hpp"
 #include "visualizer/app/force_plot.hpp"
-#include "visualizer/app/notices.hpp"
 #include "visualizer/app/picture.hpp"
 #include "visualizer/app/run.hpp"
-#include "visualizer/app/shown_rates.hpp"
-#include "visualizer/app/user_files.hpp"
+#include "visualizer/app/window_figures.hpp"
 #include "visualizer/app/window_keys.hpp"
 #include "visualizer/gl/window.hpp"
 #include "visualizer/render/renderer_choice.hpp"
+#include "visualizer/surface/mesh_file.hpp"
 #include "visualizer/view/frame_report.hpp"
-#include "visualizer/view/transfer_file.hpp"
 
 namespace kerf {
 
@@ -46,7 +41,7 @@ class FollowedSession {
   FollowedSession(const VisualizerOptions& options, Session first, double aspect)
       : options_(options),
         session_(std::move(first)),
-        picture_(std::in_place, session_, first_look(options), aspect) {}
+        picture_(std::in_place, session_, options.look, aspect) {}
 
   [[nodiscard]] Session& session() noexcept { return session_; }
   [[nodiscard]] Picture& picture() noexcept { return *picture_; }
@@ -92,7 +87,7 @@ class WindowRun {
   WindowRun(const VisualizerOptions& options, Session first)
       : options_(options),
         record_from_start_(options.record.has_value()),
-        report_{.renderer = options.renderer, .attach_ms = first.attach_ms()},
+        report_{.renderer = options.look.renderer, .attach_ms = first.attach_ms()},
         window_(options.size, Window::Visibility::shown),
         aspect_(static_cast<double>(options.size.width) / options.size.height),
         followed_(options, std::move(first), aspect_) {
@@ -192,11 +187,7 @@ int run_window(const VisualizerOptions& options) {
   place_process(options.cpus);
   if (options.mesh) check_export(*options.mesh);
   if (options.report) check_new_file(*options.report);
-  Session first = Session::attach(options.name, std::chrono::duration<double>(options.wait_s));
-  if (options.transfer) {
-    check_materials(options.opacities, first.scene(), options.transfer->string());
-  }
-  WindowRun run(options, std::move(first));
+  WindowRun run(options, attach(options));
   constexpr double kMsPerS = 1e3;
   const double end_ms = options.seconds.value_or(std::numeric_limits<double>::infinity()) * kMsPerS;
   auto next_frame = Clock::now();

@@ -7,6 +7,8 @@
 
 #include <glm/gtc/matrix_transform.hpp>
 
+#include "shared/volume/voxel_loops.hpp"
+
 namespace kerf {
 
 namespace {
@@ -68,26 +70,18 @@ double density_at(glm::dvec3 at, double edge) {
 /// The box of what is not air, with one voxel around.
 VoxelBox body_of(const VoxelGrid& grid, const std::vector<Density>& density) {
   VoxelBox body;
-  for (int z = 0; z < grid.nz; ++z) {
-    for (int y = 0; y < grid.ny; ++y) {
-      for (int x = 0; x < grid.nx; ++x) {
-        if (density[grid.index(x, y, z)] == 0) continue;
-        body = body.united({{x, y, z}, {x + 1, y + 1, z + 1}});
-      }
-    }
-  }
+  for_each_voxel(grid.box(), [&](int x, int y, int z) {
+    if (density[grid.index(x, y, z)] == 0) return;
+    body = body.united({{x, y, z}, {x + 1, y + 1, z + 1}});
+  });
   return body.grown(1).clipped(grid.box());
 }
 
 std::vector<Density> crop(const VoxelGrid& grid, const std::vector<Density>& density,
                           const VoxelBox& box) {
   std::vector<Density> cropped;
-  for (int z = box.lo.z; z < box.hi.z; ++z) {
-    for (int y = box.lo.y; y < box.hi.y; ++y) {
-      const auto row = density.begin() + static_cast<std::ptrdiff_t>(grid.index(box.lo.x, y, z));
-      cropped.insert(cropped.end(), row, row + box.extent().x);
-    }
-  }
+  for_each_voxel(box,
+                 [&](int x, int y, int z) { cropped.push_back(density[grid.index(x, y, z)]); });
   return cropped;
 }
 
@@ -98,14 +92,10 @@ BenchTooth::BenchTooth(const VoxelGrid& padded, bool cropped) {
   const double edge = 1.0 / grid.nz;
   const glm::dvec3 middle = 0.5 * glm::dvec3(grid.nx - 1, grid.ny - 1, 0);
   density_.reserve(grid.voxel_count());
-  for (int z = 0; z < grid.nz; ++z) {
-    for (int y = 0; y < grid.ny; ++y) {
-      for (int x = 0; x < grid.nx; ++x) {
-        const double share = density_at((glm::dvec3(x, y, z) - middle) * edge, edge);
-        density_.push_back(static_cast<Density>(std::lround(share * kDensityMax)));
-      }
-    }
-  }
+  for_each_voxel(grid.box(), [&](int x, int y, int z) {
+    const double share = density_at((glm::dvec3(x, y, z) - middle) * edge, edge);
+    density_.push_back(static_cast<Density>(std::lround(share * kDensityMax)));
+  });
   // The crown is up in the world, and the side of low y faces the camera.
   const double edge_mm = edge * kHeightMm;
   VolumeView whole;
@@ -137,15 +127,10 @@ BenchCut BenchTooth::cut(int diameter) {
                            .grown(diameter / 2)
                            .clipped(grid.box());
   BenchCut cut;
-  const VoxelBox touched = bricks.bricks_of(box);
-  for (int z = touched.lo.z; z < touched.hi.z; ++z) {
-    for (int y = touched.lo.y; y < touched.hi.y; ++y) {
-      for (int x = touched.lo.x; x < touched.hi.x; ++x) {
-        cut.bricks.push_back(bricks.id({x, y, z}));
-        take_ball(bricks.voxels(cut.bricks.back()), centre, radius, cut.differs);
-      }
-    }
-  }
+  for_each_voxel(bricks.bricks_of(box), [&](int x, int y, int z) {
+    cut.bricks.push_back(bricks.id({x, y, z}));
+    take_ball(bricks.voxels(cut.bricks.back()), centre, radius, cut.differs);
+  });
   return cut;
 }
 
@@ -161,17 +146,13 @@ void BenchTooth::take_ball(const VoxelBox& brick, VoxelIndex centre, double radi
         VoxelBox{lo, {lo.x + kDiffersEdge, lo.y + kDiffersEdge, lo.z + kDiffersEdge}}.clipped(
             brick);
     VoxelBox around;
-    for (int z = box.lo.z; z < box.hi.z; ++z) {
-      for (int y = box.lo.y; y < box.hi.y; ++y) {
-        for (int x = box.lo.x; x < box.hi.x; ++x) {
-          const glm::dvec3 off(x - centre.x, y - centre.y, z - centre.z);
-          Density& at = density_[view().bricks.grid.index(x, y, z)];
-          if (glm::length(off) > radius || at == 0) continue;
-          at = 0;
-          around = around.united({{x, y, z}, {x + 1, y + 1, z + 1}});
-        }
-      }
-    }
+    for_each_voxel(box, [&](int x, int y, int z) {
+      const glm::dvec3 off(x - centre.x, y - centre.y, z - centre.z);
+      Density& at = density_[view().bricks.grid.index(x, y, z)];
+      if (glm::length(off) > radius || at == 0) return;
+      at = 0;
+      around = around.united({{x, y, z}, {x + 1, y + 1, z + 1}});
+    });
     if (!around.empty()) differs.push_back(around);
   }
 }

@@ -156,9 +156,8 @@ std::string gradient_table(const PictureFigures& figures) {
     std::array<char, 96> angles{};
     std::snprintf(angles.data(), angles.size(), " | %.2f | %.2f | ", gradient.angle_deg,
                   gradient.noisy_angle_deg);
-    table += "| " + std::string(kGradientNames[static_cast<std::size_t>(gradient.gradient)]) +
-             angles.data() + cpu(0, false) + " | " + cpu(16, false) + " | " + cpu(16, true) +
-             " |\n";
+    table += "| " + std::string(name_of(gradient.gradient)) + angles.data() + cpu(0, false) +
+             " | " + cpu(16, false) + " | " + cpu(16, true) + " |\n";
   }
   return table;
 }
@@ -188,10 +187,10 @@ std::string picture_report(const PictureFigures& figures) {
   Json rows = Json::List{};
   for (const PictureRow& row : figures.rows) {
     rows.push_back({{"renderer", row.renderer},
-                    {"gradient", kGradientNames[static_cast<std::size_t>(row.gradient)]},
+                    {"gradient", name_of(row.gradient)},
                     {"volume", name_of(row.volume)},
                     {"tool", row.tool},
-                    {"modifying", row.modifying},
+                    {"modifying", row.tool > 0},
                     {"cropped", row.cropped},
                     {"partial", row.partial},
                     {"fps", row.fps()},
@@ -201,7 +200,7 @@ std::string picture_report(const PictureFigures& figures) {
   }
   Json gradients = Json::List{};
   for (const GradientRow& row : figures.gradients) {
-    gradients.push_back({{"gradient", kGradientNames[static_cast<std::size_t>(row.gradient)]},
+    gradients.push_back({{"gradient", name_of(row.gradient)},
                          {"angle_deg", row.angle_deg},
                          {"noisy_angle_deg", row.noisy_angle_deg}});
   }

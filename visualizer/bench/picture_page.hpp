@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "visualizer/bench/gradient_rows.hpp"
+#include "visualizer/bench/normal_errors.hpp"
 #include "visualizer/bench/picture_rows.hpp"
 
 namespace kerf {

@@ -121,7 +121,6 @@ std::vector<PictureRow> measure_pictures(
       if (stop_requested()) return rows;
       PictureRow row = subject;
       row.tool = change.tool;
-      row.modifying = change.tool > 0;
       row.partial = change.partial;
       progress(row.renderer, static_cast<int>(rows.size()), all);
       Stage(row, tooth, size).measure(change, row);  // each cuts a whole tooth

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "shared/volume/voxel_grid.hpp"
-#include "visualizer/gl/target.hpp"
 #include "visualizer/view/gradient.hpp"
+#include "visualizer/view/pixel_rect.hpp"
 
 namespace kerf {
 
@@ -16,8 +16,7 @@ struct PictureRow {
   std::string renderer;
   Gradient gradient = Gradient::corners;
   VoxelGrid volume;          ///< as the paper names it, before any crop
-  int tool = 0;              ///< voxels across; 0: nothing is cut
-  bool modifying = false;    ///< a ball of the tool's size is cut before each frame
+  int tool = 0;              ///< voxels across: a ball is cut before each frame; 0: none
   bool cropped = false;      ///< only the tooth's box
   bool partial = false;      ///< only what the cut can change is drawn again; else all
   double cpu_ms = 0.0;       ///< median, over all threads

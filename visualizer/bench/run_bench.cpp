@@ -6,7 +6,6 @@
 #include "shared/posix/new_file.hpp"
 #include "shared/posix/page_part.hpp"
 #include "shared/posix/stop_signals.hpp"
-#include "visualizer/app/cpu_placement.hpp"
 #include "visualizer/app/run.hpp"
 #include "visualizer/bench/picture_page.hpp"
 #include "visualizer/gl/context.hpp"

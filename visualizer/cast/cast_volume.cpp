@@ -6,10 +6,10 @@
 #include <limits>
 #include <string>
 
+#include <glm/gtc/matrix_access.hpp>
 #include <glm/gtc/matrix_inverse.hpp>
 #include <glm/gtc/matrix_transform.hpp>
 
-#include "visualizer/cast/cast_eye.hpp"
 #include "visualizer/error.hpp"
 
 namespace kerf {
@@ -20,7 +20,7 @@ constexpr float kMost = 0.996F;  // opacity: 1 has no finite extinction
 constexpr double kBorder = 1.0;  // voxels of air around the volume: voxel v is at v + 1
 
 /// Samples below show nothing.
-Density least_visible(CastMode mode, const VolumeView& volume, const CastMatter& matter) {
+Density least_visible(CastMode mode, const VolumeView& volume, const TransferFunction& matter) {
   if (mode == CastMode::iso) return volume.iso;
   return static_cast<Density>(std::max(1.0, std::floor(matter.empty * kDensityMax)));
 }
@@ -67,22 +67,12 @@ void CastVolume::set_materials(const Palette& materials) {
   settled_ = static_cast<float>(first) / static_cast<float>(by_density.size() - 1);
 }
 
-double CastVolume::edge_mm() const {
-  return std::min({glm::length(world_from_voxel_[0]), glm::length(world_from_voxel_[1]),
-                   glm::length(world_from_voxel_[2])});
-}
-
 std::optional<BoxCorners> CastVolume::body() const {
   if (body_.empty()) return std::nullopt;
-  const auto& [low, high] = body_;
-  BoxCorners corners;
-  for (std::size_t i = 0; i < corners.size(); ++i) {
-    const glm::ivec3 cell((i & 1) != 0 ? high.x : low.x, (i & 2) != 0 ? high.y : low.y,
-                          (i & 4) != 0 ? high.z : low.z);
-    const glm::dvec3 voxel = glm::dvec3(kCastCellVox * cell) - kBorder;
-    corners[i] = glm::dvec3(world_from_voxel_ * glm::dvec4(voxel, 1.0));
-  }
-  return corners;
+  const auto voxel = [](const VoxelIndex& cell) {
+    return glm::dvec3(kCastCellVox * glm::ivec3(cell.x, cell.y, cell.z)) - kBorder;
+  };
+  return box_corners(voxel(body_.lo), voxel(body_.hi), world_from_voxel_);
 }
 
 void CastVolume::update_bricks(std::span<const Density> density,
@@ -187,6 +177,33 @@ CastVolumeJob CastVolume::job(const View& view, std::int32_t width, std::int32_t
   put(job.origin, glm::dvec3(place_from_eye[3]));
   put(job.from_eye, glm::dmat3(place_from_eye));
   return job;
+}
+
+CastEye cast_eye(const View& view, std::int32_t width, std::int32_t height) {
+  CastEye eye;
+  eye.width = width;
+  eye.height = height;
+  eye.half_width_at_1mm = static_cast<float>(view.tan_half_height * view.aspect);
+  eye.half_height_at_1mm = static_cast<float>(view.tan_half_height);
+  eye.middle_right_at_1mm = static_cast<float>(view.middle_right);
+  eye.near_mm = static_cast<float>(view.near_mm);
+  eye.far_mm = static_cast<float>(view.far_mm);
+  // Equation (1) as depth_far - depth_slope / t.
+  const double span_mm = view.far_mm - view.near_mm;
+  eye.depth_far = static_cast<float>(view.far_mm / span_mm);
+  eye.depth_slope = static_cast<float>(view.far_mm * view.near_mm / span_mm);
+  // A plane goes over by the transposed inverse.
+  const glm::dvec4 shown = glm::transpose(glm::affineInverse(view.eye_from_world)) * view.shown;
+  for (int i = 0; i < 4; ++i) eye.shown[i] = static_cast<float>(shown[i]);
+  return eye;
+}
+
+void put(float (&to)[3], const glm::dvec3& from) {
+  for (int i = 0; i < 3; ++i) to[i] = static_cast<float>(from[i]);
+}
+
+void put(float (&to)[3][3], const glm::dmat3& from) {
+  for (int i = 0; i < 3; ++i) put(to[i], glm::row(from, i));
 }
 
 }  // namespace kerf

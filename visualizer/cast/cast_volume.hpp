@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -12,28 +11,28 @@
 #include "visualizer/cast/gradient_rows.hpp"
 #include "visualizer/cast/macrocells.hpp"
 #include "visualizer/cast/paired_rows.hpp"
-#include "visualizer/view/palette.hpp"
+#include "visualizer/view/camera.hpp"
 #include "visualizer/view/scene_view.hpp"
+#include "visualizer/view/transfer_function.hpp"
 
 namespace kerf {
 
+/// `view` as the kernels take it, for a picture of `width` x `height` pixels.
+[[nodiscard]] CastEye cast_eye(const View& view, std::int32_t width, std::int32_t height);
+
+/// `from` into what the kernels read.
+void put(float (&to)[3], const glm::dvec3& from);
+/// [to][from], so that a row makes one part of a place.
+void put(float (&to)[3][3], const glm::dmat3& from);
+
 /// Rays end at the iso-surface, or go on through what is translucent.
 enum class CastMode : std::uint8_t { iso, blend };
-
-/// What the voxels of a volume look like.
-struct CastMatter {
-  /// Linear colour, and opacity over one voxel edge in the fourth place: row 0 by density (entry i
-  /// is density i/255), row 1 by label.
-  Palette materials{};
-  double empty = 0.0;  ///< blend: density up to which nothing is seen
-  double full = 1.0;   ///< blend: density from which the material is seen whole
-};
 
 /// One volume, whole.
 struct CastContent {
   std::span<const Density> density;
   std::span<const Label> labels;  ///< empty, or one per voxel
-  CastMatter matter;
+  TransferFunction matter;
 };
 
 /// A volume as the ray caster keeps it; whole once, then bricks only.
@@ -51,7 +50,7 @@ class CastVolume {
   /// Other colours and opacities.
   void set_materials(const Palette& materials);
 
-  [[nodiscard]] double edge_mm() const;  ///< the shortest
+  [[nodiscard]] double edge_mm() const { return shortest_edge_mm(world_from_voxel_); }
   /// A box around all that can be seen of it; nothing can where there is none.
   [[nodiscard]] std::optional<BoxCorners> body() const;
   /// For a part of a picture of `width` x `height`; good until the next call of anything.
@@ -67,9 +66,9 @@ class CastVolume {
 
   BrickGrid bricks_;
   glm::dmat4 world_from_voxel_;
-  CastMatter matter_;     ///< extinction in place of opacity
-  float settled_ = 1.0F;  ///< `CastVolumeJob::settled`
-  float iso_;             ///< 0..1
+  TransferFunction matter_;  ///< extinction in place of opacity
+  float settled_ = 1.0F;     ///< `CastVolumeJob::settled`
+  float iso_;                ///< 0..1
   PairedRows<Density, std::uint32_t> density_;
   std::optional<PairedRows<Label, std::uint16_t>> labels_;
   std::optional<GradientRows> gradient_;  ///< blend only

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <string>
 
-#include "visualizer/cast/cast_eye.hpp"
+#include "shared/posix/cores.hpp"
 #include "visualizer/error.hpp"
 
 namespace kerf {
@@ -56,8 +56,7 @@ void Caster::set_materials(const Palette& materials) {
 
 void Caster::draw(const View& view, std::span<const PixelRect> parts, CastPicture& picture,
                   std::span<const float> end_depth, std::span<float> normals) {
-  PixelRect bounds;
-  for (const PixelRect& part : parts) bounds = bounds.united(part);
+  const PixelRect bounds = united(parts);
   CastJob job;
   double shortest_mm = view.far_mm;
   for (CastVolume& volume : volumes_) {
@@ -87,6 +86,45 @@ void Caster::draw(const View& view, std::span<const PixelRect> parts, CastPictur
   }
   pool_.run(static_cast<std::uint32_t>(tiles_.size()),
             [&](std::uint32_t tile) { cast(job, tiles_[tile]); });
+}
+
+int TilePool::default_workers() {
+  return static_cast<int>(allowed_cores().size()) - 1;
+}
+
+TilePool::TilePool(int workers) {
+  for (int i = 0; i < workers; ++i) workers_.emplace_back([this] { wait_for_work(); });
+}
+
+TilePool::~TilePool() {
+  round_.fetch_add(1);
+  round_.notify_all();
+}
+
+void TilePool::run(std::uint32_t count, const std::function<void(std::uint32_t)>& work) {
+  work_ = &work;
+  count_ = count;
+  next_ = 0;
+  busy_ = static_cast<std::uint32_t>(workers_.size());
+  round_.fetch_add(2);
+  round_.notify_all();
+  take_pieces();
+  for (std::uint32_t busy = busy_; busy != 0; busy = busy_) busy_.wait(busy);
+}
+
+void TilePool::wait_for_work() {
+  std::uint32_t round = 0;
+  while (true) {
+    round_.wait(round);
+    round = round_;
+    if (round % 2 != 0) return;
+    take_pieces();
+    if (busy_.fetch_sub(1) == 1) busy_.notify_all();
+  }
+}
+
+void TilePool::take_pieces() {
+  for (std::uint32_t i = next_++; i < count_; i = next_++) (*work_)(i);
 }
 
 }  // namespace kerf

@@ -1,15 +1,45 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <atomic>
 #include <cstdint>
+#include <functional>
 #include <span>
+#include <thread>
 #include <vector>
 
 #include "visualizer/cast/cast_volume.hpp"
-#include "visualizer/cast/tile_pool.hpp"
 #include "visualizer/view/camera.hpp"
 
 namespace kerf {
+
+/// Threads that share out numbered pieces of work, as many as this process has cores when the pool
+/// is made: `place_process` has taken the servo's core away by then. The caller works too, so one
+/// core needs no thread.
+class TilePool {
+ public:
+  /// `workers` beside the caller; by default one less than the cores.
+  explicit TilePool(int workers = default_workers());
+  TilePool(const TilePool&) = delete;
+  TilePool& operator=(const TilePool&) = delete;
+  ~TilePool();
+
+  /// Calls `work(i)` once for each i in 0..count-1, on any thread, and returns after the last. One
+  /// caller at a time; `work` must not throw.
+  void run(std::uint32_t count, const std::function<void(std::uint32_t)>& work);
+
+ private:
+  [[nodiscard]] static int default_workers();
+  void wait_for_work();
+  void take_pieces();
+
+  const std::function<void(std::uint32_t)>* work_ = nullptr;
+  std::uint32_t count_ = 0;
+  std::atomic<std::uint32_t> next_{0};
+  std::atomic<std::uint32_t> round_{0};  ///< odd: the pool ends
+  std::atomic<std::uint32_t> busy_{0};   ///< workers that have not finished this round
+  std::vector<std::jthread> workers_;
+};
 
 /// What the ray caster draws into. Rows from the bottom up, as GL has them.
 struct CastPicture {
@@ -50,7 +80,7 @@ class Caster {
 
   /// What each picture shows is in one of these boxes.
   [[nodiscard]] std::vector<BoxCorners> bodies() const;
-  /// Other colours and opacities for all volumes, as in `CastMatter`.
+  /// Other colours and opacities for all volumes, as in `TransferFunction`.
   void set_materials(const Palette& materials);
 
   /// Draws `parts` of the picture; the rest of it stays. Rays of blend end at `end_depth` (window

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "shared/segment/brick_grid.hpp"
+#include "shared/volume/voxel_loops.hpp"
 
 namespace kerf {
 
@@ -13,13 +13,8 @@ Macrocells::Macrocells(VoxelGrid volume, std::span<const Density> density, Densi
       edge_(edge),
       grid_{volume.nx / edge + 1, volume.ny / edge + 1, volume.nz / edge + 1},
       iso_(iso),
-      maxima_(grid_.voxel_count()),
       active_(grid_.voxel_count()) {
-  for (std::int32_t z = 0; z < grid_.nz; ++z) {
-    for (std::int32_t y = 0; y < grid_.ny; ++y) {
-      for (std::int32_t x = 0; x < grid_.nx; ++x) update_cell({x, y, z}, density);
-    }
-  }
+  for_each_voxel(grid_.box(), [&](int x, int y, int z) { update_cell({x, y, z}, density); });
 }
 
 bool Macrocells::update_cell(VoxelIndex cell, std::span<const Density> density) {
@@ -36,7 +31,6 @@ bool Macrocells::update_cell(VoxelIndex cell, std::span<const Density> density) 
   }
   const std::size_t at = grid_.index(cell.x, cell.y, cell.z);
   const std::uint8_t before = active_[at];
-  maxima_[at] = highest;
   active_[at] = highest >= iso_ ? 1 : 0;
   return active_[at] != before;
 }
@@ -53,13 +47,7 @@ VoxelBox Macrocells::update_bricks(const BrickGrid& bricks, std::span<const std:
         {at.x * per_brick, at.y * per_brick, at.z * per_brick},
         {beyond(at.x), beyond(at.y),
          beyond(at.z)}}.clipped(grid_.box());
-    for (std::int32_t z = cells.lo.z; z < cells.hi.z; ++z) {
-      for (std::int32_t y = cells.lo.y; y < cells.hi.y; ++y) {
-        for (std::int32_t x = cells.lo.x; x < cells.hi.x; ++x) {
-          touched.push_back(grid_.index(x, y, z));
-        }
-      }
-    }
+    for_each_voxel(cells, [&](int x, int y, int z) { touched.push_back(grid_.index(x, y, z)); });
   }
   std::sort(touched.begin(), touched.end());
   touched.erase(std::unique(touched.begin(), touched.end()), touched.end());
@@ -80,19 +68,15 @@ std::vector<std::array<std::uint16_t, 4>> Macrocells::boundary_faces(const Voxel
     return grid_.contains(c) && active_[grid_.index(c.x, c.y, c.z)] != 0;
   };
   std::vector<std::array<std::uint16_t, 4>> faces;
-  for (std::int32_t z = cells.lo.z; z < cells.hi.z; ++z) {
-    for (std::int32_t y = cells.lo.y; y < cells.hi.y; ++y) {
-      for (std::int32_t x = cells.lo.x; x < cells.hi.x; ++x) {
-        if (!is_active({x, y, z})) continue;
-        for (std::size_t face = 0; face < kNeighbour.size(); ++face) {
-          const VoxelIndex n = kNeighbour[face];
-          if (is_active({x + n.x, y + n.y, z + n.z})) continue;
-          faces.push_back({static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y),
-                           static_cast<std::uint16_t>(z), static_cast<std::uint16_t>(face)});
-        }
-      }
+  for_each_voxel(cells, [&](int x, int y, int z) {
+    if (!is_active({x, y, z})) return;
+    for (std::size_t face = 0; face < kNeighbour.size(); ++face) {
+      const VoxelIndex n = kNeighbour[face];
+      if (is_active({x + n.x, y + n.y, z + n.z})) continue;
+      faces.push_back({static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y),
+                       static_cast<std::uint16_t>(z), static_cast<std::uint16_t>(face)});
     }
-  }
+  });
   return faces;
 }
 

@@ -10,11 +10,11 @@
 
 namespace kerf {
 
-/// The highest density in each cell of e^3 voxel edges, so that rays pass over cells that cannot
-/// hold the iso-surface.
+/// Which cells of e^3 voxel edges have a density of iso or more, so that rays pass over those that
+/// cannot hold the iso-surface.
 ///
 /// Air surrounds the volume: its surface is closed at the border too. Cell (i, j, k) spans voxel
-/// coordinates ei-1 to ei+e-1 on each axis and its maximum covers both ends, so it bounds every
+/// coordinates ei-1 to ei+e-1 on each axis with both ends, so its highest density bounds every
 /// trilinear sample in the cell. A changed brick (voxels 8b to 8b+7) touches cells 8b/e to
 /// 8(b+1)/e.
 class Macrocells {
@@ -31,7 +31,6 @@ class Macrocells {
                          std::span<const Density> density);
 
   [[nodiscard]] const VoxelGrid& grid() const noexcept { return grid_; }
-  [[nodiscard]] std::span<const Density> maxima() const noexcept { return maxima_; }
   /// 1 where a sample may reach iso.
   [[nodiscard]] std::span<const std::uint8_t> active() const noexcept { return active_; }
 
@@ -51,7 +50,6 @@ class Macrocells {
   std::int32_t edge_;
   VoxelGrid grid_;
   Density iso_;
-  std::vector<Density> maxima_;
   std::vector<std::uint8_t> active_;
 };
 

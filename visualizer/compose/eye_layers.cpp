@@ -44,7 +44,7 @@ std::vector<PixelRect> EyeLayers::draw(const Stale& stale, ScenePainter& painter
   painter.renderers().set_moving(stale.now.moving);
   if (!stale.now.moving) {
     coarse_.clear();
-  } else if (painter.renderers().coarse_while_moving()) {
+  } else if (painter.renderers().any(&Renderer::coarse_while_moving)) {
     for (const PixelRect& part : stale.stage) coarse_.mark(part);
   }
   if (stale.now.hand) painter.hold(*stale.now.hand);
@@ -72,14 +72,7 @@ void EyeLayers::draw_stage(const Stale& stale, ScenePainter& painter) {
   const auto& [view, moving, hand] = stale.now;
   std::vector<PixelRect> of_hand;  // a mesh costs its vertices for each part
   if (hand) {
-    PixelRect bounds;
-    for (const PixelRect& part : painter.bounds(*hand, view, stage_.size())) {
-      bounds = bounds.united(part);
-    }
-    for (const PixelRect& part : stale.stage) {
-      const PixelRect both = part.clipped(bounds);
-      if (!both.empty()) of_hand.push_back(both);
-    }
+    of_hand = clipped(stale.stage, united(painter.bounds(*hand, view, stage_.size())));
     stage_.restrict_to(of_hand);
     painter.draw_tool(*hand, view, stage_);
   }
@@ -88,6 +81,26 @@ void EyeLayers::draw_stage(const Stale& stale, ScenePainter& painter) {
   if (!hand) return;
   stage_.restrict_to(of_hand);
   painter.draw_force(*hand, view, stage_);
+}
+
+void ScreenPasses::draw_backdrop(const RenderTarget& target) {
+  target.bind();
+  glEnable(GL_DEPTH_TEST);
+  glDepthFunc(GL_ALWAYS);
+  glDisable(GL_BLEND);
+  backdrop_.use();
+  target.cover();
+  glDepthFunc(GL_LESS);
+}
+
+void ScreenPasses::smooth_edges(const RenderTarget& from, const RenderTarget& to) {
+  to.bind();
+  glDisable(GL_DEPTH_TEST);
+  glDisable(GL_BLEND);
+  glBindTextureUnit(0, from.colour_texture());
+  smooth_.set("u_picture", 0);
+  smooth_.use();
+  to.cover();
 }
 
 }  // namespace kerf

@@ -6,9 +6,25 @@
 #include <vector>
 
 #include "visualizer/compose/scene_painter.hpp"
-#include "visualizer/render/screen_passes.hpp"
+#include "visualizer/gl/program.hpp"
+#include "visualizer/gl/target.hpp"
 
 namespace kerf {
+
+/// What is drawn as one triangle over the whole picture, within the parts of its target.
+class ScreenPasses {
+ public:
+  /// Colour, and the depth of the far plane, whatever was there.
+  void draw_backdrop(const RenderTarget& target);
+
+  /// Smooths the edges in `from`. A pixel depends on those up to `kSmoothingReach` away.
+  static constexpr int kSmoothingReach = 3;
+  void smooth_edges(const RenderTarget& from, const RenderTarget& to);
+
+ private:
+  GlProgram backdrop_{"screen.vert", "backdrop.frag"};
+  GlProgram smooth_{"screen.vert", "smooth.frag"};
+};
 
 /// The picture of one eye as it grows, kept from frame to frame: backdrop and opaque volumes, over
 /// them the hand and what is translucent, and all that with smoothed edges. So a hand that moves

@@ -2,9 +2,8 @@
 #include "visualizer/compose/hand_painter.hpp"
 
 #include <limits>
-#include <vector>
 
-#include "visualizer/view/screen_bounds.hpp"
+#include "visualizer/view/camera.hpp"
 
 namespace kerf {
 
@@ -21,16 +20,6 @@ constexpr int kPieces = 6;  // of a tool or an arrow: rectangles that follow it
 
 glm::dmat4 pose_of(const Hand& hand) {
   return rigid(hand.tip_mm, hand.orientation);
-}
-
-BoxCorners corners_of(const glm::dvec3& low, const glm::dvec3& high,
-                      const glm::dmat4& pose = glm::dmat4(1.0)) {
-  BoxCorners corners;
-  for (std::size_t c = 0; c < corners.size(); ++c) {
-    const glm::dvec3 side(c & 1, c >> 1 & 1, c >> 2);
-    corners[c] = glm::dvec3(pose * glm::dvec4(glm::mix(low, high, side), 1.0));
-  }
-  return corners;
 }
 
 }  // namespace
@@ -90,7 +79,7 @@ std::vector<PixelRect> HandPainter::bounds(const Hand& hand, const View& view,
       glm::dvec3 low = tool.low_mm, high = tool.high_mm;
       low.y = glm::mix(tool.low_mm.y, tool.high_mm.y, static_cast<double>(piece) / kPieces);
       high.y = glm::mix(tool.low_mm.y, tool.high_mm.y, (piece + 1.0) / kPieces);
-      bounds.push_back(screen_bounds(corners_of(low, high, pose), view, size));
+      bounds.push_back(screen_bounds(box_corners(low, high, pose), view, size));
     }
   }
   const Arrow arrow = arrow_of(hand);
@@ -100,7 +89,7 @@ std::vector<PixelRect> HandPainter::bounds(const Hand& hand, const View& view,
     const glm::dvec3 from = arrow.foot_mm + arrow.shaft_mm * (static_cast<double>(piece) / kPieces);
     const glm::dvec3 to = arrow.foot_mm + arrow.shaft_mm * ((piece + 1.0) / kPieces);
     bounds.push_back(screen_bounds(
-        corners_of(glm::min(from, to) - around_mm, glm::max(from, to) + around_mm), view, size));
+        box_corners(glm::min(from, to) - around_mm, glm::max(from, to) + around_mm), view, size));
   }
   return bounds;
 }

@@ -2,7 +2,7 @@
 #include "visualizer/compose/scene_painter.hpp"
 
 #include "visualizer/render/renderer_choice.hpp"
-#include "visualizer/view/screen_bounds.hpp"
+#include "visualizer/view/camera.hpp"
 
 namespace kerf {
 
@@ -38,16 +38,16 @@ void ScenePainter::set_cut_open(bool open, std::span<const VolumeContent> conten
 }
 
 void ScenePainter::update(std::size_t volume, const VolumeSnapshot& snapshot) {
-  renderers_.update(volume, snapshot.density, snapshot.changed);
   const auto [renderer, index] = renderers_.of(volume);
+  renderer.update(index, snapshot.density, snapshot.changed);
   stale_[volume].add(renderer, index, snapshot.differs);
 }
 
 void ScenePainter::hold(const Hand& hand) {
   if (!tool_) return;
-  const std::size_t last = volumes_.size();
-  if (tool_->take(hand.tool)) renderers_.update(last, tool_->content().density, tool_->bricks());
-  renderers_.place(last, tool_->world_from_voxel(hand));
+  const auto [renderer, last] = renderers_.of(volumes_.size());
+  if (tool_->take(hand.tool)) renderer.update(last, tool_->content().density, tool_->bricks());
+  renderer.place(last, tool_->world_from_voxel(hand));
 }
 
 void ScenePainter::draw_tool(const Hand& hand, const View& view, const RenderTarget& target) {

@@ -4,7 +4,6 @@
 #include <cstdint>
 #include <vector>
 
-#include "visualizer/gl/target.hpp"
 #include "visualizer/view/pixel_rect.hpp"
 
 namespace kerf {

@@ -7,10 +7,10 @@
 #include <glm/gtc/matrix_inverse.hpp>
 #include <glm/gtc/matrix_transform.hpp>
 
-#include "visualizer/cast/cast_eye.hpp"
+#include "visualizer/cast/cast_volume.hpp"
 #include "visualizer/compose/stale_triangles.hpp"
 #include "visualizer/render/dirty_cells.hpp"
-#include "visualizer/view/screen_bounds.hpp"
+#include "visualizer/view/camera.hpp"
 
 namespace kerf {
 
@@ -64,18 +64,6 @@ std::vector<std::vector<VoxelBox>> clusters_of(std::span<const VoxelBox> boxes) 
     clusters[at].push_back(box);
   }
   return clusters;
-}
-
-/// The pixels whose rays may pass a box in voxel coordinates.
-PixelRect pixels_of(const glm::dvec3& low, const glm::dvec3& high, const VolumeView& volume,
-                    const View& view, PictureSize size) {
-  std::array<glm::dvec3, 8> corners;
-  for (unsigned c = 0; c < corners.size(); ++c) {
-    const glm::dvec4 corner((c & 1) != 0 ? high.x : low.x, (c & 2) != 0 ? high.y : low.y,
-                            (c & 4) != 0 ? high.z : low.z, 1.0);
-    corners[c] = glm::dvec3(volume.world_from_voxel * corner);
-  }
-  return screen_bounds(corners, view, size);
 }
 
 /// The dirty cells of a volume, as one view sees them.
@@ -150,8 +138,10 @@ void StaleVolume::mark(StaleTiles& tiles, const Renderer& renderer, const Volume
   const RayFootprint footprint = renderer.footprint();
   const CastKernels& kernels = *cast_kernels()[0];
   const double taps_vox = footprint.taps_normal ? kLongestTapVox : 0.0;
+  // The pixels whose rays may pass a box in voxel coordinates, or `vox` beside it.
   const auto pixels_around = [&](const glm::dvec3& low, const glm::dvec3& high, double vox) {
-    return pixels_of(low - vox, high + vox, volume, view, kept.size());
+    return screen_bounds(box_corners(low - vox, high + vox, volume.world_from_voxel), view,
+                         kept.size());
   };
   for (const std::vector<VoxelBox>& together : clusters_of(changed_)) {
     if (const auto& [lo, hi] = together.front(); voxels_in({lo, hi}) > kMostTogether) {

@@ -1,16 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "visualizer/compose/tool_volume.hpp"
 
-#include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numeric>
 
 #include <glm/gtc/matrix_transform.hpp>
 
 #include "visualizer/compose/facet_distance.hpp"
 #include "visualizer/error.hpp"
-#include "visualizer/view/palette.hpp"
+#include "visualizer/view/transfer_function.hpp"
 
 namespace kerf {
 
@@ -59,11 +57,6 @@ Outlines closed(Outlines outlines) {
   return outlines;
 }
 
-double shortest_edge_mm(const VolumeView& volume) {
-  const glm::dmat4& m = volume.world_from_voxel;
-  return std::min({glm::length(m[0]), glm::length(m[1]), glm::length(m[2])});
-}
-
 }  // namespace
 
 ToolVolume::ToolVolume(const SceneView& scene)
@@ -89,7 +82,8 @@ ToolVolume::ToolVolume(const SceneView& scene)
     throw VisualizerError(
         "--voxel-tool: the scene has no tool with an extent; leave the option out");
   }
-  edge_mm_ = std::max(shortest_edge_mm(scene.main_volume()), along_mm / kMostAlong);
+  edge_mm_ =
+      std::max(shortest_edge_mm(scene.main_volume().world_from_voxel), along_mm / kMostAlong);
   const auto voxels = [&](double length_mm) {
     return static_cast<std::int32_t>(std::ceil(length_mm / edge_mm_ + 2.0 * kMarginEdges)) + 1;
   };
@@ -168,13 +162,7 @@ std::optional<BoxCorners> ToolVolume::corners(const Hand& hand) const {
   const double radius_mm = extent.radius_mm + margin_mm;
   const glm::dvec3 low(-radius_mm, extent.low_mm - margin_mm, -radius_mm);
   const glm::dvec3 high(radius_mm, extent.high_mm + margin_mm, radius_mm);
-  const glm::dmat4 pose = rigid(hand.tip_mm, hand.orientation);
-  BoxCorners corners;
-  for (std::size_t c = 0; c < corners.size(); ++c) {
-    const glm::dvec3 side(c & 1, c >> 1 & 1, c >> 2);
-    corners[c] = glm::dvec3(pose * glm::dvec4(glm::mix(low, high, side), 1.0));
-  }
-  return corners;
+  return box_corners(low, high, rigid(hand.tip_mm, hand.orientation));
 }
 
 std::vector<std::uint32_t> ToolVolume::bricks() const {

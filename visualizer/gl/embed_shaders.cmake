@@ -11,7 +11,7 @@ endforeach()
 file(WRITE ${OUTPUT} "// Generated from shaders/; edit those.
 #include <array>
 
-#include \"visualizer/gl/shader_texts.hpp\"
+#include \"visualizer/gl/program.hpp\"
 
 namespace kerf {
 

@@ -56,6 +56,12 @@ inline void destroy_program(const GLuint* id) {
 }
 }  // namespace gl_calls
 
+/// Texels are read as they are, without a blend of neighbours.
+inline void read_nearest(GLuint texture) {
+  glTextureParameteri(texture, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
+  glTextureParameteri(texture, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
+}
+
 template <GLenum Target>
 using GlTexture = GlName<gl_calls::create_texture<Target>, gl_calls::destroy<glDeleteTextures>>;
 using GlTexture2D = GlTexture<GL_TEXTURE_2D>;

@@ -36,14 +36,8 @@ RenderTarget::RenderTarget(PictureSize size) : size_(size) {
 }
 
 void RenderTarget::restrict_to(std::span<const PixelRect> parts) {
-  parts_.clear();
-  bounds_ = {};
-  for (const PixelRect& part : parts) {
-    const PixelRect inside = part.clipped(all());
-    if (inside.empty()) continue;
-    parts_.push_back(inside);
-    bounds_ = bounds_.united(inside);
-  }
+  parts_ = clipped(parts, all());
+  bounds_ = united(parts_);
 }
 
 void RenderTarget::scissor(const PixelRect& part) {
@@ -55,6 +49,11 @@ void RenderTarget::bind() const {
   glViewport(0, 0, size_.width, size_.height);
   glEnable(GL_SCISSOR_TEST);
   scissor(bounds_);
+}
+
+void RenderTarget::cover(std::span<const PixelRect> parts) const {
+  glBindVertexArray(no_vertices_.id());
+  for_parts(parts, [] { glDrawArrays(GL_TRIANGLES, 0, 3); });
 }
 
 void RenderTarget::copy(const RenderTarget& from, const PixelRect& part) const {

@@ -44,6 +44,9 @@ class RenderTarget {
     }
     scissor(bounds_);
   }
+  /// Draws one triangle over each of `parts`, with the program in use.
+  void cover(std::span<const PixelRect> parts) const;
+  void cover() const { cover(parts_); }
   /// Takes colour and depth of `part` over from a target of the same size.
   void copy(const RenderTarget& from, const PixelRect& part) const;
   /// Takes the colour of `part` of another target over, to the same place or to one `right` pixels
@@ -65,6 +68,7 @@ class RenderTarget {
   GlTexture2D colour_ = GlTexture2D::create();
   GlTexture2D depth_ = GlTexture2D::create();
   GlFramebuffer framebuffer_ = GlFramebuffer::create();
+  GlVertexArray no_vertices_ = GlVertexArray::create();
 };
 
 }  // namespace kerf

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "visualizer/gl/context.hpp"
-#include "visualizer/gl/pointer.hpp"
 #include "visualizer/gl/target.hpp"
+#include "visualizer/view/pixel_rect.hpp"
 
 struct GLFWwindow;
 

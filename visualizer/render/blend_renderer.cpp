@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "visualizer/render/blend_renderer.hpp"
 
-#include "visualizer/render/view_uniforms.hpp"
+#include "visualizer/gl/program.hpp"
 
 namespace kerf {
 
@@ -29,8 +29,7 @@ void BlendRenderer::draw(const View& view, const RenderTarget& target) {
   entries_.bind(volumes_.free_unit());
   glBindTextureUnit(volumes_.free_unit() + 1, target.depth_texture());
   cast_program_.use();
-  glBindVertexArray(no_vertices_.id());
-  target.for_parts([] { glDrawArrays(GL_TRIANGLES, 0, 3); });
+  target.cover();
   layer_.finish(target);
 }
 

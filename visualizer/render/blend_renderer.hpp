@@ -27,10 +27,10 @@ class BlendRenderer final : public Renderer {
 
   void update(std::size_t volume, std::span<const Density> density,
               std::span<const std::uint32_t> changed) override {
-    volumes_.update(volume, density, changed);
+    volumes_.volumes()[volume].update_bricks(density, changed);
   }
   void place(std::size_t volume, const glm::dmat4& world_from_voxel) override {
-    volumes_.place(volume, world_from_voxel);
+    volumes_.volumes()[volume].place(world_from_voxel);
   }
   void set_opacities(std::span<const MaterialView> materials,
                      std::span<const VolumeContent> contents) override {
@@ -43,7 +43,6 @@ class BlendRenderer final : public Renderer {
   TranslucentVolumes volumes_;
   RayEntries entries_;
   GlProgram cast_program_;
-  GlVertexArray no_vertices_ = GlVertexArray::create();
   TranslucentLayer layer_;
 };
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "visualizer/render/cast_renderer.hpp"
 
-#include "visualizer/view/screen_bounds.hpp"
+#include "visualizer/view/camera.hpp"
 #include "visualizer/view/transfer_function.hpp"
 
 namespace kerf {
@@ -12,10 +12,8 @@ std::vector<CastContent> cast_contents(const SceneView& scene,
                                        std::span<const VolumeContent> contents) {
   std::vector<CastContent> all;
   for (std::size_t i = 0; i < contents.size(); ++i) {
-    const TransferFunction look = make_transfer_function(scene, i, contents[i]);
-    all.push_back({contents[i].density,
-                   contents[i].labels,
-                   {.materials = look.materials, .empty = look.empty, .full = look.full}});
+    all.push_back(
+        {contents[i].density, contents[i].labels, make_transfer_function(scene, i, contents[i])});
   }
   return all;
 }
@@ -51,10 +49,7 @@ CastRenderer::Frame::Frame(PictureSize size) {
   end_depth.resize(picture.depth.size());
   glTextureStorage2D(colour.id(), 1, GL_RGBA8, size.width, size.height);
   glTextureStorage2D(depth.id(), 1, GL_R32F, size.width, size.height);
-  for (const GlTexture2D* texture : {&colour, &depth}) {
-    glTextureParameteri(texture->id(), GL_TEXTURE_MIN_FILTER, GL_NEAREST);
-    glTextureParameteri(texture->id(), GL_TEXTURE_MAG_FILTER, GL_NEAREST);
-  }
+  for (const GlTexture2D* texture : {&colour, &depth}) read_nearest(texture->id());
 }
 
 void CastRenderer::draw(const View& view, const RenderTarget& target) {
@@ -62,16 +57,9 @@ void CastRenderer::draw(const View& view, const RenderTarget& target) {
   if (!frame_ || frame_->picture.width != size.width || frame_->picture.height != size.height) {
     frame_.emplace(size);
   }
-  const PixelRect volumes = bounds(view, size);
-  parts_.clear();
-  PixelRect drawn;
-  for (const PixelRect& part : target.parts()) {
-    const PixelRect shows = part.clipped(volumes);
-    if (shows.empty()) continue;
-    parts_.push_back(shows);
-    drawn = drawn.united(shows);
-  }
+  parts_ = clipped(target.parts(), bounds(view, size));
   if (parts_.empty()) return;
+  const PixelRect drawn = united(parts_);
   const bool ends_at_target = mode_ == CastMode::blend;
   if (ends_at_target) read_end_depth(target, drawn);
   caster_.draw(view, parts_, frame_->picture,
@@ -116,7 +104,6 @@ void CastRenderer::show(const RenderTarget& target) {
   target.bind();
   glBindTextureUnit(0, frame_->colour.id());
   glBindTextureUnit(1, frame_->depth.id());
-  glBindVertexArray(no_vertices_.id());
   program_.use();
   glEnable(GL_DEPTH_TEST);
   glDepthFunc(GL_LESS);
@@ -126,7 +113,7 @@ void CastRenderer::show(const RenderTarget& target) {
   } else {
     glDisable(GL_BLEND);
   }
-  target.for_parts(parts_, [] { glDrawArrays(GL_TRIANGLES, 0, 3); });
+  target.cover(parts_);
 }
 
 }  // namespace kerf

@@ -51,7 +51,6 @@ class CastRenderer final : public Renderer {
   CastMode mode_;
   Caster caster_;
   GlProgram program_{"screen.vert", "cast.frag"};
-  GlVertexArray no_vertices_ = GlVertexArray::create();
   std::optional<Frame> frame_;
   std::vector<PixelRect> parts_;  ///< that are cast in this frame
 };

@@ -9,7 +9,6 @@
 
 #include "shared/volume/voxel_grid.hpp"
 #include "visualizer/cast/dirty_job.hpp"
-#include "visualizer/view/ray_footprint.hpp"
 
 namespace kerf {
 

@@ -7,8 +7,7 @@ namespace kerf {
 
 RayEntries::Buffer::Buffer(PictureSize of_size, int layers) : size(of_size) {
   glTextureStorage3D(entry_mm.id(), 1, GL_R32F, size.width, size.height, layers);
-  glTextureParameteri(entry_mm.id(), GL_TEXTURE_MIN_FILTER, GL_NEAREST);
-  glTextureParameteri(entry_mm.id(), GL_TEXTURE_MAG_FILTER, GL_NEAREST);
+  read_nearest(entry_mm.id());
   glTextureStorage2D(depth.id(), 1, GL_DEPTH_COMPONENT32F, size.width, size.height);
   glNamedFramebufferTexture(framebuffer.id(), GL_DEPTH_ATTACHMENT, depth.id(), 0);
 }

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <string>
 
 #include "shared/text/words.hpp"
 #include "visualizer/error.hpp"

@@ -8,10 +8,10 @@
 #include <string_view>
 #include <vector>
 
+#include "visualizer/cast/dirty_job.hpp"
 #include "visualizer/gl/target.hpp"
 #include "visualizer/surface/volume_samples.hpp"
 #include "visualizer/view/camera.hpp"
-#include "visualizer/view/ray_footprint.hpp"
 #include "visualizer/view/scene_view.hpp"
 
 namespace kerf {

@@ -3,9 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <numeric>
 
-#include "visualizer/render/slice_polygons.hpp"
-#include "visualizer/render/view_uniforms.hpp"
+#include "visualizer/gl/program.hpp"
 
 namespace kerf {
 
@@ -21,17 +22,10 @@ SceneView with_volume(const SceneView& scene, std::size_t volume) {
 BoxCorners active_corners(const CellsOnGpu& cells, const View& view, double margin_mm) {
   const VoxelBox& box = cells.active_box();
   const glm::dmat4 eye_from_cell = view.eye_from_world * cells.world_from_cell();
-  BoxCorners corners;
-  for (std::size_t i = 0; i < corners.size(); ++i) {
-    glm::dvec3 at((i & 1) != 0 ? box.hi.x : box.lo.x, (i & 2) != 0 ? box.hi.y : box.lo.y,
-                  (i & 4) != 0 ? box.hi.z : box.lo.z);
-    for (int axis = 0; axis < 3; ++axis) {
-      const double margin = margin_mm / glm::length(eye_from_cell[axis]);
-      at[axis] += (i >> axis & 1) != 0 ? margin : -margin;
-    }
-    corners[i] = glm::dvec3(eye_from_cell * glm::dvec4(at, 1.0));
-  }
-  return corners;
+  glm::dvec3 margin;
+  for (int axis = 0; axis < 3; ++axis) margin[axis] = margin_mm / glm::length(eye_from_cell[axis]);
+  return box_corners(glm::dvec3(box.lo.x, box.lo.y, box.lo.z) - margin,
+                     glm::dvec3(box.hi.x, box.hi.y, box.hi.z) + margin, eye_from_cell);
 }
 
 }  // namespace
@@ -60,11 +54,11 @@ SlicesRenderer::SlicesRenderer(const SceneView& scene, std::span<const VolumeCon
 
 void SlicesRenderer::update(std::size_t volume, std::span<const Density> density,
                             std::span<const std::uint32_t> changed) {
-  volumes_[volume]->volume.update(0, density, changed);
+  volumes_[volume]->volume.volumes().front().update_bricks(density, changed);
 }
 
 void SlicesRenderer::place(std::size_t volume, const glm::dmat4& world_from_voxel) {
-  volumes_[volume]->volume.place(0, world_from_voxel);
+  volumes_[volume]->volume.volumes().front().place(world_from_voxel);
 }
 
 void SlicesRenderer::set_opacities(std::span<const MaterialView> materials,
@@ -147,6 +141,27 @@ void SlicesRenderer::draw_cuts(const View& view, const RenderTarget& target) con
     });
     begin = end;
   }
+}
+
+std::vector<glm::dvec2> cut_box(const BoxCorners& eye_corners, double eye_mm) {
+  std::vector<glm::dvec2> vertices;
+  for (std::size_t from = 0; from < eye_corners.size(); ++from) {
+    for (const std::size_t axis : {1U, 2U, 4U}) {
+      if ((from & axis) != 0) continue;  // each of the twelve edges once
+      const glm::dvec3& a = eye_corners[from];
+      const glm::dvec3& b = eye_corners[from | axis];
+      const double before = -a.z - eye_mm;
+      const double behind = -b.z - eye_mm;
+      if ((before < 0.0) == (behind < 0.0)) continue;
+      vertices.emplace_back(glm::mix(a, b, before / (before - behind)));
+    }
+  }
+  const glm::dvec2 middle = std::accumulate(vertices.begin(), vertices.end(), glm::dvec2(0.0)) /
+                            static_cast<double>(std::max<std::size_t>(vertices.size(), 1));
+  const auto angle = [&](glm::dvec2 v) { return std::atan2(v.y - middle.y, v.x - middle.x); };
+  std::sort(vertices.begin(), vertices.end(),
+            [&](glm::dvec2 a, glm::dvec2 b) { return angle(a) < angle(b); });
+  return vertices;
 }
 
 }  // namespace kerf

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "visualizer/render/surface_renderer.hpp"
 
-#include <optional>
 #include <utility>
 
 #include <glm/gtc/matrix_inverse.hpp>
 
-#include "visualizer/render/view_uniforms.hpp"
+#include "visualizer/gl/context.hpp"
+#include "visualizer/view/camera.hpp"
 
 namespace kerf {
 
@@ -23,7 +23,40 @@ std::vector<FrustumCulling::Part> drawn_parts(const RenderTarget& target) {
   return parts;
 }
 
+constexpr GLuint kPaletteUnit = 2;  // after the textures of SolidOnGpu
+
+/// The parts of the target in which a volume may show.
+std::vector<PixelRect> parts_of(const SolidOnGpu& volume, const View& view,
+                                const RenderTarget& target) {
+  const BoxCorners corners =
+      box_corners(glm::dvec3(0.0), glm::dvec3(1.0), volume.world_from_texture());
+  return clipped(target.parts(), screen_bounds(corners, view, target.size()));
+}
+
 }  // namespace
+
+SectionFaces::SectionFaces(const SceneView& scene, std::span<const VolumeContent> contents)
+    : palette_(palette_texture(scene.materials)) {
+  const int limit = query_gl_driver().max_texture_size_3d;
+  volumes_.reserve(scene.volumes.size());
+  for (std::size_t v = 0; v < scene.volumes.size(); ++v) {
+    volumes_.emplace_back(scene.volumes[v], contents[v], limit);
+  }
+  SolidOnGpu::set_units(program_, static_cast<int>(kPaletteUnit));
+}
+
+void SectionFaces::draw(const View& view, const RenderTarget& target) const {
+  target.bind();
+  glEnable(GL_DEPTH_TEST);
+  glDepthFunc(GL_LESS);
+  glBindTextureUnit(kPaletteUnit, palette_.id());
+  set_view(program_, view);
+  for (const SolidOnGpu& volume : volumes_) {
+    volume.bind(program_, view);
+    program_.use();
+    target.cover(parts_of(volume, view, target));
+  }
+}
 
 SurfaceRenderer::SurfaceRenderer(const SceneView& scene, std::span<const VolumeContent> contents)
     : scene_(scene) {
@@ -41,12 +74,12 @@ void SurfaceRenderer::update(std::size_t volume, std::span<const Density> densit
                              std::span<const std::uint32_t> changed) {
   Volume& of = volumes_[volume];
   of.gpu.update(of.surface, of.surface.update(density, changed));
-  if (faces_) faces_->update(volume, density, changed);
+  if (faces_) faces_->volumes()[volume].update_bricks(density, changed);
 }
 
 void SurfaceRenderer::place(std::size_t volume, const glm::dmat4& world_from_voxel) {
   scene_.volumes[volume].world_from_voxel = world_from_voxel;
-  if (faces_) faces_->place(volume, world_from_voxel);
+  if (faces_) faces_->volumes()[volume].place(world_from_voxel);
 }
 
 void SurfaceRenderer::set_cut_open(bool open, std::span<const VolumeContent> contents) {

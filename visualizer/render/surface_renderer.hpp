@@ -2,15 +2,35 @@
 #pragma once
 
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "visualizer/gl/program.hpp"
+#include "visualizer/gl/target.hpp"
 #include "visualizer/render/renderer.hpp"
-#include "visualizer/render/section_faces.hpp"
 #include "visualizer/surface/surface_on_gpu.hpp"
 #include "visualizer/surface/volume_surface.hpp"
+#include "visualizer/texture/solid_on_gpu.hpp"
 
 namespace kerf {
+
+/// The faces that a clip plane cuts into volumes whose surfaces are meshes, in the colours of their
+/// materials: each pixel whose ray enters the plane in what is solid.
+class SectionFaces {
+ public:
+  /// Throws VisualizerError where the driver takes no textures of this size.
+  SectionFaces(const SceneView& scene, std::span<const VolumeContent> contents);
+
+  [[nodiscard]] std::span<SolidOnGpu> volumes() noexcept { return volumes_; }
+  /// Draws over what is in `target`, under its depth test.
+  void draw(const View& view, const RenderTarget& target) const;
+
+ private:
+  GlProgram program_{"screen.vert", "section.frag",  "solid.frag",
+                     "ray.frag",    "lighting.frag", "depth.frag"};
+  GlTexture2D palette_;
+  std::vector<SolidOnGpu> volumes_;
+};
 
 /// Iso-surfaces as meshes: marching cubes on the CPU, again only around what changed; the GPU draws
 /// triangles and never sees the volume.

@@ -8,10 +8,7 @@ namespace kerf {
 TranslucentLayer::Buffer::Buffer(PictureSize of_size) : size(of_size) {
   glTextureStorage2D(colour.id(), 1, GL_RGBA16F, size.width, size.height);
   glTextureStorage2D(depth.id(), 1, GL_R32F, size.width, size.height);
-  for (const GlTexture2D* texture : {&colour, &depth}) {
-    glTextureParameteri(texture->id(), GL_TEXTURE_MIN_FILTER, GL_NEAREST);
-    glTextureParameteri(texture->id(), GL_TEXTURE_MAG_FILTER, GL_NEAREST);
-  }
+  for (const GlTexture2D* texture : {&colour, &depth}) read_nearest(texture->id());
   glNamedFramebufferTexture(framebuffer.id(), GL_COLOR_ATTACHMENT0, colour.id(), 0);
   glNamedFramebufferTexture(framebuffer.id(), GL_COLOR_ATTACHMENT1, depth.id(), 0);
   constexpr std::array<GLenum, 2> kOutputs{GL_COLOR_ATTACHMENT0, GL_COLOR_ATTACHMENT1};
@@ -47,8 +44,7 @@ void TranslucentLayer::finish(const RenderTarget& target) {
   program_.set("u_colour", 0);
   program_.set("u_depth", 1);
   program_.use();
-  glBindVertexArray(no_vertices_.id());
-  target.for_parts([] { glDrawArrays(GL_TRIANGLES, 0, 3); });
+  target.cover();
   glDisable(GL_BLEND);
 }
 

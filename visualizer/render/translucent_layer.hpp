@@ -31,7 +31,6 @@ class TranslucentLayer {
   };
 
   GlProgram program_{"screen.vert", "layer.frag", "lighting.frag"};
-  GlVertexArray no_vertices_ = GlVertexArray::create();
   std::optional<Buffer> buffer_;
 };
 

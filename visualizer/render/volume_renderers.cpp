@@ -43,15 +43,6 @@ VolumeRenderers::VolumeRenderers(std::span<const std::string> kinds, const Scene
   }
 }
 
-void VolumeRenderers::update(std::size_t volume, std::span<const Density> density,
-                             std::span<const std::uint32_t> changed) {
-  renderer_of(volume).update(places_[volume].index, density, changed);
-}
-
-void VolumeRenderers::place(std::size_t volume, const glm::dmat4& world_from_voxel) {
-  renderer_of(volume).place(places_[volume].index, world_from_voxel);
-}
-
 void VolumeRenderers::set_opacities(std::span<const MaterialView> materials,
                                     std::span<const VolumeContent> contents) {
   for (const Group& group : groups_) {
@@ -82,22 +73,18 @@ bool VolumeRenderers::any(Layer layer) const {
                      [&](const Group& group) { return kerf::layer_of(*group.renderer) == layer; });
 }
 
-bool VolumeRenderers::take_gradient() const {
+bool VolumeRenderers::any(Trait trait) const {
   return std::any_of(groups_.begin(), groups_.end(),
-                     [](const Group& group) { return group.renderer->takes_gradient(); });
-}
-
-bool VolumeRenderers::coarse_while_moving() const {
-  return std::any_of(groups_.begin(), groups_.end(),
-                     [](const Group& group) { return group.renderer->coarse_while_moving(); });
+                     [&](const Group& group) { return (*group.renderer.*trait)(); });
 }
 
 Layer VolumeRenderers::layer_of(std::size_t volume) const {
-  return kerf::layer_of(renderer_of(volume));
+  return kerf::layer_of(of(volume).renderer);
 }
 
 VolumeRenderers::Drawn VolumeRenderers::of(std::size_t volume) const {
-  return {renderer_of(volume), places_[volume].index};
+  const auto& [group, index] = places_[volume];
+  return {*groups_[group].renderer, index};
 }
 
 }  // namespace kerf

@@ -22,9 +22,6 @@ class VolumeRenderers {
   VolumeRenderers(std::span<const std::string> kinds, const SceneView& scene,
                   std::span<const VolumeContent> contents);
 
-  void update(std::size_t volume, std::span<const Density> density,
-              std::span<const std::uint32_t> changed);
-  void place(std::size_t volume, const glm::dmat4& world_from_voxel);
   void set_opacities(std::span<const MaterialView> materials,
                      std::span<const VolumeContent> contents);
   void set_cut_open(bool open, std::span<const VolumeContent> contents);
@@ -32,13 +29,14 @@ class VolumeRenderers {
   void draw(Layer layer, const View& view, const RenderTarget& target);
 
   [[nodiscard]] bool any(Layer layer) const;
-  [[nodiscard]] bool take_gradient() const;
-  [[nodiscard]] bool coarse_while_moving() const;
+  /// Whether a renderer has this, such as `&Renderer::takes_gradient`.
+  using Trait = bool (Renderer::*)() const noexcept;
+  [[nodiscard]] bool any(Trait trait) const;
   [[nodiscard]] Layer layer_of(std::size_t volume) const;
 
   /// A renderer, and which of its own volumes is meant.
   struct Drawn {
-    const Renderer& renderer;
+    Renderer& renderer;
     std::size_t index;
   };
   [[nodiscard]] Drawn of(std::size_t volume) const;
@@ -51,9 +49,6 @@ class VolumeRenderers {
   struct Place {
     std::size_t group, index;
   };
-  [[nodiscard]] Renderer& renderer_of(std::size_t volume) const {
-    return *groups_[places_[volume].group].renderer;
-  }
 
   std::vector<Group> groups_;
   std::vector<Place> places_;  ///< by volume

@@ -1,10 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "visualizer/surface/mesh_file.hpp"
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <cstring>
 #include <string>
+#include <string_view>
+#include <unordered_map>
+
+#include <glm/gtc/matrix_inverse.hpp>
+
+#include "shared/posix/new_file.hpp"
+#include "visualizer/error.hpp"
 
 namespace kerf {
 
@@ -29,6 +37,40 @@ std::uint8_t srgb8(float linear) {
                        ? 12.92 * static_cast<double>(linear)
                        : 1.055 * std::pow(static_cast<double>(linear), 1.0 / 2.4) - 0.055;
   return static_cast<std::uint8_t>(std::lround(255.0 * c));
+}
+
+/// On a face of its block, where another block may have it too.
+bool is_shared(const SurfaceVertex& vertex) {
+  constexpr int kEnd = kBlockEdge * kFinePerVoxel;
+  return std::any_of(vertex.position.begin(), vertex.position.end(),
+                     [](std::uint16_t at) { return at == 0 || at == kEnd; });
+}
+
+/// The cube edge that a vertex lies on: its axis and start, 17 bits each.
+std::uint64_t edge_of(FinePoint at) {
+  std::uint64_t key = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    key = key << 17 | static_cast<std::uint64_t>((at[axis] >> kFineLog2) + 1);
+  }
+  for (int axis = 0; axis < 3; ++axis) {
+    key = key << 1 | ((at[axis] & (kFinePerVoxel - 1)) != 0 ? 1U : 0U);
+  }
+  return key;
+}
+
+struct Format {
+  std::string_view ending;
+  std::string (*bytes)(const ClosedMesh&);
+};
+constexpr auto kFormats = std::to_array<Format>({{".stl", stl_bytes}, {".ply", ply_bytes}});
+
+const Format& format_of(const std::filesystem::path& file) {
+  const auto found = std::find_if(kFormats.begin(), kFormats.end(), [&](const Format& format) {
+    return file.extension() == format.ending;
+  });
+  if (found != kFormats.end()) return *found;
+  throw VisualizerError("--export: " + file.string() +
+                        ": the name says no format; let it end in .stl or .ply");
 }
 
 }  // namespace
@@ -79,6 +121,53 @@ std::string ply_bytes(const ClosedMesh& mesh) {
     append(bytes, triangle);
   }
   return bytes;
+}
+
+void ClosedMesh::append(const VolumeSurface& surface, const glm::dmat4& world_from_voxel) {
+  const glm::dmat3 world_from_normal = glm::inverseTranspose(glm::dmat3(world_from_voxel));
+  std::unordered_map<std::uint64_t, std::uint32_t> shared;
+  std::vector<std::uint32_t> index;  // of the block's vertices here
+  for (std::uint32_t id = 0; id < surface.meshes().size(); ++id) {
+    const BlockMesh& block = surface.meshes()[id];
+    const VoxelIndex start = block_start(surface.block(id));
+    index.clear();
+    for (const SurfaceVertex& vertex : block.vertices) {
+      const FinePoint at = fine_place(vertex, start);
+      const auto fresh = static_cast<std::uint32_t>(vertices.size());
+      const std::uint32_t known =
+          is_shared(vertex) ? shared.try_emplace(edge_of(at), fresh).first->second : fresh;
+      index.push_back(known);
+      if (known != fresh) continue;
+      const glm::dvec3 voxel = glm::dvec3(at) / double{kFinePerVoxel};
+      const glm::dvec3 normal(vertex.normal[0], vertex.normal[1], vertex.normal[2]);
+      constexpr float kOne = 65535.0F;
+      vertices.push_back({glm::vec3(world_from_voxel * glm::dvec4(voxel, 1.0)),
+                          glm::vec3(glm::normalize(world_from_normal * normal)),
+                          glm::vec3(vertex.colour[0], vertex.colour[1], vertex.colour[2]) / kOne});
+    }
+    for (const auto& triangle : block.triangles) {
+      triangles.push_back({index[triangle[0]], index[triangle[1]], index[triangle[2]]});
+    }
+  }
+}
+
+void check_export(const std::filesystem::path& file) {
+  static_cast<void>(format_of(file));
+  check_new_file(file);
+}
+
+void export_surface(const std::filesystem::path& file, const SceneView& scene,
+                    std::span<const VolumeContent> contents) {
+  const Format& format = format_of(file);
+  const bool some_solid = scene.main_volume().solid;
+  ClosedMesh mesh;
+  for (std::size_t i = 0; i < scene.volumes.size(); ++i) {
+    const VolumeView& volume = scene.volumes[i];
+    if (some_solid ? !volume.solid : i != 0) continue;
+    mesh.append(VolumeSurface(volume, scene.materials, contents[i].density, contents[i].labels),
+                volume.world_from_voxel);
+  }
+  write_new_file(file, format.bytes(mesh));
 }
 
 }  // namespace kerf

@@ -1,12 +1,33 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <filesystem>
+#include <span>
 #include <vector>
 
-#include "visualizer/surface/closed_mesh.hpp"
+#include <glm/glm.hpp>
+
+#include "visualizer/surface/volume_surface.hpp"
+#include "visualizer/view/scene_view.hpp"
 
 namespace kerf {
+
+/// Surfaces as one mesh in the world: what goes into a file.
+struct ClosedMesh {
+  struct Vertex {
+    glm::vec3 position_mm;
+    glm::vec3 normal;  ///< outward, of length 1
+    glm::vec3 colour;  ///< linear
+  };
+  std::vector<Vertex> vertices;
+  std::vector<std::array<std::uint32_t, 3>> triangles;  ///< counter-clockwise from outside
+
+  /// Adds a volume that stands at `world_from_voxel`, which must not mirror. The vertices that its
+  /// blocks share become one, so each side of a triangle belongs to exactly one other triangle.
+  void append(const VolumeSurface& surface, const glm::dmat4& world_from_voxel);
+};
 
 /// The mesh as the bytes of a binary STL file: triangles with the normal of their plane. STL has no
 /// colours and names no unit; ours are mm, as most readers take it.
@@ -15,5 +36,16 @@ namespace kerf {
 /// The mesh as the bytes of a binary little-endian PLY file: position, normal and sRGB colour of
 /// each vertex, and triangles.
 [[nodiscard]] std::string ply_bytes(const ClosedMesh& mesh);
+
+/// Writes the iso-surfaces of the solid volumes (of the first volume where none is solid), in mm in
+/// the world, as STL or PLY by the name's ending. Each is closed; where volumes overlap so do they.
+/// Whole or not at all; with nothing left to show, a valid file without triangles. Needs no GL.
+/// Throws VisualizerError or FileError.
+void export_surface(const std::filesystem::path& file, const SceneView& scene,
+                    std::span<const VolumeContent> contents);
+
+/// Throws now what `export_surface` would throw later: for another ending, or a place that cannot
+/// be written.
+void check_export(const std::filesystem::path& file);
 
 }  // namespace kerf

@@ -2,11 +2,10 @@
 #pragma once
 
 #include <array>
-#include <span>
 #include <vector>
 
 #include "visualizer/surface/volume_samples.hpp"
-#include "visualizer/view/palette.hpp"
+#include "visualizer/view/transfer_function.hpp"
 
 namespace kerf {
 

@@ -7,6 +7,7 @@
 #include <thread>
 #include <utility>
 
+#include "shared/volume/voxel_loops.hpp"
 #include "visualizer/surface/vertex_look.hpp"
 
 namespace kerf {
@@ -95,15 +96,11 @@ VoxelBox VolumeSurface::follow(std::span<const Density> density, const VoxelBox&
 
 void VolumeSurface::mark(const VoxelBox& blocks, Work work) {
   const VoxelBox near = blocks.clipped(blocks_.box());
-  for (std::int32_t z = near.lo.z; z < near.hi.z; ++z) {
-    for (std::int32_t y = near.lo.y; y < near.hi.y; ++y) {
-      for (std::int32_t x = near.lo.x; x < near.hi.x; ++x) {
-        const std::size_t id = blocks_.index(x, y, z);
-        if (work_[id] == Work::none) marked_.push_back(static_cast<std::uint32_t>(id));
-        work_[id] = std::max(work_[id], work);
-      }
-    }
-  }
+  for_each_voxel(near, [&](int x, int y, int z) {
+    const std::size_t id = blocks_.index(x, y, z);
+    if (work_[id] == Work::none) marked_.push_back(static_cast<std::uint32_t>(id));
+    work_[id] = std::max(work_[id], work);
+  });
 }
 
 std::span<const std::uint32_t> VolumeSurface::update(std::span<const Density> density,

@@ -3,7 +3,7 @@
 
 #include <glm/gtc/matrix_inverse.hpp>
 
-#include "visualizer/view/palette.hpp"
+#include "visualizer/view/transfer_function.hpp"
 
 namespace kerf {
 

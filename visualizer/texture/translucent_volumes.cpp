@@ -17,11 +17,6 @@ constexpr TexelFormat kTexel{GL_RGBA8, GL_RGBA, GL_UNSIGNED_BYTE, GL_LINEAR};
 constexpr VoxelGrid kNoVoxels{};
 constexpr int kOtherUnits = 3;  // materials by density, where rays enter, depth of opaque things
 
-double shortest_edge_mm(const glm::dmat4& world_from_voxel) {
-  return std::min({glm::length(world_from_voxel[0]), glm::length(world_from_voxel[1]),
-                   glm::length(world_from_voxel[2])});
-}
-
 void check_units(std::size_t volumes) {
   GLint units = 0;
   glGetIntegerv(GL_MAX_TEXTURE_IMAGE_UNITS, &units);
@@ -95,8 +90,7 @@ TranslucentVolumes::TranslucentVolumes(const SceneView& scene,
   volumes_.reserve(scene.volumes.size());
   const auto rows = static_cast<GLsizei>(scene.volumes.size());
   glTextureStorage2D(by_density_.id(), 1, GL_RGBA32F, kPaletteWidth, rows);
-  glTextureParameteri(by_density_.id(), GL_TEXTURE_MIN_FILTER, GL_NEAREST);
-  glTextureParameteri(by_density_.id(), GL_TEXTURE_MAG_FILTER, GL_NEAREST);
+  read_nearest(by_density_.id());
   for (std::size_t v = 0; v < scene.volumes.size(); ++v) {
     const TransferFunction transfer = make_transfer_function(scene, v, contents[v]);
     volumes_.emplace_back(scene.volumes[v], contents[v], transfer, scene.gradient, limit,
@@ -117,11 +111,6 @@ void TranslucentVolumes::set_opacities(std::span<const MaterialView> materials,
     volumes_[v].set_materials(palette, contents[v]);
     upload_materials(v);
   }
-}
-
-void TranslucentVolumes::update(std::size_t volume, std::span<const Density> density,
-                                std::span<const std::uint32_t> changed) {
-  volumes_[volume].update_bricks(density, changed);
 }
 
 std::string TranslucentVolumes::defines() const {

@@ -71,14 +71,6 @@ class TranslucentVolumes {
   TranslucentVolumes(const SceneView& scene, std::span<const VolumeContent> contents,
                      bool skip_empty);
 
-  void update(std::size_t volume, std::span<const Density> density,
-              std::span<const std::uint32_t> changed);
-
-  /// See `Renderer::place`.
-  void place(std::size_t volume, const glm::dmat4& world_from_voxel) {
-    volumes_[volume].place(world_from_voxel);
-  }
-
   /// See `Renderer::set_opacities`.
   void set_opacities(std::span<const MaterialView> materials,
                      std::span<const VolumeContent> contents);
@@ -93,7 +85,7 @@ class TranslucentVolumes {
   /// Matrices of `view`, and binds the textures.
   void bind(const GlProgram& program, const View& view) const;
 
-  [[nodiscard]] const std::vector<TranslucentVolume>& volumes() const noexcept { return volumes_; }
+  [[nodiscard]] std::span<TranslucentVolume> volumes() noexcept { return volumes_; }
   /// Shortest voxel edge of all volumes, in mm.
   [[nodiscard]] double edge_mm() const noexcept;
 

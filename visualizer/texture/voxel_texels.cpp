@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "shared/segment/brick_grid.hpp"
+#include "shared/volume/voxel_loops.hpp"
 
 namespace kerf {
 
@@ -56,18 +57,14 @@ class UnlabelledVoxels {
         VoxelBox{at, {at.x + 1, at.y + 1, at.z + 1}}.grown(kMaterialReach).clipped(grid_.box());
     glm::vec4 sum(0.0F);
     float weights = 0.0F;
-    for (std::int32_t z = box.lo.z; z < box.hi.z; ++z) {
-      for (std::int32_t y = box.lo.y; y < box.hi.y; ++y) {
-        for (std::int32_t x = box.lo.x; x < box.hi.x; ++x) {
-          const Label label = labels_[grid_.index(x, y, z)];
-          if (label == 0) continue;
-          const glm::ivec3 d(x - at.x, y - at.y, z - at.z);
-          const float weight = 1.0F / static_cast<float>(d.x * d.x + d.y * d.y + d.z * d.z);
-          sum += weight * palette_[1][label];
-          weights += weight;
-        }
-      }
-    }
+    for_each_voxel(box, [&](int x, int y, int z) {
+      const Label label = labels_[grid_.index(x, y, z)];
+      if (label == 0) return;
+      const glm::ivec3 d(x - at.x, y - at.y, z - at.z);
+      const float weight = 1.0F / static_cast<float>(d.x * d.x + d.y * d.y + d.z * d.z);
+      sum += weight * palette_[1][label];
+      weights += weight;
+    });
     if (weights == 0.0F) return std::nullopt;
     return sum / weights;
   }
@@ -87,15 +84,11 @@ void fill_gradient_texels(Gradient kind, const VoxelGrid& grid, std::span<const 
   texels.clear();
   texels.reserve(gradients.size());
   auto gradient = gradients.begin();
-  for (std::int32_t z = box.lo.z; z < box.hi.z; ++z) {
-    for (std::int32_t y = box.lo.y; y < box.hi.y; ++y) {
-      const Density* const row = density.data() + grid.index(0, y, z);
-      for (std::int32_t x = box.lo.x; x < box.hi.x; ++x, ++gradient) {
-        texels.push_back({gradient_byte(gradient->x), gradient_byte(gradient->y),
-                          gradient_byte(gradient->z), density_byte(row[x])});
-      }
-    }
-  }
+  for_each_voxel(box, [&](int x, int y, int z) {
+    const glm::vec3& g = *gradient++;
+    texels.push_back({gradient_byte(g.x), gradient_byte(g.y), gradient_byte(g.z),
+                      density_byte(density[grid.index(x, y, z)])});
+  });
 }
 
 std::vector<MaterialTexel> material_texels(const VoxelGrid& grid, std::span<const Density> density,
@@ -112,19 +105,15 @@ std::vector<MaterialTexel> material_texels(const VoxelGrid& grid, std::span<cons
   for (std::uint32_t id = 0; id < bricks.count(); ++id) {
     const VoxelBox box = bricks.voxels(id);
     const bool near_labels = unlabelled.any_label(box.grown(kMaterialReach).clipped(grid.box()));
-    for (std::int32_t z = box.lo.z; z < box.hi.z; ++z) {
-      for (std::int32_t y = box.lo.y; y < box.hi.y; ++y) {
-        for (std::int32_t x = box.lo.x; x < box.hi.x; ++x) {
-          const std::size_t at = grid.index(x, y, z);
-          if (labels[at] != 0) {
-            texels[at] = by_label[labels[at]];
-            continue;
-          }
-          const auto mean = near_labels ? unlabelled.mean_around({x, y, z}) : std::nullopt;
-          texels[at] = mean ? texel_of(*mean) : by_density[density_byte(density[at])];
-        }
+    for_each_voxel(box, [&](int x, int y, int z) {
+      const std::size_t at = grid.index(x, y, z);
+      if (labels[at] != 0) {
+        texels[at] = by_label[labels[at]];
+        return;
       }
-    }
+      const auto mean = near_labels ? unlabelled.mean_around({x, y, z}) : std::nullopt;
+      texels[at] = mean ? texel_of(*mean) : by_density[density_byte(density[at])];
+    });
   }
   return texels;
 }

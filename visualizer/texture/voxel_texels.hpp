@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "visualizer/view/gradient.hpp"
-#include "visualizer/view/palette.hpp"
+#include "visualizer/view/transfer_function.hpp"
 
 namespace kerf {
 

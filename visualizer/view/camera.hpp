@@ -2,14 +2,30 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <span>
 
 #include <glm/glm.hpp>
+
+#include "visualizer/view/pixel_rect.hpp"
 
 namespace kerf {
 
 /// The eight corners, in world mm, of a box of any orientation that a picture should show.
 using BoxCorners = std::array<glm::dvec3, 8>;
+
+/// Those of the box from `low` to `high` that stands at `pose`; bit 0 of the index: high x, bit 1:
+/// high y, bit 2: high z.
+[[nodiscard]] inline BoxCorners box_corners(const glm::dvec3& low, const glm::dvec3& high,
+                                            const glm::dmat4& pose = glm::dmat4(1.0)) {
+  BoxCorners corners;
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    const glm::dvec4 at((i & 1) != 0 ? high.x : low.x, (i & 2) != 0 ? high.y : low.y,
+                        (i & 4) != 0 ? high.z : low.z, 1.0);
+    corners[i] = glm::dvec3(pose * at);
+  }
+  return corners;
+}
 
 /// The paper's equation (1): window depth, 0 at the near and 1 at the far plane, of a point
 /// `eye_mm` away along the view axis. Every renderer writes this, so that volumes, meshes and the
@@ -70,5 +86,33 @@ class OrbitCamera {
   double yaw_rad_ = 0.0;
   double pitch_rad_ = 0.0;
 };
+
+/// Pixels of a picture that what lies within the hull of `corners` can cover; all of them where a
+/// corner is not in front of the near plane.
+[[nodiscard]] PixelRect screen_bounds(std::span<const glm::dvec3> corners, const View& view,
+                                      PictureSize size);
+
+/// Two eyes before one window: parallel view axes and asymmetric frusta whose middles meet at the
+/// convergence distance. Eyes that toe in would shift things up and down against each other in the
+/// corners, which hurts (P. Bourke, "Calculating stereo pairs", 1999; A. Woods, T. Docherty and
+/// R. Koch, "Image distortions in stereoscopic video systems", 1993).
+///
+/// A point at distance z is seen by the left eye farther right than by the right one by
+///
+///     eyes_mm (1 / z - 1 / convergence_mm) / (tan_half_height aspect)
+///
+/// half widths of the picture: 0 at the convergence distance, which is that of the screen.
+struct StereoBase {
+  double eyes_mm;         ///< between the eyes; negative: crossed, for pictures seen cross-eyed
+  double convergence_mm;  ///< from the eyes to what seems to lie in the screen; positive
+};
+
+/// The left and the right eye on either side of `middle`.
+[[nodiscard]] std::array<View, 2> eye_views(const View& middle, const StereoBase& base);
+
+/// Eyes that lie a thirtieth of the convergence distance apart: 65 mm at two metres, as if the
+/// tooth had the size of a person. The photographers' rule; what is a quarter nearer or farther
+/// than the screen then stays within 0.7 degrees of it, where eyes can rest.
+inline constexpr double kEyesPerConvergence = 1.0 / 30.0;
 
 }  // namespace kerf

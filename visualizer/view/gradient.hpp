@@ -4,7 +4,6 @@
 #include <array>
 #include <cstdint>
 #include <span>
-#include <string>
 #include <string_view>
 #include <vector>
 
@@ -23,6 +22,9 @@ enum class Gradient : std::uint8_t {
 
 /// All of them, as on the command line, in the order of the enumeration.
 inline constexpr std::array<std::string_view, 3> kGradientNames{"central", "corners", "farid5"};
+[[nodiscard]] constexpr std::string_view name_of(Gradient gradient) noexcept {
+  return kGradientNames[static_cast<std::size_t>(gradient)];
+}
 /// Throws VisualizerError for an unknown name, and names the known.
 [[nodiscard]] Gradient gradient_named(std::string_view name);
 

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <algorithm>
+#include <span>
+#include <vector>
 
 namespace kerf {
 
@@ -34,6 +36,29 @@ struct PixelRect {
             std::max(y1, other.y1)};
   }
   friend constexpr bool operator==(const PixelRect&, const PixelRect&) noexcept = default;
+};
+
+/// What of `rects` lies in `bounds`; none of it is empty.
+[[nodiscard]] inline std::vector<PixelRect> clipped(std::span<const PixelRect> rects,
+                                                    const PixelRect& bounds) {
+  std::vector<PixelRect> inside;
+  for (const PixelRect& rect : rects) {
+    if (const PixelRect both = rect.clipped(bounds); !both.empty()) inside.push_back(both);
+  }
+  return inside;
+}
+/// The smallest rectangle that holds all of `rects`.
+[[nodiscard]] inline PixelRect united(std::span<const PixelRect> rects) noexcept {
+  PixelRect all;
+  for (const PixelRect& rect : rects) all = all.united(rect);
+  return all;
+}
+
+/// Where the mouse is, in pixels of the picture from its upper left corner, and its left button.
+struct Pointer {
+  double x = -1.0, y = -1.0;  ///< outside at first
+  bool down = false;
+  friend bool operator==(const Pointer&, const Pointer&) noexcept = default;
 };
 
 }  // namespace kerf

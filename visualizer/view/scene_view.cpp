@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "visualizer/view/scene_view.hpp"
 
-#include <algorithm>
 #include <cmath>
 
 #include <glm/gtc/matrix_transform.hpp>
@@ -105,13 +104,7 @@ glm::dmat4 rigid(const glm::dvec3& position_mm, const glm::dvec4& q) {
 
 BoxCorners VolumeView::corners() const {
   const VoxelGrid& n = bricks.grid;
-  BoxCorners corners;
-  for (std::size_t i = 0; i < corners.size(); ++i) {
-    const glm::dvec4 voxel((i & 1) != 0 ? n.nx - 0.5 : -0.5, (i & 2) != 0 ? n.ny - 0.5 : -0.5,
-                           (i & 4) != 0 ? n.nz - 0.5 : -0.5, 1.0);
-    corners[i] = glm::dvec3(world_from_voxel * voxel);
-  }
-  return corners;
+  return box_corners(glm::dvec3(-0.5), {n.nx - 0.5, n.ny - 0.5, n.nz - 0.5}, world_from_voxel);
 }
 
 double VolumeView::radius_mm() const {

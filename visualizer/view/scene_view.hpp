@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <optional>
@@ -30,6 +31,12 @@ struct VolumeView {
   /// Half the diagonal of that box.
   [[nodiscard]] double radius_mm() const;
 };
+
+/// Of a voxel.
+[[nodiscard]] inline double shortest_edge_mm(const glm::dmat4& world_from_voxel) {
+  return std::min({glm::length(world_from_voxel[0]), glm::length(world_from_voxel[1]),
+                   glm::length(world_from_voxel[2])});
+}
 
 /// What a renderer draws of a volume at this moment; spans of the caller, x fastest.
 struct VolumeContent {

@@ -7,56 +7,49 @@
 #include <sstream>
 #include <string>
 #include <system_error>
+#include <vector>
 
 #include "shared/posix/new_file.hpp"
 #include "shared/text/json.hpp"
 #include "shared/text/toml.hpp"
+#include "shared/text/words.hpp"
 #include "visualizer/error.hpp"
 
 namespace kerf {
 
 namespace {
 
-[[noreturn]] void refuse(const std::string& name, const toml::source_region& at,
-                         const std::string& problem) {
-  throw VisualizerError(name + ":" + std::to_string(at.begin.line) + ": " + problem);
+[[noreturn]] void refuse(const std::string& name, std::size_t line, const std::string& problem) {
+  throw VisualizerError(name + ":" + std::to_string(line) + ": " + one_line(problem));
 }
 
-/// A key or a value as it can stand in one line.
-std::string shown(std::string text) {
-  constexpr std::size_t kMost = 100;
-  std::replace_if(
-      text.begin(), text.end(), [](char c) { return static_cast<unsigned char>(c) < ' '; }, ' ');
-  return text.size() <= kMost ? text : text.substr(0, kMost) + "...";
-}
-
-std::string written(const toml::node& node) {
-  std::ostringstream text;
-  node.visit([&](const auto& value) { text << value; });
-  return shown(text.str());
+TomlNode parse_file(std::string_view text, const std::string& name) {
+  try {
+    return parse_toml(text);
+  } catch (const TomlError& error) {
+    refuse(name, error.line, error.what());
+  }
 }
 
 }  // namespace
 
 Opacities parse_transfer(std::string_view text, const std::string& name) {
-  const toml::parse_result parsed = toml::parse(text, name);
-  if (!parsed) refuse(name, parsed.error().source(), shown(toml_problem(parsed.error())));
-  for (const auto& [key, value] : parsed.table()) {
-    if (key.str() == "opacity" && value.is_table()) continue;
-    refuse(name, key.source(),
-           shown(std::string(key.str())) + " is not known here; known is the table [opacity]");
+  const TomlNode file = parse_file(text, name);
+  for (const TomlNode& entry : file.entries) {
+    if (entry.key == "opacity" && entry.form == TomlNode::Form::table) continue;
+    refuse(name, entry.key_line, entry.key + " is not known here; known is the table [opacity]");
   }
   Opacities opacities;
-  const toml::table* table = parsed.table()["opacity"].as_table();
+  const TomlNode* table = file.find("opacity");
   if (table == nullptr) throw VisualizerError(name + ": there is no table [opacity]; write one");
-  for (const auto& [key, value] : *table) {
-    const double opacity = value.value<double>().value_or(-1.0);
+  for (const TomlNode& entry : table->entries) {
+    const double opacity = entry.number().value_or(-1.0);
     if (!(opacity >= 0.0 && opacity <= 1.0)) {
-      refuse(name, value.source(),
-             "opacity." + shown(std::string(key.str())) + " = " + written(value) +
+      refuse(name, entry.line,
+             "opacity." + entry.key + " = " + entry.shown +
                  " is no opacity; give a number from 0 to 1");
     }
-    opacities[std::string(key.str())] = opacity;
+    opacities[entry.key] = opacity;
   }
   return opacities;
 }
@@ -94,19 +87,13 @@ void write_transfer(const std::filesystem::path& file, const Opacities& opacitie
 }
 
 void check_materials(const Opacities& opacities, const SceneView& scene, const std::string& name) {
-  std::string known;
-  for (std::size_t m = 1; m < scene.materials.size(); ++m) {
-    known += (known.empty() ? "" : ", ") + scene.materials[m].name;
-  }
+  std::vector<std::string> known;
+  for (std::size_t m = 1; m < scene.materials.size(); ++m) known.push_back(scene.materials[m].name);
   for (const auto& [material, opacity] : opacities) {
-    const auto has_name = [&](const MaterialView& one) { return one.name == material; };
-    if (!scene.materials.empty() &&
-        std::any_of(scene.materials.begin() + 1, scene.materials.end(), has_name)) {
-      continue;
-    }
-    throw VisualizerError(name + ": opacity." + shown(material) +
+    if (std::ranges::find(known, material) != known.end()) continue;
+    throw VisualizerError(name + ": opacity." + one_line(material) +
                           " is no material of this scene; it has " +
-                          (known.empty() ? "none" : known));
+                          (known.empty() ? "none" : listed(known)));
   }
 }
 

@@ -2,7 +2,6 @@
 #include "hil/front/firewire/firewire_bus.hpp"
 
 #include <algorithm>
-#include <span>
 
 #include "shared/numeric/fnv1a.hpp"
 

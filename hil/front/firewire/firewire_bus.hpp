@@ -1,18 +1,73 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cerrno>
 #include <cstdint>
+#include <functional>
+#include <limits>
+#include <map>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "hil/devmodel/packet_device.hpp"
-#include "hil/front/firewire/agenda.hpp"
 #include "hil/front/firewire/bus_clock.hpp"
 #include "hil/front/firewire/iso_context.hpp"
-#include "hil/front/firewire/iso_resources.hpp"
 #include "hil/front/firewire/omni_registers.hpp"
 
 namespace kerf {
+
+/// What the isochronous resource manager of a bus gives away: 64 channels and the bandwidth of a
+/// cycle.
+class IsoResources {
+ public:
+  static constexpr std::int32_t kBandwidth = 4915;  ///< units of 20.3 ns: 100 us of the 125
+
+  /// Takes the lowest free channel of `channels` (bit 0 = channel 0) and `bandwidth` units. Returns
+  /// the channel, or -EBUSY where either is not left. `channels` of 0 asks for bandwidth alone, and
+  /// gets channel 0.
+  [[nodiscard]] std::int32_t allocate(std::uint64_t channels, std::int32_t bandwidth) noexcept {
+    std::int32_t channel = 0;
+    while (channels != 0 && channel < 64 && (channels & free_ & bit(channel)) == 0) ++channel;
+    if (channel == 64 || bandwidth > bandwidth_) return -EBUSY;
+    if (channels != 0) free_ &= ~bit(channel);
+    bandwidth_ -= bandwidth;
+    return channel;
+  }
+  /// Gives back what `allocate` gave for the same `channels` and `bandwidth`.
+  void free(std::uint64_t channels, std::int32_t channel, std::int32_t bandwidth) noexcept {
+    if (channels != 0) free_ |= bit(channel);
+    bandwidth_ += bandwidth;
+  }
+
+ private:
+  static constexpr std::uint64_t bit(std::int32_t channel) noexcept {
+    return std::uint64_t{1} << channel;
+  }
+  std::uint64_t free_ = ~std::uint64_t{0};
+  std::int32_t bandwidth_ = kBandwidth;
+};
+
+/// What will happen in a later bus cycle: answers on their way, time-outs, scripted faults. Things
+/// of one cycle happen in the order in which they were entered.
+class Agenda {
+ public:
+  static constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::max();
+
+  void at(std::int64_t cycle, std::function<void()> action) {
+    entries_.emplace(cycle, std::move(action));
+  }
+  [[nodiscard]] std::int64_t next() const noexcept {
+    return entries_.empty() ? kNever : entries_.begin()->first;
+  }
+  /// What is due up to and in `cycle`, also what that adds.
+  void run(std::int64_t cycle) {
+    while (next() <= cycle) entries_.extract(entries_.begin()).mapped()();
+  }
+
+ private:
+  std::multimap<std::int64_t, std::function<void()>> entries_;
+};
 
 /// What may happen to a bus.
 enum class BusFault : std::uint8_t {

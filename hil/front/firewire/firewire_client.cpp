@@ -4,11 +4,9 @@
 #include <algorithm>
 #include <cerrno>
 #include <ctime>
-#include <vector>
-
-#include <linux/firewire-cdev.h>
 
 #include "hil/front/fuse/caller_memory.hpp"
+#include "hil/front/fuse/fuse_channel.hpp"
 
 namespace kerf {
 namespace {
@@ -16,11 +14,6 @@ namespace {
 constexpr unsigned kLargestNumber = 0x18;
 constexpr std::uint32_t kNodeId = 0xFFC0;
 constexpr std::uint32_t kLocalNodeId = 0xFFC1;
-
-template <class T>
-std::span<const std::uint8_t> bytes_of(const T& value) noexcept {
-  return {reinterpret_cast<const std::uint8_t*>(&value), sizeof value};
-}
 
 }  // namespace
 
@@ -113,7 +106,7 @@ int FirewireClient::get_info(const FuseIoctl& call) {
   }
   if (info.bus_reset != 0) {
     const fw_cdev_event_bus_reset event = bus_reset_event();
-    if (!write_caller(call.thread, info.bus_reset, bytes_of(event))) return -EFAULT;
+    if (!write_caller(call.thread, info.bus_reset, fuse_bytes(event))) return -EFAULT;
   }
   info.version = static_cast<std::uint32_t>(bus_.settings().abi_version);
   info.rom_length = rom_bytes;

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <utility>
 
 #include <poll.h>
 
@@ -45,11 +44,6 @@ std::optional<FuseAnswer> FirewireNode::read(FuseOpen id, FuseRequest request,
   if (open.client->gone()) return FuseAnswer::fail(ENODEV);
   open.parked.push_back({request, size});
   return std::nullopt;
-}
-
-std::optional<FuseAnswer> FirewireNode::write(FuseOpen /*open*/, FuseRequest /*request*/,
-                                              std::span<const std::uint8_t> /*bytes*/) {
-  return FuseAnswer::fail(EINVAL);  // the kernel's node has no write()
 }
 
 std::optional<FuseAnswer> FirewireNode::ioctl(FuseOpen id, const FuseIoctl& call) {

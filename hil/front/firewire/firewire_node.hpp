@@ -26,13 +26,10 @@ class FirewireNode final : public FuseNode, private FirewireBus::Listener {
       : bus_(settings, device, *this) {}
 
   [[nodiscard]] bool present() const noexcept override { return bus_.listed(); }
-  [[nodiscard]] bool seekable() const noexcept override { return false; }
   void open(FuseOpen open) override;
   void release(FuseOpen open) override;
   std::optional<FuseAnswer> read(FuseOpen open, FuseRequest request, std::uint64_t offset,
                                  std::size_t size) override;
-  std::optional<FuseAnswer> write(FuseOpen open, FuseRequest request,
-                                  std::span<const std::uint8_t> bytes) override;
   std::optional<FuseAnswer> ioctl(FuseOpen open, const FuseIoctl& call) override;
   std::uint32_t poll(FuseOpen open, bool sleeps) override;
   void interrupted(FuseRequest request) override;

@@ -2,7 +2,6 @@
 #include "hil/front/firewire/omni_registers.hpp"
 
 #include <cstddef>
-#include <optional>
 
 #include <linux/firewire-constants.h>
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cerrno>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -62,13 +63,15 @@ class FuseNode {
   /// `offset` grows from read to read where the node is seekable, else it is 0.
   virtual std::optional<FuseAnswer> read(FuseOpen open, FuseRequest request, std::uint64_t offset,
                                          std::size_t size) = 0;
-  virtual std::optional<FuseAnswer> write(FuseOpen open, FuseRequest request,
-                                          std::span<const std::uint8_t> bytes) = 0;
+  virtual std::optional<FuseAnswer> write(FuseOpen /*open*/, FuseRequest /*request*/,
+                                          std::span<const std::uint8_t> /*bytes*/) {
+    return FuseAnswer::fail(EINVAL);  // the kernel's own node has no write()
+  }
   virtual std::optional<FuseAnswer> ioctl(FuseOpen open, const FuseIoctl& call) = 0;
   /// POLLIN and others that hold now. `sleeps`: the caller waits for a change.
   virtual std::uint32_t poll(FuseOpen open, bool sleeps) = 0;
   /// A signal met the client of a parked call: answer it now, with EINTR.
-  virtual void interrupted(FuseRequest request) = 0;
+  virtual void interrupted(FuseRequest /*request*/) {}
 
   /// When `wake` is due although nobody calls, CLOCK_MONOTONIC ns; INT64_MAX for never.
   [[nodiscard]] virtual std::int64_t next_wake_ns() const noexcept = 0;

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstddef>
-#include <string>
 #include <string_view>
 #include <system_error>
 

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <span>
 
-#include "hil/front/kernel_device.hpp"
+#include "hil/front/serving.hpp"
 #include "hil/front/usb/wooden_hid.hpp"
 
 namespace kerf {

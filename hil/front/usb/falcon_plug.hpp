@@ -9,8 +9,7 @@
 #include <vector>
 
 #include "hil/front/usb/ftdi_falcon.hpp"
-#include "hil/front/usb/usb_fault.hpp"
-#include "hil/front/usb/usb_setup.hpp"
+#include "hil/front/usb/usb_device.hpp"
 
 namespace kerf {
 

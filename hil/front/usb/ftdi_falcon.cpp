@@ -2,74 +2,23 @@
 #include "hil/front/usb/ftdi_falcon.hpp"
 
 #include <algorithm>
-#include <array>
 
 namespace kerf {
 namespace {
 
 using falcon::FtdiRequest;
 
-constexpr std::uint8_t low(std::uint16_t value) noexcept {
-  return static_cast<std::uint8_t>(value & 0xFF);
-}
-constexpr std::uint8_t high(std::uint16_t value) noexcept {
-  return static_cast<std::uint8_t>(value >> 8);
-}
-
 constexpr std::size_t kDeviceBytes = 18;
 constexpr std::uint8_t kSerialText = 3;
 
-// USB 2.0, chapter 9.6: device, configuration, interface, two bulk endpoints of 64 bytes.
-constexpr std::array<std::uint8_t, kDeviceBytes + 32> kDescriptors{18,
-                                                                   1,
-                                                                   0x00,
-                                                                   0x02,
-                                                                   0,
-                                                                   0,
-                                                                   0,
-                                                                   8,
-                                                                   low(falcon::kVendorId),
-                                                                   high(falcon::kVendorId),
-                                                                   low(falcon::kProductId),
-                                                                   high(falcon::kProductId),
-                                                                   0x00,
-                                                                   0x06,
-                                                                   1,
-                                                                   2,
-                                                                   kSerialText,
-                                                                   1,  //
-                                                                   9,
-                                                                   2,
-                                                                   32,
-                                                                   0,
-                                                                   1,
-                                                                   1,
-                                                                   0,
-                                                                   0xA0,
-                                                                   45,  //
-                                                                   9,
-                                                                   4,
-                                                                   0,
-                                                                   0,
-                                                                   2,
-                                                                   0xFF,
-                                                                   0xFF,
-                                                                   0xFF,
-                                                                   2,  //
-                                                                   7,
-                                                                   5,
-                                                                   falcon::kEndpointIn,
-                                                                   2,
-                                                                   64,
-                                                                   0,
-                                                                   0,  //
-                                                                   7,
-                                                                   5,
-                                                                   falcon::kEndpointOut,
-                                                                   2,
-                                                                   64,
-                                                                   0,
-                                                                   0};
+// USB 2.0, chapter 9.6.
+constexpr auto kDescriptors = usb_bytes(
+    18, 1, 0x00, 0x02, 0, 0, 0, 8, low(falcon::kVendorId), high(falcon::kVendorId),
+    low(falcon::kProductId), high(falcon::kProductId), 0x00, 0x06, 1, 2, kSerialText, 1,  // device
+    9, 2, 32, 0, 1, 1, 0, 0xA0, 45,          // configuration
+    9, 4, 0, 0, 2, 0xFF, 0xFF, 0xFF, 2,      // interface
+    7, 5, falcon::kEndpointIn, 2, 64, 0, 0,  // two bulk endpoints of 64 bytes
+    7, 5, falcon::kEndpointOut, 2, 64, 0, 0);
 
 constexpr std::uint8_t kToHost = 0x80;
 constexpr std::uint8_t kGetDescriptor = 6;

@@ -11,8 +11,7 @@
 
 #include "hil/devmodel/packet_device.hpp"
 #include "hil/front/usb/falcon_boot_loader.hpp"
-#include "hil/front/usb/usb_setup.hpp"
-#include "hil/front/usb/usb_time.hpp"
+#include "hil/front/usb/usb_device.hpp"
 #include "shared/wire/falcon_framer.hpp"
 
 namespace kerf {

@@ -2,10 +2,8 @@
 #include "hil/front/usb/usbfs_node.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cerrno>
 #include <cstddef>
-#include <cstring>
 #include <limits>
 
 #include <linux/usbdevice_fs.h>
@@ -53,11 +51,6 @@ std::optional<FuseAnswer> UsbfsNode::read(FuseOpen open, FuseRequest /*request*/
   const auto all = FtdiFalcon::descriptors();
   const auto rest = all.subspan(std::min<std::size_t>(offset, all.size()));
   return FuseAnswer{.bytes = rest.first(std::min(size, rest.size()))};
-}
-
-std::optional<FuseAnswer> UsbfsNode::write(FuseOpen /*open*/, FuseRequest /*request*/,
-                                           std::span<const std::uint8_t> /*bytes*/) {
-  return FuseAnswer::fail(EINVAL);  // the kernel's node has no write()
 }
 
 std::optional<FuseAnswer> UsbfsNode::ioctl(FuseOpen id, const FuseIoctl& call) {

@@ -33,11 +33,8 @@ class UsbfsNode final : public FuseNode, private UsbHost {
   /// The descriptors.
   std::optional<FuseAnswer> read(FuseOpen open, FuseRequest request, std::uint64_t offset,
                                  std::size_t size) override;
-  std::optional<FuseAnswer> write(FuseOpen open, FuseRequest request,
-                                  std::span<const std::uint8_t> bytes) override;
   std::optional<FuseAnswer> ioctl(FuseOpen open, const FuseIoctl& call) override;
   std::uint32_t poll(FuseOpen open, bool sleeps) override;
-  void interrupted(FuseRequest /*request*/) override {}  // nothing is ever parked
   [[nodiscard]] std::int64_t next_wake_ns() const noexcept override;
   void wake() override;
 
@@ -93,7 +90,6 @@ class UsbfsNode final : public FuseNode, private UsbHost {
   FalconPlug plug_;
   std::map<FuseOpen, Open> opens_;
   std::optional<FuseOpen> claimed_by_;
-  std::vector<std::uint8_t> answer_;
   bool used_ = false;
   int rash_clears_ = 0;
 };

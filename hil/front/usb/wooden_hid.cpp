@@ -11,37 +11,15 @@ std::uint16_t WoodenHid::product_id() const noexcept {
 }
 
 std::vector<std::uint8_t> WoodenHid::report_descriptor() const {
-  const auto low = [](std::uint16_t value) { return static_cast<std::uint8_t>(value & 0xFF); };
-  const auto high = [](std::uint16_t value) { return static_cast<std::uint8_t>(value >> 8); };
-  const auto count = static_cast<std::uint8_t>(packet_bytes_);
-  return {0x06,
-          low(wooden::kUsagePage),
-          high(wooden::kUsagePage),  // usage page
-          0x0A,
-          low(wooden::kUsage),
-          high(wooden::kUsage),  // usage
-          0xA1,
-          0x01,  // collection: application
-          0x75,
-          0x08,
-          0x15,
-          0x00,
-          0x26,
-          0xFF,
-          0x00,  // bytes of 0 to 255
-          0x95,
-          count,
-          0x09,
-          0x01,
-          0x81,
-          0x02,  // so many in
-          0x95,
-          count,
-          0x09,
-          0x02,
-          0x91,
-          0x02,  // and out
-          0xC0};
+  const auto bytes =
+      usb_bytes(0x06, low(wooden::kUsagePage), high(wooden::kUsagePage),  // usage page
+                0x0A, low(wooden::kUsage), high(wooden::kUsage),          // usage
+                0xA1, 0x01,                                               // collection: application
+                0x75, 0x08, 0x15, 0x00, 0x26, 0xFF, 0x00,                 // bytes of 0 to 255
+                0x95, packet_bytes_, 0x09, 0x01, 0x81, 0x02,              // so many in
+                0x95, packet_bytes_, 0x09, 0x02, 0x91, 0x02,              // and out
+                0xC0);
+  return {bytes.begin(), bytes.end()};
 }
 
 void WoodenHid::catch_up(HidHost& host) {

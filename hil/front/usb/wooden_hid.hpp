@@ -6,12 +6,10 @@
 #include <span>
 #include <string>
 #include <string_view>
-#include <utility>
 #include <vector>
 
 #include "hil/devmodel/packet_device.hpp"
-#include "hil/front/usb/usb_fault.hpp"
-#include "hil/front/usb/usb_time.hpp"
+#include "hil/front/usb/usb_device.hpp"
 #include "shared/wire/wooden_constants.hpp"
 
 namespace kerf {

@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "hil/front/kernel_device.hpp"
+#include "hil/front/serving.hpp"
 #include "hil/front/usb/falcon_plug.hpp"
 #include "hil/front/usbip/usbip_message.hpp"
 
@@ -68,5 +68,11 @@ class UsbipFalcon final : public KernelDevice, private UsbHost {
   std::vector<std::uint8_t> heard_;  ///< whole messages and the first part of one
   std::deque<Read> reads_;
 };
+
+/// Plugs a full-speed device into a free port of the kernel's virtual USB host controller (module
+/// vhci-hcd) and returns the device's end of the cable, a stream socket that speaks USB/IP. The
+/// caller closes it, which unplugs the device. Throws `HilError` where the module, the right (root)
+/// or a free port is missing.
+[[nodiscard]] int plug_into_vhci();
 
 }  // namespace kerf

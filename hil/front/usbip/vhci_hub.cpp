@@ -1,10 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "hil/front/usbip/vhci_hub.hpp"
-
 #include <array>
 #include <cerrno>
 #include <fstream>
-#include <limits>
 #include <sstream>
 #include <string>
 #include <system_error>
@@ -13,6 +10,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include "hil/front/usbip/usbip_falcon.hpp"
 #include "hil/hil_error.hpp"
 
 namespace kerf {

@@ -12,7 +12,7 @@
 #include <doctest/doctest.h>
 
 #include "controller/device/port/firewire_port.hpp"
-#include "hil/front/real_time.hpp"
+#include "hil/front/serving.hpp"
 #include "shared/posix/monotonic_clock.hpp"
 #include "shared/wire/omni_packet.hpp"
 #include "tests/hil/fuse/mounted_node.hpp"

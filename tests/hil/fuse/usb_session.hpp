@@ -15,7 +15,7 @@
 #include "controller/device/port/open_port.hpp"
 #include "hil/devmodel/falcon_model.hpp"
 #include "hil/devmodel/wooden_model.hpp"
-#include "hil/front/real_time.hpp"
+#include "hil/front/serving.hpp"
 #include "hil/front/usb/hidraw_node.hpp"
 #include "hil/front/usb/usbfs_node.hpp"
 #include "hil/script/hand_script_file.hpp"

@@ -16,7 +16,7 @@
 
 #include "controller/device/port/hid_port.hpp"
 #include "controller/device/port/usb_port.hpp"
-#include "hil/front/real_time.hpp"
+#include "hil/front/serving.hpp"
 #include "hil/front/usb/hidraw_node.hpp"
 #include "hil/front/usb/usbfs_node.hpp"
 #include "shared/posix/monotonic_clock.hpp"

@@ -12,7 +12,7 @@
 #include <unistd.h>
 
 #include "hil/front/fuse/caller_memory.hpp"
-#include "hil/front/real_time.hpp"
+#include "hil/front/serving.hpp"
 
 namespace kerf::test {
 namespace {

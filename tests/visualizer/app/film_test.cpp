@@ -19,7 +19,7 @@
 
 #include "shared/posix/new_file.hpp"
 #include "tests/visualizer/gl/gl_fixture.hpp"
-#include "visualizer/app/yuv.hpp"
+#include "visualizer/app/video_file.hpp"
 
 using namespace kerf;
 using namespace kerf::test;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "visualizer/app/notices.hpp"
-
 #include <doctest/doctest.h>
+
+#include "visualizer/app/window_figures.hpp"
 
 using namespace kerf;
 

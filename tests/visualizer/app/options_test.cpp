@@ -55,9 +55,9 @@ TEST_CASE("a size that is none is refused with the limits") {
 }
 
 TEST_CASE("the gradient and a tool of voxels are part of the first look") {
-  CHECK(first_look(*parse({})).gradient == Gradient::corners);
-  CHECK_FALSE(first_look(*parse({})).voxel_tool);
-  const Look look = first_look(*parse({"--gradient", "farid5", "--voxel-tool"}));
+  CHECK(parse({})->look.gradient == Gradient::corners);
+  CHECK_FALSE(parse({})->look.voxel_tool);
+  const Look look = parse({"--gradient", "farid5", "--voxel-tool"})->look;
   CHECK(look.gradient == Gradient::farid5);
   CHECK(look.voxel_tool);
   CHECK_THROWS_WITH_AS(parse({"--gradient", "sobel"}),
@@ -75,7 +75,7 @@ TEST_CASE("an unknown renderer is refused and the known ones are named") {
 }
 
 TEST_CASE("each volume may have a renderer of its own, and one kind of them looks into volumes") {
-  CHECK(first_look(*parse({"--renderer", "surface,blend"})).renderer == "surface,blend");
+  CHECK(parse({"--renderer", "surface,blend"})->look.renderer == "surface,blend");
   CHECK_THROWS_WITH_AS(parse({"--renderer", "surface,"}),
                        doctest::Contains("--renderer:  is unknown; known: iso"), VisualizerError);
   CHECK_THROWS_WITH_AS(parse({"--renderer", "blend,iso,slices"}),

@@ -270,7 +270,7 @@ TEST_CASE("every renderer draws a session") {
     const std::string renderer(kind);
     CAPTURE(renderer);
     VisualizerOptions options = place.options();
-    options.renderer = renderer;
+    options.look.renderer = renderer;
     options.out = place.path / renderer;
     CHECK(run_headless(options) == 0);
     pictures.push_back(contents(options.out / "frame-0001.png"));
@@ -278,7 +278,7 @@ TEST_CASE("every renderer draws a session") {
   }
   CHECK(pictures[0] != pictures[1]);
   VisualizerOptions options = place.options();
-  options.renderer = "surface,blend";
+  options.look.renderer = "surface,blend";
   CHECK_THROWS_WITH_AS(static_cast<void>(run_headless(options)),
                        doctest::Contains("surface,blend is for 2 volumes, and the scene has 1"),
                        VisualizerError);
@@ -308,7 +308,7 @@ TEST_CASE("a headless run exports the final surface, drawn by the surface render
   const Place place;
   Miller miller;
   VisualizerOptions options = place.options();
-  options.renderer = "surface";
+  options.look.renderer = "surface";
   options.mesh = place.path / "block.stl";
   auto code = std::async(std::launch::async, [&] { return run_headless(options); });
   miller.run_to(51);
@@ -336,7 +336,7 @@ TEST_CASE("a sheet at the end of a headless run shows the opacities of --transfe
     VisualizerOptions options = place.options();
     options.sheet = place.path / "sheet.png";
     options.transfer = "named in messages only";
-    options.opacities = {{"bone", opacity}};
+    options.look.opacities = {{"bone", opacity}};
     CHECK(run_headless(options) == 0);
     sheets.push_back(contents(*options.sheet));
     CHECK(sheets.back().substr(1, 3) == "PNG");

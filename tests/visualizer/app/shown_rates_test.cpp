@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "visualizer/app/shown_rates.hpp"
-
 #include <chrono>
 
 #include <doctest/doctest.h>
+
+#include "visualizer/app/window_figures.hpp"
 
 using namespace kerf;
 using namespace std::chrono_literals;

@@ -16,8 +16,8 @@
 #include "shared/posix/new_file.hpp"
 #include "tests/visualizer/gl/gl_fixture.hpp"
 #include "tests/visualizer/surface/mesh_checks.hpp"
-#include "visualizer/app/export_surface.hpp"
 #include "visualizer/error.hpp"
+#include "visualizer/surface/mesh_file.hpp"
 
 using namespace kerf;
 using namespace kerf::test;

@@ -80,7 +80,6 @@ TEST_CASE("the bench's table has a line for each subject, beside the paper's fig
     return PictureRow{.renderer = renderer,
                       .volume = large,
                       .tool = tool,
-                      .modifying = tool > 0,
                       .partial = partial,
                       .cpu_ms = 2.0 * wall_ms,
                       .wall_ms_p50 = wall_ms,

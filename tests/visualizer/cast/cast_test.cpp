@@ -35,8 +35,8 @@ Cast cast(Caster& caster, const View& view) {
 }
 
 /// Translucent: a tenth and a third of opacity over a voxel edge.
-CastMatter matter(std::span<const MaterialView> materials = {}) {
-  CastMatter made{.materials = make_palette(materials), .empty = 0.2, .full = 0.5};
+TransferFunction matter(std::span<const MaterialView> materials = {}) {
+  TransferFunction made{.materials = make_palette(materials), .empty = 0.2, .full = 0.5};
   for (glm::vec4& material : made.materials[0]) material.w = 0.1F;
   for (glm::vec4& material : made.materials[1]) material.w = 0.33F;
   return made;

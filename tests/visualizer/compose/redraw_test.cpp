@@ -18,7 +18,7 @@
 #include "visualizer/app/picture.hpp"
 #include "visualizer/error.hpp"
 #include "visualizer/render/renderer_choice.hpp"
-#include "visualizer/view/screen_bounds.hpp"
+#include "visualizer/view/camera.hpp"
 
 using namespace kerf;
 using namespace kerf::test;

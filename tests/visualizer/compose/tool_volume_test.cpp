@@ -14,7 +14,7 @@
 #include "visualizer/compose/mesh.hpp"
 #include "visualizer/compose/scene_painter.hpp"
 #include "visualizer/error.hpp"
-#include "visualizer/view/palette.hpp"
+#include "visualizer/view/transfer_function.hpp"
 
 using namespace kerf;
 using namespace kerf::test;

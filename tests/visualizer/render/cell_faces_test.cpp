@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "visualizer/texture/cell_faces.hpp"
-
 #include <algorithm>
 
 #include <doctest/doctest.h>
 #include <rapidcheck.h>
+
+#include "visualizer/texture/cells_on_gpu.hpp"
 
 using namespace kerf;
 

@@ -11,7 +11,7 @@
 #include <glm/gtc/matrix_transform.hpp>
 
 #include "tests/visualizer/gl/gl_fixture.hpp"
-#include "visualizer/cast/cast_eye.hpp"
+#include "visualizer/cast/cast_volume.hpp"
 
 using namespace kerf;
 using namespace kerf::test;

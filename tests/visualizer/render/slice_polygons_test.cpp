@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "visualizer/render/slice_polygons.hpp"
-
 #include <cmath>
 
 #include <doctest/doctest.h>
 #include <glm/gtc/matrix_transform.hpp>
 #include <rapidcheck.h>
+
+#include "visualizer/render/slices_renderer.hpp"
 
 using namespace kerf;
 

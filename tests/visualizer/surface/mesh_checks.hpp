@@ -14,7 +14,7 @@
 #include <glm/glm.hpp>
 
 #include "tests/visualizer/gl/gl_fixture.hpp"
-#include "visualizer/surface/closed_mesh.hpp"
+#include "visualizer/surface/mesh_file.hpp"
 
 namespace kerf::test {
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "visualizer/view/palette.hpp"
-
 #include <doctest/doctest.h>
+
+#include "visualizer/view/transfer_function.hpp"
 
 using namespace kerf;
 

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "visualizer/view/stereo.hpp"
-
 #include <cmath>
 
 #include <doctest/doctest.h>
@@ -8,6 +6,7 @@
 
 #include "tests/visualizer/gl/gl_fixture.hpp"
 #include "visualizer/render/renderer.hpp"
+#include "visualizer/view/camera.hpp"
 
 using namespace kerf;
 using namespace kerf::test;

@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "hil/devmodel/bus_cycle.hpp"
+#include "hil/devmodel/packet_device.hpp"
+#include "shared/posix/monotonic_clock.hpp"
+
+namespace kerf {
+
+/// The time of an emulated USB device: frames of 1 ms by the machine's clock. Its mechanics catch
+/// up cycle by cycle (125 us), and whoever drives this handles the packets that fall due.
+class UsbTime {
+ public:
+  /// Advances `device` to the present; `hear(packet)` for each of its packets, `frame()` at the end
+  /// of the cycle that begins each frame.
+  template <class Hear, class Frame>
+  void catch_up(PacketDevice& device, Hear hear, Frame frame) {
+    const std::int64_t now = (monotonic_ns() - began_ns_) / kNsPerCycle;
+    while (cycle_ < now) {
+      ++cycle_;
+      device.advance(1);
+      for (auto packet = device.next_packet(); !packet.empty(); packet = device.next_packet()) {
+        hear(packet);
+      }
+      if (cycle_ % kCyclesPerUsbFrame == 0) frame();
+    }
+  }
+  /// Since the start, in cycles.
+  [[nodiscard]] std::int64_t cycle() const noexcept { return cycle_; }
+  /// When the next frame begins, CLOCK_MONOTONIC.
+  [[nodiscard]] std::int64_t next_frame_ns() const noexcept {
+    const std::int64_t frame = cycle_ / kCyclesPerUsbFrame + 1;
+    return began_ns_ + frame * kCyclesPerUsbFrame * kNsPerCycle;
+  }
+
+ private:
+  static constexpr std::int64_t kNsPerCycle = kNsPerSecond / kCyclesPerSecond;
+  std::int64_t began_ns_ = monotonic_ns();
+  std::int64_t cycle_ = 0;
+};
+
+/// What may happen to a device on USB.
+enum class UsbFault : std::uint8_t {
+  stall,   ///< the endpoint that is read halts until the host clears it (Falcon)
+  split,   ///< for 0.1 s the serial line is slow: packets come in pieces (Falcon)
+  deaf,    ///< for 0.1 s it takes nothing: what the host writes has to wait (FUSE nodes)
+  vanish,  ///< unplugged
+  back,    ///< plugged in again, without power having been lost
+};
+
+/// How long one lasts that passes by itself.
+inline constexpr int kUsbFaultFrames = 100;
+
+/// A fault, and when it strikes.
+struct ScriptedUsbFault {
+  std::int64_t cycle = 0;  ///< of 125 us, counted from the start
+  UsbFault fault = UsbFault::vanish;
+  const std::atomic<bool>* when = nullptr;  ///< and not before this is set; any thread may do so
+};
+
+/// Plays faults, which are given in the order of time.
+class UsbFaultScript {
+ public:
+  explicit UsbFaultScript(std::vector<ScriptedUsbFault> faults) : faults_(std::move(faults)) {}
+
+  /// `strike(fault)` for each that is due in `cycle` or before it and has not struck yet.
+  template <class Strike>
+  void run(std::int64_t cycle, Strike strike) {
+    while (next_ < faults_.size() && is_due(faults_[next_], cycle)) strike(faults_[next_++].fault);
+  }
+
+ private:
+  static bool is_due(const ScriptedUsbFault& entry, std::int64_t cycle) noexcept {
+    return entry.cycle <= cycle && (!entry.when || entry.when->load());
+  }
+
+  std::vector<ScriptedUsbFault> faults_;
+  std::size_t next_ = 0;
+};
+
+/// A control request to a USB device, as on the bus (USB 2.0, 9.3).
+struct UsbSetup {
+  static constexpr std::size_t kBytes = 8;
+
+  std::uint8_t type = 0;
+  std::uint8_t request = 0;
+  std::uint16_t value = 0;
+  std::uint16_t index = 0;
+  std::uint16_t length = 0;
+};
+
+[[nodiscard]] inline UsbSetup setup_of(std::span<const std::uint8_t, UsbSetup::kBytes> b) noexcept {
+  const auto word = [&](std::size_t at) {
+    return static_cast<std::uint16_t>(b[at] | b[at + 1] << 8);
+  };
+  return {b[0], b[1], word(2), word(4), word(6)};
+}
+
+// What descriptors are written from.
+constexpr int low(std::uint16_t value) noexcept {
+  return value & 0xFF;
+}
+constexpr int high(std::uint16_t value) noexcept {
+  return value >> 8;
+}
+/// Each value is one byte, 0..255.
+template <class... Values>
+[[nodiscard]] constexpr std::array<std::uint8_t, sizeof...(Values)> usb_bytes(
+    Values... values) noexcept {
+  return {static_cast<std::uint8_t>(values)...};
+}
+
+}  // namespace kerf

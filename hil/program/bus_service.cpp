@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "hil/program/bus_service.hpp"
+
+#include <ostream>
+#include <utility>
+
+#include "hil/front/firewire/firewire_node.hpp"
+#include "hil/front/fuse/fuse_mount.hpp"
+#include "hil/front/uhid/uhid_arm.hpp"
+#include "hil/front/usb/hidraw_node.hpp"
+#include "hil/front/usb/usbfs_node.hpp"
+#include "hil/front/usbip/usbip_falcon.hpp"
+
+namespace kerf {
+namespace {
+
+/// Serves `node` as `mount`/`name`; `cycles()` since the start.
+template <class Node, class Cycles>
+void serve_node(const BusService& service, const std::string& mount, const char* device,
+                const std::string& name, Node& node, Cycles cycles) {
+  FuseMount folder(mount);
+  folder.add(name, node);
+  service.out << "kerf-emulator: " << device << " at " << mount << '/' << name << std::endl;
+  folder.serve([&] { return service.goes_on(cycles(), node.left()); });
+  service.stats.wake = folder.lateness();
+}
+
+}  // namespace
+
+void serve_fuse(const BusService& service, const std::string& mount, const FirewireSettings& omni) {
+  FirewireNode node(omni, service.device);
+  serve_node(service, mount, "omni", "fw1", node, [&] { return node.bus().cycle() - kFirstCycle; });
+  service.stats.sent = node.bus().stats().reports;
+  service.stats.dropped = node.bus().stats().unheard;
+}
+
+void serve_fuse(const BusService& service, const std::string& mount,
+                const FtdiFalcon::Settings& falcon, std::vector<ScriptedUsbFault> script) {
+  UsbfsNode node(falcon, std::move(script), service.device);
+  serve_node(service, mount, "falcon", "usb", node, [&] { return node.chip().time().cycle(); });
+  service.stats.sent = node.chip().reports();
+  service.stats.dropped = node.chip().lost();
+}
+
+void serve_fuse(const BusService& service, const std::string& mount,
+                const WoodenHid::Settings& wooden) {
+  HidrawNode node(wooden, service.device);
+  serve_node(service, mount, "woodenhaptics", "hidraw0", node,
+             [&] { return node.arm().time().cycle(); });
+  service.stats.sent = node.arm().reports();
+  service.stats.dropped = node.lost();
+}
+
+void serve_usbip(const BusService& service, const FtdiFalcon::Settings& falcon,
+                 std::vector<ScriptedUsbFault> script) {
+  UsbipFalcon device(falcon, std::move(script), service.device, plug_into_vhci);
+  service.out << "kerf-emulator: falcon at a port of vhci_hcd" << std::endl;
+  const auto goes_on = [&] {  // a kernel that let go does not come back, even to one that stays
+    return !device.left() && service.goes_on(device.chip().time().cycle(), false);
+  };
+  serve_kernel(device, goes_on, service.stats.wake);
+  service.stats.sent = device.chip().reports();
+  service.stats.dropped = device.chip().lost();
+}
+
+void serve_uhid(const BusService& service, const WoodenHid::Settings& wooden) {
+  UhidArm device(open_uhid(), wooden, service.device);
+  service.out << "kerf-emulator: woodenhaptics at /dev/uhid" << std::endl;
+  const auto goes_on = [&] { return service.goes_on(device.arm().time().cycle(), device.left()); };
+  serve_kernel(device, goes_on, service.stats.wake);
+  service.stats.sent = device.arm().reports();
+  service.stats.dropped = device.lost();
+}
+
+}  // namespace kerf

@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "hil/script/script_table.hpp"
+
+#include <algorithm>
+#include <fstream>
+#include <ios>
+#include <system_error>
+#include <utility>
+
+#include "hil/hil_error.hpp"
+#include "shared/text/number.hpp"
+#include "shared/text/words.hpp"
+
+namespace kerf {
+namespace {
+
+constexpr std::size_t kMaxBytes = 1 << 20;
+
+}  // namespace
+
+ScriptTable::ScriptTable(const TomlNode& node, std::string place, std::string name)
+    : node_(node), place_(std::move(place)), name_(std::move(name)) {}
+
+void ScriptTable::fail(const TomlNode& node, std::string_view key, const std::string& why) const {
+  const std::string dot = name_.empty() || key.empty() ? "" : ".";
+  throw HilError(place_ + ":" + std::to_string(node.line) + ": " + name_ + dot + std::string(key) +
+                 why);
+}
+
+void ScriptTable::fail(const std::string& why) const {
+  fail(node_, "", why);
+}
+
+void ScriptTable::allow_only(std::initializer_list<std::string_view> keys) const {
+  for (const TomlNode& entry : node_.entries) {
+    if (std::ranges::find(keys, entry.key) != keys.end()) continue;
+    fail(entry, entry.key, ": unknown key; known here: " + listed(keys));
+  }
+}
+
+double ScriptTable::checked(const TomlNode& node, std::string_view key, ScriptRange range) const {
+  const auto value = node.number();
+  if (!value) fail(node, key, ": not a number; write one");
+  const auto [low, high, above_low] = range;
+  if (*value <= high && (above_low ? *value > low : *value >= low)) return *value;  // no nan is
+  fail(node, key,
+       " = " + node.shown + " is out of range; use " + (above_low ? "more than " : "") +
+           number_text(low) + (above_low ? ", at most " : " to ") + number_text(high));
+}
+
+double ScriptTable::number(std::string_view key, double otherwise, ScriptRange range) const {
+  const TomlNode* node = node_.find(key);
+  return node == nullptr ? otherwise : checked(*node, key, range);
+}
+
+void ScriptTable::read_list(std::string_view key, std::span<double> into, ScriptRange range) const {
+  const TomlNode& list = *node_.find(key);
+  if (list.form != TomlNode::Form::array || list.entries.size() != into.size()) {
+    fail(list, key, ": not a list; write " + std::to_string(into.size()) + " numbers");
+  }
+  for (std::size_t i = 0; i < into.size(); ++i) into[i] = checked(list.entries[i], key, range);
+}
+
+std::string ScriptTable::word(std::string_view key, const std::string& otherwise,
+                              std::span<const std::string_view> words) const {
+  const TomlNode* node = node_.find(key);
+  if (node == nullptr) return otherwise;
+  const auto* value = std::get_if<std::string>(&node->value);
+  if (value != nullptr && std::ranges::find(words, *value) != words.end()) return *value;
+  fail(*node, key, ": unknown value; use one of " + listed(words));
+}
+
+bool ScriptTable::flag(std::string_view key) const {
+  const TomlNode* node = node_.find(key);
+  if (node == nullptr) return false;
+  if (const bool* value = std::get_if<bool>(&node->value)) return *value;
+  fail(*node, key, ": not a truth value; use true or false");
+}
+
+std::span<const TomlNode> ScriptTable::tables(const std::string& key, std::size_t most) const {
+  const TomlNode* list = node_.find(key);
+  const auto is_table = [](const TomlNode& entry) { return entry.form == TomlNode::Form::table; };
+  if (list == nullptr || list->form != TomlNode::Form::array || list->entries.empty() ||
+      !std::ranges::all_of(list->entries, is_table)) {
+    throw HilError(place_ + ": no " + key + "s; add at least one [[" + key + "]]");
+  }
+  if (list->entries.size() > most) {
+    throw HilError(place_ + ": " + std::to_string(list->entries.size()) + " " + key +
+                   "s; use at most " + std::to_string(most));
+  }
+  return list->entries;
+}
+
+TomlNode parse_script(std::string_view text, const std::string& place) {
+  try {
+    return parse_toml(text);
+  } catch (const TomlError& error) {
+    throw HilError(place + ":" + std::to_string(error.line) + ": " + one_line(error.what()));
+  }
+}
+
+std::string read_script(const std::filesystem::path& file, const std::string& example) {
+  const std::string place = file.string();
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(file, error)) {
+    throw HilError(place + ": not a file; name one such as " + example);
+  }
+  std::ifstream in(file, std::ios::binary);
+  std::string text(kMaxBytes + 1, '\0');
+  in.read(text.data(), static_cast<std::streamsize>(text.size()));
+  text.resize(static_cast<std::size_t>(in.gcount()));
+  if (in.bad() || (!in.eof() && text.size() <= kMaxBytes)) {
+    throw HilError(place + ": cannot be read; check its rights");
+  }
+  if (text.size() > kMaxBytes) throw HilError(place + ": more than 1 MiB; use a shorter one");
+  return text;
+}
+
+}  // namespace kerf
