@@ -70,11 +70,11 @@ Json table_json(std::string_view table, SceneParts& parts, SceneKeys keys) {
   Json object;
   SceneParts defaults;
   for (const SceneKey& key : keys_of(table, keys)) {
-    const InJson told = key.more.json;
-    if (told == InJson::never || (told != InJson::always && !is_used(key, parts))) continue;
+    const InJson shown = key.options.json;
+    if (shown == InJson::never || (shown != InJson::always && !is_used(key, parts))) continue;
     const TomlValue value = value_of(key, parts);
     if (std::holds_alternative<std::monostate>(value)) continue;
-    if (told == InJson::if_changed && value == value_of(key, defaults)) continue;
+    if (shown == InJson::if_changed && value == value_of(key, defaults)) continue;
     object[name_in_table(key)] = json_of(value);
   }
   return object;

@@ -24,9 +24,9 @@ namespace kerf {
 namespace {
 
 template <class N>
-class SceneIn final : public CompiledScene {
+class CompiledSceneOf final : public CompiledScene {
  public:
-  SceneIn(const LoadedScene& scene, const KernelSet& kernels) : memory_(scene) {
+  CompiledSceneOf(const LoadedScene& scene, const KernelSet& kernels) : memory_(scene) {
     plan_device(scene.device, plan_);
     plan_limits(scene, plan_);
     plan_.kernel = scene.servo.kernel;
@@ -126,13 +126,13 @@ std::unique_ptr<CompiledScene> plan_scene(const LoadedScene& scene, const Kernel
   }
   switch (scene.servo.numeric) {
     case NumericKind::fixed:
-      return std::make_unique<SceneIn<FixedNumbers>>(scene, kernels);
+      return std::make_unique<CompiledSceneOf<FixedNumbers>>(scene, kernels);
     case NumericKind::float32:
-      return std::make_unique<SceneIn<FloatNumbers>>(scene, kernels);
+      return std::make_unique<CompiledSceneOf<FloatNumbers>>(scene, kernels);
     case NumericKind::float64:
       break;
   }
-  return std::make_unique<SceneIn<DoubleNumbers>>(scene, kernels);
+  return std::make_unique<CompiledSceneOf<DoubleNumbers>>(scene, kernels);
 }
 
 std::unique_ptr<CompiledScene> compile(LoadedScene& scene, const KernelSet& kernels) {

@@ -43,7 +43,7 @@ struct Allowed {
   std::span<const std::string_view> words{};
 };
 
-/// Which choice of another key gives a key a meaning: that it is `word`, or that it is not.
+/// The key counts only while another key is `word`, or is not.
 struct SceneCondition {
   std::string_view key{};  ///< `table.key`; empty: none is needed
   std::string_view word{};
@@ -51,21 +51,20 @@ struct SceneCondition {
   std::string_view refusal{};  ///< what follows `table.key = value` else; empty: names the choice
 };
 
-/// Whether readers of the segment are told a key. All that they are told is part of the scene's
-/// identity (config_hash): a new key is told `if_changed`, so that the scenes of before keep
-/// theirs.
+/// Whether a key is in the scene's JSON, which readers of the segment get. What is in the JSON is
+/// hashed (config_hash). Give a new key `if_changed`: older scenes then keep their hash.
 enum class InJson : std::uint8_t { used, always, if_changed, never };
 
-/// What few rows say.
-struct KeyMore {
+/// Settings that few rows need.
+struct KeyOptions {
   std::string_view default_text{};  ///< where the default is no plain value
   std::string_view required_as{};   ///< where there is no default: how to write one
-  InJson json = InJson::used;       ///< of volumes and tools, what is loaded is told instead
+  InJson json = InJson::used;       ///< scene_json.cpp writes volumes and tools
   bool one_for_all = false;         ///< one number stands for a list of equal ones
 };
 
 /// One row of the table of keys: all that is known of one key of a scene file. Reading, the answer
-/// to every mistake, the scene's JSON, `--check` and docs/scene-keys.md come from it.
+/// to every mistake, the JSON of settings, `--check` and docs/scene-keys.md come from it.
 struct SceneKey {
   std::string_view name;  ///< `table.key`
   std::string_view unit;  ///< empty: a plain number, a text or a switch
@@ -73,7 +72,7 @@ struct SceneKey {
   Allowed allowed;
   std::string_view meaning;
   SceneCondition only_with{};  ///< where it does not hold, the key is refused
-  KeyMore more{};
+  KeyOptions options{};
 };
 using SceneKeys = std::span<const SceneKey>;
 

@@ -57,7 +57,7 @@ constexpr SceneCondition kNoMesh{
     "file)"};
 
 // Ranges are wide enough for any tooth, bone and device, narrow enough that a slip of the unit
-// shows. A row: key, unit, member, allowed values; meaning, condition, more.
+// shows. A row: key, unit, member, allowed values; meaning, condition, options.
 // clang-format off
 constexpr SceneKey kKeys[] = {
     {"scene.title", "", at<&SceneSettings::title>, {},

@@ -63,9 +63,9 @@ std::string condition_text(const SceneCondition& condition) {
 
 std::string row_of(const SceneKey& key) {
   SceneParts parts;
-  std::string by_default(key.more.default_text);
+  std::string by_default(key.options.default_text);
   if (by_default.empty()) by_default = written(value_of(key, parts));
-  if (!key.more.required_as.empty()) by_default = "required";
+  if (!key.options.required_as.empty()) by_default = "required";
   return "| `" + std::string(name_in_table(key)) + "` | " + std::string(key.unit) + " | " +
          std::visit(AllowedText{key.allowed}, key.at(parts)) + " | " + by_default + " | " +
          std::string(key.meaning) + condition_text(key.only_with) + " |\n";

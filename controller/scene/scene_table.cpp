@@ -43,7 +43,7 @@ struct Take {
   }
   template <std::size_t N>
   void operator()(std::array<double, N>* into) const {
-    const bool one = key.more.one_for_all && node.form != TomlNode::Form::array;
+    const bool one = key.options.one_for_all && node.form != TomlNode::Form::array;
     if (!one && (node.form != TomlNode::Form::array || node.entries.size() != N)) {
       refuse(place, " is not a list of " + std::to_string(N) + " numbers; write " +
                         (N == 2   ? "[a, b]"
@@ -133,7 +133,7 @@ void SceneTable::read_conditional(SceneParts& parts) const {
 
 void SceneTable::read(const SceneKey& key, SceneParts& parts) const {
   const std::string_view name = name_in_table(key);
-  const std::string form(key.more.required_as);
+  const std::string form(key.options.required_as);
   if (has(name)) {
     std::visit(Take{key, *node_->find(name), place(name)}, key.at(parts));
   } else if (!form.empty()) {

@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "hil/devmodel/arm_pose.hpp"
+#include "hil/devmodel/arm_math.hpp"
 #include "hil/devmodel/bus_cycle.hpp"
 #include "hil/devmodel/hand_script.hpp"
 #include "hil/devmodel/motor_chain.hpp"

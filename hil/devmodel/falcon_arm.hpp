@@ -3,7 +3,7 @@
 
 #include <array>
 
-#include "hil/devmodel/arm_pose.hpp"
+#include "hil/devmodel/arm_math.hpp"
 #include "shared/wire/falcon_constants.hpp"
 
 namespace kerf {

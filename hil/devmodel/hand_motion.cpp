@@ -26,7 +26,7 @@ HandMotion::HandMotion(const HandScript& script, const HandRoute& route)
   const DeviceVec<double> rest = route.rest_tip_mm;
   const DeviceVec<double> start = vec_of(script.start) * script.unit_mm;
   for (const HandStep& step : route.calibration) add(step, 1.0);
-  way_from_ = legs_.size();
+  leaves_at_ = legs_.size();
   if (route.lift_mm > 0) {
     add(hand_move(rest + DeviceVec<double>{0, route.lift_mm, 0}, route.lift_s), 1.0);
   }
@@ -45,7 +45,7 @@ void HandMotion::calibrate() noexcept {
 }
 
 void HandMotion::leave() noexcept {
-  if (phase_ == Phase::resting) leg_ = way_from_;
+  if (phase_ == Phase::resting) leg_ = leaves_at_;
   phase_ = Phase::left;  // a motion of the calibration that has begun comes to its end
 }
 
@@ -90,12 +90,12 @@ void HandMotion::begin_next_leg() noexcept {
   cycle_ = 0;
   ++leg_;
   if (leg_ == legs_.size()) leg_ = repeat_from_;
-  if (leg_ == way_from_ && phase_ == Phase::calibrating) leg_ = 0;  // once more, until it may leave
+  if (leg_ == leaves_at_ && phase_ == Phase::calibrating) leg_ = 0;  // again, until it leaves
 }
 
 HandGoal HandMotion::next() noexcept {
   HandGoal goal;
-  const bool moves = left() || (phase_ == Phase::calibrating && way_from_ > 0);
+  const bool moves = left() || (phase_ == Phase::calibrating && leaves_at_ > 0);
   goal.calibrate = phase_ == Phase::calibrating && !moves;
   if (!moves) return goal;
   goal.in_inkwell = false;

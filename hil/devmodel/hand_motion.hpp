@@ -43,7 +43,7 @@ class HandMotion {
   void begin_next_leg() noexcept;
 
   std::vector<Leg> legs_;        ///< calibration, way to the start, script
-  std::size_t way_from_ = 0;     ///< first leg after the calibration
+  std::size_t leaves_at_ = 0;    ///< first leg after the calibration
   std::size_t repeat_from_ = 0;  ///< legs_.size(): no repeat
   std::size_t leg_ = 0;
   std::int64_t cycle_ = 0;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "hil/devmodel/arm_pose.hpp"
+#include "hil/devmodel/arm_math.hpp"
 #include "shared/numeric/vec.hpp"
 #include "shared/wire/omni_constants.hpp"
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "hil/devmodel/arm_pose.hpp"
+#include "hil/devmodel/arm_math.hpp"
 #include "hil/devmodel/plant_params.hpp"
 
 namespace kerf {

@@ -73,7 +73,7 @@ int BenchCommand::run(std::ostream& out) const {
     throw HilError("bench: a sanitized build's times mean nothing; use the release preset");
   } else {
     out << "ns a tick on core " << core << "; 256 x 256 x 161 voxels; ratio to the paper's form\n"
-        << "tick                     number way               p50        p99    ratio        "
+        << "tick                     number kernel            p50        p99    ratio        "
            "bytes\n";
     const auto add_row = [&](const KernelRow& row) { out << line_of(row) << std::endl; };
     const auto rows = bench_kernels(add_row);

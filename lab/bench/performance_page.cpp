@@ -43,7 +43,7 @@ smallest.
 )";
 
 std::string table_of(const std::vector<KernelRow>& rows) {
-  std::string page = "| tick | numbers | way | p50 us | p99 us | ratio | bytes |\n";
+  std::string page = "| tick | numbers | kernel | p50 us | p99 us | ratio | bytes |\n";
   page += "|---|---|---|---:|---:|---:|---:|\n";
   for (const KernelRow& row : rows) {
     char line[192];

@@ -62,7 +62,7 @@ void draw(std::ostream& script, const Slide& slide) {
     script << at.travel_mm << ' ' << at.paper << ' ' << at.proxy << '\n';
   });
   script << "set title 'slide over a ball of R 40 voxels, 2 deep, 50 mm/s'\n"
-            "set xlabel 'way (mm)'\nset ylabel 'force over its mean'\nset yrange [0.98:1.02]\n"
+            "set xlabel 'path (mm)'\nset ylabel 'force over its mean'\nset yrange [0.98:1.02]\n"
             "plot $slide using 1:3 title 'proxy' with "
          << kProxyLine << ", $slide using 1:2 title 'paper' with " << kPaperLine
          << "\nset yrange [*:*]\n";

@@ -97,7 +97,7 @@ struct Samples {
     if (key.name == "volume.pose.orientation") numbers = {1, 0, 0, 0};  // of length one
     right = {list_of(numbers)};
     if (N == 3) right.push_back(list_of({lo, lo, lo}));
-    if (key.more.one_for_all) right.push_back(number_text(lo));
+    if (key.options.one_for_all) right.push_back(number_text(lo));
     for (const std::string& value : outside()) {
       std::string list = list_of(std::vector<double>(N - 1, hi));
       list.insert(list.size() - 1, ", " + value);
@@ -108,7 +108,7 @@ struct Samples {
       wrong.push_back({list_of(std::vector<double>(count, hi)), form});
     }
     wrong.push_back({"[]", form});
-    wrong.push_back({"\"zzz\"", key.more.one_for_all ? kNoNumber : form});
+    wrong.push_back({"\"zzz\"", key.options.one_for_all ? kNoNumber : form});
     std::string mixed = list_of(std::vector<double>(N - 1, hi));
     wrong.push_back({mixed.insert(mixed.size() - 1, ", true"), kNoNumber});
   }
@@ -191,7 +191,7 @@ TEST_CASE("every row: its default is allowed") {
     if (const auto* numbers = std::get_if<std::vector<double>>(&value)) {
       CHECK(std::ranges::all_of(*numbers, allowed));
     }
-    CHECK((key.allowed.words.empty() || !key.more.required_as.empty() ||
+    CHECK((key.allowed.words.empty() || !key.options.required_as.empty() ||
            !std::holds_alternative<std::monostate>(value)));
   }
 }
@@ -208,7 +208,7 @@ TEST_CASE("every row: a key that the scene's choices leave no meaning is refused
 TEST_CASE("every row: a key without a default is asked for") {
   std::size_t count = 0;
   for (const SceneKey& key : scene_keys()) {
-    if (key.more.required_as.empty()) continue;
+    if (key.options.required_as.empty()) continue;
     SceneLines lines = scene_for(key).drop(key.name);
     const std::string table(key.name.substr(0, key.name.find('.')));
     if (table == "material") lines.set("material.iso", "0.5");
@@ -337,7 +337,7 @@ TEST_CASE("docs/scene-keys.md is what the table says") {
   const VoxelGrid grid = PhantomSpec{}.grid;
   const double sides[] = {double(grid.nx), double(grid.ny), double(grid.nz)};
   const auto size = std::ranges::find(scene_keys(), "volume.size", &SceneKey::name);
-  CHECK(size->more.default_text == list_of({std::begin(sides), std::end(sides)}));
+  CHECK(size->options.default_text == list_of({std::begin(sides), std::end(sides)}));
 }
 
 TEST_CASE("a new row alone brings a key: it is read, checked, told, printed and explained") {

@@ -16,7 +16,7 @@ namespace {
 using falcon::FtdiRequest;
 
 constexpr int kAnswerMs = 20;  // the boot loader's latency timer is 16 ms
-constexpr int kProbes = 10;
+constexpr int kEchoTries = 10;
 constexpr int kEchoMs = 200;
 
 void purge(FalconLine& line) {
@@ -34,7 +34,7 @@ void settle_to_run(FalconLine& line) {
 bool runs(FalconLine& line) {
   falcon::Framer framer;
   std::array<std::uint8_t, falcon::kFtdiPacketBytes> bytes{};
-  for (int probe = 0; probe < kProbes; ++probe) {
+  for (int probe = 0; probe < kEchoTries; ++probe) {
     line.write(encode(FalconCommand{}));
     for (std::size_t size = 0; (size = line.read(bytes, kAnswerMs)) > 0;) {
       for (std::size_t i = 0; i < size; ++i) {

@@ -184,8 +184,8 @@ template <class N>
   using Unit = typename N::Unit;
   using Ratio = typename N::Ratio;
   const ContactVec<Unit> offset = direction<N>(-means.offset);
-  const Unit spread = falling_share<N>(Unit(std::min(norm(means.offset), Ratio(1))), 0.85, 0.7);
-  const Unit share = spread * falling_share<N>(dot(offset, downhill), 0.9397, 0.6428);
+  const Unit cancelled = falling_share<N>(Unit(std::min(norm(means.offset), Ratio(1))), 0.85, 0.7);
+  const Unit share = cancelled * falling_share<N>(dot(offset, downhill), 0.9397, 0.6428);
   if (share <= Unit{} || downhill == ContactVec<Unit>{}) return offset;
   return between<N>(offset, downhill, share);
 }

@@ -8,6 +8,8 @@
 
 namespace kerf {
 
+// Helpers of the arms' mechanics: a pose, an end stop, an encoder's count, three linear equations.
+
 /// One pose of an arm, both ways: joint angles and tip that belong together.
 struct ArmPose {
   JointVec<double> q;
