@@ -35,7 +35,7 @@ struct RecordSummary {
 
 /// Writes every row of the recording in `folder` as CSV, whole or not at all: one column per number
 /// (`position_mm_0` ...), floats in the shortest form that reads back to the same bits. Throws
-/// `RecordError`, or `SceneError` where the file cannot be written.
+/// `RecordError`, or `FileError` where the file cannot be written.
 void export_csv(const std::filesystem::path& folder, const std::filesystem::path& csv);
 
 /// Draws the recording in `folder` as an SVG of two panels over time: force magnitudes in N, and

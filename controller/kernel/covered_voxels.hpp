@@ -16,7 +16,7 @@
 
 namespace kerf {
 
-/// Index: label, 0 where a volume has no labels.
+/// Indexed by label; without labels all is at 0.
 template <class T>
 using ByMaterial = std::array<T, kMaxCutMaterials>;
 

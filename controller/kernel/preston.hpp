@@ -18,7 +18,7 @@ namespace kerf {
 // be cut carries its part of the force and stays. Over several volumes the sum of w goes through
 // all of them: each gets its share of the drive (F_n - F_0) omega/omega_ref (`cut_drive`).
 
-/// How force cuts one volume; constant during a run. Index: label, 0 where there are no labels.
+/// How force cuts one volume; constant during a run. Indexed by label; without labels all is at 0.
 template <class N>
 struct PrestonPlan {
   ByMaterial<ForceRate<N>> rate{};

@@ -18,10 +18,10 @@ struct SurfaceDrag {
   typename N::Unit arm{};  ///< distance from the axis over the rim radius, kSpeedFloor to 1
 };
 
-/// That of a ball whose contact bears a load along `normal`, out of the solid, at `arm` from the
-/// axis on average. Whatever places bear it, SUM load_i arm_i is -R times the load, so omega x arm
-/// is known without them. Most of what a ball covers of its own bore bears nothing, and changes
-/// sides where the ball moves by a tenth of a voxel.
+/// The drag of a ball. `normal`: direction of the load, out of the solid. `arm`: mean distance of
+/// the contact from the axis, over the rim radius. Whatever places bear it, SUM load_i arm_i is -R
+/// times the load, so omega x arm is known without them. Most of what a ball covers of its own bore
+/// bears nothing, and changes sides where the ball moves by a tenth of a voxel.
 template <class N>
 [[nodiscard]] constexpr SurfaceDrag<N> ball_drag(Vec<typename N::Unit, ToolSpace> normal,
                                                  typename N::Unit arm) noexcept {

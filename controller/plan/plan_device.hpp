@@ -16,6 +16,8 @@
 
 namespace kerf {
 
+// The device of a scene in the loop's numbers: joints, motors, kinematics, limits.
+
 namespace device_parts {
 
 /// How a joint of the servo's kinematics follows its encoder, and its motor the joint.

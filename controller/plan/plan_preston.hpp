@@ -59,7 +59,7 @@ template <class N>
   return friction_plan<N>(scene.cut.friction, 1.0 / scene.servo.rate_hz);
 }
 
-/// All of it, for the volumes of the plan; without labels, which get a place of their own later.
+/// The whole cutting plan. `ForceCutMemory` adds the labels later.
 template <class N>
 [[nodiscard]] ForceCutPlan<N> plan_force_cut(const LoadedScene& scene, const ServoPlan<N>& plan) {
   ForceCutPlan<N> cut;

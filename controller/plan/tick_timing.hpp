@@ -80,11 +80,11 @@ struct WorstTick {
   std::uint64_t covered = 0;  ///< what the last cut by force covered
 };
 
-/// Drives tool `t` through the functions of the servo step that feel and cut, as dearly as a hand
-/// could: the tool cuts where volume `v` is densest, turned as unfavourably as it can be and so
-/// slowly that it stays surrounded; where the swept proxy is felt, the hand jumps to and fro around
-/// that place in every tick, and turns, so that the proxy looks for its way as long as it may. A
-/// tick is all volumes'. Takes 250 ticks.
+/// Drives tool `t` through the functions of the servo step that feel and cut, at about the highest
+/// cost that a hand can cause: the tool cuts where volume `v` is densest, turned as unfavourably as
+/// it can be and so slowly that it stays surrounded; where the swept proxy is felt, the hand jumps
+/// to and fro around that place in every tick, and turns, so that the sweep needs many queries.
+/// Each tick covers all volumes. Takes 250 ticks.
 template <class N>
 class WorstDrive {
   using Real = typename N::Real;
@@ -141,7 +141,7 @@ class WorstDrive {
  private:
   static constexpr Rotation<N> kWidest = widest_rotation<N>();
 
-  /// Of a place in voxels of volume `v`. The rows of the way into it are orthogonal.
+  /// World place of `vox` in volume `v`: inverse of `voxel_from_world`, whose rows are orthogonal.
   [[nodiscard]] Place world(const std::array<double, 3>& vox) const {
     const VolumePlan<N>& volume = plan_->volumes[v_];
     std::array<double, 3> mm{};

@@ -35,8 +35,8 @@ struct ProxyContact {
   Placing placing = Placing::searching;
   ProxyPose<N> pose;
   ContactVec<typename N::Real> spring{};  ///< from goal to proxy, units: force over stiffness
-  ContactVec<typename N::Unit>
-      normal{};  ///< of the whole pressing force, out of the solid; 0 in air
+  /// Of the whole pressing force, out of the solid; 0 in air.
+  ContactVec<typename N::Unit> normal{};
   /// Torque about the tool's centre over the force's length, units.
   ContactVec<typename N::Real> moment_arm{};
   std::int32_t queries = 0;
@@ -49,8 +49,8 @@ inline constexpr double kLostDepth = 1;  // units
 /// Sets the contact's normal and moment arm: the sum of what presses, and its moment over the
 /// length of the spring (docs/theory.md 5.3). Friction acts where the loads do.
 ///
-/// What friction cannot hold of the spring is borne by planes that the sweep has not met (4.5). A
-/// tool that is still `moving` is not held there.
+/// The part of the spring beyond the friction cone is carried by planes that this tick did not meet
+/// (docs/theory.md 4.5). A tool that is still `moving` is not held there.
 template <class N>
 constexpr void add_loads(const Swept<N>& swept, typename N::Unit friction, bool moving,
                          ProxyContact<N>& contact) noexcept {

@@ -50,8 +50,8 @@ template <class N>
 struct ToolInVolume {
   /// Voxels per pitch along the world's axes; times the tool's rotation it is the sample step.
   Transform<typename N::Ratio, VoxelSpace, WorldSpace> voxel_from_pitch;
-  std::array<std::array<typename N::Step, 3>, 3>
-      unturned_step{};               ///< of a tool that keeps its axes
+  /// The sample step of a tool that keeps its axes.
+  std::array<std::array<typename N::Step, 3>, 3> unturned_step{};
   typename N::Step overlap_ratio{};  ///< a^3 / V_voxel
   Method method = Method::gather;
   const AlignedTable* aligned = nullptr;  ///< of the method `aligned`

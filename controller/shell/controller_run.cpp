@@ -31,7 +31,7 @@ namespace kerf {
 namespace {
 
 constexpr int kPortPatienceMs = 5000;
-constexpr double kStableNPerMm = 0.7;  // CHAI3D's cap for the Omni; the design's for couplings
+constexpr double kStableNPerMm = 0.7;  // CHAI3D's cap for the Omni; a stiffer contact is warned of
 
 const char* text_of(EndReason end) {
   switch (end) {

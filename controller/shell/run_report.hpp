@@ -36,7 +36,7 @@ struct RunReport {
   std::optional<double> start_to_force_ms;  ///< from start to the first force that was sent
 };
 
-/// JSON text with the keys of the design page; ends with a newline.
+/// All of it as JSON text; ends with a newline.
 [[nodiscard]] std::string report_json(const RunReport& report);
 
 /// The same figures for a person, on one screen.

@@ -35,7 +35,7 @@ struct Face {
 
 struct Rim {
   std::uint32_t a, b;
-  Point inward;  // across the edge into both faces, the sum of two ways of length 1
+  Point inward;  // across the edge into both faces, the sum of two unit vectors
 };
 
 /// Across the edge from a to b, into the face.

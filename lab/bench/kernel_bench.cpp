@@ -96,7 +96,7 @@ class Bench {
     });
   }
 
-  /// A slow cut, so that the tool stays surrounded by material: the dearest tick.
+  /// A slow cut, so that the tool stays surrounded by material: the costliest tick.
   void mill(const std::vector<Density>& density, const Ticks& ticks) {
     constexpr double kFraction = 1.0 / 4096;
     begin(ticks);

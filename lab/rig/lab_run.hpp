@@ -16,9 +16,8 @@ int pin_lab(int core);
 /// Three digits, or all before the point: how pages show their figures.
 [[nodiscard]] std::string page_number(double value);
 
-/// A file that is tried before the measurement, so that a wrong name costs nothing, and made after
-/// it, so that a run which is stopped leaves nothing behind. Does nothing for an empty path. Throws
-/// `HilError` that names the option.
+/// An output file. Its name is checked before the measurement; the file is made after it. Does
+/// nothing for an empty path. Throws `HilError` that names the option.
 class LabOutput {
  public:
   LabOutput(const char* option, std::string path);

@@ -176,7 +176,7 @@ TEST_CASE_TEMPLATE("the height of a peak does not depend on its dimension", N, F
 TEST_CASE_TEMPLATE(
     "what the queries of a tick look at is bounded; the first after a turn is answered", N,
     FixedNumbers, DoubleNumbers) {
-  // Felt on all sides, solid nowhere: the dearest that there is.
+  // Felt on all sides, solid nowhere: the costliest that there is.
   const TestVolume tissue = blurred({40, 40, 40}, [](Point p) { return 0.2 + 0.01 * (p[1] - 20); });
   for (const SceneTool& tool : {kBall, tool_of_units("cylinder", 5, 16)}) {
     QueryRig<N> rig(tool);

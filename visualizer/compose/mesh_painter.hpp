@@ -27,7 +27,7 @@ struct Paint {
   bool metal = false;
 };
 
-/// Draws meshes over the volumes, with true depth (equation (1)).
+/// Draws meshes over the volumes, with true depth (the paper's equation (1)).
 class MeshPainter {
  public:
   /// `world_from_mesh` may scale; hidden where something nearer is in `target`.

@@ -16,7 +16,7 @@
 namespace kerf {
 
 /// One volume for `iso`: what it is made of, its macrocells, and the gradient where it spans too
-/// many voxels for a shader to work it out: 8 bytes a voxel. Whole once, then bricks only.
+/// many voxels for a shader: 8 bytes a voxel. Uploaded whole once, then by changed bricks.
 class VolumeOnGpu {
  public:
   /// `skip_empty` false takes every cell for active: the slow obvious picture, for comparison.

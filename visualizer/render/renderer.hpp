@@ -16,8 +16,8 @@
 
 namespace kerf {
 
-/// Draws the volumes of one session. Every renderer writes colour and true depth (equation (1)), so
-/// several volumes, the tool and other meshes hide one another as they should.
+/// Draws the volumes of one session. Every renderer writes colour and true depth (the paper's
+/// equation (1)), so several volumes, the tool and other meshes hide one another as they should.
 ///
 /// Lives and is called on the thread whose GL context is current.
 class Renderer {

@@ -18,8 +18,8 @@ void check_renderers(const std::string& choice);
 [[nodiscard]] std::vector<std::string> renderer_of_each(const std::string& choice,
                                                         std::size_t volumes);
 
-/// `choice` with another renderer for one of `volumes` volumes; where it looks into that one, so it
-/// does into all that are looked into.
+/// `choice` with another renderer for one of `volumes` volumes. If the new renderer is translucent,
+/// it replaces every translucent one.
 [[nodiscard]] std::string with_renderer(const std::string& choice, std::size_t volumes,
                                         std::size_t volume, const std::string& kind);
 

@@ -35,8 +35,8 @@ class SectionFaces {
 /// Iso-surfaces as meshes: marching cubes on the CPU, again only around what changed; the GPU draws
 /// triangles and never sees the volume.
 ///
-/// A clip plane opens the shell that a mesh is. While volumes are cut open they are textures too,
-/// from which the face in the plane is drawn.
+/// A mesh is hollow; a clip plane would show its inside. While volumes are cut open they are
+/// textures too, from which the face in the plane is drawn.
 ///
 /// Honours the GL scissor: blocks beside it are not drawn at all.
 class SurfaceRenderer final : public Renderer {

@@ -10,8 +10,8 @@
 
 namespace kerf {
 
-/// Density and labels of one volume as textures: what solid.frag reads. Whole once, then bricks
-/// only.
+/// Density and labels of one volume as textures: what solid.frag reads. Uploaded whole
+/// once, then by changed bricks.
 class SolidOnGpu {
  public:
   /// Throws VisualizerError where the volume is beyond `max_texture_size`.

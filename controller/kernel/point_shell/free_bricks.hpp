@@ -12,8 +12,8 @@ namespace kerf {
 inline constexpr std::int32_t kFreeBrick = 2;
 
 /// Where a volume has nothing that contact could feel (docs/theory.md 2.3). Each brick of voxels
-/// has the Chebyshev distance, in bricks, to the nearest one with density: 0 if it has some itself,
-/// at most 255.
+/// has the Chebyshev distance, in bricks, to the nearest one with density that contact counts
+/// (r >= 1/16): 0 if it has some itself, at most 255.
 ///
 /// Made at load (controller/plan/tables/free_brick_map.hpp). Cutting only takes density away, so
 /// the map is a lower bound for ever and needs no update. Points into the maker's memory.
@@ -36,7 +36,7 @@ struct FreeBricks {
 };
 
 /// Distance that a brick needs so that no sample within `radius_vox` of a point in it, on each
-/// axis, reads a voxel of a brick with density. A sample reads the voxel after its own too.
+/// axis, reads a voxel of a brick with such density. A sample reads the voxel after its own too.
 [[nodiscard]] constexpr std::int32_t free_bricks_for(double radius_vox) noexcept {
   std::int32_t bricks = 1;
   while ((bricks - 1) * kFreeBrick < radius_vox + 1) ++bricks;

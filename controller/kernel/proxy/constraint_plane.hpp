@@ -11,8 +11,7 @@
 namespace kerf {
 
 /// Where the swept contact is solved: axes and origin of the world; one unit is the edge of the
-/// finest voxel of the scene's solid volumes (docs/theory.md 1.2). docs/contact.md calls it a
-/// voxel.
+/// finest voxel of all solid volumes (docs/theory.md 1.2). docs/contact.md calls it a voxel.
 struct ContactSpace;
 
 template <class S>
@@ -21,8 +20,8 @@ using ContactVec = Vec<S, ContactSpace>;
 /// Most planes that hold the tool at one place: a face, a crease, a corner.
 inline constexpr std::size_t kMaxPlanes = 3;
 
-/// What one contact asks of a tool whose centre is at q: the centre may move to any x with normal .
-/// (x - q) >= depth (docs/theory.md 4.3).
+/// A contact allows the centre, now at q, to be at any x with `dot(normal, x - q) >= depth`
+/// (docs/theory.md 4.3).
 template <class N>
 struct ConstraintPlane {
   ContactVec<typename N::Unit> normal{};  ///< out of the solid, length 1

@@ -29,20 +29,19 @@ concept ContactField = requires(F field, ContactVec<typename N::Real> q, ToolTur
 /// Constants of the sweep (docs/theory.md 4.2 and after); lengths in units of contact space.
 struct SweepRules {
   static constexpr std::int32_t kMaxQueries = 32;
-  static constexpr std::int32_t kMaxTurnQueries =
-      12;                                          ///< and a turn's pushes; the rest is the move's
+  /// No turn begins once so many queries are made, pushes included; the rest is the move's.
+  static constexpr std::int32_t kMaxTurnQueries = 12;
   static constexpr double kTolerance = 0.01;       ///< a place this deep is allowed
   static constexpr double kTurnTolerance = 0.005;  ///< of a turn: it leaves the move some play
   static constexpr double kNoMove = 0.002;         ///< from rest no shorter displacement is tried
   static constexpr double kArrived = 0.004;        ///< after a step this near counts as there
   /// Longest displacement of any sample between two queries. The middle of the thinnest wall, 2
-  /// units, is one unit deep: beyond it density falls again, and its gradient leads on through the
-  /// wall.
+  /// units, is one unit deep: beyond it density falls again, and its gradient leads onward.
   static constexpr double kStep = 0.875;
   static constexpr double kGain = 0.001;    ///< a step this much nearer to the goal is kept
   static constexpr double kResidual = 0.8;  ///< share of the displacement that a step may leave
-  static constexpr double kEased =
-      0.5;  ///< a next step shorter than this share of a failed one is tried whole
+  /// A next step shorter than this share of a failed one is tried whole.
+  static constexpr double kEased = 0.5;
   static constexpr double kShrink = 0.4;  ///< of a failed step, for the next try
   /// Share of a step below which the proxy rather lags. What a tool has milled leaves it a play of
   /// hundredths of a unit, where longer steps only meet the other wall: in its first kFineQueries
@@ -50,8 +49,8 @@ struct SweepRules {
   static constexpr double kShortest = 0.1;
   static constexpr double kFinest = 0.02;
   static constexpr std::int32_t kFineQueries = 14;
-  static constexpr std::int32_t kStillQueries =
-      24;                               ///< after so many without a nearer place the tool stays
+  /// After so many without a nearer place the tool stays.
+  static constexpr std::int32_t kStillQueries = 24;
   static constexpr double kPush = 0.5;  ///< longest correction of one push
   /// The tool may be this deep in one wall where a push out of it leads into another, or where no
   /// query is left to see whether it does. What two opposite faces read differs by some hundredths

@@ -9,8 +9,8 @@
 #include "controller/kernel/sets/point_places.hpp"
 
 // Sums of a point shell for AVX2 and AVX-512, in the bits of point_sums.hpp; `Simd` as in
-// box_vector.hpp. A sample is a 32-bit entry; where densities meet, its halves are the voxels x and
-// x + 1.
+// box_vector.hpp. Each sample fills a 32-bit lane. While densities are blended, its two halves hold
+// voxels x and x + 1.
 
 namespace kerf {
 namespace {

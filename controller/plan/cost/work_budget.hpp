@@ -30,8 +30,8 @@ inline constexpr double kBudgetShare = 0.5;
 /// take it up at any tick.
 [[nodiscard]] std::size_t costliest_tool(const SceneCosts& costs);
 
-/// Why the scene is refused: the costliest tool, its dearest stage and the highest rate that fits,
-/// on one line with the way out. Empty where every tool fits.
+/// Why the scene is refused: the costliest tool, its costliest stage and the highest rate that
+/// fits, on one line with the way out. Empty where every tool fits.
 [[nodiscard]] std::string over_budget(const LoadedScene& scene, const SceneCosts& costs);
 
 }  // namespace kerf

@@ -20,7 +20,7 @@ struct StageCost {
 [[nodiscard]] double work_us(const std::vector<StageCost>& stages) noexcept;
 
 /// ns of one operation on the reference machine, a core of 2024 at 4.4 GHz, by what runs it;
-/// rounded up from the dearest of many tools. 0 where a stage does not exist. NEON was never
+/// rounded up from the costliest of many tools. 0 where a stage does not exist. NEON was never
 /// measured on hardware: guesses, for slower cores.
 struct Prices {
   double avx512, avx2, neon, scalar;
