@@ -142,6 +142,7 @@ struct SceneSettings {
   LimitSettings limits;
   ServoSettings servo;
   std::string hand_script;  ///< [hand] script, relative to the working directory; empty: none
+  std::string hand_place;   ///< begins a complaint about it
 };
 
 /// One [[volume]] as the scene file says it; `where` begins a complaint about what it holds.

@@ -42,10 +42,10 @@ struct SceneTables {
 
 /// Names tell volumes and tools apart in pictures and reports.
 template <class Spec>
-void add_named(const SceneTable& table, Spec spec, std::vector<Spec>& list) {
+void add_named(const SceneTable& table, Spec spec, std::vector<Spec>& list,
+               const char* way_out = "write another name = \"..\"") {
   if (std::ranges::find(list, spec.name, &Spec::name) != list.end()) {
-    refuse(table.place(),
-           " is the second named \"" + spec.name + "\"; write another name = \"..\"");
+    refuse(table.place(), " is the second named \"" + spec.name + "\"; " + way_out);
   }
   list.push_back(std::move(spec));
 }
@@ -66,8 +66,10 @@ void read_lists(const SceneTables& tables, SceneParts& parts) {
     finish_tool(table, parts.tool);
     add_named(table, parts.tool, scene.tools);
   }
+  std::vector<Material> given;
   for (const SceneTable& table : tables.all("material")) {
     table.read(parts);
+    add_named(table, parts.material, given, "write one [[material]] with the keys of both");
     // Now that the name is known: what is known of it, and above that what the table says.
     Material& material = material_named(table, parts.material.name, scene.materials);
     parts.material = material;
@@ -111,6 +113,7 @@ Scene read_scene(const TomlNode& root, const std::filesystem::path& path, SceneK
   refuse_uncut(scene);
   if (!scene.hand_script.empty()) {
     scene.hand_script = (path.parent_path() / scene.hand_script).string();
+    scene.hand_place = tables.once("hand").place("script");
   }
   return std::move(parts.scene);
 }
@@ -129,11 +132,11 @@ Scene parse_scene(std::string_view text, const std::filesystem::path& path, Scen
 Scene parse_scene_file(const std::filesystem::path& path) {
   constexpr std::uintmax_t kLargestFile = std::uintmax_t{1} << 20;
   std::error_code fault;
-  if (std::filesystem::is_directory(path, fault)) {
-    refuse(path.string(), ": is a folder; name a scene file in it");
+  if (!exists(symlink_status(path, fault))) {
+    refuse(path.string(), ": no such scene file; name one, for example scenes/phantom.toml");
   }
   if (!std::filesystem::is_regular_file(path, fault)) {
-    refuse(path.string(), ": no such scene file; name one, for example scenes/phantom.toml");
+    refuse(path.string(), ": is no regular file; name a scene file");
   }
   const std::uintmax_t size = std::filesystem::file_size(path, fault);
   if (fault || size > kLargestFile) {
@@ -143,6 +146,15 @@ Scene parse_scene_file(const std::filesystem::path& path) {
   const std::string text{std::istreambuf_iterator<char>(file), {}};
   if (!file) refuse(path.string(), ": cannot be read; check its permissions");
   return parse_scene(text, path);
+}
+
+void check_hand_script(const SceneSettings& scene) {
+  std::error_code fault;
+  if (scene.hand_script.empty() || std::filesystem::is_regular_file(scene.hand_script, fault)) {
+    return;
+  }
+  refuse(scene.hand_place,
+         " is no file; name a hand script from the scene's folder, for example hands/touch.toml");
 }
 
 }  // namespace kerf

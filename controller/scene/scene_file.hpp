@@ -17,4 +17,8 @@ namespace kerf {
 /// Reads a scene file of at most 1 MiB.
 [[nodiscard]] Scene parse_scene_file(const std::filesystem::path& path);
 
+/// Throws SceneError where the scene names a hand script that is no file. Only an emulated hand
+/// needs it, so loading does not look.
+void check_hand_script(const SceneSettings& scene);
+
 }  // namespace kerf

@@ -43,9 +43,7 @@ struct AllowedText {
   }
 
  private:
-  [[nodiscard]] std::string range() const {
-    return number_text(allowed.range.lo) + " to " + number_text(allowed.range.hi);
-  }
+  [[nodiscard]] std::string range() const { return range_text(allowed.range.lo, allowed.range.hi); }
   [[nodiscard]] std::string words() const {
     std::string list;
     for (const std::string_view word : allowed.words) {

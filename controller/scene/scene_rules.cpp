@@ -30,8 +30,11 @@ void make_unit(const SceneTable& table, std::array<double, 4>& q) {
 /// Of a solid of revolution; a mesh has its own size.
 void check_size(const SceneTable& table, const ToolSpec& tool) {
   const ToolSize& size = tool.size;
-  if (table.has("radius_mm") == table.has("size_vox")) {
+  if (!table.has("radius_mm") && !table.has("size_vox")) {
     refuse(table.place(), " needs either radius_mm or size_vox; write one of them");
+  }
+  if (table.has("radius_mm") && table.has("size_vox")) {
+    refuse(table.place("radius_mm"), " contradicts size_vox; leave one of the two out");
   }
   if (!size.length_mm) return;
   if (size.size_vox) {

@@ -44,7 +44,10 @@ struct Take {
   template <std::size_t N>
   void operator()(std::array<double, N>* into) const {
     const bool one = key.options.one_for_all && node.form != TomlNode::Form::array;
-    if (!one && (node.form != TomlNode::Form::array || node.entries.size() != N)) {
+    const auto is_number = [](const TomlNode& entry) { return entry.number().has_value(); };
+    const bool list = node.form == TomlNode::Form::array && node.entries.size() == N &&
+                      std::ranges::all_of(node.entries, is_number);
+    if (!one && !list) {
       refuse(place, " is not a list of " + std::to_string(N) + " numbers; write " +
                         (N == 2   ? "[a, b]"
                          : N == 3 ? "[x, y, z]"
@@ -78,7 +81,9 @@ struct Take {
     const auto words = key.allowed.words;
     if (words.empty() || std::ranges::find(words, *text) != words.end()) return *text;
     const auto [lo, hi] = key.allowed.range;
-    refuse(place, unknown_word(*text, words, "\"") + (lo < hi ? ", or " + range_text() : ""));
+    const bool or_number = lo < hi;
+    refuse(place,
+           unknown_word(*text, words, "\"") + (or_number ? ", or " + range_text(lo, hi) : ""));
   }
   /// Whether a word stands for a number.
   [[nodiscard]] bool is_word() const {
@@ -94,10 +99,7 @@ struct Take {
     std::string words;
     for (const std::string_view word : key.allowed.words)
       words += ", or \"" + std::string(word) + '"';
-    refuse(place, " is out of range; use " + range_text() + words);
-  }
-  [[nodiscard]] std::string range_text() const {
-    return number_text(key.allowed.range.lo) + " to " + number_text(key.allowed.range.hi);
+    refuse(place, " is out of range; use " + range_text(lo, hi) + words);
   }
 };
 

@@ -15,6 +15,7 @@
 #include "controller/plan/compile.hpp"
 #include "controller/plan/cost/work_budget.hpp"
 #include "controller/scene/scene.hpp"
+#include "controller/scene/scene_file.hpp"
 #include "controller/shell/check_scene.hpp"
 #include "controller/shell/log_line.hpp"
 #include "controller/shell/run_report.hpp"
@@ -141,6 +142,7 @@ int run_controller(const ControllerOptions& options) {
   LoadedScene scene = load_scene(options.scene, options.overrides);
   const std::unique_ptr<CompiledScene> servo = plan_scene(scene);
   if (options.check) {
+    check_hand_script(scene);
     print_scene(scene, servo->costs());
     check_budget(options, scene, servo->costs());
     return 0;

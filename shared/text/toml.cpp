@@ -2,6 +2,7 @@
 #include "shared/text/toml.hpp"
 
 #include <algorithm>
+#include <sstream>
 #include <type_traits>
 #include <utility>
 
@@ -55,7 +56,11 @@ TomlNode node_of(const toml::node& from) {
     if (const auto number = from.as_floating_point()) to.value = number->get();
     if (const auto text = from.as_string()) to.value = text->get();
     to.shown = one_line(written(to.value));
-    if (to.shown.empty()) to.shown = "a date or time";
+    if (to.shown.empty()) {  // a date or a time
+      std::ostringstream text;
+      text << toml::node_view(from);
+      to.shown = text.str();
+    }
   }
   if (to.shown.size() > kLongestShown) to.shown = to.shown.substr(0, kLongestShown) + "...";
   return to;

@@ -250,6 +250,11 @@ TEST_CASE("bad arguments are one line and exit 2") {
   CHECK(refused({controller}).find("--scene") != std::string::npos);
   CHECK(refused({controller, "--scene", "missing.toml", "--check"}).find("missing.toml") !=
         std::string::npos);
+  const TemporaryFolder folder;
+  std::ofstream(folder / "scene.toml") << "[[volume]]\nfile = \"phantom\"\n[[tool]]\nshape = "
+                                          "\"ball\"\nsize_vox = 8\n[hand]\nscript = \"no.toml\"\n";
+  CHECK(refused({controller, "--scene", (folder / "scene.toml").string(), "--check"})
+            .find("scene.toml:7: hand.script = \"no.toml\"") != std::string::npos);
   CHECK(refused({controller, "--scene", scene, "--port", "usbx"}).find("socket:PATH") !=
         std::string::npos);
   CHECK(

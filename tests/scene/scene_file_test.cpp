@@ -2,6 +2,7 @@
 #include "controller/scene/scene_file.hpp"
 
 #include <cmath>
+#include <filesystem>
 #include <string>
 
 #include <doctest/doctest.h>
@@ -201,8 +202,15 @@ TEST_CASE("a value of the wrong type is reported with its line") {
                "scenes/x.toml:2: volume.file = 3 is not text"));
   CHECK(begins(error_after("[device]\noffset_mm = [1, 2]\n"),
                "scenes/x.toml:7: device.offset_mm = [1, 2] is not a list of 3 numbers"));
-  CHECK(begins(error_after("[device]\noffset_mm = [1, 2, true]\n"),
-               "scenes/x.toml:7: device.offset_mm = [1, 2, true] is not a number"));
+  for (const std::string list : {"[1, 2, true]", "[1, 2, [3]]", "[1, 2, \"3\"]"}) {
+    CHECK(error_after("[device]\noffset_mm = " + list + "\n") ==
+          "scenes/x.toml:7: device.offset_mm = " + list +
+              " is not a list of 3 numbers; write [x, y, z]");
+  }
+  CHECK(begins(error_after("[servo]\nrate_hz = 1979-05-27\n"),
+               "scenes/x.toml:7: servo.rate_hz = 1979-05-27 is not a whole number"));
+  CHECK(begins(error_after("[servo]\nrate_hz = 07:32:00.5\n"),
+               "scenes/x.toml:7: servo.rate_hz = 07:32:00.5 is not a whole number"));
   CHECK(begins(error_after("[device]\ndock_rad = 0.2\n"),
                "scenes/x.toml:7: device.dock_rad = 0.2 is not a list"));
   CHECK(begins(error_with("file = \"phantom\"", "file = \"phantom\"\nsolid = 1"),
@@ -222,6 +230,8 @@ TEST_CASE("a value out of range is reported with its line and the range") {
         "scenes/x.toml:7: servo.rate_hz = 100 is out of range; use 250 to 8000");
   CHECK(error_after("[device]\nworkspace_scale = 0\n") ==
         "scenes/x.toml:7: device.workspace_scale = 0 is out of range; use 0.01 to 100");
+  CHECK(error_after("[cut]\nmodel = \"overlap\"\nrate_per_s = -1\n") ==
+        "scenes/x.toml:8: cut.rate_per_s = -1 is out of range; use 0 to 100000, or \"1/T\"");
   CHECK(begins(error_after("[force]\nstiffness_n_per_mm = nan\n"),
                "scenes/x.toml:7: force.stiffness_n_per_mm = nan is out of range"));
   CHECK(begins(error_after("[force]\nstiffness_n_per_mm = inf\n"),
@@ -231,7 +241,7 @@ TEST_CASE("a value out of range is reported with its line and the range") {
   CHECK(begins(error_after("[limits]\nforce_n = 1\ncontinuous_force_n = 2\n"),
                "scenes/x.toml:8: limits.continuous_force_n = 2 is out of range; use 0.01 to 1"));
   CHECK(begins(error_with("file = \"phantom\"", "file = \"phantom\"\niso = 2"),
-               "scenes/x.toml:3: volume.iso = 2 is out of range; use 1e-04 to 1, or \"otsu\""));
+               "scenes/x.toml:3: volume.iso = 2 is out of range; use 0.0001 to 1, or \"otsu\""));
   CHECK(begins(error_with("size_vox = 16", "size_vox = 0"),
                "scenes/x.toml:5: tool.size_vox = 0 is out of range"));
   CHECK(begins(error_with("size_vox = 16", "radius_mm = -1"),
@@ -251,10 +261,10 @@ TEST_CASE("a word that is not known is reported with those that are") {
   CHECK(begins(error_after("[cut]\nmodel = \"overlap\"\nrate_per_s = \"T\"\n"),
                "scenes/x.toml:8: cut.rate_per_s = \"T\" is unknown"));
   CHECK(begins(error_with("file = \"phantom\"", "file = \"phantom\"\niso = \"auto\""),
-               "scenes/x.toml:3: volume.iso = \"auto\" is unknown; known: otsu, or 1e-04 to 1"));
+               "scenes/x.toml:3: volume.iso = \"auto\" is unknown; known: otsu, or 0.0001 to 1"));
   CHECK(error_with("file = \"phantom\"", "file = \"phantom\"\niso = \"otzu\"") ==
         "scenes/x.toml:3: volume.iso = \"otzu\" is unknown; did you mean \"otsu\"? known: otsu, "
-        "or 1e-04 to 1");
+        "or 0.0001 to 1");
 }
 
 TEST_CASE("what contradicts itself or is missing is reported with its line") {
@@ -265,7 +275,8 @@ TEST_CASE("what contradicts itself or is missing is reported with its line") {
   CHECK(begins(error_with("file = \"phantom\"\n", ""), "scenes/x.toml:1: volume has no file"));
   CHECK(begins(error_with("shape = \"ball\"\n", ""), "scenes/x.toml:3: tool has no shape"));
   CHECK(begins(error_with("size_vox = 16\n", ""), "scenes/x.toml:3: tool needs either radius_mm"));
-  CHECK(begins(error_after("radius_mm = 1\n"), "scenes/x.toml:3: tool needs either radius_mm"));
+  CHECK(error_after("radius_mm = 1\n") ==
+        "scenes/x.toml:6: tool.radius_mm = 1 contradicts size_vox; leave one of the two out");
   CHECK(begins(error_after("length_mm = 1\n"),
                "scenes/x.toml:6: tool.length_mm = 1 contradicts size_vox"));
   CHECK(begins(error_after("[[tool]]\nshape = \"ball\"\nradius_mm = 1\nlength_mm = 1\n"),
@@ -276,6 +287,11 @@ TEST_CASE("what contradicts itself or is missing is reported with its line") {
                "scenes/x.toml:6: tool is the second named \"ball 16 vox\""));
   CHECK(begins(error_after("[[volume]]\nfile = \"phantom\"\n"),
                "scenes/x.toml:6: volume is the second named \"phantom\""));
+  const std::string wax = "[[material]]\nname = \"wax\"\n";
+  CHECK(error_after("[[material]]\nname = \"enamel\"\n" + wax).empty());
+  CHECK(error_after(wax + wax) ==
+        "scenes/x.toml:8: material is the second named \"wax\"; write "
+        "one [[material]] with the keys of both");
   CHECK(begins(error_with("file = \"phantom\"", "file = \"phantom\"\nsolid = false"),
                "scenes/x.toml: no [[volume]] is solid"));
   CHECK(begins(error_with("file = \"phantom\"", "file = \"phantom\"\nspacing_mm = 0.2"),
@@ -325,7 +341,7 @@ TEST_CASE("control characters never reach a message or a name") {
   CHECK(error.find_first_of("\n\x1b") == std::string::npos);
 }
 
-TEST_CASE("a scene file that is not there, a folder or a huge file is refused") {
+TEST_CASE("a scene file that is not there, no file or a huge one is refused") {
   const kerf::test::TempFolder folder;
   const auto missing =
       kerf::test::error_of([] { static_cast<void>(kerf::parse_scene_file("/nowhere/x.toml")); });
@@ -334,7 +350,25 @@ TEST_CASE("a scene file that is not there, a folder or a huge file is refused") 
   CHECK(kerf::test::error_of([&] {
           static_cast<void>(kerf::parse_scene_file(huge));
         }).find("larger than 1 MiB") != std::string::npos);
-  const auto is_folder =
-      kerf::test::error_of([&] { static_cast<void>(kerf::parse_scene_file(huge.parent_path())); });
-  CHECK(is_folder.find(": is a folder; name a scene file in it") != std::string::npos);
+  std::filesystem::create_symlink("loop.toml", huge.parent_path() / "loop.toml");
+  for (const auto& none :
+       {huge.parent_path(), huge.parent_path() / "loop.toml", std::filesystem::path("/dev/null")}) {
+    CHECK(kerf::test::error_of([&] { static_cast<void>(kerf::parse_scene_file(none)); }) ==
+          none.string() + ": is no regular file; name a scene file");
+  }
+}
+
+TEST_CASE("a hand script that is not there is refused where one asks") {
+  const kerf::test::TempFolder folder;
+  const auto file = folder.write("x.toml", kSmallest + "[hand]\nscript = \"hand.toml\"\n");
+  const kerf::Scene scene = kerf::parse_scene_file(file);
+  const auto error = [](const kerf::Scene& of) {
+    return kerf::test::error_of([&] { kerf::check_hand_script(of); });
+  };
+  CHECK(error(scene) == file.string() +
+                            ":7: hand.script = \"hand.toml\" is no file; name a hand script from "
+                            "the scene's folder, for example hands/touch.toml");
+  folder.write("hand.toml", "");
+  CHECK(error(scene).empty());
+  CHECK(error(parse(kSmallest)).empty());
 }

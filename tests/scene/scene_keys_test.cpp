@@ -110,7 +110,7 @@ struct Samples {
     wrong.push_back({"[]", form});
     wrong.push_back({"\"zzz\"", key.options.one_for_all ? kNoNumber : form});
     std::string mixed = list_of(std::vector<double>(N - 1, hi));
-    wrong.push_back({mixed.insert(mixed.size() - 1, ", true"), kNoNumber});
+    wrong.push_back({mixed.insert(mixed.size() - 1, ", true"), form});
   }
   void operator()(const VoxelGrid*) {
     (*this)(static_cast<std::array<double, 3>*>(nullptr));

@@ -11,6 +11,7 @@
 namespace kerf {
 
 // One file each.
+[[nodiscard]] const ToolMethod& surface_method() noexcept;
 [[nodiscard]] const ToolMethod& aligned_method() noexcept;
 [[nodiscard]] const ToolMethod& splat_method() noexcept;
 [[nodiscard]] const ToolMethod& gather_method() noexcept;

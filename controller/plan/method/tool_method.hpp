@@ -73,7 +73,7 @@ struct TickShape {
 ///     price for each kernel set that runs it (stage_cost.hpp);
 ///  4. the declaration of `x_method()` in methods.hpp, and its place in the list of methods.cpp:
 ///     before every method that it is to be preferred to;
-///  5. the source file in controller/plan/CMakeLists.txt and in tests/golden/CMakeLists.txt.
+///  5. the source file in controller/plan/sources.cmake.
 /// Tables and scratch of its own are held by MethodMemory, and `plan_tool` (plan_tools.hpp) hands
 /// them to its ToolInVolume.
 class ToolMethod {

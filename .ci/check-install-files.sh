@@ -9,7 +9,7 @@ rules=controller/device/60-kerf.rules
 unit=controller/shell/kerf@.service
 failures=0
 complain() {
-  echo "check-templates: $*" >&2
+  echo "check-install-files: $*" >&2
   failures=$((failures + 1))
 }
 
@@ -41,6 +41,6 @@ if command -v systemd-analyze >/dev/null; then
   said=$(systemd-analyze verify --man=no "$lab/kerf@.service" 2>&1 | grep 'kerf@' || true)
   [[ -z $said ]] || complain "$unit: $said"
 else
-  echo 'check-templates: no systemd-analyze: the unit was not checked' >&2
+  echo 'check-install-files: no systemd-analyze: the unit was not checked' >&2
 fi
-((failures == 0)) && echo 'check-templates: fine'
+((failures == 0)) && echo 'check-install-files: fine'
