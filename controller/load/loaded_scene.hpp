@@ -27,6 +27,7 @@ struct SceneVolume {
   Pose pose;
   Density iso = 32768;
   bool solid = true;
+  bool enclosed = false;  ///< not cropped, solid at its border: a layer of air was laid around it
 };
 
 /// A scene after loading: everything the controller needs, in double, checked. Load time only.

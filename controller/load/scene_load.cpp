@@ -131,7 +131,10 @@ SceneVolume load_volume(const VolumeSpec& spec, const std::filesystem::path& fol
                           : otsu_threshold(volume.image);
     scale_to_felt_iso(materials, felt_at ? nearest_density(*felt_at * kDensityMax) : volume.iso,
                       volume.image);
-    if (spec.crop) volume.image = crop_to_solid(volume.image, volume.iso);
+    const VoxelGrid whole = volume.image.grid;
+    volume.image = spec.crop ? crop_to_solid(volume.image, volume.iso)
+                             : enclosed_in_air(std::move(volume.image), volume.iso);
+    volume.enclosed = !spec.crop && !(volume.image.grid == whole);
   } catch (const SceneError& error) {
     refuse(spec.where, std::string(": ") + error.what());
   }

@@ -63,8 +63,8 @@ class CompiledSceneOf final : public CompiledScene {
   ServoOutput step(const DeviceReport& report) noexcept override {
     return servo_step(plan_, state_, report);
   }
-  void apply(const ServoCommand& command) noexcept override {
-    apply_command(plan_, state_, command);
+  bool apply(const ServoCommand& command) noexcept override {
+    return apply_command(plan_, state_, command);
   }
   [[nodiscard]] double penetration_mm() const noexcept override {
     return kerf::penetration_mm(plan_, state_);

@@ -146,6 +146,7 @@ void plan_limits(const LoadedScene& scene, ServoPlan<N>& plan) {
     return std::max(1U, static_cast<std::uint32_t>(ms * rate_hz / 1000.0));
   };
   plan.rate_hz = scene.servo.rate_hz;
+  plan.device.gimbal_samples = std::clamp<std::size_t>(ticks(20), 1, kMaxGimbalSamples);
   plan.velocity = {.rate_hz = scene.servo.rate_hz,
                    .stride = std::max(1, scene.servo.rate_hz / 1000),
                    .noise_mm = Real(device_parts::tip_noise_mm(scene.device.personality))};

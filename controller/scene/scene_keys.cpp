@@ -173,8 +173,9 @@ constexpr SceneKey kKeys[] = {
      "at the device; 3.3 is what an Omni can give"},
     {"limits.continuous_force_n", "N", at<&LimitSettings::continuous_force_n>, between(0.01, 3.3),
      "root mean square over time; at most force_n"},
-    {"limits.slew_n_per_ms", "N/ms", at<&LimitSettings::slew_n_per_ms>, between(0.001, 0.5),
-     "change of force; a larger jump is felt as a blow"},
+    {"limits.slew_n_per_ms", "N/ms", at<&LimitSettings::slew_n_per_ms>, between(0.22, 0.5),
+     "change of force; a larger jump is felt as a blow, a smaller one cannot follow the fade when "
+     "reports are missing: 3.3 N in 15 ms"},
     {"limits.speed_mm_per_s", "mm/s", at<&LimitSettings::speed_mm_per_s>, between(1, 10000),
      "of the hand; faster is a fault of the sensor"},
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <type_traits>
 
@@ -25,6 +26,9 @@ struct JointPlan {
   typename N::Real counts_per_n_mm{};  ///< motor counts per torque, signed
 };
 
+/// In 20 ms: no device with a gimbal reports more than 1000 times a second.
+inline constexpr std::size_t kMaxGimbalSamples = 20;
+
 /// Everything constant of the held device.
 template <class N>
 struct DevicePlan {
@@ -35,6 +39,8 @@ struct DevicePlan {
   bool absolute_encoders = false;
   SerialArm<N> serial{};  ///< of the Omni and WoodenHaptics
   DeltaArm<N> delta{};    ///< of the Falcon
+
+  std::size_t gimbal_samples = 1;  ///< in 20 ms, of a device with a gimbal
 
   bool motors_configured = false;
   std::int32_t motor_count_end = 0;  ///< motor counts lie within +- this

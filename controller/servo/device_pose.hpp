@@ -45,8 +45,9 @@ inline bool follow_encoders(const DeviceReport& report, bool absolute, std::uint
   return true;
 }
 
-/// Takes the pots of this report into their means over GimbalFilter::kSamples reports.
-inline void follow_gimbal(const DeviceReport& report, GimbalFilter& filter) noexcept {
+/// Takes a reading; `samples`, 1 to kMaxGimbalSamples, make up the sum.
+inline void follow_gimbal(const DeviceReport& report, std::size_t samples,
+                          GimbalFilter& filter) noexcept {
   auto& oldest = filter.ring[filter.next];
   for (std::size_t i = 0; i < 3; ++i) {
     filter.sum[i] += report.wiper_a[i] - std::uint32_t{oldest[i]};
@@ -54,7 +55,7 @@ inline void follow_gimbal(const DeviceReport& report, GimbalFilter& filter) noex
     oldest[i] = report.wiper_a[i];
     oldest[i + 3] = report.wiper_b[i];
   }
-  filter.next = (filter.next + 1) % GimbalFilter::kSamples;
+  filter.next = (filter.next + 1) % samples;
 }
 
 /// Angle of `counts` encoder steps from home.

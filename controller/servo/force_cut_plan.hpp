@@ -50,6 +50,13 @@ struct ForceCutState {
   Vec<typename N::Real, ToolSpace> friction_n;  ///< felt in the next tick, force in the scene
   std::array<PrestonState<N>, kMaxVolumes> volume{};
   std::array<std::span<CoveredEntry<N>>, kMaxVolumes> list{};  ///< scratch of one tick
+
+  /// A new tool stands still and has cut nothing; what the materials are owed stays.
+  constexpr void change_tool() noexcept {
+    advance = typename N::Real(kCutAdvance);
+    spindle = {};
+    friction_n = {};
+  }
 };
 
 }  // namespace kerf

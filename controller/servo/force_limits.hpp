@@ -15,7 +15,7 @@ template <class N>
 struct ForceLimits {
   typename N::Real peak_n;             ///< |F| never above it
   typename N::Real continuous_n;       ///< RMS that the motors bear for ever
-  typename N::Real slew_n_per_tick;    ///< |dF| per tick while force builds up or turns
+  typename N::Real slew_n_per_tick;    ///< |dF| per tick, but see `limited_force`
   typename N::Ratio thermal_per_tick;  ///< T / thermal time constant
 };
 
@@ -76,13 +76,28 @@ constexpr void heat_up(const ForceLimits<N>& limits, ThermalState<N>& state,
   }
 }
 
+/// The part of `v` that `wanted` still has along it: between 0 and `v`.
+template <class Real>
+[[nodiscard]] constexpr DeviceVec<Real> fallen(DeviceVec<Real> v, DeviceVec<Real> wanted) noexcept {
+  const Real length = norm(v);
+  if (!(length > Real(0))) return v;
+  const auto along = [&](Real part, Real by) { return by * (part / length); };
+  const Real left = std::clamp(along(v.x, wanted.x) + along(v.y, wanted.y) + along(v.z, wanted.z),
+                               Real(0), length);
+  return clamped(v, left);
+}
+
 /// Clamps the wanted force to peak and thermal limit, then its step from the force of the last
 /// tick; heats the winding by what is left, the force to send.
+///
+/// A hand that `leaves`, moving with the force of the last tick, is given energy by it: then that
+/// force may fall along its own direction at once, and the step counts from where it fell to.
 template <class N>
 [[nodiscard]] constexpr DeviceVec<typename N::Real> limited_force(
     const ForceLimits<N>& limits, ThermalState<N>& thermal, DeviceVec<typename N::Real> wanted_n,
-    DeviceVec<typename N::Real> last_n) noexcept {
+    DeviceVec<typename N::Real> last_n, bool leaves) noexcept {
   const auto bounded = clamped(wanted_n, std::min(limits.peak_n, thermal_limit(limits, thermal)));
+  if (leaves) last_n = fallen(last_n, bounded);
   // The second clamp takes off what rounding of the slew steps may have added up.
   const auto sent =
       clamped(last_n + clamped(bounded - last_n, limits.slew_n_per_tick), limits.peak_n);

@@ -18,8 +18,8 @@ struct ProxyPlan {
   typename N::Real ramp_per_tick{};
 };
 
-/// What one tick hands to the next. A fresh state looks for a place. It is made afresh after a jump
-/// of the device, a change of the tool, and when a volume was filled again.
+/// What one tick hands to the next. A fresh state looks for a place at the goal: it is made when
+/// the device is parked at rest, or has lost its home.
 template <class N>
 struct ProxyState {
   ProxyPose<N> pose;
@@ -27,6 +27,17 @@ struct ProxyState {
   StartSearch<N> search;
   bool ramping = false;
   typename N::Real longest{};  ///< that the spring may be while it ramps, units
+
+  /// Looks for a place around the one that it has: another tool took over, or the solid changed.
+  constexpr void place_anew() noexcept {
+    search = placed ? StartSearch<N>(pose.centre) : search.again();
+    placed = false;
+  }
+  /// The spring grows from 0 again: nothing was felt meanwhile.
+  constexpr void ramp() noexcept {
+    ramping = true;
+    longest = {};
+  }
 };
 
 /// The contact of one tick.
@@ -49,8 +60,9 @@ inline constexpr double kLostDepth = 1;  // units
 /// Sets the contact's normal and moment arm: the sum of what presses, and its moment over the
 /// length of the spring (docs/theory.md 5.3). Friction acts where the loads do.
 ///
-/// The part of the spring beyond the friction cone is carried by planes that this tick did not meet
-/// (docs/theory.md 4.5). A tool that is still `moving` is not held there.
+/// The part of the spring beyond the loads and the friction cone is carried by planes that this
+/// tick did not meet (docs/theory.md 4.5). So a tool at rest always has a normal, since forces
+/// balance there. A tool that is still `moving` is not held.
 template <class N>
 constexpr void add_loads(const Swept<N>& swept, typename N::Unit friction, bool moving,
                          ProxyContact<N>& contact) noexcept {
@@ -60,8 +72,10 @@ constexpr void add_loads(const Swept<N>& swept, typename N::Unit friction, bool 
   ContactVec<Real> pressed{}, arm{};
   Real whole(0);
   for (std::size_t i = 0; i < swept.planes.count; ++i) whole = whole + swept.slide.load[i];
-  if (whole < Real(1e-3)) return;
-  for (std::size_t i = 0; i < swept.planes.count; ++i) {
+  const bool loaded = whole >= Real(1e-3);
+  if (!loaded && moving) return;
+  if (!loaded && swept.planes.count > 0) arm = swept.planes.plane[0].arm;
+  for (std::size_t i = 0; loaded && i < swept.planes.count; ++i) {
     const ConstraintPlane<N>& plane = swept.planes.plane[i];
     const Real load = swept.slide.load[i];
     pressed = pressed + times<N>(plane.normal, load);
@@ -104,23 +118,25 @@ constexpr ProxyContact<N> follow(const ProxyPlan<N>& plan, ProxyState<N>& state,
     state.placed = contact.placing == Placing::placed;
     state.ramping = state.placed && !(state.pose == goal);
     state.longest = Real(0);
-    contact.pose = state.pose;
+    contact.pose = state.placed ? state.pose : goal;
     return contact;
   }
-  const ContactVec<Real> from = state.pose.centre;
+  const ProxyPose<N> last = state.pose;
   const Swept<N> swept =
       ProxySweep<N, Field>(field, state.pose, plan.friction, plan.turn_step).tick(goal);
   contact.pose = state.pose;
   contact.queries = swept.queries;
   contact.turned = swept.turned;
   if (swept.buried || swept.depth > Real(kLostDepth)) {
-    state = {};
+    state.pose = last;
+    state.place_anew();
     contact.placing = Placing::searching;
+    contact.pose = goal;
     return contact;
   }
   contact.spring = state.pose.centre - goal.centre;
   // After a whole step the proxy may only lag because the tick's work was spent.
-  const bool moving = norm(state.pose.centre - from) >= Real(SweepRules::kStep);
+  const bool moving = norm(state.pose.centre - last.centre) >= Real(SweepRules::kStep);
   add_loads(swept, plan.friction, moving, contact);
   if (state.ramping) {
     state.longest = state.longest + plan.ramp_per_tick;

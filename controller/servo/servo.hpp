@@ -19,7 +19,7 @@ class Servo {
   virtual ~Servo() = default;
 
   [[nodiscard]] virtual ServoOutput step(const DeviceReport& report) noexcept = 0;
-  virtual void apply(const ServoCommand& command) noexcept = 0;
+  virtual bool apply(const ServoCommand& command) noexcept = 0;
   [[nodiscard]] virtual double penetration_mm() const noexcept = 0;
 
   [[nodiscard]] virtual VoxelGrid grid(std::size_t scene_index) const noexcept = 0;

@@ -10,6 +10,7 @@
 #include "controller/kernel/milling.hpp"
 #include "controller/kernel/splat_table.hpp"
 #include "controller/servo/contact_plan.hpp"
+#include "controller/servo/device_plan.hpp"
 #include "controller/servo/force_cut_plan.hpp"
 #include "controller/servo/force_limits.hpp"
 #include "controller/servo/kinematics/forward_kinematics.hpp"
@@ -36,10 +37,9 @@ struct EncoderState {
   std::uint32_t rest_ticks = 0;             ///< reports in a row: parked, and no joint turning
 };
 
-/// Sliding sum over the last 20 gimbal readings: the pots' low bits are noise.
+/// Sliding sum over the gimbal readings of the last 20 ms: the pots' low bits are noise.
 struct GimbalFilter {
-  static constexpr std::size_t kSamples = 20;
-  std::array<std::array<std::uint16_t, 6>, kSamples> ring{};
+  std::array<std::array<std::uint16_t, 6>, kMaxGimbalSamples> ring{};
   std::array<std::uint32_t, 6> sum{};
   std::size_t next = 0;
 };
@@ -67,7 +67,9 @@ struct ServoState {
   JacobianTransposed<N> jacobian_t_mm;  ///< of the last good report
   DeviceVec<Real> tip_mm;               ///< device port
   Rotation<N> rotation = identity_rotation<N>();
-  bool tip_known = false;  ///< false before the first report
+  bool tip_known = false;       ///< false before the first report
+  std::uint32_t tip_ticks = 0;  ///< since the tip was taken over
+  DeviceVec<Real> force_sum_n;  ///< sent in these ticks
   VelocityWindow<N> velocity;
 
   DeviceVec<Real> contact_n;       ///< felt in the last tick, before limits

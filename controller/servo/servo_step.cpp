@@ -10,6 +10,7 @@
 #include "controller/kernel/penetration.hpp"
 #include "controller/servo/device_pose.hpp"
 #include "controller/servo/force_cut.hpp"
+#include "controller/servo/swept_force.hpp"
 #include "controller/servo/tool_forces.hpp"
 #include "shared/numeric/fnv1a.hpp"
 
@@ -54,24 +55,38 @@ bool all_finite(Vec<S, Space> v) noexcept {
   return is_finite(v.x) && is_finite(v.y) && is_finite(v.z);
 }
 
-/// Takes the new tip over and keeps the energy ledger. Returns true when the
-/// tip moved faster than the limit since the last report, `gap` ticks ago.
+/// How the tip moved since it was last known.
+struct TipMotion {
+  bool overspeed = false;  ///< faster than the limit
+  bool leaves = false;     ///< with the force of the last tick
+};
+
+/// Takes the new tip over. The energy ledger books the motion at the mean of the forces that were
+/// sent meanwhile, as if it had been even.
 template <class N>
-bool move_tip(const ServoPlan<N>& plan, ServoState<N>& state, const DevicePose<N>& pose,
-              std::uint32_t gap) noexcept {
+TipMotion move_tip(const ServoPlan<N>& plan, ServoState<N>& state,
+                   const DevicePose<N>& pose) noexcept {
   using Real = typename N::Real;
+  const std::uint32_t gap = std::clamp<std::uint32_t>(state.tip_ticks, 1, 1000);
   if (!state.tip_known) {
     state.tip_mm = pose.arm.tip_mm;
     state.velocity.start(pose.arm.tip_mm);
   }
   const auto moved_mm = pose.arm.tip_mm - state.tip_mm;
-  const auto ticks = Real(static_cast<double>(std::clamp<std::uint32_t>(gap, 1, 1000)));
-  const bool overspeed = norm(moved_mm) > plan.speed_limit_mm_per_tick * ticks;
-  absorb<N>(state.absorbed_mj, state.force_n, moved_mm);
+  const auto ticks = Real(static_cast<double>(gap));
+  const DeviceVec<Real> sent_n =
+      gap == 1 ? state.force_n
+               : DeviceVec<Real>{state.force_sum_n.x / ticks, state.force_sum_n.y / ticks,
+                                 state.force_sum_n.z / ticks};
+  absorb<N>(state.absorbed_mj, sent_n, moved_mm);
+  state.velocity.take(pose.arm.tip_mm, gap);
   state.tip_mm = pose.arm.tip_mm;
   state.rotation = pose.rotation;
   state.tip_known = true;
-  return overspeed;
+  state.tip_ticks = 0;
+  state.force_sum_n = {};
+  return {norm(moved_mm) > plan.speed_limit_mm_per_tick * ticks,
+          dot(state.force_n, moved_mm) > Real(0)};
 }
 
 /// What the motors get: signed counts, and the share of the force that they can carry.
@@ -148,6 +163,8 @@ template <class N>
 struct Sensed {
   DevicePose<N> pose;
   bool usable = false;  ///< a fresh report with a finite pose
+  bool leaves = false;  ///< the hand moves with the force of the last tick
+  bool docked = false;  ///< parked at rest: calibrated in this tick
   WorldVec<typename N::Real> tip_mm;
   DeviceVec<typename N::Real> velocity_mm_per_s;
 };
@@ -160,18 +177,21 @@ Sensed<N> sense(const ServoPlan<N>& plan, ServoState<N>& state,
   if (report.fresh) {
     seen.calibrated = follow_encoders(report, plan.device.absolute_encoders, plan.timing.rest_ticks,
                                       state.encoders);
-    follow_gimbal(report, state.gimbal);
+    follow_gimbal(report, plan.device.gimbal_samples, state.gimbal);
   }
   Sensed<N> sensed;
   sensed.pose = device_pose(plan.device, state.encoders, state.gimbal);
   seen.finite = all_finite(sensed.pose.arm.tip_mm);
   sensed.usable = seen.fresh && seen.finite;
+  sensed.docked = seen.calibrated;
+  state.tip_ticks += state.tip_ticks < UINT32_MAX ? 1U : 0U;
   if (sensed.usable) {
     state.jacobian_t_mm = sensed.pose.arm.jacobian_t_mm;
-    const std::uint32_t gap = state.supervisor.stale_ticks + 1;
-    seen.overspeed = move_tip(plan, state, sensed.pose, gap) && !report.parked;
+    const TipMotion motion = move_tip(plan, state, sensed.pose);
+    seen.overspeed = motion.overspeed && !report.parked;
+    sensed.leaves = motion.leaves;
   }
-  sensed.velocity_mm_per_s = state.velocity.advance(plan.velocity, state.tip_mm);
+  sensed.velocity_mm_per_s = state.velocity.velocity(plan.velocity);
   sensed.tip_mm = relabel<WorldSpace>(state.tip_mm * plan.workspace_scale) + plan.offset_mm;
   supervise(plan.timing, seen, state.supervisor);
   return sensed;
@@ -192,6 +212,24 @@ void tell_removed(const std::array<Removed, kMaxVolumes>& removed, ServoOutput& 
   }
 }
 
+/// The proxy goes on following a hand that gets no force, so that it is on the same side of every
+/// wall when the force comes back, with a ramp. A device that rests parked, or has lost its home,
+/// begins anew.
+template <class N>
+void follow_unfelt(const ServoPlan<N>& plan, ServoState<N>& state,
+                   const Sensed<N>& sensed) noexcept {
+  if (!plan.contact.swept) return;
+  const Phase phase = state.supervisor.phase;
+  const bool begins = phase == Phase::off || phase == Phase::calibrating || sensed.docked;
+  if (begins) {
+    state.contact.proxy = {};
+    return;
+  }
+  static_cast<void>(
+      feel_swept(plan, state, sensed.tip_mm, state.rotation, sensed.velocity_mm_per_s));
+  state.contact.proxy.ramp();
+}
+
 /// The force that the tool feels, and the removal it makes there by overlap. Without a usable pose
 /// the force of the last good report is held and then faded, and nothing is cut.
 template <class N>
@@ -205,10 +243,11 @@ Wanted<N> wanted_force(const ServoPlan<N>& plan, ServoState<N>& state, const Sen
   };
   state.contact_n = {};
   state.proxy_offset_mm = {};
-  if (!supervisor.motors_on() || (sensed.usable && state.hold)) {
-    state.contact.proxy = {};  // it looks for a new place when the tool is taken up again
+  if (sensed.usable && (!supervisor.motors_on() || state.hold)) {
+    follow_unfelt(plan, state, sensed);
     return {};
   }
+  if (!supervisor.motors_on()) return {};
   if (!sensed.usable) {
     return {state.held_force_n * share(stale_share(timing, supervisor.stale_ticks),
                                        timing.zero_ticks - timing.hold_ticks),
@@ -233,7 +272,7 @@ Wanted<N> wanted_force(const ServoPlan<N>& plan, ServoState<N>& state, const Sen
 /// Limits the force and turns it into motor counts. Switching off is exempt from the slew limit.
 template <class N>
 void drive(const ServoPlan<N>& plan, ServoState<N>& state, DeviceVec<typename N::Real> wanted_n,
-           ServoOutput& out) noexcept {
+           bool leaves, ServoOutput& out) noexcept {
   using Real = typename N::Real;
   if (state.supervisor.motors_on() && !all_finite(wanted_n)) {
     latch(Fault::not_finite, state.supervisor);
@@ -245,7 +284,7 @@ void drive(const ServoPlan<N>& plan, ServoState<N>& state, DeviceVec<typename N:
     return;
   }
   const DeviceVec<Real> limited_n =
-      limited_force(plan.limits, state.thermal, wanted_n, state.force_n);
+      limited_force(plan.limits, state.thermal, wanted_n, state.force_n, leaves);
   const MotorCommand<N> motors = motor_command(plan, state.jacobian_t_mm * limited_n);
   out.motor_counts = motors.counts;
   state.force_n = {multiply<Real>(motors.share, limited_n.x),
@@ -280,6 +319,8 @@ void tell(const ServoPlan<N>& plan, ServoState<N>& state, const Sensed<N>& sense
   out.started = state.supervisor.started;
   out.stale = !fresh;
   out.contact = norm(state.force_n) > Real(kContactThresholdN);
+  const ProxyState<N>& proxy = state.contact.proxy;
+  out.refused = plan.contact.swept && !proxy.placed && proxy.search.refused();
   for (std::size_t i = 0; i < 3; ++i) {
     out.joint_counts[i] = state.encoders.unwrapped[i];
     out.gimbal_rad[i] = as_double(sensed.pose.gimbal[i]);
@@ -305,7 +346,8 @@ ServoOutput servo_step(const ServoPlan<N>& plan, ServoState<N>& state,
   ServoOutput out;
   const Sensed<N> sensed = sense(plan, state, report);
   const Wanted<N> wanted = wanted_force(plan, state, sensed, out);
-  drive(plan, state, wanted.force_n, out);
+  drive(plan, state, wanted.force_n, sensed.leaves, out);
+  state.force_sum_n = state.force_sum_n + state.force_n;
   cut(plan, state, wanted.tool, out);
   if (sensed.usable) state.held_force_n = state.force_n;
   tell(plan, state, sensed, report.fresh, out);
@@ -336,24 +378,28 @@ double penetration_mm(const ServoPlan<N>& plan, const ServoState<N>& state) noex
 }
 
 template <class N>
-void apply_command(const ServoPlan<N>& plan, ServoState<N>& state,
+bool apply_command(const ServoPlan<N>& plan, ServoState<N>& state,
                    const ServoCommand& command) noexcept {
   switch (command.kind) {
     case ServoCommand::Kind::none:
-      return;
+      return true;
     case ServoCommand::Kind::select_tool:
-      if (command.argument < plan.tool_count) state.active_tool = command.argument;
-      state.contact.proxy = {};  // the new tool may not fit where the old one was
-      return;
+      if (command.argument >= plan.tool_count) return false;
+      if (command.argument == state.active_tool) return true;
+      state.active_tool = command.argument;
+      state.contact.proxy.place_anew();  // the new tool may not fit where the old one was
+      state.force_cut.change_tool();
+      return true;
     case ServoCommand::Kind::fade_in:
       restart_fade(state.supervisor);
       state.force_n = {};  // the motors were off meanwhile
       state.held_force_n = {};
-      return;
+      return true;
     case ServoCommand::Kind::hold:
       state.hold = command.argument != 0;
-      return;
+      return true;
   }
+  return false;
 }
 
 // The three bundles, compiled once.
@@ -361,7 +407,7 @@ void apply_command(const ServoPlan<N>& plan, ServoState<N>& state,
   template ServoOutput servo_step<N>(const ServoPlan<N>&, ServoState<N>&,                \
                                      const DeviceReport&) noexcept;                      \
   template double penetration_mm<N>(const ServoPlan<N>&, const ServoState<N>&) noexcept; \
-  template void apply_command<N>(const ServoPlan<N>&, ServoState<N>&, const ServoCommand&) noexcept;
+  template bool apply_command<N>(const ServoPlan<N>&, ServoState<N>&, const ServoCommand&) noexcept;
 KERF_INSTANTIATE(FixedNumbers)
 KERF_INSTANTIATE(FloatNumbers)
 KERF_INSTANTIATE(DoubleNumbers)

@@ -25,9 +25,9 @@ template <class N>
 template <class N>
 [[nodiscard]] double penetration_mm(const ServoPlan<N>& plan, const ServoState<N>& state) noexcept;
 
-/// Applies a command between two ticks; an index out of range changes nothing.
+/// Applies a command between two ticks. An index out of range changes nothing: false.
 template <class N>
-void apply_command(const ServoPlan<N>& plan, ServoState<N>& state,
+bool apply_command(const ServoPlan<N>& plan, ServoState<N>& state,
                    const ServoCommand& command) noexcept;
 
 }  // namespace kerf

@@ -37,11 +37,30 @@ class VelocityWindow {
   /// At rest here since ever.
   constexpr void start(DeviceVec<Real> tip_mm) noexcept { ring_.fill(tip_mm); }
 
-  /// Takes the tip of this tick; returns its velocity in mm/s, saturated.
-  [[nodiscard]] constexpr DeviceVec<Real> advance(const VelocityPlan<N>& plan,
-                                                  DeviceVec<Real> tip_mm) noexcept {
-    newest_ = (newest_ + 1) % kRing;
-    ring_[static_cast<std::size_t>(newest_)] = tip_mm;
+  /// Takes the tip `gap` ticks after the last one. What lies between was not reported: it is filled
+  /// in along the line, as if the hand had kept its speed. At most kRing places are written.
+  constexpr void take(DeviceVec<Real> tip_mm, std::uint32_t gap) noexcept {
+    const std::int64_t ticks = std::max(gap, 1U);
+    const DeviceVec<Real> from = ring_[static_cast<std::size_t>(newest_)];
+    const auto between = [&](Real a, Real b, std::int64_t i) {
+      const Wide part = (wide(b) - wide(a)) * Wide(i) / Wide(ticks);
+      if constexpr (N::kIsFixed) {
+        return Real::from_raw(static_cast<std::int32_t>(a.raw() + part));
+      } else {
+        return a + part;
+      }
+    };
+    for (std::int64_t i = std::max<std::int64_t>(1, ticks - kRing); i <= ticks; ++i) {
+      newest_ = (newest_ + 1) % kRing;
+      ring_[static_cast<std::size_t>(newest_)] =
+          i == ticks ? tip_mm
+                     : DeviceVec<Real>{between(from.x, tip_mm.x, i), between(from.y, tip_mm.y, i),
+                                       between(from.z, tip_mm.z, i)};
+    }
+  }
+
+  /// At the newest tip, in mm/s, saturated.
+  [[nodiscard]] constexpr DeviceVec<Real> velocity(const VelocityPlan<N>& plan) const noexcept {
     return {axis(plan, &DeviceVec<Real>::x), axis(plan, &DeviceVec<Real>::y),
             axis(plan, &DeviceVec<Real>::z)};
   }

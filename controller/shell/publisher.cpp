@@ -34,6 +34,7 @@ std::uint32_t flags_of(const DeviceReport& report, const ServoOutput& output) no
   set(output.motors_on, kFlagMotorsOn);
   set(output.started, kFlagStarted);
   set(output.forbidden, kFlagForbidden);
+  set(output.refused, kFlagRefused);
   return flags;
 }
 

@@ -15,6 +15,7 @@ namespace kerf {
 struct FaultEvent {
   std::uint64_t tick = 0;  ///< as in the segment and in the log
   const char* name = "";
+  bool fault = false;  ///< it makes the run a failure
 };
 
 /// Statistics of a run. Fixed memory: the servo thread writes it, others read it after the end.
@@ -39,10 +40,14 @@ struct RunRecord {
   std::size_t fault_count = 0;  ///< events that make the run a failure
 
   void add_event(std::uint64_t tick, const char* name) noexcept {
-    if (event_count < kMaxEvents) events[event_count] = {tick, name};
+    if (event_count < kMaxEvents) {
+      events[event_count].tick = tick;
+      events[event_count].name = name;
+    }
     ++event_count;
   }
   void add_fault(std::uint64_t tick, const char* name) noexcept {
+    if (event_count < kMaxEvents) events[event_count].fault = true;
     add_event(tick, name);
     ++fault_count;
   }

@@ -116,8 +116,8 @@ std::string summary(const RunReport& report) {
   text += format("  hashes     volume %s, output %s\n", hex64(report.volume_hash).c_str(),
                  hex64(r.output_hash).c_str());
   for (std::size_t i = 0; i < std::min(r.event_count, RunRecord::kMaxEvents); ++i) {
-    text += format("  fault      %s at tick %llu\n", r.events[i].name,
-                   static_cast<unsigned long long>(r.events[i].tick));
+    text += format("  %-10s %s at tick %llu\n", r.events[i].fault ? "fault" : "event",
+                   r.events[i].name, static_cast<unsigned long long>(r.events[i].tick));
   }
   return text;
 }

@@ -32,6 +32,8 @@ class Bookkeeper {
       record_.add_fault(tick, fault_name(output.fault));
     }
     last_fault_ = output.fault;
+    if (output.refused && !last_refused_) record_.add_event(tick, "no_free_place");
+    last_refused_ = output.refused;
     if (!output.started) return;
     if (record_.ticks == 0) {
       record_.armed_at_tick = tick;
@@ -72,6 +74,7 @@ class Bookkeeper {
   RunRecord& record_;
   const TickSource& clock_;
   Fault last_fault_ = Fault::none;
+  bool last_refused_ = false;
   std::uint64_t overruns_ = 0;
   std::uint64_t allocations_ = 0;
   ThreadFaults faults_;
@@ -95,13 +98,13 @@ EndReason run_servo(TickSource& clock, DeviceDriver& device, Servo& servo, Publi
     timing.start_ns = monotonic_ns();
     const DeviceReport report = device.read();  // newest pose; never blocks
     if (const auto command = commands.take_command()) {
-      servo.apply(servo_command(*command));
+      if (!servo.apply(servo_command(*command))) record.add_event(tick, "refused_command");
       last_command = command->index;
     }
     // What stopped the servo may have stopped its watchdog too: the clock tells as well.
     const bool watchdog_tripped = signals.stalled.exchange(false, std::memory_order_relaxed);
     if (watchdog_tripped || clock.stood_still()) {
-      servo.apply({.kind = ServoCommand::Kind::fade_in});
+      static_cast<void>(servo.apply({.kind = ServoCommand::Kind::fade_in}));
       record.add_event(tick, watchdog_tripped ? "watchdog" : "stood_still");
     }
     const std::int64_t in_hand_ns = monotonic_ns();

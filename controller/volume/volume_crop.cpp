@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <sstream>
+#include <utility>
 
 #include "controller/scene/scene_error.hpp"
 #include "controller/volume/volume_density.hpp"
@@ -47,6 +48,12 @@ VolumeImage crop(const VolumeImage& image, const VoxelBox& box) {
   part.density = cut(image.density, image.grid, box, part.grid);
   if (!image.labels.empty()) part.labels = cut(image.labels, image.grid, box, part.grid);
   return part;
+}
+
+VolumeImage enclosed_in_air(VolumeImage image, Density least) {
+  const VoxelBox solid = solid_box(image, least), all = image.grid.box();
+  const bool inside = solid.empty() || solid.grown(1).clipped(all) == solid.grown(1);
+  return inside ? std::move(image) : crop(image, all.grown(1));
 }
 
 VolumeImage crop_to_solid(const VolumeImage& image, Density iso, std::int32_t guard) {

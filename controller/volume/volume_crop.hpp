@@ -14,6 +14,10 @@ inline constexpr std::int32_t kGuardVoxels = 3;
 /// box or one above the limits of volume_limits.hpp.
 [[nodiscard]] VolumeImage crop(const VolumeImage& image, const VoxelBox& box);
 
+/// The image with one layer of air around it where a voxel of at least `least` lies at its border:
+/// a solid that ends there has a surface then. Else the image as it is.
+[[nodiscard]] VolumeImage enclosed_in_air(VolumeImage image, Density least);
+
 /// Crops to the tightest box around the voxels of at least `iso`, plus `guard` voxels on each side.
 /// Throws SceneError where nothing is solid.
 [[nodiscard]] VolumeImage crop_to_solid(const VolumeImage& image, Density iso,

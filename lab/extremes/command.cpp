@@ -33,12 +33,13 @@ template <void (*kMeasure)(const Effort&, const RowSink&)>
 void rows_only(const Effort& effort, const RowSink& add_row, Findings&) {
   kMeasure(effort, add_row);
 }
-constexpr std::array<Group, 8> kGroups{{
+constexpr std::array<Group, 9> kGroups{{
     {"walls", rows_only<measure_walls>},
     {"rests", rows_only<measure_rests>},
     {"slides", rows_only<measure_slides>},
     {"shapes", rows_only<measure_shapes>},
     {"cutting", rows_only<measure_cutting>},
+    {"traps", rows_only<measure_traps>},
     {"ticks", rows_only<measure_ticks>},
     {"paper", [](const Effort& effort, const RowSink& add_row,
                  Findings& findings) { findings.comparison = compare(effort, add_row); }},
@@ -115,6 +116,7 @@ int Command::run(std::ostream& out) const {
   static_cast<void>(pin_lab(core_));
   Effort effort = quick_ ? Effort::quick() : Effort{};
   effort.data = data_;
+  if (!quick_ && only_ == std::vector<std::string>{"traps"}) effort.presses = 10000;
   Findings findings;
   out << "group    what                                                      value unit        "
          "must "

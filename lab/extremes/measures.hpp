@@ -39,9 +39,10 @@ struct Effort {
   int phases = 64;        ///< of the ticks along a stroke
   VoxelGrid phantom{256, 256, 161};
   double hand_seconds = 8;
+  int presses = 240;  ///< of tools that cut, 5 s each; all 10,000 where only these are asked
   std::filesystem::path data;  ///< folder of real volumes; empty: there is none
 
-  [[nodiscard]] static Effort quick() { return {5, 8, 1, 200, 8, {128, 128, 80}, 4, {}}; }
+  [[nodiscard]] static Effort quick() { return {5, 8, 1, 200, 8, {128, 128, 80}, 4, 24, {}}; }
 };
 
 /// F7 (docs/validation.md): random motions at walls.
@@ -59,6 +60,8 @@ void measure_shape_edges(const Effort& effort, const RowSink& add_row);
 /// F11: what force removes in the whole servo, and what the hand feels of it. Few cases at any
 /// effort.
 void measure_cutting(const Effort& effort, const RowSink& add_row);
+/// Random search for places where a tool that presses stops cutting, or is held by what is soft.
+void measure_traps(const Effort& effort, const RowSink& add_row);
 /// What a tick costs.
 void measure_ticks(const Effort& effort, const RowSink& add_row);
 

@@ -71,6 +71,12 @@ voxel. A contact without any mean would feel this.)"},
      R"(The whole servo with `[cut] model = "preston"` and a ball of radius 1 mm. It is led by hand over a flat; pressed on it
 with a force that goes up to 1.2 N and back, however far the flat gives way; and sunk into a crown at the rate of
 enamel, at the worst of nine places. `GE tooth` is a real tooth by CT, below `--data` or `$KERF_DATA`.)"},
+    {"traps", "Traps",
+     R"(A random search in the whole servo: a hand presses a ball, cylinder, cone, inverted cone, flame or wheel of 0.4 to
+1 mm with 0.1 to 1 N for 5 s, from any side and with a tremor of 0.1 mm, into a flat, a crown, layers around soft
+tissue, rubble or a pit, turned anyhow; machinability is 1, 4 or 8 times that of enamel. Wherever force presses with
+more than the threshold, matter must leave. What is all softer than the iso must bear nothing. 240 presses; 10,000 with
+`--only traps`.)"},
     {"ticks", "Ticks",
      R"(On 256 x 256 x 161 voxels. The costliest tick of each tool is searched among thousands: at flat, sharp, hollow and
 noisy solids, in a slot with a play of 0.1 voxels, in tissue just below the iso and, where its data are, at the GE

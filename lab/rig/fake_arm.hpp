@@ -50,15 +50,16 @@ class FakeArm {
 inline constexpr int kDockTicks = 60;  ///< enough rest in the inkwell to be calibrated at 1 kHz
 
 /// Docks, leaves the inkwell, waits there until the force is faded in.
-inline void arm_at(Servo& servo, FakeArm& arm, double x_mm, double y_mm, double z_mm) {
-  for (int tick = 0; tick < kDockTicks; ++tick) static_cast<void>(servo.step(arm.docked()));
+inline void arm_at(Servo& servo, FakeArm& arm, double x_mm, double y_mm, double z_mm,
+                   int ticks = 1) {
+  for (int tick = 0; tick < kDockTicks * ticks; ++tick) static_cast<void>(servo.step(arm.docked()));
   // The move from the inkwell is slow enough for the speed limit: held far away, then close.
-  constexpr int kSteps = 200;
+  const int steps = 200 * ticks;
   const OmniArm geometry;
   const auto& d = omni::kDockRad;
   const auto start = geometry.tip_mm({d[0], d[1], d[2]});
-  for (int i = 1; i <= kSteps; ++i) {
-    const double s = double(i) / kSteps;
+  for (int i = 1; i <= steps; ++i) {
+    const double s = double(i) / steps;
     static_cast<void>(
         servo.step(arm.at(start.x + s * (x_mm - start.x), start.y + s * (y_mm - start.y),
                           start.z + s * (z_mm - start.z))));

@@ -27,6 +27,10 @@ class FlatField {
     return felt;
   }
   [[nodiscard]] bool half_spent() const { return false; }
+  [[nodiscard]] bool may_query() const { return true; }
+  [[nodiscard]] bool is_solid(ContactVec<typename N::Real> at) const {
+    return dot(up_, point_of<N>(at)) < 0;
+  }
   [[nodiscard]] typename N::Real free_distance(ContactVec<typename N::Real> at) const {
     const double free = dot(up_, point_of<N>(at) + turned_arm()) - 1;
     return typename N::Real(std::max(0.0, free));

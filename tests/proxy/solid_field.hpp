@@ -29,6 +29,10 @@ class SolidField {
     return felt;
   }
   [[nodiscard]] bool half_spent() const { return false; }
+  [[nodiscard]] bool may_query() const { return true; }
+  [[nodiscard]] bool is_solid(ContactVec<typename N::Real> at) const {
+    return nearest_(point_of<N>(at)).first < 0;
+  }
   [[nodiscard]] typename N::Real free_distance(ContactVec<typename N::Real> at) const {
     return typename N::Real(std::max(0.0, nearest_(point_of<N>(at)).first - radius_ - 1));
   }

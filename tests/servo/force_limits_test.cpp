@@ -43,7 +43,7 @@ TEST_CASE("whatever is wanted, peak and slew hold, also from the ends of the num
     for (int tick = 0; tick < 50; ++tick) {
       const auto next = kerf::limited_force<FixedNumbers>(
           omni_limits<FixedNumbers>(), thermal,
-          {Q16::from_raw(x), Q16::from_raw(y), Q16::from_raw(z)}, sent);
+          {Q16::from_raw(x), Q16::from_raw(y), Q16::from_raw(z)}, sent, false);
       RC_ASSERT(length(next) <= double(Q16(3.3)));
       RC_ASSERT(length(next - sent) <= 0.5 + 4e-5);  // two steps of rounding
       sent = next;
@@ -58,8 +58,8 @@ TEST_CASE_TEMPLATE("a peak held for long settles at the continuous force", N, Fi
   DeviceVec<Real> sent{};
   double peak_n = 0;
   for (int tick = 0; tick < 60'000; ++tick) {
-    sent =
-        kerf::limited_force<N>(omni_limits<N>(), thermal, {Real(0.0), Real(3.3), Real(0.0)}, sent);
+    sent = kerf::limited_force<N>(omni_limits<N>(), thermal, {Real(0.0), Real(3.3), Real(0.0)},
+                                  sent, false);
     peak_n = std::max(peak_n, length(sent));
   }
   CHECK(peak_n == doctest::Approx(3.3).epsilon(1e-3));
@@ -72,13 +72,40 @@ TEST_CASE("one more peak is there after a rest") {
   DeviceVec<Q16> sent{};
   const DeviceVec<Q16> push{Q16(0), Q16(3.3), Q16(0)};
   for (int tick = 0; tick < 20'000; ++tick) {
-    sent = kerf::limited_force<FixedNumbers>(omni_limits<FixedNumbers>(), thermal, push, sent);
+    sent =
+        kerf::limited_force<FixedNumbers>(omni_limits<FixedNumbers>(), thermal, push, sent, false);
   }
   for (int tick = 0; tick < 30'000; ++tick) {
-    sent = kerf::limited_force<FixedNumbers>(omni_limits<FixedNumbers>(), thermal, {}, sent);
+    sent = kerf::limited_force<FixedNumbers>(omni_limits<FixedNumbers>(), thermal, {}, sent, false);
   }
   for (int tick = 0; tick < 20; ++tick) {
-    sent = kerf::limited_force<FixedNumbers>(omni_limits<FixedNumbers>(), thermal, push, sent);
+    sent =
+        kerf::limited_force<FixedNumbers>(omni_limits<FixedNumbers>(), thermal, push, sent, false);
   }
   CHECK(length(sent) == doctest::Approx(3.3).epsilon(1e-3));
+}
+
+TEST_CASE_TEMPLATE(
+    "a force falls at once while the hand leaves with it, and never grows or turns faster", N,
+    FixedNumbers, FloatNumbers, DoubleNumbers) {
+  using Real = typename N::Real;
+  auto limits = omni_limits<N>();
+  limits.slew_n_per_tick = Real(0.01);
+  const DeviceVec<Real> last{Real(1.0), Real(2.0), Real(-2.0)};  // 3 N
+  const auto sent = [&](DeviceVec<Real> wanted, bool leaves) {
+    kerf::ThermalState<N> thermal;
+    return kerf::limited_force<N>(limits, thermal, wanted, last, leaves);
+  };
+  CHECK(length(sent({}, true)) < 1e-4);
+  CHECK(length(sent({}, false)) == doctest::Approx(2.99).epsilon(1e-4));
+  const DeviceVec<Real> third{Real(1.0 / 3), Real(2.0 / 3), Real(-2.0 / 3)};
+  CHECK(length(sent(third, true) - third) < 1e-4);
+  const DeviceVec<Real> more{Real(1.1), Real(2.2), Real(-2.2)};
+  CHECK(length(sent(more, true) - last) == doctest::Approx(0.01).epsilon(1e-2));
+  // Against the last force: it falls to 0, and turns from there by the slew limit.
+  const DeviceVec<Real> opposite{Real(-1.0), Real(-2.0), Real(2.0)};
+  CHECK(length(sent(opposite, true)) == doctest::Approx(0.01).epsilon(1e-2));
+  // Across it: what is left along it is nothing.
+  const DeviceVec<Real> across{Real(0.0), Real(2.0), Real(2.0)};
+  CHECK(length(sent(across, true)) == doctest::Approx(0.01).epsilon(1e-2));
 }

@@ -88,9 +88,11 @@ using vec3::length;
 
 /// A compiled scene under an arm that was docked and led to `start_mm`, in the air above the flat.
 struct ArmedServo {
-  explicit ArmedServo(LoadedScene& scene, const std::array<double, 3>& start_mm = {0, 5, 0})
+  /// `ticks`: for each place on the way there, 1 per kHz of the rate.
+  explicit ArmedServo(LoadedScene& scene, const std::array<double, 3>& start_mm = {0, 5, 0},
+                      int ticks = 1)
       : servo(compile(scene)) {
-    arm_at(*servo, arm, start_mm[0], start_mm[1], start_mm[2]);
+    arm_at(*servo, arm, start_mm[0], start_mm[1], start_mm[2], ticks);
   }
   ServoOutput step(double x_mm, double y_mm, double z_mm) {
     return servo->step(arm.at(x_mm, y_mm, z_mm));

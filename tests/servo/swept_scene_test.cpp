@@ -69,14 +69,15 @@ TEST_CASE("no stroke gets through a wall of two voxels, nor feels nothing behind
   }
 }
 
-TEST_CASE("a tool that is taken up inside of the solid is pushed out with a ramp") {
+TEST_CASE("a larger tool that takes over under pressure is pushed out with a ramp") {
   LoadedScene scene = swept_scene(NumericKind::fixed);
-  ArmedServo armed(scene, {0, -1.5, 0});  // from the side, below the surface, docked outside
-  armed.servo->apply({.kind = ServoCommand::Kind::select_tool, .argument = 0});
-  double last_n = 0;
-  double most_n = 0;
+  scene.tools.push_back(ball(32));
+  ArmedServo armed(scene, {0, 5, 0});
+  static_cast<void>(armed.settled(0, -0.5, 0));  // 1.5 mm deep: the small ball rests at 1 mm
+  CHECK(armed.servo->apply({.kind = ServoCommand::Kind::select_tool, .argument = 1}));
+  double last_n = 0, most_n = 0;
   for (int tick = 0; tick < 200; ++tick) {
-    const ServoOutput out = armed.step(0, -1.5, 0);
+    const ServoOutput out = armed.step(0, -0.5, 0);
     CHECK(length(out.contact_n) <= last_n + 0.1 + 1e-3);
     last_n = length(out.contact_n);
     most_n = std::max(most_n, last_n);

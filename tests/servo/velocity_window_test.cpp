@@ -19,6 +19,15 @@ namespace {
 constexpr double kStepMm = 0.055;  // of the Omni's encoders at the tip
 constexpr double kNoiseMm = kStepMm / 2;
 
+/// The velocity after the tip of the next tick.
+template <class N>
+kerf::DeviceVec<typename N::Real> advance(
+    kerf::VelocityWindow<N>& window, const kerf::VelocityPlan<N>& plan,
+    std::type_identity_t<kerf::DeviceVec<typename N::Real>> tip_mm, std::uint32_t gap = 1) {
+  window.take(tip_mm, gap);
+  return window.velocity(plan);
+}
+
 struct Errors {
   double rms = 0, largest = 0;
 };
@@ -37,7 +46,7 @@ Errors errors(int rate_hz, double velocity_mm_per_s) {
     const double x_mm = velocity_mm_per_s * k / rate_hz + 0.0123;
     const double read_mm = kStepMm * std::floor(x_mm / kStepMm + 0.5);
     const double error =
-        double(window.advance(plan, {Real(read_mm), Real(), Real()}).x) - velocity_mm_per_s;
+        double(advance(window, plan, {Real(read_mm), Real(), Real()}).x) - velocity_mm_per_s;
     if (k < settled) continue;
     squares += error * error;
     largest = std::max(largest, std::abs(error));
@@ -76,12 +85,12 @@ TEST_CASE_TEMPLATE("a hand that stops dead is at rest within two encoder steps",
   double x_mm = 0;
   for (int k = 0; k < 50; ++k) {  // 200 mm/s
     x_mm += 0.2;
-    static_cast<void>(window.advance(plan, {Real(x_mm), Real(), Real()}));
+    static_cast<void>(advance(window, plan, {Real(x_mm), Real(), Real()}));
   }
   double last = 0;
-  for (int k = 0; k < 3; ++k) last = double(window.advance(plan, {Real(x_mm), Real(), Real()}).x);
+  for (int k = 0; k < 3; ++k) last = double(advance(window, plan, {Real(x_mm), Real(), Real()}).x);
   CHECK(std::abs(last) <= 1000 * kStepMm);
-  for (int k = 0; k < 16; ++k) last = double(window.advance(plan, {Real(x_mm), Real(), Real()}).x);
+  for (int k = 0; k < 16; ++k) last = double(advance(window, plan, {Real(x_mm), Real(), Real()}).x);
   CHECK(last == 0);
 }
 
@@ -93,11 +102,36 @@ TEST_CASE("whatever the places, the velocity is theirs within the range, and fix
     kerf::VelocityWindow<DoubleNumbers> exact;
     for (const std::int32_t raw : places) {
       const auto place = kerf::Q16::from_raw(raw);
-      const double is = double(fixed.advance(fixed_plan, {place, place, place}).y);
-      const double should = exact.advance(plan, {double(place), double(place), double(place)}).y;
+      const double is = double(advance(fixed, fixed_plan, {place, place, place}).y);
+      const double should = advance(exact, plan, {double(place), double(place), double(place)}).y;
       const double lowest = double(kerf::Q16::from_raw(INT32_MIN));
       const double highest = double(kerf::Q16::from_raw(INT32_MAX));
       RC_ASSERT(std::abs(is - std::clamp(should, lowest, highest)) <= 1e-4);
     }
   }));
+}
+
+TEST_CASE_TEMPLATE("missing reports leave a steady hand its velocity", N, FixedNumbers,
+                   FloatNumbers, DoubleNumbers) {
+  using Real = typename N::Real;
+  for (const int rate_hz : {250, 1000, 8000}) {
+    for (const std::uint32_t gap : {2U, 5U, 20U, 400U}) {  // the last is longer than the window
+      CAPTURE(rate_hz);
+      CAPTURE(gap);
+      const kerf::VelocityPlan<N> plan{rate_hz, std::max(1, rate_hz / 1000), Real(kNoiseMm)};
+      kerf::VelocityWindow<N> window;
+      window.start({});
+      constexpr double kMmPerS = 50;
+      double x_mm = 0;
+      for (int k = 0; k < rate_hz; ++k) {
+        x_mm += kMmPerS / rate_hz;
+        static_cast<void>(advance(window, plan, {Real(x_mm), Real(), Real()}));
+      }
+      for (int times = 0; times < 3; ++times) {
+        x_mm += kMmPerS * gap / rate_hz;
+        const double seen = double(advance(window, plan, {Real(x_mm), Real(), Real()}, gap).x);
+        CHECK(seen == doctest::Approx(kMmPerS).epsilon(0.02));
+      }
+    }
+  }
 }

@@ -103,3 +103,28 @@ TEST_CASE("nothing solid, an empty box and a box above the limit are refused in 
   CHECK_THROWS_AS(static_cast<void>(crop(image, VoxelBox{{2, 0, 0}, {2, 4, 4}})), SceneError);
   CHECK_THROWS_AS(static_cast<void>(crop(image, VoxelBox{{0, 0, 0}, {2000, 4, 4}})), SceneError);
 }
+
+TEST_CASE(
+    "a solid that ends at the border gets one voxel of air around it; no other image changes") {
+  VolumeImage image;
+  image.grid = {4, 5, 6};
+  image.spacing_mm = {1, 2, 3};
+  image.direction = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+  image.density.assign(image.grid.voxel_count(), 100);
+  image.density[image.grid.index(2, 2, 2)] = 1000;
+  const VolumeImage inside = enclosed_in_air(image, 500);
+  CHECK(inside.grid == image.grid);
+  CHECK(inside.density == image.density);
+  CHECK(enclosed_in_air(image, 2000).grid == image.grid);  // nothing is solid
+
+  for (const VoxelIndex at : {VoxelIndex{0, 2, 2}, VoxelIndex{3, 2, 2}, VoxelIndex{2, 0, 2},
+                              VoxelIndex{2, 4, 2}, VoxelIndex{2, 2, 0}, VoxelIndex{2, 2, 5}}) {
+    VolumeImage border = image;
+    border.density[border.grid.index(at.x, at.y, at.z)] = 500;
+    const VolumeImage around = enclosed_in_air(border, 500);
+    CHECK(around.grid == VoxelGrid{6, 7, 8});
+    CHECK(around.origin_mm == std::array<double, 3>{-1, -2, -3});  // every voxel stays in its place
+    CHECK(around.density[around.grid.index(at.x + 1, at.y + 1, at.z + 1)] == 500);
+    CHECK(around.density[around.grid.index(0, 3, 3)] == 0);
+  }
+}

@@ -234,6 +234,9 @@ OverlayFigures overlay_figures(const Session& session) {
   } else if (figures.data_age_ms && *figures.data_age_ms > kStaleMs) {
     figures.banner = "stale: no news from the servo";
     figures.alarm = true;
+  } else if (const auto& record = session.latest(); record && (record->flags & kFlagRefused) != 0) {
+    figures.banner = "no free place for this tool here, so it feels nothing: lead it into air";
+    figures.alarm = true;
   }
   return figures;
 }

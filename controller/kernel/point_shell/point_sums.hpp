@@ -136,8 +136,8 @@ constexpr void add_sample(PointSums<N>& sums, std::int32_t i, const PointSample<
     sums.top = r;
     sums.top_sample = i;
   }
-  if (round) return;
   sums.square += weight * square;
+  if (round) return;
   Sum high = weight * square;
   if constexpr (N::kIsFixed) high = (weight >> 8) * square >> 8;
   sums.high += high;

@@ -119,15 +119,15 @@ template <class N>
   }
 }
 
-/// The exponent e of a shape that is no ball, from y = m2 / m1^2 = 8 (7 + e) / (7 (8 + e)), 0 to 2
-/// (docs/theory.md 3.2).
+/// The exponent e from y = m2 / m1^2 = (p + 2) (p + 1 + e) / ((p + 1) (p + 2 + e)), 0 to 2
+/// (docs/theory.md 3.2); p is 4 of a ball, 6 of other shapes.
 template <class N>
-[[nodiscard]] constexpr typename N::Ratio fall_of(const PointMeans<N>& means) noexcept {
+[[nodiscard]] constexpr typename N::Ratio fall_of(const PointMeans<N>& means, bool round) noexcept {
   using Ratio = typename N::Ratio;
+  const Ratio low(round ? 5 : 7), high(round ? 6 : 8), product(round ? 30 : 56);
   const Ratio spread = std::max(Ratio(1), means.square / means.density / means.density);
-  const Ratio rest = Ratio(8) - Ratio(7) * spread;
-  return rest > Ratio(0.001) ? std::min(Ratio(56) * (spread - Ratio(1)) / rest, Ratio(2))
-                             : Ratio(2);
+  const Ratio rest = high - low * spread;
+  return rest > Ratio(0.001) ? std::min(product * (spread - Ratio(1)) / rest, Ratio(2)) : Ratio(2);
 }
 
 /// Height of the peak of density over the tool's surface, from its power sums (docs/theory.md 3.2).
@@ -137,9 +137,12 @@ template <class N>
 [[nodiscard]] constexpr typename N::Ratio peak_height(const PointMeans<N>& means,
                                                       bool round) noexcept {
   using Ratio = typename N::Ratio;
-  // p = 4 gives 1.2. But samples below 1/16 are left out, and trilinear reads are raised where
-  // density begins: on planes the mean is 0.75 % low.
-  const Ratio factor = round ? static_cast<Ratio>(1.209) : Ratio(1) + fall_of(means) / Ratio(7);
+  // A ball touches in a point, e = 1, but where all about it is alike. p = 4 gives 1.2; but samples
+  // below 1/16 are left out, and trilinear reads are raised where density begins: on planes the
+  // mean is 0.75 % low.
+  const Ratio e = fall_of(means, round);
+  const Ratio factor =
+      Ratio(1) + (round ? static_cast<Ratio>(0.209) * std::min(e, Ratio(1)) : e / Ratio(7));
   // A lone spike has few samples and hardly moves the mean: it may not stand far above it unseen.
   constexpr auto kSpike = static_cast<Ratio>(0.2);
   const Ratio height = std::max(factor * means.density, means.top - kSpike);

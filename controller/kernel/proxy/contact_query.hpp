@@ -80,19 +80,30 @@ class ContactQuery {
   [[nodiscard]] const QueryWork& work() const noexcept { return work_; }
   /// See ContactField.
   [[nodiscard]] bool half_spent() const noexcept { return left_ <= work_.budget() / 2; }
+  [[nodiscard]] bool may_query() const noexcept { return left_ >= work_.query + work_.closer; }
   /// Work since `begin_tick`, in the samples of `work`.
   [[nodiscard]] std::int64_t spent() const noexcept { return work_.budget() - left_; }
 
   /// What the tool feels with its centre at `q`: at most one plane a volume, the deepest three.
   [[nodiscard]] Contacts<N> query(ContactVec<Real> q) const noexcept {
     Contacts<N> felt;
-    felt.buried = left_ < work_.query + work_.closer && !turned_;
+    const bool closer = may_query();
+    felt.buried = !closer && !turned_;
     if (felt.buried) return felt;
     turned_ = false;
-    const bool closer = left_ >= work_.query + work_.closer;
     for (const ContactVolume<N>& volume : volumes_) feel(volume, q, closer, felt);
     if (felt.count > 0) felt.depth = std::max(felt.depth, felt.plane[0].depth);
     return felt;
+  }
+
+  /// Whether a volume's density at `q` reaches its iso.
+  [[nodiscard]] bool is_solid(ContactVec<Real> q) const noexcept {
+    constexpr auto kIso = N::kIsFixed ? PointNumber<N>(1 << 14) : PointNumber<N>(0.5);
+    return std::any_of(volumes_.begin(), volumes_.end(), [&](const ContactVolume<N>& volume) {
+      const VoxelVec<Real> at = place_of(volume, q);
+      return point_sample<N>(volume.field, {number_of(at.x), number_of(at.y), number_of(at.z)})
+                 .density >= kIso;
+    });
   }
 
   /// How far the centre may move from `q` in any direction and feel nothing: a lower bound.
@@ -190,9 +201,12 @@ class ContactQuery {
         look_again(volume, at, sums, means, plane);
       }
     }
-    // Nearly all samples are in the solid, or the tool feels the same all round.
+    // Nearly all samples are in the solid, or the tool feels the same all round. What is softer
+    // than the iso bears nothing.
     const ContactVec<typename N::Unit> none{};
-    if (sums.solid >= points_.table.count - points_.table.count / 16 || plane.normal == none) {
+    const bool immersed = sums.solid >= points_.table.count - points_.table.count / 16;
+    if (!immersed && plane.normal == none && means.top < typename N::Ratio(0.5)) return;
+    if (immersed || plane.normal == none) {
       felt.buried = true;
       felt.depth = std::max(felt.depth, plane.depth);
       return;
@@ -217,7 +231,7 @@ class ContactQuery {
     using Unit = typename N::Unit;
     using Ratio = typename N::Ratio;
     PointNumber<N> peak[3] = {};
-    peak_offset(sums, fall_of(means), peak);
+    peak_offset(sums, fall_of(means, false), peak);
     Closeup<N> seen = look_closely_at(volume, at, peak);
     Ratio height = seen.height;
     // If the highest sample of the point shell was not among what was seen, the tool touches twice.

@@ -17,13 +17,17 @@ namespace kerf {
 ///   free_distance(q)  how far the centre may go from q in any direction and feel nothing; a lower
 ///                     bound, 0 if unknown
 ///   turn(t)           sets the orientation of the tool for all queries from now on
+///   is_solid(q)       the place is in the solid
 ///   half_spent()      half of the tick's work is spent: the rest is the move's
+///   may_query()       the tick's work allows another query
 template <class F, class N>
 concept ContactField = requires(F field, ContactVec<typename N::Real> q, ToolTurn<N> turn) {
   { field.query(q) } -> std::convertible_to<Contacts<N>>;
   { field.free_distance(q) } -> std::convertible_to<typename N::Real>;
   field.turn(turn);
+  { field.is_solid(q) } -> std::convertible_to<bool>;
   { field.half_spent() } -> std::convertible_to<bool>;
+  { field.may_query() } -> std::convertible_to<bool>;
 };
 
 /// Constants of the sweep (docs/theory.md 4.2 and after); lengths in units of contact space.

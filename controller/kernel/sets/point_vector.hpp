@@ -172,7 +172,7 @@ template <bool kRound, bool kInside>
   const PointWeights weights(w);
   weights.count(sums.weight);
   weights.add(sums.density, r);
-  if constexpr (!kRound) weights.add(sums.square, r2);
+  weights.add(sums.square, r2);
   V r3 = Simd::zero(), lift = w;
   if constexpr (kRound) {
     r3 = Simd::srl32<6>(Simd::multiply_pairs(Simd::srl32<1>(r2), r));

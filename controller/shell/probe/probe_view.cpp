@@ -45,11 +45,10 @@ void ProbeView::take(const DeviceReport& report, std::int64_t now_ns) noexcept {
   if (follow_encoders(report, plan_.absolute_encoders, rest_ticks_, encoders_)) {
     seen_.calibrated = true;
   }
-  follow_gimbal(report, gimbal_);
 }
 
 std::array<double, 3> ProbeView::tip_mm() const noexcept {
-  const auto tip = device_pose(plan_, encoders_, gimbal_).arm.tip_mm;
+  const auto tip = device_pose(plan_, encoders_, {}).arm.tip_mm;
   return {tip.x, tip.y, tip.z};
 }
 

@@ -43,7 +43,6 @@ class ProbeView {
   DevicePlan<DoubleNumbers> plan_;
   std::uint32_t rest_ticks_;
   EncoderState encoders_;
-  GimbalFilter gimbal_;
   std::array<std::int32_t, 3> travelled_{};  ///< counts since the first report, over the wrap
   DeviceReport last_;
   std::int64_t last_ns_ = 0;
