@@ -39,7 +39,7 @@ class VelocityWindow {
   constexpr void start(DeviceVec<Real> tip_mm) noexcept { ring_.fill(tip_mm); }
 
   /// Takes the tip `gap` ticks after the last one. What lies between was not reported: it is filled
-  /// in along the line, as if the hand had kept its speed. At most kRing places are written.
+  /// in along the line, as if the hand had kept its speed. At most kRing + 1 places are written.
   constexpr void take(DeviceVec<Real> tip_mm, std::uint32_t gap) noexcept {
     const std::int64_t ticks = std::max(gap, 1U);
     const DeviceVec<Real> from = ring_[static_cast<std::size_t>(newest_)];
