@@ -53,7 +53,7 @@ controller/kernel/sets/gather_vector.hpp | border: one cell too many | s/grid\.n
 controller/kernel/sets/gather_vector.hpp | sums widened too late | s/kGatherBlock = 65536/kGatherBlock = 262144/
 controller/kernel/sets/gather_vector.hpp | samples beyond the last count | s/\(i < count\) & //
 controller/kernel/sets/splat_loops.hpp | rounding of a scaled overlap | s/ \+ \(1 << 19\)\) >> 20/) >> 20/
-controller/kernel/sets/splat_loops.hpp | air is felt | s/density\[x\] == INT16_MIN \? 0 : covered/covered/
+controller/kernel/sets/splat_loops.hpp | air is felt | s/density == INT16_MIN \? 0 : covered/covered/
 controller/kernel/sets/splat_loops.hpp | what lies beyond a full voxel is lost | s/sums\[x\] - covered : sums/0 : sums/
 controller/kernel/splat.hpp | the box lies one voxel off | s/low\.y - kGradientReach/low.y - 1/
 controller/plan/tables/aligned_tool.cpp | the flush bound is twice too large | s/\(2 \* largest \* 32768\)/(largest * 32768)/
