@@ -50,6 +50,14 @@ struct CoverSums {
   std::uint64_t covered, covered_number, weight, weight_speed;
 };
 
+/// How far a voxel lies ahead of the tool's centre along its press, as a linear form of its place:
+/// 1 at the foremost (covered_loads.hpp).
+template <class Sum>
+struct AheadForm {
+  Sum origin;   ///< of voxel 0, 0, 0; fixed: 20 fraction bits, as have the steps
+  Sum step[3];  ///< from a voxel to the next
+};
+
 /// How one tick's budget is taken: a voxel of material m loses weight * mantissa[m] 2^-shift[m]
 /// density steps, with 16 fraction bits; the shifts are 0..63.
 struct CoverSpend {

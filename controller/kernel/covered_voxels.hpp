@@ -47,11 +47,12 @@ struct CoveredVoxel {
 template <class N>
 struct CoveredWeights {
   ByMaterial<CutWeight<N>> weight{};  ///< sums of the list's
+  ByMaterial<CutWeight<N>> load{};    ///< by which materials share a press: the weights, or `loads`
   SurfaceDrag<N> drag;
 
-  [[nodiscard]] constexpr CutWeight<N> whole_weight() const noexcept {
+  [[nodiscard]] constexpr CutWeight<N> whole_load() const noexcept {
     CutWeight<N> sum{};
-    for (const CutWeight<N> w : weight) sum += w;
+    for (const CutWeight<N> part : load) sum += part;
     return sum;
   }
 };
@@ -83,6 +84,7 @@ class CoverScan {
       drag.add(add_row(first, count, ratio, start, frame.step()), start, frame.step());
     });
     found_.drag = drag.mean();
+    found_.load = found_.weight;
     found_.list = memory_.first(count_);
     return found_;
   }

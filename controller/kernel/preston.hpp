@@ -57,10 +57,10 @@ class PrestonTick {
 
   /// Feeds the accounts of the materials under the tool and spends them.
   constexpr void cut(Sum drive, PrestonOutcome<N>& out) noexcept {
-    const CutWeight<N> all = covered_.whole_weight();
+    const CutWeight<N> all = covered_.whole_load();
     each_material([&](std::size_t m) {
       const auto fed =
-          portion<N>(budget_of(plan_.rate[m], drive), share_of<N>(covered_.weight[m], all));
+          portion<N>(budget_of(plan_.rate[m], drive), share_of<N>(covered_.load[m], all));
       if (!(fed > 0)) return;
       fed_[m] = true;
       budget_[m] = fed + state_.carry[m] / kCarryTicks;

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <numbers>
 
+#include "controller/kernel/covered_loads.hpp"
 #include "controller/load/loaded_scene.hpp"
 #include "controller/plan/method/matrices.hpp"
 #include "controller/servo/servo_plan.hpp"
@@ -42,6 +43,13 @@ template <class N>
     }
   }
   return rounded<typename N::Ratio, WorldSpace, VoxelSpace>(m);
+}
+
+/// For `scaled_press`.
+template <class N>
+[[nodiscard]] typename N::Ratio slimness(const SceneTool& tool) {
+  const double ratio = tool.round ? 1 : 2 * tool.radius_mm / tool.length_mm;
+  return typename N::Ratio(std::clamp(ratio, kSlimmest, 1 / kSlimmest));
 }
 
 template <class N>

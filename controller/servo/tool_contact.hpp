@@ -15,6 +15,13 @@ struct ToolContact {
   WorldVec<typename N::Unit> normal{};            ///< out of the solid; 0 in air
 };
 
+/// A place of the world in a volume.
+template <class N>
+[[nodiscard]] VoxelVec<typename N::Real> place_in(const VolumePlan<N>& volume,
+                                                  WorldVec<typename N::Real> at_mm) noexcept {
+  return volume.voxel_from_world * (at_mm - volume.position_mm);
+}
+
 /// Samples of the active tool in one volume. A tool that is round, or that does not turn, has the
 /// same samples whatever the stylus does.
 template <class N>
@@ -23,7 +30,7 @@ template <class N>
                                     WorldVec<typename N::Real> tip_mm,
                                     const Rotation<N>& rotation) noexcept {
   ToolPose<N> pose;
-  pose.centre_vox = volume.voxel_from_world * (tip_mm - volume.position_mm);
+  pose.centre_vox = place_in(volume, tip_mm);
   pose.step = in_volume.unturned_step;
   if (tool.round || !tool.turns) return pose;
   for (std::size_t i = 0; i < 3; ++i) {

@@ -9,6 +9,7 @@
 #include <doctest/doctest.h>
 
 #include "controller/kernel/covered_groups.hpp"
+#include "controller/kernel/covered_loads.hpp"
 #include "controller/kernel/splat.hpp"
 #include "controller/plan/tables/sample_tool.hpp"
 #include "tests/kernel/aligned_support.hpp"
@@ -153,6 +154,79 @@ TEST_CASE("every method and instruction set cuts the same by force, inside and a
   }
   CHECK(cuts > 200);
   CHECK(exhausted > 20);
+}
+
+TEST_CASE("what materials bear of a press is the same in groups, on every instruction set") {
+  const auto tool = ragged_tool(9, 7, 8, 4);
+  BoxMemory memory;
+  memory.hold({9, 7, 8}, true);
+  Cutter<N> cutter(20);
+  std::vector<CoveredVoxel<N>> list(60'000);
+  std::vector<CoveredGroup> groups(4000);
+  std::mt19937 random(12);
+  std::uniform_real_distribution<double> part(-1, 1);
+  int some = 0, case_number = 0;
+  for (int fill = 0; fill < kFills; ++fill) {
+    const VoxelGrid grid = fill % 4 == 3 ? VoxelGrid{7, 9, 8} : VoxelGrid{44, 14, 12};
+    const TestVolume volume = hard_volume(grid, fill, static_cast<std::uint32_t>(fill));
+    for (int i = 0; i < 20; ++i, ++case_number) {
+      const std::vector<Label> labels = labels_of(grid, case_number % 5);
+      const auto pose = random_pose(grid, {9, 7, 8}, random);
+      const auto& at = pose.centre_vox;
+      const auto frame = frame_at<N>({double(at.x), double(at.y), double(at.z)}, 4.0, Axis::z);
+      Transform<N::Ratio, WorldSpace, VoxelSpace> rims;
+      for (auto& row : rims.row) {
+        for (auto& entry : row) entry = N::Ratio(i % 4 == 0 ? 60 * part(random) : 0.2);
+      }
+      const double long_press = i % 3 == 0 ? 16 : 1;
+      const AheadForm<N::Sum> form = ahead_form<N>(
+          at, rims, {N::Ratio(part(random)), N::Ratio(long_press * part(random)), N::Ratio(0.1)});
+      overlap<N>(grid, tool, pose, N::kStepOne, cutter.overlap);
+      const auto covered = covered_voxels<N>(grid, std::span<const Density>(volume.density), labels,
+                                             cutter.overlap, frame, std::span(list));
+      const auto truth = loads(covered, form);
+      for (std::size_t m = 0; m < truth.size(); ++m) {
+        REQUIRE(truth[m] <= covered.weight[m]);
+        some += truth[m] > 0 && truth[m] < covered.weight[m] ? 1 : 0;
+      }
+      for (auto set = kernel_sets(); *set != nullptr; ++set) {
+        INFO(std::string((*set)->name), ", fill ", fill, ", case ", i);
+        const AlignedTool table(tool, kExactFarid, **set);
+        std::vector<Density> density = volume.density;
+        const AlignedTick tick(**set, table.table(), memory.view(), grid, density, pose);
+        tick.cover();
+        const bool same = loads(covered_groups(**set, grid, labels, tick.overlap(), frame, groups),
+                                form) == truth;
+        REQUIRE(same);
+      }
+    }
+  }
+  CHECK(some > 100);
+}
+
+TEST_CASE_TEMPLATE("a tool bears where it looks ahead", N, FixedNumbers, DoubleNumbers) {
+  using Ratio = typename N::Ratio;
+  using Unit = typename N::Unit;
+  using Real = typename N::Real;
+  Transform<Ratio, WorldSpace, VoxelSpace> rims;  // of 8 voxels
+  for (std::size_t a = 0; a < 3; ++a) rims.row[a][a] = Ratio(0.125);
+  const VoxelVec<Real> centre{Real(20), Real(30), Real(40)};
+  const auto ahead = [&](const auto& form, double x, double y, double z) {
+    const double one = N::kIsFixed ? 1 << 20 : 1;
+    return (double(form.origin) + x * double(form.step[0]) + y * double(form.step[1]) +
+            z * double(form.step[2])) /
+           one;
+  };
+  const WorldVec<Unit> up{{}, Unit(1), {}}, left{Unit(-1), {}, {}};
+  // A ball that presses towards +x is foremost there, at its rim.
+  const auto ball = ahead_form<N>(centre, rims, scaled_press<N>(left, up, Ratio(1)));
+  CHECK(ahead(ball, 28, 30, 40) == doctest::Approx(1).epsilon(1e-5));
+  CHECK(std::abs(ahead(ball, 20, 22, 48)) < 1e-5);
+  CHECK(ahead(ball, 12, 30, 40) == doctest::Approx(-1).epsilon(1e-5));
+  // A tool of three times its radius that presses down is foremost at its end.
+  const auto tall = ahead_form<N>(centre, rims, scaled_press<N>(up, up, Ratio(1.0 / 3)));
+  CHECK(ahead(tall, 20, 6, 40) == doctest::Approx(1).epsilon(1e-4));
+  CHECK(ahead(tall, 28, 18, 40) == doctest::Approx(0.5).epsilon(1e-4));
 }
 
 TEST_CASE("a long thin tool of any step along its rows weighs the same in groups") {

@@ -70,14 +70,17 @@ namespace {
   }
 }
 
-[[gnu::always_inline]] inline void add_weights(const CoveredGroup& group, std::uint64_t sum,
+/// Adds the weights of a group, whose sum is `sum`, to those of its materials.
+[[gnu::always_inline]] inline void add_weights(const CoveredGroup& group,
+                                               const std::uint32_t (&weight)[kCoverGroup],
+                                               std::uint64_t sum,
                                                std::uint64_t* by_material) noexcept {
   if (!group.mixed) {
     by_material[group.material[0]] += sum;
     return;
   }
   KERF_LANES
-  for (std::int32_t i = 0; i < kCoverGroup; ++i) by_material[group.material[i]] += group.weight[i];
+  for (std::int32_t i = 0; i < kCoverGroup; ++i) by_material[group.material[i]] += weight[i];
 }
 
 /// Lists the groups of a row that the tool covers some of, at most `room`, and adds their weights.
@@ -99,7 +102,7 @@ std::int32_t weigh_row(const CoverRow& row, CoveredGroup* list, std::int32_t roo
     group.place[1] = static_cast<std::int16_t>(row.first.y);
     group.place[2] = static_cast<std::int16_t>(row.first.z);
     find_materials(row, group);
-    add_weights(group, own.weight, by_material);
+    add_weights(group, group.weight, own.weight, by_material);
     ++listed;
   }
   return listed;
@@ -114,7 +117,28 @@ void weigh_again(CoveredGroup* list, std::int32_t count, std::uint64_t* by_mater
       group->weight[i] = weight_in_parts(group->covered[i], group->speed[i]);
       sum += group->weight[i];
     }
-    add_weights(*group, sum, by_material);
+    add_weights(*group, group->weight, sum, by_material);
+  }
+}
+
+/// Adds up what the materials of `count` groups bear of a press.
+void add_loads(const AheadForm<std::int64_t>& form, const CoveredGroup* list, std::int32_t count,
+               std::uint64_t* by_material) noexcept {
+  constexpr std::int64_t kOne = 1 << 20;
+  for (const CoveredGroup* group = list; group != list + count; ++group) {
+    const std::int64_t first = form.origin + form.step[0] * group->place[0] +
+                               form.step[1] * group->place[1] + form.step[2] * group->place[2];
+    std::uint32_t load[kCoverGroup];
+    std::uint64_t sum = 0;
+    KERF_LANES
+    for (std::int32_t i = 0; i < kCoverGroup; ++i) {
+      const std::int64_t ahead = first + i * form.step[0];
+      const std::int64_t positive = ahead < 0 ? 0 : ahead;
+      const auto weight = static_cast<std::uint32_t>((positive > kOne ? kOne : positive) >> 5);
+      load[i] = weight_in_parts(group->weight[i], weight);
+      sum += load[i];
+    }
+    add_weights(*group, load, sum, by_material);
   }
 }
 

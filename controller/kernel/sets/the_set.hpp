@@ -27,6 +27,7 @@ constexpr KernelSet the_set(const char* name, bool can_fuse) noexcept {
           cover_sums,
           weigh_row,
           weigh_again,
+          add_loads,
           take_steps,
           place_point_samples,
           sum_point_samples,

@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: Apache-2.0
+// Which of the materials around a tool a press cuts: those that bear it.
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include <doctest/doctest.h>
+
+#include "controller/scene/materials.hpp"
+#include "controller/tool/tool_shapes.hpp"
+#include "controller/volume/phantom.hpp"
+#include "lab/rig/miller.hpp"
+#include "tests/servo/support.hpp"
+
+using namespace kerf;
+using namespace kerf::test;
+using extremes::Miller;
+
+namespace {
+
+constexpr double kRadiusMm = 1, kTopMm = 1.5, kDownMm = -1;
+constexpr Label kLow = kLabelEnamel, kHigh = kLabelDentin;  // of low x, of high x
+
+/// A vertical bore as the tool leaves it, a quarter of a voxel wider than itself, in one material
+/// for x below 0 and another one above. Edges are over two voxels.
+LoadedScene bored_scene(const char* shape) {
+  LoadedScene scene = half_space_scene(8);
+  scene.volumes[0] = volume_of(48, kVoxelMm, [&](double x, double y, double z) {
+    return std::max(kRadiusMm + kVoxelMm / 4 - std::hypot(x, z), y - kTopMm) / 2;
+  });
+  VolumeImage& image = scene.volumes[0].image;
+  for (int i = 0; i < int(image.grid.voxel_count()); ++i) {
+    image.labels.push_back(i % image.grid.nx < image.grid.nx / 2 ? kLow : kHigh);
+  }
+  scene.tools = {make_tool(shape, shape, {.pitch_mm = kVoxelMm, .size_vox = 16})};
+  scene.tools[0].turns = false;  // upright in its bore
+  scene.materials = default_materials();
+  scene.materials[kLow].machinability = scene.materials[kHigh].machinability = 1;
+  scene.cut.model = CutModel::preston;
+  scene.cut.machinability_mm3_per_s_n = 2;
+  return scene;
+}
+
+/// The part of what a press removes that is of high x.
+double share_of_high(const LoadedScene& scene, const std::array<double, 3>& press_mm) {
+  const std::vector<Label> labels = scene.volumes[0].image.labels;
+  Miller miller(scene, {0, kTopMm + 1.5, 0});
+  for (double y = kTopMm + 1.5; y > kDownMm; y -= 0.01) static_cast<void>(miller.step({0, y, 0}));
+  const auto density = miller.servo().density(0);
+  const std::vector<Density> before(density.begin(), density.end());
+  static_cast<void>(miller.hold(press_mm, 0.2));
+  double all = 0, high = 0;
+  for (std::size_t i = 0; i < before.size(); ++i) {
+    all += before[i] - density[i];
+    if (labels[i] == kHigh) high += before[i] - density[i];
+  }
+  CHECK(all > 10 * kDensityMax);
+  return high / all;
+}
+
+}  // namespace
+
+TEST_CASE("a tool in its bore cuts the material that it presses on") {
+  for (const auto numeric : {NumericKind::fixed, NumericKind::float64}) {
+    CAPTURE(static_cast<int>(numeric));
+    for (const char* shape : {"ball", "cylinder"}) {
+      LoadedScene scene = bored_scene(shape);
+      scene.servo.numeric = numeric;
+      const double left = share_of_high(scene, {-0.5, kDownMm, 0});
+      const double right = 1 - share_of_high(scene, {0.5, kDownMm, 0});
+      MESSAGE(std::string(shape), " of the other: ", left, " ", right);
+      CHECK(left < 0.005);
+      CHECK(right < 0.005);
+    }
+  }
+}
+
+TEST_CASE("two materials under one face share the press by what lies ahead in each") {
+  for (const char* shape : {"ball", "cylinder"}) {
+    CAPTURE(std::string(shape));
+    LoadedScene scene = bored_scene(shape);
+    scene.volumes[0].image.density = volume_of(48, kVoxelMm, [](double, double y, double) {
+                                       return (y - kTopMm) / 2;
+                                     }).image.density;
+    const double bottom_mm = scene.tools[0].length_mm / 2;
+    Miller miller(scene, {0, kTopMm + bottom_mm + 0.3, 0});
+    const std::vector<Label> labels = scene.volumes[0].image.labels;
+    const std::vector<Density> before = scene.volumes[0].image.density;
+    static_cast<void>(miller.hold({0, kTopMm + bottom_mm - 0.5, 0}, 0.3));
+    const auto after = miller.servo().density(0);
+    double all = 0, high = 0;
+    for (std::size_t i = 0; i < before.size(); ++i) {
+      all += before[i] - after[i];
+      if (labels[i] == kHigh) high += before[i] - after[i];
+    }
+    CHECK(all > 10 * kDensityMax);
+    CHECK(high / all == doctest::Approx(0.5).epsilon(0.05));
+  }
+}
