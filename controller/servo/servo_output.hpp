@@ -57,6 +57,7 @@ struct ServoOutput {
   bool contact = false;    ///< commanded force above 0.01 N
   bool forbidden = false;  ///< the tool presses on a forbidden material
   bool refused = false;    ///< the tool finds no free place near the hand, and feels nothing
+  bool shaft = false;      ///< what presses on shaft or handpiece is above 0.01 N
 
   std::array<std::int32_t, 3> joint_counts{};  ///< unwrapped since calibration
   std::array<double, 3> gimbal_rad{};          ///< yaw, pitch, roll

@@ -260,6 +260,7 @@ Wanted<N> wanted_force(const ServoPlan<N>& plan, ServoState<N>& state, const Sen
   out.proxy_offset_mm = as_doubles(forces.proxy_offset_mm);
   out.tip_torque_n_mm = as_doubles(forces.tip_torque_n_mm);
   out.contact_n = as_doubles(forces.contact_n);
+  out.shaft = forces.behind_n > Real(kContactThresholdN);
   out.modification_n = as_doubles(forces.modification_n);
   tell_removed(forces.removed, out);
   const DeviceVec<Real> felt_n = forces.contact_n + forces.modification_n;
@@ -326,9 +327,11 @@ void tell(const ServoPlan<N>& plan, ServoState<N>& state, const Sensed<N>& sense
     out.gimbal_rad[i] = as_double(sensed.pose.gimbal[i]);
   }
   out.position_mm = as_doubles(sensed.tip_mm);
-  // Drawn as it is felt: a tool that does not turn keeps the world's axes.
-  const Rotation<N> rotation =
-      plan.tools[state.active_tool].turns ? state.rotation : identity_rotation<N>();
+  // Drawn as it is felt: a tool that does not turn keeps the world's axes, and a shaft that is held
+  // lags behind the stylus.
+  const ToolPlan<N>& tool = plan.tools[state.active_tool];
+  Rotation<N> rotation = tool.turns ? state.rotation : identity_rotation<N>();
+  if (tool.swept.behind.count > 0 && proxy.placed) rotation = {rows_of(proxy.pose.turn)};
   for (std::size_t i = 0; i < 9; ++i) out.rotation[i] = as_double(rotation.row[i / 3][i % 3]);
   out.velocity_mm_per_s = as_doubles(sensed.velocity_mm_per_s);
   out.force_n = as_doubles(state.force_n);

@@ -12,7 +12,8 @@ template <class N>
 struct ToolContact {
   WorldVec<typename N::Real> centre_mm;
   Rotation<N> rotation = identity_rotation<N>();  ///< of its samples
-  WorldVec<typename N::Unit> normal{};            ///< out of the solid; 0 in air
+  WorldVec<typename N::Unit> normal{};            ///< out of the solid, of the head; 0 in air
+  typename N::Unit head_share{1};                 ///< of the force along `normal`
 };
 
 /// Samples of the active tool in one volume. A tool that is round, or that does not turn, has the

@@ -21,6 +21,7 @@ ToolForces<N> feel_and_cut(const ServoPlan<N>& plan, ServoState<N>& state,
     forces.proxy_offset_mm = felt.offset_mm;
     forces.tip_torque_n_mm = felt.torque_n_mm;
     forces.tool = felt.tool;
+    forces.behind_n = felt.behind_n;
     forces.queried = felt.queried;
     if (plan.force_cut.on) forces.modification_n = felt_friction(plan, state, felt.tool);
     if (!plan.cutting) return forces;

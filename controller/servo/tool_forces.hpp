@@ -20,6 +20,7 @@ struct ToolForces {
   WorldVec<typename N::Real> proxy_offset_mm;   ///< from the tip; 0 without a proxy
   DeviceVec<typename N::Real> tip_torque_n_mm;  ///< likewise
   ToolContact<N> tool;                          ///< likewise
+  typename N::Real behind_n{};                  ///< likewise: of it on the shaft or the handpiece
   std::int64_t queried = 0;                     ///< likewise: samples, as query_work.hpp counts
   std::array<Removed, kMaxVolumes> removed{};   ///< by volume of the scene
 };

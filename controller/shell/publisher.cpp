@@ -35,6 +35,7 @@ std::uint32_t flags_of(const DeviceReport& report, const ServoOutput& output) no
   set(output.started, kFlagStarted);
   set(output.forbidden, kFlagForbidden);
   set(output.refused, kFlagRefused);
+  set(output.shaft, kFlagShaft);
   return flags;
 }
 

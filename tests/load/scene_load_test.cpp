@@ -273,6 +273,32 @@ TEST_CASE("a tool that does not suit the volume is reported with its line and th
             "use at most 0.125"));
 }
 
+TEST_CASE("a shaft that does not suit the head or the volume is reported with its line") {
+  const kerf::test::TempFolder folder;
+  const auto error_with = [&](const std::string& lines) {
+    return load_error(block_scene(
+        folder, 0.125, "[[tool]]\nshape = \"ball\"\nradius_mm = 1\nshaft_length_mm = " + lines));
+  };
+  CHECK(error_with("2.1\nshaft_radius_mm = 0.5\n").empty());
+  CHECK(
+      has(error_with("2\nshaft_radius_mm = 0.5\n"),
+          "scene.toml:6: tool.shaft_length_mm = 2 ends inside of the head, which is 2 mm long; it "
+          "counts from the tool's tip, so use more"));
+  CHECK(has(error_with("9\nshaft_radius_mm = 0.06\n"),
+            " is of a shaft thinner than a voxel (0.125 mm); use a larger shaft_radius_mm"));
+  const auto planned = [&](const std::string& lines) {
+    const auto path = block_scene(
+        folder, 0.125, "[[tool]]\nshape = \"ball\"\nradius_mm = 1\nshaft_length_mm = " + lines);
+    return kerf::test::error_of(
+        [&] { static_cast<void>(kerf::plan_scene(kerf::load_scene(path))); });
+  };
+  CHECK(planned("12\nshaft_radius_mm = 0.8\nhandpiece_radius_mm = 5\n").empty());
+  CHECK(has(planned("12\nshaft_radius_mm = 0.8\nhandpiece_radius_mm = 50\n"),
+            "scene.toml: tool 'ball 1 mm': its handpiece has a surface of "));
+  CHECK(has(planned("200\nshaft_radius_mm = 0.8\n"),
+            "scene.toml: tool 'ball 1 mm': its shaft reaches "));
+}
+
 TEST_CASE("a mesh that does not suit the volume is reported with what to do about it") {
   const kerf::test::TempFolder folder;
   const auto error_of = [&](std::vector<kerf::LooseTriangle> triangles, double aside,
