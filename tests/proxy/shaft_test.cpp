@@ -266,3 +266,60 @@ TEST_CASE_TEMPLATE("a start with the shaft inside of the solid finds a place for
   CHECK_FALSE(felt.buried);
   CHECK(double(felt.depth) < 0.06);
 }
+
+TEST_CASE_TEMPLATE("askew in a hole with a play of half a unit a shaft sinks into neither rim", N,
+                   FixedNumbers, DoubleNumbers) {
+  // A plate 16 units thick, its middle at the height 40.
+  const auto plate = [](Point p) {
+    return std::max(std::abs(p[1] - 40) - 8, 3.5 - std::hypot(p[0] - 40, p[2] - 32));
+  };
+  const Body body = blurred(kGrid, plate);
+  const SceneTool tool = tool_with("ball", 3, 6, {.radius_mm = 3, .length_mm = 50});
+  ShaftRig<N> rig(tool, {&body});
+  const ToolPart part = parts_behind(tool)[0];
+  const PartSamples surface = part_samples(tool, part, 1);
+  rig.lead({40, 70, 32}, {40, 20, 32}, 500);
+  Dice dice(5);
+  double deepest = 0, most_lean = 0;
+  for (int tick = 0; tick < 600; ++tick) {
+    const double lean_rad = 0.25 * std::sin(0.02 * tick);
+    const Point hand{40 + dice.uniform(-2, 2), 20, 32 + dice.uniform(-2, 2)};
+    const ProxyContact<N> held = rig.tick(hand, leaning<N>(lean_rad));
+    const TurnRows<N> rows = rows_of(held.pose.turn);
+    most_lean = std::max(most_lean, std::abs(2 * std::asin(double(held.pose.turn.z))));
+    for (const Point& at : surface.samples) {
+      Point in_world = rig.proxy();
+      const Point offset{at[0], at[1] + part.middle_mm, at[2]};
+      for (std::size_t i = 0; i < 3; ++i) {
+        for (std::size_t j = 0; j < 3; ++j) in_world[i] += double(rows[i][j]) * offset[j];
+      }
+      deepest = std::max(deepest, -plate(in_world));
+    }
+  }
+  // Both rims hold it at 1 unit of play over 16 of height.
+  CHECK(deepest < 0.12);
+  CHECK(most_lean < 0.075);
+  CHECK(most_lean > 0.05);
+}
+
+TEST_CASE_TEMPLATE("no tick costs more than its bound, whatever there is to feel", N, FixedNumbers,
+                   DoubleNumbers) {
+  Dice noise(3);
+  const Body body = body_of(kGrid, [&](Point) { return noise.uniform(0, 0.6); });
+  const SceneTool tool = tool_with(
+      "ball", 5, 10,
+      {.radius_mm = 3, .length_mm = 30, .handpiece_radius_mm = 14, .handpiece_length_mm = 10});
+  ShaftRig<N> rig(tool, {&body});
+  Dice dice(4);
+  std::int64_t most = 0;
+  rig.tick({40, 120, 32});
+  for (int tick = 0; tick < 300; ++tick) {
+    const ProxyContact<N> held =
+        rig.tick({dice.uniform(20, 60), dice.uniform(20, 90), dice.uniform(10, 50)},
+                 dice.template turn<N>(dice.uniform(0, 0.5)));
+    REQUIRE(held.queries <= SweepRules::kMaxQueries);
+    most = std::max(most, rig.field().spent());
+  }
+  CHECK(most <= rig.field().work().most());
+  CHECK(most > rig.field().work().budget() / 2);  // the bound is none that nothing meets
+}

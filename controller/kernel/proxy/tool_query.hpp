@@ -48,7 +48,7 @@ template <class N>
   return work;
 }
 
-/// Collision queries of a tool with a shaft: the ContactField of the sweep (docs/theory.md 3.6).
+/// Collision queries of a tool with a shaft: the ContactField of the sweep (docs/theory.md 3.7).
 ///
 /// A query is one of each part at the same pose; what they feel is put together as planes of
 /// several volumes are: the deepest three stay. Planes of the parts behind are marked. One budget
