@@ -149,6 +149,23 @@ TEST_CASE("a volume from the command line is fitted to the hand") {
   }
 }
 
+TEST_CASE("a shaft grows with its tool in a volume of the command line") {
+  const kerf::test::TempFolder folder;
+  static_cast<void>(block_scene(folder, 0.5, kBall));
+  const auto base =
+      folder.write("base.toml",
+                   "[[volume]]\nfile = \"phantom\"\n[[tool]]\nshape = \"ball\"\nradius_mm = 0.5\n"
+                   "shaft_radius_mm = 0.25\nshaft_length_mm = 3\nhandpiece_radius_mm = 1\n");
+  kerf::SceneOverrides overrides;
+  overrides.volume_file = base.parent_path() / "block.nrrd";
+  const kerf::SceneTool tool = kerf::load_scene(base, overrides).tools.at(0);
+  CHECK(tool.radius_mm == doctest::Approx(2));  // written for 0.125 mm
+  CHECK(tool.shaft.radius_mm == doctest::Approx(1));
+  CHECK(tool.shaft.end_mm == doctest::Approx(12 - 2));
+  CHECK(tool.shaft.handpiece_radius_mm == doctest::Approx(4));
+  CHECK(tool.shaft.handpiece_end_mm == doctest::Approx(14));
+}
+
 TEST_CASE("a press cuts the same share of the tool's volume in a volume of the command line") {
   const kerf::test::TempFolder folder;
   constexpr double kEdgeMm = 0.5, kGrown = 4;  // over the phantom's voxels

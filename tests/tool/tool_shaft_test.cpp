@@ -62,6 +62,15 @@ TEST_CASE("a shaft begins where the head becomes narrower than it, and counts fr
   }
 }
 
+TEST_CASE("behind a mesh the shaft has a face of its own") {
+  SceneTool tool = tool_of("cylinder", 6, 20, {.radius_mm = 4, .length_mm = 60});
+  tool.mesh.triangles.push_back({0, 1, 2});  // its shape is no longer known
+  const auto parts = parts_behind(tool);
+  REQUIRE(parts.size() == 1);
+  CHECK(parts[0].profile[0] == std::array<double, 2>{10, 0});
+  CHECK(parts[0].profile[1] == std::array<double, 2>{10, 4});
+}
+
 TEST_CASE("samples of both parts lie on their surface, evenly, and none on what is hidden") {
   const SceneTool tool = tool_of(
       "ball", 8, 16,
