@@ -129,6 +129,31 @@ TEST_CASE("a tool cuts the same bits as without its shaft while that is in air")
   }
 }
 
+TEST_CASE("a ball that cuts its own bore is not held by its shaft, neither in nor out") {
+  for (const auto numeric : {NumericKind::fixed, NumericKind::float64}) {
+    CAPTURE(static_cast<int>(numeric));
+    const auto bored_mm3 = [&](const ShaftSize& shaft) {
+      LoadedScene scene = upright_scene([](double, double y, double) { return y - 2; }, shaft);
+      scene.servo.numeric = numeric;
+      scene.cut.machinability_mm3_per_s_n = 40;
+      Miller miller(scene, {0, 3.2, 0});
+      double proxy_mm = 3;
+      for (int ticks = 0; proxy_mm > -2 && ticks < 3000; ++ticks) {
+        const ServoOutput out = miller.step({0, proxy_mm - 1.5, 0});  // presses with 0.6 N
+        proxy_mm = out.position_mm[1] + out.proxy_offset_mm[1];
+        REQUIRE_FALSE(out.shaft);
+      }
+      CHECK(proxy_mm <= -2);
+      for (int tick = 0; tick < 500; ++tick) {
+        REQUIRE(length(miller.step({0, -2 + 0.01 * tick, 0}).force_n) < 0.05);
+      }
+      return miller.removed_mm3();
+    };
+    CHECK(bored_mm3({.radius_mm = 0.6, .length_mm = 6.0}) ==
+          doctest::Approx(bored_mm3({})).epsilon(0.01));
+  }
+}
+
 TEST_CASE("a ball with a shaft turns with the stylus: it is told and drawn turned") {
   LoadedScene bare = upright_scene(ledge), shafted = upright_scene(ledge);
   bare.tools[0].shaft = {};
