@@ -183,9 +183,26 @@ TEST_CASE_TEMPLATE("on a floor and a ledge of two volumes head and shaft each be
   CHECK(double(held.moment_arm.z) == doctest::Approx(-22 * 0.8).epsilon(0.02));
 }
 
-TEST_CASE_TEMPLATE("faces that lie alike share the force: the head's part is what it bears", N,
+TEST_CASE_TEMPLATE("where head and shaft press alike, in part, the head's part is what it bears", N,
                    FixedNumbers, DoubleNumbers) {
-  // A head and a shaft of the same width, flat along a wall.
+  // A ramp of 45 degrees below the ball when that is at (33, 25).
+  const Body wall = ledge(), ramp = blurred(kGrid, [](Point p) {
+                               return (p[0] + p[1] - 58) / std::numbers::sqrt2 + 5;
+                             });
+  ShaftRig<N> rig(tool_with("ball", 5, 10, kShaft), {&wall, &ramp});
+  rig.lead({45, 30, 32}, {29, 22, 32}, 100);
+  const ProxyContact<N> held = rig.tick({29, 22, 32});
+  CHECK(rig.proxy()[0] == doctest::Approx(33).epsilon(0.002));
+  CHECK(rig.proxy()[1] == doctest::Approx(25).epsilon(0.002));
+  // The spring (4, 3) is 3 sqrt 2 along (1, 1) / sqrt 2 and 1 along (1, 0).
+  CHECK(double(held.normal.x) == doctest::Approx(std::sqrt(0.5)).epsilon(0.005));
+  CHECK(double(held.normal.y) == doctest::Approx(std::sqrt(0.5)).epsilon(0.005));
+  CHECK(double(held.behind_share) == doctest::Approx(1.0 / 5).epsilon(0.05));
+  CHECK(double(held.head_share) == doctest::Approx(6.0 / 7).epsilon(0.01));
+}
+
+TEST_CASE_TEMPLATE("a shaft as wide as its head lies beside it on a wall, neither deeper", N,
+                   FixedNumbers, DoubleNumbers) {
   const Body wall = blurred(kGrid, [](Point p) { return p[0] - 30; });
   ShaftRig<N> rig(tool_with("cylinder", 5, 10, {.radius_mm = 5, .length_mm = 30}), {&wall});
   rig.lead({50, 28, 32}, {33, 28, 32}, 60);
@@ -193,6 +210,10 @@ TEST_CASE_TEMPLATE("faces that lie alike share the force: the head's part is wha
   CHECK(rig.proxy()[0] == doctest::Approx(35).epsilon(0.002));
   const double head = double(held.normal.x) * double(held.head_share);
   CHECK(head + double(held.behind_share) == doctest::Approx(1).epsilon(0.02));
+  // It slides along the wall freely.
+  rig.lead({33, 28, 32}, {33, 31, 35}, 30);
+  CHECK(rig.proxy()[1] == doctest::Approx(31).epsilon(0.002));
+  CHECK(rig.proxy()[2] == doctest::Approx(35).epsilon(0.002));
 }
 
 TEST_CASE_TEMPLATE("in the bore that a ball has cut its shaft has play, and leans on the rim", N,
