@@ -167,6 +167,22 @@ TEST_CASE_TEMPLATE("a head feels the same bits as without its shaft while that i
   }
 }
 
+TEST_CASE_TEMPLATE("a ball on a floor feels the same while its shaft turns above it", N,
+                   FixedNumbers, DoubleNumbers) {
+  const Body body = floor_body();
+  ShaftRig<N> rig(tool_with("ball", 5, 10, kShaft), {&body});
+  const Point hand{40, 22, 32};
+  rig.lead({40, 30, 32}, hand, 100);
+  const Point rest = point_of<N>(rig.tick(hand).spring);
+  CHECK(rest[1] == doctest::Approx(3).epsilon(0.005));
+  for (int tick = 0; tick < 400; ++tick) {  // up to 4 rad/s at 1 kHz
+    const ProxyContact<N> felt = rig.tick(hand, leaning<N>(0.8 * std::sin(0.005 * tick)));
+    REQUIRE(felt.turned);
+    REQUIRE(length(point_of<N>(felt.spring) - rest) < 0.015);
+    REQUIRE(felt.behind_share == typename N::Unit(0));
+  }
+}
+
 TEST_CASE_TEMPLATE("on a floor and a ledge of two volumes head and shaft each bear their own part",
                    N, FixedNumbers, DoubleNumbers) {
   const Body wall = ledge(), ground = floor_body();
