@@ -20,6 +20,7 @@ namespace {
           {"seconds", s.seconds},
           {"lost_ticks", s.lost_ticks},
           {"contact_ticks", s.contact_ticks},
+          {"shaft_ticks", s.shaft_ticks},
           {"stale_ticks", s.stale_ticks},
           {"faults", s.faults},
           {"missed_deadlines", s.missed_deadlines},
@@ -48,6 +49,7 @@ RecordSummary summarise(const std::filesystem::path& folder) {
     next_seq = record.seq + 2;
     out.last_tick = record.tick;
     out.contact_ticks += (record.flags & kFlagContact) != 0 ? 1 : 0;
+    out.shaft_ticks += (record.flags & kFlagShaft) != 0 ? 1 : 0;
     out.stale_ticks += (record.flags & kFlagStaleInput) != 0 ? 1 : 0;
     out.faults += record.fault != 0 && record.fault != fault ? 1 : 0;
     fault = record.fault;

@@ -15,6 +15,7 @@ struct RecordSummary {
   double seconds = 0;
   std::uint64_t lost_ticks = 0;  ///< from the sequence numbers of the rows
   std::uint64_t contact_ticks = 0;
+  std::uint64_t shaft_ticks = 0;  ///< shaft or handpiece touched
   std::uint64_t stale_ticks = 0;
   std::uint64_t faults = 0;  ///< times that the fault code became another one than 0
   std::uint32_t missed_deadlines = 0;

@@ -12,6 +12,7 @@
 #include "controller/scene/scene_text.hpp"
 #include "controller/tool/mesh_tool.hpp"
 #include "controller/tool/stl_file.hpp"
+#include "controller/tool/tool_shaft.hpp"
 #include "controller/tool/tool_shapes.hpp"
 
 namespace kerf {
@@ -81,6 +82,18 @@ SceneTool load_mesh(const ToolSpec& spec, double pitch_mm, double voxel_mm,
   return tool;
 }
 
+/// The part of a shaft that the head hides is none.
+void check_shaft(const ToolSpec& spec, const SceneTool& tool, double voxel_mm) {
+  if (!spec.shaft.radius_mm) return;
+  if (*spec.shaft.length_mm <= tool.length_mm) {
+    refuse(spec.shaft_place, " ends inside of the head, which is " + short_text(tool.length_mm) +
+                                 " mm long; it counts from the tool's tip, so use more");
+  }
+  if (*spec.shaft.radius_mm >= voxel_mm / 2) return;
+  refuse(spec.shaft_place, " is of a shaft thinner than a voxel (" + short_text(voxel_mm) +
+                               " mm); use a larger shaft_radius_mm or a finer volume");
+}
+
 }  // namespace
 
 TouchedVolumes touched_volumes(const std::vector<SceneVolume>& volumes) {
@@ -109,6 +122,8 @@ SceneTool load_tool(const ToolSpec& spec, const TouchedVolumes& touched,
                        ? load_mesh(spec, size.pitch_mm, touched.voxel_mm, folder)
                        : load_shape(spec, size, touched.voxel_mm);
   tool.turns = spec.turns;
+  check_shaft(spec, tool, touched.voxel_mm);
+  tool.shaft = tool_shaft(spec.shaft, tool.length_mm);
   const double side_mm = std::max(2 * tool.radius_mm, tool.length_mm);
   if (side_mm > touched.side_mm) {
     refuse(spec.size_place, " makes a tool of " + short_text(side_mm) + " mm" +

@@ -7,6 +7,7 @@
 #include <utility>
 #include <variant>
 
+#include "controller/tool/tool_shaft.hpp"
 #include "controller/tool/tool_shapes.hpp"
 #include "shared/numeric/fnv1a.hpp"
 #include "shared/posix/hex64.hpp"
@@ -49,6 +50,7 @@ Json tool_json(const SceneTool& tool) {
                  {"turns", tool.turns},
                  {"size_vox", tool.size_vox},
                  {"offsets_half_pitch", std::move(offsets)}};
+  if (tool.shaft.radius_mm > 0) object["shaft"] = shaft_profile(tool);
   if (tool.mesh.triangles.empty()) {
     object["profile"] = tool_profile(tool);
   } else {

@@ -17,7 +17,8 @@ namespace kerf {
 ///              density_hash}]
 ///   tools      [{name, shape, pitch_mm, radius_mm, length_mm, round, turns, size_vox,
 ///              offsets_half_pitch [x, y, z, x, y, z..], and what it looks like: profile
-///              [[y_mm, radius_mm]..] or mesh {points_mm [[x, y, z]..], triangles [[a, b, c]..]}}]
+///              [[y_mm, radius_mm]..] or mesh {points_mm [[x, y, z]..], triangles [[a, b, c]..]};
+///              shaft, if one is felt: the outline of it and the handpiece, as profile}]
 ///   active_tool
 ///   materials [..], scene, device, force, cut, spindle, limits, servo  as the rows of the table of
 ///              keys say (`InJson`), of the models that the scene has

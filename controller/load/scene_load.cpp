@@ -176,7 +176,11 @@ void fit_to_volume(double written_mm, Scene& spec, LoadedScene& scene) {
   for (ToolSpec& tool : spec.tools) {
     tool.size.radius_mm *= grown;
     tool.size.pitch_mm *= grown;
-    if (tool.size.length_mm) *tool.size.length_mm *= grown;
+    ShaftSize& shaft = tool.shaft;
+    for (auto* length_mm : {&tool.size.length_mm, &shaft.radius_mm, &shaft.length_mm,
+                            &shaft.handpiece_radius_mm, &shaft.handpiece_length_mm}) {
+      if (*length_mm) **length_mm *= grown;
+    }
     tool.scale *= grown;
   }
   const WorldBox box = world_box(scene.volumes.front());

@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "controller/kernel/proxy/query_work.hpp"
+#include "controller/kernel/proxy/tool_query.hpp"
 #include "controller/plan/method/methods.hpp"
 #include "controller/plan/plan_contact.hpp"
 #include "controller/plan/plan_device.hpp"
@@ -86,7 +86,8 @@ class CompiledSceneOf final : public CompiledScene {
     plan.offsets = memory_.hold_samples(tool);
     if (plan_.contact.swept) {
       plan.swept.point_shell = memory_.contact().hold_point_shell(scene, tool);
-      plan.swept.proxy = plan_proxy(scene, tool, plan.swept.point_shell);
+      plan.swept.behind = memory_.contact().hold_parts_behind(scene, tool);
+      plan_proxy(scene, tool, plan.swept);
     }
     for (std::size_t v = 0; v < plan_.volume_count; ++v) {
       const std::size_t scene_index = plan_.volumes[v].scene_index;
@@ -96,17 +97,16 @@ class CompiledSceneOf final : public CompiledScene {
       const AlignedTable* table = choice.method->hold(in, v, memory_.methods());
       plan.in_volume[v] = plan_tool<N>(in, *choice.method, table);
       const TickShape shape = tick_shape(in, table);
-      costs_.ticks.push_back(
-          {plan_.tool_count - 1, scene_index, choice, shape,
-           most_stages(*choice.method, shape, in, most_samples(plan.swept.point_shell))});
+      costs_.ticks.push_back({plan_.tool_count - 1, scene_index, choice, shape,
+                              most_stages(*choice.method, shape, in, most_samples(plan.swept))});
     }
     plan.samples = memory_.methods().samples_of(tool);
   }
 
   /// Of one volume, rounded up.
-  [[nodiscard]] std::uint64_t most_samples(const PointShell<N>& point_shell) const {
+  [[nodiscard]] std::uint64_t most_samples(const SweptTool<N>& tool) const {
     if (!plan_.contact.swept) return 0;
-    const std::int64_t all = query_work(point_shell.table, plan_.volume_count).most();
+    const std::int64_t all = query_work(tool.point_shell, tool.behind, plan_.volume_count).most();
     return (static_cast<std::uint64_t>(all) + plan_.volume_count - 1) / plan_.volume_count;
   }
 

@@ -16,6 +16,7 @@
 #include "controller/scene/scene_error.hpp"
 #include "controller/servo/servo_state.hpp"
 #include "controller/tool/surface_samples.hpp"
+#include "controller/tool/tool_shaft.hpp"
 
 namespace kerf {
 
@@ -27,18 +28,23 @@ class ContactMemory {
   /// Samples of a tool's surface; they stay where they are.
   PointShell<N> hold_point_shell(const LoadedScene& scene, const SceneTool& tool) {
     const double unit_mm = contact_unit_mm(scene);
-    const auto in_units = [unit_mm](std::vector<std::array<double, 3>> samples) {
-      for (auto& sample : samples) {
-        for (double& x : sample) x /= unit_mm;
-      }
-      return samples;
-    };
-    const auto samples = in_units(samples_of(scene, tool, unit_mm));
-    const auto close = in_units(close_samples(tool, unit_mm));
-    const auto& held =
-        tools_.emplace_back(tool.name, ToolPoints<N>(samples, tool.round, close)).second;
-    for (PlaceMemory<N>& places : places_) places.hold(held.point_shell());
-    return held.point_shell();
+    const auto samples = named(scene, [&] { return surface_samples(tool, unit_mm); });
+    return hold(tool.name, unit_mm, {samples, close_samples(tool, unit_mm)}, tool.round, places_);
+  }
+
+  /// The same of what is behind the tool's head.
+  PartsBehind<N> hold_parts_behind(const LoadedScene& scene, const SceneTool& tool) {
+    const double unit_mm = contact_unit_mm(scene);
+    PartsBehind<N> behind;
+    for (const ToolPart& part : parts_behind(tool)) {
+      const auto samples = named(scene, [&] { return part_samples(tool, part, unit_mm); });
+      auto& places = places_behind_[behind.count];
+      places.resize(places_.size());
+      behind.part[behind.count++] = {
+          hold(tool.name + "'s " + part.name, unit_mm, samples, false, places),
+          typename N::Real(part.middle_mm / unit_mm)};
+    }
+    return behind;
   }
 
   /// Room in one more volume of the plan.
@@ -61,6 +67,12 @@ class ContactMemory {
         {volume.image.grid, density.data(), density_scale(volume.iso), map.bricks()},
         contact_frame<N>(scene, volume),
         places_[v].places()};
+    for (std::size_t part = 0; part < kMostBehind; ++part) {
+      state.behind[part][v] = state.volumes[v];
+      if (v < places_behind_[part].size()) {
+        state.behind[part][v].places = places_behind_[part][v].places();
+      }
+    }
   }
 
   [[nodiscard]] std::vector<ArrayBytes> arrays() const {
@@ -69,25 +81,41 @@ class ContactMemory {
       list.push_back({"surface of " + name, tool.bytes(), true});
     }
     for (std::size_t v = 0; v < names_.size(); ++v) {
-      list.push_back({"places in " + names_[v], places_[v].bytes(), true});
+      std::size_t places = places_[v].bytes();
+      for (const auto& behind : places_behind_) places += v < behind.size() ? behind[v].bytes() : 0;
+      list.push_back({"places in " + names_[v], places, true});
       list.push_back({"free bricks of " + names_[v], map_bytes_[v], false});
     }
     return list;
   }
 
  private:
-  static auto samples_of(const LoadedScene& scene, const SceneTool& tool, double unit_mm) {
+  /// With the scene's name before a complaint.
+  static auto named(const LoadedScene& scene, const auto& make) {
     try {
-      return surface_samples(tool, unit_mm);
+      return make();
     } catch (const SceneError& error) {
       throw SceneError(scene.path + ": " + error.what());
     }
+  }
+
+  PointShell<N> hold(const std::string& name, double unit_mm, PartSamples mm, bool round,
+                     std::vector<PlaceMemory<N>>& places) {
+    for (auto* samples : {&mm.samples, &mm.close}) {
+      for (auto& sample : *samples) {
+        for (double& x : sample) x /= unit_mm;
+      }
+    }
+    const auto& held = tools_.emplace_back(name, ToolPoints<N>(mm.samples, round, mm.close)).second;
+    for (PlaceMemory<N>& in_volume : places) in_volume.hold(held.point_shell());
+    return held.point_shell();
   }
 
   std::vector<std::pair<std::string, ToolPoints<N>>> tools_;
   std::vector<std::string> names_;  ///< by volume of the plan
   std::vector<std::size_t> map_bytes_;
   std::vector<PlaceMemory<N>> places_;
+  std::array<std::vector<PlaceMemory<N>>, kMostBehind> places_behind_;  ///< where a tool has a part
   std::vector<FreeBrickMap> maps_;
 };
 

@@ -93,18 +93,22 @@ template <class N>
           rounded<VoxelVec<typename N::Real>, typename N::Real>(origin_vox)};
 }
 
-/// How the proxy of a tool with this point shell moves.
+/// How the proxy of a tool with these point shells moves.
 template <class N>
-[[nodiscard]] ProxyPlan<N> plan_proxy(const LoadedScene& scene, const SceneTool& tool,
-                                      const PointShell<N>& point_shell) {
+void plan_proxy(const LoadedScene& scene, const SceneTool& tool, SweptTool<N>& swept) {
   constexpr double kRampNPerMs = 0.1;  // after a start inside of the solid: docs/theory.md 4.7
   const double n_per_unit =
       scene.force.stiffness_n_per_mm * contact_unit_mm(scene) / scene.device.workspace_scale;
-  const bool turning = tool.turns && !tool.round;
-  const double reach = std::max(1.0, static_cast<double>(point_shell.reach));
-  return {.friction = typename N::Unit(scene.force.friction),
-          .turn_step = typename N::Unit(turning ? turn_step_of(reach) : 0.0),
-          .ramp_per_tick = typename N::Real(kRampNPerMs * 1000 / scene.servo.rate_hz / n_per_unit)};
+  swept.turned = tool.turns && (!tool.round || swept.behind.count > 0);
+  double reach = std::max(1.0, static_cast<double>(swept.point_shell.reach));
+  for (std::size_t i = 0; i < swept.behind.count; ++i) {
+    const PartBehind<N>& part = swept.behind.part[i];
+    reach = std::max(reach, static_cast<double>(part.up + part.point_shell.reach));
+  }
+  swept.proxy = {
+      .friction = typename N::Unit(scene.force.friction),
+      .turn_step = typename N::Unit(swept.turned ? turn_step_of(reach) : 0.0),
+      .ramp_per_tick = typename N::Real(kRampNPerMs * 1000 / scene.servo.rate_hz / n_per_unit)};
 }
 
 }  // namespace kerf

@@ -42,6 +42,15 @@ struct ToolSize {
   std::optional<std::int32_t> size_vox{};  ///< the head fills a cube of so many pitches
 };
 
+/// What the scene says of the parts behind the head, which are felt and never cut. Cylinders about
+/// the tool's axis; a handpiece begins where the shaft ends.
+struct ShaftSize {
+  std::optional<double> radius_mm{};  ///< none: no shaft is felt
+  std::optional<double> length_mm{};  ///< from the tool's tip to the shaft's end, head included
+  std::optional<double> handpiece_radius_mm{};  ///< none: there is none
+  std::optional<double> handpiece_length_mm{};  ///< none: its radius
+};
+
 inline constexpr double kMinWorkspaceScale = 0.01, kMaxWorkspaceScale = 100;
 inline constexpr double kLargestWorldMm = 10000;  ///< a third of the range of the loop's numbers
 inline constexpr double kMinTorqueScale = 1e-3;   // N mm per count
@@ -170,6 +179,8 @@ struct ToolSpec {
   double scale = 1;          ///< mm per unit of the mesh
   bool pitch_given = false;  ///< else the smallest voxel of what can be touched
   ToolSize size;
+  ShaftSize shaft;
+  std::string shaft_place;  ///< begins complaints about the shaft
   bool turns = true;
 };
 

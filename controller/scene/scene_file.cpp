@@ -111,6 +111,7 @@ Scene read_scene(const TomlNode& root, const std::filesystem::path& path, SceneK
   finish_device(tables.once("device"), scene);
   finish_limits(tables.once("limits"), scene.limits);
   refuse_uncut(scene);
+  refuse_unfelt(scene);
   if (!scene.hand_script.empty()) {
     scene.hand_script = (path.parent_path() / scene.hand_script).string();
     scene.hand_place = tables.once("hand").place("script");

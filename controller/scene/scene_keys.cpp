@@ -14,9 +14,10 @@ namespace {
 template <class Part, class T>
 Part& part_with(T Part::*, SceneParts& parts) {
   Scene& scene = parts.scene;
-  return std::get<Part&>(std::tie(parts.volume, parts.tool, parts.tool.size, parts.material,
-                                  static_cast<SceneSettings&>(scene), scene.device, scene.force,
-                                  scene.cut, scene.spindle, scene.limits, scene.servo));
+  return std::get<Part&>(std::tie(parts.volume, parts.tool, parts.tool.size, parts.tool.shaft,
+                                  parts.material, static_cast<SceneSettings&>(scene), scene.device,
+                                  scene.force, scene.cut, scene.spindle, scene.limits,
+                                  scene.servo));
 }
 
 template <auto kMember>
@@ -105,6 +106,15 @@ constexpr SceneKey kKeys[] = {
     {"tool.scale", "mm", at<&ToolSpec::scale>, between(1e-6, 1000), "of a unit of the file", kMesh},
     {"tool.pitch_mm", "mm", at<&ToolSize::pitch_mm>, between(1e-4, 100),
      "distance of the samples", {}, {.default_text = "the smallest voxel edge"}},
+    {"tool.shaft_radius_mm", "mm", at<&ShaftSize::radius_mm>, between(1e-4, 1000),
+     "of the shaft behind the head, which is felt and never cuts", {}, {.default_text = "none"}},
+    {"tool.shaft_length_mm", "mm", at<&ShaftSize::length_mm>, between(1e-4, 1000),
+     "from the tool's tip to the shaft's end", {}, {.default_text = "none"}},
+    {"tool.handpiece_radius_mm", "mm", at<&ShaftSize::handpiece_radius_mm>, between(1e-4, 1000),
+     "of the handpiece, felt like the shaft: it begins where that ends",
+     {}, {.default_text = "none"}},
+    {"tool.handpiece_length_mm", "mm", at<&ShaftSize::handpiece_length_mm>, between(1e-4, 1000),
+     "of the handpiece", {}, {.default_text = "its radius"}},
     {"tool.turns", "", at<&ToolSpec::turns>, {}, "with the stylus; else it keeps the world's axes"},
 
     {"material.name", "", at<&Material::name>, {},

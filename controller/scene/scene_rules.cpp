@@ -49,6 +49,30 @@ void check_size(const SceneTable& table, const ToolSpec& tool) {
   }
 }
 
+/// Of any tool; what the head's own length forbids is told once that is known (load_tool.cpp).
+void check_shaft(const SceneTable& table, ToolSpec& tool) {
+  const ShaftSize& shaft = tool.shaft;
+  if (shaft.radius_mm && !shaft.length_mm) {
+    refuse(table.place("shaft_radius_mm"),
+           " has no length; write shaft_length_mm, from the tool's tip to the shaft's end");
+  }
+  if (shaft.length_mm && !shaft.radius_mm) {
+    refuse(table.place("shaft_length_mm"), " has no radius; write shaft_radius_mm");
+  }
+  if (shaft.handpiece_radius_mm && !shaft.radius_mm) {
+    refuse(table.place("handpiece_radius_mm"),
+           " has no shaft to hold; write shaft_radius_mm and shaft_length_mm");
+  }
+  if (shaft.handpiece_length_mm && !shaft.handpiece_radius_mm) {
+    refuse(table.place("handpiece_length_mm"), " has no radius; write handpiece_radius_mm");
+  }
+  if (shaft.handpiece_radius_mm && *shaft.handpiece_radius_mm < *shaft.radius_mm) {
+    refuse(table.place("handpiece_radius_mm"),
+           " is narrower than the shaft; use at least " + number_text(*shaft.radius_mm));
+  }
+  if (shaft.length_mm) tool.shaft_place = table.place("shaft_length_mm");
+}
+
 }  // namespace
 
 void finish_volume(const SceneTable& table, VolumeSpec& volume) {
@@ -74,6 +98,7 @@ void finish_tool(const SceneTable& table, ToolSpec& tool) {
            (in_voxels ? std::to_string(*tool.size.size_vox) + " vox"
                       : number_text(tool.size.radius_mm) + " mm");
   }
+  check_shaft(table, tool);
   tool.pitch_given = table.has("pitch_mm");
   if (tool.pitch_given) tool.pitch_place = table.place("pitch_mm");
   if (!table.has("name")) tool.name = name;
@@ -112,6 +137,15 @@ void refuse_uncut(const Scene& scene) {
     refuse(scene.path, ": material " + material.name +
                            " is forbidden, and this cut.model cuts everything; set model "
                            "= \"preston\", or leave forbidden out");
+  }
+}
+
+void refuse_unfelt(const Scene& scene) {
+  if (scene.force.model == ForceModel::proxy) return;
+  for (const ToolSpec& tool : scene.tools) {
+    if (!tool.shaft.length_mm) continue;
+    refuse(tool.shaft_place,
+           " is felt by a proxy alone; set force.model = \"proxy\", or leave the shaft out");
   }
 }
 

@@ -24,6 +24,8 @@ void finish_device(const SceneTable& table, Scene& scene);
 void choose_cut(const SceneTable& table, Scene& scene);
 /// The overlap models cut whatever they meet, forbidden or not.
 void refuse_uncut(const Scene& scene);
+/// The paper's force feels heads alone.
+void refuse_unfelt(const Scene& scene);
 void finish_limits(const SceneTable& table, LimitSettings& limits);
 
 }  // namespace kerf

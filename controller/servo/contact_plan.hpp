@@ -7,6 +7,7 @@
 
 #include "controller/kernel/proxy/constraint_plane.hpp"
 #include "controller/kernel/proxy/contact_query.hpp"
+#include "controller/kernel/proxy/tool_query.hpp"
 #include "controller/servo/proxy_contact.hpp"
 #include "shared/numeric/numbers.hpp"
 #include "shared/numeric/vec.hpp"
@@ -78,14 +79,18 @@ struct ContactPlan {
 /// A tool's surface and how its proxy moves.
 template <class N>
 struct SweptTool {
-  PointShell<N> point_shell;
+  PointShell<N> point_shell;  ///< of the head
+  PartsBehind<N> behind;
+  bool turned = false;  ///< by the stylus; else it keeps the world's axes, or is a ball alone
   ProxyPlan<N> proxy;
 };
 
 /// What one tick hands to the next; the memory of `volumes` belongs to the compiled scene.
 template <class N>
 struct ContactState {
-  std::array<ContactVolume<N>, kMaxVolumes> volumes{};  ///< by index of the plan's volumes
+  using Volumes = std::array<ContactVolume<N>, kMaxVolumes>;  ///< by index of the plan's volumes
+  Volumes volumes{};
+  std::array<Volumes, kMostBehind> behind{};  ///< the same with places of the parts behind the head
   ProxyState<N> proxy;
 };
 

@@ -12,11 +12,11 @@ namespace kerf {
 namespace {
 
 /// Axes of the spindle. A round tool has the same samples in every orientation, but turns about its
-/// shaft.
+/// shaft; one whose shaft is felt is turned as that is.
 template <class N>
 const Rotation<N>& spindle_axes(const ToolPlan<N>& tool, const ServoState<N>& state,
                                 const ToolContact<N>& at) noexcept {
-  return tool.round && tool.turns ? state.rotation : at.rotation;
+  return tool.round && tool.turns && !tool.swept.turned ? state.rotation : at.rotation;
 }
 
 /// What the tool covers of all volumes, and how they share its press.
@@ -147,9 +147,8 @@ ForceCut<N> cut_by_sent_force(const ServoPlan<N>& plan, ServoState<N>& state,
   const ForceCutPlan<N>& rules = plan.force_cut;
   ForceCutState<N>& memory = state.force_cut;
   ForceCut<N> cut;
-  cut.press_n =
-      std::max(Real(0), along<N>(relabel<ContactSpace>(at.normal), relabel<ContactSpace>(sent_n)) /
-                            plan.workspace_scale);
+  const Real along_n = along<N>(relabel<ContactSpace>(at.normal), relabel<ContactSpace>(sent_n));
+  cut.press_n = std::max(Real(0), multiply<Real>(at.head_share, along_n) / plan.workspace_scale);
   CuttingFriction<N> friction;
   if (cut.press_n > Real(0)) friction = press_on_volumes(plan, state, at, cut);
   const bool turns = rules.spindle.free_ratio > typename N::Unit{};

@@ -46,10 +46,19 @@ struct ProxyContact {
   Placing placing = Placing::searching;
   ProxyPose<N> pose;
   ContactVec<typename N::Real> spring{};  ///< from goal to proxy, units: force over stiffness
-  /// Of the whole pressing force, out of the solid; 0 in air.
+  /// Of what the head presses with, out of the solid; 0 in air.
   ContactVec<typename N::Unit> normal{};
+  /// The head's share of the part of the force along `normal`: 1 without a shaft that presses.
+  typename N::Unit head_share{1};
+  /// What presses on the parts behind the head over the length of the spring, at most 1.
+  typename N::Unit behind_share{};
   /// Torque about the tool's centre over the force's length, units.
   ContactVec<typename N::Real> moment_arm{};
+  /// From the tool's centre to the middle of what the head presses on, units.
+  ContactVec<typename N::Real> head_arm{};
+  /// What holds the tool, and each plane's load over the length of the spring.
+  ConstraintSet<N> planes{};
+  std::array<typename N::Real, kMaxPlanes> part{};
   std::int32_t queries = 0;
   bool turned = true;  ///< the tool has the orientation of the goal
 };
@@ -62,34 +71,55 @@ inline constexpr double kLostDepth = 1;  // units
 ///
 /// The part of the spring beyond the loads and the friction cone is carried by planes that this
 /// tick did not meet (docs/theory.md 4.5). So a tool at rest always has a normal, since forces
-/// balance there. A tool that is still `moving` is not held.
+/// balance there. A tool that is still `moving` is not held. Such planes count as the head's: it
+/// cuts nothing but what it covers.
 template <class N>
 constexpr void add_loads(const Swept<N>& swept, typename N::Unit friction, bool moving,
                          ProxyContact<N>& contact) noexcept {
   using Real = typename N::Real;
   const Real length = norm(contact.spring);
   if (length < Real(1e-3)) return;
-  ContactVec<Real> pressed{}, arm{};
-  Real whole(0);
+  ContactVec<Real> pressed{}, behind{}, arm{}, head_arm{};
+  Real whole(0), load_behind(0);
   for (std::size_t i = 0; i < swept.planes.count; ++i) whole = whole + swept.slide.load[i];
   const bool loaded = whole >= Real(1e-3);
   if (!loaded && moving) return;
-  if (!loaded && swept.planes.count > 0) arm = swept.planes.plane[0].arm;
+  if (!loaded && swept.planes.count > 0) arm = head_arm = swept.planes.plane[0].arm;
+  if (loaded) contact.planes = swept.planes;
   for (std::size_t i = 0; loaded && i < swept.planes.count; ++i) {
     const ConstraintPlane<N>& plane = swept.planes.plane[i];
     const Real load = swept.slide.load[i];
     pressed = pressed + times<N>(plane.normal, load);
+    if (plane.behind) {
+      behind = behind + times<N>(plane.normal, load);
+      load_behind = load_behind + load;
+    } else {
+      head_arm = head_arm + part_of<N>(plane.arm, share<N>(load, whole));
+    }
     arm = arm + part_of<N>(plane.arm, share<N>(load, whole));
-    contact.moment_arm = contact.moment_arm + moment<N>(plane.arm, plane.normal) * (load / length);
+    contact.part[i] = load / length;
+    contact.moment_arm = contact.moment_arm + moment<N>(plane.arm, plane.normal) * contact.part[i];
   }
   const ContactVec<Real> along_faces = contact.spring - pressed;
   const Real rubbed = norm(along_faces);
   const Real held = multiply<Real>(friction, norm(pressed));
   if (rubbed > held && !moving)
     pressed = pressed + part_of<N>(along_faces, share<N>(rubbed - held, rubbed));
-  contact.normal = direction_of<N>(pressed);
+  // Beside a shaft that presses, less than the tolerance of a place is no press of the head.
+  const ContactVec<Real> head = pressed - behind;
+  const Real by_head = norm(head);
+  if (load_behind <= Real(0) || by_head >= Real(SweepRules::kTolerance)) {
+    contact.normal = direction_of<N>(head);
+  }
   contact.moment_arm = contact.moment_arm + moment<N>(arm, direction_of<N>(along_faces)) *
                                                 (std::min(rubbed, length) / length);
+  contact.head_arm = head_arm;
+  if (load_behind <= Real(0)) return;
+  const Real on_head = whole - load_behind;
+  if (on_head > Real(1e-3)) contact.head_arm = head_arm * (whole / on_head);
+  contact.behind_share = share<N>(std::min(load_behind, length), length);
+  const Real together = along<N>(contact.normal, pressed);
+  if (by_head < together) contact.head_share = share<N>(by_head, together);
 }
 
 /// One tick of the swept contact (docs/theory.md 4): the proxy follows `goal`, and the spring

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 
 #include "shared/volume/scene_limits.hpp"
@@ -43,6 +44,14 @@ enum class Fault : std::uint32_t {
   return "unknown";
 }
 
+/// A plane that the tool presses on, at the device port.
+struct PlaneLoad {
+  std::array<double, 3> normal{};  ///< out of the solid
+  std::array<double, 3> arm_mm{};  ///< from the tool's centre to the contact
+  double load_n = 0;               ///< along the normal, before any limit
+};
+inline constexpr std::size_t kMaxPlaneLoads = 3;
+
 /// Everything one tick decided: motor counts for the device, the rest for the eyes and the log.
 ///
 /// Physical values are converted from the loop's numbers exactly; nothing here flows back.
@@ -57,6 +66,7 @@ struct ServoOutput {
   bool contact = false;    ///< commanded force above 0.01 N
   bool forbidden = false;  ///< the tool presses on a forbidden material
   bool refused = false;    ///< the tool finds no free place near the hand, and feels nothing
+  bool shaft = false;      ///< what presses on shaft or handpiece is above 0.01 N
 
   std::array<std::int32_t, 3> joint_counts{};  ///< unwrapped since calibration
   std::array<double, 3> gimbal_rad{};          ///< yaw, pitch, roll
@@ -68,8 +78,10 @@ struct ServoOutput {
   std::array<double, 3> modification_n{};      ///< and of the cutting: reaction, or friction
   std::array<double, 3> torque_n_mm{};         ///< motor torques
   std::array<double, 3> proxy_offset_mm{};     ///< from the tip to the proxy's, in the scene
-  std::array<double, 3> tip_torque_n_mm{};     ///< of the contact about the tip, device port
-  double absorbed_mj = 0;  ///< SUM -F_sent . dx since arming; + = taken from the hand
+  std::array<double, 3> tip_torque_n_mm{};     ///< of contact and cutting about the tip
+  std::array<PlaneLoad, kMaxPlaneLoads> planes{};
+  std::uint32_t plane_count = 0;  ///< of the planes that hold the tool
+  double absorbed_mj = 0;         ///< SUM -F_sent . dx since arming; + = taken from the hand
 
   double press_n = 0;        ///< normal force that cuts, in the scene
   double spindle_ratio = 0;  ///< speed over the reference speed, in this tick's cut

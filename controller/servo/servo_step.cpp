@@ -212,6 +212,16 @@ void tell_removed(const std::array<Removed, kMaxVolumes>& removed, ServoOutput& 
   }
 }
 
+template <class N>
+void tell_planes(const ToolContact<N>& tool, ServoOutput& out) noexcept {
+  static_assert(kMaxPlaneLoads == kMaxPlanes);
+  for (std::size_t i = 0; i < tool.plane_count; ++i) {
+    const PressedPlane<N>& plane = tool.planes[i];
+    out.planes[i] = {as_doubles(plane.normal), as_doubles(plane.arm_mm), as_double(plane.load_n)};
+  }
+  out.plane_count = static_cast<std::uint32_t>(tool.plane_count);
+}
+
 /// The proxy goes on following a hand that gets no force, so that it is on the same side of every
 /// wall when the force comes back, with a ramp. A device that rests parked, or has lost its home,
 /// begins anew.
@@ -259,7 +269,9 @@ Wanted<N> wanted_force(const ServoPlan<N>& plan, ServoState<N>& state, const Sen
   state.proxy_offset_mm = forces.proxy_offset_mm;
   out.proxy_offset_mm = as_doubles(forces.proxy_offset_mm);
   out.tip_torque_n_mm = as_doubles(forces.tip_torque_n_mm);
+  tell_planes(forces.tool, out);
   out.contact_n = as_doubles(forces.contact_n);
+  out.shaft = forces.behind_n > Real(kContactThresholdN);
   out.modification_n = as_doubles(forces.modification_n);
   tell_removed(forces.removed, out);
   const DeviceVec<Real> felt_n = forces.contact_n + forces.modification_n;
@@ -326,9 +338,11 @@ void tell(const ServoPlan<N>& plan, ServoState<N>& state, const Sensed<N>& sense
     out.gimbal_rad[i] = as_double(sensed.pose.gimbal[i]);
   }
   out.position_mm = as_doubles(sensed.tip_mm);
-  // Drawn as it is felt: a tool that does not turn keeps the world's axes.
-  const Rotation<N> rotation =
-      plan.tools[state.active_tool].turns ? state.rotation : identity_rotation<N>();
+  // Drawn as it is felt: a tool that does not turn keeps the world's axes, and a shaft that is held
+  // lags behind the stylus.
+  const ToolPlan<N>& tool = plan.tools[state.active_tool];
+  Rotation<N> rotation = tool.turns ? state.rotation : identity_rotation<N>();
+  if (tool.swept.behind.count > 0 && proxy.placed) rotation = {rows_of(proxy.pose.turn)};
   for (std::size_t i = 0; i < 9; ++i) out.rotation[i] = as_double(rotation.row[i / 3][i % 3]);
   out.velocity_mm_per_s = as_doubles(sensed.velocity_mm_per_s);
   out.force_n = as_doubles(state.force_n);

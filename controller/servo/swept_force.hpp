@@ -17,12 +17,56 @@ struct SweptForce {
   WorldVec<typename N::Real> offset_mm;     ///< from the hand's tip to the proxy's
   DeviceVec<typename N::Real> torque_n_mm;  ///< of the contact about the tool's centre
   ToolContact<N> tool;
-  std::int64_t queried = 0;  ///< samples that it took, as query_work.hpp counts
+  typename N::Real behind_n{};  ///< what presses on the shaft or the handpiece, at the device port
+  std::int64_t queried = 0;     ///< samples that it took, as query_work.hpp counts
 };
 
+/// A length in units, at the device port.
+template <class N>
+[[nodiscard]] DeviceVec<typename N::Real> at_device(const ContactPlan<N>& contact,
+                                                    ContactVec<typename N::Real> units) noexcept {
+  using Real = typename N::Real;
+  const auto mm = [&](Real x) { return multiply<Real>(contact.device_mm_per_unit, x); };
+  return {mm(units.x), mm(units.y), mm(units.z)};
+}
+
+/// The contact of one tick, with a tool's own field: a tool without a shaft has no part of one.
+template <class N>
+[[nodiscard]] ProxyContact<N> follow_tool(const ServoPlan<N>& plan, const SweptTool<N>& tool,
+                                          ContactState<N>& state, const ProxyPose<N>& goal,
+                                          std::int64_t& queried) noexcept {
+  const auto in_volumes = [&](const auto& volumes) {
+    return std::span(volumes).first(plan.volume_count);
+  };
+  const auto with = [&](auto&& field) {
+    field.begin_tick();
+    const ProxyContact<N> felt = follow<N>(tool.proxy, state.proxy, field, goal);
+    queried = field.spent();
+    return felt;
+  };
+  if (tool.behind.count == 0) {
+    return with(ContactQuery<N>(*plan.kernels, tool.point_shell, in_volumes(state.volumes)));
+  }
+  return with(ToolQuery<N>(*plan.kernels, tool.point_shell, in_volumes(state.volumes), tool.behind,
+                           {in_volumes(state.behind[0]), in_volumes(state.behind[1])}));
+}
+
+/// Tells the planes that bear a load of a force of `force_n`.
+template <class N>
+void tell_planes(const ContactPlan<N>& contact, const ProxyContact<N>& felt,
+                 typename N::Real force_n, ToolContact<N>& tool) noexcept {
+  using Real = typename N::Real;
+  for (std::size_t i = 0; i < felt.planes.count; ++i) {
+    if (felt.part[i] <= Real(0)) continue;
+    const ConstraintPlane<N>& plane = felt.planes.plane[i];
+    tool.planes[tool.plane_count++] = {relabel<DeviceSpace>(plane.normal),
+                                       at_device(contact, plane.arm), felt.part[i] * force_n};
+  }
+}
+
 /// One tick: the proxy of the active tool follows the hand, the coupling pulls the hand to the
-/// proxy (docs/theory.md 4, 5.1). `rotation` turns the tool, unless it is round or keeps the
-/// world's axes. Servo thread; at most 32 queries; writes only `state.contact`.
+/// proxy (docs/theory.md 4, 5.1). `rotation` turns the tool, unless it is a ball without a shaft or
+/// keeps the world's axes. Servo thread; at most 32 queries; writes only `state.contact`.
 template <class N>
 [[nodiscard]] SweptForce<N> feel_swept(const ServoPlan<N>& plan, ServoState<N>& state,
                                        WorldVec<typename N::Real> tip_mm,
@@ -30,7 +74,7 @@ template <class N>
                                        DeviceVec<typename N::Real> velocity_mm_per_s) noexcept {
   using Real = typename N::Real;
   const ContactPlan<N>& contact = plan.contact;
-  const ToolPlan<N>& tool = plan.tools[state.active_tool];
+  const SweptTool<N>& tool = plan.tools[state.active_tool].swept;
   const auto scaled = [](ContactVec<Real> v, typename N::Ratio by) {
     return ContactVec<Real>{multiply<Real>(by, v.x), multiply<Real>(by, v.y),
                             multiply<Real>(by, v.z)};
@@ -38,24 +82,23 @@ template <class N>
 
   ProxyPose<N> goal;
   goal.centre = scaled(relabel<ContactSpace>(tip_mm - contact.origin_mm), contact.units_per_mm);
-  if (tool.turns && !tool.round) goal.turn = turn_of<N>(rotation.row);
-  ContactQuery<N> field(*plan.kernels, tool.swept.point_shell,
-                        std::span(state.contact.volumes).first(plan.volume_count));
-  field.begin_tick();
-  const ProxyContact<N> felt = follow<N>(tool.swept.proxy, state.contact.proxy, field, goal);
+  if (tool.turned) goal.turn = turn_of<N>(rotation.row);
 
   SweptForce<N> out;
-  out.force_n = coupling_force(
-      contact.coupling, relabel<DeviceSpace>(scaled(felt.spring, contact.device_mm_per_unit)),
-      velocity_mm_per_s);
+  const ProxyContact<N> felt = follow_tool(plan, tool, state.contact, goal, out.queried);
+  out.force_n =
+      coupling_force(contact.coupling, at_device(contact, felt.spring), velocity_mm_per_s);
   out.offset_mm = relabel<WorldSpace>(scaled(felt.pose.centre - goal.centre, contact.mm_per_unit));
   out.tool.centre_mm =
       contact.origin_mm + relabel<WorldSpace>(scaled(felt.pose.centre, contact.mm_per_unit));
-  if (tool.turns && !tool.round) out.tool.rotation = {rows_of(felt.pose.turn)};
+  if (tool.turned) out.tool.rotation = {rows_of(felt.pose.turn)};
   out.tool.normal = relabel<WorldSpace>(felt.normal);
-  out.torque_n_mm =
-      relabel<DeviceSpace>(scaled(felt.moment_arm, contact.device_mm_per_unit)) * norm(out.force_n);
-  out.queried = field.spent();
+  out.tool.head_share = felt.head_share;
+  const Real force_n = norm(out.force_n);
+  out.tool.head_arm_mm = at_device(contact, felt.head_arm);
+  tell_planes(contact, felt, force_n, out.tool);
+  out.behind_n = multiply<Real>(felt.behind_share, force_n);
+  out.torque_n_mm = at_device(contact, felt.moment_arm) * force_n;
   return out;
 }
 

@@ -1,18 +1,34 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
+#include <cstddef>
+
+#include "controller/kernel/proxy/constraint_plane.hpp"
 #include "controller/kernel/tool_pose.hpp"
 #include "controller/servo/kinematics/rotation.hpp"
 #include "controller/servo/servo_plan.hpp"
 
 namespace kerf {
 
+/// A plane that the tool presses on, at the device port.
+template <class N>
+struct PressedPlane {
+  DeviceVec<typename N::Unit> normal{};  ///< out of the solid
+  DeviceVec<typename N::Real> arm_mm{};  ///< from the tool's centre to the contact
+  typename N::Real load_n{};             ///< along the normal, before any limit
+};
+
 /// The tool as it rests on the solid: at its proxy, not where the hand would have it.
 template <class N>
 struct ToolContact {
   WorldVec<typename N::Real> centre_mm;
   Rotation<N> rotation = identity_rotation<N>();  ///< of its samples
-  WorldVec<typename N::Unit> normal{};            ///< out of the solid; 0 in air
+  WorldVec<typename N::Unit> normal{};            ///< out of the solid, of the head; 0 in air
+  typename N::Unit head_share{1};                 ///< of the force along `normal`
+  DeviceVec<typename N::Real> head_arm_mm{};      ///< from its centre to where the head presses
+  std::array<PressedPlane<N>, kMaxPlanes> planes{};
+  std::size_t plane_count = 0;
 };
 
 /// A place of the world in a volume.

@@ -21,8 +21,13 @@ ToolForces<N> feel_and_cut(const ServoPlan<N>& plan, ServoState<N>& state,
     forces.proxy_offset_mm = felt.offset_mm;
     forces.tip_torque_n_mm = felt.torque_n_mm;
     forces.tool = felt.tool;
+    forces.behind_n = felt.behind_n;
     forces.queried = felt.queried;
-    if (plan.force_cut.on) forces.modification_n = felt_friction(plan, state, felt.tool);
+    if (plan.force_cut.on) {
+      forces.modification_n = felt_friction(plan, state, felt.tool);
+      forces.tip_torque_n_mm =
+          forces.tip_torque_n_mm + cross(felt.tool.head_arm_mm, forces.modification_n);
+    }
     if (!plan.cutting) return forces;
   }
   for (std::size_t v = 0; v < plan.volume_count; ++v) {

@@ -17,11 +17,13 @@ template <class N>
 struct ToolForces {
   DeviceVec<typename N::Real> contact_n;
   DeviceVec<typename N::Real> modification_n;
-  WorldVec<typename N::Real> proxy_offset_mm;   ///< from the tip; 0 without a proxy
-  DeviceVec<typename N::Real> tip_torque_n_mm;  ///< likewise
-  ToolContact<N> tool;                          ///< likewise
-  std::int64_t queried = 0;                     ///< likewise: samples, as query_work.hpp counts
-  std::array<Removed, kMaxVolumes> removed{};   ///< by volume of the scene
+  WorldVec<typename N::Real> proxy_offset_mm;  ///< from the tip; 0 without a proxy
+  DeviceVec<typename N::Real>
+      tip_torque_n_mm;                         ///< likewise; of both forces about the tool's centre
+  ToolContact<N> tool;                         ///< likewise
+  typename N::Real behind_n{};                 ///< likewise: of it on the shaft or the handpiece
+  std::int64_t queried = 0;                    ///< likewise: samples, as query_work.hpp counts
+  std::array<Removed, kMaxVolumes> removed{};  ///< by volume of the scene
 };
 
 /// Contact force of the active tool in all solid volumes as they are; then, where the plan cuts,

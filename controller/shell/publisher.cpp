@@ -35,6 +35,7 @@ std::uint32_t flags_of(const DeviceReport& report, const ServoOutput& output) no
   set(output.started, kFlagStarted);
   set(output.forbidden, kFlagForbidden);
   set(output.refused, kFlagRefused);
+  set(output.shaft, kFlagShaft);
   return flags;
 }
 
@@ -96,6 +97,15 @@ void Publisher::publish(Tick tick, const DeviceReport& report, const ServoOutput
   put(record.modification_force_n, output.modification_n);
   put(record.torque_n_mm, output.tip_torque_n_mm);
   put(record.proxy_offset_mm, output.proxy_offset_mm);
+  record.plane_count = output.plane_count;
+  for (std::size_t i = 0; i < output.plane_count; ++i) {
+    const PlaneLoad& plane = output.planes[i];
+    record.plane_load_n[i] = static_cast<float>(plane.load_n);
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      record.plane_normal[3 * i + axis] = static_cast<float>(plane.normal[axis]);
+      record.plane_arm_mm[3 * i + axis] = static_cast<float>(plane.arm_mm[axis]);
+    }
+  }
   std::ranges::copy(output.motor_counts, record.dac_counts);
   record.removed = static_cast<std::uint32_t>(output.removed_steps);
   record.port_energy_j = output.absorbed_mj / 1000.0;

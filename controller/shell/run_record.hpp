@@ -25,6 +25,7 @@ struct RunRecord {
   std::uint64_t overruns = 0;
   std::uint64_t stale_ticks = 0;
   std::uint64_t contact_ticks = 0;
+  std::uint64_t shaft_ticks = 0;  ///< shaft or handpiece touched
   Histogram wake, compute, publish;
   double peak_force_n = 0;
   std::int64_t first_force_ns = 0;  ///< when the first force was sent, CLOCK_MONOTONIC; 0: none was

@@ -72,6 +72,7 @@ std::string report_json(const RunReport& report) {
       {"guarded", report.guarded},
       {"unexpected_call", report.unexpected_call},
       {"contact_ticks", r.contact_ticks},
+      {"shaft_ticks", r.shaft_ticks},
       {"peak_force_n", r.peak_force_n},
       {"removed_mm3", report.removed_mm3},
       {"energy_j", r.absorbed_mj / 1000.0},
@@ -103,6 +104,9 @@ std::string summary(const RunReport& report) {
   text += line("publish", r.publish);
   text += format("\n  contact    %llu ticks, peak force %.3f N, work of the hand %.3f mJ\n",
                  static_cast<unsigned long long>(r.contact_ticks), r.peak_force_n, r.absorbed_mj);
+  if (r.shaft_ticks > 0) {
+    text += format("  shaft      %llu ticks\n", static_cast<unsigned long long>(r.shaft_ticks));
+  }
   text += format("  removed    %.3f mm3\n", report.removed_mm3);
   text += format("  losses     %llu stale ticks, %llu overruns, %llu packets lost\n",
                  static_cast<unsigned long long>(r.stale_ticks),

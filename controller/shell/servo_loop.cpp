@@ -42,6 +42,7 @@ class Bookkeeper {
     ++record_.ticks;
     record_.stale_ticks += output.stale ? 1 : 0;
     record_.contact_ticks += output.contact ? 1 : 0;
+    record_.shaft_ticks += output.shaft ? 1 : 0;
     const double force_n = vec3::length(output.force_n);
     record_.peak_force_n = std::max(record_.peak_force_n, force_n);
     if (record_.first_force_ns == 0 && output.motors_on && force_n > 0) {

@@ -11,6 +11,15 @@
 
 namespace kerf {
 
+/// What is behind a tool's head: felt, and never cutting. Cylinders about the tool's y axis;
+/// heights count from the tool's centre.
+struct ToolShaft {
+  double radius_mm = 0;  ///< 0: no shaft is felt
+  double end_mm = 0;
+  double handpiece_radius_mm = 0;  ///< 0: there is none
+  double handpiece_end_mm = 0;     ///< it begins where the shaft ends
+};
+
 /// One [[tool]]: voxel-offset list in the tool frame (tip at the centre of the cutting head, shaft
 /// along +y). `round` tools feel and cut the same in every orientation.
 struct SceneTool {
@@ -24,6 +33,7 @@ struct SceneTool {
   std::array<std::int32_t, 3> size_vox{};
   std::vector<ToolOffset> offsets;
   ToolMesh mesh;  ///< of the shape "stl"; else empty, and the shape says all
+  ToolShaft shaft;
 };
 
 }  // namespace kerf

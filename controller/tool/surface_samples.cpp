@@ -164,6 +164,37 @@ std::vector<Sample> surface_samples(const SceneTool& tool, double unit_mm) {
   return samples;
 }
 
+PartSamples part_samples(const SceneTool& tool, const ToolPart& part, double unit_mm) {
+  const auto refuse_part = [&](const std::string& fault) {
+    throw SceneError("tool '" + tool.name + "': its " + part.name + fault);
+  };
+  double reach_mm = 0;
+  Profile profile = part.profile;
+  for (auto& [y_mm, radius_mm] : profile) {
+    reach_mm = std::max(reach_mm, std::hypot(y_mm, radius_mm));
+    y_mm -= part.middle_mm;
+  }
+  if (reach_mm > kMostReach * unit_mm) {
+    std::ostringstream line;
+    line << " reaches " << reach_mm << " mm from the tool's centre, of which contact takes at most "
+         << kMostReach << " voxels in time; make it shorter, or use coarser voxels than " << unit_mm
+         << " mm";
+    refuse_part(line.str());
+  }
+  const double area = area_of(profile) / (unit_mm * unit_mm);
+  const double pitch =
+      std::sqrt(area / std::clamp(area, double{kMinSurfaceSamples}, double{kMostPartSamples}));
+  if (pitch > kWidestPartPitch) {
+    std::ostringstream line;
+    line << " has a surface of " << area << " voxels, of which contact reads at most "
+         << kMostPartSamples * kWidestPartPitch * kWidestPartPitch
+         << " in time; make it smaller, or use coarser voxels than " << unit_mm << " mm";
+    refuse_part(line.str());
+  }
+  return {samples_apart(tool, profile, pitch * unit_mm),
+          samples_apart(tool, profile, kClosePitch * unit_mm)};
+}
+
 std::vector<Sample> close_samples(const SceneTool& tool, double unit_mm) {
   if (tool.round) return {};
   return samples_apart(tool, profile_of(tool), kClosePitch * unit_mm, kNearlyEven);

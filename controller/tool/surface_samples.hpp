@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "controller/tool/scene_tool.hpp"
+#include "controller/tool/tool_shaft.hpp"
 
 namespace kerf {
 
@@ -28,6 +29,16 @@ inline constexpr int kMinSurfaceSamples = 512;
 /// A query reads each sample, some 2 ns of the tick's time apiece.
 inline constexpr int kMaxSurfaceSamples = 8000;
 
+/// Of a part behind the head, which is as long as a hand: its pitch grows so that it has no more,
+/// up to kWidestPartPitch. Closer looks tell its contacts as exactly as a head's; but between its
+/// own samples a point or a loose bit that is narrower than their pitch is not noticed.
+inline constexpr int kMostPartSamples = 2048;
+inline constexpr double kWidestPartPitch = 4;
+
+/// No part reaches farther from the tool's centre, in units: in a tick of 1 ms the sweep turns the
+/// tool by 12 steps of 0.875 / reach, which is then 10 rad/s, as fast as a hand.
+inline constexpr double kMostReach = 1024;
+
 /// Samples of a tool's surface, ends and rims included, in mm from its centre along its axes. Each
 /// has the same area to itself, and no grid line meets many of them. Load time.
 ///
@@ -47,5 +58,12 @@ inline constexpr int kMaxSurfaceSamples = 8000;
 /// a contact (contact_closeup.hpp). None of a ball. Load time.
 [[nodiscard]] std::vector<std::array<double, 3>> close_samples(const SceneTool& tool,
                                                                double unit_mm);
+
+/// Both for a part behind the head of `tool` (tool_shaft.hpp), in mm from the part's own middle.
+/// Throws SceneError for a part that is too large or too long for its unit. Load time.
+struct PartSamples {
+  std::vector<std::array<double, 3>> samples, close;
+};
+[[nodiscard]] PartSamples part_samples(const SceneTool& tool, const ToolPart& part, double unit_mm);
 
 }  // namespace kerf

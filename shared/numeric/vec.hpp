@@ -49,6 +49,10 @@ template <class S, class Space>
 [[nodiscard]] constexpr S dot(Vec<S, Space> a, Vec<S, Space> b) noexcept {
   return a.x * b.x + a.y * b.y + a.z * b.z;
 }
+template <class S, class Space>
+[[nodiscard]] constexpr Vec<S, Space> cross(Vec<S, Space> a, Vec<S, Space> b) noexcept {
+  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
 /// One rounding for the three products: |a_i b_i| < 2^60 is enough room.
 template <int F, class Space>
 [[nodiscard]] constexpr Fixed<F> dot(Vec<Fixed<F>, Space> a, Vec<Fixed<F>, Space> b) noexcept {

@@ -146,9 +146,11 @@ struct TickRecord {
   std::uint32_t fault;
   std::uint32_t stale;
   float penetration_mm;
-  std::uint32_t reserved0;
-  std::uint32_t crc32c;  ///< filled by the writer, over bytes 8..375
-  std::uint32_t reserved1;
+  std::uint32_t plane_count;  ///< of the planes that hold the tool, at most 3
+  float plane_load_n[3];      ///< along each normal, before any limit, at the device port
+  float plane_normal[9];      ///< x, y, z of each plane: out of the solid
+  float plane_arm_mm[9];      ///< likewise: from the tool's centre to the contact
+  std::uint32_t crc32c;       ///< filled by the writer, over bytes 8 up to this one
 };
 
 inline constexpr std::uint32_t kFlagButton1 = 1U << 0;
@@ -162,6 +164,7 @@ inline constexpr std::uint32_t kFlagParked = 1U << 8;
 inline constexpr std::uint32_t kFlagStarted = 1U << 9;
 inline constexpr std::uint32_t kFlagForbidden = 1U << 10;  ///< pressed on what may not be cut
 inline constexpr std::uint32_t kFlagRefused = 1U << 11;    ///< the tool has no free place
+inline constexpr std::uint32_t kFlagShaft = 1U << 12;      ///< pressed with shaft or handpiece
 
 inline constexpr std::size_t kRawEncoder = 0;  ///< first of 3
 inline constexpr std::size_t kRawPot = 3;      ///< first of 6

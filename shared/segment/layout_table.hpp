@@ -151,9 +151,11 @@ inline constexpr std::array kLayoutTable = {
     KERF_FIELD(TickRecord, fault, 360, "u32", 1),
     KERF_FIELD(TickRecord, stale, 364, "u32", 1),
     KERF_FIELD(TickRecord, penetration_mm, 368, "f32", 1),
-    KERF_FIELD(TickRecord, reserved0, 372, "u32", 1),
-    KERF_FIELD(TickRecord, crc32c, 376, "u32", 1),
-    KERF_FIELD(TickRecord, reserved1, 380, "u32", 1),
+    KERF_FIELD(TickRecord, plane_count, 372, "u32", 1),
+    KERF_FIELD(TickRecord, plane_load_n, 376, "f32", 3),
+    KERF_FIELD(TickRecord, plane_normal, 388, "f32", 9),
+    KERF_FIELD(TickRecord, plane_arm_mm, 424, "f32", 9),
+    KERF_FIELD(TickRecord, crc32c, 460, "u32", 1),
 
     KERF_FIELD(DirtyRecord, seq, 0, "u64", 1),
     KERF_FIELD(DirtyRecord, tick, 8, "u64", 1),
@@ -184,7 +186,7 @@ inline constexpr std::array kLayoutTable = {
 }
 static_assert(layout_matches("SegmentHeader", 4096) && sizeof(SegmentHeader) == 4096);
 static_assert(layout_matches("VolumeDescriptor", 128) && sizeof(VolumeDescriptor) == 128);
-static_assert(layout_matches("TickRecord", 384) && sizeof(TickRecord) == 384);
+static_assert(layout_matches("TickRecord", 464) && sizeof(TickRecord) == 464);
 static_assert(layout_matches("DirtyRecord", 64) && sizeof(DirtyRecord) == 64);
 static_assert(kStaticHeaderBytes == 0x100);
 

@@ -54,13 +54,13 @@ template <class Names>
 [[nodiscard]] inline std::string_view nearest(std::string_view word,
                                               std::span<const std::string_view> known) {
   const auto quantity = [](std::string_view key) { return key.substr(0, key.find('_')); };
-  for (const std::string_view name : known) {
-    if (quantity(name) == quantity(word)) return name;
-  }
+  const bool is_one = std::ranges::any_of(
+      known, [&](std::string_view name) { return quantity(name) == quantity(word); });
   std::string_view best;
   // Half of the letters must be right, else the guess would only mislead.
-  std::size_t best_distance = word.size() / 2 + 1;
+  std::size_t best_distance = is_one ? std::string_view::npos : word.size() / 2 + 1;
   for (const std::string_view name : known) {
+    if (is_one && quantity(name) != quantity(word)) continue;
     const std::size_t distance = edit_distance(word, name);
     if (distance < best_distance) {
       best = name;

@@ -149,6 +149,23 @@ TEST_CASE("a volume from the command line is fitted to the hand") {
   }
 }
 
+TEST_CASE("a shaft grows with its tool in a volume of the command line") {
+  const kerf::test::TempFolder folder;
+  static_cast<void>(block_scene(folder, 0.5, kBall));
+  const auto base =
+      folder.write("base.toml",
+                   "[[volume]]\nfile = \"phantom\"\n[[tool]]\nshape = \"ball\"\nradius_mm = 0.5\n"
+                   "shaft_radius_mm = 0.25\nshaft_length_mm = 3\nhandpiece_radius_mm = 1\n");
+  kerf::SceneOverrides overrides;
+  overrides.volume_file = base.parent_path() / "block.nrrd";
+  const kerf::SceneTool tool = kerf::load_scene(base, overrides).tools.at(0);
+  CHECK(tool.radius_mm == doctest::Approx(2));  // written for 0.125 mm
+  CHECK(tool.shaft.radius_mm == doctest::Approx(1));
+  CHECK(tool.shaft.end_mm == doctest::Approx(12 - 2));
+  CHECK(tool.shaft.handpiece_radius_mm == doctest::Approx(4));
+  CHECK(tool.shaft.handpiece_end_mm == doctest::Approx(14));
+}
+
 TEST_CASE("a press cuts the same share of the tool's volume in a volume of the command line") {
   const kerf::test::TempFolder folder;
   constexpr double kEdgeMm = 0.5, kGrown = 4;  // over the phantom's voxels
@@ -271,6 +288,32 @@ TEST_CASE("a tool that does not suit the volume is reported with its line and th
   CHECK(has(error_with("shape = \"ball\"\nsize_vox = 8\npitch_mm = 0.2\n"),
             "scene.toml:6: tool.pitch_mm = 0.2 is above the smallest voxel edge and leaves gaps; "
             "use at most 0.125"));
+}
+
+TEST_CASE("a shaft that does not suit the head or the volume is reported with its line") {
+  const kerf::test::TempFolder folder;
+  const auto error_with = [&](const std::string& lines) {
+    return load_error(block_scene(
+        folder, 0.125, "[[tool]]\nshape = \"ball\"\nradius_mm = 1\nshaft_length_mm = " + lines));
+  };
+  CHECK(error_with("2.1\nshaft_radius_mm = 0.5\n").empty());
+  CHECK(
+      has(error_with("2\nshaft_radius_mm = 0.5\n"),
+          "scene.toml:6: tool.shaft_length_mm = 2 ends inside of the head, which is 2 mm long; it "
+          "counts from the tool's tip, so use more"));
+  CHECK(has(error_with("9\nshaft_radius_mm = 0.06\n"),
+            " is of a shaft thinner than a voxel (0.125 mm); use a larger shaft_radius_mm"));
+  const auto planned = [&](const std::string& lines) {
+    const auto path = block_scene(
+        folder, 0.125, "[[tool]]\nshape = \"ball\"\nradius_mm = 1\nshaft_length_mm = " + lines);
+    return kerf::test::error_of(
+        [&] { static_cast<void>(kerf::plan_scene(kerf::load_scene(path))); });
+  };
+  CHECK(planned("12\nshaft_radius_mm = 0.8\nhandpiece_radius_mm = 5\n").empty());
+  CHECK(has(planned("12\nshaft_radius_mm = 0.8\nhandpiece_radius_mm = 50\n"),
+            "scene.toml: tool 'ball 1 mm': its handpiece has a surface of "));
+  CHECK(has(planned("200\nshaft_radius_mm = 0.8\n"),
+            "scene.toml: tool 'ball 1 mm': its shaft reaches "));
 }
 
 TEST_CASE("a mesh that does not suit the volume is reported with what to do about it") {

@@ -90,14 +90,13 @@ TEST_CASE_TEMPLATE("planes push and never pull, and only where they are touched"
     const Slide<N> slide = nearest(constraints, place_of<N>(displacement));
     Point pushed = point_of<N>(slide.move) - displacement;
     for (std::size_t k = 0; k < constraints.count; ++k) {
-      const auto& [normal, depth, arm] = constraints.plane[k];
-      const double gap = double(along<N>(normal, slide.move) - depth);
+      const ConstraintPlane<N>& plane = constraints.plane[k];
+      const double gap = double(along<N>(plane.normal, slide.move) - plane.depth);
       CHECK(gap >= -1e-4);
       CHECK(slide.load[k] >= Real(0));
       // Where normals are nearly parallel, a step of load is a long way along the crease.
       if (slide.load[k] > Real(0)) CHECK(gap < 300 * kStep<N>);
-      pushed = pushed -
-               double(slide.load[k]) * Point{double(normal.x), double(normal.y), double(normal.z)};
+      pushed = pushed - double(slide.load[k]) * normal_of(plane);
     }
     CHECK(length(pushed) < 16 * kStep<N>);
   }

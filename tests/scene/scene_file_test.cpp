@@ -310,6 +310,36 @@ TEST_CASE("what contradicts itself or is missing is reported with its line") {
                "scenes/x.toml:7: material.name = \"none\" is air"));
 }
 
+TEST_CASE("a shaft that is half said, too wide or not felt is reported with its line") {
+  const auto error_with_shaft = [](const std::string& lines) { return error_after(lines); };
+  CHECK(error_with_shaft("shaft_radius_mm = 0.5\nshaft_length_mm = 9\n").empty());
+  CHECK(
+      error_with_shaft("shaft_radius_mm = 0.5\n") ==
+      "scenes/x.toml:6: tool.shaft_radius_mm = 0.5 has no length; write shaft_length_mm, from the "
+      "tool's tip to the shaft's end");
+  CHECK(error_with_shaft("shaft_length_mm = 9\n") ==
+        "scenes/x.toml:6: tool.shaft_length_mm = 9 has no radius; write shaft_radius_mm");
+  CHECK(error_with_shaft("handpiece_radius_mm = 5\n") ==
+        "scenes/x.toml:6: tool.handpiece_radius_mm = 5 has no shaft to hold; write shaft_radius_mm "
+        "and shaft_length_mm");
+  const std::string shaft = "shaft_radius_mm = 0.5\nshaft_length_mm = 9\n";
+  CHECK(error_with_shaft(shaft + "handpiece_length_mm = 5\n") ==
+        "scenes/x.toml:8: tool.handpiece_length_mm = 5 has no radius; write handpiece_radius_mm");
+  CHECK(error_with_shaft(shaft + "handpiece_radius_mm = 0.4\n") ==
+        "scenes/x.toml:8: tool.handpiece_radius_mm = 0.4 is narrower than the shaft; use at least "
+        "0.5");
+  CHECK(error_with_shaft(shaft + "handpiece_radius_mm = 0.5\n").empty());
+  for (const char* key :
+       {"shaft_radius_mm", "shaft_length_mm", "handpiece_radius_mm", "handpiece_length_mm"}) {
+    CHECK(
+        begins(error_with_shaft(key + std::string(" = -1\n")),
+               "scenes/x.toml:6: tool." + std::string(key) + " = -1 is out of range; use 0.0001"));
+  }
+  CHECK(error_with_shaft(shaft + "[force]\nmodel = \"paper\"\n") ==
+        "scenes/x.toml:7: tool.shaft_length_mm = 9 is felt by a proxy alone; set force.model = "
+        "\"proxy\", or leave the shaft out");
+}
+
 TEST_CASE("too many tools are refused") {
   std::string text = kSmallest;
   for (int i = 0; i < 16; ++i) {

@@ -77,6 +77,10 @@ inline SceneLines scene_for(const SceneKey& key, bool counts = true) {
   } else if (key.name != "tool.radius_mm" || !counts) {
     lines.set("tool.size_vox", "16");
   }
+  if (key.name.starts_with("tool.shaft_") || key.name.starts_with("tool.handpiece_")) {
+    lines.set("tool.shaft_radius_mm", "0.0001").set("tool.shaft_length_mm", "1");
+    lines.set("tool.handpiece_radius_mm", "1000");
+  }
   if (key.name.starts_with("material.")) lines.set("material.name", "\"wax\"");
   return lines;
 }

@@ -33,7 +33,7 @@ class FlatOutWriter {
         TickRecord record{};
         record.tick = tick;
         record.port_energy_j = static_cast<double>(tick);
-        record.reserved0 = static_cast<std::uint32_t>(tick);
+        record.plane_count = static_cast<std::uint32_t>(tick);
         writer_.publish_state(record);
         writer_.end_tick(tick);
       }
@@ -94,7 +94,7 @@ TEST_CASE("a reader that chases a writer flat out never keeps a torn brick or re
     }
     if (const auto record = reader.latest()) {
       torn_records += record->port_energy_j == static_cast<double>(record->tick) &&
-                              record->reserved0 == static_cast<std::uint32_t>(record->tick)
+                              record->plane_count == static_cast<std::uint32_t>(record->tick)
                           ? 0
                           : 1;
     }

@@ -237,6 +237,8 @@ OverlayFigures overlay_figures(const Session& session) {
   } else if (const auto& record = session.latest(); record && (record->flags & kFlagRefused) != 0) {
     figures.banner = "no free place for this tool here, so it feels nothing: lead it into air";
     figures.alarm = true;
+  } else if (record && (record->flags & kFlagShaft) != 0) {
+    figures.banner = "the shaft touches: it cuts nothing";
   }
   return figures;
 }

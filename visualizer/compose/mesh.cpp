@@ -112,6 +112,10 @@ Outlines tool_outlines(const ToolView& tool) {
     low = std::min(low, y);
     high = std::max(high, y);
   }
+  if (!tool.shaft_mm.empty()) {
+    outlines.push_back(tool.shaft_mm);
+    return outlines;
+  }
   // A neck that starts inside the head, and the shank of a real bur in proportion to it.
   const double neck = 0.42 * tool.radius_mm;
   const double shank = 0.62 * tool.radius_mm;

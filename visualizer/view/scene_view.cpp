@@ -17,7 +17,8 @@ constexpr std::size_t kMaxProfilePoints = 4096;  // a mesh of some 10^5 triangle
 
 constexpr std::size_t kMaxTriangles = 65536;  // as the controller takes them
 
-void read_profile(const Json& text, ToolView& tool) {
+std::vector<std::array<double, 2>> profile_of(const Json& text, const ToolView& tool) {
+  std::vector<std::array<double, 2>> profile;
   for (const Json& point : text) {
     const auto at = point.get<std::array<double, 2>>();
     if (!std::isfinite(at[0]) || !std::isfinite(at[1]) || at[1] < 0.0) {
@@ -25,14 +26,14 @@ void read_profile(const Json& text, ToolView& tool) {
                             " has a profile point that is no height and radius; restart the "
                             "controller");
     }
-    tool.radius_mm = std::max(tool.radius_mm, at[1]);
-    tool.profile_mm.push_back(at);
+    profile.push_back(at);
   }
-  if (tool.profile_mm.size() > kMaxProfilePoints) {
+  if (profile.size() > kMaxProfilePoints) {
     throw VisualizerError("segment scene: tool " + tool.name + " has " +
-                          std::to_string(tool.profile_mm.size()) + " profile points; at most " +
+                          std::to_string(profile.size()) + " profile points; at most " +
                           std::to_string(kMaxProfilePoints));
   }
+  return profile;
 }
 
 void read_facets(const Json& text, ToolView& tool) {
@@ -67,8 +68,12 @@ ToolView tool_view(const Json& text) {
   if (text.contains("mesh")) {
     read_facets(text.at("mesh"), tool);
   } else {
-    read_profile(text.at("profile"), tool);
+    tool.profile_mm = profile_of(text.at("profile"), tool);
+    for (const auto& [y, radius] : tool.profile_mm) {
+      tool.radius_mm = std::max(tool.radius_mm, radius);
+    }
   }
+  if (text.contains("shaft")) tool.shaft_mm = profile_of(text.at("shaft"), tool);
   return tool;
 }
 

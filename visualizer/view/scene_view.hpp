@@ -55,7 +55,9 @@ struct ToolView {
   std::string name;
   std::vector<std::array<double, 2>> profile_mm;  ///< (y, radius), from the tip upwards
   double radius_mm = 0.0;                         ///< of the cutting head, at its widest
-  Facets facets{};                                ///< instead of a profile
+  /// The same of shaft and handpiece as they are felt; empty: they are not, and one is made up.
+  std::vector<std::array<double, 2>> shaft_mm{};
+  Facets facets{};  ///< instead of a profile
 };
 
 /// A material shows from density `iso` (0..1) upwards, or by its label, which is its index; index 0

@@ -27,6 +27,7 @@ struct ConstraintPlane {
   ContactVec<typename N::Unit> normal{};  ///< out of the solid, length 1
   typename N::Real depth{};               ///< units; above 0: the tool is in too deep
   ContactVec<typename N::Real> arm{};     ///< from the tool's centre to the contact, units
+  bool behind = false;                    ///< met by what is behind the head (tool_query.hpp)
 
   friend constexpr bool operator==(const ConstraintPlane&,
                                    const ConstraintPlane&) noexcept = default;
@@ -42,5 +43,20 @@ struct Contacts {
 
   friend constexpr bool operator==(const Contacts&, const Contacts&) noexcept = default;
 };
+
+/// Adds a plane where it belongs by its depth. Of more than kMaxPlanes the deepest stay.
+template <class N>
+constexpr void insert(Contacts<N>& felt, const ConstraintPlane<N>& plane) noexcept {
+  auto slot = static_cast<std::size_t>(felt.count);
+  if (slot < kMaxPlanes) {
+    ++felt.count;
+  } else if (felt.plane[--slot].depth >= plane.depth) {
+    return;
+  }
+  for (; slot > 0 && felt.plane[slot - 1].depth < plane.depth; --slot) {
+    felt.plane[slot] = felt.plane[slot - 1];
+  }
+  felt.plane[slot] = plane;
+}
 
 }  // namespace kerf

@@ -89,7 +89,12 @@ class ContactQuery {
     Contacts<N> felt;
     const bool closer = may_query();
     felt.buried = !closer && !turned_;
-    if (felt.buried) return felt;
+    return felt.buried ? felt : look(q, closer);
+  }
+
+  /// The same, with closer looks or without, whatever the tick's work allows.
+  [[nodiscard]] Contacts<N> look(ContactVec<Real> q, bool closer) const noexcept {
+    Contacts<N> felt;
     turned_ = false;
     for (const ContactVolume<N>& volume : volumes_) feel(volume, q, closer, felt);
     if (felt.count > 0) felt.depth = std::max(felt.depth, felt.plane[0].depth);
@@ -211,16 +216,7 @@ class ContactQuery {
       felt.depth = std::max(felt.depth, plane.depth);
       return;
     }
-    auto slot = static_cast<std::size_t>(felt.count);
-    if (slot < kMaxPlanes) {
-      ++felt.count;
-    } else if (felt.plane[--slot].depth >= plane.depth) {
-      return;
-    }
-    for (; slot > 0 && felt.plane[slot - 1].depth < plane.depth; --slot) {
-      felt.plane[slot] = felt.plane[slot - 1];
-    }
-    felt.plane[slot] = plane;
+    insert(felt, plane);
   }
 
   /// Corrects the plane of a tool that is no ball: by the close samples around the peak, then by a

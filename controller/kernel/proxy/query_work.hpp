@@ -26,6 +26,12 @@ struct QueryWork {
   std::int64_t closer = 0;  ///< its closer looks at most
   std::int64_t turn = 0;    ///< to place all samples anew
 
+  /// Of two point shells that are queried together.
+  [[nodiscard]] friend constexpr QueryWork operator+(const QueryWork& a,
+                                                     const QueryWork& b) noexcept {
+    return {a.query + b.query, a.closer + b.closer, a.turn + b.turn};
+  }
+
   /// Of a tick. No query begins that might go beyond it, but for the first after a turn, which then
   /// has no closer look.
   [[nodiscard]] constexpr std::int64_t budget() const noexcept {

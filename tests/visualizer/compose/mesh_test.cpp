@@ -110,6 +110,22 @@ TEST_CASE("a tool has its head around the origin and a thinner shank towards +y"
   CHECK(widest_above_head < 1.0F);
 }
 
+TEST_CASE("a shaft that is felt is drawn as it is felt, and none is made up") {
+  ToolView ball{.name = "ball", .profile_mm = circle_profile(1.0), .radius_mm = 1.0};
+  ball.shaft_mm = {{0.8, 0.6}, {5.0, 0.6}, {5.0, 3.0}, {8.0, 3.0}, {8.0, 0.0}};
+  const Mesh mesh = tool_mesh(ball);
+  const double head_mm3 = volume_mm3(lathe(ball.profile_mm));
+  CHECK(volume_mm3(mesh) - head_mm3 ==
+        doctest::Approx(std::numbers::pi * (4.2 * 0.36 + 3 * 9)).epsilon(0.01));
+  CHECK(open_edges(mesh) == 0);
+  for (const Mesh::Vertex& vertex : mesh.vertices) {
+    CHECK(vertex.position.y <= 8.0F);
+    if (vertex.position.y > 1.01F && vertex.position.y < 4.99F) {
+      CHECK(std::hypot(vertex.position.x, vertex.position.z) == doctest::Approx(0.6));
+    }
+  }
+}
+
 TEST_CASE("a mesh is drawn as it is: sharp edges stay sharp, and round ones are lit round") {
   // A bar of 24 sides: 15 degrees between two of them, 90 to the ends.
   constexpr std::uint32_t kSides = 24;

@@ -46,6 +46,19 @@ TEST_CASE("a voxel stands where the descriptor's origin, turn and spacing put it
   CHECK(scene.tools[0].profile_mm[1] == std::array<double, 2>{0.0, 1.0});
 }
 
+TEST_CASE("a shaft that is felt comes with its outline, a wrong one in one line") {
+  const auto shafted = [](const std::string& outline) {
+    return scene_view(segment_with(
+        R"({"volumes": [], "materials": [], "tools": [{"name": "ball",
+            "profile": [[-1, 0], [0, 1], [1, 0]], "shaft": )" + outline + "}]}"));
+  };
+  const SceneView scene = shafted("[[0.8, 0.6], [5, 0.6], [5, 0]]");
+  CHECK(scene.tools[0].shaft_mm.size() == 3);
+  CHECK(scene.tools[0].radius_mm == 1.0);  // of the head
+  CHECK(scene_view(segment_with(kScene)).tools[0].shaft_mm.empty());
+  CHECK_THROWS_AS(static_cast<void>(shafted("[[0.8, -0.6], [5, 0.6]]")), VisualizerError);
+}
+
 TEST_CASE("a box has its corners half a voxel outside the outermost centres") {
   const SceneView scene = scene_view(segment_with(kScene));
   const BoxCorners corners = scene.volumes[0].corners();

@@ -1,0 +1,156 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+
+#include "controller/kernel/kernel_set.hpp"
+#include "controller/kernel/proxy/constraint_plane.hpp"
+#include "controller/kernel/proxy/contact_math.hpp"
+#include "controller/kernel/proxy/contact_query.hpp"
+#include "controller/kernel/proxy/query_work.hpp"
+#include "controller/kernel/proxy/tool_turn.hpp"
+
+namespace kerf {
+
+/// Most parts behind a head: the shaft, and the handpiece behind it.
+inline constexpr std::size_t kMostBehind = 2;
+
+/// A part of a tool behind its head: it is felt and cuts nothing. It has a point shell of its own
+/// about its own middle, so the head keeps the accuracy that its own reach gives it, and each has a
+/// plane of its own.
+template <class N>
+struct PartBehind {
+  PointShell<N> point_shell;
+  typename N::Real up{};  ///< from the tool's centre to the part's, along the shaft, units
+};
+
+/// All parts of one tool behind its head; none of a tool without a shaft.
+template <class N>
+struct PartsBehind {
+  std::size_t count = 0;
+  std::array<PartBehind<N>, kMostBehind> part{};
+};
+
+/// What the queries of a whole tool cost.
+template <class N>
+[[nodiscard]] constexpr QueryWork query_work(const PointShell<N>& head,
+                                             const PartsBehind<N>& behind,
+                                             std::size_t volumes) noexcept {
+  QueryWork work = query_work(head.table, volumes);
+  for (std::size_t i = 0; i < behind.count; ++i) {
+    work = work + query_work(behind.part[i].point_shell.table, volumes);
+  }
+  return work;
+}
+
+/// Collision queries of a tool with a shaft: the ContactField of the sweep (docs/theory.md 3.7).
+///
+/// A query is one of each part at the same pose; what they feel is put together as planes of
+/// several volumes are: the deepest three stay. Planes of the parts behind are marked. One budget
+/// serves all. The tool turns, whatever its head; a ball's samples stay as they are, so it feels
+/// the same as without a shaft. Servo thread; no heap.
+template <class N>
+class ToolQuery {
+  using Real = typename N::Real;
+
+ public:
+  /// The volumes that a part is felt in: the same for all, each with places of its own.
+  using Volumes = std::span<const ContactVolume<N>>;
+
+  /// `behind` has a part at least.
+  ToolQuery(const KernelSet& kernels, const PointShell<N>& head, Volumes volumes,
+            const PartsBehind<N>& behind,
+            const std::array<Volumes, kMostBehind>& volumes_behind) noexcept
+      : round_(head.table.round),
+        head_(kernels, head, volumes),
+        shaft_{{kernels, behind.part[0].point_shell, volumes_behind[0]}, behind.part[0].up},
+        work_(query_work(head, behind, volumes.size())) {
+    if (behind.count > 1) {
+      handpiece_.emplace(
+          Part{{kernels, behind.part[1].point_shell, volumes_behind[1]}, behind.part[1].up});
+    }
+    if (round_) head_.turn({});
+    begin_tick();
+  }
+
+  void turn(const ToolTurn<N>& turn) noexcept {
+    if (!round_) head_.turn(turn);
+    const TurnRows<N> rows = rows_of(turn);
+    each_behind([&](Part& part) {
+      part.query.turn(turn);
+      part.from_head = times<N>({rows[0][1], rows[1][1], rows[2][1]}, part.up);
+    });
+    turned_ = true;
+  }
+
+  void begin_tick() noexcept {
+    head_.begin_tick();
+    each_behind([](Part& part) { part.query.begin_tick(); });
+  }
+  [[nodiscard]] const QueryWork& work() const noexcept { return work_; }
+  [[nodiscard]] bool half_spent() const noexcept { return spent() >= work_.budget() / 2; }
+  [[nodiscard]] bool may_query() const noexcept {
+    return work_.budget() - spent() >= work_.query + work_.closer;
+  }
+  [[nodiscard]] std::int64_t spent() const noexcept {
+    return head_.spent() + shaft_.query.spent() + (handpiece_ ? handpiece_->query.spent() : 0);
+  }
+
+  [[nodiscard]] Contacts<N> query(ContactVec<Real> q) noexcept {
+    Contacts<N> felt;
+    const bool closer = may_query();
+    felt.buried = !closer && !turned_;
+    if (felt.buried) return felt;
+    turned_ = false;
+    felt = head_.look(q, closer);
+    each_behind([&](Part& part) {
+      const Contacts<N> seen = part.query.look(q + part.from_head, closer);
+      for (std::size_t i = 0; i < static_cast<std::size_t>(seen.count); ++i) {
+        ConstraintPlane<N> plane = seen.plane[i];
+        plane.arm = plane.arm + part.from_head;
+        plane.behind = true;
+        insert(felt, plane);
+      }
+      felt.buried = felt.buried || seen.buried;
+      felt.depth = std::max(felt.depth, seen.depth);
+    });
+    return felt;
+  }
+
+  [[nodiscard]] bool is_solid(ContactVec<Real> q) const noexcept { return head_.is_solid(q); }
+
+  [[nodiscard]] Real free_distance(ContactVec<Real> q) const noexcept {
+    Real free = std::min(head_.free_distance(q), shaft_.query.free_distance(q + shaft_.from_head));
+    if (handpiece_) {
+      free = std::min(free, handpiece_->query.free_distance(q + handpiece_->from_head));
+    }
+    return free;
+  }
+
+ private:
+  struct Part {
+    ContactQuery<N> query;
+    Real up{};
+    ContactVec<Real> from_head{};  ///< `up` along the shaft as it is turned
+  };
+
+  template <class Visit>
+  void each_behind(Visit visit) noexcept {
+    visit(shaft_);
+    if (handpiece_) visit(*handpiece_);
+  }
+
+  bool round_;
+  ContactQuery<N> head_;
+  Part shaft_;
+  std::optional<Part> handpiece_;
+  QueryWork work_;
+  bool turned_ = false;  ///< and not queried since
+};
+
+}  // namespace kerf

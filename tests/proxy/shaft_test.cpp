@@ -1,0 +1,362 @@
+// SPDX-License-Identifier: Apache-2.0
+// A tool with a shaft among bodies: the same contact, with planes that are marked.
+#include <array>
+#include <cmath>
+#include <deque>
+#include <numbers>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include <doctest/doctest.h>
+
+#include "controller/kernel/proxy/tool_query.hpp"
+#include "controller/tool/tool_shaft.hpp"
+#include "lab/rig/contact_rig.hpp"
+#include "lab/rig/posed_tool.hpp"
+
+using namespace kerf;
+using namespace kerf::extremes;
+
+namespace {
+
+/// A tool of voxels of 1 mm with its shaft, so that mm are units.
+SceneTool tool_with(const char* shape, double radius, double length, const ShaftSize& shaft) {
+  SceneTool tool = tool_of_units(shape, radius, length);
+  tool.shaft = tool_shaft(shaft, length);
+  return tool;
+}
+
+/// It among bodies, felt by the servo's own query.
+template <class N>
+class ShaftRig {
+ public:
+  ShaftRig(const SceneTool& tool, const std::vector<const Body*>& bodies) {
+    const SampledTool head(tool);
+    shells_.emplace_back(head.samples, head.round, head.close);
+    head_ = shells_.back().point_shell();
+    double reach = double(head_.reach);
+    for (const ToolPart& part : parts_behind(tool)) {
+      const PartSamples samples = part_samples(tool, part, 1);
+      shells_.emplace_back(samples.samples, false, samples.close);
+      behind_.part[behind_.count++] = {shells_.back().point_shell(),
+                                       typename N::Real(part.middle_mm)};
+      reach = std::max(reach, part.middle_mm + double(shells_.back().point_shell().reach));
+    }
+    turn_step_ = turn_step_of(reach);
+    for (const Body* body : bodies) {
+      maps_.emplace_back(body->grid, body->density, static_cast<Density>(kIso / 8));
+      for (std::size_t i = 0; i <= behind_.count; ++i) {
+        places_.emplace_back().hold(i == 0 ? head_ : behind_.part[i - 1].point_shell);
+        volumes_[i].push_back(
+            {{body->grid, body->density.data(), density_scale(kIso), maps_.back().bricks()},
+             plain_frame<N>(),
+             places_.back().places()});
+      }
+    }
+    field_.emplace(**kernel_sets(), head_, volumes_[0], behind_,
+                   std::array{std::span<const ContactVolume<N>>(volumes_[1]),
+                              std::span<const ContactVolume<N>>(volumes_[2])});
+  }
+
+  ProxyContact<N> tick(Point hand, const ToolTurn<N>& turn = {}) {
+    field_->begin_tick();
+    return kerf::follow<N>(
+        {.turn_step = typename N::Unit(turn_step_), .ramp_per_tick = typename N::Real(1)}, state_,
+        *field_, {place_of<N>(hand), turn});
+  }
+  /// The last of so many ticks along a line.
+  ProxyContact<N> lead(Point from, Point to, int ticks, const ToolTurn<N>& turn = {}) {
+    ProxyContact<N> contact;
+    for (int i = 1; i <= ticks; ++i) {
+      contact = tick(from + (double(i) / ticks) * (to - from), turn);
+    }
+    return contact;
+  }
+  [[nodiscard]] ToolQuery<N>& field() { return *field_; }
+  [[nodiscard]] Point proxy() const { return point_of<N>(state_.pose.centre); }
+  [[nodiscard]] const ProxyState<N>& state() const { return state_; }
+
+ private:
+  std::deque<ToolPoints<N>> shells_;
+  PointShell<N> head_;
+  PartsBehind<N> behind_;
+  std::deque<FreeBrickMap> maps_;
+  std::deque<PlaceMemory<N>> places_;
+  std::array<std::vector<ContactVolume<N>>, 1 + kMostBehind> volumes_;
+  std::optional<ToolQuery<N>> field_;
+  double turn_step_ = 0;
+  ProxyState<N> state_;
+};
+
+constexpr ShaftSize kShaft{.radius_mm = 3, .length_mm = 45};
+const VoxelGrid kGrid{80, 80, 64};
+
+/// Solid at x < 30 between the heights 44 and 50.
+Body ledge() {
+  return blurred(kGrid, [](Point p) { return std::max(p[0] - 30, std::abs(p[1] - 47) - 3); });
+}
+/// Solid below the height 20.
+Body floor_body() {
+  return blurred(kGrid, [](Point p) { return p[1] - 20; });
+}
+
+template <class N>
+ToolTurn<N> leaning(double angle_rad) {  // about z: the shaft leans to -x
+  return {typename N::Unit(0), typename N::Unit(0), typename N::Unit(std::sin(angle_rad / 2)),
+          typename N::Unit(std::cos(angle_rad / 2))};
+}
+
+}  // namespace
+
+TEST_CASE_TEMPLATE("a shaft at an edge stops the tool while its head is in air, and by its lever",
+                   N, FixedNumbers, DoubleNumbers) {
+  const Body body = ledge();
+  for (const char* shape : {"ball", "cylinder"}) {
+    CAPTURE(shape);
+    ShaftRig<N> rig(tool_with(shape, 5, 10, kShaft), {&body});
+    rig.lead({60, 28, 32}, {36, 28, 32}, 100);
+    const ProxyContact<N> air = rig.tick({36, 28, 32});
+    CHECK(air.spring == decltype(air.spring){});
+    CHECK(air.behind_share == typename N::Unit(0));
+    rig.lead({36, 28, 32}, {25, 28, 32}, 50);
+    const ProxyContact<N> held = rig.tick({25, 28, 32});
+    // The shaft's flank is at x = 30, so the axis 3 units from it; the ledge's middle is 19 above
+    // the tool's centre.
+    CHECK(rig.proxy()[0] == doctest::Approx(33).epsilon(0.002));
+    CHECK(rig.proxy()[1] == doctest::Approx(28).epsilon(0.002));
+    CHECK(double(held.behind_share) == doctest::Approx(1).epsilon(0.001));
+    CHECK(held.normal == decltype(held.normal){});  // the head presses on nothing
+    CHECK(double(held.moment_arm.z) == doctest::Approx(-19).epsilon(0.02));
+    CHECK(std::abs(double(held.moment_arm.y)) < 0.2);
+    // Up to where the shaft ends, and not beyond.
+    rig.lead({25, 28, 32}, {25, 7, 32}, 100);
+    CHECK(rig.proxy()[0] == doctest::Approx(33).epsilon(0.003));
+    rig.lead({25, 7, 32}, {25, 1, 32}, 100);  // it ends at 40 above the centre
+    CHECK(rig.proxy()[0] == doctest::Approx(25).epsilon(0.003));
+  }
+}
+
+TEST_CASE_TEMPLATE("a head feels the same bits as without its shaft while that is in air", N,
+                   FixedNumbers, DoubleNumbers) {
+  const Body body = floor_body();
+  for (const char* shape : {"ball", "cone"}) {
+    CAPTURE(shape);
+    const SceneTool tool = tool_with(shape, 5, 10, kShaft);
+    ShaftRig<N> with(tool, {&body});
+    ContactRig<N> without(tool, body);
+    ProxyState<N> state;
+    Dice dice(7);
+    Point hand{40, 28, 32};
+    for (int tick = 0; tick < 400; ++tick) {
+      hand = hand + Point{dice.uniform(-0.3, 0.3), tick < 100 ? -0.1 : dice.uniform(-0.3, 0.3),
+                          dice.uniform(-0.3, 0.3)};
+      const ProxyContact<N> felt = with.tick(hand);
+      without.field().begin_tick();
+      const ProxyContact<N> alone =
+          without.follow({.turn_step = without.turn_step(), .ramp_per_tick = typename N::Real(1)},
+                         state, {place_of<N>(hand), {}});
+      REQUIRE(felt.pose == alone.pose);
+      REQUIRE(felt.spring == alone.spring);
+      REQUIRE(felt.normal == alone.normal);
+      REQUIRE(felt.moment_arm == alone.moment_arm);
+      REQUIRE(felt.queries == alone.queries);
+      REQUIRE(felt.head_share == typename N::Unit(1));
+      REQUIRE(felt.behind_share == typename N::Unit(0));
+    }
+  }
+}
+
+TEST_CASE_TEMPLATE("a ball on a floor feels the same while its shaft turns above it", N,
+                   FixedNumbers, DoubleNumbers) {
+  const Body body = floor_body();
+  ShaftRig<N> rig(tool_with("ball", 5, 10, kShaft), {&body});
+  const Point hand{40, 22, 32};
+  rig.lead({40, 30, 32}, hand, 100);
+  const Point rest = point_of<N>(rig.tick(hand).spring);
+  CHECK(rest[1] == doctest::Approx(3).epsilon(0.005));
+  for (int tick = 0; tick < 400; ++tick) {  // up to 4 rad/s at 1 kHz
+    const ProxyContact<N> felt = rig.tick(hand, leaning<N>(0.8 * std::sin(0.005 * tick)));
+    REQUIRE(felt.turned);
+    REQUIRE(length(point_of<N>(felt.spring) - rest) < 0.015);
+    REQUIRE(felt.behind_share == typename N::Unit(0));
+  }
+}
+
+TEST_CASE_TEMPLATE("on a floor and a ledge of two volumes head and shaft each bear their own part",
+                   N, FixedNumbers, DoubleNumbers) {
+  const Body wall = ledge(), ground = floor_body();
+  ShaftRig<N> rig(tool_with("ball", 5, 10, kShaft), {&wall, &ground});
+  rig.lead({45, 30, 32}, {29, 22, 32}, 100);
+  const ProxyContact<N> held = rig.tick({29, 22, 32});
+  CHECK(rig.proxy()[0] == doctest::Approx(33).epsilon(0.002));
+  CHECK(rig.proxy()[1] == doctest::Approx(25).epsilon(0.002));
+  // 4 units to the side and 3 up.
+  CHECK(double(held.behind_share) == doctest::Approx(0.8).epsilon(0.01));
+  CHECK(double(held.head_share) == doctest::Approx(1).epsilon(0.01));
+  CHECK(double(held.normal.y) == doctest::Approx(1).epsilon(0.001));
+  // The ball's part has no moment; the ledge is 22 above.
+  CHECK(double(held.moment_arm.z) == doctest::Approx(-22 * 0.8).epsilon(0.02));
+}
+
+TEST_CASE_TEMPLATE("where head and shaft press alike, in part, the head's part is what it bears", N,
+                   FixedNumbers, DoubleNumbers) {
+  // A ramp of 45 degrees below the ball when that is at (33, 25).
+  const Body wall = ledge(), ramp = blurred(kGrid, [](Point p) {
+                               return (p[0] + p[1] - 58) / std::numbers::sqrt2 + 5;
+                             });
+  ShaftRig<N> rig(tool_with("ball", 5, 10, kShaft), {&wall, &ramp});
+  rig.lead({45, 30, 32}, {29, 22, 32}, 100);
+  const ProxyContact<N> held = rig.tick({29, 22, 32});
+  CHECK(rig.proxy()[0] == doctest::Approx(33).epsilon(0.002));
+  CHECK(rig.proxy()[1] == doctest::Approx(25).epsilon(0.002));
+  // The spring (4, 3) is 3 sqrt 2 along (1, 1) / sqrt 2 and 1 along (1, 0).
+  CHECK(double(held.normal.x) == doctest::Approx(std::sqrt(0.5)).epsilon(0.005));
+  CHECK(double(held.normal.y) == doctest::Approx(std::sqrt(0.5)).epsilon(0.005));
+  CHECK(double(held.behind_share) == doctest::Approx(1.0 / 5).epsilon(0.05));
+  CHECK(double(held.head_share) == doctest::Approx(6.0 / 7).epsilon(0.01));
+}
+
+TEST_CASE_TEMPLATE("a shaft as wide as its head lies beside it on a wall, neither deeper", N,
+                   FixedNumbers, DoubleNumbers) {
+  const Body wall = blurred(kGrid, [](Point p) { return p[0] - 30; });
+  ShaftRig<N> rig(tool_with("cylinder", 5, 10, {.radius_mm = 5, .length_mm = 30}), {&wall});
+  rig.lead({50, 28, 32}, {33, 28, 32}, 60);
+  const ProxyContact<N> held = rig.tick({33, 28, 32});
+  CHECK(rig.proxy()[0] == doctest::Approx(35).epsilon(0.002));
+  const double head = double(held.normal.x) * double(held.head_share);
+  CHECK(head + double(held.behind_share) == doctest::Approx(1).epsilon(0.02));
+  // It slides along the wall freely.
+  rig.lead({33, 28, 32}, {33, 31, 35}, 30);
+  CHECK(rig.proxy()[1] == doctest::Approx(31).epsilon(0.002));
+  CHECK(rig.proxy()[2] == doctest::Approx(35).epsilon(0.002));
+}
+
+TEST_CASE_TEMPLATE("in the bore that a ball has cut its shaft has play, and leans on the rim", N,
+                   FixedNumbers, DoubleNumbers) {
+  // As wide as the ball and its advance; its rim is at the height 60.
+  const Body bored = blurred(
+      kGrid, [](Point p) { return std::max(p[1] - 60, 5.25 - std::hypot(p[0] - 40, p[2] - 32)); });
+  ShaftRig<N> rig(tool_with("ball", 5, 10, kShaft), {&bored});
+  rig.tick({40, 72, 32});
+  for (int tick = 0; tick <= 520; ++tick) {
+    const ProxyContact<N> held = rig.tick({40, 72 - 0.1 * tick, 32});
+    REQUIRE(held.behind_share == typename N::Unit(0));
+    REQUIRE(length(point_of<N>(held.spring)) < 0.05);
+  }
+  const Point bottom{40, 40, 32};
+  rig.lead({40, 20, 32}, bottom, 200);
+  // 20 units below the rim: the shaft leans on it where 20 tan a + 3 / cos a = 5.25 + 0.25.
+  const double rim_rad = 6.93 * std::numbers::pi / 180;
+  ProxyContact<N> held;
+  for (int tick = 0; tick < 100; ++tick) held = rig.tick(bottom, leaning<N>(0.8 * rim_rad));
+  CHECK(held.turned);
+  CHECK(held.behind_share == typename N::Unit(0));
+  for (int tick = 0; tick < 100; ++tick) held = rig.tick(bottom, leaning<N>(2 * rim_rad));
+  CHECK_FALSE(held.turned);
+  const double leant_rad = 2 * std::asin(double(held.pose.turn.z));
+  CHECK(leant_rad == doctest::Approx(rim_rad).epsilon(0.05));
+  CHECK(length(rig.proxy() - bottom) < 0.4);
+}
+
+TEST_CASE_TEMPLATE("a handpiece that meets the rim of a pit ends the descent", N, FixedNumbers,
+                   DoubleNumbers) {
+  const Body pit = blurred(
+      kGrid, [](Point p) { return std::max(p[1] - 50, 8 - std::hypot(p[0] - 40, p[2] - 32)); });
+  const SceneTool tool = tool_with(
+      "ball", 5, 10,
+      {.radius_mm = 3, .length_mm = 30, .handpiece_radius_mm = 14, .handpiece_length_mm = 10});
+  ShaftRig<N> rig(tool, {&pit});
+  rig.lead({40, 62, 32}, {40, 15, 32}, 300);
+  const ProxyContact<N> held = rig.tick({40, 15, 32});
+  CHECK(rig.proxy()[1] == doctest::Approx(25).epsilon(0.004));  // its face is 25 above the centre
+  CHECK(double(held.behind_share) == doctest::Approx(1).epsilon(0.01));
+  CHECK(held.normal == decltype(held.normal){});
+}
+
+TEST_CASE_TEMPLATE("no random motion takes a shaft through a ledge of two units", N, FixedNumbers,
+                   DoubleNumbers) {
+  // A blade that stands on a far wall and reaches to z = 31; the shaft passes beside it.
+  const Body blade =
+      blurred(kGrid, [](Point p) { return std::max(std::abs(p[0] - 30) - 1, p[2] - 40); });
+  ShaftRig<N> rig(tool_with("ball", 5, 10, kShaft), {&blade});
+  Dice dice(11);
+  rig.tick({50, 28, 32});
+  for (int tick = 0; tick < 3000; ++tick) {
+    const Point hand{30 + dice.uniform(-25, 25), dice.uniform(15, 40), dice.uniform(10, 32)};
+    const double lean_rad = dice.uniform(-0.2, 0.2);
+    rig.tick(hand, leaning<N>(lean_rad));
+    // It stays on its side, ball and shaft.
+    REQUIRE(rig.proxy()[0] > 36 - 0.1);
+  }
+}
+
+TEST_CASE_TEMPLATE("a start with the shaft inside of the solid finds a place for all of it", N,
+                   FixedNumbers, DoubleNumbers) {
+  const Body body = ledge();
+  ShaftRig<N> rig(tool_with("ball", 5, 10, kShaft), {&body});
+  const Point hand{28, 28, 32};
+  for (int tick = 0; tick < 300 && !rig.state().placed; ++tick) rig.tick(hand);
+  REQUIRE(rig.state().placed);
+  rig.field().begin_tick();
+  const Contacts<N> felt = rig.field().query(rig.state().pose.centre);
+  CHECK_FALSE(felt.buried);
+  CHECK(double(felt.depth) < 0.06);
+}
+
+TEST_CASE_TEMPLATE("askew in a hole with a play of half a unit a shaft sinks into neither rim", N,
+                   FixedNumbers, DoubleNumbers) {
+  // A plate 16 units thick, its middle at the height 40.
+  const auto plate = [](Point p) {
+    return std::max(std::abs(p[1] - 40) - 8, 3.5 - std::hypot(p[0] - 40, p[2] - 32));
+  };
+  const Body body = blurred(kGrid, plate);
+  const SceneTool tool = tool_with("ball", 3, 6, {.radius_mm = 3, .length_mm = 50});
+  ShaftRig<N> rig(tool, {&body});
+  const ToolPart part = parts_behind(tool)[0];
+  const PartSamples surface = part_samples(tool, part, 1);
+  rig.lead({40, 70, 32}, {40, 20, 32}, 500);
+  Dice dice(5);
+  double deepest = 0, most_lean = 0;
+  for (int tick = 0; tick < 600; ++tick) {
+    const double lean_rad = 0.25 * std::sin(0.02 * tick);
+    const Point hand{40 + dice.uniform(-2, 2), 20, 32 + dice.uniform(-2, 2)};
+    const ProxyContact<N> held = rig.tick(hand, leaning<N>(lean_rad));
+    const TurnRows<N> rows = rows_of(held.pose.turn);
+    most_lean = std::max(most_lean, std::abs(2 * std::asin(double(held.pose.turn.z))));
+    for (const Point& at : surface.samples) {
+      Point in_world = rig.proxy();
+      const Point offset{at[0], at[1] + part.middle_mm, at[2]};
+      for (std::size_t i = 0; i < 3; ++i) {
+        for (std::size_t j = 0; j < 3; ++j) in_world[i] += double(rows[i][j]) * offset[j];
+      }
+      deepest = std::max(deepest, -plate(in_world));
+    }
+  }
+  // Both rims hold it at 1 unit of play over 16 of height.
+  CHECK(deepest < 0.12);
+  CHECK(most_lean < 0.075);
+  CHECK(most_lean > 0.05);
+}
+
+TEST_CASE_TEMPLATE("no tick costs more than its bound, whatever there is to feel", N, FixedNumbers,
+                   DoubleNumbers) {
+  Dice noise(3);
+  const Body body = body_of(kGrid, [&](Point) { return noise.uniform(0, 0.6); });
+  const SceneTool tool = tool_with(
+      "ball", 5, 10,
+      {.radius_mm = 3, .length_mm = 30, .handpiece_radius_mm = 14, .handpiece_length_mm = 10});
+  ShaftRig<N> rig(tool, {&body});
+  Dice dice(4);
+  std::int64_t most = 0;
+  rig.tick({40, 120, 32});
+  for (int tick = 0; tick < 300; ++tick) {
+    const ProxyContact<N> held =
+        rig.tick({dice.uniform(20, 60), dice.uniform(20, 90), dice.uniform(10, 50)},
+                 dice.template turn<N>(dice.uniform(0, 0.5)));
+    REQUIRE(held.queries <= SweepRules::kMaxQueries);
+    most = std::max(most, rig.field().spent());
+  }
+  CHECK(most <= rig.field().work().most());
+  CHECK(most > rig.field().work().budget() / 2);  // the bound is none that nothing meets
+}
