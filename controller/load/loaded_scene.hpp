@@ -9,6 +9,7 @@
 #include "controller/scene/scene.hpp"
 #include "controller/tool/scene_tool.hpp"
 #include "controller/volume/volume_image.hpp"
+#include "controller/volume/volume_noise.hpp"
 
 namespace kerf {
 
@@ -27,6 +28,8 @@ struct SceneVolume {
   Pose pose;
   Density iso = 32768;
   bool solid = true;
+  Noise noise;            ///< that was found
+  int denoised = 0;       ///< passes that were made against it
   bool enclosed = false;  ///< not cropped, solid at its border: a layer of air was laid around it
 };
 

@@ -15,9 +15,11 @@
 #include "controller/scene/scene_text.hpp"
 #include "controller/volume/phantom.hpp"
 #include "controller/volume/volume_crop.hpp"
+#include "controller/volume/volume_denoise.hpp"
 #include "controller/volume/volume_density.hpp"
 #include "controller/volume/volume_io.hpp"
 #include "controller/volume/volume_limits.hpp"
+#include "controller/volume/volume_noise.hpp"
 
 namespace kerf {
 namespace {
@@ -57,6 +59,7 @@ void apply_overrides(const SceneOverrides& overrides, Scene& scene) {
     replaced.where = "--volume";
     replaced.file = overrides.volume_file->string();
     replaced.name = overrides.volume_file->stem().string();
+    replaced.denoise = first.denoise;
     replaced.crop = first.crop;
     replaced.position_mm = first.position_mm;
     replaced.orientation = first.orientation;
@@ -117,6 +120,42 @@ void check_labels(const VolumeImage& image, std::size_t materials) {
                    std::to_string(materials - 1) + "; add a [[material]] for it");
 }
 
+static_assert(kMostDenoise == kMostPasses);
+
+/// Neither has noise that can be told from its steps.
+void refuse_steps(Denoise passes, const VolumeImage& image) {
+  const std::string begin = "denoise: " + std::to_string(static_cast<int>(passes));
+  if (is_label_map(image.grid, image.density)) {
+    throw SceneError(begin + " for a label map, whose steps are no noise; leave it out");
+  }
+  const std::size_t levels = levels_of(image.density);
+  if (levels >= kLeastLevels) return;
+  throw SceneError(begin + " for " + std::to_string(levels) +
+                   " levels of density, noise is told from " + std::to_string(kLeastLevels) +
+                   "; leave it out");
+}
+
+/// Finds the noise of a volume, and makes the passes against it that the scene asks for.
+void denoise_volume(const VolumeSpec& spec, SceneVolume& volume) {
+  VolumeImage& image = volume.image;
+  if (spec.denoise > Denoise::off) refuse_steps(spec.denoise, image);
+  if (!is_phantom(spec)) {  // which has none
+    volume.noise = noise_of(image.grid, image.density, volume.iso);
+  }
+  volume.denoised = spec.denoise == Denoise::automatic ? passes_for(volume.noise)
+                                                       : static_cast<int>(spec.denoise);
+  if (volume.denoised == 0) return;
+  // Only what the crop keeps, and what reaches into it. Labels may make solid what is softer.
+  const VoxelBox solid = solid_box(image, volume.iso);
+  if (spec.crop && image.labels.empty() && !solid.empty()) {
+    image = crop(image, solid.grown(kGuardVoxels + volume.denoised * kDenoiseReach)
+                            .clipped(image.grid.box().grown(kGuardVoxels)));
+  } else {
+    image = enclosed_in_air(std::move(image), volume.iso);
+  }
+  denoise(image.grid, image.density, volume.denoised);
+}
+
 /// `felt_at`: the iso that the materials' `felt_iso` were written for; none: that of the volume.
 SceneVolume load_volume(const VolumeSpec& spec, const std::filesystem::path& folder,
                         const std::vector<Material>& materials, std::optional<double> felt_at) {
@@ -129,9 +168,10 @@ SceneVolume load_volume(const VolumeSpec& spec, const std::filesystem::path& fol
     check_labels(volume.image, materials.size());
     volume.iso = spec.iso ? static_cast<Density>(std::lround(*spec.iso * kDensityMax))
                           : otsu_threshold(volume.image);
+    const VoxelGrid whole = volume.image.grid;
+    denoise_volume(spec, volume);
     scale_to_felt_iso(materials, felt_at ? nearest_density(*felt_at * kDensityMax) : volume.iso,
                       volume.image);
-    const VoxelGrid whole = volume.image.grid;
     volume.image = spec.crop ? crop_to_solid(volume.image, volume.iso)
                              : enclosed_in_air(std::move(volume.image), volume.iso);
     volume.enclosed = !spec.crop && !(volume.image.grid == whole);

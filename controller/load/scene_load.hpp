@@ -29,15 +29,16 @@ inline constexpr std::array<double, 3> kWorkspaceMm = {100.0, 80.0, 60.0};
 /// Reads the scene file and everything that it names, and checks it as a whole. Throws SceneError
 /// with one line for the user. Load time only; takes a second or two for the default phantom.
 ///
-/// Volumes are windowed to u16 (whole range of the source unless given), cropped to what is solid
-/// plus three voxels of air, and placed. The pitch of a tool is the smallest voxel edge of the
-/// solid volumes unless given. Where the scene has no `offset_mm`, the device origin is put on the
-/// first surface below +y (see `first_surface_from_above`) of the first solid volume.
+/// Volumes are windowed to u16 (whole range of the source unless given), smoothed where the scene
+/// or the noise that is found asks for it, cropped to what is solid plus three voxels of air, and
+/// placed. The pitch of a tool is the smallest voxel edge of the solid volumes unless given. Where
+/// the scene has no `offset_mm`, the device origin is put on the first surface below +y (see
+/// `first_surface_from_above`) of the first solid volume.
 ///
 /// With `volume_file` the first volume is replaced by that one, and the scene is fitted to it, so
 /// that any CT can be felt with the hand scripts of the default scene:
 /// - window from its range unless overridden, iso by Otsu, spacing from the file unless overridden;
-///   pose and crop as in the scene;
+///   denoise, pose and crop as in the scene;
 /// - tools keep their size in voxels: lengths are scaled by the new over the old voxel edge (old:
 ///   the scene's spacing_mm, or that of the phantom);
 /// - the materials' densities move with the surface: what begins at the scene's iso begins at the

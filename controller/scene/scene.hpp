@@ -86,6 +86,12 @@ enum class ForceModel : std::uint8_t {
 /// How material leaves (docs/cutting.md).
 enum class CutModel : std::uint8_t { none, overlap, overlap_exact, preston };
 
+/// The filter against a volume's noise: a word, or how many passes of it.
+enum class Denoise : std::int8_t { automatic = -1, off = 0 };
+inline constexpr std::array<std::string_view, 2> kDenoiseWords = {"auto", "off"};
+inline constexpr int kMostDenoise =
+    3;  ///< passes; more would move a scan's edges (docs/theory.md 2.4)
+
 // The tables of a scene file. What a member means, its unit and range: scene_keys.cpp.
 
 /// [device]
@@ -163,6 +169,7 @@ struct VolumeSpec {
   std::optional<std::array<double, 3>> spacing_mm;  ///< none: what the file says
   std::optional<std::array<double, 2>> window;      ///< source values of density 0 and 1
   std::optional<double> iso;                        ///< density 0..1; none: Otsu's threshold
+  Denoise denoise = Denoise::automatic;
   bool crop = true;
   bool solid = true;
   std::array<double, 3> position_mm{0, 0, 0};        ///< world place of the middle of its box

@@ -22,6 +22,10 @@ struct Get {
   TomlValue operator()(const Choice* from) const {
     return std::string(words[static_cast<std::size_t>(*from)]);
   }
+  TomlValue operator()(const Denoise* from) const {
+    if (*from > Denoise::off) return static_cast<std::int64_t>(*from);
+    return std::string(words[*from == Denoise::off ? 1 : 0]);
+  }
   TomlValue operator()(const VoxelGrid* from) const {
     return std::vector<double>{double(from->nx), double(from->ny), double(from->nz)};
   }

@@ -79,6 +79,8 @@ constexpr SceneKey kKeys[] = {
      "source values of density 0 and 1", kNoPhantom, {.default_text = "all of the file's values"}},
     {"volume.iso", "", at<&VolumeSpec::iso>, between(1e-4, 1, kIsoWords),
      "density (0 to 1) of the surface; otsu: the threshold of Otsu, 1979"},
+    {"volume.denoise", "", at<&VolumeSpec::denoise>, between(1, kMostDenoise, kDenoiseWords),
+     "passes of a filter against noise; auto: as many as the noise found asks for, 0 where it is clean"},
     {"volume.crop", "", at<&VolumeSpec::crop>, {}, "cut away the air around it"},
     {"volume.solid", "", at<&VolumeSpec::solid>, {}, "felt and cut; else only seen"},
     {"volume.pose.position_mm", "mm", at<&VolumeSpec::position_mm>,

@@ -28,6 +28,7 @@ struct AllowedText {
   std::string operator()(const double*) const {
     return range() + (allowed.words.empty() ? "" : ", or " + words());
   }
+  std::string operator()(const Denoise*) const { return "whole, " + range() + ", or " + words(); }
   template <class Text>
   std::string operator()(const Text*) const {
     return allowed.words.empty() ? "text" : words();

@@ -41,6 +41,16 @@ struct Take {
     const auto words = key.allowed.words;
     *into = static_cast<Choice>(std::ranges::find(words, text()) - words.begin());
   }
+  /// The words come before the counts.
+  void operator()(Denoise* into) const {
+    int passes = 0;
+    if (!is_word()) {
+      (*this)(&passes);
+    } else if (text() == kDenoiseWords.front()) {
+      passes = static_cast<int>(Denoise::automatic);
+    }
+    *into = Denoise{static_cast<std::int8_t>(passes)};
+  }
   template <std::size_t N>
   void operator()(std::array<double, N>* into) const {
     const bool one = key.options.one_for_all && node.form != TomlNode::Form::array;

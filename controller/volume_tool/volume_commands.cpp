@@ -157,7 +157,11 @@ struct Commands {
       print(figures, out);
       if (!report.empty()) write_report(figures, report);
     } else if (import.chosen()) {
-      target.write(source.image(), out);
+      const VolumeImage image = source.image();
+      target.write(image, out);
+      out << noise_line(noise_of(image.grid, image.density, otsu_threshold(image)),
+                        {0, kDensityMax})
+          << '\n';
     } else if (crop.chosen()) {
       const VolumeImage image = source.image();
       const Density threshold =

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <ostream>
 
 #include "shared/posix/new_file.hpp"
@@ -26,6 +27,17 @@ std::string bars(const VolumeInfo& info) {
 
 }  // namespace
 
+std::string noise_line(const Noise& noise, Window window) {
+  if (noise.share == 0) return "noise      none found";
+  const int passes = passes_for(noise);
+  char text[128];
+  std::snprintf(
+      text, sizeof text,
+      "noise      %.4g (%.3g %% of the surface's step); denoise = \"auto\" makes %d pass%s",
+      noise.density * (window.hi - window.lo), 100 * noise.share, passes, passes == 1 ? "" : "es");
+  return text;
+}
+
 VolumeInfo describe(const std::string& file, const SourceVolume& volume, Window window) {
   const VolumeImage image = apply_window(volume, window);
   VolumeInfo info;
@@ -37,6 +49,7 @@ VolumeInfo describe(const std::string& file, const SourceVolume& volume, Window 
   info.window = window;
   info.otsu = otsu_threshold(image);
   info.otsu_value = window.lo + (window.hi - window.lo) * info.otsu / kDensityMax;
+  info.noise = noise_of(image.grid, image.density, info.otsu);
   info.solid = solid_box(image, info.otsu);
   const auto solid = std::count_if(image.density.begin(), image.density.end(),
                                    [&](Density d) { return d >= info.otsu; });
@@ -63,21 +76,24 @@ void print(const VolumeInfo& info, std::ostream& out) {
       << d[3] << " " << d[6] << ") (" << d[1] << " " << d[4] << " " << d[7] << ") (" << d[2] << " "
       << d[5] << " " << d[8] << ")\nvalues     " << info.min << " .. " << info.max
       << "\nwindow     " << info.window.lo << " .. " << info.window.hi << "\notsu       "
-      << info.otsu_value << " (density " << info.otsu / kDensityMax << ")\nsolid box  ("
-      << info.solid.lo.x << ", " << info.solid.lo.y << ", " << info.solid.lo.z << ") .. ("
-      << info.solid.hi.x - 1 << ", " << info.solid.hi.y - 1 << ", " << info.solid.hi.z - 1 << "), "
-      << 100.0 * info.solid_ratio << " % of the voxels are solid\nhistogram  |" << bars(info)
-      << "| (log)\n";
+      << info.otsu_value << " (density " << info.otsu / kDensityMax << ")\n"
+      << noise_line(info.noise, info.window) << "\nsolid box  (" << info.solid.lo.x << ", "
+      << info.solid.lo.y << ", " << info.solid.lo.z << ") .. (" << info.solid.hi.x - 1 << ", "
+      << info.solid.hi.y - 1 << ", " << info.solid.hi.z - 1 << "), " << 100.0 * info.solid_ratio
+      << " % of the voxels are solid\nhistogram  |" << bars(info) << "| (log)\n";
 }
 
 void write_report(const VolumeInfo& info, const std::filesystem::path& path) {
   const auto corner = [](VoxelIndex v) { return std::array{v.x, v.y, v.z}; };
-  const Json report{{"direction", info.direction},
+  const Json report{{"denoise_passes", passes_for(info.noise)},
+                    {"direction", info.direction},
                     {"file", info.file},
                     {"has_spacing", info.has_spacing},
                     {"histogram", info.histogram},
                     {"max", info.max},
                     {"min", info.min},
+                    {"noise_density", info.noise.density},
+                    {"noise_share", info.noise.share},
                     {"origin_mm", info.origin_mm},
                     {"otsu_density", info.otsu / kDensityMax},
                     {"otsu_value", info.otsu_value},

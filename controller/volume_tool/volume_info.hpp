@@ -9,6 +9,7 @@
 
 #include "controller/volume/volume_density.hpp"
 #include "controller/volume/volume_io.hpp"
+#include "controller/volume/volume_noise.hpp"
 
 namespace kerf {
 
@@ -22,10 +23,14 @@ struct VolumeInfo : VolumeFrame {
   Window window;
   Density otsu = 0;
   double otsu_value = 0;   ///< the same threshold in values of the file
+  Noise noise;             ///< of what is at or above it
   VoxelBox solid;          ///< tightest box of what is at or above it
   double solid_ratio = 0;  ///< its share of all voxels, 0..1
   std::array<std::uint64_t, kHistogramBins> histogram{};  ///< over the window, equal steps
 };
+
+/// The noise in one line: in values of a file of that window, and what a scene makes of it.
+[[nodiscard]] std::string noise_line(const Noise& noise, Window window);
 
 [[nodiscard]] VolumeInfo describe(const std::string& file, const SourceVolume& volume,
                                   Window window);

@@ -63,10 +63,11 @@ and noise of 2 %.)"},
      R"(At rest on flats of any tilt and on sharp edges of 90 degrees, the edges against the volume's own iso-surface; and
 sliding at 50 mm/s over a ball of R 40, 2 voxels deep. Limits are 1.5 times those of the ball.
 
-On CT with noise a rim or a point misses them. It touches in one place, where the noise of one voxel makes waves of
-the surface itself; a ball's height and normal are means of some fifty samples. `exact contact` shows that surface:
-height and normal of the iso-surface where the tool's close samples touch it at the ideal place, the normal over half a
-voxel. A contact without any mean would feel this.)"},
+On CT with noise a rim or a point touches in one place, where the noise of one voxel makes waves of the surface itself;
+a ball's height and normal are means of some fifty samples. A scene smooths such a volume when it loads it
+(`denoise = "auto"`, docs/theory.md 2.4), and so do the rows with limits; `denoise off` is the same without. `exact
+contact` shows the surface that was not smoothed: height and normal of the iso-surface where the tool's close samples
+touch it at the ideal place, the normal over half a voxel. A contact without any mean would feel this.)"},
     {"cutting", "Cutting by force",
      R"(The whole servo with `[cut] model = "preston"` and a ball of radius 1 mm. It is led by hand over a flat; pressed on it
 with a force that goes up to 1.2 N and back, however far the flat gives way; and sunk into a crown at the rate of

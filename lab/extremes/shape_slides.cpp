@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "controller/volume/volume_denoise.hpp"
+#include "controller/volume/volume_noise.hpp"
 #include "lab/extremes/measured_tools.hpp"
 #include "lab/extremes/measures.hpp"
 #include "lab/rig/exact_touch.hpp"
@@ -83,38 +85,59 @@ class Course {
   int count_ = 0;
 };
 
-/// `share` of full density by signed distance. `exact`: what ExactTouch has on the same way.
-void slide(const SampledTool& tool, const Reach& reach, const std::function<double(double)>& share,
-           Dice& dice, Figures& figures, Figures* exact) {
-  Frame frame(dice, {28, 28, 28});
-  frame.place = frame.at(0, -4 - kBump, 0);
-  const Axes axes = standing_on(dice.direction(), dice);
-  const Body body =
-      body_of({60, 60, 60}, [&](Point p) { return share(length(p - frame.place) - kBump); });
-  const std::vector<Touch> path = path_over(frame, axes, reach);
-  const ToolTurn<N> turn = axes.turn<N>();
-  constexpr double kHigh = 20;  // the tool turns first
-  GuidedTool<N> guided(tool, body, path.front().hand(-kHigh));
-  for (int i = 0; i < 100 && !(guided.pose().turn == turn); ++i) {
-    guided.tick(path.front().hand(-kHigh), turn);
+/// A bump turned at random, a tool in some pose, and the tool's way over the bump.
+class Slide {
+ public:
+  Slide(const SampledTool& tool, const Reach& reach, Dice& dice)
+      : tool_(tool), frame_(dice, {28, 28, 28}), axes_(standing_on(dice.direction(), dice)) {
+    frame_.place = frame_.at(0, -4 - kBump, 0);
+    path_ = path_over(frame_, axes_, reach);
   }
-  for (double depth = -kHigh; depth < kDepth; depth += 0.1)
-    guided.tick(path.front().hand(depth), turn);
-  Course course;
-  for (const Touch& touch : path) {
-    const Point force = guided.tick(touch.hand(kDepth), turn);
-    course.add(touch, force, dot(guided.proxy() - touch.centre, touch.normal));
+
+  /// `share` of full density by signed distance.
+  [[nodiscard]] Body body(const std::function<double(double)>& share) const {
+    return body_of({60, 60, 60}, [&](Point p) { return share(length(p - frame_.place) - kBump); });
   }
-  course.worsen(figures);
-  if (exact == nullptr) return;
-  const ExactTouch truth(tool, axes, body);
-  Course exact_course;
-  for (const Touch& touch : path) {
-    const double height = truth.height(touch.centre, touch.normal);
-    const Point normal = truth.normal(touch.centre, touch.normal);
-    exact_course.add(touch, (kDepth + height) * normal, height);
+  /// Adds what the tool feels.
+  void feel(const Body& body, Figures& figures) const {
+    const ToolTurn<N> turn = axes_.turn<N>();
+    constexpr double kHigh = 20;  // the tool turns first
+    GuidedTool<N> guided(tool_, body, path_.front().hand(-kHigh));
+    for (int i = 0; i < 100 && !(guided.pose().turn == turn); ++i) {
+      guided.tick(path_.front().hand(-kHigh), turn);
+    }
+    for (double depth = -kHigh; depth < kDepth; depth += 0.1)
+      guided.tick(path_.front().hand(depth), turn);
+    Course course;
+    for (const Touch& touch : path_) {
+      const Point force = guided.tick(touch.hand(kDepth), turn);
+      course.add(touch, force, dot(guided.proxy() - touch.centre, touch.normal));
+    }
+    course.worsen(figures);
   }
-  exact_course.worsen(*exact);
+  /// What ExactTouch has on the same way.
+  void touch_exactly(const Body& body, Figures& figures) const {
+    const ExactTouch truth(tool_, axes_, body);
+    Course course;
+    for (const Touch& touch : path_) {
+      const double height = truth.height(touch.centre, touch.normal);
+      const Point normal = truth.normal(touch.centre, touch.normal);
+      course.add(touch, (kDepth + height) * normal, height);
+    }
+    course.worsen(figures);
+  }
+
+ private:
+  const SampledTool& tool_;
+  Frame frame_;
+  Axes axes_;
+  std::vector<Touch> path_;
+};
+
+/// As a scene loads it with `denoise = "auto"`.
+void smooth(Body& body) {
+  constexpr Density kIso = 32768;
+  denoise(body.grid, body.density, passes_for(noise_of(body.grid, body.density, kIso)));
 }
 
 }  // namespace
@@ -137,18 +160,21 @@ void measure_shape_slides(const Effort& effort, const RowSink& add_row) {
       row(", angle", figures.degrees, "deg", limits.degrees);
       row(", surface sd", figures.height_sd, "voxels", limits.sd);
     };
-    const auto measure = [&](const std::function<double(double)>& share, Figures* exact) {
-      Dice dice(5);
-      Figures figures;
-      for (int k = 0; k < 2 * effort.slides; ++k) slide(tool, reach, share, dice, figures, exact);
-      return figures;
-    };
-    const auto clean = [](double distance) { return 0.5 - distance / 2; };
-    tell(": sliding", measure(clean, nullptr), {{3, 2.1}, {0.75, 0.45}, {0.0075, 0.003}});
+    Dice dice(5);
     CtEdge ct;
-    Figures exact;
-    tell(": sliding on CT with noise", measure(std::ref(ct), &exact),
-         {{4.5, 2.7}, {1.8, 1.35}, {0.03, 0.0225}});
+    Figures clean, smoothed, noisy, exact;
+    for (int k = 0; k < 2 * effort.slides; ++k) {
+      const Slide slide(tool, reach, dice);
+      slide.feel(slide.body([](double distance) { return 0.5 - distance / 2; }), clean);
+      Body body = slide.body(std::ref(ct));
+      slide.feel(body, noisy);
+      slide.touch_exactly(body, exact);
+      smooth(body);
+      slide.feel(body, smoothed);
+    }
+    tell(": sliding", clean, {{3, 2.1}, {0.75, 0.45}, {0.0075, 0.003}});
+    tell(": sliding on CT with noise", smoothed, {{4.5, 2.7}, {1.8, 1.35}, {0.03, 0.0225}});
+    tell(": sliding on CT with noise, denoise off", noisy, {});
     tell(": exact contact on CT with noise", exact, {});
   }
 }

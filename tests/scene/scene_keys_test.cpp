@@ -89,6 +89,13 @@ struct Samples {
       wrong.push_back({value, " is not text; put it in quotes"});
     }
   }
+  void operator()(const Denoise*) {
+    (*this)(static_cast<int*>(nullptr));
+    for (const std::string_view word : key.allowed.words) right.push_back(in_quotes(word));
+    std::erase_if(wrong, [](const Wrong& value) { return value.value == "\"100\""; });
+    wrong.push_back({"\"1\"", " is unknown; "});
+    wrong.push_back({"\"\"", " is not a usable text; "});
+  }
   template <std::size_t N>
   void operator()(const std::array<double, N>*) {
     const auto [lo, hi] = key.allowed.range;

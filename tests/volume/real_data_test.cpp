@@ -6,6 +6,7 @@
 
 #include "controller/volume/volume_crop.hpp"
 #include "controller/volume/volume_density.hpp"
+#include "controller/volume/volume_noise.hpp"
 #include "tests/volume/volume_files.hpp"
 
 using namespace kerf;
@@ -83,6 +84,29 @@ TEST_CASE("the CT of spine and pelvis: NIfTI in HU; bone from a window that begi
   const double bone = threshold_hu({0, 1500});
   CHECK(bone > 120);  // soft tissue ends
   CHECK(bone < 400);
+}
+
+TEST_CASE("the noise of the real scans, and the passes that it takes") {
+  struct Scan {
+    const char* file;
+    double values;  ///< deviation in values of the file
+    double share;
+    int passes;
+  };
+  for (const Scan& scan : {Scan{"ge_tooth_16bit/tooth.nhdr", 5.33, 0.0104, 1},
+                           Scan{"ge_tooth_8bit/tooth.mhd", 1.11, 0.0063, 0},
+                           Scan{"ct_spine_pelvis/example_ct.nii.gz", 15.3, 0.0153, 1}}) {
+    const auto path = data(scan.file);
+    if (!path) continue;
+    const SourceVolume v = read_volume(*path);
+    const VolumeImage image = apply_window(v, range_window(v));
+    const Noise noise = noise_of(image.grid, image.density, otsu_threshold(image));
+    CAPTURE(scan.file);
+    CHECK(noise.density * (v.max - v.min) == doctest::Approx(scan.values).scale(0).epsilon(0.01));
+    CHECK(noise.share == doctest::Approx(scan.share).scale(0).epsilon(0.01));
+    CHECK(passes_for(noise) == scan.passes);
+    CHECK_FALSE(is_label_map(image.grid, image.density));
+  }
 }
 
 TEST_CASE("the tar of slices of the hand is refused with the kinds that are read") {

@@ -1,5 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <cmath>
+#include <cstdint>
 #include <fstream>
+#include <random>
 #include <sstream>
 
 #include <doctest/doctest.h>
@@ -70,6 +73,43 @@ TEST_CASE("info tells size, spacing, values and what is solid, the same in its r
   std::uint64_t voxels = 0;
   for (const auto& count : json["histogram"]) voxels += count.get<std::uint64_t>();
   CHECK(voxels == 1728);
+}
+
+TEST_CASE("info and import tell the noise in one line") {
+  const TempFolder folder;
+  const VoxelGrid grid{24, 24, 24};
+  std::vector<std::uint8_t> values(grid.voxel_count());
+  std::mt19937 random(1);
+  std::normal_distribution<double> normal(100, 3);
+  for (std::int32_t z = 3; z < 21; ++z) {
+    for (std::int32_t y = 3; y < 21; ++y) {
+      for (std::int32_t x = 3; x < 21; ++x) {
+        values[grid.index(x, y, z)] = static_cast<std::uint8_t>(std::lround(normal(random)));
+      }
+    }
+  }
+  values[grid.index(1, 1, 1)] = 200;
+  const std::string file =
+      folder
+          .write("noisy.nrrd",
+                 nrrd("uint8", "spacings: 1 1 1\n", "raw", "24 24 24") + "\n" + bytes_of(values))
+          .string();
+  const std::string report = (folder / "r.json").string();
+  const Outcome info = run({"info", file, "--report", report});
+  CHECK(info.out.find("noise      3.") != std::string::npos);
+  CHECK(info.out.find(" % of the surface's step); denoise = \"auto\" makes 3 passes\n") !=
+        std::string::npos);
+  const auto json = nlohmann::json::parse(read_bytes(report));
+  CHECK(json["noise_density"].get<double>() == doctest::Approx(3.0 / 200).scale(0).epsilon(0.1));
+  CHECK(json["noise_share"].get<double>() ==
+        doctest::Approx(3 / 2.0 / json["otsu_value"].get<double>()).scale(0).epsilon(0.1));
+  CHECK(json["denoise_passes"] == 3);
+  const Outcome import = run({"import", file, "--out", (folder / "out.nrrd").string()});
+  CHECK(import.out.find("makes 3 passes\n") != std::string::npos);
+  CHECK(std::count(import.out.begin(), import.out.end(), '\n') == 2);
+
+  const std::string clean = blob_file(folder);
+  CHECK(run({"info", clean}).out.find("noise      none found\n") != std::string::npos);
 }
 
 TEST_CASE("import, crop and resample do what the library does") {

@@ -1,0 +1,198 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <filesystem>
+#include <random>
+#include <string>
+#include <vector>
+
+#include <doctest/doctest.h>
+
+#include "controller/load/scene_json.hpp"
+#include "controller/load/scene_load.hpp"
+#include "controller/volume/volume_crop.hpp"
+#include "controller/volume/volume_denoise.hpp"
+#include "controller/volume/volume_density.hpp"
+#include "tests/scene/support.hpp"
+
+using namespace kerf;
+
+namespace {
+
+constexpr VoxelGrid kGrid{40, 40, 40};
+const std::string kTool = "[[tool]]\nshape = \"ball\"\nsize_vox = 8\n";
+
+/// A ball with the edge of a scan, in values of a file; `shift` moves it along x.
+std::vector<Density> ball(double noise, double shift = 0) {
+  std::mt19937 random(5);
+  std::normal_distribution<double> normal;
+  std::vector<Density> values;
+  for (std::int32_t z = 0; z < kGrid.nz; ++z) {
+    for (std::int32_t y = 0; y < kGrid.ny; ++y) {
+      for (std::int32_t x = 0; x < kGrid.nx; ++x) {
+        const double far = std::hypot(x - 19.5 - shift, y - 19.5, z - 19.5) - 14;
+        const double share =
+            0.1 + 0.4 * std::erfc(far / std::sqrt(2)) + 0.8 * noise * normal(random);
+        values.push_back(static_cast<Density>(std::clamp(60000 * share, 0.0, 65535.0)));
+      }
+    }
+  }
+  return values;
+}
+
+/// A scene with that file and the lines of its volume.
+std::filesystem::path scene_of(const test::TempFolder& folder, const std::vector<Density>& values,
+                               const std::string& lines) {
+  static_cast<void>(folder.write("scan.nrrd", test::nrrd(kGrid, {0.1, 0.1, 0.1}, values)));
+  return folder.write(
+      "scene.toml",
+      "[[volume]]\nfile = \"scan.nrrd\"\nwindow = [0, 65535]\niso = 0.458\n" + lines + kTool);
+}
+
+SceneVolume load(const std::vector<Density>& values, const std::string& lines) {
+  const test::TempFolder folder;
+  return load_scene(scene_of(folder, values, lines)).volumes.at(0);
+}
+
+/// Standard deviation within 4 voxels of the middle.
+double deviation(const VolumeImage& image) {
+  double sum = 0, squares = 0, count = 0;
+  const VoxelIndex middle{image.grid.nx / 2, image.grid.ny / 2, image.grid.nz / 2};
+  for (std::int32_t z = -4; z <= 4; ++z) {
+    for (std::int32_t y = -4; y <= 4; ++y) {
+      for (std::int32_t x = -4; x <= 4; ++x) {
+        const double d = image.density[image.grid.index(middle.x + x, middle.y + y, middle.z + z)];
+        sum += d;
+        squares += d * d;
+        ++count;
+      }
+    }
+  }
+  return std::sqrt(squares / count - sum / count * sum / count);
+}
+
+}  // namespace
+
+TEST_CASE("a noisy scan is smoothed as its noise asks; off, and a count, do as they say") {
+  const std::vector<Density> noisy = ball(0.02);
+  const SceneVolume off = load(noisy, "denoise = \"off\"\n");
+  CHECK(off.denoised == 0);
+  CHECK(off.noise.share == doctest::Approx(0.02).scale(0).epsilon(0.1));  // told all the same
+  const SceneVolume automatic = load(noisy, "");
+  CHECK(automatic.denoised >= 2);
+  CHECK(automatic.noise.share == off.noise.share);
+  CHECK(load(noisy, "denoise = \"auto\"\n").image.density == automatic.image.density);
+  double before = deviation(off.image);
+  CHECK(before == doctest::Approx(0.016 * 60000).scale(0).epsilon(0.1));
+  const double left[] = {0.436, 0.358, 0.321};  // of white noise
+  for (int passes = 1; passes <= kMostPasses; ++passes) {
+    const SceneVolume smooth = load(noisy, "denoise = " + std::to_string(passes) + "\n");
+    CHECK(smooth.denoised == passes);
+    CHECK(deviation(smooth.image) ==
+          doctest::Approx(left[passes - 1] * before).scale(0).epsilon(0.15));
+    if (passes == automatic.denoised) CHECK(smooth.image.density == automatic.image.density);
+  }
+}
+
+TEST_CASE("a clean scan keeps its bits under auto, and so its identity") {
+  const std::vector<Density> clean = ball(0);
+  const test::TempFolder folder;
+  const LoadedScene automatic = load_scene(scene_of(folder, clean, ""));
+  const LoadedScene off = load_scene(scene_of(folder, clean, "denoise = \"off\"\n"));
+  CHECK(automatic.volumes[0].denoised == 0);
+  CHECK(canonical_json(automatic) == canonical_json(off));
+  CHECK(canonical_json(load_scene(scene_of(folder, clean, "denoise = 1\n"))) !=
+        canonical_json(off));
+}
+
+TEST_CASE("what is cropped before it is smoothed is what the whole volume would give") {
+  for (const double shift : {0.0, 12.0, -12.0}) {  // in air, and over the border
+    const std::vector<Density> noisy = ball(0.02, shift);
+    for (int passes = 1; passes <= kMostPasses; ++passes) {
+      VolumeImage whole;
+      whole.grid = kGrid;
+      whole.spacing_mm = {0.1, 0.1, 0.1};
+      whole.density = noisy;
+      const auto iso = static_cast<Density>(std::lround(0.458 * kDensityMax));
+      whole = crop(whole, kGrid.box().grown(kGuardVoxels));
+      denoise(whole.grid, whole.density, passes);
+      const SceneVolume part = load(noisy, "denoise = " + std::to_string(passes) + "\n");
+      CHECK(part.image.density == crop_to_solid(whole, iso).density);
+    }
+  }
+}
+
+TEST_CASE("a solid at the border keeps its face there within 0.02 voxels, cropped or not") {
+  std::vector<Density> slab(kGrid.voxel_count());
+  for (std::size_t i = 0; i < slab.size(); ++i) {
+    slab[i] = static_cast<Density>(i % 40 < 20 ? 55000 + i * 7 % 31 : i * 7 % 31);
+  }
+  for (const char* crop : {"true", "false"}) {
+    const SceneVolume volume = load(slab, std::string("denoise = 3\ncrop = ") + crop + "\n");
+    const VoxelGrid& grid = volume.image.grid;
+    const std::int32_t first = solid_box(volume.image, volume.iso).lo.x;
+    REQUIRE(first > 0);
+    const double in = volume.image.density[grid.index(first, grid.ny / 2, grid.nz / 2)];
+    const double out = volume.image.density[grid.index(first - 1, grid.ny / 2, grid.nz / 2)];
+    CHECK(std::abs((in - 55000 / 2) / (in - out) - 0.5) < 0.02);
+    CHECK(volume.enclosed == (crop == std::string("false")));
+  }
+}
+
+TEST_CASE("denoise of labels and of few levels is refused in one line; auto leaves them alone") {
+  std::vector<Density> coarse = ball(0.02);
+  for (Density& d : coarse) d = static_cast<Density>(d / 8000 * 8000);
+  // Labels of 30 bodies and no gradation, in any order.
+  std::vector<Density> labels(kGrid.voxel_count());
+  for (std::size_t i = 0; i < labels.size(); ++i) {
+    labels[i] = static_cast<Density>((i % 40 / 8 * 6 + i / 40 % 40 / 7) * 7 % 30 * 2000);
+  }
+  const test::TempFolder folder;
+  const auto error = [&](const std::vector<Density>& values, const std::string& lines) {
+    return test::error_of([&] { static_cast<void>(load_scene(scene_of(folder, values, lines))); });
+  };
+  const std::string few = error(coarse, "denoise = 2\n");
+  CHECK(
+      few.find("scene.toml:2: denoise: 2 for 8 levels of density, noise is told from 16; leave it "
+               "out") != std::string::npos);
+  CHECK(few.find('\n') == std::string::npos);
+  const std::string map = error(labels, "denoise = 1\n");
+  CHECK(map.find(
+            "scene.toml:2: denoise: 1 for a label map, whose steps are no noise; leave it out") !=
+        std::string::npos);
+  CHECK(map.find('\n') == std::string::npos);
+  CHECK(error(labels, "denoise = \"off\"\n").empty());
+  CHECK(load(labels, "").denoised == 0);
+  CHECK(load(coarse, "").denoised == 0);
+  CHECK(load(coarse, "denoise = \"off\"\n").image.density == load(coarse, "").image.density);
+}
+
+TEST_CASE("the phantom is smoothed only where a scene says how often") {
+  const test::TempFolder folder;
+  const auto phantom = [&](const std::string& lines) {
+    return load_scene(folder.write("scene.toml",
+                                   "[[volume]]\nfile = \"phantom\"\niso = 0.45\n"
+                                   "size = [40, 40, 25]\n" +
+                                       lines + kTool))
+        .volumes.at(0);
+  };
+  const SceneVolume plain = phantom("");
+  CHECK(plain.noise.share == 0);
+  CHECK(plain.image.density == phantom("denoise = \"off\"\n").image.density);
+  const SceneVolume smooth = phantom("denoise = 1\n");
+  CHECK(smooth.denoised == 1);
+  CHECK(smooth.image.labels.size() == smooth.image.density.size());
+  CHECK(smooth.image.density != plain.image.density);
+}
+
+TEST_CASE("a volume of the command line keeps the scene's word on noise") {
+  const test::TempFolder folder;
+  const std::filesystem::path scan =
+      folder.write("other.nrrd", test::nrrd(kGrid, {0.1, 0.1, 0.1}, ball(0.02)));
+  const SceneOverrides with{.volume_file = scan};
+  CHECK(load_scene(scene_of(folder, ball(0), ""), with).volumes[0].denoised > 0);
+  CHECK(load_scene(scene_of(folder, ball(0), "denoise = \"off\"\n"), with).volumes[0].denoised ==
+        0);
+  CHECK(load_scene(scene_of(folder, ball(0), "denoise = 1\n"), with).volumes[0].denoised == 1);
+}
