@@ -10,14 +10,14 @@
 namespace kerf {
 namespace {
 
-std::atomic<DeviceDriver*> guarded{nullptr};  // a signal handler can reach nothing but globals
+std::atomic<DeviceDriver*> driven{nullptr};  // a signal handler can reach nothing but globals
 static_assert(std::atomic<DeviceDriver*>::is_always_lock_free);
 
 constexpr int kCrashes[] = {SIGSEGV, SIGBUS,  SIGFPE,  SIGILL,  SIGABRT, SIGQUIT,
                             SIGSYS,  SIGTRAP, SIGXCPU, SIGALRM, SIGUSR1, SIGUSR2};
 
 void on_crash(int signal) {
-  if (DeviceDriver* device = guarded.load()) {
+  if (DeviceDriver* device = driven.load()) {
     static_cast<void>(device->release_for_good());  // one send(): signal-safe
     // A bus carries it in one of its next cycles, and takes it down with a process that is gone.
     const timespec cycles{0, 2'000'000};
@@ -36,7 +36,7 @@ void handle_crashes(void (*handler)(int)) noexcept {
 }  // namespace
 
 MotorGuard::MotorGuard(DeviceDriver& device) noexcept : device_(device) {
-  guarded = &device;
+  driven = &device;
   handle_crashes(on_crash);
 }
 
@@ -46,7 +46,7 @@ MotorGuard::~MotorGuard() {
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }
   handle_crashes(SIG_DFL);
-  guarded = nullptr;
+  driven = nullptr;
 }
 
 void MotorGuard::guard_stack() noexcept {

@@ -15,6 +15,12 @@
 
 namespace kerf {
 namespace fs = std::filesystem;
+
+std::string lower(std::string text) {
+  for (char& c : text) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  return text;
+}
+
 namespace {
 
 /// Lines of `key<separator>value` up to a blank line, the end, or the key `last`. Keys in lower
@@ -34,11 +40,6 @@ std::string trimmed(const std::string& text) {
   const auto first = std::find_if_not(text.begin(), text.end(), space);
   const auto last = std::find_if_not(text.rbegin(), text.rend(), space).base();
   return first < last ? std::string(first, last) : std::string{};
-}
-
-std::string lower(std::string text) {
-  for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return text;
 }
 
 TextHeader read_text(const fs::path& path, char separator, const std::string& last) {

@@ -18,6 +18,9 @@ struct VolumeHeader {
   std::string data_file;  ///< where they lie, for messages
 };
 
+/// In small letters, of ASCII alone: so keys of headers and ends of file names are compared.
+[[nodiscard]] std::string lower(std::string text);
+
 /// Each reads one header, checks sizes against the limits, and throws SceneError for what it can
 /// judge: no header, bad sizes, zero spacing, no data file.
 [[nodiscard]] VolumeHeader read_nrrd_header(const std::filesystem::path& path);

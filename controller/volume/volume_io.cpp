@@ -42,13 +42,6 @@ using volume::cross, volume::dot;
 using volume::Place, volume::set_frame, volume::set_grid, volume::set_range, volume::set_spacing;
 using volume::Quiet, volume::Slice;
 
-std::string lower(std::string text) {
-  std::transform(text.begin(), text.end(), text.begin(), [](char c) {
-    return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-  });
-  return text;
-}
-
 [[noreturn]] void refuse_unreadable(const fs::path& path, const std::string& reason) {
   throw SceneError(path.string() + ": cannot be read (" + volume::last_line(reason) +
                    "); check that the file is whole and of the kind its name says");

@@ -9,7 +9,6 @@
 #include <string>
 #include <string_view>
 
-#define ZLIB_CONST  // its input is const then
 #include <zlib.h>
 
 #include "controller/scene/scene_error.hpp"

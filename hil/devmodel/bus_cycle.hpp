@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cmath>
+#include <cstdint>
+
 /// The time of the device models: cycles of 125 us (one of FireWire, an eighth of a USB frame),
 /// each in four steps of the mechanics.
 namespace kerf {
@@ -10,6 +13,10 @@ inline constexpr int kCyclesPerUsbFrame = kCyclesPerSecond / 1000;
 inline constexpr double kCycleS = 1.0 / kCyclesPerSecond;
 inline constexpr int kStepsPerCycle = 4;  // 31 us: far below the fastest spring-mass period here
 inline constexpr double kStepS = kCycleS / kStepsPerCycle;
+
+[[nodiscard]] inline std::int64_t cycles_of(double seconds) noexcept {
+  return std::llround(seconds * kCyclesPerSecond);
+}
 
 /// The 1 ms frames of a USB bus, counted in cycles.
 class UsbFrames {

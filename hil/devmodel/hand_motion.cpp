@@ -50,7 +50,7 @@ void HandMotion::leave() noexcept {
 }
 
 void HandMotion::add(const HandStep& step, double unit_mm) {
-  Leg leg{step, std::max<std::int64_t>(1, std::llround(step.seconds * kCyclesPerSecond))};
+  Leg leg{step, std::max<std::int64_t>(1, cycles_of(step.seconds))};
   for (double& length : leg.step.to) length *= unit_mm;
   for (double& length : leg.step.size) length *= unit_mm;
   leg.step.sink *= unit_mm;

@@ -14,10 +14,6 @@ namespace {
 constexpr double kPushN = 0.05;
 constexpr int kPotNoiseMask = 31;
 
-std::int64_t cycles_of(double seconds) {
-  return std::llround(seconds * kCyclesPerSecond);
-}
-
 std::int16_t wrapped(int count) {
   return static_cast<std::int16_t>(static_cast<std::uint16_t>(count));
 }

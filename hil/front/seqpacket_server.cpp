@@ -16,7 +16,6 @@
 namespace kerf {
 namespace {
 
-constexpr int kStopCheckMs = 100;        // how long a stop request may wait
 constexpr const char* kUnborn = ".new";  // name until the socket listens
 
 sockaddr_un address_of(const std::string& path) {

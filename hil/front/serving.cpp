@@ -16,8 +16,7 @@ namespace {
 
 constexpr std::int64_t kNsPerCycle = 125'000;
 constexpr std::int64_t kMaxBehindNs = 100'000'000;  // beyond this the past is not made up for
-constexpr int kStopCheckMs = 100;
-constexpr int kMaxTakenPerPeriod = 64;  // a flooding host cannot hold the device
+constexpr int kMaxTakenPerPeriod = 64;              // a flooding host cannot hold the device
 // One byte more than any command, so that a longer packet is seen to be wrong.
 using Buffer = std::array<std::uint8_t, 65>;
 
@@ -28,8 +27,6 @@ void send(PacketLink& client, PacketDevice& device, FrontStats& stats) noexcept 
     if (sent == PacketLink::Sent::full) ++stats.dropped;
   }
 }
-
-constexpr std::int64_t kStopCheckNs = 100'000'000;
 
 }  // namespace
 

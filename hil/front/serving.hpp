@@ -37,6 +37,10 @@ class PacketLink {
   bool closed_ = false;
 };
 
+/// How long a stop request may wait.
+inline constexpr int kStopCheckMs = 100;
+inline constexpr std::int64_t kStopCheckNs = kStopCheckMs * std::int64_t{1'000'000};
+
 /// Whether something can be read from `fd` within the time.
 [[nodiscard]] bool readable(int fd, int timeout_ms) noexcept;
 

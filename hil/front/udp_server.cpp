@@ -15,7 +15,6 @@
 namespace kerf {
 namespace {
 
-constexpr int kStopCheckMs = 100;                // how long a stop request may wait
 constexpr std::int64_t kGoneNs = 2'000'000'000;  // silence of a host that has left
 constexpr int kMaxStrangers = 64;                // datagrams of others, thrown away in one call
 

@@ -27,10 +27,6 @@
 namespace kerf {
 namespace {
 
-std::int64_t cycles_of(double seconds) {
-  return std::llround(seconds * kCyclesPerSecond);
-}
-
 /// What any device takes from the command line.
 template <class Params>
 Params plant_of(const EmulatorOptions& o) {

@@ -12,7 +12,6 @@ namespace kerf {
 namespace {
 
 constexpr std::size_t kMaxFaults = 1000;
-constexpr double kMaxSeconds = 3600;
 constexpr double kMaxCounts = 32767;
 constexpr double kMaxDelayMs = 1000;
 constexpr double kMaxEvery = 1e6;
@@ -57,8 +56,8 @@ DeviceFault fault_of(const ScriptTable& table) {
   fault.of_commands =
       table.word("packets", "reports", std::array<std::string_view, 2>{"reports", "commands"}) ==
       "commands";
-  fault.at_s = table.number("at_s", 0, {0, kMaxSeconds});
-  fault.for_s = table.number("for_s", 0, {0, kMaxSeconds});
+  fault.at_s = table.number("at_s", 0, {0, kMaxScriptSeconds});
+  fault.for_s = table.number("for_s", 0, {0, kMaxScriptSeconds});
   fault.every = whole(table, "every", 1, {1, kMaxEvery});
   fault.axis = whole(table, "axis", 0, {0, 2});
   fault.counts = whole(table, "counts", 0, {-kMaxCounts, kMaxCounts});

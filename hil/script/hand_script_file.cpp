@@ -12,7 +12,6 @@ namespace {
 
 constexpr std::array<std::string_view, 2> kEaseWords{"smooth", "linear"};
 constexpr std::size_t kMaxSteps = 10'000;
-constexpr double kMaxSeconds = 3600;
 constexpr double kMaxLength = 1000;  // script units: far outside any arm's reach
 constexpr double kMaxTurns = 10'000;
 constexpr double kMaxUnitMm = 100;
@@ -20,7 +19,7 @@ constexpr double kMaxDegrees = 360;
 
 constexpr ScriptRange kLength{-kMaxLength, kMaxLength};
 constexpr ScriptRange kSize{0, kMaxLength};
-constexpr ScriptRange kSeconds{0, kMaxSeconds, true};
+constexpr ScriptRange kSeconds{0, kMaxScriptSeconds, true};
 
 HandStep step_of(const ScriptTable& table) {
   table.allow_only({"move_mm", "hold", "circle_mm", "zigzag_mm", "seconds", "ease", "turns",

@@ -13,6 +13,8 @@
 
 namespace kerf {
 
+inline constexpr double kMaxScriptSeconds = 3600;
+
 /// A range and how to say it.
 struct ScriptRange {
   double low;

@@ -11,7 +11,6 @@ namespace {
 
 constexpr TexelFormat kDensityTexel{GL_R16, GL_RED, GL_UNSIGNED_SHORT, GL_LINEAR};
 constexpr TexelFormat kLabelTexel{GL_R8UI, GL_RED_INTEGER, GL_UNSIGNED_BYTE, GL_NEAREST};
-constexpr VoxelGrid kNoVoxels{};
 constexpr GLuint kDensityUnit = 0;
 constexpr GLuint kLabelUnit = 1;
 
@@ -28,7 +27,7 @@ SolidOnGpu::SolidOnGpu(const VolumeView& volume, const VolumeContent& content, i
       iso_(static_cast<float>(volume.iso / kDensityMax)),
       world_from_texture_(kerf::world_from_texture(volume.world_from_voxel, volume.bricks.grid)),
       density_(checked_grid(volume, max_texture_size), kDensityTexel),
-      labels_(has_labels_ ? bricks_.grid : kNoVoxels, kLabelTexel) {
+      labels_(has_labels_ ? bricks_.grid : VoxelGrid{}, kLabelTexel) {
   const VoxelBox whole = bricks_.grid.box();
   density_.upload_from(content.density.data(), whole);
   if (has_labels_) labels_.upload_from(content.labels.data(), whole);

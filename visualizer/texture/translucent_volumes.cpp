@@ -14,7 +14,6 @@ namespace kerf {
 namespace {
 
 constexpr TexelFormat kTexel{GL_RGBA8, GL_RGBA, GL_UNSIGNED_BYTE, GL_LINEAR};
-constexpr VoxelGrid kNoVoxels{};
 constexpr int kOtherUnits = 3;  // materials by density, where rays enter, depth of opaque things
 
 void check_units(std::size_t volumes) {
@@ -44,7 +43,7 @@ TranslucentVolume::TranslucentVolume(const VolumeView& volume, const VolumeConte
       world_from_texture_(kerf::world_from_texture(volume.world_from_voxel, volume.bricks.grid)),
       edge_mm_(shortest_edge_mm(volume.world_from_voxel)),
       voxels_(bricks_.grid, kTexel, &kAirTexel),
-      materials_(has_labels_ ? bricks_.grid : kNoVoxels, kTexel),
+      materials_(has_labels_ ? bricks_.grid : VoxelGrid{}, kTexel),
       cells_(volume, content.density, skip_empty ? transfer.lowest_seen() : Density{0}) {
   set_materials(transfer.materials, content);
   for_each_layer(bricks_.grid, [&](const VoxelBox& layer) { upload(content.density, layer); });

@@ -28,7 +28,6 @@ constexpr int kYieldTurns = 3;   // neutral packets before a stream stops
 constexpr std::uint32_t kHousekeepingTurns = 64;
 
 constexpr int kConnectMs = 4000;  // a recent bus reset alone holds allocations back for a second
-constexpr int kAnswerMs = 50;
 constexpr std::chrono::milliseconds kFewCycles{2};
 
 const omni::CommandBytes kNeutral = encode(OmniCommand{});
@@ -47,7 +46,7 @@ FirewirePort::~FirewirePort() {
   std::this_thread::sleep_for(kFewCycles);  // it goes out before the device is told to stop
   if (const auto control = requests_.read_byte(kControl)) {
     requests_.write(kControl, static_cast<std::uint8_t>(*control & ~kStreams), 0);
-    static_cast<void>(requests_.ready(kAnswerMs));
+    static_cast<void>(requests_.ready(kFirewireAnswerMs));
   }
   receiver_.stop(received_);
   transmitter_.stop(transmitted_);

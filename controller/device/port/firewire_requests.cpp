@@ -7,7 +7,6 @@ namespace kerf {
 namespace {
 
 constexpr std::uint64_t kReadClosure = ~std::uint64_t{0};
-constexpr int kAnswerMs = 50;
 constexpr int kTries = 3;
 constexpr std::uint64_t kBroadcastChannel = std::uint64_t{1} << 31;
 
@@ -47,7 +46,7 @@ std::optional<std::uint8_t> FirewireRequests::read_byte(std::uint64_t offset) no
     request.closure = kReadClosure;
     request.generation = generation_;
     if (file_.call(FW_CDEV_IOC_SEND_REQUEST, &request) < 0) continue;
-    while (ready(kAnswerMs)) {
+    while (ready(kFirewireAnswerMs)) {
       const auto answer = event();
       const auto response = event_as<fw_cdev_event_response>(answer);
       if (response.type != FW_CDEV_EVENT_RESPONSE || response.closure != kReadClosure) continue;

@@ -21,6 +21,8 @@ namespace kerf {
 inline constexpr std::size_t kResponseDataAt = offsetof(fw_cdev_event_response, data);
 inline constexpr std::size_t kIsoHeadersAt = offsetof(fw_cdev_event_iso_interrupt, header);
 
+inline constexpr int kFirewireAnswerMs = 50;  ///< a device answers sooner, or not at all
+
 /// The fixed part of an event; what is missing of a short one is zero.
 template <class Event>
 [[nodiscard]] Event event_as(std::span<const std::uint8_t> bytes) noexcept {

@@ -10,12 +10,12 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "hil/front/serving.hpp"
 #include "shared/posix/monotonic_clock.hpp"
 
 namespace kerf {
 namespace {
 
-constexpr std::int64_t kStopCheckNs = 100'000'000;
 constexpr std::uint32_t kMinorVersion = 31;
 constexpr std::uint64_t kFirstInode = 2;  // 1 is the folder
 
