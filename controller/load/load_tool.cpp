@@ -85,7 +85,7 @@ SceneTool load_mesh(const ToolSpec& spec, double pitch_mm, double voxel_mm,
 /// The part of a shaft that the head hides is none.
 void check_shaft(const ToolSpec& spec, const SceneTool& tool, double voxel_mm) {
   if (!spec.shaft.radius_mm) return;
-  if (*spec.shaft.length_mm <= tool.length_mm) {
+  if (*spec.shaft.length_mm <= tool.length_mm * (1 + 1e-9)) {
     refuse(spec.shaft_place, " ends inside of the head, which is " + short_text(tool.length_mm) +
                                  " mm long; it counts from the tool's tip, so use more");
   }

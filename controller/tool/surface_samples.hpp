@@ -29,9 +29,9 @@ inline constexpr int kMinSurfaceSamples = 512;
 /// A query reads each sample, some 2 ns of the tick's time apiece.
 inline constexpr int kMaxSurfaceSamples = 8000;
 
-/// Of a part behind the head, which is as long as a hand: its pitch grows so that it has no more,
-/// up to kWidestPartPitch. Closer looks tell its contacts as exactly as a head's; but between its
-/// own samples a point or a loose bit that is narrower than their pitch is not noticed.
+/// Of a part behind the head. One that would have more gets a wider pitch, up to kWidestPartPitch.
+/// Closer looks tell its contacts as exactly as a head's; but a point or a loose bit that is
+/// narrower than the pitch may go unnoticed.
 inline constexpr int kMostPartSamples = 2048;
 inline constexpr double kWidestPartPitch = 4;
 

@@ -62,6 +62,19 @@ TEST_CASE_TEMPLATE("an eased step ends at the bottom of its bowl", N, FixedNumbe
   }
 }
 
+TEST_CASE_TEMPLATE("a head's plane and a shaft's tell of no bowl", N, FixedNumbers, DoubleNumbers) {
+  auto field = hollow<N>(0.5);
+  const Point from = on(0.5, 0.4), to = on(0.5, 0.1);
+  const auto before = field.query(place_of<N>(from));
+  auto after = field.query(place_of<N>(to));
+  CurvatureEstimate<N> curvature;
+  curvature.learn(before, after, place_of<N>(to - from));
+  CHECK(eases(curvature));
+  after.plane[0].behind = true;
+  curvature.learn(before, after, place_of<N>(to - from));
+  CHECK_FALSE(eases(curvature));
+}
+
 TEST_CASE_TEMPLATE("two steps tell of both directions", N, FixedNumbers, DoubleNumbers) {
   constexpr double kPlay = 0.5;
   const Point begin = on(kPlay, 0.4);

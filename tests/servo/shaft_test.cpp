@@ -167,6 +167,36 @@ TEST_CASE("a ball with a shaft turns with the stylus: it is told and drawn turne
   }
 }
 
+TEST_CASE("a shaft comes and goes with its tool, and is pushed out with a ramp") {
+  for (const auto numeric : {NumericKind::fixed, NumericKind::float64}) {
+    CAPTURE(static_cast<int>(numeric));
+    LoadedScene scene = upright_scene(ledge);
+    scene.servo.numeric = numeric;
+    scene.cut.model = CutModel::none;
+    scene.tools.push_back(scene.tools[0]);
+    scene.tools[1].shaft = {};
+    ArmedServo armed(scene, {3, 3, -3});
+    armed.settled(2, 0, 0);
+    const ServoOutput held = armed.settled(-1.3, 0, 0);
+    CHECK(held.shaft);
+    CHECK(held.force_n[0] > 0.6);
+    for (int time = 0; time < 2; ++time) {
+      CHECK(armed.servo->apply({.kind = ServoCommand::Kind::select_tool, .argument = 1}));
+      const ServoOutput bare = armed.settled(-1.3, 0, 0);
+      CHECK(length(bare.force_n) == 0);
+      CHECK_FALSE(bare.shaft);
+      CHECK(armed.servo->apply({.kind = ServoCommand::Kind::select_tool, .argument = 0}));
+      double last_n = 0;
+      for (int tick = 0; tick < 100; ++tick) {
+        const ServoOutput out = armed.step(-1.3, 0, 0);
+        CHECK(length(out.contact_n) <= last_n + 0.1 + 1e-3);
+        last_n = length(out.contact_n);
+      }
+      CHECK(last_n == doctest::Approx(held.force_n[0]).epsilon(0.02));
+    }
+  }
+}
+
 TEST_CASE("ticks with a shaft and a handpiece never touch the heap") {
   LoadedScene scene = upright_scene(
       ledge_and_floor,

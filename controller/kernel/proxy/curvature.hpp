@@ -35,11 +35,12 @@ class CurvatureEstimate {
 
  public:
   /// Learns from the deepest planes of two places, the second `moved` from the first. Unlike planes
-  /// are two walls: all is forgotten. Normals that part are a bump: its steps only fall short, and
-  /// stay as they are.
+  /// are two walls, or one is the head's and one the shaft's: all is forgotten. Normals that part
+  /// are a bump: its steps only fall short, and stay as they are.
   constexpr void learn(const Contacts<N>& before, const Contacts<N>& after, Place moved) noexcept {
     constexpr double kTelling = 0.01;  // units: over less noise turns a normal as much
     if (before.count == 0 || after.count == 0) return forget();
+    if (before.plane[0].behind != after.plane[0].behind) return forget();
     const auto& from = before.plane[0].normal;
     const auto& to = after.plane[0].normal;
     if (dot(from, to) < Unit(kFalseCreaseCosine)) return forget();

@@ -50,7 +50,8 @@ TEST_CASE("a shaft that is felt comes with its outline, a wrong one in one line"
   const auto shafted = [](const std::string& outline) {
     return scene_view(segment_with(
         R"({"volumes": [], "materials": [], "tools": [{"name": "ball",
-            "profile": [[-1, 0], [0, 1], [1, 0]], "shaft": )" + outline + "}]}"));
+            "profile": [[-1, 0], [0, 1], [1, 0]], "shaft": )" +
+        outline + "}]}"));
   };
   const SceneView scene = shafted("[[0.8, 0.6], [5, 0.6], [5, 0]]");
   CHECK(scene.tools[0].shaft_mm.size() == 3);
