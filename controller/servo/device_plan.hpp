@@ -26,8 +26,8 @@ struct JointPlan {
   typename N::Real counts_per_n_mm{};  ///< motor counts per torque, signed
 };
 
-/// In 20 ms: no device with a gimbal reports more than 1000 times a second.
-inline constexpr std::size_t kMaxGimbalSamples = 20;
+/// In 20 ms, at the highest rate of 8 kHz.
+inline constexpr std::size_t kMaxGimbalSamples = 160;
 
 /// Everything constant of the held device.
 template <class N>
