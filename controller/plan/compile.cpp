@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "controller/kernel/proxy/tool_query.hpp"
+#include "controller/plan/air_speed.hpp"
 #include "controller/plan/method/methods.hpp"
 #include "controller/plan/plan_contact.hpp"
 #include "controller/plan/plan_device.hpp"
@@ -88,6 +89,8 @@ class CompiledSceneOf final : public CompiledScene {
       plan.swept.point_shell = memory_.contact().hold_point_shell(scene, tool);
       plan.swept.behind = memory_.contact().hold_parts_behind(scene, tool);
       plan_proxy(scene, tool, plan.swept);
+      costs_.air_speeds_mm_per_s.push_back(
+          air_speed_mm_per_s(scene, plan.swept, plan_.volume_count));
     }
     for (std::size_t v = 0; v < plan_.volume_count; ++v) {
       const std::size_t scene_index = plan_.volumes[v].scene_index;

@@ -33,6 +33,9 @@ struct TickTime {
 struct SceneCosts {
   std::vector<TickCost> ticks;  ///< by tool, then by solid volume
   std::vector<ArrayBytes> arrays;
+  /// By tool: speed of the hand up to which it is free of drag in air (air_speed.hpp). Empty where
+  /// the force is the paper's.
+  std::vector<double> air_speeds_mm_per_s;
 };
 
 }  // namespace kerf

@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "controller/shell/check_scene.hpp"
 
+#include <algorithm>
+#include <cstddef>
 #include <cstdio>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 #include "controller/load/scene_json.hpp"
 #include "controller/load/scene_load.hpp"
@@ -22,6 +25,27 @@ std::string hand_lines(const LoadedScene& scene) {
   std::snprintf(unit, sizeof unit, "%.9g", hand_unit_mm(scene));
   return "hand_unit_mm=" + std::string(unit) + "\nhand_script=" + scene.hand_script +
          "\nrate_hz=" + std::to_string(scene.servo.rate_hz) + "\n";
+}
+
+namespace {
+
+/// A free hand over a tooth moves up to so fast; what is slower than that is told.
+constexpr double kHandSpeedMmPerS = 1000;
+
+}  // namespace
+
+std::string air_lines(const LoadedScene& scene, const SceneCosts& costs) {
+  const std::vector<double>& speeds = costs.air_speeds_mm_per_s;
+  if (speeds.empty()) return {};
+  const auto slowest = std::min_element(speeds.begin(), speeds.end());
+  char speed[32];
+  std::snprintf(speed, sizeof speed, "%.2f", *slowest / 1000);
+  const std::string lines = "free_of_drag_m_per_s=" + std::string(speed) + "\n";
+  if (*slowest >= kHandSpeedMmPerS) return lines;
+  const auto tool = static_cast<std::size_t>(slowest - speeds.begin());
+  return lines + "note=beside a surface tool " + scene.tools[tool].name +
+         " is dragged in air from " + speed +
+         " m/s on; a higher rate or larger voxels raise that\n";
 }
 
 void print_scene(const LoadedScene& scene, const SceneCosts& costs) {
@@ -50,6 +74,7 @@ void print_scene(const LoadedScene& scene, const SceneCosts& costs) {
   const std::size_t costliest = costliest_tool(costs);
   std::printf("costliest_tool=%s\nhighest_rate_hz=%d\n", scene.tools[costliest].name.c_str(),
               highest_rate_hz(work_us(costs, costliest)));
+  std::fputs(air_lines(scene, costs).c_str(), stdout);
   std::fputs(hand_lines(scene).c_str(), stdout);
   Scene settings;
   static_cast<SceneSettings&>(settings) = scene;

@@ -13,6 +13,10 @@ namespace kerf {
 /// What the demo script hands to the emulator.
 [[nodiscard]] std::string hand_lines(const LoadedScene& scene);
 
+/// The speed up to which no tool is dragged in air (air_speed.hpp), and a note where a hand is
+/// faster.
+[[nodiscard]] std::string air_lines(const LoadedScene& scene, const SceneCosts& costs);
+
 /// Prints what --check tells: whatever can be said without memory for the loop, one `name=value` a
 /// line, and then every setting in effect as `table.key=value`.
 void print_scene(const LoadedScene& scene, const SceneCosts& costs);

@@ -33,8 +33,9 @@ template <void (*kMeasure)(const Effort&, const RowSink&)>
 void rows_only(const Effort& effort, const RowSink& add_row, Findings&) {
   kMeasure(effort, add_row);
 }
-constexpr std::array<Group, 9> kGroups{{
+constexpr std::array<Group, 10> kGroups{{
     {"walls", rows_only<measure_walls>},
+    {"air", rows_only<measure_air>},
     {"rests", rows_only<measure_rests>},
     {"slides", rows_only<measure_slides>},
     {"shapes", rows_only<measure_shapes>},

@@ -32,7 +32,8 @@ using RowSink = std::function<void(Row)>;
 
 /// How much is measured: the whole takes about a minute.
 struct Effort {
-  int walls = 500;  ///< of each kind of wall and tool, 500 ticks at each: a million ticks in all
+  int walls = 500;    ///< of each kind of wall and tool, 500 ticks at each: a million ticks in all
+  int air_walls = 8;  ///< along which each tool flies 100 ticks
   int tilts = 100;
   int slides = 10;        ///< over each bump
   int tick_count = 2000;  ///< that are timed
@@ -42,11 +43,13 @@ struct Effort {
   int presses = 240;  ///< of tools that cut, 5 s each; all 10,000 where only these are asked
   std::filesystem::path data;  ///< folder of real volumes; empty: there is none
 
-  [[nodiscard]] static Effort quick() { return {5, 8, 1, 200, 8, {128, 128, 80}, 4, 24, {}}; }
+  [[nodiscard]] static Effort quick() { return {5, 2, 8, 1, 200, 8, {128, 128, 80}, 4, 24, {}}; }
 };
 
 /// F7 (docs/validation.md): random motions at walls.
 void measure_walls(const Effort& effort, const RowSink& add_row);
+/// What is felt in air beside a wall: nothing, however fast.
+void measure_air(const Effort& effort, const RowSink& add_row);
 /// F9: where a ball comes to rest, against the ideal solid, and on sharp edges against the volume's
 /// own iso-surface.
 void measure_rests(const Effort& effort, const RowSink& add_row);

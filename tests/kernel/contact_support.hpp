@@ -35,8 +35,8 @@ class QueryRig : public ContactRig<N> {
 
   void turn(const std::array<Point, 3>& rotation) { this->field().turn(tool_turn<N>(rotation)); }
   [[nodiscard]] Contacts<N> at(const Point& q) const { return this->field().query(place_of<N>(q)); }
-  [[nodiscard]] double free_distance(const Point& q) const {
-    return double(this->field().free_distance(place_of<N>(q)));
+  [[nodiscard]] double free_distance(const Point& q, const Point& move) const {
+    return double(this->field().free_distance(place_of<N>(q), place_of<N>(move)));
   }
 
   /// How far beyond `q` along `n` the tool rests: its depth is 0 there. Within +-`range`.

@@ -2,8 +2,8 @@
 #include "controller/plan/tables/free_brick_map.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
-#include <cstdlib>
 #include <random>
 #include <vector>
 
@@ -11,45 +11,62 @@
 
 using namespace kerf;
 
-TEST_CASE("bricks tell how far the nearest brick with density is") {
-  const VoxelGrid grid{45, 22, 31};  // no whole number of bricks on any axis
+namespace {
+
+/// Voxels between what brick b holds, 2b to 2b + 2, and where voxel v is read, v - 1 to v + 1.
+double between(int brick, int voxel) {
+  return std::max({0, voxel - 1 - (2 * brick + 2), 2 * brick - (voxel + 1)});
+}
+
+int steps_between(const VoxelIndex& brick, const VoxelIndex& voxel) {
+  const double distance =
+      std::hypot(between(brick.x, voxel.x), between(brick.y, voxel.y), between(brick.z, voxel.z));
+  return std::min(254, static_cast<int>(4 * distance + 1e-9));
+}
+
+}  // namespace
+
+TEST_CASE("bricks tell how far the nearest voxel with density is read") {
   std::mt19937 random(4);
-  for (const int dense : {0, 1, 3, 20}) {
-    std::vector<Density> density(grid.voxel_count(), 99);
-    std::vector<VoxelIndex> solid;
-    for (int i = 0; i < dense; ++i) {
-      const VoxelIndex at{static_cast<std::int32_t>(random() % 45),
-                          static_cast<std::int32_t>(random() % 22),
-                          static_cast<std::int32_t>(random() % 31)};
-      density[grid.index(at.x, at.y, at.z)] = 100;
-      solid.push_back(at);
-    }
-    const FreeBrickMap map(grid, density, 100);
-    const FreeBricks bricks = map.bricks();
-    CHECK(map.bytes() == 23 * 11 * 16);
-    for (std::int32_t z = 0; z < grid.nz; ++z) {
-      for (std::int32_t y = 0; y < grid.ny; ++y) {
-        for (std::int32_t x = 0; x < grid.nx; ++x) {
-          int nearest = 255;
-          for (const VoxelIndex& s : solid) {
-            nearest =
-                std::min(nearest, std::max({std::abs(s.x / 2 - x / 2), std::abs(s.y / 2 - y / 2),
-                                            std::abs(s.z / 2 - z / 2)}));
+  // No whole number of bricks, farther than the map can say, and hardly a volume.
+  for (const VoxelGrid grid : {VoxelGrid{45, 22, 31}, {161, 7, 90}, {1, 2, 3}}) {
+    for (const int dense : {0, 1, 3, 20}) {
+      std::vector<Density> density(grid.voxel_count(), 99);
+      std::vector<VoxelIndex> solid;
+      const auto any = [&](std::int32_t n) {
+        return static_cast<std::int32_t>(random() % static_cast<unsigned>(n));
+      };
+      for (int i = 0; i < dense; ++i) {
+        const VoxelIndex at{any(grid.nx), any(grid.ny), any(grid.nz)};
+        density[grid.index(at.x, at.y, at.z)] = 100;
+        solid.push_back(at);
+      }
+      const FreeBrickMap map(grid, density, 100);
+      const FreeBricks bricks = map.bricks();
+      CHECK(map.bytes() == bricks.grid.voxel_count());
+      for (std::int32_t z = 0; z < grid.nz; ++z) {
+        for (std::int32_t y = 0; y < grid.ny; ++y) {
+          for (std::int32_t x = 0; x < grid.nx; ++x) {
+            int nearest = 254;
+            for (const VoxelIndex& s : solid) {
+              nearest = std::min(nearest, steps_between({x / 2, y / 2, z / 2}, s));
+            }
+            if (bricks.at(x, y, z) != nearest) REQUIRE(bricks.at(x, y, z) == nearest);
           }
-          if (bricks.at(x, y, z) != nearest) REQUIRE(bricks.at(x, y, z) == nearest);
         }
       }
+      // Outside: that of the nearest brick inside.
+      CHECK(bricks.at(-100, 1, 1000) == bricks.at(0, 1, grid.nz - 1));
     }
-    // Outside: that of the nearest brick inside.
-    CHECK(bricks.at(-100, 3, 1000) == bricks.at(0, 3, 30));
   }
   CHECK(FreeBricks{}.at(1, 2, 3) == 0);
 }
 
-TEST_CASE("enough free bricks keep every voxel that a sample reads free") {
-  CHECK(free_bricks_for(0.5) == 2);
-  CHECK(free_bricks_for(1) == 2);
-  CHECK(free_bricks_for(1.01) == 3);
-  CHECK(free_bricks_for(3) == 3);
-  CHECK(free_bricks_for(3.5) == 4);
+TEST_CASE("a sphere needs the steps of its radius, and more than there are where it is too large") {
+  CHECK(free_steps_for(0.5) == 2);
+  CHECK(free_steps_for(0.51) == 3);
+  CHECK(free_steps_for(3.5) == 14);
+  CHECK(free_steps_for(63.5) == 254);
+  CHECK(free_steps_for(63.6) == 255);
+  CHECK(free_steps_for(1000) == 255);
 }

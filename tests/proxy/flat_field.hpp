@@ -31,7 +31,8 @@ class FlatField {
   [[nodiscard]] bool is_solid(ContactVec<typename N::Real> at) const {
     return dot(up_, point_of<N>(at)) < 0;
   }
-  [[nodiscard]] typename N::Real free_distance(ContactVec<typename N::Real> at) const {
+  [[nodiscard]] typename N::Real free_distance(ContactVec<typename N::Real> at,
+                                               ContactVec<typename N::Real>) const {
     const double free = dot(up_, point_of<N>(at) + turned_arm()) - 1;
     return typename N::Real(std::max(0.0, free));
   }

@@ -87,7 +87,7 @@ struct OneWayField {
     felt.buried = length(point_of<N>(q) - way_out) > 0.01;
     return felt;
   }
-  [[nodiscard]] Real free_distance(ContactVec<Real>) const { return Real(0); }
+  [[nodiscard]] Real free_distance(ContactVec<Real>, ContactVec<Real>) const { return Real(0); }
   [[nodiscard]] bool is_solid(ContactVec<Real>) const { return true; }
   [[nodiscard]] bool half_spent() const { return false; }
   [[nodiscard]] bool may_query() const { return left > 0; }

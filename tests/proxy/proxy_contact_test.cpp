@@ -42,8 +42,9 @@ struct CountedField {
   [[nodiscard]] bool half_spent() const { return field.half_spent(); }
   [[nodiscard]] bool may_query() const { return field.may_query(); }
   [[nodiscard]] bool is_solid(ContactVec<typename N::Real> q) const { return field.is_solid(q); }
-  typename N::Real free_distance(ContactVec<typename N::Real> q) const {
-    return field.free_distance(q);
+  typename N::Real free_distance(ContactVec<typename N::Real> q,
+                                 ContactVec<typename N::Real> move) const {
+    return field.free_distance(q, move);
   }
   void turn(const ToolTurn<N>& turn) { field.turn(turn); }
 

@@ -33,7 +33,8 @@ class SolidField {
   [[nodiscard]] bool is_solid(ContactVec<typename N::Real> at) const {
     return nearest_(point_of<N>(at)).first < 0;
   }
-  [[nodiscard]] typename N::Real free_distance(ContactVec<typename N::Real> at) const {
+  [[nodiscard]] typename N::Real free_distance(ContactVec<typename N::Real> at,
+                                               ContactVec<typename N::Real>) const {
     return typename N::Real(std::max(0.0, nearest_(point_of<N>(at)).first - radius_ - 1));
   }
   void turn(const ToolTurn<N>&) const {}

@@ -7,13 +7,16 @@
 
 namespace kerf {
 
-/// Voxels along the edge of a brick of the free-space map. Smaller bricks let queries leave out
-/// more samples: of a sliding ball of radius 8 it is 36 %, with bricks of 4 it would be 15 %.
+/// Voxels along the edge of a brick of the free-space map: a byte for eight voxels.
 inline constexpr std::int32_t kFreeBrick = 2;
+/// Steps of the map's distances in a voxel.
+inline constexpr std::int32_t kFreeSteps = 4;
+inline constexpr std::int32_t kFreeFarthest = 254;  ///< the longest distance, steps
 
 /// Where a volume has nothing that contact could feel (docs/theory.md 2.3). Each brick of voxels
-/// has the Chebyshev distance, in bricks, to the nearest one with density that contact counts
-/// (r >= 1/16): 0 if it has some itself, at most 255.
+/// has the Euclidean distance, in steps of 1/4 voxel rounded down, from its nearest point to the
+/// nearest one where a sample would read a voxel that contact counts (r >= 1/16); at most
+/// `kFreeFarthest`. A voxel is read less than one edge away from it on every axis.
 ///
 /// Made at load (controller/plan/tables/free_brick_map.hpp). Cutting only takes density away, so
 /// the map is a lower bound for ever and needs no update. Points into the maker's memory.
@@ -21,9 +24,9 @@ struct FreeBricks {
   VoxelGrid grid;                          ///< of bricks
   const std::uint8_t* distance = nullptr;  ///< none: nothing is known to be free
 
-  /// Distance of the brick that holds a voxel; a voxel outside of the volume counts as the nearest
-  /// one in it, whose distance is no larger. Always inlined: the code of an instruction set may not
-  /// end where other machines find it.
+  /// Distance of the brick that holds a voxel's cell; one outside of the volume counts as the
+  /// nearest one in it, whose distance is no larger. Always inlined: the code of an instruction set
+  /// may not end where other machines find it.
   [[nodiscard, gnu::always_inline]] inline std::int32_t at(std::int32_t x, std::int32_t y,
                                                            std::int32_t z) const noexcept {
     if (distance == nullptr) return 0;
@@ -35,12 +38,12 @@ struct FreeBricks {
   }
 };
 
-/// Distance that a brick needs so that no sample within `radius_vox` of a point in it, on each
-/// axis, reads a voxel of a brick with such density. A sample reads the voxel after its own too.
-[[nodiscard]] constexpr std::int32_t free_bricks_for(double radius_vox) noexcept {
-  std::int32_t bricks = 1;
-  while ((bricks - 1) * kFreeBrick < radius_vox + 1) ++bricks;
-  return bricks;
+/// Distance that the brick of a sphere's centre needs so that nothing in the sphere reads a voxel
+/// with such density. One more than any brick has where the sphere is too large for the map.
+[[nodiscard]] constexpr std::uint8_t free_steps_for(double radius_vox) noexcept {
+  if (radius_vox * kFreeSteps > kFreeFarthest) return kFreeFarthest + 1;
+  const auto steps = static_cast<std::uint8_t>(radius_vox * kFreeSteps);
+  return static_cast<std::uint8_t>(steps + (steps < radius_vox * kFreeSteps ? 1 : 0));
 }
 
 }  // namespace kerf

@@ -205,7 +205,7 @@ template <class N>
       middle[axis] =
           N::kIsFixed ? static_cast<std::int32_t>(at) >> 16 : static_cast<std::int32_t>(at);
     }
-    if (field.free.at(middle[0], middle[1], middle[2]) >= table.bricks[group]) continue;
+    if (field.free.at(middle[0], middle[1], middle[2]) >= table.needed[group]) continue;
     sums.read += kPointGroup;
     for (std::int32_t i = group * kPointGroup; i < (group + 1) * kPointGroup; ++i) {
       const PointNumber<N> place[3] = {centre[0] + places.offset_vox[0][i],

@@ -25,8 +25,10 @@ template <class N>
 struct PointTable {
   const PointNumber<N>* offset[3] = {};  ///< from the tool's centre, over its reach; Q0.15
   const PointNumber<N>* middle[3] = {};  ///< of each group, the same
-  const std::uint8_t* bricks = nullptr;  ///< `free_bricks_for` each group
-  std::int32_t count = 0;                ///< of samples
+  const std::uint8_t* needed = nullptr;  ///< `free_steps_for` each group
+  /// The same for all of the tool about its centre, and for one sample.
+  std::uint8_t needed_whole = kFreeFarthest + 1, needed_sample = kFreeFarthest + 1;
+  std::int32_t count = 0;  ///< of samples
   std::int32_t groups = 0;
   bool round = false;      ///< a ball: the offset is the normal
   PointNumber<N> reach{};  ///< no offset of a sample is longer; voxels, Q15.16

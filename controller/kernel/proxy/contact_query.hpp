@@ -8,6 +8,7 @@
 #include <span>
 
 #include "controller/kernel/kernel_set.hpp"
+#include "controller/kernel/point_shell/free_way.hpp"
 #include "controller/kernel/point_shell/point_sums.hpp"
 #include "controller/kernel/point_shell/point_table.hpp"
 #include "controller/kernel/proxy/ball_cap.hpp"
@@ -76,7 +77,11 @@ class ContactQuery {
   }
 
   /// Begins the budget of one tick. Before the first call nothing is counted.
-  void begin_tick() noexcept { left_ = work_.budget(); }
+  void begin_tick() noexcept {
+    left_ = work_.budget();
+    nearest_ = 0;
+    in_vain_ = 0;
+  }
   [[nodiscard]] const QueryWork& work() const noexcept { return work_; }
   /// See ContactField.
   [[nodiscard]] bool half_spent() const noexcept { return left_ <= work_.budget() / 2; }
@@ -111,33 +116,46 @@ class ContactQuery {
     });
   }
 
-  /// How far the centre may move from `q` in any direction and feel nothing: a lower bound.
-  [[nodiscard]] Real free_distance(ContactVec<Real> q) const noexcept {
-    // A sample reads one voxel further, and half a unit is for roundings.
-    const Real own = points_.reach + Real(1.5);
-    Real free(kContactLimit);
+  /// How far along `move` the centre may go from `q` and feel nothing: a lower bound. The tool goes
+  /// as one sphere about its centre, which is all of a ball, and then by the spheres of its groups.
+  /// One more query is left. What groups have looked at in vain is bounded by `QueryWork::in_vain`.
+  [[nodiscard]] Real free_distance(ContactVec<Real> q, ContactVec<Real> move) const noexcept {
+    return free_distance(q, move, left_ - work_.query - work_.closer);
+  }
+  /// The same by `work` at most.
+  [[nodiscard]] Real free_distance(ContactVec<Real> q, ContactVec<Real> move,
+                                   std::int64_t work) const noexcept {
+    const Real length = norm(move);
+    if (!(length > Real(SweepRules::kStep))) return Real(0);
+    const PointTable<N>& table = points_.table;
+    const bool as_one = table.round && table.needed_whole <= kFreeFarthest;
+    const std::int64_t spare = std::max<std::int64_t>(work, 0) / QueryWork::kFreeLook;
+    std::int64_t looks = spare;
+    MoveShare<N> share = kWholeMove<N>;
     for (const ContactVolume<N>& volume : volumes_) {
-      const VoxelVec<Real> at = place_of(volume, q);
-      const std::int32_t x = whole(at.x), y = whole(at.y), z = whole(at.z);
-      const VoxelGrid& grid = volume.field.grid;
-      const auto beyond = [](std::int32_t i, std::int32_t n) { return std::max(-i, i - n + 1); };
-      const std::int32_t outside =
-          std::max({beyond(x, grid.nx), beyond(y, grid.ny), beyond(z, grid.nz)});
-      const std::int32_t bricks = volume.field.free.at(x, y, z);
+      const VoxelVec<Real> at = place_of(volume, q), by = volume.frame.voxel_from_contact * move;
       // No edge of a voxel is shorter than a unit.
-      free = std::min(free, Real(std::max(outside, (bricks - 1) * kFreeBrick)) - own);
+      const FreeWay<N> way(volume.field.free, {number_of(by.x), number_of(by.y), number_of(by.z)},
+                           number_of(length));
+      const PointNumber<N> centre[3] = {number_of(at.x), number_of(at.y), number_of(at.z)};
+      const MoveShare<N> most = share;
+      share = way.free_up_to(centre, table.needed_whole, 0, most, looks);
+      if (as_one || in_vain_ >= work_.in_vain()) continue;
+      share = free_share_of_groups(table, volume.places, centre, way, share, most, nearest_, looks);
     }
-    return std::max(free, Real(0));
+    Real free{};
+    if constexpr (N::kIsFixed) {
+      free = Real::from_raw(static_cast<std::int32_t>(length.raw() * share >> 30));
+    } else {
+      free = length * share;
+    }
+    const std::int64_t looked = QueryWork::kFreeLook * (spare - looks);
+    left_ -= looked;
+    if (free <= Real(SweepRules::kStep)) in_vain_ += looked;
+    return free;
   }
 
  private:
-  [[nodiscard]] static std::int32_t whole(Real x) noexcept {
-    if constexpr (N::kIsFixed) {
-      return x.raw() >> Real::kFractionBits;
-    } else {
-      return static_cast<std::int32_t>(x < Real(0) ? x - Real(1) : x);
-    }
-  }
   [[nodiscard]] static PointNumber<N> number_of(Real x) noexcept {
     if constexpr (N::kIsFixed) {
       return x.raw();
@@ -369,6 +387,8 @@ class ContactQuery {
   TurnRows<N> rows_{};
   mutable std::int64_t left_ = std::numeric_limits<std::int64_t>::max();  ///< of the tick's samples
   mutable bool turned_ = false;                                           ///< and not queried since
+  mutable std::int32_t nearest_ = 0;  ///< group that stopped the last free way
+  mutable std::int64_t in_vain_ = 0;  ///< work of the tick for free ways that led nowhere
 };
 
 }  // namespace kerf

@@ -14,8 +14,9 @@ namespace kerf {
 /// What the sweep asks of tool and volumes.
 ///
 ///   query(q)          what the tool feels with its centre at q
-///   free_distance(q)  how far the centre may go from q in any direction and feel nothing; a lower
-///                     bound, 0 if unknown
+///   free_distance(q, move)  how far the centre may go from q along a move and feel nothing; at
+///   most
+///                     the move's length, a lower bound, 0 if unknown
 ///   turn(t)           sets the orientation of the tool for all queries from now on
 ///   is_solid(q)       the place is in the solid
 ///   half_spent()      half of the tick's work is spent: the rest is the move's
@@ -23,7 +24,7 @@ namespace kerf {
 template <class F, class N>
 concept ContactField = requires(F field, ContactVec<typename N::Real> q, ToolTurn<N> turn) {
   { field.query(q) } -> std::convertible_to<Contacts<N>>;
-  { field.free_distance(q) } -> std::convertible_to<typename N::Real>;
+  { field.free_distance(q, q) } -> std::convertible_to<typename N::Real>;
   field.turn(turn);
   { field.is_solid(q) } -> std::convertible_to<bool>;
   { field.half_spent() } -> std::convertible_to<bool>;
@@ -270,7 +271,7 @@ class ProxySweep {
     while (may_look() && !here_.buried && onward.length >= enough) {
       const Place from = pose_.centre;
       auto step = Real(SweepRules::kStep);
-      if (here_.count == 0) step = std::max(step, field_.free_distance(from));
+      if (here_.count == 0) step = std::max(step, field_.free_distance(from, onward.displacement));
       const Unit capped = step < onward.length ? share<N>(step, onward.length) : Unit(1);
       const Place moved = part_of<N>(onward.displacement, shrink * capped);
       const Trial trial = attempt(Trying::move, from + moved, held_by_, moved);

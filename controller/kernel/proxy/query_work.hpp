@@ -22,6 +22,9 @@ struct QueryWork {
   static constexpr std::int64_t kLookSamples = 128;  ///< what a look costs besides those it reads
   static constexpr std::int64_t kCloseSamples = 2;   ///< what one of a closeup costs
 
+  /// What a look for a free way costs: each waits for what the last one found.
+  static constexpr std::int64_t kFreeLook = 12;
+
   std::int64_t query = 0;   ///< one query at most: all samples in every volume
   std::int64_t closer = 0;  ///< its closer looks at most
   std::int64_t turn = 0;    ///< to place all samples anew
@@ -37,6 +40,8 @@ struct QueryWork {
   [[nodiscard]] constexpr std::int64_t budget() const noexcept {
     return std::max(kTickSamples, kLeastQueries * (query + turn));
   }
+  /// Once so much of it went into free ways that led nowhere, no group looks for one.
+  [[nodiscard]] constexpr std::int64_t in_vain() const noexcept { return budget() / 8; }
   /// No tick of a sweep reads more: the budget, and one query after the turns, whose last ones may
   /// reach into the move's half. A tool of few samples runs out of queries before.
   [[nodiscard]] constexpr std::int64_t most() const noexcept {

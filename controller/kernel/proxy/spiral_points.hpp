@@ -19,7 +19,7 @@ struct SpiralArrays {
 
   std::array<std::array<PointNumber<N>, kCount>, 3> offset{};
   std::array<PointNumber<N>, kGroups> middle{};
-  std::array<std::uint8_t, kGroups> bricks{};
+  std::array<std::uint8_t, kGroups> needed{};
   double reach{};
 
   struct Place {
@@ -43,7 +43,7 @@ struct SpiralArrays {
       sine = sine * kCosine + cosine * kSine;
       cosine = turned;
     }
-    bricks.fill(static_cast<std::uint8_t>(free_bricks_for(reach)));
+    needed.fill(free_steps_for(reach));
   }
 
   /// No voxel's edge is shorter than a unit, so `reach` holds in voxels.
@@ -53,7 +53,7 @@ struct SpiralArrays {
       table.offset[axis] = offset[axis].data();
       table.middle[axis] = middle.data();
     }
-    table.bricks = bricks.data();
+    table.needed = needed.data();
     table.count = static_cast<std::int32_t>(kCount);
     table.groups = static_cast<std::int32_t>(kGroups);
     table.reach = static_cast<PointNumber<N>>(reach * (N::kIsFixed ? 65536 : 1));

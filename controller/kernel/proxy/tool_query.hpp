@@ -124,11 +124,15 @@ class ToolQuery {
 
   [[nodiscard]] bool is_solid(ContactVec<Real> q) const noexcept { return head_.is_solid(q); }
 
-  [[nodiscard]] Real free_distance(ContactVec<Real> q) const noexcept {
-    Real free = std::min(head_.free_distance(q), shaft_.query.free_distance(q + shaft_.from_head));
-    if (handpiece_) {
-      free = std::min(free, handpiece_->query.free_distance(q + handpiece_->from_head));
-    }
+  [[nodiscard]] Real free_distance(ContactVec<Real> q, ContactVec<Real> move) const noexcept {
+    Real free = norm(move);
+    const auto look = [&](const ContactQuery<N>& part, ContactVec<Real> at) {
+      const std::int64_t work = work_.budget() - spent() - work_.query - work_.closer;
+      free = std::min(free, part.free_distance(at, move, work));
+    };
+    look(head_, q);
+    look(shaft_.query, q + shaft_.from_head);
+    if (handpiece_) look(handpiece_->query, q + handpiece_->from_head);
     return free;
   }
 

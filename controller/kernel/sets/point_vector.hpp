@@ -235,7 +235,7 @@ template <bool kRound, bool kInside>
   for (; group < end; ++group) {
     if (field.free.at((centre[0] + places.middle[0][group]) >> 16,
                       (centre[1] + places.middle[1][group]) >> 16,
-                      (centre[2] + places.middle[2][group]) >> 16) >= table.bricks[group]) {
+                      (centre[2] + places.middle[2][group]) >> 16) >= table.needed[group]) {
       continue;
     }
     sums.read += kPointGroup;

@@ -13,8 +13,8 @@ namespace kerf {
 /// Owner of a volume's FreeBricks. Load time; moving it keeps the map valid.
 class FreeBrickMap {
  public:
-  /// A brick counts as free when no density in it reaches `faintest`, below which contact feels
-  /// nothing.
+  /// A voxel counts when its density reaches `faintest`, below which contact feels nothing. While
+  /// the map is made it takes half a byte more for each voxel.
   FreeBrickMap(const VoxelGrid& grid, std::span<const Density> density, Density faintest);
 
   [[nodiscard]] FreeBricks bricks() const noexcept { return {grid_, distance_.data()}; }

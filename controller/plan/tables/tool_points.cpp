@@ -85,7 +85,7 @@ ToolPoints<N>::ToolPoints(std::span<const Point> samples_units, bool round,
     double radius = 0;
     for (const Point& p : group) radius = std::max(radius, distance(p, middle));
     add(middle_, middle);
-    bricks_.push_back(static_cast<std::uint8_t>(free_bricks_for(radius + rounding())));
+    needed_.push_back(free_steps_for(radius + rounding()));
   }
 }
 
@@ -96,9 +96,11 @@ PointShell<N> ToolPoints<N>::point_shell() const noexcept {
     point_shell.table.offset[axis] = offset_[axis].data();
     point_shell.table.middle[axis] = middle_[axis].data();
   }
-  point_shell.table.bricks = bricks_.data();
+  point_shell.table.needed = needed_.data();
+  point_shell.table.needed_whole = free_steps_for(reach_ + rounding());
+  point_shell.table.needed_sample = free_steps_for(rounding());
   point_shell.table.count = static_cast<std::int32_t>(count_);
-  point_shell.table.groups = static_cast<std::int32_t>(bricks_.size());
+  point_shell.table.groups = static_cast<std::int32_t>(needed_.size());
   point_shell.table.round = round_;
   point_shell.close = close_.table();
   point_shell.reach = typename N::Real(reach_);
@@ -113,7 +115,7 @@ PointShell<N> ToolPoints<N>::point_shell() const noexcept {
 
 template <class N>
 std::size_t ToolPoints<N>::bytes() const noexcept {
-  return 3 * (offset_[0].size() + middle_[0].size()) * sizeof(PointNumber<N>) + bricks_.size() +
+  return 3 * (offset_[0].size() + middle_[0].size()) * sizeof(PointNumber<N>) + needed_.size() +
          close_.bytes();
 }
 

@@ -32,7 +32,7 @@ class ToolPoints {
   [[nodiscard]] double rounding() const noexcept { return 4 * reach_ / 32768 + 0.001; }
 
   std::array<std::vector<PointNumber<N>>, 3> offset_, middle_;
-  std::vector<std::uint8_t> bricks_;
+  std::vector<std::uint8_t> needed_;
   std::size_t count_;
   double reach_;
   bool round_;

@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <numbers>
+
+#include "controller/kernel/point_shell/free_bricks.hpp"
+#include "controller/kernel/proxy/tool_query.hpp"
+#include "controller/load/loaded_scene.hpp"
+#include "controller/plan/plan_contact.hpp"
+#include "controller/servo/contact_plan.hpp"
+
+namespace kerf {
+
+// Up to which speed a scene is free of drag in air (docs/theory.md 4.2): at any distance from a
+// flat wall, as long as no sample of the tool reads density that contact counts. In a cavity hardly
+// wider than the tool more samples are near matter, and it may be less.
+
+/// No hand turns a tool faster: five turns a second.
+inline constexpr double kFastestTurnRadPerS = 30;
+
+/// Samples that a query reads at most beside a flat wall, the wall in the worst direction. A group
+/// is left out once its middle is farther above all matter than what it needs, by what the map may
+/// not know: the diagonal of a brick, that of the cells in which a voxel is read, and a step.
+template <class N>
+[[nodiscard]] std::int64_t most_read_beside_wall(const PointTable<N>& table) {
+  constexpr double kUnknown = (kFreeBrick + 1) * std::numbers::sqrt3 + 1.0 / kFreeSteps;
+  constexpr int kDirections = 128;
+  const double scale = double(table.reach) / (N::kIsFixed ? 65536.0 * 32768.0 : 1.0);
+  std::int64_t most = 0;
+  for (int k = 0; k < kDirections; ++k) {  // evenly, along a spiral of the golden angle
+    const double y = (2 * k + 1.0) / kDirections - 1, turn = k * std::numbers::pi * 2.2360679775;
+    const double across = std::sqrt(1 - y * y);
+    const double up[3] = {across * std::cos(turn), y, across * std::sin(turn)};
+    const auto height = [&](const PointNumber<N>* const(&offset)[3], std::int32_t i) {
+      double sum = 0;
+      for (std::size_t axis = 0; axis < 3; ++axis) sum += up[axis] * double(offset[axis][i]);
+      return scale * sum;
+    };
+    double lowest = 0;
+    for (std::int32_t i = 0; i < table.count; ++i) {
+      lowest = std::min(lowest, height(table.offset, i));
+    }
+    std::int64_t read = 0;
+    for (std::int32_t group = 0; group < table.groups; ++group) {
+      const double needed = double(table.needed[group]) / kFreeSteps + kUnknown;
+      read += height(table.middle, group) - lowest < needed ? kPointGroup : 0;
+    }
+    most = std::max(most, read);
+  }
+  return most;
+}
+
+/// How far a tool surely moves in one tick there while it turns by so much, units: a step for each
+/// query that turning leaves to the move. Each reads what is near the wall, and three looks tell
+/// that no way is free. Groups may have looked in vain before, once with two looks each beyond the
+/// bound. Of a tool with a shaft each part counts as if it were nearest.
+template <class N>
+[[nodiscard]] double least_air_move(const SweptTool<N>& tool, std::size_t volumes,
+                                    double turn_rad) {
+  const QueryWork work = query_work(tool.point_shell, tool.behind, volumes);
+  const auto times = static_cast<std::int64_t>(volumes);
+  std::int64_t query = 0, in_vain = 0;
+  const auto add = [&](const PointTable<N>& table) {
+    query +=
+        times * (QueryWork::kLookSamples + 3 * QueryWork::kFreeLook) + most_read_beside_wall(table);
+    if (table.round && table.needed_whole <= kFreeFarthest) return;  // as one sphere
+    in_vain +=
+        query_work(table, volumes).in_vain() + times * 2 * QueryWork::kFreeLook * table.groups;
+  };
+  add(tool.point_shell.table);
+  for (std::size_t i = 0; i < tool.behind.count; ++i) {
+    add(tool.behind.part[i].point_shell.table);
+  }
+  const double step_rad = 2 * double(tool.proxy.turn_step);
+  const std::int64_t turns =
+      step_rad > 0 ? std::clamp<std::int64_t>(std::int64_t(std::ceil(turn_rad / step_rad)), 1,
+                                              SweepRules::kMaxTurnQueries)
+                   : 1;
+  const std::int64_t left =
+      work.budget() - in_vain -
+      std::min((turns + 1) * (query + work.turn), work.budget() / 2 + 2 * (query + work.turn));
+  const std::int64_t last = work.query + work.closer;  // no query begins with less
+  const std::int64_t queries = left < last ? 0 : (left - last) / query + 1;
+  return SweepRules::kStep * double(std::min(SweepRules::kMaxQueries - turns, queries)) -
+         SweepRules::kArrived;
+}
+
+/// The speed of the hand up to which this tool is free of drag, mm/s.
+template <class N>
+[[nodiscard]] double air_speed_mm_per_s(const LoadedScene& scene, const SweptTool<N>& tool,
+                                        std::size_t volumes) {
+  const double units = least_air_move(tool, volumes, kFastestTurnRadPerS / scene.servo.rate_hz);
+  return units * contact_unit_mm(scene) * scene.servo.rate_hz / scene.device.workspace_scale;
+}
+
+}  // namespace kerf

@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: Apache-2.0
+// A hand in free air feels nothing: docs/theory.md 2.3, 4.2.
+#include <algorithm>
+#include <string>
+#include <vector>
+
+#include <doctest/doctest.h>
+
+#include "controller/plan/air_speed.hpp"
+#include "lab/rig/air_flight.hpp"
+
+using namespace kerf;
+using namespace kerf::extremes;
+
+namespace {
+
+std::vector<AirWall> tilted_walls() {
+  Dice dice(17);
+  std::vector<AirWall> walls;
+  for (int i = 0; i < 3; ++i) walls.emplace_back(dice);
+  return walls;
+}
+
+const SceneTool kTools[] = {tool_of_units("ball", 8, 16),     tool_of_units("ball", 20, 40),
+                            tool_of_units("cylinder", 5, 16), tool_of_units("cylinder", 12, 60),
+                            tool_of_units("cone", 12, 36),    tool_of_units("wheel", 16, 8)};
+
+template <class N>
+Flown flown_at(const SampledTool& tool, const std::vector<AirWall>& walls, const AirFlight& flight,
+               int ticks) {
+  Flown flown;
+  Dice dice(5);
+  for (const AirWall& wall : walls) fly<N>(tool, wall, flight, ticks, dice, flown);
+  return flown;
+}
+
+/// In double a sum of steps misses its end by a rounding.
+constexpr double kNothing = 1e-9;
+
+}  // namespace
+
+TEST_CASE_TEMPLATE("no tool is dragged in the air beside a tilted wall, however fast", N,
+                   FixedNumbers, DoubleNumbers) {
+  struct Case {
+    double rate_hz, voxel_mm, m_per_s, gap_mm, turn_rad_per_s;
+  };
+  const auto walls = tilted_walls();
+  for (const Case& c : {Case{250, 0.05, 0.5, 0.5, 0},
+                        {250, 0.05, 1, 0.5, 30},
+                        {250, 0.02, 0.4, 0.24, 0},
+                        {1000, 0.02, 1, 0.22, 0},
+                        {1000, 0.02, 3, 0.24, 30},
+                        {8000, 0.02, 1, 0.03, 30},
+                        {250, 0.1, 0.35, 0.14, 0},
+                        {250, 0.1, 2, 1.1, 30},
+                        {1000, 0.1, 1, 0.14, 30},
+                        {8000, 0.1, 10, 0.14, 0}}) {
+    for (const SceneTool& made : kTools) {
+      const SampledTool tool(made);
+      const AirFlight flight{1000 * c.m_per_s / c.rate_hz / c.voxel_mm, c.gap_mm / c.voxel_mm,
+                             c.turn_rad_per_s / c.rate_hz};
+      const Flown flown = flown_at<N>(tool, walls, flight, 50);
+      CAPTURE(c.rate_hz);
+      CAPTURE(c.voxel_mm);
+      CAPTURE(c.m_per_s);
+      CAPTURE(made.name);
+      CAPTURE(made.radius_mm);
+      CHECK(flown.longest_spring < kNothing);
+      CHECK(flown.ticks == 150);
+    }
+  }
+}
+
+TEST_CASE_TEMPLATE("the speed that a scene is told to be free of drag up to is so, and hardly shy",
+                   N, FixedNumbers, DoubleNumbers) {
+  const auto walls = tilted_walls();
+  for (const SceneTool& made : kTools) {
+    const SampledTool tool(made);
+    const ToolPoints<N> points(tool.samples, tool.round, tool.close);
+    SweptTool<N> swept{points.point_shell(), {}};
+    if (!tool.round) {
+      swept.proxy.turn_step = typename N::Unit(turn_step_of(double(swept.point_shell.reach)));
+    }
+    CAPTURE(made.name);
+    CAPTURE(made.radius_mm);
+    for (const double turn_rad : {0.0, 0.03, 0.12}) {
+      const double units = least_air_move(swept, 1, turn_rad);
+      // From where nothing is felt any more to where all is proven free.
+      for (const double gap : {1.3, 2.5, 4.0, 5.5, 7.0, 8.5, 10.0, 12.0}) {
+        CAPTURE(gap);
+        CHECK(flown_at<N>(tool, walls, {units, gap, turn_rad}, 25).longest_spring < kNothing);
+      }
+      if (turn_rad > 0) continue;
+      double bold = 1.1;
+      while (flown_at<N>(tool, walls, {bold * units, 1.3, 0}, 12).longest_spring < kNothing) {
+        bold += 0.1;
+        REQUIRE(bold < 2);
+      }
+      MESSAGE(std::string(N::kName)
+              << ", " << made.name << " of " << made.radius_mm << ": told " << units
+              << " units a tick, dragged from " << bold << " times that");
+    }
+  }
+}
