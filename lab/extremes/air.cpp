@@ -28,9 +28,9 @@ void measure_air(const Effort& effort, const RowSink& add_row) {
                            {1000, 0.1, 1, 0.14},
                            {8000, 0.02, 1, 0.03}}) {
     for (const Subject& tool :
-         {Subject{"ball", "ball", 0.5, 1, 0}, Subject{"cylinder", "cylinder", 0.5, 2, 0},
-          Subject{"turning cylinder", "cylinder", 0.5, 2, 30},
-          Subject{"cone", "cone", 0.5, 2, 0}}) {
+         {Subject{"ball", "ball", 0.4, 0.8, 0}, Subject{"cylinder", "cylinder", 0.4, 0.8, 0},
+          Subject{"turning cylinder", "cylinder", 0.4, 0.8, 30},
+          Subject{"cone", "cone", 0.4, 0.8, 0}}) {
       const double length = tool.length_mm / at.voxel_mm;
       const SampledTool made(make_tool(tool.name, tool.shape,
                                        {.pitch_mm = std::max(1.0, length / 40),

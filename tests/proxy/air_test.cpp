@@ -90,11 +90,11 @@ TEST_CASE_TEMPLATE("the speed that a scene is told to be free of drag up to is s
         CAPTURE(gap);
         CHECK(flown_at<N>(tool, walls, {units, gap, turn_rad}, 25).longest_spring < kNothing);
       }
-      if (turn_rad > 0) continue;
+      if (turn_rad > 0 || !tool.round) continue;  // others are told for their worst pose
       double bold = 1.1;
       while (flown_at<N>(tool, walls, {bold * units, 1.3, 0}, 12).longest_spring < kNothing) {
         bold += 0.1;
-        REQUIRE(bold < 2);
+        REQUIRE(bold < 1.5);
       }
       MESSAGE(std::string(N::kName)
               << ", " << made.name << " of " << made.radius_mm << ": told " << units

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <algorithm>
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <type_traits>
@@ -89,7 +88,8 @@ class FreeWay {
     if constexpr (N::kIsFixed) {
       return static_cast<std::int32_t>(place >> 16);
     } else {
-      return static_cast<std::int32_t>(std::floor(place));
+      const auto voxel = static_cast<std::int32_t>(place);
+      return Wide(voxel) > place ? voxel - 1 : voxel;
     }
   }
 
@@ -117,7 +117,8 @@ class FreeWay {
         share = ((move_[axis] < 0 ? in : kEdge - in) + kPast) * inverse_[axis] >> 16;
       } else {
         constexpr S kEdge = kFreeBrick, kPast(0x1p-14);
-        const S in = place[axis] - kEdge * std::floor(place[axis] / kEdge);
+        const std::int32_t voxel = voxel_of(place[axis]);
+        const S in = place[axis] - S(voxel - (voxel & (kFreeBrick - 1)));
         share = ((move_[axis] < 0 ? in : kEdge - in) + kPast) * inverse_[axis];
       }
       soonest = std::min(soonest, share);
