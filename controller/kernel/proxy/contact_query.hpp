@@ -17,6 +17,7 @@
 #include "controller/kernel/proxy/contact_peak.hpp"
 #include "controller/kernel/proxy/normal_patch.hpp"
 #include "controller/kernel/proxy/query_work.hpp"
+#include "controller/kernel/proxy/ramp_middle.hpp"
 #include "controller/kernel/proxy/spiral_points.hpp"
 #include "controller/kernel/proxy/tool_turn.hpp"
 
@@ -98,11 +99,10 @@ class ContactQuery {
 
   /// Whether a volume's density at `q` reaches its iso.
   [[nodiscard]] bool is_solid(ContactVec<Real> q) const noexcept {
-    constexpr auto kIso = N::kIsFixed ? PointNumber<N>(1 << 14) : PointNumber<N>(0.5);
     return std::any_of(volumes_.begin(), volumes_.end(), [&](const ContactVolume<N>& volume) {
       const VoxelVec<Real> at = place_of(volume, q);
       return point_sample<N>(volume.field, {number_of(at.x), number_of(at.y), number_of(at.z)})
-                 .density >= kIso;
+                 .density >= kIsoDensity;
     });
   }
 
@@ -126,6 +126,8 @@ class ContactQuery {
   }
 
  private:
+  static constexpr auto kIsoDensity = N::kIsFixed ? PointNumber<N>(1 << 14) : PointNumber<N>(0.5);
+
   [[nodiscard]] static std::int32_t whole(Real x) noexcept {
     if constexpr (N::kIsFixed) {
       return x.raw() >> Real::kFractionBits;
@@ -191,21 +193,13 @@ class ContactQuery {
 
     const PointSums<N> sums = sums_at(volume.field, points_.table, volume.places, at);
     if (sums.weight <= typename N::Sum(0)) return;
-    const bool round = points_.table.round;
-    const auto means = point_means<N>(sums, volume.field.scale, volume.frame, rows_, round);
-    ConstraintPlane<N> plane = plane_of<N>(means, points_.reach, round);
-    if (closer) {
-      if (round && plane.depth < Real(kCapBelow) && -plane.depth < Real(kCapAbove)) {
-        plane.depth = depth_around(volume, at, sums, means, plane);
-      } else if (!round && std::max(plane.depth, -plane.depth) < Real(kCloseDepth)) {
-        look_again(volume, at, sums, means, plane);
-      }
-    }
+    ConstraintPlane<N> plane = plane_at(volume, at, sums, closer);
+    if (closer) look_midway(volume, q, plane);
     // Nearly all samples are in the solid, or the tool feels the same all round. What is softer
     // than the iso bears nothing.
     const ContactVec<typename N::Unit> none{};
     const bool immersed = sums.solid >= points_.table.count - points_.table.count / 16;
-    if (!immersed && plane.normal == none && means.top < typename N::Ratio(0.5)) return;
+    if (!immersed && plane.normal == none && sums.top < kIsoDensity) return;
     if (immersed || plane.normal == none) {
       felt.buried = true;
       felt.depth = std::max(felt.depth, plane.depth);
@@ -221,6 +215,57 @@ class ContactQuery {
       felt.plane[slot] = felt.plane[slot - 1];
     }
     felt.plane[slot] = plane;
+  }
+
+  /// The plane of these sums, after a closer look where it is near rest.
+  [[nodiscard]] ConstraintPlane<N> plane_at(const ContactVolume<N>& volume, VoxelVec<Real> at,
+                                            const PointSums<N>& sums, bool closer) const noexcept {
+    const bool round = points_.table.round;
+    const auto means = point_means<N>(sums, volume.field.scale, volume.frame, rows_, round);
+    ConstraintPlane<N> plane = plane_of<N>(means, points_.reach, round);
+    if (!closer) return plane;
+    if (round && plane.depth < Real(kCapBelow) && -plane.depth < Real(kCapAbove)) {
+      plane.depth = depth_around(volume, at, sums, means, plane);
+    } else if (!round && std::max(plane.depth, -plane.depth) < Real(kCloseDepth)) {
+      look_again(volume, at, sums, means, plane);
+    }
+    return plane;
+  }
+
+  /// Normal and place of a contact whose iso is near an end of its face's ramp, from the ramp's
+  /// middle (ramp_middle.hpp). The depth stays that of the iso.
+  void look_midway(const ContactVolume<N>& volume, ContactVec<Real> q,
+                   ConstraintPlane<N>& plane) const noexcept {
+    using Unit = typename N::Unit;
+    if (is_midway(volume.field.scale) || plane.normal == ContactVec<Unit>{} || !may_query()) return;
+    const auto arm = points_.table.round ? times<N>(-plane.normal, points_.reach) : plane.arm;
+    const auto middle = ramp_middle<N>(
+        [&](Real below) { return density_at(volume, q + arm - times<N>(plane.normal, below)); });
+    if (middle.level == 0) return;
+    ContactVolume<N> seen = volume;
+    seen.field.scale = density_scale(middle.level);
+    const VoxelVec<Real> at = place_of(volume, q - times<N>(plane.normal, middle.below));
+    const PointSums<N> sums = sums_at(seen.field, points_.table, volume.places, at);
+    if (sums.weight <= typename N::Sum(0)) return;
+    const ConstraintPlane<N> found = plane_at(seen, at, sums, true);
+    if (dot(found.normal, plane.normal) <= Unit(0)) return;
+    plane.normal = found.normal;
+    plane.arm = found.arm;
+  }
+
+  /// A volume's own density at a place, 0 to 1.
+  [[nodiscard]] static Real density_at(const ContactVolume<N>& volume,
+                                       ContactVec<Real> place) noexcept {
+    DensityField plain = volume.field;
+    plain.scale = {};
+    const VoxelVec<Real> at = place_of(volume, place);
+    const auto density =
+        point_sample<N>(plain, {number_of(at.x), number_of(at.y), number_of(at.z)}).density;
+    if constexpr (N::kIsFixed) {
+      return Real::from_raw(density * 2);
+    } else {
+      return density;
+    }
   }
 
   /// Corrects the plane of a tool that is no ball: by the close samples around the peak, then by a
