@@ -130,10 +130,6 @@ template <class N>
   return rest > Ratio(0.001) ? std::min(product * (spread - Ratio(1)) / rest, Ratio(2)) : Ratio(2);
 }
 
-/// A summit of another shape lies at most so far beyond its highest sample, units (docs/theory.md
-/// 3.2). Times the gradient it is density: none in a plateau, which so bears nothing below the iso.
-inline constexpr double kUnsampled = 0.06;
-
 /// Height of the peak of density over the tool's surface, from its power sums (docs/theory.md 3.2).
 /// e is half the number of dimensions over which r falls: 1 for a ball; of another shape the mean
 /// of r^2 tells it.
@@ -150,8 +146,9 @@ template <class N>
   // A lone spike has few samples and hardly moves the mean: it may not stand far above it unseen.
   constexpr auto kSpike = static_cast<Ratio>(0.2);
   const Ratio height = std::max(factor * means.density, means.top - kSpike);
-  if (round) return height;
-  return std::min(height, means.top + static_cast<Ratio>(kUnsampled) * norm(means.gradient));
+  // Samples lie on the tool's edges and points: no summit is far above the highest sample.
+  constexpr auto kUnsampled = static_cast<Ratio>(0.03);
+  return round ? height : std::min(height, means.top + kUnsampled);
 }
 
 /// Limits of the slope in a depth (docs/theory.md 3.3), density per unit: flatter is noise, and no

@@ -194,6 +194,10 @@ class ContactQuery {
     const PointSums<N> sums = sums_at(volume.field, points_.table, volume.places, at);
     if (sums.weight <= typename N::Sum(0)) return;
     ConstraintPlane<N> plane = plane_at(volume, at, sums, closer);
+    if (plane.depth > Real(0) && sums.top < kIsoDensity &&
+        !iso_is_near(volume, at, sums.top_sample)) {
+      return;
+    }
     if (closer) look_midway(volume, q, plane);
     // Nearly all samples are in the solid, or the tool feels the same all round. What is softer
     // than the iso bears nothing.
@@ -237,20 +241,53 @@ class ContactQuery {
   void look_midway(const ContactVolume<N>& volume, ContactVec<Real> q,
                    ConstraintPlane<N>& plane) const noexcept {
     using Unit = typename N::Unit;
-    if (is_midway(volume.field.scale) || plane.normal == ContactVec<Unit>{} || !may_query()) return;
-    const auto arm = points_.table.round ? times<N>(-plane.normal, points_.reach) : plane.arm;
-    const auto middle = ramp_middle<N>(
-        [&](Real below) { return density_at(volume, q + arm - times<N>(plane.normal, below)); });
-    if (middle.level == 0) return;
+    if (is_midway(volume.field.scale)) return;
     ContactVolume<N> seen = volume;
-    seen.field.scale = density_scale(middle.level);
-    const VoxelVec<Real> at = place_of(volume, q - times<N>(plane.normal, middle.below));
-    const PointSums<N> sums = sums_at(seen.field, points_.table, volume.places, at);
-    if (sums.weight <= typename N::Sum(0)) return;
-    const ConstraintPlane<N> found = plane_at(seen, at, sums, true);
-    if (dot(found.normal, plane.normal) <= Unit(0)) return;
-    plane.normal = found.normal;
-    plane.arm = found.arm;
+    for (int look = 0; look < kMidwayLooks; ++look) {
+      if (plane.normal == ContactVec<Unit>{} || !may_query()) return;
+      const auto arm = points_.table.round ? times<N>(-plane.normal, points_.reach) : plane.arm;
+      const auto middle = ramp_middle<N>(
+          [&](Real below) { return density_at(volume, q + arm - times<N>(plane.normal, below)); });
+      if (middle.level == 0) return;
+      seen.field.scale = density_scale(middle.level);
+      const VoxelVec<Real> at = place_of(volume, q - times<N>(plane.normal, middle.below));
+      const PointSums<N> sums = sums_at(seen.field, points_.table, volume.places, at);
+      if (sums.weight <= typename N::Sum(0)) return;
+      const ConstraintPlane<N> found = plane_at(seen, at, sums, true);
+      const Unit alike = dot(found.normal, plane.normal);
+      if (alike <= Unit(0)) return;
+      plane.normal = found.normal;
+      plane.arm = found.arm;
+      if (alike > Unit(kMidwayAlike)) return;
+    }
+  }
+
+  /// Whether a voxel near a sample reaches the iso: where none does, no summit between the samples
+  /// does (docs/theory.md 3.2).
+  [[nodiscard]] bool iso_is_near(const ContactVolume<N>& volume, VoxelVec<Real> at,
+                                 std::int32_t sample) const noexcept {
+    constexpr std::int32_t kNear = 3;  // voxels: the reach of a closeup, and its cell
+    left_ -= kNear * kNear * kNear;    // a sample has eight voxels
+    const VoxelGrid& grid = volume.field.grid;
+    const PointNumber<N> centre[3] = {number_of(at.x), number_of(at.y), number_of(at.z)};
+    const std::int32_t end[3] = {grid.nx, grid.ny, grid.nz};
+    std::int32_t from[3] = {}, to[3] = {};
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const PointNumber<N> place = centre[axis] + volume.places.offset_vox[axis][sample];
+      const auto low = static_cast<std::int32_t>(N::kIsFixed ? place / 65536 : place);
+      from[axis] = std::max(low - kNear + 1, 0);
+      to[axis] = std::min(low + kNear + 1, end[axis]);
+    }
+    const DensityScale& scale = volume.field.scale;
+    for (std::int32_t z = from[2]; z < to[2]; ++z) {
+      for (std::int32_t y = from[1]; y < to[1]; ++y) {
+        for (std::int32_t x = from[0]; x < to[0]; ++x) {
+          const std::uint64_t density = volume.field.density[grid.index(x, y, z)];
+          if ((density * scale.mantissa >> scale.shift) >= 32768) return true;
+        }
+      }
+    }
+    return false;
   }
 
   /// A volume's own density at a place, 0 to 1.

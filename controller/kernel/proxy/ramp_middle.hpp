@@ -24,6 +24,9 @@ inline constexpr double kMidwayFrom = 0.42, kMidwayTo = 0.6;
 /// and reads raise a surface of low iso by up to 0.6 more.
 inline constexpr double kMidwayFarthest = 1.6;
 
+inline constexpr int kMidwayLooks = 2;          ///< the second along the normal of the first,
+inline constexpr double kMidwayAlike = 0.9998;  ///< if it is turned by more than a degree; cosine
+
 [[nodiscard]] constexpr bool is_midway(const DensityScale& scale) noexcept {
   const double full_over_two_iso = scale_factor<double>(scale);
   return 2 * kMidwayFrom * full_over_two_iso < 1 && 2 * kMidwayTo * full_over_two_iso > 1;
