@@ -33,12 +33,14 @@ template <void (*kMeasure)(const Effort&, const RowSink&)>
 void rows_only(const Effort& effort, const RowSink& add_row, Findings&) {
   kMeasure(effort, add_row);
 }
-constexpr std::array<Group, 10> kGroups{{
+constexpr std::array<Group, 12> kGroups{{
     {"walls", rows_only<measure_walls>},
     {"air", rows_only<measure_air>},
     {"rests", rows_only<measure_rests>},
     {"slides", rows_only<measure_slides>},
     {"shapes", rows_only<measure_shapes>},
+    {"edges", rows_only<measure_edge_slides>},
+    {"isos", rows_only<measure_isos>},
     {"cutting", rows_only<measure_cutting>},
     {"traps", rows_only<measure_traps>},
     {"ticks", rows_only<measure_ticks>},

@@ -55,6 +55,10 @@ void measure_air(const Effort& effort, const RowSink& add_row);
 void measure_rests(const Effort& effort, const RowSink& add_row);
 /// F8: what a sliding ball feels, on edges over two voxels and on those of a noisy CT.
 void measure_slides(const Effort& effort, const RowSink& add_row);
+/// Slides along and over a sharp edge, 0.05 units a tick.
+void measure_edge_slides(const Effort& effort, const RowSink& add_row);
+/// The contact's normal where the iso is not half of full density.
+void measure_isos(const Effort& effort, const RowSink& add_row);
 /// Tools that are no balls, on flats, in any pose.
 void measure_shapes(const Effort& effort, const RowSink& add_row);
 /// Their part that slides over a bump of 40 units, and the one that rests on sharp edges.

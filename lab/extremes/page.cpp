@@ -71,6 +71,14 @@ a ball's height and normal are means of some fifty samples. A scene smooths such
 (`denoise = "auto"`, docs/theory.md 2.4), and so do the rows with limits; `denoise off` is the same without. `exact
 contact` shows the surface that was not smoothed: height and normal of the iso-surface where the tool's close samples
 touch it at the ideal place, the normal over half a voxel. A contact without any mean would feel this.)"},
+    {"edges", "Along and over sharp edges",
+     R"(A ball, and a cylinder whose side lies on the edge, two voxels deep on a sharp convex edge of 90 degrees at 0.05
+voxels a tick. The density is the solid's share of a cube of two voxels, as a scan has it. A ramp of the distance from
+the solid has a ridge that voxels do not hold: its trilinear iso-surface is a row of bumps about a voxel apart, and from
+bump to bump the place nearest to the hand itself jumps.)"},
+    {"isos", "Low and high iso",
+     R"(Tools at rest on flats of any tilt and on balls of R 14, where the iso is a share of full density other than the
+half. The angle between force and normal may be 1.5 times that at an iso of 0.45.)"},
     {"cutting", "Cutting by force",
      R"(The whole servo with `[cut] model = "preston"` and a ball of radius 1 mm. It is led by hand over a flat; pressed on it
 with a force that goes up to 1.2 N and back, however far the flat gives way; and sunk into a crown at the rate of

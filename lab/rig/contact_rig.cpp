@@ -10,8 +10,9 @@ ContactRig<N>::ContactRig(const SampledTool& tool, const KernelSet& kernels)
       points_(tool_.point_shell()) {}
 
 template <class N>
-ContactRig<N>::ContactRig(const SampledTool& tool, const Body& body) : ContactRig(tool) {
-  add(body, plain_frame<N>());
+ContactRig<N>::ContactRig(const SampledTool& tool, const Body& body, Density iso)
+    : ContactRig(tool) {
+  add(body, plain_frame<N>(), iso);
 }
 
 template <class N>

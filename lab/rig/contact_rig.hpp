@@ -49,7 +49,7 @@ template <class N>
 class ContactRig {
  public:
   explicit ContactRig(const SampledTool& tool, const KernelSet& kernels = **kernel_sets());
-  ContactRig(const SampledTool& tool, const Body& body);
+  ContactRig(const SampledTool& tool, const Body& body, Density iso = kIso);
   ContactRig(const ContactRig&) = delete;
   ContactRig& operator=(const ContactRig&) = delete;
 

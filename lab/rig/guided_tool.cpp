@@ -4,8 +4,9 @@
 namespace kerf::extremes {
 
 template <class N>
-GuidedTool<N>::GuidedTool(const SampledTool& tool, const Body& body, Point start, double friction)
-    : rig_(tool, body), pose_{place_of<N>(start), {}}, friction_(friction) {}
+GuidedTool<N>::GuidedTool(const SampledTool& tool, const Body& body, Point start, double friction,
+                          Density iso)
+    : rig_(tool, body, iso), pose_{place_of<N>(start), {}}, friction_(friction) {}
 
 template <class N>
 Point GuidedTool<N>::tick(Point hand, const ToolTurn<N>& turn) {

@@ -12,7 +12,8 @@ namespace kerf::extremes {
 template <class N>
 class GuidedTool {
  public:
-  GuidedTool(const SampledTool& tool, const Body& body, Point start, double friction = 0);
+  GuidedTool(const SampledTool& tool, const Body& body, Point start, double friction = 0,
+             Density iso = kIso);
 
   /// The spring from the hand to the proxy: the force over the stiffness.
   Point tick(Point hand, const ToolTurn<N>& turn = {});

@@ -9,8 +9,8 @@ namespace kerf::extremes {
 /// units above `at`, along `up`, to one unit below.
 template <class N>
 [[nodiscard]] Point rest_of(const SampledTool& tool, const Body& body, Point at, Point up,
-                            const ToolTurn<N>& turn = {}, double off = 1.5) {
-  GuidedTool<N> guided(tool, body, at + off * up);
+                            const ToolTurn<N>& turn = {}, double off = 1.5, Density iso = kIso) {
+  GuidedTool<N> guided(tool, body, at + off * up, 0, iso);
   constexpr int kTicks = 20;
   for (int i = 0; i <= kTicks; ++i) guided.tick(at + (off - (off + 1) * i / kTicks) * up, turn);
   return guided.proxy();

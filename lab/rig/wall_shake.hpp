@@ -58,10 +58,11 @@ struct Shaken {
 
 /// F7 of docs/validation.md: a hand at the face of a wall of `thickness` units, tilted anyhow, goes
 /// random steps of 0.1 to 10 m/s (at 0.1 mm a unit and 1 kHz), with small turns and large ones. No
-/// supervisor stops it. `made` is the tool's.
+/// supervisor stops it. `made` is the tool's. Depths count from where density is 1/2, crossings
+/// too.
 template <class N>
 void shake(double thickness, const ShakenTool& tool, const SampledTool& made, int ticks, Dice& dice,
-           Shaken& seen) {
+           Shaken& seen, Density iso = kIso) {
   const Frame frame(dice, {32, 32, 32});
   const Body wall = blurred({66, 66, 66}, [&](Point p) {
     const double height = frame.of(p)[1];
@@ -69,7 +70,7 @@ void shake(double thickness, const ShakenTool& tool, const SampledTool& made, in
   });
   Point hand = frame.at(0, tool.reach() + 3, 0);
   ToolTurn<N> turn;
-  GuidedTool<N> guided(made, wall, hand);
+  GuidedTool<N> guided(made, wall, hand, 0, iso);
   for (int i = 0; i < ticks; ++i) {
     hand = hand + std::pow(10.0, dice.uniform(0, 2)) * dice.direction();
     const Point h = frame.of(hand);

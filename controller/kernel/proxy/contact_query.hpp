@@ -18,6 +18,7 @@
 #include "controller/kernel/proxy/contact_peak.hpp"
 #include "controller/kernel/proxy/normal_patch.hpp"
 #include "controller/kernel/proxy/query_work.hpp"
+#include "controller/kernel/proxy/ramp_middle.hpp"
 #include "controller/kernel/proxy/spiral_points.hpp"
 #include "controller/kernel/proxy/tool_turn.hpp"
 
@@ -108,11 +109,10 @@ class ContactQuery {
 
   /// Whether a volume's density at `q` reaches its iso.
   [[nodiscard]] bool is_solid(ContactVec<Real> q) const noexcept {
-    constexpr auto kIso = N::kIsFixed ? PointNumber<N>(1 << 14) : PointNumber<N>(0.5);
     return std::any_of(volumes_.begin(), volumes_.end(), [&](const ContactVolume<N>& volume) {
       const VoxelVec<Real> at = place_of(volume, q);
       return point_sample<N>(volume.field, {number_of(at.x), number_of(at.y), number_of(at.z)})
-                 .density >= kIso;
+                 .density >= kIsoDensity;
     });
   }
 
@@ -156,6 +156,8 @@ class ContactQuery {
   }
 
  private:
+  static constexpr auto kIsoDensity = N::kIsFixed ? PointNumber<N>(1 << 14) : PointNumber<N>(0.5);
+
   [[nodiscard]] static PointNumber<N> number_of(Real x) noexcept {
     if constexpr (N::kIsFixed) {
       return x.raw();
@@ -214,27 +216,107 @@ class ContactQuery {
 
     const PointSums<N> sums = sums_at(volume.field, points_.table, volume.places, at);
     if (sums.weight <= typename N::Sum(0)) return;
-    const bool round = points_.table.round;
-    const auto means = point_means<N>(sums, volume.field.scale, volume.frame, rows_, round);
-    ConstraintPlane<N> plane = plane_of<N>(means, points_.reach, round);
-    if (closer) {
-      if (round && plane.depth < Real(kCapBelow) && -plane.depth < Real(kCapAbove)) {
-        plane.depth = depth_around(volume, at, sums, means, plane);
-      } else if (!round && std::max(plane.depth, -plane.depth) < Real(kCloseDepth)) {
-        look_again(volume, at, sums, means, plane);
-      }
+    ConstraintPlane<N> plane = plane_at(volume, at, sums, closer);
+    if (plane.depth > Real(0) && sums.top < kIsoDensity &&
+        !iso_is_near(volume, at, sums.top_sample)) {
+      return;
     }
+    if (closer) look_midway(volume, q, plane);
     // Nearly all samples are in the solid, or the tool feels the same all round. What is softer
     // than the iso bears nothing.
     const ContactVec<typename N::Unit> none{};
     const bool immersed = sums.solid >= points_.table.count - points_.table.count / 16;
-    if (!immersed && plane.normal == none && means.top < typename N::Ratio(0.5)) return;
+    if (!immersed && plane.normal == none && sums.top < kIsoDensity) return;
     if (immersed || plane.normal == none) {
       felt.buried = true;
       felt.depth = std::max(felt.depth, plane.depth);
       return;
     }
     insert(felt, plane);
+  }
+
+  /// The plane of these sums, after a closer look where it is near rest.
+  [[nodiscard]] ConstraintPlane<N> plane_at(const ContactVolume<N>& volume, VoxelVec<Real> at,
+                                            const PointSums<N>& sums, bool closer) const noexcept {
+    const bool round = points_.table.round;
+    const auto means = point_means<N>(sums, volume.field.scale, volume.frame, rows_, round);
+    ConstraintPlane<N> plane = plane_of<N>(means, points_.reach, round);
+    if (!closer) return plane;
+    if (round && plane.depth < Real(kCapBelow) && -plane.depth < Real(kCapAbove)) {
+      plane.depth = depth_around(volume, at, sums, means, plane);
+    } else if (!round && std::max(plane.depth, -plane.depth) < Real(kCloseDepth)) {
+      look_again(volume, at, sums, means, plane);
+    }
+    return plane;
+  }
+
+  /// Normal and place of a contact whose iso is near an end of its face's ramp, from the ramp's
+  /// middle (ramp_middle.hpp). The depth stays that of the iso.
+  void look_midway(const ContactVolume<N>& volume, ContactVec<Real> q,
+                   ConstraintPlane<N>& plane) const noexcept {
+    using Unit = typename N::Unit;
+    if (is_midway(volume.field.scale)) return;
+    ContactVolume<N> seen = volume;
+    for (int look = 0; look < kMidwayLooks; ++look) {
+      if (plane.normal == ContactVec<Unit>{} || !may_query()) return;
+      const auto arm = points_.table.round ? times<N>(-plane.normal, points_.reach) : plane.arm;
+      const auto middle = ramp_middle<N>(
+          [&](Real below) { return density_at(volume, q + arm - times<N>(plane.normal, below)); });
+      if (middle.level == 0) return;
+      seen.field.scale = density_scale(middle.level);
+      const VoxelVec<Real> at = place_of(volume, q - times<N>(plane.normal, middle.below));
+      const PointSums<N> sums = sums_at(seen.field, points_.table, volume.places, at);
+      if (sums.weight <= typename N::Sum(0)) return;
+      const ConstraintPlane<N> found = plane_at(seen, at, sums, true);
+      const Unit alike = dot(found.normal, plane.normal);
+      if (alike <= Unit(0)) return;
+      plane.normal = found.normal;
+      plane.arm = found.arm;
+      if (alike > Unit(kMidwayAlike)) return;
+    }
+  }
+
+  /// Whether a voxel near a sample reaches the iso: where none does, no summit between the samples
+  /// does (docs/theory.md 3.2).
+  [[nodiscard]] bool iso_is_near(const ContactVolume<N>& volume, VoxelVec<Real> at,
+                                 std::int32_t sample) const noexcept {
+    constexpr std::int32_t kNear = 3;  // voxels: the reach of a closeup, and its cell
+    left_ -= kNear * kNear * kNear;    // a sample has eight voxels
+    const VoxelGrid& grid = volume.field.grid;
+    const PointNumber<N> centre[3] = {number_of(at.x), number_of(at.y), number_of(at.z)};
+    const std::int32_t end[3] = {grid.nx, grid.ny, grid.nz};
+    std::int32_t from[3] = {}, to[3] = {};
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const PointNumber<N> place = centre[axis] + volume.places.offset_vox[axis][sample];
+      const auto low = static_cast<std::int32_t>(N::kIsFixed ? place / 65536 : place);
+      from[axis] = std::max(low - kNear + 1, 0);
+      to[axis] = std::min(low + kNear + 1, end[axis]);
+    }
+    const DensityScale& scale = volume.field.scale;
+    for (std::int32_t z = from[2]; z < to[2]; ++z) {
+      for (std::int32_t y = from[1]; y < to[1]; ++y) {
+        for (std::int32_t x = from[0]; x < to[0]; ++x) {
+          const std::uint64_t density = volume.field.density[grid.index(x, y, z)];
+          if ((density * scale.mantissa >> scale.shift) >= 32768) return true;
+        }
+      }
+    }
+    return false;
+  }
+
+  /// A volume's own density at a place, 0 to 1.
+  [[nodiscard]] static Real density_at(const ContactVolume<N>& volume,
+                                       ContactVec<Real> place) noexcept {
+    DensityField plain = volume.field;
+    plain.scale = {};
+    const VoxelVec<Real> at = place_of(volume, place);
+    const auto density =
+        point_sample<N>(plain, {number_of(at.x), number_of(at.y), number_of(at.z)}).density;
+    if constexpr (N::kIsFixed) {
+      return Real::from_raw(density * 2);
+    } else {
+      return density;
+    }
   }
 
   /// Corrects the plane of a tool that is no ball: by the close samples around the peak, then by a
