@@ -32,6 +32,22 @@ struct ConstraintPlane {
                                    const ConstraintPlane&) noexcept = default;
 };
 
+/// Least determinant of planes that are solved for together: 1 - c^2 of two, c the product of their
+/// normals. Below it they nearly lie on one line, or three in one plane.
+inline constexpr double kLeastDeterminant = 1e-3;
+
+/// Planes of two volumes that say the same, as of a face that both share: their normals lie within
+/// 1.8 degrees, so that no loads of the two can be told apart, and the deeper one alone holds the
+/// tool. Two would take a place of three and, as they cannot be solved for together, let the third
+/// be left out.
+template <class N>
+[[nodiscard]] constexpr bool are_one_face(ContactVec<typename N::Unit> a,
+                                          ContactVec<typename N::Unit> b) noexcept {
+  using Unit = typename N::Unit;
+  const Unit cosine = dot(a, b);
+  return cosine > Unit(0) && Unit(1) - cosine * cosine < Unit(kLeastDeterminant);
+}
+
 /// What one collision query finds: `count` planes, the deepest first.
 template <class N>
 struct Contacts {

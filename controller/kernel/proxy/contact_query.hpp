@@ -84,7 +84,8 @@ class ContactQuery {
   /// Work since `begin_tick`, in the samples of `work`.
   [[nodiscard]] std::int64_t spent() const noexcept { return work_.budget() - left_; }
 
-  /// What the tool feels with its centre at `q`: at most one plane a volume, the deepest three.
+  /// What the tool feels with its centre at `q`: at most one plane a volume, the deepest three. Of
+  /// volumes that share a face the deepest plane counts.
   [[nodiscard]] Contacts<N> query(ContactVec<Real> q) const noexcept {
     Contacts<N> felt;
     const bool closer = may_query();
@@ -211,12 +212,12 @@ class ContactQuery {
       felt.depth = std::max(felt.depth, plane.depth);
       return;
     }
-    auto slot = static_cast<std::size_t>(felt.count);
-    if (slot < kMaxPlanes) {
-      ++felt.count;
-    } else if (felt.plane[--slot].depth >= plane.depth) {
-      return;
-    }
+    const auto count = static_cast<std::size_t>(felt.count);
+    std::size_t slot = 0;  // that the plane takes, in place of one that says the same or is shallow
+    while (slot < count && !are_one_face<N>(felt.plane[slot].normal, plane.normal)) ++slot;
+    if (slot == kMaxPlanes) --slot;
+    if (slot < count && felt.plane[slot].depth >= plane.depth) return;
+    if (slot == count) ++felt.count;
     for (; slot > 0 && felt.plane[slot - 1].depth < plane.depth; --slot) {
       felt.plane[slot] = felt.plane[slot - 1];
     }
