@@ -46,13 +46,8 @@ struct SweepRules {
   static constexpr double kResidual = 0.8;  ///< share of the displacement that a step may leave
   /// A next step shorter than this share of a failed one is tried whole.
   static constexpr double kEased = 0.5;
-  static constexpr double kShrink = 0.4;  ///< of a failed step, for the next try
-  /// Share of a step below which the proxy rather lags. What a tool has milled leaves it a play of
-  /// hundredths of a unit, where longer steps only meet the other wall: in its first kFineQueries
-  /// it may try steps down to kFinest.
-  static constexpr double kShortest = 0.1;
-  static constexpr double kFinest = 0.02;
-  static constexpr std::int32_t kFineQueries = 14;
+  static constexpr double kShrink = 0.4;    ///< of a failed step, for the next try
+  static constexpr double kShortest = 0.1;  ///< share of a step below which the proxy rather lags
   /// After so many without a nearer place the tool stays.
   static constexpr std::int32_t kStillQueries = 24;
   static constexpr double kPush = 0.5;  ///< longest correction of one push
@@ -298,8 +293,7 @@ class ProxySweep {
       } else {
         shrink = shrink * Unit(SweepRules::kShrink);
         if (queries_ >= SweepRules::kStillQueries && nearest_yet >= closer) break;
-        const bool fine = queries_ <= SweepRules::kFineQueries;
-        if (shrink < Unit(fine ? SweepRules::kFinest : SweepRules::kShortest)) break;
+        if (shrink < Unit(SweepRules::kShortest)) break;
       }
     }
     return onward.slide;
