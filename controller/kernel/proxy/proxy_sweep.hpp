@@ -52,7 +52,7 @@ struct SweepRules {
   static constexpr std::int32_t kStillQueries = 24;
   static constexpr double kPush = 0.5;  ///< longest correction of one push
   /// The tool may be this deep in one wall where a push out of it leads into another, or where no
-  /// query is left to see whether it does. What two opposite faces read differs by some hundredths
+  /// query is left for one. What two opposite faces read differs by some hundredths
   /// from place to place, and a tool that is turned until both hold it would stay whatever the hand
   /// does: of tools that spin askew in slots 4 % did, with 0.03 still one in a thousand.
   static constexpr double kWedged = 0.05;
@@ -147,13 +147,6 @@ class ProxySweep {
     return !felt.buried && felt.depth <= std::max(tolerance, here_.depth);
   }
 
-  /// A push out of what was felt first led into another wall, or was not seen.
-  [[nodiscard]] static constexpr bool meets_another(const Contacts<N>& first,
-                                                    const Contacts<N>& pushed) noexcept {
-    if (first.count == 0 || pushed.count == 0) return true;
-    return dot(first.plane[0].normal, pushed.plane[0].normal) < Unit(kFalseCreaseCosine);
-  }
-
   /// How to go on from a place.
   struct Route {
     Slide<N> slide;      ///< under the planes alone
@@ -206,7 +199,7 @@ class ProxySweep {
       keep(trial.planes, known, moved + pushed);
     }
     trial.allowed = allows(trial.felt, tolerance);
-    if (!turns && !trial.allowed && allows_rest(first) && meets_another(first, trial.felt)) {
+    if (!turns && !trial.allowed && allows_rest(first)) {
       return {centre, first, unpushed, first, true};
     }
     keep(trial.planes, constraints_of(first), pushed);
