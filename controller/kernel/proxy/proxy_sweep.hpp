@@ -42,7 +42,6 @@ struct SweepRules {
   /// Longest displacement of any sample between two queries. The middle of the thinnest wall, 2
   /// units, is one unit deep: beyond it density falls again, and its gradient leads onward.
   static constexpr double kStep = 0.875;
-  static constexpr double kGain = 0.001;    ///< a step this much nearer to the goal is kept
   static constexpr double kResidual = 0.8;  ///< share of the displacement that a step may leave
   /// A next step shorter than this share of a failed one is tried whole.
   static constexpr double kEased = 0.5;
@@ -253,7 +252,7 @@ class ProxySweep {
     Route onward = route(held_by_, goal - pose_.centre);
     // Farther than any place, while the tool has to get out of the solid.
     Real nearest_yet = allows_rest(here_) ? norm(goal - pose_.centre) : Real(4 * kContactLimit);
-    const Real closer = nearest_yet - Real(SweepRules::kGain);
+    const Real began = nearest_yet;
     auto enough = Real(SweepRules::kNoMove);
     while (may_look() && !here_.buried && onward.length >= enough) {
       const Place from = pose_.centre;
@@ -268,7 +267,7 @@ class ProxySweep {
         const Real distance = norm(goal - trial.centre);
         const bool strays = distance > nearest_yet + Real(SweepRules::kAstray);
         const bool leads = next.length < multiply<Real>(Unit(SweepRules::kResidual), onward.length);
-        if ((leads && !strays) || distance < norm(goal - from) - Real(SweepRules::kGain)) {
+        if ((leads && !strays) || distance < norm(goal - from)) {
           pose_.centre = trial.centre;
           here_ = trial.felt;
           if (allows_rest(here_)) nearest_yet = std::min(nearest_yet, distance);
@@ -285,7 +284,7 @@ class ProxySweep {
         onward = again;
       } else {
         shrink = shrink * Unit(SweepRules::kShrink);
-        if (queries_ >= SweepRules::kStillQueries && nearest_yet >= closer) break;
+        if (queries_ >= SweepRules::kStillQueries && nearest_yet >= began) break;
         if (shrink < Unit(SweepRules::kShortest)) break;
       }
     }
