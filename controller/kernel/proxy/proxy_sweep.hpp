@@ -43,7 +43,8 @@ struct SweepRules {
   /// units, is one unit deep: beyond it density falls again, and its gradient leads onward.
   static constexpr double kStep = 0.875;
   static constexpr double kResidual = 0.8;  ///< share of the displacement that a step may leave
-  /// A next step shorter than this share of a failed one is tried whole.
+  /// A next step shorter than this share of a failed one is tried whole. Without it the force of
+  /// `cutting, milling into the GE tooth, 16 bits` steps by 1.5 % instead of 0.3.
   static constexpr double kEased = 0.5;
   static constexpr double kShrink = 0.4;    ///< of a failed step, for the next try
   static constexpr double kShortest = 0.1;  ///< share of a step below which the proxy rather lags
