@@ -15,16 +15,18 @@ usage() {
 
   --only NAME,...  these of .ci/ablations.txt; NAME+NAME: both at once   (all)
   --list           the names
+  --count          how many named constants the contact has
   --check          only whether each text still stands once in its file
   --full           every case of the rows, not a hundredth of them
   --stages N       no stages beyond: 1 walls, rests, slides, shapes; 2 tests of the contact; 3 traps;
                    4 tests of the servo; 5 cutting   (5)
   --jobs N         so many runs at once   (1)
   --again          forget what was measured before
-  --page FILE      write what is measured as a page
+  --page FILE      write what is measured as a page (docs/ablation.md)
 
 Rows move by more than 1 % of their limit (of their value where they have none), or get lost. Runs go
-from cheap to dear and end after the stage that loses a row. Exit codes: 0 fine, 2 bad input.
+from cheap to dear and end after the stage in which a row is lost, or worse by 5 % of its limit. Exit
+codes: 0 fine, 2 bad input.
 HELP
 }
 
@@ -231,6 +233,12 @@ tell() {
     "$results/$1.changes"
 }
 
+# constants: how many the contact names.
+constants() {
+  grep -rhE 'constexpr' controller/kernel/proxy controller/kernel/point_shell controller/servo/proxy_contact.hpp |
+    grep -oE '\bk[A-Z][A-Za-z]* =' | wc -l
+}
+
 declare -a only=()
 full='' stages=5 jobs=1 page='' again=''
 read_list
@@ -238,6 +246,7 @@ while (($#)); do
   case $1 in
     -h | --help) usage && exit ;;
     --list) printf '%s\n' "${names[@]}" && exit ;;
+    --count) constants && exit ;;
     --check)
       edit_all
       echo "ablate: ${#names[@]} texts stand once each"
@@ -278,17 +287,25 @@ run_all() {
 }
 
 page() {
-  local name i state
+  local name i
   cat <<HEAD
 # Ablation
 
-Made by \`./kerf lab ablate --page $page\`; nothing is typed by hand. Each constant and each branch of
-the swept contact (\`.ci/ablations.txt\`) is turned off alone. Then the rows of \`kerf-lab extremes${full:+}$([[ -n $full ]] || echo ' --quick')\`
-(walls, rests, slides, shapes, traps, cutting) and the tests of contact and servo in fixed point are run, a failed
-test counting as a lost row. A row moves by more than 1 % of its limit. Runs go from cheap to dear and end after the
-stage that loses a row, so more rows may get lost than are told.
+Made by \`./kerf lab ablate --page $page\`; nothing is typed by hand. Each constant and each branch of the swept
+contact (\`.ci/ablations.txt\`) is turned off alone; A+B: both at once. Then these are run, from cheap to dear, and
+what comes after a stage that loses a row is left out, so more rows may get lost than are told:
 
-$(date -u +%F), $("${CXX:-c++}" --version | sed -n 1p).
+1. \`kerf-lab extremes$([[ -n $full ]] || echo ' --quick')\`: walls, rests, slides and shapes
+2. the tests of proxy and point shell, in fixed point; a failed one counts as a lost row
+3. traps
+4. the tests of the servo
+5. cutting, and the test of a tool that turns askew in a tight hollow
+
+Here up to stage $stages. A row moves by more than 1 % of its limit. What is needed loses one, or
+makes one worse by 5 % of its limit or more.
+
+$(date -u +%F), commit $(git rev-parse --short HEAD), $("${CXX:-c++}" --version | sed -n 1p). The contact has
+$(constants) named constants (\`./kerf lab ablate --count\`).
 
 | off | where | means | rows that move, the worst first | verdict |
 |---|---|---|---|---|
@@ -297,13 +314,14 @@ HEAD
     i=${number[${name%%+*}]}
     awk -F'\t' -v name="$name" -v file="${files[i]#controller/}" -v means="${meanings[i]}" -v why="${reasons[i]}" '
       { n[$1]++ }
+      $1 == "worse" && $2 >= 100.05 { worn = 1 }
       NR <= 2 && $1 != "better" {
         cell = cell (cell == "" ? "" : "; ") $3 ", " $4 ": " $5 " to " $6 ($7 == "-" ? "" : ", limit " $7) ($1 == "lost" ? " **lost**" : "")
       }
       END {
         counts = sprintf("%d lost, %d worse, %d better", n["lost"], n["worse"], n["better"] + n["won"])
         if (NR == 0) counts = "none"
-        verdict = n["lost"] ? "needed" : why != "" ? "stays: " why : NR ? "no row is lost" : "moves none"
+        verdict = n["lost"] ? "needed: a row is lost" : worn ? "needed: a row is worse" : why != "" ? "stays: " why : "no row needs it"
         print "| " name " | " file " | " (name ~ /\+/ ? "both" : means) " | " counts (cell == "" ? "" : ": " cell) " | " verdict " |"
       }' "$results/$name.changes"
   done
@@ -313,7 +331,7 @@ trap 'jobs -pr | xargs -r kill' EXIT
 command -v ninja >/dev/null || die "ninja: missing; run ./kerf setup"
 edit_all
 mkdir -p "$work"
-key=$(git ls-files -z --cached --others --exclude-standard controller lab shared tests $list | xargs -0 cat | sha256sum)
+key=$(git ls-files -z --cached --others --exclude-standard controller lab shared tests | xargs -0 cat | cat - <(sed 's/@[^@]*$//' $list) | sha256sum)
 results=$work/${full:+full-}${key:0:12}
 if [[ -n $again ]]; then rm -rf "$results"; fi
 mkdir -p "$results"
