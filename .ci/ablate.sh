@@ -242,6 +242,7 @@ constants() {
 declare -a only=()
 full='' stages=5 jobs=1 page='' again=''
 read_list
+((${#names[@]})) || die "$list: names no ablation; mend it"
 while (($#)); do
   case $1 in
     -h | --help) usage && exit ;;
@@ -257,7 +258,10 @@ while (($#)); do
     --only | --jobs | --stages | --page)
       (($# > 1)) || die "$1: no value; see --help"
       case $1 in
-        --only) IFS=, read -ra only <<<"$2" ;;
+        --only)
+          IFS=, read -ra only <<<"$2"
+          ((${#only[@]})) || die "--only: no name; see --list"
+          ;;
         --jobs) jobs=$2 ;;
         --stages) stages=$2 ;;
         --page) page=$2 ;;
@@ -270,6 +274,7 @@ while (($#)); do
 done
 [[ $jobs =~ ^[1-9][0-9]?$ ]] || die "--jobs $jobs: not 1 to 99; take 1"
 [[ $stages =~ ^[1-5]$ ]] || die "--stages $stages: not 1 to 5; take 5"
+if [[ -n $page ]]; then { : >>"$page"; } 2>/dev/null || die "--page $page: cannot be written; name another"; fi
 for name in "${only[@]}"; do
   for part in ${name//+/ }; do
     [[ -n ${number[$part]:-} ]] || die "--only $part: unknown; see --list"
@@ -327,7 +332,7 @@ HEAD
   done
 }
 
-trap 'jobs -pr | xargs -r kill' EXIT
+trap 'jobs -pr | xargs -r kill 2>/dev/null || true' EXIT
 command -v ninja >/dev/null || die "ninja: missing; run ./kerf setup"
 edit_all
 mkdir -p "$work"
