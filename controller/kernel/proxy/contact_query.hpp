@@ -233,7 +233,7 @@ class ContactQuery {
     using Ratio = typename N::Ratio;
     PointNumber<N> peak[3] = {};
     peak_offset(sums, fall_of(means, false), peak);
-    const Closeup<N> seen = look_closely_at(volume, at, peak);
+    Closeup<N> seen = look_closely_at(volume, at, peak);
     Ratio height = seen.height;
     // If the highest sample of the point shell was not among what was seen, the tool touches twice.
     const auto share = falling_share<N>(Unit(means.top - seen.top), 0.06, 0.02);
@@ -243,6 +243,7 @@ class ContactQuery {
       const Closeup<N> other =
           look_closely_at(volume, at, {offset[0][top], offset[1][top], offset[2][top]});
       height = other.height + multiply<Ratio>(share, height - other.height);
+      if (share <= Unit(0)) seen = other;
     }
     const auto offset = turned_offset<N>(seen.offset, rows_);
     const ContactVec<Real> arm{multiply<Real>(offset.x, points_.reach),
