@@ -98,6 +98,27 @@ TEST_CASE_TEMPLATE("each volume gives a plane, the deepest three are kept in ord
   }
 }
 
+TEST_CASE_TEMPLATE("volumes that share a face give one plane, whichever comes first", N,
+                   FixedNumbers, DoubleNumbers) {
+  const auto floor = [](double deep) {
+    return blurred({28, 28, 28}, [=](const Point& x) { return x[1] - 13.5 + 8 - deep; });
+  };
+  const TestVolume low = floor(0.1), high = floor(0.2);
+  const TestVolume wall =
+      blurred({28, 28, 28}, [](const Point& x) { return x[0] - 13.5 + 8 - 0.15; });
+  std::array<const TestVolume*, 3> order{&low, &high, &wall};
+  do {
+    QueryRig<N> rig(kBall);
+    for (const TestVolume* volume : order) rig.add(*volume, plain_frame<N>());
+    const Contacts<N> felt = rig.at({13.5, 13.5, 13.5});
+    REQUIRE(felt.count == 2);
+    CHECK(double(felt.plane[0].depth) == doctest::Approx(0.2).epsilon(0.1));
+    CHECK(degrees_between(normal_of(felt.plane[0]), {0, 1, 0}) < 0.5);
+    CHECK(double(felt.plane[1].depth) == doctest::Approx(0.15).epsilon(0.1));
+    CHECK(degrees_between(normal_of(felt.plane[1]), {1, 0, 0}) < 0.5);
+  } while (std::next_permutation(order.begin(), order.end()));
+}
+
 TEST_CASE_TEMPLATE("a tool deep in the solid is buried and has no plane", N, FixedNumbers,
                    DoubleNumbers) {
   const TestVolume volume = blurred({40, 40, 60}, [](const Point& x) { return x[2] - 50; });

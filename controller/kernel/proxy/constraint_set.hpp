@@ -29,7 +29,7 @@ struct Slide {
 /// The loads of two or three planes that are all touched, by Cramer's rule. For each plane i SUM_j
 /// c_ij load_j = need_i: c_ij is the product of two normals (c_ii = 1), need_i how far plane i
 /// wants the tool out. False where the normals nearly lie on one line or in one plane: a
-/// determinant below 1e-3.
+/// determinant below kLeastDeterminant.
 template <class N>
 class Loads {
   using Real = typename N::Real;
@@ -45,7 +45,7 @@ class Loads {
                                               std::size_t j, Needs& load) noexcept {
     const Cofactor one(1), minus_c = -Cofactor(c[i][j]);
     const Cofactor determinant = one - multiply<Cofactor>(c[i][j], c[i][j]);
-    if (determinant < Cofactor(kLeast)) return false;
+    if (determinant < Cofactor(kLeastDeterminant)) return false;
     load[i] = quotient({one, minus_c, {}}, {need[i], need[j], {}}, determinant);
     load[j] = quotient({minus_c, one, {}}, {need[i], need[j], {}}, determinant);
     return true;
@@ -60,7 +60,7 @@ class Loads {
     const Cofactor c01 = minor(1, 2, 2, 0), c02 = minor(1, 0, 2, 1), c12 = minor(0, 1, 2, 0);
     const Cofactor determinant =
         c00 + multiply<Cofactor>(c[0][1], c01) + multiply<Cofactor>(c[0][2], c02);
-    if (determinant < Cofactor(kLeast)) return false;
+    if (determinant < Cofactor(kLeastDeterminant)) return false;
     load = {quotient({c00, c01, c02}, need, determinant),
             quotient({c01, c11, c12}, need, determinant),
             quotient({c02, c12, c22}, need, determinant)};
@@ -68,8 +68,6 @@ class Loads {
   }
 
  private:
-  static constexpr double kLeast = 1e-3;
-
   /// cofactor . need / determinant. Fixed: Q45 over Q29, exact up to the quotient's last bit.
   [[nodiscard]] static constexpr Real quotient(const std::array<Cofactor, kMaxPlanes>& cofactor,
                                                const Needs& need, Cofactor determinant) noexcept {

@@ -90,7 +90,8 @@ class ContactQuery {
   /// Work since `begin_tick`, in the samples of `work`.
   [[nodiscard]] std::int64_t spent() const noexcept { return work_.budget() - left_; }
 
-  /// What the tool feels with its centre at `q`: at most one plane a volume, the deepest three.
+  /// What the tool feels with its centre at `q`: at most one plane a volume, the deepest three. Of
+  /// volumes that share a face the deepest plane counts.
   [[nodiscard]] Contacts<N> query(ContactVec<Real> q) const noexcept {
     Contacts<N> felt;
     const bool closer = may_query();

@@ -80,11 +80,10 @@ class CurvatureEstimate {
   constexpr void forget() noexcept { first_ = second_ = last_ = {}; }
 
   static constexpr Curve<N> curve_of(Turn turned, Place moved, Real least) noexcept {
-    constexpr double kTightest = 0.05;  // units: no play is noticed below
     const Turn across = direction_of_turn<N>(turned);
     const Real closing = along<N>(across, moved);
     if (closing <= least) return {};
-    return {across, std::max(quotient<N>(closing, norm(turned)), Real(kTightest))};
+    return {across, quotient<N>(closing, norm(turned))};
   }
   /// At most a radian.
   static constexpr Turn turn_of_normal(const Curve<N>& curve, Place moved) noexcept {
