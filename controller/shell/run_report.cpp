@@ -2,10 +2,10 @@
 #include "controller/shell/run_report.hpp"
 
 #include <algorithm>
-#include <cstdio>
 
 #include "controller/servo/velocity_window.hpp"
 #include "shared/posix/hex64.hpp"
+#include "shared/text/format.hpp"
 #include "shared/text/json.hpp"
 
 namespace kerf {
@@ -19,18 +19,8 @@ Json percentiles(const Histogram& histogram) {
 }
 
 std::string line(const char* name, const Histogram& histogram) {
-  char text[128];
-  std::snprintf(text, sizeof text, "  %-10s %9.1f %9.1f %9.1f %9.1f\n", name,
-                histogram.percentile_us(0.5), histogram.percentile_us(0.99),
-                histogram.percentile_us(0.999), histogram.max_us());
-  return text;
-}
-
-template <class... Values>
-std::string format(const char* pattern, Values... values) {
-  char text[512];
-  std::snprintf(text, sizeof text, pattern, values...);
-  return text;
+  return format("  %-10s %9.1f %9.1f %9.1f %9.1f\n", name, histogram.percentile_us(0.5),
+                histogram.percentile_us(0.99), histogram.percentile_us(0.999), histogram.max_us());
 }
 
 }  // namespace

@@ -32,7 +32,7 @@ inline constexpr std::uint64_t kSegmentMagic = [] {
   return magic;
 }();
 inline constexpr std::uint32_t kLayoutMajor = 1;
-inline constexpr std::uint32_t kLayoutMinor = 0;
+inline constexpr std::uint32_t kLayoutMinor = 1;
 inline constexpr std::uint32_t kStateSlots = 4096;  // 4.1 s at 1 kHz: as long as a reader may stop
 inline constexpr std::uint32_t kDirtySlots = 4096;
 inline constexpr std::uint64_t kMaxSceneBytes = std::uint64_t{1} << 26;  // a reader copies it whole

@@ -17,7 +17,7 @@ namespace {
 constexpr double kMostAlong = 512.0;  // voxels
 constexpr double kRampEdges = 2.0;    // over which the surface is antialiased
 constexpr double kMarginEdges = 2.0;  // around a tool: half the ramp, and an edge of interpolation
-constexpr glm::dvec3 kSteel{0.60, 0.60, 0.61};
+constexpr glm::dvec3 kToolColour{0.60, 0.60, 0.61};
 
 double distance_to_wall(const ProfilePoint& a, const ProfilePoint& b, const glm::dvec2& at) {
   const glm::dvec2 from(a[0], a[1]), along = glm::dvec2(b[0], b[1]) - from;
@@ -104,7 +104,7 @@ SceneView ToolVolume::added_to(const SceneView& scene) const {
         scene.materials[m].opacity.value_or(default_opacity(scene.materials, m));
   }
   // No density reaches this iso: a material by label only.
-  with.materials.push_back({.name = "tool", .iso = 2.0, .colour = kSteel, .opacity = 1.0});
+  with.materials.push_back({.name = "tool", .iso = 2.0, .colour = kToolColour, .opacity = 1.0});
   VolumeView& volume = with.volumes.emplace_back();
   volume.name = "tool";
   volume.bricks = BrickGrid::of(grid_);

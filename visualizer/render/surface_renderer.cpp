@@ -23,7 +23,7 @@ std::vector<FrustumCulling::Part> drawn_parts(const RenderTarget& target) {
   return parts;
 }
 
-constexpr GLuint kPaletteUnit = 2;  // after the textures of SolidOnGpu
+constexpr GLuint kColoursUnit = 2;  // after the textures of SolidOnGpu
 
 /// The parts of the target in which a volume may show.
 std::vector<PixelRect> parts_of(const SolidOnGpu& volume, const View& view,
@@ -42,14 +42,14 @@ SectionFaces::SectionFaces(const SceneView& scene, std::span<const VolumeContent
   for (std::size_t v = 0; v < scene.volumes.size(); ++v) {
     volumes_.emplace_back(scene.volumes[v], contents[v], limit);
   }
-  SolidOnGpu::set_units(program_, static_cast<int>(kPaletteUnit));
+  SolidOnGpu::set_units(program_, static_cast<int>(kColoursUnit));
 }
 
 void SectionFaces::draw(const View& view, const RenderTarget& target) const {
   target.bind();
   glEnable(GL_DEPTH_TEST);
   glDepthFunc(GL_LESS);
-  glBindTextureUnit(kPaletteUnit, palette_.id());
+  glBindTextureUnit(kColoursUnit, palette_.id());
   set_view(program_, view);
   for (const SolidOnGpu& volume : volumes_) {
     volume.bind(program_, view);

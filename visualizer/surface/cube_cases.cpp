@@ -7,11 +7,11 @@ namespace kerf {
 
 namespace {
 
-constexpr std::size_t kMaxTriangles = 5;  // more would not compile
+constexpr std::size_t kMostTriangles = 5;  // more would not compile
 
 struct CubeCase {
   std::uint8_t triangles = 0;
-  std::array<CubeTriangle, kMaxTriangles> list{};
+  std::array<CubeTriangle, kMostTriangles> list{};
 };
 
 using Loop = std::array<std::uint8_t, kCubeEdges>;

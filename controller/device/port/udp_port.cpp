@@ -18,7 +18,7 @@ namespace {
 
 constexpr int kRefusalMs = 50;  // a refusal comes as fast as an answer
 
-[[noreturn]] void refuse(const std::string& where, const std::string& why) {
+[[noreturn]] void refuse_address(const std::string& where, const std::string& why) {
   throw std::runtime_error("--port udp:" + where + ": " + why +
                            "; name the [ADDRESS:]PORT of kerf-emulator --front udp");
 }
@@ -32,10 +32,10 @@ int greet(int fd) noexcept {
   return is_refused ? errno : 0;
 }
 
-/// A socket that hears nobody but the other end, which did not refuse it.
+/// A socket that hears nobody but the other end, which did not refuse_address it.
 int connect_to(const std::string& where, int patience_ms, const std::atomic<bool>& stop) {
   const UdpAddress address = resolve_udp(where);
-  if (!address.error.empty()) refuse(where, address.error);
+  if (!address.error.empty()) refuse_address(where, address.error);
   const auto give_up = std::chrono::steady_clock::now() + std::chrono::milliseconds(patience_ms);
   for (;;) {
     const int fd = socket(address.storage.ss_family, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
@@ -44,7 +44,7 @@ int connect_to(const std::string& where, int patience_ms, const std::atomic<bool
     if (error == 0) return fd;
     if (fd >= 0) close(fd);
     if (stop || std::chrono::steady_clock::now() >= give_up) {
-      refuse(where, "no device answers (" + std::generic_category().message(error) + ")");
+      refuse_address(where, "no device answers (" + std::generic_category().message(error) + ")");
     }
     std::this_thread::sleep_for(std::chrono::milliseconds(kRefusalMs));
   }

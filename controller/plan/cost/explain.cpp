@@ -4,12 +4,12 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
-#include <cstdio>
 #include <utility>
 
 #include "controller/plan/cost/work_budget.hpp"
 #include "controller/scene/scene.hpp"
 #include "shared/posix/provenance.hpp"
+#include "shared/text/format.hpp"
 #include "shared/text/json.hpp"
 
 namespace kerf {
@@ -36,13 +36,6 @@ std::vector<ToolWork> works_of(const Explanation& explanation) {
     works.back().us += work_us(tick.most);
   }
   return works;
-}
-
-template <class... Values>
-std::string format(const char* pattern, Values... values) {
-  char text[256];
-  std::snprintf(text, sizeof text, pattern, values...);
-  return text;
 }
 
 /// Of a stage, or of a whole tick.
