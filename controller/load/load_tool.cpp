@@ -86,7 +86,8 @@ SceneTool load_mesh(const ToolSpec& spec, double pitch_mm, double voxel_mm,
 void check_shaft(const ToolSpec& spec, const SceneTool& tool, double voxel_mm) {
   if (!spec.shaft.radius_mm) return;
   if (*spec.shaft.length_mm <= tool.length_mm * (1 + 1e-9)) {
-    refuse(spec.shaft_place, " ends inside of the head, which is " + short_text(tool.length_mm) +
+    refuse(spec.shaft_place, " ends no farther than the head, which is " +
+                                 short_text(tool.length_mm) +
                                  " mm long; it counts from the tool's tip, so use more");
   }
   if (*spec.shaft.radius_mm >= voxel_mm / 2) return;

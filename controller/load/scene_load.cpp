@@ -130,9 +130,9 @@ void refuse_steps(Denoise passes, const VolumeImage& image) {
   }
   const std::size_t levels = levels_of(image.density);
   if (levels >= kLeastLevels) return;
-  throw SceneError(begin + " for " + std::to_string(levels) +
-                   " levels of density, noise is told from " + std::to_string(kLeastLevels) +
-                   "; leave it out");
+  throw SceneError(begin + " for a file of " + std::to_string(levels) +
+                   " levels; noise can be told from " + std::to_string(kLeastLevels) +
+                   " on, leave it out");
 }
 
 /// Finds the noise of a volume, and makes the passes against it that the scene asks for.

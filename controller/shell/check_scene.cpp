@@ -29,6 +29,22 @@ std::string hand_lines(const LoadedScene& scene) {
 
 namespace {
 
+/// The densest voxel on the border of a volume.
+Density border_density(const VolumeImage& image) {
+  const VoxelGrid& g = image.grid;
+  Density most = 0;
+  for (std::int32_t z = 0; z < g.nz; ++z) {
+    for (std::int32_t y = 0; y < g.ny; ++y) {
+      const bool whole_row = z == 0 || z == g.nz - 1 || y == 0 || y == g.ny - 1;
+      const std::int32_t step = whole_row ? 1 : std::max(1, g.nx - 1);
+      for (std::int32_t x = 0; x < g.nx; x += step) {
+        most = std::max(most, image.density[g.index(x, y, z)]);
+      }
+    }
+  }
+  return most;
+}
+
 /// A free hand over a tooth moves up to so fast; what is slower than that is told.
 constexpr double kHandSpeedMmPerS = 1000;
 
@@ -43,9 +59,21 @@ std::string air_lines(const LoadedScene& scene, const SceneCosts& costs) {
   const std::string lines = "free_of_drag_m_per_s=" + std::string(speed) + "\n";
   if (*slowest >= kHandSpeedMmPerS) return lines;
   const auto tool = static_cast<std::size_t>(slowest - speeds.begin());
-  return lines + "note=beside a surface tool " + scene.tools[tool].name +
-         " is dragged in air from " + speed +
-         " m/s on; a higher rate or larger voxels raise that\n";
+  return lines + "note=tool " + scene.tools[tool].name +
+         " is dragged in air, beside a surface, by a hand faster than " + speed +
+         " m/s; a higher rate or larger voxels raise that\n";
+}
+
+std::string border_line(const SceneVolume& volume) {
+  const Density border = border_density(volume.image);
+  if (!volume.solid || 8.0 * border < volume.iso) return {};  // a sample below that counts as air
+  char text[256];
+  std::snprintf(
+      text, sizeof text,
+      "note=%s ends in a density of %.3f, of an iso of %.3f, and air is 0: a fast tool may "
+      "feel that step; give it a window that begins at its air\n",
+      volume.name.c_str(), border / double(kDensityMax), volume.iso / kDensityMax);
+  return text;
 }
 
 void print_scene(const LoadedScene& scene, const SceneCosts& costs) {
@@ -60,6 +88,7 @@ void print_scene(const LoadedScene& scene, const SceneCosts& costs) {
       std::printf("note=%s is solid at its border; one voxel of air was laid around it\n",
                   v.name.c_str());
     }
+    std::printf("%s", border_line(v).c_str());
   }
   for (const SceneTool& t : scene.tools) {
     std::printf("tool=%s %s samples=%zu pitch_mm=%g radius_mm=%g\n", t.name.c_str(),

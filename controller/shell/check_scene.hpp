@@ -17,6 +17,9 @@ namespace kerf {
 /// faster.
 [[nodiscard]] std::string air_lines(const LoadedScene& scene, const SceneCosts& costs);
 
+/// A note where a volume ends in a density that contact counts; else nothing.
+[[nodiscard]] std::string border_line(const SceneVolume& volume);
+
 /// Prints what --check tells: whatever can be said without memory for the loop, one `name=value` a
 /// line, and then every setting in effect as `table.key=value`.
 void print_scene(const LoadedScene& scene, const SceneCosts& costs);

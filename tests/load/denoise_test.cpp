@@ -154,8 +154,9 @@ TEST_CASE("denoise of labels and of few levels is refused in one line; auto leav
   };
   const std::string few = error(coarse, "denoise = 2\n");
   CHECK(
-      few.find("scene.toml:2: denoise: 2 for 8 levels of density, noise is told from 16; leave it "
-               "out") != std::string::npos);
+      few.find(
+          "scene.toml:2: denoise: 2 for a file of 8 levels; noise can be told from 16 on, leave it "
+          "out") != std::string::npos);
   CHECK(few.find('\n') == std::string::npos);
   const std::string map = error(labels, "denoise = 1\n");
   CHECK(map.find(

@@ -297,10 +297,10 @@ TEST_CASE("a shaft that does not suit the head or the volume is reported with it
         folder, 0.125, "[[tool]]\nshape = \"ball\"\nradius_mm = 1\nshaft_length_mm = " + lines));
   };
   CHECK(error_with("2.1\nshaft_radius_mm = 0.5\n").empty());
-  CHECK(
-      has(error_with("2\nshaft_radius_mm = 0.5\n"),
-          "scene.toml:6: tool.shaft_length_mm = 2 ends inside of the head, which is 2 mm long; it "
-          "counts from the tool's tip, so use more"));
+  CHECK(has(error_with("2\nshaft_radius_mm = 0.5\n"),
+            "scene.toml:6: tool.shaft_length_mm = 2 ends no farther than the head, which is 2 mm "
+            "long; it "
+            "counts from the tool's tip, so use more"));
   CHECK(has(error_with("9\nshaft_radius_mm = 0.06\n"),
             " is of a shaft thinner than a voxel (0.125 mm); use a larger shaft_radius_mm"));
   const auto planned = [&](const std::string& lines) {

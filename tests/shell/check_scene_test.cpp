@@ -17,6 +17,30 @@ TEST_CASE("a scene tells up to which speed no tool is dragged in air, and warns 
   CHECK(air_lines(scene, costs) == "free_of_drag_m_per_s=1.00\n");
   costs.air_speeds_mm_per_s = {2500, 340};
   CHECK(air_lines(scene, costs) ==
-        "free_of_drag_m_per_s=0.34\nnote=beside a surface tool fissure is dragged in air from 0.34 "
-        "m/s on; a higher rate or larger voxels raise that\n");
+        "free_of_drag_m_per_s=0.34\nnote=tool fissure is dragged in air, beside a surface, by a "
+        "hand faster than 0.34 m/s; a higher rate or larger voxels raise that\n");
+}
+
+TEST_CASE("a volume that ends in a density that contact counts is told") {
+  SceneVolume volume;
+  volume.name = "scan";
+  volume.image.grid = {5, 4, 3};
+  volume.image.density.assign(volume.image.grid.voxel_count(), 0);
+  volume.iso = Density{32000};
+  volume.image.density[volume.image.grid.index(2, 2, 1)] = 65535;  // inside
+  CHECK(border_line(volume).empty());
+  for (const VoxelIndex at : {VoxelIndex{0, 2, 1}, VoxelIndex{4, 1, 1}, VoxelIndex{2, 0, 1},
+                              VoxelIndex{2, 3, 1}, VoxelIndex{2, 2, 0}, VoxelIndex{2, 2, 2}}) {
+    Density& border = volume.image.density[volume.image.grid.index(at.x, at.y, at.z)];
+    border = 3999;
+    CHECK(border_line(volume).empty());
+    border = 4000;
+    CHECK(border_line(volume) ==
+          "note=scan ends in a density of 0.061, of an iso of 0.488, and air is 0: a fast tool may "
+          "feel that step; give it a window that begins at its air\n");
+    volume.solid = false;
+    CHECK(border_line(volume).empty());
+    volume.solid = true;
+    border = 0;
+  }
 }

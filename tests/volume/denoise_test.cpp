@@ -18,10 +18,10 @@ namespace {
 std::vector<Density> one_pass(const VoxelGrid& grid, const std::vector<Density>& density) {
   constexpr std::int32_t kAround = 4;
   const VoxelGrid wide{grid.nx + 2 * kAround, grid.ny + 2 * kAround, grid.nz + 2 * kAround};
-  const auto place = [&](std::size_t i) {
-    return wide.index(static_cast<std::int32_t>(i % grid.nx) + kAround,
-                      static_cast<std::int32_t>(i / grid.nx % grid.ny) + kAround,
-                      static_cast<std::int32_t>(i / grid.nx / grid.ny) + kAround);
+  const auto place = [&](std::size_t entry) {
+    const auto i = static_cast<std::int32_t>(entry);
+    return wide.index(i % grid.nx + kAround, i / grid.nx % grid.ny + kAround,
+                      i / grid.nx / grid.ny + kAround);
   };
   std::vector<std::int64_t> noise(wide.voxel_count());
   for (std::size_t i = 0; i < density.size(); ++i) noise[place(i)] = density[i] * 128;
@@ -159,7 +159,8 @@ TEST_CASE(
               const std::size_t i = grid.index(x, y, z);
               constexpr double kSlope = 0.3989 * kFull;  // of a blur of one voxel, at its middle
               const double moved = (density[i] - before[i]) / kSlope;
-              most[passes] = std::max(most[passes], std::abs(moved));
+              double& far = most[static_cast<std::size_t>(passes)];
+              far = std::max(far, std::abs(moved));
             }
           }
         }

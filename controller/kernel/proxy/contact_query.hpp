@@ -87,6 +87,9 @@ class ContactQuery {
   /// See ContactField.
   [[nodiscard]] bool half_spent() const noexcept { return left_ <= work_.budget() / 2; }
   [[nodiscard]] bool may_query() const noexcept { return left_ >= work_.query + work_.closer; }
+  /// Work that is left of the tick. Parts of one tool hand one account on (tool_query.hpp).
+  [[nodiscard]] std::int64_t left() const noexcept { return left_; }
+  void set_left(std::int64_t left) noexcept { left_ = left; }
   /// Work since `begin_tick`, in the samples of `work`.
   [[nodiscard]] std::int64_t spent() const noexcept { return work_.budget() - left_; }
 

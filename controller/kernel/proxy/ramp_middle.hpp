@@ -18,8 +18,10 @@ namespace kerf {
 /// normal and place are read where it is half dense (docs/theory.md 3.8).
 ///
 /// Between these shares of full density the iso-surface is near enough to the middle: there the
-/// normal is as good, and nothing more is read.
-inline constexpr double kMidwayFrom = 0.42, kMidwayTo = 0.6;
+/// normal is as good, and nothing more is read. In teeth density goes on changing below the face,
+/// which makes the middle rough: with the look from 0.42 on the force steps by 3.5 instead of 0.9 %
+/// on the GE tooth of 8 bits, iso 0.34 (rows `cutting`).
+inline constexpr double kMidwayFrom = 0.32, kMidwayTo = 0.6;
 /// The middle is sought so far to each side, units. It is at most one unit below the iso-surface,
 /// and reads raise a surface of low iso by up to 0.6 more.
 inline constexpr double kMidwayFarthest = 1.6;

@@ -79,27 +79,26 @@ class ToolQuery {
   }
 
   void turn(const ToolTurn<N>& turn) noexcept {
-    if (!round_) head_.turn(turn);
+    if (!round_) {
+      on_account(head_, [&](ContactQuery<N>& head) { head.turn(turn); });
+    }
     const TurnRows<N> rows = rows_of(turn);
     each_behind([&](Part& part) {
-      part.query.turn(turn);
+      on_account(part.query, [&](ContactQuery<N>& query) { query.turn(turn); });
       part.from_head = times<N>({rows[0][1], rows[1][1], rows[2][1]}, part.up);
     });
     turned_ = true;
   }
 
   void begin_tick() noexcept {
+    left_ = work_.budget();
     head_.begin_tick();
     each_behind([](Part& part) { part.query.begin_tick(); });
   }
   [[nodiscard]] const QueryWork& work() const noexcept { return work_; }
-  [[nodiscard]] bool half_spent() const noexcept { return spent() >= work_.budget() / 2; }
-  [[nodiscard]] bool may_query() const noexcept {
-    return work_.budget() - spent() >= work_.query + work_.closer;
-  }
-  [[nodiscard]] std::int64_t spent() const noexcept {
-    return head_.spent() + shaft_.query.spent() + (handpiece_ ? handpiece_->query.spent() : 0);
-  }
+  [[nodiscard]] bool half_spent() const noexcept { return left_ <= work_.budget() / 2; }
+  [[nodiscard]] bool may_query() const noexcept { return left_ >= work_.query + work_.closer; }
+  [[nodiscard]] std::int64_t spent() const noexcept { return work_.budget() - left_; }
 
   [[nodiscard]] Contacts<N> query(ContactVec<Real> q) noexcept {
     Contacts<N> felt;
@@ -107,9 +106,12 @@ class ToolQuery {
     felt.buried = !closer && !turned_;
     if (felt.buried) return felt;
     turned_ = false;
-    felt = head_.look(q, closer);
+    on_account(head_, [&](const ContactQuery<N>& head) { felt = head.look(q, closer); });
     each_behind([&](Part& part) {
-      const Contacts<N> seen = part.query.look(q + part.from_head, closer);
+      Contacts<N> seen;
+      on_account(part.query, [&](const ContactQuery<N>& query) {
+        seen = query.look(q + part.from_head, closer);
+      });
       for (std::size_t i = 0; i < static_cast<std::size_t>(seen.count); ++i) {
         ConstraintPlane<N> plane = seen.plane[i];
         plane.arm = plane.arm + part.from_head;
@@ -124,15 +126,16 @@ class ToolQuery {
 
   [[nodiscard]] bool is_solid(ContactVec<Real> q) const noexcept { return head_.is_solid(q); }
 
-  [[nodiscard]] Real free_distance(ContactVec<Real> q, ContactVec<Real> move) const noexcept {
+  [[nodiscard]] Real free_distance(ContactVec<Real> q, ContactVec<Real> move) noexcept {
     Real free = norm(move);
-    const auto look = [&](const ContactQuery<N>& part, ContactVec<Real> at) {
-      const std::int64_t work = work_.budget() - spent() - work_.query - work_.closer;
-      free = std::min(free, part.free_distance(at, move, work));
+    const auto look = [&](ContactQuery<N>& part, ContactVec<Real> at) {
+      const std::int64_t work = left_ - work_.query - work_.closer;
+      on_account(part, [&](const ContactQuery<N>& query) {
+        free = std::min(free, query.free_distance(at, move, work));
+      });
     };
     look(head_, q);
-    look(shaft_.query, q + shaft_.from_head);
-    if (handpiece_) look(handpiece_->query, q + handpiece_->from_head);
+    each_behind([&](Part& part) { look(part.query, q + part.from_head); });
     return free;
   }
 
@@ -143,6 +146,13 @@ class ToolQuery {
     ContactVec<Real> from_head{};  ///< `up` along the shaft as it is turned
   };
 
+  /// Lets a part work on the account of the whole tool.
+  template <class Work>
+  void on_account(ContactQuery<N>& part, Work&& work) noexcept {
+    part.set_left(left_);
+    work(part);
+    left_ = part.left();
+  }
   template <class Visit>
   void each_behind(Visit visit) noexcept {
     visit(shaft_);
@@ -154,7 +164,8 @@ class ToolQuery {
   Part shaft_;
   std::optional<Part> handpiece_;
   QueryWork work_;
-  bool turned_ = false;  ///< and not queried since
+  std::int64_t left_ = 0;  ///< of the tick's samples
+  bool turned_ = false;    ///< and not queried since
 };
 
 }  // namespace kerf
