@@ -28,7 +28,8 @@ struct CoveredVolumes {
 };
 
 /// What the materials of all volumes bear of the tool's press, where it covers several; leaves all
-/// as it is where nothing bears any.
+/// as it is where nothing bears any. A tool that is no ball may rest on its flank behind the
+/// centre: what may not be cut is not enough ahead of it.
 template <class N>
 void find_loads(const ServoPlan<N>& plan, const ServoState<N>& state,
                 WorldVec<typename N::Real> centre_mm, const ToolContact<N>& at,
@@ -43,7 +44,10 @@ void find_loads(const ServoPlan<N>& plan, const ServoState<N>& state,
     const VolumePlan<N>& volume = plan.volumes[v];
     load[v] = loads(covered.in[v], ahead_form<N>(place_in(volume, centre_mm),
                                                  tool.in_volume[v].rims_from_voxel, press));
-    for (const CutWeight<N> part : load[v]) whole += part;
+    const ByMaterial<bool>& forbidden = plan.force_cut.volume[v].forbidden;
+    for (std::size_t m = 0; m < kMaxCutMaterials; ++m) {
+      if (tool.round || !forbidden[m]) whole += load[v][m];
+    }
   }
   if (!(whole > 0)) return;
   for (std::size_t v = 0; v < plan.volume_count; ++v) covered.in[v].load = load[v];

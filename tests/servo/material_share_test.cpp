@@ -99,3 +99,27 @@ TEST_CASE("two materials under one face share the press by what lies ahead in ea
     CHECK(high / all == doctest::Approx(0.5).epsilon(0.05));
   }
 }
+
+TEST_CASE("a cone on its flank cuts the rim of a hole, whatever soft forbidden matter fills it") {
+  LoadedScene scene = bored_scene("cone");
+  // A hole of half the cone's largest radius, full of what bears nothing and may not be cut.
+  SceneVolume& volume = scene.volumes[0];
+  VolumeImage& image = volume.image;
+  const double corner_mm = volume.pose.position_mm[0];
+  const auto at_mm = [&](int i) { return corner_mm + i * kVoxelMm; };
+  for (int i = 0; i < int(image.grid.voxel_count()); ++i) {
+    const int n = image.grid.nx;
+    const double x = at_mm(i % n), y = at_mm(i / n % n), z = at_mm(i / n / n);
+    const bool hole = std::hypot(x, z) < 0.75 * kRadiusMm;
+    const auto at = static_cast<std::size_t>(i);
+    image.labels[at] = hole ? kLabelPulp : kLow;
+    image.density[at] = y > kTopMm ? Density{0} : hole ? Density{14000} : Density{65535};
+  }
+  scene.materials[kLabelPulp].forbidden = true;
+  const double half_mm = scene.tools[0].length_mm / 2;
+  Miller miller(scene, {0, kTopMm + half_mm + 0.5, 0});
+  const double before_mm3 = miller.removed_mm3();
+  const ServoOutput out = miller.hold({0, kTopMm - half_mm, 0}, 0.5);
+  CHECK(out.press_n > 0.1);
+  CHECK(miller.removed_mm3() > before_mm3 + 0.001);  // the soft matter takes its part of the press
+}
