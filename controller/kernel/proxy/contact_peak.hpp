@@ -216,7 +216,7 @@ template <class N>
 }
 
 /// The constraint plane of one volume's contact, by the samples of the point shell alone. `reach`
-/// of the tool is in units. A closer look corrects it near rest (contact_query.hpp). Its normal is
+/// of the tool is in units. A closer look corrects it near rest (closer_look.hpp). Its normal is
 /// 0 where the tool feels the same all round.
 template <class N>
 [[nodiscard]] constexpr ConstraintPlane<N> plane_of(const PointMeans<N>& means,

@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+
+#include "controller/kernel/point_shell/point_sums.hpp"
+#include "controller/kernel/point_shell/point_table.hpp"
+#include "controller/kernel/proxy/ball_cap.hpp"
+#include "controller/kernel/proxy/constraint_plane.hpp"
+#include "controller/kernel/proxy/contact_closeup.hpp"
+#include "controller/kernel/proxy/contact_math.hpp"
+#include "controller/kernel/proxy/contact_peak.hpp"
+#include "controller/kernel/proxy/normal_patch.hpp"
+#include "controller/kernel/proxy/sample_reader.hpp"
+#include "controller/kernel/proxy/spiral_points.hpp"
+#include "controller/kernel/proxy/tool_turn.hpp"
+
+namespace kerf {
+
+/// The closer look at one volume near rest (docs/theory.md 3.5): at a ball's two caps, or at
+/// another tool's close samples and a patch of the volume. It corrects the plane that the point
+/// shell tells. It lives within one query, with the tool's centre at `at`.
+template <class N>
+class CloserLook {
+ public:
+  using Real = typename N::Real;
+
+  CloserLook(const SampleReader<N>& reader, const ContactVolume<N>& volume, VoxelVec<Real> at,
+             const PointSums<N>& sums, const PointMeans<N>& means) noexcept
+      : reader_(reader),
+        points_(reader.points()),
+        volume_(volume),
+        at_(at),
+        sums_(sums),
+        means_(means) {}
+
+  /// Corrects `plane` where it is near enough to rest.
+  void correct(ConstraintPlane<N>& plane) const noexcept {
+    const bool round = points_.table.round;
+    if (round && plane.depth < Real(kCapBelow) && -plane.depth < Real(kCapAbove)) {
+      plane.depth = depth_around(plane);
+    } else if (!round && std::max(plane.depth, -plane.depth) < Real(kCloseDepth)) {
+      look_again(plane);
+    }
+  }
+
+ private:
+  /// Corrects the plane of a tool that is no ball: by the close samples around the peak, then by a
+  /// patch of the volume around the place that they find.
+  void look_again(ConstraintPlane<N>& plane) const noexcept {
+    if (points_.close.first == nullptr) return;
+    using Unit = typename N::Unit;
+    using Ratio = typename N::Ratio;
+    PointNumber<N> peak[3] = {};
+    peak_offset(sums_, fall_of(means_, false), peak);
+    Closeup<N> seen = reader_.look_closely_at(volume_, at_, peak);
+    Ratio height = seen.height;
+    // If the highest sample of the point shell was not among what was seen, the tool touches twice.
+    const auto share = falling_share<N>(Unit(means_.top - seen.top), 0.06, 0.02);
+    if (share < Unit(1)) {
+      const auto top = static_cast<std::size_t>(sums_.top_sample);
+      const auto& offset = points_.table.offset;
+      const Closeup<N> other =
+          reader_.look_closely_at(volume_, at_, {offset[0][top], offset[1][top], offset[2][top]});
+      height = other.height + multiply<Ratio>(share, height - other.height);
+      if (share <= Unit(0)) seen = other;
+    }
+    const auto offset = turned_offset<N>(seen.offset, reader_.rows());
+    const ContactVec<Real> arm{multiply<Real>(offset.x, points_.reach),
+                               multiply<Real>(offset.y, points_.reach),
+                               multiply<Real>(offset.z, points_.reach)};
+    const VoxelVec<Real> middle = at_ + volume_.frame.voxel_from_contact * arm;
+    // The first patch lies askew, as its normal is that of the middle.
+    auto gradient = patch_gradient(middle, plane.normal);
+    gradient = patch_gradient(middle, direction<N>(-gradient));
+    const auto normal = direction<N>(-gradient);
+    // Where the tool's own gradient is far less than the patch's, it touches faces that look
+    // elsewhere.
+    const Ratio steep = norm(gradient);
+    if (steep < Ratio(0.01)) return;
+    const Ratio along = -(multiply<Ratio>(means_.gradient.x, normal.x) +
+                          multiply<Ratio>(means_.gradient.y, normal.y) +
+                          multiply<Ratio>(means_.gradient.z, normal.z));
+    const Unit alike =
+        Unit(1) -
+        falling_share<N>(Unit(std::clamp(along / steep, Ratio(0), Ratio(1))), kAlike, kUnlike);
+    const Ratio own = peak_height(means_, false);
+    plane.depth = depth_of<N>(own + multiply<Ratio>(alike, std::max(height, means_.top) - own),
+                              slope_along(means_, plane.normal, false));
+    const Unit counts = alike * share * narrowness<N>(sums_, means_.top);
+    plane.arm = plane.arm + part_of<N>(arm - plane.arm, counts);
+    plane.normal = between<N>(plane.normal, normal, counts);
+  }
+
+  /// The mean gradient over a patch that is flattened along `normal`.
+  [[nodiscard]] ContactVec<typename N::Ratio> patch_gradient(
+      VoxelVec<Real> middle, ContactVec<typename N::Unit> normal) const noexcept {
+    constexpr PointShell<N> kPatch{kPatchArrays<N>.table(), {}, Real(kPatchRadius), 15};
+    SpiralPlaces<N, kPatchSamples> memory;
+    const PointPlaces<N> places = memory.places();
+    reader_.place(kPatch, flattened<N>(normal), volume_.frame, places);
+    const PointSums<N> patch = reader_.sums_at(volume_.field, kPatch.table, places, middle);
+    if (patch.weight <= typename N::Sum(0)) return {};
+    return mean_gradient<N>(patch, volume_.field.scale, volume_.frame);
+  }
+
+  /// A ball's depth by its caps around the middle of the contact, as far as the contact is sharp.
+  [[nodiscard]] Real depth_around(const ConstraintPlane<N>& plane) const noexcept {
+    using Ratio = typename N::Ratio;
+    using Unit = typename N::Unit;
+    const Ratio height = peak_height(means_, true), slope = slope_along(means_, plane.normal, true);
+    const Unit sharp = sharpness(sums_, points_.table.count, height, slope, points_.reach);
+    const auto out = direction<N>(means_.offset);
+    if (sharp <= Unit(0) || out == decltype(out){}) return plane.depth;
+    const Real half = multiply<Real>(points_.reach, Unit(0.5));
+    const Real wide = std::min(Real(kCapRadius), half),
+               narrow = std::min(Real(kSummitRadius), half);
+    const PointMeans<N> found = cap_means(out, kCapArrays<N>, wide);
+    const Unit share(wide / points_.reach);
+    const auto moved = [&](Unit from, Ratio by) {
+      return Ratio(from) + multiply<Ratio>(share, by);
+    };
+    const auto up = direction<N>(ContactVec<Ratio>{
+        moved(out.x, found.offset.x), moved(out.y, found.offset.y), moved(out.z, found.offset.z)});
+    const PointMeans<N> near = cap_means(up, kSummitArrays<N>, narrow);
+    if (near.density <= Ratio(0)) return plane.depth;
+    const Ratio summit = peak_height(near, false);
+    return depth_of<N>(height + multiply<Ratio>(sharp, summit - height), slope) +
+           multiply<Real>(sharp, Real(kSummitAbove));
+  }
+
+  /// Means over a cap in the direction `out` from a ball's centre; 0 where it feels nothing.
+  template <std::size_t kCount>
+  [[nodiscard]] PointMeans<N> cap_means(ContactVec<typename N::Unit> out,
+                                        const SpiralArrays<N, kCount>& arrays,
+                                        Real radius) const noexcept {
+    const PointShell<N> cap{arrays.table(), {}, radius, 14};
+    SpiralPlaces<N, kCount> memory;
+    const PointPlaces<N> places = memory.places();
+    const TurnRows<N> rows = cap_rows<N>(out, radius, points_.reach);
+    reader_.place(cap, rows, volume_.frame, places);
+    const VoxelVec<Real> top =
+        at_ + volume_.frame.voxel_from_contact * times<N>(out, points_.reach);
+    const PointSums<N> sums = reader_.sums_at(volume_.field, cap.table, places, top);
+    if (sums.weight <= typename N::Sum(0)) return {};
+    return point_means<N>(sums, volume_.field.scale, volume_.frame, rows, false);
+  }
+
+  const SampleReader<N>& reader_;
+  const PointShell<N>& points_;
+  const ContactVolume<N>& volume_;
+  VoxelVec<Real> at_;
+  const PointSums<N>& sums_;
+  const PointMeans<N>& means_;
+};
+
+}  // namespace kerf

@@ -1,0 +1,200 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+
+#include "controller/kernel/kernel_set.hpp"
+#include "controller/kernel/point_shell/point_sums.hpp"
+#include "controller/kernel/point_shell/point_table.hpp"
+#include "controller/kernel/proxy/contact_closeup.hpp"
+#include "controller/kernel/proxy/contact_math.hpp"
+#include "controller/kernel/proxy/query_work.hpp"
+#include "controller/kernel/proxy/tool_turn.hpp"
+#include "shared/numeric/fixed.hpp"
+
+namespace kerf {
+
+/// A tool as contact sees it: its point shell and, of a shape that is no ball, close samples.
+template <class N>
+struct PointShell {
+  PointTable<N> table;
+  CloseTable<N> close;         ///< none of a ball
+  typename N::Real reach{};    ///< units from the centre to the farthest sample
+  std::int32_t step_bits = 0;  ///< fraction bits of PointStep's rows: reach 2^step_bits < 2^16
+};
+
+/// One solid volume, and memory for the tool's places in it, which belongs to the servo.
+template <class N>
+struct ContactVolume {
+  DensityField field;
+  ContactFrame<N> frame;
+  PointPlaces<N> places;
+};
+
+/// Reads samples of one tool in solid volumes, and counts what it reads: the work that is left of a
+/// tick, in the samples of `QueryWork`. In fixed all kernels give the same bits. Servo thread; no
+/// heap.
+template <class N>
+class SampleReader {
+ public:
+  using Real = typename N::Real;
+  static constexpr auto kIsoDensity = N::kIsFixed ? PointNumber<N>(1 << 14) : PointNumber<N>(0.5);
+
+  /// `kernels` serve fixed point alone.
+  constexpr SampleReader(const KernelSet& kernels, const PointShell<N>& points) noexcept
+      : kernels_(kernels), points_(points) {}
+
+  [[nodiscard]] const PointShell<N>& points() const noexcept { return points_; }
+  [[nodiscard]] const TurnRows<N>& rows() const noexcept { return rows_; }
+  /// Orients the tool from now on; `place` its samples in each volume then.
+  void turn(const TurnRows<N>& rows) noexcept { rows_ = rows; }
+
+  /// Work that is left of the tick; without end before the first `set_left`.
+  [[nodiscard]] std::int64_t left() const noexcept { return left_; }
+  void set_left(std::int64_t left) noexcept { left_ = left; }
+  void spend(std::int64_t work) const noexcept { left_ -= work; }
+
+  /// A number as point tables have it.
+  [[nodiscard]] static PointNumber<N> number_of(Real x) noexcept {
+    if constexpr (N::kIsFixed) {
+      return x.raw();
+    } else {
+      return x;
+    }
+  }
+  /// A place in voxels of a volume.
+  [[nodiscard]] static VoxelVec<Real> place_of(const ContactVolume<N>& volume,
+                                               ContactVec<Real> q) noexcept {
+    return volume.frame.voxel_from_contact * q + volume.frame.origin_vox;
+  }
+
+  /// Places samples in a volume, turned by `rows`.
+  void place(const PointShell<N>& points, const TurnRows<N>& rows, const ContactFrame<N>& frame,
+             const PointPlaces<N>& places) const noexcept {
+    const PointStep<N> step = step_of(points, rows, frame);
+    if constexpr (N::kIsFixed) {
+      kernels_.place_points(points.table, step, places);
+    } else {
+      place_points(points.table, step, places);
+    }
+  }
+
+  /// What samples at `places` feel about the place `at`.
+  [[nodiscard]] PointSums<N> sums_at(const DensityField& field, const PointTable<N>& table,
+                                     const PointPlaces<N>& places,
+                                     VoxelVec<Real> at) const noexcept {
+    const PointNumber<N> centre[3] = {number_of(at.x), number_of(at.y), number_of(at.z)};
+    PointSums<N> sums;
+    if constexpr (N::kIsFixed) {
+      kernels_.sum_points(table, places, centre, field, sums);
+    } else {
+      sums = point_sums<N>(table, places, centre, field);
+    }
+    left_ -= QueryWork::kLookSamples + sums.read;
+    return sums;
+  }
+
+  /// The peak of the close samples around an offset of the tool, whose centre is at `at`.
+  [[nodiscard]] Closeup<N> look_closely_at(const ContactVolume<N>& volume, VoxelVec<Real> at,
+                                           const PointNumber<N> (&offset)[3]) const noexcept {
+    CloseSamples<N> samples;
+    samples.take(points_.close, offset);
+    const PointTable<N> table = samples.table();
+    const PointPlaces<N> places = samples.places();
+    const PointStep<N> step = step_of(points_, rows_, volume.frame);
+    const PointNumber<N> centre[3] = {number_of(at.x), number_of(at.y), number_of(at.z)};
+    CloseSums<N> sums;
+    if constexpr (N::kIsFixed) {
+      kernels_.place_points(table, step, places);
+      kernels_.read_points(places, table.count, centre, volume.field, samples.density.data());
+      samples.fade(table);
+      kernels_.sum_close(table, samples.density.data(), sums);
+    } else {
+      place_points(table, step, places);
+      read_points<N>(places, table.count, centre, volume.field, samples.density.data());
+      samples.fade(table);
+      sums = close_sums<N>(table, samples.density.data());
+    }
+    left_ -= QueryWork::kLookSamples + QueryWork::kCloseSamples * table.count;
+    return peak_of(sums);
+  }
+
+  /// Whether a voxel near a sample reaches the iso: where none does, no summit between the samples
+  /// does (docs/theory.md 3.2).
+  [[nodiscard]] bool iso_is_near(const ContactVolume<N>& volume, VoxelVec<Real> at,
+                                 std::int32_t sample) const noexcept {
+    constexpr std::int32_t kNear = 3;  // voxels: the reach of a closeup, and its cell
+    left_ -= kNear * kNear * kNear;    // a sample has eight voxels
+    const VoxelGrid& grid = volume.field.grid;
+    const PointNumber<N> centre[3] = {number_of(at.x), number_of(at.y), number_of(at.z)};
+    const std::int32_t end[3] = {grid.nx, grid.ny, grid.nz};
+    std::int32_t from[3] = {}, to[3] = {};
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const PointNumber<N> place = centre[axis] + volume.places.offset_vox[axis][sample];
+      const auto low = static_cast<std::int32_t>(N::kIsFixed ? place / 65536 : place);
+      from[axis] = std::max(low - kNear + 1, 0);
+      to[axis] = std::min(low + kNear + 1, end[axis]);
+    }
+    const DensityScale& scale = volume.field.scale;
+    for (std::int32_t z = from[2]; z < to[2]; ++z) {
+      for (std::int32_t y = from[1]; y < to[1]; ++y) {
+        for (std::int32_t x = from[0]; x < to[0]; ++x) {
+          const std::uint64_t density = volume.field.density[grid.index(x, y, z)];
+          if ((density * scale.mantissa >> scale.shift) >= 32768) return true;
+        }
+      }
+    }
+    return false;
+  }
+
+  /// A volume's own density at a place, 0 to 1.
+  [[nodiscard]] static Real density_at(const ContactVolume<N>& volume,
+                                       ContactVec<Real> place) noexcept {
+    DensityField plain = volume.field;
+    plain.scale = {};
+    const VoxelVec<Real> at = place_of(volume, place);
+    const auto density =
+        point_sample<N>(plain, {number_of(at.x), number_of(at.y), number_of(at.z)}).density;
+    if constexpr (N::kIsFixed) {
+      return Real::from_raw(density * 2);
+    } else {
+      return density;
+    }
+  }
+
+ private:
+  /// The matrix that takes a tool's offsets to voxels; `rows` turns them to the world's axes.
+  [[nodiscard]] static PointStep<N> step_of(const PointShell<N>& points, const TurnRows<N>& rows,
+                                            const ContactFrame<N>& frame) noexcept {
+    PointStep<N> step;
+    step.shift = 15 + points.step_bits - 16;  // from offsets times rows to Q15.16
+    for (std::size_t i = 0; i < 3; ++i) {
+      const auto& m = frame.voxel_from_contact.row[i];
+      for (std::size_t j = 0; j < 3; ++j) {
+        if constexpr (N::kIsFixed) {
+          std::int64_t turned = 0;  // Q24 Q30 = Q54, three terms of 2^54
+          for (std::size_t k = 0; k < 3; ++k) {
+            turned += std::int64_t{m[k].raw()} * rows[k][j].raw();
+          }
+          // Q30 times a reach in Q16: 2^30 2^22.
+          const std::int64_t reached = round_shift(turned, 24) * points.reach.raw();
+          step.row[i][j] = static_cast<std::int32_t>(round_shift(reached, 46 - points.step_bits));
+        } else {
+          step.row[i][j] =
+              points.reach * (m[0] * rows[0][j] + m[1] * rows[1][j] + m[2] * rows[2][j]);
+        }
+      }
+    }
+    return step;
+  }
+
+  const KernelSet& kernels_;
+  const PointShell<N>& points_;
+  TurnRows<N> rows_{};
+  mutable std::int64_t left_ = std::numeric_limits<std::int64_t>::max();
+};
+
+}  // namespace kerf
