@@ -8,8 +8,8 @@
 
 #include <doctest/doctest.h>
 
+#include "tests/case_count.hpp"
 #include "tests/kernel/aligned_support.hpp"
-#include "tests/kernel/case_count.hpp"
 #include "tests/kernel/hash.hpp"
 
 using namespace kerf;

@@ -17,7 +17,7 @@
 #include "controller/kernel/kernel_set.hpp"
 #include "controller/kernel/proxy/contact_closeup.hpp"
 #include "controller/plan/tables/close_cells.hpp"
-#include "tests/kernel/case_count.hpp"
+#include "tests/case_count.hpp"
 #include "tests/kernel/contact_support.hpp"
 
 using namespace kerf;

@@ -9,7 +9,7 @@
 #include <doctest/doctest.h>
 
 #include "controller/kernel/proxy/proxy_sweep.hpp"
-#include "tests/kernel/case_count.hpp"
+#include "tests/case_count.hpp"
 #include "tests/kernel/contact_support.hpp"
 
 using namespace kerf;

@@ -11,8 +11,8 @@
 #include <doctest/doctest.h>
 
 #include "controller/plan/tables/sample_tool.hpp"
+#include "tests/case_count.hpp"
 #include "tests/kernel/aligned_support.hpp"
-#include "tests/kernel/case_count.hpp"
 
 using namespace kerf;
 using namespace kerf::test;

@@ -10,7 +10,7 @@
 
 #include <doctest/doctest.h>
 
-#include "tests/kernel/case_count.hpp"
+#include "tests/case_count.hpp"
 #include "tests/kernel/contact_support.hpp"
 
 using namespace kerf;

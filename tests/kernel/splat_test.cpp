@@ -12,8 +12,8 @@
 
 #include "controller/plan/tables/sample_tool.hpp"
 #include "controller/plan/tables/tick_memory.hpp"
+#include "tests/case_count.hpp"
 #include "tests/kernel/aligned_support.hpp"
-#include "tests/kernel/case_count.hpp"
 #include "tests/kernel/definitions.hpp"
 #include "tests/kernel/hash.hpp"
 

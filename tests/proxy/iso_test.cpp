@@ -8,6 +8,7 @@
 
 #include "lab/rig/iso_rest.hpp"
 #include "lab/rig/wall_shake.hpp"
+#include "tests/case_count.hpp"
 
 using namespace kerf;
 using namespace kerf::extremes;
@@ -49,7 +50,7 @@ TEST_CASE_TEMPLATE("walls of low iso hold a ball and a turning cylinder", N, Fix
     for (const double iso : {0.02, 0.05, 0.3}) {
       Dice dice(3);
       Shaken seen;
-      for (int wall = 0; wall < 8; ++wall) {
+      for (int wall = 0; wall < test::cases(8); ++wall) {
         const auto level = static_cast<Density>(std::lround(iso * kDensityMax));
         shake<N>(2, tool, made, 250, dice, seen, level);
       }

@@ -8,6 +8,7 @@
 #include <doctest/doctest.h>
 
 #include "lab/rig/guided_tool.hpp"
+#include "tests/case_count.hpp"
 
 using namespace kerf;
 using namespace kerf::extremes;
@@ -66,11 +67,11 @@ TEST_CASE_TEMPLATE("a tool that turns on and on askew in a tight hollow is pulle
     double radius, length;
   };
   Dice dice(1);
-  constexpr int kRounds = N::kIsFixed ? 40 : 5;
+  const int rounds = test::cases(N::kIsFixed ? 40 : 5);
   for (const auto [radius, length] : {Cylinder{7, 20}, Cylinder{8, 24}, Cylinder{10, 30}}) {
     const SampledTool tool(tool_of_units("cylinder", radius, length));
     const int lifted = static_cast<int>((kTop + 3 + length / 2 - kBottom) / 0.2);
-    for (int round = 0; round < kRounds; ++round) {
+    for (int round = 0; round < rounds; ++round) {
       for (const Hollow hollow : {Hollow::well, Hollow::slot}) {
         const double play = dice.uniform(0.12, 0.6);
         const bool fast = dice.uniform(0, 1) < 0.5;

@@ -6,7 +6,7 @@
 #include <doctest/doctest.h>
 
 #include "lab/rig/wall_shake.hpp"
-#include "tests/kernel/case_count.hpp"
+#include "tests/case_count.hpp"
 
 using namespace kerf;
 using namespace kerf::extremes;
