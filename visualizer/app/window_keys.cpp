@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "visualizer/app/window_keys.hpp"
 
+#include <algorithm>
 #include <array>
 #include <chrono>
+#include <cstddef>
+#include <cstdint>
 #include <cstdio>
 #include <filesystem>
 #include <stdexcept>
@@ -38,9 +41,29 @@ Notice write_for_user(const std::string& what, const Write& write) {
   }
 }
 
+using namespace std::string_literals;
+using Clock = std::chrono::steady_clock;
+
+/// Asks for the tool of a digit's key.
+void take_tool(char key, Session& session, Notices& notices) {
+  const std::size_t tools = session.scene().tools.size();
+  const auto index = static_cast<std::size_t>(key - '1');
+  if (index >= tools) {
+    notices.say({no_such_tool(index, tools), true}, Clock::now());
+  } else if (!session.select_tool(static_cast<std::uint32_t>(index))) {
+    notices.say({"tool "s + key + ": the controller did not take it; press the key again", true},
+                Clock::now());
+  }
+}
+
 }  // namespace
 
-using Clock = std::chrono::steady_clock;
+std::string no_such_tool(std::size_t index, std::size_t tools) {
+  const std::string last =
+      tools > 1 ? " to " + std::to_string(std::min<std::size_t>(tools, 9)) : "";
+  return "tool " + std::to_string(index + 1) + ": the scene has " + std::to_string(tools) +
+         "; press 1" + last;
+}
 
 void change_look(Picture& picture, const Session& session, const Look& look, Notices& notices) {
   try {
@@ -79,10 +102,7 @@ bool WindowKeys::apply(const WindowInput& input, Session& session, Picture& pict
     }
     if (key == 'c') look.clip.on = !look.clip.on;
     if (key == 't') look.stereo.on = !look.stereo.on;
-    const int tool = key - '1';
-    if (tool >= 0 && tool < static_cast<int>(session.scene().tools.size())) {
-      session.select_tool(static_cast<std::uint32_t>(tool));
-    }
+    if (key >= '1' && key <= '9') take_tool(key, session, notices);
   }
   change_look(picture, session, look, notices);
   return quit;

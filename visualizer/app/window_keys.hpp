@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <optional>
+#include <string>
 
 #include "visualizer/app/film.hpp"
 #include "visualizer/app/options.hpp"
@@ -16,6 +17,9 @@ namespace kerf {
 /// Gives the picture another look. Where its renderer cannot show these volumes, the picture keeps
 /// its look and a notice says why.
 void change_look(Picture& picture, const Session& session, const Look& look, Notices& notices);
+
+/// What a user is told who asks for tool `index`, counted from 0, of a scene that has `tools`.
+[[nodiscard]] std::string no_such_tool(std::size_t index, std::size_t tools);
 
 /// What the keys of a window have switched, and what they have asked for. Who does what was asked
 /// sets it back to false.

@@ -2,6 +2,7 @@
 #include <doctest/doctest.h>
 
 #include "visualizer/app/window_figures.hpp"
+#include "visualizer/app/window_keys.hpp"
 
 using namespace kerf;
 
@@ -40,4 +41,9 @@ TEST_CASE("with the panels hidden a notice shows only where it is a problem") {
   notices.say({"a.ply: no room", true}, now);
   CHECK(shown(notices, now, true).banner == "a.ply: no room");
   CHECK(shown(notices, now, true).alarm);
+}
+
+TEST_CASE("a tool that a scene lacks is told with the keys that it has") {
+  CHECK(no_such_tool(6, 3) == "tool 7: the scene has 3; press 1 to 3");
+  CHECK(no_such_tool(1, 1) == "tool 2: the scene has 1; press 1");
 }
