@@ -17,9 +17,9 @@ namespace kerf {
 /// play (docs/theory.md 6.3); units of contact space. While it finds less than its force would cut
 /// it reaches deeper, up to kDeepestAdvance, and then slowly back.
 ///
-/// It may find less because its inner samples end inside of its surface, of an odd shape by up to
-/// 0.7 of a pitch: its rims then rest on matter that they do not cover. A ball that is given by its
-/// radius has samples at its surface at six poles alone.
+/// It may find less because its inner samples end inside of its surface, by up to a pitch
+/// (SampleLattice::cover): its rims then rest on matter of which they cover little. A ball that is
+/// given by its radius has samples at its surface at six poles alone.
 inline constexpr double kCutAdvance = 0.25, kDeepestAdvance = 1;
 
 /// Cutting by force; constant during a run. Arrays: by index of the plan's volumes.

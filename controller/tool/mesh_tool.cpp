@@ -10,10 +10,15 @@
 #include <utility>
 #include <vector>
 
+#include "controller/tool/sample_lattice.hpp"
 #include "controller/tool/tool_shapes.hpp"
+#include "shared/numeric/vec3.hpp"
 
 namespace kerf {
 namespace {
+
+using vec3::length;
+using vec3::operator+, vec3::operator-, vec3::operator*;
 
 // Coordinates in half pitches with so many fraction bits. A mesh reaches 2^7 half pitches at most,
 // so products of differences are below 2^57.
@@ -32,7 +37,7 @@ Grid grid_of(const ToolMesh& mesh, double pitch_mm) {
     across_mm = std::max({across_mm, std::abs(x), std::abs(z)});
     high_mm = std::max(high_mm, y);
   }
-  const double reach = std::floor(across_mm / pitch_mm * (1 + 1e-9));
+  const double reach = std::ceil(across_mm / pitch_mm * (1 - 1e-9));
   return {2 * reach + 1, std::max(1.0, std::round(2 * high_mm / pitch_mm))};
 }
 
@@ -153,6 +158,21 @@ std::vector<std::array<Seen, 3>> seen_triangles(const ToolMesh& mesh, double hal
   return triangles;
 }
 
+/// Places of each triangle, at most half a pitch apart.
+void cover_surface(const ToolMesh& mesh, double pitch_mm, SampleLattice& lattice) {
+  for (const ToolMesh::Triangle& t : mesh.triangles) {
+    const auto [a, b, c] = mesh.corners(t);
+    const auto to_b = 1 / pitch_mm * (b - a), to_c = 1 / pitch_mm * (c - a);
+    const double longest = std::max({length(to_b), length(to_c), length(to_c - to_b)});
+    const int parts = std::max(1, static_cast<int>(std::ceil(2 * longest)));
+    for (int i = 0; i <= parts; ++i) {
+      for (int j = 0; j <= parts - i; ++j) {
+        lattice.cover(1 / pitch_mm * a + double(i) / parts * to_b + double(j) / parts * to_c);
+      }
+    }
+  }
+}
+
 }  // namespace
 
 double mesh_side_vox(const ToolMesh& mesh, double pitch_mm) {
@@ -184,16 +204,19 @@ SceneTool make_mesh_tool(std::string name, ToolMesh mesh, double pitch_mm) {
   for (const Nudge nudge : {Nudge{1, 1}, Nudge{1, -1}, Nudge{-1, 1}, Nudge{-1, -1}}) {
     columns.keep(triangles, nudge);
   }
+  SampleLattice lattice(across, along);
+  bool any = false;
   for (std::int32_t y = 0; y < along; ++y) {
     for (std::int32_t z = 0; z < across; ++z) {
       for (std::int32_t x = 0; x < across; ++x) {
         if (!columns.inside(x, y, z)) continue;
-        tool.offsets.push_back({static_cast<std::int16_t>(2 * x + 1 - across),
-                                static_cast<std::int16_t>(2 * y + 1 - along),
-                                static_cast<std::int16_t>(2 * z + 1 - across)});
+        lattice.keep(x, y, z);
+        any = true;
       }
     }
   }
+  if (any) cover_surface(mesh, pitch_mm, lattice);
+  tool.offsets = lattice.offsets();
   tool.mesh = std::move(mesh);
   return tool;
 }

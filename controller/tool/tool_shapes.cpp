@@ -7,6 +7,8 @@
 #include <numbers>
 #include <utility>
 
+#include "controller/tool/sample_lattice.hpp"
+
 namespace kerf {
 namespace {
 
@@ -48,11 +50,31 @@ struct HeadGrid {
 
 HeadGrid head_grid(std::string_view shape, const ToolSize& size) {
   const HeadSize head = head_size(shape, size);
-  // A radius of exactly n pitches reaches n samples, however the quotient was rounded.
-  const double reach = std::floor(head.radius_mm / size.pitch_mm * (1 + 1e-12));
+  // A radius of exactly n pitches reaches n samples, however the quotient was rounded. Of what is
+  // no ball the lattice reaches as far as the surface (SampleLattice::cover).
+  const double pitches = head.radius_mm / size.pitch_mm;
+  const double reach =
+      shape == "ball" ? std::floor(pitches * (1 + 1e-12)) : std::ceil(pitches * (1 - 1e-12));
   const double across = size.size_vox ? *size.size_vox : 2 * reach + 1;
   if (shape == "ball") return {across, across};
   return {across, std::max(1.0, std::round(head.length_mm / size.pitch_mm))};
+}
+
+/// Rings a quarter of a pitch apart, of places as far apart.
+void cover_surface(const SceneTool& tool, SampleLattice& lattice) {
+  const double apart_mm = tool.pitch_mm / 4;
+  const double long_mm = std::numbers::pi / 2 * (tool.length_mm + tool.radius_mm);
+  for (const auto& [y_mm, radius_mm] :
+       tool_profile(tool, static_cast<int>(std::ceil(long_mm / apart_mm)))) {
+    // As many in each eighth, so that all are alike.
+    const double eighth_mm = std::numbers::pi / 4 * radius_mm;
+    const int count = 8 * std::max(1, static_cast<int>(std::ceil(eighth_mm / apart_mm)));
+    for (int i = 0; i < count; ++i) {
+      const double angle = 2 * std::numbers::pi * i / count;
+      lattice.cover({radius_mm * std::cos(angle) / tool.pitch_mm, y_mm / tool.pitch_mm,
+                     radius_mm * std::sin(angle) / tool.pitch_mm});
+    }
+  }
 }
 
 }  // namespace
@@ -85,20 +107,22 @@ SceneTool make_tool(std::string name, std::string shape, const ToolSize& size) {
   tool.round = tool.shape == "ball";
   tool.size_vox = {across, along, across};
 
+  SampleLattice lattice(across, along);
   const double half_pitch_mm = size.pitch_mm / 2;
   // A sample that lies on the surface is kept, however the radius was rounded.
   const double on_surface = 1e-9 * head.radius_mm * head.radius_mm;
-  for (std::int32_t y = 1 - along; y < along; y += 2) {
-    const double radius_mm = profile_radius_mm(tool, y * half_pitch_mm);
+  for (std::int32_t y = 0; y < along; ++y) {
+    const double radius_mm = profile_radius_mm(tool, (2 * y + 1 - along) * half_pitch_mm);
     const double limit = (radius_mm * radius_mm + on_surface) / (half_pitch_mm * half_pitch_mm);
-    for (std::int32_t z = 1 - across; z < across; z += 2) {
-      for (std::int32_t x = 1 - across; x < across; x += 2) {
-        if (x * x + z * z > limit) continue;
-        tool.offsets.push_back({static_cast<std::int16_t>(x), static_cast<std::int16_t>(y),
-                                static_cast<std::int16_t>(z)});
+    for (std::int32_t z = 0; z < across; ++z) {
+      for (std::int32_t x = 0; x < across; ++x) {
+        const std::int32_t right = 2 * x + 1 - across, back = 2 * z + 1 - across;
+        if (right * right + back * back <= limit) lattice.keep(x, y, z);
       }
     }
   }
+  if (!tool.round) cover_surface(tool, lattice);
+  tool.offsets = lattice.offsets();
   assert(!tool.offsets.empty() && tool.offsets.size() <= kMaxToolOffsets);
   return tool;
 }

@@ -30,13 +30,14 @@ class Miller {
       mm3_per_step_.push_back(h[0] * h[1] * h[2] / kDensityMax);
     }
     servo_ = compile(scene);
-    const int rest = kDockTicks * std::max(1, scene.servo.rate_hz / 1000);
-    for (int tick = 0; tick < rest; ++tick) static_cast<void>(servo_->step(arm_.docked()));
+    const int per_ms = std::max(1, scene.servo.rate_hz / 1000);
+    for (int tick = 0; tick < kDockTicks * per_ms; ++tick)
+      static_cast<void>(servo_->step(arm_.docked()));
     constexpr std::array<double, 3> kAbove{0, 30, -60};
-    constexpr int kSteps = 200;
-    arm_at(*servo_, arm_, kAbove[0], kAbove[1], kAbove[2]);
-    for (int i = 1; i <= kSteps; ++i) {
-      const double s = double(i) / kSteps;
+    const int steps = 200 * per_ms;
+    arm_at(*servo_, arm_, kAbove[0], kAbove[1], kAbove[2], per_ms);
+    for (int i = 1; i <= steps; ++i) {
+      const double s = double(i) / steps;
       static_cast<void>(
           step({s * start_mm[0], kAbove[1] + s * (start_mm[1] - kAbove[1]), (1 - s) * kAbove[2]}));
     }

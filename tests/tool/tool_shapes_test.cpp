@@ -37,6 +37,19 @@ double analytic_volume_mm3(const SceneTool& tool) {
   return pi * (core * core * l + core * pi * rim * rim + 4.0 / 3 * rim * rim * rim);
 }
 
+/// How far a place lies outside of a solid of revolution; 0 in it.
+double outside_mm(const SceneTool& tool, double y_mm, double radius_mm) {
+  if (radius_mm <= kerf::profile_radius_mm(tool, y_mm * (1 - 1e-12)) + 1e-4 * tool.radius_mm) {
+    return 0;
+  }
+  double nearest_mm = std::numeric_limits<double>::max();
+  for (const auto& [y, radius] : kerf::tool_profile(tool, 2000)) {
+    const double across = std::max(0.0, radius_mm - radius);
+    nearest_mm = std::min(nearest_mm, std::hypot(y - y_mm, across));
+  }
+  return nearest_mm;
+}
+
 }  // namespace
 
 TEST_CASE("balls counted in voxels have the sample counts of the paper") {
@@ -142,10 +155,11 @@ TEST_CASE("any size within the limits gives samples, inside the profile and with
     RC_ASSERT(tool.offsets.size() <= kerf::kMaxToolOffsets);
     for (const auto& [x, y, z] : tool.offsets) {
       const double half_mm = tool.pitch_mm / 2;
-      const double radius_mm = std::hypot(x * half_mm, z * half_mm);
-      RC_ASSERT(radius_mm <= tool.radius_mm * (1 + 1e-9));
-      RC_ASSERT(radius_mm <=
-                kerf::profile_radius_mm(tool, y * half_mm * (1 - 1e-12)) + 1e-4 * tool.radius_mm);
+      // Half a pitch across each way, and three quarters along a head that is no whole pitches
+      // long.
+      RC_ASSERT(outside_mm(tool, y * half_mm, std::hypot(x * half_mm, z * half_mm)) <=
+                std::hypot(0.5, 0.5, 0.75) * tool.pitch_mm * (1 + 1e-9));
+
       RC_ASSERT(std::abs(x) < tool.size_vox[0]);
       RC_ASSERT(std::abs(y) < tool.size_vox[1]);
       RC_ASSERT(std::abs(z) < tool.size_vox[2]);
