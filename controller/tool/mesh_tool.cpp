@@ -37,7 +37,7 @@ Grid grid_of(const ToolMesh& mesh, double pitch_mm) {
     across_mm = std::max({across_mm, std::abs(x), std::abs(z)});
     high_mm = std::max(high_mm, y);
   }
-  const double reach = std::ceil(across_mm / pitch_mm * (1 - 1e-9));
+  const double reach = std::floor(across_mm / pitch_mm * (1 + 1e-9));
   return {2 * reach + 1, std::max(1.0, std::round(2 * high_mm / pitch_mm))};
 }
 

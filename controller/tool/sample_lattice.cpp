@@ -55,6 +55,19 @@ void SampleLattice::cover(const std::array<double, 3>& place) {
   }
 }
 
+std::int32_t SampleLattice::taken_across() const {
+  std::int32_t first = across_ / 2;
+  for (std::int32_t y = 0; y < along_; ++y) {
+    for (std::int32_t z = 0; z < across_; ++z) {
+      for (std::int32_t x = 0; x < across_; ++x) {
+        if (!has(x, y, z)) continue;
+        first = std::min({first, x, z, across_ - 1 - x, across_ - 1 - z});
+      }
+    }
+  }
+  return across_ - 2 * first;
+}
+
 std::vector<ToolOffset> SampleLattice::offsets() const {
   std::vector<ToolOffset> offsets;
   const auto half_pitches = [](std::int32_t index, std::int32_t side) {
@@ -63,7 +76,7 @@ std::vector<ToolOffset> SampleLattice::offsets() const {
   for (std::int32_t y = 0; y < along_; ++y) {
     for (std::int32_t z = 0; z < across_; ++z) {
       for (std::int32_t x = 0; x < across_; ++x) {
-        if (!kept_[index(x, y, z)] && !added_[index(x, y, z)]) continue;
+        if (!has(x, y, z)) continue;
         offsets.push_back(
             {half_pitches(x, across_), half_pitches(y, along_), half_pitches(z, across_)});
       }

@@ -33,10 +33,16 @@ class SampleLattice {
   /// cut, so the tool would rest on it for ever (docs/theory.md 6.3).
   void cover(const std::array<double, 3>& place);
 
+  /// The side along x and z that samples take up: `across`, less the empty planes at its ends.
+  [[nodiscard]] std::int32_t taken_across() const;
+
   /// Of all samples, ordered by y, then z, then x.
   [[nodiscard]] std::vector<ToolOffset> offsets() const;
 
  private:
+  [[nodiscard]] bool has(std::int32_t x, std::int32_t y, std::int32_t z) const {
+    return kept_[index(x, y, z)] || added_[index(x, y, z)];
+  }
   [[nodiscard]] std::size_t index(std::int32_t x, std::int32_t y, std::int32_t z) const {
     return static_cast<std::size_t>((y * across_ + z) * across_ + x);
   }

@@ -105,7 +105,6 @@ SceneTool make_tool(std::string name, std::string shape, const ToolSize& size) {
   tool.radius_mm = head.radius_mm;
   tool.length_mm = head.length_mm;
   tool.round = tool.shape == "ball";
-  tool.size_vox = {across, along, across};
 
   SampleLattice lattice(across, along);
   const double half_pitch_mm = size.pitch_mm / 2;
@@ -123,6 +122,8 @@ SceneTool make_tool(std::string name, std::string shape, const ToolSize& size) {
   }
   if (!tool.round) cover_surface(tool, lattice);
   tool.offsets = lattice.offsets();
+  const std::int32_t taken = size.size_vox ? across : lattice.taken_across();
+  tool.size_vox = {taken, along, taken};
   assert(!tool.offsets.empty() && tool.offsets.size() <= kMaxToolOffsets);
   return tool;
 }
