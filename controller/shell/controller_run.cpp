@@ -171,7 +171,8 @@ int run_controller(const ControllerOptions& options) {
   const std::string port_text = resolve_port(options.port, scene.device.personality);
   std::unique_ptr<PacketPort> port;
   try {
-    port = open_port(port_text, scene.servo.rate_hz, kPortPatienceMs, stop);
+    const Hello ours{scene.device.personality, options.virtual_time, scene.servo.rate_hz};
+    port = open_port(port_text, ours, kPortPatienceMs, stop);
   } catch (const std::runtime_error&) {
     if (stop) return 1;  // asked to end before there was a device: nothing to tell
     throw;
