@@ -2,6 +2,7 @@
 #include "shared/posix/new_file.hpp"
 
 #include <cerrno>
+#include <cstddef>
 #include <string>
 #include <system_error>
 #include <utility>
@@ -47,11 +48,13 @@ NewFile::NewFile(const std::filesystem::path& path) : path_(path) {
   if (std::filesystem::is_symlink(there)) fail(ELOOP);
   if (std::filesystem::is_directory(there)) fail(EISDIR);
   if (std::filesystem::exists(there) && !std::filesystem::is_regular_file(there)) fail(EOPNOTSUPP);
-  constexpr mode_t kReadWriteAll = 0666;  // the user's mask takes away from this
-  constexpr int kMaxTries = 100;          // names that others have taken
-  const std::string stem = path.string() + ".new-" + std::to_string(::getpid()) + "-";
+  constexpr mode_t kReadWriteAll = 0666;     // the user's mask takes away from this
+  constexpr int kMaxTries = 100;             // names that others have taken
+  constexpr std::size_t kLongestStem = 200;  // of 255 bytes that a name may have
+  const std::string stem =
+      path.filename().string().substr(0, kLongestStem) + ".new-" + std::to_string(::getpid()) + "-";
   for (int tries = 0; fd_ < 0 && tries < kMaxTries; ++tries) {
-    temporary_ = stem + std::to_string(tries);
+    temporary_ = path.parent_path() / (stem + std::to_string(tries));
     fd_ = ::open(temporary_.c_str(), O_CREAT | O_EXCL | O_NOFOLLOW | O_WRONLY | O_CLOEXEC,
                  kReadWriteAll);
     if (fd_ < 0 && errno != EEXIST) break;

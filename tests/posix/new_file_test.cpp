@@ -100,6 +100,12 @@ TEST_CASE("a folder in the place of the file is refused, and a new file has the 
   struct stat a {};
   REQUIRE(stat((folder / "a").c_str(), &a) == 0);
   CHECK((a.st_mode & 0777) == 0640);
+  const std::string longest(255, 'x');
+  CHECK_NOTHROW(write_new_file(folder / longest.c_str(), "x"));
+  CHECK(refusal_of([&] {
+          write_new_file(folder / (longest + "x").c_str(), "x");
+        }).find("cannot be written") != std::string::npos);
+  CHECK(folder.count() == 2);
 }
 
 TEST_CASE("what holds no bytes is written to as it stands, by a link too") {
