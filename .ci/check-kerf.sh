@@ -11,7 +11,7 @@ export KERF_BIN=$lab/bin TMPDIR=$lab/tmp LAB=$lab
 unset DISPLAY WAYLAND_DISPLAY
 
 # The stand-in: notes its process and its arguments, does what a demo needs of it, and ends with
-# the exit code FAIL_<name> where that is set. The file `segment` lives as long as the controller.
+# the exit code FAIL_<name> where that is set, or by the signal CRASH_<name>. The file `segment` lives as long as the controller.
 cat >"$lab/stand-in" <<'PROGRAM'
 #!/usr/bin/env bash
 name=${0##*/kerf-}
@@ -19,6 +19,12 @@ echo $$ >>"$LAB/pids"
 echo "$name $*" >>"$LAB/calls"
 fail=FAIL_$name code=0
 if [[ -n ${!fail:-} ]]; then code=${!fail}; fi
+crash=CRASH_$name
+if [[ $* == *--describe* ]]; then
+  if [[ -n ${CRASH_describe:-} ]]; then kill "-$CRASH_describe" $$; fi
+elif [[ -n ${!crash:-} ]]; then
+  (sleep 0.3 && kill "-${!crash}" $$ && if [[ $name == controller ]]; then rm "$LAB/segment"; fi) &
+fi
 if ((code == 2)); then
   echo "kerf-$name: place: value; way out" >&2
   exit 2
@@ -67,6 +73,7 @@ case $name in
     ;;
   record) touch "$out" ;;
 esac
+if [[ -n ${!crash:-} ]]; then wait; fi
 exit "$code"
 PROGRAM
 chmod +x "$lab/stand-in"
@@ -161,6 +168,18 @@ expect 'a failed check is told' \
   with FAIL_controller=1 kerf_gives 1 demo --seconds 1 --out "$lab/out"
 expect 'and its results are kept' kept "$all"
 expect 'a crash is a failed check' with FAIL_controller=139 kerf_gives 1 demo --seconds 1
+for name in controller emulator recorder visualizer record; do
+  for signal in SEGV KILL ABRT; do
+    expect "a crash of the $name by $signal" \
+      with "CRASH_$name=$signal" kerf_gives 1 demo --seconds 2 --out "$lab/crash"
+    expect 'is told in one line of ours' \
+      says "^kerf: demo: $name: ended by signal $(kill -l "$signal")\$"
+    expect 'and in no other' test "$(grep -c '^kerf: \|line [0-9]*:' "$lab/said")" == 1
+  done
+done
+expect 'a crash before the demo begins' with CRASH_describe=SEGV kerf_gives 1 demo
+expect 'is told too' test "$(cat "$lab/said")" == 'kerf: demo: emulator: ended by signal 11'
+rm -rf "$lab/crash"
 expect 'a failing picture is told' with FAIL_visualizer=2 kerf_gives 2 demo --seconds 1
 expect 'with its reason' says '^kerf-visualizer: place: value; way out'
 expect 'a failing log is told' with FAIL_recorder=1 kerf_gives 1 demo --seconds 1

@@ -44,8 +44,8 @@ void for_each_number(Visit visit) {
 }  // namespace
 
 void export_csv(const std::filesystem::path& folder, const std::filesystem::path& csv) {
-  TickLogReader log(folder / kTickLogName);
   NewFile file(csv);
+  TickLogReader log(folder / kTickLogName);
   std::string line;
   const auto end_line = [&] {
     line.back() = '\n';  // the last comma

@@ -3,38 +3,70 @@
 
 #include <array>
 #include <cerrno>
-#include <filesystem>
-#include <fstream>
-#include <sstream>
+#include <cstddef>
 #include <system_error>
 
-#include <fcntl.h>
 #include <spawn.h>
+#include <sys/mman.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include "record/record_error.hpp"
-#include "shared/posix/new_file.hpp"
 
 extern char** environ;  // NOLINT(readability-identifier-naming): POSIX
 
 namespace kerf {
 namespace {
 
-/// Exit code of `gnuplot script`, its picture in `drawn` and its messages in `log`; throws where
-/// there is no gnuplot.
-[[nodiscard]] int run_gnuplot(const std::filesystem::path& script,
-                              const std::filesystem::path& drawn,
-                              const std::filesystem::path& log) {
+/// A file in memory alone, which goes with its owner, however that ends.
+class MemoryFile {
+ public:
+  MemoryFile() : fd_(memfd_create("kerf-plot", MFD_CLOEXEC)) {
+    if (fd_ < 0) fail();
+  }
+  ~MemoryFile() { close(fd_); }
+  MemoryFile(const MemoryFile&) = delete;
+  MemoryFile& operator=(const MemoryFile&) = delete;
+
+  [[nodiscard]] int fd() const noexcept { return fd_; }
+  void write(const std::string& text) const {
+    std::size_t done = 0;
+    while (done < text.size()) {
+      const ssize_t bytes =
+          pwrite(fd_, text.data() + done, text.size() - done, static_cast<off_t>(done));
+      if (bytes <= 0) fail();
+      done += static_cast<std::size_t>(bytes);
+    }
+  }
+  [[nodiscard]] std::string text() const {
+    std::string text;
+    std::array<char, 65536> part;
+    for (ssize_t bytes = 0;
+         (bytes = pread(fd_, part.data(), part.size(), static_cast<off_t>(text.size()))) > 0;) {
+      text.append(part.data(), static_cast<std::size_t>(bytes));
+    }
+    return text;
+  }
+
+ private:
+  [[noreturn]] static void fail() {
+    throw RecordError("gnuplot: no file in memory (" + std::generic_category().message(errno) +
+                      "); make room");
+  }
+  int fd_;
+};
+
+/// Exit code of gnuplot with `script`, its picture in `drawn` and its messages in `log`; throws
+/// where there is no gnuplot.
+[[nodiscard]] int run_gnuplot(const MemoryFile& script, const MemoryFile& drawn,
+                              const MemoryFile& log) {
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
-  const auto redirect = [&actions](int fd, const std::filesystem::path& path) {
-    posix_spawn_file_actions_addopen(&actions, fd, path.c_str(), O_WRONLY | O_CREAT, 0600);
-  };
-  redirect(STDOUT_FILENO, drawn);
-  redirect(STDERR_FILENO, log);
+  posix_spawn_file_actions_adddup2(&actions, script.fd(), STDIN_FILENO);
+  posix_spawn_file_actions_adddup2(&actions, drawn.fd(), STDOUT_FILENO);
+  posix_spawn_file_actions_adddup2(&actions, log.fd(), STDERR_FILENO);
   std::string program = "gnuplot";
-  std::string argument = script.string();
+  std::string argument = "/dev/stdin";
   std::array<char*, 3> arguments{program.data(), argument.data(), nullptr};
   pid_t child = 0;
   const int error =
@@ -50,46 +82,17 @@ namespace {
   return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
 }
 
-/// A private folder that goes with its owner.
-class ScratchFolder {
- public:
-  ScratchFolder() : path_((std::filesystem::temp_directory_path() / "kerf-plot-XXXXXX").string()) {
-    if (mkdtemp(path_.data()) == nullptr) {
-      throw RecordError(path_ + ": " + std::generic_category().message(errno) +
-                        "; set TMPDIR to a folder that can be written");
-    }
-  }
-  ~ScratchFolder() {
-    std::error_code ignored;
-    std::filesystem::remove_all(path_, ignored);
-  }
-  ScratchFolder(const ScratchFolder&) = delete;
-  ScratchFolder& operator=(const ScratchFolder&) = delete;
-  [[nodiscard]] std::filesystem::path path() const { return path_; }
-
- private:
-  std::string path_;
-};
-
-[[nodiscard]] std::string text_of(const std::filesystem::path& path) {
-  std::ifstream file(path);
-  std::ostringstream text;
-  text << file.rdbuf();
-  return text.str();
-}
-
 }  // namespace
 
 std::string gnuplot_svg(const std::string& script) {
-  const ScratchFolder scratch;
-  const std::filesystem::path drawn = scratch.path() / "plot.svg";
-  const std::filesystem::path commands = scratch.path() / "plot.gp";
-  const std::filesystem::path log = scratch.path() / "plot.log";
-  write_new_file(commands, script);
+  const MemoryFile commands;
+  const MemoryFile drawn;
+  const MemoryFile log;
+  commands.write(script);
   const int code = run_gnuplot(commands, drawn, log);
-  std::string picture = text_of(drawn);
+  std::string picture = drawn.text();
   if (code != 0 || picture.find("</svg>") == std::string::npos) {
-    std::string message = text_of(log);
+    std::string message = log.text();
     for (char& c : message) c = c == '\n' ? ' ' : c;
     throw RecordError("gnuplot: exit " + std::to_string(code) + " " + message +
                       "; try another version");

@@ -6,7 +6,7 @@
 namespace kerf {
 
 /// The picture that gnuplot draws on its standard output for a script with `set terminal svg`.
-/// Throws `RecordError` where there is no gnuplot, no folder for its files, or no whole picture.
+/// Writes no file. Throws `RecordError` where there is no gnuplot, no memory, or no whole picture.
 [[nodiscard]] std::string gnuplot_svg(const std::string& script);
 
 }  // namespace kerf

@@ -102,6 +102,7 @@ struct Curve {
 }  // namespace
 
 void plot_forces(const std::filesystem::path& folder, const std::filesystem::path& svg) {
+  check_new_file(svg);
   write_new_file(svg, gnuplot_svg(gnuplot_script(folder)));
 }
 

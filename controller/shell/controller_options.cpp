@@ -77,6 +77,12 @@ void declare_scene_options(Arguments& app, ControllerOptions& options, Raw& raw)
              "end after this much servo time, counted from arming; of --probe, from its start")
       .within(0.01, kLongestS)
       .shown_as("S");
+  app.option(
+         "--wait", options.wait_s,
+         "give up with exit code 1 where the device is not taken in hand after so much servo time")
+      .within(0.01, kLongestS)
+      .shown_as("S")
+      .shows_default();
   app.option("--rate", raw.rate_hz, "servo rate, instead of the scene's")
       .within(250, 8000)
       .shown_as("HZ");

@@ -15,6 +15,7 @@ struct ControllerOptions {
   SceneOverrides overrides;
   std::string port;               ///< as open_port.hpp says
   std::optional<double> seconds;  ///< servo time after arming; none: until stopped
+  double wait_s = 60;             ///< servo time for the device to be taken in hand
   std::string name = "kerf";
   bool virtual_time = false;
   bool check = false;

@@ -90,6 +90,12 @@ void check_budget(const ControllerOptions& options, const LoadedScene& scene,
   if (!refusal.empty()) throw std::runtime_error(refusal);
 }
 
+/// What is written at the end is refused now.
+void check_places(const ControllerOptions& options) {
+  if (!options.report.empty()) check_new_file(options.report);
+  if (!options.final_volume.empty()) check_volume_path(options.final_volume);
+}
+
 /// Everything that can be known to go wrong, before the hand is moved.
 void check_run(const ControllerOptions& options, const LoadedScene& scene,
                const SceneCosts& costs) {
@@ -99,8 +105,7 @@ void check_run(const ControllerOptions& options, const LoadedScene& scene,
                              std::to_string(scene.servo.rate_hz) + " Hz; spin less");
   }
   check_budget(options, scene, costs);
-  if (!options.report.empty()) check_new_file(options.report);
-  if (!options.final_volume.empty()) check_volume_path(options.final_volume);
+  check_places(options);
   if (const double stiffness = device_stiffness_n_per_mm(scene); stiffness > kStableNPerMm) {
     const bool paper = scene.force.model == ForceModel::paper;
     char text[160];
@@ -143,6 +148,7 @@ int run_controller(const ControllerOptions& options) {
   const std::unique_ptr<CompiledScene> servo = plan_scene(scene);
   if (options.check) {
     check_hand_script(scene);
+    check_places(options);
     print_scene(scene, servo->costs());
     check_budget(options, scene, servo->costs());
     return 0;
@@ -165,7 +171,8 @@ int run_controller(const ControllerOptions& options) {
   const std::string port_text = resolve_port(options.port, scene.device.personality);
   std::unique_ptr<PacketPort> port;
   try {
-    port = open_port(port_text, scene.servo.rate_hz, kPortPatienceMs, stop);
+    const Hello ours{scene.device.personality, options.virtual_time, scene.servo.rate_hz};
+    port = open_port(port_text, ours, kPortPatienceMs, stop);
   } catch (const std::runtime_error&) {
     if (stop) return 1;  // asked to end before there was a device: nothing to tell
     throw;
@@ -201,7 +208,7 @@ int run_controller(const ControllerOptions& options) {
   std::fputs(summary(report).c_str(), stdout);
   if (!options.report.empty()) write_new_file(options.report, report_json(report));
   if (!options.final_volume.empty()) write_final(scene, *servo, options.final_volume);
-  return clean && report.record.fault_count == 0 ? 0 : 1;
+  return clean && report.record.faults.count == 0 ? 0 : 1;
 }
 
 }  // namespace kerf

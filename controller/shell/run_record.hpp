@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 
 #include "controller/servo/servo_output.hpp"
 #include "controller/shell/real_time.hpp"
@@ -11,11 +13,24 @@
 
 namespace kerf {
 
-/// A fault as it latched, or an event of the shell.
-struct FaultEvent {
-  std::uint64_t tick = 0;  ///< as in the segment and in the log
-  const char* name = "";
-  bool fault = false;  ///< it makes the run a failure
+/// What befell a run, in order. Fixed memory.
+struct EventList {
+  struct Event {
+    std::uint64_t tick = 0;  ///< as in the segment and in the log
+    const char* name = "";
+  };
+
+  void add(std::uint64_t tick, const char* name) noexcept {
+    if (count < kMax) first[count] = {tick, name};
+    ++count;
+  }
+  [[nodiscard]] std::span<const Event> kept() const noexcept {
+    return std::span(first).first(std::min(count, kMax));
+  }
+
+  static constexpr std::size_t kMax = 64;
+  std::array<Event, kMax> first{};
+  std::size_t count = 0;  ///< may exceed kMax
 };
 
 /// Statistics of a run. Fixed memory: the servo thread writes it, others read it after the end.
@@ -35,23 +50,11 @@ struct RunRecord {
   std::uint64_t allocations = 0;
   ThreadFaults faults_of_pages;
 
-  static constexpr std::size_t kMaxEvents = 64;
-  std::array<FaultEvent, kMaxEvents> events{};
-  std::size_t event_count = 0;  ///< may exceed kMaxEvents: the first ones are kept
-  std::size_t fault_count = 0;  ///< events that make the run a failure
+  EventList faults;  ///< as they latched; one makes the run a failure
+  EventList events;  ///< of the shell, and after each the run went on
 
-  void add_event(std::uint64_t tick, const char* name) noexcept {
-    if (event_count < kMaxEvents) {
-      events[event_count].tick = tick;
-      events[event_count].name = name;
-    }
-    ++event_count;
-  }
-  void add_fault(std::uint64_t tick, const char* name) noexcept {
-    if (event_count < kMaxEvents) events[event_count].fault = true;
-    add_event(tick, name);
-    ++fault_count;
-  }
+  void add_event(std::uint64_t tick, const char* name) noexcept { events.add(tick, name); }
+  void add_fault(std::uint64_t tick, const char* name) noexcept { faults.add(tick, name); }
 };
 
 }  // namespace kerf

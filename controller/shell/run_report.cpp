@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "controller/shell/run_report.hpp"
 
-#include <algorithm>
-
 #include "controller/servo/velocity_window.hpp"
 #include "shared/posix/hex64.hpp"
 #include "shared/text/format.hpp"
@@ -23,14 +21,27 @@ std::string line(const char* name, const Histogram& histogram) {
                 histogram.percentile_us(0.99), histogram.percentile_us(0.999), histogram.max_us());
 }
 
+Json list(const EventList& events) {
+  Json list = Json::List{};
+  for (const EventList::Event& event : events.kept()) {
+    list.push_back({{"tick", event.tick}, {"name", event.name}});
+  }
+  return list;
+}
+
+std::string lines(const char* kind, const EventList& events) {
+  std::string text;
+  for (const EventList::Event& event : events.kept()) {
+    text += format("  %-10s %s at tick %llu\n", kind, event.name,
+                   static_cast<unsigned long long>(event.tick));
+  }
+  return text;
+}
+
 }  // namespace
 
 std::string report_json(const RunReport& report) {
   const RunRecord& r = report.record;
-  Json events = Json::List{};
-  for (std::size_t i = 0; i < std::min(r.event_count, RunRecord::kMaxEvents); ++i) {
-    events.push_back({{"tick", r.events[i].tick}, {"name", r.events[i].name}});
-  }
   Json missing = Json::List{};
   for (const MissingRight& right : report.missing_rights) {
     missing.push_back({{"what", right.what}, {"effect", right.effect}});
@@ -66,9 +77,10 @@ std::string report_json(const RunReport& report) {
       {"peak_force_n", r.peak_force_n},
       {"removed_mm3", report.removed_mm3},
       {"energy_j", r.absorbed_mj / 1000.0},
-      {"faults", events},
-      {"fault_count", r.fault_count},
-      {"event_count", r.event_count},
+      {"faults", list(r.faults)},
+      {"fault_count", r.faults.count},
+      {"events", list(r.events)},
+      {"event_count", r.events.count},
       {"watchdog_trips", report.watchdog_trips},
       {"lost_packets", report.lost_packets},
       {"refused_packets", report.refused_packets},
@@ -109,11 +121,7 @@ std::string summary(const RunReport& report) {
                  static_cast<long long>(r.faults_of_pages.major));
   text += format("  hashes     volume %s, output %s\n", hex64(report.volume_hash).c_str(),
                  hex64(r.output_hash).c_str());
-  for (std::size_t i = 0; i < std::min(r.event_count, RunRecord::kMaxEvents); ++i) {
-    text += format("  %-10s %s at tick %llu\n", r.events[i].fault ? "fault" : "event",
-                   r.events[i].name, static_cast<unsigned long long>(r.events[i].tick));
-  }
-  return text;
+  return text + lines("fault", r.faults) + lines("event", r.events);
 }
 
 }  // namespace kerf

@@ -19,7 +19,6 @@
 namespace kerf {
 namespace {
 
-constexpr double kArmingPatienceS = 60;
 constexpr std::chrono::milliseconds kLookPeriod{5};
 
 /// Main thread while the servo runs: draws the progress bar.
@@ -42,7 +41,7 @@ LoopLimits limits_of(const ControllerOptions& options, double rate_hz) {
     limits.armed_ticks = static_cast<std::uint64_t>(std::llround(*options.seconds * rate_hz));
   }
   limits.gone_ticks = static_cast<std::uint64_t>(2 * rate_hz);
-  limits.arming_ticks = static_cast<std::uint64_t>(kArmingPatienceS * rate_hz);
+  limits.arming_ticks = static_cast<std::uint64_t>(std::llround(options.wait_s * rate_hz));
   return limits;
 }
 

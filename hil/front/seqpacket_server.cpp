@@ -43,6 +43,11 @@ bool is_live(const std::string& path) {
   return !refused;
 }
 
+bool is_socket(const std::string& path) {
+  struct stat file {};
+  return lstat(path.c_str(), &file) == 0 && S_ISSOCK(file.st_mode);
+}
+
 void check_path(const std::string& path) {
   const std::size_t longest = sizeof(sockaddr_un::sun_path) - 1 - std::strlen(kUnborn);
   if (path.empty() || path.size() > longest) {
@@ -89,17 +94,18 @@ PacketLink::Sent SeqpacketLink::send(std::span<const std::uint8_t> packet) noexc
 SeqpacketServer::SeqpacketServer(std::string path) : path_(std::move(path)) {
   check_path(path_);
   const std::string unborn = path_ + kUnborn;
-  unlink(unborn.c_str());
+  if (is_socket(unborn)) unlink(unborn.c_str());  // of an emulator that was killed
   fd_ = socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0);
   const sockaddr_un address = address_of(unborn);
   const auto bind_here = [this](const sockaddr* a, socklen_t size) { return bind(fd_, a, size); };
   // One waits while one is served.
-  const bool ready = fd_ >= 0 && with_address(address, bind_here) == 0 && listen(fd_, 1) == 0 &&
-                     std::rename(unborn.c_str(), path_.c_str()) == 0;
+  const bool bound = fd_ >= 0 && with_address(address, bind_here) == 0;
+  const bool ready =
+      bound && listen(fd_, 1) == 0 && std::rename(unborn.c_str(), path_.c_str()) == 0;
   if (ready) return;
   const int error = errno;
   if (fd_ >= 0) close(fd_);
-  unlink(unborn.c_str());
+  if (bound) unlink(unborn.c_str());
   throw HilError("--socket: " + path_ + ": " + std::strerror(error) +
                  "; choose a path in a folder that you may write");
 }

@@ -29,6 +29,7 @@ class PacketLink {
   /// Never blocks: `full` when the other end does not read.
   [[nodiscard]] virtual Sent send(std::span<const std::uint8_t> packet) noexcept = 0;
   [[nodiscard]] bool closed() const noexcept { return closed_; }
+  [[nodiscard]] int descriptor() const noexcept { return fd_; }
 
  protected:
   explicit PacketLink(int fd) noexcept : fd_(fd) {}

@@ -16,7 +16,7 @@ namespace {
 
 /// Serves `node` as `mount`/`name`; `cycles()` since the start.
 template <class Node, class Cycles>
-void serve_node(const BusService& service, const std::string& mount, const char* device,
+void serve_node(BusService& service, const std::string& mount, const char* device,
                 const std::string& name, Node& node, Cycles cycles) {
   FuseMount folder(mount);
   folder.add(name, node);
@@ -27,23 +27,22 @@ void serve_node(const BusService& service, const std::string& mount, const char*
 
 }  // namespace
 
-void serve_fuse(const BusService& service, const std::string& mount, const FirewireSettings& omni) {
+void serve_fuse(BusService& service, const std::string& mount, const FirewireSettings& omni) {
   FirewireNode node(omni, service.device);
   serve_node(service, mount, "omni", "fw1", node, [&] { return node.bus().cycle() - kFirstCycle; });
   service.stats.sent = node.bus().stats().reports;
   service.stats.dropped = node.bus().stats().unheard;
 }
 
-void serve_fuse(const BusService& service, const std::string& mount,
-                const FtdiFalcon::Settings& falcon, std::vector<ScriptedUsbFault> script) {
+void serve_fuse(BusService& service, const std::string& mount, const FtdiFalcon::Settings& falcon,
+                std::vector<ScriptedUsbFault> script) {
   UsbfsNode node(falcon, std::move(script), service.device);
   serve_node(service, mount, "falcon", "usb", node, [&] { return node.chip().time().cycle(); });
   service.stats.sent = node.chip().reports();
   service.stats.dropped = node.chip().lost();
 }
 
-void serve_fuse(const BusService& service, const std::string& mount,
-                const WoodenHid::Settings& wooden) {
+void serve_fuse(BusService& service, const std::string& mount, const WoodenHid::Settings& wooden) {
   HidrawNode node(wooden, service.device);
   serve_node(service, mount, "woodenhaptics", "hidraw0", node,
              [&] { return node.arm().time().cycle(); });
@@ -51,7 +50,7 @@ void serve_fuse(const BusService& service, const std::string& mount,
   service.stats.dropped = node.lost();
 }
 
-void serve_usbip(const BusService& service, const FtdiFalcon::Settings& falcon,
+void serve_usbip(BusService& service, const FtdiFalcon::Settings& falcon,
                  std::vector<ScriptedUsbFault> script) {
   UsbipFalcon device(falcon, std::move(script), service.device, plug_into_vhci);
   service.out << "kerf-emulator: falcon at a port of vhci_hcd" << std::endl;
@@ -63,7 +62,7 @@ void serve_usbip(const BusService& service, const FtdiFalcon::Settings& falcon,
   service.stats.dropped = device.chip().lost();
 }
 
-void serve_uhid(const BusService& service, const WoodenHid::Settings& wooden) {
+void serve_uhid(BusService& service, const WoodenHid::Settings& wooden) {
   UhidArm device(open_uhid(), wooden, service.device);
   service.out << "kerf-emulator: woodenhaptics at /dev/uhid" << std::endl;
   const auto goes_on = [&] { return service.goes_on(device.arm().time().cycle(), device.left()); };

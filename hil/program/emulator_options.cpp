@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <initializer_list>
 #include <ranges>
 #include <string_view>
 #include <utility>
@@ -87,6 +88,20 @@ void check_front(const EmulatorOptions& o) {
   if (o.front == "fuse" && o.bus.mount.empty()) {
     throw HilError("--mount: missing; name an empty folder for --front fuse");
   }
+  const auto only_on = [&](std::initializer_list<std::string_view> fronts, const char* option,
+                           bool given) {
+    if (!given || std::ranges::find(fronts, o.front) != fronts.end()) return;
+    throw HilError(std::string(option) + ": front " + o.front +
+                   " has no such thing; leave it out, or use --front " + listed(fronts));
+  };
+  only_on({"socket"}, "--socket", !o.socket.empty());
+  only_on({"udp"}, "--udp", !o.udp.empty());
+  only_on({"fuse", "usbip", "uhid"}, "--bus-fault", !o.bus.faults.empty());
+  only_on({"fuse", "usbip"}, "--firmware-runs", o.bus.firmware_runs);
+  only_on({"fuse"}, "--mount", !o.bus.mount.empty());
+  only_on({"fuse"}, "--packet-hz", o.bus.packet_hz != BusOptions{}.packet_hz);
+  only_on({"fuse"}, "--drift-ppm", o.bus.drift_ppm != 0);
+  only_on({"fuse"}, "--reset-stops-stream", o.bus.reset_stops_stream);
   const auto speaks_for = [&](const char* front, Personality device) {
     if (o.front == front && o.personality != device) {
       throw HilError(std::string("--front ") + front + ": not for " + o.device +

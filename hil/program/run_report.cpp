@@ -30,16 +30,17 @@ void check_report(const std::string& file) {
   or_refuse([&] { check_new_file(file); });
 }
 
-void write_run_report(const std::string& file, const Emulator& emulator, std::uint64_t withheld,
+void write_run_report(const std::string& file, const EmulatedDevice& device,
                       const FrontStats& front) {
-  const EmulatorStats& stats = emulator.stats();
-  const DeviceVec<double> tip = emulator.model().tip_mm();
+  const EmulatorStats stats = device.stats();
+  const DeviceModel& model = device.model();
+  const DeviceVec<double> tip = model.tip_mm();
   Json report;
-  report["personality"] = emulator.model().name();
+  report["personality"] = model.name();
   report["seconds"] = seconds_of(stats.cycles);
   report["packets_sent"] = front.sent;
   report["packets_dropped"] = front.dropped;
-  report["packets_withheld"] = withheld;
+  report["packets_withheld"] = device.withheld();
   report["commands_received"] = stats.commands;
   report["commands_refused"] = stats.refused;
   report["resyncs"] = front.resyncs;
@@ -47,8 +48,8 @@ void write_run_report(const std::string& file, const Emulator& emulator, std::ui
                        {"p99", front.wake.percentile_us(0.99)},
                        {"max", front.wake.max_us()}};
   report["peak_motor_force_n"] = stats.peak_motor_force_n;
-  report["calibrated"] = emulator.model().calibration() == Calibration::done;
-  report["docked"] = emulator.model().docked();
+  report["calibrated"] = model.calibration() == Calibration::done;
+  report["docked"] = model.docked();
   report["undocked_at_s"] = stats.undocked_at ? Json(seconds_of(*stats.undocked_at)) : nullptr;
   report["final_tip_mm"] = std::array{tip.x, tip.y, tip.z};
   report["report_hash"] = hex64(stats.report_hash);

@@ -2,24 +2,63 @@
 #include "shared/posix/new_file.hpp"
 
 #include <cerrno>
+#include <cstddef>
 #include <string>
 #include <system_error>
 #include <utility>
 
 #include <fcntl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 namespace kerf {
 
-NewFile::NewFile(const std::filesystem::path& path) : path_(path) {
+bool is_stream(const std::filesystem::path& path) {
   std::error_code ignored;
   const auto status = std::filesystem::status(path, ignored);
-  if (!std::filesystem::exists(status) || std::filesystem::is_regular_file(status)) {
-    temporary_ = path.string() + ".new-" + std::to_string(::getpid());
+  return std::filesystem::is_fifo(status) || std::filesystem::is_character_file(status);
+}
+
+int open_stream(const std::filesystem::path& path) noexcept {
+  const int fd = ::open(path.c_str(), O_WRONLY | O_NONBLOCK | O_NOCTTY | O_CLOEXEC);
+  if (fd < 0) return -1;
+  struct stat opened {};
+  if (::fstat(fd, &opened) == 0 && (S_ISFIFO(opened.st_mode) || S_ISCHR(opened.st_mode))) return fd;
+  ::close(fd);
+  errno = ELOOP;
+  return -1;
+}
+
+std::string not_written(int error) {
+  if (error == ELOOP) return "is a link; name a file itself";
+  if (error == ENXIO) return "nobody reads this pipe; start the reader first";
+  return "cannot be written (" + std::generic_category().message(error) +
+         "); make room or choose another place";
+}
+
+NewFile::NewFile(const std::filesystem::path& path) : path_(path) {
+  if (is_stream(path)) {
+    fd_ = open_stream(path);
+    if (fd_ < 0) fail(errno);
+    ::fcntl(fd_, F_SETFL, 0);  // `write` waits for a slow reader
+    return;
   }
-  constexpr mode_t kReadWriteAll = 0666;  // the user's mask takes away from this
-  const auto& target = temporary_.empty() ? path_ : temporary_;
-  fd_ = ::open(target.c_str(), O_CREAT | O_TRUNC | O_WRONLY | O_CLOEXEC, kReadWriteAll);
+  std::error_code ignored;
+  const auto there = std::filesystem::symlink_status(path, ignored);
+  if (std::filesystem::is_symlink(there)) fail(ELOOP);
+  if (std::filesystem::is_directory(there)) fail(EISDIR);
+  if (std::filesystem::exists(there) && !std::filesystem::is_regular_file(there)) fail(EOPNOTSUPP);
+  constexpr mode_t kReadWriteAll = 0666;     // the user's mask takes away from this
+  constexpr int kMaxTries = 100;             // names that others have taken
+  constexpr std::size_t kLongestStem = 200;  // of 255 bytes that a name may have
+  const std::string stem =
+      path.filename().string().substr(0, kLongestStem) + ".new-" + std::to_string(::getpid()) + "-";
+  for (int tries = 0; fd_ < 0 && tries < kMaxTries; ++tries) {
+    temporary_ = path.parent_path() / (stem + std::to_string(tries));
+    fd_ = ::open(temporary_.c_str(), O_CREAT | O_EXCL | O_NOFOLLOW | O_WRONLY | O_CLOEXEC,
+                 kReadWriteAll);
+    if (fd_ < 0 && errno != EEXIST) break;
+  }
   if (fd_ < 0) fail(errno);
 }
 
@@ -52,11 +91,12 @@ void NewFile::commit() {
 }
 
 void NewFile::fail(int error) const {
-  throw FileError(path_.string() + ": cannot be written (" +
-                  std::generic_category().message(error) + "); make room or choose another place");
+  throw FileError(path_.string() + ": " + not_written(error));
 }
 
 void check_new_file(const std::filesystem::path& path) {
+  // The reader of a pipe would take this for its end.
+  if (is_stream(path) && ::access(path.c_str(), W_OK) == 0) return;
   const NewFile never_committed(path);
 }
 

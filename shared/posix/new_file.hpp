@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <filesystem>
 #include <stdexcept>
+#include <string>
 #include <string_view>
 
 namespace kerf {
@@ -14,9 +15,22 @@ class FileError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+/// Whether what stands at `path` holds no bytes of its own, as a pipe, a terminal or /dev/null, or
+/// is a link to such a thing (/dev/stdout): it is written to as it stands.
+[[nodiscard]] bool is_stream(const std::filesystem::path& path);
+
+/// Opens such a thing for writing, without waiting for the reader of a pipe, now or in a `write`.
+/// -1 and errno: ENXIO where nobody reads, ELOOP where it is no stream any more. Creates and cuts
+/// nothing.
+[[nodiscard]] int open_stream(const std::filesystem::path& path) noexcept;
+
+/// What is told, after its name, of a place that cannot be written for such an errno.
+[[nodiscard]] std::string not_written(int error);
+
 /// A file that appears whole or not at all: written under a temporary name in the same folder, and
 /// renamed by `commit`. Without it the destructor removes it, and what was there before stays.
-/// A path that is there and is no regular file (a pipe, /dev/null) is written to as it stands.
+/// Others may write to the folder: the temporary is a new file or none, and a link that stands at
+/// `path` is refused. A stream is written to as it stands.
 ///
 /// Every failure (no folder, no right, disk full) is a FileError that names the final path.
 class NewFile {
@@ -41,7 +55,8 @@ class NewFile {
   bool committed_ = false;
 };
 
-/// Throws now what a NewFile at `path` would throw later; leaves nothing behind. For long runs.
+/// Throws now what a NewFile at `path` would throw later, but that nobody reads a pipe; leaves
+/// nothing behind. For long runs.
 void check_new_file(const std::filesystem::path& path);
 
 /// All of `bytes` as one new file.

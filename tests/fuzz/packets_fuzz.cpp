@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Every packet decoder, of device and host, and every driver behind it; the Falcon's serial line
-// and the events of FireWire, in which packets come. The input is a sequence of packets, each after
-// one byte that says its length, or one stream, or one event.
+// Every packet decoder, of device and host, hello too, and every driver behind it; the Falcon's
+// serial line and the events of FireWire, in which packets come. The input is a sequence of
+// packets, each after one byte that says its length, or one stream, or one event.
 #include <algorithm>
 #include <array>
 #include <cstddef>
@@ -15,6 +15,7 @@
 #include "controller/device/port/firewire_streams.hpp"
 #include "shared/wire/falcon_framer.hpp"
 #include "shared/wire/falcon_packet.hpp"
+#include "shared/wire/hello.hpp"
 #include "shared/wire/omni_packet.hpp"
 #include "shared/wire/wooden_packet.hpp"
 
@@ -131,6 +132,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     round_trip(packet, [](Bytes b) { return kerf::falcon::decode_command(b); });
     round_trip(packet, [](Bytes b) { return kerf::wooden::decode_report(b); });
     round_trip(packet, [](Bytes b) { return kerf::wooden::decode_command(b); });
+    round_trip(packet, [](Bytes b) { return kerf::decode_hello(b); });
   }
   frame(input);
   take_events(input);

@@ -174,6 +174,13 @@ TEST_CASE("a path that is no socket, too long or in no folder is refused") {
   std::ofstream(path.text()) << "precious";
   CHECK_THROWS_AS(SeqpacketServer{path.text()}, kerf::HilError);
   CHECK(std::filesystem::file_size(path.text()) == 8);
+  // Nor is one lost that has the name which the socket bears until it listens.
+  const SocketPath born("born");
+  std::ofstream(born.text() + ".new") << "precious";
+  CHECK_THROWS_AS(SeqpacketServer{born.text()}, kerf::HilError);
+  CHECK(std::filesystem::file_size(born.text() + ".new") == 8);
+  std::filesystem::remove(born.text() + ".new");
+  CHECK_NOTHROW(SeqpacketServer{born.text()});
   CHECK_THROWS_AS(SeqpacketServer{std::string(104, 'x')}, kerf::HilError);
   CHECK_THROWS_AS(SeqpacketServer{""}, kerf::HilError);
   CHECK_THROWS_AS(SeqpacketServer{"/nowhere/at/all"}, kerf::HilError);

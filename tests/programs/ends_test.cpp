@@ -125,7 +125,7 @@ TEST_CASE("a controller that stood still with all its threads pushes again only 
     last = record;
   }
   CHECK(standstills >= 1);
-  const auto events = pair.report()["faults"];
+  const auto events = pair.report()["events"];
   CHECK(std::ranges::any_of(events, [](const auto& event) {
     return event["name"] == "watchdog" || event["name"] == "stood_still";
   }));

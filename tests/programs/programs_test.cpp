@@ -264,6 +264,10 @@ TEST_CASE("bad arguments are one line and exit 2") {
         std::string::npos);
   CHECK(refused({controller, "--scene", scene, "--explain", "--report", "/nonexistent/a.json"})
             .find("/nonexistent/a.json") != std::string::npos);
+  CHECK(refused({controller, "--scene", scene, "--check", "--report", "/nonexistent/a.json"})
+            .find("/nonexistent/a.json") != std::string::npos);
+  CHECK(refused({controller, "--scene", scene, "--check", "--final", "/nonexistent/a.nrrd"})
+            .find("/nonexistent/a.nrrd") != std::string::npos);
   CHECK(refused({controller, "--scene", scene, "--cpu", "-1", "--check"}).find("range 0 to 1023") !=
         std::string::npos);
   CHECK(refused({controller, "--scene", scene, "--rate", "20000", "--check"}).find("20000") !=

@@ -5,6 +5,7 @@
 
 #include "record/manifest.hpp"
 #include "record/summary.hpp"
+#include "shared/posix/new_file.hpp"
 #include "tests/record/record_support.hpp"
 
 using namespace kerf;
@@ -121,4 +122,26 @@ TEST_CASE("the plot is an SVG with both panels and every curve") {
     CHECK(svg.find(part) != std::string::npos);
   }
   CHECK(svg.size() < 1'000'000);
+
+  // It needs no room for files of its own, and none is left.
+  const char* const before = std::getenv("TMPDIR");
+  const std::string kept = before != nullptr ? before : "";
+  setenv("TMPDIR", (folder / "none").c_str(), 1);
+  CHECK_NOTHROW(plot_forces(folder / "log", folder / "again.svg"));
+  CHECK_THROWS_WITH_AS(plot_forces(folder / "log", folder / "none/a.svg"),
+                       doctest::Contains("none/a.svg: cannot be written"), FileError);
+  CHECK_FALSE(std::filesystem::exists(folder / "none"));
+  if (before != nullptr) {
+    setenv("TMPDIR", kept.c_str(), 1);
+  } else {
+    unsetenv("TMPDIR");
+  }
+}
+
+TEST_CASE("a place that cannot be written is told before anything is drawn") {
+  const TestFolder folder;
+  CHECK_THROWS_WITH_AS(plot_forces(folder / "no recording", folder / "none/a.svg"),
+                       doctest::Contains("none/a.svg: cannot be written"), FileError);
+  CHECK_THROWS_WITH_AS(export_csv(folder / "no recording", folder / "none/a.csv"),
+                       doctest::Contains("none/a.csv: cannot be written"), FileError);
 }

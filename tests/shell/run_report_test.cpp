@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "controller/shell/run_report.hpp"
 
+#include <string>
+
 #include <doctest/doctest.h>
 #include <nlohmann/json.hpp>
 
@@ -8,14 +10,14 @@ TEST_CASE("the report has every promised key, hashes as 16 hex digits") {
   kerf::RunReport report;
   report.record.ticks = 3;
   report.record.output_hash = 0xab;
-  report.record.add_event(2, "stale_input");
+  report.record.add_fault(2, "stale_input");
   report.link = {{"bus_resets", 2}};
   report.start_to_force_ms = 812.5;
   const auto json = nlohmann::json::parse(kerf::report_json(report));
   for (const char* key :
        {"ticks", "overruns", "stale_ticks", "wake_us", "compute_us", "publish_us", "allocations",
         "minor_faults", "major_faults", "contact_ticks", "peak_force_n", "removed_mm3", "energy_j",
-        "faults", "volume_hash", "output_hash"}) {
+        "faults", "events", "volume_hash", "output_hash"}) {
     CAPTURE(key);
     CHECK(json.contains(key));
   }
@@ -29,11 +31,19 @@ TEST_CASE("the report has every promised key, hashes as 16 hex digits") {
   CHECK(json["start_to_force_ms"] == 812.5);
 }
 
-TEST_CASE("more events than fit are counted, and the first ones kept") {
+TEST_CASE("an event is no fault, and more of them than fit hide none") {
   kerf::RunReport report;
   for (std::uint64_t i = 0; i < 100; ++i) report.record.add_event(i, "watchdog");
+  report.record.add_fault(101, "stale_input");
   const auto json = nlohmann::json::parse(kerf::report_json(report));
-  CHECK(json["faults"].size() == kerf::RunRecord::kMaxEvents);
+  CHECK(json["events"].size() == kerf::EventList::kMax);
+  CHECK(json["events"][0]["name"] == "watchdog");
   CHECK(json["event_count"] == 100);
-  CHECK(json["fault_count"] == 0);
+  CHECK(json["faults"].size() == 1);
+  CHECK(json["faults"][0]["name"] == "stale_input");
+  CHECK(json["fault_count"] == 1);
+  const std::string text = kerf::summary(report);
+  CHECK(text.find("fault      stale_input at tick 101\n") != std::string::npos);
+  CHECK(text.find("event      watchdog at tick 0\n") != std::string::npos);
+  CHECK(text.find("fault      watchdog") == std::string::npos);
 }

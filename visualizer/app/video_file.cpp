@@ -31,8 +31,8 @@ int opened(const std::string& path) {
     dup2(STDERR_FILENO, STDOUT_FILENO);  // where words for the user would end up in the video
     return fd;
   }
-  // Does not wait for the reader of a pipe.
-  return open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NONBLOCK, 0666);
+  constexpr int kNew = O_WRONLY | O_CREAT | O_TRUNC | O_NOFOLLOW | O_CLOEXEC;
+  return is_stream(path) ? open_stream(path) : open(path.c_str(), kNew, 0666);
 }
 
 // Of BT.709, times the range of the result over 255, in 1/65536.
@@ -65,10 +65,7 @@ std::uint8_t value(const Weights& weight, std::int32_t r, std::int32_t g, std::i
 
 VideoFile::VideoFile(std::string path, PictureSize size, int frames_per_s)
     : path_(std::move(path)), size_(size), to_{opened(path_)} {
-  if (to_.fd < 0) {
-    fail(errno == ENXIO ? "nobody reads this pipe; start the reader first"
-                        : std::string(std::strerror(errno)) + "; name a place that can be written");
-  }
+  if (to_.fd < 0) fail(not_written(errno));
   // The colour differences stand in the middle of their squares, which y4m calls "jpeg"; the range
   // is limited all the same.
   write(bytes_of("YUV4MPEG2 W" + std::to_string(size.width) + " H" + std::to_string(size.height) +

@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <string_view>
 
+#include "controller/device/port/agree.hpp"
 #include "controller/device/port/firewire_port.hpp"
 #include "controller/device/port/socket_port.hpp"
 #include "controller/device/port/udp_port.hpp"
@@ -26,7 +27,7 @@ constexpr std::array<std::string_view, 3> kBusOf{"fw", "usb", "hid"};  // by Per
 static_assert(kBusOf.size() == kPersonalityWords.size());
 
 struct Request {
-  int rate_hz = 0;
+  const Hello& ours;
   int patience_ms = 0;
   const std::atomic<bool>& stop;
 };
@@ -43,7 +44,7 @@ std::optional<std::string_view> after(std::string_view bus, std::string_view tex
 std::unique_ptr<PacketPort> firewire(std::string_view rest, const Request* request) {
   FirewireOptions options = parse_firewire_port(rest);
   if (!request) return nullptr;
-  options.rate_hz = request->rate_hz;
+  options.rate_hz = request->ours.rate_hz;
   return std::make_unique<FirewirePort>(options, request->patience_ms, request->stop);
 }
 
@@ -73,22 +74,29 @@ std::unique_ptr<PacketPort> hid(std::string_view, const Request*) {
 }
 #endif
 
+std::unique_ptr<PacketPort> emulator(const std::string& text, const Request& request) {
+  const bool is_udp = text.starts_with(kUdp);
+  const std::string where = text.substr(is_udp ? kUdp.size() : kSocket.size());
+  std::unique_ptr<PacketPort> port;
+  if (is_udp) {
+    port = std::make_unique<UdpPort>(where, request.patience_ms, request.stop);
+  } else {
+    port = std::make_unique<SocketPort>(where, request.patience_ms, request.stop);
+  }
+  agree(*port, "--port " + text, request.ours, is_udp, request.patience_ms, request.stop);
+  return port;
+}
+
 std::unique_ptr<PacketPort> port(const std::string& text, const Request* request) {
   if (const auto rest = after("fw", text)) return firewire(*rest, request);
   if (const auto rest = after("usb", text)) return usb(*rest, request);
   if (const auto rest = after("hid", text)) return hid(*rest, request);
-  const bool is_udp = text.starts_with(kUdp);
-  if (!is_udp && !text.starts_with(kSocket)) {
+  if (!text.starts_with(kUdp) && !text.starts_with(kSocket)) {
     throw std::runtime_error("--port '" + text +
                              "' is not known; use auto, fw, usb, hid, or socket:PATH or "
                              "udp:[ADDRESS:]PORT, where kerf-emulator listens");
   }
-  if (!request) return nullptr;
-  if (is_udp) {
-    return std::make_unique<UdpPort>(text.substr(kUdp.size()), request->patience_ms, request->stop);
-  }
-  return std::make_unique<SocketPort>(text.substr(kSocket.size()), request->patience_ms,
-                                      request->stop);
+  return request ? emulator(text, *request) : nullptr;
 }
 
 }  // namespace
@@ -109,9 +117,9 @@ std::string resolve_port(const std::string& text, Personality personality) {
   return text;
 }
 
-std::unique_ptr<PacketPort> open_port(const std::string& text, int rate_hz, int patience_ms,
+std::unique_ptr<PacketPort> open_port(const std::string& text, const Hello& ours, int patience_ms,
                                       const std::atomic<bool>& stop) {
-  const Request request{rate_hz, patience_ms, stop};
+  const Request request{ours, patience_ms, stop};
   return port(text, &request);
 }
 

@@ -136,7 +136,7 @@ std::unique_ptr<PacketPort> open_or_explain(const ControllerOptions& options, Pe
                                             int rate_hz, const std::atomic<bool>& stop) {
   const std::string port = resolve_port(options.port, kind);
   try {
-    return open_port(port, rate_hz, kPatienceMs, stop);
+    return open_port(port, {kind, false, rate_hz}, kPatienceMs, stop);
   } catch (const std::runtime_error&) {
     const bool is_emulated = port.starts_with("socket:") || port.starts_with("udp:");
     if (!is_emulated) print(lacks_of_nodes(kind, list_device_nodes()));

@@ -75,7 +75,7 @@ void play(Personality personality, Emulator& emulator, const std::string& bus, S
   const auto served = serve(device);
   int pushing = 0, in_fault = 0;
   {
-    const auto port = kerf::open_port(bus + ":" + served->path(), 1000, 1000, kGoOn);
+    const auto port = kerf::open_port(bus + ":" + served->path(), {}, 1000, kGoOn);
     kerf::test::ServoSession session(personality, *port, kerf::test::firm_half_space());
     const auto watch = [&](const ServoOutput& output) {
       device.tick(output);

@@ -24,7 +24,7 @@ using kerf::test::kGoOn;
 /// FireWire is in lock-step here, and needs no clock.
 std::string unexpected_call(Personality personality, const std::string& text, bool seeded = false) {
   const bool lockstep = personality == Personality::omni;
-  const auto port = kerf::open_port(text, 1000, 1000, kGoOn);
+  const auto port = kerf::open_port(text, {}, 1000, kGoOn);
   const auto driver = kerf::make_driver(personality, *port);
   driver->start();
   std::atomic<bool> stop{false};

@@ -60,6 +60,35 @@ TEST_CASE("kerf-emulator --front fuse serves one client, ends with it and unmoun
   CHECK(std::filesystem::is_empty(folder.path()));
 }
 
+TEST_CASE("with --stay the second client finds the hand where the first one found it") {
+  const kerf::test::TempFolder folder;
+  std::atomic<bool> stop{false};
+  Outcome outcome;
+  std::thread emulator([&] {
+    outcome = run({"--front", "fuse", "--mount", folder.path(), "--lockstep", "--priority", "0",
+                   "--stay", "--hand", KERF_HANDS "/touch.toml"},
+                  stop);
+  });
+  for (int client = 0; client < 2; ++client) {
+    CAPTURE(client);
+    kerf::FirewireOptions options;
+    options.where = folder.path();
+    kerf::FirewirePort port(options, 5000, kGoOn);
+    kerf::OmniDriver driver(port);
+    kerf::DeviceReport report = driver.read();
+    REQUIRE(report.fresh);
+    CHECK(report.parked);
+    for (int tick = 0; tick < 4000 && report.parked; ++tick) {
+      driver.command({});
+      report = driver.read();
+    }
+    CHECK_FALSE(report.parked);
+  }
+  stop = true;
+  emulator.join();
+  CHECK(outcome.code == 0);
+}
+
 TEST_CASE("kerf-emulator --front fuse refuses what cannot be, in one line with a way out") {
   const kerf::test::TempFolder folder;
   const auto refused = [&](std::vector<std::string> more) {

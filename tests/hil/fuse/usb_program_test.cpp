@@ -44,7 +44,7 @@ void serve_once(const std::string& device, const std::string& bus, const std::st
   std::thread emulator([&] { outcome = run(arguments); });
   {
     const std::string place = folder.path() + "/" + node;
-    const auto port = kerf::open_port(bus + ":" + place, 1000, 5000, kGoOn);
+    const auto port = kerf::open_port(bus + ":" + place, {}, 5000, kGoOn);
     port->send(packet);
     CHECK(port->wait(1000));
   }

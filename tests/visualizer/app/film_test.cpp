@@ -185,7 +185,12 @@ TEST_CASE("a full disk leaves whole frames and says so in one line") {
         std::string::npos);
   CHECK(problem_of([&] {
           VideoFile((place.path / "none" / "a.y4m").string(), size, 60);
-        }).find("name a place that can be written") != std::string::npos);
+        }).find("choose another place") != std::string::npos);
+  const std::string link = (place.path / "link.y4m").string();
+  std::filesystem::create_symlink(place.path / "another's", link);
+  CHECK(problem_of([&] { VideoFile(link, size, 60); }).find("is a link; name a file itself") !=
+        std::string::npos);
+  CHECK_FALSE(std::filesystem::exists(place.path / "another's"));
 }
 
 TEST_CASE("a reader that is not there, goes away or takes nothing is told in one line") {

@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "hil/program/emulated_device.hpp"
+
+#include <algorithm>
+#include <string>
+
+#include "hil/devmodel/falcon_model.hpp"
+#include "hil/devmodel/omni_model.hpp"
+#include "hil/devmodel/wooden_model.hpp"
+#include "hil/hil_error.hpp"
+#include "hil/script/hand_script_file.hpp"
+#include "shared/numeric/fnv1a.hpp"
+
+namespace kerf {
+namespace {
+
+std::optional<HandScript> hand_of(const EmulatorOptions& o) {
+  if (o.hand.empty()) return std::nullopt;
+  HandScript script = read_hand_script(o.hand);
+  if (o.unit_mm) script.unit_mm = *o.unit_mm;
+  return script;
+}
+
+/// Faults of a device; one of its host can only be played where both are in one program.
+FaultScript faults_of(const EmulatorOptions& o) {
+  if (o.fault.empty()) return {};
+  FaultScript script = read_fault_script(o.fault);
+  if (std::ranges::count(script.faults, FaultKind::host_late, &DeviceFault::kind) > 0) {
+    throw HilError(o.fault + ": host_late: no device can hold up its host; use ./kerf lab faults " +
+                   "--scripts " + o.fault + ", or stop the controller (kill -STOP)");
+  }
+  return script;
+}
+
+/// What any device takes from the command line.
+template <class Params>
+Params plant_of(const EmulatorOptions& o) {
+  Params params;
+  params.joint_inertia_kg_m2.fill(o.joint_inertia_kg_m2);
+  params.mode_hz = o.mode_hz;
+  if (o.drop_torque) params.on_silence = OnSilence::drop_torque;
+  return params;
+}
+
+}  // namespace
+
+std::unique_ptr<DeviceModel> make_device(const EmulatorOptions& o) {
+  switch (o.personality) {
+    case Personality::falcon:
+      return std::make_unique<FalconModel>(plant_of<FalconParams>(o));
+    case Personality::woodenhaptics: {
+      auto params = plant_of<WoodenParams>(o);
+      params.packet_bytes = o.packet_bytes;
+      params.wireless_button = o.wireless_button;
+      return std::make_unique<WoodenModel>(params);
+    }
+    case Personality::omni:
+      break;
+  }
+  auto params = plant_of<OmniParams>(o);
+  params.pot_noise = o.pot_noise;
+  params.seed = o.seed;
+  return std::make_unique<OmniModel>(params);
+}
+
+EmulatedDevice::EmulatedDevice(const EmulatorOptions& options)
+    : options_(options), hand_(hand_of(options)), faults_(faults_of(options)) {
+  renew();
+}
+
+void EmulatedDevice::renew() {
+  if (emulator_) {
+    earlier_ = stats();
+    withheld_ = withheld();
+  }
+  faulty_.reset();
+  emulator_.emplace(make_device(options_), hand_);
+  faulty_.emplace(*emulator_, faults_);
+}
+
+EmulatorStats EmulatedDevice::joined(const EmulatorStats& earlier,
+                                     const EmulatorStats& later) noexcept {
+  if (earlier.cycles == 0) return later;
+  EmulatorStats all = later;
+  all.cycles += earlier.cycles;
+  all.reports += earlier.reports;
+  all.commands += earlier.commands;
+  all.refused += earlier.refused;
+  all.peak_motor_force_n = std::max(earlier.peak_motor_force_n, later.peak_motor_force_n);
+  if (later.undocked_at) all.undocked_at = earlier.cycles + *later.undocked_at;
+  if (earlier.undocked_at) all.undocked_at = earlier.undocked_at;
+  all.report_hash = fnv1a_step(earlier.report_hash, later.report_hash);
+  return all;
+}
+
+}  // namespace kerf

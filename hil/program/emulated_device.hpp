@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+
+#include "hil/devmodel/emulator.hpp"
+#include "hil/devmodel/packet_device.hpp"
+#include "hil/fault/faulty_device.hpp"
+#include "hil/program/emulator_options.hpp"
+#include "hil/script/fault_script.hpp"
+
+namespace kerf {
+
+/// The device model that the options describe.
+[[nodiscard]] std::unique_ptr<DeviceModel> make_device(const EmulatorOptions& options);
+
+/// The device of kerf-emulator with its hand and its faults; each client gets all three from their
+/// start, as if it were the first one. One thread.
+class EmulatedDevice final : public PacketDevice {
+ public:
+  /// `options` outlive it. Reads the scripts; throws `HilError`.
+  explicit EmulatedDevice(const EmulatorOptions& options);
+
+  void receive(std::span<const std::uint8_t> packet) noexcept override { faulty_->receive(packet); }
+  void advance(int cycles) noexcept override { faulty_->advance(cycles); }
+  [[nodiscard]] std::span<const std::uint8_t> next_packet() noexcept override {
+    return faulty_->next_packet();
+  }
+
+  /// For a new client. Allocates.
+  void renew();
+
+  [[nodiscard]] const DeviceModel& model() const noexcept { return emulator_->model(); }
+  /// Of all clients together.
+  [[nodiscard]] EmulatorStats stats() const noexcept {
+    return joined(earlier_, emulator_->stats());
+  }
+  /// Packets that faults kept from them.
+  [[nodiscard]] std::uint64_t withheld() const noexcept { return withheld_ + faulty_->withheld(); }
+
+ private:
+  [[nodiscard]] static EmulatorStats joined(const EmulatorStats& earlier,
+                                            const EmulatorStats& later) noexcept;
+
+  const EmulatorOptions& options_;
+  std::optional<HandScript> hand_;
+  FaultScript faults_;
+  std::optional<Emulator> emulator_;
+  std::optional<FaultyDevice> faulty_;
+  EmulatorStats earlier_;
+  std::uint64_t withheld_ = 0;
+};
+
+}  // namespace kerf

@@ -1,0 +1,132 @@
+// SPDX-License-Identifier: Apache-2.0
+// In a folder that others may write to: what they have put there is neither followed nor cut.
+#include "shared/posix/new_file.hpp"
+
+#include <array>
+#include <cstddef>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <string>
+
+#include <doctest/doctest.h>
+#include <fcntl.h>
+#include <poll.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+namespace fs = std::filesystem;
+using kerf::FileError;
+using kerf::write_new_file;
+
+namespace {
+
+struct Folder {
+  Folder() {
+    std::string pattern = (fs::temp_directory_path() / "kerf-new-XXXXXX").string();
+    REQUIRE(mkdtemp(pattern.data()) != nullptr);
+    path = pattern;
+  }
+  ~Folder() { fs::remove_all(path); }
+  Folder(const Folder&) = delete;
+  Folder& operator=(const Folder&) = delete;
+  [[nodiscard]] fs::path operator/(const char* name) const { return path / name; }
+  [[nodiscard]] auto count() const {
+    return std::distance(fs::directory_iterator(path), fs::directory_iterator());
+  }
+  fs::path path;
+};
+
+std::string text_of(const fs::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+/// The one line with which `call` is refused; empty: it is not.
+template <class Call>
+std::string refusal_of(const Call& call) {
+  try {
+    call();
+  } catch (const FileError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+}  // namespace
+
+TEST_CASE("a link or a file that waits under a temporary name is left alone") {
+  const Folder folder;
+  write_new_file(folder / "victim", "precious");
+  const std::string temporary =
+      (folder / "report.json").string() + ".new-" + std::to_string(getpid());
+  for (const char* end : {"", "-0", "-1"}) fs::create_symlink(folder / "victim", temporary + end);
+  fs::create_symlink(folder / "unborn", temporary + "-2");
+  write_new_file(temporary + "-3", "another's");
+  write_new_file(folder / "report.json", "{}");
+  CHECK(text_of(folder / "report.json") == "{}");
+  CHECK(text_of(folder / "victim") == "precious");
+  CHECK_FALSE(fs::exists(folder / "unborn"));
+  CHECK(text_of(temporary + "-3") == "another's");
+  CHECK(folder.count() == 7);
+}
+
+TEST_CASE("a link in the place of the file is refused, wherever it leads") {
+  const Folder folder;
+  write_new_file(folder / "victim", "precious");
+  fs::create_symlink(folder / "victim", folder / "link");
+  fs::create_symlink(folder / "unborn", folder / "dangling");
+  fs::create_symlink(folder / "round", folder / "round");
+  for (const char* name : {"link", "dangling", "round"}) {
+    CAPTURE(name);
+    const fs::path file = folder / name;
+    const std::string line = refusal_of([&] { write_new_file(file, "{}"); });
+    CHECK(line == file.string() + ": is a link; name a file itself");
+    CHECK(refusal_of([&] { kerf::check_new_file(file); }) == line);
+    CHECK(fs::is_symlink(file));
+  }
+  CHECK(text_of(folder / "victim") == "precious");
+  CHECK(folder.count() == 4);
+}
+
+TEST_CASE("a folder in the place of the file is refused, and a new file has the user's rights") {
+  const Folder folder;
+  CHECK(refusal_of([&] { kerf::check_new_file(folder.path); }).find("cannot be written") !=
+        std::string::npos);
+  const mode_t before = umask(027);
+  write_new_file(folder / "a", "x");
+  umask(before);
+  struct stat a {};
+  REQUIRE(stat((folder / "a").c_str(), &a) == 0);
+  CHECK((a.st_mode & 0777) == 0640);
+  const std::string longest(255, 'x');
+  CHECK_NOTHROW(write_new_file(folder / longest.c_str(), "x"));
+  CHECK(refusal_of([&] {
+          write_new_file(folder / (longest + "x").c_str(), "x");
+        }).find("cannot be written") != std::string::npos);
+  CHECK(folder.count() == 2);
+}
+
+TEST_CASE("what holds no bytes is written to as it stands, by a link too") {
+  const Folder folder;
+  fs::create_symlink("/dev/null", folder / "nothing");
+  CHECK_NOTHROW(kerf::check_new_file(folder / "nothing"));
+  CHECK_NOTHROW(write_new_file(folder / "nothing", "{}"));
+  CHECK(fs::is_symlink(folder / "nothing"));
+
+  const fs::path pipe = folder / "pipe";
+  REQUIRE(mkfifo(pipe.c_str(), 0600) == 0);
+  CHECK(refusal_of([&] { write_new_file(pipe, "{}"); }) ==
+        pipe.string() + ": nobody reads this pipe; start the reader first");
+  const int reader = open(pipe.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
+  REQUIRE(reader >= 0);
+  kerf::check_new_file(pipe);
+  pollfd ended{reader, POLLIN, 0};
+  CHECK(poll(&ended, 1, 0) == 0);  // no writer has come and gone
+  write_new_file(pipe, "{}");
+  std::array<char, 8> heard{};
+  CHECK(read(reader, heard.data(), heard.size()) == 2);
+  close(reader);
+  CHECK(folder.count() == 2);
+}
