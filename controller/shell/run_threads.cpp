@@ -105,6 +105,11 @@ EndReason run_threads(const Run& run) {
   {
     MotorGuard guard(run.device);
     if (run.options.guard) calls.emplace(run.device, run.stop);
+    // The watchdog first: where there is no thread for one of the two, no servo runs without it.
+    std::jthread watching;
+    if (!run.options.virtual_time) {
+      watching = start_watchdog(watchdog, run.options.real_time);
+    }
     const std::jthread servo_thread([&] {
       guard.guard_stack();
       try {
@@ -114,11 +119,12 @@ EndReason run_threads(const Run& run) {
       }
       ended = true;
     });
-    std::jthread watching;
-    if (!run.options.virtual_time) {
-      watching = start_watchdog(watchdog, run.options.real_time);
+    try {
+      show_progress(signals, ended, run);
+    } catch (...) {
+      run.stop = true;  // or the servo would be waited for in vain
+      throw;
     }
-    show_progress(signals, ended, run);
   }
   run.report.watchdog_trips = watchdog.trips();
   run.report.waiting = text_of(run.personality, signals.waiting.load());

@@ -9,6 +9,8 @@
 #include <fcntl.h>
 #include <unistd.h>
 
+#include "shared/posix/failure.hpp"
+
 namespace kerf {
 
 NewFile::NewFile(const std::filesystem::path& path) : path_(path) {
@@ -53,7 +55,8 @@ void NewFile::commit() {
 
 void NewFile::fail(int error) const {
   throw FileError(path_.string() + ": cannot be written (" +
-                  std::generic_category().message(error) + "); make room or choose another place");
+                  std::generic_category().message(error) + "); " +
+                  way_out_of(error, "make room or choose another place"));
 }
 
 void check_new_file(const std::filesystem::path& path) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "controller/shell/probe/probe.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <memory>
@@ -159,7 +160,8 @@ int look_around(const ControllerOptions& options) {
                     {"missing", json_of(lacks)}};
     write_new_file(options.report, json.document());
   }
-  return 0;
+  const auto& sought = options.overrides.personality;
+  return !sought || std::ranges::count(nodes, *sought, &DeviceNode::personality) > 0 ? 0 : 1;
 }
 
 Json report_of(const ControllerOptions& options, const DeviceSettings& device,
