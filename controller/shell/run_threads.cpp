@@ -17,6 +17,7 @@
 #include "controller/shell/watchdog.hpp"
 #include "shared/posix/monotonic_clock.hpp"
 #include "shared/posix/progress_bar.hpp"
+#include "shared/posix/stop_signals.hpp"
 
 namespace kerf {
 namespace {
@@ -119,6 +120,7 @@ EndReason run_threads(const Run& run) {
       }
       ended = true;
     });
+    const StopSignalsElsewhere to_the_threads_above;
     try {
       show_progress(signals, ended, run);
     } catch (...) {

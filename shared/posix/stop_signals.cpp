@@ -65,6 +65,18 @@ void at_stop_signal(void (*act)() noexcept) noexcept {
   first_act.store(act);
 }
 
+StopSignalsElsewhere::StopSignalsElsewhere() noexcept {
+  sigset_t asking;
+  sigemptyset(&asking);
+  for (const int signal : kAsks) sigaddset(&asking, signal);
+  for (int signal = SIGRTMIN; signal <= SIGRTMAX; ++signal) sigaddset(&asking, signal);
+  pthread_sigmask(SIG_BLOCK, &asking, &before_);
+}
+
+StopSignalsElsewhere::~StopSignalsElsewhere() {
+  pthread_sigmask(SIG_SETMASK, &before_, nullptr);
+}
+
 std::span<const int> crash_signals() noexcept {
   return kCrashes;
 }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <atomic>
+#include <csignal>
 #include <span>
 
 namespace kerf {
@@ -38,6 +39,19 @@ void make_signals_of_writes_errors() noexcept;
 /// Calls `act` first thing in the handler of every signal that asks for the end; nullptr: nothing.
 /// It may do only what a signal handler may, and must not wait.
 void at_stop_signal(void (*act)() noexcept) noexcept;
+
+/// While one of these lives the calling thread leaves signals that ask for the end to the others,
+/// so that those with a right to real time hear of them on a busy machine too.
+class StopSignalsElsewhere {
+ public:
+  StopSignalsElsewhere() noexcept;
+  ~StopSignalsElsewhere();
+  StopSignalsElsewhere(const StopSignalsElsewhere&) = delete;
+  StopSignalsElsewhere& operator=(const StopSignalsElsewhere&) = delete;
+
+ private:
+  sigset_t before_;
+};
 
 /// Those of the second kind, for whoever has something to do before they take their course.
 [[nodiscard]] std::span<const int> crash_signals() noexcept;

@@ -61,7 +61,15 @@ class Process {
     posix_spawn_file_actions_addopen(&files, 1, output_.c_str(), O_WRONLY | O_CREAT | O_TRUNC,
                                      0600);
     posix_spawn_file_actions_adddup2(&files, 1, 2);
-    const int error = posix_spawn(&pid_, argv[0], &files, nullptr, argv.data(), environ);
+    // As from a terminal: a shell in the background has some ignored.
+    posix_spawnattr_t signals;
+    posix_spawnattr_init(&signals);
+    sigset_t all;
+    sigfillset(&all);
+    posix_spawnattr_setsigdefault(&signals, &all);
+    posix_spawnattr_setflags(&signals, POSIX_SPAWN_SETSIGDEF);
+    const int error = posix_spawn(&pid_, argv[0], &files, &signals, argv.data(), environ);
+    posix_spawnattr_destroy(&signals);
     posix_spawn_file_actions_destroy(&files);
     if (error != 0) throw std::runtime_error("cannot start " + arguments[0]);
   }
