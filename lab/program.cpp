@@ -2,13 +2,13 @@
 #include "lab/program.hpp"
 
 #include <array>
-#include <exception>
 #include <ostream>
 
 #include "lab/accuracy/command.hpp"
 #include "lab/bench/bench_command.hpp"
 #include "lab/extremes/command.hpp"
 #include "lab/faults/command.hpp"
+#include "shared/posix/failure.hpp"
 #include "shared/text/command_line.hpp"
 
 namespace kerf {
@@ -26,8 +26,8 @@ int run_lab(int argc, const char* const* argv, std::ostream& out, std::ostream& 
     for (const LabCommand* command : commands) {
       if (command->chosen()) return command->run(out);
     }
-  } catch (const std::exception& error) {
-    err << "kerf-lab: " << error.what() << '\n';
+  } catch (...) {
+    err << "kerf-lab: " << failure_text() << '\n';
     return 2;
   }
   return 0;

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <exception>
 #include <filesystem>
 #include <iostream>
 
 #include "record/summary.hpp"
+#include "shared/posix/failure.hpp"
 #include "shared/posix/new_file.hpp"
+#include "shared/posix/private_files.hpp"
 #include "shared/posix/stop_signals.hpp"
 #include "shared/text/command_line.hpp"
 
@@ -44,11 +45,12 @@ int run_record(int argc, char** argv) {
 }  // namespace kerf
 
 int main(int argc, char** argv) {
+  kerf::keep_files_private();
   kerf::make_signals_of_writes_errors();
   try {
     return kerf::run_record(argc, argv);
-  } catch (const std::exception& error) {
-    std::cerr << "kerf-record: " << error.what() << '\n';
+  } catch (...) {
+    std::cerr << "kerf-record: " << kerf::failure_text() << '\n';
     return 2;
   }
 }

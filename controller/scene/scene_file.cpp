@@ -2,9 +2,11 @@
 #include "controller/scene/scene_file.hpp"
 
 #include <algorithm>
+#include <cerrno>
 #include <fstream>
 #include <iterator>
 #include <string>
+#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -12,6 +14,7 @@
 #include "controller/scene/scene_rules.hpp"
 #include "controller/scene/scene_table.hpp"
 #include "controller/scene/scene_text.hpp"
+#include "shared/posix/failure.hpp"
 
 namespace kerf {
 namespace {
@@ -144,6 +147,11 @@ Scene parse_scene_file(const std::filesystem::path& path) {
     refuse(path.string(), ": not a scene file, it is larger than 1 MiB; name a scene file");
   }
   std::ifstream file(path, std::ios::binary);
+  if (!file) {
+    const int error = errno;
+    refuse(path.string(), ": " + std::generic_category().message(error) + "; " +
+                              way_out_of(error, "check its permissions"));
+  }
   const std::string text{std::istreambuf_iterator<char>(file), {}};
   if (!file) refuse(path.string(), ": cannot be read; check its permissions");
   return parse_scene(text, path);

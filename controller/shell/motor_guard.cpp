@@ -7,14 +7,18 @@
 #include <ctime>
 #include <thread>
 
+#include "shared/posix/stop_signals.hpp"
+
 namespace kerf {
 namespace {
 
 std::atomic<DeviceDriver*> driven{nullptr};  // a signal handler can reach nothing but globals
 static_assert(std::atomic<DeviceDriver*>::is_always_lock_free);
 
-constexpr int kCrashes[] = {SIGSEGV, SIGBUS,  SIGFPE,  SIGILL,  SIGABRT, SIGQUIT,
-                            SIGSYS,  SIGTRAP, SIGXCPU, SIGALRM, SIGUSR1, SIGUSR2};
+/// The way out may last for some ticks, and the force need not.
+void on_stop() noexcept {
+  if (DeviceDriver* device = driven.load()) device->stay_released();
+}
 
 void on_crash(int signal) {
   if (DeviceDriver* device = driven.load()) {
@@ -30,13 +34,14 @@ void handle_crashes(void (*handler)(int)) noexcept {
   struct sigaction action {};
   action.sa_handler = handler;
   action.sa_flags = static_cast<int>(SA_RESETHAND | SA_ONSTACK);
-  for (const int signal : kCrashes) sigaction(signal, &action, nullptr);
+  for (const int signal : crash_signals()) sigaction(signal, &action, nullptr);
 }
 
 }  // namespace
 
 MotorGuard::MotorGuard(DeviceDriver& device) noexcept : device_(device) {
   driven = &device;
+  at_stop_signal(on_stop);
   handle_crashes(on_crash);
 }
 
@@ -45,6 +50,7 @@ MotorGuard::~MotorGuard() {
   for (int tries = 0; !device_.release_for_good() && tries < 20; ++tries) {
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }
+  at_stop_signal(nullptr);
   handle_crashes(SIG_DFL);
   driven = nullptr;
 }

@@ -8,9 +8,11 @@
 
 namespace kerf {
 
-/// Motors off on every way out while one of these lives: its own end (return or exception), and the
-/// signals that end a program at once (segmentation fault, stack overflow, abort, ...), after which
-/// the signal takes its usual course. SIGKILL cannot be caught: there the device must notice.
+/// Motors off on every way out while one of these lives: its own end (return or exception), the
+/// signals that ask for the end, in their handler already, and those that end a program at once
+/// (segmentation fault, stack overflow, abort, ...), after which the signal takes its usual course
+/// (shared/posix/stop_signals.hpp has them all). SIGKILL cannot be caught: there the device must
+/// notice.
 ///
 /// One at a time per process; the servo thread calls `guard_stack` once.
 class MotorGuard {

@@ -7,6 +7,7 @@
 #include <exception>
 #include <optional>
 #include <stdexcept>
+#include <string>
 #include <thread>
 
 #include "controller/shell/call_guard.hpp"
@@ -14,23 +15,31 @@
 #include "controller/shell/motor_guard.hpp"
 #include "controller/shell/publisher.hpp"
 #include "controller/shell/watchdog.hpp"
+#include "shared/posix/monotonic_clock.hpp"
 #include "shared/posix/progress_bar.hpp"
+#include "shared/posix/stop_signals.hpp"
 
 namespace kerf {
 namespace {
 
 constexpr std::chrono::milliseconds kLookPeriod{5};
 
-/// Main thread while the servo runs: draws the progress bar.
-void show_progress(const LoopSignals& signals, const std::atomic<bool>& ended,
-                   const ControllerOptions& options, int rate_hz) {
+/// Main thread while the servo runs: draws the progress bar, and says what the device waits for.
+void show_progress(const LoopSignals& signals, const std::atomic<bool>& ended, const Run& run) {
+  const ControllerOptions& options = run.options;
   const ProgressBar bar(options.progress);
+  WaitTeller teller;
   while (!ended.load()) {
-    const double done_s = static_cast<double>(signals.armed_ticks.load()) / rate_hz;
+    const Waiting waiting = signals.waiting.load(std::memory_order_relaxed);
+    const std::string waits = text_of(run.personality, waiting);
+    if (teller.look(waiting, monotonic_ns())) {
+      bar.hide();
+      log_note(waits);
+    }
+    const double done_s = static_cast<double>(signals.armed_ticks.load()) / run.rate_hz;
     char text[64];
     std::snprintf(text, sizeof text, "%.1f s", done_s);
-    bar.show(options.seconds ? done_s / *options.seconds : 0,
-             done_s > 0 ? text : "waiting for the device to be parked at rest");
+    bar.show(options.seconds ? done_s / *options.seconds : 0, done_s > 0 ? text : waits);
     for (int i = 0; i < 10 && !ended.load(); ++i) std::this_thread::sleep_for(kLookPeriod);
   }
 }
@@ -96,6 +105,11 @@ EndReason run_threads(const Run& run) {
   {
     MotorGuard guard(run.device);
     if (run.options.guard) calls.emplace(run.device, run.stop);
+    // The watchdog first: where there is no thread for one of the two, no servo runs without it.
+    std::jthread watching;
+    if (!run.options.virtual_time) {
+      watching = start_watchdog(watchdog, run.options.real_time);
+    }
     const std::jthread servo_thread([&] {
       guard.guard_stack();
       try {
@@ -105,13 +119,16 @@ EndReason run_threads(const Run& run) {
       }
       ended = true;
     });
-    std::jthread watching;
-    if (!run.options.virtual_time) {
-      watching = start_watchdog(watchdog, run.options.real_time);
+    const StopSignalsElsewhere to_the_threads_above;
+    try {
+      show_progress(signals, ended, run);
+    } catch (...) {
+      run.stop = true;  // or the servo would be waited for in vain
+      throw;
     }
-    show_progress(signals, ended, run.options, run.rate_hz);
   }
   run.report.watchdog_trips = watchdog.trips();
+  run.report.waiting = text_of(run.personality, signals.waiting.load());
   if (failure) std::rethrow_exception(failure);
   return calls ? end_by(*calls, end, run.report) : end;
 }

@@ -8,6 +8,7 @@
 #include "controller/volume/phantom_shape.hpp"
 #include "controller/volume/volume_density.hpp"
 #include "controller/volume/volume_limits.hpp"
+#include "shared/posix/helper_thread.hpp"
 
 namespace kerf {
 namespace {
@@ -39,7 +40,7 @@ class Sampler {
   void sample_on_threads(const VoxelBox& box, int cuts) {
     if (cuts == 0) return sample(box);
     const Halves half(box);
-    const std::jthread other([&] { sample_on_threads(half.low, cuts - 1); });
+    const std::jthread other = helper_thread([&] { sample_on_threads(half.low, cuts - 1); });
     sample_on_threads(half.high, cuts - 1);
   }
 

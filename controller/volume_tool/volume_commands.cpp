@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <exception>
 #include <ostream>
 #include <sstream>
 #include <string>
@@ -17,6 +16,7 @@
 #include "controller/volume/volume_resample.hpp"
 #include "controller/volume/volume_write.hpp"
 #include "controller/volume_tool/volume_info.hpp"
+#include "shared/posix/failure.hpp"
 #include "shared/text/command_line.hpp"
 #include "shared/text/number.hpp"
 
@@ -177,12 +177,6 @@ struct Commands {
   }
 };
 
-/// Some messages of libraries have several lines.
-std::string one_line(std::string text) {
-  std::replace(text.begin(), text.end(), '\n', ' ');
-  return text;
-}
-
 }  // namespace
 
 int run_volume_tool(int argc, const char* const* argv, std::ostream& out, std::ostream& err) {
@@ -192,8 +186,8 @@ int run_volume_tool(int argc, const char* const* argv, std::ostream& out, std::o
   try {
     if (app.parse(argc, argv, out)) commands.run(out);
     return 0;
-  } catch (const std::exception& error) {
-    err << "kerf-volume: " << one_line(error.what()) << '\n';
+  } catch (...) {
+    err << "kerf-volume: " << failure_text() << '\n';
     return 2;
   }
 }

@@ -4,6 +4,7 @@
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
+#include <iostream>
 #include <utility>
 
 #include <sys/socket.h>
@@ -12,6 +13,8 @@
 #include <unistd.h>
 
 #include "hil/hil_error.hpp"
+#include "shared/posix/failure.hpp"
+#include "shared/posix/peer.hpp"
 
 namespace kerf {
 namespace {
@@ -99,15 +102,17 @@ SeqpacketServer::SeqpacketServer(std::string path) : path_(std::move(path)) {
   const sockaddr_un address = address_of(unborn);
   const auto bind_here = [this](const sockaddr* a, socklen_t size) { return bind(fd_, a, size); };
   // One waits while one is served.
-  const bool bound = fd_ >= 0 && with_address(address, bind_here) == 0;
+  constexpr mode_t kOwnerAlone = S_IRUSR | S_IWUSR;  // bind() makes the file with these rights
+  const bool bound =
+      fd_ >= 0 && fchmod(fd_, kOwnerAlone) == 0 && with_address(address, bind_here) == 0;
   const bool ready =
       bound && listen(fd_, 1) == 0 && std::rename(unborn.c_str(), path_.c_str()) == 0;
   if (ready) return;
   const int error = errno;
   if (fd_ >= 0) close(fd_);
   if (bound) unlink(unborn.c_str());
-  throw HilError("--socket: " + path_ + ": " + std::strerror(error) +
-                 "; choose a path in a folder that you may write");
+  throw HilError("--socket: " + path_ + ": " + std::strerror(error) + "; " +
+                 way_out_of(error, "choose a path in a folder that you may write"));
 }
 
 SeqpacketServer::~SeqpacketServer() {
@@ -115,11 +120,20 @@ SeqpacketServer::~SeqpacketServer() {
   unlink(path_.c_str());
 }
 
-std::optional<SeqpacketLink> SeqpacketServer::accept(const std::atomic<bool>& stop) {
-  while (!stop.load(std::memory_order_relaxed)) {
-    if (!readable(fd_, kStopCheckMs)) continue;
+std::optional<SeqpacketLink> SeqpacketServer::accept(const std::atomic<bool>& stop,
+                                                     std::int64_t patience_ns) {
+  while (readable_within(fd_, patience_ns, stop)) {
     const int client = accept4(fd_, nullptr, nullptr, SOCK_CLOEXEC);
-    if (client >= 0) return SeqpacketLink(client);
+    if (client < 0 && (errno == EMFILE || errno == ENFILE)) {  // the client goes on waiting
+      throw HilError("--socket: " + path_ + ": " + std::strerror(errno) + "; " +
+                     way_out_of(errno, ""));
+    }
+    if (client < 0) continue;
+    SeqpacketLink link(client);
+    const std::optional<uid_t> stranger = stranger_at(client);
+    if (!stranger) return link;
+    std::cerr << "kerf-emulator: --socket: " << path_ << ": a client of user " << *stranger
+              << " was refused; be user " << geteuid() << " or root" << std::endl;
   }
   return std::nullopt;
 }

@@ -36,8 +36,10 @@ class SeqpacketServer {
   SeqpacketServer& operator=(const SeqpacketServer&) = delete;
   ~SeqpacketServer();
 
-  /// Waits for a client; nothing when `stop` became true.
-  [[nodiscard]] std::optional<SeqpacketLink> accept(const std::atomic<bool>& stop);
+  /// Waits for a client of this user or of root; nothing when `stop` became true, or for so long.
+  /// Another user is refused, with a line on stderr.
+  [[nodiscard]] std::optional<SeqpacketLink> accept(const std::atomic<bool>& stop,
+                                                    std::int64_t patience_ns = kForeverNs);
 
  private:
   std::string path_;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <ctime>
 #include <system_error>
 
@@ -14,7 +15,6 @@
 namespace kerf {
 namespace {
 
-constexpr std::int64_t kNsPerCycle = 125'000;
 constexpr std::int64_t kMaxBehindNs = 100'000'000;  // beyond this the past is not made up for
 constexpr int kMaxTakenPerPeriod = 64;              // a flooding host cannot hold the device
 // One byte more than any command, so that a longer packet is seen to be wrong.
@@ -33,6 +33,18 @@ void send(PacketLink& client, PacketDevice& device, FrontStats& stats) noexcept 
 bool readable(int fd, int timeout_ms) noexcept {
   pollfd waiting{fd, POLLIN, 0};
   return poll(&waiting, 1, timeout_ms) > 0;
+}
+
+bool readable_within(int fd, std::int64_t patience_ns, const std::atomic<bool>& stop) noexcept {
+  const std::int64_t began_ns = monotonic_ns();
+  std::int64_t left_ns = patience_ns;
+  while (!stop.load(std::memory_order_relaxed) && left_ns > 0) {
+    constexpr std::int64_t kNsPerMs = 1'000'000;
+    const auto ms = std::min<std::int64_t>(kStopCheckMs, (left_ns + kNsPerMs - 1) / kNsPerMs);
+    if (readable(fd, static_cast<int>(ms))) return true;
+    left_ns = patience_ns - (monotonic_ns() - began_ns);
+  }
+  return false;
 }
 
 std::span<const std::uint8_t> PacketLink::wait(std::span<std::uint8_t> buffer,

@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <span>
 #include <string>
 
@@ -38,6 +39,10 @@ class PacketLink {
   bool closed_ = false;
 };
 
+inline constexpr std::int64_t kNsPerCycle = 125'000;  ///< of the bus
+
+inline constexpr std::int64_t kForeverNs = std::numeric_limits<std::int64_t>::max();
+
 /// How long a stop request may wait.
 inline constexpr int kStopCheckMs = 100;
 inline constexpr std::int64_t kStopCheckNs = kStopCheckMs * std::int64_t{1'000'000};
@@ -45,11 +50,20 @@ inline constexpr std::int64_t kStopCheckNs = kStopCheckMs * std::int64_t{1'000'0
 /// Whether something can be read from `fd` within the time.
 [[nodiscard]] bool readable(int fd, int timeout_ms) noexcept;
 
+/// The same, for as long as that takes: false when `patience_ns` are over or `stop` became true,
+/// seen within kStopCheckMs.
+[[nodiscard]] bool readable_within(int fd, std::int64_t patience_ns,
+                                   const std::atomic<bool>& stop) noexcept;
+
 /// What both ways of serving share.
 struct ServeLimits {
   std::int64_t cycles = 0;  ///< bus cycles to serve in all; 0 = until the client leaves
   const std::atomic<bool>& stop;
 
+  /// How long that is from `served` bus cycles on, by the clock: how long to wait for a client.
+  [[nodiscard]] std::int64_t left_ns(std::int64_t served) const noexcept {
+    return cycles == 0 ? kForeverNs : (cycles - served) * kNsPerCycle;
+  }
   /// Whether that is all, after `served` bus cycles.
   [[nodiscard]] bool reached(std::int64_t served) const noexcept {
     return stop.load(std::memory_order_relaxed) || (cycles != 0 && served >= cycles);

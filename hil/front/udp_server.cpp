@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include "hil/hil_error.hpp"
+#include "shared/posix/failure.hpp"
 #include "shared/posix/monotonic_clock.hpp"
 #include "shared/posix/udp_address.hpp"
 
@@ -23,20 +24,22 @@ sockaddr* generic(sockaddr_storage& address) {
   return reinterpret_cast<sockaddr*>(&address);
 }
 
+constexpr const char* kUseAnother =
+    "use [ADDRESS:]PORT with an address of this machine and a free port";
+
 [[noreturn]] void refuse(const std::string& where, const std::string& why) {
-  throw HilError("--udp: " + where + ": " + why +
-                 "; use [ADDRESS:]PORT with an address of this machine and a free port");
+  throw HilError("--udp: " + where + ": " + why);
 }
 
 /// A socket bound to `where`.
 int bind_to(const std::string& where) {
   const UdpAddress address = resolve_udp(where);
-  if (!address.error.empty()) refuse(where, address.error);
+  if (!address.error.empty()) refuse(where, address.error + "; " + kUseAnother);
   const int fd = socket(address.storage.ss_family, SOCK_DGRAM | SOCK_CLOEXEC, 0);
   if (fd >= 0 && bind(fd, address.get(), address.bytes) == 0) return fd;
   const int cause = errno;
   if (fd >= 0) close(fd);
-  refuse(where, std::generic_category().message(cause));
+  refuse(where, std::generic_category().message(cause) + "; " + way_out_of(cause, kUseAnother));
 }
 
 }  // namespace
@@ -81,9 +84,8 @@ std::uint16_t UdpServer::port() const noexcept {
   return ntohs(reinterpret_cast<const sockaddr_in&>(own).sin_port);
 }
 
-std::optional<UdpLink> UdpServer::accept(const std::atomic<bool>& stop) {
-  while (!stop.load(std::memory_order_relaxed)) {
-    if (!readable(fd_, kStopCheckMs)) continue;
+std::optional<UdpLink> UdpServer::accept(const std::atomic<bool>& stop, std::int64_t patience_ns) {
+  while (readable_within(fd_, patience_ns, stop)) {
     sockaddr_storage host{};
     socklen_t host_bytes = sizeof host;
     std::uint8_t first = 0;

@@ -43,9 +43,10 @@ class UdpServer {
   ~UdpServer();
 
   [[nodiscard]] std::uint16_t port() const noexcept;
-  /// Waits for the first datagram of a host, empty or not; nothing when `stop` became true. The
-  /// link must not outlive the server.
-  [[nodiscard]] std::optional<UdpLink> accept(const std::atomic<bool>& stop);
+  /// Waits for the first datagram of a host, empty or not; nothing when `stop` became true, or for
+  /// so long. The link must not outlive the server.
+  [[nodiscard]] std::optional<UdpLink> accept(const std::atomic<bool>& stop,
+                                              std::int64_t patience_ns = kForeverNs);
 
  private:
   int fd_ = -1;

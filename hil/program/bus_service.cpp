@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "hil/program/bus_service.hpp"
 
+#include <cstdint>
 #include <ostream>
 #include <utility>
 
@@ -10,9 +11,23 @@
 #include "hil/front/usb/hidraw_node.hpp"
 #include "hil/front/usb/usbfs_node.hpp"
 #include "hil/front/usbip/usbip_falcon.hpp"
+#include "shared/posix/monotonic_clock.hpp"
 
 namespace kerf {
 namespace {
+
+/// Since when nobody uses a device, by the clock: its own time stands still then.
+class Unused {
+ public:
+  [[nodiscard]] bool for_longer_than(std::int64_t ns, bool in_use) noexcept {
+    const std::int64_t now_ns = monotonic_ns();
+    if (in_use) since_ns_ = now_ns;
+    return now_ns - since_ns_ > ns;
+  }
+
+ private:
+  std::int64_t since_ns_ = monotonic_ns();
+};
 
 /// Serves `node` as `mount`/`name`; `cycles()` since the start.
 template <class Node, class Cycles>
@@ -21,7 +36,11 @@ void serve_node(BusService& service, const std::string& mount, const char* devic
   FuseMount folder(mount);
   folder.add(name, node);
   service.out << "kerf-emulator: " << device << " at " << mount << '/' << name << std::endl;
-  folder.serve([&] { return service.goes_on(cycles(), node.left()); });
+  Unused unused;
+  folder.serve([&] {
+    return service.goes_on(cycles(), node.left()) &&
+           !unused.for_longer_than(service.limits.left_ns(cycles()), node.in_use());
+  });
   service.stats.wake = folder.lateness();
 }
 

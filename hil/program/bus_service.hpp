@@ -15,8 +15,8 @@
 
 namespace kerf {
 
-/// A device that is served on a bus, and when that ends: at a stop, at the limit of bus cycles, or
-/// once its client is gone.
+/// A device that is served on a bus, and when that ends: at a stop, at the limit of bus cycles,
+/// once its client is gone, or when nobody used it for as long as the rest of the limit.
 struct BusService {
   EmulatedDevice& device;
   const ServeLimits& limits;

@@ -43,7 +43,8 @@ void declare_front(Arguments& app, EmulatorOptions& o) {
       .shows_default();
   app.option("--cpu", o.cpu, "core to run on (default: the last)").within(0, 1023);
   app.flag("--stay", o.stay, "wait for another client when one leaves");
-  app.option("--seconds", o.seconds, "device time to serve (default: no limit)")
+  app.option("--seconds", o.seconds,
+             "device time to serve, and the longest wait for a client (default: no limit)")
       .within(0.0, kMaxSeconds);
 }
 

@@ -2,8 +2,10 @@
 #include <iostream>
 
 #include "hil/program/program.hpp"
+#include "shared/posix/private_files.hpp"
 #include "shared/posix/stop_signals.hpp"
 
 int main(int argc, char** argv) {
+  kerf::keep_files_private();
   return kerf::run_emulator(argc, argv, kerf::catch_stop_signals(), std::cout, std::cerr);
 }

@@ -14,6 +14,7 @@
 #include "hil/program/emulated_device.hpp"
 #include "hil/program/emulator_options.hpp"
 #include "hil/program/run_report.hpp"
+#include "shared/posix/failure.hpp"
 #include "shared/text/command_line.hpp"
 
 namespace kerf {
@@ -35,7 +36,7 @@ void serve_clients(const EmulatorOptions& o, Server& server, const std::string& 
                    std::ostream& out, std::ostream& err) {
   out << "kerf-emulator: " << o.device << " at " << place << std::endl;
   do {
-    auto client = server.accept(limits.stop);
+    auto client = server.accept(limits.stop, limits.left_ns(stats.cycles));
     if (!client) break;
     device.renew();
     HelloLink link(*client, hello_of(o));
@@ -102,10 +103,10 @@ void serve(const EmulatorOptions& o, const std::atomic<bool>& stop, std::ostream
 int run_emulator(int argc, const char* const* argv, const std::atomic<bool>& stop,
                  std::ostream& out, std::ostream& err) {
   EmulatorOptions options;
-  CommandLine app("Is the haptic device: wire bytes, mechanics, hand and faults.", "kerf-emulator",
-                  "kerf-emulator " KERF_VERSION);
-  declare(app, options);
   try {
+    CommandLine app("Is the haptic device: wire bytes, mechanics, hand and faults.",
+                    "kerf-emulator", "kerf-emulator " KERF_VERSION);
+    declare(app, options);
     if (!app.parse(argc, argv, out)) return 0;
     check(options);
     if (options.describe) {
@@ -114,12 +115,10 @@ int run_emulator(int argc, const char* const* argv, const std::atomic<bool>& sto
       serve(options, stop, out, err);
     }
     return 0;
-  } catch (const UsageError& error) {
-    err << "kerf-emulator: " << error.what() << '\n';
-  } catch (const HilError& error) {
-    err << "kerf-emulator: " << error.what() << '\n';
+  } catch (...) {
+    err << "kerf-emulator: " << failure_text() << '\n';
+    return 2;
   }
-  return 2;
 }
 
 }  // namespace kerf

@@ -2,12 +2,14 @@
 #include "hil/script/script_table.hpp"
 
 #include <algorithm>
+#include <cerrno>
 #include <fstream>
 #include <ios>
 #include <system_error>
 #include <utility>
 
 #include "hil/hil_error.hpp"
+#include "shared/posix/failure.hpp"
 #include "shared/text/number.hpp"
 #include "shared/text/words.hpp"
 
@@ -106,6 +108,10 @@ std::string read_script(const std::filesystem::path& file, const std::string& ex
     throw HilError(place + ": not a file; name one such as " + example);
   }
   std::ifstream in(file, std::ios::binary);
+  if (!in) {
+    throw HilError(place + ": " + std::generic_category().message(errno) + "; " +
+                   way_out_of(errno, "check its rights"));
+  }
   std::string text(kMaxBytes + 1, '\0');
   in.read(text.data(), static_cast<std::streamsize>(text.size()));
   text.resize(static_cast<std::size_t>(in.gcount()));

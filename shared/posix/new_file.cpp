@@ -11,6 +11,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "shared/posix/failure.hpp"
+
 namespace kerf {
 
 bool is_stream(const std::filesystem::path& path) {
@@ -32,8 +34,8 @@ int open_stream(const std::filesystem::path& path) noexcept {
 std::string not_written(int error) {
   if (error == ELOOP) return "is a link; name a file itself";
   if (error == ENXIO) return "nobody reads this pipe; start the reader first";
-  return "cannot be written (" + std::generic_category().message(error) +
-         "); make room or choose another place";
+  return "cannot be written (" + std::generic_category().message(error) + "); " +
+         way_out_of(error, "make room or choose another place");
 }
 
 NewFile::NewFile(const std::filesystem::path& path) : path_(path) {

@@ -1,16 +1,28 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "shared/posix/stop_signals.hpp"
 
+#include <array>
+#include <cerrno>
 #include <csignal>
 
 namespace kerf {
 namespace {
 
-std::atomic<bool> stop_asked{false};  // a signal handler can reach nothing but globals
+// A signal handler can reach nothing but globals.
+std::atomic<bool> stop_asked{false};
+std::atomic<void (*)() noexcept> first_act{nullptr};
 static_assert(std::atomic<bool>::is_always_lock_free);
+static_assert(std::atomic<void (*)() noexcept>::is_always_lock_free);
+
+constexpr std::array kAsks{SIGINT,    SIGTERM, SIGHUP, SIGALRM, SIGUSR1,   SIGUSR2,
+                           SIGVTALRM, SIGPROF, SIGIO,  SIGPWR,  SIGSTKFLT, SIGXCPU};
+constexpr std::array kCrashes{SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGSYS, SIGTRAP, SIGQUIT};
 
 void ask_to_stop(int) {
+  const int error = errno;  // of the call that the signal met
+  if (const auto act = first_act.load()) act();
   stop_asked.store(true);
+  errno = error;
 }
 
 void on(int signal, void (*handler)(int)) noexcept {
@@ -20,13 +32,18 @@ void on(int signal, void (*handler)(int)) noexcept {
   sigaction(signal, &action, nullptr);
 }
 
+void let_ask(int signal) noexcept {
+  struct sigaction before {};
+  sigaction(signal, nullptr, &before);
+  const bool overrides = signal == SIGINT || signal == SIGTERM;
+  if (overrides || before.sa_handler != SIG_IGN) on(signal, ask_to_stop);
+}
+
 }  // namespace
 
 std::atomic<bool>& catch_stop_signals() noexcept {
-  for (const int signal : {SIGINT, SIGTERM}) on(signal, ask_to_stop);
-  struct sigaction hang_up {};
-  sigaction(SIGHUP, nullptr, &hang_up);
-  if (hang_up.sa_handler != SIG_IGN) on(SIGHUP, ask_to_stop);
+  for (const int signal : kAsks) let_ask(signal);
+  for (int signal = SIGRTMIN; signal <= SIGRTMAX; ++signal) let_ask(signal);
   make_signals_of_writes_errors();
   return stop_asked;
 }
@@ -42,6 +59,26 @@ void make_signals_of_writes_errors() noexcept {
 
 bool stop_requested() noexcept {
   return stop_asked.load();
+}
+
+void at_stop_signal(void (*act)() noexcept) noexcept {
+  first_act.store(act);
+}
+
+StopSignalsElsewhere::StopSignalsElsewhere() noexcept {
+  sigset_t asking;
+  sigemptyset(&asking);
+  for (const int signal : kAsks) sigaddset(&asking, signal);
+  for (int signal = SIGRTMIN; signal <= SIGRTMAX; ++signal) sigaddset(&asking, signal);
+  pthread_sigmask(SIG_BLOCK, &asking, &before_);
+}
+
+StopSignalsElsewhere::~StopSignalsElsewhere() {
+  pthread_sigmask(SIG_SETMASK, &before_, nullptr);
+}
+
+std::span<const int> crash_signals() noexcept {
+  return kCrashes;
 }
 
 }  // namespace kerf

@@ -2,12 +2,25 @@
 #pragma once
 
 #include <atomic>
+#include <csignal>
+#include <span>
 
 namespace kerf {
 
-/// From now on SIGINT, SIGTERM and SIGHUP only ask for an end in order, and the signals of writes
-/// become errors. Returns what is true once an end was asked for. A SIGHUP that is ignored already
-/// (nohup) stays so. Calls that a signal met are started again.
+// The signals that end a process by default, and what every program of kerf makes of them:
+//
+//   ask for an end in order   INT, TERM, HUP, ALRM, USR1, USR2, VTALRM, PROF, IO, PWR, STKFLT, XCPU
+//                             and all real-time signals
+//   crash                     SEGV, BUS, FPE, ILL, ABRT, SYS, TRAP, and QUIT, the way out of a
+//                             program that no longer looks at the others
+//   become errors of a write  PIPE, XFSZ
+//   out of reach              KILL; and STOP, which ends nothing
+//
+// Two that the C library keeps for itself, 32 and 33, do what it makes of them.
+
+/// From now on the first kind only asks, and the signals of writes become errors. Returns what is
+/// true once an end was asked for. One that is ignored already (nohup) stays so, but INT and TERM.
+/// Calls that a signal met are started again.
 ///
 /// Main thread, once per process; stays for the rest of it.
 std::atomic<bool>& catch_stop_signals() noexcept;
@@ -22,5 +35,25 @@ void make_signals_of_writes_errors() noexcept;
 
 /// Whether a signal asked for the end.
 [[nodiscard]] bool stop_requested() noexcept;
+
+/// Calls `act` first thing in the handler of every signal that asks for the end; nullptr: nothing.
+/// It may do only what a signal handler may, and must not wait.
+void at_stop_signal(void (*act)() noexcept) noexcept;
+
+/// While one of these lives the calling thread leaves signals that ask for the end to the others,
+/// so that those with a right to real time hear of them on a busy machine too.
+class StopSignalsElsewhere {
+ public:
+  StopSignalsElsewhere() noexcept;
+  ~StopSignalsElsewhere();
+  StopSignalsElsewhere(const StopSignalsElsewhere&) = delete;
+  StopSignalsElsewhere& operator=(const StopSignalsElsewhere&) = delete;
+
+ private:
+  sigset_t before_;
+};
+
+/// Those of the second kind, for whoever has something to do before they take their course.
+[[nodiscard]] std::span<const int> crash_signals() noexcept;
 
 }  // namespace kerf

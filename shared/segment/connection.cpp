@@ -10,6 +10,7 @@
 #include <sys/un.h>
 #include <unistd.h>
 
+#include "shared/posix/failure.hpp"
 #include "shared/segment/hand_over.hpp"
 #include "shared/segment/hand_over_wire.hpp"
 #include "shared/segment/layout.hpp"
@@ -92,8 +93,11 @@ SegmentConnection connect_segment(std::string_view name) {
   address.sun_family = AF_UNIX;
   std::copy(path.begin(), path.end(), address.sun_path);
   OwnedFd link(socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0));
-  if (link.get() < 0 ||
-      connect(link.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
+  if (link.get() < 0) {
+    throw SegmentError("--name " + std::string(name) + ": " + system_message(errno) + "; " +
+                       way_out_of(errno, "end other programs"));
+  }
+  if (connect(link.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
     throw SegmentAbsent("--name " + std::string(name) + ": " + system_message(errno) + " (" + path +
                         "); start kerf-controller with this name first");
   }

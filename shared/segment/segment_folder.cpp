@@ -11,6 +11,7 @@
 #include <sys/un.h>
 #include <unistd.h>
 
+#include "shared/posix/failure.hpp"
 #include "shared/segment/hand_over.hpp"
 #include "shared/segment/hand_over_wire.hpp"
 
@@ -68,7 +69,8 @@ NameLock::NameLock(std::string_view name)
   for (;;) {
     file_ = OwnedFd(open(path_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0600));
     if (file_.get() < 0) {
-      throw SegmentError(path_ + ": " + system_message(errno) + "; make the folder writable");
+      throw SegmentError(path_ + ": " + system_message(errno) + "; " +
+                         way_out_of(errno, "make the folder writable"));
     }
     if (flock(file_.get(), LOCK_EX | LOCK_NB) != 0) {
       std::array<char, 24> holder{};

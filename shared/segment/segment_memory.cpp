@@ -10,6 +10,7 @@
 #include <sys/random.h>
 #include <unistd.h>
 
+#include "shared/posix/failure.hpp"
 #include "shared/segment/segment_error.hpp"
 
 namespace kerf {
@@ -17,8 +18,8 @@ namespace kerf {
 SegmentMemory SegmentMemory::create(std::uint64_t bytes) {
   const auto fail = [bytes](const char* call) {
     return SegmentError("segment: " + std::string(call) + " of " + std::to_string(bytes >> 20) +
-                        " MiB: " + system_message(errno) +
-                        "; crop the volume or free shared memory");
+                        " MiB: " + system_message(errno) + "; " +
+                        way_out_of(errno, "crop the volume or free shared memory"));
   };
   SegmentMemory memory;
   memory.fd_ = memfd_create("kerf-segment", MFD_CLOEXEC | MFD_ALLOW_SEALING);

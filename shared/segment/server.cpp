@@ -3,7 +3,9 @@
 #include <cerrno>
 #include <csignal>
 #include <cstring>
+#include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include <fcntl.h>
@@ -12,9 +14,12 @@
 #include <sched.h>
 #include <sys/eventfd.h>
 #include <sys/socket.h>
+#include <sys/stat.h>
 #include <sys/un.h>
 #include <unistd.h>
 
+#include "shared/posix/failure.hpp"
+#include "shared/posix/peer.hpp"
 #include "shared/segment/hand_over.hpp"
 #include "shared/segment/hand_over_wire.hpp"
 #include "shared/segment/layout_table.hpp"
@@ -23,35 +28,53 @@
 namespace kerf {
 namespace {
 
-[[nodiscard]] OwnedFd listen_at(const std::string& path) {
-  sockaddr_un address{};
-  address.sun_family = AF_UNIX;
-  std::copy(path.begin(), path.end(), address.sun_path);
-  OwnedFd listener(socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
-  unlink(path.c_str());  // of a dead controller: the name lock is ours
-  if (listener.get() < 0 ||
-      bind(listener.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0 ||
-      listen(listener.get(), SOMAXCONN) != 0) {
-    throw SegmentError(path + ": " + system_message(errno) + "; make the folder writable");
+/// The socket at `path` that readers ask; the path goes with it.
+class Listener {
+ public:
+  explicit Listener(std::string path) : path_(std::move(path)) {
+    sockaddr_un address{};
+    address.sun_family = AF_UNIX;
+    std::copy(path_.begin(), path_.end(), address.sun_path);
+    unlink(path_.c_str());  // of a dead controller: the name lock is ours
+    fd_ = OwnedFd(socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+    constexpr mode_t kOwnerAlone = S_IRUSR | S_IWUSR;  // bind() makes the file with these rights
+    if (fd_.get() < 0 || fchmod(fd_.get(), kOwnerAlone) != 0 ||
+        bind(fd_.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0 ||
+        listen(fd_.get(), SOMAXCONN) != 0) {
+      throw SegmentError(path_ + ": " + system_message(errno) + "; " +
+                         way_out_of(errno, "make the folder writable"));
+    }
   }
-  return listener;
-}
+  ~Listener() { unlink(path_.c_str()); }
+  Listener(const Listener&) = delete;
+  Listener& operator=(const Listener&) = delete;
+
+  [[nodiscard]] int get() const noexcept { return fd_.get(); }
+
+ private:
+  std::string path_;
+  OwnedFd fd_;
+};
 
 /// The memfd opened again, read-only: what a reader gets, so that it cannot even try to write.
 [[nodiscard]] OwnedFd reopen_read_only(int memfd) {
   const std::string path = "/proc/self/fd/" + std::to_string(memfd);
   OwnedFd fd(open(path.c_str(), O_RDONLY | O_CLOEXEC));
   if (fd.get() < 0) {
-    throw SegmentError(path + ": " + system_message(errno) + "; mount /proc");
+    throw SegmentError(path + ": " + system_message(errno) + "; " +
+                       way_out_of(errno, "mount /proc"));
   }
   return fd;
 }
 
-[[nodiscard]] bool may_connect(int peer) noexcept {
-  ucred credentials{};
-  socklen_t length = sizeof credentials;
-  return getsockopt(peer, SOL_SOCKET, SO_PEERCRED, &credentials, &length) == 0 &&
-         (credentials.uid == geteuid() || credentials.uid == 0);
+/// What wakes the server's thread for its end.
+[[nodiscard]] OwnedFd make_event() {
+  OwnedFd fd(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK));
+  if (fd.get() < 0) {
+    throw SegmentError("eventfd: " + system_message(errno) + "; " +
+                       way_out_of(errno, "end other programs"));
+  }
+  return fd;
 }
 
 [[nodiscard]] bool send_hello(int peer, const Hello& hello, int segment) noexcept {
@@ -77,17 +100,19 @@ struct SegmentServer::State {
   State(std::string_view name, const SegmentWriter& writer, CommandLimits command_limits)
       : path(segment_socket(name)),
         lock(name),
-        listener(listen_at(path)),
+        listener(path),
         segment(reopen_read_only(writer.fd())),
-        stop(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)),
+        stop(make_event()),
         hello{kSegmentMagic, kLayoutMajor, kLayoutMinor, kAbiHash, writer.session_id()},
-        limits(command_limits),
-        thread([this] { serve(); }) {}
+        limits(command_limits) {
+    polled.reserve(2 + kMaxPeers);  // not in the thread, which has nobody to tell that it failed
+    peers.reserve(kMaxPeers);
+    thread = std::thread([this] { serve(); });
+  }
 
   ~State() {
     eventfd_write(stop.get(), 1);
     thread.join();
-    unlink(path.c_str());
   }
   State(const State&) = delete;
   State& operator=(const State&) = delete;
@@ -99,9 +124,6 @@ struct SegmentServer::State {
     pthread_sigmask(SIG_BLOCK, &all, nullptr);  // signals go to the main thread
     const sched_param normal{};
     pthread_setschedparam(pthread_self(), SCHED_OTHER, &normal);
-    std::vector<pollfd> polled;
-    polled.reserve(2 + kMaxPeers);
-    peers.reserve(kMaxPeers);
     for (;;) {
       polled.assign({{stop.get(), POLLIN, 0}, {listener.get(), POLLIN, 0}});
       for (const OwnedFd& peer : peers) polled.push_back({peer.get(), POLLIN, 0});
@@ -122,7 +144,7 @@ struct SegmentServer::State {
     if (peer.get() < 0 && (errno == EMFILE || errno == ENFILE)) {
       usleep(10'000);  // the caller still waits in the queue: do not spin until a file is free
     }
-    if (peer.get() < 0 || peers.size() >= kMaxPeers || !may_connect(peer.get())) return;
+    if (peer.get() < 0 || peers.size() >= kMaxPeers || stranger_at(peer.get())) return;
     if (send_hello(peer.get(), hello, segment.get())) peers.push_back(std::move(peer));
   }
 
@@ -145,11 +167,12 @@ struct SegmentServer::State {
   SpscQueue<Command, kCommandSlots> commands;  // first: it is aligned to cache lines
   std::string path;
   NameLock lock;
-  OwnedFd listener;
+  Listener listener;
   OwnedFd segment;
   OwnedFd stop;
   Hello hello;
   CommandLimits limits;
+  std::vector<pollfd> polled;
   std::vector<OwnedFd> peers;
   std::uint32_t accepted = 0;
   std::thread thread;  // last: everything it uses is ready before it starts

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <chrono>
+#include <filesystem>
+#include <fstream>
 #include <optional>
 #include <string>
 #include <vector>
@@ -17,6 +19,15 @@ namespace kerf::test {
 inline const std::string kBin = KERF_TEST_BIN;
 inline const std::string kScenes = KERF_TEST_SCENES;
 inline const std::string kTorqueScale = "0.342,0.342,0.342";  // of the emulated Omni
+
+/// A scene that loads at once: a coarse tooth and one ball, nothing cut. Its path.
+inline std::string small_scene(const TemporaryFolder& folder) {
+  const std::filesystem::path path = folder / "small.toml";
+  std::ofstream(path) << "[[volume]]\nfile = \"phantom\"\nsize = [48, 48, 32]\niso = 0.45\n"
+                         "[[tool]]\nname = \"ball\"\nshape = \"ball\"\nsize_vox = 8\n"
+                         "[force]\nstiffness_n_per_mm = 0.4\n[cut]\nmodel = \"none\"\n";
+  return path.string();
+}
 
 inline std::string unique_name() {
   static int count = 0;
@@ -47,7 +58,7 @@ struct Pair {
     emulator.emplace(device, folder / "emulator.log");
     std::vector<std::string> servo{kBin + "/kerf-controller",
                                    "--scene",
-                                   kScenes + "/" + scene,
+                                   (std::filesystem::path(kScenes) / scene).string(),
                                    "--torque-scale",
                                    kTorqueScale,
                                    "--port",

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <filesystem>
 #include <fstream>
+#include <optional>
 #include <sstream>
 #include <stdexcept>
 #include <string>
@@ -60,38 +61,59 @@ class Process {
     posix_spawn_file_actions_addopen(&files, 1, output_.c_str(), O_WRONLY | O_CREAT | O_TRUNC,
                                      0600);
     posix_spawn_file_actions_adddup2(&files, 1, 2);
-    const int error = posix_spawn(&pid_, argv[0], &files, nullptr, argv.data(), environ);
+    // As from a terminal: a shell in the background has some ignored.
+    posix_spawnattr_t signals;
+    posix_spawnattr_init(&signals);
+    sigset_t all;
+    sigfillset(&all);
+    posix_spawnattr_setsigdefault(&signals, &all);
+    posix_spawnattr_setflags(&signals, POSIX_SPAWN_SETSIGDEF);
+    const int error = posix_spawn(&pid_, argv[0], &files, &signals, argv.data(), environ);
+    posix_spawnattr_destroy(&signals);
     posix_spawn_file_actions_destroy(&files);
     if (error != 0) throw std::runtime_error("cannot start " + arguments[0]);
   }
   /// Asked to end first, so that programs leave no sockets behind.
   ~Process() {
-    if (pid_ < 0) return;
+    if (code_) return;
     ::kill(pid_, SIGTERM);
-    for (int tries = 0; tries < 200; ++tries) {
-      if (waitpid(pid_, nullptr, WNOHANG) == pid_) return;
-      std::this_thread::sleep_for(std::chrono::milliseconds(10));
-    }
+    if (ends_within(std::chrono::seconds(2))) return;
     ::kill(pid_, SIGKILL);
     waitpid(pid_, nullptr, 0);
   }
   Process(const Process&) = delete;
   Process& operator=(const Process&) = delete;
 
-  void signal(int number) const { ::kill(pid_, number); }
+  void signal(int number) const {
+    if (!code_) ::kill(pid_, number);
+  }
 
   /// Exit code, or 128 + signal.
   int wait() {
-    int status = 0;
-    waitpid(pid_, &status, 0);
-    pid_ = -1;
-    return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+    if (!code_) take_end(0);
+    return *code_;
+  }
+  /// Whether it has ended by then; `wait` tells how.
+  [[nodiscard]] bool ends_within(std::chrono::milliseconds patience) {
+    const auto end = std::chrono::steady_clock::now() + patience;
+    while (!code_ && !take_end(WNOHANG) && std::chrono::steady_clock::now() < end) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    }
+    return code_.has_value();
   }
   /// Everything it printed so far.
   [[nodiscard]] std::string output() const { return text_of(output_); }
 
  private:
+  bool take_end(int options) {
+    int status = 0;
+    if (waitpid(pid_, &status, options) != pid_) return false;
+    code_ = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+    return true;
+  }
+
   pid_t pid_ = -1;
+  std::optional<int> code_;
   std::filesystem::path output_;
 };
 

@@ -1,17 +1,24 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "controller/shell/motor_guard.hpp"
 
+#include <algorithm>
 #include <array>
+#include <atomic>
+#include <chrono>
 #include <csignal>
-#include <cstdlib>
+#include <cstdint>
 #include <stdexcept>
+#include <thread>
+#include <vector>
 
 #include <doctest/doctest.h>
+#include <sys/mman.h>
 #include <sys/socket.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include "controller/device/driver/omni_driver.hpp"
+#include "shared/posix/monotonic_clock.hpp"
 #include "shared/posix/stop_signals.hpp"
 #include "shared/wire/omni_packet.hpp"
 
@@ -32,11 +39,44 @@ class PairPort final : public kerf::PacketPort {
   int fd_;
 };
 
-/// Runs `way_out` in a child that commands torque, and returns the last command it sent.
+/// How a child ended that commanded torque.
+struct Ending {
+  kerf::OmniCommand last;  ///< command that it sent
+  double off_ms = -1;      ///< from the begin of its way out to the packet that let go for good
+  int status = 0;          ///< of waitpid
+  [[nodiscard]] bool was_ended_by(int signal) const {
+    return WIFSIGNALED(status) && WTERMSIG(status) == signal;
+  }
+  [[nodiscard]] bool exited_with(int code) const {
+    return WIFEXITED(status) && WEXITSTATUS(status) == code;
+  }
+};
+
+/// When something happened, on a page that parent and child share.
+class SharedTime {
+ public:
+  SharedTime()
+      : ns_(static_cast<std::int64_t*>(mmap(nullptr, sizeof(std::int64_t), PROT_READ | PROT_WRITE,
+                                            MAP_SHARED | MAP_ANONYMOUS, -1, 0))) {
+    REQUIRE(ns_ != MAP_FAILED);
+  }
+  SharedTime(const SharedTime&) = delete;
+  SharedTime& operator=(const SharedTime&) = delete;
+  ~SharedTime() { munmap(ns_, sizeof(std::int64_t)); }
+  void set() noexcept { *ns_ = kerf::monotonic_ns(); }
+  [[nodiscard]] std::int64_t get() const noexcept { return *ns_; }
+
+ private:
+  std::int64_t* ns_;
+};
+
+/// Runs `way_out(stop)` in a child that commands torque; it ends with code 0 afterwards, or 2 after
+/// an exception.
 template <class WayOut>
-kerf::OmniCommand last_command_of(WayOut way_out) {
+Ending ending_by(WayOut way_out) {
   std::array<int, 2> ends{};
   REQUIRE(socketpair(AF_UNIX, SOCK_SEQPACKET, 0, ends.data()) == 0);
+  SharedTime began;
   const pid_t child = fork();
   REQUIRE(child >= 0);
   if (child == 0) {
@@ -51,6 +91,7 @@ kerf::OmniCommand last_command_of(WayOut way_out) {
       output.motor_counts = {500, 500, 500};
       output.motors_on = true;
       driver.command(output);
+      began.set();
       way_out(stop);
     } catch (const std::exception&) {
       _exit(2);
@@ -58,36 +99,150 @@ kerf::OmniCommand last_command_of(WayOut way_out) {
     _exit(0);
   }
   close(ends[1]);
-  kerf::OmniCommand last;
+  Ending ending;
   std::array<std::uint8_t, 64> packet{};
+  std::int64_t off_ns = 0;
   int packets = 0;
   for (ssize_t size = 0; (size = recv(ends[0], packet.data(), packet.size(), 0)) > 0; ++packets) {
     const auto command =
         kerf::decode_command(std::span(packet).first(static_cast<std::size_t>(size)));
     REQUIRE(command);
-    last = *command;
+    if (*command != ending.last) off_ns = kerf::monotonic_ns();
+    ending.last = *command;
   }
   CHECK(packets >= 2);
   close(ends[0]);
-  waitpid(child, nullptr, 0);
-  return last;
+  waitpid(child, &ending.status, 0);
+  ending.off_ms = static_cast<double>(off_ns - began.get()) / 1e6;
+  return ending;
 }
+
+/// Whether the kernel ends a process by this signal that has not said otherwise: asked of a child.
+bool ends_by_default(int signal) {
+  const pid_t child = fork();
+  REQUIRE(child >= 0);
+  if (child == 0) {
+    std::signal(signal, SIG_DFL);
+    std::raise(signal);
+    _exit(0);
+  }
+  int status = 0;
+  waitpid(child, &status, WUNTRACED);
+  if (WIFSTOPPED(status)) {
+    kill(child, SIGKILL);
+    waitpid(child, nullptr, 0);
+  }
+  return WIFSIGNALED(status);
+}
+
+bool is_crash(int signal) {
+  return std::ranges::count(kerf::crash_signals(), signal) > 0;
+}
+
+/// Signals 32 and 33 belong to the C library.
+std::vector<int> signals_that_can_be_caught() {
+  std::vector<int> signals;
+  for (int signal = 1; signal <= SIGRTMAX; ++signal) {
+    if (signal >= 32 && signal < SIGRTMIN) continue;
+    if (signal != SIGKILL && ends_by_default(signal)) signals.push_back(signal);
+  }
+  return signals;
+}
+
+constexpr kerf::OmniCommand kNeutral{};
 
 }  // namespace
 
-TEST_CASE("motors are off after return, exception, signal and crash") {
-  const kerf::OmniCommand neutral{};
-  CHECK(last_command_of([](auto&) {}) == neutral);
-  CHECK(last_command_of([](auto&) { throw std::runtime_error("edge"); }) == neutral);
-  for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGTSTP}) {
-    CHECK(last_command_of([signal](std::atomic<bool>& stop) {
-            std::raise(signal);
-            if (!stop) _exit(3);  // without the guard's packet the check fails
-          }) == neutral);
-  }
-#ifndef KERF_SANITIZED  // sanitizers take these signals for themselves
-  for (const int signal : {SIGSEGV, SIGABRT, SIGFPE, SIGUSR1, SIGSYS}) {
-    CHECK(last_command_of([signal](auto&) { std::raise(signal); }) == neutral);
-  }
+TEST_CASE("motors are off after return and exception") {
+  CHECK(ending_by([](auto&) {}).last == kNeutral);
+  const Ending thrown = ending_by([](auto&) { throw std::runtime_error("edge"); });
+  CHECK(thrown.last == kNeutral);
+  CHECK(thrown.exited_with(2));
+}
+
+TEST_CASE("every signal that ends a process by default switches the motors off first") {
+  const std::vector<int> signals = signals_that_can_be_caught();
+  CHECK(signals.size() == 22 + static_cast<std::size_t>(SIGRTMAX - SIGRTMIN + 1));
+  double slowest_ms = 0;
+  int slowest = 0;
+  for (const int signal : signals) {
+    CAPTURE(signal);
+    if (signal == SIGPIPE || signal == SIGXFSZ) continue;  // errors of a write, below
+#ifdef KERF_SANITIZED                                      // they take these for themselves
+    if (is_crash(signal)) continue;
 #endif
+    const Ending ending = ending_by([signal](std::atomic<bool>& stop) {
+      std::raise(signal);
+      if (!stop) _exit(3);
+      // A servo may still be in its tick, and computes one more force.
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    });
+    CHECK(ending.last == kNeutral);
+    CHECK(is_crash(signal) ? ending.was_ended_by(signal) : ending.exited_with(0));
+    if (ending.off_ms > slowest_ms) {
+      slowest_ms = ending.off_ms;
+      slowest = signal;
+    }
+  }
+  MESSAGE("motors off " << slowest_ms << " ms after the signal at most, by signal " << slowest);
+}
+
+TEST_CASE("what a tick commands after the signal is neutral") {
+  std::array<int, 2> ends{};
+  REQUIRE(socketpair(AF_UNIX, SOCK_SEQPACKET, 0, ends.data()) == 0);
+  PairPort port(ends[0]);
+  kerf::OmniDriver driver(port);
+  kerf::ServoOutput output;
+  output.motor_counts = {500, 500, 500};
+  output.motors_on = true;
+  CHECK(driver.stay_released());
+  driver.command(output);
+  std::array<std::uint8_t, 64> packet{};
+  for (ssize_t size = 0; (size = recv(ends[1], packet.data(), packet.size(), MSG_DONTWAIT)) > 0;) {
+    const auto command =
+        kerf::decode_command(std::span(packet).first(static_cast<std::size_t>(size)));
+    REQUIRE(command);
+    CHECK_FALSE(command->motors_on);
+    CHECK(command->motor == kNeutral.motor);
+  }
+  close(ends[0]);
+  close(ends[1]);
+}
+
+TEST_CASE("signals of a write end nothing, and those that pause a program end it") {
+  for (const int signal : {SIGPIPE, SIGXFSZ}) {
+    CAPTURE(signal);
+    const Ending ending = ending_by([signal](std::atomic<bool>& stop) {
+      std::raise(signal);
+      if (stop) _exit(3);
+    });
+    CHECK(ending.exited_with(0));
+    CHECK(ending.last == kNeutral);
+  }
+  for (const int signal : {SIGTSTP, SIGTTIN, SIGTTOU}) {
+    CAPTURE(signal);
+    const Ending ending = ending_by([signal](std::atomic<bool>& stop) {
+      std::raise(signal);
+      if (!stop) _exit(3);
+    });
+    CHECK(ending.exited_with(0));
+    CHECK(ending.last == kNeutral);
+  }
+}
+
+TEST_CASE("a signal that is ignored from the start stays so, but INT and TERM") {
+  for (const int signal : {SIGHUP, SIGUSR1, SIGALRM, SIGRTMIN, SIGINT, SIGTERM}) {
+    CAPTURE(signal);
+    const pid_t child = fork();
+    REQUIRE(child >= 0);
+    if (child == 0) {
+      std::signal(signal, SIG_IGN);
+      const std::atomic<bool>& stop = kerf::catch_stop_signals();
+      std::raise(signal);
+      _exit(stop ? 1 : 0);
+    }
+    int status = 0;
+    waitpid(child, &status, 0);
+    CHECK(WEXITSTATUS(status) == (signal == SIGINT || signal == SIGTERM ? 1 : 0));
+  }
 }

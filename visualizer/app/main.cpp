@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cstdio>
-#include <exception>
 
+#include "shared/posix/failure.hpp"
+#include "shared/posix/private_files.hpp"
 #include "shared/posix/stop_signals.hpp"
 #include "visualizer/app/run.hpp"
 #include "visualizer/error.hpp"
 #include "visualizer/gl/window.hpp"
 
 int main(int argc, char** argv) {
+  kerf::keep_files_private();
   try {
     const auto options = kerf::parse_options(argc, argv);
     if (!options) return 0;
@@ -20,8 +22,8 @@ int main(int argc, char** argv) {
           "--headless --out DIR for pictures without a screen");
     }
     return kerf::run_window(*options);
-  } catch (const std::exception& problem) {
-    std::fprintf(stderr, "kerf-visualizer: %s\n", problem.what());
+  } catch (...) {
+    std::fprintf(stderr, "kerf-visualizer: %s\n", kerf::failure_text().c_str());
     return 2;
   }
 }

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <string>
+#include <system_error>
 
 #include "shared/posix/cores.hpp"
 #include "visualizer/error.hpp"
@@ -93,7 +94,11 @@ int TilePool::default_workers() {
 }
 
 TilePool::TilePool(int workers) {
-  for (int i = 0; i < workers; ++i) workers_.emplace_back([this] { wait_for_work(); });
+  try {
+    for (int i = 0; i < workers; ++i) workers_.emplace_back([this] { wait_for_work(); });
+  } catch (const std::system_error&) {
+    // No thread is left: those that are there, or the caller alone, do the work.
+  }
 }
 
 TilePool::~TilePool() {

@@ -44,6 +44,11 @@ bool DeviceDriver::release() const noexcept {
   return port_.send_now(std::span(packet).first(size));
 }
 
+bool DeviceDriver::stay_released() noexcept {
+  released_.store(true);
+  return release();
+}
+
 bool DeviceDriver::release_for_good() noexcept {
   released_.store(true);
   Packet packet;

@@ -41,8 +41,10 @@ class DeviceDriver {
   /// Motors off now: one packet. False when it could not be sent. Any thread, any signal handler.
   bool release() const noexcept;
 
-  /// Motors off, and off they stay: every later command is neutral too. As `release`, but by the
-  /// port's `send_last`, since the process may be about to end.
+  /// Motors off, and off they stay: every later command is neutral too. As `release`.
+  bool stay_released() noexcept;
+
+  /// The same by the port's `send_last`, since the process may be about to end.
   bool release_for_good() noexcept;
 
   [[nodiscard]] bool wait(int milliseconds) noexcept { return port_.wait(milliseconds); }

@@ -14,6 +14,7 @@
 
 #include "controller/device/port/firewire_file.hpp"
 #include "controller/device/port/packet_port.hpp"
+#include "shared/posix/failure.hpp"
 #include "shared/wire/omni_constants.hpp"
 
 namespace kerf {
@@ -46,8 +47,8 @@ std::optional<FirewireDevice> identify(const std::string& path, int* refused) {
 }
 
 std::string reason_of(int refused) {
-  return "a node cannot be opened (" + std::generic_category().message(refused) +
-         "); give your user the right to it: docs/devices.md";
+  return "a node cannot be opened (" + std::generic_category().message(refused) + "); " +
+         way_out_of(refused, "give your user the right to it: docs/devices.md");
 }
 
 }  // namespace

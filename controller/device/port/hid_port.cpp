@@ -18,6 +18,7 @@
 
 #include "controller/device/port/packet_port.hpp"
 #include "shared/posix/cores.hpp"
+#include "shared/posix/failure.hpp"
 #include "shared/wire/wooden_constants.hpp"
 
 namespace kerf {
@@ -76,7 +77,9 @@ std::optional<std::size_t> identify(const std::string& where, const std::string&
   if (fd < 0 && errno == ENOENT) return std::nullopt;
   if (fd < 0) {
     refuse(where, node + " cannot be opened (" + std::generic_category().message(errno) + ")" +
-                      (errno == EACCES ? kGiveRight : "; name the node of the arm"));
+                      (errno == EACCES
+                           ? kGiveRight
+                           : std::string("; ") + way_out_of(errno, "name the node of the arm")));
   }
   hidraw_devinfo about{};
   const bool known = ioctl(fd, HIDIOCGRAWINFO, &about) >= 0;
@@ -116,15 +119,24 @@ HidPort::HidPort(const std::string& where, int patience_ms, const std::atomic<bo
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
   }
   sem_init(&raised_, 0, 0);
-  reader_ = std::thread([this] { read_reports(); });
-  writer_ = std::thread([this] { write_commands(); });
+  try {
+    reader_ = std::thread([this] { read_reports(); });
+    writer_ = std::thread([this] { write_commands(); });
+  } catch (const std::system_error&) {
+    close();
+    throw;
+  }
 }
 
 HidPort::~HidPort() {
+  close();
+}
+
+void HidPort::close() noexcept {
   stop_ = true;
   sem_post(&raised_);
-  writer_.join();
-  reader_.join();
+  if (writer_.joinable()) writer_.join();
+  if (reader_.joinable()) reader_.join();
   sem_destroy(&raised_);
   hid_close(device_);
 }

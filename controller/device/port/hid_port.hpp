@@ -51,6 +51,7 @@ class HidPort final : public PacketPort {
 
  private:
   [[nodiscard]] bool open(const std::string& where);
+  void close() noexcept;
   void read_reports() noexcept;
   void write_commands() noexcept;
 

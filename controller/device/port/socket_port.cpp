@@ -13,6 +13,8 @@
 #include <sys/un.h>
 #include <unistd.h>
 
+#include "shared/posix/failure.hpp"
+
 namespace kerf {
 
 SocketPort::SocketPort(const std::filesystem::path& path, int patience_ms,
@@ -38,10 +40,12 @@ SocketPort::SocketPort(const std::filesystem::path& path, int patience_ms,
     const int error = errno;
     if (fd_ >= 0) close(fd_);
     fd_ = -1;
-    if (stop || std::chrono::steady_clock::now() >= give_up) {
+    const bool lacks_files = error == EMFILE || error == ENFILE;
+    if (lacks_files || stop || std::chrono::steady_clock::now() >= give_up) {
+      const std::string start = "start kerf-emulator --front socket --socket " + text;
       throw std::runtime_error("--port socket:" + text + ": no device answers (" +
-                               std::generic_category().message(error) +
-                               "); start kerf-emulator --front socket --socket " + text);
+                               std::generic_category().message(error) + "); " +
+                               way_out_of(error, start.c_str()));
     }
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
   }

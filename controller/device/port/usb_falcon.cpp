@@ -13,6 +13,8 @@
 #include <libusb-1.0/libusb.h>
 #include <unistd.h>
 
+#include "shared/posix/failure.hpp"
+
 namespace kerf {
 namespace {
 
@@ -118,7 +120,9 @@ bool UsbFalcon::open_node(const std::string& path) {
   if (fd_ < 0 && errno == ENOENT) return false;
   if (fd_ < 0) {
     refuse_usb(path, "cannot be opened (" + std::generic_category().message(errno) + ")" +
-                         (errno == EACCES ? kGiveRight : "; name the node of a Falcon"));
+                         (errno == EACCES ? kGiveRight
+                                          : std::string("; ") +
+                                                way_out_of(errno, "name the node of a Falcon")));
   }
   const int error = libusb_wrap_sys_device(context_, static_cast<std::intptr_t>(fd_), &handle_);
   if (error != 0) {

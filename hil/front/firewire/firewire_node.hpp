@@ -37,7 +37,9 @@ class FirewireNode final : public FuseNode, private FirewireBus::Listener {
   void wake() override;
 
   /// Somebody had a stream, and nobody has the node open any more.
-  [[nodiscard]] bool left() const noexcept { return streamed_ && opens_.empty(); }
+  [[nodiscard]] bool left() const noexcept { return streamed_ && !in_use(); }
+  /// Somebody has it open.
+  [[nodiscard]] bool in_use() const noexcept { return !opens_.empty(); }
   [[nodiscard]] const FirewireBus& bus() const noexcept { return bus_; }
   /// Largest number of events that one open has let wait.
   [[nodiscard]] std::size_t events_high_water() const noexcept { return high_water_; }

@@ -14,6 +14,7 @@
 #include <unistd.h>
 
 #include "hil/hil_error.hpp"
+#include "shared/posix/failure.hpp"
 #include "shared/posix/monotonic_clock.hpp"
 
 namespace kerf {
@@ -35,8 +36,9 @@ FuseChannel::FuseChannel(std::string folder) : folder_(std::move(folder)) {
   }
   fd_ = ::open("/dev/fuse", O_RDWR | O_NONBLOCK | O_CLOEXEC);
   if (fd_ < 0) {
-    throw HilError("--front fuse: /dev/fuse cannot be opened (" + reason() +
-                   "); run as root, or use --front socket");
+    const int error = errno;
+    throw HilError("--front fuse: /dev/fuse cannot be opened (" + reason() + "); " +
+                   way_out_of(error, "run as root, or use --front socket"));
   }
   const std::string options = "fd=" + std::to_string(fd_) +
                               ",rootmode=40000,user_id=" + std::to_string(getuid()) +

@@ -37,7 +37,9 @@ class HidrawNode final : public FuseNode, private HidHost {
   void wake() override;
 
   /// Somebody has written, and nobody has the node open any more.
-  [[nodiscard]] bool left() const noexcept { return used_ && opens_.empty(); }
+  [[nodiscard]] bool left() const noexcept { return used_ && !in_use(); }
+  /// Somebody has it open.
+  [[nodiscard]] bool in_use() const noexcept { return !opens_.empty(); }
   [[nodiscard]] const WoodenHid& arm() const noexcept { return arm_; }
   /// Reports for which an open had no place.
   [[nodiscard]] std::uint64_t lost() const noexcept { return lost_; }

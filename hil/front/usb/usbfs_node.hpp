@@ -39,7 +39,9 @@ class UsbfsNode final : public FuseNode, private UsbHost {
   void wake() override;
 
   /// Somebody had transfers, and nobody has the node open any more.
-  [[nodiscard]] bool left() const noexcept { return used_ && opens_.empty(); }
+  [[nodiscard]] bool left() const noexcept { return used_ && !in_use(); }
+  /// Somebody has it open.
+  [[nodiscard]] bool in_use() const noexcept { return !opens_.empty(); }
   /// Times that an endpoint was freed while reads waited there, which the kernel does not allow
   /// (usb_clear_halt): what becomes of them is up to its controller.
   [[nodiscard]] int rash_clears() const noexcept { return rash_clears_; }

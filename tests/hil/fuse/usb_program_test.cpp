@@ -62,6 +62,20 @@ TEST_CASE("kerf-emulator --front fuse is a Falcon or a WoodenHaptics arm for one
   serve_once("woodenhaptics", "hid", "hidraw0", encode(kerf::WoodenCommand{}));
 }
 
+TEST_CASE("--seconds ends an emulator whose node nobody opens") {
+  for (const std::vector<std::string>& device :
+       {std::vector<std::string>{"omni"}, {"omni", "--lockstep"}, {"falcon"}, {"woodenhaptics"}}) {
+    CAPTURE(device.front());
+    const kerf::test::TempFolder folder;
+    std::vector<std::string> arguments{"--front", "fuse",         "--mount", folder.path(),
+                                       "--stay",  "--priority",   "0",       "--seconds",
+                                       "0.1",     "--personality"};
+    arguments.insert(arguments.end(), device.begin(), device.end());
+    CHECK(run(arguments).code == 0);
+    CHECK(std::filesystem::is_empty(folder.path()));
+  }
+}
+
 TEST_CASE("kerf-emulator --front fuse knows the faults and the limits of each bus") {
   const kerf::test::TempFolder folder;
   const auto refused = [&](const std::string& device, std::vector<std::string> more) {

@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "shared/posix/failure.hpp"
+
+#include <algorithm>
+#include <cerrno>
+#include <exception>
+#include <filesystem>
+#include <new>
+#include <system_error>
+
+namespace kerf {
+namespace {
+
+/// Messages of libraries may have several.
+std::string on_one_line(std::string text) {
+  std::replace(text.begin(), text.end(), '\n', ' ');
+  return text;
+}
+
+}  // namespace
+
+const char* way_out_of(int error, const char* usual) noexcept {
+  switch (error) {
+    case EMFILE:
+      return "raise ulimit -n";
+    case ENFILE:
+      return "end other programs, or raise fs.file-max";
+    case ENOMEM:
+      return "free memory, or raise ulimit -v";
+    default:
+      return usual;
+  }
+}
+
+std::string failure_text() {
+  try {
+    throw;
+  } catch (const std::bad_alloc&) {
+    return "memory: none is left; take a smaller volume, free memory, or raise ulimit -v";
+  } catch (const std::filesystem::filesystem_error& error) {
+    return error.path1().string() + ": " + error.code().message() + "; " +
+           way_out_of(error.code().value(), "check the path and its rights");
+  } catch (const std::system_error& error) {  // of the library itself: no thread
+    return "threads: " + error.code().message() + "; raise ulimit -u, or TasksMax of the service";
+  } catch (const std::exception& error) {
+    return on_one_line(error.what());
+  }
+}
+
+}  // namespace kerf

@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+
+namespace kerf {
+
+/// The way out of `error` of the system where that is a limit of this machine or of this user (open
+/// files, memory); else `usual`, what helps against every other reason.
+[[nodiscard]] const char* way_out_of(int error, const char* usual) noexcept;
+
+/// In a handler, for the one place of each program that prints errors: what the exception in flight
+/// says, on one line. Those of the standard library, which know of no way out, get one.
+[[nodiscard]] std::string failure_text();
+
+}  // namespace kerf

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "shared/posix/failure.hpp"
+
+#include <cerrno>
+#include <filesystem>
+#include <new>
+#include <stdexcept>
+#include <string>
+#include <system_error>
+
+#include <doctest/doctest.h>
+
+namespace {
+
+template <class Exception>
+std::string text_of(const Exception& exception) {
+  try {
+    throw exception;
+  } catch (...) {
+    return kerf::failure_text();
+  }
+}
+
+}  // namespace
+
+TEST_CASE("what a program says at its end is one line with a way out") {
+  CHECK(text_of(std::runtime_error("scene.toml: value; way\nout")) == "scene.toml: value; way out");
+  CHECK(text_of(std::bad_alloc())
+            .ends_with("; take a smaller volume, free memory, or raise ulimit -v"));
+  CHECK(text_of(std::system_error(EAGAIN, std::generic_category())) ==
+        "threads: Resource temporarily unavailable; raise ulimit -u, or TasksMax of the service");
+  const auto code = [](int error) { return std::error_code(error, std::generic_category()); };
+  CHECK(text_of(std::filesystem::filesystem_error("rename", "/a/b", code(EACCES))) ==
+        "/a/b: Permission denied; check the path and its rights");
+  CHECK(text_of(std::filesystem::filesystem_error("open", "/a/b", code(EMFILE))) ==
+        "/a/b: Too many open files; raise ulimit -n");
+}
+
+TEST_CASE("a limit of the machine has its own way out, anything else the usual one") {
+  CHECK(kerf::way_out_of(EMFILE, "knock") == std::string("raise ulimit -n"));
+  CHECK(kerf::way_out_of(ENOMEM, "knock") == std::string("free memory, or raise ulimit -v"));
+  CHECK(kerf::way_out_of(ENOENT, "knock") == std::string("knock"));
+  CHECK(kerf::way_out_of(EAGAIN, "knock") == std::string("knock"));  // a full queue, of a socket
+}
