@@ -156,12 +156,15 @@ void plan_limits(const LoadedScene& scene, ServoPlan<N>& plan) {
   plan.limits.slew_n_per_tick = Real(scene.limits.slew_n_per_ms * 1000.0 / rate_hz);
   plan.limits.thermal_per_tick = typename N::Ratio(1.0 / (rate_hz * kThermalTimeS));
   plan.speed_limit_mm_per_tick = Real(scene.limits.speed_mm_per_s / rate_hz);
+  const auto at_least = [&](double ms) {
+    return static_cast<std::uint32_t>(std::ceil(ms * rate_hz / 1000.0));
+  };
   plan.timing = {.hold_ticks = ticks(5),
                  .zero_ticks = ticks(20),
                  // Below 500 Hz a tick is longer than the 2 ms: the first bad one trips.
                  .not_finite_ticks = static_cast<std::uint32_t>(2 * rate_hz / 1000),
-                 .fade_in_ticks = ticks(100),
-                 .rest_ticks = ticks(50)};
+                 .fade_in_ticks = at_least(100),
+                 .rest_ticks = at_least(50)};
 }
 
 }  // namespace kerf

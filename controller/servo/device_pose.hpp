@@ -11,6 +11,7 @@
 #include "controller/servo/device_report.hpp"
 #include "controller/servo/kinematics/omni_gimbal.hpp"
 #include "controller/servo/servo_state.hpp"
+#include "controller/servo/supervisor.hpp"
 
 namespace kerf {
 
@@ -24,11 +25,24 @@ struct DevicePose {
 
 inline constexpr std::int32_t kRestCounts = 2;  ///< steps of an encoder that jitters at an edge
 
-/// Follows the encoders over the wrap at 16 bits. Parked at rest for `rest_ticks` and homed, the
-/// counters start again, from 0 or from the device's absolute counts: that is the calibration.
-/// Returns whether it holds in this report.
-inline bool follow_encoders(const DeviceReport& report, bool absolute, std::uint32_t rest_ticks,
+/// One tick without a fresh report. Where the servo is faster than the device the last report still
+/// holds, and with it a rest, for as long as a force would be held.
+inline void follow_silence(const SafetyTiming& timing, EncoderState& encoders) noexcept {
+  encoders.silent_ticks += encoders.silent_ticks <= timing.hold_ticks ? 1U : 0U;
+  const bool rests = encoders.rest_ticks > 0 && encoders.silent_ticks <= timing.hold_ticks;
+  encoders.rest_ticks = rests ? std::min(encoders.rest_ticks + 1, timing.rest_ticks) : 0;
+}
+
+/// One tick of the encoders, followed over the wrap at 16 bits. Parked at rest for `rest_ticks` and
+/// homed, the counters start again, from 0 or from the device's absolute counts: that is the
+/// calibration. Returns whether it holds in this report; never in one that is not fresh.
+inline bool follow_encoders(const DeviceReport& report, bool absolute, const SafetyTiming& timing,
                             EncoderState& encoders) noexcept {
+  if (!report.fresh) {
+    follow_silence(timing, encoders);
+    return false;
+  }
+  encoders.silent_ticks = 0;
   bool at_rest = report.parked && report.homed;
   for (std::size_t i = 0; i < 3; ++i) {
     const auto step = static_cast<std::int16_t>(report.encoder[i] - encoders.last[i]);
@@ -38,8 +52,8 @@ inline bool follow_encoders(const DeviceReport& report, bool absolute, std::uint
     encoders.last[i] = report.encoder[i];
     at_rest = at_rest && step >= -kRestCounts && step <= kRestCounts;
   }
-  encoders.rest_ticks = at_rest ? std::min(encoders.rest_ticks + 1, rest_ticks) : 0;
-  if (encoders.rest_ticks < rest_ticks) return false;
+  encoders.rest_ticks = at_rest ? std::min(encoders.rest_ticks + 1, timing.rest_ticks) : 0;
+  if (encoders.rest_ticks < timing.rest_ticks) return false;
   encoders.unwrapped = {};
   if (absolute) std::ranges::copy(report.encoder, encoders.unwrapped.begin());
   return true;

@@ -34,7 +34,8 @@ struct VolumeState {
 struct EncoderState {
   std::array<std::int16_t, 3> last{};
   std::array<std::int32_t, 3> unwrapped{};  ///< counts from home, beyond 16 bits
-  std::uint32_t rest_ticks = 0;             ///< reports in a row: parked, and no joint turning
+  std::uint32_t rest_ticks = 0;             ///< since it is parked and no joint turns
+  std::uint32_t silent_ticks = 0;           ///< since the last report
 };
 
 /// Sliding sum over the gimbal readings of the last 20 ms: the pots' low bits are noise.

@@ -174,11 +174,9 @@ template <class N>
 Sensed<N> sense(const ServoPlan<N>& plan, ServoState<N>& state,
                 const DeviceReport& report) noexcept {
   SafetyInputs seen{.fresh = report.fresh, .parked = report.parked, .homed = report.homed};
-  if (report.fresh) {
-    seen.calibrated = follow_encoders(report, plan.device.absolute_encoders, plan.timing.rest_ticks,
-                                      state.encoders);
-    follow_gimbal(report, plan.device.gimbal_samples, state.gimbal);
-  }
+  seen.calibrated =
+      follow_encoders(report, plan.device.absolute_encoders, plan.timing, state.encoders);
+  if (report.fresh) follow_gimbal(report, plan.device.gimbal_samples, state.gimbal);
   Sensed<N> sensed;
   sensed.pose = device_pose(plan.device, state.encoders, state.gimbal);
   seen.finite = all_finite(sensed.pose.arm.tip_mm);

@@ -13,7 +13,7 @@ struct SafetyTiming {
   std::uint32_t zero_ticks = 20;       ///< then the force falls to zero by here (20 ms)
   std::uint32_t not_finite_ticks = 2;  ///< NaN for longer: motors off
   std::uint32_t fade_in_ticks = 100;   ///< after arming
-  std::uint32_t rest_ticks = 50;       ///< parked at rest this long: calibrated (50 ms)
+  std::uint32_t rest_ticks = 50;       ///< parked at rest this long: calibrated (50 ms at least)
 };
 
 /// What the supervisor saw in this tick.

@@ -47,7 +47,7 @@ const char* text_of(EndReason end) {
     case EndReason::never_armed:
       break;
   }
-  return "the device was never calibrated: nobody parked it at rest; see docs/devices.md";
+  return "the device was never taken in hand";
 }
 
 double removed_mm3(const LoadedScene& scene, const RunRecord& record) {
@@ -183,8 +183,9 @@ int run_controller(const ControllerOptions& options) {
 
   segment.set_lifecycle(Lifecycle::run);
   report.load_s = static_cast<double>(monotonic_ns() - began_ns) / 1e9;
-  const EndReason end = run_threads(
-      {options, port_text, scene.servo.rate_hz, segment, server, *servo, device, stop, report});
+  const EndReason end =
+      run_threads({options, port_text, scene.device.personality, scene.servo.rate_hz, segment,
+                   server, *servo, device, stop, report});
   if (!options.virtual_time) unlock_memory();
 
   const bool clean = end == EndReason::ticks_done || end == EndReason::stopped;

@@ -14,6 +14,10 @@ inline void log_line(const char* level, const char* colour, const std::string& t
   std::fprintf(stderr, "kerf-controller: %s%s%s: %s\n", terminal ? colour : "", level,
                terminal ? "\033[m" : "", text.c_str());
 }
+/// One that needs no level.
+inline void log_note(const std::string& text) {
+  std::fprintf(stderr, "kerf-controller: %s\n", text.c_str());
+}
 inline void log_warning(const std::string& text) {
   log_line("warning", "\033[33m\033[1m", text);
 }

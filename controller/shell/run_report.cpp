@@ -48,6 +48,7 @@ std::string report_json(const RunReport& report) {
       {"velocity_estimator", kVelocityEstimator},
       {"virtual", report.virtual_time},
       {"end", report.end},
+      {"waiting", report.waiting},
       {"ticks", r.ticks},
       {"armed_at_tick", r.armed_at_tick},
       {"overruns", r.overruns},
@@ -88,6 +89,9 @@ std::string summary(const RunReport& report) {
   text += format("kerf: %s, %llu ticks at %d Hz (%s, %s numbers)\n\n", report.end.c_str(),
                  static_cast<unsigned long long>(r.ticks), report.rate_hz,
                  report.virtual_time ? "virtual time" : "real time", report.numeric.c_str());
+  if (r.ticks == 0 && !report.waiting.empty()) {
+    text += format("  never in use; %s\n\n", report.waiting.c_str());
+  }
   text += "  us              p50       p99     p99.9       max\n";
   if (!report.virtual_time) text += line("wake-up", r.wake);
   text += line("compute", r.compute);

@@ -15,7 +15,8 @@ namespace kerf {
 /// Everything a run is reported with.
 struct RunReport {
   RunRecord record;
-  std::string end;  ///< why the run ended
+  std::string end;      ///< why the run ended
+  std::string waiting;  ///< what the device waited for at the end; empty: nothing
   std::string scene;
   std::string device;
   std::string numeric;

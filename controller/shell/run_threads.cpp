@@ -7,6 +7,7 @@
 #include <exception>
 #include <optional>
 #include <stdexcept>
+#include <string>
 #include <thread>
 
 #include "controller/shell/call_guard.hpp"
@@ -14,6 +15,7 @@
 #include "controller/shell/motor_guard.hpp"
 #include "controller/shell/publisher.hpp"
 #include "controller/shell/watchdog.hpp"
+#include "shared/posix/monotonic_clock.hpp"
 #include "shared/posix/progress_bar.hpp"
 
 namespace kerf {
@@ -22,16 +24,22 @@ namespace {
 constexpr double kArmingPatienceS = 60;
 constexpr std::chrono::milliseconds kLookPeriod{5};
 
-/// Main thread while the servo runs: draws the progress bar.
-void show_progress(const LoopSignals& signals, const std::atomic<bool>& ended,
-                   const ControllerOptions& options, int rate_hz) {
+/// Main thread while the servo runs: draws the progress bar, and says what the device waits for.
+void show_progress(const LoopSignals& signals, const std::atomic<bool>& ended, const Run& run) {
+  const ControllerOptions& options = run.options;
   const ProgressBar bar(options.progress);
+  WaitTeller teller;
   while (!ended.load()) {
-    const double done_s = static_cast<double>(signals.armed_ticks.load()) / rate_hz;
+    const Waiting waiting = signals.waiting.load(std::memory_order_relaxed);
+    const std::string waits = text_of(run.personality, waiting);
+    if (teller.look(waiting, monotonic_ns())) {
+      bar.hide();
+      log_note(waits);
+    }
+    const double done_s = static_cast<double>(signals.armed_ticks.load()) / run.rate_hz;
     char text[64];
     std::snprintf(text, sizeof text, "%.1f s", done_s);
-    bar.show(options.seconds ? done_s / *options.seconds : 0,
-             done_s > 0 ? text : "waiting for the device to be parked at rest");
+    bar.show(options.seconds ? done_s / *options.seconds : 0, done_s > 0 ? text : waits);
     for (int i = 0; i < 10 && !ended.load(); ++i) std::this_thread::sleep_for(kLookPeriod);
   }
 }
@@ -110,9 +118,10 @@ EndReason run_threads(const Run& run) {
     if (!run.options.virtual_time) {
       watching = start_watchdog(watchdog, run.options.real_time);
     }
-    show_progress(signals, ended, run.options, run.rate_hz);
+    show_progress(signals, ended, run);
   }
   run.report.watchdog_trips = watchdog.trips();
+  run.report.waiting = text_of(run.personality, signals.waiting.load());
   if (failure) std::rethrow_exception(failure);
   return calls ? end_by(*calls, end, run.report) : end;
 }

@@ -11,6 +11,7 @@
 #include "controller/shell/servo_loop.hpp"
 #include "shared/segment/hand_over.hpp"
 #include "shared/segment/writer.hpp"
+#include "shared/wire/personality.hpp"
 
 namespace kerf {
 
@@ -18,6 +19,7 @@ namespace kerf {
 struct Run {
   const ControllerOptions& options;
   const std::string& port;  ///< as `--port` names it, `auto` resolved
+  Personality personality;
   int rate_hz;
   SegmentWriter& segment;
   SegmentServer& server;

@@ -116,6 +116,7 @@ EndReason run_servo(TickSource& clock, DeviceDriver& device, Servo& servo, Publi
 
     signals.heartbeat.store(tick, std::memory_order_relaxed);
     signals.armed_ticks.store(record.ticks, std::memory_order_relaxed);
+    signals.waiting.store(waiting_for(report, output), std::memory_order_relaxed);
     silent_ticks = report.fresh ? 0 : silent_ticks + 1;
     if (record.ticks >= limits.armed_ticks) {
       end = EndReason::ticks_done;

@@ -9,6 +9,7 @@
 #include "controller/shell/publisher.hpp"
 #include "controller/shell/run_record.hpp"
 #include "controller/shell/tick_source.hpp"
+#include "controller/shell/waiting.hpp"
 #include "shared/segment/hand_over.hpp"
 
 namespace kerf {
@@ -30,10 +31,11 @@ struct LoopLimits {
 
 /// What the loop shares with other threads.
 struct LoopSignals {
-  std::atomic<bool>& stop;                    ///< asked by a signal
-  std::atomic<bool> stalled{false};           ///< the watchdog switched the motors off
-  std::atomic<std::uint64_t> heartbeat{0};    ///< ticks so far: the watchdog's pulse
-  std::atomic<std::uint64_t> armed_ticks{0};  ///< for the progress bar
+  std::atomic<bool>& stop;                        ///< asked by a signal
+  std::atomic<bool> stalled{false};               ///< the watchdog switched the motors off
+  std::atomic<std::uint64_t> heartbeat{0};        ///< ticks so far: the watchdog's pulse
+  std::atomic<std::uint64_t> armed_ticks{0};      ///< for the progress bar
+  std::atomic<Waiting> waiting{Waiting::report};  ///< of the device, after the last tick
 };
 
 /// What a tick does first: force begins anew where the servo has stood still, told by its watchdog,

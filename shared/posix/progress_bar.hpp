@@ -14,11 +14,14 @@ namespace kerf {
 class ProgressBar {
  public:
   explicit ProgressBar(bool wanted) noexcept : shown_(wanted && isatty(STDERR_FILENO) == 1) {}
-  ~ProgressBar() {
-    if (shown_) std::fputs("\r\033[K", stderr);
-  }
+  ~ProgressBar() { hide(); }
   ProgressBar(const ProgressBar&) = delete;
   ProgressBar& operator=(const ProgressBar&) = delete;
+
+  /// Until it is shown again: for another line on stderr.
+  void hide() const noexcept {
+    if (shown_) std::fputs("\r\033[K", stderr);
+  }
 
   /// `share` 0..1, or negative while waiting; `text` says what for.
   void show(double share, const std::string& text) const {

@@ -19,6 +19,7 @@
 #include "controller/shell/probe/probe_nodes.hpp"
 #include "controller/shell/probe/probe_view.hpp"
 #include "controller/shell/real_time.hpp"
+#include "controller/shell/waiting.hpp"
 #include "shared/posix/new_file.hpp"
 #include "shared/posix/stop_signals.hpp"
 #include "shared/text/json.hpp"
@@ -49,25 +50,17 @@ DeviceSettings device_of(const ControllerOptions& options) {
 void add_lacks_of_device(const DeviceSettings& device, const ProbeView::Seen& seen,
                          std::vector<Lack>& lacks) {
   const std::string name = word_of(device.personality);
+  const auto lacks_deed = [&](const char* what, Waiting waiting) {
+    lacks.push_back({name + what, deed_for(device.personality, waiting)});
+  };
   if (seen.reports == 0) {
-    lacks.push_back({name + ": not one report",
-                     device.personality == Personality::falcon
-                         ? "load its firmware (docs/devices.md), or unplug it and plug it in again"
-                         : "unplug it and plug it in again"});
+    lacks_deed(": not one report", Waiting::report);
     return;
   }
   if (!seen.homed) {
-    lacks.push_back(
-        {name + ": not homed", device.personality == Personality::falcon
-                                   ? "pull the grip all the way out, then push it in"
-                                   : "hold the home pose, press its calibration button"});
+    lacks_deed(": not homed", Waiting::homing);
   } else if (!seen.calibrated) {
-    lacks.push_back(
-        {name + ": not calibrated", device.personality == Personality::omni
-                                        ? "put the stylus into the inkwell and let it rest there"
-                                    : device.personality == Personality::falcon
-                                        ? "hold the grip's centre button, at rest"
-                                        : "hold the home pose, press its calibration button"});
+    lacks_deed(": not calibrated", Waiting::parked);
   }
   if (!device.torque_scale) {
     lacks.push_back({name + ": device.torque_scale is not set, so its motors will stay off",

@@ -17,10 +17,13 @@ ProbeView::ProbeView(const DeviceSettings& device, int rate_hz) {
   plan_device(device, plan);
   plan_limits(scene, plan);
   plan_ = plan.device;
-  rest_ticks_ = plan.timing.rest_ticks;
+  timing_ = plan.timing;
 }
 
 void ProbeView::take(const DeviceReport& report, std::int64_t now_ns) noexcept {
+  if (follow_encoders(report, plan_.absolute_encoders, timing_, encoders_)) {
+    seen_.calibrated = true;
+  }
   if (!report.fresh) {
     seen_.ticks += seen_.reports > 0 ? 1 : 0;
     return;
@@ -42,9 +45,6 @@ void ProbeView::take(const DeviceReport& report, std::int64_t now_ns) noexcept {
   seen_.pressed[1] = seen_.pressed[1] || report.button2;
   seen_.parked = seen_.parked || report.parked;
   seen_.homed = seen_.homed || report.homed;
-  if (follow_encoders(report, plan_.absolute_encoders, rest_ticks_, encoders_)) {
-    seen_.calibrated = true;
-  }
 }
 
 std::array<double, 3> ProbeView::tip_mm() const noexcept {

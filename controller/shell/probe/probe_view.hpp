@@ -8,6 +8,7 @@
 #include "controller/scene/scene.hpp"
 #include "controller/servo/device_pose.hpp"
 #include "controller/servo/device_report.hpp"
+#include "controller/servo/supervisor.hpp"
 #include "shared/numeric/numbers.hpp"
 
 namespace kerf {
@@ -41,7 +42,7 @@ class ProbeView {
 
  private:
   DevicePlan<DoubleNumbers> plan_;
-  std::uint32_t rest_ticks_;
+  SafetyTiming timing_;
   EncoderState encoders_;
   std::array<std::int32_t, 3> travelled_{};  ///< counts since the first report, over the wrap
   DeviceReport last_;
