@@ -139,9 +139,9 @@ TEST_CASE("a fault has been met when it changed something, not when its time has
   CHECK(lost.device.met() == 0);
   lost.packets(8);
   CHECK(lost.device.met() == 1);
-  Bench stuck({.kind = FaultKind::stick,
-               .at_s = 2 * kCycleS,
-               .for_s = 1});  // of an arm that stands still anyhow
+  Bench stuck({.kind = FaultKind::stick,  // of an arm that stands still anyhow
+               .at_s = 6 * kCycleS,
+               .for_s = 1});
   stuck.packets(8);
   CHECK(stuck.device.begun() == 1);
   CHECK(stuck.device.met() == 0);
