@@ -164,6 +164,9 @@ int Command::run(std::ostream& out) const {
       if (concerns(script, cell)) jobs.push_back({&cell, &script});
     }
   }
+  if (jobs.empty()) {
+    throw HilError("--scripts: " + scripts_ + ": no device has what they break; name others");
+  }
 
   out << table_head() << std::endl;
   Json rows = Json::List{};
@@ -185,7 +188,6 @@ int Command::run(std::ostream& out) const {
     rows.push_back(json_of(row));
   }
   out << summary.text() << '\n';
-  if (jobs.empty()) throw HilError("--scripts: " + scripts_ + ": no device has what they break");
   report.write(Json{{"rows", rows}, {"all", summary.json()}}.document());
   return summary.held() ? 0 : 1;
 }
