@@ -102,21 +102,14 @@ EndReason run_servo(TickSource& clock, DeviceDriver& device, Servo& servo, Publi
       if (!servo.apply(servo_command(*command))) record.add_event(tick, "refused_command");
       last_command = command->index;
     }
-    // What stopped the servo may have stopped its watchdog too: the clock tells as well.
-    const bool watchdog_tripped = signals.stalled.exchange(false, std::memory_order_relaxed);
-    if (watchdog_tripped || clock.stood_still()) {
-      static_cast<void>(servo.apply({.kind = ServoCommand::Kind::fade_in}));
-      record.add_event(tick, watchdog_tripped ? "watchdog" : "stood_still");
+    if (const char* stall = recover(signals, clock.stood_still(), servo)) {
+      record.add_event(tick, stall);
     }
     const std::int64_t in_hand_ns = monotonic_ns();
     const ServoOutput output = servo.step(report);  // all physics, all limits
     timing.compute_ns = monotonic_ns() - in_hand_ns;
     timing.missed_deadlines = clock.overruns();
-    if (signals.stalled.load(std::memory_order_relaxed)) {
-      device.release();  // this tick was the stall: its force is late, the next one fades in
-    } else {
-      device.command(output);  // the hand first,
-    }
+    send_tick(output, signals, device);  // the hand first,
     const std::int64_t sent_ns = monotonic_ns();
     eyes.publish(tick, report, output, last_command, timing);  // then the eyes
     books.count(tick, output, timing, sent_ns, monotonic_ns() - sent_ns);

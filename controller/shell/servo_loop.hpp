@@ -38,6 +38,27 @@ struct LoopSignals {
   std::atomic<Waiting> waiting{Waiting::report};  ///< of the device, after the last tick
 };
 
+/// What a tick does first: force begins anew where the servo has stood still, told by its watchdog,
+/// or by the clock where what stopped the one stopped the other too. Names what told; none:
+/// nullptr.
+inline const char* recover(LoopSignals& signals, bool stood_still, Servo& servo) noexcept {
+  const bool watchdog_tripped = signals.stalled.exchange(false, std::memory_order_relaxed);
+  if (!watchdog_tripped && !stood_still) return nullptr;
+  static_cast<void>(servo.apply({.kind = ServoCommand::Kind::fade_in}));
+  return watchdog_tripped ? "watchdog" : "stood_still";
+}
+
+/// Sends what a tick decided. A tick that was itself the stall is late: nothing of it, and the next
+/// one fades in.
+inline void send_tick(const ServoOutput& output, const LoopSignals& signals,
+                      DeviceDriver& device) noexcept {
+  if (signals.stalled.load(std::memory_order_relaxed)) {
+    device.release();
+  } else {
+    device.command(output);
+  }
+}
+
 /// The loop around the servo step: time, device, step, device, eyes, statistics. Runs on the
 /// calling thread until a limit is met or somebody asks to stop; the motors are off when it
 /// returns.

@@ -2,7 +2,6 @@
 #include "controller/shell/watchdog.hpp"
 
 #include <algorithm>
-#include <chrono>
 
 #include "shared/posix/cores.hpp"
 #include "shared/posix/monotonic_clock.hpp"
@@ -10,7 +9,6 @@
 namespace kerf {
 namespace {
 
-constexpr std::chrono::milliseconds kPeriod{5};
 constexpr int kHighestPriority = 99;
 
 }  // namespace
@@ -25,7 +23,7 @@ std::jthread start_watchdog(Watchdog& watchdog, const RealTimeOptions& servo) {
     static_cast<void>(set_fifo(priority));
     while (!stop.stop_requested()) {
       watchdog.look(monotonic_ns());
-      std::this_thread::sleep_for(kPeriod);
+      std::this_thread::sleep_for(kWatchdogPeriod);
     }
   });
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <thread>
 
@@ -10,6 +11,8 @@
 
 namespace kerf {
 
+inline constexpr std::chrono::milliseconds kWatchdogPeriod{5};
+
 /// Looks from another thread whether the servo still ticks. When it has stood still for 20 ms the
 /// motors go off, once per stall; the loop fades the force in again when it comes back.
 class Watchdog {
@@ -17,7 +20,7 @@ class Watchdog {
   Watchdog(const DeviceDriver& device, LoopSignals& signals) noexcept
       : device_(device), signals_(signals) {}
 
-  /// Call every few milliseconds.
+  /// Call once per `kWatchdogPeriod`.
   void look(std::int64_t now_ns) noexcept {
     const std::uint64_t heartbeat = signals_.heartbeat.load(std::memory_order_relaxed);
     if (heartbeat != last_heartbeat_ || heartbeat == 0) {
@@ -44,10 +47,10 @@ class Watchdog {
   std::uint64_t trips_ = 0;
 };
 
-/// Starts the thread that looks every 5 ms, until the jthread is gone: above the servo, so that the
-/// servo itself cannot keep it from looking, and on any core but the servo's, so that what takes
-/// that core away does not take the watchdog too. With one core, or without the rights, as well as
-/// it can.
+/// Starts the thread that looks once per `kWatchdogPeriod`, until the jthread is gone: above the
+/// servo, so that the servo itself cannot keep it from looking, and on any core but the servo's, so
+/// that what takes that core away does not take the watchdog too. With one core, or without the
+/// rights, as well as it can.
 [[nodiscard]] std::jthread start_watchdog(Watchdog& watchdog, const RealTimeOptions& servo);
 
 }  // namespace kerf

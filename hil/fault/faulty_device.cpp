@@ -41,10 +41,16 @@ bool FaultyDevice::host_is_late() const noexcept {
   });
 }
 
+std::uint64_t FaultyDevice::met() const noexcept {
+  return static_cast<std::uint64_t>(std::ranges::count_if(faults_, &Running::met));
+}
+
 bool FaultyDevice::hits(Running& running, bool of_commands) noexcept {
   const DeviceFault& fault = running.fault;
   if (fault.of_commands != of_commands || !runs(running)) return false;
-  return running.packets++ % fault.every == 0;
+  const bool hit = running.packets++ % fault.every == 0;
+  running.met = running.met || hit;
+  return hit;
 }
 
 bool FaultyDevice::send_on(std::span<const std::uint8_t> packet, bool of_commands,
@@ -56,7 +62,10 @@ bool FaultyDevice::send_on(std::span<const std::uint8_t> packet, bool of_command
     const DeviceFault& fault = running.fault;
     const bool unplugged = fault.kind == FaultKind::unplug && runs(running);
     const bool silent = fault.kind == FaultKind::silence && !of_commands && runs(running);
-    if (unplugged || silent) return false;
+    if (unplugged || silent) {
+      running.met = true;
+      return false;
+    }
     if (fault.kind > FaultKind::corrupt || !hits(running, of_commands)) continue;
     switch (fault.kind) {
       case FaultKind::lose:
@@ -99,6 +108,7 @@ void FaultyDevice::break_sensors(Bytes& packet) {
       continue;
     }
     changed = true;
+    const Readings before = *readings;
     switch (fault.kind) {
       case FaultKind::stick:
         count = running.stuck_at;
@@ -129,6 +139,7 @@ void FaultyDevice::break_sensors(Bytes& packet) {
       default:
         break;
     }
+    running.met = running.met || *readings != before;
   }
   if (changed) put_readings(*readings, packet);
 }
@@ -147,6 +158,7 @@ void FaultyDevice::step_clock() noexcept {
   for (Running& running : faults_) {
     if (running.begun || !runs(running)) continue;
     running.begun = true;
+    running.met = running.fault.kind == FaultKind::host_late;
     ++begun_;
   }
 }

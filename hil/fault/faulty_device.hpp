@@ -28,6 +28,8 @@ class FaultyDevice final : public PacketDevice {
   [[nodiscard]] bool host_is_late() const noexcept;
   /// Faults that have begun.
   [[nodiscard]] std::uint64_t begun() const noexcept { return begun_; }
+  /// Faults that have changed something: a packet, a reading, the host's time.
+  [[nodiscard]] std::uint64_t met() const noexcept;
   /// Packets of the device that they kept from the host.
   [[nodiscard]] std::uint64_t withheld() const noexcept { return withheld_; }
 
@@ -36,7 +38,7 @@ class FaultyDevice final : public PacketDevice {
   struct Running {
     DeviceFault fault;
     std::int64_t from = 0, to = 0;  ///< cycles of the script's clock
-    bool begun = false;
+    bool begun = false, met = false;
     int packets = 0;            ///< of its stream since it began
     std::int16_t stuck_at = 0;  ///< of `stick`
     int off_by = 0;             ///< of `wander`

@@ -15,6 +15,8 @@ struct Readings {
       false;          ///< docked (Omni), centre button (Falcon), calibration button (WoodenHaptics)
   bool homed = true;  ///< of the Falcon
   std::array<std::uint16_t, 6> pots{};  ///< of the Omni's gimbal
+
+  friend bool operator==(const Readings&, const Readings&) noexcept = default;
 };
 
 /// Nothing where `packet` is no report of a device; which one it comes from shows by its size.

@@ -74,13 +74,15 @@ DeviceFault fault_of(const ScriptTable& table) {
 FaultScript parse_fault_script(std::string_view text, const std::string& place) {
   const TomlNode file = parse_script(text, place);
   const ScriptTable top(file, place, "");
-  top.allow_only({"seed", "clock", "latches", "fault"});
+  top.allow_only({"seed", "clock", "latches", "seconds", "fault"});
   FaultScript script;
   constexpr double kMaxSeed = 4294967295.0;
   script.seed = static_cast<std::uint32_t>(top.number("seed", script.seed, {0, kMaxSeed}));
   const std::string clock = top.word("clock", "push", kFaultClockWords);
   script.clock = clock == "start" ? FaultClock::start : FaultClock::push;
   script.latches = top.word("latches", "", kLatchWords);
+  script.seconds = top.number("seconds", script.seconds, {0.1, kMaxScriptSeconds});
+  if (top.has("seconds") && !top.has("fault")) return script;  // all goes well, for so long
   for (const TomlNode& fault : top.tables("fault", kMaxFaults)) {
     script.faults.push_back(fault_of(ScriptTable(fault, place, "fault")));
   }
@@ -96,13 +98,14 @@ FaultScript random_faults(std::uint32_t seed) {
   const auto below = [&](std::uint32_t end) { return static_cast<int>(random() % end); };
   FaultScript script;
   script.seed = seed;
+  script.is_random = true;
   const int count = 3 + below(4);
   for (int i = 0; i < count; ++i) {
     DeviceFault fault;
     fault.kind = static_cast<FaultKind>(below(kFaultWords.size()));
     fault.of_commands = is_of_packets(fault.kind) && below(2) == 1;
-    fault.at_s = below(4000) / 1000.0;
-    fault.for_s = fault.kind == FaultKind::host_late ? 0 : below(300) / 1000.0;
+    fault.at_s = below(1600) / 1000.0;
+    fault.for_s = fault.kind == FaultKind::host_late ? 0 : (20 + below(300)) / 1000.0;
     fault.every = 1 + below(5);
     fault.axis = below(3);
     fault.counts = (1 + below(2000)) * (below(2) == 1 ? 1 : -1);

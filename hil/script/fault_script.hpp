@@ -60,10 +60,12 @@ struct DeviceFault {
 };
 
 struct FaultScript {
-  std::vector<DeviceFault> faults;
+  std::vector<DeviceFault> faults;  ///< none: all goes well
   std::uint32_t seed = 1;
   FaultClock clock = FaultClock::push;
-  std::string latches{};  ///< of kLatchWords; empty: chance or the device decides
+  std::string latches{};   ///< of kLatchWords; empty: chance or the device decides
+  double seconds = 4;      ///< that a lab plays it
+  bool is_random = false;  ///< by `random_faults`: one fault may hide another
 };
 
 /// Reads a fault script, TOML of at most 1 MiB and 1000 faults.
@@ -71,7 +73,8 @@ struct FaultScript {
 ///     seed = 1               # of everything random below
 ///     clock = "push"         # begins when the motors first push; or "start": with the emulator
 ///     latches = "none"       # what kerf-lab faults demands: a word of kLatchWords; none: nothing
-///     [[fault]]
+///     seconds = 4            # how long kerf-lab faults plays it
+///     [[fault]]              # at least one, but where seconds says how long all goes well
 ///     kind = "lose"          # a word of kFaultWords
 ///     packets = "reports"    # or "commands"; of lose, delay, duplicate, reorder, truncate,
 ///                            # corrupt
@@ -89,7 +92,8 @@ struct FaultScript {
 /// The same from text; `place` names it in errors.
 [[nodiscard]] FaultScript parse_fault_script(std::string_view text, const std::string& place);
 
-/// Three to six faults of any kind within four seconds, by `seed`.
+/// Three to six faults of any kind, each of 20 to 320 ms (a late host: 1 to 100 ms), within two
+/// seconds, by `seed`.
 [[nodiscard]] FaultScript random_faults(std::uint32_t seed);
 
 }  // namespace kerf

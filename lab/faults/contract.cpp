@@ -2,33 +2,59 @@
 #include "lab/faults/contract.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdio>
+#include <cstdlib>
 
-#include "shared/numeric/vec3.hpp"
+#include "controller/servo/servo_output.hpp"
 
 namespace kerf::faults {
 namespace {
 
 // The contract: docs/safety.md.
-constexpr double kSlewNPerMs = 0.5;
-constexpr double kHoldMs = 5, kZeroMs = 20, kFadeInMs = 100, kOffMs = 2;
-constexpr double kNotFiniteMs = 2;  // from the first tick without a finite pose
-constexpr double kReportMs = 1;     // from one report to the next, of the slowest device
+constexpr double kHoldMs = 5, kZeroMs = 20, kFadeInMs = 100, kOffMs = 2, kRestMs = 50;
+constexpr double kNotFiniteMs = 2;    // from the first tick without a finite pose
+constexpr double kStandstillMs = 20;  // a host that came back after that
+constexpr double kWatchdogMs = 25;
+constexpr double kThermalTimeMs = 10'000;
+constexpr int kRestCounts = 2;   // an encoder that jitters at an edge rests
+constexpr double kReportMs = 1;  // from one report to the next, of the slowest device
+constexpr double kCycleMs = 0.125;
 // A step of the converters is 0.4 to 5 mN at the tip, and the watch is on the outside of them.
 constexpr double kStepN = 0.01;
 constexpr double kDeviceShare = 1.03;  // the tip moves on while a command is under way
+constexpr double kSpeedShare = 1.02;   // encoders count whole steps: surely too fast from here on
+constexpr double kSpeedStepMm = 0.2;
+constexpr double kPushN = 0.05;
+// A force may have turned about as fast as it may rise; longer inward is no slew.
+constexpr double kTurnMs = 20;
 constexpr std::size_t kMaxListed = 4;
 
-/// From the start of a fault at the device until the servo has latched `name`. A fault that the
-/// servo bears for a while begins for it with the report that first shows it, or that is missing.
-double latest_latch_ms(const std::string& name) {
-  if (name == fault_name(Fault::stale_input)) return kZeroMs + kReportMs;
-  if (name == fault_name(Fault::not_finite)) return kNotFiniteMs + kReportMs;
-  return kOffMs;
+/// From the start of a fault at the device until the motors must be off for `name`. A fault that
+/// the servo bears for a while begins for it with the report that first shows it, or is missing.
+double latest_latch_ms(const std::string& name, double tick_ms) {
+  if (name == fault_name(Fault::stale_input)) return kZeroMs + kReportMs + tick_ms;
+  if (name == fault_name(Fault::not_finite)) return kNotFiniteMs + kReportMs + tick_ms;
+  return kReportMs + tick_ms;
+}
+
+/// How far `force` is from any force that `last` may fall to at once: its own direction, or zero.
+double change_n(DeviceVec<double> last, DeviceVec<double> force) {
+  const double square = dot(last, last);
+  const double share = square > 0 ? std::clamp(dot(force, last) / square, 0.0, 1.0) : 0.0;
+  return norm(force - last * share);
 }
 
 }  // namespace
+
+Contract::Contract(const LoadedScene& scene, bool trusted, Outcome& outcome)
+    : limits_(scene.limits),
+      tick_ms_(1000.0 / scene.servo.rate_hz),
+      trusted_(trusted),
+      outcome_(outcome),
+      wire_(scene.device.personality, scene.device.dock_rad),
+      outward_(scene) {}
 
 void Contract::check(bool kept, double time_ms, const char* rule, double value, double limit) {
   if (kept) return;
@@ -41,68 +67,234 @@ void Contract::broken(double time_ms, const std::string& what) {
   ++outcome_.violation_count;
   if (outcome_.violations.size() >= kMaxListed) return;
   char time[24];
-  std::snprintf(time, sizeof time, "%.3f s: ", time_ms / 1000);
+  std::snprintf(time, sizeof time, "%.4f s: ", time_ms / 1000);
   outcome_.violations.emplace_back(time + what);
 }
 
-void Contract::tick(double time_ms, const ServoOutput& output) {
-  const double now_n = vec3::length(output.force_n);
-  const bool may_push = output.phase == Phase::ramping || output.phase == Phase::active;
-  check(output.motors_on <= may_push, time_ms, "motors on in a phase that forbids it",
-        static_cast<double>(output.phase), 0);
-  check(!output.motors_on || output.fault == Fault::none, time_ms, "motors on with a fault",
-        static_cast<double>(output.fault), 0);
-  check(output.motors_on || now_n == 0, time_ms, "force with the motors off", now_n, 0);
-  check(now_n <= peak_n_, time_ms, "force in N", now_n, peak_n_);
+void Contract::reported(double time_ms, std::span<const std::uint8_t> packet) {
+  const auto told = wire_.report(packet);
+  if (!told) return;
+  told_ = *told;
+  fresh_ = true;
+  heard_ms_ = time_ms;
+}
 
-  const double rise = (now_n - last_n_) * ticks_per_ms_;
-  check(rise <= kSlewNPerMs + kStepN, time_ms, "rise in N/ms", rise, kSlewNPerMs);
-  outcome_.steepest_n_per_ms = std::max(outcome_.steepest_n_per_ms, rise);
+/// Parked, homed and no joint turning for 50 ms: calibrated, whatever was before.
+void Contract::follow_rest(double time_ms) {
+  bool still = told_.parked && told_.homed;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const auto step = static_cast<std::int16_t>(
+        static_cast<std::uint16_t>(int{told_.count[i]} - int{rest_count_[i]}));
+    still = still && std::abs(int{step}) <= kRestCounts;
+  }
+  rest_count_ = told_.count;
+  if (!still) rest_since_ms_ = -1;
+  if (still && rest_since_ms_ < 0) rest_since_ms_ = time_ms;
+  // Counted in whole ticks, from a report that came up to one of its own periods before.
+  const bool rested =
+      still && time_ms - rest_since_ms_ >= kRestMs - 2 * std::max(tick_ms_, kReportMs);
+  if (!rested) return;
+  calibrated_again_ = calibrated_again_ || outcome_.pushed;
+  if (wire_.counts_from_rest()) pose_is_known_ = docked_;
+  calibrated_ = true;
+}
+
+void Contract::must_stay_off(const char* fault) {
+  off_ = Off::fault;
+  calibrated_ = false;
+  if (outcome_.latched == fault_name(Fault::none)) outcome_.latched = fault;
+}
+
+/// What the newest report means for the motors.
+void Contract::follow_report(double time_ms) {
+  follow_rest(time_ms);
+  const auto told_pose = wire_.pose(told_.count);
+  const std::optional<ArmPose> before = pose_;
+  const double since_ms = time_ms - pose_ms_;
+  if (told_pose) {
+    pose_ = told_pose;
+    pose_ms_ = time_ms;
+    no_pose_since_ms_ = -1;
+  } else if (no_pose_since_ms_ < 0) {
+    no_pose_since_ms_ = time_ms;
+    had_no_pose_ = had_no_pose_ || off_ == Off::no_reason;
+  }
+  if (!told_.homed) {
+    off_ = Off::not_homed;
+    calibrated_ = false;
+    return;
+  }
+  if (told_.parked) {
+    if (calibrated_ || off_ == Off::no_reason) off_ = Off::parked;
+    return;
+  }
+  if (off_ == Off::parked) {
+    off_ = Off::no_reason;
+    calibrated_ = false;
+    may_push_since_ms_ = time_ms;
+  }
+  if (off_ != Off::no_reason) return;
+  if (before && told_pose) {
+    const double moved_mm = norm(told_pose->tip_mm - before->tip_mm);
+    const double most_mm = limits_.speed_mm_per_s / 1000 * since_ms;
+    if (moved_mm > most_mm * kSpeedShare + kSpeedStepMm) {
+      must_stay_off(fault_name(Fault::overspeed));
+    }
+  }
+}
+
+/// No report came in this tick, or none that tells of a pose.
+void Contract::follow_silence(double time_ms) {
+  if (off_ != Off::no_reason) return;
+  constexpr double kRounding = 1e-6;
+  if (listened_ms_ - heard_ms_ > kZeroMs + kRounding) {
+    must_stay_off(fault_name(Fault::stale_input));
+  } else if (no_pose_since_ms_ >= 0 &&
+             time_ms - no_pose_since_ms_ > kNotFiniteMs + tick_ms_ + kRounding) {
+    must_stay_off(fault_name(Fault::not_finite));
+  }
+}
+
+/// A host that was silent for 20 ms begins at zero and fades in again; what ends the silence may be
+/// the watchdog's packet, and then the next one is the host's own.
+void Contract::follow_stall(const Command& command) {
+  const bool stalled = command.time_ms - last_.time_ms >= kStandstillMs;
+  if (stalled || after_stall_) {
+    may_push_since_ms_ = std::max(may_push_since_ms_, command.time_ms);
+  }
+  after_stall_ = stalled && command.asked.off();
+}
+
+void Contract::commanded(double time_ms, std::span<const std::uint8_t> packet) {
+  const auto asked = wire_.command(packet);
+  if (!asked) return broken(time_ms, "a packet that the device cannot read");
+  if (fresh_) follow_report(time_ms);
+  follow_silence(time_ms);
+  Command command{.time_ms = time_ms,
+                  .tick_ms = std::min(time_ms - last_.time_ms, tick_ms_),
+                  .asked = *asked,
+                  .force_n = {}};
+  if (pose_) command.force_n = wire_.force_n(*pose_, asked->count);
+  heat_until(time_ms);
+  follow_stall(command);
+  check_state(command);
+  if (pose_ && pose_is_known_) {
+    check_size(command);
+    check_change(command);
+    check_direction(command);
+  }
+  if (fresh_) held_n_ = command.force_n;
+  if (asked->off() && !last_.asked.off()) began_off_ms_ = time_ms;
+  if (norm(command.force_n) > kPushN) last_push_ms_ = time_ms;
+  last_ = command;
+  fresh_ = false;
+  silence_told_ = false;
+}
+
+void Contract::check_state(const Command& command) {
+  for (const std::int16_t count : command.asked.count) {
+    check(std::abs(int{count}) <= wire_.count_end(), command.time_ms, "a motor's counts",
+          std::abs(int{count}), wire_.count_end());
+  }
+  if (command.asked.off() || off_ == Off::no_reason) return;
+  constexpr std::array<const char*, 4> kWhy{"motors on before calibration",
+                                            "motors on while parked", "motors on without homing",
+                                            "motors on after a fault"};
+  broken(command.time_ms, kWhy[static_cast<std::size_t>(off_)]);
+}
+
+void Contract::check_size(const Command& command) {
+  const double now_n = norm(command.force_n), peak_n = limits_.force_n;
   outcome_.peak_n = std::max(outcome_.peak_n, now_n);
+  check(now_n <= peak_n + kStepN, command.time_ms, "force in N", now_n, peak_n);
 
-  stale_ticks_ = output.stale ? stale_ticks_ + 1 : 0;
-  if (!output.stale) held_n_ = now_n;
-  const double stale_ms = static_cast<double>(stale_ticks_) / ticks_per_ms_;
-  const double fading = std::clamp((kZeroMs - stale_ms) / (kZeroMs - kHoldMs), 0.0, 1.0);
-  const double left_n = held_n_ * fading;
-  check(!output.stale || now_n <= left_n + kStepN, time_ms, "force without reports in N", now_n,
+  const double silent_ms = command.time_ms - heard_ms_;
+  const double left_n =
+      norm(held_n_) * std::clamp((kZeroMs - silent_ms) / (kZeroMs - kHoldMs), 0.0, 1.0);
+  check(fresh_ || now_n <= left_n + kStepN, command.time_ms, "force without reports in N", now_n,
         left_n);
-  check(stale_ms < kZeroMs || now_n == 0, time_ms, "force 20 ms after the last report", now_n, 0);
 
-  on_ticks_ = output.motors_on ? on_ticks_ + 1 : 0;
-  const double ramp = std::min(1.0, static_cast<double>(on_ticks_) / ticks_per_ms_ / kFadeInMs);
-  check(now_n <= peak_n_ * ramp + kStepN, time_ms, "force while fading in, in N", now_n,
-        peak_n_ * ramp);
-  if (output.fault != Fault::none && outcome_.latched == fault_name(Fault::none)) {
-    outcome_.latched = fault_name(output.fault);
-    outcome_.latch_ms = time_ms - begun_ms_;
-  }
-  if (on_ && !output.motors_on) off_since_ms_ = time_ms;
-  on_ = output.motors_on;
-  last_n_ = now_n;
+  // Two ticks: the first one has its share already, and a stall may end one before.
+  const double faded_ms = command.time_ms - may_push_since_ms_ + 2 * tick_ms_;
+  const double most_n = peak_n * std::min(1.0, faded_ms / kFadeInMs);
+  check(now_n <= most_n + kStepN, command.time_ms, "force while fading in, in N", now_n, most_n);
+
+  const double rms_n = std::sqrt(heat_n2_);
+  outcome_.rms_n = std::max(outcome_.rms_n, rms_n);
+  const double bearable_n = std::min(limits_.continuous_force_n, peak_n);
+  check(rms_n <= bearable_n + kStepN, command.time_ms, "RMS over 10 s in N", rms_n, bearable_n);
 }
 
-void Contract::end(double time_ms, const std::string& latches) {
-  if (latches.empty()) return;
-  if (outcome_.latched != latches) {
-    broken(time_ms, "latched " + outcome_.latched + ", not " + latches);
-  } else if (outcome_.latched != fault_name(Fault::none)) {
-    const double limit_ms = latest_latch_ms(latches);
-    check(outcome_.latch_ms <= limit_ms, time_ms, "ms until it was latched", outcome_.latch_ms,
-          limit_ms);
-  }
+void Contract::check_change(const Command& command) {
+  if (command.tick_ms <= 0) return;
+  const double change = change_n(last_.force_n, command.force_n);
+  const double most_n = limits_.slew_n_per_ms * command.tick_ms;
+  outcome_.steepest_n_per_ms = std::max(outcome_.steepest_n_per_ms, change / command.tick_ms);
+  check(change <= most_n + kStepN, command.time_ms, "change of the force in a tick, in N", change,
+        most_n);
 }
 
-void Contract::device_force(double time_ms, double force_n, bool trusted) {
+void Contract::check_direction(const Command& command) {
+  const auto out = norm(command.force_n) > kPushN ? outward_.at(pose_->tip_mm) : std::nullopt;
+  const bool inward = out && dot(*out, command.force_n) < 0;
+  if (!inward) {
+    inward_since_ms_ = -1;
+    return;
+  }
+  if (inward_since_ms_ < 0) inward_since_ms_ = command.time_ms;
+  const double for_ms = command.time_ms - inward_since_ms_;
+  check(for_ms <= kTurnMs, command.time_ms, "ms in which the force points into the solid", for_ms,
+        kTurnMs);
+}
+
+void Contract::heat_until(double time_ms) {
+  const double share = -std::expm1((last_.time_ms - time_ms) / kThermalTimeMs);
+  heat_n2_ += (dot(last_.force_n, last_.force_n) - heat_n2_) * share;
+}
+
+void Contract::cycle(double time_ms, const DeviceMoment& device) {
+  docked_ = device.docked;
+  const double alone_ms = time_ms - last_.time_ms;
+  if (!last_.asked.off()) {
+    outcome_.longest_alone_ms = std::max(outcome_.longest_alone_ms, alone_ms);
+    if (alone_ms > kWatchdogMs + kCycleMs && !silence_told_) {
+      silence_told_ = true;
+      check(false, time_ms, "motors on, ms after the last packet", alone_ms, kWatchdogMs);
+    }
+  }
+  const double force_n = norm(device.motor_force_n);
   outcome_.device_peak_n = std::max(outcome_.device_peak_n, force_n);
-  if (!trusted) return;
-  const double limit_n = peak_n_ * kDeviceShare + kStepN;
+  outcome_.pushed = outcome_.pushed || force_n > kPushN;
+  if (!trusted_ || !pose_is_known_) return;
+  const double limit_n = limits_.force_n * kDeviceShare + kStepN;
   check(force_n <= limit_n, time_ms, "force of the motors in N", force_n, limit_n);
-  if (on_ || force_n < kStepN) return;
-  const double after_ms = time_ms - off_since_ms_;
+  if (!last_.asked.off() || force_n < kStepN) return;
+  const double after_ms = time_ms - began_off_ms_;
   outcome_.slowest_off_ms = std::max(outcome_.slowest_off_ms, after_ms);
   check(after_ms <= kOffMs, time_ms, "force of the motors, ms after they went off", after_ms,
         kOffMs);
+}
+
+void Contract::end(double time_ms, const std::string& latches, double faults_end_ms) {
+  outcome_.pushed_again = last_push_ms_ > faults_end_ms;
+  if (latches.empty()) return;
+  // Counts that lead to no pose may be told from a jump, or from numbers that are none.
+  const bool as_written =
+      outcome_.latched == latches || (had_no_pose_ && outcome_.latched != fault_name(Fault::none));
+  if (!as_written) {
+    broken(time_ms, "the reports amount to " + outcome_.latched + ", not " + latches);
+    return;
+  }
+  if (latches == fault_name(Fault::none)) {
+    const bool may_push = off_ == Off::no_reason && !calibrated_again_;
+    check(outcome_.pushed_again || !may_push, time_ms, "no force after the last fault, in N", 0,
+          kPushN);
+    return;
+  }
+  outcome_.latch_ms = std::max(0.0, began_off_ms_ - begun_ms_);
+  const double limit_ms = latest_latch_ms(outcome_.latched, tick_ms_);
+  check(last_.asked.off() && outcome_.latch_ms <= limit_ms, time_ms,
+        "ms until the motors were off for good", outcome_.latch_ms, limit_ms);
 }
 
 }  // namespace kerf::faults

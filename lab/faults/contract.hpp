@@ -1,47 +1,105 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <optional>
+#include <span>
 #include <string>
 
-#include "controller/servo/servo_output.hpp"
+#include "controller/load/loaded_scene.hpp"
+#include "lab/faults/device_wire.hpp"
 #include "lab/faults/fault_run.hpp"
+#include "lab/faults/outward.hpp"
+#include "shared/numeric/vec.hpp"
 
 namespace kerf::faults {
 
-/// Watches the commands of a run, tick by tick, and says where they break the safety contract. It
-/// knows what the servo step promises, not how it does it.
+/// What the emulated device itself is doing in a bus cycle.
+struct DeviceMoment {
+  DeviceVec<double> motor_force_n;  ///< at the true tip
+  bool docked = false;              ///< truly at rest
+};
+
+/// Watches a run from outside and says where it breaks docs/safety.md. It sees the packets as they
+/// go over the host's end of the wire, reads them by the emulator's geometry, and has the
+/// emulator's clock; it never hears what the servo thinks of itself. Times in ms of that clock;
+/// they never go back. One thread.
 class Contract {
  public:
-  Contract(int rate_hz, double peak_n, Outcome& outcome) noexcept
-      : ticks_per_ms_(rate_hz / 1000.0), peak_n_(peak_n), outcome_(outcome) {}
+  /// `trusted`: neither sensors nor commands are broken on the way, so the motors' true force must
+  /// follow the commands. `scene` and `outcome` outlive it.
+  Contract(const LoadedScene& scene, bool trusted, Outcome& outcome);
 
-  /// One tick of the servo, at `time_ms`.
-  void tick(double time_ms, const ServoOutput& output);
+  /// The host has asked for packets of the device.
+  void listened(double time_ms) noexcept { listened_ms_ = time_ms; }
+  /// A packet of the device that the host has taken.
+  void reported(double time_ms, std::span<const std::uint8_t> packet);
+  /// A packet that the host has sent.
+  void commanded(double time_ms, std::span<const std::uint8_t> packet);
+  /// A bus cycle of the device is over.
+  void cycle(double time_ms, const DeviceMoment& device);
   /// Something went wrong for the first time.
   void fault_begins(double time_ms) noexcept { begun_ms_ = time_ms; }
-  /// The run is over; `latches` as in FaultScript.
-  void end(double time_ms, const std::string& latches);
-  /// The watchdog switched the motors off in the servo's place: its next force begins at zero.
-  void watchdog_off() noexcept { last_n_ = 0; }
-  /// Force of the motors at the true tip; `trusted`: neither sensors nor commands are broken, so it
-  /// must follow the commands.
-  void device_force(double time_ms, double force_n, bool trusted);
+  /// The run is over; `latches` as in FaultScript, `faults_end_ms` when the last fault was over.
+  void end(double time_ms, const std::string& latches, double faults_end_ms);
 
  private:
+  /// Why motors must be off, by what was told until now; `no_reason`: they may be on.
+  enum class Off : std::uint8_t { not_calibrated, parked, not_homed, fault, no_reason };
+  struct Command {
+    double time_ms = 0;
+    double tick_ms = 0;  ///< since the last one, no longer than a tick
+    ToldCommand asked;
+    DeviceVec<double> force_n;
+  };
+
+  void follow_report(double time_ms);
+  void follow_rest(double time_ms);
+  void follow_silence(double time_ms);
+  void must_stay_off(const char* fault);
+  void follow_stall(const Command& command);
+  void check_state(const Command& command);
+  void check_size(const Command& command);
+  void check_change(const Command& command);
+  void check_direction(const Command& command);
+  void heat_until(double time_ms);
   void check(bool kept, double time_ms, const char* rule, double value, double limit);
   void broken(double time_ms, const std::string& what);
 
-  double ticks_per_ms_;
-  double peak_n_;
+  LimitSettings limits_;
+  double tick_ms_;
+  bool trusted_;
   Outcome& outcome_;
-  double last_n_ = 0;
-  double held_n_ = 0;  ///< with the last fresh report
-  std::uint64_t stale_ticks_ = 0;
-  std::uint64_t on_ticks_ = 0;  ///< since the motors came on
-  double off_since_ms_ = 0;
-  bool on_ = false;
+  DeviceWire wire_;
+  Outward outward_;
+
+  ToldReport told_;               ///< the newest report
+  bool fresh_ = false;            ///< it came since the last command
+  double heard_ms_ = 0;           ///< when
+  double listened_ms_ = 0;        ///< the host last asked for one
+  std::optional<ArmPose> pose_;   ///< that was told last
+  double pose_ms_ = 0;            ///< when
+  bool had_no_pose_ = false;      ///< in some report
+  double no_pose_since_ms_ = -1;  ///< reports tell of none since; negative: they do
+  std::array<std::int16_t, 3> rest_count_{};
+  double rest_since_ms_ = -1;  ///< parked and still; negative: it is not
+  bool calibrated_ = false;
+  bool pose_is_known_ = true;      ///< false: calibrated where the device was not at rest
+  bool calibrated_again_ = false;  ///< in the run, after it had pushed
+  Off off_ = Off::not_calibrated;
+  double may_push_since_ms_ = 0;  ///< the fade begins
+  bool after_stall_ = false;      ///< the last packet was one that ends a stall: motors off
+
+  Command last_;
+  DeviceVec<double> held_n_;  ///< sent after the last report
+  double heat_n2_ = 0;
+  double inward_since_ms_ = -1;  ///< the force points into the solid; negative: it does not
+  bool silence_told_ = false;
+  double began_off_ms_ = 0;  ///< the last packet that asks for nothing, after one that did
+  bool docked_ = true;
   double begun_ms_ = 0;
+  double last_push_ms_ = -1;
 };
 
 }  // namespace kerf::faults

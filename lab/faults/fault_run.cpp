@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <chrono>
 #include <memory>
 
 #include "controller/device/driver/device_driver.hpp"
@@ -16,12 +17,11 @@
 #include "hil/devmodel/wooden_model.hpp"
 #include "hil/fault/faulty_device.hpp"
 #include "lab/faults/contract.hpp"
+#include "lab/faults/watched_port.hpp"
 #include "lab/rig/direct_port.hpp"
 
 namespace kerf::faults {
 namespace {
-
-constexpr double kPushN = 0.05;
 
 /// Half of the seeds hold the torque when the host is silent, half drop it: what a device does is
 /// not known.
@@ -80,59 +80,94 @@ double end_of(const FaultScript& script) {
   return end_s;
 }
 
+/// The same faults at another moment of the hand's motion, up to 0.1 s later.
+FaultScript shifted(FaultScript script) {
+  constexpr std::uint32_t kPrime = 7919, kMs = 100;
+  const double later_s = (script.seed * kPrime % kMs) / 1000.0;
+  for (DeviceFault& fault : script.faults) fault.at_s += later_s;
+  return script;
+}
+
+/// One line where the run shows nothing: no contact, or a fault that never was.
+std::string vacuous_line(const FaultScript& script, Personality personality, const Outcome& outcome,
+                         std::uint64_t met) {
+  if (!outcome.pushed) return "the motors never pushed at the tip";
+  const auto due = std::ranges::count_if(
+      script.faults, [&](const DeviceFault& fault) { return concerns(fault.kind, personality); });
+  if (script.is_random ? met > 0 || due == 0 : met >= static_cast<std::uint64_t>(due)) return {};
+  return std::to_string(met) + " of " + std::to_string(due) + " faults changed anything";
+}
+
+/// The shell of a controller in virtual time: its clock is the emulator's.
+class VirtualShell {
+ public:
+  VirtualShell(const LoadedScene& scene, CompiledScene& servo, PacketPort& port)
+      : servo_(servo), driver_(make_driver(scene.device.personality, port)) {}
+
+  void start() { driver_->start(); }
+  void look(std::int64_t now_ns) { watchdog_.look(now_ns); }
+  void tick(std::int64_t now_ns) {
+    const DeviceReport report = driver_->read();
+    const bool stood_still = began_ns_ > 0 && now_ns - began_ns_ >= kStandstillNs;
+    began_ns_ = now_ns;
+    static_cast<void>(recover(signals_, stood_still, servo_));
+    send_tick(servo_.step(report), signals_, *driver_);
+    ++signals_.heartbeat;
+  }
+
+ private:
+  CompiledScene& servo_;
+  std::unique_ptr<DeviceDriver> driver_;
+  std::atomic<bool> stop_{false};
+  LoopSignals signals_{stop_};
+  Watchdog watchdog_{*driver_, signals_};
+  std::int64_t began_ns_ = 0;
+};
+
 }  // namespace
 
-Outcome run_faults(const Subject& subject, const FaultScript& script) {
+bool concerns(FaultKind kind, Personality personality) noexcept {
+  if (kind == FaultKind::unhome) return personality == Personality::falcon;
+  if (kind == FaultKind::noise) return personality == Personality::omni;
+  return true;
+}
+
+Outcome run_faults(const Subject& subject, const FaultScript& as_written) {
+  const FaultScript script = shifted(as_written);
   LoadedScene scene = subject.scene;  // the servo takes its volumes
   const std::unique_ptr<CompiledScene> servo = compile(scene);
   Emulator emulator = make_emulator(subject, script.seed);
   FaultyDevice device(emulator, script);
-  DirectPort port(device);
-  const std::unique_ptr<DeviceDriver> driver = make_driver(scene.device.personality, port);
-  std::atomic<bool> stop{false};
-  LoopSignals signals{stop};
-  Watchdog watchdog(*driver, signals);
+  DirectPort wire(device);
 
   Outcome outcome;
-  const int rate_hz = scene.servo.rate_hz;
-  const int cycles_per_tick = kCyclesPerSecond / rate_hz;
-  const auto ticks = static_cast<std::int64_t>(subject.seconds * rate_hz);
-  Contract contract(rate_hz, scene.limits.force_n, outcome);
   const bool trusted = std::ranges::none_of(script.faults, misleads);
-  double first_push_s = -1;
+  Contract contract(subject.scene, trusted, outcome);
   double time_ms = 0;
-  bool is_well = true;
+  WatchedPort port(wire, contract, time_ms);
+  VirtualShell shell(scene, *servo, port);
 
-  driver->start();
-  for (std::int64_t tick = 1; tick <= ticks; ++tick) {
-    for (int cycle = 0; cycle < cycles_per_tick; ++cycle) {
-      port.cycle();
-      time_ms = static_cast<double>(emulator.stats().cycles) * 1000 / kCyclesPerSecond;
-      if (is_well && device.begun() > 0) contract.fault_begins(time_ms);
-      is_well = device.begun() == 0;
-      contract.device_force(time_ms, norm(emulator.model().motor_force_n()), trusted);
-    }
-    watchdog.look(static_cast<std::int64_t>(time_ms * 1e6));
-    if (device.host_is_late()) {
-      if (signals.stalled) contract.watchdog_off();
-      continue;
-    }
-    const DeviceReport report = driver->read();
-    if (signals.stalled.exchange(false)) servo->apply({.kind = ServoCommand::Kind::fade_in});
-    const ServoOutput output = servo->step(report);
-    driver->command(output);
-    ++signals.heartbeat;
-    contract.tick(time_ms, output);
-
-    const double force_n = std::max(
-        {std::abs(output.force_n[0]), std::abs(output.force_n[1]), std::abs(output.force_n[2])});
-    if (force_n < kPushN) continue;
-    if (first_push_s < 0) first_push_s = time_ms / 1000;
-    outcome.pushed = true;
-    outcome.pushed_again = time_ms / 1000 > first_push_s + end_of(script) + 0.05;
+  const int cycles_per_tick = kCyclesPerSecond / scene.servo.rate_hz;
+  const auto cycles_per_look =
+      static_cast<std::uint32_t>(cycles_of(std::chrono::duration<double>(kWatchdogPeriod).count()));
+  double first_push_ms = -1;
+  shell.start();
+  const std::int64_t cycles = cycles_of(script.seconds);
+  for (std::int64_t cycle = 1; cycle <= cycles; ++cycle) {
+    wire.cycle();
+    time_ms = static_cast<double>(cycle) * 1000 / kCyclesPerSecond;
+    if (outcome.faults_begun == 0 && device.begun() > 0) contract.fault_begins(time_ms);
+    outcome.faults_begun = device.begun();
+    contract.cycle(time_ms, {emulator.model().motor_force_n(), emulator.model().docked()});
+    if (first_push_ms < 0 && outcome.pushed) first_push_ms = time_ms;
+    const auto now_ns = static_cast<std::int64_t>(time_ms * 1e6);
+    if ((static_cast<std::uint64_t>(cycle) + script.seed) % cycles_per_look == 0)
+      shell.look(now_ns);
+    if (cycle % cycles_per_tick == 0 && !device.host_is_late()) shell.tick(now_ns);
   }
-  contract.end(time_ms, script.latches);
-  outcome.faults_begun = device.begun();
+  constexpr double kGraceMs = 50;
+  contract.end(time_ms, script.latches, first_push_ms + end_of(script) * 1000 + kGraceMs);
+  outcome.vacuous = vacuous_line(script, scene.device.personality, outcome, device.met());
   return outcome;
 }
 

@@ -8,6 +8,7 @@
 #include "controller/load/loaded_scene.hpp"
 #include "hil/devmodel/hand_script.hpp"
 #include "hil/script/fault_script.hpp"
+#include "shared/wire/personality.hpp"
 
 namespace kerf::faults {
 
@@ -15,25 +16,32 @@ namespace kerf::faults {
 struct Subject {
   const LoadedScene& scene;  ///< its device is the one that is emulated
   const HandScript& hand;
-  double seconds = 4;
 };
 
-/// What a run has shown of the safety contract (docs/safety.md).
+/// What a run has shown of the safety contract (docs/safety.md), by the wire, the emulated device
+/// and its clock.
 struct Outcome {
   std::vector<std::string> violations;  ///< the first few, with their times
   std::uint64_t violation_count = 0;
+  std::string vacuous;  ///< why the run shows nothing; empty: it does
   std::uint64_t faults_begun = 0;
   double peak_n = 0;             ///< commanded
   double device_peak_n = 0;      ///< of the motors at the true tip
-  double steepest_n_per_ms = 0;  ///< rise of the command
-  double slowest_off_ms = 0;     ///< from the tick that switched the motors off to no torque
-  std::string latched = "none";  ///< the first fault that the servo latched
+  double steepest_n_per_ms = 0;  ///< change of the command, but for letting go
+  double rms_n = 0;              ///< of the command, over 10 s
+  double longest_alone_ms = 0;   ///< motors on without a newer packet
+  double slowest_off_ms = 0;     ///< from the packet that switched the motors off to no torque
+  std::string latched = "none";  ///< the first fault that the reports amounted to
   double latch_ms = 0;           ///< from the first fault of the script to that
   bool pushed = false;           ///< there was a force to go wrong
   bool pushed_again = false;     ///< and again after the last fault
 };
 
-/// Plays `script` on `subject`. The same arguments give the same outcome.
+/// Whether a device has what this kind of fault breaks.
+[[nodiscard]] bool concerns(FaultKind kind, Personality personality) noexcept;
+
+/// Plays `script` on `subject`, each seed at another moment of the hand's motion. The same
+/// arguments give the same outcome.
 [[nodiscard]] Outcome run_faults(const Subject& subject, const FaultScript& script);
 
 }  // namespace kerf::faults

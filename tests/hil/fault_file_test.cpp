@@ -43,6 +43,8 @@ TEST_CASE("a fault script is read whole") {
                                          "faults.toml");
   CHECK(script.seed == 7);
   CHECK(script.latches == "overspeed");
+  CHECK(script.seconds == 4);
+  CHECK_FALSE(script.is_random);
   REQUIRE(script.faults.size() == 3);
   CHECK(script.faults[0].kind == FaultKind::lose);
   CHECK(script.faults[0].of_commands);
@@ -52,6 +54,13 @@ TEST_CASE("a fault script is read whole") {
   CHECK(script.faults[1].axis == 2);
   CHECK(script.faults[1].counts == -200);
   CHECK(script.faults[2].ms == 10);
+}
+
+TEST_CASE("a script that says how long needs no faults") {
+  const auto script = parse_fault_script("seconds = 12", "well.toml");
+  CHECK(script.seconds == 12);
+  CHECK(script.faults.empty());
+  CHECK(error_of("seconds = 0").starts_with("faults.toml:1: seconds = 0 is out of range"));
 }
 
 TEST_CASE("bad fault scripts are refused with file, line, value and way out") {
@@ -79,7 +88,7 @@ TEST_CASE("bad fault scripts are refused with file, line, value and way out") {
 }
 
 TEST_CASE("the scripts of the project are read, and random ones differ by seed") {
-  CHECK(kerf::read_fault_script(KERF_FAULTS_DIR "/late_host.toml").faults.size() == 4);
+  CHECK(kerf::read_fault_script(KERF_FAULTS_DIR "/late_host.toml").faults.size() == 5);
   const auto one = kerf::random_faults(1);
   CHECK(one.faults.size() >= 3);
   CHECK(kerf::random_faults(1).faults.size() == one.faults.size());

@@ -133,3 +133,19 @@ TEST_CASE("host_late: says so for as long as it lasts") {
   CHECK(late == 8);
   CHECK(bench.device.begun() == 1);
 }
+
+TEST_CASE("a fault has been met when it changed something, not when its time has come") {
+  Bench lost({.kind = FaultKind::lose, .at_s = 2 * kCycleS, .for_s = 1});
+  CHECK(lost.device.met() == 0);
+  lost.packets(8);
+  CHECK(lost.device.met() == 1);
+  Bench stuck({.kind = FaultKind::stick,  // of an arm that stands still anyhow
+               .at_s = 6 * kCycleS,
+               .for_s = 1});
+  stuck.packets(8);
+  CHECK(stuck.device.begun() == 1);
+  CHECK(stuck.device.met() == 0);
+  Bench late({.kind = FaultKind::host_late, .ms = 1});
+  late.packets(1);
+  CHECK(late.device.met() == 1);
+}

@@ -1,48 +1,85 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "lab/faults/contract.hpp"
 
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <string>
+
 #include <doctest/doctest.h>
 
-using kerf::Phase;
-using kerf::ServoOutput;
+#include "hil/devmodel/omni_model.hpp"
+#include "lab/faults/device_wire.hpp"
+#include "shared/wire/omni_packet.hpp"
+#include "tests/servo/support.hpp"
+
+using kerf::OmniCommand;
+using kerf::OmniReport;
 using kerf::faults::Contract;
+using kerf::faults::DeviceMoment;
+using kerf::faults::DeviceWire;
 using kerf::faults::Outcome;
 
 namespace {
 
-constexpr double kPeakN = 3.3;
-
-ServoOutput pushing(double force_n) {
-  ServoOutput output;
-  output.motors_on = true;
-  output.phase = Phase::active;
-  output.force_n = {0, force_n, 0};
-  return output;
+kerf::LoadedScene omni_scene() {
+  kerf::LoadedScene scene = kerf::test::half_space_scene();
+  scene.device.personality = kerf::Personality::omni;
+  scene.limits.force_n = 3.3;
+  scene.servo.rate_hz = 1000;
+  return scene;
 }
 
-/// Ticks of 1 ms.
+/// An Omni and its host as packets, in ticks of 1 ms: what a perfect servo and a broken one send.
 struct Watched {
+  kerf::LoadedScene scene = omni_scene();
   Outcome outcome;
-  Contract contract{1000, kPeakN, outcome};
-  double time_ms = 0;
+  Contract contract{scene, true, outcome};
+  double ms = 0;
+  std::uint32_t packets = 0;
+  OmniReport told{.encoder = {32760, -32700, 32700}};
+  double n_per_count = 0;
 
-  void tick(const ServoOutput& output) { contract.tick(++time_ms, output); }
-  /// Motors on without force until the fade is over, then up to `force_n` as fast as allowed.
-  void push_up_to(double force_n) {
-    for (int i = 0; i < 100; ++i) tick(pushing(0));
-    for (double f = 0.5; f < force_n; f += 0.5) tick(pushing(f));
-    tick(pushing(force_n));
+  Watched() {
+    const DeviceWire wire(scene.device.personality, scene.device.dock_rad);
+    n_per_count = norm(wire.force_n(*wire.pose(told.encoder), {0, 1, 0}));
   }
-  /// A force, a fault, so many ms until too high a speed is latched, and the end.
-  void end_latched(int after_ms, const char* latches) {
-    push_up_to(1);
-    contract.fault_begins(time_ms);
-    for (int i = 1; i < after_ms; ++i) tick(pushing(1));
-    ServoOutput off;
-    off.phase = Phase::fault;
-    off.fault = kerf::Fault::overspeed;
-    tick(off);
-    contract.end(time_ms, latches);
+
+  void report() {
+    told.counter = ++packets;
+    contract.reported(ms, encode(told));
+  }
+  void command(double force_n, bool on = true) {
+    OmniCommand asked{.motors_on = on};
+    asked.motor[1] = static_cast<std::int16_t>(std::lround(force_n / n_per_count));
+    contract.commanded(ms, encode(asked));
+  }
+  void tick(double force_n, bool on = true, bool hears = true) {
+    ++ms;
+    contract.listened(ms);
+    if (hears) report();
+    command(force_n, on);
+    contract.cycle(ms, {{0, force_n, 0}, told.docked});
+  }
+  void park(int ticks) {
+    told.docked = true;
+    for (int i = 0; i < ticks; ++i) tick(0, false);
+    told.docked = false;
+  }
+  /// Calibrates, fades in without a force, then goes up to `force_n` as fast as allowed.
+  void push_up_to(double force_n) {
+    park(60);
+    for (int i = 0; i < 100; ++i) tick(0);
+    for (double f = 0.5; f < force_n; f += 0.5) tick(f);
+    tick(force_n);
+  }
+  /// Nothing is heard for so many ms; held, faded and off, as it should be.
+  void lose(int ticks, double held_n) {
+    for (int i = 1; i <= ticks; ++i) {
+      const double share = std::clamp((20.0 - i) / 15.0, 0.0, 1.0);
+      tick(held_n * share, i < 20, false);
+    }
   }
 };
 
@@ -51,76 +88,128 @@ struct Watched {
 TEST_CASE("the contract accepts what it allows") {
   Watched run;
   run.push_up_to(3.3);
-  ServoOutput stale = pushing(3.3);
-  stale.stale = true;
-  for (int i = 0; i < 5; ++i) run.tick(stale);  // held
-  for (int i = 1; i <= 15; ++i) {
-    stale.force_n[1] = 3.3 * (15 - i) / 15;
-    run.tick(stale);
-  }
+  run.lose(19, 3.3);
+  run.tick(0.5);
+  for (double f = 1; f < 3; f += 0.5) run.tick(f);
+  run.tick(0.1);  // lets go at once
+  run.park(60);
+  run.tick(0.03);
   CHECK(run.outcome.violation_count == 0);
-  CHECK(run.outcome.peak_n == doctest::Approx(3.3));
-  CHECK(run.outcome.steepest_n_per_ms == doctest::Approx(0.5));
+  for (const std::string& line : run.outcome.violations) MESSAGE(line);
+  CHECK(run.outcome.peak_n == doctest::Approx(3.3).epsilon(0.01));
+  CHECK(run.outcome.steepest_n_per_ms == doctest::Approx(0.5).epsilon(0.02));
 }
 
 TEST_CASE("the contract sees each way to break it") {
   Watched run;
+  SUBCASE("motors on before calibration") {
+    run.tick(0);
+  }
   SUBCASE("more than the peak") {
     run.push_up_to(3.3);
-    run.tick(pushing(3.31));
+    run.tick(3.4);
   }
   SUBCASE("a rise of 0.6 N in a millisecond") {
     run.push_up_to(1);
-    run.tick(pushing(1.6));
+    run.tick(1.6);
   }
-  SUBCASE("a force held longer than 5 ms without reports") {
+  SUBCASE("a force that turns round in a tick, as long as before") {
+    run.push_up_to(1);
+    run.tick(-1);
+  }
+  SUBCASE("a force held for 20 ms without reports") {
     run.push_up_to(2);
-    ServoOutput stale = pushing(2);
-    stale.stale = true;
-    for (int i = 0; i < 7; ++i) run.tick(stale);
+    for (int i = 0; i < 19; ++i) run.tick(2, true, false);
+  }
+  SUBCASE("motors on 21 ms after the last report") {
+    run.push_up_to(2);
+    run.lose(19, 2);
+    run.tick(0, true, false);
+    run.tick(0, true, false);
+  }
+  SUBCASE("force again after a fault") {
+    run.push_up_to(1);
+    run.lose(30, 1);
+    run.tick(0.1);
+  }
+  SUBCASE("one parked packet forgives a fault") {
+    run.push_up_to(1);
+    run.lose(30, 1);
+    run.park(1);
+    run.tick(0.03);
+  }
+  SUBCASE("a joint that turns while parked forgives a fault") {
+    run.push_up_to(1);
+    run.lose(30, 1);
+    for (int i = 0; i < 60; ++i) {
+      run.told.encoder[0] = static_cast<std::int16_t>(run.told.encoder[0] - 4);
+      run.park(1);
+    }
+    run.tick(0.03);
+  }
+  SUBCASE("motors on while parked") {
+    run.push_up_to(1);
+    run.told.docked = true;
+    run.tick(1);
   }
   SUBCASE("a force that came back without fading in") {
     run.push_up_to(1);
-    run.tick({});
-    for (int i = 0; i < 10; ++i) run.tick(pushing(0));
-    run.tick(pushing(0.5));
+    run.park(1);
+    for (int i = 0; i < 10; ++i) run.tick(0);
+    run.tick(0.5);
   }
-  SUBCASE("motors on in a phase that forbids it") {
-    ServoOutput output = pushing(0);
-    output.phase = Phase::armed;
-    run.tick(output);
+  SUBCASE("full force after a stall that the watchdog ended") {
+    run.push_up_to(1);
+    run.ms += 22;
+    run.command(0, false);
+    run.ms += 60;
+    run.tick(0.5);
+    run.tick(1);
   }
-  SUBCASE("motors on with a fault") {
-    ServoOutput output = pushing(0);
-    output.fault = kerf::Fault::overspeed;
-    run.tick(output);
+  SUBCASE("a stall that nobody ends") {
+    run.push_up_to(1);
+    for (int i = 0; i < 26; ++i) run.contract.cycle(++run.ms, {{0, 1, 0}, false});
   }
-  SUBCASE("force with the motors off") {
-    ServoOutput output;
-    output.force_n = {0.1, 0, 0};
-    run.tick(output);
+  SUBCASE("a tip at 20 m/s that is believed") {
+    run.push_up_to(1);
+    run.told.encoder[0] = static_cast<std::int16_t>(run.told.encoder[0] - 500);
+    run.tick(1);
+  }
+  SUBCASE("the peak for five seconds") {
+    run.push_up_to(3.3);
+    for (int i = 0; i < 5000; ++i) run.tick(3.3);
   }
   SUBCASE("torque 3 ms after the motors went off") {
     run.push_up_to(1);
-    run.tick({});
-    run.contract.device_force(run.time_ms + 3, 1.0, true);
+    run.tick(0, false);
+    run.contract.cycle(run.ms + 3, {{0, 1, 0}, false});
   }
   SUBCASE("the device pushes more than it was told") {
     run.push_up_to(3.3);
-    run.contract.device_force(run.time_ms, 3.6, true);
+    run.contract.cycle(run.ms, {{0, 3.6, 0}, false});
+  }
+  SUBCASE("a packet that the device cannot read") {
+    run.contract.commanded(1, std::array<std::uint8_t, 3>{});
   }
   SUBCASE("a fault that should be latched, and is not") {
     run.push_up_to(1);
-    run.contract.end(run.time_ms, "overspeed");
+    run.contract.end(run.ms, "overspeed", run.ms);
   }
   SUBCASE("a fault that should not be latched") {
-    run.end_latched(1, "none");
+    run.push_up_to(1);
+    run.lose(30, 1);
+    run.contract.end(run.ms, "none", run.ms);
   }
   SUBCASE("another fault than the script says") {
-    run.end_latched(1, "stale_input");
+    run.push_up_to(1);
+    run.lose(30, 1);
+    run.contract.end(run.ms, "overspeed", run.ms);
   }
-  SUBCASE("a fault that is latched 3 ms after it began") {
-    run.end_latched(3, "overspeed");
+  SUBCASE("motors that go off for good though nothing is wrong") {
+    run.push_up_to(1);
+    const double fault_ends_ms = run.ms;
+    for (int i = 0; i < 50; ++i) run.tick(0, false);
+    run.contract.end(run.ms, "none", fault_ends_ms);
   }
   CHECK(run.outcome.violation_count > 0);
   CHECK_FALSE(run.outcome.violations.empty());
@@ -128,8 +217,24 @@ TEST_CASE("the contract sees each way to break it") {
 
 TEST_CASE("the contract accepts the fault that the script says, in time") {
   Watched run;
-  run.end_latched(1, "overspeed");
+  run.push_up_to(1);
+  run.contract.fault_begins(run.ms);
+  run.lose(30, 1);
+  run.contract.end(run.ms, "stale_input", run.ms);
+  for (const std::string& line : run.outcome.violations) MESSAGE(line);
   CHECK(run.outcome.violation_count == 0);
-  CHECK(run.outcome.latched == "overspeed");
-  CHECK(run.outcome.latch_ms == doctest::Approx(1));
+  CHECK(run.outcome.latched == "stale_input");
+  CHECK(run.outcome.latch_ms == doctest::Approx(20));
+}
+
+TEST_CASE("a force into the solid is seen, whatever the motors' signs are") {
+  // A Falcon above a half-space that fills y < 0: +y is the way out.
+  const kerf::LoadedScene scene = kerf::test::half_space_scene();
+  const kerf::faults::Outward outward(scene);
+  const double radius_mm = scene.tools[scene.active_tool].radius_mm;
+  const auto out = outward.at({0, radius_mm / 2, 0});
+  REQUIRE(out);
+  CHECK(out->y == doctest::Approx(1).epsilon(0.02));
+  CHECK_FALSE(outward.at({0, 3 * radius_mm, 0}));
+  CHECK_FALSE(outward.at({0, -2 * radius_mm, 0}));
 }

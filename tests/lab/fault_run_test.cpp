@@ -12,17 +12,31 @@ using kerf::Personality;
 
 namespace {
 
-/// A Falcon whose hand comes down on a half-space and presses on; a servo in float.
-kerf::faults::Outcome pressing_falcon(const DeviceFault& fault) {
+kerf::LoadedScene falcon_scene() {
   kerf::LoadedScene scene = kerf::test::half_space_scene();
   scene.device.personality = Personality::falcon;
   scene.device.torque_scale = kerf::FalconParams().torque_scale();
   scene.servo.numeric = kerf::NumericKind::float32;
+  return scene;
+}
+
+/// A Falcon whose hand comes down on a half-space and presses on; a servo in float.
+kerf::faults::Outcome pressing_falcon(const DeviceFault& fault) {
+  const kerf::LoadedScene scene = falcon_scene();
   kerf::HandScript hand;
   hand.start = {0, 4, 0};
   hand.steps = {kerf::hand_move({0, -1, 0}, 0.4), kerf::hand_move({0, -1, 0}, 10)};
   return kerf::faults::run_faults({.scene = scene, .hand = hand},
                                   {.faults = {fault}, .latches = "not_finite"});
+}
+
+/// The same hand, and it stays above.
+kerf::faults::Outcome run_in_air() {
+  const kerf::LoadedScene scene = falcon_scene();
+  kerf::HandScript hand;
+  hand.start = {0, 10, 0};
+  return kerf::faults::run_faults({.scene = scene, .hand = hand},
+                                  {.faults = {}, .latches = "none"});
 }
 
 }  // namespace
@@ -36,5 +50,15 @@ TEST_CASE("legs that cannot meet give NaN in float: the motors go off after 2 ms
   CHECK(outcome.faults_begun == 1);
   CHECK(outcome.pushed);
   CHECK(outcome.latched == "not_finite");
+  CHECK(outcome.vacuous.empty());
   CHECK_FALSE(outcome.pushed_again);
+}
+
+TEST_CASE("a run without contact, or whose fault never was, shows nothing and says so") {
+  const auto away = run_in_air();
+  CHECK(away.vacuous == "the motors never pushed at the tip");
+  const auto never = pressing_falcon({.kind = FaultKind::silence, .at_s = 100, .for_s = 1});
+  CHECK(never.vacuous == "0 of 1 faults changed anything");
+  const auto nothing_to_break = pressing_falcon({.kind = FaultKind::noise, .at_s = 0, .for_s = 1});
+  CHECK(nothing_to_break.vacuous.empty());  // a Falcon has no pots: the matrix leaves it out
 }

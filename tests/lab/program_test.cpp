@@ -2,6 +2,7 @@
 #include "lab/program.hpp"
 
 #include <filesystem>
+#include <fstream>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -102,4 +103,39 @@ TEST_CASE("the page says where its figures come from, and holds one line for eac
   std::size_t lines = 0;
   for (auto at = page.find(line); at != std::string::npos; at = page.find(line, at + 1)) ++lines;
   CHECK(lines == 3);
+}
+
+TEST_CASE("faults runs from any folder, and names what it plays") {
+  const auto here = std::filesystem::current_path();
+  std::filesystem::current_path(std::filesystem::temp_directory_path());
+  const Answer answer = lab({"faults", "--device", "falcon", "--rate", "250,500", "--scripts",
+                             "hil/faults/parked_once.toml", "--random", "0", "--seeds", "1"});
+  std::filesystem::current_path(here);
+  CHECK(answer.complained.empty());
+  CHECK(answer.code == 0);
+  CHECK(answer.said.find("2 runs, 0 show nothing, 0 rules broken") != std::string::npos);
+}
+
+TEST_CASE("faults refuses what cannot be played, before anything is") {
+  const Answer rate = lab({"faults", "--rate", "1000,3000"});
+  CHECK(rate.code == 2);
+  CHECK(rate.complained.find("--rate: 3000 does not divide 8000") != std::string::npos);
+  const Answer pots = lab(
+      {"faults", "--device", "falcon", "--random", "0", "--scripts", "hil/faults/pot_noise.toml"});
+  CHECK(pots.code == 2);
+  CHECK(pots.complained.find("no device has what they break") != std::string::npos);
+  CHECK(lab({"faults", "--model", "springs"}).code == 2);
+  CHECK(lab({"faults", "--scripts", "/nonexistent"}).code == 2);
+}
+
+TEST_CASE("faults calls a run whose hand felt nothing an error") {
+  const auto hand = std::filesystem::temp_directory_path() / "kerf-hand-in-the-air.toml";
+  std::ofstream(hand) << "start_mm = [0, 20, 0]\n[[step]]\nhold = 1\n";
+  const Answer answer = lab({"faults", "--device", "omni", "--random", "0", "--scripts",
+                             "hil/faults/lost_long.toml", "--seeds", "2", "--hand", hand.c_str()});
+  std::filesystem::remove(hand);
+  CHECK(answer.code == 1);
+  CHECK(answer.said.find("shows nothing: seed 1: the motors never pushed at the tip") !=
+        std::string::npos);
+  CHECK(answer.said.find("2 runs, 2 show nothing") != std::string::npos);
 }

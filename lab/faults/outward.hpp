@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <optional>
+
+#include "controller/load/loaded_scene.hpp"
+#include "shared/numeric/vec.hpp"
+
+namespace kerf::faults {
+
+/// Which way out of the solid it is, from the voxels alone: from the middle of what a ball of the
+/// tool's radius covers to the ball's own middle. For a scene of one volume that nothing is cut
+/// from, felt with a ball. `scene` outlives it.
+class Outward {
+ public:
+  explicit Outward(const LoadedScene& scene);
+
+  /// Of length 1, at a tip of the device; none where the ball covers nothing, or its own middle, or
+  /// where the scene is another one.
+  [[nodiscard]] std::optional<DeviceVec<double>> at(DeviceVec<double> tip_mm) const;
+
+ private:
+  const LoadedScene& scene_;
+  const SceneVolume* volume_ = nullptr;  ///< none: another scene
+  double radius_mm_ = 0;
+  std::array<double, 9> axes_{};  ///< world from volume, row-major
+};
+
+}  // namespace kerf::faults
