@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <functional>
 #include <utility>
 
@@ -56,7 +57,7 @@ TEST_CASE("a turned DICOM series keeps right-handed axes") {
   const SourceVolume v = read_volume(folder.path());
   CHECK(v.spacing_mm[2] == doctest::Approx(3.0));
   CHECK(v.direction == std::array<double, 9>{1, 0, 0, 0, 0, 1, 0, -1, 0});
-  CHECK(v.values == counting<float>());
+  CHECK(std::ranges::equal(v.values, counting<float>()));
 }
 
 TEST_CASE("a DICOM folder that is not one even stack is refused in one line") {
