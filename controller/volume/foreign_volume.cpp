@@ -71,7 +71,7 @@ void convert(std::span<const std::byte> from, std::span<std::byte> to) {
   constexpr std::size_t kBlock = 1024;
   std::array<T, kBlock> values;
   std::array<float, kBlock> floats;
-  for (std::size_t left = from.size() / sizeof(T); left > 0;) {
+  for (std::size_t left = std::min(from.size() / sizeof(T), to.size() / sizeof(float)); left > 0;) {
     const std::size_t count = std::min(left, kBlock);
     std::memcpy(values.data(), from.data(), count * sizeof(T));
     std::transform(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(count),
@@ -106,8 +106,10 @@ void check_type(const fs::path& path, ImageIo::IOComponentEnum type) {
                    " voxels; save it as integers of 8..32 bits or as floats");
 }
 
-void to_floats(ImageIo::IOComponentEnum type, std::span<const std::byte> from,
+/// As many as `from` holds and `to` has room for.
+void to_floats(const fs::path& path, ImageIo::IOComponentEnum type, std::span<const std::byte> from,
                std::span<std::byte> to) {
+  check_type(path, type);
   std::ranges::find(kKinds, type, &Kind::type)->convert(from, to);
 }
 
@@ -177,23 +179,31 @@ void read_one_file(const fs::path& path, ImageIo& io, const VolumeHeader& header
   const std::span<std::byte> own = memory.last(bytes);
   read_voxels(path, io, own);
   quiet.refuse_if_missing(path);
-  to_floats(io.GetComponentType(), own, memory);
+  to_floats(path, io.GetComponentType(), own, memory);
 }
 
-/// Whether the tag of this name holds two distances; nullopt: it is not there.
-std::optional<bool> holds_spacing(const itk::GDCMImageIO& io, const char* tag) {
+/// The value of a tag on the first level of the file.
+std::optional<std::string> value_of(const itk::GDCMImageIO& io, const char* tag) {
   std::string text;
-  if (!itk::ExposeMetaData<std::string>(io.GetMetaDataDictionary(), tag, text)) return std::nullopt;
-  return is_pixel_spacing(text);
+  const bool there = itk::ExposeMetaData<std::string>(io.GetMetaDataDictionary(), tag, text);
+  return there ? std::optional(text) : std::nullopt;
 }
+
+constexpr const char* kPixelSpacing = "0028|0030";
 
 /// GDCM fills in 1 mm where a file names no spacing between pixels, or none that is a number. What
-/// neither tag of the file's first level tells may come from deeper in it.
+/// no tag of the file's first level tells may come from deeper in it.
 bool names_spacing(const itk::GDCMImageIO& io) {
-  for (const char* tag : {"0028|0030", "0018|1164"}) {
-    if (const auto holds = holds_spacing(io, tag)) return *holds;
+  for (const char* tag : {kPixelSpacing, "0018|1164"}) {
+    if (const auto text = value_of(io, tag)) return dicom_distances(*text).size() == 2;
   }
   return io.GetSpacing(0) != 1.0 || io.GetSpacing(1) != 1.0;
+}
+
+/// The same of the slices of one file: where its pixels' spacing is on the first level, theirs is.
+bool names_slice_distance(const itk::GDCMImageIO& io) {
+  if (!value_of(io, kPixelSpacing) || io.GetSpacing(2) != 1.0) return true;
+  return dicom_distances(value_of(io, "0018|0088").value_or("")) == std::vector{1.0};
 }
 
 void read_dicom_file(const fs::path& path, const Offer& offer) {
@@ -205,7 +215,7 @@ void read_dicom_file(const fs::path& path, const Offer& offer) {
       throw SceneError(path.string() +
                        ": one slice; name the folder that holds the whole DICOM series");
     }
-    header.has_spacing = names_spacing(*io);
+    header.has_spacing = names_spacing(*io) && names_slice_distance(*io);
   }
   read_one_file(path, *io, header, offer);
 }
@@ -245,18 +255,23 @@ void read_dicom_series(const fs::path& folder, const std::vector<fs::path>& besi
 
   const auto io = itk::GDCMImageIO::New();
   const std::array<std::int64_t, 3> size = open(files.front(), *io);
-  check_type(files.front(), io->GetComponentType());
   const auto layers = static_cast<std::int64_t>(files.size());
-  VolumeClaim claim = claim_of(*io, {size[0], size[1], layers}, names_spacing(*io));
+  const bool in_file = names_spacing(*io);
+  VolumeClaim claim = claim_of(*io, {size[0], size[1], layers}, in_file);
   const Place x = claim.axes[0], y = claim.axes[1];
   const Place normal = cross(x, y);
+  // What no tag names is a guess, and differs from one time to the next.
+  const auto same_spacing = [&] {
+    return names_spacing(*io) == in_file &&
+           (!in_file ||
+            (io->GetSpacing(0) == claim.spacing_mm[0] && io->GetSpacing(1) == claim.spacing_mm[1]));
+  };
 
   std::vector<Slice> slices;
   for (const fs::path& file : files) {
     sandbox.at(file.string());
     const bool same = open(file, *io) == size && size[2] == 1 && axis_of(*io, 0) == x &&
-                      axis_of(*io, 1) == y && io->GetSpacing(0) == claim.spacing_mm[0] &&
-                      io->GetSpacing(1) == claim.spacing_mm[1];
+                      axis_of(*io, 1) == y && same_spacing();
     if (!same) {
       throw SceneError(file.string() + ": its size, spacing or direction differs from " +
                        files.front().filename().string() + "; keep one stack of slices per folder");
@@ -281,7 +296,7 @@ void read_dicom_series(const fs::path& folder, const std::vector<fs::path>& besi
     own.resize(static_cast<std::size_t>(io->GetImageSizeInBytes()));
     read_voxels(slice.file, *io, own);
     quiet.refuse_if_missing(slice.file);
-    to_floats(io->GetComponentType(), own, rest.first(values));
+    to_floats(slice.file, io->GetComponentType(), own, rest.first(values));
     rest = rest.subspan(values);
   }
 }

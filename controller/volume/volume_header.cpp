@@ -97,19 +97,29 @@ void check_sizes(const fs::path& path, const std::string& text) {
   }
 }
 
+/// A text of the file as part of a message.
+std::string shown(const std::string& text) {
+  constexpr std::size_t kLongest = 300;
+  std::string plain = text.substr(0, kLongest);
+  const auto control = [](char c) { return static_cast<unsigned char>(c) < ' ' || c == '\x7f'; };
+  std::replace_if(plain.begin(), plain.end(), control, '?');
+  return plain;
+}
+
 /// Sets where the voxels lie and how many bytes they can be. `offset`: bytes before them.
 void locate_data(VolumeHeader& header, const fs::path& path, const fs::path& data,
                  std::uint64_t offset, bool compressed) {
   std::error_code error;
   const std::uint64_t size = fs::file_size(data, error);
   if (error) {
-    throw SceneError(path.string() + ": data file " + data.string() + " cannot be read (" +
-                     error.message() + "); put it beside the header or correct the header");
+    throw SceneError(path.string() + ": data file " + shown(data.filename().string()) +
+                     " cannot be read (" + error.message() +
+                     "); put it beside the header or correct the header");
   }
   // Deflate packs at most 1032 bytes into one.
   constexpr std::uint64_t kBestDeflate = 1032;
   const std::uint64_t held = size - std::min(size, offset);
-  header.data_file = data.string();
+  header.data_file = shown(data.string());
   header.data_bytes_at_most = compressed ? held * kBestDeflate : held;
 }
 
@@ -129,7 +139,7 @@ VolumeHeader read_nrrd_header(const fs::path& path) {
   header.has_spacing = spacings.size() >= 3 || directions.size() >= 9;
   if (std::find(spacings.begin(), spacings.end(), 0.0) != spacings.end()) {
     throw SceneError(
-        path.string() + ": spacings: " + text.get("spacings") +
+        path.string() + ": spacings: " + shown(text.get("spacings")) +
         " holds a zero; correct the header, or remove the line and give the spacing in "
         "the scene or with `--spacing`");
   }

@@ -76,17 +76,21 @@ void set_origin(const fs::path& path, const std::array<double, 3>& origin_mm,
   volume.origin_mm = origin_mm;
 }
 
-bool is_pixel_spacing(std::string_view text) {
-  constexpr std::string_view kPadding{" \0", 2};  // files have even lengths
-  const auto is_distance = [&](std::string_view word) {
+std::vector<double> dicom_distances(std::string_view text) {
+  constexpr std::string_view kPadding{" \0", 2};  // to an even length
+  std::vector<double> distances;
+  for (std::size_t next = 0; next != text.npos;) {
+    next = text.find('\\');
+    std::string_view word = text.substr(0, next);
+    if (next != text.npos) text.remove_prefix(next + 1);
     word.remove_prefix(std::min(word.find_first_not_of(kPadding), word.size()));
     word = word.substr(0, word.find_last_not_of(kPadding) + 1);
     if (word.starts_with('+')) word.remove_prefix(1);
     const auto value = number_in(word);
-    return value && *value > 0;
-  };
-  const std::size_t bar = text.find('\\');
-  return bar != text.npos && is_distance(text.substr(0, bar)) && is_distance(text.substr(bar + 1));
+    if (!value || !(*value > 0)) return {};
+    distances.push_back(*value);
+  }
+  return distances;
 }
 
 void set_range(const fs::path& path, SourceVolume& volume) {

@@ -31,9 +31,9 @@ void set_spacing(const std::filesystem::path& path, const ReadOptions& options, 
 void set_origin(const std::filesystem::path& path, const std::array<double, 3>& origin_mm,
                 SourceVolume& volume);
 
-/// Whether a DICOM value is a spacing between rows and one between columns: two decimal numbers,
-/// finite and above 0, as the standard writes them (PS3.5 6.2: DS), with a backslash between.
-[[nodiscard]] bool is_pixel_spacing(std::string_view text);
+/// The distances in a DICOM value: decimal numbers, finite and above 0, with backslashes between
+/// (PS3.5 6.2, DS). None where any part is something else.
+[[nodiscard]] std::vector<double> dicom_distances(std::string_view text);
 
 /// Sets `min` and `max` from the values; refuses NaN and infinity.
 void set_range(const std::filesystem::path& path, SourceVolume& volume);
