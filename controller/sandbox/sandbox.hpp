@@ -12,7 +12,7 @@
 
 namespace kerf {
 
-inline constexpr int kReadCpuSeconds = 60;
+inline constexpr int kReadCpuSeconds = 60, kMostReadCpuSeconds = 86400;
 
 /// One foreign file that is to be read.
 struct SandboxJob {
