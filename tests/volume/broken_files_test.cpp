@@ -149,7 +149,7 @@ TEST_CASE("what ends a library ends nothing else") {
   const std::size_t voxels = whole.size() - 60 * sizeof(std::int16_t);
   const std::string length = bytes_of(std::uint32_t{0xfffffff0});
   const std::string endless = whole.substr(0, voxels - 4) + length;
-  for (const std::size_t left : {0, 8, 120}) {
+  for (const std::size_t left : {std::size_t{0}, std::size_t{8}, std::size_t{120}}) {
     refused("length.dcm", endless + whole.substr(voxels, left), "");
   }
   refused("cut.dcm", whole.substr(0, voxels - 6), "");

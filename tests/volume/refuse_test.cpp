@@ -90,6 +90,13 @@ TEST_CASE("a header that promises more than its file can hold takes no memory") 
                 "120 of 4294967296 bytes");
   check_refused(folder.write("b.nrrd", nrrd("double", kLittle, "gzip", sizes) + "\n" + kBytes),
                 "of 4294967296 bytes");
+  check_refused(folder.write("c.nrrd", nrrd("double", kLittle, "ascii", sizes) + "\n1 2 3"),
+                "20 of 4294967296 bytes");
+  check_refused(folder.write("d.mha",
+                             "ObjectType = Image\nNDims = 3\nDimSize = 1024 1024 512\n"
+                             "BinaryData = False\nElementType = MET_DOUBLE\n" +
+                                 kElementSpacing + "ElementDataFile = LOCAL\n1 2 3"),
+                "20 of 4294967296 bytes");
 }
 
 TEST_CASE("sizes of zero or above the limits are refused from the header") {
