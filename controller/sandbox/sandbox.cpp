@@ -66,9 +66,10 @@ std::uint64_t memory_before_offer(const SandboxJob& job) {
 /// The child's whole life.
 [[noreturn]] void live(const SandboxJob& job, pid_t parent, int channel, int memory,
                        const std::function<void(SandboxReader&)>& read) noexcept {
-  drop_inheritance(parent, channel, memory);
-  SandboxReader reader(kSandboxChannel, kSandboxMemory);
+  SandboxReader reader(channel, memory);
   try {
+    drop_inheritance(parent, channel, memory);
+    reader = SandboxReader(kSandboxChannel, kSandboxMemory);
     drop_rights(memory_before_offer(job), job.cpu_s);
     read(reader);
     reader.say(SandboxWord::done);

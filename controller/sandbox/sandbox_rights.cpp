@@ -118,6 +118,9 @@ void drop_inheritance(pid_t parent, int channel, int memory) {
   constexpr int kAbove = 16;  // out of the way of the numbers that they get
   const int far_channel = ::fcntl(channel, F_DUPFD, kAbove);
   const int far_memory = ::fcntl(memory, F_DUPFD, kAbove);
+  if (null < 0 || far_channel < 0 || far_memory < 0) {
+    throw std::runtime_error("too few files may be open to read it; raise `ulimit -n` to 64");
+  }
   ::dup2(null, STDIN_FILENO);
   ::dup2(null, STDOUT_FILENO);
 #ifndef KERF_SANITIZED

@@ -12,7 +12,7 @@ inline constexpr int kSandboxChannel = 3, kSandboxMemory = 4;
 
 /// For a fresh child process of `parent`, once: it ends with its parent; no signal of a terminal
 /// ends it, and every other has its default; of the files that it inherited it keeps `channel` and
-/// `memory`, by the numbers above.
+/// `memory`, by the numbers above. Throws std::runtime_error, one line, with `channel` still open.
 void drop_inheritance(pid_t parent, int channel, int memory);
 
 /// Gives up all rights but to read, to decode and to speak on kSandboxChannel: a filter of system

@@ -305,6 +305,11 @@ TEST_CASE("where no process or file is left, reading says so") {
   CAPTURE(message);
   CHECK(message.find("a.vol: no process to read it in (Too many open files); end other programs") ==
         0);
+  few.rlim_cur = static_cast<rlim_t>(open_files()) + 4;  // enough here, too few there
+  setrlimit(RLIMIT_NOFILE, &few);
+  const std::string there = answer([](SandboxReader&) {});
+  setrlimit(RLIMIT_NOFILE, &before);
+  CHECK(there == "a.vol: too few files may be open to read it; raise `ulimit -n` to 64");
 }
 #endif
 
