@@ -109,14 +109,13 @@ class Child {
   Child& operator=(const Child&) = delete;
 
   SharedBytes result(const std::function<std::size_t(std::span<const std::byte>)>& accept) {
-    const ProgressBar bar(true);
     for (;;) {
       constexpr int kLookMs = 100;
       pollfd wait{channel_.get(), POLLIN, 0};
       if (::poll(&wait, 1, kLookMs) > 0) {
         if (take(accept)) break;
       } else {
-        look(bar);
+        look();
       }
     }
     static_cast<void>(end());  // from here on nobody else writes there
@@ -205,7 +204,7 @@ class Child {
   }
 
   /// While the child says nothing.
-  void look(const ProgressBar& bar) {
+  void look() {
     if (stop_requested()) refuse(": reading it was stopped by a signal; start again");
     const std::int64_t now_ns = monotonic_ns();
     timespec cpu{};
@@ -219,7 +218,9 @@ class Child {
              " s; copy the file to a disk of this machine");
     }
     constexpr std::int64_t kQuickNs = 2 * kNsPerSecond;
-    if (now_ns - began_ns_ > kQuickNs) bar.show(share(), "reading " + place_);
+    if (now_ns - began_ns_ < kQuickNs) return;
+    if (!bar_) bar_.emplace(true);
+    bar_->show(share(), "reading " + place_);
   }
 
   /// Of the memory that was written to, 0..1; negative before there is some.
@@ -235,6 +236,7 @@ class Child {
   File channel_, memory_;
   pid_t pid_ = -1;
   std::optional<std::size_t> size_;
+  std::optional<ProgressBar> bar_;
   std::int64_t began_ns_ = monotonic_ns(), last_work_ns_ = 0, work_ns_ = -1;
 };
 
