@@ -14,14 +14,18 @@ seconds=${1:-20}
 }
 build=build/asan
 if [[ ! -e $build/build.ninja ]]; then cmake --preset asan --log-level=NOTICE; fi
-cmake --build "$build" --target fuzzers >/dev/null
+targets=(fuzzers)
+if (($# > 1)); then targets=("${@:2}") && targets=("${targets[@]/#/fuzz_}"); fi
+cmake --build "$build" --target "${targets[@]}" >/dev/null
 lists=$build/tests/fuzz
 
 # fuzz NAME CORPUS...: one fuzzer; its last lines when it finds something, else its figures.
 fuzz() {
   local name=$1 work=$build/fuzz/$1 status=0 own=(-timeout=5)
   # A child may take a second of a core that others want as well; the day's mutations can be repeated.
-  if grep -q "^$name " "$lists/importers"; then own=(-timeout=60 -seed="$seed" -max_len=8192 -reduce_inputs=0); fi
+  if grep -q "^$name " "$lists/importers"; then
+    own=(-timeout=60 -seed="$seed" -max_len=8192 -reduce_inputs=0)
+  fi
   mkdir -p "$work/inputs"
   # Memory of a text's nesting and of error messages stays far below; so does the time of one input.
   "$build/bin/fuzz_$name" -max_total_time="$seconds" "${own[@]}" -rss_limit_mb=1024 \
@@ -45,10 +49,7 @@ export UBSAN_OPTIONS=halt_on_error=1:print_stacktrace=1
 wanted() {
   if (($#)); then
     local name
-    for name; do
-      grep -h "^$name " "$lists/fuzzers" "$lists/importers" ||
-        echo "fuzz: $name: no fuzzer of that name in tests/fuzz" >&2
-    done
+    for name; do grep -h "^$name " "$lists/fuzzers" "$lists/importers"; done
     return
   fi
   local importers today
