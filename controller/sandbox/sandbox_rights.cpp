@@ -26,7 +26,7 @@ namespace {
 [[noreturn]] void fail(const char* what, int error) {
   throw std::runtime_error("no sandbox: " + std::string(what) + " (" +
                            std::generic_category().message(error) +
-                           "); the kernel needs CONFIG_SECCOMP_FILTER and a mounted /proc");
+                           "); it needs a kernel with CONFIG_SECCOMP_FILTER, /proc and /dev/null");
 }
 
 void limit(__rlimit_resource resource, rlim_t soft, rlim_t hard) {
@@ -115,6 +115,7 @@ void drop_inheritance(pid_t parent, int channel, int memory) {
   sigprocmask(SIG_SETMASK, &none, nullptr);
 
   const int null = ::open("/dev/null", O_RDWR);
+  if (null < 0 && errno != EMFILE) fail("/dev/null", errno);
   constexpr int kAbove = 16;  // out of the way of the numbers that they get
   const int far_channel = ::fcntl(channel, F_DUPFD, kAbove);
   const int far_memory = ::fcntl(memory, F_DUPFD, kAbove);

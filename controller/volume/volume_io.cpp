@@ -2,6 +2,7 @@
 #include "controller/volume/volume_io.hpp"
 
 #include <algorithm>
+#include <cerrno>
 #include <cstddef>
 #include <cstring>
 #include <limits>
@@ -9,6 +10,8 @@
 #include <system_error>
 #include <utility>
 #include <vector>
+
+#include <unistd.h>
 
 #include "controller/sandbox/sandbox.hpp"
 #include "controller/scene/scene_error.hpp"
@@ -52,6 +55,10 @@ Kind kind_of(const fs::path& path) {
   if (!fs::is_regular_file(status)) {
     throw SceneError(path.string() +
                      ": a pipe, socket or device; copy what it gives to a file, and name that");
+  }
+  if (::access(path.c_str(), R_OK) != 0) {
+    throw SceneError(path.string() + ": cannot be read (" + std::generic_category().message(errno) +
+                     "); check its permissions");
   }
   const std::string name = lower(path.filename().string());
   constexpr std::pair<const char*, Kind> kEnds[] = {

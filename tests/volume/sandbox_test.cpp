@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "controller/sandbox/sandbox.hpp"
 
+#include <array>
+#include <atomic>
 #include <cerrno>
 #include <csignal>
 #include <cstdlib>
@@ -8,6 +10,7 @@
 #include <functional>
 #include <stdexcept>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include <doctest/doctest.h>
@@ -312,6 +315,24 @@ TEST_CASE("where no process or file is left, reading says so") {
   CHECK(there == "a.vol: too few files may be open to read it; raise `ulimit -n` to 64");
 }
 #endif
+
+TEST_CASE("several threads read at once, each what is its own") {
+  constexpr int kThreads = 4, kReads = 8;
+  std::array<std::atomic<int>, kThreads> right{};
+  std::vector<std::thread> threads;
+  for (std::size_t t = 0; t < kThreads; ++t) {
+    threads.emplace_back([&, t] {
+      for (int i = 0; i < kReads; ++i) {
+        const auto mine = static_cast<std::byte>(16 * static_cast<int>(t) + i);
+        const SharedBytes memory = read_in_sandbox(
+            job(), [&](SandboxReader& s) { s.offer({})[7] = mine; }, any);
+        if (memory.bytes()[7] == mine) ++right[t];
+      }
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+  for (const auto& count : right) CHECK(count == kReads);
+}
 
 TEST_CASE("a program that ignores the end of its children reads all the same") {
   const auto before = std::signal(SIGCHLD, SIG_IGN);
