@@ -13,7 +13,7 @@ shared/numeric shared/volume shared/wire shared/text shared/posix shared/segment
 
 controller/kernel/point_shell controller/kernel controller/kernel/proxy controller/kernel/sets
 controller/servo/kinematics controller/servo
-controller/scene controller/volume controller/volume_tool controller/tool controller/load
+controller/scene controller/sandbox controller/volume controller/volume_tool controller/tool controller/load
 controller/plan/tables controller/plan/method controller/plan controller/plan/cost
 controller/device/port controller/device/driver
 controller/shell controller/shell/probe controller
@@ -105,7 +105,7 @@ broken() {
   grep -rnE --include='*.[ch]pp' 'system_clock|CLOCK_REALTIME|gettimeofday|timespec_get' \
     controller/servo controller/shell controller/device shared/segment \
     shared/posix/monotonic_clock.hpp || true
-  includes '<itk' "${programs[@]}" | grep -v '^controller/volume/volume_io.cpp:'
+  includes '<itk' "${programs[@]}" | grep -v '^controller/volume/foreign_volume.cpp:'
 }
 
 found=$(broken || true)

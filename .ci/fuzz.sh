@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# Every fuzzer of tests/fuzz for so many seconds, as many at once as there are cores. What they find
-# out about the code stays in build/asan/fuzz; an input that breaks something stays there too and is
+# Every fuzzer of tests/fuzz for so many seconds, as many at once as there are cores. Of those that read
+# foreign files through the sandbox, whose mutations are blind, one: the day's. What they find out
+# about the code stays in build/asan/fuzz; an input that breaks something stays there too and is
 # named. Ends with 1 when there is one.
 #     .ci/fuzz.sh [SECONDS [NAME...]]      e.g. .ci/fuzz.sh 300 scene
 set -euo pipefail
@@ -13,14 +14,21 @@ seconds=${1:-20}
 }
 build=build/asan
 if [[ ! -e $build/build.ninja ]]; then cmake --preset asan --log-level=NOTICE; fi
-cmake --build "$build" --target fuzzers >/dev/null
+targets=(fuzzers)
+if (($# > 1)); then targets=("${@:2}") && targets=("${targets[@]/#/fuzz_}"); fi
+cmake --build "$build" --target "${targets[@]}" >/dev/null
+lists=$build/tests/fuzz
 
 # fuzz NAME CORPUS...: one fuzzer; its last lines when it finds something, else its figures.
 fuzz() {
-  local name=$1 work=$build/fuzz/$1 status=0
+  local name=$1 work=$build/fuzz/$1 status=0 own=(-timeout=5)
+  # A child may take a second of a core that others want as well; the day's mutations can be repeated.
+  if grep -q "^$name " "$lists/importers"; then
+    own=(-timeout=60 -seed="$seed" -max_len=8192 -reduce_inputs=0)
+  fi
   mkdir -p "$work/inputs"
   # Memory of a text's nesting and of error messages stays far below; so does the time of one input.
-  "$build/bin/fuzz_$name" -max_total_time="$seconds" -timeout=5 -rss_limit_mb=1024 \
+  "$build/bin/fuzz_$name" -max_total_time="$seconds" "${own[@]}" -rss_limit_mb=1024 \
     -artifact_prefix="$work/" -print_final_stats=1 "$work/inputs" "${@:2}" \
     >"$work/log" 2>&1 || status=$?
   if ((status)); then
@@ -32,10 +40,24 @@ fuzz() {
     split(a[2], b, " ") } END { printf "fuzz: %s: %d inputs, %d places covered\n", name, runs, b[1] }' \
     "$work/log"
 }
+seed=${KERF_FUZZ_DAY:-$(($(date -u +%s) / 86400))}
 export -f fuzz
-export build seconds
+export build lists seconds seed
 export UBSAN_OPTIONS=halt_on_error=1:print_stacktrace=1
 
-while read -r name corpus; do
-  if (($# < 2)) || [[ " ${*:2} " == *" $name "* ]]; then echo "$name $corpus"; fi
-done <"$build/tests/fuzz/fuzzers" | nice xargs -P "$(nproc)" -L 1 bash -c 'fuzz "$@"' fuzz || exit 1
+# The lines of the fuzzers that are wanted.
+wanted() {
+  if (($#)); then
+    local name
+    for name; do grep -h "^$name " "$lists/fuzzers" "$lists/importers"; done
+    return
+  fi
+  local importers today
+  mapfile -t importers <"$lists/importers"
+  today=${importers[seed % ${#importers[@]}]}
+  echo "fuzz: today's importer: ${today%% *} (KERF_FUZZ_DAY=$seed repeats its mutations)" >&2
+  cat "$lists/fuzzers"
+  echo "$today"
+}
+
+wanted "${@:2}" | nice xargs -P "$(nproc)" -L 1 bash -c 'fuzz "$@"' fuzz || exit 1

@@ -58,11 +58,11 @@ SceneTool load_shape(const ToolSpec& spec, const ToolSize& size, double voxel_mm
 }
 
 SceneTool load_mesh(const ToolSpec& spec, double pitch_mm, double voxel_mm,
-                    const std::filesystem::path& folder) {
+                    const std::filesystem::path& folder, int cpu_s) {
   const std::filesystem::path path = folder / spec.file;
   ToolMesh mesh;
   try {
-    mesh = join_triangles(read_stl(path), spec.scale, path.string());
+    mesh = join_triangles(read_stl(path, cpu_s), spec.scale, path.string());
   } catch (const SceneError& error) {
     refuse(spec.where, std::string(": ") + error.what());
   }
@@ -112,7 +112,7 @@ TouchedVolumes touched_volumes(const std::vector<SceneVolume>& volumes) {
 }
 
 SceneTool load_tool(const ToolSpec& spec, const TouchedVolumes& touched,
-                    const std::filesystem::path& folder) {
+                    const std::filesystem::path& folder, int cpu_s) {
   ToolSize size = spec.size;
   if (!spec.pitch_given) size.pitch_mm = touched.voxel_mm;
   if (size.pitch_mm > touched.voxel_mm * (1 + 1e-9)) {
@@ -120,7 +120,7 @@ SceneTool load_tool(const ToolSpec& spec, const TouchedVolumes& touched,
                                  number_text(touched.voxel_mm));
   }
   SceneTool tool = spec.shape == kMeshShape
-                       ? load_mesh(spec, size.pitch_mm, touched.voxel_mm, folder)
+                       ? load_mesh(spec, size.pitch_mm, touched.voxel_mm, folder, cpu_s)
                        : load_shape(spec, size, touched.voxel_mm);
   tool.turns = spec.turns;
   check_shaft(spec, tool, touched.voxel_mm);

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "controller/load/loaded_scene.hpp"
+#include "controller/sandbox/sandbox.hpp"
 
 namespace kerf {
 
@@ -19,6 +20,6 @@ struct TouchedVolumes {
 /// The samples of one tool, or its mesh's from a file in `folder`. Throws SceneError where it does
 /// not fit the volumes. Load time.
 [[nodiscard]] SceneTool load_tool(const ToolSpec& spec, const TouchedVolumes& touched,
-                                  const std::filesystem::path& folder);
+                                  const std::filesystem::path& folder, int cpu_s = kReadCpuSeconds);
 
 }  // namespace kerf

@@ -87,16 +87,16 @@ void apply_overrides(const SceneOverrides& overrides, Scene& scene) {
   if (scene.cut_in_one_tick) scene.cut.rate_per_s = scene.servo.rate_hz;
 }
 
-VolumeImage load_image(const VolumeSpec& spec, const std::filesystem::path& folder) {
+VolumeImage load_image(const VolumeSpec& spec, const std::filesystem::path& folder, int cpu_s) {
   if (is_phantom(spec)) {
     return make_phantom({.grid = spec.phantom_size.value_or(PhantomSpec{}.grid)});
   }
   const std::filesystem::path path = folder / spec.file;
-  const SourceVolume source = read_volume(path, {.spacing_mm = spec.spacing_mm});
+  const SourceVolume source = read_volume(path, {.spacing_mm = spec.spacing_mm, .cpu_s = cpu_s});
   const Window window =
       spec.window ? Window{(*spec.window)[0], (*spec.window)[1]} : range_window(source);
   VolumeImage image = apply_window(source, window);
-  read_labels_beside(path, image);
+  read_labels_beside(path, image, cpu_s);
   return image;
 }
 
@@ -158,13 +158,14 @@ void denoise_volume(const VolumeSpec& spec, SceneVolume& volume) {
 
 /// `felt_at`: the iso that the materials' `felt_iso` were written for; none: that of the volume.
 SceneVolume load_volume(const VolumeSpec& spec, const std::filesystem::path& folder,
-                        const std::vector<Material>& materials, std::optional<double> felt_at) {
+                        const std::vector<Material>& materials, std::optional<double> felt_at,
+                        int cpu_s) {
   SceneVolume volume;
   volume.name = spec.name;
   volume.file = spec.file;
   volume.solid = spec.solid;
   try {
-    volume.image = load_image(spec, folder);
+    volume.image = load_image(spec, folder, cpu_s);
     check_labels(volume.image, materials.size());
     volume.iso = spec.iso ? static_cast<Density>(std::lround(*spec.iso * kDensityMax))
                           : otsu_threshold(volume.image);
@@ -252,7 +253,7 @@ LoadedScene load_scene(const std::filesystem::path& path, const SceneOverrides& 
     const bool from_command_line = i == 0 && overrides.volume_file;
     scene.volumes.push_back(
         load_volume(spec.volumes[i], from_command_line ? "" : path.parent_path(), scene.materials,
-                    from_command_line ? written_iso : std::nullopt));
+                    from_command_line ? written_iso : std::nullopt, overrides.read_cpu_s));
   }
   check_felt_materials(scene);
   if (overrides.volume_file) {
@@ -264,7 +265,7 @@ LoadedScene load_scene(const std::filesystem::path& path, const SceneOverrides& 
   const TouchedVolumes touched = touched_volumes(scene.volumes);
   for (const ToolSpec& tool : spec.tools) {
     try {
-      scene.tools.push_back(load_tool(tool, touched, path.parent_path()));
+      scene.tools.push_back(load_tool(tool, touched, path.parent_path(), overrides.read_cpu_s));
       scene.tool_specs.push_back(tool);
       scene.tool_specs.back().size.pitch_mm = scene.tools.back().pitch_mm;
       scene.tool_specs.back().size.radius_mm = scene.tools.back().radius_mm;

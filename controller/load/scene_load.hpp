@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "controller/load/loaded_scene.hpp"
+#include "controller/sandbox/sandbox.hpp"
 
 namespace kerf {
 
@@ -19,6 +20,7 @@ struct SceneOverrides {
   std::optional<Personality> personality{};             ///< --device; torque_scale counts no more
   std::optional<std::array<double, 3>> torque_scale{};  ///< --torque-scale a,b,c
   std::optional<VoxelGrid> phantom_size{};              ///< every phantom, for tests and the lab
+  int read_cpu_s = kReadCpuSeconds;                     ///< --read-seconds, of each file
 };
 
 /// The tool of the default scene, at scale 1; `--volume` makes any other feel like it.

@@ -60,6 +60,10 @@ void declare_scene_options(Arguments& app, ControllerOptions& options, Raw& raw)
   app.option("--window", raw.window, "source values shown as air and as densest")
       .values(2, 2)
       .shown_as("LO,HI");
+  app.option("--read-seconds", options.overrides.read_cpu_s,
+             "CPU time that parsing a volume or a mesh may take")
+      .within(1, kMostReadCpuSeconds)
+      .shows_default();
   app.option("--device", raw.device, "what is held, instead of the scene's")
       .one_of(words_of(kPersonalityWords))
       .shown_as("NAME");

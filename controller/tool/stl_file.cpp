@@ -7,11 +7,14 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdlib>
+#include <cstring>
 #include <fstream>
 #include <iterator>
 #include <limits>
+#include <span>
 #include <system_error>
 
+#include "controller/sandbox/sandbox.hpp"
 #include "controller/scene/scene_text.hpp"
 
 namespace kerf {
@@ -156,7 +159,22 @@ std::vector<LooseTriangle> parse_stl(std::string_view bytes, const std::string& 
   return text_triangles(StlText(bytes, place), place);
 }
 
-std::vector<LooseTriangle> read_stl(const std::filesystem::path& path) {
+namespace {
+
+/// In the sandbox.
+void hand_over_stl(const std::filesystem::path& path, SandboxReader& sandbox) {
+  std::ifstream file(path, std::ios::binary);
+  const std::string bytes{std::istreambuf_iterator<char>(file), {}};
+  if (!file) refuse(path.string(), ": cannot be read; check its permissions");
+  const std::vector<LooseTriangle> triangles = parse_stl(bytes, path.string());
+  const std::uint64_t count = triangles.size();
+  const std::span<std::byte> memory = sandbox.offer(std::as_bytes(std::span(&count, 1)));
+  std::ranges::copy(std::as_bytes(std::span(triangles)), memory.begin());
+}
+
+}  // namespace
+
+std::vector<LooseTriangle> read_stl(const std::filesystem::path& path, int cpu_s) {
   std::error_code fault;
   if (std::filesystem::is_directory(path, fault)) {
     refuse(path.string(), ": is a folder; name an STL file in it");
@@ -169,10 +187,19 @@ std::vector<LooseTriangle> read_stl(const std::filesystem::path& path) {
     refuse(path.string(),
            ": larger than " + std::to_string(kMaxStlBytes >> 20) + " MiB; simplify the mesh");
   }
-  std::ifstream file(path, std::ios::binary);
-  const std::string bytes{std::istreambuf_iterator<char>(file), {}};
-  if (!file) refuse(path.string(), ": cannot be read; check its permissions");
-  return parse_stl(bytes, path.string());
+  std::vector<LooseTriangle> triangles;
+  const SharedBytes memory = read_in_sandbox(
+      {path.string(), "STL", size, cpu_s},
+      [&](SandboxReader& sandbox) { hand_over_stl(path, sandbox); },
+      [&](std::span<const std::byte> header) {
+        std::uint64_t count = 0;
+        if (header.size() == sizeof count) std::memcpy(&count, header.data(), sizeof count);
+        check_count(count, path.string());
+        triangles.resize(count);
+        return count * sizeof(LooseTriangle);
+      });
+  std::ranges::copy(memory.bytes(), std::as_writable_bytes(std::span(triangles)).begin());
+  return triangles;
 }
 
 }  // namespace kerf

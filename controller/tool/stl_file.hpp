@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "controller/sandbox/sandbox.hpp"
 #include "controller/tool/tool_mesh.hpp"
 
 namespace kerf {
@@ -27,7 +28,8 @@ inline constexpr std::uintmax_t kMaxStlBytes = std::uintmax_t{512} * kMaxMeshTri
 [[nodiscard]] std::vector<LooseTriangle> parse_stl(std::string_view bytes,
                                                    const std::string& place);
 
-/// The same of a file of at most kMaxStlBytes.
-[[nodiscard]] std::vector<LooseTriangle> read_stl(const std::filesystem::path& path);
+/// The same of a file of at most kMaxStlBytes, in a sandbox.
+[[nodiscard]] std::vector<LooseTriangle> read_stl(const std::filesystem::path& path,
+                                                  int cpu_s = kReadCpuSeconds);
 
 }  // namespace kerf

@@ -8,8 +8,8 @@
 
 namespace kerf::volume {
 
-/// Keeps what ITK, MetaIO and GDCM print to std::cerr and std::cout while it lives. Load time,
-/// before other threads write there.
+/// Keeps what ITK, MetaIO and GDCM print to std::cerr and std::cout while it lives. In the
+/// sandbox, where nobody else writes there.
 class Quiet {
  public:
   Quiet();

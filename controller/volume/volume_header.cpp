@@ -97,20 +97,32 @@ void check_sizes(const fs::path& path, const std::string& text) {
   }
 }
 
+/// A text of the file as part of a message.
+std::string shown(const std::string& text) {
+  constexpr std::size_t kLongest = 300;
+  std::string plain = text.substr(0, kLongest);
+  const auto control = [](char c) { return static_cast<unsigned char>(c) < ' ' || c == '\x7f'; };
+  std::replace_if(plain.begin(), plain.end(), control, '?');
+  return plain;
+}
+
+/// The most bytes of voxels that a byte of the file can be: raw; as a digit and a blank for each
+/// voxel of at most 8 bytes; by deflate.
+enum class Packing : std::uint64_t { raw = 1, text = 4, deflated = 1032 };
+
 /// Sets where the voxels lie and how many bytes they can be. `offset`: bytes before them.
 void locate_data(VolumeHeader& header, const fs::path& path, const fs::path& data,
-                 std::uint64_t offset, bool compressed) {
+                 std::uint64_t offset, Packing packing) {
   std::error_code error;
   const std::uint64_t size = fs::file_size(data, error);
   if (error) {
-    throw SceneError(path.string() + ": data file " + data.string() + " cannot be read (" +
-                     error.message() + "); put it beside the header or correct the header");
+    throw SceneError(path.string() + ": data file " + shown(data.filename().string()) +
+                     " cannot be read (" + error.message() +
+                     "); put it beside the header or correct the header");
   }
-  // Deflate packs at most 1032 bytes into one.
-  constexpr std::uint64_t kBestDeflate = 1032;
   const std::uint64_t held = size - std::min(size, offset);
-  header.data_file = data.string();
-  header.data_bytes_at_most = compressed ? held * kBestDeflate : held;
+  header.data_file = shown(data.string());
+  header.data_bytes_at_most = held * static_cast<std::uint64_t>(packing);
 }
 
 }  // namespace
@@ -129,7 +141,7 @@ VolumeHeader read_nrrd_header(const fs::path& path) {
   header.has_spacing = spacings.size() >= 3 || directions.size() >= 9;
   if (std::find(spacings.begin(), spacings.end(), 0.0) != spacings.end()) {
     throw SceneError(
-        path.string() + ": spacings: " + text.get("spacings") +
+        path.string() + ": spacings: " + shown(text.get("spacings")) +
         " holds a zero; correct the header, or remove the line and give the spacing in "
         "the scene or with `--spacing`");
   }
@@ -137,10 +149,14 @@ VolumeHeader read_nrrd_header(const fs::path& path) {
   if (data.empty()) data = text.get("datafile");
   const std::string encoding = lower(text.get("encoding"));
   const bool compressed = encoding == "gzip" || encoding == "gz";
+  const bool text_voxels = encoding == "ascii" || encoding == "text" || encoding == "txt";
   const bool several = data.find('%') != std::string::npos || lower(data).rfind("list", 0) == 0;
-  if (several || (encoding != "raw" && !compressed)) return header;  // the reader counts
+  if (several || (encoding != "raw" && !compressed && !text_voxels)) return header;  // ITK counts
   const fs::path file = data.empty() ? path : path.parent_path() / data;
-  locate_data(header, path, file, data.empty() ? text.end : 0, compressed);
+  locate_data(header, path, file, data.empty() ? text.end : 0,
+              compressed    ? Packing::deflated
+              : text_voxels ? Packing::text
+                            : Packing::raw);
   return header;
 }
 
@@ -157,11 +173,13 @@ VolumeHeader read_meta_header(const fs::path& path) {
   VolumeHeader header;
   header.has_spacing = !text.get("elementspacing").empty() || !text.get("elementsize").empty();
   const bool several = data.find('%') != std::string::npos || lower(data).rfind("list", 0) == 0;
+  if (several) return header;  // ITK counts
   const bool ascii = lower(text.get("binarydata")) == "false";
-  if (several || ascii) return header;  // the reader counts
   const bool local = lower(data) == "local";
   locate_data(header, path, local ? path : path.parent_path() / data, local ? text.end : 0,
-              lower(text.get("compresseddata")) == "true");
+              lower(text.get("compresseddata")) == "true" ? Packing::deflated
+              : ascii                                     ? Packing::text
+                                                          : Packing::raw);
   return header;
 }
 

@@ -4,8 +4,10 @@
 #include <array>
 #include <filesystem>
 #include <optional>
-#include <vector>
+#include <span>
 
+#include "controller/sandbox/sandbox.hpp"
+#include "controller/sandbox/shared_bytes.hpp"
 #include "controller/volume/volume_image.hpp"
 
 namespace kerf {
@@ -16,27 +18,32 @@ namespace kerf {
 /// read with its last axis reversed, so the picture is the same and the axes are right-handed.
 struct SourceVolume : VolumeFrame {
   bool has_spacing = true;  ///< false: neither the file nor the options name one; 1 mm stands in
-  std::vector<float> values;
+  std::span<float> values;  ///< in `memory`
   double min = 0, max = 0;
+  SharedBytes memory;
 };
 
 struct ReadOptions {
   std::optional<std::array<double, 3>> spacing_mm;  ///< goes before what the file says
   bool allow_missing_spacing = false;               ///< for a first look; see `has_spacing`
+  int cpu_s = kReadCpuSeconds;                      ///< CPU time that parsing may take
 };
 
 /// Reads NRRD (.nrrd, .nhdr), MetaImage (.mha, .mhd), NIfTI (.nii, .nii.gz), one DICOM file (.dcm)
 /// or the one DICOM series in a folder. Integer and floating types, either byte order.
 ///
+/// Parsed in a sandbox (controller/sandbox/sandbox.hpp), whatever the file does there; what it says
+/// of itself is checked here.
+///
 /// Throws SceneError, one line, for anything that is not a whole, finite, scalar volume of three
 /// axes with right angles between them, of known spacing and within the limits of
-/// volume_limits.hpp (checked before memory is taken). Load time, before other threads write to
-/// std::cout or std::cerr: what the libraries print there meanwhile is swallowed.
+/// volume_limits.hpp (checked before memory is taken). Load time.
 [[nodiscard]] SourceVolume read_volume(const std::filesystem::path& path,
                                        const ReadOptions& options = {});
 
 /// Takes the labels in the file that `write_volume` puts beside a volume, where there is one.
 /// Throws SceneError when it does not fit the image.
-void read_labels_beside(const std::filesystem::path& volume_path, VolumeImage& image);
+void read_labels_beside(const std::filesystem::path& volume_path, VolumeImage& image,
+                        int cpu_s = kReadCpuSeconds);
 
 }  // namespace kerf

@@ -183,8 +183,8 @@ VolumeHeader read_nifti_header(const fs::path& path) {
   }
   walk_data(path, file.get(), h, expected);
   VolumeHeader header;
-  header.has_spacing =
-      std::all_of(h.pixdim.begin(), h.pixdim.end(), [](double edge) { return edge != 0.0; });
+  header.has_spacing = std::all_of(h.pixdim.begin(), h.pixdim.end(),
+                                   [](double edge) { return std::isfinite(edge) && edge != 0.0; });
   return header;
 }
 

@@ -10,6 +10,7 @@
 #include "controller/scene/scene_error.hpp"
 #include "controller/volume/volume_header.hpp"
 #include "controller/volume/volume_limits.hpp"
+#include "shared/text/number.hpp"
 
 namespace kerf::volume {
 
@@ -63,6 +64,33 @@ void set_spacing(const fs::path& path, const ReadOptions& options, bool in_file,
                      "`--spacing x,y,z` (mm)");
   }
   check_spacing(path.string(), volume.spacing_mm);
+}
+
+void set_origin(const fs::path& path, const std::array<double, 3>& origin_mm,
+                SourceVolume& volume) {
+  for (const double o : origin_mm) {
+    if (std::isfinite(o)) continue;
+    throw SceneError(path.string() +
+                     ": its origin is not a number of mm; correct the header, or leave it out");
+  }
+  volume.origin_mm = origin_mm;
+}
+
+std::vector<double> dicom_distances(std::string_view text) {
+  constexpr std::string_view kPadding{" \0", 2};  // to an even length
+  std::vector<double> distances;
+  for (std::size_t next = 0; next != text.npos;) {
+    next = text.find('\\');
+    std::string_view word = text.substr(0, next);
+    if (next != text.npos) text.remove_prefix(next + 1);
+    word.remove_prefix(std::min(word.find_first_not_of(kPadding), word.size()));
+    word = word.substr(0, word.find_last_not_of(kPadding) + 1);
+    if (word.starts_with('+')) word.remove_prefix(1);
+    const auto value = number_in(word);
+    if (!value || !(*value > 0)) return {};
+    distances.push_back(*value);
+  }
+  return distances;
 }
 
 void set_range(const fs::path& path, SourceVolume& volume) {

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <string_view>
 #include <vector>
 
 #include "controller/volume/volume_io.hpp"
@@ -25,6 +26,14 @@ void set_grid(const std::filesystem::path& path, const std::array<std::int64_t, 
 /// Chooses between the file's spacing and the option.
 void set_spacing(const std::filesystem::path& path, const ReadOptions& options, bool in_file,
                  const std::array<double, 3>& from_file, SourceVolume& volume);
+
+/// Refuses a place that is not finite.
+void set_origin(const std::filesystem::path& path, const std::array<double, 3>& origin_mm,
+                SourceVolume& volume);
+
+/// The distances in a DICOM value: decimal numbers, finite and above 0, with backslashes between
+/// (PS3.5 6.2, DS). None where any part is something else.
+[[nodiscard]] std::vector<double> dicom_distances(std::string_view text);
 
 /// Sets `min` and `max` from the values; refuses NaN and infinity.
 void set_range(const std::filesystem::path& path, SourceVolume& volume);

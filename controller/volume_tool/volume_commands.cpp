@@ -3,10 +3,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <exception>
+#include <filesystem>
 #include <ostream>
 #include <sstream>
 #include <string>
 #include <string_view>
+#include <system_error>
 
 #include "controller/scene/scene_error.hpp"
 #include "controller/volume/phantom.hpp"
@@ -67,6 +70,7 @@ VoxelGrid grid_from(const std::string& text) {
 /// What the commands that read a volume have in common.
 struct Source {
   std::string file, spacing, window;
+  int cpu_s = kReadCpuSeconds;
 
   void add_to(Arguments& command, bool with_spacing) {
     command.option("file", file, "volume file, or folder with a DICOM series")
@@ -78,10 +82,14 @@ struct Source {
     }
     command.option("--window", window, "values that become density 0 and 1 (default: all)")
         .shown_as("LO,HI");
+    command.option("--read-seconds", cpu_s, "CPU time that parsing a file may take")
+        .within(1, kMostReadCpuSeconds)
+        .shows_default();
   }
   [[nodiscard]] SourceVolume read(bool allow_missing_spacing = false) const {
     ReadOptions options;
     options.allow_missing_spacing = allow_missing_spacing;
+    options.cpu_s = cpu_s;
     if (!spacing.empty()) options.spacing_mm = spacing_from(spacing);
     return read_volume(file, options);
   }
@@ -91,18 +99,29 @@ struct Source {
   [[nodiscard]] VolumeImage image() const {
     const SourceVolume source = read();
     VolumeImage image = apply_window(source, window_for(source));
-    read_labels_beside(file, image);
+    read_labels_beside(file, image, cpu_s);
     return image;
   }
 };
 
 struct Target {
   std::string file;
-  bool raw = false;
+  bool raw = false, force = false;
 
   void add_to(Arguments& command) {
     command.option("--out", file, "file to write").required().shown_as("OUT.nrrd");
     command.flag("--raw", raw, "write without compression");
+    command.flag("--force", force, "replace the file, and the labels beside it, where it is there");
+  }
+  /// Before the work.
+  void check() const {
+    check_volume_path(file);
+    for (const std::filesystem::path& path : {std::filesystem::path(file), labels_path(file)}) {
+      std::error_code fault;
+      if (force || !exists(symlink_status(path, fault))) continue;
+      throw SceneError(path.string() +
+                       ": is there already; take another name, or --force to replace it");
+    }
   }
   void write(const VolumeImage& image, std::ostream& out) const {
     write_volume(image, file, raw ? VolumeEncoding::raw : VolumeEncoding::gzip);
@@ -151,6 +170,7 @@ struct Commands {
   }
 
   void run(std::ostream& out) const {
+    if (!info.chosen()) target.check();
     if (info.chosen()) {
       const SourceVolume volume = source.read(true);
       const VolumeInfo figures = describe(source.file, volume, source.window_for(volume));

@@ -14,7 +14,8 @@ using namespace kerf::test;
 
 namespace {
 
-SourceVolume source(const std::vector<float>& values) {
+/// Of values that outlive it.
+SourceVolume source(std::vector<float>& values) {
   SourceVolume v;
   v.grid = {static_cast<std::int32_t>(values.size()), 1, 1};
   v.spacing_mm = {0.5, 0.25, 2};
@@ -35,7 +36,8 @@ VolumeImage row(const std::vector<Density>& densities) {
 }  // namespace
 
 TEST_CASE("the window of the range maps the ends to 0 and 65535 and rounds to the nearest") {
-  const SourceVolume v = source({-1000, 0, 1000, 500.01F});
+  std::vector<float> values{-1000, 0, 1000, 500.01F};
+  const SourceVolume v = source(values);
   const Window window = range_window(v);
   CHECK(window.lo == -1000);
   CHECK(window.hi == 1000);
@@ -47,24 +49,27 @@ TEST_CASE("the window of the range maps the ends to 0 and 65535 and rounds to th
 }
 
 TEST_CASE("values outside a window are clamped") {
-  const VolumeImage image = apply_window(source({-3000, 0, 50, 100, 4000}), {0, 100});
+  std::vector<float> values{-3000, 0, 50, 100, 4000};
+  const VolumeImage image = apply_window(source(values), {0, 100});
   CHECK(image.density == std::vector<Density>{0, 0, 32768, 65535, 65535});
 }
 
 TEST_CASE("a window without width is refused, and a uniform file is named as the reason") {
-  const SourceVolume uniform = source({5, 5, 5});
+  std::vector<float> fives{5, 5, 5};
+  const SourceVolume uniform = source(fives);
   CHECK_THROWS_WITH_AS(static_cast<void>(apply_window(uniform, range_window(uniform))),
                        doctest::Contains("nothing to see"), SceneError);
   for (const Window bad :
        {Window{2, 1}, Window{1, 1}, Window{0, std::numeric_limits<double>::infinity()},
         Window{std::numeric_limits<double>::quiet_NaN(), 1}}) {
-    CHECK_THROWS_AS(static_cast<void>(apply_window(source({0, 1}), bad)), SceneError);
+    std::vector<float> values{0, 1};
+    CHECK_THROWS_AS(static_cast<void>(apply_window(source(values), bad)), SceneError);
   }
 }
 
 TEST_CASE("windowing is monotonic and within half a step of the straight line") {
   CHECK(rc::check("window", [] {
-    const auto values = *rc::gen::container<std::vector<float>>(
+    auto values = *rc::gen::container<std::vector<float>>(
         20, rc::gen::map(rc::gen::inRange(-30000, 30000),
                          [](int v) { return 0.1F * static_cast<float>(v); }));
     const SourceVolume v = source(values);

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <functional>
 #include <utility>
 
@@ -56,7 +57,7 @@ TEST_CASE("a turned DICOM series keeps right-handed axes") {
   const SourceVolume v = read_volume(folder.path());
   CHECK(v.spacing_mm[2] == doctest::Approx(3.0));
   CHECK(v.direction == std::array<double, 9>{1, 0, 0, 0, 0, 1, 0, -1, 0});
-  CHECK(v.values == counting<float>());
+  CHECK(std::ranges::equal(v.values, counting<float>()));
 }
 
 TEST_CASE("a DICOM folder that is not one even stack is refused in one line") {
@@ -97,7 +98,7 @@ TEST_CASE("a DICOM folder that is not one even stack is refused in one line") {
     refused("differs");
   }
   SUBCASE("no spacing") {
-    write_series(folder, [](DicomSpec& spec, int) { spec.pixel_spacing.clear(); });
+    write_series(folder, [](DicomSpec& spec, int) { spec.pixel_spacing.reset(); });
     refused("spacing is not in the file");
   }
   SUBCASE("one slice") {
@@ -111,4 +112,49 @@ TEST_CASE("a DICOM folder that is not one even stack is refused in one line") {
     folder.write("image0.dcm", whole.substr(0, whole.size() - 10));
     refused("image0.dcm");
   }
+}
+
+TEST_CASE(
+    "a spacing that is no two distances is not in the file, whatever the library makes of it") {
+  const std::string nul(1, '\0');
+  for (const std::string& text :
+       {std::string(""), std::string("0\\0"), std::string("0.3\\0"), std::string("0\\0.3"),
+        std::string("nan\\nan"), std::string("inf\\inf"), std::string("1e999\\1"),
+        std::string("-0.5\\0.5"), std::string("abc\\def"), std::string("0.5x\\0.5"),
+        std::string("0,3\\0,3"), std::string("0x1\\0x1"), std::string("0.3"), std::string("0.3\\"),
+        std::string("\\0.3"), std::string("0.3\\0.3\\0.3"), "0.3" + nul + "1\\0.3",
+        std::string("0 .3\\0.3")}) {
+    const TempFolder folder;
+    write_series(folder, [&](DicomSpec& spec, int) { spec.pixel_spacing = text; });
+    const std::string message = refusal(folder.path());
+    CAPTURE(text);
+    CAPTURE(message);
+    CHECK(message.find(": spacing is not in the file; add `spacing_mm = [x, y, z]` to the scene "
+                       "or `--spacing x,y,z` (mm)") != std::string::npos);
+    ReadOptions options;
+    options.spacing_mm = {0.25, 0.5, 2};
+    CHECK(read_volume(folder.path(), options).spacing_mm == *options.spacing_mm);
+  }
+  for (const std::string& text : {std::string("0.5\\0.25"), std::string(" 0.5 \\ 0.25"),
+                                  std::string("+5e-1\\2.5E-1"), "0.5\\0.25" + nul}) {
+    const TempFolder folder;
+    write_series(folder, [&](DicomSpec& spec, int) { spec.pixel_spacing = text; });
+    CAPTURE(text);
+    CHECK(read_volume(folder.path()).spacing_mm == std::array<double, 3>{0.25, 0.5, 2});
+  }
+}
+
+TEST_CASE("slices in one file need a distance that the file tells") {
+  const TempFolder folder;
+  DicomSpec spec;
+  spec.frames = 5;
+  spec.values = counting<std::int16_t>();
+  const std::string missing = "spacing is not in the file";
+  CHECK(refusal(folder.write("none.dcm", dicom(spec))).find(missing) != std::string::npos);
+  spec.slice_spacing = "2";  // GDCM does not look there in a plain CT
+  CHECK(refusal(folder.write("two.dcm", dicom(spec))).find(missing) != std::string::npos);
+  spec.slice_spacing = "1";
+  const SourceVolume v = read_volume(folder.write("one.dcm", dicom(spec)));
+  CHECK(v.spacing_mm == std::array<double, 3>{0.25, 0.5, 1});
+  CHECK(std::ranges::equal(v.values, counting<float>()));
 }

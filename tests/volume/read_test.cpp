@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <cmath>
 #include <iostream>
 #include <sstream>
@@ -16,7 +17,7 @@ using Three = std::array<double, 3>;
 
 void check_counting(const SourceVolume& v) {
   CHECK(v.grid == kSmall);
-  CHECK(v.values == counting<float>());
+  CHECK(std::ranges::equal(v.values, counting<float>()));
   CHECK(v.min == 0.0);
   CHECK(v.max == 59.0);
   CHECK(v.spacing_mm == Three{1, 2, 3});

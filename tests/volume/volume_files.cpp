@@ -116,16 +116,19 @@ std::string dicom(const DicomSpec& spec) {
   meta = element(0x0002, 0x0000, "UL", bytes_of(static_cast<std::uint32_t>(meta.size()))) + meta;
   std::string data =
       element(0x0008, 0x0016, "UI", ct) + element(0x0008, 0x0018, "UI", instance) +
-      element(0x0008, 0x0060, "CS", "CT") + element(0x0020, 0x000D, "UI", "1.2.826.0.1.9") +
-      element(0x0020, 0x000E, "UI", spec.series) +
+      element(0x0008, 0x0060, "CS", "CT") +
+      (spec.slice_spacing.empty() ? "" : element(0x0018, 0x0088, "DS", spec.slice_spacing)) +
+      element(0x0020, 0x000D, "UI", "1.2.826.0.1.9") + element(0x0020, 0x000E, "UI", spec.series) +
       element(0x0020, 0x0013, "IS", std::to_string(spec.instance)) +
       element(0x0020, 0x0032, "DS",
               text(spec.position_mm[0]) + "\\" + text(spec.position_mm[1]) + "\\" +
                   text(spec.position_mm[2])) +
       element(0x0020, 0x0037, "DS", spec.orientation) + element(0x0028, 0x0002, "US", u16(1)) +
-      element(0x0028, 0x0004, "CS", "MONOCHROME2") + element(0x0028, 0x0010, "US", u16(spec.rows)) +
+      element(0x0028, 0x0004, "CS", "MONOCHROME2") +
+      (spec.frames == 0 ? "" : element(0x0028, 0x0008, "IS", std::to_string(spec.frames))) +
+      element(0x0028, 0x0010, "US", u16(spec.rows)) +
       element(0x0028, 0x0011, "US", u16(spec.columns));
-  if (!spec.pixel_spacing.empty()) data += element(0x0028, 0x0030, "DS", spec.pixel_spacing);
+  if (spec.pixel_spacing) data += element(0x0028, 0x0030, "DS", *spec.pixel_spacing);
   data += element(0x0028, 0x0100, "US", u16(16)) + element(0x0028, 0x0101, "US", u16(16)) +
           element(0x0028, 0x0102, "US", u16(15)) + element(0x0028, 0x0103, "US", u16(1)) +
           element(0x0028, 0x1052, "DS", text(spec.intercept)) +

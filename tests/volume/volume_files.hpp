@@ -6,6 +6,7 @@
 #include <bit>
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <type_traits>
 #include <vector>
@@ -86,7 +87,9 @@ struct DicomSpec {
   int rows = 4, columns = 3;
   std::array<double, 3> position_mm{0, 0, 0};
   std::string orientation = "1\\0\\0\\0\\1\\0";
-  std::string pixel_spacing = "0.5\\0.25";  ///< between rows, between columns; empty: left out
+  std::optional<std::string> pixel_spacing = "0.5\\0.25";  ///< between rows, between columns
+  std::string slice_spacing;                               ///< empty: left out
+  int frames = 0;                                          ///< of one file; 0: not told
   std::string series = "1.2.826.0.1.3680043.2.1125.1";
   int instance = 1;
   double slope = 1, intercept = 0;

@@ -121,12 +121,15 @@ TEST_CASE("import, crop and resample do what the library does") {
   CHECK(imported.spacing_mm == std::array<double, 3>{2, 2, 2});
   CHECK(imported.min == std::lround(100.0 / 300 * 65535));
 
-  REQUIRE(run({"crop", blob_file(folder), "--out", out, "--guard", "1", "--raw"}).code == 0);
+  REQUIRE(run({"crop", blob_file(folder), "--out", out, "--guard", "1", "--raw", "--force"}).code ==
+          0);
   CHECK(read_volume(out).grid == VoxelGrid{5, 3, 3});
-  REQUIRE(run({"crop", blob_file(folder), "--out", out, "--iso", "0"}).code == 0);
+  REQUIRE(run({"crop", blob_file(folder), "--out", out, "--iso", "0", "--force"}).code == 0);
   CHECK(read_volume(out).grid == VoxelGrid{18, 18, 18});
 
-  REQUIRE(run({"resample", blob_file(folder), "--out", out, "--spacing", "1,1,0.5"}).code == 0);
+  REQUIRE(
+      run({"resample", blob_file(folder), "--out", out, "--spacing", "1,1,0.5", "--force"}).code ==
+      0);
   CHECK(read_volume(out).grid == VoxelGrid{6, 6, 24});
 }
 
@@ -141,10 +144,51 @@ TEST_CASE("the phantom and its labels survive phantom, crop and resample") {
   CHECK(image.density == made.density);
   CHECK(image.labels == made.labels);
   REQUIRE(run({"crop", tooth, "--out", part}).code == 0);
-  REQUIRE(run({"resample", part, "--out", part, "--spacing", "0.25"}).code == 0);
+  REQUIRE(run({"resample", part, "--out", part, "--spacing", "0.25", "--force"}).code == 0);
   VolumeImage fine = apply_window(read_volume(part), {0, kDensityMax});
   read_labels_beside(part, fine);
   CHECK(fine.labels.size() == fine.density.size());
+}
+
+TEST_CASE("a file that is there is replaced where that is asked for, and else stays") {
+  const TempFolder folder;
+  const std::string blob = blob_file(folder);
+  for (const std::vector<std::string>& command : {std::vector<std::string>{"import", blob},
+                                                  {"crop", blob},
+                                                  {"resample", blob, "--spacing", "1"},
+                                                  {"phantom", "--size", "16x16x10"}}) {
+    std::vector<std::string> arguments = command;
+    arguments.insert(arguments.end(), {"--out", ""});
+    const auto refused = [&](const std::string& out, const std::string& place) {
+      arguments.back() = (folder / out).string();
+      const Outcome result = run(arguments);
+      CHECK(result.code == 2);
+      CHECK(result.out.empty());
+      CHECK(result.err == "kerf-volume: " + (folder / place).string() +
+                              ": is there already; take another name, or --force to replace it\n");
+    };
+    folder.write("there.nrrd", "mine");
+    refused("there.nrrd", "there.nrrd");
+    CHECK(read_bytes(folder / "there.nrrd") == "mine");
+    const auto labels = folder.write("new-labels.nrrd", "mine");
+    refused("new.nrrd", "new-labels.nrrd");
+    CHECK(read_bytes(labels) == "mine");
+    std::filesystem::remove(labels);
+    arguments.back() = (folder / "there.nrrd").string();
+    arguments.emplace_back("--force");
+    CHECK(run(arguments).code == 0);
+    CHECK(read_bytes(folder / "there.nrrd").starts_with("NRRD0004"));
+    std::filesystem::remove(folder / "there-labels.nrrd");
+  }
+}
+
+TEST_CASE("the time to read has both ends of its range") {
+  const TempFolder folder;
+  const std::string blob = blob_file(folder);
+  CHECK(run({"info", blob, "--read-seconds", "1"}).code == 0);
+  CHECK(run({"info", blob, "--read-seconds", "86400"}).code == 0);
+  CHECK(run({"info", blob, "--read-seconds", "0"}).code == 2);
+  CHECK(run({"info", blob, "--read-seconds", "86401"}).code == 2);
 }
 
 TEST_CASE("bad input is one line on the error stream and exit code 2") {
