@@ -88,7 +88,8 @@ Outcome run_faults(const Subject& subject, const FaultScript& script) {
   Emulator emulator = make_emulator(subject, script.seed);
   FaultyDevice device(emulator, script);
   DirectPort port(device);
-  const std::unique_ptr<DeviceDriver> driver = make_driver(scene.device.personality, port);
+  const std::unique_ptr<DeviceDriver> driver =
+      make_driver(scene.device.personality, port, scene.device.encoder_sign);
   std::atomic<bool> stop{false};
   LoopSignals signals{stop};
   Watchdog watchdog(*driver, signals);
