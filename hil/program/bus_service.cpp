@@ -4,6 +4,7 @@
 #include <ostream>
 #include <utility>
 
+#include "hil/front/firewire/firewire_host_node.hpp"
 #include "hil/front/firewire/firewire_node.hpp"
 #include "hil/front/fuse/fuse_mount.hpp"
 #include "hil/front/uhid/uhid_arm.hpp"
@@ -14,11 +15,10 @@
 namespace kerf {
 namespace {
 
-/// Serves `node` as `mount`/`name`; `cycles()` since the start.
+/// Serves `node` as `mount`/`name`, and what else is in `folder`; `cycles()` since the start.
 template <class Node, class Cycles>
-void serve_node(const BusService& service, const std::string& mount, const char* device,
-                const std::string& name, Node& node, Cycles cycles) {
-  FuseMount folder(mount);
+void serve_node(const BusService& service, FuseMount& folder, const std::string& mount,
+                const char* device, const std::string& name, Node& node, Cycles cycles) {
   folder.add(name, node);
   service.out << "kerf-emulator: " << device << " at " << mount << '/' << name << std::endl;
   folder.serve([&] { return service.goes_on(cycles(), node.left()); });
@@ -29,7 +29,11 @@ void serve_node(const BusService& service, const std::string& mount, const char*
 
 void serve_fuse(const BusService& service, const std::string& mount, const FirewireSettings& omni) {
   FirewireNode node(omni, service.device);
-  serve_node(service, mount, "omni", "fw1", node, [&] { return node.bus().cycle() - kFirstCycle; });
+  FirewireHostNode host(node);
+  FuseMount folder(mount);
+  folder.add("fw0", host);
+  serve_node(service, folder, mount, "omni", "fw1", node,
+             [&] { return node.bus().cycle() - kFirstCycle; });
   service.stats.sent = node.bus().stats().reports;
   service.stats.dropped = node.bus().stats().unheard;
 }
@@ -37,7 +41,9 @@ void serve_fuse(const BusService& service, const std::string& mount, const Firew
 void serve_fuse(const BusService& service, const std::string& mount,
                 const FtdiFalcon::Settings& falcon, std::vector<ScriptedUsbFault> script) {
   UsbfsNode node(falcon, std::move(script), service.device);
-  serve_node(service, mount, "falcon", "usb", node, [&] { return node.chip().time().cycle(); });
+  FuseMount folder(mount);
+  serve_node(service, folder, mount, "falcon", "usb", node,
+             [&] { return node.chip().time().cycle(); });
   service.stats.sent = node.chip().reports();
   service.stats.dropped = node.chip().lost();
 }
@@ -45,7 +51,8 @@ void serve_fuse(const BusService& service, const std::string& mount,
 void serve_fuse(const BusService& service, const std::string& mount,
                 const WoodenHid::Settings& wooden) {
   HidrawNode node(wooden, service.device);
-  serve_node(service, mount, "woodenhaptics", "hidraw0", node,
+  FuseMount folder(mount);
+  serve_node(service, folder, mount, "woodenhaptics", "hidraw0", node,
              [&] { return node.arm().time().cycle(); });
   service.stats.sent = node.arm().reports();
   service.stats.dropped = node.lost();
