@@ -4,6 +4,7 @@
 #include <cerrno>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <string>
 #include <vector>
 
@@ -97,7 +98,8 @@ TEST_CASE("nifalcon: who gives the interface up has no reads left that another h
   const Node leaving(falcon.path()), coming(falcon.path());
   unsigned interface = 0;
   std::vector<std::uint8_t> buffer(64);
-  usbdevfs_urb read{};
+  usbdevfs_urb read;
+  std::memset(&read, 0, sizeof read);  // it ends in an array without a size
   read.type = USBDEVFS_URB_TYPE_BULK;
   read.endpoint = kerf::falcon::kEndpointIn;
   read.buffer = buffer.data();
