@@ -228,5 +228,36 @@ expect 'and what is missing' says '^warn  /dev/fw1 .*Permission denied'
 expect 'with its cure' says '^ *the cure'
 expect 'an unknown option of the doctor is refused' kerf_gives 2 doctor --fast
 
+# A machine without QEMU, and tests that a stand-in runs in a tree of their own.
+mkdir -p "$lab/no-qemu" "$lab/tools" "$lab/tree/.ci" "$lab/tree/build/release"
+ln -s /usr/bin/* "$lab/no-qemu"
+rm -f "$lab"/no-qemu/{qemu-system-x86_64,busybox}
+cp "$root/kerf" "$lab/tree"
+printf '#!/bin/sh\n' | tee "$lab/tools/ninja" >"$lab/tree/.ci/packages.sh"
+printf '#!/bin/sh\nmkdir -p build/release/Testing/Temporary\necho "$GUEST" >build/release/Testing/Temporary/LastTest.log\nexit $CTEST\n' \
+  >"$lab/tools/ctest"
+chmod +x "$lab"/tools/* "$lab/tree/.ci/packages.sh"
+touch "$lab/tree/build/release/configured.log"
+# tests_give CODE GUEST CTEST: the exit code of `kerf test` where the test in a guest printed GUEST and
+# ctest ended with CTEST.
+tests_give() {
+  local code=0
+  PATH=$lab/tools:$PATH GUEST=$2 CTEST=$3 "$lab/tree/kerf" test >"$lab/said" 2>&1 || code=$?
+  [[ $code == "$1" ]]
+}
+ends_with() { [[ $(tail -n 1 "$lab/said") == "$1" ]]; }
+lack=$(PATH=$lab/no-qemu "$root/hil/guest/guest.sh" lacks) || true
+expect 'a guest needs QEMU, and one command installs it' \
+  test "$lack" == 'guest: no qemu-system-x86_64 busybox; .ci/packages.sh guest installs what lacks'
+expect 'the doctor' with PATH="$lab/no-qemu" kerf_gives 0 doctor
+expect 'says what lacks' says '^warn  QEMU  *no qemu-system-x86_64 busybox$'
+expect 'and the command' says '.ci/packages.sh guest installs what lacks$'
+expect 'tests end' tests_give 0 "$lack" 0
+expect 'with the same words' ends_with "kerf: test: hil_guest was skipped: ${lack#guest: }"
+expect 'failed ones too' tests_give 1 "$lack" 8
+expect 'with the same words' ends_with "kerf: test: hil_guest was skipped: ${lack#guest: }"
+expect 'with a guest' tests_give 0 '[doctest] Status: SUCCESS!' 0
+expect 'nothing is said' ends_with ''
+
 echo "check-kerf: $checks checks, $failures failed"
 ((failures == 0))

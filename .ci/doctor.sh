@@ -65,12 +65,11 @@ else
   row warn FUSE 'no access to /dev/fuse' 'device nodes cannot be emulated; the socket port can'
 fi
 
-lacking=$("$root/.ci/packages.sh" --missing guest | paste -sd ' ') || true
-if [[ -z $lacking ]] && command -v qemu-system-x86_64 >/dev/null; then
+if lack=$("$root/hil/guest/guest.sh" lacks); then
   row ok QEMU "$(qemu-system-x86_64 --version | sed -n '1s/.*version \([0-9.]*\).*/\1/p')"
 else
-  row warn QEMU "no ${lacking:-qemu-system-x86}" \
-    'the test in a guest is skipped; .ci/packages.sh guest installs them'
+  lack=${lack#guest: }
+  row warn QEMU "${lack%%; *}" "hil_guest is skipped; ${lack#*; }"
 fi
 
 libraries=$(dpkg-query -W -f '${Package} ${Version}\n' libusb-1.0-0-dev libhidapi-dev \

@@ -101,6 +101,7 @@ struct DeviceSettings {
   std::array<double, 3> offset_mm{0, 0, 0};
   std::optional<std::array<double, 3>> torque_scale;  ///< none: the motors stay off
   std::array<double, 3> dock_rad{0.0, 0.23, -0.37};
+  std::optional<std::array<double, 3>> encoder_sign;  ///< 1 or -1 each; none: 1
 };
 
 /// [force]

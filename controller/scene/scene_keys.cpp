@@ -47,6 +47,7 @@ constexpr SceneCondition kSpindle{
     "cut.model", "preston", true,
     " turns nothing: only cut.model = \"preston\" has a spindle; leave it out"};
 constexpr SceneCondition kOmni{"device.personality", "omni"};
+constexpr SceneCondition kWooden{"device.personality", "woodenhaptics"};
 constexpr SceneCondition kPhantom{"volume.file", kPhantomFile, true,
                                   " only shapes the phantom; leave it out, a file has its own"};
 constexpr SceneCondition kNoPhantom{"volume.file", kPhantomFile, false,
@@ -147,6 +148,9 @@ constexpr SceneKey kKeys[] = {
      {}, {.default_text = "the motors stay off"}},
     {"device.dock_rad", "rad", at<&DeviceSettings::dock_rad>, between(-3.15, 3.15),
      "joint angles in the inkwell", kOmni, {.json = InJson::always}},
+    {"device.encoder_sign", "", at<&DeviceSettings::encoder_sign>, between(-1, 1),
+     "1 or -1 at each joint: which way its encoder counts, which differs between the makers' branches (docs/devices.md)",
+     kWooden, {.default_text = "[1, 1, 1]"}},
 
     {"force.model", "", at<&ForceSettings::model>, one_of(kForceModelWords),
      "proxy: swept contact of the surface, coupled to the hand; paper: sum of gradients"},

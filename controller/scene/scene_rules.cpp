@@ -115,6 +115,12 @@ Material& material_named(const SceneTable& table, const std::string& name,
 
 void finish_device(const SceneTable& table, Scene& scene) {
   scene.offset_given = table.has("offset_mm");
+  for (const double sign : scene.device.encoder_sign.value_or(std::array{1.0, 1.0, 1.0})) {
+    if (std::abs(sign) == 1) continue;
+    refuse(
+        table.place("encoder_sign"),
+        " is not 1 or -1 at each joint; ./kerf controller --probe shows which (docs/devices.md)");
+  }
   if (!scene.device.torque_scale) return;
   for (const double scale : *scene.device.torque_scale) {
     if (std::abs(scale) >= kMinTorqueScale) continue;

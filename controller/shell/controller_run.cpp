@@ -177,7 +177,8 @@ int run_controller(const ControllerOptions& options) {
     if (stop) return 1;  // asked to end before there was a device: nothing to tell
     throw;
   }
-  const std::unique_ptr<DeviceDriver> driver = make_driver(scene.device.personality, *port);
+  const std::unique_ptr<DeviceDriver> driver =
+      make_driver(scene.device.personality, *port, scene.device.encoder_sign);
   DeviceDriver& device = *driver;
   device.start();
   if (!options.virtual_time) {

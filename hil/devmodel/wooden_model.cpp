@@ -22,9 +22,10 @@ WoodenModel::WoodenModel(const WoodenParams& params)
 
 std::array<double, 6> WoodenModel::turned_counts() const noexcept {
   const JointVec<double> q = plant_.encoder_rad();
-  return {q.x / wooden::kRadPerCount[0],
-          q.y / wooden::kRadPerCount[1],
-          q.z / wooden::kRadPerCount[2],
+  const auto& sign = params_.encoder_sign;
+  return {sign[0] * q.x / wooden::kRadPerCount[0],
+          sign[1] * q.y / wooden::kRadPerCount[1],
+          sign[2] * q.z / wooden::kRadPerCount[2],
           0,
           0,
           0};
@@ -41,7 +42,8 @@ void WoodenModel::command(const WoodenCommand& command) noexcept {
   streaming_ = true;
   const auto torque = [&](std::size_t i) {
     constexpr int kMax = wooden::kAmplifierMilliamps;
-    return std::clamp<int>(command.milliamps[i], -kMax, kMax) * params_.torque_nmm_per_count[i];
+    return std::clamp<int>(command.milliamps[i], -kMax, kMax) * params_.encoder_sign[i] *
+           params_.torque_nmm_per_count[i];
   };
   if (!command.set_encoders) {
     plant_.motors().command({torque(0), torque(1), torque(2)});

@@ -25,6 +25,9 @@ struct WoodenParams : PlantParams {
   }
   /// What the firmware counts in the rest pose after power-up: anything, until the host sets it.
   std::array<int, 6> power_up_count{310, -220, 140, 0, 0, 0};
+  /// -1: this encoder counts, and this motor turns, the other way, as in some of the makers'
+  /// branches.
+  std::array<int, 3> encoder_sign{1, 1, 1};
   std::size_t packet_bytes = wooden::kPacketBytes;  ///< or kLongPacketBytes
   bool wireless_button = false;                     ///< shows the hand's first button on encoder d
 };

@@ -4,35 +4,50 @@
 # our programs (docs/devices.md tells what that shows). Needs no root.
 #     hil/guest/guest.sh image PROGRAMS FOLDER   makes the image in FOLDER of the programs in PROGRAMS
 #     hil/guest/guest.sh boot FOLDER LOG         runs it; what it prints is LOG
+#     hil/guest/guest.sh lacks                   says what this machine lacks for that
 # FOLDER keeps the kernel, which is Debian's newest when it is first needed. Exit code 77 and one line
 # where something is missing.
 set -euo pipefail
 here=$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")
-modules=(vhci-hcd hid-generic uhid)
-programs=(controller emulator recorder record)
+modules=(fuse vhci-hcd hid-generic uhid)
+programs=(kerf-controller kerf-emulator kerf-recorder kerf-record test_hil_clients)
 
 lack() {
   echo "guest: $*"
   exit 77
 }
 
-need() {
-  command -v "$1" >/dev/null || lack "no $1; .ci/packages.sh guest installs it"
+# What `./kerf test` and `./kerf doctor` say, too.
+check_packages() {
+  local name missing=()
+  for name in qemu-system-x86_64 busybox; do
+    command -v "$name" >/dev/null || missing+=("$name")
+  done
+  if ((${#missing[@]})); then lack "no ${missing[*]}; .ci/packages.sh guest installs what lacks"; fi
 }
 
-# fetch_kernel FOLDER: the kernel and the modules of its USB and HID stacks; never installed.
+# complete KERNEL: it is there with all of the modules.
+complete() {
+  local name
+  for name in "${modules[@]}"; do
+    [[ -n $(find "$1/lib/modules" -name "$name.ko" -print -quit 2>/dev/null) ]] || return 1
+  done
+}
+
+# fetch_kernel FOLDER: the kernel and the modules of its FUSE, USB and HID stacks; never installed.
 fetch_kernel() {
   local package part=$1.part
-  if [[ -e $1 ]]; then return; fi
+  if complete "$1"; then return; fi
   package=$(apt-cache depends linux-image-amd64 2>/dev/null |
     sed -n 's/^ *Depends: \(linux-image-[0-9].*\)/\1/p') || true
   [[ -n $package ]] || lack "apt knows no linux-image-amd64; apt-get update, on Debian for amd64"
-  rm -rf "$part"
+  rm -rf "$1" "$part"
   mkdir -p "$part"
   (cd "$part" && apt-get -q download "$package") >"$part/log" 2>&1 ||
     lack "$package cannot be downloaded ($(tail -n 1 "$part/log"))"
   dpkg-deb --fsys-tarfile "$part/$package"_*.deb | tar -xf - -C "$part" --wildcards \
-    './boot/vmlinuz-*' './lib/modules/*/kernel/drivers/usb/*' './lib/modules/*/kernel/drivers/hid/*'
+    './boot/vmlinuz-*' './lib/modules/*/kernel/drivers/usb/*' './lib/modules/*/kernel/drivers/hid/*' \
+    './lib/modules/*/kernel/fs/fuse/*'
   rm "$part/$package"_*.deb
   busybox depmod -b "$part" "${package#linux-image-}"
   mv "$part" "$1"
@@ -40,7 +55,7 @@ fetch_kernel() {
 
 # add_programs BIN ROOT: ours and busybox, and the libraries that ours load.
 add_programs() {
-  local ours=("${programs[@]/#/$1/kerf-}") path
+  local ours=("${programs[@]/#/$1/}") path
   cp "${ours[@]}" "$(command -v busybox)" "$2/bin/"
   ldd "${ours[@]}" | sed -n 's|.*[ \t]\(/[^ ]*\) (0x.*|\1|p' | sort -u | while read -r path; do
     mkdir -p "$2${path%/*}"
@@ -63,8 +78,7 @@ add_modules() {
 
 make_image() {
   local root=$2/root
-  need qemu-system-x86_64
-  need busybox
+  check_packages
   mkdir -p "$2"
   fetch_kernel "$2/kernel"
   rm -rf "$root"
@@ -95,8 +109,9 @@ nokaslr norandmaps random.trust_cpu=1 tsc=reliable lpj=1000000 cryptomgr.notests
 case "${1:-}/$#" in
   image/3) make_image "${@:2}" ;;
   boot/3) boot "${@:2}" ;;
+  lacks/1) check_packages ;;
   *)
-    echo "guest: ${1:-nothing}: say image PROGRAMS FOLDER, or boot FOLDER LOG" >&2
+    echo "guest: ${1:-nothing}: say image PROGRAMS FOLDER, boot FOLDER LOG, or lacks" >&2
     exit 2
     ;;
 esac

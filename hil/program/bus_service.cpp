@@ -5,6 +5,7 @@
 #include <ostream>
 #include <utility>
 
+#include "hil/front/firewire/firewire_host_node.hpp"
 #include "hil/front/firewire/firewire_node.hpp"
 #include "hil/front/fuse/fuse_mount.hpp"
 #include "hil/front/uhid/uhid_arm.hpp"
@@ -29,11 +30,10 @@ class Unused {
   std::int64_t since_ns_ = monotonic_ns();
 };
 
-/// Serves `node` as `mount`/`name`; `cycles()` since the start.
+/// Serves `node` as `mount`/`name`, and what else is in `folder`; `cycles()` since the start.
 template <class Node, class Cycles>
-void serve_node(BusService& service, const std::string& mount, const char* device,
-                const std::string& name, Node& node, Cycles cycles) {
-  FuseMount folder(mount);
+void serve_node(BusService& service, FuseMount& folder, const std::string& mount,
+                const char* device, const std::string& name, Node& node, Cycles cycles) {
   folder.add(name, node);
   service.out << "kerf-emulator: " << device << " at " << mount << '/' << name << std::endl;
   Unused unused;
@@ -48,7 +48,11 @@ void serve_node(BusService& service, const std::string& mount, const char* devic
 
 void serve_fuse(BusService& service, const std::string& mount, const FirewireSettings& omni) {
   FirewireNode node(omni, service.device);
-  serve_node(service, mount, "omni", "fw1", node, [&] { return node.bus().cycle() - kFirstCycle; });
+  FirewireHostNode host(node);
+  FuseMount folder(mount);
+  folder.add("fw0", host);
+  serve_node(service, folder, mount, "omni", "fw1", node,
+             [&] { return node.bus().cycle() - kFirstCycle; });
   service.stats.sent = node.bus().stats().reports;
   service.stats.dropped = node.bus().stats().unheard;
 }
@@ -56,14 +60,17 @@ void serve_fuse(BusService& service, const std::string& mount, const FirewireSet
 void serve_fuse(BusService& service, const std::string& mount, const FtdiFalcon::Settings& falcon,
                 std::vector<ScriptedUsbFault> script) {
   UsbfsNode node(falcon, std::move(script), service.device);
-  serve_node(service, mount, "falcon", "usb", node, [&] { return node.chip().time().cycle(); });
+  FuseMount folder(mount);
+  serve_node(service, folder, mount, "falcon", "usb", node,
+             [&] { return node.chip().time().cycle(); });
   service.stats.sent = node.chip().reports();
   service.stats.dropped = node.chip().lost();
 }
 
 void serve_fuse(BusService& service, const std::string& mount, const WoodenHid::Settings& wooden) {
   HidrawNode node(wooden, service.device);
-  serve_node(service, mount, "woodenhaptics", "hidraw0", node,
+  FuseMount folder(mount);
+  serve_node(service, folder, mount, "woodenhaptics", "hidraw0", node,
              [&] { return node.arm().time().cycle(); });
   service.stats.sent = node.arm().reports();
   service.stats.dropped = node.lost();

@@ -204,8 +204,9 @@ void check(EmulatorOptions& o) {
 }
 
 void declare_bus(Arguments& app, BusOptions& o) {
-  app.option("--mount", o.mount,
-             "front fuse: folder in which the node appears: fw1, usb or hidraw0");
+  app.option(
+      "--mount", o.mount,
+      "front fuse: folder in which the node appears: fw1 (beside the host's, fw0), usb or hidraw0");
   app.option("--packet-hz", o.packet_hz, "front fuse: packets of the omni, 8000 or 1000")
       .one_of({"8000", "1000"})
       .shows_default();

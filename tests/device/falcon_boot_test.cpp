@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <deque>
 #include <numeric>
+#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
@@ -115,4 +116,41 @@ TEST_CASE("falcon boot: what goes wrong is told in one line with its place") {
                        std::runtime_error);
   CHECK_THROWS_WITH_AS(static_cast<void>(kerf::read_firmware("/dev/null")),
                        doctest::Contains("is empty"), std::runtime_error);
+}
+
+TEST_CASE("falcon boot: the loader answers each greeting, and starts anew only when it is called") {
+  kerf::FalconBootLoader loader(false);
+  std::deque<std::uint8_t> line;
+  const auto say = [&](std::span<const std::uint8_t> bytes) {
+    line.clear();
+    for (const std::uint8_t byte : bytes) loader.take(byte, line);
+    return line.size();
+  };
+  const auto call = [&](std::uint16_t divisor) {
+    loader.set_divisor(divisor);
+    loader.set_dtr(false);
+    loader.set_dtr(true);
+  };
+  CHECK(say(kerf::falcon::kBootHello) == 0);  // asleep
+  call(kerf::falcon::kBootDivisor);
+  CHECK(say(kerf::falcon::kBootHello) == 5);  // the first with a leading zero
+  CHECK(say(kerf::falcon::kBootHello) == 4);
+  CHECK(say(std::span(kerf::falcon::kBootHello).first(2)) == 0);
+  CHECK(say(std::span(kerf::falcon::kBootHello).last(1)) == 4);  // in two pieces
+  CHECK(say(kerf::falcon::kUploadBegin) == 0);                   // not at this rate
+  loader.set_dtr(false);
+  loader.set_divisor(kerf::falcon::kUploadDivisor);
+  CHECK(say(kerf::falcon::kBootHello) == 0);  // nor this one
+  CHECK(say(kerf::falcon::kUploadBegin) == 1);
+  loader.set_divisor(kerf::falcon::kRunDivisor);
+  CHECK_FALSE(loader.running());  // no firmware came
+  CHECK(say(firmware()) == 1000);
+  loader.set_divisor(kerf::falcon::kRunDivisor);
+  CHECK(loader.running());
+
+  call(kerf::falcon::kRunDivisor);  // as a plain open of the line does
+  CHECK(loader.running());
+  call(kerf::falcon::kBootDivisor);
+  CHECK_FALSE(loader.running());
+  CHECK(say(kerf::falcon::kBootHello) == 5);
 }

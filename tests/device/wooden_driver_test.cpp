@@ -110,6 +110,28 @@ TEST_CASE("wooden: the button in use parks, and keeps the encoders as they are")
   CHECK(released.homed);
 }
 
+TEST_CASE("wooden: an encoder of the other sign is turned with its motor and its home") {
+  FakePort port;
+  kerf::WoodenDriver driver(port, {1, -1, -1});
+  press(port, driver, {30, -40, 50});
+  const std::array<std::int16_t, 6> home{0, 0, -6000, 0, 0, 0};
+  CHECK(last_sent(port).set_encoders == home);
+  push(port, {0, 0, -6000});
+  CHECK(driver.read().homed);
+  push(port, {400, 1000, -32768});
+  const std::array<std::int16_t, 3> joints{400, -1000, -32768};  // wraps
+  CHECK(driver.read().encoder == joints);
+  driver.command(forcing());
+  const std::array<std::int16_t, 3> currents{500, 500, 0};
+  CHECK(last_sent(port).milliamps == currents);
+  // In use its counts are kept as they came.
+  push(port, {400, 1000, -5000}, true);
+  static_cast<void>(driver.read());
+  driver.command({});
+  const std::array<std::int16_t, 6> as_they_are{400, 1000, -5000, 0, 0, 0};
+  CHECK(last_sent(port).set_encoders == as_they_are);
+}
+
 TEST_CASE("wooden: near home the button calibrates again") {
   FakePort port;
   kerf::WoodenDriver driver(port);

@@ -246,6 +246,16 @@ TEST_CASE("a value out of range is reported with its line and the range") {
                "scenes/x.toml:5: tool.size_vox = 0 is out of range"));
   CHECK(begins(error_with("size_vox = 16", "radius_mm = -1"),
                "scenes/x.toml:5: tool.radius_mm = -1 is out of range"));
+  const std::string wooden = "[device]\npersonality = \"woodenhaptics\"\n";
+  for (const char* list : {"[1, 0.5, 1]", "[1, 0, 1]"}) {
+    CHECK(begins(error_after(wooden + "encoder_sign = " + list + "\n"),
+                 std::string("scenes/x.toml:8: device.encoder_sign = ") + list +
+                     " is not 1 or -1 at each joint"));
+  }
+  CHECK(begins(error_after(wooden + "encoder_sign = [1, 2, 1]\n"),
+               "scenes/x.toml:8: device.encoder_sign = [1, 2, 1] is out of range; use -1 to 1"));
+  CHECK(begins(error_after("[device]\nencoder_sign = [1, 1, -1]\n"),
+               "scenes/x.toml:7: device.encoder_sign"));  // an Omni has none
   CHECK(begins(error_after("[device]\ntorque_scale = [0.3, 0.3, 0]\n"),
                "scenes/x.toml:7: device.torque_scale = [0.3, 0.3, 0] is below 0.001"));
 }

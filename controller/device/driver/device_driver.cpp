@@ -56,12 +56,17 @@ bool DeviceDriver::release_for_good() noexcept {
   return port_.send_last(std::span(packet).first(size));
 }
 
-std::unique_ptr<DeviceDriver> make_driver(Personality personality, PacketPort& port) {
+std::unique_ptr<DeviceDriver> make_driver(
+    Personality personality, PacketPort& port,
+    const std::optional<std::array<double, 3>>& encoder_sign) {
   switch (personality) {
     case Personality::falcon:
       return std::make_unique<FalconDriver>(port);
-    case Personality::woodenhaptics:
-      return std::make_unique<WoodenDriver>(port);
+    case Personality::woodenhaptics: {
+      const auto sign = encoder_sign.value_or(std::array{1.0, 1.0, 1.0});
+      return std::make_unique<WoodenDriver>(
+          port, std::array{sign[0] < 0 ? -1 : 1, sign[1] < 0 ? -1 : 1, sign[2] < 0 ? -1 : 1});
+    }
     case Personality::omni:
       break;
   }

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 
 #include "controller/device/port/packet_port.hpp"
@@ -77,7 +78,10 @@ class DeviceDriver {
   std::uint64_t refused_ = 0;
 };
 
-/// The driver of a device; `port` outlives it.
-[[nodiscard]] std::unique_ptr<DeviceDriver> make_driver(Personality personality, PacketPort& port);
+/// The driver of a device; `port` outlives it. `encoder_sign` is a WoodenHaptics'
+/// (wooden_driver.hpp).
+[[nodiscard]] std::unique_ptr<DeviceDriver> make_driver(
+    Personality personality, PacketPort& port,
+    const std::optional<std::array<double, 3>>& encoder_sign = {});
 
 }  // namespace kerf

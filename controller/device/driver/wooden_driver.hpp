@@ -17,7 +17,11 @@ namespace kerf {
 /// pose.
 class WoodenDriver final : public DeviceDriver {
  public:
-  using DeviceDriver::DeviceDriver;
+  /// `encoder_sign`: 1 or -1 at each joint. Where it is -1, what the device counts falls as the
+  /// joint turns in the sense of wooden_constants.hpp, and its motor turns the other way, too: the
+  /// makers' branches differ so. Counts in reports and of motors are in the joints' sense.
+  explicit WoodenDriver(PacketPort& port, std::array<int, 3> encoder_sign = {1, 1, 1}) noexcept
+      : DeviceDriver(port), sign_(encoder_sign) {}
 
   void start() noexcept override { static_cast<void>(release()); }
 
@@ -27,9 +31,15 @@ class WoodenDriver final : public DeviceDriver {
   [[nodiscard]] std::size_t compose(const ServoOutput& output, Packet& packet) noexcept override;
   [[nodiscard]] std::size_t compose_release(Packet& packet) const noexcept override;
 
+  using Counts = std::array<std::int16_t, 3>;
+  /// From the device's sense to the joints', and back.
+  [[nodiscard]] Counts turned(const Counts& counts) const noexcept;
+
+  std::array<int, 3> sign_;
   std::size_t packet_bytes_ = wooden::kPacketBytes;  ///< then as long as the device's own
   bool button_ = false;                              ///< of the newest report
-  std::array<std::int16_t, 6> counts_{};
+  std::array<std::int16_t, 6> counts_{};             ///< as they came
+  Counts joints_{};                                  ///< of a, b, c in the joints' sense
   bool set_sent_ = false;  ///< encoders were set to home since the button was pressed
   bool homed_ = false;
   bool at_home_ = false;  ///< has not left the pose since

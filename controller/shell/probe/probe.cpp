@@ -63,6 +63,11 @@ void add_lacks_of_device(const DeviceSettings& device, const ProbeView::Seen& se
   } else if (!seen.calibrated) {
     lacks_deed(": not calibrated", Waiting::parked);
   }
+  if (device.personality == Personality::woodenhaptics && !device.encoder_sign) {
+    lacks.push_back({name + ": device.encoder_sign is not set; the makers' branches differ in it",
+                     "push the tip to the right, up, towards you: x, y, z must rise, else turn a "
+                     "sign: docs/devices.md"});
+  }
   if (!device.torque_scale) {
     lacks.push_back({name + ": device.torque_scale is not set, so its motors will stay off",
                      "measure it: docs/devices.md"});
@@ -201,7 +206,7 @@ int run_probe(const ControllerOptions& options) {
   const DeviceSettings device = device_of(options);
   std::atomic<bool>& stop = catch_stop_and_pause_signals();
   const auto port = open_or_explain(options, device.personality, rate_hz, stop);
-  const auto driver = make_driver(device.personality, *port);
+  const auto driver = make_driver(device.personality, *port, device.encoder_sign);
   driver->start();
   static_cast<void>(become_real_time(options.real_time));  // what lacks is told at the end
 

@@ -105,6 +105,7 @@ void FirewireBus::reset(BusFault kind) {
     const std::uint64_t bit = foreign_channels_ & std::uint64_t{1} << channel;
     if (bit != 0) static_cast<void>(resources_.allocate(bit, 0));
   }
+  listener_.generation_is_new();
   listener_.bus_was_reset(kind == BusFault::device_reset ? kRomCycles : 0);
 }
 
@@ -112,6 +113,7 @@ void FirewireBus::vanish() {
   if (!present_) return;
   present_ = false;
   const std::uint32_t generation = ++generation_;
+  listener_.generation_is_new();
   later(kGoneCycles, [this, generation] {
     if (present_ || generation_ != generation) return;
     listed_ = false;

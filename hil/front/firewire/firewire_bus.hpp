@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <cerrno>
 #include <cstdint>
 #include <functional>
 #include <limits>
@@ -13,40 +12,10 @@
 #include "hil/devmodel/packet_device.hpp"
 #include "hil/front/firewire/bus_clock.hpp"
 #include "hil/front/firewire/iso_context.hpp"
+#include "hil/front/firewire/iso_resources.hpp"
 #include "hil/front/firewire/omni_registers.hpp"
 
 namespace kerf {
-
-/// What the isochronous resource manager of a bus gives away: 64 channels and the bandwidth of a
-/// cycle.
-class IsoResources {
- public:
-  static constexpr std::int32_t kBandwidth = 4915;  ///< units of 20.3 ns: 100 us of the 125
-
-  /// Takes the lowest free channel of `channels` (bit 0 = channel 0) and `bandwidth` units. Returns
-  /// the channel, or -EBUSY where either is not left. `channels` of 0 asks for bandwidth alone, and
-  /// gets channel 0.
-  [[nodiscard]] std::int32_t allocate(std::uint64_t channels, std::int32_t bandwidth) noexcept {
-    std::int32_t channel = 0;
-    while (channels != 0 && channel < 64 && (channels & free_ & bit(channel)) == 0) ++channel;
-    if (channel == 64 || bandwidth > bandwidth_) return -EBUSY;
-    if (channels != 0) free_ &= ~bit(channel);
-    bandwidth_ -= bandwidth;
-    return channel;
-  }
-  /// Gives back what `allocate` gave for the same `channels` and `bandwidth`.
-  void free(std::uint64_t channels, std::int32_t channel, std::int32_t bandwidth) noexcept {
-    if (channels != 0) free_ |= bit(channel);
-    bandwidth_ += bandwidth;
-  }
-
- private:
-  static constexpr std::uint64_t bit(std::int32_t channel) noexcept {
-    return std::uint64_t{1} << channel;
-  }
-  std::uint64_t free_ = ~std::uint64_t{0};
-  std::int32_t bandwidth_ = kBandwidth;
-};
 
 /// What will happen in a later bus cycle: answers on their way, time-outs, scripted faults. Things
 /// of one cycle happen in the order in which they were entered.
@@ -114,7 +83,9 @@ class FirewireBus {
   class Listener {
    public:
     virtual ~Listener() = default;
-    /// The generation is new; resources are to be claimed again now, clients to be told
+    /// The generation is new, which the host's own node tells at once.
+    virtual void generation_is_new() = 0;
+    /// After that: resources are to be claimed again now, the device's clients to be told
     /// `event_delay` cycles later.
     virtual void bus_was_reset(std::int64_t event_delay) = 0;
     /// The channel that a foreign node should take in a reset; -1 for none.

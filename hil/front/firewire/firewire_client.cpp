@@ -5,6 +5,7 @@
 #include <cerrno>
 #include <ctime>
 
+#include "hil/front/firewire/host_registers.hpp"
 #include "hil/front/fuse/caller_memory.hpp"
 #include "hil/front/fuse/fuse_channel.hpp"
 
@@ -12,8 +13,6 @@ namespace kerf {
 namespace {
 
 constexpr unsigned kLargestNumber = 0x18;
-constexpr std::uint32_t kNodeId = 0xFFC0;
-constexpr std::uint32_t kLocalNodeId = 0xFFC1;
 
 }  // namespace
 
@@ -79,9 +78,9 @@ fw_cdev_event_bus_reset FirewireClient::bus_reset_event() const noexcept {
   fw_cdev_event_bus_reset event{};
   event.closure = reset_closure_;
   event.type = FW_CDEV_EVENT_BUS_RESET;
-  event.node_id = kNodeId;
-  event.local_node_id = kLocalNodeId;
-  event.bm_node_id = event.irm_node_id = event.root_node_id = kLocalNodeId;
+  event.node_id = node_;
+  event.local_node_id = kHostNodeId;
+  event.bm_node_id = event.irm_node_id = event.root_node_id = kHostNodeId;
   event.generation = bus_.generation();
   return event;
 }
@@ -95,7 +94,8 @@ int FirewireClient::get_info(const FuseIoctl& call) {
   linked_ = true;
   version_ = info.version;
   reset_closure_ = info.bus_reset_closure;
-  const std::vector<std::uint32_t> rom = bus_.registers().config_rom();
+  const std::vector<std::uint32_t> rom =
+      node_ == kHostNodeId ? host_config_rom() : bus_.registers().config_rom();
   const auto rom_bytes = static_cast<std::uint32_t>(rom.size() * sizeof rom[0]);
   if (info.rom != 0) {
     const std::span<const std::uint8_t> all(reinterpret_cast<const std::uint8_t*>(rom.data()),

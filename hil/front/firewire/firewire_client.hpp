@@ -27,8 +27,9 @@ namespace kerf {
 /// generation.
 class FirewireClient : public std::enable_shared_from_this<FirewireClient> {
  public:
-  explicit FirewireClient(FirewireBus& bus)
-      : bus_(bus), next_handle_(bus.settings().abi_version > 5 ? 1 : 0) {}
+  /// `node`: whose file it is, kOmniNodeId or kHostNodeId.
+  FirewireClient(FirewireBus& bus, std::uint32_t node)
+      : bus_(bus), node_(node), next_handle_(bus.settings().abi_version > 5 ? 1 : 0) {}
   ~FirewireClient();
   FirewireClient(const FirewireClient&) = delete;
   FirewireClient& operator=(const FirewireClient&) = delete;
@@ -45,6 +46,7 @@ class FirewireClient : public std::enable_shared_from_this<FirewireClient> {
   void tell_bus_reset();
   /// The lowest isochronous channel that it holds; -1 for none.
   [[nodiscard]] std::int32_t lowest_channel() const noexcept;
+  [[nodiscard]] std::uint32_t node() const noexcept { return node_; }
   /// From now on everything is ENODEV.
   void shut_down() noexcept { gone_ = true; }
   [[nodiscard]] bool gone() const noexcept { return gone_; }
@@ -75,6 +77,8 @@ class FirewireClient : public std::enable_shared_from_this<FirewireClient> {
   void respond(std::uint64_t closure, std::uint32_t rcode, std::span<const std::uint8_t> data = {});
   void execute(std::uint32_t tcode, std::uint64_t offset, std::uint32_t generation,
                std::uint64_t closure, std::vector<std::uint8_t> data);
+  void ask_device(std::uint32_t tcode, std::uint64_t offset, std::uint64_t closure,
+                  std::vector<std::uint8_t> data);
   void try_allocation(std::uint32_t handle);
   void tell_resource(std::uint32_t type, std::uint32_t handle, const Resource& resource,
                      std::int32_t channel, std::int32_t bandwidth);
@@ -90,6 +94,7 @@ class FirewireClient : public std::enable_shared_from_this<FirewireClient> {
   static constexpr int kDeviceSpeed = SCODE_400;
 
   FirewireBus& bus_;
+  std::uint32_t node_;
   EventQueue events_;
   std::optional<IsoContext> context_;
   std::map<std::uint32_t, Resource> resources_;

@@ -10,6 +10,7 @@
 #include <linux/firewire-cdev.h>
 
 #include "hil/front/firewire/firewire_client.hpp"
+#include "hil/front/firewire/host_registers.hpp"
 #include "hil/front/fuse/caller_memory.hpp"
 
 namespace kerf {
@@ -71,6 +72,16 @@ int FirewireClient::send_request(const FuseIoctl& call) {
 void FirewireClient::execute(std::uint32_t tcode, std::uint64_t offset, std::uint32_t generation,
                              std::uint64_t closure, std::vector<std::uint8_t> data) {
   if (generation != bus_.generation()) return respond(closure, RCODE_GENERATION);
+  if (node_ == kOmniNodeId) return ask_device(tcode, offset, closure, std::move(data));
+  const BusClock::Instant now = bus_.clock().at(monotonic_ns());
+  std::vector<std::uint8_t> answer;
+  const std::uint32_t rcode =
+      ask_host(tcode, offset, data, cycle_timer(now.cycle, now.ticks), bus_.resources(), answer);
+  respond(closure, rcode, answer);
+}
+
+void FirewireClient::ask_device(std::uint32_t tcode, std::uint64_t offset, std::uint64_t closure,
+                                std::vector<std::uint8_t> data) {
   if (!bus_.present()) return respond(closure, RCODE_NO_ACK);
   OmniRegisters& registers = bus_.registers();
   switch (tcode) {

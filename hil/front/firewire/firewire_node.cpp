@@ -8,8 +8,8 @@
 
 namespace kerf {
 
-void FirewireNode::open(FuseOpen open) {
-  opens_[open].client = std::make_shared<FirewireClient>(bus_);
+void FirewireNode::add(FuseOpen open, std::uint32_t node) {
+  opens_[open].client = std::make_shared<FirewireClient>(bus_, node);
 }
 
 void FirewireNode::release(FuseOpen open) {
@@ -117,13 +117,13 @@ void FirewireNode::deliver() {
 
 void FirewireNode::bus_was_reset(std::int64_t event_delay) {
   for (auto& [id, open] : opens_) open.client->reclaim_resources();
-  const auto tell = [this] {
-    for (auto& [id, open] : opens_) open.client->tell_bus_reset();
-  };
-  if (event_delay == 0) {
-    tell();
-  } else {
-    bus_.later(event_delay, tell);
+  if (event_delay == 0) return tell_bus_reset(kOmniNodeId);
+  bus_.later(event_delay, [this] { tell_bus_reset(kOmniNodeId); });
+}
+
+void FirewireNode::tell_bus_reset(std::uint32_t node) {
+  for (auto& [id, open] : opens_) {
+    if (open.client->node() == node) open.client->tell_bus_reset();
   }
 }
 
@@ -137,7 +137,9 @@ std::int32_t FirewireNode::channel_in_use() const {
 }
 
 void FirewireNode::device_is_gone() {
-  for (auto& [id, open] : opens_) open.client->shut_down();
+  for (auto& [id, open] : opens_) {
+    if (open.client->node() == kOmniNodeId) open.client->shut_down();
+  }
 }
 
 }  // namespace kerf

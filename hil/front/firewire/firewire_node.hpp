@@ -26,7 +26,9 @@ class FirewireNode final : public FuseNode, private FirewireBus::Listener {
       : bus_(settings, device, *this) {}
 
   [[nodiscard]] bool present() const noexcept override { return bus_.listed(); }
-  void open(FuseOpen open) override;
+  void open(FuseOpen open) override { add(open, kOmniNodeId); }
+  /// An open of the host's own node on this bus (firewire_host_node.hpp).
+  void open_host(FuseOpen open) { add(open, kHostNodeId); }
   void release(FuseOpen open) override;
   std::optional<FuseAnswer> read(FuseOpen open, FuseRequest request, std::uint64_t offset,
                                  std::size_t size) override;
@@ -57,10 +59,13 @@ class FirewireNode final : public FuseNode, private FirewireBus::Listener {
     bool announced = false;  ///< pollers know of the events that wait
   };
 
+  void generation_is_new() override { tell_bus_reset(kHostNodeId); }
   void bus_was_reset(std::int64_t event_delay) override;
   [[nodiscard]] std::int32_t channel_in_use() const override;
   void device_is_gone() override;
 
+  void add(FuseOpen open, std::uint32_t node);
+  void tell_bus_reset(std::uint32_t node);
   void sleep_on(Open& open);
   [[nodiscard]] FuseAnswer take(Open& open, std::size_t size);
   void deliver();

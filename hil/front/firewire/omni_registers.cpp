@@ -1,15 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "hil/front/firewire/omni_registers.hpp"
 
+#include <array>
 #include <cstddef>
 
 #include <linux/firewire-constants.h>
+
+#include "hil/front/firewire/config_rom.hpp"
 
 namespace kerf {
 namespace {
 
 constexpr std::uint32_t kVendor = 0x000B99;
-constexpr std::uint64_t kRomBegin = 0xFFFF'F000'0400;
 
 constexpr std::uint64_t kListenChannel = 0x1000;
 constexpr std::uint64_t kTransmitChannel = 0x1001;
@@ -20,40 +22,13 @@ constexpr std::uint64_t kMode20010 = 0x20010;
 constexpr std::uint64_t kGuidHigh = 0x1006'000C;
 constexpr std::uint64_t kGuidLow = 0x1006'0010;
 
-/// CRC-16 of IEEE 1212 over whole quadlets.
-std::uint32_t crc16(std::span<const std::uint32_t> quadlets) noexcept {
-  std::uint32_t crc = 0;
-  for (const std::uint32_t data : quadlets) {
-    for (int shift = 28; shift >= 0; shift -= 4) {
-      const std::uint32_t sum = (crc >> 12 ^ data >> shift) & 0xF;
-      crc = (crc << 4 ^ sum << 12 ^ sum << 5 ^ sum) & 0xFFFF;
-    }
-  }
-  return crc;
-}
-
-void put_quadlet(std::span<std::uint8_t> out, std::uint32_t value) noexcept {
-  for (std::size_t i = 0; i < 4; ++i) out[i] = static_cast<std::uint8_t>(value >> (24 - 8 * i));
-}
-
 }  // namespace
 
 std::vector<std::uint32_t> OmniRegisters::config_rom() const {
-  constexpr std::uint32_t kInfoQuadlets = 4;
-  constexpr std::uint32_t kDirectoryQuadlets = 2;
-  std::vector<std::uint32_t> rom{
-      0,
-      0x3133'3934,     // "1394"
-      0x0064'6002,     // no bus master, 512-byte blocks, S400
-      kVendor << 8,    // GUID
-      packed_serial_,  //
-      0,               // root directory:
-      0x0300'0000 | kVendor,
-      0x1700'0000,  // model 0: the ROM does not tell an Omni from its siblings
-  };
-  rom[0] = kInfoQuadlets << 24 | kInfoQuadlets << 16 | crc16(std::span(rom).subspan(1, 4));
-  rom[5] = kDirectoryQuadlets << 16 | crc16(std::span(rom).subspan(6));
-  return rom;
+  constexpr std::uint32_t kAbilities = 0x0064'6002;  // no bus master, 512-byte blocks, S400
+  // Model 0: the ROM does not tell an Omni from its siblings.
+  constexpr std::array<std::uint32_t, 2> kDirectory{0x0300'0000 | kVendor, 0x1700'0000};
+  return make_rom(kAbilities, kVendor << 8, packed_serial_, kDirectory);
 }
 
 std::uint32_t OmniRegisters::read(std::uint64_t offset, std::span<std::uint8_t> data) const {
@@ -83,10 +58,7 @@ std::uint32_t OmniRegisters::read(std::uint64_t offset, std::span<std::uint8_t> 
     default:
       break;
   }
-  const std::vector<std::uint32_t> rom = config_rom();
-  const std::uint64_t in_rom = offset - kRomBegin;
-  if (in_rom >= rom.size() * 4 || in_rom % 4 != 0) return RCODE_ADDRESS_ERROR;
-  return quadlet(rom[in_rom / 4]);
+  return read_rom(config_rom(), offset, data);
 }
 
 std::uint32_t OmniRegisters::write(std::uint64_t offset, std::span<const std::uint8_t> data) {

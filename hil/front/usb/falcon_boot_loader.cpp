@@ -11,7 +11,8 @@ void FalconBootLoader::set_divisor(std::uint16_t divisor) noexcept {
 }
 
 void FalconBootLoader::set_dtr(bool high) noexcept {
-  if (high && !dtr_ && !running()) {
+  const bool listens = !running() || divisor_ == falcon::kBootDivisor;
+  if (high && !dtr_ && listens) {
     state_ = State::greeting;
     greeted_ = 0;
     stored_ = 0;
@@ -25,24 +26,32 @@ void FalconBootLoader::take(std::uint8_t byte, std::deque<std::uint8_t>& line) {
     case State::running:
       return;
     case State::greeting:
-      if (divisor_ != falcon::kBootDivisor || byte != falcon::kBootHello[greeted_]) {
-        greeted_ = 0;
+    case State::waiting:
+      if (state_ == State::waiting && divisor_ == falcon::kUploadDivisor && !dtr_ &&
+          byte == falcon::kUploadBegin[0]) {
+        state_ = State::loading;
+        line.push_back(byte);
         return;
       }
-      if (++greeted_ < falcon::kBootHello.size()) return;
-      state_ = State::waiting;
-      line.push_back(0);  // some units begin with a zero: hosts have to bear it
-      line.insert(line.end(), falcon::kBootHelloReply.begin(), falcon::kBootHelloReply.end());
-      return;
-    case State::waiting:
-      if (divisor_ != falcon::kUploadDivisor || dtr_ || byte != falcon::kUploadBegin[0]) return;
-      state_ = State::loading;
-      line.push_back(byte);
-      return;
+      return hear_greeting(byte, line);
     case State::loading:
       line.push_back(stored_++ == wrong_echo_at_ ? static_cast<std::uint8_t>(byte ^ 1) : byte);
       return;
   }
+}
+
+/// Answered as often as it comes: hosts say it again where a read that was under way took the
+/// answer.
+void FalconBootLoader::hear_greeting(std::uint8_t byte, std::deque<std::uint8_t>& line) {
+  if (divisor_ != falcon::kBootDivisor || byte != falcon::kBootHello[greeted_]) {
+    greeted_ = 0;
+    return;
+  }
+  if (++greeted_ < falcon::kBootHello.size()) return;
+  greeted_ = 0;
+  if (state_ == State::greeting) line.push_back(0);  // some units begin so: hosts have to bear it
+  line.insert(line.end(), falcon::kBootHelloReply.begin(), falcon::kBootHelloReply.end());
+  state_ = State::waiting;
 }
 
 }  // namespace kerf

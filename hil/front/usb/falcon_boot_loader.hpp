@@ -22,13 +22,16 @@ class FalconBootLoader {
   [[nodiscard]] std::int64_t stored() const noexcept { return stored_; }
 
   void set_divisor(std::uint16_t divisor) noexcept;
-  /// A rising edge begins the greeting anew.
+  /// A rising edge begins the greeting anew; of a processor that runs its firmware, only at the
+  /// boot loader's baud rate: hosts load firmware without asking whether it is there.
   void set_dtr(bool high) noexcept;
   /// A byte of the host; answers go to `line`.
   void take(std::uint8_t byte, std::deque<std::uint8_t>& line);
 
  private:
   enum class State : std::uint8_t { asleep, greeting, waiting, loading, running };
+
+  void hear_greeting(std::uint8_t byte, std::deque<std::uint8_t>& line);
 
   State state_;
   std::int64_t wrong_echo_at_;

@@ -123,6 +123,7 @@ int UsbfsNode::claim(FuseOpen id, const FuseIoctl& call) {
 int UsbfsNode::give_up_interface(FuseOpen id) {
   if (claimed_by_ != id) return -EINVAL;
   claimed_by_.reset();
+  end_transfers(opens_.at(id), -ENOENT);
   return 0;
 }
 
@@ -167,12 +168,7 @@ void UsbfsNode::plugged(bool in) {
   for (auto& [id, open] : opens_) {
     open.gone = true;
     open.announced = false;
-    for (std::deque<Urb>* const urbs : {&open.reads, &open.writes}) {
-      for (; !urbs->empty(); urbs->pop_front()) {
-        urbs->front().data.clear();
-        finish(open, std::move(urbs->front()), -ESHUTDOWN);
-      }
-    }
+    end_transfers(open, -ESHUTDOWN);
   }
 }
 

@@ -81,6 +81,8 @@ class UsbfsNode final : public FuseNode, private UsbHost {
   int connect_info(const FuseIoctl& call);
 
   static void finish(Open& open, Urb urb, int status);
+  /// All that are under way.
+  static void end_transfers(Open& open, int status);
   [[nodiscard]] std::optional<std::size_t> room() override;
   void complete_read(int status, std::span<const std::uint8_t> bytes) override;
   void plugged(bool in) override;

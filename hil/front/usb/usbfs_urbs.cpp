@@ -117,6 +117,15 @@ int UsbfsNode::discard(Open& open, std::uint64_t address) {
   return -EINVAL;
 }
 
+void UsbfsNode::end_transfers(Open& open, int status) {
+  for (std::deque<Urb>* const urbs : {&open.reads, &open.writes}) {
+    for (; !urbs->empty(); urbs->pop_front()) {
+      urbs->front().data.clear();
+      finish(open, std::move(urbs->front()), status);
+    }
+  }
+}
+
 UsbfsNode::Open* UsbfsNode::reader() {
   for (auto& [id, open] : opens_) {
     if (!open.reads.empty()) return &open;

@@ -76,6 +76,28 @@ TEST_CASE("hid: from the calibration button to a force, with short and with long
   }
 }
 
+TEST_CASE("hid: an arm that counts the other way is felt where it is told, and else not at all") {
+  // As in the makers' first branches. Down at the home pose is the forearm's joint alone: told
+  // wrongly it goes up, and nothing is ever touched.
+  for (const bool told : {true, false}) {
+    CAPTURE(told);
+    MountedArm arm({}, kerf::test::touching_hand(), {-1, 1, -1});
+    {
+      HidPort port(arm.path(), 0, kGoOn);
+      kerf::LoadedScene scene = kerf::test::half_space_scene();
+      if (told) scene.device.encoder_sign = std::array{-1.0, 1.0, -1.0};
+      ServoSession session(Personality::woodenhaptics, port, std::move(scene));
+      const auto course =
+          session.run(told ? 8000 : 2500, [](const auto& c) { return c.contact > 300; });
+      CHECK((course.contact > 300) == told);
+      CHECK(course.faults == 0);
+    }
+    arm.stop();
+    CHECK(arm.emulator().model().calibration() == kerf::Calibration::done);
+    CHECK((arm.emulator().stats().peak_motor_force_n > 0.01) == told);
+  }
+}
+
 TEST_CASE("hid: no read, no write, no read of nothing, no loss of the arm allocates in the servo") {
   std::atomic<bool> read_all{false};
   const MountedArm arm({.script = {{0, UsbFault::vanish, &read_all}}});

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <functional>
 #include <memory>
@@ -94,8 +95,9 @@ class MountedFalcon {
 class MountedArm {
  public:
   explicit MountedArm(WoodenHid::Settings settings = {},
-                      const std::optional<HandScript>& hand = touching_hand())
-      : emulator_(std::make_unique<WoodenModel>(params_of(settings)), hand),
+                      const std::optional<HandScript>& hand = touching_hand(),
+                      std::array<int, 3> encoder_sign = {1, 1, 1})
+      : emulator_(std::make_unique<WoodenModel>(params_of(settings, encoder_sign)), hand),
         served_("hidraw0", become_device, with_cycles(std::move(settings)), emulator_) {}
 
   void stop() { served_.stop(); }
@@ -104,8 +106,10 @@ class MountedArm {
   [[nodiscard]] const Emulator& emulator() const noexcept { return emulator_; }
 
  private:
-  static WoodenParams params_of(const WoodenHid::Settings& settings) {
+  static WoodenParams params_of(const WoodenHid::Settings& settings,
+                                std::array<int, 3> encoder_sign) {
     WoodenParams params;
+    params.encoder_sign = encoder_sign;
     params.packet_bytes = settings.packet_bytes;
     return params;
   }
@@ -123,7 +127,8 @@ class MountedArm {
 class ServoSession {
  public:
   ServoSession(Personality personality, PacketPort& port, LoadedScene scene = half_space_scene())
-      : scene_(std::move(scene)), driver_(make_driver(personality, port)) {
+      : scene_(std::move(scene)),
+        driver_(make_driver(personality, port, scene_.device.encoder_sign)) {
     scene_.device.personality = personality;
     scene_.device.torque_scale = std::array{0.3, 0.3, 0.3};
     servo_ = compile(scene_);

@@ -136,3 +136,32 @@ TEST_CASE("guest: the hand feels the tooth, and the motors give what the control
     CHECK(pushed);
   }
 }
+
+TEST_CASE(
+    "guest: a host that asks as libnifalcon does loads firmware at once, with a read under way") {
+  const auto said = [](const char* words) { return first_run().only(words); };
+  CHECK(said("nifalcon client exit") == "0");
+  CHECK(said("nifalcon before") == "0");
+  CHECK(said("nifalcon reads") == "1");
+  CHECK(said("nifalcon load") == "ok");
+  CHECK(said("nifalcon after") == "1");
+  CHECK(said("nifalcon exchanges") == "500");
+  CHECK(said("nifalcon closes with a read") == "1");
+  CHECK(said("nifalcon again") == "1");
+  CHECK(said("nifalcon emulator exit") == "0");
+}
+
+TEST_CASE(
+    "guest: a host that asks as libraw1394 does finds the card and shares the bus by swapping") {
+  const auto said = [](const char* words) { return first_run().only(words); };
+  CHECK(said("raw1394 client exit") == "0");
+  CHECK(said("raw1394 local") == "/fw0");
+  CHECK(said("raw1394 nodes") == "2");
+  CHECK(said("raw1394 bus manager") == "1");
+  CHECK(said("raw1394 takes") == "1 1");
+  CHECK(said("raw1394 again takes") == "0");  // it has it
+  CHECK(said("raw1394 left") == "4000 7fffffff");
+  CHECK(said("raw1394 resets") == "1");
+  CHECK(said("raw1394 after reset left") == "4915 ffffffff");
+  CHECK(said("raw1394 emulator exit") == "0");
+}
