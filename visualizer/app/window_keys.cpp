@@ -2,7 +2,6 @@
 #include "visualizer/app/window_keys.hpp"
 
 #include <array>
-#include <chrono>
 #include <cstdio>
 #include <filesystem>
 #include <stdexcept>
@@ -40,18 +39,17 @@ Notice write_for_user(const std::string& what, const Write& write) {
 
 }  // namespace
 
-using Clock = std::chrono::steady_clock;
-
-void change_look(Picture& picture, const Session& session, const Look& look, Notices& notices) {
+void change_look(Picture& picture, const Session& session, const Look& look, Notices& notices,
+                 Notices::Clock::time_point now) {
   try {
     picture.set_look(session, look);
   } catch (const VisualizerError& problem) {
-    notices.say({problem.what(), true}, Clock::now());
+    notices.say({problem.what(), true}, now);
   }
 }
 
 bool WindowKeys::apply(const WindowInput& input, Session& session, Picture& picture, double aspect,
-                       Notices& notices) {
+                       Notices& notices, Notices::Clock::time_point now) {
   bool quit = input.close;
   Look look = picture.look();
   const std::vector<VolumeView>& volumes = session.scene().volumes;
@@ -75,7 +73,7 @@ bool WindowKeys::apply(const WindowInput& input, Session& session, Picture& pict
     }
     if (key == 'b') {
       one = (one + 1) % (volumes.size() + 1);
-      notices.say({"v: " + (one > 0 ? volumes[one - 1].name : "all volumes")}, Clock::now());
+      notices.say({"v: " + (one > 0 ? volumes[one - 1].name : "all volumes")}, now);
     }
     if (key == 'c') look.clip.on = !look.clip.on;
     if (key == 't') look.stereo.on = !look.stereo.on;
@@ -84,7 +82,7 @@ bool WindowKeys::apply(const WindowInput& input, Session& session, Picture& pict
       session.select_tool(static_cast<std::uint32_t>(tool));
     }
   }
-  change_look(picture, session, look, notices);
+  change_look(picture, session, look, notices, now);
   return quit;
 }
 

@@ -15,7 +15,8 @@ namespace kerf {
 
 /// Gives the picture another look. Where its renderer cannot show these volumes, the picture keeps
 /// its look and a notice says why.
-void change_look(Picture& picture, const Session& session, const Look& look, Notices& notices);
+void change_look(Picture& picture, const Session& session, const Look& look, Notices& notices,
+                 Notices::Clock::time_point now);
 
 /// What the keys of a window have switched, and what they have asked for. Who does what was asked
 /// sets it back to false.
@@ -32,7 +33,7 @@ struct WindowKeys {
   /// Takes the keys of `input`: the camera and the look of `picture`, and the tool, follow at once.
   /// True when the user wants to leave.
   bool apply(const WindowInput& input, Session& session, Picture& picture, double aspect,
-             Notices& notices);
+             Notices& notices, Notices::Clock::time_point now);
 };
 
 // What keys of the window write: each says where it went, or why it did not. A full disk must not
