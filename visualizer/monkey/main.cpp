@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <cstdint>
 #include <cstdio>
+#include <cstdlib>
 #include <exception>
 #include <filesystem>
 #include <iostream>
 #include <string>
+#include <utility>
 
 #include <unistd.h>
 
@@ -39,13 +42,21 @@ struct Place {
   ~Place() { fs::remove_all(path); }
 };
 
+std::string g_gl_fault;  ///< the first one since it was looked at
+
+/// One event of the monkey; what GL finds wrong with it is as bad as a wrong picture.
+void act(Monkey& monkey) {
+  monkey.act();
+  if (!g_gl_fault.empty()) throw kerf::VisualizerError(std::exchange(g_gl_fault, {}));
+}
+
 /// True where all went well; else says what did not, and writes both pictures.
 bool play(const kerf::GlContext& context, std::uint32_t seed, const fs::path& files,
           const MonkeyOptions& options, Monkey::Count& count) {
   Monkey monkey(context, seed, files);
   try {
     while (monkey.count().events < options.events) {
-      monkey.act();
+      act(monkey);
       if (options.trace) std::fprintf(stderr, "%s\n", monkey.event().c_str());
     }
     count += monkey.count();
@@ -67,6 +78,7 @@ bool play(const kerf::GlContext& context, std::uint32_t seed, const fs::path& fi
 
 int run(const MonkeyOptions& options) {
   const Place place;
+  kerf::report_gl_faults([](const std::string& text) { g_gl_fault = "OpenGL: " + text; });
   const auto context = kerf::make_headless_context();
   const kerf::Stopwatch watch;
   Monkey::Count count;

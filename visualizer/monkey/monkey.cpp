@@ -237,15 +237,15 @@ void Monkey::compare() {
   expected_ = drawn_anew();
   const std::string differs = difference_of(shown_, expected_);
   if (differs.empty()) return;
+  // Whether what was kept is wrong, or the renderers hold something else than the volumes.
   const MonkeyPicture wrong = shown_;
   run_->picture().redraw_all();
   frame({});
-  const bool right = shown_.rgb == expected_.rgb;
+  const bool kept = shown_.rgb == expected_.rgb;
   shown_ = wrong;
-  throw VisualizerError(
-      look_text(run_->picture().look()) + " at " + size_text(size_) +
-      " shows another picture than one drawn anew: " + differs +
-      (right ? "; drawn again all of it is right" : "; drawn again it stays wrong"));
+  throw VisualizerError(look_text(run_->picture().look()) + " at " + size_text(size_) +
+                        " shows another picture than one drawn anew: " + differs + "; all of it " +
+                        (kept ? "drawn again is right" : "drawn again stays wrong"));
 }
 
 MonkeyPicture Monkey::drawn_anew() {
@@ -261,6 +261,7 @@ MonkeyPicture Monkey::drawn_anew() {
     no_panels.hidden = true;
     static_cast<void>(picture.draw(session, no_panels, target));
   }
+  glUseProgram(0);  // panels put back what was in use, and that has gone
   run_->picture().draw_panels(target);
   return {size_, target.read_rgb()};
 }

@@ -14,6 +14,7 @@ constexpr const char* kMaterials = R"(
   "materials": [{"name": "none", "iso": 0, "colour": [0, 0, 0]},
                 {"name": "dentin", "iso": 0.3, "colour": [0.8, 0.7, 0.5]},
                 {"name": "enamel", "iso": 0.7, "colour": [0.9, 0.9, 0.85]}])";
+constexpr std::uint32_t kIso = 25'000;
 constexpr double kVoxelMm = 0.5;
 constexpr std::uint64_t kMonkeyTickNs = 1'000'000;
 
@@ -58,7 +59,7 @@ MonkeyController::MonkeyController(const std::string& name, Dice& dice)
     shown.spacing_mm = {kVoxelMm, kVoxelMm, dice.once_in(3) ? 2.0 * kVoxelMm : kVoxelMm};
     for (double& at : shown.origin_mm) at = dice.between(-12.0, -4.0);
     if (dice.once_in(2)) shown.orientation = {0.0F, 0.0F, 0.3826834F, 0.9238795F};
-    shown.iso = 25'000;
+    shown.iso = kIso;
     shown.density = volume.density;
     if (dice.once_in(3)) {
       volume.labels.resize(volume.density.size());
@@ -76,7 +77,7 @@ MonkeyController::MonkeyController(const std::string& name, Dice& dice)
   if (!dice.once_in(4)) move(dice);  // else: no tick yet
 }
 
-/// Bars and gaps, with a slope in density at their sides.
+/// Bars with a slope, and gaps that are the greater half.
 void MonkeyController::fill(Volume& volume, Dice& dice) {
   const int period = 4 + dice.below(14);
   const int axis = dice.below(3);
@@ -84,10 +85,8 @@ void MonkeyController::fill(Volume& volume, Dice& dice) {
   volume.density.assign(volume.grid.voxel_count(), 0);
   for_each_voxel(volume.grid.box(), [&](int x, int y, int z) {
     const int along = axis == 0 ? x : axis == 1 ? y : z;
-    const int at = along % period;
-    const int share = std::clamp(2 * at - period / 2, 0, 4);
-    volume.density[volume.grid.index(x, y, z)] = static_cast<Density>(
-        std::min(share * full / 4, static_cast<int>(std::lround(kDensityMax))));
+    const int step = std::clamp(2 * (along % period) - period, 0, 4);
+    volume.density[volume.grid.index(x, y, z)] = static_cast<Density>(step * full / 4);
   });
 }
 
@@ -97,18 +96,22 @@ VoxelBox MonkeyController::any_box(const VoxelGrid& grid, Dice& dice) const {
   return VoxelBox{at, {at.x + edge, at.y + edge, at.z + edge}}.clipped(grid.box());
 }
 
+/// Air stays the greater part of what is below any iso in a volume without labels: translucent
+/// renderers take the median of that for air when they are made, and draw no less a picture than
+/// others made later.
 void MonkeyController::cut(Dice& dice) {
   writer_->begin_tick(++now_);
   for (int boxes = 1 + dice.below(4); boxes > 0; --boxes) {
     const auto v = static_cast<std::size_t>(dice.below(static_cast<int>(volumes_.size())));
     Volume& volume = volumes_[v];
     const VoxelBox box = any_box(volume.grid, dice);
-    const bool adds = dice.once_in(4);
-    const int left = dice.below(3);
+    const bool adds = dice.once_in(4), in_part = !volume.labels.empty();
+    const int left = in_part ? dice.below(3) : 0;
     std::uint32_t removed = 0;
     for_each_voxel(box, [&](int x, int y, int z) {
       Density& at = volume.density[volume.grid.index(x, y, z)];
-      const auto next = static_cast<Density>(adds ? std::max<int>(at, 60'000) : at * left / 4);
+      const bool solid = adds && (at > 0 || in_part);
+      const auto next = static_cast<Density>(solid ? 65'535 : at * left / 4);
       removed += next < at ? static_cast<std::uint32_t>(at - next) : 0U;
       at = next;
     });
