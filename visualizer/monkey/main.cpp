@@ -5,6 +5,7 @@
 #include <exception>
 #include <filesystem>
 #include <iostream>
+#include <memory>
 #include <string>
 #include <utility>
 
@@ -14,6 +15,7 @@
 #include "shared/text/command_line.hpp"
 #include "visualizer/error.hpp"
 #include "visualizer/gl/context.hpp"
+#include "visualizer/gl/window.hpp"
 #include "visualizer/monkey/monkey.hpp"
 #include "visualizer/view/file_out.hpp"
 #include "visualizer/view/frame_report.hpp"
@@ -28,7 +30,7 @@ struct MonkeyOptions {
   std::uint32_t events = 200;
   double seconds = 10.0;
   fs::path out = "out/monkey";
-  bool trace = false;
+  bool trace = false, window = false;
 };
 
 /// A private folder for the socket and for what keys write.
@@ -51,9 +53,10 @@ void act(Monkey& monkey) {
 }
 
 /// True where all went well; else says what did not, and writes both pictures.
-bool play(const kerf::GlContext& context, std::uint32_t seed, const fs::path& files,
+bool play(kerf::GlContext& context, std::uint32_t seed, const fs::path& files,
           const MonkeyOptions& options, Monkey::Count& count) {
-  Monkey monkey(context, seed, files);
+  auto* const window = options.window ? dynamic_cast<kerf::Window*>(&context) : nullptr;
+  Monkey monkey(context, seed, files, window);
   try {
     while (monkey.count().events < options.events) {
       act(monkey);
@@ -79,7 +82,10 @@ bool play(const kerf::GlContext& context, std::uint32_t seed, const fs::path& fi
 int run(const MonkeyOptions& options) {
   const Place place;
   kerf::report_gl_faults([](const std::string& text) { g_gl_fault = "OpenGL: " + text; });
-  const auto context = kerf::make_headless_context();
+  constexpr kerf::PictureSize kWindow{640, 480};
+  const std::unique_ptr<kerf::GlContext> context =
+      options.window ? std::make_unique<kerf::Window>(kWindow, kerf::Window::Visibility::shown)
+                     : kerf::make_headless_context();
   const kerf::Stopwatch watch;
   Monkey::Count count;
   std::uint32_t seed = options.seed;
@@ -113,6 +119,7 @@ int main(int argc, char** argv) {
     app.option("--out", options.out, "folder for the two pictures of a round that went wrong")
         .shown_as("DIR")
         .shows_default();
+    app.flag("--window", options.window, "show it in a window too, on the screen of DISPLAY");
     app.flag("--trace", options.trace, "tell each event");
     app.footer("Exit codes: 0 fine, 1 a picture was wrong, 2 bad input or set-up.");
     if (!app.parse(argc, argv, std::cout)) return 0;

@@ -79,8 +79,9 @@ Monkey::Count& Monkey::Count::operator+=(const Count& more) noexcept {
   return *this;
 }
 
-Monkey::Monkey(const GlContext& context, std::uint32_t seed, std::filesystem::path folder)
-    : dice_(seed), size_(kSizes.front()) {
+Monkey::Monkey(const GlContext& context, std::uint32_t seed, std::filesystem::path folder,
+               Window* window)
+    : window_(window), dice_(seed), size_(kSizes.front()) {
   options_.name = kMonkeyName;
   options_.size = size_;
   options_.out = std::move(folder);
@@ -218,6 +219,10 @@ void Monkey::frame(const WindowInput& input) {
   const WindowRun::Frame frame = run_->step(all, size_, now_);
   rests_ = frame.drawn == nullptr;
   if (!rests_) shown_ = {size_, frame.drawn->read_rgb()};
+  if (window_ != nullptr) {
+    static_cast<void>(window_->poll());
+    if (!rests_) window_->present(*frame.drawn);
+  }
   if (release_) pointer_.down = release_ = false;
 }
 

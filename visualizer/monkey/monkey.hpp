@@ -39,8 +39,11 @@ class Monkey {
     Count& operator+=(const Count& more) noexcept;
   };
 
-  /// `folder` takes what keys write. Throws as Session and Picture do.
-  Monkey(const GlContext& context, std::uint32_t seed, std::filesystem::path folder);
+  /// `folder` takes what keys write. With a `window`, which is then the context, it shows there
+  /// what a window would; whoever resizes it gets pictures of other sizes than its own. Throws as
+  /// Session and Picture do.
+  Monkey(const GlContext& context, std::uint32_t seed, std::filesystem::path folder,
+         Window* window = nullptr);
 
   /// One event: what happened before a frame, and frames until all of it is shown. Throws
   /// VisualizerError where the window shows something else than the fresh picture.
@@ -66,6 +69,7 @@ class Monkey {
   void compare();
   [[nodiscard]] MonkeyPicture drawn_anew();
 
+  Window* window_;
   Dice dice_;
   VisualizerOptions options_;
   std::unique_ptr<MonkeyController> controller_;

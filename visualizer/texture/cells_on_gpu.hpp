@@ -30,8 +30,8 @@ class CellFaces {
   std::vector<Run> update(const Macrocells& cells, const VoxelBox& flipped);
 
   [[nodiscard]] std::span<const Face> all() const noexcept { return faces_; }
-  /// The list of a grid is no longer: all walls of its cells. A bar of active cells has four of five
-  /// of them, and where active and empty cells take turns, nearly all are faces too.
+  /// The list of a grid is no longer: all walls of its cells. A bar of active cells has four of
+  /// five of them, and where active and empty cells take turns, nearly all are faces too.
   [[nodiscard]] static std::size_t most(const VoxelGrid& grid) noexcept {
     const auto [nx, ny, nz] = grid;
     return 3 * grid.voxel_count() + VoxelGrid{nx, ny, 1}.voxel_count() +
