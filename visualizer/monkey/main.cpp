@@ -30,7 +30,7 @@ struct MonkeyOptions {
   std::uint32_t events = 200;
   double seconds = 10.0;
   fs::path out = "out/monkey";
-  bool trace = false, window = false;
+  bool trace = false, window = false, large = false;
 };
 
 /// A private folder for the socket and for what keys write.
@@ -56,7 +56,7 @@ void act(Monkey& monkey) {
 bool play(kerf::GlContext& context, std::uint32_t seed, const fs::path& files,
           const MonkeyOptions& options, Monkey::Count& count) {
   auto* const window = options.window ? dynamic_cast<kerf::Window*>(&context) : nullptr;
-  Monkey monkey(context, seed, files, window);
+  Monkey monkey(context, {seed, files, window, options.large});
   try {
     while (monkey.count().events < options.events) {
       act(monkey);
@@ -120,6 +120,7 @@ int main(int argc, char** argv) {
         .shown_as("DIR")
         .shows_default();
     app.flag("--window", options.window, "show it in a window too, on the screen of DISPLAY");
+    app.flag("--large", options.large, "pictures of 800x600 and 1100x760 pixels only");
     app.flag("--trace", options.trace, "tell each event");
     app.footer("Exit codes: 0 fine, 1 a picture was wrong, 2 bad input or set-up.");
     if (!app.parse(argc, argv, std::cout)) return 0;

@@ -79,12 +79,14 @@ Monkey::Count& Monkey::Count::operator+=(const Count& more) noexcept {
   return *this;
 }
 
-Monkey::Monkey(const GlContext& context, std::uint32_t seed, std::filesystem::path folder,
-               Window* window)
-    : window_(window), dice_(seed), size_(kSizes.front()) {
+Monkey::Monkey(const GlContext& context, const Habits& habits)
+    : window_(habits.window),
+      large_(habits.large),
+      dice_(habits.seed),
+      size_(habits.large ? kLargeSize : kSizes.front()) {
   options_.name = kMonkeyName;
   options_.size = size_;
-  options_.out = std::move(folder);
+  options_.out = habits.folder;
   const auto kinds = renderer_kinds();
   options_.look.renderer = dice_.one_of(std::span<const std::string_view>(kinds));
   controller_ = std::make_unique<MonkeyController>(kMonkeyName, dice_);
@@ -173,7 +175,7 @@ void Monkey::use_panel(WindowInput& /*input*/) {
 void Monkey::resize(WindowInput& input) {
   size_ = dice_.one_of(std::span<const PictureSize>(kSizes));
   if (dice_.once_in(4)) size_ = {1 + dice_.below(300), 1 + dice_.below(200)};
-  if (dice_.once_in(40)) size_ = dice_.once_in(2) ? kDefaultSize : kLargeSize;
+  if (large_ || dice_.once_in(40)) size_ = dice_.once_in(2) ? kDefaultSize : kLargeSize;
   if (dice_.once_in(12)) (dice_.once_in(2) ? size_.width : size_.height) = 0;
   input.exposed = true;
   say("resize " + size_text(size_));

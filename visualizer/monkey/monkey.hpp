@@ -39,11 +39,17 @@ class Monkey {
     Count& operator+=(const Count& more) noexcept;
   };
 
-  /// `folder` takes what keys write. With a `window`, which is then the context, it shows there
-  /// what a window would; whoever resizes it gets pictures of other sizes than its own. Throws as
-  /// Session and Picture do.
-  Monkey(const GlContext& context, std::uint32_t seed, std::filesystem::path folder,
-         Window* window = nullptr);
+  struct Habits {
+    std::uint32_t seed = 1;
+    std::filesystem::path folder;  ///< for what keys write
+    /// Which is then the context, and shows what it would. Whoever resizes it gets pictures of
+    /// other sizes than its own.
+    Window* window = nullptr;
+    bool large = false;  ///< the picture has 800x600 or 1100x760 pixels, and not any size
+  };
+
+  /// Throws as Session and Picture do.
+  Monkey(const GlContext& context, const Habits& habits);
 
   /// One event: what happened before a frame, and frames until all of it is shown. Throws
   /// VisualizerError where the window shows something else than the fresh picture.
@@ -70,6 +76,7 @@ class Monkey {
   [[nodiscard]] MonkeyPicture drawn_anew();
 
   Window* window_;
+  bool large_;
   Dice dice_;
   VisualizerOptions options_;
   std::unique_ptr<MonkeyController> controller_;

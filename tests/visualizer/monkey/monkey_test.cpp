@@ -3,6 +3,8 @@
 
 #include <cstdlib>
 #include <filesystem>
+#include <memory>
+#include <string>
 #include <vector>
 
 #include <doctest/doctest.h>
@@ -51,7 +53,7 @@ TEST_CASE("whatever a monkey does, the window shows what a picture drawn anew sh
   if (!context) return;
   for (const std::uint32_t seed : {1U, 2U}) {
     CAPTURE(seed);
-    Monkey monkey(*context, seed, place.path / "files");
+    Monkey monkey(*context, {.seed = seed, .folder = place.path / "files"});
     while (monkey.count().events < kEvents) {
       try {
         monkey.act();
@@ -71,7 +73,7 @@ TEST_CASE("a monkey with the same seed does the same, and sees the same") {
   std::vector<std::uint8_t> seen[2];
   for (int run = 0; run < 2; ++run) {
     fs::remove_all(place.path / "files");  // their names are told in the picture
-    Monkey monkey(*context, 3, place.path / "files");
+    Monkey monkey(*context, {.seed = 3, .folder = place.path / "files"});
     for (int event = 0; event < 10; ++event) {
       monkey.act();
       events[run].push_back(monkey.event());
