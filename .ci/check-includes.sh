@@ -26,7 +26,7 @@ hil/front/usbip hil/script hil/fault hil/program
 lab/rig lab/accuracy lab/extremes lab/faults lab/bench lab
 
 visualizer visualizer/view visualizer/gl visualizer/cast visualizer/surface visualizer/texture
-visualizer/render visualizer/compose visualizer/app visualizer/bench
+visualizer/render visualizer/compose visualizer/app visualizer/bench visualizer/monkey
 '
 programs=(shared controller record hil lab visualizer)
 hash='^[[:space:]]*#[[:space:]]*include[[:space:]]*'

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "visualizer/app/overlay.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include <backends/imgui_impl_opengl3.h>
@@ -78,8 +79,9 @@ PixelRect Overlay::prepare(const OverlayFigures& figures, PictureSize size) {
   PixelRect bounds;
   const ImDrawData& panels = *ImGui::GetDrawData();
   for (int i = 0; i < panels.CmdListsCount; ++i) {
-    for (const ImDrawCmd& command : panels.CmdLists[i]->CmdBuffer) {
-      const ImVec4& clip = command.ClipRect;  // from the upper left corner
+    for (ImDrawCmd& command : panels.CmdLists[i]->CmdBuffer) {
+      ImVec4& clip = command.ClipRect;                            // from the upper left corner
+      clip.z = std::min(clip.z, static_cast<float>(size.width));  // the other eye's begins there
       bounds = bounds.united(PixelRect{
           static_cast<int>(std::floor(clip.x)), size.height - static_cast<int>(std::ceil(clip.w)),
           static_cast<int>(std::ceil(clip.z)), size.height - static_cast<int>(std::floor(clip.y))});

@@ -186,6 +186,12 @@ Redrawn Picture::draw(const Session& session, const OverlayFigures& figures,
   return {true, redrawn / (static_cast<double>(eyes_.size()) * size.width * size.height)};
 }
 
+void Picture::draw_panels(const RenderTarget& target) {
+  static_cast<void>(overlay_.prepare(shown_figures_, eye_size(target.size())));
+  overlay_.draw(target, static_cast<int>(eyes_.size()));
+  glDisable(GL_SCISSOR_TEST);
+}
+
 bool Picture::handle(const Pointer& pointer, OverlayFigures& figures, PictureSize size) {
   const PictureSize eye = eye_size(size);
   Pointer within = pointer;

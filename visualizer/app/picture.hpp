@@ -35,6 +35,8 @@ class Picture {
   /// the camera rests only the part of the screen is drawn again where bricks changed or where the
   /// tool was or is. The result is that of drawing everything.
   Redrawn draw(const Session& session, const OverlayFigures& figures, const RenderTarget& target);
+  /// Draws the panels of the last `draw` over another target of its size, as that did.
+  void draw_panels(const RenderTarget& target);
   /// The next `draw` draws everything.
   void redraw_all() noexcept { eyes_.clear(); }
 

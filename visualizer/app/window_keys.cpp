@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <cstdio>
@@ -42,17 +41,15 @@ Notice write_for_user(const std::string& what, const Write& write) {
 }
 
 using namespace std::string_literals;
-using Clock = std::chrono::steady_clock;
-
 /// Asks for the tool of a digit's key.
-void take_tool(char key, Session& session, Notices& notices) {
+void take_tool(char key, Session& session, Notices& notices, Notices::Clock::time_point now) {
   const std::size_t tools = session.scene().tools.size();
   const auto index = static_cast<std::size_t>(key - '1');
   if (index >= tools) {
-    notices.say({no_such_tool(index, tools), true}, Clock::now());
+    notices.say({no_such_tool(index, tools), true}, now);
   } else if (!session.select_tool(static_cast<std::uint32_t>(index))) {
     notices.say({"tool "s + key + ": the controller did not take it; press the key again", true},
-                Clock::now());
+                now);
   }
 }
 
@@ -65,16 +62,17 @@ std::string no_such_tool(std::size_t index, std::size_t tools) {
          "; press 1" + last;
 }
 
-void change_look(Picture& picture, const Session& session, const Look& look, Notices& notices) {
+void change_look(Picture& picture, const Session& session, const Look& look, Notices& notices,
+                 Notices::Clock::time_point now) {
   try {
     picture.set_look(session, look);
   } catch (const VisualizerError& problem) {
-    notices.say({problem.what(), true}, Clock::now());
+    notices.say({problem.what(), true}, now);
   }
 }
 
 bool WindowKeys::apply(const WindowInput& input, Session& session, Picture& picture, double aspect,
-                       Notices& notices) {
+                       Notices& notices, Notices::Clock::time_point now) {
   bool quit = input.close;
   Look look = picture.look();
   const std::vector<VolumeView>& volumes = session.scene().volumes;
@@ -98,13 +96,13 @@ bool WindowKeys::apply(const WindowInput& input, Session& session, Picture& pict
     }
     if (key == 'b') {
       one = (one + 1) % (volumes.size() + 1);
-      notices.say({"v: " + (one > 0 ? volumes[one - 1].name : "all volumes")}, Clock::now());
+      notices.say({"v: " + (one > 0 ? volumes[one - 1].name : "all volumes")}, now);
     }
     if (key == 'c') look.clip.on = !look.clip.on;
     if (key == 't') look.stereo.on = !look.stereo.on;
-    if (key >= '1' && key <= '9') take_tool(key, session, notices);
+    if (key >= '1' && key <= '9') take_tool(key, session, notices, now);
   }
-  change_look(picture, session, look, notices);
+  change_look(picture, session, look, notices, now);
   return quit;
 }
 

@@ -16,7 +16,8 @@ namespace kerf {
 
 /// Gives the picture another look. Where its renderer cannot show these volumes, the picture keeps
 /// its look and a notice says why.
-void change_look(Picture& picture, const Session& session, const Look& look, Notices& notices);
+void change_look(Picture& picture, const Session& session, const Look& look, Notices& notices,
+                 Notices::Clock::time_point now);
 
 /// What a user is told who asks for tool `index`, counted from 0, of a scene that has `tools`.
 [[nodiscard]] std::string no_such_tool(std::size_t index, std::size_t tools);
@@ -36,7 +37,7 @@ struct WindowKeys {
   /// Takes the keys of `input`: the camera and the look of `picture`, and the tool, follow at once.
   /// True when the user wants to leave.
   bool apply(const WindowInput& input, Session& session, Picture& picture, double aspect,
-             Notices& notices);
+             Notices& notices, Notices::Clock::time_point now);
 };
 
 // What keys of the window write: each says where it went, or why it did not. A full disk must not

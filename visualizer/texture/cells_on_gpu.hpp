@@ -30,10 +30,12 @@ class CellFaces {
   std::vector<Run> update(const Macrocells& cells, const VoxelBox& flipped);
 
   [[nodiscard]] std::span<const Face> all() const noexcept { return faces_; }
-  /// As long as the list of a grid can get: where active and empty cells take turns, half of them
-  /// have six.
+  /// The list of a grid is no longer: all walls of its cells. A bar of active cells has four of
+  /// five of them, and where active and empty cells take turns, nearly all are faces too.
   [[nodiscard]] static std::size_t most(const VoxelGrid& grid) noexcept {
-    return 3 * (grid.voxel_count() + 1);
+    const auto [nx, ny, nz] = grid;
+    return 3 * grid.voxel_count() + VoxelGrid{nx, ny, 1}.voxel_count() +
+           VoxelGrid{nx, 1, nz}.voxel_count() + VoxelGrid{1, ny, nz}.voxel_count();
   }
   /// In cells, the smallest box that holds every active one.
   [[nodiscard]] VoxelBox active_box() const;

@@ -52,9 +52,8 @@ TranslucentVolume::TranslucentVolume(const VolumeView& volume, const VolumeConte
 void TranslucentVolume::set_materials(const Palette& materials, const VolumeContent& content) {
   transfer_.materials = materials;
   if (!has_labels_) return;
-  const VoxelGrid& grid = bricks_.grid;
-  const auto texels = material_texels(grid, content.density, content.labels, materials);
-  materials_.upload(texels.data(), grid.box());
+  material_texels_.emplace(bricks_.grid, content.labels, materials);
+  materials_.upload(material_texels_->of_all(content.density).data(), bricks_.grid.box());
 }
 
 void TranslucentVolume::upload(std::span<const Density> density, const VoxelBox& box) {
@@ -67,6 +66,9 @@ void TranslucentVolume::update_bricks(std::span<const Density> density,
   for (const std::uint32_t id : changed) {
     const VoxelBox around = bricks_.voxels(id).grown(gradient_reach(gradient_));
     upload(density, around.clipped(bricks_.grid.box()));
+    if (!material_texels_) continue;
+    const VoxelBox brick = bricks_.voxels(id);  // what has no label has the material of its density
+    materials_.upload(material_texels_->of(brick, density).data(), brick);
   }
   cells_.update_bricks(density, changed);
 }

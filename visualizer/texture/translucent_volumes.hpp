@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -23,7 +24,8 @@ class TranslucentVolume {
                     const TransferFunction& transfer, Gradient gradient, int max_texture_size,
                     bool skip_empty);
 
-  /// Uploads bricks `changed` of `density` (the whole volume), gradients around them included.
+  /// Uploads bricks `changed` of `density` (the whole volume), gradients around them included. The
+  /// labels are those of the last `set_materials`.
   void update_bricks(std::span<const Density> density, std::span<const std::uint32_t> changed);
 
   /// See `Renderer::place`.
@@ -56,6 +58,7 @@ class TranslucentVolume {
   double edge_mm_;
   VoxelTexture voxels_;
   VoxelTexture materials_;
+  std::optional<MaterialTexels> material_texels_;  ///< where there are labels
   CellsOnGpu cells_;
   std::vector<GradientTexel> upload_buffer_;
 };

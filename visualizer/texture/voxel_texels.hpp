@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -34,9 +36,29 @@ struct MaterialTexel {
 /// The material of each voxel by its label. A voxel without one takes the mean of the labelled
 /// voxels within two edges, so that a border which fades into the air keeps its colour; where there
 /// are none either, the material of its density.
-[[nodiscard]] std::vector<MaterialTexel> material_texels(const VoxelGrid& grid,
-                                                         std::span<const Density> density,
-                                                         std::span<const Label> labels,
-                                                         const Palette& palette);
+///
+/// Refers to the labels, which do not change.
+class MaterialTexels {
+ public:
+  MaterialTexels(const VoxelGrid& grid, std::span<const Label> labels, const Palette& palette);
+
+  /// Of a brick of a whole volume, or of any box; x fastest.
+  [[nodiscard]] std::vector<MaterialTexel> of(const VoxelBox& box,
+                                              std::span<const Density> density) const;
+  /// Of all of it.
+  [[nodiscard]] std::vector<MaterialTexel> of_all(std::span<const Density> density) const;
+
+ private:
+  [[nodiscard]] bool any_label(const VoxelBox& box) const;
+  [[nodiscard]] std::optional<glm::vec4> mean_around(VoxelIndex at) const;
+  /// Calls `put(voxel, texel)` for each voxel of the box.
+  template <class Put>
+  void each(const VoxelBox& box, std::span<const Density> density, const Put& put) const;
+
+  VoxelGrid grid_;
+  std::span<const Label> labels_;
+  std::array<glm::vec4, kPaletteWidth> label_looks_;
+  std::array<MaterialTexel, kPaletteWidth> by_density_{}, by_label_{};
+};
 
 }  // namespace kerf

@@ -375,6 +375,34 @@ TEST_CASE("a target made anew in the place of another, a column narrower, is dra
   CHECK(same);
 }
 
+TEST_CASE("panels wider than the picture of an eye end where that ends") {
+  if (!have_gl()) return;
+  const Place place;
+  Controller controller;
+  Session session("redraw");
+  session.poll();
+  constexpr PictureSize kOdd{161, 120};
+  Picture picture(session, {.renderer = "iso", .stereo = {.on = true}}, 4.0 / 3.0);
+  const RenderTarget target(kOdd), anew(kOdd);
+  OverlayFigures figures;
+  figures.tool = "a tool whose name is longer than the picture of an eye is wide";
+  for (const double force_n : {0.0, 1.0, 2.0}) {
+    figures.force_n = force_n;
+    CHECK(picture.draw(session, figures, target).any);
+  }
+  const auto seen = target.read_rgb();
+  picture.redraw_all();
+  static_cast<void>(picture.draw(session, figures, anew));
+  const bool same = seen == anew.read_rgb();
+  CHECK(same);
+  int lit = 0;  // of the odd column, which is nobody's
+  for (int y = 0; y < kOdd.height; ++y) {
+    const auto last = static_cast<std::size_t>(3 * ((y + 1) * kOdd.width - 1));
+    lit += seen[last] != 0 || seen[last + 1] != 0 || seen[last + 2] != 0 ? 1 : 0;
+  }
+  CHECK(lit == 0);
+}
+
 TEST_CASE("bounds on the screen hold all that is inside a box, and the whole screen near the eye") {
   const View view = look_at({0, 0, 10}, {0, 0, 0}, 1, 100);
   const PictureSize size{200, 100};

@@ -130,6 +130,27 @@ TEST_CASE("labels give colour and opacity, also to the border that fades into th
   CHECK(green > 1000);
 }
 
+TEST_CASE("what has no label shows the material of its density after a cut too") {
+  if (!have_gl()) return;
+  const VoxelGrid grid{32, 32, 32};
+  TestVolume volume(grid, centred(grid, glm::dvec3(0.25)), ball({}, 3.0, 0.5));
+  std::vector<Label> labels(grid.voxel_count(), 0);
+  labels.front() = 1;  // far from the ball
+  SceneView scene = scene_of({&volume});
+  scene.materials = {{"none", 0.0, {0, 0, 0}}, {"red", 0.3, {1, 0, 0}}, {"green", 0.9, {0, 1, 0}}};
+  const VolumeContent content{volume.density, labels};
+  BlendRenderer edited(scene, {&content, 1});
+  for (Density& density : volume.density) density = static_cast<Density>(density / 2);
+  edited.update(0, volume.density, bricks_in(volume.view.bricks, grid.box()));
+  BlendRenderer fresh(scene, {&content, 1});
+  const View view = look_at({0, 0, 30}, {}, 20, 40);
+  const RenderTarget target(kTestSize);
+  const Drawn seen = draw(edited, view, target);
+  CHECK(*std::max_element(seen.rgb.begin(), seen.rgb.end()) > 0);
+  const bool same = seen.rgb == draw(fresh, view, target).rgb;
+  CHECK(same);
+}
+
 TEST_CASE("more volumes than texture units are refused, and the limit is named") {
   if (!have_gl()) return;
   GLint units = 0;

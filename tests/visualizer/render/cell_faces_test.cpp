@@ -60,7 +60,15 @@ TEST_CASE(
   }));
 }
 
-TEST_CASE("cells that take turns have as many faces as a list is ever given room for") {
+TEST_CASE("a list is given room for all faces of a volume a few voxels thick") {
+  for (const VoxelGrid& grid : {VoxelGrid{7, 7, 95}, VoxelGrid{7, 15, 31}, VoxelGrid{95, 1, 1}}) {
+    const std::vector<Density> solid(grid.voxel_count(), 60'000);
+    const Macrocells cells(grid, solid, 1);
+    CHECK(CellFaces(cells).all().size() <= CellFaces::most(cells.grid()));
+  }
+}
+
+TEST_CASE("a list is given room for all faces of cells that take turns") {
   constexpr VoxelGrid kGrid{39, 31, 23};  // 5 x 4 x 3 cells
   std::vector<Density> density(kGrid.voxel_count());
   for (int z = 0; z < kGrid.nz; ++z) {

@@ -77,7 +77,8 @@ TEST_CASE(
   labels[10] = 1;
   const std::vector<Density> density(20, 60000);
   const Palette palette = make_palette(kTwo);
-  const auto texels = material_texels(grid, density, labels, palette);
+  const MaterialTexels materials(grid, labels, palette);
+  const auto texels = materials.of_all(density);
   CHECK(texels[9] == MaterialTexel{0, 0, 255, 102});
   CHECK(texels[10].r == 255);
   CHECK(texels[7] == texels[9]);  // only that one is within reach
@@ -85,4 +86,6 @@ TEST_CASE(
   CHECK(texels[8].r < 128);
   CHECK(texels[8].b == 255);
   CHECK(texels[2] == texels[10]);  // dense, so the hard one
+  const auto part = materials.of({{1, 0, 0}, {12, 1, 1}}, density);
+  CHECK(part == std::vector<MaterialTexel>(texels.begin() + 1, texels.begin() + 12));
 }

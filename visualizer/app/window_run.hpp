@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <optional>
+
+#include "visualizer/app/film.hpp"
+#include "visualizer/app/force_plot.hpp"
+#include "visualizer/app/options.hpp"
+#include "visualizer/app/picture.hpp"
+#include "visualizer/app/window_figures.hpp"
+#include "visualizer/app/window_keys.hpp"
+#include "visualizer/gl/context.hpp"
+#include "visualizer/gl/target.hpp"
+#include "visualizer/gl/window.hpp"
+#include "visualizer/view/frame_report.hpp"
+#include "visualizer/view/session.hpp"
+
+namespace kerf {
+
+/// The session in a window and its picture. A controller that is started again under the same name
+/// takes the place of the one that ended; the look stays.
+class FollowedSession {
+ public:
+  using Clock = std::chrono::steady_clock;
+
+  FollowedSession(const VisualizerOptions& options, Session first, double aspect);
+
+  [[nodiscard]] Session& session() noexcept { return session_; }
+  [[nodiscard]] Picture& picture() noexcept { return *picture_; }
+  /// Of all sessions so far.
+  [[nodiscard]] std::uint64_t bricks_uploaded() const {
+    return earlier_bricks_ + picture_->bricks_uploaded();
+  }
+
+  /// Brings both up to the present.
+  void update(double aspect, Clock::time_point now);
+
+ private:
+  void attach_again(double aspect, Clock::time_point now);
+
+  const VisualizerOptions& options_;
+  Session session_;
+  std::optional<Picture> picture_;
+  std::uint64_t earlier_bricks_ = 0;
+  Clock::time_point next_attach_{};
+};
+
+/// What a window does from its first frame to its last: input, the session, panels, picture, film.
+/// It needs no window: what it draws is a target, and what the user did is handed to it. `options`
+/// outlives it.
+class WindowRun {
+ public:
+  using Clock = std::chrono::steady_clock;
+
+  /// What came of a frame.
+  struct Frame {
+    bool quit = false;                    ///< the user wants to leave; nothing else was done
+    const RenderTarget* drawn = nullptr;  ///< to be presented; none: what was, stays
+  };
+
+  /// `context` is current, now and in each step; `since_attached` began when `first` did.
+  WindowRun(const VisualizerOptions& options, Session first, const GlContext& context,
+            const Stopwatch& since_attached = {});
+
+  /// One frame that begins `now`, in a window of `size`, of which a side is 0 while nothing of it
+  /// is seen.
+  Frame step(const WindowInput& input, PictureSize size, Clock::time_point now);
+
+  /// Completes and writes the report; returns the exit code.
+  [[nodiscard]] int end();
+
+  [[nodiscard]] double age_ms() const { return since_attached_.wall_ms(); }
+  [[nodiscard]] Session& session() noexcept { return followed_.session(); }
+  [[nodiscard]] Picture& picture() noexcept { return followed_.picture(); }
+
+ private:
+  [[nodiscard]] OverlayFigures figures_at(Clock::time_point now);
+  Redrawn draw(PictureSize size, const WindowInput& input, Clock::time_point now);
+
+  const VisualizerOptions& options_;
+  const Stopwatch since_attached_;
+  bool record_from_start_, video_is_cut_ = false;
+  FrameReport report_;
+  double aspect_;
+  FollowedSession followed_;
+  std::optional<RenderTarget> target_;
+  ShownRates rates_;
+  WindowKeys keys_;
+  Notices notices_;
+  ForcePlot plot_;
+  std::optional<Film> film_;
+};
+
+}  // namespace kerf
