@@ -4,6 +4,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "controller/kernel/proxy/constraint_plane.hpp"
+
 namespace kerf {
 namespace {
 
@@ -41,9 +43,11 @@ StageCost query_stage(std::uint64_t samples, std::string_view runs_it) {
   return priced("queries", samples, {2.4, 2.6, 9, 18, 19, 18}, runs_it);
 }
 
-void add_force_stages(std::uint64_t covered, std::string_view runs_it,
+void add_force_stages(std::uint64_t covered, bool shares, std::string_view runs_it,
                       std::vector<StageCost>& stages) {
   stages.push_back(priced("list", covered, {32, 42, 130, 80, 8, 8}, runs_it));
+  const std::uint64_t contacts = shares ? kMaxPlanes : 0;
+  stages.push_back(priced("loads", contacts * covered, {13, 13, 45, 25, 3, 3}, runs_it));
   stages.push_back(priced("spend", covered, {9, 12, 65, 36, 4, 4}, runs_it));
 }
 
