@@ -156,7 +156,8 @@ void measure_traps(const Effort& effort, const RowSink& add_row) {
     add_row({"traps", what, value, unit, must, aim});
   };
   const double made = std::max(hard.made, 1);
-  row("presses made, 5 s each", hard.made, "", {}, {});
+  const std::string scenes = "presses of 5 s, from --seed " + std::to_string(effort.first_scene);
+  row(scenes.c_str(), hard.made, "", {}, {});
   row("of them with a force that must cut", 100 * hard.touched / made, "%", {}, {});
   row("of them borne by a shaft", 100 * hard.by_shaft / made, "%", {}, {});
   row("presses that stop cutting for over 0.5 s", hard.bad, "", 0, 0);

@@ -159,9 +159,9 @@ TEST_CASE("a cone on its flank cuts the rim of a hole, whatever soft matter fill
     CHECK(empty.press_n > 0.1);
     CHECK(empty.rim > 10);
     // The soft matter bears nothing: the rim gets all of the press.
-    CHECK(forbidden.rim == doctest::Approx(empty.rim).epsilon(0.02));
+    CHECK(forbidden.rim == doctest::Approx(empty.rim).epsilon(0.05));
     CHECK(forbidden.filling == 0);
-    CHECK(soft.rim == doctest::Approx(empty.rim).epsilon(0.02));
+    CHECK(soft.rim == doctest::Approx(empty.rim).epsilon(0.05));
     CHECK(soft.filling > 1);
   }
 }

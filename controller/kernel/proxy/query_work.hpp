@@ -16,8 +16,9 @@ namespace kerf {
 /// What the queries of one tool cost in all volumes together, counted in samples that are read. It
 /// bounds a tick (`ContactQuery::begin_tick`, docs/theory.md 4.8), and a scene is planned with it.
 struct QueryWork {
-  /// What a tick may read, some 2.5 ns each; a tool of very many samples may make kLeastQueries.
-  static constexpr std::int64_t kTickSamples = 18000;
+  /// What a tick may read, some 2.5 ns each, and what one of a tool with a shaft may: 53 us. A head
+  /// of very many samples may make kLeastQueries.
+  static constexpr std::int64_t kTickSamples = 18000, kShaftedSamples = 21000;
   static constexpr std::int64_t kLeastQueries = 12;
   static constexpr std::int64_t kLookSamples = 128;  ///< what a look costs besides those it reads
   static constexpr std::int64_t kCloseSamples = 2;   ///< what one of a closeup costs
@@ -28,16 +29,18 @@ struct QueryWork {
   std::int64_t query = 0;   ///< one query at most: all samples in every volume
   std::int64_t closer = 0;  ///< its closer looks at most
   std::int64_t turn = 0;    ///< to place all samples anew
+  std::int64_t head = 0;    ///< query and turn of the head alone; 0: there is nothing behind it
 
-  /// Of two point shells that are queried together.
+  /// Of a head, or of it and a part behind, and one more part.
   [[nodiscard]] friend constexpr QueryWork operator+(const QueryWork& a,
                                                      const QueryWork& b) noexcept {
-    return {a.query + b.query, a.closer + b.closer, a.turn + b.turn};
+    return {a.query + b.query, a.closer + b.closer, a.turn + b.turn,
+            a.head > 0 ? a.head : a.query + a.turn};
   }
-
   /// Of a tick. No query begins that might go beyond it, but for the first after a turn, which then
   /// has no closer look.
   [[nodiscard]] constexpr std::int64_t budget() const noexcept {
+    if (head > 0) return std::max(kShaftedSamples, kLeastQueries * head);
     return std::max(kTickSamples, kLeastQueries * (query + turn));
   }
   /// Once so much of it went into free ways that led nowhere, no group looks for one.

@@ -97,7 +97,10 @@ class ToolQuery {
   }
   [[nodiscard]] const QueryWork& work() const noexcept { return work_; }
   [[nodiscard]] bool half_spent() const noexcept { return left_ <= work_.budget() / 2; }
-  [[nodiscard]] bool may_query() const noexcept { return left_ >= work_.query + work_.closer; }
+  /// The head comes first: a part behind looks closer only where there is work left for it.
+  [[nodiscard]] bool may_query() const noexcept {
+    return left_ >= work_.query + head_.work().closer;
+  }
   [[nodiscard]] std::int64_t spent() const noexcept { return work_.budget() - left_; }
 
   [[nodiscard]] Contacts<N> query(ContactVec<Real> q) noexcept {
@@ -107,11 +110,19 @@ class ToolQuery {
     if (felt.buried) return felt;
     turned_ = false;
     on_account(head_, [&](const ContactQuery<N>& head) { felt = head.look(q, closer); });
+    std::int64_t to_come = work_.query - head_.work().query;
+    if (closer && left_ < to_come) {
+      felt = {};
+      felt.buried = true;
+      return felt;
+    }
     each_behind([&](Part& part) {
       Contacts<N> seen;
+      const bool near = closer && left_ >= to_come + part.query.work().closer;
       on_account(part.query, [&](const ContactQuery<N>& query) {
-        seen = query.look(q + part.from_head, closer);
+        seen = query.look(q + part.from_head, near);
       });
+      to_come -= part.query.work().query;
       for (std::size_t i = 0; i < static_cast<std::size_t>(seen.count); ++i) {
         ConstraintPlane<N> plane = seen.plane[i];
         plane.arm = plane.arm + part.from_head;
@@ -129,7 +140,7 @@ class ToolQuery {
   [[nodiscard]] Real free_distance(ContactVec<Real> q, ContactVec<Real> move) noexcept {
     Real free = norm(move);
     const auto look = [&](ContactQuery<N>& part, ContactVec<Real> at) {
-      const std::int64_t work = left_ - work_.query - work_.closer;
+      const std::int64_t work = left_ - work_.query - head_.work().closer;
       on_account(part, [&](const ContactQuery<N>& query) {
         free = std::min(free, query.free_distance(at, move, work));
       });

@@ -143,10 +143,11 @@ void add_loads(const AheadForm<std::int64_t>& form, const CoveredGroup* list, st
                std::uint64_t* ahead_of, std::uint64_t* bearing_of) noexcept {
   constexpr std::int64_t kOne = 1 << 20;
   for (const CoveredGroup* group = list; group != list + count; ++group) {
-    alignas(32) std::uint16_t rho[kCoverGroup];
-    static_cast<void>(read_group(*group, density, entries, rho));
     const std::int64_t first = form.origin + form.step[0] * group->place[0] +
                                form.step[1] * group->place[1] + form.step[2] * group->place[2];
+    if (first <= 0 && first + (kCoverGroup - 1) * form.step[0] <= 0) continue;
+    alignas(32) std::uint16_t rho[kCoverGroup];
+    static_cast<void>(read_group(*group, density, entries, rho));
     std::uint32_t load[kCoverGroup], borne[kCoverGroup];
     std::uint64_t sum = 0, borne_sum = 0;
     KERF_LANES
@@ -159,7 +160,6 @@ void add_loads(const AheadForm<std::int64_t>& form, const CoveredGroup* list, st
       sum += load[i];
       borne_sum += borne[i];
     }
-    if (sum == 0) continue;
     add_weights(*group, load, sum, ahead_of);
     add_weights(*group, borne, borne_sum, bearing_of);
   }

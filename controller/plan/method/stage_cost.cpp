@@ -47,7 +47,7 @@ void add_force_stages(std::uint64_t covered, bool shares, std::string_view runs_
                       std::vector<StageCost>& stages) {
   stages.push_back(priced("list", covered, {32, 42, 130, 80, 8, 8}, runs_it));
   const std::uint64_t contacts = shares ? kMaxPlanes : 0;
-  stages.push_back(priced("loads", contacts * covered, {13, 13, 45, 25, 3, 3}, runs_it));
+  stages.push_back(priced("loads", contacts * covered, {18, 20, 60, 26, 4, 4}, runs_it));
   stages.push_back(priced("spend", covered, {9, 12, 65, 36, 4, 4}, runs_it));
 }
 
