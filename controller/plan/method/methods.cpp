@@ -48,7 +48,8 @@ std::vector<StageCost> tick_stages(const ToolMethod& method, const TickShape& sh
                                    std::uint64_t queried, std::uint64_t covered) {
   std::vector<StageCost> stages = method.stages(shape, box);
   if (shape.swept) stages.insert(stages.begin(), query_stage(queried, shape.runs_it));
-  if (shape.cut == CutModel::preston) add_force_stages(covered, shape.shares, shape.runs_it, stages);
+  if (shape.cut == CutModel::preston)
+    add_force_stages(covered, shape.shares, shape.runs_it, stages);
   return stages;
 }
 
