@@ -83,8 +83,7 @@ template <class N>
   const std::int64_t left =
       work.budget() - in_vain -
       std::min((turns + 1) * (query + work.turn), work.budget() / 2 + 2 * (query + work.turn));
-  // No query begins with less.
-  const std::int64_t last = work.query + query_work(tool.point_shell.table, volumes).closer;
+  const std::int64_t last = work.query + work.closer;  // no query begins with less
   const std::int64_t queries = left < last ? 0 : (left - last) / query + 1;
   return SweepRules::kStep * double(std::min(SweepRules::kMaxQueries - turns, queries)) -
          SweepRules::kArrived;

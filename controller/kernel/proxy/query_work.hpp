@@ -31,11 +31,13 @@ struct QueryWork {
   std::int64_t turn = 0;    ///< to place all samples anew
   std::int64_t head = 0;    ///< query and turn of the head alone; 0: there is nothing behind it
 
-  /// Of a head, or of it and a part behind, and one more part.
+  /// Of a head, or of it and a part behind, and one more part. The head and one part may always
+  /// look closer; another one does where there is work left for it.
   [[nodiscard]] friend constexpr QueryWork operator+(const QueryWork& a,
                                                      const QueryWork& b) noexcept {
-    return {a.query + b.query, a.closer + b.closer, a.turn + b.turn,
-            a.head > 0 ? a.head : a.query + a.turn};
+    const bool more = a.head > 0;
+    return {a.query + b.query, more ? a.closer : a.closer + b.closer, a.turn + b.turn,
+            more ? a.head : a.query + a.turn};
   }
   /// Of a tick. No query begins that might go beyond it, but for the first after a turn, which then
   /// has no closer look.

@@ -97,10 +97,7 @@ class ToolQuery {
   }
   [[nodiscard]] const QueryWork& work() const noexcept { return work_; }
   [[nodiscard]] bool half_spent() const noexcept { return left_ <= work_.budget() / 2; }
-  /// The head comes first: a part behind looks closer only where there is work left for it.
-  [[nodiscard]] bool may_query() const noexcept {
-    return left_ >= work_.query + head_.work().closer;
-  }
+  [[nodiscard]] bool may_query() const noexcept { return left_ >= work_.query + work_.closer; }
   [[nodiscard]] std::int64_t spent() const noexcept { return work_.budget() - left_; }
 
   [[nodiscard]] Contacts<N> query(ContactVec<Real> q) noexcept {
@@ -140,7 +137,7 @@ class ToolQuery {
   [[nodiscard]] Real free_distance(ContactVec<Real> q, ContactVec<Real> move) noexcept {
     Real free = norm(move);
     const auto look = [&](ContactQuery<N>& part, ContactVec<Real> at) {
-      const std::int64_t work = left_ - work_.query - head_.work().closer;
+      const std::int64_t work = left_ - work_.query - work_.closer;
       on_account(part, [&](const ContactQuery<N>& query) {
         free = std::min(free, query.free_distance(at, move, work));
       });

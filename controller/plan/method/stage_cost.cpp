@@ -46,8 +46,8 @@ StageCost query_stage(std::uint64_t samples, std::string_view runs_it) {
 void add_force_stages(std::uint64_t covered, bool shares, std::string_view runs_it,
                       std::vector<StageCost>& stages) {
   stages.push_back(priced("list", covered, {32, 42, 130, 80, 8, 8}, runs_it));
-  const std::uint64_t contacts = shares ? kMaxPlanes : 0;
-  stages.push_back(priced("loads", contacts * covered, {18, 20, 60, 26, 4, 4}, runs_it));
+  if (shares)
+    stages.push_back(priced("loads", kMaxPlanes * covered, {18, 20, 60, 26, 4, 4}, runs_it));
   stages.push_back(priced("spend", covered, {9, 12, 65, 36, 4, 4}, runs_it));
 }
 
