@@ -16,8 +16,8 @@ namespace kerf {
 /// What the queries of one tool cost in all volumes together, counted in samples that are read. It
 /// bounds a tick (`ContactQuery::begin_tick`, docs/theory.md 4.8), and a scene is planned with it.
 struct QueryWork {
-  /// What a tick may read, some 2.5 ns each, and what one of a tool with a shaft may: 53 us. A head
-  /// of very many samples may make kLeastQueries.
+  /// What a tick may read, some 2.5 ns each. A head of very many samples may make kLeastQueries, and
+  /// a whole tool with its shaft as many as kShaftedSamples allow: 53 us.
   static constexpr std::int64_t kTickSamples = 18000, kShaftedSamples = 21000;
   static constexpr std::int64_t kLeastQueries = 12;
   static constexpr std::int64_t kLookSamples = 128;  ///< what a look costs besides those it reads
@@ -42,8 +42,9 @@ struct QueryWork {
   /// Of a tick. No query begins that might go beyond it, but for the first after a turn, which then
   /// has no closer look.
   [[nodiscard]] constexpr std::int64_t budget() const noexcept {
-    if (head > 0) return std::max(kShaftedSamples, kLeastQueries * head);
-    return std::max(kTickSamples, kLeastQueries * (query + turn));
+    const std::int64_t least = kLeastQueries * (query + turn);
+    const std::int64_t fits = std::max(kShaftedSamples, kLeastQueries * head);
+    return std::max(kTickSamples, head > 0 ? std::min(least, fits) : least);
   }
   /// Once so much of it went into free ways that led nowhere, no group looks for one.
   [[nodiscard]] constexpr std::int64_t in_vain() const noexcept { return budget() / 8; }

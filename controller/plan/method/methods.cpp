@@ -32,8 +32,6 @@ TickShape tick_shape(const ToolCase& in, const AlignedTable* table) {
           .grid = in.volume.image.grid,
           .cut = in.scene.cut.model,
           .swept = in.scene.force.model == ForceModel::proxy,
-          .shares = !in.volume.image.labels.empty() ||
-                    std::ranges::count_if(in.scene.volumes, &SceneVolume::solid) > 1,
           .runs_it = numeric == NumericKind::fixed ? in.kernels.name : word_of(numeric),
           .table = table};
 }
@@ -48,8 +46,7 @@ std::vector<StageCost> tick_stages(const ToolMethod& method, const TickShape& sh
                                    std::uint64_t queried, std::uint64_t covered) {
   std::vector<StageCost> stages = method.stages(shape, box);
   if (shape.swept) stages.insert(stages.begin(), query_stage(queried, shape.runs_it));
-  if (shape.cut == CutModel::preston)
-    add_force_stages(covered, shape.shares, shape.runs_it, stages);
+  if (shape.cut == CutModel::preston) add_force_stages(covered, shape.runs_it, stages);
   return stages;
 }
 

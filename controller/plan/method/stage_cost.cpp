@@ -4,8 +4,6 @@
 #include <stdexcept>
 #include <string>
 
-#include "controller/kernel/proxy/constraint_plane.hpp"
-
 namespace kerf {
 namespace {
 
@@ -43,11 +41,9 @@ StageCost query_stage(std::uint64_t samples, std::string_view runs_it) {
   return priced("queries", samples, {2.4, 2.6, 9, 18, 19, 18}, runs_it);
 }
 
-void add_force_stages(std::uint64_t covered, bool shares, std::string_view runs_it,
+void add_force_stages(std::uint64_t covered, std::string_view runs_it,
                       std::vector<StageCost>& stages) {
   stages.push_back(priced("list", covered, {32, 42, 130, 80, 8, 8}, runs_it));
-  if (shares)
-    stages.push_back(priced("loads", kMaxPlanes * covered, {18, 20, 60, 26, 4, 4}, runs_it));
   stages.push_back(priced("spend", covered, {9, 12, 65, 36, 4, 4}, runs_it));
 }
 

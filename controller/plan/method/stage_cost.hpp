@@ -38,11 +38,10 @@ struct Prices {
 /// the solid.
 [[nodiscard]] StageCost query_stage(std::uint64_t samples, std::string_view runs_it);
 
-/// Where force cuts, `list`, `loads` and `spend`, the same beside every method: groups of voxels
-/// that the tool covers (covered_bound.hpp), in float and double voxels, read with what they weigh;
-/// the same for each of three contacts, where materials or volumes share the press; and the same,
-/// from which the budget is taken, twice where the fullest have not enough.
-void add_force_stages(std::uint64_t covered, bool shares, std::string_view runs_it,
+/// Where force cuts, `list` and `spend`, the same beside every method: groups of voxels that the
+/// tool covers (covered_bound.hpp), in float and double voxels, read with what they weigh; and the
+/// same, from which the budget is taken, twice where the fullest have not enough.
+void add_force_stages(std::uint64_t covered, std::string_view runs_it,
                       std::vector<StageCost>& stages);
 
 }  // namespace kerf

@@ -57,7 +57,6 @@ struct TickShape {
   VoxelGrid grid{};
   CutModel cut = CutModel::none;
   bool swept = false;                   ///< the proxy is felt, so a method has no `contact`
-  bool shares = false;                  ///< several materials or volumes may share a press
   std::string_view runs_it;             ///< name of the kernels, or "float" or "double"
   const AlignedTable* table = nullptr;  ///< of the method `aligned`
 };
