@@ -50,8 +50,8 @@ struct CoverSums {
   std::uint64_t covered, covered_number, weight, weight_speed;
 };
 
-/// How far a voxel lies ahead of the tool's centre along its press, as a linear form of its place:
-/// 1 at the foremost (covered_loads.hpp).
+/// How far a voxel lies at a contact of the tool, as a linear form of its place: 1 and more bear
+/// all, 0 and less nothing (covered_loads.hpp).
 template <class Sum>
 struct AheadForm {
   Sum origin;   ///< of voxel 0, 0, 0; fixed: 20 fraction bits, as have the steps

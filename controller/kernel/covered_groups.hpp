@@ -53,7 +53,7 @@ struct CoveredGroups : CoveredWeights<FixedNumbers> {
     drag.add({sums.covered, sums.covered_number, sums.weight, sums.weight_speed}, place, step);
   });
   found.drag = drag.mean();
-  found.load = found.weight;
+  found.share_by_weight();
   found.list = memory.first(count);
   return found;
 }

@@ -48,12 +48,14 @@ template <class N>
 struct CoveredWeights {
   ByMaterial<CutWeight<N>> weight{};  ///< sums of the list's
   ByMaterial<CutWeight<N>> load{};    ///< by which materials share a press: the weights, or `loads`
+  CutWeight<N> whole{};               ///< of what each load is a part
   SurfaceDrag<N> drag;
 
-  [[nodiscard]] constexpr CutWeight<N> whole_load() const noexcept {
-    CutWeight<N> sum{};
-    for (const CutWeight<N> part : load) sum += part;
-    return sum;
+  /// All share the press by their weights.
+  constexpr void share_by_weight() noexcept {
+    load = weight;
+    whole = {};
+    for (const CutWeight<N> part : load) whole += part;
   }
 };
 
@@ -84,7 +86,7 @@ class CoverScan {
       drag.add(add_row(first, count, ratio, start, frame.step()), start, frame.step());
     });
     found_.drag = drag.mean();
-    found_.load = found_.weight;
+    found_.share_by_weight();
     found_.list = memory_.first(count_);
     return found_;
   }

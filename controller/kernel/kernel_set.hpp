@@ -66,8 +66,10 @@ struct KernelSet {
                             std::uint64_t* weight_by_material) noexcept;
   void (*weigh_again)(CoveredGroup* list, std::int32_t count,
                       std::uint64_t* weight_by_material) noexcept;
+  /// `ahead` and `bearing` by material: `loads` (covered_loads.hpp).
   void (*add_loads)(const AheadForm<std::int64_t>&, const CoveredGroup* list, std::int32_t count,
-                    std::uint64_t* load_by_material) noexcept;
+                    const Density*, std::int64_t entries, Density iso, std::uint64_t* ahead,
+                    std::uint64_t* bearing) noexcept;
   void (*take_steps)(const CoverSpend&, CoveredGroup* list, std::int32_t count, Density*,
                      std::int64_t entries, CoverTaken&) noexcept;
   /// The swept contact: `place_points`, `point_sums` and `read_points` of a tool's surface samples.

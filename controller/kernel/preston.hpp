@@ -16,7 +16,7 @@ namespace kerf {
 // Cutting that follows force: Preston's law, shared among the voxels under the tool by what it
 // covers of them (o_j) times the speed of its surface there (w_j): docs/theory.md 6.2. What cannot
 // be cut carries its part of the force and stays. Over several volumes the sum of w goes through
-// all of them: each gets its share of the drive (F_n - F_0) omega/omega_ref (`cut_drive`).
+// all of them: `CoveredWeights::whole`.
 
 /// How force cuts one volume; constant during a run. Indexed by label; without labels all is at 0.
 template <class N>
@@ -57,10 +57,9 @@ class PrestonTick {
 
   /// Feeds the accounts of the materials under the tool and spends them.
   constexpr void cut(Sum drive, PrestonOutcome<N>& out) noexcept {
-    const CutWeight<N> all = covered_.whole_load();
     each_material([&](std::size_t m) {
-      const auto fed =
-          portion<N>(budget_of(plan_.rate[m], drive), share_of<N>(covered_.load[m], all));
+      const auto fed = portion<N>(budget_of(plan_.rate[m], drive),
+                                  share_of<N>(covered_.load[m], covered_.whole));
       if (!(fed > 0)) return;
       fed_[m] = true;
       budget_[m] = fed + state_.carry[m] / kCarryTicks;

@@ -83,7 +83,7 @@ class CompiledSceneOf final : public CompiledScene {
     plan.round = tool.round;
     plan.turns = tool.turns;
     plan.rim_mm = typename N::Real(tool.radius_mm);
-    plan.slimness = slimness<N>(tool);
+    plan.steepness = bearing_steepness<N>(tool, plan_.contact);
     plan.offsets = memory_.hold_samples(tool);
     if (plan_.contact.swept) {
       plan.swept.point_shell = memory_.contact().hold_point_shell(scene, tool);

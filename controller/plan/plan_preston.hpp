@@ -45,11 +45,12 @@ template <class N>
   return rounded<typename N::Ratio, WorldSpace, VoxelSpace>(m);
 }
 
-/// For `scaled_press`.
+/// For a `BearingPlane`.
 template <class N>
-[[nodiscard]] typename N::Ratio slimness(const SceneTool& tool) {
-  const double ratio = tool.round ? 1 : 2 * tool.radius_mm / tool.length_mm;
-  return typename N::Ratio(std::clamp(ratio, kSlimmest, 1 / kSlimmest));
+[[nodiscard]] typename N::Ratio bearing_steepness(const SceneTool& tool,
+                                                  const ContactPlan<N>& contact) {
+  const double rim = tool.radius_mm * static_cast<double>(contact.units_per_mm);
+  return typename N::Ratio(tool.round ? 1 : std::clamp(rim, 1.0, kSteepest));
 }
 
 template <class N>

@@ -106,7 +106,9 @@ class WorstDrive {
     dense_ = densest_place(volume.grid, state.volumes[v].density, reach);
     if (tool.turns && !tool.round) at_.rotation = kWidest;
     at_.centre_mm = world({dense_.x + 0.0, dense_.y + 0.3, dense_.z + 0.4});
-    at_.normal = {{}, typename N::Unit(1), {}};
+    at_.normal = at_.press = {{}, typename N::Unit(1), {}};
+    at_.plane_count = kMaxPlanes;  // as many contacts as there may be
+    at_.planes.fill({relabel<DeviceSpace>(at_.normal), {}, Real(1)});
   }
 
   WorstTick time() {

@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <span>
 
-#include "controller/kernel/covered_loads.hpp"
 #include "controller/kernel/proxy/contact_math.hpp"
 #include "controller/servo/method_step.hpp"
+#include "controller/servo/press_shares.hpp"
 
 namespace kerf {
 namespace {
@@ -17,60 +17,6 @@ template <class N>
 const Rotation<N>& spindle_axes(const ToolPlan<N>& tool, const ServoState<N>& state,
                                 const ToolContact<N>& at) noexcept {
   return tool.round && tool.turns && !tool.swept.turned ? state.rotation : at.rotation;
-}
-
-/// What the tool covers of all volumes, and how they share its press.
-template <class N>
-struct CoveredVolumes {
-  std::array<Covered<N>, kMaxVolumes> in{};
-  std::array<CutWeight<N>, kMaxVolumes> load{};  ///< in voxels of the largest kind
-  CutWeight<N> whole{};
-};
-
-/// What the materials of all volumes bear of the tool's press, where it covers several; leaves all
-/// as it is where nothing bears any. A tool that is no ball may rest on its flank behind the
-/// centre: what may not be cut is not enough ahead of it.
-template <class N>
-void find_loads(const ServoPlan<N>& plan, const ServoState<N>& state,
-                WorldVec<typename N::Real> centre_mm, const ToolContact<N>& at,
-                CoveredVolumes<N>& covered) noexcept {
-  const ToolPlan<N>& tool = plan.tools[state.active_tool];
-  const WorldVec<typename N::Unit> axis{at.rotation.row[0][1], at.rotation.row[1][1],
-                                        at.rotation.row[2][1]};
-  const auto press = scaled_press<N>(at.normal, axis, tool.slimness);
-  std::array<ByMaterial<CutWeight<N>>, kMaxVolumes> load{};
-  CutWeight<N> whole{};
-  for (std::size_t v = 0; v < plan.volume_count; ++v) {
-    const VolumePlan<N>& volume = plan.volumes[v];
-    load[v] = loads(covered.in[v], ahead_form<N>(place_in(volume, centre_mm),
-                                                 tool.in_volume[v].rims_from_voxel, press));
-    const ByMaterial<bool>& forbidden = plan.force_cut.volume[v].forbidden;
-    for (std::size_t m = 0; m < kMaxCutMaterials; ++m) {
-      if (tool.round || !forbidden[m]) whole += load[v][m];
-    }
-  }
-  if (!(whole > 0)) return;
-  for (std::size_t v = 0; v < plan.volume_count; ++v) covered.in[v].load = load[v];
-}
-
-/// Covers all volumes with the tool's centre at `centre_mm`, where it cuts.
-template <class N>
-CoveredVolumes<N> cover_all(const ServoPlan<N>& plan, ServoState<N>& state,
-                            WorldVec<typename N::Real> centre_mm,
-                            const ToolContact<N>& at) noexcept {
-  CoveredVolumes<N> covered;
-  std::size_t materials = 0;
-  for (std::size_t v = 0; v < plan.volume_count; ++v) {
-    covered.in[v] = cover(plan, state, v, centre_mm, at);
-    for (const CutWeight<N> weight : covered.in[v].weight) materials += weight > 0 ? 1 : 0;
-  }
-  if (materials > 1) find_loads(plan, state, centre_mm, at, covered);
-  for (std::size_t v = 0; v < plan.volume_count; ++v) {
-    const auto own = static_cast<CutBudget<N>>(covered.in[v].whole_load());
-    covered.load[v] = static_cast<CutWeight<N>>(portion<N>(own, plan.force_cut.voxel_share[v]));
-    covered.whole += covered.load[v];
-  }
-  return covered;
 }
 
 /// Deals a press of `cut.press_n` out over the volumes, by the part of it that each bears, cuts
@@ -91,17 +37,15 @@ CuttingFriction<N> press_on_volumes(const ServoPlan<N>& plan, ServoState<N>& sta
   const auto drive = cut_drive<N>(cut.press_n, rules.threshold_n, state.force_cut.spindle.ratio);
   bool starves = drive > 0 && !(covered.whole > 0);
   for (std::size_t v = 0; v < plan.volume_count; ++v) {
-    if (!(covered.load[v] > 0)) continue;
+    if (covered.in[v].list.empty() || !(covered.whole > 0)) continue;
     const PrestonPlan<N>& volume = rules.volume[v];
     cut.forbidden = cut.forbidden || touches_forbidden(volume, covered.in[v]);
-    const auto share = share_of<N>(covered.load[v], covered.whole);
     const Real press_n =
-        multiply<Real>(unit_share_of<N>(covered.load[v], covered.whole), cut.press_n);
+        multiply<Real>(unit_share_of<N>(covered.borne[v], covered.whole), cut.press_n);
     const SurfaceDrag<N>& drag = covered.in[v].drag;
     friction.add(rules.friction, press_n, tool.round ? ball_drag<N>(normal, drag.arm) : drag);
-    const PrestonOutcome<N> out =
-        cut_by_force(volume, portion<N>(drive, share), state.volumes[v].density,
-                     state.force_cut.volume[v], covered.in[v]);
+    const PrestonOutcome<N> out = cut_by_force(volume, drive, state.volumes[v].density,
+                                               state.force_cut.volume[v], covered.in[v]);
     cut.removed[plan.volumes[v].scene_index] = out.removed;
     starves = starves || out.starves;
   }
@@ -151,7 +95,7 @@ ForceCut<N> cut_by_sent_force(const ServoPlan<N>& plan, ServoState<N>& state,
   const ForceCutPlan<N>& rules = plan.force_cut;
   ForceCutState<N>& memory = state.force_cut;
   ForceCut<N> cut;
-  const Real along_n = along<N>(relabel<ContactSpace>(at.normal), relabel<ContactSpace>(sent_n));
+  const Real along_n = along<N>(relabel<ContactSpace>(at.press), relabel<ContactSpace>(sent_n));
   cut.press_n = std::max(Real(0), multiply<Real>(at.head_share, along_n) / plan.workspace_scale);
   CuttingFriction<N> friction;
   if (cut.press_n > Real(0)) friction = press_on_volumes(plan, state, at, cut);

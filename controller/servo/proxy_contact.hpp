@@ -48,7 +48,9 @@ struct ProxyContact {
   ContactVec<typename N::Real> spring{};  ///< from goal to proxy, units: force over stiffness
   /// Of what the head presses with, out of the solid; 0 in air.
   ContactVec<typename N::Unit> normal{};
-  /// The head's share of the part of the force along `normal`: 1 without a shaft that presses.
+  /// Of what the whole tool presses with, and what the head bears over that, at most 1: the same as
+  /// `normal`, and 1, without a shaft that presses.
+  ContactVec<typename N::Unit> press{};
   typename N::Unit head_share{1};
   /// What presses on the parts behind the head over the length of the spring, at most 1.
   typename N::Unit behind_share{};
@@ -114,12 +116,17 @@ constexpr void add_loads(const Swept<N>& swept, typename N::Unit friction, bool 
   contact.moment_arm = contact.moment_arm + moment<N>(arm, direction_of<N>(along_faces)) *
                                                 (std::min(rubbed, length) / length);
   contact.head_arm = head_arm;
+  contact.press = direction_of<N>(pressed);
   if (load_behind <= Real(0)) return;
   const Real on_head = whole - load_behind;
   if (on_head > Real(1e-3)) contact.head_arm = head_arm * (whole / on_head);
   contact.behind_share = share<N>(std::min(load_behind, length), length);
-  const Real together = along<N>(contact.normal, pressed);
-  if (by_head < together) contact.head_share = share<N>(by_head, together);
+  // Where shaft and head press against each other both bear more than the hand presses with.
+  const Real together = norm(pressed);
+  const bool presses = by_head >= Real(SweepRules::kTolerance);
+  if (!presses || by_head < together) {
+    contact.head_share = presses ? share<N>(by_head, together) : typename N::Unit(0);
+  }
 }
 
 /// One tick of the swept contact (docs/theory.md 4): the proxy follows `goal`, and the spring

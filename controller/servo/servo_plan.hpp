@@ -69,10 +69,10 @@ struct ToolPlan {
   SampleTable samples;  ///< the same for the methods `gather` and `splat` in fixed point
   /// A round tool has the same samples in every orientation: they keep the volume's axes.
   bool round = false;
-  bool turns = true;             ///< with the stylus; else the tool keeps the world's axes
-  typename N::Real rim_mm{};     ///< largest radius about the shaft
-  typename N::Ratio slimness{};  ///< radius over half the height; 1 of a round tool
-  SweptTool<N> swept;            ///< where the swept proxy is felt
+  bool turns = true;              ///< with the stylus; else the tool keeps the world's axes
+  typename N::Real rim_mm{};      ///< largest radius about the shaft
+  typename N::Ratio steepness{};  ///< of its contacts' bearing (covered_loads.hpp)
+  SweptTool<N> swept;             ///< where the swept proxy is felt
   std::array<ToolInVolume<N>, kMaxVolumes> in_volume{};  ///< by index of the plan's volumes
 };
 

@@ -60,7 +60,8 @@ void tell_planes(const ContactPlan<N>& contact, const ProxyContact<N>& felt,
     if (felt.part[i] <= Real(0)) continue;
     const ConstraintPlane<N>& plane = felt.planes.plane[i];
     tool.planes[tool.plane_count++] = {relabel<DeviceSpace>(plane.normal),
-                                       at_device(contact, plane.arm), felt.part[i] * force_n};
+                                       at_device(contact, plane.arm), felt.part[i] * force_n,
+                                       plane.behind};
   }
 }
 
@@ -93,6 +94,7 @@ template <class N>
       contact.origin_mm + relabel<WorldSpace>(scaled(felt.pose.centre, contact.mm_per_unit));
   if (tool.turned) out.tool.rotation = {rows_of(felt.pose.turn)};
   out.tool.normal = relabel<WorldSpace>(felt.normal);
+  out.tool.press = relabel<WorldSpace>(felt.press);
   out.tool.head_share = felt.head_share;
   const Real force_n = norm(out.force_n);
   out.tool.head_arm_mm = at_device(contact, felt.head_arm);

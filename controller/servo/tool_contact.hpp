@@ -17,6 +17,7 @@ struct PressedPlane {
   DeviceVec<typename N::Unit> normal{};  ///< out of the solid
   DeviceVec<typename N::Real> arm_mm{};  ///< from the tool's centre to the contact
   typename N::Real load_n{};             ///< along the normal, before any limit
+  bool behind = false;                   ///< on shaft or handpiece
 };
 
 /// The tool as it rests on the solid: at its proxy, not where the hand would have it.
@@ -25,7 +26,8 @@ struct ToolContact {
   WorldVec<typename N::Real> centre_mm;
   Rotation<N> rotation = identity_rotation<N>();  ///< of its samples
   WorldVec<typename N::Unit> normal{};            ///< out of the solid, of the head; 0 in air
-  typename N::Unit head_share{1};                 ///< of the force along `normal`
+  WorldVec<typename N::Unit> press{};             ///< the same of the whole tool
+  typename N::Unit head_share{1};                 ///< of the force along `press`
   DeviceVec<typename N::Real> head_arm_mm{};      ///< from its centre to where the head presses
   std::array<PressedPlane<N>, kMaxPlanes> planes{};
   std::size_t plane_count = 0;

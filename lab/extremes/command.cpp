@@ -102,6 +102,9 @@ Command::Command(Arguments& program)
   app_.option("--data", data_, "folder of real volumes (default: $KERF_DATA)")
       .from_environment("KERF_DATA")
       .shown_as("DIR");
+  app_.option("--presses", presses_, "of the search for traps (default: 24, 240 or 10,000)")
+      .within(1, 1000000);
+  app_.option("--seed", seed_, "first scene of the search for traps").within(0, 1000000);
   app_.option("--cpu", core_, "core to run on (default: the last)").within(0, 1023);
   app_.footer("Exit codes: 0 every limit is kept, 1 one is not, 2 bad input or set-up.");
 }
@@ -120,6 +123,8 @@ int Command::run(std::ostream& out) const {
   Effort effort = quick_ ? Effort::quick() : Effort{};
   effort.data = data_;
   if (!quick_ && only_ == std::vector<std::string>{"traps"}) effort.presses = 10000;
+  if (presses_ > 0) effort.presses = presses_;
+  effort.first_scene = static_cast<std::uint64_t>(seed_);
   Findings findings;
   out << "group    what                                                      value unit        "
          "must "

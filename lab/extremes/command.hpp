@@ -18,7 +18,7 @@ class Command final : public LabCommand {
   std::string report_, page_, data_;
   std::vector<std::string> only_;
   bool quick_ = false;
-  int core_ = -1;
+  int core_ = -1, presses_ = 0, seed_ = 0;
 };
 
 }  // namespace kerf::extremes

@@ -14,10 +14,9 @@ std::array<EdgedTool, 3> edged_tools() {
            {"STL, square bar, any pose", mesh_of_units("bar", prism(6, 16, 4))}}};
 }
 
-SceneTool shipped_bur() {
+SceneTool shipped_bur(double units_per_mm, double pitch) {
   constexpr const char* kFile = "scenes/burs/fluted.stl";
-  constexpr double kUnitsPerMm = 8;
-  return make_mesh_tool("bur", join_triangles(read_stl(kFile), kUnitsPerMm, kFile), 1);
+  return make_mesh_tool("bur", join_triangles(read_stl(kFile), units_per_mm, kFile), pitch);
 }
 
 }  // namespace kerf::extremes

@@ -18,8 +18,8 @@ struct EdgedTool {
 /// A cylinder, a cone and a mesh, 16 units long. Each is measured in any pose.
 [[nodiscard]] std::array<EdgedTool, 3> edged_tools();
 
-/// The fluted bur of scenes/fluted_bur.toml in voxels of 0.125 mm: 32 units long, 6.4 in radius.
-/// Throws SceneError where its file cannot be read.
-[[nodiscard]] SceneTool shipped_bur();
+/// The fluted bur of scenes/fluted_bur.toml, 4 mm long and 0.8 mm in radius, on a grid of this
+/// pitch; by default in voxels of 0.125 mm. Throws SceneError where its file cannot be read.
+[[nodiscard]] SceneTool shipped_bur(double units_per_mm = 8, double pitch = 1);
 
 }  // namespace kerf::extremes

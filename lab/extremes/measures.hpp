@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <optional>
@@ -41,9 +42,10 @@ struct Effort {
   VoxelGrid phantom{256, 256, 161};
   double hand_seconds = 8;
   int presses = 240;  ///< of tools that cut, 5 s each; all 10,000 where only these are asked
-  std::filesystem::path data;  ///< folder of real volumes; empty: there is none
+  std::uint64_t first_scene = 0;  ///< in which they are made (trap_scenes.hpp)
+  std::filesystem::path data;     ///< folder of real volumes; empty: there is none
 
-  [[nodiscard]] static Effort quick() { return {5, 2, 8, 1, 200, 8, {128, 128, 80}, 4, 24, {}}; }
+  [[nodiscard]] static Effort quick() { return {5, 2, 8, 1, 200, 8, {128, 128, 80}, 4, 24, 0, {}}; }
 };
 
 /// F7 (docs/validation.md): random motions at walls.

@@ -84,11 +84,14 @@ half. The angle between force and normal may be 1.5 times that at an iso of 0.45
 with a force that goes up to 1.2 N and back, however far the flat gives way; and sunk into a crown at the rate of
 enamel, at the worst of nine places. `GE tooth` is a real tooth by CT, below `--data` or `$KERF_DATA`.)"},
     {"traps", "Traps",
-     R"(A random search in the whole servo: a hand presses a ball, cylinder, cone, inverted cone, flame or wheel of 0.4 to
-1 mm with 0.1 to 1 N for 5 s, from any side and with a tremor of 0.1 mm, into a flat, a crown, layers around soft
-tissue, rubble or a pit, turned anyhow; machinability is 1, 4 or 8 times that of enamel. Wherever force presses with
-more than the threshold, matter must leave. What is all softer than the iso must bear nothing. 240 presses; 10,000 with
-`--only traps`.)"},
+     R"(A random search in the whole servo: a hand presses a tool of 0.4 to 1 mm or the fluted bur, half of them with a
+shaft, some with a handpiece, turned anyhow, with 0.1 to 1 N for 5 s, from any side and with a tremor of 0.1 mm: into a
+flat, a crown, layers, rubble, pits, shells, plates, or a block that ends at the volume's border. Half of these have
+soft matter in them, which may not be cut in half of those; machinability is 1, 4 or 8 times that of enamel. Of 24
+scenes 18 run in fixed point at 1 kHz and 250 Hz, the others at 8 kHz, in double and in float. Wherever force presses
+with more than the threshold, matter must leave. A shaft may bear what its own cylinders, where they touch, can balance
+by any forces along their normals; the rest is the head's. What is all softer than the iso must bear nothing. 240
+presses; 10,000 with `--only traps`; `--seed` names the first scene.)"},
     {"ticks", "Ticks",
      R"(On 256 x 256 x 161 voxels. The costliest tick of each tool is searched among thousands: at flat, sharp, hollow and
 noisy solids, in a slot with a play of 0.1 voxels, in tissue just below the iso and, where its data are, at the GE

@@ -11,6 +11,7 @@
 #include "lab/extremes/worst_tick.hpp"
 #include "lab/rig/bench_scene.hpp"
 #include "lab/rig/contact_rig.hpp"
+#include "lab/rig/shaft_rig.hpp"
 #include "lab/rig/tick_timer.hpp"
 #include "shared/numeric/percentile.hpp"
 
@@ -32,9 +33,15 @@ void measure_worst_ticks(const Effort& effort, const RowSink& add_row) {
     SceneTool tool;
     WorstTick worst;
   };
-  Subject subjects[] = {{"ball", tool_of_units("ball", kRadius, 2 * kRadius), {}},
-                        {"turning cylinder", tool_of_units("cylinder", 5, 16), {}},
-                        {"turning bur (STL)", shipped_bur(), {}}};
+  Subject subjects[] = {
+      {"ball", tool_of_units("ball", kRadius, 2 * kRadius), {}},
+      {"turning cylinder", tool_of_units("cylinder", 5, 16), {}},
+      {"turning bur (STL)", shipped_bur(), {}},
+      {"ball with a shaft", tool_with("ball", 5.6, 11.2, {.radius_mm = 3.6, .length_mm = 72}), {}},
+      {"inverted cone with a handpiece",
+       tool_with("inverted_cone", 6, 12,
+                 {.radius_mm = 4, .length_mm = 40, .handpiece_radius_mm = 12}),
+       {}}};
   for (const Trap& trap : worst_traps(effort.data)) {
     const Body body = trap.body();
     for (Subject& subject : subjects) {
@@ -46,6 +53,12 @@ void measure_worst_ticks(const Effort& effort, const RowSink& add_row) {
              std::string("proxy, ") + subject.name + ", costliest tick found (" +
                  subject.worst.trap + ")",
              subject.worst.us, "us", 60, 40});
+    add_row({"ticks",
+             std::string("proxy, ") + subject.name + ", samples of that tick",
+             static_cast<double>(subject.worst.samples),
+             "",
+             {},
+             {}});
   }
 }
 

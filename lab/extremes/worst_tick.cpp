@@ -8,6 +8,7 @@
 #include "controller/servo/proxy_contact.hpp"
 #include "lab/rig/bench_scene.hpp"
 #include "lab/rig/contact_rig.hpp"
+#include "lab/rig/shaft_rig.hpp"
 
 namespace kerf::extremes {
 namespace {
@@ -19,15 +20,14 @@ struct Tick {
   ProxyPose<N> goal;
   double ns = 0;
   std::int32_t queries = 0;
+  std::int64_t samples = 0;
 };
 
+template <class Rig>
 class Stopwatch {
  public:
-  Stopwatch(const SceneTool& tool, const Trap& trap, const Body& body)
-      : rig_(tool), plan_{.turn_step = {}, .ramp_per_tick = N::Real(1)} {
-    rig_.add(body, plain_frame<N>(), trap.iso);
-    plan_.turn_step = rig_.turn_step();
-  }
+  explicit Stopwatch(Rig& rig)
+      : rig_(rig), plan_{.turn_step = rig.turn_step(), .ramp_per_tick = N::Real(1)} {}
 
   /// Fastest of some runs; the state after them.
   ProxyState<N> time(Tick& tick, int runs) {
@@ -43,13 +43,14 @@ class Stopwatch {
       const double ns = std::chrono::duration<double, std::nano>(Clock::now() - start).count();
       fastest_ns = std::min(fastest_ns, ns);
       tick.queries = felt.queries;
+      tick.samples = rig_.field().spent();
     }
     tick.ns = fastest_ns;
     return after;
   }
 
  private:
-  ContactRig<N> rig_;
+  Rig& rig_;
   ProxyPlan<N> plan_;
 };
 
@@ -59,11 +60,9 @@ void keep_costliest(std::vector<Tick>& ticks, std::size_t count) {
   ticks.resize(std::min(ticks.size(), count));
 }
 
-}  // namespace
-
-void find_worst_tick(const SceneTool& tool, const Trap& trap, const Body& body, int ticks,
-                     WorstTick& worst) {
-  Stopwatch stopwatch(tool, trap, body);
+template <class Rig>
+void find_with(Rig& rig, const Trap& trap, int ticks, WorstTick& worst) {
+  Stopwatch<Rig> stopwatch(rig);
   Dice dice(3);
   std::vector<Tick> tried;
   ProxyState<N> state;
@@ -106,8 +105,20 @@ void find_worst_tick(const SceneTool& tool, const Trap& trap, const Body& body, 
     }
   }
   for (const Tick& tick : tried) {
-    if (tick.ns / 1e3 > worst.us) worst = {tick.ns / 1e3, tick.queries, trap.name};
+    if (tick.ns / 1e3 > worst.us) worst = {tick.ns / 1e3, tick.queries, trap.name, tick.samples};
   }
+}
+
+}  // namespace
+
+void find_worst_tick(const SceneTool& tool, const Trap& trap, const Body& body, int ticks,
+                     WorstTick& worst) {
+  if (tool.shaft.radius_mm > 0) {
+    ShaftRig<N> rig(tool, {&body}, trap.iso);
+    return find_with(rig, trap, ticks, worst);
+  }
+  ContactRig<N> rig(tool, body, trap.iso);
+  find_with(rig, trap, ticks, worst);
 }
 
 }  // namespace kerf::extremes

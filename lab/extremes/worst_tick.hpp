@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <string>
@@ -29,6 +30,7 @@ struct WorstTick {
   double us = 0;
   int queries = 0;
   std::string trap;
+  std::int64_t samples = 0;  ///< as query_work.hpp counts
 };
 
 /// Ticks of `follow` from a proxy that is placed or looks for a place, for goals near and far;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -9,6 +10,7 @@
 #include "controller/servo/device_report.hpp"
 #include "controller/servo/servo.hpp"
 #include "hil/devmodel/omni_arm.hpp"
+#include "shared/wire/omni_constants.hpp"
 
 namespace kerf {
 
@@ -25,6 +27,13 @@ class FakeArm {
   [[nodiscard]] DeviceReport at(double x_mm, double y_mm, double z_mm) {
     return report_of(arm_.joints_rad({x_mm, y_mm, z_mm}), false);
   }
+  /// Turns the wrist for all reports from now on: yaw, pitch and roll, to the nearest count.
+  void turn_wrist(const std::array<double, 3>& rad) {
+    for (std::size_t i = 0; i < 3; ++i) {
+      const double share = (rad[i] - omni::kGimbalOffsetRad[i]) / omni::kGimbalSlopeRad[i];
+      wiper_[i] = static_cast<std::uint16_t>(std::lround(std::clamp(share, 0.0, 1.0) * kWipers));
+    }
+  }
 
  private:
   DeviceReport report_of(JointVec<double> q, bool docked) {
@@ -33,8 +42,9 @@ class FakeArm {
     report.fresh = true;
     report.parked = docked;
     report.counter = ++counter_;
-    report.wiper_a = report.wiper_b = {0x8000, 0x8000, 0x8000};
     for (std::size_t i = 0; i < 3; ++i) {
+      report.wiper_a[i] = wiper_[i];
+      report.wiper_b[i] = static_cast<std::uint16_t>(kWipers - wiper_[i]);
       const double turned = (joints[i] - omni::kDockRad[i]) / omni::kRadPerCount;
       const auto counts = kPowerUp[i] + omni::kEncoderSign[i] * std::lround(turned);
       report.encoder[i] = static_cast<std::int16_t>(counts);  // wraps as the device does
@@ -43,7 +53,9 @@ class FakeArm {
   }
 
   static constexpr std::array<long, 3> kPowerUp{32760, -32700, 32700};
+  static constexpr std::uint16_t kWipers = 0xfffe;  ///< both of a pot; the middle is a whole count
   OmniArm arm_;
+  std::array<std::uint16_t, 3> wiper_{kWipers / 2, kWipers / 2, kWipers / 2};
   std::uint32_t counter_ = 0;
 };
 

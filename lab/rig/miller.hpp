@@ -44,7 +44,10 @@ class Miller {
     static_cast<void>(hold(start_mm, 0.3));
   }
 
+  /// For all steps from now on: yaw, pitch and roll.
+  void turn_wrist(const std::array<double, 3>& rad) { arm_.turn_wrist(rad); }
   ServoOutput step(const std::array<double, 3>& at_mm) {
+    at_mm_ = at_mm;
     const ServoOutput out = servo_->step(arm_.at(at_mm[0], at_mm[1], at_mm[2]));
     for (std::size_t v = 0; v < mm3_per_step_.size(); ++v) {
       removed_mm3_ += mm3_per_step_[v] * static_cast<double>(out.removed_by_volume[v]);
@@ -52,6 +55,15 @@ class Miller {
     fed_mm3_ +=
         machinability_ * std::max(0.0, out.press_n - threshold_n_) * out.spindle_ratio * tick_s_;
     return out;
+  }
+  /// From where the hand is along a line, at 1 m/s.
+  void travel(const Point& to_mm) {
+    constexpr double kMmPerS = 1000;
+    const Point from_mm = at_mm_, way = to_mm - from_mm;
+    const int ticks = 1 + static_cast<int>(length(way) / (kMmPerS * tick_s_));
+    for (int i = 1; i <= ticks; ++i) {
+      static_cast<void>(step(from_mm + static_cast<double>(i) / ticks * way));
+    }
   }
   ServoOutput hold(const std::array<double, 3>& at_mm, double seconds) {
     ServoOutput out;
@@ -69,6 +81,7 @@ class Miller {
   std::vector<double> mm3_per_step_;
   std::unique_ptr<Servo> servo_;
   FakeArm arm_;
+  Point at_mm_{};
   double removed_mm3_ = 0, fed_mm3_ = 0;
 };
 

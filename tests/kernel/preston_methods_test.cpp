@@ -178,16 +178,22 @@ TEST_CASE("what materials bear of a press is the same in groups, on every instru
       for (auto& row : rims.row) {
         for (auto& entry : row) entry = N::Ratio(i % 4 == 0 ? 60 * part(random) : 0.2);
       }
-      const double long_press = i % 3 == 0 ? 16 : 1;
-      const AheadForm<N::Sum> form = ahead_form<N>(
-          at, rims, {N::Ratio(part(random)), N::Ratio(long_press * part(random)), N::Ratio(0.1)});
+      const BearingPlane<N> plane{{N::Unit(part(random)), N::Unit(part(random)), N::Unit(0.1)},
+                                  N::Ratio(i % 2 == 0 ? -1 : 20 * part(random)),
+                                  N::Ratio(i % 3 == 0 ? 16 : 1)};
+      const AheadForm<N::Sum> form = ahead_form<N>(at, rims, plane);
+      constexpr Density kIso = 30000;
       overlap<N>(grid, tool, pose, N::kStepOne, cutter.overlap);
       const auto covered = covered_voxels<N>(grid, std::span<const Density>(volume.density), labels,
                                              cutter.overlap, frame, std::span(list));
-      const auto truth = loads(covered, form);
-      for (std::size_t m = 0; m < truth.size(); ++m) {
-        REQUIRE(truth[m] <= covered.weight[m]);
-        some += truth[m] > 0 && truth[m] < covered.weight[m] ? 1 : 0;
+      const auto truth = loads(covered, form, volume.density, kIso);
+      for (std::size_t m = 0; m < kMaxCutMaterials; ++m) {
+        REQUIRE(truth.bearing[m] <= truth.ahead[m]);
+        REQUIRE(truth.ahead[m] <= covered.weight[m]);
+        some += truth.bearing[m] > 0 && truth.bearing[m] < truth.ahead[m] &&
+                        truth.ahead[m] < covered.weight[m]
+                    ? 1
+                    : 0;
       }
       for (auto set = kernel_sets(); *set != nullptr; ++set) {
         INFO(std::string((*set)->name), ", fill ", fill, ", case ", i);
@@ -196,7 +202,7 @@ TEST_CASE("what materials bear of a press is the same in groups, on every instru
         const AlignedTick tick(**set, table.table(), memory.view(), grid, density, pose);
         tick.cover();
         const bool same = loads(covered_groups(**set, grid, labels, tick.overlap(), frame, groups),
-                                form) == truth;
+                                form, density, kIso) == truth;
         REQUIRE(same);
       }
     }
@@ -204,7 +210,7 @@ TEST_CASE("what materials bear of a press is the same in groups, on every instru
   CHECK(some > 100);
 }
 
-TEST_CASE_TEMPLATE("a tool bears where it looks ahead", N, FixedNumbers, DoubleNumbers) {
+TEST_CASE_TEMPLATE("a tool bears what lies at its contact", N, FixedNumbers, DoubleNumbers) {
   using Ratio = typename N::Ratio;
   using Unit = typename N::Unit;
   using Real = typename N::Real;
@@ -219,14 +225,18 @@ TEST_CASE_TEMPLATE("a tool bears where it looks ahead", N, FixedNumbers, DoubleN
   };
   const WorldVec<Unit> up{{}, Unit(1), {}}, left{Unit(-1), {}, {}};
   // A ball that presses towards +x is foremost there, at its rim.
-  const auto ball = ahead_form<N>(centre, rims, scaled_press<N>(left, up, Ratio(1)));
+  const auto ball = ahead_form<N>(centre, rims, {left, Ratio(-1), Ratio(1)});
   CHECK(ahead(ball, 28, 30, 40) == doctest::Approx(1).epsilon(1e-5));
   CHECK(std::abs(ahead(ball, 20, 22, 48)) < 1e-5);
   CHECK(ahead(ball, 12, 30, 40) == doctest::Approx(-1).epsilon(1e-5));
-  // A tool of three times its radius that presses down is foremost at its end.
-  const auto tall = ahead_form<N>(centre, rims, scaled_press<N>(up, up, Ratio(1.0 / 3)));
-  CHECK(ahead(tall, 20, 6, 40) == doctest::Approx(1).epsilon(1e-4));
-  CHECK(ahead(tall, 28, 18, 40) == doctest::Approx(0.5).epsilon(1e-4));
+  // One whose end is three rims below its centre bears within one voxel above that end.
+  const auto end = ahead_form<N>(centre, rims, {up, Ratio(-3), Ratio(8)});
+  for (const double x : {12, 20, 28}) {
+    CHECK(ahead(end, x, 6, 40) == doctest::Approx(1).epsilon(1e-4));
+    CHECK(ahead(end, x, 6.5, 40) == doctest::Approx(0.5).epsilon(1e-4));
+    CHECK(std::abs(ahead(end, x, 7, 40)) < 1e-4);
+  }
+  CHECK(ahead(ahead_everywhere<N>(), 3, 5, 60) == 1);
 }
 
 TEST_CASE("a long thin tool of any step along its rows weighs the same in groups") {

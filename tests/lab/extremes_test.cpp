@@ -78,6 +78,13 @@ TEST_CASE("the report has each row with its limit and whether it is kept, and th
   CHECK(answer.code == (all ? 0 : 1));
 }
 
+TEST_CASE("a head that is wedged against its own shaft between two walls goes on cutting") {
+  // The sent force stands across the face that the head is pressed on.
+  const Answer answer = extremes({"--only", "traps", "--presses", "23", "--seed", "5"});
+  CAPTURE(answer.said);
+  CHECK(answer.code == 0);
+}
+
 TEST_CASE("the paper's force ends inside of a wall and can be passed; the proxy's does not") {
   const Comparison comparison = compare(Effort::quick(), [](const Row&) {});
   for (const Wall& wall : comparison.walls) {

@@ -2,92 +2,19 @@
 // A tool with a shaft among bodies: the same contact, with planes that are marked.
 #include <array>
 #include <cmath>
-#include <deque>
 #include <numbers>
-#include <optional>
 #include <utility>
 #include <vector>
 
 #include <doctest/doctest.h>
 
-#include "controller/kernel/proxy/tool_query.hpp"
-#include "controller/tool/tool_shaft.hpp"
-#include "lab/rig/contact_rig.hpp"
 #include "lab/rig/posed_tool.hpp"
+#include "lab/rig/shaft_rig.hpp"
 
 using namespace kerf;
 using namespace kerf::extremes;
 
 namespace {
-
-/// A tool of voxels of 1 mm with its shaft, so that mm are units.
-SceneTool tool_with(const char* shape, double radius, double length, const ShaftSize& shaft) {
-  SceneTool tool = tool_of_units(shape, radius, length);
-  tool.shaft = tool_shaft(shaft, length);
-  return tool;
-}
-
-/// It among bodies, felt by the servo's own query.
-template <class N>
-class ShaftRig {
- public:
-  ShaftRig(const SceneTool& tool, const std::vector<const Body*>& bodies) {
-    const SampledTool head(tool);
-    shells_.emplace_back(head.samples, head.round, head.close);
-    head_ = shells_.back().point_shell();
-    double reach = double(head_.reach);
-    for (const ToolPart& part : parts_behind(tool)) {
-      const PartSamples samples = part_samples(tool, part, 1);
-      shells_.emplace_back(samples.samples, false, samples.close);
-      behind_.part[behind_.count++] = {shells_.back().point_shell(),
-                                       typename N::Real(part.middle_mm)};
-      reach = std::max(reach, part.middle_mm + double(shells_.back().point_shell().reach));
-    }
-    turn_step_ = turn_step_of(reach);
-    for (const Body* body : bodies) {
-      maps_.emplace_back(body->grid, body->density, static_cast<Density>(kIso / 8));
-      for (std::size_t i = 0; i <= behind_.count; ++i) {
-        places_.emplace_back().hold(i == 0 ? head_ : behind_.part[i - 1].point_shell);
-        volumes_[i].push_back(
-            {{body->grid, body->density.data(), density_scale(kIso), maps_.back().bricks()},
-             plain_frame<N>(),
-             places_.back().places()});
-      }
-    }
-    field_.emplace(**kernel_sets(), head_, volumes_[0], behind_,
-                   std::array{std::span<const ContactVolume<N>>(volumes_[1]),
-                              std::span<const ContactVolume<N>>(volumes_[2])});
-  }
-
-  ProxyContact<N> tick(Point hand, const ToolTurn<N>& turn = {}) {
-    field_->begin_tick();
-    return kerf::follow<N>(
-        {.turn_step = typename N::Unit(turn_step_), .ramp_per_tick = typename N::Real(1)}, state_,
-        *field_, {place_of<N>(hand), turn});
-  }
-  /// The last of so many ticks along a line.
-  ProxyContact<N> lead(Point from, Point to, int ticks, const ToolTurn<N>& turn = {}) {
-    ProxyContact<N> contact;
-    for (int i = 1; i <= ticks; ++i) {
-      contact = tick(from + (double(i) / ticks) * (to - from), turn);
-    }
-    return contact;
-  }
-  [[nodiscard]] ToolQuery<N>& field() { return *field_; }
-  [[nodiscard]] Point proxy() const { return point_of<N>(state_.pose.centre); }
-  [[nodiscard]] const ProxyState<N>& state() const { return state_; }
-
- private:
-  std::deque<ToolPoints<N>> shells_;
-  PointShell<N> head_;
-  PartsBehind<N> behind_;
-  std::deque<FreeBrickMap> maps_;
-  std::deque<PlaceMemory<N>> places_;
-  std::array<std::vector<ContactVolume<N>>, 1 + kMostBehind> volumes_;
-  std::optional<ToolQuery<N>> field_;
-  double turn_step_ = 0;
-  ProxyState<N> state_;
-};
 
 constexpr ShaftSize kShaft{.radius_mm = 3, .length_mm = 45};
 const VoxelGrid kGrid{80, 80, 64};
@@ -99,6 +26,11 @@ Body ledge() {
 /// Solid below the height 20.
 Body floor_body() {
   return blurred(kGrid, [](Point p) { return p[1] - 20; });
+}
+
+template <class Unit>
+Point point_from(ContactVec<Unit> v) {
+  return {double(v.x), double(v.y), double(v.z)};
 }
 
 template <class N>
@@ -193,7 +125,7 @@ TEST_CASE_TEMPLATE("on a floor and a ledge of two volumes head and shaft each be
   CHECK(rig.proxy()[1] == doctest::Approx(25).epsilon(0.002));
   // 4 units to the side and 3 up.
   CHECK(double(held.behind_share) == doctest::Approx(0.8).epsilon(0.01));
-  CHECK(double(held.head_share) == doctest::Approx(1).epsilon(0.01));
+  CHECK(double(held.head_share) == doctest::Approx(0.6).epsilon(0.01));
   CHECK(double(held.normal.y) == doctest::Approx(1).epsilon(0.001));
   // The ball's part has no moment; the ledge is 22 above.
   CHECK(double(held.moment_arm.z) == doctest::Approx(-22 * 0.8).epsilon(0.02));
@@ -214,7 +146,26 @@ TEST_CASE_TEMPLATE("where head and shaft press alike, in part, the head's part i
   CHECK(double(held.normal.x) == doctest::Approx(std::sqrt(0.5)).epsilon(0.005));
   CHECK(double(held.normal.y) == doctest::Approx(std::sqrt(0.5)).epsilon(0.005));
   CHECK(double(held.behind_share) == doctest::Approx(1.0 / 5).epsilon(0.05));
-  CHECK(double(held.head_share) == doctest::Approx(6.0 / 7).epsilon(0.01));
+  CHECK(double(held.head_share) == doctest::Approx(std::sqrt(18.0) / 5).epsilon(0.01));
+}
+
+TEST_CASE_TEMPLATE("a head bears its part where its face stands across the force", N, FixedNumbers,
+                   DoubleNumbers) {
+  // The face of normal (-1/2, sqrt(3)/2) is below the ball when that is at (33, 25).
+  const Point face{-0.5, std::numbers::sqrt3 / 2, 0};
+  const Body wall = ledge(), ramp = blurred(kGrid, [&](Point p) {
+                               return dot(face, p - Point{33, 25, 32}) + 5;
+                             });
+  ShaftRig<N> rig(tool_with("ball", 5, 10, kShaft), {&wall, &ramp});
+  // The spring is 2 along the face's normal and 4 along that of the ledge, (1, 0): no part of it is
+  // along the face's.
+  const Point spring = 2 * face + Point{4, 0, 0}, hand = Point{33, 25, 32} - spring;
+  rig.lead({48, 45, 32}, hand, 200);
+  const ProxyContact<N> held = rig.tick(hand);
+  CHECK(length(rig.proxy() - Point{33, 25, 32}) < 0.1);
+  const double force = dot(point_of<N>(held.spring), point_from(held.press));
+  CHECK(force * double(held.head_share) == doctest::Approx(2).epsilon(0.03));
+  CHECK(dot(point_from(held.normal), face) == doctest::Approx(1).epsilon(0.001));
 }
 
 TEST_CASE_TEMPLATE("a shaft as wide as its head lies beside it on a wall, neither deeper", N,

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include <doctest/doctest.h>
@@ -100,9 +101,13 @@ TEST_CASE("two materials under one face share the press by what lies ahead in ea
   }
 }
 
-TEST_CASE("a cone on its flank cuts the rim of a hole, whatever soft forbidden matter fills it") {
+namespace {
+
+constexpr Density kSoft = 14000;  // of an iso of 32768
+
+/// A cone upright above a hole of three quarters of its largest radius, full of `filling`.
+LoadedScene filled_hole(Density filling, bool forbidden) {
   LoadedScene scene = bored_scene("cone");
-  // A hole of half the cone's largest radius, full of what bears nothing and may not be cut.
   SceneVolume& volume = scene.volumes[0];
   VolumeImage& image = volume.image;
   const double corner_mm = volume.pose.position_mm[0];
@@ -113,13 +118,50 @@ TEST_CASE("a cone on its flank cuts the rim of a hole, whatever soft forbidden m
     const bool hole = std::hypot(x, z) < 0.75 * kRadiusMm;
     const auto at = static_cast<std::size_t>(i);
     image.labels[at] = hole ? kLabelPulp : kLow;
-    image.density[at] = y > kTopMm ? Density{0} : hole ? Density{14000} : Density{65535};
+    image.density[at] = y > kTopMm ? Density{0} : hole ? filling : Density{65535};
   }
-  scene.materials[kLabelPulp].forbidden = true;
+  scene.materials[kLabelPulp].forbidden = forbidden;
+  return scene;
+}
+
+/// What a press of half a second takes of either material, in voxels, and the press.
+struct Taken {
+  double rim = 0, filling = 0, press_n = 0;
+};
+Taken press_into(LoadedScene scene) {
+  const std::vector<Label> labels = scene.volumes[0].image.labels;
+  const std::vector<Density> before = scene.volumes[0].image.density;
   const double half_mm = scene.tools[0].length_mm / 2;
-  Miller miller(scene, {0, kTopMm + half_mm + 0.5, 0});
-  const double before_mm3 = miller.removed_mm3();
-  const ServoOutput out = miller.hold({0, kTopMm - half_mm, 0}, 0.5);
-  CHECK(out.press_n > 0.1);
-  CHECK(miller.removed_mm3() > before_mm3 + 0.001);  // the soft matter takes its part of the press
+  Miller miller(std::move(scene), {0, kTopMm + half_mm + 0.5, 0});
+  Taken taken;
+  taken.press_n = miller.hold({0, kTopMm - half_mm, 0}, 0.5).press_n;
+  const auto after = miller.servo().density(0);
+  for (std::size_t i = 0; i < before.size(); ++i) {
+    (labels[i] == kLabelPulp ? taken.filling : taken.rim) +=
+        double(before[i] - after[i]) / kDensityMax;
+  }
+  return taken;
+}
+
+}  // namespace
+
+TEST_CASE("a cone on its flank cuts the rim of a hole, whatever soft matter fills it") {
+  for (const auto numeric : {NumericKind::fixed, NumericKind::float64}) {
+    CAPTURE(static_cast<int>(numeric));
+    const auto press = [&](Density filling, bool forbidden) {
+      LoadedScene scene = filled_hole(filling, forbidden);
+      scene.servo.numeric = numeric;
+      return press_into(std::move(scene));
+    };
+    const Taken empty = press(0, true), forbidden = press(kSoft, true), soft = press(kSoft, false);
+    MESSAGE("rim of an empty hole ", empty.rim, ", of one full of soft matter that may not be cut ",
+            forbidden.rim, ", that may ", soft.rim, " and of that ", soft.filling);
+    CHECK(empty.press_n > 0.1);
+    CHECK(empty.rim > 10);
+    // The soft matter bears nothing: the rim gets all of the press.
+    CHECK(forbidden.rim == doctest::Approx(empty.rim).epsilon(0.05));
+    CHECK(forbidden.filling == 0);
+    CHECK(soft.rim == doctest::Approx(empty.rim).epsilon(0.05));
+    CHECK(soft.filling > 1);
+  }
 }

@@ -41,6 +41,7 @@ Notice write_for_user(const std::string& what, const Write& write) {
 }
 
 using namespace std::string_literals;
+
 /// Asks for the tool of a digit's key.
 void take_tool(char key, Session& session, Notices& notices, Notices::Clock::time_point now) {
   const std::size_t tools = session.scene().tools.size();

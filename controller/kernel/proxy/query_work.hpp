@@ -16,8 +16,9 @@ namespace kerf {
 /// What the queries of one tool cost in all volumes together, counted in samples that are read. It
 /// bounds a tick (`ContactQuery::begin_tick`, docs/theory.md 4.8), and a scene is planned with it.
 struct QueryWork {
-  /// What a tick may read, some 2.5 ns each; a tool of very many samples may make kLeastQueries.
-  static constexpr std::int64_t kTickSamples = 18000;
+  /// What a tick may read, some 2.5 ns each. A head of very many samples may make kLeastQueries, and
+  /// a whole tool with its shaft as many as kShaftedSamples allow: 53 us.
+  static constexpr std::int64_t kTickSamples = 18000, kShaftedSamples = 21000;
   static constexpr std::int64_t kLeastQueries = 12;
   static constexpr std::int64_t kLookSamples = 128;  ///< what a look costs besides those it reads
   static constexpr std::int64_t kCloseSamples = 2;   ///< what one of a closeup costs
@@ -28,17 +29,22 @@ struct QueryWork {
   std::int64_t query = 0;   ///< one query at most: all samples in every volume
   std::int64_t closer = 0;  ///< its closer looks at most
   std::int64_t turn = 0;    ///< to place all samples anew
+  std::int64_t head = 0;    ///< query and turn of the head alone; 0: there is nothing behind it
 
-  /// Of two point shells that are queried together.
+  /// Of a head, or of it and a part behind, and one more part. The head and one part may always
+  /// look closer; another one does where there is work left for it.
   [[nodiscard]] friend constexpr QueryWork operator+(const QueryWork& a,
                                                      const QueryWork& b) noexcept {
-    return {a.query + b.query, a.closer + b.closer, a.turn + b.turn};
+    const bool more = a.head > 0;
+    return {a.query + b.query, more ? a.closer : a.closer + b.closer, a.turn + b.turn,
+            more ? a.head : a.query + a.turn};
   }
-
   /// Of a tick. No query begins that might go beyond it, but for the first after a turn, which then
   /// has no closer look.
   [[nodiscard]] constexpr std::int64_t budget() const noexcept {
-    return std::max(kTickSamples, kLeastQueries * (query + turn));
+    const std::int64_t least = kLeastQueries * (query + turn);
+    const std::int64_t fits = std::max(kShaftedSamples, kLeastQueries * head);
+    return std::max(kTickSamples, head > 0 ? std::min(least, fits) : least);
   }
   /// Once so much of it went into free ways that led nowhere, no group looks for one.
   [[nodiscard]] constexpr std::int64_t in_vain() const noexcept { return budget() / 8; }

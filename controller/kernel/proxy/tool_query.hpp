@@ -107,11 +107,19 @@ class ToolQuery {
     if (felt.buried) return felt;
     turned_ = false;
     on_account(head_, [&](const ContactQuery<N>& head) { felt = head.look(q, closer); });
+    std::int64_t to_come = work_.query - head_.work().query;
+    if (closer && left_ < to_come) {
+      felt = {};
+      felt.buried = true;
+      return felt;
+    }
     each_behind([&](Part& part) {
       Contacts<N> seen;
+      const bool near = closer && left_ >= to_come + part.query.work().closer;
       on_account(part.query, [&](const ContactQuery<N>& query) {
-        seen = query.look(q + part.from_head, closer);
+        seen = query.look(q + part.from_head, near);
       });
+      to_come -= part.query.work().query;
       for (std::size_t i = 0; i < static_cast<std::size_t>(seen.count); ++i) {
         ConstraintPlane<N> plane = seen.plane[i];
         plane.arm = plane.arm + part.from_head;

@@ -121,24 +121,47 @@ void weigh_again(CoveredGroup* list, std::int32_t count, std::uint64_t* by_mater
   }
 }
 
-/// Adds up what the materials of `count` groups bear of a press.
+/// Densities of a group in a volume of `entries`; false where it is not all in there: no lane
+/// outside is covered.
+[[gnu::always_inline]] inline bool read_group(const CoveredGroup& group,
+                                              const std::uint16_t* density, std::int64_t entries,
+                                              std::uint16_t (&rho)[kCoverGroup]) noexcept {
+  if (group.at >= 0 && group.at + kCoverGroup <= entries) {
+    std::memcpy(rho, density + group.at, sizeof rho);
+    return true;
+  }
+  KERF_LANES
+  for (std::int32_t i = 0; i < kCoverGroup; ++i) {
+    rho[i] = group.covered[i] != 0 ? density[group.at + i] : 0;
+  }
+  return false;
+}
+
+/// Adds up what the materials of `count` groups have at a contact, and what of that reaches `iso`.
 void add_loads(const AheadForm<std::int64_t>& form, const CoveredGroup* list, std::int32_t count,
-               std::uint64_t* by_material) noexcept {
+               const std::uint16_t* density, std::int64_t entries, std::uint16_t iso,
+               std::uint64_t* ahead_of, std::uint64_t* bearing_of) noexcept {
   constexpr std::int64_t kOne = 1 << 20;
   for (const CoveredGroup* group = list; group != list + count; ++group) {
     const std::int64_t first = form.origin + form.step[0] * group->place[0] +
                                form.step[1] * group->place[1] + form.step[2] * group->place[2];
-    std::uint32_t load[kCoverGroup];
-    std::uint64_t sum = 0;
+    if (first <= 0 && first + (kCoverGroup - 1) * form.step[0] <= 0) continue;
+    alignas(32) std::uint16_t rho[kCoverGroup];
+    static_cast<void>(read_group(*group, density, entries, rho));
+    std::uint32_t load[kCoverGroup], borne[kCoverGroup];
+    std::uint64_t sum = 0, borne_sum = 0;
     KERF_LANES
     for (std::int32_t i = 0; i < kCoverGroup; ++i) {
       const std::int64_t ahead = first + i * form.step[0];
       const std::int64_t positive = ahead < 0 ? 0 : ahead;
       const auto weight = static_cast<std::uint32_t>((positive > kOne ? kOne : positive) >> 5);
       load[i] = weight_in_parts(group->weight[i], weight);
+      borne[i] = rho[i] >= iso ? load[i] : 0;
       sum += load[i];
+      borne_sum += borne[i];
     }
-    add_weights(*group, load, sum, by_material);
+    add_weights(*group, load, sum, ahead_of);
+    add_weights(*group, borne, borne_sum, bearing_of);
   }
 }
 
@@ -148,15 +171,7 @@ void take_steps(const CoverSpend& spend, CoveredGroup* list, std::int32_t count,
   for (CoveredGroup* group = list; group != list + count; ++group) {
     alignas(32) std::uint16_t rho[kCoverGroup];
     const std::int64_t at = group->at;
-    const bool whole = at >= 0 && at + kCoverGroup <= entries;
-    if (whole) {
-      std::memcpy(rho, density + at, sizeof rho);
-    } else {  // no lane outside of the volume is covered
-      KERF_LANES
-      for (std::int32_t i = 0; i < kCoverGroup; ++i) {
-        rho[i] = group->covered[i] != 0 ? density[at + i] : 0;
-      }
-    }
+    const bool whole = read_group(*group, density, entries, rho);
     const TakenLanes lost = take_lanes(spend, *group, rho);
     taken.full = taken.full || lost.full;
     if (lost.lanes == 0) continue;
