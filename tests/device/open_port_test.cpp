@@ -13,7 +13,8 @@ const std::atomic<bool> kGoOn{false};
 
 std::string error_of(const std::string& text, kerf::Personality personality) {
   try {
-    static_cast<void>(kerf::open_port(kerf::resolve_port(text, personality), {personality}, 0, kGoOn));
+    static_cast<void>(
+        kerf::open_port(kerf::resolve_port(text, personality), {personality}, 0, kGoOn));
   } catch (const std::runtime_error& error) {
     return error.what();
   }
