@@ -70,11 +70,20 @@ StopSignalsElsewhere::StopSignalsElsewhere() noexcept {
   sigemptyset(&asking);
   for (const int signal : kAsks) sigaddset(&asking, signal);
   for (int signal = SIGRTMIN; signal <= SIGRTMAX; ++signal) sigaddset(&asking, signal);
+  for (const int signal : {SIGQUIT, SIGABRT})
+    sigaddset(&asking, signal);  // abort() unblocks its own
   pthread_sigmask(SIG_BLOCK, &asking, &before_);
 }
 
 StopSignalsElsewhere::~StopSignalsElsewhere() {
   pthread_sigmask(SIG_SETMASK, &before_, nullptr);
+}
+
+void leave_signals_to_others() noexcept {
+  sigset_t all;
+  sigfillset(&all);
+  for (const int crash : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGSYS, SIGTRAP}) sigdelset(&all, crash);
+  pthread_sigmask(SIG_BLOCK, &all, nullptr);
 }
 
 std::span<const int> crash_signals() noexcept {

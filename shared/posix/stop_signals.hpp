@@ -40,8 +40,9 @@ void make_signals_of_writes_errors() noexcept;
 /// It may do only what a signal handler may, and must not wait.
 void at_stop_signal(void (*act)() noexcept) noexcept;
 
-/// While one of these lives the calling thread leaves signals that ask for the end to the others,
-/// so that those with a right to real time hear of them on a busy machine too.
+/// While one of these lives the calling thread leaves signals that ask for the end, and QUIT and
+/// ABRT from outside, to the others, so that those with a right to real time hear of them on a busy
+/// machine too. The other crashes belong to the thread that met them.
 class StopSignalsElsewhere {
  public:
   StopSignalsElsewhere() noexcept;
@@ -52,6 +53,10 @@ class StopSignalsElsewhere {
  private:
   sigset_t before_;
 };
+
+/// First thing in a thread whose system calls no signal may cut short: from now on it hears of
+/// crashes alone.
+void leave_signals_to_others() noexcept;
 
 /// Those of the second kind, for whoever has something to do before they take their course.
 [[nodiscard]] std::span<const int> crash_signals() noexcept;

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cerrno>
-#include <csignal>
 #include <cstring>
 #include <string>
 #include <thread>
@@ -20,6 +19,7 @@
 
 #include "shared/posix/failure.hpp"
 #include "shared/posix/peer.hpp"
+#include "shared/posix/stop_signals.hpp"
 #include "shared/segment/hand_over.hpp"
 #include "shared/segment/hand_over_wire.hpp"
 #include "shared/segment/layout_table.hpp"
@@ -118,10 +118,7 @@ struct SegmentServer::State {
   State& operator=(const State&) = delete;
 
   void serve() noexcept {
-    sigset_t all;
-    sigfillset(&all);
-    for (const int fault : {SIGSEGV, SIGBUS, SIGFPE, SIGILL}) sigdelset(&all, fault);
-    pthread_sigmask(SIG_BLOCK, &all, nullptr);  // signals go to the main thread
+    leave_signals_to_others();
     const sched_param normal{};
     pthread_setschedparam(pthread_self(), SCHED_OTHER, &normal);
     for (;;) {

@@ -178,7 +178,7 @@ TEST_CASE("every signal that ends a process by default switches the motors off f
       std::this_thread::sleep_for(std::chrono::milliseconds(5));
     });
     CHECK(ending.last == kNeutral);
-    CHECK(is_crash(signal) ? ending.was_ended_by(signal) : ending.exited_with(0));
+    CHECK((is_crash(signal) ? ending.was_ended_by(signal) : ending.exited_with(0)));
     if (ending.off_ms > slowest_ms) {
       slowest_ms = ending.off_ms;
       slowest = signal;

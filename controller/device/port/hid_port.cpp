@@ -19,6 +19,7 @@
 #include "controller/device/port/packet_port.hpp"
 #include "shared/posix/cores.hpp"
 #include "shared/posix/failure.hpp"
+#include "shared/posix/stop_signals.hpp"
 #include "shared/wire/wooden_constants.hpp"
 
 namespace kerf {
@@ -174,6 +175,7 @@ bool HidPort::send_last(std::span<const std::uint8_t> packet) noexcept {
 }
 
 void HidPort::read_reports() noexcept {
+  leave_signals_to_others();  // a call that one cut short would look like a device that is gone
   hurry();
   std::array<std::uint8_t, MailboxPacket::kMaxBytes> report{};
   while (!stop_ && !closed()) {
@@ -185,6 +187,7 @@ void HidPort::read_reports() noexcept {
 }
 
 void HidPort::write_commands() noexcept {
+  leave_signals_to_others();
   writer_id_ = gettid();
   hurry();
   while (!stop_ || !outbox_.empty()) {

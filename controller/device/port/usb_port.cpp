@@ -13,6 +13,7 @@
 #include "controller/device/port/packet_port.hpp"
 #include "shared/posix/cores.hpp"
 #include "shared/posix/monotonic_clock.hpp"
+#include "shared/posix/stop_signals.hpp"
 
 namespace kerf {
 namespace {
@@ -102,6 +103,7 @@ std::vector<LinkCounter> UsbPort::counters() const {
 }
 
 void UsbPort::run() noexcept {
+  leave_signals_to_others();
   thread_id_ = gettid();
   // Without the right to either, packets come later; the servo's own start tells the user.
   static_cast<void>(pin_to_core(allowed_cores().back()));
