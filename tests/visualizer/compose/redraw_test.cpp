@@ -381,7 +381,7 @@ TEST_CASE("a banner wider than the picture of an eye ends where that ends") {
   Controller controller;
   Session session("redraw");
   session.poll();
-  constexpr PictureSize kOdd{161, 120};
+  constexpr PictureSize kOdd{97, 73};  // an eye has 48 columns, a banner at least 60
   Picture picture(session, {.renderer = "iso", .stereo = {.on = true}}, 4.0 / 3.0);
   const RenderTarget target(kOdd), anew(kOdd);
   OverlayFigures figures;
