@@ -52,24 +52,27 @@ void act(Monkey& monkey) {
   if (!g_gl_fault.empty()) throw kerf::VisualizerError(std::exchange(g_gl_fault, {}));
 }
 
+void write(const fs::path& file, const kerf::MonkeyPicture& picture) {
+  if (picture.size.width > 0) kerf::write_png(file, picture.size, picture.rgb);
+}
+
 /// True where all went well; else says what did not, and writes both pictures.
 bool play(kerf::GlContext& context, std::uint32_t seed, const fs::path& files,
           const MonkeyOptions& options, Monkey::Count& count) {
   auto* const window = options.window ? dynamic_cast<kerf::Window*>(&context) : nullptr;
   Monkey monkey(context, {seed, files, window, options.large});
   try {
-    while (monkey.count().events < options.events) {
+    while (monkey.count().events < options.events && !kerf::stop_requested()) {
       act(monkey);
       if (options.trace) std::fprintf(stderr, "%s\n", monkey.event().c_str());
     }
     count += monkey.count();
     return true;
   } catch (const kerf::VisualizerError& problem) {
+    count += monkey.count();
     kerf::make_folder(options.out);
-    kerf::write_png(options.out / "shown.png", monkey.shown().size, monkey.shown().rgb);
-    if (monkey.expected().size.width > 0) {
-      kerf::write_png(options.out / "expected.png", monkey.expected().size, monkey.expected().rgb);
-    }
+    write(options.out / "shown.png", monkey.shown());
+    write(options.out / "expected.png", monkey.expected());
     std::fprintf(stderr,
                  "seed %u, event %ju (%s): %s; both pictures are in %s, again: "
                  "kerf-visualizer-monkey --seed %u --events %ju --seconds 0 --trace\n",
@@ -112,7 +115,7 @@ int main(int argc, char** argv) {
         "kerf-visualizer-monkey", "kerf-visualizer-monkey " KERF_VERSION);
     app.option("--seed", options.seed, "of the first round; the next ones count up")
         .shows_default();
-    app.option("--events", options.events, "of each round").shows_default();
+    app.option("--events", options.events, "of each round").within(1, 1e9).shows_default();
     app.option("--seconds", options.seconds, "rounds begin until this time is over")
         .within(0.0, 1e6)
         .shows_default();

@@ -375,17 +375,17 @@ TEST_CASE("a target made anew in the place of another, a column narrower, is dra
   CHECK(same);
 }
 
-TEST_CASE("panels wider than the picture of an eye end where that ends") {
+TEST_CASE("a banner wider than the picture of an eye ends where that ends") {
   if (!have_gl()) return;
   const Place place;
   Controller controller;
   Session session("redraw");
   session.poll();
-  constexpr PictureSize kOdd{161, 120};
+  constexpr PictureSize kOdd{97, 73};  // an eye has 48 columns, a banner at least 60
   Picture picture(session, {.renderer = "iso", .stereo = {.on = true}}, 4.0 / 3.0);
   const RenderTarget target(kOdd), anew(kOdd);
   OverlayFigures figures;
-  figures.tool = "a tool whose name is longer than the picture of an eye is wide";
+  figures.banner = "stale: no news from the servo";
   for (const double force_n : {0.0, 1.0, 2.0}) {
     figures.force_n = force_n;
     CHECK(picture.draw(session, figures, target).any);
