@@ -16,8 +16,8 @@ namespace kerf {
 /// What the queries of one tool cost in all volumes together, counted in samples that are read. It
 /// bounds a tick (`ContactQuery::begin_tick`, docs/theory.md 4.8), and a scene is planned with it.
 struct QueryWork {
-  /// What a tick may read, some 2.5 ns each. A head of very many samples may make kLeastQueries, and
-  /// a whole tool with its shaft as many as kShaftedSamples allow: 53 us.
+  /// What a tick may read, some 2.5 ns each. A head of very many samples may make kLeastQueries,
+  /// and a whole tool with its shaft as many as kShaftedSamples allow: 53 us.
   static constexpr std::int64_t kTickSamples = 18000, kShaftedSamples = 21000;
   static constexpr std::int64_t kLeastQueries = 12;
   static constexpr std::int64_t kLookSamples = 128;  ///< what a look costs besides those it reads
