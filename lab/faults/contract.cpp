@@ -175,6 +175,8 @@ void Contract::commanded(double time_ms, std::span<const std::uint8_t> packet) {
                   .asked = *asked,
                   .force_n = {}};
   if (pose_) command.force_n = wire_.force_n(*pose_, asked->count);
+  // Where the arm is stretched out no force at the tip goes with its torques.
+  if (!std::isfinite(dot(command.force_n, command.force_n))) command.force_n = last_.force_n;
   heat_until(time_ms);
   follow_stall(command);
   check_state(command);

@@ -200,7 +200,7 @@ TEST_CASE("an emulator's socket refuses another user in one line, and serves on"
       "--probe",          "--device", "omni",  "--port",         "socket:" + socket,
       "--seconds",        "0.3"};
   Process stranger(probe, folder / "stranger.log");
-  CHECK(stranger.wait() == 1);
+  CHECK(stranger.wait() == 2);
   const std::string told = emulator.output();
   CAPTURE(told);
   CHECK(told.find("a client of user 54321 was refused; be user 0 or root\n") != std::string::npos);

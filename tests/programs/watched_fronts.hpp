@@ -8,6 +8,7 @@
 #include <string>
 #include <thread>
 
+#include "hil/front/hello_link.hpp"
 #include "hil/front/seqpacket_server.hpp"
 #include "hil/front/serving.hpp"
 #include "hil/front/udp_server.hpp"
@@ -36,11 +37,12 @@ inline void hurry() {
 template <class Server>
 class ServedSocket final : public ServedFront {
  public:
-  ServedSocket(const std::string& place, PacketDevice& device)
-      : server_(place), thread_([this, &device] {
+  ServedSocket(const std::string& place, Personality personality, PacketDevice& device)
+      : server_(place), thread_([this, personality, &device] {
           hurry();
           while (auto client = server_.accept(stop_)) {
-            serve_real_time(*client, device, 2, {0, stop_}, stats_);
+            HelloLink link(*client, {personality, false, 4000});
+            serve_real_time(link, device, 2, {0, stop_}, stats_);
           }
         }) {
     if constexpr (std::is_same_v<Server, UdpServer>) {
@@ -95,9 +97,12 @@ inline std::unique_ptr<ServedFront> serve(const WatchedFront& front, PacketDevic
                                           const std::filesystem::path& folder) {
   const std::string name = front.name;
   if (name == "socket") {
-    return std::make_unique<ServedSocket<SeqpacketServer>>((folder / "port").string(), device);
+    return std::make_unique<ServedSocket<SeqpacketServer>>((folder / "port").string(),
+                                                           front.personality, device);
   }
-  if (name == "udp") return std::make_unique<ServedSocket<UdpServer>>("0", device);
+  if (name == "udp") {
+    return std::make_unique<ServedSocket<UdpServer>>("0", front.personality, device);
+  }
   if (name == "fw") {
     FirewireSettings settings;
     settings.clock = BusClock::real_time();

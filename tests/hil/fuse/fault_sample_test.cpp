@@ -1,8 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// A sample of the fault matrix (./kerf lab faults) through each device's own bus: the same faults,
-// the same rules, the same watch. The Omni's bus is in lock-step, the others run by the clock.
+// A sample of the fault matrix (./kerf lab faults) through each device's own bus. The Omni's is in
+// lock-step and has the matrix's own watch, the contract. The others run by the clock, which a busy
+// machine holds up: there what the emulated motors did is looked at.
+#include <algorithm>
+#include <cstddef>
 #include <memory>
 #include <mutex>
+#include <span>
 #include <string>
 
 #include <doctest/doctest.h>
@@ -32,10 +36,12 @@ const kerf::FaultScript kSample{
 constexpr int kTicksAfterFault = 100;
 constexpr int kMostTicks = 8000;
 
-/// The device with its faults, watched from both ends: the servo's thread and the node's.
+/// The device with its faults. The node's thread moves it on, the host's end of the bus is watched
+/// from the servo's.
 class WatchedDevice final : public kerf::PacketDevice {
  public:
-  explicit WatchedDevice(Emulator& emulator) : emulator_(emulator), device_(emulator, kSample) {}
+  WatchedDevice(Emulator& emulator, const kerf::LoadedScene& scene)
+      : emulator_(emulator), device_(emulator, kSample), contract_(scene, true, outcome_) {}
 
   void receive(std::span<const std::uint8_t> packet) noexcept override { device_.receive(packet); }
   void advance(int cycles) noexcept override {
@@ -43,21 +49,25 @@ class WatchedDevice final : public kerf::PacketDevice {
       device_.advance(1);
       const std::scoped_lock lock(mutex_);
       time_ms_ = static_cast<double>(emulator_.stats().cycles) * 1000 / kerf::kCyclesPerSecond;
-      contract_.device_force(time_ms_, norm(emulator_.model().motor_force_n()),
-                             kerf::test::keeps_time());
+      const auto& model = emulator_.model();
+      contract_.cycle(time_ms_, {model.motor_force_n(), model.docked()});
     }
   }
   std::span<const std::uint8_t> next_packet() noexcept override { return device_.next_packet(); }
 
-  void tick(const ServoOutput& output) {
+  void told(std::span<const std::uint8_t> packet) {
     const std::scoped_lock lock(mutex_);
-    contract_.tick(time_ms_, output);
+    contract_.listened(time_ms_);
+    if (!packet.empty()) contract_.reported(time_ms_, packet);
   }
-  /// When nobody calls any more.
-  [[nodiscard]] const kerf::faults::Outcome& outcome() {
-    outcome_.faults_begun = device_.begun();
-    return outcome_;
+  void asked(std::span<const std::uint8_t> packet) {
+    const std::scoped_lock lock(mutex_);
+    contract_.commanded(time_ms_, packet);
   }
+
+  // When nobody calls any more.
+  [[nodiscard]] const kerf::faults::Outcome& outcome() const { return outcome_; }
+  [[nodiscard]] std::size_t faults_begun() const { return device_.begun(); }
 
  private:
   Emulator& emulator_;
@@ -65,25 +75,54 @@ class WatchedDevice final : public kerf::PacketDevice {
   std::mutex mutex_;
   double time_ms_ = 0;
   kerf::faults::Outcome outcome_;
-  kerf::faults::Contract contract_{1000, kerf::test::half_space_scene().limits.force_n, outcome_};
+  kerf::faults::Contract contract_;
+};
+
+/// The host's end of a bus.
+class WatchedPort final : public kerf::PacketPort {
+ public:
+  WatchedPort(kerf::PacketPort& port, WatchedDevice& device) : port_(port), device_(device) {}
+
+  std::size_t receive(std::span<std::uint8_t> out) noexcept override {
+    const std::size_t size = port_.receive(out);
+    device_.told(out.first(std::min(size, out.size())));
+    return size;
+  }
+  bool send(std::span<const std::uint8_t> packet) noexcept override {
+    device_.asked(packet);
+    return port_.send(packet);
+  }
+  bool send_now(std::span<const std::uint8_t> packet) noexcept override {
+    device_.asked(packet);
+    return port_.send_now(packet);
+  }
+  [[nodiscard]] bool closed() const noexcept override { return port_.closed(); }
+  [[nodiscard]] bool wait(int milliseconds) noexcept override { return port_.wait(milliseconds); }
+
+ private:
+  kerf::PacketPort& port_;
+  WatchedDevice& device_;
 };
 
 /// Plays the sample; `serve(device)` makes the node.
 template <class Serve>
 void play(Personality personality, Emulator& emulator, const std::string& bus, Serve serve) {
-  WatchedDevice device(emulator);
+  const bool lockstep = personality == Personality::omni;
+  kerf::LoadedScene scene = kerf::test::firm_half_space();
+  scene.device.personality = personality;
+  WatchedDevice device(emulator, scene);
   const auto served = serve(device);
   int pushing = 0, in_fault = 0;
   {
     const auto port = kerf::open_port(bus + ":" + served->path(), {}, 1000, kGoOn);
-    kerf::test::ServoSession session(personality, *port, kerf::test::firm_half_space());
+    WatchedPort watched(*port, device);
+    kerf::test::ServoSession session(personality, watched, scene);
     const auto watch = [&](const ServoOutput& output) {
-      device.tick(output);
       pushing += output.contact ? 1 : 0;
       in_fault += output.fault == kerf::Fault::stale_input ? 1 : 0;
     };
     const auto done = [&] { return in_fault >= kTicksAfterFault; };
-    if (personality == Personality::omni) {
+    if (lockstep) {
       for (int tick = 0; tick < kMostTicks && !done(); ++tick) watch(session.step().output);
     } else {
       session.watch(watch);
@@ -92,10 +131,14 @@ void play(Personality personality, Emulator& emulator, const std::string& bus, S
   }
   served->stop();
   const auto& outcome = device.outcome();
-  for (const std::string& violation : outcome.violations) MESSAGE(violation);
-  CHECK(outcome.violation_count == 0);
-  CHECK(outcome.faults_begun == kSample.faults.size());
+  if (lockstep) {
+    for (const std::string& violation : outcome.violations) MESSAGE(violation);
+    CHECK(outcome.violation_count == 0);
+  }
+  CHECK(device.faults_begun() == kSample.faults.size());
   CHECK(outcome.device_peak_n > 0.05);
+  CHECK(outcome.device_peak_n < 1.05 * scene.limits.force_n);
+  CHECK(norm(emulator.model().motor_force_n()) == 0);
   CHECK(pushing > 300);
   CHECK(in_fault == kTicksAfterFault);
 }
