@@ -102,7 +102,8 @@ std::string vacuous_line(const FaultScript& script, Personality personality, con
 class VirtualShell {
  public:
   VirtualShell(const LoadedScene& scene, CompiledScene& servo, PacketPort& port)
-      : servo_(servo), driver_(make_driver(scene.device.personality, port, scene.device.encoder_sign)) {}
+      : servo_(servo),
+        driver_(make_driver(scene.device.personality, port, scene.device.encoder_sign)) {}
 
   void start() { driver_->start(); }
   void look(std::int64_t now_ns) { watchdog_.look(now_ns); }
