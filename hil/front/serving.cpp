@@ -40,7 +40,7 @@ bool readable_within(int fd, std::int64_t patience_ns, const std::atomic<bool>& 
   std::int64_t left_ns = patience_ns;
   while (!stop.load(std::memory_order_relaxed) && left_ns > 0) {
     constexpr std::int64_t kNsPerMs = 1'000'000;
-    const auto ms = std::min<std::int64_t>(kStopCheckMs, (left_ns + kNsPerMs - 1) / kNsPerMs);
+    const auto ms = std::min<std::int64_t>(kStopCheckMs, (left_ns - 1) / kNsPerMs + 1);
     if (readable(fd, static_cast<int>(ms))) return true;
     left_ns = patience_ns - (monotonic_ns() - began_ns);
   }
