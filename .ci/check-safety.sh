@@ -101,7 +101,7 @@ judge() {
     program=$here/${words[0]}
   else
     object=$(ninja -C "$build" -t deps 2>/dev/null | awk -v file="$file" '/^[^ ].*:/ { at = $1; sub(":$", "", at) }
-      substr($1, length($1) - length(file) + 1) == file { print at }' | grep -E -- "$object" | awk 'NR == 1')
+      substr($1, length($1) - length(file) + 1) == file { print at }' | grep -E -- "$object" | awk 'NR == 1') || true
     if [[ -z $object ]]; then
       echo "$name: no object of the build reads $file; mend $list" >"$here/bad"
       return
@@ -162,6 +162,8 @@ printf '%-26s %-36s %s\n' change 'what must notice' 'caught by'
 each judge "${lines[@]}"
 cat "$lab"/[0-9]*/row 2>/dev/null || true
 if cat "$lab"/*/bad 2>/dev/null; then die 'mend these lines'; fi
+judged=$(cat "$lab"/[0-9]*/row 2>/dev/null | grep -c . || true)
+if ((judged != ${#lines[@]})); then die "only $judged of ${#lines[@]} changes were tried"; fi
 missed=$(cat "$lab"/[0-9]*/row | grep -c ' NOTHING$' || true)
 echo "check-safety: ${#lines[@]} changes, $missed unseen, $SECONDS s"
 if ((missed)); then exit 1; fi
