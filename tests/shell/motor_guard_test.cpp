@@ -30,10 +30,14 @@ class PairPort final : public kerf::PacketPort {
   explicit PairPort(int fd) : fd_(fd) {}
   std::size_t receive(std::span<std::uint8_t>) noexcept override { return 0; }
   bool send(std::span<const std::uint8_t> packet) noexcept override {
+    const auto command = kerf::decode_command(packet);
+    lets_go = command && !command->motors_on;
     return ::send(fd_, packet.data(), packet.size(), MSG_NOSIGNAL) > 0;
   }
   bool closed() const noexcept override { return false; }
   bool wait(int) noexcept override { return false; }
+
+  std::atomic<bool> lets_go = false;  ///< the last packet does
 
  private:
   int fd_;
@@ -70,8 +74,8 @@ class SharedTime {
   std::int64_t* ns_;
 };
 
-/// Runs `way_out(stop)` in a child that commands torque; it ends with code 0 afterwards, or 2 after
-/// an exception.
+/// Runs `way_out(stop, port)` in a child that commands torque; it ends with code 0 afterwards, or 2
+/// after an exception.
 template <class WayOut>
 Ending ending_by(WayOut way_out) {
   std::array<int, 2> ends{};
@@ -92,7 +96,7 @@ Ending ending_by(WayOut way_out) {
       output.motors_on = true;
       driver.command(output);
       began.set();
-      way_out(stop);
+      way_out(stop, port);
     } catch (const std::exception&) {
       _exit(2);
     }
@@ -154,8 +158,8 @@ constexpr kerf::OmniCommand kNeutral{};
 }  // namespace
 
 TEST_CASE("motors are off after return and exception") {
-  CHECK(ending_by([](auto&) {}).last == kNeutral);
-  const Ending thrown = ending_by([](auto&) { throw std::runtime_error("edge"); });
+  CHECK(ending_by([](auto&, auto&) {}).last == kNeutral);
+  const Ending thrown = ending_by([](auto&, auto&) { throw std::runtime_error("edge"); });
   CHECK(thrown.last == kNeutral);
   CHECK(thrown.exited_with(2));
 }
@@ -171,9 +175,10 @@ TEST_CASE("every signal that ends a process by default switches the motors off f
 #ifdef KERF_SANITIZED                                      // they take these for themselves
     if (is_crash(signal)) continue;
 #endif
-    const Ending ending = ending_by([signal](std::atomic<bool>& stop) {
+    const Ending ending = ending_by([signal](std::atomic<bool>& stop, const PairPort& port) {
       std::raise(signal);
       if (!stop) _exit(3);
+      if (!port.lets_go) _exit(4);  // the way out may last: the motors are off by now
       // A servo may still be in its tick, and computes one more force.
       std::this_thread::sleep_for(std::chrono::milliseconds(5));
     });
@@ -212,7 +217,7 @@ TEST_CASE("what a tick commands after the signal is neutral") {
 TEST_CASE("signals of a write end nothing, and those that pause a program end it") {
   for (const int signal : {SIGPIPE, SIGXFSZ}) {
     CAPTURE(signal);
-    const Ending ending = ending_by([signal](std::atomic<bool>& stop) {
+    const Ending ending = ending_by([signal](std::atomic<bool>& stop, const PairPort&) {
       std::raise(signal);
       if (stop) _exit(3);
     });
@@ -221,7 +226,7 @@ TEST_CASE("signals of a write end nothing, and those that pause a program end it
   }
   for (const int signal : {SIGTSTP, SIGTTIN, SIGTTOU}) {
     CAPTURE(signal);
-    const Ending ending = ending_by([signal](std::atomic<bool>& stop) {
+    const Ending ending = ending_by([signal](std::atomic<bool>& stop, const PairPort&) {
       std::raise(signal);
       if (!stop) _exit(3);
     });
