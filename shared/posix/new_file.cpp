@@ -14,6 +14,14 @@
 #include "shared/posix/failure.hpp"
 
 namespace kerf {
+namespace {
+
+/// Where the kernel shows an open file, so that it can be given a name.
+std::string open_file(int fd) {
+  return "/proc/self/fd/" + std::to_string(fd);
+}
+
+}  // namespace
 
 bool is_stream(const std::filesystem::path& path) {
   std::error_code ignored;
@@ -45,23 +53,39 @@ NewFile::NewFile(const std::filesystem::path& path) : path_(path) {
     ::fcntl(fd_, F_SETFL, 0);  // `write` waits for a slow reader
     return;
   }
-  std::error_code ignored;
-  const auto there = std::filesystem::symlink_status(path, ignored);
+  std::error_code error;
+  const auto there = std::filesystem::symlink_status(path, error);
+  if (there.type() == std::filesystem::file_type::none) fail(error.value());
   if (std::filesystem::is_symlink(there)) fail(ELOOP);
   if (std::filesystem::is_directory(there)) fail(EISDIR);
   if (std::filesystem::exists(there) && !std::filesystem::is_regular_file(there)) fail(EOPNOTSUPP);
-  constexpr mode_t kReadWriteAll = 0666;     // the user's mask takes away from this
+  constexpr mode_t kReadWriteAll = 0666;  // the user's mask takes away from this
+  const auto folder = path.has_parent_path() ? path.parent_path() : ".";
+  fd_ = ::open(folder.c_str(), O_TMPFILE | O_WRONLY | O_CLOEXEC, kReadWriteAll);
+  nameless_ = fd_ >= 0 && ::access(open_file(fd_).c_str(), F_OK) == 0;
+  if (nameless_) return;
+  if (fd_ >= 0) ::close(fd_);
+  take_temporary_name([&](const char* name) {
+    fd_ = ::open(name, O_CREAT | O_EXCL | O_NOFOLLOW | O_WRONLY | O_CLOEXEC, kReadWriteAll);
+    return fd_ >= 0;
+  });
+}
+
+template <class Take>
+void NewFile::take_temporary_name(Take take) {
   constexpr int kMaxTries = 100;             // names that others have taken
   constexpr std::size_t kLongestStem = 200;  // of 255 bytes that a name may have
-  const std::string stem =
-      path.filename().string().substr(0, kLongestStem) + ".new-" + std::to_string(::getpid()) + "-";
-  for (int tries = 0; fd_ < 0 && tries < kMaxTries; ++tries) {
-    temporary_ = path.parent_path() / (stem + std::to_string(tries));
-    fd_ = ::open(temporary_.c_str(), O_CREAT | O_EXCL | O_NOFOLLOW | O_WRONLY | O_CLOEXEC,
-                 kReadWriteAll);
-    if (fd_ < 0 && errno != EEXIST) break;
+  const std::string stem = path_.filename().string().substr(0, kLongestStem) + ".new-" +
+                           std::to_string(::getpid()) + "-";
+  for (int tries = 0; tries < kMaxTries; ++tries) {
+    const auto name = path_.parent_path() / (stem + std::to_string(tries));
+    if (take(name.c_str())) {
+      temporary_ = name;
+      return;
+    }
+    if (errno != EEXIST) break;
   }
-  if (fd_ < 0) fail(errno);
+  fail(errno);
 }
 
 NewFile::~NewFile() {
@@ -83,6 +107,11 @@ void NewFile::write(const void* data, std::size_t size) {
 void NewFile::close() {
   const bool stored = ::fsync(fd_) == 0 || errno == EINVAL || errno == EROFS;  // pipes cannot
   const int error = errno;
+  if (stored && nameless_) {
+    take_temporary_name([&](const char* name) {
+      return ::linkat(AT_FDCWD, open_file(fd_).c_str(), AT_FDCWD, name, AT_SYMLINK_FOLLOW) == 0;
+    });
+  }
   if (::close(std::exchange(fd_, -1)) != 0) fail(errno);
   if (!stored) fail(error);
 }

@@ -27,10 +27,12 @@ class FileError : public std::runtime_error {
 /// What is told, after its name, of a place that cannot be written for such an errno.
 [[nodiscard]] std::string not_written(int error);
 
-/// A file that appears whole or not at all: written under a temporary name in the same folder, and
-/// renamed by `commit`. Without it the destructor removes it, and what was there before stays.
-/// Others may write to the folder: the temporary is a new file or none, and a link that stands at
-/// `path` is refused. A stream is written to as it stands.
+/// A file that appears whole or not at all: written without a name, so that nothing is left of it
+/// however the program ends; `close` gives it a temporary name in the same folder, `commit` its
+/// own. Without `commit` the destructor removes it, and what was there before stays. Where the file
+/// system has only files with names, it has the temporary one from the start. Others may write to
+/// the folder: the temporary is a new file or none, and a link that stands at `path` is refused. A
+/// stream is written to as it stands.
 ///
 /// Every failure (no folder, no right, disk full) is a FileError that names the final path.
 class NewFile {
@@ -47,11 +49,15 @@ class NewFile {
   void commit();
 
  private:
+  /// Sets `temporary_` to the first free name that `take` could take.
+  template <class Take>
+  void take_temporary_name(Take take);
   [[noreturn]] void fail(int error) const;
 
   std::filesystem::path path_;
   std::filesystem::path temporary_;  ///< empty: `path_` is written directly
   int fd_ = -1;
+  bool nameless_ = false;
   bool committed_ = false;
 };
 

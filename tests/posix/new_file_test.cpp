@@ -3,6 +3,7 @@
 #include "shared/posix/new_file.hpp"
 
 #include <array>
+#include <csignal>
 #include <cstddef>
 #include <cstdlib>
 #include <filesystem>
@@ -14,6 +15,7 @@
 #include <fcntl.h>
 #include <poll.h>
 #include <sys/stat.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 namespace fs = std::filesystem;
@@ -106,6 +108,42 @@ TEST_CASE("a folder in the place of the file is refused, and a new file has the 
           write_new_file(folder / (longest + "x").c_str(), "x");
         }).find("cannot be written") != std::string::npos);
   CHECK(folder.count() == 2);
+}
+
+TEST_CASE("a name that is too long, or below a file, is refused before anything is written") {
+  const Folder folder;
+  write_new_file(folder / "file", "x");
+  for (const std::string& name :
+       {std::string(256, 'x'), std::string("file/below"), std::string("no/where")}) {
+    CAPTURE(name);
+    CHECK(refusal_of([&] {
+            kerf::check_new_file(folder / name.c_str());
+          }).find("cannot be written") != std::string::npos);
+  }
+  CHECK(folder.count() == 1);
+}
+
+TEST_CASE("nothing is left of a file whose writer is killed half-way") {
+  const Folder folder;
+  const int nameless = open(folder.path.c_str(), O_TMPFILE | O_WRONLY | O_CLOEXEC, 0600);
+  if (nameless < 0) {
+    MESSAGE("skipped: the file system of " << folder.path << " has no nameless files");
+    return;
+  }
+  close(nameless);
+  write_new_file(folder / "a", "before");
+  const pid_t child = fork();
+  REQUIRE(child >= 0);
+  if (child == 0) {
+    kerf::NewFile file(folder / "a");
+    file.write("half", 4);
+    raise(SIGKILL);
+  }
+  int status = 0;
+  waitpid(child, &status, 0);
+  CHECK(WIFSIGNALED(status));
+  CHECK(text_of(folder / "a") == "before");
+  CHECK(folder.count() == 1);
 }
 
 TEST_CASE("what holds no bytes is written to as it stands, by a link too") {
