@@ -23,7 +23,10 @@ struct DevicePose {
   std::array<typename N::Angle, 3> gimbal{};  ///< yaw, pitch, roll
 };
 
-inline constexpr std::int32_t kRestCounts = 2;  ///< steps of an encoder that jitters at an edge
+/// An encoder that jitters at an edge. A rest that gives the counters their zero lets none go
+/// farther than this from where it began; on a device that knows its zero, and that a hand holds
+/// still, none goes farther from one report to the next.
+inline constexpr std::int32_t kRestCounts = 2;
 
 /// One tick without a fresh report. Where the servo is faster than the device the last report still
 /// holds, and with it a rest, for as long as a force would be held.
@@ -50,8 +53,11 @@ inline bool follow_encoders(const DeviceReport& report, bool absolute, const Saf
     encoders.unwrapped[i] = static_cast<std::int32_t>(
         std::clamp(std::int64_t{encoders.unwrapped[i]} + step, -kEnd, kEnd));
     encoders.last[i] = report.encoder[i];
-    at_rest = at_rest && step >= -kRestCounts && step <= kRestCounts;
+    const auto moved =
+        absolute ? step : static_cast<std::int16_t>(report.encoder[i] - encoders.rest_from[i]);
+    at_rest = at_rest && moved >= -kRestCounts && moved <= kRestCounts;
   }
+  if (!at_rest) encoders.rest_from = report.encoder;
   encoders.rest_ticks = at_rest ? std::min(encoders.rest_ticks + 1, timing.rest_ticks) : 0;
   if (encoders.rest_ticks < timing.rest_ticks) return false;
   encoders.unwrapped = {};

@@ -34,6 +34,7 @@ struct VolumeState {
 struct EncoderState {
   std::array<std::int16_t, 3> last{};
   std::array<std::int32_t, 3> unwrapped{};  ///< counts from home, beyond 16 bits
+  std::array<std::int16_t, 3> rest_from{};  ///< reading with which the rest began
   std::uint32_t rest_ticks = 0;             ///< since it is parked and no joint turns
   std::uint32_t silent_ticks = 0;           ///< since the last report
 };

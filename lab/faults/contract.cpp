@@ -79,7 +79,8 @@ void Contract::reported(double time_ms, std::span<const std::uint8_t> packet) {
   heard_ms_ = time_ms;
 }
 
-/// Parked, homed and no joint turning for 50 ms: calibrated, whatever was before.
+/// Parked, homed and no joint turning for 50 ms: calibrated, whatever was before. Counters that get
+/// their zero there may not creep away meanwhile.
 void Contract::follow_rest(double time_ms) {
   bool still = told_.parked && told_.homed;
   for (std::size_t i = 0; i < 3; ++i) {
@@ -87,7 +88,7 @@ void Contract::follow_rest(double time_ms) {
         static_cast<std::uint16_t>(int{told_.count[i]} - int{rest_count_[i]}));
     still = still && std::abs(int{step}) <= kRestCounts;
   }
-  rest_count_ = told_.count;
+  if (!still || !wire_.counts_from_rest()) rest_count_ = told_.count;
   if (!still) rest_since_ms_ = -1;
   if (still && rest_since_ms_ < 0) rest_since_ms_ = time_ms;
   // Counted in whole ticks, from a report that came up to one of its own periods before.

@@ -81,6 +81,21 @@ TEST_CASE("a device that says nothing for more than 5 ms, or moves, has to rest 
   }
 }
 
+TEST_CASE("an arm that creeps by a count in two reports is not at rest; one that jitters is") {
+  for (const bool creeps : {true, false}) {
+    CAPTURE(creeps);
+    RestingServo resting(1000);
+    Phase phase = Phase::off;
+    for (int i = 0; i < 300; ++i) {
+      DeviceReport report = resting.arm.docked();
+      report.encoder[2] = static_cast<std::int16_t>(report.encoder[2] + (creeps ? i / 2 : i % 3));
+      phase = resting.servo->step(report).phase;
+      if (creeps) REQUIRE(phase == Phase::calibrating);
+    }
+    CHECK((phase == Phase::armed) == !creeps);
+  }
+}
+
 TEST_CASE("a gap of 4 ms does not end a rest") {
   for (const int rate_hz : {1000, 8000}) {
     CAPTURE(rate_hz);
