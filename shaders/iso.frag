@@ -90,11 +90,12 @@ void main() {
     if (density >= u_iso) hit_density = density;
     on_face = hit_density >= 0.0 && shown.x > u_near_mm;
   }
-  while (k * step_mm < end_mm && hit_density < 0.0) {
+  float k_end = ceil(end_mm / step_mm);
+  while (k < k_end && hit_density < 0.0) {
     float t = k * step_mm;
     vec3 cell = floor(cell_origin + t * cell_direction);
     float exit_mm = box_mm(cell_origin, inverse_cell_direction, cell, cell + 1.0).y;
-    float k_exit = max(k + 1.0, ceil(exit_mm / step_mm));
+    float k_exit = min(max(k + 1.0, ceil(exit_mm / step_mm)), k_end);
     if (texelFetch(u_active_cell, ivec3(cell), 0).r == 0u) {
       k = k_exit;
     } else {

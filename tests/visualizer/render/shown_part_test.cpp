@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // What every renderer leaves out on demand: what the clip plane takes, what is outside a rectangle.
+#include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -33,6 +35,25 @@ TEST_CASE("the clip plane leaves a face where it cuts through solid, and nothing
     for (const float depth : drawn.depth) {
       CHECK(eye_distance_mm(static_cast<double>(depth), view) > 28.969);
     }
+  }
+}
+
+TEST_CASE("what lies behind the clip plane is not seen from before it, however near it lies") {
+  if (!have_gl()) return;
+  const VoxelGrid grid{40, 40, 40};
+  const TestVolume volume(grid, centred(grid, glm::dvec3(0.25)),
+                          [](glm::dvec3 at) { return at.z < -0.3 ? 1.0 : 0.0; });
+  const VolumeContent content = volume.content();
+  View view = look_at({3, 2, 30}, {}, 20, 40);
+  view.shown = {0, 0, 1, 0};  // z >= 0
+  for (const std::string_view kind : renderer_kinds()) {
+    CAPTURE(std::string(kind));
+    const auto renderer = make_renderer(kind, scene_of({&volume}), {&content, 1});
+    renderer->set_cut_open(true, {&content, 1});
+    const Drawn drawn = draw(*renderer, view, RenderTarget(kTestSize));
+    CHECK(std::count(drawn.rgb.begin(), drawn.rgb.end(), 0) ==
+          static_cast<std::ptrdiff_t>(drawn.rgb.size()));
+    for (const float depth : drawn.depth) CHECK(depth == 1.0F);
   }
 }
 
