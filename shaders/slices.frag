@@ -2,7 +2,6 @@
 #version 450 core
 // One slice through one volume: what a ray meets between the slice before and this one.
 
-in vec2 v_direction;
 flat in float v_slice;
 layout(location = 0) out vec4 o_colour;  // linear, times opacity
 layout(location = 1) out float o_depth;
@@ -14,6 +13,7 @@ uniform float u_step_mm;                 // between slices
 uniform float u_near_mm;
 uniform float u_far_mm;
 
+vec3 eye_direction_at(vec2 ndc);
 vec2 shown_mm(vec3 eye_direction);
 float window_depth(float eye_mm, float near_mm, float far_mm);
 float eye_distance(float window_depth, float near_mm, float far_mm);
@@ -24,7 +24,10 @@ float beginning_between(int v, float front, float back);
 vec4 matter_of(int v, vec4 voxel, vec3 p, vec3 to_eye);
 
 void main() {
-  vec3 eye_direction = vec3(v_direction, -1.0);
+  // Of the pixel, not interpolated: slices are cut to what there is in a volume, and a change in one
+  // place would round all of it anew.
+  vec2 size = vec2(textureSize(u_opaque_depth, 0));
+  vec3 eye_direction = eye_direction_at(2.0 * gl_FragCoord.xy / size - 1.0);
   vec2 shown = shown_mm(eye_direction);
   float opaque_mm = eye_distance(texelFetch(u_opaque_depth, ivec2(gl_FragCoord.xy), 0).r,
                                  u_near_mm, u_far_mm);

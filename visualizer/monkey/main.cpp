@@ -75,9 +75,10 @@ bool play(kerf::GlContext& context, std::uint32_t seed, const fs::path& files,
     write(options.out / "expected.png", monkey.expected());
     std::fprintf(stderr,
                  "seed %u, event %ju (%s): %s; both pictures are in %s, again: "
-                 "kerf-visualizer-monkey --seed %u --events %ju --seconds 0 --trace\n",
+                 "kerf-visualizer-monkey%s --seed %u --events %ju --seconds 0 --trace\n",
                  seed, std::uintmax_t{monkey.count().events}, monkey.event().c_str(),
-                 problem.what(), options.out.c_str(), seed, std::uintmax_t{monkey.count().events});
+                 problem.what(), options.out.c_str(), options.large ? " --large" : "", seed,
+                 std::uintmax_t{monkey.count().events});
     return false;
   }
 }
