@@ -13,7 +13,7 @@ shared/numeric shared/volume shared/wire shared/text shared/posix shared/segment
 
 controller/kernel/point_shell controller/kernel controller/kernel/proxy controller/kernel/sets
 controller/servo/kinematics controller/servo
-controller/scene controller/sandbox controller/volume controller/volume_tool controller/tool controller/load
+controller/stability controller/scene controller/sandbox controller/volume controller/volume_tool controller/tool controller/load
 controller/plan/tables controller/plan/method controller/plan controller/plan/cost
 controller/device/port controller/device/driver
 controller/shell controller/shell/probe controller
