@@ -136,11 +136,11 @@ std::string standard_of(const Assignment& values, AxisId axis) {
     case AxisId::quantum:
       return ideal ? "0" : number_text(std::round(step_mm * kMicrons) / kMicrons);
     case AxisId::friction:
-      return ideal ? "0" : number_text(plant.coulomb_n);
+      return ideal ? "0" : format("%.9g", plant.coulomb_n);
     case AxisId::viscous:
-      return number_text(plant.viscous_ns_per_mm);
+      return format("%.9g", plant.viscous_ns_per_mm);
     case AxisId::mass:
-      return number_text(plant.tip_mass_kg);
+      return format("%.9g", plant.tip_mass_kg);
     case AxisId::estimator:
       return ideal ? "difference" : "foaw";
     case AxisId::numeric:
@@ -172,7 +172,7 @@ AxisValues axis_values(AxisId axis, const std::string& text) {
   if (const auto range = range_in(text); range && kind.lowest != kind.highest) {
     for (int i = 0; i < range->count; ++i) {
       const double share = static_cast<double>(i) / (range->count - 1);
-      values.push_back(number_text(range->from + (range->to - range->from) * share));
+      values.push_back(format("%.9g", range->from + (range->to - range->from) * share));
     }
   } else {
     values = split(text, ',');

@@ -156,11 +156,20 @@ MapSpec Command::spec() const {
     throw HilError("--map: " + map_ + ": the same axis twice; give two");
   }
   std::array<std::string, kAxisCount> texts = axes_;
+  for (const AxisId axis : {AxisId::loop, AxisId::quantum, AxisId::estimator, AxisId::filter,
+                            AxisId::law, AxisId::limits}) {
+    if (!arm_ || texts[index_of(axis)].empty()) continue;
+    throw HilError(std::string("--") + axis_kinds()[index_of(axis)].name +
+                   ": device and servo have their own with --arm; leave one of the two out");
+  }
+  if (!arm_ && !axes_[index_of(AxisId::mode)].empty()) {
+    throw HilError("--mode: one axis is rigid; add --arm, or leave it out");
+  }
   const auto standard = [&](AxisId axis, const char* text) {
     std::string& value = texts[index_of(axis)];
     if (value.empty()) value = text;
   };
-  if (quick_) standard(AxisId::loop, "ideal,kerf");
+  if (quick_ && !arm_) standard(AxisId::loop, "ideal,kerf");
   if (std::ranges::find(spec.mapped, index_of(AxisId::damping)) != spec.mapped.end()) {
     standard(AxisId::damping, quick_ ? "0:0.03:21" : "0:0.03:40");
   }

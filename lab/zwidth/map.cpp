@@ -8,7 +8,9 @@
 #include <thread>
 #include <utility>
 
+#include "controller/load/loaded_scene.hpp"
 #include "controller/stability/stable_gains.hpp"
+#include "lab/zwidth/arm.hpp"
 #include "lab/zwidth/one_axis.hpp"
 #include "shared/text/format.hpp"
 
@@ -19,7 +21,9 @@ namespace {
 class ColumnRun {
  public:
   ColumnRun(const MapSpec& spec, const Subject& subject, std::size_t index)
-      : spec_(spec), subject_(subject), index_(index) {}
+      : spec_(spec), subject_(subject), index_(index) {
+    if (spec.arm) scene_ = flat_scene(subject);
+  }
 
   const Swing& at(double stiffness) {
     const auto [place, is_new] = known_.try_emplace(stiffness);
@@ -59,6 +63,10 @@ class ColumnRun {
  private:
   /// Until one hit has shown the worst by both rules.
   Swing measure(double stiffness) {
+    if (spec_.arm) {
+      const std::uint64_t seed = spec_.seed == 0 ? 0 : spec_.seed + index_;
+      return hit_with_arm(scene_, subject_, stiffness, spec_.seconds, seed, ticks_);
+    }
     Swing worst;
     for (std::size_t hit = 0; hit < kHitsMmPerS.size(); ++hit) {
       const std::uint64_t seed =
@@ -72,6 +80,7 @@ class ColumnRun {
   const MapSpec& spec_;
   Subject subject_;
   std::size_t index_;
+  LoadedScene scene_;  ///< of the whole arm
   std::map<double, Swing> known_;
   std::uint64_t ticks_ = 0;
 };

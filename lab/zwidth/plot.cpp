@@ -22,7 +22,7 @@ constexpr const char* kSwings = "'#F0B79B'";
 constexpr const char* kNone = "'#D9D9D9'";
 
 constexpr std::size_t kMostPanels = 12;
-constexpr int kPanelWidth = 560, kPanelHeight = 440, kFoot = 130;
+constexpr int kPanelWidth = 560, kPanelHeight = 440, kFoot = 150;
 
 /// Where the values of an axis stand in a picture: numbers at their place, words one after another.
 class Scale {
@@ -142,7 +142,7 @@ std::string foot_of(const Part& part) {
     text += say(AxisId::friction, "friction ", " N") + say(AxisId::quantum, "encoder ", " mm") +
             say(AxisId::numeric, "", "") + say(AxisId::estimator, "speed by ", "");
   }
-  text += say(AxisId::rate, "", " Hz") + say(AxisId::delay, "delay ", " periods") +
+  text += say(AxisId::rate, "", " Hz") + say(AxisId::delay, "delay of periods ", "") +
           say(AxisId::damping, "B ", " N s/mm") + say(AxisId::hand, "hand ", "");
   return text + (part.spec.arm ? "whole arm, " : "one axis, ") + "hits: a push, 50 and 200 mm/s, " +
          number_text(part.spec.seconds) + " s each, seed " + std::to_string(part.spec.seed);
@@ -159,9 +159,9 @@ void begin(std::ostream& script, std::size_t panels, int foot) {
             "set border 3 linecolor rgb '#555555' front\n"
             "set tics nomirror out textcolor rgb '#333333'\n"
             "set multiplot layout "
-         << down << ',' << across << " margins screen " << 75.0 / width << "," << 1 - 25.0 / width
-         << "," << (foot + 60.0) / height << "," << 1 - 35.0 / height << " spacing screen "
-         << 85.0 / width << "," << 90.0 / height << "\n";
+         << down << ',' << across << " margins screen " << 95.0 / width << "," << 1 - 25.0 / width
+         << "," << (foot + 60.0) / height << "," << 1 - 45.0 / height << " spacing screen "
+         << 95.0 / width << "," << 90.0 / height << "\n";
 }
 
 void data(std::ostream& script, const char* name, const std::function<void()>& rows) {
@@ -219,7 +219,8 @@ void draw_verdicts(std::ostream& script, const Part& part, const Panel& panel, c
   script << "plot " << box("rests", kRests) << box("active", kActive) << box("swings", kSwings)
          << box("none", kNone)
          << "$lines using 1:2 notitle with lines linewidth 2.5 linecolor rgb '#000000', \\\n"
-            "  $lines using 1:3 notitle with lines linewidth 2 dashtype 2 linecolor rgb '#0072B2', "
+            "  $lines using 1:3 notitle with linespoints pointtype 2 linewidth 2 dashtype 2 "
+            "linecolor rgb '#0072B2', "
             "\\\n"
             "  $lines using 1:4 notitle with lines linewidth 2 dashtype 4 linecolor rgb '#009E73', "
             "\\\n"
@@ -260,7 +261,7 @@ void draw_heights(std::ostream& script, const Part& part, const Panel& panel, co
 
 /// Under the panels: what colours and lines mean, drawn with the last of them.
 void draw_legend(std::ostream& script, const Part& part, bool verdicts, double height) {
-  const auto line = [&](int row) { return (kFoot - 22.0 - 21 * row) / height; };
+  const auto line = [&](int row) { return (kFoot - 30.0 - 24 * row) / height; };
   script << "set label \"" << foot_of(part) << "\" at screen 0.02, screen " << line(4)
          << " left noenhanced font ',11' textcolor rgb '#555555'\n";
   if (!verdicts) return;
@@ -287,11 +288,11 @@ void draw_legend(std::ostream& script, const Part& part, bool verdicts, double h
            << line(item.row) << " left point " << item.style << " offset 1.2,0\n";
   }
   const Item lines[] = {
-      {"linear loop, exact: no friction, no encoder steps", "linewidth 2.5 linecolor rgb '#000000'",
-       0.66, 0},
-      {"passive: stable with any hand", "linewidth 2 dashtype 2 linecolor rgb '#0072B2'", 0.66, 1},
-      {"friction swallows the encoder's steps (B = 0, no delay)",
-       "linewidth 2 dashtype 4 linecolor rgb '#009E73'", 0.66, 2},
+      {"linear loop, exact (no friction, no encoder steps)",
+       "linewidth 2.5 linecolor rgb '#000000'", 0.65, 0},
+      {"passive: stable with any hand", "linewidth 2 dashtype 2 linecolor rgb '#0072B2'", 0.65, 1},
+      {"friction swallows encoder steps (for B = 0)",
+       "linewidth 2 dashtype 4 linecolor rgb '#009E73'", 0.65, 2},
   };
   for (const Item& item : lines) {
     script << "set arrow from screen " << item.x - 0.01 << ", screen " << line(item.row)

@@ -41,7 +41,7 @@ std::string column_name(const AxisKind& kind) {
 Analytic analytic_of(const Subject& subject) {
   return {highest_stiffness(subject.loop, subject.damping_ns_per_mm),
           passive_stiffness(subject.loop, subject.damping_ns_per_mm),
-          quantum_stiffness(subject.loop)};
+          subject.loop.delay_s > 0 ? 0 : quantum_stiffness(subject.loop)};
 }
 
 std::string csv_of(const Part& part) {

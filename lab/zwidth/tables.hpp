@@ -7,7 +7,8 @@
 
 namespace kerf::zwidth {
 
-/// The analytic boundaries of a column, N/mm; 0: none is stable. Of the linear loop, without the
+/// The analytic boundaries of a column, N/mm; 0: none is stable, or the bound is about another loop
+/// (`quantum`: without delay). Of the linear loop, without the
 /// limits, and with the backward difference whatever the subject's estimator.
 struct Analytic {
   double exact, passive, quantum;
