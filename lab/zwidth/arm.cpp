@@ -31,7 +31,7 @@ constexpr double kAwayMm = 3;  ///< the tool's middle above the flat, between tw
 /// The hand that pushes: the subject's, or a spring so soft that the device is as good as free.
 SampledHand pushing_hand(const Subject& subject) {
   SampledHand hand = subject.loop.hand;
-  constexpr double kSoft = 0.05;
+  constexpr double kSoft = 0.2;
   if (hand.stiffness_n_per_mm <= 0) hand.stiffness_n_per_mm = kSoft;
   return hand;
 }

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <filesystem>
+#include <numeric>
 #include <ostream>
 #include <set>
 #include <thread>
@@ -13,6 +15,7 @@
 #include "lab/rig/lab_run.hpp"
 #include "lab/zwidth/map.hpp"
 #include "lab/zwidth/one_axis.hpp"
+#include "lab/zwidth/page.hpp"
 #include "lab/zwidth/plot.hpp"
 #include "lab/zwidth/tables.hpp"
 #include "record/gnuplot.hpp"
@@ -137,6 +140,9 @@ Command::Command(Arguments& program)
   app_.option("--cells", cells_, "for --portraits: stiffness:damping, as many as 12")
       .split_at_commas()
       .shown_as("K:B,...");
+  app_.option("--page", page_,
+              "measure and write docs/stability.md, its pictures beside it; takes minutes")
+      .shown_as("FILE");
   app_.footer(
       "An axis takes one value, a list (0,1,2) or a range (0:3:4: from, to, count). Two are "
       "mapped;\n"
@@ -239,21 +245,47 @@ void Command::draw_portraits(const MapSpec& spec) const {
   LabOutput("--portraits", portraits_).write(gnuplot_svg(plot_of(portraits)));
 }
 
-int Command::run(std::ostream& out) const {
+int Command::threads(std::size_t columns) const {
+  const std::size_t cores = std::max(1U, std::thread::hardware_concurrency());
+  const std::size_t wanted = jobs_ > 0 ? static_cast<std::size_t>(jobs_) : cores;
+  return static_cast<int>(std::clamp<std::size_t>(columns, 1, wanted));
+}
+
+void Command::write_page() const {
+  const auto beside = [&](const char* end) {
+    return std::filesystem::path(page_).replace_extension(end);
+  };
+  const auto devices = beside(".devices.svg"), rates = beside(".rates.svg");
+  const LabOutput as_page("--page", page_);
+  const LabOutput as_devices("--page", devices.string()), as_rates("--page", rates.string());
+  const ProgressBar bar(true);
+  const Measure measure = [&](const MapSpec& spec, const std::string& what) {
+    Part part{spec, {}, {}};
+    std::vector<std::size_t> all(spec.columns().size());
+    std::iota(all.begin(), all.end(), std::size_t{0});
+    measure_columns(spec, all, threads(all.size()), [&](std::size_t index, Column column) {
+      part.columns[index] = std::move(column);
+      bar.show(static_cast<double>(part.columns.size()) / static_cast<double>(all.size()), what);
+      return true;
+    });
+    return part;
+  };
+  const StabilityPage page =
+      stability_page(measure, devices.filename().string(), rates.filename().string(), quick_);
+  as_devices.write(gnuplot_svg(page.devices_plot));
+  as_rates.write(gnuplot_svg(page.rates_plot));
+  as_page.write(page.text);
+}
+
+bool Command::measure(const MapSpec& map, const Shard& shard, PartWriter& kept,
+                      std::ostream& out) const {
   using Clock = std::chrono::steady_clock;
-  const MapSpec map = spec();
-  const Shard part = shard();
-  const Outputs outputs(paths_);
-  if (!portraits_.empty()) draw_portraits(map);
-  PartWriter kept(part_, map, part);
   std::vector<std::size_t> wanted;
   const std::size_t count = map.columns().size();
   for (std::size_t i = 0; i < count; ++i) {
-    if (part.has(i) && !kept.columns().contains(i)) wanted.push_back(i);
+    if (shard.has(i) && !kept.columns().contains(i)) wanted.push_back(i);
   }
-  const std::size_t cores = std::max(1U, std::thread::hardware_concurrency());
-  const int jobs = static_cast<int>(std::clamp<std::size_t>(
-      std::min(jobs_ > 0 ? static_cast<std::size_t>(jobs_) : cores, wanted.size()), 1, 1024));
+  const int jobs = threads(wanted.size());
   const std::atomic<bool>& stop = catch_stop_signals();
   const ProgressBar bar(true);
   const auto begun = Clock::now();
@@ -265,27 +297,43 @@ int Command::run(std::ostream& out) const {
     ticks += column.ticks;
     kept.add(index, std::move(column));
     ++done;
-    const double left =
-        seconds() / static_cast<double>(done) * static_cast<double>(wanted.size() - done);
-    bar.show(static_cast<double>(done) / static_cast<double>(wanted.size()),
-             format("%zu of %zu columns, %.0f s left", done, wanted.size(), left));
+    const auto of = static_cast<double>(wanted.size()), have = static_cast<double>(done);
+    bar.show(have / of, format("%zu of %zu columns, %.0f s left", done, wanted.size(),
+                               seconds() / have * (of - have)));
     return !stop.load();
   });
   bar.hide();
   if (done < wanted.size()) {
     out << "interrupted: " << done << " of " << wanted.size() << " columns measured"
-        << (part_.empty() ? "; nothing kept without --part\n" : "; run it again to go on\n");
-    return 3;
+        << (part_.empty() ? "; nothing is kept without --part\n" : "; run it again to go on\n");
+    return false;
   }
+  if (done > 0) {
+    out << format(
+        "%zu columns, %.3g servo steps in %.1f s on %d threads: %.3g steps per second and core\n",
+        done, static_cast<double>(ticks), seconds(), jobs,
+        static_cast<double>(ticks) / seconds() / jobs);
+  }
+  return true;
+}
+
+int Command::run(std::ostream& out) const {
+  if (!page_.empty()) {
+    write_page();
+    return 0;
+  }
+  const MapSpec map = spec();
+  const Shard part = shard();
+  const Outputs outputs(paths_);
+  if (!portraits_.empty()) {
+    draw_portraits(map);
+    return 0;
+  }
+  PartWriter kept(part_, map, part);
+  if (!measure(map, part, kept, out)) return 3;
   kept.finish();
   const Part whole{map, part, kept.columns()};
   tell(whole, out);
-  if (!wanted.empty()) {
-    out << format(
-        "%zu columns, %.3g servo steps in %.1f s on %d threads: %.3g steps per second and core\n",
-        wanted.size(), static_cast<double>(ticks), seconds(), jobs,
-        static_cast<double>(ticks) / seconds() / jobs);
-  }
   outputs.write(whole);
   return 0;
 }

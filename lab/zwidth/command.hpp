@@ -2,7 +2,9 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
+#include <iosfwd>
 #include <string>
 #include <vector>
 
@@ -27,7 +29,12 @@ class Command final : public LabCommand {
  private:
   [[nodiscard]] MapSpec spec() const;
   [[nodiscard]] Shard shard() const;
+  [[nodiscard]] int threads(std::size_t columns) const;
+  /// The columns of the shard that `kept` has not; false: interrupted.
+  [[nodiscard]] bool measure(const MapSpec& map, const Shard& shard, PartWriter& kept,
+                             std::ostream& out) const;
   void draw_portraits(const MapSpec& spec) const;
+  void write_page() const;
 
   std::array<std::string, kAxisCount> axes_;
   std::string stiffness_, map_ = "damping,stiffness", shard_ = "1/1", part_, portraits_, page_;

@@ -105,6 +105,12 @@ std::vector<Panel> panels_of(const Part& part) {
       const bool mapped = std::ranges::find(part.spec.mapped, axis) != part.spec.mapped.end();
       if (mapped || part.spec.table[axis].size() < 2) continue;
       const AxisKind& kind = axis_kinds()[axis];
+      if (static_cast<AxisId>(axis) == AxisId::loop) {
+        title += columns[index][axis] == "ideal"
+                     ? "the loop of the theory: linear, exact numbers"
+                     : "the loop of kerf: friction, encoder steps, its own force";
+        continue;
+      }
       title += (title.empty() ? "" : ", ") + std::string(kind.name) + " " + columns[index][axis] +
                (*kind.unit != 0 ? " " : "") + kind.unit;
     }
