@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "shared/numeric/energy_source.hpp"
 #include "shared/volume/scene_limits.hpp"
 #include "shared/volume/voxel_grid.hpp"
 
@@ -82,6 +83,9 @@ struct ServoOutput {
   std::array<PlaneLoad, kMaxPlaneLoads> planes{};
   std::uint32_t plane_count = 0;  ///< of the planes that hold the tool
   double absorbed_mj = 0;         ///< SUM -F_sent . dx since arming; + = taken from the hand
+  double port_minimum_mj = 0;     ///< lowest value of it so far
+  /// `absorbed_mj` by source, in steps of 2^-32 mJ: exact in fixed, and their sum is.
+  std::array<std::int64_t, kEnergySources> energy_steps{};
 
   double press_n = 0;        ///< normal force that cuts, in the scene
   double spindle_ratio = 0;  ///< speed over the reference speed, in this tick's cut

@@ -11,6 +11,7 @@
 #include "controller/kernel/splat_table.hpp"
 #include "controller/servo/contact_plan.hpp"
 #include "controller/servo/device_plan.hpp"
+#include "controller/servo/energy_ledger.hpp"
 #include "controller/servo/force_cut_plan.hpp"
 #include "controller/servo/force_limits.hpp"
 #include "controller/servo/kinematics/forward_kinematics.hpp"
@@ -78,7 +79,7 @@ struct ServoState {
   DeviceVec<Real> force_n;         ///< sent in the last tick
   DeviceVec<Real> held_force_n;    ///< sent with the last good report: faded when reports stop
   ThermalState<N> thermal;
-  typename N::Energy absorbed_mj{};
+  EnergyLedger<N> ledger;
   std::uint64_t output_hash = kFnv1aBasis;
 };
 

@@ -30,23 +30,21 @@ constexpr std::array<double, 3> as_doubles(Vec<S, Space> v) noexcept {
 template <class N>
 constexpr double energy_mj(typename N::Energy energy) noexcept {
   if constexpr (N::kIsFixed) {
-    return static_cast<double>(energy) / 4294967296.0;  // 32 fraction bits
+    return energy_mj_of_steps(energy);
   } else {
     return static_cast<double>(energy);
   }
 }
 
-/// Adds -F . dx to a ledger: work that the hand put in. Exact in fixed: Q16 * Q16.
+/// For the record: in steps of 2^-32 mJ, rounded and saturated.
 template <class N>
-void absorb(typename N::Energy& ledger, DeviceVec<typename N::Real> force_n,
-            DeviceVec<typename N::Real> moved_mm) noexcept {
+constexpr std::int64_t energy_steps(typename N::Energy energy) noexcept {
   if constexpr (N::kIsFixed) {
-    const auto term = [](Q16 f, Q16 d) { return -(std::int64_t{f.raw()} * d.raw()); };
-    ledger = saturating_add(ledger, term(force_n.x, moved_mm.x));
-    ledger = saturating_add(ledger, term(force_n.y, moved_mm.y));
-    ledger = saturating_add(ledger, term(force_n.z, moved_mm.z));
+    return energy;
   } else {
-    ledger -= dot(force_n, moved_mm);
+    const double steps = static_cast<double>(energy) * kEnergyStepsPerMj;
+    constexpr double kEnd = 9223372036854774784.0;  // largest double below 2^63
+    return static_cast<std::int64_t>(std::clamp(steps + (steps < 0 ? -0.5 : 0.5), -kEnd, kEnd));
   }
 }
 
@@ -78,7 +76,7 @@ TipMotion move_tip(const ServoPlan<N>& plan, ServoState<N>& state,
       gap == 1 ? state.force_n
                : DeviceVec<Real>{state.force_sum_n.x / ticks, state.force_sum_n.y / ticks,
                                  state.force_sum_n.z / ticks};
-  absorb<N>(state.absorbed_mj, sent_n, moved_mm);
+  state.ledger.move(sent_n, moved_mm, gap);
   state.velocity.take(pose.arm.tip_mm, gap);
   state.tip_mm = pose.arm.tip_mm;
   state.rotation = pose.rotation;
@@ -200,6 +198,7 @@ template <class N>
 struct Wanted {
   DeviceVec<typename N::Real> force_n;
   ToolContact<N> tool;
+  ForceParts<N> parts{};  ///< of the force before fading in
 };
 
 void tell_removed(const std::array<Removed, kMaxVolumes>& removed, ServoOutput& out) noexcept {
@@ -273,10 +272,15 @@ Wanted<N> wanted_force(const ServoPlan<N>& plan, ServoState<N>& state, const Sen
   out.modification_n = as_doubles(forces.modification_n);
   tell_removed(forces.removed, out);
   const DeviceVec<Real> felt_n = forces.contact_n + forces.modification_n;
-  if (supervisor.phase != Phase::ramping) return {felt_n, forces.tool};
+  const ForceParts<N> parts{.felt = true,
+                            .spring = forces.spring_n,
+                            .damping = forces.contact_n - forces.spring_n - forces.friction_n,
+                            .friction = forces.friction_n,
+                            .cutting = forces.modification_n};
+  if (supervisor.phase != Phase::ramping) return {felt_n, forces.tool, parts};
   // What is beyond the peak is never sent, so it must not hasten the fade.
   return {clamped(felt_n, plan.limits.peak_n) * share(supervisor.fade_ticks, timing.fade_in_ticks),
-          forces.tool};
+          forces.tool, parts};
 }
 
 /// Limits the force and turns it into motor counts. Switching off is exempt from the slew limit.
@@ -303,6 +307,17 @@ void drive(const ServoPlan<N>& plan, ServoState<N>& state, DeviceVec<typename N:
   out.clamped = !(state.force_n == wanted_n);
   const JointVec<Real> torque_n_mm = state.jacobian_t_mm * state.force_n;
   out.torque_n_mm = {as_double(torque_n_mm.x), as_double(torque_n_mm.y), as_double(torque_n_mm.z)};
+}
+
+/// Splits the work since the last report, and keeps the parts of the force that was sent.
+template <class N>
+void book(ServoState<N>& state, const Wanted<N>& wanted, const Sensed<N>& sensed) noexcept {
+  if (!sensed.usable) return;
+  ForceParts<N> parts = wanted.parts;
+  state.ledger.split(parts);
+  if (!state.supervisor.motors_on()) parts = {};
+  parts.limits = state.force_n - wanted.force_n;
+  state.ledger.send(parts);
 }
 
 /// What the force that was sent cuts. The spindle runs while the hand is held by the motors.
@@ -344,7 +359,9 @@ void tell(const ServoPlan<N>& plan, ServoState<N>& state, const Sensed<N>& sense
   for (std::size_t i = 0; i < 9; ++i) out.rotation[i] = as_double(rotation.row[i / 3][i % 3]);
   out.velocity_mm_per_s = as_doubles(sensed.velocity_mm_per_s);
   out.force_n = as_doubles(state.force_n);
-  out.absorbed_mj = energy_mj<N>(state.absorbed_mj);
+  out.absorbed_mj = energy_mj<N>(state.ledger.total_mj());
+  out.port_minimum_mj = energy_mj<N>(state.ledger.lowest_mj());
+  std::ranges::transform(state.ledger.by_source_mj(), out.energy_steps.begin(), energy_steps<N>);
   out.active_tool = state.active_tool;
   state.output_hash = hash_of<N>(state.output_hash, out, state.force_n);
   out.output_hash = state.output_hash;
@@ -360,6 +377,7 @@ ServoOutput servo_step(const ServoPlan<N>& plan, ServoState<N>& state,
   const Wanted<N> wanted = wanted_force(plan, state, sensed, out);
   drive(plan, state, wanted.force_n, sensed.leaves, out);
   state.force_sum_n = state.force_sum_n + state.force_n;
+  book(state, wanted, sensed);
   cut(plan, state, wanted.tool, out);
   if (sensed.usable) state.held_force_n = state.force_n;
   tell(plan, state, sensed, report.fresh, out);
@@ -406,6 +424,7 @@ bool apply_command(const ServoPlan<N>& plan, ServoState<N>& state,
       restart_fade(state.supervisor);
       state.force_n = {};  // the motors were off meanwhile
       state.held_force_n = {};
+      state.ledger.send({});
       return true;
     case ServoCommand::Kind::hold:
       state.hold = command.argument != 0;

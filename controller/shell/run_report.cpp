@@ -16,6 +16,24 @@ Json percentiles(const Histogram& histogram) {
           {"max", histogram.max_us()}};
 }
 
+Json by_source(const RunRecord& record) {
+  Json list = Json::Members{};
+  for (std::size_t i = 0; i < kEnergySources; ++i) {
+    list[std::string(kEnergySourceNames[i])] = record.energy_mj[i] / 1000.0;
+  }
+  return list;
+}
+
+/// The sources that did any work, in mJ.
+std::string energy_line(const RunRecord& record) {
+  std::string text = format("  energy     lowest %.3f mJ", record.port_minimum_mj);
+  for (std::size_t i = 0; i < kEnergySources; ++i) {
+    if (record.energy_mj[i] == 0) continue;
+    text += format(", %s %.3f", std::string(kEnergySourceNames[i]).c_str(), record.energy_mj[i]);
+  }
+  return text + "\n";
+}
+
 std::string line(const char* name, const Histogram& histogram) {
   return format("  %-10s %9.1f %9.1f %9.1f %9.1f\n", name, histogram.percentile_us(0.5),
                 histogram.percentile_us(0.99), histogram.percentile_us(0.999), histogram.max_us());
@@ -78,6 +96,8 @@ std::string report_json(const RunReport& report) {
       {"peak_force_n", r.peak_force_n},
       {"removed_mm3", report.removed_mm3},
       {"energy_j", r.absorbed_mj / 1000.0},
+      {"port_minimum_j", r.port_minimum_mj / 1000.0},
+      {"energy_by_source_j", by_source(r)},
       {"faults", list(r.faults)},
       {"fault_count", r.faults.count},
       {"events", list(r.events)},
@@ -110,6 +130,7 @@ std::string summary(const RunReport& report) {
   text += line("publish", r.publish);
   text += format("\n  contact    %llu ticks, peak force %.3f N, work of the hand %.3f mJ\n",
                  static_cast<unsigned long long>(r.contact_ticks), r.peak_force_n, r.absorbed_mj);
+  text += energy_line(r);
   if (r.shaft_ticks > 0) {
     text += format("  shaft      %llu ticks\n", static_cast<unsigned long long>(r.shaft_ticks));
   }
