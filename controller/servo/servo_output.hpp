@@ -28,7 +28,11 @@ enum class Fault : std::uint32_t {
   none = 0,
   stale_input = 1,  ///< no report for 20 ms
   not_finite = 2,   ///< NaN after kinematics for more than 2 ms
-  overspeed = 3     ///< tip faster than the limit
+  overspeed = 3,    ///< tip faster than the limit
+  // A law of the scene gave something that is no number:
+  force_law = 4,
+  velocity_estimator = 5,
+  stabiliser = 6
 };
 
 [[nodiscard]] constexpr const char* fault_name(Fault fault) noexcept {
@@ -41,6 +45,12 @@ enum class Fault : std::uint32_t {
       return "not_finite";
     case Fault::overspeed:
       return "overspeed";
+    case Fault::force_law:
+      return "force_law";
+    case Fault::velocity_estimator:
+      return "velocity_estimator";
+    case Fault::stabiliser:
+      return "stabiliser";
   }
   return "unknown";
 }
@@ -73,7 +83,7 @@ struct ServoOutput {
   std::array<double, 3> gimbal_rad{};          ///< yaw, pitch, roll
   std::array<double, 3> position_mm{};         ///< tip in the scene
   std::array<double, 9> rotation{};            ///< world from the tool as felt, row-major
-  std::array<double, 3> velocity_mm_per_s{};   ///< device port, by VelocityWindow
+  std::array<double, 3> velocity_mm_per_s{};   ///< device port, as estimated
   std::array<double, 3> force_n{};             ///< sent to the hand, device port
   std::array<double, 3> contact_n{};           ///< part of it before limits, device port
   std::array<double, 3> modification_n{};      ///< and of the cutting: reaction, or friction

@@ -66,10 +66,7 @@ TipMotion move_tip(const ServoPlan<N>& plan, ServoState<N>& state,
                    const DevicePose<N>& pose) noexcept {
   using Real = typename N::Real;
   const std::uint32_t gap = std::clamp<std::uint32_t>(state.tip_ticks, 1, 1000);
-  if (!state.tip_known) {
-    state.tip_mm = pose.arm.tip_mm;
-    state.velocity.start(pose.arm.tip_mm);
-  }
+  if (!state.tip_known) state.tip_mm = pose.arm.tip_mm;
   const auto moved_mm = pose.arm.tip_mm - state.tip_mm;
   const auto ticks = Real(static_cast<double>(gap));
   const DeviceVec<Real> sent_n =
@@ -77,7 +74,10 @@ TipMotion move_tip(const ServoPlan<N>& plan, ServoState<N>& state,
                : DeviceVec<Real>{state.force_sum_n.x / ticks, state.force_sum_n.y / ticks,
                                  state.force_sum_n.z / ticks};
   state.ledger.move(sent_n, moved_mm, gap);
-  state.velocity.take(pose.arm.tip_mm, gap);
+  state.velocity_mm_per_s =
+      plan.velocity(state.velocity, {pose.arm.tip_mm, gap, !state.velocity.begun});
+  state.moved_mm = moved_mm;
+  state.moved_ticks = gap;
   state.tip_mm = pose.arm.tip_mm;
   state.rotation = pose.rotation;
   state.tip_known = true;
@@ -187,9 +187,17 @@ Sensed<N> sense(const ServoPlan<N>& plan, ServoState<N>& state,
     seen.overspeed = motion.overspeed && !report.parked;
     sensed.leaves = motion.leaves;
   }
-  sensed.velocity_mm_per_s = state.velocity.velocity(plan.velocity);
+  const bool known_velocity = all_finite(state.velocity_mm_per_s);
+  if (!known_velocity) {
+    state.velocity.begin_anew();
+    state.velocity_mm_per_s = {};
+  }
+  sensed.velocity_mm_per_s = state.velocity_mm_per_s;
   sensed.tip_mm = relabel<WorldSpace>(state.tip_mm * plan.workspace_scale) + plan.offset_mm;
   supervise(plan.timing, seen, state.supervisor);
+  if (!known_velocity && state.supervisor.motors_on()) {
+    latch(Fault::velocity_estimator, state.supervisor);
+  }
   return sensed;
 }
 
@@ -234,6 +242,7 @@ void follow_unfelt(const ServoPlan<N>& plan, ServoState<N>& state,
   }
   static_cast<void>(
       feel_swept(plan, state, sensed.tip_mm, state.rotation, sensed.velocity_mm_per_s));
+  state.force_law.begin_anew();
   state.contact.proxy.ramp();
 }
 
@@ -243,7 +252,7 @@ template <class N>
 Wanted<N> wanted_force(const ServoPlan<N>& plan, ServoState<N>& state, const Sensed<N>& sensed,
                        ServoOutput& out) noexcept {
   using Real = typename N::Real;
-  const Supervisor& supervisor = state.supervisor;
+  Supervisor& supervisor = state.supervisor;
   const SafetyTiming& timing = plan.timing;
   const auto share = [](std::uint32_t part, std::uint32_t whole) {
     return Real(double(part)) / Real(double(whole));
@@ -262,6 +271,10 @@ Wanted<N> wanted_force(const ServoPlan<N>& plan, ServoState<N>& state, const Sen
   }
   const ToolForces<N> forces =
       feel_and_cut(plan, state, sensed.tip_mm, state.rotation, sensed.velocity_mm_per_s);
+  if (plan.force_law.given() && !all_finite(forces.contact_n)) {
+    latch(Fault::force_law, supervisor);
+    return {};
+  }
   state.contact_n = forces.contact_n;
   state.proxy_offset_mm = forces.proxy_offset_mm;
   out.proxy_offset_mm = as_doubles(forces.proxy_offset_mm);
@@ -283,40 +296,72 @@ Wanted<N> wanted_force(const ServoPlan<N>& plan, ServoState<N>& state, const Sen
           forces.tool, parts};
 }
 
+/// The force to send: limited, and where the scene names a stabiliser what that makes of it,
+/// limited once more; its part is kept in `wanted`. One that is no number latches a fault.
+template <class N>
+DeviceVec<typename N::Real> force_to_send(const ServoPlan<N>& plan, ServoState<N>& state,
+                                          Wanted<N>& wanted, const Sensed<N>& sensed) noexcept {
+  using Real = typename N::Real;
+  const auto limited = [&](DeviceVec<Real> force_n, ThermalState<N>& thermal) {
+    return limited_force(plan.limits, thermal, force_n, state.force_n, sensed.leaves);
+  };
+  if (state.hold) state.stabiliser.begin_anew();
+  if (!plan.stabiliser.given() || !sensed.usable || state.hold) {
+    return limited(wanted.force_n, state.thermal);
+  }
+  ThermalState<N> heated = state.thermal;
+  const DeviceVec<Real> limited_n = limited(wanted.force_n, heated);
+  const DeviceVec<Real> steady_n =
+      plan.stabiliser(state.stabiliser, {limited_n, state.force_n, state.moved_mm,
+                                         state.moved_ticks, state.velocity_mm_per_s,
+                                         state.ledger.total_mj(), norm(state.contact_n) > Real(0)});
+  if (!all_finite(steady_n)) {
+    latch(Fault::stabiliser, state.supervisor);
+    return {};
+  }
+  wanted.parts.stabiliser = steady_n - limited_n;
+  if (!(steady_n == limited_n)) return limited(steady_n, state.thermal);
+  state.thermal = heated;  // limits round: what was not changed is not limited again
+  return limited_n;
+}
+
 /// Limits the force and turns it into motor counts. Switching off is exempt from the slew limit.
 template <class N>
-void drive(const ServoPlan<N>& plan, ServoState<N>& state, DeviceVec<typename N::Real> wanted_n,
-           bool leaves, ServoOutput& out) noexcept {
+void drive(const ServoPlan<N>& plan, ServoState<N>& state, Wanted<N>& wanted,
+           const Sensed<N>& sensed, ServoOutput& out) noexcept {
   using Real = typename N::Real;
-  if (state.supervisor.motors_on() && !all_finite(wanted_n)) {
+  if (state.supervisor.motors_on() && !all_finite(wanted.force_n)) {
     latch(Fault::not_finite, state.supervisor);
   }
-  out.motors_on = state.supervisor.motors_on() && plan.device.motors_configured;
+  DeviceVec<Real> limited_n{};
+  if (state.supervisor.motors_on() && plan.device.motors_configured) {
+    limited_n = force_to_send(plan, state, wanted, sensed);
+    out.motors_on = state.supervisor.motors_on();
+  }
   if (!out.motors_on) {
     heat_up(plan.limits, state.thermal, {});
     state.force_n = {};
+    state.stabiliser.begin_anew();
     return;
   }
-  const DeviceVec<Real> limited_n =
-      limited_force(plan.limits, state.thermal, wanted_n, state.force_n, leaves);
   const MotorCommand<N> motors = motor_command(plan, state.jacobian_t_mm * limited_n);
   out.motor_counts = motors.counts;
   state.force_n = {multiply<Real>(motors.share, limited_n.x),
                    multiply<Real>(motors.share, limited_n.y),
                    multiply<Real>(motors.share, limited_n.z)};
-  out.clamped = !(state.force_n == wanted_n);
+  out.clamped = !(state.force_n == wanted.force_n);
   const JointVec<Real> torque_n_mm = state.jacobian_t_mm * state.force_n;
   out.torque_n_mm = {as_double(torque_n_mm.x), as_double(torque_n_mm.y), as_double(torque_n_mm.z)};
 }
 
-/// Splits the work since the last report, and keeps the parts of the force that was sent.
+/// With a usable report: splits the work since the last one, and keeps the parts of the force that
+/// was sent.
 template <class N>
-void book(ServoState<N>& state, const Wanted<N>& wanted, const Sensed<N>& sensed) noexcept {
-  if (!sensed.usable) return;
+void book(ServoState<N>& state, const Wanted<N>& wanted, bool motors_on) noexcept {
   ForceParts<N> parts = wanted.parts;
   state.ledger.split(parts);
-  if (!state.supervisor.motors_on()) parts = {};
-  parts.limits = state.force_n - wanted.force_n;
+  if (!motors_on) return state.ledger.send({});
+  parts.limits = state.force_n - wanted.force_n - parts.stabiliser;
   state.ledger.send(parts);
 }
 
@@ -374,10 +419,10 @@ ServoOutput servo_step(const ServoPlan<N>& plan, ServoState<N>& state,
                        const DeviceReport& report) noexcept {
   ServoOutput out;
   const Sensed<N> sensed = sense(plan, state, report);
-  const Wanted<N> wanted = wanted_force(plan, state, sensed, out);
-  drive(plan, state, wanted.force_n, sensed.leaves, out);
+  Wanted<N> wanted = wanted_force(plan, state, sensed, out);
+  drive(plan, state, wanted, sensed, out);
   state.force_sum_n = state.force_sum_n + state.force_n;
-  book(state, wanted, sensed);
+  if (sensed.usable) book(state, wanted, out.motors_on);
   cut(plan, state, wanted.tool, out);
   if (sensed.usable) state.held_force_n = state.force_n;
   tell(plan, state, sensed, report.fresh, out);

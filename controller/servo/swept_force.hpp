@@ -82,9 +82,10 @@ void split_spring(DeviceVec<typename N::Real> spring_n, const ProxyContact<N>& f
   out.friction_n = spring_n - out.spring_n;
 }
 
-/// One tick: the proxy of the active tool follows the hand, the coupling pulls the hand to the
+/// One tick: the proxy of the active tool follows the hand, coupling or law pull the hand to the
 /// proxy (docs/theory.md 4, 5.1). `rotation` turns the tool, unless it is a ball without a shaft or
-/// keeps the world's axes. Servo thread; at most 32 queries; writes only `state.contact`.
+/// keeps the world's axes. Servo thread; at most 32 queries; writes `state.contact`, and
+/// `state.force_law` where the scene names a force law, whose force may not be finite.
 template <class N>
 [[nodiscard]] SweptForce<N> feel_swept(const ServoPlan<N>& plan, ServoState<N>& state,
                                        WorldVec<typename N::Real> tip_mm,
@@ -104,12 +105,18 @@ template <class N>
 
   SweptForce<N> out;
   const ProxyContact<N> felt = follow_tool(plan, tool, state.contact, goal, out.queried);
-  out.force_n =
-      coupling_force(contact.coupling, at_device(contact, felt.spring), velocity_mm_per_s);
-  const bool damped = contact.coupling.damping_ns_per_mm != typename N::Unit{};
-  const auto spring_n = damped ? coupling_force<N>({contact.coupling.stiffness_n_per_mm},
-                                                   at_device(contact, felt.spring), {})
-                               : out.force_n;
+  const auto spring_mm = at_device(contact, felt.spring);
+  // The coupling is no law behind a pointer: the compiler joins it with what surrounds it.
+  out.force_n = plan.force_law.given()
+                    ? plan.force_law(state.force_law, {state.tip_mm, tip_mm, velocity_mm_per_s,
+                                                       spring_mm, relabel<DeviceSpace>(felt.press)})
+                    : coupling_force(contact.coupling, spring_mm, velocity_mm_per_s);
+  // A law's force has no other part.
+  const bool whole =
+      plan.force_law.given() || contact.coupling.damping_ns_per_mm == typename N::Unit{};
+  const auto spring_n =
+      whole ? out.force_n
+            : coupling_force<N>({contact.coupling.stiffness_n_per_mm, {}}, spring_mm, {});
   if (tool.proxy.friction == typename N::Unit{}) {
     out.spring_n = spring_n;
   } else {

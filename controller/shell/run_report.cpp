@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "controller/shell/run_report.hpp"
 
-#include "controller/servo/velocity_window.hpp"
 #include "shared/posix/hex64.hpp"
 #include "shared/text/format.hpp"
 #include "shared/text/json.hpp"
@@ -74,7 +73,7 @@ std::string report_json(const RunReport& report) {
       {"device", report.device},
       {"numeric", report.numeric},
       {"rate_hz", report.rate_hz},
-      {"velocity_estimator", kVelocityEstimator},
+      {"velocity_estimator", report.velocity_estimator},
       {"virtual", report.virtual_time},
       {"end", report.end},
       {"waiting", report.waiting},
