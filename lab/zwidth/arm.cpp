@@ -187,6 +187,8 @@ LoadedScene flat_scene(const Subject& subject) {
   scene.device.personality = subject.device;
   scene.device.torque_scale = torque_scale_of(subject.device);
   scene.force.damping_ns_per_mm = subject.damping_ns_per_mm;
+  scene.force.stabiliser = subject.stabiliser;
+  scene.servo.velocity = subject.estimator;
   scene.servo.rate_hz = rate_hz;
   scene.servo.numeric = subject.numeric;
   return scene;
@@ -196,6 +198,7 @@ Swing hit_with_arm(const LoadedScene& scene, const Subject& subject, double stif
                    double seconds, std::uint64_t seed, std::uint64_t& ticks) {
   LoadedScene own = scene;
   own.force.stiffness_n_per_mm = stiffness_n_per_mm;
+  own.force.law = force_law_at(subject, stiffness_n_per_mm);
   Rig rig(std::move(own), subject, hits_of(subject, seconds, seed));
   Swing worst;
   for (std::size_t hit = 0; hit < kHitsMmPerS.size(); ++hit) {

@@ -18,8 +18,8 @@ namespace kerf::zwidth {
 /// from its first contact on, by the device's own encoders and the servo's own account of its work;
 /// the first that is bad by both rules ends the run.
 ///
-/// The subject's delay counts in whole bus cycles of 125 us; its encoder, estimator, law and limits
-/// are those of device and servo. Without a hand a spring of 0.2 N/mm pushes. Counts its ticks in
+/// The subject's delay counts in whole bus cycles of 125 us; encoder and limits are those of
+/// device and servo. Without a hand a spring of 0.2 N/mm pushes. Counts its ticks in
 /// `ticks`. Throws HilError where the device never gets to the wall.
 [[nodiscard]] Swing hit_with_arm(const LoadedScene& scene, const Subject& subject,
                                  double stiffness_n_per_mm, double seconds, std::uint64_t seed,

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <optional>
 #include <sstream>
+#include <string_view>
 #include <utility>
 
 #include "hil/devmodel/falcon_model.hpp"
@@ -33,14 +34,19 @@ constexpr std::array<AxisKind, kAxisCount> kKinds{{
     {"friction", "N", "", 0, 100, "", "Coulomb friction of the device"},
     {"viscous", "N s/mm", "", 0, 2, "", "damping of the device itself, b"},
     {"mass", "kg", "", 0.001, 100, "", "of the device at the tip"},
-    {"estimator", "", "", 0, 0, "foaw difference", "of the hand's speed"},
+    {"estimator", "", "", 0, 0, "", "of the hand's speed: foaw, difference, or one of your own"},
     {"filter", "ms", "0", 0, 1000, "", "time constant of the low-pass behind difference"},
     {"hand", "", "none", 0, 0, "",
      "that holds the device: none, light, firm or KG/NS_PER_MM/N_PER_MM"},
     {"mode", "Hz", "0", 0, 4000, "", "structural mode, of the whole arm alone (--arm)"},
     {"numeric", "", "", 0, 0, "fixed float double", "numbers of the wall"},
-    {"law", "", "", 0, 0, "coupling linear two_sided",
-     "force of the wall: coupling (kerf's), linear (never pulls), two_sided"},
+    {"law", "", "", 0, 0, "",
+     "force of the wall: coupling (kerf's), linear (never pulls), two_sided, or one of your own "
+     "with a "
+     "setting stiffness_n_per_mm"},
+    {"stabiliser", "", "none", 0, 0, "",
+     "none, passivity, energy_bounding or one of your own; settings of a law as "
+     "NAME/setting=value/..."},
     {"limits", "", "", 0, 0, "on off", "peak, thermal budget and slew of a scene"},
 }};
 
@@ -98,11 +104,59 @@ std::optional<SampledHand> hand_of(const std::string& text) {
   return SampledHand{*mass, *damping, *stiffness};
 }
 
+/// The walls of the theory, and kerf's; other names are laws of the registry.
+constexpr std::array<std::string_view, 3> kLawWords = {"coupling", "linear", "two_sided"};
+
+/// name/setting=value/..., checked.
+LawChoice law_choice(AxisId axis, LawKind kind, const std::string& text) {
+  const auto parts = split(text, '/');
+  LawChoice choice{kind, parts.empty() ? text : parts.front(), {}};
+  const auto refuse = [&](const std::string& what) {
+    throw HilError(std::string("--") + kKinds[index_of(axis)].name + ": " + text + what);
+  };
+  for (std::size_t i = 1; i < parts.size(); ++i) {
+    const std::size_t equals = parts[i].find('=');
+    const auto value =
+        equals == std::string::npos ? std::nullopt : number_in(parts[i].substr(equals + 1));
+    if (!value) refuse(": a setting is NAME=NUMBER; give such as passivity/mass_kg=0.1");
+    choice.settings.emplace_back(parts[i].substr(0, equals), *value);
+  }
+  try {
+    const LawRow& row = find_law(kind, choice.name);
+    static_cast<void>(law_values(row, choice));
+    const bool stiff = std::ranges::find(row.settings, "stiffness_n_per_mm", &LawSetting::name) !=
+                       row.settings.end();
+    if (kind == LawKind::force && !stiff) {
+      refuse(": has no setting stiffness_n_per_mm, which a map varies; give it one");
+    }
+  } catch (const LawError& error) {
+    refuse(error.what());
+  }
+  return choice;
+}
+
+/// Sets what the law lets be set and the text has not.
+void fill_in(LawChoice& choice, std::string_view setting, double value) {
+  const auto& known = find_law(choice.kind, choice.name).settings;
+  const auto row = std::ranges::find(known, setting, &LawSetting::name);
+  const auto given =
+      std::ranges::find(choice.settings, setting, &std::pair<std::string, double>::first);
+  if (row == known.end() || given != choice.settings.end()) return;
+  choice.settings.emplace_back(setting, std::clamp(value, row->lo, row->hi));
+}
+
 void check(AxisId axis, const std::string& value) {
   const AxisKind& kind = kKinds[index_of(axis)];
   if (axis == AxisId::hand) {
     if (!hand_of(value))
       fail(kind, value, "is no hand; use none, light, firm or such as 0.1/0.003/0.2");
+  } else if (axis == AxisId::estimator) {
+    static_cast<void>(law_choice(axis, LawKind::velocity, value));
+  } else if (axis == AxisId::stabiliser) {
+    if (value != "none") static_cast<void>(law_choice(axis, LawKind::stabiliser, value));
+  } else if (axis == AxisId::law) {
+    if (std::ranges::find(kLawWords, value) == kLawWords.end())
+      static_cast<void>(law_choice(axis, LawKind::force, value));
   } else if (kind.lowest == kind.highest) {
     if (!has_word(kind.words, value))
       fail(kind, value, std::string("is not one of: ") + kind.words);
@@ -242,11 +296,21 @@ Subject subject_of(const Assignment& values) {
   loop.quantum_mm = number(AxisId::quantum);
   loop.hand = hand_of(text(AxisId::hand)).value_or(SampledHand{});
   subject.damping_ns_per_mm = number(AxisId::damping);
-  subject.estimator = word_of<Estimator>(AxisId::estimator, text(AxisId::estimator));
-  if (subject.estimator == Estimator::difference) {
+  subject.estimator = law_choice(AxisId::estimator, LawKind::velocity, text(AxisId::estimator));
+  if (subject.estimator.name == "difference") {
     loop.velocity_filter_s = number(AxisId::filter) / 1000;
+    fill_in(subject.estimator, "tau_ms", number(AxisId::filter));
   }
-  subject.law = word_of<Law>(AxisId::law, text(AxisId::law));
+  const std::string law = text(AxisId::law);
+  const auto word = std::ranges::find(kLawWords, law);
+  subject.law = static_cast<Law>(word - kLawWords.begin());
+  if (subject.law == Law::own) subject.force_law = law_choice(AxisId::law, LawKind::force, law);
+  if (text(AxisId::stabiliser) != "none") {
+    subject.stabiliser =
+        law_choice(AxisId::stabiliser, LawKind::stabiliser, text(AxisId::stabiliser));
+    fill_in(subject.stabiliser, "mass_kg", loop.mass_kg);
+    fill_in(subject.stabiliser, "damping_ns_per_mm", loop.viscous_ns_per_mm);
+  }
   subject.numeric = word_of<NumericKind>(AxisId::numeric, text(AxisId::numeric));
   subject.limits = text(AxisId::limits) == "on";
   subject.device = word_of<Personality>(AxisId::device, text(AxisId::device));

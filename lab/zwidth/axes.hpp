@@ -28,9 +28,10 @@ enum class AxisId : std::size_t {
   mode,
   numeric,
   law,
+  stabiliser,
   limits
 };
-inline constexpr std::size_t kAxisCount = 16;
+inline constexpr std::size_t kAxisCount = 17;
 
 /// One axis as the command line knows it. A number's `lowest` and `highest` are in its unit.
 struct AxisKind {

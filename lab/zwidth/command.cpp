@@ -162,11 +162,15 @@ MapSpec Command::spec() const {
     throw HilError("--map: " + map_ + ": the same axis twice; give two");
   }
   std::array<std::string, kAxisCount> texts = axes_;
-  for (const AxisId axis : {AxisId::loop, AxisId::quantum, AxisId::estimator, AxisId::filter,
-                            AxisId::law, AxisId::limits}) {
+  for (const AxisId axis : {AxisId::loop, AxisId::quantum, AxisId::limits}) {
     if (!arm_ || texts[index_of(axis)].empty()) continue;
     throw HilError(std::string("--") + axis_kinds()[index_of(axis)].name +
                    ": device and servo have their own with --arm; leave one of the two out");
+  }
+  for (const char* word : {"linear", "two_sided"}) {
+    if (!arm_ || texts[index_of(AxisId::law)].find(word) == std::string::npos) continue;
+    throw HilError(std::string("--law: ") + word +
+                   " is a wall of one axis alone; leave it or --arm out");
   }
   if (!arm_ && !axes_[index_of(AxisId::mode)].empty()) {
     throw HilError("--mode: one axis is rigid; add --arm, or leave it out");
@@ -325,6 +329,7 @@ int Command::run(std::ostream& out) const {
   const MapSpec map = spec();
   const Shard part = shard();
   const Outputs outputs(paths_);
+  if (!paths_.plot.empty()) check_panels(map);
   if (!portraits_.empty()) {
     draw_portraits(map);
     return 0;
@@ -347,6 +352,7 @@ MergeCommand::MergeCommand(Arguments& program)
 int MergeCommand::run(std::ostream& out) const {
   const Outputs outputs(paths_);
   const Part whole = merge_parts(parts_);
+  if (!paths_.plot.empty()) check_panels(whole.spec);
   tell(whole, out);
   outputs.write(whole);
   return 0;

@@ -5,9 +5,10 @@
 #include <cmath>
 #include <cstddef>
 
-#include "controller/servo/contact_plan.hpp"
+#include "controller/law/coupling.hpp"
+#include "controller/law/velocity_window.hpp"
+#include "controller/servo/energy_ledger.hpp"
 #include "controller/servo/force_limits.hpp"
-#include "controller/servo/velocity_window.hpp"
 #include "lab/zwidth/one_axis_plant.hpp"
 #include "shared/numeric/numbers.hpp"
 
@@ -22,26 +23,22 @@ class OneAxisWall {
 
   OneAxisWall(const Subject& subject, double stiffness_n_per_mm, double tip_mm)
       : law_(subject.law),
-        estimator_(subject.estimator),
         limits_on_(subject.limits),
         coupling_{typename N::Ratio(stiffness_n_per_mm),
-                  typename N::Unit(subject.damping_ns_per_mm)} {
-    const SampledLoop& loop = subject.loop;
-    const double rate_hz = 1 / loop.period_s;
-    window_plan_ = {.rate_hz = static_cast<std::int32_t>(std::lround(rate_hz)),
-                    .stride = std::clamp(static_cast<std::int32_t>(std::lround(rate_hz)) / 1000, 1,
-                                         VelocityWindow<N>::kMaxStride),
-                    .noise_mm = Real(loop.quantum_mm)};
-    per_second_ = static_cast<Real>(rate_hz);
-    share_ = typename N::Unit(loop.period_s / (loop.period_s + loop.velocity_filter_s));
+                  typename N::Unit(subject.damping_ns_per_mm)},
+        last_mm_(Real(tip_mm)) {
+    const double period_s = subject.loop.period_s;
+    const LawLoop loop{.rate_hz = std::round(1 / period_s),
+                       .tip_noise_mm = subject.loop.quantum_mm};
+    velocity_plan_ = plan_law<VelocityInput, N>(subject.estimator, loop);
+    force_plan_ = plan_law<ForceInput, N>(force_law_at(subject, stiffness_n_per_mm), loop);
+    stabiliser_plan_ = plan_law<StabiliserInput, N>(subject.stabiliser, loop);
     const LimitSettings scene;
     constexpr double kThermalS = 10;
     limits_ = {.peak_n = Real(scene.force_n),
                .continuous_n = Real(scene.continuous_force_n),
-               .slew_n_per_tick = Real(scene.slew_n_per_ms * 1000 * loop.period_s),
-               .thermal_per_tick = typename N::Ratio(loop.period_s / kThermalS)};
-    last_mm_ = Real(tip_mm);
-    window_.start({Real(0), last_mm_, Real(0)});
+               .slew_n_per_tick = Real(scene.slew_n_per_ms * 1000 * period_s),
+               .thermal_per_tick = typename N::Ratio(period_s / kThermalS)};
   }
 
   /// The force on the tip, outwards positive, that a reading of `tip_mm` asks for.
@@ -49,53 +46,72 @@ class OneAxisWall {
     const auto tip_mm = Real(reading_mm);
     const Real moved_mm = tip_mm - last_mm_;
     last_mm_ = tip_mm;
-    window_.take({Real(0), tip_mm, Real(0)}, 1);
-    const Real raw = saturated(moved_mm);
-    slow_ = slow_ + multiply<Real>(share_, raw - slow_);
+    absorb(moved_mm);
+    velocity_ = velocity_plan_(velocity_memory_, {along(tip_mm), 1, !velocity_memory_.begun});
+    const bool touches = tip_mm < Real(0);
     DeviceVec<Real> wanted_n{};
-    if (law_ == Law::two_sided || tip_mm < Real(0)) wanted_n.y = wanted(tip_mm);
-    if (limits_on_) {
-      sent_n_ = limited_force(limits_, thermal_, wanted_n, sent_n_, sent_n_.y * moved_mm > Real(0));
-    } else {
-      sent_n_ = wanted_n;
-    }
+    if (law_ == Law::two_sided || touches) wanted_n = wanted(tip_mm);
+    sent_n_ = steadied(wanted_n, moved_mm, touches);
     return static_cast<double>(sent_n_.y);
   }
 
  private:
-  Real saturated(Real moved_mm) const noexcept {
+  static DeviceVec<Real> along(Real y) noexcept { return {Real(0), y, Real(0)}; }
+
+  /// What the loop took from the hand, as the servo's account has it.
+  void absorb(Real moved_mm) noexcept {
     if constexpr (N::kIsFixed) {
-      return Real::from_raw(saturate_i32(std::int64_t{moved_mm.raw()} * window_plan_.rate_hz));
+      taken_mj_ = saturating_add(taken_mj_, -(std::int64_t{sent_n_.y.raw()} * moved_mm.raw()));
     } else {
-      return moved_mm * per_second_;
+      taken_mj_ -= sent_n_.y * moved_mm;
     }
   }
 
-  Real wanted(Real tip_mm) const noexcept {
-    const DeviceVec<Real> velocity = estimator_ == Estimator::foaw
-                                         ? window_.velocity(window_plan_)
-                                         : DeviceVec<Real>{Real(0), slow_, Real(0)};
+  DeviceVec<Real> wanted(Real tip_mm) noexcept {
     const Real spring_mm = Real(0) - tip_mm;
-    if (law_ == Law::coupling) {
-      return coupling_force(coupling_, {Real(0), spring_mm, Real(0)}, velocity).y;
+    if (law_ == Law::coupling) return coupling_force(coupling_, along(spring_mm), velocity_);
+    if (law_ == Law::own) {
+      using Unit = typename N::Unit;
+      return force_plan_(force_memory_, {along(tip_mm),
+                                         {Real(0), tip_mm, Real(0)},
+                                         velocity_,
+                                         along(spring_mm),
+                                         {Unit(0), Unit(1), Unit(0)}});
     }
     const Real push_n = multiply<Real>(coupling_.stiffness_n_per_mm, spring_mm) -
-                        multiply<Real>(coupling_.damping_ns_per_mm, velocity.y);
-    return law_ == Law::linear ? std::max(Real(0), push_n) : push_n;
+                        multiply<Real>(coupling_.damping_ns_per_mm, velocity_.y);
+    return along(law_ == Law::linear ? std::max(Real(0), push_n) : push_n);
+  }
+
+  /// Limits and stabiliser, in the order of the servo step.
+  DeviceVec<Real> steadied(DeviceVec<Real> wanted_n, Real moved_mm, bool touches) noexcept {
+    const bool leaves = sent_n_.y * moved_mm > Real(0);
+    const auto limited = [&](DeviceVec<Real> force_n, ThermalState<N>& thermal) {
+      return limits_on_ ? limited_force(limits_, thermal, force_n, sent_n_, leaves) : force_n;
+    };
+    if (!stabiliser_plan_.given()) return limited(wanted_n, thermal_);
+    ThermalState<N> heated = thermal_;
+    const DeviceVec<Real> limited_n = limited(wanted_n, heated);
+    const DeviceVec<Real> steady_n =
+        stabiliser_plan_(stabiliser_memory_,
+                         {limited_n, sent_n_, along(moved_mm), 1, velocity_, taken_mj_, touches});
+    if (!(steady_n == limited_n)) return limited(steady_n, thermal_);
+    thermal_ = heated;
+    return limited_n;
   }
 
   Law law_;
-  Estimator estimator_;
   bool limits_on_;
   Coupling<N> coupling_;
-  VelocityPlan<N> window_plan_;
-  VelocityWindow<N> window_;
-  Real per_second_{};
-  typename N::Unit share_{};  ///< of the low-pass
-  Real last_mm_{}, slow_{};
+  Real last_mm_;
+  VelocityEstimatorPlan<N> velocity_plan_;
+  ForceLawPlan<N> force_plan_;
+  StabiliserPlan<N> stabiliser_plan_;
+  LawMemory velocity_memory_, force_memory_, stabiliser_memory_;
   ForceLimits<N> limits_{};
   ThermalState<N> thermal_;
-  DeviceVec<Real> sent_n_{};
+  DeviceVec<Real> velocity_{}, sent_n_{};
+  typename N::Energy taken_mj_{};
 };
 
 /// Forces on their way to the motors: held for whole periods, and for a part of one.

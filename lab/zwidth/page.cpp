@@ -30,8 +30,8 @@ has a travel in its last third above three encoder steps and 0.97 of that in the
 wall's work goes on rising by as much as that. *First* is the lowest K at which a column does so, to 0.5 %; cells
 above it that come to rest again are told apart, because no hand gets there through those that swing.
 
-One axis has the servo's own coupling, velocity window and force limits, as the same templates, in the loop's numbers, and
-exact mechanics. *Whole arm* is the servo step itself with the emulated device, its driver and its packets in virtual
+One axis has the servo's own coupling, velocity window, stabilisers and force limits, as the same templates, in the
+loop's numbers, and exact mechanics. *Whole arm* is the servo step itself with the emulated device, its driver and its packets in virtual
 time (`--arm`). The mechanics of the devices are plausible values, not those of a unit: with a device of your own,
 give `--mass`, `--viscous`, `--friction` and `--quantum`, and take its map.
 
@@ -43,6 +43,10 @@ constexpr const char* kHow = R"(## Maps of your own
     ./kerf lab zwidth --rate 4000 --delay 0.5 --csv map.csv         any axis takes a value, a list or a range
     ./kerf lab zwidth --map delay,quantum --delay 0:3:13 --quantum 0:0.2:11 --plot k.svg   the highest K as a colour
     ./kerf lab zwidth --portraits portrait.svg --cells 1:0.002,10:0.002                    position against speed
+    ./kerf lab zwidth --arm --delay 0 --stiffness 0.1:50:40 --plot arm.svg                 the whole servo step
+    ./kerf lab zwidth --stabiliser none,passivity,energy_bounding --plot s.svg             one panel for each
+
+`--law`, `--estimator` and `--stabiliser` also take the laws that a program of yours registers (docs/own-law.md).
 
 A map larger than one machine is cut into shards. Each keeps its finished columns in a part file and goes on from there
 when it is started again; `merge` refuses parts of other seeds, versions or axes, and names what is missing. With GNU
@@ -50,6 +54,37 @@ parallel, and as a job array of Slurm (`examples/cluster/zwidth.sbatch`):
 
     parallel ./kerf lab zwidth --rate 250,500,1000,2000 --jobs 1 --shard {}/8 --part zwidth-{}.part ::: {1..8}
     ./kerf lab merge zwidth-*.part --plot zwidth.svg --csv zwidth.csv --json zwidth.json
+
+)";
+
+constexpr const char* kDevicesText =
+    R"(The lower of both rules, in N/mm, at two dampings: the default, and the one that carries most on the device's map.
+*Linear, exact* is the boundary without friction and encoder steps; the emulated firm hand is 0.1 kg, 0.005 N s/mm,
+0.5 N/mm; in *whole arm* a spring of 0.2 N/mm pushes. The recommended K is the least of the row over 1.5. The delay of a
+real device has not been measured; take two periods until it is. Take no more damping than the map bears: beyond its
+hump the lag of the velocity and the encoder's steps drive the wall.
+
+)";
+
+constexpr const char* kRatesText =
+    R"(Without friction the boundary grows with the rate; measured, it does so less and less. The encoder's steps are the
+same at every rate, and the velocity window spans up to 16 ms at every rate, so its lag counts more periods: a fast loop
+bears less damping than the linear boundary says. Grey columns have more damping than is stable without any wall.
+
+)";
+
+constexpr const char* kKnobsText = R"(## What each knob does
+
+An Omni with B = 0.002 N s/mm and a delay of one period, one knob at a time, K in N/mm; the standard in bold. The linear
+boundary knows mass, both dampings, delay, rate, hand and filter. *Re-entry* is the lowest K above the first crossing
+that comes to rest again. Rows of the same loop differ by up to 2 %: the seed puts the encoder's steps elsewhere.
+
+)";
+
+constexpr const char* kNumbersText = R"(
+They part where a run is chaotic, as near every boundary of a loop with friction and encoder steps: 2^-16 mm or N more
+or less shift the tick in which an encoder's step is met, and with it where the tip comes to rest. No kind of numbers is
+always on the better side.
 
 )";
 
@@ -157,6 +192,7 @@ constexpr Knob kKnobs[] = {{AxisId::rate, "250,500,1000,2000,4000,8000", ""},
                            {AxisId::estimator, "foaw,difference", ""},
                            {AxisId::filter, "0,1,5", "difference"},
                            {AxisId::law, "coupling,linear,two_sided", ""},
+                           {AxisId::stabiliser, "none,passivity,energy_bounding", ""},
                            {AxisId::limits, "on,off", ""},
                            {AxisId::numeric, "fixed,float,double", ""}};
 
@@ -242,32 +278,11 @@ StabilityPage stability_page(const Measure& measure, const std::string& devices,
   const Part rate_maps = measure(of_rates, "rates");
 
   StabilityPage page;
-  page.text =
-      std::string(kAbout) + "## Devices\n\n![Maps of three devices](" + devices +
-      ")\n\nThe lower of both rules, in N/mm, at two dampings: the default, and the one that "
-      "carries "
-      "most on the device's map. The recommended K is\nthe least of the row over 1.5. Never take "
-      "more "
-      "damping than the map shows: above its hump the velocity's own delay and the encoder's steps "
-      "drive the\nwall.\n\n" +
-      devices_table(measure, device_maps, quick) + "\n## Rates\n\n![Maps of six rates](" + rates +
-      ")\n\nThe linear boundary without damping grows with the rate. With damping the velocity "
-      "window, which "
-      "spans up to 16 ms at every rate, and the encoder's steps set\nthe limit: a higher rate "
-      "carries "
-      "less damping than the linear boundary says.\n\n## What each knob does\n\nAn Omni with B = "
-      "0.002 N s/mm, "
-      "one knob at a time, K in N/mm; the standard in bold. The linear boundary knows mass, "
-      "dampings, "
-      "delay, rate, hand and filter.\n\n" +
-      knobs_table(measure, quick) + "\n## Fixed point, float and double\n\n" +
-      numbers_text(measure, quick) +
-      "\nThey part where a run is chaotic, as near every boundary of a loop with friction and "
-      "encoder steps: "
-      "a step of 2^-16 mm or N shifts the tick in which an\nencoder step is met, and with it where "
-      "the tip "
-      "comes to rest. Neither is the safer one.\n\n" +
-      kHow + lab_provenance() + "\n";
+  page.text = std::string(kAbout) + "## Devices\n\n![Maps of three devices](" + devices + ")\n\n" +
+              kDevicesText + devices_table(measure, device_maps, quick) +
+              "\n## Rates\n\n![Maps of six rates](" + rates + ")\n\n" + kRatesText + kKnobsText +
+              knobs_table(measure, quick) + "\n## Fixed point, float and double\n\n" +
+              numbers_text(measure, quick) + kNumbersText + kHow + lab_provenance() + "\n";
   page.devices_plot = plot_of(device_maps);
   page.rates_plot = plot_of(rate_maps);
   return page;

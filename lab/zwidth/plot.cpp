@@ -22,7 +22,7 @@ constexpr const char* kSwings = "'#F0B79B'";
 constexpr const char* kNone = "'#D9D9D9'";
 
 constexpr std::size_t kMostPanels = 12;
-constexpr int kPanelWidth = 560, kPanelHeight = 440, kFoot = 150;
+constexpr int kPanelWidth = 560, kPanelHeight = 450, kFoot = 150;
 
 /// Where the values of an axis stand in a picture: numbers at their place, words one after another.
 class Scale {
@@ -121,11 +121,6 @@ std::vector<Panel> panels_of(const Part& part) {
       at->columns.push_back(index);
     }
   }
-  if (panels.size() > kMostPanels) {
-    throw HilError(
-        "--plot: " + std::to_string(panels.size()) +
-        " panels, and a picture holds 12; give the axes that are not mapped fewer values");
-  }
   return panels;
 }
 
@@ -167,7 +162,7 @@ void begin(std::ostream& script, std::size_t panels, int foot) {
             "set multiplot layout "
          << down << ',' << across << " margins screen " << 95.0 / width << "," << 1 - 25.0 / width
          << "," << (foot + 60.0) / height << "," << 1 - 45.0 / height << " spacing screen "
-         << 95.0 / width << "," << 90.0 / height << "\n";
+         << 95.0 / width << "," << 115.0 / height << "\n";
 }
 
 void data(std::ostream& script, const char* name, const std::function<void()>& rows) {
@@ -309,6 +304,18 @@ void draw_legend(std::ostream& script, const Part& part, bool verdicts, double h
 }
 
 }  // namespace
+
+void check_panels(const MapSpec& spec) {
+  std::size_t panels = 1;
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
+    if (std::ranges::find(spec.mapped, axis) != spec.mapped.end()) continue;
+    panels *= std::max<std::size_t>(1, spec.table[axis].size());
+  }
+  if (panels <= kMostPanels) return;
+  throw HilError("--plot: " + std::to_string(panels) + " panels, and a picture holds " +
+                 std::to_string(kMostPanels) +
+                 "; give the axes that are not mapped fewer values, or leave --plot out");
+}
 
 std::string axis_label(std::size_t axis) {
   if (axis == kAxisCount) return "stiffness of the wall, K (N/mm)";

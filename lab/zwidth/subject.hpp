@@ -3,23 +3,19 @@
 
 #include <cstdint>
 
+#include "controller/law/registry/law_registry.hpp"
 #include "controller/scene/scene.hpp"
 #include "controller/stability/sampled_loop.hpp"
 #include "shared/wire/personality.hpp"
 
 namespace kerf::zwidth {
 
-/// How the wall reads the hand's speed.
-enum class Estimator : std::uint8_t {
-  foaw,       ///< the servo's own window (docs/theory.md 5.2)
-  difference  ///< of two readings, through the loop's low-pass
-};
-
 /// The force of a wall that is pressed in by delta at speed v outwards.
 enum class Law : std::uint8_t {
-  coupling,  ///< the servo's own (docs/theory.md 5.1): its damper grows with the spring
-  linear,    ///< max(0, K delta - B v)
-  two_sided  ///< -K x - B v on both sides of the face: what the exact boundary is about
+  coupling,   ///< the servo's own (docs/theory.md 5.1): its damper grows with the spring
+  linear,     ///< max(0, K delta - B v)
+  two_sided,  ///< -K x - B v on both sides of the face: what the exact boundary is about
+  own         ///< `Subject::force_law`
 };
 
 /// One cell of a map but for its stiffness: what is pressed against the wall, and what the wall is.
@@ -27,13 +23,29 @@ struct Subject {
   SampledLoop loop;
   double damping_ns_per_mm = 0;
   double push_n = 0.5;  ///< of the hand, above Coulomb friction
-  Estimator estimator = Estimator::foaw;
+  LawChoice estimator{LawKind::velocity, "foaw", {}};
   Law law = Law::coupling;
+  LawChoice force_law{LawKind::force, "", {}};  ///< K and B are settings of it
+  LawChoice stabiliser{LawKind::stabiliser, "", {}};
   NumericKind numeric = NumericKind::fixed;
   bool limits = true;  ///< peak, thermal budget and slew of a scene that sets none
   // Of the whole arm alone:
   Personality device = Personality::omni;
   double mode_hz = 0;  ///< structural mode; 0: rigid
 };
+
+/// The subject's own force law at this stiffness: `stiffness_n_per_mm` and, where it has it,
+/// `damping_ns_per_mm` are its settings.
+[[nodiscard]] inline LawChoice force_law_at(const Subject& subject, double stiffness_n_per_mm) {
+  LawChoice choice = subject.force_law;
+  if (choice.name.empty()) return choice;
+  choice.settings.emplace_back("stiffness_n_per_mm", stiffness_n_per_mm);
+  for (const LawSetting& setting : find_law(LawKind::force, choice.name).settings) {
+    if (setting.name == "damping_ns_per_mm") {
+      choice.settings.emplace_back(setting.name, subject.damping_ns_per_mm);
+    }
+  }
+  return choice;
+}
 
 }  // namespace kerf::zwidth

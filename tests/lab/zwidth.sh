@@ -13,7 +13,7 @@ grep -q 'stiffness of the wall, K (N/mm)' zwidth.svg
 grep -q 'servo steps' told
 "$lab" zwidth --portraits portraits.svg --cells 1:0.002,20:0.002 --seconds 0.3
 grep -q '<svg' portraits.svg
-"$lab" zwidth --quick --page stability.md
+"$lab" zwidth --quick --jobs 2 --page stability.md
 grep -q '## What each knob does' stability.md
 grep -q '<svg' stability.devices.svg
 grep -q '<svg' stability.rates.svg

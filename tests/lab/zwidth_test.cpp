@@ -30,7 +30,7 @@ Subject ideal(double delay_periods) {
   Subject subject;
   subject.loop.viscous_ns_per_mm = 0.0002;
   subject.loop.delay_s = delay_periods * subject.loop.period_s;
-  subject.estimator = Estimator::difference;
+  subject.estimator = {LawKind::velocity, "difference", {}};
   subject.law = Law::two_sided;
   subject.numeric = NumericKind::float64;
   subject.limits = false;
@@ -252,7 +252,8 @@ TEST_CASE("axes that mean nothing are refused in one line; columns that cannot e
                            "--arm --rate 3000 --seconds 0.1",
                            "--portraits /dev/null",
                            "--portraits /dev/null --cells 1",
-                           "--seconds 0"}) {
+                           "--seconds 0",
+                           "--plot /dev/null --delay 0:3:7 --quantum 0,0.1"}) {
     const Said said = lab(std::string("zwidth ") + line);
     CAPTURE(line);
     CAPTURE(said.err);
