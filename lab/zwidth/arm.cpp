@@ -188,6 +188,7 @@ LoadedScene flat_scene(const Subject& subject) {
   scene.device.torque_scale = torque_scale_of(subject.device);
   scene.force.damping_ns_per_mm = subject.damping_ns_per_mm;
   scene.force.stabiliser = subject.stabiliser;
+  scene.limits.continuous_force_n = scene.limits.force_n;  // the motors stay cool
   scene.servo.velocity = subject.estimator;
   scene.servo.rate_hz = rate_hz;
   scene.servo.numeric = subject.numeric;

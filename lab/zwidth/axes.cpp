@@ -47,7 +47,7 @@ constexpr std::array<AxisKind, kAxisCount> kKinds{{
     {"stabiliser", "", "none", 0, 0, "",
      "none, passivity, energy_bounding or one of your own; settings of a law as "
      "NAME/setting=value/..."},
-    {"limits", "", "", 0, 0, "on off", "peak, thermal budget and slew of a scene"},
+    {"limits", "", "", 0, 0, "on off", "peak and slew of a scene; the motors stay cool"},
 }};
 
 [[noreturn]] void fail(const AxisKind& kind, const std::string& text, const std::string& way_out) {

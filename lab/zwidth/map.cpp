@@ -8,8 +8,10 @@
 #include <thread>
 #include <utility>
 
+#include "controller/law/registry/law_registry.hpp"
 #include "controller/load/loaded_scene.hpp"
 #include "controller/stability/stable_gains.hpp"
+#include "hil/hil_error.hpp"
 #include "lab/zwidth/arm.hpp"
 #include "lab/zwidth/one_axis.hpp"
 #include "shared/text/format.hpp"
@@ -98,11 +100,17 @@ Column measure_column(const MapSpec& spec, const Assignment& values, std::size_t
   const Subject subject = subject_of(values);
   Column column;
   if (!impossible(subject).empty()) return column;
-  ColumnRun run(spec, subject, index);
-  for (const double stiffness : spec.stiffness_n_per_mm) column.cells.push_back(run.at(stiffness));
-  column.swing = run.crossing(&Swing::swings);
-  column.energy = run.crossing(&Swing::active);
-  column.ticks = run.ticks();
+  try {
+    ColumnRun run(spec, subject, index);
+    for (const double stiffness : spec.stiffness_n_per_mm) {
+      column.cells.push_back(run.at(stiffness));
+    }
+    column.swing = run.crossing(&Swing::swings);
+    column.energy = run.crossing(&Swing::active);
+    column.ticks = run.ticks();
+  } catch (const LawError& error) {
+    throw HilError("--law: " + subject.force_law.name + error.what());
+  }
   return column;
 }
 

@@ -28,7 +28,8 @@ Each cell of a map is a device at a flat wall, without a hand unless said. It st
 50 and at 200 mm/s, and is pushed on with its Coulomb friction and 0.5 N more. A cell *swings* where one of these runs
 has a travel in its last third above three encoder steps and 0.97 of that in the middle third. It is *active* where the
 wall's work goes on rising by as much as that. *First* is the lowest K at which a column does so, to 0.5 %; cells
-above it that come to rest again are told apart, because no hand gets there through those that swing.
+above it that come to rest again are told apart, because no hand gets there through those that swing. The motors stay
+cool: a thermal limit would end a swing by weakening them.
 
 One axis has the servo's own coupling, velocity window, stabilisers and force limits, as the same templates, in the
 loop's numbers, and exact mechanics. *Whole arm* is the servo step itself with the emulated device, its driver and its packets in virtual

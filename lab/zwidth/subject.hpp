@@ -28,7 +28,9 @@ struct Subject {
   LawChoice force_law{LawKind::force, "", {}};  ///< K and B are settings of it
   LawChoice stabiliser{LawKind::stabiliser, "", {}};
   NumericKind numeric = NumericKind::fixed;
-  bool limits = true;  ///< peak, thermal budget and slew of a scene that sets none
+  /// Peak and slew of a scene that sets none. The thermal budget is never used up: motors that get
+  /// weaker make a swing die out that a cool device goes on with.
+  bool limits = true;
   // Of the whole arm alone:
   Personality device = Personality::omni;
   double mode_hz = 0;  ///< structural mode; 0: rigid

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <filesystem>
@@ -10,6 +11,7 @@
 
 #include <doctest/doctest.h>
 
+#include "controller/law/law_row.hpp"
 #include "controller/stability/stable_gains.hpp"
 #include "hil/hil_error.hpp"
 #include "lab/program.hpp"
@@ -24,6 +26,30 @@ using namespace kerf;
 using namespace kerf::zwidth;
 
 namespace {
+
+/// A law as a program of a user's own registers it: a bare spring; above 60 N/mm it breaks.
+template <class N>
+class BareSpring {
+ public:
+  static constexpr const char* kName = "bare_spring";
+  static constexpr const char* kMeaning = "a spring, for a test";
+  static constexpr std::array<LawSetting, 1> kSettings{
+      {{"stiffness_n_per_mm", "N/mm", 0, 100, 1, "of the spring"}}};
+  struct State {};
+
+  explicit BareSpring(const LawSetup& setup)
+      : stiffness_(typename N::Ratio(setup["stiffness_n_per_mm"])) {}
+  [[nodiscard]] DeviceVec<typename N::Real> step(const ForceInput<N>& in, State&) const noexcept {
+    using Real = typename N::Real;
+    if constexpr (!N::kIsFixed) {
+      if (stiffness_ > 60) return {Real(0), Real(0) / Real(0), Real(0)};
+    }
+    return {Real(0), multiply<Real>(stiffness_, in.spring_mm.y), Real(0)};
+  }
+
+ private:
+  typename N::Ratio stiffness_;
+};
 
 /// The loop of the theory.
 Subject ideal(double delay_periods) {
@@ -79,6 +105,8 @@ constexpr const char* kSmall =
     "zwidth --damping 0,0.002,0.02 --stiffness 0.2:20:6 --seconds 0.3 --delay 0,1 ";
 
 }  // namespace
+
+KERF_REGISTER_FORCE_LAW(BareSpring)
 
 TEST_CASE("one axis in time has the exact boundary, by travel and by energy") {
   for (const double delay : {0.0, 0.5, 1.0, 2.3}) {
@@ -285,4 +313,47 @@ TEST_CASE("a column tells its first crossing and what comes to rest above it apa
   CHECK(measure_column(spec, values, 0).swing.first_n_per_mm == Crossing::kNever);
   spec.stiffness_n_per_mm = {30, 50};
   CHECK(measure_column(spec, values, 0).swing.first_n_per_mm == 0);
+}
+
+TEST_CASE("a law of the user's own gets its map, on one axis and with the whole arm") {
+  const Folder folder;
+  const auto verdicts = [&](const std::string& options) {
+    const std::string file = folder.at("map.csv");
+    REQUIRE(lab("zwidth --damping 0 --delay 0.5 --stiffness 0.3:30:8 --seconds 0.3 --csv " + file +
+                " " + options)
+                .code == 0);
+    // From the stiffness on: the law's name stands before it.
+    std::istringstream in(bytes(file));
+    std::string all;
+    for (std::string line; std::getline(in, line);) {
+      std::size_t at = line.size();
+      for (int comma = 0; comma < 5; ++comma) at = line.rfind(',', at - 1);
+      all += line.substr(at) + "\n";
+    }
+    return all;
+  };
+  CHECK(verdicts("--law bare_spring") == verdicts("--law linear"));
+  CHECK(verdicts("--law bare_spring --arm --numeric double").find(",1,1,") != std::string::npos);
+  // What is no number is no wall: it counts as the worst, and nothing crashes.
+  for (const char* where : {"", " --arm"}) {
+    CHECK(lab(std::string(
+                  "zwidth --law bare_spring --numeric double --damping 0 --delay 0 --seconds 0.2 "
+                  "--stiffness 61,62") +
+              where)
+              .out.find("below all") != std::string::npos);
+  }
+  CHECK(lab("zwidth --law bare_spring --stiffness 101,102 --seconds 0.1 --damping 0").code == 2);
+}
+
+TEST_CASE("a stabiliser widens the map") {
+  const auto first = [](const std::string& stabiliser) {
+    MapSpec spec;
+    spec.stiffness_n_per_mm = stiffness_values("0.1:50:20");
+    spec.seconds = 0.6;
+    Assignment values;
+    values[index_of(AxisId::damping)] = "0";
+    values[index_of(AxisId::stabiliser)] = stabiliser;
+    return measure_column(spec, values, 0).swing.first_n_per_mm;
+  };
+  CHECK(first("energy_bounding") > 1.5 * first("none"));
 }
