@@ -6,8 +6,10 @@
 
 #include "lab/accuracy/command.hpp"
 #include "lab/bench/bench_command.hpp"
+#include "lab/energy/command.hpp"
 #include "lab/extremes/command.hpp"
 #include "lab/faults/command.hpp"
+#include "lab/zwidth/command.hpp"
 #include "shared/posix/failure.hpp"
 #include "shared/text/command_line.hpp"
 
@@ -18,9 +20,13 @@ int run_lab(int argc, const char* const* argv, std::ostream& out, std::ostream& 
   app.footer("Exit codes: 0 fine, 1 a check failed, 2 bad input or set-up.");
   const BenchCommand bench(app);
   const accuracy::Command accuracy(app);
+  const energy::Command energy(app);
   const extremes::Command extremes(app);
   const faults::Command faults(app);
-  const std::array<const LabCommand*, 4> commands{&bench, &accuracy, &extremes, &faults};
+  const zwidth::Command zwidth(app);
+  const zwidth::MergeCommand merge(app);
+  const std::array<const LabCommand*, 7> commands{&bench,  &accuracy, &energy, &extremes,
+                                                  &faults, &zwidth,   &merge};
   try {
     if (!app.parse(argc, argv, out)) return 0;
     for (const LabCommand* command : commands) {

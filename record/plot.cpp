@@ -1,8 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <array>
 #include <cmath>
+#include <cstddef>
+#include <span>
 #include <sstream>
 #include <string>
+#include <string_view>
+#include <vector>
 
 #include "record/envelope.hpp"
 #include "record/gnuplot.hpp"
@@ -11,6 +15,7 @@
 #include "record/summary.hpp"
 #include "record/tick_log.hpp"
 #include "shared/posix/new_file.hpp"
+#include "shared/segment/energy_columns.hpp"
 
 namespace kerf {
 namespace {
@@ -21,7 +26,7 @@ constexpr std::size_t kMaxPoints = 4000;  // twice the pixels across a wide scre
 // broad under the contact force that it mostly follows.
 constexpr std::string_view kStyle = R"(
 set encoding utf8
-set terminal svg size 960,640 dynamic font 'Helvetica,13' background rgb 'white' linewidth 1.2
+set terminal svg size 960,920 dynamic font 'Helvetica,13' background rgb 'white' linewidth 1.2
 set grid back linecolor rgb '#dddddd' linetype 1 linewidth 0.5
 set border 3 linecolor rgb '#555555'
 set tics nomirror out textcolor rgb '#333333'
@@ -30,20 +35,18 @@ set rmargin at screen 0.91
 set multiplot
 )";
 constexpr std::string_view kPanels = R"(
-set tmargin at screen 0.93
-set bmargin at screen 0.56
-set key at screen 0.09, 0.97 left horizontal Left reverse samplen 2 textcolor rgb '#333333'
+set tmargin at screen 0.95
+set bmargin at screen 0.70
+set key at screen 0.09, 0.98 left horizontal Left reverse samplen 2 textcolor rgb '#333333'
 set format x ''
 set yrange [0:0.01<*]
 set ylabel 'force (N)'
 plot $commanded with lines linecolor rgb '#E69F00' linewidth 3 title 'commanded', \
      $contact with lines linecolor rgb '#0072B2' title 'contact', \
      $modification with lines linecolor rgb '#009E73' title 'modification'
-set tmargin at screen 0.46
-set bmargin at screen 0.10
-set key at screen 0.09, 0.50
-set format x '%g'
-set xlabel 'time (s)'
+set tmargin at screen 0.64
+set bmargin at screen 0.39
+set key at screen 0.09, 0.67
 set ylabel 'penetration (mm)'
 set y2label 'removed (mm³)'
 set y2range [0:0.01<*]
@@ -51,13 +54,45 @@ set border 11
 set y2tics nomirror out textcolor rgb '#333333'
 plot $penetration with lines linecolor rgb '#0072B2' title 'penetration', \
      $removed axes x1y2 with lines linecolor rgb '#D55E00' linewidth 1.6 title 'removed volume'
-unset multiplot
+unset y2tics
+unset y2label
+set border 3
+set tmargin at screen 0.33
+set bmargin at screen 0.07
+set key at screen 0.09, 0.36
+set format x '%g'
+set xlabel 'time (s)'
+set ylabel 'work of the hand (mJ)'
+set autoscale y
+set xzeroaxis linecolor rgb '#555555'
 )";
+// Of the sources in their order.
+constexpr std::array<std::string_view, kEnergySources> kSourceColours = {
+    "#0072B2", "#009E73", "#D55E00", "#CC79A7", "#F0E442", "#999999", "#56B4E9", "#7B3F00"};
 
 struct Curve {
-  const char* name;
+  std::string_view name;
   Envelope envelope;
+  bool is_zero = true;
+
+  /// A number that is none would stop the plot; it shows as a gap at zero and in the log.
+  void add(double x, double y) {
+    is_zero = is_zero && !(std::abs(y) > 0);
+    envelope.add(x, std::isfinite(y) ? y : 0);
+  }
 };
+
+/// The work at the port over all, and by each source that did any.
+[[nodiscard]] std::string energy_panel(std::span<const Curve> sources) {
+  std::string plot = "plot $port with lines linecolor rgb '#E69F00' linewidth 3 title 'all'";
+  for (std::size_t i = 0; i < sources.size(); ++i) {
+    if (sources[i].is_zero) continue;
+    const std::string name(sources[i].name);
+    plot += ", $" + name + " with lines linecolor rgb '" + std::string(kSourceColours[i]) +
+            "' title '" + name + "'";
+  }
+  return plot + "\nunset multiplot\n";
+}
 
 [[nodiscard]] std::string gnuplot_script(const std::filesystem::path& folder) {
   const Manifest manifest = read_manifest(folder);
@@ -66,11 +101,13 @@ struct Curve {
     throw RecordError((folder / kTickLogName).string() + ": 0 rows; nothing to plot");
   }
   const Envelope empty(log.rows(), kMaxPoints);
-  std::array<Curve, 5> curves{{{"contact", empty},
-                               {"modification", empty},
-                               {"commanded", empty},
-                               {"penetration", empty},
-                               {"removed", empty}}};
+  std::vector<Curve> curves;
+  for (const std::string_view name :
+       {"contact", "modification", "commanded", "penetration", "removed", "port"}) {
+    curves.push_back({name, empty});
+  }
+  const std::size_t first_source = curves.size();
+  for (const std::string_view name : kEnergySourceNames) curves.push_back({name, empty});
   double removed = 0;
   double end_s = 0;
   std::uint64_t first_tick = 0;
@@ -79,12 +116,15 @@ struct Curve {
     end_s = static_cast<double>(record.tick - first_tick) * manifest.tick_ns * 1e-9;
     removed += removed_mm3(record, manifest.voxel_mm3);
     if (record.stale != 0) return;  // nothing was felt in it; the curves go on to the next tick
-    const std::array<double, 5> values{
-        magnitude(record.contact_force_n), magnitude(record.modification_force_n),
-        magnitude(record.commanded_force_n), double{record.penetration_mm}, removed};
-    for (std::size_t i = 0; i < curves.size(); ++i) {
-      // A number that is none would stop the plot; it shows as a gap at zero and in the log.
-      curves[i].envelope.add(end_s, std::isfinite(values[i]) ? values[i] : 0);
+    const std::array values{magnitude(record.contact_force_n),
+                            magnitude(record.modification_force_n),
+                            magnitude(record.commanded_force_n),
+                            double{record.penetration_mm},
+                            removed,
+                            record.port_energy_j * 1000};
+    for (std::size_t i = 0; i < values.size(); ++i) curves[i].add(end_s, values[i]);
+    for (std::size_t i = 0; i < kEnergySources; ++i) {
+      curves[first_source + i].add(end_s, energy_mj_of_steps(record.*kEnergyColumns[i]));
     }
   });
   std::ostringstream script;
@@ -95,7 +135,7 @@ struct Curve {
     for (const Envelope::Point& p : curve.envelope.points()) script << p.x << ' ' << p.y << '\n';
     script << "EOD\n";
   }
-  script << kPanels;
+  script << kPanels << energy_panel(std::span(curves).subspan(first_source));
   return script.str();
 }
 

@@ -7,6 +7,7 @@
 
 #include "record/manifest.hpp"
 #include "record/tick_log.hpp"
+#include "shared/segment/energy_columns.hpp"
 #include "shared/text/json.hpp"
 
 namespace kerf {
@@ -14,20 +15,26 @@ namespace {
 
 // The one list of figures: name, value. Text and JSON both come from it.
 [[nodiscard]] Json figures(const RecordSummary& s) {
-  return {{"rows", s.rows},
-          {"first_tick", s.first_tick},
-          {"last_tick", s.last_tick},
-          {"seconds", s.seconds},
-          {"lost_ticks", s.lost_ticks},
-          {"contact_ticks", s.contact_ticks},
-          {"shaft_ticks", s.shaft_ticks},
-          {"stale_ticks", s.stale_ticks},
-          {"faults", s.faults},
-          {"missed_deadlines", s.missed_deadlines},
-          {"peak_force_n", s.peak_force_n},
-          {"deepest_mm", s.deepest_mm},
-          {"removed_mm3", s.removed_mm3},
-          {"end_reason", s.end_reason}};
+  Json list = {{"rows", s.rows},
+               {"first_tick", s.first_tick},
+               {"last_tick", s.last_tick},
+               {"seconds", s.seconds},
+               {"lost_ticks", s.lost_ticks},
+               {"contact_ticks", s.contact_ticks},
+               {"shaft_ticks", s.shaft_ticks},
+               {"stale_ticks", s.stale_ticks},
+               {"faults", s.faults},
+               {"missed_deadlines", s.missed_deadlines},
+               {"peak_force_n", s.peak_force_n},
+               {"deepest_mm", s.deepest_mm},
+               {"removed_mm3", s.removed_mm3},
+               {"port_energy_mj", s.port_energy_mj},
+               {"port_minimum_mj", s.port_minimum_mj}};
+  for (std::size_t i = 0; i < kEnergySources; ++i) {
+    list["energy_" + std::string(kEnergySourceNames[i]) + "_mj"] = s.energy_mj[i];
+  }
+  list["end_reason"] = s.end_reason;
+  return list;
 }
 
 }  // namespace
@@ -57,6 +64,11 @@ RecordSummary summarise(const std::filesystem::path& folder) {
     out.peak_force_n = std::max(out.peak_force_n, magnitude(record.commanded_force_n));
     out.deepest_mm = std::max(out.deepest_mm, double{record.penetration_mm});
     out.removed_mm3 += removed_mm3(record, manifest.voxel_mm3);
+    out.port_energy_mj = record.port_energy_j * 1000;
+    out.port_minimum_mj = record.port_minimum_j * 1000;
+    for (std::size_t i = 0; i < kEnergySources; ++i) {
+      out.energy_mj[i] = energy_mj_of_steps(record.*kEnergyColumns[i]);
+    }
   });
   if (out.rows != 0) {
     out.seconds = static_cast<double>(out.last_tick - out.first_tick + 1) * manifest.tick_ns * 1e-9;

@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <string>
+
+#include "shared/numeric/energy_source.hpp"
 
 namespace kerf {
 
@@ -22,6 +25,9 @@ struct RecordSummary {
   double peak_force_n = 0;
   double deepest_mm = 0;
   double removed_mm3 = 0;
+  double port_energy_mj = 0;   ///< taken from the hand up to the last row
+  double port_minimum_mj = 0;  ///< its lowest value of the run: below 0 the loop gave energy
+  std::array<double, kEnergySources> energy_mj{};  ///< `port_energy_mj` by source
   std::string end_reason;
 };
 
@@ -39,8 +45,9 @@ struct RecordSummary {
 /// `RecordError`, or `FileError` where the file cannot be written.
 void export_csv(const std::filesystem::path& folder, const std::filesystem::path& csv);
 
-/// Draws the recording in `folder` as an SVG of two panels over time: force magnitudes in N, and
-/// penetration in mm with removed volume in mm^3. At most 4000 points per curve, every peak kept.
+/// Draws the recording in `folder` as an SVG of three panels over time: force magnitudes in N,
+/// penetration in mm with removed volume in mm^3, and the work of the hand in mJ with its sources.
+/// At most 4000 points per curve, every peak kept.
 ///
 /// Runs gnuplot. The file appears whole or not at all. Throws `RecordError`.
 void plot_forces(const std::filesystem::path& folder, const std::filesystem::path& svg);

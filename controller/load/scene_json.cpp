@@ -61,8 +61,16 @@ Json tool_json(const SceneTool& tool) {
 
 Json json_of(const TomlValue& value) {
   const auto convert = [](const auto& held) -> Json {
-    if constexpr (!std::is_same_v<decltype(held), const std::monostate&>) return held;
-    return nullptr;
+    using T = std::remove_cvref_t<decltype(held)>;
+    if constexpr (std::is_same_v<T, std::monostate>) {
+      return nullptr;
+    } else if constexpr (std::is_same_v<T, NamedNumbers>) {
+      Json object = {{"name", held.name}};
+      for (const auto& [name, number] : held.numbers) object[name] = number;
+      return object;
+    } else {
+      return held;
+    }
   };
   return std::visit(convert, value);
 }

@@ -12,6 +12,7 @@
 #include "controller/plan/method/methods.hpp"
 #include "controller/plan/plan_contact.hpp"
 #include "controller/plan/plan_device.hpp"
+#include "controller/plan/plan_laws.hpp"
 #include "controller/plan/plan_preston.hpp"
 #include "controller/plan/plan_tools.hpp"
 #include "controller/plan/plan_volumes.hpp"
@@ -30,6 +31,7 @@ class CompiledSceneOf final : public CompiledScene {
   CompiledSceneOf(const LoadedScene& scene, const KernelSet& kernels) : memory_(scene) {
     plan_device(scene.device, plan_);
     plan_limits(scene, plan_);
+    plan_laws(scene, plan_);
     plan_.kernel = scene.servo.kernel;
     plan_.taps = &exact_taps(scene.servo.kernel);
     plan_.kernels = &kernels;

@@ -147,9 +147,6 @@ void plan_limits(const LoadedScene& scene, ServoPlan<N>& plan) {
   };
   plan.rate_hz = scene.servo.rate_hz;
   plan.device.gimbal_samples = std::clamp<std::size_t>(ticks(20), 1, kMaxGimbalSamples);
-  plan.velocity = {.rate_hz = scene.servo.rate_hz,
-                   .stride = std::max(1, scene.servo.rate_hz / 1000),
-                   .noise_mm = Real(device_parts::tip_noise_mm(scene.device.personality))};
   constexpr double kStep = 1.0 / 65536;  // the limit is rounded down, not to nearest
   plan.limits.peak_n = Real(scene.limits.force_n - kStep);
   plan.limits.continuous_n = Real(std::min(scene.limits.continuous_force_n, scene.limits.force_n));

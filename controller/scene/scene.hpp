@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "controller/kernel/gradient.hpp"
+#include "controller/law/registry/law_registry.hpp"
 #include "shared/volume/voxel_grid.hpp"
 #include "shared/wire/personality.hpp"
 
@@ -111,6 +112,8 @@ struct ForceSettings {
   double stiffness_n_per_mm = 0.4;
   double damping_ns_per_mm = 0.002;
   double friction = 0.0;
+  LawChoice law{LawKind::force, "", {}};              ///< none: the coupling
+  LawChoice stabiliser{LawKind::stabiliser, "", {}};  ///< none
 };
 
 /// [cut]
@@ -144,6 +147,7 @@ struct ServoSettings {
   int rate_hz = 1000;
   NumericKind numeric = NumericKind::fixed;
   GradientKernel kernel = GradientKernel::farid;
+  LawChoice velocity{LawKind::velocity, "foaw", {}};
 };
 
 /// What a scene says of everything but volumes and tools; the same before and after loading.

@@ -4,6 +4,9 @@
 #include <algorithm>
 #include <iterator>
 #include <string>
+#include <vector>
+
+#include "controller/law/registry/law_registry.hpp"
 
 namespace kerf {
 namespace {
@@ -28,6 +31,17 @@ struct Get {
   }
   TomlValue operator()(const VoxelGrid* from) const {
     return std::vector<double>{double(from->nx), double(from->ny), double(from->nz)};
+  }
+  /// All settings of the law, those that the scene leaves out too.
+  TomlValue operator()(const LawChoice* from) const {
+    if (from->name.empty()) return {};
+    const LawRow& row = find_law(from->kind, from->name);
+    const std::vector<double> values = law_values(row, *from);
+    NamedNumbers law{from->name, {}};
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      law.numbers.emplace_back(row.settings[i].name, values[i]);
+    }
+    return law;
   }
   template <std::size_t N>
   TomlValue operator()(const std::array<double, N>* from) const {

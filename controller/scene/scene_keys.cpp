@@ -163,6 +163,14 @@ constexpr SceneKey kKeys[] = {
     {"force.friction", "", at<&ForceSettings::friction>, between(0, 1),
      "Coulomb coefficient of the tool on the surface", kProxy},
 
+    {"force.law", "", at<&ForceSettings::law>, {},
+     "a law in place of the coupling, and its settings (docs/own-law.md)",
+     kProxy, {.default_text = "the coupling of stiffness_n_per_mm and damping_ns_per_mm",
+              .json = InJson::if_changed}},
+    {"force.stabiliser", "", at<&ForceSettings::stabiliser>, {},
+     "what sees the force after its limits and may change it, and its settings (docs/own-law.md)",
+     {}, {.default_text = "none", .json = InJson::if_changed}},
+
     {"cut.model", "", at<&CutSettings::model>, one_of(kCutModelWords),
      "preston: the force cuts; overlap: what is covered goes at a rate; overlap_exact: the same at any rate",
      {}, {.default_text = "\"preston\"; with the paper's force \"overlap\""}},
@@ -201,6 +209,9 @@ constexpr SceneKey kKeys[] = {
      "numbers of the loop; fixed: the same bits on every machine"},
     {"servo.kernel", "", at<&ServoSettings::kernel>, one_of(kGradientWords),
      "how the gradient of density is estimated"},
+    {"servo.velocity", "", at<&ServoSettings::velocity>, {},
+     "the estimator of the hand's velocity, and its settings (docs/own-law.md)",
+     {}, {.json = InJson::if_changed}},
 
     {"hand.script", "", at<&SceneSettings::hand_script>, {},
      "what the emulated hand does, from the scene's folder", {}, {.json = InJson::never}},

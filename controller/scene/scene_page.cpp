@@ -7,6 +7,7 @@
 #include <string_view>
 #include <variant>
 
+#include "controller/law/registry/law_registry.hpp"
 #include "controller/scene/scene_text.hpp"
 
 namespace kerf {
@@ -29,6 +30,7 @@ struct AllowedText {
     return range() + (allowed.words.empty() ? "" : ", or " + words());
   }
   std::string operator()(const Denoise*) const { return "whole, " + range() + ", or " + words(); }
+  std::string operator()(const LawChoice*) const { return "{ name = \"..\", .. }"; }
   template <class Text>
   std::string operator()(const Text*) const {
     return allowed.words.empty() ? "text" : words();
@@ -80,6 +82,23 @@ std::string lines_of(std::string_view table, SceneParts& parts, SceneKeys keys) 
   return lines;
 }
 
+/// The laws of one kind that a key of the table can name, each with its settings.
+std::string laws_of(std::string_view key, LawKind kind) {
+  std::string text;
+  for (const LawRow* law : known_laws(kind)) {
+    text += "\n`" + std::string(key) + " = { name = \"" + std::string(law->name) +
+            "\" }`: " + std::string(law->meaning) + ".\n";
+    if (law->settings.empty()) continue;
+    text += "\n| setting | unit | value | default | meaning |\n|---|---|---|---|---|\n";
+    for (const LawSetting& setting : law->settings) {
+      text += "| `" + std::string(setting.name) + "` | " + std::string(setting.unit) + " | " +
+              range_text(setting.lo, setting.hi) + " | " + number_text(setting.by_default) + " | " +
+              std::string(setting.meaning) + " |\n";
+    }
+  }
+  return text;
+}
+
 }  // namespace
 
 std::string scene_keys_page(SceneKeys keys) {
@@ -94,6 +113,12 @@ std::string scene_keys_page(SceneKeys keys) {
     if (about != scene_tables().end()) page += std::string(about->meaning) + "\n\n";
     page += "| key | unit | value | default | meaning |\n|---|---|---|---|---|\n";
     for (const SceneKey& key : keys_of(table, keys)) page += row_of(key);
+    for (const SceneKey& key : keys_of(table, keys)) {
+      SceneParts parts;
+      const SceneSlot slot = key.at(parts);
+      if (const auto* law = std::get_if<LawChoice*>(&slot))
+        page += laws_of(name_in_table(key), (*law)->kind);
+    }
   }
   return page;
 }

@@ -8,6 +8,7 @@
 #include <utility>
 #include <variant>
 
+#include "controller/law/registry/law_registry.hpp"
 #include "controller/scene/scene_text.hpp"
 #include "shared/text/words.hpp"
 
@@ -21,6 +22,7 @@ struct Take {
   const SceneKey& key;
   const TomlNode& node;
   const std::string place;  ///< `file:line: table.key = value`
+  const std::string& file;
 
   void operator()(bool* into) const {
     const bool* flag = std::get_if<bool>(&node.value);
@@ -50,6 +52,32 @@ struct Take {
       passes = static_cast<int>(Denoise::automatic);
     }
     *into = Denoise{static_cast<std::int8_t>(passes)};
+  }
+  /// The name of a law, and those of its settings that are given.
+  void operator()(LawChoice* into) const {
+    const TomlNode* name = node.form == TomlNode::Form::table ? node.find("name") : nullptr;
+    const std::string* text = name == nullptr ? nullptr : std::get_if<std::string>(&name->value);
+    if (text == nullptr) {
+      refuse(place, " does not say which; write { name = \"..\" } and what it sets");
+    }
+    const auto place_below = [&](const TomlNode& entry) {
+      return place_of(entry, std::string(key.name) + "." + one_line(entry.key), file);
+    };
+    const LawRow* row = nullptr;
+    try {
+      row = &find_law(into->kind, *text);
+    } catch (const LawError& error) {
+      refuse(place_below(*name), error.what());
+    }
+    *into = {into->kind, *text, {}};
+    for (const TomlNode& entry : node.entries) {
+      if (&entry == name) continue;
+      const std::optional<double> number = entry.number();
+      if (!number) refuse(place_below(entry), " is not a number; write one without quotes or unit");
+      const std::string problem = setting_problem(*row, entry.key, *number);
+      if (!problem.empty()) refuse(place_below(entry), problem);
+      into->settings.emplace_back(entry.key, *number);
+    }
   }
   template <std::size_t N>
   void operator()(std::array<double, N>* into) const {
@@ -147,7 +175,7 @@ void SceneTable::read(const SceneKey& key, SceneParts& parts) const {
   const std::string_view name = name_in_table(key);
   const std::string form(key.options.required_as);
   if (has(name)) {
-    std::visit(Take{key, *node_->find(name), place(name)}, key.at(parts));
+    std::visit(Take{key, *node_->find(name), place(name), file_}, key.at(parts));
   } else if (!form.empty()) {
     refuse(place(), " has no " + std::string(name) + "; write " + form);
   }

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "shared/numeric/energy_source.hpp"
 #include "shared/volume/scene_limits.hpp"
 #include "shared/volume/voxel_grid.hpp"
 
@@ -27,7 +28,11 @@ enum class Fault : std::uint32_t {
   none = 0,
   stale_input = 1,  ///< no report for 20 ms
   not_finite = 2,   ///< NaN after kinematics for more than 2 ms
-  overspeed = 3     ///< tip faster than the limit
+  overspeed = 3,    ///< tip faster than the limit
+  // A law of the scene gave something that is no number:
+  force_law = 4,
+  velocity_estimator = 5,
+  stabiliser = 6
 };
 
 [[nodiscard]] constexpr const char* fault_name(Fault fault) noexcept {
@@ -40,6 +45,12 @@ enum class Fault : std::uint32_t {
       return "not_finite";
     case Fault::overspeed:
       return "overspeed";
+    case Fault::force_law:
+      return "force_law";
+    case Fault::velocity_estimator:
+      return "velocity_estimator";
+    case Fault::stabiliser:
+      return "stabiliser";
   }
   return "unknown";
 }
@@ -72,7 +83,7 @@ struct ServoOutput {
   std::array<double, 3> gimbal_rad{};          ///< yaw, pitch, roll
   std::array<double, 3> position_mm{};         ///< tip in the scene
   std::array<double, 9> rotation{};            ///< world from the tool as felt, row-major
-  std::array<double, 3> velocity_mm_per_s{};   ///< device port, by VelocityWindow
+  std::array<double, 3> velocity_mm_per_s{};   ///< device port, as estimated
   std::array<double, 3> force_n{};             ///< sent to the hand, device port
   std::array<double, 3> contact_n{};           ///< part of it before limits, device port
   std::array<double, 3> modification_n{};      ///< and of the cutting: reaction, or friction
@@ -82,6 +93,9 @@ struct ServoOutput {
   std::array<PlaneLoad, kMaxPlaneLoads> planes{};
   std::uint32_t plane_count = 0;  ///< of the planes that hold the tool
   double absorbed_mj = 0;         ///< SUM -F_sent . dx since arming; + = taken from the hand
+  double port_minimum_mj = 0;     ///< lowest value of it so far
+  /// `absorbed_mj` by source, in steps of 2^-32 mJ: exact in fixed, and their sum is.
+  std::array<std::int64_t, kEnergySources> energy_steps{};
 
   double press_n = 0;        ///< normal force that cuts, in the scene
   double spindle_ratio = 0;  ///< speed over the reference speed, in this tick's cut

@@ -10,13 +10,15 @@
 #include "controller/kernel/kernel_set.hpp"
 #include "controller/kernel/milling.hpp"
 #include "controller/kernel/tool_pose.hpp"
+#include "controller/law/force_law.hpp"
+#include "controller/law/stabiliser.hpp"
+#include "controller/law/velocity_estimator.hpp"
 #include "controller/servo/contact_plan.hpp"
 #include "controller/servo/device_plan.hpp"
 #include "controller/servo/force_cut_plan.hpp"
 #include "controller/servo/force_limits.hpp"
 #include "controller/servo/sum_to_force.hpp"
 #include "controller/servo/supervisor.hpp"
-#include "controller/servo/velocity_window.hpp"
 #include "shared/volume/scene_limits.hpp"
 #include "shared/volume/voxel_grid.hpp"
 
@@ -93,9 +95,12 @@ struct ServoPlan {
   ForceCutPlan<N> force_cut;  ///< else, by force
 
   DevicePlan<N> device;
-  VelocityPlan<N> velocity;
   typename N::Real workspace_scale{};  ///< x_scene = scale * x_device + offset
   WorldVec<typename N::Real> offset_mm;
+
+  VelocityEstimatorPlan<N> velocity;  ///< always one
+  ForceLawPlan<N> force_law;          ///< in place of `contact.coupling`; or none
+  StabiliserPlan<N> stabiliser;       ///< or none
 
   ForceLimits<N> limits;
   SafetyTiming timing;

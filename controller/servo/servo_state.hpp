@@ -9,15 +9,16 @@
 #include "controller/kernel/gradient.hpp"
 #include "controller/kernel/milling.hpp"
 #include "controller/kernel/splat_table.hpp"
+#include "controller/law/law_plan.hpp"
 #include "controller/servo/contact_plan.hpp"
 #include "controller/servo/device_plan.hpp"
+#include "controller/servo/energy_ledger.hpp"
 #include "controller/servo/force_cut_plan.hpp"
 #include "controller/servo/force_limits.hpp"
 #include "controller/servo/kinematics/forward_kinematics.hpp"
 #include "controller/servo/kinematics/rotation.hpp"
 #include "controller/servo/servo_output.hpp"
 #include "controller/servo/supervisor.hpp"
-#include "controller/servo/velocity_window.hpp"
 #include "shared/numeric/fnv1a.hpp"
 
 namespace kerf {
@@ -69,17 +70,22 @@ struct ServoState {
   JacobianTransposed<N> jacobian_t_mm;  ///< of the last good report
   DeviceVec<Real> tip_mm;               ///< device port
   Rotation<N> rotation = identity_rotation<N>();
-  bool tip_known = false;       ///< false before the first report
-  std::uint32_t tip_ticks = 0;  ///< since the tip was taken over
-  DeviceVec<Real> force_sum_n;  ///< sent in these ticks
-  VelocityWindow<N> velocity;
+  bool tip_known = false;             ///< false before the first report
+  std::uint32_t tip_ticks = 0;        ///< since the tip was taken over
+  DeviceVec<Real> force_sum_n;        ///< sent in these ticks
+  DeviceVec<Real> moved_mm;           ///< to this tip, from the last one
+  std::uint32_t moved_ticks = 1;      ///< in so many ticks
+  DeviceVec<Real> velocity_mm_per_s;  ///< there
+  LawMemory velocity;
+  LawMemory force_law;
+  LawMemory stabiliser;
 
   DeviceVec<Real> contact_n;       ///< felt in the last tick, before limits
   WorldVec<Real> proxy_offset_mm;  ///< in the last tick
   DeviceVec<Real> force_n;         ///< sent in the last tick
   DeviceVec<Real> held_force_n;    ///< sent with the last good report: faded when reports stop
   ThermalState<N> thermal;
-  typename N::Energy absorbed_mj{};
+  EnergyLedger<N> ledger;
   std::uint64_t output_hash = kFnv1aBasis;
 };
 

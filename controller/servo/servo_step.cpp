@@ -30,23 +30,21 @@ constexpr std::array<double, 3> as_doubles(Vec<S, Space> v) noexcept {
 template <class N>
 constexpr double energy_mj(typename N::Energy energy) noexcept {
   if constexpr (N::kIsFixed) {
-    return static_cast<double>(energy) / 4294967296.0;  // 32 fraction bits
+    return energy_mj_of_steps(energy);
   } else {
     return static_cast<double>(energy);
   }
 }
 
-/// Adds -F . dx to a ledger: work that the hand put in. Exact in fixed: Q16 * Q16.
+/// For the record: in steps of 2^-32 mJ, rounded and saturated.
 template <class N>
-void absorb(typename N::Energy& ledger, DeviceVec<typename N::Real> force_n,
-            DeviceVec<typename N::Real> moved_mm) noexcept {
+constexpr std::int64_t energy_steps(typename N::Energy energy) noexcept {
   if constexpr (N::kIsFixed) {
-    const auto term = [](Q16 f, Q16 d) { return -(std::int64_t{f.raw()} * d.raw()); };
-    ledger = saturating_add(ledger, term(force_n.x, moved_mm.x));
-    ledger = saturating_add(ledger, term(force_n.y, moved_mm.y));
-    ledger = saturating_add(ledger, term(force_n.z, moved_mm.z));
+    return energy;
   } else {
-    ledger -= dot(force_n, moved_mm);
+    const double steps = static_cast<double>(energy) * kEnergyStepsPerMj;
+    constexpr double kEnd = 9223372036854774784.0;  // largest double below 2^63
+    return static_cast<std::int64_t>(std::clamp(steps + (steps < 0 ? -0.5 : 0.5), -kEnd, kEnd));
   }
 }
 
@@ -68,18 +66,18 @@ TipMotion move_tip(const ServoPlan<N>& plan, ServoState<N>& state,
                    const DevicePose<N>& pose) noexcept {
   using Real = typename N::Real;
   const std::uint32_t gap = std::clamp<std::uint32_t>(state.tip_ticks, 1, 1000);
-  if (!state.tip_known) {
-    state.tip_mm = pose.arm.tip_mm;
-    state.velocity.start(pose.arm.tip_mm);
-  }
+  if (!state.tip_known) state.tip_mm = pose.arm.tip_mm;
   const auto moved_mm = pose.arm.tip_mm - state.tip_mm;
   const auto ticks = Real(static_cast<double>(gap));
   const DeviceVec<Real> sent_n =
       gap == 1 ? state.force_n
                : DeviceVec<Real>{state.force_sum_n.x / ticks, state.force_sum_n.y / ticks,
                                  state.force_sum_n.z / ticks};
-  absorb<N>(state.absorbed_mj, sent_n, moved_mm);
-  state.velocity.take(pose.arm.tip_mm, gap);
+  state.ledger.move(sent_n, moved_mm, gap);
+  state.velocity_mm_per_s =
+      plan.velocity(state.velocity, {pose.arm.tip_mm, gap, !state.velocity.begun});
+  state.moved_mm = moved_mm;
+  state.moved_ticks = gap;
   state.tip_mm = pose.arm.tip_mm;
   state.rotation = pose.rotation;
   state.tip_known = true;
@@ -189,9 +187,17 @@ Sensed<N> sense(const ServoPlan<N>& plan, ServoState<N>& state,
     seen.overspeed = motion.overspeed && !report.parked;
     sensed.leaves = motion.leaves;
   }
-  sensed.velocity_mm_per_s = state.velocity.velocity(plan.velocity);
+  const bool known_velocity = all_finite(state.velocity_mm_per_s);
+  if (!known_velocity) {
+    state.velocity.begin_anew();
+    state.velocity_mm_per_s = {};
+  }
+  sensed.velocity_mm_per_s = state.velocity_mm_per_s;
   sensed.tip_mm = relabel<WorldSpace>(state.tip_mm * plan.workspace_scale) + plan.offset_mm;
   supervise(plan.timing, seen, state.supervisor);
+  if (!known_velocity && state.supervisor.motors_on()) {
+    latch(Fault::velocity_estimator, state.supervisor);
+  }
   return sensed;
 }
 
@@ -200,6 +206,7 @@ template <class N>
 struct Wanted {
   DeviceVec<typename N::Real> force_n;
   ToolContact<N> tool;
+  ForceParts<N> parts{};  ///< of the force before fading in
 };
 
 void tell_removed(const std::array<Removed, kMaxVolumes>& removed, ServoOutput& out) noexcept {
@@ -235,6 +242,7 @@ void follow_unfelt(const ServoPlan<N>& plan, ServoState<N>& state,
   }
   static_cast<void>(
       feel_swept(plan, state, sensed.tip_mm, state.rotation, sensed.velocity_mm_per_s));
+  state.force_law.begin_anew();
   state.contact.proxy.ramp();
 }
 
@@ -244,7 +252,7 @@ template <class N>
 Wanted<N> wanted_force(const ServoPlan<N>& plan, ServoState<N>& state, const Sensed<N>& sensed,
                        ServoOutput& out) noexcept {
   using Real = typename N::Real;
-  const Supervisor& supervisor = state.supervisor;
+  Supervisor& supervisor = state.supervisor;
   const SafetyTiming& timing = plan.timing;
   const auto share = [](std::uint32_t part, std::uint32_t whole) {
     return Real(double(part)) / Real(double(whole));
@@ -263,6 +271,10 @@ Wanted<N> wanted_force(const ServoPlan<N>& plan, ServoState<N>& state, const Sen
   }
   const ToolForces<N> forces =
       feel_and_cut(plan, state, sensed.tip_mm, state.rotation, sensed.velocity_mm_per_s);
+  if (plan.force_law.given() && !all_finite(forces.contact_n)) {
+    latch(Fault::force_law, supervisor);
+    return {};
+  }
   state.contact_n = forces.contact_n;
   state.proxy_offset_mm = forces.proxy_offset_mm;
   out.proxy_offset_mm = as_doubles(forces.proxy_offset_mm);
@@ -273,36 +285,84 @@ Wanted<N> wanted_force(const ServoPlan<N>& plan, ServoState<N>& state, const Sen
   out.modification_n = as_doubles(forces.modification_n);
   tell_removed(forces.removed, out);
   const DeviceVec<Real> felt_n = forces.contact_n + forces.modification_n;
-  if (supervisor.phase != Phase::ramping) return {felt_n, forces.tool};
+  const ForceParts<N> parts{.felt = true,
+                            .spring = forces.spring_n,
+                            .damping = forces.contact_n - forces.spring_n - forces.friction_n,
+                            .friction = forces.friction_n,
+                            .cutting = forces.modification_n};
+  if (supervisor.phase != Phase::ramping) return {felt_n, forces.tool, parts};
   // What is beyond the peak is never sent, so it must not hasten the fade.
   return {clamped(felt_n, plan.limits.peak_n) * share(supervisor.fade_ticks, timing.fade_in_ticks),
-          forces.tool};
+          forces.tool, parts};
+}
+
+/// The force to send: limited, and where the scene names a stabiliser what that makes of it,
+/// limited once more; its part is kept in `wanted`. One that is no number latches a fault.
+template <class N>
+DeviceVec<typename N::Real> force_to_send(const ServoPlan<N>& plan, ServoState<N>& state,
+                                          Wanted<N>& wanted, const Sensed<N>& sensed) noexcept {
+  using Real = typename N::Real;
+  const auto limited = [&](DeviceVec<Real> force_n, ThermalState<N>& thermal) {
+    return limited_force(plan.limits, thermal, force_n, state.force_n, sensed.leaves);
+  };
+  if (state.hold) state.stabiliser.begin_anew();
+  if (!plan.stabiliser.given() || !sensed.usable || state.hold) {
+    return limited(wanted.force_n, state.thermal);
+  }
+  ThermalState<N> heated = state.thermal;
+  const DeviceVec<Real> limited_n = limited(wanted.force_n, heated);
+  const DeviceVec<Real> steady_n =
+      plan.stabiliser(state.stabiliser, {limited_n, state.force_n, state.moved_mm,
+                                         state.moved_ticks, state.velocity_mm_per_s,
+                                         state.ledger.total_mj(), norm(state.contact_n) > Real(0)});
+  if (!all_finite(steady_n)) {
+    latch(Fault::stabiliser, state.supervisor);
+    return {};
+  }
+  wanted.parts.stabiliser = steady_n - limited_n;
+  if (!(steady_n == limited_n)) return limited(steady_n, state.thermal);
+  state.thermal = heated;  // limits round: what was not changed is not limited again
+  return limited_n;
 }
 
 /// Limits the force and turns it into motor counts. Switching off is exempt from the slew limit.
 template <class N>
-void drive(const ServoPlan<N>& plan, ServoState<N>& state, DeviceVec<typename N::Real> wanted_n,
-           bool leaves, ServoOutput& out) noexcept {
+void drive(const ServoPlan<N>& plan, ServoState<N>& state, Wanted<N>& wanted,
+           const Sensed<N>& sensed, ServoOutput& out) noexcept {
   using Real = typename N::Real;
-  if (state.supervisor.motors_on() && !all_finite(wanted_n)) {
+  if (state.supervisor.motors_on() && !all_finite(wanted.force_n)) {
     latch(Fault::not_finite, state.supervisor);
   }
-  out.motors_on = state.supervisor.motors_on() && plan.device.motors_configured;
+  DeviceVec<Real> limited_n{};
+  if (state.supervisor.motors_on() && plan.device.motors_configured) {
+    limited_n = force_to_send(plan, state, wanted, sensed);
+    out.motors_on = state.supervisor.motors_on();
+  }
   if (!out.motors_on) {
     heat_up(plan.limits, state.thermal, {});
     state.force_n = {};
+    state.stabiliser.begin_anew();
     return;
   }
-  const DeviceVec<Real> limited_n =
-      limited_force(plan.limits, state.thermal, wanted_n, state.force_n, leaves);
   const MotorCommand<N> motors = motor_command(plan, state.jacobian_t_mm * limited_n);
   out.motor_counts = motors.counts;
   state.force_n = {multiply<Real>(motors.share, limited_n.x),
                    multiply<Real>(motors.share, limited_n.y),
                    multiply<Real>(motors.share, limited_n.z)};
-  out.clamped = !(state.force_n == wanted_n);
+  out.clamped = !(state.force_n == wanted.force_n);
   const JointVec<Real> torque_n_mm = state.jacobian_t_mm * state.force_n;
   out.torque_n_mm = {as_double(torque_n_mm.x), as_double(torque_n_mm.y), as_double(torque_n_mm.z)};
+}
+
+/// With a usable report: splits the work since the last one, and keeps the parts of the force that
+/// was sent.
+template <class N>
+void book(ServoState<N>& state, const Wanted<N>& wanted, bool motors_on) noexcept {
+  ForceParts<N> parts = wanted.parts;
+  state.ledger.split(parts);
+  if (!motors_on) return state.ledger.send({});
+  parts.limits = state.force_n - wanted.force_n - parts.stabiliser;
+  state.ledger.send(parts);
 }
 
 /// What the force that was sent cuts. The spindle runs while the hand is held by the motors.
@@ -344,7 +404,9 @@ void tell(const ServoPlan<N>& plan, ServoState<N>& state, const Sensed<N>& sense
   for (std::size_t i = 0; i < 9; ++i) out.rotation[i] = as_double(rotation.row[i / 3][i % 3]);
   out.velocity_mm_per_s = as_doubles(sensed.velocity_mm_per_s);
   out.force_n = as_doubles(state.force_n);
-  out.absorbed_mj = energy_mj<N>(state.absorbed_mj);
+  out.absorbed_mj = energy_mj<N>(state.ledger.total_mj());
+  out.port_minimum_mj = energy_mj<N>(state.ledger.lowest_mj());
+  std::ranges::transform(state.ledger.by_source_mj(), out.energy_steps.begin(), energy_steps<N>);
   out.active_tool = state.active_tool;
   state.output_hash = hash_of<N>(state.output_hash, out, state.force_n);
   out.output_hash = state.output_hash;
@@ -357,9 +419,10 @@ ServoOutput servo_step(const ServoPlan<N>& plan, ServoState<N>& state,
                        const DeviceReport& report) noexcept {
   ServoOutput out;
   const Sensed<N> sensed = sense(plan, state, report);
-  const Wanted<N> wanted = wanted_force(plan, state, sensed, out);
-  drive(plan, state, wanted.force_n, sensed.leaves, out);
+  Wanted<N> wanted = wanted_force(plan, state, sensed, out);
+  drive(plan, state, wanted, sensed, out);
   state.force_sum_n = state.force_sum_n + state.force_n;
+  if (sensed.usable) book(state, wanted, out.motors_on);
   cut(plan, state, wanted.tool, out);
   if (sensed.usable) state.held_force_n = state.force_n;
   tell(plan, state, sensed, report.fresh, out);
@@ -406,6 +469,7 @@ bool apply_command(const ServoPlan<N>& plan, ServoState<N>& state,
       restart_fade(state.supervisor);
       state.force_n = {};  // the motors were off meanwhile
       state.held_force_n = {};
+      state.ledger.send({});
       return true;
     case ServoCommand::Kind::hold:
       state.hold = command.argument != 0;

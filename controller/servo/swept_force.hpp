@@ -14,6 +14,8 @@ namespace kerf {
 template <class N>
 struct SweptForce {
   DeviceVec<typename N::Real> force_n;      ///< of the coupling, before any limit
+  DeviceVec<typename N::Real> spring_n;     ///< part of it: of the spring, out of the faces
+  DeviceVec<typename N::Real> friction_n;   ///< and along them
   WorldVec<typename N::Real> offset_mm;     ///< from the hand's tip to the proxy's
   DeviceVec<typename N::Real> torque_n_mm;  ///< of the contact about the tool's centre
   ToolContact<N> tool;
@@ -65,9 +67,25 @@ void tell_planes(const ContactPlan<N>& contact, const ProxyContact<N>& felt,
   }
 }
 
-/// One tick: the proxy of the active tool follows the hand, the coupling pulls the hand to the
+/// Splits the force of the spring: what friction holds lies along the faces, across the press.
+template <class N>
+void split_spring(DeviceVec<typename N::Real> spring_n, const ProxyContact<N>& felt,
+                  SweptForce<N>& out) noexcept {
+  using Real = typename N::Real;
+  out.spring_n = spring_n;
+  const auto press = relabel<DeviceSpace>(felt.press);
+  const Real pressed_n = multiply<Real>(press.x, spring_n.x) + multiply<Real>(press.y, spring_n.y) +
+                         multiply<Real>(press.z, spring_n.z);
+  if (!(pressed_n > Real(0))) return;
+  out.spring_n = {multiply<Real>(press.x, pressed_n), multiply<Real>(press.y, pressed_n),
+                  multiply<Real>(press.z, pressed_n)};
+  out.friction_n = spring_n - out.spring_n;
+}
+
+/// One tick: the proxy of the active tool follows the hand, coupling or law pull the hand to the
 /// proxy (docs/theory.md 4, 5.1). `rotation` turns the tool, unless it is a ball without a shaft or
-/// keeps the world's axes. Servo thread; at most 32 queries; writes only `state.contact`.
+/// keeps the world's axes. Servo thread; at most 32 queries; writes `state.contact`, and
+/// `state.force_law` where the scene names a force law, whose force may not be finite.
 template <class N>
 [[nodiscard]] SweptForce<N> feel_swept(const ServoPlan<N>& plan, ServoState<N>& state,
                                        WorldVec<typename N::Real> tip_mm,
@@ -87,8 +105,23 @@ template <class N>
 
   SweptForce<N> out;
   const ProxyContact<N> felt = follow_tool(plan, tool, state.contact, goal, out.queried);
-  out.force_n =
-      coupling_force(contact.coupling, at_device(contact, felt.spring), velocity_mm_per_s);
+  const auto spring_mm = at_device(contact, felt.spring);
+  // The coupling is no law behind a pointer: the compiler joins it with what surrounds it.
+  out.force_n = plan.force_law.given()
+                    ? plan.force_law(state.force_law, {state.tip_mm, tip_mm, velocity_mm_per_s,
+                                                       spring_mm, relabel<DeviceSpace>(felt.press)})
+                    : coupling_force(contact.coupling, spring_mm, velocity_mm_per_s);
+  // A law's force has no other part.
+  const bool whole =
+      plan.force_law.given() || contact.coupling.damping_ns_per_mm == typename N::Unit{};
+  const auto spring_n =
+      whole ? out.force_n
+            : coupling_force<N>({contact.coupling.stiffness_n_per_mm, {}}, spring_mm, {});
+  if (tool.proxy.friction == typename N::Unit{}) {
+    out.spring_n = spring_n;
+  } else {
+    split_spring(spring_n, felt, out);
+  }
   out.offset_mm = relabel<WorldSpace>(scaled(felt.pose.centre - goal.centre, contact.mm_per_unit));
   out.tool.centre_mm =
       contact.origin_mm + relabel<WorldSpace>(scaled(felt.pose.centre, contact.mm_per_unit));

@@ -18,6 +18,8 @@ ToolForces<N> feel_and_cut(const ServoPlan<N>& plan, ServoState<N>& state,
   if (plan.contact.swept) {
     const SweptForce<N> felt = feel_swept(plan, state, tip_mm, rotation, velocity_mm_per_s);
     forces.contact_n = felt.force_n;
+    forces.spring_n = felt.spring_n;
+    forces.friction_n = felt.friction_n;
     forces.proxy_offset_mm = felt.offset_mm;
     forces.tip_torque_n_mm = felt.torque_n_mm;
     forces.tool = felt.tool;
@@ -39,6 +41,7 @@ ToolForces<N> feel_and_cut(const ServoPlan<N>& plan, ServoState<N>& state,
     forces.modification_n = forces.modification_n - in_volume.modification_n;
     forces.removed[plan.volumes[v].scene_index] = in_volume.removed;
   }
+  if (!plan.contact.swept) forces.spring_n = forces.contact_n;
   return forces;
 }
 

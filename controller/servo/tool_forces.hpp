@@ -17,7 +17,8 @@ template <class N>
 struct ToolForces {
   DeviceVec<typename N::Real> contact_n;
   DeviceVec<typename N::Real> modification_n;
-  WorldVec<typename N::Real> proxy_offset_mm;  ///< from the tip; 0 without a proxy
+  DeviceVec<typename N::Real> spring_n{}, friction_n{};  ///< of the contact: the rest is damping
+  WorldVec<typename N::Real> proxy_offset_mm;            ///< from the tip; 0 without a proxy
   DeviceVec<typename N::Real>
       tip_torque_n_mm;                         ///< likewise; of both forces about the tool's centre
   ToolContact<N> tool;                         ///< likewise

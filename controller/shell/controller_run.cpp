@@ -128,6 +128,7 @@ RunReport new_report(const ControllerOptions& options, const LoadedScene& scene,
   report.scene = options.scene;
   report.device = kPersonalityWords[static_cast<std::size_t>(scene.device.personality)];
   report.numeric = word_of(scene.servo.numeric);
+  report.velocity_estimator = scene.servo.velocity.name;
   report.rate_hz = scene.servo.rate_hz;
   report.virtual_time = options.virtual_time;
   report.config_hash = hash;

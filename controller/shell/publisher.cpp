@@ -7,6 +7,7 @@
 
 #include "shared/numeric/fixed.hpp"
 #include "shared/numeric/rotation.hpp"
+#include "shared/segment/energy_columns.hpp"
 
 namespace kerf {
 namespace {
@@ -109,7 +110,10 @@ void Publisher::publish(Tick tick, const DeviceReport& report, const ServoOutput
   std::ranges::copy(output.motor_counts, record.dac_counts);
   record.removed = static_cast<std::uint32_t>(output.removed_steps);
   record.port_energy_j = output.absorbed_mj / 1000.0;
-  record.energies[0] = std::llround(output.absorbed_mj / 1000.0 * 4294967296.0);
+  record.port_minimum_j = output.port_minimum_mj / 1000.0;
+  for (std::size_t i = 0; i < kEnergySources; ++i) {
+    record.*kEnergyColumns[i] = output.energy_steps[i];
+  }
   record.volume_hash = removal_hash_;
   record.output_hash = output.output_hash;
   record.sub_steps = 1;

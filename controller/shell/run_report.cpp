@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "controller/shell/run_report.hpp"
 
-#include "controller/servo/velocity_window.hpp"
 #include "shared/posix/hex64.hpp"
 #include "shared/text/format.hpp"
 #include "shared/text/json.hpp"
@@ -14,6 +13,24 @@ Json percentiles(const Histogram& histogram) {
           {"p99", histogram.percentile_us(0.99)},
           {"p999", histogram.percentile_us(0.999)},
           {"max", histogram.max_us()}};
+}
+
+Json by_source(const RunRecord& record) {
+  Json list = Json::Members{};
+  for (std::size_t i = 0; i < kEnergySources; ++i) {
+    list[std::string(kEnergySourceNames[i])] = record.energy_mj[i] / 1000.0;
+  }
+  return list;
+}
+
+/// The sources that did any work, in mJ.
+std::string energy_line(const RunRecord& record) {
+  std::string text = format("  energy     lowest %.3f mJ", record.port_minimum_mj);
+  for (std::size_t i = 0; i < kEnergySources; ++i) {
+    if (record.energy_mj[i] == 0) continue;
+    text += format(", %s %.3f", std::string(kEnergySourceNames[i]).c_str(), record.energy_mj[i]);
+  }
+  return text + "\n";
 }
 
 std::string line(const char* name, const Histogram& histogram) {
@@ -56,7 +73,7 @@ std::string report_json(const RunReport& report) {
       {"device", report.device},
       {"numeric", report.numeric},
       {"rate_hz", report.rate_hz},
-      {"velocity_estimator", kVelocityEstimator},
+      {"velocity_estimator", report.velocity_estimator},
       {"virtual", report.virtual_time},
       {"end", report.end},
       {"waiting", report.waiting},
@@ -78,6 +95,8 @@ std::string report_json(const RunReport& report) {
       {"peak_force_n", r.peak_force_n},
       {"removed_mm3", report.removed_mm3},
       {"energy_j", r.absorbed_mj / 1000.0},
+      {"port_minimum_j", r.port_minimum_mj / 1000.0},
+      {"energy_by_source_j", by_source(r)},
       {"faults", list(r.faults)},
       {"fault_count", r.faults.count},
       {"events", list(r.events)},
@@ -110,6 +129,7 @@ std::string summary(const RunReport& report) {
   text += line("publish", r.publish);
   text += format("\n  contact    %llu ticks, peak force %.3f N, work of the hand %.3f mJ\n",
                  static_cast<unsigned long long>(r.contact_ticks), r.peak_force_n, r.absorbed_mj);
+  text += energy_line(r);
   if (r.shaft_ticks > 0) {
     text += format("  shaft      %llu ticks\n", static_cast<unsigned long long>(r.shaft_ticks));
   }

@@ -20,6 +20,7 @@ struct RunReport {
   std::string scene;
   std::string device;
   std::string numeric;
+  std::string velocity_estimator;
   int rate_hz = 1000;
   bool virtual_time = false;
   bool allocations_counted = true;

@@ -52,6 +52,8 @@ class Bookkeeper {
       record_.removed_steps[v] += output.removed_by_volume[v];
     }
     record_.absorbed_mj = output.absorbed_mj;
+    record_.port_minimum_mj = output.port_minimum_mj;
+    std::ranges::transform(output.energy_steps, record_.energy_mj.begin(), energy_mj_of_steps);
     record_.output_hash = output.output_hash;
     record_.wake.record(timing.late_ns);
     record_.compute.record(timing.compute_ns);

@@ -32,7 +32,7 @@ inline constexpr std::uint64_t kSegmentMagic = [] {
   return magic;
 }();
 inline constexpr std::uint32_t kLayoutMajor = 1;
-inline constexpr std::uint32_t kLayoutMinor = 1;
+inline constexpr std::uint32_t kLayoutMinor = 2;
 inline constexpr std::uint32_t kStateSlots = 4096;  // 4.1 s at 1 kHz: as long as a reader may stop
 inline constexpr std::uint32_t kDirtySlots = 4096;
 inline constexpr std::uint64_t kMaxSceneBytes = std::uint64_t{1} << 26;  // a reader copies it whole
@@ -126,10 +126,9 @@ struct TickRecord {
   float modification_force_n[3];
   float proxy_offset_mm[3];
   std::int16_t dac_counts[4];
-  std::uint32_t removed;  ///< density units taken away in this tick
-  double port_energy_j;
-  double damping_energy_j;
-  double cutting_work_j;
+  std::uint32_t removed;      ///< density units taken away in this tick
+  double port_energy_j;       ///< work that the loop took from the hand since it armed
+  double port_minimum_j;      ///< its lowest value so far: below 0 the loop gave more than it took
   std::uint64_t volume_hash;  ///< chained over ticks
   std::uint64_t output_hash;
   std::uint16_t dirty_lo[3];
@@ -139,8 +138,16 @@ struct TickRecord {
   std::uint32_t last_command;   ///< Command::index of the last one applied; 0: none yet
   float torque_n_mm[3];
   float spindle_ratio;
-  std::int32_t raw[12];      ///< as they came: kRaw... below
-  std::int64_t energies[6];  ///< Q31.32 J, by source, in the order of the servo's ledger
+  std::int32_t raw[12];  ///< as they came: kRaw... below
+  // By `EnergySource`, in mJ with 32 fraction bits. Their sum is `port_energy_j`.
+  std::int64_t energy_spring;
+  std::int64_t energy_damping;
+  std::int64_t energy_friction;
+  std::int64_t energy_cutting;
+  std::int64_t energy_limits;
+  std::int64_t energy_hold;
+  std::int64_t energy_leak;
+  std::int64_t energy_stabiliser;
   float spindle_load;
   std::uint32_t active_tool;
   std::uint32_t fault;

@@ -216,7 +216,10 @@ Option Arguments::option(const char* name, T& value, const std::string& meaning)
   auto* option =
       app_->add_option(name, take_all, meaning, false, [&value] { return shown(value); });
   option->type_name(type_word<typename Taken<T>::Value>());
-  if (Taken<T>::kList) option->expected(1, CLI::detail::expected_max_vector_size);
+  if (Taken<T>::kList) {
+    option->expected(1, CLI::detail::expected_max_vector_size);
+    option->allow_extra_args(option->get_positional());
+  }
   return Option(option);
 }
 template Option Arguments::option(const char*, int&, const std::string&);

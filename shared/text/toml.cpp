@@ -111,6 +111,13 @@ std::string written(const TomlValue& value) {
       for (const double number : held) list += (list.empty() ? "" : ", ") + number_text(number);
       return "[" + list + "]";
     }
+    if constexpr (std::is_same_v<T, NamedNumbers>) {
+      std::string list = "{ name = \"" + held.name + '"';
+      for (const auto& [name, number] : held.numbers) {
+        list += ", " + name + " = " + number_text(number);
+      }
+      return list + " }";
+    }
   };
   return std::visit(text, value);
 }

@@ -7,14 +7,23 @@
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <variant>
 #include <vector>
 
 namespace kerf {
 
+/// An inline table of numbers behind a name: `{ name = "spring", stiffness = 0.4 }`.
+struct NamedNumbers {
+  std::string name;
+  std::vector<std::pair<std::string, double>> numbers;
+
+  friend bool operator==(const NamedNumbers&, const NamedNumbers&) = default;
+};
+
 /// One value as TOML writes it; empty: none, or one that no file of ours uses, such as a date.
-using TomlValue =
-    std::variant<std::monostate, bool, std::int64_t, double, std::string, std::vector<double>>;
+using TomlValue = std::variant<std::monostate, bool, std::int64_t, double, std::string,
+                               std::vector<double>, NamedNumbers>;
 
 /// A value of a parsed file with its place, and what lies below it.
 struct TomlNode {

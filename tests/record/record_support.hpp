@@ -8,6 +8,7 @@
 
 #include <doctest/doctest.h>
 
+#include "shared/numeric/energy_source.hpp"
 #include "shared/segment/hand_over.hpp"
 #include "tests/segment/segment_support.hpp"
 #include "tests/segment/test_folder.hpp"
@@ -44,6 +45,10 @@ template <class Call>
   record.penetration_mm = press / 4;
   record.removed = phase > 0.5 ? 65535 : 0;
   record.dirty_volumes = phase > 0.5 ? 1 : 0;
+  record.port_energy_j = 1e-3 * phase;
+  record.port_minimum_j = -2e-3 * phase;
+  record.energy_spring = static_cast<std::int64_t>(2 * kEnergyStepsPerMj * phase);
+  record.energy_leak = record.energy_spring / -2;
   record.flags = press > 0.01F ? kFlagContact : 0;
   return record;
 }

@@ -46,9 +46,14 @@ TEST_CASE("the summary counts what was recorded") {
   CHECK(summary.peak_force_n == doctest::Approx(3.0));
   CHECK(summary.removed_mm3 == doctest::Approx(500 * 0.125));  // 500 ticks, one full voxel each
   CHECK(summary.contact_ticks > 900);
+  CHECK(summary.port_energy_mj == doctest::Approx(1));
+  CHECK(summary.port_minimum_mj == doctest::Approx(-2));
+  CHECK(summary.energy_mj[static_cast<std::size_t>(EnergySource::spring)] == doctest::Approx(2));
+  CHECK(summary.energy_mj[static_cast<std::size_t>(EnergySource::leak)] == doctest::Approx(-1));
   CHECK(summary.end_reason == "clean end");
   CHECK(to_text(summary).find("rows              1000\n") != std::string::npos);
   CHECK(nlohmann::json::parse(to_json(summary))["last_tick"] == 1000);
+  CHECK(nlohmann::json::parse(to_json(summary))["energy_leak_mj"] == doctest::Approx(-1));
 }
 
 TEST_CASE("a gap in the sequence shows in the summary without the manifest's help") {
@@ -107,7 +112,7 @@ TEST_CASE("views of a folder that is no recording are refused and leave no file"
   }
 }
 
-TEST_CASE("the plot is an SVG with both panels and every curve") {
+TEST_CASE("the plot is an SVG with its panels and every curve that is not zero") {
   if (std::system("gnuplot --version >/dev/null 2>&1") != 0) {
     MESSAGE("skipped: gnuplot is not installed");
     return;
@@ -116,11 +121,13 @@ TEST_CASE("the plot is an SVG with both panels and every curve") {
   record(folder / "log", 10'000);
   plot_forces(folder / "log", folder / "forces.svg");
   const std::string svg = file_text(folder / "forces.svg");
-  for (const std::string part : {"</svg>", "force (N)", "penetration (mm)", "removed (mm³)",
-                                 "time (s)", ">contact<", ">modification<", ">commanded<"}) {
+  for (const std::string part :
+       {"</svg>", "force (N)", "penetration (mm)", "removed (mm³)", "time (s)", ">contact<",
+        ">modification<", ">commanded<", "work of the hand (mJ)", ">all<", ">spring<", ">leak<"}) {
     CAPTURE(part);
     CHECK(svg.find(part) != std::string::npos);
   }
+  CHECK(svg.find(">stabiliser<") == std::string::npos);
   CHECK(svg.size() < 1'000'000);
 
   // It needs no room for files of its own, and none is left.

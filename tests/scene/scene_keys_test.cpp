@@ -1,16 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
 // Every row of the table of keys, by tests that are made from it: what it allows is read, and every
 // slip has its answer of one line.
+#include <array>
 #include <cmath>
 #include <fstream>
 #include <iterator>
 #include <limits>
 #include <sstream>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <doctest/doctest.h>
 
+#include "controller/law/law_row.hpp"
+#include "controller/law/registry/law_registry.hpp"
 #include "controller/load/scene_json.hpp"
 #include "controller/scene/scene_file.hpp"
 #include "controller/scene/scene_key.hpp"
@@ -25,6 +29,23 @@ using test::scene_for;
 using test::SceneLines;
 
 namespace {
+
+/// The test's own laws, so that each key that names one has a name.
+template <class N>
+struct Nothing {
+  static constexpr const char* kName = "nothing";
+  static constexpr const char* kMeaning = "gives no force";
+  static constexpr std::array<LawSetting, 1> kSettings{{{"share", "", 0, 1, 0.5, "of nothing"}}};
+  struct State {};
+  explicit Nothing(const LawSetup&) {}
+  DeviceVec<typename N::Real> step(const auto&, State&) const noexcept { return {}; }
+};
+KERF_REGISTER_FORCE_LAW(Nothing)
+template <class N>
+struct Calm : Nothing<N> {
+  using Nothing<N>::Nothing;
+};
+KERF_REGISTER_STABILISER(Calm)
 
 std::string error_of(const std::string& text, SceneKeys keys = scene_keys()) {
   return test::error_of([&] { static_cast<void>(parse_scene(text, "x.toml", keys)); });
@@ -119,6 +140,14 @@ struct Samples {
     std::string mixed = list_of(std::vector<double>(N - 1, hi));
     wrong.push_back({mixed.insert(mixed.size() - 1, ", true"), form});
   }
+  void operator()(const LawChoice* law) {
+    for (const LawRow* known : known_laws(law->kind)) {
+      right.push_back("{ name = " + in_quotes(known->name) + " }");
+    }
+    for (const char* value : {"\"zzz\"", "1", "[]", "{}", "{ name = 1 }", "{ tau_ms = 1 }"}) {
+      wrong.push_back({value, " does not say which; write { name = "});
+    }
+  }
   void operator()(const VoxelGrid*) {
     (*this)(static_cast<std::array<double, 3>*>(nullptr));
     wrong.push_back({"[64, 64.5, 64]", " counts voxels; write whole numbers"});
@@ -182,6 +211,28 @@ TEST_CASE("every row: a wrong value has its answer with line, key, value and a w
     }
   }
   CHECK(count > 400);
+}
+
+TEST_CASE("a law that is unknown, or has no such setting, has its answer") {
+  const auto answer = [](const std::string& table) {
+    return error_of("[[volume]]\nfile = \"phantom\"\n[[tool]]\nshape = \"ball\"\nsize_vox = 16\n" +
+                    table);
+  };
+  CHECK(answer("[servo.velocity]\nname = \"difference\"\ntau_ms = 1000\n").empty());
+  CHECK(answer("[servo.velocity]\nname = \"diference\"\n") ==
+        "x.toml:7: servo.velocity.name = \"diference\" is unknown; did you mean \"difference\"? "
+        "known: difference, foaw");
+  CHECK(answer("[servo.velocity]\ntau = 3\nname = \"difference\"\n") ==
+        "x.toml:7: servo.velocity.tau = 3 is unknown; did you mean tau_ms? known: tau_ms");
+  CHECK(answer("[servo.velocity]\nname = \"foaw\"\ntau_ms = 3\n") ==
+        "x.toml:8: servo.velocity.tau_ms = 3 is unknown; foaw has no settings, leave it out");
+  for (const char* value : {"1000.1", "-1e-9", "nan", "inf"}) {
+    CHECK(answer("[servo.velocity]\nname = \"difference\"\ntau_ms = " + std::string(value))
+              .ends_with(" is out of range; use 0 to 1000"));
+  }
+  CHECK(answer("[servo.velocity]\nname = \"difference\"\ntau_ms = \"1\"").ends_with(kNoNumber));
+  CHECK(answer("[force]\nmodel = \"paper\"\nlaw = { name = \"x\" }\n")
+            .find(" is of the model proxy; leave it out") != std::string::npos);
 }
 
 TEST_CASE("every row: its default is allowed") {
@@ -340,7 +391,11 @@ TEST_CASE("docs/scene-keys.md is what the table says") {
   std::ifstream file(KERF_DOCS "/scene-keys.md", std::ios::binary);
   const std::string page{std::istreambuf_iterator<char>(file), {}};
   INFO("renew it: ./kerf controller --scene-keys > docs/scene-keys.md");
+  const LawRow* own = std::exchange(first_own_law, nullptr);
   CHECK((page == scene_keys_page()));
+  first_own_law = own;
+  CHECK(scene_keys_page().find("`law = { name = \"nothing\" }`: gives no force.\n") !=
+        std::string::npos);
   const VoxelGrid grid = PhantomSpec{}.grid;
   const double sides[] = {double(grid.nx), double(grid.ny), double(grid.nz)};
   const auto size = std::ranges::find(scene_keys(), "volume.size", &SceneKey::name);

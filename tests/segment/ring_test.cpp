@@ -27,7 +27,7 @@ TEST_CASE("tick records come back whole, in order, and the newest at once") {
     CHECK(record.seq == 2 * index + 2);
     CHECK(record.tick == index + 1);
     CHECK(record.position_mm[0] == static_cast<double>(index + 1));
-    CHECK(record.crc32c == crc32c(std::as_bytes(std::span(&record, 1)).subspan(8, 452)));
+    CHECK(record.crc32c == crc32c(std::as_bytes(std::span(&record, 1)).subspan(8, 460)));
   }
   CHECK(reader.state_at(10, record) == ReadState::not_yet);
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/servo/velocity_window.hpp"
+#include "controller/law/velocity_window.hpp"
 
 #include <algorithm>
 #include <cmath>

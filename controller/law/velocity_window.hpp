@@ -21,9 +21,6 @@ struct VelocityPlan {
   typename N::Real noise_mm{};  ///< no encoder reading is farther from the true place
 };
 
-/// What reports call it.
-inline constexpr const char* kVelocityEstimator = "FOAW, best fit over at most 16 intervals";
-
 /// Velocity of the tip by first-order adaptive windowing (docs/theory.md 5.2): on each axis the
 /// longest window of at most 16 intervals whose line misses no sample by more than twice
 /// `noise_mm`: both the sample and the newest may be off by it, so a steady hand never shortens its

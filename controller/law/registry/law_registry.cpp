@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "controller/law/registry/law_registry.hpp"
+
+#include <algorithm>
+
+#include "controller/law/difference.hpp"
+#include "controller/law/energy_bounding.hpp"
+#include "controller/law/foaw.hpp"
+#include "controller/law/passivity_controller.hpp"
+#include "shared/text/number.hpp"
+#include "shared/text/words.hpp"
+
+namespace kerf {
+namespace {
+
+// The laws that kerf brings. A new one is a header in controller/law and a row here.
+constexpr VelocityEstimatorRow kFoaw = law_row<Foaw, VelocityInput>(LawKind::velocity);
+constexpr VelocityEstimatorRow kDifference = law_row<Difference, VelocityInput>(LawKind::velocity);
+constexpr StabiliserRow kPassivity =
+    law_row<PassivityController, StabiliserInput>(LawKind::stabiliser);
+constexpr StabiliserRow kEnergyBounding =
+    law_row<EnergyBounding, StabiliserInput>(LawKind::stabiliser);
+constexpr const LawRow* kOurs[] = {&kFoaw, &kDifference, &kPassivity, &kEnergyBounding};
+
+std::vector<std::string_view> names_of(const std::vector<const LawRow*>& rows) {
+  std::vector<std::string_view> names;
+  for (const LawRow* row : rows) names.push_back(row->name);
+  return names;
+}
+
+}  // namespace
+
+std::string_view kind_name(LawKind kind) noexcept {
+  switch (kind) {
+    case LawKind::force:
+      return "force law";
+    case LawKind::velocity:
+      return "velocity estimator";
+    case LawKind::stabiliser:
+      break;
+  }
+  return "stabiliser";
+}
+
+std::vector<const LawRow*> known_laws(LawKind kind) {
+  std::vector<const LawRow*> rows(std::begin(kOurs), std::end(kOurs));
+  for (const LawRow* row = first_own_law; row != nullptr; row = row->next) rows.push_back(row);
+  std::erase_if(rows, [&](const LawRow* row) { return row->kind != kind; });
+  std::ranges::sort(rows, {}, &LawRow::name);
+  const auto twice = std::ranges::adjacent_find(rows, {}, &LawRow::name);
+  if (twice != rows.end()) {
+    throw LawError(": two of this program's laws are the " + std::string(kind_name(kind)) + " \"" +
+                   std::string((*twice)->name) + "\"; give one another kName");
+  }
+  return rows;
+}
+
+const LawRow& find_law(LawKind kind, std::string_view name) {
+  const std::vector<const LawRow*> rows = known_laws(kind);
+  const auto found = std::ranges::find(rows, name, &LawRow::name);
+  if (found != rows.end()) return **found;
+  if (rows.empty()) {
+    throw LawError(" is unknown: this program has no " + std::string(kind_name(kind)) +
+                   "; link one to it (docs/own-law.md)");
+  }
+  throw LawError(unknown_word(name, names_of(rows), "\""));
+}
+
+std::string setting_problem(const LawRow& row, std::string_view setting, double value) {
+  const auto found = std::ranges::find(row.settings, setting, &LawSetting::name);
+  if (found == row.settings.end()) {
+    std::vector<std::string_view> known;
+    for (const LawSetting& one : row.settings) known.push_back(one.name);
+    if (!known.empty()) return unknown_word(setting, known);
+    return " is unknown; " + std::string(row.name) + " has no settings, leave it out";
+  }
+  if (value >= found->lo && value <= found->hi) return "";  // no nan is
+  return " is out of range; use " + number_text(found->lo) + " to " + number_text(found->hi);
+}
+
+std::vector<double> law_values(const LawRow& row, const LawChoice& choice) {
+  std::vector<double> values;
+  for (const LawSetting& setting : row.settings) values.push_back(setting.by_default);
+  for (const auto& [name, value] : choice.settings) {
+    const std::string problem = setting_problem(row, name, value);
+    if (!problem.empty()) throw LawError("." + name + " = " + number_text(value) + problem);
+    const auto found = std::ranges::find(row.settings, name, &LawSetting::name);
+    values[static_cast<std::size_t>(found - row.settings.begin())] = value;
+  }
+  return values;
+}
+
+}  // namespace kerf

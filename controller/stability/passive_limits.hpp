@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "controller/stability/sampled_loop.hpp"
+
+namespace kerf {
+
+// Bounds of a sampled wall that hold for every hand, or that are short formulas (docs/theory.md
+// 5.7). Passive is more than stable: a passive wall never gives energy, whoever holds the device.
+// The hand of the loop is not used here.
+
+/// The device damping (N s/mm) above which the wall is passive: Colgate and Schenkel's
+/// (T/2) max_w Re[(1 - e^-jwT) H(e^jwT)] / (1 - cos wT), with the loop's delay and filter, by a
+/// scan of the circle. Never below 0.
+[[nodiscard]] double passive_viscosity(const SampledLoop& loop, double stiffness_n_per_mm,
+                                       double damping_ns_per_mm);
+
+/// The same in closed form, for a loop without delay: K T/2 + B T/(T + 2 tau).
+[[nodiscard]] double undelayed_passive_viscosity(const SampledLoop& loop, double stiffness_n_per_mm,
+                                                 double damping_ns_per_mm);
+
+/// The largest K (N/mm) that is passive on this device at this damping; 0: none.
+[[nodiscard]] double passive_stiffness(const SampledLoop& loop, double damping_ns_per_mm);
+
+/// (b + B) / (T/2 + td): Gil's bound for small b and B and a short delay; with B = 0 Diolaiti's. A
+/// rule of thumb beside `highest_stiffness`, which is exact.
+[[nodiscard]] double short_delay_stiffness(const SampledLoop& loop, double damping_ns_per_mm);
+
+/// min(2 b/T, 2 fc/D): up to here quantisation and sampling never give energy, whoever holds the
+/// device (Abbott and Okamura; B = 0, no delay). Without a quantum the first of the two.
+[[nodiscard]] double quantum_stiffness(const SampledLoop& loop);
+
+}  // namespace kerf

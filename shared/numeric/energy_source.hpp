@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <string_view>
+
+namespace kerf {
+
+/// Where the work at the device port goes to or comes from (docs/theory.md 5.5): the columns of the
+/// tick record, in its order. Their sum is the work that the loop took from the hand.
+enum class EnergySource : std::uint8_t {
+  spring,     ///< the virtual coupling, or the contact force of another law: as if never sampled
+  damping,    ///< injected with the spring
+  friction,   ///< of the tool on the solid: the part of the spring along the faces
+  cutting,    ///< reaction of the removal, friction of the cutter
+  limits,     ///< what peak, thermal, slew and motor limits changed
+  hold,       ///< fading in; and what a gap in the reports changed, held or faded
+  leak,       ///< spring and friction are held for a tick and not followed: K T/2 of damping less
+  stabiliser  ///< what the stabiliser of the scene added
+};
+inline constexpr std::size_t kEnergySources = 8;
+
+inline constexpr std::array<std::string_view, kEnergySources> kEnergySourceNames = {
+    "spring", "damping", "friction", "cutting", "limits", "hold", "leak", "stabiliser"};
+
+/// Energies in the record and the output: mJ with 32 fraction bits.
+inline constexpr double kEnergyStepsPerMj = 4294967296.0;
+[[nodiscard]] constexpr double energy_mj_of_steps(std::int64_t steps) noexcept {
+  return static_cast<double>(steps) / kEnergyStepsPerMj;
+}
+
+}  // namespace kerf

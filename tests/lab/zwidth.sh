@@ -1,0 +1,35 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+# A map of both loops with its picture, its portraits, the page at its smallest, and a map from shards.
+#     tests/lab/zwidth.sh KERF-LAB
+set -euo pipefail
+lab=$1
+dir=$(mktemp -d)
+trap 'rm -rf "$dir"' EXIT
+cd "$dir"
+
+"$lab" zwidth --quick --damping 0:0.03:5 --stiffness 0.05:50:8 --seconds 0.3 --plot zwidth.svg >told
+grep -q 'stiffness of the wall, K (N/mm)' zwidth.svg
+grep -q 'servo steps' told
+"$lab" zwidth --portraits portraits.svg --cells 1:0.002,20:0.002 --seconds 0.3
+grep -q '<svg' portraits.svg
+"$lab" zwidth --quick --jobs 2 --page stability.md
+grep -q '## What each knob does' stability.md
+grep -q '<svg' stability.devices.svg
+grep -q '<svg' stability.rates.svg
+
+map='--damping 0,0.002,0.01 --delay 0,1 --stiffness 0.2:20:5 --seconds 0.2'
+# shellcheck disable=SC2086  # words
+"$lab" zwidth $map --csv whole.csv >/dev/null
+if ! command -v parallel >/dev/null; then
+  echo 'zwidth: no GNU parallel here; the shards are run one after the other'
+  for i in 1 2 3; do
+    # shellcheck disable=SC2086
+    "$lab" zwidth $map --jobs 1 --shard "$i/3" --part "shard-$i.part" >/dev/null
+  done
+else
+  # shellcheck disable=SC2086
+  parallel --will-cite "$lab" zwidth $map --jobs 1 --shard {}/3 --part shard-{}.part ::: 1 2 3 >/dev/null
+fi
+"$lab" merge shard-*.part --csv merged.csv >/dev/null
+cmp whole.csv merged.csv

@@ -1,0 +1,359 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include <doctest/doctest.h>
+
+#include "controller/law/law_row.hpp"
+#include "controller/stability/stable_gains.hpp"
+#include "hil/hil_error.hpp"
+#include "lab/program.hpp"
+#include "lab/zwidth/arm.hpp"
+#include "lab/zwidth/axes.hpp"
+#include "lab/zwidth/map.hpp"
+#include "lab/zwidth/one_axis.hpp"
+#include "lab/zwidth/one_axis_plant.hpp"
+#include "lab/zwidth/part_file.hpp"
+
+using namespace kerf;
+using namespace kerf::zwidth;
+
+namespace {
+
+/// A law as a program of a user's own registers it: a bare spring; above 60 N/mm it breaks.
+template <class N>
+class BareSpring {
+ public:
+  static constexpr const char* kName = "bare_spring";
+  static constexpr const char* kMeaning = "a spring, for a test";
+  static constexpr std::array<LawSetting, 1> kSettings{
+      {{"stiffness_n_per_mm", "N/mm", 0, 100, 1, "of the spring"}}};
+  struct State {};
+
+  explicit BareSpring(const LawSetup& setup)
+      : stiffness_(typename N::Ratio(setup["stiffness_n_per_mm"])) {}
+  [[nodiscard]] DeviceVec<typename N::Real> step(const ForceInput<N>& in, State&) const noexcept {
+    using Real = typename N::Real;
+    if constexpr (!N::kIsFixed) {
+      if (stiffness_ > 60) return {Real(0), Real(0) / Real(0), Real(0)};
+    }
+    return {Real(0), multiply<Real>(stiffness_, in.spring_mm.y), Real(0)};
+  }
+
+ private:
+  typename N::Ratio stiffness_;
+};
+
+/// The loop of the theory.
+Subject ideal(double delay_periods) {
+  Subject subject;
+  subject.loop.viscous_ns_per_mm = 0.0002;
+  subject.loop.delay_s = delay_periods * subject.loop.period_s;
+  subject.estimator = {LawKind::velocity, "difference", {}};
+  subject.law = Law::two_sided;
+  subject.numeric = NumericKind::float64;
+  subject.limits = false;
+  return subject;
+}
+
+bool swings(const Subject& subject, double stiffness, bool by_energy = false) {
+  std::uint64_t ticks = 0;
+  const Swing swing = hit_one_axis(subject, stiffness, 0, 3, 0, ticks);
+  return by_energy ? swing.active : swing.swings;
+}
+
+/// `kerf-lab` with these arguments: exit code, and what it said.
+struct Said {
+  int code;
+  std::string out, err;
+};
+Said lab(const std::string& line) {
+  std::vector<std::string> words{"kerf-lab"};
+  std::istringstream in(line);
+  for (std::string word; in >> word;) words.push_back(word);
+  std::vector<const char*> argv;
+  for (const std::string& word : words) argv.push_back(word.c_str());
+  std::ostringstream out, err;
+  const int code = run_lab(static_cast<int>(argv.size()), argv.data(), out, err);
+  return {code, out.str(), err.str()};
+}
+
+std::string bytes(const std::filesystem::path& path) {
+  std::ifstream in(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+/// An empty folder that goes with the test.
+struct Folder {
+  std::filesystem::path path;
+  Folder() : path(std::filesystem::temp_directory_path() / "kerf-zwidth-test") {
+    std::filesystem::remove_all(path);
+    std::filesystem::create_directory(path);
+  }
+  ~Folder() { std::filesystem::remove_all(path); }
+  [[nodiscard]] std::string at(const std::string& name) const { return (path / name).string(); }
+};
+
+constexpr const char* kSmall =
+    "zwidth --damping 0,0.002,0.02 --stiffness 0.2:20:6 --seconds 0.3 --delay 0,1 ";
+
+}  // namespace
+
+KERF_REGISTER_FORCE_LAW(BareSpring)
+
+TEST_CASE("one axis in time has the exact boundary, by travel and by energy") {
+  for (const double delay : {0.0, 0.5, 1.0, 2.3}) {
+    for (const double damping : {0.002, 0.01}) {
+      Subject subject = ideal(delay);
+      subject.damping_ns_per_mm = damping;
+      const double exact = highest_stiffness(subject.loop, damping);
+      CAPTURE(delay);
+      CAPTURE(damping);
+      REQUIRE(exact > 0);
+      for (const bool by_energy : {false, true}) {
+        CHECK_FALSE(swings(subject, 0.99 * exact, by_energy));
+        CHECK(swings(subject, 1.01 * exact, by_energy));
+      }
+    }
+  }
+}
+
+TEST_CASE("Coulomb friction carries a wall without any damping, as computed elsewhere") {
+  struct Cell {
+    double coulomb_n, step_mm, stiffness;
+  };
+  for (const Cell& cell : {Cell{.02, .02, .384},
+                           {.02, .055, .384},
+                           {.05, .02, 1.736},
+                           {.1, .02, 4.603},
+                           {.26, .2, 10.532}}) {
+    Subject subject = ideal(0);
+    subject.law = Law::linear;
+    subject.loop.viscous_ns_per_mm = 0;
+    subject.loop.coulomb_n = cell.coulomb_n;
+    subject.loop.quantum_mm = cell.step_mm;
+    CAPTURE(cell.coulomb_n);
+    CAPTURE(cell.step_mm);
+    double stiffness = cell.stiffness / 2;
+    while (!swings(subject, stiffness)) stiffness *= 1.03;
+    CHECK(std::abs(stiffness / cell.stiffness - 1) < 0.1);
+    CHECK(highest_stiffness(subject.loop, 0) == 0);
+  }
+}
+
+TEST_CASE("a mass with friction comes to rest where its energy says, and stays") {
+  SampledLoop loop;
+  loop.coulomb_n = 0.1;
+  OneAxisPlant plant(loop, 0.25, 0.75);
+  plant.place(0, 100 * loop.period_s);  // 100 mm/s
+  for (int tick = 0; tick < 200; ++tick) {
+    plant.advance(0, 0);
+    plant.advance(1, 0);
+  }
+  // m v^2 / 2 = f x: 0.045 kg * (0.1 m/s)^2 / 2 / 0.1 N.
+  CHECK(std::abs(plant.tip_mm() - 2.25) < 1e-6);
+  CHECK(plant.stuck());
+  plant.advance(1, 0.0999);
+  CHECK(plant.stuck());
+  plant.advance(1, 0.1001);
+  CHECK_FALSE(plant.stuck());
+}
+
+TEST_CASE("the whole arm comes to rest on a soft wall and swings on a hard one") {
+  for (const NumericKind numeric : {NumericKind::fixed, NumericKind::float64}) {
+    Subject subject = subject_of({});
+    subject.numeric = numeric;
+    subject.loop.delay_s = 0;
+    const LoadedScene scene = flat_scene(subject);
+    std::uint64_t ticks = 0;
+    const Swing soft = hit_with_arm(scene, subject, 0.3, 0.3, 1, ticks);
+    CHECK_FALSE(soft.swings);
+    CHECK_FALSE(soft.active);
+    const Swing hard = hit_with_arm(scene, subject, 40, 0.3, 1, ticks);
+    CHECK(hard.swings);
+    CHECK(hard.active);
+    CHECK(ticks > 1000);
+  }
+}
+
+TEST_CASE("a map has the same bytes on any number of threads and shards, and after a break") {
+  const Folder folder;
+  const auto files = [&](const std::string& name) {
+    return " --csv " + folder.at(name + ".csv") + " --json " + folder.at(name + ".json");
+  };
+  REQUIRE(
+      lab(kSmall + std::string("--jobs 1 --part ") + folder.at("whole.part") + files("one")).code ==
+      0);
+  REQUIRE(lab(kSmall + std::string("--jobs 3") + files("three")).code == 0);
+  std::string parts;
+  for (const char* shard : {"3", "1", "2"}) {
+    const std::string part = folder.at(std::string("shard-") + shard + ".part");
+    REQUIRE(lab(kSmall + std::string("--shard ") + shard + "/3 --part " + part).code == 0);
+    parts += " " + part;
+  }
+  REQUIRE(lab("merge" + parts + files("merged")).code == 0);
+  CHECK(bytes(folder.at("one.csv")).size() > 500);
+  for (const char* end : {".csv", ".json"}) {
+    const std::string one = bytes(folder.at(std::string("one") + end));
+    CHECK(one == bytes(folder.at(std::string("three") + end)));
+    CHECK(one == bytes(folder.at(std::string("merged") + end)));
+  }
+  // Killed in the middle of a line: what is whole stays, the rest is measured again.
+  const std::string whole = bytes(folder.at("whole.part"));
+  std::ofstream(folder.at("torn.part"), std::ios::binary) << whole.substr(0, whole.size() * 3 / 5);
+  const Said again = lab(kSmall + std::string("--part ") + folder.at("torn.part") + files("again"));
+  CHECK(again.code == 0);
+  CHECK(again.out.find("\n") != std::string::npos);
+  CHECK(bytes(folder.at("torn.part")) == whole);
+  CHECK(bytes(folder.at("again.csv")) == bytes(folder.at("one.csv")));
+  // Another seed is another map.
+  REQUIRE(lab(kSmall + std::string("--seed 2") + files("seed")).code == 0);
+  CHECK(bytes(folder.at("seed.csv")) != bytes(folder.at("one.csv")));
+}
+
+TEST_CASE("parts that make no map are refused in one line, and nothing is lost") {
+  const Folder folder;
+  const std::string a = folder.at("a.part"), b = folder.at("b.part"), c = folder.at("c.part");
+  REQUIRE(lab(kSmall + std::string("--shard 1/2 --part ") + a).code == 0);
+  REQUIRE(lab(kSmall + std::string("--seed 2 --shard 2/2 --part ") + b).code == 0);
+  REQUIRE(lab(kSmall + std::string("--shard 2/2 --part ") + c).code == 0);
+  const std::string kept = bytes(a);
+  const auto refused = [&](const std::string& line, const char* why) {
+    const Said said = lab(line);
+    CAPTURE(line);
+    CAPTURE(said.err);
+    CHECK(said.code == 2);
+    CHECK(said.err.find(why) != std::string::npos);
+    CHECK(std::count(said.err.begin(), said.err.end(), '\n') == 1);
+  };
+  refused("merge " + a + " " + b, "seed 2, not the 1");
+  refused("merge " + a, "shard 2/2 is missing");
+  refused("merge " + a + " " + a, "again");
+  refused("merge " + folder.at("none.part"), "cannot be read");
+  refused(kSmall + std::string("--hand firm --shard 1/2 --part ") + a, "another map or shard");
+  // A version that this is not; a shard that is not done; text that is no part.
+  std::string old = kept;
+  old.replace(old.find(KERF_VERSION), std::string(KERF_VERSION).size(), "0.0.1");
+  std::ofstream(b, std::ios::binary) << old;
+  refused("merge " + b + " " + c, "of version 0.0.1");
+  std::ofstream(b, std::ios::binary) << kept.substr(0, kept.rfind('\n', kept.size() - 2) + 1);
+  refused("merge " + b + " " + c, "has 2 of its 3 columns");
+  std::ofstream(b, std::ios::binary) << "hello\n";
+  refused("merge " + b + " " + c, "line 1");
+  std::ofstream(b, std::ios::binary) << "";
+  refused("merge " + b + " " + c, "no part of a map");
+  CHECK(bytes(a) == kept);
+}
+
+TEST_CASE("axes that mean nothing are refused in one line; columns that cannot exist are told") {
+  for (const char* line : {"--damping 1:0:5",
+                           "--damping 0:1:1",
+                           "--damping -1",
+                           "--damping nan",
+                           "--damping 0,,1",
+                           "--delay 65",
+                           "--rate 0",
+                           "--hand soft",
+                           "--hand 1/2",
+                           "--hand -1/0/0",
+                           "--law none",
+                           "--stiffness 0:1:5",
+                           "--stiffness 2,1",
+                           "--stiffness 1:200:4",
+                           "--map damping",
+                           "--map damping,damping",
+                           "--map x,stiffness",
+                           "--map delay,stiffness",
+                           "--shard 3/2 --part x",
+                           "--shard 0/2 --part x",
+                           "--shard 1/2",
+                           "--shard a/b",
+                           "--mode 100",
+                           "--arm --quantum 0.1",
+                           "--arm --rate 3000 --seconds 0.1",
+                           "--portraits /dev/null",
+                           "--portraits /dev/null --cells 1",
+                           "--seconds 0",
+                           "--plot /dev/null --delay 0:3:7 --quantum 0,0.1"}) {
+    const Said said = lab(std::string("zwidth ") + line);
+    CAPTURE(line);
+    CAPTURE(said.err);
+    CHECK(said.code == 2);
+    CHECK(std::count(said.err.begin(), said.err.end(), '\n') == 1);
+  }
+  // B T/m above 2 without a delay: no wall may have it.
+  const Said said =
+      lab("zwidth --damping 0.002,0.2 --delay 0 --viscous 0 --stiffness 0.2,1 --seconds 0.2");
+  CHECK(said.code == 0);
+  CHECK(said.out.find("1 of 2 columns cannot exist") != std::string::npos);
+}
+
+TEST_CASE("a column tells its first crossing and what comes to rest above it apart") {
+  MapSpec spec;
+  spec.mapped = {index_of(AxisId::damping), kAxisCount};
+  spec.stiffness_n_per_mm = {0.1, 1, 10, 50};
+  spec.seconds = 0.5;
+  Assignment values;
+  values[index_of(AxisId::loop)] = "ideal";
+  values[index_of(AxisId::delay)] = "0";
+  values[index_of(AxisId::damping)] = "0.01";
+  const Column column = measure_column(spec, values, 0);
+  const double exact = highest_stiffness(subject_of(values).loop, 0.01);
+  CHECK(std::abs(column.swing.first_n_per_mm / exact - 1) < 0.01);
+  CHECK(std::abs(column.energy.first_n_per_mm / exact - 1) < 0.01);
+  CHECK(column.swing.re_entry_from_n_per_mm == 0);
+  spec.stiffness_n_per_mm = {0.1, 1};
+  CHECK(measure_column(spec, values, 0).swing.first_n_per_mm == Crossing::kNever);
+  spec.stiffness_n_per_mm = {30, 50};
+  CHECK(measure_column(spec, values, 0).swing.first_n_per_mm == 0);
+}
+
+TEST_CASE("a law of the user's own gets its map, on one axis and with the whole arm") {
+  const Folder folder;
+  const auto verdicts = [&](const std::string& options) {
+    const std::string file = folder.at("map.csv");
+    REQUIRE(lab("zwidth --damping 0 --delay 0.5 --stiffness 0.3:30:8 --seconds 0.3 --csv " + file +
+                " " + options)
+                .code == 0);
+    // From the stiffness on: the law's name stands before it.
+    std::istringstream in(bytes(file));
+    std::string all;
+    for (std::string line; std::getline(in, line);) {
+      std::size_t at = line.size();
+      for (int comma = 0; comma < 5; ++comma) at = line.rfind(',', at - 1);
+      all += line.substr(at) + "\n";
+    }
+    return all;
+  };
+  CHECK(verdicts("--law bare_spring") == verdicts("--law linear"));
+  CHECK(verdicts("--law bare_spring --arm --numeric double").find(",1,1,") != std::string::npos);
+  // What is no number is no wall: it counts as the worst, and nothing crashes.
+  for (const char* where : {"", " --arm"}) {
+    CHECK(lab(std::string(
+                  "zwidth --law bare_spring --numeric double --damping 0 --delay 0 --seconds 0.2 "
+                  "--stiffness 61,62") +
+              where)
+              .out.find("below all") != std::string::npos);
+  }
+  CHECK(lab("zwidth --law bare_spring --stiffness 101,102 --seconds 0.1 --damping 0").code == 2);
+}
+
+TEST_CASE("a stabiliser widens the map") {
+  const auto first = [](const std::string& stabiliser) {
+    MapSpec spec;
+    spec.stiffness_n_per_mm = stiffness_values("0.1:50:20");
+    spec.seconds = 0.6;
+    Assignment values;
+    values[index_of(AxisId::damping)] = "0";
+    values[index_of(AxisId::stabiliser)] = stabiliser;
+    return measure_column(spec, values, 0).swing.first_n_per_mm;
+  };
+  CHECK(first("energy_bounding") > 1.5 * first("none"));
+}
