@@ -16,8 +16,8 @@ TEST_CASE("the report has every promised key, hashes as 16 hex digits") {
   const auto json = nlohmann::json::parse(kerf::report_json(report));
   for (const char* key :
        {"ticks", "overruns", "stale_ticks", "wake_us", "compute_us", "publish_us", "allocations",
-        "minor_faults", "major_faults", "contact_ticks", "peak_force_n", "removed_mm3", "energy_j", "port_minimum_j", "energy_by_source_j",
-        "faults", "events", "volume_hash", "output_hash"}) {
+        "minor_faults", "major_faults", "contact_ticks", "peak_force_n", "removed_mm3", "energy_j",
+        "port_minimum_j", "energy_by_source_j", "faults", "events", "volume_hash", "output_hash"}) {
     CAPTURE(key);
     CHECK(json.contains(key));
   }
