@@ -5,8 +5,8 @@
 #include <array>
 #include <cstddef>
 
+#include "controller/stability/one_axis.hpp"
 #include "controller/stability/sampled_loop.hpp"
-#include "lab/rig/one_axis.hpp"
 
 namespace kerf {
 
