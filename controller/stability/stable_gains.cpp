@@ -6,6 +6,9 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <utility>
+
+#include "controller/stability/held_mass.hpp"
 
 namespace kerf {
 namespace {
@@ -42,47 +45,6 @@ bool all_inside(Polynomial p) {
   return true;
 }
 
-/// A mass on damper and spring, driven by a constant force, in units of one period: how place and
-/// speed (mm per period) after `periods` follow from those before (`free`) and from 1 N (`driven`).
-struct Response {
-  std::array<std::array<double, 2>, 2> free;
-  std::array<double, 2> driven;
-};
-
-Response response(const SampledLoop& loop, double periods) {
-  constexpr double kMmPerM = 1000;
-  const double per_n = kMmPerM * loop.period_s * loop.period_s / (loop.mass_kg + loop.hand.mass_kg);
-  const double spring = loop.hand.stiffness_n_per_mm * per_n;
-  const double damper =
-      (loop.viscous_ns_per_mm + loop.hand.damping_ns_per_mm) * per_n / loop.period_s;
-  // exp of the 3 x 3 generator of (place, speed, force): Taylor for a short time, then squared.
-  using Matrix = std::array<std::array<double, 3>, 3>;
-  const auto times = [](const Matrix& a, const Matrix& b) {
-    Matrix c{};
-    for (std::size_t i = 0; i < 3; ++i) {
-      for (std::size_t j = 0; j < 3; ++j) {
-        for (std::size_t k = 0; k < 3; ++k) c[i][j] += a[i][k] * b[k][j];
-      }
-    }
-    return c;
-  };
-  const double size = (1 + spring + damper + per_n) * periods;
-  const int halvings = size > 0.25 ? static_cast<int>(std::ceil(std::log2(size / 0.25))) : 0;
-  const double step = std::ldexp(periods, -halvings);
-  const Matrix generator{{{0, step, 0}, {-spring * step, -damper * step, per_n * step}, {0, 0, 0}}};
-  const Matrix one{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
-  Matrix whole = one;
-  constexpr int kTerms = 14;  // 0.25^14 / 14! < 1e-19
-  for (int n = kTerms; n > 0; --n) {
-    whole = times(generator, whole);
-    for (std::size_t i = 0; i < 3; ++i) {
-      for (std::size_t j = 0; j < 3; ++j) whole[i][j] = one[i][j] + whole[i][j] / n;
-    }
-  }
-  for (int i = 0; i < halvings; ++i) whole = times(whole, whole);
-  return {{{{whole[0][0], whole[0][1]}, {whole[1][0], whole[1][1]}}}, {whole[0][2], whole[1][2]}};
-}
-
 /// The loop's characteristic polynomial in z, open + K stiffness + B damping. Plant, hold and delay
 /// make x = N/(z^D P) F, the wall F = -(K + B (z - 1)/(T W)) x with W = (1 + tau/T) z - tau/T, and
 /// so z^D P W + N (K W + (B/T) (z - 1)) = 0.
@@ -93,7 +55,7 @@ struct Characteristic {
 };
 
 /// (z I - free)^-1 driven, first row, over the plant's own polynomial.
-Polynomial numerator(const Response& whole, const std::array<double, 2>& driven) {
+Polynomial numerator(const HeldMass& whole, const std::array<double, 2>& driven) {
   return {whole.free[0][1] * driven[1] - whole.free[1][1] * driven[0], driven[0]};
 }
 
@@ -103,9 +65,9 @@ Characteristic characteristic(const SampledLoop& loop) {
   double ticks = std::floor(delay + kWhole);
   const double part = delay - ticks > kWhole ? delay - ticks : 0;
 
-  const Response whole = response(loop, 1);
+  const HeldMass whole = held_mass(loop, 1);
   // The force of the tick before acts for `part` of a period, then the new one.
-  const Response before = response(loop, part), after = response(loop, 1 - part);
+  const HeldMass before = held_mass(loop, part), after = held_mass(loop, 1 - part);
   const auto& [a, b] = after.free;
   const std::array<double, 2> old{a[0] * before.driven[0] + a[1] * before.driven[1],
                                   b[0] * before.driven[0] + b[1] * before.driven[1]};

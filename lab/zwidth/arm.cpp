@@ -1,0 +1,212 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "lab/zwidth/arm.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "controller/device/driver/device_driver.hpp"
+#include "controller/plan/compile.hpp"
+#include "controller/tool/tool_shapes.hpp"
+#include "hil/devmodel/bus_cycle.hpp"
+#include "hil/devmodel/emulator.hpp"
+#include "hil/devmodel/falcon_model.hpp"
+#include "hil/devmodel/omni_model.hpp"
+#include "hil/devmodel/wooden_model.hpp"
+#include "hil/hil_error.hpp"
+#include "lab/rig/bench_scene.hpp"
+#include "lab/rig/direct_port.hpp"
+#include "lab/zwidth/one_axis.hpp"
+
+namespace kerf::zwidth {
+namespace {
+
+constexpr double kRadiusMm = 1, kVoxelMm = 0.25;
+constexpr double kAwayMm = 3;  ///< the tool's middle above the flat, between two hits
+
+/// The hand that pushes: the subject's, or a spring so soft that the device is as good as free.
+SampledHand pushing_hand(const Subject& subject) {
+  SampledHand hand = subject.loop.hand;
+  constexpr double kSoft = 0.05;
+  if (hand.stiffness_n_per_mm <= 0) hand.stiffness_n_per_mm = kSoft;
+  return hand;
+}
+
+template <class Params>
+Params with_plant(Params params, const Subject& subject) {
+  const SampledHand hand = pushing_hand(subject);
+  params.tip_mass_kg = subject.loop.mass_kg;
+  params.viscous_ns_per_mm = subject.loop.viscous_ns_per_mm;
+  params.coulomb_n = subject.loop.coulomb_n;
+  params.hand_mass_kg = hand.mass_kg;
+  params.hand_damping_ns_per_mm = hand.damping_ns_per_mm;
+  params.hand_stiffness_n_per_mm = hand.stiffness_n_per_mm;
+  params.output_delay_cycles = static_cast<int>(cycles_of(subject.loop.delay_s));
+  if (subject.mode_hz > 0) {
+    // A tenth of the tip's mass turns with the motors, at a lever of 0.13 m.
+    constexpr double kShare = 0.1, kLeverM = 0.13;
+    params.joint_inertia_kg_m2.fill(kShare * params.tip_mass_kg * kLeverM * kLeverM);
+    params.tip_mass_kg *= 1 - kShare;
+    params.mode_hz = subject.mode_hz;
+  }
+  return params;
+}
+
+Emulator emulator_of(const Subject& subject, const HandScript& hand) {
+  switch (subject.device) {
+    case Personality::falcon:
+      return {std::make_unique<FalconModel>(with_plant(FalconParams{}, subject)), hand};
+    case Personality::woodenhaptics:
+      return {std::make_unique<WoodenModel>(with_plant(WoodenParams{}, subject)), hand};
+    case Personality::omni:
+      break;
+  }
+  return {with_plant(OmniParams{}, subject), hand};
+}
+
+std::array<double, 3> torque_scale_of(Personality personality) {
+  switch (personality) {
+    case Personality::falcon:
+      return FalconParams().torque_scale();
+    case Personality::woodenhaptics:
+      return WoodenParams().torque_scale();
+    case Personality::omni:
+      break;
+  }
+  return OmniParams().torque_scale();
+}
+
+/// Down at each speed (0: gently), a stay, up again; at a place that the seed shifts.
+HandScript hits_of(const Subject& subject, double seconds, std::uint64_t seed) {
+  const double push_n = subject.push_n + subject.loop.coulomb_n;
+  const double goal_mm = kRadiusMm - push_n / pushing_hand(subject).stiffness_n_per_mm;
+  constexpr std::uint64_t kPlaces = 1000;
+  const double x_mm = static_cast<double>(seed * 7919 % kPlaces) / kPlaces;
+  HandScript script;
+  script.start = {x_mm, kAwayMm, 0};
+  HandStep stay;
+  stay.seconds = seconds + 0.3;
+  for (const double speed : kHitsMmPerS) {
+    HandStep wait;
+    wait.seconds = 0.2;
+    script.steps.push_back(wait);
+    constexpr double kGentlyS = 0.4;
+    HandStep down = hand_move({x_mm, goal_mm, 0}, kGentlyS);
+    if (speed > 0) {
+      down.seconds = (kAwayMm - goal_mm) / speed;
+      down.ease = HandStep::Ease::linear;
+    }
+    script.steps.push_back(down);
+    script.steps.push_back(stay);
+    script.steps.push_back(hand_move({x_mm, kAwayMm, 0}, 0.2));
+  }
+  return script;
+}
+
+/// One device, its driver and a servo; a step is one tick.
+class Rig {
+ public:
+  Rig(LoadedScene scene, const Subject& subject, const HandScript& hand)
+      : servo_(compile(scene)),
+        emulator_(emulator_of(subject, hand)),
+        port_(emulator_),
+        driver_(make_driver(subject.device, port_)),
+        cycles_per_tick_(kCyclesPerSecond / scene.servo.rate_hz) {
+    driver_->start();
+  }
+  ServoOutput tick() {
+    for (int cycle = 0; cycle < cycles_per_tick_; ++cycle) port_.cycle();
+    const ServoOutput out = servo_->step(driver_->read());
+    driver_->command(out);
+    return out;
+  }
+
+ private:
+  std::unique_ptr<CompiledScene> servo_;
+  Emulator emulator_;
+  DirectPort port_;
+  std::unique_ptr<DeviceDriver> driver_;
+  int cycles_per_tick_;
+};
+
+/// What a latched fault, or a device that never comes back, counts as.
+constexpr Swing kLost{true, true, 0, 0};
+
+/// One hit: nothing before the first contact; the verdict after `seconds`.
+std::optional<Swing> watch_hit(Rig& rig, const Subject& subject, double seconds,
+                               std::uint64_t& ticks) {
+  const double rate_hz = 1 / subject.loop.period_s;
+  const std::int64_t count = std::llround(seconds * rate_hz);
+  constexpr double kPatienceS = 8;  // calibration, the way there, and a stay that chattered away
+  SwingMeter meter(count, subject.loop.quantum_mm, subject.push_n);
+  std::int64_t away = 0;
+  std::int64_t judged = 0;
+  const std::int64_t settled = std::llround(0.05 * rate_hz);
+  const std::int64_t patience = std::llround(kPatienceS * rate_hz);
+  for (std::int64_t tick = 0; judged < count; ++tick, ++ticks) {
+    if (tick - judged > patience) return std::nullopt;
+    const ServoOutput out = rig.tick();
+    if (out.fault != Fault::none) return kLost;
+    const bool free = out.motors_on && out.phase == Phase::active && !out.contact;
+    if (judged == 0 && away < settled) {
+      away = free ? away + 1 : 0;
+    } else if (judged > 0 || out.contact) {
+      meter.take(out.position_mm[1], -out.absorbed_mj);
+      ++judged;
+    }
+  }
+  return meter.swing();
+}
+
+}  // namespace
+
+LoadedScene flat_scene(const Subject& subject) {
+  const int rate_hz = static_cast<int>(std::lround(1 / subject.loop.period_s));
+  if (kCyclesPerSecond % rate_hz != 0) {
+    throw HilError("--rate: " + std::to_string(rate_hz) +
+                   " does not divide 8000, the rate of the devices' mechanics; use such as 4000");
+  }
+  LoadedScene scene;
+  scene.path = "flat";
+  constexpr std::int32_t kEdge = 32;
+  const VoxelGrid grid{kEdge, kEdge, kEdge};
+  constexpr double kCorner = -kVoxelMm * (kEdge - 1) / 2;
+  SceneVolume& volume = scene.volumes.emplace_back();
+  volume.name = "solid";
+  volume.image.grid = grid;
+  volume.image.spacing_mm = {kVoxelMm, kVoxelMm, kVoxelMm};
+  volume.image.density =
+      bench::densities(grid, [&](double, double y, double) { return (kEdge - 1) / 2.0 - y; });
+  volume.pose.position_mm = {kCorner, kCorner, kCorner};
+  scene.tools.push_back(make_tool("ball", "ball", {.pitch_mm = kVoxelMm, .radius_mm = kRadiusMm}));
+  scene.cut.model = CutModel::none;
+  scene.device.personality = subject.device;
+  scene.device.torque_scale = torque_scale_of(subject.device);
+  scene.force.damping_ns_per_mm = subject.damping_ns_per_mm;
+  scene.servo.rate_hz = rate_hz;
+  scene.servo.numeric = subject.numeric;
+  return scene;
+}
+
+Swing hit_with_arm(const LoadedScene& scene, const Subject& subject, double stiffness_n_per_mm,
+                   double seconds, std::uint64_t seed, std::uint64_t& ticks) {
+  LoadedScene own = scene;
+  own.force.stiffness_n_per_mm = stiffness_n_per_mm;
+  Rig rig(std::move(own), subject, hits_of(subject, seconds, seed));
+  Swing worst;
+  for (std::size_t hit = 0; hit < kHitsMmPerS.size(); ++hit) {
+    const std::optional<Swing> seen = watch_hit(rig, subject, seconds, ticks);
+    if (!seen && hit == 0) {
+      throw HilError("the emulated hand: did not bring the device to the wall within 8 s");
+    }
+    worst.join(seen.value_or(kLost));
+    if (worst.swings && worst.active) break;
+  }
+  return worst;
+}
+
+}  // namespace kerf::zwidth

@@ -1,0 +1,307 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "lab/zwidth/command.hpp"
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <ostream>
+#include <set>
+#include <thread>
+#include <utility>
+
+#include "hil/hil_error.hpp"
+#include "lab/rig/lab_run.hpp"
+#include "lab/zwidth/map.hpp"
+#include "lab/zwidth/one_axis.hpp"
+#include "lab/zwidth/plot.hpp"
+#include "lab/zwidth/tables.hpp"
+#include "record/gnuplot.hpp"
+#include "shared/posix/progress_bar.hpp"
+#include "shared/posix/stop_signals.hpp"
+#include "shared/text/format.hpp"
+#include "shared/text/number.hpp"
+
+namespace kerf::zwidth {
+namespace {
+
+/// The files of a map, checked before it is measured.
+class Outputs {
+ public:
+  explicit Outputs(const OutputPaths& paths)
+      : draws_(!paths.plot.empty()),
+        csv_("--csv", paths.csv),
+        json_("--json", paths.json),
+        plot_("--plot", paths.plot) {
+    LabOutput::check_distinct({&csv_, &json_, &plot_});
+  }
+  void write(const Part& part) const {
+    csv_.write(csv_of(part));
+    json_.write(json_of(part));
+    if (draws_) plot_.write(gnuplot_svg(plot_of(part)));
+  }
+
+ private:
+  bool draws_;
+  LabOutput csv_, json_, plot_;
+};
+
+std::string crossing_text(const Crossing& crossing) {
+  if (crossing.first_n_per_mm == Crossing::kNever) return "above all";
+  if (crossing.first_n_per_mm == 0) return "below all";
+  return format("%.4g", crossing.first_n_per_mm);
+}
+
+/// One line for each column: what it is, and where it stops.
+void tell(const Part& part, std::ostream& out) {
+  const std::vector<Assignment> columns = part.spec.columns();
+  std::set<std::string> reasons;
+  std::size_t impossible_count = 0;
+  out << format("%-40s %10s %10s %10s %10s  re-entry\n", "column (N/mm)", "swings", "energy",
+                "exact", "passive");
+  for (const auto& [index, column] : part.columns) {
+    const Subject subject = subject_of(columns[index]);
+    if (column.cells.empty()) {
+      ++impossible_count;
+      reasons.insert(impossible(subject));
+      continue;
+    }
+    std::string name;
+    for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
+      if (part.spec.table[axis].size() < 2) continue;
+      name += std::string(name.empty() ? "" : " ") + axis_kinds()[axis].name + " " +
+              columns[index][axis];
+    }
+    const Analytic analytic = analytic_of(subject);
+    out << format("%-40s %10s %10s %10.4g %10.4g", name.c_str(),
+                  crossing_text(column.swing).c_str(), crossing_text(column.energy).c_str(),
+                  analytic.exact, analytic.passive);
+    if (column.swing.re_entry_from_n_per_mm > 0) {
+      out << format("  %.4g to %.4g", column.swing.re_entry_from_n_per_mm,
+                    column.swing.re_entry_to_n_per_mm);
+    }
+    out << '\n';
+  }
+  if (impossible_count > 0) {
+    out << impossible_count << " of " << part.columns.size()
+        << " columns cannot exist and are left empty: " << *reasons.begin() << '\n';
+  }
+}
+
+std::pair<double, double> cell_in(const std::string& text) {
+  const std::size_t colon = text.find(':');
+  const auto stiffness = number_in(text.substr(0, colon));
+  const auto damping =
+      colon == std::string::npos ? std::nullopt : number_in(text.substr(colon + 1));
+  if (!stiffness || !damping || !(*stiffness > 0) || *stiffness > 127 || *damping < 0 ||
+      *damping > 2) {
+    throw HilError("--cells: " + text +
+                   " is no cell; give stiffness:damping in N/mm and N s/mm, such as 2:0.002");
+  }
+  return {*stiffness, *damping};
+}
+
+}  // namespace
+
+void OutputPaths::declare(Arguments& app) {
+  app.option("--csv", csv, "write one row for each cell").shown_as("FILE");
+  app.option("--json", json, "write axes, boundaries and cells").shown_as("FILE");
+  app.option("--plot", plot, "draw the map beside the analytic limits (SVG)").shown_as("FILE");
+}
+
+Command::Command(Arguments& program)
+    : LabCommand(program, "zwidth",
+                 "which stiffness and damping a device bears, beside the theory") {
+  for (std::size_t i = 0; i < kAxisCount; ++i) {
+    const AxisKind& kind = axis_kinds()[i];
+    std::string meaning = kind.meaning;
+    if (*kind.standard != 0) meaning += std::string(" [") + kind.standard + "]";
+    app_.option((std::string("--") + kind.name).c_str(), axes_[i], meaning)
+        .shown_as(*kind.unit != 0 ? kind.unit : "VALUE");
+  }
+  app_.option("--stiffness", stiffness_,
+              "of the wall, K: from:to:count, even in their ratio [0.05:50:40]")
+      .shown_as("N/mm");
+  app_.option("--map", map_, "the two axes of the picture").shown_as("X,Y").shows_default();
+  app_.flag("--quick", quick_, "a small map of both loops, in seconds");
+  app_.flag("--arm", arm_, "the whole servo step with an emulated device in place of one axis");
+  app_.option("--seconds", seconds_, "of each hit [3; 1 where quick]").within(0.1, 60);
+  app_.option("--seed", seed_, "shifts the encoders' steps against the wall; 0: an edge lies on it")
+      .shows_default();
+  app_.option("--jobs", jobs_, "threads [all cores]").within(1, 1024);
+  app_.option("--shard", shard_, "only part i of n, into --part").shown_as("i/n");
+  app_.option("--part", part_, "keep finished columns here, and go on from those that it has")
+      .shown_as("FILE");
+  paths_.declare(app_);
+  app_.option("--portraits", portraits_, "draw position against speed of --cells (SVG)")
+      .shown_as("FILE");
+  app_.option("--cells", cells_, "for --portraits: stiffness:damping, as many as 12")
+      .split_at_commas()
+      .shown_as("K:B,...");
+  app_.footer(
+      "An axis takes one value, a list (0,1,2) or a range (0:3:4: from, to, count). Two are "
+      "mapped;\n"
+      "each combination of the others is a panel of the picture. docs/stability.md has examples.\n"
+      "Exit codes: 0 fine, 2 bad input or set-up; 3 interrupted, and --part has what is done.");
+}
+
+MapSpec Command::spec() const {
+  MapSpec spec;
+  const std::size_t comma = map_.find(',');
+  if (comma == std::string::npos) {
+    throw HilError("--map: " + map_ + ": two axes make a map; give such as damping,stiffness");
+  }
+  spec.mapped = {axis_named("--map", map_.substr(0, comma)),
+                 axis_named("--map", map_.substr(comma + 1))};
+  if (spec.mapped[0] == spec.mapped[1]) {
+    throw HilError("--map: " + map_ + ": the same axis twice; give two");
+  }
+  std::array<std::string, kAxisCount> texts = axes_;
+  for (const AxisId axis : {AxisId::loop, AxisId::quantum, AxisId::estimator, AxisId::filter,
+                            AxisId::law, AxisId::limits}) {
+    if (!arm_ || texts[index_of(axis)].empty()) continue;
+    throw HilError(std::string("--") + axis_kinds()[index_of(axis)].name +
+                   ": device and servo have their own with --arm; leave one of the two out");
+  }
+  if (!arm_ && !axes_[index_of(AxisId::mode)].empty()) {
+    throw HilError("--mode: one axis is rigid; add --arm, or leave it out");
+  }
+  const auto standard = [&](AxisId axis, const char* text) {
+    std::string& value = texts[index_of(axis)];
+    if (value.empty()) value = text;
+  };
+  if (quick_ && !arm_) standard(AxisId::loop, "ideal,kerf");
+  if (std::ranges::find(spec.mapped, index_of(AxisId::damping)) != spec.mapped.end()) {
+    standard(AxisId::damping, quick_ ? "0:0.03:21" : "0:0.03:40");
+  }
+  for (std::size_t i = 0; i < kAxisCount; ++i) {
+    if (!texts[i].empty()) spec.table[i] = axis_values(static_cast<AxisId>(i), texts[i]);
+  }
+  for (const std::size_t axis : spec.mapped) {
+    if (axis == kAxisCount || !spec.table[axis].empty()) continue;
+    throw HilError(std::string("--map: the axis ") + axis_kinds()[axis].name +
+                   " has no range; give --" + axis_kinds()[axis].name + " from:to:count or a list");
+  }
+  spec.stiffness_n_per_mm = stiffness_values(!stiffness_.empty() ? stiffness_
+                                             : quick_            ? "0.05:50:25"
+                                                                 : "0.05:50:40");
+  spec.arm = arm_;
+  spec.seconds = seconds_ > 0 ? seconds_ : quick_ ? 1 : 3;
+  spec.seed = seed_;
+  constexpr std::size_t kMostColumns = 100000;
+  std::size_t count = 1;
+  for (const AxisValues& values : spec.table) {
+    count *= std::max<std::size_t>(1, values.size());
+    if (count > kMostColumns)
+      throw HilError("--map: more than 100000 columns; give the axes fewer values");
+  }
+  return spec;
+}
+
+Shard Command::shard() const {
+  const std::size_t slash = shard_.find('/');
+  const auto index = number_in(shard_.substr(0, slash));
+  const auto count =
+      slash == std::string::npos ? std::nullopt : number_in(shard_.substr(slash + 1));
+  constexpr double kMost = 10000;
+  const auto whole = [](double value) {
+    return value == static_cast<double>(static_cast<int>(value));
+  };
+  if (!index || !count || !(*count >= 1) || *count > kMost || !(*index >= 1) || *index > *count ||
+      !whole(*index) || !whole(*count)) {
+    throw HilError("--shard: " + shard_ + " is no part of a whole; give such as 2/8");
+  }
+  if (*count > 1 && part_.empty()) {
+    throw HilError("--shard: " + shard_ + " needs a file for its part; give --part FILE");
+  }
+  return {static_cast<std::size_t>(*index), static_cast<std::size_t>(*count)};
+}
+
+void Command::draw_portraits(const MapSpec& spec) const {
+  constexpr std::size_t kMost = 12;
+  if (cells_.empty() || cells_.size() > kMost) {
+    throw HilError("--portraits: give --cells, 1 to 12 of them, such as 2:0.002,20:0.002");
+  }
+  std::vector<Portrait> portraits;
+  for (const std::string& cell : cells_) {
+    const auto [stiffness, damping] = cell_in(cell);
+    Subject subject = subject_of(spec.columns().front());
+    subject.damping_ns_per_mm = damping;
+    Portrait portrait{format("K %g N/mm, B %g N s/mm", stiffness, damping), {}};
+    std::uint64_t ticks = 0;
+    for (const double speed : kHitsMmPerS) {
+      std::vector<OneAxisTick> curve;
+      static_cast<void>(hit_one_axis(subject, stiffness, speed, spec.seconds, spec.seed, ticks,
+                                     [&](const OneAxisTick& tick) { curve.push_back(tick); }));
+      portrait.hits.push_back(std::move(curve));
+    }
+    portraits.push_back(std::move(portrait));
+  }
+  LabOutput("--portraits", portraits_).write(gnuplot_svg(plot_of(portraits)));
+}
+
+int Command::run(std::ostream& out) const {
+  using Clock = std::chrono::steady_clock;
+  const MapSpec map = spec();
+  const Shard part = shard();
+  const Outputs outputs(paths_);
+  if (!portraits_.empty()) draw_portraits(map);
+  PartWriter kept(part_, map, part);
+  std::vector<std::size_t> wanted;
+  const std::size_t count = map.columns().size();
+  for (std::size_t i = 0; i < count; ++i) {
+    if (part.has(i) && !kept.columns().contains(i)) wanted.push_back(i);
+  }
+  const std::size_t cores = std::max(1U, std::thread::hardware_concurrency());
+  const int jobs = static_cast<int>(std::clamp<std::size_t>(
+      std::min(jobs_ > 0 ? static_cast<std::size_t>(jobs_) : cores, wanted.size()), 1, 1024));
+  const std::atomic<bool>& stop = catch_stop_signals();
+  const ProgressBar bar(true);
+  const auto begun = Clock::now();
+  const auto seconds = [&] { return std::chrono::duration<double>(Clock::now() - begun).count(); };
+  std::uint64_t ticks = 0;
+  std::size_t done = 0;
+  bar.show(0, format("0 of %zu columns", wanted.size()));
+  measure_columns(map, wanted, jobs, [&](std::size_t index, Column column) {
+    ticks += column.ticks;
+    kept.add(index, std::move(column));
+    ++done;
+    const double left =
+        seconds() / static_cast<double>(done) * static_cast<double>(wanted.size() - done);
+    bar.show(static_cast<double>(done) / static_cast<double>(wanted.size()),
+             format("%zu of %zu columns, %.0f s left", done, wanted.size(), left));
+    return !stop.load();
+  });
+  bar.hide();
+  if (done < wanted.size()) {
+    out << "interrupted: " << done << " of " << wanted.size() << " columns measured"
+        << (part_.empty() ? "; nothing kept without --part\n" : "; run it again to go on\n");
+    return 3;
+  }
+  kept.finish();
+  const Part whole{map, part, kept.columns()};
+  tell(whole, out);
+  if (!wanted.empty()) {
+    out << format(
+        "%zu columns, %.3g servo steps in %.1f s on %d threads: %.3g steps per second and core\n",
+        wanted.size(), static_cast<double>(ticks), seconds(), jobs,
+        static_cast<double>(ticks) / seconds() / jobs);
+  }
+  outputs.write(whole);
+  return 0;
+}
+
+MergeCommand::MergeCommand(Arguments& program)
+    : LabCommand(program, "merge", "the parts of a map (zwidth --shard) as one map") {
+  app_.option("parts", parts_, "part files, one of each shard").required().shown_as("FILE...");
+  paths_.declare(app_);
+}
+
+int MergeCommand::run(std::ostream& out) const {
+  const Outputs outputs(paths_);
+  const Part whole = merge_parts(parts_);
+  tell(whole, out);
+  outputs.write(whole);
+  return 0;
+}
+
+}  // namespace kerf::zwidth

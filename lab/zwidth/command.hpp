@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "lab/rig/lab_command.hpp"
+#include "lab/zwidth/axes.hpp"
+#include "lab/zwidth/part_file.hpp"
+
+namespace kerf::zwidth {
+
+/// The files that a map is written to; `MergeCommand` has the same.
+struct OutputPaths {
+  std::string csv, json, plot;
+  void declare(Arguments& app);
+};
+
+/// `kerf-lab zwidth`: which stiffness and damping a device bears, measured, beside the theory.
+class Command final : public LabCommand {
+ public:
+  explicit Command(Arguments& program);
+  [[nodiscard]] int run(std::ostream& out) const override;
+
+ private:
+  [[nodiscard]] MapSpec spec() const;
+  [[nodiscard]] Shard shard() const;
+  void draw_portraits(const MapSpec& spec) const;
+
+  std::array<std::string, kAxisCount> axes_;
+  std::string stiffness_, map_ = "damping,stiffness", shard_ = "1/1", part_, portraits_, page_;
+  std::vector<std::string> cells_;
+  OutputPaths paths_;
+  bool quick_ = false, arm_ = false;
+  double seconds_ = 0;
+  std::uint32_t seed_ = 1;
+  int jobs_ = 0;
+};
+
+/// `kerf-lab merge`: the parts of a map's shards as one map.
+class MergeCommand final : public LabCommand {
+ public:
+  explicit MergeCommand(Arguments& program);
+  [[nodiscard]] int run(std::ostream& out) const override;
+
+ private:
+  std::vector<std::string> parts_;
+  OutputPaths paths_;
+};
+
+}  // namespace kerf::zwidth

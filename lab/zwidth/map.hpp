@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <limits>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "lab/zwidth/axes.hpp"
+#include "lab/zwidth/swing.hpp"
+
+namespace kerf::zwidth {
+
+/// What a map is about. Two runs with the same value give the same map, bit for bit.
+struct MapSpec {
+  std::array<std::size_t, 2> mapped{};  ///< axes of the picture, `kAxisCount`: stiffness
+  std::vector<double> stiffness_n_per_mm;
+  AxisTable table;
+  bool arm = false;    ///< the whole servo with an emulated device, else one axis
+  double seconds = 3;  ///< of each hit
+  std::uint64_t seed = 1;
+
+  [[nodiscard]] std::vector<Assignment> columns() const { return combinations(table); }
+};
+
+/// Where a column of rising stiffness stops being fine, by one rule.
+struct Crossing {
+  static constexpr double kNever = std::numeric_limits<double>::infinity();
+  /// The first crossing, to 0.5 %; 0: not even the lowest stiffness is fine; kNever: all are.
+  double first_n_per_mm = kNever;
+  /// Cells above it that are fine again, their lowest and highest; 0: none.
+  double re_entry_from_n_per_mm = 0, re_entry_to_n_per_mm = 0;
+};
+
+/// One combination of the other axes, at all stiffnesses.
+struct Column {
+  std::vector<Swing> cells;  ///< empty: it cannot exist
+  Crossing swing, energy;
+  std::uint64_t ticks = 0;  ///< that it took, in this process
+};
+using Columns = std::map<std::size_t, Column>;
+
+/// Why a column cannot exist: its damping alone is beyond what any sampled wall may have; else
+/// empty.
+[[nodiscard]] std::string impossible(const Subject& subject);
+
+/// The column of `values`, number `index` of the map.
+[[nodiscard]] Column measure_column(const MapSpec& spec, const Assignment& values,
+                                    std::size_t index);
+
+/// Measures the columns of `wanted` on `jobs` threads. `done` is told of each as it comes, under a
+/// lock; where it returns false no further one begins. An exception of a thread is thrown here.
+void measure_columns(const MapSpec& spec, const std::vector<std::size_t>& wanted, int jobs,
+                     const std::function<bool(std::size_t index, Column column)>& done);
+
+}  // namespace kerf::zwidth

@@ -1,0 +1,200 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "lab/zwidth/one_axis.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+#include "controller/servo/contact_plan.hpp"
+#include "controller/servo/force_limits.hpp"
+#include "controller/servo/velocity_window.hpp"
+#include "lab/zwidth/one_axis_plant.hpp"
+#include "shared/numeric/numbers.hpp"
+
+namespace kerf::zwidth {
+namespace {
+
+/// The wall's side of the loop: from a reading to a force, once per tick. Along y, as the servo's.
+template <class N>
+class OneAxisWall {
+ public:
+  using Real = typename N::Real;
+
+  OneAxisWall(const Subject& subject, double stiffness_n_per_mm, double tip_mm)
+      : law_(subject.law),
+        estimator_(subject.estimator),
+        limits_on_(subject.limits),
+        coupling_{typename N::Ratio(stiffness_n_per_mm),
+                  typename N::Unit(subject.damping_ns_per_mm)} {
+    const SampledLoop& loop = subject.loop;
+    const double rate_hz = 1 / loop.period_s;
+    window_plan_ = {.rate_hz = static_cast<std::int32_t>(std::lround(rate_hz)),
+                    .stride = std::clamp(static_cast<std::int32_t>(std::lround(rate_hz)) / 1000, 1,
+                                         VelocityWindow<N>::kMaxStride),
+                    .noise_mm = Real(loop.quantum_mm)};
+    per_second_ = static_cast<Real>(rate_hz);
+    share_ = typename N::Unit(loop.period_s / (loop.period_s + loop.velocity_filter_s));
+    const LimitSettings scene;
+    constexpr double kThermalS = 10;
+    limits_ = {.peak_n = Real(scene.force_n),
+               .continuous_n = Real(scene.continuous_force_n),
+               .slew_n_per_tick = Real(scene.slew_n_per_ms * 1000 * loop.period_s),
+               .thermal_per_tick = typename N::Ratio(loop.period_s / kThermalS)};
+    last_mm_ = Real(tip_mm);
+    window_.start({Real(0), last_mm_, Real(0)});
+  }
+
+  /// The force on the tip, outwards positive, that a reading of `tip_mm` asks for.
+  double force(double reading_mm) noexcept {
+    const auto tip_mm = Real(reading_mm);
+    const Real moved_mm = tip_mm - last_mm_;
+    last_mm_ = tip_mm;
+    window_.take({Real(0), tip_mm, Real(0)}, 1);
+    const Real raw = saturated(moved_mm);
+    slow_ = slow_ + multiply<Real>(share_, raw - slow_);
+    DeviceVec<Real> wanted_n{};
+    if (law_ == Law::two_sided || tip_mm < Real(0)) wanted_n.y = wanted(tip_mm);
+    if (limits_on_) {
+      sent_n_ = limited_force(limits_, thermal_, wanted_n, sent_n_, sent_n_.y * moved_mm > Real(0));
+    } else {
+      sent_n_ = wanted_n;
+    }
+    return static_cast<double>(sent_n_.y);
+  }
+
+ private:
+  Real saturated(Real moved_mm) const noexcept {
+    if constexpr (N::kIsFixed) {
+      return Real::from_raw(saturate_i32(std::int64_t{moved_mm.raw()} * window_plan_.rate_hz));
+    } else {
+      return moved_mm * per_second_;
+    }
+  }
+
+  Real wanted(Real tip_mm) const noexcept {
+    const DeviceVec<Real> velocity = estimator_ == Estimator::foaw
+                                         ? window_.velocity(window_plan_)
+                                         : DeviceVec<Real>{Real(0), slow_, Real(0)};
+    const Real spring_mm = Real(0) - tip_mm;
+    if (law_ == Law::coupling) {
+      return coupling_force(coupling_, {Real(0), spring_mm, Real(0)}, velocity).y;
+    }
+    const Real push_n = multiply<Real>(coupling_.stiffness_n_per_mm, spring_mm) -
+                        multiply<Real>(coupling_.damping_ns_per_mm, velocity.y);
+    return law_ == Law::linear ? std::max(Real(0), push_n) : push_n;
+  }
+
+  Law law_;
+  Estimator estimator_;
+  bool limits_on_;
+  Coupling<N> coupling_;
+  VelocityPlan<N> window_plan_;
+  VelocityWindow<N> window_;
+  Real per_second_{};
+  typename N::Unit share_{};  ///< of the low-pass
+  Real last_mm_{}, slow_{};
+  ForceLimits<N> limits_{};
+  ThermalState<N> thermal_;
+  DeviceVec<Real> sent_n_{};
+};
+
+/// Forces on their way to the motors: held for whole periods, and for a part of one.
+class Delay {
+ public:
+  explicit Delay(const SampledLoop& loop) {
+    const double periods = std::min(loop.delay_s / loop.period_s, kMaxDelayPeriods);
+    constexpr double kWhole = 1e-9;
+    whole_ = static_cast<std::size_t>(periods + kWhole);
+    part_ = std::max(0.0, periods - static_cast<double>(whole_));
+    if (part_ < kWhole) part_ = 0;
+  }
+  [[nodiscard]] double part() const noexcept { return part_; }
+  void send(double force_n) noexcept {
+    newest_ = (newest_ + 1) % ring_.size();
+    ring_[newest_] = force_n;
+  }
+  /// What acts in the first part of the period, and then.
+  [[nodiscard]] double before() const noexcept { return at(whole_ + 1); }
+  [[nodiscard]] double after() const noexcept { return at(whole_); }
+
+ private:
+  [[nodiscard]] double at(std::size_t age) const noexcept {
+    return ring_[(newest_ + ring_.size() - age) % ring_.size()];
+  }
+  std::array<double, static_cast<std::size_t>(kMaxDelayPeriods) + 2> ring_{};
+  std::size_t newest_ = 0, whole_ = 0;
+  double part_ = 0;
+};
+
+/// A part of a step, from the seed alone (splitmix64); of seed 0 none.
+double shift_of(std::uint64_t seed) {
+  if (seed == 0) return 0;
+  seed += 0x9E37'79B9'7F4A'7C15;
+  seed = (seed ^ (seed >> 30)) * 0xBF58'476D'1CE4'E5B9;
+  seed = (seed ^ (seed >> 27)) * 0x94D0'49BB'1331'11EB;
+  return static_cast<double>((seed ^ (seed >> 31)) >> 11) * 0x1p-53;
+}
+
+template <class N>
+Swing hit(const Subject& subject, double stiffness, double hit_mm_per_s, double seconds,
+          std::uint64_t seed, std::uint64_t& ticks, const OneAxisWatch& watch) {
+  const SampledLoop& loop = subject.loop;
+  const double step_mm = loop.quantum_mm, shift_mm = shift_of(seed) * step_mm;
+  const auto reading = [&](double tip_mm) {
+    return step_mm > 0 ? std::floor((tip_mm + shift_mm) / step_mm) * step_mm - shift_mm : tip_mm;
+  };
+  const double push_n = loop.coulomb_n + subject.push_n;
+  Delay delay(loop);
+  OneAxisPlant plant(loop, delay.part(), 1 - delay.part());
+  plant.place(kStartMm, -hit_mm_per_s * loop.period_s);
+  OneAxisWall<N> wall(subject, stiffness, reading(kStartMm));
+
+  const std::int64_t count = std::llround(seconds / loop.period_s);
+  // Friction holds the tip, and all that the wall remembers is over.
+  const std::int64_t settled = std::llround(0.2 / loop.period_s) +
+                               static_cast<std::int64_t>(kMaxDelayPeriods) +
+                               VelocityWindow<N>::kIntervals * VelocityWindow<N>::kMaxStride;
+  constexpr double kFarMm = 1e4;  // where no motion comes back from
+  SwingMeter meter(count, step_mm, push_n);
+  double given_mj = 0;
+  std::int64_t still = 0;
+  for (std::int64_t tick = 0; tick < count; ++tick, ++ticks) {
+    delay.send(wall.force(reading(plant.tip_mm())));
+    const auto move = [&](std::size_t stretch, double force_n) {
+      const double from_mm = plant.tip_mm();
+      plant.advance(stretch, force_n - push_n);
+      given_mj += force_n * (plant.tip_mm() - from_mm);
+    };
+    if (delay.part() > 0) move(0, delay.before());
+    move(1, delay.after());
+    meter.take(plant.tip_mm(), given_mj);
+    if (watch) {
+      watch({static_cast<double>(tick + 1) * loop.period_s, plant.tip_mm(),
+             plant.mm_per_period() / loop.period_s, delay.after()});
+    }
+    still = plant.stuck() ? still + 1 : 0;
+    if (still > settled) return {};
+    if (!(std::abs(plant.tip_mm()) < kFarMm)) return {true, true, kFarMm, given_mj};
+  }
+  return meter.swing();
+}
+
+}  // namespace
+
+Swing hit_one_axis(const Subject& subject, double stiffness_n_per_mm, double hit_mm_per_s,
+                   double seconds, std::uint64_t seed, std::uint64_t& ticks,
+                   const OneAxisWatch& watch) {
+  switch (subject.numeric) {
+    case NumericKind::float32:
+      return hit<FloatNumbers>(subject, stiffness_n_per_mm, hit_mm_per_s, seconds, seed, ticks,
+                               watch);
+    case NumericKind::float64:
+      return hit<DoubleNumbers>(subject, stiffness_n_per_mm, hit_mm_per_s, seconds, seed, ticks,
+                                watch);
+    case NumericKind::fixed:
+      break;
+  }
+  return hit<FixedNumbers>(subject, stiffness_n_per_mm, hit_mm_per_s, seconds, seed, ticks, watch);
+}
+
+}  // namespace kerf::zwidth

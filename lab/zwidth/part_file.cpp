@@ -1,0 +1,216 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "lab/zwidth/part_file.hpp"
+
+#include <algorithm>
+#include <filesystem>
+#include <optional>
+#include <sstream>
+#include <utility>
+
+#include "hil/hil_error.hpp"
+#include "shared/posix/new_file.hpp"
+#include "shared/text/json.hpp"
+
+namespace kerf::zwidth {
+namespace {
+
+Json json_of(const Crossing& crossing) {
+  return Json{
+      {"first", crossing.first_n_per_mm},  // null: never
+      {"re_entry", Json::List{crossing.re_entry_from_n_per_mm, crossing.re_entry_to_n_per_mm}}};
+}
+
+Crossing crossing_in(const Json& json) {
+  Crossing crossing;
+  if (!json.at("first").is_null()) crossing.first_n_per_mm = json.at("first").get<double>();
+  crossing.re_entry_from_n_per_mm = json.at("re_entry").at(0).get<double>();
+  crossing.re_entry_to_n_per_mm = json.at("re_entry").at(1).get<double>();
+  return crossing;
+}
+
+std::string line_of(std::size_t index, const Column& column) {
+  Json cells = Json::List{};
+  for (const Swing& cell : column.cells) {
+    cells.push_back(Json::List{cell.swings, cell.active, cell.travel_mm, cell.given_mj});
+  }
+  return Json{{"column", index},
+              {"cells", std::move(cells)},
+              {"swing", json_of(column.swing)},
+              {"energy", json_of(column.energy)}}
+      .canonical();
+}
+
+void take_line(const std::string& line, Part& part) {
+  const Json json = Json::parse(line);
+  Column column;
+  for (const Json& cell : json.at("cells")) {
+    column.cells.push_back({cell.at(0).get<bool>(), cell.at(1).get<bool>(),
+                            cell.at(2).get<double>(), cell.at(3).get<double>()});
+  }
+  column.swing = crossing_in(json.at("swing"));
+  column.energy = crossing_in(json.at("energy"));
+  part.columns[json.at("column").get<std::size_t>()] = std::move(column);
+}
+
+std::string head_of(const Part& part) {
+  const MapSpec& spec = part.spec;
+  Json axes = Json::Members{};
+  for (std::size_t i = 0; i < kAxisCount; ++i) {
+    if (!spec.table[i].empty()) axes[axis_kinds()[i].name] = spec.table[i];
+  }
+  return Json{{"kerf_zwidth", 1},
+              {"version", KERF_VERSION},
+              {"shard", Json::List{part.shard.index, part.shard.count}},
+              {"map", spec.mapped},
+              {"stiffness_n_per_mm", spec.stiffness_n_per_mm},
+              {"axes", std::move(axes)},
+              {"arm", spec.arm},
+              {"seconds", spec.seconds},
+              {"seed", spec.seed}}
+      .canonical();
+}
+
+void take_head(const std::string& line, Part& part) {
+  const Json json = Json::parse(line);
+  if (json.at("kerf_zwidth").get<int>() != 1) throw JsonError("kerf_zwidth is not 1");
+  if (json.at("version").get<std::string>() != KERF_VERSION) {
+    throw JsonError("of version " + json.at("version").get<std::string>() +
+                    ", this is " KERF_VERSION);
+  }
+  part.shard = {json.at("shard").at(0).get<std::size_t>(),
+                json.at("shard").at(1).get<std::size_t>()};
+  MapSpec& spec = part.spec;
+  spec.mapped = json.at("map").get<std::array<std::size_t, 2>>();
+  spec.stiffness_n_per_mm = json.at("stiffness_n_per_mm").get<std::vector<double>>();
+  for (const auto& [name, values] : json.at("axes").members()) {
+    spec.table[axis_named("axes", name)] = values.get<std::vector<std::string>>();
+  }
+  spec.arm = json.at("arm").get<bool>();
+  spec.seconds = json.at("seconds").get<double>();
+  spec.seed = json.at("seed").get<std::uint64_t>();
+}
+
+/// The same map, whatever the shard.
+std::string map_of(const Part& part) {
+  return head_of({part.spec, {}, {}});
+}
+
+std::string shard_text(const Shard& shard) {
+  return std::to_string(shard.index) + "/" + std::to_string(shard.count);
+}
+
+/// Why the columns of a part are not those of its shard; else empty.
+std::string gap_of(const Part& part, std::size_t column_count) {
+  std::size_t missing = 0, all = 0;
+  for (std::size_t i = 0; i < column_count; ++i) {
+    if (!part.shard.has(i)) continue;
+    ++all;
+    missing += part.columns.contains(i) ? 0 : 1;
+  }
+  if (missing == 0) return {};
+  return "has " + std::to_string(all - missing) + " of its " + std::to_string(all) +
+         " columns; run its shard " + shard_text(part.shard) + " again, it resumes";
+}
+
+}  // namespace
+
+std::string part_text(const Part& part) {
+  std::string text = head_of(part) + "\n";
+  for (const auto& [index, column] : part.columns) text += line_of(index, column) + "\n";
+  return text;
+}
+
+Part read_part(const std::string& path) {
+  std::ifstream in(path);
+  if (!in) throw HilError(path + ": cannot be read; name a part of a map (--part)");
+  Part part;
+  std::size_t number = 0;
+  try {
+    for (std::string line; std::getline(in, line); ++number) {
+      if (in.eof()) break;  // no end of line: not whole
+      if (number == 0) {
+        take_head(line, part);
+      } else {
+        take_line(line, part);
+      }
+    }
+  } catch (const JsonError& error) {
+    throw HilError(path + ": line " + std::to_string(number + 1) + " is none of a part of a map (" +
+                   error.what() + "); remove the file to begin anew");
+  }
+  if (number == 0) throw HilError(path + ": no part of a map; remove the file to begin anew");
+  const std::size_t count = part.spec.columns().size();
+  const bool fits = std::ranges::all_of(part.columns, [&](const auto& column) {
+    return column.first < count && part.shard.has(column.first);
+  });
+  if (part.shard.index < 1 || part.shard.index > part.shard.count || !fits) {
+    throw HilError(path + ": has columns that its shard " + shard_text(part.shard) +
+                   " has not; remove the file to begin anew");
+  }
+  return part;
+}
+
+Part merge_parts(const std::vector<std::string>& paths) {
+  Part whole;
+  std::map<std::size_t, std::string> seen;  // path by shard
+  for (const std::string& path : paths) {
+    const Part part = read_part(path);
+    if (seen.empty()) whole = {part.spec, part.shard, {}};
+    if (map_of(part) != map_of(whole) || part.shard.count != whole.shard.count) {
+      const std::string seeds = part.spec.seed == whole.spec.seed
+                                    ? std::string("other axes, hits or shards than ")
+                                    : "seed " + std::to_string(part.spec.seed) + ", not the " +
+                                          std::to_string(whole.spec.seed) + " of ";
+      throw HilError(path + ": " + seeds + paths.front() + "; merge shards of one map");
+    }
+    const auto [other, is_new] = seen.emplace(part.shard.index, path);
+    if (!is_new) {
+      throw HilError(path + ": shard " + shard_text(part.shard) + " again, as " + other->second +
+                     "; name each once");
+    }
+    const std::string gap = gap_of(part, part.spec.columns().size());
+    if (!gap.empty()) throw HilError(path + ": " + gap);
+    whole.columns.insert(part.columns.begin(), part.columns.end());
+  }
+  for (std::size_t i = 1; i <= whole.shard.count; ++i) {
+    if (seen.contains(i)) continue;
+    throw HilError("merge: shard " + std::to_string(i) + "/" + std::to_string(whole.shard.count) +
+                   " is missing; run it, or name its part");
+  }
+  whole.shard = {};
+  return whole;
+}
+
+PartWriter::PartWriter(std::string path, const MapSpec& spec, const Shard& shard)
+    : path_(std::move(path)), part_{spec, shard, {}} {
+  if (path_.empty()) return;
+  std::error_code error;
+  if (std::filesystem::exists(path_, error) && !is_stream(path_)) {
+    Part found = read_part(path_);
+    if (head_of(found) != head_of(part_)) {
+      throw HilError("--part " + path_ +
+                     ": has another map or shard; name another file, or remove it to begin anew");
+    }
+    part_.columns = std::move(found.columns);
+  }
+  // Also takes off a last line that is not whole.
+  write_new_file(path_, part_text(part_));
+  out_.open(path_, std::ios::app);
+  if (!out_) throw HilError("--part " + path_ + ": cannot be written; name another file");
+}
+
+void PartWriter::add(std::size_t index, Column column) {
+  if (!path_.empty()) {
+    out_ << line_of(index, column) << std::endl;
+    if (!out_) throw HilError("--part " + path_ + ": cannot be written; make room and run again");
+  }
+  part_.columns[index] = std::move(column);
+}
+
+void PartWriter::finish() {
+  if (path_.empty()) return;
+  out_.close();
+  write_new_file(path_, part_text(part_));
+}
+
+}  // namespace kerf::zwidth

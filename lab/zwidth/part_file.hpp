@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include "lab/zwidth/map.hpp"
+
+namespace kerf::zwidth {
+
+/// Part `index` of `count` of a map: the columns whose number leaves index - 1 when divided by
+/// count.
+struct Shard {
+  std::size_t index = 1, count = 1;
+
+  [[nodiscard]] bool has(std::size_t column) const { return column % count == index - 1; }
+};
+
+/// What a part file says: one line of JSON for the map, one for each column.
+struct Part {
+  MapSpec spec;
+  Shard shard;
+  Columns columns;
+};
+
+/// The text of a part with its columns in order: the same for the same content.
+[[nodiscard]] std::string part_text(const Part& part);
+
+/// Reads a part file; a last line that is not whole (of a run that was killed) is left out. Throws
+/// HilError that names `path`.
+[[nodiscard]] Part read_part(const std::string& path);
+
+/// Whole maps from the parts of all shards. Throws HilError where they are not of one map, or one
+/// or a column of one is missing, or twice there.
+[[nodiscard]] Part merge_parts(const std::vector<std::string>& paths);
+
+/// A part file while its columns come: each is on the disk before the next one is told. What the
+/// file already has of the same map is kept.
+class PartWriter {
+ public:
+  /// An empty path: nothing is written, and nothing was there. Throws HilError where the file has
+  /// another map, and where it cannot be written.
+  PartWriter(std::string path, const MapSpec& spec, const Shard& shard);
+
+  [[nodiscard]] const Columns& columns() const { return part_.columns; }
+  void add(std::size_t index, Column column);
+  /// Puts the lines into order.
+  void finish();
+
+ private:
+  std::string path_;
+  Part part_;
+  std::ofstream out_;
+};
+
+}  // namespace kerf::zwidth

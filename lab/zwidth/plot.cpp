@@ -1,0 +1,375 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "lab/zwidth/plot.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <functional>
+#include <sstream>
+
+#include "hil/hil_error.hpp"
+#include "lab/zwidth/tables.hpp"
+#include "shared/text/number.hpp"
+
+namespace kerf::zwidth {
+namespace {
+
+// Colours of Okabe and Ito, which differ for every kind of colour vision; cells are their light
+// shades.
+constexpr const char* kRests = "'#CFE8DC'";
+constexpr const char* kActive = "'#F7E3A1'";
+constexpr const char* kSwings = "'#F0B79B'";
+constexpr const char* kNone = "'#D9D9D9'";
+
+constexpr std::size_t kMostPanels = 12;
+constexpr int kPanelWidth = 560, kPanelHeight = 440, kFoot = 150;
+
+/// Where the values of an axis stand in a picture: numbers at their place, words one after another.
+class Scale {
+ public:
+  Scale(const MapSpec& spec, std::size_t axis) : axis_(axis) {
+    if (axis == kAxisCount) {
+      places_ = spec.stiffness_n_per_mm;
+      for (const double value : places_) texts_.push_back(number_text(value));
+    } else {
+      texts_ = spec.table[axis];
+      for (const std::string& text : texts_) {
+        places_.push_back(number_in(text).value_or(static_cast<double>(places_.size())));
+      }
+    }
+    words_ = axis < kAxisCount && axis_kinds()[axis].lowest == axis_kinds()[axis].highest;
+    if (words_) {
+      for (std::size_t i = 0; i < places_.size(); ++i) places_[i] = static_cast<double>(i);
+    }
+    log_ = axis == kAxisCount;
+  }
+
+  [[nodiscard]] std::size_t index(const std::string& text) const {
+    return static_cast<std::size_t>(std::ranges::find(texts_, text) - texts_.begin());
+  }
+  [[nodiscard]] double place(std::size_t i) const { return places_[i]; }
+  [[nodiscard]] double low(std::size_t i) const {
+    return i > 0 ? between(places_[i - 1], places_[i]) : beyond(i, i + 1);
+  }
+  [[nodiscard]] double high(std::size_t i) const {
+    return i + 1 < places_.size() ? between(places_[i], places_[i + 1]) : beyond(i, i - 1);
+  }
+  [[nodiscard]] std::size_t size() const { return places_.size(); }
+
+  void set(std::ostream& script, const char* axis) const {
+    script << "set " << axis << "label \"" << axis_label(axis_) << "\"\nset " << axis << "range ["
+           << low(0) << ":" << high(size() - 1) << "]\n";
+    script << (log_ ? "set logscale " : "unset logscale ") << axis << "\n";
+    if (!words_) {
+      script << "set " << axis << "tics autofreq\n";
+      return;
+    }
+    script << "set " << axis << "tics (";
+    for (std::size_t i = 0; i < size(); ++i) {
+      script << (i > 0 ? "," : "") << "\"" << texts_[i] << "\" " << i;
+    }
+    script << ")\n";
+  }
+
+ private:
+  [[nodiscard]] double between(double a, double b) const {
+    return log_ ? std::sqrt(a * b) : (a + b) / 2;
+  }
+  /// As far beyond value i as the border to its neighbour is on the other side.
+  [[nodiscard]] double beyond(std::size_t i, std::size_t neighbour) const {
+    const double at = places_[i];
+    if (size() == 1)
+      return log_ ? at * (neighbour > i ? 0.8 : 1.25) : at + (neighbour > i ? -0.5 : 0.5);
+    const double other = places_[neighbour];
+    return log_ ? at * std::sqrt(at / other) : at + (at - other) / 2;
+  }
+
+  std::size_t axis_;
+  std::vector<std::string> texts_;
+  std::vector<double> places_;
+  bool words_ = false, log_ = false;
+};
+
+/// One combination of the axes that are not mapped, and its columns.
+struct Panel {
+  std::string title;
+  std::vector<std::size_t> columns;
+};
+
+std::vector<Panel> panels_of(const Part& part) {
+  const std::vector<Assignment> columns = part.spec.columns();
+  std::vector<Panel> panels;
+  for (const auto& [index, column] : part.columns) {
+    std::string title;
+    for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
+      const bool mapped = std::ranges::find(part.spec.mapped, axis) != part.spec.mapped.end();
+      if (mapped || part.spec.table[axis].size() < 2) continue;
+      const AxisKind& kind = axis_kinds()[axis];
+      title += (title.empty() ? "" : ", ") + std::string(kind.name) + " " + columns[index][axis] +
+               (*kind.unit != 0 ? " " : "") + kind.unit;
+    }
+    const auto at = std::ranges::find(panels, title, &Panel::title);
+    if (at == panels.end()) {
+      panels.push_back({title, {index}});
+    } else {
+      at->columns.push_back(index);
+    }
+  }
+  if (panels.size() > kMostPanels) {
+    throw HilError(
+        "--plot: " + std::to_string(panels.size()) +
+        " panels, and a picture holds 12; give the axes that are not mapped fewer values");
+  }
+  return panels;
+}
+
+/// What is the same in all panels.
+std::string foot_of(const Part& part) {
+  Assignment first = part.spec.columns().front();
+  const auto varies = [&](AxisId axis) {
+    const std::size_t i = index_of(axis);
+    return part.spec.table[i].size() > 1;
+  };
+  const auto say = [&](AxisId axis, const char* before, const char* after) {
+    return varies(axis) ? std::string() : before + value_of(first, axis) + after + ", ";
+  };
+  const bool loops = varies(AxisId::loop) || varies(AxisId::device);
+  std::string text = say(AxisId::device, "", "");
+  if (!varies(AxisId::device)) {
+    text += say(AxisId::mass, "", " kg") + say(AxisId::viscous, "b ", " N s/mm");
+  }
+  if (!loops) {
+    text += say(AxisId::friction, "friction ", " N") + say(AxisId::quantum, "encoder ", " mm") +
+            say(AxisId::numeric, "", "") + say(AxisId::estimator, "speed by ", "");
+  }
+  text += say(AxisId::rate, "", " Hz") + say(AxisId::delay, "delay of periods ", "") +
+          say(AxisId::damping, "B ", " N s/mm") + say(AxisId::hand, "hand ", "");
+  return text + (part.spec.arm ? "whole arm, " : "one axis, ") + "hits: a push, 50 and 200 mm/s, " +
+         number_text(part.spec.seconds) + " s each, seed " + std::to_string(part.spec.seed);
+}
+
+void begin(std::ostream& script, std::size_t panels, int foot) {
+  const std::size_t across = std::min<std::size_t>(panels, panels == 4 ? 2 : 3);
+  const std::size_t down = (panels + across - 1) / across;
+  const int width = kPanelWidth * static_cast<int>(across) + (across == 1 ? 160 : 0);
+  const int height = kPanelHeight * static_cast<int>(down) + foot;
+  script.precision(7);
+  script << "set encoding utf8\nset terminal svg size " << width << ',' << height
+         << " dynamic font 'Helvetica,13' background rgb 'white'\n"
+            "set border 3 linecolor rgb '#555555' front\n"
+            "set tics nomirror out textcolor rgb '#333333'\n"
+            "set multiplot layout "
+         << down << ',' << across << " margins screen " << 95.0 / width << "," << 1 - 25.0 / width
+         << "," << (foot + 60.0) / height << "," << 1 - 45.0 / height << " spacing screen "
+         << 95.0 / width << "," << 90.0 / height << "\n";
+}
+
+void data(std::ostream& script, const char* name, const std::function<void()>& rows) {
+  script << '$' << name << " << EOD\n";
+  rows();
+  script << "EOD\n";
+}
+
+/// The verdicts of a panel as boxes, and its boundaries as lines.
+void draw_verdicts(std::ostream& script, const Part& part, const Panel& panel, const Scale& x,
+                   const Scale& y, std::size_t x_axis) {
+  const std::vector<Assignment> columns = part.spec.columns();
+  const auto boxes = [&](const char* name, const auto& belongs) {
+    data(script, name, [&] {
+      script << "-1e9 1 -1e9 -1e9 1 1\n";  // gnuplot refuses a block without a row
+      for (const std::size_t c : panel.columns) {
+        const Column& column = part.columns.at(c);
+        const std::size_t i = x.index(columns[c][x_axis]);
+        for (std::size_t k = 0; k < y.size(); ++k) {
+          if (!belongs(column, k)) continue;
+          script << x.place(i) << ' ' << y.place(k) << ' ' << x.low(i) << ' ' << x.high(i) << ' '
+                 << y.low(k) << ' ' << y.high(k) << '\n';
+        }
+      }
+    });
+  };
+  const auto seen = [](const Column& column) { return !column.cells.empty(); };
+  boxes("rests", [&](const Column& c, std::size_t k) {
+    return seen(c) && !c.cells[k].swings && !c.cells[k].active;
+  });
+  boxes("active", [&](const Column& c, std::size_t k) {
+    return seen(c) && !c.cells[k].swings && c.cells[k].active;
+  });
+  boxes("swings", [&](const Column& c, std::size_t k) { return seen(c) && c.cells[k].swings; });
+  boxes("none", [&](const Column& c, std::size_t) { return !seen(c); });
+  data(script, "lines", [&] {
+    for (const std::size_t c : panel.columns) {
+      const Column& column = part.columns.at(c);
+      const Analytic analytic = analytic_of(subject_of(columns[c]));
+      const auto shown = [&](double value) {
+        return value > 0 && std::isfinite(value) ? number_text(value) : std::string("NaN");
+      };
+      const bool is = seen(column);
+      script << x.place(x.index(columns[c][x_axis])) << ' ' << shown(analytic.exact) << ' '
+             << shown(analytic.passive) << ' ' << shown(analytic.quantum) << ' '
+             << shown(is ? column.swing.first_n_per_mm : 0) << ' '
+             << shown(is ? column.energy.first_n_per_mm : 0) << '\n';
+    }
+  });
+  const auto box = [](const char* name, const char* colour) {
+    return std::string("$") + name +
+           " using 1:2:3:4:5:6 notitle with boxxyerror fillstyle solid noborder linecolor rgb " +
+           colour + ", \\\n  ";
+  };
+  script << "plot " << box("rests", kRests) << box("active", kActive) << box("swings", kSwings)
+         << box("none", kNone)
+         << "$lines using 1:2 notitle with lines linewidth 2.5 linecolor rgb '#000000', \\\n"
+            "  $lines using 1:3 notitle with linespoints pointtype 2 linewidth 2 dashtype 2 "
+            "linecolor rgb '#0072B2', "
+            "\\\n"
+            "  $lines using 1:4 notitle with lines linewidth 2 dashtype 4 linecolor rgb '#009E73', "
+            "\\\n"
+            "  $lines using 1:5 notitle with linespoints linewidth 1.5 pointtype 7 pointsize 0.5 "
+            "linecolor rgb '#D55E00', \\\n"
+            "  $lines using 1:6 notitle with points pointtype 6 pointsize 0.8 linecolor rgb "
+            "'#AA4499'\n";
+}
+
+/// The highest stiffness of every cell as a colour, and as a number where there is room.
+void draw_heights(std::ostream& script, const Part& part, const Panel& panel, const Scale& x,
+                  const Scale& y) {
+  const std::vector<Assignment> columns = part.spec.columns();
+  const std::vector<double>& stiffness = part.spec.stiffness_n_per_mm;
+  data(script, "cells", [&] {
+    for (const std::size_t c : panel.columns) {
+      const Column& column = part.columns.at(c);
+      if (column.cells.empty()) continue;
+      const std::size_t i = x.index(columns[c][part.spec.mapped[0]]);
+      const std::size_t j = y.index(columns[c][part.spec.mapped[1]]);
+      const double first =
+          std::clamp(column.swing.first_n_per_mm, stiffness.front() / 2, stiffness.back() * 2);
+      script << x.place(i) << ' ' << y.place(j) << ' ' << x.low(i) << ' ' << x.high(i) << ' '
+             << y.low(j) << ' ' << y.high(j) << ' ' << first << '\n';
+    }
+  });
+  script << "set logscale cb\nset cbrange [" << stiffness.front() << ":" << stiffness.back()
+         << "]\nset cblabel 'highest stiffness that comes to rest (N/mm)'\n"
+            "set palette defined (0 '#F0B79B', 0.5 '#F7E3A1', 1 '#8CC8B0')\n"
+            "plot $cells using 1:2:3:4:5:6:7 notitle with boxxyerror fillstyle solid noborder "
+            "linecolor palette";
+  constexpr std::size_t kMostNumbers = 14;
+  if (x.size() <= kMostNumbers && y.size() <= kMostNumbers) {
+    script << ", $cells using 1:2:(sprintf('%.2g', $7)) notitle with labels";
+  }
+  script << "\n";
+}
+
+/// Under the panels: what colours and lines mean, drawn with the last of them.
+void draw_legend(std::ostream& script, const Part& part, bool verdicts, double height) {
+  const auto line = [&](int row) { return (kFoot - 30.0 - 24 * row) / height; };
+  script << "set label \"" << foot_of(part) << "\" at screen 0.02, screen " << line(4)
+         << " left noenhanced font ',11' textcolor rgb '#555555'\n";
+  if (!verdicts) return;
+  struct Item {
+    const char* text;
+    const char* style;
+    double x;
+    int row;
+  };
+  const Item items[] = {
+      {"comes to rest", "pointtype 5 pointsize 2 linecolor rgb '#9CCFB8'", 0.03, 0},
+      {"rests, but the wall goes on giving energy",
+       "pointtype 5 pointsize 2 linecolor rgb '#F0D060'", 0.03, 1},
+      {"swings on (a limit cycle, or worse)", "pointtype 5 pointsize 2 linecolor rgb '#F0B79B'",
+       0.03, 2},
+      {"not stable even without a wall", "pointtype 5 pointsize 2 linecolor rgb '#D9D9D9'", 0.03,
+       3},
+      {"measured: first swing", "pointtype 7 pointsize 0.9 linecolor rgb '#D55E00'", 0.40, 0},
+      {"measured: first energy that goes on", "pointtype 6 pointsize 1 linecolor rgb '#AA4499'",
+       0.40, 1},
+  };
+  for (const Item& item : items) {
+    script << "set label \"" << item.text << "\" at screen " << item.x << ", screen "
+           << line(item.row) << " left point " << item.style << " offset 1.2,0\n";
+  }
+  const Item lines[] = {
+      {"linear loop, exact (no friction, no encoder steps)",
+       "linewidth 2.5 linecolor rgb '#000000'", 0.65, 0},
+      {"passive: stable with any hand", "linewidth 2 dashtype 2 linecolor rgb '#0072B2'", 0.65, 1},
+      {"friction swallows encoder steps (for B = 0)",
+       "linewidth 2 dashtype 4 linecolor rgb '#009E73'", 0.65, 2},
+  };
+  for (const Item& item : lines) {
+    script << "set arrow from screen " << item.x - 0.01 << ", screen " << line(item.row)
+           << " to screen " << item.x + 0.025 << ", screen " << line(item.row) << " nohead "
+           << item.style << "\nset label \"" << item.text << "\" at screen " << item.x + 0.033
+           << ", screen " << line(item.row) << " left\n";
+  }
+}
+
+}  // namespace
+
+std::string axis_label(std::size_t axis) {
+  if (axis == kAxisCount) return "stiffness of the wall, K (N/mm)";
+  const AxisKind& kind = axis_kinds()[axis];
+  switch (static_cast<AxisId>(axis)) {
+    case AxisId::damping:
+      return "damping of the wall, B (N s/mm)";
+    case AxisId::delay:
+      return "delay from reading to force (periods)";
+    case AxisId::quantum:
+      return "step of the encoders at the tip (mm)";
+    case AxisId::friction:
+      return "Coulomb friction of the device (N)";
+    default:
+      return std::string(kind.name) + (*kind.unit != 0 ? std::string(" (") + kind.unit + ")" : "");
+  }
+}
+
+std::string plot_of(const Part& part) {
+  const std::vector<Panel> panels = panels_of(part);
+  std::size_t x_axis = part.spec.mapped[0], y_axis = part.spec.mapped[1];
+  if (x_axis == kAxisCount) std::swap(x_axis, y_axis);
+  const bool verdicts = y_axis == kAxisCount;
+  const Scale x(part.spec, x_axis), y(part.spec, y_axis);
+  std::ostringstream script;
+  begin(script, panels.size(), kFoot);
+  const std::size_t across = std::min<std::size_t>(panels.size(), panels.size() == 4 ? 2 : 3);
+  const std::size_t down = (panels.size() + across - 1) / across;
+  draw_legend(script, part, verdicts, kPanelHeight * static_cast<double>(down) + kFoot);
+  for (const Panel& panel : panels) {
+    script << "set title \"" << panel.title << "\" noenhanced\n";
+    x.set(script, "x");
+    y.set(script, "y");
+    if (verdicts) {
+      draw_verdicts(script, part, panel, x, y, x_axis);
+    } else {
+      draw_heights(script, part, panel, x, y);
+    }
+    script << "unset label\nunset arrow\n";
+  }
+  script << "unset multiplot\n";
+  return script.str();
+}
+
+std::string plot_of(const std::vector<Portrait>& portraits) {
+  constexpr const char* kHitLines[] = {"'#0072B2'", "'#D55E00'", "'#009E73'"};
+  std::ostringstream script;
+  begin(script, portraits.size(), 20);
+  script << "set xlabel 'place of the tip, wall at 0 (mm)'\nset ylabel 'speed (mm/s)'\n"
+            "set grid back linecolor rgb '#dddddd'\nset key right top samplen 2\n";
+  for (const Portrait& portrait : portraits) {
+    for (std::size_t h = 0; h < portrait.hits.size(); ++h) {
+      data(script, ("hit" + std::to_string(h)).c_str(), [&] {
+        for (const OneAxisTick& tick : portrait.hits[h]) {
+          script << tick.tip_mm << ' ' << tick.mm_per_s << '\n';
+        }
+      });
+    }
+    script << "set title \"" << portrait.title << "\" noenhanced\nplot ";
+    for (std::size_t h = portrait.hits.size(); h-- > 0;) {
+      script << "$hit" << h << " using 1:2 title '"
+             << (h == 0 ? "push" : number_text(kHitsMmPerS[h]) + " mm/s")
+             << "' with lines linecolor rgb " << kHitLines[h] << (h > 0 ? ", " : "\n");
+    }
+  }
+  script << "unset multiplot\n";
+  return script.str();
+}
+
+}  // namespace kerf::zwidth
