@@ -41,10 +41,10 @@ struct WallSwing {
 /// out of the wall. The loop's motion stops where it is far beyond any device (1 m).
 template <class Law>
 [[nodiscard]] WallSwing push_on_wall(const SampledLoop& loop, Law&& force_n,
-                                     const WallPush& push = {}) noexcept {
+                                     const WallPush& push = {}) {
   constexpr double kLostMm = 1000;
   OneAxis axis(loop);
-  axis.start(push.from_mm, 0);
+  axis.start(push.from_mm);
   WallSwing swing;
   swing.quantum_mm = loop.quantum_mm;
   const auto ticks = static_cast<long>(push.seconds / loop.period_s);
@@ -65,8 +65,7 @@ template <class Law>
 
 /// The same against the sampled wall.
 [[nodiscard]] inline WallSwing push_on_wall(const SampledLoop& loop, double stiffness_n_per_mm,
-                                            double damping_ns_per_mm,
-                                            const WallPush& push = {}) noexcept {
+                                            double damping_ns_per_mm, const WallPush& push = {}) {
   SampledWall wall(loop, stiffness_n_per_mm, damping_ns_per_mm);
   wall.start(push.from_mm);
   return push_on_wall(

@@ -8,7 +8,7 @@
 #include "controller/servo/contact_plan.hpp"
 #include "controller/servo/force_limits.hpp"
 #include "controller/servo/velocity_window.hpp"
-#include "lab/zwidth/one_axis_plant.hpp"
+#include "controller/stability/one_axis_plant.hpp"
 #include "shared/numeric/numbers.hpp"
 
 namespace kerf::zwidth {
