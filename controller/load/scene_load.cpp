@@ -79,6 +79,7 @@ void apply_overrides(const SceneOverrides& overrides, Scene& scene) {
   }
   scene.servo.rate_hz = overrides.rate_hz.value_or(scene.servo.rate_hz);
   scene.servo.numeric = overrides.numeric.value_or(scene.servo.numeric);
+  scene.force.unchecked_gain = scene.force.unchecked_gain || overrides.unchecked_gain;
   if (overrides.personality && *overrides.personality != scene.device.personality) {
     scene.device.personality = *overrides.personality;
     scene.device.torque_scale.reset();  // of another device's motors

@@ -20,6 +20,7 @@ struct SceneOverrides {
   std::optional<Personality> personality{};             ///< --device; torque_scale counts no more
   std::optional<std::array<double, 3>> torque_scale{};  ///< --torque-scale a,b,c
   std::optional<VoxelGrid> phantom_size{};              ///< every phantom, for tests and the lab
+  bool unchecked_gain = false;                          ///< --unchecked-gain
   int read_cpu_s = kReadCpuSeconds;                     ///< --read-seconds, of each file
 };
 

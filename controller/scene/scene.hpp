@@ -60,6 +60,12 @@ inline constexpr int kMinRateHz = 250;            // slower than the hand can be
 inline constexpr int kMaxRateHz = 8000;           // one tick per cycle of the FireWire bus
 inline constexpr std::size_t kMaxMaterials = 32;  // labels are small indices
 
+// Gains that all number types of the loop hold with room to spare: in fixed point a stiffness ends
+// at 128 N/mm, a damping at 2 N s/mm. What a device bears is a matter of its port.
+inline constexpr double kMinStiffnessNPerMm = 0.001;
+inline constexpr double kMaxStiffnessNPerMm = 100;
+inline constexpr double kMaxDampingNsPerMm = 1;
+
 /// The `file` of a [[volume]] that is computed instead of read.
 inline constexpr std::string_view kPhantomFile = "phantom";
 
@@ -114,6 +120,7 @@ struct ForceSettings {
   double friction = 0.0;
   LawChoice law{LawKind::force, "", {}};              ///< none: the coupling
   LawChoice stabiliser{LawKind::stabiliser, "", {}};  ///< none
+  bool unchecked_gain = false;  ///< a loop that its device's model calls unstable is no mistake
 };
 
 /// [cut]

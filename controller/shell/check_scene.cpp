@@ -76,7 +76,7 @@ std::string border_line(const SceneVolume& volume) {
   return text;
 }
 
-void print_scene(const LoadedScene& scene, const SceneCosts& costs) {
+void print_scene(const LoadedScene& scene, const SceneCosts& costs, const GainMargin& margin) {
   std::printf("scene=%s\n", scene.path.c_str());
   for (const SceneVolume& v : scene.volumes) {
     const auto& g = v.image.grid;
@@ -100,6 +100,7 @@ void print_scene(const LoadedScene& scene, const SceneCosts& costs) {
   std::printf("force=%s\ncut=%s\n", std::string(word_of(scene.force.model)).c_str(),
               std::string(word_of(scene.cut.model)).c_str());
   std::printf("stiffness_at_device_n_per_mm=%g\n", device_stiffness_n_per_mm(scene));
+  std::fputs(gain_lines(scene, margin).c_str(), stdout);
   const std::size_t costliest = costliest_tool(costs);
   std::printf("costliest_tool=%s\nhighest_rate_hz=%d\n", scene.tools[costliest].name.c_str(),
               highest_rate_hz(work_us(costs, costliest)));
@@ -122,7 +123,8 @@ void explain_scene(const ControllerOptions& options, LoadedScene& scene, Compile
   const Explanation explanation = explain(scene, servo, segment);
   std::fputs(explanation_text(explanation).c_str(), stdout);
   if (!options.report.empty()) write_new_file(options.report, explanation_json(explanation));
-  const std::string refusal = over_budget(scene, servo.costs());
+  std::string refusal = over_budget(scene, servo.costs());
+  if (refusal.empty() && !options.virtual_time) refusal = gain_refusal(scene, explanation.gain);
   if (!refusal.empty()) throw std::runtime_error(refusal);
 }
 

@@ -5,6 +5,7 @@
 
 #include "controller/load/loaded_scene.hpp"
 #include "controller/plan/compile.hpp"
+#include "controller/plan/cost/gain_margin.hpp"
 #include "controller/plan/scene_costs.hpp"
 #include "controller/shell/controller_options.hpp"
 
@@ -22,10 +23,11 @@ namespace kerf {
 
 /// Prints what --check tells: whatever can be said without memory for the loop, one `name=value` a
 /// line, and then every setting in effect as `table.key=value`.
-void print_scene(const LoadedScene& scene, const SceneCosts& costs);
+void print_scene(const LoadedScene& scene, const SceneCosts& costs, const GainMargin& margin);
 
 /// `--explain`: prints what the scene costs on this machine; it is not run. Throws
-/// std::runtime_error with one line for a scene above the budget, after all is told.
+/// std::runtime_error with one line for a scene above the budget or its device's stability, after
+/// all is told.
 void explain_scene(const ControllerOptions& options, LoadedScene& scene, CompiledScene& servo);
 
 }  // namespace kerf

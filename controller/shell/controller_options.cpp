@@ -99,6 +99,9 @@ void declare_run_options(Arguments& app, ControllerOptions& options, Raw& raw) {
   app.option("--name", options.name, "name under which readers find the segment").shows_default();
   app.flag("--virtual", options.virtual_time,
            "lock-step with the device, no clock: the same input gives the same bits");
+  app.flag("--unchecked-gain", options.unchecked_gain,
+           "give a real device a stiffness and damping above its own bounds or stability; the "
+           "limits of force stay");
   app.flag("--strict", options.real_time.strict, "refuse to start without every real-time right");
   app.flag("--guard", options.guard,
            "an unexpected system call of the servo thread switches the motors off and ends it");
@@ -204,6 +207,7 @@ std::optional<int> parse_options(int argc, const char* const* argv, ControllerOp
     return 2;
   }
   override_scene(raw, options.overrides);
+  options.overrides.unchecked_gain = options.unchecked_gain;
   return std::nullopt;
 }
 

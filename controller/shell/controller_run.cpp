@@ -13,6 +13,7 @@
 #include "controller/load/scene_json.hpp"
 #include "controller/load/scene_load.hpp"
 #include "controller/plan/compile.hpp"
+#include "controller/plan/cost/gain_margin.hpp"
 #include "controller/plan/cost/work_budget.hpp"
 #include "controller/scene/scene.hpp"
 #include "controller/scene/scene_file.hpp"
@@ -32,7 +33,6 @@ namespace kerf {
 namespace {
 
 constexpr int kPortPatienceMs = 5000;
-constexpr double kStableNPerMm = 0.7;  // CHAI3D's cap for the Omni; a stiffer contact is warned of
 
 const char* text_of(EndReason end) {
   switch (end) {
@@ -90,6 +90,18 @@ void check_budget(const ControllerOptions& options, const LoadedScene& scene,
   if (!refusal.empty()) throw std::runtime_error(refusal);
 }
 
+/// In lock-step nobody holds the device: any gain may be studied.
+void check_gains(const ControllerOptions& options, const LoadedScene& scene) {
+  if (options.virtual_time) return;
+  const std::string above = options.unchecked_gain ? "" : above_device(scene);
+  if (!above.empty()) throw std::runtime_error(above);
+  const GainMargin margin = gain_margin(scene, PlayFriction::where_it_decides);
+  const std::string refusal = gain_refusal(scene, margin);
+  if (!refusal.empty()) throw std::runtime_error(refusal);
+  const std::string warning = gain_warning(scene, margin);
+  if (!warning.empty()) log_warning(warning);
+}
+
 /// What is written at the end is refused now.
 void check_places(const ControllerOptions& options) {
   if (!options.report.empty()) check_new_file(options.report);
@@ -106,15 +118,7 @@ void check_run(const ControllerOptions& options, const LoadedScene& scene,
   }
   check_budget(options, scene, costs);
   check_places(options);
-  if (const double stiffness = device_stiffness_n_per_mm(scene); stiffness > kStableNPerMm) {
-    const bool paper = scene.force.model == ForceModel::paper;
-    char text[160];
-    std::snprintf(text, sizeof text,
-                  "contact is %.3g N/mm stiff at the device, an Omni bears %.3g: it will tremble; "
-                  "lower force.%s",
-                  stiffness, kStableNPerMm, paper ? "p0_n_per_mm2" : "stiffness_n_per_mm");
-    log_warning(text);
-  }
+  check_gains(options, scene);
   if (!scene.device.torque_scale) {
     const auto kind = static_cast<std::size_t>(scene.device.personality);
     log_warning("device.torque_scale is not set for " + std::string(kPersonalityWords[kind]) +
@@ -150,8 +154,11 @@ int run_controller(const ControllerOptions& options) {
   if (options.check) {
     check_hand_script(scene);
     check_places(options);
-    print_scene(scene, servo->costs());
+    const GainMargin margin = gain_margin(scene);
+    print_scene(scene, servo->costs(), margin);
     check_budget(options, scene, servo->costs());
+    const std::string refusal = options.virtual_time ? "" : gain_refusal(scene, margin);
+    if (!refusal.empty()) throw std::runtime_error(refusal);
     return 0;
   }
   if (options.explain) {

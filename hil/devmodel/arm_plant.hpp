@@ -8,6 +8,7 @@
 #include "hil/devmodel/hand_script.hpp"
 #include "hil/devmodel/motor_chain.hpp"
 #include "hil/devmodel/plant_params.hpp"
+#include "hil/devmodel/reported_joints.hpp"
 #include "hil/devmodel/rotors.hpp"
 #include "shared/numeric/vec.hpp"
 
@@ -58,10 +59,11 @@ struct PlantState {
 /// The mechanics that all devices share: motors, an arm, its tip and the hand that holds it, in
 /// fixed steps and without a clock.
 ///
-/// Per cycle: delay and lag of the motors, then four steps of torque to tip force, mass, friction,
-/// hand spring and end stops. Weight counts as balanced. `Arm` knows its geometry: `tip_mm`,
-/// `joints_rad`, `tip_force_n` (J^-T torque), `joint_rates` (J^-1 velocity), `stop_at_limits`. One
-/// thread; never allocates; the same calls give the same numbers, bit for bit on one machine.
+/// Per cycle: delay and lag of the motors (and of what is reported), then four steps of torque to
+/// tip force, mass, friction, hand spring and end stops. Weight counts as balanced. `Arm` knows its
+/// geometry: `tip_mm`, `joints_rad`, `tip_force_n` (J^-T torque), `joint_rates` (J^-1 velocity),
+/// `stop_at_limits`. One thread; never allocates; the same calls give the same numbers, bit for bit
+/// on one machine.
 template <class Arm>
 class ArmPlant {
  public:
@@ -74,6 +76,7 @@ class ArmPlant {
         hand_stiffness_(params.hand_stiffness_n_per_mm),
         hand_damping_(params.hand_damping_ns_per_mm),
         rotors_(params, rest_rad),
+        reported_(params.input_delay_cycles, rest_rad),
         rest_{rest_rad, arm.tip_mm(rest_rad)},
         target_mm_(rest_.tip_mm) {
     state_.pose = rest_;
@@ -84,9 +87,13 @@ class ArmPlant {
   [[nodiscard]] const Arm& arm() const noexcept { return arm_; }
   [[nodiscard]] const PlantState& state() const noexcept { return state_; }
   [[nodiscard]] const ArmPose& rest() const noexcept { return rest_; }
-  /// Joint angles as the encoders see them.
+  /// Joint angles as a report of this moment tells them: by the encoders ...
   [[nodiscard]] JointVec<double> encoder_rad() const noexcept {
-    return rotors_.seen_rad(state_.pose.q);
+    return reported_.old_or(&JointReadings::encoder_rad, rotors_.seen_rad(state_.pose.q));
+  }
+  /// ... and of the links.
+  [[nodiscard]] JointVec<double> link_rad() const noexcept {
+    return reported_.old_or(&JointReadings::link_rad, state_.pose.q);
   }
 
   /// One bus cycle.
@@ -106,6 +113,7 @@ class ArmPlant {
       }
     }
     target_mm_ = goal;
+    reported_.take({rotors_.seen_rad(state_.pose.q), state_.pose.q});
   }
 
  private:
@@ -144,6 +152,7 @@ class ArmPlant {
   double hand_stiffness_;  ///< N/mm
   double hand_damping_;    ///< N s/mm
   Rotors rotors_;
+  ReportedJoints reported_;
   ArmPose rest_;
   DeviceVec<double> target_mm_;
   PlantState state_;

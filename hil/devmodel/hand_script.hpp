@@ -7,6 +7,7 @@
 #include <optional>
 #include <vector>
 
+#include "hil/devmodel/plant_keys.hpp"
 #include "shared/numeric/vec.hpp"
 
 namespace kerf {
@@ -42,6 +43,7 @@ struct HandScript {
   std::array<double, 3> start{0, 5, 0};  ///< first point above the surface
   std::vector<HandStep> steps;
   std::optional<std::size_t> repeat_from;  ///< after the last step go on here; none: stay
+  PlantValues plant;                       ///< of the device and the hand that the script is for
 };
 
 /// How a hand gets a device from rest to the start of a script. Device mm and seconds.

@@ -39,15 +39,14 @@ class MotorChain {
   JointVec<double> applied_nmm_;
   JointVec<double> torque_nmm_;
   int cycles_since_command_ = 0;
-  std::array<JointVec<double>, kMaxOutputDelayCycles + 1> delayed_nmm_{};
+  std::array<JointVec<double>, kMaxDelayCycles + 1> delayed_nmm_{};
   std::size_t delay_head_ = 0;
 };
 
 inline MotorChain::MotorChain(const PlantParams& params) noexcept
     : on_silence_(params.on_silence),
       silence_cycles_(params.silence_cycles),
-      delay_(static_cast<std::size_t>(
-          std::clamp(params.output_delay_cycles, 0, kMaxOutputDelayCycles))),
+      delay_(static_cast<std::size_t>(std::clamp(params.output_delay_cycles, 0, kMaxDelayCycles))),
       lag_decay_(params.current_lag_s > 0 ? std::exp(-kStepS / params.current_lag_s) : 0.0) {}
 
 inline void MotorChain::command(JointVec<double> torque_nmm) noexcept {

@@ -63,7 +63,7 @@ OmniReport OmniModel::next_report() noexcept {
   const JointVec<double> seen = plant_.encoder_rad();
   const JointVec<double>& dock = plant_.rest().q;
   const std::array<double, 3> turned{seen.x - dock.x, seen.y - dock.y, seen.z - dock.z};
-  const std::array<double, 3> gimbal{orientation_rad_[0], joints_rad().z + orientation_rad_[1],
+  const std::array<double, 3> gimbal{orientation_rad_[0], plant_.link_rad().z + orientation_rad_[1],
                                      orientation_rad_[2]};
   OmniReport report;
   for (std::size_t i = 0; i < 3; ++i) {

@@ -10,7 +10,7 @@ namespace kerf {
 /// What a device does with its motors when host packets stop.
 enum class OnSilence : std::uint8_t { hold_torque, drop_torque };
 
-inline constexpr int kMaxOutputDelayCycles = 64;
+inline constexpr int kMaxDelayCycles = 64;  // 8 ms
 
 /// What every arm has, and the hand that holds it. Defaults are plausible ones for an Omni, to be
 /// swept; none is a claim about a unit.
@@ -29,7 +29,8 @@ struct PlantParams {
 
   std::array<double, 3> torque_nmm_per_count{0.342, 0.342, 0.342};  ///< 0.70 N m at full scale
   double current_lag_s = 0;     ///< time constant of the current loop; 0 = none
-  int output_delay_cycles = 0;  ///< 0..kMaxOutputDelayCycles
+  int output_delay_cycles = 0;  ///< 0..kMaxDelayCycles, from a command to its torque
+  int input_delay_cycles = 0;   ///< the same from the joints to what is reported of them
   OnSilence on_silence = OnSilence::hold_torque;
   int silence_cycles = 800;  ///< 100 ms without a command count as silence
 

@@ -11,6 +11,7 @@
 
 #include "shared/posix/cores.hpp"
 #include "shared/posix/monotonic_clock.hpp"
+#include "shared/wire/turn.hpp"
 
 namespace kerf {
 namespace {
@@ -26,6 +27,18 @@ void send(PacketLink& client, PacketDevice& device, FrontStats& stats) noexcept 
     if (sent == PacketLink::Sent::yes) ++stats.sent;
     if (sent == PacketLink::Sent::full) ++stats.dropped;
   }
+}
+
+/// All that is due as one turn, which may be none.
+void send_turn(PacketLink& client, PacketDevice& device, FrontStats& stats) noexcept {
+  Turn turn;
+  std::uint64_t packets = 0;
+  for (auto packet = device.next_packet(); !packet.empty(); packet = device.next_packet()) {
+    ++(turn.add(packet) ? packets : stats.dropped);
+  }
+  const PacketLink::Sent sent = client.send(turn.bytes());
+  if (sent == PacketLink::Sent::yes) stats.sent += packets;
+  if (sent == PacketLink::Sent::full) stats.dropped += packets;
 }
 
 }  // namespace
@@ -77,17 +90,21 @@ void serve_real_time(PacketLink& client, PacketDevice& device, int packet_cycles
   }
 }
 
-void serve_lockstep(PacketLink& client, PacketDevice& device, int tick_cycles,
+void serve_lockstep(PacketLink& client, PacketDevice& device, const LockStepTurns& turns,
                     const ServeLimits& limits, FrontStats& stats) {
   Buffer buffer;
-  send(client, device, stats);
+  const auto say = [&] {
+    if (turns.says_nothing_came) return send_turn(client, device, stats);
+    send(client, device, stats);
+  };
+  if (turns.speaks_first || !turns.says_nothing_came) say();
   while (!client.closed() && !limits.reached(stats.cycles)) {
     const auto packet = client.wait(buffer, kStopCheckMs);
     if (packet.empty()) continue;
     device.receive(packet);
-    device.advance(tick_cycles);
-    stats.cycles += tick_cycles;
-    send(client, device, stats);
+    device.advance(turns.tick_cycles);
+    stats.cycles += turns.tick_cycles;
+    say();
   }
 }
 

@@ -86,10 +86,19 @@ struct FrontStats {
 void serve_real_time(PacketLink& client, PacketDevice& device, int packet_cycles,
                      const ServeLimits& limits, FrontStats& stats);
 
+/// How a lock-step run takes its turns.
+struct LockStepTurns {
+  int tick_cycles = 8;  ///< bus cycles of a tick
+  /// All packets of a tick go as one turn (turn.hpp), an empty one where nothing is due: for
+  /// devices whose packets a fault may keep back or double. Only kerf's own controller reads turns.
+  bool says_nothing_came = false;
+  bool speaks_first = true;  ///< the device, before any packet of the host
+};
+
 /// Serves one client in lock-step: one packet at once (of a device that speaks first), then for
-/// every packet of the host `tick_cycles` bus cycles and the packet that is due then. No clock: the
-/// same host sees the same bytes.
-void serve_lockstep(PacketLink& client, PacketDevice& device, int tick_cycles,
+/// every packet of the host one tick and the packets that are due then. No clock: the same host
+/// sees the same bytes.
+void serve_lockstep(PacketLink& client, PacketDevice& device, const LockStepTurns& turns,
                     const ServeLimits& limits, FrontStats& stats);
 
 /// A device that a kernel drives through one descriptor: requests come, answers and what the device

@@ -34,22 +34,25 @@ FaultScript faults_of(const EmulatorOptions& o) {
 
 /// What any device takes from the command line.
 template <class Params>
-Params plant_of(const EmulatorOptions& o) {
+Params plant_of(const EmulatorOptions& o, const PlantValues& of_script) {
   Params params;
-  params.joint_inertia_kg_m2.fill(o.joint_inertia_kg_m2);
-  params.mode_hz = o.mode_hz;
+  take_plant(of_script, params);
+  take_plant(o.plant, params);
+  if (params.mode_hz > 0 && params.joint_inertia_kg_m2[0] <= 0) {
+    throw HilError("--mode-hz: without inertia nothing rings; give --joint-inertia, such as 1e-4");
+  }
   if (o.drop_torque) params.on_silence = OnSilence::drop_torque;
   return params;
 }
 
 }  // namespace
 
-std::unique_ptr<DeviceModel> make_device(const EmulatorOptions& o) {
+std::unique_ptr<DeviceModel> make_device(const EmulatorOptions& o, const PlantValues& of_script) {
   switch (o.personality) {
     case Personality::falcon:
-      return std::make_unique<FalconModel>(plant_of<FalconParams>(o));
+      return std::make_unique<FalconModel>(plant_of<FalconParams>(o, of_script));
     case Personality::woodenhaptics: {
-      auto params = plant_of<WoodenParams>(o);
+      auto params = plant_of<WoodenParams>(o, of_script);
       params.packet_bytes = o.packet_bytes;
       params.wireless_button = o.wireless_button;
       return std::make_unique<WoodenModel>(params);
@@ -57,7 +60,7 @@ std::unique_ptr<DeviceModel> make_device(const EmulatorOptions& o) {
     case Personality::omni:
       break;
   }
-  auto params = plant_of<OmniParams>(o);
+  auto params = plant_of<OmniParams>(o, of_script);
   params.pot_noise = o.pot_noise;
   params.seed = o.seed;
   return std::make_unique<OmniModel>(params);
@@ -74,7 +77,7 @@ void EmulatedDevice::renew() {
     withheld_ = withheld();
   }
   faulty_.reset();
-  emulator_.emplace(make_device(options_), hand_);
+  emulator_.emplace(make_device(options_, hand_ ? hand_->plant : PlantValues{}), hand_);
   faulty_.emplace(*emulator_, faults_);
 }
 

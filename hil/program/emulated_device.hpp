@@ -14,8 +14,10 @@
 
 namespace kerf {
 
-/// The device model that the options describe.
-[[nodiscard]] std::unique_ptr<DeviceModel> make_device(const EmulatorOptions& options);
+/// The device model that the options describe, and where they say nothing of its plant, the hand
+/// script. Throws `HilError` for a plant that cannot be.
+[[nodiscard]] std::unique_ptr<DeviceModel> make_device(const EmulatorOptions& options,
+                                                       const PlantValues& of_script);
 
 /// The device of kerf-emulator with its hand and its faults; each client gets all three from their
 /// start, as if it were the first one. One thread.

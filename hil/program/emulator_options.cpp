@@ -19,8 +19,6 @@ namespace kerf {
 namespace {
 
 constexpr double kMaxSeconds = 1e6;
-constexpr double kMaxInertiaKgM2 = 0.1;
-constexpr double kMaxModeHz = 1000;  // beyond, a step of 31 us no longer resolves it
 
 void declare_front(Arguments& app, EmulatorOptions& o) {
   app.option("--front", o.front,
@@ -49,11 +47,10 @@ void declare_front(Arguments& app, EmulatorOptions& o) {
 }
 
 void declare_device(Arguments& app, EmulatorOptions& o) {
-  app.option("--joint-inertia", o.joint_inertia_kg_m2,
-             "of each motor at its joint, kg m^2 (default: part of the tip's mass)")
-      .within(0, kMaxInertiaKgM2);
-  app.option("--mode-hz", o.mode_hz, "structural mode of that inertia (default: rigid)")
-      .within(0, kMaxModeHz);
+  for (std::size_t i = 0; i < o.plant.size(); ++i) {
+    const PlantKey& row = kPlantKeys[i];
+    app.option(row.option, o.plant[i], row.meaning).within(row.low, row.high);
+  }
   app.flag("--drop-torque", o.drop_torque,
            "omni, falcon: motors let go when the host is silent for 0.1 s (default: hold)");
   app.flag("--pot-noise", o.pot_noise, "omni: noise in the low bits of the gimbal pots");
@@ -121,10 +118,10 @@ void check_front(const EmulatorOptions& o) {
     throw HilError("--rate: " + std::to_string(o.rate_hz) + " does not divide " +
                    std::to_string(fastest) + ", the rate of the bus; use such as 500 or 1000");
   }
-  if (o.lockstep && !o.fault.empty()) {
+  if (o.lockstep && !o.fault.empty() && o.front == "fuse") {
     throw HilError(
-        "--fault: in lock-step a lost packet would stop both sides for ever; use the faults in "
-        "real time");
+        "--fault: in lock-step a node has no way to say that nothing came; use --front socket or "
+        "udp");
   }
 }
 
@@ -146,8 +143,12 @@ void check_device(const EmulatorOptions& o) {
   if (o.drop_torque && o.personality == Personality::woodenhaptics) {
     throw HilError("--drop-torque: woodenhaptics lets go after 0.5 s anyway; leave it out");
   }
-  if (o.mode_hz > 0 && o.joint_inertia_kg_m2 <= 0) {
-    throw HilError("--mode-hz: without inertia nothing rings; give --joint-inertia, such as 1e-4");
+  for (std::size_t i = 0; i < o.plant.size(); ++i) {
+    const PlantKey& row = kPlantKeys[i];
+    const double value = o.plant[i].value_or(0);
+    if (!row.whole || value == std::floor(value)) continue;
+    throw HilError(std::string(row.option) + ": " + number_text(value) +
+                   " is not whole; give a number of bus cycles");
   }
 }
 

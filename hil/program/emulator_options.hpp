@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "hil/devmodel/plant_keys.hpp"
 #include "hil/front/firewire/firewire_bus.hpp"
 #include "hil/front/usb/usb_device.hpp"
 #include "shared/text/command_line.hpp"
@@ -51,8 +52,7 @@ struct EmulatorOptions {
   int cpu = -1;
   bool stay = false;
   double seconds = 0;
-  double joint_inertia_kg_m2 = 0;
-  double mode_hz = 0;
+  PlantValues plant;
   bool drop_torque = false;
   bool pot_noise = false;
   std::size_t packet_bytes = 14;

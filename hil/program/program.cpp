@@ -21,7 +21,7 @@ namespace kerf {
 namespace {
 
 void describe(const EmulatorOptions& o, std::ostream& out) {
-  const auto scale = make_device(o)->params().torque_scale();
+  const auto scale = make_device(o, {})->params().torque_scale();
   out << "torque_scale=" << scale[0] << ',' << scale[1] << ',' << scale[2] << '\n';
 }
 
@@ -41,7 +41,12 @@ void serve_clients(const EmulatorOptions& o, Server& server, const std::string& 
     device.renew();
     HelloLink link(*client, hello_of(o));
     if (o.lockstep) {
-      serve_lockstep(link, device, kCyclesPerSecond / o.rate_hz, limits, stats);
+      const bool speaks_first = o.personality == Personality::omni;
+      serve_lockstep(link, device,
+                     {.tick_cycles = kCyclesPerSecond / o.rate_hz,
+                      .says_nothing_came = !o.fault.empty(),
+                      .speaks_first = speaks_first},
+                     limits, stats);
     } else {
       serve_real_time(link, device, o.packet_cycles, limits, stats);
     }

@@ -2,7 +2,6 @@
 #include "hil/script/fault_script.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <cstddef>
 #include <random>
 
@@ -29,14 +28,6 @@ bool has_ms(FaultKind kind) {
   return kind == FaultKind::delay || kind == FaultKind::host_late;
 }
 
-int whole(const ScriptTable& table, std::string_view key, int otherwise, ScriptRange range) {
-  const double value = table.number(key, otherwise, range);
-  if (value != std::floor(value)) {
-    table.fail(": " + std::string(key) + " is not whole; use a whole number");
-  }
-  return static_cast<int>(value);
-}
-
 DeviceFault fault_of(const ScriptTable& table) {
   table.allow_only({"kind", "packets", "at_s", "for_s", "every", "axis", "counts", "ms"});
   if (!table.has("kind")) table.fail(": no kind; add one, for example kind = \"lose\"");
@@ -58,9 +49,9 @@ DeviceFault fault_of(const ScriptTable& table) {
       "commands";
   fault.at_s = table.number("at_s", 0, {0, kMaxScriptSeconds});
   fault.for_s = table.number("for_s", 0, {0, kMaxScriptSeconds});
-  fault.every = whole(table, "every", 1, {1, kMaxEvery});
-  fault.axis = whole(table, "axis", 0, {0, 2});
-  fault.counts = whole(table, "counts", 0, {-kMaxCounts, kMaxCounts});
+  fault.every = table.whole("every", 1, {1, kMaxEvery});
+  fault.axis = table.whole("axis", 0, {0, 2});
+  fault.counts = table.whole("counts", 0, {-kMaxCounts, kMaxCounts});
   fault.ms = table.number("ms", 0, {0, kMaxDelayMs});
   if (has_ms(fault.kind) && fault.ms <= 0) table.fail(": " + word + " without ms; add ms = 10");
   if (has_counts(fault.kind) && fault.counts == 0) {

@@ -3,6 +3,8 @@
 
 #include <array>
 #include <cmath>
+#include <cstddef>
+#include <vector>
 
 #include "hil/script/script_table.hpp"
 #include "shared/wire/omni_constants.hpp"
@@ -65,16 +67,38 @@ HandStep step_of(const ScriptTable& table) {
   return step;
 }
 
+/// What `[device]` and `[hand]` say of the plant.
+PlantValues plant_of(const ScriptTable& top, const std::string& place) {
+  PlantValues values;
+  for (const std::string_view name : {"device", "hand"}) {
+    const TomlNode* node = top.table(name);
+    if (node == nullptr) continue;
+    const ScriptTable table(*node, place, std::string(name));
+    std::vector<std::string_view> known;
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      const PlantKey& row = kPlantKeys[i];
+      if (row.table != name) continue;
+      known.push_back(row.key);
+      if (!table.has(row.key)) continue;
+      const ScriptRange range{row.low, row.high};
+      values[i] = row.whole ? table.whole(row.key, 0, range) : table.number(row.key, 0, range);
+    }
+    table.allow_only(known);
+  }
+  return values;
+}
+
 }  // namespace
 
 HandScript parse_hand_script(std::string_view text, const std::string& place) {
   const TomlNode file = parse_script(text, place);
   const ScriptTable top(file, place, "");
-  top.allow_only({"unit_mm", "start_mm", "step"});
+  top.allow_only({"unit_mm", "start_mm", "device", "hand", "step"});
   HandScript script;
   script.unit_mm = top.number("unit_mm", script.unit_mm, {0, kMaxUnitMm, true});
   script.start = top.numbers<3>("start_mm", script.start, kLength);
 
+  script.plant = plant_of(top, place);
   for (const TomlNode& step : top.tables("step", kMaxSteps)) {
     const ScriptTable table(step, place, "step");
     script.steps.push_back(step_of(table));

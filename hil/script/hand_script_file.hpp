@@ -13,6 +13,10 @@ namespace kerf {
 ///
 ///     unit_mm  = 1.0             # device mm per unit of length below
 ///     start_mm = [0, 5, 0]       # first point above the surface
+///     [device]                   # any key of kPlantKeys that belongs to it; options win
+///     coulomb_n = 0.1
+///     [hand]                     # likewise
+///     mass_kg = 0.1
 ///     [[step]]                   # exactly one of move_mm, hold, circle_mm, zigzag_mm
 ///     move_mm = [0, -1, 0]       # absolute, origin = surface point under the tool, y up
 ///     seconds = 0.5

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <cmath>
 #include <fstream>
 #include <ios>
 #include <system_error>
@@ -33,7 +34,7 @@ void ScriptTable::fail(const std::string& why) const {
   fail(node_, "", why);
 }
 
-void ScriptTable::allow_only(std::initializer_list<std::string_view> keys) const {
+void ScriptTable::allow_only(std::span<const std::string_view> keys) const {
   for (const TomlNode& entry : node_.entries) {
     if (std::ranges::find(keys, entry.key) != keys.end()) continue;
     fail(entry, entry.key, ": unknown key; known here: " + listed(keys));
@@ -53,6 +54,14 @@ double ScriptTable::checked(const TomlNode& node, std::string_view key, ScriptRa
 double ScriptTable::number(std::string_view key, double otherwise, ScriptRange range) const {
   const TomlNode* node = node_.find(key);
   return node == nullptr ? otherwise : checked(*node, key, range);
+}
+
+int ScriptTable::whole(std::string_view key, int otherwise, ScriptRange range) const {
+  const double value = number(key, otherwise, range);
+  if (value != std::floor(value)) {
+    fail(": " + std::string(key) + " is not whole; use a whole number");
+  }
+  return static_cast<int>(value);
 }
 
 void ScriptTable::read_list(std::string_view key, std::span<double> into, ScriptRange range) const {
@@ -77,6 +86,14 @@ bool ScriptTable::flag(std::string_view key) const {
   if (node == nullptr) return false;
   if (const bool* value = std::get_if<bool>(&node->value)) return *value;
   fail(*node, key, ": not a truth value; use true or false");
+}
+
+const TomlNode* ScriptTable::table(std::string_view key) const {
+  const TomlNode* node = node_.find(key);
+  if (node != nullptr && node->form != TomlNode::Form::table) {
+    fail(*node, key, ": not a table; write [" + std::string(key) + "]");
+  }
+  return node;
 }
 
 std::span<const TomlNode> ScriptTable::tables(const std::string& key, std::size_t most) const {

@@ -30,9 +30,13 @@ class ScriptTable {
   ScriptTable(const TomlNode& node, std::string place, std::string name);
 
   [[noreturn]] void fail(const std::string& why) const;
-  void allow_only(std::initializer_list<std::string_view> keys) const;
+  void allow_only(std::span<const std::string_view> keys) const;
+  void allow_only(std::initializer_list<std::string_view> keys) const {
+    allow_only(std::span(keys.begin(), keys.size()));
+  }
   [[nodiscard]] bool has(std::string_view key) const { return node_.find(key) != nullptr; }
   [[nodiscard]] double number(std::string_view key, double otherwise, ScriptRange range) const;
+  [[nodiscard]] int whole(std::string_view key, int otherwise, ScriptRange range) const;
   template <std::size_t N>
   [[nodiscard]] std::array<double, N> numbers(std::string_view key, std::array<double, N> otherwise,
                                               ScriptRange range) const {
@@ -42,6 +46,8 @@ class ScriptTable {
   [[nodiscard]] std::string word(std::string_view key, const std::string& otherwise,
                                  std::span<const std::string_view> words) const;
   [[nodiscard]] bool flag(std::string_view key) const;
+  /// The table `[key]`; none where it is absent.
+  [[nodiscard]] const TomlNode* table(std::string_view key) const;
   /// The tables of `[[key]]`, at least one and at most `most`.
   [[nodiscard]] std::span<const TomlNode> tables(const std::string& key, std::size_t most) const;
 

@@ -105,3 +105,45 @@ TEST_CASE("a missing file, a folder and an endless file are refused") {
                        kerf::HilError);
   std::filesystem::remove(big);
 }
+
+TEST_CASE("a script may say what holds the tool: device and hand") {
+  const std::string steps = "[[step]]\nhold = 1\n";
+  const auto script = kerf::parse_hand_script(
+      "[device]\ncoulomb_n = 0.05\noutput_delay_cycles = 16\ninput_delay_cycles = 0\n"
+      "joint_inertia_kg_m2 = 1e-4\nmode_hz = 80\n[hand]\nmass_kg = 0\nstiffness_n_per_mm = 10\n" +
+          steps,
+      "hand.toml");
+  kerf::PlantParams params;
+  kerf::take_plant(script.plant, params);
+  CHECK(params.coulomb_n == 0.05);
+  CHECK(params.output_delay_cycles == 16);
+  CHECK(params.input_delay_cycles == 0);
+  CHECK(params.joint_inertia_kg_m2 == std::array{1e-4, 1e-4, 1e-4});
+  CHECK(params.mode_hz == 80);
+  CHECK(params.hand_mass_kg == 0);
+  CHECK(params.hand_stiffness_n_per_mm == 10);
+  CHECK(params.tip_mass_kg == kerf::PlantParams{}.tip_mass_kg);  // not said: the device's own
+
+  struct Slip {
+    std::string text, says;
+  };
+  for (const auto& [text, says] : {
+           Slip{"device = 3\n", "hand.toml:1: device: not a table; write [device]"},
+           Slip{"[device]\nmass_kg = 1\n",
+                "hand.toml:2: device.mass_kg: unknown key; known here: "},
+           Slip{"[hand]\ncoulomb_n = 1\n", "hand.toml:2: hand.coulomb_n: unknown key"},
+           Slip{"[device]\ntip_mass_kg = 0\n",
+                "hand.toml:2: device.tip_mass_kg = 0 is out of range; "
+                "use 0.001 to 10"},
+           Slip{"[hand]\nmass_kg = nan\n", "hand.toml:2: hand.mass_kg = nan is out of range"},
+           Slip{"[hand]\nmass_kg = '1'\n", "hand.toml:2: hand.mass_kg: not a number"},
+           Slip{"[device]\noutput_delay_cycles = 0.5\n",
+                "hand.toml:1: device: output_delay_cycles is not whole"},
+       }) {
+    CAPTURE(text);
+    const std::string error = error_of(text + steps);
+    CAPTURE(error);
+    CHECK(starts_with(error, says));
+    CHECK(error.find('\n') == std::string::npos);
+  }
+}

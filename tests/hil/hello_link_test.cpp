@@ -109,7 +109,7 @@ TEST_CASE("in lock-step a session after a hello has the bytes of one without") {
     for (int tick = 0; tick < 50; ++tick) m.client.say(encode(kerf::OmniCommand{}));
     const std::atomic<bool> stop{false};
     kerf::FrontStats stats;
-    kerf::serve_lockstep(m.link, emulator, 8, {8 * 50, stop}, stats);
+    kerf::serve_lockstep(m.link, emulator, {.tick_cycles = 8}, {8 * 50, stop}, stats);
     CHECK(stats.cycles == 8 * 50);
     heard[greets ? 1 : 0] = m.client.heard;
   }

@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
+#include <vector>
 
 #include <doctest/doctest.h>
 #include <rapidcheck.h>
@@ -199,6 +201,26 @@ TEST_CASE("output delay counts bus cycles and the current loop is a first-order 
   lag.command(motors({0, 100, 0}));
   run(lag, {}, 8);
   CHECK(norm(lag.motor_force_n()) == doctest::Approx(full * (1 - std::exp(-1.0))).epsilon(1e-9));
+}
+
+TEST_CASE("input delay counts bus cycles: a report tells what the encoders were") {
+  OmniParams params;
+  params.input_delay_cycles = 5;
+  OmniModel delayed(params), prompt;
+  std::vector<std::array<std::uint16_t, 3>> told, was;
+  for (int cycle = 0; cycle < 400; ++cycle) {
+    for (OmniModel* model : {&delayed, &prompt}) {
+      model->step(at({0, 5 + 0.05 * cycle, 0}));
+      const auto& encoder = model->next_report().encoder;
+      auto& list = model == &delayed ? told : was;
+      list.push_back({static_cast<std::uint16_t>(encoder[0]),
+                      static_cast<std::uint16_t>(encoder[1]),
+                      static_cast<std::uint16_t>(encoder[2])});
+    }
+  }
+  CHECK(was.front() != was.back());
+  for (std::size_t i = 5; i < told.size(); ++i) CHECK(told[i] == was[i - 5]);
+  for (std::size_t i = 0; i < 5; ++i) CHECK(told[i] == told[0]);
 }
 
 TEST_CASE("when host packets stop the last torque is held, or dropped after 100 ms") {

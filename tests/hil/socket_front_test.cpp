@@ -54,7 +54,7 @@ class Served {
 };
 
 const auto kLockstep = [](auto& client, auto& device, const auto& limits, auto& stats) {
-  kerf::serve_lockstep(client, device, 8, limits, stats);
+  kerf::serve_lockstep(client, device, {.tick_cycles = 8}, limits, stats);
 };
 const auto kRealTime = [](auto& client, auto& device, const auto& limits, auto& stats) {
   kerf::serve_real_time(client, device, 4, limits, stats);

@@ -1,8 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstddef>
 
 #include <doctest/doctest.h>
 
+#include "controller/stability/stable_gains.hpp"
 #include "hil/devmodel/arm_plant.hpp"
 
 namespace {
@@ -78,4 +82,50 @@ TEST_CASE("Coulomb friction stops a moving mass after the distance of its energy
   // m v^2 / 2 = F d: 0.045 kg, 0.1 m/s, 0.1 N -> 2.25 mm in 45 ms.
   CHECK(travelled == doctest::Approx(2.25).epsilon(1e-4));
   CHECK(steps * kStepS == doctest::Approx(0.045).epsilon(1e-3));
+}
+
+namespace {
+
+/// Whether a small swing about a sampled wall of the emulator's mass grows: backward difference,
+/// the force held over a period of 1 ms, `delay` whole periods late.
+bool grows(double stiffness, double damping, double viscous, std::size_t delay) {
+  constexpr int kSteps = 32, kTicks = 1500;
+  const TipMass mass(kMassKg, viscous, 0, kStepS);
+  std::array<double, 8> held_n{};
+  double place_mm = 1e-3, last_mm = place_mm;
+  DeviceVec<double> velocity;
+  double largest[2] = {};
+  for (int tick = 0; tick < kTicks; ++tick) {
+    const auto now = static_cast<std::size_t>(tick) % held_n.size();
+    held_n[now] = -stiffness * place_mm - damping * (place_mm - last_mm) * 1000;
+    last_mm = place_mm;
+    const double force_n = held_n[(now + held_n.size() - delay) % held_n.size()];
+    for (int i = 0; i < kSteps; ++i) {
+      place_mm += velocity.x * (kStepS / 2);
+      velocity = mass.kick(velocity, {force_n, 0, 0});
+      place_mm += velocity.x * (kStepS / 2);
+    }
+    double& of_half = largest[tick < kTicks / 2 ? 0 : 1];
+    of_half = std::max(of_half, std::abs(place_mm));
+    if (std::abs(place_mm) > 1e6) return true;
+  }
+  return largest[1] > largest[0];
+}
+
+}  // namespace
+
+TEST_CASE("S9: the emulator's mass has the exact boundary of a sampled wall within 2 %") {
+  for (const std::size_t delay : {0u, 1u, 2u, 3u}) {
+    for (const double damping : {0.0005, 0.002, 0.005, 0.01}) {
+      CAPTURE(delay);
+      CAPTURE(damping);
+      kerf::SampledLoop loop;
+      loop.mass_kg = kMassKg;
+      loop.viscous_ns_per_mm = 0.0002;
+      loop.delay_s = 0.001 * static_cast<double>(delay);
+      const double exact = kerf::highest_stiffness(loop, damping);
+      CHECK_FALSE(grows(0.98 * exact, damping, 0.0002, delay));
+      CHECK(grows(1.02 * exact, damping, 0.0002, delay));
+    }
+  }
 }

@@ -91,7 +91,7 @@ class Served {
 };
 
 const auto kLockstep = [](auto& host, auto& device, const auto& limits, auto& stats) {
-  kerf::serve_lockstep(host, device, 8, limits, stats);
+  kerf::serve_lockstep(host, device, {.tick_cycles = 8}, limits, stats);
 };
 const auto kRealTime = [](auto& host, auto& device, const auto& limits, auto& stats) {
   kerf::serve_real_time(host, device, 4, limits, stats);

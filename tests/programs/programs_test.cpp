@@ -23,6 +23,7 @@ using kerf::test::kScenes;
 using kerf::test::kTorqueScale;
 using kerf::test::Pair;
 using kerf::test::Process;
+using kerf::test::small_scene;
 using kerf::test::TemporaryFolder;
 using kerf::test::text_of;
 using namespace std::chrono_literals;
@@ -56,6 +57,55 @@ TEST_CASE("virtual time: the same demo twice gives the same volume and output ha
   CHECK(reports[0]["allocations"] == 0);
   CHECK(reports[0]["volume_hash"] == reports[1]["volume_hash"]);
   CHECK(reports[0]["output_hash"] == reports[1]["output_hash"]);
+}
+
+TEST_CASE("virtual time: faults keep packets back, and the same run gives the same hashes") {
+  struct Case {
+    std::string fault;
+    int exit_code, least_stale;
+  };
+  for (const auto& [fault, exit_code, least_stale] :
+       {Case{"late_reports", 0, 5}, Case{"lost_long", 1, 40}, Case{"silence", 1, 300},
+        Case{"duplicated", 0, 0}, Case{"lost_commands", 0, 0}}) {
+    CAPTURE(fault);
+    nlohmann::json reports[2];
+    for (auto& report : reports) {
+      Pair pair;
+      pair.scene = small_scene(pair.folder);
+      pair.start("touch.toml", {"--virtual", "--seconds", "2"},
+                 {"--lockstep", "--fault", KERF_TEST_SCENES "/../hil/faults/" + fault + ".toml"});
+      CHECK(pair.controller->wait() == exit_code);
+      report = pair.report();
+    }
+    CHECK(reports[0]["ticks"] == 2000);
+    CHECK(reports[0]["stale_ticks"] >= least_stale);
+    CHECK(reports[0]["stale_ticks"] == reports[1]["stale_ticks"]);
+    CHECK(reports[0]["output_hash"] == reports[1]["output_hash"]);
+  }
+}
+
+TEST_CASE("virtual time: a stiffness that no port takes can be studied, and goes active") {
+  const auto energy_j = [](double stiffness, const std::string& delay) {
+    Pair pair;
+    pair.scene = (pair.folder / "stiff.toml").string();
+    std::ofstream(pair.scene)
+        << "[[volume]]\nfile = \"phantom\"\nsize = [48, 48, 32]\niso = 0.45\n[[tool]]\nname = "
+           "\"ball\"\nshape = \"ball\"\nsize_vox = 8\n[force]\ndamping_ns_per_mm = 0\n"
+           "stiffness_n_per_mm = "
+        << stiffness << "\n[cut]\nmodel = \"none\"\n";
+    pair.start("touch.toml", {"--virtual", "--seconds", "3", "--rate", "250"},
+               {"--lockstep", "--rate", "250", "--output-delay", delay});
+    CHECK(pair.controller->wait() == 0);
+    const nlohmann::json report = pair.report();
+    CHECK(report["peak_force_n"] <= 3.3);
+    return report["energy_j"].get<double>();
+  };
+  // What the wall took of the hand, in J: a passive one takes, an active one gives.
+  CHECK(energy_j(0.4, "0") > 0);
+  CHECK(energy_j(10, "0") < -1e-3);
+  // A delay of two samples (of 4 ms) brings the end down: 2 N/mm gave nothing without it.
+  CHECK(energy_j(2, "0") > -1e-4);
+  CHECK(energy_j(2, "64") < -1e-3);
 }
 
 TEST_CASE("a tool from an STL file cuts the same voxels in every run") {

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 
 #include <doctest/doctest.h>
 #include <rapidcheck.h>
 
+#include "controller/scene/scene.hpp"
 #include "controller/servo/contact_plan.hpp"
 
 using kerf::coupling_force;
@@ -56,6 +58,43 @@ TEST_CASE_TEMPLATE("a hand that arrives fast feels no blow", N, FixedNumbers, Do
   const auto touch = coupling_force(coupling<N>(), vec<N>(0, 0.001, 0), vec<N>(0, -1000, 0));
   CHECK(double(touch.y) > 0.0);
   CHECK(double(touch.y) < 0.03);
+}
+
+TEST_CASE_TEMPLATE("both ends of what a scene may say give a force in the spring's direction", N,
+                   FixedNumbers, FloatNumbers, DoubleNumbers) {
+  using Real = typename N::Real;
+  constexpr double kFar = 32767;
+  for (const double stiffness : {kerf::kMinStiffnessNPerMm, 1.0, kerf::kMaxStiffnessNPerMm}) {
+    for (const double damping : {0.0, kerf::kMaxDampingNsPerMm}) {
+      const auto gains = coupling<N>(stiffness, damping);
+      CHECK(double(gains.stiffness_n_per_mm) == doctest::Approx(stiffness).epsilon(1e-4));
+      CHECK(double(gains.damping_ns_per_mm) == doctest::Approx(damping));
+      for (const double spring : {-kFar, -1.0, -0.01, 0.0, 0.01, 1.0, kFar}) {
+        for (const double velocity : {-kFar, -1.0, 0.0, 1.0, kFar}) {
+          CAPTURE(stiffness);
+          CAPTURE(damping);
+          CAPTURE(spring);
+          CAPTURE(velocity);
+          const auto force = coupling_force(gains, vec<N>(spring, spring, -spring),
+                                            vec<N>(velocity, -velocity, velocity));
+          for (const Real component : {force.x, force.y, force.z}) {
+            CHECK(std::isfinite(double(component)));
+          }
+          CHECK(double(force.x) * spring >= 0);
+          CHECK(double(force.y) * spring >= 0);
+          CHECK(double(force.z) * spring <= 0);
+        }
+      }
+    }
+  }
+  // Fixed: stays at the end of its range, where double goes on.
+  const auto most = coupling_force(coupling<N>(kerf::kMaxStiffnessNPerMm, 0), vec<N>(0, kFar, 0),
+                                   vec<N>(0, 0, 0));
+  if constexpr (N::kIsFixed) {
+    CHECK(double(most.y) == doctest::Approx(32768).epsilon(1e-4));
+  } else {
+    CHECK(double(most.y) == doctest::Approx(kFar * kerf::kMaxStiffnessNPerMm));
+  }
 }
 
 TEST_CASE("fixed follows double, and no input makes it point the wrong way") {

@@ -331,3 +331,31 @@ TEST_CASE("the same reports cut the same bits, and no tick of cutting touches th
   CHECK(run(1) == run(1));
   CHECK(run(1) != run(1.5));
 }
+
+TEST_CASE(
+    "S16: a hand held still in a wall that is cut feels F = K x0 exp(-t / tau), tau = A/(G K)") {
+  constexpr double kRadiusMm = 0.5, kStiffness = 0.5, kMm3PerSN = 0.0826;
+  for (const auto numeric : {NumericKind::fixed, NumericKind::float64}) {
+    CAPTURE(static_cast<int>(numeric));
+    LoadedScene scene = mill_scene();
+    scene.servo.numeric = numeric;
+    scene.tools = {make_tool("flat", "cylinder",
+                             {.pitch_mm = kVoxelMm, .radius_mm = kRadiusMm, .length_mm = 2.0})};
+    scene.tools[0].turns = false;
+    scene.force.stiffness_n_per_mm = kStiffness;
+    scene.force.damping_ns_per_mm = 0;
+    scene.cut.machinability_mm3_per_s_n = kMm3PerSN;
+    scene.cut.threshold_n = 0;
+    scene.cut.friction = 0;
+    Miller miller(scene, {0, 1.3, 0});
+    const double start_n = length(miller.hold({0, 0, 0}, 0.05).force_n);
+    const double tau_s =
+        std::numbers::pi * kRadiusMm * kRadiusMm / (kMm3PerSN * kStiffness);  // 19.02 s
+    for (int second = 1; second <= 8; ++second) {
+      const double force_n = length(miller.hold({0, 0, 0}, 1).force_n);
+      printf("%d: %.5f ratio %.5f should %.5f\n", second, start_n, force_n / start_n,
+             std::exp(-second / tau_s));
+      CHECK(std::abs(force_n / start_n / std::exp(-second / tau_s) - 1) <= 0.01);
+    }
+  }
+}

@@ -10,6 +10,7 @@
 #include "controller/device/port/agree.hpp"
 #include "controller/device/port/firewire_port.hpp"
 #include "controller/device/port/socket_port.hpp"
+#include "controller/device/port/turn_port.hpp"
 #include "controller/device/port/udp_port.hpp"
 #ifdef KERF_HAS_HID
 #include "controller/device/port/hid_port.hpp"
@@ -84,6 +85,7 @@ std::unique_ptr<PacketPort> emulator(const std::string& text, const Request& req
     port = std::make_unique<SocketPort>(where, request.patience_ms, request.stop);
   }
   agree(*port, "--port " + text, request.ours, is_udp, request.patience_ms, request.stop);
+  if (request.ours.lockstep) return std::make_unique<TurnPort>(std::move(port));
   return port;
 }
 

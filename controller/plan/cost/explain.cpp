@@ -112,7 +112,10 @@ Explanation explain(const LoadedScene& scene, CompiledScene& servo, const Segmen
                           .rate_hz = scene.servo.rate_hz,
                           .budget_us = work_budget_us(scene),
                           .ticks = {},
-                          .arrays = costs.arrays};
+                          .arrays = costs.arrays,
+                          .gain = gain_margin(scene),
+                          .gain_lines = {}};
+  explanation.gain_lines = gain_lines(scene, explanation.gain);
   for (ArrayBytes& array : segment_arrays(segment, scene))
     explanation.arrays.push_back(std::move(array));
   double measured_us = 0, timed_us = 0;
@@ -140,7 +143,7 @@ std::string explanation_text(const Explanation& e) {
       format("%.2f, which fits these ticks on this machine\n", e.machine_factor) +
       "measured: median and p99 of that tick, as the servo computes it\n";
   text += budget_text(e);
-  text += "\nmemory\n";
+  text += "\nstability\n" + e.gain_lines + "\nmemory\n";
   for (const ArrayBytes& array : e.arrays) text += memory_line(array.name, array.bytes);
   text += memory_line("total", total_bytes(e.arrays));
   return text;
@@ -188,6 +191,13 @@ std::string explanation_json(const Explanation& e) {
                   {"machine", e.machine},
                   {"machine_factor", e.machine_factor},
                   {"budget_us", e.budget_us},
+                  {"stability",
+                   {{"stiffness_n_per_mm", e.gain.stiffness_n_per_mm},
+                    {"damping_ns_per_mm", e.gain.damping_ns_per_mm},
+                    {"highest_n_per_mm", e.gain.highest_n_per_mm},
+                    {"margin", e.gain.margin()},
+                    {"highest_with_friction_n_per_mm", e.gain.highest_with_friction_n_per_mm},
+                    {"margin_with_friction", e.gain.with_friction()}}},
                   {"tools", tools},
                   {"ticks", ticks},
                   {"arrays", arrays},

@@ -6,6 +6,7 @@
 
 #include "controller/load/loaded_scene.hpp"
 #include "controller/plan/compile.hpp"
+#include "controller/plan/cost/gain_margin.hpp"
 #include "controller/plan/scene_costs.hpp"
 #include "shared/segment/segment_plan.hpp"
 
@@ -28,6 +29,8 @@ struct Explanation {
   double budget_us = 0;  ///< of work, for one tool in all volumes
   std::vector<ExplainedTick> ticks;
   std::vector<ArrayBytes> arrays;  ///< of the servo, then of the segment
+  GainMargin gain;
+  std::string gain_lines;  ///< the same for a person
 };
 
 /// The parts of a segment as its layout places them, each up to where the next one begins.

@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "controller/plan/cost/gain_margin.hpp"
+
+#include <algorithm>
+#include <cstddef>
+
+#include "controller/load/scene_load.hpp"
+#include "controller/scene/scene.hpp"
+#include "controller/stability/device_figures.hpp"
+#include "controller/stability/stable_gains.hpp"
+#include "controller/stability/wall_push.hpp"
+#include "shared/text/format.hpp"
+
+namespace kerf {
+namespace {
+
+/// Where the search for a boundary with friction ends.
+constexpr double kMostNPerMm = 1000;
+
+std::string device_word(const LoadedScene& scene) {
+  return std::string(kPersonalityWords[static_cast<std::size_t>(scene.device.personality)]);
+}
+
+SampledLoop loop_of(const LoadedScene& scene) {
+  return light_loop(scene.device.personality, scene.servo.rate_hz);
+}
+
+/// From the linear boundary up, by doubling and then halving to 1 %.
+double with_friction(const SampledLoop& loop, double damping, double linear_n_per_mm) {
+  const auto swings = [&](double stiffness) {
+    return push_on_wall(loop, stiffness, damping, {.push_n = 1}).swings_on();
+  };
+  double stable = std::max(linear_n_per_mm, kMinStiffnessNPerMm);
+  while (stable < kMostNPerMm && !swings(2 * stable)) stable *= 2;
+  double unstable = 2 * stable;
+  constexpr int kHalvings = 7;  // 2^7 parts of a doubling
+  for (int i = 0; i < kHalvings; ++i) {
+    const double middle = (stable + unstable) / 2;
+    (swings(middle) ? unstable : stable) = middle;
+  }
+  return stable;
+}
+
+/// What a way out begins with.
+std::string gain_key(const LoadedScene& scene) {
+  return scene.force.model == ForceModel::paper ? "force.p0_n_per_mm2" : "force.stiffness_n_per_mm";
+}
+
+/// Of a damping that is too high for any stiffness, or of a stiffness that is.
+std::string way_out(const LoadedScene& scene, const GainMargin& margin) {
+  if (margin.highest_n_per_mm <= 0) {
+    return format("use at most %.3g in force.damping_ns_per_mm",
+                  highest_damping(loop_of(scene)) / kSafeMargin);
+  }
+  const double safe = margin.deciding() * margin.stiffness_n_per_mm / kSafeMargin;
+  if (!margin.friction_decides) {
+    return format("use at most %.3g in %s", safe, gain_key(scene).c_str());
+  }
+  return format("lower %s to %.3g times its value", gain_key(scene).c_str(),
+                safe / margin.stiffness_n_per_mm);
+}
+
+}  // namespace
+
+GainMargin gain_margin(const LoadedScene& scene, PlayFriction friction) {
+  GainMargin margin;
+  margin.friction_decides = scene.force.model == ForceModel::paper;
+  margin.stiffness_n_per_mm = device_stiffness_n_per_mm(scene);
+  margin.damping_ns_per_mm = margin.friction_decides ? 0 : scene.force.damping_ns_per_mm;
+  const SampledLoop loop = loop_of(scene);
+  margin.highest_n_per_mm = highest_stiffness(loop, margin.damping_ns_per_mm);
+  if (margin.friction_decides || friction == PlayFriction::always) {
+    margin.highest_with_friction_n_per_mm =
+        with_friction(loop, margin.damping_ns_per_mm, margin.highest_n_per_mm);
+  }
+  return margin;
+}
+
+std::string gain_lines(const LoadedScene& scene, const GainMargin& margin) {
+  const SampledLoop loop = loop_of(scene);
+  std::string text = format("gain_loop=%s at %d Hz: %g kg, %g N s/mm, Coulomb %g N, delay %g ms\n",
+                            device_word(scene).c_str(), scene.servo.rate_hz, loop.mass_kg,
+                            loop.viscous_ns_per_mm, loop.coulomb_n, 1000 * loop.delay_s);
+  text += format("highest_stable_stiffness_n_per_mm=%.3g\nstability_margin=%.2f\n",
+                 margin.highest_n_per_mm, margin.margin());
+  text += format("highest_with_friction_n_per_mm=%.3g\nstability_margin_with_friction=%.2f\n",
+                 margin.highest_with_friction_n_per_mm, margin.with_friction());
+  const std::string warning = gain_warning(scene, margin);
+  return warning.empty() ? text : text + "note=" + warning + "\n";
+}
+
+std::string gain_warning(const LoadedScene& scene, const GainMargin& margin) {
+  if (margin.deciding() >= kSafeMargin) return {};
+  return format(
+             "contact of %.3g N/mm and %.3g N s/mm has a stability margin of %.2f on a lightly "
+             "held %s at %d Hz: it may tremble; ",
+             margin.stiffness_n_per_mm, margin.damping_ns_per_mm, margin.deciding(),
+             device_word(scene).c_str(), scene.servo.rate_hz) +
+         way_out(scene, margin);
+}
+
+std::string gain_refusal(const LoadedScene& scene, const GainMargin& margin) {
+  if (scene.force.unchecked_gain || margin.friction_decides || margin.margin() >= 1) return {};
+  return scene.path +
+         format(
+             ": force.stiffness_n_per_mm = %.6g with damping %.6g is unstable on a lightly held "
+             "%s at %d Hz, margin %.2f; ",
+             margin.stiffness_n_per_mm, margin.damping_ns_per_mm, device_word(scene).c_str(),
+             scene.servo.rate_hz, margin.margin()) +
+         way_out(scene, margin) + ", or set force.unchecked_gain = true";
+}
+
+std::string above_device(const LoadedScene& scene) {
+  if (scene.force.model == ForceModel::paper) return {};
+  const DeviceFigures device = device_figures(scene.device.personality);
+  const auto refused = [&](const char* key, double value, double most) {
+    return scene.path + format(
+                            ": force.%s = %.6g is above %.6g, the most that is known to be safe "
+                            "on %s; lower it, use --virtual, or say --unchecked-gain",
+                            key, value, most, device_word(scene).c_str());
+  };
+  const double stiffness = scene.force.stiffness_n_per_mm;
+  const double damping = scene.force.damping_ns_per_mm;
+  if (stiffness > device.highest_stiffness_n_per_mm) {
+    return refused("stiffness_n_per_mm", stiffness, device.highest_stiffness_n_per_mm);
+  }
+  if (damping > device.highest_damping_ns_per_mm) {
+    return refused("damping_ns_per_mm", damping, device.highest_damping_ns_per_mm);
+  }
+  return {};
+}
+
+}  // namespace kerf

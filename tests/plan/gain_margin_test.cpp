@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "controller/plan/cost/gain_margin.hpp"
+
+#include <filesystem>
+#include <limits>
+#include <string>
+
+#include <doctest/doctest.h>
+
+#include "controller/load/scene_load.hpp"
+#include "controller/stability/stable_gains.hpp"
+#include "tests/servo/support.hpp"
+
+using namespace kerf;
+
+namespace {
+
+LoadedScene scene_of(double stiffness, double damping, int rate_hz) {
+  LoadedScene scene = test::half_space_scene(8);
+  scene.path = "mine.toml";
+  scene.tools.push_back(test::ball(8));
+  scene.force.stiffness_n_per_mm = stiffness;
+  scene.force.damping_ns_per_mm = damping;
+  scene.servo.rate_hz = rate_hz;
+  return scene;
+}
+
+GainMargin linear(const LoadedScene& scene) {
+  return gain_margin(scene, PlayFriction::where_it_decides);
+}
+
+bool is_line(const std::string& text) {
+  return !text.empty() && text.find('\n') == std::string::npos &&
+         text.find(';') != std::string::npos;
+}
+
+}  // namespace
+
+TEST_CASE("every scene of the project is held with a safe margin at its own rate") {
+  int count = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(KERF_SCENES_DIR)) {
+    if (entry.path().extension() != ".toml") continue;
+    LoadedScene scene = load_scene(entry.path(), {.phantom_size = VoxelGrid{64, 64, 40}});
+    // The paper's stiffness goes with the tool's radius, and that with the voxels.
+    if (scene.force.model == ForceModel::paper) scene = load_scene(entry.path());
+    for (const Personality device :
+         {Personality::omni, Personality::falcon, Personality::woodenhaptics}) {
+      CAPTURE(entry.path());
+      CAPTURE(static_cast<int>(device));
+      ++count;
+      scene.device.personality = device;
+      const GainMargin margin = linear(scene);
+      CHECK(gain_warning(scene, margin) == "");
+      CHECK(gain_refusal(scene, margin) == "");
+      CHECK(above_device(scene) == "");
+    }
+  }
+  CHECK(count >= 12);
+}
+
+TEST_CASE("the default coupling has the margin of the reference: 2.1, 4.1 with friction") {
+  const LoadedScene scene = scene_of(0.4, 0.002, 1000);
+  const GainMargin margin = gain_margin(scene);
+  CHECK(margin.highest_n_per_mm == doctest::Approx(0.8262).epsilon(0.002));
+  CHECK(margin.margin() == doctest::Approx(2.07).epsilon(0.01));
+  CHECK(margin.with_friction() == doctest::Approx(4.1).epsilon(0.1));
+  const std::string lines = gain_lines(scene, margin);
+  CHECK(lines.find("stability_margin=2.07\n") != std::string::npos);
+  CHECK(lines.find("note=") == std::string::npos);
+  CHECK(lines.find("omni at 1000 Hz: 0.045 kg") != std::string::npos);
+}
+
+TEST_CASE("at 250 Hz the default coupling is warned of, and what the warning says helps") {
+  LoadedScene scene = scene_of(0.4, 0.002, 250);
+  const std::string warning = gain_warning(scene, linear(scene));
+  CHECK(is_line(warning));
+  CHECK(warning.find("margin of 1.14") != std::string::npos);
+  CHECK(warning.find("use at most 0.305 in force.stiffness_n_per_mm") != std::string::npos);
+  CHECK(gain_refusal(scene, linear(scene)) == "");
+  scene.force.stiffness_n_per_mm = 0.304;
+  CHECK(gain_warning(scene, linear(scene)) == "");
+}
+
+TEST_CASE("an unstable coupling is refused unless it is asked for") {
+  LoadedScene scene = scene_of(0.9, 0.002, 1000);
+  CHECK(linear(scene).margin() < 1);
+  const std::string refusal = gain_refusal(scene, linear(scene));
+  CHECK(is_line(refusal));
+  CHECK(refusal.find("mine.toml: force.stiffness_n_per_mm = 0.9") == 0);
+  CHECK(refusal.find("use at most 0.551") != std::string::npos);
+  CHECK(refusal.find("force.unchecked_gain = true") != std::string::npos);
+  scene.force.unchecked_gain = true;
+  CHECK(gain_refusal(scene, linear(scene)) == "");
+  CHECK(gain_warning(scene, linear(scene)) != "");
+  // On both sides of the boundary.
+  const double highest = linear(scene).highest_n_per_mm;
+  scene.force.unchecked_gain = false;
+  scene.force.stiffness_n_per_mm = highest * 0.999;
+  CHECK(gain_refusal(scene, linear(scene)) == "");
+  scene.force.stiffness_n_per_mm = highest * 1.001;
+  CHECK(gain_refusal(scene, linear(scene)) != "");
+}
+
+TEST_CASE("a damping that no stiffness bears is named with its own bound") {
+  const LoadedScene scene = scene_of(0.4, 0.03, 1000);  // the Omni's boundary lies at 0.0243
+  CHECK(linear(scene).highest_n_per_mm == 0);
+  const std::string refusal = gain_refusal(scene, linear(scene));
+  CHECK(is_line(refusal));
+  CHECK(refusal.find("margin 0.00; use at most 0.0162 in force.damping_ns_per_mm") !=
+        std::string::npos);
+}
+
+TEST_CASE("a real device takes no more than is known of it, each its own") {
+  LoadedScene scene = scene_of(0.75, 0.002, 1000);
+  CHECK(above_device(scene).find("mine.toml: force.stiffness_n_per_mm = 0.75 is above 0.7, ") == 0);
+  CHECK(is_line(above_device(scene)));
+  scene.device.personality = Personality::falcon;
+  CHECK(above_device(scene) == "");
+  scene.force.stiffness_n_per_mm = 0.7;
+  scene.device.personality = Personality::omni;
+  CHECK(above_device(scene) == "");
+  scene.force.damping_ns_per_mm = 0.006;
+  CHECK(above_device(scene).find("force.damping_ns_per_mm = 0.006 is above 0.005") !=
+        std::string::npos);
+  scene.force.unchecked_gain = true;  // a scene alone does not lift it
+  CHECK(above_device(scene) != "");
+  scene.force.model = ForceModel::paper;  // has no coupling
+  CHECK(above_device(scene) == "");
+}
+
+TEST_CASE("the paper's force is judged with friction, which alone holds it, and never refused") {
+  LoadedScene scene = scene_of(0.4, 0.002, 1000);
+  scene.force.model = ForceModel::paper;
+  scene.force.p0_n_per_mm2 = 0.06;
+  GainMargin margin = linear(scene);
+  CHECK(margin.damping_ns_per_mm == 0);
+  CHECK(margin.margin() < 1);
+  CHECK(margin.with_friction() > 1);
+  scene.force.p0_n_per_mm2 = 1;
+  margin = linear(scene);
+  CHECK(margin.with_friction() < 1);
+  CHECK(gain_refusal(scene, margin) == "");
+  CHECK(is_line(gain_warning(scene, margin)));
+  CHECK(gain_warning(scene, margin).find("lower force.p0_n_per_mm2 to ") != std::string::npos);
+  scene.force.p0_n_per_mm2 = 0;  // nothing is felt
+  CHECK(gain_warning(scene, linear(scene)) == "");
+}
+
+TEST_CASE("the ends of what a scene may say give numbers and one line each") {
+  for (const int rate_hz : {250, 8000}) {
+    for (const double stiffness : {kMinStiffnessNPerMm, kMaxStiffnessNPerMm}) {
+      for (const double damping : {0.0, kMaxDampingNsPerMm}) {
+        CAPTURE(rate_hz);
+        CAPTURE(stiffness);
+        CAPTURE(damping);
+        const LoadedScene scene = scene_of(stiffness, damping, rate_hz);
+        const GainMargin margin = linear(scene);
+        CHECK(margin.margin() >= 0);
+        CHECK(margin.margin() < std::numeric_limits<double>::infinity());
+        CHECK((margin.margin() < 1) == is_line(gain_refusal(scene, margin)));
+        CHECK((margin.margin() < kSafeMargin) == is_line(gain_warning(scene, margin)));
+      }
+    }
+  }
+}

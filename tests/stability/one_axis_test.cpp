@@ -1,0 +1,241 @@
+// SPDX-License-Identifier: Apache-2.0
+// The time-domain loop against the exact boundary and against maps that another simulator made
+// (100 sub-steps of semi-implicit Euler, Karnopp's stiction, 0.1 mm before the wall, K in steps of
+// 3 %).
+#include "controller/stability/one_axis.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <vector>
+
+#include <doctest/doctest.h>
+
+#include "controller/stability/device_figures.hpp"
+#include "controller/stability/stable_gains.hpp"
+#include "controller/stability/wall_push.hpp"
+
+using namespace kerf;
+
+namespace {
+
+constexpr double kSi = 1e-3;  // N/m to N/mm, N s/m to N s/mm
+
+SampledLoop omni(double viscous_ns_per_m, double coulomb_n, double quantum_mm,
+                 double delay_ms = 0) {
+  SampledLoop loop;
+  loop.mass_kg = 0.045;
+  loop.viscous_ns_per_mm = viscous_ns_per_m * kSi;
+  loop.coulomb_n = coulomb_n;
+  loop.quantum_mm = quantum_mm;
+  loop.delay_s = delay_ms * 1e-3;
+  return loop;
+}
+
+/// Where rest becomes swing: with friction and an encoder not one K but a band, in which single
+/// walls swing below and single ones rest above.
+struct Parting {
+  double first;   ///< the lowest K that swings
+  double fewest;  ///< the K with the fewest exceptions on both sides
+
+  /// Whether a coarser scan's first swing is this band's, within 10 %.
+  [[nodiscard]] bool fits(double tabled) const {
+    return std::abs(first / tabled - 1) <= 0.1 || std::abs(fewest / tabled - 1) <= 0.1;
+  }
+};
+
+/// By a scan of 35 % around `about`, in steps of 2 %.
+Parting parting(const SampledLoop& loop, double damping_ns_per_mm, double push_n,
+                double about_n_per_mm) {
+  constexpr double kBand = 1.35, kStep = 1.02;
+  std::vector<double> stiffness;
+  std::vector<int> swings;
+  for (double k = about_n_per_mm / kBand; k < about_n_per_mm * kBand; k *= kStep) {
+    stiffness.push_back(k);
+    swings.push_back(push_on_wall(loop, k, damping_ns_per_mm, {.push_n = push_n}).swings_on() ? 1
+                                                                                              : 0);
+  }
+  Parting at{stiffness.back(), stiffness.front()};
+  int wrong = 0;  // of a parting below all: those that rest
+  for (const int s : swings) wrong += 1 - s;
+  int fewest = wrong;
+  for (std::size_t i = 0; i < stiffness.size(); ++i) {
+    if (swings[i] == 1) at.first = std::min(at.first, stiffness[i]);
+    wrong += swings[i] == 1 ? 1 : -1;
+    if (wrong >= fewest) continue;
+    fewest = wrong;
+    at.fewest = stiffness[i] * std::sqrt(kStep);
+  }
+  return at;
+}
+
+/// Whether a small swing about the depth at which the hand's push and the wall rest grows: contact
+/// is not lost before it has grown, so the loop stays linear. One that has grown as far as it can,
+/// with the contact lost in each turn, keeps its width.
+bool grows(const SampledLoop& loop, double stiffness_n_per_mm, double damping_ns_per_mm) {
+  constexpr double kPushN = 1;
+  const double depth_mm = kPushN / stiffness_n_per_mm;
+  const WallSwing swing =
+      push_on_wall(loop, stiffness_n_per_mm, damping_ns_per_mm,
+                   {.from_mm = depth_mm * (1 + 1e-6), .push_n = kPushN, .seconds = 1.5});
+  return swing.span_mm[2] >= 0.99 * swing.span_mm[1];
+}
+
+}  // namespace
+
+TEST_CASE("S9: in time the loop without friction has the exact boundary within 2 %") {
+  for (const double delay_ms : {0.0, 0.5, 1.0, 2.0, 3.0}) {
+    for (const double damping : {0.0, 0.5, 2.0, 5.0, 10.0}) {
+      CAPTURE(delay_ms);
+      CAPTURE(damping);
+      const SampledLoop loop = omni(0.2, 0, 0, delay_ms);
+      const double exact = highest_stiffness(loop, damping * kSi);
+      REQUIRE(exact > 0);
+      CHECK_FALSE(grows(loop, exact * 0.98, damping * kSi));
+      CHECK(grows(loop, exact * 1.02, damping * kSi));
+    }
+  }
+  // Filtered velocity, another rate, a hand.
+  SampledLoop held = omni(0.2, 0, 0, 2);
+  held.velocity_filter_s = 0.003;
+  held.period_s = 0.00025;
+  held.hand = {0.1, 0.003, 0.2};
+  const double exact = highest_stiffness(held, 0.002);
+  CHECK_FALSE(grows(held, exact * 0.98, 0.002));
+  CHECK(grows(held, exact * 1.02, 0.002));
+}
+
+TEST_CASE("S10: Coulomb friction alone makes a stable region, by the tabled 12 cells") {
+  constexpr std::array<double, 4> kCoulombN{0.02, 0.05, 0.10, 0.26};
+  constexpr std::array<double, 3> kQuantumMm{0.02, 0.055, 0.2};
+  constexpr double kHighest[4][3] = {
+      {384, 384, 373}, {1736, 1588, 1497}, {4603, 4213, 3743}, {15930, 15016, 10532}};
+  for (std::size_t i = 0; i < kCoulombN.size(); ++i) {
+    for (std::size_t j = 0; j < kQuantumMm.size(); ++j) {
+      CAPTURE(kCoulombN[i]);
+      CAPTURE(kQuantumMm[j]);
+      const SampledLoop loop = omni(0, kCoulombN[i], kQuantumMm[j]);
+      CHECK(highest_stiffness(loop, 0) == 0);  // the linear loop has none
+      const double tabled = kHighest[i][j] * kSi;
+      CHECK(parting(loop, 0, 0.5, tabled).fits(tabled));
+    }
+  }
+}
+
+TEST_CASE("S11: with delay, damping and friction the boundaries are the tabled ones") {
+  struct Row {
+    double coulomb_n, delay_ms;
+    std::vector<double> highest;
+  };
+  constexpr std::array<double, 5> kDamping{0, 1, 2, 5, 10};
+  constexpr std::array<double, 4> kFew{0, 1, 2, 5};
+  const std::vector<Row> rows{{0.26, 0, {8563, 10532, 12953, 19022, 25564}},
+                              {0.26, 1, {1453, 2402, 3043, 5030, 7387}},
+                              {0.26, 2, {635, 1182, 1636, 2625, 3855}},
+                              {0.26, 3, {362, 736, 1050, 1736, 2332}},
+                              {0.05, 0, {1254, 3528, 5661, 10532}},
+                              {0.05, 1, {270, 1019, 1685, 3325}},
+                              {0.05, 2, {141, 564, 961, 1841}}};
+  for (const Row& row : rows) {
+    const SampledLoop loop = omni(0.2, row.coulomb_n, 0.055, row.delay_ms);
+    for (std::size_t i = 0; i < row.highest.size(); ++i) {
+      const double damping = (row.highest.size() == kFew.size() ? kFew[i] : kDamping[i]) * kSi;
+      CAPTURE(row.coulomb_n);
+      CAPTURE(row.delay_ms);
+      CAPTURE(damping);
+      const double tabled = row.highest[i] * kSi;
+      CHECK(parting(loop, damping, 1, tabled).fits(tabled));
+    }
+  }
+}
+
+TEST_CASE("S12: more damping of the device makes the region larger, a higher rate allows more K") {
+  for (const Personality device :
+       {Personality::omni, Personality::falcon, Personality::woodenhaptics}) {
+    double at_rate = 0;
+    for (const double rate_hz : {250.0, 500.0, 1000.0, 2000.0, 4000.0, 8000.0}) {
+      SampledLoop loop = light_loop(device, rate_hz);
+      const double highest = highest_stiffness(loop, 0.002);
+      CHECK(highest > at_rate);
+      at_rate = highest;
+      for (const double damping : {0.0, 0.002, 0.01}) {
+        double at_viscous = 0;
+        for (const double viscous : {0.0002, 0.0005, 0.002, 0.01}) {
+          CAPTURE(rate_hz);
+          CAPTURE(damping);
+          CAPTURE(viscous);
+          loop.viscous_ns_per_mm = viscous;
+          const double more = highest_stiffness(loop, damping);
+          CHECK(more > at_viscous);
+          at_viscous = more;
+        }
+      }
+    }
+  }
+}
+
+TEST_CASE("S13: each sample of delay costs stiffness, with friction and without") {
+  // With friction, between what two delays bear: quiet at the shorter one, loud at the longer.
+  constexpr std::array<double, 4> kByTable{8.563, 1.453, 0.635, 0.362};
+  for (const double damping : {0.0, 1.0, 2.0, 5.0, 10.0}) {
+    double before = 1e9;
+    for (const double delay_ms : {0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0}) {
+      CAPTURE(damping);
+      CAPTURE(delay_ms);
+      const double highest = highest_stiffness(omni(0.2, 0, 0, delay_ms), damping * kSi);
+      CHECK(highest < before);
+      before = highest;
+    }
+  }
+  for (std::size_t d = 1; d < kByTable.size(); ++d) {
+    CAPTURE(d);
+    const double between = std::sqrt(kByTable[d - 1] * kByTable[d]);
+    const auto swings = [&](double delay_ms) {
+      return push_on_wall(omni(0.2, 0.26, 0.055, delay_ms), between, 0, {.push_n = 1}).swings_on();
+    };
+    CHECK_FALSE(swings(static_cast<double>(d) - 1));
+    CHECK(swings(static_cast<double>(d)));
+  }
+}
+
+TEST_CASE("S17: one difference knows velocity in quanta of D/T alone") {
+  SampledLoop loop = omni(0.2, 0.05, 0.055);
+  OneAxis axis(loop);
+  axis.start(0.0123);
+  double last_mm = axis.encoder_mm();
+  int moved = 0;
+  for (int tick = 0; tick < 2000; ++tick) {
+    axis.tick(0, tick < 1000 ? 0.3 : -0.5);
+    const double mm_per_s = (axis.encoder_mm() - last_mm) / loop.period_s;
+    last_mm = axis.encoder_mm();
+    const double levels = mm_per_s / 55;
+    CHECK(std::abs(levels - std::round(levels)) < 1e-6);
+    moved += std::abs(levels) > 0.5 ? 1 : 0;
+  }
+  CHECK(moved > 1000);
+}
+
+TEST_CASE("a wall that swings gives the energy that friction takes, a quiet one takes it") {
+  const SampledLoop loop = omni(0.2, 0.05, 0.055, 2);
+  const WallSwing quiet = push_on_wall(loop, 0.4, 0.002);
+  CHECK_FALSE(quiet.swings_on());
+  CHECK_FALSE(quiet.gives_energy());
+  const WallSwing loud = push_on_wall(loop, 2, 0.002);
+  CHECK(loud.swings_on());
+  CHECK(loud.gives_energy());
+}
+
+TEST_CASE("without a force the axis coasts as its equation says, whatever the delay") {
+  SampledLoop loop = omni(2, 0, 0, 1.3);
+  loop.hand = {0.1, 0.001, 0.2};
+  OneAxis axis(loop);
+  axis.start(1);
+  for (int tick = 0; tick < 100; ++tick) axis.tick(0, 0);
+  // m x'' + b x' + k x = 0 from x = 1 at rest, after 0.1 s.
+  const double m = 0.145, b = 3, k = 200, t = 0.1;
+  const double decay = b / (2 * m), w = std::sqrt(k / m - decay * decay);
+  CHECK(axis.place_mm() ==
+        doctest::Approx(std::exp(-decay * t) * (std::cos(w * t) + decay / w * std::sin(w * t)))
+            .epsilon(1e-9));
+}
