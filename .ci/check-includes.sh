@@ -23,7 +23,7 @@ record
 hil hil/devmodel hil/front hil/front/fuse hil/front/firewire hil/front/usb hil/front/uhid
 hil/front/usbip hil/script hil/fault hil/program
 
-lab/rig lab/accuracy lab/energy lab/extremes lab/faults lab/bench lab/zwidth lab
+lab/rig lab/accuracy lab/energy lab/extremes lab/faults lab/bench lab/law lab/zwidth lab
 
 visualizer visualizer/view visualizer/gl visualizer/cast visualizer/surface visualizer/texture
 visualizer/render visualizer/compose visualizer/app visualizer/bench visualizer/monkey
@@ -43,7 +43,7 @@ rooms_and_folders() {
   local known folders
   known=$(tr -s ' \n' '\n' <<<"$rooms" | sed '/^$/d' | sort)
   folders=$(find . -path './.*' -prune -o -path ./build -prune -o -path ./out -prune -o \
-    -path ./tests -prune -o -name '*.[ch]pp' -printf '%P\n' | sed 's|/*[^/]*$||' | sort -u)
+    -path ./tests -prune -o -path ./examples -prune -o -name '*.[ch]pp' -printf '%P\n' | sed 's|/*[^/]*$||' | sort -u)
   comm -13 <(echo "$known") <(echo "$folders") | sed 's|$|/   <- no room of that name|'
   comm -23 <(echo "$known") <(echo "$folders") | sed 's|$|/   <- a room without C++|'
   find "${programs[@]}" tests -regextype egrep -regex '.*\.(c|h|cc|hh|cxx|hxx|c\+\+|h\+\+|inl|ipp|tpp)' \

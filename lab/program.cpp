@@ -9,6 +9,7 @@
 #include "lab/energy/command.hpp"
 #include "lab/extremes/command.hpp"
 #include "lab/faults/command.hpp"
+#include "lab/law/command.hpp"
 #include "lab/zwidth/command.hpp"
 #include "shared/posix/failure.hpp"
 #include "shared/text/command_line.hpp"
@@ -23,10 +24,11 @@ int run_lab(int argc, const char* const* argv, std::ostream& out, std::ostream& 
   const energy::Command energy(app);
   const extremes::Command extremes(app);
   const faults::Command faults(app);
+  const laws::Command laws(app);
   const zwidth::Command zwidth(app);
   const zwidth::MergeCommand merge(app);
-  const std::array<const LabCommand*, 7> commands{&bench,  &accuracy, &energy, &extremes,
-                                                  &faults, &zwidth,   &merge};
+  const std::array<const LabCommand*, 8> commands{&bench,  &accuracy, &energy, &extremes,
+                                                  &faults, &laws,     &zwidth, &merge};
   try {
     if (!app.parse(argc, argv, out)) return 0;
     for (const LabCommand* command : commands) {

@@ -112,6 +112,7 @@ Scene read_scene(const TomlNode& root, const std::filesystem::path& path, SceneK
   choose_cut(tables.once("cut"), scene);
   for (const SceneTable& table : once) table.read_conditional(parts);
   finish_device(tables.once("device"), scene);
+  refuse_idle_coupling(tables.once("force"), scene.force);
   finish_limits(tables.once("limits"), scene.limits);
   refuse_uncut(scene);
   refuse_unfelt(scene);

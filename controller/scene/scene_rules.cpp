@@ -155,6 +155,15 @@ void refuse_unfelt(const Scene& scene) {
   }
 }
 
+void refuse_idle_coupling(const SceneTable& table, const ForceSettings& force) {
+  if (force.law.name.empty()) return;
+  for (const char* key : {"stiffness_n_per_mm", "damping_ns_per_mm"}) {
+    if (table.has(key)) {
+      refuse(table.place(key), " is of the coupling, and force.law is in its place; leave it out");
+    }
+  }
+}
+
 void finish_limits(const SceneTable& table, LimitSettings& limits) {
   if (limits.continuous_force_n <= limits.force_n) return;
   if (table.has("continuous_force_n")) {

@@ -26,6 +26,9 @@ void choose_cut(const SceneTable& table, Scene& scene);
 void refuse_uncut(const Scene& scene);
 /// The paper's force feels heads alone.
 void refuse_unfelt(const Scene& scene);
+/// A law stands in place of the coupling, whose own keys then count for nothing.
+void refuse_idle_coupling(const SceneTable& table, const ForceSettings& force);
+
 void finish_limits(const SceneTable& table, LimitSettings& limits);
 
 }  // namespace kerf

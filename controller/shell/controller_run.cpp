@@ -1,15 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "controller/shell/controller_run.hpp"
 
+#include <array>
 #include <atomic>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
 #include <stdexcept>
 #include <string>
+#include <string_view>
+#include <utility>
 
 #include "controller/device/driver/device_driver.hpp"
 #include "controller/device/port/open_port.hpp"
+#include "controller/law/registry/law_registry.hpp"
 #include "controller/load/scene_json.hpp"
 #include "controller/load/scene_load.hpp"
 #include "controller/plan/compile.hpp"
@@ -143,6 +147,22 @@ RunReport new_report(const ControllerOptions& options, const LoadedScene& scene,
   return report;
 }
 
+/// A fault of a law has only its kind; the scene knows the name.
+void name_law_faults(const LoadedScene& scene, const EventList& faults) {
+  const std::array<std::pair<Fault, const LawChoice*>, 3> laws{
+      {{Fault::force_law, &scene.force.law},
+       {Fault::velocity_estimator, &scene.servo.velocity},
+       {Fault::stabiliser, &scene.force.stabiliser}}};
+  for (const EventList::Event& event : faults.kept()) {
+    for (const auto& [fault, law] : laws) {
+      if (event.name != std::string_view(fault_name(fault))) continue;
+      log_warning(std::string(kind_name(law->kind)) + " " + law->name +
+                  " gave something that is no finite number at tick " + std::to_string(event.tick) +
+                  ", and the motors went off; the lab tries it: law " + law->name);
+    }
+  }
+}
+
 }  // namespace
 
 int run_controller(const ControllerOptions& options) {
@@ -207,6 +227,7 @@ int run_controller(const ControllerOptions& options) {
   const bool clean = end == EndReason::ticks_done || end == EndReason::stopped;
   segment.set_lifecycle(clean ? Lifecycle::clean_end : Lifecycle::fault);
   report.end = text_of(end);
+  name_law_faults(scene, report.record.faults);
   report.removed_mm3 = removed_mm3(scene, report.record);
   report.lost_packets = device.lost();
   report.refused_packets = device.refused();

@@ -19,7 +19,7 @@
 #include "lab/zwidth/axes.hpp"
 #include "lab/zwidth/map.hpp"
 #include "lab/zwidth/one_axis.hpp"
-#include "lab/zwidth/one_axis_plant.hpp"
+#include "controller/stability/one_axis_plant.hpp"
 #include "lab/zwidth/part_file.hpp"
 
 using namespace kerf;

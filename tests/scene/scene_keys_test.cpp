@@ -231,6 +231,9 @@ TEST_CASE("a law that is unknown, or has no such setting, has its answer") {
               .ends_with(" is out of range; use 0 to 1000"));
   }
   CHECK(answer("[servo.velocity]\nname = \"difference\"\ntau_ms = \"1\"").ends_with(kNoNumber));
+  CHECK(answer("[force]\ndamping_ns_per_mm = 0\nlaw = { name = \"nothing\" }\n") ==
+        "x.toml:7: force.damping_ns_per_mm = 0 is of the coupling, and force.law is in its place; "
+        "leave it out");
   CHECK(answer("[force]\nmodel = \"paper\"\nlaw = { name = \"x\" }\n")
             .find(" is of the model proxy; leave it out") != std::string::npos);
 }
