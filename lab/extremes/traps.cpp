@@ -37,7 +37,7 @@ double force_on_head(Miller& miller, const LoadedScene& scene, const SceneTool& 
   Point centre_mm{};
   for (std::size_t i = 0; i < 3; ++i) centre_mm[i] = out.position_mm[i] + out.proxy_offset_mm[i];
   const ShaftTouch touch(scene.volumes[0], miller.servo().density(0));
-  return force_n * touch.least_head_share(tool, centre_mm, out.rotation, -1 * unit(out.force_n));
+  return force_n * touch.least_head_share(tool, centre_mm, out.rotation, -1 * out.force_n);
 }
 
 /// How a hand presses.
@@ -109,7 +109,6 @@ std::string press_name(const TrapScene& at, const SceneTool& tool, std::uint64_t
 /// What many presses met.
 struct Search {
   int made = 0, touched = 0, by_shaft = 0, bad = 0;
-  int bad_with_shaft = 0;  ///< not among `bad`, nor in `worst`
   double worst = 0;
 };
 
@@ -130,13 +129,15 @@ Search search(int presses, std::uint64_t first, double seconds, double limit, co
       const Pressed seen = press(miller, hand, at.scene, at.scene.tools[tool], seconds);
       found.touched += seen.touched ? 1 : 0;
       found.by_shaft += seen.by_shaft ? 1 : 0;
-      const bool has_shaft = at.scene.tools[tool].shaft.radius_mm > 0;
-      if (!has_shaft) found.worst = std::max(found.worst, value(seen));
+      found.worst = std::max(found.worst, value(seen));
       if (value(seen) <= limit) continue;
-      ++(has_shaft ? found.bad_with_shaft : found.bad);
-      add_row({"traps", press_name(at, at.scene.tools[tool], number, i), value(seen), unit_name,
-               has_shaft ? std::nullopt : std::optional(limit),
-               has_shaft ? std::optional(limit) : std::nullopt});
+      ++found.bad;
+      add_row({"traps",
+               press_name(at, at.scene.tools[tool], number, i),
+               value(seen),
+               unit_name,
+               limit,
+               {}});
     }
     found.made += std::min(at.presses, presses - found.made);
   }
@@ -159,9 +160,8 @@ void measure_traps(const Effort& effort, const RowSink& add_row) {
   row(scenes.c_str(), hard.made, "", {}, {});
   row("of them with a force that must cut", 100 * hard.touched / made, "%", {}, {});
   row("of them borne by a shaft", 100 * hard.by_shaft / made, "%", {}, {});
-  row("presses without a shaft that stop cutting for over 0.5 s", hard.bad, "", 0, 0);
-  row("presses with a shaft that do", hard.bad_with_shaft, "", {}, 0);
-  row("longest time of force without removal, no shaft", hard.worst, "s", kTrappedS, 0.2);
+  row("presses that stop cutting for over 0.5 s", hard.bad, "", 0, 0);
+  row("longest time of force without removal", hard.worst, "s", kTrappedS, 0.2);
   const Search soft = search(
       effort.presses / 4, effort.first_scene, kSoftS, kSoftN, "N", soft_scene,
       [](const Pressed& seen) { return seen.held_n; }, add_row);

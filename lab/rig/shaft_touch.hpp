@@ -17,62 +17,80 @@
 
 namespace kerf::extremes {
 
-/// Where what is behind a tool's head touches a volume, by the cylinders themselves and trilinear
+/// What is behind a tool's head as a volume holds it, by the cylinders themselves and trilinear
 /// density: truth for what a shaft may bear.
 class ShaftTouch {
  public:
   /// `density` is the volume's as it is now.
   ShaftTouch(const SceneVolume& volume, std::span<const Density> density)
-      : volume_(volume), density_(density), to_volume_(matrix_of(volume.pose.orientation)) {}
+      : volume_(volume),
+        density_(density),
+        to_volume_(matrix_of(volume.pose.orientation)),
+        voxel_mm_(*std::ranges::min_element(volume.image.spacing_mm)) {}
 
-  /// The least part of a press along `press` that is the head's, 0..1: what no sum of forces along
-  /// the normals of the shaft's contacts can bear (the rest of Moreau's decomposition into a cone
-  /// and its polar one). 1 where the shaft touches nothing. `rotation` row-major, world from tool.
+  /// The least part that the head bears, 0..1, where the hand presses the tool along `press`: what
+  /// no contact of the shaft without friction can bear. By Moreau's decomposition that is the
+  /// longest part of the press along a way that the shaft leaves free; at an edge a way tells more
+  /// than a normal. A way is free if the shaft may go one voxel along it and gets deeper nowhere.
+  /// 1 where it touches nothing. `rotation` row-major, world from tool.
   [[nodiscard]] double least_head_share(const SceneTool& tool, Point centre_mm,
                                         const std::array<double, 9>& rotation, Point press) const {
-    const std::vector<Point> normals = normals_of(tool, centre_mm, rotation);
-    std::vector<double> load(normals.size());
-    Point left = press;
-    constexpr int kSweeps = 200;  // of coordinate descent; few normals
-    for (int sweep = 0; sweep < kSweeps; ++sweep) {
-      for (std::size_t i = 0; i < normals.size(); ++i) {
-        const double next = std::max(0.0, load[i] - dot(left, normals[i]));
-        left = left + (next - load[i]) * normals[i];
-        load[i] = next;
+    const std::vector<Place> places = places_of(tool, centre_mm, rotation);
+    const auto is_free = [&](Point way) {
+      return std::ranges::all_of(places, [&](const Place& place) {
+        return density_at(place.at + voxel_mm_ * way) <= place.most;
+      });
+    };
+    // Evenly over the half sphere about it, 1.5 degrees apart.
+    constexpr int kWays = 10000;
+    const Point down = unit(press);
+    const Point x = unit(cross(down, std::abs(down[0]) < 0.7 ? Point{1, 0, 0} : Point{0, 1, 0}));
+    const Point y = cross(down, x);
+    for (int i = 0; i < kWays; ++i) {
+      const double along = 1 - static_cast<double>(i) / kWays;
+      const double across = std::sqrt(1 - along * along);
+      const double turn = i * std::numbers::pi * (3 - std::sqrt(5.0));
+      if (is_free(along * down + across * std::cos(turn) * x + across * std::sin(turn) * y)) {
+        return along;
       }
     }
-    return length(left);
+    return 0;
   }
 
  private:
-  /// A contact rests within so much of the iso-surface (docs/theory.md 3.6), in the finest voxels.
+  /// A contact rests within so much of the iso-surface (docs/theory.md 3.6), in the finest voxels:
+  /// so much is the shaft grown.
   static constexpr double kNearVox = 0.15;
+  /// A place that gets so much denser is held: deeper by 0.05 voxels, as deep as a wedged tool may
+  /// be (docs/theory.md 4.2), in the ramp of a face of two voxels. So a face that stands straight
+  /// against the press holds to 3 degrees.
+  static constexpr double kDeeper = 0.05 * kDensityMax / 2.0;
 
-  /// Normals out of the solid where the shaft touches, none within 2 degrees of another.
-  [[nodiscard]] std::vector<Point> normals_of(const SceneTool& tool, Point centre_mm,
-                                              const std::array<double, 9>& rotation) const {
-    const auto& spacing = volume_.image.spacing_mm;
-    const double voxel_mm = *std::ranges::min_element(spacing), near_mm = kNearVox * voxel_mm;
-    std::vector<Point> normals;
+  /// A place of the shaft's surface near the solid, and the density that it may have after a way.
+  struct Place {
+    Point at;
+    double most;
+  };
+
+  [[nodiscard]] std::vector<Place> places_of(const SceneTool& tool, Point centre_mm,
+                                             const std::array<double, 9>& rotation) const {
+    std::vector<Place> places;
+    const double near_mm = kNearVox * voxel_mm_;
     const auto look = [&](double y, double radius) {
-      const int around = std::max(8, static_cast<int>(4 * radius * std::numbers::pi / voxel_mm));
+      const int around = std::max(8, static_cast<int>(4 * radius * std::numbers::pi / voxel_mm_));
       for (int i = 0; i < around; ++i) {
         const double angle = 2 * std::numbers::pi * i / around;
         const Point at{radius * std::cos(angle), y, radius * std::sin(angle)};
         const Point place = centre_mm + turned(rotation, at);
-        if (!(density_at(place) >= volume_.iso)) continue;
-        const Point normal = normal_at(place, voxel_mm);
-        const auto alike = [&](Point n) {
-          return dot(n, normal) > std::cos(2 * std::numbers::pi / 180);
-        };
-        if (length(normal) > 0.5 && std::ranges::none_of(normals, alike)) normals.push_back(normal);
+        if (!is_near(place)) continue;
+        places.push_back({place, std::max<double>(volume_.iso, density_at(place)) + kDeeper});
       }
     };
     for (const ToolPart& part : parts_behind(tool)) {
       for (std::size_t i = 1; i < part.profile.size(); ++i) {
         const auto [y0, r0] = part.profile[i - 1];
         const auto [y1, r1] = part.profile[i];
-        const int steps = 1 + static_cast<int>(2 * std::hypot(y1 - y0, r1 - r0) / voxel_mm);
+        const int steps = 1 + static_cast<int>(2 * std::hypot(y1 - y0, r1 - r0) / voxel_mm_);
         for (int s = 0; s <= steps; ++s) {
           const double t = static_cast<double>(s) / steps;
           const double y = y0 + t * (y1 - y0) + (y1 == y0 ? (i == 1 ? -near_mm : near_mm) : 0);
@@ -80,7 +98,35 @@ class ShaftTouch {
         }
       }
     }
-    return normals;
+    return places;
+  }
+
+  /// Whether a way of one voxel may lead to where a voxel reaches the iso.
+  [[nodiscard]] bool is_near(Point world_mm) const {
+    const VoxelGrid& grid = volume_.image.grid;
+    const Point at = in_voxels(world_mm);
+    const auto from = [&](double x) { return std::max(0, static_cast<int>(std::floor(x)) - 1); };
+    const auto to = [&](double x, int n) {
+      return std::min(n - 1, static_cast<int>(std::floor(x)) + 2);
+    };
+    for (int z = from(at[2]); z <= to(at[2], grid.nz); ++z) {
+      for (int y = from(at[1]); y <= to(at[1], grid.ny); ++y) {
+        for (int x = from(at[0]); x <= to(at[0], grid.nx); ++x) {
+          if (density_[grid.index(x, y, z)] >= volume_.iso) return true;
+        }
+      }
+    }
+    return false;
+  }
+
+  [[nodiscard]] Point in_voxels(Point world_mm) const {
+    const Point off = world_mm - volume_.pose.position_mm;
+    Point at{};
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const Point column{to_volume_[0][axis], to_volume_[1][axis], to_volume_[2][axis]};
+      at[axis] = dot(column, off) / volume_.image.spacing_mm[axis];
+    }
+    return at;
   }
 
   [[nodiscard]] static Point turned(const std::array<double, 9>& m, Point p) {
@@ -91,14 +137,12 @@ class ShaftTouch {
   /// Trilinear; 0 outside of the volume.
   [[nodiscard]] double density_at(Point world_mm) const {
     const VoxelGrid& grid = volume_.image.grid;
-    const Point off = world_mm - volume_.pose.position_mm;
+    const Point at = in_voxels(world_mm);
     std::array<std::int32_t, 3> low{};
     std::array<double, 3> part{};
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      const Point column{to_volume_[0][axis], to_volume_[1][axis], to_volume_[2][axis]};
-      const double at = dot(column, off) / volume_.image.spacing_mm[axis];
-      low[axis] = static_cast<std::int32_t>(std::floor(at));
-      part[axis] = at - low[axis];
+      low[axis] = static_cast<std::int32_t>(std::floor(at[axis]));
+      part[axis] = at[axis] - low[axis];
     }
     double sum = 0;
     for (std::int32_t corner = 0; corner < 8; ++corner) {
@@ -112,19 +156,10 @@ class ShaftTouch {
     return sum;
   }
 
-  [[nodiscard]] Point normal_at(Point place, double step_mm) const {
-    Point gradient{};
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      Point off{};
-      off[axis] = step_mm;
-      gradient[axis] = density_at(place + off) - density_at(place - off);
-    }
-    return length(gradient) > 1 ? -1 * unit(gradient) : Point{};
-  }
-
   const SceneVolume& volume_;
   std::span<const Density> density_;
   Matrix to_volume_;
+  double voxel_mm_;  ///< the finest
 };
 
 }  // namespace kerf::extremes

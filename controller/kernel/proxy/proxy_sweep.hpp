@@ -59,6 +59,9 @@ struct SweepRules {
   static constexpr std::int32_t kFineQueries = 14;
   /// After so many without a nearer place the tool stays.
   static constexpr std::int32_t kStillQueries = 24;
+  /// Ticks in a row whose work may be spent in vain before the next begins with shorter steps. The
+  /// motion of a hand ends such a row after three (tests/golden, `sweep`).
+  static constexpr std::int32_t kSameTries = 4;
   static constexpr double kPush = 0.5;  ///< longest correction of one push
   /// The tool may be this deep in one wall where a push out of it leads into another, or where no
   /// query is left for one. What two opposite faces read differs by some hundredths
@@ -94,12 +97,18 @@ struct Swept {
   std::int32_t queries = 0;
   bool turned = true;  ///< the tool has the orientation that was asked
   typename N::Real depth{-1};
-  bool buried = false;  ///< nothing to push against: the start rule is needed
+  bool buried = false;       ///< nothing to push against: the start rule is needed
+  std::int32_t in_vain = 0;  ///< ticks in a row, this one included, whose work found no step
 };
 
 /// One tick of the proxy (docs/theory.md 4.2, 4.6): it moves from a pose that the solid allows
 /// towards a goal, first the orientation, then the centre. When its queries or its attempts are
 /// spent it lags. It never jumps, so a wall of 2 units holds it at any speed.
+///
+/// Where a tick's work is spent before any step was kept, the next one tries anew: the hand goes
+/// on, and the solid changes. But a tool at rest would try the same in vain for ever. So after
+/// kSameTries such ticks in a row the next does not turn, and its first step is kShrink of the last
+/// one's, down to kFinest: each length is once a tick's first try. Then it begins anew.
 ///
 /// From an allowed place the tool goes at most kAstray farther from its goal: in a groove of its
 /// own shape planes that change from query to query would lead it on and on.
@@ -117,15 +126,17 @@ class ProxySweep {
 
  public:
   /// `friction`: Coulomb's coefficient, 0 to 1. `turn_step`: turn_step_of(reach), or 0 for a tool
-  /// that does not turn or is round.
-  constexpr ProxySweep(Field& field, ProxyPose<N>& pose, Unit friction, Unit turn_step) noexcept
-      : field_(field), pose_(pose), friction_(friction), turn_step_(turn_step) {}
+  /// that does not turn or is round. `in_vain`: what the last tick told, or 0.
+  constexpr ProxySweep(Field& field, ProxyPose<N>& pose, Unit friction, Unit turn_step,
+                       std::int32_t in_vain = 0) noexcept
+      : field_(field), pose_(pose), friction_(friction), turn_step_(turn_step), in_vain_(in_vain) {}
 
   constexpr Swept<N> tick(const ProxyPose<N>& goal) noexcept {
     here_ = turn_to(goal.turn);
     held_by_ = constraints_of(here_);
     const Slide<N> slide = move_to(goal.centre);
-    return {held_by_, slide, queries_, pose_.turn == goal.turn, here_.depth, here_.buried};
+    return {held_by_,    slide,        queries_, pose_.turn == goal.turn,
+            here_.depth, here_.buried, in_vain_};
   }
 
  private:
@@ -224,7 +235,8 @@ class ProxySweep {
     }
     Unit step = turn_step_;
     bool known = false;
-    while (!(pose_.turn == goal) && queries_ < SweepRules::kMaxTurnQueries &&
+    const bool goes_on = first_step() < Unit(1);  // with the last tick's move
+    while (!goes_on && !(pose_.turn == goal) && queries_ < SweepRules::kMaxTurnQueries &&
            !field_.half_spent()) {
       const ToolTurn<N> next = turned_towards(pose_.turn, goal, step);
       field_.turn(next);
@@ -257,7 +269,8 @@ class ProxySweep {
   /// comes nearer. By the distance to the goal alone the proxy would stick in creases and cycle in
   /// grooves. Returns the slide of the last place.
   constexpr Slide<N> move_to(Place goal) noexcept {
-    Unit shrink(1);
+    Unit shrink = first_step();
+    bool kept = false;
     CurvatureEstimate<N> curvature;
     Route onward = route(held_by_, goal - pose_.centre);
     // Farther than any place, while the tool has to get out of the solid.
@@ -285,6 +298,7 @@ class ProxySweep {
           onward = next;
           shrink = Unit(1);
           enough = Real(SweepRules::kArrived);
+          kept = true;
           continue;
         }
       }
@@ -299,13 +313,26 @@ class ProxySweep {
         if (shrink < Unit(fine ? SweepRules::kFinest : SweepRules::kShortest)) break;
       }
     }
+    const bool vain = !kept && onward.length >= enough && !field_.may_query();
+    in_vain_ = vain ? in_vain_ + 1 : 0;
+    if (first_step() < Unit(SweepRules::kFinest)) in_vain_ = 0;
     return onward.slide;
+  }
+
+  /// Share of a step that a tick tries first.
+  [[nodiscard]] constexpr Unit first_step() const noexcept {
+    Unit step(1);
+    for (std::int32_t tick = SweepRules::kSameTries; tick <= in_vain_; ++tick) {
+      step = step * Unit(SweepRules::kShrink);
+    }
+    return step;
   }
 
   Field& field_;
   ProxyPose<N>& pose_;
   Unit friction_;
   Unit turn_step_;
+  std::int32_t in_vain_;
   Contacts<N> here_{};
   ConstraintSet<N> held_by_{};
   std::int32_t queries_ = 0;

@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: Apache-2.0
+// A tick whose work is spent hands its search on to the next one.
+#include <algorithm>
+#include <cstdint>
+#include <utility>
+
+#include <doctest/doctest.h>
+
+#include "controller/servo/proxy_contact.hpp"
+#include "tests/proxy/solid_field.hpp"
+
+using namespace kerf;
+using namespace kerf::test;
+
+namespace {
+
+constexpr double kBowl = 5;
+
+/// A point in a bowl about the origin, solid beyond kBowl, whose queries of a tick are counted
+/// down; beyond them they answer `buried`. A turned tool is in the solid while `holds_turns`.
+template <class N>
+class CountedBowl {
+ public:
+  explicit CountedBowl(int queries) : queries_(queries) {}
+
+  void begin_tick() { left_ = queries_; }
+  Contacts<N> query(ContactVec<typename N::Real> at) {
+    Contacts<N> felt;
+    felt.buried = (left_ <= 0 && !unseen_) || (holds_turns && !(turn_ == ToolTurn<N>{}));
+    unseen_ = false;
+    --left_;
+    return felt.buried ? felt : bowl_.query(at);
+  }
+  [[nodiscard]] bool half_spent() const { return left_ <= queries_ / 2; }
+  [[nodiscard]] bool may_query() const { return left_ > 0; }
+  [[nodiscard]] bool is_solid(ContactVec<typename N::Real> at) const { return bowl_.is_solid(at); }
+  [[nodiscard]] typename N::Real free_distance(ContactVec<typename N::Real> at,
+                                               ContactVec<typename N::Real> move) const {
+    return bowl_.free_distance(at, move);
+  }
+  void turn(const ToolTurn<N>& turn) {
+    turn_ = turn;
+    unseen_ = true;
+  }
+
+  bool holds_turns = false;
+
+ private:
+  static std::pair<double, Point> height_in_bowl(Point at) {
+    return {kBowl - length(at), -1 * unit(at)};
+  }
+
+  int queries_, left_ = 0;
+  bool unseen_ = false;
+  ToolTurn<N> turn_{};
+  SolidField<N, decltype(&height_in_bowl)> bowl_{0, &height_in_bowl};
+};
+
+/// Leads the point from the bowl's bottom to under `goal` outside of it, and says where it is.
+template <class N>
+struct Led {
+  explicit Led(int queries, double turn_step = 0) : field(queries) {
+    plan.turn_step = typename N::Unit(turn_step);
+    plan.ramp_per_tick = typename N::Real(1);
+    state.pose.centre = place_of<N>({0, -kBowl, 0});
+    state.placed = true;
+  }
+  ProxyContact<N> tick(Point goal, const ToolTurn<N>& turn = {}) {
+    field.begin_tick();
+    return follow(plan, state, field, {place_of<N>(goal), turn});
+  }
+  [[nodiscard]] Point at() const { return point_of<N>(state.pose.centre); }
+
+  CountedBowl<N> field;
+  ProxyPlan<N> plan;
+  ProxyState<N> state;
+};
+
+const Point kSide = unit(Point{0.8, -0.5, 0.3});
+
+}  // namespace
+
+TEST_CASE_TEMPLATE("a tick of two queries still finds along a bowl", N, FixedNumbers, FloatNumbers,
+                   DoubleNumbers) {
+  // A step of 0.875 ends 0.076 units in the bowl, and no query is left to push the tool out.
+  for (const int queries : {2, 3, 4, 6, 32}) {
+    CAPTURE(queries);
+    Led<N> led(queries);
+    for (int tick = 0; tick < 800; ++tick) led.tick(12 * kSide);
+    CHECK(length(led.at() - kBowl * kSide) < 0.06);  // as deep as a wedged tool may be
+  }
+}
+
+TEST_CASE_TEMPLATE("a turn that the solid refuses does not stop the move", N, FixedNumbers,
+                   DoubleNumbers) {
+  const ToolTurn<N> askew{typename N::Unit(0), typename N::Unit(0), typename N::Unit(0.6),
+                          typename N::Unit(0.8)};
+  for (const int queries : {3, 4, 5, 8}) {
+    CAPTURE(queries);
+    Led<N> led(queries, turn_step_of(3));
+    led.field.holds_turns = true;
+    for (int tick = 0; tick < 800; ++tick) CHECK_FALSE(led.tick(12 * kSide, askew).turned);
+    CHECK(length(led.at() - kBowl * kSide) < 0.06);
+    // Nor does the move stop the turn: the tool turns as soon as it may, at rest and on its way.
+    led.field.holds_turns = false;
+    for (int tick = 0; tick < 400; ++tick) led.tick({-12, 0, 0}, askew);
+    CHECK(led.tick({-12, 0, 0}, askew).turned);
+  }
+}
+
+TEST_CASE_TEMPLATE("a tool that is held begins its search anew", N, FixedNumbers, DoubleNumbers) {
+  Led<N> led(1);  // one query tells where it is, and none is left to move
+  std::int32_t most = 0;
+  for (int tick = 0; tick < 50; ++tick) {
+    const std::int32_t before = led.state.in_vain;
+    led.tick(12 * kSide);
+    CHECK((led.state.in_vain == before + 1 || led.state.in_vain == 0));
+    most = std::max(most, led.state.in_vain);
+  }
+  CHECK(most == SweepRules::kSameTries + 3);  // with steps of 1, 0.4, 0.16, 0.064 and 0.0256
+  while (led.state.in_vain == 0) led.tick(12 * kSide);
+  led.tick(led.at());  // the hand comes to where it is
+  CHECK(led.state.in_vain == 0);
+}
