@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "lab/ranges/combination.hpp"
 
-#include <bit>
 #include <cstdint>
 #include <cstdlib>
 #include <exception>
 #include <fstream>
 #include <memory>
-#include <numeric>
 #include <optional>
 #include <utility>
 
@@ -19,8 +17,8 @@
 #include "controller/volume/volume_write.hpp"
 #include "hil/hil_error.hpp"
 #include "lab/ranges/hard_hand.hpp"
+#include "lab/ranges/watched_servo.hpp"
 #include "lab/rig/body.hpp"
-#include "shared/numeric/fnv1a.hpp"
 
 namespace kerf::ranges {
 namespace {
@@ -89,38 +87,6 @@ std::optional<Loaded> load(const KeyTexts& texts, NumericKind numeric,
     outcome.violations.push_back({"line", std::string("no SceneError: ") + error.what()});
   }
   return std::nullopt;
-}
-
-std::uint64_t sum_of(const Servo& servo, std::size_t volumes) {
-  std::uint64_t sum = 0;
-  for (std::size_t v = 0; v < volumes; ++v) {
-    const auto density = servo.density(v);
-    sum = std::accumulate(density.begin(), density.end(), sum);
-  }
-  return sum;
-}
-
-/// Of all that the last tick told and left.
-std::uint64_t hash_of(const Servo& servo, std::size_t volumes, const ServoOutput& last) {
-  std::uint64_t hash = fnv1a_step(last.output_hash, std::bit_cast<std::uint64_t>(last.absorbed_mj));
-  for (const double mm : last.position_mm)
-    hash = fnv1a_step(hash, std::bit_cast<std::uint64_t>(mm));
-  for (const double mm : last.proxy_offset_mm) {
-    hash = fnv1a_step(hash, std::bit_cast<std::uint64_t>(mm));
-  }
-  for (std::size_t v = 0; v < volumes; ++v) {
-    for (const Density density : servo.density(v)) hash = fnv1a_step(hash, density);
-  }
-  return hash;
-}
-
-std::uint64_t most_samples(const SceneCosts& costs, const LoadedScene& scene) {
-  std::uint64_t samples = 0;
-  for (const TickCost& cost : costs.ticks) {
-    const bool counts = cost.tool == scene.active_tool && cost.shape.swept;
-    if (counts) samples += cost.stages.front().operations;
-  }
-  return samples;
 }
 
 void look_at_mark(const Mark& mark, const ServoOutput& out, bool motors, Rules& rules) {

@@ -54,7 +54,8 @@ int PairTable::take(const Levels& row) {
 }
 
 std::vector<Levels> covering_rows(
-    const std::vector<int>& level_counts, std::size_t first, std::uint64_t seed,
+    const std::vector<int>& level_counts, std::size_t first, const std::vector<bool>& rare,
+    std::uint64_t seed,
     const std::function<bool(const Levels& row, std::size_t factor, int level)>& may) {
   constexpr int kTries = 8;  // rows in vain before the end
   PairTable table(level_counts);
@@ -75,7 +76,8 @@ std::vector<Levels> covering_rows(
     for (const std::size_t factor : order) {
       int best = -1, most = -1;
       const int levels = level_counts[factor];
-      if (levels == 0 || below(2) == 0) continue;
+      const std::size_t chances = rare[factor] ? 8 : 2;
+      if (levels == 0 || below(chances) != 0) continue;
       const int from = static_cast<int>(below(static_cast<std::size_t>(levels)));  // ties
       for (int i = 0; i < levels; ++i) {
         const int level = (from + i) % levels;

@@ -15,11 +15,13 @@ using Levels = std::vector<int>;
 /// may have both.
 ///
 /// Greedy (Cohen, Dalal, Fredman, Patton 1997): each row takes its factors in an order of its own,
-/// those before `first` first, leaves half of them out, and gives each other one the level that
+/// those before `first` first, leaves half of them out (of the
+/// `rare` ones seven of eight), and gives each other one the level that
 /// brings the most new pairs. `may` says which levels a factor may have beside those that the row
 /// has so far. Ends after rows that bring nothing new. The same seed gives the same rows.
 [[nodiscard]] std::vector<Levels> covering_rows(
-    const std::vector<int>& level_counts, std::size_t first, std::uint64_t seed,
+    const std::vector<int>& level_counts, std::size_t first, const std::vector<bool>& rare,
+    std::uint64_t seed,
     const std::function<bool(const Levels& row, std::size_t factor, int level)>& may);
 
 /// Which pairs of levels were seen. Levels are counted from 0; -1 is none.

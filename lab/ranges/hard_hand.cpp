@@ -44,7 +44,11 @@ class Writer {
     rest(56, true);
     mark(Mark::Kind::armed);
     out_.recovered = out_.reports.size();
-    glide(hand_.counts_at(top_), 20, true);
+    // Over the solid: a proxy that came through it would stay below.
+    constexpr double kHighMm = 70;
+    glide(hand_.counts_at({0, kHighMm, -kHighMm}), 5, true);
+    glide(hand_.counts_at({0, kHighMm, 0}), 5, true);
+    glide(hand_.counts_at(top_), 10, true);
     rest(101, false);
     mark(Mark::Kind::active);
   }
@@ -95,7 +99,7 @@ class Writer {
   void glide(const CountHand::Counts& to, double ms, bool parked) {
     const CountHand::Counts from = at_;
     // No encoder steps half of its 16 bits in a tick.
-    const std::size_t steps = std::max<std::size_t>(ticks(ms), 20);
+    const std::size_t steps = std::max<std::size_t>(ticks(ms), 5);
     for (std::size_t i = 1; i <= steps; ++i) {
       const double s = static_cast<double>(i) / static_cast<double>(steps);
       for (std::size_t j = 0; j < 3; ++j) at_[j] = from[j] + s * (to[j] - from[j]);

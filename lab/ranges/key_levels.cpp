@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <type_traits>
 #include <utility>
 #include <variant>
@@ -117,6 +118,21 @@ constexpr Companion kCompanions[] = {
     {"tool.handpiece_length_mm", nullptr, "tool.shaft_length_mm", "4.0"},
 };
 
+/// What keys without a default of their own hold in the plain scene.
+constexpr std::pair<std::string_view, const char*> kPlain[] = {
+    {"volume.spacing_mm", "0.25"}, {"tool.scale", "1.0"},       {"tool.pitch_mm", "0.25"},
+    {"tool.size_vox", "8"},        {"tool.length_mm", "2.0"},   {"volume.denoise", "1"},
+    {"volume.iso", "0.5"},         {"device.offset_mm", "0.0"},
+};
+
+/// Ends that lie within a row's range, because of a rule of their own (scene_rules.cpp).
+constexpr std::pair<std::string_view, const char*> kInnerEnds[] = {
+    {"device.torque_scale", "[0.001, -0.001, 0.001]"},
+    {"volume.pose.orientation", "[1.0, 0.0, 0.0, 0.0]"},
+    {"volume.pose.orientation", "[0.5, -0.5, 0.5, 0.5]"},
+    {"volume.spacing_mm", "[0.125, 0.25, 0.5]"},
+};
+
 /// The scene that the keys change.
 const KeyTexts& base() {
   static const KeyTexts texts{{"volume.file", "\"solid.nrrd\""},
@@ -144,6 +160,30 @@ std::string value_of_key(std::string_view name, const KeyTexts& texts) {
 
 }  // namespace
 
+std::string number_text(const PlainNumber& form, double value) {
+  const std::string text =
+      form.whole ? std::to_string(static_cast<long long>(value)) : number(value);
+  return form.length == 0 ? text : list_text(form.length, text, text);
+}
+
+std::optional<PlainNumber> plain_number(const SceneKey& key) {
+  SceneParts parts;
+  const Form form = std::visit(FormOf{}, key.at(parts));
+  if (!form.has_numbers) return std::nullopt;
+  std::string text;
+  for (const Companion& with : kCompanions) {
+    if (key.name == with.beside && with.text[0] != '\0') text = with.text;
+  }
+  for (const auto& [name, plain] : kPlain) {
+    if (key.name == name) text = plain;
+  }
+  if (const auto at = base().find(key.name); at != base().end()) text = at->second;
+  if (text.empty()) text = written(value_of(key, parts));
+  const std::size_t begin = text.find_first_of("-0123456789");
+  if (begin == std::string::npos || text.find('"') != std::string::npos) return std::nullopt;
+  return PlainNumber{std::strtod(text.c_str() + begin, nullptr), form.whole, form.length};
+}
+
 std::vector<KeyLevels> key_levels(SceneKeys keys) {
   SceneParts parts;
   std::vector<KeyLevels> list;
@@ -155,6 +195,9 @@ std::vector<KeyLevels> key_levels(SceneKeys keys) {
     for (const std::string_view word : key.allowed.words) add(quoted(word), levels.ends);
     if (!key.allowed.words.empty() && !form.has_numbers)
       levels.beyond.push_back(quoted("nonsense"));
+    for (const auto& [name, text] : kInnerEnds) {
+      if (key.name == name) add(text, levels.ends);
+    }
     for (const SceneKey& other : keys) {
       if (other.only_with.key == key.name) add(quoted(other.only_with.word), levels.ends);
     }

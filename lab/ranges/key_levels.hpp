@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <map>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -29,6 +30,18 @@ struct KeyLevels {
 /// Of every key that has a range, words, or is a switch. Names and files have no ends; of a file
 /// whose content another key asks for ("phantom") that word counts.
 [[nodiscard]] std::vector<KeyLevels> key_levels(SceneKeys keys = scene_keys());
+
+/// What the key holds in a plain scene, and how numbers of its form are written: to look between it
+/// and an end for the last value that a scene can have.
+struct PlainNumber {
+  double value;
+  bool whole;
+  std::size_t length;  ///< of a list; 0: one value
+};
+/// None where the key holds no number.
+[[nodiscard]] std::optional<PlainNumber> plain_number(const SceneKey& key);
+/// The same number in all places of the form.
+[[nodiscard]] std::string number_text(const PlainNumber& form, double value);
 
 /// Whether `key` is on in a scene with these values, by its row's condition.
 [[nodiscard]] bool counts(const SceneKey& key, const KeyTexts& texts);

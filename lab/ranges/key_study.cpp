@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cmath>
 #include <mutex>
+#include <optional>
 #include <thread>
 #include <utility>
 
@@ -39,10 +41,33 @@ bool set(const SceneKey& key, const std::string& text, KeyTexts& texts) {
   return true;
 }
 
+/// The last value from the plain one toward `end` that the loader takes in the first numbers of the
+/// effort; empty where there is none. By bisection: of sizes by their ratio.
+std::string last_accepted(const SceneKey& key, double end, const Effort& effort,
+                          const std::filesystem::path& file) {
+  constexpr int kHalvings = 8;
+  const std::optional<PlainNumber> plain = plain_number(key);
+  if (!plain) return {};
+  const auto accepted = [&](const std::string& text) {
+    KeyTexts texts;
+    if (!set(key, text, texts)) return false;
+    return !load_combination(texts, effort.numerics.front(), file).refused;
+  };
+  double good = plain->value, bad = end;
+  if (!accepted(number_text(*plain, good))) return {};
+  for (int i = 0; i < kHalvings; ++i) {
+    const bool sizes = good * bad > 0;
+    const double middle = sizes ? std::copysign(std::sqrt(good * bad), good) : (good + bad) / 2;
+    (accepted(number_text(*plain, middle)) ? good : bad) = middle;
+  }
+  return number_text(*plain, good);
+}
+
 /// The keys of the pairs. Those that others depend on come first.
 struct Factors {
   std::vector<const KeyRow*> rows;
   std::vector<int> level_counts;
+  std::vector<bool> rare;  ///< where nothing is felt at some end: else hardly any row would feel
   std::size_t deciding = 0;
 
   explicit Factors(const std::vector<KeyRow>& keys) {
@@ -57,6 +82,7 @@ struct Factors {
         if (row.levels.key->name == "servo.numeric" || decides(row) != first) continue;
         rows.push_back(&row);
         level_counts.push_back(static_cast<int>(row.accepted.size()));
+        rare.push_back(row.ends.felt < row.ends.ran);
       }
       if (first) deciding = rows.size();
     }
@@ -162,9 +188,9 @@ std::vector<KeyRow> study_keys(const Effort& effort, const Progress& progress) {
   const auto study = [&](std::size_t i, const std::filesystem::path& file) {
     KeyRow& row = rows[i];
     const SceneKey& key = *row.levels.key;
-    for (const std::string& text : row.levels.ends) {
+    const auto run = [&](const std::string& text) {
       KeyTexts texts;
-      if (!set(key, text, texts)) continue;
+      if (!set(key, text, texts)) return;
       bool refused = false;
       for (const NumericKind numeric : effort.numerics) {
         const Outcome outcome = run_combination(texts, numeric, file);
@@ -172,6 +198,15 @@ std::vector<KeyRow> study_keys(const Effort& effort, const Progress& progress) {
         refused = refused || outcome.refused;
       }
       if (!refused) row.accepted.push_back(text);
+    };
+    for (const std::string& text : row.levels.ends) run(text);
+    for (const double end : {key.allowed.range.lo, key.allowed.range.hi}) {
+      const auto plain = plain_number(key);
+      const bool taken =
+          !plain || std::ranges::find(row.accepted, number_text(*plain, end)) != row.accepted.end();
+      if (taken || plain->whole) continue;
+      const std::string nearest = last_accepted(key, end, effort, file);
+      if (!nearest.empty()) run(nearest);
     }
     for (const std::string& text : row.levels.beyond) {
       KeyTexts texts;
@@ -215,8 +250,8 @@ PairRows study_pairs(const std::vector<KeyRow>& keys, const Effort& effort,
     for (const Tally& tally : tallies) out.tally.add(tally);
   };
   while (out.tally.ran < effort.combinations) {
-    std::vector<Levels> rows =
-        covering_rows(factors.level_counts, factors.deciding, effort.seed + out.arrays, may);
+    std::vector<Levels> rows = covering_rows(factors.level_counts, factors.deciding, factors.rare,
+                                             effort.seed + out.arrays, may);
     const std::size_t numbers = effort.numerics.size();
     rows.resize(std::min(rows.size(), (effort.combinations - out.tally.ran) / numbers + 1));
     ++out.arrays;
