@@ -53,46 +53,100 @@ int PairTable::take(const Levels& row) {
   return added;
 }
 
-std::vector<Levels> covering_rows(
-    const std::vector<int>& level_counts, std::size_t first, const std::vector<bool>& rare,
-    std::uint64_t seed,
-    const std::function<bool(const Levels& row, std::size_t factor, int level)>& may) {
-  constexpr int kTries = 8;  // rows in vain before the end
-  PairTable table(level_counts);
-  std::mt19937_64 random(seed);
-  const auto below = [&](std::size_t end) { return static_cast<std::size_t>(random() % end); };
-  std::vector<Levels> rows;
-  std::vector<std::size_t> order(level_counts.size());
-  for (int vain = 0; vain < kTries;) {
-    std::iota(order.begin(), order.end(), std::size_t{0});
-    const auto shuffle = [&](std::size_t from, std::size_t to) {
-      for (std::size_t i = to; i > from + 1; --i) {
-        std::swap(order[i - 1], order[from + below(i - from)]);
+namespace {
+
+class Builder {
+ public:
+  Builder(const Factors& factors, std::uint64_t seed)
+      : factors_(factors), table_(factors.level_counts), random_(seed), order_(count()) {}
+
+  std::vector<Levels> rows() {
+    constexpr int kTries = 8;  // rows in vain before pairs are looked for one by one
+    for (int vain = 0; vain < kTries;) vain = take(filled(decided())) ? 0 : vain + 1;
+    for (std::size_t f = 0; f < count(); ++f) {
+      for (std::size_t g = f + 1; g < count(); ++g) {
+        for (int a = 0; a < factors_.level_counts[f]; ++a) {
+          for (int b = 0; b < factors_.level_counts[g]; ++b) {
+            if (!table_.has(f, a, g, b)) add_pair(f, a, g, b);
+          }
+        }
       }
-    };
-    shuffle(0, first);
-    shuffle(first, order.size());
-    Levels row(level_counts.size(), -1);
-    for (const std::size_t factor : order) {
-      int best = -1, most = -1;
-      const int levels = level_counts[factor];
-      const std::size_t chances = rare[factor] ? 8 : 2;
-      if (levels == 0 || below(chances) != 0) continue;
-      const int from = static_cast<int>(below(static_cast<std::size_t>(levels)));  // ties
-      for (int i = 0; i < levels; ++i) {
-        const int level = (from + i) % levels;
-        if (!may(row, factor, level)) continue;
-        const int added = table.added_by(row, factor, level);
-        if (added <= most) continue;
-        most = added;
-        best = level;
-      }
-      row[factor] = best;
     }
-    vain = table.take(row) > 0 ? 0 : vain + 1;
-    if (vain == 0) rows.push_back(std::move(row));
+    return std::move(rows_);
   }
-  return rows;
+
+ private:
+  [[nodiscard]] std::size_t count() const { return factors_.level_counts.size(); }
+  std::size_t below(std::size_t end) { return static_cast<std::size_t>(random_() % end); }
+  bool take(Levels row) {
+    const bool is_new = table_.take(row) > 0;
+    if (is_new) rows_.push_back(std::move(row));
+    return is_new;
+  }
+
+  /// A row with any levels of the deciding factors.
+  Levels decided() {
+    Levels row(count(), -1);
+    for (std::size_t f = 0; f < factors_.deciding; ++f) set_best(f, row);
+    return row;
+  }
+  /// The rest of the row in an order of its own.
+  Levels filled(Levels row) {
+    std::iota(order_.begin(), order_.end(), std::size_t{0});
+    for (std::size_t i = order_.size(); i > factors_.deciding + 1; --i) {
+      std::swap(order_[i - 1], order_[factors_.deciding + below(i - factors_.deciding)]);
+    }
+    for (std::size_t i = factors_.deciding; i < order_.size(); ++i) {
+      if (row[order_[i]] < 0) set_best(order_[i], row);
+    }
+    return row;
+  }
+  /// The level that brings most, or none: see the header.
+  void set_best(std::size_t factor, Levels& row) {
+    const int levels = factors_.level_counts[factor];
+    const std::size_t chances = factors_.rare[factor] ? 8 : 2;
+    if (levels == 0 || below(chances) != 0) return;
+    int most = -1;
+    const auto from = static_cast<int>(below(static_cast<std::size_t>(levels)));  // of ties
+    for (int i = 0; i < levels; ++i) {
+      const int level = (from + i) % levels;
+      const int added = table_.added_by(row, factor, level);
+      if (added <= most || !factors_.may(row, factor, level)) continue;
+      most = added;
+      row[factor] = level;
+    }
+  }
+  /// A row with this pair, if one is found with it.
+  void add_pair(std::size_t f, int a, std::size_t g, int b) {
+    constexpr int kTries = 32;
+    for (int i = 0; i < kTries; ++i) {
+      Levels row = decided();
+      row[f] = row[g] = -1;
+      if (!factors_.may(row, f, a)) continue;
+      row[f] = a;
+      if (!factors_.may(row, g, b)) continue;
+      row[g] = b;
+      bool holds = true;  // a level of a deciding factor may rule others out
+      for (std::size_t k = 0; k < factors_.deciding; ++k) {
+        holds = holds && (row[k] < 0 || factors_.may(row, k, row[k]));
+      }
+      if (!holds || !factors_.may(row, f, a)) continue;
+      static_cast<void>(take(filled(std::move(row))));
+      return;
+    }
+  }
+
+  const Factors& factors_;
+  PairTable table_;
+  std::mt19937_64 random_;
+  std::vector<std::size_t> order_;
+  std::vector<Levels> rows_;
+};
+
+}  // namespace
+
+std::vector<Levels> covering_rows(const Factors& factors, std::uint64_t seed) {
+  return Builder(factors, seed).rows();
 }
 
 }  // namespace kerf::ranges

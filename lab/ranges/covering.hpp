@@ -11,18 +11,22 @@ namespace kerf::ranges {
 /// One level of each factor; -1: the factor is left out.
 using Levels = std::vector<int>;
 
+/// What rows are made of.
+struct Factors {
+  std::vector<int> level_counts;
+  std::vector<bool> rare;    ///< by factor: stands in an eighth of the rows, else in half
+  std::size_t deciding = 0;  ///< so many come first: what others may have depends on them
+  /// Which levels a factor may have beside those of a row.
+  std::function<bool(const Levels& row, std::size_t factor, int level)> may;
+};
+
 /// Rows of levels in which every two levels of two factors stand together at least once, if any row
 /// may have both.
 ///
 /// Greedy (Cohen, Dalal, Fredman, Patton 1997): each row takes its factors in an order of its own,
-/// those before `first` first, leaves half of them out (of the
-/// `rare` ones seven of eight), and gives each other one the level that
-/// brings the most new pairs. `may` says which levels a factor may have beside those that the row
-/// has so far. Ends after rows that bring nothing new. The same seed gives the same rows.
-[[nodiscard]] std::vector<Levels> covering_rows(
-    const std::vector<int>& level_counts, std::size_t first, const std::vector<bool>& rare,
-    std::uint64_t seed,
-    const std::function<bool(const Levels& row, std::size_t factor, int level)>& may);
+/// leaves some out, and gives each other one the level that brings the most new pairs. Pairs that
+/// are missing in the end get a row each. The same seed gives the same rows.
+[[nodiscard]] std::vector<Levels> covering_rows(const Factors& factors, std::uint64_t seed);
 
 /// Which pairs of levels were seen. Levels are counted from 0; -1 is none.
 class PairTable {

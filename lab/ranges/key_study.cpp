@@ -64,13 +64,13 @@ std::string last_accepted(const SceneKey& key, double end, const Effort& effort,
 }
 
 /// The keys of the pairs. Those that others depend on come first.
-struct Factors {
+struct KeyFactors {
   std::vector<const KeyRow*> rows;
   std::vector<int> level_counts;
   std::vector<bool> rare;  ///< where nothing is felt at some end: else hardly any row would feel
   std::size_t deciding = 0;
 
-  explicit Factors(const std::vector<KeyRow>& keys) {
+  explicit KeyFactors(const std::vector<KeyRow>& keys) {
     const auto decides = [&](const KeyRow& row) {
       return std::ranges::any_of(keys, [&](const KeyRow& other) {
         return other.levels.key->only_with.key == row.levels.key->name;
@@ -121,7 +121,7 @@ struct Factors {
 };
 
 /// One row, made smaller until it loads.
-Outcome run_row(const Factors& factors, NumericKind numeric, const std::filesystem::path& file,
+Outcome run_row(const KeyFactors& factors, NumericKind numeric, const std::filesystem::path& file,
                 Levels& row) {
   for (std::size_t turn = 0;; ++turn) {
     Outcome outcome = run_combination(factors.texts(row), numeric, file);
@@ -135,7 +135,7 @@ struct Pair {
   int a, b;
 };
 
-std::vector<Pair> pairs_missing(const Factors& factors, const PairTable& table) {
+std::vector<Pair> pairs_missing(const KeyFactors& factors, const PairTable& table) {
   std::vector<Pair> missing;
   for (std::size_t f = 0; f < factors.rows.size(); ++f) {
     for (std::size_t g = f + 1; g < factors.rows.size(); ++g) {
@@ -150,7 +150,7 @@ std::vector<Pair> pairs_missing(const Factors& factors, const PairTable& table) 
 }
 
 /// A pair by itself; nothing where the two cannot stand together.
-bool pair_texts(const Factors& factors, const Pair& pair, KeyTexts& texts) {
+bool pair_texts(const KeyFactors& factors, const Pair& pair, KeyTexts& texts) {
   Levels row(factors.rows.size(), -1);
   row[pair.f] = pair.a;
   row[pair.g] = pair.b;
@@ -228,10 +228,13 @@ std::vector<KeyRow> study_keys(const Effort& effort, const Progress& progress) {
 
 PairRows study_pairs(const std::vector<KeyRow>& keys, const Effort& effort,
                      const Progress& progress) {
-  const Factors factors(keys);
-  const auto may = [&](const Levels& row, std::size_t factor, int) {
-    return counts(*factors.rows[factor]->levels.key, factors.texts(row));
-  };
+  const KeyFactors factors(keys);
+  const Factors all{.level_counts = factors.level_counts,
+                    .rare = factors.rare,
+                    .deciding = factors.deciding,
+                    .may = [&](const Levels& row, std::size_t factor, int) {
+                      return counts(*factors.rows[factor]->levels.key, factors.texts(row));
+                    }};
   const SceneFolder folder;
   PairRows out;
   PairTable table(factors.level_counts);
@@ -250,8 +253,7 @@ PairRows study_pairs(const std::vector<KeyRow>& keys, const Effort& effort,
     for (const Tally& tally : tallies) out.tally.add(tally);
   };
   while (out.tally.ran < effort.combinations) {
-    std::vector<Levels> rows = covering_rows(factors.level_counts, factors.deciding, factors.rare,
-                                             effort.seed + out.arrays, may);
+    std::vector<Levels> rows = covering_rows(all, effort.seed + out.arrays);
     const std::size_t numbers = effort.numerics.size();
     rows.resize(std::min(rows.size(), (effort.combinations - out.tally.ran) / numbers + 1));
     ++out.arrays;
