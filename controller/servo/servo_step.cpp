@@ -224,8 +224,8 @@ void tell_planes(const ToolContact<N>& tool, ServoOutput& out) noexcept {
 /// wall when the force comes back, with a ramp. A device that rests parked, or has lost its home,
 /// begins anew.
 template <class N>
-void follow_unfelt(const ServoPlan<N>& plan, ServoState<N>& state,
-                   const Sensed<N>& sensed, ServoOutput& out) noexcept {
+void follow_unfelt(const ServoPlan<N>& plan, ServoState<N>& state, const Sensed<N>& sensed,
+                   ServoOutput& out) noexcept {
   if (!plan.contact.swept) return;
   const Phase phase = state.supervisor.phase;
   const bool begins = phase == Phase::off || phase == Phase::calibrating || sensed.docked;
