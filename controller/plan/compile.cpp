@@ -63,6 +63,15 @@ class CompiledSceneOf final : public CompiledScene {
             tick_stages(*cost.choice.method, cost.shape, worst.box, worst.queried, worst.covered)};
   }
 
+  [[nodiscard]] std::unique_ptr<ServoSnapshot> keep() const override {
+    return std::make_unique<SnapshotOf<N>>(memory_.keep(state_));
+  }
+  void restore(const ServoSnapshot& kept) override {
+    const auto* same = dynamic_cast<const SnapshotOf<N>*>(&kept);
+    if (same == nullptr) refuse_snapshot();
+    memory_.restore(*same, state_);
+  }
+
   ServoOutput step(const DeviceReport& report) noexcept override {
     return servo_step(plan_, state_, report);
   }

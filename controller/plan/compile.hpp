@@ -7,6 +7,7 @@
 #include "controller/kernel/kernel_set.hpp"
 #include "controller/load/loaded_scene.hpp"
 #include "controller/plan/scene_costs.hpp"
+#include "controller/plan/servo_snapshot.hpp"
 #include "controller/servo/servo.hpp"
 
 namespace kerf {
@@ -27,6 +28,12 @@ class CompiledScene : public Servo {
   /// where the scene cuts: only for a servo that will not be stepped. After `take`; takes 250
   /// ticks.
   [[nodiscard]] virtual TickTime time_tick(std::size_t tick) = 0;
+
+  /// All that the last tick hands to the next, copied. After `take`, between two ticks.
+  [[nodiscard]] virtual std::unique_ptr<ServoSnapshot> keep() const = 0;
+  /// Goes on where that was kept, by this servo or another of the same scene. Throws
+  /// std::invalid_argument where it is of another scene.
+  virtual void restore(const ServoSnapshot& kept) = 0;
 };
 
 /// Plans, tables and costs of a checked scene; no array of the size of a volume is made. Throws

@@ -13,6 +13,7 @@
 #include "controller/plan/contact_memory.hpp"
 #include "controller/plan/force_cut_memory.hpp"
 #include "controller/plan/method/method_memory.hpp"
+#include "controller/plan/servo_snapshot.hpp"
 #include "controller/plan/tables/tick_memory.hpp"
 #include "controller/servo/servo_plan.hpp"
 #include "controller/servo/servo_state.hpp"
@@ -72,6 +73,19 @@ class ServoMemory {
 
   [[nodiscard]] std::span<const Density> density(std::size_t scene_index) const noexcept {
     return densities_[scene_index];
+  }
+
+  /// After `take`.
+  [[nodiscard]] SnapshotOf<N> keep(const ServoState<N>& state) const {
+    return {state, densities_, gradients_, carries_};
+  }
+  /// The arrays keep their places: plan and state point at them. Throws std::invalid_argument where
+  /// the snapshot is of another scene.
+  void restore(const SnapshotOf<N>& kept, ServoState<N>& state) {
+    restore_arrays(kept.densities, densities_);
+    restore_arrays(kept.gradients, gradients_);
+    restore_arrays(kept.carries, carries_);
+    state = kept.state_in(state);
   }
 
   /// All of it by name, as it is before `take`.

@@ -101,6 +101,7 @@ struct ServoOutput {
   double spindle_ratio = 0;  ///< speed over the reference speed, in this tick's cut
   double spindle_load = 0;   ///< torque over the stall torque
   std::uint32_t active_tool = 0;
+  std::int64_t samples_read = 0;    ///< of the tool's surface, by contact (query_work.hpp)
   std::uint64_t removed_steps = 0;  ///< density steps removed in this tick, all volumes
   std::array<std::uint64_t, kMaxVolumes> removed_by_volume{};
   std::array<VoxelBox, kMaxVolumes> changed{};  ///< voxels that changed, by volume

@@ -231,8 +231,8 @@ void tell_planes(const ToolContact<N>& tool, ServoOutput& out) noexcept {
 /// wall when the force comes back, with a ramp. A device that rests parked, or has lost its home,
 /// begins anew.
 template <class N>
-void follow_unfelt(const ServoPlan<N>& plan, ServoState<N>& state,
-                   const Sensed<N>& sensed) noexcept {
+void follow_unfelt(const ServoPlan<N>& plan, ServoState<N>& state, const Sensed<N>& sensed,
+                   ServoOutput& out) noexcept {
   if (!plan.contact.swept) return;
   const Phase phase = state.supervisor.phase;
   const bool begins = phase == Phase::off || phase == Phase::calibrating || sensed.docked;
@@ -240,8 +240,8 @@ void follow_unfelt(const ServoPlan<N>& plan, ServoState<N>& state,
     state.contact.proxy = {};
     return;
   }
-  static_cast<void>(
-      feel_swept(plan, state, sensed.tip_mm, state.rotation, sensed.velocity_mm_per_s));
+  out.samples_read =
+      feel_swept(plan, state, sensed.tip_mm, state.rotation, sensed.velocity_mm_per_s).queried;
   state.force_law.begin_anew();
   state.contact.proxy.ramp();
 }
@@ -260,7 +260,7 @@ Wanted<N> wanted_force(const ServoPlan<N>& plan, ServoState<N>& state, const Sen
   state.contact_n = {};
   state.proxy_offset_mm = {};
   if (sensed.usable && (!supervisor.motors_on() || state.hold)) {
-    follow_unfelt(plan, state, sensed);
+    follow_unfelt(plan, state, sensed, out);
     return {};
   }
   if (!supervisor.motors_on()) return {};
@@ -277,6 +277,7 @@ Wanted<N> wanted_force(const ServoPlan<N>& plan, ServoState<N>& state, const Sen
   }
   state.contact_n = forces.contact_n;
   state.proxy_offset_mm = forces.proxy_offset_mm;
+  out.samples_read = forces.queried;
   out.proxy_offset_mm = as_doubles(forces.proxy_offset_mm);
   out.tip_torque_n_mm = as_doubles(forces.tip_torque_n_mm);
   tell_planes(forces.tool, out);

@@ -25,11 +25,14 @@ struct QueryWork {
 
   /// What a look for a free way costs: each waits for what the last one found.
   static constexpr std::int64_t kFreeLook = 12;
+  /// What it costs to see whether any voxel near a sample reaches the iso.
+  static constexpr std::int64_t kNearLook = 27;
 
   std::int64_t query = 0;   ///< one query at most: all samples in every volume
   std::int64_t closer = 0;  ///< its closer looks at most
   std::int64_t turn = 0;    ///< to place all samples anew
   std::int64_t head = 0;    ///< query and turn of the head alone; 0: there is nothing behind it
+  std::int64_t near = 0;    ///< of a query, which begins whether or not the tick has so much left
 
   /// Of a head, or of it and a part behind, and one more part. The head and one part may always
   /// look closer; another one does where there is work left for it.
@@ -37,7 +40,7 @@ struct QueryWork {
                                                      const QueryWork& b) noexcept {
     const bool more = a.head > 0;
     return {a.query + b.query, more ? a.closer : a.closer + b.closer, a.turn + b.turn,
-            more ? a.head : a.query + a.turn};
+            more ? a.head : a.query + a.turn, a.near + b.near};
   }
   /// Of a tick. No query begins that might go beyond it, but for the first after a turn, which then
   /// has no closer look.
@@ -53,7 +56,8 @@ struct QueryWork {
   [[nodiscard]] constexpr std::int64_t most() const noexcept {
     constexpr std::int64_t kTurns = SweepRules::kMaxTurnQueries + 1;
     const std::int64_t after = 8 * (query + closer) > budget() ? turn + query : 0;
-    return std::min(budget() + after, SweepRules::kMaxQueries * (query + closer) + kTurns * turn);
+    return std::min(budget() + after + 2 * near,
+                    SweepRules::kMaxQueries * (query + closer + near) + kTurns * turn);
   }
 };
 
@@ -68,7 +72,10 @@ template <class N>
                                                 : 2 * kCloseup + 2 * (kLook + kPatchSamples);
   const std::int64_t query = std::int64_t{point_shell.groups} * kPointGroup + kLook;
   const auto times = static_cast<std::int64_t>(volumes);
-  return {times * query, times * closer, times * (point_shell.count / 8)};
+  return {.query = times * query,
+          .closer = times * closer,
+          .turn = times * (point_shell.count / 8),
+          .near = times * QueryWork::kNearLook};
 }
 
 }  // namespace kerf

@@ -127,7 +127,7 @@ class SampleReader {
   [[nodiscard]] bool iso_is_near(const ContactVolume<N>& volume, VoxelVec<Real> at,
                                  std::int32_t sample) const noexcept {
     constexpr std::int32_t kNear = 3;  // voxels: the reach of a closeup, and its cell
-    left_ -= kNear * kNear * kNear;    // a sample has eight voxels
+    left_ -= QueryWork::kNearLook;     // a sample has eight voxels
     const VoxelGrid& grid = volume.field.grid;
     const PointNumber<N> centre[3] = {number_of(at.x), number_of(at.y), number_of(at.z)};
     const std::int32_t end[3] = {grid.nx, grid.ny, grid.nz};

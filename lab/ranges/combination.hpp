@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "controller/scene/scene.hpp"
+#include "lab/ranges/key_levels.hpp"
+#include "lab/ranges/rules.hpp"
+
+namespace kerf::ranges {
+
+/// The files that scenes of a run name, in a folder that goes with this: a half space of 32^3
+/// voxels of 0.25 mm with air above it, labelled enamel over dentin, and the mesh of a bur.
+class SceneFolder {
+ public:
+  SceneFolder();
+  ~SceneFolder();
+  SceneFolder(const SceneFolder&) = delete;
+  SceneFolder& operator=(const SceneFolder&) = delete;
+
+  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+/// What became of one scene.
+struct Outcome {
+  bool refused = false;
+  std::string refusal;
+  std::vector<Violation> violations;
+  bool felt = false, cut = false, faulted = false;
+  std::size_t ticks = 0;
+};
+
+/// Loads the scene of these values in these numbers and plays the hard hand to it. Rules besides
+/// those of every tick (rules.hpp):
+///
+///   line       what the loader refuses is one line "place: value; way out"
+///   faded      after 25 ms of silence the motors are off, without force
+///   armed      50 ms parked at rest forgive every fault
+///   active     100 ms after it was taken in hand the motors are on, if they are known
+///   removed    densities fall by exactly what the ticks told
+///   again      a second servo gives the same bits for the same reports
+///   recovered  a servo restored from the state after the last recovery gives the same bits
+///
+/// `file` is written and read; one for each thread.
+[[nodiscard]] Outcome run_combination(const KeyTexts& texts, NumericKind numeric,
+                                      const std::filesystem::path& file);
+
+/// Loads it only: whether it is refused, and how.
+[[nodiscard]] Outcome load_combination(const KeyTexts& texts, NumericKind numeric,
+                                       const std::filesystem::path& file);
+
+}  // namespace kerf::ranges

@@ -1,0 +1,192 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "lab/ranges/command.hpp"
+
+#include <algorithm>
+#include <cstdio>
+#include <ostream>
+#include <thread>
+
+#include "lab/ranges/extreme_rows.hpp"
+#include "lab/ranges/key_study.hpp"
+#include "lab/ranges/long_run.hpp"
+#include "lab/rig/lab_run.hpp"
+#include "shared/posix/progress_bar.hpp"
+#include "shared/text/json.hpp"
+
+namespace kerf::ranges {
+namespace {
+
+std::string keys_of(const KeyTexts& texts) {
+  std::string line;
+  for (const auto& [key, text] : texts) line += (line.empty() ? "" : ", ") + key + " = " + text;
+  return line.empty() ? "no key" : line;
+}
+
+std::string key_line(const KeyRow& row) {
+  char text[160];
+  std::snprintf(text, sizeof text, "%-34s %3zu ran %3zu refused   beyond %zu of %zu refused   %s",
+                std::string(row.levels.key->name).c_str(), row.ends.ran, row.ends.refused,
+                row.beyond_refused, row.levels.beyond.size(),
+                row.ends.broken.empty() ? "pass" : "FAIL");
+  return text;
+}
+
+std::string tally_text(const Tally& tally) {
+  return std::to_string(tally.ran) + " ran, " + std::to_string(tally.refused) + " refused; " +
+         std::to_string(tally.felt) + " felt, " + std::to_string(tally.cut) + " cut, " +
+         std::to_string(tally.faulted) + " met a fault; " + std::to_string(tally.ticks) + " ticks";
+}
+
+std::string long_line(NumericKind numeric, const LongRun& run) {
+  char text[400];
+  std::snprintf(
+      text, sizeof text,
+      "long run  %-6s %.3g h, %llu ticks: carry %.3g voxels, ledger off by %.2g of %.6g mJ, a "
+      "round takes %.6g and then %.6g mJ, %llu ramps of %llu to %llu ticks, %llu steps "
+      "removed; %.0f ticks/s   %s",
+      std::string(word_of(numeric)).c_str(), static_cast<double>(run.ticks) / 3.6e6,
+      static_cast<unsigned long long>(run.ticks), run.largest_carry, run.ledger_off_mj,
+      run.absorbed_mj, run.first_cycle_mj, run.last_cycle_mj,
+      static_cast<unsigned long long>(run.ramps),
+      static_cast<unsigned long long>(run.shortest_ramp),
+      static_cast<unsigned long long>(run.longest_ramp),
+      static_cast<unsigned long long>(run.removed), run.ticks_per_s,
+      run.violations.empty() ? "pass" : "FAIL");
+  return text;
+}
+
+/// What a run tells and writes.
+class Teller {
+ public:
+  explicit Teller(std::ostream& out) : out_(out) {}
+
+  void row(const std::string& group, const std::string& name, const std::string& rule,
+           const std::string& line, std::size_t broken) {
+    out_ << line << std::endl;
+    violations_ += broken;
+    rows_.push_back({{"group", group},
+                     {"name", name},
+                     {"rule", rule},
+                     {"told", line},
+                     {"violations", static_cast<std::int64_t>(broken)}});
+  }
+  void broken(const Violation& violation) {
+    out_ << "  broken: " << violation.rule << ": " << violation.what << '\n';
+  }
+  void broken(const Broken& one) {
+    broken(one.violation);
+    out_ << "    " << word_of(one.numeric) << ": " << keys_of(one.texts) << '\n';
+  }
+  [[nodiscard]] std::size_t violations() const { return violations_; }
+  [[nodiscard]] const Json& rows() const { return rows_; }
+
+ private:
+  std::ostream& out_;
+  std::size_t violations_ = 0;
+  Json rows_ = Json::List{};
+};
+
+constexpr const char* kTickRules = "rules of every tick and scene (lab/ranges/rules.hpp)";
+
+void tell_keys(const std::vector<KeyRow>& keys, Teller& teller) {
+  Tally all;
+  for (const KeyRow& row : keys) {
+    teller.row("key", std::string(row.levels.key->name), kTickRules, key_line(row),
+               row.ends.broken.size());
+    for (const Broken& one : row.ends.broken) teller.broken(one);
+    all.add(row.ends);
+  }
+  teller.row("keys", "ends alone", kTickRules, "ends alone: " + tally_text(all), 0);
+}
+
+void tell_extremes(const Effort& effort, const std::vector<KeyRow>& keys, Teller& teller) {
+  for (const ExtremeRow& row : extreme_rows()) {
+    std::vector<Violation> broken;
+    std::string told = row.measure != nullptr ? row.measure(effort, keys, broken) : "";
+    for (const ShownBy& test : row.shown_by) {
+      told += (told.empty() ? "" : "; ") + ("tests/" + std::string(test.file)) + " \"" + test.name +
+              '"';
+    }
+    teller.row(
+        "extreme", row.name, row.rule,
+        std::string(row.name) + ": " + row.rule + "\n    " + told + "   " +
+            (broken.empty() ? (row.measure != nullptr ? "pass" : "shown by the tests") : "FAIL"),
+        broken.size());
+    for (const Violation& violation : broken) teller.broken(violation);
+  }
+}
+
+void tell_pairs(const PairRows& pairs, Teller& teller) {
+  teller.row("pairs", "ends of two keys", kTickRules,
+             "pairs: " + std::to_string(pairs.arrays) + " arrays, " +
+                 std::to_string(pairs.together) + " of " + std::to_string(pairs.pairs) +
+                 " pairs stood together; " + tally_text(pairs.tally),
+             pairs.tally.broken.size());
+  constexpr std::size_t kTold = 8;
+  for (std::size_t i = 0; i < std::min(kTold, pairs.tally.broken.size()); ++i) {
+    teller.broken(shrunk(pairs.tally.broken[i]));
+  }
+}
+
+}  // namespace
+
+Command::Command(Arguments& program)
+    : LabCommand(program, "ranges", "the servo at the ends of all that can be set, by rule") {
+  app_.option("--combinations", combinations_,
+              "of keys at their ends, at least; 0: no key and no pair")
+      .within(0, 1e8)
+      .shows_default();
+  app_.option("--hours", hours_,
+              "of a run at 1 kHz in virtual time, in all numbers (default: none)")
+      .within(0, 1000);
+  app_.option("--seed", seed_, "of the covering arrays").within(0, 1e9).shows_default();
+  app_.option("--jobs", jobs_, "threads (default: all cores)").within(1, 1024);
+  app_.option("--numeric", numerics_, "only these numbers of the loop")
+      .one_of({kNumericWords.begin(), kNumericWords.end()})
+      .split_at_commas();
+  app_.option("--report", report_, "write the rows as JSON").shown_as("FILE");
+  app_.footer("Exit codes: 0 no rule is broken, 1 one is, 2 bad input or set-up.");
+}
+
+int Command::run(std::ostream& out) const {
+  Effort effort;
+  for (std::size_t i = 0; i < kNumericWords.size(); ++i) {
+    const bool wanted =
+        numerics_.empty() || std::ranges::find(numerics_, kNumericWords.at(i)) != numerics_.end();
+    if (wanted) effort.numerics.push_back(static_cast<NumericKind>(i));
+  }
+  effort.combinations = static_cast<std::size_t>(combinations_);
+  effort.seed = static_cast<std::uint64_t>(seed_);
+  effort.jobs = jobs_ > 0 ? static_cast<std::size_t>(jobs_)
+                          : std::max(1U, std::thread::hardware_concurrency());
+  const LabOutput report("--report", report_);
+  const ProgressBar bar(true);
+  const auto progress = [&](double share, const std::string& what) { bar.show(share, what); };
+  Teller teller(out);
+  if (combinations_ > 0) {
+    const std::vector<KeyRow> keys = study_keys(effort, progress);
+    bar.hide();
+    tell_keys(keys, teller);
+    tell_extremes(effort, keys, teller);
+    const PairRows pairs = study_pairs(keys, effort, progress);
+    bar.hide();
+    tell_pairs(pairs, teller);
+  }
+  for (const NumericKind numeric : effort.numerics) {
+    const auto ticks = static_cast<std::uint64_t>(hours_ * 3.6e6);
+    if (ticks == 0) break;
+    const LongRun run =
+        run_long(numeric, ticks, [&](double share) { bar.show(share, "long run"); });
+    bar.hide();
+    teller.row("long", std::string(word_of(numeric)), "as lab/ranges/long_run.hpp says",
+               long_line(numeric, run), run.violations.size());
+    for (const Violation& violation : run.violations) teller.broken(violation);
+  }
+  out << "violations: " << teller.violations() << std::endl;
+  report.write(
+      Json{{"rows", teller.rows()}, {"violations", static_cast<std::int64_t>(teller.violations())}}
+          .document());
+  return teller.violations() == 0 ? 0 : 1;
+}
+
+}  // namespace kerf::ranges

@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "lab/ranges/rules.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <span>
+#include <utility>
+
+#include "controller/plan/plan_device.hpp"
+
+namespace kerf::ranges {
+namespace {
+
+double dot(const std::array<double, 3>& a, const std::array<double, 3>& b) {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+std::array<double, 3> minus(const std::array<double, 3>& a, const std::array<double, 3>& b) {
+  return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
+}
+double length(const std::array<double, 3>& v) {
+  return std::sqrt(dot(v, v));
+}
+
+/// From `f` to the nearest force between 0 and `last`.
+double beyond_fall(const std::array<double, 3>& f, const std::array<double, 3>& last) {
+  const double whole = dot(last, last);
+  const double share = whole > 0 ? std::clamp(dot(f, last) / whole, 0.0, 1.0) : 0.0;
+  return length(minus(f, {last[0] * share, last[1] * share, last[2] * share}));
+}
+
+std::string figures(const char* form, double a, double b) {
+  char text[96];
+  std::snprintf(text, sizeof text, form, a, b);
+  return text;
+}
+
+bool all_finite(const ServoOutput& out) {
+  const auto finite = [](std::span<const double> values) {
+    return std::ranges::all_of(values, [](double x) { return std::isfinite(x); });
+  };
+  for (const PlaneLoad& plane : out.planes) {
+    if (!finite(plane.normal) || !finite(plane.arm_mm) || !std::isfinite(plane.load_n))
+      return false;
+  }
+  const std::array<double, 4> single{out.absorbed_mj, out.press_n, out.spindle_ratio,
+                                     out.spindle_load};
+  return finite(out.gimbal_rad) && finite(out.position_mm) && finite(out.rotation) &&
+         finite(out.velocity_mm_per_s) && finite(out.force_n) && finite(out.contact_n) &&
+         finite(out.modification_n) && finite(out.torque_n_mm) && finite(out.proxy_offset_mm) &&
+         finite(out.tip_torque_n_mm) && finite(single);
+}
+
+}  // namespace
+
+Rules::Rules(const LoadedScene& scene, std::uint64_t most_samples)
+    : force_n_(scene.limits.force_n),
+      slew_n_(scene.limits.slew_n_per_ms * 1000 / scene.servo.rate_hz),
+      limit_mm_(scene.limits.speed_mm_per_s / scene.servo.rate_hz),
+      scale_(scene.device.workspace_scale),
+      most_samples_(most_samples),
+      legs_(scene.device.personality == Personality::falcon),
+      motor_end_(device_parts::motor_count_end(scene.device.personality)),
+      zero_ticks_(static_cast<std::size_t>(20.0 * scene.servo.rate_hz / 1000)) {
+  // The place is told in the scene: two roundings of the loop's numbers, and the offset's.
+  const auto& offset = scene.device.offset_mm;
+  const double farthest =
+      std::max({std::abs(offset[0]), std::abs(offset[1]), std::abs(offset[2])}) + 500 * scale_;
+  const bool is_float = scene.servo.numeric == NumericKind::float32;
+  const double step = is_float ? std::ldexp(1.0, -23) : std::ldexp(1.0, -50);
+  const double fixed_step = scene.servo.numeric == NumericKind::fixed ? std::ldexp(1.0, -15) : 0;
+  place_error_mm_ = 2 * (fixed_step + farthest * step) / scale_ + 500 * step;
+  energy_error_ = is_float ? 1e-6 : 1e-9;  // of the whole ledger, a tick
+}
+
+void Rules::broken(const char* rule, std::string what) {
+  if (std::ranges::find(violations_, rule, &Violation::rule) != violations_.end()) return;
+  violations_.push_back({rule, "tick " + std::to_string(tick_) + ": " + std::move(what)});
+}
+
+void Rules::look_at_force(const ServoOutput& out, bool leaves) {
+  constexpr double kRounding = 4.0 / 65536;  // of the loop's coarsest force, N
+  const double force_n = length(out.force_n);
+  if (!(force_n <= force_n_)) broken("clamp", figures("%.9g N above %.9g", force_n, force_n_));
+  const int most = std::max({std::abs(out.motor_counts[0]), std::abs(out.motor_counts[1]),
+                             std::abs(out.motor_counts[2])});
+  if (most > motor_end_)
+    broken("clamp", figures("%.0f motor counts, beyond %.0f", most, motor_end_));
+  if (!out.motors_on) {
+    if (most != 0 || force_n != 0) broken("off", figures("%.0f counts, %.9g N", most, force_n));
+    return;
+  }
+  const bool may =
+      (out.phase == Phase::ramping || out.phase == Phase::active) && out.fault == Fault::none;
+  if (!may) broken("off", "motors on in phase " + std::to_string(static_cast<int>(out.phase)));
+  const double step_n = leaves || most >= motor_end_ ? beyond_fall(out.force_n, last_force_n_)
+                                                     : length(minus(out.force_n, last_force_n_));
+  if (!(step_n <= slew_n_ + kRounding))
+    broken("slew", figures("%.9g N in a tick, above %.9g", step_n, slew_n_));
+}
+
+void Rules::look_at_motion(const DeviceReport& report, const ServoOutput& out, double way_mm) {
+  const double allowed_mm = limit_mm_ * static_cast<double>(gap_) * 1.001 + place_error_mm_;
+  if (!report.parked && way_mm > allowed_mm && out.motors_on) {
+    broken("overspeed",
+           figures("%.6g mm in a tick, above %.6g, and motors on", way_mm, allowed_mm));
+  }
+  const double booked_mj = std::abs(out.absorbed_mj - last_mj_);
+  const double most_mj = largest_gap_n_ * (way_mm + place_error_mm_) * 1.001 +
+                         energy_error_ * (std::abs(last_mj_) + 1) + 1e-9;
+  if (!(booked_mj <= most_mj))
+    broken("energy", figures("%.9g mJ booked, at most %.9g", booked_mj, most_mj));
+}
+
+void Rules::look_at(const DeviceReport& report, const ServoOutput& out) {
+  if (!all_finite(out)) broken("finite", "an output is no number");
+  const Vector moved_mm = known_ ? minus(out.position_mm, last_mm_) : Vector{};
+  ++gap_;
+  largest_gap_n_ = std::max(largest_gap_n_, length(last_force_n_));
+  const bool leaves = report.fresh && dot(last_force_n_, moved_mm) >= 0;
+  look_at_force(out, leaves);
+  stale_ticks_ = report.fresh ? 0 : stale_ticks_ + 1;
+  if (stale_ticks_ > 0 && length(out.force_n) > length(last_force_n_) + 1e-4) {
+    broken("stale", "a force grows without reports");
+  }
+  if (stale_ticks_ >= zero_ticks_ && out.motors_on)
+    broken("stale", "motors on after 20 ms of silence");
+  if (report.fresh) {
+    if (known_) look_at_motion(report, out, length(moved_mm) / scale_);
+    // Legs that cannot meet have no place: the tip stays, and the gap goes on.
+    const bool placed = !known_ || !legs_ || length(moved_mm) > 0;
+    known_ = true;
+    if (placed) {
+      gap_ = 0;
+      largest_gap_n_ = 0;
+    }
+    last_mm_ = out.position_mm;
+  }
+  last_mj_ = out.absorbed_mj;
+  if (out.samples_read < 0 || static_cast<std::uint64_t>(out.samples_read) > most_samples_) {
+    broken("work", figures("%.0f samples, planned with %.0f", static_cast<double>(out.samples_read),
+                           static_cast<double>(most_samples_)));
+  }
+  last_force_n_ = out.force_n;
+  ++tick_;
+}
+
+}  // namespace kerf::ranges
