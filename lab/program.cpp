@@ -8,6 +8,7 @@
 #include "lab/bench/bench_command.hpp"
 #include "lab/extremes/command.hpp"
 #include "lab/faults/command.hpp"
+#include "lab/sweep/command.hpp"
 #include "shared/posix/failure.hpp"
 #include "shared/text/command_line.hpp"
 
@@ -20,7 +21,8 @@ int run_lab(int argc, const char* const* argv, std::ostream& out, std::ostream& 
   const accuracy::Command accuracy(app);
   const extremes::Command extremes(app);
   const faults::Command faults(app);
-  const std::array<const LabCommand*, 4> commands{&bench, &accuracy, &extremes, &faults};
+  const sweep::Command sweep(app);
+  const std::array<const LabCommand*, 5> commands{&bench, &accuracy, &extremes, &faults, &sweep};
   try {
     if (!app.parse(argc, argv, out)) return 0;
     for (const LabCommand* command : commands) {
