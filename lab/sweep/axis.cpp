@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <optional>
 
 #include "controller/scene/scene_setting.hpp"
@@ -46,8 +47,10 @@ std::optional<std::vector<std::string>> range_of(std::string_view text, std::str
   std::vector<std::string> list;
   const auto last = static_cast<int>(*count) - 1;
   for (int i = 0; i <= last; ++i) {
-    // The ends are exact, and the same value comes out whichever way the axis runs.
-    list.push_back(number_text(i == last ? *hi : *lo + (*hi - *lo) * i / last));
+    // Twelve digits: a step of a tenth reads as one. The ends are as they were written.
+    char digits[32];
+    std::snprintf(digits, sizeof digits, "%.12g", *lo + (*hi - *lo) * i / std::max(last, 1));
+    list.push_back(i == 0 ? number_text(*lo) : i == last ? number_text(*hi) : digits);
   }
   return list;
 }

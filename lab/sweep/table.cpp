@@ -64,7 +64,9 @@ Table::~Table() {
   if (fd_ >= 0) close(fd_);
 }
 
-void Table::fail(const char* what) const {
+void Table::fail(const char* what) {
+  if (fd_ >= 0) close(fd_);  // and its lock, in a constructor too
+  fd_ = -1;
   throw HilError("--out " + part_.string() + ": " + what);
 }
 

@@ -35,7 +35,7 @@ class Table {
   void finish(const std::string& head);
 
  private:
-  [[noreturn]] void fail(const char* what) const;
+  [[noreturn]] void fail(const char* what);
 
   std::filesystem::path folder_, part_;
   int fd_ = -1;

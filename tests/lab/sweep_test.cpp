@@ -174,7 +174,7 @@ TEST_CASE(
   Pair pair;  // as ./kerf demo starts the two
   pair.scene = "touch.toml";
   pair.start("touch.toml", {"--virtual", "--seconds", "1", "--device", "omni", "--rate", "1000"},
-             {"--lockstep", "--rate", "1000", "--unit-mm", fine.at("run").empty() ? "1" : "1"});
+             {"--lockstep", "--rate", "1000", "--unit-mm", "1"});
   REQUIRE(pair.controller->wait() == 0);
   const auto report = pair.report();
   CHECK(report["output_hash"] == fine.at("output_hash"));
