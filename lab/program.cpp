@@ -11,6 +11,7 @@
 #include "lab/faults/command.hpp"
 #include "lab/law/command.hpp"
 #include "lab/ranges/command.hpp"
+#include "lab/sweep/command.hpp"
 #include "lab/zwidth/command.hpp"
 #include "shared/posix/failure.hpp"
 #include "shared/text/command_line.hpp"
@@ -27,10 +28,11 @@ int run_lab(int argc, const char* const* argv, std::ostream& out, std::ostream& 
   const faults::Command faults(app);
   const laws::Command laws(app);
   const ranges::Command ranges(app);
+  const sweep::Command sweep(app);
   const zwidth::Command zwidth(app);
   const zwidth::MergeCommand merge(app);
-  const std::array<const LabCommand*, 9> commands{&bench, &accuracy, &energy, &extremes, &faults,
-                                                  &laws,  &ranges,   &zwidth, &merge};
+  const std::array<const LabCommand*, 10> commands{
+      &bench, &accuracy, &energy, &extremes, &faults, &laws, &ranges, &sweep, &zwidth, &merge};
   try {
     if (!app.parse(argc, argv, out)) return 0;
     for (const LabCommand* command : commands) {

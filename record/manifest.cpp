@@ -55,6 +55,8 @@ Manifest read_manifest(const std::filesystem::path& folder) {
     const Json json = Json::parse(text);
     out.tick_ns = json.at("tick_ns").get<std::uint32_t>();
     out.end_reason = json.at("end_reason").get<std::string>();
+    out.lost_ticks = json.at("lost_ticks").get<std::uint64_t>();
+    out.missed_before_start = json.at("missed_before_start").get<std::uint64_t>();
     for (const Json& volume : json.at("volumes")) {
       const auto spacing = volume.at("spacing_mm").get<std::array<double, 3>>();
       out.voxel_mm3.push_back(spacing[0] * spacing[1] * spacing[2]);

@@ -14,12 +14,16 @@ namespace kerf {
 inline constexpr std::string_view kTickLogName = "ticks.npy";
 inline constexpr std::string_view kManifestName = "manifest.json";
 inline constexpr std::string_view kSceneName = "scene.json";
+inline constexpr std::string_view kStillRunning = "running";
 
 /// What a log needs beside its rows.
 struct Manifest {
   std::uint32_t tick_ns = 0;
   std::vector<double> voxel_mm3;  ///< per volume
   std::string end_reason;
+  std::uint64_t lost_ticks = 0;  ///< by the recorder; a killed one has not told yet
+  std::uint64_t missed_before_start = 0;
+  [[nodiscard]] bool complete() const { return end_reason != kStillRunning; }
 };
 
 /// Writes manifest.json, whole or not at all.

@@ -2,6 +2,7 @@
 #include <filesystem>
 #include <iostream>
 
+#include "record/log_columns.hpp"
 #include "record/summary.hpp"
 #include "shared/posix/failure.hpp"
 #include "shared/posix/new_file.hpp"
@@ -12,7 +13,7 @@
 namespace kerf {
 namespace {
 
-/// `info DIR`, `plot DIR --out FILE.svg`, `export DIR --csv FILE`. Bad input throws.
+/// `info DIR`, `plot DIR --out FILE.svg`, `export DIR --csv FILE`, `columns`. Bad input throws.
 int run_record(int argc, char** argv) {
   CommandLine app("Looks at what kerf-recorder wrote.", "kerf-record", KERF_VERSION);
   std::filesystem::path folder;
@@ -30,7 +31,9 @@ int run_record(int argc, char** argv) {
   plot.option("--out", svg, "the SVG file").required();
   Arguments table = add_command("export", "every tick as a line of text");
   table.option("--csv", csv, "the CSV file").required();
+  const Arguments columns = app.command("columns", "what each column of a log says, as a page");
   if (!app.parse(argc, argv, std::cout)) return 0;
+  if (columns.chosen()) std::cout << log_page();
   if (info.chosen()) {
     const RecordSummary summary = summarise(folder);
     std::cout << to_text(summary);

@@ -83,7 +83,7 @@ int run_recorder(const RecorderOptions& options, const std::atomic<bool>& stop) 
   TickLogWriter log(options.out / kTickLogName);
   write_new_file(options.out / kSceneName, reader.info().scene_json);
   Recorder recorder(reader, log);
-  write_manifest(options.out, reader.info(), recorder, 0, "running");
+  write_manifest(options.out, reader.info(), recorder, 0, kStillRunning);
 
   std::uint64_t reported_lost = 0;
   auto next_sync = Clock::now() + kSyncPeriod;

@@ -20,11 +20,14 @@ namespace {
                {"last_tick", s.last_tick},
                {"seconds", s.seconds},
                {"lost_ticks", s.lost_ticks},
+               {"missed_before_start", s.missed_before_start},
                {"contact_ticks", s.contact_ticks},
                {"shaft_ticks", s.shaft_ticks},
                {"stale_ticks", s.stale_ticks},
                {"faults", s.faults},
                {"missed_deadlines", s.missed_deadlines},
+               {"lost_packets", s.lost_packets},
+               {"refused_packets", s.refused_packets},
                {"peak_force_n", s.peak_force_n},
                {"deepest_mm", s.deepest_mm},
                {"removed_mm3", s.removed_mm3},
@@ -45,14 +48,12 @@ RecordSummary summarise(const std::filesystem::path& folder) {
   RecordSummary out;
   out.rows = log.rows();
   out.end_reason = manifest.end_reason;
-  std::uint64_t next_seq = 0;
+  out.missed_before_start = manifest.missed_before_start;
+  std::uint64_t next_seq = 2 * manifest.missed_before_start + 2;  // of index i: 2 i + 2
   std::uint32_t fault = 0;
   log.for_each([&](const TickRecord& record) {
-    if (next_seq == 0) {
-      out.first_tick = record.tick;
-    } else if (record.seq > next_seq) {
-      out.lost_ticks += (record.seq - next_seq) / 2;
-    }
+    if (out.last_tick == 0) out.first_tick = record.tick;
+    if (record.seq > next_seq) out.lost_ticks += (record.seq - next_seq) / 2;
     next_seq = record.seq + 2;
     out.last_tick = record.tick;
     out.contact_ticks += (record.flags & kFlagContact) != 0 ? 1 : 0;
@@ -61,6 +62,8 @@ RecordSummary summarise(const std::filesystem::path& folder) {
     out.faults += record.fault != 0 && record.fault != fault ? 1 : 0;
     fault = record.fault;
     out.missed_deadlines = std::max(out.missed_deadlines, record.missed_deadlines);
+    out.lost_packets = std::max(out.lost_packets, record.lost_packets);
+    out.refused_packets = std::max(out.refused_packets, record.refused_packets);
     out.peak_force_n = std::max(out.peak_force_n, magnitude(record.commanded_force_n));
     out.deepest_mm = std::max(out.deepest_mm, double{record.penetration_mm});
     out.removed_mm3 += removed_mm3(record, manifest.voxel_mm3);
@@ -70,6 +73,7 @@ RecordSummary summarise(const std::filesystem::path& folder) {
       out.energy_mj[i] = energy_mj_of_steps(record.*kEnergyColumns[i]);
     }
   });
+  if (manifest.complete()) out.lost_ticks = std::max(out.lost_ticks, manifest.lost_ticks);
   if (out.rows != 0) {
     out.seconds = static_cast<double>(out.last_tick - out.first_tick + 1) * manifest.tick_ns * 1e-9;
   }
@@ -80,7 +84,7 @@ std::string to_text(const RecordSummary& summary) {
   std::ostringstream text;
   const Json list = figures(summary);
   for (const auto& [name, value] : list.members()) {
-    text << std::left << std::setw(18) << name;
+    text << std::left << std::setw(20) << name;
     if (value.is_text()) {
       text << value.get<std::string>();
     } else if (value.is_fraction()) {

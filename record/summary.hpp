@@ -16,12 +16,17 @@ struct RecordSummary {
   std::uint64_t first_tick = 0;
   std::uint64_t last_tick = 0;
   double seconds = 0;
-  std::uint64_t lost_ticks = 0;  ///< from the sequence numbers of the rows
+  /// Published while recording, and in no row: by the rows' sequence numbers; what went missing
+  /// behind the last row, by the manifest.
+  std::uint64_t lost_ticks = 0;
+  std::uint64_t missed_before_start = 0;  ///< published and gone before the recorder came
   std::uint64_t contact_ticks = 0;
   std::uint64_t shaft_ticks = 0;  ///< shaft or handpiece touched
   std::uint64_t stale_ticks = 0;
   std::uint64_t faults = 0;  ///< times that the fault code became another one than 0
   std::uint32_t missed_deadlines = 0;
+  std::uint32_t lost_packets = 0;
+  std::uint32_t refused_packets = 0;
   double peak_force_n = 0;
   double deepest_mm = 0;
   double removed_mm3 = 0;

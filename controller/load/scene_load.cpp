@@ -242,7 +242,7 @@ void fit_to_volume(double written_mm, Scene& spec, LoadedScene& scene) {
 }  // namespace
 
 LoadedScene load_scene(const std::filesystem::path& path, const SceneOverrides& overrides) {
-  Scene spec = parse_scene_file(path);
+  Scene spec = parse_scene_file(path, overrides.settings);
   const double written_mm = written_voxel_mm(spec.volumes.front());
   const std::optional<double> written_iso = spec.volumes.front().iso;
   apply_overrides(overrides, spec);

@@ -4,14 +4,17 @@
 #include <array>
 #include <filesystem>
 #include <optional>
+#include <vector>
 
 #include "controller/load/loaded_scene.hpp"
 #include "controller/sandbox/sandbox.hpp"
+#include "controller/scene/scene_setting.hpp"
 
 namespace kerf {
 
 /// What the command line may change of a scene. Spacing and window belong to the first volume.
 struct SceneOverrides {
+  std::vector<SceneSetting> settings{};                 ///< --set table.key=VALUE
   std::optional<std::filesystem::path> volume_file{};   ///< --volume, "phantom" or a path
   std::optional<std::array<double, 3>> spacing_mm{};    ///< --spacing a[,b,c]
   std::optional<std::array<double, 2>> window{};        ///< --window lo,hi

@@ -125,16 +125,19 @@ Scene read_scene(const TomlNode& root, const std::filesystem::path& path, SceneK
 
 }  // namespace
 
-Scene parse_scene(std::string_view text, const std::filesystem::path& path, SceneKeys keys) {
+Scene parse_scene(std::string_view text, const std::filesystem::path& path, SceneKeys keys,
+                  std::span<const SceneSetting> settings) {
   try {
-    return read_scene(parse_toml(text), path, keys);
+    TomlNode root = parse_toml(text);
+    put_settings(settings, root);
+    return read_scene(root, path, keys);
   } catch (const TomlError& error) {
     refuse(path.string() + ":" + std::to_string(error.line) + ":" + std::to_string(error.column),
            std::string(": ") + error.what());
   }
 }
 
-Scene parse_scene_file(const std::filesystem::path& path) {
+Scene parse_scene_file(const std::filesystem::path& path, std::span<const SceneSetting> settings) {
   constexpr std::uintmax_t kLargestFile = std::uintmax_t{1} << 20;
   std::error_code fault;
   if (!exists(symlink_status(path, fault))) {
@@ -155,7 +158,7 @@ Scene parse_scene_file(const std::filesystem::path& path) {
   }
   const std::string text{std::istreambuf_iterator<char>(file), {}};
   if (!file) refuse(path.string(), ": cannot be read; check its permissions");
-  return parse_scene(text, path);
+  return parse_scene(text, path, scene_keys(), settings);
 }
 
 void check_hand_script(const SceneSettings& scene) {

@@ -2,20 +2,25 @@
 #pragma once
 
 #include <filesystem>
+#include <span>
 #include <string_view>
 
 #include "controller/scene/scene.hpp"
 #include "controller/scene/scene_key.hpp"
+#include "controller/scene/scene_setting.hpp"
 
 namespace kerf {
 
-/// Reads TOML text. `path` is only used in messages and to resolve `script`. Throws SceneError, one
-/// line with the line number, for anything that is not a valid scene. Any thread; load time only.
+/// Reads TOML text, with `settings` in the place of what it says. `path` is only used in messages
+/// and to resolve `script`. Throws SceneError, one line with the line number, for anything that is
+/// not a valid scene. Any thread; load time only.
 [[nodiscard]] Scene parse_scene(std::string_view text, const std::filesystem::path& path,
-                                SceneKeys keys = scene_keys());
+                                SceneKeys keys = scene_keys(),
+                                std::span<const SceneSetting> settings = {});
 
 /// Reads a scene file of at most 1 MiB.
-[[nodiscard]] Scene parse_scene_file(const std::filesystem::path& path);
+[[nodiscard]] Scene parse_scene_file(const std::filesystem::path& path,
+                                     std::span<const SceneSetting> settings = {});
 
 /// Throws SceneError where the scene names a hand script that is no file. Only an emulated hand
 /// needs it, so loading does not look.

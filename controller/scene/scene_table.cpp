@@ -198,7 +198,9 @@ std::string SceneTable::place() const {
 }
 
 std::string place_of(const TomlNode& node, std::string_view name, const std::string& file) {
-  return file + ":" + std::to_string(node.line) + ": " + std::string(name) + " = " + node.shown;
+  // What stands in no line was set from outside.
+  const std::string at = node.line == 0 ? " --set " : std::to_string(node.line) + ": ";
+  return file + ":" + at + std::string(name) + " = " + node.shown;
 }
 
 }  // namespace kerf

@@ -13,7 +13,8 @@ namespace kerf {
 
 inline constexpr double kContactThresholdN = 0.01;  ///< a tick with more force is a contact tick
 
-/// Where the safety of the loop stands. Motors are on in `ramping` and `active` only.
+/// Where the safety of the loop stands. Motors are on in `ramping` and `active` only. Values go
+/// into logs: append only.
 enum class Phase : std::uint8_t {
   off,          ///< no report has come yet
   calibrating,  ///< never parked at rest yet, or homing lost: the joint angles are unknown

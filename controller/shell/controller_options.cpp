@@ -45,12 +45,16 @@ struct Raw {
   std::vector<double> spacing_mm, window, torque_scale;
   int rate_hz = 0;
   std::string numeric, device;
+  std::vector<std::string> settings;
   bool scene_keys = false;
 };
 
 /// What is touched, held and run.
 void declare_scene_options(Arguments& app, ControllerOptions& options, Raw& raw) {
   app.option("--scene", options.scene, "scene file (TOML)").shown_as("FILE");
+  app.option("--set", raw.settings, "another value of a key of the scene; may be given often")
+      .one_each()
+      .shown_as("KEY=VALUE");
   app.option("--volume", options.overrides.volume_file,
              "replace the first volume: NRRD, MetaImage, NIfTI, DICOM folder")
       .shown_as("FILE");
@@ -171,6 +175,7 @@ std::string wrong_with(const ControllerOptions& options, const Raw& raw) {
 }
 
 void override_scene(const Raw& raw, SceneOverrides& scene) {
+  for (const std::string& text : raw.settings) scene.settings.push_back(parse_setting(text));
   if (!raw.spacing_mm.empty()) scene.spacing_mm = three_of(raw.spacing_mm);
   if (!raw.window.empty()) scene.window = std::array{raw.window[0], raw.window[1]};
   if (raw.rate_hz != 0) scene.rate_hz = raw.rate_hz;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 
 #include "shared/numeric/fixed.hpp"
 #include "shared/numeric/rotation.hpp"
@@ -38,6 +39,25 @@ std::uint32_t flags_of(const DeviceReport& report, const ServoOutput& output) no
   set(output.refused, kFlagRefused);
   set(output.shaft, kFlagShaft);
   return flags;
+}
+
+/// The pose, as far as it is known: before docking the joint angles have no zero, and what
+/// kinematics makes of them is no place. Velocities of the dive to the first known place are none.
+void put_pose(const ServoOutput& output, TickRecord& record) noexcept {
+  const bool known = output.phase != Phase::off && output.phase != Phase::calibrating;
+  if (known) {
+    std::ranges::copy(output.position_mm, record.position_mm);
+    std::ranges::transform(quaternion_of(output.rotation), record.orientation,
+                           [](double q) { return static_cast<float>(q); });
+  } else {
+    std::ranges::fill(record.position_mm, std::numeric_limits<double>::quiet_NaN());
+    std::ranges::fill(record.orientation, std::numeric_limits<float>::quiet_NaN());
+  }
+  if (known && output.started) {
+    put(record.velocity_mm_per_s, output.velocity_mm_per_s);
+  } else {
+    std::ranges::fill(record.velocity_mm_per_s, std::numeric_limits<float>::quiet_NaN());
+  }
 }
 
 void put_raw(const DeviceReport& report, TickRecord& record) noexcept {
@@ -89,14 +109,12 @@ void Publisher::publish(Tick tick, const DeviceReport& report, const ServoOutput
     record.encoder_counts[3 + i] =
         static_cast<std::int32_t>(std::lround(output.gimbal_rad[i] * 1000));
   }
-  std::ranges::copy(output.position_mm, record.position_mm);
-  std::ranges::transform(quaternion_of(output.rotation), record.orientation,
-                         [](double q) { return static_cast<float>(q); });
-  put(record.velocity_mm_per_s, output.velocity_mm_per_s);
+  put_pose(output, record);
   put(record.commanded_force_n, output.force_n);
   put(record.contact_force_n, output.contact_n);
   put(record.modification_force_n, output.modification_n);
-  put(record.torque_n_mm, output.tip_torque_n_mm);
+  put(record.joint_torque_n_mm, output.torque_n_mm);
+  put(record.tip_torque_n_mm, output.tip_torque_n_mm);
   put(record.proxy_offset_mm, output.proxy_offset_mm);
   record.plane_count = output.plane_count;
   for (std::size_t i = 0; i < output.plane_count; ++i) {
@@ -116,7 +134,10 @@ void Publisher::publish(Tick tick, const DeviceReport& report, const ServoOutput
   }
   record.volume_hash = removal_hash_;
   record.output_hash = output.output_hash;
-  record.sub_steps = 1;
+  record.lost_packets = static_cast<std::uint32_t>(timing.lost_packets);
+  record.refused_packets = static_cast<std::uint32_t>(timing.refused_packets);
+  record.phase = static_cast<std::uint16_t>(output.phase);
+  record.press_n = static_cast<float>(output.press_n);
   record.last_command = last_command;
   put_raw(report, record);
   record.spindle_ratio = static_cast<float>(output.spindle_ratio);

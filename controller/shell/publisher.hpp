@@ -12,12 +12,14 @@
 
 namespace kerf {
 
-/// What the shell knows of a tick and the servo step must not: times and losses.
+/// What the shell knows of a tick and the servo step must not: times and losses, from its start on.
 struct TickTiming {
   std::int64_t start_ns = 0;
   std::int64_t late_ns = 0;
   std::int64_t compute_ns = 0;
   std::uint64_t missed_deadlines = 0;
+  std::uint64_t lost_packets = 0;
+  std::uint64_t refused_packets = 0;
 };
 
 /// Shows each tick to the readers of the segment, after the device has its command.

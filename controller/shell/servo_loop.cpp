@@ -111,6 +111,8 @@ EndReason run_servo(TickSource& clock, DeviceDriver& device, Servo& servo, Publi
     const ServoOutput output = servo.step(report);  // all physics, all limits
     timing.compute_ns = monotonic_ns() - in_hand_ns;
     timing.missed_deadlines = clock.overruns();
+    timing.lost_packets = device.lost();
+    timing.refused_packets = device.refused();
     send_tick(output, signals, device);  // the hand first,
     const std::int64_t sent_ns = monotonic_ns();
     eyes.publish(tick, report, output, last_command, timing);  // then the eyes

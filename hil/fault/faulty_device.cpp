@@ -42,14 +42,25 @@ bool FaultyDevice::host_is_late() const noexcept {
 }
 
 std::uint64_t FaultyDevice::met() const noexcept {
-  return static_cast<std::uint64_t>(std::ranges::count_if(faults_, &Running::met));
+  return static_cast<std::uint64_t>(
+      std::ranges::count_if(faults_, [](const Running& running) { return running.changed > 0; }));
+}
+
+std::vector<InjectedFault> FaultyDevice::injected() const {
+  std::vector<InjectedFault> list;
+  for (const Running& running : faults_) {
+    if (!running.begun) continue;
+    list.push_back(
+        {running.fault.kind, running.fault.of_commands, running.begun_at, running.changed});
+  }
+  return list;
 }
 
 bool FaultyDevice::hits(Running& running, bool of_commands) noexcept {
   const DeviceFault& fault = running.fault;
   if (fault.of_commands != of_commands || !runs(running)) return false;
   const bool hit = running.packets++ % fault.every == 0;
-  running.met = running.met || hit;
+  running.changed += hit ? 1 : 0;
   return hit;
 }
 
@@ -63,7 +74,7 @@ bool FaultyDevice::send_on(std::span<const std::uint8_t> packet, bool of_command
     const bool unplugged = fault.kind == FaultKind::unplug && runs(running);
     const bool silent = fault.kind == FaultKind::silence && !of_commands && runs(running);
     if (unplugged || silent) {
-      running.met = true;
+      ++running.changed;
       return false;
     }
     if (fault.kind > FaultKind::corrupt || !hits(running, of_commands)) continue;
@@ -139,7 +150,7 @@ void FaultyDevice::break_sensors(Bytes& packet) {
       default:
         break;
     }
-    running.met = running.met || *readings != before;
+    running.changed += *readings != before ? 1 : 0;
   }
   if (changed) put_readings(*readings, packet);
 }
@@ -158,7 +169,8 @@ void FaultyDevice::step_clock() noexcept {
   for (Running& running : faults_) {
     if (running.begun || !runs(running)) continue;
     running.begun = true;
-    running.met = running.fault.kind == FaultKind::host_late;
+    running.begun_at = cycle_;
+    running.changed = running.fault.kind == FaultKind::host_late ? 1 : 0;
     ++begun_;
   }
 }

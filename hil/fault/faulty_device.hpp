@@ -14,6 +14,14 @@
 
 namespace kerf {
 
+/// A fault of a script that has begun, and what it did.
+struct InjectedFault {
+  FaultKind kind = FaultKind::lose;
+  bool of_commands = false;
+  std::int64_t at_cycle = 0;  ///< of the device, from its start
+  std::uint64_t changed = 0;  ///< packets and readings that it changed; 1 for a host that is late
+};
+
 /// An emulated device whose packets and sensors go wrong by a script; without one it changes
 /// nothing. The same script and the same calls give the same faults. One thread.
 class FaultyDevice final : public PacketDevice {
@@ -30,6 +38,8 @@ class FaultyDevice final : public PacketDevice {
   [[nodiscard]] std::uint64_t begun() const noexcept { return begun_; }
   /// Faults that have changed something: a packet, a reading, the host's time.
   [[nodiscard]] std::uint64_t met() const noexcept;
+  /// The same one by one, in the order of the script. Allocates.
+  [[nodiscard]] std::vector<InjectedFault> injected() const;
   /// Packets of the device that they kept from the host.
   [[nodiscard]] std::uint64_t withheld() const noexcept { return withheld_; }
 
@@ -38,7 +48,9 @@ class FaultyDevice final : public PacketDevice {
   struct Running {
     DeviceFault fault;
     std::int64_t from = 0, to = 0;  ///< cycles of the script's clock
-    bool begun = false, met = false;
+    bool begun = false;
+    std::int64_t begun_at = 0;  ///< cycle of the device
+    std::uint64_t changed = 0;
     int packets = 0;            ///< of its stream since it began
     std::int16_t stuck_at = 0;  ///< of `stick`
     int off_by = 0;             ///< of `wander`

@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <vector>
 
 #include "hil/devmodel/emulator.hpp"
 #include "hil/devmodel/packet_device.hpp"
@@ -42,6 +43,8 @@ class EmulatedDevice final : public PacketDevice {
   }
   /// Packets that faults kept from them.
   [[nodiscard]] std::uint64_t withheld() const noexcept { return withheld_ + faulty_->withheld(); }
+  /// What the fault script has done to the last client.
+  [[nodiscard]] std::vector<InjectedFault> injected() const { return faulty_->injected(); }
 
  private:
   [[nodiscard]] static EmulatorStats joined(const EmulatorStats& earlier,

@@ -2,6 +2,8 @@
 #include "hil/program/run_report.hpp"
 
 #include <array>
+#include <cstddef>
+#include <vector>
 
 #include "hil/hil_error.hpp"
 #include "shared/posix/hex64.hpp"
@@ -13,6 +15,18 @@ namespace {
 
 double seconds_of(std::int64_t cycles) {
   return static_cast<double>(cycles) / kCyclesPerSecond;
+}
+
+/// What the fault script did, one by one: a report of the run counts it, and its log is read by it.
+Json injected_list(const std::vector<InjectedFault>& faults) {
+  Json list = Json::List{};
+  for (const InjectedFault& fault : faults) {
+    list.push_back({{"kind", kFaultWords[static_cast<std::size_t>(fault.kind)]},
+                    {"packets", fault.of_commands ? "commands" : "reports"},
+                    {"at_s", seconds_of(fault.at_cycle)},
+                    {"changed", fault.changed}});
+  }
+  return list;
 }
 
 template <class Call>
@@ -41,6 +55,7 @@ void write_run_report(const std::string& file, const EmulatedDevice& device,
   report["packets_sent"] = front.sent;
   report["packets_dropped"] = front.dropped;
   report["packets_withheld"] = device.withheld();
+  report["injected"] = injected_list(device.injected());
   report["commands_received"] = stats.commands;
   report["commands_refused"] = stats.refused;
   report["resyncs"] = front.resyncs;

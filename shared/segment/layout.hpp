@@ -109,6 +109,7 @@ struct VolumeDescriptor {
 };
 
 /// What one servo tick read, felt and sent. World mm for the tip; forces in N at the device port.
+/// `record/log_columns.cpp` tells each field's unit, meaning and when it is valid (docs/log.md).
 struct TickRecord {
   std::uint64_t seq;  ///< filled by the writer: 2 * index + 1 while writing, + 2 when valid
   std::uint64_t tick;
@@ -118,27 +119,31 @@ struct TickRecord {
   std::uint32_t flags;  ///< kFlag... below
   std::uint32_t missed_deadlines;
   std::int32_t encoder_counts[6];  ///< joints 0..2: unwrapped since docking; gimbal 3..5: mrad
-  double position_mm[3];
-  float orientation[4];  ///< quaternion x, y, z, w: tool to world
-  float velocity_mm_per_s[3];
+  double position_mm[3];           ///< NaN before docking
+  float orientation[4];            ///< quaternion x, y, z, w: tool to world; NaN before docking
+  float velocity_mm_per_s[3];      ///< NaN until first taken in hand
   float commanded_force_n[3];
   float contact_force_n[3];
   float modification_force_n[3];
   float proxy_offset_mm[3];
-  std::int16_t dac_counts[4];
-  std::uint32_t removed;      ///< density units taken away in this tick
-  double port_energy_j;       ///< work that the loop took from the hand since it armed
-  double port_minimum_j;      ///< its lowest value so far: below 0 the loop gave more than it took
-  std::uint64_t volume_hash;  ///< chained over ticks
+  std::int16_t dac_counts[3];
+  std::uint16_t phase;    ///< of the servo's safety
+  std::uint32_t removed;  ///< density units taken away in this tick
+  double port_energy_j;   ///< work that the loop took from the hand since it armed
+  double port_minimum_j;  ///< its lowest value so far: below 0 the loop gave more than it took
+  float joint_torque_n_mm[3];
+  std::uint32_t refused_packets;  ///< since the start
+  std::uint64_t volume_hash;      ///< chained over ticks
   std::uint64_t output_hash;
   std::uint16_t dirty_lo[3];
   std::uint16_t dirty_hi[3];
-  std::uint32_t sub_steps;
+  std::uint32_t lost_packets;   ///< since the start
   std::uint32_t dirty_volumes;  ///< bit v: volume v changed in this tick
   std::uint32_t last_command;   ///< Command::index of the last one applied; 0: none yet
-  float torque_n_mm[3];
+  float tip_torque_n_mm[3];
   float spindle_ratio;
-  std::int32_t raw[12];  ///< as they came: kRaw... below
+  std::int32_t raw[11];  ///< as they came: kRaw... below
+  float press_n;         ///< normal force that cuts, in the scene
   // By `EnergySource`, in mJ with 32 fraction bits. Their sum is `port_energy_j`.
   std::int64_t energy_spring;
   std::int64_t energy_damping;

@@ -190,6 +190,10 @@ Option& Option::split_at_commas() {
   option_->delimiter(',');
   return *this;
 }
+Option& Option::one_each() {
+  option_->expected(1)->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+  return *this;
+}
 Option& Option::needs(Option other) {
   option_->needs(other.option_);
   return *this;

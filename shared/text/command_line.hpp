@@ -36,6 +36,8 @@ class Option {
   Option& values(int fewest, int most);
   /// Of a list: any number of values, separated by commas.
   Option& split_at_commas();
+  /// Of a list: one value for each time that it is given.
+  Option& one_each();
   Option& needs(Option other);
   Option& excludes(Option other);
   /// Taken from the environment where the arguments do not give it.

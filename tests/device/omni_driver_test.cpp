@@ -59,6 +59,42 @@ TEST_CASE("an old or repeated packet does not move the tip back") {
   CHECK(driver.lost() == 0);
 }
 
+TEST_CASE("a counter with a wrong bit is refused once, and nothing is lost by it") {
+  for (const int bit : {8, 13, 20, 30, 31}) {
+    CAPTURE(bit);
+    FakePort port;
+    kerf::OmniDriver driver(port);
+    for (const std::uint32_t counter : {500U, 501U, 502U ^ (1U << bit), 503U, 504U}) {
+      push(port, counter, static_cast<std::int16_t>(counter % 1000));
+    }
+    CHECK(driver.read().encoder[0] == 504);
+    CHECK(driver.refused() == 1);
+    CHECK(driver.lost() == 1);  // 502, which cannot be told
+  }
+}
+
+TEST_CASE("a device that counts anew is believed at its second packet") {
+  FakePort port;
+  kerf::OmniDriver driver(port);
+  push(port, 0x80000000, 10);
+  push(port, 1, 20);
+  CHECK(driver.read().encoder[0] == 10);
+  push(port, 2, 30);
+  CHECK(driver.read().encoder[0] == 30);
+  CHECK(driver.lost() == 0);
+}
+
+TEST_CASE("a long gap is counted when its end is believed, and no more than a device can be away") {
+  FakePort port;
+  kerf::OmniDriver driver(port);
+  for (const std::uint32_t counter : {1U, 5002U, 5003U}) push(port, counter);
+  static_cast<void>(driver.read());
+  CHECK(driver.lost() == 5000);
+  for (const std::uint32_t counter : {1'005'003U, 1'005'004U}) push(port, counter);
+  CHECK(driver.read().fresh);
+  CHECK(driver.lost() == 5000);
+}
+
 TEST_CASE("truncated and overlong packets are refused, not read as reports") {
   FakePort port;
   kerf::OmniDriver driver(port);

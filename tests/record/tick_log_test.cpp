@@ -42,7 +42,7 @@ TEST_CASE("the log header is a NPY 1.0 header of fixed size that names each colu
   CHECK(header.back() == '\n');
   for (const char* const part :
        {"('seq', '<u8'), ", "('encoder_counts', '<i4', (6,)), ", "('position_mm', '<f8', (3,)), ",
-        "('dac_counts', '<i2', (4,)), ", "('dirty_lo', '<u2', (3,)), ", "'shape': (1234,)",
+        "('dac_counts', '<i2', (3,)), ", "('dirty_lo', '<u2', (3,)), ", "'shape': (1234,)",
         "('penetration_mm', '<f4'), ", "'fortran_order': False"}) {
     CAPTURE(part);
     CHECK(header.find(part) != std::string::npos);

@@ -51,7 +51,7 @@ TEST_CASE("the summary counts what was recorded") {
   CHECK(summary.energy_mj[static_cast<std::size_t>(EnergySource::spring)] == doctest::Approx(2));
   CHECK(summary.energy_mj[static_cast<std::size_t>(EnergySource::leak)] == doctest::Approx(-1));
   CHECK(summary.end_reason == "clean end");
-  CHECK(to_text(summary).find("rows              1000\n") != std::string::npos);
+  CHECK(to_text(summary).find("rows                1000\n") != std::string::npos);
   CHECK(nlohmann::json::parse(to_json(summary))["last_tick"] == 1000);
   CHECK(nlohmann::json::parse(to_json(summary))["energy_leak_mj"] == doctest::Approx(-1));
 }
@@ -68,6 +68,35 @@ TEST_CASE("a gap in the sequence shows in the summary without the manifest's hel
   });
   log.sync();
   CHECK(summarise(folder / "cut").lost_ticks == 7);
+}
+
+TEST_CASE("info and the manifest agree on losses, before the first row and behind the last too") {
+  const TestFolder folder;
+  const NoiseVolume volume({8, 8, 8});
+  SegmentWriter writer = SegmentWriter::create(spec_of(volume));
+  const SegmentReader reader = SegmentReader::map(writer.fd());
+  std::filesystem::create_directories(folder / "log");
+  TickLogWriter log(folder / "log" / std::string(kTickLogName));
+  constexpr Tick kMissed = 10, kLost = 25;
+  const Tick slots = reader.info().state_slots;
+  Tick tick = 0;
+  while (tick < slots + kMissed) publish_tick(writer, made_up_tick(++tick, 10000));
+  Recorder recorder(reader, log);  // what is overwritten now is not its loss
+  for (Tick i = 0; i < kLost; ++i) publish_tick(writer, made_up_tick(++tick, 10000));
+  recorder.drain();
+  log.sync();
+  const auto lost_of = [&](std::string_view end_reason) {
+    write_manifest(folder / "log", reader.info(), recorder, log.rows(), end_reason);
+    const RecordSummary summary = summarise(folder / "log");
+    CHECK(summary.missed_before_start == kMissed);
+    CHECK(summary.first_tick == kMissed + kLost + 1);
+    CHECK(summary.rows + summary.lost_ticks + summary.missed_before_start == tick);
+    return summary.lost_ticks;
+  };
+  CHECK(recorder.lost() == kLost);
+  CHECK(lost_of("clean end") == kLost);
+  std::filesystem::remove(folder / "log/manifest.json");
+  CHECK(lost_of(kStillRunning) == kLost);  // a killed recorder: by the rows alone
 }
 
 TEST_CASE("the CSV has a line per tick and reads back to the same numbers") {

@@ -2,6 +2,7 @@
 #include "controller/shell/servo_loop.hpp"
 
 #include <atomic>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -14,6 +15,7 @@
 #include "controller/load/scene_json.hpp"
 #include "controller/plan/compile.hpp"
 #include "controller/shell/scene_segment.hpp"
+#include "shared/segment/reader.hpp"
 #include "shared/wire/omni_packet.hpp"
 #include "tests/servo/support.hpp"
 
@@ -62,4 +64,13 @@ TEST_CASE("a device that says nothing for 2000 ticks ends the loop, and no motor
   CHECK(signals.heartbeat == 2000);
   CHECK(port.sent == 2001);  // the last one on the way out
   CHECK(port.pushed == 0);
+
+  // A place that is not known is told as none.
+  const auto told = kerf::SegmentReader::map(segment.fd()).latest();
+  REQUIRE(told);
+  CHECK(told->tick == 2000);
+  for (std::size_t i = 0; i < 3; ++i) {
+    CHECK(std::isnan(told->position_mm[i]));
+    CHECK(std::isnan(told->velocity_mm_per_s[i]));
+  }
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "visualizer/compose/hand_painter.hpp"
 
+#include <cmath>
 #include <limits>
 
 #include "visualizer/view/camera.hpp"
@@ -24,15 +25,16 @@ glm::dmat4 pose_of(const Hand& hand) {
 
 }  // namespace
 
-Hand hand_of(const TickRecord& record) {
+std::optional<Hand> hand_of(const TickRecord& record) {
   const auto& p = record.position_mm;
+  if (!std::isfinite(p[0])) return std::nullopt;
   const auto& q = record.orientation;
   const auto& f = record.commanded_force_n;
   const auto& off = record.proxy_offset_mm;
-  return {{p[0] + off[0], p[1] + off[1], p[2] + off[2]},
-          {q[0], q[1], q[2], q[3]},
-          record.active_tool,
-          {f[0], f[1], f[2]}};
+  return Hand{{p[0] + off[0], p[1] + off[1], p[2] + off[2]},
+              {q[0], q[1], q[2], q[3]},
+              record.active_tool,
+              {f[0], f[1], f[2]}};
 }
 
 HandPainter::HandPainter(const SceneView& scene, double scale_mm) : scale_mm_(scale_mm) {

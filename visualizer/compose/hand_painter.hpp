@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include <glm/glm.hpp>
@@ -27,8 +28,8 @@ struct Hand {
 };
 
 /// The tip is the proxy's, where there is one: a tool that is held by the tooth's surface is drawn
-/// there, however deep the hand pushes.
-[[nodiscard]] Hand hand_of(const TickRecord& record);
+/// there, however deep the hand pushes. Nothing before docking, when its place is unknown.
+[[nodiscard]] std::optional<Hand> hand_of(const TickRecord& record);
 
 /// Draws the tool and the arrow of its force.
 class HandPainter {

@@ -24,18 +24,37 @@ OmniCommand::Light light_of(Phase phase) noexcept {
   return OmniCommand::Light::off;
 }
 
+// Packets in 20 ms of an 8 kHz stream, after which the force is off whatever comes: a packet more
+// costs nothing then.
+constexpr std::uint32_t kNear = 160;
+// In 2 s of it, after which the controller has given the device up: more cannot be missing.
+constexpr std::uint32_t kMostMissing = 16'000;
+
 }  // namespace
+
+bool OmniDriver::is_newest(std::uint32_t counter) noexcept {
+  const std::uint32_t step = counter - newest_;
+  if (seen_) {
+    if (step == 0 || 0U - step <= kNear) return false;
+    if (step <= kNear) {
+      lost_ += step - 1;
+    } else {
+      const bool goes_on = far_ && counter - *far_ - 1 < kNear;
+      far_ = counter;
+      if (!goes_on) return false;
+      if (step <= kMostMissing) lost_ += step - 2;  // the refused one came
+    }
+  }
+  far_.reset();
+  seen_ = true;
+  newest_ = counter;
+  return true;
+}
 
 bool OmniDriver::take(std::span<const std::uint8_t> packet, DeviceReport& report) noexcept {
   const auto said = decode_report(packet);
   if (!said) return false;
-  if (seen_) {
-    // A counter that steps back or stands still is an old packet: keep the newer one.
-    const std::uint32_t step = said->counter - report.counter;
-    if (step == 0 || step > UINT32_MAX / 2) return false;
-    lost_ += step - 1;
-  }
-  seen_ = true;
+  if (!is_newest(said->counter)) return false;
   report.encoder = said->encoder;
   report.wiper_a = said->pot_a;
   report.wiper_b = said->pot_b;

@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "lab/sweep/axis.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <optional>
+
+#include "controller/scene/scene_setting.hpp"
+#include "hil/hil_error.hpp"
+#include "shared/text/number.hpp"
+
+namespace kerf::sweep {
+namespace {
+
+[[noreturn]] void refuse_axis(std::string_view text, const char* why) {
+  throw HilError("--set " + std::string(text) + ": " + why);
+}
+
+/// Parts between the separators that stand in no brackets or quotes.
+std::vector<std::string> split(std::string_view text, char separator) {
+  std::vector<std::string> parts(1);
+  int depth = 0;
+  bool quoted = false;
+  for (const char c : text) {
+    quoted = quoted != (c == '"');
+    depth += c == '[' ? 1 : c == ']' ? -1 : 0;
+    if (c == separator && depth == 0 && !quoted) {
+      parts.emplace_back();
+    } else {
+      parts.back() += c;
+    }
+  }
+  return parts;
+}
+
+/// The values of LO:HI:N; nothing where the text is none.
+std::optional<std::vector<std::string>> range_of(std::string_view text, std::string_view values) {
+  const std::vector<std::string> parts = split(values, ':');
+  if (parts.size() != 3) return std::nullopt;
+  const auto lo = number_in(parts[0]), hi = number_in(parts[1]), count = number_in(parts[2]);
+  if (!lo || !hi || !count || !std::isfinite(*lo) || !std::isfinite(*hi)) return std::nullopt;
+  if (!(*count >= 1 && *count <= kMostRuns) || *count != std::floor(*count)) {
+    refuse_axis(text, "not 1 to 1000000 values; write LO:HI:N, such as 0.2:3:16");
+  }
+  if (*count == 1 && *lo != *hi) refuse_axis(text, "one value cannot be both ends; take 2 or more");
+  std::vector<std::string> list;
+  const auto last = static_cast<int>(*count) - 1;
+  for (int i = 0; i <= last; ++i) {
+    // Twelve digits: a step of a tenth reads as one. The ends are as they were written.
+    char digits[32];
+    std::snprintf(digits, sizeof digits, "%.12g", *lo + (*hi - *lo) * i / std::max(last, 1));
+    list.push_back(i == 0 ? number_text(*lo) : i == last ? number_text(*hi) : digits);
+  }
+  return list;
+}
+
+}  // namespace
+
+Axis parse_axis(std::string_view text) {
+  const std::size_t equals = text.find('=');
+  if (equals == text.npos || equals == 0) {
+    refuse_axis(text, "not KEY=VALUES; write such as force.stiffness_n_per_mm=0.2:3:16");
+  }
+  Axis axis{std::string(text.substr(0, equals)), {}};
+  const std::string_view values = text.substr(equals + 1);
+  if (const auto range = range_of(text, values)) {
+    axis.values = *range;
+  } else {
+    axis.values = split(values, ',');
+  }
+  if (std::ranges::any_of(axis.values, &std::string::empty)) {
+    refuse_axis(text, "a value is empty; write LO:HI:N or A,B,C");
+  }
+  if (!axis.of_emulator()) {
+    for (const std::string& value : axis.values) {
+      static_cast<void>(parse_setting(axis.key + "=" + value));
+    }
+  }
+  return axis;
+}
+
+std::vector<Axis> parse_axes(std::span<const std::string> texts) {
+  std::vector<Axis> axes;
+  double runs = 1;
+  for (const std::string& text : texts) {
+    Axis axis = parse_axis(text);
+    if (std::ranges::find(axes, axis.key, &Axis::key) != axes.end()) {
+      throw HilError("--set " + text + ": the key stands there already; write one list");
+    }
+    runs *= static_cast<double>(axis.values.size());
+    axes.push_back(std::move(axis));
+  }
+  if (runs > kMostRuns) {
+    throw HilError("--set: " + number_text(runs) + " runs; at most 1000000 go into one sweep");
+  }
+  return axes;
+}
+
+std::size_t runs_of(std::span<const Axis> axes) {
+  std::size_t runs = 1;
+  for (const Axis& axis : axes) runs *= axis.values.size();
+  return runs;
+}
+
+std::vector<std::string> values_of(std::span<const Axis> axes, std::size_t run) {
+  std::vector<std::string> values(axes.size());
+  for (std::size_t i = axes.size(); i-- > 0;) {
+    values[i] = axes[i].values[run % axes[i].values.size()];
+    run /= axes[i].values.size();
+  }
+  return values;
+}
+
+}  // namespace kerf::sweep

@@ -1,0 +1,202 @@
+// SPDX-License-Identifier: Apache-2.0
+// The table of a log's columns. A new field of a tick record is one row here; then
+// `./kerf record columns > docs/log.md`.
+#include "record/log_columns.hpp"
+
+#include <array>
+#include <cstddef>
+
+#include "shared/segment/layout_table.hpp"
+
+namespace kerf {
+namespace {
+
+constexpr std::string_view kDocked = "from docking on; NaN before";
+constexpr std::string_view kContact = "in a tick with contact; else 0";
+constexpr std::string_view kPreston = "with cut.model = \"preston\"; else 0";
+constexpr std::string_view kChange = "where dirty_volumes is not 0";
+
+// A row: column, unit, meaning, when it is valid.
+// clang-format off
+constexpr LogColumn kColumns[] = {
+    {"seq", "", "twice the number of records published before this one, + 2: a step of more than 2 "
+     "is a gap"},
+    {"tick", "tick", "count of servo steps since the start of the controller, from 1"},
+    {"start_ns", "ns", "when the tick began, CLOCK_MONOTONIC"},
+    {"period_error_ns", "ns", "how late it began, after its deadline", "0 in lock-step"},
+    {"execution_ns", "ns", "time that the servo step took"},
+    {"flags", "", "bits, below"},
+    {"missed_deadlines", "tick", "deadlines missed since the start", "0 in lock-step"},
+    {"encoder_counts", "count, mrad", "0 to 2: joints, unwrapped; 3 to 5: yaw, pitch and roll of "
+     "the gimbal", "joints from docking on; before they count from any place"},
+    {"position_mm", "mm", "tip in the scene", kDocked},
+    {"orientation", "", "quaternion x, y, z, w: tool, as it is felt, to world", kDocked},
+    {"velocity_mm_per_s", "mm/s", "of the device port, as report.json's velocity_estimator has it",
+     "from the first tick in hand on; NaN before, and while homing is lost"},
+    {"commanded_force_n", "N", "sent to the device, after all limits; at the device port",
+     "0 while the motors are off"},
+    {"contact_force_n", "N", "part of the wanted force that the contact makes, before limits", kContact},
+    {"modification_force_n", "N", "part of it that cutting makes: reaction, or friction", kContact},
+    {"proxy_offset_mm", "mm", "from the tip to the proxy's tip, in the scene",
+     "with force.model = \"proxy\", in contact; else 0"},
+    {"dac_counts", "count", "signed motor commands, 0 is no torque", "0 while the motors are off"},
+    {"phase", "", "code, below: where the safety of the loop stands"},
+    {"removed", "1/65535 voxel", "density taken away in this tick, all volumes"},
+    {"port_energy_j", "J", "energy taken from the hand since arming: SUM -F.dx of the force as it was sent"},
+    {"port_minimum_j", "J", "its lowest value so far; below 0 the loop gave more than it took"},
+    {"joint_torque_n_mm", "N mm", "motor torques about the joints, of commanded_force_n",
+     "0 while the motors are off"},
+    {"refused_packets", "packet", "since the start: no report, or an old one"},
+    {"volume_hash", "", "hash chained over all changed boxes since the start"},
+    {"output_hash", "", "hash chained over what the servo put out since the start"},
+    {"dirty_lo", "voxel", "first voxel of the box that changed, in the first volume that did", kChange},
+    {"dirty_hi", "voxel", "end of that box; it does not belong to it", kChange},
+    {"lost_packets", "packet", "since the start, by the device's own counter",
+     "Omni; 0 for devices that do not number their packets"},
+    {"dirty_volumes", "", "bit v: volume v changed"},
+    {"last_command", "", "index of the last command of a reader that was applied", "0: none yet"},
+    {"tip_torque_n_mm", "N mm", "of contact and cutting about the tip; no device of ours renders it", kContact},
+    {"spindle_ratio", "", "speed of the spindle over its reference speed", kPreston},
+    {"raw", "count", "as the device sent it: 0 to 2 encoders, 3 to 5 and 6 to 8 both wipers of the "
+     "gimbal's pots, 9 bits (1 button, 2 second button, 4 parked, 8 not homed), 10 packet counter",
+     "the last report that came; pots: Omni"},
+    {"press_n", "N", "normal force that cuts, in the scene", kPreston},
+    {"energy_spring", "2^-32 mJ", "share of port_energy_j: the coupling or another force law, as if never sampled"},
+    {"energy_damping", "2^-32 mJ", "share of the damping that is injected with the spring"},
+    {"energy_friction", "2^-32 mJ", "share of the tool's friction on the solid"},
+    {"energy_cutting", "2^-32 mJ", "share of the removal's reaction and of the cutter's friction"},
+    {"energy_limits", "2^-32 mJ", "share of what peak, thermal, slew and motor limits changed"},
+    {"energy_hold", "2^-32 mJ", "share of fading in, and of a force that was held or faded over a gap"},
+    {"energy_leak", "2^-32 mJ", "share of holding spring and friction for a tick"},
+    {"energy_stabiliser", "2^-32 mJ", "share of what the scene's stabiliser added"},
+    {"spindle_load", "", "torque on the spindle over its stall torque", kPreston},
+    {"active_tool", "", "index of the tool in the scene, from 0"},
+    {"fault", "", "code, below: why there is no force"},
+    {"stale", "", "1: no fresh report came for this tick, and nothing was felt in it"},
+    {"penetration_mm", "mm", "how deep the hand is in the solid: length of proxy_offset_mm, or of the "
+     "overlap along the force", kContact},
+    {"plane_count", "", "planes that hold the tool, at most 3", "with force.model = \"proxy\""},
+    {"plane_load_n", "N", "load along each plane's normal, before limits", "the first plane_count"},
+    {"plane_normal", "", "x, y, z of each plane's normal, out of the solid", "the first plane_count"},
+    {"plane_arm_mm", "mm", "x, y, z from the tool's centre to each contact", "the first plane_count"},
+    {"crc32c", "", "checksum of the row from tick on"},
+};
+// clang-format on
+
+constexpr LogCode kFlags[] = {
+    {kFlagButton1, "button 1", "pressed"},
+    {kFlagButton2, "button 2", "pressed"},
+    {kFlagContact, "contact", "the commanded force is above 0.01 N"},
+    {kFlagClamped, "clamped", "a limit of force, slew, heat or motors acted"},
+    {kFlagStaleInput, "stale input", "no fresh report came for this tick"},
+    {kFlagDeviceFault, "fault", "a fault is latched: the column fault says which"},
+    {kFlagMotorsOn, "motors on", ""},
+    {kFlagParked, "parked", "the device says that the hand is not at work"},
+    {kFlagStarted, "started", "taken in hand at least once: reports count from here"},
+    {kFlagForbidden, "forbidden", "pressed on what may not be cut"},
+    {kFlagRefused, "refused", "the tool finds no free place, and feels nothing"},
+    {kFlagShaft, "shaft", "pressed with shaft or handpiece"},
+};
+constexpr LogCode kPhases[] = {
+    {0, "off", "no report has come yet"},
+    {1, "calibrating", "never docked yet, or homing lost: positions are unknown"},
+    {2, "armed", "docked, waits for the hand"},
+    {3, "ramping", "taken in hand: the force fades in"},
+    {4, "active", "the motors follow"},
+    {5, "fault", "no force until parked at rest"},
+};
+constexpr LogCode kFaults[] = {
+    {0, "none", ""},
+    {1, "stale_input", "no report for 20 ms"},
+    {2, "not_finite", "NaN after kinematics for more than 2 ms"},
+    {3, "overspeed", "tip faster than the limit"},
+};
+
+/// Each field of a tick record has its row, in its order.
+constexpr bool covers_all() {
+  std::size_t row = 0;
+  for (const LayoutField& field : kLayoutTable) {
+    if (field.record != "TickRecord") continue;
+    if (row == std::size(kColumns) || kColumns[row].name != field.name) return false;
+    ++row;
+  }
+  return row == std::size(kColumns);
+}
+static_assert(covers_all(), "log_columns.cpp: a row for each field of TickRecord, in its order");
+
+constexpr std::string_view kHead =
+    R"(# The log of a run
+
+`kerf-recorder` writes every tick of a running controller into a folder; `./kerf demo --out DIR` keeps it as
+`DIR/log`. `./kerf record info DIR/log` sums it up, `record plot` draws it, `record export` makes text of it.
+
+| file | what |
+|---|---|
+| `ticks.npy` | one row for each tick, the columns below, for NumPy as it is |
+| `manifest.json` | length of a tick, voxels, losses of the recorder and where they lie, how the run ended |
+| `scene.json` | the scene as it was loaded, every setting |
+
+Three lines of NumPy read it (`examples/python/` has more):
+
+    import numpy as np
+    log = np.load("DIR/log/ticks.npy", mmap_mode="r")
+    print(np.abs(log["commanded_force_n"]).max(axis=0), "N")
+
+`log["position_mm"]` is an array of rows x 3. World millimetres, newtons at the device port, little-endian.
+`info` counts as lost what was published and is in no row, so the manifest says the same; a recorder that was
+killed leaves a manifest that says `running`, and all rows.
+
+This page is made from the table in `record/log_columns.cpp` by
+
+    ./kerf record columns > docs/log.md
+
+## Columns
+
+| column | type | unit | meaning | valid |
+|---|---|---|---|---|
+)";
+
+std::string page_row(const LayoutField& field, const LogColumn& column) {
+  std::string type(field.type);
+  if (field.count > 1) type += " x " + std::to_string(field.count);
+  return "| `" + std::string(column.name) + "` | " + type + " | " + std::string(column.unit) +
+         " | " + std::string(column.meaning) + " | " +
+         (column.valid.empty() ? "always" : std::string(column.valid)) + " |\n";
+}
+
+std::string codes(std::string_view title, std::string_view number, std::span<const LogCode> list) {
+  std::string text = "\n## " + std::string(title) + "\n\n| " + std::string(number) +
+                     " | name | meaning |\n|---|---|---|\n";
+  for (const LogCode& code : list) {
+    text += "| " + std::to_string(code.value) + " | " + std::string(code.name) + " | " +
+            std::string(code.meaning) + " |\n";
+  }
+  return text;
+}
+
+}  // namespace
+
+std::span<const LogColumn> log_columns() {
+  return kColumns;
+}
+std::span<const LogCode> log_flags() {
+  return kFlags;
+}
+std::span<const LogCode> log_phases() {
+  return kPhases;
+}
+std::span<const LogCode> log_faults() {
+  return kFaults;
+}
+
+std::string log_page() {
+  std::string page(kHead);
+  std::size_t row = 0;
+  for (const LayoutField& field : kLayoutTable) {
+    if (field.record == "TickRecord") page += page_row(field, kColumns[row++]);
+  }
+  return page + codes("Flags", "bit", kFlags) + codes("Phases", "phase", kPhases) +
+         codes("Faults", "fault", kFaults);
+}
+
+}  // namespace kerf

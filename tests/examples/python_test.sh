@@ -1,0 +1,71 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+# The Python examples on a real log, a sweep and a K-B map: each draws a picture that is not empty.
+#     python_test.sh BIN-FOLDER REPOSITORY
+# Exit code 77: skipped, for want of numpy or matplotlib.
+set -euo pipefail
+bin=$1 root=$2
+for python in python3 /usr/bin/python3 ''; do
+  if [[ -n $python ]] && "$python" -c 'import numpy, matplotlib' 2>/dev/null; then break; fi
+done
+if [[ -z $python ]]; then
+  echo 'python: numpy or matplotlib is missing; apt-get install python3-numpy python3-matplotlib'
+  exit 77
+fi
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+export MPLBACKEND=Agg MPLCONFIGDIR=$work
+
+# A log, as ./kerf demo --virtual makes it.
+"$bin/kerf-controller" --scene "$root/scenes/touch.toml" --torque-scale 0.342,0.342,0.342 \
+  --port "socket:$work/port" --seconds 1.5 --virtual --name "python-$$" >"$work/controller.txt" &
+controller=$!
+"$bin/kerf-recorder" --name "python-$$" --out "$work/log" >"$work/recorder.txt" &
+recorder=$!
+until [[ -s $work/log/ticks.npy ]]; do sleep 0.02; kill -0 $controller; done
+"$bin/kerf-emulator" --front socket --socket "$work/port" --hand "$root/scenes/hands/touch.toml" \
+  --lockstep >"$work/emulator.txt" &
+wait $controller $recorder
+
+# What docs/log.md says: its three lines read this log.
+sed -n 's/^    //p' "$root/docs/log.md" | sed -n '/^import numpy/,/^print/p' |
+  sed "s|DIR/log|$work/log|" >"$work/three.py"
+grep -q '^\[.*\] N$' <("$python" "$work/three.py") || { echo "docs/log.md: its lines read nothing" && exit 1; }
+"$python" - "$work/log" <<'PY'
+import sys
+import numpy as np
+log = np.load(sys.argv[1] + "/ticks.npy", mmap_mode="r")
+known = (log["phase"] >= 2)
+assert 0 < known.sum() < len(log)
+assert np.isnan(log["position_mm"][~known]).all() and np.isfinite(log["position_mm"][known]).all()
+started = (log["flags"] & 512) != 0
+assert np.isfinite(log["velocity_mm_per_s"][started]).all() and started.sum() == 1500
+assert abs(log["position_mm"][known]).max() < 1000 and abs(log["velocity_mm_per_s"][started]).max() < 5000
+assert (abs(log["joint_torque_n_mm"]).max(axis=1)[(log["flags"] & 4) != 0] > 0).all()
+PY
+
+"$bin/kerf-lab" sweep "$root/scenes/touch.toml" --set force.stiffness_n_per_mm=0.2,0.4 \
+  --set servo.rate_hz=500,1000 --seconds 1.2 --out "$work/sweep" >"$work/sweep.txt"
+if "$bin/kerf-lab" --help | grep -q '^ *zwidth '; then
+  "$bin/kerf-lab" zwidth --stiffness 0.1:10:8 --damping 0:0.01:4 --loop ideal --seconds 0.3 \
+    --csv "$work/map.csv" >"$work/map.txt"
+fi
+examples=$root/examples/python
+"$python" "$examples/spectrum.py" "$work/log" "$work/spectrum.png"
+"$python" "$examples/phase_portrait.py" "$work/log" "$work/portrait.png"
+"$python" "$examples/kb_map.py" "$work/sweep/sweep.csv" "$work/sweep.png" \
+  servo.rate_hz force.stiffness_n_per_mm peak_force_n
+if [[ -e $work/map.csv ]]; then
+  "$python" "$examples/kb_map.py" "$work/map.csv" "$work/map.png" loop=ideal
+fi
+"$python" - "$work"/*.png <<'PY'
+import sys
+import matplotlib.image
+for name in sys.argv[1:]:
+    picture = matplotlib.image.imread(name)[..., :3]
+    drawn = (picture.max(axis=2) - picture.min(axis=2) > 0.2).mean()  # coloured: data, not axes
+    assert drawn > 0.002, f"{name}: {drawn:.4f} of it is drawn"
+PY
+for example in "$examples"/*.py; do
+  (($(wc -l <"$example") < 30)) || { echo "$example: 30 lines or more" && exit 1; }
+done

@@ -1,0 +1,184 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <csignal>
+#include <map>
+#include <sstream>
+
+#include <doctest/doctest.h>
+
+#include "hil/hil_error.hpp"
+#include "lab/sweep/axis.hpp"
+#include "lab/sweep/table.hpp"
+#include "tests/programs/pair.hpp"
+
+using kerf::test::eventually;
+using kerf::test::kBin;
+using kerf::test::kScenes;
+using kerf::test::Pair;
+using kerf::test::Process;
+using kerf::test::TemporaryFolder;
+using kerf::test::text_of;
+using namespace kerf::sweep;
+using namespace std::chrono_literals;
+
+namespace {
+
+std::string refusal_of(const std::string& axis) {
+  try {
+    static_cast<void>(parse_axes(std::vector{axis}));
+  } catch (const std::exception& error) {
+    return error.what();
+  }
+  return "";
+}
+
+/// A scene that loads at once, with a hand.
+std::string scene_with_hand(const TemporaryFolder& folder) {
+  const std::string path = kerf::test::small_scene(folder);
+  std::ofstream(path, std::ios::app) << "[hand]\nscript = \"" << kScenes << "/hands/touch.toml\"\n";
+  return path;
+}
+
+/// `kerf-lab sweep` over two axes, six runs of 0.2 s.
+std::vector<std::string> sweep(const std::string& scene, const std::filesystem::path& out,
+                               const std::string& jobs) {
+  return {kBin + "/kerf-lab",
+          "sweep",
+          scene,
+          "--set",
+          "force.stiffness_n_per_mm=0.2:0.6:3",
+          "--set",
+          "servo.rate_hz=500,1000",
+          "--seconds",
+          "0.2",
+          "--jobs",
+          jobs,
+          "--out",
+          out.string()};
+}
+
+/// Names and cells of one line each.
+std::map<std::string, std::string> row_of(const std::string& table, int row) {
+  std::istringstream lines(table);
+  std::string head, line;
+  std::getline(lines, head);
+  for (int i = 0; i <= row; ++i) std::getline(lines, line);
+  std::istringstream names(head), cells(line);
+  std::map<std::string, std::string> values;
+  for (std::string name, cell; std::getline(names, name, ',');) {
+    cell.clear();
+    std::getline(cells, cell, ',');
+    values[name] = cell;
+  }
+  return values;
+}
+
+}  // namespace
+
+TEST_CASE("an axis is a range with both ends, or a list; the last axis changes fastest") {
+  CHECK(parse_axis("force.stiffness_n_per_mm=0.2:3:3").values ==
+        std::vector<std::string>{"0.2", "1.6", "3"});
+  CHECK(parse_axis("servo.rate_hz=1000:500:2").values == std::vector<std::string>{"1000", "500"});
+  CHECK(parse_axis("servo.rate_hz=500:500:1").values == std::vector<std::string>{"500"});
+  CHECK(parse_axis("device.offset_mm=[0,1,2],[3,4,5]").values ==
+        std::vector<std::string>{"[0,1,2]", "[3,4,5]"});
+  const std::vector<std::string> texts{"servo.rate_hz=1,2,3", "emulator.seed=7,8"};
+  const std::vector<Axis> axes = parse_axes(texts);
+  CHECK(runs_of(axes) == 6);
+  CHECK(values_of(axes, 0) == std::vector<std::string>{"1", "7"});
+  CHECK(values_of(axes, 1) == std::vector<std::string>{"1", "8"});
+  CHECK(values_of(axes, 5) == std::vector<std::string>{"3", "8"});
+}
+
+TEST_CASE("what is no axis is refused in one line that names it") {
+  for (const char* const text :
+       {"force", "=1", "force.stiffness_n_per_mm=", "force.stiffness_n_per_mm=1,,2",
+        "force.stiffness_n_per_mm=1:2:0", "force.stiffness_n_per_mm=1:2:1",
+        "force.stiffness_n_per_mm=1:2:2.5", "force.stiffness_n_per_mm=1:2:1e9", "force.stifness=1",
+        "servo.rate=500"}) {
+    CAPTURE(text);
+    const std::string line = refusal_of(text);
+    CHECK(line.starts_with("--set "));
+    CHECK(line.find('\n') == std::string::npos);
+  }
+  CHECK(refusal_of("force.stifness_n_per_mm=1").find("force.stiffness_n_per_mm?") !=
+        std::string::npos);
+  const std::vector<std::string> twice{"servo.rate_hz=500", "servo.rate_hz=1000"};
+  CHECK_THROWS_AS(static_cast<void>(parse_axes(twice)), kerf::HilError);
+  const std::vector<std::string> many{"servo.rate_hz=1:2:1000", "emulator.seed=1:2:1000",
+                                      "cut.radius=1,2"};
+  CHECK_THROWS_AS(static_cast<void>(parse_axes(many)), std::exception);
+}
+
+TEST_CASE("a part goes on where it stopped, without a row that was cut, and is one sweep's alone") {
+  const TemporaryFolder folder;
+  {
+    Table table(folder / "out", "plan a");
+    table.add(2, "two,");
+    table.add(0, "zero,failed");
+    CHECK_THROWS_AS(Table(folder / "out", "plan a"), kerf::HilError);  // at work
+  }
+  CHECK_THROWS_AS(Table(folder / "out", "plan b"), kerf::HilError);
+  std::ofstream(folder / "out/sweep.part", std::ios::app) << "1,on";
+  {
+    Table table(folder / "out", "plan a");
+    CHECK(table.size() == 2);
+    CHECK(table.has(2));
+    CHECK_FALSE(table.has(1));
+    table.add(1, "one,");
+    CHECK(table.failed() == 1);
+    table.finish("name,message");
+  }
+  CHECK(text_of(folder / "out/sweep.csv") == "run,name,message\n0,zero,failed\n1,one,\n2,two,\n");
+  CHECK_FALSE(std::filesystem::exists(folder / "out/sweep.part"));
+  CHECK_THROWS_AS(Table(folder / "out", "plan a"), kerf::HilError);  // done
+}
+
+TEST_CASE("a sweep gives the same bytes on any number of cores, interrupted or not") {
+  const TemporaryFolder folder;
+  const std::string scene = scene_with_hand(folder);
+  Process two(sweep(scene, folder / "two", "2"), folder / "two.log");
+  CHECK(two.wait() == 0);
+  {
+    Process cut(sweep(scene, folder / "cut", "1"), folder / "cut.log");
+    REQUIRE(eventually(
+        [&] {
+          const std::string part = text_of(folder / "cut/sweep.part");
+          return std::ranges::count(part, '\n') >= 2;
+        },
+        20s));
+    cut.signal(SIGINT);
+    CHECK(cut.wait() == 130);
+    CHECK(cut.output().find("of 6 runs are kept") != std::string::npos);
+  }
+  Process rest(sweep(scene, folder / "cut", "1"), folder / "rest.log");
+  CHECK(rest.wait() == 0);
+  const std::string table = text_of(folder / "two/sweep.csv");
+  CHECK(table == text_of(folder / "cut/sweep.csv"));
+  CHECK(std::ranges::count(table, '\n') == 7);
+}
+
+TEST_CASE(
+    "a run of a sweep is the demo's, bit by bit; a run that fails is a row with its message") {
+  const TemporaryFolder folder;
+  Process process({kBin + "/kerf-lab", "sweep", kScenes + "/touch.toml", "--set",
+                   "servo.rate_hz=99,1000", "--seconds", "1", "--out", (folder / "out").string()},
+                  folder / "log");
+  CHECK(process.wait() == 1);
+  const std::string table = text_of(folder / "out/sweep.csv");
+  const auto refused = row_of(table, 0), fine = row_of(table, 1);
+  CHECK(refused.at("exit") == "2");
+  CHECK(refused.at("message").find("servo.rate_hz = 99") != std::string::npos);
+  CHECK(refused.at("output_hash").empty());
+  CHECK(fine.at("exit") == "0");
+
+  Pair pair;  // as ./kerf demo starts the two
+  pair.scene = "touch.toml";
+  pair.start("touch.toml", {"--virtual", "--seconds", "1", "--device", "omni", "--rate", "1000"},
+             {"--lockstep", "--rate", "1000", "--unit-mm", "1"});
+  REQUIRE(pair.controller->wait() == 0);
+  const auto report = pair.report();
+  CHECK(report["output_hash"] == fine.at("output_hash"));
+  CHECK(report["volume_hash"] == fine.at("volume_hash"));
+  CHECK(report["config_hash"] == fine.at("config_hash"));
+  CHECK(std::to_string(report["contact_ticks"].get<int>()) == fine.at("contact_ticks"));
+}

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "record/log_columns.hpp"
+
+#include <doctest/doctest.h>
+
+#include "controller/servo/servo_output.hpp"
+#include "tests/record/record_support.hpp"
+
+using namespace kerf;
+
+TEST_CASE("docs/log.md is what the table says") {
+  INFO("renew it: ./kerf record columns > docs/log.md");
+  CHECK((test::file_text(KERF_DOCS "/log.md") == log_page()));
+}
+
+TEST_CASE("the page's codes are the servo's") {
+  for (const LogCode& code : log_faults()) {
+    CHECK(code.name == fault_name(static_cast<Fault>(code.value)));
+  }
+  CHECK(fault_name(static_cast<Fault>(log_faults().size())) == std::string_view("unknown"));
+  CHECK(log_phases().size() == static_cast<std::size_t>(Phase::fault) + 1);
+  CHECK(log_phases()[static_cast<std::size_t>(Phase::ramping)].name == "ramping");
+  for (std::size_t i = 0; i < log_phases().size(); ++i) CHECK(log_phases()[i].value == i);
+}
+
+TEST_CASE("every flag that a record can have is on the page, once") {
+  std::uint32_t seen = 0;
+  for (const LogCode& flag : log_flags()) {
+    CHECK((seen & flag.value) == 0);
+    seen |= flag.value;
+  }
+  CHECK(seen == (kFlagButton1 | kFlagButton2 | kFlagContact | kFlagClamped | kFlagStaleInput |
+                 kFlagDeviceFault | kFlagMotorsOn | kFlagParked | kFlagStarted | kFlagForbidden |
+                 kFlagRefused | kFlagShaft));
+}
