@@ -173,13 +173,15 @@ VolumeHeader read_meta_header(const fs::path& path) {
   VolumeHeader header;
   header.has_spacing = !text.get("elementspacing").empty() || !text.get("elementsize").empty();
   const bool several = data.find('%') != std::string::npos || lower(data).rfind("list", 0) == 0;
-  if (several) return header;  // ITK counts
+  const bool packed = lower(text.get("compresseddata")) == "true";
+  header.leaves_out = several || packed;
+  if (several) return header;
   const bool ascii = lower(text.get("binarydata")) == "false";
   const bool local = lower(data) == "local";
   locate_data(header, path, local ? path : path.parent_path() / data, local ? text.end : 0,
-              lower(text.get("compresseddata")) == "true" ? Packing::deflated
-              : ascii                                     ? Packing::text
-                                                          : Packing::raw);
+              packed  ? Packing::deflated
+              : ascii ? Packing::text
+                      : Packing::raw);
   return header;
 }
 

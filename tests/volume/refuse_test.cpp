@@ -82,6 +82,35 @@ TEST_CASE("a file that ends too early is refused in every format") {
                 "of 240 bytes");
 }
 
+TEST_CASE("what MetaImage leaves out in silence is refused: data files, and what is packed") {
+  const TempFolder folder;
+  std::string names;
+  for (const std::string name : {"a", "b", "c", "d", "e"}) {  // one layer each
+    const auto at = static_cast<std::size_t>(name[0] - 'a') * 24;
+    folder.write(name, kBytes.substr(at, 24));
+    names += "\n" + name;
+  }
+  const auto listed = [&](const std::string& list) {
+    return folder.write("a.mhd", meta("MET_USHORT", kElementSpacing, "LIST" + list));
+  };
+  CHECK(refusal(listed(names)) == "no error");
+  check_refused(listed("\na\nb\nnowhere\nd\ne"), "a.mhd: voxels are missing");
+  check_refused(listed("\na\nb\nc\nd"), "a.mhd: voxels are missing");
+
+  const std::string packed = gzipped(kBytes);
+  const auto with_size = [&](const std::string& bytes) {
+    return folder.write(
+        "b.mha", meta("MET_USHORT", "CompressedData = True\nCompressedDataSize = " +
+                                        std::to_string(bytes.size()) + "\n" + kElementSpacing) +
+                     bytes);
+  };
+  CHECK(refusal(with_size(packed)) == "no error");
+  std::string flipped = packed;
+  flipped[packed.size() / 2] = static_cast<char>(~flipped[packed.size() / 2]);
+  check_refused(with_size(flipped), "b.mha: voxels are missing or broken");
+  check_refused(with_size(gzipped(kBytes.substr(0, 60))), "b.mha: voxels are missing");
+}
+
 TEST_CASE("a header that promises more than its file can hold takes no memory") {
   const TempFolder folder;
   // 512 Mi voxels of 8 bytes would be 4 GiB.
