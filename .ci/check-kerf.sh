@@ -112,8 +112,8 @@ nothing_survives() {
 # interrupted SIGNAL: a demo that is hit in its middle ends within three seconds.
 interrupted() {
   rm -f "$lab/pids" "$lab/calls" "$lab/segment"
-  # A background process ignores SIGINT, and so does all that runs below one.
-  env --default-signal=INT "$root/kerf" demo --seconds 60 --out "$lab/out" >"$lab/said" 2>&1 &
+  # A background process ignores SIGINT and SIGQUIT, and so does all that runs below one.
+  env --default-signal=INT,QUIT "$root/kerf" demo --seconds 60 --out "$lab/out" >"$lab/said" 2>&1 &
   local demo=$! code=0 began
   until [[ -e $lab/calls ]] && called '^emulator'; do sleep 0.05; done
   sleep 0.2
@@ -195,6 +195,10 @@ expect 'its results so far are kept' kept "$all"
 expect 'nothing survives a stop' nothing_survives
 expect 'a terminated demo ends with 143' interrupted TERM 143
 expect 'nothing survives a termination' nothing_survives
+for signal in PWR QUIT RTMIN+3; do
+  expect "a demo that $signal meets ends alike" interrupted "$signal" 143
+  expect "nothing survives it" nothing_survives
+done
 expect 'no process survives a kill' interrupted KILL 137
 rm -rf "$lab"/tmp/*
 expect 'none at all' nothing_survives
