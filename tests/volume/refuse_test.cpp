@@ -111,6 +111,30 @@ TEST_CASE("what MetaImage leaves out in silence is refused: data files, and what
   check_refused(with_size(gzipped(kBytes.substr(0, 60))), "b.mha: voxels are missing");
 }
 
+TEST_CASE("a NRRD whose lengths are no millimetres is refused, and one in mm is not") {
+  const TempFolder folder;
+  const auto with_units = [&](const std::string& units) {
+    return folder.write("a.nrrd", nrrd("ushort", kLittle + units) + "\n" + kBytes);
+  };
+  for (const std::string unit : {"um", "\u00b5m", "m", "cm", "microns"}) {
+    CAPTURE(unit);
+    check_refused(with_units("units: \"" + unit + "\" \"" + unit + "\" \"" + unit + "\"\n"),
+                  "a.nrrd: units: " + unit + " where kerf reads mm");
+  }
+  CHECK(refusal(with_units("units: \"mm\" \"mm\" \"mm\"\n")) == "no error");
+  CHECK(refusal(with_units("units: \"\" \"\" \"\"\n")) == "no error");
+}
+
+TEST_CASE("a packed NRRD is good only to its checksum, whatever its reader stops at") {
+  const TempFolder folder;
+  const std::string head = nrrd("ushort", kLittle, "gzip") + "\n";
+  const auto more = bytes_of(counting<std::uint16_t>(80));  // longer than the header says
+  std::string packed = gzipped(more);
+  CHECK(refusal(folder.write("a.nrrd", head + packed)) == "no error");
+  packed[packed.size() - 6] = static_cast<char>(~packed[packed.size() - 6]);  // of the checksum
+  check_refused(folder.write("b.nrrd", head + packed), "b.nrrd: its packed voxels are broken");
+}
+
 TEST_CASE("a header that promises more than its file can hold takes no memory") {
   const TempFolder folder;
   // 512 Mi voxels of 8 bytes would be 4 GiB.
