@@ -112,8 +112,8 @@ nothing_survives() {
 # interrupted SIGNAL: a demo that is hit in its middle ends within three seconds.
 interrupted() {
   rm -f "$lab/pids" "$lab/calls" "$lab/segment"
-  # A background process ignores SIGINT, and so does all that runs below one.
-  env --default-signal=INT "$root/kerf" demo --seconds 60 --out "$lab/out" >"$lab/said" 2>&1 &
+  # A background process ignores SIGINT and SIGQUIT, and so does all that runs below one.
+  env --default-signal=INT,QUIT "$root/kerf" demo --seconds 60 --out "$lab/out" >"$lab/said" 2>&1 &
   local demo=$! code=0 began
   until [[ -e $lab/calls ]] && called '^emulator'; do sleep 0.05; done
   sleep 0.2
@@ -159,6 +159,7 @@ expect 'a slow one' kerf_gives 0 demo --seconds 1
 expect 'leaves the emulator its own pace' test "$(grep -c -- --packet-cycles "$lab/calls")" == 0
 expect 'a demo keeps its results' kerf_gives 0 demo --seconds 1 --out "$lab/out" --virtual
 expect 'all of them' kept "$all"
+expect 'in a folder of its user alone' test "$(stat -c %a "$lab/out")" == 700
 expect 'lock-step reaches the controller' called '^controller.*--virtual'
 expect 'lock-step reaches the emulator' called '^emulator.*--lockstep'
 expect 'the second demo replaces the first' kerf_gives 0 demo --seconds 1 --out "$lab/out"
@@ -195,6 +196,10 @@ expect 'its results so far are kept' kept "$all"
 expect 'nothing survives a stop' nothing_survives
 expect 'a terminated demo ends with 143' interrupted TERM 143
 expect 'nothing survives a termination' nothing_survives
+for signal in PWR QUIT RTMIN+3; do
+  expect "a demo that $signal meets ends alike" interrupted "$signal" 143
+  expect "nothing survives it" nothing_survives
+done
 expect 'no process survives a kill' interrupted KILL 137
 rm -rf "$lab"/tmp/*
 expect 'none at all' nothing_survives

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <fstream>
 #include <iterator>
+#include <system_error>
 
 #include "record/record_error.hpp"
 #include "shared/posix/hex64.hpp"
@@ -45,8 +46,10 @@ void write_manifest(const std::filesystem::path& folder, const SegmentInfo& info
 
 Manifest read_manifest(const std::filesystem::path& folder) {
   const std::filesystem::path path = folder / kManifestName;
-  std::ifstream file(path);
-  if (!file) {
+  std::error_code fault;
+  std::ifstream file;
+  if (std::filesystem::is_regular_file(path, fault)) file.open(path);  // a pipe would be waited for
+  if (!file.is_open()) {
     throw RecordError(path.string() + ": cannot be read; give the folder of a recording");
   }
   Manifest out;

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <charconv>
 #include <string_view>
+#include <system_error>
 #include <utility>
 
 #include "record/record_error.hpp"
@@ -28,9 +29,12 @@ namespace {
 
 }  // namespace
 
-TickLogReader::TickLogReader(std::filesystem::path path)
-    : path_(std::move(path)), file_(path_, std::ios::binary) {
-  if (!file_) {
+TickLogReader::TickLogReader(std::filesystem::path path) : path_(std::move(path)) {
+  std::error_code fault;
+  const bool is_file =
+      std::filesystem::is_regular_file(path_, fault);  // a pipe would be waited for
+  if (is_file) file_.open(path_, std::ios::binary);
+  if (!file_.is_open()) {
     throw RecordError(path_.string() + ": cannot be read; give the folder of a recording");
   }
   std::string header(kTickLogHeaderBytes, '\0');

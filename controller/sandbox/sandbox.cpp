@@ -24,6 +24,7 @@
 
 #include "controller/sandbox/sandbox_rights.hpp"
 #include "controller/scene/scene_error.hpp"
+#include "shared/posix/failure.hpp"
 #include "shared/posix/monotonic_clock.hpp"
 #include "shared/posix/progress_bar.hpp"
 #include "shared/posix/stop_signals.hpp"
@@ -174,8 +175,10 @@ class Child {
     constexpr int kSeals = F_SEAL_SHRINK | F_SEAL_GROW | F_SEAL_SEAL;
     if (::ftruncate(memory_.get(), static_cast<off_t>(size)) != 0 ||
         ::fcntl(memory_.get(), F_ADD_SEALS, kSeals) != 0) {
-      refuse(": no " + std::to_string(size >> 20) + " MiB of memory for it (" +
-             std::generic_category().message(errno) + "); crop or resample it first");
+      const int error = errno;
+      refuse(": no " + std::to_string((size >> 20) + 1) + " MiB of memory for it (" +
+             std::generic_category().message(error) + "); " +
+             way_out_of(error, "crop or resample it first"));
     }
     size_ = size;
     raise_memory(pid_, 2 * size);

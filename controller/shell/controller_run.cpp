@@ -30,6 +30,7 @@
 #include "shared/numeric/fnv1a.hpp"
 #include "shared/posix/new_file.hpp"
 #include "shared/posix/stop_signals.hpp"
+#include "shared/segment/hand_over.hpp"
 #include "shared/segment/segment_plan.hpp"
 #include "shared/volume/density_hash.hpp"
 
@@ -106,22 +107,24 @@ void check_gains(const ControllerOptions& options, const LoadedScene& scene) {
   if (!warning.empty()) log_warning(warning);
 }
 
-/// What is written at the end is refused now.
-void check_places(const ControllerOptions& options) {
-  if (!options.report.empty()) check_new_file(options.report);
-  if (!options.final_volume.empty()) check_volume_path(options.final_volume);
-}
-
-/// Everything that can be known to go wrong, before the hand is moved.
-void check_run(const ControllerOptions& options, const LoadedScene& scene,
-               const SceneCosts& costs) {
+/// What the command line asks for is refused now, also what would be met at the end.
+void check_options(const ControllerOptions& options, const LoadedScene& scene) {
   if (static_cast<double>(options.real_time.spin_us) * scene.servo.rate_hz > 0.9e6) {
     throw std::runtime_error("--spin-us " + std::to_string(options.real_time.spin_us) +
                              " is more than 90 % of a tick at " +
                              std::to_string(scene.servo.rate_hz) + " Hz; spin less");
   }
+  static_cast<void>(segment_socket(options.name));
+  if (!options.report.empty()) check_new_file(options.report);
+  if (!options.final_volume.empty()) check_volume_path(options.final_volume);
+  if (!options.emulator_args.empty()) check_new_file(options.emulator_args);
+}
+
+/// Everything that can be known to go wrong, before the hand is moved.
+void check_run(const ControllerOptions& options, const LoadedScene& scene,
+               const SceneCosts& costs) {
+  check_options(options, scene);
   check_budget(options, scene, costs);
-  check_places(options);
   check_gains(options, scene);
   if (!scene.device.torque_scale) {
     const auto kind = static_cast<std::size_t>(scene.device.personality);
@@ -173,7 +176,7 @@ int run_controller(const ControllerOptions& options) {
   const std::unique_ptr<CompiledScene> servo = plan_scene(scene);
   if (options.check) {
     check_hand_script(scene);
-    check_places(options);
+    check_options(options, scene);
     const GainMargin margin = gain_margin(scene);
     print_scene(scene, servo->costs(), margin);
     check_budget(options, scene, servo->costs());

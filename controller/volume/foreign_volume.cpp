@@ -9,6 +9,7 @@
 #include <set>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 // clang-format off
@@ -145,6 +146,20 @@ void read_voxels(const fs::path& path, ImageIo& io, std::span<std::byte> bytes) 
   guarded(path, [&] { io.Read(bytes.data()); });
 }
 
+/// MetaIO leaves out, without a word, what it cannot unpack and which of its data files are not
+/// there: those bytes stay as they were before. So they show by a second reading over other bytes.
+void read_all_voxels(const fs::path& path, ImageIo& io, std::span<std::byte> bytes) {
+  const auto hash_over = [&](std::byte before) {
+    std::ranges::fill(bytes, before);
+    read_voxels(path, io, bytes);
+    return std::hash<std::string_view>{}(
+        {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+  };
+  if (hash_over(std::byte{0xff}) == hash_over(std::byte{0})) return;
+  throw SceneError(path.string() +
+                   ": voxels are missing in its data; copy it again, with all of its data files");
+}
+
 /// Column `axis` of the direction matrix: the way that axis points.
 Place axis_of(const ImageIo& io, unsigned axis) {
   const std::vector<double> d = io.GetDirection(axis);
@@ -177,7 +192,11 @@ void read_one_file(const fs::path& path, ImageIo& io, const VolumeHeader& header
   const std::span<std::byte> memory = offer(claim_of(io, size, header.has_spacing));
   // The file's own voxels fill the end of the memory, their values then its begin.
   const std::span<std::byte> own = memory.last(bytes);
-  read_voxels(path, io, own);
+  if (header.leaves_out) {
+    read_all_voxels(path, io, own);
+  } else {
+    read_voxels(path, io, own);
+  }
   quiet.refuse_if_missing(path);
   to_floats(path, io.GetComponentType(), own, memory);
 }
@@ -191,13 +210,18 @@ std::optional<std::string> value_of(const itk::GDCMImageIO& io, const char* tag)
 
 constexpr const char* kPixelSpacing = "0028|0030";
 
-/// GDCM fills in 1 mm where a file names no spacing between pixels, or none that is a number. What
-/// no tag of the file's first level tells may come from deeper in it.
+/// GDCM fills in 1 mm where a file names no spacing between pixels, none that is a number, or only
+/// one that its kind of image does not go by, such as a CT's at the detector (0018|1164). What no
+/// tag of the file's first level tells may come from deeper in it.
 bool names_spacing(const itk::GDCMImageIO& io) {
+  const bool may_be_filled_in = io.GetSpacing(0) == 1.0 && io.GetSpacing(1) == 1.0;
   for (const char* tag : {kPixelSpacing, "0018|1164"}) {
-    if (const auto text = value_of(io, tag)) return dicom_distances(*text).size() == 2;
+    const auto text = value_of(io, tag);
+    if (!text) continue;
+    const std::vector<double> told = dicom_distances(*text);
+    return told.size() == 2 && (!may_be_filled_in || told == std::vector{1.0, 1.0});
   }
-  return io.GetSpacing(0) != 1.0 || io.GetSpacing(1) != 1.0;
+  return !may_be_filled_in;
 }
 
 /// The same of the slices of one file: where its pixels' spacing is on the first level, theirs is.
@@ -222,7 +246,7 @@ void read_dicom_file(const fs::path& path, const Offer& offer) {
 
 /// The DICOM images among `files`, which must be of one series.
 std::vector<fs::path> series_files(const fs::path& folder, const std::vector<fs::path>& files,
-                                   SandboxReader& sandbox) {
+                                   SandboxReader& sandbox, const Quiet& quiet) {
   std::vector<fs::path> images;
   std::set<std::string> series;
   for (const fs::path& file : files) {
@@ -230,6 +254,7 @@ std::vector<fs::path> series_files(const fs::path& folder, const std::vector<fs:
     sandbox.at(file.string());
     if (!guarded(file, [&] { return io->CanReadFile(file.c_str()); })) continue;
     open(file, *io);
+    quiet.refuse_if_missing(file);
     std::string uid;
     itk::ExposeMetaData<std::string>(io->GetMetaDataDictionary(), "0020|000e", uid);
     series.insert(uid);
@@ -250,7 +275,7 @@ std::vector<fs::path> series_files(const fs::path& folder, const std::vector<fs:
 void read_dicom_series(const fs::path& folder, const std::vector<fs::path>& beside,
                        SandboxReader& sandbox, const Offer& offer) {
   const Quiet quiet;
-  const std::vector<fs::path> files = series_files(folder, beside, sandbox);
+  const std::vector<fs::path> files = series_files(folder, beside, sandbox, quiet);
   if (files.size() == 1) return read_dicom_file(files.front(), offer);
 
   const auto io = itk::GDCMImageIO::New();

@@ -18,8 +18,9 @@ Quiet::~Quiet() {
 void Quiet::refuse_if_missing(const std::filesystem::path& path) const {
   const std::string text = kept_.str();
   if (text.find("not read completely") != std::string::npos ||
-      text.find("Incomplete Pixel Data") != std::string::npos) {
-    throw SceneError(path.string() + ": voxels are missing at its end; copy the file again");
+      text.find("Incomplete Pixel Data") != std::string::npos ||
+      text.find("Uncompress failed") != std::string::npos) {
+    throw SceneError(path.string() + ": voxels are missing or broken; copy the file again");
   }
 }
 

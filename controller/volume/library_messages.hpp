@@ -17,7 +17,8 @@ class Quiet {
   Quiet(const Quiet&) = delete;
   Quiet& operator=(const Quiet&) = delete;
 
-  /// MetaIO and GDCM only print that voxels are missing, and go on: throws SceneError for them.
+  /// MetaIO and GDCM only print that voxels are missing or cannot be unpacked, and go on: throws
+  /// SceneError for them. What is kept is of all files read since the beginning.
   void refuse_if_missing(const std::filesystem::path& path) const;
 
  private:

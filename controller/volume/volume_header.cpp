@@ -2,13 +2,22 @@
 #include "controller/volume/volume_header.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <charconv>
 #include <cmath>
 #include <fstream>
+#include <iomanip>
 #include <map>
+#include <memory>
+#include <new>
 #include <sstream>
+#include <string_view>
 #include <vector>
+
+#include <fcntl.h>
+#include <unistd.h>
+#include <zlib.h>
 
 #include "controller/scene/scene_error.hpp"
 #include "controller/volume/volume_limits.hpp"
@@ -125,6 +134,44 @@ void locate_data(VolumeHeader& header, const fs::path& path, const fs::path& dat
   header.data_bytes_at_most = held * static_cast<std::uint64_t>(packing);
 }
 
+/// ITK takes each length for mm, whatever the header says.
+void check_units(const fs::path& path, const TextHeader& text) {
+  constexpr std::array<std::string_view, 10> kOthers{
+      "m", "cm", "um", "\u00b5m", "\u03bcm", "nm", "micron", "microns", "micrometer", "in"};
+  for (const char* const key : {"space units", "units"}) {
+    std::istringstream words(text.get(key));
+    for (std::string word; words >> std::quoted(word);) {
+      if (std::ranges::find(kOthers, lower(word)) == kOthers.end()) continue;
+      throw SceneError(path.string() + ": " + key + ": " + word +
+                       " where kerf reads mm; write the header's lengths in mm, or remove the line "
+                       "and give the spacing in the scene or with `--spacing`");
+    }
+  }
+}
+
+struct CloseGz {
+  void operator()(gzFile file) const noexcept { gzclose(file); }
+};
+
+/// Unpacks what follows `offset` to its end, where its checksum is: NrrdIO stops at the last voxel
+/// that it wants, and so takes a broken stream that became longer for a good one.
+void check_gzip(const fs::path& data, std::uint64_t offset) {
+  const int fd = ::open(data.c_str(), O_RDONLY | O_CLOEXEC);
+  if (fd < 0) return;  // NrrdIO says so
+  ::lseek(fd, static_cast<off_t>(offset), SEEK_SET);
+  const std::unique_ptr<gzFile_s, CloseGz> file(gzdopen(fd, "rb"));
+  if (!file) throw std::bad_alloc();
+  std::vector<char> piece(std::size_t{1} << 20);
+  int got = 0;
+  do {
+    got = gzread(file.get(), piece.data(), static_cast<unsigned>(piece.size()));
+  } while (got > 0);
+  int fault = Z_OK;
+  gzerror(file.get(), &fault);
+  if (fault != Z_DATA_ERROR) return;
+  throw SceneError(shown(data.string()) + ": its packed voxels are broken; copy the file again");
+}
+
 }  // namespace
 
 VolumeHeader read_nrrd_header(const fs::path& path) {
@@ -135,6 +182,7 @@ VolumeHeader read_nrrd_header(const fs::path& path) {
                      ": no NRRD header (`sizes` is missing); is it another format?");
   }
   check_sizes(path, sizes);
+  check_units(path, text);
   VolumeHeader header;
   const std::vector<double> spacings = numbers(text.get("spacings"));
   const std::vector<double> directions = numbers(text.get("space directions"));
@@ -157,6 +205,8 @@ VolumeHeader read_nrrd_header(const fs::path& path) {
               compressed    ? Packing::deflated
               : text_voxels ? Packing::text
                             : Packing::raw);
+  const bool skips = !text.get("byte skip").empty() || !text.get("line skip").empty();
+  if (compressed && !skips) check_gzip(file, data.empty() ? text.end : 0);
   return header;
 }
 
@@ -173,13 +223,15 @@ VolumeHeader read_meta_header(const fs::path& path) {
   VolumeHeader header;
   header.has_spacing = !text.get("elementspacing").empty() || !text.get("elementsize").empty();
   const bool several = data.find('%') != std::string::npos || lower(data).rfind("list", 0) == 0;
-  if (several) return header;  // ITK counts
+  const bool packed = lower(text.get("compresseddata")) == "true";
+  header.leaves_out = several || packed;
+  if (several) return header;
   const bool ascii = lower(text.get("binarydata")) == "false";
   const bool local = lower(data) == "local";
   locate_data(header, path, local ? path : path.parent_path() / data, local ? text.end : 0,
-              lower(text.get("compresseddata")) == "true" ? Packing::deflated
-              : ascii                                     ? Packing::text
-                                                          : Packing::raw);
+              packed  ? Packing::deflated
+              : ascii ? Packing::text
+                      : Packing::raw);
   return header;
 }
 

@@ -16,6 +16,8 @@ struct VolumeHeader {
   /// The most bytes of voxels that the file can hold, given its size and encoding.
   std::uint64_t data_bytes_at_most = std::numeric_limits<std::uint64_t>::max();
   std::string data_file;  ///< where they lie, for messages
+  bool leaves_out =
+      false;  ///< MetaImage, in several files or packed: what cannot be read is left out
 };
 
 /// In small letters, of ASCII alone: so keys of headers and ends of file names are compared.

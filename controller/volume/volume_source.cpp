@@ -112,6 +112,30 @@ void set_range(const fs::path& path, SourceVolume& volume) {
   volume.max = static_cast<double>(max);
 }
 
+namespace {
+
+/// The slices do not follow one another evenly: names the one whose distance to the slice before it
+/// is the oddest. Most others are right, so the median is what is usual.
+[[noreturn]] void refuse_uneven(const fs::path& folder, const std::vector<Slice>& slices) {
+  std::vector<double> apart;
+  for (std::size_t i = 1; i < slices.size(); ++i) {
+    apart.push_back(slices[i].depth_mm - slices[i - 1].depth_mm);
+  }
+  std::vector<double> sorted = apart;
+  std::ranges::sort(sorted);
+  const double usual = sorted[sorted.size() / 2];
+  const auto oddest = std::ranges::max_element(
+      apart, {}, [&](double distance) { return std::abs(distance - usual); });
+  const auto slice = static_cast<std::size_t>(oddest - apart.begin()) + 1;
+  std::ostringstream text;
+  text << folder.string() << ": " << *oddest << " mm before slice "
+       << slices[slice].file.filename().string() << " where " << usual
+       << " mm is usual; add the missing slices or remove doubled ones";
+  throw SceneError(text.str());
+}
+
+}  // namespace
+
 double slice_distance(const std::filesystem::path& folder, const std::vector<Slice>& slices,
                       const Place& normal) {
   const double step =
@@ -121,13 +145,7 @@ double slice_distance(const std::filesystem::path& folder, const std::vector<Sli
     const Place apart = slices[i].origin_mm - slices[i - 1].origin_mm;
     const double depth = dot(apart, normal);
     const Place aside = apart - depth * normal;
-    if (std::abs(depth - step) > slack_mm) {
-      std::ostringstream text;
-      text << folder.string() << ": " << depth << " mm before slice "
-           << slices[i].file.filename().string() << " where " << step
-           << " mm is usual; add the missing slices or remove doubled ones";
-      throw SceneError(text.str());
-    }
+    if (std::abs(depth - step) > slack_mm) refuse_uneven(folder, slices);
     if (length(aside) > slack_mm) {
       throw SceneError(folder.string() +
                        ": its axes are not at right angles (tilted gantry); resample it to a "

@@ -33,7 +33,8 @@ void declare_front(Arguments& app, EmulatorOptions& o) {
   app.option("--rate", o.rate_hz, "servo rate for --lockstep, Hz; must divide 8000 (USB: 1000)")
       .shows_default();
   app.option("--packet-cycles", o.packet_cycles,
-             "in real time: bus cycles of 125 us from one look at the host to the next")
+             "fronts socket, udp, in real time: bus cycles of 125 us from one look at the host "
+             "to the next")
       .within(1, 800)
       .shows_default();
   app.option("--priority", o.priority, "SCHED_FIFO priority; 0 = none")
@@ -54,7 +55,8 @@ void declare_device(Arguments& app, EmulatorOptions& o) {
   app.flag("--drop-torque", o.drop_torque,
            "omni, falcon: motors let go when the host is silent for 0.1 s (default: hold)");
   app.flag("--pot-noise", o.pot_noise, "omni: noise in the low bits of the gimbal pots");
-  app.option("--packet-bytes", o.packet_bytes, "woodenhaptics: 14 (mbed) or 64 (Teensy)")
+  app.option("--packet-bytes", o.packet_bytes,
+             "woodenhaptics: 14 (mbed) or, fronts fuse, uhid, 64 (Teensy)")
       .shows_default();
   app.flag("--wireless-button", o.wireless_button,
            "woodenhaptics: the hand's first button shows on encoder d");
@@ -94,6 +96,9 @@ void check_front(const EmulatorOptions& o) {
   };
   only_on({"socket"}, "--socket", !o.socket.empty());
   only_on({"udp"}, "--udp", !o.udp.empty());
+  only_on({"socket", "udp"}, "--packet-cycles", o.packet_cycles != EmulatorOptions{}.packet_cycles);
+  // Nobody fills up a short packet there, as a HID host does.
+  only_on({"fuse", "uhid"}, "--packet-bytes", o.packet_bytes != wooden::kPacketBytes);
   only_on({"fuse", "usbip", "uhid"}, "--bus-fault", !o.bus.faults.empty());
   only_on({"fuse", "usbip"}, "--firmware-runs", o.bus.firmware_runs);
   only_on({"fuse"}, "--mount", !o.bus.mount.empty());
@@ -117,6 +122,13 @@ void check_front(const EmulatorOptions& o) {
   if (o.rate_hz < 1 || fastest % o.rate_hz != 0) {
     throw HilError("--rate: " + std::to_string(o.rate_hz) + " does not divide " +
                    std::to_string(fastest) + ", the rate of the bus; use such as 500 or 1000");
+  }
+  if (!o.lockstep && o.rate_hz != EmulatorOptions{}.rate_hz) {
+    throw HilError(
+        "--rate: the device runs by its own clock; give --lockstep too, or leave it out");
+  }
+  if (o.lockstep && o.packet_cycles != EmulatorOptions{}.packet_cycles) {
+    throw HilError("--packet-cycles: lock-step looks at the host once a tick; leave it out");
   }
   if (o.lockstep && !o.fault.empty() && o.front == "fuse") {
     throw HilError(

@@ -25,6 +25,8 @@ const char* way_out_of(int error, const char* usual) noexcept {
       return "raise ulimit -n";
     case ENFILE:
       return "end other programs, or raise fs.file-max";
+    case EFBIG:
+      return "raise ulimit -f";
     case ENOMEM:
       return "free memory, or raise ulimit -v";
     default:

@@ -51,6 +51,12 @@ TEST_CASE("a partner that does not fit is refused with the place and both words"
   CHECK(refusal_of(port, 5000).find("--port x: the controller wants a device omni") == 0);
 }
 
+TEST_CASE("an emulator that ends before it answers served another client: --stay is the way out") {
+  FakePort port;
+  port.gone = true;
+  CHECK(refusal_of(port, 5000).find("--stay") != std::string::npos);
+}
+
 TEST_CASE("where nothing comes back a lossy link says it again, until patience or stop") {
   FakePort port;
   CHECK(refusal_of(port, 450).find("--port x: nobody answers the hello") == 0);

@@ -33,7 +33,7 @@ class FakePort final : public PacketPort {
     ++sent_now;
     return send(packet);
   }
-  bool closed() const noexcept override { return false; }
+  bool closed() const noexcept override { return gone; }
   bool wait(int) noexcept override { return !incoming.empty(); }
 
   /// A packet of the device that waits to be received.
@@ -45,6 +45,7 @@ class FakePort final : public PacketPort {
   std::vector<std::vector<std::uint8_t>> sent;
   int sent_now = 0;  ///< of these, out of turn
   int receive_calls = 0;
+  bool gone = false;  ///< the other end
   std::function<void()> before_send;
 };
 

@@ -318,6 +318,12 @@ TEST_CASE("bad arguments are one line and exit 2") {
             .find("/nonexistent/a.json") != std::string::npos);
   CHECK(refused({controller, "--scene", scene, "--check", "--final", "/nonexistent/a.nrrd"})
             .find("/nonexistent/a.nrrd") != std::string::npos);
+  CHECK(refused({controller, "--scene", scene, "--check", "--emulator-args", "/nonexistent/a"})
+            .find("/nonexistent/a") != std::string::npos);
+  CHECK(refused({controller, "--scene", scene, "--check", "--name", "a/b"}).find("--name: 'a/b'") !=
+        std::string::npos);
+  CHECK(refused({controller, "--scene", scene, "--check", "--rate", "2000", "--spin-us", "900"})
+            .find("--spin-us 900 is more than 90 % of a tick at 2000 Hz") != std::string::npos);
   CHECK(refused({controller, "--scene", scene, "--cpu", "-1", "--check"}).find("range 0 to 1023") !=
         std::string::npos);
   CHECK(refused({controller, "--scene", scene, "--rate", "20000", "--check"}).find("20000") !=

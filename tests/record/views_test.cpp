@@ -2,6 +2,7 @@
 #include <cstdlib>
 
 #include <nlohmann/json.hpp>
+#include <sys/stat.h>
 
 #include "record/manifest.hpp"
 #include "record/summary.hpp"
@@ -139,6 +140,22 @@ TEST_CASE("views of a folder that is no recording are refused and leave no file"
             static_cast<void>(read_manifest(folder / "empty"));
           }).find("record it again") != std::string::npos);
   }
+}
+
+TEST_CASE("a pipe or a device in the place of a recording's file is refused, not waited for") {
+  const TestFolder folder;
+  record(folder / "log", 100);
+  for (const char* const name : {"manifest.json", "ticks.npy"}) {
+    CAPTURE(name);
+    std::filesystem::rename(folder / "log" / name, folder / "kept");
+    const std::string pipe = (folder / "log" / name).string();
+    REQUIRE(mkfifo(pipe.c_str(), 0600) == 0);
+    CHECK(error_of([&] { static_cast<void>(summarise(folder / "log")); }) ==
+          pipe + ": cannot be read; give the folder of a recording");
+    std::filesystem::remove(pipe);
+    std::filesystem::rename(folder / "kept", pipe);
+  }
+  CHECK(summarise(folder / "log").rows == 100);
 }
 
 TEST_CASE("the plot is an SVG with its panels and every curve that is not zero") {

@@ -81,7 +81,12 @@ TEST_CASE("a DICOM folder that is not one even stack is refused in one line") {
     write_series(folder, [](DicomSpec& spec, int k) {
       if (k == 4) spec.position_mm[2] += 2;
     });
-    refused("add the missing slices");
+    refused(": 4 mm before slice image2.dcm where 2 mm is usual; add the missing slices");
+  }
+  SUBCASE("a slice is there twice") {
+    write_series(folder, [](DicomSpec&, int) {});
+    folder.write("image3 (copy).dcm", dicom(slice(1)));
+    refused(": 0 mm before slice image3");
   }
   SUBCASE("two slices in one place") {
     write_series(folder, [](DicomSpec& spec, int) { spec.position_mm[2] = 100; });
@@ -107,11 +112,26 @@ TEST_CASE("a DICOM folder that is not one even stack is refused in one line") {
   }
   SUBCASE("a slice is cut off") {
     write_series(folder, [](DicomSpec&, int) {});
-    const auto path = folder / "image0.dcm";
-    const std::string whole = read_bytes(path);
-    folder.write("image0.dcm", whole.substr(0, whole.size() - 10));
-    refused("image0.dcm");
+    for (const std::string name : {"image0.dcm", "image3.dcm"}) {
+      const std::string whole = read_bytes(folder / name);
+      folder.write(name, whole.substr(0, whole.size() - 10));
+      refused(name + ": voxels are missing or broken");
+      folder.write(name, whole);
+    }
   }
+}
+
+TEST_CASE("a spacing that the kind of image does not go by is not in the file") {
+  const TempFolder folder;
+  const auto spaced_at_the_detector = [&](const std::string& text) {
+    write_series(folder, [&](DicomSpec& spec, int) {
+      spec.pixel_spacing.reset();
+      spec.imager_spacing = text;
+    });
+    return refusal(folder.path());
+  };
+  CHECK(spaced_at_the_detector("0.4\\0.4").find("spacing is not in the file") != std::string::npos);
+  CHECK(spaced_at_the_detector("1\\1") == "no error");
 }
 
 TEST_CASE(

@@ -82,6 +82,59 @@ TEST_CASE("a file that ends too early is refused in every format") {
                 "of 240 bytes");
 }
 
+TEST_CASE("what MetaImage leaves out in silence is refused: data files, and what is packed") {
+  const TempFolder folder;
+  std::string names;
+  for (const std::string name : {"a", "b", "c", "d", "e"}) {  // one layer each
+    const auto at = static_cast<std::size_t>(name[0] - 'a') * 24;
+    folder.write(name, kBytes.substr(at, 24));
+    names += "\n" + name;
+  }
+  const auto listed = [&](const std::string& list) {
+    return folder.write("a.mhd", meta("MET_USHORT", kElementSpacing, "LIST" + list));
+  };
+  CHECK(refusal(listed(names)) == "no error");
+  check_refused(listed("\na\nb\nnowhere\nd\ne"), "a.mhd: voxels are missing");
+  check_refused(listed("\na\nb\nc\nd"), "a.mhd: voxels are missing");
+
+  const std::string packed = gzipped(kBytes);
+  const auto with_size = [&](const std::string& bytes) {
+    return folder.write(
+        "b.mha", meta("MET_USHORT", "CompressedData = True\nCompressedDataSize = " +
+                                        std::to_string(bytes.size()) + "\n" + kElementSpacing) +
+                     bytes);
+  };
+  CHECK(refusal(with_size(packed)) == "no error");
+  std::string flipped = packed;
+  flipped[packed.size() / 2] = static_cast<char>(~flipped[packed.size() / 2]);
+  check_refused(with_size(flipped), "b.mha: voxels are missing or broken");
+  check_refused(with_size(gzipped(kBytes.substr(0, 60))), "b.mha: voxels are missing");
+}
+
+TEST_CASE("a NRRD whose lengths are no millimetres is refused, and one in mm is not") {
+  const TempFolder folder;
+  const auto with_units = [&](const std::string& units) {
+    return folder.write("a.nrrd", nrrd("ushort", kLittle + units) + "\n" + kBytes);
+  };
+  for (const std::string unit : {"um", "\u00b5m", "m", "cm", "microns"}) {
+    CAPTURE(unit);
+    check_refused(with_units("units: \"" + unit + "\" \"" + unit + "\" \"" + unit + "\"\n"),
+                  "a.nrrd: units: " + unit + " where kerf reads mm");
+  }
+  CHECK(refusal(with_units("units: \"mm\" \"mm\" \"mm\"\n")) == "no error");
+  CHECK(refusal(with_units("units: \"\" \"\" \"\"\n")) == "no error");
+}
+
+TEST_CASE("a packed NRRD is good only to its checksum, whatever its reader stops at") {
+  const TempFolder folder;
+  const std::string head = nrrd("ushort", kLittle, "gzip") + "\n";
+  const auto more = bytes_of(counting<std::uint16_t>(80));  // longer than the header says
+  std::string packed = gzipped(more);
+  CHECK(refusal(folder.write("a.nrrd", head + packed)) == "no error");
+  packed[packed.size() - 6] = static_cast<char>(~packed[packed.size() - 6]);  // of the checksum
+  check_refused(folder.write("b.nrrd", head + packed), "b.nrrd: its packed voxels are broken");
+}
+
 TEST_CASE("a header that promises more than its file can hold takes no memory") {
   const TempFolder folder;
   // 512 Mi voxels of 8 bytes would be 4 GiB.

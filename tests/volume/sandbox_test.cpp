@@ -8,6 +8,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <functional>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <thread>
@@ -340,4 +341,19 @@ TEST_CASE("a program that ignores the end of its children reads all the same") {
   CHECK(answer([](SandboxReader&) { std::abort(); }).find("the reader of VOL ended") !=
         std::string::npos);
   std::signal(SIGCHLD, before);
+}
+
+TEST_CASE("a limit of file sizes, which is one of shared memory too, is told as that") {
+  rlimit before{};
+  getrlimit(RLIMIT_FSIZE, &before);
+  rlimit few = before;
+  few.rlim_cur = 1024;
+  const auto kept = std::signal(SIGXFSZ, SIG_IGN);  // as in every program
+  setrlimit(RLIMIT_FSIZE, &few);
+  const std::string told = answer([](SandboxReader& sandbox) {
+    static_cast<void>(sandbox.offer(std::as_bytes(std::span("header"))));
+  });
+  setrlimit(RLIMIT_FSIZE, &before);
+  std::signal(SIGXFSZ, kept);
+  CHECK(told == "a.vol: no 1 MiB of memory for it (File too large); raise ulimit -f");
 }

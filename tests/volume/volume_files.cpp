@@ -118,6 +118,7 @@ std::string dicom(const DicomSpec& spec) {
       element(0x0008, 0x0016, "UI", ct) + element(0x0008, 0x0018, "UI", instance) +
       element(0x0008, 0x0060, "CS", "CT") +
       (spec.slice_spacing.empty() ? "" : element(0x0018, 0x0088, "DS", spec.slice_spacing)) +
+      (spec.imager_spacing.empty() ? "" : element(0x0018, 0x1164, "DS", spec.imager_spacing)) +
       element(0x0020, 0x000D, "UI", "1.2.826.0.1.9") + element(0x0020, 0x000E, "UI", spec.series) +
       element(0x0020, 0x0013, "IS", std::to_string(spec.instance)) +
       element(0x0020, 0x0032, "DS",

@@ -88,6 +88,7 @@ struct DicomSpec {
   std::array<double, 3> position_mm{0, 0, 0};
   std::string orientation = "1\\0\\0\\0\\1\\0";
   std::optional<std::string> pixel_spacing = "0.5\\0.25";  ///< between rows, between columns
+  std::string imager_spacing;                              ///< at the detector; empty: left out
   std::string slice_spacing;                               ///< empty: left out
   int frames = 0;                                          ///< of one file; 0: not told
   std::string series = "1.2.826.0.1.3680043.2.1125.1";

@@ -40,7 +40,9 @@ void agree(PacketPort& port, const std::string& place, const Hello& ours, bool i
     throw std::runtime_error(place + ": " + reason);
   }
   if (port.closed()) {
-    throw std::runtime_error(place + ": the emulator closed the link; see what it says");
+    throw std::runtime_error(place +
+                             ": the emulator closed the link; see what it says, and start it with "
+                             "--stay where clients come one after another");
   }
   throw std::runtime_error(place + ": nobody answers the hello of this controller within " +
                            std::to_string(patience_ms / 1000) +

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <system_error>
@@ -104,6 +105,11 @@ void upload(FalconLine& line, std::span<const std::uint8_t> chunk, std::size_t o
 }  // namespace
 
 std::vector<std::uint8_t> read_firmware(const std::string& file) {
+  std::error_code fault;
+  if (std::filesystem::exists(file, fault) && !std::filesystem::is_regular_file(file, fault)) {
+    throw std::runtime_error("firmware " + file +
+                             ": is no regular file; name the file with the Falcon's firmware");
+  }
   std::ifstream in(file, std::ios::binary);
   std::vector<std::uint8_t> bytes{std::istreambuf_iterator<char>(in), {}};
   if (!in.is_open() || in.bad() || bytes.empty()) {
