@@ -154,8 +154,12 @@ std::string devices_table(const Measure& measure, const Part& maps, bool quick) 
       best = first;
       best_damping = assignments[index][index_of(AxisId::damping)];
     }
-    for (const std::string& damping : {std::string("0.002"), best_damping}) {
-      for (const char* delay : {"0", "1", "2"}) {
+    const std::vector<std::string> dampings =
+        quick ? std::vector{best_damping} : std::vector<std::string>{"0.002", best_damping};
+    const std::vector<std::string> delays =
+        quick ? std::vector<std::string>{"1"} : std::vector<std::string>{"0", "1", "2"};
+    for (const std::string& damping : dampings) {
+      for (const std::string& delay : delays) {
         Assignment values;
         values[index_of(AxisId::device)] = device.word;
         values[index_of(AxisId::damping)] = damping;

@@ -49,10 +49,10 @@ class Scale {
   }
   [[nodiscard]] double place(std::size_t i) const { return places_[i]; }
   [[nodiscard]] double low(std::size_t i) const {
-    return i > 0 ? between(places_[i - 1], places_[i]) : beyond(i, i + 1);
+    return i > 0 ? between(places_[i - 1], places_[i]) : beyond(i, -1);
   }
   [[nodiscard]] double high(std::size_t i) const {
-    return i + 1 < places_.size() ? between(places_[i], places_[i + 1]) : beyond(i, i - 1);
+    return i + 1 < places_.size() ? between(places_[i], places_[i + 1]) : beyond(i, 1);
   }
   [[nodiscard]] std::size_t size() const { return places_.size(); }
 
@@ -75,12 +75,11 @@ class Scale {
   [[nodiscard]] double between(double a, double b) const {
     return log_ ? std::sqrt(a * b) : (a + b) / 2;
   }
-  /// As far beyond value i as the border to its neighbour is on the other side.
-  [[nodiscard]] double beyond(std::size_t i, std::size_t neighbour) const {
+  /// To one side (-1 or 1) of an end, as far as the border to its neighbour is on the other.
+  [[nodiscard]] double beyond(std::size_t i, int side) const {
     const double at = places_[i];
-    if (size() == 1)
-      return log_ ? at * (neighbour > i ? 0.8 : 1.25) : at + (neighbour > i ? -0.5 : 0.5);
-    const double other = places_[neighbour];
+    if (size() == 1) return log_ ? at * std::pow(1.25, side) : at + 0.5 * side;
+    const double other = places_[side < 0 ? i + 1 : i - 1];
     return log_ ? at * std::sqrt(at / other) : at + (at - other) / 2;
   }
 
