@@ -9,7 +9,7 @@
 #include "controller/law/velocity_window.hpp"
 #include "controller/servo/energy_ledger.hpp"
 #include "controller/servo/force_limits.hpp"
-#include "lab/zwidth/one_axis_plant.hpp"
+#include "controller/stability/one_axis_plant.hpp"
 #include "shared/numeric/numbers.hpp"
 
 namespace kerf::zwidth {

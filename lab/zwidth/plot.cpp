@@ -275,7 +275,7 @@ void draw_legend(std::ostream& script, const Part& part, bool verdicts, double h
   };
   const Item items[] = {
       {"comes to rest", "pointtype 5 pointsize 2 linecolor rgb '#9CCFB8'", 0.03, 0},
-      {"hardly moves, but the wall goes on giving energy",
+      {"travel small or falling, but the wall goes on giving energy",
        "pointtype 5 pointsize 2 linecolor rgb '#F0D060'", 0.03, 1},
       {"swings on (a limit cycle, or worse)", "pointtype 5 pointsize 2 linecolor rgb '#F0B79B'",
        0.03, 2},

@@ -8,7 +8,7 @@
 #include "controller/stability/held_mass.hpp"
 #include "controller/stability/sampled_loop.hpp"
 
-namespace kerf::zwidth {
+namespace kerf {
 
 /// One axis of a device with its hand, under a force that is held: exact, with Coulomb friction.
 ///
@@ -107,4 +107,4 @@ class OneAxisPlant {
   bool stuck_ = false;
 };
 
-}  // namespace kerf::zwidth
+}  // namespace kerf
