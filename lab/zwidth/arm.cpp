@@ -205,7 +205,9 @@ Swing hit_with_arm(const LoadedScene& scene, const Subject& subject, double stif
   for (std::size_t hit = 0; hit < kHitsMmPerS.size(); ++hit) {
     const std::optional<Swing> seen = watch_hit(rig, subject, seconds, ticks);
     if (!seen && hit == 0) {
-      throw HilError("the emulated hand: did not bring the device to the wall within 8 s");
+      throw HilError(
+          "--arm: the emulated hand did not bring the device to the wall within 8 s; give less "
+          "friction, mass or delay, or --hand firm");
     }
     worst.join(seen.value_or(kLost));
     if (worst.swings && worst.active) break;

@@ -49,10 +49,10 @@ class Scale {
   }
   [[nodiscard]] double place(std::size_t i) const { return places_[i]; }
   [[nodiscard]] double low(std::size_t i) const {
-    return i > 0 ? between(places_[i - 1], places_[i]) : beyond(i, i + 1);
+    return i > 0 ? between(places_[i - 1], places_[i]) : beyond(i, -1);
   }
   [[nodiscard]] double high(std::size_t i) const {
-    return i + 1 < places_.size() ? between(places_[i], places_[i + 1]) : beyond(i, i - 1);
+    return i + 1 < places_.size() ? between(places_[i], places_[i + 1]) : beyond(i, 1);
   }
   [[nodiscard]] std::size_t size() const { return places_.size(); }
 
@@ -75,12 +75,11 @@ class Scale {
   [[nodiscard]] double between(double a, double b) const {
     return log_ ? std::sqrt(a * b) : (a + b) / 2;
   }
-  /// As far beyond value i as the border to its neighbour is on the other side.
-  [[nodiscard]] double beyond(std::size_t i, std::size_t neighbour) const {
+  /// To one side (-1 or 1) of an end, as far as the border to its neighbour is on the other.
+  [[nodiscard]] double beyond(std::size_t i, int side) const {
     const double at = places_[i];
-    if (size() == 1)
-      return log_ ? at * (neighbour > i ? 0.8 : 1.25) : at + (neighbour > i ? -0.5 : 0.5);
-    const double other = places_[neighbour];
+    if (size() == 1) return log_ ? at * std::pow(1.25, side) : at + 0.5 * side;
+    const double other = places_[side < 0 ? i + 1 : i - 1];
     return log_ ? at * std::sqrt(at / other) : at + (at - other) / 2;
   }
 
@@ -149,10 +148,12 @@ std::string foot_of(const Part& part) {
          number_text(part.spec.seconds) + " s each, seed " + std::to_string(part.spec.seed);
 }
 
-void begin(std::ostream& script, std::size_t panels, int foot) {
+/// `right`: room beside each panel, in pixels.
+void begin(std::ostream& script, std::size_t panels, int foot, int right) {
   const std::size_t across = std::min<std::size_t>(panels, panels == 4 ? 2 : 3);
   const std::size_t down = (panels + across - 1) / across;
-  const int width = kPanelWidth * static_cast<int>(across) + (across == 1 ? 160 : 0);
+  constexpr int kLegendWidth = 1120;
+  const int width = std::max(kLegendWidth, (kPanelWidth + right) * static_cast<int>(across));
   const int height = kPanelHeight * static_cast<int>(down) + foot;
   script.precision(7);
   script << "set encoding utf8\nset terminal svg size " << width << ',' << height
@@ -160,9 +161,9 @@ void begin(std::ostream& script, std::size_t panels, int foot) {
             "set border 3 linecolor rgb '#555555' front\n"
             "set tics nomirror out textcolor rgb '#333333'\n"
             "set multiplot layout "
-         << down << ',' << across << " margins screen " << 95.0 / width << "," << 1 - 25.0 / width
-         << "," << (foot + 60.0) / height << "," << 1 - 45.0 / height << " spacing screen "
-         << 95.0 / width << "," << 115.0 / height << "\n";
+         << down << ',' << across << " margins screen " << 95.0 / width << ","
+         << 1 - (25.0 + right) / width << "," << (foot + 60.0) / height << "," << 1 - 45.0 / height
+         << " spacing screen " << (95.0 + right) / width << "," << 115.0 / height << "\n";
 }
 
 void data(std::ostream& script, const char* name, const std::function<void()>& rows) {
@@ -274,7 +275,7 @@ void draw_legend(std::ostream& script, const Part& part, bool verdicts, double h
   };
   const Item items[] = {
       {"comes to rest", "pointtype 5 pointsize 2 linecolor rgb '#9CCFB8'", 0.03, 0},
-      {"rests, but the wall goes on giving energy",
+      {"travel small or falling, but the wall goes on giving energy",
        "pointtype 5 pointsize 2 linecolor rgb '#F0D060'", 0.03, 1},
       {"swings on (a limit cycle, or worse)", "pointtype 5 pointsize 2 linecolor rgb '#F0B79B'",
        0.03, 2},
@@ -341,7 +342,7 @@ std::string plot_of(const Part& part) {
   const bool verdicts = y_axis == kAxisCount;
   const Scale x(part.spec, x_axis), y(part.spec, y_axis);
   std::ostringstream script;
-  begin(script, panels.size(), kFoot);
+  begin(script, panels.size(), kFoot, verdicts ? 0 : 110);
   const std::size_t across = std::min<std::size_t>(panels.size(), panels.size() == 4 ? 2 : 3);
   const std::size_t down = (panels.size() + across - 1) / across;
   draw_legend(script, part, verdicts, kPanelHeight * static_cast<double>(down) + kFoot);
@@ -363,7 +364,7 @@ std::string plot_of(const Part& part) {
 std::string plot_of(const std::vector<Portrait>& portraits) {
   constexpr const char* kHitLines[] = {"'#0072B2'", "'#D55E00'", "'#009E73'"};
   std::ostringstream script;
-  begin(script, portraits.size(), 20);
+  begin(script, portraits.size(), 20, 0);
   script << "set xlabel 'place of the tip, wall at 0 (mm)'\nset ylabel 'speed (mm/s)'\n"
             "set grid back linecolor rgb '#dddddd'\nset key right top samplen 2\n";
   for (const Portrait& portrait : portraits) {

@@ -11,6 +11,10 @@ cd "$dir"
 "$lab" zwidth --quick --damping 0:0.03:5 --stiffness 0.05:50:8 --seconds 0.3 --plot zwidth.svg >told
 grep -q 'stiffness of the wall, K (N/mm)' zwidth.svg
 grep -q 'servo steps' told
+"$lab" zwidth --damping 0.002 --stiffness 1 --seconds 0.1 --plot one.svg >/dev/null  # a single cell
+"$lab" zwidth --map numeric,rate --numeric fixed,double --rate 500,1000 --damping 0.002 --stiffness 0.2:20:5 \
+  --seconds 0.2 --plot heights.svg >/dev/null
+grep -q 'highest stiffness that comes to rest' heights.svg
 "$lab" zwidth --portraits portraits.svg --cells 1:0.002,20:0.002 --seconds 0.3
 grep -q '<svg' portraits.svg
 "$lab" zwidth --quick --jobs 2 --page stability.md

@@ -12,6 +12,7 @@
 #include <doctest/doctest.h>
 
 #include "controller/law/law_row.hpp"
+#include "controller/stability/one_axis_plant.hpp"
 #include "controller/stability/stable_gains.hpp"
 #include "hil/hil_error.hpp"
 #include "lab/program.hpp"
@@ -19,7 +20,6 @@
 #include "lab/zwidth/axes.hpp"
 #include "lab/zwidth/map.hpp"
 #include "lab/zwidth/one_axis.hpp"
-#include "controller/stability/one_axis_plant.hpp"
 #include "lab/zwidth/part_file.hpp"
 
 using namespace kerf;
