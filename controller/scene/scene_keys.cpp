@@ -162,7 +162,7 @@ constexpr SceneKey kKeys[] = {
     {"force.damping_ns_per_mm", "N s/mm", at<&ForceSettings::damping_ns_per_mm>,
      between(0, kMaxDampingNsPerMm), "of the coupling, at the device", kProxy},
     {"force.unchecked_gain", "", at<&ForceSettings::unchecked_gain>, {},
-     "hold a device with a contact that its model calls unstable", {},
+     "true: a device may be held by a contact that its model calls unstable", kProxy,
      {.json = InJson::if_changed}},
     {"force.friction", "", at<&ForceSettings::friction>, between(0, 1),
      "Coulomb coefficient of the tool on the surface", kProxy},

@@ -23,10 +23,12 @@
 namespace kerf::faults {
 namespace {
 
-/// Half of the seeds hold the torque when the host is silent, half drop it: what a device does is
-/// not known.
+/// The plant that the hand script asks for. Half of the seeds hold the torque when the host is
+/// silent, half drop it: what a device does is not known.
 template <class Params>
-Params with_silence(Params params, std::uint32_t seed) {
+Params plant_of(const HandScript& hand, std::uint32_t seed) {
+  Params params;
+  take_plant(hand.plant, params);
   params.on_silence = seed % 2 == 0 ? OnSilence::hold_torque : OnSilence::drop_torque;
   return params;
 }
@@ -34,13 +36,17 @@ Params with_silence(Params params, std::uint32_t seed) {
 Emulator make_emulator(const Subject& subject, std::uint32_t seed) {
   switch (subject.scene.device.personality) {
     case Personality::falcon:
-      return {std::make_unique<FalconModel>(with_silence(FalconParams{}, seed)), subject.hand};
-    case Personality::woodenhaptics:
-      return {std::make_unique<WoodenModel>(WoodenParams{}), subject.hand};
+      return {std::make_unique<FalconModel>(plant_of<FalconParams>(subject.hand, seed)),
+              subject.hand};
+    case Personality::woodenhaptics: {
+      WoodenParams wooden;  // lets go by itself
+      take_plant(subject.hand.plant, wooden);
+      return {std::make_unique<WoodenModel>(wooden), subject.hand};
+    }
     case Personality::omni:
       break;
   }
-  OmniParams params = with_silence(OmniParams{}, seed);
+  auto params = plant_of<OmniParams>(subject.hand, seed);
   params.dock_rad = subject.scene.device.dock_rad;
   return {params, subject.hand};
 }

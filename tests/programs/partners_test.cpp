@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <csignal>
 #include <filesystem>
+#include <fstream>
 #include <string>
 #include <vector>
 
@@ -109,6 +110,35 @@ TEST_CASE("partners that do not fit: one line on both sides, and exit code 2") {
     CHECK(line.find("kerf-emulator: " + place.socket + ": ") == 0);
     CHECK(line.find(misfit.told) != std::string::npos);
     CHECK_FALSE(std::filesystem::exists(place.socket));
+  }
+}
+
+TEST_CASE(
+    "a real port refuses gains above its device and an unstable loop: one line, exit code 2") {
+  const TemporaryFolder folder;
+  const std::string scene = (folder / "stiff.toml").string();
+  struct Case {
+    std::string force, told;
+  };
+  for (const auto& [force, told] :
+       {Case{"stiffness_n_per_mm = 0.71\nunchecked_gain = true\n",
+             "force.stiffness_n_per_mm = 0.71 is above 0.7, the most that is known to be safe on "
+             "omni"},
+        Case{"damping_ns_per_mm = 0.0051\n", "force.damping_ns_per_mm = 0.0051 is above 0.005"},
+        Case{"damping_ns_per_mm = 0\n",
+             "force.stiffness_n_per_mm = 0.4 with damping 0 is unstable on a lightly held omni"}}) {
+    CAPTURE(told);
+    std::ofstream(scene)
+        << "[[volume]]\nfile = \"phantom\"\nsize = [48, 48, 32]\n[[tool]]\nshape = "
+           "\"ball\"\nsize_vox = 8\n[force]\n"
+        << force;
+    Process controller({kBin + "/kerf-controller", "--scene", scene, "--port", "socket:/nowhere"},
+                       folder / "controller.log");
+    CHECK(controller.wait() == 2);
+    CAPTURE(controller.output());
+    CHECK(is_one_line(controller.output()));
+    CHECK(controller.output().find(told) != std::string::npos);
+    CHECK(controller.output().find(';') != std::string::npos);
   }
 }
 

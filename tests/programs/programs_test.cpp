@@ -84,6 +84,31 @@ TEST_CASE("virtual time: faults keep packets back, and the same run gives the sa
   }
 }
 
+TEST_CASE("virtual time: 2 ms of delay are the same loop wherever they lie") {
+  const auto energy_j = [](const std::string& before_delay,
+                           const std::vector<std::string>& options) {
+    Pair pair;
+    pair.scene = small_scene(pair.folder);
+    const std::string script = (pair.folder / "late.toml").string();
+    std::ofstream(script)
+        << "clock = \"start\"\n[[fault]]\nkind = \"delay\"\nms = 2\nfor_s = 3600\n"
+        << before_delay;
+    std::vector<std::string> emulator{"--lockstep"};
+    if (!before_delay.empty()) emulator.insert(emulator.end(), {"--fault", script});
+    emulator.insert(emulator.end(), options.begin(), options.end());
+    pair.start("touch.toml", {"--virtual", "--seconds", "2"}, emulator);
+    CHECK(pair.controller->wait() == 0);
+    return pair.report()["energy_j"].get<double>();
+  };
+  const double late_reports = energy_j("packets = \"reports\"\n", {});
+  CHECK(late_reports > 0);
+  CHECK(energy_j("packets = \"commands\"\n", {}) == late_reports);
+  CHECK(energy_j("", {"--output-delay", "16"}) == late_reports);
+  CHECK(energy_j("", {"--input-delay", "16"}) == late_reports);
+  CHECK(energy_j("", {"--input-delay", "8", "--output-delay", "8"}) == late_reports);
+  CHECK(energy_j("", {}) != late_reports);
+}
+
 TEST_CASE("virtual time: a stiffness that no port takes can be studied, and goes active") {
   const auto energy_j = [](double stiffness, const std::string& delay) {
     Pair pair;

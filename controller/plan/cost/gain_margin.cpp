@@ -31,6 +31,7 @@ double with_friction(const SampledLoop& loop, double damping, double linear_n_pe
     return push_on_wall(loop, stiffness, damping, {.push_n = 1}).swings_on();
   };
   double stable = std::max(linear_n_per_mm, kMinStiffnessNPerMm);
+  if (swings(stable)) return linear_n_per_mm;
   while (stable < kMostNPerMm && !swings(2 * stable)) stable *= 2;
   double unstable = 2 * stable;
   constexpr int kHalvings = 7;  // 2^7 parts of a doubling
