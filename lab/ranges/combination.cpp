@@ -7,6 +7,7 @@
 #include <fstream>
 #include <memory>
 #include <optional>
+#include <system_error>
 #include <utility>
 
 #include <unistd.h>
@@ -149,9 +150,10 @@ End play_watched(CompiledScene& servo, const HardHand& hand, const LoadedScene& 
 }  // namespace
 
 SceneFolder::SceneFolder() {
-  std::string name = (std::filesystem::temp_directory_path() / "kerf-ranges.XXXXXX").string();
-  if (mkdtemp(name.data()) == nullptr) {
-    throw HilError("TMPDIR: " + name + ": cannot be created; set TMPDIR to a folder that can");
+  std::error_code fault;
+  std::string name = (std::filesystem::temp_directory_path(fault) / "kerf-ranges.XXXXXX").string();
+  if (fault || mkdtemp(name.data()) == nullptr) {
+    throw HilError("TMPDIR: no folder can be made there; set it to one that can be written");
   }
   path_ = name;
   write_volume(half_space(), path_ / "solid.nrrd", VolumeEncoding::raw);

@@ -77,6 +77,11 @@ class Teller {
     broken(one.violation);
     out_ << "    " << word_of(one.numeric) << ": " << keys_of(one.texts) << '\n';
   }
+  /// A line for each part of the pairs.
+  void so_far(const Tally& tally) {
+    out_ << "  " << tally.ran << " combinations, " << tally.broken.size() << " violations"
+         << std::endl;
+  }
   [[nodiscard]] std::size_t violations() const { return violations_; }
   [[nodiscard]] const Json& rows() const { return rows_; }
 
@@ -168,7 +173,10 @@ int Command::run(std::ostream& out) const {
     bar.hide();
     tell_keys(keys, teller);
     tell_extremes(effort, keys, teller);
-    const PairRows pairs = study_pairs(keys, effort, progress);
+    const PairRows pairs = study_pairs(keys, effort, progress, [&](const PairRows& so_far) {
+      bar.hide();
+      teller.so_far(so_far.tally);
+    });
     bar.hide();
     tell_pairs(pairs, teller);
   }

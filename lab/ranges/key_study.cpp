@@ -67,7 +67,9 @@ std::string last_accepted(const SceneKey& key, double end, const Effort& effort,
 struct KeyFactors {
   std::vector<const KeyRow*> rows;
   std::vector<int> level_counts;
-  std::vector<bool> rare;  ///< where nothing is felt at some end: else hardly any row would feel
+  /// Where nothing is felt at some end, else hardly any row would feel; and where the ends take
+  /// more than twice the ticks of most, as that of 8 kHz does.
+  std::vector<bool> rare;
   std::size_t deciding = 0;
 
   explicit KeyFactors(const std::vector<KeyRow>& keys) {
@@ -76,13 +78,20 @@ struct KeyFactors {
         return other.levels.key->only_with.key == row.levels.key->name;
       });
     };
+    std::vector<std::size_t> ticks;
+    for (const KeyRow& row : keys) {
+      if (row.ends.ran > 0) ticks.push_back(row.ends.ticks / row.ends.ran);
+    }
+    std::ranges::sort(ticks);
+    const std::size_t usual_ticks = ticks.empty() ? 0 : ticks[ticks.size() / 2];
     for (const bool first : {true, false}) {
       for (const KeyRow& row : keys) {
         // The numbers are chosen for the run as a whole.
         if (row.levels.key->name == "servo.numeric" || decides(row) != first) continue;
         rows.push_back(&row);
         level_counts.push_back(static_cast<int>(row.accepted.size()));
-        rare.push_back(row.ends.felt < row.ends.ran);
+        rare.push_back(row.ends.felt < row.ends.ran ||
+                       2 * usual_ticks * row.ends.ran < row.ends.ticks);
       }
       if (first) deciding = rows.size();
     }
@@ -227,7 +236,7 @@ std::vector<KeyRow> study_keys(const Effort& effort, const Progress& progress) {
 }
 
 PairRows study_pairs(const std::vector<KeyRow>& keys, const Effort& effort,
-                     const Progress& progress) {
+                     const Progress& progress, const std::function<void(const PairRows&)>& told) {
   const KeyFactors factors(keys);
   const Factors all{.level_counts = factors.level_counts,
                     .rare = factors.rare,
@@ -239,18 +248,24 @@ PairRows study_pairs(const std::vector<KeyRow>& keys, const Effort& effort,
   PairRows out;
   PairTable table(factors.level_counts);
   out.pairs = table.pairs();
+  // In parts, so that a run that is ended early has told what it found.
+  constexpr std::size_t kPart = 100;
   const auto run = [&](std::size_t count, const auto& one) {
-    std::vector<Tally> tallies(count);
-    in_parallel(
-        count, effort.jobs, folder,
-        [&](std::size_t i, const std::filesystem::path& file) { one(i, file, tallies[i]); },
-        [&](double share) {
-          const double now =
-              static_cast<double>(out.tally.ran) + share * static_cast<double>(count);
-          progress(std::min(1.0, now / static_cast<double>(effort.combinations)),
-                   "pairs of ends, array " + std::to_string(out.arrays));
-        });
-    for (const Tally& tally : tallies) out.tally.add(tally);
+    for (std::size_t from = 0; from < count; from += kPart) {
+      std::vector<Tally> tallies(std::min(kPart, count - from));
+      in_parallel(
+          tallies.size(), effort.jobs, folder,
+          [&](std::size_t i, const std::filesystem::path& file) {
+            one(from + i, file, tallies[i]);
+          },
+          [&](double) {
+            progress(std::min(1.0, static_cast<double>(out.tally.ran) /
+                                       static_cast<double>(effort.combinations)),
+                     "pairs of ends, array " + std::to_string(out.arrays));
+          });
+      for (const Tally& tally : tallies) out.tally.add(tally);
+      told(out);
+    }
   };
   while (out.tally.ran < effort.combinations) {
     std::vector<Levels> rows = covering_rows(all, effort.seed + out.arrays);

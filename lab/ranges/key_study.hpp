@@ -62,8 +62,10 @@ using Progress = std::function<void(double share, const std::string& what)>;
 /// Covering arrays of the accepted ends, one after the other until there are as many combinations
 /// as the effort says. A row that the loader refuses gives up the key that the refusal names, until
 /// it loads; pairs that were lost so are tried by themselves after the first array.
+/// `told` gets what there is so far after each few hundred combinations.
 [[nodiscard]] PairRows study_pairs(const std::vector<KeyRow>& keys, const Effort& effort,
-                                   const Progress& progress);
+                                   const Progress& progress,
+                                   const std::function<void(const PairRows&)>& told);
 
 /// Takes keys out of a scene as long as it still breaks the rule.
 [[nodiscard]] Broken shrunk(Broken broken);

@@ -184,7 +184,7 @@ TEST_CASE(
   const auto study = [&](std::size_t jobs) {
     return study_pairs(
         keys, {.numerics = {NumericKind::fixed}, .combinations = 40, .seed = 5, .jobs = jobs},
-        [](double, const std::string&) {});
+        [](double, const std::string&) {}, [](const PairRows&) {});
   };
   const PairRows one = study(1), two = study(2);
   CHECK(one.tally.broken.empty());
