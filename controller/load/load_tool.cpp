@@ -114,7 +114,13 @@ TouchedVolumes touched_volumes(const std::vector<SceneVolume>& volumes) {
 SceneTool load_tool(const ToolSpec& spec, const TouchedVolumes& touched,
                     const std::filesystem::path& folder, int cpu_s) {
   ToolSize size = spec.size;
-  if (!spec.pitch_given) size.pitch_mm = touched.voxel_mm;
+  if (!spec.pitch_given) {
+    // Samples end inside of the surface by up to a pitch. Of that cell of the volume they then
+    // leave as large a part, and what is more than half of it is felt and never cut
+    // (docs/theory.md 6.3).
+    const bool thin = !size.size_vox && size.radius_mm < touched.voxel_mm;
+    size.pitch_mm = thin && spec.shape != kMeshShape ? touched.voxel_mm / 2 : touched.voxel_mm;
+  }
   if (size.pitch_mm > touched.voxel_mm * (1 + 1e-9)) {
     refuse(spec.pitch_place, " is above the smallest voxel edge and leaves gaps; use at most " +
                                  number_text(touched.voxel_mm));

@@ -56,20 +56,19 @@ template <class N>
 
 /// How far a tool surely moves in one tick there while it turns by so much, units: a step for each
 /// query that turning leaves to the move. Each reads what is near the wall, and three looks tell
-/// that no way is free. Groups may have looked in vain before, once with two looks each beyond the
-/// bound. Of a tool with a shaft each part counts as if it were nearest.
+/// that no way is free. Groups may have looked in vain before, once with two looks each of one part
+/// beyond the bound of all. Of a tool with a shaft each part counts as if it were nearest.
 template <class N>
 [[nodiscard]] double least_air_move(const SweptTool<N>& tool, std::size_t volumes,
                                     double turn_rad) {
   const QueryWork work = query_work(tool.point_shell, tool.behind, volumes);
   const auto times = static_cast<std::int64_t>(volumes);
-  std::int64_t query = 0, in_vain = 0;
+  std::int64_t query = 0, beyond = 0;
   const auto add = [&](const PointTable<N>& table) {
     query +=
         times * (QueryWork::kLookSamples + 3 * QueryWork::kFreeLook) + most_read_beside_wall(table);
     if (table.round && table.needed_whole <= kFreeFarthest) return;  // as one sphere
-    in_vain +=
-        query_work(table, volumes).in_vain() + times * 2 * QueryWork::kFreeLook * table.groups;
+    beyond = std::max(beyond, times * 2 * QueryWork::kFreeLook * table.groups);
   };
   add(tool.point_shell.table);
   for (std::size_t i = 0; i < tool.behind.count; ++i) {
@@ -81,7 +80,7 @@ template <class N>
                                               SweepRules::kMaxTurnQueries)
                    : 1;
   const std::int64_t left =
-      work.budget() - in_vain -
+      work.budget() - (beyond > 0 ? work.in_vain() + beyond : 0) -
       std::min((turns + 1) * (query + work.turn), work.budget() / 2 + 2 * (query + work.turn));
   const std::int64_t last = work.query + work.closer;  // no query begins with less
   const std::int64_t queries = left < last ? 0 : (left - last) / query + 1;

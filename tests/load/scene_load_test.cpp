@@ -257,6 +257,18 @@ TEST_CASE("a volume that cannot be used is reported with the line that names it"
   }
 }
 
+TEST_CASE("a tool thinner than two voxels has samples half a voxel apart, unless it says a pitch") {
+  const kerf::test::TempFolder folder;
+  const auto pitch_of = [&](const std::string& lines) {
+    return kerf::load_scene(block_scene(folder, 0.125, "[[tool]]\n" + lines)).tools[0].pitch_mm;
+  };
+  CHECK(pitch_of("shape = \"cone\"\nradius_mm = 0.124\n") == 0.0625);
+  CHECK(pitch_of("shape = \"ball\"\nradius_mm = 0.0625\n") == 0.0625);
+  CHECK(pitch_of("shape = \"cone\"\nradius_mm = 0.125\n") == 0.125);
+  CHECK(pitch_of("shape = \"cone\"\nradius_mm = 0.1\npitch_mm = 0.125\n") == 0.125);
+  CHECK(pitch_of("shape = \"ball\"\nsize_vox = 1\n") == 0.125);
+}
+
 TEST_CASE("a tool that does not suit the volume is reported with its line and the numbers") {
   const kerf::test::TempFolder folder;
   const auto error_with = [&](const std::string& lines) {

@@ -70,6 +70,9 @@ class ContactQuery {
   /// Work that is left of the tick. Parts of one tool hand one account on (tool_query.hpp).
   [[nodiscard]] std::int64_t left() const noexcept { return reader_.left(); }
   void set_left(std::int64_t left) noexcept { reader_.set_left(left); }
+  /// Work of the tick for free ways that led nowhere; the same account.
+  [[nodiscard]] std::int64_t in_vain() const noexcept { return in_vain_; }
+  void set_in_vain(std::int64_t in_vain) noexcept { in_vain_ = in_vain; }
   /// Work since `begin_tick`, in the samples of `work`.
   [[nodiscard]] std::int64_t spent() const noexcept { return work_.budget() - left(); }
 
@@ -105,11 +108,11 @@ class ContactQuery {
   /// as one sphere about its centre, which is all of a ball, and then by the spheres of its groups.
   /// One more query is left. What groups have looked at in vain is bounded by `QueryWork::in_vain`.
   [[nodiscard]] Real free_distance(ContactVec<Real> q, ContactVec<Real> move) const noexcept {
-    return free_distance(q, move, left() - work_.query - work_.closer);
+    return free_distance(q, move, left() - work_.query - work_.closer, work_.in_vain());
   }
-  /// The same by `work` at most.
-  [[nodiscard]] Real free_distance(ContactVec<Real> q, ContactVec<Real> move,
-                                   std::int64_t work) const noexcept {
+  /// The same by `work` at most, and by groups up to this much in vain.
+  [[nodiscard]] Real free_distance(ContactVec<Real> q, ContactVec<Real> move, std::int64_t work,
+                                   std::int64_t most_in_vain) const noexcept {
     const Real length = norm(move);
     if (!(length > Real(SweepRules::kStep))) return Real(0);
     const PointTable<N>& table = points_.table;
@@ -129,7 +132,7 @@ class ContactQuery {
                                         Reader::number_of(at.z)};
       const MoveShare<N> most = share;
       share = way.free_up_to(centre, table.needed_whole, 0, most, looks);
-      if (as_one || in_vain_ >= work_.in_vain()) continue;
+      if (as_one || in_vain_ >= most_in_vain) continue;
       share = free_share_of_groups(table, volume.places, centre, way, share, most, nearest_, looks);
     }
     Real free{};
@@ -199,9 +202,10 @@ class ContactQuery {
       if (plane.normal == ContactVec<Unit>{} || !may_query()) return;
       const auto arm = points_.table.round ? times<N>(-plane.normal, points_.reach) : plane.arm;
       const auto middle = ramp_middle<N>([&](Real below) {
+        reader_.spend(QueryWork::kFreeLook);
         return Reader::density_at(volume, q + arm - times<N>(plane.normal, below));
       });
-      if (middle.level == 0) return;
+      if (middle.level == 0 || !may_query()) return;
       seen.field.scale = density_scale(middle.level);
       const VoxelVec<Real> at = Reader::place_of(volume, q - times<N>(plane.normal, middle.below));
       const PointSums<N> sums = reader_.sums_at(seen.field, points_.table, volume.places, at);
@@ -221,7 +225,7 @@ class ContactQuery {
   QueryWork work_;
   mutable bool turned_ = false;       ///< and not queried since
   mutable std::int32_t nearest_ = 0;  ///< group that stopped the last free way
-  mutable std::int64_t in_vain_ = 0;  ///< work of the tick for free ways that led nowhere
+  mutable std::int64_t in_vain_ = 0;
 };
 
 }  // namespace kerf
