@@ -6,11 +6,13 @@
 #include <cstdint>
 #include <limits>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <doctest/doctest.h>
 
 #include "controller/law/law_row.hpp"
+#include "controller/law/registry/law_registry.hpp"
 #include "tests/servo/support.hpp"
 
 using namespace kerf;
@@ -105,6 +107,18 @@ class Sleeper {
   }
 };
 KERF_REGISTER_VELOCITY_ESTIMATOR(Sleeper)
+
+/// Reads a setting that it does not list.
+template <class N>
+struct Reader {
+  static constexpr const char* kName = "reader";
+  static constexpr const char* kMeaning = "is wrong";
+  static constexpr std::array<LawSetting, 0> kSettings{};
+  struct State {};
+  explicit Reader(const LawSetup& setup) { static_cast<void>(setup["gain"]); }
+  DeviceVec<typename N::Real> step(const VelocityInput<N>&, State&) const noexcept { return {}; }
+};
+KERF_REGISTER_VELOCITY_ESTIMATOR(Reader)
 
 LoadedScene with_force_law(NumericKind numeric, double k) {
   LoadedScene scene = half_space_scene();
@@ -249,6 +263,42 @@ TEST_CASE("a law begins anew where the hand was not felt") {
   }
 }
 
+TEST_CASE("two laws of one name are refused, whoever asks") {
+  LawRow twin = find_law(LawKind::velocity, "sleeper");
+  twin.next = std::exchange(first_own_law, &twin);
+  CHECK_THROWS_WITH(static_cast<void>(known_laws(LawKind::velocity)),
+                    "two laws of this program are the velocity estimator \"sleeper\"; give one "
+                    "another kName");
+  first_own_law = twin.next;
+  CHECK(known_laws(LawKind::velocity).size() == 4);
+}
+
+TEST_CASE(
+    "a backward difference is exact on a line, over gaps too, and its filter is of first order") {
+  for (const NumericKind numeric : kEveryNumber) {
+    for (const double tau_ms : {0.0, 5.0, 1000.0}) {
+      LoadedScene scene = half_space_scene();
+      scene.servo.numeric = numeric;
+      scene.servo.velocity = {LawKind::velocity, "difference", {{"tau_ms", tau_ms}}};
+      ArmedServo armed(scene);
+      ServoOutput last = armed.step(0, 5, 0);
+      std::array<double, 3> y = last.velocity_mm_per_s;
+      for (const int gap : {1, 1, 3, 1, 7, 1, 1}) {
+        for (int missed = 1; missed < gap; ++missed) last = armed.servo->step({});
+        CHECK(last.velocity_mm_per_s == y);  // it stands
+        const ServoOutput out = armed.step(0.3 * gap, 5 + 0.2 * gap, 0);
+        const double kept = std::pow(tau_ms / (tau_ms + 1), gap);
+        for (std::size_t i = 0; i < 3; ++i) {
+          const double v = (out.position_mm[i] - last.position_mm[i]) * 1000 / gap;
+          CHECK(out.velocity_mm_per_s[i] == doctest::Approx(v + kept * (y[i] - v)).epsilon(1e-3));
+        }
+        last = out;
+        y = out.velocity_mm_per_s;
+      }
+    }
+  }
+}
+
 TEST_CASE("a law that a scene names and the program has not is refused with the known ones") {
   const auto refusal = [](const LawChoice& law) -> std::string {
     LoadedScene scene = half_space_scene();
@@ -265,6 +315,12 @@ TEST_CASE("a law that a scene names and the program has not is refused with the 
         "plain_spring");
   CHECK(refusal({LawKind::force, "plain_spring", {{"k", 101}}}) ==
         "test: force.law \"plain_spring\".k = 101 is out of range; use 0 to 100");
+  LoadedScene scene = half_space_scene();
+  scene.servo.velocity.name = "reader";
+  CHECK_THROWS_WITH(
+      static_cast<void>(compile(scene)),
+      "test: servo.velocity \"reader\" reads a setting gain that its kSettings do not "
+      "list; add it there");
   CHECK(refusal({LawKind::force, "plain_spring", {{"b", 1}}}) ==
         "test: force.law \"plain_spring\".b = 1 is unknown; known: k");
 }

@@ -49,8 +49,8 @@ std::vector<const LawRow*> known_laws(LawKind kind) {
   std::ranges::sort(rows, {}, &LawRow::name);
   const auto twice = std::ranges::adjacent_find(rows, {}, &LawRow::name);
   if (twice != rows.end()) {
-    throw LawError(": two of this program's laws are the " + std::string(kind_name(kind)) + " \"" +
-                   std::string((*twice)->name) + "\"; give one another kName");
+    throw std::runtime_error("two laws of this program are the " + std::string(kind_name(kind)) +
+                             " \"" + std::string((*twice)->name) + "\"; give one another kName");
   }
   return rows;
 }

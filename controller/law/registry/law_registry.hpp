@@ -31,7 +31,7 @@ struct LawError : std::runtime_error {
 [[nodiscard]] std::string_view kind_name(LawKind kind) noexcept;
 
 /// All laws of a kind that this program knows, by name: ours, and those of its own files. Throws
-/// LawError where two have the same name.
+/// std::runtime_error, a whole line, where two have the same name.
 [[nodiscard]] std::vector<const LawRow*> known_laws(LawKind kind);
 
 /// Throws LawError with the known names for one that is unknown.
