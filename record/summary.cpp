@@ -34,7 +34,7 @@ namespace {
                {"port_energy_mj", s.port_energy_mj},
                {"port_minimum_mj", s.port_minimum_mj}};
   for (std::size_t i = 0; i < kEnergySources; ++i) {
-    list["energy_" + std::string(kEnergySourceNames[i]) + "_mj"] = s.energy_mj[i];
+    list[std::string(kEnergySourceNames[i]) + "_mj"] = s.energy_mj[i];
   }
   list["end_reason"] = s.end_reason;
   return list;

@@ -54,7 +54,7 @@ TEST_CASE("the summary counts what was recorded") {
   CHECK(summary.end_reason == "clean end");
   CHECK(to_text(summary).find("rows                1000\n") != std::string::npos);
   CHECK(nlohmann::json::parse(to_json(summary))["last_tick"] == 1000);
-  CHECK(nlohmann::json::parse(to_json(summary))["energy_leak_mj"] == doctest::Approx(-1));
+  CHECK(nlohmann::json::parse(to_json(summary))["leak_mj"] == doctest::Approx(-1));
 }
 
 TEST_CASE("a gap in the sequence shows in the summary without the manifest's help") {
