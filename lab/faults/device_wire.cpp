@@ -70,9 +70,21 @@ std::optional<ToldReport> DeviceWire::report(std::span<const std::uint8_t> packe
   }
   const auto said = decode_report(packet);
   if (!said) return std::nullopt;
-  const std::uint32_t ahead = said->counter - packet_number_.value_or(said->counter - 1);
-  if (ahead == 0 || ahead > UINT32_MAX / 2) return std::nullopt;
+  // Newer or older by up to 20 ms of an 8 kHz stream is as it says. What is farther off may be a
+  // wrong bit: it counts from the second packet on that goes on from there.
+  constexpr std::int64_t kNear = 160;
+  const auto from = [&](std::uint32_t number) {
+    return static_cast<std::int32_t>(said->counter - number);
+  };
+  if (packet_number_ && from(*packet_number_) <= 0 && -kNear <= from(*packet_number_))
+    return std::nullopt;
+  if (packet_number_ && std::abs(std::int64_t{from(*packet_number_)}) > kNear) {
+    const bool goes_on = far_number_ && from(*far_number_) > 0 && from(*far_number_) <= kNear;
+    far_number_ = said->counter;
+    if (!goes_on) return std::nullopt;
+  }
   packet_number_ = said->counter;
+  far_number_.reset();
   return ToldReport{said->encoder, said->docked, true};
 }
 

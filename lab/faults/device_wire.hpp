@@ -58,6 +58,7 @@ class DeviceWire {
   std::array<int, 3> zero_count_{};
   std::array<double, 3> zero_rad_{}, rad_per_count_{}, nmm_per_count_{};
   std::optional<std::uint32_t> packet_number_;  ///< of the Omni's last report
+  std::optional<std::uint32_t> far_number_;     ///< of the last packet, where it was far from that
   bool parked_ = false, encoders_set_ = false;  ///< WoodenHaptics
 };
 
