@@ -58,12 +58,15 @@ SceneSetting parse_setting(std::string_view text, SceneKeys keys) {
 
 void put_settings(std::span<const SceneSetting> settings, TomlNode& root) {
   for (const SceneSetting& setting : settings) {
-    const std::size_t dot = setting.key.find('.');
-    const std::string table = setting.key.substr(0, dot), key = setting.key.substr(dot + 1);
+    const std::size_t dot = setting.key.find('.'), last = setting.key.rfind('.');
+    const std::string table = setting.key.substr(0, dot), key = setting.key.substr(last + 1);
     const auto put = [&](TomlNode& into) {
+      // `[[volume]]` has a table below it, `pose`.
+      TomlNode& below =
+          last == dot ? into : entry_of(into, setting.key.substr(dot + 1, last - dot - 1));
       TomlNode node = value_node(setting);
       node.key = key;
-      entry_of(into, key) = std::move(node);
+      entry_of(below, key) = std::move(node);
     };
     if (most_of(table) == 0) {
       put(entry_of(root, table));
