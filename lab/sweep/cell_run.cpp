@@ -96,7 +96,6 @@ constexpr Column kColumns[] = {
     {"volume_hash", false},
     {"output_hash", false},
     {"peak_motor_force_n", true},
-    {"report_hash", true},
 };
 
 CellResult result_of(int exit, const std::filesystem::path& folder, const std::string& last_line) {
