@@ -31,8 +31,8 @@ int run_lab(int argc, const char* const* argv, std::ostream& out, std::ostream& 
   const sweep::Command sweep(app);
   const zwidth::Command zwidth(app);
   const zwidth::MergeCommand merge(app);
-  const std::array<const LabCommand*, 10> commands{
-      &bench, &accuracy, &energy, &extremes, &faults, &laws, &ranges, &sweep, &zwidth, &merge};
+  const std::array<const LabCommand*, 10> commands{&bench, &accuracy, &energy, &extremes, &faults,
+                                                   &laws,  &ranges,   &sweep,  &zwidth,   &merge};
   try {
     if (!app.parse(argc, argv, out)) return 0;
     for (const LabCommand* command : commands) {

@@ -110,6 +110,9 @@ constexpr LogCode kFaults[] = {
     {1, "stale_input", "no report for 20 ms"},
     {2, "not_finite", "NaN after kinematics for more than 2 ms"},
     {3, "overspeed", "tip faster than the limit"},
+    {4, "force_law", "the scene's force law gave what is no number"},
+    {5, "velocity_estimator", "the scene's velocity estimator gave what is no number"},
+    {6, "stabiliser", "the scene's stabiliser gave what is no number"},
 };
 
 /// Each field of a tick record has its row, in its order.

@@ -92,7 +92,8 @@ TEST_CASE_TEMPLATE("the speed that a scene is told to be free of drag up to is s
       // From where nothing is felt any more to where all is proven free.
       for (const double gap : {1.3, 2.5, 4.0, 5.5, 7.0, 8.5, 10.0, 12.0}) {
         CAPTURE(gap);
-        CHECK(flown_at<N>(tool, walls, {units, gap, turn_rad}, cases(25)).longest_spring < kNothing);
+        CHECK(flown_at<N>(tool, walls, {units, gap, turn_rad}, cases(25)).longest_spring <
+              kNothing);
       }
       if (turn_rad > 0 || !tool.round) continue;  // others are told for their worst pose
       double bold = 1.1;
