@@ -61,7 +61,7 @@ TEST_CASE("rows come back as they were written, and lie behind the header byte f
     CHECK(std::memcmp(&record, &expected, sizeof record) == 0);
   });
   CHECK(index == 1500);
-  CHECK(file_text(folder / "ticks.npy").size() == kTickLogHeaderBytes + 1500 * 472);
+  CHECK(file_text(folder / "ticks.npy").size() == kTickLogHeaderBytes + 1500 * sizeof(TickRecord));
 }
 
 TEST_CASE(
@@ -91,13 +91,13 @@ TEST_CASE("a log that is cut, changed, foreign or missing is refused in one line
   CHECK(error_of(read).find("cannot be read") != std::string::npos);
   write_rows(path, 100);
   CHECK(error_of(read).empty());
-  std::filesystem::resize_file(path, kTickLogHeaderBytes + 99 * 472 + 463);
+  std::filesystem::resize_file(path, kTickLogHeaderBytes + 99 * sizeof(TickRecord) + 463);
   CHECK(error_of(read).find("99 rows of 100") != std::string::npos);
   std::filesystem::remove(path);
   write_rows(path, 100);
   {
     std::fstream file(path, std::ios::binary | std::ios::in | std::ios::out);
-    file.seekp(kTickLogHeaderBytes + 42 * 472 + 70);
+    file.seekp(kTickLogHeaderBytes + 42 * sizeof(TickRecord) + 70);
     file.put('!');
   }
   CHECK(error_of(read).find("row 42 has a wrong checksum") != std::string::npos);
