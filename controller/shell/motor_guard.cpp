@@ -55,11 +55,15 @@ MotorGuard::~MotorGuard() {
   driven = nullptr;
 }
 
-void MotorGuard::guard_stack() noexcept {
-  stack_t stack{};
-  stack.ss_sp = stack_.data();
-  stack.ss_size = stack_.size();
-  sigaltstack(&stack, nullptr);
+HandlerStack::HandlerStack(std::byte* stack, std::size_t bytes) noexcept {
+  stack_t own{};
+  own.ss_sp = stack;
+  own.ss_size = bytes;
+  sigaltstack(&own, &before_);
+}
+
+HandlerStack::~HandlerStack() {
+  sigaltstack(&before_, nullptr);
 }
 
 }  // namespace kerf

@@ -2,11 +2,24 @@
 #pragma once
 
 #include <array>
+#include <csignal>
 #include <cstddef>
 
 #include "controller/device/driver/device_driver.hpp"
 
 namespace kerf {
+
+/// While one of these lives, signal handlers of its thread run on this stack; then on the former.
+class HandlerStack {
+ public:
+  HandlerStack(std::byte* stack, std::size_t bytes) noexcept;
+  ~HandlerStack();
+  HandlerStack(const HandlerStack&) = delete;
+  HandlerStack& operator=(const HandlerStack&) = delete;
+
+ private:
+  stack_t before_{};
+};
 
 /// Motors off on every way out while one of these lives: its own end (return or exception), the
 /// signals that ask for the end, in their handler already, and those that end a program at once
@@ -24,7 +37,7 @@ class MotorGuard {
 
   /// Gives the calling thread a stack for the handlers, so that they run after a stack overflow
   /// too.
-  void guard_stack() noexcept;
+  [[nodiscard]] HandlerStack guard_stack() noexcept { return {stack_.data(), stack_.size()}; }
 
  private:
   static constexpr std::size_t kStackBytes = 65536;

@@ -111,7 +111,7 @@ EndReason run_threads(const Run& run) {
       watching = start_watchdog(watchdog, run.options.real_time);
     }
     const std::jthread servo_thread([&] {
-      guard.guard_stack();
+      const HandlerStack handlers = guard.guard_stack();
       try {
         end = serve(run, signals, calls ? &*calls : nullptr);
       } catch (...) {

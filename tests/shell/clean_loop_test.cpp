@@ -137,7 +137,7 @@ Outcome run_loop(Seed seed, bool guarded = false) {
     std::optional<kerf::CallGuard> calls;
     if (guarded) calls.emplace(device, stop);
     std::thread([&] {
-      motors.guard_stack();
+      const kerf::HandlerStack handlers = motors.guard_stack();
       static_cast<void>(kerf::become_real_time({}));
       kerf::Publisher eyes(segment, *servo);
       kerf::RealTimeTicks clock(1'000'000, 0);

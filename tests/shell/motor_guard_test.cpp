@@ -90,7 +90,7 @@ Ending ending_by(WayOut way_out) {
     std::atomic<bool>& stop = kerf::catch_stop_and_pause_signals();
     try {
       kerf::MotorGuard guard(driver);
-      guard.guard_stack();
+      const kerf::HandlerStack handlers = guard.guard_stack();
       kerf::ServoOutput output;
       output.motor_counts = {500, 500, 500};
       output.motors_on = true;

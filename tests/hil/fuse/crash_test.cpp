@@ -30,7 +30,7 @@ int status_of(const std::string& node, WayOut way_out) {
       kerf::FirewirePort port(options, 1000, go_on);
       kerf::OmniDriver driver(port);
       kerf::MotorGuard guard(driver);
-      guard.guard_stack();
+      const kerf::HandlerStack handlers = guard.guard_stack();
       kerf::ServoOutput output;
       output.motor_counts = {100, 100, 100};
       output.motors_on = true;

@@ -31,7 +31,7 @@ std::string unexpected_call(Personality personality, const std::string& text, bo
   kerf::MotorGuard motors(*driver);
   kerf::CallGuard calls(*driver, stop);
   std::thread([&] {
-    motors.guard_stack();
+    const kerf::HandlerStack handlers = motors.guard_stack();
     calls.enter(text);
     std::int64_t deadline_ns = kerf::monotonic_ns();
     for (int tick = 0; tick < 2000 && !stop && !port->closed(); ++tick) {
