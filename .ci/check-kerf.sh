@@ -129,7 +129,17 @@ with() {
 }
 all='out/final.nrrd out/forces.svg out/frame-0001.png out/log out/report.json '
 
+cd "$lab"  # where a demo without a display keeps its pictures
 expect 'a demo runs' kerf_gives 0 demo --seconds 1
+expect 'without a display it says where its pictures are' says '^kept in kerf-demo: '
+expect 'and there they are' test -e kerf-demo/frame-0001.png
+expect 'and once more, in place of the first' kerf_gives 0 demo --seconds 1
+expect 'asked for no window, it keeps none' kerf_gives 0 demo --seconds 1 --headless
+expect 'and says so' test "$(grep -c kept said)" == 0
+mv kerf-demo/frame-0001.png kerf-demo/mine.png
+expect 'a folder of somebody else is not touched' kerf_gives 2 demo --seconds 1
+rm -r kerf-demo
+expect 'a demo in an empty folder' kerf_gives 0 demo --seconds 1
 expect 'the hand is the one that the scene names' called '^emulator.*--hand hand.toml --unit-mm 2'
 expect 'the frames are spread over the run' called '^visualizer.*--every-ticks 41 '
 expect 'a demo leaves nothing behind' nothing_survives
@@ -162,6 +172,8 @@ expect 'all of them' kept "$all"
 expect 'in a folder of its user alone' test "$(stat -c %a "$lab/out")" == 700
 expect 'lock-step reaches the controller' called '^controller.*--virtual'
 expect 'lock-step reaches the emulator' called '^emulator.*--lockstep'
+expect 'and is led from picture to picture' called '^controller.*--virtual --until .*/lead '
+expect 'by the visualizer' called '^visualizer.*--lead .*/lead '
 expect 'the second demo replaces the first' kerf_gives 0 demo --seconds 1 --out "$lab/out"
 expect 'and leaves nothing else' kept "$all"
 

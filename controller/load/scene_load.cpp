@@ -90,7 +90,8 @@ void apply_overrides(const SceneOverrides& overrides, Scene& scene) {
 
 VolumeImage load_image(const VolumeSpec& spec, const std::filesystem::path& folder, int cpu_s) {
   if (is_phantom(spec)) {
-    return make_phantom({.grid = spec.phantom_size.value_or(PhantomSpec{}.grid)});
+    return make_phantom(
+        {.shape = spec.shape, .grid = spec.phantom_size.value_or(PhantomSpec{}.grid)});
   }
   const std::filesystem::path path = folder / spec.file;
   const SourceVolume source = read_volume(path, {.spacing_mm = spec.spacing_mm, .cpu_s = cpu_s});

@@ -28,12 +28,13 @@ namespace kerf {
 ///   cone           pointed at the tip, widest at the shaft
 ///   inverted_cone  widest at the tip, 0.6 of that at the shaft
 ///   flame          a pointed ogive up to 0.6 of the length, then drawn in to half at the shaft
+///   pear           rounded at the tip, widest soon above it, 0.65 of that at the shaft
 ///   wheel          a flat disc whose rim is half of a torus as thick as the disc
 ///   stl            the mesh of a file
 inline constexpr std::string_view kMeshShape = "stl";
-inline constexpr std::array<std::string_view, 7> kShapeWords = {
-    "ball", "cylinder", "cone", "inverted_cone", "flame", "wheel", kMeshShape};
-inline constexpr auto kToolShapes = std::span(kShapeWords).first<6>();  ///< of revolution
+inline constexpr std::array<std::string_view, 8> kShapeWords = {
+    "ball", "cylinder", "cone", "inverted_cone", "flame", "wheel", "pear", kMeshShape};
+inline constexpr auto kToolShapes = std::span(kShapeWords).first<7>();  ///< of revolution
 
 /// What the scene says about the size of one tool; all in mm unless counted in pitches.
 struct ToolSize {
@@ -68,6 +69,20 @@ inline constexpr double kMaxDampingNsPerMm = 1;
 
 /// The `file` of a [[volume]] that is computed instead of read.
 inline constexpr std::string_view kPhantomFile = "phantom";
+
+/// What the phantom can be, in a box of 32 x 32 x 20 mm, z up:
+///
+///   molar          a lower molar of enamel, dentin and pulp
+///   carious_molar  the same with a lesion below its fissures: a fourth label
+///   wall           solid in the lower half of the box
+///   ball           of 8 mm radius
+///   torus          about z, ring of 10 mm, tube of 4 mm
+///
+/// The last three have no labels, and their surface at a density of 0.5.
+inline constexpr std::string_view kMolar = "molar";
+inline constexpr std::string_view kCariousMolar = "carious_molar";
+inline constexpr std::array<std::string_view, 5> kPhantomShapes = {kMolar, kCariousMolar, "wall",
+                                                                   "ball", "torus"};
 
 /// Removal rate of enamel per newton at the reference speed, mm^3/(s N): 0.067 to 0.108 of human
 /// enamel under a diamond bur at 50 to 80 g (docs/theory.md 6.6).
@@ -177,6 +192,7 @@ struct VolumeSpec {
   std::string where;  ///< `file:line`
   std::string name;
   std::string file;                                 ///< as written
+  std::string shape{kMolar};                        ///< one of kPhantomShapes, with the phantom
   std::optional<VoxelGrid> phantom_size;            ///< only with file = "phantom"
   std::optional<std::array<double, 3>> spacing_mm;  ///< none: what the file says
   std::optional<std::array<double, 2>> window;      ///< source values of density 0 and 1
@@ -193,6 +209,7 @@ struct ToolSpec {
   std::string where;  ///< `file:line`, of a mesh
   std::string size_place, pitch_place;
   std::string name;
+  std::string bur;  ///< as written; what it stands for is in the other members
   std::string shape;
   std::string file;          ///< of a mesh, as written
   double scale = 1;          ///< mm per unit of the mesh

@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "controller/scene/burs.hpp"
 #include "controller/scene/materials.hpp"
 #include "controller/scene/scene_rules.hpp"
 #include "controller/scene/scene_table.hpp"
@@ -130,6 +131,7 @@ Scene parse_scene(std::string_view text, const std::filesystem::path& path, Scen
   try {
     TomlNode root = parse_toml(text);
     put_settings(settings, root);
+    spell_out_burs(root, path.string());
     return read_scene(root, path, keys);
   } catch (const TomlError& error) {
     refuse(path.string() + ":" + std::to_string(error.line) + ":" + std::to_string(error.column),

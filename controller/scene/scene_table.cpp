@@ -15,8 +15,6 @@
 namespace kerf {
 namespace {
 
-constexpr std::size_t kLongestText = 256;  // bytes of a name or a path
-
 /// Takes the value that stands at a key into its slot, if it is of that type and allowed.
 struct Take {
   const SceneKey& key;
@@ -112,7 +110,7 @@ struct Take {
   [[nodiscard]] std::string text() const {
     const std::string* text = std::get_if<std::string>(&node.value);
     if (text == nullptr) refuse(place, " is not text; put it in quotes");
-    if (text->empty() || text->size() > kLongestText || one_line(*text) != *text) {
+    if (!is_usable_text(*text)) {
       refuse(place, " is not a usable text; write 1 to " + std::to_string(kLongestText) +
                         " printable characters");
     }

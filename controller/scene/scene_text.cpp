@@ -27,6 +27,10 @@ std::string range_text(double lo, double hi) {
   return plain(lo) + " to " + plain(hi);
 }
 
+bool is_usable_text(std::string_view text) {
+  return !text.empty() && text.size() <= kLongestText && one_line(text) == text;
+}
+
 void refuse(std::string_view place, std::string_view what) {
   throw SceneError(one_line(std::string(place) + std::string(what)));
 }

@@ -103,6 +103,10 @@ void declare_run_options(Arguments& app, ControllerOptions& options, Raw& raw) {
   app.option("--name", options.name, "name under which readers find the segment").shows_default();
   app.flag("--virtual", options.virtual_time,
            "lock-step with the device, no clock: the same input gives the same bits");
+  app.option("--until", options.until,
+             "with --virtual: go on only to the tick that a picture asks for in this FIFO (the "
+             "visualizer's --lead)")
+      .shown_as("FIFO");
   app.flag("--unchecked-gain", options.unchecked_gain,
            "give a real device a stiffness and damping above its own bounds or stability; the "
            "limits of force stay");
@@ -161,6 +165,10 @@ std::string wrong_with(const ControllerOptions& options, const Raw& raw) {
   }
   if (options.probe && !options.port.empty() && options.scene.empty() && raw.device.empty()) {
     return "--probe: which device? give --device, or a --scene that says it";
+  }
+  if (!options.until.empty() && (!options.virtual_time || options.guard)) {
+    return "--until: waits, which only lock-step can; give --virtual and no --guard, or leave it "
+           "out";
   }
   const bool runs = !options.check && !options.explain && !options.probe;
   if (runs && options.port.empty()) {

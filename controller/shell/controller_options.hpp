@@ -18,6 +18,7 @@ struct ControllerOptions {
   double wait_s = 60;             ///< servo time for the device to be taken in hand
   std::string name = "kerf";
   bool virtual_time = false;
+  std::string until;            ///< FIFO that says how far lock-step may go; empty: none
   bool unchecked_gain = false;  ///< gains above the device's and beyond its stability
   bool check = false;
   bool explain = false;

@@ -5,6 +5,7 @@
 
 #include "controller/device/driver/device_driver.hpp"
 #include "controller/shell/clock.hpp"
+#include "controller/shell/tick_leash.hpp"
 
 namespace kerf {
 
@@ -45,11 +46,14 @@ class RealTimeTicks final : public TickSource {
 };
 
 /// Virtual time: one tick per report, as fast as both ends go. A device that is silent for two
-/// seconds of real time lets ticks pass without a report until it speaks again.
+/// seconds of real time lets ticks pass without a report until it speaks again. On a leash no
+/// further than that allows.
 class LockStepTicks final : public TickSource {
  public:
-  explicit LockStepTicks(DeviceDriver& device) noexcept : device_(device) {}
+  explicit LockStepTicks(DeviceDriver& device, TickLeash* leash = nullptr) noexcept
+      : device_(device), leash_(leash) {}
   std::int64_t wait_next() noexcept override {
+    if (leash_ != nullptr) leash_->wait_for(++tick_);
     silent_ = !device_.wait(silent_ ? 0 : kPatienceMs);
     return 0;
   }
@@ -58,6 +62,8 @@ class LockStepTicks final : public TickSource {
  private:
   static constexpr int kPatienceMs = 2000;
   DeviceDriver& device_;
+  TickLeash* leash_;
+  std::uint64_t tick_ = 0;
   bool silent_ = false;
 };
 

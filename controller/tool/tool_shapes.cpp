@@ -15,6 +15,8 @@ namespace {
 constexpr double kInvertedConeNeck = 0.6;  // radius at the shaft over radius at the tip
 constexpr double kFlameBelly = 0.6;        // where a flame is widest, as a part of its length
 constexpr double kFlameNeck = 0.5;         // its radius at the shaft over the largest
+constexpr double kPearBelly = 0.3;         // where a pear is widest, as a part of its length
+constexpr double kPearNeck = 0.65;         // its radius at the shaft over the largest
 
 /// Radius at `rise` = 0 (tip) .. 1 (shaft) over the largest radius; for shapes that only stretch.
 double relative_radius(std::string_view shape, double rise) {
@@ -27,6 +29,13 @@ double relative_radius(std::string_view shape, double rise) {
     }
     const double from_belly = (rise - kFlameBelly) / (1.0 - kFlameBelly);
     return 1.0 - (1.0 - kFlameNeck) * from_belly * from_belly;
+  }
+  if (shape == "pear") {
+    if (rise >= kPearBelly) {
+      return 1.0 - (1.0 - kPearNeck) * (rise - kPearBelly) / (1.0 - kPearBelly);
+    }
+    const double from_belly = 1.0 - rise / kPearBelly;
+    return std::sqrt(1.0 - from_belly * from_belly);  // half of an ellipse
   }
   return 1.0;  // cylinder
 }

@@ -29,6 +29,11 @@ struct Halves {
   VoxelBox low, high;
 };
 
+/// Share of a voxel of edge `h_mm` at this distance from a boundary that lies inside.
+double share_inside(double distance_mm, double h_mm) noexcept {
+  return std::clamp(0.5 - distance_mm / (2.0 * h_mm), 0.0, 1.0);
+}
+
 /// Samples the shape block by block. A block whose middle is far from every boundary is all of one
 /// material and is filled; others are halved down to `kLeaf` voxels.
 class Sampler {
@@ -61,7 +66,7 @@ class Sampler {
   [[nodiscard]] double cover(phantom::Field field, phantom::Point p, double value) const noexcept {
     if (value >= far_mm_) return 0.0;
     if (value <= -far_mm_) return 1.0;
-    return std::clamp(0.5 - phantom::distance(field, p, value) / (2.0 * h_mm_), 0.0, 1.0);
+    return share_inside(phantom::distance(field, p, value), h_mm_);
   }
 
   [[nodiscard]] phantom::Point position(double x, double y, double z) const noexcept {
@@ -133,6 +138,39 @@ class Sampler {
   double far_mm_;  ///< a field value beyond this is more than one voxel from its boundary
 };
 
+/// Calls `visit` with the index and the place of each voxel.
+void for_each_voxel(const VolumeImage& image, const auto& visit) {
+  std::size_t at = 0;
+  const auto& origin = image.origin_mm;
+  const double h_mm = image.spacing_mm[0];
+  for (std::int32_t z = 0; z < image.grid.nz; ++z) {
+    for (std::int32_t y = 0; y < image.grid.ny; ++y) {
+      for (std::int32_t x = 0; x < image.grid.nx; ++x, ++at) {
+        visit(at, phantom::Point{origin[0] + x * h_mm, origin[1] + y * h_mm, origin[2] + z * h_mm});
+      }
+    }
+  }
+}
+
+void add_caries(VolumeImage& image) {
+  for_each_voxel(image, [&](std::size_t at, phantom::Point p) {
+    Density& density = image.density[at];
+    Label& label = image.labels[at];
+    if (density <= kPhantomCaries || label == kLabelPulp) return;
+    const double share = share_inside(phantom::lesion_distance(p), image.spacing_mm[0]);
+    density = nearest_density(density + share * (double{kPhantomCaries} - density));
+    if (share > 0.5) label = kLabelCaries;
+  });
+}
+
+void sample_solid(std::string_view shape, VolumeImage& image) {
+  for_each_voxel(image, [&](std::size_t at, phantom::Point p) {
+    const double distance_mm = phantom::solid_distance(shape, p);
+    image.density[at] =
+        nearest_density(kDensityMax * share_inside(distance_mm, image.spacing_mm[0]));
+  });
+}
+
 }  // namespace
 
 VolumeImage make_phantom(const PhantomSpec& spec) {
@@ -148,9 +186,14 @@ VolumeImage make_phantom(const PhantomSpec& spec) {
   image.origin_mm = {-0.5 * spacing * (spec.grid.nx - 1), -0.5 * spacing * (spec.grid.ny - 1),
                      -0.5 * spacing * (spec.grid.nz - 1)};
   image.density.assign(spec.grid.voxel_count(), 0);
+  if (spec.shape != kMolar && spec.shape != kCariousMolar) {
+    sample_solid(spec.shape, image);
+    return image;
+  }
   image.labels.assign(spec.grid.voxel_count(), 0);
   constexpr int kCuts = 2;  // the first is in the middle of the tooth: halves of equal work
   Sampler(image).sample_on_threads(spec.grid.box(), kCuts);
+  if (spec.shape == kCariousMolar) add_caries(image);
   return image;
 }
 

@@ -237,6 +237,30 @@ double pulp_field(Point p) noexcept {
   return smooth_min(field, canal(kDistalRoot, 0.0, p), 0.3);
 }
 
+double lesion_distance(Point p) noexcept {
+  // Below the central fossa, at the border of enamel and dentin.
+  constexpr Point kMiddle{0.0, -0.2, 5.2};
+  constexpr Point kRadii{1.5, 1.2, 1.2};
+  constexpr double kTrackRadius = 0.3;
+  const double x = (p.x - kMiddle.x) / kRadii.x;
+  const double y = (p.y - kMiddle.y) / kRadii.y;
+  const double z = (p.z - kMiddle.z) / kRadii.z;
+  const double reach = vec3::length({x, y, z});
+  // First order: the ellipsoid's field over the length of its gradient.
+  const double steep = vec3::length({x / kRadii.x, y / kRadii.y, z / kRadii.z});
+  const double pool = steep > 0.0 ? (reach - 1.0) * reach / steep : -kRadii.z;
+  const double track = rod(p, {-0.7, kMiddle.y, 9.0}, kTrackRadius, kMiddle, kTrackRadius);
+  const double other = rod(p, {0.7, kMiddle.y, 9.0}, kTrackRadius, kMiddle, kTrackRadius);
+  return std::min(pool, std::min(track, other));
+}
+
+double solid_distance(std::string_view shape, Point p) noexcept {
+  if (shape == "wall") return p.z;
+  if (shape == "ball") return vec3::length({p.x, p.y, p.z}) - 8.0;
+  const double from_ring = std::sqrt(p.x * p.x + p.y * p.y) - 10.0;
+  return std::sqrt(from_ring * from_ring + p.z * p.z) - 4.0;
+}
+
 double distance(Field field, Point p, double value) noexcept {
   constexpr double kStep = 1.0 / 128.0;  // mm; a power of two, far below the smallest radius
   // Where opposite slopes meet, far from a boundary, the gradient vanishes: do not divide by it.

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <string_view>
+
 namespace kerf::phantom {
 
 /// A place in the phantom.
@@ -16,6 +18,13 @@ struct Point {
 [[nodiscard]] double pulp_field(Point p) noexcept;
 
 inline constexpr double kSteepest = 2.5;
+
+/// Distance in mm from the lesion of the carious molar, negative inside, where it ends in a tooth;
+/// near its boundary right to a tenth.
+[[nodiscard]] double lesion_distance(Point p) noexcept;
+
+/// Signed distance in mm from a plain solid of kPhantomShapes, exact.
+[[nodiscard]] double solid_distance(std::string_view shape, Point p) noexcept;
 
 using Field = double (*)(Point) noexcept;
 

@@ -135,6 +135,7 @@ struct Commands {
   Source source;
   Target target;
   std::string report, resample_spacing, size = "256x256x161";
+  std::string shape{kMolar};
   double iso = -1.0;
   std::int32_t guard = kGuardVoxels;
   Arguments info, import, crop, resample, phantom;
@@ -144,7 +145,7 @@ struct Commands {
         import(app.command("import", "convert any readable volume to a .nrrd of densities")),
         crop(app.command("crop", "cut to the tightest box around what is solid, plus a guard")),
         resample(app.command("resample", "change the voxel size")),
-        phantom(app.command("phantom", "make the procedural molar")) {
+        phantom(app.command("phantom", "make the procedural molar, or a solid to measure on")) {
     source.add_to(info, true);
     info.option("--report", report, "write the same figures as JSON").shown_as("FILE");
 
@@ -163,6 +164,9 @@ struct Commands {
         .required()
         .shown_as("A[,B,C]");
 
+    phantom.option("--shape", shape, "what it is")
+        .one_of({kPhantomShapes.begin(), kPhantomShapes.end()})
+        .shows_default();
     phantom.option("--size", size, "voxels; its size in mm stays")
         .shows_default()
         .shown_as("NXxNYxNZ");
@@ -191,6 +195,7 @@ struct Commands {
       target.write(kerf::resample(source.image(), spacing_from(resample_spacing)), out);
     } else {
       PhantomSpec spec;
+      spec.shape = shape;
       spec.grid = grid_from(size);
       target.write(make_phantom(spec), out);
     }

@@ -263,7 +263,7 @@ TEST_CASE("a value out of range is reported with its line and the range") {
 TEST_CASE("a word that is not known is reported with those that are") {
   CHECK(error_with("\"ball\"", "\"bal\"") ==
         "scenes/x.toml:4: tool.shape = \"bal\" is unknown; did you mean \"ball\"? known: ball, "
-        "cylinder, cone, inverted_cone, flame, wheel, stl");
+        "cylinder, cone, inverted_cone, flame, wheel, pear, stl");
   CHECK(begins(error_after("[device]\npersonality = \"spacemouse\"\n"),
                "scenes/x.toml:7: device.personality = \"spacemouse\" is unknown"));
   CHECK(begins(error_after("[force]\nmodel = \"glue\"\n"),
@@ -411,4 +411,50 @@ TEST_CASE("a hand script that is not there is refused where one asks") {
   folder.write("hand.toml", "");
   CHECK(error(scene).empty());
   CHECK(error(parse(kSmallest)).empty());
+}
+
+TEST_CASE("a bur of ISO 6360 stands for shape, radius, neck and name, and its table may say more") {
+  const auto tool_of = [](const std::string& lines) {
+    return parse("[[volume]]\nfile = \"phantom\"\n[[tool]]\n" + lines).tools.at(0);
+  };
+  const kerf::ToolSpec round = tool_of("bur = \"001 014\"\n");
+  CHECK(round.name == "round 014");
+  CHECK(round.shape == "ball");
+  CHECK(round.size.radius_mm == doctest::Approx(0.7));
+  CHECK(*round.shaft.radius_mm == doctest::Approx(0.42));
+  CHECK(*round.shaft.length_mm == 8);
+  CHECK(*tool_of("bur = \"010 050\"\n").shaft.radius_mm == 0.8);  // no thicker than the shank
+  const kerf::ToolSpec own =
+      tool_of("bur = \"107 012\"\nname = \"mine\"\nlength_mm = 5\nshaft_length_mm = 11\n");
+  CHECK(own.name == "mine");
+  CHECK(*own.size.length_mm == 5);
+  CHECK(*own.shaft.length_mm == 11);
+
+  const auto refused = [&](const std::string& lines) {
+    return error_of("[[volume]]\nfile = \"phantom\"\n[[tool]]\n" + lines);
+  };
+  for (const char* unknown :
+       {"\"002 014\"", "\"001 004\"", "\"001 051\"", "\"249 032\"", "\"001014\"", "\"001 01\"",
+        "\"001 0140\"", "\"001 -14\"", "\"ball\""}) {
+    CAPTURE(unknown);
+    CHECK(begins(refused("bur = " + std::string(unknown) + "\n"),
+                 "scenes/x.toml:4: tool.bur = " + std::string(unknown) +
+                     " is no bur; write its head and its diameter in tenths of a mm, such as"));
+  }
+  for (const char* also :
+       {"shape = \"ball\"", "radius_mm = 1", "size_vox = 16", "file = \"a.stl\""}) {
+    CAPTURE(also);
+    CHECK(begins(refused("bur = \"001 014\"\n" + std::string(also) + "\n"),
+                 "scenes/x.toml:4: tool.bur = \"001 014\" contradicts"));
+  }
+  CHECK(begins(refused("bur = \"001 014\"\nlength_mm = 3\n"),
+               "scenes/x.toml:5: tool.length_mm = 3 contradicts the ball"));
+}
+
+TEST_CASE("what the phantom is, is asked of the phantom only, and one of the known") {
+  CHECK(parse(kSmallest).volumes[0].shape == kerf::kMolar);
+  CHECK(begins(error_with("\"phantom\"", "\"phantom\"\nshape = \"tooth\""),
+               "scenes/x.toml:3: volume.shape = \"tooth\" is unknown; known: molar"));
+  CHECK(begins(error_with("\"phantom\"", "\"a.nrrd\"\nshape = \"wall\""),
+               "scenes/x.toml:3: volume.shape = \"wall\" only shapes the phantom"));
 }

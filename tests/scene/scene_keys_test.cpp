@@ -189,6 +189,7 @@ void must_answer(const std::string& error, const SceneLines& lines, const SceneK
 
 TEST_CASE("every row: what it allows is read, both ends of its range too") {
   for (const SceneKey& key : scene_keys()) {
+    if (key.name == "tool.bur") continue;  // stands for other keys: scene_file_test.cpp
     for (const std::string& value : samples_of(key).right) {
       SceneLines lines = scene_for(key).set(key.name, value);
       if (value == in_quotes(kMeshShape)) lines.set("tool.file", "\"a.stl\"").drop("tool.size_vox");
@@ -352,8 +353,9 @@ TEST_CASE("every table: one of another form is answered with the right one") {
 TEST_CASE("the settings in effect: of the models that the scene has, in the table's order") {
   const std::string text = settings_text(parse_scene(
       SceneLines().set("tool.size_vox", "16").set("force.model", "\"paper\"").text(), "x.toml"));
-  CHECK(text.rfind("volume.name=\"phantom\"\nvolume.file=\"phantom\"\nvolume.iso=\"otsu\"\n", 0) ==
-        0);
+  CHECK(text.rfind("volume.name=\"phantom\"\nvolume.file=\"phantom\"\nvolume.shape="
+                   "\"molar\"\nvolume.iso=\"otsu\"\n",
+                   0) == 0);
   CHECK(text.find("\nforce.model=\"paper\"\nforce.p0_n_per_mm2=0.06\ncut.model=\"overlap\"\n") !=
         std::string::npos);
   CHECK(text.find("stiffness_n_per_mm") == std::string::npos);

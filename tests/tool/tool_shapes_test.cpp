@@ -32,6 +32,10 @@ double analytic_volume_mm3(const SceneTool& tool) {
   if (tool.shape == "inverted_cone") return pi * r * r * l * (1 + 0.6 + 0.36) / 3;
   // Ogive: 8/15 of 0.6 l; upper part: (1 - 1/3 + 1/20) of 0.4 l.
   if (tool.shape == "flame") return pi * r * r * l * (0.6 * 8 / 15 + 0.4 * (1 - 1.0 / 3 + 0.05));
+  // Half of an ellipsoid: 2/3 of 0.3 l; the frustum above it.
+  if (tool.shape == "pear") {
+    return pi * r * r * l * (0.3 * 2 / 3 + 0.7 * (1 + 0.65 + 0.65 * 0.65) / 3);
+  }
   const double rim = l / 2;  // wheel: Pappus for the half torus, and the disc inside of it
   const double core = r - rim;
   return pi * (core * core * l + core * pi * rim * rim + 4.0 / 3 * rim * rim * rim);

@@ -3,6 +3,8 @@
 
 #include <array>
 #include <cmath>
+#include <numbers>
+#include <string_view>
 
 #include <doctest/doctest.h>
 #include <rapidcheck.h>
@@ -276,4 +278,60 @@ TEST_CASE("a phantom without voxels, above the limits or of no spacing is refuse
   CHECK_THROWS_AS(static_cast<void>(make_phantom({.grid = {2000, 10, 10}})), SceneError);
   CHECK_THROWS_AS(static_cast<void>(make_phantom({.grid = {10, 10, 10}, .spacing_mm = -1})),
                   SceneError);
+}
+
+TEST_CASE(
+    "the carious molar differs from the molar in its lesion alone, which leaves the pulp alone") {
+  const VolumeImage carious = make_phantom({.shape = kCariousMolar, .grid = {128, 128, 80}});
+  std::size_t lesion = 0, touches_air = 0;
+  double deepest_mm = 100;
+  for (std::int32_t z = 0; z < 80; ++z) {
+    for (std::int32_t y = 0; y < 128; ++y) {
+      for (std::int32_t x = 0; x < 128; ++x) {
+        const std::size_t at = carious.grid.index(x, y, z);
+        const auto [px, py, pz] = place(carious, x, y, z);
+        if (carious.labels[at] != kLabelCaries) {
+          CHECK(carious.labels[at] == half().labels[at]);
+          if (phantom::lesion_distance({px, py, pz}) > 0.5) {
+            CHECK(carious.density[at] == half().density[at]);
+          }
+          continue;
+        }
+        ++lesion;
+        touches_air += carious.density[carious.grid.index(x, y, z + 2)] < kPhantomPulp ? 1 : 0;
+        deepest_mm = std::min(deepest_mm, pz);
+        CHECK(half().labels[at] != kLabelPulp);
+      }
+    }
+  }
+  // The ellipsoid of 1.5 x 1.2 x 1.2 mm has 9.05 mm3; the track through the enamel adds some.
+  CHECK(lesion > 9 * 64);  // 64 voxels a mm3
+  CHECK(lesion < 12 * 64);
+  CHECK(touches_air > 0);
+  CHECK(phantom::pulp_field({0.0, -0.2, deepest_mm - 0.25}) > 0.3);
+}
+
+TEST_CASE("a plain solid has its surface at a density of 0.5, and no labels") {
+  for (const std::string_view shape : {"wall", "ball", "torus"}) {
+    CAPTURE(shape);
+    const VolumeImage image = make_phantom({.shape = shape, .grid = {128, 128, 80}});
+    CHECK(image.labels.empty());
+    double solid_mm3 = 0;
+    for (const Density density : image.density) solid_mm3 += density / kDensityMax / 64.0;
+    constexpr double kPi = std::numbers::pi;
+    const double known_mm3 = shape == "wall"   ? 32.0 * 32 * 10
+                             : shape == "ball" ? 4.0 / 3 * kPi * 8 * 8 * 8
+                                               : 2 * kPi * kPi * 10 * 4 * 4;
+    CHECK(solid_mm3 == doctest::Approx(known_mm3).epsilon(0.002));
+    for (std::int32_t z = 0; z < 80; z += 3) {
+      for (std::int32_t x = 0; x < 128; x += 3) {
+        const auto [px, py, pz] = place(image, x, 60, z);
+        const double distance_mm = phantom::solid_distance(shape, {px, py, pz});
+        const double share = image.density[image.grid.index(x, 60, z)] / kDensityMax;
+        if (std::abs(distance_mm) < 0.25)
+          CHECK(share == doctest::Approx(0.5 - distance_mm / 0.5).epsilon(1e-4));
+        if (std::abs(distance_mm) >= 0.25) CHECK(share == (distance_mm < 0 ? 1 : 0));
+      }
+    }
+  }
 }

@@ -28,6 +28,8 @@ class FrameSchedule {
   [[nodiscard]] bool due(std::optional<std::uint64_t> ticks) const noexcept {
     return !complete() && ticks && *ticks / every_ticks_ > taken_;
   }
+  /// Ticks since arming at which the next picture is due.
+  [[nodiscard]] std::uint64_t next_ticks() const noexcept { return (taken_ + 1) * every_ticks_; }
   /// The end of the run has a picture too, unless the last one shows that tick already.
   [[nodiscard]] bool final_due(std::optional<std::uint64_t> ticks) const noexcept {
     return !complete() && (due(ticks) || taken_ == 0 || ticks.value_or(kUnarmed) != last_ticks_);

@@ -2,7 +2,9 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <cmath>
 #include <cstdio>
+#include <limits>
 #include <optional>
 #include <thread>
 
@@ -14,6 +16,7 @@
 #include "visualizer/app/frame_schedule.hpp"
 #include "visualizer/app/picture.hpp"
 #include "visualizer/app/run.hpp"
+#include "visualizer/app/tick_lead.hpp"
 #include "visualizer/gl/context.hpp"
 #include "visualizer/surface/mesh_file.hpp"
 #include "visualizer/view/file_out.hpp"
@@ -56,6 +59,22 @@ class FrameTaker {
   FrameReport& report_;
   OverlayFigures figures_;
 };
+
+/// The tick that the next picture or frame shows: a controller in lock-step is let go so far.
+Tick next_tick(const Session& session, const FrameSchedule& schedule,
+               const std::optional<Film>& film) {
+  constexpr Tick kUntilArmed = 20;  // fewer than are between two pictures
+  const Tick now = session.latest() ? session.latest()->tick : 0;
+  const auto ticks = session.ticks_since_armed();
+  if (!ticks) return now + kUntilArmed;
+  Tick next = std::numeric_limits<Tick>::max();
+  if (!schedule.complete()) next = now - *ticks + schedule.next_ticks();
+  if (film) {
+    const double due_ticks = film->due_in_s(session.servo_s()) * 1e9 / session.tick_ns();
+    next = std::min(next, now + static_cast<Tick>(std::max(1.0, std::ceil(due_ticks))));
+  }
+  return next;
+}
 
 void tell(const VisualizerOptions& options, const FrameSchedule& schedule,
           const std::optional<Film>& film, const FrameReport& report) {
@@ -105,6 +124,8 @@ int run_headless(const VisualizerOptions& options) {
   if (options.record) film.emplace(*options.record, options.size, options.video_hz);
   FrameSchedule schedule(options.frames, options.every_ticks.value_or(ticks_between(
                                              options.frames, options.seconds, session.tick_ns())));
+  std::optional<TickLead> lead;
+  if (options.lead) lead.emplace(*options.lead);
   bool over = false;
   while (!over && (film || !schedule.complete())) {
     over = session.ended() || stop_requested() ||
@@ -123,6 +144,7 @@ int run_headless(const VisualizerOptions& options) {
       if (!over) break;  // late pictures show the present, each its own
     }
     if (over) continue;
+    if (lead) lead->allow(next_tick(session, schedule, film));
     std::chrono::duration<double> pause = kIdle;
     if (film && ticks) {
       // A frame begins when the tick that it waits for is out, not up to a pause later: its delay

@@ -85,6 +85,10 @@ void declare_files(Arguments& app, VisualizerOptions& o, const Option& headless)
              "headless: at the end one PNG with the final state by every renderer")
       .shown_as("FILE")
       .needs(headless);
+  app.option("--lead", o.lead,
+             "headless: lead a controller in lock-step (its --until) from picture to picture")
+      .shown_as("FIFO")
+      .needs(headless);
   app.option("--fps", o.video_hz, "record: frames per second of servo time")
       .within(1, 240)
       .shows_default();

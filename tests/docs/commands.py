@@ -1,0 +1,96 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Whether the commands that the pages print are commands:  commands.py ROOT BIN check|tutorial
+
+check: every option of every `./kerf` line of README.md and docs/ is one that the program's --help knows.
+tutorial: the lines of docs/tutorial.md, run one after the other in a scratch folder, all end well, and each
+file that the page names is there then."""
+import functools
+import importlib.util
+import os
+import pathlib
+import re
+import shlex
+import subprocess
+import sys
+import tempfile
+
+root, bin_folder, what = pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[2]), sys.argv[3]
+environment = dict(os.environ, KERF_BIN=str(bin_folder))
+environment.pop("DISPLAY", None)
+
+
+def shell_lines(page):
+    """(line number, words) of each indented line of a page that runs something of kerf's."""
+    lines = page.read_text(encoding="utf-8").splitlines()
+    joined = ""
+    for number, line in enumerate(lines, 1):
+        if not joined and not line.startswith("    "):
+            continue
+        joined += line.strip().removesuffix("\\")
+        if line.endswith("\\"):
+            continue
+        yield number, joined
+        joined = ""
+
+
+@functools.cache
+def help_of(*command):
+    return subprocess.run([*command, "--help"], capture_output=True, text=True, env=environment).stdout
+
+
+def known_options(words):
+    """Options of `./kerf WORDS...`: those of kerf itself, or of a program and its subcommand."""
+    if words[0] in ("demo", "test", "bench", "doctor", "setup", "docs", "sweep"):
+        text = help_of(root / "kerf") + (help_of(bin_folder / "kerf-lab", "sweep") if words[0] == "sweep" else "")
+        text += help_of(bin_folder / "kerf-lab", "ranges") + help_of(bin_folder / "kerf-lab", "faults")
+        text += help_of(bin_folder / "kerf-lab", "bench") + help_of(bin_folder / "kerf-visualizer")
+    else:
+        text = help_of(bin_folder / ("kerf-" + words[0]))
+        if len(words) > 1 and re.fullmatch(r"[a-z][a-z-]*", words[1]):
+            text += help_of(bin_folder / ("kerf-" + words[0]), words[1])
+    return set(re.findall(r"--[a-z][a-z0-9-]*", text)) | {"--help"}
+
+
+def check():
+    wrong, checked = [], 0
+    for page in [root / "README.md", *sorted((root / "docs").glob("*.md"))]:
+        for number, line in shell_lines(page):
+            for part in re.split(r"\s(?:\||&&|;|&)\s", re.sub(r"\s#.*", "", line)):
+                match = re.search(r"(?:^|\s)\./kerf\s+(.*)", part)
+                if not match:
+                    continue
+                words = shlex.split(match[1])
+                if words[0].startswith("-") or words[0].isupper():
+                    continue
+                checked += 1
+                known = known_options(words)
+                wrong += [f"{page.name}:{number}: {word} is no option of ./kerf {words[0]}"
+                          for word in (w.split("=")[0] for w in words)
+                          if re.fullmatch(r"--[a-z][a-z0-9-]*", word) and word not in known]
+    print(*wrong, sep="\n")
+    print(f"{checked} commands checked, {len(wrong)} wrong")
+    return not wrong and checked > 30
+
+
+def tutorial():
+    page = root / "docs" / "tutorial.md"
+    with tempfile.TemporaryDirectory() as scratch:
+        for name in ("kerf", "scenes", "examples"):
+            os.symlink(root / name, pathlib.Path(scratch) / name)
+        for number, line in shell_lines(page):
+            if "python3" in line and not importlib.util.find_spec("matplotlib"):
+                print(f"skipped, no matplotlib: {line}")
+                continue
+            done = subprocess.run(["bash", "-c", line], cwd=scratch, env=environment, capture_output=True, text=True)
+            print(f"{'ok' if done.returncode == 0 else 'FAILED'}: {line}")
+            if done.returncode:
+                print(f"{page.name}:{number}: exit code {done.returncode}\n{done.stdout}{done.stderr}")
+                return False
+        named = set(re.findall(r"`([a-z]+/[a-z0-9.-]+\.[a-z]+)`", page.read_text(encoding="utf-8")))
+        lacking = [name for name in named if not (pathlib.Path(scratch) / name).exists()]
+        print(f"{len(named)} files named, lacking: {lacking}")
+        return bool(named) and not lacking
+
+
+sys.exit(0 if {"check": check, "tutorial": tutorial}[what]() else 1)
