@@ -14,19 +14,20 @@
 namespace kerf::ranges {
 namespace {
 
-/// `work(i, file)` for all i below `count` on so many threads, each with a scene file of its own.
+/// `work(i, file)` for all i below `count` on so many threads, each with a scene file of its own;
+/// then `done(i, share of all)`, one thread at a time.
 void in_parallel(std::size_t count, std::size_t jobs, const SceneFolder& folder,
                  const std::function<void(std::size_t, const std::filesystem::path&)>& work,
-                 const std::function<void(double share)>& progress) {
-  std::atomic<std::size_t> next{0}, done{0};
+                 const std::function<void(std::size_t, double share)>& done) {
+  std::atomic<std::size_t> next{0};
+  std::size_t ended = 0;
   std::mutex telling;
   const auto run = [&](std::size_t worker) {
     const auto file = folder.path() / ("scene" + std::to_string(worker) + ".toml");
     for (std::size_t i = next++; i < count; i = next++) {
       work(i, file);
-      const std::size_t now = ++done;
       const std::lock_guard lock(telling);
-      progress(static_cast<double>(now) / static_cast<double>(count));
+      done(i, static_cast<double>(++ended) / static_cast<double>(count));
     }
   };
   std::vector<std::jthread> workers;
@@ -190,7 +191,7 @@ void Tally::add(const Tally& other) {
   broken.insert(broken.end(), other.broken.begin(), other.broken.end());
 }
 
-std::vector<KeyRow> study_keys(const Effort& effort, const Progress& progress) {
+std::vector<KeyRow> study_keys(const Effort& effort, const Told& told) {
   std::vector<KeyRow> rows;
   for (KeyLevels& levels : key_levels()) rows.push_back({std::move(levels), {}, 0, {}});
   const SceneFolder folder;
@@ -230,13 +231,14 @@ std::vector<KeyRow> study_keys(const Effort& effort, const Progress& progress) {
       }
     }
   };
-  in_parallel(rows.size(), effort.jobs, folder, study,
-              [&](double share) { progress(share, "ends of every key"); });
+  in_parallel(rows.size(), effort.jobs, folder, study, [&](std::size_t i, double share) {
+    for (const Broken& broken : rows[i].ends.broken) told.broken(broken);
+    told.progress(share, "ends of every key");
+  });
   return rows;
 }
 
-PairRows study_pairs(const std::vector<KeyRow>& keys, const Effort& effort,
-                     const Progress& progress, const std::function<void(const PairRows&)>& told) {
+PairRows study_pairs(const std::vector<KeyRow>& keys, const Effort& effort, const Told& told) {
   const KeyFactors factors(keys);
   const Factors all{.level_counts = factors.level_counts,
                     .rare = factors.rare,
@@ -258,13 +260,14 @@ PairRows study_pairs(const std::vector<KeyRow>& keys, const Effort& effort,
           [&](std::size_t i, const std::filesystem::path& file) {
             one(from + i, file, tallies[i]);
           },
-          [&](double) {
-            progress(std::min(1.0, static_cast<double>(out.tally.ran) /
-                                       static_cast<double>(effort.combinations)),
-                     "pairs of ends, array " + std::to_string(out.arrays));
+          [&](std::size_t i, double) {
+            for (const Broken& broken : tallies[i].broken) told.broken(broken);
+            told.progress(std::min(1.0, static_cast<double>(out.tally.ran) /
+                                            static_cast<double>(effort.combinations)),
+                          "pairs of ends, array " + std::to_string(out.arrays));
           });
       for (const Tally& tally : tallies) out.tally.add(tally);
-      told(out);
+      told.part(out);
     }
   };
   while (out.tally.ran < effort.combinations) {
