@@ -77,6 +77,8 @@ template <class N>
   state.tip_ticks += state.tip_ticks < UINT32_MAX ? 1U : 0U;
   if (sensed.usable) {
     state.jacobian_t_mm = sensed.pose.arm.jacobian_t_mm;
+    // The device rests, maybe at another place than its counters told so far.
+    if (sensed.docked) state.velocity.begin_anew();
     const TipMotion motion = move_tip(plan, state, sensed.pose);
     seen.overspeed = motion.overspeed && !report.parked;
     sensed.leaves = motion.leaves;
