@@ -10,6 +10,7 @@
 #include "lab/ranges/extreme_rows.hpp"
 #include "lab/ranges/key_study.hpp"
 #include "lab/ranges/long_run.hpp"
+#include "lab/ranges/pair_study.hpp"
 #include "lab/rig/lab_run.hpp"
 #include "shared/posix/progress_bar.hpp"
 #include "shared/text/json.hpp"

@@ -45,13 +45,7 @@ struct KeyRow {
   Tally ends;
 };
 
-/// All pairs of ends of two keys.
-struct PairRows {
-  std::size_t arrays = 0;
-  std::size_t pairs = 0, together = 0;  ///< of one array's pairs; that stood together in a run
-  std::size_t never = 0;                ///< that contradict each other, or are refused together
-  Tally tally;
-};
+struct PairRows;
 
 /// Who is told of a study while it runs. One thread at a time.
 struct Told {
@@ -62,14 +56,5 @@ struct Told {
 
 /// Each end of each key alone, and what lies just beyond, in all numbers.
 [[nodiscard]] std::vector<KeyRow> study_keys(const Effort& effort, const Told& told);
-
-/// Covering arrays of the accepted ends, one after the other until there are as many combinations
-/// as the effort says. A row that the loader refuses gives up the key that the refusal names, until
-/// it loads; pairs that were lost so are tried by themselves after the first array.
-[[nodiscard]] PairRows study_pairs(const std::vector<KeyRow>& keys, const Effort& effort,
-                                   const Told& told);
-
-/// Takes keys out of a scene as long as it still breaks the rule.
-[[nodiscard]] Broken shrunk(Broken broken);
 
 }  // namespace kerf::ranges

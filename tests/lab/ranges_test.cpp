@@ -22,6 +22,7 @@
 #include "lab/ranges/key_levels.hpp"
 #include "lab/ranges/key_study.hpp"
 #include "lab/ranges/long_run.hpp"
+#include "lab/ranges/pair_study.hpp"
 #include "lab/ranges/rules.hpp"
 
 using namespace kerf;
