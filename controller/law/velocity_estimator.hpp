@@ -14,7 +14,8 @@ template <class N>
 struct VelocityInput {
   DeviceVec<typename N::Real> tip_mm;  ///< at the device port
   std::uint32_t ticks = 1;  ///< since the last one, 1 to 1000: more where reports were missing
-  bool first = false;       ///< there was none: the tip is at rest here since ever
+  /// There was none, or the device was calibrated with it: the tip is at rest here since ever.
+  bool first = false;
 };
 
 /// A velocity estimator gives the velocity of the tip in mm/s. It stands for the tick and for those

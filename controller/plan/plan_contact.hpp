@@ -105,10 +105,11 @@ void plan_proxy(const LoadedScene& scene, const SceneTool& tool, SweptTool<N>& s
     const PartBehind<N>& part = swept.behind.part[i];
     reach = std::max(reach, static_cast<double>(part.up + part.point_shell.reach));
   }
-  swept.proxy = {
-      .friction = typename N::Unit(scene.force.friction),
-      .turn_step = typename N::Unit(swept.turned ? turn_step_of(reach) : 0.0),
-      .ramp_per_tick = typename N::Real(kRampNPerMs * 1000 / scene.servo.rate_hz / n_per_unit)};
+  swept.proxy = {.friction = typename N::Unit(scene.force.friction),
+                 .turn_step = typename N::Unit(swept.turned ? turn_step_of(reach) : 0.0),
+                 // At least a step of fixed point, else the ramp would never end.
+                 .ramp_per_tick = typename N::Real(std::max(
+                     kRampNPerMs * 1000 / scene.servo.rate_hz / n_per_unit, std::ldexp(1.0, -16)))};
 }
 
 }  // namespace kerf

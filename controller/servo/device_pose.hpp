@@ -78,14 +78,17 @@ inline void follow_gimbal(const DeviceReport& report, std::size_t samples,
   filter.next = (filter.next + 1) % samples;
 }
 
-/// Angle of `counts` encoder steps from home.
+/// Angle of `counts` encoder steps from home; at most 8 rad either way, where fixed saturates: what
+/// lies beyond is no joint of a device, and no tip of it may leave the range of floats.
 template <class N>
 [[nodiscard]] constexpr typename N::Angle joint_angle(const JointPlan<N>& joint,
                                                       std::int32_t counts) noexcept {
   if constexpr (N::kIsFixed) {
     return joint.home_rad + N::Angle::from_wide(counts * joint.angle_per_count, kAnglePerCountBits);
   } else {
-    return joint.home_rad + typename N::Angle(joint.angle_per_count * counts);
+    constexpr typename N::Angle kEnd(8);
+    return std::clamp(joint.home_rad + typename N::Angle(joint.angle_per_count * counts), -kEnd,
+                      kEnd);
   }
 }
 

@@ -99,7 +99,7 @@ void print_scene(const LoadedScene& scene, const SceneCosts& costs, const GainMa
               o[2]);
   std::printf("force=%s\ncut=%s\n", std::string(word_of(scene.force.model)).c_str(),
               std::string(word_of(scene.cut.model)).c_str());
-  std::printf("stiffness_at_device_n_per_mm=%g\n", device_stiffness_n_per_mm(scene));
+  std::printf("stiffness_at_device_n_per_mm=%g\n", margin.stiffness_n_per_mm);
   std::fputs(gain_lines(scene, margin).c_str(), stdout);
   const std::size_t costliest = costliest_tool(costs);
   std::printf("costliest_tool=%s\nhighest_rate_hz=%d\n", scene.tools[costliest].name.c_str(),

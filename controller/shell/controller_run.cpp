@@ -22,6 +22,7 @@
 #include "controller/scene/scene.hpp"
 #include "controller/scene/scene_file.hpp"
 #include "controller/shell/check_scene.hpp"
+#include "controller/shell/law_trial.hpp"
 #include "controller/shell/log_line.hpp"
 #include "controller/shell/run_report.hpp"
 #include "controller/shell/run_threads.hpp"
@@ -173,6 +174,7 @@ int run_controller(const ControllerOptions& options) {
   std::atomic<bool>& stop = catch_stop_and_pause_signals();
 
   LoadedScene scene = load_scene(options.scene, options.overrides);
+  for (const std::string& line : try_own_laws(scene)) log_warning(line);
   const std::unique_ptr<CompiledScene> servo = plan_scene(scene);
   if (options.check) {
     check_hand_script(scene);

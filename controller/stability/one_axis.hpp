@@ -15,19 +15,30 @@ namespace kerf {
 /// with the encoder and the delay of its `SampledLoop`. mm, N, s. Never allocates.
 class OneAxis {
  public:
-  explicit OneAxis(const SampledLoop& loop)
+  /// The encoder's steps lie `shift_mm` before the multiples of its quantum.
+  explicit OneAxis(const SampledLoop& loop, double shift_mm = 0)
       : whole_(whole_of(loop)),
         part_(delay_of(loop) - static_cast<double>(whole_)),
         quantum_mm_(loop.quantum_mm),
+        shift_mm_(shift_mm),
+        period_s_(loop.period_s),
         plant_(loop, part_, 1 - part_) {}
 
-  /// At rest, before the first period.
-  void start(double place_mm) noexcept { plant_.place(place_mm, 0); }
+  /// Before the first period.
+  void start(double place_mm, double mm_per_s = 0) noexcept {
+    plant_.place(place_mm, mm_per_s * period_s_);
+  }
 
   [[nodiscard]] double place_mm() const noexcept { return plant_.tip_mm(); }
+  [[nodiscard]] double mm_per_s() const noexcept { return plant_.mm_per_period() / period_s_; }
+  /// Held by friction at the end of the last period.
+  [[nodiscard]] bool stuck() const noexcept { return plant_.stuck(); }
+  /// Of the motors, at the end of the last period.
+  [[nodiscard]] double motor_n() const noexcept { return asked(whole_); }
   /// The place as the encoder shows it: the quantum's lower end; exact without a quantum.
   [[nodiscard]] double encoder_mm() const noexcept {
-    return quantum_mm_ > 0 ? std::floor(place_mm() / quantum_mm_) * quantum_mm_ : place_mm();
+    if (!(quantum_mm_ > 0)) return place_mm();
+    return std::floor((place_mm() + shift_mm_) / quantum_mm_) * quantum_mm_ - shift_mm_;
   }
   /// Work of the motors on hand and device since the start, N mm = mJ, by the true motion. Rises
   /// for good: the loop is active.
@@ -63,7 +74,8 @@ class OneAxis {
 
   std::size_t whole_;  ///< periods of the delay
   double part_;        ///< and the rest of it, of a period
-  double quantum_mm_;
+  double quantum_mm_, shift_mm_;
+  double period_s_;
   OneAxisPlant plant_;
   std::array<double, static_cast<std::size_t>(kMaxDelayPeriods) + 2> asked_n_{};  ///< ring
   std::size_t head_ = 0;

@@ -13,7 +13,7 @@ class HardeningSpring {
   static constexpr const char* kMeaning = "a spring with a cubic part: K d + H d^3";
   static constexpr std::array<kerf::LawSetting, 3> kSettings{{
       {"k_n_per_mm", "N/mm", 0, 10, 0.2, "stiffness K of a short spring"},
-      {"h_n_per_mm3", "N/mm^3", 0, 10, 0.3, "how it hardens: H"},
+      {"h_n_per_mm3", "N/mm^3", 0, 10, 0.005, "how it hardens: H"},
       {"b_ns_per_mm", "N s/mm", 0, 0.1, 0.002, "damping along the spring"},
   }};
   struct State {};  // it remembers nothing

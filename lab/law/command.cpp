@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "lab/law/command.hpp"
 
-#include <array>
 #include <ostream>
 #include <stdexcept>
 #include <string_view>
 #include <vector>
 
 #include "controller/law/registry/law_registry.hpp"
-#include "lab/law/trial.hpp"
+#include "controller/shell/law_trial.hpp"
 #include "shared/text/format.hpp"
 #include "shared/text/words.hpp"
 
@@ -33,7 +32,7 @@ int Command::run(std::ostream& out) const {
   bool fine = true;
   for (const LawRow* row : chosen) {
     const std::string law = std::string(kind_name(row->kind)) + " " + std::string(row->name);
-    for (const Trial& trial : try_law(*row)) {
+    for (const LawTrial& trial : try_law(*row)) {
       fine &= trial.fault.empty();
       out << law << " (" << trial.numbers << "): "
           << (trial.fault.empty()

@@ -6,9 +6,11 @@
 #include <ostream>
 #include <thread>
 
+#include "controller/scene/scene_setting.hpp"
 #include "lab/ranges/extreme_rows.hpp"
 #include "lab/ranges/key_study.hpp"
 #include "lab/ranges/long_run.hpp"
+#include "lab/ranges/pair_study.hpp"
 #include "lab/rig/lab_run.hpp"
 #include "shared/posix/progress_bar.hpp"
 #include "shared/text/json.hpp"
@@ -16,10 +18,11 @@
 namespace kerf::ranges {
 namespace {
 
-std::string keys_of(const KeyTexts& texts) {
-  std::string line;
-  for (const auto& [key, text] : texts) line += (line.empty() ? "" : ", ") + key + " = " + text;
-  return line.empty() ? "no key" : line;
+/// What plays just this scene.
+std::string command_of(const Broken& broken) {
+  std::string line = "./kerf lab ranges --numeric " + std::string(word_of(broken.numeric));
+  for (const auto& [key, text] : broken.texts) line += " --set '" + key + "=" + text + "'";
+  return line;
 }
 
 std::string key_line(const KeyRow& row) {
@@ -71,11 +74,11 @@ class Teller {
                      {"violations", static_cast<std::int64_t>(broken)}});
   }
   void broken(const Violation& violation) {
-    out_ << "  broken: " << violation.rule << ": " << violation.what << '\n';
+    out_ << "  broken: " << violation.rule << ": " << violation.what << std::endl;
   }
   void broken(const Broken& one) {
     broken(one.violation);
-    out_ << "    " << word_of(one.numeric) << ": " << keys_of(one.texts) << '\n';
+    out_ << "    " << command_of(one) << std::endl;
   }
   /// A line for each part of the pairs.
   void so_far(const Tally& tally) {
@@ -98,7 +101,6 @@ void tell_keys(const std::vector<KeyRow>& keys, Teller& teller) {
   for (const KeyRow& row : keys) {
     teller.row("key", std::string(row.levels.key->name), kTickRules, key_line(row),
                row.ends.broken.size());
-    for (const Broken& one : row.ends.broken) teller.broken(one);
     all.add(row.ends);
   }
   teller.row("keys", "ends alone", kTickRules, "ends alone: " + tally_text(all), 0);
@@ -133,6 +135,30 @@ void tell_pairs(const PairRows& pairs, Teller& teller) {
   }
 }
 
+/// `table.key=VALUE`, the value as a scene file writes it.
+KeyTexts texts_of(const std::vector<std::string>& settings) {
+  KeyTexts texts;
+  for (const std::string& text : settings) {
+    SceneSetting setting = parse_setting(text);
+    texts[setting.key] = setting.value;
+  }
+  return texts;
+}
+
+void tell_one(const KeyTexts& texts, const Effort& effort, Teller& teller) {
+  const SceneFolder folder;
+  for (const NumericKind numeric : effort.numerics) {
+    const Outcome outcome = run_combination(texts, numeric, folder.path() / "scene.toml");
+    Tally tally;
+    tally.add(texts, numeric, outcome);
+    teller.row("one", std::string(word_of(numeric)), kTickRules,
+               std::string(word_of(numeric)) + ": " +
+                   (outcome.refused ? "refused: " + outcome.refusal : tally_text(tally)),
+               tally.broken.size());
+    for (const Broken& broken : tally.broken) teller.broken(shrunk(broken));
+  }
+}
+
 }  // namespace
 
 Command::Command(Arguments& program)
@@ -149,6 +175,9 @@ Command::Command(Arguments& program)
   app_.option("--numeric", numerics_, "only these numbers of the loop")
       .one_of({kNumericWords.begin(), kNumericWords.end()})
       .split_at_commas();
+  app_.option("--set", set_, "only the scene with this value of a key; may be given often")
+      .shown_as("TABLE.KEY=VALUE")
+      .one_each();
   app_.option("--report", report_, "write the rows as JSON").shown_as("FILE");
   app_.footer("Exit codes: 0 no rule is broken, 1 one is, 2 bad input or set-up.");
 }
@@ -166,17 +195,18 @@ int Command::run(std::ostream& out) const {
                           : std::max(1U, std::thread::hardware_concurrency());
   const LabOutput report("--report", report_);
   const ProgressBar bar(true);
-  const auto progress = [&](double share, const std::string& what) { bar.show(share, what); };
   Teller teller(out);
-  if (combinations_ > 0) {
-    const std::vector<KeyRow> keys = study_keys(effort, progress);
+  const Told told{.progress = [&](double share, const std::string& what) { bar.show(share, what); },
+                  .broken = [&](const Broken& broken) { bar.hide(), teller.broken(broken); },
+                  .part = [&](const PairRows& so_far) { bar.hide(), teller.so_far(so_far.tally); }};
+  if (!set_.empty()) {
+    tell_one(texts_of(set_), effort, teller);
+  } else if (combinations_ > 0) {
+    const std::vector<KeyRow> keys = study_keys(effort, told);
     bar.hide();
     tell_keys(keys, teller);
     tell_extremes(effort, keys, teller);
-    const PairRows pairs = study_pairs(keys, effort, progress, [&](const PairRows& so_far) {
-      bar.hide();
-      teller.so_far(so_far.tally);
-    });
+    const PairRows pairs = study_pairs(keys, effort, told);
     bar.hide();
     tell_pairs(pairs, teller);
   }

@@ -16,7 +16,7 @@ class Command final : public LabCommand {
   [[nodiscard]] int run(std::ostream& out) const override;
 
  private:
-  std::vector<std::string> numerics_;
+  std::vector<std::string> numerics_, set_;
   std::string report_;
   int combinations_ = 5000, seed_ = 1, jobs_ = 0;
   double hours_ = 0;

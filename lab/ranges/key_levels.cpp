@@ -10,6 +10,8 @@
 #include <utility>
 #include <variant>
 
+#include "controller/law/registry/law_registry.hpp"
+
 namespace kerf::ranges {
 namespace {
 
@@ -95,6 +97,38 @@ void add_numbers(const Form& form, const Range& range, KeyLevels& levels) {
 
 std::string quoted(std::string_view word) {
   return '"' + std::string(word) + '"';
+}
+
+/// A law by its name, with these of its settings.
+std::string law_text(const LawRow& row, const std::string& settings) {
+  return "{ name = " + quoted(row.name) + settings + " }";
+}
+
+/// Every law of the kind that this program knows: as it is, with each setting at each of its ends,
+/// and with all of them there at once.
+void add_laws(LawKind kind, KeyLevels& levels) {
+  for (const LawRow* row : known_laws(kind)) {
+    add(law_text(*row, ""), levels.ends);
+    std::string all_low, all_high;
+    for (const LawSetting& setting : row->settings) {
+      const std::string set = ", " + std::string(setting.name) + " = ";
+      const double step = std::max(setting.hi - setting.lo, 1e-6) / 1000;
+      for (const double end : {setting.lo, setting.hi}) {
+        add(law_text(*row, set + number(end)), levels.ends);
+      }
+      for (const double beyond : {setting.lo - step, setting.hi + step}) {
+        levels.beyond.push_back(law_text(*row, set + number(beyond)));
+      }
+      for (const char* text : {"inf", "-inf", "nan"}) {
+        levels.beyond.push_back(law_text(*row, set + text));
+      }
+      all_low += set + number(setting.lo);
+      all_high += set + number(setting.hi);
+    }
+    add(law_text(*row, all_low), levels.ends);
+    add(law_text(*row, all_high), levels.ends);
+  }
+  if (!levels.ends.empty()) levels.beyond.emplace_back("{ name = \"nonsense\" }");
 }
 
 /// What stands beside a key, where the scene has no word of its own on it: several keys make one
@@ -189,7 +223,9 @@ std::vector<KeyLevels> key_levels(SceneKeys keys) {
   std::vector<KeyLevels> list;
   for (const SceneKey& key : keys) {
     KeyLevels levels{&key, {}, {}};
-    const Form form = std::visit(FormOf{}, key.at(parts));
+    const SceneSlot slot = key.at(parts);
+    const Form form = std::visit(FormOf{}, slot);
+    if (const auto* law = std::get_if<LawChoice*>(&slot)) add_laws((*law)->kind, levels);
     if (form.is_switch) levels.ends = {"true", "false"};
     if (form.has_numbers) add_numbers(form, key.allowed.range, levels);
     for (const std::string_view word : key.allowed.words) add(quoted(word), levels.ends);

@@ -22,14 +22,15 @@ using KeyTexts = std::map<std::string, std::string, std::less<>>;
 struct KeyLevels {
   const SceneKey* key;
   /// Allowed by the key's own row: both ends, every word. Of a list: all at one end, and each end
-  /// in its first place with the others at the other one or at 0.
+  /// in its first place with the others at the other one or at 0. Of a law: every one that this
+  /// program knows, at both ends of its settings.
   std::vector<std::string> ends;
   /// Just beyond each end, infinite, and no number: the loader must refuse them.
   std::vector<std::string> beyond;
 };
 
-/// Of every key that has a range, words, or is a switch. Names and files have no ends; of a file
-/// whose content another key asks for ("phantom") that word counts.
+/// Of every key that has a range, words, or names a law, or is a switch. Names and files have no
+/// ends; of a file whose content another key asks for ("phantom") that word counts.
 [[nodiscard]] std::vector<KeyLevels> key_levels(SceneKeys keys = scene_keys());
 
 /// What the key holds in a plain scene, and how numbers of its form are written: to look between it

@@ -45,29 +45,16 @@ struct KeyRow {
   Tally ends;
 };
 
-/// All pairs of ends of two keys.
-struct PairRows {
-  std::size_t arrays = 0;
-  std::size_t pairs = 0, together = 0;  ///< of one array's pairs; that stood together in a run
-  std::size_t never = 0;                ///< that contradict each other, or are refused together
-  Tally tally;
+struct PairRows;
+
+/// Who is told of a study while it runs. One thread at a time.
+struct Told {
+  std::function<void(double share, const std::string& what)> progress;  ///< 0..1, at work on what
+  std::function<void(const Broken&)> broken;                            ///< at once
+  std::function<void(const PairRows&)> part;  ///< what there is after each hundred rows
 };
 
-/// Called with the share that is done, 0..1, and what is at work. One thread at a time.
-using Progress = std::function<void(double share, const std::string& what)>;
-
 /// Each end of each key alone, and what lies just beyond, in all numbers.
-[[nodiscard]] std::vector<KeyRow> study_keys(const Effort& effort, const Progress& progress);
-
-/// Covering arrays of the accepted ends, one after the other until there are as many combinations
-/// as the effort says. A row that the loader refuses gives up the key that the refusal names, until
-/// it loads; pairs that were lost so are tried by themselves after the first array.
-/// `told` gets what there is so far after each few hundred combinations.
-[[nodiscard]] PairRows study_pairs(const std::vector<KeyRow>& keys, const Effort& effort,
-                                   const Progress& progress,
-                                   const std::function<void(const PairRows&)>& told);
-
-/// Takes keys out of a scene as long as it still breaks the rule.
-[[nodiscard]] Broken shrunk(Broken broken);
+[[nodiscard]] std::vector<KeyRow> study_keys(const Effort& effort, const Told& told);
 
 }  // namespace kerf::ranges

@@ -36,20 +36,34 @@ std::string figures(const char* form, double a, double b) {
   return text;
 }
 
-bool all_finite(const ServoOutput& out) {
+/// The first output that is no number; null: all are.
+const char* not_finite(const ServoOutput& out) {
   const auto finite = [](std::span<const double> values) {
     return std::ranges::all_of(values, [](double x) { return std::isfinite(x); });
   };
   for (const PlaneLoad& plane : out.planes) {
-    if (!finite(plane.normal) || !finite(plane.arm_mm) || !std::isfinite(plane.load_n))
-      return false;
+    if (!finite(plane.normal) || !finite(plane.arm_mm) || !std::isfinite(plane.load_n)) {
+      return "a plane";
+    }
   }
   const std::array<double, 4> single{out.absorbed_mj, out.press_n, out.spindle_ratio,
                                      out.spindle_load};
-  return finite(out.gimbal_rad) && finite(out.position_mm) && finite(out.rotation) &&
-         finite(out.velocity_mm_per_s) && finite(out.force_n) && finite(out.contact_n) &&
-         finite(out.modification_n) && finite(out.torque_n_mm) && finite(out.proxy_offset_mm) &&
-         finite(out.tip_torque_n_mm) && finite(single);
+  const std::pair<const char*, std::span<const double>> outputs[] = {
+      {"gimbal_rad", out.gimbal_rad},
+      {"position_mm", out.position_mm},
+      {"rotation", out.rotation},
+      {"velocity_mm_per_s", out.velocity_mm_per_s},
+      {"force_n", out.force_n},
+      {"contact_n", out.contact_n},
+      {"modification_n", out.modification_n},
+      {"torque_n_mm", out.torque_n_mm},
+      {"proxy_offset_mm", out.proxy_offset_mm},
+      {"tip_torque_n_mm", out.tip_torque_n_mm},
+      {"energy, press or spindle", single}};
+  for (const auto& [name, values] : outputs) {
+    if (!finite(values)) return name;
+  }
+  return nullptr;
 }
 
 }  // namespace
@@ -114,11 +128,16 @@ void Rules::look_at_motion(const DeviceReport& report, const ServoOutput& out, d
 }
 
 void Rules::look_at(const DeviceReport& report, const ServoOutput& out) {
-  if (!all_finite(out)) broken("finite", "an output is no number");
+  if (const char* output = not_finite(out)) {
+    broken("finite", std::string(output) + " is no number");
+  }
   const Vector moved_mm = known_ ? minus(out.position_mm, last_mm_) : Vector{};
   ++gap_;
   largest_gap_n_ = std::max(largest_gap_n_, length(last_force_n_));
-  const bool leaves = report.fresh && dot(last_force_n_, moved_mm) >= 0;
+  // Below the rounding of the places that are told nobody here knows which way the hand went.
+  const double unknown_mm = place_error_mm_ * scale_;
+  const bool leaves =
+      report.fresh && dot(last_force_n_, moved_mm) >= -unknown_mm * length(last_force_n_);
   look_at_force(out, leaves);
   stale_ticks_ = report.fresh ? 0 : stale_ticks_ + 1;
   if (stale_ticks_ > 0 && length(out.force_n) > length(last_force_n_) + 1e-4) {

@@ -9,7 +9,7 @@
 #include "controller/law/velocity_window.hpp"
 #include "controller/servo/energy_ledger.hpp"
 #include "controller/servo/force_limits.hpp"
-#include "controller/stability/one_axis_plant.hpp"
+#include "controller/stability/one_axis.hpp"
 #include "shared/numeric/numbers.hpp"
 
 namespace kerf::zwidth {
@@ -113,34 +113,6 @@ class OneAxisWall {
   typename N::Energy taken_mj_{};
 };
 
-/// Forces on their way to the motors: held for whole periods, and for a part of one.
-class Delay {
- public:
-  explicit Delay(const SampledLoop& loop) {
-    const double periods = std::min(loop.delay_s / loop.period_s, kMaxDelayPeriods);
-    constexpr double kWhole = 1e-9;
-    whole_ = static_cast<std::size_t>(periods + kWhole);
-    part_ = std::max(0.0, periods - static_cast<double>(whole_));
-    if (part_ < kWhole) part_ = 0;
-  }
-  [[nodiscard]] double part() const noexcept { return part_; }
-  void send(double force_n) noexcept {
-    newest_ = (newest_ + 1) % ring_.size();
-    ring_[newest_] = force_n;
-  }
-  /// What acts in the first part of the period, and then.
-  [[nodiscard]] double before() const noexcept { return at(whole_ + 1); }
-  [[nodiscard]] double after() const noexcept { return at(whole_); }
-
- private:
-  [[nodiscard]] double at(std::size_t age) const noexcept {
-    return ring_[(newest_ + ring_.size() - age) % ring_.size()];
-  }
-  std::array<double, static_cast<std::size_t>(kMaxDelayPeriods) + 2> ring_{};
-  std::size_t newest_ = 0, whole_ = 0;
-  double part_ = 0;
-};
-
 /// A part of a step, from the seed alone (splitmix64); of seed 0 none.
 double shift_of(std::uint64_t seed) {
   if (seed == 0) return 0;
@@ -154,15 +126,10 @@ template <class N>
 Swing hit(const Subject& subject, double stiffness, double hit_mm_per_s, double seconds,
           std::uint64_t seed, std::uint64_t& ticks, const OneAxisWatch& watch) {
   const SampledLoop& loop = subject.loop;
-  const double step_mm = loop.quantum_mm, shift_mm = shift_of(seed) * step_mm;
-  const auto reading = [&](double tip_mm) {
-    return step_mm > 0 ? std::floor((tip_mm + shift_mm) / step_mm) * step_mm - shift_mm : tip_mm;
-  };
   const double push_n = loop.coulomb_n + subject.push_n;
-  Delay delay(loop);
-  OneAxisPlant plant(loop, delay.part(), 1 - delay.part());
-  plant.place(kStartMm, -hit_mm_per_s * loop.period_s);
-  OneAxisWall<N> wall(subject, stiffness, reading(kStartMm));
+  OneAxis axis(loop, shift_of(seed) * loop.quantum_mm);
+  axis.start(kStartMm, -hit_mm_per_s);
+  OneAxisWall<N> wall(subject, stiffness, axis.encoder_mm());
 
   const std::int64_t count = std::llround(seconds / loop.period_s);
   // Friction holds the tip, and all that the wall remembers is over.
@@ -170,28 +137,20 @@ Swing hit(const Subject& subject, double stiffness, double hit_mm_per_s, double 
                                static_cast<std::int64_t>(kMaxDelayPeriods) +
                                VelocityWindow<N>::kIntervals * VelocityWindow<N>::kMaxStride;
   constexpr double kFarMm = 1e4;  // where no motion comes back from
-  SwingMeter meter(count, step_mm, push_n);
-  double given_mj = 0;
+  SwingMeter meter(count, loop.quantum_mm, push_n);
   std::int64_t still = 0;
   for (std::int64_t tick = 0; tick < count; ++tick, ++ticks) {
-    const double asked_n = wall.force(reading(plant.tip_mm()));
+    const double asked_n = wall.force(axis.encoder_mm());
     if (!std::isfinite(asked_n)) return {true, true, 0, 0};  // the servo would latch a fault
-    delay.send(asked_n);
-    const auto move = [&](std::size_t stretch, double force_n) {
-      const double from_mm = plant.tip_mm();
-      plant.advance(stretch, force_n - push_n);
-      given_mj += force_n * (plant.tip_mm() - from_mm);
-    };
-    if (delay.part() > 0) move(0, delay.before());
-    move(1, delay.after());
-    meter.take(plant.tip_mm(), given_mj);
+    axis.tick(asked_n, -push_n);
+    meter.take(axis.place_mm(), axis.motor_work_mj());
     if (watch) {
-      watch({static_cast<double>(tick + 1) * loop.period_s, plant.tip_mm(),
-             plant.mm_per_period() / loop.period_s, delay.after()});
+      watch({static_cast<double>(tick + 1) * loop.period_s, axis.place_mm(), axis.mm_per_s(),
+             axis.motor_n()});
     }
-    still = plant.stuck() ? still + 1 : 0;
+    still = axis.stuck() ? still + 1 : 0;
     if (still > settled) return {};
-    if (!(std::abs(plant.tip_mm()) < kFarMm)) return {true, true, kFarMm, given_mj};
+    if (!(std::abs(axis.place_mm()) < kFarMm)) return {true, true, kFarMm, axis.motor_work_mj()};
   }
   return meter.swing();
 }

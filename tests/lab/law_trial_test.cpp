@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Laws that do what no law may: each is told in one line, and the lab goes on.
+#include "controller/shell/law_trial.hpp"
+
 #include <array>
 #include <cmath>
 #include <limits>
@@ -7,13 +9,13 @@
 #include <stdexcept>
 #include <string>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 #include <doctest/doctest.h>
 
 #include "controller/law/law_row.hpp"
 #include "controller/law/registry/law_registry.hpp"
-#include "lab/law/trial.hpp"
 #include "lab/program.hpp"
 
 using namespace kerf;
@@ -81,7 +83,7 @@ KERF_REGISTER_FORCE_LAW(Thrower)
 
 /// Of the trial in double, after fixed and float, which are fine.
 std::string fault_of(const char* law) {
-  const auto trials = laws::try_law(find_law(LawKind::force, law));
+  const auto trials = try_law(find_law(LawKind::force, law));
   REQUIRE(trials.size() == 3);
   CHECK(trials[0].fault.empty());
   CHECK(trials[1].fault.empty());
@@ -92,14 +94,14 @@ std::string fault_of(const char* law) {
 }  // namespace
 
 TEST_CASE("a law that does what it may passes its trial, with every set of settings") {
-  for (const auto& trial : laws::try_law(find_law(LawKind::force, "fine"))) {
+  for (const auto& trial : try_law(find_law(LawKind::force, "fine"))) {
     CHECK(trial.fault.empty());
     CHECK(trial.steps == 5 * 20'000);
   }
   for (const LawKind kind : {LawKind::velocity, LawKind::stabiliser}) {
     for (const LawRow* row : known_laws(kind)) {
       CAPTURE(row->name);
-      for (const auto& trial : laws::try_law(*row)) CHECK(trial.fault.empty());
+      for (const auto& trial : try_law(*row)) CHECK(trial.fault.empty());
     }
   }
 }
@@ -124,6 +126,33 @@ TEST_CASE("a law that allocates is told") {
   CHECK(fault_of("hoarder").find("allocates with its defaults at spring_mm [") == 0);
 }
 #endif
+
+TEST_CASE("a scene's own law is tried before it runs: what would hang is refused, the rest told") {
+  LoadedScene scene;
+  scene.path = "mine.toml";
+  const auto tried = [&](const char* law, std::vector<std::pair<std::string, double>> settings) {
+    scene.force.law = {LawKind::force, law, std::move(settings)};
+    return try_own_laws(scene);
+  };
+  scene.servo.numeric = NumericKind::float64;
+  CHECK(tried("fine", {}).empty());
+  CHECK(tried("rooter", {{"gain", 2}}).empty());  // as the scene sets it
+  const auto told = tried("rooter", {{"gain", 4}});
+  REQUIRE(told.size() == 1);
+  CHECK(told[0].find("mine.toml: force law rooter gave something that is no finite number with "
+                     "gain = 4 at spring_mm [-") == 0);
+  CHECK_THROWS_WITH_AS(
+      tried("looper", {}),
+      doctest::Contains("mine.toml: force law looper did not end its steps in 2 s"),
+      std::runtime_error);
+  CHECK_THROWS_WITH_AS(tried("thrower", {}), doctest::Contains("ended the program by signal 6"),
+                       std::runtime_error);
+  scene.servo.numeric = NumericKind::fixed;  // in which they do nothing wrong
+  CHECK(tried("looper", {}).empty());
+  scene.force.law = {};
+  scene.force.stabiliser = {LawKind::stabiliser, "passivity", {}};
+  CHECK(try_own_laws(scene).empty());
+}
 
 TEST_CASE("the lab tries one law by its name, and knows all of them") {
   const auto lab = [](const char* name) {

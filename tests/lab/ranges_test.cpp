@@ -22,6 +22,7 @@
 #include "lab/ranges/key_levels.hpp"
 #include "lab/ranges/key_study.hpp"
 #include "lab/ranges/long_run.hpp"
+#include "lab/ranges/pair_study.hpp"
 #include "lab/ranges/rules.hpp"
 
 using namespace kerf;
@@ -170,6 +171,21 @@ TEST_CASE("every range of the table has both of its ends, and a new key by itsel
   CHECK(all.back().ends == std::vector<std::string>{"2.0", "7.0"});
 }
 
+TEST_CASE("every law that the program knows has the ends of its settings") {
+  const std::vector<KeyLevels> all = key_levels();
+  const auto levels_of = [&](std::string_view key) -> const KeyLevels& {
+    return *std::ranges::find(all, key, [](const KeyLevels& levels) { return levels.key->name; });
+  };
+  const KeyLevels& velocity = levels_of("servo.velocity");
+  CHECK(velocity.ends == std::vector<std::string>{
+                             "{ name = \"difference\" }", "{ name = \"difference\", tau_ms = 0.0 }",
+                             "{ name = \"difference\", tau_ms = 1000.0 }", "{ name = \"foaw\" }"});
+  CHECK(std::ranges::count(velocity.beyond, "{ name = \"difference\", tau_ms = 1001.0 }") == 1);
+  CHECK(std::ranges::count(velocity.beyond, "{ name = \"nonsense\" }") == 1);
+  CHECK(levels_of("force.stabiliser").ends.size() == 6);
+  CHECK(levels_of("force.law").ends.size() >= 2);  // of this program alone: law_trial_test.cpp
+}
+
 TEST_CASE(
     "a scene at an end keeps every rule; what is refused is told; the same again on two threads") {
   const SceneFolder folder;
@@ -184,7 +200,7 @@ TEST_CASE(
   const auto study = [&](std::size_t jobs) {
     return study_pairs(
         keys, {.numerics = {NumericKind::fixed}, .combinations = 40, .seed = 5, .jobs = jobs},
-        [](double, const std::string&) {}, [](const PairRows&) {});
+        {[](double, const std::string&) {}, [](const Broken&) {}, [](const PairRows&) {}});
   };
   const PairRows one = study(1), two = study(2);
   CHECK(one.tally.broken.empty());

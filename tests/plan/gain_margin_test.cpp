@@ -1,13 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "controller/plan/cost/gain_margin.hpp"
 
+#include <array>
 #include <filesystem>
 #include <limits>
 #include <string>
 
 #include <doctest/doctest.h>
 
+#include "controller/law/law_row.hpp"
 #include "controller/load/scene_load.hpp"
+#include "controller/stability/device_figures.hpp"
 #include "controller/stability/stable_gains.hpp"
 #include "tests/servo/support.hpp"
 
@@ -32,6 +35,43 @@ GainMargin linear(const LoadedScene& scene) {
 bool is_line(const std::string& text) {
   return !text.empty() && text.find('\n') == std::string::npos &&
          text.find(';') != std::string::npos;
+}
+
+/// F = A d + B d^3 - C v: its slope grows with d, and its damping is that of a linear damper.
+template <class N>
+struct Hardening {
+  static constexpr const char* kName = "hardening";
+  static constexpr const char* kMeaning = "for a test";
+  static constexpr std::array<LawSetting, 3> kSettings{{{"a", "N/mm", -10, 10, 0.2, "A"},
+                                                        {"b", "N/mm^3", 0, 10, 0, "B"},
+                                                        {"c", "N s/mm", 0, 1, 0.002, "C"}}};
+  using Real = typename N::Real;
+  struct State {};
+  explicit Hardening(const LawSetup& s) : a(s["a"]), b(s["b"]), c(s["c"]) {}
+  DeviceVec<Real> step(const ForceInput<N>& in, State&) const noexcept {
+    const double d = double(in.spring_mm.y), v = double(in.velocity_mm_per_s.y);
+    return {Real(0), Real(a * d + b * d * d * d - c * v), Real(0)};
+  }
+  double a, b, c;
+};
+KERF_REGISTER_FORCE_LAW(Hardening)
+
+/// An estimator that nothing is known of.
+template <class N>
+struct Mine {
+  static constexpr const char* kName = "mine";
+  static constexpr const char* kMeaning = "for a test";
+  static constexpr std::array<LawSetting, 0> kSettings{};
+  struct State {};
+  explicit Mine(const LawSetup&) {}
+  DeviceVec<typename N::Real> step(const VelocityInput<N>&, State&) const noexcept { return {}; }
+};
+KERF_REGISTER_VELOCITY_ESTIMATOR(Mine)
+
+LoadedScene with_law(double a, double b, double c) {
+  LoadedScene scene = scene_of(0.4, 0.002, 1000);
+  scene.force.law = {LawKind::force, "hardening", {{"a", a}, {"b", b}, {"c", c}}};
+  return scene;
 }
 
 }  // namespace
@@ -162,4 +202,49 @@ TEST_CASE("the ends of what a scene may say give numbers and one line each") {
       }
     }
   }
+}
+
+TEST_CASE("a force law has the margin of its worst slope, up to the largest force") {
+  const GainMargin coupling = gain_margin(scene_of(0.4, 0.002, 1000));
+  const GainMargin linear_law = gain_margin(with_law(0.4, 0, 0.002));
+  CHECK(linear_law.margin() == doctest::Approx(coupling.margin()).epsilon(1e-6));
+  CHECK(linear_law.with_friction() == doctest::Approx(coupling.with_friction()).epsilon(1e-6));
+  // 0.2 d + 0.1 d^3 is 3.3 N at 2.999 mm, where it rises by 0.2 + 0.3 d^2 = 2.9 N/mm.
+  const LoadedScene hard = with_law(0.2, 0.1, 0.002);
+  const GainMargin margin = linear(hard);
+  CHECK(margin.spring_mm == doctest::Approx(3.0).epsilon(0.03));
+  CHECK(margin.stiffness_n_per_mm == doctest::Approx(2.9).epsilon(0.03));
+  CHECK(margin.margin() == doctest::Approx(0.8262 / margin.stiffness_n_per_mm).epsilon(0.01));
+  const std::string refusal = gain_refusal(hard, margin);
+  CHECK(is_line(refusal));
+  CHECK(refusal.find("mine.toml: force.law hardening at a spring of ") == 0);
+  CHECK(refusal.find("let it rise by at most 0.551 N/mm") != std::string::npos);
+  CHECK(is_line(above_device(hard)));
+  CHECK(above_device(hard).find("force.law hardening: its steepest stiffness_n_per_mm = ") !=
+        std::string::npos);
+  CHECK(gain_lines(hard, margin).find("steepest=force.law hardening at a spring of ") !=
+        std::string::npos);
+  CHECK(above_device(with_law(0.4, 0, 0.002)) == "");
+  CHECK(gain_refusal(with_law(0.4, 0, 0.03), linear(with_law(0.4, 0, 0.03)))
+            .find("let it damp by at most 0.0162 N s/mm") != std::string::npos);
+  const LoadedScene falling = with_law(-1, 0, 0.002);  // never holds a hand
+  CHECK(gain_warning(falling, gain_margin(falling)) == "");
+}
+
+TEST_CASE("a filter of the velocity costs margin, and what is not counted is told") {
+  LoadedScene scene = scene_of(0.4, 0.002, 1000);
+  CHECK(gain_lines(scene, linear(scene)).find("delay 2 ms\n") != std::string::npos);
+  const double bare = linear(scene).margin();
+  scene.servo.velocity = {LawKind::velocity, "difference", {}};
+  CHECK(linear(scene).margin() == bare);
+  scene.servo.velocity.settings = {{"tau_ms", 5}};
+  SampledLoop loop = light_loop(Personality::omni, 1000);
+  loop.velocity_filter_s = 0.005;
+  CHECK(linear(scene).margin() < 0.9 * bare);
+  CHECK(linear(scene).highest_n_per_mm == highest_stiffness(loop, 0.002));
+  scene.servo.velocity = {LawKind::velocity, "mine", {}};
+  scene.force.stabiliser = {LawKind::stabiliser, "passivity", {}};
+  CHECK(gain_lines(scene, linear(scene))
+            .find("delay 2 ms, mine taken for a bare difference, without what passivity does\n") !=
+        std::string::npos);
 }

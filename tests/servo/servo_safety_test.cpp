@@ -126,6 +126,28 @@ TEST_CASE("faster than 10 m/s: motors off in the same tick") {
   CHECK(length(out.force_n) == 0);
 }
 
+TEST_CASE("counters far beyond any joint leave a place in range, and docking forgets the jump") {
+  for (const NumericKind numeric :
+       {NumericKind::fixed, NumericKind::float32, NumericKind::float64}) {
+    CAPTURE(static_cast<int>(numeric));
+    LoadedScene scene = half_space_scene();
+    scene.servo.numeric = numeric;
+    scene.servo.velocity = {LawKind::velocity, "difference", {{"tau_ms", 1000}}};
+    ArmedServo armed(scene);
+    auto report = armed.arm.at(0, 5, 0);
+    for (int i = 0; i < 100; ++i) {  // to a million counts, where the sines' series leaves floats
+      for (auto& encoder : report.encoder) encoder = static_cast<std::int16_t>(encoder + 10'000);
+      const ServoOutput out = armed.servo->step(report);
+      CHECK(length(out.position_mm) < 10'000);
+      CHECK_FALSE(out.motors_on);
+    }
+    arm_at(*armed.servo, armed.arm, 0, 5, 0);
+    const ServoOutput out = armed.step(0, 5, 0);
+    CHECK(out.motors_on);
+    CHECK(length(out.velocity_mm_per_s) < 1000);  // of the way from the dock alone
+  }
+}
+
 TEST_CASE("a scene without torque scale feels, but never turns the motors on") {
   LoadedScene scene = half_space_scene();
   scene.device.torque_scale.reset();

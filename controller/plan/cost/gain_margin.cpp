@@ -4,7 +4,10 @@
 #include <algorithm>
 #include <cstddef>
 
+#include "controller/law/difference.hpp"
+#include "controller/law/foaw.hpp"
 #include "controller/load/scene_load.hpp"
+#include "controller/plan/cost/law_slopes.hpp"
 #include "controller/scene/scene.hpp"
 #include "controller/stability/device_figures.hpp"
 #include "controller/stability/stable_gains.hpp"
@@ -22,7 +25,49 @@ std::string device_word(const LoadedScene& scene) {
 }
 
 SampledLoop loop_of(const LoadedScene& scene) {
-  return light_loop(scene.device.personality, scene.servo.rate_hz);
+  SampledLoop loop = light_loop(scene.device.personality, scene.servo.rate_hz);
+  const LawChoice& estimator = scene.servo.velocity;
+  if (estimator.name == Difference<DoubleNumbers>::kName && !estimator.settings.empty()) {
+    loop.velocity_filter_s = estimator.settings.front().second / 1000;  // its only one
+  }
+  return loop;
+}
+
+bool has_law(const LoadedScene& scene) {
+  return scene.force.model == ForceModel::proxy && !scene.force.law.name.empty();
+}
+
+/// What of the loop the boundary does not know, as it stands behind that.
+std::string not_counted(const LoadedScene& scene) {
+  std::string text;
+  const std::string& estimator = scene.servo.velocity.name;
+  if (estimator != Difference<DoubleNumbers>::kName && estimator != Foaw<DoubleNumbers>::kName) {
+    text += ", " + estimator + " taken for a bare difference";
+  }
+  const std::string& stabiliser = scene.force.stabiliser.name;
+  if (!stabiliser.empty()) text += ", without what " + stabiliser + " does";
+  return text;
+}
+
+/// The length of the law's spring at which it has the least margin.
+void set_worst_slope(const LoadedScene& scene, const SampledLoop& loop, GainMargin& margin) {
+  margin.stiffness_n_per_mm = margin.damping_ns_per_mm = 0;
+  margin.highest_n_per_mm = highest_stiffness(loop, 0);  // of a law that never rises
+  double damping = -1, highest = 0;
+  for (const LawSlope& slope : law_slopes(scene)) {
+    if (slope.stiffness_n_per_mm <= 0) continue;  // the hand alone holds it there
+    const double damps = std::max(0.0, slope.damping_ns_per_mm);
+    if (damps != damping) highest = highest_stiffness(loop, damping = damps);
+    const bool first = margin.stiffness_n_per_mm <= 0;
+    if (!first &&
+        highest * margin.stiffness_n_per_mm >= margin.highest_n_per_mm * slope.stiffness_n_per_mm) {
+      continue;
+    }
+    margin.spring_mm = slope.spring_mm;
+    margin.stiffness_n_per_mm = slope.stiffness_n_per_mm;
+    margin.damping_ns_per_mm = damps;
+    margin.highest_n_per_mm = highest;
+  }
 }
 
 /// From the linear boundary up, by doubling and then halving to 1 %.
@@ -47,13 +92,21 @@ std::string gain_key(const LoadedScene& scene) {
   return scene.force.model == ForceModel::paper ? "force.p0_n_per_mm2" : "force.stiffness_n_per_mm";
 }
 
+/// Of a law: which length, and of what.
+std::string law_words(const LoadedScene& scene, const GainMargin& margin) {
+  return format("force.law %s at a spring of %.3g mm", scene.force.law.name.c_str(),
+                margin.spring_mm);
+}
+
 /// Of a damping that is too high for any stiffness, or of a stiffness that is.
 std::string way_out(const LoadedScene& scene, const GainMargin& margin) {
   if (margin.highest_n_per_mm <= 0) {
-    return format("use at most %.3g in force.damping_ns_per_mm",
-                  highest_damping(loop_of(scene)) / kSafeMargin);
+    const double most = highest_damping(loop_of(scene)) / kSafeMargin;
+    if (has_law(scene)) return format("let it damp by at most %.3g N s/mm", most);
+    return format("use at most %.3g in force.damping_ns_per_mm", most);
   }
   const double safe = margin.deciding() * margin.stiffness_n_per_mm / kSafeMargin;
+  if (has_law(scene)) return format("let it rise by at most %.3g N/mm", safe);
   if (!margin.friction_decides) {
     return format("use at most %.3g in %s", safe, gain_key(scene).c_str());
   }
@@ -69,7 +122,11 @@ GainMargin gain_margin(const LoadedScene& scene, PlayFriction friction) {
   margin.stiffness_n_per_mm = device_stiffness_n_per_mm(scene);
   margin.damping_ns_per_mm = margin.friction_decides ? 0 : scene.force.damping_ns_per_mm;
   const SampledLoop loop = loop_of(scene);
-  margin.highest_n_per_mm = highest_stiffness(loop, margin.damping_ns_per_mm);
+  if (has_law(scene)) {
+    set_worst_slope(scene, loop, margin);
+  } else {
+    margin.highest_n_per_mm = highest_stiffness(loop, margin.damping_ns_per_mm);
+  }
   if (margin.friction_decides || friction == PlayFriction::always) {
     margin.highest_with_friction_n_per_mm =
         with_friction(loop, margin.damping_ns_per_mm, margin.highest_n_per_mm);
@@ -79,9 +136,14 @@ GainMargin gain_margin(const LoadedScene& scene, PlayFriction friction) {
 
 std::string gain_lines(const LoadedScene& scene, const GainMargin& margin) {
   const SampledLoop loop = loop_of(scene);
-  std::string text = format("gain_loop=%s at %d Hz: %g kg, %g N s/mm, Coulomb %g N, delay %g ms\n",
-                            device_word(scene).c_str(), scene.servo.rate_hz, loop.mass_kg,
-                            loop.viscous_ns_per_mm, loop.coulomb_n, 1000 * loop.delay_s);
+  std::string text =
+      format("gain_loop=%s at %d Hz: %g kg, %g N s/mm, Coulomb %g N, delay %g ms%s\n",
+             device_word(scene).c_str(), scene.servo.rate_hz, loop.mass_kg, loop.viscous_ns_per_mm,
+             loop.coulomb_n, 1000 * loop.delay_s, not_counted(scene).c_str());
+  if (has_law(scene)) {
+    text += format("steepest=%s: %.3g N/mm, %.3g N s/mm\n", law_words(scene, margin).c_str(),
+                   margin.stiffness_n_per_mm, margin.damping_ns_per_mm);
+  }
   text += format("highest_stable_stiffness_n_per_mm=%.3g\nstability_margin=%.2f\n",
                  margin.highest_n_per_mm, margin.margin());
   text += format("highest_with_friction_n_per_mm=%.3g\nstability_margin_with_friction=%.2f\n",
@@ -102,6 +164,15 @@ std::string gain_warning(const LoadedScene& scene, const GainMargin& margin) {
 
 std::string gain_refusal(const LoadedScene& scene, const GainMargin& margin) {
   if (scene.force.unchecked_gain || margin.friction_decides || margin.margin() >= 1) return {};
+  if (has_law(scene)) {
+    return scene.path + ": " + law_words(scene, margin) +
+           format(
+               " rises by %.3g N/mm and damps by %.3g N s/mm, which is unstable on a lightly "
+               "held %s at %d Hz, margin %.2f; ",
+               margin.stiffness_n_per_mm, margin.damping_ns_per_mm, device_word(scene).c_str(),
+               scene.servo.rate_hz, margin.margin()) +
+           way_out(scene, margin) + ", or set force.unchecked_gain = true";
+  }
   return scene.path +
          format(
              ": force.stiffness_n_per_mm = %.6g with damping %.6g is unstable on a lightly held "
@@ -114,19 +185,27 @@ std::string gain_refusal(const LoadedScene& scene, const GainMargin& margin) {
 std::string above_device(const LoadedScene& scene) {
   if (scene.force.model == ForceModel::paper) return {};
   const DeviceFigures device = device_figures(scene.device.personality);
-  const auto refused = [&](const char* key, double value, double most) {
+  const auto refused = [&](const std::string& what, double value, double most) {
     return scene.path + format(
                             ": force.%s = %.6g is above %.6g, the most that is known to be safe "
                             "on %s; lower it, use --virtual, or say --unchecked-gain",
-                            key, value, most, device_word(scene).c_str());
+                            what.c_str(), value, most, device_word(scene).c_str());
   };
-  const double stiffness = scene.force.stiffness_n_per_mm;
-  const double damping = scene.force.damping_ns_per_mm;
+  double stiffness = scene.force.stiffness_n_per_mm, damping = scene.force.damping_ns_per_mm;
+  std::string of_law;
+  if (has_law(scene)) {
+    of_law = "law " + scene.force.law.name + ": its steepest ";
+    stiffness = damping = 0;
+    for (const LawSlope& slope : law_slopes(scene)) {
+      stiffness = std::max(stiffness, slope.stiffness_n_per_mm);
+      damping = std::max(damping, slope.damping_ns_per_mm);
+    }
+  }
   if (stiffness > device.highest_stiffness_n_per_mm) {
-    return refused("stiffness_n_per_mm", stiffness, device.highest_stiffness_n_per_mm);
+    return refused(of_law + "stiffness_n_per_mm", stiffness, device.highest_stiffness_n_per_mm);
   }
   if (damping > device.highest_damping_ns_per_mm) {
-    return refused("damping_ns_per_mm", damping, device.highest_damping_ns_per_mm);
+    return refused(of_law + "damping_ns_per_mm", damping, device.highest_damping_ns_per_mm);
   }
   return {};
 }

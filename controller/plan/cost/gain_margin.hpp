@@ -17,6 +17,9 @@ namespace kerf {
 // window down to one interval: the backward difference of the exact loop. A swing that stays inside
 // of both is felt as a hum, and friction takes it. The paper's force has no damper, so only
 // friction makes it stable at all: its margin is that with friction, and it is never refused.
+//
+// A force law has the margin of its worst length (law_slopes.hpp). The low-pass of `difference`
+// counts, an estimator of the program's own does as a bare difference, and no stabiliser does.
 
 /// Below, a person is warned: a unit may have half of the damping that its figures say.
 inline constexpr double kSafeMargin = 1.5;
@@ -27,6 +30,7 @@ struct GainMargin {
   double highest_n_per_mm = 0;                ///< stiffness at the boundary, without friction
   double highest_with_friction_n_per_mm = 0;  ///< the same with it, from a push of 1 N
   bool friction_decides = false;              ///< of the paper's force
+  double spring_mm = 0;                       ///< of a force law: where it has these; else 0
 
   [[nodiscard]] double margin() const noexcept { return highest_n_per_mm / stiffness_n_per_mm; }
   [[nodiscard]] double with_friction() const noexcept {

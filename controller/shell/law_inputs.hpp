@@ -10,18 +10,18 @@
 #include "controller/law/law_row.hpp"
 #include "shared/text/format.hpp"
 
-namespace kerf::laws {
+namespace kerf {
 
 /// What a law was given last, as numbers: written before the step, read by whoever outlives it.
-struct Told {
+struct ToldInput {
   std::array<double, 16> number{};
 };
 
 /// Inputs at random: of each number a third at an end of its range, 0, or one step of fixed point.
-class Inputs {
+class LawInputs {
  public:
   template <class N>
-  void next(ForceInput<N>& in, Told& told) {
+  void next(ForceInput<N>& in, ToldInput& told) {
     spring(in.spring_mm, told);
     vec(in.velocity_mm_per_s, kEnd, told, 3);
     vec(in.tip_mm, 1000, told, 6);
@@ -34,14 +34,14 @@ class Inputs {
     if (length > 0) in.normal.y = typename N::Unit(1);
   }
   template <class N>
-  void next(VelocityInput<N>& in, Told& told) {
+  void next(VelocityInput<N>& in, ToldInput& told) {
     vec(in.tip_mm, kEnd, told, 0);
     constexpr std::array<std::uint32_t, 4> kTicks{1, 1, 2, 1000};
     in.ticks = kTicks[bits_() % kTicks.size()];
     told.number[3] = in.ticks;
   }
   template <class N>
-  void next(StabiliserInput<N>& in, Told& told) {
+  void next(StabiliserInput<N>& in, ToldInput& told) {
     vec(in.wanted_n, 10, told, 0);
     vec(in.sent_n, 10, told, 3);
     vec(in.moved_mm, 100, told, 6);
@@ -59,7 +59,7 @@ class Inputs {
   }
 
   /// What `told` says of a law of this kind.
-  [[nodiscard]] static std::string text(LawKind kind, const Told& told) {
+  [[nodiscard]] static std::string text(LawKind kind, const ToldInput& told) {
     const auto& n = told.number;
     const auto vec = [&](const char* name, std::size_t at) {
       return format("%s [%g, %g, %g]", name, n[at], n[at + 1], n[at + 2]);
@@ -86,7 +86,7 @@ class Inputs {
     return end * (2 * (static_cast<double>(draw >> 11) / 9007199254740992.0) - 1);
   }
   template <class V>
-  void vec(V& v, double end, Told& told, std::size_t at) {
+  void vec(V& v, double end, ToldInput& told, std::size_t at) {
     using Real = decltype(v.x);
     for (auto of : {&V::x, &V::y, &V::z}) {
       told.number[at] = number(end);
@@ -95,7 +95,7 @@ class Inputs {
   }
   /// Most springs are as long as a hand makes them.
   template <class V>
-  void spring(V& v, Told& told) {
+  void spring(V& v, ToldInput& told) {
     constexpr std::array<double, 4> kLength{0.1, 1, 10, kEnd};
     vec(v, kLength[bits_() % kLength.size()], told, 0);
   }
@@ -103,4 +103,4 @@ class Inputs {
   std::mt19937_64 bits_{18};
 };
 
-}  // namespace kerf::laws
+}  // namespace kerf

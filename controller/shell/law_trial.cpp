@@ -1,0 +1,229 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "controller/shell/law_trial.hpp"
+
+#include <algorithm>
+#include <cerrno>
+#include <csignal>
+#include <cstddef>
+#include <ctime>
+#include <memory>
+#include <new>
+#include <stdexcept>
+#include <system_error>
+
+#include <sys/mman.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "controller/law/registry/law_registry.hpp"
+#include "controller/plan/plan_device.hpp"
+#include "controller/scene/scene.hpp"
+#include "controller/shell/allocation_counter.hpp"
+#include "controller/shell/law_inputs.hpp"
+#include "shared/text/format.hpp"
+
+namespace kerf {
+namespace {
+
+constexpr rlim_t kMostSeconds = 2;
+
+/// What is tried: a law with each of these settings, so many steps each.
+struct LawJob {
+  std::vector<LawChoice> choices;
+  int steps;
+  LawLoop loop;
+};
+
+/// What the child tells, in memory that both see.
+struct LawProgress {
+  std::size_t settings = 0;  ///< at work on this set
+  ToldInput told;
+  std::uint64_t steps = 0;
+  double seconds = 0;
+  LawFlaw flaw = LawFlaw::none;
+  bool done = false;
+};
+
+/// The sets of settings that are tried.
+std::vector<LawChoice> choices_of(const LawRow& row) {
+  const std::string name(row.name);
+  std::vector<LawChoice> choices{{row.kind, name, {}}};
+  LawChoice low{row.kind, name, {}}, high = low;
+  for (const LawSetting& setting : row.settings) {
+    const std::string key(setting.name);
+    choices.push_back({row.kind, name, {{key, setting.lo}}});
+    choices.push_back({row.kind, name, {{key, setting.hi}}});
+    low.settings.emplace_back(key, setting.lo);
+    high.settings.emplace_back(key, setting.hi);
+  }
+  choices.push_back(low);
+  choices.push_back(high);
+  return choices;
+}
+
+template <class In, class Real>
+LawFlaw run_steps(const LawPlan<In, Real>& plan, int steps, LawProgress& progress) {
+  LawInputs inputs;
+  const auto memory = std::make_unique<LawMemory>();
+  In in;
+  const CountedAllocations counted;
+  const std::uint64_t allocations = CountedAllocations::total();
+  for (int step = 0; step < steps; ++step) {
+    inputs.next(in, progress.told);
+    if constexpr (requires { in.first; }) in.first = !memory->begun;
+    const auto out = plan(*memory, in);
+    ++progress.steps;
+    if (!is_finite(out.x) || !is_finite(out.y) || !is_finite(out.z)) return LawFlaw::no_number;
+    if (CountedAllocations::total() != allocations) return LawFlaw::allocates;
+  }
+  return LawFlaw::none;
+}
+
+template <template <class> class In, class N>
+void try_all(const LawJob& job, LawProgress& progress) {
+  const std::clock_t began = std::clock();
+  for (const LawChoice& choice : job.choices) {
+    try {
+      progress.flaw = run_steps(plan_law<In, N>(choice, job.loop), job.steps, progress);
+    } catch (const LawError&) {  // its name and settings are known
+      progress.flaw = LawFlaw::unlisted;
+    }
+    if (progress.flaw != LawFlaw::none) break;
+    ++progress.settings;
+  }
+  progress.seconds = static_cast<double>(std::clock() - began) / CLOCKS_PER_SEC;
+  progress.done = true;
+}
+
+template <class N>
+void try_kind(const LawJob& job, LawProgress& progress) {
+  switch (job.choices.front().kind) {
+    case LawKind::force:
+      return try_all<ForceInput, N>(job, progress);
+    case LawKind::velocity:
+      return try_all<VelocityInput, N>(job, progress);
+    case LawKind::stabiliser:
+      return try_all<StabiliserInput, N>(job, progress);
+  }
+}
+
+std::string settings_of(const LawChoice& choice) {
+  if (choice.settings.empty()) return "its defaults";
+  std::string text;
+  for (const auto& [name, value] : choice.settings) {
+    text += (text.empty() ? "" : ", ") + format("%s = %g", name.c_str(), value);
+  }
+  return text;
+}
+
+LawFlaw flaw_of(const LawProgress& progress, int status) {
+  if (WIFSIGNALED(status) && (WTERMSIG(status) == SIGXCPU || WTERMSIG(status) == SIGKILL)) {
+    return LawFlaw::endless;
+  }
+  return progress.done ? progress.flaw : LawFlaw::ends_program;
+}
+
+std::string fault_of(const LawJob& job, const LawProgress& progress, LawFlaw flaw, int status) {
+  std::string what, way_out;
+  switch (flaw) {
+    case LawFlaw::none:
+      return "";
+    case LawFlaw::unlisted:
+      return "reads a setting that its kSettings do not list; add it there";
+    case LawFlaw::no_number:
+      what = "gave something that is no finite number";
+      way_out = "look for a division by 0 and for sums that overflow";
+      break;
+    case LawFlaw::allocates:
+      what = "allocates";
+      way_out = "keep all memory in its State";
+      break;
+    case LawFlaw::endless:
+      what = format("did not end its steps in %d s", static_cast<int>(kMostSeconds));
+      way_out = "give every loop a bound that does not depend on the input";
+      break;
+    case LawFlaw::ends_program: {
+      const int signal = WIFSIGNALED(status) ? WTERMSIG(status) : 0;
+      what = format("ended the program by signal %d", signal);
+      way_out = signal == SIGABRT ? "a step throws nothing" : "look at the memory that it writes";
+      break;
+    }
+  }
+  const LawChoice& choice = job.choices[std::min(progress.settings, job.choices.size() - 1)];
+  return what + " with " + settings_of(choice) + " at " +
+         LawInputs::text(choice.kind, progress.told) + "; " + way_out;
+}
+
+template <class N>
+LawTrial try_in(const LawJob& job) {
+  void* page =
+      mmap(nullptr, sizeof(LawProgress), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+  if (page == MAP_FAILED) throw std::system_error(errno, std::generic_category(), "mmap");
+  auto& progress = *::new (page) LawProgress;
+  const pid_t child = fork();
+  if (child < 0) throw std::system_error(errno, std::generic_category(), "fork");
+  if (child == 0) {
+    const rlimit cpu{kMostSeconds, kMostSeconds + 1}, no_core{0, 0};
+    setrlimit(RLIMIT_CPU, &cpu);
+    setrlimit(RLIMIT_CORE, &no_core);
+    for (const int number : {SIGXCPU, SIGABRT, SIGSEGV, SIGFPE, SIGILL, SIGBUS}) {
+      std::signal(number, SIG_DFL);  // NOLINT(cert-err33-c): these can be set
+    }
+    try_kind<N>(job, progress);
+    _exit(0);
+  }
+  int status = 0;
+  while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
+  }
+  LawTrial trial{N::kName, progress.steps, 0, flaw_of(progress, status), ""};
+  trial.fault = fault_of(job, progress, trial.flaw, status);
+  if (progress.steps > 0) {
+    trial.step_ns = progress.seconds * 1e9 / static_cast<double>(progress.steps);
+  }
+  munmap(page, sizeof(LawProgress));
+  return trial;
+}
+
+bool is_own(const LawChoice& choice) {
+  if (choice.name.empty()) return false;
+  const LawRow& row = find_law(choice.kind, choice.name);
+  for (const LawRow* own = first_own_law; own != nullptr; own = own->next) {
+    if (own == &row) return true;
+  }
+  return false;
+}
+
+}  // namespace
+
+std::vector<LawTrial> try_law(const LawRow& row) {
+  // A spacious loop: nothing of it decides whether a law holds.
+  const LawJob job{choices_of(row), 20'000, {1000, 0.05}};
+  return {try_in<FixedNumbers>(job), try_in<FloatNumbers>(job), try_in<DoubleNumbers>(job)};
+}
+
+std::vector<std::string> try_own_laws(const LoadedScene& scene) {
+  std::vector<std::string> lines;
+  for (const LawChoice* choice :
+       {&scene.force.law, &scene.servo.velocity, &scene.force.stabiliser}) {
+    if (!is_own(*choice)) continue;
+    const LawJob job{
+        {*choice},
+        2'000,
+        {double(scene.servo.rate_hz), device_parts::tip_noise_mm(scene.device.personality)}};
+    const LawTrial trial = scene.servo.numeric == NumericKind::fixed ? try_in<FixedNumbers>(job)
+                           : scene.servo.numeric == NumericKind::float32
+                               ? try_in<FloatNumbers>(job)
+                               : try_in<DoubleNumbers>(job);
+    if (trial.flaw == LawFlaw::none || trial.flaw == LawFlaw::unlisted) continue;
+    const std::string line = scene.path + ": " + std::string(kind_name(choice->kind)) + " " +
+                             choice->name + " " + trial.fault;
+    if (trial.flaw == LawFlaw::endless || trial.flaw == LawFlaw::ends_program) {
+      throw std::runtime_error(line);
+    }
+    lines.push_back(line);
+  }
+  return lines;
+}
+
+}  // namespace kerf
