@@ -146,14 +146,9 @@ void denoise_volume(const VolumeSpec& spec, SceneVolume& volume) {
   volume.denoised = spec.denoise == Denoise::automatic ? passes_for(volume.noise)
                                                        : static_cast<int>(spec.denoise);
   if (volume.denoised == 0) return;
-  // Only what the crop keeps, and what reaches into it. Labels may make solid what is softer.
-  const VoxelBox solid = solid_box(image, volume.iso);
-  if (spec.crop && image.labels.empty() && !solid.empty()) {
-    image = crop(image, solid.grown(kGuardVoxels + volume.denoised * kDenoiseReach)
-                            .clipped(image.grid.box().grown(kGuardVoxels)));
-  } else {
-    image = enclosed_in_air(std::move(image), volume.iso);
-  }
+  // Labels may make solid what is softer.
+  image = spec.crop && image.labels.empty() ? crop_for_passes(image, volume.iso, volume.denoised)
+                                            : enclosed_in_air(std::move(image), volume.iso);
   denoise(image.grid, image.density, volume.denoised);
 }
 

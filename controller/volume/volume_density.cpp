@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "controller/scene/scene_error.hpp"
+#include "controller/volume/otsu.hpp"
 
 namespace kerf {
 
@@ -43,31 +44,7 @@ Density otsu_threshold(const VolumeImage& image) {
   std::array<double, 1 << kBinBits> count{};
   for (const Density d : image.density) count[d >> kShift] += 1.0;
 
-  double total = 0.0;
-  double total_sum = 0.0;
-  for (std::size_t bin = 0; bin < count.size(); ++bin) {
-    total += count[bin];
-    total_sum += count[bin] * static_cast<double>(bin);
-  }
-  // Both ends of the range of best thresholds; counts are whole, so equal parts compare equal.
-  double best = 0.0;
-  std::size_t first = count.size() / 2;
-  std::size_t last = first;
-  double below = 0.0;
-  double below_sum = 0.0;
-  for (std::size_t bin = 1; bin < count.size(); ++bin) {  // classes: [0, bin) and [bin, end)
-    below += count[bin - 1];
-    below_sum += count[bin - 1] * static_cast<double>(bin - 1);
-    if (below == 0.0 || below == total) continue;
-    const double distance = below_sum / below - (total_sum - below_sum) / (total - below);
-    const double between = below * (total - below) * distance * distance;
-    if (between > best) {
-      best = between;
-      first = bin;
-    }
-    if (between == best) last = bin;
-  }
-  return static_cast<Density>(((first + last) << kShift) / 2);
+  return static_cast<Density>(otsu_split(count).bin * (1 << kShift));
 }
 
 VoxelBox solid_box(const VolumeImage& image, Density iso) noexcept {
