@@ -4,7 +4,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
+#include <span>
 #include <sstream>
+#include <type_traits>
+#include <vector>
 
 #include "controller/scene/scene_error.hpp"
 #include "controller/volume/otsu.hpp"
@@ -32,8 +36,17 @@ VolumeImage apply_window(const SourceVolume& source, Window window) {
   static_cast<VolumeFrame&>(image) = source;
   image.density.resize(source.values.size());
   const double scale = kDensityMax / width;
-  std::transform(source.values.begin(), source.values.end(), image.density.begin(), [&](float v) {
-    return nearest_density((static_cast<double>(v) - window.lo) * scale);
+  const auto density = [&](double value) { return nearest_density((value - window.lo) * scale); };
+  source.values.visit([&]<class T>(std::span<const T> values) {
+    if constexpr (std::is_same_v<T, float>) {
+      std::ranges::transform(values, image.density.begin(),
+                             [&](float v) { return density(static_cast<double>(v)); });
+    } else {  // the same, each of the 65536 values once
+      std::vector<Density> of(std::size_t{1} << 16);
+      for (std::size_t i = 0; i < of.size(); ++i) of[i] = density(static_cast<T>(i));
+      std::ranges::transform(values, image.density.begin(),
+                             [&](T v) { return of[static_cast<std::uint16_t>(v)]; });
+    }
   });
   return image;
 }

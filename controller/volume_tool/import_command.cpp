@@ -55,12 +55,23 @@ struct ImportCommand::Files {
 
 ImportCommand::ImportCommand(Arguments& app)
     : command_(app.command("import", "any CT to a volume, a ready scene and a preview")) {
-  command_.option("path", path_, "volume file, or folder with a DICOM series")
+  command_.option("path", path_, "volume file, or folder of DICOM, PNG or TIFF slices")
       .required()
       .shown_as("PATH");
   command_
       .option("--out", out_, "the volume; scene and preview lie beside it (default: PATH's name)")
       .shown_as("OUT.nrrd");
+  command_.option("--series", series_, "of several in a folder: its number or a part of its name")
+      .shown_as("WHICH");
+  Option dims = command_.option("--dims", dims_, "voxels of a file without a header");
+  dims.shown_as("NXxNYxNZ");
+  command_.option("--type", type_, "of its numbers")
+      .one_of({std::begin(kVoxelTypeWords), std::end(kVoxelTypeWords)})
+      .shows_default()
+      .needs(dims);
+  command_.flag("--big-endian", big_endian_, "of its numbers: the highest byte is first")
+      .needs(dims);
+  command_.option("--skip", skip_, "bytes before its first voxel").within(0, 1e12).needs(dims);
   command_.option("--spacing", spacing_, "mm per voxel, in place of the file's")
       .shown_as("A[,B,C]");
   command_.option("--iso", iso_, "the surface, in values of the file (HU of a CT)")
@@ -102,6 +113,12 @@ void ImportCommand::run(std::ostream& out) const {
   const Files to = files();
   ReadOptions options;
   options.cpu_s = cpu_s_;
+  options.series = series_;
+  if (!dims_.empty()) {
+    const auto word = std::ranges::find(kVoxelTypeWords, type_) - std::begin(kVoxelTypeWords);
+    options.raw = RawLayout{grid_from("--dims", dims_), static_cast<VoxelType>(word), big_endian_,
+                            static_cast<std::uint64_t>(skip_)};
+  }
   if (!spacing_.empty()) options.spacing_mm = spacing_from(spacing_);
   ProposalWishes wishes;
   wishes.keep_all = keep_all_;
@@ -114,6 +131,7 @@ void ImportCommand::run(std::ostream& out) const {
 
   SourceVolume source = read_volume(path_, options);
   const Window range = range_window(source);
+  const std::string note = source.note;
   std::ostringstream values;
   values << path_ << ": " << size_text(source) << ", values " << source.min << " .. " << source.max;
 
@@ -145,6 +163,7 @@ void ImportCommand::run(std::ostream& out) const {
   write_new_file(to.preview, preview);
 
   line(out, "file", values.str(), spacing_.empty() ? "--spacing A,B,C for another voxel size" : "");
+  if (!note.empty()) line(out, "series", note, "--series for another");
   for (const ProposalLine& choice : proposal_lines(proposal)) {
     line(out, choice.what, choice.chosen, way_to_change(choice.what));
   }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <iosfwd>
 #include <string>
 
@@ -30,6 +31,9 @@ class ImportCommand {
 
   Arguments command_;
   std::string path_, out_, spacing_, window_, iso_, denoise_ = "auto";
+  std::string series_, dims_, type_ = "uint16";
+  std::int64_t skip_ = 0;
+  bool big_endian_ = false;
   int cpu_s_ = kReadCpuSeconds;
   bool force_ = false, keep_all_ = false, whole_ = false, packed_ = false;
 };
