@@ -147,6 +147,10 @@ std::string refusal(const fs::path& path, const ReadOptions& options) {
   return "no error";
 }
 
+bool same_values(const SourceVolume& volume, const std::vector<float>& values) {
+  return volume.values.visit([&](auto held) { return std::ranges::equal(held, values); });
+}
+
 bool is_one_line(const std::string& message) {
   return message.find('\n') == std::string::npos && message.find(": ") != std::string::npos &&
          message.find("; ") != std::string::npos;

@@ -103,6 +103,9 @@ struct DicomSpec {
 [[nodiscard]] std::string refusal(const std::filesystem::path& path,
                                   const ReadOptions& options = {});
 
+/// Whether a volume holds these, in their order.
+[[nodiscard]] bool same_values(const SourceVolume& volume, const std::vector<float>& values);
+
 /// What may stand for a one-line message: `place: value; way out`.
 [[nodiscard]] bool is_one_line(const std::string& message);
 
