@@ -15,9 +15,9 @@ namespace {
 
 constexpr double kMostSolid = 0.999;
 constexpr double kLeastIsoDensity = 0.25;  // as the CT tooth has it: half-way up to dentine
-// Linear. Bone and soft tissue as a neutral grey-brown scale; ivory where nothing has a name.
+// Linear; tuned by eye: a scale of grey-browns that takes nothing for enamel or pulp.
 constexpr std::array<double, 3> kBone{0.80, 0.74, 0.62}, kSoft{0.50, 0.40, 0.34},
-    kDenser{0.86, 0.83, 0.76};
+    kSofter{0.62, 0.56, 0.46}, kDenser{0.80, 0.76, 0.68};
 
 /// How often each density occurs, and which one stands at a share of them.
 class Densities {
@@ -124,7 +124,7 @@ std::vector<ProposedMaterial> materials_of(const VolumeProposal& proposal) {
     return {{"soft tissue", surface.skin, kSoft}, {"bone", proposal.iso, kBone}};
   }
   if (surface.hard && *surface.hard > proposal.iso) {
-    return {{"softer", proposal.iso, kBone}, {"denser", *surface.hard, kDenser}};
+    return {{"softer", proposal.iso, kSofter}, {"denser", *surface.hard, kDenser}};
   }
   return {{"body", proposal.iso, kBone}};
 }
