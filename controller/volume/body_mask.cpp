@@ -43,13 +43,15 @@ BodyMask::BodyMask(const VolumeImage& image, Density skin) {
   const auto count = [&](std::int32_t voxels) { return (voxels + edge_ - 1) / edge_; };
   grid_ = {count(from.nx), count(from.ny), count(from.nz)};
   std::vector<std::uint32_t> solid(grid_.voxel_count()), all(solid);
-  const Density* d = image.density.data();
   for (std::int32_t z = 0; z < from.nz; ++z) {
     for (std::int32_t y = 0; y < from.ny; ++y) {
-      for (std::int32_t x = 0; x < from.nx; ++x, ++d) {
+      const Density* const row = &image.density[from.index(0, y, z)];
+      for (std::int32_t x = 0; x < from.nx; x += edge_) {
+        const std::int32_t end = std::min(x + edge_, from.nx);
         const std::size_t cell = grid_.index(x / edge_, y / edge_, z / edge_);
-        ++all[cell];
-        if (*d >= skin) ++solid[cell];
+        all[cell] += static_cast<std::uint32_t>(end - x);
+        solid[cell] += static_cast<std::uint32_t>(
+            std::count_if(row + x, row + end, [skin](Density d) { return d >= skin; }));
       }
     }
   }

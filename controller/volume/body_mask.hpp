@@ -19,6 +19,9 @@ class BodyMask {
   [[nodiscard]] bool contains(std::int32_t x, std::int32_t y, std::int32_t z) const {
     return cells_[grid_.index(x / edge_, y / edge_, z / edge_)] != 0;
   }
+  /// Edge of a cell, in voxels: from a multiple of it on, so many along x are all inside or all
+  /// out.
+  [[nodiscard]] std::int32_t edge() const { return edge_; }
 
  private:
   std::int32_t edge_;

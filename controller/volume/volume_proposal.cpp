@@ -90,11 +90,14 @@ void take_away(const SolidParts& solid, const std::vector<bool>& keep, const Bod
     }
   }
   if (!outside) return;
-  Density* d = image.density.data();
   for (std::int32_t z = 0; z < grid.nz; ++z) {
     for (std::int32_t y = 0; y < grid.ny; ++y) {
-      for (std::int32_t x = 0; x < grid.nx; ++x, ++d) {
-        if (*d < iso && !body.contains(x, y, z)) *d = 0;
+      Density* const row = &image.density[grid.index(0, y, z)];
+      for (std::int32_t x = 0; x < grid.nx; x += body.edge()) {
+        if (body.contains(x, y, z)) continue;
+        const std::int32_t end = std::min(x + body.edge(), grid.nx);
+        std::replace_if(
+            row + x, row + end, [iso](Density d) { return d < iso; }, Density{0});
       }
     }
   }

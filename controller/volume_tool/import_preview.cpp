@@ -61,9 +61,10 @@ class Placed {
     return half;
   }
   [[nodiscard]] std::optional<std::size_t> nearest(const Point& voxel) const {
-    const VoxelIndex at{static_cast<std::int32_t>(std::lround(std::clamp(voxel[0], -1e6, 1e6))),
-                        static_cast<std::int32_t>(std::lround(std::clamp(voxel[1], -1e6, 1e6))),
-                        static_cast<std::int32_t>(std::lround(std::clamp(voxel[2], -1e6, 1e6)))};
+    const auto whole = [](double at) {
+      return static_cast<std::int32_t>(std::floor(std::clamp(at, -1e6, 1e6) + 0.5));
+    };
+    const VoxelIndex at{whole(voxel[0]), whole(voxel[1]), whole(voxel[2])};
     if (!frame_.grid.contains(at)) return std::nullopt;
     return frame_.grid.index(at.x, at.y, at.z);
   }
@@ -136,37 +137,43 @@ class Field {
 class Surface {
  public:
   Surface(const ProposedVolume& proposed, Density iso)
-      : field_(proposed.image), placed_(proposed.image), proposal_(proposed.proposal), iso_(iso) {
+      : image_(proposed.image),
+        field_(proposed.image),
+        placed_(proposed.image),
+        proposal_(proposed.proposal),
+        iso_(iso) {
     const VoxelBox& box = proposal_.solid;
     middle_ = placed_.mm(middle_of(box));
     reach_mm_ = vec3::length(placed_.half_mm(box.extent()));
-    step_mm_ = *std::ranges::min_element(proposed.image.spacing_mm) / 2;
-    step_mm_ = std::max(step_mm_, reach_mm_ / 512);  // never more than some 1000 steps
+    step_mm_ = *std::ranges::min_element(proposed.image.spacing_mm);
+    step_mm_ = std::max(step_mm_, reach_mm_ / 1024);  // never more than some 2000 steps
   }
   [[nodiscard]] Colour at(double right, double down) const {
-    const Point start =
-        middle_ + (right * reach_mm_) * right_ - (down * reach_mm_) * up_ - reach_mm_ * ahead_;
+    // In voxels a ray is as straight as in mm.
+    const Point start = placed_.voxel(middle_ + (right * reach_mm_) * right_ -
+                                      (down * reach_mm_) * up_ - reach_mm_ * ahead_);
+    const Point way = placed_.voxel(ahead_);
     for (double along = 0; along < 2 * reach_mm_; along += step_mm_) {
-      const auto near = placed_.nearest(placed_.voxel(start + along * ahead_));
-      if (!near || density(start + along * ahead_) < iso_) continue;
-      double outside = along - step_mm_, inside = along;
-      for (int halving = 0; halving < 5; ++halving) {
+      const auto near = placed_.nearest(start + along * way);
+      if (!near || image_.density[*near] < iso_) continue;
+      double outside = along - 2 * step_mm_, inside = along + step_mm_;
+      for (int halving = 0; halving < 6; ++halving) {
         const double between = (outside + inside) / 2;
-        (density(start + between * ahead_) < iso_ ? outside : inside) = between;
+        (field_.at(start + between * way) < iso_ ? outside : inside) = between;
       }
-      return shaded(start + inside * ahead_);
+      return shaded(start + inside * way);
     }
     return {0.05, 0.06, 0.08};
   }
 
  private:
-  [[nodiscard]] double density(const Point& mm) const { return field_.at(placed_.voxel(mm)); }
-  [[nodiscard]] Colour shaded(const Point& mm) const {
+  [[nodiscard]] Colour shaded(const Point& voxel) const {
     Point slope{};
     for (std::size_t i = 0; i < 3; ++i) {
-      Point way{};
-      way[i] = 2 * step_mm_;
-      slope[i] = density(mm + way) - density(mm - way);
+      Point mm{};
+      mm[i] = 2 * step_mm_;
+      const Point way = placed_.voxel(mm);
+      slope[i] = field_.at(voxel + way) - field_.at(voxel - way);
     }
     const double light = 0.15 + 0.85 * std::max(0.0, dot(unit(slope), ahead_));
     const Colour& c = proposal_.materials.back().name == "denser"
@@ -178,6 +185,7 @@ class Surface {
   // The source's frame is LPS: x to the left of a patient, y to the back, z up.
   const Point ahead_ = unit({-0.5, 1, -0.35}), right_ = unit(vec3::cross(ahead_, {0, 0, 1})),
               up_ = vec3::cross(right_, ahead_);
+  const VolumeImage& image_;
   Field field_;
   Placed placed_;
   const VolumeProposal& proposal_;
