@@ -106,7 +106,7 @@ broken() {
   grep -rnE --include='*.[ch]pp' 'system_clock|CLOCK_REALTIME|gettimeofday|timespec_get' \
     controller/servo controller/shell controller/device shared/segment \
     shared/posix/monotonic_clock.hpp || true
-  includes '<itk' "${programs[@]}" | grep -v '^controller/volume/foreign_volume.cpp:'
+  includes '<itk' "${programs[@]}" | grep -v '^controller/volume/foreign_[a-z]*\.[ch]pp:'
 }
 
 found=$(broken || true)

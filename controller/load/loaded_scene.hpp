@@ -28,8 +28,10 @@ struct SceneVolume {
   Pose pose;
   Density iso = 32768;
   bool solid = true;
-  Noise noise;            ///< that was found
-  int denoised = 0;       ///< passes that were made against it
+  Noise noise;                          ///< that was found
+  int denoised = 0;                     ///< passes that were made against it
+  std::vector<std::string> proposal{};  ///< of --volume: "what=chosen" for each choice
+  std::vector<Material> proposed{};     ///< the materials that belong to it
   bool enclosed = false;  ///< not cropped, solid at its border: a layer of air was laid around it
 };
 

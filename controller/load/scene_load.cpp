@@ -3,9 +3,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
+#include <iterator>
 #include <numbers>
 #include <optional>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "controller/load/felt_density.hpp"
 #include "controller/load/load_tool.hpp"
@@ -14,12 +18,15 @@
 #include "controller/scene/scene_file.hpp"
 #include "controller/scene/scene_text.hpp"
 #include "controller/volume/phantom.hpp"
+#include "controller/volume/spacing_check.hpp"
 #include "controller/volume/volume_crop.hpp"
 #include "controller/volume/volume_denoise.hpp"
 #include "controller/volume/volume_density.hpp"
 #include "controller/volume/volume_io.hpp"
 #include "controller/volume/volume_limits.hpp"
 #include "controller/volume/volume_noise.hpp"
+#include "controller/volume/volume_proposal.hpp"
+#include "controller/volume/volume_write.hpp"
 
 namespace kerf {
 namespace {
@@ -88,24 +95,53 @@ void apply_overrides(const SceneOverrides& overrides, Scene& scene) {
   if (scene.cut_in_one_tick) scene.cut.rate_per_s = scene.servo.rate_hz;
 }
 
-VolumeImage load_image(const VolumeSpec& spec, const std::filesystem::path& folder, int cpu_s) {
-  if (is_phantom(spec)) {
-    return make_phantom(
-        {.shape = spec.shape, .grid = spec.phantom_size.value_or(PhantomSpec{}.grid)});
+/// Takes what is proposed for a volume of which the scene says nothing.
+void propose(const SourceVolume& source, const VolumeSpec& spec, SceneVolume& volume) {
+  ProposalWishes wishes;
+  if (spec.window) wishes.window = {(*spec.window)[0], (*spec.window)[1]};
+  ProposedVolume proposed = propose_volume(std::move(volume.image), range_window(source), wishes);
+  const VolumeProposal& proposal = proposed.proposal;
+  volume.image = std::move(proposed.image);
+  volume.iso = nearest_density(proposal.density_of(proposal.iso) * kDensityMax);
+  for (const ProposedMaterial& material : proposal.materials) {
+    volume.proposed.push_back({.name = material.name,
+                               .iso = proposal.density_of(material.from),
+                               .colour = material.colour});
   }
-  const std::filesystem::path path = folder / spec.file;
-  const SourceVolume source = read_volume(path, {.spacing_mm = spec.spacing_mm, .cpu_s = cpu_s});
-  const Window window =
-      spec.window ? Window{(*spec.window)[0], (*spec.window)[1]} : range_window(source);
-  VolumeImage image = apply_window(source, window);
-  read_labels_beside(path, image, cpu_s);
-  return image;
+  for (const ProposalLine& line : proposal_lines(proposal)) {
+    volume.proposal.push_back(line.what + "=" + line.chosen);
+  }
+  const std::string odd = odd_spacing(source, proposal.solid, proposal.surface.hounsfield);
+  if (!odd.empty() && !spec.spacing_mm) volume.proposal.push_back("spacing=" + odd + "; --spacing");
+}
+
+/// The image of a volume and the density of its surface. `unknown`: the scene says nothing of it.
+void load_image(const VolumeSpec& spec, const std::filesystem::path& folder, bool unknown,
+                int cpu_s, SceneVolume& volume) {
+  if (is_phantom(spec)) {
+    volume.image =
+        make_phantom({.shape = spec.shape, .grid = spec.phantom_size.value_or(PhantomSpec{}.grid)});
+  } else {
+    const std::filesystem::path path = folder / spec.file;
+    const SourceVolume source = read_volume(path, {.spacing_mm = spec.spacing_mm, .cpu_s = cpu_s});
+    const bool proposing = unknown && !std::filesystem::exists(labels_path(path));
+    volume.image = apply_window(source, spec.window && !proposing
+                                            ? Window{(*spec.window)[0], (*spec.window)[1]}
+                                            : range_window(source));
+    if (proposing) return propose(source, spec, volume);
+    read_labels_beside(path, volume.image, cpu_s);
+  }
+  volume.iso = spec.iso ? nearest_density(*spec.iso * kDensityMax) : otsu_threshold(volume.image);
+}
+
+bool none_is_labelled(const LoadedScene& scene) {
+  return std::ranges::all_of(scene.volumes,
+                             [](const SceneVolume& volume) { return volume.image.labels.empty(); });
 }
 
 /// A surface of a material's own needs to know where the material is.
 void check_felt_materials(const LoadedScene& scene) {
-  const auto labelled = [](const SceneVolume& volume) { return !volume.image.labels.empty(); };
-  if (std::any_of(scene.volumes.begin(), scene.volumes.end(), labelled)) return;
+  if (!none_is_labelled(scene)) return;
   for (const Material& material : scene.materials) {
     if (!material.felt_iso) continue;
     refuse(scene.path, ": material " + material.name +
@@ -147,19 +183,14 @@ void denoise_volume(const VolumeSpec& spec, SceneVolume& volume) {
   volume.denoised = spec.denoise == Denoise::automatic ? passes_for(volume.noise)
                                                        : static_cast<int>(spec.denoise);
   if (volume.denoised == 0) return;
-  // Only what the crop keeps, and what reaches into it. Labels may make solid what is softer.
-  const VoxelBox solid = solid_box(image, volume.iso);
-  if (spec.crop && image.labels.empty() && !solid.empty()) {
-    image = crop(image, solid.grown(kGuardVoxels + volume.denoised * kDenoiseReach)
-                            .clipped(image.grid.box().grown(kGuardVoxels)));
-  } else {
-    image = enclosed_in_air(std::move(image), volume.iso);
-  }
+  // Labels may make solid what is softer.
+  image = spec.crop && image.labels.empty() ? crop_for_passes(image, volume.iso, volume.denoised)
+                                            : enclosed_in_air(std::move(image), volume.iso);
   denoise(image.grid, image.density, volume.denoised);
 }
 
 /// `felt_at`: the iso that the materials' `felt_iso` were written for; none: that of the volume.
-SceneVolume load_volume(const VolumeSpec& spec, const std::filesystem::path& folder,
+SceneVolume load_volume(const VolumeSpec& spec, const std::filesystem::path& folder, bool unknown,
                         const std::vector<Material>& materials, std::optional<double> felt_at,
                         int cpu_s) {
   SceneVolume volume;
@@ -167,10 +198,8 @@ SceneVolume load_volume(const VolumeSpec& spec, const std::filesystem::path& fol
   volume.file = spec.file;
   volume.solid = spec.solid;
   try {
-    volume.image = load_image(spec, folder, cpu_s);
+    load_image(spec, folder, unknown, cpu_s, volume);
     check_labels(volume.image, materials.size());
-    volume.iso = spec.iso ? static_cast<Density>(std::lround(*spec.iso * kDensityMax))
-                          : otsu_threshold(volume.image);
     const VoxelGrid whole = volume.image.grid;
     denoise_volume(spec, volume);
     scale_to_felt_iso(materials, felt_at ? nearest_density(*felt_at * kDensityMax) : volume.iso,
@@ -195,6 +224,17 @@ SceneVolume load_volume(const VolumeSpec& spec, const std::filesystem::path& fol
   return volume;
 }
 
+/// Where no voxel has a label, nobody knows of enamel or pulp: what is left is what the scene says
+/// of densities, or, of a volume of --volume, what was proposed.
+void leave_unlabelled_materials(bool of_command_line, LoadedScene& scene) {
+  const auto first = scene.materials.begin() + 1;
+  const auto left = std::remove_if(first, scene.materials.end(), [&](const Material& material) {
+    return of_command_line || !material.in_scene;
+  });
+  scene.materials.erase(left, scene.materials.end());
+  std::ranges::copy(scene.volumes.front().proposed, std::back_inserter(scene.materials));
+}
+
 /// Moves the materials' densities so that what began at the surface `from` begins at `to`; air and
 /// full density stay where they are.
 void move_materials(double from, double to, std::vector<Material>& materials) {
@@ -213,7 +253,7 @@ void fit_cutting(double grown, double scale, LoadedScene& scene) {
   scene.spindle.inertia_g_mm2 *= grown / scale;  // runs up in the same time
 }
 
-/// Fits a scene to the volume of --volume; what is done is told in the header.
+/// Fits a scene to its first volume; what is done is told in the header.
 void fit_to_volume(double written_mm, Scene& spec, LoadedScene& scene) {
   const double grown = touched_volumes(scene.volumes).voxel_mm / written_mm;
   for (ToolSpec& tool : spec.tools) {
@@ -232,9 +272,9 @@ void fit_to_volume(double written_mm, Scene& spec, LoadedScene& scene) {
     scale = std::max(scale, (box.hi_mm[axis] - box.lo_mm[axis]) / kWorkspaceMm[axis]);
   }
   if (scale > kMaxWorkspaceScale) {
-    refuse("--volume", ": the box needs a workspace scale of " + short_text(scale) +
-                           ", above the limit of " + number_text(kMaxWorkspaceScale) +
-                           "; check --spacing");
+    refuse(scene.volume_specs.front().where,
+           ": the box needs a workspace scale of " + short_text(scale) + ", above the limit of " +
+               number_text(kMaxWorkspaceScale) + "; check its spacing");
   }
   scene.device.workspace_scale = scale;
   fit_cutting(grown, scale, scene);
@@ -244,7 +284,8 @@ void fit_to_volume(double written_mm, Scene& spec, LoadedScene& scene) {
 
 LoadedScene load_scene(const std::filesystem::path& path, const SceneOverrides& overrides) {
   Scene spec = parse_scene_file(path, overrides.settings);
-  const double written_mm = written_voxel_mm(spec.volumes.front());
+  const double written_mm =
+      spec.device.fit ? kPhantomVoxelMm : written_voxel_mm(spec.volumes.front());
   const std::optional<double> written_iso = spec.volumes.front().iso;
   apply_overrides(overrides, spec);
 
@@ -253,13 +294,16 @@ LoadedScene load_scene(const std::filesystem::path& path, const SceneOverrides& 
   scene.volume_specs = spec.volumes;
   for (std::size_t i = 0; i < spec.volumes.size(); ++i) {
     const bool from_command_line = i == 0 && overrides.volume_file;
-    scene.volumes.push_back(
-        load_volume(spec.volumes[i], from_command_line ? "" : path.parent_path(), scene.materials,
-                    from_command_line ? written_iso : std::nullopt, overrides.read_cpu_s));
+    scene.volumes.push_back(load_volume(
+        spec.volumes[i], from_command_line ? "" : path.parent_path(), from_command_line,
+        scene.materials, from_command_line ? written_iso : std::nullopt, overrides.read_cpu_s));
   }
   check_felt_materials(scene);
-  if (overrides.volume_file) {
-    fit_to_volume(written_mm, spec, scene);
+  const bool fitted = overrides.volume_file.has_value() || spec.device.fit;
+  if (fitted) fit_to_volume(written_mm, spec, scene);
+  if (none_is_labelled(scene)) {
+    leave_unlabelled_materials(overrides.volume_file.has_value(), scene);
+  } else if (overrides.volume_file) {
     if (written_iso && *written_iso > 0 && *written_iso < 1) {
       move_materials(*written_iso, scene.volumes.front().iso / kDensityMax, scene.materials);
     }
@@ -272,12 +316,13 @@ LoadedScene load_scene(const std::filesystem::path& path, const SceneOverrides& 
       scene.tool_specs.back().size.pitch_mm = scene.tools.back().pitch_mm;
       scene.tool_specs.back().size.radius_mm = scene.tools.back().radius_mm;
     } catch (const SceneError&) {
-      // A spare tool of the scene that does not fit a volume of --volume is nobody's mistake.
-      if (!overrides.volume_file || scene.tools.empty()) throw;
+      // A spare tool of the scene that does not fit a volume that it was fitted to is nobody's
+      // mistake.
+      if (!fitted || scene.tools.empty()) throw;
     }
   }
 
-  if (overrides.volume_file) {
+  if (fitted) {
     const double scale = scene.device.workspace_scale;
     const double weaker =
         kReferenceRadiusMm / (scale * scale * scene.tools[scene.active_tool].radius_mm);

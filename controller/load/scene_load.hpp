@@ -43,12 +43,15 @@ inline constexpr std::array<double, 3> kWorkspaceMm = {100.0, 80.0, 60.0};
 ///
 /// With `volume_file` the first volume is replaced by that one, and the scene is fitted to it, so
 /// that any CT can be felt with the hand scripts of the default scene:
-/// - window from its range unless overridden, iso by Otsu, spacing from the file unless overridden;
-///   denoise, pose and crop as in the scene;
+/// - iso, window, materials and what is taken away as `propose_volume` has it, which a window of
+/// the
+///   options overrides; of a volume with labels: iso by Otsu, window from its range. Spacing from
+///   the file unless overridden; denoise, pose and crop as in the scene;
 /// - tools keep their size in voxels: lengths are scaled by the new over the old voxel edge (old:
 ///   the scene's spacing_mm, or that of the phantom);
-/// - the materials' densities move with the surface: what begins at the scene's iso begins at the
-///   new one;
+/// - where it has labels, the materials' densities move with the surface: what begins at the
+/// scene's
+///   iso begins at the new one;
 /// - spare tools (all but the first) that do not fit the volume are left out;
 /// - workspace_scale s is such that its box, after cropping and in world axes, fits kWorkspaceMm;
 ///   the offset is found as above;
@@ -58,6 +61,10 @@ inline constexpr std::array<double, 3> kWorkspaceMm = {100.0, 80.0, 60.0};
 ///   device port as it stands;
 /// - a tool g times as large takes g^3 as much at the same force of the hand: machinability is
 ///   multiplied by s g^3, the threshold by 1/s, the spindle's stall torque and inertia by g/s.
+///
+/// `device.fit` fits a scene to its own first volume in the same way; its sizes were written for
+/// voxels of 0.125 mm. Where no volume has labels, only the materials that the scene names are
+/// left.
 [[nodiscard]] LoadedScene load_scene(const std::filesystem::path& path, const SceneOverrides& = {});
 
 /// Stiffness in N/mm at the device port: of the coupling to the proxy; of the paper's force when

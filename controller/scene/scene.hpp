@@ -92,6 +92,7 @@ inline constexpr double kReferenceSpeedKrpm = 300;
 /// A [[material]]; its place in the list is the label of its voxels.
 struct Material {
   std::string name;
+  bool in_scene = false;                         ///< the scene's text names it
   double iso = 0.5;                              ///< density, 0..1
   std::optional<double> felt_iso{};              ///< where its surface lies; none: volume's iso
   double machinability = 1.0;                    ///< removal rate over that of enamel
@@ -120,6 +121,7 @@ inline constexpr int kMostDenoise =
 struct DeviceSettings {
   Personality personality = Personality::omni;
   double workspace_scale = 1.0;  ///< x_scene = scale * x_device
+  bool fit = false;              ///< the first volume tells the scale
   std::array<double, 3> offset_mm{0, 0, 0};
   std::optional<std::array<double, 3>> torque_scale;  ///< none: the motors stay off
   std::array<double, 3> dock_rad{0.0, 0.23, -0.37};

@@ -80,6 +80,7 @@ void read_lists(const SceneTables& tables, SceneParts& parts) {
     table.read(parts);
     table.read_conditional(parts);
     material = parts.material;
+    material.in_scene = true;
   }
 }
 

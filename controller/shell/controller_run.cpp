@@ -167,6 +167,19 @@ void name_law_faults(const LoadedScene& scene, const EventList& faults) {
   }
 }
 
+/// What was chosen for a volume of which nobody said anything: now, not with the summary.
+void tell_proposal(const LoadedScene& scene) {
+  for (const SceneVolume& volume : scene.volumes) {
+    for (std::string choice : volume.proposal) {
+      choice.replace(choice.find('='), 1, " ");
+      std::fprintf(stderr, "kerf: %s: %s\n", volume.name.c_str(), choice.c_str());
+    }
+    if (volume.proposal.empty()) continue;
+    std::fprintf(stderr, "kerf: %s: ./kerf volume import %s writes a scene with other choices\n",
+                 volume.name.c_str(), volume.file.c_str());
+  }
+}
+
 }  // namespace
 
 int run_controller(const ControllerOptions& options) {
@@ -191,6 +204,7 @@ int run_controller(const ControllerOptions& options) {
     return 0;
   }
   check_run(options, scene, servo->costs());
+  tell_proposal(scene);
 
   const std::string json = canonical_json(scene);
   RunReport report = new_report(options, scene, fnv1a(json));

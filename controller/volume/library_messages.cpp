@@ -35,6 +35,10 @@ std::string last_line(const std::string& message) {
   if (object != std::string::npos) last.erase(0, object + 3);
   const std::size_t biff = last.find("] ");  // "[nrrd] function: text"
   if (last.front() == '[' && biff != std::string::npos) last.erase(0, biff + 2);
+  if (last.starts_with("_nrrd") || last.starts_with("nrrd")) {  // "_nrrdReadNrrdParse_type: text"
+    const std::size_t step = last.find(": ");
+    if (step != std::string::npos) last.erase(0, step + 2);
+  }
   return last;
 }
 

@@ -7,6 +7,9 @@
 #include <cstdint>
 #include <vector>
 
+#include "controller/volume/volume_crop.hpp"
+#include "controller/volume/volume_density.hpp"
+
 namespace kerf {
 namespace {
 
@@ -103,6 +106,13 @@ void denoise_once(const VoxelGrid& grid, std::span<Density> density) {
 
 void denoise(const VoxelGrid& grid, std::span<Density> density, int passes) {
   for (int i = 0; i < passes; ++i) denoise_once(grid, density);
+}
+
+VolumeImage crop_for_passes(const VolumeImage& image, Density iso, int passes) {
+  const VoxelBox solid = solid_box(image, iso);
+  if (solid.empty()) return image;
+  return crop(image, solid.grown(kGuardVoxels + passes * kDenoiseReach)
+                         .clipped(image.grid.box().grown(kGuardVoxels)));
 }
 
 }  // namespace kerf

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <span>
 
-#include "shared/volume/voxel_grid.hpp"
+#include "controller/volume/volume_image.hpp"
 
 namespace kerf {
 
@@ -23,5 +23,9 @@ inline constexpr std::int32_t kDenoiseReach = 4;
 /// is rounded to 1/128 of a step of density, the pass to a whole one, and held within 0..65535.
 /// Where the density is even over 4 voxels, no bit changes. Load time; takes 13 planes of 32 bits.
 void denoise(const VoxelGrid& grid, std::span<Density> density, int passes);
+
+/// What a crop to the solid keeps and, around it, what so many passes carry into that. The image as
+/// it is where nothing is solid.
+[[nodiscard]] VolumeImage crop_for_passes(const VolumeImage& image, Density iso, int passes);
 
 }  // namespace kerf

@@ -4,9 +4,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
+#include <span>
 #include <sstream>
+#include <type_traits>
+#include <vector>
 
 #include "controller/scene/scene_error.hpp"
+#include "controller/volume/otsu.hpp"
 
 namespace kerf {
 
@@ -31,8 +36,17 @@ VolumeImage apply_window(const SourceVolume& source, Window window) {
   static_cast<VolumeFrame&>(image) = source;
   image.density.resize(source.values.size());
   const double scale = kDensityMax / width;
-  std::transform(source.values.begin(), source.values.end(), image.density.begin(), [&](float v) {
-    return nearest_density((static_cast<double>(v) - window.lo) * scale);
+  const auto density = [&](double value) { return nearest_density((value - window.lo) * scale); };
+  source.values.visit([&]<class T>(std::span<const T> values) {
+    if constexpr (std::is_same_v<T, float>) {
+      std::ranges::transform(values, image.density.begin(),
+                             [&](float v) { return density(static_cast<double>(v)); });
+    } else {  // the same, each of the 65536 values once
+      std::vector<Density> of(std::size_t{1} << 16);
+      for (std::size_t i = 0; i < of.size(); ++i) of[i] = density(static_cast<T>(i));
+      std::ranges::transform(values, image.density.begin(),
+                             [&](T v) { return of[static_cast<std::uint16_t>(v)]; });
+    }
   });
   return image;
 }
@@ -43,31 +57,7 @@ Density otsu_threshold(const VolumeImage& image) {
   std::array<double, 1 << kBinBits> count{};
   for (const Density d : image.density) count[d >> kShift] += 1.0;
 
-  double total = 0.0;
-  double total_sum = 0.0;
-  for (std::size_t bin = 0; bin < count.size(); ++bin) {
-    total += count[bin];
-    total_sum += count[bin] * static_cast<double>(bin);
-  }
-  // Both ends of the range of best thresholds; counts are whole, so equal parts compare equal.
-  double best = 0.0;
-  std::size_t first = count.size() / 2;
-  std::size_t last = first;
-  double below = 0.0;
-  double below_sum = 0.0;
-  for (std::size_t bin = 1; bin < count.size(); ++bin) {  // classes: [0, bin) and [bin, end)
-    below += count[bin - 1];
-    below_sum += count[bin - 1] * static_cast<double>(bin - 1);
-    if (below == 0.0 || below == total) continue;
-    const double distance = below_sum / below - (total_sum - below_sum) / (total - below);
-    const double between = below * (total - below) * distance * distance;
-    if (between > best) {
-      best = between;
-      first = bin;
-    }
-    if (between == best) last = bin;
-  }
-  return static_cast<Density>(((first + last) << kShift) / 2);
+  return static_cast<Density>(otsu_split(count).bin * (1 << kShift));
 }
 
 VoxelBox solid_box(const VolumeImage& image, Density iso) noexcept {

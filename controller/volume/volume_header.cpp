@@ -9,7 +9,6 @@
 #include <fstream>
 #include <iomanip>
 #include <map>
-#include <memory>
 #include <new>
 #include <sstream>
 #include <string_view>
@@ -20,6 +19,7 @@
 #include <zlib.h>
 
 #include "controller/scene/scene_error.hpp"
+#include "controller/volume/gz_file.hpp"
 #include "controller/volume/volume_limits.hpp"
 
 namespace kerf {
@@ -149,17 +149,13 @@ void check_units(const fs::path& path, const TextHeader& text) {
   }
 }
 
-struct CloseGz {
-  void operator()(gzFile file) const noexcept { gzclose(file); }
-};
-
 /// Unpacks what follows `offset` to its end, where its checksum is: NrrdIO stops at the last voxel
 /// that it wants, and so takes a broken stream that became longer for a good one.
 void check_gzip(const fs::path& data, std::uint64_t offset) {
   const int fd = ::open(data.c_str(), O_RDONLY | O_CLOEXEC);
   if (fd < 0) return;  // NrrdIO says so
   ::lseek(fd, static_cast<off_t>(offset), SEEK_SET);
-  const std::unique_ptr<gzFile_s, CloseGz> file(gzdopen(fd, "rb"));
+  const volume::GzFile file(gzdopen(fd, "rb"));
   if (!file) throw std::bad_alloc();
   std::vector<char> piece(std::size_t{1} << 20);
   int got = 0;

@@ -35,9 +35,9 @@ using volume::VolumeClaim, volume::VolumeKind;
                        beside.filename().string() + " instead");
     }
   }
-  throw SceneError(path.string() +
-                   ": voxels without a header; write a .nhdr or .mhd beside it that tells size, "
-                   "type and spacing, and name that");
+  throw SceneError(path.string() + ": " + std::to_string(fs::file_size(path)) +
+                   " bytes without a header; ./kerf volume import takes it with --dims NXxNYxNZ "
+                   "--type uint16 --spacing x,y,z");
 }
 
 struct Kind {
@@ -45,13 +45,25 @@ struct Kind {
   const char* name;
 };
 
-Kind kind_of(const fs::path& path) {
+/// What a folder holds, by the names of its files.
+Kind kind_of_folder(const std::vector<fs::path>& files) {
+  std::size_t png = 0, tiff = 0;
+  for (const fs::path& file : files) {
+    const std::string end = lower(file.extension().string());
+    png += end == ".png" ? 1 : 0;
+    tiff += end == ".tif" || end == ".tiff" ? 1 : 0;
+  }
+  if (2 * std::max(png, tiff) <= files.size()) return {VolumeKind::dicom_series, "DICOM"};
+  return png >= tiff ? Kind{VolumeKind::png_stack, "PNG"} : Kind{VolumeKind::tiff_stack, "TIFF"};
+}
+
+Kind kind_of(const fs::path& path, const std::vector<fs::path>& folder, bool raw) {
   std::error_code fault;
   const fs::file_status status = fs::status(path, fault);
   if (!fs::exists(status)) {
     throw SceneError(path.string() + ": no such file or folder; check the path");
   }
-  if (fs::is_directory(status)) return {VolumeKind::dicom_series, "DICOM"};
+  if (fs::is_directory(status)) return kind_of_folder(folder);
   if (!fs::is_regular_file(status)) {
     throw SceneError(path.string() +
                      ": a pipe, socket or device; copy what it gives to a file, and name that");
@@ -60,11 +72,13 @@ Kind kind_of(const fs::path& path) {
     throw SceneError(path.string() + ": cannot be read (" + std::generic_category().message(errno) +
                      "); check its permissions");
   }
+  if (raw) return {VolumeKind::raw, "raw voxels"};
   const std::string name = lower(path.filename().string());
   constexpr std::pair<const char*, Kind> kEnds[] = {
       {".nrrd", {VolumeKind::nrrd, "NRRD"}},      {".nhdr", {VolumeKind::nrrd, "NRRD"}},
       {".mha", {VolumeKind::meta, "MetaImage"}},  {".mhd", {VolumeKind::meta, "MetaImage"}},
       {".nii", {VolumeKind::nifti, "NIfTI"}},     {".nii.gz", {VolumeKind::nifti, "NIfTI"}},
+      {".tif", {VolumeKind::tiff, "TIFF"}},       {".tiff", {VolumeKind::tiff, "TIFF"}},
       {".dcm", {VolumeKind::dicom_file, "DICOM"}}};
   for (const auto& [end, kind] : kEnds) {
     if (name.ends_with(end)) return kind;
@@ -72,23 +86,59 @@ Kind kind_of(const fs::path& path) {
   if (name.ends_with(".raw")) refuse_raw(path);
   throw SceneError(path.string() +
                    ": not a kind of volume that kerf reads; use .nrrd .nhdr .mha .mhd .nii .nii.gz "
-                   ".dcm or a folder with a DICOM series");
+                   ".tif .dcm, a folder of DICOM, PNG or TIFF slices, or --dims of kerf volume "
+                   "import");
 }
 
-/// The regular files of a folder by their names; none where `path` is no folder.
+/// Runs of digits count as numbers: slice2 comes before slice10.
+bool in_natural_order(const std::string& a, const std::string& b) {
+  const auto digit = [](char c) { return c >= '0' && c <= '9'; };
+  for (std::size_t i = 0, j = 0; i < a.size() && j < b.size();) {
+    if (!digit(a[i]) || !digit(b[j])) {
+      if (a[i] != b[j]) return a[i] < b[j];
+      ++i;
+      ++j;
+      continue;
+    }
+    const auto number = [&](const std::string& text, std::size_t& at) {
+      while (at < text.size() && text[at] == '0') ++at;
+      const std::size_t first = at;
+      while (at < text.size() && digit(text[at])) ++at;
+      return text.substr(first, at - first);
+    };
+    const std::string x = number(a, i), y = number(b, j);
+    if (x.size() != y.size()) return x.size() < y.size();
+    if (x != y) return x < y;
+  }
+  return a.size() != b.size() ? a.size() < b.size() : a < b;
+}
+
+/// The regular files of a folder in the order of their names, or, where there is none but an index,
+/// those of its folders, as on a disc of DICOM; none where `path` is no folder.
 std::vector<fs::path> files_in(const fs::path& path) {
-  std::vector<fs::path> files;
+  constexpr int kDeepest = 5;
+  constexpr std::size_t kMostFiles = 20000;
+  std::vector<fs::path> files, below;
   std::error_code fault;
   if (!fs::is_directory(path, fault)) return files;
-  for (const fs::directory_entry& entry : fs::directory_iterator(path, fault)) {
-    const bool index = entry.path().filename() == "DICOMDIR";
-    if (!index && entry.is_regular_file(fault)) files.push_back(entry.path());
+  for (fs::recursive_directory_iterator entry(path, fault), end; !fault && entry != end;
+       entry.increment(fault)) {
+    if (entry.depth() >= kDeepest) entry.disable_recursion_pending();
+    const bool index = entry->path().filename() == "DICOMDIR";
+    std::error_code gone;
+    if (index || !entry->is_regular_file(gone)) continue;
+    (entry.depth() == 0 ? files : below).push_back(entry->path());
+    if (files.size() + below.size() > kMostFiles) {
+      throw SceneError(path.string() + ": more than " + std::to_string(kMostFiles) +
+                       " files; name the folder that holds the slices");
+    }
   }
   if (fault && files.empty()) {
     throw SceneError(path.string() + ": cannot be listed (" + fault.message() +
                      "); check its permissions");
   }
-  std::sort(files.begin(), files.end());  // the order in which a folder lists is chance
+  if (files.empty()) files = std::move(below);
+  std::ranges::sort(files, in_natural_order, [](const fs::path& file) { return file.string(); });
   return files;
 }
 
@@ -109,31 +159,46 @@ std::size_t accept(const fs::path& path, const ReadOptions& options, const Volum
   volume::set_grid(path, claim.size, source);
   volume::set_spacing(path, options, claim.has_spacing != 0, claim.spacing_mm, source);
   volume::set_origin(path, claim.origin_mm, source);
-  const std::uint64_t each = std::clamp<std::uint64_t>(claim.voxel_bytes, sizeof(float), 8);
+  const std::uint64_t each = std::clamp<std::uint64_t>(claim.voxel_bytes, bytes_of(claim.kind), 8);
   return source.grid.voxel_count() * each;
+}
+
+/// On one line of a terminal.
+std::string note_of(const VolumeClaim& claim) {
+  std::string note(claim.note.begin(), std::ranges::find(claim.note, '\0'));
+  const auto control = [](char c) { return static_cast<unsigned char>(c) < ' ' || c == '\x7f'; };
+  std::ranges::replace_if(note, control, ' ');
+  return note;
 }
 
 }  // namespace
 
 SourceVolume read_volume(const fs::path& path, const ReadOptions& options) {
-  const Kind kind = kind_of(path);
   const std::vector<fs::path> folder = files_in(path);
+  const Kind kind = kind_of(path, folder, options.raw.has_value());
   SourceVolume source;
   VolumeClaim claim;
   SharedBytes memory = read_in_sandbox(
       {path.string(), kind.name, largest_bytes(folder.empty() ? std::vector{path} : folder),
        options.cpu_s},
       [&](SandboxReader& sandbox) {
-        volume::read_foreign_volume(path, kind.kind, folder, sandbox);
+        if (kind.kind == VolumeKind::raw) {
+          return volume::read_raw(path, *options.raw, [&](const VolumeClaim& raw) {
+            return sandbox.offer(std::as_bytes(std::span(&raw, 1)));
+          });
+        }
+        volume::read_foreign_volume(path, kind.kind, folder, options.series, sandbox);
       },
       [&](std::span<const std::byte> header) {
         if (header.size() != sizeof claim) {
           throw SceneError(path.string() + ": its reader says nothing of its size; copy it again");
         }
         std::memcpy(&claim, header.data(), sizeof claim);
+        if (claim.kind > ValueKind::uint16) claim.kind = ValueKind::float32;
         return accept(path, options, claim, source);
       });
-  source.values = {reinterpret_cast<float*>(memory.bytes().data()), source.grid.voxel_count()};
+  source.values = VoxelValues(memory.bytes(), claim.kind, source.grid.voxel_count());
+  source.note = note_of(claim);
   source.memory = std::move(memory);
   volume::set_range(path, source);
   volume::set_frame(path, claim.axes[0], claim.axes[1], claim.axes[2], source);
@@ -153,9 +218,11 @@ void read_labels_beside(const fs::path& volume_path, VolumeImage& image, int cpu
     throw SceneError(path.string() + ": labels do not fit " + volume_path.filename().string() +
                      " (same size, values 0..255); remove or rename them");
   }
-  image.labels.assign(source.values.size(), 0);
-  std::transform(source.values.begin(), source.values.end(), image.labels.begin(),
-                 [](float v) { return static_cast<Label>(v); });
+  image.labels.resize(source.values.size());
+  source.values.visit([&](auto values) {
+    std::ranges::transform(values, image.labels.begin(),
+                           [](auto v) { return static_cast<Label>(v); });
+  });
 }
 
 }  // namespace kerf

@@ -5,10 +5,13 @@
 #include <filesystem>
 #include <optional>
 #include <span>
+#include <string>
 
 #include "controller/sandbox/sandbox.hpp"
 #include "controller/sandbox/shared_bytes.hpp"
+#include "controller/volume/raw_layout.hpp"
 #include "controller/volume/volume_image.hpp"
+#include "controller/volume/voxel_values.hpp"
 
 namespace kerf {
 
@@ -18,7 +21,8 @@ namespace kerf {
 /// read with its last axis reversed, so the picture is the same and the axes are right-handed.
 struct SourceVolume : VolumeFrame {
   bool has_spacing = true;  ///< false: neither the file nor the options name one; 1 mm stands in
-  std::span<float> values;  ///< in `memory`
+  VoxelValues values;       ///< in `memory`
+  std::string note;         ///< what was chosen among several, or empty
   double min = 0, max = 0;
   SharedBytes memory;
 };
@@ -27,10 +31,14 @@ struct ReadOptions {
   std::optional<std::array<double, 3>> spacing_mm;  ///< goes before what the file says
   bool allow_missing_spacing = false;               ///< for a first look; see `has_spacing`
   int cpu_s = kReadCpuSeconds;                      ///< CPU time that parsing may take
+  std::string series{};            ///< of several in a folder: its number or a part of its name
+  std::optional<RawLayout> raw{};  ///< of a file without a header
 };
 
-/// Reads NRRD (.nrrd, .nhdr), MetaImage (.mha, .mhd), NIfTI (.nii, .nii.gz), one DICOM file (.dcm)
-/// or the one DICOM series in a folder. Integer and floating types, either byte order.
+/// Reads NRRD (.nrrd, .nhdr), MetaImage (.mha, .mhd), NIfTI (.nii, .nii.gz), TIFF of several pages,
+/// one DICOM file (.dcm), a DICOM series or a stack of PNG or TIFF slices in a folder, and, where
+/// the options tell its layout, a file without a header. Integer and floating types, either byte
+/// order.
 ///
 /// Parsed in a sandbox (controller/sandbox/sandbox.hpp), whatever the file does there; what it says
 /// of itself is checked here.

@@ -3,12 +3,12 @@
 #include <array>
 #include <bit>
 #include <cmath>
-#include <memory>
 #include <vector>
 
 #include <zlib.h>
 
 #include "controller/scene/scene_error.hpp"
+#include "controller/volume/gz_file.hpp"
 #include "controller/volume/volume_header.hpp"
 #include "controller/volume/volume_limits.hpp"
 
@@ -16,10 +16,7 @@ namespace kerf {
 namespace fs = std::filesystem;
 namespace {
 
-struct CloseGz {
-  void operator()(gzFile file) const noexcept { gzclose(file); }
-};
-using GzFile = std::unique_ptr<gzFile_s, CloseGz>;
+using volume::GzFile;
 
 /// Bytes of a header in the byte order of the file.
 class Fields {

@@ -5,7 +5,9 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <span>
 #include <sstream>
+#include <type_traits>
 
 #include "controller/scene/scene_error.hpp"
 #include "controller/volume/volume_header.hpp"
@@ -29,14 +31,12 @@ void set_frame(const fs::path& path, Place x, Place y, Place z, SourceVolume& vo
   y = unit(y - dot(x, y) * x);
   const Place right_handed = cross(x, y);
   if (dot(right_handed, z) < 0.0) {
-    const std::size_t layer =
-        static_cast<std::size_t>(volume.grid.nx) * static_cast<std::size_t>(volume.grid.ny);
-    auto low = volume.values.begin();
-    auto high = volume.values.end();
-    for (; high - low >= static_cast<std::ptrdiff_t>(2 * layer);
-         low += static_cast<std::ptrdiff_t>(layer)) {
-      high -= static_cast<std::ptrdiff_t>(layer);
-      std::swap_ranges(low, low + static_cast<std::ptrdiff_t>(layer), high);
+    const auto layer = static_cast<std::ptrdiff_t>(volume.values.bytes().size()) / volume.grid.nz;
+    auto low = volume.values.bytes().begin();
+    auto high = volume.values.bytes().end();
+    for (; high - low >= 2 * layer; low += layer) {
+      high -= layer;
+      std::swap_ranges(low, low + layer, high);
     }
     const double depth_mm = volume.spacing_mm[2] * (volume.grid.nz - 1);
     volume.origin_mm = volume.origin_mm - depth_mm * right_handed;
@@ -93,13 +93,16 @@ std::vector<double> dicom_distances(std::string_view text) {
   return distances;
 }
 
-void set_range(const fs::path& path, SourceVolume& volume) {
+namespace {
+
+/// Of floats, which may be no numbers.
+void set_float_range(const fs::path& path, std::span<const float> values, SourceVolume& volume) {
   float min = std::numeric_limits<float>::infinity();
   float max = -min;
   std::uint64_t bad = 0;
   std::uint64_t first_bad = 0;
-  for (std::size_t i = 0; i < volume.values.size(); ++i) {
-    const float v = volume.values[i];
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const float v = values[i];
     if (!std::isfinite(v) && bad++ == 0) first_bad = i;
     min = std::min(min, v);
     max = std::max(max, v);
@@ -110,6 +113,24 @@ void set_range(const fs::path& path, SourceVolume& volume) {
   }
   volume.min = static_cast<double>(min);
   volume.max = static_cast<double>(max);
+}
+
+}  // namespace
+
+void set_range(const fs::path& path, SourceVolume& volume) {
+  volume.values.visit([&]<class T>(std::span<const T> values) {
+    if constexpr (std::is_same_v<T, float>) {
+      set_float_range(path, values, volume);
+    } else {
+      T least = values.front(), most = least;
+      for (const T v : values) {  // a loop that the compiler turns into vectors
+        least = std::min(least, v);
+        most = std::max(most, v);
+      }
+      volume.min = least;
+      volume.max = most;
+    }
+  });
 }
 
 namespace {

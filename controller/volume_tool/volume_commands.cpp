@@ -6,10 +6,7 @@
 #include <exception>
 #include <filesystem>
 #include <ostream>
-#include <sstream>
 #include <string>
-#include <string_view>
-#include <system_error>
 
 #include "controller/scene/scene_error.hpp"
 #include "controller/volume/phantom.hpp"
@@ -18,54 +15,14 @@
 #include "controller/volume/volume_io.hpp"
 #include "controller/volume/volume_resample.hpp"
 #include "controller/volume/volume_write.hpp"
+#include "controller/volume_tool/import_command.hpp"
 #include "controller/volume_tool/volume_info.hpp"
+#include "controller/volume_tool/volume_options.hpp"
 #include "shared/posix/failure.hpp"
 #include "shared/text/command_line.hpp"
-#include "shared/text/number.hpp"
 
 namespace kerf {
 namespace {
-
-/// SceneError that names the option where `text` is no number.
-double number(const std::string& option, std::string_view text) {
-  if (const auto value = number_in(text)) return *value;
-  throw SceneError(option + ": '" + std::string(text) + "' is not a number; see --help");
-}
-
-std::vector<double> numbers(const std::string& option, const std::string& text, char separator) {
-  std::vector<double> values;
-  std::istringstream parts(text + separator);
-  for (std::string part; std::getline(parts, part, separator);) {
-    values.push_back(number(option, part));
-  }
-  return values;
-}
-
-std::array<double, 3> spacing_from(const std::string& text) {
-  const std::vector<double> s = numbers("--spacing", text, ',');
-  if (s.size() == 1) return {s[0], s[0], s[0]};
-  if (s.size() == 3) return {s[0], s[1], s[2]};
-  throw SceneError("--spacing: " + text + " has " + std::to_string(s.size()) +
-                   " numbers; give one, or three as x,y,z (mm)");
-}
-
-Window window_from(const std::string& text) {
-  const std::vector<double> w = numbers("--window", text, ',');
-  if (w.size() != 2) {
-    throw SceneError("--window: " + text + " is not a range; give lo,hi in values of the file");
-  }
-  return {w[0], w[1]};
-}
-
-VoxelGrid grid_from(const std::string& text) {
-  const std::vector<double> n = numbers("--size", text, 'x');
-  const auto whole = [](double v) { return v >= 1.0 && v <= 1e6 && v == std::floor(v); };
-  if (n.size() != 3 || !std::all_of(n.begin(), n.end(), whole)) {
-    throw SceneError("--size: " + text + " is not a size; give three counts such as 256x256x161");
-  }
-  return {static_cast<std::int32_t>(n[0]), static_cast<std::int32_t>(n[1]),
-          static_cast<std::int32_t>(n[2])};
-}
 
 /// What the commands that read a volume have in common.
 struct Source {
@@ -116,12 +73,8 @@ struct Target {
   /// Before the work.
   void check() const {
     check_volume_path(file);
-    for (const std::filesystem::path& path : {std::filesystem::path(file), labels_path(file)}) {
-      std::error_code fault;
-      if (force || !exists(symlink_status(path, fault))) continue;
-      throw SceneError(path.string() +
-                       ": is there already; take another name, or --force to replace it");
-    }
+    refuse_replacing(file, force);
+    refuse_replacing(labels_path(file), force);
   }
   void write(const VolumeImage& image, std::ostream& out) const {
     write_volume(image, file, raw ? VolumeEncoding::raw : VolumeEncoding::gzip);
@@ -138,19 +91,17 @@ struct Commands {
   std::string shape{kMolar};
   double iso = -1.0;
   std::int32_t guard = kGuardVoxels;
-  Arguments info, import, crop, resample, phantom;
+  ImportCommand import;
+  Arguments info, crop, resample, phantom;
 
   explicit Commands(Arguments& app)
-      : info(app.command("info", "print size, spacing, values and what is solid")),
-        import(app.command("import", "convert any readable volume to a .nrrd of densities")),
+      : import(app),
+        info(app.command("info", "print size, spacing, values and what is solid")),
         crop(app.command("crop", "cut to the tightest box around what is solid, plus a guard")),
         resample(app.command("resample", "change the voxel size")),
         phantom(app.command("phantom", "make the procedural molar, or a solid to measure on")) {
     source.add_to(info, true);
     info.option("--report", report, "write the same figures as JSON").shown_as("FILE");
-
-    source.add_to(import, true);
-    target.add_to(import);
 
     source.add_to(crop, true);
     target.add_to(crop);
@@ -174,18 +125,13 @@ struct Commands {
   }
 
   void run(std::ostream& out) const {
+    if (import.chosen()) return import.run(out);
     if (!info.chosen()) target.check();
     if (info.chosen()) {
       const SourceVolume volume = source.read(true);
       const VolumeInfo figures = describe(source.file, volume, source.window_for(volume));
       print(figures, out);
       if (!report.empty()) write_report(figures, report);
-    } else if (import.chosen()) {
-      const VolumeImage image = source.image();
-      target.write(image, out);
-      out << noise_line(noise_of(image.grid, image.density, otsu_threshold(image)),
-                        {0, kDensityMax})
-          << '\n';
     } else if (crop.chosen()) {
       const VolumeImage image = source.image();
       const Density threshold =
@@ -196,7 +142,7 @@ struct Commands {
     } else {
       PhantomSpec spec;
       spec.shape = shape;
-      spec.grid = grid_from(size);
+      spec.grid = grid_from("--size", size);
       target.write(make_phantom(spec), out);
     }
   }

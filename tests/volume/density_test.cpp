@@ -21,7 +21,7 @@ SourceVolume source(std::vector<float>& values) {
   v.spacing_mm = {0.5, 0.25, 2};
   v.origin_mm = {1, 2, 3};
   v.direction = {0, -1, 0, 1, 0, 0, 0, 0, 1};
-  v.values = values;
+  v.values = VoxelValues(values);
   v.min = static_cast<double>(*std::min_element(values.begin(), values.end()));
   v.max = static_cast<double>(*std::max_element(values.begin(), values.end()));
   return v;

@@ -57,7 +57,7 @@ TEST_CASE("a turned DICOM series keeps right-handed axes") {
   const SourceVolume v = read_volume(folder.path());
   CHECK(v.spacing_mm[2] == doctest::Approx(3.0));
   CHECK(v.direction == std::array<double, 9>{1, 0, 0, 0, 0, 1, 0, -1, 0});
-  CHECK(std::ranges::equal(v.values, counting<float>()));
+  CHECK(same_values(v, counting<float>()));
 }
 
 TEST_CASE("a DICOM folder that is not one even stack is refused in one line") {
@@ -73,9 +73,13 @@ TEST_CASE("a DICOM folder that is not one even stack is refused in one line") {
   }
   SUBCASE("two series") {
     write_series(folder, [](DicomSpec& spec, int k) {
-      if (k == 4) spec.series += ".2";
+      if (k >= 3) spec.series += ".2";
     });
-    refused("2 DICOM series");
+    refused("2 DICOM series; choose one with --series: 1 '' (3 slices of 3 x 4), 2 '' (2 slices");
+  }
+  SUBCASE("series of one slice each") {
+    write_series(folder, [](DicomSpec& spec, int k) { spec.series += std::to_string(k); });
+    refused("5 DICOM series");
   }
   SUBCASE("a slice is missing") {
     write_series(folder, [](DicomSpec& spec, int k) {
@@ -119,6 +123,47 @@ TEST_CASE("a DICOM folder that is not one even stack is refused in one line") {
       folder.write(name, whole);
     }
   }
+}
+
+TEST_CASE("one of several DICOM series is taken by its number or identifier") {
+  const TempFolder folder;
+  write_series(folder, [](DicomSpec& spec, int k) {
+    if (k >= 3) spec.series += ".2";
+  });
+  ReadOptions options;
+  options.series = "1";
+  CHECK(read_volume(folder.path(), options).grid == VoxelGrid{3, 4, 3});
+  options.series = "2";
+  const SourceVolume second = read_volume(folder.path(), options);
+  CHECK(second.grid == VoxelGrid{3, 4, 2});
+  CHECK(second.values[0] == 36);
+  CHECK(second.note == "series 2 of 2, '' (2 slices of 3 x 4)");
+  options.series = "125.1.2";
+  CHECK(read_volume(folder.path(), options).grid == VoxelGrid{3, 4, 2});
+  for (const char* none : {"0", "3", "head"}) {
+    options.series = none;
+    CHECK(refusal(folder.path(), options).find("is not one of them; choose one") !=
+          std::string::npos);
+  }
+}
+
+TEST_CASE("beside an overview of one slice the series is taken, and told") {
+  const TempFolder folder;
+  write_series(folder, [](DicomSpec& spec, int k) {
+    if (k == 4) spec.series = "1.1";
+  });
+  const SourceVolume v = read_volume(folder.path());
+  CHECK(v.grid == VoxelGrid{3, 4, 4});
+  CHECK(v.note.find("of 2, ") != std::string::npos);
+}
+
+TEST_CASE("a disc's folders are searched where its own holds only an index") {
+  const TempFolder folder;
+  for (int k = 0; k < 5; ++k) {
+    folder.write("DICOM/P1/S" + std::to_string(k), dicom(slice(k)));
+  }
+  folder.write("DICOMDIR", "an index");
+  CHECK(same_values(read_volume(folder.path()), counting<float>()));
 }
 
 TEST_CASE("a spacing that the kind of image does not go by is not in the file") {
@@ -176,5 +221,5 @@ TEST_CASE("slices in one file need a distance that the file tells") {
   spec.slice_spacing = "1";
   const SourceVolume v = read_volume(folder.write("one.dcm", dicom(spec)));
   CHECK(v.spacing_mm == std::array<double, 3>{0.25, 0.5, 1});
-  CHECK(std::ranges::equal(v.values, counting<float>()));
+  CHECK(same_values(v, counting<float>()));
 }

@@ -17,7 +17,7 @@ using Three = std::array<double, 3>;
 
 void check_counting(const SourceVolume& v) {
   CHECK(v.grid == kSmall);
-  CHECK(std::ranges::equal(v.values, counting<float>()));
+  CHECK(same_values(v, counting<float>()));
   CHECK(v.min == 0.0);
   CHECK(v.max == 59.0);
   CHECK(v.spacing_mm == Three{1, 2, 3});

@@ -47,7 +47,7 @@ TEST_CASE("a missing file, a missing data file and an unknown kind are refused")
 TEST_CASE("voxels without a header are refused with the name of the header beside them") {
   const TempFolder folder;
   const auto raw = folder.write("tooth.raw", kBytes);
-  check_refused(raw, "write a .nhdr or .mhd beside it");
+  check_refused(raw, "120 bytes without a header; ./kerf volume import takes it with --dims");
   folder.write("tooth.mhd", meta("MET_USHORT", kElementSpacing, "tooth.raw"));
   check_refused(raw, "name its header tooth.mhd");
 }

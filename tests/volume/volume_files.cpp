@@ -10,6 +10,7 @@
 #include <zlib.h>
 
 #include "controller/scene/scene_error.hpp"
+#include "controller/volume_tool/volume_commands.hpp"
 
 namespace kerf::test {
 namespace fs = std::filesystem;
@@ -147,9 +148,25 @@ std::string refusal(const fs::path& path, const ReadOptions& options) {
   return "no error";
 }
 
+bool same_values(const SourceVolume& volume, const std::vector<float>& values) {
+  return volume.values.visit([&](auto held) { return std::ranges::equal(held, values); });
+}
+
 bool is_one_line(const std::string& message) {
   return message.find('\n') == std::string::npos && message.find(": ") != std::string::npos &&
          message.find("; ") != std::string::npos;
+}
+
+Outcome run(const std::vector<std::string>& arguments) {
+  std::vector<const char*> argv{"kerf-volume"};
+  for (const std::string& a : arguments) argv.push_back(a.c_str());
+  std::ostringstream out;
+  std::ostringstream err;
+  Outcome outcome;
+  outcome.code = run_volume_tool(static_cast<int>(argv.size()), argv.data(), out, err);
+  outcome.out = out.str();
+  outcome.err = err.str();
+  return outcome;
 }
 
 VolumeImage air(VoxelGrid grid) {

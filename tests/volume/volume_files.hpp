@@ -103,8 +103,18 @@ struct DicomSpec {
 [[nodiscard]] std::string refusal(const std::filesystem::path& path,
                                   const ReadOptions& options = {});
 
+/// Whether a volume holds these, in their order.
+[[nodiscard]] bool same_values(const SourceVolume& volume, const std::vector<float>& values);
+
 /// What may stand for a one-line message: `place: value; way out`.
 [[nodiscard]] bool is_one_line(const std::string& message);
+
+/// What kerf-volume says to these arguments.
+struct Outcome {
+  int code = 0;
+  std::string out, err;
+};
+[[nodiscard]] Outcome run(const std::vector<std::string>& arguments);
 
 /// An image of `grid`, all air.
 [[nodiscard]] VolumeImage air(VoxelGrid grid);

@@ -1,0 +1,220 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "controller/volume/foreign_io.hpp"
+// ITK from here on.
+#include <itkGDCMImageIO.h>
+#include <itkMetaDataObject.h>
+
+#include "controller/volume/library_messages.hpp"
+#include "controller/volume/volume_limits.hpp"
+#include "controller/volume/volume_source.hpp"
+#include "shared/text/number.hpp"
+
+namespace kerf::volume {
+namespace fs = std::filesystem;
+namespace {
+
+/// The value of a tag on the first level of the file.
+std::optional<std::string> value_of(const itk::GDCMImageIO& io, const char* tag) {
+  std::string text;
+  const bool there = itk::ExposeMetaData<std::string>(io.GetMetaDataDictionary(), tag, text);
+  return there ? std::optional(text) : std::nullopt;
+}
+
+/// Without the padding to an even length.
+std::string trimmed(const std::string& text) {
+  constexpr std::string_view kPadding{" \0", 2};
+  const std::size_t first = text.find_first_not_of(kPadding);
+  if (first == std::string::npos) return {};
+  return text.substr(first, text.find_last_not_of(kPadding) + 1 - first);
+}
+
+constexpr const char* kPixelSpacing = "0028|0030";
+
+/// GDCM fills in 1 mm where a file names no spacing between pixels, none that is a number, or only
+/// one that its kind of image does not go by, such as a CT's at the detector (0018|1164). What no
+/// tag of the file's first level tells may come from deeper in it.
+bool names_spacing(const itk::GDCMImageIO& io) {
+  const bool may_be_filled_in = io.GetSpacing(0) == 1.0 && io.GetSpacing(1) == 1.0;
+  for (const char* tag : {kPixelSpacing, "0018|1164"}) {
+    const auto text = value_of(io, tag);
+    if (!text) continue;
+    const std::vector<double> told = dicom_distances(*text);
+    return told.size() == 2 && (!may_be_filled_in || told == std::vector{1.0, 1.0});
+  }
+  return !may_be_filled_in;
+}
+
+/// The same of the slices of one file: where its pixels' spacing is on the first level, theirs is.
+bool names_slice_distance(const itk::GDCMImageIO& io) {
+  if (!value_of(io, kPixelSpacing) || io.GetSpacing(2) != 1.0) return true;
+  return dicom_distances(value_of(io, "0018|0088").value_or("")) == std::vector{1.0};
+}
+
+}  // namespace
+
+void read_dicom_file(const fs::path& path, const Offer& offer) {
+  const auto io = itk::GDCMImageIO::New();
+  VolumeHeader header;
+  {
+    const Quiet quiet;
+    if (open_image(path, *io)[2] == 1) {
+      throw SceneError(path.string() +
+                       ": one slice; name the folder that holds the whole DICOM series");
+    }
+    header.has_spacing = names_spacing(*io) && names_slice_distance(*io);
+  }
+  read_one_file(path, *io, header, offer);
+}
+
+namespace {
+
+/// One image of a folder, as its header has it.
+struct Image {
+  fs::path file;
+  VolumeClaim claim;
+};
+
+/// Images of one series.
+struct Series {
+  std::string uid, name;
+  std::vector<Image> images;
+};
+
+/// The DICOM images among `files`, by their series; those in the order of their numbers.
+std::vector<Series> all_series(const std::vector<fs::path>& files, SandboxReader& sandbox,
+                               const Quiet& quiet) {
+  std::map<std::pair<double, std::string>, Series> found;
+  const auto io = itk::GDCMImageIO::New();
+  for (const fs::path& file : files) {
+    sandbox.at(file.string());
+    if (!guarded(file, [&] { return io->CanReadFile(file.c_str()); })) continue;
+    const std::array<std::int64_t, 3> size = open_image(file, *io);
+    quiet.refuse_if_missing(file);
+    const std::string uid = value_of(*io, "0020|000e").value_or("");
+    const double number = number_in(trimmed(value_of(*io, "0020|0011").value_or(""))).value_or(0);
+    Series& series = found[{number, uid}];
+    series.uid = uid;
+    series.name = trimmed(value_of(*io, "0008|103e").value_or(""));
+    series.images.push_back({file, claim_of(file, *io, size, names_spacing(*io))});
+  }
+  std::vector<Series> all;
+  for (auto& [key, series] : found) all.push_back(std::move(series));
+  return all;
+}
+
+std::string text_of(const Series& series) {
+  const auto& size = series.images.front().claim.size;
+  const std::size_t slices = series.images.size();
+  return "'" + series.name + "' (" + std::to_string(slices) +
+         (slices == 1 ? " slice of " : " slices of ") + std::to_string(size[0]) + " x " +
+         std::to_string(size[1]) + ")";
+}
+
+/// Which one is wanted: by its place in the list, or by a part of its name or identifier. Without a
+/// word the only one that has more than one slice: the others are overviews.
+std::size_t chosen_series(const fs::path& folder, const std::vector<Series>& all,
+                          const std::string& wanted) {
+  std::vector<std::size_t> fit;
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    const bool by_name = all[i].name.find(wanted) != std::string::npos ||
+                         all[i].uid.find(wanted) != std::string::npos;
+    if (wanted.empty() ? all[i].images.size() > 1 || all.size() == 1
+                       : std::to_string(i + 1) == wanted) {
+      fit.push_back(i);
+    } else if (!wanted.empty() && !number_in(wanted) && by_name) {
+      fit.push_back(i);
+    }
+  }
+  if (fit.size() == 1) return fit.front();
+  std::string list;
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    list += (i == 0 ? " " : ", ") + std::to_string(i + 1) + " " + text_of(all[i]);
+  }
+  throw SceneError(folder.string() + ": " + std::to_string(all.size()) + " DICOM series" +
+                   (wanted.empty() ? "" : ", and --series " + wanted + " is not one of them") +
+                   "; choose one with --series:" + list);
+}
+
+/// The images as one stack: what they have in common, and their order in space.
+struct Stack {
+  VolumeClaim claim;
+  std::vector<Slice> slices;
+};
+
+Stack stack_of(const fs::path& folder, const std::vector<Image>& images) {
+  const Image& first = images.front();
+  Stack stack{first.claim, {}};
+  const Place x = first.claim.axes[0], y = first.claim.axes[1];
+  const Place normal = cross(x, y);
+  for (const Image& image : images) {
+    const VolumeClaim& own = image.claim;
+    // What no tag names is a guess, and differs from one time to the next.
+    const bool same_spacing =
+        own.has_spacing == first.claim.has_spacing &&
+        (own.has_spacing == 0 || (own.spacing_mm[0] == first.claim.spacing_mm[0] &&
+                                  own.spacing_mm[1] == first.claim.spacing_mm[1]));
+    if (own.size != first.claim.size || own.size[2] != 1 || own.axes[0] != x || own.axes[1] != y ||
+        !same_spacing) {
+      throw SceneError(image.file.string() + ": its size, spacing or direction differs from " +
+                       first.file.filename().string() + "; keep one stack of slices per folder");
+    }
+    stack.claim.kind = common_kind(stack.claim.kind, own.kind);
+    stack.slices.push_back({image.file, own.origin_mm, dot(own.origin_mm, normal)});
+  }
+  std::ranges::sort(stack.slices, {}, &Slice::depth_mm);
+  stack.claim.size[2] = static_cast<std::int64_t>(images.size());
+  stack.claim.spacing_mm[2] = slice_distance(folder, stack.slices, normal);
+  stack.claim.origin_mm = stack.slices.front().origin_mm;
+  stack.claim.axes[2] = normal;
+  // A slice is small, so each is read apart.
+  stack.claim.voxel_bytes = static_cast<std::uint32_t>(bytes_of(stack.claim.kind));
+  return stack;
+}
+
+}  // namespace
+
+void read_dicom_series(const fs::path& folder, const std::vector<fs::path>& beside,
+                       const std::string& wanted, SandboxReader& sandbox, const Offer& offer) {
+  const Quiet quiet;
+  const std::vector<Series> all = all_series(beside, sandbox, quiet);
+  sandbox.at(folder.string());
+  if (all.empty()) {
+    throw SceneError(folder.string() +
+                     ": no DICOM series in this folder; name a volume file or another folder");
+  }
+  const std::size_t chosen = chosen_series(folder, all, wanted);
+  const std::vector<Image>& images = all[chosen].images;
+  if (images.size() == 1) return read_dicom_file(images.front().file, offer);
+
+  Stack stack = stack_of(folder, images);
+  if (all.size() > 1) {
+    const std::string note = "series " + std::to_string(chosen + 1) + " of " +
+                             std::to_string(all.size()) + ", " + text_of(all[chosen]);
+    std::copy_n(note.begin(), std::min(note.size(), stack.claim.note.size() - 1),
+                stack.claim.note.begin());
+  }
+  std::span<std::byte> rest = offer(stack.claim);
+  const std::size_t bytes = static_cast<std::size_t>(stack.claim.size[0] * stack.claim.size[1]) *
+                            bytes_of(stack.claim.kind);
+  const auto io = itk::GDCMImageIO::New();
+  std::vector<std::byte> own;
+  for (const Slice& slice : stack.slices) {
+    sandbox.at(slice.file.string());
+    static_cast<void>(open_image(slice.file, *io));
+    own.resize(static_cast<std::size_t>(io->GetImageSizeInBytes()));
+    read_voxels(slice.file, *io, own);
+    quiet.refuse_if_missing(slice.file);
+    convert_values(type_of(slice.file, *io), own, stack.claim.kind, rest.first(bytes));
+    rest = rest.subspan(bytes);
+  }
+}
+
+}  // namespace kerf::volume

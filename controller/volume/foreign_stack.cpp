@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <string>
+#include <vector>
+
+#include "controller/volume/foreign_io.hpp"
+// ITK from here on.
+#include <itkPNGImageIO.h>
+#include <itkTIFFImageIO.h>
+
+#include "controller/volume/library_messages.hpp"
+
+namespace kerf::volume {
+namespace fs = std::filesystem;
+
+void read_slice_stack(const fs::path& folder, const std::vector<fs::path>& beside, VolumeKind kind,
+                      SandboxReader& sandbox, const Offer& offer) {
+  const Quiet quiet;
+  const auto is_slice = [kind](const fs::path& file) {
+    const std::string end = lower(file.extension().string());
+    return kind == VolumeKind::png_stack ? end == ".png" : end == ".tif" || end == ".tiff";
+  };
+  std::vector<fs::path> files;
+  std::ranges::copy_if(beside, std::back_inserter(files), is_slice);
+  if (files.size() < 2) {
+    throw SceneError(folder.string() + ": one picture; name a folder that holds all slices");
+  }
+  const ImageIo::Pointer io = kind == VolumeKind::png_stack
+                                  ? ImageIo::Pointer(itk::PNGImageIO::New())
+                                  : ImageIo::Pointer(itk::TIFFImageIO::New());
+  VolumeClaim claim;
+  for (const fs::path& file : files) {
+    sandbox.at(file.string());
+    const std::array<std::int64_t, 3> size = open_image(file, *io, 2);
+    const ValueKind own = kind_of(type_of(file, *io));
+    if (file == files.front()) {
+      claim.size = {size[0], size[1], static_cast<std::int64_t>(files.size())};
+      claim.kind = own;
+    } else if (size[0] != claim.size[0] || size[1] != claim.size[1]) {
+      throw SceneError(file.string() + ": " + std::to_string(size[0]) + " x " +
+                       std::to_string(size[1]) + " pixels, and " +
+                       files.front().filename().string() + " has " + std::to_string(claim.size[0]) +
+                       " x " + std::to_string(claim.size[1]) +
+                       "; keep one stack of slices per folder");
+    }
+    claim.kind = common_kind(claim.kind, own);
+  }
+  claim.voxel_bytes = static_cast<std::uint32_t>(bytes_of(claim.kind));
+  claim.has_spacing = 0;
+  // Rows run downwards and slices upwards in a body that lies on its back, as in DICOM.
+  claim.axes = {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
+
+  sandbox.at(folder.string());
+  std::span<std::byte> rest = offer(claim);
+  const std::size_t bytes =
+      static_cast<std::size_t>(claim.size[0] * claim.size[1]) * bytes_of(claim.kind);
+  std::vector<std::byte> own;
+  for (const fs::path& file : files) {
+    sandbox.at(file.string());
+    static_cast<void>(open_image(file, *io, 2));
+    own.resize(static_cast<std::size_t>(io->GetImageSizeInBytes()));
+    read_voxels(file, *io, own);
+    quiet.refuse_if_missing(file);
+    convert_values(type_of(file, *io), own, claim.kind, rest.first(bytes));
+    rest = rest.subspan(bytes);
+  }
+}
+
+}  // namespace kerf::volume

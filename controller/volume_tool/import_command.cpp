@@ -1,0 +1,191 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "controller/volume_tool/import_command.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <ostream>
+#include <sstream>
+#include <utility>
+
+#include "controller/scene/scene_error.hpp"
+#include "controller/volume/spacing_check.hpp"
+#include "controller/volume/volume_crop.hpp"
+#include "controller/volume/volume_denoise.hpp"
+#include "controller/volume/volume_io.hpp"
+#include "controller/volume/volume_noise.hpp"
+#include "controller/volume/volume_proposal.hpp"
+#include "controller/volume/volume_write.hpp"
+#include "controller/volume_tool/import_preview.hpp"
+#include "controller/volume_tool/import_scene.hpp"
+#include "controller/volume_tool/volume_options.hpp"
+#include "shared/posix/new_file.hpp"
+#include "shared/text/number.hpp"
+
+namespace kerf {
+namespace fs = std::filesystem;
+namespace {
+
+void line(std::ostream& out, std::string what, const std::string& chosen, const char* change) {
+  what.resize(11, ' ');
+  out << what << chosen << (*change == '\0' ? "" : "; ") << change << '\n';
+}
+
+std::string size_text(const VolumeFrame& frame) {
+  const auto& s = frame.spacing_mm;
+  std::ostringstream text;
+  text << frame.grid.nx << " x " << frame.grid.ny << " x " << frame.grid.nz << " voxels of " << s[0]
+       << " x " << s[1] << " x " << s[2] << " mm";
+  return text.str();
+}
+
+const char* way_to_change(const std::string& what) {
+  if (what == "surface") return "--iso VALUE for another";
+  if (what == "window") return "--window LO,HI for another";
+  if (what == "body") return "--keep-all keeps them";
+  return "edit [[material]] in the scene";
+}
+
+}  // namespace
+
+/// What is written.
+struct ImportCommand::Files {
+  fs::path volume, scene, preview;
+};
+
+ImportCommand::ImportCommand(Arguments& app)
+    : command_(app.command("import", "any CT to a volume, a ready scene and a preview")) {
+  command_.option("path", path_, "volume file, or folder of DICOM, PNG or TIFF slices")
+      .required()
+      .shown_as("PATH");
+  command_
+      .option("--out", out_, "the volume; scene and preview lie beside it (default: PATH's name)")
+      .shown_as("OUT.nrrd");
+  command_.option("--series", series_, "of several in a folder: its number or a part of its name")
+      .shown_as("WHICH");
+  Option dims = command_.option("--dims", dims_, "voxels of a file without a header");
+  dims.shown_as("NXxNYxNZ");
+  command_.option("--type", type_, "of its numbers")
+      .one_of({std::begin(kVoxelTypeWords), std::end(kVoxelTypeWords)})
+      .shows_default()
+      .needs(dims);
+  command_.flag("--big-endian", big_endian_, "of its numbers: the highest byte is first")
+      .needs(dims);
+  command_.option("--skip", skip_, "bytes before its first voxel").within(0, 1e12).needs(dims);
+  command_.option("--spacing", spacing_, "mm per voxel, in place of the file's")
+      .shown_as("A[,B,C]");
+  command_.option("--iso", iso_, "the surface, in values of the file (HU of a CT)")
+      .shown_as("VALUE");
+  command_.option("--window", window_, "values that become density 0 and 1").shown_as("LO,HI");
+  command_.option("--denoise", denoise_, "passes against noise")
+      .one_of({"auto", "off", "1", "2", "3"})
+      .shows_default();
+  command_.flag("--keep-all", keep_all_, "couch, holder and specks stay");
+  command_.flag("--no-crop", whole_, "all of the volume stays");
+  command_.flag("--packed", packed_, "write with compression: smaller, and slower to load");
+  command_.flag("--force", force_, "replace what is there");
+  command_.option("--read-seconds", cpu_s_, "CPU time that parsing a file may take")
+      .within(1, kMostReadCpuSeconds)
+      .shows_default();
+}
+
+ImportCommand::Files ImportCommand::files() const {
+  Files files{out_, {}, {}};
+  if (out_.empty()) {
+    fs::path name = fs::path(path_).lexically_normal();
+    if (!name.has_filename()) name = name.parent_path();
+    std::string stem = name.stem().string();
+    if (stem.ends_with(".nii")) stem.resize(stem.size() - 4);
+    if (stem.empty() || stem == "." || stem == "..") stem = "volume";
+    files.volume = stem + ".nrrd";
+  }
+  check_volume_path(files.volume);
+  files.scene = fs::path(files.volume).replace_extension(".toml");
+  files.preview = fs::path(files.volume).replace_extension(".png");
+  for (const fs::path& file :
+       {files.volume, labels_path(files.volume), files.scene, files.preview}) {
+    refuse_replacing(file, force_);
+  }
+  return files;
+}
+
+void ImportCommand::run(std::ostream& out) const {
+  const Files to = files();
+  ReadOptions options;
+  options.cpu_s = cpu_s_;
+  options.series = series_;
+  if (!dims_.empty()) {
+    const auto word = std::ranges::find(kVoxelTypeWords, type_) - std::begin(kVoxelTypeWords);
+    options.raw = RawLayout{grid_from("--dims", dims_), static_cast<VoxelType>(word), big_endian_,
+                            static_cast<std::uint64_t>(skip_)};
+  }
+  if (!spacing_.empty()) options.spacing_mm = spacing_from(spacing_);
+  ProposalWishes wishes;
+  wishes.keep_all = keep_all_;
+  if (!window_.empty()) wishes.window = window_from(window_);
+  if (!iso_.empty()) {
+    wishes.iso = number_in(iso_);
+    if (!wishes.iso)
+      throw SceneError("--iso: '" + iso_ + "' is not a number; give a value of the file");
+  }
+
+  SourceVolume source = read_volume(path_, options);
+  const Window range = range_window(source);
+  const std::string note = source.note;
+  std::ostringstream values;
+  values << path_ << ": " << size_text(source) << ", values " << source.min << " .. " << source.max;
+
+  VolumeImage whole = apply_window(source, range);
+  read_labels_beside(path_, whole, cpu_s_);
+  if (!whole.labels.empty()) return import_labelled(std::move(whole), to, out);
+  ProposedVolume proposed = propose_volume(std::move(whole), range, wishes);
+  const VolumeProposal& proposal = proposed.proposal;
+  const std::string odd = odd_spacing(source, proposal.solid, proposal.surface.hounsfield);
+  if (!odd.empty() && spacing_.empty()) {
+    throw SceneError(path_ + ": " + odd + "; give the true voxel size with --spacing x,y,z (mm)");
+  }
+  const std::string preview = png_bytes(import_preview(source, proposed));
+  source = {};
+
+  const Density iso = nearest_density(proposal.density_of(proposal.iso) * kDensityMax);
+  VolumeImage image = std::move(proposed.image);
+  const Noise noise = noise_of(image.grid, image.density, iso);
+  const int passes = denoise_ == "auto"  ? passes_for(noise)
+                     : denoise_ == "off" ? 0
+                                         : denoise_[0] - '0';
+  if (!whole_) image = crop_for_passes(image, iso, passes);
+  denoise(image.grid, image.density, passes);
+  if (!whole_) image = crop_to_solid(image, iso);
+
+  write_volume(image, to.volume, packed_ ? VolumeEncoding::gzip : VolumeEncoding::raw);
+  write_new_file(to.scene,
+                 imported_scene_text({path_, to.volume, &proposal, iso / kDensityMax, passes}));
+  write_new_file(to.preview, preview);
+
+  line(out, "file", values.str(), spacing_.empty() ? "--spacing A,B,C for another voxel size" : "");
+  if (!note.empty()) line(out, "series", note, "--series for another");
+  for (const ProposalLine& choice : proposal_lines(proposal)) {
+    line(out, choice.what, choice.chosen, way_to_change(choice.what));
+  }
+  std::ostringstream crop, smooth;
+  crop << size_text(image) << (whole_ ? ", all of it" : ", what is solid and three voxels of air");
+  line(out, "crop", crop.str(), whole_ ? "" : "--no-crop keeps all");
+  smooth << passes << (passes == 1 ? " pass" : " passes") << " against noise of "
+         << std::round(1000 * noise.share) / 10 << " % of the surface's step";
+  line(out, "denoise", smooth.str(), "--denoise off, 1, 2 or 3");
+  line(out, "wrote", to.volume.string() + ", " + to.scene.string() + ", " + to.preview.string(),
+       "look at the last one first");
+  line(out, "try", "./kerf demo --scene " + to.scene.string(), "");
+}
+
+void ImportCommand::import_labelled(VolumeImage image, const Files& to, std::ostream& out) const {
+  const Density iso = otsu_threshold(image);
+  if (!whole_) image = crop_to_solid(image, iso);
+  write_volume(image, to.volume, packed_ ? VolumeEncoding::gzip : VolumeEncoding::raw);
+  write_new_file(to.scene, imported_scene_text({path_, to.volume, nullptr, iso / kDensityMax, 0}));
+  line(out, "file", path_ + ": " + size_text(image) + ", with labels, which tell the materials",
+       "");
+  line(out, "wrote", to.volume.string() + ", its labels, " + to.scene.string(), "");
+}
+
+}  // namespace kerf

@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <iosfwd>
+#include <string>
+
+#include "controller/sandbox/sandbox.hpp"
+#include "controller/volume/volume_image.hpp"
+#include "shared/text/command_line.hpp"
+
+namespace kerf {
+
+/// kerf-volume import: any CT to a .nrrd of densities, a scene and a preview, by the proposal of
+/// volume_proposal.hpp; says in one line each what it chose and how to change it.
+class ImportCommand {
+ public:
+  explicit ImportCommand(Arguments& app);
+  ImportCommand(const ImportCommand&) = delete;
+  ImportCommand& operator=(const ImportCommand&) = delete;
+
+  [[nodiscard]] bool chosen() const { return command_.chosen(); }
+  /// Throws SceneError, one line, with nothing written.
+  void run(std::ostream& out) const;
+
+ private:
+  struct Files;
+  [[nodiscard]] Files files() const;
+  void import_plain(const Files& files, std::ostream& out) const;
+  void import_labelled(VolumeImage image, const Files& files, std::ostream& out) const;
+
+  Arguments command_;
+  std::string path_, out_, spacing_, window_, iso_, denoise_ = "auto";
+  std::string series_, dims_, type_ = "uint16";
+  std::int64_t skip_ = 0;
+  bool big_endian_ = false;
+  int cpu_s_ = kReadCpuSeconds;
+  bool force_ = false, keep_all_ = false, whole_ = false, packed_ = false;
+};
+
+}  // namespace kerf

@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "controller/volume/volume_proposal.hpp"
+
+namespace kerf {
+
+/// What the scene of an imported volume says beside its file.
+struct ImportedScene {
+  std::string source;                        ///< what was imported, for a comment
+  std::filesystem::path volume;              ///< beside the scene
+  const VolumeProposal* proposal = nullptr;  ///< none: a volume with labels
+  double iso_density = 0;
+  int passes = 0;  ///< against noise, that the import made
+};
+
+/// The text of a scene (TOML) with this volume alone, fitted to any device as --volume fits it.
+[[nodiscard]] std::string imported_scene_text(const ImportedScene& scene);
+
+}  // namespace kerf

@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cstdlib>
+#include <filesystem>
+
+#include <doctest/doctest.h>
+
+#include "controller/scene/scene_file.hpp"
+#include "controller/volume/phantom.hpp"
+#include "controller/volume/volume_density.hpp"
+#include "controller/volume/volume_write.hpp"
+#include "controller/volume_tool/png_file.hpp"
+#include "tests/volume/volume_files.hpp"
+
+using namespace kerf;
+using namespace kerf::test;
+
+namespace {
+
+/// A ball of 200 in air of 10, on 20 x 20 x 20 voxels.
+std::string ball_file(const TempFolder& folder, const std::string& spacings) {
+  const VoxelGrid grid{20, 20, 20};
+  std::vector<std::uint8_t> values(grid.voxel_count(), 10);
+  for (std::int32_t z = 0; z < 20; ++z) {
+    for (std::int32_t y = 0; y < 20; ++y) {
+      for (std::int32_t x = 0; x < 20; ++x) {
+        const std::int32_t r2 = (x - 10) * (x - 10) + (y - 10) * (y - 10) + (z - 8) * (z - 8);
+        if (r2 <= 25) values[grid.index(x, y, z)] = 200;
+      }
+    }
+  }
+  return folder
+      .write("ball.nrrd", nrrd("uint8", spacings, "raw", "20 20 20") + "\n" + bytes_of(values))
+      .string();
+}
+
+const std::string kHalf = "spacings: 0.5 0.5 0.5\n";
+
+bool has(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
+
+}  // namespace
+
+TEST_CASE("import writes a volume, a scene that reads it and a preview, and tells each choice") {
+  const TempFolder folder;
+  const std::string out = (folder / "out.nrrd").string();
+  const Outcome made = run({"import", ball_file(folder, kHalf), "--out", out});
+  CAPTURE(made.err);
+  REQUIRE(made.code == 0);
+  for (const char* line : {"file  ", "surface  ", "window  ", "body  ", "materials  ", "crop  ",
+                           "denoise  ", "wrote  ", "try  "}) {
+    CHECK(has(made.out, std::string("\n") + line) == (std::string(line) != "file  "));
+  }
+  CHECK(has(made.out, "--iso VALUE for another"));
+
+  const SourceVolume v = read_volume(out);
+  CHECK(v.grid == VoxelGrid{11 + 6, 11 + 6, 11 + 6});
+  CHECK(v.spacing_mm == std::array<double, 3>{0.5, 0.5, 0.5});
+  CHECK(v.origin_mm == std::array<double, 3>{1, 1, 0});  // voxel (2, 2, 0) of the source
+  CHECK(v.min == 0);
+  CHECK(v.max == kDensityMax);
+  const Scene scene = parse_scene_file(folder / "out.toml");
+  REQUIRE(scene.volumes.size() == 1);
+  CHECK(scene.volumes[0].file == "out.nrrd");
+  CHECK(*scene.volumes[0].iso == doctest::Approx(0.5).epsilon(0.01));
+  CHECK(scene.device.fit);
+  CHECK(read_bytes(folder / "out.png").starts_with("\x89PNG\r\n"));
+}
+
+TEST_CASE("import takes the user's word for surface, window, crop and size") {
+  const TempFolder folder;
+  const std::string out = (folder / "out.nrrd").string();
+  REQUIRE(run({"import", ball_file(folder, kHalf), "--out", out, "--iso", "50", "--window",
+               "-90,210", "--no-crop", "--spacing", "2", "--denoise", "off", "--packed"})
+              .code == 0);
+  const SourceVolume v = read_volume(out);
+  CHECK(v.grid == VoxelGrid{20, 20, 20});
+  CHECK(v.spacing_mm == std::array<double, 3>{2, 2, 2});
+  CHECK(v.min == std::lround(100.0 / 300 * kDensityMax));
+  CHECK(v.max == std::lround(290.0 / 300 * kDensityMax));
+  CHECK(*parse_scene_file(folder / "out.toml").volumes[0].iso ==
+        doctest::Approx(140.0 / 300).epsilon(1e-4));
+}
+
+TEST_CASE("import replaces no file without --force") {
+  const TempFolder folder;
+  const std::string ball = ball_file(folder, kHalf), out = (folder / "out.nrrd").string();
+  for (const std::string name : {"out.nrrd", "out.toml", "out.png", "out-labels.nrrd"}) {
+    const auto there = folder.write(name, "mine");
+    const Outcome refused = run({"import", ball, "--out", out});
+    CHECK(refused.code == 2);
+    CHECK(has(refused.err, name + ": is there already"));
+    CHECK(read_bytes(there) == "mine");
+    std::filesystem::remove(there);
+  }
+  CHECK(run({"import", ball, "--out", out}).code == 0);
+  CHECK(run({"import", ball, "--out", out}).code == 2);
+  CHECK(run({"import", ball, "--out", out, "--force"}).code == 0);
+}
+
+TEST_CASE("import asks about a voxel size that makes no sense, and writes nothing") {
+  const TempFolder folder;
+  const std::string out = (folder / "out.nrrd").string();
+  for (const std::string spacings : {"spacings: 1 1 1\n", "spacings: 300 300 300\n", ""}) {
+    const std::string ball = ball_file(folder, spacings);
+    const Outcome asked = run({"import", ball, "--out", out});
+    CAPTURE(asked.err);
+    CHECK(asked.code == 2);
+    CHECK(has(asked.err, "--spacing"));
+    CHECK(is_one_line(asked.err.substr(0, asked.err.size() - 1)));
+    CHECK_FALSE(std::filesystem::exists(out));
+    CHECK(run({"import", ball, "--out", out, "--spacing", "1", "--force"}).code == 0);
+    std::filesystem::remove(out);
+    std::filesystem::remove(folder / "out.toml");
+    std::filesystem::remove(folder / "out.png");
+  }
+}
+
+TEST_CASE("a volume with labels keeps them and gets no proposal") {
+  const TempFolder folder;
+  const std::string tooth = (folder / "tooth.nrrd").string();
+  const std::string out = (folder / "out.nrrd").string();
+  write_volume(make_phantom({.grid = {48, 48, 30}}), tooth);
+  REQUIRE(run({"import", tooth, "--out", out}).code == 0);
+  VolumeImage image = apply_window(read_volume(out), {0, kDensityMax});
+  read_labels_beside(out, image);
+  CHECK(image.labels.size() == image.density.size());
+  CHECK(parse_scene_file(folder / "out.toml").materials.size() == 4);
+}
+
+TEST_CASE("each real scan is imported at first try") {
+  struct Scan {
+    const char* file;
+    std::vector<std::string> words;  ///< that the options need, or that the answer has
+    double least, most;              ///< of the surface, in values of the file
+  };
+  const char* data = std::getenv("KERF_DATA");
+  for (const Scan& scan : {Scan{"ge_tooth_16bit/tooth.nhdr", {"--spacing", "0.125"}, 550, 750},
+                           Scan{"ge_tooth_8bit/tooth.mhd", {"--spacing", "0.125"}, 70, 110},
+                           Scan{"ct_spine_pelvis/example_ct.nii.gz", {}, 120, 400}}) {
+    if (data == nullptr || !std::filesystem::exists(std::filesystem::path(data) / scan.file)) {
+      MESSAGE("skipped: " << scan.file << " is not there (KERF_DATA names the folder)");
+      continue;
+    }
+    CAPTURE(scan.file);
+    const TempFolder folder;
+    const std::string path = (std::filesystem::path(data) / scan.file).string();
+    std::vector<std::string> arguments{"import", path, "--out", (folder / "out.nrrd").string()};
+    if (!scan.words.empty()) CHECK(run(arguments).code == 2);  // 1 mm for a tooth
+    arguments.insert(arguments.end(), scan.words.begin(), scan.words.end());
+    const Outcome made = run(arguments);
+    CAPTURE(made.err);
+    REQUIRE(made.code == 0);
+    const std::size_t at = made.out.find("\nsurface") + 8;
+    const double surface = std::stod(made.out.substr(at));
+    CHECK(surface > scan.least);
+    CHECK(surface < scan.most);
+    CHECK(has(made.out, "bone") == scan.words.empty());
+  }
+}
+
+TEST_CASE("a PNG has the bytes that its standard asks for") {
+  const std::string bytes = png_bytes({1, 1, {255, 0, 0}});
+  CHECK(bytes.substr(0, 8) == "\x89PNG\r\n\x1a\n");
+  CHECK(bytes.substr(8, 8) == std::string("\0\0\0\x0dIHDR", 8));
+  CHECK(bytes.substr(16, 13) == std::string("\0\0\0\1\0\0\0\1\x08\x02\0\0\0", 13));
+  CHECK(bytes.substr(29, 4) == "\x90\x77\x53\xde");  // the checksum of every picture of 1 x 1
+  CHECK(bytes.substr(bytes.size() - 12) == std::string("\0\0\0\0IEND\xae\x42\x60\x82", 12));
+}

@@ -1,0 +1,202 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <functional>
+
+#include <doctest/doctest.h>
+#include <zlib.h>
+
+#include "tests/volume/volume_files.hpp"
+
+using namespace kerf;
+using namespace kerf::test;
+
+namespace {
+
+std::string big(std::uint32_t value) {
+  return bytes_of(value, std::endian::big);
+}
+
+std::string chunk(const std::string& type, const std::string& data) {
+  const std::string checked = type + data;
+  const auto sum =
+      crc32(0, reinterpret_cast<const Bytef*>(checked.data()), static_cast<uInt>(checked.size()));
+  return big(static_cast<std::uint32_t>(data.size())) + checked +
+         big(static_cast<std::uint32_t>(sum));
+}
+
+/// PNG of `channels` numbers a pixel, all as they lie in `rows`.
+std::string png(int width, int height, int bits, int colour, const std::string& pixels) {
+  std::string rows;
+  const std::size_t row = pixels.size() / static_cast<std::size_t>(height);
+  for (std::size_t y = 0; y < static_cast<std::size_t>(height); ++y) {
+    rows += '\0' + pixels.substr(y * row, row);
+  }
+  uLongf size = compressBound(rows.size());
+  std::string packed(size, '\0');
+  compress(reinterpret_cast<Bytef*>(packed.data()), &size,
+           reinterpret_cast<const Bytef*>(rows.data()), rows.size());
+  packed.resize(size);
+  return "\x89PNG\r\n\x1a\n" +
+         chunk("IHDR", big(static_cast<std::uint32_t>(width)) +
+                           big(static_cast<std::uint32_t>(height)) + static_cast<char>(bits) +
+                           static_cast<char>(colour) + std::string(3, '\0')) +
+         chunk("IDAT", packed) + chunk("IEND", "");
+}
+constexpr int kGrey = 0, kRgba = 6;
+
+/// TIFF of grey pages, not packed, little-endian.
+std::string tiff(std::uint32_t width, std::uint32_t height, std::uint16_t bits,
+                 const std::vector<std::string>& pages) {
+  std::string bytes = std::string("II*\0", 4) + bytes_of(std::uint32_t{8});
+  for (std::size_t page = 0; page < pages.size(); ++page) {
+    constexpr std::uint16_t kEntries = 10;
+    const auto begin = static_cast<std::uint32_t>(bytes.size());
+    const std::uint32_t data = begin + 2 + kEntries * 12 + 4;
+    const auto entry = [](std::uint16_t tag, std::uint16_t type, std::uint32_t value) {
+      return bytes_of(tag) + bytes_of(type) + bytes_of(std::uint32_t{1}) + bytes_of(value);
+    };
+    constexpr std::uint16_t kShort = 3, kLong = 4;
+    const auto size = static_cast<std::uint32_t>(pages[page].size());
+    bytes += bytes_of(kEntries) + entry(256, kLong, width) + entry(257, kLong, height) +
+             entry(258, kShort, bits) + entry(259, kShort, 1) + entry(262, kShort, 1) +
+             entry(273, kLong, data) + entry(277, kShort, 1) + entry(278, kLong, height) +
+             entry(279, kLong, size) + entry(284, kShort, 1);
+    bytes += bytes_of(page + 1 < pages.size() ? data + size : std::uint32_t{0}) + pages[page];
+  }
+  return bytes;
+}
+
+/// The slice z of 3 x 4 x 5 voxels that count 0 .. 59.
+template <class T>
+std::string slice(int z, std::endian order = std::endian::little) {
+  const std::vector<T> all = counting<T>();
+  return bytes_of(std::vector<T>(all.begin() + 12 * z, all.begin() + 12 * (z + 1)), order);
+}
+
+/// Five files whose numbers have no leading zeros: 8 .. 12.
+void write_stack(const TempFolder& folder, const std::string& end,
+                 const std::function<std::string(int)>& bytes) {
+  for (int z = 0; z < 5; ++z) folder.write("slice" + std::to_string(8 + z) + end, bytes(z));
+}
+
+const ReadOptions kSpaced{.spacing_mm = std::array<double, 3>{0.5, 0.5, 2}};
+
+}  // namespace
+
+TEST_CASE("a folder of grey pictures is a volume, in the order of the numbers in their names") {
+  const TempFolder folder;
+  SUBCASE("PNG of 8 bits") {
+    write_stack(folder, ".png", [](int z) { return png(3, 4, 8, kGrey, slice<std::uint8_t>(z)); });
+  }
+  SUBCASE("PNG of 16 bits") {
+    write_stack(folder, ".PNG", [](int z) {
+      return png(3, 4, 16, kGrey, slice<std::uint16_t>(z, std::endian::big));
+    });
+  }
+  SUBCASE("TIFF") {
+    write_stack(folder, ".tif", [](int z) { return tiff(3, 4, 16, {slice<std::uint16_t>(z)}); });
+  }
+  folder.write("notes.txt", "not a slice");
+  const SourceVolume v = read_volume(folder.path(), kSpaced);
+  CHECK(v.grid == kSmall);
+  CHECK(same_values(v, counting<float>()));
+  CHECK(refusal(folder.path()).find("spacing is not in the file") != std::string::npos);
+}
+
+TEST_CASE("a TIFF of several pages is a volume") {
+  const TempFolder folder;
+  std::vector<std::string> pages;
+  for (int z = 0; z < 5; ++z) pages.push_back(slice<std::uint8_t>(z));
+  const SourceVolume v = read_volume(folder.write("a.tiff", tiff(3, 4, 8, pages)), kSpaced);
+  CHECK(v.grid == kSmall);
+  CHECK(same_values(v, counting<float>()));
+}
+
+TEST_CASE("values of 16 bits come whole from the largest and the smallest") {
+  const TempFolder folder;
+  for (int z = 0; z < 2; ++z) {
+    folder.write(
+        "s" + std::to_string(z) + ".png",
+        png(2, 1, 16, kGrey, bytes_of(std::vector<std::uint16_t>{0, 65535}, std::endian::big)));
+  }
+  const SourceVolume v = read_volume(folder.path(), kSpaced);
+  CHECK(v.min == 0);
+  CHECK(v.max == 65535);
+}
+
+TEST_CASE("pictures that are no stack are refused in one line") {
+  const TempFolder folder;
+  const auto refused = [&](const std::string& what) {
+    const std::string message = refusal(folder.path(), kSpaced);
+    CAPTURE(message);
+    CHECK(is_one_line(message));
+    CHECK(message.find(what) != std::string::npos);
+  };
+  const auto grey = [](int z) { return png(3, 4, 8, kGrey, slice<std::uint8_t>(z)); };
+  SUBCASE("colour and transparency") {
+    write_stack(folder, ".png",
+                [](int) { return png(3, 4, 8, kRgba, std::string(std::size_t{4} * 12, 'x')); });
+    refused("slice8.png: 4 values per voxel");
+  }
+  SUBCASE("mixed sizes") {
+    write_stack(folder, ".png", [&](int z) {
+      return z == 3 ? png(4, 3, 8, kGrey, slice<std::uint8_t>(z)) : grey(z);
+    });
+    refused("slice11.png: 4 x 3 pixels, and slice8.png has 3 x 4");
+  }
+  SUBCASE("one picture") {
+    folder.write("a.png", grey(0));
+    refused("one picture");
+  }
+  SUBCASE("a picture is cut off") {
+    write_stack(folder, ".png", [&](int z) { return z == 2 ? grey(z).substr(0, 50) : grey(z); });
+    refused("slice10.png");
+  }
+  SUBCASE("a picture is none") {
+    write_stack(folder, ".png", [&](int z) { return z == 2 ? "no picture" : grey(z); });
+    refused("slice10.png");
+  }
+  SUBCASE("a page too many") {
+    write_stack(folder, ".tif", [](int z) {
+      return tiff(3, 4, 8, {slice<std::uint8_t>(z), slice<std::uint8_t>(z)});
+    });
+    refused("slice8.tif");
+  }
+}
+
+TEST_CASE("a file without a header is what its layout says") {
+  const TempFolder folder;
+  const auto read = [&](const std::string& bytes, const RawLayout& layout) {
+    ReadOptions options = kSpaced;
+    options.raw = layout;
+    return read_volume(folder.write("voxels", bytes), options);
+  };
+  CHECK(same_values(read(bytes_of(counting<std::uint8_t>()), {kSmall, VoxelType::uint8}),
+                    counting<float>()));
+  CHECK(same_values(
+      read(bytes_of(counting<std::int16_t>(), std::endian::big), {kSmall, VoxelType::int16, true}),
+      counting<float>()));
+  CHECK(same_values(read("header" + bytes_of(counting<double>(), std::endian::big),
+                         {kSmall, VoxelType::float64, true, 6}),
+                    counting<float>()));
+  CHECK(same_values(read(bytes_of(counting<std::int64_t>()), {kSmall, VoxelType::int64}),
+                    counting<float>()));
+}
+
+TEST_CASE("a file without a header is refused where its size is not that of the layout") {
+  const TempFolder folder;
+  const auto path = folder.write("voxels.raw", bytes_of(counting<std::uint16_t>()));
+  const auto refused = [&](const RawLayout& layout) {
+    ReadOptions options = kSpaced;
+    options.raw = layout;
+    const std::string message = refusal(path, options);
+    CAPTURE(message);
+    CHECK(is_one_line(message));
+    return message;
+  };
+  CHECK(refused({{3, 4, 6}, VoxelType::uint16}).find("120 bytes of voxels") != std::string::npos);
+  CHECK(refused({{3, 4, 4}, VoxelType::uint16}).find("--skip 24") != std::string::npos);
+  CHECK(refused({kSmall, VoxelType::uint16, false, 200}).find("0 bytes of voxels") !=
+        std::string::npos);
+  CHECK(refused({{1024, 1024, 1024}, VoxelType::float64}) != "no error");
+}
