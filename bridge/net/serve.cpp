@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "bridge/net/serve.hpp"
+
+#include <charconv>
+#include <cstdint>
+#include <iostream>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "bridge/net/bridge_error.hpp"
+#include "bridge/net/host_names.hpp"
+#include "bridge/net/server.hpp"
+
+namespace kerf::bridge {
+namespace {
+
+struct HostPort {
+  std::string host;
+  std::uint16_t port = 0;
+};
+
+/// `HOST:PORT`, IPv6 in brackets.
+HostPort parse_listen(const std::string& text) {
+  const auto refuse = [&text](const char* why) {
+    return BridgeError("--listen " + text + ": " + why + "; give HOST:PORT, as 127.0.0.1:7400");
+  };
+  const std::size_t colon = text.rfind(':');
+  if (colon == std::string::npos) throw refuse("has no port");
+  HostPort out{text.substr(0, colon), 0};
+  if (out.host.starts_with('[') && out.host.ends_with(']')) {
+    out.host = out.host.substr(1, out.host.size() - 2);
+  } else if (out.host.find(':') != std::string::npos) {
+    throw refuse("an IPv6 address stands in brackets");
+  }
+  if (out.host.empty()) throw refuse("has no host");
+  const char* const end = text.data() + text.size();
+  const auto [stopped, error] = std::from_chars(text.data() + colon + 1, end, out.port);
+  if (error != std::errc() || stopped != end) throw refuse("the port is 0 to 65535");
+  return out;
+}
+
+/// Where others reach what listens at `host`: itself, or each address of this machine.
+[[nodiscard]] std::vector<std::string> reached_at(const std::string& host) {
+  if (host != "0.0.0.0" && host != "::") return {host};
+  std::vector<std::string> out = own_addresses();
+  if (host == "0.0.0.0") {
+    std::erase_if(out, [](const std::string& one) { return one.find(':') != std::string::npos; });
+  }
+  return out;
+}
+
+[[nodiscard]] bool is_loopback(const std::string& host) {
+  return host.starts_with("127.") || host == "::1" || host == "localhost";
+}
+
+void print_addresses(const ServerSetup& setup, std::uint16_t port) {
+  for (const std::string& host : reached_at(setup.host)) {
+    const bool v6 = host.find(':') != std::string::npos;
+    std::cout << (setup.tls ? "https://" : "http://") << (v6 ? "[" : "") << host << (v6 ? "]" : "")
+              << ':' << port << "/?token=" << setup.tokens.first() << '\n';
+  }
+  std::cout.flush();
+}
+
+}  // namespace
+
+int run_serve(const ServeOptions& options, const std::atomic<bool>& stop) {
+  const HostPort at = parse_listen(options.listen);
+  ServerSetup setup;
+  setup.host = at.host;
+  setup.port = at.port;
+  setup.name = options.name;
+  setup.max_viewers = static_cast<std::size_t>(options.max_viewers);
+  setup.dedicated_link = options.dedicated_link;
+  if (options.token_file.empty()) {
+    setup.tokens.add(new_token(), Right::look);
+  } else {
+    setup.tokens.add_file(options.token_file, "--token-file", Right::look);
+  }
+  if (!options.command_tokens.empty()) {
+    setup.tokens.add_file(options.command_tokens, "--allow-commands", Right::command);
+  }
+  setup.host_names = own_hosts();
+  setup.host_names.push_back(at.host);
+  if (!options.identity.empty()) {
+    setup.tls = load_tls_keys(options.identity);
+  } else if (!is_loopback(at.host)) {
+    setup.tls = self_signed_keys(own_hosts());
+    std::cout << "certificate, self-signed, SHA-256 " << setup.tls->fingerprint << '\n';
+  }
+  if (setup.tls) {
+    setup.host_names.insert(setup.host_names.end(), setup.tls->names.begin(),
+                            setup.tls->names.end());
+  }
+  Server server(setup);
+  print_addresses(setup, server.port());
+  server.run(stop);
+  return 0;
+}
+
+}  // namespace kerf::bridge
