@@ -13,9 +13,6 @@ Reply CommandDesk::ask(const Command& command) noexcept {
   to_send_ = CommandMessage{kCommandMagic, static_cast<std::uint32_t>(command.kind),
                             command.argument, ++sequence_};
   reply_.reset();
-  lock.unlock();
-  wake_();
-  lock.lock();
   answered_.wait_for(lock, kPatience, [this] { return reply_.has_value(); });
   to_send_.reset();
   return reply_.value_or(Reply{ReplyStatus::busy, 0});

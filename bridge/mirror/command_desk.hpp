@@ -4,7 +4,6 @@
 #include <chrono>
 #include <condition_variable>
 #include <cstdint>
-#include <functional>
 #include <mutex>
 #include <optional>
 
@@ -14,16 +13,14 @@
 namespace kerf::bridge {
 
 /// Where a command of a local reader waits for the other machine's answer. One at a time: the
-/// segment server's thread asks, the network's thread sends and answers.
+/// segment server's thread asks, the network's thread looks for it as often as something arrives,
+/// at least 60 times a second, sends it and brings the answer.
 class CommandDesk {
  public:
   /// What the link can do: no connection is a reason to try again, no right is not.
   enum class Link : std::uint8_t { down, read_only, open };
   /// An answer later than that is no answer; a local reader waits for 2 s.
   static constexpr std::chrono::milliseconds kPatience{1500};
-
-  /// `wake` is called whenever a command waits to be sent, by the thread that asks.
-  explicit CommandDesk(std::function<void()> wake) : wake_(std::move(wake)) {}
 
   /// Waits for the answer, at most `kPatience`: then `busy`, though the command may still come.
   [[nodiscard]] Reply ask(const Command& command) noexcept;
@@ -34,7 +31,6 @@ class CommandDesk {
   void set_link(Link link);
 
  private:
-  std::function<void()> wake_;
   std::mutex mutex_;
   std::condition_variable answered_;
   Link link_ = Link::down;

@@ -3,7 +3,7 @@
 #include "bridge/mirror/mirror.hpp"
 
 #include <algorithm>
-#include <chrono>
+#include <atomic>
 #include <cstdint>
 #include <optional>
 #include <thread>
@@ -295,16 +295,20 @@ TEST_CASE("a name that is taken, another layout and a segment too large are told
 }
 
 TEST_CASE("a local reader's command gets the far side's answer, or is told that there is none") {
-  std::optional<CommandMessage> sent;
-  CommandDesk* far = nullptr;
-  CommandDesk desk([&] {
-    sent = far->take();
-    if (sent->argument == 1) far->answer({kReplyMagic, sent->sequence - 1, 0, 4});  // late
-    if (sent->argument <= 1) far->answer({kReplyMagic, sent->sequence, 0, 9});
-    if (sent->argument == 2) far->answer({kReplyMagic, sent->sequence, 77, 0});
-    if (sent->argument == 3) far->set_link(CommandDesk::Link::down);
+  CommandDesk desk;
+  std::atomic<bool> done{false};
+  std::atomic<std::uint32_t> kind{0};
+  std::thread far([&] {
+    for (; !done; std::this_thread::yield()) {
+      const auto sent = desk.take();
+      if (!sent) continue;
+      kind = sent->kind;
+      if (sent->argument == 1) desk.answer({kReplyMagic, sent->sequence - 1, 0, 4});  // late
+      if (sent->argument <= 1) desk.answer({kReplyMagic, sent->sequence, 0, 9});
+      if (sent->argument == 2) desk.answer({kReplyMagic, sent->sequence, 77, 0});
+      if (sent->argument == 3) desk.set_link(CommandDesk::Link::down);
+    }
   });
-  far = &desk;
   CHECK(desk.ask({}).status == ReplyStatus::busy);  // no connection: try again
   desk.set_link(CommandDesk::Link::read_only);
   CHECK(desk.ask({}).status == ReplyStatus::refused);
@@ -313,9 +317,11 @@ TEST_CASE("a local reader's command gets the far side's answer, or is told that 
     const Reply reply = desk.ask({.kind = CommandKind::select_tool, .argument = argument});
     CHECK(reply.status == ReplyStatus::accepted);
     CHECK(reply.index == 9);
-    CHECK(sent->kind == static_cast<std::uint32_t>(CommandKind::select_tool));
+    CHECK(kind == static_cast<std::uint32_t>(CommandKind::select_tool));
   }
   CHECK(desk.ask({.argument = 2}).status == ReplyStatus::refused);
   CHECK(desk.ask({.argument = 3}).status == ReplyStatus::busy);  // lost while it waited
   CHECK(!desk.take());
+  done = true;
+  far.join();
 }
