@@ -6,6 +6,7 @@
 
 #include "lab/accuracy/command.hpp"
 #include "lab/bench/bench_command.hpp"
+#include "lab/bridge/command.hpp"
 #include "lab/energy/command.hpp"
 #include "lab/extremes/command.hpp"
 #include "lab/faults/command.hpp"
@@ -23,6 +24,7 @@ int run_lab(int argc, const char* const* argv, std::ostream& out, std::ostream& 
   app.footer("Exit codes: 0 fine, 1 a check failed, 2 bad input or set-up.");
   const BenchCommand bench(app);
   const accuracy::Command accuracy(app);
+  const two_machines::Command bridge(app);
   const energy::Command energy(app);
   const extremes::Command extremes(app);
   const faults::Command faults(app);
@@ -31,8 +33,9 @@ int run_lab(int argc, const char* const* argv, std::ostream& out, std::ostream& 
   const sweep::Command sweep(app);
   const zwidth::Command zwidth(app);
   const zwidth::MergeCommand merge(app);
-  const std::array<const LabCommand*, 10> commands{&bench, &accuracy, &energy, &extremes, &faults,
-                                                   &laws,  &ranges,   &sweep,  &zwidth,   &merge};
+  const std::array<const LabCommand*, 11> commands{&bench,    &accuracy, &bridge, &energy,
+                                                   &extremes, &faults,   &laws,   &ranges,
+                                                   &sweep,    &zwidth,   &merge};
   try {
     if (!app.parse(argc, argv, out)) return 0;
     for (const LabCommand* command : commands) {
