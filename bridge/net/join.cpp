@@ -102,7 +102,7 @@ class Joiner {
   /// A reason is told once, not with every try.
   void lost(const std::string& reason) {
     if (std::exchange(last_reason_, reason) != reason) {
-      say(address_.host_and_port() + ": " + reason + "; trying again");
+      say(place() + reason + "; trying again");
     }
   }
 
@@ -116,9 +116,9 @@ class Joiner {
         } else {
           co_await follow(Plain(io_));
         }
-      } catch (const Hopeless&) {
-        if (joins_ == 0) throw;
-        lost(last_error());
+      } catch (const Hopeless& error) {
+        if (joins_ == 0) throw BridgeError(place() + error.what());
+        lost(error.what());
       } catch (const SegmentError&) {
         if (joins_ == 0) throw;
         lost(last_error());
@@ -148,7 +148,10 @@ class Joiner {
     beast::flat_buffer in;
     for (;;) {
       in.clear();
-      co_await stream.async_read(in, use_awaitable);
+      boost::system::error_code error;
+      co_await stream.async_read(in, asio::redirect_error(use_awaitable, error));
+      if (error == websocket::error::closed) throw_closed(stream.reason().code);
+      if (error) throw boost::system::system_error(error);
       heard_ns_ = monotonic_ns();
       const std::span message(static_cast<const std::byte*>(in.data().data()), in.size());
       if (const auto ack = take(message, link.socket().native_handle())) {
@@ -177,9 +180,6 @@ class Joiner {
       if (error) throw_no_trust(error);
     }
     stream.read_message_max(kMaxMessageBytes);
-    stream.set_option(websocket::stream_base::decorator([this](websocket::request_type& request) {
-      if (!cookie_.empty()) request.set(http::field::cookie, cookie_);
-    }));
     const std::string target =
         kBridgePath + (address_.token.empty() ? std::string() : "?token=" + address_.token);
     websocket::response_type response;
@@ -189,19 +189,14 @@ class Joiner {
     if (error) throw_no_welcome(error, response.result_int());
     link.expires_never();
     stream.binary(true);
-    const auto cookie = response.find(http::field::set_cookie);
-    if (cookie != response.end()) {
-      cookie_ = std::string(cookie->value().substr(0, cookie->value().find(';')));
-    }
   }
 
   [[noreturn]] void throw_no_trust(const boost::system::error_code& error) const {
     if (const std::string reason = trust_.refusal(); !reason.empty()) {
-      throw Hopeless(address_.host_and_port() + ": " + reason);
+      throw Hopeless(reason);
     }
     if (error.category() == asio::error::get_ssl_category()) {
-      throw Hopeless(address_.host_and_port() +
-                     ": no TLS 1.3 there; is it a kerf-bridge serve, and off loopback?");
+      throw Hopeless("no TLS 1.3 there; is it a kerf-bridge serve, and off loopback?");
     }
     throw boost::system::system_error(error);
   }
@@ -209,15 +204,28 @@ class Joiner {
   [[noreturn]] void throw_no_welcome(const boost::system::error_code& error,
                                      unsigned status) const {
     if (error != websocket::error::upgrade_declined) throw boost::system::system_error(error);
-    const std::string place = address_.host_and_port() + ": answers " + std::to_string(status);
-    if (status == 401 || status == 403) {
-      throw Hopeless(place +
-                     ", the token is not one of its own; take the address that serve "
-                     "prints");
+    if (status == 404) throw Hopeless("no kerf-bridge serve answers; take its port");
+    if (status == 421) {
+      throw Hopeless("does not know itself by this name; take the address it prints");
     }
-    if (status == 404) throw Hopeless(place + ", no kerf-bridge serve; take its port");
-    throw BridgeError(place);
+    throw BridgeError("answers " + std::to_string(status) + "; is it a kerf-bridge serve?");
   }
+
+  [[noreturn]] void throw_closed(unsigned code) const {
+    switch (static_cast<CloseCode>(code)) {
+      case CloseCode::no_token:
+        throw Hopeless("the token is not one of its own; take the address it prints");
+      case CloseCode::too_many:
+        throw BridgeError("has as many viewers as it takes");
+      case CloseCode::too_slow:
+        throw BridgeError("had no answer from here for 5 s");
+      case CloseCode::not_understood:
+        throw BridgeError("does not understand this program; use programs of one build");
+    }
+    throw BridgeError("closed the connection");
+  }
+
+  [[nodiscard]] std::string place() const { return address_.host_and_port() + ": "; }
 
   /// One message of the server; what is to be answered.
   std::optional<AckMessage> take(std::span<const std::byte> message, int socket) {
@@ -299,7 +307,7 @@ class Joiner {
   beast::tcp_stream* link_ = nullptr;  // of the connection that lives
   bool greeted_ = false;
   std::int64_t heard_ns_ = 0, since_ns_ = 0;
-  std::string cookie_, why_closed_, last_reason_;
+  std::string why_closed_, last_reason_;
   unsigned joins_ = 0;
   std::uint32_t repaired_here_ = 0;
   std::uint64_t repaired_ = 0;
