@@ -7,6 +7,7 @@
 #include "lab/accuracy/command.hpp"
 #include "lab/bench/bench_command.hpp"
 #include "lab/bridge/command.hpp"
+#include "lab/bridge/demo_command.hpp"
 #include "lab/energy/command.hpp"
 #include "lab/extremes/command.hpp"
 #include "lab/faults/command.hpp"
@@ -25,6 +26,7 @@ int run_lab(int argc, const char* const* argv, std::ostream& out, std::ostream& 
   const BenchCommand bench(app);
   const accuracy::Command accuracy(app);
   const two_machines::Command bridge(app);
+  const two_machines::DemoCommand demo(app);
   const energy::Command energy(app);
   const extremes::Command extremes(app);
   const faults::Command faults(app);

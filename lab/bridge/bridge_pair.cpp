@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "lab/bridge/bridge_pair.hpp"
 
+#include <algorithm>
 #include <chrono>
 #include <csignal>
 #include <cstdlib>
@@ -13,17 +14,12 @@
 
 #include "hil/hil_error.hpp"
 #include "shared/posix/hex64.hpp"
-#include "shared/posix/shipped_file.hpp"
 #include "shared/segment/segment_memory.hpp"
 
 namespace kerf::two_machines {
 namespace {
 
 constexpr const char* kPort = "7400";
-
-[[nodiscard]] std::filesystem::path beside_this_program(const char* name) {
-  return std::filesystem::read_symlink("/proc/self/exe").parent_path() / name;
-}
 
 /// Runs to its end; throws with its last line where it failed.
 void run_to_end(sweep::Child& child, const std::string& what) {
@@ -49,7 +45,7 @@ WorkFolder::~WorkFolder() {
 
 BridgeFiles::BridgeFiles(std::filesystem::path in)
     : folder(std::move(in)),
-      program(beside_this_program("kerf-bridge")),
+      program(sweep::program_beside("bridge")),
       ca(folder / "identity" / "ca.pem"),
       identity(folder / "identity"),
       token_file(folder / "tokens"),

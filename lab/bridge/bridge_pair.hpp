@@ -35,6 +35,7 @@ class BridgePair {
  public:
   static constexpr const char* kNearName = "near";
 
+  /// Serves the segment `kNearName`, which may come later.
   BridgePair(const TwoNetworks& networks, const BridgeFiles& files, bool dedicated_link);
 
   void start_serve();

@@ -33,4 +33,7 @@ class Child {
   std::filesystem::path output_;
 };
 
+/// Path of a program of kerf, by its short name: it lies beside this one.
+[[nodiscard]] std::string program_beside(const char* name);
+
 }  // namespace kerf::sweep
