@@ -11,7 +11,7 @@
 #include <ostream>
 #include <span>
 #include <type_traits>
-#include <utility>  // before Boost 1.74's awaitable.hpp, which needs it
+#include <utility>  // before the coroutines of Boost 1.74, which need it
 
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/detached.hpp>

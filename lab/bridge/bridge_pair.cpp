@@ -14,20 +14,30 @@
 
 #include "hil/hil_error.hpp"
 #include "shared/posix/hex64.hpp"
+#include "shared/posix/stop_signals.hpp"
 #include "shared/segment/segment_memory.hpp"
 
 namespace kerf::two_machines {
 namespace {
 
 constexpr const char* kPort = "7400";
+constexpr std::chrono::milliseconds kStopLook{50};
 
 /// Runs to its end; throws with its last line where it failed.
 void run_to_end(sweep::Child& child, const std::string& what) {
-  while (!child.ended()) std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  while (!child.ended()) pause(std::chrono::milliseconds(2));
   if (*child.ended() != 0) throw HilError(what + ": " + child.last_line());
 }
 
 }  // namespace
+
+void pause(std::chrono::nanoseconds time) {
+  const auto end = std::chrono::steady_clock::now() + time;
+  for (auto left = time; left.count() > 0; left = end - std::chrono::steady_clock::now()) {
+    if (stop_requested()) throw HilError("stopped");
+    std::this_thread::sleep_for(std::min<std::chrono::nanoseconds>(left, kStopLook));
+  }
+}
 
 WorkFolder::WorkFolder() {
   std::string pattern = (std::filesystem::temp_directory_path() / "kerf-bridge-XXXXXX").string();
@@ -51,6 +61,8 @@ BridgeFiles::BridgeFiles(std::filesystem::path in)
       token_file(folder / "tokens"),
       token(hex64(random_session_id()) + hex64(random_session_id())) {
   std::ofstream(token_file) << token << '\n';
+  using std::filesystem::perms;
+  std::filesystem::permissions(token_file, perms::owner_read | perms::owner_write);
   sweep::Child make({program, "make-identity", identity, "--host", TwoNetworks::kNearAddress},
                     folder / "make-identity.log");
   run_to_end(make, "make-identity");
@@ -70,6 +82,10 @@ void BridgePair::start_serve() {
       "--token-file", files_.token_file};
   if (dedicated_link_) arguments.emplace_back("--dedicated-link");
   serve_ = networks_.start(TwoNetworks::Side::near, arguments, files_.folder / "serve.log");
+}
+
+void BridgePair::require_serve() {
+  if (serve_->ended()) throw HilError(serve_->last_line());
 }
 
 void BridgePair::kill_serve() {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
@@ -9,6 +10,9 @@
 #include "lab/bridge/two_networks.hpp"
 
 namespace kerf::two_machines {
+
+/// Sleeps; throws `HilError` where a signal asks for the end, so that all that was started ends.
+void pause(std::chrono::nanoseconds time);
 
 /// A folder of this process alone, with the sockets of segments in it; goes with its owner.
 class WorkFolder {
@@ -39,6 +43,8 @@ class BridgePair {
   BridgePair(const TwoNetworks& networks, const BridgeFiles& files, bool dedicated_link);
 
   void start_serve();
+  /// Throws `HilError` with its last words where it has ended by itself.
+  void require_serve();
   /// Kills it where it lives, as by SIGKILL.
   void kill_serve();
   [[nodiscard]] sweep::Child& serve() { return *serve_; }

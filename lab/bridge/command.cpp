@@ -10,6 +10,7 @@
 #include "lab/bridge/measurements.hpp"
 #include "lab/bridge/two_networks.hpp"
 #include "lab/rig/lab_run.hpp"
+#include "shared/posix/stop_signals.hpp"
 #include "shared/text/format.hpp"
 
 namespace kerf::two_machines {
@@ -142,6 +143,7 @@ int Command::run(std::ostream& out) const {
     out << "bridge: skipped: " << reason.what() << '\n';
     return kSkipped;
   }
+  catch_stop_signals();
   const WorkFolder folder;
   const BridgeFiles files(folder.path());
   Table table(out, files, quick_ ? 2 : seconds_, quick_, seed_);

@@ -11,7 +11,6 @@
 #include <memory>
 #include <ostream>
 #include <sstream>
-#include <thread>
 #include <utility>
 #include <vector>
 
@@ -19,6 +18,7 @@
 #include "lab/bridge/bridge_pair.hpp"
 #include "lab/bridge/two_networks.hpp"
 #include "shared/posix/shipped_file.hpp"
+#include "shared/posix/stop_signals.hpp"
 #include "shared/text/format.hpp"
 #include "shared/text/json.hpp"
 #include "shared/text/number.hpp"
@@ -56,7 +56,7 @@ bool wait_for(Child& child, seconds patience, Condition there) {
        std::chrono::steady_clock::now() < end;) {
     if (there()) return true;
     if (child.ended()) return there();
-    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    pause(std::chrono::milliseconds(5));
   }
   return false;
 }
@@ -132,7 +132,7 @@ class Demo {
 
   /// The controller's exit code.
   int wait_for_end() {
-    while (!controller_->ended()) std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    while (!controller_->ended()) pause(std::chrono::milliseconds(20));
     if (window_) visualizer_->signal(SIGTERM);
     wait_for(*visualizer_, seconds(20), [] { return false; });
     join_->signal(SIGTERM);
@@ -203,6 +203,7 @@ int DemoCommand::run(std::ostream& out) const {
     out << "two machines: skipped: " << reason.what() << '\n';
     return kSkipped;
   }
+  catch_stop_signals();
   const WorkFolder folder;
   const std::string pictures = out_.empty() ? (folder.path() / "pictures").string() : out_;
   Demo demo({.loss = loss_percent_ / 100, .delay_ms = delay_ms_, .mbit = mbit_}, folder.path());

@@ -4,6 +4,7 @@
 #include <optional>
 #include <utility>
 
+#include "lab/bridge/bridge_pair.hpp"
 #include "shared/posix/monotonic_clock.hpp"
 #include "shared/segment/hand_over.hpp"
 #include "shared/volume/density_hash.hpp"
@@ -19,7 +20,7 @@ template <class Condition>
   const auto end = std::chrono::steady_clock::now() + patience;
   while (!holds()) {
     if (std::chrono::steady_clock::now() > end) return false;
-    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    pause(std::chrono::milliseconds(2));
   }
   return true;
 }

@@ -9,7 +9,6 @@
 #include <memory>
 #include <random>
 #include <span>
-#include <thread>
 #include <utility>
 
 #include "lab/bridge/far_viewer.hpp"
@@ -26,7 +25,7 @@ constexpr milliseconds kRepairPatience{2'000};
 constexpr milliseconds kStillPatience{10'000};  // of a slow link with a queue
 
 void sleep_s(double seconds) {
-  std::this_thread::sleep_for(std::chrono::duration<double>(seconds));
+  pause(std::chrono::nanoseconds(static_cast<std::int64_t>(seconds * 1e9)));
 }
 
 [[nodiscard]] double seconds_since(std::int64_t ns) {
@@ -39,7 +38,10 @@ struct Scene {
         bool dedicated_link = false)
       : networks(link),
         volume(BridgePair::kNearName, load, layers),
-        pair(networks, files, dedicated_link) {}
+        pair(networks, files, dedicated_link) {
+    sleep_s(0.5);  // it listens by then, or tells why not
+    pair.require_serve();
+  }
   TwoNetworks networks;
   MilledVolume volume;
   BridgePair pair;
@@ -80,7 +82,6 @@ std::vector<Case> quick_cases() {
 CaseResult run_case(const Case& what, const BridgeFiles& files, double seconds) {
   Scene scene(what.link, files, what.load, what.layers, what.dedicated_link);
   FarViewer viewer("far", scene.volume);
-  sleep_s(0.5);  // serve listens
   CaseResult out;
   const std::int64_t start_ns = monotonic_ns();
   const auto join = scene.pair.join("far");
