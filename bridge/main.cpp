@@ -2,6 +2,7 @@
 #include <iostream>
 
 #include "bridge/net/identity.hpp"
+#include "bridge/net/join.hpp"
 #include "bridge/net/serve.hpp"
 #include "shared/posix/failure.hpp"
 #include "shared/posix/private_files.hpp"
@@ -29,6 +30,21 @@ Arguments add_serve(CommandLine& app, ServeOptions& options) {
   return serve;
 }
 
+Arguments add_join(CommandLine& app, JoinOptions& options) {
+  Arguments join = app.command("join", "Repeats a far controller's segment here, for all readers.");
+  join.option("address", options.address, "what serve prints: wss://HOST:PORT/?token=TOKEN")
+      .required();
+  join.option("--name", options.name, "of the segment here, as readers ask for it").shows_default();
+  join.option("--ca", options.ca, "ca.pem of the lab that vouches for the server").shown_as("FILE");
+  join.option("--fingerprint", options.fingerprint,
+              "of the server's certificate, as serve prints it")
+      .shown_as("SHA256");
+  join.option("--most-mib", options.most_mib, "a larger segment is refused")
+      .within(1, 65536)
+      .shows_default();
+  return join;
+}
+
 void add_make_identity(CommandLine& app, IdentityOptions& options) {
   Arguments make =
       app.command("make-identity", "Makes a lab's CA, and a certificate of a machine.");
@@ -40,13 +56,16 @@ void add_make_identity(CommandLine& app, IdentityOptions& options) {
 
 int run(int argc, char** argv) {
   ServeOptions serve_options;
+  JoinOptions join_options;
   IdentityOptions identity_options;
   CommandLine app("Carries the picture of a kerf-controller to other machines.", "kerf-bridge",
                   KERF_VERSION);
   const Arguments serve = add_serve(app, serve_options);
+  const Arguments join = add_join(app, join_options);
   add_make_identity(app, identity_options);
   if (!app.parse(argc, argv, std::cout)) return 0;
   if (serve.chosen()) return run_serve(serve_options, catch_stop_signals());
+  if (join.chosen()) return run_join(join_options, catch_stop_signals(), std::cout);
   return run_make_identity(identity_options);
 }
 

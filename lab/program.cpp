@@ -6,6 +6,8 @@
 
 #include "lab/accuracy/command.hpp"
 #include "lab/bench/bench_command.hpp"
+#include "lab/bridge/command.hpp"
+#include "lab/bridge/demo_command.hpp"
 #include "lab/burs/command.hpp"
 #include "lab/energy/command.hpp"
 #include "lab/extremes/command.hpp"
@@ -24,6 +26,8 @@ int run_lab(int argc, const char* const* argv, std::ostream& out, std::ostream& 
   app.footer("Exit codes: 0 fine, 1 a check failed, 2 bad input or set-up.");
   const BenchCommand bench(app);
   const accuracy::Command accuracy(app);
+  const two_machines::Command bridge(app);
+  const two_machines::DemoCommand demo(app);
   const burs::Command burs(app);
   const energy::Command energy(app);
   const extremes::Command extremes(app);
@@ -33,9 +37,9 @@ int run_lab(int argc, const char* const* argv, std::ostream& out, std::ostream& 
   const sweep::Command sweep(app);
   const zwidth::Command zwidth(app);
   const zwidth::MergeCommand merge(app);
-  const std::array<const LabCommand*, 11> commands{&bench,    &accuracy, &burs, &energy,
-                                                   &extremes, &faults,   &laws, &ranges,
-                                                   &sweep,    &zwidth,   &merge};
+  const std::array<const LabCommand*, 13> commands{&bench,  &accuracy, &bridge, &demo, &burs,
+                                                   &energy, &extremes, &faults, &laws, &ranges,
+                                                   &sweep,  &zwidth,   &merge};
   try {
     if (!app.parse(argc, argv, out)) return 0;
     for (const LabCommand* command : commands) {

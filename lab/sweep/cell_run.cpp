@@ -135,11 +135,6 @@ const std::vector<std::string>& result_columns() {
   return names;
 }
 
-std::string program_beside(const char* name) {
-  return std::filesystem::read_symlink("/proc/self/exe")
-      .replace_filename(std::string("kerf-") + name);
-}
-
 std::optional<CellResult> run_cell(const CellJob& job, const std::filesystem::path& folder,
                                    const std::atomic<bool>& stop) {
   const auto at = [&](const char* name) { return (folder / name).string(); };

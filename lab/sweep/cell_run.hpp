@@ -37,7 +37,4 @@ struct CellResult {
                                                  const std::filesystem::path& folder,
                                                  const std::atomic<bool>& stop);
 
-/// Where a program of kerf lies: beside this one.
-[[nodiscard]] std::string program_beside(const char* name);
-
 }  // namespace kerf::sweep

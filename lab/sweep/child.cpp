@@ -74,4 +74,9 @@ std::string Child::last_line() const {
   return last;
 }
 
+std::string program_beside(const char* name) {
+  return std::filesystem::read_symlink("/proc/self/exe")
+      .replace_filename(std::string("kerf-") + name);
+}
+
 }  // namespace kerf::sweep

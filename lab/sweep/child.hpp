@@ -23,6 +23,7 @@ class Child {
   /// Exit code, or 128 + signal; nothing while it runs.
   [[nodiscard]] std::optional<int> ended();
   void signal(int number);
+  [[nodiscard]] pid_t pid() const noexcept { return pid_; }
   /// The last line that it said; empty: none.
   [[nodiscard]] std::string last_line() const;
 
@@ -31,5 +32,8 @@ class Child {
   std::optional<int> code_;
   std::filesystem::path output_;
 };
+
+/// Path of a program of kerf, by its short name: it lies beside this one.
+[[nodiscard]] std::string program_beside(const char* name);
 
 }  // namespace kerf::sweep

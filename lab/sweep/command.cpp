@@ -20,6 +20,7 @@
 #include "hil/hil_error.hpp"
 #include "lab/sweep/axis.hpp"
 #include "lab/sweep/cell_run.hpp"
+#include "lab/sweep/child.hpp"
 #include "lab/sweep/table.hpp"
 #include "shared/numeric/fnv1a.hpp"
 #include "shared/posix/hex64.hpp"

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -32,6 +34,12 @@ class SegmentServer {
   /// Throws `SegmentError` where another live controller has the name; the socket of a dead one is
   /// replaced.
   SegmentServer(std::string_view name, const SegmentWriter& writer, CommandLimits limits = {});
+
+  /// For the segment `memfd` of another writer: `answer` decides what becomes of a command, whose
+  /// content is unchecked. The server's thread calls it; while it waits, at most 2 s, no other
+  /// reader is served. It does not throw.
+  using Answer = std::function<Reply(const Command&)>;
+  SegmentServer(std::string_view name, int memfd, std::uint64_t session_id, Answer answer);
   ~SegmentServer();
   SegmentServer(const SegmentServer&) = delete;
   SegmentServer& operator=(const SegmentServer&) = delete;

@@ -9,6 +9,7 @@
 #include "shared/posix/hex64.hpp"
 #include "shared/segment/layout_table.hpp"
 #include "shared/segment/reader.hpp"
+#include "shared/segment/segment_plan.hpp"
 #include "shared/segment/shared_words.hpp"
 #include "shared/volume/scene_limits.hpp"
 
@@ -122,6 +123,13 @@ void require_same_layout(std::uint32_t major, std::uint32_t minor, std::uint64_t
   }
   if (abi_hash != kAbiHash) {
     refuse("abi hash", hex64(abi_hash), hex64(kAbiHash) + ": use programs of one build");
+  }
+}
+
+void check_plan(const SegmentPlan& plan) {
+  check_header(plan.header, plan.header.total_bytes);
+  for (std::size_t i = 0; i < plan.volumes.size(); ++i) {
+    static_cast<void>(check_volume(plan.volumes[i], i, plan.header.total_bytes));
   }
 }
 

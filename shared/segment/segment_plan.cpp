@@ -14,7 +14,7 @@ namespace {
 
 constexpr std::uint64_t kPartAlignment = 4096;  // no two parts share a page or a cache line
 
-void check_volume(const SegmentVolumeSpec& volume, std::size_t index) {
+void check_source(const SegmentVolumeSpec& volume, std::size_t index) {
   const std::string place = "segment: volume " + std::to_string(index) + ": ";
   const auto fits = [](std::int32_t n) {
     return n >= 1 && n <= std::numeric_limits<std::uint16_t>::max();
@@ -63,6 +63,7 @@ VolumeDescriptor describe(const SegmentVolumeSpec& volume) {
   std::copy(volume.orientation.begin(), volume.orientation.end(), out.orientation);
   out.material = volume.material;
   out.iso = volume.iso;
+  out.off_labels = volume.labels.empty() ? 0 : 1;  // until `lay_out` places them
   return out;
 }
 
@@ -80,40 +81,49 @@ SegmentPlan plan_segment(const SegmentSpec& spec) {
   if (spec.tick_ns == 0) throw SegmentError("segment: tick of 0 ns; give the servo's period");
 
   SegmentPlan plan;
+  plan.header.config_hash = spec.config_hash;
+  plan.header.tick_ns = spec.tick_ns;
+  plan.header.dirty_slots = spec.mirror_updates ? kDirtySlots : 1;
+  plan.header.scene_bytes = spec.scene_json.size();
+  set_build_id(plan.header, spec.build_id);
+  for (std::size_t i = 0; i < spec.volumes.size(); ++i) {
+    check_source(spec.volumes[i], i);
+    plan.volumes.push_back(describe(spec.volumes[i]));
+  }
+  lay_out(plan);
+  return plan;
+}
+
+void set_build_id(SegmentHeader& header, std::string_view build_id) {
+  std::copy_n(build_id.begin(), std::min(build_id.size(), sizeof header.build_id - 1),
+              header.build_id);
+}
+
+void lay_out(SegmentPlan& plan) {
+  SegmentHeader& header = plan.header;
   std::uint64_t end = sizeof(SegmentHeader);
   const auto place = [&end](std::uint64_t bytes) {
     const std::uint64_t at = end;
     end = (end + bytes + kPartAlignment - 1) / kPartAlignment * kPartAlignment;
     return at;
   };
-  SegmentHeader& header = plan.header;
   header.layout_major = kLayoutMajor;
   header.layout_minor = kLayoutMinor;
   header.abi_hash = kAbiHash;
-  header.config_hash = spec.config_hash;
-  header.tick_ns = spec.tick_ns;
-  header.volume_count = static_cast<std::uint32_t>(spec.volumes.size());
+  header.volume_count = static_cast<std::uint32_t>(plan.volumes.size());
   header.state_slots = kStateSlots;
-  header.dirty_slots = spec.mirror_updates ? kDirtySlots : 1;
   header.state_record_bytes = sizeof(TickRecord);
   header.dirty_record_bytes = sizeof(DirtyRecord);
-  const std::size_t id_length = std::min(spec.build_id.size(), sizeof header.build_id - 1);
-  std::copy_n(spec.build_id.begin(), id_length, header.build_id);
-
-  header.off_volume_table = place(spec.volumes.size() * sizeof(VolumeDescriptor));
-  header.off_scene = place(spec.scene_json.size());
-  header.scene_bytes = spec.scene_json.size();
+  header.off_volume_table = place(plan.volumes.size() * sizeof(VolumeDescriptor));
+  header.off_scene = place(header.scene_bytes);
   header.off_state = place(std::uint64_t{header.state_slots} * sizeof(TickRecord));
   header.off_dirty = place(std::uint64_t{header.dirty_slots} * sizeof(DirtyRecord));
-  for (std::size_t i = 0; i < spec.volumes.size(); ++i) {
-    check_volume(spec.volumes[i], i);
-    VolumeDescriptor& out = plan.volumes.emplace_back(describe(spec.volumes[i]));
+  for (VolumeDescriptor& out : plan.volumes) {
     out.off_versions = place(std::uint64_t{out.brick_count} * sizeof(std::uint64_t));
     out.off_bricks = place(std::uint64_t{out.brick_count} * kBrickVoxels * sizeof(Density));
-    if (!spec.volumes[i].labels.empty()) out.off_labels = place(spec.volumes[i].labels.size());
+    if (out.off_labels != 0) out.off_labels = place(std::uint64_t{out.nx} * out.ny * out.nz);
   }
   header.total_bytes = end;
-  return plan;
 }
 
 }  // namespace kerf

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <string_view>
 #include <vector>
 
 #include "shared/segment/layout.hpp"
@@ -17,5 +18,15 @@ struct SegmentPlan {
 
 /// Checks `spec` and lays it out. Throws `SegmentError`.
 [[nodiscard]] SegmentPlan plan_segment(const SegmentSpec& spec);
+
+/// Cut to what the header holds.
+void set_build_id(SegmentHeader& header, std::string_view build_id);
+
+/// Fills what every segment has and all places, from the volumes' sizes (`off_labels` not 0: has
+/// labels), the scene's size and the slots of the dirty ring.
+void lay_out(SegmentPlan& plan);
+
+/// Checks a plan that is laid out, by the rules of `parse_segment`. Throws `SegmentError`.
+void check_plan(const SegmentPlan& plan);
 
 }  // namespace kerf

@@ -97,14 +97,16 @@ class Listener {
 }  // namespace
 
 struct SegmentServer::State {
-  State(std::string_view name, const SegmentWriter& writer, CommandLimits command_limits)
+  State(std::string_view name, int memfd, std::uint64_t session_id, CommandLimits command_limits,
+        Answer others_answer)
       : path(segment_socket(name)),
         lock(name),
         listener(path),
-        segment(reopen_read_only(writer.fd())),
+        segment(reopen_read_only(memfd)),
         stop(make_event()),
-        hello{kSegmentMagic, kLayoutMajor, kLayoutMinor, kAbiHash, writer.session_id()},
-        limits(command_limits) {
+        hello{kSegmentMagic, kLayoutMajor, kLayoutMinor, kAbiHash, session_id},
+        limits(command_limits),
+        others(std::move(others_answer)) {
     polled.reserve(2 + kMaxPeers);  // not in the thread, which has nobody to tell that it failed
     peers.reserve(kMaxPeers);
     thread = std::thread([this] { serve(); });
@@ -152,7 +154,9 @@ struct SegmentServer::State {
     if (length < 0) return errno == EAGAIN || errno == EINTR;
     if (length == 0) return false;
     Reply reply;
-    if (length == static_cast<ssize_t>(sizeof command) && is_valid(command, limits)) {
+    if (others && length == static_cast<ssize_t>(sizeof command)) {
+      reply = others(command);
+    } else if (length == static_cast<ssize_t>(sizeof command) && is_valid(command, limits)) {
       command.index = accepted + 1;
       const bool queued = commands.push(command);
       if (queued) reply.index = ++accepted;
@@ -169,6 +173,7 @@ struct SegmentServer::State {
   OwnedFd stop;
   Hello hello;
   CommandLimits limits;
+  Answer others;  // where the commands are not for `commands`
   std::vector<pollfd> polled;
   std::vector<OwnedFd> peers;
   std::uint32_t accepted = 0;
@@ -177,7 +182,11 @@ struct SegmentServer::State {
 
 SegmentServer::SegmentServer(std::string_view name, const SegmentWriter& writer,
                              CommandLimits limits)
-    : state_(std::make_unique<State>(name, writer, limits)) {}
+    : state_(std::make_unique<State>(name, writer.fd(), writer.session_id(), limits, Answer{})) {}
+SegmentServer::SegmentServer(std::string_view name, int memfd, std::uint64_t session_id,
+                             Answer answer)
+    : state_(std::make_unique<State>(name, memfd, session_id, CommandLimits{}, std::move(answer))) {
+}
 SegmentServer::~SegmentServer() = default;
 
 std::optional<Command> SegmentServer::take_command() noexcept {

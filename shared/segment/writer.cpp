@@ -11,6 +11,7 @@
 #include "shared/posix/monotonic_clock.hpp"
 #include "shared/segment/dirty_bricks.hpp"
 #include "shared/segment/hash.hpp"
+#include "shared/segment/record_ring.hpp"
 #include "shared/segment/segment_memory.hpp"
 #include "shared/segment/segment_plan.hpp"
 #include "shared/segment/shared_words.hpp"
@@ -47,23 +48,6 @@ struct MirroredVolume {
       }
     }
     words::close(version, stable_version(tick));
-  }
-};
-
-/// A ring of records with a private counter: the segment is never read back.
-template <class Record>
-struct RecordRing {
-  std::byte* slots = nullptr;
-  std::byte* head = nullptr;
-  std::uint64_t mask = 0;
-  std::uint64_t published = 0;
-
-  void push(Record& record) noexcept {
-    std::byte* const slot = slots + (published & mask) * sizeof(Record);
-    words::open(slot, 2 * published + 1);
-    words::store(slot + 8, reinterpret_cast<const std::byte*>(&record) + 8, sizeof(Record) - 8);
-    words::close(slot, 2 * published + 2);
-    words::word(head).store(++published, std::memory_order_release);
   }
 };
 

@@ -1,0 +1,218 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "lab/bridge/demo_command.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <csignal>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <memory>
+#include <ostream>
+#include <sstream>
+#include <utility>
+#include <vector>
+
+#include "hil/hil_error.hpp"
+#include "lab/bridge/bridge_pair.hpp"
+#include "lab/bridge/two_networks.hpp"
+#include "shared/posix/shipped_file.hpp"
+#include "shared/posix/stop_signals.hpp"
+#include "shared/text/format.hpp"
+#include "shared/text/json.hpp"
+#include "shared/text/number.hpp"
+
+namespace kerf::two_machines {
+namespace {
+
+using Side = TwoNetworks::Side;
+using std::chrono::seconds;
+using sweep::Child;
+using sweep::program_beside;
+
+constexpr int kSkipped = 77;
+constexpr int kPictures = 12;
+constexpr const char* kFarName = "far";
+
+[[nodiscard]] std::string text_in(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+/// The value of `name=value`, a line of `text`; empty where there is none.
+[[nodiscard]] std::string value_in(const std::string& text, const std::string& name) {
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) {
+    if (line.starts_with(name + "=")) return line.substr(name.size() + 1);
+  }
+  return "";
+}
+
+/// Waits until `there` holds, `child` has ended, or it took too long; true: it holds.
+template <class Condition>
+bool wait_for(Child& child, seconds patience, Condition there) {
+  for (const auto end = std::chrono::steady_clock::now() + patience;
+       std::chrono::steady_clock::now() < end;) {
+    if (there()) return true;
+    if (child.ended()) return there();
+    pause(std::chrono::milliseconds(5));
+  }
+  return false;
+}
+
+[[nodiscard]] bool has_display() {
+  // NOLINTNEXTLINE(concurrency-mt-unsafe): nobody writes the environment
+  return std::getenv("DISPLAY") != nullptr || std::getenv("WAYLAND_DISPLAY") != nullptr;
+}
+
+/// What runs on both machines, with its files in one folder.
+class Demo {
+ public:
+  Demo(const LinkSettings& link, std::filesystem::path folder)
+      : folder_(std::move(folder)), networks_(link), files_(folder_) {}
+
+  void start_controller(const std::string& scene, double run_s) {
+    Child describe({program_beside("emulator"), "--personality", "omni", "--describe"},
+                   at("describe"));
+    wait_for(describe, seconds(10), [&] { return describe.ended().has_value(); });
+    controller_ = networks_.start(Side::near,
+                                  {program_beside("controller"), "--scene", scene, "--device",
+                                   "omni", "--port", "socket:" + at("device"), "--torque-scale",
+                                   value_in(text_in(at("describe")), "torque_scale"), "--seconds",
+                                   number_text(run_s), "--name", BridgePair::kNearName,
+                                   "--emulator-args", at("told"), "--report", at("report.json")},
+                                  at("controller.log"));
+    const bool told =
+        wait_for(*controller_, seconds(60), [&] { return std::filesystem::exists(at("told")); });
+    if (!told) throw HilError(controller_->last_line());
+    told_ = text_in(at("told"));
+  }
+
+  void start_picture(const std::string& size, const std::string& out, double run_s) {
+    pair_ = std::make_unique<BridgePair>(networks_, files_, false);
+    join_ = pair_->join(kFarName);
+    std::vector<std::string> words{program_beside("visualizer"),
+                                   "--name",
+                                   kFarName,
+                                   "--size",
+                                   size,
+                                   "--wait",
+                                   "30",
+                                   "--attached",
+                                   at("attached"),
+                                   "--out",
+                                   out};
+    window_ = has_display();
+    if (!window_) {
+      const double rate_hz = std::strtod(value_in(told_, "rate_hz").c_str(), nullptr);
+      const auto every = static_cast<long>(run_s * (rate_hz > 0 ? rate_hz : 1000) / kPictures);
+      for (const std::string& word :
+           {std::string("--headless"), std::string("--frames"), std::to_string(kPictures),
+            std::string("--every-ticks"), std::to_string(std::max(every, 1L)),
+            std::string("--report"), at("visualizer.json")}) {
+        words.push_back(word);
+      }
+    }
+    visualizer_ = networks_.start(Side::far, words, at("visualizer.log"));
+    wait_for(*visualizer_, seconds(40), [&] { return std::filesystem::exists(at("attached")); });
+    if (!std::filesystem::exists(at("attached"))) {
+      throw HilError(visualizer_->last_line() + " (join: " + join_->last_line() + ")");
+    }
+  }
+
+  void start_hand() {
+    emulator_ =
+        networks_.start(Side::near,
+                        {program_beside("emulator"), "--personality", "omni", "--front", "socket",
+                         "--socket", at("device"), "--hand", value_in(told_, "hand_script"),
+                         "--unit-mm", value_in(told_, "hand_unit_mm")},
+                        at("emulator.log"));
+  }
+
+  /// The controller's exit code.
+  int wait_for_end() {
+    while (!controller_->ended()) pause(std::chrono::milliseconds(20));
+    if (window_) visualizer_->signal(SIGTERM);
+    wait_for(*visualizer_, seconds(20), [] { return false; });
+    join_->signal(SIGTERM);
+    wait_for(*join_, seconds(5), [] { return false; });
+    return *controller_->ended();
+  }
+
+  void tell(std::ostream& out) const {
+    out << text_in(at("controller.log"));
+    out << "on the second machine:\n" << text_in(at("far.log"));
+    if (window_) return;
+    const std::string text = text_in(at("visualizer.json"));
+    if (text.empty()) return;
+    const Json report = Json::parse(text);
+    const double wall_ms = report.at("wall_ms").at("p50").get<double>();
+    out << format(
+        "%d pictures, %.0f a second when all is drawn anew; from the cut to its picture "
+        "p50 %.0f, p99 %.0f ms\n",
+        report.at("frames").get<int>(), wall_ms > 0 ? 1e3 / wall_ms : 0.0,
+        report.at("latency_ms").at("p50").get<double>(),
+        report.at("latency_ms").at("p99").get<double>());
+  }
+
+  [[nodiscard]] bool has_picture() {
+    return text_in(at("far.log")).find("joined") != std::string::npos && visualizer_->ended() == 0;
+  }
+
+ private:
+  [[nodiscard]] std::string at(const char* name) const { return folder_ / name; }
+
+  std::filesystem::path folder_;
+  TwoNetworks networks_;
+  BridgeFiles files_;
+  std::string told_;
+  bool window_ = false;
+  std::unique_ptr<BridgePair> pair_;
+  std::unique_ptr<Child> controller_, join_, visualizer_, emulator_;
+};
+
+}  // namespace
+
+DemoCommand::DemoCommand(Arguments& program)
+    : LabCommand(program, "two-machines", "a demo whose picture is on a second machine"),
+      scene_("scenes/phantom.toml"),
+      size_("640x480") {
+  app_.option("--scene", scene_, "what is touched").shows_default();
+  app_.option("--seconds", seconds_, "that the hand works").within(1, 100'000).shows_default();
+  app_.option("--loss", loss_percent_, "of packets on the link, in %")
+      .within(0, 50)
+      .shows_default();
+  app_.option("--delay-ms", delay_ms_, "of the link, each way").within(0, 2000).shows_default();
+  app_.option("--mbit", mbit_, "rate of the link, Mbit/s; 0: no bound")
+      .within(0, 100'000)
+      .shows_default();
+  app_.option("--size", size_, "of the pictures").shown_as("WxH [640x480]");
+  app_.option("--out", out_, "keep the pictures in this folder").shown_as("DIR");
+  app_.footer(
+      "Exit codes: 0 fine, 1 a check failed, 2 bad input or set-up, 77 this machine forbids "
+      "network\n"
+      "namespaces or TUN devices.");
+}
+
+int DemoCommand::run(std::ostream& out) const {
+  try {
+    enter_user_namespace();
+    static_cast<void>(TwoNetworks({}));
+  } catch (const NoNamespaces& reason) {
+    out << "two machines: skipped: " << reason.what() << '\n';
+    return kSkipped;
+  }
+  catch_stop_signals();
+  const WorkFolder folder;
+  const std::string pictures = out_.empty() ? (folder.path() / "pictures").string() : out_;
+  Demo demo({.loss = loss_percent_ / 100, .delay_ms = delay_ms_, .mbit = mbit_}, folder.path());
+  demo.start_controller(shipped_file(scene_), seconds_);
+  demo.start_picture(size_, pictures, seconds_);
+  demo.start_hand();
+  const int code = demo.wait_for_end();
+  demo.tell(out);
+  return code != 0 ? code : demo.has_picture() ? 0 : 1;
+}
+
+}  // namespace kerf::two_machines

@@ -1,0 +1,159 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "lab/bridge/two_networks.hpp"
+
+#include <array>
+#include <cerrno>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <fstream>
+#include <span>
+#include <utility>
+
+#include <arpa/inet.h>
+#include <fcntl.h>
+#include <linux/if_tun.h>
+#include <net/if.h>
+#include <poll.h>
+#include <sched.h>
+#include <sys/eventfd.h>
+#include <sys/ioctl.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include "shared/posix/monotonic_clock.hpp"
+#include "shared/segment/segment_error.hpp"
+
+namespace kerf::two_machines {
+namespace {
+
+constexpr const char* kOwnNetwork = "/proc/thread-self/ns/net";
+constexpr std::size_t kLargestPacket = 65536;
+
+[[noreturn]] void fail(const std::string& what) {
+  throw NoNamespaces(what + ": " + system_message(errno));
+}
+
+void put(const std::string& path, const std::string& text) {
+  std::ofstream file(path);
+  file << text << std::flush;
+  if (!file) fail(path);
+}
+
+[[nodiscard]] ifreq request_for(const char* device) {
+  ifreq out{};
+  std::strncpy(out.ifr_name, device, IFNAMSIZ - 1);
+  return out;
+}
+
+void bring_up(const File& any_socket, const char* device) {
+  ifreq request = request_for(device);
+  request.ifr_flags = IFF_UP | IFF_RUNNING;
+  if (ioctl(any_socket.get(), SIOCSIFFLAGS, &request) != 0) fail(std::string(device) + " up");
+}
+
+void set_address(const File& any_socket, const char* device, const char* address, int call) {
+  ifreq request = request_for(device);
+  sockaddr_in place{};
+  place.sin_family = AF_INET;
+  inet_pton(AF_INET, address, &place.sin_addr);
+  std::memcpy(&request.ifr_addr, &place, sizeof place);
+  if (ioctl(any_socket.get(), static_cast<unsigned long>(call), &request) != 0) {
+    fail(std::string("address ") + address);
+  }
+}
+
+}  // namespace
+
+File::File(File&& other) noexcept : fd_(std::exchange(other.fd_, -1)) {}
+File& File::operator=(File&& other) noexcept {
+  std::swap(fd_, other.fd_);
+  return *this;
+}
+File::~File() {
+  if (fd_ >= 0) close(fd_);
+}
+
+void enter_user_namespace() {
+  if (unshare(CLONE_NEWNET) == 0) return;  // has the right
+  const std::string user = std::to_string(geteuid()), group = std::to_string(getegid());
+  if (unshare(CLONE_NEWUSER) != 0) fail("user namespace");
+  put("/proc/self/setgroups", "deny");
+  put("/proc/self/uid_map", "0 " + user + " 1");
+  put("/proc/self/gid_map", "0 " + group + " 1");
+}
+
+TwoNetworks::TwoNetworks(const LinkSettings& settings)
+    : settings_(settings), home_(open(kOwnNetwork, O_RDONLY | O_CLOEXEC)) {
+  near_ = make(kNearAddress);
+  far_ = make(kFarAddress);
+  if (setns(home_.get(), CLONE_NEWNET) != 0) fail("way back");
+  stop_ = File(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK));
+  relay_ = std::thread([this] { relay(); });
+}
+
+TwoNetworks::~TwoNetworks() {
+  eventfd_write(stop_.get(), 1);
+  relay_.join();
+}
+
+TwoNetworks::Machine TwoNetworks::make(const char* address) const {
+  if (unshare(CLONE_NEWNET) != 0) fail("network namespace");
+  Machine out{File(open(kOwnNetwork, O_RDONLY | O_CLOEXEC)),
+              File(open("/dev/net/tun", O_RDWR | O_NONBLOCK | O_CLOEXEC))};
+  if (out.network.get() < 0) fail(kOwnNetwork);
+  if (out.device.get() < 0) fail("/dev/net/tun");
+  ifreq request = request_for("link0");
+  request.ifr_flags = IFF_TUN | IFF_NO_PI;
+  if (ioctl(out.device.get(), TUNSETIFF, &request) != 0) fail("TUN device");
+  const File any_socket(socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0));
+  set_address(any_socket, "link0", address, SIOCSIFADDR);
+  set_address(any_socket, "link0", "255.255.255.0", SIOCSIFNETMASK);
+  bring_up(any_socket, "link0");
+  bring_up(any_socket, "lo");
+  return out;
+}
+
+std::unique_ptr<sweep::Child> TwoNetworks::start(Side side,
+                                                 const std::vector<std::string>& arguments,
+                                                 const std::filesystem::path& output) const {
+  const Machine& machine = side == Side::near ? near_ : far_;
+  if (setns(machine.network.get(), CLONE_NEWNET) != 0) fail("entering a network");
+  auto child = std::make_unique<sweep::Child>(arguments, output);
+  if (setns(home_.get(), CLONE_NEWNET) != 0) fail("way back");
+  return child;
+}
+
+void TwoNetworks::relay() {
+  struct Way {
+    int in, out;
+    Link link;
+  };
+  std::array<Way, 2> ways{{{near_.device.get(), far_.device.get(), Link(settings_, 0)},
+                           {far_.device.get(), near_.device.get(), Link(settings_, 1)}}};
+  std::vector<std::byte> buffer(kLargestPacket);
+  for (;;) {
+    std::int64_t next_ns = monotonic_ns() + kNsPerSecond;
+    for (Way& way : ways) {
+      while (const auto packet = way.link.take(monotonic_ns())) {
+        const ssize_t written = write(way.out, packet->data(), packet->size());
+        if (written > 0 && &way == ways.data()) bytes_to_far_ += packet->size();
+      }
+      next_ns = std::min(next_ns, way.link.next_ns().value_or(next_ns));
+    }
+    const std::int64_t wait_ns = std::max<std::int64_t>(next_ns - monotonic_ns(), 0);
+    const timespec wait{wait_ns / kNsPerSecond, wait_ns % kNsPerSecond};
+    std::array<pollfd, 3> polled{
+        {{ways[0].in, POLLIN, 0}, {ways[1].in, POLLIN, 0}, {stop_.get(), POLLIN, 0}}};
+    if (ppoll(polled.data(), polled.size(), &wait, nullptr) > 0 && polled[2].revents != 0) return;
+    for (Way& way : ways) {
+      for (ssize_t n = 0; (n = read(way.in, buffer.data(), buffer.size())) > 0;) {
+        if (cut_) continue;
+        const auto packet = std::span(buffer).first(static_cast<std::size_t>(n));
+        static_cast<void>(way.link.offer(monotonic_ns(), {packet.begin(), packet.end()}));
+      }
+    }
+  }
+}
+
+}  // namespace kerf::two_machines
