@@ -31,6 +31,7 @@ class LinkRate {
   void acked(std::uint64_t frame, std::int64_t now_ns);
 
   [[nodiscard]] bool has_credit() const noexcept { return flight_.size() < window(); }
+  [[nodiscard]] bool waits_for_ack() const noexcept { return !flight_.empty(); }
   [[nodiscard]] unsigned window() const noexcept;
   /// 0: nothing was acknowledged yet.
   [[nodiscard]] double bytes_per_s() const noexcept;
