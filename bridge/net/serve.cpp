@@ -5,6 +5,7 @@
 #include <charconv>
 #include <cstdint>
 #include <iostream>
+#include <optional>
 #include <string_view>
 #include <utility>
 #include <vector>
@@ -14,6 +15,7 @@
 #include <netinet/in.h>
 #include <unistd.h>
 
+#include "bridge/igtl/igtl_output.hpp"
 #include "bridge/net/bridge_error.hpp"
 #include "bridge/net/server.hpp"
 
@@ -120,6 +122,13 @@ int run_serve(const ServeOptions& options, const std::atomic<bool>& stop) {
                             setup.tls->names.end());
   }
   Server server(setup);
+  std::optional<IgtlOutput> slicer;
+  if (options.openigtlink != 0) {
+    const auto port = static_cast<std::uint16_t>(options.openigtlink);
+    slicer.emplace(IgtlOptions{.host = at.host, .port = port, .name = options.name});
+    std::cout << "OpenIGTLink, for whoever reaches it, "
+              << options.listen.substr(0, options.listen.rfind(':')) << ':' << port << '\n';
+  }
   print_addresses(setup, server.port());
   server.run(stop);
   return 0;
