@@ -17,6 +17,7 @@
 
 #include "bridge/igtl/igtl_output.hpp"
 #include "bridge/net/bridge_error.hpp"
+#include "bridge/net/qr_code.hpp"
 #include "bridge/net/server.hpp"
 
 namespace kerf::bridge {
@@ -80,12 +81,17 @@ HostPort parse_listen(const std::string& text) {
   return host.starts_with("127.") || host == "::1" || host == "localhost";
 }
 
-void print_addresses(const ServerSetup& setup, std::uint16_t port) {
+void print_addresses(const ServerSetup& setup, std::uint16_t port, bool qr) {
+  std::string for_others;
   for (const std::string& host : reached_at(setup.host)) {
     const bool v6 = host.find(':') != std::string::npos;
-    std::cout << (setup.tls ? "https://" : "http://") << (v6 ? "[" : "") << host << (v6 ? "]" : "")
-              << ':' << port << "/?token=" << setup.tokens.first() << '\n';
+    const std::string address = (setup.tls ? "https://" : "http://") +
+                                (v6 ? '[' + host + ']' : host) + ':' + std::to_string(port) +
+                                "/?token=" + setup.tokens.first();
+    if (for_others.empty() && !is_loopback(host)) for_others = address;
+    std::cout << address << '\n';
   }
+  if (qr && !for_others.empty()) std::cout << qr_code(for_others);
   std::cout.flush();
 }
 
@@ -129,7 +135,7 @@ int run_serve(const ServeOptions& options, const std::atomic<bool>& stop) {
     std::cout << "OpenIGTLink, for whoever reaches it, "
               << options.listen.substr(0, options.listen.rfind(':')) << ':' << port << '\n';
   }
-  print_addresses(setup, server.port());
+  print_addresses(setup, server.port(), options.qr);
   server.run(stop);
   return 0;
 }

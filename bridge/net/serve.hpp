@@ -17,7 +17,7 @@ struct ServeOptions {
   int max_viewers = 32;
   bool dedicated_link = false;
   int openigtlink = 0;  ///< port for 3D Slicer, at the same host; 0: none
-  bool qr = false;      ///< the first address that others reach, as a QR code
+  bool qr = false;      ///< also draws the first address off loopback as a QR code
 };
 
 /// Serves until `stop`. Prints the address with its token on stdout. Throws `BridgeError`, or what
