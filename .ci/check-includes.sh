@@ -112,6 +112,7 @@ broken() {
   includes '<(boost|openssl)/' "${programs[@]}" | grep -v '^bridge/net/'
   includes '<lz4' "${programs[@]}" | grep -v '^bridge/wire/lz4_block.cpp:'
   includes '<igtl' "${programs[@]}" | grep -v '^bridge/igtl/'
+  includes '<qrencode' "${programs[@]}" | grep -v '^bridge/net/qr_code.cpp:'
 }
 
 found=$(broken || true)

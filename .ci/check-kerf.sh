@@ -72,12 +72,17 @@ case $name in
     if [[ $name == recorder ]]; then mkdir -p "$out"; else touch "$out/frame-0001.png"; fi
     ;;
   record) touch "$out" ;;
+  bridge)
+    trap 'exit "$code"' TERM
+    echo 'http://127.0.0.1:7400/?token=abc'
+    while :; do sleep 0.05; done
+    ;;
 esac
 if [[ -n ${!crash:-} ]]; then wait; fi
 exit "$code"
 PROGRAM
 chmod +x "$lab/stand-in"
-for name in controller emulator visualizer recorder record; do
+for name in controller emulator visualizer recorder record bridge; do
   ln -s ../stand-in "$lab/bin/kerf-$name"
 done
 
@@ -159,6 +164,19 @@ expect 'with a display they' with DISPLAY=:99 kerf_gives 0 demo --seconds 1 --st
 expect 'reach the window, which keeps its files with the others' \
   called '^visualizer --name [^ ]* --size [^ ]* --stereo --record v.y4m --out .*/out/\.partial-'
 expect 'and there is one video' test "$(grep -c -- --record "$lab/calls")" == 1
+expect 'a picture is served' kerf_gives 0 demo --seconds 1 --serve --headless
+expect 'its address is told' says 'http://127.0.0.1:7400/?token=abc'
+expect 'on this machine' called '^bridge serve --name demo-[0-9]* --listen 127.0.0.1:0$'
+expect 'the bridge ends with the demo' nothing_survives
+expect 'elsewhere' kerf_gives 0 demo --seconds 1 --serve --listen 0.0.0.0:7400
+expect 'where it is asked to' called '^bridge .*--listen 0.0.0.0:7400$'
+expect 'a bridge that cannot listen ends the demo' with FAIL_bridge=2 kerf_gives 2 demo --serve
+expect 'it has not begun' eval '! called ^controller'
+expect 'in its words' says 'kerf-bridge: place: value; way out'
+expect 'a bridge that falls does not stop the demo' with CRASH_bridge=SEGV kerf_gives 1 demo --seconds 2 --serve
+expect 'and is told' says 'bridge: ended by signal 11'
+expect 'all of it is cleared up' nothing_survives
+expect 'nothing listens unserved' kerf_gives 2 demo --listen 0.0.0.0:7400
 expect 'a video does not mix with what a demo says' kerf_gives 2 demo --record -
 expect 'and a file is asked for' says 'name a file or a pipe'
 expect 'a fast servo' with RATE_HZ=8000 kerf_gives 0 demo --seconds 1

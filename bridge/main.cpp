@@ -27,6 +27,11 @@ Arguments add_serve(CommandLine& app, ServeOptions& options) {
   serve.option("--max-viewers", options.max_viewers, "at once").within(1, 32).shows_default();
   serve.flag("--dedicated-link", options.dedicated_link,
              "nobody else uses the link: fresher under loss, unfair to others");
+  serve
+      .option("--openigtlink", options.openigtlink,
+              "port for 3D Slicer at the same host: send only, no token, no encryption")
+      .within(1, 65535);
+  serve.flag("--qr", options.qr, "the address as a QR code, for a tablet");
   return serve;
 }
 

@@ -96,6 +96,8 @@ constexpr LogCode kFlags[] = {
     {kFlagForbidden, "forbidden", "pressed on what may not be cut"},
     {kFlagRefused, "refused", "the tool finds no free place, and feels nothing"},
     {kFlagShaft, "shaft", "pressed with shaft or handpiece"},
+    {kFlagReset, "reset",
+     "the volumes go back to their first content: no force, and nothing is cut"},
 };
 constexpr LogCode kPhases[] = {
     {0, "off", "no report has come yet"},

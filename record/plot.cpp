@@ -114,6 +114,7 @@ struct Curve {
   log.for_each([&](const TickRecord& record) {
     if (first_tick == 0) first_tick = record.tick;
     end_s = static_cast<double>(record.tick - first_tick) * manifest.tick_ns * 1e-9;
+    if ((record.flags & kFlagReset) != 0) removed = 0;
     removed += removed_mm3(record, manifest.voxel_mm3);
     if (record.stale != 0) return;  // nothing was felt in it; the curves go on to the next tick
     const std::array values{magnitude(record.contact_force_n),

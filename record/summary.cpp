@@ -66,6 +66,7 @@ RecordSummary summarise(const std::filesystem::path& folder) {
     out.refused_packets = std::max(out.refused_packets, record.refused_packets);
     out.peak_force_n = std::max(out.peak_force_n, magnitude(record.commanded_force_n));
     out.deepest_mm = std::max(out.deepest_mm, double{record.penetration_mm});
+    if ((record.flags & kFlagReset) != 0) out.removed_mm3 = 0;
     out.removed_mm3 += removed_mm3(record, manifest.voxel_mm3);
     out.port_energy_mj = record.port_energy_j * 1000;
     out.port_minimum_mj = record.port_minimum_j * 1000;

@@ -4,12 +4,20 @@
 #include <charconv>
 #include <cstdint>
 #include <iostream>
+#include <optional>
 #include <string_view>
 #include <utility>
 #include <vector>
 
+#include <arpa/inet.h>
+#include <ifaddrs.h>
+#include <netinet/in.h>
+#include <unistd.h>
+
+#include "bridge/igtl/igtl_output.hpp"
 #include "bridge/net/bridge_error.hpp"
 #include "bridge/net/host_names.hpp"
+#include "bridge/net/qr_code.hpp"
 #include "bridge/net/server.hpp"
 
 namespace kerf::bridge {
@@ -54,12 +62,17 @@ HostPort parse_listen(const std::string& text) {
   return host.starts_with("127.") || host == "::1" || host == "localhost";
 }
 
-void print_addresses(const ServerSetup& setup, std::uint16_t port) {
+void print_addresses(const ServerSetup& setup, std::uint16_t port, bool qr) {
+  std::string for_others;
   for (const std::string& host : reached_at(setup.host)) {
     const bool v6 = host.find(':') != std::string::npos;
-    std::cout << (setup.tls ? "https://" : "http://") << (v6 ? "[" : "") << host << (v6 ? "]" : "")
-              << ':' << port << "/?token=" << setup.tokens.first() << '\n';
+    const std::string address = (setup.tls ? "https://" : "http://") +
+                                (v6 ? '[' + host + ']' : host) + ':' + std::to_string(port) +
+                                "/?token=" + setup.tokens.first();
+    if (for_others.empty() && !is_loopback(host)) for_others = address;
+    std::cout << address << '\n';
   }
+  if (qr && !for_others.empty()) std::cout << qr_code(for_others);
   std::cout.flush();
 }
 
@@ -94,7 +107,14 @@ int run_serve(const ServeOptions& options, const std::atomic<bool>& stop) {
                             setup.tls->names.end());
   }
   Server server(setup);
-  print_addresses(setup, server.port());
+  std::optional<IgtlOutput> slicer;
+  if (options.openigtlink != 0) {
+    const auto port = static_cast<std::uint16_t>(options.openigtlink);
+    slicer.emplace(IgtlOptions{.host = at.host, .port = port, .name = options.name});
+    std::cout << "OpenIGTLink, for whoever reaches it, "
+              << options.listen.substr(0, options.listen.rfind(':')) << ':' << port << '\n';
+  }
+  print_addresses(setup, server.port(), options.qr);
   server.run(stop);
   return 0;
 }

@@ -16,9 +16,12 @@ struct ServeOptions {
   std::filesystem::path command_tokens;   ///< who may command; empty: nobody
   int max_viewers = 32;
   bool dedicated_link = false;
+  int openigtlink = 0;  ///< port for 3D Slicer, at the same host; 0: none
+  bool qr = false;      ///< also draws the first address off loopback as a QR code
 };
 
-/// Serves until `stop`. Prints the address with its token on stdout. Throws `BridgeError`.
+/// Serves until `stop`. Prints the address with its token on stdout. Throws `BridgeError`, or what
+/// `IgtlOutput` does.
 int run_serve(const ServeOptions& options, const std::atomic<bool>& stop);
 
 }  // namespace kerf::bridge

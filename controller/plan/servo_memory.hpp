@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <span>
 #include <string>
@@ -17,6 +18,7 @@
 #include "controller/plan/tables/tick_memory.hpp"
 #include "controller/servo/servo_plan.hpp"
 #include "controller/servo/servo_state.hpp"
+#include "controller/servo/volume_reset.hpp"
 
 namespace kerf {
 
@@ -25,11 +27,13 @@ namespace kerf {
 template <class N>
 class ServoMemory {
  public:
-  explicit ServoMemory(const LoadedScene& scene) : methods_(scene.servo.kernel) {
+  explicit ServoMemory(const LoadedScene& scene)
+      : cuts_(scene.cut.model != CutModel::none), methods_(scene.servo.kernel) {
     for (const SceneVolume& volume : scene.volumes) {
       volumes_.push_back({volume.name, volume.image.density.size() * sizeof(Density),
                           volume.image.labels.size() * sizeof(Label)});
-      if (volume.solid) solid_names_.push_back(volume.name);
+      if (!volume.solid) continue;
+      solids_.push_back({volume.name, volume.image.grid});
     }
   }
 
@@ -58,7 +62,11 @@ class ServoMemory {
         refresh_gradients<N>(plan.kernel, volume.grid, density, volume.grid.box(), gradients_[v],
                              *scratch);
       }
-      state.volumes[v] = {density, gradients_[v], carries_[v]};
+      if (cuts_) {
+        firsts_[v] = density;
+        cut_blocks_[v].resize(BrickBlocks::of(volume.grid).count());
+      }
+      state.volumes[v] = {density, gradients_[v], carries_[v], firsts_[v], cut_blocks_[v]};
       if (plan.contact.swept) {
         contact_.take(scene, scene.volumes[volume.scene_index], v, density, state.contact);
       }
@@ -77,7 +85,7 @@ class ServoMemory {
 
   /// After `take`.
   [[nodiscard]] SnapshotOf<N> keep(const ServoState<N>& state) const {
-    return {state, densities_, gradients_, carries_};
+    return {state, densities_, gradients_, carries_, cut_blocks_};
   }
   /// The arrays keep their places: plan and state point at them. Throws std::invalid_argument where
   /// the snapshot is of another scene.
@@ -85,6 +93,7 @@ class ServoMemory {
     restore_arrays(kept.densities, densities_);
     restore_arrays(kept.gradients, gradients_);
     restore_arrays(kept.carries, carries_);
+    restore_arrays(kept.cut_blocks, cut_blocks_);
     state = kept.state_in(state);
   }
 
@@ -99,9 +108,13 @@ class ServoMemory {
       add("labels of " + volume.name, volume.labels, true);
     }
     const MethodMemory::Lengths& lengths = methods_.lengths;
-    for (std::size_t v = 0; v < solid_names_.size(); ++v) {
-      add("gradient of " + solid_names_[v], lengths.gradients[v] * sizeof(Gradient<N>), false);
-      add("carry of " + solid_names_[v], lengths.carry[v] * sizeof(RemovalCarry<N>), false);
+    for (std::size_t v = 0; v < solids_.size(); ++v) {
+      const auto& [name, grid] = solids_[v];
+      add("gradient of " + name, lengths.gradients[v] * sizeof(Gradient<N>), false);
+      add("carry of " + name, lengths.carry[v] * sizeof(RemovalCarry<N>), false);
+      if (!cuts_) continue;
+      add("first content of " + name, grid.voxel_count() * sizeof(Density), false);
+      add("cut bricks of " + name, BrickBlocks::of(grid).count() * sizeof(std::uint64_t), false);
     }
     for (const auto& [name, samples] : samples_) {
       add("samples of " + name, samples.size() * sizeof(ToolOffset), true);
@@ -121,11 +134,14 @@ class ServoMemory {
   };
 
   std::vector<VolumeBytes> volumes_;  ///< by volume of the scene, as the densities
-  std::vector<std::string> solid_names_;
+  std::vector<std::pair<std::string, VoxelGrid>> solids_;
+  bool cuts_;
   std::vector<std::vector<Density>> densities_;
   std::vector<std::pair<std::string, std::vector<ToolOffset>>> samples_;
   std::array<std::vector<Gradient<N>>, kMaxVolumes> gradients_;  ///< by volume of the plan
   std::array<std::vector<RemovalCarry<N>>, kMaxVolumes> carries_;
+  std::array<std::vector<Density>, kMaxVolumes> firsts_;  ///< where something is cut, as the next
+  std::array<std::vector<std::uint64_t>, kMaxVolumes> cut_blocks_;
   std::vector<typename N::Weight> overlap_;
   std::vector<GradientScratch> refresh_;
   MethodMemory methods_;

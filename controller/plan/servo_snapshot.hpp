@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <stdexcept>
 #include <utility>
 #include <vector>
@@ -43,11 +44,13 @@ template <class N>
 struct SnapshotOf final : ServoSnapshot {
   SnapshotOf(const ServoState<N>& of, std::vector<std::vector<Density>> density,
              std::array<std::vector<Gradient<N>>, kMaxVolumes> gradient,
-             std::array<std::vector<RemovalCarry<N>>, kMaxVolumes> carry)
+             std::array<std::vector<RemovalCarry<N>>, kMaxVolumes> carry,
+             std::array<std::vector<std::uint64_t>, kMaxVolumes> blocks)
       : state(of),
         densities(std::move(density)),
         gradients(std::move(gradient)),
-        carries(std::move(carry)) {}
+        carries(std::move(carry)),
+        cut_blocks(std::move(blocks)) {}
 
   /// The kept values, with the memory of `here`.
   [[nodiscard]] ServoState<N> state_in(const ServoState<N>& here) const {
@@ -81,6 +84,7 @@ struct SnapshotOf final : ServoSnapshot {
   std::vector<std::vector<Density>> densities;                  ///< by volume of the scene
   std::array<std::vector<Gradient<N>>, kMaxVolumes> gradients;  ///< by volume of the plan
   std::array<std::vector<RemovalCarry<N>>, kMaxVolumes> carries;
+  std::array<std::vector<std::uint64_t>, kMaxVolumes> cut_blocks;
 };
 
 }  // namespace kerf

@@ -79,6 +79,7 @@ struct ServoOutput {
   bool forbidden = false;  ///< the tool presses on a forbidden material
   bool refused = false;    ///< the tool finds no free place near the hand, and feels nothing
   bool shaft = false;      ///< what presses on shaft or handpiece is above 0.01 N
+  bool resetting = false;  ///< volumes go back to their first content: what changed was not cut
 
   std::array<std::int32_t, 3> joint_counts{};  ///< unwrapped since calibration
   std::array<double, 3> gimbal_rad{};          ///< yaw, pitch, roll

@@ -29,6 +29,14 @@ struct VolumeState {
   std::span<Density> density;
   std::span<Gradient<N>> gradient;   ///< empty where no tool gathers
   std::span<RemovalCarry<N>> carry;  ///< fractions of density steps still owed
+  std::span<const Density> first;    ///< content before the first cut; empty where nothing is cut
+  std::span<std::uint64_t> cut_blocks;  ///< what differs from it (volume_reset.hpp)
+};
+
+/// How far a reset of the volumes has come (volume_reset.hpp).
+struct ResetState {
+  bool runs = false;
+  std::size_t volume = 0, block = 0;  ///< to be looked at next
 };
 
 /// Joint counters since the last calibration.
@@ -66,6 +74,8 @@ struct ServoState {
   GimbalFilter gimbal;
   std::uint32_t active_tool = 0;
   bool hold = false;  ///< asked by command: force 0, nothing is cut
+  ResetState reset;   ///< asked by command; a hold while it runs
+  [[nodiscard]] constexpr bool held() const noexcept { return hold || reset.runs; }
 
   JacobianTransposed<N> jacobian_t_mm;  ///< of the last good report
   DeviceVec<Real> tip_mm;               ///< device port

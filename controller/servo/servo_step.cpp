@@ -13,6 +13,7 @@
 #include "controller/servo/swept_force.hpp"
 #include "controller/servo/tell.hpp"
 #include "controller/servo/tool_forces.hpp"
+#include "controller/servo/volume_reset.hpp"
 
 namespace kerf {
 namespace {
@@ -57,7 +58,7 @@ Wanted<N> wanted_force(const ServoPlan<N>& plan, ServoState<N>& state, const Sen
   };
   state.contact_n = {};
   state.proxy_offset_mm = {};
-  if (sensed.usable && (!supervisor.motors_on() || state.hold)) {
+  if (sensed.usable && (!supervisor.motors_on() || state.held())) {
     follow_unfelt(plan, state, sensed, out);
     return {};
   }
@@ -104,8 +105,8 @@ DeviceVec<typename N::Real> force_to_send(const ServoPlan<N>& plan, ServoState<N
   const auto limited = [&](DeviceVec<Real> force_n, ThermalState<N>& thermal) {
     return limited_force(plan.limits, thermal, force_n, state.force_n, sensed.leaves);
   };
-  if (state.hold) state.stabiliser.begin_anew();
-  if (!plan.stabiliser.given() || !sensed.usable || state.hold) {
+  if (state.held()) state.stabiliser.begin_anew();
+  if (!plan.stabiliser.given() || !sensed.usable || state.held()) {
     return limited(wanted.force_n, state.thermal);
   }
   ThermalState<N> heated = state.thermal;
@@ -170,12 +171,23 @@ void cut(const ServoPlan<N>& plan, ServoState<N>& state, const ToolContact<N>& t
          ServoOutput& out) noexcept {
   if (!plan.force_cut.on) return;
   out.spindle_ratio = as_double(state.force_cut.spindle.ratio);
-  const bool runs = state.supervisor.motors_on() && !state.hold;
+  const bool runs = state.supervisor.motors_on() && !state.held();
   const ForceCut<N> done = cut_by_sent_force(plan, state, tool, state.force_n, runs);
   out.press_n = as_double(done.press_n);
   out.spindle_load = as_double(state.force_cut.spindle.load);
   out.forbidden = done.forbidden;
   tell_removed(done.removed, out);
+}
+
+/// Notes what was cut, or restores it while a reset runs: then nothing is cut.
+template <class N>
+void follow_cuts(const ServoPlan<N>& plan, ServoState<N>& state, ServoOutput& out) noexcept {
+  out.resetting = state.reset.runs;
+  if (out.resetting) return restore_some(plan, state, out.changed);
+  for (std::size_t v = 0; v < plan.volume_count; ++v) {
+    const VolumePlan<N>& volume = plan.volumes[v];
+    mark_cut(volume.grid, out.changed[volume.scene_index], state.volumes[v].cut_blocks);
+  }
 }
 
 }  // namespace
@@ -190,6 +202,7 @@ ServoOutput servo_step(const ServoPlan<N>& plan, ServoState<N>& state,
   state.force_sum_n = state.force_sum_n + state.force_n;
   if (sensed.usable) book(state, wanted, out.motors_on);
   cut(plan, state, wanted.tool, out);
+  follow_cuts(plan, state, out);
   if (sensed.usable) state.held_force_n = state.force_n;
   tell(plan, state, sensed, report.fresh, out);
   return out;
@@ -239,6 +252,9 @@ bool apply_command(const ServoPlan<N>& plan, ServoState<N>& state,
       return true;
     case ServoCommand::Kind::hold:
       state.hold = command.argument != 0;
+      return true;
+    case ServoCommand::Kind::reset:
+      state.reset.runs = plan.cutting || plan.force_cut.on;
       return true;
   }
   return false;

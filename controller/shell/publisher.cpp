@@ -38,6 +38,7 @@ std::uint32_t flags_of(const DeviceReport& report, const ServoOutput& output) no
   set(output.forbidden, kFlagForbidden);
   set(output.refused, kFlagRefused);
   set(output.shaft, kFlagShaft);
+  set(output.resetting, kFlagReset);
   return flags;
 }
 
@@ -80,7 +81,8 @@ void Publisher::publish_volumes(const ServoOutput& output, TickRecord& record) n
     if (box.empty()) continue;
     const std::span<const Density> density = servo_.density(v);
     const std::uint64_t hash = segment_.publish_box(
-        v, density, box, static_cast<std::uint32_t>(output.removed_by_volume[v]));
+        v, density, box, static_cast<std::uint32_t>(output.removed_by_volume[v]),
+        output.resetting ? DirtyCause::reset : DirtyCause::milling);
     removal_hash_ = fnv1a_step(removal_hash_, hash);
     record.dirty_volumes |= 1U << v;
     if (first_box.empty()) first_box = box;

@@ -44,7 +44,8 @@ struct RunRecord {
   Histogram wake, compute, publish;
   double peak_force_n = 0;
   std::int64_t first_force_ns = 0;  ///< when the first force was sent, CLOCK_MONOTONIC; 0: none was
-  std::array<std::uint64_t, kMaxVolumes> removed_steps{};  ///< by volume
+  std::array<std::uint64_t, kMaxVolumes> removed_steps{};  ///< by volume, since the last reset
+  std::uint64_t resets = 0;                                ///< of the volumes; before arming too
   double absorbed_mj = 0;      ///< at the device port, + is taken from the hand
   double port_minimum_mj = 0;  ///< lowest value of it: below 0 the loop gave more than it took
   std::array<double, kEnergySources> energy_mj{};  ///< it by source

@@ -94,6 +94,7 @@ std::string report_json(const RunReport& report) {
       {"shaft_ticks", r.shaft_ticks},
       {"peak_force_n", r.peak_force_n},
       {"removed_mm3", report.removed_mm3},
+      {"resets", r.resets},
       {"energy_j", r.absorbed_mj / 1000.0},
       {"port_minimum_j", r.port_minimum_mj / 1000.0},
       {"energy_by_source_j", by_source(r)},
@@ -133,7 +134,11 @@ std::string summary(const RunReport& report) {
   if (r.shaft_ticks > 0) {
     text += format("  shaft      %llu ticks\n", static_cast<unsigned long long>(r.shaft_ticks));
   }
-  text += format("  removed    %.3f mm3\n", report.removed_mm3);
+  text += format("  removed    %.3f mm3", report.removed_mm3);
+  if (r.resets > 0) {
+    text += format(" since the last of %llu resets", static_cast<unsigned long long>(r.resets));
+  }
+  text += "\n";
   text += format("  losses     %llu stale ticks, %llu overruns, %llu packets lost\n",
                  static_cast<unsigned long long>(r.stale_ticks),
                  static_cast<unsigned long long>(r.overruns),

@@ -16,6 +16,8 @@ ServoCommand servo_command(const Command& command) noexcept {
       return {ServoCommand::Kind::select_tool, command.argument};
     case CommandKind::hold:
       return {ServoCommand::Kind::hold, command.argument};
+    case CommandKind::reset:
+      return {ServoCommand::Kind::reset, 0};
   }
   return {};
 }
@@ -34,6 +36,12 @@ class Bookkeeper {
     last_fault_ = output.fault;
     if (output.refused && !last_refused_) record_.add_event(tick, "no_free_place");
     last_refused_ = output.refused;
+    if (output.resetting && !last_reset_) {
+      ++record_.resets;
+      record_.add_event(tick, "reset");
+    }
+    last_reset_ = output.resetting;
+    if (output.resetting) record_.removed_steps = {};
     if (!output.started) return;
     if (record_.ticks == 0) {
       record_.armed_at_tick = tick;
@@ -78,6 +86,7 @@ class Bookkeeper {
   const TickSource& clock_;
   Fault last_fault_ = Fault::none;
   bool last_refused_ = false;
+  bool last_reset_ = false;
   std::uint64_t overruns_ = 0;
   std::uint64_t allocations_ = 0;
   ThreadFaults faults_;

@@ -12,6 +12,7 @@ namespace kerf {
 enum class CommandKind : std::uint32_t {
   select_tool = 1,  ///< argument: index into the scene's tools
   hold = 2,         ///< argument: 1 stops cutting and force, 0 goes on
+  reset = 3,        ///< argument: 0; the volumes go back to their first content
 };
 
 /// One wish of a reader to the controller: a fixed-size message over the socket, validated outside
@@ -57,6 +58,8 @@ struct CommandLimits {
       return command.argument < limits.tools;
     case CommandKind::hold:
       return command.argument <= 1;
+    case CommandKind::reset:
+      return command.argument == 0;
   }
   return false;
 }

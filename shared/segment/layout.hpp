@@ -177,6 +177,7 @@ inline constexpr std::uint32_t kFlagStarted = 1U << 9;
 inline constexpr std::uint32_t kFlagForbidden = 1U << 10;  ///< pressed on what may not be cut
 inline constexpr std::uint32_t kFlagRefused = 1U << 11;    ///< the tool has no free place
 inline constexpr std::uint32_t kFlagShaft = 1U << 12;      ///< pressed with shaft or handpiece
+inline constexpr std::uint32_t kFlagReset = 1U << 13;      ///< volumes go back to what they were
 
 inline constexpr std::size_t kRawEncoder = 0;  ///< first of 3
 inline constexpr std::size_t kRawPot = 3;      ///< first of 6

@@ -240,6 +240,51 @@ TEST_CASE("a reader that joins in the middle of milling sees the controller's ow
   CHECK(pair.report()["volume_hash"] == kerf::hex64(hash));
 }
 
+TEST_CASE("a reader resets the volumes: the mirror follows, and the report counts from there") {
+  Pair pair;
+  pair.start("cut_cavity.toml", {"--virtual", "--seconds", "3"}, {"--lockstep"});
+  std::optional<kerf::SegmentConnection> connection;
+  REQUIRE(eventually(
+      [&] {
+        try {
+          if (!connection) connection.emplace(kerf::connect_segment(pair.name));
+          return connection->reader().dirty_head() > 200;
+        } catch (const kerf::SegmentError&) {
+          return false;
+        }
+      },
+      20s));
+  CHECK(connection->send({.kind = kerf::CommandKind::reset, .argument = 1}).status ==
+        kerf::ReplyStatus::refused);
+  CHECK(connection->send({.kind = kerf::CommandKind::reset}).status == kerf::ReplyStatus::accepted);
+  CHECK(pair.controller->wait() == 0);
+  const nlohmann::json report = pair.report();
+  CHECK(report["resets"] == 1);
+  REQUIRE(report["event_count"] > 0);
+  CHECK(report["events"].back()["name"] == "reset");
+
+  const kerf::SegmentReader& reader = connection->reader();
+  kerf::VolumeSnapshot snapshot;
+  reader.update(0, snapshot);
+  const std::uint64_t hash =
+      kerf::fnv1a_step(kerf::kFnv1aBasis, kerf::density_hash(snapshot.density));
+  CHECK(report["volume_hash"] == kerf::hex64(hash));
+  REQUIRE(reader.dirty_head() <= reader.info().dirty_slots);
+  double removed = 0;
+  int boxes = 0;
+  for (std::uint64_t i = 0; i < reader.dirty_head(); ++i) {
+    kerf::DirtyRecord record;
+    REQUIRE(reader.dirty_at(i, record) == kerf::ReadState::ok);
+    const bool reset = record.cause == static_cast<std::uint16_t>(kerf::DirtyCause::reset);
+    removed = reset ? 0 : removed + record.removed;
+    boxes += reset ? 1 : 0;
+  }
+  CHECK(boxes > 0);
+  const auto& h = reader.info().volumes[0].spacing_mm;
+  CHECK(report["removed_mm3"].get<double>() ==
+        doctest::Approx(removed / kerf::kDensityMax * h[0] * h[1] * h[2]));
+}
+
 TEST_CASE("--explain tells what is really allocated, and what each tool's tick takes") {
   const TemporaryFolder folder;
   Process controller({kBin + "/kerf-controller", "--scene", kScenes + "/touch.toml", "--explain",

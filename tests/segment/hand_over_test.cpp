@@ -198,6 +198,10 @@ TEST_CASE("commands outside the limits are refused before they reach the servo")
   hold.argument = 1;
   hold.value[2] = std::numeric_limits<double>::quiet_NaN();
   CHECK(connection.send(hold).status == ReplyStatus::refused);
+  Command reset;
+  reset.kind = CommandKind::reset;
+  reset.argument = 1;
+  CHECK(connection.send(reset).status == ReplyStatus::refused);
   Command unknown;
   unknown.kind = static_cast<CommandKind>(77);
   CHECK(connection.send(unknown).status == ReplyStatus::refused);

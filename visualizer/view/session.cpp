@@ -90,6 +90,8 @@ void Session::read_removals() {
       continue;
     }
     if (record.volume >= scene_.volumes.size()) continue;
+    // Over all volumes, though a record tells of one: nothing is cut while a reset runs.
+    if (record.cause == static_cast<std::uint16_t>(DirtyCause::reset)) removed_mm3_ = 0;
     if (record.removed > 0) on_the_way_.push_back(record);
     removed_mm3_ += record.removed / kDensityMax * voxel_mm3(scene_.volumes[record.volume]);
   }
@@ -184,9 +186,9 @@ bool Session::ended_cleanly() const noexcept {
   return connection_.reader().lifecycle() == Lifecycle::clean_end;
 }
 
-bool Session::select_tool(std::uint32_t index) {
+bool Session::send(CommandKind kind, std::uint32_t argument) {
   try {
-    const Command command{.kind = CommandKind::select_tool, .index = 0, .argument = index};
+    const Command command{.kind = kind, .index = 0, .argument = argument};
     return connection_.send(command).status == ReplyStatus::accepted;
   } catch (const SegmentError&) {
     return false;  // it has gone; the picture says so

@@ -40,6 +40,7 @@ class Session {
   /// Ticks since the device was armed; none before.
   [[nodiscard]] std::optional<std::uint64_t> ticks_since_armed() const noexcept;
   [[nodiscard]] std::optional<double> tick_rate_hz() const;
+  /// Since the session began or the volumes were reset.
   [[nodiscard]] double removed_mm3() const noexcept { return removed_mm3_; }
   [[nodiscard]] bool joined_late() const noexcept { return joined_late_; }
   [[nodiscard]] std::optional<double> data_age_ms() const;
@@ -61,10 +62,13 @@ class Session {
   /// It said so, and it was no fault.
   [[nodiscard]] bool ended_cleanly() const noexcept;
 
-  /// False where the controller refuses, is busy or has gone.
-  bool select_tool(std::uint32_t index);
+  // False where the controller refuses, is busy or has gone.
+  bool select_tool(std::uint32_t index) { return send(CommandKind::select_tool, index); }
+  /// The volumes go back to their first content.
+  bool reset() { return send(CommandKind::reset, 0); }
 
  private:
+  bool send(CommandKind kind, std::uint32_t argument);
   void read_states();
   void read_removals();
   void note_arrivals();

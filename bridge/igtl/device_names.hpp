@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "shared/segment/reader.hpp"
+
+namespace kerf::bridge {
+
+/// OpenIGTLink's device name of each volume: its name in the scene, at most 20 bytes, each another;
+/// "volume 1" and so on where the scene's text does not tell.
+[[nodiscard]] std::vector<std::string> device_names(const SegmentInfo& segment);
+
+}  // namespace kerf::bridge

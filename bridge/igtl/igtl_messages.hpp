@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "shared/segment/reader.hpp"
+
+namespace kerf::bridge {
+
+/// One packed message; several clients may wait for the same.
+using IgtlBytes = std::shared_ptr<const std::vector<std::byte>>;
+
+/// The library counts an image's bytes in 31 bits.
+[[nodiscard]] bool fits_an_image(const VoxelGrid& grid) noexcept;
+
+/// `part` of a volume as IMAGE with the volume's size and place: 16 bits a voxel. OpenIGTLink's
+/// origin is the middle of the image, between the centres of its corner voxels. `part` is not empty
+/// and lies in the volume, whose density is `linear`.
+[[nodiscard]] IgtlBytes image_message(const std::string& device, const SegmentVolumeInfo& volume,
+                                      const std::vector<Density>& linear, const VoxelBox& part);
+
+/// World from tool as TRANSFORM "Tool"; none where the pose is not known yet.
+[[nodiscard]] std::optional<IgtlBytes> tool_message(const TickRecord& tick);
+
+/// The force that was sent to the hand as SENSOR "Force": x, y, z in newtons, along the same axes.
+[[nodiscard]] IgtlBytes force_message(const TickRecord& tick);
+
+}  // namespace kerf::bridge

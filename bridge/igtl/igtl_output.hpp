@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <memory>
+#include <string>
+
+namespace kerf::bridge {
+
+/// Where OpenIGTLink goes out.
+struct IgtlOptions {
+  std::string host = "127.0.0.1";  ///< address of this machine to listen on
+  std::uint16_t port = 18944;      ///< 0: one that is free
+  std::string name = "default";    ///< of the controller
+  /// A client that takes nothing for so long is dropped.
+  std::chrono::milliseconds patience{5000};
+};
+
+/// OpenIGTLink for 3D Slicer, send only: while one of these lives, a thread follows a controller's
+/// segment and sends to each client
+///
+/// * each volume as IMAGE under its name, whole first, then the box of what changed, at most 20 Hz;
+/// * the tool's pose as TRANSFORM "Tool" and the force as SENSOR "Force" in newtons, at 60 Hz.
+///
+/// All of it is in RAS, for kerf's world as LPS, which is what medical files are loaded in: x and y
+/// change their signs. A client that is slow gets fewer and larger boxes, and holds up no other: at
+/// most one image waits for it. What clients send is thrown away unread. Controllers may come, go
+/// and come again; then the volumes go out whole. There is no token and no encryption.
+class IgtlOutput {
+ public:
+  static constexpr std::size_t kMaxClients = 8;  ///< one more is let in and out
+
+  /// Throws std::runtime_error, one line, where it cannot listen or was built without OpenIGTLink.
+  explicit IgtlOutput(const IgtlOptions& options);
+  ~IgtlOutput();
+  IgtlOutput(const IgtlOutput&) = delete;
+  IgtlOutput& operator=(const IgtlOutput&) = delete;
+
+  [[nodiscard]] std::uint16_t port() const noexcept;
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace kerf::bridge
