@@ -7,7 +7,7 @@ cd "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/.."
 check=$PWD/.ci/check-includes.sh
 lab=$(mktemp -d)
 trap 'rm -rf "$lab"' EXIT
-cp -r shared controller record hil lab visualizer tests "$lab"
+cp -r shared controller record hil lab visualizer bridge tests "$lab"
 cd "$lab"
 failures=0
 

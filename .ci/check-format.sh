@@ -5,7 +5,7 @@
 set -euo pipefail
 cd "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/.."
 
-mapfile -t sources < <(find shared controller record hil lab visualizer tests examples -name '*.[ch]pp' | sort)
+mapfile -t sources < <(find shared controller record hil lab visualizer bridge tests examples -name '*.[ch]pp' | sort)
 status=0
 unformatted() {
   if ! clang-format-14 --dry-run -Werror "$1" 2>/dev/null; then

@@ -27,8 +27,10 @@ lab/rig lab/accuracy lab/energy lab/extremes lab/faults lab/bench lab/law lab/ra
 
 visualizer visualizer/view visualizer/gl visualizer/cast visualizer/surface visualizer/texture
 visualizer/render visualizer/compose visualizer/app visualizer/bench visualizer/monkey
+
+bridge/wire bridge/stream bridge/mirror bridge/igtl bridge/page bridge/net bridge
 '
-programs=(shared controller record hil lab visualizer)
+programs=(shared controller record hil lab visualizer bridge)
 hash='^[[:space:]]*#[[:space:]]*include[[:space:]]*'
 
 # includes PATTERN PATH...: the lines below PATH... that include what matches PATTERN.
@@ -107,6 +109,9 @@ broken() {
     controller/servo controller/shell controller/device shared/segment \
     shared/posix/monotonic_clock.hpp || true
   includes '<itk' "${programs[@]}" | grep -v '^controller/volume/foreign_volume.cpp:'
+  includes '<(boost|openssl)/' "${programs[@]}" | grep -v '^bridge/net/'
+  includes '<lz4' "${programs[@]}" | grep -v '^bridge/wire/lz4_block.cpp:'
+  includes '<igtl' "${programs[@]}" | grep -v '^bridge/igtl/'
 }
 
 found=$(broken || true)

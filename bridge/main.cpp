@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <iostream>
+
+#include "bridge/net/identity.hpp"
+#include "bridge/net/serve.hpp"
+#include "shared/posix/failure.hpp"
+#include "shared/posix/private_files.hpp"
+#include "shared/posix/stop_signals.hpp"
+#include "shared/text/command_line.hpp"
+
+namespace {
+
+using namespace kerf;
+using namespace kerf::bridge;
+
+Arguments add_serve(CommandLine& app, ServeOptions& options) {
+  Arguments serve =
+      app.command("serve", "Shows a running kerf-controller to browsers and to join.");
+  serve.option("--listen", options.listen, "HOST:PORT; off loopback TLS 1.3, always")
+      .shows_default();
+  serve.option("--name", options.name, "name of the controller").shows_default();
+  serve.option("--identity", options.identity, "folder of make-identity; else self-signed");
+  serve.option("--token-file", options.token_file,
+               "who may look: one token a line; else a new one");
+  serve.option("--allow-commands", options.command_tokens, "who may command too: one token a line");
+  serve.option("--max-viewers", options.max_viewers, "at once").within(1, 32).shows_default();
+  serve.flag("--dedicated-link", options.dedicated_link,
+             "nobody else uses the link: fresher under loss, unfair to others");
+  return serve;
+}
+
+void add_make_identity(CommandLine& app, IdentityOptions& options) {
+  Arguments make =
+      app.command("make-identity", "Makes a lab's CA, and a certificate of a machine.");
+  make.option("folder", options.folder, "where they go").required();
+  make.option("--host", options.hosts, "name or address of the machine; may be given often")
+      .one_each();
+  make.option("--days", options.days, "that the certificate holds").within(1, 3650).shows_default();
+}
+
+int run(int argc, char** argv) {
+  ServeOptions serve_options;
+  IdentityOptions identity_options;
+  CommandLine app("Carries the picture of a kerf-controller to other machines.", "kerf-bridge",
+                  KERF_VERSION);
+  const Arguments serve = add_serve(app, serve_options);
+  add_make_identity(app, identity_options);
+  if (!app.parse(argc, argv, std::cout)) return 0;
+  if (serve.chosen()) return run_serve(serve_options, catch_stop_signals());
+  return run_make_identity(identity_options);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  keep_files_private();
+  try {
+    return run(argc, argv);
+  } catch (...) {
+    std::cerr << "kerf-bridge: " << failure_text() << '\n';
+    return 2;
+  }
+}

@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <stdexcept>
+#include <variant>
+#include <vector>
+
+#include "bridge/wire/block_plan.hpp"
+#include "bridge/wire/messages.hpp"
+
+namespace kerf::bridge {
+
+// Checked parsers for both directions. The bytes may be hostile: each count is bounded before it is
+// used, and what is allocated does not depend on them beyond `kMaxMessageBytes`.
+
+/// A message that does not hold; one line: what, value, what was expected.
+struct WireError : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+/// What a server said first.
+struct ParsedHello {
+  HelloMessage head{};  ///< `build_id` is zero-terminated
+  std::vector<VolumeDescriptor> volumes;
+};
+
+/// Viewer's side. Checks sizes, grids, spacings; not `abi_hash`, which a viewer that reads no
+/// records need not share: the others call `require_same_layout`. Throws `WireError`.
+[[nodiscard]] ParsedHello parse_hello(std::span<const std::byte> message);
+
+/// A frame, its blocks decoded.
+class FrameParser {
+ public:
+  /// Of the run that `hello` opened.
+  explicit FrameParser(const ParsedHello& hello);
+
+  struct Block {
+    std::uint32_t id;       ///< below `plan().count()`
+    std::uint64_t version;  ///< even, not 0; of text and labels `kConstantVersion`
+    std::span<const std::byte> bytes;
+  };
+
+  /// Viewer's side. `blocks()` holds until the next call, and with it `message`. Throws `WireError`
+  /// and then keeps nothing.
+  FrameHead parse(std::span<const std::byte> message);
+  [[nodiscard]] std::span<const Block> blocks() const noexcept { return blocks_; }
+  [[nodiscard]] const BlockPlan& plan() const noexcept { return plan_; }
+
+ private:
+  BlockPlan plan_;
+  std::uint64_t session_;
+  std::vector<Block> blocks_;
+  std::array<std::byte, kMaxRawBytes> raw_;
+};
+
+/// Records of one ring, decoded.
+struct ParsedRecords {
+  RecordsHead head;
+  std::span<const std::byte> bytes;  ///< in `message` or in `scratch`
+};
+
+/// Viewer's side. Throws `WireError`.
+[[nodiscard]] ParsedRecords parse_records(std::span<const std::byte> message, std::uint64_t session,
+                                          std::span<std::byte, kMaxRawBytes> scratch);
+
+/// Viewer's side. Throws `WireError`.
+[[nodiscard]] ReplyMessage parse_reply(std::span<const std::byte> message);
+
+/// First word of a message; 0 where it has none.
+[[nodiscard]] std::uint32_t magic_of(std::span<const std::byte> message) noexcept;
+
+/// Server's side: what a viewer said, or nothing where it is neither.
+[[nodiscard]] std::optional<std::variant<AckMessage, CommandMessage>> parse_up(
+    std::span<const std::byte> message) noexcept;
+
+}  // namespace kerf::bridge
