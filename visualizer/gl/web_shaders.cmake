@@ -11,6 +11,7 @@ set(cell_faces cell_faces.vert cell_faces.frag)
 set(mesh mesh.vert lighting.frag mesh.frag)
 set(backdrop screen.vert backdrop.frag)
 set(smooth screen.vert smooth.frag)
+set(shown screen.vert shown.frag)
 
 # A browser's default precision is too coarse for a depth, and there is none for these samplers.
 set(head "#version 300 es\nprecision highp float;\nprecision highp int;\n")
@@ -36,7 +37,7 @@ function(append_file file stage_text known)
 endfunction()
 
 set(entries "")
-foreach(program iso blend layer cell_faces mesh backdrop smooth)
+foreach(program iso blend layer cell_faces mesh backdrop smooth shown)
   set(vert "")
   set(frag "")
   set(vert_uniforms "")

@@ -72,6 +72,7 @@ export class Painter {
     const count = scene.volumes.length;
     this.backdrop = new Program(gl, 'backdrop');
     this.smooth = new Program(gl, 'smooth');
+    this.shown = new Program(gl, 'shown');
     this.faces = new Program(gl, 'cell_faces');
     this.metal = new Program(gl, 'mesh', '#define KERF_METAL 1\n');
     this.plain = new Program(gl, 'mesh', '#define KERF_METAL 0\n');
@@ -300,21 +301,22 @@ export class Painter {
   /** Puts the eyes side by side on the canvas. */
   show(width, height) {
     const {gl} = this;
-    gl.disable(gl.SCISSOR_TEST);
     const each = Math.floor(width / this.eyes.length);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, null);
+    gl.disable(gl.SCISSOR_TEST);
+    this.shown.use();
+    this.shown.setInts({u_picture: 0});
     this.eyes.forEach((eye, i) => {
-      const {x1, y1} = eye.all;
-      gl.bindFramebuffer(gl.READ_FRAMEBUFFER, eye.smooth.framebuffer);
-      gl.bindFramebuffer(gl.DRAW_FRAMEBUFFER, null);
-      gl.blitFramebuffer(0, 0, x1, y1, i * each, 0, (i + 1) * each, height, gl.COLOR_BUFFER_BIT,
-        x1 === each && y1 === height ? gl.NEAREST : gl.LINEAR);
+      gl.viewport(i * each, 0, each, height);
+      bind(gl, 0, gl.TEXTURE_2D, eye.smooth.colours[0]);
+      cover(gl);
     });
   }
 
   free() {
     for (const one of [...this.eyes, ...this.volumes, ...this.tools, this.cylinder, this.cone]) one.free();
     this.gl.deleteTexture(this.palette);
-    for (const name of ['backdrop', 'smooth', 'faces', 'metal', 'plain', 'cast', 'layer']) {
+    for (const name of ['backdrop', 'smooth', 'shown', 'faces', 'metal', 'plain', 'cast', 'layer']) {
       if (this[name]) this.gl.deleteProgram(this[name].program);
     }
   }
