@@ -12,7 +12,7 @@ const kBudgetMs = 85;      // of one picture while things move: ten a second wit
 const kRestMs = 250;       // without motion: the picture is drawn finely again
 const kScales = [1, 1 / 2, 1 / 3, 1 / 4, 1 / 6, 1 / 8];
 const kMostPixels = 4096;  // of a side
-const kTaught = 10000;     // pixels of a picture that tells what one costs
+const kTaught = 10000;     // pixels of a picture whose time is that of its pixels
 
 export class Stage {
   /** `trouble(text)` says why there is no picture; '' where there is one again. Throws as contextOf. */
@@ -145,9 +145,10 @@ export class Stage {
     const tookMs = performance.now() - fence.began;
     // The first pictures of a painter pay for its shaders.
     if (this.untaught > 0) --this.untaught;
-    else if (fence.pixels >= kTaught) {
-      const cost = tookMs / fence.pixels;
-      this.costMs = this.costMs === 0 ? cost : mix(this.costMs, cost, 0.4);
+    else if (fence.pixels > 0) {
+      const cost = tookMs / fence.pixels;  // of few pixels: at most
+      if (this.costMs === 0) this.costMs = cost;
+      else if (fence.pixels >= kTaught || cost < this.costMs) this.costMs = mix(this.costMs, cost, 0.4);
     }
     return true;
   }
@@ -164,6 +165,6 @@ export class Stage {
     const fits = scale => cost * scale * scale <= kBudgetMs;
     const best = kScales.find(fits) ?? kScales.at(-1);
     // Finer again only with room to spare, so that it does not go to and fro.
-    if (best < this.scale || (!turns && cost * best * best * 1.3 <= kBudgetMs)) this.scale = best;
+    if (best < this.scale || cost * best * best * 1.3 <= kBudgetMs) this.scale = best;
   }
 }
