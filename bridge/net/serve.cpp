@@ -1,12 +1,128 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "bridge/net/serve.hpp"
 
+#include <array>
+#include <charconv>
+#include <cstdint>
+#include <iostream>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include <arpa/inet.h>
+#include <ifaddrs.h>
+#include <netinet/in.h>
+#include <unistd.h>
+
 #include "bridge/net/bridge_error.hpp"
+#include "bridge/net/server.hpp"
 
 namespace kerf::bridge {
+namespace {
 
-int run_serve(const ServeOptions& options, const std::atomic<bool>&) {
-  throw BridgeError("--listen " + options.listen + ": not built yet");
+struct HostPort {
+  std::string host;
+  std::uint16_t port = 0;
+};
+
+/// `HOST:PORT`, IPv6 in brackets.
+HostPort parse_listen(const std::string& text) {
+  const auto refuse = [&text](const char* why) {
+    return BridgeError("--listen " + text + ": " + why + "; give HOST:PORT, as 127.0.0.1:7400");
+  };
+  const std::size_t colon = text.rfind(':');
+  if (colon == std::string::npos) throw refuse("has no port");
+  HostPort out{text.substr(0, colon), 0};
+  if (out.host.starts_with('[') && out.host.ends_with(']')) {
+    out.host = out.host.substr(1, out.host.size() - 2);
+  } else if (out.host.find(':') != std::string::npos) {
+    throw refuse("an IPv6 address stands in brackets");
+  }
+  if (out.host.empty()) throw refuse("has no host");
+  const char* const end = text.data() + text.size();
+  const auto [stopped, error] = std::from_chars(text.data() + colon + 1, end, out.port);
+  if (error != std::errc() || stopped != end) throw refuse("the port is 0 to 65535");
+  return out;
+}
+
+[[nodiscard]] std::string machine_name() {
+  std::array<char, 256> name{};
+  return gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "";
+}
+
+[[nodiscard]] std::string address_text(const sockaddr* address) {
+  std::array<char, INET6_ADDRSTRLEN> text{};
+  if (address->sa_family == AF_INET) {
+    const auto* const v4 = reinterpret_cast<const sockaddr_in*>(address);
+    inet_ntop(AF_INET, &v4->sin_addr, text.data(), text.size());
+  }
+  return text.data();
+}
+
+/// Where others reach what listens at `host`: itself, or each address of this machine.
+[[nodiscard]] std::vector<std::string> reached_at(const std::string& host) {
+  if (host != "0.0.0.0" && host != "::") return {host};
+  std::vector<std::string> out;
+  ifaddrs* all = nullptr;
+  if (getifaddrs(&all) != 0) return {host};
+  for (const ifaddrs* one = all; one != nullptr; one = one->ifa_next) {
+    if (one->ifa_addr == nullptr) continue;
+    if (std::string text = address_text(one->ifa_addr); !text.empty())
+      out.push_back(std::move(text));
+  }
+  freeifaddrs(all);
+  return out;
+}
+
+[[nodiscard]] bool is_loopback(const std::string& host) {
+  return host.starts_with("127.") || host == "::1" || host == "localhost";
+}
+
+void print_addresses(const ServerSetup& setup, std::uint16_t port) {
+  for (const std::string& host : reached_at(setup.host)) {
+    const bool v6 = host.find(':') != std::string::npos;
+    std::cout << (setup.tls ? "https://" : "http://") << (v6 ? "[" : "") << host << (v6 ? "]" : "")
+              << ':' << port << "/?token=" << setup.tokens.first() << '\n';
+  }
+  std::cout.flush();
+}
+
+}  // namespace
+
+int run_serve(const ServeOptions& options, const std::atomic<bool>& stop) {
+  const HostPort at = parse_listen(options.listen);
+  ServerSetup setup;
+  setup.host = at.host;
+  setup.port = at.port;
+  setup.name = options.name;
+  setup.max_viewers = static_cast<std::size_t>(options.max_viewers);
+  setup.dedicated_link = options.dedicated_link;
+  if (options.token_file.empty()) {
+    setup.tokens.add(new_token(), Right::look);
+  } else {
+    setup.tokens.add_file(options.token_file, "--token-file", Right::look);
+  }
+  if (!options.command_tokens.empty()) {
+    setup.tokens.add_file(options.command_tokens, "--allow-commands", Right::command);
+  }
+  const std::string machine = machine_name();
+  setup.host_names = {machine, machine + ".local", at.host};
+  if (!options.identity.empty()) {
+    setup.tls = load_tls_keys(options.identity);
+  } else if (!is_loopback(at.host)) {
+    std::vector<std::string> hosts = reached_at(at.host);
+    hosts.push_back(machine);
+    setup.tls = self_signed_keys(hosts);
+    std::cout << "certificate, self-signed, SHA-256 " << setup.tls->fingerprint << '\n';
+  }
+  if (setup.tls) {
+    setup.host_names.insert(setup.host_names.end(), setup.tls->names.begin(),
+                            setup.tls->names.end());
+  }
+  Server server(setup);
+  print_addresses(setup, server.port());
+  server.run(stop);
+  return 0;
 }
 
 }  // namespace kerf::bridge

@@ -27,12 +27,12 @@ constexpr int kMaxPasses = 4;  // over the versions in one update; 2 are the mos
 using Brick = std::array<Density, kBrickVoxels>;
 
 /// The version under which `brick` came whole, or 0.
-[[nodiscard]] std::uint64_t read_brick(std::byte* version, std::byte* content,
-                                       Brick& brick) noexcept {
+[[nodiscard]] std::uint64_t copy_brick(std::byte* version, std::byte* content,
+                                       std::span<Density, kBrickVoxels> brick) noexcept {
   for (int i = 0; i < kMaxTries; ++i) {
     const std::uint64_t seen = words::word(version).load(std::memory_order_acquire);
     if (seen % 2 != 0) continue;
-    words::load(brick.data(), content, sizeof brick);
+    words::load(brick.data(), content, brick.size_bytes());
     if (words::unchanged(version, seen)) return seen;
   }
   return 0;
@@ -189,7 +189,7 @@ bool SegmentReader::copy_changed(const SegmentVolumeInfo& volume, VolumeSnapshot
     std::byte* const version = versions + std::size_t{id} * sizeof(std::uint64_t);
     if (words::word(version).load(words::kDataLoad) == snapshot.versions[id]) continue;
     const std::uint64_t whole =
-        read_brick(version, content + std::size_t{id} * sizeof brick, brick);
+        copy_brick(version, content + std::size_t{id} * sizeof brick, brick);
     if (whole == 0) {
       all = false;
       continue;
@@ -213,16 +213,40 @@ void SegmentReader::update(std::size_t volume, VolumeSnapshot& snapshot) const {
     snapshot.versions.assign(info.bricks.count(), 0);
     snapshot.density.assign(info.grid.voxel_count(), 0);
   }
-  std::byte* const epoch = bytes_.data() + offsetof(SegmentHeader, epoch);
   for (int pass = 0; pass < kMaxPasses && !snapshot.consistent; ++pass) {
-    const std::uint64_t before = words::word(epoch).load(std::memory_order_acquire);
+    const std::uint64_t before = epoch();
     const bool all = copy_changed(info, snapshot);
-    snapshot.consistent = all && before % 2 == 0 && words::unchanged(epoch, before);
+    snapshot.consistent = all && before % 2 == 0 && unchanged_since(before);
     if (snapshot.consistent) snapshot.tick = tick_of_version(before);
   }
   std::sort(snapshot.changed.begin(), snapshot.changed.end());
   snapshot.changed.erase(std::unique(snapshot.changed.begin(), snapshot.changed.end()),
                          snapshot.changed.end());
+}
+
+std::uint64_t SegmentReader::epoch() const noexcept {
+  return words::word(bytes_.data() + offsetof(SegmentHeader, epoch))
+      .load(std::memory_order_acquire);
+}
+
+bool SegmentReader::unchanged_since(std::uint64_t seen) const noexcept {
+  return words::unchanged(bytes_.data() + offsetof(SegmentHeader, epoch), seen);
+}
+
+void SegmentReader::changed_bricks(std::size_t volume, std::span<const std::uint64_t> seen,
+                                   std::vector<std::uint32_t>& ids) const {
+  std::byte* const versions = bytes_.data() + info_.volumes.at(volume).off_versions;
+  for (std::uint32_t id = 0; id < seen.size(); ++id) {
+    std::byte* const version = versions + std::size_t{id} * sizeof(std::uint64_t);
+    if (words::word(version).load(words::kDataLoad) != seen[id]) ids.push_back(id);
+  }
+}
+
+std::uint64_t SegmentReader::read_brick(std::size_t volume, std::uint32_t id,
+                                        std::span<Density, kBrickVoxels> out) const noexcept {
+  const SegmentVolumeInfo& info = info_.volumes[volume];
+  return copy_brick(bytes_.data() + info.off_versions + std::size_t{id} * sizeof(std::uint64_t),
+                    bytes_.data() + info.off_bricks + std::size_t{id} * sizeof(Brick), out);
 }
 
 }  // namespace kerf

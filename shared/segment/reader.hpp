@@ -109,6 +109,21 @@ class SegmentReader {
   /// copy. Where it ends `consistent`, the density is exactly the volume of `tick`.
   void update(std::size_t volume, VolumeSnapshot& snapshot) const;
 
+  // For a reader that keeps bricks instead, of several volumes at one tick. Between `epoch` and
+  // `unchanged_since` it reads what changed; where both are even and equal, it holds that tick.
+
+  /// Version word of the whole publication.
+  [[nodiscard]] std::uint64_t epoch() const noexcept;
+  /// True where nothing was published since `epoch` gave `seen`.
+  [[nodiscard]] bool unchanged_since(std::uint64_t seen) const noexcept;
+  /// Appends the bricks of `volume` whose version is not the one in `seen`, which has all of them.
+  void changed_bricks(std::size_t volume, std::span<const std::uint64_t> seen,
+                      std::vector<std::uint32_t>& ids) const;
+  /// Copies a brick, x fastest, zeros beyond the far faces. Returns its version, or 0 where the
+  /// writer was busy with it in all of 64 tries: `out` then holds anything.
+  [[nodiscard]] std::uint64_t read_brick(std::size_t volume, std::uint32_t id,
+                                         std::span<Density, kBrickVoxels> out) const noexcept;
+
  private:
   SegmentReader(std::span<std::byte> bytes, SegmentInfo info) noexcept;
   template <class Record>

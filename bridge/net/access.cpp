@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "bridge/net/access.hpp"
+
+#include <algorithm>
+#include <cctype>
+#include <cerrno>
+#include <fstream>
+
+#include <arpa/inet.h>
+#include <openssl/crypto.h>
+#include <openssl/rand.h>
+#include <openssl/sha.h>
+#include <sys/stat.h>
+
+#include "bridge/net/bridge_error.hpp"
+#include "shared/posix/new_file.hpp"
+
+namespace kerf::bridge {
+namespace {
+
+constexpr std::size_t kFewest = 16, kMost = 128;
+constexpr std::size_t kMaxTokens = 256;
+
+using Digest = std::array<unsigned char, 32>;
+
+Digest digest_of(std::string_view token) noexcept {
+  Digest digest;
+  SHA256(reinterpret_cast<const unsigned char*>(token.data()), token.size(), digest.data());
+  return digest;
+}
+
+[[nodiscard]] bool is_token(std::string_view text) noexcept {
+  return text.size() >= kFewest && text.size() <= kMost &&
+         std::all_of(text.begin(), text.end(),
+                     [](unsigned char c) { return std::isalnum(c) != 0 || c == '-' || c == '_'; });
+}
+
+[[nodiscard]] bool same_text(std::string_view a, std::string_view b) noexcept {
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](unsigned char x, unsigned char y) {
+    return std::tolower(x) == std::tolower(y);
+  });
+}
+
+/// The value of `key` among `key=value` parts with `separator` between them.
+[[nodiscard]] std::string_view value_among(std::string_view parts, std::string_view key,
+                                           char separator) noexcept {
+  while (!parts.empty()) {
+    const std::size_t end = std::min(parts.find(separator), parts.size());
+    std::string_view part = parts.substr(0, end);
+    while (!part.empty() && part.front() == ' ') part.remove_prefix(1);
+    parts.remove_prefix(std::min(end + 1, parts.size()));
+    if (part.size() > key.size() && part.starts_with(key) && part[key.size()] == '=') {
+      return part.substr(key.size() + 1);
+    }
+  }
+  return {};
+}
+
+}  // namespace
+
+void Tokens::add_file(const std::filesystem::path& file, const char* option, Right right) {
+  const std::string place = std::string(option) + " " + file.string() + ": ";
+  struct stat status {};
+  if (stat(file.c_str(), &status) != 0) {
+    throw BridgeError(place + not_written(errno) + "; write one token a line into it");
+  }
+  if ((status.st_mode & (S_IRWXG | S_IRWXO)) != 0) {
+    throw BridgeError(place + "is open to other users; chmod 600 it");
+  }
+  std::ifstream in(file);
+  const std::size_t before = entries_.size();
+  std::string line;
+  while (std::getline(in, line)) {
+    line.erase(std::min(line.find('#'), line.size()));
+    line.erase(line.find_last_not_of(" \t\r") + 1);
+    if (line.empty()) continue;
+    if (!is_token(line)) {
+      throw BridgeError(place + "a line of " + std::to_string(line.size()) +
+                        " characters is no token; take 16 to 128 letters, digits, '-' or '_'");
+    }
+    if (entries_.size() == kMaxTokens)
+      throw BridgeError(place + "more than 256 tokens; take fewer");
+    add(line, right);
+  }
+  if (entries_.size() == before) throw BridgeError(place + "no token; write one a line into it");
+}
+
+void Tokens::add(std::string_view token, Right right) {
+  entries_.push_back({digest_of(token), right});
+  if (first_.empty()) first_ = token;
+}
+
+Right Tokens::right_of(std::string_view token) const noexcept {
+  const Digest digest = digest_of(token);
+  Right right = Right::none;
+  for (const Entry& entry : entries_) {
+    const bool same = CRYPTO_memcmp(digest.data(), entry.digest.data(), digest.size()) == 0;
+    right = std::max(right, same ? entry.right : Right::none);
+  }
+  return right;
+}
+
+std::string new_token() {
+  std::array<unsigned char, 16> random;
+  if (RAND_bytes(random.data(), static_cast<int>(random.size())) != 1) {
+    throw BridgeError("token: the system gives no random numbers; try again");
+  }
+  std::string text;
+  for (const unsigned char byte : random) {
+    text += "0123456789abcdef"[byte >> 4];
+    text += "0123456789abcdef"[byte & 15];
+  }
+  return text;
+}
+
+std::string_view query_value(std::string_view target, std::string_view key) noexcept {
+  const std::size_t query = target.find('?');
+  if (query == std::string_view::npos) return {};
+  return value_among(target.substr(query + 1), key, '&');
+}
+
+std::string_view path_of(std::string_view target) noexcept {
+  return target.substr(0, target.find('?'));
+}
+
+std::string_view cookie_value(std::string_view cookies, std::string_view name) noexcept {
+  return value_among(cookies, name, ';');
+}
+
+std::string_view host_name(std::string_view host) noexcept {
+  if (host.starts_with('[')) {
+    const std::size_t end = host.find(']');
+    return end == std::string_view::npos ? std::string_view{} : host.substr(1, end - 1);
+  }
+  return host.substr(0, host.rfind(':'));
+}
+
+bool is_own_host(std::string_view host, const std::vector<std::string>& names) {
+  const std::string text(host);
+  in6_addr address{};
+  if (inet_pton(AF_INET, text.c_str(), &address) == 1) return true;
+  if (inet_pton(AF_INET6, text.c_str(), &address) == 1) return true;
+  return same_text(text, "localhost") ||
+         std::any_of(names.begin(), names.end(),
+                     [&text](const std::string& name) { return same_text(text, name); });
+}
+
+bool is_own_origin(std::string_view origin, std::string_view host, bool tls) {
+  return origin.empty() ||
+         same_text(origin, std::string(tls ? "https://" : "http://") + std::string(host));
+}
+
+}  // namespace kerf::bridge

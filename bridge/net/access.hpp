@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace kerf::bridge {
+
+/// What a token lets its holder do.
+enum class Right { none, look, command };
+
+/// Who may look and who may command. Tokens have 16 to 128 letters, digits, '-' and '_'.
+class Tokens {
+ public:
+  /// One token a line; '#' starts a comment. Throws `BridgeError` where the file is not to be read,
+  /// is open to others, or has no token or a bad one.
+  void add_file(const std::filesystem::path& file, const char* option, Right right);
+  void add(std::string_view token, Right right);
+
+  /// Takes as long whatever `token` is: digests are compared, all of them, to their end.
+  [[nodiscard]] Right right_of(std::string_view token) const noexcept;
+
+  /// Of the first that may look or command, for the printed address.
+  [[nodiscard]] const std::string& first() const noexcept { return first_; }
+
+ private:
+  struct Entry {
+    std::array<unsigned char, 32> digest;
+    Right right;
+  };
+  std::vector<Entry> entries_;
+  std::string first_;
+};
+
+/// 128 random bits in hex.
+[[nodiscard]] std::string new_token();
+
+/// The value of `key` in `a=1&b=2`, of a target `/path?a=1&b=2`; empty where there is none.
+[[nodiscard]] std::string_view query_value(std::string_view target, std::string_view key) noexcept;
+/// The target without its query.
+[[nodiscard]] std::string_view path_of(std::string_view target) noexcept;
+/// The value of `name` in the text of a Cookie header; empty where there is none.
+[[nodiscard]] std::string_view cookie_value(std::string_view cookies,
+                                            std::string_view name) noexcept;
+
+/// A Host header without its port, and IPv6 without its brackets.
+[[nodiscard]] std::string_view host_name(std::string_view host) noexcept;
+
+/// Whether a browser that names `host` (without port) meant this server: an address, which no
+/// stranger's name server can give another meaning, "localhost", or one of `names`.
+[[nodiscard]] bool is_own_host(std::string_view host, const std::vector<std::string>& names);
+
+/// Whether the page that opens a WebSocket came from here: none told (no browser), or scheme and
+/// host as the request has them.
+[[nodiscard]] bool is_own_origin(std::string_view origin, std::string_view host, bool tls);
+
+}  // namespace kerf::bridge

@@ -1,0 +1,162 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <chrono>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include <boost/asio/co_spawn.hpp>
+#include <boost/asio/redirect_error.hpp>
+#include <boost/asio/use_awaitable.hpp>
+#include <boost/asio/write.hpp>
+#include <boost/beast/core/detect_ssl.hpp>
+
+#include "bridge/net/replies.hpp"
+#include "bridge/net/server_impl.hpp"
+#include "bridge/page/page_files.hpp"
+
+namespace kerf::bridge {
+namespace {
+
+namespace http = beast::http;
+
+constexpr auto kHandshakeTime = std::chrono::seconds(5);  // for TLS, and for each request
+constexpr auto kReplyTime = std::chrono::seconds(30);     // 200 KB over 64 kbit/s
+constexpr auto kWrongTokenTime = std::chrono::seconds(1);
+constexpr std::uint32_t kMaxHeaderBytes = 8 * 1024;
+
+std::string_view text(beast::string_view view) {
+  return {view.data(), view.size()};
+}
+
+auto quiet(ErrorCode& error) {
+  return asio::redirect_error(asio::use_awaitable, error);
+}
+
+}  // namespace
+
+asio::awaitable<void> Server::Impl::connection(tcp::socket socket) {
+  ErrorCode error;
+  HandshakePlace place(*this, socket.remote_endpoint(error).address());
+  auto ws = std::make_unique<WebSocket>(std::move(socket), tls_ ? &*tls_ : nullptr);
+  beast::flat_buffer in(kMaxHeaderBytes);
+  bool done = true;
+  if (tls_) co_await handshake(*ws, in, done);
+  if (done) co_await talk_http(std::move(ws), in, place);
+}
+
+asio::awaitable<void> Server::Impl::handshake(WebSocket& ws, beast::flat_buffer& in, bool& done) {
+  Link& link = ws.next_layer();
+  ErrorCode error;
+  link.next_layer().expires_after(kHandshakeTime);
+  done = co_await beast::async_detect_ssl(link.next_layer(), in, quiet(error));
+  if (error) co_return;
+  if (!done) {
+    const std::string reply = http_text({400, "text/plain; charset=utf-8",
+                                         "This port speaks TLS only: open it with https:// (a "
+                                         "page) or wss:// (kerf bridge join).\n",
+                                         "", false});
+    co_await asio::async_write(link.next_layer(), asio::buffer(reply), quiet(error));
+    co_return;
+  }
+  const std::size_t used =
+      co_await link.tls().async_handshake(asio::ssl::stream_base::server, in.data(), quiet(error));
+  in.consume(used);
+  done = !error;
+}
+
+Right Server::Impl::right_of(const Request& request) const {
+  const std::string_view asked = query_value(text(request.target()), "token");
+  if (!asked.empty()) return setup_.tokens.right_of(asked);
+  const std::string name = "kerf" + std::to_string(port());
+  return setup_.tokens.right_of(cookie_value(text(request[http::field::cookie]), name));
+}
+
+std::string Server::Impl::page_text(const Request& request, Right right) const {
+  HttpReply reply;
+  reply.keep_alive = request.keep_alive();
+  reply.head_only = request.method() == http::verb::head;
+  const std::string_view token = query_value(text(request.target()), "token");
+  if (right == Right::none) {
+    reply.status = 401;
+    reply.body =
+        "This picture needs a token: open the address that kerf bridge printed, with all of its "
+        "?token=...\n";
+    return http_text(reply);
+  }
+  if (!token.empty()) {
+    reply.cookie = "kerf" + std::to_string(port()) + "=" + std::string(token) +
+                   "; Path=/; HttpOnly; SameSite=Strict" + (tls_ ? "; Secure" : "");
+  }
+  std::string_view name = path_of(text(request.target())).substr(1);
+  if (name.empty()) name = "index.html";
+  const auto files = page_files();
+  const auto file = std::find_if(files.begin(), files.end(),
+                                 [name](const PageFile& one) { return one.name == name; });
+  if (file == files.end()) {
+    reply.status = 404;
+    reply.body = "No such page.\n";
+  } else {
+    reply.content_type = file->content_type;
+    reply.body = file->bytes;
+  }
+  return http_text(reply);
+}
+
+asio::awaitable<void> Server::Impl::refuse(Link& link, int status, std::string_view why,
+                                           bool head_only) {
+  ErrorCode error;
+  const std::string reply =
+      http_text({status, "text/plain; charset=utf-8", why, "", false, head_only});
+  link.next_layer().expires_after(kReplyTime);
+  co_await asio::async_write(link, asio::buffer(reply), quiet(error));
+  link.next_layer().socket().shutdown(tcp::socket::shutdown_send, error);
+}
+
+asio::awaitable<void> Server::Impl::talk_http(std::unique_ptr<WebSocket> ws, beast::flat_buffer& in,
+                                              HandshakePlace& place) {
+  Link& link = ws->next_layer();
+  ErrorCode error;
+  for (bool more = true; more && !error;) {
+    http::request_parser<http::empty_body> parser;
+    parser.header_limit(kMaxHeaderBytes);
+    parser.body_limit(0);
+    link.next_layer().expires_after(kHandshakeTime);
+    co_await http::async_read(link, in, parser, quiet(error));
+    if (error == http::error::end_of_stream || error == beast::error::timeout) co_return;
+    if (error) co_return co_await refuse(link, 400, "This is no request for a page.\n", false);
+    const Request& request = parser.get();
+    const std::string_view host = text(request[http::field::host]);
+    const bool head = request.method() == http::verb::head;
+    if (!is_own_host(host_name(host), setup_.host_names)) {
+      co_return co_await refuse(link, 421, "Open this machine by its address or its own name.\n",
+                                head);
+    }
+    if ((request.method() != http::verb::get && !head) || !request.target().starts_with('/')) {
+      co_return co_await refuse(link, 405, "Only GET and HEAD are answered here.\n", head);
+    }
+    const bool upgrade = beast::websocket::is_upgrade(request);
+    if (upgrade && !is_own_origin(text(request[http::field::origin]), host, tls_.has_value())) {
+      co_return co_await refuse(link, 403, "A page from elsewhere may not look in here.\n", head);
+    }
+    const Right right = right_of(request);
+    const bool gave_token = !query_value(text(request.target()), "token").empty();
+    if (right == Right::none && gave_token) {
+      // The place is held meanwhile, so who guesses gets 32 answers a second at most.
+      asio::steady_timer wait(io_, kWrongTokenTime);
+      co_await wait.async_wait(quiet(error));
+    }
+    if (upgrade && path_of(text(request.target())) == kBridgePath) {
+      const Request upgrade_request = parser.release();
+      place.release();
+      co_return co_await view(std::move(ws), upgrade_request, right);
+    }
+    const std::string reply = page_text(request, right);
+    more = request.keep_alive();
+    link.next_layer().expires_after(kReplyTime);
+    co_await asio::async_write(link, asio::buffer(reply), quiet(error));
+  }
+  link.next_layer().socket().shutdown(tcp::socket::shutdown_send, error);
+}
+
+}  // namespace kerf::bridge

@@ -1,0 +1,202 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "bridge/net/server.hpp"
+
+#include <chrono>
+#include <iostream>
+#include <utility>
+
+#include <boost/asio/buffer.hpp>
+#include <boost/asio/co_spawn.hpp>
+#include <boost/asio/detached.hpp>
+#include <boost/asio/post.hpp>
+#include <boost/asio/redirect_error.hpp>
+#include <boost/asio/use_awaitable.hpp>
+#include <openssl/ssl.h>
+
+#include "bridge/net/bridge_error.hpp"
+#include "bridge/net/server_impl.hpp"
+#include "bridge/net/tcp_options.hpp"
+#include "shared/posix/failure.hpp"
+#include "shared/posix/hex64.hpp"
+#include "shared/posix/monotonic_clock.hpp"
+
+namespace kerf::bridge {
+namespace {
+
+// Connections that are no viewers yet: room for a browser's six in several windows, and a bound for
+// those who come to keep others out.
+constexpr std::size_t kMaxHandshakes = 128, kMaxHandshakesOfOne = 32;
+constexpr std::int64_t kRetryNs = kNsPerSecond / 10;
+constexpr std::int64_t kBbrRestartNs = 5 * kNsPerSecond;
+
+tcp::endpoint resolve(asio::io_context& io, const std::string& host, std::uint16_t port) {
+  const std::string place = "--listen " + host + ":" + std::to_string(port) + ": ";
+  ErrorCode error;
+  const auto found = tcp::resolver(io).resolve(
+      host, std::to_string(port), tcp::resolver::passive | tcp::resolver::numeric_service, error);
+  if (error || found.empty()) {
+    throw BridgeError(place + error.message() + "; give an address of this machine (ip address)");
+  }
+  return found.begin()->endpoint();
+}
+
+tcp::acceptor listen_at(asio::io_context& io, const ServerSetup& setup) {
+  const tcp::endpoint at = resolve(io, setup.host, setup.port);
+  const std::string place = "--listen " + setup.host + ":" + std::to_string(setup.port) + ": ";
+  if (!setup.tls && !at.address().is_loopback()) {
+    throw BridgeError(place + "is no loopback address; off loopback there is TLS only");
+  }
+  tcp::acceptor acceptor(io);
+  ErrorCode error;
+  acceptor.open(at.protocol(), error);
+  if (!error) acceptor.set_option(tcp::acceptor::reuse_address(true), error);
+  if (!error) acceptor.bind(at, error);
+  if (!error) acceptor.listen(asio::socket_base::max_listen_connections, error);
+  if (!error) return acceptor;
+  const char* way = "take another address";
+  if (error == asio::error::address_in_use) way = "another program has it; take another port";
+  if (error == asio::error::access_denied) way = "take a port from 1024 on";
+  if (error == boost::system::errc::address_not_available) {
+    way = "give an address of this machine (ip address)";
+  }
+  throw BridgeError(place + error.message() + "; " + way_out_of(error.value(), way));
+}
+
+asio::ssl::context make_tls(const TlsKeys& keys) {
+  asio::ssl::context tls(asio::ssl::context::tls_server);
+  SSL_CTX_set_min_proto_version(tls.native_handle(), TLS1_3_VERSION);
+  // No early data, and no tickets: a viewer that comes again shows what it has again.
+  SSL_CTX_set_num_tickets(tls.native_handle(), 0);
+  tls.use_certificate_chain(asio::buffer(keys.chain_pem));
+  tls.use_private_key(asio::buffer(keys.key_pem), asio::ssl::context::pem);
+  return tls;
+}
+
+}  // namespace
+
+Server::Impl::Impl(ServerSetup setup)
+    : setup_(std::move(setup)), acceptor_(listen_at(io_, setup_)) {
+  static_cast<void>(segment_socket(setup_.name));  // a name that cannot be is not worth a wait
+  if (setup_.tls) tls_.emplace(make_tls(*setup_.tls));
+  const std::string why = why_no_bbr(acceptor_.native_handle());
+  if (!why.empty()) {
+    std::cerr << "kerf-bridge: no BBR: " << why << "; over links that lose packets it is slow\n";
+  }
+}
+
+Server::Impl::~Impl() {
+  helper_.join();
+  // Viewers live as long as `io_` does, longer than what their streams look at.
+  for (const std::shared_ptr<Viewer>& viewer : viewers_) viewer->stream.reset();
+}
+
+void Server::Impl::run(const std::atomic<bool>& stop) {
+  const auto raise = [](const std::exception_ptr& error) {
+    if (error) std::rethrow_exception(error);
+  };
+  asio::co_spawn(io_, accept_all(), raise);
+  asio::co_spawn(io_, clock(stop), raise);
+  io_.run();
+}
+
+asio::awaitable<void> Server::Impl::accept_all() {
+  asio::steady_timer pause(io_);
+  for (;;) {
+    ErrorCode error;
+    tcp::socket socket =
+        co_await acceptor_.async_accept(asio::redirect_error(asio::use_awaitable, error));
+    if (error) {  // no descriptor is left, or the peer was gone already
+      pause.expires_after(std::chrono::milliseconds(50));
+      co_await pause.async_wait(asio::redirect_error(asio::use_awaitable, error));
+      continue;
+    }
+    const asio::ip::address from = socket.remote_endpoint(error).address();
+    if (error || handshake_count_ >= kMaxHandshakes) continue;
+    const auto same = handshakes_.find(from);
+    if (same != handshakes_.end() && same->second >= kMaxHandshakesOfOne) continue;
+    asio::co_spawn(io_, connection(std::move(socket)), asio::detached);
+  }
+}
+
+asio::awaitable<void> Server::Impl::clock(const std::atomic<bool>& stop) {
+  using Clock = std::chrono::steady_clock;
+  asio::steady_timer timer(io_);
+  for (auto at = Clock::now(); !stop; at += std::chrono::nanoseconds(kSlotNs)) {
+    at = std::max(at, Clock::now() - std::chrono::nanoseconds(kSlotNs));  // no rush after a sleep
+    timer.expires_at(at);
+    ErrorCode error;
+    co_await timer.async_wait(asio::redirect_error(asio::use_awaitable, error));
+    slot();
+  }
+  io_.stop();
+}
+
+void Server::Impl::slot() {
+  const std::int64_t now_ns = monotonic_ns();
+  watch_controller(now_ns);
+  const bool restart = setup_.dedicated_link && now_ns - bbr_restarted_ns_ >= kBbrRestartNs;
+  if (restart) bbr_restarted_ns_ = now_ns;
+  const bool ended = connection_ == nullptr || !connection_->alive();
+  if (snapshot_ && !viewers_.empty()) snapshot_->update(now_ns, ended);
+  for (const std::shared_ptr<Viewer>& viewer : viewers_) {
+    if (viewer->stream) {
+      viewer->stream->note_changes();
+      viewer->stream->slot(now_ns, ended);
+    }
+    if (restart && !viewer->gone) restart_bbr(viewer->fd());
+    look_after(*viewer, now_ns);
+    viewer->wake.cancel();
+  }
+}
+
+void Server::Impl::watch_controller(std::int64_t now_ns) {
+  if (connecting_ || now_ns < next_try_ns_ || (connection_ && connection_->alive())) return;
+  connecting_ = true;
+  asio::post(helper_, [this] {
+    std::unique_ptr<SegmentConnection> found;
+    std::string why;
+    try {
+      found = std::make_unique<SegmentConnection>(connect_segment(setup_.name));
+    } catch (const SegmentAbsent&) {
+      why = "waiting for controller \"" + setup_.name + "\"";
+    } catch (...) {
+      why = failure_text();
+    }
+    asio::post(io_, [this, why, found = std::move(found)]() mutable {
+      connecting_ = false;
+      next_try_ns_ = monotonic_ns() + kRetryNs;
+      if (found) {
+        begin_run(std::move(found));
+      } else {
+        say_once(why);
+      }
+    });
+  });
+}
+
+void Server::Impl::begin_run(std::unique_ptr<SegmentConnection> connection) {
+  for (const std::shared_ptr<Viewer>& viewer : viewers_) viewer->stream.reset();
+  snapshot_.reset();
+  connection_ = std::move(connection);
+  said_.clear();
+  say_once("controller \"" + setup_.name + "\", run " +
+           hex64(connection_->reader().info().session_id));
+  for (const std::shared_ptr<Viewer>& viewer : viewers_) open_stream(*viewer);
+}
+
+void Server::Impl::say_once(const std::string& text) {
+  if (text == said_) return;
+  said_ = text;
+  std::cerr << "kerf-bridge: " << text << '\n';
+}
+
+Server::Server(ServerSetup setup) : impl_(std::make_unique<Impl>(std::move(setup))) {}
+Server::~Server() = default;
+std::uint16_t Server::port() const noexcept {
+  return impl_->port();
+}
+void Server::run(const std::atomic<bool>& stop) {
+  impl_->run(stop);
+}
+
+}  // namespace kerf::bridge

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "bridge/net/access.hpp"
+#include "bridge/net/tls_keys.hpp"
+
+namespace kerf::bridge {
+
+/// All that a server is made from.
+struct ServerSetup {
+  std::string host = "127.0.0.1";  ///< address or name to listen on
+  std::uint16_t port = 7400;       ///< 0: one that is free
+  std::string name;                ///< of the controller
+  Tokens tokens;
+  std::optional<TlsKeys> tls;           ///< nothing: plain, on loopback only
+  std::vector<std::string> host_names;  ///< by which browsers may call it, beside addresses
+  std::size_t max_viewers = 32;
+  bool dedicated_link = false;
+};
+
+/// One port for the page and for viewers; one more reader of the segment of one controller, which
+/// may be absent, go and come back. Nothing from the network reaches the controller but commands of
+/// those who may command, checked again by the controller.
+class Server {
+ public:
+  /// Listens. Throws `BridgeError` where that is not to be had.
+  explicit Server(ServerSetup setup);
+  ~Server();
+  Server(const Server&) = delete;
+  Server& operator=(const Server&) = delete;
+
+  [[nodiscard]] std::uint16_t port() const noexcept;
+  /// Serves until `stop`.
+  void run(const std::atomic<bool>& stop);
+
+ private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace kerf::bridge

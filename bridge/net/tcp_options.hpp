@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+namespace kerf::bridge {
+
+/// What a viewer's socket is set to: no waiting for more to send, few unsent bytes, so that none
+/// grows stale, a look whether the peer is still there, and BBR, which bears loss. The size of the
+/// send buffer is the kernel's business: a small one makes joins over lossy links slow.
+void tune_socket(int fd) noexcept;
+
+/// A new BBR in place of the old one, which would soon go and probe for the round trip with four
+/// packets under way: fresher, and unfair to whoever shares the link.
+void restart_bbr(int fd) noexcept;
+
+/// Empty where BBR is to be had, else why not.
+[[nodiscard]] std::string why_no_bbr(int fd);
+
+/// The kernel's least round trip of a connection; 0 where it knows none yet.
+[[nodiscard]] std::int64_t least_round_trip_ns(int fd) noexcept;
+
+}  // namespace kerf::bridge

@@ -1,0 +1,190 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "bridge/stream/stream.hpp"
+
+#include <algorithm>
+#include <cstring>
+#include <numeric>
+#include <string>
+
+#include "bridge/stream/packing.hpp"
+#include "bridge/wire/set_hash.hpp"
+#include "shared/segment/layout_table.hpp"
+
+namespace kerf::bridge {
+
+Stream::Stream(RunSnapshot& snapshot, std::uint32_t flags)
+    : snapshot_(snapshot),
+      flags_(flags),
+      session_(snapshot.reader().info().session_id),
+      held_(snapshot.plan().count()),
+      waiting_(snapshot.plan().count()),
+      is_waiting_(snapshot.plan().count(), true),
+      ticks_(snapshot.reader(), Ring::ticks),
+      dirty_(snapshot.reader(), Ring::dirty) {
+  std::iota(waiting_.begin(), waiting_.end(), 0U);
+}
+
+Stream::~Stream() {
+  for (; in_pass(); ++sent_of_pass_) {
+    snapshot_.unpin(pass_[sent_of_pass_].id, pass_[sent_of_pass_].version);
+  }
+}
+
+void Stream::note_changes() {
+  for (const std::uint32_t id : snapshot_.changed()) {
+    if (is_waiting_[id]) continue;
+    is_waiting_[id] = true;
+    waiting_.push_back(id);
+  }
+}
+
+void Stream::slot(std::int64_t now_ns, bool ended) {
+  std::uint64_t records = kMessagesPerSlot * (kMaxRawBytes / sizeof(TickRecord));
+  const double rate = link_.bytes_per_s();
+  if (in_pass() && rate > 0 && slot_ns_ != 0) {
+    const double bytes = kRecordShare * rate * static_cast<double>(now_ns - slot_ns_) * 1e-9;
+    const double each = (sizeof(TickRecord) + sizeof(DirtyRecord)) / ticks_.ratio();
+    records = std::min(records, static_cast<std::uint64_t>(bytes / each));
+  }
+  ticks_.plan(records);
+  dirty_.plan(records);
+  slot_ns_ = now_ns;
+  ended_ = ended;
+  pass_due_ = true;
+}
+
+bool Stream::next(std::int64_t now_ns, std::vector<std::byte>& out) {
+  out.clear();
+  if (!greeted_) {
+    greeted_ = true;
+    write_hello(now_ns, out);
+    return true;
+  }
+  // By turns, so that neither keeps the other from a link that is slower than it alone.
+  if (frame_next_ && next_frame(now_ns, out)) return true;
+  if (next_records(out)) return true;
+  return !frame_next_ && next_frame(now_ns, out);
+}
+
+void Stream::write_hello(std::int64_t now_ns, std::vector<std::byte>& out) {
+  const SegmentInfo& info = snapshot_.reader().info();
+  HelloMessage head{};
+  head.magic = kHelloMagic;
+  head.protocol = kProtocol;
+  head.session = session_;
+  head.config_hash = info.config_hash;
+  head.abi_hash = kAbiHash;
+  head.layout_major = kLayoutMajor;
+  head.layout_minor = kLayoutMinor;
+  head.tick_ns = info.tick_ns;
+  head.flags = flags_;
+  head.server_ns = now_ns;
+  head.start_ns = info.start_ns;
+  head.volume_count = static_cast<std::uint32_t>(info.volumes.size());
+  head.record_bytes = sizeof(TickRecord);
+  head.dirty_bytes = sizeof(DirtyRecord);
+  head.scene_bytes = static_cast<std::uint32_t>(info.scene_json.size());
+  info.build_id.copy(head.build_id, sizeof head.build_id - 1);
+  const std::vector<VolumeDescriptor> volumes = describe_volumes(info);
+  out.resize(sizeof head + volumes.size() * sizeof(VolumeDescriptor));
+  std::memcpy(out.data(), &head, sizeof head);
+  std::memcpy(out.data() + sizeof head, volumes.data(), volumes.size() * sizeof(VolumeDescriptor));
+  link_.sent(out.size());
+}
+
+bool Stream::next_records(std::vector<std::byte>& out) {
+  for (RecordBatches* ring : {&ticks_, &dirty_}) {
+    if (!ring->waiting() || !ring->write(link_.bytes_per_s(), out)) continue;
+    link_.sent(out.size());
+    frame_next_ = true;
+    return true;
+  }
+  return false;
+}
+
+bool Stream::next_frame(std::int64_t now_ns, std::vector<std::byte>& out) {
+  if (!link_.has_credit()) return false;
+  if (!in_pass()) {
+    if (!pass_due_) return false;
+    begin_pass();
+    if (!opened_) return false;
+  }
+  frame_next_ = false;
+  write_frame(now_ns, out);
+  return true;
+}
+
+void Stream::begin_pass() {
+  pass_due_ = false;
+  pass_.clear();
+  sent_of_pass_ = 0;
+  if (!snapshot_.whole()) return;  // a sign of life, and no news
+  opened_ = true;
+  pass_tick_ = snapshot_.tick();
+  pass_taken_ns_ = snapshot_.taken_ns();
+  for (const std::uint32_t id : waiting_) {
+    is_waiting_[id] = false;
+    const std::uint64_t version = snapshot_.version(id);
+    if (version == 0 || version == held_[id]) continue;
+    snapshot_.pin(id);
+    pass_.push_back({id, version});
+  }
+  waiting_.clear();
+  std::sort(pass_.begin(), pass_.end(), [](const Entry& a, const Entry& b) { return a.id < b.id; });
+}
+
+std::size_t Stream::take_blocks() {
+  raw_.clear();
+  std::size_t blocks = 0;
+  for (; in_pass(); ++sent_of_pass_, ++blocks) {
+    const auto [id, version] = pass_[sent_of_pass_];
+    const std::size_t bytes = snapshot_.plan().plane_of(id).block_bytes();
+    if (raw_.size() + bytes > kMaxRawBytes) break;
+    raw_.resize(raw_.size() + bytes);
+    snapshot_.copy(id, version, std::span(raw_).last(bytes));
+    snapshot_.unpin(id, version);
+    set_hash_ = with_block(set_hash_, id, held_[id], version, session_);
+    held_[id] = version;
+  }
+  return blocks;
+}
+
+void Stream::write_frame(std::int64_t now_ns, std::vector<std::byte>& out) {
+  const std::size_t begin = sent_of_pass_;
+  const std::size_t blocks = take_blocks();
+  FrameHead head{};
+  head.magic = kFrameMagic;
+  head.flags = (in_pass() ? 0 : kLastOfPass) | (ended_ ? kRunEnded : 0);
+  head.session = session_;
+  head.frame = ++frame_;
+  head.tick = pass_tick_;
+  head.taken_ns = pass_taken_ns_;
+  head.heartbeat_ns = static_cast<std::int64_t>(snapshot_.reader().heartbeat_ns());
+  head.set_hash = set_hash_;
+  head.lifecycle = static_cast<std::uint32_t>(snapshot_.reader().lifecycle());
+  head.blocks = static_cast<std::uint32_t>(blocks);
+  head.raw_bytes = static_cast<std::uint32_t>(raw_.size());
+  head.sent_ns = now_ns;
+  const std::size_t payload_at = sizeof head + blocks * kBlockEntryBytes;
+  out.resize(payload_at);
+  std::byte* versions = out.data() + sizeof head;
+  std::byte* ids = versions + blocks * sizeof(std::uint64_t);
+  for (std::size_t i = 0; i < blocks; ++i) {
+    const Entry& entry = pass_[begin + i];
+    std::memcpy(versions + i * sizeof entry.version, &entry.version, sizeof entry.version);
+    std::memcpy(ids + i * sizeof entry.id, &entry.id, sizeof entry.id);
+  }
+  if (append_payload(raw_, link_.bytes_per_s(), pack_choice_, out)) head.flags |= kPacked;
+  head.payload_bytes = static_cast<std::uint32_t>(out.size() - payload_at);
+  std::memcpy(out.data(), &head, sizeof head);
+  link_.sent_frame(frame_, out.size(), now_ns);
+}
+
+bool Stream::acked(const AckMessage& ack, std::int64_t now_ns) {
+  if (ack.session != session_) return true;
+  if (ack.frame > frame_) return false;
+  link_.acked(ack.frame, now_ns);
+  return true;
+}
+
+}  // namespace kerf::bridge
