@@ -115,8 +115,11 @@ class Page:
             self.mouse('mouseMoved', *point, button=button, buttons=buttons, modifiers=modifiers)
         self.mouse('mouseReleased', *points[-1], button=button, modifiers=modifiers)
 
-    def click(self, x, y):
-        self.drag([(x, y)])
+    def press(self, selector):
+        """Clicks on the middle of an element."""
+        self.evaluate(f"document.querySelector('{selector}').scrollIntoView({{block: 'center', behavior: 'instant'}})")
+        x, y, width, height = self.box(selector)
+        self.drag([(x + width / 2, y + height / 2)])
 
     def touch(self, kind, *points):
         self.call('Input.dispatchTouchEvent', type=kind,

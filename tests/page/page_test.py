@@ -21,13 +21,13 @@ WIDTH, HEIGHT = 780, 400  # of the window; the picture has what the panel leaves
 PANEL = (260, 170)        # of the native picture's own figures, upper left
 
 
-def likeness(a, b, without_panel=True):
-    """The share of pixels that differ by NEAR at most."""
+def likeness(a, b, panel=PANEL):
+    """The share of pixels that differ by NEAR at most; `panel` does not count."""
     (width, height, first), (other_width, other_height, second) = pixels(a), pixels(b)
     assert (width, height) == (other_width, other_height), (width, height, other_width, other_height)
     alike = all_of_them = 0
     for y in range(height):
-        x0 = PANEL[0] if without_panel and y < PANEL[1] else 0
+        x0 = min(panel[0], width) if y < panel[1] else 0
         one, two = first[y][3 * x0:], second[y][3 * x0:]
         differs = [abs(p - q) > NEAR for p, q in zip(one, two)]
         bad = sum(any(differs[i:i + 3]) for i in range(0, len(differs), 3)) if any(differs) else 0
@@ -57,28 +57,36 @@ class Case:
         self.page.size(WIDTH, HEIGHT)
         self.page.go(self.address)
         self.check(self.page.until(text_of('#state') + ".includes('no controller')"), 'the page waits for a controller')
-        rig.start_run()
-        self.check(self.page.until('document.body?.dataset.state === "live"'), 'it goes live')
-        self.check(self.page.until(figure('removed') + ' > 0.5'), 'the cut is counted')
+        # A hand that comes late, as on a busy machine, is a fault: then once more.
+        for _ in range(3):
+            rig.start_run()
+            self.check(self.page.until('document.body?.dataset.state === "live"'), 'it goes live')
+            # Ticks after which the hand rests. A page that came late has not seen what was cut before.
+            self.check(self.page.until('Number(document.body.dataset.tick) > 4000'), 'the hand has cut')
+            late = "document.getElementById('figures').textContent.includes('since joining')"
+            if self.page.until(f"{late} || {figure('removed')} > 0.1", 2):
+                break
+            print('  not cut: ' + self.page.evaluate(text_of('#banner')) + rig.log('controller'))
+            rig.end('controller')
+            rig.end('emulator')
+        else:
+            self.check(False, 'something is cut')
         self.rest = self.settle()
 
     def check(self, holds, what):
         if not holds:
-            with open(self.rig.path("wrong.png"), "wb") as out:
-                out.write(self.page.picture())
+            if 'KERF_PAGE_OUT' in os.environ:  # a file for what is seen then
+                with open(os.environ['KERF_PAGE_OUT'], 'wb') as out:
+                    out.write(self.page.picture())
             raise AssertionError(what)
-        print('  ' + what, flush=True)
+        if what != 'the picture comes to rest':
+            print('  ' + what, flush=True)
 
     def settle(self):
-        """Until three pictures in a row are the same."""
-        last, same, end = None, 0, time.monotonic() + 20
-        while same < 3 and time.monotonic() < end:
-            time.sleep(0.3)
-            now = self.canvas()
-            same = same + 1 if now == last else 0
-            last = now
-        self.check(same == 3, 'the picture comes to rest')
-        return last
+        """The picture once it is drawn finely and nothing moves."""
+        self.check(self.page.until("document.getElementById('picture').dataset.state === 'at rest'", 40),
+                   'the picture comes to rest')
+        return self.canvas()
 
     def canvas(self):
         return self.page.picture(self.page.box('#picture'))
@@ -106,19 +114,20 @@ def shows_what_the_visualizer_shows(case):
     other = likeness(blend, iso)
     case.check(other < 0.9, f'blend is not iso: {100 * other:.1f} %')
     case.choose('#renderer', 'ArrowUp')
-    case.page.key('t')
-    case.page.evaluate("document.getElementById('picture').focus()")
-    case.page.key('t')
+    case.choose('#picture', 't')
+    case.page.evaluate("document.activeElement.blur()")  # its ring is over the picture
     stereo = case.settle()
-    like = likeness(stereo, case.rig.native_picture(width, height, '--stereo'), True)
-    case.check(like >= 0.9, f'stereo: {100 * like:.3f} %, with the panel of the right eye')
-    case.page.key('t')
+    like = likeness(stereo, case.rig.native_picture(width, height, '--stereo'), (width, PANEL[1]))
+    case.check(like >= LIKE, f'stereo: {100 * like:.3f} %')
+    case.choose('#picture', 't')
+    case.page.evaluate("document.activeElement.blur()")
     case.check(case.settle() == case.rest, 'and back')
     middle = case.middle()
     case.page.drag([middle, (middle[0] + height * 2 / 180, middle[1])])
     turned = likeness(case.settle(), iso)
     case.check(turned < LIKE, f'two degrees are seen: {100 * turned:.1f} %')
-    case.page.key('r')
+    case.choose('#picture', 'r')
+    case.page.evaluate("document.activeElement.blur()")
     case.check(case.settle() == case.rest, 'the first view again')
 
 
@@ -170,8 +179,8 @@ def is_reached_by_keyboard(case):
                                    " getComputedStyle(document.activeElement).outlineStyle]")
         reached.append(name)
         rings = rings and (ring != 'none' or name == 'BODY')
-    wanted = ['picture', 'tool', 'hold', 'renderer', 'clip', 'stereo', 'home', 'SUMMARY']
-    case.check([name for name in reached if name in wanted][:len(wanted)] == wanted, 'Tab reaches: ' + ' '.join(wanted))
+    wanted = ['picture', 'tool', 'hold', 'go', 'renderer', 'clip', 'stereo', 'home', 'SUMMARY']
+    case.check([name for name in reached if name in wanted][:len(wanted)] == wanted, 'Tab reaches: ' + ' '.join(reached))
     case.check(rings, 'the focus is seen')
 
 
@@ -179,16 +188,17 @@ def commands_where_allowed(case):
     page = case.page
     case.choose('#tool', 'ArrowDown')
     case.check(page.until("document.querySelector('#figures dd').textContent === 'fissure'"), 'another tool')
-    page.click(*centre(page.box('#hold')))
-    case.check(page.until("document.getElementById('hold').getAttribute('aria-pressed') === 'true'"), 'hold')
-    case.check('Held' in page.evaluate(text_of('#banner')), 'the banner says so')
-    page.click(*centre(page.box('#hold')))
-    case.check(page.until("document.getElementById('hold').getAttribute('aria-pressed') === 'false'"), 'go on')
-
-
-def centre(box):
-    x, y, width, height = box
-    return x + width / 2, y + height / 2
+    for name, button in (('hold', '#hold'), ('go on', '#go')):
+        page.press(button)
+        case.check(page.until(text_of('#reply') + f" === '{name}: done'"), name)
+    # Only the second press of the same button does it.
+    if page.evaluate("document.getElementById('reset').hidden"):
+        return
+    page.press('#reset')
+    case.check('press again' in page.evaluate(text_of('#reset')), 'a reset asks first')
+    page.press('#reset')
+    case.check(page.until(text_of('#reply') + " === 'reset: done'"), 'reset')
+    case.check(page.until(figure('removed') + ' === 0'), 'the tooth is whole again')
 
 
 def tells_faults_and_ends(case):

@@ -20,6 +20,9 @@ radius_mm = 0.5
 length_mm = 3.8
 [force]
 stiffness_n_per_mm = 0.4
+[cut]
+model = "preston"
+machinability_mm3_per_s_n = 8
 '''
 # Through the crown, and away.
 HAND = '''start_mm = [0, 6, 0]

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The page: the bridge's news go to the stage and the panel, the user's wishes to both and back.
-import {CommandKind, kLastOfPass, kMayCommand, kRunEnded, Lifecycle, records, ReplyStatus} from './constants.js';
+import {CommandKind, kLastOfPass, kMayCommand, kRunEnded, records, ReplyStatus} from './constants.js';
 import {handOf} from './hand.js';
 import {listen} from './input.js';
 import {Link} from './link.js';
@@ -11,6 +11,8 @@ import {recordAt} from './wire.js';
 
 const kFiguresMs = 200;
 const kSureMs = 3000;
+const kWanted = new Set(['tick', 'start_ns', 'flags', 'position_mm', 'orientation', 'commanded_force_n',
+  'proxy_offset_mm', 'active_tool', 'fault', 'penetration_mm']);
 const element = id => document.getElementById(id);
 
 const plot = new Plot(element('plot'));
@@ -29,6 +31,7 @@ try {
 
 const link = new Link({
   state(text, trouble) {
+    if (element('state').textContent === text) return;  // it would be read out again
     element('state').textContent = text;
     element('state').classList.toggle('trouble', trouble);
     document.body.dataset.state = trouble ? 'trouble' : text;
@@ -56,7 +59,7 @@ const link = new Link({
   records(message) {
     if (message.record !== 'TickRecord') return;
     for (let i = 0; i < message.count; ++i) {
-      const record = recordAt('TickRecord', message.view, i * records.TickRecord.bytes);
+      const record = recordAt('TickRecord', message.view, i * records.TickRecord.bytes, kWanted);
       if (now.record && record.tick <= now.record.tick) continue;
       now.record = record;
       plot.add(record);
@@ -66,21 +69,20 @@ const link = new Link({
     }
     if (stage) stage.hand = handOf(now.record);
   },
-  reply({status}) {
-    element('reply').textContent = {[ReplyStatus.accepted]: 'done', [ReplyStatus.busy]: 'busy: try again'}[status] ??
-      'refused';
+  reply({sequence, status}) {
+    const answer = {[ReplyStatus.accepted]: 'done', [ReplyStatus.busy]: 'busy, try again'}[status] ?? 'refused';
+    element('reply').textContent = `${wishes.get(sequence) ?? 'command'}: ${answer}`;
+    wishes.delete(sequence);
   },
 });
 
 /** All of a run's volumes are here. */
 function begin() {
-  const before = scene;
   scene = sceneView(held);
   scene.materialOf = materialOf(scene.materials);
   const choice = element('tool');
   choice.replaceChildren(...scene.tools.map((tool, i) => new Option(tool.name, i)));
-  stage?.setScene(scene, before !== null);
-  performance.mark('kerf-scene');
+  stage?.setScene(scene);
 }
 
 /** mm3 by material, in the order of the scene; what has none last. */
@@ -110,8 +112,6 @@ function showNews() {
     ageMs: now.takenNs && !now.ended ? Math.max(link.clock.ageMs(now.takenNs), 0) : null});
   showBanner(bannerOf(now));
   plot.draw();
-  const holds = now.frame?.lifecycle === Lifecycle.hold;
-  element('hold').setAttribute('aria-pressed', holds);
   if (record && document.activeElement !== element('tool')) element('tool').value = record.active_tool;
 }
 setInterval(showNews, kFiguresMs);
@@ -135,17 +135,20 @@ element('home').addEventListener('click', () => stage?.home());
 
 // What is sent back, where that is allowed.
 
-function wish(kind, argument) {
-  element('reply').textContent = link.send(kind, argument) ? 'sent' : 'not connected';
+const wishes = new Map();  // by the number under which a command was sent
+function wish(name, kind, argument) {
+  const number = link.send(kind, argument);
+  if (number) wishes.set(number, name);
+  element('reply').textContent = `${name}: ${number ? 'sent' : 'not connected'}`;
 }
-element('tool').addEventListener('change', ({target}) => wish(CommandKind.select_tool, Number(target.value)));
-element('hold').addEventListener('click', ({target}) =>
-  wish(CommandKind.hold, target.getAttribute('aria-pressed') === 'true' ? 0 : 1));
+element('tool').addEventListener('change', ({target}) => wish('tool', CommandKind.select_tool, Number(target.value)));
+element('hold').addEventListener('click', () => wish('hold', CommandKind.hold, 1));
+element('go').addEventListener('click', () => wish('go on', CommandKind.hold, 0));
 const reset = element('reset');
 reset.hidden = CommandKind.reset === undefined;
 let sure = 0;
 reset.addEventListener('click', () => {
-  if (sure) wish(CommandKind.reset, 0);
+  if (sure) wish('reset', CommandKind.reset, 0);
   clearTimeout(sure);
   const forget = () => {
     sure = 0;

@@ -119,10 +119,10 @@ export class Link {
     this.on.reply(message);
   }
 
-  /** False where there is no connection. */
+  /** The number of the command, which its reply names; 0 where there is no connection. */
   send(kind, argument) {
-    if (this.socket?.readyState !== WebSocket.OPEN) return false;
+    if (this.socket?.readyState !== WebSocket.OPEN) return 0;
     this.socket.send(command(kind, argument, ++this.sequence));
-    return true;
+    return this.sequence;
   }
 }

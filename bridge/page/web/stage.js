@@ -46,10 +46,11 @@ export class Stage {
     return (this.look.stereo ? 0.5 : 1) * this.canvas.clientWidth / Math.max(this.canvas.clientHeight, 1);
   }
 
-  /** Another scene; `sameView` keeps the camera. */
-  setScene(scene, sameView) {
+  /** Another scene. The camera stays where the volumes lie as before. */
+  setScene(scene) {
+    const same = this.scene && String(this.scene.corners) === String(scene.corners);
     this.scene = scene;
-    if (!sameView) this.home();
+    if (!same) this.home();
     this.rebuild();
   }
   home() {
@@ -67,6 +68,10 @@ export class Stage {
       this.trouble(`${problem.message}.`);
     }
   }
+  /** In the document, for who waits for the finished picture. */
+  tell(state) {
+    if (this.canvas.dataset.state !== state) this.canvas.dataset.state = state;
+  }
   /** Changes of the look. */
   setLook(change) {
     const before = this.look;
@@ -81,6 +86,7 @@ export class Stage {
   touch() {
     this.stale = true;
     this.moved = performance.now();
+    this.tell('moving');
   }
 
   /** Of each eye, in a picture of this size. */
@@ -115,7 +121,11 @@ export class Stage {
     const wide = Math.floor(width / eyes);
     const before = this.scale;
     this.chooseScale(eyes * wide * height, now);
-    if (!this.stale && !moves && this.scale === before && boxes.length === 0) return;
+    if (!this.stale && !moves && this.scale === before && boxes.length === 0) {
+      if (now - Math.max(this.moved, this.changed) > kRestMs) this.tell('at rest');
+      return;
+    }
+    this.tell('moving');
     const size = [wide, height].map(n => Math.max(Math.round(n * this.scale), 1));
     const all = this.painter.fit(eyes, ...size) || this.stale;
     const hand = this.hand ?? null;

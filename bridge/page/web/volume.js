@@ -45,7 +45,10 @@ export class Volume {
   }
 
   putDensity(id, block) {
-    if (this.came[id] && !this.first.has(id)) this.first.set(id, this.copyOf(id));
+    if (this.came[id]) {
+      if (this.holds(id, block)) return;  // it came once more
+      if (!this.first.has(id)) this.first.set(id, this.copyOf(id));
+    }
     this.rows(id, (from, to, count) => {
       for (let i = 0; i < count; ++i) {
         this.density[to + i] = block[2 * (from + i)] | block[2 * (from + i) + 1] << 8;
@@ -57,8 +60,25 @@ export class Volume {
   }
 
   putLabels(id, block) {
-    this.rows(id, (from, to, count) => this.labels.set(block.subarray(from, from + count), to));
+    let differs = 0;
+    this.rows(id, (from, to, count) => {
+      for (let i = 0; i < count; ++i) {
+        differs |= this.labels[to + i] ^ block[from + i];
+        this.labels[to + i] = block[from + i];
+      }
+    });
+    if (differs === 0) return;
     for (const listener of this.listeners) listener.add(id);
+  }
+
+  holds(id, block) {
+    let differs = 0;
+    this.rows(id, (from, at, count) => {
+      for (let i = 0; i < count; ++i) {
+        differs |= this.density[at + i] ^ (block[2 * (from + i)] | block[2 * (from + i) + 1] << 8);
+      }
+    });
+    return differs === 0;
   }
 
   copyOf(id) {

@@ -33,10 +33,11 @@ class Cursor {
   }
 }
 
-/** A record of the segment: numbers by name, arrays where a field has several. */
-export function recordAt(name, view, at) {
+/** A record of the segment: numbers by name, arrays where a field has several. `wanted`: which. */
+export function recordAt(name, view, at, wanted = null) {
   const values = {};
   for (const [field, offset, type, count] of records[name].fields) {
+    if (wanted && !wanted.has(field)) continue;
     const get = i => view[kGetters[type]](at + offset + i * kBytes[type], true);
     values[field] = count === 1 ? get(0) : Array.from({length: count}, (_, i) => get(i));
   }
