@@ -5,7 +5,7 @@
 //
 // One ray goes through all volumes together, so they mix where they intersect. It is cut into pieces
 // at whole multiples of the step along the view axis, whatever was skipped: skipping changes the
-// time, never the picture. KERF_EACH_VOLUME(f) is f(0) f(1) ...: a loop over volumes inside that
+// time, never the picture. Volumes are gone through by KERF_EACH_VOLUME: a loop over them inside that
 // along the ray is not unrolled by every driver, and then costs half the frame.
 
 in vec2 v_ndc;
@@ -68,8 +68,13 @@ bool may_be_seen(int v, Line line, float t, inout float until_mm) {
   vec3 cell = floor(line.cell_origin + t * line.cell_direction);
   until_mm =
       min(until_mm, box_mm(line.cell_origin, line.inverse_cell_direction, cell, cell + 1.0).y);
-  ivec3 last = textureSize(u_active_cell[v], 0) - 1;
-  return texelFetch(u_active_cell[v], clamp(ivec3(cell), ivec3(0), last), 0).r != 0u;
+#define TAKE_CELL(i)                                                                    \
+  if (v == i) {                                                                         \
+    ivec3 last = textureSize(u_active_cell[i], 0) - 1;                                  \
+    return texelFetch(u_active_cell[i], clamp(ivec3(cell), ivec3(0), last), 0).r != 0u; \
+  }
+  KERF_EACH_VOLUME(TAKE_CELL)
+  return false;
 }
 
 void main() {

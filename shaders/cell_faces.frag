@@ -7,4 +7,9 @@ uniform float u_near_mm;
 
 out float o_entry_mm;
 
-void main() { o_entry_mm = gl_FrontFacing ? 1.0 / gl_FragCoord.w : u_near_mm; }
+void main() {
+  o_entry_mm = gl_FrontFacing ? 1.0 / gl_FragCoord.w : u_near_mm;
+#ifdef GL_ES
+  gl_FragDepth = clamp(1.0 - u_near_mm * gl_FragCoord.w, 0.0, 1.0);
+#endif
+}

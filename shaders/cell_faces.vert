@@ -17,5 +17,10 @@ void main() {
   vec3 corner = axis == 0u ? vec3(high, at) : axis == 1u ? vec3(at.y, high, at.x) : vec3(at, high);
   gl_Position = u_clip_from_cell * vec4(vec3(a_face.xyz) + corner, 1.0);
   // No far plane: beyond it the nearest face still says whether a ray has been inside all the way.
+  // Nor a near one: where depth cannot be clamped, cell_faces.frag writes it.
+#ifdef GL_ES
+  gl_Position.z = 0.0;
+#else
   gl_Position.z = gl_Position.w - 2.0 * u_near_mm;
+#endif
 }

@@ -6,6 +6,8 @@
 uniform sampler3D u_density;   // 0..1, inside a border of air one voxel thick
 uniform vec3 u_texels;         // its extent
 
+float density_of(vec4 texel);
+
 #if defined(KERF_GRADIENT_FARID5)
 
 uniform sampler3D u_gradient;  // of the same extent
@@ -16,12 +18,12 @@ vec3 gradient_at(vec3 p) { return textureLod(u_gradient, p, 0.0).xyz; }
 
 vec3 gradient_at(vec3 p) {
   vec3 d = 1.0 / u_texels;
-  vec3 above = vec3(textureLod(u_density, p + vec3(d.x, 0.0, 0.0), 0.0).r,
-                    textureLod(u_density, p + vec3(0.0, d.y, 0.0), 0.0).r,
-                    textureLod(u_density, p + vec3(0.0, 0.0, d.z), 0.0).r);
-  vec3 below = vec3(textureLod(u_density, p - vec3(d.x, 0.0, 0.0), 0.0).r,
-                    textureLod(u_density, p - vec3(0.0, d.y, 0.0), 0.0).r,
-                    textureLod(u_density, p - vec3(0.0, 0.0, d.z), 0.0).r);
+  vec3 above = vec3(density_of(textureLod(u_density, p + vec3(d.x, 0.0, 0.0), 0.0)),
+                    density_of(textureLod(u_density, p + vec3(0.0, d.y, 0.0), 0.0)),
+                    density_of(textureLod(u_density, p + vec3(0.0, 0.0, d.z), 0.0)));
+  vec3 below = vec3(density_of(textureLod(u_density, p - vec3(d.x, 0.0, 0.0), 0.0)),
+                    density_of(textureLod(u_density, p - vec3(0.0, d.y, 0.0), 0.0)),
+                    density_of(textureLod(u_density, p - vec3(0.0, 0.0, d.z), 0.0)));
   return above - below;
 }
 
@@ -36,7 +38,7 @@ vec3 gradient_at(vec3 p) {
   vec3 sum = vec3(0.0);
   for (int corner = 0; corner < 8; ++corner) {
     vec3 side = vec3((corner & 1) * 2 - 1, (corner & 2) - 1, (corner & 4) / 2 - 1);
-    sum += side * texture(u_density, p + side * d).r;
+    sum += side * density_of(texture(u_density, p + side * d));
   }
   return sum;
 }

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #version 450 core
 // What a sample inside a volume looks like: the transfer function and the light. The program defines
-// KERF_VOLUMES and KERF_HAS_LABELS, one bool for each.
+// KERF_VOLUMES, KERF_EACH_VOLUME(f), which is f(0) f(1) ..., and KERF_HAS_LABELS, one bool for each.
+// A sampler is taken by a constant index, as WebGL asks; where the volume is a constant nothing of
+// the choice is left.
 
 uniform sampler3D u_voxel[KERF_VOLUMES];     // gradient (128 + 127 g in 8 bits) and density
 uniform sampler3D u_material[KERF_VOLUMES];  // linear colour, opacity over one voxel edge
@@ -16,6 +18,19 @@ const bool kHasLabels[KERF_VOLUMES] = KERF_HAS_LABELS;
 
 vec3 lit(vec3 albedo, vec3 normal, vec3 to_eye, vec3 up_eye, float openness);
 
+// Gradient and density.
+vec4 voxel_at(int v, vec3 p) {
+#define TAKE_VOXEL(i) if (v == i) return textureLod(u_voxel[i], p, 0.0);
+  KERF_EACH_VOLUME(TAKE_VOXEL)
+  return vec4(0.0);
+}
+
+vec4 material_by_label(int v, vec3 p) {
+#define TAKE_MATERIAL(i) if (v == i) return textureLod(u_material[i], p, 0.0);
+  KERF_EACH_VOLUME(TAKE_MATERIAL)
+  return vec4(0.0);
+}
+
 // A volume without labels: the material at a border is that of what the border belongs to, a voxel
 // and a half up the gradient. By its own density every border would have a skin of softer tissue.
 vec4 material_by_density(int v, vec3 p, vec3 gradient, float density) {
@@ -23,13 +38,10 @@ vec4 material_by_density(int v, vec3 p, vec3 gradient, float density) {
   float size = length(gradient);
   if (size > 0.0) {
     vec3 inward = gradient * (kDepthVox / size) / u_texels[v];
-    density = max(density, textureLod(u_voxel[v], p + inward, 0.0).a);
+    density = max(density, voxel_at(v, p + inward).a);
   }
   return texelFetch(u_by_density, ivec2(density * 255.0 + 0.5, v), 0);
 }
-
-// Gradient and density.
-vec4 voxel_at(int v, vec3 p) { return textureLod(u_voxel[v], p, 0.0); }
 
 // How much of its material is there, 0..1, on the mean between two points. The density runs straight
 // between them, so the ramp of the transfer function is integrated exactly: sampled, a border that
@@ -54,7 +66,7 @@ bool is_seen(float extinction) { return extinction >= u_least_extinction; }
 // presence and a length in voxel edges that is exact, (1 - a)^(p s / s0) = 2^(-p s / s0 * this).
 vec4 matter_of(int v, vec4 voxel, vec3 p, vec3 to_eye) {
   vec3 gradient = (voxel.rgb * 255.0 - 128.0) / 127.0;
-  vec4 material = kHasLabels[v] ? textureLod(u_material[v], p, 0.0)
+  vec4 material = kHasLabels[v] ? material_by_label(v, p)
                                 : material_by_density(v, p, gradient, voxel.a);
 
   // Where the density hardly changes there is no surface to be lit; inside, light comes from

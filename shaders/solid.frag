@@ -8,7 +8,15 @@ uniform sampler2D u_palette;   // linear colour: row 0 by density, row 1 by labe
 uniform vec3 u_texels;         // extent of u_density
 uniform bool u_has_labels;
 
-float density_at(vec3 texture_point) { return texture(u_density, texture_point).r; }
+// A texel of u_density. WebGL filters no texel of 16 bits: there it is two of 8, low and high, whose
+// weighted sum filters as one would.
+#ifdef GL_ES
+float density_of(vec4 texel) { return dot(texel.rg, vec2(1.0, 256.0) / 257.0); }
+#else
+float density_of(vec4 texel) { return texel.r; }
+#endif
+
+float density_at(vec3 texture_point) { return density_of(texture(u_density, texture_point)); }
 
 // Colour of the labels around, blended so that their borders are smooth, times the share (alpha) of
 // voxels that have one.

@@ -10,7 +10,15 @@ namespace kerf {
 namespace {
 
 constexpr std::uint32_t kSides = 48;
-const double kCosCrease = std::cos(40.0 * std::numbers::pi / 180.0);
+constexpr double kCreaseDegrees = 40.0;
+const double kCosCrease = std::cos(kCreaseDegrees * std::numbers::pi / 180.0);
+
+// Neck and shank of a real bur, in radii of its head; the last three from the head's end.
+constexpr double kNeckPerRadius = 0.42;
+constexpr double kShankPerRadius = 0.62;
+constexpr double kNeckRadii = 1.5;
+constexpr double kShankFromRadii = 2.5;
+constexpr double kShankToRadii = 16.0;
 
 /// Outward normal (y, radial) of the wall between two profile points.
 glm::dvec2 wall_normal(const ProfilePoint& low, const ProfilePoint& high) {
@@ -116,13 +124,13 @@ Outlines tool_outlines(const ToolView& tool) {
     outlines.push_back(tool.shaft_mm);
     return outlines;
   }
-  // A neck that starts inside the head, and the shank of a real bur in proportion to it.
-  const double neck = 0.42 * tool.radius_mm;
-  const double shank = 0.62 * tool.radius_mm;
+  // The neck starts inside the head.
+  const double neck = kNeckPerRadius * tool.radius_mm;
+  const double shank = kShankPerRadius * tool.radius_mm;
   outlines.push_back({{0.5 * (low + high), neck},
-                      {high + 1.5 * tool.radius_mm, neck},
-                      {high + 2.5 * tool.radius_mm, shank},
-                      {high + 16.0 * tool.radius_mm, shank}});
+                      {high + kNeckRadii * tool.radius_mm, neck},
+                      {high + kShankFromRadii * tool.radius_mm, shank},
+                      {high + kShankToRadii * tool.radius_mm, shank}});
   return outlines;
 }
 

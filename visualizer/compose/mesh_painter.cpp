@@ -12,6 +12,12 @@ namespace kerf {
 
 namespace {
 
+// An arrow's head, in thicknesses of its shaft, which ends within the head.
+constexpr double kHeadLength = 4.0;
+constexpr double kHeadRadius = 2.2;
+constexpr double kHeadBare = 0.9;  // of its length: without shaft
+constexpr float kFaint = 0.30F;    // opacity of what is behind other things
+
 /// Axes with y along `direction`, moved to `at`.
 glm::dmat4 along(const glm::dvec3& at, const glm::dvec3& direction) {
   const glm::dvec3 y = glm::normalize(direction);
@@ -77,14 +83,14 @@ void MeshPainter::draw_arrow(const glm::dvec3& foot_mm, const glm::dvec3& arrow_
                              const RenderTarget& target) {
   const double length = glm::length(arrow_mm);
   if (!(length > 0.0)) return;
-  const double head = std::min(length, 4.0 * thickness_mm);
+  const double head = std::min(length, kHeadLength * thickness_mm);
   const glm::dmat4 axis = along(foot_mm, arrow_mm);
   const glm::dmat4 shaft =
-      glm::scale(axis, glm::dvec3(thickness_mm, length - 0.9 * head, thickness_mm));
-  const glm::dmat4 tip = glm::scale(glm::translate(axis, glm::dvec3(0.0, length - head, 0.0)),
-                                    glm::dvec3(2.2 * thickness_mm, head, 2.2 * thickness_mm));
+      glm::scale(axis, glm::dvec3(thickness_mm, length - kHeadBare * head, thickness_mm));
+  const glm::dmat4 tip =
+      glm::scale(glm::translate(axis, glm::dvec3(0.0, length - head, 0.0)),
+                 glm::dvec3(kHeadRadius * thickness_mm, head, kHeadRadius * thickness_mm));
 
-  constexpr float kFaint = 0.30F;
   target.bind();
   glEnable(GL_BLEND);
   glBlendFuncSeparate(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA, GL_ZERO, GL_ONE);

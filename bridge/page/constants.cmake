@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: Apache-2.0
+# What C++ fixes and the page must know, as a module of JavaScript: fields of records, codes, and
+# constants of the picture, each out of the file that defines it. Ends the build where one is gone.
+# cmake -DOUTPUT=FILE -DROOT=FOLDER -P constants.cmake
+cmake_minimum_required(VERSION 3.25)
+set(text "// Generated from C++ by constants.cmake; edit that.
+const magic = text => [...text].reduceRight((value, c) => value * 256 + c.charCodeAt(0), 0);
+")
+
+# Sets `value` to what `pattern` has in brackets, and C++'s forms of numbers become JavaScript's.
+function(take file pattern what)
+  file(READ ${ROOT}/${file} source)
+  if(NOT source MATCHES "${pattern}")
+    message(FATAL_ERROR "constants.cmake: ${file} has no ${what}; name the file that has it")
+  endif()
+  string(REGEX REPLACE "//[^\n]*" "" value "${CMAKE_MATCH_1}")
+  string(REGEX REPLACE "([0-9])[UF]" "\\1" value "${value}")
+  string(REPLACE "std::numbers::pi" "Math.PI" value "${value}")
+  set(value "${value}" PARENT_SCOPE)
+endfunction()
+
+macro(constants file)
+  foreach(name ${ARGN})
+    take(${file} "[^a-zA-Z_]${name} =[ \n]+([^;]+);" ${name})
+    string(APPEND text "export const ${name} = ${value};\n")
+  endforeach()
+endmacro()
+
+# Of a name and a list in braces.
+macro(list_constant file name pattern)
+  take(${file} "${pattern}{([^}]*)}" ${name})
+  string(APPEND text "export const ${name} = [${value}];\n")
+endmacro()
+
+macro(enumeration file name)
+  take(${file} "enum class ${name} : [a-z0-9_:]+ {([^}]*)}" "enum ${name}")
+  string(REPLACE "=" ":" value "${value}")
+  string(APPEND text "export const ${name} = {${value}};\n")
+endmacro()
+
+# code: [name, meaning]
+macro(codes file name pattern)
+  take(${file} "${pattern}\\[\\] = {([^;]*)}" ${name})
+  string(REGEX REPLACE "{([0-9]+), " "\\1: [" value "${value}")
+  string(REPLACE "}" "]" value "${value}")
+  string(APPEND text "export const ${name} = {${value}};\n")
+endmacro()
+
+macro(record name)
+  take(shared/segment/layout_table.hpp "(${name}, [^\n]*.*KERF_FIELD\\(${name}, [^\n]*)" "record ${name}")
+  string(REGEX MATCHALL "${name}, [a-z_0-9]+, [0-9a-fx]+, \"[a-z0-9]+\", [0-9]+" fields "${value}")
+  set(rows "")
+  foreach(field ${fields})
+    string(REGEX REPLACE "^${name}, ([a-z_0-9]+), (.*)" "    ['\\1', \\2],\n" row ${field})
+    string(APPEND rows "${row}")
+  endforeach()
+  take(shared/segment/layout_table.hpp "layout_matches\\(\"${name}\", ([0-9]+)\\)" "size of ${name}")
+  string(APPEND text "  ${name}: {bytes: ${value}, fields: [\n${rows}  ]},\n")
+endmacro()
+
+string(APPEND text "/** Name, offset, type and count of each field. */\nexport const records = {\n")
+record(VolumeDescriptor)
+record(TickRecord)
+record(DirtyRecord)
+string(APPEND text "};\n")
+
+constants(bridge/wire/messages.hpp kProtocol kMaxRawBytes kHelloMagic kFrameMagic kRecordsMagic kReplyMagic
+  kAckMagic kCommandMagic kMayCommand kPacked kLastOfPass kRunEnded)
+enumeration(bridge/wire/messages.hpp CloseCode)
+constants(shared/segment/layout.hpp kFlagContact kFlagDeviceFault kFlagForbidden kFlagRefused kFlagShaft)
+enumeration(shared/segment/layout.hpp Lifecycle)
+enumeration(shared/segment/command.hpp CommandKind)
+enumeration(shared/segment/command.hpp ReplyStatus)
+codes(record/log_columns.cpp kFaults kFaults)
+codes(record/log_columns.cpp kPhases kPhases)
+
+constants(visualizer/view/camera.cpp kHalfHeightRad kHomeYawRad kHomePitchRad kMaxPitchRad kZoomStep
+  kMargin kNearest kFarthest kNearPlane)
+constants(visualizer/view/camera.hpp kEyesPerConvergence)
+constants(visualizer/view/transfer_function.hpp kPaletteWidth kLeastOpacity)
+constants(visualizer/view/transfer_function.cpp kEmptyShare kHighestAir kWholeSoftest kHalfBand
+  kHardestOpacity kSoftestOpacity)
+list_constant(visualizer/view/transfer_function.cpp kIvory "kIvory")
+constants(visualizer/texture/voxel_texels.cpp kMaterialReach)
+constants(visualizer/cast/dirty_job.hpp kLongestTapVox)
+take(visualizer/render/iso_renderer.hpp "step_vox = ([^;]+);" "step of iso")
+string(APPEND text "export const kIsoStepVox = ${value};\n")
+take(visualizer/render/blend_renderer.hpp "step_vox = ([^;]+);" "step of blend")
+string(APPEND text "export const kBlendStepVox = ${value};\n")
+constants(visualizer/compose/mesh.cpp kSides kCreaseDegrees kNeckPerRadius kShankPerRadius kNeckRadii
+  kShankFromRadii kShankToRadii)
+constants(visualizer/compose/mesh_painter.cpp kHeadLength kHeadRadius kHeadBare kFaint)
+constants(visualizer/compose/hand_painter.cpp kArrowScalesPerN kArrowThickness kLeastArrowN)
+list_constant(visualizer/compose/hand_painter.cpp kSteel "kSteel{.colour = ")
+list_constant(visualizer/compose/hand_painter.cpp kForce "kForce{.colour = ")
+constants(visualizer/app/picture.cpp kStaleMs kToolRoom)
+constants(visualizer/app/force_plot.hpp kSpanS)
+constants(visualizer/app/overlay_panels.cpp kLeastFullForceN kLeastFullDepthMm)
+take(visualizer/app/overlay.hpp "full_force_n = ([^;]+);" "full force")
+string(APPEND text "export const kFullForceN = ${value};\n")
+file(WRITE ${OUTPUT} "${text}")

@@ -1,0 +1,173 @@
+// SPDX-License-Identifier: Apache-2.0
+// The page: the bridge's news go to the stage and the panel, the user's wishes to both and back.
+import {CommandKind, kLastOfPass, kMayCommand, kRunEnded, records, ReplyStatus} from './constants.js';
+import {handOf} from './hand.js';
+import {listen} from './input.js';
+import {Link} from './link.js';
+import {bannerOf, Plot, showBanner, showFigures} from './panel.js';
+import {materialOf, sceneView} from './scene.js';
+import {Stage} from './stage.js';
+import {recordAt} from './wire.js';
+
+const kFiguresMs = 200;
+const kSureMs = 3000;
+const kWanted = new Set(['tick', 'start_ns', 'flags', 'position_mm', 'orientation', 'commanded_force_n',
+  'proxy_offset_mm', 'active_tool', 'fault', 'penetration_mm']);
+const element = id => document.getElementById(id);
+
+const plot = new Plot(element('plot'));
+const now = {record: null, frame: null, ended: false, newRun: 0, earlier: null};
+let stage = null, scene = null, held = null;
+
+function missing(text) {
+  element('missing').hidden = text === '';
+  element('missing').textContent = text;
+}
+try {
+  stage = new Stage(element('picture'), missing);
+} catch (problem) {
+  missing(`${problem.message} The figures are shown without a picture.`);
+}
+
+const link = new Link({
+  state(text, trouble) {
+    if (element('state').textContent === text) return;  // it would be read out again
+    element('state').textContent = text;
+    element('state').classList.toggle('trouble', trouble);
+    document.body.dataset.state = trouble ? 'trouble' : text;
+  },
+  hello(news, sameRun) {
+    if (!sameRun) {
+      now.newRun = held ? performance.now() : 0;
+      Object.assign(now, {record: null, ended: false, frame: null, earlier: null});
+      plot.clear();
+      scene = null;
+    }
+    held = news;
+    element('teaching').hidden = !(held.hello.flags & kMayCommand);
+    this.state('joining', false);
+  },
+  frame(news, frame) {
+    now.frame = frame;
+    now.ended = (frame.flags & kRunEnded) !== 0;
+    if (!(frame.flags & kLastOfPass) || !held.complete) return;
+    if (!scene) begin();
+    now.takenNs = frame.takenNs;
+    document.body.dataset.tick = frame.tick;
+    this.state(now.ended ? 'ended' : 'live', false);
+  },
+  records(message) {
+    if (message.record !== 'TickRecord') return;
+    for (let i = 0; i < message.count; ++i) {
+      const record = recordAt('TickRecord', message.view, i * records.TickRecord.bytes, kWanted);
+      if (now.record && record.tick <= now.record.tick) continue;
+      now.record = record;
+      plot.add(record);
+      if (!now.earlier || record.start_ns - now.earlier[0].start_ns > 1000000000n) {
+        now.earlier = now.earlier ? [now.earlier[1], record] : [record, record];
+      }
+    }
+    if (stage) stage.hand = handOf(now.record);
+  },
+  reply({sequence, status}) {
+    const answer = {[ReplyStatus.accepted]: 'done', [ReplyStatus.busy]: 'busy, try again'}[status] ?? 'refused';
+    element('reply').textContent = `${wishes.get(sequence) ?? 'command'}: ${answer}`;
+    wishes.delete(sequence);
+  },
+});
+
+/** All of a run's volumes are here. */
+function begin() {
+  scene = sceneView(held);
+  scene.materialOf = materialOf(scene.materials);
+  const choice = element('tool');
+  choice.replaceChildren(...scene.tools.map((tool, i) => new Option(tool.name, i)));
+  stage?.setScene(scene);
+}
+
+/** mm3 by material, in the order of the scene; what has none last. */
+function removedByMaterial() {
+  const names = ['no material', ...scene.materials.slice(1).map(one => one.name)];
+  const mm3 = new Array(names.length).fill(0);
+  for (const view of scene.volumes) {
+    const units = view.volume.removedUnits(scene.materialOf, names.length);
+    units.forEach((value, m) => mm3[m] += value / 65535 * view.voxelMm3);
+  }
+  const rows = names.map((name, m) => [name, mm3[m]]);
+  return [...rows.slice(1), rows[0]];
+}
+
+let shownBefore = 0, figuresBefore = performance.now();
+function showNews() {
+  const at = performance.now();
+  const picturesHz = stage ? 1000 * (stage.shown - shownBefore) / (at - figuresBefore) : 0;
+  shownBefore = stage?.shown ?? 0;
+  figuresBefore = at;
+  const {record, earlier} = now;
+  const span = record && earlier ? Number(record.start_ns - earlier[0].start_ns) : 0;
+  showFigures({record, picturesHz, late: held?.late ?? false,
+    tool: record && scene?.tools[record.active_tool]?.name,
+    removed: scene ? removedByMaterial() : [],
+    servoHz: span > 0 && !now.ended ? 1e9 * Number(record.tick - earlier[0].tick) / span : null,
+    ageMs: now.takenNs && !now.ended ? Math.max(link.clock.ageMs(now.takenNs), 0) : null});
+  showBanner(bannerOf(now));
+  plot.draw();
+  if (record && document.activeElement !== element('tool')) element('tool').value = record.active_tool;
+}
+setInterval(showNews, kFiguresMs);
+
+// The look.
+
+const toggled = id => element(id).click();
+element('renderer').addEventListener('change', ({target}) => stage?.setLook({renderer: target.value}));
+function readClip() {
+  const axis = Number(document.querySelector('input[name="axis"]:checked').value);
+  element('plane').hidden = !element('clip').checked;
+  stage?.setLook({clip: {on: element('clip').checked, axis, at: Number(element('place').value)}});
+}
+element('clip').addEventListener('change', readClip);
+element('plane').addEventListener('input', readClip);
+element('stereo').addEventListener('change', ({target}) => {
+  stage?.setLook({stereo: target.checked});
+  stage?.home();
+});
+element('home').addEventListener('click', () => stage?.home());
+
+// What is sent back, where that is allowed.
+
+const wishes = new Map();  // by the number under which a command was sent
+function wish(name, kind, argument) {
+  const number = link.send(kind, argument);
+  if (number) wishes.set(number, name);
+  element('reply').textContent = `${name}: ${number ? 'sent' : 'not connected'}`;
+}
+element('tool').addEventListener('change', ({target}) => wish('tool', CommandKind.select_tool, Number(target.value)));
+element('hold').addEventListener('click', () => wish('hold', CommandKind.hold, 1));
+element('go').addEventListener('click', () => wish('go on', CommandKind.hold, 0));
+const reset = element('reset');
+reset.hidden = CommandKind.reset === undefined;
+let sure = 0;
+reset.addEventListener('click', () => {
+  if (sure) wish('reset', CommandKind.reset, 0);
+  clearTimeout(sure);
+  const forget = () => {
+    sure = 0;
+    reset.classList.remove('sure');
+    reset.textContent = 'reset the tooth';
+  };
+  if (sure) return forget();
+  reset.classList.add('sure');
+  reset.textContent = 'all that was cut is lost: press again';
+  sure = setTimeout(forget, kSureMs);
+});
+
+if (stage) {
+  const next = () => {
+    const choice = element('renderer');
+    choice.selectedIndex = (choice.selectedIndex + 1) % choice.length;
+    stage.setLook({renderer: choice.value});
+  };
+  listen(stage, {r: () => stage.home(), v: next, c: () => toggled('clip'), t: () => toggled('stereo')});
+}
+// A token in the address has done its work once the page is here: a cookie holds it.
+if (location.search) history.replaceState(null, '', location.pathname);

@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: Apache-2.0
+// The talk with the bridge: joins, acknowledges what it applied, joins again after silence.
+import {CloseCode} from './constants.js';
+import {Held} from './held.js';
+import {ack, command, read} from './wire.js';
+
+const kSilenceMs = 3000;     // a bridge that is there sends sixty signs of life a second
+const kFirstPauseMs = 250, kLongestPauseMs = 5000;
+const kOffsetSpanMs = 10000;
+
+const kRefusals = {
+  [CloseCode.no_token]: 'No access: open the address as the bridge prints it, with its token.',
+  [CloseCode.too_slow]: 'This page was too slow to answer.',
+  [CloseCode.not_understood]: 'The bridge does not understand this page; load it again.',
+  [CloseCode.too_many]: 'The bridge has as many viewers as it takes.',
+};
+
+/**
+ * The difference of this machine's clock and the bridge's: the least of what messages took lately,
+ * so that an age holds all delays but that of the fastest message. Two spans, since clocks drift.
+ */
+class ClockOffset {
+  constructor() {
+    this.now = this.before = Infinity;
+    this.began = -Infinity;
+  }
+  add(localMs, serverNs) {
+    if (localMs - this.began > kOffsetSpanMs) {
+      this.before = this.now;
+      this.now = Infinity;
+      this.began = localMs;
+    }
+    this.now = Math.min(this.now, localMs - Number(serverNs) / 1e6);
+  }
+  /** Since a time of the bridge's clock. */
+  ageMs(serverNs) {
+    return performance.now() - Math.min(this.now, this.before) - Number(serverNs) / 1e6;
+  }
+}
+
+export class Link {
+  /** `on`: hello(held, sameRun), frame(held, frame), records(message), reply(message), state(text, trouble). */
+  constructor(on) {
+    this.on = on;
+    this.held = null;
+    this.sequence = 0;
+    this.pause = kFirstPauseMs;
+    this.clock = new ClockOffset();
+    setInterval(() => this.checkSilence(), 500);
+    this.join();
+  }
+
+  join() {
+    this.greeted = false;
+    this.on.state('connecting', false);
+    this.heard = performance.now();
+    const address = `${location.protocol.replace('http', 'ws')}//${location.host}/bridge`;
+    const socket = this.socket = new WebSocket(address);
+    socket.binaryType = 'arraybuffer';
+    socket.onmessage = ({data}) => this.take(socket, data);
+    socket.onclose = ({code}) => this.lost(socket, kRefusals[code]);
+    socket.onopen = () => {
+      this.heard = performance.now();
+      this.on.state('connected; the bridge has no controller yet', false);
+    };
+  }
+
+  lost(socket, why) {
+    if (socket !== this.socket) return;
+    this.socket = null;
+    socket.onclose = socket.onmessage = null;
+    socket.close();
+    this.clock = new ClockOffset();  // the machine may be another now
+    const next = Math.ceil(this.pause / 1000);
+    this.on.state(`${why ?? 'The bridge is not reached.'} Trying again in ${next} s.`, true);
+    setTimeout(() => this.join(), this.pause);
+    this.pause = Math.min(this.pause * 1.6, kLongestPauseMs);
+  }
+
+  checkSilence() {
+    const {socket} = this;
+    if (!socket || performance.now() - this.heard < kSilenceMs) return;
+    // An open one without a hello waits for a controller.
+    if (socket.readyState === WebSocket.OPEN && !this.greeted) return;
+    this.lost(socket, 'The bridge is silent.');
+  }
+
+  take(socket, data) {
+    if (socket !== this.socket) return;
+    this.heard = performance.now();
+    try {
+      const message = read(data);
+      this[message.kind](message);
+    } catch (problem) {
+      console.error(problem);
+      this.lost(socket, `${problem.message}.`);
+    }
+  }
+
+  hello(message) {
+    const before = this.held;
+    this.greeted = true;
+    this.clock.add(this.heard, message.serverNs);
+    this.held = new Held(message, before);
+    this.on.hello(this.held, before?.hello.session === message.session);
+  }
+  frame(message) {
+    if (!this.held) throw new Error('frame: before the hello');
+    this.clock.add(this.heard, message.sentNs);
+    this.held.apply(message);
+    this.socket.send(ack(message.session, message.frame));
+    this.pause = kFirstPauseMs;
+    this.on.frame(this.held, message);
+  }
+  records(message) {
+    if (message.session === this.held?.hello.session) this.on.records(message);
+  }
+  reply(message) {
+    this.on.reply(message);
+  }
+
+  /** The number of the command, which its reply names; 0 where there is no connection. */
+  send(kind, argument) {
+    if (this.socket?.readyState !== WebSocket.OPEN) return 0;
+    this.socket.send(command(kind, argument, ++this.sequence));
+    return this.sequence;
+  }
+}

@@ -1,0 +1,184 @@
+// SPDX-License-Identifier: Apache-2.0
+// What voxels look like: palette, transfer function and texels of visualizer/view/transfer_function
+// and visualizer/texture/voxel_texels.
+import {kEmptyShare, kHalfBand, kHardestOpacity, kHighestAir, kIvory, kLeastOpacity, kMaterialReach,
+  kPaletteWidth, kSoftestOpacity, kWholeSoftest} from './constants.js';
+import {clamp, mix} from './math.js';
+
+const kFull = 65535;
+const smoothstep = (low, high, x) => {
+  const t = clamp((x - low) / (high - low), 0, 1);
+  return t * t * (3 - 2 * t);
+};
+
+/** In equal ratios from the softest to the hardest; among equals the first is the softer. */
+function defaultOpacity(materials, index) {
+  if (materials.length < 3) return kSoftestOpacity;
+  const {iso} = materials[index];
+  const softer = materials.filter((one, m) =>
+    m > 0 && (one.iso < iso || (one.iso === iso && m < index))).length;
+  return kSoftestOpacity * (kHardestOpacity / kSoftestOpacity) ** (softer / (materials.length - 2));
+}
+
+/** Two rows of `kPaletteWidth` linear colours with opacity: by density, and by label. */
+export function palette(materials) {
+  const looks = materials.map((one, label) =>
+    ({iso: one.iso, label, colour: [...one.colour, defaultOpacity(materials, label)]})).slice(1)
+    .sort((a, b) => a.iso - b.iso);
+  const rows = new Float32Array(8 * kPaletteWidth);
+  for (let i = 0; i < kPaletteWidth; ++i) {
+    let colour = looks[0]?.colour ?? kIvory;
+    for (const look of looks.slice(1)) {
+      const share = smoothstep(look.iso - kHalfBand, look.iso + kHalfBand, i / (kPaletteWidth - 1));
+      colour = colour.map((value, k) => mix(value, look.colour[k], share));
+    }
+    rows.set(colour, 4 * i);
+    rows.set(kIvory, 4 * (kPaletteWidth + i));
+  }
+  for (const {label, colour} of looks) {
+    if (label < kPaletteWidth) rows.set(colour, 4 * (kPaletteWidth + label));
+  }
+  if (materials.length > 0) rows.set([...materials[0].colour, 0], 4 * kPaletteWidth);
+  return rows;
+}
+
+/** The median of the densities below `iso`, rounded down to 8 bits. */
+function airLevel(density, iso) {
+  const step = Math.floor(density.length / (1 << 20)) | 1;
+  const counts = new Uint32Array(256);
+  let below = 0;
+  for (let i = 0; i < density.length; i += step) {
+    if (density[i] >= iso) continue;
+    ++counts[density[i] >> 8];
+    ++below;
+  }
+  let median = 0;
+  for (let passed = counts[0]; 2 * passed < below; passed += counts[median]) ++median;
+  return median << 8;
+}
+
+/** Densities (0..1) from which something is seen and from which all of it, and the lowest seen. */
+export function transferFunction(view, materials) {
+  const {labels, density} = view.volume;
+  const softest = Math.min(...materials.slice(1).map(one => one.iso));
+  const air = labels ? 0 : airLevel(density, view.iso);
+  let full = labels && materials.length > 1 ? kWholeSoftest * softest : view.iso / kFull;
+  full = clamp(full, 2 / 255, 1);
+  const emptyOfAll = Math.min(air / kFull, kHighestAir * full);
+  const empty = emptyOfAll + kEmptyShare * (full - emptyOfAll);
+  return {empty, full,
+    lowestSeen: Math.max(1, Math.floor(Math.max(0, empty - 0.5 / 255) * kFull))};
+}
+
+export const leastExtinction = -Math.log2(1 - kLeastOpacity);
+
+const densityByte = density => Math.floor((density * 255 + 32767) / kFull);
+
+/**
+ * Gradient (128 + 127 g) and density in 8 bits for each voxel of a box, from the corners of the
+ * cube around it, with air outside. With `skipAir` null where all of it has no density at all.
+ */
+export function gradientTexels(volume, low, high, skipAir) {
+  const {size: [nx, ny, nz], density} = volume;
+  const wide = high[0] - low[0] + 2, tall = high[1] - low[1] + 2, deep = high[2] - low[2] + 2;
+  const field = new Uint16Array(wide * tall * deep);
+  let any = 0;
+  for (let z = Math.max(low[2] - 1, 0); z < Math.min(high[2] + 1, nz); ++z) {
+    for (let y = Math.max(low[1] - 1, 0); y < Math.min(high[1] + 1, ny); ++y) {
+      const to = ((z - low[2] + 1) * tall + y - low[1] + 1) * wide - low[0] + 1;
+      const from = (z * ny + y) * nx;
+      for (let x = Math.max(low[0] - 1, 0); x < Math.min(high[0] + 1, nx); ++x) {
+        any |= field[to + x] = density[from + x];
+      }
+    }
+  }
+  if (skipAir && any === 0) return null;
+  const texels = new Uint8Array(4 * (wide - 2) * (tall - 2) * (deep - 2));
+  const byte = sum => Math.trunc(sum / (4 * kFull) * 127 + 128.5);
+  const up = wide, far = wide * tall;
+  let out = 0;
+  for (let z = 1; z < deep - 1; ++z) {
+    for (let y = 1; y < tall - 1; ++y) {
+      for (let x = 1, at = (z * tall + y) * wide + 1; x < wide - 1; ++x, ++at) {
+        const a = at - up - far, b = at + up - far, c = at - up + far, d = at + up + far;
+        const a0 = field[a - 1], a1 = field[a + 1], b0 = field[b - 1], b1 = field[b + 1];
+        const c0 = field[c - 1], c1 = field[c + 1], d0 = field[d - 1], d1 = field[d + 1];
+        texels[out++] = byte(a1 - a0 + b1 - b0 + c1 - c0 + d1 - d0);
+        texels[out++] = byte(b0 + b1 - a0 - a1 + d0 + d1 - c0 - c1);
+        texels[out++] = byte(c0 + c1 - a0 - a1 + d0 + d1 - b0 - b1);
+        texels[out++] = densityByte(field[at]);
+      }
+    }
+  }
+  return texels;
+}
+
+const unitByte = value => Math.round(clamp(value, 0, 1) * 255);
+
+/**
+ * Colour and opacity of each voxel by its label. One without takes the mean of the labelled voxels
+ * around, the nearer the heavier; where there are none, the material of its density.
+ */
+export class MaterialTexels {
+  constructor(volume, rows) {
+    this.volume = volume;
+    const bytes = Uint8Array.from(rows, unitByte);
+    this.byDensity = bytes.subarray(0, 4 * kPaletteWidth);
+    this.byLabel = bytes.subarray(4 * kPaletteWidth);
+    this.looks = rows.subarray(4 * kPaletteWidth);
+  }
+
+  of(low, high) {
+    const {size: [nx, ny], density, labels} = this.volume;
+    const texels = new Uint8Array(4 * (high[0] - low[0]) * (high[1] - low[1]) * (high[2] - low[2]));
+    const near = this.anyLabel(low, high);
+    let out = 0;
+    for (let z = low[2]; z < high[2]; ++z) {
+      for (let y = low[1]; y < high[1]; ++y) {
+        for (let x = low[0], at = (z * ny + y) * nx + x; x < high[0]; ++x, ++at, out += 4) {
+          if (labels[at] !== 0) {
+            this.take(texels, out, this.byLabel, labels[at]);
+          } else if (!near || !this.meanAround(texels, out, x, y, z)) {
+            this.take(texels, out, this.byDensity, densityByte(density[at]));
+          }
+        }
+      }
+    }
+    return texels;
+  }
+
+  take(texels, out, row, index) {
+    for (let k = 0; k < 4; ++k) texels[out + k] = row[4 * index + k];
+  }
+
+  /** Calls `visit(label, x, y, z)` for what has a label around a box. */
+  around(low, high, visit) {
+    const {size: [nx, ny, nz], labels} = this.volume;
+    const reach = kMaterialReach;
+    for (let z = Math.max(low[2] - reach, 0); z < Math.min(high[2] + reach, nz); ++z) {
+      for (let y = Math.max(low[1] - reach, 0); y < Math.min(high[1] + reach, ny); ++y) {
+        const row = (z * ny + y) * nx;
+        for (let x = Math.max(low[0] - reach, 0); x < Math.min(high[0] + reach, nx); ++x) {
+          if (labels[row + x] !== 0 && visit(labels[row + x], x, y, z)) return true;
+        }
+      }
+    }
+    return false;
+  }
+  anyLabel(low, high) {
+    return this.around(low, high, () => true);
+  }
+  meanAround(texels, out, x, y, z) {
+    const sum = [0, 0, 0, 0];
+    let weights = 0;
+    this.around([x, y, z], [x + 1, y + 1, z + 1], (label, i, j, k) => {
+      const weight = 1 / ((i - x) ** 2 + (j - y) ** 2 + (k - z) ** 2);
+      for (let c = 0; c < 4; ++c) sum[c] += weight * this.looks[4 * label + c];
+      weights += weight;
+      return false;
+    });
+    if (weights === 0) return false;
+    for (let c = 0; c < 4; ++c) texels[out + c] = unitByte(sum[c] / weights);
+    return true;
+  }
+}

@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: Apache-2.0
+// Figures, plot and banner.
+import {kFaults, kFlagDeviceFault, kFlagForbidden, kFlagRefused, kFlagShaft, kFullForceN, kLeastFullDepthMm,
+  kLeastFullForceN, kPhases, kSpanS, kStaleMs, Lifecycle} from './constants.js';
+import {length} from './math.js';
+
+const kNewRunMs = 4000;
+const element = id => document.getElementById(id);
+
+/** What is to be said large over the picture: {text, alarm}; null where there is nothing. */
+export function bannerOf({record, frame, ended, newRun}) {
+  if (ended) {
+    return frame.lifecycle === Lifecycle.clean_end ?
+      {text: 'The controller has ended: this is the final state.', alarm: false} :
+      {text: 'The controller is gone: this is its last state.', alarm: true};
+  }
+  const silentMs = frame && frame.heartbeatNs > 0n ? Number(frame.takenNs - frame.heartbeatNs) / 1e6 : 0;
+  if (silentMs > kStaleMs) return {text: 'Stale: no news from the servo.', alarm: true};
+  if (record && record.flags & kFlagDeviceFault) {
+    const [name, meaning] = kFaults[record.fault] ?? ['unknown', ''];
+    return {text: `Fault ${name}: ${meaning}. ${kPhases[5][1]}.`, alarm: true};
+  }
+  if (record && record.flags & kFlagRefused) {
+    return {text: 'No free place for this tool here, so it feels nothing: lead it into air.', alarm: true};
+  }
+  if (frame?.lifecycle === Lifecycle.hold) return {text: 'Held: no cutting and no force.', alarm: false};
+  if (record && record.flags & kFlagForbidden) return {text: 'Pressed on what may not be cut.', alarm: false};
+  if (record && record.flags & kFlagShaft) return {text: 'The shaft touches: it cuts nothing.', alarm: false};
+  if (newRun && performance.now() - newRun < kNewRunMs) return {text: 'A new run has begun.', alarm: false};
+  return null;
+}
+
+export function showBanner(banner) {
+  const to = element('banner');
+  to.hidden = !banner;
+  if (banner && to.textContent !== banner.text) to.textContent = banner.text;
+  to.classList.toggle('alarm', banner?.alarm ?? false);
+}
+
+/** Rows of [label, value, is a part]. */
+function showRows(rows) {
+  const list = element('figures');
+  while (list.children.length > 2 * rows.length) list.lastChild.remove();
+  while (list.children.length < 2 * rows.length) {
+    list.append(document.createElement('dt'), document.createElement('dd'));
+  }
+  rows.forEach(([label, value, part], i) => {
+    const [dt, dd] = [list.children[2 * i], list.children[2 * i + 1]];
+    dt.classList.toggle('part', part === true);
+    if (dt.textContent !== label) dt.textContent = label;
+    if (dd.textContent !== value) dd.textContent = value;
+  });
+}
+
+/** `removed`: [[name, mm3]...]. */
+export function showFigures({record, tool, removed, late, servoHz, picturesHz, ageMs}) {
+  const force = record ? length(record.commanded_force_n) : 0;
+  element('force').textContent = record ? `${force.toFixed(2)} N` : '–';
+  const bar = element('bar');
+  Object.assign(bar, {max: kFullForceN, low: 0.5 * kFullForceN, high: 0.9 * kFullForceN, optimum: 0, value: force});
+  const sum = removed.reduce((all, [, mm3]) => all + mm3, 0);
+  const mm3 = value => `${Math.abs(value) < 0.005 ? '0.00' : value.toFixed(2)} mm³`;
+  const rows = [['tool', tool ?? '–'],
+    ['depth', record ? `${record.penetration_mm.toFixed(2)} mm` : '–'],
+    [late ? 'removed since joining' : 'removed', mm3(sum)]];
+  for (const [name, value] of removed) if (Math.abs(value) >= 0.005) rows.push([name, mm3(value), true]);
+  rows.push(['servo', servoHz ? `${servoHz.toFixed(0)} Hz` : '–'], ['pictures', `${picturesHz.toFixed(0)} /s`],
+    ['data age', ageMs === null ? '–' : ageMs < 1000 ? `${ageMs.toFixed(0)} ms` : `${(ageMs / 1000).toFixed(1)} s`]);
+  showRows(rows);
+}
+
+/** Force and depth over the last seconds: points {ns, force, depth}, oldest first. */
+export class Plot {
+  constructor(canvas) {
+    this.canvas = canvas;
+    this.points = [];
+  }
+  clear() {
+    this.points = [];
+  }
+  add(record) {
+    const ns = Number(record.start_ns);
+    if (this.points.length > 0 && ns <= this.points.at(-1).ns) return;
+    this.points.push({ns, force: length(record.commanded_force_n), depth: record.penetration_mm});
+    const oldest = this.points.findIndex(point => ns - point.ns <= kSpanS * 1e9);
+    if (oldest > 512 || oldest > this.points.length / 2) this.points.splice(0, oldest);
+  }
+  draw() {
+    const {canvas} = this;
+    const ratio = window.devicePixelRatio || 1;
+    const [wide, high] = [canvas.clientWidth, canvas.clientHeight];
+    if (wide === 0) return;
+    Object.assign(canvas, {width: Math.round(wide * ratio), height: Math.round(high * ratio)});
+    const to = canvas.getContext('2d');
+    to.scale(ratio, ratio);
+    const style = getComputedStyle(document.documentElement);
+    const colour = name => style.getPropertyValue(name);
+    const half = high / 2;
+    this.curve(to, 0, wide, half, 'force', 'N', 'force', kLeastFullForceN, colour('--calm'), colour);
+    this.curve(to, half, wide, half, 'depth', 'mm', 'depth', kLeastFullDepthMm, colour('--strong'), colour);
+  }
+  curve(to, top, wide, high, name, unit, key, leastFull, stroke, colour) {
+    const words = 18, tall = high - words - 4;
+    const last = this.points.at(-1)?.ns ?? 0;
+    const seen = this.points.filter(point => last - point.ns <= kSpanS * 1e9);
+    const peak = seen.reduce((most, point) => Math.max(most, point[key]), 0);
+    const full = Math.max(peak, leastFull);
+    to.font = `12px ${getComputedStyle(document.body).fontFamily}`;
+    to.textBaseline = 'middle';
+    to.fillStyle = colour('--soft');
+    to.fillText(`${name}, ${kSpanS} s, peak`, 0, top + words / 2);
+    to.textAlign = 'right';
+    to.fillStyle = colour('--ink');
+    to.fillText(`${peak.toFixed(2)} ${unit}`, wide, top + words / 2);
+    to.textAlign = 'left';
+    to.fillStyle = colour('--ground');
+    to.fillRect(0, top + words, wide, tall);
+    to.strokeStyle = stroke;
+    to.lineWidth = 1.5;
+    to.lineJoin = 'round';
+    to.beginPath();
+    for (const point of seen) {
+      const x = wide * (1 - (last - point.ns) / (kSpanS * 1e9));
+      to.lineTo(x, top + words + 1 + (tall - 2) * (1 - Math.max(point[key], 0) / full));
+    }
+    to.stroke();
+  }
+}

@@ -1,0 +1,184 @@
+// SPDX-License-Identifier: Apache-2.0
+// Volumes on the GPU: uploaded by changed bricks, whole layers of them where most of one changed.
+import {bind, texture} from './gl.js';
+import {Macrocells} from './cells.js';
+import {gradientTexels, MaterialTexels, transferFunction} from './matter.js';
+import {scaled, translated} from './math.js';
+
+/** A texel for each voxel inside a border of air one voxel thick. */
+class VoxelTexture {
+  constructor(gl, size, internal, format, filter) {
+    Object.assign(this, {gl, size, format});
+    this.texture = texture(gl, gl.TEXTURE_3D, internal, filter, size.map(n => n + 2));
+  }
+  /** Makes all of it one colour, which the format can be drawn in. */
+  fill(colour) {
+    const {gl} = this;
+    const framebuffer = gl.createFramebuffer();
+    gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
+    gl.disable(gl.SCISSOR_TEST);
+    for (let z = 0; z < this.size[2] + 2; ++z) {
+      gl.framebufferTextureLayer(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, this.texture, 0, z);
+      gl.clearBufferfv(gl.COLOR, 0, colour);
+    }
+    gl.deleteFramebuffer(framebuffer);
+  }
+  /** `texels` fill the box from `low` to `high`. */
+  upload(low, high, texels) {
+    const {gl} = this;
+    gl.bindTexture(gl.TEXTURE_3D, this.texture);
+    gl.texSubImage3D(gl.TEXTURE_3D, 0, low[0] + 1, low[1] + 1, low[2] + 1, high[0] - low[0],
+      high[1] - low[1], high[2] - low[2], this.format, gl.UNSIGNED_BYTE, texels);
+  }
+  /** The box out of `whole`, the bytes of all texels. */
+  uploadFrom(low, high, whole, texelBytes) {
+    const {gl} = this;
+    gl.pixelStorei(gl.UNPACK_ROW_LENGTH, this.size[0]);
+    gl.pixelStorei(gl.UNPACK_IMAGE_HEIGHT, this.size[1]);
+    const first = (low[2] * this.size[1] + low[1]) * this.size[0] + low[0];
+    this.upload(low, high, whole.subarray(first * texelBytes));
+    gl.pixelStorei(gl.UNPACK_ROW_LENGTH, 0);
+    gl.pixelStorei(gl.UNPACK_IMAGE_HEIGHT, 0);
+  }
+  free() {
+    this.gl.deleteTexture(this.texture);
+  }
+}
+
+/** Boxes that hold these bricks: a layer of the volume where a third of it changed, else bricks. */
+function boxesOf(volume, bricks) {
+  const [gx, gy, gz] = volume.grid;
+  const layers = Array.from({length: gz}, () => []);
+  for (const id of bricks) layers[Math.floor(id / gx / gy)].push(id);
+  return layers.flatMap((ids, z) => {
+    if (3 * ids.length < gx * gy) return ids.map(id => volume.brick(id));
+    return [{low: [0, 0, 8 * z], high: [volume.size[0], volume.size[1], Math.min(8 * z + 8, volume.size[2])]}];
+  });
+}
+
+/** Active cells of a volume as a texture, and the faces around them. */
+class CellsOnGpu {
+  constructor(gl, view, threshold) {
+    this.gl = gl;
+    this.cells = new Macrocells(view.volume, threshold);
+    this.texture = texture(gl, gl.TEXTURE_3D, gl.R8UI, gl.NEAREST, this.cells.grid);
+    this.worldFromCell = scaled(translated(view.worldFromVoxel, [-1, -1, -1]), [8, 8, 8]);
+    this.array = gl.createVertexArray();
+    this.buffer = gl.createBuffer();
+    this.faces = 0;
+    gl.bindVertexArray(this.array);
+    gl.bindBuffer(gl.ARRAY_BUFFER, this.buffer);
+    gl.enableVertexAttribArray(0);
+    gl.vertexAttribIPointer(0, 4, gl.UNSIGNED_SHORT, 0, 0);
+    gl.vertexAttribDivisor(0, 1);
+    gl.bindVertexArray(null);
+  }
+  update(bricks) {
+    if (!this.cells.update(bricks)) return;
+    const {gl} = this;
+    gl.bindTexture(gl.TEXTURE_3D, this.texture);
+    gl.texSubImage3D(gl.TEXTURE_3D, 0, 0, 0, 0, ...this.cells.grid, gl.RED_INTEGER, gl.UNSIGNED_BYTE,
+      this.cells.active);
+    const faces = this.cells.faces();
+    this.faces = faces.length / 4;
+    gl.bindBuffer(gl.ARRAY_BUFFER, this.buffer);
+    gl.bufferData(gl.ARRAY_BUFFER, faces, gl.DYNAMIC_DRAW);
+  }
+  drawFaces() {
+    if (this.faces === 0) return;
+    this.gl.bindVertexArray(this.array);
+    this.gl.drawArraysInstanced(this.gl.TRIANGLES, 0, 6, this.faces);
+  }
+  free() {
+    this.gl.deleteTexture(this.texture);
+    this.gl.deleteBuffer(this.buffer);
+    this.gl.deleteVertexArray(this.array);
+  }
+}
+
+/** What both renderers have of a volume; `take` uploads what came since. */
+class VolumeOnGpu {
+  constructor(gl, view, threshold) {
+    Object.assign(this, {gl, view, volume: view.volume});
+    this.texels = this.volume.size.map(n => n + 2);
+    this.worldFromTexture = scaled(translated(view.worldFromVoxel, [-1.5, -1.5, -1.5]), this.texels);
+    this.cells = new CellsOnGpu(gl, view, threshold);
+    this.stale = this.volume.follow();
+  }
+  /** Takes up what changed; returns those bricks. */
+  take() {
+    const bricks = [...this.stale];
+    this.stale.clear();
+    if (bricks.length === 0) return bricks;
+    this.gl.pixelStorei(this.gl.UNPACK_ALIGNMENT, 1);
+    for (const {low, high} of boxesOf(this.volume, bricks)) this.upload(low, high);
+    this.cells.update(bricks);
+    return bricks;
+  }
+  free() {
+    this.volume.forget(this.stale);
+    this.cells.free();
+  }
+}
+
+/** Density, as two bytes a texel, low and high, and labels: what solid.frag reads. */
+export class SolidOnGpu extends VolumeOnGpu {
+  constructor(gl, view) {
+    super(gl, view, view.iso);
+    this.density = new VoxelTexture(gl, this.volume.size, gl.RG8, gl.RG, gl.LINEAR);
+    const labelled = this.volume.labels ? this.volume.size : [0, 0, 0];
+    this.labels = new VoxelTexture(gl, labelled, gl.R8UI, gl.RED_INTEGER, gl.NEAREST);
+  }
+  upload(low, high) {
+    this.density.uploadFrom(low, high, new Uint8Array(this.volume.density.buffer), 2);
+    if (this.volume.labels) this.labels.uploadFrom(low, high, this.volume.labels, 1);
+  }
+  bind() {
+    bind(this.gl, 0, this.gl.TEXTURE_3D, this.density.texture);
+    bind(this.gl, 1, this.gl.TEXTURE_3D, this.labels.texture);
+    bind(this.gl, 2, this.gl.TEXTURE_3D, this.cells.texture);
+  }
+  free() {
+    super.free();
+    this.density.free();
+    this.labels.free();
+  }
+}
+
+/** Gradient and density in one texture, materials in a second where there are labels. */
+export class TranslucentOnGpu extends VolumeOnGpu {
+  constructor(gl, view, materials, rows) {
+    const transfer = transferFunction(view, materials);
+    super(gl, view, transfer.lowestSeen);
+    this.transfer = transfer;
+    const {labels, size} = this.volume;
+    this.voxels = new VoxelTexture(gl, size, gl.RGBA8, gl.RGBA, gl.LINEAR);
+    this.voxels.fill([128 / 255, 128 / 255, 128 / 255, 0]);
+    this.materials = new VoxelTexture(gl, labels ? size : [0, 0, 0], gl.RGBA8, gl.RGBA, gl.LINEAR);
+    this.materialTexels = labels ? new MaterialTexels(this.volume, rows) : null;
+  }
+  upload(low, high) {
+    // A gradient reaches a voxel farther.
+    const from = low.map(n => Math.max(n - 1, 0));
+    const to = high.map((n, axis) => Math.min(n + 1, this.volume.size[axis]));
+    const texels = gradientTexels(this.volume, from, to, !this.begun);
+    if (!texels) return;  // as the texture is at first
+    this.voxels.upload(from, to, texels);
+    if (this.materialTexels) this.materials.upload(low, high, this.materialTexels.of(low, high));
+  }
+  take() {
+    const bricks = super.take();
+    this.begun = true;
+    return bricks;
+  }
+  bind(unit) {
+    bind(this.gl, unit, this.gl.TEXTURE_3D, this.voxels.texture);
+    bind(this.gl, unit + 1, this.gl.TEXTURE_3D, this.materials.texture);
+    bind(this.gl, unit + 2, this.gl.TEXTURE_3D, this.cells.texture);
+  }
+  free() {
+    super.free();
+    this.voxels.free();
+    this.materials.free();
+  }
+}

@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: Apache-2.0
+
+const kBrick = 8, kBrickVoxels = 512;
+
+/** One volume as it is held: densities and labels, x fastest, and which bricks are new. */
+export class Volume {
+  constructor(descriptor) {
+    const {nx, ny, nz} = descriptor;
+    this.descriptor = descriptor;
+    this.size = [nx, ny, nz];
+    this.grid = this.size.map(n => Math.ceil(n / kBrick));
+    this.bricks = this.grid[0] * this.grid[1] * this.grid[2];
+    if (this.bricks !== descriptor.brick_count || descriptor.log2_brick !== 3 ||
+        descriptor.bits_per_voxel !== 16) {
+      throw new Error('hello: a volume of another version; load the page again');
+    }
+    this.density = new Uint16Array(nx * ny * nz);
+    this.labels = descriptor.off_labels !== 0n ? new Uint8Array(nx * ny * nz) : null;
+    this.came = new Uint8Array(this.bricks);
+    this.first = new Map();    // brick -> its densities when they came, of bricks that changed since
+    this.changed = new Set();  // bricks of `first` whose removed material is not counted yet
+    this.removed = new Map();  // brick -> what was, by material
+    this.listeners = new Set();  // sets of bricks to be taken up
+  }
+
+  brick(id) {
+    const [gx, gy] = this.grid;
+    const at = [id % gx, Math.floor(id / gx) % gy, Math.floor(id / gx / gy)];
+    const low = at.map(i => i * kBrick);
+    return {low, high: low.map((i, axis) => Math.min(i + kBrick, this.size[axis]))};
+  }
+  brickId(x, y, z) {
+    return (z * this.grid[1] + y) * this.grid[0] + x;
+  }
+
+  /** Calls `row(from, to, count)` for each row of a brick: places in the brick and in the volume. */
+  rows(id, row) {
+    const {low, high} = this.brick(id);
+    for (let z = low[2]; z < high[2]; ++z) {
+      for (let y = low[1]; y < high[1]; ++y) {
+        row(((z - low[2]) * kBrick + y - low[1]) * kBrick,
+          (z * this.size[1] + y) * this.size[0] + low[0], high[0] - low[0]);
+      }
+    }
+  }
+
+  putDensity(id, block) {
+    if (this.came[id]) {
+      if (this.holds(id, block)) return;  // it came once more
+      if (!this.first.has(id)) this.first.set(id, this.copyOf(id));
+    }
+    this.rows(id, (from, to, count) => {
+      for (let i = 0; i < count; ++i) {
+        this.density[to + i] = block[2 * (from + i)] | block[2 * (from + i) + 1] << 8;
+      }
+    });
+    if (this.came[id]) this.changed.add(id);
+    this.came[id] = 1;
+    for (const listener of this.listeners) listener.add(id);
+  }
+
+  putLabels(id, block) {
+    let differs = 0;
+    this.rows(id, (from, to, count) => {
+      for (let i = 0; i < count; ++i) {
+        differs |= this.labels[to + i] ^ block[from + i];
+        this.labels[to + i] = block[from + i];
+      }
+    });
+    if (differs === 0) return;
+    for (const listener of this.listeners) listener.add(id);
+  }
+
+  holds(id, block) {
+    let differs = 0;
+    this.rows(id, (from, at, count) => {
+      for (let i = 0; i < count; ++i) {
+        differs |= this.density[at + i] ^ (block[2 * (from + i)] | block[2 * (from + i) + 1] << 8);
+      }
+    });
+    return differs === 0;
+  }
+
+  copyOf(id) {
+    const copy = new Uint16Array(kBrickVoxels);
+    this.rows(id, (to, from, count) => copy.set(this.density.subarray(from, from + count), to));
+    return copy;
+  }
+
+  /** A set that gets the bricks which come from now on, and all that are there. */
+  follow() {
+    const all = new Set(Array(this.bricks).keys());
+    this.listeners.add(all);
+    return all;
+  }
+  forget(listener) {
+    this.listeners.delete(listener);
+  }
+
+  /** Density units that are gone since each brick came, by material; `materialOf(label, density)`. */
+  removedUnits(materialOf, materials) {
+    for (const id of this.changed) {
+      const gone = new Float64Array(materials), first = this.first.get(id);
+      this.rows(id, (from, at, count) => {
+        for (let i = 0; i < count; ++i) {
+          const was = first[from + i], lost = was - this.density[at + i];
+          if (lost !== 0) gone[materialOf(this.labels ? this.labels[at + i] : 0, was)] += lost;
+        }
+      });
+      this.removed.set(id, gone);
+    }
+    if (this.changed.size > 0 || !this.sums) {
+      this.sums = new Float64Array(materials);
+      for (const gone of this.removed.values()) gone.forEach((units, m) => this.sums[m] += units);
+    }
+    this.changed.clear();
+    return this.sums;
+  }
+}
