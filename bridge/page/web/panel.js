@@ -91,7 +91,8 @@ export class Plot {
     const [wide, high] = [canvas.clientWidth, canvas.clientHeight];
     if (wide === 0) return;
     Object.assign(canvas, {width: Math.round(wide * ratio), height: Math.round(high * ratio)});
-    const to = canvas.getContext('2d');
+    // Drawn by the processor: where GL is software, two lines by it cost more than the tooth.
+    const to = canvas.getContext('2d', {willReadFrequently: true});
     to.scale(ratio, ratio);
     const style = getComputedStyle(document.documentElement);
     const colour = name => style.getPropertyValue(name);
