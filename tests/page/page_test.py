@@ -173,14 +173,16 @@ def is_reached_by_keyboard(case):
     page = case.page
     page.evaluate('document.activeElement.blur()')
     reached, rings = [], True
-    for _ in range(14):
+    for _ in range(24):
         page.key('Tab', code='Tab')
         name, ring = page.evaluate("[document.activeElement.id || document.activeElement.tagName,"
                                    " getComputedStyle(document.activeElement).outlineStyle]")
         reached.append(name)
         rings = rings and (ring != 'none' or name == 'BODY')
     wanted = ['picture', 'tool', 'hold', 'go', 'renderer', 'clip', 'stereo', 'home', 'SUMMARY']
-    case.check([name for name in reached if name in wanted][:len(wanted)] == wanted, 'Tab reaches: ' + ' '.join(reached))
+    reached = [name for name in reached if name in wanted]  # from wherever the last click was
+    reached = reached[reached.index('picture'):][:len(wanted)]
+    case.check(reached == wanted, 'Tab reaches: ' + ' '.join(reached))
     case.check(rings, 'the focus is seen')
 
 

@@ -38,6 +38,9 @@ export class Program {
   use() {
     this.gl.useProgram(this.program);
   }
+  free() {
+    this.gl.deleteProgram(this.program);
+  }
   at(uniform) {
     if (!this.locations.has(uniform)) {
       this.locations.set(uniform, this.gl.getUniformLocation(this.program, uniform));

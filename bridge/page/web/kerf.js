@@ -23,12 +23,6 @@ function missing(text) {
   element('missing').hidden = text === '';
   element('missing').textContent = text;
 }
-try {
-  stage = new Stage(element('picture'), missing);
-} catch (problem) {
-  missing(`${problem.message} The figures are shown without a picture.`);
-}
-
 const link = new Link({
   state(text, trouble) {
     if (element('state').textContent === text) return;  // it would be read out again
@@ -75,6 +69,13 @@ const link = new Link({
     wishes.delete(sequence);
   },
 });
+
+// After the link, so that the volumes are on their way meanwhile.
+try {
+  stage = new Stage(element('picture'), missing);
+} catch (problem) {
+  missing(`${problem.message} The figures are shown without a picture.`);
+}
 
 /** All of a run's volumes are here. */
 function begin() {
