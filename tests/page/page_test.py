@@ -62,7 +62,7 @@ class Case:
             rig.start_run()
             self.check(self.page.until('document.body?.dataset.state === "live"'), 'it goes live')
             # Ticks after which the hand rests. A page that came late has not seen what was cut before.
-            self.check(self.page.until('Number(document.body.dataset.tick) > 4000'), 'the hand has cut')
+            self.check(self.page.until('Number(document.body.dataset.tick) > 7000'), 'the hand has been there')
             late = "document.getElementById('figures').textContent.includes('since joining')"
             if self.page.until(f"{late} || {figure('removed')} > 0.1", 2):
                 break
