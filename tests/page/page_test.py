@@ -233,6 +233,9 @@ def is_small_and_breaks_no_rule(case):
              if event.get('method') == 'Runtime.exceptionThrown' or
              event.get('method') == 'Log.entryAdded' and event['params']['entry']['level'] == 'error']
     case.check(not wrong, f'no error and no broken rule {wrong or ""}')
+    unnamed = page.evaluate("""performance.getEntriesByType('resource').map(one => one.name.split('/').pop())
+      .filter(name => name.endsWith('.js') && !document.querySelector(`[src="${name}"], [href="${name}"]`))""")
+    case.check(not unnamed, f'index.html names every module, so that all come at once {unnamed or ""}')
     case.check(TOKEN not in page.evaluate('location.href'), 'the address keeps no token')
 
 
