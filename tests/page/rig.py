@@ -22,22 +22,24 @@ length_mm = 3.8
 stiffness_n_per_mm = 0.4
 [cut]
 model = "preston"
-machinability_mm3_per_s_n = 8
+machinability_mm3_per_s_n = 30
 '''
-# Through the crown, and away.
+# Waits for the page, cuts the crown and goes away.
 HAND = '''start_mm = [0, 6, 0]
 [[step]]
-move_mm = [0, 0.3, 0]
+hold = 3.0
+[[step]]
+move_mm = [0, 0.3, 1.5]
 seconds = 0.3
 [[step]]
-move_mm = [0, -0.6, 0]
-seconds = 0.3
-[[step]]
-move_mm = [1.5, -0.6, 0.8]
+move_mm = [0, -1.5, 1.5]
 seconds = 0.4
 [[step]]
-move_mm = [3, 4, 2]
-seconds = 0.4
+move_mm = [1.5, -1.5, 3.0]
+seconds = 0.6
+[[step]]
+move_mm = [4, 3, -2]
+seconds = 0.5
 [[step]]
 hold = 3600
 '''

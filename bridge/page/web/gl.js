@@ -7,10 +7,15 @@ export function contextOf(canvas) {
   const gl = canvas.getContext('webgl2', {alpha: false, antialias: false, depth: false,
     powerPreference: 'high-performance'});
   if (!gl) throw new Error('This browser has no WebGL 2, or it is switched off.');
+  enableExtensions(gl);
+  return gl;
+}
+
+/** Of a context, and again of one that was lost and came back. */
+export function enableExtensions(gl) {
   if (!gl.getExtension('EXT_color_buffer_float')) {
     throw new Error('The WebGL 2 of this browser cannot draw into floating-point textures (EXT_color_buffer_float).');
   }
-  return gl;
 }
 
 /** A linked program of shaders.js. Uniforms are set by name; one that the linker removed is ignored. */
@@ -37,6 +42,9 @@ export class Program {
 
   use() {
     this.gl.useProgram(this.program);
+  }
+  free() {
+    this.gl.deleteProgram(this.program);
   }
   at(uniform) {
     if (!this.locations.has(uniform)) {

@@ -16,21 +16,16 @@ const kWanted = new Set(['tick', 'start_ns', 'flags', 'position_mm', 'orientatio
 const element = id => document.getElementById(id);
 
 const plot = new Plot(element('plot'));
-const now = {record: null, frame: null, ended: false, newRun: 0, earlier: null};
+const now = {record: null, frame: null, ended: false, newRun: 0, earlier: null, takenNs: null, lost: false};
 let stage = null, scene = null, held = null;
 
 function missing(text) {
   element('missing').hidden = text === '';
   element('missing').textContent = text;
 }
-try {
-  stage = new Stage(element('picture'), missing);
-} catch (problem) {
-  missing(`${problem.message} The figures are shown without a picture.`);
-}
-
 const link = new Link({
   state(text, trouble) {
+    if (trouble) now.lost = true;
     if (element('state').textContent === text) return;  // it would be read out again
     element('state').textContent = text;
     element('state').classList.toggle('trouble', trouble);
@@ -39,7 +34,7 @@ const link = new Link({
   hello(news, sameRun) {
     if (!sameRun) {
       now.newRun = held ? performance.now() : 0;
-      Object.assign(now, {record: null, ended: false, frame: null, earlier: null});
+      Object.assign(now, {record: null, ended: false, frame: null, earlier: null, takenNs: null});
       plot.clear();
       scene = null;
     }
@@ -53,6 +48,7 @@ const link = new Link({
     if (!(frame.flags & kLastOfPass) || !held.complete) return;
     if (!scene) begin();
     now.takenNs = frame.takenNs;
+    now.lost = false;
     document.body.dataset.tick = frame.tick;
     this.state(now.ended ? 'ended' : 'live', false);
   },
@@ -75,6 +71,13 @@ const link = new Link({
     wishes.delete(sequence);
   },
 });
+
+// After the link, so that the volumes are on their way meanwhile.
+try {
+  stage = new Stage(element('picture'), missing);
+} catch (problem) {
+  missing(`${problem.message} The figures are shown without a picture.`);
+}
 
 /** All of a run's volumes are here. */
 function begin() {
@@ -109,7 +112,7 @@ function showNews() {
     tool: record && scene?.tools[record.active_tool]?.name,
     removed: scene ? removedByMaterial() : [],
     servoHz: span > 0 && !now.ended ? 1e9 * Number(record.tick - earlier[0].tick) / span : null,
-    ageMs: now.takenNs && !now.ended ? Math.max(link.clock.ageMs(now.takenNs), 0) : null});
+    ageMs: now.takenNs && !now.ended && !now.lost ? Math.max(link.clock.ageMs(now.takenNs), 0) : null});
   showBanner(bannerOf(now));
   plot.draw();
   if (record && document.activeElement !== element('tool')) element('tool').value = record.active_tool;

@@ -126,59 +126,94 @@ export class MaterialTexels {
     this.byDensity = bytes.subarray(0, 4 * kPaletteWidth);
     this.byLabel = bytes.subarray(4 * kPaletteWidth);
     this.looks = rows.subarray(4 * kPaletteWidth);
+    this.around = [];  // {x, y, z, step through the labels, weight}
+    const [nx, ny] = volume.size, reach = kMaterialReach;
+    for (let z = -reach; z <= reach; ++z) {
+      for (let y = -reach; y <= reach; ++y) {
+        for (let x = -reach; x <= reach; ++x) {
+          const far = x * x + y * y + z * z;
+          if (far > 0) this.around.push({x, y, z, step: (z * ny + y) * nx + x, weight: 1 / far});
+        }
+      }
+    }
+    this.steps = Int32Array.from(this.around, one => one.step);
   }
 
+  /** Of a box; in blocks of 8^3, since most have no label anywhere near. */
   of(low, high) {
-    const {size: [nx, ny], density, labels} = this.volume;
     const texels = new Uint8Array(4 * (high[0] - low[0]) * (high[1] - low[1]) * (high[2] - low[2]));
-    const near = this.anyLabel(low, high);
-    let out = 0;
-    for (let z = low[2]; z < high[2]; ++z) {
-      for (let y = low[1]; y < high[1]; ++y) {
-        for (let x = low[0], at = (z * ny + y) * nx + x; x < high[0]; ++x, ++at, out += 4) {
-          if (labels[at] !== 0) {
-            this.take(texels, out, this.byLabel, labels[at]);
-          } else if (!near || !this.meanAround(texels, out, x, y, z)) {
-            this.take(texels, out, this.byDensity, densityByte(density[at]));
-          }
+    for (let z = low[2]; z < high[2]; z += 8) {
+      for (let y = low[1]; y < high[1]; y += 8) {
+        for (let x = low[0]; x < high[0]; x += 8) {
+          const from = [x, y, z];
+          this.fill(texels, low, high, from, from.map((n, axis) => Math.min(n + 8, high[axis])));
         }
       }
     }
     return texels;
   }
 
+  /** The part `from` .. `to` of the box `low` .. `high`. */
+  fill(texels, low, high, from, to) {
+    const {size: [nx, ny], density, labels} = this.volume;
+    const near = this.anyLabel(from, to);
+    for (let z = from[2]; z < to[2]; ++z) {
+      for (let y = from[1]; y < to[1]; ++y) {
+        let out = 4 * (((z - low[2]) * (high[1] - low[1]) + y - low[1]) * (high[0] - low[0]) + from[0] - low[0]);
+        for (let x = from[0], at = (z * ny + y) * nx + x; x < to[0]; ++x, ++at, out += 4) {
+          if (labels[at] !== 0) {
+            this.take(texels, out, this.byLabel, labels[at]);
+          } else if (!near || !this.meanAround(texels, out, x, y, z, at)) {
+            this.take(texels, out, this.byDensity, densityByte(density[at]));
+          }
+        }
+      }
+    }
+  }
+
   take(texels, out, row, index) {
     for (let k = 0; k < 4; ++k) texels[out + k] = row[4 * index + k];
   }
 
-  /** Calls `visit(label, x, y, z)` for what has a label around a box. */
-  around(low, high, visit) {
+  anyLabel(from, to) {
     const {size: [nx, ny, nz], labels} = this.volume;
     const reach = kMaterialReach;
-    for (let z = Math.max(low[2] - reach, 0); z < Math.min(high[2] + reach, nz); ++z) {
-      for (let y = Math.max(low[1] - reach, 0); y < Math.min(high[1] + reach, ny); ++y) {
+    const last = [nx, ny, nz].map((n, axis) => Math.min(to[axis] + reach, n));
+    for (let z = Math.max(from[2] - reach, 0); z < last[2]; ++z) {
+      for (let y = Math.max(from[1] - reach, 0); y < last[1]; ++y) {
         const row = (z * ny + y) * nx;
-        for (let x = Math.max(low[0] - reach, 0); x < Math.min(high[0] + reach, nx); ++x) {
-          if (labels[row + x] !== 0 && visit(labels[row + x], x, y, z)) return true;
-        }
+        for (let x = Math.max(from[0] - reach, 0); x < last[0]; ++x) if (labels[row + x] !== 0) return true;
       }
     }
     return false;
   }
-  anyLabel(low, high) {
-    return this.around(low, high, () => true);
-  }
-  meanAround(texels, out, x, y, z) {
-    const sum = [0, 0, 0, 0];
-    let weights = 0;
-    this.around([x, y, z], [x + 1, y + 1, z + 1], (label, i, j, k) => {
-      const weight = 1 / ((i - x) ** 2 + (j - y) ** 2 + (k - z) ** 2);
-      for (let c = 0; c < 4; ++c) sum[c] += weight * this.looks[4 * label + c];
+
+  meanAround(texels, out, x, y, z, at) {
+    const {size: [nx, ny, nz], labels} = this.volume;
+    const {steps, around, looks} = this;
+    const reach = kMaterialReach;
+    const inside = x >= reach && y >= reach && z >= reach && x < nx - reach && y < ny - reach && z < nz - reach;
+    let r = 0, g = 0, b = 0, opacity = 0, weights = 0;
+    for (let i = 0; i < steps.length; ++i) {
+      if (!inside) {
+        const one = around[i];
+        const [px, py, pz] = [x + one.x, y + one.y, z + one.z];
+        if (px < 0 || py < 0 || pz < 0 || px >= nx || py >= ny || pz >= nz) continue;
+      }
+      const label = labels[at + steps[i]];
+      if (label === 0) continue;
+      const {weight} = around[i];
+      r += weight * looks[4 * label];
+      g += weight * looks[4 * label + 1];
+      b += weight * looks[4 * label + 2];
+      opacity += weight * looks[4 * label + 3];
       weights += weight;
-      return false;
-    });
+    }
     if (weights === 0) return false;
-    for (let c = 0; c < 4; ++c) texels[out + c] = unitByte(sum[c] / weights);
+    texels[out] = unitByte(r / weights);
+    texels[out + 1] = unitByte(g / weights);
+    texels[out + 2] = unitByte(b / weights);
+    texels[out + 3] = unitByte(opacity / weights);
     return true;
   }
 }

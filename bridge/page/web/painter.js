@@ -1,45 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 // The picture of a scene for one or two eyes: backdrop, volumes, tool, force arrow, in the order and
 // with the layers of visualizer/compose.
-import {kBlendStepVox, kFaint, kForce, kHeadBare, kHeadLength, kHeadRadius, kIsoStepVox, kLongestTapVox,
-  kPaletteWidth, kSteel} from './constants.js';
-import {clipFromEye, clippedRect, grownRect, isEmptyRect, screenBounds, shownInEye, unitedRect} from './camera.js';
-import {bind, cover, GpuMesh, Program, Target, texture} from './gl.js';
-import {arrowOf, poseOf, toolBounds} from './hand.js';
-import {toolMesh, unitCone, unitCylinder} from './mesh.js';
+import {clipFromEye, clippedRect, grownRect, isEmptyRect, screenBounds, unitedRect} from './camera.js';
+import {kBlendStepVox, kIsoStepVox, kLongestTapVox, kPaletteWidth} from './constants.js';
+import {Eye, viewUniforms} from './eye.js';
+import {bind, cover, Program, texture} from './gl.js';
+import {toolBounds} from './hand.js';
+import {HandPainter} from './hand_painter.js';
 import {leastExtinction, palette} from './matter.js';
-import {affineInverse, boxCorners, multiply, normalMatrix, turn} from './math.js';
+import {affineInverse, boxCorners, multiply} from './math.js';
 import {SolidOnGpu, TranslucentOnGpu} from './textures.js';
 
 const kSmoothingReach = 3;  // pixels
 const kUnitsPerVolume = 3;
-
-/** What both ray casters read of a view. */
-function viewUniforms(view) {
-  return {u_half_size_at_1mm: [view.tanHalfHeight * view.aspect, view.tanHalfHeight],
-    u_middle_at_1mm: [view.middleRight, 0], u_near_mm: view.near, u_far_mm: view.far,
-    u_shown_eye: shownInEye(view), u_up_eye: turn(view.eyeFromWorld, [0, 1, 0])};
-}
-
-/** The layers of one eye, kept from frame to frame. */
-class Eye {
-  constructor(gl, width, height, volumes, translucent) {
-    this.gl = gl;
-    this.all = {x0: 0, y0: 0, x1: width, y1: height};
-    this.opaque = new Target(gl, width, height, [gl.RGBA8]);
-    this.stage = new Target(gl, width, height, [gl.RGBA8]);
-    this.smooth = new Target(gl, width, height, [gl.RGBA8], false);
-    this.layers = translucent ? volumes : 1;
-    this.entry = texture(gl, gl.TEXTURE_2D_ARRAY, gl.R32F, gl.NEAREST, [width, height, this.layers]);
-    this.entries = new Target(gl, width, height, []);
-    // Linear light, which a sum of hundreds of faint samples needs, and depth.
-    this.gathered = translucent ? new Target(gl, width, height, [gl.RGBA16F, gl.R32F], false) : null;
-  }
-  free() {
-    this.gl.deleteTexture(this.entry);
-    for (const one of [this.opaque, this.stage, this.smooth, this.entries, this.gathered]) one?.free();
-  }
-}
 
 export class Painter {
   /** Uploads all of a scene. `renderer`: iso or blend. */
@@ -61,9 +34,7 @@ export class Painter {
     this.makePrograms(rows);
     this.volumes = scene.volumes.map(view =>
       this.translucent ? new TranslucentOnGpu(gl, view, scene.materials, rows) : new SolidOnGpu(gl, view));
-    this.tools = scene.tools.map(tool => new GpuMesh(gl, toolMesh(tool)));
-    this.cylinder = new GpuMesh(gl, unitCylinder());
-    this.cone = new GpuMesh(gl, unitCone());
+    this.hand = new HandPainter(gl, scene);
     if (this.translucent) this.setConstants();
   }
 
@@ -74,8 +45,6 @@ export class Painter {
     this.smooth = new Program(gl, 'smooth');
     this.shown = new Program(gl, 'shown');
     this.faces = new Program(gl, 'cell_faces');
-    this.metal = new Program(gl, 'mesh', '#define KERF_METAL 1\n');
-    this.plain = new Program(gl, 'mesh', '#define KERF_METAL 0\n');
     // Half floats: they are filtered everywhere.
     const palettes = this.translucent ? count : 2;
     this.palette = texture(gl, gl.TEXTURE_2D, gl.RGBA16F, gl.LINEAR, [kPaletteWidth, palettes]);
@@ -160,9 +129,10 @@ export class Painter {
     if (isEmptyRect(stage)) return 0;
     if (!isEmptyRect(volumes)) this.drawOpaque(eye, view, volumes);
     eye.stage.copy(eye.opaque, stage);
-    if (hand) this.drawTool(eye, view, hand, stage);
+    eye.stage.bind(stage);
+    if (hand) this.hand.drawTool(view, hand);
     if (this.translucent) this.blend(eye, view, stage);
-    if (hand) this.drawForce(eye, view, hand, stage);
+    if (hand) this.hand.drawForce(view, hand);
     this.smoothEdges(eye, clippedRect(grownRect(stage, kSmoothingReach), eye.all));
     const cast = this.translucent ? stage : volumes;
     return isEmptyRect(cast) ? 0 : (cast.x1 - cast.x0) * (cast.y1 - cast.y0);
@@ -244,49 +214,6 @@ export class Painter {
     gl.disable(gl.BLEND);
   }
 
-  drawMesh(program, mesh, worldFromMesh, colour, opacity, view) {
-    const eyeFromMesh = multiply(view.eyeFromWorld, worldFromMesh);
-    program.use();
-    program.set({u_eye_from_mesh: eyeFromMesh, u_eye_from_mesh_normal: normalMatrix(eyeFromMesh),
-      u_clip_from_eye: clipFromEye(view), u_colour: colour, u_opacity: opacity,
-      u_up_eye: turn(view.eyeFromWorld, [0, 1, 0])});
-    mesh.draw();
-  }
-
-  drawTool(eye, view, hand, part) {
-    const {gl} = this;
-    const tool = this.tools[hand.tool];
-    if (!tool) return;
-    eye.stage.bind(part);
-    gl.enable(gl.DEPTH_TEST);
-    gl.depthFunc(gl.LESS);
-    gl.enable(gl.CULL_FACE);
-    this.drawMesh(this.metal, tool, poseOf(hand), kSteel, 1, view);
-    gl.disable(gl.CULL_FACE);
-  }
-
-  /** The part behind other things shines through, so that a force is seen in a deep cavity too. */
-  drawForce(eye, view, hand, part) {
-    const arrow = arrowOf(this.scene, hand);
-    if (!arrow) return;
-    const {gl} = this;
-    const pieces = [[this.cylinder, arrow.shaft(kHeadLength, kHeadBare)],
-      [this.cone, arrow.head(kHeadLength, kHeadRadius)]];
-    eye.stage.bind(part);
-    gl.enable(gl.CULL_FACE);
-    gl.enable(gl.DEPTH_TEST);
-    gl.enable(gl.BLEND);
-    gl.blendFuncSeparate(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA, gl.ZERO, gl.ONE);
-    gl.depthFunc(gl.GREATER);
-    gl.depthMask(false);
-    for (const [mesh, pose] of pieces) this.drawMesh(this.plain, mesh, pose, kForce, kFaint, view);
-    gl.depthMask(true);
-    gl.depthFunc(gl.LESS);
-    gl.disable(gl.BLEND);
-    for (const [mesh, pose] of pieces) this.drawMesh(this.plain, mesh, pose, kForce, 1, view);
-    gl.disable(gl.CULL_FACE);
-  }
-
   smoothEdges(eye, part) {
     const {gl} = this;
     eye.smooth.bind(part);
@@ -314,10 +241,10 @@ export class Painter {
   }
 
   free() {
-    for (const one of [...this.eyes, ...this.volumes, ...this.tools, this.cylinder, this.cone]) one.free();
-    this.gl.deleteTexture(this.palette);
-    for (const name of ['backdrop', 'smooth', 'shown', 'faces', 'metal', 'plain', 'cast', 'layer']) {
-      if (this[name]) this.gl.deleteProgram(this[name].program);
+    for (const one of [...this.eyes, ...this.volumes, this.hand, this.backdrop, this.smooth, this.shown, this.faces,
+      this.cast, this.layer]) {
+      one?.free();
     }
+    this.gl.deleteTexture(this.palette);
   }
 }

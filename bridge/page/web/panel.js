@@ -8,7 +8,8 @@ const kNewRunMs = 4000;
 const element = id => document.getElementById(id);
 
 /** What is to be said large over the picture: {text, alarm}; null where there is nothing. */
-export function bannerOf({record, frame, ended, newRun}) {
+export function bannerOf({record, frame, ended, newRun, lost}) {
+  if (lost && frame && !ended) return {text: 'No connection to the bridge: this is its last picture.', alarm: true};
   if (ended) {
     return frame.lifecycle === Lifecycle.clean_end ?
       {text: 'The controller has ended: this is the final state.', alarm: false} :
@@ -18,7 +19,7 @@ export function bannerOf({record, frame, ended, newRun}) {
   if (silentMs > kStaleMs) return {text: 'Stale: no news from the servo.', alarm: true};
   if (record && record.flags & kFlagDeviceFault) {
     const [name, meaning] = kFaults[record.fault] ?? ['unknown', ''];
-    return {text: `Fault ${name}: ${meaning}. ${kPhases[5][1]}.`, alarm: true};
+    return {text: `Fault ${name}: ${meaning}; ${kPhases[5][1]}.`, alarm: true};
   }
   if (record && record.flags & kFlagRefused) {
     return {text: 'No free place for this tool here, so it feels nothing: lead it into air.', alarm: true};
@@ -91,7 +92,8 @@ export class Plot {
     const [wide, high] = [canvas.clientWidth, canvas.clientHeight];
     if (wide === 0) return;
     Object.assign(canvas, {width: Math.round(wide * ratio), height: Math.round(high * ratio)});
-    const to = canvas.getContext('2d');
+    // Drawn by the processor: where GL is software, two lines by it cost more than the tooth.
+    const to = canvas.getContext('2d', {willReadFrequently: true});
     to.scale(ratio, ratio);
     const style = getComputedStyle(document.documentElement);
     const colour = name => style.getPropertyValue(name);

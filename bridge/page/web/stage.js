@@ -3,7 +3,7 @@
 // move where the machine would fall below ten pictures a second.
 import {eyeViews, OrbitCamera} from './camera.js';
 import {kToolRoom} from './constants.js';
-import {contextOf} from './gl.js';
+import {contextOf, enableExtensions} from './gl.js';
 import {sameHand} from './hand.js';
 import {mix} from './math.js';
 import {Painter} from './painter.js';
@@ -36,6 +36,7 @@ export class Stage {
     canvas.addEventListener('webglcontextrestored', () => {
       this.fence = null;
       trouble('');
+      enableExtensions(this.gl);
       if (this.scene) this.rebuild();
     });
     new ResizeObserver(() => this.stale = true).observe(canvas);

@@ -104,7 +104,9 @@ export class Volume {
       this.rows(id, (from, at, count) => {
         for (let i = 0; i < count; ++i) {
           const was = first[from + i], lost = was - this.density[at + i];
-          if (lost !== 0) gone[materialOf(this.labels ? this.labels[at + i] : 0, was)] += lost;
+          // A reset gives back what was gone before this page came.
+          if (lost < 0) first[from + i] = this.density[at + i];
+          if (lost > 0) gone[materialOf(this.labels ? this.labels[at + i] : 0, was)] += lost;
         }
       });
       this.removed.set(id, gone);
