@@ -6,8 +6,6 @@
 #include <utility>
 
 #include <boost/asio/co_spawn.hpp>
-#include <boost/asio/redirect_error.hpp>
-#include <boost/asio/use_awaitable.hpp>
 #include <boost/asio/write.hpp>
 #include <boost/beast/core/detect_ssl.hpp>
 
@@ -20,17 +18,11 @@ namespace {
 
 namespace http = beast::http;
 
-constexpr auto kHandshakeTime = std::chrono::seconds(5);  // for TLS, and for each request
-constexpr auto kReplyTime = std::chrono::seconds(30);     // 200 KB over 64 kbit/s
-constexpr auto kWrongTokenTime = std::chrono::seconds(1);
+constexpr auto kReplyTime = std::chrono::seconds(30);  // 200 KB over 64 kbit/s
 constexpr std::uint32_t kMaxHeaderBytes = 8 * 1024;
 
 std::string_view text(beast::string_view view) {
   return {view.data(), view.size()};
-}
-
-auto quiet(ErrorCode& error) {
-  return asio::redirect_error(asio::use_awaitable, error);
 }
 
 }  // namespace
@@ -48,7 +40,7 @@ asio::awaitable<void> Server::Impl::connection(tcp::socket socket) {
 asio::awaitable<void> Server::Impl::handshake(WebSocket& ws, beast::flat_buffer& in, bool& done) {
   Link& link = ws.next_layer();
   ErrorCode error;
-  link.next_layer().expires_after(kHandshakeTime);
+  link.next_layer().expires_after(std::chrono::nanoseconds(setup_.handshake_ns));
   done = co_await beast::async_detect_ssl(link.next_layer(), in, quiet(error));
   if (error) co_return;
   if (!done) {
@@ -121,7 +113,7 @@ asio::awaitable<void> Server::Impl::talk_http(std::unique_ptr<WebSocket> ws, bea
     http::request_parser<http::empty_body> parser;
     parser.header_limit(kMaxHeaderBytes);
     parser.body_limit(0);
-    link.next_layer().expires_after(kHandshakeTime);
+    link.next_layer().expires_after(std::chrono::nanoseconds(setup_.handshake_ns));
     co_await http::async_read(link, in, parser, quiet(error));
     if (error == http::error::end_of_stream || error == beast::error::timeout) co_return;
     if (error) co_return co_await refuse(link, 400, "This is no request for a page.\n", false);
@@ -143,7 +135,7 @@ asio::awaitable<void> Server::Impl::talk_http(std::unique_ptr<WebSocket> ws, bea
     const bool gave_token = !query_value(text(request.target()), "token").empty();
     if (right == Right::none && gave_token) {
       // The place is held meanwhile, so who guesses gets 32 answers a second at most.
-      asio::steady_timer wait(io_, kWrongTokenTime);
+      asio::steady_timer wait(io_, std::chrono::nanoseconds(setup_.wrong_token_ns));
       co_await wait.async_wait(quiet(error));
     }
     if (upgrade && path_of(text(request.target())) == kBridgePath) {

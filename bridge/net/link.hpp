@@ -4,7 +4,9 @@
 #include <memory>
 #include <utility>
 
+#include <boost/asio/redirect_error.hpp>
 #include <boost/asio/ssl.hpp>
+#include <boost/asio/use_awaitable.hpp>
 #include <boost/beast/core.hpp>
 #include <boost/beast/ssl.hpp>
 #include <boost/beast/websocket.hpp>
@@ -77,6 +79,11 @@ void async_teardown(beast::role_type, Link& link, Handler&& handler) {
   ErrorCode error;
   link.next_layer().socket().shutdown(tcp::socket::shutdown_both, error);
   asio::post(link.get_executor(), beast::bind_handler(std::forward<Handler>(handler), ErrorCode{}));
+}
+
+/// Awaits an operation; its failure goes to `error` instead of an exception.
+inline auto quiet(ErrorCode& error) {
+  return asio::redirect_error(asio::use_awaitable, error);
 }
 
 using WebSocket = beast::websocket::stream<Link>;

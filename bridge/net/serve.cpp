@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "bridge/net/serve.hpp"
 
-#include <array>
 #include <charconv>
 #include <cstdint>
 #include <iostream>
@@ -10,13 +9,9 @@
 #include <utility>
 #include <vector>
 
-#include <arpa/inet.h>
-#include <ifaddrs.h>
-#include <netinet/in.h>
-#include <unistd.h>
-
 #include "bridge/igtl/igtl_output.hpp"
 #include "bridge/net/bridge_error.hpp"
+#include "bridge/net/host_names.hpp"
 #include "bridge/net/qr_code.hpp"
 #include "bridge/net/server.hpp"
 
@@ -48,32 +43,13 @@ HostPort parse_listen(const std::string& text) {
   return out;
 }
 
-[[nodiscard]] std::string machine_name() {
-  std::array<char, 256> name{};
-  return gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "";
-}
-
-[[nodiscard]] std::string address_text(const sockaddr* address) {
-  std::array<char, INET6_ADDRSTRLEN> text{};
-  if (address->sa_family == AF_INET) {
-    const auto* const v4 = reinterpret_cast<const sockaddr_in*>(address);
-    inet_ntop(AF_INET, &v4->sin_addr, text.data(), text.size());
-  }
-  return text.data();
-}
-
 /// Where others reach what listens at `host`: itself, or each address of this machine.
 [[nodiscard]] std::vector<std::string> reached_at(const std::string& host) {
   if (host != "0.0.0.0" && host != "::") return {host};
-  std::vector<std::string> out;
-  ifaddrs* all = nullptr;
-  if (getifaddrs(&all) != 0) return {host};
-  for (const ifaddrs* one = all; one != nullptr; one = one->ifa_next) {
-    if (one->ifa_addr == nullptr) continue;
-    if (std::string text = address_text(one->ifa_addr); !text.empty())
-      out.push_back(std::move(text));
+  std::vector<std::string> out = own_addresses();
+  if (host == "0.0.0.0") {
+    std::erase_if(out, [](const std::string& one) { return one.find(':') != std::string::npos; });
   }
-  freeifaddrs(all);
   return out;
 }
 
@@ -113,14 +89,12 @@ int run_serve(const ServeOptions& options, const std::atomic<bool>& stop) {
   if (!options.command_tokens.empty()) {
     setup.tokens.add_file(options.command_tokens, "--allow-commands", Right::command);
   }
-  const std::string machine = machine_name();
-  setup.host_names = {machine, machine + ".local", at.host};
+  setup.host_names = own_hosts();
+  setup.host_names.push_back(at.host);
   if (!options.identity.empty()) {
     setup.tls = load_tls_keys(options.identity);
   } else if (!is_loopback(at.host)) {
-    std::vector<std::string> hosts = reached_at(at.host);
-    hosts.push_back(machine);
-    setup.tls = self_signed_keys(hosts);
+    setup.tls = self_signed_keys(own_hosts());
     std::cout << "certificate, self-signed, SHA-256 " << setup.tls->fingerprint << '\n';
   }
   if (setup.tls) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "bridge/net/server.hpp"
 
+#include <algorithm>
 #include <chrono>
 #include <iostream>
 #include <utility>
@@ -9,8 +10,6 @@
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/detached.hpp>
 #include <boost/asio/post.hpp>
-#include <boost/asio/redirect_error.hpp>
-#include <boost/asio/use_awaitable.hpp>
 #include <openssl/ssl.h>
 
 #include "bridge/net/bridge_error.hpp"
@@ -103,11 +102,10 @@ asio::awaitable<void> Server::Impl::accept_all() {
   asio::steady_timer pause(io_);
   for (;;) {
     ErrorCode error;
-    tcp::socket socket =
-        co_await acceptor_.async_accept(asio::redirect_error(asio::use_awaitable, error));
+    tcp::socket socket = co_await acceptor_.async_accept(quiet(error));
     if (error) {  // no descriptor is left, or the peer was gone already
       pause.expires_after(std::chrono::milliseconds(50));
-      co_await pause.async_wait(asio::redirect_error(asio::use_awaitable, error));
+      co_await pause.async_wait(quiet(error));
       continue;
     }
     const asio::ip::address from = socket.remote_endpoint(error).address();
@@ -125,7 +123,7 @@ asio::awaitable<void> Server::Impl::clock(const std::atomic<bool>& stop) {
     at = std::max(at, Clock::now() - std::chrono::nanoseconds(kSlotNs));  // no rush after a sleep
     timer.expires_at(at);
     ErrorCode error;
-    co_await timer.async_wait(asio::redirect_error(asio::use_awaitable, error));
+    co_await timer.async_wait(quiet(error));
     slot();
   }
   io_.stop();

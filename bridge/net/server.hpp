@@ -24,6 +24,9 @@ struct ServerSetup {
   std::vector<std::string> host_names;  ///< by which browsers may call it, beside addresses
   std::size_t max_viewers = 32;
   bool dedicated_link = false;
+  std::int64_t silence_ns = 5'000'000'000;      ///< a viewer that acknowledges nothing is dropped
+  std::int64_t handshake_ns = 5'000'000'000;    ///< for TLS, and for each request
+  std::int64_t wrong_token_ns = 1'000'000'000;  ///< before a wrong token is answered
 };
 
 /// One port for the page and for viewers; one more reader of the segment of one controller, which

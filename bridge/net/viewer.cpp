@@ -7,8 +7,6 @@
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/detached.hpp>
 #include <boost/asio/post.hpp>
-#include <boost/asio/redirect_error.hpp>
-#include <boost/asio/use_awaitable.hpp>
 
 #include "bridge/net/server_impl.hpp"
 #include "bridge/net/tcp_options.hpp"
@@ -20,15 +18,10 @@ namespace {
 
 namespace websocket = beast::websocket;
 
-constexpr std::int64_t kSilenceNs = 5 * kNsPerSecond;
 constexpr std::int64_t kGoodbyeNs = kNsPerSecond;
 constexpr std::int64_t kMeasureNs = kNsPerSecond / 4;
 constexpr int kMaySay = 64;  // beside one ack a frame: a second of commands or pings
 constexpr std::size_t kMaxReplies = 16;
-
-auto quiet(ErrorCode& error) {
-  return asio::redirect_error(asio::use_awaitable, error);
-}
 
 std::string_view words(CloseCode code) {
   switch (code) {
@@ -49,7 +42,7 @@ std::string_view words(CloseCode code) {
 asio::awaitable<void> Server::Impl::view(std::unique_ptr<WebSocket> ws, const Request& request,
                                          Right right) {
   auto& tcp_stream = ws->next_layer().next_layer();
-  tcp_stream.expires_after(std::chrono::nanoseconds(kSilenceNs));
+  tcp_stream.expires_after(std::chrono::nanoseconds(setup_.handshake_ns));
   ws->read_message_max(kMaxUpBytes);
   ws->auto_fragment(false);
   tune_socket(tcp_stream.socket().native_handle());
@@ -184,7 +177,8 @@ void Server::Impl::command(const std::shared_ptr<Viewer>& viewer, const CommandM
 void Server::Impl::look_after(Viewer& viewer, std::int64_t now_ns) {
   viewer.may_say = std::max(viewer.may_say, std::min(viewer.may_say + 1, kMaySay));
   if (!viewer.stream || !viewer.stream->link().waits_for_ack()) viewer.heard_ns = now_ns;
-  if (!viewer.closing && now_ns - viewer.heard_ns > kSilenceNs) drop(viewer, CloseCode::too_slow);
+  if (!viewer.closing && now_ns - viewer.heard_ns > setup_.silence_ns)
+    drop(viewer, CloseCode::too_slow);
   if (viewer.closing && !viewer.gone && now_ns > viewer.close_by_ns) {
     ErrorCode error;
     viewer.ws->next_layer().next_layer().socket().close(error);

@@ -41,10 +41,13 @@ void Stream::note_changes() {
 void Stream::slot(std::int64_t now_ns, bool ended) {
   std::uint64_t records = kMessagesPerSlot * (kMaxRawBytes / sizeof(TickRecord));
   const double rate = link_.bytes_per_s();
-  if (in_pass() && rate > 0 && slot_ns_ != 0) {
-    const double bytes = kRecordShare * rate * static_cast<double>(now_ns - slot_ns_) * 1e-9;
+  if (in_pass() && rate > 0) {
+    record_bytes_ += kRecordShare * rate * static_cast<double>(now_ns - slot_ns_) * 1e-9;
+    record_bytes_ = std::min<double>(record_bytes_, kMaxRawBytes);
     const double each = (sizeof(TickRecord) + sizeof(DirtyRecord)) / ticks_.ratio();
-    records = std::min(records, static_cast<std::uint64_t>(bytes / each));
+    records = std::min(records, static_cast<std::uint64_t>(std::max(record_bytes_, 0.0) / each));
+  } else {
+    record_bytes_ = 0;
   }
   ticks_.plan(records);
   dirty_.plan(records);
@@ -60,10 +63,16 @@ bool Stream::next(std::int64_t now_ns, std::vector<std::byte>& out) {
     write_hello(now_ns, out);
     return true;
   }
-  // By turns, so that neither keeps the other from a link that is slower than it alone.
-  if (frame_next_ && next_frame(now_ns, out)) return true;
-  if (next_records(out)) return true;
-  return !frame_next_ && next_frame(now_ns, out);
+  for (int i = 0; i < kTurns; ++i) {
+    const int turn = (turn_ + i) % kTurns;
+    const bool sent = turn == 0   ? next_records(ticks_, out)
+                      : turn == 1 ? next_records(dirty_, out)
+                                  : next_frame(now_ns, out);
+    if (!sent) continue;
+    turn_ = (turn + 1) % kTurns;
+    return true;
+  }
+  return false;
 }
 
 void Stream::write_hello(std::int64_t now_ns, std::vector<std::byte>& out) {
@@ -92,14 +101,11 @@ void Stream::write_hello(std::int64_t now_ns, std::vector<std::byte>& out) {
   link_.sent(out.size());
 }
 
-bool Stream::next_records(std::vector<std::byte>& out) {
-  for (RecordBatches* ring : {&ticks_, &dirty_}) {
-    if (!ring->waiting() || !ring->write(link_.bytes_per_s(), out)) continue;
-    link_.sent(out.size());
-    frame_next_ = true;
-    return true;
-  }
-  return false;
+bool Stream::next_records(RecordBatches& ring, std::vector<std::byte>& out) {
+  if (!ring.waiting() || !ring.write(link_.bytes_per_s(), out)) return false;
+  link_.sent(out.size());
+  record_bytes_ -= static_cast<double>(out.size());
+  return true;
 }
 
 bool Stream::next_frame(std::int64_t now_ns, std::vector<std::byte>& out) {
@@ -109,7 +115,6 @@ bool Stream::next_frame(std::int64_t now_ns, std::vector<std::byte>& out) {
     begin_pass();
     if (!opened_) return false;
   }
-  frame_next_ = false;
   write_frame(now_ns, out);
   return true;
 }

@@ -63,7 +63,7 @@ class Stream {
   };
 
   void write_hello(std::int64_t now_ns, std::vector<std::byte>& out);
-  bool next_records(std::vector<std::byte>& out);
+  bool next_records(RecordBatches& ring, std::vector<std::byte>& out);
   bool next_frame(std::int64_t now_ns, std::vector<std::byte>& out);
   void begin_pass();
   void write_frame(std::int64_t now_ns, std::vector<std::byte>& out);
@@ -73,7 +73,11 @@ class Stream {
   RunSnapshot& snapshot_;
   std::uint32_t flags_;
   std::uint64_t session_;
-  bool greeted_ = false, ended_ = false, pass_due_ = false, opened_ = false, frame_next_ = false;
+  bool greeted_ = false, ended_ = false, pass_due_ = false, opened_ = false;
+  // Ticks, dirty boxes, a frame: by turns, so that none keeps the others from a link that is slower
+  // than it alone.
+  static constexpr int kTurns = 3;
+  int turn_ = 0;
 
   std::vector<std::uint64_t> held_;     // version by block, 0: none
   std::vector<std::uint32_t> waiting_;  // for the next pass
@@ -83,6 +87,8 @@ class Stream {
   Tick pass_tick_ = 0;
   std::int64_t pass_taken_ns_ = 0, slot_ns_ = 0;
   std::uint64_t frame_ = 0, set_hash_ = 0;
+
+  double record_bytes_ = 0;  // that records may take yet, while a pass is under way
 
   LinkRate link_;
   PackChoice pack_choice_;

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "bridge/net/host_names.hpp"
+
+#include <array>
+#include <utility>
+
+#include <arpa/inet.h>
+#include <ifaddrs.h>
+#include <netinet/in.h>
+#include <unistd.h>
+
+namespace kerf::bridge {
+namespace {
+
+/// Empty for what is neither IPv4 nor an IPv6 address that is reached without naming an interface.
+std::string text_of(const sockaddr* address) {
+  std::array<char, INET6_ADDRSTRLEN> text{};
+  if (address == nullptr) return {};
+  if (address->sa_family == AF_INET) {
+    const auto* const v4 = reinterpret_cast<const sockaddr_in*>(address);
+    inet_ntop(AF_INET, &v4->sin_addr, text.data(), text.size());
+  } else if (address->sa_family == AF_INET6) {
+    const auto* const v6 = reinterpret_cast<const sockaddr_in6*>(address);
+    if (IN6_IS_ADDR_LINKLOCAL(&v6->sin6_addr)) return {};
+    inet_ntop(AF_INET6, &v6->sin6_addr, text.data(), text.size());
+  }
+  return text.data();
+}
+
+}  // namespace
+
+std::string machine_name() {
+  std::array<char, 256> name{};
+  return gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "";
+}
+
+std::vector<std::string> own_addresses() {
+  std::vector<std::string> out;
+  ifaddrs* all = nullptr;
+  if (getifaddrs(&all) != 0) return out;
+  for (const ifaddrs* one = all; one != nullptr; one = one->ifa_next) {
+    std::string text = text_of(one->ifa_addr);
+    if (!text.empty()) out.push_back(std::move(text));
+  }
+  freeifaddrs(all);
+  return out;
+}
+
+std::vector<std::string> own_hosts() {
+  std::vector<std::string> out;
+  if (const std::string name = machine_name(); !name.empty()) out = {name, name + ".local"};
+  out.emplace_back("localhost");
+  for (std::string& address : own_addresses()) out.push_back(std::move(address));
+  return out;
+}
+
+}  // namespace kerf::bridge

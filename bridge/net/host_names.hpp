@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace kerf::bridge {
+
+/// This machine's name; empty where it has none.
+[[nodiscard]] std::string machine_name();
+
+/// Its addresses that others may reach and loopback's: IPv4 and global IPv6, as text.
+[[nodiscard]] std::vector<std::string> own_addresses();
+
+/// Name, name.local, localhost and addresses: by what a browser may call it.
+[[nodiscard]] std::vector<std::string> own_hosts();
+
+}  // namespace kerf::bridge

@@ -1,0 +1,269 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <array>
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <doctest/doctest.h>
+
+#include "bridge/net/bridge_error.hpp"
+#include "bridge/wire/messages.hpp"
+#include "tests/bridge/server_bench.hpp"
+
+using namespace kerf;
+using namespace kerf::bridge;
+using namespace kerf::test;
+
+namespace {
+
+bool has(const std::string& answer, const std::string& part) {
+  return answer.find(part) != std::string::npos;
+}
+
+/// What the server says when it closes this connection.
+int code_of(RawClient& client) {
+  while (client.message()) {
+  }
+  return client.close_code;
+}
+
+}  // namespace
+
+TEST_CASE("a viewer holds the volume, and what is cut while it looks") {
+  TestController controller;
+  const TestBridge bridge;
+  TestViewer viewer(bridge.port());
+  CHECK(has(viewer.answer, "101 "));
+  REQUIRE(viewer.until_whole());
+  CHECK(viewer.far.volume(0) == controller.volume.density);
+  CHECK(viewer.far.hello->head.flags == 0);
+  for (Tick tick = 1; tick <= 50; ++tick) {
+    cut_and_publish(controller.writer, controller.volume, tick, {{3, 3, 3}, {20, 9, 8}});
+  }
+  REQUIRE(viewer.follow([&] { return viewer.far.last.tick == 50 && viewer.far.is_whole(); }));
+  CHECK(viewer.far.volume(0) == controller.volume.density);
+  REQUIRE(viewer.follow([&] { return !viewer.far.ticks.empty(); }));
+  CHECK(viewer.far.ticks.back().tick == 50);
+}
+
+TEST_CASE("a bridge waits for its controller, and greets anew where another one starts") {
+  const TestBridge bridge;
+  TestViewer viewer(bridge.port());
+  CHECK(has(viewer.answer, "101 "));
+  auto first = std::make_unique<TestController>(1);
+  REQUIRE(viewer.until_whole());
+  CHECK(viewer.far.volume(0) == first->volume.density);
+  first.reset();
+  REQUIRE(viewer.follow([&] { return (viewer.far.last.flags & kRunEnded) != 0; }));
+  const TestController second(2);
+  REQUIRE(viewer.follow([&] {
+    return viewer.far.hello->head.session == second.writer.session_id() && viewer.far.passes > 0;
+  }));
+  CHECK(viewer.far.volume(0) == second.volume.density);
+}
+
+TEST_CASE("a page needs a token, once; then a cookie that no script sees") {
+  const TestBridge bridge;
+  RawClient client(bridge.port());
+  CHECK(has(client.ask("/"), "401 "));
+  CHECK(has(client.ask("/?token=wrong"), "401 "));
+  CHECK(has(client.ask("/?token="), "401 "));
+  const std::string page = client.ask("/?token=" + kLook);
+  CHECK(has(page, "200 OK"));
+  CHECK(has(page, "Content-Security-Policy: default-src 'none'"));
+  CHECK(has(page, "HttpOnly; SameSite=Strict"));
+  const std::string cookie = "kerf" + std::to_string(bridge.port()) + "=" + kLook;
+  CHECK(has(page, cookie));
+  CHECK(has(client.ask("/index.html", "Cookie: other=1; " + cookie + "\r\n"), "200 OK"));
+  CHECK(has(client.ask("/", "Cookie: x" + cookie + "\r\n"), "401 "));
+  CHECK(has(client.ask("/secret?token=" + kLook), "404 "));
+  CHECK(has(client.ask("/../etc/passwd?token=" + kLook), "404 "));
+  const std::string head = client.ask("/?token=" + kLook, "", "HEAD");
+  CHECK(has(head, "200 OK"));
+  CHECK(head.ends_with("\r\n\r\n"));
+}
+
+TEST_CASE("another method, another host and no HTTP are refused") {
+  const TestBridge bridge;
+  const auto ask = [&bridge](const std::string& head, const std::string& method = "GET") {
+    return RawClient(bridge.port()).ask("/?token=" + kLook, head, method);
+  };
+  CHECK(has(ask("", "POST"), "405 "));
+  CHECK(has(ask("", "DELETE"), "405 "));
+  CHECK(has(ask("Host: evil.example\r\n"), "421 "));
+  CHECK(has(ask("Host: 127.0.0.1.evil.example:7400\r\n"), "421 "));
+  CHECK(has(ask("Host: \r\n"), "421 "));
+  CHECK(has(ask("Host: localhost:7400\r\n"), "200 OK"));
+  CHECK(has(ask("Host: [::1]:7400\r\n"), "200 OK"));
+  CHECK(has(ask("Content-Length: 5\r\n"), "400 "));
+  CHECK(has(ask("X: " + std::string(9000, 'x') + "\r\n"), "400 "));
+  RawClient garbage(bridge.port());
+  garbage.send_bytes(std::string("\x16\x03\x01\0\xff\r\n\r\n", 9));
+  CHECK(has(garbage.receive(4096), "400 "));
+}
+
+TEST_CASE("a page from elsewhere cannot open the socket, and who has no token is told so") {
+  const TestController controller;
+  const TestBridge bridge;
+  const std::string own = "127.0.0.1:" + std::to_string(bridge.port());
+  const std::string host = "Host: " + own + "\r\n";
+  const auto open = [&](const std::string& origin) {
+    return RawClient(bridge.port())
+        .upgrade("/bridge?token=" + kLook, host + "Origin: " + origin + "\r\n");
+  };
+  CHECK(has(open("http://" + own), "101 "));
+  CHECK(has(open("https://" + own), "403 "));
+  CHECK(has(open("http://evil.example"), "403 "));
+  CHECK(has(open("null"), "403 "));
+  RawClient wrong(bridge.port());
+  CHECK(has(wrong.upgrade("/bridge?token=" + kLook + "x"), "101 "));
+  CHECK(code_of(wrong) == static_cast<int>(CloseCode::no_token));
+  RawClient none(bridge.port());
+  none.upgrade("/bridge");
+  CHECK(code_of(none) == static_cast<int>(CloseCode::no_token));
+  RawClient cookie(bridge.port());
+  cookie.upgrade("/bridge", "Cookie: kerf" + std::to_string(bridge.port()) + "=" + kLook + "\r\n");
+  CHECK(cookie.message().has_value());
+}
+
+TEST_CASE("what a viewer may not say ends its connection and no other") {
+  const TestController controller;
+  const TestBridge bridge;
+  TestViewer good(bridge.port());
+  REQUIRE(good.until_whole());
+  const auto ends = [&](auto&& misbehave) {
+    TestViewer bad(bridge.port());
+    misbehave(bad.client);
+    return code_of(bad.client);
+  };
+  const int not_understood = static_cast<int>(CloseCode::not_understood);
+  const std::array<std::byte, 300> zeros{};
+  CHECK(ends([&](RawClient& c) { c.send_frame(2, std::span(zeros).first(24)); }) == not_understood);
+  CHECK(ends([&](RawClient& c) { c.send_frame(2, {}); }) == not_understood);
+  CHECK(ends([&](RawClient& c) { c.send_frame(1, std::span(zeros).first(24)); }) == not_understood);
+  CHECK(ends([&](RawClient& c) { c.send_frame(2, zeros); }) == 1009);  // too big
+  CHECK(ends([&](RawClient& c) { c.send_frame(3, {}); }) == 1002);     // no such frame
+  CHECK(ends([&](RawClient& c) {
+          for (int i = 0; i < 400 && c.send_frame(9, {}); ++i) {
+          }
+        }) == not_understood);
+  CHECK(ends([&](RawClient& c) {
+          for (int i = 0; i < 400 && c.send_value(AckMessage{kAckMagic, 0, 1, 0}); ++i) {
+          }
+        }) == not_understood);
+  CHECK(ends([&](RawClient& c) {  // a message that never ends
+          for (int i = 0; i < 400 && c.send_frame(i == 0 ? 2 : 0, std::span(zeros).first(8), false);
+               ++i) {
+          }
+        }) == 1009);
+  CHECK(good.follow([&, frames = good.far.frames] { return good.far.frames > frames + 5; }));
+}
+
+TEST_CASE("a viewer that acknowledges nothing is dropped, and no other") {
+  const TestController controller;
+  ServerSetup setup;
+  setup.silence_ns = 200'000'000;
+  const TestBridge bridge(setup);
+  TestViewer good(bridge.port());
+  TestViewer silent(bridge.port());
+  REQUIRE(good.until_whole());
+  good.follow([&, frames = good.far.frames] { return good.far.frames > frames + 30; });
+  CHECK(code_of(silent.client) == static_cast<int>(CloseCode::too_slow));
+  CHECK(good.follow([&, frames = good.far.frames] { return good.far.frames > frames + 5; }));
+}
+
+TEST_CASE("there are as many viewers as are allowed") {
+  const TestController controller;
+  ServerSetup setup;
+  setup.max_viewers = 2;
+  const TestBridge bridge(setup);
+  auto first = std::make_unique<TestViewer>(bridge.port());
+  TestViewer second(bridge.port());
+  REQUIRE(first->until_whole());
+  REQUIRE(second.until_whole());
+  TestViewer third(bridge.port());
+  CHECK(code_of(third.client) == static_cast<int>(CloseCode::too_many));
+  first.reset();
+  for (int i = 0; i < 100; ++i) {  // until it has seen that the first one has gone
+    TestViewer fourth(bridge.port());
+    if (fourth.until_whole()) return;
+  }
+  FAIL("no place became free");
+}
+
+TEST_CASE("only who may command reaches the controller, and with what is valid") {
+  TestController controller;
+  const TestBridge bridge;
+  const auto say = [&](TestViewer& viewer, CommandKind kind, std::uint32_t argument) {
+    const std::size_t before = viewer.far.replies.size();
+    viewer.client.send_value(
+        CommandMessage{kCommandMagic, static_cast<std::uint32_t>(kind), argument, 40 + argument});
+    REQUIRE(viewer.follow([&] { return viewer.far.replies.size() > before; }));
+    CHECK(viewer.far.replies.back().sequence == 40 + argument);
+    return static_cast<ReplyStatus>(viewer.far.replies.back().status);
+  };
+  TestViewer looker(bridge.port());
+  REQUIRE(looker.until_whole());
+  CHECK(say(looker, CommandKind::hold, 1) == ReplyStatus::refused);
+  CHECK(!controller.server.take_command().has_value());
+  TestViewer teacher(bridge.port(), kCommand);
+  REQUIRE(teacher.until_whole());
+  CHECK(teacher.far.hello->head.flags == kMayCommand);
+  CHECK(say(teacher, CommandKind::select_tool, 1) == ReplyStatus::accepted);
+  const std::optional<Command> taken = controller.server.take_command();
+  REQUIRE(taken.has_value());
+  CHECK(taken->kind == CommandKind::select_tool);
+  CHECK(taken->argument == 1);
+  CHECK(say(teacher, CommandKind::select_tool, 2) == ReplyStatus::refused);
+  CHECK(say(teacher, static_cast<CommandKind>(99), 0) == ReplyStatus::refused);
+}
+
+TEST_CASE("connections that say nothing, or one letter a second, end by themselves") {
+  const TestController controller;
+  ServerSetup setup;
+  setup.handshake_ns = 300'000'000;
+  const TestBridge bridge(setup);
+  TestViewer good(bridge.port());
+  REQUIRE(good.until_whole());
+  std::vector<std::unique_ptr<RawClient>> crowd;
+  for (int i = 0; i < 300; ++i) {
+    crowd.push_back(std::make_unique<RawClient>(bridge.port()));
+    if (i % 2 == 0) crowd.back()->send_bytes("GET / HT");
+  }
+  for (int i = 0; i < 12; ++i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    crowd.back()->send_bytes("T");
+    CHECK(good.follow([&, frames = good.far.frames] { return good.far.frames > frames; }));
+  }
+  for (const auto& one : crowd) CHECK(!has(one->receive(4096), "200"));
+  CHECK(has(RawClient(bridge.port()).ask("/?token=" + kLook), "200 OK"));
+}
+
+TEST_CASE("a port that is taken and an address of nobody are told in one line") {
+  const TestBridge bridge;
+  ServerSetup setup;
+  setup.name = "bridge-test";
+  setup.port = bridge.port();
+  const auto why = [](const ServerSetup& refused) -> std::string {
+    try {
+      const Server server(refused);
+    } catch (const BridgeError& error) {
+      return error.what();
+    }
+    return "";
+  };
+  CHECK(has(why(setup), "another program has it"));
+  setup.port = 0;
+  setup.host = "192.0.2.1";
+  CHECK(has(why(setup), "TLS only"));
+  setup.tls = self_signed_keys({"localhost"});
+  CHECK(has(why(setup), "give an address of this machine"));
+  setup.host = "no such host";
+  CHECK(has(why(setup), "give an address of this machine"));
+}
