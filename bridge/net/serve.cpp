@@ -9,11 +9,6 @@
 #include <utility>
 #include <vector>
 
-#include <arpa/inet.h>
-#include <ifaddrs.h>
-#include <netinet/in.h>
-#include <unistd.h>
-
 #include "bridge/igtl/igtl_output.hpp"
 #include "bridge/net/bridge_error.hpp"
 #include "bridge/net/host_names.hpp"
@@ -100,7 +95,6 @@ int run_serve(const ServeOptions& options, const std::atomic<bool>& stop) {
     setup.tls = load_tls_keys(options.identity);
   } else if (!is_loopback(at.host)) {
     setup.tls = self_signed_keys(own_hosts());
-    std::cout << "certificate, self-signed, SHA-256 " << setup.tls->fingerprint << '\n';
   }
   if (setup.tls) {
     setup.host_names.insert(setup.host_names.end(), setup.tls->names.begin(),
@@ -113,6 +107,9 @@ int run_serve(const ServeOptions& options, const std::atomic<bool>& stop) {
     slicer.emplace(IgtlOptions{.host = at.host, .port = port, .name = options.name});
     std::cout << "OpenIGTLink, for whoever reaches it, "
               << options.listen.substr(0, options.listen.rfind(':')) << ':' << port << '\n';
+  }
+  if (setup.tls && options.identity.empty()) {
+    std::cout << "certificate, self-signed, SHA-256 " << setup.tls->fingerprint << '\n';
   }
   print_addresses(setup, server.port(), options.qr);
   server.run(stop);

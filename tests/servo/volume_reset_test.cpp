@@ -273,10 +273,10 @@ TEST_CASE("of several volumes each is restored, and what is no solid stays") {
     Groove groove(scene);
     LoadedScene fresh_scene = scene;
     const ArmedServo fresh(fresh_scene);
-    for (const std::size_t v : {1, 2})
+    for (const std::size_t v : {std::size_t{1}, std::size_t{2}})
       CHECK(groove.hash(v) != density_hash(fresh.servo->density(v)));
     CHECK(groove.reset() > 1);
-    for (const std::size_t v : {0, 1, 2}) {
+    for (std::size_t v = 0; v < 3; ++v) {
       CHECK(groove.after_reset[v] == density_hash(fresh.servo->density(v)));
     }
   }
