@@ -39,7 +39,7 @@ void Stream::note_changes() {
 }
 
 void Stream::slot(std::int64_t now_ns, bool ended) {
-  std::uint64_t records = kMessagesPerSlot * (kMaxRawBytes / sizeof(TickRecord));
+  std::uint64_t records = kSlotsBehind * kSlotNs / snapshot_.reader().info().tick_ns;
   const double rate = link_.bytes_per_s();
   if (in_pass() && rate > 0) {
     record_bytes_ += kRecordShare * rate * static_cast<double>(now_ns - slot_ns_) * 1e-9;

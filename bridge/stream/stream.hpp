@@ -29,8 +29,9 @@ class Stream {
   /// Of the delivered bytes. A quarter is a state every 4 ms on 4 Mbit/s, and lets a pass take a
   /// third longer at most.
   static constexpr double kRecordShare = 0.25;
-  /// Messages of records per slot and ring: 132 states, enough for a servo of 7.9 kHz.
-  static constexpr std::uint64_t kMessagesPerSlot = 4;
+  /// The bridge may be late by so many slots (133 ms), and all records still go; a link that falls
+  /// further behind gets fewer, so that those it gets are new.
+  static constexpr std::uint64_t kSlotsBehind = 8;
 
   /// `flags` of the greeting.
   Stream(RunSnapshot& snapshot, std::uint32_t flags);

@@ -243,6 +243,32 @@ TEST_CASE("a fast link carries every record, from the newest at the start on") {
   CHECK(far.widest_stride == 1);
 }
 
+TEST_CASE("a servo of 8 kHz loses no record, though the bridge is late by a few slots") {
+  NoiseVolume volume({1, 1, 1});  // and a scene without text
+  SegmentSpec spec = spec_of(volume);
+  spec.scene_json.clear();
+  spec.tick_ns = 125'000;
+  SegmentWriter writer = SegmentWriter::create(spec);
+  const SegmentReader reader = SegmentReader::map(writer.fd());
+  RunSnapshot snapshot(reader);
+  Stream stream(snapshot, 0);
+  FarSide far;
+  std::int64_t now_ns = 1;
+  Tick tick = 0;
+  for (const int slots : {1, 1, 5, 1, 8, 1}) {
+    for (int k = 0; k < 133 * slots; ++k) cut_and_publish(writer, volume, ++tick, {{}, {1, 1, 1}});
+    now_ns += slots * kSlotNs;
+    snapshot.update(now_ns, false);
+    stream.note_changes();
+    stream.slot(now_ns, false);
+    drain(stream, far, now_ns);
+  }
+  CHECK(far.volume(0) == volume.density);
+  CHECK(far.widest_stride == 1);
+  CHECK(far.ticks.back().tick == tick);
+  CHECK(far.ticks.size() == 1 + tick - far.ticks.front().tick);
+}
+
 TEST_CASE("a link of 4 Mbit/s gives records a quarter, thinned, and always the newest") {
   Bench bench(NoiseVolume({200, 200, 200}));
   Stream stream(bench.snapshot, 0);
