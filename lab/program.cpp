@@ -35,9 +35,9 @@ int run_lab(int argc, const char* const* argv, std::ostream& out, std::ostream& 
   const sweep::Command sweep(app);
   const zwidth::Command zwidth(app);
   const zwidth::MergeCommand merge(app);
-  const std::array<const LabCommand*, 11> commands{&bench,    &accuracy, &bridge, &energy,
-                                                   &extremes, &faults,   &laws,   &ranges,
-                                                   &sweep,    &zwidth,   &merge};
+  const std::array<const LabCommand*, 12> commands{&bench,  &accuracy, &bridge, &demo,
+                                                   &energy, &extremes, &faults, &laws,
+                                                   &ranges, &sweep,    &zwidth, &merge};
   try {
     if (!app.parse(argc, argv, out)) return 0;
     for (const LabCommand* command : commands) {
