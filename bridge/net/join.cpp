@@ -150,7 +150,9 @@ class Joiner {
       in.clear();
       boost::system::error_code error;
       co_await stream.async_read(in, asio::redirect_error(use_awaitable, error));
-      if (error == websocket::error::closed) throw_closed(stream.reason().code);
+      // A reason that came counts, however the connection ended after it.
+      const unsigned reason = stream.reason().code;
+      if (error && reason != websocket::close_code::none) throw_closed(reason);
       if (error) throw boost::system::system_error(error);
       heard_ns_ = monotonic_ns();
       const std::span message(static_cast<const std::byte*>(in.data().data()), in.size());
@@ -204,6 +206,7 @@ class Joiner {
   [[noreturn]] void throw_no_welcome(const boost::system::error_code& error,
                                      unsigned status) const {
     if (error != websocket::error::upgrade_declined) throw boost::system::system_error(error);
+    if (status == 400) throw Hopeless("takes no unencrypted viewers; take wss://");
     if (status == 404) throw Hopeless("no kerf-bridge serve answers; take its port");
     if (status == 421) {
       throw Hopeless("does not know itself by this name; take the address it prints");
