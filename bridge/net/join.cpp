@@ -88,10 +88,10 @@ class Joiner {
     if (age_.count() != 0) {
       say(format(
           "age of the picture p50 %.1f, p99 %.1f, max %.1f ms; %llu states, joined %u times, "
-          "%llu packets repaired",
+          "%llu packets waited for a lost one",
           age_.percentile_us(0.5) / 1e3, age_.percentile_us(0.99) / 1e3, age_.max_us() / 1e3,
           static_cast<unsigned long long>(mirror_.passes()), joins_,
-          static_cast<unsigned long long>(repaired_)));
+          static_cast<unsigned long long>(waited_)));
     }
     return 0;
   }
@@ -246,7 +246,7 @@ class Joiner {
         const AckMessage ack = mirror_.frame(message, heard_ns_, figures.least_round_trip_ns);
         if (!joined && mirror_.joined()) tell_joined();
         if (!ended && mirror_.ended()) say("the run has ended; waiting for the next");
-        repaired_ += figures.out_of_order - std::exchange(repaired_here_, figures.out_of_order);
+        waited_ += figures.out_of_order - std::exchange(waited_here_, figures.out_of_order);
         return ack;
       }
       case kRecordsMagic:
@@ -312,8 +312,8 @@ class Joiner {
   std::int64_t heard_ns_ = 0, since_ns_ = 0;
   std::string why_closed_, last_reason_;
   unsigned joins_ = 0;
-  std::uint32_t repaired_here_ = 0;
-  std::uint64_t repaired_ = 0;
+  std::uint32_t waited_here_ = 0;
+  std::uint64_t waited_ = 0;
   Histogram age_;
 };
 

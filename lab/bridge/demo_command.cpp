@@ -117,7 +117,8 @@ class Demo {
     visualizer_ = networks_.start(Side::far, words, at("visualizer.log"));
     wait_for(*visualizer_, seconds(40), [&] { return std::filesystem::exists(at("attached")); });
     if (!std::filesystem::exists(at("attached"))) {
-      throw HilError(visualizer_->last_line() + " (join: " + join_->last_line() + ")");
+      const std::string words = visualizer_->last_line();
+      throw HilError(words.empty() ? join_->last_line() : words);
     }
   }
 
