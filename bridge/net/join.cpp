@@ -137,6 +137,7 @@ class Joiner {
   asio::awaitable<void> follow(Stream stream) {
     why_closed_.clear();
     greeted_ = false;
+    waited_here_ = 0;
     heard_ns_ = monotonic_ns();
     beast::tcp_stream& link = beast::get_lowest_layer(stream);
     struct Watched {  // the watch may close it while it lives
