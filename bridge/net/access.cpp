@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cctype>
 #include <cerrno>
+#include <cstring>
 #include <fstream>
 
 #include <arpa/inet.h>
@@ -13,7 +14,6 @@
 #include <sys/stat.h>
 
 #include "bridge/net/bridge_error.hpp"
-#include "shared/posix/new_file.hpp"
 
 namespace kerf::bridge {
 namespace {
@@ -62,7 +62,7 @@ void Tokens::add_file(const std::filesystem::path& file, const char* option, Rig
   const std::string place = std::string(option) + " " + file.string() + ": ";
   struct stat status {};
   if (stat(file.c_str(), &status) != 0) {
-    throw BridgeError(place + not_written(errno) + "; write one token a line into it");
+    throw BridgeError(place + std::strerror(errno) + "; write one token a line into it");
   }
   if ((status.st_mode & (S_IRWXG | S_IRWXO)) != 0) {
     throw BridgeError(place + "is open to other users; chmod 600 it");

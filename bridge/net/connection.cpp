@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <chrono>
+#include <iostream>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -12,6 +13,7 @@
 #include "bridge/net/replies.hpp"
 #include "bridge/net/server_impl.hpp"
 #include "bridge/page/page_files.hpp"
+#include "shared/posix/monotonic_clock.hpp"
 
 namespace kerf::bridge {
 namespace {
@@ -95,6 +97,15 @@ std::string Server::Impl::page_text(const Request& request, Right right) const {
   return http_text(reply);
 }
 
+void Server::Impl::say_refused(const Link& link) {
+  const std::int64_t now_ns = monotonic_ns();
+  if (now_ns - refused_ns_ < kNsPerSecond) return;
+  refused_ns_ = now_ns;
+  ErrorCode error;
+  std::cerr << "kerf-bridge: a wrong token from "
+            << link.next_layer().socket().remote_endpoint(error).address() << '\n';
+}
+
 asio::awaitable<void> Server::Impl::refuse(Link& link, int status, std::string_view why,
                                            bool head_only) {
   ErrorCode error;
@@ -135,13 +146,13 @@ asio::awaitable<void> Server::Impl::talk_http(std::unique_ptr<WebSocket> ws, bea
     const bool gave_token = !query_value(text(request.target()), "token").empty();
     if (right == Right::none && gave_token) {
       // The place is held meanwhile, so who guesses gets 32 answers a second at most.
+      say_refused(link);
       asio::steady_timer wait(io_, std::chrono::nanoseconds(setup_.wrong_token_ns));
       co_await wait.async_wait(quiet(error));
     }
     if (upgrade && path_of(text(request.target())) == kBridgePath) {
       const Request upgrade_request = parser.release();
-      place.release();
-      co_return co_await view(std::move(ws), upgrade_request, right);
+      co_return co_await view(std::move(ws), upgrade_request, right, place);
     }
     const std::string reply = page_text(request, right);
     more = request.keep_alive();

@@ -87,13 +87,15 @@ int run_serve(const ServeOptions& options, const std::atomic<bool>& stop) {
     setup.tls = load_tls_keys(options.identity);
   } else if (!is_loopback(at.host)) {
     setup.tls = self_signed_keys(own_hosts());
-    std::cout << "certificate, self-signed, SHA-256 " << setup.tls->fingerprint << '\n';
   }
   if (setup.tls) {
     setup.host_names.insert(setup.host_names.end(), setup.tls->names.begin(),
                             setup.tls->names.end());
   }
   Server server(setup);
+  if (setup.tls && options.identity.empty()) {
+    std::cout << "certificate, self-signed, SHA-256 " << setup.tls->fingerprint << '\n';
+  }
   print_addresses(setup, server.port());
   server.run(stop);
   return 0;

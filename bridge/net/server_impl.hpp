@@ -10,7 +10,7 @@
 #include <optional>
 #include <span>
 #include <string>
-#include <utility>  // before Boost 1.74's awaitable.hpp, which needs it
+#include <utility>  // before Boost 1.74's awaitable, which needs it
 
 #include <boost/asio/awaitable.hpp>
 #include <boost/asio/io_context.hpp>
@@ -75,11 +75,13 @@ class Server::Impl {
   Void handshake(WebSocket& ws, beast::flat_buffer& in, bool& done);
   Void talk_http(std::unique_ptr<WebSocket> ws, beast::flat_buffer& in, HandshakePlace& place);
   Void refuse(Link& link, int status, std::string_view text, bool head_only);
+  void say_refused(const Link& link);
   [[nodiscard]] Right right_of(const Request& request) const;
   [[nodiscard]] std::string page_text(const Request& request, Right right) const;
 
   // viewer.cpp
-  Void view(std::unique_ptr<WebSocket> ws, const Request& request, Right right);
+  Void view(std::unique_ptr<WebSocket> ws, const Request& request, Right right,
+            HandshakePlace& place);
   Void read_viewer(std::shared_ptr<Viewer> viewer);
   Void write_viewer(std::shared_ptr<Viewer> viewer);
   [[nodiscard]] bool obey(const std::shared_ptr<Viewer>& viewer,
@@ -103,7 +105,7 @@ class Server::Impl {
   std::unique_ptr<RunSnapshot> snapshot_;
   std::optional<SegmentConnection> command_link_;  // of `helper_` alone
   bool connecting_ = false;
-  std::int64_t next_try_ns_ = 0, bbr_restarted_ns_ = 0;
+  std::int64_t next_try_ns_ = 0, bbr_restarted_ns_ = 0, refused_ns_ = 0;
   std::string said_;
 
   std::list<std::shared_ptr<Viewer>> viewers_;

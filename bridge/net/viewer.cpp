@@ -40,7 +40,7 @@ std::string_view words(CloseCode code) {
 }  // namespace
 
 asio::awaitable<void> Server::Impl::view(std::unique_ptr<WebSocket> ws, const Request& request,
-                                         Right right) {
+                                         Right right, HandshakePlace& place) {
   auto& tcp_stream = ws->next_layer().next_layer();
   tcp_stream.expires_after(std::chrono::nanoseconds(setup_.handshake_ns));
   ws->read_message_max(kMaxUpBytes);
@@ -61,6 +61,7 @@ asio::awaitable<void> Server::Impl::view(std::unique_ptr<WebSocket> ws, const Re
     viewer->ws->next_layer().next_layer().expires_after(std::chrono::nanoseconds(kGoodbyeNs));
     co_return co_await write_viewer(viewer);
   }
+  place.release();
   viewer->may_say = kMaySay;
   viewer->ws->control_callback([watched = viewer.get()](websocket::frame_type, beast::string_view) {
     if (--watched->may_say < 0) drop(*watched, CloseCode::not_understood);

@@ -62,6 +62,7 @@ void RunSnapshot::update(std::int64_t now_ns, bool writer_gone) {
     if (!whole_) continue;
     // An odd epoch was cut short: the tick before it is the last that was complete.
     tick_ = tick_of_version(epoch - epoch % 2);
+    if (taken_ns_ == 0) reader_.forget_pages();  // once all has been read
     taken_ns_ = now_ns;
   }
 }

@@ -249,4 +249,8 @@ std::uint64_t SegmentReader::read_brick(std::size_t volume, std::uint32_t id,
                     bytes_.data() + info.off_bricks + std::size_t{id} * sizeof(Brick), out);
 }
 
+void SegmentReader::forget_pages() const noexcept {
+  madvise(bytes_.data(), bytes_.size(), MADV_DONTNEED);
+}
+
 }  // namespace kerf

@@ -123,6 +123,9 @@ class SegmentReader {
   /// writer was busy with it in all of 64 tries: `out` then holds anything.
   [[nodiscard]] std::uint64_t read_brick(std::size_t volume, std::uint32_t id,
                                          std::span<Density, kBrickVoxels> out) const noexcept;
+  /// What was read so far counts as memory of this process, though it is the controller's: from now
+  /// on only what is read again does.
+  void forget_pages() const noexcept;
 
  private:
   SegmentReader(std::span<std::byte> bytes, SegmentInfo info) noexcept;
