@@ -6,14 +6,20 @@
 namespace kerf {
 
 Recorder::Recorder(const SegmentReader& reader, TickLogWriter& log) : reader_(reader), log_(log) {
-  const std::uint64_t head = reader.state_head();
-  const std::uint64_t slots = reader.info().state_slots;
-  next_ = missed_before_start_ = head > slots ? head - slots : 0;
+  next_ = oldest();
+  // Of another machine's run a segment may hold less than its ring could.
+  TickRecord record;
+  while (reader.state_at(next_, record) == ReadState::overrun) ++next_;
+  missed_before_start_ = next_;
+}
+
+std::uint64_t Recorder::oldest() const noexcept {
+  const std::uint64_t head = reader_.state_head();
+  return head - std::min<std::uint64_t>(head, reader_.info().state_slots);
 }
 
 std::uint64_t Recorder::poll() {
   const std::uint64_t head = reader_.state_head();
-  const std::uint64_t slots = reader_.info().state_slots;
   const std::uint64_t before = log_.rows();
   largest_lag_ = std::max(largest_lag_, head - std::min(next_, head));
   TickRecord record;
@@ -25,7 +31,7 @@ std::uint64_t Recorder::poll() {
       ++next_;
     } else {
       // The oldest record may be overwritten as we look: then the next round skips on.
-      skip_to(std::max(next_ + 1, reader_.state_head() - slots));
+      skip_to(std::max(next_ + 1, oldest()));
     }
   }
   log_.flush();

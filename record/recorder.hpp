@@ -40,6 +40,8 @@ class Recorder {
 
  private:
   void skip_to(std::uint64_t index);
+  /// The first index that the ring has room for.
+  [[nodiscard]] std::uint64_t oldest() const noexcept;
 
   const SegmentReader& reader_;
   TickLogWriter& log_;

@@ -7,6 +7,7 @@
 #include <cstdint>
 
 #include "bridge/net/bridge_error.hpp"
+#include "shared/text/words.hpp"
 
 namespace kerf::bridge {
 namespace {
@@ -46,10 +47,9 @@ std::string BridgeAddress::host_and_port() const {
 
 BridgeAddress parse_address(std::string_view text) {
   const auto refuse = [text](const std::string& way_out) {
-    // The token is a secret, and the rest may be long.
-    return BridgeError(
-        "join: " + std::string(text.substr(0, std::min<std::size_t>(text.find('?'), 80))) + ": " +
-        way_out);
+    // The token is a secret, and the rest may be long or hold line ends.
+    const std::size_t shown = std::min<std::size_t>(text.find('?'), 80);
+    return BridgeError(one_line("join: " + std::string(text.substr(0, shown)) + ": " + way_out));
   };
   constexpr const char* kForm = "not wss://HOST:PORT/?token=TOKEN; take what serve prints";
   BridgeAddress out;

@@ -88,10 +88,10 @@ class Joiner {
     if (age_.count() != 0) {
       say(format(
           "age of the picture p50 %.1f, p99 %.1f, max %.1f ms; %llu states, joined %u times, "
-          "%llu packets repaired",
+          "%llu packets waited for a lost one",
           age_.percentile_us(0.5) / 1e3, age_.percentile_us(0.99) / 1e3, age_.max_us() / 1e3,
           static_cast<unsigned long long>(mirror_.passes()), joins_,
-          static_cast<unsigned long long>(repaired_)));
+          static_cast<unsigned long long>(waited_)));
     }
     return 0;
   }
@@ -137,6 +137,7 @@ class Joiner {
   asio::awaitable<void> follow(Stream stream) {
     why_closed_.clear();
     greeted_ = false;
+    waited_here_ = 0;
     heard_ns_ = monotonic_ns();
     beast::tcp_stream& link = beast::get_lowest_layer(stream);
     struct Watched {  // the watch may close it while it lives
@@ -150,7 +151,9 @@ class Joiner {
       in.clear();
       boost::system::error_code error;
       co_await stream.async_read(in, asio::redirect_error(use_awaitable, error));
-      if (error == websocket::error::closed) throw_closed(stream.reason().code);
+      // A reason that came counts, however the connection ended after it.
+      const unsigned reason = stream.reason().code;
+      if (error && reason != websocket::close_code::none) throw_closed(reason);
       if (error) throw boost::system::system_error(error);
       heard_ns_ = monotonic_ns();
       const std::span message(static_cast<const std::byte*>(in.data().data()), in.size());
@@ -204,6 +207,7 @@ class Joiner {
   [[noreturn]] void throw_no_welcome(const boost::system::error_code& error,
                                      unsigned status) const {
     if (error != websocket::error::upgrade_declined) throw boost::system::system_error(error);
+    if (status == 400) throw Hopeless("takes no unencrypted viewers; take wss://");
     if (status == 404) throw Hopeless("no kerf-bridge serve answers; take its port");
     if (status == 421) {
       throw Hopeless("does not know itself by this name; take the address it prints");
@@ -243,7 +247,7 @@ class Joiner {
         const AckMessage ack = mirror_.frame(message, heard_ns_, figures.least_round_trip_ns);
         if (!joined && mirror_.joined()) tell_joined();
         if (!ended && mirror_.ended()) say("the run has ended; waiting for the next");
-        repaired_ += figures.out_of_order - std::exchange(repaired_here_, figures.out_of_order);
+        waited_ += figures.out_of_order - std::exchange(waited_here_, figures.out_of_order);
         return ack;
       }
       case kRecordsMagic:
@@ -309,8 +313,8 @@ class Joiner {
   std::int64_t heard_ns_ = 0, since_ns_ = 0;
   std::string why_closed_, last_reason_;
   unsigned joins_ = 0;
-  std::uint32_t repaired_here_ = 0;
-  std::uint64_t repaired_ = 0;
+  std::uint32_t waited_here_ = 0;
+  std::uint64_t waited_ = 0;
   Histogram age_;
 };
 

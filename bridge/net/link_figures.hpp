@@ -8,7 +8,7 @@ namespace kerf::bridge {
 /// What the kernel knows of a TCP connection. glibc's struct ends before these.
 struct LinkFigures {
   std::int64_t least_round_trip_ns = 0;  ///< 0: not known yet
-  std::uint32_t out_of_order = 0;        ///< packets that came behind a gap, which was repaired
+  std::uint32_t out_of_order = 0;        ///< packets that waited for a lost one before them
 };
 
 /// All 0 where the kernel does not tell.

@@ -28,7 +28,7 @@ using Digest = std::array<std::uint8_t, 32>;
     const std::size_t value = std::string_view("0123456789abcdef0123456789ABCDEF").find(c);
     if (value == std::string_view::npos || digits == 64) return std::nullopt;
     std::uint8_t& byte = out.at(digits++ / 2);
-    byte = static_cast<std::uint8_t>(byte << 4 | (value & 15));
+    byte = static_cast<std::uint8_t>(byte << 4 | static_cast<int>(value & 15));
   }
   if (digits != 64) return std::nullopt;
   return out;

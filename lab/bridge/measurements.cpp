@@ -81,7 +81,7 @@ std::vector<Case> quick_cases() {
 
 CaseResult run_case(const Case& what, const BridgeFiles& files, double seconds) {
   Scene scene(what.link, files, what.load, what.layers, what.dedicated_link);
-  FarViewer viewer("far", scene.volume);
+  FarViewer viewer("far", scene.volume), control(BridgePair::kNearName, scene.volume);
   CaseResult out;
   const std::int64_t start_ns = monotonic_ns();
   const auto join = scene.pair.join("far");
@@ -92,8 +92,10 @@ CaseResult run_case(const Case& what, const BridgeFiles& files, double seconds) 
   const std::uint64_t bytes_before = scene.networks.bytes_to_far();
   const std::int64_t from_ns = monotonic_ns();
   viewer.begin_ages();
+  control.begin_ages();
   sleep_s(seconds);
   const Histogram ages = viewer.take_ages();
+  out.near_p99_ms = control.take_ages().percentile_us(0.99) / 1e3;
   const double passed_s = seconds_since(from_ns);
   const ProcessCost serve = cost_of(scene.pair.serve()), joined = cost_of(*join);
   out.age_p50_ms = ages.percentile_us(0.5) / 1e3;

@@ -26,7 +26,8 @@ struct CaseResult {
   bool equal = false;  ///< in the end both segments had the same content
   double join_s = 0;   ///< from the start of the program to the first whole picture
   double age_p50_ms = 0, age_p99_ms = 0, age_max_ms = 0;
-  double link_mbit = 0;  ///< that came out at the far end while ages were taken
+  double near_p99_ms = 0;  ///< of the near segment itself, by the same look: this machine's share
+  double link_mbit = 0;    ///< that came out at the far end while ages were taken
   double serve_cpu_percent = 0, join_cpu_percent = 0;
   double serve_mib = 0, join_mib = 0;
 };

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "record/recorder.hpp"
 
+#include "shared/segment/mirror_writer.hpp"
 #include "tests/record/record_support.hpp"
 
 using namespace kerf;
@@ -68,4 +69,37 @@ TEST_CASE("ticks overwritten before the recorder came are not its loss") {
   CHECK(recorder.missed_before_start() == 7);
   CHECK(recorder.lost() == 0);
   CHECK(log.rows() == kStateSlots);
+}
+
+TEST_CASE("of another machine's run a recorder takes what came, and counts what did not as lost") {
+  VolumeDescriptor volume{};
+  volume.nx = volume.ny = volume.nz = 8;
+  volume.log2_brick = kBrickLog2;
+  volume.bits_per_voxel = 16;
+  volume.bricks_x = volume.bricks_y = volume.bricks_z = volume.brick_count = 1;
+  for (double& mm : volume.spacing_mm) mm = 0.1;
+  volume.orientation[3] = 1;
+  MirrorSpec spec;
+  spec.session_id = 1;
+  spec.tick_ns = 1'000'000;
+  spec.volumes = {volume};
+  MirrorWriter mirror = MirrorWriter::create(spec);
+  const auto come = [&mirror](std::uint64_t index) {
+    mirror.put_record(index, made_up_tick(index + 1, 1000));
+  };
+  come(2000);  // joined long after the start, though the ring has room for more
+  come(2001);
+  const SegmentReader reader = SegmentReader::map(mirror.fd());
+  const TestFolder folder;
+  TickLogWriter log(folder / "ticks.npy");
+  Recorder recorder(reader, log);
+  CHECK(recorder.missed_before_start() == 2000);
+  CHECK(recorder.poll() == 2);
+  come(2002);
+  come(2005);
+  CHECK(recorder.poll() == 2);
+  CHECK(recorder.lost() == 2);
+  REQUIRE(recorder.gaps().size() == 1);
+  CHECK(recorder.gaps()[0].first_index == 2003);
+  CHECK(recorder.gaps()[0].count == 2);
 }

@@ -121,7 +121,7 @@ TEST_CASE("a mirror has all that the other machine's segment has") {
   CHECK(ours.info().volumes[1].material == 4);
   CHECK(std::vector<Label>(ours.labels(0).begin(), ours.labels(0).end()) == tooth.labels);
   CHECK(ours.labels(1).empty());
-  for (const std::size_t v : {0, 1}) {
+  for (const std::size_t v : {0U, 1U}) {
     VolumeSnapshot a, b;
     theirs.update(v, a), ours.update(v, b);
     CHECK(b.density == a.density);
@@ -242,7 +242,7 @@ TEST_CASE("records keep their indices, and what never came reads as lost") {
   CHECK(reader.state_at(1'000'001 - kStateSlots, out) == ReadState::overrun);
   put(1'000'004);
   CHECK(reader.state_at(1'000'000, out) == ReadState::ok);
-  for (const std::uint64_t lost : {1'000'001, 1'000'002, 1'000'003}) {
+  for (const std::uint64_t lost : {1'000'001U, 1'000'002U, 1'000'003U}) {
     CHECK(reader.state_at(lost, out) == ReadState::overrun);
   }
   put(1'000'003);  // too late
