@@ -68,7 +68,7 @@ constexpr SceneKey kKeys[] = {
     {"volume.name", "", at<&VolumeSpec::name>, {},
      "tells it from others in pictures and reports", {}, {.default_text = "the file's"}},
     {"volume.file", "", at<&VolumeSpec::file>, {},
-     "NRRD, MetaImage, NIfTI or a DICOM folder, from the scene's folder; or \"phantom\", a tooth",
+     "NRRD, MetaImage, NIfTI, TIFF, or a folder of DICOM, PNG or TIFF slices, from the scene's folder; or \"phantom\", a tooth",
      {}, {.required_as = "file = \"phantom\" or a path"}},
     {"volume.size", "voxels", at<&VolumeSpec::phantom_size>, between(16, 512),
      "samples of the phantom along x, y and z; the tooth keeps its size",
