@@ -32,11 +32,8 @@ void read_foreign_volume(const std::filesystem::path& path, VolumeKind kind,
       return read_one_file(path, *itk::MetaImageIO::New(), read_meta_header(path), offer);
     case VolumeKind::nifti:
       return read_one_file(path, *itk::NiftiImageIO::New(), read_nifti_header(path), offer);
-    case VolumeKind::tiff: {
-      VolumeHeader header;
-      header.has_spacing = false;  // a TIFF tells none between its pages
-      return read_one_file(path, *itk::TIFFImageIO::New(), header, offer);
-    }
+    case VolumeKind::tiff:
+      return read_one_file(path, *itk::TIFFImageIO::New(), read_tiff_header(path), offer);
     case VolumeKind::dicom_file:
       return read_dicom_file(path, offer);
     case VolumeKind::dicom_series:

@@ -32,6 +32,10 @@ struct VolumeHeader {
 /// neither reports missing bytes nor keeps NaN (it reads them as 0): both are refused here.
 [[nodiscard]] VolumeHeader read_nifti_header(const std::filesystem::path& path);
 
+/// TIFF, classic or big. libtiff takes a file that is cut off for one of fewer pages: the chain of
+/// pages is followed here to its end.
+[[nodiscard]] VolumeHeader read_tiff_header(const std::filesystem::path& path);
+
 /// One line for voxels that are not numbers: how many, and the place of the first.
 [[noreturn]] void refuse_not_finite(const std::filesystem::path& path, std::uint64_t count,
                                     std::uint64_t first_index, std::uint64_t nx, std::uint64_t ny);

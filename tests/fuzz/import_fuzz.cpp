@@ -105,10 +105,14 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   static const Folder folder;
   const std::string_view bytes(reinterpret_cast<const char*>(data), size);
   const bool packed = kEnd == ".nii" && bytes.starts_with("\x1f\x8b");
-  const fs::path path = folder.path / ("a" + std::string(kEnd) + (packed ? ".gz" : ""));
+  const bool slices = kEnd == ".png";  // two of them in a folder
+  const fs::path place = slices ? folder.path / "slices" : folder.path;
+  fs::create_directory(place);
+  const fs::path path = place / ("a" + std::string(kEnd) + (packed ? ".gz" : ""));
   std::ofstream(path, std::ios::binary) << bytes;
+  if (slices) std::ofstream(place / "b.png", std::ios::binary) << bytes;
 
-  const std::string message = read_it(path);
+  const std::string message = read_it(slices ? place : path);
   const bool control =
       std::ranges::any_of(message, [](char c) { return static_cast<unsigned char>(c) < ' '; });
   demand(!control && message.size() < 1000, "not one line, or what the checks found", message);

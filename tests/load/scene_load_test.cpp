@@ -149,6 +149,59 @@ TEST_CASE("a volume from the command line is fitted to the hand") {
   }
 }
 
+TEST_CASE("a scene that says fit is fitted to its own volume as one of the command line is") {
+  const kerf::test::TempFolder folder;
+  const std::string rest = kBall + "[force]\nmodel = \"paper\"\n";
+  const auto base = folder.write("base.toml", "[[volume]]\nfile = \"phantom\"\n" + rest);
+  static_cast<void>(block_scene(folder, 0.5, kBall));
+  kerf::SceneOverrides overrides;
+  overrides.volume_file = base.parent_path() / "block.nrrd";
+  const kerf::LoadedScene given = kerf::load_scene(base, overrides);
+  const kerf::LoadedScene fitted =
+      kerf::load_scene(folder.write("fit.toml", "[[volume]]\nfile = \"block.nrrd\"\n" + rest +
+                                                    "[device]\nfit = true\nworkspace_scale = 7\n"));
+  CHECK(fitted.device.workspace_scale == doctest::Approx(given.device.workspace_scale));
+  CHECK(fitted.cut.machinability_mm3_per_s_n ==
+        doctest::Approx(given.cut.machinability_mm3_per_s_n));
+  CHECK(fitted.force.p0_n_per_mm2 == doctest::Approx(given.force.p0_n_per_mm2));
+  CHECK(fitted.tools.at(0).radius_mm == given.tools.at(0).radius_mm);
+}
+
+TEST_CASE("where no voxel has a label there is no enamel and no pulp") {
+  const kerf::test::TempFolder folder;
+  const auto names = [](const kerf::LoadedScene& scene) {
+    std::string text;
+    for (const kerf::Material& material : scene.materials) text += material.name + " ";
+    return text;
+  };
+  CHECK(names(kerf::load_scene(block_scene(folder, 0.5, kBall))) == "none ");
+  CHECK(names(kerf::load_scene(block_scene(
+            folder, 0.5,
+            kBall + "[[material]]\nname = \"bone\"\n[[material]]\nname = \"pulp\"\n"))) ==
+        "none pulp bone ");
+  kerf::SceneOverrides overrides;
+  overrides.volume_file = folder.write("x", "").parent_path() / "block.nrrd";
+  const kerf::LoadedScene ct =
+      kerf::load_scene(std::filesystem::path(KERF_SCENES_DIR) / "phantom.toml", overrides);
+  CHECK(names(ct).find("pulp") == std::string::npos);
+  CHECK(names(ct).find("enamel") == std::string::npos);
+  CHECK(ct.materials.size() >= 2);
+  CHECK_FALSE(ct.volumes.at(0).proposal.empty());
+  CHECK(names(kerf::load_scene(std::filesystem::path(KERF_SCENES_DIR) / "phantom.toml")) ==
+        "none enamel dentin pulp ");
+}
+
+TEST_CASE("a window of the command line goes before the proposal's") {
+  const kerf::test::TempFolder folder;
+  static_cast<void>(block_scene(folder, 0.5, kBall));
+  kerf::SceneOverrides overrides;
+  overrides.volume_file = folder.write("x", "").parent_path() / "block.nrrd";
+  overrides.window = {{-1000, 3000}};
+  const kerf::LoadedScene scene =
+      kerf::load_scene(std::filesystem::path(KERF_SCENES_DIR) / "phantom.toml", overrides);
+  CHECK(scene.volumes.at(0).proposal.at(1).find("window=-1000 .. 3000") == 0);
+}
+
 TEST_CASE("a shaft grows with its tool in a volume of the command line") {
   const kerf::test::TempFolder folder;
   static_cast<void>(block_scene(folder, 0.5, kBall));

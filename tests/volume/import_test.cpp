@@ -139,7 +139,8 @@ TEST_CASE("each real scan is imported at first try") {
                            Scan{"ge_tooth_8bit/tooth.mhd", {"--spacing", "0.125"}, 70, 110},
                            Scan{"ct_spine_pelvis/example_ct.nii.gz", {}, 120, 400}}) {
     if (data == nullptr || !std::filesystem::exists(std::filesystem::path(data) / scan.file)) {
-      MESSAGE("skipped: " << scan.file << " is not there (KERF_DATA names the folder)");
+      MESSAGE("skipped: " << std::string(scan.file)
+                          << " is not there (KERF_DATA names the folder)");
       continue;
     }
     CAPTURE(scan.file);

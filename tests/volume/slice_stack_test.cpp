@@ -112,6 +112,22 @@ TEST_CASE("a TIFF of several pages is a volume") {
   CHECK(same_values(v, counting<float>()));
 }
 
+TEST_CASE("a TIFF that is cut off is refused, wherever it is") {
+  const TempFolder folder;
+  std::vector<std::string> pages;
+  for (int z = 0; z < 5; ++z) pages.push_back(slice<std::uint8_t>(z));
+  const std::string whole = tiff(3, 4, 8, pages);
+  for (std::size_t held = 0; held < whole.size(); held += 7) {
+    const std::string message = refusal(folder.write("a.tif", whole.substr(0, held)), kSpaced);
+    CAPTURE(held);
+    CAPTURE(message);
+    CHECK(is_one_line(message));
+  }
+  std::string endless = whole;  // the first page is followed by itself
+  endless.replace(8 + 2 + 120, 4, bytes_of(std::uint32_t{8}));
+  CHECK(is_one_line(refusal(folder.write("b.tif", endless), kSpaced)));
+}
+
 TEST_CASE("values of 16 bits come whole from the largest and the smallest") {
   const TempFolder folder;
   for (int z = 0; z < 2; ++z) {
