@@ -191,7 +191,8 @@ ServoOutput servo_step(const ServoPlan<N>& plan, ServoState<N>& state,
   if (sensed.usable) book(state, wanted, out.motors_on);
   cut(plan, state, wanted.tool, out);
   if (sensed.usable) state.held_force_n = state.force_n;
-  tell(plan, state, sensed, report.fresh, out);
+  out.stale = !report.fresh;
+  tell(plan, state, sensed, out);
   return out;
 }
 
