@@ -204,7 +204,8 @@ ServoOutput servo_step(const ServoPlan<N>& plan, ServoState<N>& state,
   cut(plan, state, wanted.tool, out);
   follow_cuts(plan, state, out);
   if (sensed.usable) state.held_force_n = state.force_n;
-  tell(plan, state, sensed, report.fresh, out);
+  out.stale = !report.fresh;
+  tell(plan, state, sensed, out);
   return out;
 }
 

@@ -81,13 +81,12 @@ void tell_planes(const ToolContact<N>& tool, ServoOutput& out) noexcept {
 
 /// The rest of the output, for the eyes and the log.
 template <class N>
-void tell(const ServoPlan<N>& plan, ServoState<N>& state, const Sensed<N>& sensed, bool fresh,
+void tell(const ServoPlan<N>& plan, ServoState<N>& state, const Sensed<N>& sensed,
           ServoOutput& out) noexcept {
   using Real = typename N::Real;
   out.phase = state.supervisor.phase;
   out.fault = state.supervisor.fault;
   out.started = state.supervisor.started;
-  out.stale = !fresh;
   out.contact = norm(state.force_n) > Real(kContactThresholdN);
   const ProxyState<N>& proxy = state.contact.proxy;
   out.refused = plan.contact.swept && !proxy.placed && proxy.search.refused();

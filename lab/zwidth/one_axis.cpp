@@ -28,8 +28,10 @@ class OneAxisWall {
                   typename N::Unit(subject.damping_ns_per_mm)},
         last_mm_(Real(tip_mm)) {
     const double period_s = subject.loop.period_s;
+    // Half a step, as plan_device.hpp: a reading shows the lower end of its step, always as far
+    // off.
     const LawLoop loop{.rate_hz = std::round(1 / period_s),
-                       .tip_noise_mm = subject.loop.quantum_mm};
+                       .tip_noise_mm = subject.loop.quantum_mm / 2};
     velocity_plan_ = plan_law<VelocityInput, N>(subject.estimator, loop);
     force_plan_ = plan_law<ForceInput, N>(force_law_at(subject, stiffness_n_per_mm), loop);
     stabiliser_plan_ = plan_law<StabiliserInput, N>(subject.stabiliser, loop);

@@ -67,6 +67,15 @@ hump the lag of the velocity and the encoder's steps drive the wall.
 
 )";
 
+constexpr const char* kStabilisersText =
+    R"(
+## Stabilisers
+
+The same with B = 0.002 N s/mm and a stabiliser that knows the device's own mass and damping, on one axis and, behind the
+stroke, with the whole arm. What each costs the hand is in docs/energy.md.
+
+)";
+
 constexpr const char* kRatesText =
     R"(Without friction the boundary grows with the rate; measured, it does so less and less. The encoder's steps are the
 same at every rate, and the velocity window spans up to 16 ms at every rate, so its lag counts more periods: a fast loop
@@ -181,6 +190,36 @@ std::string devices_table(const Measure& measure, const Part& maps, bool quick) 
   return text;
 }
 
+std::string stabilisers_table(const Measure& measure, bool quick) {
+  std::string text = "| device | delay, periods |", line = "|---|---:|";
+  const std::vector<std::string> words =
+      quick ? std::vector<std::string>{"none"}
+            : std::vector<std::string>{"none", "passivity", "energy_bounding"};
+  const std::vector<std::string> delays =
+      quick ? std::vector<std::string>{"1"} : std::vector<std::string>{"0", "1", "2"};
+  for (const std::string& word : words) {
+    text += " " + word + " |";
+    line += "---:|";
+  }
+  text += "\n" + line + "\n";
+  for (const Device& device : kDevices) {
+    for (const std::string& delay : delays) {
+      text += std::string("| ") + device.name + " | " + delay + " |";
+      for (const std::string& word : words) {
+        Assignment values;
+        values[index_of(AxisId::device)] = device.word;
+        values[index_of(AxisId::damping)] = "0.002";
+        values[index_of(AxisId::delay)] = delay;
+        values[index_of(AxisId::stabiliser)] = word;
+        text += " " + first_text(first_of(column_of(measure, values, false, quick))) + " / " +
+                first_text(first_of(column_of(measure, values, true, quick))) + " |";
+      }
+      text += "\n";
+    }
+  }
+  return text;
+}
+
 struct Knob {
   AxisId axis;
   const char* values;
@@ -276,10 +315,11 @@ StabilityPage stability_page(const Measure& measure, const std::string& devices,
 
   StabilityPage page;
   page.text = std::string(kAbout) + "## Devices\n\n![Maps of three devices](" + devices + ")\n\n" +
-              kDevicesText + devices_table(measure, device_maps, quick) +
-              "\n## Rates\n\n![Maps of six rates](" + rates + ")\n\n" + kRatesText + kKnobsText +
-              knobs_table(measure, quick) + "\n## Fixed point, float and double\n\n" +
-              numbers_text(measure, quick) + kNumbersText + kHow + lab_provenance() + "\n";
+              kDevicesText + devices_table(measure, device_maps, quick) + kStabilisersText +
+              stabilisers_table(measure, quick) + "\n## Rates\n\n![Maps of six rates](" + rates +
+              ")\n\n" + kRatesText + kKnobsText + knobs_table(measure, quick) +
+              "\n## Fixed point, float and double\n\n" + numbers_text(measure, quick) +
+              kNumbersText + kHow + lab_provenance() + "\n";
   page.devices_plot = plot_of(device_maps);
   page.rates_plot = plot_of(rate_maps);
   return page;

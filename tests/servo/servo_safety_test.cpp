@@ -132,7 +132,7 @@ TEST_CASE("counters far beyond any joint leave a place in range, and docking for
     CAPTURE(static_cast<int>(numeric));
     LoadedScene scene = half_space_scene();
     scene.servo.numeric = numeric;
-    scene.servo.velocity = {LawKind::velocity, "difference", {{"tau_ms", 1000}}};
+    scene.servo.velocity = {kerf::LawKind::velocity, "difference", {{"tau_ms", 1000}}};
     ArmedServo armed(scene);
     auto report = armed.arm.at(0, 5, 0);
     for (int i = 0; i < 100; ++i) {  // to a million counts, where the sines' series leaves floats
