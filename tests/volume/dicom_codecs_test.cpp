@@ -59,10 +59,10 @@ TEST_CASE("a DICOM series reads the same from every codec without loss") {
       {"JPEG lossless", Syntax::JPEGLosslessProcess14_1},
       {"JPEG-LS", Syntax::JPEGLSLossless},
       {"JPEG 2000", Syntax::JPEG2000Lossless}};
-  for (const auto& [name, syntax] : kCodecs) {
-    CAPTURE(name);
+  for (const auto& codec : kCodecs) {
+    CAPTURE(std::string(codec.first));
     const TempFolder folder;
-    for (int z = 0; z < 3; ++z) REQUIRE(write_packed(folder, z, syntax));
+    for (int z = 0; z < 3; ++z) REQUIRE(write_packed(folder, z, codec.second));
     const SourceVolume v = read_volume(folder.path());
     REQUIRE(v.grid == VoxelGrid{kEdge, kEdge, 3});
     CHECK(v.spacing_mm == std::array<double, 3>{0.25, 0.5, 1.5});
