@@ -12,6 +12,7 @@
 
 #include "controller/kernel/gradient.hpp"
 #include "controller/law/registry/law_registry.hpp"
+#include "controller/scene/phantom_shapes.hpp"
 #include "shared/volume/voxel_grid.hpp"
 #include "shared/wire/personality.hpp"
 
@@ -69,20 +70,6 @@ inline constexpr double kMaxDampingNsPerMm = 1;
 
 /// The `file` of a [[volume]] that is computed instead of read.
 inline constexpr std::string_view kPhantomFile = "phantom";
-
-/// What the phantom can be, in a box of 32 x 32 x 20 mm, z up:
-///
-///   molar          a lower molar of enamel, dentin and pulp
-///   carious_molar  the same with a lesion below its fissures: a fourth label
-///   wall           solid in the lower half of the box
-///   ball           of 8 mm radius
-///   torus          about z, ring of 10 mm, tube of 4 mm
-///
-/// The last three have no labels, and their surface at a density of 0.5.
-inline constexpr std::string_view kMolar = "molar";
-inline constexpr std::string_view kCariousMolar = "carious_molar";
-inline constexpr std::array<std::string_view, 5> kPhantomShapes = {kMolar, kCariousMolar, "wall",
-                                                                   "ball", "torus"};
 
 /// Removal rate of enamel per newton at the reference speed, mm^3/(s N): 0.067 to 0.108 of human
 /// enamel under a diamond bur at 50 to 80 g (docs/theory.md 6.6).

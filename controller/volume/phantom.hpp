@@ -3,7 +3,7 @@
 
 #include <string_view>
 
-#include "controller/scene/scene.hpp"
+#include "controller/scene/phantom_shapes.hpp"
 #include "controller/volume/volume_image.hpp"
 
 namespace kerf {
