@@ -201,8 +201,11 @@ LoadedScene scene_around(VolumeImage image, Point middle_mm, const Loop& loop, D
   return scene;
 }
 
+/// Without the pear: pages and tests name scenes by their seed, and one more shape makes others of it.
+constexpr auto kDrawnShapes = kToolShapes.first<6>();
+
 void add_tools(bool bur, Dice& dice, LoadedScene& scene) {
-  for (const std::string_view shape : kToolShapes) {
+  for (const std::string_view shape : kDrawnShapes) {
     const std::string name(shape);
     const double radius_mm = dice.uniform(0.4, 1);
     scene.tools.push_back(make_tool(name, name, {.pitch_mm = kVoxelMm, .radius_mm = radius_mm}));
