@@ -201,7 +201,7 @@ LoadedScene scene_around(VolumeImage image, Point middle_mm, const Loop& loop, D
   return scene;
 }
 
-/// Without the pear: pages and tests name scenes by their seed, and one more shape makes others of it.
+/// Without the pear: pages and tests name scenes by their seed, which one more shape would change.
 constexpr auto kDrawnShapes = kToolShapes.first<6>();
 
 void add_tools(bool bur, Dice& dice, LoadedScene& scene) {
