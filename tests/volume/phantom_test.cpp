@@ -283,7 +283,7 @@ TEST_CASE("a phantom without voxels, above the limits or of no spacing is refuse
 TEST_CASE(
     "the carious molar differs from the molar in its lesion alone, which leaves the pulp alone") {
   const VolumeImage carious = make_phantom({.shape = kCariousMolar, .grid = {128, 128, 80}});
-  std::size_t lesion = 0, touches_air = 0;
+  std::size_t lesion = 0, touches_air = 0, others = 0;
   double deepest_mm = 100;
   for (std::int32_t z = 0; z < 80; ++z) {
     for (std::int32_t y = 0; y < 128; ++y) {
@@ -291,10 +291,9 @@ TEST_CASE(
         const std::size_t at = carious.grid.index(x, y, z);
         const auto [px, py, pz] = place(carious, x, y, z);
         if (carious.labels[at] != kLabelCaries) {
-          CHECK(carious.labels[at] == half().labels[at]);
-          if (phantom::lesion_distance({px, py, pz}) > 0.5) {
-            CHECK(carious.density[at] == half().density[at]);
-          }
+          others += carious.labels[at] != half().labels[at] ? 1 : 0;
+          const bool far = phantom::lesion_distance({px, py, pz}) > 0.5;
+          others += far && carious.density[at] != half().density[at] ? 1 : 0;
           continue;
         }
         ++lesion;
@@ -304,6 +303,7 @@ TEST_CASE(
       }
     }
   }
+  CHECK(others == 0);
   // The ellipsoid of 1.5 x 1.2 x 1.2 mm has 9.05 mm3; the track through the enamel adds some.
   CHECK(lesion > 9 * 64);  // 64 voxels a mm3
   CHECK(lesion < 12 * 64);
