@@ -41,7 +41,8 @@ std::optional<Bur> parse_bur(std::string_view text) {
 void spell_out(TomlNode& tool, const TomlNode& bur, const std::string& file) {
   const std::string* text = std::get_if<std::string>(&bur.value);
   if (text == nullptr || !is_usable_text(*text)) return;  // which the row of the key refuses
-  const std::string place = file + ":" + std::to_string(bur.line) + ": tool.bur = " + bur.shown;
+  const std::string where = bur.line == 0 ? ": --set" : ":" + std::to_string(bur.line) + ":";
+  const std::string place = file + where + " tool.bur = " + bur.shown;
   const std::optional<Bur> known = parse_bur(*text);
   if (!known) {
     refuse(place,

@@ -447,6 +447,13 @@ TEST_CASE("a bur of ISO 6360 stands for shape, radius, neck and name, and its ta
     CHECK(begins(refused("bur = \"001 014\"\n" + std::string(also) + "\n"),
                  "scenes/x.toml:4: tool.bur = \"001 014\" contradicts"));
   }
+  const kerf::SceneSetting setting{"tool.bur", "\"001 999\""};
+  CHECK(begins(kerf::test::error_of([&] {
+                 static_cast<void>(kerf::parse_scene("[[volume]]\nfile = \"phantom\"\n[[tool]]\n",
+                                                     "scenes/x.toml", kerf::scene_keys(),
+                                                     {&setting, 1}));
+               }),
+               "scenes/x.toml: --set tool.bur = \"001 999\" is no bur;"));
   CHECK(begins(refused("bur = \"001 014\"\nlength_mm = 3\n"),
                "scenes/x.toml:5: tool.length_mm = 3 contradicts the ball"));
 }
