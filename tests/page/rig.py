@@ -24,7 +24,7 @@ stiffness_n_per_mm = 0.4
 model = "preston"
 machinability_mm3_per_s_n = 30
 '''
-# Waits for the page, cuts the crown and goes away.
+# Waits for the page, cuts the crown and goes so far away that no tool touches the tooth.
 HAND = '''start_mm = [0, 6, 0]
 [[step]]
 hold = 3.0
@@ -38,7 +38,7 @@ seconds = 0.4
 move_mm = [1.5, -1.5, 3.0]
 seconds = 0.6
 [[step]]
-move_mm = [4, 3, -2]
+move_mm = [4, 9, -2]
 seconds = 0.5
 [[step]]
 hold = 3600
