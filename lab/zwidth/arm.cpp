@@ -27,6 +27,9 @@ namespace {
 
 constexpr double kRadiusMm = 1, kVoxelMm = 0.25;
 constexpr double kAwayMm = 3;  ///< the tool's middle above the flat, between two hits
+/// x and z where two more walls meet the flat: away from the hand's way in, which comes from -z,
+/// and from where friction lets a soft hand stop short.
+constexpr double kCornerMm = 4.25;
 
 /// The hand that pushes: the subject's, or a spring so soft that the device is as good as free.
 SampledHand pushing_hand(const Subject& subject) {
@@ -80,29 +83,52 @@ std::array<double, 3> torque_scale_of(Personality personality) {
   return OmniParams().torque_scale();
 }
 
-/// Down at each speed (0: gently), a stay, up again; at a place that the seed shifts.
-HandScript hits_of(const Subject& subject, double seconds, std::uint64_t seed) {
-  const double push_n = subject.push_n + subject.loop.coulomb_n;
-  const double goal_mm = kRadiusMm - push_n / pushing_hand(subject).stiffness_n_per_mm;
+/// One way of meeting a wall; device mm, of the tool's middle. Judged along `normal`.
+struct ArmHit {
+  DeviceVec<double> from, to;
+  double mm_per_s;  ///< 0: gently
+  DeviceVec<double> normal{0, 1, 0};
+};
+
+/// At a place that the seed shifts.
+std::array<ArmHit, kArmHits> hits_of(const Subject& subject, std::uint64_t seed) {
+  const double depth_mm =
+      (subject.push_n + subject.loop.coulomb_n) / pushing_hand(subject).stiffness_n_per_mm;
   constexpr std::uint64_t kPlaces = 1000;
   const double x_mm = static_cast<double>(seed * 7919 % kPlaces) / kPlaces;
+  const DeviceVec<double> above{x_mm, kAwayMm, 0}, pressed{x_mm, kRadiusMm - depth_mm, 0};
+  // A slide comes down by a sixth of its way; the hand is in full only at the end.
+  constexpr double kSlideMm = 3;
+  const DeviceVec<double> graze{x_mm - kSlideMm, kRadiusMm + kSlideMm / 6, 0};
+  const double third = 1 / std::sqrt(3.0), in_mm = kCornerMm - kRadiusMm;
+  const DeviceVec<double> out{-third, third, -third}, corner{in_mm, kRadiusMm, in_mm};
+  return {{{above, pressed, kHitsMmPerS[0]},
+           {above, pressed, kHitsMmPerS[1]},
+           {above, pressed, kHitsMmPerS[2]},
+           {graze, pressed, 50},
+           {corner + out * kAwayMm, corner - out * depth_mm, 50, out}}};
+}
+
+/// Each hit from its start, a stay, and off again by the way it came; high over to the next.
+HandScript script_of(const std::array<ArmHit, kArmHits>& hits, double seconds) {
   HandScript script;
-  script.start = {x_mm, kAwayMm, 0};
-  HandStep stay;
+  const auto start = hits.front().from;
+  script.start = {start.x, start.y, start.z};
+  HandStep wait, stay;
+  wait.seconds = 0.2;
   stay.seconds = seconds + 0.3;
-  for (const double speed : kHitsMmPerS) {
-    HandStep wait;
-    wait.seconds = 0.2;
+  for (const ArmHit& hit : hits) {
+    script.steps.push_back(hand_move(hit.from, 0.2));
     script.steps.push_back(wait);
     constexpr double kGentlyS = 0.4;
-    HandStep down = hand_move({x_mm, goal_mm, 0}, kGentlyS);
-    if (speed > 0) {
-      down.seconds = (kAwayMm - goal_mm) / speed;
+    HandStep down = hand_move(hit.to, kGentlyS);
+    if (hit.mm_per_s > 0) {
+      down.seconds = norm(hit.to - hit.from) / hit.mm_per_s;
       down.ease = HandStep::Ease::linear;
     }
     script.steps.push_back(down);
     script.steps.push_back(stay);
-    script.steps.push_back(hand_move({x_mm, kAwayMm, 0}, 0.2));
+    script.steps.push_back(hand_move(hit.from + hit.normal * kAwayMm, 0.2));
   }
   return script;
 }
@@ -137,7 +163,7 @@ class Rig {
 constexpr Swing kLost{true, true, 0, 0};
 
 /// One hit: nothing before the first contact; the verdict after `seconds`.
-std::optional<Swing> watch_hit(Rig& rig, const Subject& subject, double seconds,
+std::optional<Swing> watch_hit(Rig& rig, const Subject& subject, const ArmHit& hit, double seconds,
                                std::uint64_t& ticks) {
   const double rate_hz = 1 / subject.loop.period_s;
   const std::int64_t count = std::llround(seconds * rate_hz);
@@ -155,7 +181,8 @@ std::optional<Swing> watch_hit(Rig& rig, const Subject& subject, double seconds,
     if (judged == 0 && away < settled) {
       away = free ? away + 1 : 0;
     } else if (judged > 0 || out.contact) {
-      meter.take(out.position_mm[1], -out.absorbed_mj);
+      const DeviceVec<double> tip_mm{out.position_mm[0], out.position_mm[1], out.position_mm[2]};
+      meter.take(dot(tip_mm, hit.normal), -out.absorbed_mj);
       ++judged;
     }
   }
@@ -164,23 +191,25 @@ std::optional<Swing> watch_hit(Rig& rig, const Subject& subject, double seconds,
 
 }  // namespace
 
-LoadedScene flat_scene(const Subject& subject) {
+LoadedScene walls_scene(const Subject& subject) {
   const int rate_hz = static_cast<int>(std::lround(1 / subject.loop.period_s));
   if (kCyclesPerSecond % rate_hz != 0) {
     throw HilError("--rate: " + std::to_string(rate_hz) +
                    " does not divide 8000, the rate of the devices' mechanics; use such as 4000");
   }
   LoadedScene scene;
-  scene.path = "flat";
-  constexpr std::int32_t kEdge = 32;
+  scene.path = "walls";
+  constexpr std::int32_t kEdge = 48;
   const VoxelGrid grid{kEdge, kEdge, kEdge};
   constexpr double kCorner = -kVoxelMm * (kEdge - 1) / 2;
   SceneVolume& volume = scene.volumes.emplace_back();
   volume.name = "solid";
   volume.image.grid = grid;
   volume.image.spacing_mm = {kVoxelMm, kVoxelMm, kVoxelMm};
-  volume.image.density =
-      bench::densities(grid, [&](double, double y, double) { return (kEdge - 1) / 2.0 - y; });
+  volume.image.density = bench::densities(grid, [&](double x, double y, double z) {
+    constexpr double kMiddle = (kEdge - 1) / 2.0, kWall = kMiddle + kCornerMm / kVoxelMm;
+    return std::max({kMiddle - y, x - kWall, z - kWall});
+  });
   volume.pose.position_mm = {kCorner, kCorner, kCorner};
   scene.tools.push_back(make_tool("ball", "ball", {.pitch_mm = kVoxelMm, .radius_mm = kRadiusMm}));
   scene.cut.model = CutModel::none;
@@ -200,11 +229,12 @@ Swing hit_with_arm(const LoadedScene& scene, const Subject& subject, double stif
   LoadedScene own = scene;
   own.force.stiffness_n_per_mm = stiffness_n_per_mm;
   own.force.law = force_law_at(subject, stiffness_n_per_mm);
-  Rig rig(std::move(own), subject, hits_of(subject, seconds, seed));
+  const std::array<ArmHit, kArmHits> hits = hits_of(subject, seed);
+  Rig rig(std::move(own), subject, script_of(hits, seconds));
   Swing worst;
-  for (std::size_t hit = 0; hit < kHitsMmPerS.size(); ++hit) {
-    const std::optional<Swing> seen = watch_hit(rig, subject, seconds, ticks);
-    if (!seen && hit == 0) {
+  for (const ArmHit& hit : hits) {
+    const std::optional<Swing> seen = watch_hit(rig, subject, hit, seconds, ticks);
+    if (!seen && &hit == &hits.front()) {
       throw HilError(
           "--arm: the emulated hand did not bring the device to the wall within 8 s; give less "
           "friction, mass or delay, or --hand firm");

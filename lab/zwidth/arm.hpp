@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 
 #include "controller/load/loaded_scene.hpp"
@@ -9,14 +10,19 @@
 
 namespace kerf::zwidth {
 
-/// A ball of 1 mm over a flat, felt by the swept contact and not cut, for the subject's device.
-/// Throws HilError for a rate that does not divide that of the devices' mechanics.
-[[nodiscard]] LoadedScene flat_scene(const Subject& subject);
+/// Ways in which the whole arm meets walls.
+inline constexpr std::size_t kArmHits = 5;
 
-/// The whole servo step, driver and emulated device in virtual time, on `flat_scene`: the hand
-/// pushes slowly, then hits at 50 and 200 mm/s, and stays for `seconds` each time. A hit is judged
-/// from its first contact on, by the device's own encoders and the servo's own account of its work;
-/// the first that is bad by both rules ends the run.
+/// A ball of 1 mm over a flat that meets two more walls in a corner, felt by the swept contact and
+/// not cut, for the subject's device. Throws HilError for a rate that does not divide that of the
+/// devices' mechanics.
+[[nodiscard]] LoadedScene walls_scene(const Subject& subject);
+
+/// The whole servo step, driver and emulated device in virtual time, on `walls_scene`: the hand
+/// pushes slowly, hits the flat at 50 and 200 mm/s, slides onto it at 50 mm/s, then hits the corner
+/// of three walls at 50 mm/s, and stays for `seconds` each time. A hit is judged along the normal,
+/// in the corner along the diagonal, from its first contact on, by the device's own encoders and
+/// the servo's own account of its work; the first that is bad by both rules ends the run.
 ///
 /// The subject's delay counts in whole bus cycles of 125 us; encoder and limits are those of
 /// device and servo. Without a hand a spring of 0.2 N/mm pushes. Counts its ticks in

@@ -24,7 +24,7 @@ class ColumnRun {
  public:
   ColumnRun(const MapSpec& spec, const Subject& subject, std::size_t index)
       : spec_(spec), subject_(subject), index_(index) {
-    if (spec.arm) scene_ = flat_scene(subject);
+    if (spec.arm) scene_ = walls_scene(subject);
   }
 
   const Swing& at(double stiffness) {

@@ -33,7 +33,7 @@ cool: a thermal limit would end a swing by weakening them.
 
 One axis has the servo's own coupling, velocity window, stabilisers and force limits, as the same templates, in the
 loop's numbers, and exact mechanics. *Whole arm* is the servo step itself with the emulated device, its driver and its packets in virtual
-time (`--arm`). The mechanics of the devices are plausible values, not those of a unit: with a device of your own,
+time (`--arm`); it also slides onto the flat and hits the corner of three walls. The mechanics of the devices are plausible values, not those of a unit: with a device of your own,
 give `--mass`, `--viscous`, `--friction` and `--quantum`, and take its map.
 
 )";

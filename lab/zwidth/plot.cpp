@@ -145,7 +145,8 @@ std::string foot_of(const Part& part) {
   text += say(AxisId::rate, "", " Hz") + say(AxisId::delay, "delay of periods ", "") +
           say(AxisId::damping, "B ", " N s/mm") + say(AxisId::hand, "hand ", "");
   return text + (part.spec.arm ? "whole arm, " : "one axis, ") + "hits: a push, 50 and 200 mm/s, " +
-         number_text(part.spec.seconds) + " s each, seed " + std::to_string(part.spec.seed);
+         (part.spec.arm ? "a slide, a corner, " : "") + number_text(part.spec.seconds) +
+         " s each, seed " + std::to_string(part.spec.seed);
 }
 
 /// `right`: room beside each panel, in pixels.

@@ -171,7 +171,7 @@ TEST_CASE("the whole arm comes to rest on a soft wall and swings on a hard one")
     Subject subject = subject_of({});
     subject.numeric = numeric;
     subject.loop.delay_s = 0;
-    const LoadedScene scene = flat_scene(subject);
+    const LoadedScene scene = walls_scene(subject);
     std::uint64_t ticks = 0;
     const Swing soft = hit_with_arm(scene, subject, 0.3, 0.3, 1, ticks);
     CHECK_FALSE(soft.swings);
