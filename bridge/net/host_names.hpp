@@ -6,6 +6,9 @@
 
 namespace kerf::bridge {
 
+/// Whether `host` is an address, IPv4 or IPv6 without brackets, not a name.
+[[nodiscard]] bool is_address(const std::string& host) noexcept;
+
 /// This machine's name; empty where it has none.
 [[nodiscard]] std::string machine_name();
 
