@@ -61,10 +61,18 @@ class Table {
   }
 
   void kills() {
-    for (const auto& [side, words] :
-         {std::pair(Killed::serve, "serve killed"), std::pair(Killed::join, "join killed"),
-          std::pair(Killed::cable, "cable pulled for 3 s")}) {
-      const int times = side == Killed::cable ? (quick_ ? 1 : 5) : (quick_ ? 2 : 20);
+    struct Kind {
+      Killed side;
+      const char* words;
+      int times, few;
+    };
+    for (const auto& [side, words, all, few] : {
+             Kind{Killed::serve, "serve killed", 20, 2},
+             Kind{Killed::join, "join killed", 20, 2},
+             Kind{Killed::cable, "cable pulled for 3 s", 5, 1},
+             Kind{Killed::interface, "interface down for 3 s, of each machine by turns", 6, 2},
+         }) {
+      const int times = quick_ ? few : all;
       const KillResult result = run_kills(files_, side, times, layers(), seed_);
       held_ = held_ && result.kills == times && result.equal == times;
       tell(format("* %s: %d of %d times equal by hash within 2 s, the slowest after %.2f s", words,
