@@ -334,7 +334,7 @@ TEST_CASE("the window is twice what the link holds, and a frame") {
 }
 
 TEST_CASE("small frames are more under way than large ones, and two always") {
-  for (const std::size_t bytes : {1'000, 4'000, 16'000, 20'000}) {
+  for (const std::size_t bytes : std::vector<std::size_t>{1'000, 4'000, 16'000, 20'000}) {
     LinkRate link;
     std::uint64_t frames = 0;
     for (; link.has_credit(); ++frames) link.sent_frame(frames + 1, bytes, 1);
