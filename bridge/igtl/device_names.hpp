@@ -12,4 +12,7 @@ namespace kerf::bridge {
 /// "volume 1" and so on where the scene's text does not tell.
 [[nodiscard]] std::vector<std::string> device_names(const SegmentInfo& segment);
 
+/// Of the labels of volumes of these names: "NAME labels", by the same rules.
+[[nodiscard]] std::vector<std::string> label_names(const std::vector<std::string>& volumes);
+
 }  // namespace kerf::bridge

@@ -36,7 +36,8 @@ class IgtlClient {
   /// has taken nothing for `patience` while something waited.
   [[nodiscard]] bool serve(std::chrono::milliseconds patience);
 
-  std::vector<VoxelBox> lacks;  ///< by volume; the caller's
+  std::vector<VoxelBox> lacks;     ///< by volume; the caller's
+  std::vector<bool> lacks_labels;  ///< by volume; the caller's
 
  private:
   struct Waiting {

@@ -45,9 +45,11 @@ IgtlBytes packed(igtl::MessageBase& message, const char* device) {
   return std::make_shared<const std::vector<std::byte>>(first, first + message.GetPackSize());
 }
 
-void copy_part(const VoxelGrid& grid, const std::vector<Density>& linear, const VoxelBox& part,
-               char* to) {
-  const auto row = static_cast<std::size_t>(part.extent().x) * sizeof(Density);
+template <class Voxel>
+void copy_part(const VoxelGrid& grid, std::span<const Voxel> linear, const VoxelBox& part,
+               void* out) {
+  auto* to = static_cast<char*>(out);
+  const auto row = static_cast<std::size_t>(part.extent().x) * sizeof(Voxel);
   for (std::int32_t z = part.lo.z; z < part.hi.z; ++z) {
     for (std::int32_t y = part.lo.y; y < part.hi.y; ++y, to += row) {
       std::memcpy(to, &linear[grid.index(part.lo.x, y, z)], row);
@@ -55,27 +57,18 @@ void copy_part(const VoxelGrid& grid, const std::vector<Density>& linear, const 
   }
 }
 
-}  // namespace
-
-bool fits_an_image(const VoxelGrid& grid) noexcept {
-  constexpr std::size_t kHeaders = 4096;  // of the message; far more than it has
-  return grid.voxel_count() * sizeof(Density) <= INT32_MAX - kHeaders;
-}
-
-IgtlBytes image_message(const std::string& device, const SegmentVolumeInfo& volume,
-                        const std::vector<Density>& linear, const VoxelBox& part) {
+/// Size and place of a volume, of which the image has `part`; one number a voxel.
+void set_place(const SegmentVolumeInfo& volume, const VoxelBox& part, igtl::ImageMessage& image) {
   const VoxelGrid& grid = volume.grid;
   const VoxelIndex extent = part.extent();
-  const igtl::ImageMessage::Pointer image = igtl::ImageMessage::New();
-  image->SetDimensions(grid.nx, grid.ny, grid.nz);
-  image->SetSubVolume(extent.x, extent.y, extent.z, part.lo.x, part.lo.y, part.lo.z);
-  image->SetSpacing(static_cast<float>(volume.spacing_mm[0]),
-                    static_cast<float>(volume.spacing_mm[1]),
-                    static_cast<float>(volume.spacing_mm[2]));
-  image->SetScalarTypeToUint16();
-  image->SetNumComponents(1);
-  image->SetEndian(igtl::ImageMessage::ENDIAN_LITTLE);
-  image->SetCoordinateSystem(igtl::ImageMessage::COORDINATE_RAS);
+  image.SetDimensions(grid.nx, grid.ny, grid.nz);
+  image.SetSubVolume(extent.x, extent.y, extent.z, part.lo.x, part.lo.y, part.lo.z);
+  image.SetSpacing(static_cast<float>(volume.spacing_mm[0]),
+                   static_cast<float>(volume.spacing_mm[1]),
+                   static_cast<float>(volume.spacing_mm[2]));
+  image.SetNumComponents(1);
+  image.SetEndian(igtl::ImageMessage::ENDIAN_LITTLE);
+  image.SetCoordinateSystem(igtl::ImageMessage::COORDINATE_RAS);
 
   const auto& q = volume.orientation;
   const Matrix3 orientation = rotation_of({q[0], q[1], q[2], q[3]});
@@ -90,9 +83,33 @@ IgtlBytes image_message(const std::string& device, const SegmentVolumeInfo& volu
     }
     matrix[row][3] = static_cast<float>(kRas[row] * middle_mm);
   }
-  image->SetMatrix(matrix);
+  image.SetMatrix(matrix);
+}
+
+}  // namespace
+
+bool fits_an_image(const VoxelGrid& grid) noexcept {
+  constexpr std::size_t kHeaders = 4096;  // of the message; far more than it has
+  return grid.voxel_count() * sizeof(Density) <= INT32_MAX - kHeaders;
+}
+
+IgtlBytes image_message(const std::string& device, const SegmentVolumeInfo& volume,
+                        const std::vector<Density>& linear, const VoxelBox& part) {
+  const igtl::ImageMessage::Pointer image = igtl::ImageMessage::New();
+  set_place(volume, part, *image);
+  image->SetScalarTypeToUint16();
   image->AllocateScalars();
-  copy_part(grid, linear, part, static_cast<char*>(image->GetScalarPointer()));
+  copy_part(volume.grid, std::span<const Density>(linear), part, image->GetScalarPointer());
+  return packed(*image, device.c_str());
+}
+
+IgtlBytes label_message(const std::string& device, const SegmentVolumeInfo& volume,
+                        std::span<const Label> linear) {
+  const igtl::ImageMessage::Pointer image = igtl::ImageMessage::New();
+  set_place(volume, volume.grid.box(), *image);
+  image->SetScalarTypeToUint8();
+  image->AllocateScalars();
+  copy_part(volume.grid, linear, volume.grid.box(), image->GetScalarPointer());
   return packed(*image, device.c_str());
 }
 

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -22,6 +23,10 @@ using IgtlBytes = std::shared_ptr<const std::vector<std::byte>>;
 /// and lies in the volume, whose density is `linear`.
 [[nodiscard]] IgtlBytes image_message(const std::string& device, const SegmentVolumeInfo& volume,
                                       const std::vector<Density>& linear, const VoxelBox& part);
+
+/// All labels of a volume as IMAGE of the same size and place: 8 bits a voxel.
+[[nodiscard]] IgtlBytes label_message(const std::string& device, const SegmentVolumeInfo& volume,
+                                      std::span<const Label> linear);
 
 /// World from tool as TRANSFORM "Tool"; none where the pose is not known yet.
 [[nodiscard]] std::optional<IgtlBytes> tool_message(const TickRecord& tick);

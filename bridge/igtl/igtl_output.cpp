@@ -81,19 +81,24 @@ bool is_due(Clock::time_point& next, Clock::duration period) {
 /// One run of a controller, and the volumes as they were read last.
 struct Run {
   explicit Run(SegmentConnection to)
-      : connection(std::move(to)), names(device_names(reader().info())), snapshots(names.size()) {}
+      : connection(std::move(to)),
+        names(device_names(reader().info())),
+        labels(label_names(names)),
+        snapshots(names.size()) {}
 
   [[nodiscard]] const SegmentReader& reader() const { return connection.reader(); }
   [[nodiscard]] const SegmentVolumeInfo& volume(std::size_t v) const {
     return reader().info().volumes[v];
   }
-  /// What a client lacks that has nothing.
-  [[nodiscard]] std::vector<VoxelBox> all() const {
-    std::vector<VoxelBox> boxes;
+  /// A client that has nothing.
+  void lacks_all(IgtlClient& client) const {
+    client.lacks.clear();
+    client.lacks_labels.clear();
     for (const SegmentVolumeInfo& volume : reader().info().volumes) {
-      boxes.push_back(fits_an_image(volume.grid) ? volume.grid.box() : VoxelBox{});
+      const bool fits = fits_an_image(volume.grid);
+      client.lacks.push_back(fits ? volume.grid.box() : VoxelBox{});
+      client.lacks_labels.push_back(fits && volume.has_labels);
     }
-    return boxes;
   }
   /// Reads what changed; the boxes around it.
   std::vector<VoxelBox> update() {
@@ -107,7 +112,7 @@ struct Run {
   }
 
   SegmentConnection connection;
-  std::vector<std::string> names;
+  std::vector<std::string> names, labels;
   std::vector<VolumeSnapshot> snapshots;
 };
 
@@ -184,7 +189,7 @@ void IgtlOutput::State::accept_all() {
     const int yes = 1;
     static_cast<void>(setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &yes, sizeof yes));
     clients.push_back(std::make_unique<IgtlClient>(fd));
-    if (run) clients.back()->lacks = run->all();
+    if (run) run->lacks_all(*clients.back());
   }
 }
 
@@ -193,7 +198,7 @@ void IgtlOutput::State::attach() {
   if (!is_due(next_attach, kAttachPeriod)) return;
   try {
     run.emplace(connect_segment(options.name));
-    for (auto& client : clients) client->lacks = run->all();
+    for (auto& client : clients) run->lacks_all(*client);
   } catch (const SegmentError&) {
     // None yet, or none any more: its last picture stays.
   }
@@ -211,8 +216,8 @@ void IgtlOutput::State::send_poses() {
   }
 }
 
-/// To each client one part of the first volume that it lacks something of. Clients that lack the
-/// same share the message.
+/// To each client one part of the first volume that it lacks something of; labels go out between
+/// the whole of a volume and what changes of it. Clients that lack the same share the message.
 void IgtlOutput::State::send_images() {
   const std::vector<VoxelBox> changed = run->update();
   for (auto& client : clients) {
@@ -222,9 +227,16 @@ void IgtlOutput::State::send_images() {
   }
   for (std::size_t v = 0; v < changed.size(); ++v) {
     VoxelBox part;
-    IgtlBytes message;
+    IgtlBytes message, labels;
     for (auto& client : clients) {
       VoxelBox& lacks = client->lacks[v];
+      if (client->lacks_labels[v] && !(lacks == run->volume(v).grid.box()) &&
+          !client->waits(IgtlClient::Kind::image)) {
+        if (!labels)
+          labels = label_message(run->labels[v], run->volume(v), run->reader().labels(v));
+        client->add(labels, IgtlClient::Kind::image);
+        client->lacks_labels[v] = false;
+      }
       if (lacks.empty() || client->waits(IgtlClient::Kind::image)) continue;
       if (message == nullptr || !(part == lacks)) {
         part = lacks;

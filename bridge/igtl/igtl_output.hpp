@@ -21,6 +21,7 @@ struct IgtlOptions {
 /// segment and sends to each client
 ///
 /// * each volume as IMAGE under its name, whole first, then the box of what changed, at most 20 Hz;
+/// * its labels, where it has some, as IMAGE "NAME labels" of 8 bits, once: they never change;
 /// * the tool's pose as TRANSFORM "Tool" and the force as SENSOR "Force" in newtons, at 60 Hz.
 ///
 /// All of it is in RAS, for kerf's world as LPS, which is what medical files are loaded in: x and y

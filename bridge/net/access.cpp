@@ -7,13 +7,13 @@
 #include <cstring>
 #include <fstream>
 
-#include <arpa/inet.h>
 #include <openssl/crypto.h>
 #include <openssl/rand.h>
 #include <openssl/sha.h>
 #include <sys/stat.h>
 
 #include "bridge/net/bridge_error.hpp"
+#include "bridge/net/host_names.hpp"
 
 namespace kerf::bridge {
 namespace {
@@ -137,10 +137,7 @@ std::string_view host_name(std::string_view host) noexcept {
 
 bool is_own_host(std::string_view host, const std::vector<std::string>& names) {
   const std::string text(host);
-  in6_addr address{};
-  if (inet_pton(AF_INET, text.c_str(), &address) == 1) return true;
-  if (inet_pton(AF_INET6, text.c_str(), &address) == 1) return true;
-  return same_text(text, "localhost") ||
+  return is_address(text) || same_text(text, "localhost") ||
          std::any_of(names.begin(), names.end(),
                      [&text](const std::string& name) { return same_text(text, name); });
 }

@@ -7,6 +7,7 @@
 #include <cstdint>
 
 #include "bridge/net/bridge_error.hpp"
+#include "bridge/net/host_names.hpp"
 #include "shared/text/words.hpp"
 
 namespace kerf::bridge {
@@ -32,11 +33,6 @@ constexpr std::size_t kLongest = 253;  // of a name in DNS; a token is shorter
   std::uint16_t port = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), port);
   return error == std::errc() && end == text.data() + text.size() && port != 0;
-}
-
-[[nodiscard]] bool is_loopback(std::string_view host) noexcept {
-  return host == "localhost" || host == "::1" ||
-         (host.starts_with("127.") && host.find_first_not_of("0123456789.") == host.npos);
 }
 
 }  // namespace

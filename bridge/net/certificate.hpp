@@ -37,8 +37,9 @@ struct CertificateSpec {
 [[nodiscard]] Certificate certificate_of(const std::string& pem);
 [[nodiscard]] Key key_of(const std::string& pem);
 
-/// SHA-256 of the certificate: hex, a colon between bytes.
-[[nodiscard]] std::string fingerprint_of(X509* certificate);
+/// SHA-256 of the certificate: hex in capitals, a colon between bytes. Empty where OpenSSL has no
+/// memory; never throws `BridgeError`.
+[[nodiscard]] std::string fingerprint_of(const X509* certificate);
 /// Its DNS names.
 [[nodiscard]] std::vector<std::string> dns_names_of(X509* certificate);
 /// The day of its end, as OpenSSL tells it.

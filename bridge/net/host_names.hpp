@@ -2,9 +2,16 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace kerf::bridge {
+
+/// Whether `host` is an address, IPv4 or IPv6 without brackets, not a name.
+[[nodiscard]] bool is_address(const std::string& host) noexcept;
+
+/// Whether what is sent to `host` never leaves this machine, by its text alone.
+[[nodiscard]] bool is_loopback(std::string_view host) noexcept;
 
 /// This machine's name; empty where it has none.
 [[nodiscard]] std::string machine_name();

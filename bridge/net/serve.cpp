@@ -53,10 +53,6 @@ HostPort parse_listen(const std::string& text) {
   return out;
 }
 
-[[nodiscard]] bool is_loopback(const std::string& host) {
-  return host.starts_with("127.") || host == "::1" || host == "localhost";
-}
-
 void print_addresses(const ServerSetup& setup, std::uint16_t port, bool qr) {
   std::string for_others;
   for (const std::string& host : reached_at(setup.host)) {

@@ -1,10 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <array>
-#include <cstdint>
 #include <filesystem>
-#include <optional>
 #include <string>
 
 struct ssl_st;  // OpenSSL's own names
@@ -36,7 +33,7 @@ class ServerTrust {
 
   std::string host_;
   std::filesystem::path ca_;
-  std::optional<std::array<std::uint8_t, 32>> fingerprint_;
+  std::string fingerprint_;  // empty: none was told
   std::string refusal_;
 };
 

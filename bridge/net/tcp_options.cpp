@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "bridge/net/tcp_options.hpp"
 
-#include <array>
 #include <cerrno>
 #include <cstring>
 #include <string_view>
@@ -17,8 +16,6 @@ namespace {
 
 constexpr int kUnsentBytes = 16 * 1024;  // a frame
 constexpr int kIdleS = 30;               // before the peer is asked whether it is there
-// tcpi_min_rtt, in us, lies at byte 148 of the kernel's tcp_info; glibc's ends before it.
-constexpr std::size_t kMinRttWord = 148 / sizeof(std::uint32_t);
 
 bool congestion(int fd, std::string_view name) noexcept {
   return setsockopt(fd, IPPROTO_TCP, TCP_CONGESTION, name.data(),
@@ -50,14 +47,6 @@ std::string why_no_bbr(int fd) {
     return "BBR is not allowed (net.ipv4.tcp_allowed_congestion_control)";
   }
   return std::strerror(errno);
-}
-
-std::int64_t least_round_trip_ns(int fd) noexcept {
-  std::array<std::uint32_t, 64> info{};
-  socklen_t bytes = sizeof info;
-  if (getsockopt(fd, IPPROTO_TCP, TCP_INFO, info.data(), &bytes) != 0) return 0;
-  const std::uint32_t us = info[kMinRttWord];
-  return us == ~0U ? 0 : std::int64_t{us} * 1000;  // ~0: none measured
 }
 
 }  // namespace kerf::bridge

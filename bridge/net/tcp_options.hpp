@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <cstdint>
 #include <string>
 
 namespace kerf::bridge {
@@ -17,8 +16,5 @@ void restart_bbr(int fd) noexcept;
 
 /// Empty where BBR is to be had, else why not.
 [[nodiscard]] std::string why_no_bbr(int fd);
-
-/// The kernel's least round trip of a connection; 0 where it knows none yet.
-[[nodiscard]] std::int64_t least_round_trip_ns(int fd) noexcept;
 
 }  // namespace kerf::bridge

@@ -8,6 +8,7 @@
 #include <boost/asio/detached.hpp>
 #include <boost/asio/post.hpp>
 
+#include "bridge/net/link_figures.hpp"
 #include "bridge/net/server_impl.hpp"
 #include "bridge/net/tcp_options.hpp"
 #include "bridge/wire/parse.hpp"
@@ -138,7 +139,7 @@ bool Server::Impl::obey(const std::shared_ptr<Viewer>& viewer, std::span<const s
   viewer->heard_ns = now_ns;
   if (now_ns - viewer->measured_ns >= kMeasureNs) {
     viewer->measured_ns = now_ns;
-    viewer->stream->set_round_trip(least_round_trip_ns(viewer->fd()));
+    viewer->stream->set_round_trip(link_figures(viewer->fd()).least_round_trip_ns);
   }
   return viewer->stream->acked(std::get<AckMessage>(*up), now_ns);
 }

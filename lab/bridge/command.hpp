@@ -21,7 +21,7 @@ class Command final : public LabCommand {
   double seconds_ = 15;
   std::uint64_t seed_ = 1;
   bool quick_ = false;
-  std::string only_;
+  std::string only_, link_;
   std::string page_;
 };
 

@@ -126,6 +126,12 @@ KillResult run_kills(const BridgeFiles& files, Killed side, int times, std::int3
       scene.networks.set_cut(true);
       sleep_s(3);
       scene.networks.set_cut(false);
+    } else if (side == Killed::interface) {
+      using Side = TwoNetworks::Side;
+      const Side machine = out.kills % 2 == 0 ? Side::near : Side::far;
+      scene.networks.set_interface(machine, false);
+      sleep_s(3);
+      scene.networks.set_interface(machine, true);
     } else if (side == Killed::serve) {
       scene.pair.kill_serve();
       scene.pair.start_serve();

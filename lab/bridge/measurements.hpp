@@ -45,8 +45,8 @@ struct KillResult {
   int equal = 0;         ///< times that the far volume was the near one's within 2 s
   double slowest_s = 0;  ///< of them
 };
-enum class Killed { serve, join, cable };
-/// `cable`: pulled for 3 s instead.
+enum class Killed { serve, join, cable, interface };
+/// `cable`: pulled for 3 s instead; `interface`: down for 3 s, of each machine by turns.
 [[nodiscard]] KillResult run_kills(const BridgeFiles& files, Killed side, int times,
                                    std::int32_t layers, std::uint64_t seed);
 

@@ -27,6 +27,7 @@
 namespace kerf::two_machines {
 namespace {
 
+constexpr const char* kDevice = "link0";
 constexpr const char* kOwnNetwork = "/proc/thread-self/ns/net";
 constexpr std::size_t kLargestPacket = 65536;
 
@@ -46,10 +47,16 @@ void put(const std::string& path, const std::string& text) {
   return out;
 }
 
-void bring_up(const File& any_socket, const char* device) {
+[[nodiscard]] File socket_of_any_kind() {
+  return File(socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0));
+}
+
+void bring(const File& any_socket, const char* device, bool up) {
   ifreq request = request_for(device);
-  request.ifr_flags = IFF_UP | IFF_RUNNING;
-  if (ioctl(any_socket.get(), SIOCSIFFLAGS, &request) != 0) fail(std::string(device) + " up");
+  request.ifr_flags = up ? IFF_UP | IFF_RUNNING : 0;
+  if (ioctl(any_socket.get(), SIOCSIFFLAGS, &request) != 0) {
+    fail(std::string(device) + (up ? " up" : " down"));
+  }
 }
 
 void set_address(const File& any_socket, const char* device, const char* address, int call) {
@@ -103,14 +110,14 @@ TwoNetworks::Machine TwoNetworks::make(const char* address) const {
               File(open("/dev/net/tun", O_RDWR | O_NONBLOCK | O_CLOEXEC))};
   if (out.network.get() < 0) fail(kOwnNetwork);
   if (out.device.get() < 0) fail("/dev/net/tun");
-  ifreq request = request_for("link0");
+  ifreq request = request_for(kDevice);
   request.ifr_flags = IFF_TUN | IFF_NO_PI;
   if (ioctl(out.device.get(), TUNSETIFF, &request) != 0) fail("TUN device");
-  const File any_socket(socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0));
-  set_address(any_socket, "link0", address, SIOCSIFADDR);
-  set_address(any_socket, "link0", "255.255.255.0", SIOCSIFNETMASK);
-  bring_up(any_socket, "link0");
-  bring_up(any_socket, "lo");
+  const File any_socket = socket_of_any_kind();
+  set_address(any_socket, kDevice, address, SIOCSIFADDR);
+  set_address(any_socket, kDevice, "255.255.255.0", SIOCSIFNETMASK);
+  bring(any_socket, kDevice, true);
+  bring(any_socket, "lo", true);
   return out;
 }
 
@@ -122,6 +129,13 @@ std::unique_ptr<sweep::Child> TwoNetworks::start(Side side,
   auto child = std::make_unique<sweep::Child>(arguments, output);
   if (setns(home_.get(), CLONE_NEWNET) != 0) fail("way back");
   return child;
+}
+
+void TwoNetworks::set_interface(Side side, bool up) const {
+  const Machine& machine = side == Side::near ? near_ : far_;
+  if (setns(machine.network.get(), CLONE_NEWNET) != 0) fail("entering a network");
+  bring(socket_of_any_kind(), kDevice, up);
+  if (setns(home_.get(), CLONE_NEWNET) != 0) fail("way back");
 }
 
 void TwoNetworks::relay() {

@@ -54,6 +54,8 @@ class TwoNetworks {
 
   /// Pulls the cable, and puts it back.
   void set_cut(bool cut) noexcept { cut_ = cut; }
+  /// `ip link set link0 up` or `down` on one of the machines: down, it has no way to the other.
+  void set_interface(Side side, bool up) const;
   /// Payload and headers that came out at the far end so far.
   [[nodiscard]] std::uint64_t bytes_to_far() const noexcept { return bytes_to_far_; }
 

@@ -2,13 +2,18 @@
 #include "bridge/net/qr_code.hpp"
 
 #include <cstddef>
+#include <cstdlib>
+#include <fstream>
 #include <string>
 #include <vector>
 
 #include <doctest/doctest.h>
 #include <qrencode.h>
 
+#include "tests/segment/test_folder.hpp"
+
 using kerf::bridge::qr_code;
+using kerf::test::TestFolder;
 
 namespace {
 
@@ -63,6 +68,37 @@ TEST_CASE("a QR code is the library's, black on white within four modules of whi
     CHECK(seen[4][4 + i]);
     CHECK(seen[4 + i][4]);
     CHECK(seen[7][4 + i] == (i != 1 && i != 5));
+  }
+}
+
+TEST_CASE("a decoder reads the address back") {
+  if (std::system("command -v zbarimg >/dev/null") != 0) {  // NOLINT(concurrency-mt-unsafe)
+    MESSAGE("skipped: zbarimg is missing; apt-get install zbar-tools");
+    return;
+  }
+  const TestFolder folder;
+  constexpr std::size_t kPixels = 4;  // of a module's edge
+  for (const std::string address :
+       {"https://10.0.0.1:7400/?token=0123456789abcdef",
+        "https://[2001:db8:85a3::8a2e:370:7334]:65535/?token=0123456789abcdef0123456789abcdef"}) {
+    const Modules seen = modules_of(qr_code(address));
+    const std::size_t edge = seen.size() * kPixels, wide = seen[0].size() * kPixels;
+    std::ofstream picture(folder / "code.pgm", std::ios::binary);
+    picture << "P5 " << wide << ' ' << edge << " 255\n";
+    for (std::size_t y = 0; y < edge; ++y) {
+      for (std::size_t x = 0; x < wide; ++x) {
+        picture.put(seen[y / kPixels][x / kPixels] ? '\0' : '\xff');
+      }
+    }
+    picture.close();
+    const std::string text = folder / "text";
+    const std::string command =
+        "zbarimg -q --raw " + (folder / "code.pgm").string() + " >" + text + " 2>/dev/null";
+    CHECK(std::system(command.c_str()) == 0);  // NOLINT(concurrency-mt-unsafe)
+    std::string line;
+    std::ifstream in(text);
+    CHECK(std::getline(in, line));
+    CHECK(line == address);
   }
 }
 

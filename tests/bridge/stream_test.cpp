@@ -157,7 +157,7 @@ TEST_CASE("no more frames are under way than there is credit, and no ack comes t
   std::vector<std::byte> message;
   bench.slot(stream);
   while (stream.next(bench.now_ns, message)) far.take(message);
-  CHECK(far.frames == LinkRate::kLeastWindow);
+  CHECK(far.frames == LinkRate::kLeastFrames);
   AckMessage ack = far.ack();
   ack.frame += 1;
   CHECK(!stream.acked(ack, bench.now_ns));
@@ -309,10 +309,10 @@ TEST_CASE("a link of 4 Mbit/s gives records a quarter, thinned, and always the n
   CHECK(std::is_sorted(far.ticks.begin(), far.ticks.end(), rising));
 }
 
-TEST_CASE("the window is twice what the link holds, and one") {
+TEST_CASE("the window is twice what the link holds, and a frame") {
   LinkRate link;
   link.set_round_trip(40'000'000);
-  CHECK(link.window() == LinkRate::kLeastWindow);
+  CHECK(link.window() == kMaxRawBytes);
   CHECK(link.bytes_per_s() == 0);
   // A frame of 1000 bytes leaves every 10 ms and is acknowledged 40 ms later: 100 a second.
   std::int64_t now_ns = 0;
@@ -322,15 +322,28 @@ TEST_CASE("the window is twice what the link holds, and one") {
     link.sent_frame(frame, 1000, now_ns);
   }
   CHECK(link.bytes_per_s() == doctest::Approx(100'000).epsilon(0.01));
-  CHECK(link.window() == 1 + 8);
+  CHECK(link.window() == doctest::Approx(kMaxRawBytes + 2 * 4000).epsilon(0.01));
   link.set_round_trip(std::int64_t{1} << 40);
-  CHECK(link.window() == LinkRate::kMostWindow);
+  CHECK(link.window() == LinkRate::kMostBytes);
   for (std::uint64_t frame = 101; frame <= 100 + LinkRate::kSamples; ++frame) {
     now_ns += 1'000'000'000;
     link.sent_frame(frame, 1000, now_ns);
     link.acked(frame, now_ns);
   }
   CHECK(link.bytes_per_s() < 20'000);  // the fast ones are forgotten
+}
+
+TEST_CASE("small frames are more under way than large ones, and two always") {
+  for (const std::size_t bytes : std::vector<std::size_t>{1'000, 4'000, 16'000, 20'000}) {
+    LinkRate link;
+    std::uint64_t frames = 0;
+    for (; link.has_credit(); ++frames) link.sent_frame(frames + 1, bytes, 1);
+    CHECK(frames == std::max(LinkRate::kLeastFrames, (kMaxRawBytes + bytes - 1) / bytes));
+    CHECK(link.waits_for_ack());
+    link.acked(frames, 2);
+    CHECK(link.has_credit());
+    CHECK(!link.waits_for_ack());
+  }
 }
 
 TEST_CASE("packing pays on links slower than speed (1 - 1 / ratio)") {

@@ -9,96 +9,11 @@ import sys
 import tempfile
 import time
 
-from browser import Page, find_chromium, pixels
+from browser import Page, find_chromium
+from case import Case, figure, HEIGHT, LIKE, likeness, PANEL, text_of, WIDTH
+from looks import looks_as_asked_by_volume_iso_and_opacity
 from rig import Rig, TOKEN
-
-# A picture is like another one where all but a thousandth of its pixels differ by `NEAR` at most of
-# 255: GPUs round differently, and a silhouette may take or leave a pixel. iso reads densities of 16
-# bits, blend sums hundreds of samples.
-NEAR = 6
-LIKE = 0.999
-WIDTH, HEIGHT = 780, 400  # of the window; the picture has what the panel leaves
-PANEL = (260, 170)        # of the native picture's own figures, upper left
-
-
-def likeness(a, b, panel=PANEL):
-    """The share of pixels that differ by NEAR at most; `panel` does not count."""
-    (width, height, first), (other_width, other_height, second) = pixels(a), pixels(b)
-    assert (width, height) == (other_width, other_height), (width, height, other_width, other_height)
-    alike = all_of_them = 0
-    for y in range(height):
-        x0 = min(panel[0], width) if y < panel[1] else 0
-        one, two = first[y][3 * x0:], second[y][3 * x0:]
-        differs = [abs(p - q) > NEAR for p, q in zip(one, two)]
-        bad = sum(any(differs[i:i + 3]) for i in range(0, len(differs), 3)) if any(differs) else 0
-        alike += width - x0 - bad
-        all_of_them += width - x0
-    return alike / all_of_them
-
-
-def figure(name):
-    """Of the panel, as JavaScript: a number."""
-    return (f"parseFloat([...document.querySelectorAll('#figures dt')]"
-            f".find(dt => dt.textContent.startsWith('{name}'))?.nextElementSibling.textContent ?? '0')")
-
-
-def text_of(selector):
-    return f"document.querySelector('{selector}')?.textContent ?? ''"
-
-
-class Case:
-    """What all cases share: a page that shows a tooth with a cut, which rests."""
-
-    def __init__(self, rig, chromium, folder):
-        self.rig, self.chromium, self.folder = rig, chromium, folder
-        self.bridge = ('--token-file', rig.path('tokens'), '--allow-commands', rig.path('tokens'))
-        self.address = rig.start_bridge('127.0.0.1:0', *self.bridge)
-        self.page = Page(chromium, folder)
-        self.page.size(WIDTH, HEIGHT)
-        self.page.go(self.address)
-        self.check(self.page.until(text_of('#state') + ".includes('no controller')"), 'the page waits for a controller')
-        # A hand that comes late, as on a busy machine, is a fault: then once more.
-        for _ in range(3):
-            rig.start_run()
-            self.check(self.page.until('document.body?.dataset.state === "live"'), 'it goes live')
-            # Ticks after which the hand rests. A page that came late has not seen what was cut before.
-            self.check(self.page.until('Number(document.body.dataset.tick) > 7000'), 'the hand has been there')
-            late = "document.getElementById('figures').textContent.includes('since joining')"
-            if self.page.until(f"{late} || {figure('removed')} > 0.1", 2):
-                break
-            print('  not cut: ' + self.page.evaluate(text_of('#banner')) + rig.log('controller'))
-            rig.end('controller')
-            rig.end('emulator')
-        else:
-            self.check(False, 'something is cut')
-        self.rest = self.settle()
-
-    def check(self, holds, what):
-        if not holds:
-            if 'KERF_PAGE_OUT' in os.environ:  # a file for what is seen then
-                with open(os.environ['KERF_PAGE_OUT'], 'wb') as out:
-                    out.write(self.page.picture())
-            raise AssertionError(what)
-        if what != 'the picture comes to rest':
-            print('  ' + what, flush=True)
-
-    def settle(self):
-        """The picture once it is drawn finely and nothing moves."""
-        self.check(self.page.until("document.getElementById('picture').dataset.state === 'at rest'", 40),
-                   'the picture comes to rest')
-        return self.canvas()
-
-    def canvas(self):
-        return self.page.picture(self.page.box('#picture'))
-
-    def middle(self):
-        x, y, width, height = self.page.box('#picture')
-        return x + width / 2, y + height / 2
-
-    def choose(self, selector, key):
-        """Focuses a control with a click's help and presses a key in it."""
-        self.page.evaluate(f"document.querySelector('{selector}').focus()")
-        self.page.key(key, code=key)
+from secured import is_secured
 
 
 def shows_what_the_visualizer_shows(case):
@@ -179,7 +94,7 @@ def is_reached_by_keyboard(case):
                                    " getComputedStyle(document.activeElement).outlineStyle]")
         reached.append(name)
         rings = rings and (ring != 'none' or name == 'BODY')
-    wanted = ['picture', 'tool', 'hold', 'go', 'renderer', 'clip', 'stereo', 'home', 'SUMMARY']
+    wanted = ['picture', 'tool', 'hold', 'go', 'renderer', 'iso', 'clip', 'stereo', 'home', 'SUMMARY']
     reached = [name for name in reached if name in wanted]  # from wherever the last click was
     reached = reached[reached.index('picture'):][:len(wanted)]
     case.check(reached == wanted, 'Tab reaches: ' + ' '.join(reached))
@@ -270,7 +185,7 @@ def says_what_is_missing(case):
 
 CASES = [shows_what_the_visualizer_shows, is_turned_by_mouse_fingers_and_keys, is_reached_by_keyboard,
          decodes_lz4_and_refuses_what_is_none, commands_where_allowed, is_small_and_breaks_no_rule,
-         tells_faults_and_ends, says_what_is_missing]
+         tells_faults_and_ends, says_what_is_missing, looks_as_asked_by_volume_iso_and_opacity, is_secured]
 
 
 def main():

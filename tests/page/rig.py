@@ -43,6 +43,29 @@ seconds = 0.5
 [[step]]
 hold = 3600
 '''
+# Two teeth beside each other, and a hand that stays away.
+TWO_TEETH = '''[[volume]]
+name = "molar"
+file = "phantom"
+size = [64, 64, 48]
+iso = ISO
+crop = false  # which the iso value decides
+[[volume]]
+name = "neighbour"
+file = "phantom"
+size = [64, 64, 48]
+iso = ISO
+crop = false  # which the iso value decides
+solid = false
+pose = { position_mm = [-12.5, -0.5, 0.0], orientation = [-0.704416, 0.061628, -0.061628, 0.704416] }
+[[tool]]
+shape = "ball"
+radius_mm = 1.0
+'''
+AWAY = '''start_mm = [4, 9, 1]
+[[step]]
+hold = 3600
+'''
 TOKEN = 'a-token-of-the-page-test'
 
 
@@ -54,8 +77,11 @@ class Rig:
         self.name = f'page-{os.getpid()}'
         self.processes = {}
         for file, text in (('scene.toml', SCENE), ('hand.toml', HAND), ('tokens', TOKEN + '\n')):
-            with open(self.path(file), 'w', opener=lambda p, f: os.open(p, f, 0o600)) as out:
-                out.write(text)
+            self.write(file, text)
+
+    def write(self, name, text):
+        with open(self.path(name), 'w', opener=lambda p, f: os.open(p, f, 0o600)) as out:
+            out.write(text)
 
     def path(self, name):
         return os.path.join(self.work, name)
@@ -103,6 +129,13 @@ class Rig:
                        check=True, stdout=subprocess.DEVNULL, timeout=60)
         with open(os.path.join(out, 'frame-0001.png'), 'rb') as picture:
             return picture.read()
+
+    def make_identity(self):
+        """Its folder; a CA and a certificate for 127.0.0.1."""
+        folder = self.path('identity')
+        subprocess.run([os.path.join(self.bin, 'kerf-bridge'), 'make-identity', folder, '--host', '127.0.0.1'],
+                       check=True, stdout=subprocess.DEVNULL)
+        return folder
 
     def close(self):
         for what in list(self.processes):

@@ -12,17 +12,18 @@ export function viewUniforms(view) {
 
 /** The layers of one eye, kept from frame to frame. */
 export class Eye {
-  constructor(gl, width, height, volumes, translucent) {
+  /** `blended`: how many volumes are looked into. */
+  constructor(gl, width, height, blended) {
     this.gl = gl;
     this.all = {x0: 0, y0: 0, x1: width, y1: height};
     this.opaque = new Target(gl, width, height, [gl.RGBA8]);
     this.stage = new Target(gl, width, height, [gl.RGBA8]);
     this.smooth = new Target(gl, width, height, [gl.RGBA8], false);
-    this.layers = translucent ? volumes : 1;
+    this.layers = Math.max(blended, 1);
     this.entry = texture(gl, gl.TEXTURE_2D_ARRAY, gl.R32F, gl.NEAREST, [width, height, this.layers]);
     this.entries = new Target(gl, width, height, []);
     // Linear light, which a sum of hundreds of faint samples needs, and depth.
-    this.gathered = translucent ? new Target(gl, width, height, [gl.RGBA16F, gl.R32F], false) : null;
+    this.gathered = blended > 0 ? new Target(gl, width, height, [gl.RGBA16F, gl.R32F], false) : null;
   }
   free() {
     this.gl.deleteTexture(this.entry);

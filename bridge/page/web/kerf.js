@@ -4,6 +4,7 @@ import {CommandKind, kLastOfPass, kMayCommand, kRunEnded, records, ReplyStatus} 
 import {handOf} from './hand.js';
 import {listen} from './input.js';
 import {Link} from './link.js';
+import {LookControls} from './look.js';
 import {bannerOf, Plot, showBanner, showFigures} from './panel.js';
 import {materialOf, sceneView} from './scene.js';
 import {Stage} from './stage.js';
@@ -78,6 +79,7 @@ try {
 } catch (problem) {
   missing(`${problem.message} The figures are shown without a picture.`);
 }
+const look = new LookControls(stage);
 
 /** All of a run's volumes are here. */
 function begin() {
@@ -86,6 +88,7 @@ function begin() {
   const choice = element('tool');
   choice.replaceChildren(...scene.tools.map((tool, i) => new Option(tool.name, i)));
   stage?.setScene(scene);
+  look.begin(scene);
 }
 
 /** mm3 by material, in the order of the scene; what has none last. */
@@ -119,23 +122,6 @@ function showNews() {
 }
 setInterval(showNews, kFiguresMs);
 
-// The look.
-
-const toggled = id => element(id).click();
-element('renderer').addEventListener('change', ({target}) => stage?.setLook({renderer: target.value}));
-function readClip() {
-  const axis = Number(document.querySelector('input[name="axis"]:checked').value);
-  element('plane').hidden = !element('clip').checked;
-  stage?.setLook({clip: {on: element('clip').checked, axis, at: Number(element('place').value)}});
-}
-element('clip').addEventListener('change', readClip);
-element('plane').addEventListener('input', readClip);
-element('stereo').addEventListener('change', ({target}) => {
-  stage?.setLook({stereo: target.checked});
-  stage?.home();
-});
-element('home').addEventListener('click', () => stage?.home());
-
 // What is sent back, where that is allowed.
 
 const wishes = new Map();  // by the number under which a command was sent
@@ -165,12 +151,9 @@ reset.addEventListener('click', () => {
 });
 
 if (stage) {
-  const next = () => {
-    const choice = element('renderer');
-    choice.selectedIndex = (choice.selectedIndex + 1) % choice.length;
-    stage.setLook({renderer: choice.value});
-  };
-  listen(stage, {r: () => stage.home(), v: next, c: () => toggled('clip'), t: () => toggled('stereo')});
+  const toggled = id => element(id).click();
+  listen(stage, {r: () => stage.home(), v: () => look.nextRenderer(), c: () => toggled('clip'),
+    t: () => toggled('stereo')});
 }
 // A token in the address has done its work once the page is here: a cookie holds it.
 if (location.search) history.replaceState(null, '', location.pathname);

@@ -12,7 +12,7 @@ const smoothstep = (low, high, x) => {
 };
 
 /** In equal ratios from the softest to the hardest; among equals the first is the softer. */
-function defaultOpacity(materials, index) {
+export function defaultOpacity(materials, index) {
   if (materials.length < 3) return kSoftestOpacity;
   const {iso} = materials[index];
   const softer = materials.filter((one, m) =>
@@ -23,7 +23,7 @@ function defaultOpacity(materials, index) {
 /** Two rows of `kPaletteWidth` linear colours with opacity: by density, and by label. */
 export function palette(materials) {
   const looks = materials.map((one, label) =>
-    ({iso: one.iso, label, colour: [...one.colour, defaultOpacity(materials, label)]})).slice(1)
+    ({iso: one.iso, label, colour: [...one.colour, one.opacity ?? defaultOpacity(materials, label)]})).slice(1)
     .sort((a, b) => a.iso - b.iso);
   const rows = new Float32Array(8 * kPaletteWidth);
   for (let i = 0; i < kPaletteWidth; ++i) {

@@ -15,14 +15,15 @@ const kSmoothingReach = 3;  // pixels
 const kUnitsPerVolume = 3;
 
 export class Painter {
-  /** Uploads all of a scene. `renderer`: iso or blend. */
-  constructor(gl, scene, renderer) {
-    Object.assign(this, {gl, scene, renderer, eyes: []});
-    this.translucent = renderer === 'blend';
+  /** Uploads all of a scene. `kindOf(volume)`: iso or blend. */
+  constructor(gl, scene, kindOf) {
+    Object.assign(this, {gl, scene, eyes: []});
+    const isBlend = scene.volumes.map((_, v) => kindOf(v) === 'blend');
+    this.blended = isBlend.filter(blend => blend).length;
     const units = gl.getParameter(gl.MAX_TEXTURE_IMAGE_UNITS);
     const most = Math.floor((units - 3) / kUnitsPerVolume);
-    if (this.translucent && scene.volumes.length > most) {
-      throw new Error(`${scene.volumes.length} volumes, and this browser has texture units for ${most}; take iso`);
+    if (this.blended > most) {
+      throw new Error(`${this.blended} volumes, and this browser has texture units for ${most}; take iso`);
     }
     const limit = gl.getParameter(gl.MAX_3D_TEXTURE_SIZE) - 2;
     for (const {name, volume} of scene.volumes) {
@@ -31,50 +32,62 @@ export class Painter {
       }
     }
     const rows = palette(scene.materials);
-    this.makePrograms(rows);
-    this.volumes = scene.volumes.map(view =>
-      this.translucent ? new TranslucentOnGpu(gl, view, scene.materials, rows) : new SolidOnGpu(gl, view));
-    this.hand = new HandPainter(gl, scene);
-    if (this.translucent) this.setConstants();
-  }
-
-  makePrograms(rows) {
-    const {gl, scene} = this;
-    const count = scene.volumes.length;
+    this.volumes = scene.volumes.map((view, v) => isBlend[v] ?
+      new TranslucentOnGpu(gl, view, scene.materials, rows) : new SolidOnGpu(gl, view));
+    this.solids = this.volumes.filter((_, v) => !isBlend[v]);
+    this.translucents = this.volumes.filter((_, v) => isBlend[v]);
+    // Half floats: they are filtered everywhere.
+    this.palette = texture(gl, gl.TEXTURE_2D, gl.RGBA16F, gl.LINEAR, [kPaletteWidth, 2]);
+    this.byDensity = texture(gl, gl.TEXTURE_2D, gl.RGBA16F, gl.LINEAR, [kPaletteWidth, Math.max(this.blended, 1)]);
+    this.uploadPalettes(rows);
     this.backdrop = new Program(gl, 'backdrop');
     this.smooth = new Program(gl, 'smooth');
     this.shown = new Program(gl, 'shown');
     this.faces = new Program(gl, 'cell_faces');
-    // Half floats: they are filtered everywhere.
-    const palettes = this.translucent ? count : 2;
-    this.palette = texture(gl, gl.TEXTURE_2D, gl.RGBA16F, gl.LINEAR, [kPaletteWidth, palettes]);
-    for (let row = 0; row < palettes; ++row) {
-      const from = this.translucent ? 0 : 4 * kPaletteWidth * row;
-      gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, row, kPaletteWidth, 1, gl.RGBA, gl.FLOAT, rows, from);
+    if (this.solids.length > 0) this.makeIso();
+    if (this.blended > 0) this.makeBlend();
+    this.hand = new HandPainter(gl, scene);
+  }
+
+  uploadPalettes(rows) {
+    const {gl} = this;
+    gl.bindTexture(gl.TEXTURE_2D, this.palette);
+    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, kPaletteWidth, 2, gl.RGBA, gl.FLOAT, rows);
+    gl.bindTexture(gl.TEXTURE_2D, this.byDensity);
+    for (let v = 0; v < this.blended; ++v) {
+      gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, v, kPaletteWidth, 1, gl.RGBA, gl.FLOAT, rows);
     }
-    if (!this.translucent) {
-      this.cast = new Program(gl, 'iso');
-      this.cast.use();
-      this.cast.setInts({u_density: 0, u_label: 1, u_active_cell: 2, u_entry_mm: 4, u_palette: 5});
-      this.cast.set({u_step_vox: kIsoStepVox});
-      return;
-    }
-    const each = scene.volumes.map((_, v) => `f(${v})`).join(' ');
-    const labelled = scene.volumes.map(({volume}) => volume.labels !== null).join(', ');
-    this.cast = new Program(gl, 'blend', `#define KERF_VOLUMES ${count}\n` +
+  }
+
+  /** Other colours and opacities of the same materials. */
+  setMaterials(materials) {
+    const rows = palette(materials);
+    this.uploadPalettes(rows);
+    for (const volume of this.translucents) volume.setRows(rows);
+  }
+
+  makeIso() {
+    this.iso = new Program(this.gl, 'iso');
+    this.iso.use();
+    this.iso.setInts({u_density: 0, u_label: 1, u_active_cell: 2, u_entry_mm: 4, u_palette: 5});
+    this.iso.set({u_step_vox: kIsoStepVox});
+  }
+
+  makeBlend() {
+    const {gl, translucents} = this;
+    const each = translucents.map((_, v) => `f(${v})`).join(' ');
+    const labelled = translucents.map(({volume}) => volume.labels !== null).join(', ');
+    this.cast = new Program(gl, 'blend', `#define KERF_VOLUMES ${this.blended}\n` +
       `#define KERF_EACH_VOLUME(f) ${each}\n#define KERF_HAS_LABELS bool[](${labelled})\n`);
     this.layer = new Program(gl, 'layer');
     this.layer.use();
     this.layer.setInts({u_colour: 0, u_depth: 1});
-  }
-
-  setConstants() {
-    const unit = kUnitsPerVolume * this.volumes.length;
-    const edge = Math.min(...this.scene.volumes.map(view => view.edge));
+    const unit = kUnitsPerVolume * this.blended;
+    const edge = Math.min(...translucents.map(({view}) => view.edge));
     this.cast.use();
     this.cast.setInts({u_by_density: unit, u_entry_mm: unit + 1, u_opaque_depth: unit + 2});
     this.cast.set({u_least_extinction: leastExtinction, u_step_mm: kBlendStepVox * edge});
-    this.volumes.forEach((volume, v) => {
+    translucents.forEach((volume, v) => {
       const first = kUnitsPerVolume * v;
       this.cast.setInts({[`u_voxel[${v}]`]: first, [`u_material[${v}]`]: first + 1,
         [`u_active_cell[${v}]`]: first + 2});
@@ -109,7 +122,7 @@ export class Painter {
     if (same) return false;
     for (const eye of this.eyes) eye.free();
     this.eyes = Array.from({length: eyes},
-      () => new Eye(this.gl, width, height, this.volumes.length, this.translucent));
+      () => new Eye(this.gl, width, height, this.blended));
     return true;
   }
 
@@ -131,10 +144,10 @@ export class Painter {
     eye.stage.copy(eye.opaque, stage);
     eye.stage.bind(stage);
     if (hand) this.hand.drawTool(view, hand);
-    if (this.translucent) this.blend(eye, view, stage);
+    if (this.blended > 0) this.blend(eye, view, stage);
     if (hand) this.hand.drawForce(view, hand);
     this.smoothEdges(eye, clippedRect(grownRect(stage, kSmoothingReach), eye.all));
-    const cast = this.translucent ? stage : volumes;
+    const cast = this.blended > 0 ? stage : volumes;
     return isEmptyRect(cast) ? 0 : (cast.x1 - cast.x0) * (cast.y1 - cast.y0);
   }
 
@@ -147,17 +160,16 @@ export class Painter {
     this.backdrop.use();
     cover(gl);
     gl.depthFunc(gl.LESS);
-    if (this.translucent) return;
-    for (const volume of this.volumes) {
+    for (const volume of this.solids) {
       this.drawEntries(eye, 0, volume, view, part);
       eye.opaque.bind(part);
       volume.bind();
       bind(gl, 4, gl.TEXTURE_2D_ARRAY, eye.entry);
       bind(gl, 5, gl.TEXTURE_2D, this.palette);
-      this.cast.use();
-      this.cast.set({...viewUniforms(view), u_iso: volume.view.iso / 65535, u_texels: volume.texels,
+      this.iso.use();
+      this.iso.set({...viewUniforms(view), u_iso: volume.view.iso / 65535, u_texels: volume.texels,
         u_texture_from_eye: affineInverse(multiply(view.eyeFromWorld, volume.worldFromTexture))});
-      this.cast.setInts({u_has_labels: volume.volume.labels ? 1 : 0});
+      this.iso.setInts({u_has_labels: volume.volume.labels ? 1 : 0});
       cover(gl);
     }
   }
@@ -182,21 +194,21 @@ export class Painter {
 
   blend(eye, view, part) {
     const {gl} = this;
-    this.volumes.forEach((volume, v) => this.drawEntries(eye, v, volume, view, part));
+    this.translucents.forEach((volume, v) => this.drawEntries(eye, v, volume, view, part));
     eye.gathered.bind(part);
     gl.clearBufferfv(gl.COLOR, 0, [0, 0, 0, 0]);
     gl.clearBufferfv(gl.COLOR, 1, [1, 0, 0, 0]);
     gl.disable(gl.DEPTH_TEST);
     this.cast.use();
-    this.volumes.forEach((volume, v) => {
+    this.translucents.forEach((volume, v) => {
       volume.bind(kUnitsPerVolume * v);
       const textureFromEye = affineInverse(multiply(view.eyeFromWorld, volume.worldFromTexture));
       // A gradient per voxel edge goes to the eye's millimetres by the transposed Jacobian.
       const turned = [0, 1, 2].flatMap(c => [0, 1, 2].map(r => textureFromEye[4 * r + c] * volume.texels[c]));
       this.cast.set({[`u_texture_from_eye[${v}]`]: textureFromEye, [`u_eye_from_gradient[${v}]`]: turned});
     });
-    const unit = kUnitsPerVolume * this.volumes.length;
-    bind(gl, unit, gl.TEXTURE_2D, this.palette);
+    const unit = kUnitsPerVolume * this.blended;
+    bind(gl, unit, gl.TEXTURE_2D, this.byDensity);
     bind(gl, unit + 1, gl.TEXTURE_2D_ARRAY, eye.entry);
     bind(gl, unit + 2, gl.TEXTURE_2D, eye.stage.depth);
     this.cast.set(viewUniforms(view));
@@ -242,9 +254,10 @@ export class Painter {
 
   free() {
     for (const one of [...this.eyes, ...this.volumes, this.hand, this.backdrop, this.smooth, this.shown, this.faces,
-      this.cast, this.layer]) {
+      this.iso, this.cast, this.layer]) {
       one?.free();
     }
     this.gl.deleteTexture(this.palette);
+    this.gl.deleteTexture(this.byDensity);
   }
 }

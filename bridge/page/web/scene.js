@@ -25,14 +25,24 @@ function toolView(text) {
     radius: facets.points_mm.reduce((most, [x, , z]) => Math.max(most, Math.hypot(x, z)), radius)};
 }
 
+/** The first solid volume, else the first one. */
+export const mainVolume = scene => scene.volumes.find(view => view.solid) ?? scene.volumes[0];
+
 /** {volumes, tools, materials, main, corners}; throws where the text is not of this version. */
 export function sceneView(held) {
   const text = held.sceneJson;
   const volumes = held.volumes.map((volume, i) => volumeView(volume, text.volumes[i]));
   return {volumes, tools: text.tools.map(toolView),
     materials: text.materials.map(({name, iso, colour}) => ({name, iso, colour})),
-    main: volumes.find(view => view.solid) ?? volumes[0],
+    main: mainVolume({volumes}),
     corners: volumes.flatMap(view => view.corners)};
+}
+
+/** The scene with the iso value (null: each volume its own) and the opacities of a look. */
+export function sceneIn(scene, {iso, opacities}) {
+  return {...scene,
+    volumes: scene.volumes.map(view => iso === null ? view : {...view, iso: Math.round(iso * kFull)}),
+    materials: scene.materials.map(one => ({...one, opacity: opacities[one.name]}))};
 }
 
 /** The material of a voxel by its label, else by its density: which counts what is removed. */

@@ -7,6 +7,7 @@ import {contextOf, enableExtensions} from './gl.js';
 import {sameHand} from './hand.js';
 import {mix} from './math.js';
 import {Painter} from './painter.js';
+import {sceneIn} from './scene.js';
 
 const kBudgetMs = 85;      // of one picture while things move: ten a second with some room
 const kRestMs = 250;       // without motion: the picture is drawn finely again
@@ -20,7 +21,7 @@ export class Stage {
     Object.assign(this, {canvas, trouble});
     this.gl = contextOf(canvas);
     this.camera = new OrbitCamera();
-    this.look = {renderer: 'iso', clip: {on: false, axis: 2, at: 0.5}, stereo: false};
+    this.look = {kinds: [], iso: null, opacities: {}, clip: {on: false, axis: 2, at: 0.5}, stereo: false};
     this.scale = 1;
     this.costMs = 0;  // of a pixel of volumes
     this.share = 0;   // of a picture that is drawn again where the camera rests
@@ -58,13 +59,17 @@ export class Stage {
     if (this.scene) this.camera.frame(this.scene.corners, this.aspect);
     this.touch();
   }
+  /** The renderer of a volume: iso or blend. */
+  kindOf(volume) {
+    return this.look.kinds[volume] ?? 'iso';
+  }
   rebuild() {
     this.painter?.free();
     this.painter = null;
     this.stale = true;
     this.untaught = 2;
     try {
-      this.painter = new Painter(this.gl, this.scene, this.look.renderer);
+      this.painter = new Painter(this.gl, sceneIn(this.scene, this.look), v => this.kindOf(v));
     } catch (problem) {
       this.trouble(`${problem.message}.`);
     }
@@ -77,9 +82,11 @@ export class Stage {
   setLook(change) {
     const before = this.look;
     this.look = {...before, ...change};
-    if (this.look.renderer !== before.renderer && this.scene) {
+    if (this.scene && (String(this.look.kinds) !== String(before.kinds) || this.look.iso !== before.iso)) {
       this.trouble('');
       this.rebuild();
+    } else if (this.look.opacities !== before.opacities) {
+      this.painter?.setMaterials(sceneIn(this.scene, this.look).materials);
     }
     this.touch();
   }

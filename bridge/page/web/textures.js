@@ -166,6 +166,14 @@ export class TranslucentOnGpu extends VolumeOnGpu {
     this.voxels.upload(from, to, texels);
     if (this.materialTexels) this.materials.upload(low, high, this.materialTexels.of(low, high));
   }
+  /** Other colours and opacities: of labels; by density the palette has them. */
+  setRows(rows) {
+    if (!this.materialTexels) return;
+    this.materialTexels = new MaterialTexels(this.volume, rows);
+    this.gl.pixelStorei(this.gl.UNPACK_ALIGNMENT, 1);
+    const low = [0, 0, 0], high = this.volume.size;
+    this.materials.upload(low, high, this.materialTexels.of(low, high));
+  }
   take() {
     const bricks = super.take();
     this.begun = true;

@@ -44,6 +44,7 @@ using Place = std::array<double, 3>;
 struct Picture {
   VoxelGrid grid;
   std::vector<Density> density;
+  std::vector<Label> labels;  ///< of an image of 8 bits
   igtl::Matrix4x4 matrix{};
   std::array<float, 3> spacing{};
   int whole = 0, parts = 0;
@@ -136,7 +137,8 @@ class Client {
     int size[3], part[3], at[3];
     image->GetDimensions(size);
     image->GetSubVolume(part, at);
-    REQUIRE(image->GetScalarType() == igtl::ImageMessage::TYPE_UINT16);
+    const bool is_labels = image->GetScalarType() == igtl::ImageMessage::TYPE_UINT8;
+    if (!is_labels) REQUIRE(image->GetScalarType() == igtl::ImageMessage::TYPE_UINT16);
     REQUIRE(image->GetEndian() == igtl::ImageMessage::ENDIAN_LITTLE);
     CHECK(image->GetCoordinateSystem() == igtl::ImageMessage::COORDINATE_RAS);
     image->GetMatrix(picture.matrix);
@@ -149,6 +151,12 @@ class Client {
       picture.density.assign(grid.voxel_count(), 0);
     }
     (whole ? picture.whole : picture.parts) += 1;
+    if (is_labels) {
+      REQUIRE(whole);
+      const auto* const first = static_cast<const Label*>(image->GetScalarPointer());
+      picture.labels.assign(first, first + grid.voxel_count());
+      return true;
+    }
     const auto voxels = static_cast<std::size_t>(part[0]) * static_cast<std::size_t>(part[1]) *
                         static_cast<std::size_t>(part[2]);
     if (!whole) picture.part_voxels = std::max(picture.part_voxels, voxels);
@@ -239,6 +247,47 @@ TEST_CASE("volumes, tool and force lie in RAS as they lie in the scene") {
   CHECK(near({m[0][1], m[1][1], m[2][1]}, {1, 0, 0}));
   CHECK(near({m[0][2], m[1][2], m[2][2]}, {0, 0, 1}));
   CHECK(client.force_n == Place{-0.5, -0.25, -1});
+}
+
+TEST_CASE("labels come once a client and a run, beside their volume and where it lies") {
+  const TestFolder folder;
+  NoiseVolume tooth({12, 9, 7}), bare({8, 8, 8}, 2);
+  for (std::size_t i = 0; i < tooth.density.size(); ++i) {
+    tooth.labels.push_back(static_cast<Label>(i * 7 % 256));
+  }
+  const IgtlOutput output(options_for("igtl"));
+  Client early(output.port());
+  for (int life = 0; life < 2; ++life) {
+    SegmentSpec spec = spec_of(tooth);
+    spec.volumes.push_back(bare.spec());
+    spec.volumes[0].spacing_mm = {0.5, 0.25, 2};
+    spec.scene_json = scene_text({"tooth", "bone"});
+    SegmentWriter writer = SegmentWriter::create(spec);
+    const SegmentServer server("igtl", writer);
+    publish_tick(writer, 1, record_at({1, 2, 3}, {0, 0, 0, 1}, {0, 0, 0}));
+    Client late(output.port());
+    for (Client* const client : {&early, &late}) {
+      const int runs = client == &early ? life + 1 : 1;
+      client->take_until([&] { return client->pictures["tooth labels"].whole == runs; });
+      const Picture& labels = client->pictures.at("tooth labels");
+      CHECK(labels.labels == tooth.labels);
+      const Picture& density = client->pictures.at("tooth");
+      CHECK(density.density == tooth.density);
+      CHECK(near(labels.ras_of(1, 2, 3), density.ras_of(1, 2, 3)));
+      CHECK(labels.spacing == density.spacing);
+    }
+    tooth.cut({{2, 2, 2}, {5, 6, 7}});
+    writer.begin_tick(2);
+    writer.publish_box(0, tooth.density, tooth.grid.box(), 1);
+    writer.end_tick(2'000'000);
+    for (Client* const client : {&early, &late}) {
+      client->take_until([&] { return client->pictures.at("tooth").density == tooth.density; });
+      CHECK(client->pictures.at("tooth labels").whole == (client == &early ? life + 1 : 1));
+      client->take_until([&] { return client->pictures.count("bone") == 1; });
+      CHECK(client->pictures.count("bone labels") == 0);
+    }
+    writer.set_lifecycle(Lifecycle::clean_end);
+  }
 }
 
 TEST_CASE("an unknown pose is not sent, and the force is") {
@@ -392,6 +441,11 @@ TEST_CASE("device names are the scene's, at most 20 bytes, and no two alike") {
   const auto names = device_names(segment);
   CHECK(names == std::vector<std::string>{"tooth", "tooth 2", "a molar of the upper",
                                           "a molar of the upp 4", "häääääääää"});
+  CHECK(label_names(names) == std::vector<std::string>{"tooth labels", "tooth 2 labels",
+                                                       "a molar of th labels",
+                                                       "a molar of  4 labels", "hääääää labels"});
+  CHECK(label_names({"a", "a labels"}) ==
+        std::vector<std::string>{"a 1 labels", "a labels labels"});
   segment.scene_json = "{";
   CHECK(device_names(segment)[4] == "volume 5");
 }

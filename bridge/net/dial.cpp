@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "bridge/net/dial.hpp"
+
+#include <chrono>
+#include <string>
+
+#include "bridge/wire/messages.hpp"
+
+namespace kerf::bridge {
+namespace {
+
+namespace websocket = beast::websocket;
+using asio::use_awaitable;
+using namespace std::chrono_literals;
+
+constexpr auto kConnectPatience = 1500ms;  // a lost SYN comes again after 1 s
+constexpr auto kGreetingPatience = 10s;    // TLS and HTTP over a slow link
+
+[[noreturn]] void throw_no_trust(const ServerTrust& trust, const ErrorCode& error) {
+  if (const std::string reason = trust.refusal(); !reason.empty()) throw Hopeless(reason);
+  if (error.category() == asio::error::get_ssl_category()) {
+    throw Hopeless("no TLS 1.3 there; is it a kerf-bridge serve, and off loopback?");
+  }
+  throw boost::system::system_error(error);
+}
+
+[[noreturn]] void throw_no_welcome(const ErrorCode& error, unsigned status) {
+  if (error != websocket::error::upgrade_declined) throw boost::system::system_error(error);
+  if (status == 400) throw Hopeless("takes no unencrypted viewers; take wss://");
+  if (status == 404) throw Hopeless("no kerf-bridge serve answers; take its port");
+  if (status == 421) {
+    throw Hopeless("does not know itself by this name; take the address it prints");
+  }
+  throw BridgeError("answers " + std::to_string(status) + "; is it a kerf-bridge serve?");
+}
+
+}  // namespace
+
+asio::awaitable<void> dial(WebSocket& ws, const BridgeAddress& address, ServerTrust& trust) {
+  Link& link = ws.next_layer();
+  beast::tcp_stream& tcp_stream = link.next_layer();
+  tcp::resolver resolver(ws.get_executor());
+  const auto places = co_await resolver.async_resolve(address.host, address.port, use_awaitable);
+  tcp_stream.expires_after(kConnectPatience);
+  co_await tcp_stream.async_connect(places, use_awaitable);
+  tcp_stream.socket().set_option(tcp::no_delay(true));
+  tcp_stream.expires_after(kGreetingPatience);
+  ErrorCode error;
+  if (link.is_tls()) {
+    trust.begin(link.tls().native_handle());
+    co_await link.tls().async_handshake(asio::ssl::stream_base::client, quiet(error));
+    if (error) throw_no_trust(trust, error);
+  }
+  ws.read_message_max(kMaxMessageBytes);
+  const std::string target =
+      kBridgePath + (address.token.empty() ? std::string() : "?token=" + address.token);
+  websocket::response_type response;
+  co_await ws.async_handshake(response, address.host_and_port(), target, quiet(error));
+  if (error) throw_no_welcome(error, response.result_int());
+  tcp_stream.expires_never();
+  ws.binary(true);
+}
+
+void throw_closed(std::uint16_t code) {
+  switch (static_cast<CloseCode>(code)) {
+    case CloseCode::no_token:
+      throw Hopeless("the token is not one of its own; take the address it prints");
+    case CloseCode::too_many:
+      throw BridgeError("has as many viewers as it takes");
+    case CloseCode::too_slow:
+      throw BridgeError("had no answer from here for 5 s");
+    case CloseCode::not_understood:
+      throw BridgeError("does not understand this program; use programs of one build");
+  }
+  throw BridgeError("closed the connection");
+}
+
+}  // namespace kerf::bridge
