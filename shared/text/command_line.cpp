@@ -61,6 +61,8 @@ bool take(const std::string& text, double& value) {
   if (number) value = *number;
   return number.has_value();
 }
+/// What is wrong with a text that no option takes, whatever its type: a name of nothing.
+constexpr const char* kEmpty = " is empty; give a value, or leave the option out";
 template <std::integral T>
 bool take(const std::string& text, T& value) {
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
@@ -115,8 +117,9 @@ std::string unexpected(const CLI::App& program, const CLI::App* chosen) {
     for (const CLI::Option* known : app.get_options()) names.push_back(known->get_name());
   };
   for (const CLI::App* command : program.get_subcommands([](const CLI::App*) { return true; })) {
-    if (command->get_option_no_throw(word) != nullptr) {
-      return word + " is an option of " + command->get_name() + "; write it after that word";
+    if (command != chosen && command->get_option_no_throw(word) != nullptr) {
+      return word + " is an option of " + command->get_name() +
+             (chosen == nullptr ? "; write it after that word" : ", not of " + chosen->get_name());
     }
     if (command == chosen) add_options(*command);
     if (chosen == nullptr) names.push_back(command->get_name());
@@ -149,8 +152,15 @@ std::string what_is_wrong(const CLI::App& program, const CLI::ParseError& error)
   const CLI::App& app = chosen.empty() ? program : *chosen.front();
   if (program.remaining_size(true) > 0) return unexpected(program, chosen.empty() ? nullptr : &app);
   if (chosen.empty() && program.get_require_subcommand_min() > 0) return "no command is given";
-  if (dynamic_cast<const CLI::ArgumentMismatch*>(&error) == nullptr) return error.what();
-  const std::string text = error.what(), name = text.substr(0, text.find_first_of(": "));
+  const std::string said = error.what(), first = said.substr(0, said.find(' '));
+  const std::string last = said.substr(said.rfind(' ') + 1);
+  if (dynamic_cast<const CLI::RequiredError*>(&error) != nullptr) return first + " is missing";
+  if (dynamic_cast<const CLI::RequiresError*>(&error) != nullptr)
+    return first + " needs " + last + "; give both";
+  if (dynamic_cast<const CLI::ExcludesError*>(&error) != nullptr)
+    return first + " and " + last + " exclude each other; leave one out";
+  if (dynamic_cast<const CLI::ArgumentMismatch*>(&error) == nullptr) return said;
+  const std::string name = said.substr(0, said.find_first_of(": "));
   const CLI::Option* option = app.get_option_no_throw(name);
   if (option == nullptr) return "--" + name + " takes no value; leave out what follows the =";
   const std::size_t count = option->count();
@@ -213,6 +223,8 @@ bool Option::given() const {
 template <class T>
 Option Arguments::option(const char* name, T& value, const std::string& meaning) {
   const auto take_all = [name, &value](const CLI::results_t& given) {
+    if (given.size() == 1 && given.front().empty())
+      throw CLI::ValidationError(name + std::string(kEmpty));
     if (Taken<T>::take_all(given, value)) return true;
     throw CLI::ValidationError(
         name, CLI::detail::join(given, ",") + not_taken<typename Taken<T>::Value>());
