@@ -6,6 +6,7 @@
 set -euo pipefail
 root=$(cd "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/.." && pwd)
 bin=${KERF_BIN:-$root/build/release/bin}
+if [[ ! -e $root/CMakeLists.txt ]]; then bin=${KERF_BIN:-$(readlink -m "$root/../../bin")}; fi  # installed
 impossible=0
 
 # row ok|warn|fail WHAT FOUND [EFFECT; WAY OUT]
@@ -15,7 +16,10 @@ row() {
   if [[ -n ${4:-} ]]; then printf '%21s%s\n' '' "$4"; fi
 }
 
-mapfile -t missing < <("$root/.ci/packages.sh" --missing build)
+missing=()
+if [[ -e $root/CMakeLists.txt ]]; then
+  mapfile -t missing < <("$root/.ci/packages.sh" --missing build)
+fi
 if ((${#missing[@]} == 0)); then
   row ok packages 'all that the build needs'
 elif ((EUID == 0)) || command -v sudo >/dev/null; then
@@ -65,7 +69,9 @@ else
   row warn FUSE 'no access to /dev/fuse' 'device nodes cannot be emulated; the socket port can'
 fi
 
-if lack=$("$root/hil/guest/guest.sh" lacks); then
+if [[ ! -e $root/CMakeLists.txt ]]; then
+  true  # installed: no tests
+elif lack=$("$root/hil/guest/guest.sh" lacks); then
   row ok QEMU "$(qemu-system-x86_64 --version | sed -n '1s/.*version \([0-9.]*\).*/\1/p')"
 else
   lack=${lack#guest: }

@@ -12,6 +12,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "shared/text/manual.hpp"
 #include "shared/text/number.hpp"
 #include "shared/text/words.hpp"
 
@@ -170,6 +171,61 @@ std::string what_is_wrong(const CLI::App& program, const CLI::ParseError& error)
          (option->get_expected_max() > option->get_expected_min() ? " or more" : "");
 }
 
+/// `{a,b,c}` in what the library shows of a value, which `member` wrote there.
+std::vector<std::string> choices_in(const std::string& type) {
+  const std::size_t from = type.find('{'), to = type.find('}');
+  std::vector<std::string> words;
+  if (to == type.npos) return words;
+  std::istringstream list(type.substr(from + 1, to - from - 1));
+  for (std::string word; std::getline(list, word, ',');) words.push_back(word);
+  return words;
+}
+
+ManualOption manual_of(const CLI::Option& option) {
+  ManualOption out;
+  out.meaning = option.get_description();
+  out.choices = choices_in(option.get_type_name());
+  if (option.get_expected_max() > 0) {
+    const std::string type = option.get_type_name();
+    out.value = type.substr(0, std::min(type.find(":{"), type.find(":[")));
+    const std::size_t range = type.find('['), end = type.rfind(']');
+    if (out.value.size() < range && end != type.npos) {  // not A[,B,C]
+      out.meaning += "; in " + type.substr(range, end + 1 - range);
+    }
+    const std::string usual = option.get_default_str();
+    if (!usual.empty()) out.meaning += " (default: " + usual + ")";
+  }
+  if (option.get_positional()) {
+    out.names = {option.get_name()};
+    return out;
+  }
+  for (const std::string& name : option.get_snames()) out.names.push_back("-" + name);
+  for (const std::string& name : option.get_lnames()) out.names.push_back("--" + name);
+  if (option.get_required()) out.meaning += "; needed";
+  for (const CLI::Option* other : option.get_needs()) out.meaning += "; needs " + other->get_name();
+  for (const CLI::Option* other : option.get_excludes())
+    out.meaning += "; not with " + other->get_name();
+  if (!option.get_envname().empty()) out.meaning += "; else $" + option.get_envname();
+  return out;
+}
+
+ManualPart manual_of(const CLI::App& app) {
+  ManualPart part{app.get_name(), app.get_description(), app.get_footer(), {}, {}};
+  for (const CLI::Option* option : app.get_options()) {
+    (option->get_positional() ? part.places : part.options).push_back(manual_of(*option));
+  }
+  return part;
+}
+
+/// What everything declared so far is for a reader.
+Manual manual_of(const CLI::App& program, const std::string& version) {
+  Manual manual{manual_of(program), {}, version};
+  for (const CLI::App* command : program.get_subcommands([](const CLI::App*) { return true; })) {
+    manual.commands.push_back(manual_of(*command));
+  }
+  return manual;
+}
+
 }  // namespace
 
 Option& Option::shown_as(const char* word) {
@@ -283,6 +339,12 @@ CommandLine::CommandLine(const std::string& about, const std::string& program,
 CommandLine::~CommandLine() = default;
 
 bool CommandLine::parse(int argc, const char* const* argv, std::ostream& out) {
+  const std::string_view only = argc == 2 ? argv[1] : "";
+  if (only == "--man" || only == "--completion") {
+    const Manual manual = manual_of(*app_, KERF_VERSION);
+    out << (only == "--man" ? man_page(manual) : bash_completion(manual));
+    return false;
+  }
   try {
     app_->parse(argc, argv);
     return true;

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+// A reader of a running controller: its tip and force, ten times a second, until it ends.    watch
+// [NAME]
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <exception>
+#include <thread>
+
+#include "shared/segment/hand_over.hpp"
+
+int main(int argc, char** argv) {
+  try {
+    const kerf::SegmentConnection connection = kerf::connect_segment(argc > 1 ? argv[1] : "kerf");
+    const kerf::SegmentReader& reader = connection.reader();
+    kerf::VolumeSnapshot volume;  // of the first one: what has changed is copied
+    while (connection.alive()) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(100));
+      reader.update(0, volume);
+      const auto last = reader.latest();
+      if (!last) continue;
+      const auto& [x, y, z] = last->position_mm;
+      const auto& [fx, fy, fz] = last->commanded_force_n;
+      std::printf("tick %ju: tip %.2f %.2f %.2f mm, force %.2f N, %zu bricks new\n",
+                  std::uintmax_t{last->tick}, x, y, z, std::hypot(fx, fy, fz),
+                  volume.changed.size());
+    }
+  } catch (const std::exception& error) {
+    return std::fprintf(stderr, "watch: %s\n", error.what()), 2;
+  }
+}
