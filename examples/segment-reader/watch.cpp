@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A reader of a running controller: its tip and force, ten times a second, until it ends.    watch
-// [NAME]
+// A reader of a running controller, ten times a second until it ends.    watch [NAME]
 #include <chrono>
 #include <cmath>
 #include <cstdio>
@@ -11,13 +10,12 @@
 
 int main(int argc, char** argv) {
   try {
-    const kerf::SegmentConnection connection = kerf::connect_segment(argc > 1 ? argv[1] : "kerf");
-    const kerf::SegmentReader& reader = connection.reader();
-    kerf::VolumeSnapshot volume;  // of the first one: what has changed is copied
+    const auto connection = kerf::connect_segment(argc > 1 ? argv[1] : "kerf");
+    kerf::VolumeSnapshot volume;  // the densities of the first one: what has changed is copied
     while (connection.alive()) {
       std::this_thread::sleep_for(std::chrono::milliseconds(100));
-      reader.update(0, volume);
-      const auto last = reader.latest();
+      connection.reader().update(0, volume);
+      const auto last = connection.reader().latest();
       if (!last) continue;
       const auto& [x, y, z] = last->position_mm;
       const auto& [fx, fy, fz] = last->commanded_force_n;

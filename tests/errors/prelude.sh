@@ -21,7 +21,11 @@ start() {
   until [[ -e socket ]]; do sleep 0.01; done
   kerf-controller --scene scenes/wall.toml --name "$1" --port socket:socket --rate 250 --seconds "$2" \
     --torque-scale 1,1,1 >/dev/null 2>&1 &
-  until [[ -e $XDG_RUNTIME_DIR/kerf/$1.sock ]]; do sleep 0.01; done
+  local controller=$!
+  until [[ -e $XDG_RUNTIME_DIR/kerf/$1.sock ]]; do
+    sleep 0.01
+    kill -0 $controller || exit
+  done
 }
 # record_log: a recording of half a second, log.
 record_log() {
