@@ -36,6 +36,7 @@ namespace {
 /// case.
 struct TextHeader {
   HeaderFields fields;
+  std::string first;      ///< line
   std::string stray;      ///< the first line after the first that has no separator
   std::uint64_t end = 0;  ///< offset of the byte after the header
 
@@ -67,6 +68,7 @@ TextHeader read_text(const fs::path& path, char separator, const std::string& la
     header.end = c == EOF ? fs::file_size(path) : static_cast<std::uint64_t>(in.tellg());
     if (c == EOF && line.empty()) return header;
     if (trimmed(line).empty() && last.empty()) return header;
+    if (lines == 0) header.first = line;
     const std::size_t at = line.find(separator);
     const bool says = !line.empty() && line.front() != '#';
     if (at == std::string::npos && says && lines > 0 && header.stray.empty()) header.stray = line;
@@ -177,9 +179,11 @@ void check_gzip(const fs::path& data, std::uint64_t offset) {
 VolumeHeader read_nrrd_header(const fs::path& path) {
   const TextHeader text = read_text(path, ':', "");
   const std::string sizes = text.get("sizes");
-  if (sizes.empty()) {
-    throw SceneError(path.string() +
-                     ": no NRRD header (`sizes` is missing); is it another format?");
+  const bool is_nrrd = text.first.starts_with("NRRD");
+  if (!is_nrrd || sizes.empty()) {
+    throw SceneError(path.string() + ": no NRRD header (" +
+                     (is_nrrd ? "`sizes` is missing" : "its first line is not NRRD0004") +
+                     "); is it another format?");
   }
   const bool names_files = lower(text.get("data file")).starts_with("list");  // a line for each
   if (!text.stray.empty() && !names_files) {

@@ -63,7 +63,7 @@ bool take(const std::string& text, double& value) {
   return number.has_value();
 }
 /// What is wrong with a text that no option takes, whatever its type: a name of nothing.
-constexpr const char* kEmpty = " is empty; give a value, or leave the option out";
+constexpr const char* kEmpty = " is empty; give a value, or leave it out";
 template <std::integral T>
 bool take(const std::string& text, T& value) {
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
