@@ -15,8 +15,17 @@ row() {
   if [[ -n ${4:-} ]]; then printf '%21s%s\n' '' "$4"; fi
 }
 
-mapfile -t missing < <("$root/.ci/packages.sh" --missing build)
-if ((${#missing[@]} == 0)); then
+missing=()
+installed=''
+if [[ ! -e $root/CMakeLists.txt ]]; then
+  installed=1  # its package asked for what it needs
+  bin=${KERF_BIN:-$(readlink -m "$root/../../bin")}
+else
+  mapfile -t missing < <("$root/.ci/packages.sh" --missing build)
+fi
+if [[ -n $installed ]]; then
+  row ok kerf "$("$bin/kerf-controller" --version), installed"
+elif ((${#missing[@]} == 0)); then
   row ok packages 'all that the build needs'
 elif ((EUID == 0)) || command -v sudo >/dev/null; then
   row warn packages "missing: ${missing[*]}" './kerf setup installs them'
@@ -24,7 +33,9 @@ else
   row fail packages "missing: ${missing[*]}" 'not root and no sudo: ask who may install packages'
 fi
 
-if command -v g++ >/dev/null; then
+if [[ -n $installed ]]; then
+  true
+elif command -v g++ >/dev/null; then
   row ok compiler "$(g++ --version | head -n 1)"
 else
   row warn compiler none './kerf setup installs g++'
@@ -65,7 +76,9 @@ else
   row warn FUSE 'no access to /dev/fuse' 'device nodes cannot be emulated; the socket port can'
 fi
 
-if lack=$("$root/hil/guest/guest.sh" lacks); then
+if [[ -n $installed ]]; then
+  true  # no tests
+elif lack=$("$root/hil/guest/guest.sh" lacks); then
   row ok QEMU "$(qemu-system-x86_64 --version | sed -n '1s/.*version \([0-9.]*\).*/\1/p')"
 else
   lack=${lack#guest: }
@@ -75,7 +88,7 @@ fi
 libraries=$(dpkg-query -W -f '${Package} ${Version}\n' libusb-1.0-0-dev libhidapi-dev \
   libseccomp-dev libinsighttoolkit5-dev 2>/dev/null | sed -E 's/(-dev)? ([0-9]+:)?([0-9.]+).*/ \3/' |
   paste -sd ',' | sed 's/,/, /g') || true
-row ok libraries "${libraries:-unknown: this is not Debian}"
+if [[ -z $installed ]]; then row ok libraries "${libraries:-unknown: this is not Debian}"; fi
 
 if [[ -n ${DISPLAY:-}${WAYLAND_DISPLAY:-} ]]; then
   row ok display "${WAYLAND_DISPLAY:-$DISPLAY}"

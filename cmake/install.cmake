@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-# `cmake --install`: programs, and what a project of one's own needs to build programs with laws of its
-# own (docs/own-law.md): headers, static libraries, find_package(kerf).
+# `cmake --install`, in two components. kerf: programs, ./kerf itself as `kerf`, what they need, man pages,
+# completion, docs. development: what a project of one's own needs to build upon kerf (docs/packages.md):
+# headers, static libraries, find_package(kerf).
 include(CMakePackageConfigHelpers)
 include(GNUInstallDirs)
+set(CMAKE_INSTALL_DEFAULT_COMPONENT_NAME kerf)
 
 # kerf_libraries(out folder): the libraries that are built in a folder and below.
 function(kerf_libraries out folder)
@@ -32,19 +34,61 @@ foreach(library ${libraries})  # kerf_law is kerf::law
   set_target_properties(${library} PROPERTIES EXPORT_NAME ${name})
 endforeach()
 
+set(programs kerf-controller kerf-emulator kerf-lab kerf-record kerf-recorder kerf-volume)
+foreach(program kerf-bridge kerf-visualizer)  # where their libraries are there
+  if(TARGET ${program})
+    list(APPEND programs ${program})
+  endif()
+endforeach()
+install(TARGETS ${programs})
+
+# Their man pages and completion, from their own command lines, and those of ./kerf.
+set(pages ${PROJECT_BINARY_DIR}/man)
+set(completion ${PROJECT_BINARY_DIR}/completion)
+file(MAKE_DIRECTORY ${pages} ${completion})
+foreach(program ${programs})
+  add_custom_command(OUTPUT ${pages}/${program}.1 ${completion}/${program}
+    COMMAND ${program} --man > ${pages}/${program}.1
+    COMMAND ${program} --completion > ${completion}/${program}
+    VERBATIM)
+  list(APPEND manuals ${pages}/${program}.1 ${completion}/${program})
+endforeach()
+add_custom_command(OUTPUT ${pages}/kerf.1 ${completion}/kerf
+  COMMAND cmake/kerf-manual.sh ${PROJECT_VERSION} > ${pages}/kerf.1
+  COMMAND cmake -E copy cmake/kerf-completion.sh ${completion}/kerf
+  WORKING_DIRECTORY ${PROJECT_SOURCE_DIR}
+  DEPENDS ${PROJECT_SOURCE_DIR}/kerf ${PROJECT_SOURCE_DIR}/cmake/kerf-manual.sh
+    ${PROJECT_SOURCE_DIR}/cmake/kerf-completion.sh VERBATIM)
+add_custom_target(manuals ALL DEPENDS ${manuals} ${pages}/kerf.1)
+install(DIRECTORY ${pages}/ DESTINATION ${CMAKE_INSTALL_MANDIR}/man1)
+install(DIRECTORY ${completion}/ DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions)
+
+# ./kerf looks for all else beside itself, and finds that it is installed.
+set(share ${CMAKE_INSTALL_DATADIR}/kerf)
+install(PROGRAMS kerf DESTINATION ${share})
+install(PROGRAMS .ci/doctor.sh DESTINATION ${share}/.ci)
+install(CODE "file(CREATE_LINK ../${share}/kerf
+  \"\$ENV{DESTDIR}\${CMAKE_INSTALL_PREFIX}/${CMAKE_INSTALL_BINDIR}/kerf\" SYMBOLIC)")
+install(DIRECTORY scenes DESTINATION ${share})
+install(DIRECTORY hil/faults DESTINATION ${share}/hil)
+install(DIRECTORY docs/ DESTINATION ${CMAKE_INSTALL_DOCDIR})
+install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR} RENAME copyright)
+install(FILES controller/device/60-kerf.rules DESTINATION lib/udev/rules.d)
+install(DIRECTORY examples python DESTINATION ${CMAKE_INSTALL_DOCDIR}
+  PATTERN __pycache__ EXCLUDE)
+
+set(CMAKE_INSTALL_DEFAULT_COMPONENT_NAME development)
 set(package ${CMAKE_INSTALL_LIBDIR}/cmake/kerf)
 set(headers ${CMAKE_INSTALL_INCLUDEDIR}/kerf)
 install(TARGETS ${libraries} EXPORT kerf
   ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR}/kerf INCLUDES DESTINATION ${headers})
 install(EXPORT kerf NAMESPACE kerf:: DESTINATION ${package} FILE kerf-targets.cmake)
-install(TARGETS kerf-controller kerf-emulator kerf-lab kerf-record kerf-recorder kerf-volume)
 install(DIRECTORY shared controller record hil lab DESTINATION ${headers}
   FILES_MATCHING PATTERN *.hpp)
 # What each program compiles for itself: a main, and the allocator that counts.
 install(FILES controller/main.cpp DESTINATION ${CMAKE_INSTALL_DATADIR}/kerf/controller)
 install(FILES lab/main.cpp DESTINATION ${CMAKE_INSTALL_DATADIR}/kerf/lab)
 install(FILES controller/shell/allocation_counter.cpp DESTINATION ${CMAKE_INSTALL_DATADIR}/kerf)
-install(DIRECTORY scenes DESTINATION ${CMAKE_INSTALL_DATADIR}/kerf)
 
 foreach(port usb hid)  # what these need, the project needs, too
   set(kerf_has_${port} OFF)
@@ -58,3 +102,4 @@ write_basic_package_version_file(${PROJECT_BINARY_DIR}/kerf-config-version.cmake
   COMPATIBILITY ExactVersion)
 install(FILES ${PROJECT_BINARY_DIR}/kerf-config.cmake ${PROJECT_BINARY_DIR}/kerf-config-version.cmake
   DESTINATION ${package})
+include(cmake/package.cmake)

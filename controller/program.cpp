@@ -14,8 +14,9 @@ int run_controller_program(int argc, char** argv) {
   keep_files_private();
   try {
     ControllerOptions options;
-    if (const auto code = parse_options(argc, argv, options)) return *code;
-    return options.probe ? run_probe(options) : run_controller(options);
+    const auto early = parse_options(argc, argv, options);
+    const int code = early ? *early : options.probe ? run_probe(options) : run_controller(options);
+    return when_told(code, "kerf-controller", std::cout, std::cerr);
   } catch (...) {
     std::cerr << "kerf-controller: " << failure_text() << '\n';
     return 2;

@@ -41,15 +41,17 @@ int run_lab(int argc, const char* const* argv, std::ostream& out, std::ostream& 
                                                    &energy, &extremes, &faults, &laws, &ranges,
                                                    &sweep,  &zwidth,   &merge};
   try {
-    if (!app.parse(argc, argv, out)) return 0;
-    for (const LabCommand* command : commands) {
-      if (command->chosen()) return command->run(out);
+    int code = 0;
+    if (app.parse(argc, argv, out)) {
+      for (const LabCommand* command : commands) {
+        if (command->chosen()) code = command->run(out);
+      }
     }
+    return when_told(code, "kerf-lab", out, err);
   } catch (...) {
     err << "kerf-lab: " << failure_text() << '\n';
     return 2;
   }
-  return 0;
 }
 
 }  // namespace kerf

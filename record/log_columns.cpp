@@ -141,7 +141,7 @@ constexpr std::string_view kHead =
 | `manifest.json` | length of a tick, voxels, losses of the recorder and where they lie, how the run ended |
 | `scene.json` | the scene as it was loaded, every setting |
 
-Three lines of NumPy read it (`examples/python/` has more):
+Three lines of NumPy read it (`python/` is a reader with more, `examples/python/` uses it):
 
     import numpy as np
     log = np.load("DIR/log/ticks.npy", mmap_mode="r")

@@ -51,7 +51,7 @@ int main(int argc, char** argv) {
   kerf::keep_files_private();
   kerf::make_signals_of_writes_errors();
   try {
-    return kerf::run_record(argc, argv);
+    return kerf::when_told(kerf::run_record(argc, argv), "kerf-record", std::cout, std::cerr);
   } catch (...) {
     std::cerr << "kerf-record: " << kerf::failure_text() << '\n';
     return 2;

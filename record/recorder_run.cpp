@@ -73,6 +73,8 @@ bool parse_options(int argc, char** argv, RecorderOptions& options) {
 }
 
 int run_recorder(const RecorderOptions& options, const std::atomic<bool>& stop) {
+  check_new_folder(options.out);
+  if (!options.report.empty()) check_new_file(options.report);
   const SegmentConnection connection = connect_within(options, stop);
   const SegmentReader& reader = connection.reader();
   std::error_code error;

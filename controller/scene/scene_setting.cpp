@@ -40,7 +40,7 @@ TomlNode& entry_of(TomlNode& table, std::string_view key) {
 SceneSetting parse_setting(std::string_view text, SceneKeys keys) {
   const std::size_t equals = text.find('=');
   const std::string place = "--set " + one_line(text);
-  if (equals == text.npos || equals + 1 == text.size() || one_line(text) != text) {
+  if (equals == text.npos || equals == 0 || equals + 1 == text.size() || one_line(text) != text) {
     refuse(place, ": not KEY=VALUE; write such as force.stiffness_n_per_mm=0.3");
   }
   const std::string_view key = text.substr(0, equals);

@@ -16,6 +16,7 @@
 #include "controller/volume/volume_limits.hpp"
 #include "controller/volume/volume_source.hpp"
 #include "shared/text/number.hpp"
+#include "shared/text/words.hpp"
 
 namespace kerf::volume {
 namespace fs = std::filesystem;
@@ -58,6 +59,19 @@ bool names_slice_distance(const itk::GDCMImageIO& io) {
   return dicom_distances(value_of(io, "0018|0088").value_or("")) == std::vector{1.0};
 }
 
+/// GDCM takes a factor of 0, or one that is no number, for 1.
+void refuse_broken_rescale(const fs::path& file, const itk::GDCMImageIO& io) {
+  for (const auto& [tag, name] :
+       {std::pair{"0028|1053", "RescaleSlope"}, {"0028|1052", "RescaleIntercept"}}) {
+    const auto text = value_of(io, tag);
+    if (!text || trimmed(*text).empty()) continue;
+    const auto value = number_in(trimmed(*text).substr(trimmed(*text).starts_with('+') ? 1 : 0));
+    if (value && (*value != 0 || tag == std::string_view("0028|1052"))) continue;
+    throw SceneError(file.string() + ": " + name + " " + one_line(trimmed(*text)) +
+                     " makes no values; correct the file, or export it again");
+  }
+}
+
 }  // namespace
 
 void read_dicom_file(const fs::path& path, const Offer& offer) {
@@ -69,6 +83,7 @@ void read_dicom_file(const fs::path& path, const Offer& offer) {
       throw SceneError(path.string() +
                        ": one slice; name the folder that holds the whole DICOM series");
     }
+    refuse_broken_rescale(path, *io);
     header.has_spacing = names_spacing(*io) && names_slice_distance(*io);
   }
   read_one_file(path, *io, header, offer);
@@ -98,6 +113,7 @@ std::vector<Series> all_series(const std::vector<fs::path>& files, SandboxReader
     if (!guarded(file, [&] { return io->CanReadFile(file.c_str()); })) continue;
     const std::array<std::int64_t, 3> size = open_image(file, *io);
     quiet.refuse_if_missing(file);
+    refuse_broken_rescale(file, *io);
     const std::string uid = value_of(*io, "0020|000e").value_or("");
     const double number = number_in(trimmed(value_of(*io, "0020|0011").value_or(""))).value_or(0);
     Series& series = found[{number, uid}];
@@ -140,7 +156,7 @@ std::size_t chosen_series(const fs::path& folder, const std::vector<Series>& all
   }
   throw SceneError(folder.string() + ": " + std::to_string(all.size()) + " DICOM series" +
                    (wanted.empty() ? "" : ", and --series " + wanted + " is not one of them") +
-                   "; choose one with --series:" + list);
+                   "; choose one with ./kerf volume import --series:" + list);
 }
 
 /// The images as one stack: what they have in common, and their order in space.

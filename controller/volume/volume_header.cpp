@@ -8,7 +8,6 @@
 #include <cmath>
 #include <fstream>
 #include <iomanip>
-#include <map>
 #include <new>
 #include <sstream>
 #include <string_view>
@@ -20,6 +19,7 @@
 
 #include "controller/scene/scene_error.hpp"
 #include "controller/volume/gz_file.hpp"
+#include "controller/volume/header_fields.hpp"
 #include "controller/volume/volume_limits.hpp"
 
 namespace kerf {
@@ -35,7 +35,9 @@ namespace {
 /// Lines of `key<separator>value` up to a blank line, the end, or the key `last`. Keys in lower
 /// case.
 struct TextHeader {
-  std::map<std::string, std::string> fields;
+  HeaderFields fields;
+  std::string first;      ///< line
+  std::string stray;      ///< the first line after the first that has no separator
   std::uint64_t end = 0;  ///< offset of the byte after the header
 
   [[nodiscard]] std::string get(const std::string& key) const {
@@ -66,7 +68,10 @@ TextHeader read_text(const fs::path& path, char separator, const std::string& la
     header.end = c == EOF ? fs::file_size(path) : static_cast<std::uint64_t>(in.tellg());
     if (c == EOF && line.empty()) return header;
     if (trimmed(line).empty() && last.empty()) return header;
+    if (lines == 0) header.first = line;
     const std::size_t at = line.find(separator);
+    const bool says = !line.empty() && line.front() != '#';
+    if (at == std::string::npos && says && lines > 0 && header.stray.empty()) header.stray = line;
     if (at == std::string::npos || line.front() == '#') continue;
     const std::string key = lower(trimmed(line.substr(0, at)));
     header.fields[key] = trimmed(line.substr(at + 1));
@@ -97,7 +102,7 @@ void check_sizes(const fs::path& path, const std::string& text) {
   std::vector<double> sizes = numbers(text);
   if (sizes.size() < 3) return;  // the number of axes is judged after reading
   constexpr double kFar = 1e15;  // far above the limit, and whole in 64 bits
-  for (double& s : sizes) s = std::clamp(s, -1.0, kFar);
+  for (double& s : sizes) s = std::clamp(s, -kFar, kFar);
   for (const double s : sizes) {
     if (s < 1.0 || s > static_cast<double>(kMaxVoxelsPerAxis)) {
       check_grid(path.string(), static_cast<std::int64_t>(sizes[0]),
@@ -136,8 +141,9 @@ void locate_data(VolumeHeader& header, const fs::path& path, const fs::path& dat
 
 /// ITK takes each length for mm, whatever the header says.
 void check_units(const fs::path& path, const TextHeader& text) {
-  constexpr std::array<std::string_view, 10> kOthers{
-      "m", "cm", "um", "\u00b5m", "\u03bcm", "nm", "micron", "microns", "micrometer", "in"};
+  constexpr std::array<std::string_view, 14> kOthers{
+      "m",      "cm",      "dm",         "um", "\u00b5m", "\u03bcm", "nm",
+      "micron", "microns", "micrometer", "in", "inch",    "inches",  "ft"};
   for (const char* const key : {"space units", "units"}) {
     std::istringstream words(text.get(key));
     for (std::string word; words >> std::quoted(word);) {
@@ -173,12 +179,24 @@ void check_gzip(const fs::path& data, std::uint64_t offset) {
 VolumeHeader read_nrrd_header(const fs::path& path) {
   const TextHeader text = read_text(path, ':', "");
   const std::string sizes = text.get("sizes");
-  if (sizes.empty()) {
-    throw SceneError(path.string() +
-                     ": no NRRD header (`sizes` is missing); is it another format?");
+  const bool is_nrrd = text.first.starts_with("NRRD");
+  if (!is_nrrd || sizes.empty()) {
+    throw SceneError(path.string() + ": no NRRD header (" +
+                     (is_nrrd ? "`sizes` is missing" : "its first line is not NRRD0004") +
+                     "); is it another format?");
   }
+  const bool names_files = lower(text.get("data file")).starts_with("list");  // a line for each
+  if (!text.stray.empty() && !names_files) {
+    throw SceneError(path.string() + ": the header's line '" + shown(text.stray) +
+                     "' is no 'field: value'; correct the header");
+  }
+  check_nrrd_fields(path, text.fields);
   check_sizes(path, sizes);
   check_units(path, text);
+  for (const char* const needed : {"dimension", "type", "encoding"}) {
+    if (text.get(needed).empty())
+      throw SceneError(path.string() + ": " + needed + ": is missing; correct the header");
+  }
   VolumeHeader header;
   const std::vector<double> spacings = numbers(text.get("spacings"));
   const std::vector<double> directions = numbers(text.get("space directions"));
@@ -215,6 +233,7 @@ VolumeHeader read_meta_header(const fs::path& path) {
                      ": no MetaImage header (`DimSize` or `ElementDataFile` is missing); is it "
                      "another format?");
   }
+  check_meta_fields(path, text.fields);
   check_sizes(path, sizes);
   VolumeHeader header;
   header.has_spacing = !text.get("elementspacing").empty() || !text.get("elementsize").empty();

@@ -110,6 +110,9 @@ ImportCommand::Files ImportCommand::files() const {
 }
 
 void ImportCommand::run(std::ostream& out) const {
+  if (!series_.empty() && fs::is_regular_file(path_)) {
+    throw SceneError("--series: " + path_ + " is one file; leave it out, or name the folder");
+  }
   const Files to = files();
   ReadOptions options;
   options.cpu_s = cpu_s_;
@@ -137,6 +140,9 @@ void ImportCommand::run(std::ostream& out) const {
 
   VolumeImage whole = apply_window(source, range);
   read_labels_beside(path_, whole, cpu_s_);
+  if (!whole.labels.empty() && !iso_.empty()) {
+    throw SceneError("--iso: the labels beside " + path_ + " tell what is solid; leave it out");
+  }
   if (!whole.labels.empty()) return import_labelled(std::move(whole), to, out);
   ProposedVolume proposed = propose_volume(std::move(whole), range, wishes);
   const VolumeProposal& proposal = proposed.proposal;

@@ -3,20 +3,22 @@
 """Spectrum of the force that was sent:  spectrum.py LOG-FOLDER PICTURE.png
 
 What hums stands out as a peak: the limit cycle of a wall that is too stiff, the spindle, a mode of the arm."""
-import json
+import pathlib
 import sys
 
 import matplotlib.pyplot as plt
 import numpy as np
 
+sys.path.append(str(pathlib.Path(__file__).resolve().parents[2] / "python"))  # or install that
+from kerf_reader import Log
+
 folder, picture = sys.argv[1:]
-log = np.load(folder + "/ticks.npy", mmap_mode="r")
-tick_s = json.load(open(folder + "/manifest.json"))["tick_ns"] * 1e-9
-force = log["commanded_force_n"][(log["flags"] & 512) != 0].astype(float)  # from the first tick in hand
+log = Log(folder)
+force = log["commanded_force_n"][log.started].astype(float)
 window = np.hanning(len(force))[:, None]
 # Amplitudes of a sine: twice the one-sided transform over the window's sum, along each axis of the device.
 amplitude = 2 * abs(np.fft.rfft(window * (force - force.mean(axis=0)), axis=0)) / window.sum()
-frequency = np.fft.rfftfreq(len(force), tick_s)
+frequency = np.fft.rfftfreq(len(force), log.tick_s)
 for axis, name in enumerate("xyz"):
     plt.loglog(frequency[1:], amplitude[1:, axis], label=name, linewidth=0.8)
 plt.xlabel("frequency (Hz)")

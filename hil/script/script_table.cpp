@@ -66,8 +66,10 @@ int ScriptTable::whole(std::string_view key, int otherwise, ScriptRange range) c
 
 void ScriptTable::read_list(std::string_view key, std::span<double> into, ScriptRange range) const {
   const TomlNode& list = *node_.find(key);
-  if (list.form != TomlNode::Form::array || list.entries.size() != into.size()) {
-    fail(list, key, ": not a list; write " + std::to_string(into.size()) + " numbers");
+  const std::string wanted = "; write " + std::to_string(into.size()) + " numbers";
+  if (list.form != TomlNode::Form::array) fail(list, key, ": not a list" + wanted);
+  if (list.entries.size() != into.size()) {
+    fail(list, key, ": a list of " + std::to_string(list.entries.size()) + wanted);
   }
   for (std::size_t i = 0; i < into.size(); ++i) into[i] = checked(list.entries[i], key, range);
 }

@@ -35,7 +35,8 @@ void guarded(const char* option, const Work& work) {
 int pin_lab(int core) {
   if (core < 0) core = allowed_cores().back();
   if (pin_to_core(core) != 0) {
-    throw HilError("--cpu " + std::to_string(core) + ": not a core that this process may use");
+    throw HilError("--cpu " + std::to_string(core) +
+                   ": not a core that this process may use; leave it out");
   }
   return core;
 }

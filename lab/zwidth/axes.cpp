@@ -159,7 +159,7 @@ void check(AxisId axis, const std::string& value) {
       static_cast<void>(law_choice(axis, LawKind::force, value));
   } else if (kind.lowest == kind.highest) {
     if (!has_word(kind.words, value))
-      fail(kind, value, std::string("is not one of: ") + kind.words);
+      fail(kind, value, std::string("is unknown; known: ") + kind.words);
   } else {
     const auto number = number_in(value);
     if (!number || *number < kind.lowest || *number > kind.highest) {

@@ -6,7 +6,11 @@
 #include <exception>
 #include <filesystem>
 #include <new>
+#include <ostream>
 #include <system_error>
+
+#include <poll.h>
+#include <unistd.h>
 
 namespace kerf {
 namespace {
@@ -15,6 +19,11 @@ namespace {
 std::string on_one_line(std::string text) {
   std::replace(text.begin(), text.end(), '\n', ' ');
   return text;
+}
+
+bool reader_left() noexcept {
+  pollfd out{STDOUT_FILENO, POLLOUT, 0};
+  return poll(&out, 1, 0) == 1 && (out.revents & POLLERR) != 0;
 }
 
 }  // namespace
@@ -47,6 +56,15 @@ std::string failure_text() {
   } catch (const std::exception& error) {
     return on_one_line(error.what());
   }
+}
+
+int when_told(int code, const char* program, std::ostream& out, std::ostream& err) {
+  errno = 0;
+  if (out.flush() || reader_left()) return code;
+  err << program << ": standard output: "
+      << (errno != 0 ? std::generic_category().message(errno) : "cannot be written")
+      << "; make room, or send it elsewhere" << std::endl;
+  return code == 0 ? 2 : code;
 }
 
 }  // namespace kerf

@@ -131,6 +131,19 @@ void check_new_file(const std::filesystem::path& path) {
   const NewFile never_committed(path);
 }
 
+void check_new_folder(const std::filesystem::path& folder) {
+  std::filesystem::path there = folder;
+  while (!there.empty() && !std::filesystem::exists(std::filesystem::symlink_status(there))) {
+    there = there.parent_path();
+  }
+  if (there.empty()) there = ".";
+  const bool is_folder = std::filesystem::is_directory(there);
+  if (is_folder && ::access(there.c_str(), W_OK | X_OK) == 0) return;
+  const int error = is_folder ? errno : ENOTDIR;
+  throw FileError(folder.string() + ": " + std::generic_category().message(error) +
+                  "; name a folder that can be written");
+}
+
 void write_new_file(const std::filesystem::path& path, std::string_view bytes) {
   NewFile file(path);
   file.write(bytes.data(), bytes.size());

@@ -65,6 +65,9 @@ class NewFile {
 /// nothing behind. For long runs.
 void check_new_file(const std::filesystem::path& path);
 
+/// Throws FileError where `folder` is something else or cannot be made or written; makes nothing.
+void check_new_folder(const std::filesystem::path& folder);
+
 /// All of `bytes` as one new file.
 void write_new_file(const std::filesystem::path& path, std::string_view bytes);
 

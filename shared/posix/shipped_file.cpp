@@ -13,7 +13,9 @@ std::string shipped_file(const std::string& name) {
   constexpr int kMostUp = 6;
   fs::path folder = fs::read_symlink("/proc/self/exe", error).parent_path();
   for (int up = 0; up <= kMostUp && !folder.empty(); ++up) {
-    if (fs::exists(folder / name, error)) return (folder / name).string();
+    for (const fs::path& place : {folder / name, folder / "share/kerf" / name}) {
+      if (fs::exists(place, error)) return place.string();
+    }
     if (folder == folder.root_path()) break;
     folder = folder.parent_path();
   }

@@ -35,7 +35,7 @@ UdpAddress resolve_udp(const std::string& text) {
   }
   UdpAddress address;
   if (!is_port(port)) {
-    address.error = "no port";
+    address.error = "'" + port + "' is no port from 0 to 65535";
     return address;
   }
   addrinfo wanted{};

@@ -12,6 +12,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "shared/text/manual.hpp"
 #include "shared/text/number.hpp"
 #include "shared/text/words.hpp"
 
@@ -61,6 +62,8 @@ bool take(const std::string& text, double& value) {
   if (number) value = *number;
   return number.has_value();
 }
+/// What is wrong with a text that no option takes, whatever its type: a name of nothing.
+constexpr const char* kEmpty = " is empty; give a value, or leave it out";
 template <std::integral T>
 bool take(const std::string& text, T& value) {
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
@@ -115,8 +118,9 @@ std::string unexpected(const CLI::App& program, const CLI::App* chosen) {
     for (const CLI::Option* known : app.get_options()) names.push_back(known->get_name());
   };
   for (const CLI::App* command : program.get_subcommands([](const CLI::App*) { return true; })) {
-    if (command->get_option_no_throw(word) != nullptr) {
-      return word + " is an option of " + command->get_name() + "; write it after that word";
+    if (command != chosen && command->get_option_no_throw(word) != nullptr) {
+      return word + " is an option of " + command->get_name() +
+             (chosen == nullptr ? "; write it after that word" : ", not of " + chosen->get_name());
     }
     if (command == chosen) add_options(*command);
     if (chosen == nullptr) names.push_back(command->get_name());
@@ -149,8 +153,15 @@ std::string what_is_wrong(const CLI::App& program, const CLI::ParseError& error)
   const CLI::App& app = chosen.empty() ? program : *chosen.front();
   if (program.remaining_size(true) > 0) return unexpected(program, chosen.empty() ? nullptr : &app);
   if (chosen.empty() && program.get_require_subcommand_min() > 0) return "no command is given";
-  if (dynamic_cast<const CLI::ArgumentMismatch*>(&error) == nullptr) return error.what();
-  const std::string text = error.what(), name = text.substr(0, text.find_first_of(": "));
+  const std::string said = error.what(), first = said.substr(0, said.find(' '));
+  const std::string last = said.substr(said.rfind(' ') + 1);
+  if (dynamic_cast<const CLI::RequiredError*>(&error) != nullptr) return first + " is missing";
+  if (dynamic_cast<const CLI::RequiresError*>(&error) != nullptr)
+    return first + " needs " + last + "; give both";
+  if (dynamic_cast<const CLI::ExcludesError*>(&error) != nullptr)
+    return first + " and " + last + " exclude each other; leave one out";
+  if (dynamic_cast<const CLI::ArgumentMismatch*>(&error) == nullptr) return said;
+  const std::string name = said.substr(0, said.find_first_of(": "));
   const CLI::Option* option = app.get_option_no_throw(name);
   if (option == nullptr) return "--" + name + " takes no value; leave out what follows the =";
   const std::size_t count = option->count();
@@ -158,6 +169,61 @@ std::string what_is_wrong(const CLI::App& program, const CLI::ParseError& error)
          (count > 1 ? " values" : " value") + "; give " +
          std::to_string(option->get_expected_min()) +
          (option->get_expected_max() > option->get_expected_min() ? " or more" : "");
+}
+
+/// `{a,b,c}` in what the library shows of a value, which `member` wrote there.
+std::vector<std::string> choices_in(const std::string& type) {
+  const std::size_t from = type.find('{'), to = type.find('}');
+  std::vector<std::string> words;
+  if (to == type.npos) return words;
+  std::istringstream list(type.substr(from + 1, to - from - 1));
+  for (std::string word; std::getline(list, word, ',');) words.push_back(word);
+  return words;
+}
+
+ManualOption manual_of(const CLI::Option& option) {
+  ManualOption out;
+  out.meaning = option.get_description();
+  out.choices = choices_in(option.get_type_name());
+  if (option.get_expected_max() > 0) {
+    const std::string type = option.get_type_name();
+    out.value = type.substr(0, std::min(type.find(":{"), type.find(":[")));
+    const std::size_t range = type.find('['), end = type.rfind(']');
+    if (out.value.size() < range && end != type.npos) {  // not A[,B,C]
+      out.meaning += "; in " + type.substr(range, end + 1 - range);
+    }
+    const std::string usual = option.get_default_str();
+    if (!usual.empty()) out.meaning += " (default: " + usual + ")";
+  }
+  if (option.get_positional()) {
+    out.names = {option.get_name()};
+    return out;
+  }
+  for (const std::string& name : option.get_snames()) out.names.push_back("-" + name);
+  for (const std::string& name : option.get_lnames()) out.names.push_back("--" + name);
+  if (option.get_required()) out.meaning += "; needed";
+  for (const CLI::Option* other : option.get_needs()) out.meaning += "; needs " + other->get_name();
+  for (const CLI::Option* other : option.get_excludes())
+    out.meaning += "; not with " + other->get_name();
+  if (!option.get_envname().empty()) out.meaning += "; else $" + option.get_envname();
+  return out;
+}
+
+ManualPart manual_of(const CLI::App& app) {
+  ManualPart part{app.get_name(), app.get_description(), app.get_footer(), {}, {}};
+  for (const CLI::Option* option : app.get_options()) {
+    (option->get_positional() ? part.places : part.options).push_back(manual_of(*option));
+  }
+  return part;
+}
+
+/// What everything declared so far is for a reader.
+Manual manual_of(const CLI::App& program, const std::string& version) {
+  Manual manual{manual_of(program), {}, version};
+  for (const CLI::App* command : program.get_subcommands([](const CLI::App*) { return true; })) {
+    manual.commands.push_back(manual_of(*command));
+  }
+  return manual;
 }
 
 }  // namespace
@@ -213,6 +279,8 @@ bool Option::given() const {
 template <class T>
 Option Arguments::option(const char* name, T& value, const std::string& meaning) {
   const auto take_all = [name, &value](const CLI::results_t& given) {
+    if (given.size() == 1 && given.front().empty())
+      throw CLI::ValidationError(name + std::string(kEmpty));
     if (Taken<T>::take_all(given, value)) return true;
     throw CLI::ValidationError(
         name, CLI::detail::join(given, ",") + not_taken<typename Taken<T>::Value>());
@@ -271,6 +339,12 @@ CommandLine::CommandLine(const std::string& about, const std::string& program,
 CommandLine::~CommandLine() = default;
 
 bool CommandLine::parse(int argc, const char* const* argv, std::ostream& out) {
+  const std::string_view only = argc == 2 ? argv[1] : "";
+  if (only == "--man" || only == "--completion") {
+    const Manual manual = manual_of(*app_, KERF_VERSION);
+    out << (only == "--man" ? man_page(manual) : bash_completion(manual));
+    return false;
+  }
   try {
     app_->parse(argc, argv);
     return true;

@@ -84,7 +84,8 @@ class CommandLine : public Arguments {
   CommandLine(const CommandLine&) = delete;
   CommandLine& operator=(const CommandLine&) = delete;
 
-  /// False: help or version was asked for, and stands on `out`. Throws `UsageError`.
+  /// False: help or version was asked for, and stands on `out`; or, for the build, which installs
+  /// them, by `--man` or `--completion` alone, the pages of manual.hpp. Throws `UsageError`.
   [[nodiscard]] bool parse(int argc, const char* const* argv, std::ostream& out);
 
  private:

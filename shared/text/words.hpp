@@ -61,7 +61,8 @@ template <class Names>
   std::size_t best_distance = is_one ? std::string_view::npos : word.size() / 2 + 1;
   for (const std::string_view name : known) {
     if (is_one && quantity(name) != quantity(word)) continue;
-    const std::size_t distance = edit_distance(word, name);
+    const std::size_t distance =
+        std::min(edit_distance(word, name), edit_distance(word, quantity(name)));
     if (distance < best_distance) {
       best = name;
       best_distance = distance;

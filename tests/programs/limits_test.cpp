@@ -88,7 +88,7 @@ TEST_CASE("few open files: one line that names the way out and exit 2, and SIGTE
 TEST_CASE("little memory: one line that names the way out and exit 2") {
   const TemporaryFolder folder;
   [[maybe_unused]] int refusals = 0;
-  for (const int mib : {60, 80}) {
+  for (const int mib : {60, 70}) {
     CAPTURE(mib);
     std::vector<std::string> servo =
         controller_at(folder, "socket:" + (folder / "none").string(), kerf::test::unique_name());

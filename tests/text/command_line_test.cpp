@@ -139,8 +139,8 @@ TEST_CASE("bad input is refused in one line that names the option") {
         Refusal{{"--triple", "1,0"}, "--triple has 2 values; give 3"},
         Refusal{{"--triple", "1,0,2"}, "--triple: 2 is not a number in the range -1 to 1"},
         Refusal{{"--words", "three"}, "--words: three is unknown; known: one, two"},
-        Refusal{{"--flag"}, "--flag requires --whole"},
-        Refusal{{"--flag", "--whole", "1", "--other"}, "excludes"},
+        Refusal{{"--flag"}, "--flag needs --whole; give both"},
+        Refusal{{"--flag", "--whole", "1", "--other"}, "exclude each other; leave one out"},
         Refusal{{"--flag=false", "--whole", "1"},
                 "--flag takes no value; leave out what follows the ="}}) {
     const std::string said = parse(arguments);
@@ -169,11 +169,10 @@ TEST_CASE("a program with commands needs one, which has its own options and the 
   CHECK(run({"hide"}) == "hide");
   CHECK(run({}) == "no command is given; see --help");
   CHECK(run({"shew"}) == "shew is not known; did you mean show? see --help");
-  CHECK(run({"show"}) == "FILE is required; see --help");
+  CHECK(run({"show"}) == "FILE is missing; see --help");
   CHECK(run({"--zzz", "a"}) == "--zzz is not known; see --help");
   CHECK(run({"hide", "--dept", "2"}) == "--dept is not known; did you mean --depth? see --help");
-  CHECK(run({"show", "a", "--depth=2"}) ==
-        "--depth is an option of hide; write it after that word; see --help");
+  CHECK(run({"show", "a", "--depth=2"}) == "--depth is an option of hide, not of show; see --help");
   CHECK(run({"hide", "a"}) == "a is not expected; see --help");
   CHECK(run({"show", "--help"}).find("shows\nUsage: kerf-commands show [OPTIONS] FILE") == 0);
   CHECK(run({"show", "--help"}).ends_with("The end.\n"));

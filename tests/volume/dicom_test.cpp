@@ -75,7 +75,9 @@ TEST_CASE("a DICOM folder that is not one even stack is refused in one line") {
     write_series(folder, [](DicomSpec& spec, int k) {
       if (k >= 3) spec.series += ".2";
     });
-    refused("2 DICOM series; choose one with --series: 1 '' (3 slices of 3 x 4), 2 '' (2 slices");
+    refused(
+        "2 DICOM series; choose one with ./kerf volume import --series: 1 '' (3 slices of 3 x 4), "
+        "2 '' (2 slices");
   }
   SUBCASE("series of one slice each") {
     write_series(folder, [](DicomSpec& spec, int k) { spec.series += std::to_string(k); });

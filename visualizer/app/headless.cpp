@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
 #include <limits>
 #include <optional>
 #include <thread>
@@ -17,6 +18,7 @@
 #include "visualizer/app/picture.hpp"
 #include "visualizer/app/run.hpp"
 #include "visualizer/app/tick_lead.hpp"
+#include "visualizer/error.hpp"
 #include "visualizer/gl/context.hpp"
 #include "visualizer/surface/mesh_file.hpp"
 #include "visualizer/view/file_out.hpp"
@@ -93,10 +95,13 @@ void tell(const VisualizerOptions& options, const FrameSchedule& schedule,
 
 int run_headless(const VisualizerOptions& options) {
   place_process(options.cpus);
-  if (options.frames > 0) make_folder(options.out);
+  if (options.frames > 0) check_new_folder(options.out);
   if (options.mesh) check_export(*options.mesh);
   for (const auto& file : {options.sheet, options.report}) {
     if (file) check_new_file(*file);
+  }
+  if (options.lead && !std::filesystem::is_fifo(*options.lead)) {
+    throw VisualizerError("--lead " + *options.lead + ": no FIFO; make one with mkfifo");
   }
   const auto context = make_headless_context();
   const GlDriver driver = query_gl_driver();
@@ -126,6 +131,7 @@ int run_headless(const VisualizerOptions& options) {
                                              options.frames, options.seconds, session.tick_ns())));
   std::optional<TickLead> lead;
   if (options.lead) lead.emplace(*options.lead);
+  if (options.frames > 0) make_folder(options.out);
   bool over = false;
   while (!over && (film || !schedule.complete())) {
     over = session.ended() || stop_requested() ||

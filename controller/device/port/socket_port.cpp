@@ -22,8 +22,11 @@ SocketPort::SocketPort(const std::filesystem::path& path, int patience_ms,
   sockaddr_un address{};
   address.sun_family = AF_UNIX;
   const std::string text = path.string();
-  if (text.empty() || text.size() >= sizeof address.sun_path) {
-    throw std::runtime_error("--port socket:" + text + ": a socket path has 1 to " +
+  if (text.empty()) {
+    throw std::runtime_error("--port socket: no path; name the one of kerf-emulator --socket");
+  }
+  if (text.size() >= sizeof address.sun_path) {
+    throw std::runtime_error("--port socket:" + text + ": a socket path has at most " +
                              std::to_string(sizeof address.sun_path - 1) +
                              " bytes; use a shorter one");
   }

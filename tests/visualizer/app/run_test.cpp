@@ -385,5 +385,5 @@ TEST_CASE("a folder that cannot be written is refused before anything is drawn")
   const Place place;
   VisualizerOptions options = place.options();
   options.out = "/dev/null/out";
-  CHECK_THROWS_AS(static_cast<void>(run_headless(options)), VisualizerError);
+  CHECK_THROWS_AS(static_cast<void>(run_headless(options)), FileError);
 }

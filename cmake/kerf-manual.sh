@@ -1,0 +1,21 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+# kerf-manual.sh VERSION: the man page of ./kerf from its --help.
+set -euo pipefail
+cat <<HEAD
+.TH KERF 1 "" "kerf $1" "kerf"
+.SH NAME
+kerf \- feel, mill and see a tooth
+.SH SYNOPSIS
+.B kerf
+\fICOMMAND\fR [\fIOPTION\fR]...
+.SH COMMANDS
+.nf
+HEAD
+./kerf --help | tail -n +3 | sed 's|\./kerf|kerf|g; s/\\/\\e/g; s/-/\\-/g; s/^\([.'"'"']\)/\\\&\1/'
+cat <<'FOOT'
+.fi
+.SH SEE ALSO
+kerf-controller(1), kerf-emulator(1), kerf-visualizer(1), kerf-recorder(1), kerf-record(1), kerf-volume(1),
+kerf-bridge(1), kerf-lab(1)
+FOOT

@@ -1,0 +1,71 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""manuals.py ROOT BUILD: every option of each program's --help stands in its man page, which roff reads without a
+word, and bash offers it.
+
+Of ./kerf: every command and option of its own."""
+import pathlib
+import re
+import shutil
+import subprocess
+import sys
+
+root, build = (pathlib.Path(p).resolve() for p in sys.argv[1:3])
+wrong = []
+
+
+def said(*command):
+    return subprocess.run(command, capture_output=True, text=True, check=True).stdout
+
+
+def options_in(text):
+    """Those that a help lists: at the start of a line, and behind a comma."""
+    return {word for line in re.findall(r'^ +(-[^ ]+)', text, re.M) for word in line.split(',') if word.startswith('-')}
+
+
+def offered(name, words):
+    """What bash offers for the last of these words."""
+    script = (f'. {build}/completion/{name}; COMP_WORDS=({name} {" ".join(words)} ""); COMP_CWORD={len(words) + 1};'
+              f'_{name.replace("-", "_")} {name} -- {words[-1] if words else name}; printf "%s\\n" "${{COMPREPLY[@]}}"')
+    return set(said('bash', '-c', script).split())
+
+
+def check(name, page, words, wanted):
+    plain = page.replace('\\-', '-')
+    for option in sorted(wanted):
+        if not re.search(re.escape('\\fB' + option + '\\fR'), plain):
+            wrong.append(f'{name}.1: lacks {" ".join([*words, option])}')
+    for option in sorted(o for o in wanted if o.startswith('--')):
+        if option not in offered(name, words):
+            wrong.append(f'completion of {name}: lacks {" ".join([*words, option])}')
+
+
+names = sorted(p.stem for p in (build / 'man').glob('*.1'))
+checked = 0
+for name in names:
+    page = (build / 'man' / (name + '.1')).read_text()
+    if shutil.which('groff'):
+        odd = subprocess.run(['groff', '-man', '-Tutf8', '-ww', '-z', build / 'man' / (name + '.1')], capture_output=True, text=True)
+        wrong += odd.stderr.splitlines()
+    if name == 'kerf':
+        help_text = said(root / 'kerf', '--help').replace('./kerf', 'kerf')
+        if help_text.split('\n', 2)[2].strip() not in page.replace('\\-', '-').replace('\\e', '\\'):
+            wrong.append('kerf.1: is not what --help says')
+        script = (f'. {build}/completion/kerf; COMP_WORDS=({root}/kerf demo --sec); COMP_CWORD=2;'
+                  f'_kerf {root}/kerf --sec demo; echo "${{COMPREPLY[@]}}"')
+        if said('bash', '-c', script).split() != ['--seconds']:
+            wrong.append(f'completion of kerf: offers {said("bash", "-c", script)!r} for demo --sec')
+        continue
+    program = build / 'bin' / name
+    help_text = said(program, '--help')
+    check(name, page, [], options_in(help_text))
+    commands = re.findall(r'^  ([a-z][a-z-]*) ', help_text.partition('Subcommands:')[2], re.M)
+    for command in commands:
+        if command not in said('bash', '-c', f'. {build}/completion/{name}; COMP_WORDS=({name} ""); COMP_CWORD=1; _{name.replace("-", "_")} {name} "" {name}; echo "${{COMPREPLY[@]}}"').split():
+            wrong.append(f'completion of {name}: lacks {command}')
+        options = options_in(said(program, command, '--help'))
+        check(name, page, [command], options)
+        checked += len(options)
+    checked += len(options_in(help_text))
+print('\n'.join(wrong) or f'manuals: {len(names)} pages, {checked} options')
+sys.exit(bool(wrong))
