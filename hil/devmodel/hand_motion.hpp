@@ -25,6 +25,8 @@ class HandMotion {
   void calibrate() noexcept;
   void leave() noexcept;
   [[nodiscard]] bool left() const noexcept { return phase_ == Phase::left; }
+  /// It has done all, and stays where it is.
+  [[nodiscard]] bool ended() const noexcept { return left() && leg_ == legs_.size(); }
 
   /// The wish for the next bus cycle.
   [[nodiscard]] HandGoal next() noexcept;
