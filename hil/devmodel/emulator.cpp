@@ -40,7 +40,7 @@ HandGoal Emulator::next_goal() noexcept {
   if (!hand_) return {};
   if (!hand_->left()) guide_hand();
   const HandGoal goal = hand_->next();
-  return led_ && hand_->ended() ? led_->next(goal, model_->tip_mm()) : goal;
+  return led_ && can_be_led() ? led_->next(goal, model_->tip_mm()) : goal;
 }
 
 void Emulator::advance(int cycles) noexcept {

@@ -51,6 +51,8 @@ class Emulator final : public PacketDevice {
   void advance(int cycles) noexcept override;
   [[nodiscard]] std::span<const std::uint8_t> next_packet() noexcept override;
 
+  /// Whether a user may lead the hand: its script has ended.
+  [[nodiscard]] bool can_be_led() const noexcept { return hand_ && hand_->ended(); }
   /// Where a user wants the hand to be, and that there is no user any more: see `LedHand`. A hand
   /// whose script has not ended follows afterwards.
   void wish(const HandWish& wish) noexcept;

@@ -24,7 +24,7 @@ void HandServer::look_for_windows() noexcept {
 
 void HandServer::lead(Emulator& emulator, int cycles) noexcept {
   since_look_ += cycles;
-  if (since_look_ >= kLookCycles) {
+  if (since_look_ >= kLookCycles && emulator.can_be_led()) {
     since_look_ = 0;
     look_for_windows();
   }

@@ -12,7 +12,8 @@ namespace kerf {
 
 /// The socket at which a window leads the hand: packets of hand_wish.hpp.
 ///
-/// One window at a time; another one is told so and sent away, and one of another user is refused.
+/// Once the hand is at its start, one window at a time is let in; another one is told so and sent
+/// away, and one of another user is refused.
 /// What is no wish is dropped and counted. Never waits. One thread.
 class HandServer {
  public:

@@ -22,6 +22,18 @@ using kerf::HandWish;
 
 constexpr int kLook = kerf::kCyclesPerSecond / 20;
 
+/// A hand at its start.
+class Ready {
+ public:
+  Ready() {
+    const kerf::OmniCommand on{.motors_on = true};
+    emulator.receive(encode(on));
+    emulator.advance(2 * kerf::kCyclesPerSecond);
+    REQUIRE(emulator.can_be_led());
+  }
+  kerf::Emulator emulator{kerf::OmniParams{}, kerf::HandScript{}};
+};
+
 /// A window's end of the socket.
 class FakeWindow {
  public:
@@ -54,7 +66,8 @@ class FakeWindow {
 TEST_CASE("one window leads the hand; a second is told, and may once the first has gone") {
   const kerf::test::SocketPath path("hand");
   kerf::HandServer server(path.text());
-  kerf::Emulator emulator(kerf::OmniParams{}, kerf::HandScript{});
+  Ready hand;
+  kerf::Emulator& emulator = hand.emulator;
   std::optional<FakeWindow> first(path.text());
   server.lead(emulator, kLook);
   CHECK(first->greeting() == HandGreeting::yours);
@@ -74,7 +87,8 @@ TEST_CASE("one window leads the hand; a second is told, and may once the first h
 TEST_CASE("what is no wish is dropped and counted, and a flood is taken in parts") {
   const kerf::test::SocketPath path("hand");
   kerf::HandServer server(path.text());
-  kerf::Emulator emulator(kerf::OmniParams{}, kerf::HandScript{});
+  Ready hand;
+  kerf::Emulator& emulator = hand.emulator;
   const FakeWindow window(path.text());
   server.lead(emulator, kLook);
   const auto wish = encode(HandWish{});
@@ -90,6 +104,19 @@ TEST_CASE("what is no wish is dropped and counted, and a flood is taken in parts
   CHECK(server.wishes() == 17);
   for (int i = 0; i < 3; ++i) server.lead(emulator, 1);
   CHECK(server.wishes() > 17);
+}
+
+TEST_CASE("a window waits until the hand is at its start") {
+  const kerf::test::SocketPath path("hand");
+  kerf::HandServer server(path.text());
+  kerf::Emulator emulator(kerf::OmniParams{}, kerf::HandScript{});
+  const FakeWindow window(path.text());
+  server.lead(emulator, kLook);
+  CHECK_FALSE(window.greeting());
+  emulator.receive(encode(kerf::OmniCommand{.motors_on = true}));
+  emulator.advance(2 * kerf::kCyclesPerSecond);
+  server.lead(emulator, kLook);
+  CHECK(window.greeting() == HandGreeting::yours);
 }
 
 TEST_CASE("a place that cannot be is refused by the name of its option") {

@@ -96,7 +96,7 @@ TEST_CASE("without wishes it presses no more, then withdraws to its start: strai
     CHECK_FALSE(goal.button1);
     hold(LedHand::kPatienceS - 0.3);
     tip = held;
-    follow(hand, tip, 0.1);
+    follow(hand, tip, 0.2);
     CHECK(tip.x == doctest::Approx(6).epsilon(0.01));
     CHECK(tip.y > -1);
     follow(hand, tip, 2);

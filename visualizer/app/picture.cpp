@@ -118,13 +118,17 @@ void Picture::update(const Session& session) {
   }
 }
 
-std::vector<View> Picture::views(PictureSize size) const {
+View Picture::middle_view(PictureSize size) const {
   const double reach_mm = camera_.radius_mm() + kToolRoom * scene_.main_volume().radius_mm();
-  const Stereo& stereo = look_.stereo;
-  const int width = eye_size(size).width;
-  View view = camera_.view(static_cast<double>(width) / size.height, reach_mm);
+  View view = camera_.view(static_cast<double>(eye_size(size).width) / size.height, reach_mm);
   view.shown = shown_half();
-  if (width == size.width) return {view};
+  return view;
+}
+
+std::vector<View> Picture::views(PictureSize size) const {
+  const View view = middle_view(size);
+  if (eye_size(size) == size) return {view};
+  const Stereo& stereo = look_.stereo;
   const double convergence_mm = stereo.convergence_mm.value_or(camera_.distance_mm());
   const double eyes_mm = stereo.eyes_mm.value_or(kEyesPerConvergence * convergence_mm);
   const auto both = eye_views(view, {eyes_mm, convergence_mm});

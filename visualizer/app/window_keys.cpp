@@ -54,6 +54,20 @@ void take_tool(char key, Session& session, Notices& notices, Notices::Clock::tim
   }
 }
 
+/// A slip of a finger must not undo what was cut: the key is pressed twice.
+void undo_all(std::optional<Notices::Clock::time_point>& asked, Session& session, Notices& notices,
+              Notices::Clock::time_point now) {
+  const bool again = asked && now - *asked < Notices::kShownFor;
+  asked = again ? std::nullopt : std::optional(now);
+  if (!again) {
+    notices.say({"u again: undo all cuts"}, now);
+  } else if (session.reset()) {
+    notices.say({"all cuts are undone"}, now);
+  } else {
+    notices.say({"undo: the controller did not take it; press u twice again", true}, now);
+  }
+}
+
 }  // namespace
 
 std::string no_such_tool(std::size_t index, std::size_t tools) {
@@ -99,6 +113,8 @@ bool WindowKeys::apply(const WindowInput& input, Session& session, Picture& pict
       one = (one + 1) % (volumes.size() + 1);
       notices.say({"v: " + (one > 0 ? volumes[one - 1].name : "all volumes")}, now);
     }
+    if (key == 'g') come = true;
+    if (key == 'u') undo_all(undo_asked, session, notices, now);
     if (key == 'c') look.clip.on = !look.clip.on;
     if (key == 't') look.stereo.on = !look.stereo.on;
     if (key >= '1' && key <= '9') take_tool(key, session, notices, now);

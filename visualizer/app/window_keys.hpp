@@ -32,7 +32,9 @@ struct WindowKeys {
   bool mesh = false;    ///< export the surface
   bool write = false;   ///< write the opacities
   bool film = false;    ///< begin a film, or end it
+  bool come = false;    ///< the hand comes to the pointer
   std::size_t one = 0;  ///< volume that v is for, counted from 1; 0: all
+  std::optional<Notices::Clock::time_point> undo_asked{};  ///< u once: the second one is meant
 
   /// Takes the keys of `input`: the camera and the look of `picture`, and the tool, follow at once.
   /// True when the user wants to leave.

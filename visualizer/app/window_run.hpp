@@ -7,8 +7,10 @@
 
 #include "visualizer/app/film.hpp"
 #include "visualizer/app/force_plot.hpp"
+#include "visualizer/app/hand_link.hpp"
 #include "visualizer/app/options.hpp"
 #include "visualizer/app/picture.hpp"
+#include "visualizer/app/pointer_hand.hpp"
 #include "visualizer/app/window_figures.hpp"
 #include "visualizer/app/window_keys.hpp"
 #include "visualizer/gl/context.hpp"
@@ -58,6 +60,7 @@ class WindowRun {
   struct Frame {
     bool quit = false;                    ///< the user wants to leave; nothing else was done
     const RenderTarget* drawn = nullptr;  ///< to be presented; none: what was, stays
+    bool leads_hand = false;              ///< the ring stands for the pointer
   };
 
   /// `context` is current, now and in each step; `since_attached` began when `first` did.
@@ -77,6 +80,11 @@ class WindowRun {
 
  private:
   [[nodiscard]] OverlayFigures figures_at(Clock::time_point now);
+  /// What the user wants of hand and camera; the mark of the hand goes into the figures.
+  void follow(const WindowInput& input, OverlayFigures& figures, PictureSize size,
+              Clock::time_point now);
+  void lead_hand(const WindowInput& input, bool over_panel, OverlayFigures& figures,
+                 PictureSize size, Clock::time_point now);
   Redrawn draw(PictureSize size, const WindowInput& input, Clock::time_point now);
 
   const VisualizerOptions& options_;
@@ -91,6 +99,10 @@ class WindowRun {
   Notices notices_;
   ForcePlot plot_;
   std::optional<Film> film_;
+  std::optional<HandLink> hand_link_;
+  PointerHand hand_;
+  Clock::time_point last_led_{};
+  bool pointer_leads_ = false;
 };
 
 }  // namespace kerf
