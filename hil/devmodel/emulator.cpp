@@ -28,8 +28,7 @@ void Emulator::guide_hand() noexcept {
 }
 
 void Emulator::wish(const HandWish& wish) noexcept {
-  if (!led_) led_.emplace(model_->params().hand_stiffness_n_per_mm);
-  led_->wish(wish);
+  if (led_) led_->wish(wish);
 }
 
 void Emulator::forsake() noexcept {
@@ -38,6 +37,10 @@ void Emulator::forsake() noexcept {
 
 HandGoal Emulator::next_goal() noexcept {
   if (!hand_) return {};
+  if (led_ && led_->parked()) {
+    led_->restart();
+    hand_->rest();
+  }
   if (!hand_->left()) guide_hand();
   const HandGoal goal = hand_->next();
   return led_ && can_be_led() ? led_->next(goal, model_->tip_mm()) : goal;

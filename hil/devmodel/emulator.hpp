@@ -41,7 +41,10 @@ class Emulator final : public PacketDevice {
   template <std::derived_from<DeviceModel> Model>
   Emulator(std::unique_ptr<Model> model, const std::optional<HandScript>& script)
       : model_(std::move(model)) {
-    if (script) hand_.emplace(*script, model_->route());
+    if (!script) return;
+    const HandRoute route = model_->route();
+    hand_.emplace(*script, route);
+    led_.emplace(model_->params().hand_stiffness_n_per_mm, route, hand_->start_mm());
   }
   /// An Omni.
   Emulator(const OmniParams& params, const std::optional<HandScript>& script)

@@ -23,6 +23,7 @@ struct HandWish {
   DeviceVec<double> tip_mm;                 ///< in steps of 1 um, each axis up to kMaxWishMm
   std::array<double, 3> orientation_rad{};  ///< as of `HandGoal`, up to kMaxWishRad each
   bool button1 = false, button2 = false;
+  bool park = false;  ///< go to the rest pose, stay there a moment, and come back
   friend bool operator==(const HandWish&, const HandWish&) noexcept = default;
 };
 
@@ -52,7 +53,8 @@ using HandGreetingBytes = std::array<std::uint8_t, 9>;
     wire::put_u32(bytes, 8 + 4 * i, steps(tip[i], kMaxWishMm, kSteps / 1000));
     wire::put_u32(bytes, 20 + 4 * i, steps(wish.orientation_rad[i], kMaxWishRad, kSteps));
   }
-  bytes[32] = static_cast<std::uint8_t>((wish.button1 ? 1 : 0) | (wish.button2 ? 2 : 0));
+  bytes[32] = static_cast<std::uint8_t>((wish.button1 ? 1 : 0) | (wish.button2 ? 2 : 0) |
+                                        (wish.park ? 4 : 0));
   return bytes;
 }
 
@@ -60,7 +62,7 @@ using HandGreetingBytes = std::array<std::uint8_t, 9>;
 [[nodiscard]] inline std::optional<HandWish> decode_hand_wish(
     std::span<const std::uint8_t> bytes) noexcept {
   if (bytes.size() != kHandWishBytes ||
-      !std::equal(kHandWishMagic.begin(), kHandWishMagic.end(), bytes.begin()) || bytes[32] > 3) {
+      !std::equal(kHandWishMagic.begin(), kHandWishMagic.end(), bytes.begin()) || bytes[32] > 7) {
     return std::nullopt;
   }
   const auto value = [&](std::size_t at, double most, double unit) {
@@ -75,6 +77,7 @@ using HandGreetingBytes = std::array<std::uint8_t, 9>;
   }
   wish.button1 = (bytes[32] & 1) != 0;
   wish.button2 = (bytes[32] & 2) != 0;
+  wish.park = (bytes[32] & 4) != 0;
   return wish;
 }
 

@@ -27,6 +27,10 @@ HandGoal start_at(DeviceVec<double> mm) {
 
 const HandGoal kStart = start_at({0, 5, 0});
 
+LedHand hand_at_start() {
+  return {kStiffness, kerf::OmniModel().route(), kStart.target_mm};
+}
+
 /// A tip that goes wherever the hand wants it, for so long; the fastest it moved in a cycle.
 double follow(LedHand& hand, DeviceVec<double>& tip_mm, double seconds) {
   double fastest = 0;
@@ -49,7 +53,7 @@ void lead(LedHand& hand, DeviceVec<double>& tip_mm, const HandWish& wish, double
 }  // namespace
 
 TEST_CASE("a hand that nobody leads stays at its start") {
-  LedHand hand(kStiffness);
+  LedHand hand = hand_at_start();
   hand.forsake();
   DeviceVec<double> tip = kStart.target_mm;
   follow(hand, tip, 3);
@@ -57,7 +61,7 @@ TEST_CASE("a hand that nobody leads stays at its start") {
 }
 
 TEST_CASE("it follows a wish with its lag, and far ones no faster than a hand's stroke") {
-  LedHand hand(kStiffness);
+  LedHand hand = hand_at_start();
   DeviceVec<double> tip = kStart.target_mm;
   hand.wish({.tip_mm = {1, 5, 0}});
   follow(hand, tip, LedHand::kLagS);
@@ -67,7 +71,7 @@ TEST_CASE("it follows a wish with its lag, and far ones no faster than a hand's 
 }
 
 TEST_CASE("it pulls at a tip that is held no harder than it may") {
-  LedHand hand(kStiffness);
+  LedHand hand = hand_at_start();
   const DeviceVec<double> held = kStart.target_mm;
   HandGoal goal;
   for (int frame = 0; frame < 50; ++frame) {
@@ -80,7 +84,7 @@ TEST_CASE("it pulls at a tip that is held no harder than it may") {
 TEST_CASE("without wishes it presses no more, then withdraws to its start: straight up first") {
   for (const bool told : {false, true}) {
     CAPTURE(told);
-    LedHand hand(kStiffness);
+    LedHand hand = hand_at_start();
     DeviceVec<double> tip = kStart.target_mm;
     lead(hand, tip, {.tip_mm = {6, -2, 0}, .button1 = true}, 1);
     CHECK(hand.next(kStart, tip).button1);
@@ -108,8 +112,10 @@ TEST_CASE("without wishes it presses no more, then withdraws to its start: strai
 }
 
 TEST_CASE("a wish survives its packet, within its limits; whatever else comes is none") {
-  const HandWish wish{
-      .tip_mm = {1.5, -2.25, 499}, .orientation_rad = {0.5, -0.25, 0}, .button2 = true};
+  const HandWish wish{.tip_mm = {1.5, -2.25, 499},
+                      .orientation_rad = {0.5, -0.25, 0},
+                      .button2 = true,
+                      .park = true};
   const auto bytes = encode(wish);
   CHECK(kerf::decode_hand_wish(bytes) == wish);
   const double nan = std::numeric_limits<double>::quiet_NaN();
@@ -128,7 +134,7 @@ TEST_CASE("a wish survives its packet, within its limits; whatever else comes is
   other[7] = 2;
   CHECK_FALSE(kerf::decode_hand_wish(other));
   other = bytes;
-  other[32] = 4;
+  other[32] = 8;
   CHECK_FALSE(kerf::decode_hand_wish(other));
 }
 
@@ -149,4 +155,27 @@ TEST_CASE("an emulated hand goes its way to the start, and only then where it is
   CHECK(emulator.model().tip_mm().z < -20);
   run(1.3);
   CHECK(norm(emulator.model().tip_mm() - DeviceVec<double>{10, 8, -5}) < 0.5);
+}
+
+TEST_CASE("asked to park it rests in the inkwell, whatever is wished meanwhile, and comes back") {
+  kerf::Emulator emulator(kerf::OmniParams{}, kerf::HandScript{});
+  const DeviceVec<double> wished{4, -3, 2};
+  int docked = 0;
+  const auto run = [&](double seconds, bool park) {
+    for (int frames = static_cast<int>(seconds * 50); frames > 0; --frames) {
+      emulator.wish({.tip_mm = wished, .park = park});
+      emulator.receive(encode(kerf::OmniCommand{.motors_on = true}));
+      emulator.advance(160);
+      docked += emulator.model().docked() ? 1 : 0;
+    }
+  };
+  run(2.5, false);
+  CHECK(norm(emulator.model().tip_mm() - wished) < 0.5);
+  docked = 0;
+  run(0.1, true);
+  run(4, false);
+  CHECK(docked * 0.02 >= LedHand::kParkedS - 0.05);
+  run(2, false);
+  CHECK_FALSE(emulator.model().docked());
+  CHECK(norm(emulator.model().tip_mm() - wished) < 0.5);
 }

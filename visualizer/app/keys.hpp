@@ -41,6 +41,7 @@ inline constexpr auto kHandKeys = std::to_array<KeyHelp>({
     {"wheel, page up/down", "deeper, nearer"},
     {"arrows", "tilt the tool"},
     {"g", "the hand comes to the pointer"},
+    {"k", "park the stylus and take it again: clears a fault"},
     {"right drag", "turn"},
     {"middle drag", "move the picture"},
     {"control + wheel", "zoom"},

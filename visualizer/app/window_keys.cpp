@@ -114,6 +114,7 @@ bool WindowKeys::apply(const WindowInput& input, Session& session, Picture& pict
       notices.say({"v: " + (one > 0 ? volumes[one - 1].name : "all volumes")}, now);
     }
     if (key == 'g') come = true;
+    if (key == 'k') park = true;
     if (key == 'u') undo_all(undo_asked, session, notices, now);
     if (key == 'c') look.clip.on = !look.clip.on;
     if (key == 't') look.stereo.on = !look.stereo.on;

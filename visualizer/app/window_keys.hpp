@@ -33,6 +33,7 @@ struct WindowKeys {
   bool write = false;   ///< write the opacities
   bool film = false;    ///< begin a film, or end it
   bool come = false;    ///< the hand comes to the pointer
+  bool park = false;    ///< it brings the stylus to rest and back
   std::size_t one = 0;  ///< volume that v is for, counted from 1; 0: all
   std::optional<Notices::Clock::time_point> undo_asked{};  ///< u once: the second one is meant
 

@@ -142,7 +142,9 @@ void WindowRun::lead_hand(const WindowInput& input, bool over_panel, OverlayFigu
   hand_.step(seen, over_panel, view, eye, held->tip_mm, scene.device,
              std::min(frame_s, kLongestFrameS));
   if (!hand_.leads()) return;
-  hand_link_->send(hand_.wish(scene.device));
+  HandWish wish = hand_.wish(scene.device);
+  wish.park = std::exchange(keys_.park, false);
+  hand_link_->send(wish);
   const SeenPoint goal = seen_at(view, eye, *hand_.goal_mm());
   const SeenPoint tool = seen_at(view, eye, held->tip_mm);
   if (goal.depth_mm <= 0.0 || tool.depth_mm <= 0.0) return;
