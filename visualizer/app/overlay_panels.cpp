@@ -91,6 +91,7 @@ void draw_figures(const OverlayFigures& figures) {
     if (figures.filmed_frames) row("filmed", "%ju frames", std::uintmax_t{*figures.filmed_frames});
     ImGui::EndTable();
   }
+  if (figures.controls && !figures.help) ImGui::TextColored(kLabelColour, "h: all keys");
   if (!figures.plot.empty()) {
     curve("force, 5 s, peak", "%.2f N", figures.plot, &ForcePlot::Point::force_n, kLeastFullForceN,
           kCalm);

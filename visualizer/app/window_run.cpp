@@ -14,6 +14,7 @@ namespace {
 
 constexpr auto kReattachPause = std::chrono::milliseconds(500);
 
+constexpr double kFarthestPullMm = 60;   // of the hand: farther off it parks, and pulls nothing
 constexpr double kLongestFrameS = 0.05;  // one that took longer was none of the user's
 
 void move_camera(OrbitCamera& camera, const WindowInput& input) {
@@ -141,13 +142,15 @@ void WindowRun::lead_hand(const WindowInput& input, bool over_panel, OverlayFigu
   if (seen.pointer.x >= eye.width) seen.pointer.x -= eye.width;  // the other eye's
   hand_.step(seen, over_panel, view, eye, held->tip_mm, scene.device,
              std::min(frame_s, kLongestFrameS));
+  time_the_tool(input, held->tip_mm, now);
   if (!hand_.leads()) return;
   HandWish wish = hand_.wish(scene.device);
   wish.park = std::exchange(keys_.park, false);
   hand_link_->send(wish);
   const SeenPoint goal = seen_at(view, eye, *hand_.goal_mm());
   const SeenPoint tool = seen_at(view, eye, held->tip_mm);
-  if (goal.depth_mm <= 0.0 || tool.depth_mm <= 0.0) return;
+  const double away_mm = glm::length(*hand_.goal_mm() - held->tip_mm) / scene.device.scale;
+  if (goal.depth_mm <= 0.0 || tool.depth_mm <= 0.0 || away_mm > kFarthestPullMm) return;
   const double radius_mm =
       held->tool < scene.tools.size() ? scene.tools[held->tool].radius_mm : 0.0;
   figures.hand = {goal.pixel.x,
@@ -156,6 +159,17 @@ void WindowRun::lead_hand(const WindowInput& input, bool over_panel, OverlayFigu
                   tool.pixel.y,
                   radius_mm * eye.height / (2.0 * view.tan_half_height * goal.depth_mm),
                   goal.depth_mm - tool.depth_mm};
+}
+
+void WindowRun::time_the_tool(const WindowInput& input, const glm::dvec3& tool_mm,
+                              Clock::time_point now) {
+  constexpr double kRestsMm = 0.005, kMovedMm = 0.02;
+  const bool moved = input.free_right != 0.0 || input.free_up != 0.0;
+  const bool rested = glm::length(tool_mm - last_tool_mm_) < kRestsMm;
+  last_tool_mm_ = tool_mm;
+  if (moved && rested && !followed_since_) followed_since_ = {now, tool_mm};
+  if (!followed_since_ || glm::length(tool_mm - followed_since_->second) < kMovedMm) return;
+  tool_follows_ = true;
 }
 
 Redrawn WindowRun::draw(PictureSize size, const WindowInput& input, Clock::time_point now) {
@@ -171,6 +185,11 @@ Redrawn WindowRun::draw(PictureSize size, const WindowInput& input, Clock::time_
     notices_.say(write_opacities(options_, picture()), now);
   }
   const Redrawn redrawn = draw_measured(picture(), session(), figures, *target_, report_);
+  if (std::exchange(tool_follows_, false)) {
+    const std::chrono::duration<double, std::milli> late = Clock::now() - followed_since_->first;
+    report_.pointer_ms.push_back(late.count());
+    followed_since_.reset();
+  }
   if (report_.wall_ms.size() == 1) report_.late_join_ms = age_ms();
   if (std::exchange(keys_.screenshot, false)) {
     notices_.say(take_screenshot(options_, *target_), now);

@@ -4,6 +4,9 @@
 #include <chrono>
 #include <cstdint>
 #include <optional>
+#include <utility>
+
+#include <glm/glm.hpp>
 
 #include "visualizer/app/film.hpp"
 #include "visualizer/app/force_plot.hpp"
@@ -85,6 +88,7 @@ class WindowRun {
               Clock::time_point now);
   void lead_hand(const WindowInput& input, bool over_panel, OverlayFigures& figures,
                  PictureSize size, Clock::time_point now);
+  void time_the_tool(const WindowInput& input, const glm::dvec3& tool_mm, Clock::time_point now);
   Redrawn draw(PictureSize size, const WindowInput& input, Clock::time_point now);
 
   const VisualizerOptions& options_;
@@ -102,7 +106,10 @@ class WindowRun {
   std::optional<HandLink> hand_link_;
   PointerHand hand_;
   Clock::time_point last_led_{};
-  bool pointer_leads_ = false;
+  glm::dvec3 last_tool_mm_{0.0};
+  /// Since when, and from where, a tool that rested is to follow the pointer.
+  std::optional<std::pair<Clock::time_point, glm::dvec3>> followed_since_;
+  bool pointer_leads_ = false, tool_follows_ = false;
 };
 
 }  // namespace kerf
