@@ -147,7 +147,7 @@ void draw_hand_mark(const HandMark& mark, double force_share) {
                     std::max(goal.y + radius, tool.y) + 8.0F};
   const ImU32 colour = ImGui::GetColorU32(colour_of(force_share));
   ImDrawList& to = *ImGui::GetBackgroundDrawList();
-  to.PushClipRect(low, high);
+  to.PushClipRect({std::max(low.x, 0.0F), low.y}, high);  // left of it may be another eye's
   to.AddLine(tool, goal, colour, kWide);
   to.AddCircle(goal, radius, colour, 0, kWide);
   to.AddCircleFilled(goal, kDot, colour);

@@ -139,7 +139,9 @@ void WindowRun::lead_hand(const WindowInput& input, bool over_panel, OverlayFigu
   const View view = picture().middle_view(size);
   const PictureSize eye = picture().eye_size(size);
   WindowInput seen = input;
-  if (seen.pointer.x >= eye.width) seen.pointer.x -= eye.width;  // the other eye's
+  const bool in_second = seen.pointer.x >= eye.width;
+  if (in_second) seen.pointer.x -= eye.width;
+  if (std::exchange(in_second_eye_, in_second) != in_second) hand_.come();  // a jump is no motion
   hand_.step(seen, over_panel, view, eye, held->tip_mm, scene.device,
              std::min(frame_s, kLongestFrameS));
   time_the_tool(input, held->tip_mm, now);

@@ -109,7 +109,7 @@ class WindowRun {
   glm::dvec3 last_tool_mm_{0.0};
   /// Since when, and from where, a tool that rested is to follow the pointer.
   std::optional<std::pair<Clock::time_point, glm::dvec3>> followed_since_;
-  bool pointer_leads_ = false, tool_follows_ = false;
+  bool pointer_leads_ = false, tool_follows_ = false, in_second_eye_ = false;
 };
 
 }  // namespace kerf
