@@ -219,6 +219,9 @@ void check(EmulatorOptions& o) {
   if (!o.hand_socket.empty() && !o.hand.empty()) {
     throw HilError("--hand-socket: the hand of --hand goes its own way; give one of the two");
   }
+  if (!o.hand_socket.empty() && o.hand_socket == o.socket) {
+    throw HilError("--hand-socket: " + o.hand_socket + " is --socket's; name another path");
+  }
   if (!o.hand_socket.empty() && o.lockstep) {
     throw HilError("--hand-socket: a user has no lock-step; leave out --lockstep");
   }

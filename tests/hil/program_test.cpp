@@ -64,6 +64,7 @@ TEST_CASE("bad input is one line that names place, value and way out, and exit c
                "--hand-socket: the hand of --hand"},
            Bad{{"--socket", socket, "--hand-socket", socket + "-hand", "--lockstep"},
                "--hand-socket: a user has no lock-step"},
+           Bad{{"--socket", socket, "--hand-socket", socket}, "--hand-socket: " + socket},
            Bad{{"--socket", socket, "--hand-socket", "/nowhere/hand"}, "--hand-socket: /nowhere"},
            Bad{{"--socket", socket, "--personality", "touch"}, "--personality: touch"},
            Bad{{"--socket", socket, "--front", "pigeon"}, "--front: pigeon"},

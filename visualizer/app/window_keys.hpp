@@ -22,6 +22,10 @@ void change_look(Picture& picture, const Session& session, const Look& look, Not
 /// What a user is told who asks for tool `index`, counted from 0, of a scene that has `tools`.
 [[nodiscard]] std::string no_such_tool(std::size_t index, std::size_t tools);
 
+/// Asks the controller for a tool, counted from 0; what came of it, where that was nothing.
+void take_tool(std::size_t index, Session& session, Notices& notices,
+               Notices::Clock::time_point now);
+
 /// What the keys of a window have switched, and what they have asked for. Who does what was asked
 /// sets it back to false.
 struct WindowKeys {

@@ -2,6 +2,8 @@
 #include "visualizer/app/window_run.hpp"
 
 #include <algorithm>
+#include <array>
+#include <cstdio>
 #include <utility>
 
 #include "shared/posix/new_file.hpp"
@@ -113,6 +115,12 @@ OverlayFigures WindowRun::figures_at(Clock::time_point now) {
   notices_.show(figures, now);
   if (keys_.plot) figures.plot = plot_.points();
   figures.controls = picture().controls();
+  for (const ToolView& tool : session().scene().tools) {
+    std::array<char, 24> size{};
+    std::snprintf(size.data(), size.size(), "%.1f mm ", 2.0 * tool.radius_mm);
+    figures.controls->tools.push_back(size.data() + tool.name);
+  }
+  if (const auto& newest = session().latest()) figures.controls->tool = newest->active_tool;
   return figures;
 }
 
@@ -181,7 +189,12 @@ Redrawn WindowRun::draw(PictureSize size, const WindowInput& input, Clock::time_
   }
   if (std::exchange(keys_.film, false)) notices_.say(toggle_film(options_, size, film_), now);
   OverlayFigures figures = figures_at(now);
+  const std::size_t held = figures.controls->tool;
   follow(input, figures, size, now);
+  if (figures.controls->tool != held) {
+    take_tool(figures.controls->tool, session(), notices_, now);
+    figures.controls->tool = held;  // until the controller has changed it
+  }
   change_look(picture(), session(), figures.controls->look, notices_, now);
   if (std::exchange(keys_.write, false) || std::exchange(figures.controls->write, false)) {
     notices_.say(write_opacities(options_, picture()), now);

@@ -31,6 +31,7 @@ struct Bench {
 WindowInput at(double x, double y) {
   WindowInput input;
   input.hovers = true;
+  input.free_up = 1e-12;  // it moves
   input.pointer = {x, y, false};
   return input;
 }
@@ -53,9 +54,13 @@ TEST_CASE("a point of the world is seen where it is drawn, and found again there
   }
 }
 
-TEST_CASE("nobody leads before the pointer comes; then the goal is under it, at the tool's depth") {
+TEST_CASE("nobody leads before the pointer moves; then the goal is under it, at the tool's depth") {
   Bench bench;
   bench.frame({});
+  CHECK_FALSE(bench.hand.leads());
+  WindowInput rests = at(120, 80);
+  rests.free_up = 0.0;
+  bench.frame(rests);
   CHECK_FALSE(bench.hand.leads());
   CHECK_FALSE(bench.hand.goal_mm());
   bench.frame(at(120, 80));
