@@ -164,6 +164,20 @@ expect 'with a display they' with DISPLAY=:99 kerf_gives 0 demo --seconds 1 --st
 expect 'reach the window, which keeps its files with the others' \
   called '^visualizer --name [^ ]* --size [^ ]* --stereo --record v.y4m --out .*/out/\.partial-'
 expect 'and there is one video' test "$(grep -c -- --record "$lab/calls")" == 1
+expect 'the pointer is the hand' with DISPLAY=:99 kerf_gives 0 demo --seconds 1 --hand mouse
+expect 'in the window' called '^visualizer.*--hand-socket [^ ]*/hand '
+expect 'of the emulator, which has no script' called '^emulator.*--hand-socket [^ ]*/hand --unit-mm'
+expect 'and leaves nothing behind' nothing_survives
+expect 'a window that ends ends it' \
+  with DISPLAY=:99 with FAIL_visualizer=2 kerf_gives 2 demo --seconds 60 --hand mouse
+expect 'in its words' says 'kerf-visualizer: place: value; way out'
+expect 'and leaves nothing behind' nothing_survives
+expect 'without a display it cannot be' kerf_gives 2 demo --hand mouse
+expect 'as it says' says '^kerf: demo: --hand mouse: no display; '
+expect 'nor without a window' with DISPLAY=:99 kerf_gives 2 demo --hand mouse --headless
+expect 'as it says' says '^kerf: demo: --hand mouse: --headless and --sheet have no window'
+expect 'nor in lock-step' with DISPLAY=:99 kerf_gives 2 demo --hand mouse --virtual
+expect 'as it says' says '^kerf: demo: --hand mouse: nobody is as fast'
 expect 'a picture is served' kerf_gives 0 demo --seconds 1 --serve --headless
 expect 'its address is told' says 'http://127.0.0.1:7400/?token=abc'
 expect 'on this machine' called '^bridge serve --name demo-[0-9]* --listen 127.0.0.1:0$'

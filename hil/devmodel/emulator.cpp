@@ -27,11 +27,29 @@ void Emulator::guide_hand() noexcept {
   if (settled || in_vain) hand_->leave();
 }
 
+void Emulator::wish(const HandWish& wish) noexcept {
+  if (led_) led_->wish(wish);
+}
+
+void Emulator::forsake() noexcept {
+  if (led_) led_->forsake();
+}
+
+HandGoal Emulator::next_goal() noexcept {
+  if (!hand_) return {};
+  if (led_ && led_->parked()) {
+    led_->restart();
+    hand_->rest();
+  }
+  if (!hand_->left()) guide_hand();
+  const HandGoal goal = hand_->next();
+  return led_ && can_be_led() ? led_->next(goal, model_->tip_mm()) : goal;
+}
+
 void Emulator::advance(int cycles) noexcept {
   asked_ = false;
   for (int i = 0; i < cycles; ++i) {
-    if (hand_ && !hand_->left()) guide_hand();
-    model_->step(hand_ ? hand_->next() : HandGoal{});
+    model_->step(next_goal());
     ++stats_.cycles;
     stats_.peak_motor_force_n = std::max(stats_.peak_motor_force_n, norm(model_->motor_force_n()));
     if (!model_->docked() && !stats_.undocked_at) stats_.undocked_at = stats_.cycles;

@@ -11,6 +11,7 @@
 #include "hil/devmodel/device_model.hpp"
 #include "hil/devmodel/hand_motion.hpp"
 #include "hil/devmodel/hand_script.hpp"
+#include "hil/devmodel/led_hand.hpp"
 #include "hil/devmodel/omni_model.hpp"
 #include "hil/devmodel/packet_device.hpp"
 
@@ -33,13 +34,17 @@ struct EmulatorStats {
 /// The hand waits until the host has the device calibrated, helps where it must (homes a Falcon,
 /// presses the button of WoodenHaptics), and plays its script 0.15 s later. For a host that does
 /// not begin to calibrate it waits 2 s, and for a host at all as long as it takes. Without a script
-/// the arm stays where it is. One thread; allocates only when constructed.
+/// the arm stays where it is. Once its script has ended, a user may lead it (`wish`). One thread;
+/// allocates only when constructed.
 class Emulator final : public PacketDevice {
  public:
   template <std::derived_from<DeviceModel> Model>
   Emulator(std::unique_ptr<Model> model, const std::optional<HandScript>& script)
       : model_(std::move(model)) {
-    if (script) hand_.emplace(*script, model_->route());
+    if (!script) return;
+    const HandRoute route = model_->route();
+    hand_.emplace(*script, route);
+    led_.emplace(model_->params().hand_stiffness_n_per_mm, route, hand_->start_mm());
   }
   /// An Omni.
   Emulator(const OmniParams& params, const std::optional<HandScript>& script)
@@ -49,14 +54,23 @@ class Emulator final : public PacketDevice {
   void advance(int cycles) noexcept override;
   [[nodiscard]] std::span<const std::uint8_t> next_packet() noexcept override;
 
+  /// Whether a user may lead the hand: its script has ended.
+  [[nodiscard]] bool can_be_led() const noexcept { return hand_ && hand_->ended(); }
+  /// Where a user wants the hand to be, and that there is no user any more: see `LedHand`. A hand
+  /// whose script has not ended follows afterwards.
+  void wish(const HandWish& wish) noexcept;
+  void forsake() noexcept;
+
   [[nodiscard]] const EmulatorStats& stats() const noexcept { return stats_; }
   [[nodiscard]] const DeviceModel& model() const noexcept { return *model_; }
 
  private:
   void guide_hand() noexcept;
+  [[nodiscard]] HandGoal next_goal() noexcept;
 
   std::unique_ptr<DeviceModel> model_;
   std::optional<HandMotion> hand_;
+  std::optional<LedHand> led_;
   EmulatorStats stats_;
   bool asked_ = false;                      ///< for a packet, since the last `advance`
   std::optional<std::int64_t> host_since_;  ///< cycle of the first packet, of either side

@@ -22,9 +22,11 @@ DeviceVec<double> vec_of(const std::array<double, 3>& v) noexcept {
 }  // namespace
 
 HandMotion::HandMotion(const HandScript& script, const HandRoute& route)
-    : from_mm_(route.rest_tip_mm) {
-  const DeviceVec<double> rest = route.rest_tip_mm;
-  const DeviceVec<double> start = vec_of(script.start) * script.unit_mm;
+    : rest_mm_(route.rest_tip_mm),
+      start_mm_(vec_of(script.start) * script.unit_mm),
+      from_mm_(route.rest_tip_mm) {
+  const DeviceVec<double> rest = rest_mm_;
+  const DeviceVec<double> start = start_mm_;
   for (const HandStep& step : route.calibration) add(step, 1.0);
   leaves_at_ = legs_.size();
   if (route.lift_mm > 0) {
@@ -47,6 +49,13 @@ void HandMotion::calibrate() noexcept {
 void HandMotion::leave() noexcept {
   if (phase_ == Phase::resting) leg_ = leaves_at_;
   phase_ = Phase::left;  // a motion of the calibration that has begun comes to its end
+}
+
+void HandMotion::rest() noexcept {
+  phase_ = Phase::resting;
+  cycle_ = 0;
+  from_mm_ = rest_mm_;
+  from_orientation_rad_ = {};
 }
 
 void HandMotion::add(const HandStep& step, double unit_mm) {

@@ -24,7 +24,13 @@ class HandMotion {
   /// Calibrates the device, again and again until it leaves.
   void calibrate() noexcept;
   void leave() noexcept;
+  /// Rests again as at the begin, where it was brought: its way begins anew.
+  void rest() noexcept;
   [[nodiscard]] bool left() const noexcept { return phase_ == Phase::left; }
+  /// The first point of the script.
+  [[nodiscard]] DeviceVec<double> start_mm() const noexcept { return start_mm_; }
+  /// It has done all, and stays where it is.
+  [[nodiscard]] bool ended() const noexcept { return left() && leg_ == legs_.size(); }
 
   /// The wish for the next bus cycle.
   [[nodiscard]] HandGoal next() noexcept;
@@ -48,6 +54,7 @@ class HandMotion {
   std::size_t leg_ = 0;
   std::int64_t cycle_ = 0;
   Phase phase_ = Phase::resting;
+  DeviceVec<double> rest_mm_, start_mm_;
   DeviceVec<double> from_mm_;
   std::array<double, 3> from_orientation_rad_{};
 };

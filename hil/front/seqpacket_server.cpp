@@ -51,19 +51,19 @@ bool is_socket(const std::string& path) {
   return lstat(path.c_str(), &file) == 0 && S_ISSOCK(file.st_mode);
 }
 
-void check_path(const std::string& path) {
+void check_path(const std::string& path, const std::string& option) {
   const std::size_t longest = sizeof(sockaddr_un::sun_path) - 1 - std::strlen(kUnborn);
   if (path.empty() || path.size() > longest) {
-    throw HilError("--socket: " + path + " has " + std::to_string(path.size()) +
+    throw HilError(option + ": " + path + " has " + std::to_string(path.size()) +
                    " bytes; use 1 to " + std::to_string(longest));
   }
   struct stat file {};
   if (lstat(path.c_str(), &file) != 0) return;
   if (!S_ISSOCK(file.st_mode)) {
-    throw HilError("--socket: " + path + " is a file of another kind; choose another path");
+    throw HilError(option + ": " + path + " is a file of another kind; choose another path");
   }
   if (is_live(path)) {
-    throw HilError("--socket: " + path +
+    throw HilError(option + ": " + path +
                    " is in use by another emulator; end it or choose another path");
   }
 }
@@ -94,8 +94,9 @@ PacketLink::Sent SeqpacketLink::send(std::span<const std::uint8_t> packet) noexc
   return Sent::closed;
 }
 
-SeqpacketServer::SeqpacketServer(std::string path) : path_(std::move(path)) {
-  check_path(path_);
+SeqpacketServer::SeqpacketServer(std::string path, const char* option)
+    : path_(std::move(path)), option_(option) {
+  check_path(path_, option_);
   const std::string unborn = path_ + kUnborn;
   if (is_socket(unborn)) unlink(unborn.c_str());  // of an emulator that was killed
   fd_ = socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0);
@@ -111,7 +112,7 @@ SeqpacketServer::SeqpacketServer(std::string path) : path_(std::move(path)) {
   const int error = errno;
   if (fd_ >= 0) close(fd_);
   if (bound) unlink(unborn.c_str());
-  throw HilError("--socket: " + path_ + ": " + std::strerror(error) + "; " +
+  throw HilError(std::string(option_) + ": " + path_ + ": " + std::strerror(error) + "; " +
                  way_out_of(error, "choose a path in a folder that you may write"));
 }
 
@@ -123,18 +124,25 @@ SeqpacketServer::~SeqpacketServer() {
 std::optional<SeqpacketLink> SeqpacketServer::accept(const std::atomic<bool>& stop,
                                                      std::int64_t patience_ns) {
   while (readable_within(fd_, patience_ns, stop)) {
-    const int client = accept4(fd_, nullptr, nullptr, SOCK_CLOEXEC);
-    if (client < 0 && (errno == EMFILE || errno == ENFILE)) {  // the client goes on waiting
-      throw HilError("--socket: " + path_ + ": " + std::strerror(errno) + "; " +
+    errno = 0;
+    if (auto link = accept_waiting()) return link;
+    if (errno == EMFILE || errno == ENFILE) {  // the client goes on waiting
+      throw HilError(std::string(option_) + ": " + path_ + ": " + std::strerror(errno) + "; " +
                      way_out_of(errno, ""));
     }
-    if (client < 0) continue;
-    SeqpacketLink link(client);
-    const std::optional<uid_t> stranger = stranger_at(client);
-    if (!stranger) return link;
-    std::cerr << "kerf-emulator: --socket: " << path_ << ": a client of user " << *stranger
-              << " was refused; be user " << geteuid() << " or root" << std::endl;
   }
+  return std::nullopt;
+}
+
+std::optional<SeqpacketLink> SeqpacketServer::accept_waiting() noexcept {
+  if (!readable(fd_, 0)) return std::nullopt;
+  const int client = accept4(fd_, nullptr, nullptr, SOCK_CLOEXEC);
+  if (client < 0) return std::nullopt;
+  SeqpacketLink link(client);
+  const std::optional<uid_t> stranger = stranger_at(client);
+  if (!stranger) return link;
+  std::cerr << "kerf-emulator: " << option_ << ": " << path_ << ": a client of user " << *stranger
+            << " was refused; be user " << geteuid() << " or root" << std::endl;
   return std::nullopt;
 }
 

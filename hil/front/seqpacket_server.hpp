@@ -27,11 +27,11 @@ class SeqpacketLink final : public PacketLink {
 /// A listening socket at a path of the file system.
 ///
 /// The path appears in one step, ready to accept. A socket file that nobody listens on any more is
-/// replaced; a live one, or a file of another kind, throws `HilError`. The path is removed at the
-/// end.
+/// replaced; a live one, or a file of another kind, throws `HilError` that names `option`. The path
+/// is removed at the end.
 class SeqpacketServer {
  public:
-  explicit SeqpacketServer(std::string path);
+  explicit SeqpacketServer(std::string path, const char* option = "--socket");
   SeqpacketServer(const SeqpacketServer&) = delete;
   SeqpacketServer& operator=(const SeqpacketServer&) = delete;
   ~SeqpacketServer();
@@ -40,9 +40,12 @@ class SeqpacketServer {
   /// Another user is refused, with a line on stderr.
   [[nodiscard]] std::optional<SeqpacketLink> accept(const std::atomic<bool>& stop,
                                                     std::int64_t patience_ns = kForeverNs);
+  /// One that waits already; else nothing, and errno tells where it could not be let in.
+  [[nodiscard]] std::optional<SeqpacketLink> accept_waiting() noexcept;
 
  private:
   std::string path_;
+  const char* option_;
   int fd_ = -1;
 };
 

@@ -15,8 +15,9 @@ namespace kerf {
 namespace {
 
 std::optional<HandScript> hand_of(const EmulatorOptions& o) {
-  if (o.hand.empty()) return std::nullopt;
-  HandScript script = read_hand_script(o.hand);
+  if (o.hand.empty() && o.hand_socket.empty()) return std::nullopt;
+  HandScript script;  // one that a window leads only goes to its start
+  if (!o.hand.empty()) script = read_hand_script(o.hand);
   if (o.unit_mm) script.unit_mm = *o.unit_mm;
   return script;
 }
@@ -68,7 +69,13 @@ std::unique_ptr<DeviceModel> make_device(const EmulatorOptions& o, const PlantVa
 
 EmulatedDevice::EmulatedDevice(const EmulatorOptions& options)
     : options_(options), hand_(hand_of(options)), faults_(faults_of(options)) {
+  if (!options_.hand_socket.empty()) leader_.emplace(options_.hand_socket);
   renew();
+}
+
+void EmulatedDevice::advance(int cycles) noexcept {
+  if (leader_) leader_->lead(*emulator_, cycles);
+  faulty_->advance(cycles);
 }
 
 void EmulatedDevice::renew() {

@@ -10,6 +10,7 @@
 #include "hil/devmodel/emulator.hpp"
 #include "hil/devmodel/packet_device.hpp"
 #include "hil/fault/faulty_device.hpp"
+#include "hil/front/hand_server.hpp"
 #include "hil/program/emulator_options.hpp"
 #include "hil/script/fault_script.hpp"
 
@@ -28,7 +29,7 @@ class EmulatedDevice final : public PacketDevice {
   explicit EmulatedDevice(const EmulatorOptions& options);
 
   void receive(std::span<const std::uint8_t> packet) noexcept override { faulty_->receive(packet); }
-  void advance(int cycles) noexcept override { faulty_->advance(cycles); }
+  void advance(int cycles) noexcept override;
   [[nodiscard]] std::span<const std::uint8_t> next_packet() noexcept override {
     return faulty_->next_packet();
   }
@@ -36,6 +37,8 @@ class EmulatedDevice final : public PacketDevice {
   /// For a new client. Allocates.
   void renew();
 
+  /// Where a window leads the hand; none without `--hand-socket`.
+  [[nodiscard]] const std::optional<HandServer>& leader() const noexcept { return leader_; }
   [[nodiscard]] const DeviceModel& model() const noexcept { return emulator_->model(); }
   /// Of all clients together.
   [[nodiscard]] EmulatorStats stats() const noexcept {
@@ -53,6 +56,7 @@ class EmulatedDevice final : public PacketDevice {
   const EmulatorOptions& options_;
   std::optional<HandScript> hand_;
   FaultScript faults_;
+  std::optional<HandServer> leader_;
   std::optional<Emulator> emulator_;
   std::optional<FaultyDevice> faulty_;
   EmulatorStats earlier_;

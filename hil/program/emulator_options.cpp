@@ -203,6 +203,9 @@ void declare(Arguments& app, EmulatorOptions& o) {
   app.flag("--describe", o.describe,
            "print what a host has to be told of this unit (torque_scale), and end");
   app.option("--hand", o.hand, "hand script (TOML); none: the arm stays in its rest pose");
+  app.option("--hand-socket", o.hand_socket,
+             "path of a socket at which a window (kerf-visualizer --hand-socket) leads the hand, "
+             "in place of a script");
   app.option("--fault", o.fault, "fault script (TOML), for example hil/faults/late_reports.toml");
   app.option("--unit-mm", o.unit_mm, "device mm per unit of the hand script").within(1e-3, 100.0);
   declare_front(app, o);
@@ -213,6 +216,15 @@ void declare(Arguments& app, EmulatorOptions& o) {
 void check(EmulatorOptions& o) {
   o.personality = static_cast<Personality>(known_at("--personality", o.device, kPersonalityWords));
   check_device(o);
+  if (!o.hand_socket.empty() && !o.hand.empty()) {
+    throw HilError("--hand-socket: the hand of --hand goes its own way; give one of the two");
+  }
+  if (!o.hand_socket.empty() && o.hand_socket == o.socket) {
+    throw HilError("--hand-socket: " + o.hand_socket + " is --socket's; name another path");
+  }
+  if (!o.hand_socket.empty() && o.lockstep) {
+    throw HilError("--hand-socket: a user has no lock-step; leave out --lockstep");
+  }
   if (!o.describe) check_front(o);
 }
 

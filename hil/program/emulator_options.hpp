@@ -43,6 +43,7 @@ struct EmulatorOptions {
   std::string udp;
   BusOptions bus;
   std::string hand;
+  std::string hand_socket;
   std::string fault;
   std::optional<double> unit_mm;
   bool lockstep = false;

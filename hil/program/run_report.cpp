@@ -67,6 +67,10 @@ void write_run_report(const std::string& file, const EmulatedDevice& device,
   report["docked"] = model.docked();
   report["undocked_at_s"] = stats.undocked_at ? Json(seconds_of(*stats.undocked_at)) : nullptr;
   report["final_tip_mm"] = std::array{tip.x, tip.y, tip.z};
+  if (device.leader()) {
+    report["wishes"] = device.leader()->wishes();
+    report["wishes_refused"] = device.leader()->refused();
+  }
   report["report_hash"] = hex64(stats.report_hash);
 
   or_refuse([&] { write_new_file(file, report.document()); });

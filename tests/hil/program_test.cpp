@@ -60,6 +60,12 @@ TEST_CASE("bad input is one line that names place, value and way out, and exit c
   for (const auto& [arguments, place] : {
            Bad{{}, "--socket"},
            Bad{{"--socket", socket, "--wrong"}, "--wrong"},
+           Bad{{"--socket", socket, "--hand-socket", socket + "-hand", "--hand", "x.toml"},
+               "--hand-socket: the hand of --hand"},
+           Bad{{"--socket", socket, "--hand-socket", socket + "-hand", "--lockstep"},
+               "--hand-socket: a user has no lock-step"},
+           Bad{{"--socket", socket, "--hand-socket", socket}, "--hand-socket: " + socket},
+           Bad{{"--socket", socket, "--hand-socket", "/nowhere/hand"}, "--hand-socket: /nowhere"},
            Bad{{"--socket", socket, "--personality", "touch"}, "--personality: touch"},
            Bad{{"--socket", socket, "--front", "pigeon"}, "--front: pigeon"},
            Bad{{"--socket", socket, "--rate", "3000"}, "--rate: 3000"},

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 
 namespace kerf {
 
@@ -11,10 +12,11 @@ struct KeyHelp {
   const char* meaning;
 };
 inline constexpr auto kKeys = std::to_array<KeyHelp>({
-    {"drag", "turn"},
+    {"drag, left or right", "turn"},
     {"shift or middle drag", "move"},
     {"wheel", "nearer, farther"},
     {"r", "first view again"},
+    {"u, u", "undo all cuts: the volumes as they were"},
     {"1 .. 9", "take this tool"},
     {"v", "next renderer"},
     {"b", "v is for one volume after another; then for all"},
@@ -27,6 +29,23 @@ inline constexpr auto kKeys = std::to_array<KeyHelp>({
     {"e", "export the surface"},
     {"h", "these keys; again: no panels; again: panels"},
     {"q", "quit"},
+});
+
+/// Rows at its begin that the mouse does alone.
+inline constexpr std::size_t kMouseKeys = 3;
+
+/// What changes where the pointer leads the emulated hand (--hand-socket).
+inline constexpr auto kHandKeys = std::to_array<KeyHelp>({
+    {"pointer", "leads the hand; the ring is where it wants to be"},
+    {"left button", "press"},
+    {"wheel, page up/down", "deeper, nearer"},
+    {"arrows", "tilt the tool"},
+    {"g", "the hand comes to the pointer"},
+    {"k", "park the stylus and take it again: clears a fault"},
+    {"right drag", "turn"},
+    {"middle drag", "move the picture"},
+    {"control + wheel", "zoom"},
+    {"gamepad", "left stick: move; right: depth; A: press; cross: tilt"},
 });
 
 }  // namespace kerf

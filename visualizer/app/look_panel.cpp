@@ -31,6 +31,18 @@ void choose_gradient(Look& look) {
   look.gradient = static_cast<Gradient>(chosen);
 }
 
+void choose_tool(LookControls& controls) {
+  if (controls.tools.size() < 2 || controls.tool >= controls.tools.size()) return;
+  if (!ImGui::BeginCombo("tool", controls.tools[controls.tool].c_str())) return;
+  const std::size_t held = controls.tool;
+  for (std::size_t i = 0; i < controls.tools.size(); ++i) {
+    ImGui::PushID(static_cast<int>(i));  // two may have one name
+    if (ImGui::Selectable(controls.tools[i].c_str(), i == held)) controls.tool = i;
+    ImGui::PopID();
+  }
+  ImGui::EndCombo();
+}
+
 /// One for each volume.
 void choose_renderers(LookControls& controls) {
   const std::size_t count = controls.volumes.size();
@@ -85,6 +97,7 @@ float LookPanel::draw(LookControls& controls, float height) {
   ImGui::Begin("look", nullptr, kTouched);
   Look& look = controls.look;
   ImGui::PushItemWidth(kWide);
+  choose_tool(controls);
   choose_renderers(controls);
   if (controls.takes_gradient) choose_gradient(look);
   if (controls.has_iso) choose_iso(controls);

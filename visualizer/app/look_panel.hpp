@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <optional>
 #include <string>
 #include <vector>
@@ -14,6 +15,8 @@ namespace kerf {
 struct LookControls {
   Look look;
   double own_iso = 0.5;                ///< of the main volume, 0..1: where the look has none
+  std::vector<std::string> tools{};    ///< names and sizes; one alone is no choice
+  std::size_t tool = 0;                ///< in the hand, or asked for
   std::vector<std::string> volumes{};  ///< their names
   bool has_iso = false;                ///< a volume shows its iso-surface
   bool takes_gradient = false;         ///< a renderer shades by the look's
@@ -23,8 +26,8 @@ struct LookControls {
   friend bool operator==(const LookControls&, const LookControls&) noexcept = default;
 };
 
-/// The controls of the look, which the mouse moves: renderers, gradient, iso value, opacities, clip
-/// plane, stereo, voxel tool. Lower left corner.
+/// The controls of tool and look, which the mouse moves: the tool in the hand, renderers, gradient,
+/// iso value, opacities, clip plane, stereo, voxel tool. Lower left corner.
 class LookPanel {
  public:
   /// Between ImGui::NewFrame and ImGui::Render. Takes the mouse's changes over into `controls`.

@@ -28,6 +28,10 @@ std::string footer() {
   for (const auto& [key, meaning] : kKeys) {
     text << "  " << std::left << std::setw(kColumn) << key << meaning << "\n";
   }
+  text << "With --hand-socket:\n";
+  for (const auto& [key, meaning] : kHandKeys) {
+    text << "  " << std::left << std::setw(kColumn) << key << meaning << "\n";
+  }
   text << "Exit codes: 0 fine, 1 the controller did not end cleanly or a video is cut short, 2 bad "
           "input or set-up, or the screen or the graphics card is gone.";
   return text.str();
@@ -67,6 +71,10 @@ void declare_run(Arguments& app, VisualizerOptions& o) {
   app.option("--wait", o.wait_s, "seconds to wait for the controller")
       .within(0.0, 1e6)
       .shows_default();
+  app.option("--hand-socket", o.hand_socket,
+             "the pointer, keys or a gamepad lead the hand of a kerf-emulator that has this "
+             "--hand-socket; in a window")
+      .shown_as("PATH");
   app.option("--attached", o.attached,
              "make this empty file once the controller is shown: a short run may begin")
       .shown_as("FILE");
@@ -162,6 +170,11 @@ std::optional<VisualizerOptions> parse_options(int argc, const char* const* argv
   }
   if (record.given() && !frames.given()) options.frames = 0;
   if (options.bench && !sized.given()) size = kBenchSize;
+  if (options.hand_socket && (options.headless || options.bench)) {
+    throw VisualizerError(std::string("--hand-socket: ") +
+                          (options.headless ? "--headless" : "--bench") +
+                          " has no pointer that could lead a hand; give one of the two");
+  }
   options.size = parse_size(size);
   check_renderers(options.look.renderer);
   options.look.gradient = gradient_named(gradient);

@@ -24,6 +24,7 @@ struct VisualizerOptions {
   std::optional<double> seconds;             ///< ends after this time; default: with the controller
   double wait_s = 10.0;                      ///< for the controller to appear
   std::optional<std::filesystem::path> attached;  ///< --attached: made once it is shown
+  std::optional<std::string> hand_socket;         ///< where an emulator's hand is to be led
   std::optional<std::string> lead;                ///< headless: FIFO of a controller in lock-step
   std::optional<std::string> record;              ///< video: a file, a pipe, or "-" for stdout
   int video_hz = 60;                              ///< its frames per second of servo time

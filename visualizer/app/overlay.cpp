@@ -18,6 +18,13 @@ OverlayFigures OverlayFigures::rounded() const {
   shown.removed_mm3 = rounded_to(0.01, removed_mm3);
   if (tick_rate_hz) shown.tick_rate_hz = rounded_to(1.0, *tick_rate_hz);
   if (frame_rate_hz) shown.frame_rate_hz = rounded_to(1.0, *frame_rate_hz);
+  if (hand) {
+    for (double HandMark::*length : {&HandMark::goal_x, &HandMark::goal_y, &HandMark::tool_x,
+                                     &HandMark::tool_y, &HandMark::radius}) {
+      (*shown.hand).*length = rounded_to(0.5, (*hand).*length);
+    }
+    shown.hand->deeper_mm = rounded_to(0.1, hand->deeper_mm);
+  }
   if (data_age_ms) shown.data_age_ms = rounded_to(0.1, *data_age_ms);
   return shown;
 }
@@ -66,7 +73,8 @@ void Overlay::lay_out(OverlayFigures& figures, PictureSize size) {
   if (!figures.hidden) draw_figures(figures);
   float controls_x = 0.0F;
   if (figures.controls && !figures.hidden) controls_x = look_panel_.draw(*figures.controls, all.y);
-  if (figures.help) draw_key_help(all);
+  if (figures.hand) draw_hand_mark(*figures.hand, figures.force_n / figures.full_force_n);
+  if (figures.help) draw_key_help(all, figures.leads_hand);
   if (!figures.banner.empty()) draw_banner(figures.banner, figures.alarm, all, controls_x);
   ImGui::Render();
 }

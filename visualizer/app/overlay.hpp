@@ -13,6 +13,15 @@
 
 namespace kerf {
 
+/// Where a led hand wants to be and where it is, in pixels from the upper left corner.
+struct HandMark {
+  double goal_x = 0.0, goal_y = 0.0;
+  double tool_x = 0.0, tool_y = 0.0;
+  double radius = 0.0;     ///< of the tool there
+  double deeper_mm = 0.0;  ///< the goal than the tool, along the view axis
+  friend bool operator==(const HandMark&, const HandMark&) noexcept = default;
+};
+
 /// What the panel in the corner says.
 struct OverlayFigures {
   double force_n = 0.0;
@@ -27,6 +36,8 @@ struct OverlayFigures {
   std::string banner;                          ///< shown large; empty: there is nothing to say
   bool alarm = false;                          ///< it says that something is wrong
   bool help = false;                           ///< shows the keys
+  bool leads_hand = false;                     ///< with those that lead the hand
+  std::optional<HandMark> hand;                ///< none: nobody leads it
   bool hidden = false;                         ///< shows nothing but the banner: for films
   std::vector<ForcePlot::Point> plot;          ///< force and depth over time; empty: no plot
   std::optional<LookControls> controls;        ///< in a window

@@ -2,7 +2,10 @@
 #include "visualizer/app/overlay_panels.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstddef>
+#include <cstdio>
 #include <vector>
 
 #include "visualizer/app/keys.hpp"
@@ -28,14 +31,17 @@ void row(const char* label, const char* format, Value value) {
   ImGui::TextColored(kValueColour, format, value);
 }
 
+/// Of a share of the full force.
+const ImVec4& colour_of(double share) {
+  constexpr double kStrongFrom = 0.5;
+  constexpr double kLimitFrom = 0.9;
+  return share < kStrongFrom ? kCalm : share < kLimitFrom ? kStrong : kLimit;
+}
+
 void force_bar(const OverlayFigures& figures) {
-  const auto share =
-      static_cast<float>(std::clamp(figures.force_n / figures.full_force_n, 0.0, 1.0));
-  constexpr float kStrongFrom = 0.5F;
-  constexpr float kLimitFrom = 0.9F;
-  const ImVec4& colour = share < kStrongFrom ? kCalm : share < kLimitFrom ? kStrong : kLimit;
-  ImGui::PushStyleColor(ImGuiCol_PlotHistogram, colour);
-  ImGui::ProgressBar(share, ImVec2(170.0F, 7.0F), "");
+  const double share = std::clamp(figures.force_n / figures.full_force_n, 0.0, 1.0);
+  ImGui::PushStyleColor(ImGuiCol_PlotHistogram, colour_of(share));
+  ImGui::ProgressBar(static_cast<float>(share), ImVec2(170.0F, 7.0F), "");
   ImGui::PopStyleColor();
 }
 
@@ -85,6 +91,7 @@ void draw_figures(const OverlayFigures& figures) {
     if (figures.filmed_frames) row("filmed", "%ju frames", std::uintmax_t{*figures.filmed_frames});
     ImGui::EndTable();
   }
+  if (figures.controls && !figures.help) ImGui::TextColored(kLabelColour, "h: all keys");
   if (!figures.plot.empty()) {
     curve("force, 5 s, peak", "%.2f N", figures.plot, &ForcePlot::Point::force_n, kLeastFullForceN,
           kCalm);
@@ -118,12 +125,48 @@ void draw_banner(const std::string& text, bool alarm, ImVec2 size, float control
   to.PopClipRect();
 }
 
-void draw_key_help(ImVec2 size) {
+void draw_hand_mark(const HandMark& mark, double force_share) {
+  constexpr float kLeastRadius = 4.0F, kMostRadius = 60.0F, kWide = 1.8F, kDot = 2.0F;
+  constexpr double kLeastDepthMm = 0.1;
+  const ImVec2 goal{static_cast<float>(mark.goal_x), static_cast<float>(mark.goal_y)};
+  const ImVec2 tool{static_cast<float>(mark.tool_x), static_cast<float>(mark.tool_y)};
+  const float radius = std::clamp(static_cast<float>(mark.radius), kLeastRadius, kMostRadius);
+  const std::array<char, 32> depth = [&] {
+    std::array<char, 32> text{};
+    if (std::abs(mark.deeper_mm) >= kLeastDepthMm) {
+      std::snprintf(text.data(), text.size(), "%.1f mm %s", std::abs(mark.deeper_mm),
+                    mark.deeper_mm > 0.0 ? "deeper" : "nearer");
+    }
+    return text;
+  }();
+  const ImVec2 words = ImGui::CalcTextSize(depth.data());
+  const ImVec2 at{goal.x + radius + 5.0F, goal.y - 0.5F * words.y};
+  const ImVec2 low{std::min(goal.x - radius, tool.x) - 3.0F,
+                   std::min(goal.y - radius, tool.y) - 8.0F};
+  const ImVec2 high{std::max(at.x + words.x, tool.x) + 3.0F,
+                    std::max(goal.y + radius, tool.y) + 8.0F};
+  const ImU32 colour = ImGui::GetColorU32(colour_of(force_share));
+  ImDrawList& to = *ImGui::GetBackgroundDrawList();
+  to.PushClipRect({std::max(low.x, 0.0F), low.y}, high);  // left of it may be another eye's
+  to.AddLine(tool, goal, colour, kWide);
+  to.AddCircle(goal, radius, colour, 0, kWide);
+  to.AddCircleFilled(goal, kDot, colour);
+  to.AddText(at, ImGui::GetColorU32(kValueColour), depth.data());
+  to.PopClipRect();
+}
+
+void draw_key_help(ImVec2 size, bool leads_hand) {
   ImGui::SetNextWindowPos(ImVec2(size.x - 12.0F, 12.0F), 0, ImVec2(1.0F, 0.0F));
   ImGui::SetNextWindowBgAlpha(0.9F);  // many words over whatever is behind
   ImGui::Begin("keys", nullptr, kStillPanel);
   if (ImGui::BeginTable("keys", 2)) {
-    for (const auto& [key, meaning] : kKeys) row(key, "%s", meaning);
+    if (leads_hand) {
+      for (const auto& [key, meaning] : kHandKeys) row(key, "%s", meaning);
+      ImGui::TableNextRow(ImGuiTableRowFlags_None, 6.0F);
+    }
+    // The first ones are the mouse's, which leads the hand.
+    const std::size_t from = leads_hand ? kMouseKeys : 0;
+    for (std::size_t i = from; i < kKeys.size(); ++i) row(kKeys[i].key, "%s", kKeys[i].meaning);
     ImGui::EndTable();
   }
   ImGui::End();

@@ -29,7 +29,11 @@ void draw_figures(const OverlayFigures& figures);
 /// over the banner.
 void draw_banner(const std::string& text, bool alarm, ImVec2 size, float controls_x);
 
-/// The keys and what they do: upper right corner.
-void draw_key_help(ImVec2 size);
+/// The keys and what they do, after those that lead the hand: upper right corner.
+void draw_key_help(ImVec2 size, bool leads_hand);
+
+/// A ring where the hand wants to be, a line to the tool that it pulls, and how much deeper that
+/// is; behind all panels. The colour is that of the force's share of the bar.
+void draw_hand_mark(const HandMark& mark, double force_share);
 
 }  // namespace kerf

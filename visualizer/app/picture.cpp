@@ -2,8 +2,10 @@
 #include "visualizer/app/picture.hpp"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
+#include <string>
 
 #include "visualizer/gl/context.hpp"
 #include "visualizer/view/transfer_function.hpp"
@@ -23,6 +25,26 @@ void clear(const RenderTarget& target) {
   target.bind();
   constexpr float kBlack[4] = {0.0F, 0.0F, 0.0F, 1.0F};
   glClearNamedFramebufferfv(target.framebuffer(), GL_COLOR, 0, kBlack);
+}
+
+/// What stands between the hand and its force, and what to do; empty: nothing.
+std::string state_words(const TickRecord& record) {
+  // Phases and faults as docs/log.md lists them.
+  constexpr std::uint16_t kCalibrating = 1, kArmed = 2, kFault = 5;
+  constexpr std::array<const char*, 7> kFaults{"none",      "stale_input", "not_finite",
+                                               "overspeed", "force_law",   "velocity_estimator",
+                                               "stabiliser"};
+  switch (record.phase) {
+    case kCalibrating:
+      return "the motors are off: park the device at rest, so that it is calibrated";
+    case kArmed:
+      return "parked: take the device in hand";
+    case kFault:
+      return std::string("fault ") + (record.fault < kFaults.size() ? kFaults[record.fault] : "") +
+             ": the motors are off; park the device at rest (a hand led by the pointer: k)";
+    default:
+      return {};
+  }
 }
 
 }  // namespace
@@ -118,13 +140,17 @@ void Picture::update(const Session& session) {
   }
 }
 
-std::vector<View> Picture::views(PictureSize size) const {
+View Picture::middle_view(PictureSize size) const {
   const double reach_mm = camera_.radius_mm() + kToolRoom * scene_.main_volume().radius_mm();
-  const Stereo& stereo = look_.stereo;
-  const int width = eye_size(size).width;
-  View view = camera_.view(static_cast<double>(width) / size.height, reach_mm);
+  View view = camera_.view(static_cast<double>(eye_size(size).width) / size.height, reach_mm);
   view.shown = shown_half();
-  if (width == size.width) return {view};
+  return view;
+}
+
+std::vector<View> Picture::views(PictureSize size) const {
+  const View view = middle_view(size);
+  if (eye_size(size) == size) return {view};
+  const Stereo& stereo = look_.stereo;
   const double convergence_mm = stereo.convergence_mm.value_or(camera_.distance_mm());
   const double eyes_mm = stereo.eyes_mm.value_or(kEyesPerConvergence * convergence_mm);
   const auto both = eye_views(view, {eyes_mm, convergence_mm});
@@ -242,6 +268,12 @@ OverlayFigures overlay_figures(const Session& session) {
     figures.alarm = true;
   } else if (const auto& record = session.latest(); record && (record->flags & kFlagRefused) != 0) {
     figures.banner = "no free place for this tool here, so it feels nothing: lead it into air";
+    figures.alarm = true;
+  } else if (record && !state_words(*record).empty()) {
+    figures.banner = state_words(*record);
+    figures.alarm = record->fault != 0;
+  } else if (record && (record->flags & kFlagForbidden) != 0) {
+    figures.banner = "pressed on what may not be cut";
     figures.alarm = true;
   } else if (record && (record->flags & kFlagShaft) != 0) {
     figures.banner = "the shaft touches: it cuts nothing";

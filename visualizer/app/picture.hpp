@@ -55,6 +55,10 @@ class Picture {
   bool handle(const Pointer& pointer, OverlayFigures& figures, PictureSize size);
 
   [[nodiscard]] OrbitCamera& camera() noexcept { return camera_; }
+  /// What one eye of a picture of `size` sees; of two, the one in their middle would.
+  [[nodiscard]] View middle_view(PictureSize size) const;
+  /// Of one eye in a picture of `size`.
+  [[nodiscard]] PictureSize eye_size(PictureSize size) const noexcept;
   void reset_camera(double aspect);
   [[nodiscard]] std::uint64_t bricks_uploaded() const noexcept { return bricks_uploaded_; }
 
@@ -64,8 +68,6 @@ class Picture {
   [[nodiscard]] std::unique_ptr<ScenePainter> painter_for(const Session& session, const Look& look);
   /// `View::shown` of the clip plane.
   [[nodiscard]] glm::dvec4 shown_half() const;
-  /// Of one eye in a picture of `size`.
-  [[nodiscard]] PictureSize eye_size(PictureSize size) const noexcept;
   /// Of each eye, from the left.
   [[nodiscard]] std::vector<View> views(PictureSize size) const;
 

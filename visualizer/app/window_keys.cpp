@@ -42,15 +42,17 @@ Notice write_for_user(const std::string& what, const Write& write) {
 
 using namespace std::string_literals;
 
-/// Asks for the tool of a digit's key.
-void take_tool(char key, Session& session, Notices& notices, Notices::Clock::time_point now) {
-  const std::size_t tools = session.scene().tools.size();
-  const auto index = static_cast<std::size_t>(key - '1');
-  if (index >= tools) {
-    notices.say({no_such_tool(index, tools), true}, now);
-  } else if (!session.select_tool(static_cast<std::uint32_t>(index))) {
-    notices.say({"tool "s + key + ": the controller did not take it; press the key again", true},
-                now);
+/// A slip of a finger must not undo what was cut: the key is pressed twice.
+void undo_all(std::optional<Notices::Clock::time_point>& asked, Session& session, Notices& notices,
+              Notices::Clock::time_point now) {
+  const bool again = asked && now - *asked < Notices::kShownFor;
+  asked = again ? std::nullopt : std::optional(now);
+  if (!again) {
+    notices.say({"u again: undo all cuts"}, now);
+  } else if (session.reset()) {
+    notices.say({"all cuts are undone"}, now);
+  } else {
+    notices.say({"undo: the controller did not take it; press u twice again", true}, now);
   }
 }
 
@@ -69,6 +71,19 @@ void change_look(Picture& picture, const Session& session, const Look& look, Not
     picture.set_look(session, look);
   } catch (const VisualizerError& problem) {
     notices.say({problem.what(), true}, now);
+  }
+}
+
+void take_tool(std::size_t index, Session& session, Notices& notices,
+               Notices::Clock::time_point now) {
+  const std::size_t tools = session.scene().tools.size();
+  if (index >= tools) {
+    notices.say({no_such_tool(index, tools), true}, now);
+  } else if (!session.select_tool(static_cast<std::uint32_t>(index))) {
+    notices.say(
+        {"tool "s + std::to_string(index + 1) + ": the controller did not take it; choose it again",
+         true},
+        now);
   }
 }
 
@@ -99,9 +114,14 @@ bool WindowKeys::apply(const WindowInput& input, Session& session, Picture& pict
       one = (one + 1) % (volumes.size() + 1);
       notices.say({"v: " + (one > 0 ? volumes[one - 1].name : "all volumes")}, now);
     }
+    if (key == 'g') come = true;
+    if (key == 'k') park = true;
+    if (key == 'u') undo_all(undo_asked, session, notices, now);
     if (key == 'c') look.clip.on = !look.clip.on;
     if (key == 't') look.stereo.on = !look.stereo.on;
-    if (key >= '1' && key <= '9') take_tool(key, session, notices, now);
+    if (key >= '1' && key <= '9') {
+      take_tool(static_cast<std::size_t>(key - '1'), session, notices, now);
+    }
   }
   change_look(picture, session, look, notices, now);
   return quit;

@@ -22,6 +22,10 @@ void change_look(Picture& picture, const Session& session, const Look& look, Not
 /// What a user is told who asks for tool `index`, counted from 0, of a scene that has `tools`.
 [[nodiscard]] std::string no_such_tool(std::size_t index, std::size_t tools);
 
+/// Asks the controller for a tool, counted from 0; what came of it, where that was nothing.
+void take_tool(std::size_t index, Session& session, Notices& notices,
+               Notices::Clock::time_point now);
+
 /// What the keys of a window have switched, and what they have asked for. Who does what was asked
 /// sets it back to false.
 struct WindowKeys {
@@ -32,7 +36,10 @@ struct WindowKeys {
   bool mesh = false;    ///< export the surface
   bool write = false;   ///< write the opacities
   bool film = false;    ///< begin a film, or end it
+  bool come = false;    ///< the hand comes to the pointer
+  bool park = false;    ///< it brings the stylus to rest and back
   std::size_t one = 0;  ///< volume that v is for, counted from 1; 0: all
+  std::optional<Notices::Clock::time_point> undo_asked{};  ///< u once: the second one is meant
 
   /// Takes the keys of `input`: the camera and the look of `picture`, and the tool, follow at once.
   /// True when the user wants to leave.

@@ -25,7 +25,8 @@ constexpr auto kFrame = std::chrono::microseconds(16'667);  // no faster than sc
 bool step(WindowRun& run, Window& window) {
   const auto begin = Clock::now();
   const PictureSize size = window.size();
-  const auto [quit, drawn] = run.step(window.poll(), size, begin);
+  const auto [quit, drawn, leads_hand] = run.step(window.poll(), size, begin);
+  window.show_pointer(!leads_hand);
   if (drawn != nullptr) window.present(*drawn);
   return !quit;
 }

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "visualizer/app/window_run.hpp"
 
+#include <algorithm>
+#include <array>
+#include <cstdio>
 #include <utility>
 
 #include "shared/posix/new_file.hpp"
@@ -13,10 +16,22 @@ namespace {
 
 constexpr auto kReattachPause = std::chrono::milliseconds(500);
 
+constexpr double kFarthestPullMm = 60;   // of the hand: farther off it parks, and pulls nothing
+constexpr double kLongestFrameS = 0.05;  // one that took longer was none of the user's
+
 void move_camera(OrbitCamera& camera, const WindowInput& input) {
-  camera.orbit(input.turn_right, input.turn_up);
+  camera.orbit(input.turn_right + input.drag_right, input.turn_up + input.drag_up);
   camera.pan(input.move_right, input.move_up);
-  if (input.wheel != 0.0) camera.zoom(input.wheel);
+  if (const double steps = input.wheel + input.zoom; steps != 0.0) camera.zoom(steps);
+}
+
+/// Left button and wheel are the hand's; what it works at stays where it is in the picture.
+void move_camera_around(OrbitCamera& camera, const glm::dvec3& goal_mm, const WindowInput& input) {
+  if (input.turn_right != 0.0 || input.turn_up != 0.0) {
+    camera.orbit_about(goal_mm, input.turn_right, input.turn_up);
+  }
+  camera.pan(input.move_right, input.move_up);
+  if (input.zoom != 0.0) camera.zoom(input.zoom);
 }
 
 }  // namespace
@@ -60,6 +75,7 @@ WindowRun::WindowRun(const VisualizerOptions& options, Session first, const GlCo
               .attach_ms = first.attach_ms()},
       aspect_(static_cast<double>(options.size.width) / options.size.height),
       followed_(options, std::move(first), aspect_) {
+  if (options.hand_socket) hand_link_.emplace(*options.hand_socket);
   if (options.attached) write_new_file(*options.attached, "");
 }
 
@@ -71,10 +87,14 @@ WindowRun::Frame WindowRun::step(const WindowInput& input, PictureSize size,
   followed_.update(aspect_, now);
   if (const auto& newest = session().latest()) plot_.add(*newest);
   if (std::exchange(keys_.mesh, false)) notices_.say(export_mesh(options_, session()), now);
+  if (hand_link_) {
+    if (const auto news = hand_link_->step(now)) notices_.say(*news, now);
+  }
   if (keys_.screenshot) notices_.clear();  // what was said of the one before
   if (!visible) return {};
   const Redrawn redrawn = draw(size, input, now);
-  return {.drawn = redrawn.any || input.exposed ? &*target_ : nullptr};
+  return {.drawn = redrawn.any || input.exposed ? &*target_ : nullptr,
+          .leads_hand = pointer_leads_};
 }
 
 int WindowRun::end() {
@@ -90,11 +110,76 @@ OverlayFigures WindowRun::figures_at(Clock::time_point now) {
   if (film_) figures.filmed_frames = film_->file().frames();
   rates_.show(figures, now);
   figures.help = keys_.help;
+  figures.leads_hand = hand_link_.has_value();
   figures.hidden = keys_.hidden;
   notices_.show(figures, now);
   if (keys_.plot) figures.plot = plot_.points();
   figures.controls = picture().controls();
+  for (const ToolView& tool : session().scene().tools) {
+    std::array<char, 24> size{};
+    std::snprintf(size.data(), size.size(), "%.1f mm ", 2.0 * tool.radius_mm);
+    figures.controls->tools.push_back(size.data() + tool.name);
+  }
+  if (const auto& newest = session().latest()) figures.controls->tool = newest->active_tool;
   return figures;
+}
+
+void WindowRun::follow(const WindowInput& input, OverlayFigures& figures, PictureSize size,
+                       Clock::time_point now) {
+  const bool over_panel = picture().handle(input.pointer, figures, size);
+  if (!over_panel) {
+    const auto goal_mm = hand_.goal_mm();
+    goal_mm ? move_camera_around(picture().camera(), *goal_mm, input)
+            : move_camera(picture().camera(), input);
+  }
+  if (hand_link_) lead_hand(input, over_panel, figures, size, now);
+  pointer_leads_ = figures.hand.has_value() && !over_panel;
+}
+
+void WindowRun::lead_hand(const WindowInput& input, bool over_panel, OverlayFigures& figures,
+                          PictureSize size, Clock::time_point now) {
+  const double frame_s = std::chrono::duration<double>(now - last_led_).count();
+  last_led_ = now;
+  if (std::exchange(keys_.come, false)) hand_.come();
+  const auto held = session().latest() ? hand_of(*session().latest()) : std::nullopt;
+  if (!held || !hand_link_->leads()) return;
+  const SceneView& scene = session().scene();
+  const View view = picture().middle_view(size);
+  const PictureSize eye = picture().eye_size(size);
+  WindowInput seen = input;
+  const bool in_second = seen.pointer.x >= eye.width;
+  if (in_second) seen.pointer.x -= eye.width;
+  if (std::exchange(in_second_eye_, in_second) != in_second) hand_.come();  // a jump is no motion
+  hand_.step(seen, over_panel, view, eye, held->tip_mm, scene.device,
+             std::min(frame_s, kLongestFrameS));
+  time_the_tool(input, held->tip_mm, now);
+  if (!hand_.leads()) return;
+  HandWish wish = hand_.wish(scene.device);
+  wish.park = std::exchange(keys_.park, false);
+  hand_link_->send(wish);
+  const SeenPoint goal = seen_at(view, eye, *hand_.goal_mm());
+  const SeenPoint tool = seen_at(view, eye, held->tip_mm);
+  const double away_mm = glm::length(*hand_.goal_mm() - held->tip_mm) / scene.device.scale;
+  if (goal.depth_mm <= 0.0 || tool.depth_mm <= 0.0 || away_mm > kFarthestPullMm) return;
+  const double radius_mm =
+      held->tool < scene.tools.size() ? scene.tools[held->tool].radius_mm : 0.0;
+  figures.hand = {goal.pixel.x,
+                  goal.pixel.y,
+                  tool.pixel.x,
+                  tool.pixel.y,
+                  radius_mm * eye.height / (2.0 * view.tan_half_height * goal.depth_mm),
+                  goal.depth_mm - tool.depth_mm};
+}
+
+void WindowRun::time_the_tool(const WindowInput& input, const glm::dvec3& tool_mm,
+                              Clock::time_point now) {
+  constexpr double kRestsMm = 0.005, kMovedMm = 0.02;
+  const bool moved = input.free_right != 0.0 || input.free_up != 0.0;
+  const bool rested = glm::length(tool_mm - last_tool_mm_) < kRestsMm;
+  last_tool_mm_ = tool_mm;
+  if (moved && rested && !followed_since_) followed_since_ = {now, tool_mm};
+  if (!followed_since_ || glm::length(tool_mm - followed_since_->second) < kMovedMm) return;
+  tool_follows_ = true;
 }
 
 Redrawn WindowRun::draw(PictureSize size, const WindowInput& input, Clock::time_point now) {
@@ -104,12 +189,22 @@ Redrawn WindowRun::draw(PictureSize size, const WindowInput& input, Clock::time_
   }
   if (std::exchange(keys_.film, false)) notices_.say(toggle_film(options_, size, film_), now);
   OverlayFigures figures = figures_at(now);
-  if (!picture().handle(input.pointer, figures, size)) move_camera(picture().camera(), input);
+  const std::size_t held = figures.controls->tool;
+  follow(input, figures, size, now);
+  if (figures.controls->tool != held) {
+    take_tool(figures.controls->tool, session(), notices_, now);
+    figures.controls->tool = held;  // until the controller has changed it
+  }
   change_look(picture(), session(), figures.controls->look, notices_, now);
   if (std::exchange(keys_.write, false) || std::exchange(figures.controls->write, false)) {
     notices_.say(write_opacities(options_, picture()), now);
   }
   const Redrawn redrawn = draw_measured(picture(), session(), figures, *target_, report_);
+  if (std::exchange(tool_follows_, false)) {
+    const std::chrono::duration<double, std::milli> late = Clock::now() - followed_since_->first;
+    report_.pointer_ms.push_back(late.count());
+    followed_since_.reset();
+  }
   if (report_.wall_ms.size() == 1) report_.late_join_ms = age_ms();
   if (std::exchange(keys_.screenshot, false)) {
     notices_.say(take_screenshot(options_, *target_), now);

@@ -4,11 +4,16 @@
 #include <chrono>
 #include <cstdint>
 #include <optional>
+#include <utility>
+
+#include <glm/glm.hpp>
 
 #include "visualizer/app/film.hpp"
 #include "visualizer/app/force_plot.hpp"
+#include "visualizer/app/hand_link.hpp"
 #include "visualizer/app/options.hpp"
 #include "visualizer/app/picture.hpp"
+#include "visualizer/app/pointer_hand.hpp"
 #include "visualizer/app/window_figures.hpp"
 #include "visualizer/app/window_keys.hpp"
 #include "visualizer/gl/context.hpp"
@@ -58,6 +63,7 @@ class WindowRun {
   struct Frame {
     bool quit = false;                    ///< the user wants to leave; nothing else was done
     const RenderTarget* drawn = nullptr;  ///< to be presented; none: what was, stays
+    bool leads_hand = false;              ///< the ring stands for the pointer
   };
 
   /// `context` is current, now and in each step; `since_attached` began when `first` did.
@@ -77,6 +83,12 @@ class WindowRun {
 
  private:
   [[nodiscard]] OverlayFigures figures_at(Clock::time_point now);
+  /// What the user wants of hand and camera; the mark of the hand goes into the figures.
+  void follow(const WindowInput& input, OverlayFigures& figures, PictureSize size,
+              Clock::time_point now);
+  void lead_hand(const WindowInput& input, bool over_panel, OverlayFigures& figures,
+                 PictureSize size, Clock::time_point now);
+  void time_the_tool(const WindowInput& input, const glm::dvec3& tool_mm, Clock::time_point now);
   Redrawn draw(PictureSize size, const WindowInput& input, Clock::time_point now);
 
   const VisualizerOptions& options_;
@@ -91,6 +103,13 @@ class WindowRun {
   Notices notices_;
   ForcePlot plot_;
   std::optional<Film> film_;
+  std::optional<HandLink> hand_link_;
+  PointerHand hand_;
+  Clock::time_point last_led_{};
+  glm::dvec3 last_tool_mm_{0.0};
+  /// Since when, and from where, a tool that rested is to follow the pointer.
+  std::optional<std::pair<Clock::time_point, glm::dvec3>> followed_since_;
+  bool pointer_leads_ = false, tool_follows_ = false, in_second_eye_ = false;
 };
 
 }  // namespace kerf

@@ -3,6 +3,8 @@
 
 #include <epoxy/gl.h>
 // After the GL loader.
+#include <algorithm>
+#include <cmath>
 #include <cstdlib>
 #include <utility>
 
@@ -58,6 +60,37 @@ bool is_down(GLFWwindow* handle, int button) {
   return glfwGetMouseButton(handle, button) == GLFW_PRESS;
 }
 
+/// -1, 0 or 1 by two keys.
+double of_keys(GLFWwindow* handle, int less, int more) {
+  return (glfwGetKey(handle, more) == GLFW_PRESS ? 1.0 : 0.0) -
+         (glfwGetKey(handle, less) == GLFW_PRESS ? 1.0 : 0.0);
+}
+
+/// A stick that rests is seldom quite in its middle.
+double of_axis(float value) {
+  constexpr double kRests = 0.15;
+  const double beyond = std::max(std::abs(static_cast<double>(value)) - kRests, 0.0) / (1 - kRests);
+  return std::copysign(std::min(beyond, 1.0), value);
+}
+
+void add_gamepad(HeldControls& held) {
+  GLFWgamepadstate pad;
+  if (glfwGetGamepadState(GLFW_JOYSTICK_1, &pad) != GLFW_TRUE) return;
+  const auto axis = [&](int name) { return of_axis(pad.axes[name]); };
+  const auto pressed = [&](int name) { return pad.buttons[name] == GLFW_PRESS ? 1.0 : 0.0; };
+  const HeldControls keys = held;
+  held.right += axis(GLFW_GAMEPAD_AXIS_LEFT_X);
+  held.up -= axis(GLFW_GAMEPAD_AXIS_LEFT_Y);  // down is positive
+  held.deeper -= axis(GLFW_GAMEPAD_AXIS_RIGHT_Y);
+  held.tilt_right +=
+      pressed(GLFW_GAMEPAD_BUTTON_DPAD_RIGHT) - pressed(GLFW_GAMEPAD_BUTTON_DPAD_LEFT);
+  held.tilt_up += pressed(GLFW_GAMEPAD_BUTTON_DPAD_UP) - pressed(GLFW_GAMEPAD_BUTTON_DPAD_DOWN);
+  held.press = pressed(GLFW_GAMEPAD_BUTTON_A) + pressed(GLFW_GAMEPAD_BUTTON_RIGHT_BUMPER) > 0;
+  held.by_pad = held.press || held.right != keys.right || held.up != keys.up ||
+                held.deeper != keys.deeper || held.tilt_right != keys.tilt_right ||
+                held.tilt_up != keys.tilt_up;
+}
+
 }  // namespace
 
 bool Window::has_screen() {
@@ -89,6 +122,7 @@ Window::Window(PictureSize size, Visibility visibility) {
   glfwSetWindowUserPointer(handle_, this);
   glfwSetKeyCallback(handle_, on_key);
   glfwSetCursorPosCallback(handle_, on_cursor);
+  glfwSetCursorEnterCallback(handle_, on_enter);
   glfwSetMouseButtonCallback(handle_, on_button);
   glfwSetScrollCallback(handle_, on_scroll);
   glfwSetWindowRefreshCallback(handle_, on_exposed);
@@ -127,6 +161,11 @@ void Window::present(const RenderTarget& target) {
   glfwSwapBuffers(handle_);
 }
 
+void Window::show_pointer(bool shown) {
+  if (std::exchange(pointer_shown_, shown) == shown) return;
+  glfwSetInputMode(handle_, GLFW_CURSOR, shown ? GLFW_CURSOR_NORMAL : GLFW_CURSOR_HIDDEN);
+}
+
 WindowInput Window::poll() {
   glfwPollEvents();
   if (g_screen_is_gone) {
@@ -143,6 +182,12 @@ WindowInput Window::poll() {
     input_.pointer.y = cursor_y_ * size().height / height;
   }
   if (is_down(handle_, GLFW_MOUSE_BUTTON_LEFT)) input_.pointer.down = true;
+  input_.hovers = cursor_known_;
+  HeldControls& held = input_.held;
+  held.deeper = of_keys(handle_, GLFW_KEY_PAGE_DOWN, GLFW_KEY_PAGE_UP);
+  held.tilt_right = of_keys(handle_, GLFW_KEY_LEFT, GLFW_KEY_RIGHT);
+  held.tilt_up = of_keys(handle_, GLFW_KEY_DOWN, GLFW_KEY_UP);
+  add_gamepad(held);
   return std::exchange(input_, {});
 }
 
@@ -156,6 +201,7 @@ void Window::on_cursor(GLFWwindow* handle, double x, double y) {
   Window& window = window_of(handle);
   const double right = x - std::exchange(window.cursor_x_, x);
   const double up = std::exchange(window.cursor_y_, y) - y;
+  if (!std::exchange(window.cursor_known_, true)) return;  // it came from elsewhere
   int width = 0;
   int height = 0;
   glfwGetWindowSize(handle, &width, &height);
@@ -167,10 +213,20 @@ void Window::on_cursor(GLFWwindow* handle, double x, double y) {
   if (is_down(handle, GLFW_MOUSE_BUTTON_MIDDLE) || (left && shift)) {
     input.move_right += right / height;
     input.move_up += up / height;
-  } else if (left) {
+  } else if (is_down(handle, GLFW_MOUSE_BUTTON_RIGHT)) {
     input.turn_right += right / height;
     input.turn_up += up / height;
+  } else if (left) {
+    input.drag_right += right / height;
+    input.drag_up += up / height;
+  } else {
+    input.free_right += right / height;
+    input.free_up += up / height;
   }
+}
+
+void Window::on_enter(GLFWwindow* handle, int entered) {
+  if (entered == GLFW_FALSE) window_of(handle).cursor_known_ = false;
 }
 
 void Window::on_button(GLFWwindow* handle, int button, int action, int /*mods*/) {
@@ -181,7 +237,10 @@ void Window::on_button(GLFWwindow* handle, int button, int action, int /*mods*/)
 }
 
 void Window::on_scroll(GLFWwindow* handle, double /*x*/, double y) {
-  window_of(handle).input_.wheel += y;
+  const bool control = glfwGetKey(handle, GLFW_KEY_LEFT_CONTROL) == GLFW_PRESS ||
+                       glfwGetKey(handle, GLFW_KEY_RIGHT_CONTROL) == GLFW_PRESS;
+  WindowInput& input = window_of(handle).input_;
+  (control ? input.zoom : input.wheel) += y;
 }
 
 }  // namespace kerf

@@ -13,12 +13,27 @@ struct GLFWwindow;
 
 namespace kerf {
 
+/// How far what is held down would have the hand go on moving, each -1 to 1: keys (page up and
+/// down, arrows) and the first gamepad together.
+struct HeldControls {
+  double right = 0.0, up = 0.0;            ///< in the picture's plane; left stick
+  double deeper = 0.0;                     ///< away from the eye; page up and down, right stick
+  double tilt_right = 0.0, tilt_up = 0.0;  ///< arrows, the pad's cross
+  bool press = false;                      ///< the pad's right bumper or lower button
+  bool by_pad = false;                     ///< a gamepad has a part in it
+};
+
 /// What the user did since the last `Window::poll`. Distances are fractions of the window's height,
 /// to the right and upwards.
 struct WindowInput {
-  double turn_right = 0.0, turn_up = 0.0;
-  double move_right = 0.0, move_up = 0.0;
+  double turn_right = 0.0, turn_up = 0.0;  ///< with the right button
+  double drag_right = 0.0, drag_up = 0.0;  ///< with the left one
+  double free_right = 0.0, free_up = 0.0;  ///< with none
+  double move_right = 0.0, move_up = 0.0;  ///< with the middle one, or the left one and shift
   double wheel = 0.0;
+  double zoom = 0.0;       ///< the wheel with control
+  HeldControls held;       ///< now
+  bool hovers = false;     ///< the pointer is over the window
   Pointer pointer;         ///< at the end; down if it was so at any time
   std::vector<char> keys;  ///< lower-case letters and digits as printed on them
   bool exposed = false;    ///< what the window showed is lost: `present` again
@@ -43,12 +58,15 @@ class Window final : public GlContext {
   void set_title(const std::string& title);
   /// Shows `target`, which has the window's size; waits for the screen's refresh where it can.
   void present(const RenderTarget& target);
+  /// Whether the pointer is seen over it.
+  void show_pointer(bool shown);
   /// Throws VisualizerError once the X server is gone.
   [[nodiscard]] WindowInput poll();
 
  private:
   static void on_key(GLFWwindow* handle, int key, int scancode, int action, int mods);
   static void on_cursor(GLFWwindow* handle, double x, double y);
+  static void on_enter(GLFWwindow* handle, int entered);
   static void on_button(GLFWwindow* handle, int button, int action, int mods);
   static void on_scroll(GLFWwindow* handle, double x, double y);
   static void on_exposed(GLFWwindow* handle);
@@ -57,6 +75,8 @@ class Window final : public GlContext {
   WindowInput input_;
   double cursor_x_ = 0.0;
   double cursor_y_ = 0.0;
+  bool cursor_known_ = false;  ///< it is over the window, and has said where
+  bool pointer_shown_ = true;
 };
 
 }  // namespace kerf

@@ -73,6 +73,12 @@ void OrbitCamera::orbit(double right, double up) {
   pitch_rad_ = std::clamp(pitch_rad_ - up * kDragRad, -kMaxPitchRad, kMaxPitchRad);
 }
 
+void OrbitCamera::orbit_about(const glm::dvec3& pivot_mm, double right, double up) {
+  const glm::dvec3 seen = eye_axes() * (pivot_mm - target_mm_);
+  orbit(right, up);
+  target_mm_ = pivot_mm - seen * eye_axes();
+}
+
 void OrbitCamera::pan(double right, double up) {
   const double mm = 2.0 * distance_mm_ * std::tan(kHalfHeightRad);  // height of the picture there
   target_mm_ -= mm * (glm::dvec3(right, up, 0.0) * eye_axes());
@@ -103,6 +109,24 @@ View OrbitCamera::view(double aspect, double reach_mm) const {
   view.near_mm = std::max(centre_mm - reach_mm, kNearPlane * radius_mm_);
   view.far_mm = std::max(centre_mm + reach_mm, 2.0 * view.near_mm);
   return view;
+}
+
+SeenPoint seen_at(const View& view, PictureSize size, const glm::dvec3& world_mm) {
+  const glm::dvec3 eye(view.eye_from_world * glm::dvec4(world_mm, 1.0));
+  const double depth_mm = -eye.z;
+  if (!(depth_mm > 0.0)) return {};
+  const double across = view.tan_half_height * depth_mm;
+  const double right = (eye.x - view.middle_right * depth_mm) / (across * view.aspect);
+  return {{(1.0 + right) / 2.0 * size.width, (1.0 - eye.y / across) / 2.0 * size.height}, depth_mm};
+}
+
+glm::dvec3 world_at(const View& view, PictureSize size, const SeenPoint& seen) {
+  const double across = view.tan_half_height * seen.depth_mm;
+  const double right = 2.0 * seen.pixel.x / size.width - 1.0;
+  const double up = 1.0 - 2.0 * seen.pixel.y / size.height;
+  const glm::dvec4 eye(right * across * view.aspect + view.middle_right * seen.depth_mm,
+                       up * across, -seen.depth_mm, 1.0);
+  return glm::dvec3(glm::inverse(view.eye_from_world) * eye);
 }
 
 PixelRect screen_bounds(std::span<const glm::dvec3> corners, const View& view, PictureSize size) {

@@ -63,6 +63,8 @@ class OrbitCamera {
 
   /// Drags of the pointer, in fractions of the picture's height.
   void orbit(double right, double up);
+  /// The same about a point in world mm, which stays where it is in the picture.
+  void orbit_about(const glm::dvec3& pivot_mm, double right, double up);
   void pan(double right, double up);
   /// Steps of the wheel: positive is nearer, down to 1/50 and up to 20 times the radius of what is
   /// framed.
@@ -86,6 +88,16 @@ class OrbitCamera {
   double yaw_rad_ = 0.0;
   double pitch_rad_ = 0.0;
 };
+
+/// Where a point in world mm is seen: in pixels of a picture from its upper left corner, and how
+/// far from the eye along the view axis, in mm.
+struct SeenPoint {
+  glm::dvec2 pixel{0.0};
+  double depth_mm = 0.0;  ///< not positive: behind the eye, and `pixel` means nothing
+};
+[[nodiscard]] SeenPoint seen_at(const View& view, PictureSize size, const glm::dvec3& world_mm);
+/// And back.
+[[nodiscard]] glm::dvec3 world_at(const View& view, PictureSize size, const SeenPoint& seen);
 
 /// Pixels of a picture that what lies within the hull of `corners` can cover; all of them where a
 /// corner is not in front of the near plane.

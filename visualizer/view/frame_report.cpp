@@ -22,6 +22,7 @@ std::int64_t process_cpu_ns() {
 
 Json spread(std::vector<double> values) {
   return {{"p50", percentile(values, 0.50)},
+          {"p95", percentile(values, 0.95)},
           {"p99", percentile(values, 0.99)},
           {"max", percentile(values, 1.0)}};
 }
@@ -40,14 +41,15 @@ double Stopwatch::cpu_ms() const {
 }
 
 void FrameReport::write(const std::filesystem::path& file) const {
-  const Json report{{"renderer", renderer},       {"gl_renderer", gl_renderer},
-                    {"context", context},         {"width", width},
-                    {"height", height},           {"frames", wall_ms.size()},
-                    {"cpu_ms", spread(cpu_ms)},   {"wall_ms", spread(wall_ms)},
-                    {"redrawn", spread(redrawn)}, {"latency_ms", spread(latency_ms)},
-                    {"rest_frames", rest_frames}, {"bricks_uploaded", bricks_uploaded},
-                    {"attach_ms", attach_ms},     {"late_join_ms", late_join_ms},
-                    {"clean_end", clean_end}};
+  Json report{{"renderer", renderer},       {"gl_renderer", gl_renderer},
+              {"context", context},         {"width", width},
+              {"height", height},           {"frames", wall_ms.size()},
+              {"cpu_ms", spread(cpu_ms)},   {"wall_ms", spread(wall_ms)},
+              {"redrawn", spread(redrawn)}, {"latency_ms", spread(latency_ms)},
+              {"rest_frames", rest_frames}, {"bricks_uploaded", bricks_uploaded},
+              {"attach_ms", attach_ms},     {"late_join_ms", late_join_ms},
+              {"clean_end", clean_end}};
+  if (!pointer_ms.empty()) report["pointer_ms"] = spread(pointer_ms);
   write_new_file(file, report.document());
 }
 

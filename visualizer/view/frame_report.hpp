@@ -43,6 +43,10 @@ struct FrameReport {
   /// drawing that frame; of frames that showed none, nothing.
   std::vector<double> latency_ms{};
 
+  /// From the begin of the frame that saw the pointer move a hand whose tool rested, to the end of
+  /// drawing the first one with the tool elsewhere. The event itself came up to a frame earlier.
+  std::vector<double> pointer_ms{};
+
   /// As JSON, whole or not at all; throws FileError.
   void write(const std::filesystem::path& file) const;
 };

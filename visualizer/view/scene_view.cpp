@@ -84,6 +84,11 @@ MaterialView material_view(const Json& text) {
           .colour = {colour[0], colour[1], colour[2]}};
 }
 
+DeviceFrame device_frame(const Json& text) {
+  const auto offset = text.at("offset_mm").get<std::array<double, 3>>();
+  return {{offset[0], offset[1], offset[2]}, text.at("workspace_scale").get<double>()};
+}
+
 VolumeView volume_view(const SegmentVolumeInfo& info) {
   const auto& q = info.orientation;
   const auto& o = info.origin_mm;
@@ -143,6 +148,7 @@ SceneView scene_view(const SegmentInfo& segment) {
       scene.volumes[i].solid = volumes.at(i).at("solid").get<bool>();
     }
     for (const Json& tool : text.at("tools")) scene.tools.push_back(tool_view(tool));
+    if (text.contains("device")) scene.device = device_frame(text.at("device"));
     for (const Json& one : text.at("materials")) scene.materials.push_back(material_view(one));
   } catch (const JsonError& problem) {
     throw VisualizerError("segment scene: " + std::string(problem.what()) +

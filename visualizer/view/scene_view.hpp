@@ -69,11 +69,18 @@ struct MaterialView {
   std::optional<double> opacity{};    ///< over one voxel edge, 0..1; none: by its hardness
 };
 
+/// Where the device's own space lies in the world: world = offset + scale * device.
+struct DeviceFrame {
+  glm::dvec3 offset_mm{0.0};
+  double scale = 1.0;
+};
+
 /// Everything about a session that does not change while it runs, as a look shows it.
 struct SceneView {
   std::vector<VolumeView> volumes;
   std::vector<ToolView> tools;
   std::vector<MaterialView> materials;
+  DeviceFrame device{};
   Gradient gradient = Gradient::corners;  ///< by which its volumes are shaded
   bool voxel_tool = false;                ///< the tool is one volume more
 

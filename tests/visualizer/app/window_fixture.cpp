@@ -171,6 +171,14 @@ std::vector<std::uint64_t> Controller::asked_tools() {
   return tools;
 }
 
+int Controller::resets() {
+  int resets = 0;
+  while (const auto command = server_.take_command()) {
+    resets += command->kind == CommandKind::reset ? 1 : 0;
+  }
+  return resets;
+}
+
 void act(const std::string& events) {
   send(events);
   let_it_show();

@@ -43,6 +43,8 @@ class Controller {
   void tick();
   /// What the window asked for since the last call.
   std::vector<std::uint64_t> asked_tools();
+  /// How often it asked for a reset since the last call; forgets the tools that it asked for.
+  int resets();
   void say(Lifecycle lifecycle) { writer_.set_lifecycle(lifecycle); }
 
  private:

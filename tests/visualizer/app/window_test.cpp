@@ -72,6 +72,22 @@ TEST_CASE("keys and mouse work the window") {
     CHECK(user.controller().asked_tools() == std::vector<std::uint64_t>{1});
     CHECK(user.quit() == 0);
   }
+  SUBCASE("the list of tools asks for the one that is taken from it") {
+    const auto click = [](const std::string& at) {
+      act("mousemove " + at + " sleep 0.2 mousedown 1 sleep 0.2 mouseup 1");
+    };
+    click("90 216");
+    click("60 255");  // the second one
+    CHECK(user.controller().asked_tools() == std::vector<std::uint64_t>{1});
+    CHECK(user.quit() == 0);
+  }
+  SUBCASE("u undoes all cuts when it is pressed twice, and not once") {
+    act("key u");
+    CHECK(user.controller().resets() == 0);
+    act("key u");
+    CHECK(user.controller().resets() == 1);
+    CHECK(user.quit() == 0);
+  }
   SUBCASE("e exports the surface") {
     act("key e");
     CHECK(user.quit() == 0);

@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "visualizer/app/pointer_hand.hpp"
+
+#include <array>
+#include <cmath>
+
+#include <doctest/doctest.h>
+
+using namespace kerf;
+
+namespace {
+
+constexpr PictureSize kPixels{400, 300};
+constexpr double kFrameS = 0.02;
+
+struct Bench {
+  OrbitCamera camera;
+  PointerHand hand;
+  DeviceFrame device{{1.0, 2.0, 3.0}, 2.0};
+  glm::dvec3 tool_mm{0.5, -0.5, 1.0};
+
+  Bench() { camera.frame(box_corners(glm::dvec3(-5.0), glm::dvec3(5.0)), 4.0 / 3.0); }
+  [[nodiscard]] View view() const { return camera.view(4.0 / 3.0, 40.0); }
+  [[nodiscard]] SeenPoint goal() const { return seen_at(view(), kPixels, *hand.goal_mm()); }
+  [[nodiscard]] SeenPoint tool() const { return seen_at(view(), kPixels, tool_mm); }
+  void frame(const WindowInput& input, bool over_panel = false) {
+    hand.step(input, over_panel, view(), kPixels, tool_mm, device, kFrameS);
+  }
+};
+
+WindowInput at(double x, double y) {
+  WindowInput input;
+  input.hovers = true;
+  input.free_up = 1e-12;  // it moves
+  input.pointer = {x, y, false};
+  return input;
+}
+
+bool near(const glm::dvec2& a, const glm::dvec2& b) {
+  return glm::length(a - b) < 1e-6;
+}
+
+}  // namespace
+
+TEST_CASE("a point of the world is seen where it is drawn, and found again there") {
+  const Bench bench;
+  const View view = bench.view();
+  for (const glm::dvec3& point : {glm::dvec3(0.0), glm::dvec3(3.0, -2.0, 1.0)}) {
+    const SeenPoint seen = seen_at(view, kPixels, point);
+    glm::dvec4 clip = view.clip_from_eye() * view.eye_from_world * glm::dvec4(point, 1.0);
+    clip /= clip.w;
+    CHECK(near(seen.pixel, {(clip.x + 1.0) * 200.0, (1.0 - clip.y) * 150.0}));
+    CHECK(glm::length(world_at(view, kPixels, seen) - point) < 1e-9);
+  }
+}
+
+TEST_CASE("nobody leads before the pointer moves; then the goal is under it, at the tool's depth") {
+  Bench bench;
+  bench.frame({});
+  CHECK_FALSE(bench.hand.leads());
+  WindowInput rests = at(120, 80);
+  rests.free_up = 0.0;
+  bench.frame(rests);
+  CHECK_FALSE(bench.hand.leads());
+  CHECK_FALSE(bench.hand.goal_mm());
+  bench.frame(at(120, 80));
+  CHECK(bench.hand.leads());
+  CHECK(near(bench.goal().pixel, {120, 80}));
+  CHECK(bench.goal().depth_mm == doctest::Approx(bench.tool().depth_mm));
+  const HandWish wish = bench.hand.wish(bench.device);
+  const glm::dvec3 goal = *bench.hand.goal_mm();
+  CHECK(wish.tip_mm.x == doctest::Approx((goal.x - 1.0) / 2.0));
+  CHECK(wish.tip_mm.z == doctest::Approx((goal.z - 3.0) / 2.0));
+}
+
+TEST_CASE("it moves with the pointer, and goes deeper by the wheel under it") {
+  Bench bench;
+  bench.frame(at(120, 80));
+  WindowInput moved = at(150, 95);
+  moved.free_right = 0.1;  // 30 of 300 pixels
+  moved.free_up = -0.05;
+  moved.wheel = 4;
+  bench.frame(moved);
+  CHECK(near(bench.goal().pixel, {150, 95}));
+  const double deeper_mm = 4 * PointerHand::kWheelMm * 2.0;  // the scene's scale
+  CHECK(bench.goal().depth_mm == doctest::Approx(bench.tool().depth_mm + deeper_mm));
+  moved = at(150, 95);
+  moved.wheel = 1e6;  // no further than one would wind back
+  bench.frame(moved);
+  CHECK(bench.goal().depth_mm ==
+        doctest::Approx(bench.tool().depth_mm + PointerHand::kMostAheadMm * 2.0));
+  moved.wheel = -1e6;
+  bench.frame(moved);
+  CHECK(bench.goal().depth_mm == doctest::Approx(2.0 * bench.view().near_mm));
+}
+
+TEST_CASE("the left button presses along the ray while it is down") {
+  Bench bench;
+  bench.frame(at(120, 80));
+  const glm::dvec3 before = *bench.hand.goal_mm();
+  WindowInput press = at(120, 80);
+  press.pointer.down = true;
+  bench.frame(press);
+  CHECK(glm::length(*bench.hand.goal_mm() - before) ==
+        doctest::Approx(PointerHand::kPressMm * 2.0));
+  CHECK(near(bench.goal().pixel, {120, 80}));
+  bench.frame(at(120, 80));
+  CHECK(glm::length(*bench.hand.goal_mm() - before) < 1e-9);
+  bench.frame(press, true);  // a panel's
+  CHECK(glm::length(*bench.hand.goal_mm() - before) < 1e-9);
+}
+
+TEST_CASE("a camera that turns about the goal leaves it where it is, in world and picture") {
+  Bench bench;
+  bench.frame(at(120, 80));
+  const glm::dvec3 before = *bench.hand.goal_mm();
+  bench.camera.orbit_about(before, 0.2, -0.1);
+  WindowInput turned = at(180, 110);
+  turned.turn_right = 0.2;
+  bench.frame(turned);
+  CHECK(glm::length(*bench.hand.goal_mm() - before) < 1e-9);
+  CHECK(near(bench.goal().pixel, {120, 80}));
+  bench.hand.come();
+  bench.frame(at(180, 110));
+  CHECK(near(bench.goal().pixel, {180, 110}));
+}
+
+TEST_CASE("over a panel and away the goal stays; who comes back takes it under the pointer") {
+  Bench bench;
+  bench.frame(at(120, 80));
+  const glm::dvec3 before = *bench.hand.goal_mm();
+  bench.frame(at(20, 280), true);
+  CHECK(bench.hand.leads());
+  CHECK(glm::length(*bench.hand.goal_mm() - before) < 1e-9);
+  bench.frame({});
+  CHECK_FALSE(bench.hand.leads());
+  bench.frame(at(300, 200));
+  CHECK(bench.hand.leads());
+  CHECK(near(bench.goal().pixel, {300, 200}));
+}
+
+TEST_CASE("sticks move the goal by their time, without a pointer, and keys tilt to a wrist's end") {
+  Bench bench;
+  WindowInput pad;
+  pad.held.by_pad = true;
+  pad.held.right = 1.0;
+  pad.held.deeper = 0.5;
+  bench.frame(pad);
+  CHECK(bench.hand.leads());
+  const double held_mm = PointerHand::kHeldMmPerS * 2.0 * kFrameS;
+  CHECK(bench.goal().depth_mm == doctest::Approx(bench.tool().depth_mm + 0.5 * held_mm));
+  CHECK(bench.goal().pixel.x > bench.tool().pixel.x);
+  bench.frame({});
+  CHECK(bench.hand.leads());  // a pad that rests still holds it
+  WindowInput tilt = at(100, 100);
+  tilt.held.tilt_right = 1.0;
+  for (int i = 0; i < 1000; ++i) bench.frame(tilt);
+  CHECK(bench.hand.wish(bench.device).orientation_rad[0] == doctest::Approx(kMaxWishRad));
+}
+
+TEST_CASE("a tool behind the eye is nobody's to lead") {
+  Bench bench;
+  bench.tool_mm = {0.0, 1e4, 1e4};
+  bench.frame(at(120, 80));
+  CHECK_FALSE(bench.hand.leads());
+}
