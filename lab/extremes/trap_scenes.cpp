@@ -201,11 +201,8 @@ LoadedScene scene_around(VolumeImage image, Point middle_mm, const Loop& loop, D
   return scene;
 }
 
-/// Without the pear: pages and tests name scenes by their seed, which one more shape would change.
-constexpr auto kDrawnShapes = kToolShapes.first<6>();
-
 void add_tools(bool bur, Dice& dice, LoadedScene& scene) {
-  for (const std::string_view shape : kDrawnShapes) {
+  for (const std::string_view shape : kToolShapes) {
     const std::string name(shape);
     const double radius_mm = dice.uniform(0.4, 1);
     scene.tools.push_back(make_tool(name, name, {.pitch_mm = kVoxelMm, .radius_mm = radius_mm}));

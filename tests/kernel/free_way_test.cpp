@@ -108,3 +108,22 @@ TEST_CASE_TEMPLATE(
   const FreeWay<N> way(unknown, {number<N>(1), number<N>(1), number<N>(1)}, number<N>(2));
   CHECK(way.free_up_to({number<N>(5), number<N>(5), number<N>(5)}, 1, 0, kWholeMove<N>, left) == 0);
 }
+
+TEST_CASE_TEMPLATE("from outside no way is free for a sphere that the map cannot tell", N,
+                   FixedNumbers, FloatNumbers, DoubleNumbers) {
+  std::vector<Density> density(kGrid.voxel_count(), 0);
+  density[kGrid.index(25, 20, 22)] = 9;
+  const FreeBrickMap map(kGrid, density, 9);
+  const FreeBricks bricks = map.bricks();
+  const FreeWay<N> way(bricks, {number<N>(0), number<N>(0), number<N>(-10)}, number<N>(10.001));
+  // 70 voxels above the volume: 92 from where the voxel is read.
+  const PointNumber<N> start[3] = {number<N>(25), number<N>(20), number<N>(115)};
+  for (const double radius : {40.0, 63.0, 64.0, 90.0, 91.9, 92.1, 200.0}) {
+    CAPTURE(radius);
+    std::int64_t left = 100;
+    const auto free = way.free_up_to(start, free_steps_for(radius), 0, kWholeMove<N>, left);
+    const double voxels = 10 * double(free) / double(kWholeMove<N>);
+    CHECK(voxels <= std::max(0.0, 92 - radius));
+    if (radius < 60) CHECK(voxels == doctest::Approx(10));
+  }
+}

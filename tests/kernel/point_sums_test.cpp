@@ -187,6 +187,31 @@ TEST_CASE("a volume without a cell is not felt") {
   }
 }
 
+TEST_CASE("beside a volume that is solid to its border nothing is read") {
+  const ToolPoints<FixedNumbers> tool = some_shell(512, 6, false);
+  const PointShell<FixedNumbers> point_shell = tool.point_shell();
+  const VoxelGrid grid{21, 20, 20};
+  const TestVolume volume = filled(grid, 65535);
+  const FreeBrickMap map(grid, volume.density, 1);
+  const DensityField field{grid, volume.density.data(), density_scale(32768), map.bricks()};
+  Dice dice(6);
+  for (auto set = kernel_sets(); *set != nullptr; ++set) {
+    PlaceMemory<FixedNumbers> memory;
+    memory.hold(point_shell);
+    (*set)->place_points(point_shell.table, any_step(point_shell, dice), memory.places());
+    // The sphere about a group of any samples is no wider than the tool.
+    for (const int from_border : {-8, 0, 20, 60, 300, 6000}) {
+      CAPTURE(from_border);
+      for (const std::int32_t x : {20 + from_border, -from_border}) {
+        const std::int32_t centre[3] = {x * 65536, 10 << 16, 10 << 16};
+        Sums sums;
+        (*set)->sum_points(point_shell.table, memory.places(), centre, field, sums);
+        CHECK((sums.read > 0) == (from_border <= 0));
+      }
+    }
+  }
+}
+
 TEST_CASE("any iso becomes half of the scale") {
   for (std::uint32_t iso = 1; iso <= 65535; iso = iso * 5 / 4 + 1) {
     const DensityScale scale = density_scale(static_cast<Density>(iso));

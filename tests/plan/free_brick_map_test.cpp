@@ -55,8 +55,10 @@ TEST_CASE("bricks tell how far the nearest voxel with density is read") {
           }
         }
       }
-      // Outside: that of the nearest brick inside.
-      CHECK(bricks.at(-100, 1, 1000) == bricks.at(0, 1, grid.nz - 1));
+      // Outside: that of the nearest brick inside, or the way to where something may be read.
+      CHECK(bricks.at(-1, 1, 1) == bricks.at(0, 1, 1));
+      CHECK(bricks.at(-6, 1, 1) == std::max(bricks.at(0, 1, 1), 5 * kFreeSteps));
+      CHECK(bricks.at(-100, 1, 1000) == kFreeFarthest);
     }
   }
   CHECK(FreeBricks{}.at(1, 2, 3) == 0);

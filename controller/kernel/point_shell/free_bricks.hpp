@@ -24,9 +24,9 @@ struct FreeBricks {
   VoxelGrid grid;                          ///< of bricks
   const std::uint8_t* distance = nullptr;  ///< none: nothing is known to be free
 
-  /// Distance of the brick that holds a voxel's cell; one outside of the volume counts as the
-  /// nearest one in it, whose distance is no larger. Always inlined: the code of an instruction set
-  /// may not end where other machines find it.
+  /// Distance of the brick that holds a voxel's cell; outside of the volume, where nothing is read,
+  /// that of the nearest brick in it, or the way to it if that is longer. Always inlined: the code
+  /// of an instruction set may not end where other machines find it.
   [[nodiscard, gnu::always_inline]] inline std::int32_t at(std::int32_t x, std::int32_t y,
                                                            std::int32_t z) const noexcept {
     if (distance == nullptr) return 0;
@@ -34,7 +34,21 @@ struct FreeBricks {
                        bz = z < 0 ? 0 : z / kFreeBrick;
     const std::int32_t i = bx < grid.nx ? bx : grid.nx - 1, j = by < grid.ny ? by : grid.ny - 1,
                        k = bz < grid.nz ? bz : grid.nz - 1;
-    return distance[(std::int64_t{k} * grid.ny + j) * grid.nx + i];
+    const std::int32_t inside = distance[(std::int64_t{k} * grid.ny + j) * grid.nx + i];
+    const std::int32_t over_xy = larger(beyond(x, grid.nx), beyond(y, grid.ny));
+    const std::int32_t outside = kFreeSteps * larger(over_xy, beyond(z, grid.nz));
+    return larger(inside, outside < kFreeFarthest ? outside : kFreeFarthest);
+  }
+
+ private:
+  /// Voxels from a cell to the nearest one that is read, along an axis of so many bricks.
+  [[nodiscard, gnu::always_inline]] static inline std::int32_t beyond(
+      std::int32_t cell, std::int32_t bricks) noexcept {
+    return larger(-cell - 1, cell - bricks * kFreeBrick + 1);
+  }
+  [[nodiscard, gnu::always_inline]] static inline std::int32_t larger(std::int32_t a,
+                                                                      std::int32_t b) noexcept {
+    return a > b ? a : b;
   }
 };
 

@@ -93,17 +93,9 @@ class FreeWay {
     }
   }
 
-  /// Of the brick that holds a place. Outside of the volume nothing is read.
+  /// Of the brick that holds a place.
   [[nodiscard]] std::int32_t distance(const Wide (&place)[3]) const noexcept {
-    if (free_.distance == nullptr) return 0;
-    const std::int32_t x = voxel_of(place[0]), y = voxel_of(place[1]), z = voxel_of(place[2]);
-    const auto beyond = [](std::int32_t i, std::int32_t bricks) {
-      return std::max(-i - 1, i - bricks * kFreeBrick + 1);
-    };
-    const VoxelGrid& grid = free_.grid;
-    const std::int32_t outside =
-        std::max({beyond(x, grid.nx), beyond(y, grid.ny), beyond(z, grid.nz)});
-    return std::max(free_.at(x, y, z), outside * kFreeSteps);
+    return free_.at(voxel_of(place[0]), voxel_of(place[1]), voxel_of(place[2]));
   }
 
   /// Share of the move to where its line leaves the brick of `place`.
