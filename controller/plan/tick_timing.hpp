@@ -34,7 +34,8 @@ template <class N>
 }
 
 /// The centre of a tool of this reach where the most density lies within it: there hardly anything
-/// is air and every stage does most of its work.
+/// is air and every stage does most of its work. Of several such places the one nearest to the
+/// volume's middle: past the border nothing is read.
 [[nodiscard]] inline VoxelIndex densest_place(const VoxelGrid& grid,
                                               std::span<const Density> density,
                                               const VoxelBox& reach) {
@@ -46,7 +47,12 @@ template <class N>
     return VoxelIndex{along(box.lo.x, box.hi.x, i % n, n), along(box.lo.y, box.hi.y, i / n % n, n),
                       along(box.lo.z, box.hi.z, i / n / n, n)};
   };
-  VoxelIndex best{grid.nx / 2, grid.ny / 2, grid.nz / 2};
+  const VoxelIndex middle{grid.nx / 2, grid.ny / 2, grid.nz / 2};
+  const auto off_middle = [&](VoxelIndex at) {
+    const std::int64_t x = at.x - middle.x, y = at.y - middle.y, z = at.z - middle.z;
+    return x * x + y * y + z * z;
+  };
+  VoxelIndex best = middle;
   int most = 0;
   for (std::int32_t place = 0; place < kPlaces * kPlaces * kPlaces; ++place) {
     const VoxelIndex at = spread(grid.box(), place, kPlaces);
@@ -56,7 +62,7 @@ template <class N>
       const VoxelIndex v{at.x + offset.x, at.y + offset.y, at.z + offset.z};
       if (grid.contains(v) && density[grid.index(v.x, v.y, v.z)] != 0) ++full;
     }
-    if (full <= most) continue;
+    if (full < most || (full == most && off_middle(at) >= off_middle(best))) continue;
     most = full;
     best = at;
   }
