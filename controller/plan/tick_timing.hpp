@@ -102,7 +102,6 @@ class WorstDrive {
     constexpr double kFraction = 1.0 / 4096;
     plan_->removal_rate = removal_rate<N>(kFraction, plan.removal_rate.bent);
     state.active_tool = static_cast<std::uint32_t>(t);
-    state.contact.proxy = {};
     state.force_cut.spindle.ratio = plan.force_cut.spindle.free_ratio;
     const ToolPlan<N>& tool = plan.tools[t];
     const VolumePlan<N>& volume = plan.volumes[v];
@@ -117,18 +116,32 @@ class WorstDrive {
     at_.planes.fill({relabel<DeviceSpace>(at_.normal), {}, Real(1)});
   }
 
+  /// The swept proxy gets stuck on what lies in its way, and that differs by tool: it comes from a
+  /// corner and from above, and the way that reads more counts.
   WorstTick time() {
-    constexpr int kTicks = 250;
-    if (plan_->contact.swept) {  // from outside, so that the proxy has a place
-      const double away = -2.0 * (size_.x + size_.y + size_.z);
-      static_cast<void>(feel_and_cut(*plan_, state_, world({away, away, away}), kWidest, {}));
-    }
+    if (!plan_->contact.swept) return time_here(kTicks);
+    const double away = 2.0 * (size_.x + size_.y + size_.z);
+    const WorstTick corner = time_from({-away, -away, -away});
+    const WorstTick above = time_from({dense_.x + 0.0, dense_.y + away, dense_.z + 0.0});
+    return above.queried > corner.queried ? above : corner;
+  }
+
+ private:
+  static constexpr int kTicks = 250;
+
+  WorstTick time_from(const std::array<double, 3>& outside_vox) {
+    state_.contact.proxy = {};
+    static_cast<void>(feel_and_cut(*plan_, state_, world(outside_vox), kWidest, {}));
+    return time_here(kTicks / 2);
+  }
+
+  WorstTick time_here(int ticks) {
     // A little above the threshold below which nothing is cut.
     const DeviceVec<Real> press_n{
         {}, (plan_->force_cut.threshold_n + Real(0.05)) * plan_->workspace_scale, {}};
     std::vector<double> us;
     std::vector<std::int64_t> queried;
-    for (int i = 0; i < kTicks; ++i) {
+    for (int i = 0; i < ticks; ++i) {
       const Place tip_mm = hand(i);
       const Rotation<N> turn = i % 2 == 0 ? kWidest : identity_rotation<N>();
       const auto began = std::chrono::steady_clock::now();
@@ -142,11 +155,11 @@ class WorstDrive {
     }
     std::sort(us.begin(), us.end());
     std::sort(queried.begin(), queried.end());
-    return {us[kTicks / 2], us[kTicks * 99 / 100], size_,
-            static_cast<std::uint64_t>(queried[kTicks / 2]), covered()};
+    const auto n = us.size();
+    return {us[n / 2], us[n * 99 / 100], size_, static_cast<std::uint64_t>(queried[n / 2]),
+            covered()};
   }
 
- private:
   static constexpr Rotation<N> kWidest = widest_rotation<N>();
 
   /// World place of `vox` in volume `v`: inverse of `voxel_from_world`, whose rows are orthogonal.
