@@ -56,7 +56,11 @@ grep -qE '^tick [0-9]+: tip -?[0-9.]+ -?[0-9.]+ -?[0-9.]+ mm, force 0\.[0-9]*[1-
   fail 'kerf-lab faults: does not find its scripts'
 [[ $(kerf test 2>&1) == 'kerf: test: this kerf is installed; '* ]] || fail 'kerf test: runs without sources'
 
-command -v dpkg-shlibdeps file >/dev/null || exit 0
+for tool in dpkg-shlibdeps file; do
+  command -v "$tool" >/dev/null && continue
+  echo "packages: no Debian package was made, for want of $tool; all else is fine" >&2
+  exit 77
+done
 (cd "$1" && cpack -B "$home/packages" >"$home/cpack.log" 2>&1) || { cat "$home/cpack.log" && fail 'cpack'; }
 package=$(echo "$home"/packages/kerf_*.deb)
 dpkg-deb -c "$package" | awk '{ print $6 }' >"$home/files"
