@@ -2,7 +2,6 @@
 #include "controller/servo/force_cut.hpp"
 
 #include <algorithm>
-#include <span>
 
 #include "controller/kernel/proxy/contact_math.hpp"
 #include "controller/servo/method_step.hpp"
@@ -74,17 +73,9 @@ Covered<N> cover(const ServoPlan<N>& plan, ServoState<N>& state, std::size_t v,
                            tool_pose(volume, tool, in_volume, centre_mm, at.rotation)};
   const SpindleFrame<N> frame(tick.pose.centre_vox, in_volume.rims_from_voxel,
                               spindle_axes(tool, state, at));
-  const std::span<const Label> labels = plan.force_cut.volume[v].labels;
-  const std::span<CoveredEntry<N>> memory = state.force_cut.list[v];
-  const auto weigh = [&](const auto& overlap) -> Covered<N> {
-    if constexpr (N::kIsFixed) {
-      return covered_groups(*plan.kernels, volume.grid, labels, overlap, frame, memory);
-    } else {
-      return covered_voxels<N>(volume.grid, std::span<const Density>(tick.memory().density), labels,
-                               overlap, frame, memory);
-    }
-  };
-  return by_method<N>(in_volume.method, [&](auto step) { return step.cover(tick, weigh); });
+  return by_method<N>(in_volume.method, [&](auto step) {
+    return step.cover(tick, CoverList<N>{tick, frame});
+  });
 }
 
 template <class N>

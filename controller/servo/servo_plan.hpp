@@ -17,6 +17,7 @@
 #include "controller/servo/device_plan.hpp"
 #include "controller/servo/force_cut_plan.hpp"
 #include "controller/servo/force_limits.hpp"
+#include "controller/servo/method_list.hpp"
 #include "controller/servo/sum_to_force.hpp"
 #include "controller/servo/supervisor.hpp"
 #include "shared/volume/scene_limits.hpp"
@@ -38,15 +39,6 @@ struct VolumePlan {
   typename N::Real largest_spacing_mm{};
 };
 
-/// How contact and cut of one tool in one volume are computed. Each has a step (method_step.hpp)
-/// and a file of its own for load time (controller/plan/method).
-enum class Method : std::uint8_t {
-  aligned,  ///< a correlation of the density with one table (controller/kernel/aligned_table.hpp)
-  gather,   ///< stored gradients, weighted at every sample (controller/kernel/contact.hpp)
-  splat,    ///< weights added up in the volume (controller/kernel/splat_table.hpp)
-  surface,  ///< none of them: the swept proxy feels, and nothing is cut
-};
-
 /// What one tool needs in one volume.
 template <class N>
 struct ToolInVolume {
@@ -54,8 +46,8 @@ struct ToolInVolume {
   Transform<typename N::Ratio, VoxelSpace, WorldSpace> voxel_from_pitch;
   /// The sample step of a tool that keeps its axes.
   std::array<std::array<typename N::Step, 3>, 3> unturned_step{};
-  typename N::Step overlap_ratio{};  ///< a^3 / V_voxel
-  Method method = Method::gather;
+  typename N::Step overlap_ratio{};       ///< a^3 / V_voxel
+  Method method = Method::gather;         ///< how contact and cut are computed here
   const AlignedTable* aligned = nullptr;  ///< of the method `aligned`
   // Of the method's own sums:
   SumToForce<N> contact;  ///< F_c = -p0 a^3 SUM grad (docs/theory.md 7.1), times workspace scale

@@ -14,8 +14,9 @@
 namespace kerf {
 namespace {
 
-/// In order of preference; the last one always serves.
-constexpr std::array kMethods{surface_method, aligned_method, splat_method, gather_method};
+#define KERF_METHOD(name, Step, serves) name##_method,
+constexpr std::array kMethods{KERF_METHODS(KERF_METHOD)};
+#undef KERF_METHOD
 
 }  // namespace
 

@@ -7,14 +7,14 @@
 #include <vector>
 
 #include "controller/plan/method/tool_method.hpp"
+#include "controller/servo/method_list.hpp"
 
 namespace kerf {
 
-// One file each.
-[[nodiscard]] const ToolMethod& surface_method() noexcept;
-[[nodiscard]] const ToolMethod& aligned_method() noexcept;
-[[nodiscard]] const ToolMethod& splat_method() noexcept;
-[[nodiscard]] const ToolMethod& gather_method() noexcept;
+// One file each, as the list says (method_list.hpp).
+#define KERF_DECLARE(name, Step, serves) [[nodiscard]] const ToolMethod& name##_method() noexcept;
+KERF_METHODS(KERF_DECLARE)
+#undef KERF_DECLARE
 
 struct MethodChoice {
   const ToolMethod* method;

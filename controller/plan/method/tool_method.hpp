@@ -62,20 +62,14 @@ struct TickShape {
 };
 
 /// One way to compute contact and cut of a tool in a volume, as load time knows it: when it serves,
-/// what memory it takes and what it costs. Its step is in controller/servo (method_step.hpp).
+/// what memory it takes and what it costs.
 ///
-/// A new method `x` needs, in the order in which the compiler and the linker ask for it:
-///  1. `Method::x` in controller/servo/servo_plan.hpp;
-///  2. its step `XStep`, with `feel_and_cut` and `cover` like SplatStep's, and its case, both in
-///     controller/servo/method_step.hpp;
-///  3. a source file like splat_method.cpp: a class derived from this one, and `x_method()`. What
-///     the class does not say is that of a method that does nothing in a tick. Every stage has a
-///     price for each kernel set that runs it (stage_cost.hpp);
-///  4. the declaration of `x_method()` in methods.hpp, and its place in the list of methods.cpp:
-///     before every method that it is to be preferred to;
-///  5. the source file in controller/plan/sources.cmake.
-/// Tables and scratch of its own are held by MethodMemory, and `plan_tool` (plan_tools.hpp) hands
-/// them to its ToolInVolume.
+/// A new method needs its line in controller/servo/method_list.hpp, a step like
+/// controller/servo/splat_step.cpp, and a file like splat_method.cpp: a class derived from this one
+/// and the function that returns it. What the class does not say is that of a method that does
+/// nothing in a tick. Every stage has a price for each kernel set that runs it (stage_cost.hpp). A
+/// table or scratch of its own is held by MethodMemory, and `plan_tool` (plan_tools.hpp) hands it
+/// to its ToolInVolume.
 class ToolMethod {
  public:
   Method step;
