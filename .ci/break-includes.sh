@@ -60,6 +60,6 @@ refused hil/program/x.cpp '#  include <toml++/toml.h>' '<toml++/toml.h>'
 refused controller/device/driver/x.cpp '#include <libusb-1.0/libusb.h>' '<libusb'
 refused record/x.cpp '#include <linux/firewire-cdev.h>' '<linux/firewire'
 refused lab/rig/x.cpp '#include <epoxy/gl.h>' '<epoxy'
-refused controller/volume/x.cpp '#include <itkImage.h>' '<itkImage.h>'
+refused controller/volume/file/x.cpp '#include <itkImage.h>' '<itkImage.h>'
 refused controller/servo/x.cpp 'auto t = std::chrono::system_clock::now();' system_clock
 ((failures == 0)) && echo 'break-includes: every break is refused'

@@ -13,7 +13,7 @@ shared/numeric shared/volume shared/wire shared/text shared/posix shared/segment
 
 controller/kernel/point_shell controller/kernel controller/kernel/proxy controller/kernel/sets
 controller/law controller/servo/kinematics controller/servo controller/law/registry
-controller/stability controller/scene controller/sandbox controller/volume controller/volume_tool controller/tool controller/load
+controller/stability controller/scene controller/sandbox controller/volume/file controller/volume controller/volume_tool controller/tool controller/load
 controller/plan/tables controller/plan/method controller/plan controller/plan/cost
 controller/device/port controller/device/driver
 controller/shell controller/shell/probe controller
@@ -108,7 +108,7 @@ broken() {
   grep -rnE --include='*.[ch]pp' 'system_clock|CLOCK_REALTIME|gettimeofday|timespec_get' \
     controller/servo controller/shell controller/device shared/segment \
     shared/posix/monotonic_clock.hpp || true
-  includes '<itk' "${programs[@]}" | grep -v '^controller/volume/foreign_[a-z]*\.[ch]pp:'
+  includes '<itk' "${programs[@]}" | grep -v '^controller/volume/file/foreign_[a-z]*\.[ch]pp:'
   includes '<(boost|openssl)/' "${programs[@]}" | grep -v '^bridge/net/'
   includes '<lz4' "${programs[@]}" | grep -v '^bridge/wire/lz4_block.cpp:'
   includes '<igtl' "${programs[@]}" | grep -v '^bridge/igtl/'

@@ -8,7 +8,7 @@
 
 #include "controller/scene/scene.hpp"
 #include "controller/tool/scene_tool.hpp"
-#include "controller/volume/volume_image.hpp"
+#include "controller/volume/file/volume_image.hpp"
 #include "controller/volume/volume_noise.hpp"
 
 namespace kerf {

@@ -17,16 +17,16 @@
 #include "controller/scene/scene_error.hpp"
 #include "controller/scene/scene_file.hpp"
 #include "controller/scene/scene_text.hpp"
+#include "controller/volume/file/volume_io.hpp"
+#include "controller/volume/file/volume_limits.hpp"
+#include "controller/volume/file/volume_write.hpp"
 #include "controller/volume/phantom.hpp"
 #include "controller/volume/spacing_check.hpp"
 #include "controller/volume/volume_crop.hpp"
 #include "controller/volume/volume_denoise.hpp"
 #include "controller/volume/volume_density.hpp"
-#include "controller/volume/volume_io.hpp"
-#include "controller/volume/volume_limits.hpp"
 #include "controller/volume/volume_noise.hpp"
 #include "controller/volume/volume_proposal.hpp"
-#include "controller/volume/volume_write.hpp"
 
 namespace kerf {
 namespace {

@@ -27,7 +27,7 @@
 #include "controller/shell/run_report.hpp"
 #include "controller/shell/run_threads.hpp"
 #include "controller/shell/scene_segment.hpp"
-#include "controller/volume/volume_write.hpp"
+#include "controller/volume/file/volume_write.hpp"
 #include "shared/numeric/fnv1a.hpp"
 #include "shared/posix/new_file.hpp"
 #include "shared/posix/stop_signals.hpp"

@@ -5,9 +5,9 @@
 #include <cmath>
 #include <thread>
 
+#include "controller/volume/file/volume_limits.hpp"
 #include "controller/volume/phantom_shape.hpp"
 #include "controller/volume/volume_density.hpp"
-#include "controller/volume/volume_limits.hpp"
 #include "shared/posix/helper_thread.hpp"
 
 namespace kerf {

@@ -4,7 +4,7 @@
 #include <string_view>
 
 #include "controller/scene/phantom_shapes.hpp"
-#include "controller/volume/volume_image.hpp"
+#include "controller/volume/file/volume_image.hpp"
 
 namespace kerf {
 

@@ -6,8 +6,8 @@
 #include <utility>
 
 #include "controller/scene/scene_error.hpp"
+#include "controller/volume/file/volume_limits.hpp"
 #include "controller/volume/volume_density.hpp"
-#include "controller/volume/volume_limits.hpp"
 
 namespace kerf {
 namespace {

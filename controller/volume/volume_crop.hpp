@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "controller/volume/volume_image.hpp"
+#include "controller/volume/file/volume_image.hpp"
 
 namespace kerf {
 

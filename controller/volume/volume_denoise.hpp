@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <span>
 
-#include "controller/volume/volume_image.hpp"
+#include "controller/volume/file/volume_image.hpp"
 
 namespace kerf {
 

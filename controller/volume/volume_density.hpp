@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "controller/volume/volume_image.hpp"
-#include "controller/volume/volume_io.hpp"
+#include "controller/volume/file/volume_image.hpp"
+#include "controller/volume/file/volume_io.hpp"
 
 namespace kerf {
 

@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "controller/volume/file/volume_limits.hpp"
 #include "controller/volume/volume_density.hpp"
-#include "controller/volume/volume_limits.hpp"
 
 namespace kerf {
 namespace {

@@ -3,7 +3,7 @@
 
 #include <array>
 
-#include "controller/volume/volume_image.hpp"
+#include "controller/volume/file/volume_image.hpp"
 
 namespace kerf {
 

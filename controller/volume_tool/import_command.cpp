@@ -9,13 +9,13 @@
 #include <utility>
 
 #include "controller/scene/scene_error.hpp"
+#include "controller/volume/file/volume_io.hpp"
+#include "controller/volume/file/volume_write.hpp"
 #include "controller/volume/spacing_check.hpp"
 #include "controller/volume/volume_crop.hpp"
 #include "controller/volume/volume_denoise.hpp"
-#include "controller/volume/volume_io.hpp"
 #include "controller/volume/volume_noise.hpp"
 #include "controller/volume/volume_proposal.hpp"
-#include "controller/volume/volume_write.hpp"
 #include "controller/volume_tool/import_preview.hpp"
 #include "controller/volume_tool/import_scene.hpp"
 #include "controller/volume_tool/volume_options.hpp"

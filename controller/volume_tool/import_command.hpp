@@ -6,7 +6,7 @@
 #include <string>
 
 #include "controller/sandbox/sandbox.hpp"
-#include "controller/volume/volume_image.hpp"
+#include "controller/volume/file/volume_image.hpp"
 #include "shared/text/command_line.hpp"
 
 namespace kerf {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "controller/volume/volume_io.hpp"
+#include "controller/volume/file/volume_io.hpp"
 #include "controller/volume/volume_proposal.hpp"
 #include "controller/volume_tool/png_file.hpp"
 

@@ -9,12 +9,12 @@
 #include <string>
 
 #include "controller/scene/scene_error.hpp"
+#include "controller/volume/file/volume_io.hpp"
+#include "controller/volume/file/volume_write.hpp"
 #include "controller/volume/phantom.hpp"
 #include "controller/volume/volume_crop.hpp"
 #include "controller/volume/volume_density.hpp"
-#include "controller/volume/volume_io.hpp"
 #include "controller/volume/volume_resample.hpp"
-#include "controller/volume/volume_write.hpp"
 #include "controller/volume_tool/import_command.hpp"
 #include "controller/volume_tool/volume_info.hpp"
 #include "controller/volume_tool/volume_options.hpp"

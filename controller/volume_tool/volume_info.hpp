@@ -7,8 +7,8 @@
 #include <iosfwd>
 #include <string>
 
+#include "controller/volume/file/volume_io.hpp"
 #include "controller/volume/volume_density.hpp"
-#include "controller/volume/volume_io.hpp"
 #include "controller/volume/volume_noise.hpp"
 
 namespace kerf {

@@ -10,10 +10,10 @@
 
 #include "controller/load/scene_place.hpp"
 #include "controller/tool/tool_shapes.hpp"
+#include "controller/volume/file/volume_io.hpp"
 #include "controller/volume/phantom.hpp"
 #include "controller/volume/volume_crop.hpp"
 #include "controller/volume/volume_density.hpp"
-#include "controller/volume/volume_io.hpp"
 #include "lab/extremes/measures.hpp"
 #include "lab/rig/contact_rig.hpp"
 #include "lab/rig/miller.hpp"

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cmath>
 
+#include "controller/volume/file/volume_io.hpp"
 #include "controller/volume/volume_density.hpp"
-#include "controller/volume/volume_io.hpp"
 #include "lab/extremes/worst_tick.hpp"
 #include "lab/rig/contact_rig.hpp"
 

@@ -15,7 +15,7 @@
 #include "controller/load/scene_load.hpp"
 #include "controller/plan/compile.hpp"
 #include "controller/scene/scene_error.hpp"
-#include "controller/volume/volume_write.hpp"
+#include "controller/volume/file/volume_write.hpp"
 #include "hil/hil_error.hpp"
 #include "lab/ranges/hard_hand.hpp"
 #include "lab/ranges/watched_servo.hpp"

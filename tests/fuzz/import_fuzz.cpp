@@ -18,7 +18,7 @@
 #include "controller/sandbox/sandbox.hpp"
 #include "controller/scene/scene_error.hpp"
 #include "controller/tool/stl_file.hpp"
-#include "controller/volume/volume_io.hpp"
+#include "controller/volume/file/volume_io.hpp"
 
 /// Files of one kind, KERF_FUZZ_END, through the sandbox: whatever they do to the library that
 /// reads them, they are a volume or one line, and take little memory. Mutations are blind, since

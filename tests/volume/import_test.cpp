@@ -5,9 +5,9 @@
 #include <doctest/doctest.h>
 
 #include "controller/scene/scene_file.hpp"
+#include "controller/volume/file/volume_write.hpp"
 #include "controller/volume/phantom.hpp"
 #include "controller/volume/volume_density.hpp"
-#include "controller/volume/volume_write.hpp"
 #include "controller/volume_tool/png_file.hpp"
 #include "tests/volume/volume_files.hpp"
 

@@ -9,7 +9,7 @@
 #include <unistd.h>
 
 #include "controller/scene/scene_error.hpp"
-#include "controller/volume/volume_limits.hpp"
+#include "controller/volume/file/volume_limits.hpp"
 #include "tests/volume/volume_files.hpp"
 
 using namespace kerf;

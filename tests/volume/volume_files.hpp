@@ -11,8 +11,8 @@
 #include <type_traits>
 #include <vector>
 
-#include "controller/volume/volume_image.hpp"
-#include "controller/volume/volume_io.hpp"
+#include "controller/volume/file/volume_image.hpp"
+#include "controller/volume/file/volume_io.hpp"
 
 /// Small volume files written by hand, byte by byte, so that the readers are checked against the
 /// formats' descriptions and not against another writer of the same library.

@@ -7,8 +7,8 @@
 #include <sys/resource.h>
 
 #include "controller/scene/scene_error.hpp"
+#include "controller/volume/file/volume_write.hpp"
 #include "controller/volume/volume_density.hpp"
-#include "controller/volume/volume_write.hpp"
 #include "shared/posix/new_file.hpp"
 #include "tests/volume/volume_files.hpp"
 

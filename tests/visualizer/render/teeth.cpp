@@ -9,9 +9,9 @@
 #include <doctest/doctest.h>
 #include <glm/gtc/matrix_transform.hpp>
 
+#include "controller/volume/file/volume_io.hpp"
 #include "controller/volume/phantom.hpp"
 #include "controller/volume/volume_density.hpp"
-#include "controller/volume/volume_io.hpp"
 #include "tests/visualizer/gl/gl_fixture.hpp"
 
 namespace kerf::test {

@@ -4,7 +4,7 @@
 #include <optional>
 #include <vector>
 
-#include "controller/volume/volume_image.hpp"
+#include "controller/volume/file/volume_image.hpp"
 #include "visualizer/view/scene_view.hpp"
 
 namespace kerf::test {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/volume/header_fields.hpp"
+#include "controller/volume/file/header_fields.hpp"
 
 #include <algorithm>
 #include <charconv>
@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "controller/scene/scene_error.hpp"
-#include "controller/volume/volume_header.hpp"
+#include "controller/volume/file/volume_header.hpp"
 #include "shared/text/words.hpp"
 
 namespace kerf {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/volume/library_messages.hpp"
+#include "controller/volume/file/library_messages.hpp"
 
 #include <cstddef>
 #include <iostream>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/volume/voxel_values.hpp"
+#include "controller/volume/file/voxel_values.hpp"
 
 #include <algorithm>
 #include <array>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/volume/volume_limits.hpp"
+#include "controller/volume/file/volume_limits.hpp"
 
 #include <sstream>
 

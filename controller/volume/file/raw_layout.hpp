@@ -6,8 +6,8 @@
 #include <functional>
 #include <span>
 
-#include "controller/volume/foreign_volume.hpp"
-#include "controller/volume/voxel_values.hpp"
+#include "controller/volume/file/foreign_volume.hpp"
+#include "controller/volume/file/voxel_values.hpp"
 #include "shared/volume/voxel_grid.hpp"
 
 namespace kerf {

@@ -3,12 +3,12 @@
 #include <string>
 #include <vector>
 
-#include "controller/volume/foreign_io.hpp"
+#include "controller/volume/file/foreign_io.hpp"
 // ITK from here on.
 #include <itkPNGImageIO.h>
 #include <itkTIFFImageIO.h>
 
-#include "controller/volume/library_messages.hpp"
+#include "controller/volume/file/library_messages.hpp"
 
 namespace kerf::volume {
 namespace fs = std::filesystem;

@@ -7,14 +7,14 @@
 #include <utility>
 #include <vector>
 
-#include "controller/volume/foreign_io.hpp"
+#include "controller/volume/file/foreign_io.hpp"
 // ITK from here on.
 #include <itkGDCMImageIO.h>
 #include <itkMetaDataObject.h>
 
-#include "controller/volume/library_messages.hpp"
-#include "controller/volume/volume_limits.hpp"
-#include "controller/volume/volume_source.hpp"
+#include "controller/volume/file/library_messages.hpp"
+#include "controller/volume/file/volume_limits.hpp"
+#include "controller/volume/file/volume_source.hpp"
 #include "shared/text/number.hpp"
 #include "shared/text/words.hpp"
 

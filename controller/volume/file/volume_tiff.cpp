@@ -7,8 +7,8 @@
 #include <string>
 
 #include "controller/scene/scene_error.hpp"
-#include "controller/volume/volume_header.hpp"
-#include "controller/volume/volume_limits.hpp"
+#include "controller/volume/file/volume_header.hpp"
+#include "controller/volume/file/volume_limits.hpp"
 
 namespace kerf {
 namespace fs = std::filesystem;

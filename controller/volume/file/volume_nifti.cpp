@@ -8,9 +8,9 @@
 #include <zlib.h>
 
 #include "controller/scene/scene_error.hpp"
-#include "controller/volume/gz_file.hpp"
-#include "controller/volume/volume_header.hpp"
-#include "controller/volume/volume_limits.hpp"
+#include "controller/volume/file/gz_file.hpp"
+#include "controller/volume/file/volume_header.hpp"
+#include "controller/volume/file/volume_limits.hpp"
 
 namespace kerf {
 namespace fs = std::filesystem;

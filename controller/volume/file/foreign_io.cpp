@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/volume/foreign_io.hpp"
+#include "controller/volume/file/foreign_io.hpp"
 
 #include <algorithm>
 #include <functional>
@@ -7,8 +7,8 @@
 #include <utility>
 #include <vector>
 
-#include "controller/volume/library_messages.hpp"
-#include "controller/volume/volume_limits.hpp"
+#include "controller/volume/file/library_messages.hpp"
+#include "controller/volume/file/volume_limits.hpp"
 
 namespace kerf::volume {
 namespace fs = std::filesystem;

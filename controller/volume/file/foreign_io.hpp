@@ -11,13 +11,13 @@
 #include <string>
 
 // clang-format off
-#include "controller/volume/itk_on_clang.hpp"  // before any header of ITK
+#include "controller/volume/file/itk_on_clang.hpp"  // before any header of ITK
 // clang-format on
 #include <itkImageIOBase.h>
 
 #include "controller/scene/scene_error.hpp"
-#include "controller/volume/foreign_volume.hpp"
-#include "controller/volume/volume_header.hpp"
+#include "controller/volume/file/foreign_volume.hpp"
+#include "controller/volume/file/volume_header.hpp"
 
 // What all readers of ITK share; only foreign_*.cpp include ITK. Its readers are driven one level
 // below itk::Image, so that each size is checked before memory is taken, and no type is

@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "controller/volume/volume_io.hpp"
+#include "controller/volume/file/volume_io.hpp"
 #include "shared/numeric/vec3.hpp"
 
 /// The steps that fill a SourceVolume, whatever library read the file. Each checks what it sets and

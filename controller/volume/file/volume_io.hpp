@@ -9,9 +9,9 @@
 
 #include "controller/sandbox/sandbox.hpp"
 #include "controller/sandbox/shared_bytes.hpp"
-#include "controller/volume/raw_layout.hpp"
-#include "controller/volume/volume_image.hpp"
-#include "controller/volume/voxel_values.hpp"
+#include "controller/volume/file/raw_layout.hpp"
+#include "controller/volume/file/volume_image.hpp"
+#include "controller/volume/file/voxel_values.hpp"
 
 namespace kerf {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/volume/volume_io.hpp"
+#include "controller/volume/file/volume_io.hpp"
 
 #include <algorithm>
 #include <cerrno>
@@ -15,11 +15,11 @@
 
 #include "controller/sandbox/sandbox.hpp"
 #include "controller/scene/scene_error.hpp"
-#include "controller/volume/foreign_volume.hpp"
-#include "controller/volume/volume_header.hpp"
-#include "controller/volume/volume_limits.hpp"
-#include "controller/volume/volume_source.hpp"
-#include "controller/volume/volume_write.hpp"
+#include "controller/volume/file/foreign_volume.hpp"
+#include "controller/volume/file/volume_header.hpp"
+#include "controller/volume/file/volume_limits.hpp"
+#include "controller/volume/file/volume_source.hpp"
+#include "controller/volume/file/volume_write.hpp"
 
 namespace kerf {
 namespace fs = std::filesystem;

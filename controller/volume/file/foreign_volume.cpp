@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/volume/foreign_volume.hpp"
+#include "controller/volume/file/foreign_volume.hpp"
 
-#include "controller/volume/foreign_io.hpp"
+#include "controller/volume/file/foreign_io.hpp"
 // ITK from here on.
 #include <itkMetaImageIO.h>
 #include <itkNiftiImageIO.h>

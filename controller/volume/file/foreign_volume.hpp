@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "controller/sandbox/sandbox_reader.hpp"
-#include "controller/volume/voxel_values.hpp"
+#include "controller/volume/file/voxel_values.hpp"
 #include "shared/numeric/vec3.hpp"
 
 namespace kerf::volume {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/volume/volume_source.hpp"
+#include "controller/volume/file/volume_source.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -10,8 +10,8 @@
 #include <type_traits>
 
 #include "controller/scene/scene_error.hpp"
-#include "controller/volume/volume_header.hpp"
-#include "controller/volume/volume_limits.hpp"
+#include "controller/volume/file/volume_header.hpp"
+#include "controller/volume/file/volume_limits.hpp"
 #include "shared/text/number.hpp"
 
 namespace kerf::volume {

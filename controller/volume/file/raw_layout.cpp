@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/volume/raw_layout.hpp"
+#include "controller/volume/file/raw_layout.hpp"
 
 #include <algorithm>
 #include <cstddef>
@@ -7,7 +7,7 @@
 #include <string>
 
 #include "controller/scene/scene_error.hpp"
-#include "controller/volume/volume_header.hpp"
+#include "controller/volume/file/volume_header.hpp"
 
 namespace kerf::volume {
 namespace fs = std::filesystem;

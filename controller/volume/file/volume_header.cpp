@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/volume/volume_header.hpp"
+#include "controller/volume/file/volume_header.hpp"
 
 #include <algorithm>
 #include <array>
@@ -18,9 +18,9 @@
 #include <zlib.h>
 
 #include "controller/scene/scene_error.hpp"
-#include "controller/volume/gz_file.hpp"
-#include "controller/volume/header_fields.hpp"
-#include "controller/volume/volume_limits.hpp"
+#include "controller/volume/file/gz_file.hpp"
+#include "controller/volume/file/header_fields.hpp"
+#include "controller/volume/file/volume_limits.hpp"
 
 namespace kerf {
 namespace fs = std::filesystem;
