@@ -19,7 +19,9 @@ using Point = ToolMesh::Point;
 using vec3::doubled_area, vec3::dot, vec3::length, vec3::unit;
 using vec3::operator+, vec3::operator-, vec3::operator*;
 
-const double kCosRim = std::cos(20 * std::numbers::pi / 180);
+// Between two samples a pitch apart an edge of angle t stands 1/2 tan(t / 2) pitches above both.
+// That may be 0.04 units, what a wedged tool may be deep (SweepRules::kWedged) less the tolerance.
+const double kCosRim = std::cos(2 * std::atan(2 * 0.04));
 constexpr double kPointShare = 0.05;  // of the full angle, that a point lacks at least
 // Pitches from a rim into both faces, and from a point along each of its rims. Tuned: on tilted
 // planes a cylinder of 48 sides and a square bar then rest within 0.01 voxels of the ideal in the
