@@ -100,7 +100,7 @@ int run_serve(const ServeOptions& options, const std::atomic<bool>& stop) {
   std::optional<IgtlOutput> slicer;
   if (options.openigtlink != 0) {
     const auto port = static_cast<std::uint16_t>(options.openigtlink);
-    slicer.emplace(IgtlOptions{.host = at.host, .port = port, .name = options.name});
+    slicer.emplace(IgtlOptions{.host = server.address(), .port = port, .name = options.name});
     std::cout << "OpenIGTLink, for whoever reaches it, "
               << options.listen.substr(0, options.listen.rfind(':')) << ':' << port << '\n';
   }
