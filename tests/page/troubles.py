@@ -110,3 +110,40 @@ def tells_how_old_a_picture_is(case):
     rig.start_run()
     case.check(page.until(text_of('#banner') + ".startsWith('A new run')"), 'a new run follows')
     case.check(page.until('document.body.dataset.state === "live"'), 'which is shown')
+
+
+# Of 5 x 4 x 3 bricks, the last ones cut off: which voxels the boxes of some bricks hold, and how many boxes.
+BOXES = '''import('./textures.js').then(({boxesOf}) => {
+  const volume = {grid: [5, 4, 3], size: [37, 31, 20]};
+  const all = [...Array(60).keys()];
+  const told = bricks => {
+    const boxes = boxesOf(volume, bricks);
+    const held = new Set();
+    let twice = 0;
+    for (const {low, high} of boxes) {
+      if (high.some((n, axis) => n > volume.size[axis] || n <= low[axis])) return 'no box';
+      for (let z = low[2]; z < high[2]; z += 8) {
+        for (let y = low[1]; y < high[1]; y += 8) {
+          for (let x = low[0]; x < high[0]; x += 8) {
+            const id = (z / 8 * 4 + y / 8) * 5 + x / 8;
+            twice += held.has(id);
+            held.add(id);
+          }
+        }
+      }
+    }
+    const most = Math.max(0, ...boxes.map(({low, high}) => [0, 1, 2].reduce(
+      (n, axis) => n * Math.ceil((high[axis] - low[axis]) / 8), 1)));
+    return [boxes.length, bricks.every(id => held.has(id)), held.size <= 3 * bricks.length, twice, most <= 20].join(' ');
+  };
+  return [told([]), told([0]), told([59]), told([0, 59]), told([0, 1, 5, 6, 20, 21, 25, 26]), told([0, 2]), told(all),
+    told(all.filter(id => id % 7 === 0))];
+})'''
+
+
+def uploads_few_boxes(case):
+    told = case.page.evaluate(BOXES)
+    fine = all(one.endswith(' true true 0 true') for one in told)
+    counts = [int(one.split()[0]) for one in told] if fine else told
+    case.check(fine and counts[:6] == [0, 1, 1, 2, 1, 1] and counts[6] <= 6,
+               f'changed bricks go up in boxes, all of them and little else: {counts}')
