@@ -58,17 +58,23 @@ void say_what_for(X509* certificate, X509* issuer, const CertificateSpec& spec) 
   add_extension(certificate, issuer, NID_subject_key_identifier, "hash");
   if (ca) return;
   add_extension(certificate, issuer, NID_ext_key_usage, "serverAuth");
+  require_hosts(spec.hosts);
   std::string hosts;
   for (const std::string& host : spec.hosts) {
-    if (const std::string why = why_no_host(host); !why.empty()) {
-      throw BridgeError(one_line("--host " + host.substr(0, kShown) + ": " + why));
-    }
     hosts += (hosts.empty() ? "" : ",") + std::string(is_address(host) ? "IP:" : "DNS:") + host;
   }
   add_extension(certificate, issuer, NID_subject_alt_name, hosts);
 }
 
 }  // namespace
+
+void require_hosts(const std::vector<std::string>& hosts) {
+  for (const std::string& host : hosts) {
+    if (const std::string why = why_no_host(host); !why.empty()) {
+      throw BridgeError(one_line("--host " + host.substr(0, kShown) + ": " + why));
+    }
+  }
+}
 
 Key new_key() {
   Key key(EVP_EC_gen("P-256"));

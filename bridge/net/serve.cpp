@@ -29,7 +29,7 @@ HostPort parse_listen(const std::string& text) {
     return BridgeError("--listen " + text + ": " + why + "; give HOST:PORT, as 127.0.0.1:7400");
   };
   const std::size_t colon = text.rfind(':');
-  if (colon == std::string::npos) throw refuse("has no port");
+  if (colon == std::string::npos || text.ends_with(']')) throw refuse("has no port");
   HostPort out{text.substr(0, colon), 0};
   if (out.host.starts_with('[') && out.host.ends_with(']')) {
     out.host = out.host.substr(1, out.host.size() - 2);
