@@ -98,6 +98,7 @@ def tells_how_old_a_picture_is(case):
     rig.processes['controller'].send_signal(signal.SIGSTOP)
     old = r"/^Stale: no news from the servo\. This picture is [1-9]\d* s old\.$/"
     case.check(page.until(f"{old}.test({text_of('#banner')})"), 'a servo that is stopped is told, and how old the picture is')
+    case.check(page.evaluate('document.body.dataset.state') == 'stale', 'it is not called live')
     rows = page.evaluate("document.getElementById('figures').textContent")
     case.check('servo–' in rows and 'data age–' in rows, 'no figure pretends that it is alive')
     rig.processes['controller'].send_signal(signal.SIGCONT)

@@ -55,7 +55,7 @@ const link = new Link({
     now.takenNs = frame.takenNs;
     now.lost = false;
     document.body.dataset.tick = frame.tick;
-    this.state(now.ended ? 'ended' : 'live', false);
+    this.state(now.ended ? 'ended' : isStale(frame) ? 'stale' : 'live', false);
   },
   records(message) {
     if (message.record !== 'TickRecord') return;

@@ -22,7 +22,7 @@ export const isStale = frame => frame !== null && frame.heartbeatNs > 0n &&
  * how much the picture is, from `silentMs` since the servo's last sign of life. */
 export function bannerOf({record, frame, ended, newRun, lost}, silentMs) {
   const old = ` This picture is ${spanText(silentMs)} old.`;
-  if (lost && frame && !ended) return {text: 'No connection to the bridge.', old, alarm: true};
+  if (lost && frame && !ended) return {text: 'No news from the bridge.', old, alarm: true};
   if (ended) {
     return frame.lifecycle === Lifecycle.clean_end ?
       {text: 'The controller has ended: this is the final state.', alarm: false} :
