@@ -187,8 +187,9 @@ def says_what_is_missing(case):
 
 CASES = [shows_what_the_visualizer_shows, is_turned_by_mouse_fingers_and_keys, is_reached_by_keyboard,
          decodes_lz4_and_refuses_what_is_none, shows_whole_passes_only, uploads_few_boxes,
-         draws_small_until_it_knows_the_cost, says_why_there_is_no_picture, commands_where_allowed, is_small_and_breaks_no_rule,
-         tells_how_old_a_picture_is, tells_faults_and_ends, says_what_is_missing, looks_as_asked_by_volume_iso_and_opacity, is_secured]
+         draws_small_until_it_knows_the_cost, says_why_there_is_no_picture, commands_where_allowed,
+         is_small_and_breaks_no_rule, tells_how_old_a_picture_is, tells_faults_and_ends, says_what_is_missing,
+         looks_as_asked_by_volume_iso_and_opacity, is_secured]
 
 
 def main():
