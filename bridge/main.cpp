@@ -44,6 +44,12 @@ Arguments add_join(CommandLine& app, JoinOptions& options) {
   join.option("--fingerprint", options.fingerprint,
               "of the server's certificate, as serve prints it")
       .shown_as("SHA256");
+  join.option("--token-file", options.token_file,
+              "the token, if not in the address, where other users see it")
+      .shown_as("FILE");
+  join.option("--wait", options.wait_s, "seconds for the first picture; else for ever")
+      .within(0, 86'400)
+      .shown_as("S");
   join.option("--most-mib", options.most_mib, "a larger segment is refused")
       .within(1, 65536)
       .shows_default();

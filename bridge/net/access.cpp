@@ -64,6 +64,9 @@ void Tokens::add_file(const std::filesystem::path& file, const char* option, Rig
   if (stat(file.c_str(), &status) != 0) {
     throw BridgeError(place + std::strerror(errno) + "; write one token a line into it");
   }
+  if (S_ISDIR(status.st_mode)) {
+    throw BridgeError(place + "is a folder; name a file with one token a line");
+  }
   if ((status.st_mode & (S_IRWXG | S_IRWXO)) != 0) {
     throw BridgeError(place + "is open to other users; chmod 600 it");
   }

@@ -11,11 +11,13 @@
 
 #include "bridge/net/bridge_error.hpp"
 #include "bridge/net/host_names.hpp"
+#include "shared/text/words.hpp"
 
 namespace kerf::bridge {
 namespace {
 
 constexpr long kDayS = 24L * 60 * 60;
+constexpr std::size_t kShown = 80;  // of a host in a message
 
 struct FreeBio {
   void operator()(BIO* bio) const noexcept { BIO_free(bio); }
@@ -41,10 +43,7 @@ void add_extension(X509* certificate, X509* issuer, int kind, const std::string&
   X509V3_set_ctx_nodb(&context);
   X509V3_set_ctx(&context, issuer, certificate, nullptr, nullptr, 0);
   X509_EXTENSION* const extension = X509V3_EXT_conf_nid(nullptr, &context, kind, value.c_str());
-  if (extension == nullptr) {
-    throw BridgeError("--host: " + value +
-                      ": no name and no address; give letters, digits, - and .");
-  }
+  require(extension != nullptr, "an extension");
   const int added = X509_add_ext(certificate, extension, -1);
   X509_EXTENSION_free(extension);
   require(added == 1, "an extension");
@@ -59,17 +58,23 @@ void say_what_for(X509* certificate, X509* issuer, const CertificateSpec& spec) 
   add_extension(certificate, issuer, NID_subject_key_identifier, "hash");
   if (ca) return;
   add_extension(certificate, issuer, NID_ext_key_usage, "serverAuth");
+  require_hosts(spec.hosts);
   std::string hosts;
   for (const std::string& host : spec.hosts) {
-    if (host.find_first_of(",:;= \t\n") != std::string::npos && !is_address(host)) {
-      throw BridgeError("--host " + host + ": is no name and no address; give one of both");
-    }
     hosts += (hosts.empty() ? "" : ",") + std::string(is_address(host) ? "IP:" : "DNS:") + host;
   }
   add_extension(certificate, issuer, NID_subject_alt_name, hosts);
 }
 
 }  // namespace
+
+void require_hosts(const std::vector<std::string>& hosts) {
+  for (const std::string& host : hosts) {
+    if (const std::string why = why_no_host(host); !why.empty()) {
+      throw BridgeError(one_line("--host " + host.substr(0, kShown) + ": " + why));
+    }
+  }
+}
 
 Key new_key() {
   Key key(EVP_EC_gen("P-256"));

@@ -27,6 +27,9 @@ struct CertificateSpec {
   int days = 825;
 };
 
+/// Throws where one is neither a name nor an address.
+void require_hosts(const std::vector<std::string>& hosts);
+
 /// Of `key`, signed by `issuer` with `issuer_key`; nullptr: by itself.
 [[nodiscard]] Certificate new_certificate(const CertificateSpec& spec, EVP_PKEY* key, X509* issuer,
                                           EVP_PKEY* issuer_key);

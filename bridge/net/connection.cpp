@@ -59,11 +59,12 @@ asio::awaitable<void> Server::Impl::handshake(WebSocket& ws, beast::flat_buffer&
   done = !error;
 }
 
-Right Server::Impl::right_of(const Request& request) const {
+/// Of the address, else of the cookie; empty where neither has one.
+std::string_view Server::Impl::token_of(const Request& request) const {
   const std::string_view asked = query_value(text(request.target()), "token");
-  if (!asked.empty()) return setup_.tokens.right_of(asked);
+  if (!asked.empty()) return asked;
   const std::string name = "kerf" + std::to_string(port());
-  return setup_.tokens.right_of(cookie_value(text(request[http::field::cookie]), name));
+  return cookie_value(text(request[http::field::cookie]), name);
 }
 
 std::string Server::Impl::page_text(const Request& request, Right right) const {
@@ -142,9 +143,9 @@ asio::awaitable<void> Server::Impl::talk_http(std::unique_ptr<WebSocket> ws, bea
     if (upgrade && !is_own_origin(text(request[http::field::origin]), host, tls_.has_value())) {
       co_return co_await refuse(link, 403, "A page from elsewhere may not look in here.\n", head);
     }
-    const Right right = right_of(request);
-    const bool gave_token = !query_value(text(request.target()), "token").empty();
-    if (right == Right::none && gave_token) {
+    const std::string_view token = token_of(request);
+    const Right right = setup_.tokens.right_of(token);
+    if (right == Right::none && !token.empty()) {
       // The place is held meanwhile, so who guesses gets 32 answers a second at most.
       say_refused(link);
       asio::steady_timer wait(io_, std::chrono::nanoseconds(setup_.wrong_token_ns));

@@ -41,6 +41,13 @@ asio::awaitable<void> dial(WebSocket& ws, const BridgeAddress& address, ServerTr
   beast::tcp_stream& tcp_stream = link.next_layer();
   tcp::resolver resolver(ws.get_executor());
   const auto places = co_await resolver.async_resolve(address.host, address.port, use_awaitable);
+  if (!link.is_tls()) {  // whatever a name stands for here
+    for (const auto& place : places) {
+      if (place.endpoint().address().is_loopback()) continue;
+      throw Hopeless("is " + place.endpoint().address().to_string() +
+                     ", and unencrypted is for loopback only; take wss://");
+    }
+  }
   tcp_stream.expires_after(kConnectPatience);
   co_await tcp_stream.async_connect(places, use_awaitable);
   tcp_stream.socket().set_option(tcp::no_delay(true));
@@ -61,9 +68,12 @@ asio::awaitable<void> dial(WebSocket& ws, const BridgeAddress& address, ServerTr
   ws.binary(true);
 }
 
-void throw_closed(std::uint16_t code) {
+void throw_closed(std::uint16_t code, bool had_token) {
   switch (static_cast<CloseCode>(code)) {
     case CloseCode::no_token:
+      if (!had_token) {
+        throw Hopeless("asks for a token; take all of the address it prints, in quotes");
+      }
       throw Hopeless("the token is not one of its own; take the address it prints");
     case CloseCode::too_many:
       throw BridgeError("has as many viewers as it takes");

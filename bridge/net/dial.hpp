@@ -22,7 +22,8 @@ struct Hopeless : BridgeError {
 /// or what may be better the next time: `BridgeError` and Boost's system_error.
 asio::awaitable<void> dial(WebSocket& ws, const BridgeAddress& address, ServerTrust& trust);
 
-/// What the server said by closing, 4001 and so on: throws as `dial`.
-[[noreturn]] void throw_closed(std::uint16_t code);
+/// What the server said by closing, 4001 and so on, to who showed a token or none: throws as
+/// `dial`.
+[[noreturn]] void throw_closed(std::uint16_t code, bool had_token);
 
 }  // namespace kerf::bridge

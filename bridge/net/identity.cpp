@@ -54,6 +54,7 @@ Authority authority_in(const std::filesystem::path& folder) {
 }  // namespace
 
 int run_make_identity(const IdentityOptions& options) {
+  require_hosts(options.hosts);  // before anything is made
   const std::filesystem::path& folder = options.folder;
   std::error_code error;
   std::filesystem::create_directories(folder, error);

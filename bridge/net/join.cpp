@@ -17,6 +17,7 @@
 
 #include "bridge/mirror/command_desk.hpp"
 #include "bridge/mirror/mirror.hpp"
+#include "bridge/net/access.hpp"
 #include "bridge/net/dial.hpp"
 #include "bridge/net/link_figures.hpp"
 #include "shared/numeric/histogram.hpp"
@@ -30,16 +31,31 @@ namespace websocket = beast::websocket;
 using asio::use_awaitable;
 using namespace std::chrono_literals;
 
-constexpr std::int64_t kSilenceNs = 2 * kNsPerSecond;      // of a run: it has a sign of life, 60 Hz
-constexpr std::int64_t kLongWaitNs = 10 * kNsPerSecond;    // for a run: the server has none
+constexpr std::int64_t kSilenceNs = 2 * kNsPerSecond;    // of a run: it has a sign of life, 60 Hz
+constexpr std::int64_t kLongWaitNs = 10 * kNsPerSecond;  // for a run: the server has none
+constexpr std::int64_t kSayWaitNs = kNsPerSecond;        // before that is told
+constexpr const char* kNoRun = "has no controller yet";
 constexpr auto kFirstPause = 50ms, kLongestPause = 800ms;  // between two tries
 constexpr auto kWatchPeriod = 20ms;
+
+/// With the token of `--token-file`, where that is given.
+[[nodiscard]] BridgeAddress address_in(const JoinOptions& options) {
+  BridgeAddress out = parse_address(options.address);
+  if (options.token_file.empty()) return out;
+  const std::string place = "--token-file " + options.token_file.string() + ": ";
+  if (!out.token.empty()) throw BridgeError(place + "the address has a token; give one of both");
+  Tokens tokens;
+  tokens.add_file(options.token_file, "--token-file", Right::look);
+  out.token = tokens.first();
+  return out;
+}
 
 class Joiner {
  public:
   Joiner(const JoinOptions& options, const std::atomic<bool>& stop, std::ostream& out)
-      : address_(parse_address(options.address)),
+      : address_(address_in(options)),
         name_(options.name),
+        wait_s_(options.wait_s),
         trust_(address_.host, options.ca, options.fingerprint),
         stop_(stop),
         out_(out),
@@ -107,6 +123,7 @@ class Joiner {
     why_closed_.clear();
     greeted_ = false;
     waited_here_ = 0;
+    connected_ = false;
     heard_ns_ = monotonic_ns();
     beast::tcp_stream& link = ws.next_layer().next_layer();
     struct Watched {  // the watch may close it while it lives
@@ -115,6 +132,8 @@ class Joiner {
       ~Watched() { joiner.link_ = nullptr; }
     } const watched(*this, link);
     co_await dial(ws, address_, trust_);
+    connected_ = true;
+    heard_ns_ = monotonic_ns();
     beast::flat_buffer in;
     for (;;) {
       in.clear();
@@ -122,7 +141,8 @@ class Joiner {
       co_await ws.async_read(in, quiet(error));
       // A reason that came counts, however the connection ended after it.
       const std::uint16_t reason = ws.reason().code;
-      if (error && reason != websocket::close_code::none) throw_closed(reason);
+      if (error && reason != websocket::close_code::none)
+        throw_closed(reason, !address_.token.empty());
       if (error) throw boost::system::system_error(error);
       heard_ns_ = monotonic_ns();
       const std::span message(static_cast<const std::byte*>(in.data().data()), in.size());
@@ -177,6 +197,7 @@ class Joiner {
   /// Samples the age, and ends a connection that is silent or that nobody wants any more.
   asio::awaitable<void> watch() {
     asio::steady_timer timer(io_);
+    const std::int64_t began_ns = monotonic_ns();
     for (;;) {
       timer.expires_after(kWatchPeriod);
       co_await timer.async_wait(use_awaitable);
@@ -185,10 +206,20 @@ class Joiner {
         io_.stop();
         co_return;
       }
+      if (joins_ == 0 && wait_s_ && static_cast<double>(now_ns - began_ns) > *wait_s_ * 1e9) {
+        throw BridgeError(place() + (last_reason_.empty() ? "no picture" : last_reason_) +
+                          format("; gave up after %g s (--wait)", *wait_s_));
+      }
+      if (link_ != nullptr && connected_ && !greeted_ && now_ns - heard_ns_ > kSayWaitNs) {
+        lost(kNoRun);
+      }
       const bool running = greeted_ && !mirror_.ended();
       if (running && mirror_.joined()) age_.record(now_ns - mirror_.taken_ns());
       if (link_ == nullptr || now_ns - heard_ns_ < (running ? kSilenceNs : kLongWaitNs)) continue;
-      why_closed_ = "silent for " + std::to_string((now_ns - heard_ns_) / kNsPerSecond) + " s";
+      why_closed_ =
+          connected_ && !greeted_
+              ? kNoRun
+              : "silent for " + std::to_string((now_ns - heard_ns_) / kNsPerSecond) + " s";
       ErrorCode ignored;
       link_->socket().close(ignored);
     }
@@ -198,6 +229,7 @@ class Joiner {
     try {
       throw;
     } catch (const boost::system::system_error& error) {
+      if (error.code() == beast::error::timeout) return "no answer";
       return error.code().message();
     } catch (const std::exception& error) {
       return error.what();
@@ -208,6 +240,7 @@ class Joiner {
   asio::ssl::context tls_{asio::ssl::context::tlsv13_client};
   BridgeAddress address_;
   std::string name_;
+  std::optional<double> wait_s_;
   ServerTrust trust_;
   const std::atomic<bool>& stop_;
   std::ostream& out_;
@@ -215,7 +248,7 @@ class Joiner {
   Mirror mirror_;
 
   beast::tcp_stream* link_ = nullptr;  // of the connection that lives
-  bool greeted_ = false;
+  bool connected_ = false, greeted_ = false;
   std::int64_t heard_ns_ = 0, since_ns_ = 0;
   std::string why_closed_, last_reason_;
   unsigned joins_ = 0;

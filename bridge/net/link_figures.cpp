@@ -15,7 +15,8 @@ LinkFigures link_figures(int socket) noexcept {
   if (getsockopt(socket, IPPROTO_TCP, TCP_INFO, &info, &bytes) != 0) return {};
   // The kernel starts with the largest number.
   const bool known = info.tcpi_min_rtt != std::numeric_limits<std::uint32_t>::max();
-  return {known ? std::int64_t{info.tcpi_min_rtt} * 1000 : 0, info.tcpi_rcv_ooopack};
+  return {known ? std::int64_t{info.tcpi_min_rtt} * 1000 : 0, info.tcpi_rcv_ooopack,
+          info.tcpi_bytes_received};
 }
 
 }  // namespace kerf::bridge

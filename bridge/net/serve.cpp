@@ -29,7 +29,7 @@ HostPort parse_listen(const std::string& text) {
     return BridgeError("--listen " + text + ": " + why + "; give HOST:PORT, as 127.0.0.1:7400");
   };
   const std::size_t colon = text.rfind(':');
-  if (colon == std::string::npos) throw refuse("has no port");
+  if (colon == std::string::npos || text.ends_with(']')) throw refuse("has no port");
   HostPort out{text.substr(0, colon), 0};
   if (out.host.starts_with('[') && out.host.ends_with(']')) {
     out.host = out.host.substr(1, out.host.size() - 2);
@@ -100,7 +100,7 @@ int run_serve(const ServeOptions& options, const std::atomic<bool>& stop) {
   std::optional<IgtlOutput> slicer;
   if (options.openigtlink != 0) {
     const auto port = static_cast<std::uint16_t>(options.openigtlink);
-    slicer.emplace(IgtlOptions{.host = at.host, .port = port, .name = options.name});
+    slicer.emplace(IgtlOptions{.host = server.address(), .port = port, .name = options.name});
     std::cout << "OpenIGTLink, for whoever reaches it, "
               << options.listen.substr(0, options.listen.rfind(':')) << ':' << port << '\n';
   }

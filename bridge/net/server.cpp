@@ -13,6 +13,7 @@
 #include <openssl/ssl.h>
 
 #include "bridge/net/bridge_error.hpp"
+#include "bridge/net/host_names.hpp"
 #include "bridge/net/server_impl.hpp"
 #include "bridge/net/tcp_options.hpp"
 #include "shared/posix/failure.hpp"
@@ -36,14 +37,25 @@ tcp::endpoint resolve(asio::io_context& io, const std::string& host, std::uint16
   if (error || found.empty()) {
     throw BridgeError(place + error.message() + "; give an address of this machine (ip address)");
   }
-  return found.begin()->endpoint();
+  // A machine's own name may stand for loopback too.
+  const auto outside = std::find_if(found.begin(), found.end(), [](const auto& one) {
+    return !one.endpoint().address().is_loopback();
+  });
+  const tcp::endpoint at = (outside == found.end() ? found.begin() : outside)->endpoint();
+  if (at.address().is_loopback() && !is_loopback(host)) {
+    throw BridgeError(place + "is " + at.address().to_string() +
+                      ", which no other machine reaches; give an address of this machine (ip "
+                      "address), or localhost");
+  }
+  return at;
 }
 
 tcp::acceptor listen_at(asio::io_context& io, const ServerSetup& setup) {
   const tcp::endpoint at = resolve(io, setup.host, setup.port);
   const std::string place = "--listen " + setup.host + ":" + std::to_string(setup.port) + ": ";
   if (!setup.tls && !at.address().is_loopback()) {
-    throw BridgeError(place + "is no loopback address; off loopback there is TLS only");
+    throw BridgeError(place + "is " + at.address().to_string() +
+                      ", no loopback address; off loopback there is TLS only");
   }
   tcp::acceptor acceptor(io);
   ErrorCode error;
@@ -192,6 +204,9 @@ Server::Server(ServerSetup setup) : impl_(std::make_unique<Impl>(std::move(setup
 Server::~Server() = default;
 std::uint16_t Server::port() const noexcept {
   return impl_->port();
+}
+std::string Server::address() const {
+  return impl_->address();
 }
 void Server::run(const std::atomic<bool>& stop) {
   impl_->run(stop);

@@ -26,7 +26,7 @@ struct ServerSetup {
   bool dedicated_link = false;
   std::int64_t silence_ns = 5'000'000'000;      ///< a viewer that acknowledges nothing is dropped
   std::int64_t handshake_ns = 5'000'000'000;    ///< for TLS, and for each request
-  std::int64_t wrong_token_ns = 1'000'000'000;  ///< before a wrong token is answered
+  std::int64_t wrong_token_ns = 1'000'000'000;  ///< before a wrong token or cookie is answered
 };
 
 /// One port for the page and for viewers; one more reader of the segment of one controller, which
@@ -41,6 +41,8 @@ class Server {
   Server& operator=(const Server&) = delete;
 
   [[nodiscard]] std::uint16_t port() const noexcept;
+  /// That it listens at, as text: what the host stood for.
+  [[nodiscard]] std::string address() const;
   /// Serves until `stop`.
   void run(const std::atomic<bool>& stop);
 

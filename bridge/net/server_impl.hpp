@@ -10,6 +10,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <utility>  // before Boost 1.74's awaitable, which needs it
 
 #include <boost/asio/awaitable.hpp>
@@ -40,6 +41,8 @@ struct Viewer {
   std::int64_t heard_ns = 0;
   std::int64_t measured_ns = 0;      ///< when the round trip was asked for
   int may_say = 0;                   ///< messages that it may send before it is a flood
+  std::int64_t may_send_bytes = 0;   ///< on the wire, the same
+  std::uint64_t sent_bytes = 0;      ///< by it, when that was looked at
   bool commanding = false;           ///< a command of it is with the controller
   bool gone = false;                 ///< its socket has failed or is closed
   std::optional<CloseCode> closing;  ///< it is to be told to go
@@ -56,6 +59,9 @@ class Server::Impl {
   explicit Impl(ServerSetup setup);
   ~Impl();
   [[nodiscard]] std::uint16_t port() const { return acceptor_.local_endpoint().port(); }
+  [[nodiscard]] std::string address() const {
+    return acceptor_.local_endpoint().address().to_string();
+  }
   void run(const std::atomic<bool>& stop);
 
  private:
@@ -76,7 +82,7 @@ class Server::Impl {
   Void talk_http(std::unique_ptr<WebSocket> ws, beast::flat_buffer& in, HandshakePlace& place);
   Void refuse(Link& link, int status, std::string_view text, bool head_only);
   void say_refused(const Link& link);
-  [[nodiscard]] Right right_of(const Request& request) const;
+  [[nodiscard]] std::string_view token_of(const Request& request) const;
   [[nodiscard]] std::string page_text(const Request& request, Right right) const;
 
   // viewer.cpp

@@ -22,6 +22,11 @@ namespace websocket = beast::websocket;
 constexpr std::int64_t kGoodbyeNs = kNsPerSecond;
 constexpr std::int64_t kMeasureNs = kNsPerSecond / 4;
 constexpr int kMaySay = 64;  // beside one ack a frame: a second of commands or pings
+// On the wire: masked head of a WebSocket frame, what TLS 1.3 adds to a record.
+constexpr std::int64_t kMessageBytes = kMaxUpBytes + 14 + 22;
+// What may have come since the last look: the acks of a stalled link come at once. Fragments
+// without payload are no messages, so this alone bounds them.
+constexpr std::int64_t kMaySendBytes = 1 << 20;
 constexpr std::size_t kMaxReplies = 16;
 
 std::string_view words(CloseCode code) {
@@ -64,6 +69,8 @@ asio::awaitable<void> Server::Impl::view(std::unique_ptr<WebSocket> ws, const Re
   }
   place.release();
   viewer->may_say = kMaySay;
+  viewer->may_send_bytes = kMaySendBytes;
+  viewer->sent_bytes = link_figures(viewer->fd()).received_bytes;
   viewer->ws->control_callback([watched = viewer.get()](websocket::frame_type, beast::string_view) {
     if (--watched->may_say < 0) drop(*watched, CloseCode::not_understood);
   });
@@ -92,6 +99,7 @@ asio::awaitable<void> Server::Impl::write_viewer(std::shared_ptr<Viewer> viewer)
       co_await viewer->ws->async_write(asio::buffer(&reply, sizeof reply), quiet(error));
     } else if (viewer->stream && viewer->stream->next(monotonic_ns(), out)) {
       ++viewer->may_say;
+      viewer->may_send_bytes += kMessageBytes;
       co_await viewer->ws->async_write(asio::buffer(out), quiet(error));
     } else {
       viewer->wake.expires_at(asio::steady_timer::time_point::max());
@@ -178,6 +186,13 @@ void Server::Impl::command(const std::shared_ptr<Viewer>& viewer, const CommandM
 
 void Server::Impl::look_after(Viewer& viewer, std::int64_t now_ns) {
   viewer.may_say = std::max(viewer.may_say, std::min(viewer.may_say + 1, kMaySay));
+  if (!viewer.gone) {
+    const std::uint64_t sent = link_figures(viewer.fd()).received_bytes;
+    viewer.may_send_bytes -= static_cast<std::int64_t>(sent - viewer.sent_bytes);
+    viewer.sent_bytes = sent;
+    if (viewer.may_send_bytes < 0) drop(viewer, CloseCode::not_understood);
+    viewer.may_send_bytes = std::min(viewer.may_send_bytes + kMessageBytes, kMaySendBytes);
+  }
   if (!viewer.stream || !viewer.stream->link().waits_for_ack()) viewer.heard_ns = now_ns;
   if (!viewer.closing && now_ns - viewer.heard_ns > setup_.silence_ns)
     drop(viewer, CloseCode::too_slow);

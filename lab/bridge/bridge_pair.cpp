@@ -96,9 +96,8 @@ void BridgePair::kill_serve() {
 std::unique_ptr<sweep::Child> BridgePair::join(const std::string& name) const {
   return networks_.start(
       TwoNetworks::Side::far,
-      {files_.program, "join",
-       std::string("wss://") + TwoNetworks::kNearAddress + ":" + kPort + "/?token=" + files_.token,
-       "--ca", files_.ca, "--name", name},
+      {files_.program, "join", std::string("wss://") + TwoNetworks::kNearAddress + ":" + kPort,
+       "--token-file", files_.token_file, "--ca", files_.ca, "--name", name},
       files_.folder / (name + ".log"));
 }
 

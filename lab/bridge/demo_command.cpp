@@ -141,9 +141,10 @@ class Demo {
     return *controller_->ended();
   }
 
-  void tell(std::ostream& out) const {
+  void tell(std::ostream& out) {
     out << text_in(at("controller.log"));
     out << "on the second machine:\n" << text_in(at("far.log"));
+    if (visualizer_->ended() != 0) out << visualizer_->last_line() << '\n';
     if (window_) return;
     const std::string text = text_in(at("visualizer.json"));
     if (text.empty()) return;

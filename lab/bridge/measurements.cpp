@@ -54,6 +54,11 @@ struct Scene {
   return viewer.equals_within(volume.density_hash(), patience);
 }
 
+[[nodiscard]] PublishResult::Spread spread_of(std::vector<double>& values) {
+  const auto at = [&values](double share) { return percentile(std::span(values), share); };
+  return {at(0), at(0.5), at(1)};
+}
+
 }  // namespace
 
 std::vector<Case> table_cases() {
@@ -166,12 +171,13 @@ StoppedResult run_stopped(const BridgeFiles& files, double seconds, std::int32_t
   return out;
 }
 
-PublishResult run_publish(const BridgeFiles& files, double seconds, int turns,
+PublishResult run_publish(const BridgeFiles& files, double seconds, int pairs,
                           std::int32_t layers) {
   const TwoNetworks networks({});
   MilledVolume volume(BridgePair::kNearName, Load::slow, layers);
   std::array<std::vector<double>, 2> p50, p99;
-  for (int turn = 0; turn < 2 * turns; ++turn) {
+  PublishResult out;
+  for (int turn = 0; turn < 2 * pairs; ++turn) {
     const bool bridged = turn % 2 != 0;
     std::unique_ptr<BridgePair> pair;
     std::unique_ptr<sweep::Child> join;
@@ -179,18 +185,22 @@ PublishResult run_publish(const BridgeFiles& files, double seconds, int turns,
       pair = std::make_unique<BridgePair>(networks, files, false);
       join = pair->join("far");
       const FarViewer viewer("far", volume);
-      if (!viewer.joins_within(kJoinPatience)) return {};
+      if (!viewer.joins_within(kJoinPatience)) break;
     }
     static_cast<void>(volume.take_publish_times());
-    sleep_s(seconds / (2 * turns));
+    sleep_s(seconds / (2 * pairs));
     const Histogram times = volume.take_publish_times();
     p50.at(bridged).push_back(times.percentile_us(0.5));
     p99.at(bridged).push_back(times.percentile_us(0.99));
+    if (!bridged) continue;
+    ++out.pairs;
+    if (p99[1].back() > p99[0].back()) ++out.slower;
   }
-  const auto median = [](std::vector<double>& values) {
-    return percentile(std::span(values), 0.5);
-  };
-  return {median(p50[0]), median(p99[0]), median(p50[1]), median(p99[1])};
+  out.alone_p50 = spread_of(p50[0]);
+  out.alone_p99 = spread_of(p99[0]);
+  out.bridged_p50 = spread_of(p50[1]);
+  out.bridged_p99 = spread_of(p99[1]);
+  return out;
 }
 
 CrowdResult run_crowd(const BridgeFiles& files, int viewers, double seconds, std::int32_t layers) {

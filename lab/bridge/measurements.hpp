@@ -58,11 +58,18 @@ struct StoppedResult {
 [[nodiscard]] StoppedResult run_stopped(const BridgeFiles& files, double seconds,
                                         std::int32_t layers);
 
-/// What publishing a tick costs the servo, in turns without and with a bridge and a viewer.
+/// What publishing a tick costs the servo, in pairs of turns without and with a bridge and a
+/// viewer.
 struct PublishResult {
-  double alone_p50_us = 0, alone_p99_us = 0, bridged_p50_us = 0, bridged_p99_us = 0;
+  /// Of one figure over the turns, us.
+  struct Spread {
+    double least = 0, median = 0, most = 0;
+  };
+  int pairs = 0;   ///< of turns; fewer than asked for: a viewer did not join
+  int slower = 0;  ///< of them, in which p99 was larger with the bridge
+  Spread alone_p50, alone_p99, bridged_p50, bridged_p99;
 };
-[[nodiscard]] PublishResult run_publish(const BridgeFiles& files, double seconds, int turns,
+[[nodiscard]] PublishResult run_publish(const BridgeFiles& files, double seconds, int pairs,
                                         std::int32_t layers);
 
 /// Many viewers at once.

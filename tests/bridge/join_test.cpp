@@ -10,7 +10,11 @@
 #include <string>
 #include <vector>
 
+#include <arpa/inet.h>
 #include <doctest/doctest.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <unistd.h>
 
 #include "bridge/net/bridge_error.hpp"
 #include "bridge/net/certificate.hpp"
@@ -49,6 +53,62 @@ struct Lab {
   TestFolder folder;
 };
 
+/// Ends a join as soon as it says something.
+struct StopAtWords : std::stringbuf {
+  int sync() override {
+    stop = true;
+    return 0;
+  }
+  std::atomic<bool> stop{false};
+};
+
+/// A port that is taken, so that nobody else takes it, and at which nobody listens.
+class ClosedPort {
+ public:
+  ClosedPort() : fd_(socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    socklen_t bytes = sizeof address;
+    bind(fd_, reinterpret_cast<const sockaddr*>(&address), bytes);
+    getsockname(fd_, reinterpret_cast<sockaddr*>(&address), &bytes);
+    port_ = ntohs(address.sin_port);
+  }
+  ~ClosedPort() { close(fd_); }
+  ClosedPort(const ClosedPort&) = delete;
+  ClosedPort& operator=(const ClosedPort&) = delete;
+  [[nodiscard]] std::string place() const { return "127.0.0.1:" + std::to_string(port_); }
+
+ private:
+  int fd_;
+  unsigned port_ = 0;
+};
+
+/// What a join tells first, or with which it ends.
+std::string first_words(const JoinOptions& options) {
+  StopAtWords words;
+  std::ostream said(&words);
+  try {
+    run_join(options, words.stop, said);
+  } catch (const BridgeError& error) {
+    return error.what();
+  }
+  const std::string line = words.str().substr(std::string("kerf-bridge: ").size());
+  return line.substr(0, line.find('\n'));
+}
+
+/// With what a join ends by itself.
+std::string last_words(const JoinOptions& options) {
+  const std::atomic<bool> stop{false};
+  std::ostringstream said;
+  try {
+    run_join(options, stop, said);
+  } catch (const BridgeError& error) {
+    return error.what();
+  }
+  return "no end";
+}
+
 /// A bridge with these keys, and how a join ends that looks at it.
 struct Attempt {
   explicit Attempt(const TlsKeys& keys) : bridge(setup_of(keys)) {
@@ -67,25 +127,11 @@ struct Attempt {
 
   /// The one line; "joined" where it goes on.
   [[nodiscard]] std::string ends() const {
-    std::atomic<bool> stop{false};
-    struct Watch : std::stringbuf {  // ends the join as soon as it says something
-      explicit Watch(std::atomic<bool>& flag) : stop(flag) {}
-      int sync() override {
-        stop = true;
-        return 0;
-      }
-      std::atomic<bool>& stop;
-    } watch(stop);
-    std::ostream said(&watch);
-    try {
-      run_join(options, stop, said);
-    } catch (const BridgeError& error) {
-      const std::string line = error.what();
-      CHECK(std::count(line.begin(), line.end(), '\n') == 0);
-      CHECK(line.starts_with(place() + ": "));
-      return line.substr(place().size() + 2);
-    }
-    return watch.str().find(" joined ") != std::string::npos ? "joined" : watch.str();
+    const std::string line = first_words(options);
+    if (line.starts_with("joined ")) return "joined";
+    CHECK(std::count(line.begin(), line.end(), '\n') == 0);
+    CHECK(line.starts_with(place() + ": "));
+    return line.substr(place().size() + 2);
   }
   TestBridge bridge;
   JoinOptions options;
@@ -138,6 +184,49 @@ TEST_CASE(
     CHECK(expired.ends() ==
           "its certificate: certificate has expired; set the clock, or make-identity there again");
   }
+}
+
+TEST_CASE("join tells at once what keeps it from a picture, and gives up where it is asked to") {
+  const TestBridge bridge;  // without a controller
+  const std::string place = "127.0.0.1:" + std::to_string(bridge.port());
+  const auto with = [&place](const std::string& token) {
+    JoinOptions options;
+    options.name = "join-test";
+    options.address = "ws://" + place + token;
+    return options;
+  };
+  CHECK(first_words(with("/?token=" + kLook)) == place + ": has no controller yet; trying again");
+  CHECK(first_words(with("")) ==
+        place + ": asks for a token; take all of the address it prints, in quotes");
+  CHECK(first_words(with("/?token=wrong-0123456789")) ==
+        place + ": the token is not one of its own; take the address it prints");
+  JoinOptions patient = with("/?token=" + kLook);
+  patient.wait_s = 0.1;
+  CHECK(last_words(patient).ends_with("; gave up after 0.1 s (--wait)"));
+  const ClosedPort closed;
+  JoinOptions dead = with("");
+  dead.address = "ws://" + closed.place();
+  CHECK(first_words(dead) == closed.place() + ": Connection refused; trying again");
+  dead.wait_s = 0.2;
+  CHECK(last_words(dead).ends_with("; gave up after 0.2 s (--wait)"));
+}
+
+TEST_CASE("join takes its token from a file that nobody else reads") {
+  const TestController controller;
+  const TestBridge bridge;
+  const TestFolder folder;
+  JoinOptions options;
+  options.name = "join-test";
+  options.address = "ws://127.0.0.1:" + std::to_string(bridge.port());
+  options.token_file = folder.path / "token";
+  CHECK(first_words(options).starts_with("--token-file " + options.token_file.string() + ": "));
+  std::ofstream(options.token_file) << "# of the lab\n" << kLook << '\n';
+  fs::permissions(options.token_file, fs::perms(0644));
+  CHECK(first_words(options).ends_with("is open to other users; chmod 600 it"));
+  fs::permissions(options.token_file, fs::perms(0600));
+  CHECK(first_words(options).starts_with("joined "));
+  options.address += "/?token=" + kLook;
+  CHECK(first_words(options).ends_with("the address has a token; give one of both"));
 }
 
 TEST_CASE("join takes a fingerprint however it is written") {

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <string>
@@ -121,6 +122,47 @@ TEST_CASE("an identity that does not hold is refused with its reason") {
   CHECK(has(refusal([&] { run_make_identity(options); }), "no name and no address"));
 }
 
+TEST_CASE("a certificate is made for names and addresses only, and what is neither is told") {
+  const TestFolder folder;
+  const auto make = [&folder](const std::string& host) {
+    IdentityOptions options;
+    options.folder = folder.path / "identity";
+    options.hosts = {"10.0.0.1", host};
+    const std::string line = refusal([&] { run_make_identity(options); });
+    CHECK(std::count_if(line.begin(), line.end(), [](unsigned char c) { return c < ' '; }) == 0);
+    return line;
+  };
+  CHECK(has(make(""), "--host : is empty"));
+  for (const char* strange :
+       {" ", "lab pc", "lab\npc", "lab/pc", "lab,pc", "lab;pc", "a=b", "lab_pc!", "läb"}) {
+    CHECK(has(make(strange), "no name and no address"));
+  }
+  CHECK(has(make("*"), "wildcard"));
+  CHECK(has(make("*.lab.example"), "wildcard"));
+  CHECK(has(make("https://lab-pc"), "URL"));
+  CHECK(has(make("lab-pc:7400"), "a port does not belong here"));
+  CHECK(has(make("[::1]"), "without brackets"));
+  CHECK(has(make("fe80::1::2"), "no IPv6 address"));
+  CHECK(has(make("10.0.0.256"), "no IPv4 address"));
+  CHECK(has(make("10.0.0"), "no IPv4 address"));
+  CHECK(has(make(".lab"), "before or after a dot"));
+  CHECK(has(make("lab."), "before or after a dot"));
+  CHECK(has(make("lab..pc"), "before or after a dot"));
+  CHECK(has(make("-lab"), "at an end of a part"));
+  CHECK(has(make("lab-.pc"), "at an end of a part"));
+  const std::string label(63, 'a');
+  CHECK(has(make(label + 'a'), "longer than 63"));
+  const std::string longest = label + '.' + label + '.' + label + '.' + std::string(61, 'a');
+  CHECK(has(make(longest + 'a'), "longer than 253"));
+  CHECK(make(std::string(100'000, 'a')).size() < 200);
+  CHECK(!fs::exists(folder.path / "identity"));
+  for (const std::string& host : {longest, label, std::string("a"), std::string("lab_pc-3.example"),
+                                  std::string("::1"), std::string("3com.example")}) {
+    CHECK(make(host) == "not refused");
+    CHECK(load_tls_keys(folder.path / "identity").chain_pem.size() > 0);
+  }
+}
+
 TEST_CASE("tokens come from files that nobody else reads") {
   const TestFolder folder;
   const fs::path file = folder.path / "tokens";
@@ -131,6 +173,9 @@ TEST_CASE("tokens come from files that nobody else reads") {
     });
   };
   CHECK(has(add(), "--token-file"));
+  fs::create_directory(file);
+  CHECK(has(add(), "is a folder"));
+  fs::remove(file);
   write(file, "# who may look\n\n  \n");
   CHECK(has(add(), "no token"));
   write(file, "short\n");

@@ -89,6 +89,28 @@ TEST_CASE("a page needs a token, once; then a cookie that no script sees") {
   CHECK(head.ends_with("\r\n\r\n"));
 }
 
+TEST_CASE("who guesses waits, in the address and in the cookie") {
+  ServerSetup setup;
+  setup.wrong_token_ns = 150'000'000;
+  const TestBridge bridge(setup);
+  const std::string cookie =
+      "Cookie: kerf" + std::to_string(bridge.port()) + "=guess-0123456789\r\n";
+  const auto waits = [&](const std::string& target, const std::string& head) {
+    RawClient client(bridge.port());
+    const auto began = std::chrono::steady_clock::now();
+    CHECK(has(client.ask(target, head), "401 "));
+    return std::chrono::steady_clock::now() - began >= std::chrono::milliseconds(150);
+  };
+  CHECK(waits("/?token=guess-0123456789", ""));
+  CHECK(waits("/", cookie));
+  CHECK(waits("/bridge", cookie));
+  RawClient socket(bridge.port());
+  const auto began = std::chrono::steady_clock::now();
+  CHECK(has(socket.upgrade("/bridge", cookie), "101 "));
+  CHECK(std::chrono::steady_clock::now() - began >= std::chrono::milliseconds(150));
+  CHECK(code_of(socket) == static_cast<int>(CloseCode::no_token));
+}
+
 TEST_CASE("another method, another host and no HTTP are refused") {
   const TestBridge bridge;
   const auto ask = [&bridge](const std::string& head, const std::string& method = "GET") {
@@ -162,6 +184,23 @@ TEST_CASE("what a viewer may not say ends its connection and no other") {
                ++i) {
           }
         }) == 1009);
+  CHECK(good.follow([&, frames = good.far.frames] { return good.far.frames > frames + 5; }));
+}
+
+TEST_CASE("fragments without payload end a connection long before its silence does") {
+  const TestController controller;
+  ServerSetup setup;
+  setup.silence_ns = 3'600'000'000'000;
+  const TestBridge bridge(setup);
+  TestViewer good(bridge.port());
+  REQUIRE(good.until_whole());
+  TestViewer bad(bridge.port());
+  bad.client.send_frame(2, {}, false);
+  std::string fragment{'\0', static_cast<char>(0x80U)}, many;
+  fragment += std::string(4, 0);
+  for (int i = 0; i < 1000; ++i) many += fragment;
+  for (int i = 0; i < 350; ++i) bad.client.send_bytes(many);  // 2.1 MB
+  CHECK(code_of(bad.client) == static_cast<int>(CloseCode::not_understood));
   CHECK(good.follow([&, frames = good.far.frames] { return good.far.frames > frames + 5; }));
 }
 
@@ -262,7 +301,11 @@ TEST_CASE("a port that is taken and an address of nobody are told in one line") 
   setup.port = 0;
   setup.host = "192.0.2.1";
   CHECK(has(why(setup), "TLS only"));
+  setup.host = "0x7f.1";  // as a machine's own name that stands for loopback
+  CHECK(has(why(setup), "is 127.0.0.1, which no other machine reaches"));
   setup.tls = self_signed_keys({"localhost"});
+  CHECK(has(why(setup), "is 127.0.0.1, which no other machine reaches"));
+  setup.host = "192.0.2.1";
   CHECK(has(why(setup), "give an address of this machine"));
   setup.host = "no such host";
   CHECK(has(why(setup), "give an address of this machine"));

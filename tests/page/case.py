@@ -35,7 +35,7 @@ def figure(name):
 
 
 def text_of(selector):
-    return f"document.querySelector('{selector}')?.textContent ?? ''"
+    return f"(document.querySelector('{selector}')?.textContent ?? '')"
 
 
 class Case:

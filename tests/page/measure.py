@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the page costs in headless Chromium without a graphics card: first picture, bytes before the
-volume, pictures a second at 512x512 while the camera turns, of the default scene.
+volume, pictures a second at 512x512 while the camera turns and while the hand cuts, of the default scene.
 
     measure.py BIN-FOLDER REPOSITORY"""
 import os
@@ -10,16 +10,25 @@ import tempfile
 import time
 
 from browser import Page, find_chromium
-from rig import Rig
+from rig import HAND, Rig
 
 AT_REST = "document.getElementById('picture')?.dataset.state === 'at rest'"
 SECONDS = 8
-# A drag that the page itself makes, so that the pipe to the browser costs nothing; counts pictures.
-TURN = '''new Promise(done => {
+# Strokes over the tooth for a minute and a half, in place of one.
+STROKES = ''.join(f'[[step]]\nmove_mm = [{x}, -0.02, 0]\nseconds = 0.5\n' for x in 90 * (2.5, -2.5))
+CUT_TICK = 8000  # when the first strokes are done
+# The page itself counts pictures, and drags, so that the pipe to the browser costs nothing.
+COUNT = '''new Promise(done => {
   const canvas = document.getElementById('picture'), gl = canvas.getContext('webgl2');
   const fence = gl.fenceSync, times = [], began = performance.now();
   gl.fenceSync = (...all) => (times.push(performance.now()), fence.apply(gl, all));
-  const fire = (kind, x, y) => canvas.dispatchEvent(
+  const told = () => {
+    delete gl.fenceSync;
+    const gaps = times.slice(1).map((time, i) => time - times[i]).sort((a, b) => a - b);
+    done([1000 * gaps.length / (times.at(-1) - times[0]), gaps[Math.floor(0.95 * gaps.length)]]);
+  };
+'''
+TURN = COUNT + '''  const fire = (kind, x, y) => canvas.dispatchEvent(
     new PointerEvent(kind, {pointerId: 1, clientX: x, clientY: y, buttons: 1, bubbles: true}));
   canvas.setPointerCapture = () => {};
   fire('pointerdown', 250, 250);
@@ -29,11 +38,15 @@ TURN = '''new Promise(done => {
     if (performance.now() - began < SECONDS * 1000) return;
     clearInterval(timer);
     fire('pointerup', 250, 250);
-    delete gl.fenceSync;
-    const gaps = times.slice(1).map((time, i) => time - times[i]).sort((a, b) => a - b);
-    done([1000 * gaps.length / (times.at(-1) - times[0]), gaps[Math.floor(0.95 * gaps.length)]]);
+    told();
   }, 16);
 })'''.replace('SECONDS', str(SECONDS))
+CUT = COUNT + f'setTimeout(told, {SECONDS * 1000}); }})'
+
+
+def rate_of(page, expression):
+    return page.call('Runtime.evaluate', timeout=60, expression=expression, awaitPromise=True,
+                     returnByValue=True)['result']['value']
 
 
 def main():
@@ -55,9 +68,20 @@ def main():
             print(f'first picture after {first_s:.2f} s, {size} bytes before the volume')
             for renderer in ('iso', 'blend'):
                 page.until(AT_REST, 60)
-                rate, slow = page.call('Runtime.evaluate', timeout=60, expression=TURN, awaitPromise=True,
-                                       returnByValue=True)['result']['value']
+                rate, slow = rate_of(page, TURN)
                 print(f'{renderer}: {rate:.1f} pictures/s while it turns, 95 % within {slow:.0f} ms')
+                page.evaluate("document.querySelector('#renderer').focus()")
+                page.key('ArrowDown', code='ArrowDown')
+            rig.end('controller')
+            rig.end('emulator')
+            # The hand comes down as it does else, and stays where it cuts.
+            rig.write('hand.toml', HAND[:HAND.index('[[step]]\nmove_mm = [1.5,')] + STROKES)
+            rig.start_run()
+            page.go(address)
+            for renderer in ('iso', 'blend'):
+                page.until(f'Number(document.body.dataset.tick) > {CUT_TICK}', 60)
+                rate, slow = rate_of(page, CUT)
+                print(f'{renderer}: {rate:.1f} pictures/s while it cuts, 95 % within {slow:.0f} ms')
                 page.evaluate("document.querySelector('#renderer').focus()")
                 page.key('ArrowDown', code='ArrowDown')
             print('load', *(f'{load:.1f}' for load in os.getloadavg()))

@@ -14,6 +14,8 @@ from case import Case, figure, HEIGHT, LIKE, likeness, PANEL, text_of, WIDTH
 from looks import looks_as_asked_by_volume_iso_and_opacity
 from rig import Rig, TOKEN
 from secured import is_secured
+from troubles import (draws_small_until_it_knows_the_cost, says_why_there_is_no_picture, shows_whole_passes_only,
+                      tells_how_old_a_picture_is, uploads_few_boxes)
 
 
 def shows_what_the_visualizer_shows(case):
@@ -137,7 +139,7 @@ def tells_faults_and_ends(case):
 def is_small_and_breaks_no_rule(case):
     page = case.page
     page.go(case.address)
-    page.evaluate('1')
+    case.check(page.until('document.readyState === "complete"'), 'loaded')
     page.events.clear()
     page.go(case.address)
     case.check(page.until('document.body?.dataset.state === "live"'), 'loaded again')
@@ -184,8 +186,10 @@ def says_what_is_missing(case):
 
 
 CASES = [shows_what_the_visualizer_shows, is_turned_by_mouse_fingers_and_keys, is_reached_by_keyboard,
-         decodes_lz4_and_refuses_what_is_none, commands_where_allowed, is_small_and_breaks_no_rule,
-         tells_faults_and_ends, says_what_is_missing, looks_as_asked_by_volume_iso_and_opacity, is_secured]
+         decodes_lz4_and_refuses_what_is_none, shows_whole_passes_only, uploads_few_boxes,
+         draws_small_until_it_knows_the_cost, says_why_there_is_no_picture, commands_where_allowed,
+         is_small_and_breaks_no_rule, tells_how_old_a_picture_is, tells_faults_and_ends, says_what_is_missing,
+         looks_as_asked_by_volume_iso_and_opacity, is_secured]
 
 
 def main():

@@ -18,6 +18,17 @@ export function enableExtensions(gl) {
   }
 }
 
+/** Throws where what was asked of `gl` since the last time could not be done. It waits for the GPU. A
+ * lost context is told by its event. */
+export function requireNoError(gl) {
+  const error = gl.getError();
+  if (error === gl.NO_ERROR || gl.isContextLost()) return;
+  if (error === gl.OUT_OF_MEMORY) {
+    throw new Error('The graphics memory is full: close other pages or make this window smaller, and load it again');
+  }
+  throw new Error(`This browser's WebGL 2 refuses the picture (error ${error}); load the page again`);
+}
+
 /** A linked program of shaders.js. Uniforms are set by name; one that the linker removed is ignored. */
 export class Program {
   constructor(gl, name, defines = '') {

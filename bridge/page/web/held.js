@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What this page holds of a run: scene text and volumes, block by block with their versions.
+// What this page holds of a run: scene text and volumes, block by block with their versions. What is
+// shown changes from one pass to the next one, never to a part of it.
 import {kLastOfPass} from './constants.js';
 import {Volume} from './volume.js';
 
@@ -40,9 +41,12 @@ export class Held {
     this.sum = 0n;
     this.late = same?.late ?? false;  // something was cut away before it came here
     this.passes = 0;
+    this.shown = same?.shown ?? false;  // the volumes were whole once, so a picture may have them
+    this.waiting = [];                  // of a pass that has not ended: calls that apply a block
   }
 
-  /** Applies a frame. Throws where it is none of this run, or what is held is not what it says. */
+  /** Takes a frame; what it changes is applied with the last one of its pass. Throws where it is none
+   * of this run, or what is held is not what it says. */
   apply(frame) {
     const {session} = this.hello;
     if (frame.session !== session) throw new Error('frame: of another run');
@@ -52,9 +56,14 @@ export class Held {
       if (id >= this.count || version === 0n) throw new Error('frame: names no block');
       const plane = this.planes.findLast(one => one.first <= id);
       if (frame.payload.length - at < plane.bytes) throw new Error('frame: cut short');
-      plane.take(id - plane.first, frame.payload.subarray(at, at + plane.bytes));
+      const block = frame.payload.subarray(at, at + plane.bytes);
+      // A run's first pass fills what nobody shows yet.
+      if (this.shown) this.waiting.push(() => plane.take(id - plane.first, block));
+      else plane.take(id - plane.first, block);
+      if (this.waiting.length > this.count) throw new Error('frame: the pass never ends');
       at += plane.bytes;
       const old = this.versions[id];
+      if (version <= old) throw new Error('frame: a block is not newer than before');
       if (old) this.sum -= mixed(id, old ^ session);
       else --this.missing;
       if (!old && this.passes === 0 && version > 2n) this.late = true;
@@ -63,7 +72,12 @@ export class Held {
     }
     if (at !== frame.payload.length) throw new Error('frame: too long');
     if (this.sum !== frame.setHash) throw new Error('frame: what is held here is not what was sent');
-    if (frame.flags & kLastOfPass) ++this.passes;
+    if (!(frame.flags & kLastOfPass)) return;
+    if (!this.complete) throw new Error('frame: the pass ends with blocks missing');
+    for (const apply of this.waiting) apply();
+    this.waiting = [];
+    this.shown = true;
+    ++this.passes;
   }
 
   get complete() {

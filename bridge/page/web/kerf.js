@@ -5,7 +5,7 @@ import {handOf} from './hand.js';
 import {listen} from './input.js';
 import {Link} from './link.js';
 import {LookControls} from './look.js';
-import {bannerOf, Plot, showBanner, showFigures} from './panel.js';
+import {bannerOf, isStale, Plot, showBanner, showFigures} from './panel.js';
 import {materialOf, sceneView} from './scene.js';
 import {Stage} from './stage.js';
 import {recordAt} from './wire.js';
@@ -17,12 +17,14 @@ const kWanted = new Set(['tick', 'start_ns', 'flags', 'position_mm', 'orientatio
 const element = id => document.getElementById(id);
 
 const plot = new Plot(element('plot'));
-const now = {record: null, frame: null, ended: false, newRun: 0, earlier: null, takenNs: null, lost: false};
+const now = {record: null, frame: null, ended: false, newRun: 0, earlier: null, takenNs: null, lost: false,
+  beatMs: 0};  // the servo's last sign of life, by performance.now()
 let stage = null, scene = null, held = null;
 
 function missing(text) {
   element('missing').hidden = text === '';
   element('missing').textContent = text;
+  element('picture').classList.toggle('gone', text !== '');
 }
 const link = new Link({
   state(text, trouble) {
@@ -45,13 +47,15 @@ const link = new Link({
   },
   frame(news, frame) {
     now.frame = frame;
+    const beatNs = frame.heartbeatNs > 0n ? frame.heartbeatNs : frame.takenNs;
+    now.beatMs = performance.now() - Math.max(link.clock.ageMs(beatNs), 0);
     now.ended = (frame.flags & kRunEnded) !== 0;
-    if (!(frame.flags & kLastOfPass) || !held.complete) return;
+    if (!(frame.flags & kLastOfPass)) return;
     if (!scene) begin();
     now.takenNs = frame.takenNs;
     now.lost = false;
     document.body.dataset.tick = frame.tick;
-    this.state(now.ended ? 'ended' : 'live', false);
+    this.state(now.ended ? 'ended' : isStale(frame) ? 'stale' : 'live', false);
   },
   records(message) {
     if (message.record !== 'TickRecord') return;
@@ -111,12 +115,13 @@ function showNews() {
   figuresBefore = at;
   const {record, earlier} = now;
   const span = record && earlier ? Number(record.start_ns - earlier[0].start_ns) : 0;
+  const news = !now.ended && !now.lost && !isStale(now.frame);
   showFigures({record, picturesHz, late: held?.late ?? false,
     tool: record && scene?.tools[record.active_tool]?.name,
     removed: scene ? removedByMaterial() : [],
-    servoHz: span > 0 && !now.ended ? 1e9 * Number(record.tick - earlier[0].tick) / span : null,
-    ageMs: now.takenNs && !now.ended && !now.lost ? Math.max(link.clock.ageMs(now.takenNs), 0) : null});
-  showBanner(bannerOf(now));
+    servoHz: span > 0 && news ? 1e9 * Number(record.tick - earlier[0].tick) / span : null,
+    ageMs: now.takenNs && news ? Math.max(link.clock.ageMs(now.takenNs), 0) : null});
+  showBanner(bannerOf(now, at - now.beatMs));
   plot.draw();
   if (record && document.activeElement !== element('tool')) element('tool').value = record.active_tool;
 }

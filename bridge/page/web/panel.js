@@ -7,16 +7,28 @@ import {length} from './math.js';
 const kNewRunMs = 4000;
 const element = id => document.getElementById(id);
 
-/** What is to be said large over the picture: {text, alarm}; null where there is nothing. */
-export function bannerOf({record, frame, ended, newRun, lost}) {
-  if (lost && frame && !ended) return {text: 'No connection to the bridge: this is its last picture.', alarm: true};
+/** A time as a person says it. */
+export function spanText(ms) {
+  const s = Math.floor(ms / 1000);
+  if (s < 120) return `${s} s`;
+  return s < 7200 ? `${Math.floor(s / 60)} min` : `${Math.floor(s / 3600)} h`;
+}
+
+/** Whether the servo was silent when the bridge looked last. */
+export const isStale = frame => frame !== null && frame.heartbeatNs > 0n &&
+  Number(frame.takenNs - frame.heartbeatNs) / 1e6 > kStaleMs;
+
+/** What is to be said large over the picture: {text, old, alarm}; null where there is nothing. `old`: by
+ * how much the picture is, from `silentMs` since the servo's last sign of life. */
+export function bannerOf({record, frame, ended, newRun, lost}, silentMs) {
+  const old = ` This picture is ${spanText(silentMs)} old.`;
+  if (lost && frame && !ended) return {text: 'No news from the bridge.', old, alarm: true};
   if (ended) {
     return frame.lifecycle === Lifecycle.clean_end ?
       {text: 'The controller has ended: this is the final state.', alarm: false} :
-      {text: 'The controller is gone: this is its last state.', alarm: true};
+      {text: 'The controller is gone: this is its last state.', old, alarm: true};
   }
-  const silentMs = frame && frame.heartbeatNs > 0n ? Number(frame.takenNs - frame.heartbeatNs) / 1e6 : 0;
-  if (silentMs > kStaleMs) return {text: 'Stale: no news from the servo.', alarm: true};
+  if (isStale(frame)) return {text: 'Stale: no news from the servo.', old, alarm: true};
   if (record && record.flags & kFlagDeviceFault) {
     const [name, meaning] = kFaults[record.fault] ?? ['unknown', ''];
     return {text: `Fault ${name}: ${meaning}; ${kPhases[5][1]}.`, alarm: true};
@@ -34,7 +46,9 @@ export function bannerOf({record, frame, ended, newRun, lost}) {
 export function showBanner(banner) {
   const to = element('banner');
   to.hidden = !banner;
-  if (banner && to.textContent !== banner.text) to.textContent = banner.text;
+  // Only a new text is read out, not each second of its age.
+  if (banner && to.firstChild.textContent !== banner.text) to.firstChild.textContent = banner.text;
+  to.lastChild.textContent = banner?.old ?? '';
   to.classList.toggle('alarm', banner?.alarm ?? false);
 }
 

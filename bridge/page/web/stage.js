@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // When and how finely pictures are drawn: only what changed, one at a time, coarser while things
-// move where the machine would fall below ten pictures a second.
+// move where the machine would fall below ten pictures a second. What a pixel costs is learned by
+// small pictures first.
 import {eyeViews, OrbitCamera} from './camera.js';
 import {kToolRoom} from './constants.js';
-import {contextOf, enableExtensions} from './gl.js';
+import {contextOf, enableExtensions, requireNoError} from './gl.js';
 import {sameHand} from './hand.js';
 import {mix} from './math.js';
 import {Painter} from './painter.js';
@@ -14,6 +15,9 @@ const kRestMs = 250;       // without motion: the picture is drawn finely again
 const kScales = [1, 1 / 2, 1 / 3, 1 / 4, 1 / 6, 1 / 8];
 const kMostPixels = 4096;  // of a side
 const kTaught = 10000;     // pixels of a picture whose time is that of its pixels
+const kUntaught = 2;       // pictures before that is known; they are small
+const kRoom = 1.3;
+const kNews = 0.4;         // share of the last picture in what is known of its cost
 
 export class Stage {
   /** `trouble(text)` says why there is no picture; '' where there is one again. Throws as contextOf. */
@@ -23,22 +27,22 @@ export class Stage {
     this.camera = new OrbitCamera();
     this.look = {kinds: [], iso: null, opacities: {}, clip: {on: false, axis: 2, at: 0.5}, stereo: false};
     this.scale = 1;
-    this.costMs = 0;  // of a pixel of volumes
-    this.share = 0;   // of a picture that is drawn again where the camera rests
-    this.untaught = 0;
+    this.costMs = 0;    // of a pixel, where all are drawn anew
+    this.besideMs = 0;  // of a pixel of pictures of which a part is drawn anew, beside that part
+    this.untaught = 0;  // pictures until it is known
     this.shown = 0;   // pictures
     this.moved = this.changed = -Infinity;
     this.stale = true;
     canvas.addEventListener('webglcontextlost', event => {
       event.preventDefault();
-      this.painter = null;
-      trouble('The graphics card took the picture away; waiting for it.');
+      this.fail('The graphics card took the picture away, as it does when its memory is full; waiting for it.');
     });
     canvas.addEventListener('webglcontextrestored', () => {
       this.fence = null;
-      trouble('');
-      enableExtensions(this.gl);
-      if (this.scene) this.rebuild();
+      this.attempt(() => {
+        enableExtensions(this.gl);
+        if (this.scene) this.rebuild();
+      });
     });
     new ResizeObserver(() => this.stale = true).observe(canvas);
     requestAnimationFrame(() => this.tick());
@@ -67,11 +71,23 @@ export class Stage {
     this.painter?.free();
     this.painter = null;
     this.stale = true;
-    this.untaught = 2;
-    try {
+    this.untaught = kUntaught;
+    this.attempt(() => {
       this.painter = new Painter(this.gl, sceneIn(this.scene, this.look), v => this.kindOf(v));
+      this.trouble('');
+    });
+  }
+  /** Says why there is no picture from now on: an old one would be taken for this one. */
+  fail(why) {
+    this.painter?.free();
+    this.painter = null;
+    this.trouble(why);
+  }
+  attempt(what) {
+    try {
+      what();
     } catch (problem) {
-      this.trouble(`${problem.message}.`);
+      this.fail(`${problem.message}.`);
     }
   }
   /** In the document, for who waits for the finished picture. */
@@ -83,7 +99,6 @@ export class Stage {
     const before = this.look;
     this.look = {...before, ...change};
     if (this.scene && (String(this.look.kinds) !== String(before.kinds) || this.look.iso !== before.iso)) {
-      this.trouble('');
       this.rebuild();
     } else if (this.look.opacities !== before.opacities) {
       this.painter?.setMaterials(sceneIn(this.scene, this.look).materials);
@@ -112,7 +127,11 @@ export class Stage {
 
   tick() {
     requestAnimationFrame(() => this.tick());
-    if (!this.isFree() || !this.painter || this.canvas.clientWidth < 2) return;
+    if (this.isFree() && this.painter && this.canvas.clientWidth >= 2) this.attempt(() => this.drawNews());
+  }
+
+  /** A picture, where something is not as in the last one. */
+  drawNews() {
     const {canvas, gl} = this;
     const now = performance.now();
     const ratio = Math.min(window.devicePixelRatio || 1, 2);
@@ -125,10 +144,13 @@ export class Stage {
     const boxes = this.painter.take();
     const moves = !sameHand(this.hand, this.drawn);
     if (moves || boxes.length > 0) this.changed = now;
+    const hand = this.hand ?? null;
     const eyes = this.look.stereo ? 2 : 1;
     const wide = Math.floor(width / eyes);
+    const views = this.views(wide, height);
     const before = this.scale;
-    this.chooseScale(eyes * wide * height, now);
+    this.chooseScale(eyes * wide * height, now, () => views.reduce((sum, view) =>
+      sum + this.painter.partsOf(view, hand, this.drawn, this.stale ? null : boxes, wide, height).pixels, 0));
     if (!this.stale && !moves && this.scale === before && boxes.length === 0) {
       if (now - Math.max(this.moved, this.changed) > kRestMs) this.tell('at rest');
       return;
@@ -136,16 +158,15 @@ export class Stage {
     this.tell('moving');
     const size = [wide, height].map(n => Math.max(Math.round(n * this.scale), 1));
     const all = this.painter.fit(eyes, ...size) || this.stale;
-    const hand = this.hand ?? null;
     const began = performance.now();
     let pixels = 0;
-    this.views(wide, height).forEach((view, i) => {
+    views.forEach((view, i) => {
       pixels += this.painter.draw(i, view, hand, this.drawn, all ? null : boxes);
     });
     this.painter.show(width, height);
-    const share = pixels / (eyes * size[0] * size[1]);
-    if (!all) this.share = mix(this.share, share, 0.1);
-    this.fence = {sync: gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0), began, pixels};
+    if (this.untaught === kUntaught) requireNoError(gl);  // the volumes are there now
+    this.fence = {sync: gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0), began, pixels, all,
+      ofAll: eyes * size[0] * size[1], painter: this.painter};
     gl.flush();
     this.drawn = hand;
     this.stale = false;
@@ -160,29 +181,34 @@ export class Stage {
     if (gl.clientWaitSync(fence.sync, 0, 0) === gl.TIMEOUT_EXPIRED) return false;
     gl.deleteSync(fence.sync);
     this.fence = null;
+    if (fence.painter !== this.painter) return true;
     const tookMs = performance.now() - fence.began;
-    // The first pictures of a painter pay for its shaders.
-    if (this.untaught > 0) --this.untaught;
-    else if (fence.pixels > 0) {
-      const cost = tookMs / fence.pixels;  // of few pixels: at most
-      if (this.costMs === 0) this.costMs = cost;
-      else if (fence.pixels >= kTaught || cost < this.costMs) this.costMs = mix(this.costMs, cost, 0.4);
+    const cost = tookMs / fence.ofAll;
+    if (this.untaught > 0) {
+      // The first picture of a painter pays for its shaders, the next one tells what pictures cost.
+      --this.untaught;
+      Object.assign(this, {costMs: cost, besideMs: 0, stale: true});
+    } else if (!fence.all) {
+      this.besideMs = mix(this.besideMs, Math.max(cost - this.costMs * fence.pixels / fence.ofAll, 0), kNews);
+    } else if (fence.ofAll >= kTaught || cost < this.costMs) {  // of few pixels: at most
+      this.costMs = mix(this.costMs, cost, kNews);
     }
     return true;
   }
 
-  /** The finest scale at which pictures stay within the budget: whole ones while the camera moves,
-   * else the share of them that tool and cuts change. At rest all of it, whatever it costs. */
-  chooseScale(pixels, now) {
-    const turns = this.stale || now - this.moved < kRestMs;
-    if (!turns && now - this.changed > kRestMs) {
+  /** The finest scale at which the next picture stays within the budget. At the scale of the last one
+   * only `changed()` of its pixels are cast, at another one all. At rest the finest, whatever it costs. */
+  chooseScale(pixels, now, changed) {
+    if (this.untaught > 0) {
+      this.scale = kScales.at(-1);
+    } else if (now - Math.max(this.moved, this.changed) > kRestMs) {
       this.scale = 1;
-      return;
+    } else {
+      const ofPart = () => this.costMs * changed() + this.besideMs * pixels;
+      const fits = (scale, room) => scale * scale * room *
+        (scale === this.scale && !this.stale ? ofPart() : this.costMs * pixels) <= kBudgetMs;
+      // Finer again only with room to spare, so that it does not go to and fro.
+      this.scale = kScales.find(scale => fits(scale, scale > this.scale ? kRoom : 1)) ?? kScales.at(-1);
     }
-    const cost = this.costMs * pixels * (turns ? 1 : this.share);
-    const fits = scale => cost * scale * scale <= kBudgetMs;
-    const best = kScales.find(fits) ?? kScales.at(-1);
-    // Finer again only with room to spare, so that it does not go to and fro.
-    if (best < this.scale || cost * best * best * 1.3 <= kBudgetMs) this.scale = best;
   }
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Volumes on the GPU: uploaded by changed bricks, whole layers of them where most of one changed.
+// Volumes on the GPU: uploaded by boxes of changed bricks.
 import {bind, texture} from './gl.js';
 import {Macrocells} from './cells.js';
 import {gradientTexels, MaterialTexels, transferFunction} from './matter.js';
@@ -45,15 +45,27 @@ class VoxelTexture {
   }
 }
 
-/** Boxes that hold these bricks: a layer of the volume where a third of it changed, else bricks. */
-function boxesOf(volume, bricks) {
-  const [gx, gy, gz] = volume.grid;
-  const layers = Array.from({length: gz}, () => []);
-  for (const id of bricks) layers[Math.floor(id / gx / gy)].push(id);
-  return layers.flatMap((ids, z) => {
-    if (3 * ids.length < gx * gy) return ids.map(id => volume.brick(id));
-    return [{low: [0, 0, 8 * z], high: [volume.size[0], volume.size[1], Math.min(8 * z + 8, volume.size[2])]}];
-  });
+/** Boxes of voxels that hold these bricks, no larger than a layer of the volume, and a third of each
+ * box or more changed: a call for each brick costs more than its voxels do. */
+export function boxesOf(volume, bricks) {
+  const [gx, gy] = volume.grid;
+  const boxes = [];
+  const add = cells => {
+    const low = [0, 1, 2].map(axis => cells.reduce((least, cell) => Math.min(least, cell[axis]), Infinity));
+    const high = [0, 1, 2].map(axis => cells.reduce((most, cell) => Math.max(most, cell[axis] + 1), 0));
+    const size = high.map((n, axis) => n - low[axis]);
+    const all = size[0] * size[1] * size[2];
+    if (3 * cells.length >= all && all <= gx * gy) {
+      boxes.push({low: low.map(n => 8 * n), high: high.map((n, axis) => Math.min(8 * n, volume.size[axis]))});
+      return;
+    }
+    const axis = size.indexOf(Math.max(...size));
+    const middle = low[axis] + (size[axis] >> 1);
+    add(cells.filter(cell => cell[axis] < middle));
+    add(cells.filter(cell => cell[axis] >= middle));
+  };
+  if (bricks.length > 0) add(bricks.map(id => [id % gx, Math.floor(id / gx) % gy, Math.floor(id / gx / gy)]));
+  return boxes;
 }
 
 /** Active cells of a volume as a texture, and the faces around them. */

@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: Apache-2.0
+// Volumes cast ray by ray: where rays enter them, surfaces, and looks inside, as the renderers of
+// visualizer/render.
+import {clipFromEye} from './camera.js';
+import {kBlendStepVox, kIsoStepVox} from './constants.js';
+import {viewUniforms} from './eye.js';
+import {bind, cover, Program} from './gl.js';
+import {leastExtinction} from './matter.js';
+import {affineInverse, multiply} from './math.js';
+
+export const kUnitsPerVolume = 3;  // texture units of a volume that is looked into
+
+/** Per pixel, where its ray first meets an active cell. */
+export class Entries {
+  constructor(gl) {
+    this.gl = gl;
+    this.faces = new Program(gl, 'cell_faces');
+  }
+  draw(eye, layer, volume, view, part) {
+    const {gl} = this;
+    eye.entries.bind(part);
+    gl.framebufferTextureLayer(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, eye.entry, 0, layer);
+    gl.drawBuffers([gl.COLOR_ATTACHMENT0]);
+    gl.enable(gl.DEPTH_TEST);
+    gl.depthFunc(gl.LESS);
+    gl.disable(gl.CULL_FACE);
+    gl.disable(gl.BLEND);
+    gl.clearBufferfv(gl.COLOR, 0, [view.far, 0, 0, 0]);
+    gl.clearBufferfv(gl.DEPTH, 0, [1]);
+    this.faces.use();
+    this.faces.set({u_near_mm: view.near, u_clip_from_cell: multiply(clipFromEye(view),
+      multiply(view.eyeFromWorld, volume.cells.worldFromCell))});
+    volume.cells.drawFaces();
+  }
+  free() {
+    this.faces.free();
+  }
+}
+
+/** The surface of one volume, into the opaque layer. */
+export class IsoCaster {
+  constructor(gl) {
+    this.gl = gl;
+    this.iso = new Program(gl, 'iso');
+    this.iso.use();
+    this.iso.setInts({u_density: 0, u_label: 1, u_active_cell: 2, u_entry_mm: 4, u_palette: 5});
+    this.iso.set({u_step_vox: kIsoStepVox});
+  }
+  draw(eye, volume, view, part, palette) {
+    const {gl} = this;
+    eye.opaque.bind(part);
+    volume.bind();
+    bind(gl, 4, gl.TEXTURE_2D_ARRAY, eye.entry);
+    bind(gl, 5, gl.TEXTURE_2D, palette);
+    this.iso.use();
+    this.iso.set({...viewUniforms(view), u_iso: volume.view.iso / 65535, u_texels: volume.texels,
+      u_texture_from_eye: affineInverse(multiply(view.eyeFromWorld, volume.worldFromTexture))});
+    this.iso.setInts({u_has_labels: volume.volume.labels ? 1 : 0});
+    cover(gl);
+  }
+  free() {
+    this.iso.free();
+  }
+}
+
+/** What is seen inside of all volumes together, over what stands before it. */
+export class BlendCaster {
+  constructor(gl, volumes) {
+    Object.assign(this, {gl, volumes});
+    const each = volumes.map((_, v) => `f(${v})`).join(' ');
+    const labelled = volumes.map(({volume}) => volume.labels !== null).join(', ');
+    this.cast = new Program(gl, 'blend', `#define KERF_VOLUMES ${volumes.length}\n` +
+      `#define KERF_EACH_VOLUME(f) ${each}\n#define KERF_HAS_LABELS bool[](${labelled})\n`);
+    this.layer = new Program(gl, 'layer');
+    this.layer.use();
+    this.layer.setInts({u_colour: 0, u_depth: 1});
+    this.unit = kUnitsPerVolume * volumes.length;
+    const edge = Math.min(...volumes.map(({view}) => view.edge));
+    this.cast.use();
+    this.cast.setInts({u_by_density: this.unit, u_entry_mm: this.unit + 1, u_opaque_depth: this.unit + 2});
+    this.cast.set({u_least_extinction: leastExtinction, u_step_mm: kBlendStepVox * edge});
+    volumes.forEach((volume, v) => {
+      const first = kUnitsPerVolume * v;
+      this.cast.setInts({[`u_voxel[${v}]`]: first, [`u_material[${v}]`]: first + 1,
+        [`u_active_cell[${v}]`]: first + 2});
+      this.cast.set({[`u_texels[${v}]`]: volume.texels, [`u_edge_mm[${v}]`]: volume.view.edge,
+        [`u_fade[${v}]`]: [volume.transfer.empty, volume.transfer.full]});
+    });
+  }
+  /** After the entries of each volume, into the stage. */
+  draw(eye, view, part, byDensity) {
+    const {gl, unit} = this;
+    eye.gathered.bind(part);
+    gl.clearBufferfv(gl.COLOR, 0, [0, 0, 0, 0]);
+    gl.clearBufferfv(gl.COLOR, 1, [1, 0, 0, 0]);
+    gl.disable(gl.DEPTH_TEST);
+    this.cast.use();
+    this.volumes.forEach((volume, v) => {
+      volume.bind(kUnitsPerVolume * v);
+      const textureFromEye = affineInverse(multiply(view.eyeFromWorld, volume.worldFromTexture));
+      // A gradient per voxel edge goes to the eye's millimetres by the transposed Jacobian.
+      const turned = [0, 1, 2].flatMap(c => [0, 1, 2].map(r => textureFromEye[4 * r + c] * volume.texels[c]));
+      this.cast.set({[`u_texture_from_eye[${v}]`]: textureFromEye, [`u_eye_from_gradient[${v}]`]: turned});
+    });
+    bind(gl, unit, gl.TEXTURE_2D, byDensity);
+    bind(gl, unit + 1, gl.TEXTURE_2D_ARRAY, eye.entry);
+    bind(gl, unit + 2, gl.TEXTURE_2D, eye.stage.depth);
+    this.cast.set(viewUniforms(view));
+    cover(gl);
+    bind(gl, unit + 2, gl.TEXTURE_2D, null);  // it is drawn into below
+    eye.stage.bind(part);
+    gl.enable(gl.DEPTH_TEST);
+    gl.depthFunc(gl.LESS);
+    gl.enable(gl.BLEND);
+    gl.blendFuncSeparate(gl.ONE, gl.ONE_MINUS_SRC_ALPHA, gl.ZERO, gl.ONE);
+    bind(gl, 0, gl.TEXTURE_2D, eye.gathered.colours[0]);
+    bind(gl, 1, gl.TEXTURE_2D, eye.gathered.colours[1]);
+    this.layer.use();
+    cover(gl);
+    gl.disable(gl.BLEND);
+  }
+  free() {
+    this.cast.free();
+    this.layer.free();
+  }
+}
