@@ -32,6 +32,7 @@ NOT_HERE = {
         "./kerf bridge serve", "./kerf bridge join", "scp "],
     "runs in the test own_law": ["own-law.md: "],
     "runs in the tests packages and reader": ["./kerf package", "packages.md: cmake", "pip install ./python"],
+    "runs in the test examples_scenes, which brings its CT": ["./kerf demo --scene scenes/spine/"],
     "runs in the test docs_tutorial": ["tutorial.md: "],
     "needs a registry of images": ["podman "],
     "runs all tests, or many minutes": [
