@@ -107,6 +107,7 @@ TEST_CASE("at rest nothing is heard, at once or after a cut") {
 }
 
 TEST_CASE("a step of what the tool does is no click: no sample jumps further than the tones do") {
+  constexpr double kGlideS = 0.01;  // as promised
   // So low that a wave moves by little from sample to sample, and a click by ten times as much.
   const ToolSound loud{.turns_per_s = 100, .load = 1};
   const auto samples = steady(loud);
@@ -114,8 +115,7 @@ TEST_CASE("a step of what the tool does is no click: no sample jumps further tha
   for (const double hz : {100.0, 100.0 * SpindleVoice::kBlades}) {
     const double loudest = amplitude(samples, hz);
     REQUIRE(loudest > 0.001);
-    most += loudest *
-            (2 * std::sin(std::numbers::pi * hz / kRate) + 1 / (kRate * SpindleVoice::kGlideS));
+    most += loudest * (2 * std::sin(std::numbers::pi * hz / kRate) + 1 / (kRate * kGlideS));
   }
   SpindleVoice voice;
   std::vector<float> stepped;
