@@ -69,7 +69,7 @@ install(PROGRAMS kerf DESTINATION ${share})
 install(PROGRAMS .ci/doctor.sh DESTINATION ${share}/.ci)
 install(CODE "file(CREATE_LINK ../${share}/kerf
   \"\$ENV{DESTDIR}\${CMAKE_INSTALL_PREFIX}/${CMAKE_INSTALL_BINDIR}/kerf\" SYMBOLIC)")
-install(DIRECTORY scenes DESTINATION ${share})
+install(DIRECTORY scenes DESTINATION ${share} PATTERN "ct.*" EXCLUDE)  # who has a CT keeps it
 install(DIRECTORY hil/faults DESTINATION ${share}/hil)
 install(DIRECTORY docs/ DESTINATION ${CMAKE_INSTALL_DOCDIR})
 install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR} RENAME copyright)

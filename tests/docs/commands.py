@@ -15,23 +15,11 @@ import subprocess
 import sys
 import tempfile
 
+import pages
+
 root, bin_folder, what = pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[2]), sys.argv[3]
 environment = dict(os.environ, KERF_BIN=str(bin_folder))
 environment.pop("DISPLAY", None)
-
-
-def shell_lines(page):
-    """(line number, words) of each indented line of a page that runs something of kerf's."""
-    lines = page.read_text(encoding="utf-8").splitlines()
-    joined = ""
-    for number, line in enumerate(lines, 1):
-        if not joined and not line.startswith("    "):
-            continue
-        joined += line.strip().removesuffix("\\")
-        if line.endswith("\\"):
-            continue
-        yield number, joined
-        joined = ""
 
 
 @functools.cache
@@ -54,9 +42,9 @@ def known_options(words):
 
 def check():
     wrong, checked = [], 0
-    for page in [root / "README.md", *sorted((root / "docs").glob("*.md"))]:
-        for number, line in shell_lines(page):
-            for part in re.split(r"\s(?:\||&&|;|&)\s", re.sub(r"\s#.*", "", line)):
+    for page in pages.all_pages(root):
+        for number, line, _ in pages.commands(page):
+            for part in re.split(r"\s(?:\||&&|;|&)\s", line):
                 match = re.search(r"(?:^|\s)\./kerf\s+(.*)", part)
                 if not match:
                     continue
@@ -78,7 +66,7 @@ def tutorial():
     with tempfile.TemporaryDirectory() as scratch:
         for name in ("kerf", "scenes", "examples"):
             os.symlink(root / name, pathlib.Path(scratch) / name)
-        for number, line in shell_lines(page):
+        for number, line, _ in pages.commands(page):
             if "python3" in line and not importlib.util.find_spec("matplotlib"):
                 print(f"skipped, no matplotlib: {line}")
                 continue

@@ -25,6 +25,7 @@ inline constexpr auto kKeys = std::to_array<KeyHelp>({
     {"p", "plot of force and depth"},
     {"s", "screenshot"},
     {"m", "movie: begin, end"},
+    {"a", "sound: off, on"},
     {"w", "write the opacities"},
     {"e", "export the surface"},
     {"h", "these keys; again: no panels; again: panels"},
@@ -46,6 +47,7 @@ inline constexpr auto kHandKeys = std::to_array<KeyHelp>({
     {"middle drag", "move the picture"},
     {"control + wheel", "zoom"},
     {"gamepad", "left stick: move; right: depth; A: press; cross: tilt"},
+    {"SpaceMouse", "the cap moves and tilts; its first button presses"},
 });
 
 }  // namespace kerf

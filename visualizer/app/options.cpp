@@ -75,6 +75,7 @@ void declare_run(Arguments& app, VisualizerOptions& o) {
              "the pointer, keys or a gamepad lead the hand of a kerf-emulator that has this "
              "--hand-socket; in a window")
       .shown_as("PATH");
+  app.flag("--mute", o.mute, "no sound in the window, until a is pressed");
   app.option("--attached", o.attached,
              "make this empty file once the controller is shown: a short run may begin")
       .shown_as("FILE");

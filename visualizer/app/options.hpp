@@ -24,6 +24,7 @@ struct VisualizerOptions {
   std::optional<double> seconds;             ///< ends after this time; default: with the controller
   double wait_s = 10.0;                      ///< for the controller to appear
   std::optional<std::filesystem::path> attached;  ///< --attached: made once it is shown
+  bool mute = false;                              ///< no sound until the user asks for it
   std::optional<std::string> hand_socket;         ///< where an emulator's hand is to be led
   std::optional<std::string> lead;                ///< headless: FIFO of a controller in lock-step
   std::optional<std::string> record;              ///< video: a file, a pipe, or "-" for stdout

@@ -75,7 +75,10 @@ WindowRun::WindowRun(const VisualizerOptions& options, Session first, const GlCo
               .attach_ms = first.attach_ms()},
       aspect_(static_cast<double>(options.size.width) / options.size.height),
       followed_(options, std::move(first), aspect_) {
-  if (options.hand_socket) hand_link_.emplace(*options.hand_socket);
+  if (options.hand_socket) {
+    hand_link_.emplace(*options.hand_socket);
+    space_mouse_.emplace();
+  }
   if (options.attached) write_new_file(*options.attached, "");
 }
 
@@ -141,12 +144,13 @@ void WindowRun::lead_hand(const WindowInput& input, bool over_panel, OverlayFigu
   const double frame_s = std::chrono::duration<double>(now - last_led_).count();
   last_led_ = now;
   if (std::exchange(keys_.come, false)) hand_.come();
+  WindowInput seen = input;
+  if (const auto news = space_mouse_->step(seen.held)) notices_.say({*news, true}, now);
   const auto held = session().latest() ? hand_of(*session().latest()) : std::nullopt;
   if (!held || !hand_link_->leads()) return;
   const SceneView& scene = session().scene();
   const View view = picture().middle_view(size);
   const PictureSize eye = picture().eye_size(size);
-  WindowInput seen = input;
   const bool in_second = seen.pointer.x >= eye.width;
   if (in_second) seen.pointer.x -= eye.width;
   if (std::exchange(in_second_eye_, in_second) != in_second) hand_.come();  // a jump is no motion

@@ -19,6 +19,7 @@
 #include "visualizer/gl/context.hpp"
 #include "visualizer/gl/target.hpp"
 #include "visualizer/gl/window.hpp"
+#include "visualizer/space_mouse/space_mouse.hpp"
 #include "visualizer/view/frame_report.hpp"
 #include "visualizer/view/session.hpp"
 
@@ -74,6 +75,9 @@ class WindowRun {
   /// is seen.
   Frame step(const WindowInput& input, PictureSize size, Clock::time_point now);
 
+  /// Tells the user, in the picture and on the terminal.
+  void say(const Notice& notice, Clock::time_point now) { notices_.say(notice, now); }
+
   /// Completes and writes the report; returns the exit code.
   [[nodiscard]] int end();
 
@@ -104,6 +108,7 @@ class WindowRun {
   ForcePlot plot_;
   std::optional<Film> film_;
   std::optional<HandLink> hand_link_;
+  std::optional<SpaceMouse> space_mouse_;
   PointerHand hand_;
   Clock::time_point last_led_{};
   glm::dvec3 last_tool_mm_{0.0};

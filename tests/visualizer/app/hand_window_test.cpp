@@ -56,6 +56,7 @@ struct Bench {
     return {kPrograms + "/kerf-visualizer",
             "--name",
             "test",
+            "--mute",
             "--size",
             "480x360",
             "--hand-socket",

@@ -27,6 +27,7 @@ TEST_CASE("before a hand that is still most frames of a window draw nothing") {
   Controller controller;
   VisualizerOptions options;
   options.name = "test";
+  options.mute = true;
   options.size = {160, 120};
   options.seconds = 2.0;
   options.report = screen.folder / "report.json";
@@ -53,6 +54,7 @@ TEST_CASE("a window whose GL context is lost ends with one line") {
   const Controller controller;
   VisualizerOptions options;
   options.name = "test";
+  options.mute = true;
   options.seconds = 100.0;
   // No test can reset a graphics card: the driver's answer is put in its place.
   const auto driver = glGetGraphicsResetStatus;
@@ -70,7 +72,8 @@ TEST_CASE("when the X server dies the window ends with one line, and the control
     CAPTURE(signal);
     Screen screen;
     Controller controller;
-    Process window({KERF_TEST_BIN "/kerf-visualizer", "--name", "test"}, screen.folder / "said");
+    Process window({KERF_TEST_BIN "/kerf-visualizer", "--name", "test", "--mute"},
+                   screen.folder / "said");
     act("search --sync --onlyvisible --name 'kerf: test'");
     screen.end(signal);
     CHECK(window.wait() == 2);

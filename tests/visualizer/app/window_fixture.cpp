@@ -188,6 +188,7 @@ User::User(const fs::path& folder, int blocks)
     : out_(folder / "out"), report_(folder / "report.json"), controller_(blocks) {
   VisualizerOptions options;
   options.name = "test";
+  options.mute = true;
   options.size = {480, 360};
   options.out = out_;
   options.report = report_;

@@ -1,0 +1,130 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Runs the commands that a page prints:  run.py ROOT BIN README.md|docs        this page, or all of docs/
+
+Each page has a scratch folder like a clone's, in which its commands run one after the other; a tooth.nrrd and a ct/ of
+a user's own are there. A demo runs for one second in lock-step, so that no figure of this machine counts; all
+else runs as it stands. What cannot run in a test stands in NOT_HERE, each with its reason."""
+import os
+import pathlib
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+
+import pages
+
+sys.path.insert(0, str(pathlib.Path(__file__).parent.parent / "errors"))
+import dicom
+
+# Reason, and the beginnings of the commands that it keeps from running, with their page where that matters.
+NOT_HERE = {
+    "changes the system, as root": ["sudo ", "echo '@plugdev"],
+    "needs a display": ["./kerf demo --hand mouse", "./kerf visualizer"],
+    "needs a device, or its kernel": [
+        "cat /sys/kernel/realtime", "./kerf controller --probe",
+        "./kerf controller --scene mine.toml --device omni --port fw"],
+    "records or exports the run of a device": ["./kerf recorder", "./kerf record export weights"],
+    "needs a second terminal or machine": [
+        "./kerf emulator", "./kerf controller --scene scenes/touch.toml --torque-scale",
+        "./kerf controller --scene scenes/phantom.toml --port socket", "./kerf controller --name tooth",
+        "./kerf bridge serve", "./kerf bridge join", "scp "],
+    "runs in the test own_law": ["own-law.md: "],
+    "runs in the tests packages and reader": ["./kerf package", "packages.md: cmake", "pip install ./python"],
+    "runs in the test examples_scenes, which brings its CT": ["./kerf demo --scene scenes/spine/"],
+    "runs in the test docs_tutorial": ["tutorial.md: "],
+    "needs a registry of images": ["podman "],
+    "runs all tests, or many minutes": [
+        "./kerf test", "safety.md: ./kerf lab", "./kerf lab ranges", ".ci/check-determinism.sh", "./kerf bench",
+        "KERF_KILLS="],
+    "holds a core for a minute; with other options it runs here or in the tests lab and examples_python": [
+        "./kerf lab zwidth --rate", "./kerf lab zwidth --map", "./kerf lab zwidth --arm",
+        "./kerf lab zwidth --stabiliser", "parallel ./kerf lab zwidth", "./kerf lab merge", "./kerf sweep"],
+    "runs in the test hil_guest": ["hil/guest/guest.sh"],
+}
+EVERYWHERE = ("examples", "hil", "python", "scenes")
+# `./kerf` of a scratch folder. The last word counts, so a page's own --seconds give way too.
+DOOR = """#!/bin/bash
+[[ $1 != demo ]] || set -- "$@" --virtual --seconds 1
+exec '%s/kerf' "$@"
+"""
+
+
+def furnish(folder, root, bin_folder):
+    """What a user has who follows a page: a clone's files, and data of their own."""
+    for name in EVERYWHERE:
+        os.symlink(root / name, folder / name)
+    for name in ("docs", ".sockets"):  # some commands write a page; sockets
+        (folder / name).mkdir(mode=0o700)
+    (folder / "kerf").write_text(DOOR % root)
+    (folder / "kerf").chmod(0o755)
+    subprocess.run([bin_folder / "kerf-volume", "phantom", "--shape", "ball", "--size", "32x32x32", "--out",
+                    folder / "tooth.nrrd"], check=True, stdout=subprocess.DEVNULL)
+    ball = [[[1200 if (i - 12) ** 2 + (j - 12) ** 2 + (k - 12) ** 2 < 81 else 0 for k in range(24)]
+             for j in range(24)] for i in range(24)]
+    dicom.write_series(folder / "ct", "1", ball, edge_mm="0.5")
+
+
+def fault_of(command, expected, folder, environment):
+    """What is wrong with a command, or nothing. Where the page shows its output, a line that ends in ... goes on."""
+    try:
+        done = subprocess.run(["bash", "-o", "pipefail", "-c", command], cwd=folder, env=environment, timeout=100,
+                              capture_output=True, text=True, stdin=subprocess.DEVNULL)
+    except subprocess.TimeoutExpired:
+        return "still busy after 100 s"
+    if done.returncode:
+        return f"exit code {done.returncode}\n{done.stdout[-2000:]}{done.stderr[-2000:]}"
+    for shown, line in zip(expected, done.stdout.splitlines() + [""] * len(expected)):
+        if not (line.startswith(shown[:-3]) if shown.endswith("...") else line == shown):
+            return f"the page shows {shown!r}, it prints {line!r}"
+    return None
+
+
+def rows_of(page, command):
+    return [row for rows in NOT_HERE.values() for row in rows if f"{page.name}: {command}".startswith(row)
+            or command.startswith(row)]
+
+
+def run_page(page, root, bin_folder):
+    """How many commands of a page ran, and what is wrong with them."""
+    ran, wrong = 0, []
+    with tempfile.TemporaryDirectory() as scratch:
+        folder = pathlib.Path(scratch)
+        environment = dict(os.environ, KERF_BIN=str(bin_folder), HOME=scratch, XDG_RUNTIME_DIR=f"{scratch}/.sockets")
+        environment.pop("DISPLAY", None)
+        environment.pop("WAYLAND_DISPLAY", None)
+        furnish(folder, root, bin_folder)
+        if page.name == "ci.md":  # a scene that its reader has
+            shutil.copy(root / "scenes" / "touch.toml", folder / "mine.toml")
+            os.symlink(root / "scenes" / "hands", folder / "hands")
+        for number, command, expected in pages.commands(page):
+            if rows_of(page, command):
+                continue
+            began = time.monotonic()
+            fault = fault_of(command, expected, folder, environment)
+            ran += 1
+            print(f"{time.monotonic() - began:6.1f} s  {page.name}:{number}: {command}", flush=True)
+            if fault:
+                wrong.append(f"{page.name}:{number}: {command}: {fault}")
+    return ran, wrong
+
+
+def main(root, bin_folder, which):
+    used = {row for page in pages.all_pages(root) for _, command, _ in pages.commands(page)
+            for row in rows_of(page, command)}
+    wrong = [f"NOT_HERE: {row!r}: no page has such a command; take the row out"
+             for rows in NOT_HERE.values() for row in rows if row not in used]
+    total = 0
+    for page in pages.all_pages(root):
+        if which in (page.name, page.parent.name) and not all(rows_of(page, c) for _, c, _ in pages.commands(page)):
+            ran, faults = run_page(page, root, bin_folder)
+            total += ran
+            wrong += faults
+    print(*wrong, sep="\n")
+    print(f"{total} commands ran, {len(wrong)} faults")
+    return total > 0 and not wrong
+
+
+if __name__ == "__main__":
+    sys.exit(0 if main(pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[2]), sys.argv[3]) else 1)
