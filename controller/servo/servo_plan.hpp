@@ -55,6 +55,8 @@ struct ToolInVolume {
   /// The sample step of a tool that keeps its axes.
   std::array<std::array<typename N::Step, 3>, 3> unturned_step{};
   typename N::Step overlap_ratio{};  ///< a^3 / V_voxel
+  /// No voxel farther than this from that of the tool's centre is cut, by axis.
+  std::array<std::int32_t, 3> reach_vox{};
   Method method = Method::gather;
   const AlignedTable* aligned = nullptr;  ///< of the method `aligned`
   // Of the method's own sums:
@@ -106,6 +108,7 @@ struct ServoPlan {
   SafetyTiming timing;
   typename N::Real speed_limit_mm_per_tick{};
   std::int32_t rate_hz = 1000;
+  std::uint32_t stroke_pause_ticks = 250;  ///< without contact, and the stroke is over
 };
 
 }  // namespace kerf
