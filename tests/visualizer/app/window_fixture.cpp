@@ -159,6 +159,7 @@ void Controller::tick() {
   writer_.begin_tick(++now_);
   TickRecord record{};
   record.tick = now_;
+  record.flags = flags_;
   record.start_ns = now_ns();
   record.orientation[3] = 1.0F;
   writer_.publish_state(record);
@@ -171,12 +172,10 @@ std::vector<std::uint64_t> Controller::asked_tools() {
   return tools;
 }
 
-int Controller::resets() {
-  int resets = 0;
-  while (const auto command = server_.take_command()) {
-    resets += command->kind == CommandKind::reset ? 1 : 0;
-  }
-  return resets;
+int Controller::asked(CommandKind kind) {
+  int asked = 0;
+  while (const auto command = server_.take_command()) asked += command->kind == kind ? 1 : 0;
+  return asked;
 }
 
 void act(const std::string& events) {
