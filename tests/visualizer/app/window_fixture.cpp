@@ -184,12 +184,21 @@ void act(const std::string& events) {
 }
 
 User::User(const fs::path& folder, int blocks)
-    : out_(folder / "out"), report_(folder / "report.json"), controller_(blocks) {
+    : out_(folder / "out"),
+      report_(folder / "report.json"),
+      choice_(folder / "choice"),
+      controller_(blocks) {
+  const fs::path scenes = folder / "scenes";
+  fs::create_directories(scenes);
+  std::ofstream(scenes / "none.toml") << "[tool]\n";
+  std::ofstream(scenes / "one.toml") << "[[volume]]\n";
   VisualizerOptions options;
   options.name = "test";
   options.size = {480, 360};
   options.out = out_;
   options.report = report_;
+  options.choice = choice_;
+  options.open_in = scenes;
   options.seconds = 100.0;  // a test that hangs ends
   code_ = std::async(std::launch::async, [options] { return run_window(options); });
   act("search --sync --onlyvisible --name 'kerf: test' mousemove 300 180");
@@ -220,6 +229,12 @@ std::vector<std::uint8_t> User::look_at_screen() {
 int User::quit() {
   send("key q");
   return code_.get();
+}
+
+std::string User::choice() const {
+  std::string line;
+  std::getline(std::ifstream(choice_), line);
+  return line;
 }
 
 nlohmann::json User::report() const {

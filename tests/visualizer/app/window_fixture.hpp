@@ -77,12 +77,16 @@ class User {
   std::vector<std::uint8_t> look_at_screen();
 
   int quit();
+  /// Of a window that ends by itself.
+  int ended() { return code_.get(); }
+  /// What was chosen to be opened; empty: nothing yet.
+  [[nodiscard]] std::string choice() const;
   [[nodiscard]] const std::filesystem::path& out() const { return out_; }
   [[nodiscard]] Controller& controller() { return controller_; }
   [[nodiscard]] nlohmann::json report() const;
 
  private:
-  std::filesystem::path out_, report_;
+  std::filesystem::path out_, report_, choice_;
   Controller controller_;
   std::future<int> code_;
 };

@@ -235,6 +235,23 @@ TEST_CASE("keys and mouse work the window") {
   }
 }
 
+TEST_CASE("o lists scenes; a file that is none is told, a scene ends the window with its name") {
+  if (!have("Xvfb") || !have("xdotool")) return;
+  const Screen screen;
+  User user(screen.folder);
+  const auto click = [](const std::string& at) {
+    act("mousemove " + at + " sleep 0.2 mousedown 1 sleep 0.2 mouseup 1");
+  };
+  const std::string none = "60 78", one = "60 95";  // below the folder above
+  act("key o");
+  click(none);
+  CHECK(user.choice().empty());
+  act("key o key o");  // leaves the list and what it said, and opens it again
+  click(one);
+  CHECK(user.ended() == 0);
+  CHECK(user.choice() == (screen.folder / "scenes" / "one.toml").string());
+}
+
 TEST_CASE("nothing covers a warning, whatever else is shown and in a small window too") {
   if (!have("Xvfb") || !have("xdotool")) return;
   const Screen screen;
