@@ -67,6 +67,12 @@ case $name in
       sleep "${SLOW:-0}"
       [[ -e $LAB/segment ]] || { echo 'kerf-visualizer: no controller' >&2; exit 2; }
       touch "${option[--attached]}"
+      if [[ -n ${CHOICE:-} && -n ${option[--choice]:-} && ! -e $LAB/chosen ]]; then
+        touch "$LAB/chosen"
+        sleep 0.3
+        echo "$CHOICE" >"${option[--choice]}"
+        exit 0
+      fi
     fi
     while [[ -e $LAB/segment ]]; do sleep 0.05; done
     if [[ $name == recorder ]]; then mkdir -p "$out"; else touch "$out/frame-0001.png"; fi
@@ -172,6 +178,17 @@ expect 'a window that ends ends it' \
   with DISPLAY=:99 with FAIL_visualizer=2 kerf_gives 2 demo --seconds 60 --hand mouse
 expect 'in its words' says 'kerf-visualizer: place: value; way out'
 expect 'and leaves nothing behind' nothing_survives
+expect 'a scene that the window chose is the next demo' \
+  with DISPLAY=:99 with CHOICE=/else/other.toml kerf_gives 0 demo --seconds 5 --stereo --scene "$root/scenes/wall.toml"
+expect 'with the first one before it' called '^controller.*--scene .*wall.toml'
+expect 'in its place' called '^controller.*--scene /else/other.toml'
+expect 'and all else as it was' test "$(grep -c '^visualizer.*--stereo' "$lab/calls")" = 2
+expect 'which is told' says '^kerf: demo: /else/other.toml$'
+rm "$lab/chosen"
+expect 'a volume likewise' \
+  with DISPLAY=:99 with CHOICE=/else/ct.nrrd kerf_gives 0 demo --seconds 5 --hand mouse
+expect 'without the scene of the first' called '^controller.*--volume /else/ct.nrrd'
+expect 'and nothing is left behind' nothing_survives
 expect 'without a display it cannot be' kerf_gives 2 demo --hand mouse
 expect 'as it says' says '^kerf: demo: --hand mouse: no display; '
 expect 'nor without a window' with DISPLAY=:99 kerf_gives 2 demo --hand mouse --headless

@@ -98,6 +98,9 @@ constexpr LogCode kFlags[] = {
     {kFlagShaft, "shaft", "pressed with shaft or handpiece"},
     {kFlagReset, "reset",
      "the volumes go back to their first content: no force, and nothing is cut"},
+    {kFlagUndo, "undo",
+     "the last stroke is undone: no force, and nothing is cut; `removed` is given back"},
+    {kFlagUndoable, "undoable", "the last stroke can be undone"},
 };
 constexpr LogCode kPhases[] = {
     {0, "off", "no report has come yet"},

@@ -79,13 +79,15 @@ class TickLogReader {
 }
 
 /// Volume taken away in one tick: density units over full density, times the voxel of the volume
-/// that changed (the first one, where a tick changed several).
+/// that changed (the first one, where a tick changed several). Negative where an undo gives it
+/// back.
 [[nodiscard]] inline double removed_mm3(const TickRecord& record,
                                         std::span<const double> voxel_mm3) noexcept {
   if (record.removed == 0 || voxel_mm3.empty()) return 0;
   const auto changed = static_cast<std::size_t>(std::countr_zero(record.dirty_volumes));
   const double voxel = voxel_mm3[changed < voxel_mm3.size() ? changed : 0];
-  return record.removed / kDensityMax * voxel;
+  const double mm3 = record.removed / kDensityMax * voxel;
+  return (record.flags & kFlagUndo) != 0 ? -mm3 : mm3;
 }
 
 }  // namespace kerf

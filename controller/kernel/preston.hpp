@@ -116,15 +116,16 @@ class PrestonTick {
 
 }  // namespace detail
 
-/// The tool, where it covers these voxels, touches a forbidden material.
+/// Which forbidden materials the tool touches where it covers these voxels: bit m is material m.
 template <class N>
-[[nodiscard]] constexpr bool touches_forbidden(const PrestonPlan<N>& plan,
-                                               const CoveredWeights<N>& covered) noexcept {
-  bool touches = false;
+[[nodiscard]] constexpr std::uint64_t touched_forbidden(const PrestonPlan<N>& plan,
+                                                        const CoveredWeights<N>& covered) noexcept {
+  static_assert(kMaxCutMaterials <= 64);
+  std::uint64_t touched = 0;
   for (std::size_t m = 0; m < kMaxCutMaterials; ++m) {
-    touches = touches || (plan.forbidden[m] && covered.weight[m] > 0);
+    if (plan.forbidden[m] && covered.weight[m] > 0) touched |= std::uint64_t{1} << m;
   }
-  return touches;
+  return touched;
 }
 
 /// Takes from one volume what `drive` cuts in one tick of the voxels that the tool covers, where it

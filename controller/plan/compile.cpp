@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "controller/plan/compile.hpp"
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -25,6 +26,13 @@
 namespace kerf {
 namespace {
 
+/// A quarter of a second: a bur that the hand's tremor lifts is back within a period of it, an
+/// eighth of a second at 8 Hz; to lift it on purpose and put it elsewhere takes longer.
+std::uint32_t stroke_pause_ticks(std::int32_t rate_hz) {
+  constexpr int kPerS = 4;
+  return static_cast<std::uint32_t>(std::max(1, rate_hz / kPerS));
+}
+
 template <class N>
 class CompiledSceneOf final : public CompiledScene {
  public:
@@ -39,6 +47,7 @@ class CompiledSceneOf final : public CompiledScene {
         scene.cut.model == CutModel::overlap || scene.cut.model == CutModel::overlap_exact;
     plan_.removal_rate = removal_rate<N>(scene.cut.rate_per_s / scene.servo.rate_hz,
                                          scene.cut.model == CutModel::overlap_exact);
+    plan_.stroke_pause_ticks = stroke_pause_ticks(scene.servo.rate_hz);
     plan_volumes(scene, plan_);
     plan_contact(scene, plan_);
     plan_.force_cut = plan_force_cut(scene, plan_);
@@ -83,6 +92,13 @@ class CompiledSceneOf final : public CompiledScene {
   }
   [[nodiscard]] VoxelGrid grid(std::size_t scene_index) const noexcept override {
     return grids_[scene_index];
+  }
+  [[nodiscard]] std::span<const Density> first_density(
+      std::size_t scene_index) const noexcept override {
+    for (std::size_t v = 0; v < plan_.volume_count; ++v) {
+      if (plan_.volumes[v].scene_index == scene_index) return state_.volumes[v].first;
+    }
+    return {};
   }
   [[nodiscard]] std::span<const Density> density(std::size_t scene_index) const noexcept override {
     return memory_.density(scene_index);

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <memory>
+#include <span>
 
 #include "controller/kernel/kernel_set.hpp"
 #include "controller/load/loaded_scene.hpp"
@@ -23,6 +24,11 @@ class CompiledScene : public Servo {
   /// Takes the volumes' densities over (they are empty in the scene afterwards) and allocates the
   /// rest. Once, before the first step; `scene` is the one that was compiled.
   virtual void take(LoadedScene& scene) = 0;
+
+  /// Density of volume `scene_index` before the first cut; empty where nothing is cut. After
+  /// `take`.
+  [[nodiscard]] virtual std::span<const Density> first_density(
+      std::size_t scene_index) const noexcept = 0;
 
   /// `costs().ticks[tick]` as the servo step computes it, at its worst (tick_timing.hpp). Cuts
   /// where the scene cuts: only for a servo that will not be stepped. After `take`; takes 250

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -56,6 +57,22 @@ template <class N>
   return map;
 }
 
+/// See `ToolInVolume::reach_vox`: the farthest sample in any orientation, and the cells around it.
+[[nodiscard]] inline std::array<std::int32_t, 3> reach_vox(const SceneTool& tool,
+                                                           const VolumeImage& image) {
+  constexpr double kCell = 2;  // beyond the sample, and before the centre's voxel
+  double farthest = 0;         // half pitches
+  for (const ToolOffset& offset : tool.offsets) {
+    farthest = std::max(farthest, std::hypot(offset[0], offset[1], offset[2]));
+  }
+  std::array<std::int32_t, 3> reach{};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const double voxels = farthest * tool.pitch_mm / 2 / image.spacing_mm[axis];
+    reach[axis] = static_cast<std::int32_t>(std::ceil(std::min(voxels, 1e6)) + kCell);
+  }
+  return reach;
+}
+
 /// Steps and forces of one tool in one volume, as its method wants them; `table` is that of the
 /// method `aligned`.
 template <class N>
@@ -68,6 +85,7 @@ template <class N>
   const Matrix rotation = matrix_of(volume.pose.orientation);
   ToolInVolume<N> in;
   in.method = method.step;
+  in.reach_vox = reach_vox(tool, volume.image);
   in.aligned = table;
   in.voxel_from_pitch = rounded<typename N::Ratio, VoxelSpace, WorldSpace>(
       into_volume(rotation, {a / h[0], a / h[1], a / h[2]}));

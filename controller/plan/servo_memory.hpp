@@ -71,6 +71,14 @@ class ServoMemory {
         contact_.take(scene, scene.volumes[volume.scene_index], v, density, state.contact);
       }
     }
+    if (cuts_) {
+      pool_.resize(pool_size());
+      state.stroke.pool = pool_;
+      for (std::size_t v = 0; v < plan.volume_count; ++v) {
+        kept_in_[v].resize(BrickGrid::of(plan.volumes[v].grid).count());
+        state.stroke.kept_in[v] = kept_in_[v];
+      }
+    }
     force_cut_.take(scene, plan, state.force_cut);
     overlap_.resize(lengths.overlap);
     refresh_.resize(lengths.refresh);
@@ -85,7 +93,7 @@ class ServoMemory {
 
   /// After `take`.
   [[nodiscard]] SnapshotOf<N> keep(const ServoState<N>& state) const {
-    return {state, densities_, gradients_, carries_, cut_blocks_};
+    return {state, densities_, gradients_, carries_, cut_blocks_, pool_, kept_in_};
   }
   /// The arrays keep their places: plan and state point at them. Throws std::invalid_argument where
   /// the snapshot is of another scene.
@@ -94,6 +102,9 @@ class ServoMemory {
     restore_arrays(kept.gradients, gradients_);
     restore_arrays(kept.carries, carries_);
     restore_arrays(kept.cut_blocks, cut_blocks_);
+    restore_arrays(kept.kept_in, kept_in_);
+    if (kept.pool.size() != pool_.size()) refuse_snapshot();
+    std::ranges::copy(kept.pool, pool_.begin());
     state = kept.state_in(state);
   }
 
@@ -116,6 +127,12 @@ class ServoMemory {
       add("first content of " + name, grid.voxel_count() * sizeof(Density), false);
       add("cut bricks of " + name, BrickBlocks::of(grid).count() * sizeof(std::uint64_t), false);
     }
+    if (cuts_) {
+      std::size_t stamps = 0;
+      for (const auto& [name, grid] : solids_) stamps += BrickGrid::of(grid).count();
+      add("bricks of the last stroke", pool_size() * sizeof(KeptBrick), false);
+      add("whether they are kept", stamps * sizeof(std::uint32_t), false);
+    }
     for (const auto& [name, samples] : samples_) {
       add("samples of " + name, samples.size() * sizeof(ToolOffset), true);
     }
@@ -128,6 +145,15 @@ class ServoMemory {
   }
 
  private:
+  /// Of the bricks of a stroke, and of those that may be cut next: 16 MiB hold 8 cm^3 of voxels of
+  /// 0.1 mm, a tooth several times over; small volumes fit whole.
+  [[nodiscard]] std::size_t pool_size() const {
+    constexpr std::size_t kMost = (std::size_t{16} << 20) / sizeof(KeptBrick);
+    std::size_t bricks = 0;
+    for (const auto& [name, grid] : solids_) bricks += BrickGrid::of(grid).count();
+    return std::min(2 * bricks, kMost);
+  }
+
   struct VolumeBytes {
     std::string name;
     std::size_t density, labels;
@@ -142,6 +168,8 @@ class ServoMemory {
   std::array<std::vector<RemovalCarry<N>>, kMaxVolumes> carries_;
   std::array<std::vector<Density>, kMaxVolumes> firsts_;  ///< where something is cut, as the next
   std::array<std::vector<std::uint64_t>, kMaxVolumes> cut_blocks_;
+  std::vector<KeptBrick> pool_;  ///< of the last stroke, as the next
+  std::array<std::vector<std::uint32_t>, kMaxVolumes> kept_in_;
   std::vector<typename N::Weight> overlap_;
   std::vector<GradientScratch> refresh_;
   MethodMemory methods_;

@@ -45,12 +45,16 @@ struct SnapshotOf final : ServoSnapshot {
   SnapshotOf(const ServoState<N>& of, std::vector<std::vector<Density>> density,
              std::array<std::vector<Gradient<N>>, kMaxVolumes> gradient,
              std::array<std::vector<RemovalCarry<N>>, kMaxVolumes> carry,
-             std::array<std::vector<std::uint64_t>, kMaxVolumes> blocks)
+             std::array<std::vector<std::uint64_t>, kMaxVolumes> blocks,
+             std::vector<KeptBrick> stroke_pool,
+             std::array<std::vector<std::uint32_t>, kMaxVolumes> stroke_bricks)
       : state(of),
         densities(std::move(density)),
         gradients(std::move(gradient)),
         carries(std::move(carry)),
-        cut_blocks(std::move(blocks)) {}
+        cut_blocks(std::move(blocks)),
+        pool(std::move(stroke_pool)),
+        kept_in(std::move(stroke_bricks)) {}
 
   /// The kept values, with the memory of `here`.
   [[nodiscard]] ServoState<N> state_in(const ServoState<N>& here) const {
@@ -59,6 +63,8 @@ struct SnapshotOf final : ServoSnapshot {
     placed.overlap = here.overlap;
     placed.gradient_scratch = here.gradient_scratch;
     placed.scratch = here.scratch;
+    placed.stroke.pool = here.stroke.pool;
+    placed.stroke.kept_in = here.stroke.kept_in;
     placed.contact.volumes = here.contact.volumes;
     placed.contact.behind = here.contact.behind;
     placed.force_cut.list = here.force_cut.list;
@@ -85,6 +91,8 @@ struct SnapshotOf final : ServoSnapshot {
   std::array<std::vector<Gradient<N>>, kMaxVolumes> gradients;  ///< by volume of the plan
   std::array<std::vector<RemovalCarry<N>>, kMaxVolumes> carries;
   std::array<std::vector<std::uint64_t>, kMaxVolumes> cut_blocks;
+  std::vector<KeptBrick> pool;
+  std::array<std::vector<std::uint32_t>, kMaxVolumes> kept_in;
 };
 
 }  // namespace kerf

@@ -31,7 +31,8 @@ struct ServoCommand {
     select_tool,
     hold,
     fade_in,  ///< force starts again from 0: after a stall of the servo
-    reset     ///< the volumes' first content, over some ticks; at once where nothing is cut
+    reset,    ///< the volumes' first content, over some ticks; at once where nothing is cut
+    undo      ///< the volumes before the last stroke, likewise; refused where there is none
   };
   Kind kind = Kind::none;
   std::uint32_t argument = 0;  ///< index of the tool; hold: 1 on, 0 off

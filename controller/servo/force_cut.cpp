@@ -6,6 +6,7 @@
 #include "controller/kernel/proxy/contact_math.hpp"
 #include "controller/servo/method_step.hpp"
 #include "controller/servo/press_shares.hpp"
+#include "controller/servo/stroke.hpp"
 
 namespace kerf {
 namespace {
@@ -38,9 +39,10 @@ CuttingFriction<N> press_on_volumes(const ServoPlan<N>& plan, ServoState<N>& sta
   for (std::size_t v = 0; v < plan.volume_count; ++v) {
     if (covered.in[v].list.empty() || !(covered.whole > 0)) continue;
     const PrestonPlan<N>& volume = rules.volume[v];
-    cut.forbidden = cut.forbidden || touches_forbidden(volume, covered.in[v]);
+    cut.forbidden |= touched_forbidden(volume, covered.in[v]);
     const Real press_n =
         multiply<Real>(unit_share_of<N>(covered.borne[v], covered.whole), cut.press_n);
+    if (drive > 0) keep_bricks(plan, state, v, place_in(plan.volumes[v], centre_mm));
     const SurfaceDrag<N>& drag = covered.in[v].drag;
     friction.add(rules.friction, press_n, tool.round ? ball_drag<N>(normal, drag.arm) : drag);
     const PrestonOutcome<N> out = cut_by_force(volume, drive, state.volumes[v].density,

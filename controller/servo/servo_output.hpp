@@ -77,8 +77,11 @@ struct ServoOutput {
   bool clamped = false;    ///< force, slew, thermal or motor limit was active
   bool contact = false;    ///< commanded force above 0.01 N
   bool forbidden = false;  ///< the tool presses on a forbidden material
+  std::uint64_t forbidden_materials = 0;  ///< which: bit m is material m of the scene
   bool refused = false;    ///< the tool finds no free place near the hand, and feels nothing
   bool shaft = false;      ///< what presses on shaft or handpiece is above 0.01 N
+  bool undoing = false;    ///< the last stroke is undone: likewise
+  bool undoable = false;   ///< it can be
   bool resetting = false;  ///< volumes go back to their first content: what changed was not cut
 
   std::array<std::int32_t, 3> joint_counts{};  ///< unwrapped since calibration
@@ -106,8 +109,9 @@ struct ServoOutput {
   std::int64_t samples_read = 0;    ///< of the tool's surface, by contact (query_work.hpp)
   std::uint64_t removed_steps = 0;  ///< density steps removed in this tick, all volumes
   std::array<std::uint64_t, kMaxVolumes> removed_by_volume{};
-  std::array<VoxelBox, kMaxVolumes> changed{};  ///< voxels that changed, by volume
-  std::uint64_t output_hash = 0;                ///< chain over all ticks
+  std::array<std::uint64_t, kMaxVolumes> returned_by_volume{};  ///< of a stroke that is undone
+  std::array<VoxelBox, kMaxVolumes> changed{};                  ///< voxels that changed, by volume
+  std::uint64_t output_hash = 0;                                ///< chain over all ticks
 };
 
 }  // namespace kerf

@@ -46,7 +46,9 @@ struct ToolInVolume {
   Transform<typename N::Ratio, VoxelSpace, WorldSpace> voxel_from_pitch;
   /// The sample step of a tool that keeps its axes.
   std::array<std::array<typename N::Step, 3>, 3> unturned_step{};
-  typename N::Step overlap_ratio{};       ///< a^3 / V_voxel
+  typename N::Step overlap_ratio{};  ///< a^3 / V_voxel
+  /// No voxel farther than this from that of the tool's centre is cut, by axis.
+  std::array<std::int32_t, 3> reach_vox{};
   Method method = Method::gather;         ///< how contact and cut are computed here
   const AlignedTable* aligned = nullptr;  ///< of the method `aligned`
   // Of the method's own sums:
@@ -98,6 +100,7 @@ struct ServoPlan {
   SafetyTiming timing;
   typename N::Real speed_limit_mm_per_tick{};
   std::int32_t rate_hz = 1000;
+  std::uint32_t stroke_pause_ticks = 250;  ///< without contact, and the stroke is over
 };
 
 }  // namespace kerf

@@ -20,6 +20,7 @@
 #include "controller/servo/servo_output.hpp"
 #include "controller/servo/supervisor.hpp"
 #include "shared/numeric/fnv1a.hpp"
+#include "shared/segment/brick_grid.hpp"
 
 namespace kerf {
 
@@ -37,6 +38,30 @@ struct VolumeState {
 struct ResetState {
   bool runs = false;
   std::size_t volume = 0, block = 0;  ///< to be looked at next
+};
+
+/// A brick as it was before a stroke.
+struct KeptBrick {
+  std::uint32_t volume = 0;  ///< of the plan
+  std::uint32_t id = 0;
+  std::array<Density, kBrickVoxels> density{};  ///< of its voxels that exist, x fastest
+};
+
+/// The last stroke, and what may belong to the next (stroke.hpp). `pool` is a ring; places in it
+/// only grow: begin .. next is the last stroke, next .. end waits for one.
+struct StrokeState {
+  std::span<KeptBrick> pool;                                  ///< empty where nothing is cut
+  std::array<std::span<std::uint32_t>, kMaxVolumes> kept_in;  ///< by brick: in which generation
+  std::uint32_t generation = 1;
+  std::uint64_t begin = 0, next = 0, end = 0;
+  bool open = false;       ///< it goes on, and reaches from begin to end
+  bool lost = false;       ///< it is longer than the pool
+  bool next_lost = false;  ///< likewise, if one begins in this tick
+  bool undoing = false;
+  std::uint32_t quiet_ticks = 0;  ///< since it touched anything
+  [[nodiscard]] constexpr bool can_undo() const noexcept {
+    return !lost && !undoing && (open ? end : next) != begin;
+  }
 };
 
 /// Joint counters since the last calibration.
@@ -75,7 +100,9 @@ struct ServoState {
   std::uint32_t active_tool = 0;
   bool hold = false;  ///< asked by command: force 0, nothing is cut
   ResetState reset;   ///< asked by command; a hold while it runs
-  [[nodiscard]] constexpr bool held() const noexcept { return hold || reset.runs; }
+  StrokeState stroke;
+  [[nodiscard]] constexpr bool undoes() const noexcept { return stroke.undoing; }
+  [[nodiscard]] constexpr bool held() const noexcept { return hold || reset.runs || undoes(); }
 
   JacobianTransposed<N> jacobian_t_mm;  ///< of the last good report
   DeviceVec<Real> tip_mm;               ///< device port

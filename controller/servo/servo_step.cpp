@@ -10,6 +10,7 @@
 #include "controller/servo/motor_command.hpp"
 #include "controller/servo/plain_numbers.hpp"
 #include "controller/servo/sense.hpp"
+#include "controller/servo/stroke.hpp"
 #include "controller/servo/swept_force.hpp"
 #include "controller/servo/tell.hpp"
 #include "controller/servo/tool_forces.hpp"
@@ -175,19 +176,26 @@ void cut(const ServoPlan<N>& plan, ServoState<N>& state, const ToolContact<N>& t
   const ForceCut<N> done = cut_by_sent_force(plan, state, tool, state.force_n, runs);
   out.press_n = as_double(done.press_n);
   out.spindle_load = as_double(state.force_cut.spindle.load);
-  out.forbidden = done.forbidden;
+  out.forbidden_materials = done.forbidden;
+  out.forbidden = done.forbidden != 0;
   tell_removed(done.removed, out);
 }
 
-/// Notes what was cut, or restores it while a reset runs: then nothing is cut.
+/// Notes what was cut, or restores it while a reset or an undo runs: then nothing is cut.
 template <class N>
 void follow_cuts(const ServoPlan<N>& plan, ServoState<N>& state, ServoOutput& out) noexcept {
   out.resetting = state.reset.runs;
   if (out.resetting) return restore_some(plan, state, out.changed);
+  out.undoing = state.undoes();
+  if (out.undoing) return undo_some(plan, state, out);
   for (std::size_t v = 0; v < plan.volume_count; ++v) {
     const VolumePlan<N>& volume = plan.volumes[v];
     mark_cut(volume.grid, out.changed[volume.scene_index], state.volumes[v].cut_blocks);
   }
+  if (state.stroke.pool.empty()) return;
+  const bool touches = !(state.contact_n == DeviceVec<typename N::Real>{});
+  follow_stroke(plan.stroke_pause_ticks, out.removed_steps > 0, touches, state.stroke);
+  out.undoable = state.stroke.can_undo();
 }
 
 }  // namespace
@@ -256,7 +264,11 @@ bool apply_command(const ServoPlan<N>& plan, ServoState<N>& state,
       return true;
     case ServoCommand::Kind::reset:
       state.reset.runs = plan.cutting || plan.force_cut.on;
+      state.stroke.undoing = false;  // its bricks are among those that were cut
+      forget_strokes(state.stroke);
       return true;
+    case ServoCommand::Kind::undo:
+      return !state.reset.runs && begin_undo(state.stroke);
   }
   return false;
 }

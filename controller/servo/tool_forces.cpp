@@ -5,6 +5,7 @@
 
 #include "controller/servo/force_cut.hpp"
 #include "controller/servo/method_step.hpp"
+#include "controller/servo/stroke.hpp"
 #include "controller/servo/swept_force.hpp"
 
 namespace kerf {
@@ -35,6 +36,7 @@ ToolForces<N> feel_and_cut(const ServoPlan<N>& plan, ServoState<N>& state,
   for (std::size_t v = 0; v < plan.volume_count; ++v) {
     const VolumeTick<N> at{plan, state, v,
                            tool_pose(plan.volumes[v], tool, tool.in_volume[v], tip_mm, rotation)};
+    if (plan.cutting) keep_bricks(plan, state, v, at.pose.centre_vox);
     const VolumeForces<N> in_volume =
         by_method<N>(tool.in_volume[v].method, [&](auto step) { return step.feel_and_cut(at); });
     forces.contact_n = forces.contact_n - in_volume.contact_n;

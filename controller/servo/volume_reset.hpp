@@ -104,6 +104,20 @@ VoxelBox restore_bricks(const ServoPlan<N>& plan, const VoxelGrid& grid, std::si
   return restored;
 }
 
+/// What cutting still owes a volume is of matter that has come back.
+template <class N>
+void forget_debts(ServoState<N>& state, std::size_t v) noexcept {
+  std::ranges::fill(state.volumes[v].carry, RemovalCarry<N>{});
+  state.force_cut.volume[v] = {};
+}
+
+/// The last matter has come back.
+template <class N>
+void end_restoring(ServoState<N>& state) noexcept {
+  state.force_cut.change_tool();  // it stands, and has cut nothing of what is there now
+  restart_fade(state.supervisor);
+}
+
 /// One tick of a reset that runs: some bricks of one block, told in `changed` by volume of the
 /// scene. The last tick of a reset ends it.
 template <class N>
@@ -113,14 +127,12 @@ void restore_some(const ServoPlan<N>& plan, ServoState<N>& state,
   for (int looks = kBlocksPerTick; looks > 0; --looks) {
     if (reset.volume == plan.volume_count) {
       reset = {};
-      state.force_cut.change_tool();  // it stands, and has cut nothing of what is there now
-      restart_fade(state.supervisor);
+      end_restoring(state);
       return;
     }
     VolumeState<N>& volume = state.volumes[reset.volume];
     if (reset.block == volume.cut_blocks.size()) {
-      std::ranges::fill(volume.carry, RemovalCarry<N>{});
-      state.force_cut.volume[reset.volume] = {};
+      forget_debts(state, reset.volume);
       ++reset.volume;
       reset.block = 0;
     } else if (volume.cut_blocks[reset.block] == 0) {

@@ -34,6 +34,7 @@
 #include "shared/segment/hand_over.hpp"
 #include "shared/segment/segment_plan.hpp"
 #include "shared/volume/density_hash.hpp"
+#include "shared/volume/material_rule.hpp"
 
 namespace kerf {
 namespace {
@@ -63,6 +64,34 @@ double removed_mm3(const LoadedScene& scene, const RunRecord& record) {
     mm3 += static_cast<double>(record.removed_steps[v]) / kDensityMax * h[0] * h[1] * h[2];
   }
   return mm3;
+}
+
+/// Of each material of the scene, since the last reset.
+MaterialScores scores_of(const LoadedScene& scene, const CompiledScene& servo,
+                         const RunRecord& record) {
+  std::vector<double> isos;
+  for (const Material& material : scene.materials) isos.push_back(material.iso);
+  const MaterialRule rule(isos);
+  std::vector<double> removed(rule.count());
+  for (std::size_t v = 0; v < scene.volumes.size(); ++v) {
+    StepsByMaterial steps;
+    const VolumeImage& image = scene.volumes[v].image;
+    add_removed(rule, servo.first_density(v), servo.density(v), image.labels, steps);
+    const auto& h = image.spacing_mm;
+    for (std::size_t m = 0; m < steps.size(); ++m) {
+      removed[m] += static_cast<double>(steps[m]) / kDensityMax * h[0] * h[1] * h[2];
+    }
+  }
+  MaterialScores scores;
+  for (std::size_t m = 0; m < scene.materials.size(); ++m) {
+    if (m == 0 && removed[0] == 0) continue;  // "none": no voxel of it
+    const Material& material = scene.materials[m];
+    scores.push_back({material.name, removed[m], std::nullopt});
+    if (!material.forbidden) continue;
+    scores.back().forbidden_ms =
+        static_cast<double>(record.forbidden_ticks[m]) * 1000 / scene.servo.rate_hz;
+  }
+  return scores;
 }
 
 std::uint64_t hash_of_volumes(const LoadedScene& scene, const Servo& servo) {
@@ -248,6 +277,7 @@ int run_controller(const ControllerOptions& options) {
   report.end = text_of(end);
   name_law_faults(scene, report.record.faults);
   report.removed_mm3 = removed_mm3(scene, report.record);
+  report.materials = scores_of(scene, *servo, report.record);
   report.lost_packets = device.lost();
   report.refused_packets = device.refused();
   report.link = port->counters();

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <numeric>
 
 #include "shared/numeric/fixed.hpp"
 #include "shared/numeric/rotation.hpp"
@@ -39,7 +40,14 @@ std::uint32_t flags_of(const DeviceReport& report, const ServoOutput& output) no
   set(output.refused, kFlagRefused);
   set(output.shaft, kFlagShaft);
   set(output.resetting, kFlagReset);
+  set(output.undoing, kFlagUndo);
+  set(output.undoable, kFlagUndoable);
   return flags;
+}
+
+DirtyCause cause_of(const ServoOutput& output) noexcept {
+  if (output.resetting) return DirtyCause::reset;
+  return output.undoing ? DirtyCause::undo : DirtyCause::milling;
 }
 
 /// The pose, as far as it is known: before docking the joint angles have no zero, and what
@@ -80,9 +88,9 @@ void Publisher::publish_volumes(const ServoOutput& output, TickRecord& record) n
     const VoxelBox& box = output.changed[v];
     if (box.empty()) continue;
     const std::span<const Density> density = servo_.density(v);
-    const std::uint64_t hash = segment_.publish_box(
-        v, density, box, static_cast<std::uint32_t>(output.removed_by_volume[v]),
-        output.resetting ? DirtyCause::reset : DirtyCause::milling);
+    const std::uint64_t steps = output.removed_by_volume[v] + output.returned_by_volume[v];
+    const std::uint64_t hash =
+        segment_.publish_box(v, density, box, static_cast<std::uint32_t>(steps), cause_of(output));
     removal_hash_ = fnv1a_step(removal_hash_, hash);
     record.dirty_volumes |= 1U << v;
     if (first_box.empty()) first_box = box;
@@ -128,7 +136,8 @@ void Publisher::publish(Tick tick, const DeviceReport& report, const ServoOutput
     }
   }
   std::ranges::copy(output.motor_counts, record.dac_counts);
-  record.removed = static_cast<std::uint32_t>(output.removed_steps);
+  record.removed = static_cast<std::uint32_t>(std::accumulate(
+      output.returned_by_volume.begin(), output.returned_by_volume.end(), output.removed_steps));
   record.port_energy_j = output.absorbed_mj / 1000.0;
   record.port_minimum_j = output.port_minimum_mj / 1000.0;
   for (std::size_t i = 0; i < kEnergySources; ++i) {

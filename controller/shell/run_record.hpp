@@ -33,6 +33,9 @@ struct EventList {
   std::size_t count = 0;  ///< may exceed kMax
 };
 
+/// Bits of `ServoOutput::forbidden_materials`.
+inline constexpr std::size_t kMostForbidden = 64;
+
 /// Statistics of a run. Fixed memory: the servo thread writes it, others read it after the end.
 struct RunRecord {
   std::uint64_t ticks = 0;          ///< servo steps after arming; the counters below count these
@@ -44,8 +47,10 @@ struct RunRecord {
   Histogram wake, compute, publish;
   double peak_force_n = 0;
   std::int64_t first_force_ns = 0;  ///< when the first force was sent, CLOCK_MONOTONIC; 0: none was
-  std::array<std::uint64_t, kMaxVolumes> removed_steps{};  ///< by volume, since the last reset
-  std::uint64_t resets = 0;                                ///< of the volumes; before arming too
+  std::array<std::uint64_t, kMaxVolumes> removed_steps{};       ///< by volume, since the last reset
+  std::array<std::uint64_t, kMostForbidden> forbidden_ticks{};  ///< by material, since then too
+  std::uint64_t resets = 0;    ///< of the volumes; before arming too
+  std::uint64_t undos = 0;     ///< of the last stroke each
   double absorbed_mj = 0;      ///< at the device port, + is taken from the hand
   double port_minimum_mj = 0;  ///< lowest value of it: below 0 the loop gave more than it took
   std::array<double, kEnergySources> energy_mj{};  ///< it by source

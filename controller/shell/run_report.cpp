@@ -33,6 +33,40 @@ std::string energy_line(const RunRecord& record) {
   return text + "\n";
 }
 
+Json removed_of(const MaterialScores& materials) {
+  Json list = Json::Members{};
+  for (const MaterialScore& one : materials) list[one.name] = one.removed_mm3;
+  return list;
+}
+
+Json forbidden_of(const MaterialScores& materials) {
+  Json list = Json::Members{};
+  for (const MaterialScore& one : materials) {
+    if (one.forbidden_ms) list[one.name] = *one.forbidden_ms;
+  }
+  return list;
+}
+
+/// What was removed of which material, and how long what is forbidden was touched.
+std::string score_lines(const MaterialScores& materials) {
+  constexpr double kSeenMm3 = 0.0005;  // else the line would say 0.000
+  std::string removed, touched;
+  for (const MaterialScore& one : materials) {
+    if (one.removed_mm3 >= kSeenMm3) {
+      removed +=
+          format("%s%s %.3f", removed.empty() ? "" : ", ", one.name.c_str(), one.removed_mm3);
+    }
+    if (one.forbidden_ms) {
+      touched +=
+          format("%s%s %.0f ms", touched.empty() ? "" : ", ", one.name.c_str(), *one.forbidden_ms);
+    }
+  }
+  std::string text;
+  if (!removed.empty()) text += "  of these   " + removed + " mm3\n";
+  if (!touched.empty()) text += "  forbidden  touched: " + touched + "\n";
+  return text;
+}
+
 std::string line(const char* name, const Histogram& histogram) {
   return format("  %-10s %9.1f %9.1f %9.1f %9.1f\n", name, histogram.percentile_us(0.5),
                 histogram.percentile_us(0.99), histogram.percentile_us(0.999), histogram.max_us());
@@ -94,7 +128,10 @@ std::string report_json(const RunReport& report) {
       {"shaft_ticks", r.shaft_ticks},
       {"peak_force_n", r.peak_force_n},
       {"removed_mm3", report.removed_mm3},
+      {"removed_mm3_by_material", removed_of(report.materials)},
+      {"forbidden_ms", forbidden_of(report.materials)},
       {"resets", r.resets},
+      {"undos", r.undos},
       {"energy_j", r.absorbed_mj / 1000.0},
       {"port_minimum_j", r.port_minimum_mj / 1000.0},
       {"energy_by_source_j", by_source(r)},
@@ -138,7 +175,7 @@ std::string summary(const RunReport& report) {
   if (r.resets > 0) {
     text += format(" since the last of %llu resets", static_cast<unsigned long long>(r.resets));
   }
-  text += "\n";
+  text += "\n" + score_lines(report.materials);
   text += format("  losses     %llu stale ticks, %llu overruns, %llu packets lost\n",
                  static_cast<unsigned long long>(r.stale_ticks),
                  static_cast<unsigned long long>(r.overruns),

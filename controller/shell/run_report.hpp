@@ -12,6 +12,14 @@
 
 namespace kerf {
 
+/// What became of one material since the last reset of the volumes.
+struct MaterialScore {
+  std::string name;
+  double removed_mm3 = 0;
+  std::optional<double> forbidden_ms{};  ///< of touch; none: it may be cut
+};
+using MaterialScores = std::vector<MaterialScore>;
+
 /// Everything a run is reported with.
 struct RunReport {
   RunRecord record;
@@ -28,6 +36,7 @@ struct RunReport {
   std::string unexpected_call;  ///< that it caught; empty: none
   std::vector<MissingRight> missing_rights;
   double removed_mm3 = 0;
+  MaterialScores materials;  ///< in the scene's order
   std::uint64_t lost_packets = 0;
   std::uint64_t refused_packets = 0;
   std::vector<LinkCounter> link;  ///< of the port

@@ -2,6 +2,7 @@
 #include "controller/shell/servo_loop.hpp"
 
 #include <algorithm>
+#include <bit>
 
 #include "controller/shell/allocation_counter.hpp"
 #include "controller/shell/clock.hpp"
@@ -18,6 +19,8 @@ ServoCommand servo_command(const Command& command) noexcept {
       return {ServoCommand::Kind::hold, command.argument};
     case CommandKind::reset:
       return {ServoCommand::Kind::reset, 0};
+    case CommandKind::undo:
+      return {ServoCommand::Kind::undo, 0};
   }
   return {};
 }
@@ -41,7 +44,18 @@ class Bookkeeper {
       record_.add_event(tick, "reset");
     }
     last_reset_ = output.resetting;
-    if (output.resetting) record_.removed_steps = {};
+    if (output.resetting) {
+      record_.removed_steps = {};
+      record_.forbidden_ticks = {};
+    }
+    if (output.undoing && !last_undo_) {
+      ++record_.undos;
+      record_.add_event(tick, "undo");
+    }
+    last_undo_ = output.undoing;
+    for (std::size_t v = 0; v < kMaxVolumes; ++v) {
+      record_.removed_steps[v] -= output.returned_by_volume[v];
+    }
     if (!output.started) return;
     if (record_.ticks == 0) {
       record_.armed_at_tick = tick;
@@ -58,6 +72,9 @@ class Bookkeeper {
     }
     for (std::size_t v = 0; v < kMaxVolumes; ++v) {
       record_.removed_steps[v] += output.removed_by_volume[v];
+    }
+    for (std::uint64_t left = output.forbidden_materials; left != 0; left &= left - 1) {
+      ++record_.forbidden_ticks[static_cast<std::size_t>(std::countr_zero(left))];
     }
     record_.absorbed_mj = output.absorbed_mj;
     record_.port_minimum_mj = output.port_minimum_mj;
@@ -87,6 +104,7 @@ class Bookkeeper {
   Fault last_fault_ = Fault::none;
   bool last_refused_ = false;
   bool last_reset_ = false;
+  bool last_undo_ = false;
   std::uint64_t overruns_ = 0;
   std::uint64_t allocations_ = 0;
   ThreadFaults faults_;

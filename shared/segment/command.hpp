@@ -13,6 +13,7 @@ enum class CommandKind : std::uint32_t {
   select_tool = 1,  ///< argument: index into the scene's tools
   hold = 2,         ///< argument: 1 stops cutting and force, 0 goes on
   reset = 3,        ///< argument: 0; the volumes go back to their first content
+  undo = 4,         ///< argument: 0; they go back to what they were before the last stroke
 };
 
 /// One wish of a reader to the controller: a fixed-size message over the socket, validated outside
@@ -59,6 +60,7 @@ struct CommandLimits {
     case CommandKind::hold:
       return command.argument <= 1;
     case CommandKind::reset:
+    case CommandKind::undo:
       return command.argument == 0;
   }
   return false;

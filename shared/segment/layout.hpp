@@ -128,7 +128,7 @@ struct TickRecord {
   float proxy_offset_mm[3];
   std::int16_t dac_counts[3];
   std::uint16_t phase;    ///< of the servo's safety
-  std::uint32_t removed;  ///< density units taken away in this tick
+  std::uint32_t removed;  ///< density units taken away in this tick; in an undo: given back
   double port_energy_j;   ///< work that the loop took from the hand since it armed
   double port_minimum_j;  ///< its lowest value so far: below 0 the loop gave more than it took
   float joint_torque_n_mm[3];
@@ -178,6 +178,8 @@ inline constexpr std::uint32_t kFlagForbidden = 1U << 10;  ///< pressed on what 
 inline constexpr std::uint32_t kFlagRefused = 1U << 11;    ///< the tool has no free place
 inline constexpr std::uint32_t kFlagShaft = 1U << 12;      ///< pressed with shaft or handpiece
 inline constexpr std::uint32_t kFlagReset = 1U << 13;      ///< volumes go back to what they were
+inline constexpr std::uint32_t kFlagUndo = 1U << 14;       ///< the last stroke is undone
+inline constexpr std::uint32_t kFlagUndoable = 1U << 15;   ///< it can be
 
 inline constexpr std::size_t kRawEncoder = 0;  ///< first of 3
 inline constexpr std::size_t kRawPot = 3;      ///< first of 6
@@ -185,7 +187,7 @@ inline constexpr std::size_t kRawStatus = 9;   ///< bits: button 1, button 2, pa
 inline constexpr std::size_t kRawDeviceCounter = 10;
 
 /// Why a box of voxels changed.
-enum class DirtyCause : std::uint16_t { milling = 0, load = 1, reset = 2 };
+enum class DirtyCause : std::uint16_t { milling = 0, load = 1, reset = 2, undo = 3 };
 
 /// One changed box. A hint and a history: volume correctness never depends on it.
 struct DirtyRecord {
@@ -193,8 +195,8 @@ struct DirtyRecord {
   std::uint64_t tick;
   std::uint64_t time_ns;  ///< CLOCK_MONOTONIC of the tick before: the servo asks no clock for this
   std::uint16_t lo[3];
-  std::uint16_t hi[3];  ///< half-open
-  std::uint32_t removed;
+  std::uint16_t hi[3];    ///< half-open
+  std::uint32_t removed;  ///< by an undo: given back
   std::uint16_t volume;
   std::uint16_t cause;
   std::uint32_t bricks;    ///< bricks the box touches

@@ -81,7 +81,7 @@ struct PrestonRig {
     auto covered = covered_voxels<N>(volume.grid, std::span<const Density>(volume.density),
                                      plan.labels, cutter.overlap,
                                      frame_at<N>(centre_vox, rim_vox, axis), std::span(memory));
-    Pressed<N> pressed{{}, covered.drag, touches_forbidden(plan, covered)};
+    Pressed<N> pressed{{}, covered.drag, touched_forbidden(plan, covered) != 0};
     const auto drive = cut_drive<N>(typename N::Real(force_n), typename N::Real(threshold_n),
                                     typename N::Unit(ratio));
     static_cast<PrestonOutcome<N>&>(pressed) =

@@ -31,6 +31,19 @@ TEST_CASE("the report has every promised key, hashes as 16 hex digits") {
   CHECK(json["start_to_force_ms"] == 812.5);
 }
 
+TEST_CASE(
+    "report and summary tell what was removed of each material, and touches of forbidden ones") {
+  kerf::RunReport report;
+  report.materials = {{"enamel", 2.1, {}}, {"dentin", 0.0001, {}}, {"pulp", 0.0, 121.0}};
+  const auto json = nlohmann::json::parse(kerf::report_json(report));
+  CHECK(json["removed_mm3_by_material"]["enamel"] == 2.1);
+  CHECK(json["removed_mm3_by_material"]["dentin"] == 0.0001);
+  CHECK(json["forbidden_ms"] == nlohmann::json({{"pulp", 121.0}}));
+  const std::string text = kerf::summary(report);
+  CHECK(text.find("  of these   enamel 2.100 mm3\n") != std::string::npos);
+  CHECK(text.find("  forbidden  touched: pulp 121 ms\n") != std::string::npos);
+}
+
 TEST_CASE("an event is no fault, and more of them than fit hide none") {
   kerf::RunReport report;
   for (std::uint64_t i = 0; i < 100; ++i) report.record.add_event(i, "watchdog");

@@ -41,11 +41,16 @@ std::filesystem::path frame_file(const std::filesystem::path& folder, std::uint3
 /// Draws the session as it is and measures that.
 class FrameTaker {
  public:
-  FrameTaker(Picture& picture, PictureSize size, FrameReport& report)
-      : picture_(picture), target_(size), report_(report) {}
+  FrameTaker(Picture& picture, const VisualizerOptions& options, FrameReport& report)
+      : picture_(picture),
+        target_(options.size),
+        report_(report),
+        scale_(options.panel_scale.value_or(1.0)) {}
 
   void draw(Session& session) {
     figures_ = overlay_figures(session);
+    figures_.score = picture_.score(session);
+    figures_.scale = scale_;
     draw_measured(picture_, session, figures_, target_, report_);
   }
   [[nodiscard]] const RenderTarget& target() const noexcept { return target_; }
@@ -59,6 +64,7 @@ class FrameTaker {
   Picture& picture_;
   RenderTarget target_;
   FrameReport& report_;
+  double scale_;
   OverlayFigures figures_;
 };
 
@@ -116,7 +122,7 @@ int run_headless(const VisualizerOptions& options) {
   const Stopwatch since_attached;
   const double aspect = static_cast<double>(options.size.width) / options.size.height;
   Picture picture(session, options.look, aspect);
-  FrameTaker taker(picture, options.size, report);
+  FrameTaker taker(picture, options, report);
   taker.draw(session);  // not kept: the driver compiles shaders at their first use
   if (options.attached) write_new_file(*options.attached, "");
   report.late_join_ms = since_attached.wall_ms();

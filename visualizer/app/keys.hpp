@@ -11,24 +11,31 @@ struct KeyHelp {
   const char* key;
   const char* meaning;
 };
+// Short: a page of them covers at most a quarter of a small window (overlay.hpp).
 inline constexpr auto kKeys = std::to_array<KeyHelp>({
-    {"drag, left or right", "turn"},
-    {"shift or middle drag", "move"},
+    {"drag", "turn"},
+    {"shift + drag", "move; or the middle button"},
     {"wheel", "nearer, farther"},
     {"r", "first view again"},
-    {"u, u", "undo all cuts: the volumes as they were"},
+    {"z", "undo the last stroke"},
+    {"u, u", "undo all cuts"},
     {"1 .. 9", "take this tool"},
     {"v", "next renderer"},
-    {"b", "v is for one volume after another; then for all"},
+    {"b", "v is for one volume; for all"},
     {"c", "clip plane"},
-    {"t", "two eyes: stereo, side by side"},
+    {"x", "it faces you, through the tip"},
+    {"shift + wheel", "moves the clip plane"},
+    {"l", "three slices through the tip"},
+    {"y", "colours for the colour-blind"},
+    {"t", "stereo: two eyes side by side"},
+    {"o", "open a scene or a volume"},
     {"p", "plot of force and depth"},
     {"s", "screenshot"},
     {"m", "movie: begin, end"},
     {"a", "sound: off, on"},
     {"w", "write the opacities"},
     {"e", "export the surface"},
-    {"h", "these keys; again: no panels; again: panels"},
+    {"h", "keys, no panels, panels"},
     {"q", "quit"},
 });
 
@@ -37,17 +44,18 @@ inline constexpr std::size_t kMouseKeys = 3;
 
 /// What changes where the pointer leads the emulated hand (--hand-socket).
 inline constexpr auto kHandKeys = std::to_array<KeyHelp>({
-    {"pointer", "leads the hand; the ring is where it wants to be"},
+    {"pointer", "leads the hand: see the ring"},
     {"left button", "press"},
-    {"wheel, page up/down", "deeper, nearer"},
+    {"wheel", "deeper; or page up, down"},
     {"arrows", "tilt the tool"},
-    {"g", "the hand comes to the pointer"},
-    {"k", "park the stylus and take it again: clears a fault"},
+    {"g", "the hand comes here"},
+    {"k", "park, take up: clears a fault"},
     {"right drag", "turn"},
     {"middle drag", "move the picture"},
-    {"control + wheel", "zoom"},
-    {"gamepad", "left stick: move; right: depth; A: press; cross: tilt"},
-    {"SpaceMouse", "the cap moves and tilts; its first button presses"},
+    {"ctrl + wheel", "zoom"},
+    {"gamepad", "sticks move, A press,"},
+    {"", "cross tilt"},
+    {"SpaceMouse", "moves and tilts; presses"},
 });
 
 }  // namespace kerf

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "visualizer/app/look_panel.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <string_view>
 
 #include <imgui.h>
@@ -16,9 +18,12 @@ namespace kerf {
 
 namespace {
 
-constexpr ImGuiWindowFlags kTouched = (kStillPanel & ~ImGuiWindowFlags_NoInputs) |
-                                      ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoNavInputs;
+constexpr ImGuiWindowFlags kTouched =
+    (kStillPanel & ~(ImGuiWindowFlags_NoInputs | ImGuiWindowFlags_NoScrollbar)) |
+    ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoNavInputs;
 constexpr ImGuiSliderFlags kDragOnly = ImGuiSliderFlags_NoInput | ImGuiSliderFlags_AlwaysClamp;
+
+constexpr std::size_t kMostLetters = 12;  // letters
 
 void choose_gradient(Look& look) {
   auto chosen = static_cast<std::size_t>(look.gradient);
@@ -31,16 +36,54 @@ void choose_gradient(Look& look) {
   look.gradient = static_cast<Gradient>(chosen);
 }
 
+/// Draws a tool that lies from `corner` to the right, its tip first, within a box of `size`.
+void draw_side(const Silhouette& side, ImVec2 corner, ImVec2 size) {
+  if (side.empty()) return;
+  double out = 0.0;
+  for (const auto& [y, left, right] : side) out = std::max({out, -left, right});
+  const double low = side.front()[0], length = side.back()[0] - low;
+  const double scale =
+      std::min(static_cast<double>(size.x) / length, static_cast<double>(size.y) / (2.0 * out));
+  const auto at = [&](double y, double x) {
+    return ImVec2(corner.x + static_cast<float>((y - low) * scale),
+                  corner.y + 0.5F * size.y - static_cast<float>(x * scale));
+  };
+  ImDrawList& to = *ImGui::GetWindowDrawList();
+  const ImDrawListFlags smooth = to.Flags;
+  to.Flags &= ~ImDrawListFlags_AntiAliasedFill;  // else the rows show their seams
+  for (std::size_t i = 1; i < side.size(); ++i) {
+    const auto& [y0, left0, right0] = side[i - 1];
+    const auto& [y1, left1, right1] = side[i];
+    to.AddQuadFilled(at(y0, right0), at(y1, right1), at(y1, left1), at(y0, left0),
+                     ImGui::GetColorU32(kValueColour));
+  }
+  to.Flags = smooth;
+}
+
+constexpr float kSideWide = 38.0F, kSideHigh = 13.0F;
+
+/// The picture of the one in the hand stands in place of a label.
 void choose_tool(LookControls& controls) {
   if (controls.tools.size() < 2 || controls.tool >= controls.tools.size()) return;
-  if (!ImGui::BeginCombo("tool", controls.tools[controls.tool].c_str())) return;
   const std::size_t held = controls.tool;
-  for (std::size_t i = 0; i < controls.tools.size(); ++i) {
-    ImGui::PushID(static_cast<int>(i));  // two may have one name
-    if (ImGui::Selectable(controls.tools[i].c_str(), i == held)) controls.tool = i;
-    ImGui::PopID();
+  const ImVec2 picture{kSideWide * unit_px(), kSideHigh * unit_px()};
+  if (ImGui::BeginCombo("##tool", controls.tools[held].text.c_str())) {
+    for (std::size_t i = 0; i < controls.tools.size(); ++i) {
+      ImGui::PushID(static_cast<int>(i));  // two may have one name
+      if (ImGui::Selectable("##this", i == held, 0, {0.0F, picture.y})) controls.tool = i;
+      const ImVec2 corner = ImGui::GetItemRectMin();
+      draw_side(controls.tools[i].side, corner, picture);
+      ImGui::SameLine(picture.x + 2.0F * ImGui::GetStyle().ItemSpacing.x);
+      ImGui::TextUnformatted(controls.tools[i].text.c_str());
+      ImGui::PopID();
+    }
+    ImGui::EndCombo();
   }
-  ImGui::EndCombo();
+  ImGui::SameLine(0.0F, ImGui::GetStyle().ItemInnerSpacing.x);
+  const ImVec2 corner = ImGui::GetCursorScreenPos();
+  draw_side(controls.tools[held].side,
+            {corner.x, corner.y + 0.5F * (ImGui::GetFrameHeight() - picture.y)}, picture);
+  ImGui::Dummy({picture.x, ImGui::GetFrameHeight()});
 }
 
 /// One for each volume.
@@ -49,7 +92,8 @@ void choose_renderers(LookControls& controls) {
   const std::vector<std::string> now = renderer_of_each(controls.look.renderer, count);
   for (std::size_t v = 0; v < count; ++v) {
     ImGui::PushID(static_cast<int>(v));
-    const std::string label = count == 1 ? "renderer" : controls.volumes[v];
+    const std::string label =
+        count == 1 ? "renderer" : shortened(controls.volumes[v], kMostLetters);
     if (ImGui::BeginCombo(label.c_str(), now[v].c_str())) {
       for (const std::string_view kind : renderer_kinds()) {
         const std::string name(kind);
@@ -69,7 +113,8 @@ void choose_opacities(LookControls& controls) {
   controls.write = ImGui::SmallButton("write");
   for (const auto& [material, opacity] : controls.opacities) {
     auto value = static_cast<float>(opacity);
-    if (ImGui::SliderFloat(material.c_str(), &value, 0.0F, 1.0F, "%.3f",
+    const std::string label = shortened(material, kMostLetters) + "##" + material;
+    if (ImGui::SliderFloat(label.c_str(), &value, 0.0F, 1.0F, "%.3f",
                            kDragOnly | ImGuiSliderFlags_Logarithmic)) {
       look.opacities[material] = rounded_to(0.001, static_cast<double>(value));
     }
@@ -79,8 +124,9 @@ void choose_opacities(LookControls& controls) {
 void choose_clip_plane(Look& look) {
   ImGui::Checkbox("clip", &look.clip.on);
   if (look.clip.on) {
-    constexpr std::array kAxes{"x", "y", "z"};
-    for (int axis = 0; axis < 3; ++axis) {
+    constexpr std::array kAxes{"x", "y", "z", "free"};
+    const int choices = look.clip.axis == ClipPlane::kFree ? 4 : 3;  // x turns it freely
+    for (int axis = 0; axis < choices; ++axis) {
       ImGui::SameLine();
       ImGui::RadioButton(kAxes[static_cast<std::size_t>(axis)], &look.clip.axis, axis);
     }
@@ -91,12 +137,16 @@ void choose_clip_plane(Look& look) {
 
 }  // namespace
 
-float LookPanel::draw(LookControls& controls, float height) {
-  constexpr float kWide = 130.0F;
-  ImGui::SetNextWindowPos(ImVec2(12.0F, height - 12.0F), 0, ImVec2(0.0F, 1.0F));
+float LookPanel::draw(LookControls& controls, float height, float most_area) {
+  const float gap = 12.0F * unit_px(), least_high = 48.0F * unit_px();
+  const float wide = wide_ > 0.0F ? wide_ : 215.0F * unit_px();
+  const float high = std::max(std::min(most_area / wide, height - 2.0F * gap), least_high);
+  ImGui::SetNextWindowPos(ImVec2(gap, height - gap), 0, ImVec2(0.0F, 1.0F));
+  ImGui::SetNextWindowSizeConstraints(ImVec2(0.0F, 0.0F),
+                                      ImVec2(std::numeric_limits<float>::max(), high));
   ImGui::Begin("look", nullptr, kTouched);
   Look& look = controls.look;
-  ImGui::PushItemWidth(kWide);
+  ImGui::PushItemWidth(130.0F * unit_px());
   choose_tool(controls);
   choose_renderers(controls);
   if (controls.takes_gradient) choose_gradient(look);
@@ -107,7 +157,8 @@ float LookPanel::draw(LookControls& controls, float height) {
   ImGui::SameLine();
   ImGui::Checkbox("voxel tool", &look.voxel_tool);
   ImGui::PopItemWidth();
-  const float end_x = ImGui::GetWindowPos().x + ImGui::GetWindowWidth();
+  wide_ = ImGui::GetWindowWidth();
+  const float end_x = ImGui::GetWindowPos().x + wide_;
   ImGui::End();
   return end_x;
 }

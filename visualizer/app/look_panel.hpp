@@ -8,14 +8,22 @@
 
 #include "visualizer/view/look.hpp"
 #include "visualizer/view/pixel_rect.hpp"
+#include "visualizer/view/silhouette.hpp"
 
 namespace kerf {
+
+/// A tool in the list: its size and name, and its picture.
+struct ToolChoice {
+  std::string text;
+  Silhouette side{};
+  friend bool operator==(const ToolChoice&, const ToolChoice&) noexcept = default;
+};
 
 /// What the controls show, and the look that they change.
 struct LookControls {
   Look look;
   double own_iso = 0.5;                ///< of the main volume, 0..1: where the look has none
-  std::vector<std::string> tools{};    ///< names and sizes; one alone is no choice
+  std::vector<ToolChoice> tools{};     ///< one alone is no choice
   std::size_t tool = 0;                ///< in the hand, or asked for
   std::vector<std::string> volumes{};  ///< their names
   bool has_iso = false;                ///< a volume shows its iso-surface
@@ -31,12 +39,14 @@ struct LookControls {
 class LookPanel {
  public:
   /// Between ImGui::NewFrame and ImGui::Render. Takes the mouse's changes over into `controls`.
-  /// Returns the x at which the panel ends, in pixels, in a picture `height` pixels high.
-  float draw(LookControls& controls, float height);
+  /// Returns the x at which the panel ends, in pixels, in a picture `height` pixels high. Where the
+  /// controls need more than `most_area` square pixels, the panel scrolls.
+  float draw(LookControls& controls, float height, float most_area);
 
  private:
   void choose_iso(LookControls& controls);
 
+  float wide_ = 0.0F;                 ///< when it was drawn last
   std::optional<float> dragged_iso_;  ///< taken over when the drag ends: all is drawn anew then
 };
 

@@ -56,6 +56,13 @@ void declare_look(Arguments& app, VisualizerOptions& o, std::string& gradient) {
   app.flag("--voxel-tool", o.look.voxel_tool,
            "the tool as a volume of voxels, which the renderer draws as it does the others and "
            "the clip plane cuts too");
+  app.flag("--colour-blind", o.look.colour_blind,
+           "materials in Okabe and Ito's colours, which any colour vision tells apart; in the "
+           "window y");
+  app.option("--panel-scale", o.panel_scale,
+             "size of the panels, as far as the picture has room for it (default: the display's, "
+             "headless 1)")
+      .within(1.0, 8.0);
   app.flag("--stereo", o.look.stereo.on, "two eyes side by side, each in half the width");
   app.option("--eyes", o.look.stereo.eyes_mm,
              "stereo: mm between the eyes; negative: crossed (default: 1/30 of --convergence)")
@@ -79,6 +86,15 @@ void declare_run(Arguments& app, VisualizerOptions& o) {
   app.option("--attached", o.attached,
              "make this empty file once the controller is shown: a short run may begin")
       .shown_as("FILE");
+  const Option choice =
+      app.option("--choice", o.choice,
+                 "in a window: o opens a list of scenes and volumes; the window ends with the path "
+                 "of the chosen one in this new file, for who started it")
+          .shown_as("FILE");
+  app.option("--open-in", o.open_in, "where that list begins")
+      .shown_as("FOLDER")
+      .shows_default()
+      .needs(choice);
   app.option("--cpu", o.cpus, "cores to run on, e.g. 0,1 (default: all but the last)")
       .split_at_commas()
       .within(0, 1023);

@@ -17,6 +17,7 @@ struct VisualizerOptions {
   std::string name = "kerf";  ///< of the controller
   Look look;                  ///< at first; its opacities are those of `transfer`
   PictureSize size{800, 600};
+  std::optional<double> panel_scale;  ///< of the panels' letters; none: the display's density
   bool headless = false;
   std::uint32_t frames = 10;  ///< headless: this many pictures; beside a video none by default
   std::optional<std::uint64_t> every_ticks;  ///< headless: default once a second of servo time
@@ -25,6 +26,8 @@ struct VisualizerOptions {
   double wait_s = 10.0;                      ///< for the controller to appear
   std::optional<std::filesystem::path> attached;  ///< --attached: made once it is shown
   bool mute = false;                              ///< no sound until the user asks for it
+  std::optional<std::filesystem::path> choice;    ///< --choice: made with what o chose
+  std::filesystem::path open_in = ".";            ///< where o looks first
   std::optional<std::string> hand_socket;         ///< where an emulator's hand is to be led
   std::optional<std::string> lead;                ///< headless: FIFO of a controller in lock-step
   std::optional<std::string> record;              ///< video: a file, a pipe, or "-" for stdout

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 
 #include <backends/imgui_impl_opengl3.h>
 #include <imgui.h>
@@ -25,26 +26,47 @@ OverlayFigures OverlayFigures::rounded() const {
     }
     shown.hand->deeper_mm = rounded_to(0.1, hand->deeper_mm);
   }
+  for (ScoreRow& material : shown.score) {
+    material.removed_mm3 = rounded_to(0.01, material.removed_mm3);
+  }
   if (data_age_ms) shown.data_age_ms = rounded_to(0.1, *data_age_ms);
   return shown;
 }
 
-Overlay::Overlay() {
-  ImGui::CreateContext();
-  ImGuiIO& io = ImGui::GetIO();
-  io.IniFilename = nullptr;  // leaves no file behind
-  ImGuiStyle& style = ImGui::GetStyle();
+namespace {
+
+constexpr double kQuarter = 0.25, kPlainWidth = 640.0, kPlainHeight = 480.0;
+
+/// Letters for what is asked, but no larger than where a plain picture would have as much room.
+float letters_for(double scale, PictureSize size) {
+  const double room = std::min(size.width / kPlainWidth, size.height / kPlainHeight);
+  const double taken = std::clamp(scale, 1.0, std::max(1.0, room));
+  return std::floor(kPlainLetters * static_cast<float>(taken));
+}
+
+ImGuiStyle style_for(float unit) {
+  ImGuiStyle style;
   ImGui::StyleColorsDark(&style);
   style.WindowRounding = 5.0F;
   style.FrameRounding = 3.0F;
   style.WindowBorderSize = 0.0F;
   style.WindowPadding = ImVec2(11.0F, 9.0F);
   style.CellPadding = ImVec2(4.0F, 1.5F);
+  style.ScrollbarSize = 10.0F;
   style.Colors[ImGuiCol_WindowBg] = ImVec4(0.04F, 0.05F, 0.06F, 0.72F);
   style.Colors[ImGuiCol_FrameBg] = ImVec4(1.0F, 1.0F, 1.0F, 0.12F);
   // Dark enough for the digits that stand on it.
   style.Colors[ImGuiCol_SliderGrab] = ImVec4(0.12F, 0.34F, 0.50F, 1.0F);
   style.Colors[ImGuiCol_SliderGrabActive] = ImVec4(0.16F, 0.42F, 0.60F, 1.0F);
+  if (unit != 1.0F) style.ScaleAllSizes(unit);
+  return style;
+}
+
+}  // namespace
+
+Overlay::Overlay() {
+  ImGui::CreateContext();
+  ImGui::GetIO().IniFilename = nullptr;  // leaves no file behind
   if (!ImGui_ImplOpenGL3_Init("#version 450 core")) {
     ImGui::DestroyContext();
     throw VisualizerError("overlay: Dear ImGui finds no OpenGL functions; install libgl1");
@@ -56,11 +78,28 @@ Overlay::~Overlay() {
   ImGui::DestroyContext();
 }
 
+void Overlay::begin_frame(const OverlayFigures& figures, PictureSize size) {
+  const float letters = letters_for(figures.scale, size);
+  if (letters != letters_) {
+    letters_ = letters;
+    ImFontAtlas& fonts = *ImGui::GetIO().Fonts;
+    fonts.Clear();
+    ImFontConfig plain;
+    plain.SizePixels = letters;
+    fonts.AddFontDefault(&plain);
+    ImGui_ImplOpenGL3_DestroyFontsTexture();
+    ImGui_ImplOpenGL3_CreateFontsTexture();
+    ImGui::GetStyle() = style_for(letters / kPlainLetters);
+  }
+  ImGui_ImplOpenGL3_NewFrame();
+}
+
 bool Overlay::handle(const Pointer& pointer, OverlayFigures& figures, PictureSize size) {
   ImGuiIO& io = ImGui::GetIO();
   io.MousePos = ImVec2(static_cast<float>(pointer.x), static_cast<float>(pointer.y));
   io.MouseDown[0] = pointer.down;
-  ImGui_ImplOpenGL3_NewFrame();
+  io.MouseWheel = static_cast<float>(pointer.wheel);
+  begin_frame(figures, size);
   lay_out(figures, size);
   if (figures.controls && io.WantCaptureMouse) figures.controls->over = pointer;
   return io.WantCaptureMouse;
@@ -70,17 +109,43 @@ void Overlay::lay_out(OverlayFigures& figures, PictureSize size) {
   const ImVec2 all{static_cast<float>(size.width), static_cast<float>(size.height)};
   ImGui::GetIO().DisplaySize = all;
   ImGui::NewFrame();
-  if (!figures.hidden) draw_figures(figures);
+  const double plain = kPlainWidth * kPlainHeight * static_cast<double>(unit_px() * unit_px());
+  const double picture = static_cast<double>(all.x) * static_cast<double>(all.y);
+  auto room = static_cast<float>(kQuarter * std::max(plain, picture));
   float controls_x = 0.0F;
-  if (figures.controls && !figures.hidden) controls_x = look_panel_.draw(*figures.controls, all.y);
+  if (figures.open) {
+    draw_open_panel(*figures.open, all, room);
+  } else if (figures.help > 0) {
+    help_pages_ = draw_key_help(all, figures.leads_hand, figures.help, room);
+  } else if (!figures.hidden) {
+    room -= draw_figures(figures);
+    if (figures.slices) {
+      show(*figures.slices);
+      const auto texture = static_cast<std::intptr_t>(slices_->id());
+      room -= draw_slices(*figures.slices, reinterpret_cast<ImTextureID>(texture), all);
+    }
+    if (figures.controls) controls_x = look_panel_.draw(*figures.controls, all.y, room);
+  }
   if (figures.hand) draw_hand_mark(*figures.hand, figures.force_n / figures.full_force_n);
-  if (figures.help) draw_key_help(all, figures.leads_hand);
   if (!figures.banner.empty()) draw_banner(figures.banner, figures.alarm, all, controls_x);
   ImGui::Render();
 }
 
+void Overlay::show(const SliceViews& slices) {
+  if (uploaded_ == slices) return;
+  if (!uploaded_ || uploaded_->side != slices.side) {
+    slices_ = GlTexture2D::create();
+    glTextureStorage2D(slices_->id(), 1, GL_RGB8, slices.side, 3 * slices.side);
+    read_nearest(slices_->id());
+  }
+  glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
+  glTextureSubImage2D(slices_->id(), 0, 0, 0, slices.side, 3 * slices.side, GL_RGB,
+                      GL_UNSIGNED_BYTE, slices.rgb.data());
+  uploaded_ = slices;
+}
+
 PixelRect Overlay::prepare(const OverlayFigures& figures, PictureSize size) {
-  ImGui_ImplOpenGL3_NewFrame();
+  begin_frame(figures, size);
   OverlayFigures shown = figures;
   // ImGui learns the size of what a panel holds by laying it out: the second time is right.
   for (int pass = 0; pass < 2; ++pass) lay_out(shown, size);
@@ -100,6 +165,7 @@ PixelRect Overlay::prepare(const OverlayFigures& figures, PictureSize size) {
 
 void Overlay::draw(const RenderTarget& target, int eyes) {
   target.bind();
+  glUseProgram(0);  // ImGui puts back what was in use, and that may have gone
   ImDrawData& panels = *ImGui::GetDrawData();
   panels.DisplaySize.x = static_cast<float>(target.size().width);
   const int eye_width = target.size().width / eyes;

@@ -8,8 +8,11 @@
 
 #include "visualizer/app/force_plot.hpp"
 #include "visualizer/app/look_panel.hpp"
+#include "visualizer/gl/names.hpp"
 #include "visualizer/gl/target.hpp"
+#include "visualizer/view/folder_list.hpp"
 #include "visualizer/view/pixel_rect.hpp"
+#include "visualizer/view/slice_views.hpp"
 
 namespace kerf {
 
@@ -22,6 +25,21 @@ struct HandMark {
   friend bool operator==(const HandMark&, const HandMark&) noexcept = default;
 };
 
+/// A list of what may be opened, and what the mouse chose of it.
+struct OpenPanel {
+  FolderList list;
+  std::optional<std::size_t> chosen{};  ///< index of its entries
+  friend bool operator==(const OpenPanel&, const OpenPanel&) noexcept = default;
+};
+
+/// A material with its colour in the picture, sRGB 0..1, and what was removed of it.
+struct ScoreRow {
+  std::string name;
+  float red = 0.0F, green = 0.0F, blue = 0.0F;
+  double removed_mm3 = 0.0;
+  friend bool operator==(const ScoreRow&, const ScoreRow&) noexcept = default;
+};
+
 /// What the panel in the corner says.
 struct OverlayFigures {
   double force_n = 0.0;
@@ -29,18 +47,25 @@ struct OverlayFigures {
   std::string tool;
   double removed_mm3 = 0.0;
   bool removed_is_partial = false;  ///< joined late: counted from then on
+  std::vector<ScoreRow> score;      ///< of the scene's materials
+  std::string forbidden;            ///< which of them may not be cut; empty: none
+  double forbidden_ms = 0.0;        ///< they were pressed upon for so long
   std::optional<double> tick_rate_hz;
   std::optional<double> frame_rate_hz;
   std::optional<double> data_age_ms;
   std::optional<std::uint64_t> filmed_frames;  ///< written so far; none: no video
   std::string banner;                          ///< shown large; empty: there is nothing to say
   bool alarm = false;                          ///< it says that something is wrong
-  bool help = false;                           ///< shows the keys
+  int help = 0;                                ///< shows this page of the keys, and no panel
   bool leads_hand = false;                     ///< with those that lead the hand
   std::optional<HandMark> hand;                ///< none: nobody leads it
   bool hidden = false;                         ///< shows nothing but the banner: for films
-  std::vector<ForcePlot::Point> plot;          ///< force and depth over time; empty: no plot
-  std::optional<LookControls> controls;        ///< in a window
+  std::vector<ForcePlot::Point> plot;    ///< force and depth over time, in place of score and rates
+  std::optional<SliceViews> slices;      ///< in place of plot and rates
+  std::optional<LookControls> controls;  ///< in a window
+  std::optional<OpenPanel> open;         ///< in place of all panels
+  /// Of the letters, over those for 96 dots per inch; as far as the picture has room.
+  double scale = 1.0;
 
   /// As far as the panel shows them: two equal ones look alike.
   [[nodiscard]] OverlayFigures rounded() const;
@@ -49,6 +74,9 @@ struct OverlayFigures {
 
 /// The panels over the picture, by Dear ImGui, which is told where the mouse is: it needs no
 /// window. One at a time, on the thread of the GL context.
+///
+/// Together they cover at most a quarter of a picture of 640x480 or more: what a full panel has no
+/// room for is scrolled to or, of the keys, on a page of its own. A menu that is open comes on top.
 class Overlay {
  public:
   Overlay();
@@ -65,11 +93,19 @@ class Overlay {
   /// Draws what was laid out last over `target`: once, or once for each of the `eyes` that lie side
   /// by side in it, at the same place for both, so that the panels seem to lie in the screen.
   void draw(const RenderTarget& target, int eyes = 1);
+  /// Of the keys, as they were laid out last.
+  [[nodiscard]] int help_pages() const noexcept { return help_pages_; }
 
  private:
+  void begin_frame(const OverlayFigures& figures, PictureSize size);
   void lay_out(OverlayFigures& figures, PictureSize size);
+  void show(const SliceViews& slices);
 
   LookPanel look_panel_;
+  float letters_ = 0.0F;  ///< height of those that are loaded, in pixels
+  int help_pages_ = 1;
+  std::optional<SliceViews> uploaded_;
+  std::optional<GlTexture2D> slices_;
 };
 
 }  // namespace kerf

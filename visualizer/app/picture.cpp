@@ -7,6 +7,8 @@
 #include <cmath>
 #include <string>
 
+#include <glm/gtc/matrix_access.hpp>
+
 #include "visualizer/gl/context.hpp"
 #include "visualizer/view/transfer_function.hpp"
 
@@ -25,6 +27,16 @@ void clear(const RenderTarget& target) {
   target.bind();
   constexpr float kBlack[4] = {0.0F, 0.0F, 0.0F, 1.0F};
   glClearNamedFramebufferfv(target.framebuffer(), GL_COLOR, 0, kBlack);
+}
+
+/// Of length 1, towards what a plane cuts off.
+glm::dvec3 direction_of(const ClipPlane& plane) {
+  if (plane.axis == ClipPlane::kFree) {
+    return {plane.towards[0], plane.towards[1], plane.towards[2]};
+  }
+  glm::dvec3 axis(0.0);
+  axis[plane.axis] = 1.0;
+  return axis;
 }
 
 /// What stands between the hand and its force, and what to do; empty: nothing.
@@ -71,6 +83,7 @@ SceneView Picture::scene_in(const Look& look) const {
   for (VolumeView& volume : scene.volumes) {
     if (look.iso) volume.iso = static_cast<Density>(std::lround(*look.iso * kDensityMax));
   }
+  if (look.colour_blind) take_okabe_ito(scene.materials);
   for (MaterialView& material : scene.materials) {
     const auto chosen = look.opacities.find(material.name);
     if (chosen != look.opacities.end()) material.opacity = chosen->second;
@@ -88,7 +101,7 @@ std::unique_ptr<ScenePainter> Picture::painter_for(const Session& session, const
 void Picture::set_look(const Session& session, const Look& look) {
   if (look == look_) return;
   if (look.renderer != look_.renderer || look.iso != look_.iso || look.gradient != look_.gradient ||
-      look.voxel_tool != look_.voxel_tool) {
+      look.voxel_tool != look_.voxel_tool || look.colour_blind != look_.colour_blind) {
     painter_ = painter_for(session, look);
   } else {
     if (look.clip.on != look_.clip.on) painter_->set_cut_open(look.clip.on, session.contents());
@@ -111,6 +124,21 @@ LookControls Picture::controls() const {
   return controls;
 }
 
+std::vector<ScoreRow> Picture::score(const Session& session) const {
+  const std::vector<MaterialView> materials = scene_in(look_).materials;
+  const std::vector<double> removed = session.removed_by_material_mm3();
+  std::vector<ScoreRow> rows;
+  const auto srgb = [](double linear) {
+    constexpr double kGamma = 2.2;
+    return static_cast<float>(std::pow(std::clamp(linear, 0.0, 1.0), 1.0 / kGamma));
+  };
+  for (std::size_t m = 1; m < materials.size(); ++m) {
+    const glm::dvec3& colour = materials[m].colour;
+    rows.push_back({materials[m].name, srgb(colour.r), srgb(colour.g), srgb(colour.b), removed[m]});
+  }
+  return rows;
+}
+
 Opacities Picture::opacities() const {
   Opacities opacities;
   const std::vector<MaterialView> materials = scene_in(look_).materials;
@@ -120,13 +148,40 @@ Opacities Picture::opacities() const {
   return opacities;
 }
 
+glm::dvec2 Picture::reach_along(const glm::dvec3& towards) const {
+  const glm::dvec3 middle = 0.5 * (low_mm_ + high_mm_);
+  const double half = glm::dot(glm::abs(towards), 0.5 * (high_mm_ - low_mm_));
+  return glm::dot(towards, middle) + glm::dvec2(-half, half);
+}
+
+ClipPlane Picture::facing_plane(const std::optional<glm::dvec3>& point_mm) const {
+  const View view = camera_.view(1.0, camera_.radius_mm());
+  const glm::dvec3 towards = glm::normalize(glm::dvec3(glm::row(view.eye_from_world, 2)));
+  const glm::dvec2 reach = reach_along(towards);
+  ClipPlane plane{.on = true,
+                  .axis = ClipPlane::kFree,
+                  .at = 0.5,
+                  .towards = {towards.x, towards.y, towards.z}};
+  if (point_mm) {
+    const double along = glm::dot(towards, *point_mm);
+    plane.at = std::clamp((along - reach.x) / (reach.y - reach.x), 0.0, 1.0);
+  }
+  return plane;
+}
+
+ClipPlane Picture::moved(const ClipPlane& plane, double mm) const {
+  const glm::dvec2 reach = reach_along(direction_of(plane));
+  ClipPlane moved = plane;
+  moved.at = std::clamp(plane.at + mm / (reach.y - reach.x), 0.0, 1.0);
+  return moved;
+}
+
 glm::dvec4 Picture::shown_half() const {
   const ClipPlane& clip = look_.clip;
   if (!clip.on) return View{}.shown;
-  glm::dvec4 shown(0.0);
-  shown[clip.axis] = -1.0;
-  shown.w = glm::mix(low_mm_, high_mm_, clip.at)[clip.axis];
-  return shown;
+  const glm::dvec3 towards = direction_of(clip);
+  const glm::dvec2 reach = reach_along(towards);
+  return {-towards, glm::mix(reach.x, reach.y, clip.at)};
 }
 
 void Picture::reset_camera(double aspect) {
@@ -256,6 +311,11 @@ OverlayFigures overlay_figures(const Session& session) {
   }
   figures.removed_mm3 = session.removed_mm3();
   figures.removed_is_partial = session.joined_late();
+  for (const MaterialView& material : session.scene().materials) {
+    if (!material.forbidden) continue;
+    figures.forbidden += (figures.forbidden.empty() ? "" : ", ") + material.name;
+  }
+  figures.forbidden_ms = session.forbidden_ms();
   figures.tick_rate_hz = session.tick_rate_hz();
   figures.data_age_ms = session.data_age_ms();
   if (session.ended()) {

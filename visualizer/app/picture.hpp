@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "visualizer/app/overlay.hpp"
@@ -51,8 +52,18 @@ class Picture {
   [[nodiscard]] Opacities opacities() const;
   /// For `OverlayFigures::controls`.
   [[nodiscard]] LookControls controls() const;
+  /// See `Overlay::help_pages`.
+  [[nodiscard]] int help_pages() const noexcept { return overlay_.help_pages(); }
+  /// Of the scene's materials as they are drawn, with what was removed.
+  [[nodiscard]] std::vector<ScoreRow> score(const Session& session) const;
   /// The mouse over the panels: see `Overlay::handle`.
   bool handle(const Pointer& pointer, OverlayFigures& figures, PictureSize size);
+
+  /// A plane square to the gaze, through `point_mm`, or without one through the middle of all
+  /// volumes.
+  [[nodiscard]] ClipPlane facing_plane(const std::optional<glm::dvec3>& point_mm) const;
+  /// The plane moved by `mm` towards what it cuts off.
+  [[nodiscard]] ClipPlane moved(const ClipPlane& plane, double mm) const;
 
   [[nodiscard]] OrbitCamera& camera() noexcept { return camera_; }
   /// What one eye of a picture of `size` sees; of two, the one in their middle would.
@@ -66,6 +77,8 @@ class Picture {
   /// The same of another look.
   [[nodiscard]] SceneView scene_in(const Look& look) const;
   [[nodiscard]] std::unique_ptr<ScenePainter> painter_for(const Session& session, const Look& look);
+  /// Where the box of all volumes begins and ends along a direction, in mm.
+  [[nodiscard]] glm::dvec2 reach_along(const glm::dvec3& towards) const;
   /// `View::shown` of the clip plane.
   [[nodiscard]] glm::dvec4 shown_half() const;
   /// Of each eye, from the left.

@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "visualizer/compose/hand_painter.hpp"
 #include "visualizer/error.hpp"
 #include "visualizer/render/renderer_choice.hpp"
 #include "visualizer/surface/mesh_file.hpp"
@@ -42,6 +43,13 @@ Notice write_for_user(const std::string& what, const Write& write) {
 
 using namespace std::string_literals;
 
+constexpr double kMmPerNotch = 0.25;  // of the clip plane, as of a hand's depth
+
+std::optional<glm::dvec3> tip_of(const Session& session) {
+  const auto hand = session.latest() ? hand_of(*session.latest()) : std::nullopt;
+  return hand ? std::optional(hand->tip_mm) : std::nullopt;
+}
+
 /// A slip of a finger must not undo what was cut: the key is pressed twice.
 void undo_all(std::optional<Notices::Clock::time_point>& asked, Session& session, Notices& notices,
               Notices::Clock::time_point now) {
@@ -53,6 +61,20 @@ void undo_all(std::optional<Notices::Clock::time_point>& asked, Session& session
     notices.say({"all cuts are undone"}, now);
   } else {
     notices.say({"undo: the controller did not take it; press u twice again", true}, now);
+  }
+}
+
+void undo_stroke(Session& session, Notices& notices, Notices::Clock::time_point now) {
+  const auto& newest = session.latest();
+  if (!newest || (newest->flags & kFlagUndoable) == 0) {
+    notices.say({"undo: there is no stroke to take back, or it was longer than 16 MiB of voxels; "
+                 "u, u undoes all cuts",
+                 true},
+                now);
+  } else if (session.undo()) {
+    notices.say({"the last stroke is undone"}, now);
+  } else {
+    notices.say({"undo: the controller did not take it; press z again", true}, now);
   }
 }
 
@@ -100,12 +122,13 @@ bool WindowKeys::apply(const WindowInput& input, Session& session, Picture& pict
     if (key == 'e') mesh = true;
     if (key == 'w') write = true;
     if (key == 'm') film = !film;
-    if (key == 'h') {  // panels, with the keys, none
-      const bool shown = !hidden;
-      hidden = shown && help;
-      help = shown && !help;
+    if (key == 'h') {  // panels, the keys page by page, none
+      const bool next = !hidden && help < help_pages;
+      hidden = !hidden && !next;
+      help = next ? help + 1 : 0;
     }
-    if (key == 'p') plot = !plot;
+    if (key == 'l') slices = !slices, plot = false;
+    if (key == 'p') plot = !plot, slices = false;
     if (key == 'v') {
       look.renderer = one > 0 ? next_renderer(look.renderer, volumes.size(), one - 1)
                               : next_renderer(look.renderer);
@@ -114,14 +137,21 @@ bool WindowKeys::apply(const WindowInput& input, Session& session, Picture& pict
       one = (one + 1) % (volumes.size() + 1);
       notices.say({"v: " + (one > 0 ? volumes[one - 1].name : "all volumes")}, now);
     }
+    if (key == 'o') open = !open;
     if (key == 'g') come = true;
     if (key == 'k') park = true;
+    if (key == 'z') undo_stroke(session, notices, now);
     if (key == 'u') undo_all(undo_asked, session, notices, now);
     if (key == 'c') look.clip.on = !look.clip.on;
+    if (key == 'x') look.clip = picture.facing_plane(tip_of(session));
+    if (key == 'y') look.colour_blind = !look.colour_blind;
     if (key == 't') look.stereo.on = !look.stereo.on;
     if (key >= '1' && key <= '9') {
       take_tool(static_cast<std::size_t>(key - '1'), session, notices, now);
     }
+  }
+  if (look.clip.on && input.plane != 0.0) {
+    look.clip = picture.moved(look.clip, -kMmPerNotch * input.plane);
   }
   change_look(picture, session, look, notices, now);
   return quit;

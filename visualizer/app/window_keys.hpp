@@ -29,9 +29,12 @@ void take_tool(std::size_t index, Session& session, Notices& notices,
 /// What the keys of a window have switched, and what they have asked for. Who does what was asked
 /// sets it back to false.
 struct WindowKeys {
-  bool help = false;
+  int help = 0;         ///< page of the keys
+  int help_pages = 1;   ///< there are so many
   bool hidden = false;  ///< the panels
   bool plot = false;
+  bool slices = false;
+  bool open = false;  ///< open the list of scenes, or leave it
   bool screenshot = false;
   bool mesh = false;    ///< export the surface
   bool write = false;   ///< write the opacities

@@ -86,7 +86,12 @@ WindowRun::Frame WindowRun::step(const WindowInput& input, PictureSize size,
                                  Clock::time_point now) {
   const bool visible = size.width > 0 && size.height > 0;
   if (visible) aspect_ = static_cast<double>(size.width) / size.height;
-  if (keys_.apply(input, session(), picture(), aspect_, notices_, now)) return {.quit = true};
+  density_ = input.density;
+  keys_.help_pages = picture().help_pages();
+  if (keys_.apply(input, session(), picture(), aspect_, notices_, now) || chosen_) {
+    return {.quit = true};
+  }
+  if (std::exchange(keys_.open, false)) toggle_list(now);
   followed_.update(aspect_, now);
   if (const auto& newest = session().latest()) plot_.add(*newest);
   if (std::exchange(keys_.mesh, false)) notices_.say(export_mesh(options_, session()), now);
@@ -117,14 +122,54 @@ OverlayFigures WindowRun::figures_at(Clock::time_point now) {
   figures.hidden = keys_.hidden;
   notices_.show(figures, now);
   if (keys_.plot) figures.plot = plot_.points();
+  figures.score = picture().score(session());
+  if (keys_.slices) figures.slices = slices_at_tip();
+  figures.open = open_;
+  figures.scale = options_.panel_scale.value_or(density_);
   figures.controls = picture().controls();
   for (const ToolView& tool : session().scene().tools) {
     std::array<char, 24> size{};
     std::snprintf(size.data(), size.size(), "%.1f mm ", 2.0 * tool.radius_mm);
-    figures.controls->tools.push_back(size.data() + tool.name);
+    figures.controls->tools.push_back({size.data() + tool.name, silhouette_of(tool)});
   }
   if (const auto& newest = session().latest()) figures.controls->tool = newest->active_tool;
   return figures;
+}
+
+void WindowRun::toggle_list(Clock::time_point now) {
+  if (!options_.choice) {
+    notices_.say({"open: nobody waits for a choice; ./kerf demo does", true}, now);
+  } else if (open_) {
+    open_.reset();
+  } else {
+    open_ = OpenPanel{list_folder(options_.open_in)};
+  }
+}
+
+void WindowRun::choose(const OpenPanel& panel, Clock::time_point now) {
+  const FolderList& list = panel.list;
+  const FolderList::Entry& entry = list.entries[*panel.chosen];
+  const std::filesystem::path path =
+      entry.name == ".." ? list.folder.parent_path() : list.folder / entry.name;
+  if (entry.is_folder) {
+    open_ = OpenPanel{list_folder(path)};
+    return;
+  }
+  if (open_->list.note = why_not_open(path); !open_->list.note.empty()) return;
+  try {
+    write_new_file(*options_.choice, path.string() + "\n");
+    chosen_ = true;
+  } catch (const FileError& problem) {
+    notices_.say({problem.what(), true}, now);
+  }
+}
+
+std::optional<SliceViews> WindowRun::slices_at_tip() {
+  constexpr double kSide = 56.0;  // three of them leave room for the others
+  const auto hand = session().latest() ? hand_of(*session().latest()) : std::nullopt;
+  if (!hand) return std::nullopt;
+  const int side = static_cast<int>(kSide * options_.panel_scale.value_or(density_));
+  return slice_views(picture().shown_scene(), session().contents(), hand->tip_mm, side);
 }
 
 void WindowRun::follow(const WindowInput& input, OverlayFigures& figures, PictureSize size,
@@ -195,6 +240,7 @@ Redrawn WindowRun::draw(PictureSize size, const WindowInput& input, Clock::time_
   OverlayFigures figures = figures_at(now);
   const std::size_t held = figures.controls->tool;
   follow(input, figures, size, now);
+  if (figures.open && figures.open->chosen) choose(*figures.open, now);
   if (figures.controls->tool != held) {
     take_tool(figures.controls->tool, session(), notices_, now);
     figures.controls->tool = held;  // until the controller has changed it

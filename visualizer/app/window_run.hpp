@@ -87,6 +87,12 @@ class WindowRun {
 
  private:
   [[nodiscard]] OverlayFigures figures_at(Clock::time_point now);
+  /// Opens or leaves the list of scenes, where somebody waits for a choice.
+  void toggle_list(Clock::time_point now);
+  /// What the mouse chose of it: another folder, or what the window ends with.
+  void choose(const OpenPanel& panel, Clock::time_point now);
+  /// None while nobody knows where the tip is.
+  [[nodiscard]] std::optional<SliceViews> slices_at_tip();
   /// What the user wants of hand and camera; the mark of the hand goes into the figures.
   void follow(const WindowInput& input, OverlayFigures& figures, PictureSize size,
               Clock::time_point now);
@@ -100,6 +106,7 @@ class WindowRun {
   bool record_from_start_, video_is_cut_ = false;
   FrameReport report_;
   double aspect_;
+  double density_ = 1.0;  ///< of the display
   FollowedSession followed_;
   std::optional<RenderTarget> target_;
   ShownRates rates_;
@@ -107,6 +114,8 @@ class WindowRun {
   Notices notices_;
   ForcePlot plot_;
   std::optional<Film> film_;
+  std::optional<OpenPanel> open_;
+  bool chosen_ = false;  ///< and written: the window ends
   std::optional<HandLink> hand_link_;
   std::optional<SpaceMouse> space_mouse_;
   PointerHand hand_;

@@ -60,6 +60,11 @@ bool is_down(GLFWwindow* handle, int button) {
   return glfwGetMouseButton(handle, button) == GLFW_PRESS;
 }
 
+bool has_shift(GLFWwindow* handle) {
+  return glfwGetKey(handle, GLFW_KEY_LEFT_SHIFT) == GLFW_PRESS ||
+         glfwGetKey(handle, GLFW_KEY_RIGHT_SHIFT) == GLFW_PRESS;
+}
+
 /// -1, 0 or 1 by two keys.
 double of_keys(GLFWwindow* handle, int less, int more) {
   return (glfwGetKey(handle, more) == GLFW_PRESS ? 1.0 : 0.0) -
@@ -183,6 +188,9 @@ WindowInput Window::poll() {
   }
   if (is_down(handle_, GLFW_MOUSE_BUTTON_LEFT)) input_.pointer.down = true;
   input_.hovers = cursor_known_;
+  float density = 1.0F;
+  glfwGetWindowContentScale(handle_, &density, nullptr);
+  input_.density = static_cast<double>(density);
   HeldControls& held = input_.held;
   held.deeper = of_keys(handle_, GLFW_KEY_PAGE_DOWN, GLFW_KEY_PAGE_UP);
   held.tilt_right = of_keys(handle_, GLFW_KEY_LEFT, GLFW_KEY_RIGHT);
@@ -207,8 +215,7 @@ void Window::on_cursor(GLFWwindow* handle, double x, double y) {
   glfwGetWindowSize(handle, &width, &height);
   if (height <= 0) return;
   const bool left = is_down(handle, GLFW_MOUSE_BUTTON_LEFT);
-  const bool shift = glfwGetKey(handle, GLFW_KEY_LEFT_SHIFT) == GLFW_PRESS ||
-                     glfwGetKey(handle, GLFW_KEY_RIGHT_SHIFT) == GLFW_PRESS;
+  const bool shift = has_shift(handle);
   WindowInput& input = window.input_;
   if (is_down(handle, GLFW_MOUSE_BUTTON_MIDDLE) || (left && shift)) {
     input.move_right += right / height;
@@ -240,7 +247,8 @@ void Window::on_scroll(GLFWwindow* handle, double /*x*/, double y) {
   const bool control = glfwGetKey(handle, GLFW_KEY_LEFT_CONTROL) == GLFW_PRESS ||
                        glfwGetKey(handle, GLFW_KEY_RIGHT_CONTROL) == GLFW_PRESS;
   WindowInput& input = window_of(handle).input_;
-  (control ? input.zoom : input.wheel) += y;
+  (control ? input.zoom : has_shift(handle) ? input.plane : input.wheel) += y;
+  input.pointer.wheel += y;
 }
 
 }  // namespace kerf

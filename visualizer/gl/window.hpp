@@ -32,10 +32,12 @@ struct WindowInput {
   double move_right = 0.0, move_up = 0.0;  ///< with the middle one, or the left one and shift
   double wheel = 0.0;
   double zoom = 0.0;       ///< the wheel with control
+  double plane = 0.0;      ///< with shift
   HeldControls held;       ///< now
   bool hovers = false;     ///< the pointer is over the window
   Pointer pointer;         ///< at the end; down if it was so at any time
   std::vector<char> keys;  ///< lower-case letters and digits as printed on them
+  double density = 1.0;    ///< of the display, over that of 96 dots per inch
   bool exposed = false;    ///< what the window showed is lost: `present` again
   bool close = false;
 };

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <map>
 #include <optional>
 #include <string>
@@ -9,11 +10,14 @@
 
 namespace kerf {
 
-/// Cuts the volumes open, square to an axis of the world: what lies beyond is not drawn.
+/// Cuts the volumes open, square to an axis of the world or to any direction: what lies beyond is
+/// not drawn.
 struct ClipPlane {
+  static constexpr int kFree = 3;  ///< `axis` of any direction
   bool on = false;
-  int axis = 2;     ///< 0 x, 1 y, 2 z: towards the first view
-  double at = 0.5;  ///< 0..1 of the way through the box of all volumes
+  int axis = 2;                                  ///< 0 x, 1 y, 2 z: towards the first view
+  double at = 0.5;                               ///< 0..1 of the way through the box of all volumes
+  std::array<double, 3> towards{0.0, 0.0, 1.0};  ///< of kFree; length 1
   friend bool operator==(const ClipPlane&, const ClipPlane&) noexcept = default;
 };
 
@@ -36,7 +40,8 @@ struct Look {
   Gradient gradient = Gradient::corners;
   ClipPlane clip{};
   Stereo stereo{};
-  bool voxel_tool = false;  ///< the tool is a volume, not a mesh
+  bool voxel_tool = false;    ///< the tool is a volume, not a mesh
+  bool colour_blind = false;  ///< materials in colours that any colour vision tells apart
   friend bool operator==(const Look&, const Look&) noexcept = default;
 };
 

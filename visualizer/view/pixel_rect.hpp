@@ -58,6 +58,7 @@ struct PixelRect {
 struct Pointer {
   double x = -1.0, y = -1.0;  ///< outside at first
   bool down = false;
+  double wheel = 0.0;  ///< steps
   friend bool operator==(const Pointer&, const Pointer&) noexcept = default;
 };
 

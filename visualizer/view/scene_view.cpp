@@ -81,7 +81,8 @@ MaterialView material_view(const Json& text) {
   const auto colour = text.at("colour").get<std::array<double, 3>>();
   return {.name = text.at("name").get<std::string>(),
           .iso = text.at("iso").get<double>(),
-          .colour = {colour[0], colour[1], colour[2]}};
+          .colour = {colour[0], colour[1], colour[2]},
+          .forbidden = text.contains("forbidden") && text.at("forbidden").get<bool>()};
 }
 
 DeviceFrame device_frame(const Json& text) {
@@ -103,6 +104,24 @@ VolumeView volume_view(const SegmentVolumeInfo& info) {
 }
 
 }  // namespace
+
+void take_okabe_ito(std::span<MaterialView> materials) {
+  // sRGB; the lightest first: what is cut first is seen best.
+  constexpr auto kColours = std::to_array<std::array<int, 3>>({{86, 180, 233},   // sky blue
+                                                               {240, 228, 66},   // yellow
+                                                               {213, 94, 0},     // vermilion
+                                                               {0, 158, 115},    // bluish green
+                                                               {204, 121, 167},  // reddish purple
+                                                               {0, 114, 178},    // blue
+                                                               {230, 159, 0}});  // orange
+  constexpr double kGamma = 2.2;
+  for (std::size_t m = 1; m < materials.size(); ++m) {
+    const std::array<int, 3>& srgb = kColours[(m - 1) % kColours.size()];
+    for (int i = 0; i < 3; ++i) {
+      materials[m].colour[i] = std::pow(srgb[static_cast<std::size_t>(i)] / 255.0, kGamma);
+    }
+  }
+}
 
 glm::dmat4 rigid(const glm::dvec3& position_mm, const glm::dvec4& q) {
   const glm::dquat rotation(q.w, q.x, q.y, q.z);

@@ -67,7 +67,12 @@ struct MaterialView {
   double iso = 0.0;
   glm::dvec3 colour{0.9, 0.87, 0.8};  ///< linear RGB
   std::optional<double> opacity{};    ///< over one voxel edge, 0..1; none: by its hardness
+  bool forbidden = false;             ///< never cut, and told when it is pressed
 };
+
+/// Gives each material but "none" a colour of Okabe and Ito ("Color Universal Design", 2008), which
+/// any kind of colour vision tells apart; beyond seven they come again.
+void take_okabe_ito(std::span<MaterialView> materials);
 
 /// Where the device's own space lies in the world: world = offset + scale * device.
 struct DeviceFrame {

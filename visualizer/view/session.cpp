@@ -32,7 +32,8 @@ double voxel_mm3(const VolumeView& volume) {
 Session::Session(std::string_view name)
     : connection_(connect_segment(name)),
       scene_(scene_view(connection_.reader().info())),
-      snapshots_(scene_.volumes.size()) {
+      snapshots_(scene_.volumes.size()),
+      score_(first_score()) {
   poll();
   on_the_way_.clear();
   oldest_removal_ns_.reset();
@@ -51,11 +52,19 @@ Session Session::attach(std::string_view name, std::chrono::duration<double> wai
   }
 }
 
+MaterialScore Session::first_score() {
+  for (std::size_t v = 0; v < snapshots_.size(); ++v) {
+    connection_.reader().update(v, snapshots_[v]);
+  }
+  return {scene_, contents()};
+}
+
 void Session::poll() {
   read_states();
   read_removals();
   for (std::size_t v = 0; v < snapshots_.size(); ++v) {
     connection_.reader().update(v, snapshots_[v]);
+    score_.update(v, snapshots_[v].density, snapshots_[v].changed);
   }
   note_arrivals();
 }
@@ -64,13 +73,13 @@ void Session::read_states() {
   const SegmentReader& reader = connection_.reader();
   const std::uint64_t head = reader.state_head();
   const std::uint64_t slots = reader.info().state_slots;
-  if (!armed_) {
-    if (head - next_state_ > slots) next_state_ = head - slots;
-    TickRecord record;
-    for (; next_state_ < head && !armed_; ++next_state_) {
-      if (reader.state_at(next_state_, record) != ReadState::ok) continue;
-      if ((record.flags & kFlagStarted) != 0) armed_ = record.tick;
-    }
+  if (head - next_state_ > slots) next_state_ = head - slots;
+  TickRecord record;
+  for (; next_state_ < head; ++next_state_) {
+    if (reader.state_at(next_state_, record) != ReadState::ok) continue;
+    if (!armed_ && (record.flags & kFlagStarted) != 0) armed_ = record.tick;
+    if ((record.flags & kFlagReset) != 0) forbidden_ticks_ = 0;
+    if ((record.flags & kFlagForbidden) != 0) ++forbidden_ticks_;
   }
   if (auto newest = reader.latest()) latest_ = newest;
 }
@@ -92,8 +101,13 @@ void Session::read_removals() {
     if (record.volume >= scene_.volumes.size()) continue;
     // Over all volumes, though a record tells of one: nothing is cut while a reset runs.
     if (record.cause == static_cast<std::uint16_t>(DirtyCause::reset)) removed_mm3_ = 0;
+    const double mm3 = record.removed / kDensityMax * voxel_mm3(scene_.volumes[record.volume]);
+    if (record.cause == static_cast<std::uint16_t>(DirtyCause::undo)) {
+      removed_mm3_ = std::max(removed_mm3_ - mm3, 0.0);  // one that joined late saw less go
+      continue;
+    }
     if (record.removed > 0) on_the_way_.push_back(record);
-    removed_mm3_ += record.removed / kDensityMax * voxel_mm3(scene_.volumes[record.volume]);
+    removed_mm3_ += mm3;
   }
 }
 
@@ -155,6 +169,11 @@ std::optional<double> Session::tick_rate_hz() const {
   constexpr double kNsPerS = 1e9;
   return static_cast<double>(latest_->tick - earlier.tick) * kNsPerS /
          static_cast<double>(latest_->start_ns - earlier.start_ns);
+}
+
+double Session::forbidden_ms() const noexcept {
+  constexpr double kMsPerNs = 1e-6;
+  return static_cast<double>(forbidden_ticks_) * tick_ns() * kMsPerNs;
 }
 
 std::optional<double> Session::data_age_ms() const {

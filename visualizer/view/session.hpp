@@ -9,6 +9,7 @@
 
 #include "shared/segment/hand_over.hpp"
 #include "visualizer/view/frame_report.hpp"
+#include "visualizer/view/material_score.hpp"
 #include "visualizer/view/scene_view.hpp"
 
 namespace kerf {
@@ -42,6 +43,10 @@ class Session {
   [[nodiscard]] std::optional<double> tick_rate_hz() const;
   /// Since the session began or the volumes were reset.
   [[nodiscard]] double removed_mm3() const noexcept { return removed_mm3_; }
+  /// The same by index of the scene's materials, but since this one joined.
+  [[nodiscard]] std::vector<double> removed_by_material_mm3() const { return score_.removed_mm3(); }
+  /// How long what may not be cut was pressed upon, since then too.
+  [[nodiscard]] double forbidden_ms() const noexcept;
   [[nodiscard]] bool joined_late() const noexcept { return joined_late_; }
   [[nodiscard]] std::optional<double> data_age_ms() const;
   /// When the oldest of the ticks began that removed material whose bricks came with a `poll` since
@@ -66,9 +71,12 @@ class Session {
   bool select_tool(std::uint32_t index) { return send(CommandKind::select_tool, index); }
   /// The volumes go back to their first content.
   bool reset() { return send(CommandKind::reset, 0); }
+  /// They go back to what they were before the last stroke.
+  bool undo() { return send(CommandKind::undo, 0); }
 
  private:
   bool send(CommandKind kind, std::uint32_t argument);
+  [[nodiscard]] MaterialScore first_score();
   void read_states();
   void read_removals();
   void note_arrivals();
@@ -78,6 +86,7 @@ class Session {
   SegmentConnection connection_;
   SceneView scene_;
   std::vector<VolumeSnapshot> snapshots_;
+  MaterialScore score_;
   std::optional<TickRecord> latest_;
   std::optional<Tick> armed_;
   std::uint64_t next_state_ = 0;  ///< index of the first record not read yet
@@ -85,6 +94,7 @@ class Session {
   std::vector<DirtyRecord> on_the_way_;  ///< removals whose bricks no snapshot holds yet
   std::optional<std::uint64_t> oldest_removal_ns_;
   double removed_mm3_ = 0.0;
+  std::uint64_t forbidden_ticks_ = 0;
   bool joined_late_ = false;
   double attach_ms_ = 0.0;
 };

@@ -159,6 +159,7 @@ void Controller::tick() {
   writer_.begin_tick(++now_);
   TickRecord record{};
   record.tick = now_;
+  record.flags = flags_;
   record.start_ns = now_ns();
   record.orientation[3] = 1.0F;
   writer_.publish_state(record);
@@ -171,12 +172,10 @@ std::vector<std::uint64_t> Controller::asked_tools() {
   return tools;
 }
 
-int Controller::resets() {
-  int resets = 0;
-  while (const auto command = server_.take_command()) {
-    resets += command->kind == CommandKind::reset ? 1 : 0;
-  }
-  return resets;
+int Controller::asked(CommandKind kind) {
+  int asked = 0;
+  while (const auto command = server_.take_command()) asked += command->kind == kind ? 1 : 0;
+  return asked;
 }
 
 void act(const std::string& events) {
@@ -185,13 +184,22 @@ void act(const std::string& events) {
 }
 
 User::User(const fs::path& folder, int blocks)
-    : out_(folder / "out"), report_(folder / "report.json"), controller_(blocks) {
+    : out_(folder / "out"),
+      report_(folder / "report.json"),
+      choice_(folder / "choice"),
+      controller_(blocks) {
+  const fs::path scenes = folder / "scenes";
+  fs::create_directories(scenes);
+  std::ofstream(scenes / "none.toml") << "[tool]\n";
+  std::ofstream(scenes / "one.toml") << "[[volume]]\n";
   VisualizerOptions options;
   options.name = "test";
   options.mute = true;
   options.size = {480, 360};
   options.out = out_;
   options.report = report_;
+  options.choice = choice_;
+  options.open_in = scenes;
   options.seconds = 100.0;  // a test that hangs ends
   code_ = std::async(std::launch::async, [options] { return run_window(options); });
   act("search --sync --onlyvisible --name 'kerf: test' mousemove 300 180");
@@ -222,6 +230,12 @@ std::vector<std::uint8_t> User::look_at_screen() {
 int User::quit() {
   send("key q");
   return code_.get();
+}
+
+std::string User::choice() const {
+  std::string line;
+  std::getline(std::ifstream(choice_), line);
+  return line;
 }
 
 nlohmann::json User::report() const {

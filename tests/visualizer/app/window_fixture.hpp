@@ -43,11 +43,18 @@ class Controller {
   void tick();
   /// What the window asked for since the last call.
   std::vector<std::uint64_t> asked_tools();
+  /// How often it asked for an undo since the last call; forgets what else it asked for.
+  int undos() { return asked(CommandKind::undo); }
+  /// From the next tick on: the last stroke can be undone.
+  void offer_undo() { flags_ = kFlagUndoable; }
   /// How often it asked for a reset since the last call; forgets the tools that it asked for.
-  int resets();
+  int resets() { return asked(CommandKind::reset); }
   void say(Lifecycle lifecycle) { writer_.set_lifecycle(lifecycle); }
 
  private:
+  int asked(CommandKind kind);
+
+  std::uint32_t flags_ = 0;
   std::vector<Density> density_;
   SegmentWriter writer_;
   SegmentServer server_;
@@ -70,12 +77,16 @@ class User {
   std::vector<std::uint8_t> look_at_screen();
 
   int quit();
+  /// Of a window that ends by itself.
+  int ended() { return code_.get(); }
+  /// What was chosen to be opened; empty: nothing yet.
+  [[nodiscard]] std::string choice() const;
   [[nodiscard]] const std::filesystem::path& out() const { return out_; }
   [[nodiscard]] Controller& controller() { return controller_; }
   [[nodiscard]] nlohmann::json report() const;
 
  private:
-  std::filesystem::path out_, report_;
+  std::filesystem::path out_, report_, choice_;
   Controller controller_;
   std::future<int> code_;
 };

@@ -26,6 +26,18 @@ int warning_pixels(const RgbPicture& picture) {
   return count;
 }
 
+/// Where the slices are, and no other panel.
+std::vector<std::uint8_t> right_edge(const RgbPicture& picture) {
+  const auto width = static_cast<std::size_t>(picture.size.width);
+  std::vector<std::uint8_t> edge;
+  for (std::size_t y = 0; y < static_cast<std::size_t>(picture.size.height) / 2; ++y) {
+    const auto row = picture.rgb.begin() + static_cast<std::ptrdiff_t>(y * width * 3);
+    edge.insert(edge.end(), row + static_cast<std::ptrdiff_t>(width * 3 - 80 * 3),
+                row + static_cast<std::ptrdiff_t>(width * 3));
+  }
+  return edge;
+}
+
 }  // namespace
 
 TEST_CASE("keys and mouse work the window") {
@@ -88,16 +100,61 @@ TEST_CASE("keys and mouse work the window") {
     CHECK(user.controller().resets() == 1);
     CHECK(user.quit() == 0);
   }
+  SUBCASE("z undoes the last stroke where there is one") {
+    act("key z");
+    CHECK(user.controller().undos() == 0);
+    user.controller().offer_undo();
+    user.controller().tick();
+    act("key z");
+    CHECK(user.controller().undos() == 1);
+    CHECK(user.quit() == 0);
+  }
+  SUBCASE("y shows materials in other colours, and their own again") {
+    act("key y");
+    CHECK(user.look() != first);
+    act("key y");
+    CHECK(user.look() == first);
+    CHECK(user.quit() == 0);
+  }
+  SUBCASE("x cuts the volumes open square to the gaze, and the wheel with shift moves the plane") {
+    act("key c");
+    const auto along_z = user.look();
+    act("key x");
+    const auto facing = user.look();
+    CHECK(facing != along_z);
+    CHECK(facing != first);
+    act("keydown shift click 5 click 5 click 5 click 5 keyup shift");
+    const auto nearer = user.look();
+    CHECK(nearer != facing);
+    act("keydown shift click 4 click 4 click 4 click 4 keyup shift");
+    CHECK(user.look() == facing);
+    act("key c");
+    CHECK(user.look() == first);
+    CHECK(user.quit() == 0);
+  }
+  SUBCASE("l shows three slices through the tip, and hides them") {
+    user.controller().tick();
+    const auto before = right_edge(user.whole());
+    act("key l");
+    CHECK(right_edge(user.whole()) != before);
+    act("key l");
+    CHECK(right_edge(user.whole()) == before);
+    CHECK(user.quit() == 0);
+  }
   SUBCASE("e exports the surface") {
     act("key e");
     CHECK(user.quit() == 0);
     CHECK(fs::file_size(user.out() / "kerf-0001.ply") > 1000);
   }
-  SUBCASE("h shows the keys, then no panel at all, then what was there") {
+  SUBCASE("h shows the keys on two pages, then no panel at all, then what was there") {
     const auto panels = user.whole().rgb;
     act("key h");
     const auto keys = user.whole().rgb;
     CHECK(keys != panels);
+    act("key h");
+    const auto more = user.whole().rgb;
+    CHECK(more != keys);
+    CHECK(more != panels);
     act("key h");
     const auto nothing = user.whole().rgb;
     CHECK(nothing != keys);
@@ -142,7 +199,7 @@ TEST_CASE("keys and mouse work the window") {
     CHECK(line == "FRAME");
   }
   SUBCASE("every panel may be shown") {
-    act("key p key h sleep 0.2 key p key h");
+    act("key p key l key h sleep 0.2 key p key p key h key h key h");
     CHECK(user.look() == first);
     CHECK(user.quit() == 0);
   }
@@ -176,6 +233,23 @@ TEST_CASE("keys and mouse work the window") {
     CHECK(user.look() != first);
     CHECK(user.quit() == 0);
   }
+}
+
+TEST_CASE("o lists scenes; a file that is none is told, a scene ends the window with its name") {
+  if (!have("Xvfb") || !have("xdotool")) return;
+  const Screen screen;
+  User user(screen.folder);
+  const auto click = [](const std::string& at) {
+    act("mousemove " + at + " sleep 0.2 mousedown 1 sleep 0.2 mouseup 1");
+  };
+  const std::string none = "60 78", one = "60 95";  // below the folder above
+  act("key o");
+  click(none);
+  CHECK(user.choice().empty());
+  act("key o key o");  // leaves the list and what it said, and opens it again
+  click(one);
+  CHECK(user.ended() == 0);
+  CHECK(user.choice() == (screen.folder / "scenes" / "one.toml").string());
 }
 
 TEST_CASE("nothing covers a warning, whatever else is shown and in a small window too") {

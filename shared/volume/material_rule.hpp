@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "shared/volume/voxel_grid.hpp"
+
+namespace kerf {
+
+/// Steps of density, 0..65535 a voxel, by the index of the material that they are of.
+using StepsByMaterial = std::vector<std::uint64_t>;
+
+/// Of which material a voxel is: that of its label; without one, as in a volume without labels, the
+/// densest that its first density reaches, and where it reaches none the softest. Pictures colour
+/// voxels alike. A voxel stays of its material while it is cut.
+class MaterialRule {
+ public:
+  /// Density, 0..1, from which each material shows; index 0 is "none", which no voxel reaches.
+  explicit MaterialRule(std::span<const double> isos)
+      : count_(std::max<std::size_t>(isos.size(), 1)) {
+    std::vector<std::pair<double, std::size_t>> order;
+    for (std::size_t m = 1; m < isos.size(); ++m) order.emplace_back(isos[m], m);
+    std::stable_sort(order.begin(), order.end(),
+                     [](const auto& a, const auto& b) { return a.first < b.first; });
+    for (const auto& [iso, material] : order) {
+      const double from = by_density_.empty() ? 0.0 : std::clamp(iso, 0.0, 1.0) * kDensityMax;
+      by_density_.emplace_back(from, material);
+    }
+  }
+
+  [[nodiscard]] std::size_t count() const noexcept { return count_; }
+
+  [[nodiscard]] std::size_t of(Label label, Density first) const noexcept {
+    if (label > 0 && label < count_) return label;
+    std::size_t material = 0;
+    for (const auto& [from, index] : by_density_) {
+      if (first >= from) material = index;
+    }
+    return material;
+  }
+
+ private:
+  std::size_t count_;
+  std::vector<std::pair<double, std::size_t>> by_density_;  ///< from the softest
+};
+
+/// What a volume lacks of its first content, by material; `labels` may be empty.
+inline void add_removed(const MaterialRule& rule, std::span<const Density> first,
+                        std::span<const Density> now, std::span<const Label> labels,
+                        StepsByMaterial& removed) {
+  removed.resize(rule.count());
+  for (std::size_t i = 0; i < first.size(); ++i) {
+    if (now[i] >= first[i]) continue;
+    removed[rule.of(labels.empty() ? Label{0} : labels[i], first[i])] +=
+        static_cast<std::uint64_t>(first[i] - now[i]);
+  }
+}
+
+}  // namespace kerf

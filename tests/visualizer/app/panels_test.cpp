@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: Apache-2.0
+// How much of a picture the panels cover, and that they grow with the display's density.
+#include <cmath>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <doctest/doctest.h>
+
+#include "tests/visualizer/gl/gl_faults.hpp"
+#include "visualizer/app/overlay.hpp"
+#include "visualizer/gl/context.hpp"
+
+using namespace kerf;
+
+namespace {
+
+constexpr PictureSize kPlain{640, 480};
+
+/// As much as a scene can give to show: tools, volumes, materials, opacities.
+OverlayFigures crowded() {
+  OverlayFigures figures;
+  figures.force_n = 1.23;
+  figures.tool = "a fissure bur of some length";
+  figures.removed_mm3 = 12.34;
+  for (int m = 0; m < 31; ++m) {
+    figures.score.push_back({"material " + std::to_string(m), 1.0F, 0.5F, 0.0F, 0.1 * m});
+  }
+  figures.forbidden = "pulp, nerve";
+  figures.forbidden_ms = 121.0;
+  figures.tick_rate_hz = 1000.0;
+  figures.frame_rate_hz = 60.0;
+  figures.data_age_ms = 1.0;
+  figures.filmed_frames = 1234;
+  LookControls& controls = figures.controls.emplace();
+  const Silhouette side{{0.0, -0.2, 0.2}, {1.0, -1.0, 1.0}, {4.0, -0.5, 0.5}};
+  for (int tool = 0; tool < 16; ++tool) {
+    controls.tools.push_back({"1.6 mm tool " + std::to_string(tool), side});
+  }
+  for (int v = 0; v < 8; ++v) controls.volumes.push_back("volume " + std::to_string(v));
+  controls.has_iso = controls.takes_gradient = true;
+  controls.look.clip.on = true;
+  for (int m = 0; m < 31; ++m) controls.opacities["material " + std::to_string(m)] = 0.5;
+  return figures;
+}
+
+SliceViews grey_slices(int side) {
+  SliceViews slices{.side = side, .tip = {{{0.5, 0.5}, {0.2, 0.1}, {2.0, 0.5}}}};
+  slices.rgb.assign(static_cast<std::size_t>(9) * static_cast<std::size_t>(side * side), 128);
+  return slices;
+}
+
+std::vector<ForcePlot::Point> some_plot() {
+  std::vector<ForcePlot::Point> plot(50);
+  for (std::size_t i = 0; i < plot.size(); ++i) {
+    plot[i].time_ns = 100'000'000 * i;
+    plot[i].force_n = 1.0F;
+  }
+  return plot;
+}
+
+/// Share of a black picture's pixels that `overlay` changes.
+double covered(Overlay& overlay, const OverlayFigures& figures, PictureSize size,
+               std::vector<std::uint8_t>* picture = nullptr) {
+  const RenderTarget target(size);
+  target.bind();
+  constexpr float kWhite[4] = {1.0F, 1.0F, 1.0F, 1.0F};
+  glDisable(GL_SCISSOR_TEST);
+  glClearNamedFramebufferfv(target.framebuffer(), GL_COLOR, 0, kWhite);
+  for (int frame = 0; frame < 3; ++frame) static_cast<void>(overlay.prepare(figures, size));
+  overlay.draw(target);
+  glDisable(GL_SCISSOR_TEST);
+  const std::vector<std::uint8_t> rgb = target.read_rgb();
+  int count = 0;
+  for (std::size_t i = 0; i < rgb.size(); i += 3) {
+    count += rgb[i] != 255 || rgb[i + 1] != 255 || rgb[i + 2] != 255 ? 1 : 0;
+  }
+  if (picture != nullptr) *picture = rgb;
+  return static_cast<double>(count) / (size.width * size.height);
+}
+
+/// The middle ninth of the picture is as it was.
+bool middle_is_free(const std::vector<std::uint8_t>& rgb, PictureSize size) {
+  for (int y = size.height / 3; y < size.height * 2 / 3; ++y) {
+    for (int x = size.width * 5 / 12; x < size.width * 7 / 12; ++x) {
+      if (rgb[static_cast<std::size_t>(3 * (y * size.width + x))] != 255) return false;
+    }
+  }
+  return true;
+}
+
+}  // namespace
+
+TEST_CASE("panels cover at most a quarter of a window, and not its middle, whatever they show") {
+  const auto context = make_headless_context();
+  Overlay overlay;
+  for (const double scale : {1.0, 1.5, 2.0}) {
+    const PictureSize size{static_cast<int>(kPlain.width * scale),
+                           static_cast<int>(kPlain.height * scale)};
+    for (const bool slices : {false, true}) {
+      for (const bool plot : {false, true}) {
+        CAPTURE(scale);
+        CAPTURE(slices);
+        CAPTURE(plot);
+        OverlayFigures figures = crowded();
+        figures.scale = scale;
+        if (slices) figures.slices = grey_slices(static_cast<int>(56 * scale));
+        if (plot) figures.plot = some_plot();
+        std::vector<std::uint8_t> picture;
+        const double share = covered(overlay, figures, size, &picture);
+        CHECK(share < 0.25);
+        CHECK(share > 0.1);  // it shows them
+        CHECK(middle_is_free(picture, size));
+      }
+    }
+  }
+}
+
+TEST_CASE("each page of the keys covers at most a quarter, and all keys have their page") {
+  const auto context = make_headless_context();
+  Overlay overlay;
+  for (const bool leads : {false, true}) {
+    OverlayFigures figures = crowded();
+    figures.leads_hand = leads;
+    figures.help = 1;
+    static_cast<void>(covered(overlay, figures, kPlain));
+    const int pages = overlay.help_pages();
+    CHECK(pages == (leads ? 3 : 2));
+    std::vector<std::vector<std::uint8_t>> seen;
+    for (; figures.help <= pages; ++figures.help) {
+      CAPTURE(figures.help);
+      const double share = covered(overlay, figures, kPlain, &seen.emplace_back());
+      CHECK(share < 0.25);
+      CHECK(share > 0.1);
+      if (seen.size() > 1) CHECK(seen[seen.size() - 1] != seen[seen.size() - 2]);
+    }
+  }
+}
+
+TEST_CASE("a display of twice the density has panels of twice the size, where there is room") {
+  const auto context = make_headless_context();
+  Overlay overlay;
+  OverlayFigures figures;
+  figures.tool = "ball";
+  constexpr PictureSize kTwice{2 * kPlain.width, 2 * kPlain.height};
+  const double plain = covered(overlay, figures, kTwice);
+  figures.scale = 2.0;
+  CHECK(covered(overlay, figures, kTwice) == doctest::Approx(4.0 * plain).epsilon(0.1));
+  const double small = covered(overlay, figures, kPlain);
+  figures.scale = 1.0;
+  CHECK(covered(overlay, figures, kPlain) == small);
+}

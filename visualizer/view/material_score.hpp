@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "shared/volume/material_rule.hpp"
+#include "visualizer/view/scene_view.hpp"
+
+namespace kerf {
+
+/// How much of each material the volumes lack of the content with which this was made. What comes
+/// back, as by a reset, counts no more. A byte for each voxel.
+class MaterialScore {
+ public:
+  MaterialScore(const SceneView& scene, std::span<const VolumeContent> contents);
+
+  /// Some bricks of a volume are others now. Costs their voxels.
+  void update(std::size_t volume, std::span<const Density> density,
+              std::span<const std::uint32_t> bricks);
+
+  /// By index of the scene's materials; 0 is matter of none.
+  [[nodiscard]] std::vector<double> removed_mm3() const;
+
+ private:
+  struct Volume {
+    BrickGrid bricks;
+    double step_mm3 = 0.0;              ///< of a step of density in a voxel
+    std::vector<Label> material;        ///< by voxel
+    std::vector<std::uint32_t> matter;  ///< steps by brick and material
+    std::vector<std::int64_t> removed;  ///< steps by material
+  };
+  /// Counts the matter of a brick anew; what it had more before is removed.
+  void count(Volume& volume, std::span<const Density> density, std::uint32_t brick) const;
+
+  std::size_t materials_;
+  std::vector<Volume> volumes_;
+};
+
+}  // namespace kerf
