@@ -89,6 +89,22 @@ TEST_CASE("after a stall the force starts again from nothing") {
   CHECK(last_n > 0.5);
 }
 
+TEST_CASE("a device that is parked again and again while it presses bears the heat of every ramp") {
+  LoadedScene scene = half_space_scene();
+  scene.force.stiffness_n_per_mm = 50;  // more than the peak, which alone is three times the budget
+  ArmedServo armed(scene);
+  double heat_n2 = 0;
+  for (int tick = 0; tick < 8000; ++tick) {
+    auto report = armed.arm.at(0, 0.3, 0);
+    report.parked =
+        tick % 130 < 20;  // too short to calibrate, and hardly more than the ramp between
+    const double force_n = length(armed.servo->step(report).force_n);
+    heat_n2 += (force_n * force_n - heat_n2) / 10'000;
+    CHECK(std::sqrt(heat_n2) <= scene.limits.continuous_force_n + 0.01);
+  }
+  CHECK(std::sqrt(heat_n2) > 0.9 * scene.limits.continuous_force_n);
+}
+
 TEST_CASE("a force beyond the motors keeps its direction, and what was sent is what is told") {
   LoadedScene scene = half_space_scene();
   scene.force.stiffness_n_per_mm = 50;
