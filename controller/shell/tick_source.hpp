@@ -12,6 +12,20 @@ namespace kerf {
 /// A servo whose ticks lie so far apart has stood still: what it felt then is no longer true.
 inline constexpr std::int64_t kStandstillNs = 20'000'000;
 
+/// Tells a tick that began kStandstillNs or more after the last one. One thread.
+class StandstillWatch {
+ public:
+  /// Once per tick, at its start.
+  [[nodiscard]] bool stood_still(std::int64_t now_ns) noexcept {
+    const bool stood_still = began_ns_ > 0 && now_ns - began_ns_ >= kStandstillNs;
+    began_ns_ = now_ns;
+    return stood_still;
+  }
+
+ private:
+  std::int64_t began_ns_ = 0;  ///< the last tick; 0: there was none
+};
+
 /// What starts a tick: the clock, or in lock-step the device's next report.
 class TickSource {
  public:
@@ -31,9 +45,7 @@ class RealTimeTicks final : public TickSource {
       : clock_(period_ns, spin_ns) {}
   std::int64_t wait_next() noexcept override {
     const std::int64_t late_ns = clock_.wait_next();
-    const std::int64_t now_ns = monotonic_ns();
-    stood_still_ = began_ns_ > 0 && now_ns - began_ns_ >= kStandstillNs;
-    began_ns_ = now_ns;
+    stood_still_ = watch_.stood_still(monotonic_ns());
     return late_ns;
   }
   [[nodiscard]] std::uint64_t overruns() const noexcept override { return clock_.overruns(); }
@@ -41,7 +53,7 @@ class RealTimeTicks final : public TickSource {
 
  private:
   DeadlineClock clock_;
-  std::int64_t began_ns_ = 0;  ///< the last tick
+  StandstillWatch watch_;
   bool stood_still_ = false;
 };
 

@@ -108,6 +108,7 @@ Command::Command(Arguments& program)
   app_.option("--hand", hand_, "how").shows_default();
   app_.option("--report", report_, "write the figures as JSON").shown_as("FILE");
   app_.footer(
+      "The contract: docs/safety.md.\n\n"
       "Exit codes: 0 the contract holds, 1 it was broken or a run shows nothing, 2 bad input or\n"
       "set-up.");
 }

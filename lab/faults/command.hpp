@@ -20,7 +20,7 @@ class Command final : public LabCommand {
   [[nodiscard]] std::vector<int> rates() const;
   [[nodiscard]] std::vector<Cell> cells() const;
 
-  std::string scene_ = "scenes/touch.toml", hand_ = "scenes/hands/touch.toml";
+  std::string scene_ = "scenes/low_limits.toml", hand_ = "scenes/hands/touch.toml";
   std::string scripts_ = "hil/faults", report_;
   std::vector<std::string> devices_, rates_{"1000"}, models_{"proxy"}, numerics_{"fixed"};
   std::uint32_t seed_base_ = 1;

@@ -39,8 +39,8 @@ double latest_latch_ms(const std::string& name, double tick_ms) {
   return kReportMs + tick_ms;
 }
 
-/// How far `force` is from any force that `last` may fall to at once: its own direction, or zero.
-double change_n(DeviceVec<double> last, DeviceVec<double> force) {
+/// How far `force` is from any part of `last` along its own direction, from none to all of it.
+double change_but_for_fall_n(DeviceVec<double> last, DeviceVec<double> force) {
   const double square = dot(last, last);
   const double share = square > 0 ? std::clamp(dot(force, last) / square, 0.0, 1.0) : 0.0;
   return norm(force - last * share);
@@ -55,6 +55,10 @@ Contract::Contract(const LoadedScene& scene, bool trusted, Outcome& outcome)
       outcome_(outcome),
       wire_(scene.device.personality, scene.device.dock_rad),
       outward_(scene) {}
+
+void Contract::fault_begins(double time_ms) noexcept {
+  if (outcome_.latched == fault_name(Fault::none)) begun_ms_ = time_ms;
+}
 
 void Contract::check(bool kept, double time_ms, const char* rule, double value, double limit) {
   if (kept) return;
@@ -112,7 +116,9 @@ void Contract::follow_report(double time_ms) {
   const auto told_pose = wire_.pose(told_.count);
   const std::optional<ArmPose> before = pose_;
   const double since_ms = time_ms - pose_ms_;
+  moved_mm_ = {};
   if (told_pose) {
+    if (before) moved_mm_ = told_pose->tip_mm - before->tip_mm;
     pose_ = told_pose;
     pose_ms_ = time_ms;
     no_pose_since_ms_ = -1;
@@ -136,9 +142,8 @@ void Contract::follow_report(double time_ms) {
   }
   if (off_ != Off::no_reason) return;
   if (before && told_pose) {
-    const double moved_mm = norm(told_pose->tip_mm - before->tip_mm);
     const double most_mm = limits_.speed_mm_per_s / 1000 * since_ms;
-    if (moved_mm > most_mm * kSpeedShare + kSpeedStepMm) {
+    if (norm(moved_mm_) > most_mm * kSpeedShare + kSpeedStepMm) {
       must_stay_off(fault_name(Fault::overspeed));
     }
   }
@@ -160,9 +165,8 @@ void Contract::follow_silence(double time_ms) {
 /// the watchdog's packet, and then the next one is the host's own.
 void Contract::follow_stall(const Command& command) {
   const bool stalled = command.time_ms - last_.time_ms >= kStandstillMs;
-  if (stalled || after_stall_) {
-    may_push_since_ms_ = std::max(may_push_since_ms_, command.time_ms);
-  }
+  begins_anew_ = stalled || after_stall_;
+  if (begins_anew_) may_push_since_ms_ = std::max(may_push_since_ms_, command.time_ms);
   after_stall_ = stalled && command.asked.off();
 }
 
@@ -184,9 +188,10 @@ void Contract::commanded(double time_ms, std::span<const std::uint8_t> packet) {
   if (pose_ && pose_is_known_) {
     check_size(command);
     check_change(command);
+    check_hold(command);
     check_direction(command);
   }
-  if (fresh_) held_n_ = command.force_n;
+  if (fresh_ || begins_anew_) held_n_ = command.force_n;
   if (asked->off() && !last_.asked.off()) began_off_ms_ = time_ms;
   if (norm(command.force_n) > kPushN) last_push_ms_ = time_ms;
   last_ = command;
@@ -230,11 +235,26 @@ void Contract::check_size(const Command& command) {
 
 void Contract::check_change(const Command& command) {
   if (command.tick_ms <= 0) return;
-  const double change = change_n(last_.force_n, command.force_n);
+  // A hand that moves with the force is given energy by it. Across it, only what the force's steps
+  // hide may look so.
+  const bool leaves =
+      fresh_ && dot(last_.force_n, moved_mm_) > -kStepN * norm(moved_mm_) && norm(moved_mm_) > 0;
+  const bool may_fall = leaves || begins_anew_ || command.asked.off();
+  const double change = may_fall ? change_but_for_fall_n(last_.force_n, command.force_n)
+                                 : norm(command.force_n - last_.force_n);
   const double most_n = limits_.slew_n_per_ms * command.tick_ms;
   outcome_.steepest_n_per_ms = std::max(outcome_.steepest_n_per_ms, change / command.tick_ms);
   check(change <= most_n + kStepN, command.time_ms, "change of the force in a tick, in N", change,
         most_n);
+}
+
+/// What was sent after the last report, turned and weakened by nothing.
+void Contract::check_hold(const Command& command) {
+  const bool holds =
+      !fresh_ && !begins_anew_ && off_ == Off::no_reason && command.time_ms - heard_ms_ <= kHoldMs;
+  const double off_by_n = norm(command.force_n - held_n_);
+  check(!holds || off_by_n <= kStepN, command.time_ms, "change of a held force, in N", off_by_n,
+        kStepN);
 }
 
 void Contract::check_direction(const Command& command) {

@@ -39,8 +39,8 @@ class Contract {
   void commanded(double time_ms, std::span<const std::uint8_t> packet);
   /// A bus cycle of the device is over.
   void cycle(double time_ms, const DeviceMoment& device);
-  /// Something went wrong for the first time.
-  void fault_begins(double time_ms) noexcept { begun_ms_ = time_ms; }
+  /// Something goes wrong. The time to a latched fault counts from the newest one before it.
+  void fault_begins(double time_ms) noexcept;
   /// The run is over; `latches` as in FaultScript, `faults_end_ms` when the last fault was over.
   void end(double time_ms, const std::string& latches, double faults_end_ms);
 
@@ -62,6 +62,7 @@ class Contract {
   void check_state(const Command& command);
   void check_size(const Command& command);
   void check_change(const Command& command);
+  void check_hold(const Command& command);
   void check_direction(const Command& command);
   void heat_until(double time_ms);
   void check(bool kept, double time_ms, const char* rule, double value, double limit);
@@ -80,6 +81,7 @@ class Contract {
   double listened_ms_ = 0;        ///< the host last asked for one
   std::optional<ArmPose> pose_;   ///< that was told last
   double pose_ms_ = 0;            ///< when
+  DeviceVec<double> moved_mm_;    ///< from the pose before to that
   bool had_no_pose_ = false;      ///< in some report
   double no_pose_since_ms_ = -1;  ///< reports tell of none since; negative: they do
   std::array<std::int16_t, 3> rest_count_{};
@@ -90,6 +92,7 @@ class Contract {
   Off off_ = Off::not_calibrated;
   double may_push_since_ms_ = 0;  ///< the fade begins
   bool after_stall_ = false;      ///< the last packet was one that ends a stall: motors off
+  bool begins_anew_ = false;      ///< this packet is the first of a host that was silent: from zero
 
   Command last_;
   DeviceVec<double> held_n_;  ///< sent after the last report

@@ -9,6 +9,7 @@
 #include "controller/device/driver/device_driver.hpp"
 #include "controller/plan/compile.hpp"
 #include "controller/shell/servo_loop.hpp"
+#include "controller/shell/tick_source.hpp"
 #include "controller/shell/watchdog.hpp"
 #include "hil/devmodel/bus_cycle.hpp"
 #include "hil/devmodel/emulator.hpp"
@@ -115,9 +116,7 @@ class VirtualShell {
   void look(std::int64_t now_ns) { watchdog_.look(now_ns); }
   void tick(std::int64_t now_ns) {
     const DeviceReport report = driver_->read();
-    const bool stood_still = began_ns_ > 0 && now_ns - began_ns_ >= kStandstillNs;
-    began_ns_ = now_ns;
-    static_cast<void>(recover(signals_, stood_still, servo_));
+    static_cast<void>(recover(signals_, standstill_.stood_still(now_ns), servo_));
     send_tick(servo_.step(report), signals_, *driver_);
     ++signals_.heartbeat;
   }
@@ -128,7 +127,7 @@ class VirtualShell {
   std::atomic<bool> stop_{false};
   LoopSignals signals_{stop_};
   Watchdog watchdog_{*driver_, signals_};
-  std::int64_t began_ns_ = 0;
+  StandstillWatch standstill_;
 };
 
 }  // namespace
@@ -163,7 +162,7 @@ Outcome run_faults(const Subject& subject, const FaultScript& as_written) {
   for (std::int64_t cycle = 1; cycle <= cycles; ++cycle) {
     wire.cycle();
     time_ms = static_cast<double>(cycle) * 1000 / kCyclesPerSecond;
-    if (outcome.faults_begun == 0 && device.begun() > 0) contract.fault_begins(time_ms);
+    if (device.begun() > outcome.faults_begun) contract.fault_begins(time_ms);
     outcome.faults_begun = device.begun();
     contract.cycle(time_ms, {emulator.model().motor_force_n(), emulator.model().docked()});
     if (first_push_ms < 0 && outcome.pushed) first_push_ms = time_ms;

@@ -32,7 +32,7 @@ struct Outcome {
   double longest_alone_ms = 0;   ///< motors on without a newer packet
   double slowest_off_ms = 0;     ///< from the packet that switched the motors off to no torque
   std::string latched = "none";  ///< the first fault that the reports amounted to
-  double latch_ms = 0;           ///< from the first fault of the script to that
+  double latch_ms = 0;           ///< from the newest fault of the script before that to it
   bool pushed = false;           ///< there was a force to go wrong
   bool pushed_again = false;     ///< and again after the last fault
 };

@@ -36,15 +36,13 @@ struct Watched {
   kerf::LoadedScene scene = omni_scene();
   Outcome outcome;
   Contract contract{scene, true, outcome};
+  DeviceWire wire{scene.device.personality, scene.device.dock_rad};
   double ms = 0;
   std::uint32_t packets = 0;
   OmniReport told{.encoder = {32760, -32700, 32700}};
   double n_per_count = 0;
 
-  Watched() {
-    const DeviceWire wire(scene.device.personality, scene.device.dock_rad);
-    n_per_count = norm(wire.force_n(*wire.pose(told.encoder), {0, 1, 0}));
-  }
+  Watched() { n_per_count = norm(wire.force_n(*wire.pose(told.encoder), {0, 1, 0})); }
 
   void report() {
     told.counter = ++packets;
@@ -74,6 +72,14 @@ struct Watched {
     for (double f = 0.5; f < force_n; f += 0.5) tick(f);
     tick(force_n);
   }
+  /// The hand goes a little along a force of `command`.
+  void leave() {
+    const auto before = *wire.pose(told.encoder);
+    const auto force_n = wire.force_n(before, {0, 100, 0});
+    told.encoder[1] = static_cast<std::int16_t>(told.encoder[1] + 3);
+    if (dot(force_n, wire.pose(told.encoder)->tip_mm - before.tip_mm) > 0) return;
+    told.encoder[1] = static_cast<std::int16_t>(told.encoder[1] - 6);
+  }
   /// Nothing is heard for so many ms; held, faded and off, as it should be.
   void lose(int ticks, double held_n) {
     for (int i = 1; i <= ticks; ++i) {
@@ -91,6 +97,7 @@ TEST_CASE("the contract accepts what it allows") {
   run.lose(19, 3.3);
   run.tick(0.5);
   for (double f = 1; f < 3; f += 0.5) run.tick(f);
+  run.leave();
   run.tick(0.1);  // lets go at once
   run.park(60);
   run.tick(0.03);
@@ -116,6 +123,15 @@ TEST_CASE("the contract sees each way to break it") {
   SUBCASE("a force that turns round in a tick, as long as before") {
     run.push_up_to(1);
     run.tick(-1);
+  }
+  SUBCASE("a fall of 0.6 N in a millisecond while the hand stays") {
+    run.push_up_to(1);
+    run.tick(0.4);
+  }
+  SUBCASE("a force let go 2 ms after the last report") {
+    run.push_up_to(0.4);
+    run.tick(0.4, true, false);
+    run.tick(0.1, true, false);
   }
   SUBCASE("a force held for 20 ms without reports") {
     run.push_up_to(2);
@@ -218,8 +234,10 @@ TEST_CASE("the contract sees each way to break it") {
 TEST_CASE("the contract accepts the fault that the script says, in time") {
   Watched run;
   run.push_up_to(1);
+  run.contract.fault_begins(1);  // nothing came of it
   run.contract.fault_begins(run.ms);
   run.lose(30, 1);
+  run.contract.fault_begins(run.ms);  // too late to be the cause
   run.contract.end(run.ms, "stale_input", run.ms);
   for (const std::string& line : run.outcome.violations) MESSAGE(line);
   CHECK(run.outcome.violation_count == 0);

@@ -41,7 +41,8 @@ kerf::faults::Outcome run_in_air() {
 
 }  // namespace
 
-TEST_CASE("legs that cannot meet give NaN in float: the motors go off after 2 ms, and stay off") {
+TEST_CASE(
+    "legs that cannot meet: the motors go off as for a pose that is no number, and stay off") {
   const DeviceFault jump{
       .kind = FaultKind::jump, .at_s = 0.2, .for_s = 0.1, .axis = 1, .counts = 28'672};
   const auto outcome = pressing_falcon(jump);

@@ -89,6 +89,22 @@ TEST_CASE("after a stall the force starts again from nothing") {
   CHECK(last_n > 0.5);
 }
 
+TEST_CASE("a device that is parked again and again while it presses bears the heat of every ramp") {
+  LoadedScene scene = half_space_scene();
+  scene.force.stiffness_n_per_mm = 50;  // more than the peak, which alone is three times the budget
+  ArmedServo armed(scene);
+  double heat_n2 = 0;
+  for (int tick = 0; tick < 8000; ++tick) {
+    auto report = armed.arm.at(0, 0.3, 0);
+    report.parked =
+        tick % 130 < 20;  // too short to calibrate, and hardly more than the ramp between
+    const double force_n = length(armed.servo->step(report).force_n);
+    heat_n2 += (force_n * force_n - heat_n2) / 10'000;
+    CHECK(std::sqrt(heat_n2) <= scene.limits.continuous_force_n + 0.01);
+  }
+  CHECK(std::sqrt(heat_n2) > 0.9 * scene.limits.continuous_force_n);
+}
+
 TEST_CASE("a force beyond the motors keeps its direction, and what was sent is what is told") {
   LoadedScene scene = half_space_scene();
   scene.force.stiffness_n_per_mm = 50;
@@ -114,6 +130,33 @@ TEST_CASE("a force that is not finite ends the motors at once") {
   CHECK(out.fault == Fault::not_finite);
   CHECK_FALSE(out.motors_on);
   CHECK(out.motor_counts == std::array<std::int16_t, 3>{});
+}
+
+TEST_CASE("encoders that tell of no pose: motors off after 2 ms, until the device was parked") {
+  // Of all crank angles few have no grip: for these three Newton's method ends in NaN, in float.
+  constexpr std::array<std::int16_t, 3> kNoPose{360, 6180, 2340};
+  LoadedScene scene = half_space_scene();
+  scene.device.personality = kerf::Personality::falcon;
+  scene.device.torque_scale = std::array{0.3, 0.3, 0.3};
+  scene.servo.numeric = NumericKind::float32;
+  for (const int rate_hz : {250, 1000, 8000}) {
+    CAPTURE(rate_hz);
+    scene.servo.rate_hz = rate_hz;
+    LoadedScene taken = scene;
+    const auto servo = kerf::compile(taken);
+    kerf::DeviceReport report{.fresh = true, .parked = true, .homed = true};
+    for (int tick = 0; tick <= rate_hz / 10; ++tick) static_cast<void>(servo->step(report));
+    report.parked = false;
+    for (int tick = 0; tick <= rate_hz / 10; ++tick) REQUIRE(servo->step(report).motors_on);
+    report.encoder = kNoPose;
+    int ticks_on = 0;
+    while (servo->step(report).motors_on && ticks_on < rate_hz) ++ticks_on;
+    CHECK(ticks_on == 2 * rate_hz / 1000);
+    report.encoder = {};
+    const ServoOutput out = servo->step(report);
+    CHECK(out.fault == Fault::not_finite);
+    CHECK_FALSE(out.motors_on);
+  }
 }
 
 TEST_CASE("faster than 10 m/s: motors off in the same tick") {
