@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "controller/kernel/proxy/contact_query.hpp"
-#include "controller/plan/tables/contact_maps.hpp"
+#include "controller/plan/tables/free_brick_map.hpp"
 #include "controller/plan/tables/tool_points.hpp"
 #include "controller/tool/surface_samples.hpp"
 #include "controller/tool/tool_shapes.hpp"
@@ -24,11 +24,11 @@ constexpr int kTicks = 2000;
 /// A volume of voxels of one unit, ready to be queried.
 struct Solid {
   explicit Solid(std::vector<Density> voxels)
-      : density(std::move(voxels)), maps(kGrid, density, 32768) {}
+      : density(std::move(voxels)), map(kGrid, density, 1) {}
 
   [[nodiscard]] ContactVolume<FixedNumbers> seen_by(PlaceMemory<FixedNumbers>& memory) const {
     ContactVolume<FixedNumbers> volume;
-    volume.field = maps.field();
+    volume.field = {kGrid, density.data(), density_scale(32768), map.bricks()};
     for (std::size_t axis = 0; axis < 3; ++axis) {
       volume.frame.voxel_from_contact.row[axis][axis] = FixedNumbers::Ratio(1);
     }
@@ -37,7 +37,7 @@ struct Solid {
   }
 
   std::vector<Density> density;
-  ContactMaps maps;
+  FreeBrickMap map;
 };
 
 ContactVec<Q16> unit_place(const Place& p) {
@@ -94,7 +94,7 @@ class QueryBench {
           kTicks, [] {}, [&](int i) { tick(query, i); });
       if (plain_p50_ns == 0) plain_p50_ns = times.p50_ns;
       rows_.push_back({name, "fixed", set->name, times.p50_ns, times.p99_ns, plain_p50_ns,
-                       samples.bytes() + memory.bytes() + solid.maps.bytes()});
+                       samples.bytes() + memory.bytes() + solid.map.bytes()});
       add_row_(rows_.back());
     }
   }

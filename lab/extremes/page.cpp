@@ -54,8 +54,7 @@ constexpr About kGroups[] = {
 also turned at random. There is no supervisor.)"},
     {"air", "In air",
      R"(A tool is led to and fro along tilted walls, so near and so fast that the hand goes 5 to 80 voxels in a
-tick. `--check` tells the speed up to which a scene is free of drag at any distance (docs/theory.md 4.2). Matter below
-the iso bears nothing, so a tool half in it feels nothing either.)"},
+tick. `--check` tells the speed up to which a scene is free of drag at any distance (docs/theory.md 4.2).)"},
     {"rests", "Where a ball comes to rest",
      R"(Offsets from the ideal solid at random tilts. On edges from the volume's own iso-surface, since trilinear density
 holds no sharp edge.)"},

@@ -17,12 +17,9 @@ struct AirWall {
   Frame frame;
   Body body;
 
-  /// `density` of its inside: 1 is twice the iso, and up to 1/2 it bears nothing.
-  explicit AirWall(Dice& dice, double density = 1)
+  explicit AirWall(Dice& dice)
       : frame(dice, {kEdge / 2.0, kEdge / 2.0, kEdge / 2.0}),
-        body(body_of({kEdge, kEdge, kEdge}, [&](Point p) {
-          return density * std::clamp(0.5 - frame.of(p)[1] / 2, 0.0, 1.0);
-        })) {}
+        body(blurred({kEdge, kEdge, kEdge}, [&](Point p) { return frame.of(p)[1]; })) {}
 };
 
 /// A tool that is led to and fro along it.

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "controller/kernel/proxy/contact_query.hpp"
-#include "controller/plan/tables/contact_maps.hpp"
+#include "controller/plan/tables/free_brick_map.hpp"
 #include "controller/plan/tables/tool_points.hpp"
 #include "controller/servo/proxy_contact.hpp"
 #include "controller/tool/surface_samples.hpp"
@@ -70,7 +70,7 @@ class ContactRig {
   const KernelSet& kernels_;
   ToolPoints<N> tool_;
   PointShell<N> points_;
-  std::deque<ContactMaps> maps_;
+  std::deque<FreeBrickMap> maps_;
   std::deque<PlaceMemory<N>> memories_;
   std::vector<ContactVolume<N>> volumes_;
   std::optional<ContactQuery<N>> query_;

@@ -74,49 +74,6 @@ TEST_CASE_TEMPLATE("no tool is dragged in the air beside a tilted wall, however 
   }
 }
 
-TEST_CASE_TEMPLATE("no tool is dragged in what is softer than the iso, half or wholly in it", N,
-                   FixedNumbers, DoubleNumbers) {
-  for (const double of_iso : {0.6, 0.95}) {
-    Dice dice(29);
-    std::vector<AirWall> walls;
-    for (int i = 0; i < cases(2); ++i) walls.emplace_back(dice, of_iso / 2);
-    for (const SceneTool& made : kTools) {
-      const SampledTool tool(made);
-      for (const double below : {0.5, 1.0, 2.5}) {
-        CAPTURE(of_iso);
-        CAPTURE(made.name);
-        CAPTURE(made.radius_mm);
-        CAPTURE(below);
-        const Flown flown = flown_at<N>(tool, walls, {40, -below * made.radius_mm, 0}, 50);
-        CHECK(flown.longest_spring < kNothing);
-      }
-    }
-  }
-}
-
-TEST_CASE_TEMPLATE("a wall amid soft matter holds the fastest ball", N, FixedNumbers,
-                   DoubleNumbers) {
-  Dice dice(31);
-  const Frame wall(dice, {48, 48, 48});
-  const Body body =
-      body_of({96, 96, 96}, [&](Point p) { return std::max(0.3, 0.5 - wall.of(p)[1] / 2); });
-  const double radius = 8;
-  const SampledTool tool(tool_of_units("ball", radius, 2 * radius));
-  for (const double units_per_tick : {1.0, 6.0, 40.0, 400.0}) {
-    GuidedTool<N> guided(tool, body, wall.at(0, 60, 0));
-    Point hand = wall.at(0, 60, 0);
-    for (double height = 60; height > -30; height -= units_per_tick) {
-      hand = wall.at(0, height, 0);
-      static_cast<void>(guided.tick(hand));
-    }
-    hand = wall.at(0, -30, 0);
-    for (int i = 0; i < 40; ++i) static_cast<void>(guided.tick(hand));
-    CAPTURE(units_per_tick);
-    CHECK(wall.of(guided.proxy())[1] > radius - 0.5);
-    CHECK(wall.of(guided.proxy())[1] < radius + 0.5);
-  }
-}
-
 TEST_CASE_TEMPLATE("the speed that a scene is told to be free of drag up to is so, and hardly shy",
                    N, FixedNumbers, DoubleNumbers) {
   const auto walls = tilted_walls();

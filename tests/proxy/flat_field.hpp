@@ -28,7 +28,6 @@ class FlatField {
   }
   [[nodiscard]] bool half_spent() const { return false; }
   [[nodiscard]] bool may_query() const { return true; }
-  [[nodiscard]] bool bears_nothing(ContactVec<typename N::Real>) const { return false; }
   [[nodiscard]] bool is_solid(ContactVec<typename N::Real> at) const {
     return dot(up_, point_of<N>(at)) < 0;
   }

@@ -91,7 +91,6 @@ struct OneWayField {
   [[nodiscard]] bool is_solid(ContactVec<Real>) const { return true; }
   [[nodiscard]] bool half_spent() const { return false; }
   [[nodiscard]] bool may_query() const { return left > 0; }
-  [[nodiscard]] bool bears_nothing(ContactVec<Real>) const { return false; }
   void turn(const ToolTurn<N>&) { left = 5; }
 
   Point way_out;

@@ -41,9 +41,6 @@ struct CountedField {
   }
   [[nodiscard]] bool half_spent() const { return field.half_spent(); }
   [[nodiscard]] bool may_query() const { return field.may_query(); }
-  [[nodiscard]] bool bears_nothing(ContactVec<typename N::Real> q) const {
-    return field.bears_nothing(q);
-  }
   [[nodiscard]] bool is_solid(ContactVec<typename N::Real> q) const { return field.is_solid(q); }
   typename N::Real free_distance(ContactVec<typename N::Real> q,
                                  ContactVec<typename N::Real> move) const {

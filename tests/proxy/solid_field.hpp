@@ -30,7 +30,6 @@ class SolidField {
   }
   [[nodiscard]] bool half_spent() const { return false; }
   [[nodiscard]] bool may_query() const { return true; }
-  [[nodiscard]] bool bears_nothing(ContactVec<typename N::Real>) const { return false; }
   [[nodiscard]] bool is_solid(ContactVec<typename N::Real> at) const {
     return nearest_(point_of<N>(at)).first < 0;
   }

@@ -33,7 +33,6 @@ class CountedBowl {
   }
   [[nodiscard]] bool half_spent() const { return left_ <= queries_ / 2; }
   [[nodiscard]] bool may_query() const { return left_ > 0; }
-  [[nodiscard]] bool bears_nothing(ContactVec<typename N::Real>) const { return false; }
   [[nodiscard]] bool is_solid(ContactVec<typename N::Real> at) const { return bowl_.is_solid(at); }
   [[nodiscard]] typename N::Real free_distance(ContactVec<typename N::Real> at,
                                                ContactVec<typename N::Real> move) const {

@@ -34,9 +34,7 @@ class FreeWay {
 
  public:
   /// `voxels`: the move, at most 2^14 long; `length`: no shorter, above 0 (fixed: both Q15.16).
-  /// `margin`: steps of the map that every sphere needs besides its own.
-  FreeWay(const FreeBricks& free, const S (&voxels)[3], S length, std::int32_t margin = 0) noexcept
-      : free_(free), margin_(margin) {
+  FreeWay(const FreeBricks& free, const S (&voxels)[3], S length) noexcept : free_(free) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
       move_[axis] = voxels[axis];
       const Wide size = std::max(move_[axis], -move_[axis]);
@@ -69,7 +67,7 @@ class FreeWay {
           place[axis] = start[axis] + move_[axis] * share;
         }
       }
-      const std::int32_t free = distance(place) - needed - margin_;
+      const std::int32_t free = distance(place) - needed;
       if (free < 0) return share;
       Share onward = share_of(free);
       if (free < kAcross) onward = std::max(onward, leaving(place));
@@ -82,7 +80,10 @@ class FreeWay {
   /// Share of the move in which no place goes by more than so many steps of the map.
   [[nodiscard]] Share share_of(std::int32_t steps) const noexcept { return step_ * Share(steps); }
 
-  /// The voxel cell that holds a coordinate (fixed: Q15.16).
+ private:
+  /// Steps across a brick: no brick is left later than by so many.
+  static constexpr std::int32_t kAcross = 2 * kFreeBrick * kFreeSteps;
+
   [[nodiscard]] static std::int32_t voxel_of(Wide place) noexcept {
     if constexpr (N::kIsFixed) {
       return static_cast<std::int32_t>(place >> 16);
@@ -91,10 +92,6 @@ class FreeWay {
       return Wide(voxel) > place ? voxel - 1 : voxel;
     }
   }
-
- private:
-  /// Steps across a brick: no brick is left later than by so many.
-  static constexpr std::int32_t kAcross = 2 * kFreeBrick * kFreeSteps;
 
   /// Of the brick that holds a place.
   [[nodiscard]] std::int32_t distance(const Wide (&place)[3]) const noexcept {
@@ -122,7 +119,6 @@ class FreeWay {
   }
 
   const FreeBricks& free_;
-  std::int32_t margin_;
   Wide move_[3] = {};
   Share inverse_[3] = {};  ///< share of the move that is one voxel along an axis
   Share step_{};           ///< that is one step of the map

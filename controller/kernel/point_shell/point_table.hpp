@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <algorithm>
 #include <cstdint>
-#include <limits>
 
 #include "controller/kernel/point_shell/free_bricks.hpp"
 #include "shared/numeric/numbers.hpp"
@@ -76,13 +74,6 @@ struct DensityScale {
   return scale;
 }
 
-/// The least density whose r reaches the iso's, 1/2. At most one step above the iso.
-[[nodiscard]] constexpr Density least_at_iso(const DensityScale& scale) noexcept {
-  const std::uint64_t half = std::uint64_t{32768} << scale.shift;
-  return static_cast<Density>(std::min<std::uint64_t>((half + scale.mantissa - 1) / scale.mantissa,
-                                                      std::numeric_limits<Density>::max()));
-}
-
 template <class S>
 [[nodiscard]] constexpr S scale_factor(const DensityScale& scale) noexcept {
   return S(scale.mantissa) / S(std::int32_t{1} << scale.shift);
@@ -93,8 +84,7 @@ struct DensityField {
   VoxelGrid grid;
   const Density* density = nullptr;
   DensityScale scale;
-  FreeBricks free{};     ///< of what contact feels
-  FreeBricks bearing{};  ///< of what reaches the iso: nothing softer bears
+  FreeBricks free;
 };
 
 /// Sums over the samples of one query (docs/theory.md 3.2, 3.3). r is the density of contact and w

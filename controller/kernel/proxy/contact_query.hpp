@@ -62,7 +62,6 @@ class ContactQuery {
     reader_.set_left(work_.budget());
     nearest_ = 0;
     in_vain_ = 0;
-    soft_ = false;
   }
   [[nodiscard]] const QueryWork& work() const noexcept { return work_; }
   /// See ContactField.
@@ -105,21 +104,9 @@ class ContactQuery {
     });
   }
 
-  /// Whether no voxel that reaches the iso is near enough to any sample to hold the tool, however
-  /// it is turned: by the map alone, so it may say no.
-  [[nodiscard]] bool bears_nothing(ContactVec<Real> q) const noexcept {
-    return std::all_of(volumes_.begin(), volumes_.end(), [&](const ContactVolume<N>& volume) {
-      const VoxelVec<Real> at = Reader::place_of(volume, q);
-      const auto voxel = [](Real x) { return FreeWay<N>::voxel_of(Reader::number_of(x)); };
-      return volume.field.bearing.at(voxel(at.x), voxel(at.y), voxel(at.z)) >=
-             points_.table.needed_whole + kBearingMargin;
-    });
-  }
-
-  /// How far along `move` the centre may go from `q` and be held by nothing: a lower bound. The
-  /// tool goes as one sphere about its centre, which is all of a ball, and then by the spheres of
-  /// its groups; where it feels nothing, and amid soft matter where nothing bears. One more query
-  /// is left. What groups have looked at in vain is bounded by `QueryWork::in_vain`.
+  /// How far along `move` the centre may go from `q` and feel nothing: a lower bound. The tool goes
+  /// as one sphere about its centre, which is all of a ball, and then by the spheres of its groups.
+  /// One more query is left. What groups have looked at in vain is bounded by `QueryWork::in_vain`.
   [[nodiscard]] Real free_distance(ContactVec<Real> q, ContactVec<Real> move) const noexcept {
     return free_distance(q, move, left() - work_.query - work_.closer, work_.in_vain());
   }
@@ -128,57 +115,19 @@ class ContactQuery {
                                    std::int64_t most_in_vain) const noexcept {
     const Real length = norm(move);
     if (!(length > Real(SweepRules::kStep))) return Real(0);
+    const PointTable<N>& table = points_.table;
+    const bool as_one = table.round && table.needed_whole <= kFreeFarthest;
     const std::int64_t spare = std::max<std::int64_t>(work, 0) / QueryWork::kFreeLook;
     std::int64_t looks = spare;
-    const auto along = [&](FreeBricks DensityField::*map, std::int32_t margin) {
-      const std::int64_t before = looks;
-      const Real free =
-          part_of_length(length, free_share(q, move, map, margin, most_in_vain, looks));
-      if (free <= Real(SweepRules::kStep)) in_vain_ += QueryWork::kFreeLook * (before - looks);
-      return free;
-    };
-    Real free = along(&DensityField::free, 0);
-    if (free <= Real(SweepRules::kStep) && (soft_ || bears_nothing(q))) {
-      free = std::max(free, along(&DensityField::bearing, kBearingMargin));
-    }
-    reader_.spend(QueryWork::kFreeLook * (spare - looks));
-    return free;
-  }
-
- private:
-  using Reader = SampleReader<N>;
-
-  /// What a sphere needs more on the map of what bears, so that no query on the way finds a plane
-  /// that holds: a voxel of the iso counts within three voxels of a sample on every axis
-  /// (`iso_is_near`), two more than the map has it: 2 sqrt 3 voxels, in its steps.
-  static constexpr std::int32_t kBearingMargin = 14;
-  static_assert(kBearingMargin * kBearingMargin >= 12 * kFreeSteps * kFreeSteps);
-
-  [[nodiscard]] static Real part_of_length(Real length, MoveShare<N> share) noexcept {
-    if constexpr (N::kIsFixed) {
-      return Real::from_raw(static_cast<std::int32_t>(length.raw() * share >> 30));
-    } else {
-      return length * share;
-    }
-  }
-
-  /// Share of `move` that one map of every volume proves free, where each sphere needs `margin`
-  /// steps more.
-  [[nodiscard]] MoveShare<N> free_share(ContactVec<Real> q, ContactVec<Real> move,
-                                        FreeBricks DensityField::*map, std::int32_t margin,
-                                        std::int64_t most_in_vain,
-                                        std::int64_t& looks) const noexcept {
-    const PointTable<N>& table = points_.table;
-    const bool as_one = table.round && table.needed_whole + margin <= kFreeFarthest;
     MoveShare<N> share = kWholeMove<N>;
     for (const ContactVolume<N>& volume : volumes_) {
       const VoxelVec<Real> at = Reader::place_of(volume, q),
                            by = volume.frame.voxel_from_contact * move;
       // No edge of a voxel is shorter than a unit.
       const FreeWay<N> way(
-          volume.field.*map,
+          volume.field.free,
           {Reader::number_of(by.x), Reader::number_of(by.y), Reader::number_of(by.z)},
-          Reader::number_of(norm(move)), margin);
+          Reader::number_of(length));
       const PointNumber<N> centre[3] = {Reader::number_of(at.x), Reader::number_of(at.y),
                                         Reader::number_of(at.z)};
       const MoveShare<N> most = share;
@@ -186,8 +135,20 @@ class ContactQuery {
       if (as_one || in_vain_ >= most_in_vain) continue;
       share = free_share_of_groups(table, volume.places, centre, way, share, most, nearest_, looks);
     }
-    return share;
+    Real free{};
+    if constexpr (N::kIsFixed) {
+      free = Real::from_raw(static_cast<std::int32_t>(length.raw() * share >> 30));
+    } else {
+      free = length * share;
+    }
+    const std::int64_t looked = QueryWork::kFreeLook * (spare - looks);
+    reader_.spend(looked);
+    if (free <= Real(SweepRules::kStep)) in_vain_ += looked;
+    return free;
   }
+
+ private:
+  using Reader = SampleReader<N>;
 
   /// Adds this volume's plane, after a closer look where it is near rest; the deepest stand first.
   void feel(const ContactVolume<N>& volume, ContactVec<Real> q, bool closer,
@@ -203,7 +164,6 @@ class ContactQuery {
     ConstraintPlane<N> plane = plane_at(volume, at, sums, closer);
     if (plane.depth > Real(0) && sums.top < Reader::kIsoDensity &&
         !reader_.iso_is_near(volume, at, sums.top_sample)) {
-      soft_ = true;
       return;
     }
     if (closer) look_midway(volume, q, plane);
@@ -211,10 +171,7 @@ class ContactQuery {
     // than the iso bears nothing.
     const ContactVec<typename N::Unit> none{};
     const bool immersed = sums.solid >= points_.table.count - points_.table.count / 16;
-    if (!immersed && plane.normal == none && sums.top < Reader::kIsoDensity) {
-      soft_ = true;
-      return;
-    }
+    if (!immersed && plane.normal == none && sums.top < Reader::kIsoDensity) return;
     if (immersed || plane.normal == none) {
       felt.buried = true;
       felt.depth = std::max(felt.depth, plane.depth);
@@ -269,7 +226,6 @@ class ContactQuery {
   mutable bool turned_ = false;       ///< and not queried since
   mutable std::int32_t nearest_ = 0;  ///< group that stopped the last free way
   mutable std::int64_t in_vain_ = 0;
-  mutable bool soft_ = false;  ///< a query of the tick was amid matter that bears nothing
 };
 
 }  // namespace kerf

@@ -17,7 +17,6 @@ namespace kerf {
 ///   free_distance(q, move)  how far the centre may go from q along a move and feel nothing; at
 ///   most
 ///                     the move's length, a lower bound, 0 if unknown
-///   bears_nothing(q)  whether with its centre at q nothing around the tool can hold it
 ///   turn(t)           sets the orientation of the tool for all queries from now on
 ///   is_solid(q)       the place is in the solid
 ///   half_spent()      half of the tick's work is spent: the rest is the move's
@@ -26,7 +25,6 @@ template <class F, class N>
 concept ContactField = requires(F field, ContactVec<typename N::Real> q, ToolTurn<N> turn) {
   { field.query(q) } -> std::convertible_to<Contacts<N>>;
   { field.free_distance(q, q) } -> std::convertible_to<typename N::Real>;
-  { field.bears_nothing(q) } -> std::convertible_to<bool>;
   field.turn(turn);
   { field.is_solid(q) } -> std::convertible_to<bool>;
   { field.half_spent() } -> std::convertible_to<bool>;
@@ -281,11 +279,6 @@ class ProxySweep {
     auto enough = Real(SweepRules::kNoMove);
     while (may_look() && !here_.buried && onward.length >= enough) {
       const Place from = pose_.centre;
-      if (here_.count > 0 && field_.bears_nothing(from)) {  // planes of soft matter
-        here_ = {};
-        held_by_ = {};
-        onward = route(held_by_, goal - from);
-      }
       auto step = Real(SweepRules::kStep);
       if (here_.count == 0) step = std::max(step, field_.free_distance(from, onward.displacement));
       const Unit capped = step < onward.length ? share<N>(step, onward.length) : Unit(1);

@@ -135,13 +135,6 @@ class ToolQuery {
 
   [[nodiscard]] bool is_solid(ContactVec<Real> q) const noexcept { return head_.is_solid(q); }
 
-  [[nodiscard]] bool bears_nothing(ContactVec<Real> q) noexcept {
-    bool nothing = head_.bears_nothing(q);
-    each_behind(
-        [&](Part& part) { nothing = nothing && part.query.bears_nothing(q + part.from_head); });
-    return nothing;
-  }
-
   [[nodiscard]] Real free_distance(ContactVec<Real> q, ContactVec<Real> move) noexcept {
     Real free = norm(move);
     const auto look = [&](ContactQuery<N>& part, ContactVec<Real> at) {
