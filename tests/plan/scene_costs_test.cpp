@@ -420,7 +420,8 @@ TEST_CASE("a scene holds the arrays that it names, and no others") {
   LoadedScene cut = touch;
   cut.cut.model = CutModel::overlap;
   CHECK(arrays_of(cut) == Names{"density of test", "carry of test", "first content of test",
-                                "cut bricks of test", "samples of ball", "table of ball", "box",
+                                "cut bricks of test", "bricks of the last stroke",
+                                "whether they are kept", "samples of ball", "table of ball", "box",
                                 "columns inside", "overlap ratios", "filtered rows", "live rows"});
   LoadedScene odd = touch;
   odd.tools = {shape("cone", 0.6, 2)};
@@ -431,13 +432,15 @@ TEST_CASE("a scene holds the arrays that it names, and no others") {
   odd_cut.volumes[0].image.labels.assign(odd_cut.volumes[0].image.density.size(), 1);
   CHECK(arrays_of(odd_cut) ==
         Names{"density of test", "labels of test", "carry of test", "first content of test",
-              "cut bricks of test", "samples of cone", "ordered samples of cone", "box",
-              "columns inside", "overlap ratios", "filtered rows", "live rows", "sample places",
-              "overlap sums", "rest rows", "live rest rows"});
+              "cut bricks of test", "bricks of the last stroke", "whether they are kept",
+              "samples of cone", "ordered samples of cone", "box", "columns inside",
+              "overlap ratios", "filtered rows", "live rows", "sample places", "overlap sums",
+              "rest rows", "live rest rows"});
   LoadedScene floating = odd_cut;
   floating.servo.numeric = NumericKind::float64;
   CHECK(arrays_of(floating) == Names{"density of test", "labels of test", "gradient of test",
                                      "carry of test", "first content of test", "cut bricks of test",
+                                     "bricks of the last stroke", "whether they are kept",
                                      "samples of cone", "overlap box", "refresh planes"});
   odd_cut.tools[0].turns = false;
   const Names unturned = arrays_of(odd_cut);
