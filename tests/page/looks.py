@@ -51,6 +51,6 @@ def looks_as_asked_by_volume_iso_and_opacity(case):
     case.check(likeness(moved, iso) < LIKE, 'which is seen')
     # The same teeth of that iso by themselves.
     show_two_teeth(case, '0.55')
-    # Below the tool, which has turned about itself.
-    like = likeness(moved, rig.native_picture(width, height), (width, height * 2 // 5))
+    # Below the figures and the tool, which has turned about itself.
+    like = likeness(moved, rig.native_picture(width, height), (width, height * 9 // 20))
     case.check(like >= LIKE, f'iso 0.55: {100 * like:.3f} %')

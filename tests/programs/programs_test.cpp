@@ -65,7 +65,7 @@ TEST_CASE("virtual time: faults keep packets back, and the same run gives the sa
     int exit_code, least_stale;
   };
   for (const auto& [fault, exit_code, least_stale] :
-       {Case{"late_reports", 0, 5}, Case{"lost_long", 1, 40}, Case{"silence", 1, 300},
+       {Case{"late_reports", 0, 5}, Case{"lost_long", 1, 30}, Case{"silence", 1, 300},
         Case{"duplicated", 0, 0}, Case{"lost_commands", 0, 0}}) {
     CAPTURE(fault);
     nlohmann::json reports[2];
