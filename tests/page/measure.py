@@ -60,6 +60,7 @@ def main():
             time.sleep(8)  # until the hand rests
             page = Page(find_chromium(), os.path.join(work, 'profile'))
             page.size(792, 512)  # and the panel: 512x512 are left
+            time.sleep(4)  # a browser that stands open; its own start is not the page's
             page.go(address)
             page.until("document.getElementById('picture')?.dataset.state", 60)
             first_s = page.evaluate('performance.now()') / 1000
@@ -79,7 +80,7 @@ def main():
             rig.start_run()
             page.go(address)
             for renderer in ('iso', 'blend'):
-                page.until(f'Number(document.body.dataset.tick) > {CUT_TICK}', 60)
+                page.until(f'Number(document.body?.dataset.tick) > {CUT_TICK}', 60)
                 rate, slow = rate_of(page, CUT)
                 print(f'{renderer}: {rate:.1f} pictures/s while it cuts, 95 % within {slow:.0f} ms')
                 page.evaluate("document.querySelector('#renderer').focus()")
