@@ -104,7 +104,8 @@ VoxelBox restore_bricks(const ServoPlan<N>& plan, const VoxelGrid& grid, std::si
   return restored;
 }
 
-/// What cutting still owes a volume is of matter that has come back.
+/// What cutting still owes a volume is of matter that has come back. One value for each lane of the
+/// widest tool.
 template <class N>
 void forget_debts(ServoState<N>& state, std::size_t v) noexcept {
   std::ranges::fill(state.volumes[v].carry, RemovalCarry<N>{});

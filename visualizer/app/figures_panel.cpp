@@ -57,7 +57,10 @@ void curve(const char* label, const char* format, const std::vector<ForcePlot::P
 }
 
 /// The materials with their colours: what was removed of each.
-void material_rows(const std::vector<ScoreRow>& score, std::size_t most) {
+void material_rows(const OverlayFigures& figures) {
+  const std::vector<ScoreRow>& score = figures.score;
+  const std::size_t most = figures.slices ? kFewMaterials : kMostMaterials;
+  if (!score.empty() && figures.score_is_partial) panel_row("materials", "%s", "since joining");
   const std::size_t shown = std::min(score.size(), most);
   for (std::size_t i = 0; i < shown; ++i) {
     const ScoreRow& material = score[i];
@@ -105,7 +108,7 @@ float draw_figures(const OverlayFigures& figures) {
     }
     panel_row(figures.removed_is_partial ? "since joining" : "removed", "%.2f mm3",
               figures.removed_mm3);
-    if (!plots) material_rows(figures.score, figures.slices ? kFewMaterials : kMostMaterials);
+    if (!plots) material_rows(figures);
     if (!figures.forbidden.empty()) {
       const bool touched = figures.forbidden_ms > 0.0;
       panel_row(shortened("touched " + figures.forbidden, kMostLabel).c_str(), "%.0f ms",

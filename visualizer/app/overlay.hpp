@@ -48,6 +48,7 @@ struct OverlayFigures {
   double removed_mm3 = 0.0;
   bool removed_is_partial = false;  ///< joined late: counted from then on
   std::vector<ScoreRow> score;      ///< of the scene's materials
+  bool score_is_partial = false;    ///< something was cut before this one joined
   std::string forbidden;            ///< which of them may not be cut; empty: none
   double forbidden_ms = 0.0;        ///< they were pressed upon for so long
   std::optional<double> tick_rate_hz;

@@ -311,6 +311,7 @@ OverlayFigures overlay_figures(const Session& session) {
   }
   figures.removed_mm3 = session.removed_mm3();
   figures.removed_is_partial = session.joined_late();
+  figures.score_is_partial = session.cut_before();
   for (const MaterialView& material : session.scene().materials) {
     if (!material.forbidden) continue;
     figures.forbidden += (figures.forbidden.empty() ? "" : ", ") + material.name;

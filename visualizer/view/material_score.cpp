@@ -31,11 +31,11 @@ MaterialScore::MaterialScore(const SceneView& scene, std::span<const VolumeConte
       volume.material[i] = static_cast<Label>(rule.of(label, density[i]));
     }
     volume.matter.resize(volume.bricks.count() * materials_);
+    volume.fullest.resize(volume.matter.size());
     volume.removed.resize(materials_);
     for (std::uint32_t brick = 0; brick < volume.bricks.count(); ++brick) {
       count(volume, density, brick);
     }
-    std::ranges::fill(volume.removed, 0);
   }
 }
 
@@ -47,7 +47,8 @@ void MaterialScore::update(std::size_t volume, std::span<const Density> density,
 void MaterialScore::count(Volume& volume, std::span<const Density> density,
                           std::uint32_t brick) const {
   std::uint32_t* const matter = &volume.matter[brick * materials_];
-  for (std::size_t m = 0; m < materials_; ++m) volume.removed[m] += matter[m];
+  std::uint32_t* const fullest = &volume.fullest[brick * materials_];
+  for (std::size_t m = 0; m < materials_; ++m) volume.removed[m] -= fullest[m] - matter[m];
   std::fill_n(matter, materials_, 0U);
   const VoxelBox box = volume.bricks.voxels(brick);
   for (std::int32_t z = box.lo.z; z < box.hi.z; ++z) {
@@ -57,7 +58,10 @@ void MaterialScore::count(Volume& volume, std::span<const Density> density,
       for (std::size_t i = row; i < row + wide; ++i) matter[volume.material[i]] += density[i];
     }
   }
-  for (std::size_t m = 0; m < materials_; ++m) volume.removed[m] -= matter[m];
+  for (std::size_t m = 0; m < materials_; ++m) {
+    fullest[m] = std::max(fullest[m], matter[m]);
+    volume.removed[m] += fullest[m] - matter[m];
+  }
 }
 
 std::vector<double> MaterialScore::removed_mm3() const {

@@ -10,8 +10,9 @@
 
 namespace kerf {
 
-/// How much of each material the volumes lack of the content with which this was made. What comes
-/// back, as by a reset, counts no more. A byte for each voxel.
+/// How much of each material the volumes lack of the fullest content that was seen here, brick by
+/// brick. What comes back counts no more, also where a reset gives back what had gone before this was
+/// made. A byte for each voxel.
 class MaterialScore {
  public:
   MaterialScore(const SceneView& scene, std::span<const VolumeContent> contents);
@@ -28,10 +29,11 @@ class MaterialScore {
     BrickGrid bricks;
     double step_mm3 = 0.0;              ///< of a step of density in a voxel
     std::vector<Label> material;        ///< by voxel
-    std::vector<std::uint32_t> matter;  ///< steps by brick and material
-    std::vector<std::int64_t> removed;  ///< steps by material
+    std::vector<std::uint32_t> matter;   ///< steps by brick and material
+    std::vector<std::uint32_t> fullest;  ///< the most of them so far
+    std::vector<std::int64_t> removed;   ///< steps by material
   };
-  /// Counts the matter of a brick anew; what it had more before is removed.
+  /// Counts the matter of a brick anew; what it lacks of its fullest is removed.
   void count(Volume& volume, std::span<const Density> density, std::uint32_t brick) const;
 
   std::size_t materials_;

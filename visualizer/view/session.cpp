@@ -32,6 +32,7 @@ double voxel_mm3(const VolumeView& volume) {
 Session::Session(std::string_view name)
     : connection_(connect_segment(name)),
       scene_(scene_view(connection_.reader().info())),
+      cut_before_(connection_.reader().dirty_head() != 0),
       snapshots_(scene_.volumes.size()),
       score_(first_score()) {
   poll();

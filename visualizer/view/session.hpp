@@ -47,6 +47,8 @@ class Session {
   [[nodiscard]] std::vector<double> removed_by_material_mm3() const { return score_.removed_mm3(); }
   /// How long what may not be cut was pressed upon, since then too.
   [[nodiscard]] double forbidden_ms() const noexcept;
+  /// Something had been cut before it joined, which `removed_by_material_mm3` lacks.
+  [[nodiscard]] bool cut_before() const noexcept { return cut_before_; }
   [[nodiscard]] bool joined_late() const noexcept { return joined_late_; }
   [[nodiscard]] std::optional<double> data_age_ms() const;
   /// When the oldest of the ticks began that removed material whose bricks came with a `poll` since
@@ -85,6 +87,7 @@ class Session {
   Stopwatch began_;
   SegmentConnection connection_;
   SceneView scene_;
+  bool cut_before_;  ///< as told before the first look at the volumes
   std::vector<VolumeSnapshot> snapshots_;
   MaterialScore score_;
   std::optional<TickRecord> latest_;

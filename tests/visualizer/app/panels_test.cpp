@@ -27,6 +27,7 @@ OverlayFigures crowded() {
   for (int m = 0; m < 31; ++m) {
     figures.score.push_back({"material " + std::to_string(m), 1.0F, 0.5F, 0.0F, 0.1 * m});
   }
+  figures.score_is_partial = true;
   figures.forbidden = "pulp, nerve";
   figures.forbidden_ms = 121.0;
   figures.tick_rate_hz = 1000.0;

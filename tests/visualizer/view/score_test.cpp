@@ -65,6 +65,23 @@ TEST_CASE("the score counts by label, or else by the density that a voxel had at
   }
 }
 
+TEST_CASE("a score that joined late counts nothing for what a reset gives back") {
+  const SceneView scene = scene_of(kTooth);
+  std::vector<Density> density(kGrid.voxel_count(), 0);
+  const std::vector<Label> labels(kGrid.voxel_count(), 1);
+  const std::size_t cut_before = kGrid.index(3, 4, 5), cut_now = kGrid.index(19, 9, 8);
+  density[cut_now] = 60'000;
+  MaterialScore score(scene, std::vector<VolumeContent>{{density, labels}});
+  density[cut_before] = 60'000;
+  score.update(0, density, all_bricks(scene));
+  CHECK(score.removed_mm3() == std::vector<double>{0, 0, 0});
+  for (const std::size_t at : {cut_before, cut_now}) {
+    density[at] = 0;
+    score.update(0, density, all_bricks(scene));
+  }
+  CHECK(score.removed_mm3()[1] == doctest::Approx(2 * 60'000 / kDensityMax * kVoxelMm3));
+}
+
 TEST_CASE("three sections show what lies in their planes through the tip, and where that is") {
   const SceneView scene = scene_of(kTooth);
   std::vector<Density> density(kGrid.voxel_count(), 0);
