@@ -15,6 +15,7 @@
 
 #include "controller/shell/allocation_counter.hpp"
 #include "shared/volume/density_hash.hpp"
+#include "tests/servo/cut_kinds.hpp"
 #include "tests/servo/support.hpp"
 
 using namespace kerf;
@@ -25,30 +26,6 @@ namespace {
 constexpr ServoCommand kUndo{.kind = ServoCommand::Kind::undo};
 using Place = std::array<double, 3>;
 constexpr Place kAbove{0, 5, 0};
-
-struct Kind {
-  const char* name;
-  NumericKind numeric;
-  CutModel cut;
-  bool round = true;
-};
-constexpr std::array kKinds{
-    Kind{"preston, fixed", NumericKind::fixed, CutModel::preston},
-    Kind{"preston, double", NumericKind::float64, CutModel::preston},
-    Kind{"paper, fixed, aligned", NumericKind::fixed, CutModel::overlap},
-    Kind{"paper, fixed, splat", NumericKind::fixed, CutModel::overlap, false},
-    Kind{"paper, float, gradients", NumericKind::float32, CutModel::overlap}};
-
-/// Solid below y = 0.
-LoadedScene cut_scene(const Kind& kind) {
-  const bool force = kind.cut == CutModel::preston;
-  LoadedScene scene = force ? half_space_scene(44) : paper_scene(44);
-  scene.servo.numeric = kind.numeric;
-  scene.cut.model = kind.cut;
-  scene.tools[0].round = kind.round;
-  if (force) scene.cut.machinability_mm3_per_s_n = 8;
-  return scene;
-}
 
 /// A hand that cuts one groove after another.
 struct Strokes : ArmedServo {
@@ -91,7 +68,7 @@ struct Strokes : ArmedServo {
 }  // namespace
 
 TEST_CASE("an undo brings back the bits of before the last stroke, and only of that") {
-  for (const Kind& kind : kKinds) {
+  for (const CutKind& kind : kCutKinds) {
     CAPTURE(std::string(kind.name));
     Strokes hand(cut_scene(kind));
     const std::uint64_t first = hand.hash();
@@ -114,7 +91,7 @@ TEST_CASE("an undo brings back the bits of before the last stroke, and only of t
 }
 
 TEST_CASE("after an undo the tool feels what it felt before the stroke") {
-  for (const Kind& kind : kKinds) {
+  for (const CutKind& kind : kCutKinds) {
     CAPTURE(std::string(kind.name));
     Strokes fresh(cut_scene(kind)), undone(cut_scene(kind));
     undone.stroke(0.0);
@@ -135,7 +112,7 @@ TEST_CASE("after an undo the tool feels what it felt before the stroke") {
 TEST_CASE("a stroke goes on while its tool lifts for less than the pause, and ends after it") {
   for (const int away_ms : {20, 600}) {
     CAPTURE(away_ms);
-    Strokes hand(cut_scene(kKinds[0]));
+    Strokes hand(cut_scene(kCutKinds[0]));
     const std::uint64_t first = hand.hash();
     const Place end = hand.press(-0.6);
     const Place lifted{end[0], end[1] + 3, end[2]};
@@ -150,7 +127,7 @@ TEST_CASE("a stroke goes on while its tool lifts for less than the pause, and en
 }
 
 TEST_CASE("no force is felt and nothing is cut while a stroke is undone around the tool") {
-  for (const Kind& kind : kKinds) {
+  for (const CutKind& kind : kCutKinds) {
     CAPTURE(std::string(kind.name));
     LoadedScene scene = cut_scene(kind);
     scene.servo.rate_hz = 8000;  // eight bricks a tick
@@ -169,7 +146,7 @@ TEST_CASE("no force is felt and nothing is cut while a stroke is undone around t
 }
 
 TEST_CASE("inside of the matter that came back the force comes slowly") {
-  Strokes hand(cut_scene(kKinds[0]));
+  Strokes hand(cut_scene(kCutKinds[0]));
   const Place end = hand.press(0.2);
   hand.undo(end);
   for (int ms = 0; ms < 90; ++ms) {
@@ -178,7 +155,7 @@ TEST_CASE("inside of the matter that came back the force comes slowly") {
 }
 
 TEST_CASE("a tick of an undo copies at most 64 bricks that lie within 32 voxels") {
-  Strokes hand(cut_scene(kKinds[0]));
+  Strokes hand(cut_scene(kCutKinds[0]));
   hand.stroke(-1.0);
   REQUIRE(hand.servo->apply(kUndo));
   ServoOutput out;
@@ -208,7 +185,7 @@ TEST_CASE("a stroke that is longer than the pool is told, and the next one can b
 }
 
 TEST_CASE("a reset forgets the last stroke, and ends an undo that runs") {
-  Strokes hand(cut_scene(kKinds[0]));
+  Strokes hand(cut_scene(kCutKinds[0]));
   const std::uint64_t first = hand.hash();
   hand.stroke(0.0);
   REQUIRE(hand.servo->apply(kUndo));
@@ -231,7 +208,7 @@ TEST_CASE("where nothing is cut there is nothing to undo, and asking changes no 
 }
 
 TEST_CASE("an undo repeats bit by bit from a snapshot in the middle of it, without the heap") {
-  for (const Kind& kind : kKinds) {
+  for (const CutKind& kind : kCutKinds) {
     CAPTURE(std::string(kind.name));
     Strokes hand(cut_scene(kind));
     hand.stroke(0.0);

@@ -17,6 +17,7 @@
 
 #include "controller/shell/allocation_counter.hpp"
 #include "shared/volume/density_hash.hpp"
+#include "tests/servo/cut_kinds.hpp"
 #include "tests/servo/support.hpp"
 
 using namespace kerf;
@@ -26,31 +27,6 @@ namespace {
 
 constexpr ServoCommand kReset{.kind = ServoCommand::Kind::reset};
 constexpr double kSlewN = 0.5 + 2e-3;  ///< in a tick of 1 ms, and the motors' steps
-
-struct Kind {
-  const char* name;
-  NumericKind numeric;
-  CutModel cut;
-  bool round = true;
-};
-constexpr std::array kKinds{
-    Kind{"preston, fixed", NumericKind::fixed, CutModel::preston},
-    Kind{"preston, double", NumericKind::float64, CutModel::preston},
-    Kind{"paper, fixed, aligned", NumericKind::fixed, CutModel::overlap},
-    Kind{"paper, fixed, splat", NumericKind::fixed, CutModel::overlap, false},
-    Kind{"paper, float, gradients", NumericKind::float32, CutModel::overlap},
-    Kind{"paper, double, gradients", NumericKind::float64, CutModel::overlap}};
-
-/// Solid below y = 0, in 40^3 voxels: the far bricks of a block are missing.
-LoadedScene cut_scene(const Kind& kind) {
-  const bool force = kind.cut == CutModel::preston;
-  LoadedScene scene = force ? half_space_scene(44) : paper_scene(44);
-  scene.servo.numeric = kind.numeric;
-  scene.cut.model = kind.cut;
-  scene.tools[0].round = kind.round;
-  if (force) scene.cut.machinability_mm3_per_s_n = 8;
-  return scene;
-}
 
 /// A servo that cut a groove into the solid, its hand still in it, 0.9 mm below the first surface.
 struct Groove : ArmedServo {
@@ -104,9 +80,9 @@ struct Groove : ArmedServo {
 }  // namespace
 
 TEST_CASE("after a reset every volume is its first content, whatever feels and cuts") {
-  for (const Kind& kind : kKinds) {
+  for (const CutKind& kind : kCutKinds) {
     for (const int rate_hz : {250, 1000, 8000}) {
-      if (rate_hz != 1000 && &kind != &kKinds[0]) continue;  // the time of a test
+      if (rate_hz != 1000 && &kind != &kCutKinds[0]) continue;  // the time of a test
       CAPTURE(std::string(kind.name));
       CAPTURE(rate_hz);
       LoadedScene scene = cut_scene(kind);
@@ -126,7 +102,7 @@ TEST_CASE("after a reset every volume is its first content, whatever feels and c
 
 TEST_CASE("a tick of a reset copies at most 64 bricks of one block, and tells their box") {
   for (const int rate_hz : {250, 1000, 8000}) {
-    LoadedScene scene = cut_scene(kKinds[0]);
+    LoadedScene scene = cut_scene(kCutKinds[0]);
     scene.servo.rate_hz = rate_hz;
     Groove groove(scene);
     const auto before =
@@ -157,7 +133,7 @@ TEST_CASE("a tick of a reset copies at most 64 bricks of one block, and tells th
 
 // Gradients, accounts and fractions that are owed follow: the same hand cuts the same once more.
 TEST_CASE("after a reset the same hand cuts the same as if nothing had been cut before") {
-  for (const Kind& kind : kKinds) {
+  for (const CutKind& kind : kCutKinds) {
     CAPTURE(std::string(kind.name));
     std::array<std::vector<Density>, 2> left;
     for (const bool cut_before : {false, true}) {
@@ -177,7 +153,7 @@ TEST_CASE("after a reset the same hand cuts the same as if nothing had been cut 
 }
 
 TEST_CASE("inside of the restored solid the force comes slowly, and a hand at rest does no work") {
-  for (const Kind& kind : kKinds) {
+  for (const CutKind& kind : kCutKinds) {
     CAPTURE(std::string(kind.name));
     Groove groove(cut_scene(kind));
     ServoOutput last = groove.rest(1);
@@ -206,7 +182,7 @@ TEST_CASE("inside of the restored solid the force comes slowly, and a hand at re
 }
 
 TEST_CASE("no force is felt and nothing is cut while a reset runs, whoever asks again") {
-  LoadedScene scene = cut_scene(kKinds[0]);
+  LoadedScene scene = cut_scene(kCutKinds[0]);
   scene.servo.rate_hz = 8000;
   scene.tools.push_back(ball(8));
   Groove once(scene), often(scene);
@@ -236,7 +212,7 @@ TEST_CASE("no force is felt and nothing is cut while a reset runs, whoever asks 
 TEST_CASE("a reset goes on through a fault, through missing reports and through a hold") {
   for (const int disturbance : {0, 1, 2, 3}) {
     CAPTURE(disturbance);
-    Groove groove(cut_scene(kKinds[1]));
+    Groove groove(cut_scene(kCutKinds[1]));
     if (disturbance == 2) groove.servo->apply({ServoCommand::Kind::hold, 1});
     if (disturbance == 3) {  // latched before
       static_cast<void>(groove.step(0, 40, 40));
@@ -290,7 +266,7 @@ TEST_CASE("where nothing is cut a reset changes no bit; where nothing was cut it
     const double y_mm = 1 - 0.01 * ms;
     CHECK(told.step(0, y_mm, 0).output_hash == untold.step(0, y_mm, 0).output_hash);
   }
-  LoadedScene cuts = cut_scene(kKinds[0]);
+  LoadedScene cuts = cut_scene(kCutKinds[0]);
   ArmedServo idle(cuts);
   CHECK(idle.servo->apply(kReset));
   CHECK(idle.step(0, 5, 0).resetting);
@@ -298,7 +274,7 @@ TEST_CASE("where nothing is cut a reset changes no bit; where nothing was cut it
 }
 
 TEST_CASE("a run with a reset repeats bit by bit, also from a snapshot in the middle of it") {
-  for (const Kind& kind : kKinds) {
+  for (const CutKind& kind : kCutKinds) {
     CAPTURE(std::string(kind.name));
     std::array<std::uint64_t, 2> output{};
     std::unique_ptr<ServoSnapshot> kept;
@@ -320,7 +296,7 @@ TEST_CASE("a run with a reset repeats bit by bit, also from a snapshot in the mi
 }
 
 TEST_CASE("a reset never touches the heap") {
-  for (const Kind& kind : kKinds) {
+  for (const CutKind& kind : kCutKinds) {
     Groove groove(cut_scene(kind));
     const CountedAllocations counted;
     const std::uint64_t before = CountedAllocations::total();
