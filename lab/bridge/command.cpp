@@ -16,7 +16,6 @@
 namespace kerf::two_machines {
 namespace {
 
-constexpr int kSkipped = 77;  // as ctest knows it
 constexpr std::int32_t kAllLayers = 21, kFewLayers = 4;
 constexpr int kPublishPairs = 9;  // so that a sign is one: all larger by chance, 1 in 512
 const std::vector<std::string> kParts{"all", "links", "kills", "stopped", "publish", "crowd"};

@@ -6,8 +6,6 @@
 #include <csignal>
 #include <cstdlib>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <memory>
 #include <ostream>
 #include <sstream>
@@ -19,6 +17,7 @@
 #include "lab/bridge/two_networks.hpp"
 #include "shared/posix/shipped_file.hpp"
 #include "shared/posix/stop_signals.hpp"
+#include "shared/text/file_text.hpp"
 #include "shared/text/format.hpp"
 #include "shared/text/json.hpp"
 #include "shared/text/number.hpp"
@@ -31,14 +30,8 @@ using std::chrono::seconds;
 using sweep::Child;
 using sweep::program_beside;
 
-constexpr int kSkipped = 77;
 constexpr int kPictures = 12;
 constexpr const char* kFarName = "far";
-
-[[nodiscard]] std::string text_in(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
 
 /// The value of `name=value`, a line of `text`; empty where there is none.
 [[nodiscard]] std::string value_in(const std::string& text, const std::string& name) {

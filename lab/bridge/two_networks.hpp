@@ -32,6 +32,9 @@ class File {
   int fd_;
 };
 
+/// Exit code where this machine forbids networks of one's own, as ctest knows it.
+inline constexpr int kSkipped = 77;
+
 /// Two networks of their own, as two machines have them, and a link between. The link forwards
 /// packets, so TCP sees losses, delays and rates as from a real one. Everything else (processor,
 /// memory, files, clocks) is this machine's. Goes with its owner.

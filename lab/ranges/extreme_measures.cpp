@@ -5,7 +5,6 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <cstdio>
 #include <functional>
 #include <limits>
 #include <string_view>
@@ -16,17 +15,12 @@
 #include "lab/ranges/hard_hand.hpp"
 #include "lab/rig/body.hpp"
 #include "shared/numeric/fixed.hpp"
+#include "shared/text/format.hpp"
 
 namespace kerf::ranges {
 namespace {
 
 using DensityAt = std::function<double(extremes::Point)>;
-
-std::string figures(const char* form, double a, double b = 0) {
-  char text[128];
-  std::snprintf(text, sizeof text, form, a, b);
-  return text;
-}
 
 /// A volume of 32^3 voxels about the origin, solid by its share, and a ball of 4 voxels above it.
 LoadedScene scene_of(NumericKind numeric, ForceModel model, std::array<double, 3> spacing_mm,
@@ -53,7 +47,7 @@ LoadedScene scene_of(NumericKind numeric, ForceModel model, std::array<double, 3
 }
 
 /// Solid below the middle along y, its edge two voxels wide.
-double half_space(extremes::Point p) {
+double solid_half(extremes::Point p) {
   return 0.5 - (p[1] - 15.5) / 2;
 }
 
@@ -83,7 +77,7 @@ double rest_cycle_mm(NumericKind numeric, double quantum_mm) {
   constexpr double kMassKg = 0.145, kDampingNsPerMm = 0.0032, kHandNPerMm = 0.2, kAimMm = -3;
   constexpr int kTicks = 900, kSteps = 100;
   constexpr double kDt = 1e-3 / kSteps;
-  LoadedScene scene = scene_of(numeric, ForceModel::proxy, {0.25, 0.25, 0.25}, half_space);
+  LoadedScene scene = scene_of(numeric, ForceModel::proxy, {0.25, 0.25, 0.25}, solid_half);
   CountHand hand(scene.device);
   const auto servo = compile(scene);
   const double start_mm = 1.2;
@@ -117,7 +111,7 @@ double rest_cycle_mm(NumericKind numeric, double quantum_mm) {
 
 std::string measure_stiffness(const Effort& effort, const std::vector<KeyRow>& keys, Found& found) {
   for (const NumericKind numeric : effort.numerics) {
-    LoadedScene scene = scene_of(numeric, ForceModel::paper, {0.25, 0.25, 0.25}, half_space);
+    LoadedScene scene = scene_of(numeric, ForceModel::paper, {0.25, 0.25, 0.25}, solid_half);
     scene.force.p0_n_per_mm2 = 0;
     const HardHand hand = hard_hand(scene);
     const auto servo = compile(scene);
@@ -144,7 +138,7 @@ std::string measure_voxel_sizes(const Effort& effort, const std::vector<KeyRow>&
                                             {2.0, 2.0, 2.0},
                                             {0.1, 0.4, 0.1},
                                             {0.4, 0.1, 0.4}}) {
-      LoadedScene scene = scene_of(numeric, ForceModel::proxy, mm, half_space);
+      LoadedScene scene = scene_of(numeric, ForceModel::proxy, mm, solid_half);
       const double scale = scene.device.workspace_scale, stiffness = scene.force.stiffness_n_per_mm;
       const double radius_mm = scene.tools[0].radius_mm;
       const HardHand hand = hard_hand(scene);
@@ -160,11 +154,11 @@ std::string measure_voxel_sizes(const Effort& effort, const std::vector<KeyRow>&
       const double blur = 0.05 * std::ranges::max(mm) / scale / depth_mm + 0.01;
       if (!(depth_mm > 0) || !(error <= blur)) {
         found.push_back(
-            {"invariant", figures("%.3g mm: force off by %.3g of K depth", mm[1], error)});
+            {"invariant", format("%.3g mm: force off by %.3g of K depth", mm[1], error)});
       }
     }
   }
-  return figures("force within %.2g of K depth", worst);
+  return format("force within %.2g of K depth", worst);
 }
 
 std::string measure_fields(const Effort& effort, const std::vector<KeyRow>&, Found& found) {
@@ -201,7 +195,7 @@ std::string measure_fields(const Effort& effort, const std::vector<KeyRow>&, Fou
       }
     }
   }
-  return figures("largest force %.3g N", largest_n);
+  return format("largest force %.3g N", largest_n);
 }
 
 std::string measure_quantum(const Effort& effort, const std::vector<KeyRow>&, Found& found) {
@@ -213,17 +207,17 @@ std::string measure_quantum(const Effort& effort, const std::vector<KeyRow>&, Fo
                    of_quantum = cycle_mm / std::max(mm, kCountMm);
       worst = std::max(worst, of_quantum);
       if (!(of_quantum <= 3))
-        found.push_back({"cycle", figures("D = %.3g mm: %.3g mm peak to peak", mm, cycle_mm)});
+        found.push_back({"cycle", format("D = %.3g mm: %.3g mm peak to peak", mm, cycle_mm)});
     }
   }
-  return figures("at most %.2g quanta peak to peak", worst);
+  return format("at most %.2g quanta peak to peak", worst);
 }
 
 /// In a float servo a heat that decays for 20 minutes at 250 Hz comes below 2^-126.
 std::string measure_denormals(const Effort&, const std::vector<KeyRow>&, Found& found) {
   constexpr int kTicks = 300'000;
   LoadedScene scene =
-      scene_of(NumericKind::float32, ForceModel::proxy, {0.25, 0.25, 0.25}, half_space);
+      scene_of(NumericKind::float32, ForceModel::proxy, {0.25, 0.25, 0.25}, solid_half);
   scene.servo.rate_hz = 250;
   const HardHand hand = hard_hand(scene);
   const auto servo = compile(scene);
@@ -240,9 +234,8 @@ std::string measure_denormals(const Effort&, const std::vector<KeyRow>&, Found& 
         subnormal += x != 0 && std::abs(x) < std::numeric_limits<float>::min() ? 1 : 0;
     }
   }
-  if (subnormal > 0)
-    found.push_back({"denormal", figures("%.0f outputs are subnormal", subnormal)});
-  return figures("%.0f ticks of 250 Hz, none subnormal", kTicks);
+  if (subnormal > 0) found.push_back({"denormal", format("%d outputs are subnormal", subnormal)});
+  return format("%d ticks of 250 Hz, none subnormal", kTicks);
 }
 
 std::string measure_energy(const Effort&, const std::vector<KeyRow>&, Found& found) {

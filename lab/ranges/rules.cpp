@@ -3,12 +3,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <cstdlib>
 #include <span>
 #include <utility>
 
 #include "controller/plan/plan_device.hpp"
+#include "shared/text/format.hpp"
 
 namespace kerf::ranges {
 namespace {
@@ -28,12 +28,6 @@ double beyond_fall(const std::array<double, 3>& f, const std::array<double, 3>& 
   const double whole = dot(last, last);
   const double share = whole > 0 ? std::clamp(dot(f, last) / whole, 0.0, 1.0) : 0.0;
   return length(minus(f, {last[0] * share, last[1] * share, last[2] * share}));
-}
-
-std::string figures(const char* form, double a, double b) {
-  char text[96];
-  std::snprintf(text, sizeof text, form, a, b);
-  return text;
 }
 
 /// The first output that is no number; null: all are.
@@ -96,13 +90,12 @@ void Rules::broken(const char* rule, std::string what) {
 void Rules::look_at_force(const ServoOutput& out, bool leaves) {
   constexpr double kRounding = 4.0 / 65536;  // of the loop's coarsest force, N
   const double force_n = length(out.force_n);
-  if (!(force_n <= force_n_)) broken("clamp", figures("%.9g N above %.9g", force_n, force_n_));
+  if (!(force_n <= force_n_)) broken("clamp", format("%.9g N above %.9g", force_n, force_n_));
   const int most = std::max({std::abs(out.motor_counts[0]), std::abs(out.motor_counts[1]),
                              std::abs(out.motor_counts[2])});
-  if (most > motor_end_)
-    broken("clamp", figures("%.0f motor counts, beyond %.0f", most, motor_end_));
+  if (most > motor_end_) broken("clamp", format("%d motor counts, beyond %d", most, motor_end_));
   if (!out.motors_on) {
-    if (most != 0 || force_n != 0) broken("off", figures("%.0f counts, %.9g N", most, force_n));
+    if (most != 0 || force_n != 0) broken("off", format("%d counts, %.9g N", most, force_n));
     return;
   }
   const bool may =
@@ -111,20 +104,19 @@ void Rules::look_at_force(const ServoOutput& out, bool leaves) {
   const double step_n = leaves || most >= motor_end_ ? beyond_fall(out.force_n, last_force_n_)
                                                      : length(minus(out.force_n, last_force_n_));
   if (!(step_n <= slew_n_ + kRounding))
-    broken("slew", figures("%.9g N in a tick, above %.9g", step_n, slew_n_));
+    broken("slew", format("%.9g N in a tick, above %.9g", step_n, slew_n_));
 }
 
 void Rules::look_at_motion(const DeviceReport& report, const ServoOutput& out, double way_mm) {
   const double allowed_mm = limit_mm_ * static_cast<double>(gap_) * 1.001 + place_error_mm_;
   if (!report.parked && way_mm > allowed_mm && out.motors_on) {
-    broken("overspeed",
-           figures("%.6g mm in a tick, above %.6g, and motors on", way_mm, allowed_mm));
+    broken("overspeed", format("%.6g mm in a tick, above %.6g, and motors on", way_mm, allowed_mm));
   }
   const double booked_mj = std::abs(out.absorbed_mj - last_mj_);
   const double most_mj = largest_gap_n_ * (way_mm + place_error_mm_) * 1.001 +
                          energy_error_ * (std::abs(last_mj_) + 1) + 1e-9;
   if (!(booked_mj <= most_mj))
-    broken("energy", figures("%.9g mJ booked, at most %.9g", booked_mj, most_mj));
+    broken("energy", format("%.9g mJ booked, at most %.9g", booked_mj, most_mj));
 }
 
 void Rules::look_at(const DeviceReport& report, const ServoOutput& out) {
@@ -158,8 +150,8 @@ void Rules::look_at(const DeviceReport& report, const ServoOutput& out) {
   }
   last_mj_ = out.absorbed_mj;
   if (out.samples_read < 0 || static_cast<std::uint64_t>(out.samples_read) > most_samples_) {
-    broken("work", figures("%.0f samples, planned with %.0f", static_cast<double>(out.samples_read),
-                           static_cast<double>(most_samples_)));
+    broken("work", format("%.0f samples, planned with %.0f", static_cast<double>(out.samples_read),
+                          static_cast<double>(most_samples_)));
   }
   last_force_n_ = out.force_n;
   ++tick_;

@@ -3,14 +3,13 @@
 
 #include <chrono>
 #include <csignal>
-#include <fstream>
-#include <iterator>
 #include <map>
 #include <sstream>
 #include <thread>
 
 #include "hil/hil_error.hpp"
 #include "lab/sweep/child.hpp"
+#include "shared/text/file_text.hpp"
 #include "shared/text/json.hpp"
 #include "shared/text/number.hpp"
 
@@ -23,11 +22,6 @@ using Clock = std::chrono::steady_clock;
 constexpr auto kLook = std::chrono::milliseconds(2);
 constexpr auto kLongestRun = std::chrono::minutes(30);  // a run that is stuck must not stop all
 constexpr auto kGrace = std::chrono::seconds(5);        // the emulator ends with its client
-
-std::string text_in(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
 
 /// `name=value` of each line.
 Lines lines_of(const std::string& text) {

@@ -7,8 +7,6 @@
 #include <cmath>
 #include <exception>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <mutex>
 #include <ostream>
 #include <thread>
@@ -27,6 +25,7 @@
 #include "shared/posix/progress_bar.hpp"
 #include "shared/posix/shipped_file.hpp"
 #include "shared/posix/stop_signals.hpp"
+#include "shared/text/file_text.hpp"
 #include "shared/text/number.hpp"
 #include "shared/wire/personality.hpp"
 
@@ -54,11 +53,6 @@ class WorkFolder {
  private:
   std::filesystem::path path_;
 };
-
-std::string text_in(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
 
 /// A value as a cell of the table: no comma and no quote, so that any reader splits at commas.
 std::string plain(std::string text) {
