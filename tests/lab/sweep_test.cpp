@@ -145,7 +145,7 @@ TEST_CASE("a sweep gives the same bytes on any number of cores, interrupted or n
           const std::string part = text_of(folder / "cut/sweep.part");
           return std::ranges::count(part, '\n') >= 2;
         },
-        20s));
+        120s));
     cut.signal(SIGINT);
     CHECK(cut.wait() == 130);
     CHECK(cut.output().find("of 6 runs are kept") != std::string::npos);
