@@ -11,8 +11,8 @@
 namespace kerf {
 
 /// How much of each material the volumes lack of the fullest content that was seen here, brick by
-/// brick. What comes back counts no more, also where a reset gives back what had gone before this was
-/// made. A byte for each voxel.
+/// brick. What comes back counts no more, also where a reset gives back what had gone before this
+/// was made. A byte for each voxel.
 class MaterialScore {
  public:
   MaterialScore(const SceneView& scene, std::span<const VolumeContent> contents);
@@ -27,8 +27,8 @@ class MaterialScore {
  private:
   struct Volume {
     BrickGrid bricks;
-    double step_mm3 = 0.0;              ///< of a step of density in a voxel
-    std::vector<Label> material;        ///< by voxel
+    double step_mm3 = 0.0;               ///< of a step of density in a voxel
+    std::vector<Label> material;         ///< by voxel
     std::vector<std::uint32_t> matter;   ///< steps by brick and material
     std::vector<std::uint32_t> fullest;  ///< the most of them so far
     std::vector<std::int64_t> removed;   ///< steps by material
