@@ -1,11 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <array>
-#include <cstddef>
-#include <functional>
 #include <memory>
-#include <type_traits>
 #include <utility>
 
 #include <boost/asio/redirect_error.hpp>
@@ -22,16 +18,17 @@ namespace beast = boost::beast;
 using tcp = asio::ip::tcp;
 using ErrorCode = boost::system::error_code;
 
-/// A TCP connection, plain or under TLS: chosen at run time. An AsyncStream of Beast; its timeouts
-/// are those of `next_layer`. What an operation ends with is behind a function and its buffers are
-/// a plain array, so TLS and TCP are compiled once (link.cpp), not for each operation of Beast.
+/// A TCP connection, plain or under TLS: chosen at run time, so that what is built on it is
+/// compiled once. An AsyncStream of Beast; its timeouts are those of `next_layer`.
 class Link {
  public:
   using next_layer_type = beast::tcp_stream;
   using executor_type = next_layer_type::executor_type;
 
   /// `tls` outlives the link; nullptr: plain.
-  Link(tcp::socket socket, asio::ssl::context* tls);
+  Link(tcp::socket socket, asio::ssl::context* tls) : tcp_(std::move(socket)) {
+    if (tls != nullptr) tls_ = std::make_unique<Tls>(tcp_, *tls);
+  }
 
   executor_type get_executor() noexcept { return tcp_.get_executor(); }
   next_layer_type& next_layer() noexcept { return tcp_; }
@@ -44,8 +41,11 @@ class Link {
   auto async_read_some(const Buffers& buffers, Handler&& handler) {
     return asio::async_initiate<Handler, void(ErrorCode, std::size_t)>(
         [this](auto&& done, const Buffers& into) {
-          read_some(first_of<asio::mutable_buffer>(into),
-                    shared(std::forward<decltype(done)>(done)));
+          if (tls_) {
+            tls_->async_read_some(into, std::forward<decltype(done)>(done));
+          } else {
+            tcp_.async_read_some(into, std::forward<decltype(done)>(done));
+          }
         },
         handler, buffers);
   }
@@ -53,38 +53,17 @@ class Link {
   auto async_write_some(const Buffers& buffers, Handler&& handler) {
     return asio::async_initiate<Handler, void(ErrorCode, std::size_t)>(
         [this](auto&& done, const Buffers& from) {
-          write_some(first_of<asio::const_buffer>(from),
-                     shared(std::forward<decltype(done)>(done)));
+          if (tls_) {
+            tls_->async_write_some(from, std::forward<decltype(done)>(done));
+          } else {
+            tcp_.async_write_some(from, std::forward<decltype(done)>(done));
+          }
         },
         handler, buffers);
   }
 
  private:
   using Tls = beast::ssl_stream<beast::tcp_stream&>;
-  using Done = std::function<void(ErrorCode, std::size_t)>;
-  /// As many as Asio hands to one system call, so that a request of HTTP goes out in one piece.
-  template <class Buffer>
-  using Some = std::array<Buffer, 64>;
-
-  template <class Buffer, class Buffers>
-  [[nodiscard]] static Some<Buffer> first_of(const Buffers& buffers) {
-    Some<Buffer> some;
-    auto from = asio::buffer_sequence_begin(buffers);
-    for (auto to = some.begin(); to != some.end() && from != asio::buffer_sequence_end(buffers);
-         ++from) {
-      const Buffer buffer = *from;
-      if (buffer.size() > 0) *to++ = buffer;
-    }
-    return some;
-  }
-  /// Handlers can only be moved, and a function is copied.
-  template <class Handler>
-  [[nodiscard]] static Done shared(Handler&& handler) {
-    return [held = std::make_shared<std::decay_t<Handler>>(std::forward<Handler>(handler))](
-               ErrorCode error, std::size_t bytes) { std::move (*held)(error, bytes); };
-  }
-  void read_some(const Some<asio::mutable_buffer>& into, Done done);
-  void write_some(const Some<asio::const_buffer>& from, Done done);
 
   beast::tcp_stream tcp_;
   std::unique_ptr<Tls> tls_;
