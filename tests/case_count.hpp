@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <initializer_list>
+#include <vector>
 
 namespace kerf::test {
 
@@ -14,6 +16,16 @@ namespace kerf::test {
 #endif
   const char* factor = std::getenv("KERF_CASES");
   return usual * (factor == nullptr ? 1 : std::max(1, std::atoi(factor)));
+}
+
+/// A list of rates, shapes or kinds of numbers; its first alone where each is that slow.
+template <class T>
+[[nodiscard]] std::vector<T> kinds(std::initializer_list<T> all) {
+#ifdef KERF_FEWER_CASES
+  return {*all.begin()};
+#else
+  return all;
+#endif
 }
 
 }  // namespace kerf::test

@@ -15,6 +15,7 @@
 #include "controller/tool/tool_shapes.hpp"
 #include "controller/volume/phantom.hpp"
 #include "lab/rig/miller.hpp"
+#include "tests/case_count.hpp"
 #include "tests/servo/support.hpp"
 
 using namespace kerf;
@@ -339,7 +340,7 @@ TEST_CASE(
     "S16: a hand held still in a wall that is cut feels F = K x0 exp(-t/tau), tau = A/(G K)") {
   constexpr double kRadiusMm = 0.5, kStiffness = 0.5, kMm3PerSN = 0.0826;
   constexpr int kVoxels = 8;
-  for (const auto numeric : {NumericKind::fixed, NumericKind::float64}) {
+  for (const auto numeric : kinds({NumericKind::fixed, NumericKind::float64})) {
     CAPTURE(static_cast<int>(numeric));
     LoadedScene scene = mill_scene();
     scene.servo.numeric = numeric;

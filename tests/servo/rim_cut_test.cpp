@@ -8,6 +8,7 @@
 
 #include "controller/tool/tool_shapes.hpp"
 #include "lab/rig/miller.hpp"
+#include "tests/case_count.hpp"
 #include "tests/servo/support.hpp"
 
 using namespace kerf;
@@ -56,8 +57,8 @@ TEST_CASE("what a tool rests on it cuts, wherever its rim lies on the lattice of
     int rate_hz;
   };
   for (const auto& [numeric, rate_hz] :
-       {Run{NumericKind::fixed, 250}, Run{NumericKind::fixed, 1000}, Run{NumericKind::fixed, 8000},
-        Run{NumericKind::float64, 1000}}) {
+       kinds({Run{NumericKind::fixed, 1000}, Run{NumericKind::fixed, 250},
+              Run{NumericKind::fixed, 8000}, Run{NumericKind::float64, 1000}})) {
     for (const auto& [shape, radius, length] :
          {Head{"inverted_cone", 3.04, 3}, Head{"inverted_cone", 4.06, 9.3}, Head{"flame", 4, 4},
           Head{"flame", 1, 5}, Head{"cone", 1.97, 2}, Head{"cone", 4.23, 4.2},

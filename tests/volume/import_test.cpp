@@ -9,6 +9,7 @@
 #include "controller/volume/phantom.hpp"
 #include "controller/volume/volume_density.hpp"
 #include "controller/volume_tool/png_file.hpp"
+#include "tests/case_count.hpp"
 #include "tests/volume/volume_files.hpp"
 
 using namespace kerf;
@@ -135,9 +136,10 @@ TEST_CASE("each real scan is imported at first try") {
     double least, most;              ///< of the surface, in values of the file
   };
   const char* data = std::getenv("KERF_DATA");
-  for (const Scan& scan : {Scan{"ge_tooth_16bit/tooth.nhdr", {"--spacing", "0.125"}, 550, 750},
-                           Scan{"ge_tooth_8bit/tooth.mhd", {"--spacing", "0.125"}, 70, 110},
-                           Scan{"ct_spine_pelvis/example_ct.nii.gz", {}, 120, 400}}) {
+  for (const Scan& scan :
+       kinds({Scan{"ge_tooth_8bit/tooth.mhd", {"--spacing", "0.125"}, 70, 110},
+              Scan{"ge_tooth_16bit/tooth.nhdr", {"--spacing", "0.125"}, 550, 750},
+              Scan{"ct_spine_pelvis/example_ct.nii.gz", {}, 120, 400}})) {
     if (data == nullptr || !std::filesystem::exists(std::filesystem::path(data) / scan.file)) {
       MESSAGE("skipped: " << std::string(scan.file)
                           << " is not there (KERF_DATA names the folder)");
