@@ -8,6 +8,7 @@
 #include <mutex>
 #include <span>
 #include <string>
+#include <utility>
 
 #include <doctest/doctest.h>
 
@@ -111,12 +112,13 @@ void play(Personality personality, Emulator& emulator, const std::string& bus, S
   kerf::LoadedScene scene = kerf::test::firm_half_space();
   scene.device.personality = personality;
   WatchedDevice device(emulator, scene);
+  kerf::test::ReadyServo servo(personality, scene);
   const auto served = serve(device);
   int pushing = 0, in_fault = 0;
   {
     const auto port = kerf::open_port(bus + ":" + served->path(), {}, 1000, kGoOn);
     WatchedPort watched(*port, device);
-    kerf::test::ServoSession session(personality, watched, scene);
+    kerf::test::ServoSession session(std::move(servo), watched);
     const auto watch = [&](const ServoOutput& output) {
       pushing += output.contact ? 1 : 0;
       in_fault += output.fault == kerf::Fault::stale_input ? 1 : 0;

@@ -10,6 +10,7 @@
 #include <span>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include <doctest/doctest.h>
@@ -23,6 +24,7 @@ using kerf::Personality;
 using kerf::UsbFault;
 using kerf::test::kGoOn;
 using kerf::test::MountedArm;
+using kerf::test::ReadyServo;
 using kerf::test::ServoSession;
 
 namespace {
@@ -57,8 +59,9 @@ TEST_CASE("hid: from the calibration button to a force, with short and with long
     MountedArm arm({.packet_bytes = bytes});
     std::int64_t longest_silence_ms = 0;
     {
+      ReadyServo servo(Personality::woodenhaptics);
       HidPort port(arm.path(), 0, kGoOn);
-      ServoSession session(Personality::woodenhaptics, port);
+      ServoSession session(std::move(servo), port);
       const auto course = session.run(8000, [](const auto& c) { return c.contact > 300; });
       CHECK(course.contact > 300);
       CHECK(course.motors > 300);
@@ -83,10 +86,11 @@ TEST_CASE("hid: an arm that counts the other way is felt where it is told, and e
     CAPTURE(told);
     MountedArm arm({}, kerf::test::touching_hand(), {-1, 1, -1});
     {
-      HidPort port(arm.path(), 0, kGoOn);
       kerf::LoadedScene scene = kerf::test::half_space_scene();
       if (told) scene.device.encoder_sign = std::array{-1.0, 1.0, -1.0};
-      ServoSession session(Personality::woodenhaptics, port, std::move(scene));
+      ReadyServo servo(Personality::woodenhaptics, std::move(scene));
+      HidPort port(arm.path(), 0, kGoOn);
+      ServoSession session(std::move(servo), port);
       const auto course =
           session.run(told ? 8000 : 2500, [](const auto& c) { return c.contact > 300; });
       CHECK((course.contact > 300) == told);
@@ -156,8 +160,9 @@ TEST_CASE("hid: a device that took nothing for a while gets what was on its way,
 TEST_CASE("hid: an unplugged arm closes the port, and the motors are not asked for any more") {
   std::atomic<bool> pushes{false};
   MountedArm arm({.script = {{0, UsbFault::vanish, &pushes}}});
+  ReadyServo servo(Personality::woodenhaptics);
   HidPort port(arm.path(), 0, kGoOn);
-  ServoSession session(Personality::woodenhaptics, port);
+  ServoSession session(std::move(servo), port);
   const auto course = session.run(8000, [&](const auto& c) {
     pushes = c.motors > 100;
     return port.closed();
@@ -174,8 +179,9 @@ TEST_CASE("hid: an unplugged arm closes the port, and the motors are not asked f
 
 TEST_CASE("hid: a servo that stops reading for a while finds the newest state again") {
   const MountedArm arm;
+  ReadyServo servo(Personality::woodenhaptics);
   HidPort port(arm.path(), 0, kGoOn);
-  ServoSession session(Personality::woodenhaptics, port);
+  ServoSession session(std::move(servo), port);
   static_cast<void>(session.run(50));
   kerf::sleep_until_ns(kerf::monotonic_ns() + 100'000'000);  // more than the kernel's queue holds
   const auto course = session.run(100);

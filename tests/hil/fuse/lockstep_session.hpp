@@ -24,10 +24,10 @@ class FirewireSession {
   explicit FirewireSession(const FirewireSettings& settings = {}, FirewireOptions options = {})
       : mounted_(settings, {}, read_hand_script(KERF_HANDS "/touch.toml")) {
     static const std::atomic<bool> kGoOn{false};
+    servo_ = compile(scene_);  // first: a hand does not wait long for a host that has come
     options.where = mounted_.path();
     port_ = std::make_unique<FirewirePort>(options, 1000, kGoOn);
     driver_ = std::make_unique<OmniDriver>(*port_);
-    servo_ = compile(scene_);
   }
   ~FirewireSession() { end(); }
 

@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cmath>
 #include <thread>
+#include <utility>
 
 #include <doctest/doctest.h>
 
@@ -16,6 +17,7 @@ using kerf::UsbFault;
 using kerf::test::kGoOn;
 using kerf::test::MountedArm;
 using kerf::test::MountedFalcon;
+using kerf::test::ReadyServo;
 using kerf::test::ServoSession;
 
 namespace {
@@ -40,10 +42,12 @@ TEST_CASE("usb: one of two devices dies, the other's force and timing stay as th
   const MountedArm arm({}, kerf::test::pressing_hand());
   std::atomic<bool> both_push{false};
   const MountedFalcon falcon({.firmware_runs = true}, {{0, UsbFault::vanish, &both_push}});
+  ReadyServo arm_servo(Personality::woodenhaptics, kerf::test::firm_half_space());
+  ReadyServo falcon_servo(Personality::falcon);
   kerf::HidPort arm_port(arm.path(), 0, kGoOn);
   kerf::UsbPort falcon_port({falcon.path(), ""}, 0, kGoOn);
-  ServoSession arm_session(Personality::woodenhaptics, arm_port, kerf::test::firm_half_space());
-  ServoSession falcon_session(Personality::falcon, falcon_port);
+  ServoSession arm_session(std::move(arm_servo), arm_port);
+  ServoSession falcon_session(std::move(falcon_servo), falcon_port);
 
   constexpr int kSettle = 300;  // ticks of contact before the force has come to rest
   constexpr int kCompared = 500;

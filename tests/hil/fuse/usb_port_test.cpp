@@ -14,6 +14,7 @@
 #include <span>
 #include <string>
 #include <thread>
+#include <utility>
 
 #include <doctest/doctest.h>
 #include <sys/wait.h>
@@ -29,6 +30,7 @@ using kerf::UsbFault;
 using kerf::UsbPort;
 using kerf::test::kGoOn;
 using kerf::test::MountedFalcon;
+using kerf::test::ReadyServo;
 using kerf::test::ServoSession;
 
 namespace {
@@ -118,8 +120,9 @@ TEST_CASE("usb: from power-up over firmware and homing to a force") {
   MountedFalcon falcon({.firmware_runs = false});
   const FirmwareFile firmware(1000);
   {
+    ReadyServo servo(Personality::falcon);
     UsbPort port({falcon.path(), firmware.path()}, 0, kGoOn);
-    ServoSession session(Personality::falcon, port);
+    ServoSession session(std::move(servo), port);
     const auto course = session.run(8000, [](const auto& c) { return c.contact > 300; });
     CHECK(course.contact > 300);
     CHECK(course.motors > 300);
@@ -221,8 +224,9 @@ TEST_CASE("usb: packets in pieces are put together, none is bad, none is lost") 
                        {{0, UsbFault::split, &streams}, {600, UsbFault::split}});
   std::uint64_t packets = 0;
   {
+    ReadyServo servo(Personality::falcon);
     UsbPort port({falcon.path(), ""}, 0, kGoOn);
-    ServoSession session(Personality::falcon, port);
+    ServoSession session(std::move(servo), port);
     const auto course = session.run(1000, [&](const auto& c) {
       streams = c.fresh > 50;
       return false;
@@ -294,8 +298,9 @@ TEST_CASE("usb: a stalled endpoint is freed when no read waits there, and the st
   MountedFalcon falcon({.firmware_runs = true},
                        {{0, UsbFault::stall, &once}, {0, UsbFault::stall, &twice}});
   {
+    ReadyServo servo(Personality::falcon);
     UsbPort port({falcon.path(), ""}, 0, kGoOn);
-    ServoSession session(Personality::falcon, port);
+    ServoSession session(std::move(servo), port);
     const auto course = session.run(1000, [&](const auto& c) {
       once = c.fresh > 100;
       twice = c.fresh > 300;
@@ -314,8 +319,9 @@ TEST_CASE("usb: a stalled endpoint is freed when no read waits there, and the st
 TEST_CASE("usb: an unplugged Falcon closes the port, and the motors are not asked for any more") {
   std::atomic<bool> pushes{false};
   MountedFalcon falcon({.firmware_runs = true}, {{0, UsbFault::vanish, &pushes}});
+  ReadyServo servo(Personality::falcon);
   UsbPort port({falcon.path(), ""}, 0, kGoOn);
-  ServoSession session(Personality::falcon, port);
+  ServoSession session(std::move(servo), port);
   const auto course = session.run(8000, [&](const auto& c) {
     pushes = c.motors > 100;
     return port.closed();

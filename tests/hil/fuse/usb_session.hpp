@@ -122,16 +122,27 @@ class MountedArm {
   ServedNode<HidrawNode> served_;
 };
 
-/// A driver above its real library, and a servo that touches a half-space above the driver, at 1
-/// kHz by the machine's clock.
+/// A servo that touches a half-space, compiled before the port of its device opens: a hand waits 2
+/// s for a host that does not calibrate, and a busy machine may need that long for a sanitized
+/// compilation.
+struct ReadyServo {
+  explicit ReadyServo(Personality device, LoadedScene of = half_space_scene())
+      : scene(std::move(of)) {
+    scene.device.personality = device;
+    scene.device.torque_scale = std::array{0.3, 0.3, 0.3};
+    servo = compile(scene);
+  }
+  LoadedScene scene;
+  std::unique_ptr<Servo> servo;
+};
+
+/// A driver above its real library, and a servo above the driver, at 1 kHz by the machine's clock.
 class ServoSession {
  public:
-  ServoSession(Personality personality, PacketPort& port, LoadedScene scene = half_space_scene())
-      : scene_(std::move(scene)),
-        driver_(make_driver(personality, port, scene_.device.encoder_sign)) {
-    scene_.device.personality = personality;
-    scene_.device.torque_scale = std::array{0.3, 0.3, 0.3};
-    servo_ = compile(scene_);
+  ServoSession(ReadyServo ready, PacketPort& port)
+      : ready_(std::move(ready)),
+        driver_(
+            make_driver(ready_.scene.device.personality, port, ready_.scene.device.encoder_sign)) {
     driver_->start();
   }
 
@@ -164,7 +175,7 @@ class ServoSession {
   /// One tick, now.
   Tick step() {
     const DeviceReport report = driver_->read();
-    const ServoOutput output = servo_->step(report);
+    const ServoOutput output = ready_.servo->step(report);
     driver_->command(output);
     return {report, output};
   }
@@ -200,8 +211,7 @@ class ServoSession {
     }
   }
 
-  LoadedScene scene_;
-  std::unique_ptr<Servo> servo_;
+  ReadyServo ready_;
   std::unique_ptr<DeviceDriver> driver_;
   std::function<void(const ServoOutput&)> watch_;
 };

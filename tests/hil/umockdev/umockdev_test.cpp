@@ -6,6 +6,7 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <utility>
 
 #define DOCTEST_CONFIG_IMPLEMENT
 #include <doctest/doctest.h>
@@ -18,6 +19,7 @@ namespace {
 
 using kerf::Personality;
 using kerf::test::kGoOn;
+using kerf::test::ReadyServo;
 using kerf::test::ServoSession;
 using kerf::test::UmockdevNode;
 
@@ -67,8 +69,9 @@ TEST_CASE("umockdev: libusb finds the Falcon and brings it from homing to a forc
   {
     const Bed bed(falcon_on_usb());
     const UmockdevNode served(bed.get(), "/dev/bus/usb/001/002", node);
+    ReadyServo servo(Personality::falcon);
     kerf::UsbPort port({"", ""}, 0, kGoOn);
-    ServoSession session(Personality::falcon, port);
+    ServoSession session(std::move(servo), port);
     const auto course = session.run(8000, [](const auto& c) { return c.contact > 100; });
     CHECK(course.contact > 100);
     CHECK(course.motors > 100);
