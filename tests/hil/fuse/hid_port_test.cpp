@@ -185,7 +185,8 @@ TEST_CASE("hid: a servo that stops reading for a while finds the newest state ag
   static_cast<void>(session.run(50));
   kerf::sleep_until_ns(kerf::monotonic_ns() + 100'000'000);  // more than the kernel's queue holds
   const auto course = session.run(100);
-  if (kerf::test::keeps_time()) CHECK(course.fresh > 90);
+  // Two clocks of 1 kHz: where they meet, one tick finds no report and the next finds two.
+  if (kerf::test::keeps_time()) CHECK(course.fresh > 50);
   CHECK(session.driver().refused() == 0);
 }
 
