@@ -24,7 +24,9 @@ Arguments add_serve(CommandLine& app, ServeOptions& options) {
   serve.option("--token-file", options.token_file,
                "who may look: one token a line; else a new one");
   serve.option("--allow-commands", options.command_tokens, "who may command too: one token a line");
-  serve.option("--max-viewers", options.max_viewers, "at once").within(1, 32).shows_default();
+  serve.option("--max-viewers", options.max_viewers, "at once")
+      .within(1, kMostViewers)
+      .shows_default();
   serve.flag("--dedicated-link", options.dedicated_link,
              "nobody else uses the link: fresher under loss, unfair to others");
   serve
@@ -42,7 +44,7 @@ Arguments add_join(CommandLine& app, JoinOptions& options) {
   join.option("--name", options.name, "of the segment here, as readers ask for it").shows_default();
   join.option("--ca", options.ca, "ca.pem of the lab that vouches for the server").shown_as("FILE");
   join.option("--fingerprint", options.fingerprint,
-              "of the server's certificate, as serve prints it")
+              "of the server's certificate, as serve or make-identity prints it")
       .shown_as("SHA256");
   join.option("--token-file", options.token_file,
               "the token, if not in the address, where other users see it")

@@ -5,11 +5,13 @@
 #include <filesystem>
 #include <string>
 
+#include "shared/segment/usual_name.hpp"
+
 namespace kerf {
 
 /// What the command line of kerf-recorder asks for.
 struct RecorderOptions {
-  std::string name = "kerf";
+  std::string name = kUsualName;
   std::filesystem::path out;
   double wait_s = 10;  ///< for the controller to appear
   bool strict = false;

@@ -6,13 +6,15 @@
 #include <memory>
 #include <string>
 
+#include "shared/segment/usual_name.hpp"
+
 namespace kerf::bridge {
 
 /// Where OpenIGTLink goes out.
 struct IgtlOptions {
   std::string host = "127.0.0.1";  ///< address of this machine to listen on
   std::uint16_t port = 18944;      ///< 0: one that is free
-  std::string name = "default";    ///< of the controller
+  std::string name = kUsualName;   ///< of the controller
   /// A client that takes nothing for so long is dropped.
   std::chrono::milliseconds patience{5000};
 };

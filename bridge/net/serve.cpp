@@ -14,6 +14,7 @@
 #include "bridge/net/host_names.hpp"
 #include "bridge/net/qr_code.hpp"
 #include "bridge/net/server.hpp"
+#include "bridge/stream/run_snapshot.hpp"
 
 namespace kerf::bridge {
 namespace {
@@ -75,6 +76,7 @@ int run_serve(const ServeOptions& options, const std::atomic<bool>& stop) {
   setup.host = at.host;
   setup.port = at.port;
   setup.name = options.name;
+  static_assert(kMostViewers <= RunSnapshot::kMaxStreams);  // each pins a block once
   setup.max_viewers = static_cast<std::size_t>(options.max_viewers);
   setup.dedicated_link = options.dedicated_link;
   if (options.token_file.empty()) {

@@ -5,16 +5,20 @@
 #include <filesystem>
 #include <string>
 
+#include "shared/segment/usual_name.hpp"
+
 namespace kerf::bridge {
+
+inline constexpr int kMostViewers = 32;
 
 /// `kerf-bridge serve`.
 struct ServeOptions {
   std::string listen = "127.0.0.1:7400";  ///< HOST:PORT; port 0: one that is free
-  std::string name = "default";           ///< of the controller
+  std::string name = kUsualName;          ///< of the controller
   std::filesystem::path identity;         ///< folder of `make-identity`; empty: self-signed
   std::filesystem::path token_file;       ///< who may look; empty: one token, made now
   std::filesystem::path command_tokens;   ///< who may command; empty: nobody
-  int max_viewers = 32;
+  int max_viewers = kMostViewers;
   bool dedicated_link = false;
   int openigtlink = 0;  ///< port for 3D Slicer, at the same host; 0: none
   bool qr = false;      ///< also draws the first address off loopback as a QR code

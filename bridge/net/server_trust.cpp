@@ -107,7 +107,9 @@ bool ServerTrust::believe(bool verified, x509_store_ctx_st* chain) {
     return false;
   }
   refusal_ =
-      "nobody vouches for its certificate; where serve prints the same, add --fingerprint " + seen;
+      "nobody vouches for its certificate; where serve or make-identity prints the same, add "
+      "--fingerprint " +
+      seen;
   return false;
 }
 

@@ -26,7 +26,7 @@ struct JointPlan {
   typename N::Real counts_per_n_mm{};  ///< motor counts per torque, signed
 };
 
-/// In 20 ms, at the highest rate of 8 kHz.
+/// Most readings of the gimbal that are summed: 20 ms at 8 kHz, the highest rate.
 inline constexpr std::size_t kMaxGimbalSamples = 160;
 
 /// Everything constant of the held device.

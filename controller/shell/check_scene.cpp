@@ -114,6 +114,13 @@ void print_scene(const LoadedScene& scene, const SceneCosts& costs, const GainMa
   std::fputs(settings_text(settings).c_str(), stdout);
 }
 
+std::string refused_gains(const ControllerOptions& options, const LoadedScene& scene,
+                          const GainMargin& margin) {
+  if (options.virtual_time) return "";
+  const std::string above = options.unchecked_gain ? "" : above_device(scene);
+  return above.empty() ? gain_refusal(scene, margin) : above;
+}
+
 void explain_scene(const ControllerOptions& options, LoadedScene& scene, CompiledScene& servo) {
   if (!options.report.empty()) check_new_file(options.report);
   const int core = options.real_time.cpu >= 0 ? options.real_time.cpu : allowed_cores().back();
@@ -125,7 +132,7 @@ void explain_scene(const ControllerOptions& options, LoadedScene& scene, Compile
   std::fputs(explanation_text(explanation).c_str(), stdout);
   if (!options.report.empty()) write_new_file(options.report, explanation_json(explanation));
   std::string refusal = over_budget(scene, servo.costs());
-  if (refusal.empty() && !options.virtual_time) refusal = gain_refusal(scene, explanation.gain);
+  if (refusal.empty()) refusal = refused_gains(options, scene, explanation.gain);
   if (!refusal.empty()) throw std::runtime_error(refusal);
 }
 

@@ -21,13 +21,19 @@ namespace kerf {
 /// A note where a volume ends in a density that contact counts; else nothing.
 [[nodiscard]] std::string border_line(const SceneVolume& volume);
 
+/// Why this scene is not run: gains above the most of its device (unless `--unchecked-gain`), or
+/// beyond its stability. Empty: it is. In lock-step nobody holds the device, and any gain may be
+/// studied.
+[[nodiscard]] std::string refused_gains(const ControllerOptions& options, const LoadedScene& scene,
+                                        const GainMargin& margin);
+
 /// Prints what --check tells: whatever can be said without memory for the loop, one `name=value` a
 /// line, and then every setting in effect as `table.key=value`.
 void print_scene(const LoadedScene& scene, const SceneCosts& costs, const GainMargin& margin);
 
 /// `--explain`: prints what the scene costs on this machine; it is not run. Throws
-/// std::runtime_error with one line for a scene above the budget or its device's stability, after
-/// all is told.
+/// std::runtime_error with one line for a scene above the budget or with refused gains, after all
+/// is told.
 void explain_scene(const ControllerOptions& options, LoadedScene& scene, CompiledScene& servo);
 
 }  // namespace kerf

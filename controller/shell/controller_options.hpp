@@ -6,6 +6,7 @@
 
 #include "controller/load/scene_load.hpp"
 #include "controller/shell/real_time.hpp"
+#include "shared/segment/usual_name.hpp"
 
 namespace kerf {
 
@@ -16,7 +17,7 @@ struct ControllerOptions {
   std::string port;               ///< as open_port.hpp says
   std::optional<double> seconds;  ///< servo time after arming; none: until stopped
   double wait_s = 60;             ///< servo time for the device to be taken in hand
-  std::string name = "kerf";
+  std::string name = kUsualName;
   bool virtual_time = false;
   std::string until;            ///< FIFO that says how far lock-step may go; empty: none
   bool unchecked_gain = false;  ///< gains above the device's and beyond its stability

@@ -125,16 +125,10 @@ void check_budget(const ControllerOptions& options, const LoadedScene& scene,
   if (!refusal.empty()) throw std::runtime_error(refusal);
 }
 
-/// In lock-step nobody holds the device: any gain may be studied.
-void check_gains(const ControllerOptions& options, const LoadedScene& scene) {
-  if (options.virtual_time) return;
-  const std::string above = options.unchecked_gain ? "" : above_device(scene);
-  if (!above.empty()) throw std::runtime_error(above);
-  const GainMargin margin = gain_margin(scene, PlayFriction::where_it_decides);
-  const std::string refusal = gain_refusal(scene, margin);
+void check_gains(const ControllerOptions& options, const LoadedScene& scene,
+                 const GainMargin& margin) {
+  const std::string refusal = refused_gains(options, scene, margin);
   if (!refusal.empty()) throw std::runtime_error(refusal);
-  const std::string warning = gain_warning(scene, margin);
-  if (!warning.empty()) log_warning(warning);
 }
 
 /// What the command line asks for is refused now, also what would be met at the end.
@@ -155,7 +149,12 @@ void check_run(const ControllerOptions& options, const LoadedScene& scene,
                const SceneCosts& costs) {
   check_options(options, scene);
   check_budget(options, scene, costs);
-  check_gains(options, scene);
+  if (!options.virtual_time) {
+    const GainMargin margin = gain_margin(scene, PlayFriction::where_it_decides);
+    check_gains(options, scene, margin);
+    const std::string warning = gain_warning(scene, margin);
+    if (!warning.empty()) log_warning(warning);
+  }
   if (!scene.device.torque_scale) {
     const auto kind = static_cast<std::size_t>(scene.device.personality);
     log_warning("device.torque_scale is not set for " + std::string(kPersonalityWords[kind]) +
@@ -224,8 +223,7 @@ int run_controller(const ControllerOptions& options) {
     const GainMargin margin = gain_margin(scene);
     print_scene(scene, servo->costs(), margin);
     check_budget(options, scene, servo->costs());
-    const std::string refusal = options.virtual_time ? "" : gain_refusal(scene, margin);
-    if (!refusal.empty()) throw std::runtime_error(refusal);
+    check_gains(options, scene, margin);
     return 0;
   }
   if (options.explain) {

@@ -13,7 +13,7 @@
 
 namespace kerf {
 
-/// What befell a run, in order. Fixed memory.
+/// The first things that befell a run, in order, and how many there were in all. Fixed memory.
 struct EventList {
   struct Event {
     std::uint64_t tick = 0;  ///< as in the segment and in the log

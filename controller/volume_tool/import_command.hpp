@@ -26,7 +26,6 @@ class ImportCommand {
  private:
   struct Files;
   [[nodiscard]] Files files() const;
-  void import_plain(const Files& files, std::ostream& out) const;
   void import_labelled(VolumeImage image, const Files& files, std::ostream& out) const;
 
   Arguments command_;

@@ -52,7 +52,7 @@ struct PlainNumber {
 /// something else stands there.
 [[nodiscard]] bool meet_condition(const SceneKey& key, KeyTexts& texts);
 
-/// A scene file with these values. It touches the volume of `write_small_volume` with a ball of 1
+/// A scene file with these values. It touches the small volume of combination.cpp with a ball of 1
 /// mm that force cuts; what no single key can say (a size with a tool's length, the size of a
 /// phantom) stands beside the keys that ask for it.
 [[nodiscard]] std::string scene_text(const KeyTexts& texts);

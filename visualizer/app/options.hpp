@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "shared/segment/usual_name.hpp"
 #include "visualizer/view/look.hpp"
 #include "visualizer/view/pixel_rect.hpp"
 
@@ -14,8 +15,8 @@ namespace kerf {
 
 /// The command line of kerf-visualizer.
 struct VisualizerOptions {
-  std::string name = "kerf";  ///< of the controller
-  Look look;                  ///< at first; its opacities are those of `transfer`
+  std::string name = kUsualName;  ///< of the controller
+  Look look;                      ///< at first; its opacities are those of `transfer`
   PictureSize size{800, 600};
   std::optional<double> panel_scale;  ///< of the panels' letters; none: the display's density
   bool headless = false;

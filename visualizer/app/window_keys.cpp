@@ -67,10 +67,11 @@ void undo_all(std::optional<Notices::Clock::time_point>& asked, Session& session
 void undo_stroke(Session& session, Notices& notices, Notices::Clock::time_point now) {
   const auto& newest = session.latest();
   if (!newest || (newest->flags & kFlagUndoable) == 0) {
-    notices.say({"undo: there is no stroke to take back, or it was longer than 16 MiB of voxels; "
-                 "u, u undoes all cuts",
-                 true},
-                now);
+    notices.say(
+        {"undo: there is no stroke to take back, or it was longer than can be kept, at most 12 "
+         "MiB of voxels; u, u undoes all cuts",
+         true},
+        now);
   } else if (session.undo()) {
     notices.say({"the last stroke is undone"}, now);
   } else {

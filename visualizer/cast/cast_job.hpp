@@ -3,12 +3,13 @@
 
 #include <cstdint>
 
+#include "shared/volume/scene_limits.hpp"
 #include "visualizer/view/pixel_rect.hpp"
 
 namespace kerf {
 
 /// As many as the segment has descriptors for.
-inline constexpr int kMaxCastVolumes = 8;
+inline constexpr int kMaxCastVolumes = static_cast<int>(kMaxVolumes);
 
 /// Edge of the square blocks of pixels that share one `CastBlock`.
 inline constexpr std::int32_t kCastBlock = 4;

@@ -10,9 +10,9 @@
 
 namespace kerf {
 
-/// How much of each material the volumes lack of the fullest content that was seen here, brick by
-/// brick. What comes back counts no more, also where a reset gives back what had gone before this
-/// was made. A byte for each voxel.
+/// How much of each material has been removed, brick by brick: the most that a brick has held since
+/// this was made, less what it holds now. Matter that comes back is no longer counted, also where a
+/// reset brings back what was gone before. Memory: a byte for each voxel.
 class MaterialScore {
  public:
   MaterialScore(const SceneView& scene, std::span<const VolumeContent> contents);

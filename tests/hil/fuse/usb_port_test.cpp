@@ -126,7 +126,7 @@ TEST_CASE("usb: from power-up over firmware and homing to a force") {
     const auto course = session.run(8000, [](const auto& c) { return c.contact > 300; });
     CHECK(course.contact > 300);
     CHECK(course.motors > 300);
-    if (kerf::test::keeps_time()) CHECK(course.fresh > course.ticks * 8 / 10);
+    CHECK(kerf::test::came_in_time(course.fresh, course.ticks));
     CHECK(session.driver().refused() == 0);
     CHECK(session.driver().release());
     CHECK(port.stats().strays == 0);
