@@ -21,8 +21,8 @@ lists=$build/tests/fuzz
 
 # fuzz NAME CORPUS...: one fuzzer; its last lines when it finds something, else its figures.
 fuzz() {
-  local name=$1 work=$build/fuzz/$1 status=0 own=(-timeout=30)
-  # .ci/run gives fuzzers what others leave of the cores, so 30 s of the clock may be few of a core. the day's mutations can be repeated.
+  local name=$1 work=$build/fuzz/$1 status=0 own=(-timeout=5)
+  # A child may take a second of a core that others want as well; the day's mutations can be repeated.
   if grep -q "^$name " "$lists/importers"; then
     own=(-timeout=60 -seed="$seed" -max_len=8192 -reduce_inputs=0)
   fi

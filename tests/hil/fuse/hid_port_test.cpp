@@ -179,13 +179,12 @@ TEST_CASE("hid: an unplugged arm closes the port, and the motors are not asked f
 
 TEST_CASE("hid: a servo that stops reading for a while finds the newest state again") {
   const MountedArm arm;
-  ReadyServo servo(Personality::woodenhaptics);
   HidPort port(arm.path(), 0, kGoOn);
-  ServoSession session(std::move(servo), port);
+  ServoSession session(ReadyServo(Personality::woodenhaptics), port);
   static_cast<void>(session.run(50));
   kerf::sleep_until_ns(kerf::monotonic_ns() + 100'000'000);  // more than the kernel's queue holds
   const auto course = session.run(100);
-  CHECK(kerf::test::came_in_time(course.fresh, course.ticks));
+  if (kerf::test::keeps_time()) CHECK(course.fresh > 90);
   CHECK(session.driver().refused() == 0);
 }
 

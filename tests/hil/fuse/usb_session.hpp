@@ -41,10 +41,9 @@ inline bool keeps_time() {
 #endif
 }
 
-/// Whether reports came in time: to more than half of the ticks. Two clocks of 1 kHz, where they
-/// meet, give one tick no report and the next two.
+/// Whether reports came in time: to more than eight of ten ticks.
 inline bool came_in_time(int fresh, int ticks) {
-  return fresh > ticks / 2 || !keeps_time();
+  return fresh > ticks * 8 / 10 || !keeps_time();
 }
 
 inline const std::atomic<bool> kGoOn{false};
