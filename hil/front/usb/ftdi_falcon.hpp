@@ -28,11 +28,13 @@ class FtdiFalcon {
     bool firmware_runs = false;       ///< it was started before, else the boot loader waits
     std::int64_t wrong_echo_at = -1;  ///< fault: that byte of the firmware is echoed wrongly
     std::string serial = "KERF0001";
+    const UsbClock* clock = &kMachineClock;  ///< outlives this
   };
   FtdiFalcon(const Settings& settings, PacketDevice& device)
       : serial_(settings.serial),
         device_(device),
-        loader_(settings.firmware_runs, settings.wrong_echo_at) {}
+        loader_(settings.firmware_runs, settings.wrong_echo_at),
+        time_(*settings.clock) {}
 
   /// Device and configuration descriptors, one after the other.
   [[nodiscard]] static std::span<const std::uint8_t> descriptors() noexcept;

@@ -11,19 +11,22 @@
 
 #include "hil/devmodel/bus_cycle.hpp"
 #include "hil/devmodel/packet_device.hpp"
+#include "hil/front/usb/usb_clock.hpp"
 #include "shared/posix/monotonic_clock.hpp"
 
 namespace kerf {
 
-/// The time of an emulated USB device: frames of 1 ms by the machine's clock. Its mechanics catch
-/// up cycle by cycle (125 us), and whoever drives this handles the packets that fall due.
+/// The time of an emulated USB device: frames of 1 ms by a clock. Its mechanics catch up cycle by
+/// cycle (125 us), and whoever drives this handles the packets that fall due.
 class UsbTime {
  public:
+  explicit UsbTime(const UsbClock& clock) noexcept : clock_(clock), began_ns_(clock.now_ns()) {}
+
   /// Advances `device` to the present; `hear(packet)` for each of its packets, `frame()` at the end
   /// of the cycle that begins each frame.
   template <class Hear, class Frame>
   void catch_up(PacketDevice& device, Hear hear, Frame frame) {
-    const std::int64_t now = (monotonic_ns() - began_ns_) / kNsPerCycle;
+    const std::int64_t now = (clock_.now_ns() - began_ns_) / kNsPerCycle;
     while (cycle_ < now) {
       ++cycle_;
       device.advance(1);
@@ -35,15 +38,16 @@ class UsbTime {
   }
   /// Since the start, in cycles.
   [[nodiscard]] std::int64_t cycle() const noexcept { return cycle_; }
-  /// When the next frame begins, CLOCK_MONOTONIC.
+  /// When to look for the next frame, CLOCK_MONOTONIC.
   [[nodiscard]] std::int64_t next_frame_ns() const noexcept {
     const std::int64_t frame = cycle_ / kCyclesPerUsbFrame + 1;
-    return began_ns_ + frame * kCyclesPerUsbFrame * kNsPerCycle;
+    return clock_.look_ns(began_ns_ + frame * kCyclesPerUsbFrame * kNsPerCycle);
   }
 
  private:
   static constexpr std::int64_t kNsPerCycle = kNsPerSecond / kCyclesPerSecond;
-  std::int64_t began_ns_ = monotonic_ns();
+  const UsbClock& clock_;
+  std::int64_t began_ns_;
   std::int64_t cycle_ = 0;
 };
 

@@ -31,12 +31,14 @@ class WoodenHid {
     std::size_t packet_bytes = wooden::kPacketBytes;  ///< 14: mbed's numbers; 64: Teensy's
     std::string serial = "KERF0001";
     std::vector<ScriptedUsbFault> script{};
+    const UsbClock* clock = &kMachineClock;  ///< outlives this
   };
   WoodenHid(const Settings& settings, PacketDevice& device)
       : packet_bytes_(settings.packet_bytes),
         serial_(settings.serial),
         device_(device),
-        script_(settings.script) {}
+        script_(settings.script),
+        time_(*settings.clock) {}
 
   [[nodiscard]] std::uint16_t vendor_id() const noexcept;
   [[nodiscard]] std::uint16_t product_id() const noexcept;

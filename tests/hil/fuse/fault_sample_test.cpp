@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A sample of the fault matrix (./kerf lab faults) through each device's own bus. The Omni's is in
-// lock-step and has the matrix's own watch, the contract. The others run by the clock, which a busy
-// machine holds up: there what the emulated motors did is looked at.
+// A sample of the fault matrix (./kerf lab faults) through each device's own bus, with the matrix's
+// own watch, the contract. The Omni's bus is in lock-step, the others' clocks are held.
 #include <algorithm>
 #include <cstddef>
 #include <memory>
@@ -9,6 +8,7 @@
 #include <span>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include <doctest/doctest.h>
 
@@ -99,44 +99,40 @@ class WatchedPort final : public kerf::PacketPort {
   }
   [[nodiscard]] bool closed() const noexcept override { return port_.closed(); }
   [[nodiscard]] bool wait(int milliseconds) noexcept override { return port_.wait(milliseconds); }
+  [[nodiscard]] std::vector<kerf::LinkCounter> counters() const override {
+    return port_.counters();
+  }
 
  private:
   kerf::PacketPort& port_;
   WatchedDevice& device_;
 };
 
-/// Plays the sample; `serve(device)` makes the node.
+/// Plays the sample; `serve(device, clock)` makes the node.
 template <class Serve>
 void play(Personality personality, Emulator& emulator, const std::string& bus, Serve serve) {
-  const bool lockstep = personality == Personality::omni;
   kerf::LoadedScene scene = kerf::test::firm_half_space();
   scene.device.personality = personality;
+  kerf::test::HeldClock clock;
   WatchedDevice device(emulator, scene);
   kerf::test::ReadyServo servo(personality, scene);
-  const auto served = serve(device);
+  const auto served = serve(device, clock);
   int pushing = 0, in_fault = 0;
   {
     const auto port = kerf::open_port(bus + ":" + served->path(), {}, 1000, kGoOn);
     WatchedPort watched(*port, device);
-    kerf::test::ServoSession session(std::move(servo), watched);
-    const auto watch = [&](const ServoOutput& output) {
+    kerf::test::ServoSession session(std::move(servo), watched, clock);
+    for (int tick = 0; tick < kMostTicks && in_fault < kTicksAfterFault; ++tick) {
+      const bool lockstep = personality == Personality::omni;
+      const ServoOutput output = (lockstep ? session.step() : session.tick()).output;
       pushing += output.contact ? 1 : 0;
       in_fault += output.fault == kerf::Fault::stale_input ? 1 : 0;
-    };
-    const auto done = [&] { return in_fault >= kTicksAfterFault; };
-    if (lockstep) {
-      for (int tick = 0; tick < kMostTicks && !done(); ++tick) watch(session.step().output);
-    } else {
-      session.watch(watch);
-      session.run(kMostTicks, [&](const auto&) { return done(); });
     }
   }
   served->stop();
   const auto& outcome = device.outcome();
-  if (lockstep) {
-    for (const std::string& violation : outcome.violations) MESSAGE(violation);
-    CHECK(outcome.violation_count == 0);
-  }
+  for (const std::string& violation : outcome.violations) MESSAGE(violation);
+  CHECK(outcome.violation_count == 0);
   CHECK(device.faults_begun() == kSample.faults.size());
   CHECK(outcome.device_peak_n > 0.05);
   CHECK(outcome.device_peak_n < 1.05 * scene.limits.force_n);
@@ -149,24 +145,29 @@ void play(Personality personality, Emulator& emulator, const std::string& bus, S
 
 TEST_CASE("the sample of faults breaks no rule with the Omni over FireWire") {
   Emulator emulator({}, kerf::test::pressing_hand());
-  play(Personality::omni, emulator, "fw", [](kerf::PacketDevice& device) {
-    return std::make_unique<kerf::test::MountedDevice>(kerf::FirewireSettings{}, device);
-  });
+  play(Personality::omni, emulator, "fw",
+       [](kerf::PacketDevice& device, kerf::test::HeldClock& /*clock*/) {
+         return std::make_unique<kerf::test::MountedDevice>(kerf::FirewireSettings{}, device);
+       });
 }
 
 TEST_CASE("the sample of faults breaks no rule with the Falcon over USB") {
   Emulator emulator(std::make_unique<kerf::FalconModel>(), kerf::test::pressing_hand());
-  play(Personality::falcon, emulator, "usb", [](kerf::PacketDevice& device) {
-    return std::make_unique<kerf::test::ServedNode<kerf::UsbfsNode>>(
-        "usb", kerf::test::become_device, kerf::FtdiFalcon::Settings{.firmware_runs = true},
-        std::vector<kerf::ScriptedUsbFault>{}, device);
-  });
+  play(Personality::falcon, emulator, "usb",
+       [](kerf::PacketDevice& device, kerf::test::HeldClock& clock) {
+         return std::make_unique<kerf::test::ServedNode<kerf::UsbfsNode>>(
+             "usb", kerf::test::become_device,
+             kerf::FtdiFalcon::Settings{.firmware_runs = true, .clock = &clock},
+             std::vector<kerf::ScriptedUsbFault>{}, device);
+       });
 }
 
 TEST_CASE("the sample of faults breaks no rule with WoodenHaptics over HID") {
   Emulator emulator(std::make_unique<kerf::WoodenModel>(), kerf::test::pressing_hand());
-  play(Personality::woodenhaptics, emulator, "hid", [](kerf::PacketDevice& device) {
-    return std::make_unique<kerf::test::ServedNode<kerf::HidrawNode>>(
-        "hidraw0", kerf::test::become_device, kerf::WoodenHid::Settings{}, device);
-  });
+  play(Personality::woodenhaptics, emulator, "hid",
+       [](kerf::PacketDevice& device, kerf::test::HeldClock& clock) {
+         return std::make_unique<kerf::test::ServedNode<kerf::HidrawNode>>(
+             "hidraw0", kerf::test::become_device, kerf::WoodenHid::Settings{.clock = &clock},
+             device);
+       });
 }

@@ -57,25 +57,23 @@ TEST_CASE("hid: from the calibration button to a force, with short and with long
   for (const std::size_t bytes : {std::size_t{14}, std::size_t{64}}) {
     CAPTURE(bytes);
     MountedArm arm({.packet_bytes = bytes});
-    std::int64_t longest_silence_ms = 0;
+    arm.clock().hold();
     {
       ReadyServo servo(Personality::woodenhaptics);
       HidPort port(arm.path(), 0, kGoOn);
-      ServoSession session(std::move(servo), port);
+      ServoSession session(std::move(servo), port, arm.clock());
       const auto course = session.run(8000, [](const auto& c) { return c.contact > 300; });
       CHECK(course.contact > 300);
       CHECK(course.motors > 300);
-      CHECK(kerf::test::came_in_time(course.fresh, course.ticks));
+      CHECK(course.fresh > course.ticks * 8 / 10);
       CHECK(session.driver().refused() == 0);
       CHECK(session.driver().release());
-      longest_silence_ms = course.longest_silence_ms;
     }
     arm.stop();
     CHECK(arm.emulator().model().calibration() == kerf::Calibration::done);
     CHECK(arm.emulator().stats().refused == 0);
     CHECK(arm.emulator().stats().peak_motor_force_n > 0.01);
-    // The kernel keeps 64 reports, one each ms: fewer than somebody's longest standstill may cost.
-    if (longest_silence_ms < 50) CHECK(arm.node().lost() == 0);
+    CHECK(arm.node().lost() == 0);
   }
 }
 
@@ -90,7 +88,7 @@ TEST_CASE("hid: an arm that counts the other way is felt where it is told, and e
       if (told) scene.device.encoder_sign = std::array{-1.0, 1.0, -1.0};
       ReadyServo servo(Personality::woodenhaptics, std::move(scene));
       HidPort port(arm.path(), 0, kGoOn);
-      ServoSession session(std::move(servo), port);
+      ServoSession session(std::move(servo), port, arm.clock());
       const auto course =
           session.run(told ? 8000 : 2500, [](const auto& c) { return c.contact > 300; });
       CHECK((course.contact > 300) == told);
@@ -132,27 +130,28 @@ TEST_CASE("hid: no read, no write, no read of nothing, no loss of the arm alloca
 TEST_CASE("hid: a device that took nothing for a while gets what was on its way, then the newest") {
   ListeningDevice device;
   std::atomic<bool> streams{false};
+  kerf::test::HeldClock clock;
   kerf::test::ServedNode<kerf::HidrawNode> served(
       "hidraw0", kerf::test::become_device,
-      kerf::WoodenHid::Settings{.script = kerf::test::at_ms({{0, UsbFault::deaf, &streams}})},
+      kerf::WoodenHid::Settings{.script = kerf::test::at_ms({{0, UsbFault::deaf, &streams}}),
+                                .clock = &clock},
       device);
   {
     HidPort port(served.path(), 0, kGoOn);
-    std::thread([&] {
-      static_cast<void>(kerf::make_real_time(80, -1));
-      for (std::int16_t tick = 1; tick <= 300; ++tick) {
-        device.newest = tick;
-        streams = tick >= 100;
-        const kerf::WoodenCommand command{.milliamps = {tick, 0, 0}, .set_encoders = {}};
-        CHECK(port.send(std::span<const std::uint8_t>(encode(command)).first(14)));
-        std::this_thread::sleep_for(std::chrono::milliseconds(1));
-      }
-    }).join();
+    clock.hold();
+    for (std::int16_t tick = 1; tick <= 300; ++tick) {
+      device.newest = tick;
+      const kerf::WoodenCommand command{.milliamps = {tick, 0, 0}, .set_encoders = {}};
+      CHECK(port.send(std::span<const std::uint8_t>(encode(command)).first(14)));
+      streams = tick >= 100;
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));  // the port's thread sends it
+      clock.pass(1'000'000);
+    }
   }
   served.stop();
   std::ranges::sort(device.ages, std::greater<>{});
   REQUIRE(device.ages.size() > 2);
-  CHECK(device.longest_gap > 20);  // ticks that went on while it heard nothing: 100 as a rule
+  CHECK(device.longest_gap > 90);                   // ticks that went on while it heard nothing
   CHECK(device.ages[0] >= device.longest_gap - 2);  // in the kernel's hands all the while
   CHECK(device.ages[1] < device.longest_gap / 2);
 }
@@ -162,7 +161,7 @@ TEST_CASE("hid: an unplugged arm closes the port, and the motors are not asked f
   MountedArm arm({.script = {{0, UsbFault::vanish, &pushes}}});
   ReadyServo servo(Personality::woodenhaptics);
   HidPort port(arm.path(), 0, kGoOn);
-  ServoSession session(std::move(servo), port);
+  ServoSession session(std::move(servo), port, arm.clock());
   const auto course = session.run(8000, [&](const auto& c) {
     pushes = c.motors > 100;
     return port.closed();
@@ -170,7 +169,7 @@ TEST_CASE("hid: an unplugged arm closes the port, and the motors are not asked f
   CHECK(port.closed());
   CHECK(course.motors > 100);
   const auto after = session.run(100);
-  CHECK(after.fresh == 0);
+  CHECK(after.gap_at_end >= 99);  // what came before the end may still be read
   CHECK(after.stale_with_motors == 0);
   CHECK_FALSE(session.driver().release());
   CHECK_THROWS_WITH_AS(HidPort(arm.path(), 0, kGoOn), doctest::Contains("no such node"),
@@ -178,13 +177,15 @@ TEST_CASE("hid: an unplugged arm closes the port, and the motors are not asked f
 }
 
 TEST_CASE("hid: a servo that stops reading for a while finds the newest state again") {
-  const MountedArm arm;
+  MountedArm arm;
+  ReadyServo servo(Personality::woodenhaptics);
   HidPort port(arm.path(), 0, kGoOn);
-  ServoSession session(ReadyServo(Personality::woodenhaptics), port);
+  ServoSession session(std::move(servo), port, arm.clock());
   static_cast<void>(session.run(50));
-  kerf::sleep_until_ns(kerf::monotonic_ns() + 100'000'000);  // more than the kernel's queue holds
+  arm.clock().pass(100'000'000);  // more than the mailbox holds
+  kerf::sleep_until_ns(kerf::monotonic_ns() + 100'000'000);
   const auto course = session.run(100);
-  if (kerf::test::keeps_time()) CHECK(course.fresh > 90);
+  CHECK(course.fresh > 90);
   CHECK(session.driver().refused() == 0);
 }
 

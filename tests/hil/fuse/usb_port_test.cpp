@@ -122,11 +122,11 @@ TEST_CASE("usb: from power-up over firmware and homing to a force") {
   {
     ReadyServo servo(Personality::falcon);
     UsbPort port({falcon.path(), firmware.path()}, 0, kGoOn);
-    ServoSession session(std::move(servo), port);
+    ServoSession session(std::move(servo), port, falcon.clock());
     const auto course = session.run(8000, [](const auto& c) { return c.contact > 300; });
     CHECK(course.contact > 300);
     CHECK(course.motors > 300);
-    CHECK(kerf::test::came_in_time(course.fresh, course.ticks));
+    CHECK(course.fresh > course.ticks * 8 / 10);
     CHECK(session.driver().refused() == 0);
     CHECK(session.driver().release());
     CHECK(port.stats().strays == 0);
@@ -226,71 +226,64 @@ TEST_CASE("usb: packets in pieces are put together, none is bad, none is lost") 
   {
     ReadyServo servo(Personality::falcon);
     UsbPort port({falcon.path(), ""}, 0, kGoOn);
-    ServoSession session(std::move(servo), port);
-    const auto course = session.run(1000, [&](const auto& c) {
-      streams = c.fresh > 50;
-      return false;
-    });
-    if (kerf::test::keeps_time()) CHECK(course.fresh > 600);
-    CHECK(course.longest_gap < 200);
-    CHECK(session.driver().refused() == 0);
-    CHECK(port.stats().strays == 0);
-    // Each command is answered, also the last one.
-    for (int tries = 0; tries < 5000 && port.stats().packets < port.stats().commands; ++tries) {
+    {
+      ServoSession session(std::move(servo), port, falcon.clock());
+      const auto course = session.run(1000, [&](const auto& c) {
+        streams = c.fresh > 50;
+        return false;
+      });
+      CHECK(course.fresh > 600);
+      CHECK(course.longest_gap < 200);
+      CHECK(session.driver().refused() == 0);
+      CHECK(port.stats().strays == 0);
+    }
+    // What is in the line still comes: 256 bytes at most, 9 in a frame.
+    for (int tries = 0; tries < 1000 && port.stats().packets < port.stats().commands; ++tries) {
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
     }
     packets = port.stats().packets;
   }
   falcon.stop();
   // The first ones, one as a rule, answered the question whether the firmware runs.
-  CHECK(falcon.emulator().stats().reports - packets <= 2);
+  CHECK(falcon.node().chip().reports() - packets <= 2);
 }
 
 TEST_CASE("usb: the device answers in each of its frames, wherever the servo ticks in them") {
   MountedFalcon falcon({.firmware_runs = true}, {}, std::nullopt);
+  ReadyServo servo(Personality::falcon);
   UsbPort port({falcon.path(), ""}, 0, kGoOn);
-  std::thread([&] {
-    static_cast<void>(kerf::make_real_time(80, -1));
-    std::array<std::uint8_t, 65> packet{};
-    std::int64_t deadline_ns = kerf::monotonic_ns();
-    for (int phase = 0; phase < 10; ++phase) {
-      constexpr int kTicks = 100;
-      const std::uint64_t before = port.stats().packets;
-      for (int tick = 0; tick < kTicks; ++tick) {
-        deadline_ns = std::max(deadline_ns + 1'000'000, kerf::monotonic_ns());
-        kerf::sleep_until_ns(deadline_ns);
-        while (port.receive(packet) > 0) {
-        }
-        port.send(encode(kerf::FalconCommand{}));
-      }
-      CAPTURE(phase);
-      if (kerf::test::keeps_time()) CHECK(port.stats().packets - before > kTicks * 8 / 10);
-      deadline_ns += 100'000;
-    }
-  }).join();
+  ServoSession session(std::move(servo), port, falcon.clock());
+  static_cast<void>(session.run(10));
+  for (int phase = 0; phase < 10; ++phase) {
+    CAPTURE(phase);
+    constexpr int kTicks = 100;
+    falcon.clock().pass(100'000);
+    CHECK(session.run(kTicks).fresh > kTicks * 8 / 10);
+  }
 }
 
 TEST_CASE("usb: a device that took nothing for a while gets the newest command, no older one") {
   CountingDevice device;
   std::atomic<bool> streams{false};
+  kerf::test::HeldClock clock;
   kerf::test::ServedNode<kerf::UsbfsNode> served(
-      "usb", kerf::test::become_device, kerf::FtdiFalcon::Settings{.firmware_runs = true},
+      "usb", kerf::test::become_device,
+      kerf::FtdiFalcon::Settings{.firmware_runs = true, .clock = &clock},
       kerf::test::at_ms({{0, UsbFault::deaf, &streams}}), device);
   {
     UsbPort port({served.path(), ""}, 0, kGoOn);
-    std::thread([&] {
-      static_cast<void>(kerf::make_real_time(80, -1));
-      for (std::int16_t tick = 1; tick <= 300; ++tick) {
-        port.send(encode(kerf::FalconCommand{.motor = {tick, 0, 0}}));
-        device.newest = tick;
-        streams = tick >= 100;
-        std::this_thread::sleep_for(std::chrono::milliseconds(1));
-      }
-    }).join();
+    clock.hold();
+    for (std::int16_t tick = 1; tick <= 300; ++tick) {
+      device.newest = tick;
+      port.send(encode(kerf::FalconCommand{.motor = {tick, 0, 0}}));
+      streams = tick >= 100;
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));  // the port's thread sends it
+      clock.pass(1'000'000);
+    }
   }
   served.stop();
-  CHECK(device.longest_gap > 20);                 // ticks in which it heard nothing: 100 as a rule,
-  CHECK(device.oldest < device.longest_gap / 2);  // which is how old the oldest of them are
+  CHECK(device.longest_gap > 90);  // ticks in which it heard nothing
+  CHECK(device.oldest < device.longest_gap / 2);
 }
 
 TEST_CASE("usb: a stalled endpoint is freed when no read waits there, and the stream goes on") {
@@ -300,7 +293,7 @@ TEST_CASE("usb: a stalled endpoint is freed when no read waits there, and the st
   {
     ReadyServo servo(Personality::falcon);
     UsbPort port({falcon.path(), ""}, 0, kGoOn);
-    ServoSession session(std::move(servo), port);
+    ServoSession session(std::move(servo), port, falcon.clock());
     const auto course = session.run(1000, [&](const auto& c) {
       once = c.fresh > 100;
       twice = c.fresh > 300;
@@ -321,7 +314,7 @@ TEST_CASE("usb: an unplugged Falcon closes the port, and the motors are not aske
   MountedFalcon falcon({.firmware_runs = true}, {{0, UsbFault::vanish, &pushes}});
   ReadyServo servo(Personality::falcon);
   UsbPort port({falcon.path(), ""}, 0, kGoOn);
-  ServoSession session(std::move(servo), port);
+  ServoSession session(std::move(servo), port, falcon.clock());
   const auto course = session.run(8000, [&](const auto& c) {
     pushes = c.motors > 100;
     return port.closed();
@@ -329,7 +322,7 @@ TEST_CASE("usb: an unplugged Falcon closes the port, and the motors are not aske
   CHECK(port.closed());
   CHECK(course.motors > 100);
   const auto after = session.run(100);
-  CHECK(after.fresh == 0);
+  CHECK(after.gap_at_end >= 99);  // what came before the end may still be read
   CHECK(after.stale_with_motors == 0);
   CHECK_FALSE(session.driver().release());
   CHECK(error_of({falcon.path(), ""}).find("no such node; --port usb finds") != std::string::npos);

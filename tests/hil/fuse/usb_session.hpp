@@ -4,16 +4,18 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <optional>
 #include <string>
-#include <thread>
+#include <string_view>
 #include <utility>
 #include <vector>
 
 #include "controller/device/driver/device_driver.hpp"
 #include "controller/device/port/open_port.hpp"
+#include "controller/device/port/turns.hpp"
 #include "hil/devmodel/falcon_model.hpp"
 #include "hil/devmodel/wooden_model.hpp"
 #include "hil/front/serving.hpp"
@@ -21,30 +23,11 @@
 #include "hil/front/usb/usbfs_node.hpp"
 #include "hil/script/hand_script_file.hpp"
 #include "shared/posix/monotonic_clock.hpp"
+#include "tests/hil/fuse/held_clock.hpp"
 #include "tests/hil/fuse/mounted_node.hpp"
 #include "tests/servo/support.hpp"
 
 namespace kerf::test {
-
-/// How fresh reports are says something of ours only where threads run when they want to: with the
-/// right to real time, and without sanitizers, which slow both ends down.
-inline bool keeps_time() {
-#ifdef KERF_SANITIZED
-  return false;
-#else
-  static const bool does = [] {
-    bool has_right = false;
-    std::thread([&] { has_right = make_real_time(80, -1).empty(); }).join();
-    return has_right;
-  }();
-  return does;
-#endif
-}
-
-/// Whether reports came in time: to more than eight of ten ticks.
-inline bool came_in_time(int fresh, int ticks) {
-  return fresh > ticks * 8 / 10 || !keeps_time();
-}
 
 inline const std::atomic<bool> kGoOn{false};
 
@@ -77,6 +60,13 @@ inline LoadedScene firm_half_space() {
   return scene;
 }
 
+/// The settings of a device that goes by `clock`.
+template <class Settings>
+Settings by(const HeldClock& clock, Settings settings) {
+  settings.clock = &clock;
+  return settings;
+}
+
 /// The emulated Falcon as a usbfs node.
 class MountedFalcon {
  public:
@@ -84,14 +74,16 @@ class MountedFalcon {
                          std::vector<ScriptedUsbFault> script = {},
                          const std::optional<HandScript>& hand = touching_hand())
       : emulator_(std::make_unique<FalconModel>(), hand),
-        served_("usb", become_device, settings, at_ms(std::move(script)), emulator_) {}
+        served_("usb", become_device, by(clock_, settings), at_ms(std::move(script)), emulator_) {}
 
   void stop() { served_.stop(); }
   [[nodiscard]] std::string path() const { return served_.path(); }
   [[nodiscard]] const UsbfsNode& node() const noexcept { return served_.node(); }
   [[nodiscard]] const Emulator& emulator() const noexcept { return emulator_; }
+  [[nodiscard]] HeldClock& clock() noexcept { return clock_; }
 
  private:
+  HeldClock clock_;
   Emulator emulator_;
   ServedNode<UsbfsNode> served_;
 };
@@ -103,12 +95,14 @@ class MountedArm {
                       const std::optional<HandScript>& hand = touching_hand(),
                       std::array<int, 3> encoder_sign = {1, 1, 1})
       : emulator_(std::make_unique<WoodenModel>(params_of(settings, encoder_sign)), hand),
-        served_("hidraw0", become_device, with_cycles(std::move(settings)), emulator_) {}
+        served_("hidraw0", become_device, by(clock_, with_cycles(std::move(settings))), emulator_) {
+  }
 
   void stop() { served_.stop(); }
   [[nodiscard]] std::string path() const { return served_.path(); }
   [[nodiscard]] const HidrawNode& node() const noexcept { return served_.node(); }
   [[nodiscard]] const Emulator& emulator() const noexcept { return emulator_; }
+  [[nodiscard]] HeldClock& clock() noexcept { return clock_; }
 
  private:
   static WoodenParams params_of(const WoodenHid::Settings& settings,
@@ -123,6 +117,7 @@ class MountedArm {
     return settings;
   }
 
+  HeldClock clock_;
   Emulator emulator_;
   ServedNode<HidrawNode> served_;
 };
@@ -141,32 +136,35 @@ struct ReadyServo {
   std::unique_ptr<Servo> servo;
 };
 
-/// A driver above its real library, and a servo above the driver, at 1 kHz by the machine's clock.
+/// A driver above its real library, and a servo above the driver, at 1 kHz by the clock of the
+/// device, which waits for the servo from here to the end.
 class ServoSession {
  public:
-  ServoSession(ReadyServo ready, PacketPort& port)
+  ServoSession(ReadyServo ready, PacketPort& port, HeldClock& clock)
       : ready_(std::move(ready)),
+        port_(port),
+        clock_(clock),
         driver_(
             make_driver(ready_.scene.device.personality, port, ready_.scene.device.encoder_sign)) {
+    clock_.hold();
     driver_->start();
   }
+  ~ServoSession() { clock_.let_go(); }
+  ServoSession(const ServoSession&) = delete;
+  ServoSession& operator=(const ServoSession&) = delete;
 
   struct Course {
     int ticks = 0, fresh = 0, contact = 0, motors = 0;
-    int faults = 0;                       ///< ticks with one
-    int longest_gap = 0;                  ///< ticks without a report
-    std::int64_t longest_silence_ms = 0;  ///< the same by the clock, which goes on between ticks
+    int faults = 0;             ///< ticks with one
+    int longest_gap = 0;        ///< ticks without a report
     int stale_with_motors = 0;  ///< ticks beyond 20 without a report and motors still asked for
     int gap_at_end = 0;
   };
-  /// Until so many ticks have passed, or `done` says so. On a thread with the servo's priority.
+  /// Until so many ticks have passed, or `done` says so.
   template <class Done>
   Course run(int most_ticks, Done done) {
     Course course;
-    std::thread([&] {
-      static_cast<void>(make_real_time(80, -1));
-      tick(most_ticks, done, course);
-    }).join();
+    while (course.ticks < most_ticks && !done(course)) note(tick(), course);
     return course;
   }
   Course run(int ticks) {
@@ -177,46 +175,57 @@ class ServoSession {
     DeviceReport report;
     ServoOutput output;
   };
-  /// One tick, now.
+  /// What a servo does in a tick, now.
   Tick step() {
     const DeviceReport report = driver_->read();
     const ServoOutput output = ready_.servo->step(report);
     driver_->command(output);
     return {report, output};
   }
-  /// Who is told of each tick's output in `run`, on its thread.
+  /// A millisecond of the device, then a step.
+  Tick tick() {
+    clock_.pass(kNsPerSecond / 1000);
+    static_cast<void>(port_.wait(kLongestWayMs));
+    const std::uint64_t sent = commands_sent();
+    const Tick tick = step();
+    const std::int64_t until_ns = monotonic_ns() + kLongestWayMs * std::int64_t{1'000'000};
+    while (!port_.closed() && commands_sent() == sent && monotonic_ns() < until_ns) {
+      sleep_until_ns(monotonic_ns() + 20'000);
+    }
+    return tick;
+  }
+  /// Who is told of each tick's output in `run`.
   void watch(std::function<void(const ServoOutput&)> watch) { watch_ = std::move(watch); }
 
   [[nodiscard]] DeviceDriver& driver() noexcept { return *driver_; }
 
  private:
-  template <class Done>
-  void tick(int most_ticks, Done& done, Course& course) {
-    int gap = 0;
-    std::int64_t deadline_ns = monotonic_ns();
-    std::int64_t heard_ns = deadline_ns;
-    while (course.ticks < most_ticks && !done(course)) {
-      deadline_ns = std::max(deadline_ns + 1'000'000, monotonic_ns());
-      sleep_until_ns(deadline_ns);
-      const auto [report, output] = step();
-      if (watch_) watch_(output);
-      ++course.ticks;
-      gap = report.fresh ? 0 : gap + 1;
-      course.fresh += report.fresh ? 1 : 0;
-      course.contact += output.contact ? 1 : 0;
-      course.motors += output.motors_on ? 1 : 0;
-      course.faults += output.fault != Fault::none ? 1 : 0;
-      course.longest_gap = std::max(course.longest_gap, gap);
-      const std::int64_t now_ns = monotonic_ns();
-      course.longest_silence_ms =
-          std::max(course.longest_silence_ms, (now_ns - heard_ns) / 1'000'000);
-      if (report.fresh) heard_ns = now_ns;
-      if (gap > 20 && output.motors_on) ++course.stale_with_motors;
-      course.gap_at_end = gap;
+  /// Of the machine's time, for a packet between device and servo by other threads; one that takes
+  /// longer comes in the next tick. Less than a port waits for an answer before it speaks again.
+  static constexpr int kLongestWayMs = 3;
+  static_assert(kLongestWayMs * std::int64_t{1'000'000} < Turns::kPatienceNs);
+
+  [[nodiscard]] std::uint64_t commands_sent() const {
+    for (const LinkCounter& counter : port_.counters()) {
+      if (counter.name == std::string_view("commands")) return counter.value;
     }
+    return 0;
+  }
+  void note(const Tick& tick, Course& course) {
+    if (watch_) watch_(tick.output);
+    ++course.ticks;
+    course.gap_at_end = tick.report.fresh ? 0 : course.gap_at_end + 1;
+    course.fresh += tick.report.fresh ? 1 : 0;
+    course.contact += tick.output.contact ? 1 : 0;
+    course.motors += tick.output.motors_on ? 1 : 0;
+    course.faults += tick.output.fault != Fault::none ? 1 : 0;
+    course.longest_gap = std::max(course.longest_gap, course.gap_at_end);
+    course.stale_with_motors += course.gap_at_end > 20 && tick.output.motors_on ? 1 : 0;
   }
 
   ReadyServo ready_;
+  PacketPort& port_;
+  HeldClock& clock_;
   std::unique_ptr<DeviceDriver> driver_;
   std::function<void(const ServoOutput&)> watch_;
 };

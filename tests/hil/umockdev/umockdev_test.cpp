@@ -65,13 +65,14 @@ std::string falcon_on_usb() {
 
 TEST_CASE("umockdev: libusb finds the Falcon and brings it from homing to a force") {
   kerf::Emulator emulator(std::make_unique<kerf::FalconModel>(), kerf::test::touching_hand());
-  kerf::UsbfsNode node({.firmware_runs = true}, {}, emulator);
+  kerf::test::HeldClock clock;
+  kerf::UsbfsNode node({.firmware_runs = true, .clock = &clock}, {}, emulator);
   {
     const Bed bed(falcon_on_usb());
     const UmockdevNode served(bed.get(), "/dev/bus/usb/001/002", node);
     ReadyServo servo(Personality::falcon);
     kerf::UsbPort port({"", ""}, 0, kGoOn);
-    ServoSession session(std::move(servo), port);
+    ServoSession session(std::move(servo), port, clock);
     const auto course = session.run(8000, [](const auto& c) { return c.contact > 100; });
     CHECK(course.contact > 100);
     CHECK(course.motors > 100);
