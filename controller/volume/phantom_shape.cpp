@@ -16,6 +16,7 @@ namespace kerf::phantom {
 namespace {
 
 /// Minimum with the edge rounded where the arguments differ by less than `k`; as steep as they are.
+/// Where they differ by more it is the smaller one, bit by bit, whatever the other is.
 double smooth_min(double a, double b, double k) noexcept {
   const double h = std::max(k - std::abs(a - b), 0.0);
   return std::min(a, b) - h * h / (4.0 * k);
@@ -123,10 +124,12 @@ double ridge_height(const Cusp& c, Point p, double slope, double radius) noexcep
   return c.height - c.drop * fall - slope * (side - radius);
 }
 
+constexpr double kLowestOcclusal = 5.6;
+
 /// Height of the chewing surface over (x, y). Grooves are where the slopes of two cusps meet.
 double occlusal_height(Point p) noexcept {
   constexpr double kCuspSlope = 1.25;
-  double height = 5.6;
+  double height = kLowestOcclusal;
   for (const Cusp& cusp : kCusps) {
     height = smooth_max(height, ridge_height(cusp, p, kCuspSlope, 1.5), 0.2);
   }
@@ -159,9 +162,11 @@ constexpr Root kDistalRoot{{{{{-9.0, -3.7}, {-5.5, -3.25}, {-2.5, -2.75}, {0.5, 
                            0.2,
                            1.0};
 
+constexpr double kRootTop = 1.5;  // inside the stem
+constexpr double kThickestRoot = 1.8;
+
 double root_field(const Root& root, Point p) noexcept {
-  constexpr double kTop = 1.5;  // inside the stem
-  const double z = std::clamp(p.z, root.apex_z, kTop);
+  const double z = std::clamp(p.z, root.apex_z, kRootTop);
   const double a = root.half_x(z);
   const double b = root.half_y(z);
   const double dx = p.x - root.axis_x(z);
@@ -199,10 +204,9 @@ double pulp_chamber(Point p) noexcept {
 
 /// A canal follows the axis of its root, `offset_y` beside it at the orifice and nearer below.
 double canal(const Root& root, double offset_y, Point p) noexcept {
-  constexpr double kTop = 1.5;
   const double bottom = root.apex_z - 0.2;
-  const double z = std::clamp(p.z, bottom, kTop);
-  const double t = (z - bottom) / (kTop - bottom);
+  const double z = std::clamp(p.z, bottom, kRootTop);
+  const double t = (z - bottom) / (kRootTop - bottom);
   const double x = p.x - root.axis_x(z);
   const double y = p.y - offset_y * (0.3 + 0.7 * t);
   return vec3::length({x, y, p.z - z}) - (0.17 + 0.38 * t);
@@ -213,10 +217,16 @@ double canal(const Root& root, double offset_y, Point p) noexcept {
 double outer_field(Point p) noexcept {
   // The enamel stands out a little where it begins.
   const double step = 0.14 * ramp(0.0, 0.9, above_neck(p));
-  const double crown = smooth_max(crown_side(p) - step, p.z - occlusal_height(p), 0.9);
+  constexpr double kEdge = 0.9, kFork = 1.3;  // mm, where they are rounded
+  // The costly parts are left out where a bound says that they change nothing.
+  const double side = crown_side(p) - step;
+  const bool below_top = side >= p.z - kLowestOcclusal + kEdge;
+  const double crown = below_top ? side : smooth_max(side, p.z - occlusal_height(p), kEdge);
   const double stem = smooth_max(crown, stem_bottom(p), 1.2);
+  const double nearest_root = p.z - kRootTop - kThickestRoot;
+  if (stem <= nearest_root - kFork) return stem;
   const double roots = std::min(root_field(kMesialRoot, p), root_field(kDistalRoot, p));
-  return smooth_min(stem, roots, 1.3);
+  return smooth_min(stem, roots, kFork);
 }
 
 double dentin_field(Point p) noexcept {
