@@ -175,9 +175,31 @@ double root_field(const Root& root, Point p) noexcept {
   return vec3::length({dx, squeezed_y, z - p.z}) - a + furrow;
 }
 
-/// The neck and the stem down to where the roots part; an arch between them.
+double roots_field(Point p) noexcept {
+  const bool mesial = p.x > 0.0;
+  const double near = root_field(mesial ? kMesialRoot : kDistalRoot, p);
+  // Both axes lie at least so far from the middle.
+  constexpr double kAside = 2.0;
+  if (near <= std::abs(p.x) + kAside - kThickestRoot) return near;
+  return std::min(near, root_field(mesial ? kDistalRoot : kMesialRoot, p));
+}
+
+// --- Stem --------------------------------------------------------------------------------------
+
+/// Down to where the roots part; an arch between them.
 double stem_bottom(Point p) noexcept {
   return -1.3 + 0.03 * p.y * p.y - p.z;
+}
+
+/// The crown, the neck and the stem.
+double stem_field(Point p) noexcept {
+  constexpr double kEdge = 0.9;
+  // The enamel stands out a little where it begins.
+  const double step = 0.14 * ramp(0.0, 0.9, above_neck(p));
+  const double side = crown_side(p) - step;
+  const bool top_is_far = side >= p.z - kLowestOcclusal + kEdge;
+  const double crown = top_is_far ? side : smooth_max(side, p.z - occlusal_height(p), kEdge);
+  return smooth_max(crown, stem_bottom(p), 1.2);
 }
 
 // --- Pulp --------------------------------------------------------------------------------------
@@ -214,19 +236,18 @@ double canal(const Root& root, double offset_y, Point p) noexcept {
 
 }  // namespace
 
+// Parts that a bound keeps out of a smooth minimum or maximum are not computed.
+
 double outer_field(Point p) noexcept {
-  // The enamel stands out a little where it begins.
-  const double step = 0.14 * ramp(0.0, 0.9, above_neck(p));
-  constexpr double kEdge = 0.9, kFork = 1.3;  // mm, where they are rounded
-  // The costly parts are left out where a bound says that they change nothing.
-  const double side = crown_side(p) - step;
-  const bool below_top = side >= p.z - kLowestOcclusal + kEdge;
-  const double crown = below_top ? side : smooth_max(side, p.z - occlusal_height(p), kEdge);
-  const double stem = smooth_max(crown, stem_bottom(p), 1.2);
-  const double nearest_root = p.z - kRootTop - kThickestRoot;
-  if (stem <= nearest_root - kFork) return stem;
-  const double roots = std::min(root_field(kMesialRoot, p), root_field(kDistalRoot, p));
-  return smooth_min(stem, roots, kFork);
+  constexpr double kFork = 1.3;
+  if (p.z < 0.0) {
+    const double roots = roots_field(p);
+    const bool stem_is_far = roots <= stem_bottom(p) - kFork;
+    return stem_is_far ? roots : smooth_min(stem_field(p), roots, kFork);
+  }
+  const double stem = stem_field(p);
+  const bool roots_are_far = stem <= p.z - kRootTop - kThickestRoot - kFork;
+  return roots_are_far ? stem : smooth_min(stem, roots_field(p), kFork);
 }
 
 double dentin_field(Point p) noexcept {

@@ -141,10 +141,11 @@ TEST_CASE("hid: a device that took nothing for a while gets what was on its way,
     clock.hold();
     for (std::int16_t tick = 1; tick <= 300; ++tick) {
       device.newest = tick;
+      const std::uint64_t sent = kerf::test::commands_sent(port);
       const kerf::WoodenCommand command{.milliamps = {tick, 0, 0}, .set_encoders = {}};
       CHECK(port.send(std::span<const std::uint8_t>(encode(command)).first(14)));
       streams = tick >= 100;
-      std::this_thread::sleep_for(std::chrono::milliseconds(1));  // the port's thread sends it
+      kerf::test::wait_for_command(port, sent, 10);
       clock.pass(1'000'000);
     }
   }

@@ -275,9 +275,10 @@ TEST_CASE("usb: a device that took nothing for a while gets the newest command, 
     clock.hold();
     for (std::int16_t tick = 1; tick <= 300; ++tick) {
       device.newest = tick;
+      const std::uint64_t sent = kerf::test::commands_sent(port);
       port.send(encode(kerf::FalconCommand{.motor = {tick, 0, 0}}));
       streams = tick >= 100;
-      std::this_thread::sleep_for(std::chrono::milliseconds(1));  // the port's thread sends it
+      kerf::test::wait_for_command(port, sent, 10);
       clock.pass(1'000'000);
     }
   }

@@ -136,6 +136,21 @@ struct ReadyServo {
   std::unique_ptr<Servo> servo;
 };
 
+/// Packets that have left by the port's thread.
+inline std::uint64_t commands_sent(const PacketPort& port) {
+  for (const LinkCounter& counter : port.counters()) {
+    if (counter.name == std::string_view("commands")) return counter.value;
+  }
+  return 0;
+}
+/// Until one more than `sent` has left, or so long of the machine's time has passed.
+inline void wait_for_command(const PacketPort& port, std::uint64_t sent, int most_ms) {
+  const std::int64_t until_ns = monotonic_ns() + most_ms * std::int64_t{1'000'000};
+  while (!port.closed() && commands_sent(port) == sent && monotonic_ns() < until_ns) {
+    sleep_until_ns(monotonic_ns() + 20'000);
+  }
+}
+
 /// A driver above its real library, and a servo above the driver, at 1 kHz by the clock of the
 /// device, which waits for the servo from here to the end.
 class ServoSession {
@@ -186,12 +201,9 @@ class ServoSession {
   Tick tick() {
     clock_.pass(kNsPerSecond / 1000);
     static_cast<void>(port_.wait(kLongestWayMs));
-    const std::uint64_t sent = commands_sent();
+    const std::uint64_t sent = commands_sent(port_);
     const Tick tick = step();
-    const std::int64_t until_ns = monotonic_ns() + kLongestWayMs * std::int64_t{1'000'000};
-    while (!port_.closed() && commands_sent() == sent && monotonic_ns() < until_ns) {
-      sleep_until_ns(monotonic_ns() + 20'000);
-    }
+    wait_for_command(port_, sent, kLongestWayMs);
     return tick;
   }
   /// Who is told of each tick's output in `run`.
@@ -205,12 +217,6 @@ class ServoSession {
   static constexpr int kLongestWayMs = 3;
   static_assert(kLongestWayMs * std::int64_t{1'000'000} < Turns::kPatienceNs);
 
-  [[nodiscard]] std::uint64_t commands_sent() const {
-    for (const LinkCounter& counter : port_.counters()) {
-      if (counter.name == std::string_view("commands")) return counter.value;
-    }
-    return 0;
-  }
   void note(const Tick& tick, Course& course) {
     if (watch_) watch_(tick.output);
     ++course.ticks;

@@ -13,6 +13,7 @@
 
 #include "hil/front/fuse/caller_memory.hpp"
 #include "hil/front/serving.hpp"
+#include "shared/posix/monotonic_clock.hpp"
 
 namespace kerf::test {
 namespace {
@@ -110,7 +111,7 @@ void UmockdevNode::close(UMockdevIoctlClient* client) {
 
 /// Whoever has waited for this frame gets what there is now.
 void UmockdevNode::frame() {
-  node_.wake();
+  if (node_.next_wake_ns() <= monotonic_ns()) node_.wake();
   for (UMockdevIoctlClient* const client : std::exchange(waiting_, {})) end(client, ask(client));
 }
 
