@@ -39,6 +39,14 @@ double latest_latch_ms(const std::string& name, double tick_ms) {
   return kReportMs + tick_ms;
 }
 
+/// Whether an arm that told `before` and tells `now` rests.
+bool is_near(const EncoderCounts& now, const EncoderCounts& before) {
+  return std::ranges::equal(now, before, [](std::int16_t a, std::int16_t b) {
+    const auto step = static_cast<std::int16_t>(static_cast<std::uint16_t>(int{a} - int{b}));
+    return std::abs(int{step}) <= kRestCounts;
+  });
+}
+
 /// How far `force` is from any part of `last` along its own direction, from none to all of it.
 double change_but_for_fall_n(DeviceVec<double> last, DeviceVec<double> force) {
   const double square = dot(last, last);
@@ -86,22 +94,24 @@ void Contract::reported(double time_ms, std::span<const std::uint8_t> packet) {
 /// Parked, homed and no joint turning for 50 ms: calibrated, whatever was before. Counters that get
 /// their zero there may not creep away meanwhile.
 void Contract::follow_rest(double time_ms) {
-  bool still = told_.parked && told_.homed;
-  for (std::size_t i = 0; i < 3; ++i) {
-    const auto step = static_cast<std::int16_t>(
-        static_cast<std::uint16_t>(int{told_.count[i]} - int{rest_count_[i]}));
-    still = still && std::abs(int{step}) <= kRestCounts;
-  }
+  const bool still = told_.parked && told_.homed && is_near(told_.count, rest_count_);
   if (!still || !wire_.counts_from_rest()) rest_count_ = told_.count;
+  // Whole ticks at both ends, and the first report may be one of its periods old.
+  const double tolerance_ms = 2 * std::max(tick_ms_, kReportMs);
+  const bool goes_on = still && time_ms - told_at_ms_ < tolerance_ms;
+  told_at_ms_ = time_ms;
   if (!still) rest_since_ms_ = -1;
   if (still && rest_since_ms_ < 0) rest_since_ms_ = time_ms;
-  // Counted in whole ticks, from a report that came up to one of its own periods before.
-  const bool rested =
-      still && time_ms - rest_since_ms_ >= kRestMs - 2 * std::max(tick_ms_, kReportMs);
-  if (!rested) return;
+  if (!goes_on) rest_without_gap_since_ms_ = time_ms;
+  const bool may_have_rested = still && time_ms - rest_since_ms_ >= kRestMs - tolerance_ms;
+  if (!may_have_rested) return;
   calibrated_again_ = calibrated_again_ || outcome_.pushed;
-  if (wire_.counts_from_rest()) pose_is_known_ = docked_;
   calibrated_ = true;
+  if (!wire_.counts_from_rest()) return;
+  const bool has_rested = time_ms - rest_without_gap_since_ms_ >= kRestMs + tolerance_ms;
+  zero_is_known_ = has_rested || is_near(told_.count, wire_.dock_count());
+  zero_is_true_ = docked_;
+  if (has_rested) wire_.calibrated_at(told_.count);
 }
 
 void Contract::must_stay_off(const char* fault) {
@@ -141,7 +151,7 @@ void Contract::follow_report(double time_ms) {
     may_push_since_ms_ = time_ms;
   }
   if (off_ != Off::no_reason) return;
-  if (before && told_pose) {
+  if (before && told_pose && zero_is_known_) {
     const double most_mm = limits_.speed_mm_per_s / 1000 * since_ms;
     if (norm(moved_mm_) > most_mm * kSpeedShare + kSpeedStepMm) {
       must_stay_off(fault_name(Fault::overspeed));
@@ -185,7 +195,7 @@ void Contract::commanded(double time_ms, std::span<const std::uint8_t> packet) {
   heat_until(time_ms);
   follow_stall(command);
   check_state(command);
-  if (pose_ && pose_is_known_) {
+  if (pose_ && zero_is_known_) {
     check_size(command);
     check_change(command);
     check_hold(command);
@@ -288,7 +298,7 @@ void Contract::cycle(double time_ms, const DeviceMoment& device) {
   const double force_n = norm(device.motor_force_n);
   outcome_.device_peak_n = std::max(outcome_.device_peak_n, force_n);
   outcome_.pushed = outcome_.pushed || force_n > kPushN;
-  if (!trusted_ || !pose_is_known_) return;
+  if (!trusted_ || !zero_is_known_ || !zero_is_true_) return;
   const double limit_n = limits_.force_n * kDeviceShare + kStepN;
   check(force_n <= limit_n, time_ms, "force of the motors in N", force_n, limit_n);
   if (!last_.asked.off() || force_n < kStepN) return;

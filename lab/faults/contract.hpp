@@ -84,10 +84,13 @@ class Contract {
   DeviceVec<double> moved_mm_;    ///< from the pose before to that
   bool had_no_pose_ = false;      ///< in some report
   double no_pose_since_ms_ = -1;  ///< reports tell of none since; negative: they do
-  std::array<std::int16_t, 3> rest_count_{};
+  EncoderCounts rest_count_{};
   double rest_since_ms_ = -1;  ///< parked and still; negative: it is not
   bool calibrated_ = false;
-  bool pose_is_known_ = true;      ///< false: calibrated where the device was not at rest
+  double told_at_ms_ = 0;                 ///< the last command that a report was for
+  double rest_without_gap_since_ms_ = 0;  ///< parked and still, in every report that was due
+  bool zero_is_known_ = true;  ///< false: whether that rest was long enough is a matter of a tick
+  bool zero_is_true_ = true;   ///< false: the host calibrated where the device was not at rest
   bool calibrated_again_ = false;  ///< in the run, after it had pushed
   Off off_ = Off::not_calibrated;
   double may_push_since_ms_ = 0;  ///< the fade begins

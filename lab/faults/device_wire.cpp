@@ -37,7 +37,8 @@ DeviceWire::DeviceWire(Personality personality, const std::array<double, 3>& doc
   switch (personality) {
     case Personality::omni: {
       const OmniParams unit;
-      zero_count_ = unit.encoder_offset;
+      std::ranges::transform(unit.encoder_offset, dock_count_.begin(),
+                             [](int count) { return static_cast<std::int16_t>(count); });
       zero_rad_ = dock_rad;
       nmm_per_count_ = unit.torque_nmm_per_count;
       count_end_ = omni::kMotorCountMax;
@@ -132,12 +133,12 @@ std::optional<ToldCommand> DeviceWire::command(std::span<const std::uint8_t> pac
   return ToldCommand{asked->motor, asked->motors_on};
 }
 
-std::optional<ArmPose> DeviceWire::pose(const std::array<std::int16_t, 3>& count) const {
+std::optional<ArmPose> DeviceWire::pose(const EncoderCounts& count) const {
   std::array<double, 3> q{};
   for (std::size_t i = 0; i < 3; ++i) {
     // From its zero, over the wrap of 16 bits.
     const auto turned =
-        static_cast<std::int16_t>(static_cast<std::uint16_t>(int{count[i]} - zero_count_[i]));
+        static_cast<std::int16_t>(static_cast<std::uint16_t>(int{count[i]} - dock_count_[i]));
     q[i] = zero_rad_[i] + turned * rad_per_count_[i];
   }
   ArmPose pose{{q[0], q[1], q[2]}, {}};

@@ -12,9 +12,11 @@
 
 namespace kerf::faults {
 
+using EncoderCounts = std::array<std::int16_t, 3>;
+
 /// What a report tells, in the words of docs/safety.md.
 struct ToldReport {
-  std::array<std::int16_t, 3> count{};
+  EncoderCounts count{};
   bool parked = false;
   bool homed = true;
 };
@@ -41,7 +43,7 @@ class DeviceWire {
   [[nodiscard]] std::optional<ToldCommand> command(std::span<const std::uint8_t> packet);
 
   /// Where encoders that count so from calibration put the arm; none: it has no such pose.
-  [[nodiscard]] std::optional<ArmPose> pose(const std::array<std::int16_t, 3>& count) const;
+  [[nodiscard]] std::optional<ArmPose> pose(const EncoderCounts& count) const;
   /// What motors at `count` exert at the tip in that pose.
   [[nodiscard]] DeviceVec<double> force_n(const ArmPose& pose,
                                           const std::array<std::int16_t, 3>& count) const;
@@ -49,13 +51,16 @@ class DeviceWire {
   [[nodiscard]] int count_end() const noexcept { return count_end_; }
   /// Whether a calibration in a wrong pose moves every later one: encoders that count from it.
   [[nodiscard]] bool counts_from_rest() const noexcept { return personality_ == Personality::omni; }
+  /// What such encoders tell at the dock, as the host must think since its last calibration.
+  [[nodiscard]] const EncoderCounts& dock_count() const noexcept { return dock_count_; }
+  void calibrated_at(const EncoderCounts& count) noexcept { dock_count_ = count; }
 
  private:
   [[nodiscard]] std::optional<ToldReport> wooden_report(std::span<const std::uint8_t> packet);
 
   Personality personality_;
   int count_end_ = 0;
-  std::array<int, 3> zero_count_{};
+  EncoderCounts dock_count_{};
   std::array<double, 3> zero_rad_{}, rad_per_count_{}, nmm_per_count_{};
   std::optional<std::uint32_t> packet_number_;  ///< of the Omni's last report
   std::optional<std::uint32_t> far_number_;     ///< of the last packet, where it was far from that

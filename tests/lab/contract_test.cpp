@@ -231,6 +231,50 @@ TEST_CASE("the contract sees each way to break it") {
   CHECK_FALSE(run.outcome.violations.empty());
 }
 
+TEST_CASE("speed counts from the zero that the host took last, be it wrong") {
+  // Parked and still far from the dock, by broken sensors: a host cannot know better.
+  Watched run;
+  run.push_up_to(0);
+  const auto counts_a_mm = [&] {
+    auto turned = run.told.encoder;
+    turned[0] = static_cast<std::int16_t>(turned[0] - 100);
+    return 100 / norm(run.wire.pose(turned)->tip_mm - run.wire.pose(run.told.encoder)->tip_mm);
+  };
+  const double of_dock = counts_a_mm();
+  run.told.encoder[1] = static_cast<std::int16_t>(run.told.encoder[1] - 1500);
+  REQUIRE(counts_a_mm() > 1.6 * of_dock);
+  const auto turn_mm = [&](double mm) {
+    run.told.encoder[0] =
+        static_cast<std::int16_t>(run.told.encoder[0] - std::lround(mm * of_dock));
+    run.tick(0);
+  };
+  constexpr double kLimitMm = 10;  // a tick
+  SUBCASE("a long rest: the host has taken it") {
+    run.park(60);
+    run.tick(0);
+    turn_mm(0.9 * kLimitMm);
+    CHECK(run.outcome.violation_count == 0);
+    turn_mm(1.2 * kLimitMm);
+    CHECK(run.outcome.violation_count == 1);
+  }
+  SUBCASE("a rest of 50 ms, one tick more or less: who knows") {
+    run.park(50);
+    run.tick(0);
+    turn_mm(2 * kLimitMm);
+    CHECK(run.outcome.violation_count == 0);
+  }
+  SUBCASE("a rest with a gap in the reports may have begun anew") {
+    run.park(30);
+    run.told.docked = true;
+    for (int i = 0; i < 8; ++i) run.tick(0, false, false);
+    run.park(25);
+    run.tick(0);
+    turn_mm(2 * kLimitMm);
+    CHECK(run.outcome.violation_count == 0);
+  }
+  CHECK(run.outcome.latched == (run.outcome.violation_count > 0 ? "overspeed" : "none"));
+}
+
 TEST_CASE("the contract accepts the fault that the script says, in time") {
   Watched run;
   run.push_up_to(1);
