@@ -14,8 +14,8 @@
 namespace kerf {
 
 // Cutting that follows force: Preston's law, shared among the voxels under the tool by what it
-// covers of them (o_j) times the speed of its surface there (w_j): docs/theory.md 6.2. What cannot
-// be cut carries its part of the force and stays. Over several volumes the sum of w goes through
+// covers of them (o_j) times the speed of its surface there (v_j): docs/theory.md 6.2. What cannot
+// be cut carries its part of the force and stays. Over several volumes the sum of o v goes through
 // all of them: `CoveredWeights::whole`.
 
 /// How force cuts one volume; constant during a run. Indexed by label; without labels all is at 0.
@@ -129,7 +129,7 @@ template <class N>
 }
 
 /// Takes from one volume what `drive` cuts in one tick of the voxels that the tool covers, where it
-/// is after an advance of a quarter voxel into the surface; their list, `CoveredVoxels<N>` or
+/// is after its advance into the surface (force_cut_plan.hpp); their list, `CoveredVoxels<N>` or
 /// `CoveredGroups`, is used up.
 ///
 /// Removed steps, carry and `lost` add up to the budgets of all ticks: in fixed exactly, each

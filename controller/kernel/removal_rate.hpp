@@ -14,7 +14,7 @@ namespace kerf {
 /// on the rate.
 ///
 /// Fixed: the fraction at c = 1 is `mantissa` 2^-(15 + exponent). The exact form bends c by a table
-/// of f(c) / f(1) with linear steps between 257 entries: within kT^2 / (8 * 256^2) / f(1) and two
+/// of f(c) / f(1) with linear steps between 257 entries: within (kT)^2 / (8 * 256^2) / f(1) and two
 /// weight steps, never falling. Made at load time by `removal_rate`.
 template <class N>
 struct RemovalRate {

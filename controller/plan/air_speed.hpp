@@ -80,7 +80,7 @@ template <class N>
                                               SweepRules::kMaxTurnQueries)
                    : 1;
   const std::int64_t left =
-      work.budget() - (beyond > 0 ? work.in_vain() + beyond : 0) -
+      work.budget() - (beyond > 0 ? work.most_wasted() + beyond : 0) -
       std::min((turns + 1) * (query + work.turn), work.budget() / 2 + 2 * (query + work.turn));
   const std::int64_t last = work.query + work.closer;  // no query begins with less
   const std::int64_t queries = left < last ? 0 : (left - last) / query + 1;

@@ -97,7 +97,7 @@ struct ServoOutput {
   std::array<double, 3> tip_torque_n_mm{};     ///< of contact and cutting about the tip
   std::array<PlaneLoad, kMaxPlaneLoads> planes{};
   std::uint32_t plane_count = 0;  ///< of the planes that hold the tool
-  double absorbed_mj = 0;         ///< SUM -F_sent . dx since arming; + = taken from the hand
+  double absorbed_mj = 0;         ///< SUM -F_sent . dx of the run; + = taken from the hand
   double port_minimum_mj = 0;     ///< lowest value of it so far
   /// `absorbed_mj` by source, in steps of 2^-32 mJ: exact in fixed, and their sum is.
   std::array<std::int64_t, kEnergySources> energy_steps{};

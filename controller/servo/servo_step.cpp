@@ -25,6 +25,7 @@ struct Wanted {
   DeviceVec<typename N::Real> force_n;
   ToolContact<N> tool;
   ForceParts<N> parts{};  ///< of the force before fading in
+  bool limited = false;   ///< by peak, slew or heat
 };
 
 /// The proxy goes on following a hand that gets no force, so that it is on the same side of every
@@ -98,13 +99,17 @@ Wanted<N> wanted_force(const ServoPlan<N>& plan, ServoState<N>& state, const Sen
 }
 
 /// The force to send: limited, and where the scene names a stabiliser what that makes of it,
-/// limited once more; its part is kept in `wanted`. One that is no number latches a fault.
+/// limited once more; its part is kept in `wanted`, and whether a limit acted. One that is no
+/// number latches a fault.
 template <class N>
 DeviceVec<typename N::Real> force_to_send(const ServoPlan<N>& plan, ServoState<N>& state,
                                           Wanted<N>& wanted, const Sensed<N>& sensed) noexcept {
   using Real = typename N::Real;
   const auto limited = [&](DeviceVec<Real> force_n, ThermalState<N>& thermal) {
-    return limited_force(plan.limits, thermal, force_n, state.force_n, sensed.leaves);
+    const auto limited_n =
+        limited_force(plan.limits, thermal, force_n, state.force_n, sensed.leaves);
+    wanted.limited = wanted.limited || !(limited_n == force_n);
+    return limited_n;
   };
   if (state.held()) state.stabiliser.begin_anew();
   if (!plan.stabiliser.given() || !sensed.usable || state.held()) {
@@ -150,7 +155,7 @@ void drive(const ServoPlan<N>& plan, ServoState<N>& state, Wanted<N>& wanted,
   state.force_n = {multiply<Real>(motors.share, limited_n.x),
                    multiply<Real>(motors.share, limited_n.y),
                    multiply<Real>(motors.share, limited_n.z)};
-  out.clamped = !(state.force_n == wanted.force_n);
+  out.clamped = wanted.limited || motors.share < typename N::Unit(1);
   const JointVec<Real> torque_n_mm = state.jacobian_t_mm * state.force_n;
   out.torque_n_mm = {as_double(torque_n_mm.x), as_double(torque_n_mm.y), as_double(torque_n_mm.z)};
 }

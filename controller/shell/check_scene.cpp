@@ -15,7 +15,6 @@
 #include "controller/scene/scene.hpp"
 #include "controller/scene/scene_page.hpp"
 #include "controller/shell/scene_segment.hpp"
-#include "shared/posix/cores.hpp"
 #include "shared/posix/new_file.hpp"
 
 namespace kerf {
@@ -123,7 +122,7 @@ std::string refused_gains(const ControllerOptions& options, const LoadedScene& s
 
 void explain_scene(const ControllerOptions& options, LoadedScene& scene, CompiledScene& servo) {
   if (!options.report.empty()) check_new_file(options.report);
-  const int core = options.real_time.cpu >= 0 ? options.real_time.cpu : allowed_cores().back();
+  const int core = core_of(options.real_time);
   static_cast<void>(pin_to_core(core));  // where it may not, times are less even
   const SegmentPlan segment = plan_segment(segment_spec(scene, canonical_json(scene), 0));
   check_memory(scene, servo.costs(), 0);

@@ -7,8 +7,9 @@
 
 namespace kerf {
 
-/// Absolute deadlines on CLOCK_MONOTONIC: lateness never adds up. A deadline that has passed when
-/// its turn comes is skipped and counted, never caught up in a burst.
+/// Absolute deadlines on CLOCK_MONOTONIC: lateness never adds up. A deadline that is late by a
+/// whole period or more is skipped and counted, never caught up in a burst; one that is late by
+/// less is served late.
 class DeadlineClock {
  public:
   /// `spin_ns` of each period are spent spinning before the deadline, which removes the timer's

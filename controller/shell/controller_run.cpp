@@ -246,7 +246,7 @@ int run_controller(const ControllerOptions& options) {
   std::unique_ptr<PacketPort> port;
   try {
     const Hello ours{scene.device.personality, options.virtual_time, scene.servo.rate_hz};
-    port = open_port(port_text, ours, kPortPatienceMs, stop);
+    port = open_port(port_text, ours, kPortPatienceMs, stop, io_thread_of(options.real_time));
   } catch (const std::runtime_error&) {
     if (stop) return 1;  // asked to end before there was a device: nothing to tell
     throw;

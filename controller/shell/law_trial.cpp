@@ -144,7 +144,12 @@ std::string fault_of(const LawJob& job, const LawProgress& progress, LawFlaw fla
       way_out = "give every loop a bound that does not depend on the input";
       break;
     case LawFlaw::ends_program: {
-      const int signal = WIFSIGNALED(status) ? WTERMSIG(status) : 0;
+      if (!WIFSIGNALED(status)) {
+        what = format("ended the program with exit code %d", WEXITSTATUS(status));
+        way_out = "a step ends nothing but itself";
+        break;
+      }
+      const int signal = WTERMSIG(status);
       what = format("ended the program by signal %d", signal);
       way_out = signal == SIGABRT ? "a step throws nothing" : "look at the memory that it writes";
       break;

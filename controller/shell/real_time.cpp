@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "controller/shell/real_time.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <system_error>
@@ -30,6 +31,11 @@ std::vector<MissingRight> lock_memory() {
 
 int core_of(const RealTimeOptions& options) {
   return options.cpu >= 0 ? options.cpu : allowed_cores().back();
+}
+
+IoThread io_thread_of(const RealTimeOptions& options) {
+  constexpr int kHighestPriority = 99;
+  return {.core = core_of(options), .priority = std::min(options.priority + 1, kHighestPriority)};
 }
 
 std::vector<MissingRight> become_real_time(const RealTimeOptions& options) {

@@ -5,6 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "controller/device/port/io_thread.hpp"
+
 namespace kerf {
 
 /// What the servo thread asks of the system.
@@ -17,6 +19,9 @@ struct RealTimeOptions {
 
 /// The core that the servo thread takes.
 [[nodiscard]] int core_of(const RealTimeOptions& options);
+
+/// That core, and a priority above the servo's, for what must not wait for it.
+[[nodiscard]] IoThread io_thread_of(const RealTimeOptions& options);
 
 /// A right that the system did not give, and what that costs.
 struct MissingRight {

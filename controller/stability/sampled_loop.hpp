@@ -14,9 +14,10 @@ struct SampledHand {
 /// One axis of a haptic device in contact with a virtual wall: a mass that feels, once per period,
 /// the force F = -K x - B v of the tick before, held until the next one.
 ///
-/// Linear but for `coulomb_n` and `quantum_mm`, which only the bounds of passive_limits.hpp use. No
-/// structural mode: a bound of this model says nothing above the device's first resonance.
-/// Mass and period are positive, the rest is not negative; whoever reads a file has checked that.
+/// Linear but for `coulomb_n` and `quantum_mm`: stable_gains.hpp leaves both out,
+/// passive_limits.hpp and one_axis.hpp count them. No structural mode: a bound of this model says
+/// nothing above the device's first resonance. Mass and period are positive, the rest is not
+/// negative; whoever reads a file has checked that.
 struct SampledLoop {
   double mass_kg = 0.045;      ///< apparent, at the tip
   double viscous_ns_per_mm{};  ///< damping of the device itself, b

@@ -8,8 +8,9 @@
 
 namespace kerf {
 
-/// So many passes move the edge of a scan, where its radius is 6 voxels, by at most 0.017 voxels;
-/// the limit is 0.02, which a fourth would take up (docs/theory.md 2.4).
+/// So many passes move the face of a scanned ball of 6 voxels by at most 0.017 voxels, and an edge
+/// of that radius by half as much; the limit is 0.02, which a fourth would take up
+/// (docs/theory.md 2.4).
 inline constexpr int kMostPasses = 3;
 
 /// How far a pass reaches.

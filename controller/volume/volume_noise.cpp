@@ -17,9 +17,9 @@ constexpr double kMedian = 0.67448975019608171;             // of |x|, x normal 
 constexpr std::size_t kMostLeft = std::size_t{32} * 65535;  // half of the magnitudes are positive
 
 /// How often each value occurs, and which one is in the middle.
-class Histogram {
+class ValueCounts {
  public:
-  explicit Histogram(std::size_t values) : counts_(values) {}
+  explicit ValueCounts(std::size_t values) : counts_(values) {}
 
   void add(std::size_t value) {
     ++counts_[value];
@@ -77,8 +77,8 @@ class Columns {
 };
 
 /// What the second differences leave at the voxels that count.
-Histogram left_in(const VoxelGrid& grid, std::span<const Density> density, Density iso) {
-  Histogram left(kMostLeft + 1);
+ValueCounts left_in(const VoxelGrid& grid, std::span<const Density> density, Density iso) {
+  ValueCounts left(kMostLeft + 1);
   const auto nx = static_cast<std::size_t>(grid.nx);
   Columns columns(nx);
   for (std::int32_t z = 1; z + 1 < grid.nz; ++z) {
@@ -98,7 +98,7 @@ Histogram left_in(const VoxelGrid& grid, std::span<const Density> density, Densi
 
 /// The median of what is softer than the iso.
 std::size_t air_of(std::span<const Density> density, Density iso) {
-  Histogram soft(65536);
+  ValueCounts soft(65536);
   for (const Density d : density) {
     if (d < iso) soft.add(d);
   }
@@ -134,7 +134,7 @@ bool is_label_map(const VoxelGrid& grid, std::span<const Density> density) {
 
 Noise noise_of(const VoxelGrid& grid, std::span<const Density> density, Density iso) {
   if (levels_of(density) < kLeastLevels) return {};
-  const Histogram left = left_in(grid, density, iso);
+  const ValueCounts left = left_in(grid, density, iso);
   if (left.total() < kLeastNoisy) return {};
   const double deviation = static_cast<double>(left.median()) / (kMedian * kGain);
   const double step = 2.0 * (iso - static_cast<double>(air_of(density, iso)));

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "shared/numeric/fnv1a.hpp"
+
 namespace kerf {
 namespace {
 
@@ -22,9 +24,9 @@ void Emulator::guide_hand() noexcept {
   if (calibration == Calibration::done && !calibrated_at_) calibrated_at_ = stats_.cycles;
   const bool settled = calibrated_at_ && stats_.cycles - *calibrated_at_ >= kSettleCycles;
   if (!host_since_ && stats_.commands + stats_.reports > 0) host_since_ = stats_.cycles;
-  const bool in_vain = calibration != Calibration::needs_hand && host_since_ &&
-                       stats_.cycles - *host_since_ >= kPatienceCycles;
-  if (settled || in_vain) hand_->leave();
+  const bool waited_enough = calibration != Calibration::needs_hand && host_since_ &&
+                             stats_.cycles - *host_since_ >= kPatienceCycles;
+  if (settled || waited_enough) hand_->leave();
 }
 
 void Emulator::wish(const HandWish& wish) noexcept {
@@ -63,7 +65,7 @@ std::span<const std::uint8_t> Emulator::next_packet() noexcept {
   if (packet.empty()) return {};
   ++stats_.reports;
   for (const std::uint8_t byte : packet) {
-    stats_.report_hash = (stats_.report_hash ^ byte) * 0x0000'0100'0000'01B3;
+    stats_.report_hash = fnv1a_step(stats_.report_hash, byte);
   }
   return packet;
 }

@@ -14,6 +14,7 @@
 #include "hil/devmodel/led_hand.hpp"
 #include "hil/devmodel/omni_model.hpp"
 #include "hil/devmodel/packet_device.hpp"
+#include "shared/numeric/fnv1a.hpp"
 
 namespace kerf {
 
@@ -24,8 +25,8 @@ struct EmulatorStats {
   std::uint64_t commands = 0;
   std::uint64_t refused = 0;  ///< packets that were no commands
   double peak_motor_force_n = 0;
-  std::optional<std::int64_t> undocked_at;            ///< bus cycle in which the arm left its rest
-  std::uint64_t report_hash = 0xCBF2'9CE4'8422'2325;  ///< FNV-1a of all handed-out bytes
+  std::optional<std::int64_t> undocked_at;  ///< bus cycle in which the arm left its rest
+  std::uint64_t report_hash = kFnv1aBasis;  ///< FNV-1a of all handed-out bytes
 };
 
 /// A device and its hand behind packets: no clock, no socket, so a front in real time, one in

@@ -16,7 +16,8 @@ namespace kerf {
 ///
 /// Joints from the tip: this is E cos t + F sin t + G = 0, solved by the half angle (Williams, "The
 /// delta parallel robot", 2016). Rates and forces: its total differential, so no matrix is ever
-/// inverted. The tip from joints is an iteration that only tests need. Any thread, no state.
+/// inverted. The tip from joints is an iteration, for the rest pose of a new model. Any thread, no
+/// state.
 ///
 /// The real end stops are unknown: a ball of falcon::kReachMm around the origin stands for them.
 /// Inside it all legs reach the grip with a bent knee; outside, the nearest angle is given.

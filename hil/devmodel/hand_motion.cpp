@@ -53,6 +53,7 @@ void HandMotion::leave() noexcept {
 
 void HandMotion::rest() noexcept {
   phase_ = Phase::resting;
+  leg_ = 0;
   cycle_ = 0;
   from_mm_ = rest_mm_;
   from_orientation_rad_ = {};

@@ -13,9 +13,6 @@ namespace kerf::accuracy {
 
 using Point = WorldVec<double>;  ///< mm
 
-[[nodiscard]] inline Point cross(Point a, Point b) {
-  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
-}
 /// Of length 1; `v` is not zero.
 [[nodiscard]] inline Point unit(Point v) {
   return v * (1 / norm(v));

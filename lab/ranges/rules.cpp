@@ -8,26 +8,19 @@
 #include <utility>
 
 #include "controller/plan/plan_device.hpp"
+#include "shared/numeric/vec3.hpp"
 #include "shared/text/format.hpp"
 
 namespace kerf::ranges {
 namespace {
 
-double dot(const std::array<double, 3>& a, const std::array<double, 3>& b) {
-  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-std::array<double, 3> minus(const std::array<double, 3>& a, const std::array<double, 3>& b) {
-  return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
-}
-double length(const std::array<double, 3>& v) {
-  return std::sqrt(dot(v, v));
-}
+using vec3::dot, vec3::length, vec3::operator-, vec3::operator*;
 
 /// From `f` to the nearest force between 0 and `last`.
 double beyond_fall(const std::array<double, 3>& f, const std::array<double, 3>& last) {
   const double whole = dot(last, last);
   const double share = whole > 0 ? std::clamp(dot(f, last) / whole, 0.0, 1.0) : 0.0;
-  return length(minus(f, {last[0] * share, last[1] * share, last[2] * share}));
+  return length(f - share * last);
 }
 
 /// The first output that is no number; null: all are.
@@ -102,7 +95,7 @@ void Rules::look_at_force(const ServoOutput& out, bool leaves) {
       (out.phase == Phase::ramping || out.phase == Phase::active) && out.fault == Fault::none;
   if (!may) broken("off", "motors on in phase " + std::to_string(static_cast<int>(out.phase)));
   const double step_n = leaves || most >= motor_end_ ? beyond_fall(out.force_n, last_force_n_)
-                                                     : length(minus(out.force_n, last_force_n_));
+                                                     : length(out.force_n - last_force_n_);
   if (!(step_n <= slew_n_ + kRounding))
     broken("slew", format("%.9g N in a tick, above %.9g", step_n, slew_n_));
 }
@@ -123,7 +116,7 @@ void Rules::look_at(const DeviceReport& report, const ServoOutput& out) {
   if (const char* output = not_finite(out)) {
     broken("finite", std::string(output) + " is no number");
   }
-  const Vector moved_mm = known_ ? minus(out.position_mm, last_mm_) : Vector{};
+  const Vector moved_mm = known_ ? out.position_mm - last_mm_ : Vector{};
   ++gap_;
   largest_gap_n_ = std::max(largest_gap_n_, length(last_force_n_));
   // Below the rounding of the places that are told nobody here knows which way the hand went.

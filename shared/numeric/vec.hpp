@@ -53,7 +53,8 @@ template <class S, class Space>
 [[nodiscard]] constexpr Vec<S, Space> cross(Vec<S, Space> a, Vec<S, Space> b) noexcept {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
-/// One rounding for the three products: |a_i b_i| < 2^60 is enough room.
+/// Products of any two numbers fit: each is halved, the sum once more, all towards 0, two bits
+/// below the last one that is kept; then it is rounded once.
 template <int F, class Space>
 [[nodiscard]] constexpr Fixed<F> dot(Vec<Fixed<F>, Space> a, Vec<Fixed<F>, Space> b) noexcept {
   const std::int64_t sum = saturating_add(saturating_add(std::int64_t{a.x.raw()} * b.x.raw() / 2,

@@ -31,8 +31,8 @@ inline void copy_row(Density* to, const Density* from, std::size_t voxels) noexc
   }
 }
 
-/// How a volume is cut into bricks of 8^3 voxels: id = (bz * by_count + by) * bx_count + bx, voxels
-/// x fastest inside a brick, zeros beyond the far faces. Pure arithmetic; any thread.
+/// How a volume is cut into bricks of 8^3 voxels: brick (x, y, z) has the id (z by + y) bx + x,
+/// voxels x fastest inside a brick, zeros beyond the far faces. Pure arithmetic; any thread.
 struct BrickGrid {
   VoxelGrid grid;
   std::int32_t bx = 0, by = 0, bz = 0;  ///< bricks per axis

@@ -129,7 +129,7 @@ struct TickRecord {
   std::int16_t dac_counts[3];
   std::uint16_t phase;    ///< of the servo's safety
   std::uint32_t removed;  ///< density units taken away in this tick; in an undo: given back
-  double port_energy_j;   ///< work that the loop took from the hand since it armed
+  double port_energy_j;   ///< work that the loop took from the hand since the start of the run
   double port_minimum_j;  ///< its lowest value so far: below 0 the loop gave more than it took
   float joint_torque_n_mm[3];
   std::uint32_t refused_packets;  ///< since the start
@@ -168,7 +168,8 @@ struct TickRecord {
 inline constexpr std::uint32_t kFlagButton1 = 1U << 0;
 inline constexpr std::uint32_t kFlagButton2 = 1U << 1;
 inline constexpr std::uint32_t kFlagContact = 1U << 2;
-inline constexpr std::uint32_t kFlagClamped = 1U << 4;  ///< force or slew limit was active
+inline constexpr std::uint32_t kFlagClamped = 1U
+                                              << 4;  ///< a limit acted: force, slew, heat, motors
 inline constexpr std::uint32_t kFlagStaleInput = 1U << 5;
 inline constexpr std::uint32_t kFlagDeviceFault = 1U << 6;
 inline constexpr std::uint32_t kFlagMotorsOn = 1U << 7;

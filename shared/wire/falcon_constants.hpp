@@ -13,9 +13,11 @@
 /// axis, v across, w = towards the user), with p the grip counted from the hips' plane:
 ///
 ///     (u, v, w) = Rz(-azimuth) p - (r, s, 0)
-///     knee  = a (cos t1, sin t1) in the plane of u and w: t1 is the joint that is measured and
-///     driven shin  = from the knee over d + e + b sin t3 in that plane to (u + c, w), with cos t3
-///     = (v + f) / b
+///     knee  = a (cos t1, sin t1) in the plane of u and w
+///     shin  = from the knee over d + e + b sin t3 in that plane to (u + c, w)
+///     cos t3 = (v + f) / b
+///
+/// t1 is the joint that is measured and driven.
 ///
 /// Source: the open driver libnifalcon, which measured one device. Its count of zero is "about" 35
 /// degrees, so the angle of zero differs between units.

@@ -109,6 +109,24 @@ TEST_CASE("the unit scales every length of the script and none of the way out") 
   CHECK(distance(after(motion, kSecond).target_mm, {0, -3, 0}) < 1e-9);
 }
 
+TEST_CASE("a hand that rests again after its script has ended can calibrate and leave anew") {
+  kerf::HandRoute route = from_dock();
+  route.calibration = {kerf::hand_move(kDock + DeviceVec<double>{0, 5, 0}, 0.1),
+                       kerf::hand_move(kDock, 0.1)};
+  HandMotion motion(kerf::parse_hand_script("start_mm = [1, 4, 2]\n[[step]]\nhold = 1", "test"),
+                    route);
+  motion.leave();
+  static_cast<void>(after(motion, 3 * kSecond));
+  REQUIRE(motion.ended());
+  motion.rest();
+  motion.calibrate();
+  CHECK(distance(after(motion, kSecond / 10).target_mm, kDock + DeviceVec<double>{0, 5, 0}) < 1e-9);
+  CHECK(distance(after(motion, kSecond / 10).target_mm, kDock) < 1e-9);
+  motion.leave();
+  static_cast<void>(after(motion, 3 * kSecond));
+  CHECK(motion.ended());
+}
+
 TEST_CASE("the repeated block comes again to the cycle, and the orientation is kept") {
   auto motion = motion_of(
       "[[step]]\nmove_mm = [0, 3, 0]\nseconds = 0.5\norientation_deg = [0, 30, 0]\n"

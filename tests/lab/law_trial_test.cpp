@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cmath>
+#include <cstdlib>
 #include <limits>
 #include <sstream>
 #include <stdexcept>
@@ -30,7 +31,7 @@ void raise_error() {
 }
 
 /// Which of its sins a law commits in double.
-enum class Sin { none, no_number, allocates, loops, throws };
+enum class Sin { none, no_number, allocates, loops, throws, exits };
 
 template <class N, Sin kSin>
 struct Sinner {
@@ -46,6 +47,7 @@ struct Sinner {
     if (kSin == Sin::allocates) g_kept = new std::vector<double>(3);
     while (kSin == Sin::loops && g_for_ever) continue;
     if (kSin == Sin::throws) raise_error();
+    if (kSin == Sin::exits) std::_Exit(3);
     return in.spring_mm;
   }
   double gain;
@@ -75,11 +77,17 @@ struct Thrower : Sinner<N, Sin::throws> {
   static constexpr const char* kName = "thrower";
   using Sinner<N, Sin::throws>::Sinner;
 };
+template <class N>
+struct Leaver : Sinner<N, Sin::exits> {
+  static constexpr const char* kName = "leaver";
+  using Sinner<N, Sin::exits>::Sinner;
+};
 KERF_REGISTER_FORCE_LAW(Fine)
 KERF_REGISTER_FORCE_LAW(Rooter)
 KERF_REGISTER_FORCE_LAW(Hoarder)
 KERF_REGISTER_FORCE_LAW(Looper)
 KERF_REGISTER_FORCE_LAW(Thrower)
+KERF_REGISTER_FORCE_LAW(Leaver)
 
 /// Of the trial in double, after fixed and float, which are fine.
 std::string fault_of(const char* law) {
@@ -119,6 +127,10 @@ TEST_CASE("a law that loops for ever ends in its trial") {
 
 TEST_CASE("a law that throws ends its own process alone") {
   CHECK(fault_of("thrower").find("ended the program by signal 6 with its defaults at ") == 0);
+}
+
+TEST_CASE("a law that ends the program is told so") {
+  CHECK(fault_of("leaver").find("ended the program with exit code 3 with its defaults at ") == 0);
 }
 
 #ifndef KERF_SANITIZED

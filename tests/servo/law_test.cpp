@@ -237,6 +237,19 @@ TEST_CASE("whatever a stabiliser gives, peak, slope and budget of the motors hol
   }
 }
 
+TEST_CASE("a limit that acted is told, and what a stabiliser did is none") {
+  for (const NumericKind numeric : kEveryNumber) {
+    const auto settled = [&](double push_n) {
+      ArmedServo armed(with_stabiliser(numeric, push_n, 0));
+      return armed.settled(0, 5, 0);  // in the air
+    };
+    const ServoOutput within = settled(0.05), beyond = settled(5);
+    CHECK(length(within.force_n) == doctest::Approx(0.05).epsilon(1e-3));
+    CHECK_FALSE(within.clamped);
+    CHECK(beyond.clamped);
+  }
+}
+
 TEST_CASE("a stabiliser sees the motion over a gap, and nothing while reports are missing") {
   LoadedScene scene = with_stabiliser(NumericKind::fixed, 0, 0);
   ArmedServo armed(scene);

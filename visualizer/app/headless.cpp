@@ -97,6 +97,14 @@ void tell(const VisualizerOptions& options, const FrameSchedule& schedule,
   std::printf("%.1f cpu ms each (%s)\n", percentile(cpu_ms, 0.5), report.gl_renderer.c_str());
 }
 
+/// A frame of a film begins when the tick that it waits for is out, not up to a pause later: its
+/// delay counts as latency.
+std::chrono::duration<double> pause_before_frame(const Film& film, const Session& session) {
+  const std::chrono::duration<double> due(film.due_in_s(session.servo_s()) -
+                                          session.record_age_s());
+  return std::clamp<std::chrono::duration<double>>(due, kShort, kIdle);
+}
+
 }  // namespace
 
 int run_headless(const VisualizerOptions& options) {
@@ -157,15 +165,7 @@ int run_headless(const VisualizerOptions& options) {
     }
     if (over) continue;
     if (lead) lead->allow(next_tick(session, schedule, film));
-    std::chrono::duration<double> pause = kIdle;
-    if (film && ticks) {
-      // A frame begins when the tick that it waits for is out, not up to a pause later: its delay
-      // counts as latency.
-      const std::chrono::duration<double> due(film->due_in_s(session.servo_s()) -
-                                              session.record_age_s());
-      pause = std::clamp<std::chrono::duration<double>>(due, kShort, kIdle);
-    }
-    std::this_thread::sleep_for(pause);
+    std::this_thread::sleep_for(film && ticks ? pause_before_frame(*film, session) : kIdle);
   }
 
   if (options.mesh) export_surface(*options.mesh, session.scene(), session.contents());

@@ -32,7 +32,9 @@ class VideoFile {
  public:
   static constexpr int kPatienceMs = 2000;
 
-  /// Replaces a file that is there.
+  /// Replaces a file that is there; a link is refused. The process ignores SIGPIPE from now on.
+  /// With
+  /// "-" its standard output is the video's, and what else is written there goes to standard error.
   VideoFile(std::string path, PictureSize size, int frames_per_s);
 
   /// `yuv` as from `fill_yuv420`.

@@ -7,6 +7,7 @@
 #include <thread>
 #include <utility>
 
+#include "shared/posix/cores.hpp"
 #include "shared/posix/helper_thread.hpp"
 #include "shared/volume/voxel_loops.hpp"
 #include "visualizer/surface/vertex_look.hpp"
@@ -37,7 +38,7 @@ void for_each_in_parallel(std::int32_t count, const Work& work) {
   const auto take = [&] {
     for (std::int32_t i = next++; i < count; i = next++) work(i);
   };
-  std::vector<std::jthread> helpers(std::max(1U, std::thread::hardware_concurrency()) - 1);
+  std::vector<std::jthread> helpers(allowed_cores().size() - 1);
   for (std::jthread& helper : helpers) helper = helper_thread(take);
   take();
 }

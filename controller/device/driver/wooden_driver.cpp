@@ -33,7 +33,7 @@ WoodenDriver::Counts WoodenDriver::turned(const Counts& counts) const noexcept {
 bool WoodenDriver::take(std::span<const std::uint8_t> packet, DeviceReport& report) noexcept {
   const auto said = wooden::decode_report(packet);
   if (!said) return false;
-  packet_bytes_ = packet.size();
+  packet_bytes_.store(packet.size(), std::memory_order_relaxed);
   button_ = said->calibrate;
   counts_ = said->encoder;
   joints_ = turned({counts_[0], counts_[1], counts_[2]});
@@ -65,12 +65,12 @@ std::size_t WoodenDriver::compose(const ServoOutput& output, Packet& packet) noe
     }
   }
   std::ranges::copy(encode(command), packet.begin());
-  return packet_bytes_;
+  return packet_bytes_.load(std::memory_order_relaxed);
 }
 
 std::size_t WoodenDriver::compose_release(Packet& packet) const noexcept {
   std::ranges::copy(encode(WoodenCommand{}), packet.begin());
-  return packet_bytes_;
+  return packet_bytes_.load(std::memory_order_relaxed);
 }
 
 }  // namespace kerf

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
 
@@ -36,10 +37,11 @@ class WoodenDriver final : public DeviceDriver {
   [[nodiscard]] Counts turned(const Counts& counts) const noexcept;
 
   std::array<int, 3> sign_;
-  std::size_t packet_bytes_ = wooden::kPacketBytes;  ///< then as long as the device's own
-  bool button_ = false;                              ///< of the newest report
-  std::array<std::int16_t, 6> counts_{};             ///< as they came
-  Counts joints_{};                                  ///< of a, b, c in the joints' sense
+  /// Then as long as the device's own. The watchdog and signal handlers read it.
+  std::atomic<std::size_t> packet_bytes_{wooden::kPacketBytes};
+  bool button_ = false;                   ///< of the newest report
+  std::array<std::int16_t, 6> counts_{};  ///< as they came
+  Counts joints_{};                       ///< of a, b, c in the joints' sense
   bool set_sent_ = false;  ///< encoders were set to home since the button was pressed
   bool homed_ = false;
   bool at_home_ = false;  ///< has not left the pose since

@@ -17,7 +17,6 @@
 #include <unistd.h>
 
 #include "controller/device/port/packet_port.hpp"
-#include "shared/posix/cores.hpp"
 #include "shared/posix/failure.hpp"
 #include "shared/posix/stop_signals.hpp"
 #include "shared/wire/wooden_constants.hpp"
@@ -25,8 +24,7 @@
 namespace kerf {
 namespace {
 
-constexpr int kPriority = 81;  // above the servo on its core: the hand comes first
-constexpr int kReadMs = 20;    // then the end is looked for
+constexpr int kReadMs = 20;  // then the end is looked for
 constexpr int kLastPacketMs = 20;
 constexpr SoughtDevice kSought{.name = "WoodenHaptics arm (1234:0006 or 16c0:0486)",
                                .port = "hid",
@@ -94,12 +92,6 @@ std::optional<std::size_t> identify(const std::string& where, const std::string&
   return bytes;
 }
 
-/// Without the right to either, packets come and leave later; the servo's own start tells the user.
-void hurry() noexcept {
-  static_cast<void>(pin_to_core(allowed_cores().back()));
-  static_cast<void>(set_fifo(kPriority));
-}
-
 }  // namespace
 
 std::string parse_hid_port(std::string_view text) {
@@ -110,7 +102,9 @@ std::string parse_hid_port(std::string_view text) {
   return std::string(text);
 }
 
-HidPort::HidPort(const std::string& where, int patience_ms, const std::atomic<bool>& stop) {
+HidPort::HidPort(const std::string& where, int patience_ms, const std::atomic<bool>& stop,
+                 IoThread io)
+    : io_(io) {
   if (hid_init() != 0) refuse(where, "hidapi cannot start; is /dev there?");
   const auto give_up = std::chrono::steady_clock::now() + std::chrono::milliseconds(patience_ms);
   while (!open(where)) {
@@ -176,7 +170,7 @@ bool HidPort::send_last(std::span<const std::uint8_t> packet) noexcept {
 
 void HidPort::read_reports() noexcept {
   leave_signals_to_others();  // a call that one cut short would look like a device that is gone
-  hurry();
+  become(io_);
   std::array<std::uint8_t, MailboxPacket::kMaxBytes> report{};
   while (!stop_ && !closed()) {
     const int size = hid_read_timeout(device_, report.data(), report.size(), kReadMs);
@@ -189,7 +183,7 @@ void HidPort::read_reports() noexcept {
 void HidPort::write_commands() noexcept {
   leave_signals_to_others();
   writer_id_ = gettid();
-  hurry();
+  become(io_);
   while (!stop_ || !outbox_.empty()) {
     while (sem_wait(&raised_) != 0) {
     }

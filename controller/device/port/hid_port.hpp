@@ -13,6 +13,7 @@
 #include <semaphore.h>
 
 #include "controller/device/port/io_mailbox.hpp"
+#include "controller/device/port/io_thread.hpp"
 #include "controller/device/port/packet_port.hpp"
 
 struct hid_device_;
@@ -31,7 +32,8 @@ class HidPort final : public PacketPort {
  public:
   /// `where`: a node (/dev/hidraw0), a serial number, or empty for the only arm. Tries for
   /// `patience_ms` while none is there, or until `stop`. Throws std::runtime_error with one line.
-  HidPort(const std::string& where, int patience_ms, const std::atomic<bool>& stop);
+  HidPort(const std::string& where, int patience_ms, const std::atomic<bool>& stop,
+          IoThread io = {});
   ~HidPort() override;
   HidPort(const HidPort&) = delete;
   HidPort& operator=(const HidPort&) = delete;
@@ -55,6 +57,7 @@ class HidPort final : public PacketPort {
   void read_reports() noexcept;
   void write_commands() noexcept;
 
+  IoThread io_;  ///< of both threads
   hid_device_* device_ = nullptr;
   std::size_t packet_bytes_ = 0;     ///< of this firmware; shorter packets are filled up
   std::atomic<bool> closed_{false};  ///< written by whoever meets the end first

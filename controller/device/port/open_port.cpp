@@ -31,6 +31,7 @@ struct Request {
   const Hello& ours;
   int patience_ms = 0;
   const std::atomic<bool>& stop;
+  IoThread io;
 };
 
 /// What follows the name of a bus; nothing for another port.
@@ -53,7 +54,7 @@ std::unique_ptr<PacketPort> firewire(std::string_view rest, const Request* reque
 std::unique_ptr<PacketPort> usb(std::string_view rest, const Request* request) {
   const UsbOptions options = parse_usb_port(rest);
   if (!request) return nullptr;
-  return std::make_unique<UsbPort>(options, request->patience_ms, request->stop);
+  return std::make_unique<UsbPort>(options, request->patience_ms, request->stop, request->io);
 }
 #else
 std::unique_ptr<PacketPort> usb(std::string_view, const Request*) {
@@ -66,7 +67,7 @@ std::unique_ptr<PacketPort> usb(std::string_view, const Request*) {
 std::unique_ptr<PacketPort> hid(std::string_view rest, const Request* request) {
   const std::string where = parse_hid_port(rest);
   if (!request) return nullptr;
-  return std::make_unique<HidPort>(where, request->patience_ms, request->stop);
+  return std::make_unique<HidPort>(where, request->patience_ms, request->stop, request->io);
 }
 #else
 std::unique_ptr<PacketPort> hid(std::string_view, const Request*) {
@@ -120,8 +121,8 @@ std::string resolve_port(const std::string& text, Personality personality) {
 }
 
 std::unique_ptr<PacketPort> open_port(const std::string& text, const Hello& ours, int patience_ms,
-                                      const std::atomic<bool>& stop) {
-  const Request request{ours, patience_ms, stop};
+                                      const std::atomic<bool>& stop, IoThread io) {
+  const Request request{ours, patience_ms, stop, io};
   return port(text, &request);
 }
 

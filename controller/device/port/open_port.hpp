@@ -5,6 +5,7 @@
 #include <memory>
 #include <string>
 
+#include "controller/device/port/io_thread.hpp"
 #include "controller/device/port/packet_port.hpp"
 #include "shared/wire/hello.hpp"
 #include "shared/wire/personality.hpp"
@@ -28,9 +29,11 @@ void check_port(const std::string& text);
 /// What stands for `auto` with this device; any other text as it is. Throws for another one's bus.
 [[nodiscard]] std::string resolve_port(const std::string& text, Personality personality);
 
-/// A resolved one. Tries for `patience_ms` while no device is there, or until `stop`; an emulator
-/// is then asked whether it fits `ours`, for as long again.
+/// A resolved one; `io`: of those with threads of their own. Tries for `patience_ms` while no
+/// device is there, or until `stop`; an emulator is then asked whether it fits `ours`, for as long
+/// again.
 [[nodiscard]] std::unique_ptr<PacketPort> open_port(const std::string& text, const Hello& ours,
-                                                    int patience_ms, const std::atomic<bool>& stop);
+                                                    int patience_ms, const std::atomic<bool>& stop,
+                                                    IoThread io = {});
 
 }  // namespace kerf

@@ -11,7 +11,6 @@
 #include <unistd.h>
 
 #include "controller/device/port/packet_port.hpp"
-#include "shared/posix/cores.hpp"
 #include "shared/posix/monotonic_clock.hpp"
 #include "shared/posix/stop_signals.hpp"
 
@@ -19,7 +18,6 @@ namespace kerf {
 namespace {
 
 // Above the servo on its core: a packet comes first, and costs some microseconds.
-constexpr int kPriority = 81;
 constexpr std::int64_t kLookNs = 50'000;
 constexpr std::int64_t kReplyNs = 2'000'000;   // after that the servo has nothing to say
 constexpr std::int64_t kEventsNs = 2'000'000;  // a chip that is well ends a transfer each ms
@@ -31,7 +29,9 @@ constexpr SoughtDevice kSought{
 
 }  // namespace
 
-UsbPort::UsbPort(const UsbOptions& options, int patience_ms, const std::atomic<bool>& stop) {
+UsbPort::UsbPort(const UsbOptions& options, int patience_ms, const std::atomic<bool>& stop,
+                 IoThread io)
+    : io_(io) {
   std::vector<std::uint8_t> firmware;
   const auto give_up = std::chrono::steady_clock::now() + std::chrono::milliseconds(patience_ms);
   try {
@@ -105,9 +105,7 @@ std::vector<LinkCounter> UsbPort::counters() const {
 void UsbPort::run() noexcept {
   leave_signals_to_others();
   thread_id_ = gettid();
-  // Without the right to either, packets come later; the servo's own start tells the user.
-  static_cast<void>(pin_to_core(allowed_cores().back()));
-  static_cast<void>(set_fifo(kPriority));
+  become(io_);
   for (Transfer& read : reads_) submit(read);
   while (!closed() && !stop_) {
     send_waiting();

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "controller/device/port/io_mailbox.hpp"
+#include "controller/device/port/io_thread.hpp"
 #include "controller/device/port/packet_port.hpp"
 #include "controller/device/port/turns.hpp"
 #include "controller/device/port/usb_falcon.hpp"
@@ -48,7 +49,8 @@ class UsbPort final : public PacketPort {
  public:
   /// Finds the device, claims it, starts its firmware. Tries for `patience_ms` while none is there,
   /// or until `stop`. Throws std::runtime_error with one line.
-  UsbPort(const UsbOptions& options, int patience_ms, const std::atomic<bool>& stop);
+  UsbPort(const UsbOptions& options, int patience_ms, const std::atomic<bool>& stop,
+          IoThread io = {});
   ~UsbPort() override;
   UsbPort(const UsbPort&) = delete;
   UsbPort& operator=(const UsbPort&) = delete;
@@ -109,6 +111,7 @@ class UsbPort final : public PacketPort {
   Turns turns_;
   std::int64_t reply_due_ns_ = 0;  ///< until then the servo's answer to a packet is looked for
   int failures_in_a_row_ = 0;
+  IoThread io_;
   std::thread thread_;
 };
 

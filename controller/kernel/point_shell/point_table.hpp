@@ -102,7 +102,7 @@ template <class N>
 struct PointSums {
   typename N::Sum weight{};          ///< SUM w
   typename N::Sum density{};         ///< SUM w r
-  typename N::Sum square{};          ///< SUM w r^2, r^2 in Q16; 0 for balls
+  typename N::Sum square{};          ///< SUM w r^2, r^2 in Q16
   typename N::Sum gradient[3] = {};  ///< SUM w_g grad, voxel axes
   typename N::Sum offset[3] = {};    ///< SUM w_x offset
   typename N::Sum high{};            ///< SUM w r^2, which weights `high_offset`; 0 for balls

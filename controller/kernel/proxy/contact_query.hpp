@@ -61,7 +61,7 @@ class ContactQuery {
   void begin_tick() noexcept {
     reader_.set_left(work_.budget());
     nearest_ = 0;
-    in_vain_ = 0;
+    wasted_ = 0;
   }
   [[nodiscard]] const QueryWork& work() const noexcept { return work_; }
   /// See ContactField.
@@ -71,8 +71,8 @@ class ContactQuery {
   [[nodiscard]] std::int64_t left() const noexcept { return reader_.left(); }
   void set_left(std::int64_t left) noexcept { reader_.set_left(left); }
   /// Work of the tick for free ways that led nowhere; the same account.
-  [[nodiscard]] std::int64_t in_vain() const noexcept { return in_vain_; }
-  void set_in_vain(std::int64_t in_vain) noexcept { in_vain_ = in_vain; }
+  [[nodiscard]] std::int64_t wasted() const noexcept { return wasted_; }
+  void set_wasted(std::int64_t wasted) noexcept { wasted_ = wasted; }
   /// Work since `begin_tick`, in the samples of `work`.
   [[nodiscard]] std::int64_t spent() const noexcept { return work_.budget() - left(); }
 
@@ -106,13 +106,14 @@ class ContactQuery {
 
   /// How far along `move` the centre may go from `q` and feel nothing: a lower bound. The tool goes
   /// as one sphere about its centre, which is all of a ball, and then by the spheres of its groups.
-  /// One more query is left. What groups have looked at in vain is bounded by `QueryWork::in_vain`.
+  /// One more query is left. What groups have looked at in vain is bounded by
+  /// `QueryWork::most_wasted`.
   [[nodiscard]] Real free_distance(ContactVec<Real> q, ContactVec<Real> move) const noexcept {
-    return free_distance(q, move, left() - work_.query - work_.closer, work_.in_vain());
+    return free_distance(q, move, left() - work_.query - work_.closer, work_.most_wasted());
   }
   /// The same by `work` at most, and by groups up to this much in vain.
   [[nodiscard]] Real free_distance(ContactVec<Real> q, ContactVec<Real> move, std::int64_t work,
-                                   std::int64_t most_in_vain) const noexcept {
+                                   std::int64_t most_wasted) const noexcept {
     const Real length = norm(move);
     if (!(length > Real(SweepRules::kStep))) return Real(0);
     const PointTable<N>& table = points_.table;
@@ -132,7 +133,7 @@ class ContactQuery {
                                         Reader::number_of(at.z)};
       const MoveShare<N> most = share;
       share = way.free_up_to(centre, table.needed_whole, 0, most, looks);
-      if (as_one || in_vain_ >= most_in_vain) continue;
+      if (as_one || wasted_ >= most_wasted) continue;
       share = free_share_of_groups(table, volume.places, centre, way, share, most, nearest_, looks);
     }
     Real free{};
@@ -143,7 +144,7 @@ class ContactQuery {
     }
     const std::int64_t looked = QueryWork::kFreeLook * (spare - looks);
     reader_.spend(looked);
-    if (free <= Real(SweepRules::kStep)) in_vain_ += looked;
+    if (free <= Real(SweepRules::kStep)) wasted_ += looked;
     return free;
   }
 
@@ -225,7 +226,7 @@ class ContactQuery {
   QueryWork work_;
   mutable bool turned_ = false;       ///< and not queried since
   mutable std::int32_t nearest_ = 0;  ///< group that stopped the last free way
-  mutable std::int64_t in_vain_ = 0;
+  mutable std::int64_t wasted_ = 0;
 };
 
 }  // namespace kerf

@@ -14,9 +14,8 @@ namespace kerf {
 /// What the sweep asks of tool and volumes.
 ///
 ///   query(q)          what the tool feels with its centre at q
-///   free_distance(q, move)  how far the centre may go from q along a move and feel nothing; at
-///   most
-///                     the move's length, a lower bound, 0 if unknown
+///   free_distance(q, m)  how far the centre may go from q along m and feel nothing: a lower
+///                     bound, at most |m|; 0 if unknown
 ///   turn(t)           sets the orientation of the tool for all queries from now on
 ///   is_solid(q)       the place is in the solid
 ///   half_spent()      half of the tick's work is spent: the rest is the move's
@@ -97,8 +96,8 @@ struct Swept {
   std::int32_t queries = 0;
   bool turned = true;  ///< the tool has the orientation that was asked
   typename N::Real depth{-1};
-  bool buried = false;       ///< nothing to push against: the start rule is needed
-  std::int32_t in_vain = 0;  ///< ticks in a row, this one included, whose work found no step
+  bool buried = false;           ///< nothing to push against: the start rule is needed
+  std::int32_t stuck_ticks = 0;  ///< ticks in a row, this one included, whose work found no step
 };
 
 /// One tick of the proxy (docs/theory.md 4.2, 4.6): it moves from a pose that the solid allows
@@ -126,17 +125,21 @@ class ProxySweep {
 
  public:
   /// `friction`: Coulomb's coefficient, 0 to 1. `turn_step`: turn_step_of(reach), or 0 for a tool
-  /// that does not turn or is round. `in_vain`: what the last tick told, or 0.
+  /// that does not turn or is round. `stuck_ticks`: what the last tick told, or 0.
   constexpr ProxySweep(Field& field, ProxyPose<N>& pose, Unit friction, Unit turn_step,
-                       std::int32_t in_vain = 0) noexcept
-      : field_(field), pose_(pose), friction_(friction), turn_step_(turn_step), in_vain_(in_vain) {}
+                       std::int32_t stuck_ticks = 0) noexcept
+      : field_(field),
+        pose_(pose),
+        friction_(friction),
+        turn_step_(turn_step),
+        stuck_ticks_(stuck_ticks) {}
 
   constexpr Swept<N> tick(const ProxyPose<N>& goal) noexcept {
     here_ = turn_to(goal.turn);
     held_by_ = constraints_of(here_);
     const Slide<N> slide = move_to(goal.centre);
-    return {held_by_,    slide,        queries_, pose_.turn == goal.turn,
-            here_.depth, here_.buried, in_vain_};
+    return {held_by_,    slide,        queries_,    pose_.turn == goal.turn,
+            here_.depth, here_.buried, stuck_ticks_};
   }
 
  private:
@@ -314,15 +317,15 @@ class ProxySweep {
       }
     }
     const bool vain = !kept && onward.length >= enough && !field_.may_query();
-    in_vain_ = vain ? in_vain_ + 1 : 0;
-    if (first_step() < Unit(SweepRules::kFinest)) in_vain_ = 0;
+    stuck_ticks_ = vain ? stuck_ticks_ + 1 : 0;
+    if (first_step() < Unit(SweepRules::kFinest)) stuck_ticks_ = 0;
     return onward.slide;
   }
 
   /// Share of a step that a tick tries first.
   [[nodiscard]] constexpr Unit first_step() const noexcept {
     Unit step(1);
-    for (std::int32_t tick = SweepRules::kSameTries; tick <= in_vain_; ++tick) {
+    for (std::int32_t tick = SweepRules::kSameTries; tick <= stuck_ticks_; ++tick) {
       step = step * Unit(SweepRules::kShrink);
     }
     return step;
@@ -332,7 +335,7 @@ class ProxySweep {
   ProxyPose<N>& pose_;
   Unit friction_;
   Unit turn_step_;
-  std::int32_t in_vain_;
+  std::int32_t stuck_ticks_;
   Contacts<N> here_{};
   ConstraintSet<N> held_by_{};
   std::int32_t queries_ = 0;

@@ -50,7 +50,7 @@ struct QueryWork {
     return std::max(kTickSamples, head > 0 ? std::min(least, fits) : least);
   }
   /// Once so much of it went into free ways that led nowhere, no group looks for one.
-  [[nodiscard]] constexpr std::int64_t in_vain() const noexcept { return budget() / 8; }
+  [[nodiscard]] constexpr std::int64_t most_wasted() const noexcept { return budget() / 8; }
   /// No tick of a sweep reads more: the budget, and one query after the turns, whose last ones may
   /// reach into the move's half. A tool of few samples runs out of queries before.
   [[nodiscard]] constexpr std::int64_t most() const noexcept {

@@ -92,7 +92,7 @@ class ToolQuery {
 
   void begin_tick() noexcept {
     left_ = work_.budget();
-    in_vain_ = 0;
+    wasted_ = 0;
     head_.begin_tick();
     each_behind([](Part& part) { part.query.begin_tick(); });
   }
@@ -140,7 +140,7 @@ class ToolQuery {
     const auto look = [&](ContactQuery<N>& part, ContactVec<Real> at) {
       const std::int64_t work = left_ - work_.query - work_.closer;
       on_account(part, [&](const ContactQuery<N>& query) {
-        free = std::min(free, query.free_distance(at, move, work, work_.in_vain()));
+        free = std::min(free, query.free_distance(at, move, work, work_.most_wasted()));
       });
     };
     look(head_, q);
@@ -159,10 +159,10 @@ class ToolQuery {
   template <class Work>
   void on_account(ContactQuery<N>& part, Work&& work) noexcept {
     part.set_left(left_);
-    part.set_in_vain(in_vain_);
+    part.set_wasted(wasted_);
     work(part);
     left_ = part.left();
-    in_vain_ = part.in_vain();
+    wasted_ = part.wasted();
   }
   template <class Visit>
   void each_behind(Visit visit) noexcept {
@@ -175,9 +175,9 @@ class ToolQuery {
   Part shaft_;
   std::optional<Part> handpiece_;
   QueryWork work_;
-  std::int64_t left_ = 0;     ///< of the tick's samples
-  std::int64_t in_vain_ = 0;  ///< of them for free ways that led nowhere
-  bool turned_ = false;       ///< and not queried since
+  std::int64_t left_ = 0;    ///< of the tick's samples
+  std::int64_t wasted_ = 0;  ///< of them for free ways that led nowhere
+  bool turned_ = false;      ///< and not queried since
 };
 
 }  // namespace kerf

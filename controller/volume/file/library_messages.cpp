@@ -34,7 +34,7 @@ std::string last_line(const std::string& message) {
   const std::size_t object = last.find("): ");  // "ITK ERROR: Class(0x1234): text"
   if (object != std::string::npos) last.erase(0, object + 3);
   const std::size_t biff = last.find("] ");  // "[nrrd] function: text"
-  if (last.front() == '[' && biff != std::string::npos) last.erase(0, biff + 2);
+  if (last.starts_with('[') && biff != std::string::npos) last.erase(0, biff + 2);
   if (last.starts_with("_nrrd") || last.starts_with("nrrd")) {  // "_nrrdReadNrrdParse_type: text"
     const std::size_t step = last.find(": ");
     if (step != std::string::npos) last.erase(0, step + 2);

@@ -14,6 +14,7 @@
 #include "hil/front/firewire/iso_context.hpp"
 #include "hil/front/firewire/iso_resources.hpp"
 #include "hil/front/firewire/omni_registers.hpp"
+#include "shared/numeric/fnv1a.hpp"
 
 namespace kerf {
 
@@ -72,7 +73,7 @@ struct FirewireStats {
   std::uint64_t reports = 0;   ///< packets of the device that reached an open
   std::uint64_t unheard = 0;   ///< packets of the device that no descriptor waited for
   /// FNV-1a over every packet of the host and the cycle in which it went out.
-  std::uint64_t command_hash = 0xCBF2'9CE4'8422'2325;
+  std::uint64_t command_hash = kFnv1aBasis;
 };
 
 /// The bus and the device on it, cycle by cycle: who sends on which channel, generations,
