@@ -5,12 +5,15 @@
 #include <cctype>
 #include <cerrno>
 #include <cstring>
-#include <fstream>
+#include <sstream>
 
+#include <fcntl.h>
 #include <openssl/crypto.h>
 #include <openssl/rand.h>
 #include <openssl/sha.h>
+#include <poll.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include "bridge/net/bridge_error.hpp"
 #include "bridge/net/host_names.hpp"
@@ -33,6 +36,26 @@ Digest digest_of(std::string_view token) noexcept {
   return text.size() >= kFewest && text.size() <= kMost &&
          std::all_of(text.begin(), text.end(),
                      [](unsigned char c) { return std::isalnum(c) != 0 || c == '-' || c == '_'; });
+}
+
+/// The text of a file or a pipe. No pipe is waited for without end.
+std::string text_of(const std::filesystem::path& file, const std::string& place) {
+  constexpr int kPatienceMs = 2000;
+  constexpr std::size_t kMostBytes = 1 << 20;
+  const int fd = ::open(file.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
+  if (fd < 0) throw BridgeError(place + std::strerror(errno) + "; let this user read it");
+  std::string text;
+  std::array<char, 4096> part;
+  ssize_t bytes = 0;
+  do {
+    pollfd ready{fd, POLLIN, 0};
+    bytes = ::poll(&ready, 1, kPatienceMs) == 1 ? ::read(fd, part.data(), part.size()) : -1;
+    text.append(part.data(), static_cast<std::size_t>(std::max<ssize_t>(bytes, 0)));
+  } while (bytes > 0 && text.size() <= kMostBytes);
+  ::close(fd);
+  if (bytes < 0) throw BridgeError(place + "nobody writes into this pipe; name a file");
+  if (bytes > 0) throw BridgeError(place + "more than 1 MiB; write one token a line into it");
+  return text;
 }
 
 [[nodiscard]] bool same_text(std::string_view a, std::string_view b) noexcept {
@@ -70,7 +93,7 @@ void Tokens::add_file(const std::filesystem::path& file, const char* option, Rig
   if ((status.st_mode & (S_IRWXG | S_IRWXO)) != 0) {
     throw BridgeError(place + "is open to other users; chmod 600 it");
   }
-  std::ifstream in(file);
+  std::istringstream in(text_of(file, place));
   const std::size_t before = entries_.size();
   std::string line;
   while (std::getline(in, line)) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <filesystem>
@@ -24,6 +25,10 @@ class Tokens {
   /// Takes as long whatever `token` is: digests are compared, all of them, to their end.
   [[nodiscard]] Right right_of(std::string_view token) const noexcept;
 
+  [[nodiscard]] bool may_command() const noexcept {
+    return std::ranges::any_of(entries_,
+                               [](const Entry& one) { return one.right == Right::command; });
+  }
   /// Of the first that may look or command, for the printed address.
   [[nodiscard]] const std::string& first() const noexcept { return first_; }
 

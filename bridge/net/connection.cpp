@@ -59,12 +59,14 @@ asio::awaitable<void> Server::Impl::handshake(WebSocket& ws, beast::flat_buffer&
   done = !error;
 }
 
-/// Of the address, else of the cookie; empty where neither has one.
+/// Of the address, where it is good or there is no other; else of the cookie. Empty: neither has
+/// one.
 std::string_view Server::Impl::token_of(const Request& request) const {
   const std::string_view asked = query_value(text(request.target()), "token");
-  if (!asked.empty()) return asked;
+  if (setup_.tokens.right_of(asked) != Right::none) return asked;
   const std::string name = "kerf" + std::to_string(port());
-  return cookie_value(text(request[http::field::cookie]), name);
+  const std::string_view kept = cookie_value(text(request[http::field::cookie]), name);
+  return kept.empty() ? asked : kept;
 }
 
 std::string Server::Impl::page_text(const Request& request, Right right) const {
@@ -75,11 +77,14 @@ std::string Server::Impl::page_text(const Request& request, Right right) const {
   if (right == Right::none) {
     reply.status = 401;
     reply.body =
-        "This picture needs a token: open the address that kerf bridge printed, with all of its "
-        "?token=...\n";
+        token.empty()
+            ? "This picture needs a token: open the address that kerf bridge printed, with "
+              "all of its ?token=...\n"
+            : "This token is none of its own: open the address that kerf bridge printed "
+              "last.\n";
     return http_text(reply);
   }
-  if (!token.empty()) {
+  if (setup_.tokens.right_of(token) != Right::none) {
     reply.cookie = "kerf" + std::to_string(port()) + "=" + std::string(token) +
                    "; Path=/; HttpOnly; SameSite=Strict" + (tls_ ? "; Secure" : "");
   }

@@ -35,8 +35,11 @@ constexpr std::int64_t kSilenceNs = 2 * kNsPerSecond;    // of a run: it has a s
 constexpr std::int64_t kLongWaitNs = 10 * kNsPerSecond;  // for a run: the server has none
 constexpr std::int64_t kSayWaitNs = kNsPerSecond;        // before that is told
 constexpr const char* kNoRun = "has no controller yet";
+constexpr const char* kEndless = "answers without end; is it a kerf-bridge serve?";
 constexpr auto kFirstPause = 50ms, kLongestPause = 800ms;  // between two tries
 constexpr auto kWatchPeriod = 20ms;
+// Certificates and an HTTP head. Beast reads an answer that refuses to its end, however long.
+constexpr std::uint64_t kMaxWelcomeBytes = 256 * 1024;
 
 /// With the token of `--token-file`, where that is given.
 [[nodiscard]] BridgeAddress address_in(const JoinOptions& options) {
@@ -72,7 +75,18 @@ class Joiner {
     };
     asio::co_spawn(io_, stay_joined(), ended);
     asio::co_spawn(io_, watch(), ended);
-    io_.run();
+    for (bool over = false; !over;) {
+      try {
+        io_.run();
+        over = true;
+      } catch (const std::bad_alloc&) {
+        // Beast makes room for whatever an answer promises. The attempt has ended with its handler.
+        if (link_ == nullptr || connected_) throw;
+        lost(kEndless);
+        link_ = nullptr;
+        asio::co_spawn(io_, stay_joined(), ended);
+      }
+    }
     desk_.set_link(CommandDesk::Link::down);
     if (failure) std::rethrow_exception(failure);
     if (age_.count() != 0) {
@@ -165,6 +179,8 @@ class Joiner {
         const HelloMessage& hello = mirror_.hello(message, heard_ns_, figures.least_round_trip_ns);
         desk_.set_link((hello.flags & kMayCommand) != 0 ? CommandDesk::Link::open
                                                         : CommandDesk::Link::read_only);
+        if (session_ != 0 && session_ != hello.session) say("a new run");
+        session_ = hello.session;
         greeted_ = true;
         return std::nullopt;
       }
@@ -213,6 +229,13 @@ class Joiner {
       if (link_ != nullptr && connected_ && !greeted_ && now_ns - heard_ns_ > kSayWaitNs) {
         lost(kNoRun);
       }
+      if (link_ != nullptr && !connected_ &&
+          link_figures(link_->socket().native_handle()).received_bytes > kMaxWelcomeBytes) {
+        why_closed_ = kEndless;
+        ErrorCode ignored;
+        link_->socket().close(ignored);
+        continue;
+      }
       const bool running = greeted_ && !mirror_.ended();
       if (running && mirror_.joined()) age_.record(now_ns - mirror_.taken_ns());
       if (link_ == nullptr || now_ns - heard_ns_ < (running ? kSilenceNs : kLongWaitNs)) continue;
@@ -230,6 +253,7 @@ class Joiner {
       throw;
     } catch (const boost::system::system_error& error) {
       if (error.code() == beast::error::timeout) return "no answer";
+      if (error.code() == beast::http::error::body_limit) return kEndless;
       return error.code().message();
     } catch (const std::exception& error) {
       return error.what();
@@ -251,6 +275,7 @@ class Joiner {
   bool connected_ = false, greeted_ = false;
   std::int64_t heard_ns_ = 0, since_ns_ = 0;
   std::string why_closed_, last_reason_;
+  std::uint64_t session_ = 0;  // of the run that was shown last
   unsigned joins_ = 0;
   std::uint32_t waited_here_ = 0;
   std::uint64_t waited_ = 0;

@@ -64,6 +64,9 @@ void print_addresses(const ServerSetup& setup, std::uint16_t port, bool qr) {
     if (for_others.empty() && !is_loopback(host)) for_others = address;
     std::cout << address << '\n';
   }
+  if (setup.tokens.may_command()) {
+    std::cout << "with a token of --allow-commands in its place a viewer may command, too\n";
+  }
   if (qr && !for_others.empty()) std::cout << qr_code(for_others);
   std::cout.flush();
 }

@@ -19,6 +19,12 @@ namespace {
 
 namespace websocket = beast::websocket;
 
+/// What a viewer may ask for at all: the undo of a stroke is the local user's.
+bool is_for_viewers(CommandKind kind) noexcept {
+  return kind == CommandKind::select_tool || kind == CommandKind::hold ||
+         kind == CommandKind::reset;
+}
+
 constexpr std::int64_t kGoodbyeNs = kNsPerSecond;
 constexpr std::int64_t kMeasureNs = kNsPerSecond / 4;
 constexpr int kMaySay = 64;  // beside one ack a frame: a second of commands or pings
@@ -161,11 +167,14 @@ void Server::Impl::answer(Viewer& viewer, std::uint32_t sequence, const Reply& r
 
 void Server::Impl::command(const std::shared_ptr<Viewer>& viewer, const CommandMessage& message) {
   const std::uint32_t sequence = message.sequence;
-  if (viewer->right != Right::command) return answer(*viewer, sequence, {ReplyStatus::refused, 0});
+  const auto kind = static_cast<CommandKind>(message.kind);
+  if (viewer->right != Right::command || !is_for_viewers(kind)) {
+    return answer(*viewer, sequence, {ReplyStatus::refused, 0});
+  }
   if (viewer->commanding) return answer(*viewer, sequence, {ReplyStatus::busy, 0});
   viewer->commanding = true;
   Command wish;
-  wish.kind = static_cast<CommandKind>(message.kind);
+  wish.kind = kind;
   wish.argument = message.argument;
   asio::post(helper_, [this, wish, sequence, from = std::weak_ptr(viewer)] {
     Reply reply{ReplyStatus::busy, 0};

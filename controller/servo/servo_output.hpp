@@ -80,6 +80,7 @@ struct ServoOutput {
   std::uint64_t forbidden_materials = 0;  ///< which: bit m is material m of the scene
   bool refused = false;    ///< the tool finds no free place near the hand, and feels nothing
   bool shaft = false;      ///< what presses on shaft or handpiece is above 0.01 N
+  bool held = false;       ///< by a command: no force and no cut
   bool undoing = false;    ///< the last stroke is undone: likewise
   bool undoable = false;   ///< it can be
   bool resetting = false;  ///< volumes go back to their first content: what changed was not cut

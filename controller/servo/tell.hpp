@@ -87,6 +87,7 @@ void tell(const ServoPlan<N>& plan, ServoState<N>& state, const Sensed<N>& sense
   out.phase = state.supervisor.phase;
   out.fault = state.supervisor.fault;
   out.started = state.supervisor.started;
+  out.held = state.hold;
   out.contact = norm(state.force_n) > Real(kContactThresholdN);
   const ProxyState<N>& proxy = state.contact.proxy;
   out.refused = plan.contact.swept && !proxy.placed && proxy.search.refused();

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <limits>
 #include <numeric>
+#include <utility>
 
 #include "shared/numeric/fixed.hpp"
 #include "shared/numeric/rotation.hpp"
@@ -105,6 +106,9 @@ void Publisher::publish_volumes(const ServoOutput& output, TickRecord& record) n
 void Publisher::publish(Tick tick, const DeviceReport& report, const ServoOutput& output,
                         std::uint32_t last_command, const TickTiming& timing) noexcept {
   TickRecord record{};
+  if (std::exchange(held_, output.held) != output.held) {
+    segment_.set_lifecycle(output.held ? Lifecycle::hold : Lifecycle::run);
+  }
   segment_.begin_tick(tick);
   publish_volumes(output, record);
 

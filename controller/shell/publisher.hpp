@@ -38,6 +38,7 @@ class Publisher {
 
   SegmentWriter& segment_;
   const Servo& servo_;
+  bool held_ = false;                         ///< as readers were told
   std::uint64_t removal_hash_ = kFnv1aBasis;  ///< chain over the changed boxes
 };
 

@@ -168,8 +168,7 @@ struct TickRecord {
 inline constexpr std::uint32_t kFlagButton1 = 1U << 0;
 inline constexpr std::uint32_t kFlagButton2 = 1U << 1;
 inline constexpr std::uint32_t kFlagContact = 1U << 2;
-inline constexpr std::uint32_t kFlagClamped = 1U
-                                              << 4;  ///< a limit acted: force, slew, heat, motors
+inline constexpr std::uint32_t kFlagClamped = 1U << 4;  ///< some limit of the force acted
 inline constexpr std::uint32_t kFlagStaleInput = 1U << 5;
 inline constexpr std::uint32_t kFlagDeviceFault = 1U << 6;
 inline constexpr std::uint32_t kFlagMotorsOn = 1U << 7;
