@@ -2,9 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Runs the commands that a page prints:  run.py ROOT BIN README.md|docs        this page, or all of docs/
 
-Each page has a scratch folder like a clone's, in which its commands run one after the other; a tooth.nrrd and a ct/ of
-a user's own are there. A demo runs for one second in lock-step, so that no figure of this machine counts; all
-else runs as it stands. What cannot run in a test stands in NOT_HERE, each with its reason."""
+Each page has a scratch folder like a clone's, in which its commands run one after the other; a tooth.nrrd, a
+scan.raw and a ct/ of a user's own are there. A demo runs for one second in lock-step, so that no figure of this
+machine counts; all else runs as it stands. What cannot run in a test stands in NOT_HERE, each with its reason."""
+import array
 import os
 import pathlib
 import shutil
@@ -32,7 +33,7 @@ NOT_HERE = {
         "./kerf bridge serve", "./kerf bridge join", "scp "],
     "runs in the test own_law": ["own-law.md: "],
     "runs in the tests packages and reader": ["./kerf package", "packages.md: cmake", "pip install ./python"],
-    "runs in the test examples_scenes, which brings its CT": ["./kerf demo --scene scenes/spine/"],
+    "needs a CT that does not come with kerf; the test examples_scenes brings it": ["./kerf demo --scene scenes/spine/", './kerf volume import "$KERF_DATA'],
     "runs in the test docs_tutorial": ["tutorial.md: "],
     "needs a registry of images": ["podman "],
     "runs all tests, or many minutes": [
@@ -64,6 +65,9 @@ def furnish(folder, root, bin_folder):
     ball = [[[1200 if (i - 12) ** 2 + (j - 12) ** 2 + (k - 12) ** 2 < 81 else 0 for k in range(24)]
              for j in range(24)] for i in range(24)]
     dicom.write_series(folder / "ct", "1", ball, edge_mm="0.5")
+    half = range(-32, 32)
+    (folder / "scan.raw").write_bytes(array.array("h", (
+        1000 if i * i + j * j + k * k < 400 else 0 for k in half for j in half for i in half)).tobytes())
 
 
 def fault_of(command, expected, folder, environment):
