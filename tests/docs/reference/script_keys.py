@@ -2,7 +2,7 @@
 """docs/script-keys.md: what the files of hands, of faults and of opacities may say."""
 import re
 
-from source import Source, same, table
+from source import Source, same, same_defaults, table
 
 
 def hand(root):
@@ -30,6 +30,9 @@ def hand(root):
         ("repeat", "true", "false", "from this step to the last again and again; of one step")]
     same(f"{file.path}: the file", [row[0] for row in top], file.allowed("HandScript parse_hand_script("))
     same(f"{file.path}: [[step]]", [row[0] for row in step], file.allowed("HandStep step_of("))
+    header = Source(root, "hil/devmodel/hand_script.hpp")
+    same_defaults(file.path, top, file.defaults("HandScript parse_hand_script(", header))
+    same_defaults(file.path, step, file.defaults("HandStep step_of(", header))
     heads = ("key", "values", "default", "meaning")
     keys = Source(root, "hil/devmodel/plant_keys.hpp")
     rows = re.findall(r'\{"(device|hand)", "(\w+)", "(--[\w-]+)", ([\w.]+), ([\w.]+), (?:true|false),\s+"([^"]+)"', keys.text)
@@ -78,6 +81,8 @@ def faults(root):
         ("ms", f"above 0, to {file.number('kMaxDelayMs'):g} ms", "needed", "how late")]
     same(f"{file.path}: the file", [row[0] for row in top], file.allowed("FaultScript parse_fault_script("))
     same(f"{file.path}: [[fault]]", [row[0] for row in fault], file.allowed("DeviceFault fault_of("))
+    same_defaults(file.path, top, file.defaults("FaultScript parse_fault_script(", head))
+    same_defaults(file.path, fault, file.defaults("DeviceFault fault_of(", head))
     kinds = [(word, comment) for word, _, comment in head.enumerators("FaultKind")]
     same(f"{head.path}: kFaultWords", [word for word, _ in kinds], head.words("kFaultWords"))
     names = [word for word, _ in kinds]

@@ -58,6 +58,15 @@ class Source:
         """The keys that a function of a script lets pass."""
         return re.findall(r'"([a-z_]+)"', re.search(r"allow_only\(\{(.*?)\}\)", self.body(begin), re.S)[1])
 
+    def defaults(self, begin, header):
+        """{key: default} of what a function of a script reads; `script.NAME` is the initialiser in the header."""
+        found = {}
+        for key, value in re.findall(r'\.(?:number|whole|word)\((?:\w+ \? "\w+" : )?"(\w+)", ([^,]+),', self.body(begin)):
+            if member := re.fullmatch(r"script\.(\w+)", value):
+                value = re.search(rf"\b{member[1]} = ([^;]+);", header.text)[1]
+            found[key] = value.strip('"')
+        return found
+
     def enumerators(self, name):
         """(enumerator, comment) of an enum with a line each, or with its values on one line."""
         body = re.search(rf"enum class {name} [^{{]*\{{(.*?)\}};", self.text, re.S)[1]
@@ -88,6 +97,16 @@ def same(place, documented, there):
         raise Lack(f"{place}: has {', '.join(sorted(lacking))}, which tests/docs/reference does not describe")
     if surplus := documented - there:
         raise Lack(f"{place}: has no {', '.join(sorted(surplus))}, which tests/docs/reference describes")
+
+
+def same_defaults(place, rows, there):
+    """The page's defaults, in the third column, are the source's, where that names one of use."""
+    for key, _, default, *_ in rows:
+        value, told = there.get(key), default.split(":")[0].strip("`")
+        if told in ("needed", "none", "not checked", "") or value is None:
+            continue
+        if told != value and not (re.fullmatch("[-0-9.]+", value) and re.fullmatch("[-0-9.]+", told) and float(told) == float(value)):
+            raise Lack(f"{place}: {key} is {value} by default, and tests/docs/reference says {told}")
 
 
 def table(heads, rows):
