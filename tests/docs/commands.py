@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Whether the commands that the pages print are commands:  commands.py ROOT BIN check|tutorial
 
-check: every option of every `./kerf` line of README.md and docs/ is one that the program's --help knows.
+check: every option of every `./kerf` line of README.md and docs/, and of every `./kerf` within their text, is one that the
+program's --help knows.
 tutorial: the lines of docs/tutorial.md, run one after the other in a scratch folder, all end well, and each
 file that the page names is there then."""
 import functools
@@ -17,7 +18,7 @@ import tempfile
 
 import pages
 
-root, bin_folder, what = pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[2]), sys.argv[3]
+root, bin_folder, what = pathlib.Path(sys.argv[1]).resolve(), pathlib.Path(sys.argv[2]).resolve(), sys.argv[3]
 environment = dict(os.environ, KERF_BIN=str(bin_folder))
 environment.pop("DISPLAY", None)
 
@@ -33,6 +34,8 @@ def known_options(words):
         text = help_of(root / "kerf") + (help_of(bin_folder / "kerf-lab", "sweep") if words[0] == "sweep" else "")
         text += help_of(bin_folder / "kerf-lab", "ranges") + help_of(bin_folder / "kerf-lab", "faults")
         text += help_of(bin_folder / "kerf-lab", "bench") + help_of(bin_folder / "kerf-visualizer")
+    elif words[:2] == ["lab", "ablate"]:
+        text = help_of(root / "kerf", "lab", "ablate")
     else:
         text = help_of(bin_folder / ("kerf-" + words[0]))
         if len(words) > 1 and re.fullmatch(r"[a-z][a-z-]*", words[1]):
@@ -43,7 +46,7 @@ def known_options(words):
 def check():
     wrong, checked = [], 0
     for page in pages.all_pages(root):
-        for number, line, _ in pages.commands(page):
+        for number, line in [(n, line) for n, line, _ in pages.commands(page)] + list(pages.inline(page)):
             for part in re.split(r"\s(?:\||&&|;|&)\s", line):
                 match = re.search(r"(?:^|\s)\./kerf\s+(.*)", part)
                 if not match:

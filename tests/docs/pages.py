@@ -51,3 +51,16 @@ def commands(page):
                 found.append((number, text, []))
                 joined = ""
         yield from found
+
+
+def inline(page):
+    """(line number, command) of each `./kerf ...` in running text and tables, with one blank for each gap."""
+    in_blocks = {number for _, block in blocks(page) for number, _ in block}
+    starts, prose = [], ""
+    for number, line in enumerate(page.read_text(encoding="utf-8").splitlines(), 1):
+        starts.append((len(prose), number))
+        prose += ("" if number in in_blocks or line.startswith("```") else line) + "\n"
+    for code in re.finditer(r"`([^`]+)`", prose):
+        command = " ".join(code[1].replace("\\|", "|").split())
+        if command.startswith("./kerf ") and "\n\n" not in code[1]:
+            yield max(number for start, number in starts if start <= code.start()), command

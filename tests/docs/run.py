@@ -2,9 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Runs the commands that a page prints:  run.py ROOT BIN README.md|docs        this page, or all of docs/
 
-Each page has a scratch folder like a clone's, in which its commands run one after the other; a tooth.nrrd and a ct/ of
-a user's own are there. A demo runs for one second in lock-step, so that no figure of this machine counts; all
-else runs as it stands. What cannot run in a test stands in NOT_HERE, each with its reason."""
+Each page has a scratch folder like a clone's, in which its commands run one after the other; a tooth.nrrd, a
+scan.raw and a ct/ of a user's own are there. A demo runs for one second in lock-step, so that no figure of this
+machine counts; all else runs as it stands. So do commands within text and tables, each once, after those of their page.
+What cannot run in a test stands in NOT_HERE, each with its reason."""
+import array
 import os
 import pathlib
 import shutil
@@ -18,10 +20,11 @@ import pages
 sys.path.insert(0, str(pathlib.Path(__file__).parent.parent / "errors"))
 import dicom
 
-# Reason, and the beginnings of the commands that it keeps from running, with their page where that matters.
+# Reason, and the beginnings of the commands that it keeps from running, with their page where that matters; with $ at its
+# end it is the whole command. A page alone, such as "own-law.md: ", is all of its blocks.
 NOT_HERE = {
     "changes the system, as root": ["sudo ", "echo '@plugdev"],
-    "needs a display": ["./kerf demo --hand mouse", "./kerf visualizer"],
+    "needs a display, or a controller at work": ["./kerf demo --hand mouse", "./kerf visualizer"],
     "needs a device, or its kernel": [
         "cat /sys/kernel/realtime", "./kerf controller --probe",
         "./kerf controller --scene mine.toml --device omni --port fw"],
@@ -32,7 +35,8 @@ NOT_HERE = {
         "./kerf bridge serve", "./kerf bridge join", "scp "],
     "runs in the test own_law": ["own-law.md: "],
     "runs in the tests packages and reader": ["./kerf package", "packages.md: cmake", "pip install ./python"],
-    "runs in the test examples_scenes, which brings its CT": ["./kerf demo --scene scenes/spine/"],
+    "needs a CT that does not come with kerf; the test examples_scenes brings it": [
+        "./kerf demo --scene scenes/spine/", './kerf volume import "$KERF_DATA'],
     "runs in the test docs_tutorial": ["tutorial.md: "],
     "needs a registry of images": ["podman "],
     "runs all tests, or many minutes": [
@@ -42,7 +46,20 @@ NOT_HERE = {
         "./kerf lab zwidth --rate", "./kerf lab zwidth --map", "./kerf lab zwidth --arm",
         "./kerf lab zwidth --stabiliser", "parallel ./kerf lab zwidth", "./kerf lab merge", "./kerf sweep"],
     "runs in the test hil_guest": ["hil/guest/guest.sh"],
+    "runs in the test docs_site": ["./kerf docs$"],
+    "installs packages and builds": ["./kerf setup$"],
+    "changes the sources and builds them; .ci/run does": ["./kerf lab ablate --page"],
+    "measures for minutes; the tests of lab run parts of it": [
+        "./kerf lab accuracy --page", "./kerf lab extremes", "./kerf lab zwidth --page", "./kerf lab faults --rate all"],
+    "needs network namespaces; the test bridge_net does the same": ["./kerf demo --two-machines"],
+    "names a program or an option, and is no whole command": [
+        "./kerf controller$", "./kerf lab$", "./kerf lab faults$", "./kerf volume import$", "./kerf controller --strict$",
+        "./kerf controller --rate HZ$", "./kerf controller --port udp:HOST:5000$", "./kerf controller --report FILE$",
+        "./kerf controller --explain --report FILE$", "./kerf record info LOG"],
 }
+# What stands for a reader's own file, within text.
+OWN = (("import PATH", "import ct/ --out own.nrrd"), ("info FILE", "info tooth.nrrd"), ("--volume FILE", "--volume tooth.nrrd"),
+       ("--report FILE", "--report own.json"), ("DIR", "own"))
 EVERYWHERE = ("examples", "hil", "python", "scenes")
 # `./kerf` of a scratch folder. The last word counts, so a page's own --seconds give way too.
 DOOR = """#!/bin/bash
@@ -64,6 +81,9 @@ def furnish(folder, root, bin_folder):
     ball = [[[1200 if (i - 12) ** 2 + (j - 12) ** 2 + (k - 12) ** 2 < 81 else 0 for k in range(24)]
              for j in range(24)] for i in range(24)]
     dicom.write_series(folder / "ct", "1", ball, edge_mm="0.5")
+    half = range(-32, 32)
+    (folder / "scan.raw").write_bytes(array.array("h", (
+        1000 if i * i + j * j + k * k < 400 else 0 for k in half for j in half for i in half)).tobytes())
 
 
 def fault_of(command, expected, folder, environment):
@@ -81,14 +101,36 @@ def fault_of(command, expected, folder, environment):
     return None
 
 
-def rows_of(page, command):
-    return [row for rows in NOT_HERE.values() for row in rows if f"{page.name}: {command}".startswith(row)
-            or command.startswith(row)]
+def rows_of(page, command, within_text=False):
+    def fits(row):
+        if row.endswith("$"):
+            return command == row[:-1]
+        if row.endswith(".md: ") and within_text:
+            return False
+        return f"{page.name}: {command}".startswith(row) or command.startswith(row)
+    return [row for rows in NOT_HERE.values() for row in rows if fits(row)]
+
+
+def within_text(page):
+    """(line number, command, none) of what is to be run of a page's text; each command once in all pages."""
+    for number, command in pages.inline(page):
+        if not rows_of(page, command, True) and command not in DONE:
+            DONE.add(command)
+            for form, own in OWN:
+                command = command.replace(form, own)
+            yield number, command, []
+
+
+DONE = set()
 
 
 def run_page(page, root, bin_folder):
     """How many commands of a page ran, and what is wrong with them."""
-    ran, wrong = 0, []
+    todo, ran, wrong = [one for one in pages.commands(page) if not rows_of(page, one[1])], 0, []
+    DONE.update(command for _, command, _ in todo)
+    todo += within_text(page)
+    if not todo:
+        return ran, wrong
     with tempfile.TemporaryDirectory() as scratch:
         folder = pathlib.Path(scratch)
         environment = dict(os.environ, KERF_BIN=str(bin_folder), HOME=scratch, XDG_RUNTIME_DIR=f"{scratch}/.sockets")
@@ -98,9 +140,7 @@ def run_page(page, root, bin_folder):
         if page.name == "ci.md":  # a scene that its reader has
             shutil.copy(root / "scenes" / "touch.toml", folder / "mine.toml")
             os.symlink(root / "scenes" / "hands", folder / "hands")
-        for number, command, expected in pages.commands(page):
-            if rows_of(page, command):
-                continue
+        for number, command, expected in todo:
             began = time.monotonic()
             fault = fault_of(command, expected, folder, environment)
             ran += 1
@@ -113,11 +153,13 @@ def run_page(page, root, bin_folder):
 def main(root, bin_folder, which):
     used = {row for page in pages.all_pages(root) for _, command, _ in pages.commands(page)
             for row in rows_of(page, command)}
+    used |= {row for page in pages.all_pages(root) for _, command in pages.inline(page)
+             for row in rows_of(page, command, True)}
     wrong = [f"NOT_HERE: {row!r}: no page has such a command; take the row out"
              for rows in NOT_HERE.values() for row in rows if row not in used]
     total = 0
     for page in pages.all_pages(root):
-        if which in (page.name, page.parent.name) and not all(rows_of(page, c) for _, c, _ in pages.commands(page)):
+        if which in (page.name, page.parent.name):
             ran, faults = run_page(page, root, bin_folder)
             total += ran
             wrong += faults
@@ -127,4 +169,4 @@ def main(root, bin_folder, which):
 
 
 if __name__ == "__main__":
-    sys.exit(0 if main(pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[2]), sys.argv[3]) else 1)
+    sys.exit(0 if main(pathlib.Path(sys.argv[1]).resolve(), pathlib.Path(sys.argv[2]).resolve(), sys.argv[3]) else 1)

@@ -66,6 +66,48 @@ for name in sys.argv[1:]:
     drawn = (picture.max(axis=2) - picture.min(axis=2) > 0.2).mean()  # coloured: data, not axes
     assert drawn > 0.002, f"{name}: {drawn:.4f} of it is drawn"
 PY
+
+# A log in which nothing is felt, and one in which the device was never in hand. Then what is no log and no table.
+cp -r "$work/log" "$work/free"
+cp -r "$work/log" "$work/idle"
+cp -r "$work/log" "$work/cut"
+cp -r "$work/log" "$work/empty"
+"$python" - "$work" <<'PY'
+import sys
+import numpy as np
+for name in ("free", "idle"):
+    rows = np.load(f"{sys.argv[1]}/{name}/ticks.npy")
+    rows["commanded_force_n"] = 0
+    if name == "idle":
+        rows["velocity_mm_per_s"] = np.nan
+    np.save(f"{sys.argv[1]}/{name}/ticks.npy", rows)
+PY
+truncate -s -100 "$work/cut/ticks.npy"
+: >"$work/empty/ticks.npy"
+"$python" "$examples/phase_portrait.py" "$work/free" "$work/free.png"
+refused() {  # WORDS EXAMPLE ARGUMENT...: one line that has these words, or the usage
+  local words=$1 said code=0
+  said=$("$python" "$examples/$2.py" "${@:3}" 2>&1) || code=$?
+  [[ $code == 2 && $said == *"$words"* && $said != *Traceback* ]] ||
+    { echo "$2 ${*:3}: exit code $code: $said" && exit 1; }
+  [[ $words == *.png || $words == TABLE* || $said != *$'\n'* ]] || { echo "$2 ${*:3}: lines: $said" && exit 1; }
+}
+for example in phase_portrait spectrum; do
+  refused 'PICTURE.png' "$example"
+  refused 'nowhere/ticks.npy: No such file' "$example" "$work/nowhere" "$work/none.png"
+  refused 'empty/ticks.npy: is empty' "$example" "$work/empty" "$work/none.png"
+  refused 'or the file was cut' "$example" "$work/cut" "$work/none.png"
+  refused 'nowhere/none.pn' "$example" "$work/log" "$work/nowhere/none.png"
+done
+refused 'never in hand' phase_portrait "$work/idle" "$work/none.png"
+refused 'no force was sent' spectrum "$work/free" "$work/none.png"
+refused 'no axis' phase_portrait "$work/log" "$work/none.png" 3
+refused 'TABLE.csv' kb_map
+refused 'nowhere.csv' kb_map "$work/nowhere.csv" "$work/none.png"
+refused 'no column' kb_map "$work/sweep/sweep.csv" "$work/none.png" a b c
+refused 'not three columns' kb_map "$work/sweep/sweep.csv" "$work/none.png" servo.rate_hz
+refused 'no rows of these' kb_map "$work/sweep/sweep.csv" "$work/none.png" servo.rate_hz force.stiffness_n_per_mm \
+  peak_force_n servo.rate_hz=3
 for example in "$examples"/*.py; do
   (($(wc -l <"$example") < 30)) || { echo "$example: 30 lines or more" && exit 1; }
 done

@@ -1,0 +1,209 @@
+# SPDX-License-Identifier: Apache-2.0
+"""docs/segment.md and docs/wire.md: the shared segment and the packets, byte by byte."""
+import re
+
+from source import Lack, Source, same, table
+
+
+# What a field's name and its comment in the source do not say.
+MEANINGS = {
+    "layout_major": "another one: another layout", "layout_minor": "of the layout", "abi_hash": "hash of this layout",
+    "total_bytes": "of the segment", "config_hash": "of all settings of the run", "tick_ns": "length of a servo tick",
+    "volume_count": "volumes", "off_state": "of the ring of ticks", "off_dirty": "of the ring of boxes",
+    "off_volume_table": "of the descriptors", "state_record_bytes": "size of a `TickRecord`",
+    "dirty_record_bytes": "size of a `DirtyRecord`", "off_scene": "of the scene's text", "scene_bytes": "length of the scene's text",
+    "lifecycle": "where the run stands, above", "nx": "voxels along x", "ny": "along y", "nz": "along z",
+    "log2_brick": "3: a brick has 8 voxels along its edge", "bits_per_voxel": "16: a density", "bricks_x": "bricks along x",
+    "bricks_y": "along y", "bricks_z": "along z", "brick_count": "of them in all", "spacing_mm": "of voxels, along x, y, z",
+    "origin_mm": "centre of voxel (0, 0, 0) in the world", "off_versions": "of the version words", "off_bricks": "of the densities",
+    "material": "not used: 0", "iso": "density of the surface, 0 to 65535", "seq": "as of a `TickRecord`", "tick": "of the servo",
+    "lo": "first voxel of the box", "volume": "which one, from 0", "cause": "above", "magic": "above", "protocol": "version of the talk",
+    "session": "of the run", "flags": "above", "build_id": "for messages only", "heartbeat_ns": "of the last finished tick",
+    "blocks": "how many follow", "raw_bytes": "of the payload, before it was packed", "payload_bytes": "as it follows",
+    "ring": "0 ticks, 1 dirty", "count": "records", "first": "index of the first record", "stride": "from one index to the next",
+    "sent_ns": "when it was sent", "frame": "1, 2, ...; the frame that was applied", "argument": "of the command, above"}
+SAID = {"set_hash": "sum over all that the viewer holds after this frame (`bridge/wire/set_hash.hpp`)",
+        "record_bytes": "size of a `TickRecord`", "dirty_bytes": "size of a `DirtyRecord`", "status": "above",
+        "index": "of the command, as `last_command` will show it", "kind": "above", "hi": "end of the box: it does not belong to it",
+        "removed": "density units taken away; by an undo: given back"}
+
+
+def meaning_of(file, struct, field, comment):
+    if words := SAID.get(field) or comment or MEANINGS.get(field):
+        return words
+    raise Lack(f"{file.path}: {struct}.{field}: no comment, and tests/docs/reference has none either")
+
+
+def struct_table(file, name, stated=None, told=None):
+    """A struct's fields as a table, checked against the numbers that layout_table.hpp states. `told`: (unit, meaning)."""
+    rows, size = file.struct(name)
+    if stated is not None and [row[:4] for row in rows] != stated:
+        odd = [f"{there[1]} at {there[0]}" for row, there in zip(rows, stated) if row[:4] != there] or ["its length"]
+        raise Lack(f"{file.path}: {name} is not what the layout's table says: {odd[0]}")
+    shown = []
+    for at, word, of, count, comment in rows:
+        if word.startswith(("pad_", "reserved")):
+            continue
+        what = (told[word] if word in told else ("", "")) if told else [meaning_of(file, name, word, comment)]
+        shown.append((at, f"`{word}`", of if count == 1 else f"{of} x {count}", *what))
+    if told:
+        same("docs/log.md", [row[1].strip("`") for row in shown], told)
+    return f"{size} bytes.\n\n" + table(("byte", "field", "type", *(["unit"] if told else []), "meaning"), shown)
+
+
+def log_columns(root):
+    """Unit and meaning of each field of a tick, from the log's page, which has a test of its own."""
+    rows = re.findall(r"^\| `(\w+)` \| [^|]+ \| ([^|]*) \| ([^|]+) \| [^|]+ \|$", Source(root, "docs/log.md").text, re.M)
+    return {name: (unit.strip(), meaning.replace(", below", ", told there")) for name, unit, meaning in rows}
+
+
+def choices(file, name):
+    rows, last = [], -1
+    for word, value, _ in file.enumerators(name):
+        last = int(value) if value else last + 1
+        rows.append(f"{last} `{word}`")
+    return ", ".join(rows)
+
+
+def segment(root, programs):
+    file, fields = Source(root, "shared/segment/layout.hpp"), Source(root, "shared/segment/layout_table.hpp")
+    stated = {}
+    for record, name, at, kind, count in re.findall(r'KERF_FIELD\((\w+), (\w+), (\w+), "(\w+)", (\d+)\)', fields.text):
+        stated.setdefault(record, []).append((int(at, 0), name, kind, int(count)))
+    told = {"TickRecord": log_columns(root)}
+    parts = [f"## `{name}`\n\n{what}{struct_table(file, name, stated[name], told.get(name))}\n" for name, what in (
+        ("SegmentHeader", "At byte 0, one page. Each word that changes has a line of 64 bytes of its own. "),
+        ("VolumeDescriptor", "At `off_volume_table`, one for each volume. `origin_mm` is the place of the centre of voxel "
+                             "(0, 0, 0) in the world. "),
+        ("TickRecord", "At `off_state`: a ring, slot = index mod `state_slots`. [The log](log.md) has the same rows, and "
+                       "tells when each field is valid. "),
+        ("DirtyRecord", "At `off_dirty`: a ring, slot = index mod `dirty_slots`. One box of voxels that changed. "))]
+    same(fields.path, ["SegmentHeader", "VolumeDescriptor", "TickRecord", "DirtyRecord"], stated)
+    return f"""# The shared segment
+
+What the controller writes and every reader maps, read-only: layout {file.number('kLayoutMajor')}.{file.number('kLayoutMinor')}, little-endian, natural alignment, offsets
+instead of pointers. An installed kerf and `python/kerf_reader` have readers ([packages](packages.md)). The
+magic is `KERFSHM1`. `abi_hash` is a hash of all that stands below: a reader of another layout refuses the segment.
+
+The controller named NAME listens at `$XDG_RUNTIME_DIR/kerf/NAME.sock`, else `/tmp/kerf-$UID/NAME.sock`. It answers a
+connection with {8 + 4 + 4 + 8 + 8} bytes (magic, major, minor, `abi_hash`, `session_id`) and the segment's file descriptor.
+
+| from | what |
+|---|---|
+| 0 | `SegmentHeader` |
+| `off_volume_table` | a `VolumeDescriptor` for each volume |
+| `off_scene` | the scene as JSON, `scene_bytes` long |
+| `off_state` | ring of `TickRecord`, {file.number('kStateSlots')} slots |
+| `off_dirty` | ring of `DirtyRecord`, {file.number('kDirtySlots')} slots |
+| `off_versions`, of a volume | u64 for each brick: odd while tick t is written (2 t + 1), even when complete (2 t + 2), 0 never |
+| `off_bricks`, of a volume | bricks of 8 x 8 x 8 densities, u16, x fastest |
+| `off_labels`, of a volume | u8 for each voxel, x fastest, never changed; 0: none |
+
+A reader copies a record or a brick, and takes it where the sequence or version word was even and the same before and
+after. The servo never waits for a reader.
+
+`lifecycle`: {choices(file, 'Lifecycle')}; from 3 on it is final.
+`cause` of a box: {choices(file, 'DirtyCause')}.
+
+{chr(10).join(parts)}"""
+
+
+def drawing(file, begin):
+    """The indented drawing of a header's first comment."""
+    lines = [line for line in file.comment_above(begin).split("\n") if line.startswith("    ")]
+    if not lines:
+        raise Lack(f"{file.path}: no drawing of its bytes; tests/docs/reference has to follow")
+    return "\n".join(lines)
+
+
+def wire(root, programs):
+    omni, falcon = Source(root, "shared/wire/omni_packet.hpp"), Source(root, "shared/wire/falcon_packet.hpp")
+    wooden, hello = Source(root, "shared/wire/wooden_packet.hpp"), Source(root, "shared/wire/hello.hpp")
+    wish, turn = Source(root, "shared/wire/hand_wish.hpp"), Source(root, "shared/wire/turn.hpp")
+    bridge, command = Source(root, "bridge/wire/messages.hpp"), Source(root, "shared/segment/command.hpp")
+    plan, most_kib = Source(root, "bridge/wire/block_plan.hpp"), re.search(r"kMaxMessageBytes = (\d+) \* 1024", bridge.text)[1]
+    same("shared/wire", ["omni", "falcon", "wooden", "hello", "hand_wish", "turn"],
+         {re.sub("_(packet|constants|usb|framer)$", "", path.stem) for path in (root / "shared/wire").glob("*.hpp")}
+         - {"little_endian", "personality"})
+
+    def magic(file, name):
+        marks = re.search(rf"{name}\{{([^}}]*)\}}", file.text)[1]
+        return " ".join(mark.strip("'") for mark in marks.split(", "))
+
+    def messages():
+        rows = re.findall(r'(k\w+)Magic = magic\("(\w{4})"\)', bridge.text)
+        structs = dict(zip([row[0] for row in rows], ["HelloMessage", "FrameHead", "RecordsHead", "ReplyMessage", "AckMessage",
+                                                      "CommandMessage"]))
+        same(bridge.path, structs.values(), re.findall(r"^struct (\w+) \{", bridge.text, re.M))
+        for kind, mark in rows:
+            name, size = structs[kind], re.search(rf"sizeof\({structs[kind]}\) == (\d+)", bridge.text)[1]
+            if not name.startswith(kind.removeprefix("k")) or bridge.struct(name)[1] != int(size):
+                raise Lack(f"{bridge.path}: {name} is not what its magic or its size says")
+            yield f"### `{name}`, `{mark}`\n\n{struct_table(bridge, name)}\n"
+    return f"""# Wire bytes
+
+All little-endian. The drivers of `controller/device` and the emulator share these layouts, in `shared/wire`.
+
+## Omni
+
+{drawing(omni, 'namespace kerf {')}
+
+Bytes that are not listed are written as zero and ignored when read. `on` is bit 3 of the word at 6, `lights` its two
+lowest bits.
+
+## Falcon
+
+Serial, in packets of {Source(root, 'shared/wire/falcon_constants.hpp').number('kPacketBytes')} printable bytes; `shared/wire/falcon_usb.hpp` has the way there over USB.
+
+{drawing(falcon, 'namespace kerf {')}
+
+The host's numbers are motor torques, the device's are encoder counts. Host and device take turns.
+
+## WoodenHaptics
+
+HID reports, 14 bytes or the first 14 of 64, seven i16:
+
+{drawing(wooden, 'namespace kerf {')}
+
+## kerf's own links
+
+Between controller and emulator, on a socket or over UDP, each device packet is one packet. Before them each side says
+hello; in lock-step all packets of one tick are one turn. A window that leads the hand sends wishes.
+
+| packet | byte | type | what |
+|---|---|---|---|
+| hello, {hello.number('kHelloBytes')} bytes | 0 | u8 x 8 | `{magic(hello, 'kHelloMagic')}`; the last one is the version |
+| | 8 | u8 | device: 0 omni, 1 falcon, 2 woodenhaptics |
+| | 9 | u8 | 1: lock-step |
+| | 12 | u32 | rate of the servo in Hz |
+| turn, at most {turn.number('kMostBytes')} bytes | 0 | u8 x 8 | `{magic(turn, 'kMagic')}` |
+| | 8 | | each packet behind a u8 with its length; none: nothing came |
+| wish, {wish.number('kHandWishBytes')} bytes | 0 | u8 x 8 | `{magic(wish, 'kHandWishMagic')}` |
+| | 8 | i32 x 3 | place in um, in the device's frame, each up to {wish.number('kMaxWishMm'):g} mm |
+| | 20 | i32 x 3 | yaw, pitch, roll in urad, each up to 60 degrees |
+| | 32 | u8 | 1 button 1, 2 button 2, 4 park |
+| greeting, 9 bytes | 0 | u8 x 8 | that of the wish; the emulator says it first |
+| | 8 | u8 | 0: the hand is yours; 1: it is taken, and the connection is closed |
+
+## Bridge
+
+One binary WebSocket message each, at `{re.search(r'kBridgePath = "([^"]+)"', bridge.text)[1]}`, protocol {bridge.number('kProtocol')}: to the viewer at most {most_kib} KiB, to the server at most {bridge.number('kMaxUpBytes')}
+bytes. The magic is its first four characters. Times are the server's CLOCK_MONOTONIC.
+
+The server says hello first, and again for a new run; then frames, records and replies. The viewer sends an
+acknowledgement for each frame that it has applied, and commands. What follows a head:
+
+* hello: the volumes' `VolumeDescriptor` ([segment](segment.md)). `off_labels` is 1 where there are labels; the other
+  offsets are 0. Flag {bridge.number('kMayCommand')}: this viewer may send commands.
+* frame: u64 version for each block, u32 number for each block, then the blocks. Flags: {bridge.number('kPacked')} packed as one LZ4 block,
+  {bridge.number('kLastOfPass')} last of a pass (the volumes are then those of `tick`), {bridge.number('kRunEnded')} the controller has gone.
+  Blocks are numbered: first the scene's text, {plan.number('kTextBlockBytes')} bytes each; then the bricks' densities, {plan.number('kDensityBlockBytes')} bytes each, of
+  one volume after the other; then the bricks' labels, {plan.number('kLabelBlockBytes')} bytes each.
+* records: `count` records of `ring` 0 (ticks) or 1 (dirty) as they lie in the segment; number i has the index
+  `first + i * stride`. Flag {bridge.number('kPacked')}: packed.
+* command: `kind` {', '.join(f'{value} `{word}` ({comment.removeprefix("argument: ")})' for word, value, comment in command.enumerators('CommandKind'))}.
+* reply: `status` {', '.join(f'{value} `{word}` ({comment})' for word, value, comment in command.enumerators('ReplyStatus')).replace('`kCommandSlots`', str(command.number('kCommandSlots')))}.
+
+A connection is closed with {', '.join(f'{value} `{word}`' for word, value, _ in bridge.enumerators('CloseCode'))}.
+
+{chr(10).join(messages())}"""

@@ -1,0 +1,60 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""The reference pages of docs/ that are made from sources and programs:  make.py ROOT BIN check|write
+
+check: each page is what it would be if it were made now. A key, a field or a program that came, went or changed its
+limits makes a difference, or is told as a lack."""
+import difflib
+import pathlib
+import subprocess
+import sys
+
+sys.path.insert(0, str(pathlib.Path(__file__).parent))
+import exit_codes
+import layouts
+import reports
+import script_keys
+from source import Lack
+
+PAGES = {"script-keys.md": script_keys.page, "reports.md": reports.page, "segment.md": layouts.segment,
+         "wire.md": layouts.wire, "exit-codes.md": exit_codes.page}
+BY = "Made by `tests/docs/reference/make.py` from what the programs say and from their source.\n"
+
+
+class Programs:
+    def __init__(self, folder):
+        self.folder = folder
+
+    def names(self):
+        return sorted(path.name for path in self.folder.glob("kerf-*"))
+
+    def said(self, *command):
+        return subprocess.run(command, capture_output=True, text=True, check=True, stdin=subprocess.DEVNULL).stdout
+
+    def help(self, name, *words):
+        return self.said(self.folder / name, *words, "--help")
+
+    def run(self, name, *words):
+        return subprocess.run([self.folder / name, *words], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL).returncode
+
+
+def main(root, programs, mode):
+    wrong = 0
+    for name, page in PAGES.items():
+        try:
+            title, rest = page(root, programs).rstrip("\n").split("\n", 1)
+        except Lack as lack:
+            print(f"docs/{name}: {lack}")
+            wrong += 1
+            continue
+        made, file = f"{title}\n\n{BY}{rest}\n", root / "docs" / name
+        if mode == "write":
+            file.write_text(made, encoding="utf-8")
+        before = file.read_text(encoding="utf-8") if file.exists() else ""
+        sys.stdout.writelines(difflib.unified_diff(before.splitlines(True), made.splitlines(True), f"docs/{name}", "now", n=0))
+        wrong += before != made
+    print(f"{len(PAGES)} pages, {wrong} wrong; renew them: make.py ROOT BIN write")
+    return not wrong
+
+
+sys.exit(0 if main(pathlib.Path(sys.argv[1]).resolve(), Programs(pathlib.Path(sys.argv[2]).resolve()), sys.argv[3]) else 1)

@@ -1,0 +1,111 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""The site of `./kerf docs` as its reader has it, from a folder:  site_test.py ROOT
+
+It is small, loads nothing from elsewhere, has every page in its list, and its search finds. Exit code 77: skipped, for
+want of mkdocs, or of chromium once all else is fine."""
+import html.parser
+import json
+import pathlib
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+
+root = pathlib.Path(sys.argv[1]).resolve()
+sys.path.insert(0, str(root / "tests" / "page"))
+import browser
+
+MOST_BYTES = 5_000_000
+# What a reader types, and the section that must come among the first three.
+SEARCHES = [("zigzag_mm", "script-keys.html#hands"), ("exit codes", "exit-codes.html#exit-codes"),
+            ("mouse pointer wheel", "mouse.html#a-hand-without-a-device-pointer-keys-gamepad-spacemouse"),
+            ("threshold tissue HU", "own-volume.html#a-volume-of-your-own"),
+            ("omni encoder wire", "wire.html#omni"), ("state_head", "segment.html#segmentheader")]
+
+
+class Loads(html.parser.HTMLParser):
+    """What a page loads by itself: not where its links lead."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.addresses, self.anchors = [], set()
+        self.feed(text)
+
+    def handle_starttag(self, tag, attributes):
+        values = dict(attributes)
+        self.anchors.add(values.get("id"))
+        if tag != "a":
+            self.addresses += [values[name] for name in ("src", "href", "data", "poster") if values.get(name)]
+
+
+def faults_of_files(site):
+    size = sum(file.stat().st_size for file in site.rglob("*") if file.is_file())
+    print(f"{size} bytes")
+    if size >= MOST_BYTES:
+        yield f"{size} bytes, and {MOST_BYTES} are too many"
+    for file in site.rglob("*.html"):
+        page = Loads(file.read_text(encoding="utf-8"))
+        for address in page.addresses:
+            path = re.split("[?#]", address)[0]
+            if re.match(r"([a-z]+:)?//", address):
+                yield f"{file.name}: loads {address} from elsewhere"
+            elif path and file.name != "404.html" and not (file.parent / path).exists():
+                yield f"{file.name}: loads {address}, which is not there"
+    for file in site.rglob("*.css"):
+        for address in re.findall(r"""url\(['"]?([^'")]+)""", file.read_text(encoding="utf-8")):
+            if not address.startswith("data:") and not (file.parent / re.split("[?#]", address)[0]).exists():
+                yield f"{file.name}: loads {address}, which is not there"
+    listed = (root / "mkdocs.yml").read_text(encoding="utf-8")
+    for file in (root / "docs").glob("*.md"):
+        if f": {file.name}\n" not in listed:
+            yield f"mkdocs.yml: does not list {file.name}"
+        if file.name != "index.md" and f"({file.name})" not in (root / "docs/index.md").read_text(encoding="utf-8"):
+            yield f"docs/index.md: has no link to {file.name}"
+        if file.name != "index.md" and not re.search(rf"^\| .*`(docs/)?{re.escape(file.name)}`", (root / "README.md").read_text(), re.M):
+            yield f"README.md: its table of pages lacks {file.name}"
+
+
+def faults_of_search(site, chromium):
+    with tempfile.TemporaryDirectory() as profile:
+        page = browser.Page(chromium, profile)
+        try:
+            for number, (words, place) in enumerate(SEARCHES):
+                page.go((site / "index.html").as_uri() + f"?{number}")
+                page.until(f"document.readyState === 'complete' && location.search === '?{number}'")
+                page.evaluate("{const box = document.querySelector('#mkdocs-search-query'); "
+                              f"box.value = {json.dumps(words)}; box.dispatchEvent(new Event('input'))}}")
+                page.until("document.querySelectorAll('#mkdocs-search-results a').length > 0", 10)
+                found = page.evaluate("[...document.querySelectorAll('#mkdocs-search-results a')].map((a) => a.href)")
+                if (site / place.split("#")[0]).as_uri() + "#" + place.split("#")[1] not in found[:3]:
+                    yield f"search: {words}: not {place} but {[one.rsplit('/', 1)[1] for one in found[:3]]}"
+                for address in found:
+                    file, _, anchor = address.rpartition("/")[2].partition("#")
+                    if anchor not in Loads((site / file).read_text(encoding="utf-8")).anchors:
+                        yield f"search: {words}: leads to {file}#{anchor}, which is not there"
+            page.go((site / "log.html").as_uri() + "?q=qqqq+wwww")
+            if not page.until("document.querySelector('#mkdocs-search-results')?.textContent === 'No results found'", 10):
+                yield "search: does not say that it found nothing"
+        finally:
+            page.close()
+
+
+def main():
+    if not shutil.which("mkdocs"):
+        print("no mkdocs; apt-get install mkdocs")
+        return 77
+    with tempfile.TemporaryDirectory() as folder:
+        site = pathlib.Path(folder) / "site"
+        subprocess.run(["mkdocs", "build", "--quiet", "--strict", "--config-file", root / "mkdocs.yml", "--site-dir", site],
+                       check=True)
+        wrong = list(faults_of_files(site))
+        chromium = browser.find_chromium()
+        if chromium:
+            wrong += faults_of_search(site, chromium)
+    print(*wrong, sep="\n")
+    print(f"{len(SEARCHES)} searches, {len(wrong)} wrong" if chromium else "no chromium: nothing was searched for")
+    return 1 if wrong else 0 if chromium else 77
+
+
+sys.exit(main())
