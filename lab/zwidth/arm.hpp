@@ -5,6 +5,7 @@
 #include <cstdint>
 
 #include "controller/load/loaded_scene.hpp"
+#include "hil/hil_error.hpp"
 #include "lab/zwidth/subject.hpp"
 #include "lab/zwidth/swing.hpp"
 
@@ -18,6 +19,16 @@ inline constexpr std::size_t kArmHits = 5;
 /// devices' mechanics.
 [[nodiscard]] LoadedScene walls_scene(const Subject& subject);
 
+/// Nothing was measured: within 8 s the hand did not bring the device to the wall, by too much
+/// friction, mass or damping.
+class NotMet : public HilError {
+ public:
+  NotMet()
+      : HilError(
+            "the hand did not bring the device to the wall within 8 s; give less friction, mass or "
+            "damping, or --hand firm") {}
+};
+
 /// The whole servo step, driver and emulated device in virtual time, on `walls_scene`: the hand
 /// pushes slowly, hits the flat at 50 and 200 mm/s, slides onto it at 50 mm/s, then hits the corner
 /// of three walls at 50 mm/s, and stays for `seconds` each time. A hit is judged along the normal,
@@ -26,7 +37,7 @@ inline constexpr std::size_t kArmHits = 5;
 ///
 /// The subject's delay counts in whole bus cycles of 125 us; encoder and limits are those of
 /// device and servo. Without a hand a spring of 0.2 N/mm pushes. Counts its ticks in
-/// `ticks`. Throws HilError where the device never gets to the wall.
+/// `ticks`. Throws NotMet.
 [[nodiscard]] Swing hit_with_arm(const LoadedScene& scene, const Subject& subject,
                                  double stiffness_n_per_mm, double seconds, std::uint64_t seed,
                                  std::uint64_t& ticks);

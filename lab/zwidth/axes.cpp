@@ -233,6 +233,14 @@ AxisValues axis_values(AxisId axis, const std::string& text) {
   }
   if (values.empty()) fail(kind, text, "; give one, a list or a range (from:to:count)");
   for (const std::string& value : values) check(axis, value);
+  const bool numbers = kind.lowest != kind.highest;
+  for (std::size_t i = 1; i < values.size(); ++i) {
+    const bool falls = numbers && *number_in(values[i]) <= *number_in(values[i - 1]);
+    const bool again = std::find(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(i),
+                                 values[i]) != values.begin() + static_cast<std::ptrdiff_t>(i);
+    if (falls) fail(kind, text, "are no rising values; sort them, each once");
+    if (again) fail(kind, text, "has " + values[i] + " twice; name each once");
+  }
   return values;
 }
 

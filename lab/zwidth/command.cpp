@@ -11,8 +11,10 @@
 #include <thread>
 #include <utility>
 
+#include "controller/shell/law_trial.hpp"
 #include "hil/hil_error.hpp"
 #include "lab/rig/lab_run.hpp"
+#include "lab/zwidth/arm.hpp"
 #include "lab/zwidth/map.hpp"
 #include "lab/zwidth/one_axis.hpp"
 #include "lab/zwidth/page.hpp"
@@ -58,14 +60,15 @@ std::string crossing_text(const Crossing& crossing) {
 void tell(const Part& part, std::ostream& out) {
   const std::vector<Assignment> columns = part.spec.columns();
   std::set<std::string> reasons;
-  std::size_t impossible_count = 0;
+  std::size_t empty_count = 0;
   out << format("%-40s %10s %10s %10s %10s  re-entry\n", "column (N/mm)", "swings", "energy",
                 "exact", "passive");
   for (const auto& [index, column] : part.columns) {
     const Subject subject = subject_of(columns[index]);
     if (column.cells.empty()) {
-      ++impossible_count;
-      reasons.insert(impossible(subject));
+      const std::string why = impossible(part.spec, subject);
+      ++empty_count;
+      reasons.insert(why.empty() ? NotMet().what() : why);
       continue;
     }
     std::string name;
@@ -84,9 +87,9 @@ void tell(const Part& part, std::ostream& out) {
     }
     out << '\n';
   }
-  if (impossible_count > 0) {
-    out << impossible_count << " of " << part.columns.size()
-        << " columns cannot exist and are left empty: " << *reasons.begin() << '\n';
+  if (empty_count > 0) {
+    out << empty_count << " of " << part.columns.size()
+        << " columns are left empty: " << *reasons.begin() << '\n';
   }
 }
 
@@ -118,7 +121,8 @@ Command::Command(Arguments& program)
     const AxisKind& kind = axis_kinds()[i];
     std::string meaning = kind.meaning;
     if (*kind.standard != 0) meaning += std::string(" [") + kind.standard + "]";
-    app_.option((std::string("--") + kind.name).c_str(), axes_[i], meaning)
+    option_names_[i] = std::string("--") + kind.name;  // what is declared keeps only a pointer
+    app_.option(option_names_[i].c_str(), axes_[i], meaning)
         .shown_as(*kind.unit != 0 ? kind.unit : "VALUE");
   }
   app_.option("--stiffness", stiffness_,
@@ -150,6 +154,28 @@ Command::Command(Arguments& program)
       "Exit codes: 0 fine, 2 bad input or set-up; 3 interrupted, and --part has what is done.");
 }
 
+/// The program's own laws have a trial before a map runs them: one that loops would never end it.
+void Command::try_laws(const MapSpec& map) {
+  std::set<std::string> tried;
+  for (const Assignment& values : map.columns()) {
+    std::string laws;
+    for (const AxisId axis :
+         {AxisId::law, AxisId::estimator, AxisId::stabiliser, AxisId::numeric}) {
+      laws += value_of(values, axis) + ' ';
+    }
+    if (!tried.insert(laws).second) continue;
+    const Subject subject = subject_of(values);
+    LoadedScene scene;
+    scene.path = "zwidth";
+    scene.force.law = force_law_at(subject, map.stiffness_n_per_mm.front());
+    scene.force.stabiliser = subject.stabiliser;
+    scene.servo.velocity = subject.estimator;
+    scene.servo.numeric = subject.numeric;
+    const std::vector<std::string> flaws = try_own_laws(scene);
+    if (!flaws.empty()) throw HilError(flaws.front());
+  }
+}
+
 MapSpec Command::spec() const {
   MapSpec spec;
   const std::size_t comma = map_.find(',');
@@ -167,11 +193,6 @@ MapSpec Command::spec() const {
     throw HilError(std::string("--") + axis_kinds()[index_of(axis)].name +
                    ": device and servo have their own with --arm; leave one of the two out");
   }
-  for (const char* word : {"linear", "two_sided"}) {
-    if (!arm_ || texts[index_of(AxisId::law)].find(word) == std::string::npos) continue;
-    throw HilError(std::string("--law: ") + word +
-                   " is a wall of one axis alone; leave it or --arm out");
-  }
   if (!arm_ && !axes_[index_of(AxisId::mode)].empty()) {
     throw HilError("--mode: one axis is rigid; add --arm, or leave it out");
   }
@@ -185,6 +206,10 @@ MapSpec Command::spec() const {
   }
   for (std::size_t i = 0; i < kAxisCount; ++i) {
     if (!texts[i].empty()) spec.table[i] = axis_values(static_cast<AxisId>(i), texts[i]);
+  }
+  for (const std::string& law : spec.table[index_of(AxisId::law)]) {
+    if (!arm_ || (law != "linear" && law != "two_sided")) continue;
+    throw HilError("--law: " + law + " is a wall of one axis alone; leave it or --arm out");
   }
   for (const std::size_t axis : spec.mapped) {
     if (axis == kAxisCount || !spec.table[axis].empty()) continue;
@@ -322,6 +347,12 @@ bool Command::measure(const MapSpec& map, const Shard& shard, PartWriter& kept,
 }
 
 int Command::run(std::ostream& out) const {
+  const bool has_outputs =
+      !paths_.csv.empty() || !paths_.json.empty() || !paths_.plot.empty() || !part_.empty();
+  if ((!page_.empty() || !portraits_.empty()) && has_outputs) {
+    throw HilError(std::string(page_.empty() ? "--portraits" : "--page") +
+                   ": makes no map; leave --csv, --json, --plot and --part out, or run twice");
+  }
   if (!page_.empty()) {
     write_page();
     return 0;
@@ -329,8 +360,12 @@ int Command::run(std::ostream& out) const {
   const MapSpec map = spec();
   const Shard part = shard();
   const Outputs outputs(paths_);
+  try_laws(map);
   if (!paths_.plot.empty()) check_panels(map);
   if (!portraits_.empty()) {
+    if (map.arm || map.columns().size() > 1) {
+      throw HilError("--portraits: one axis and one value of each; leave --arm and lists out");
+    }
     draw_portraits(map);
     return 0;
   }

@@ -28,6 +28,7 @@ class Command final : public LabCommand {
 
  private:
   [[nodiscard]] MapSpec spec() const;
+  static void try_laws(const MapSpec& map);
   [[nodiscard]] Shard shard() const;
   [[nodiscard]] int threads(std::size_t columns) const;
   /// The columns of the shard that `kept` has not; false: interrupted.
@@ -36,7 +37,7 @@ class Command final : public LabCommand {
   void draw_portraits(const MapSpec& spec) const;
   void write_page() const;
 
-  std::array<std::string, kAxisCount> axes_;
+  std::array<std::string, kAxisCount> axes_, option_names_;
   std::string stiffness_, map_ = "damping,stiffness", shard_ = "1/1", part_, portraits_, page_;
   std::vector<std::string> cells_;
   OutputPaths paths_;

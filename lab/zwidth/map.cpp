@@ -11,6 +11,8 @@
 #include "controller/law/registry/law_registry.hpp"
 #include "controller/load/loaded_scene.hpp"
 #include "controller/stability/stable_gains.hpp"
+#include "hil/devmodel/bus_cycle.hpp"
+#include "hil/devmodel/plant_params.hpp"
 #include "hil/hil_error.hpp"
 #include "lab/zwidth/arm.hpp"
 #include "lab/zwidth/one_axis.hpp"
@@ -89,7 +91,13 @@ class ColumnRun {
 
 }  // namespace
 
-std::string impossible(const Subject& subject) {
+std::string impossible(const MapSpec& spec, const Subject& subject) {
+  const double cycles = subject.loop.delay_s * kCyclesPerSecond;
+  constexpr double kRounding = 1e-6;
+  if (spec.arm && (cycles > kMaxDelayCycles || std::abs(cycles - std::round(cycles)) > kRounding)) {
+    return format("delay %g ms: an emulated device has whole steps of 0.125 ms, up to 8 ms",
+                  subject.loop.delay_s * 1000);
+  }
   const double most = highest_damping(subject.loop);
   if (subject.damping_ns_per_mm <= most) return {};
   return format("damping %g N s/mm is above %.4g, the most that is stable without a wall",
@@ -99,7 +107,7 @@ std::string impossible(const Subject& subject) {
 Column measure_column(const MapSpec& spec, const Assignment& values, std::size_t index) {
   const Subject subject = subject_of(values);
   Column column;
-  if (!impossible(subject).empty()) return column;
+  if (!impossible(spec, subject).empty()) return column;
   try {
     ColumnRun run(spec, subject, index);
     for (const double stiffness : spec.stiffness_n_per_mm) {
@@ -108,6 +116,8 @@ Column measure_column(const MapSpec& spec, const Assignment& values, std::size_t
     column.swing = run.crossing(&Swing::swings);
     column.energy = run.crossing(&Swing::active);
     column.ticks = run.ticks();
+  } catch (const NotMet&) {
+    return {};
   } catch (const LawError& error) {
     throw HilError("--law: " + subject.force_law.name + error.what());
   }

@@ -38,15 +38,15 @@ struct Crossing {
 
 /// One combination of the other axes, at all stiffnesses.
 struct Column {
-  std::vector<Swing> cells;  ///< empty: it cannot exist
+  std::vector<Swing> cells;  ///< empty: it cannot exist, or the hand never met the wall
   Crossing swing, energy;
   std::uint64_t ticks = 0;  ///< that it took, in this process
 };
 using Columns = std::map<std::size_t, Column>;
 
-/// Why a column cannot exist: its damping alone is beyond what any sampled wall may have; else
-/// empty.
-[[nodiscard]] std::string impossible(const Subject& subject);
+/// Why a column cannot exist: its damping alone is beyond what any sampled wall may have, or the
+/// emulated device cannot have its delay; else empty.
+[[nodiscard]] std::string impossible(const MapSpec& spec, const Subject& subject);
 
 /// The column of `values`, number `index` of the map.
 [[nodiscard]] Column measure_column(const MapSpec& spec, const Assignment& values,

@@ -139,13 +139,22 @@ Part read_part(const std::string& path) {
                    error.what() + "); remove the file to begin anew");
   }
   if (number == 0) throw HilError(path + ": no part of a map; remove the file to begin anew");
-  const std::size_t count = part.spec.columns().size();
-  const bool fits = std::ranges::all_of(part.columns, [&](const auto& column) {
-    return column.first < count && part.shard.has(column.first);
-  });
-  if (part.shard.index < 1 || part.shard.index > part.shard.count || !fits) {
-    throw HilError(path + ": has columns that its shard " + shard_text(part.shard) +
-                   " has not; remove the file to begin anew");
+  if (part.shard.index < 1 || part.shard.index > part.shard.count) {
+    throw HilError(path + ": shard " + shard_text(part.shard) +
+                   " is no part of a whole; remove the file to begin anew");
+  }
+  const std::vector<Assignment> columns = part.spec.columns();
+  for (const auto& [index, column] : part.columns) {
+    if (index >= columns.size() || !part.shard.has(index)) {
+      throw HilError(path + ": has columns that its shard " + shard_text(part.shard) +
+                     " has not; remove the file to begin anew");
+    }
+    if (!column.cells.empty() && column.cells.size() != part.spec.stiffness_n_per_mm.size()) {
+      throw HilError(path + ": column " + std::to_string(index) + " has " +
+                     std::to_string(column.cells.size()) + " cells for " +
+                     std::to_string(part.spec.stiffness_n_per_mm.size()) +
+                     " stiffnesses; remove the file to begin anew");
+    }
   }
   return part;
 }

@@ -69,7 +69,7 @@ std::string json_of(const Part& part) {
     const Assignment& values = assignments[index];
     const Subject subject = subject_of(values);
     const Analytic analytic = analytic_of(subject);
-    const std::string why = impossible(subject);
+    const std::string why = impossible(part.spec, subject);
     Json axes = Json::Members{};
     each_axis([&](AxisId axis, const AxisKind& kind) {
       axes[column_name(kind)] = value_of(values, axis);

@@ -245,6 +245,16 @@ TEST_CASE("parts that make no map are refused in one line, and nothing is lost")
   refused("merge " + b + " " + c, "of version 0.0.1");
   std::ofstream(b, std::ios::binary) << kept.substr(0, kept.rfind('\n', kept.size() - 2) + 1);
   refused("merge " + b + " " + c, "has 2 of its 3 columns");
+  for (const char* shard : {"[0,0]", "[1,0]", "[3,2]"}) {
+    std::string odd = kept;
+    odd.replace(odd.find("[1,2]"), 5, shard);
+    std::ofstream(b, std::ios::binary) << odd;
+    refused("merge " + b + " " + c, "is no part of a whole");
+  }
+  std::string more = kept;
+  more.replace(more.find("\"cells\":[["), 10, "\"cells\":[[true,true,0,0],[");
+  std::ofstream(b, std::ios::binary) << more;
+  refused("merge " + b + " " + c, "cells for ");
   std::ofstream(b, std::ios::binary) << "hello\n";
   refused("merge " + b + " " + c, "line 1");
   std::ofstream(b, std::ios::binary) << "";
@@ -257,6 +267,10 @@ TEST_CASE("axes that mean nothing are refused in one line; columns that cannot e
                            "--damping 0:1:1",
                            "--damping -1",
                            "--damping nan",
+                           "--damping \"\"",
+                           "--damping 0.02,0.002",
+                           "--rate 1000,1000",
+                           "--law coupling,coupling",
                            "--damping 0,,1",
                            "--delay 65",
                            "--rate 0",
@@ -280,6 +294,9 @@ TEST_CASE("axes that mean nothing are refused in one line; columns that cannot e
                            "--arm --rate 3000 --seconds 0.1",
                            "--portraits /dev/null",
                            "--portraits /dev/null --cells 1",
+                           "--portraits /dev/null --cells 1:0.002 --csv /dev/null",
+                           "--portraits /dev/null --cells 1:0.002 --delay 0,1",
+                           "--page /dev/null --csv /dev/null",
                            "--seconds 0",
                            "--plot /dev/null --delay 0:3:7 --quantum 0,0.1"}) {
     const Said said = lab(std::string("zwidth ") + line);
@@ -292,7 +309,20 @@ TEST_CASE("axes that mean nothing are refused in one line; columns that cannot e
   const Said said =
       lab("zwidth --damping 0.002,0.2 --delay 0 --viscous 0 --stiffness 0.2,1 --seconds 0.2");
   CHECK(said.code == 0);
-  CHECK(said.out.find("1 of 2 columns cannot exist") != std::string::npos);
+  CHECK(said.out.find("1 of 2 columns are left empty: damping ") != std::string::npos);
+}
+
+TEST_CASE("what the emulated device cannot do, or the hand never meets, is empty and told") {
+  const auto told = [](const char* line) {
+    const Said said =
+        lab(std::string("zwidth --arm --damping 0.002 --stiffness 0.3,3 --seconds 0.1 ") + line);
+    CHECK(said.code == 0);
+    return said.out;
+  };
+  CHECK(told("--delay 9").find("1 of 1 columns are left empty: delay 9 ms") != std::string::npos);
+  CHECK(told("--delay 0.33").find("empty: delay 0.33 ms") != std::string::npos);
+  CHECK(told("--friction 3").find("empty: the hand did not bring the device to the wall") !=
+        std::string::npos);
 }
 
 TEST_CASE("a column tells its first crossing and what comes to rest above it apart") {
