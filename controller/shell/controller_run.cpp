@@ -102,19 +102,14 @@ std::uint64_t hash_of_volumes(const LoadedScene& scene, const Servo& servo) {
   return hash;
 }
 
-/// The volumes as they are now: the first as `path`, others beside it under their names.
-void write_final(const LoadedScene& scene, const Servo& servo, const std::filesystem::path& path) {
+/// The volumes as they are now.
+void write_final(const ControllerOptions& options, const LoadedScene& scene, const Servo& servo) {
   for (std::size_t v = 0; v < scene.volumes.size(); ++v) {
     if (v > 0 && !scene.volumes[v].solid) continue;
     VolumeImage image = scene.volumes[v].image;
     const auto density = servo.density(v);
     image.density.assign(density.begin(), density.end());
-    auto target = path;
-    if (v > 0) {
-      target.replace_filename(path.stem().string() + "-" + scene.volumes[v].name +
-                              path.extension().string());
-    }
-    write_volume(image, target);
+    write_volume(image, final_path(options, scene, v));
   }
 }
 
@@ -139,9 +134,7 @@ void check_options(const ControllerOptions& options, const LoadedScene& scene) {
                              std::to_string(scene.servo.rate_hz) + " Hz; spin less");
   }
   static_cast<void>(segment_socket(options.name));
-  if (!options.report.empty()) check_new_file(options.report);
-  if (!options.final_volume.empty()) check_volume_path(options.final_volume);
-  if (!options.emulator_args.empty()) check_new_file(options.emulator_args);
+  check_run_files(options, scene);
 }
 
 /// Everything that can be known to go wrong, before the hand is moved.
@@ -285,7 +278,7 @@ int run_controller(const ControllerOptions& options) {
   report.volume_hash = hash_of_volumes(scene, *servo);
   std::fputs(summary(report).c_str(), stdout);
   if (!options.report.empty()) write_new_file(options.report, report_json(report));
-  if (!options.final_volume.empty()) write_final(scene, *servo, options.final_volume);
+  if (!options.final_volume.empty()) write_final(options, scene, *servo);
   return clean && report.record.faults.count == 0 ? 0 : 1;
 }
 

@@ -20,6 +20,7 @@
 #include "controller/volume_tool/import_scene.hpp"
 #include "controller/volume_tool/volume_options.hpp"
 #include "shared/posix/new_file.hpp"
+#include "shared/posix/run_files.hpp"
 #include "shared/text/number.hpp"
 
 namespace kerf {
@@ -50,7 +51,7 @@ const char* way_to_change(const std::string& what) {
 
 /// What is written.
 struct ImportCommand::Files {
-  fs::path volume, scene, preview;
+  fs::path volume, labels, scene, preview;
 };
 
 ImportCommand::ImportCommand(Arguments& app)
@@ -90,7 +91,7 @@ ImportCommand::ImportCommand(Arguments& app)
 }
 
 ImportCommand::Files ImportCommand::files() const {
-  Files files{out_, {}, {}};
+  Files files{out_, {}, {}, {}};
   if (out_.empty()) {
     fs::path name = fs::path(path_).lexically_normal();
     if (!name.has_filename()) name = name.parent_path();
@@ -102,8 +103,12 @@ ImportCommand::Files ImportCommand::files() const {
   check_volume_path(files.volume);
   files.scene = fs::path(files.volume).replace_extension(".toml");
   files.preview = fs::path(files.volume).replace_extension(".png");
-  for (const fs::path& file :
-       {files.volume, labels_path(files.volume), files.scene, files.preview}) {
+  files.labels = labels_path(files.volume);
+  check_outputs(files_read(path_), {{"--out", files.volume, ".nrrd"},
+                                    {"--out", files.labels, ".nrrd"},
+                                    {"--out", files.scene, ".toml"},
+                                    {"--out", files.preview, ".png"}});
+  for (const fs::path& file : {files.volume, files.labels, files.scene, files.preview}) {
     refuse_replacing(file, force_);
   }
   return files;
@@ -163,10 +168,7 @@ void ImportCommand::run(std::ostream& out) const {
   denoise(image.grid, image.density, passes);
   if (!whole_) image = crop_to_solid(image, iso);
 
-  write_volume(image, to.volume, packed_ ? VolumeEncoding::gzip : VolumeEncoding::raw);
-  write_new_file(to.scene,
-                 imported_scene_text({path_, to.volume, &proposal, iso / kDensityMax, passes}));
-  write_new_file(to.preview, preview);
+  write(image, {path_, to.volume, &proposal, iso / kDensityMax, passes}, preview, to);
 
   line(out, "file", values.str(), spacing_.empty() ? "--spacing A,B,C for another voxel size" : "");
   if (!note.empty()) line(out, "series", note, "--series for another");
@@ -184,11 +186,25 @@ void ImportCommand::run(std::ostream& out) const {
   line(out, "try", "./kerf demo --scene " + to.scene.string(), "");
 }
 
+void ImportCommand::write(const VolumeImage& image, const ImportedScene& scene,
+                          const std::string& preview, const Files& to) const {
+  NewFiles files;
+  add_volume(image, to.volume, packed_ ? VolumeEncoding::gzip : VolumeEncoding::raw, files);
+  const auto add = [&](const fs::path& path, const std::string& bytes) {
+    NewFile& file = files.add(path);
+    file.write(bytes.data(), bytes.size());
+    file.close();
+  };
+  add(to.scene, imported_scene_text(scene));
+  if (!preview.empty()) add(to.preview, preview);
+  commit(files, force_);
+  if (image.labels.empty()) remove_labels(to.volume);
+}
+
 void ImportCommand::import_labelled(VolumeImage image, const Files& to, std::ostream& out) const {
   const Density iso = otsu_threshold(image);
   if (!whole_) image = crop_to_solid(image, iso);
-  write_volume(image, to.volume, packed_ ? VolumeEncoding::gzip : VolumeEncoding::raw);
-  write_new_file(to.scene, imported_scene_text({path_, to.volume, nullptr, iso / kDensityMax, 0}));
+  write(image, {path_, to.volume, nullptr, iso / kDensityMax, 0}, {}, to);
   line(out, "file", path_ + ": " + size_text(image) + ", with labels, which tell the materials",
        "");
   line(out, "wrote", to.volume.string() + ", its labels, " + to.scene.string(), "");

@@ -3,14 +3,15 @@
 
 #include <cstdio>
 #include <filesystem>
-#include <map>
 #include <utility>
+#include <vector>
 
 #include "hil/hil_error.hpp"
 #include "shared/posix/cores.hpp"
 #include "shared/posix/new_file.hpp"
 #include "shared/posix/page_part.hpp"
 #include "shared/posix/provenance.hpp"
+#include "shared/posix/run_files.hpp"
 
 namespace kerf {
 namespace {
@@ -66,15 +67,9 @@ void LabOutput::write_part(const char* name, const std::string& text) const {
 }
 
 void LabOutput::check_distinct(std::initializer_list<const LabOutput*> outputs) {
-  std::map<std::filesystem::path, const char*> options;
-  for (const LabOutput* output : outputs) {
-    if (output->path_.empty()) continue;
-    const auto file = std::filesystem::weakly_canonical(std::filesystem::absolute(output->path_));
-    const auto [other, is_new] = options.emplace(file, output->option_);
-    if (is_new) continue;
-    throw HilError(std::string(output->option_) + " " + output->path_ + ": " + other->second +
-                   " writes there, too; give each a file of its own");
-  }
+  std::vector<OutputFile> files;
+  for (const LabOutput* output : outputs) files.push_back({output->option_, output->path_, {}});
+  kerf::check_distinct(files);
 }
 
 }  // namespace kerf

@@ -25,7 +25,7 @@ class LabOutput {
   /// The same as one part of a page that others write to, too: see `write_page_part`.
   void write_part(const char* name, const std::string& text) const;
 
-  /// Throws `HilError` where two of a run's outputs are one file.
+  /// Throws `FileError` where two of a run's outputs are one file.
   static void check_distinct(std::initializer_list<const LabOutput*> outputs);
 
  private:

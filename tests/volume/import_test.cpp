@@ -1,8 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <array>
 #include <cstdlib>
 #include <filesystem>
+#include <future>
 
 #include <doctest/doctest.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include "controller/scene/scene_file.hpp"
 #include "controller/volume/file/volume_write.hpp"
@@ -97,6 +102,51 @@ TEST_CASE("import replaces no file without --force") {
   CHECK(run({"import", ball, "--out", out}).code == 0);
   CHECK(run({"import", ball, "--out", out}).code == 2);
   CHECK(run({"import", ball, "--out", out, "--force"}).code == 0);
+}
+
+TEST_CASE("import writes all of its files or none") {
+  const TempFolder folder;
+  const std::string ball = ball_file(folder, kHalf), out = (folder / "out.nrrd").string();
+  for (const std::string name : {"out.toml", "out.png", "out-labels.nrrd"}) {
+    const auto there = folder / name.c_str();
+    std::filesystem::create_directory(there);
+    const Outcome refused = run({"import", ball, "--out", out, "--force"});
+    CAPTURE(refused.err);
+    CHECK(refused.code == 2);
+    CHECK(has(refused.err, name + ": cannot be written (Is a directory)"));
+    CHECK_FALSE(std::filesystem::exists(out));
+    std::filesystem::remove(there);
+  }
+}
+
+TEST_CASE("of two imports to one name at once, one wins and the other gets its line") {
+  const TempFolder folder;
+  const std::string ball = ball_file(folder, kHalf), out = (folder / "out.nrrd").string();
+  constexpr std::size_t kAtOnce = 6;
+  std::array<std::future<int>, kAtOnce> codes;
+  for (auto& code : codes) {
+    code = std::async(std::launch::async, [&] {
+      const pid_t child = fork();
+      if (child == 0) {
+        const Outcome made = run({"import", ball, "--out", out});
+        const bool told = has(made.err, "is there already; take another name, or --force");
+        _exit(made.code == 0 ? 0 : told ? 1 : 2);
+      }
+      int status = 0;
+      waitpid(child, &status, 0);
+      return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+    });
+  }
+  std::array<int, kAtOnce> ends{};
+  std::ranges::transform(codes, ends.begin(), [](auto& code) { return code.get(); });
+  CHECK(std::ranges::count(ends, 0) == 1);
+  CHECK(std::ranges::count(ends, 1) == kAtOnce - 1);
+  CHECK(parse_scene_file(folder / "out.toml").volumes.size() == 1);
+  std::size_t files = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(folder.path())) {
+    files += entry.is_regular_file() ? 1 : 0;
+  }
+  CHECK(files == 4);  // the ball, and three of one import
 }
 
 TEST_CASE("import asks about a voxel size that makes no sense, and writes nothing") {

@@ -4,12 +4,17 @@
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
+#include <filesystem>
 #include <string>
+#include <system_error>
 
 #include <sched.h>
 
 #include "shared/posix/cores.hpp"
+#include "shared/posix/new_file.hpp"
+#include "shared/posix/run_files.hpp"
 #include "visualizer/error.hpp"
+#include "visualizer/surface/mesh_file.hpp"
 #include "visualizer/view/session.hpp"
 #include "visualizer/view/transfer_file.hpp"
 
@@ -27,6 +32,27 @@ int exit_code(const Session& session, bool video_is_cut) {
   const bool lost = session.ended() && !session.ended_cleanly();
   if (lost) std::fprintf(stderr, "kerf-visualizer: the controller went away without a clean end\n");
   return lost || video_is_cut ? 1 : 0;
+}
+
+void check_files(const VisualizerOptions& options) {
+  if (options.mesh) check_export(*options.mesh);
+  const auto path = [](const auto& asked) { return std::filesystem::path(asked.value_or("")); };
+  const std::filesystem::path mesh = path(options.mesh), attached = path(options.attached);
+  const std::string mesh_ending = mesh.extension().string();
+  check_outputs({path(options.transfer)},
+                {{"--attached", attached, {}},
+                 {"--choice", path(options.choice), {}},
+                 {"--record", options.record == "-" ? "" : path(options.record), ".y4m"},
+                 {"--export", mesh, mesh_ending},
+                 {"--sheet", path(options.sheet), ".png"},
+                 {"--report", path(options.report), ".json"},
+                 {"--page", path(options.page), ".md"},
+                 {"--summary", path(options.summary), ".md"}});
+  std::error_code none_there;
+  const auto bytes = std::filesystem::file_size(attached, none_there);
+  if (none_there || bytes == 0) return;
+  throw FileError(attached.string() + ": holds " + std::to_string(bytes) +
+                  " bytes, and --attached makes an empty file; give a name that is free");
 }
 
 std::vector<int> place_process(std::span<const int> cpus) {

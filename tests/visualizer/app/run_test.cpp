@@ -364,6 +364,28 @@ TEST_CASE("an export that cannot work is refused before anything is drawn") {
   CHECK_THROWS_AS(static_cast<void>(run_headless(options)), VisualizerError);
 }
 
+TEST_CASE("no output takes the place of another kind of file") {
+  const Place place;
+  fs::create_directories(place.path);
+  const fs::path scan = place.path / "scan.nrrd", notes = place.path / "notes";
+  for (const fs::path& mine : {scan, notes}) std::ofstream(mine) << "mine";
+  const auto refused = [&](const auto& ask) {
+    VisualizerOptions options = place.options();
+    ask(options);
+    CHECK_THROWS_AS(static_cast<void>(run_headless(options)), FileError);
+    CHECK_THROWS_AS(static_cast<void>(run_window(options)), FileError);
+  };
+  refused([&](VisualizerOptions& o) { o.attached = scan; });
+  refused([&](VisualizerOptions& o) { o.attached = notes; });
+  refused([&](VisualizerOptions& o) { o.choice = scan; });
+  refused([&](VisualizerOptions& o) { o.sheet = scan; });
+  refused([&](VisualizerOptions& o) { o.record = scan.string(); });
+  refused([&](VisualizerOptions& o) { o.report = scan; });
+  refused([&](VisualizerOptions& o) { o.report = o.transfer = notes; });
+  refused([&](VisualizerOptions& o) { o.report = o.sheet = place.path / "one"; });
+  for (const fs::path& mine : {scan, notes}) CHECK(contents(mine) == "mine");
+}
+
 TEST_CASE("a report that cannot be written is refused before anything is drawn") {
   const Place place;
   VisualizerOptions options = place.options();
