@@ -4,6 +4,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <future>
+#include <iterator>
 
 #include <doctest/doctest.h>
 #include <sys/wait.h>
@@ -102,6 +103,29 @@ TEST_CASE("import replaces no file without --force") {
   CHECK(run({"import", ball, "--out", out}).code == 0);
   CHECK(run({"import", ball, "--out", out}).code == 2);
   CHECK(run({"import", ball, "--out", out, "--force"}).code == 0);
+}
+
+TEST_CASE("an import writes nothing into the folder that it reads") {
+  const TempFolder folder;
+  const std::filesystem::path slices = folder / "slices", before = std::filesystem::current_path();
+  std::filesystem::create_directory(slices);
+  folder.write("slices/s1.png", "a slice");
+  const auto refused = [&](const std::string& path, const std::vector<std::string>& more) {
+    std::vector<std::string> arguments{"import", path, "--spacing", "0.5"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    const Outcome outcome = run(arguments);
+    CAPTURE(outcome.err);
+    CHECK(outcome.code == 2);
+    CHECK(has(outcome.err, ", which are read; name a place outside with --out"));
+  };
+  refused(slices, {"--out", slices / "mine.nrrd"});
+  refused(slices, {"--out", slices / "mine.nrrd", "--force"});
+  std::filesystem::current_path(slices);
+  refused(".", {});
+  refused("../slices", {});
+  std::filesystem::current_path(before);
+  const auto files = std::filesystem::directory_iterator(slices);
+  CHECK(std::distance(files, std::filesystem::directory_iterator()) == 1);
 }
 
 TEST_CASE("import writes all of its files or none") {
