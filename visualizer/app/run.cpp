@@ -68,8 +68,13 @@ std::vector<int> place_process(std::span<const int> cpus) {
     CPU_SET(static_cast<std::size_t>(cpu), &wanted);
     names += (names.empty() ? "" : ",") + std::to_string(cpu);
   }
-  if (sched_setaffinity(0, sizeof(wanted), &wanted) != 0) {
-    throw VisualizerError("--cpu: " + names + " is not to be had here; leave the option out");
+  cpu_set_t had;  // those of `wanted` that there are: one is enough for the call to work
+  const bool some = sched_setaffinity(0, sizeof(wanted), &wanted) == 0 &&
+                    sched_getaffinity(0, sizeof(had), &had) == 0;
+  for (const int cpu : taken) {
+    if (some && CPU_ISSET(static_cast<std::size_t>(cpu), &had)) continue;
+    throw VisualizerError("--cpu: " + (some ? std::to_string(cpu) : names) +
+                          " is not to be had here; leave the option out");
   }
   constexpr int kKeepWhatTheUserSet = 0;
   setenv("LP_NUM_THREADS", std::to_string(taken.size()).c_str(), kKeepWhatTheUserSet);
