@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <stdexcept>
 #include <string>
+#include <system_error>
 #include <vector>
 
 #include "controller/load/scene_json.hpp"
@@ -57,7 +58,9 @@ std::vector<fs::path> files_read(const ControllerOptions& options, const LoadedS
     const std::string& file = scene.volume_specs[v].file;
     if (file == kPhantomFile) continue;
     files.push_back(v == 0 && options.overrides.volume_file ? fs::path(file) : folder / file);
-    files.push_back(labels_path(files.back()));
+    const fs::path labels = labels_path(files.back());
+    std::error_code fault;
+    if (fs::exists(fs::symlink_status(labels, fault))) files.push_back(labels);
   }
   for (const ToolSpec& tool : scene.tool_specs) {
     if (!tool.file.empty()) files.push_back(folder / tool.file);

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <ostream>
 #include <sstream>
+#include <system_error>
 #include <utility>
 
 #include "controller/scene/scene_error.hpp"
@@ -38,6 +39,17 @@ std::string size_text(const VolumeFrame& frame) {
   text << frame.grid.nx << " x " << frame.grid.ny << " x " << frame.grid.nz << " voxels of " << s[0]
        << " x " << s[1] << " x " << s[2] << " mm";
   return text.str();
+}
+
+/// No tool fits such a scene, whoever gave the spacing.
+void refuse_stretched(const std::string& path, const VolumeFrame& frame) {
+  if (!is_stretched(frame)) return;
+  const auto& s = frame.spacing_mm;
+  std::ostringstream text;
+  text << path << ": spacing " << s[0] << " x " << s[1] << " x " << s[2]
+       << " mm has a side of more than " << kMostStretched
+       << " times another; give the true voxel size with --spacing x,y,z (mm), or resample it";
+  throw SceneError(text.str());
 }
 
 const char* way_to_change(const std::string& what) {
@@ -108,6 +120,8 @@ ImportCommand::Files ImportCommand::files() const {
                                     {"--out", files.labels, ".nrrd"},
                                     {"--out", files.scene, ".toml"},
                                     {"--out", files.preview, ".png"}});
+  check_imported_scene(imported_scene_text({path_, files.volume, nullptr, 0, 0.5, 0}), files.scene,
+                       files.volume);
   for (const fs::path& file : {files.volume, files.labels, files.scene, files.preview}) {
     refuse_replacing(file, force_);
   }
@@ -115,8 +129,13 @@ ImportCommand::Files ImportCommand::files() const {
 }
 
 void ImportCommand::run(std::ostream& out) const {
-  if (!series_.empty() && fs::is_regular_file(path_)) {
+  std::error_code fault;
+  if (!series_.empty() && fs::is_regular_file(path_, fault)) {
     throw SceneError("--series: " + path_ + " is one file; leave it out, or name the folder");
+  }
+  if (!dims_.empty() && fs::is_directory(path_, fault)) {
+    throw SceneError("--dims: " + path_ +
+                     " is a folder; name one file without a header, or leave it out");
   }
   const Files to = files();
   ReadOptions options;
@@ -138,6 +157,7 @@ void ImportCommand::run(std::ostream& out) const {
   }
 
   SourceVolume source = read_volume(path_, options);
+  refuse_stretched(path_, source);
   const Window range = range_window(source);
   const std::string note = source.note;
   std::ostringstream values;
@@ -145,15 +165,14 @@ void ImportCommand::run(std::ostream& out) const {
 
   VolumeImage whole = apply_window(source, range);
   read_labels_beside(path_, whole, cpu_s_);
-  if (!whole.labels.empty() && !iso_.empty()) {
-    throw SceneError("--iso: the labels beside " + path_ + " tell what is solid; leave it out");
-  }
+  if (!whole.labels.empty()) refuse_beside_labels();
   if (!whole.labels.empty()) return import_labelled(std::move(whole), to, out);
   ProposedVolume proposed = propose_volume(std::move(whole), range, wishes);
   const VolumeProposal& proposal = proposed.proposal;
   const std::string odd = odd_spacing(source, proposal.solid, proposal.surface.hounsfield);
   if (!odd.empty() && spacing_.empty()) {
-    throw SceneError(path_ + ": " + odd + "; give the true voxel size with --spacing x,y,z (mm)");
+    throw SceneError(path_ + ": spacing " + odd +
+                     "; give the true voxel size with --spacing x,y,z (mm)");
   }
   const std::string preview = png_bytes(import_preview(source, proposed));
   source = {};
@@ -168,7 +187,7 @@ void ImportCommand::run(std::ostream& out) const {
   denoise(image.grid, image.density, passes);
   if (!whole_) image = crop_to_solid(image, iso);
 
-  write(image, {path_, to.volume, &proposal, iso / kDensityMax, passes}, preview, to);
+  write(image, {path_, to.volume, &proposal, 0, iso / kDensityMax, passes}, preview, to);
 
   line(out, "file", values.str(), spacing_.empty() ? "--spacing A,B,C for another voxel size" : "");
   if (!note.empty()) line(out, "series", note, "--series for another");
@@ -186,6 +205,18 @@ void ImportCommand::run(std::ostream& out) const {
   line(out, "try", "./kerf demo --scene " + to.scene.string(), "");
 }
 
+void ImportCommand::refuse_beside_labels() const {
+  const std::pair<const char*, bool> given[] = {{"--iso", !iso_.empty()},
+                                                {"--window", !window_.empty()},
+                                                {"--denoise", denoise_ != "auto"},
+                                                {"--keep-all", keep_all_}};
+  for (const auto& [option, is_given] : given) {
+    if (!is_given) continue;
+    throw SceneError(std::string(option) + ": the labels beside " + path_ +
+                     " tell what is solid; leave it out");
+  }
+}
+
 void ImportCommand::write(const VolumeImage& image, const ImportedScene& scene,
                           const std::string& preview, const Files& to) const {
   NewFiles files;
@@ -195,7 +226,9 @@ void ImportCommand::write(const VolumeImage& image, const ImportedScene& scene,
     file.write(bytes.data(), bytes.size());
     file.close();
   };
-  add(to.scene, imported_scene_text(scene));
+  const std::string text = imported_scene_text(scene);
+  check_imported_scene(text, to.scene, to.volume);
+  add(to.scene, text);
   if (!preview.empty()) add(to.preview, preview);
   commit(files, force_);
   if (image.labels.empty()) remove_labels(to.volume);
@@ -203,8 +236,9 @@ void ImportCommand::write(const VolumeImage& image, const ImportedScene& scene,
 
 void ImportCommand::import_labelled(VolumeImage image, const Files& to, std::ostream& out) const {
   const Density iso = otsu_threshold(image);
+  const Label last = *std::ranges::max_element(image.labels);
   if (!whole_) image = crop_to_solid(image, iso);
-  write(image, {path_, to.volume, nullptr, iso / kDensityMax, 0}, {}, to);
+  write(image, {path_, to.volume, nullptr, last, iso / kDensityMax, 0}, {}, to);
   line(out, "file", path_ + ": " + size_text(image) + ", with labels, which tell the materials",
        "");
   line(out, "wrote", to.volume.string() + ", its labels, " + to.scene.string(), "");

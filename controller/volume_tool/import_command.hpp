@@ -31,6 +31,8 @@ class ImportCommand {
   /// All of them, or none.
   void write(const VolumeImage& image, const ImportedScene& scene, const std::string& preview,
              const Files& to) const;
+  /// What asks for a surface, where labels are one.
+  void refuse_beside_labels() const;
   void import_labelled(VolumeImage image, const Files& files, std::ostream& out) const;
 
   Arguments command_;

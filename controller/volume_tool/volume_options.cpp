@@ -56,7 +56,11 @@ VoxelGrid grid_from(const std::string& option, const std::string& text) {
 }
 
 std::vector<std::filesystem::path> files_read(const std::filesystem::path& volume) {
-  return {volume, labels_path(volume)};
+  std::vector<std::filesystem::path> files{volume};
+  const std::filesystem::path labels = labels_path(volume);
+  std::error_code fault;
+  if (exists(symlink_status(labels, fault))) files.push_back(labels);
+  return files;
 }
 
 namespace {

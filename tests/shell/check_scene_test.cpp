@@ -90,5 +90,7 @@ TEST_CASE("no output of a run takes the place of a file of its scene") {
   options.report = (folder / "report.json").string();
   options.final_volume = (folder / "final.nrrd").string();
   CHECK_NOTHROW(check_run_files(options, scene));
+  scene.volume_specs[0].file = "final.mhd";  // has the labels of final.nrrd, but there are none
+  CHECK_NOTHROW(check_run_files(options, scene));
   fs::remove_all(folder);
 }
