@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "controller/shell/controller_run.hpp"
 
+#include <algorithm>
 #include <array>
 #include <atomic>
+#include <cstdint>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
@@ -66,6 +68,18 @@ double removed_mm3(const LoadedScene& scene, const RunRecord& record) {
   return mm3;
 }
 
+/// Whether a voxel of the material can be at the surface, or within. Labels make solid whatever
+/// they name.
+bool is_felt(const LoadedScene& scene, const MaterialRule& rule, std::size_t material) {
+  return std::ranges::any_of(scene.volumes, [&](const SceneVolume& volume) {
+    if (!volume.image.labels.empty()) return true;
+    for (std::uint32_t density = volume.iso; density <= kDensityMax; ++density) {
+      if (rule.of(Label{0}, static_cast<Density>(density)) == material) return true;
+    }
+    return false;
+  });
+}
+
 /// Of each material of the scene, since the last reset.
 MaterialScores scores_of(const LoadedScene& scene, const CompiledScene& servo,
                          const RunRecord& record) {
@@ -86,7 +100,7 @@ MaterialScores scores_of(const LoadedScene& scene, const CompiledScene& servo,
   for (std::size_t m = 0; m < scene.materials.size(); ++m) {
     if (m == 0 && removed[0] == 0) continue;  // "none": no voxel of it
     const Material& material = scene.materials[m];
-    scores.push_back({material.name, removed[m], std::nullopt});
+    scores.push_back({material.name, removed[m], std::nullopt, is_felt(scene, rule, m)});
     if (!material.forbidden) continue;
     scores.back().forbidden_ms =
         static_cast<double>(record.forbidden_ticks[m]) * 1000 / scene.servo.rate_hz;
@@ -269,6 +283,9 @@ int run_controller(const ControllerOptions& options) {
   name_law_faults(scene, report.record.faults);
   report.removed_mm3 = removed_mm3(scene, report.record);
   report.materials = scores_of(scene, *servo, report.record);
+  report.workspace_scale = scene.device.workspace_scale;
+  report.tool = scene.tools[scene.active_tool].name;
+  report.tool_mm = 2 * scene.tools[scene.active_tool].radius_mm;
   report.lost_packets = device.lost();
   report.refused_packets = device.refused();
   report.link = port->counters();
