@@ -53,9 +53,11 @@ std::string page_number(double value) {
   return text;
 }
 
-LabOutput::LabOutput(const char* option, std::string path)
+LabOutput::LabOutput(const char* option, std::string path, const char* ending)
     : option_(option), path_(std::move(path)) {
-  if (!path_.empty()) guarded(option_, [&] { check_new_file(path_); });
+  if (path_.empty()) return;
+  guarded(option_, [&] { check_new_file(path_); });
+  check_outputs({}, {{option_, path_, ending}});
 }
 
 void LabOutput::write(const std::string& text) const {
