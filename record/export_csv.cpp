@@ -8,6 +8,7 @@
 #include "record/summary.hpp"
 #include "record/tick_log.hpp"
 #include "shared/posix/new_file.hpp"
+#include "shared/posix/run_files.hpp"
 #include "shared/segment/layout_table.hpp"
 
 namespace kerf {
@@ -44,6 +45,7 @@ void for_each_number(Visit visit) {
 }  // namespace
 
 void export_csv(const std::filesystem::path& folder, const std::filesystem::path& csv) {
+  check_outputs(recording_files(folder), {{"--csv", csv, ".csv"}});
   NewFile file(csv);
   TickLogReader log(folder / kTickLogName);
   std::string line;

@@ -26,6 +26,12 @@ struct Manifest {
   [[nodiscard]] bool complete() const { return end_reason != kStillRunning; }
 };
 
+/// The files of a recording, of which none may become an output beside it.
+[[nodiscard]] inline std::vector<std::filesystem::path> recording_files(
+    const std::filesystem::path& folder) {
+  return {folder / kTickLogName, folder / kManifestName, folder / kSceneName};
+}
+
 /// Writes manifest.json, whole or not at all.
 void write_manifest(const std::filesystem::path& folder, const SegmentInfo& info,
                     const Recorder& recorder, std::uint64_t rows, std::string_view end_reason);

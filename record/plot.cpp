@@ -15,6 +15,7 @@
 #include "record/summary.hpp"
 #include "record/tick_log.hpp"
 #include "shared/posix/new_file.hpp"
+#include "shared/posix/run_files.hpp"
 #include "shared/segment/energy_columns.hpp"
 
 namespace kerf {
@@ -143,7 +144,7 @@ struct Curve {
 }  // namespace
 
 void plot_forces(const std::filesystem::path& folder, const std::filesystem::path& svg) {
-  check_new_file(svg);
+  check_outputs(recording_files(folder), {{"--out", svg, ".svg"}});
   write_new_file(svg, gnuplot_svg(gnuplot_script(folder)));
 }
 

@@ -3,10 +3,12 @@
 #include <iostream>
 
 #include "record/log_columns.hpp"
+#include "record/manifest.hpp"
 #include "record/summary.hpp"
 #include "shared/posix/failure.hpp"
 #include "shared/posix/new_file.hpp"
 #include "shared/posix/private_files.hpp"
+#include "shared/posix/run_files.hpp"
 #include "shared/posix/stop_signals.hpp"
 #include "shared/text/command_line.hpp"
 
@@ -35,6 +37,7 @@ int run_record(int argc, char** argv) {
   if (!app.parse(argc, argv, std::cout)) return 0;
   if (columns.chosen()) std::cout << log_page();
   if (info.chosen()) {
+    check_outputs(recording_files(folder), {{"--report", report, ".json"}});
     const RecordSummary summary = summarise(folder);
     std::cout << to_text(summary);
     if (!report.empty()) write_new_file(report, to_json(summary));

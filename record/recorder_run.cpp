@@ -10,6 +10,7 @@
 #include "record/record_error.hpp"
 #include "record/recorder.hpp"
 #include "shared/posix/new_file.hpp"
+#include "shared/posix/run_files.hpp"
 #include "shared/segment/hand_over.hpp"
 #include "shared/text/command_line.hpp"
 #include "shared/text/json.hpp"
@@ -74,7 +75,7 @@ bool parse_options(int argc, char** argv, RecorderOptions& options) {
 
 int run_recorder(const RecorderOptions& options, const std::atomic<bool>& stop) {
   check_new_folder(options.out);
-  if (!options.report.empty()) check_new_file(options.report);
+  check_outputs(recording_files(options.out), {{"--report", options.report, ".json"}});
   const SegmentConnection connection = connect_within(options, stop);
   const SegmentReader& reader = connection.reader();
   std::error_code error;

@@ -112,7 +112,9 @@ void propose(const SourceVolume& source, const VolumeSpec& spec, SceneVolume& vo
     volume.proposal.push_back(line.what + "=" + line.chosen);
   }
   const std::string odd = odd_spacing(source, proposal.solid, proposal.surface.hounsfield);
-  if (!odd.empty() && !spec.spacing_mm) volume.proposal.push_back("spacing=" + odd + "; --spacing");
+  if (!odd.empty() && !spec.spacing_mm) {
+    volume.proposal.push_back("spacing=" + odd + "; give the true one with --spacing x,y,z (mm)");
+  }
 }
 
 /// The image of a volume and the density of its surface. `unknown`: the scene says nothing of it.

@@ -143,7 +143,12 @@ Scene parse_scene(std::string_view text, const std::filesystem::path& path, Scen
 Scene parse_scene_file(const std::filesystem::path& path, std::span<const SceneSetting> settings) {
   constexpr std::uintmax_t kLargestFile = std::uintmax_t{1} << 20;
   std::error_code fault;
-  if (!exists(symlink_status(path, fault))) {
+  const auto there = symlink_status(path, fault);
+  if (there.type() == std::filesystem::file_type::none) {
+    refuse(path.string(),
+           ": cannot be reached (" + fault.message() + "); check the permissions of its folders");
+  }
+  if (!exists(there)) {
     refuse(path.string(), ": no such scene file; name one, for example scenes/phantom.toml");
   }
   if (!std::filesystem::is_regular_file(path, fault)) {

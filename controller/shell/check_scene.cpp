@@ -4,8 +4,10 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdio>
+#include <filesystem>
 #include <stdexcept>
 #include <string>
+#include <system_error>
 #include <vector>
 
 #include "controller/load/scene_json.hpp"
@@ -15,9 +17,13 @@
 #include "controller/scene/scene.hpp"
 #include "controller/scene/scene_page.hpp"
 #include "controller/shell/scene_segment.hpp"
+#include "controller/volume/file/volume_write.hpp"
+#include "shared/posix/cores.hpp"
 #include "shared/posix/new_file.hpp"
+#include "shared/posix/run_files.hpp"
 
 namespace kerf {
+namespace fs = std::filesystem;
 
 std::string hand_lines(const LoadedScene& scene) {
   char unit[64];
@@ -42,6 +48,24 @@ Density border_density(const VolumeImage& image) {
     }
   }
   return most;
+}
+
+/// The files that a scene is made of.
+std::vector<fs::path> files_read(const ControllerOptions& options, const LoadedScene& scene) {
+  const fs::path folder = fs::path(scene.path).parent_path();
+  std::vector<fs::path> files{scene.path, scene.hand_script};
+  for (std::size_t v = 0; v < scene.volume_specs.size(); ++v) {
+    const std::string& file = scene.volume_specs[v].file;
+    if (file == kPhantomFile) continue;
+    files.push_back(v == 0 && options.overrides.volume_file ? fs::path(file) : folder / file);
+    const fs::path labels = labels_path(files.back());
+    std::error_code fault;
+    if (fs::exists(fs::symlink_status(labels, fault))) files.push_back(labels);
+  }
+  for (const ToolSpec& tool : scene.tool_specs) {
+    if (!tool.file.empty()) files.push_back(folder / tool.file);
+  }
+  return files;
 }
 
 /// A free hand over a tooth moves up to so fast; what is slower than that is told.
@@ -113,6 +137,29 @@ void print_scene(const LoadedScene& scene, const SceneCosts& costs, const GainMa
   std::fputs(settings_text(settings).c_str(), stdout);
 }
 
+fs::path final_path(const ControllerOptions& options, const LoadedScene& scene, std::size_t v) {
+  fs::path path = options.final_volume;
+  if (v > 0) {
+    path.replace_filename(path.stem().string() + "-" + scene.volumes[v].name +
+                          path.extension().string());
+  }
+  return path;
+}
+
+void check_run_files(const ControllerOptions& options, const LoadedScene& scene) {
+  if (!options.final_volume.empty()) check_volume_path(options.final_volume);
+  std::vector<OutputFile> written{{"--report", options.report, ".json"},
+                                  {"--emulator-args", options.emulator_args, {}}};
+  if (!options.final_volume.empty()) {
+    for (std::size_t i = 0; i < scene.volumes.size(); ++i) {
+      const fs::path volume = final_path(options, scene, i);
+      written.push_back({"--final", volume, ".nrrd"});
+      written.push_back({"--final", labels_path(volume), ".nrrd"});
+    }
+  }
+  check_outputs(files_read(options, scene), written);
+}
+
 std::string refused_gains(const ControllerOptions& options, const LoadedScene& scene,
                           const GainMargin& margin) {
   if (options.virtual_time) return "";
@@ -121,7 +168,7 @@ std::string refused_gains(const ControllerOptions& options, const LoadedScene& s
 }
 
 void explain_scene(const ControllerOptions& options, LoadedScene& scene, CompiledScene& servo) {
-  if (!options.report.empty()) check_new_file(options.report);
+  check_run_files(options, scene);
   const int core = core_of(options.real_time);
   static_cast<void>(pin_to_core(core));  // where it may not, times are less even
   const SegmentPlan segment = plan_segment(segment_spec(scene, canonical_json(scene), 0));

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
+#include <filesystem>
 #include <string>
 
 #include "controller/load/loaded_scene.hpp"
@@ -20,6 +22,15 @@ namespace kerf {
 
 /// A note where a volume ends in a density that contact counts; else nothing.
 [[nodiscard]] std::string border_line(const SceneVolume& volume);
+
+/// Where --final puts volume `v`: the first under the name that is given, others beside it under
+/// their own.
+[[nodiscard]] std::filesystem::path final_path(const ControllerOptions& options,
+                                               const LoadedScene& scene, std::size_t v);
+
+/// Refuses now what could not be written at the end, or would replace a file of the scene. Throws
+/// FileError or SceneError.
+void check_run_files(const ControllerOptions& options, const LoadedScene& scene);
 
 /// Why this scene is not run: gains above the most of its device (unless `--unchecked-gain`), or
 /// beyond its stability. Empty: it is. In lock-step nobody holds the device, and any gain may be

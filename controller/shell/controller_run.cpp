@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "controller/shell/controller_run.hpp"
 
+#include <algorithm>
 #include <array>
 #include <atomic>
+#include <cstdint>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
@@ -66,6 +68,18 @@ double removed_mm3(const LoadedScene& scene, const RunRecord& record) {
   return mm3;
 }
 
+/// Whether a voxel of the material can be at the surface, or within. Labels make solid whatever
+/// they name.
+bool is_felt(const LoadedScene& scene, const MaterialRule& rule, std::size_t material) {
+  return std::ranges::any_of(scene.volumes, [&](const SceneVolume& volume) {
+    if (!volume.image.labels.empty()) return true;
+    for (std::uint32_t density = volume.iso; density <= kDensityMax; ++density) {
+      if (rule.of(Label{0}, static_cast<Density>(density)) == material) return true;
+    }
+    return false;
+  });
+}
+
 /// Of each material of the scene, since the last reset.
 MaterialScores scores_of(const LoadedScene& scene, const CompiledScene& servo,
                          const RunRecord& record) {
@@ -86,7 +100,7 @@ MaterialScores scores_of(const LoadedScene& scene, const CompiledScene& servo,
   for (std::size_t m = 0; m < scene.materials.size(); ++m) {
     if (m == 0 && removed[0] == 0) continue;  // "none": no voxel of it
     const Material& material = scene.materials[m];
-    scores.push_back({material.name, removed[m], std::nullopt});
+    scores.push_back({material.name, removed[m], std::nullopt, is_felt(scene, rule, m)});
     if (!material.forbidden) continue;
     scores.back().forbidden_ms =
         static_cast<double>(record.forbidden_ticks[m]) * 1000 / scene.servo.rate_hz;
@@ -102,19 +116,14 @@ std::uint64_t hash_of_volumes(const LoadedScene& scene, const Servo& servo) {
   return hash;
 }
 
-/// The volumes as they are now: the first as `path`, others beside it under their names.
-void write_final(const LoadedScene& scene, const Servo& servo, const std::filesystem::path& path) {
+/// The volumes as they are now.
+void write_final(const ControllerOptions& options, const LoadedScene& scene, const Servo& servo) {
   for (std::size_t v = 0; v < scene.volumes.size(); ++v) {
     if (v > 0 && !scene.volumes[v].solid) continue;
     VolumeImage image = scene.volumes[v].image;
     const auto density = servo.density(v);
     image.density.assign(density.begin(), density.end());
-    auto target = path;
-    if (v > 0) {
-      target.replace_filename(path.stem().string() + "-" + scene.volumes[v].name +
-                              path.extension().string());
-    }
-    write_volume(image, target);
+    write_volume(image, final_path(options, scene, v));
   }
 }
 
@@ -139,9 +148,7 @@ void check_options(const ControllerOptions& options, const LoadedScene& scene) {
                              std::to_string(scene.servo.rate_hz) + " Hz; spin less");
   }
   static_cast<void>(segment_socket(options.name));
-  if (!options.report.empty()) check_new_file(options.report);
-  if (!options.final_volume.empty()) check_volume_path(options.final_volume);
-  if (!options.emulator_args.empty()) check_new_file(options.emulator_args);
+  check_run_files(options, scene);
 }
 
 /// Everything that can be known to go wrong, before the hand is moved.
@@ -276,6 +283,9 @@ int run_controller(const ControllerOptions& options) {
   name_law_faults(scene, report.record.faults);
   report.removed_mm3 = removed_mm3(scene, report.record);
   report.materials = scores_of(scene, *servo, report.record);
+  report.workspace_scale = scene.device.workspace_scale;
+  report.tool = scene.tools[scene.active_tool].name;
+  report.tool_mm = 2 * scene.tools[scene.active_tool].radius_mm;
   report.lost_packets = device.lost();
   report.refused_packets = device.refused();
   report.link = port->counters();
@@ -285,7 +295,7 @@ int run_controller(const ControllerOptions& options) {
   report.volume_hash = hash_of_volumes(scene, *servo);
   std::fputs(summary(report).c_str(), stdout);
   if (!options.report.empty()) write_new_file(options.report, report_json(report));
-  if (!options.final_volume.empty()) write_final(scene, *servo, options.final_volume);
+  if (!options.final_volume.empty()) write_final(options, scene, *servo);
   return clean && report.record.faults.count == 0 ? 0 : 1;
 }
 

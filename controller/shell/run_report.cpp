@@ -47,14 +47,15 @@ Json forbidden_of(const MaterialScores& materials) {
   return list;
 }
 
-/// What was removed of which material, and how long what is forbidden was touched.
+/// What was removed of which material, and how long what is forbidden was touched. What lies below
+/// the surface goes with what is cut, unfelt.
 std::string score_lines(const MaterialScores& materials) {
   constexpr double kSeenMm3 = 0.0005;  // else the line would say 0.000
-  std::string removed, touched;
+  std::string removed, unfelt, touched;
   for (const MaterialScore& one : materials) {
     if (one.removed_mm3 >= kSeenMm3) {
-      removed +=
-          format("%s%s %.3f", removed.empty() ? "" : ", ", one.name.c_str(), one.removed_mm3);
+      std::string& list = one.felt ? removed : unfelt;
+      list += format("%s%s %.3f", list.empty() ? "" : ", ", one.name.c_str(), one.removed_mm3);
     }
     if (one.forbidden_ms) {
       touched +=
@@ -63,8 +64,16 @@ std::string score_lines(const MaterialScores& materials) {
   }
   std::string text;
   if (!removed.empty()) text += "  of these   " + removed + " mm3\n";
+  if (!unfelt.empty()) text += "  not felt   " + unfelt + " mm3, below the surface\n";
   if (!touched.empty()) text += "  forbidden  touched: " + touched + "\n";
   return text;
+}
+
+/// A scan is larger than the workspace: its tool, and what it removes, are so, too.
+std::string scale_line(const RunReport& report) {
+  if (report.workspace_scale <= 1) return {};
+  return format("  scale      1 mm of the hand is %.3g mm here, where tool %s is %.3g mm wide\n",
+                report.workspace_scale, report.tool.c_str(), report.tool_mm);
 }
 
 std::string line(const char* name, const Histogram& histogram) {
@@ -175,7 +184,7 @@ std::string summary(const RunReport& report) {
   if (r.resets > 0) {
     text += format(" since the last of %llu resets", static_cast<unsigned long long>(r.resets));
   }
-  text += "\n" + score_lines(report.materials);
+  text += "\n" + score_lines(report.materials) + scale_line(report);
   text += format("  losses     %llu stale ticks, %llu overruns, %llu packets lost\n",
                  static_cast<unsigned long long>(r.stale_ticks),
                  static_cast<unsigned long long>(r.overruns),

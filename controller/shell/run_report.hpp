@@ -17,6 +17,7 @@ struct MaterialScore {
   std::string name;
   double removed_mm3 = 0;
   std::optional<double> forbidden_ms{};  ///< of touch; none: it may be cut
+  bool felt = true;                      ///< false: all of it lies below the surface
 };
 using MaterialScores = std::vector<MaterialScore>;
 
@@ -37,6 +38,9 @@ struct RunReport {
   std::vector<MissingRight> missing_rights;
   double removed_mm3 = 0;
   MaterialScores materials;  ///< in the scene's order
+  double workspace_scale = 1;
+  std::string tool;    ///< the one that the run began with
+  double tool_mm = 0;  ///< its width
   std::uint64_t lost_packets = 0;
   std::uint64_t refused_packets = 0;
   std::vector<LinkCounter> link;  ///< of the port

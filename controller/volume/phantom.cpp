@@ -174,7 +174,7 @@ void sample_solid(std::string_view shape, VolumeImage& image) {
 }  // namespace
 
 VolumeImage make_phantom(const PhantomSpec& spec) {
-  check_grid("phantom size", spec.grid.nx, spec.grid.ny, spec.grid.nz);
+  check_grid("phantom size", spec.grid.nx, spec.grid.ny, spec.grid.nz, "ask for fewer voxels");
   double spacing = spec.spacing_mm;
   if (spacing == 0.0) {
     spacing = std::max({32.0 / spec.grid.nx, 32.0 / spec.grid.ny, 20.0 / spec.grid.nz});

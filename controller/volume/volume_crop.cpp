@@ -34,7 +34,7 @@ std::vector<T> cut(const std::vector<T>& from, const VoxelGrid& from_grid, const
 
 VolumeImage crop(const VolumeImage& image, const VoxelBox& box) {
   const VoxelIndex extent = box.extent();
-  check_grid("crop", extent.x, extent.y, extent.z);
+  check_grid("crop", extent.x, extent.y, extent.z, "resample it to larger voxels first");
   VolumeImage part;
   part.grid = {extent.x, extent.y, extent.z};
   part.spacing_mm = image.spacing_mm;

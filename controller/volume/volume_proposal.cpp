@@ -154,10 +154,12 @@ ProposedVolume propose_volume(VolumeImage image, Window range, const ProposalWis
   const Density skin = density_in(range, std::min(proposal.surface.skin, proposal.iso));
   {
     const SolidParts solid(image.grid, image.density, iso);
-    if (solid.parts().empty() || proposal.iso > range.hi) {
+    const bool all = proposal.iso <= range.lo;
+    if (all || solid.parts().empty() || proposal.iso > range.hi) {
       std::ostringstream text;
-      text << "iso: nothing reaches " << proposal.iso << "; the values of the file go from "
-           << range.lo << " to " << range.hi << ", give --iso between them";
+      text << "iso: " << (all ? "everything" : "nothing") << " reaches " << proposal.iso
+           << "; the values of the file go from " << range.lo << " to " << range.hi
+           << ", give --iso between them";
       throw SceneError(text.str());
     }
     const BodyMask body(image, skin);
@@ -169,6 +171,11 @@ ProposedVolume propose_volume(VolumeImage image, Window range, const ProposalWis
   if (!(proposal.window.lo < proposal.window.hi && proposal.window.lo < proposal.iso &&
         proposal.iso <= proposal.window.hi)) {
     std::ostringstream text;
+    if (!wishes.window) {
+      text << "iso: " << proposal.iso << " parts nothing from what is around it; the values of the "
+           << "file go from " << range.lo << " to " << range.hi << ", give --iso between them";
+      throw SceneError(text.str());
+    }
     text << "window: " << proposal.window.lo << " .. " << proposal.window.hi
          << " does not hold the surface at " << proposal.iso
          << "; give --window lo,hi around it, or another --iso";

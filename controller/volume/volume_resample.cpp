@@ -96,7 +96,7 @@ VolumeImage resample(const VolumeImage& image, const std::array<double, 3>& spac
   const AxisMap x(old.nx, spacing_mm[0] / image.spacing_mm[0]);
   const AxisMap y(old.ny, spacing_mm[1] / image.spacing_mm[1]);
   const AxisMap z(old.nz, spacing_mm[2] / image.spacing_mm[2]);
-  check_grid("resample", x.new_count(), y.new_count(), z.new_count());
+  check_grid("resample", x.new_count(), y.new_count(), z.new_count(), "ask for larger voxels");
 
   VolumeImage result;
   result.grid = {x.new_count(), y.new_count(), z.new_count()};

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <ostream>
 #include <sstream>
+#include <system_error>
 #include <utility>
 
 #include "controller/scene/scene_error.hpp"
@@ -20,6 +21,7 @@
 #include "controller/volume_tool/import_scene.hpp"
 #include "controller/volume_tool/volume_options.hpp"
 #include "shared/posix/new_file.hpp"
+#include "shared/posix/run_files.hpp"
 #include "shared/text/number.hpp"
 
 namespace kerf {
@@ -39,6 +41,17 @@ std::string size_text(const VolumeFrame& frame) {
   return text.str();
 }
 
+/// No tool fits such a scene, whoever gave the spacing.
+void refuse_stretched(const std::string& path, const VolumeFrame& frame) {
+  if (!is_stretched(frame)) return;
+  const auto& s = frame.spacing_mm;
+  std::ostringstream text;
+  text << path << ": spacing " << s[0] << " x " << s[1] << " x " << s[2]
+       << " mm has a side of more than " << kMostStretched
+       << " times another; give the true voxel size with --spacing x,y,z (mm), or resample it";
+  throw SceneError(text.str());
+}
+
 const char* way_to_change(const std::string& what) {
   if (what == "surface") return "--iso VALUE for another";
   if (what == "window") return "--window LO,HI for another";
@@ -50,7 +63,7 @@ const char* way_to_change(const std::string& what) {
 
 /// What is written.
 struct ImportCommand::Files {
-  fs::path volume, scene, preview;
+  fs::path volume, labels, scene, preview;
 };
 
 ImportCommand::ImportCommand(Arguments& app)
@@ -90,7 +103,7 @@ ImportCommand::ImportCommand(Arguments& app)
 }
 
 ImportCommand::Files ImportCommand::files() const {
-  Files files{out_, {}, {}};
+  Files files{out_, {}, {}, {}};
   if (out_.empty()) {
     fs::path name = fs::path(path_).lexically_normal();
     if (!name.has_filename()) name = name.parent_path();
@@ -102,16 +115,27 @@ ImportCommand::Files ImportCommand::files() const {
   check_volume_path(files.volume);
   files.scene = fs::path(files.volume).replace_extension(".toml");
   files.preview = fs::path(files.volume).replace_extension(".png");
-  for (const fs::path& file :
-       {files.volume, labels_path(files.volume), files.scene, files.preview}) {
+  files.labels = labels_path(files.volume);
+  check_outputs(files_read(path_), {{"--out", files.volume, ".nrrd"},
+                                    {"--out", files.labels, ".nrrd"},
+                                    {"--out", files.scene, ".toml"},
+                                    {"--out", files.preview, ".png"}});
+  check_imported_scene(imported_scene_text({path_, files.volume, nullptr, 0, 0.5, 0}), files.scene,
+                       files.volume);
+  for (const fs::path& file : {files.volume, files.labels, files.scene, files.preview}) {
     refuse_replacing(file, force_);
   }
   return files;
 }
 
 void ImportCommand::run(std::ostream& out) const {
-  if (!series_.empty() && fs::is_regular_file(path_)) {
+  std::error_code fault;
+  if (!series_.empty() && fs::is_regular_file(path_, fault)) {
     throw SceneError("--series: " + path_ + " is one file; leave it out, or name the folder");
+  }
+  if (!dims_.empty() && fs::is_directory(path_, fault)) {
+    throw SceneError("--dims: " + path_ +
+                     " is a folder; name one file without a header, or leave it out");
   }
   const Files to = files();
   ReadOptions options;
@@ -133,6 +157,7 @@ void ImportCommand::run(std::ostream& out) const {
   }
 
   SourceVolume source = read_volume(path_, options);
+  refuse_stretched(path_, source);
   const Window range = range_window(source);
   const std::string note = source.note;
   std::ostringstream values;
@@ -140,15 +165,14 @@ void ImportCommand::run(std::ostream& out) const {
 
   VolumeImage whole = apply_window(source, range);
   read_labels_beside(path_, whole, cpu_s_);
-  if (!whole.labels.empty() && !iso_.empty()) {
-    throw SceneError("--iso: the labels beside " + path_ + " tell what is solid; leave it out");
-  }
+  if (!whole.labels.empty()) refuse_beside_labels();
   if (!whole.labels.empty()) return import_labelled(std::move(whole), to, out);
   ProposedVolume proposed = propose_volume(std::move(whole), range, wishes);
   const VolumeProposal& proposal = proposed.proposal;
   const std::string odd = odd_spacing(source, proposal.solid, proposal.surface.hounsfield);
   if (!odd.empty() && spacing_.empty()) {
-    throw SceneError(path_ + ": " + odd + "; give the true voxel size with --spacing x,y,z (mm)");
+    throw SceneError(path_ + ": spacing " + odd +
+                     "; give the true voxel size with --spacing x,y,z (mm)");
   }
   const std::string preview = png_bytes(import_preview(source, proposed));
   source = {};
@@ -163,10 +187,7 @@ void ImportCommand::run(std::ostream& out) const {
   denoise(image.grid, image.density, passes);
   if (!whole_) image = crop_to_solid(image, iso);
 
-  write_volume(image, to.volume, packed_ ? VolumeEncoding::gzip : VolumeEncoding::raw);
-  write_new_file(to.scene,
-                 imported_scene_text({path_, to.volume, &proposal, iso / kDensityMax, passes}));
-  write_new_file(to.preview, preview);
+  write(image, {path_, to.volume, &proposal, 0, iso / kDensityMax, passes}, preview, to);
 
   line(out, "file", values.str(), spacing_.empty() ? "--spacing A,B,C for another voxel size" : "");
   if (!note.empty()) line(out, "series", note, "--series for another");
@@ -184,11 +205,40 @@ void ImportCommand::run(std::ostream& out) const {
   line(out, "try", "./kerf demo --scene " + to.scene.string(), "");
 }
 
+void ImportCommand::refuse_beside_labels() const {
+  const std::pair<const char*, bool> given[] = {{"--iso", !iso_.empty()},
+                                                {"--window", !window_.empty()},
+                                                {"--denoise", denoise_ != "auto"},
+                                                {"--keep-all", keep_all_}};
+  for (const auto& [option, is_given] : given) {
+    if (!is_given) continue;
+    throw SceneError(std::string(option) + ": the labels beside " + path_ +
+                     " tell what is solid; leave it out");
+  }
+}
+
+void ImportCommand::write(const VolumeImage& image, const ImportedScene& scene,
+                          const std::string& preview, const Files& to) const {
+  NewFiles files;
+  add_volume(image, to.volume, packed_ ? VolumeEncoding::gzip : VolumeEncoding::raw, files);
+  const auto add = [&](const fs::path& path, const std::string& bytes) {
+    NewFile& file = files.add(path);
+    file.write(bytes.data(), bytes.size());
+    file.close();
+  };
+  const std::string text = imported_scene_text(scene);
+  check_imported_scene(text, to.scene, to.volume);
+  add(to.scene, text);
+  if (!preview.empty()) add(to.preview, preview);
+  commit(files, force_);
+  if (image.labels.empty()) remove_labels(to.volume);
+}
+
 void ImportCommand::import_labelled(VolumeImage image, const Files& to, std::ostream& out) const {
   const Density iso = otsu_threshold(image);
+  const Label last = *std::ranges::max_element(image.labels);
   if (!whole_) image = crop_to_solid(image, iso);
-  write_volume(image, to.volume, packed_ ? VolumeEncoding::gzip : VolumeEncoding::raw);
-  write_new_file(to.scene, imported_scene_text({path_, to.volume, nullptr, iso / kDensityMax, 0}));
+  write(image, {path_, to.volume, nullptr, last, iso / kDensityMax, 0}, {}, to);
   line(out, "file", path_ + ": " + size_text(image) + ", with labels, which tell the materials",
        "");
   line(out, "wrote", to.volume.string() + ", its labels, " + to.scene.string(), "");

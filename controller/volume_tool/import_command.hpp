@@ -11,6 +11,8 @@
 
 namespace kerf {
 
+struct ImportedScene;
+
 /// kerf-volume import: any CT to a .nrrd of densities, a scene and a preview, by the proposal of
 /// volume_proposal.hpp; says in one line each what it chose and how to change it.
 class ImportCommand {
@@ -26,6 +28,11 @@ class ImportCommand {
  private:
   struct Files;
   [[nodiscard]] Files files() const;
+  /// All of them, or none.
+  void write(const VolumeImage& image, const ImportedScene& scene, const std::string& preview,
+             const Files& to) const;
+  /// What asks for a surface, where labels are one.
+  void refuse_beside_labels() const;
   void import_labelled(VolumeImage image, const Files& files, std::ostream& out) const;
 
   Arguments command_;

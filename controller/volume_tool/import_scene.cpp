@@ -2,18 +2,26 @@
 #include "controller/volume_tool/import_scene.hpp"
 
 #include <algorithm>
+#include <cstddef>
 #include <sstream>
 
+#include "controller/scene/materials.hpp"
+#include "controller/scene/scene_error.hpp"
+#include "controller/scene/scene_file.hpp"
 #include "shared/text/json.hpp"
 
 namespace kerf {
 namespace {
 
-/// On one line of a comment.
-std::string comment(std::string text) {
-  std::ranges::replace_if(
-      text, [](char c) { return static_cast<unsigned char>(c) < ' ' || c == '\x7f'; }, ' ');
+/// On one line of a comment, whatever bytes the name has.
+std::string comment(const std::string& name) {
+  std::string text = Json(name).canonical();
+  std::ranges::replace(text, '\x7f', ' ');
   return text;
+}
+
+bool is_control(char c) {
+  return static_cast<unsigned char>(c) < ' ' || c == '\x7f';
 }
 
 constexpr const char* kTools = R"(
@@ -46,6 +54,16 @@ machinability_mm3_per_s_n = 4  # tuned: to see a cavity within seconds
 
 }  // namespace
 
+void check_imported_scene(const std::string& text, const std::filesystem::path& scene,
+                          const std::filesystem::path& volume) {
+  const std::string name = volume.filename().string();
+  const bool plain = std::ranges::none_of(name, is_control);
+  if (plain && parse_scene(text, scene).volumes.front().file == name) return;
+  throw SceneError(volume.string() +
+                   ": a scene cannot name this file (its name has control characters, or is no "
+                   "UTF-8); give another with --out");
+}
+
 std::string imported_scene_text(const ImportedScene& scene) {
   std::ostringstream text;
   text << "# Made by kerf volume import from " << comment(scene.source)
@@ -67,6 +85,9 @@ std::string imported_scene_text(const ImportedScene& scene) {
            << "\niso = " << scene.proposal->density_of(material.from) << "\ncolour = [" << c[0]
            << ", " << c[1] << ", " << c[2] << "]\n";
     }
+  }
+  for (std::size_t label = default_materials().size(); label <= scene.last_label; ++label) {
+    text << "\n[[material]]\nname = \"label " << label << "\"\niso = " << scene.iso_density << '\n';
   }
   text << kTools;
   return text.str();

@@ -13,11 +13,17 @@ struct ImportedScene {
   std::string source;                        ///< what was imported, for a comment
   std::filesystem::path volume;              ///< beside the scene
   const VolumeProposal* proposal = nullptr;  ///< none: a volume with labels
+  Label last_label = 0;                      ///< the highest that a voxel has
   double iso_density = 0;
   int passes = 0;  ///< against noise, that the import made
 };
 
 /// The text of a scene (TOML) with this volume alone, fitted to any device as --volume fits it.
 [[nodiscard]] std::string imported_scene_text(const ImportedScene& scene);
+
+/// Reads that text as the controller will, as `scene`, and throws SceneError where it is no scene
+/// of `volume`.
+void check_imported_scene(const std::string& text, const std::filesystem::path& scene,
+                          const std::filesystem::path& volume);
 
 }  // namespace kerf

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <ostream>
 #include <string>
+#include <vector>
 
 #include "controller/scene/scene_error.hpp"
 #include "controller/volume/file/volume_io.hpp"
@@ -19,6 +20,7 @@
 #include "controller/volume_tool/volume_info.hpp"
 #include "controller/volume_tool/volume_options.hpp"
 #include "shared/posix/failure.hpp"
+#include "shared/posix/run_files.hpp"
 #include "shared/text/command_line.hpp"
 
 namespace kerf {
@@ -71,13 +73,18 @@ struct Target {
     command.flag("--force", force, "replace the file, and the labels beside it, where it is there");
   }
   /// Before the work.
-  void check() const {
+  void check(const std::vector<std::filesystem::path>& read) const {
     check_volume_path(file);
+    const std::filesystem::path labels = labels_path(file);
+    check_outputs(read, {{"--out", file, ".nrrd"}, {"--out", labels, ".nrrd"}});
     refuse_replacing(file, force);
-    refuse_replacing(labels_path(file), force);
+    refuse_replacing(labels, force);
   }
   void write(const VolumeImage& image, std::ostream& out) const {
-    write_volume(image, file, raw ? VolumeEncoding::raw : VolumeEncoding::gzip);
+    NewFiles files;
+    add_volume(image, file, raw ? VolumeEncoding::raw : VolumeEncoding::gzip, files);
+    commit(files, force);
+    if (image.labels.empty()) remove_labels(file);
     out << file << ": " << image.grid.nx << " x " << image.grid.ny << " x " << image.grid.nz
         << " voxels of " << image.spacing_mm[0] << " x " << image.spacing_mm[1] << " x "
         << image.spacing_mm[2] << " mm" << (image.labels.empty() ? "" : ", with labels") << '\n';
@@ -126,8 +133,11 @@ struct Commands {
 
   void run(std::ostream& out) const {
     if (import.chosen()) return import.run(out);
-    if (!info.chosen()) target.check();
+    const auto read =
+        phantom.chosen() ? std::vector<std::filesystem::path>{} : files_read(source.file);
+    if (!info.chosen()) target.check(read);
     if (info.chosen()) {
+      check_outputs(read, {{"--report", report, ".json"}});
       const SourceVolume volume = source.read(true);
       const VolumeInfo figures = describe(source.file, volume, source.window_for(volume));
       print(figures, out);

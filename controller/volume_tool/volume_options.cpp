@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "controller/scene/scene_error.hpp"
+#include "controller/volume/file/volume_write.hpp"
 #include "shared/text/number.hpp"
 
 namespace kerf {
@@ -54,11 +55,31 @@ VoxelGrid grid_from(const std::string& option, const std::string& text) {
           static_cast<std::int32_t>(n[2])};
 }
 
-void refuse_replacing(const std::filesystem::path& path, bool force) {
+std::vector<std::filesystem::path> files_read(const std::filesystem::path& volume) {
+  std::vector<std::filesystem::path> files{volume};
+  const std::filesystem::path labels = labels_path(volume);
   std::error_code fault;
-  if (force || !exists(symlink_status(path, fault))) return;
+  if (exists(symlink_status(labels, fault))) files.push_back(labels);
+  return files;
+}
+
+namespace {
+
+[[noreturn]] void refuse_there(const std::filesystem::path& path) {
   throw SceneError(path.string() +
                    ": is there already; take another name, or --force to replace it");
+}
+
+}  // namespace
+
+void refuse_replacing(const std::filesystem::path& path, bool force) {
+  std::error_code fault;
+  if (!force && exists(symlink_status(path, fault))) refuse_there(path);
+}
+
+void commit(NewFiles& files, bool force) {
+  if (force) return files.commit();
+  if (const auto there = files.commit_if_new()) refuse_there(*there);
 }
 
 }  // namespace kerf

@@ -4,8 +4,10 @@
 #include <array>
 #include <filesystem>
 #include <string>
+#include <vector>
 
 #include "controller/volume/volume_density.hpp"
+#include "shared/posix/new_files.hpp"
 
 namespace kerf {
 
@@ -15,7 +17,13 @@ namespace kerf {
 /// "256x256x161"
 [[nodiscard]] VoxelGrid grid_from(const std::string& option, const std::string& text);
 
+/// What a command reads of a volume, which its outputs leave alone: the file or folder, and labels.
+[[nodiscard]] std::vector<std::filesystem::path> files_read(const std::filesystem::path& volume);
+
 /// Refuses a file that is there, unless `force`.
 void refuse_replacing(const std::filesystem::path& path, bool force);
+
+/// Gives the files their names; refuses what is there by now, unless `force`.
+void commit(NewFiles& files, bool force);
 
 }  // namespace kerf

@@ -77,7 +77,7 @@ void serve_on_fuse(const EmulatorOptions& o, BusService& service) {
 
 void serve(const EmulatorOptions& o, const std::atomic<bool>& stop, std::ostream& out,
            std::ostream& err) {
-  if (!o.report.empty()) check_report(o.report);
+  check_report(o);
   EmulatedDevice device(o);
   if (!o.lockstep) {
     const std::string missing = make_real_time(o.priority, o.cpu);

@@ -5,9 +5,9 @@
 #include <cstddef>
 #include <vector>
 
-#include "hil/hil_error.hpp"
 #include "shared/posix/hex64.hpp"
 #include "shared/posix/new_file.hpp"
+#include "shared/posix/run_files.hpp"
 #include "shared/text/json.hpp"
 
 namespace kerf {
@@ -29,19 +29,10 @@ Json injected_list(const std::vector<InjectedFault>& faults) {
   return list;
 }
 
-template <class Call>
-void or_refuse(const Call& call) {
-  try {
-    call();
-  } catch (const FileError& error) {
-    throw HilError(std::string("--report: ") + error.what());
-  }
-}
-
 }  // namespace
 
-void check_report(const std::string& file) {
-  or_refuse([&] { check_new_file(file); });
+void check_report(const EmulatorOptions& options) {
+  check_outputs({options.hand, options.fault}, {{"--report", options.report, ".json"}});
 }
 
 void write_run_report(const std::string& file, const EmulatedDevice& device,
@@ -73,7 +64,7 @@ void write_run_report(const std::string& file, const EmulatedDevice& device,
   }
   report["report_hash"] = hex64(stats.report_hash);
 
-  or_refuse([&] { write_new_file(file, report.document()); });
+  write_new_file(file, report.document());
 }
 
 }  // namespace kerf

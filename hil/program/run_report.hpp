@@ -5,15 +5,17 @@
 
 #include "hil/front/serving.hpp"
 #include "hil/program/emulated_device.hpp"
+#include "hil/program/emulator_options.hpp"
 
 namespace kerf {
 
-/// Throws `HilError` now where the report could not be written after the run.
-void check_report(const std::string& file);
+/// Throws FileError now where the report could not be written after the run, or would replace what
+/// the run reads.
+void check_report(const EmulatorOptions& options);
 
 /// Writes what a run has shown as JSON: under another name first, then renamed, so the file is
 /// whole or absent. Times in s from the first client on, device time. Counts are those of all
-/// clients together, the device's state at the end is the last one's. Throws `HilError`.
+/// clients together, the device's state at the end is the last one's. Throws FileError.
 void write_run_report(const std::string& file, const EmulatedDevice& device,
                       const FrontStats& front);
 

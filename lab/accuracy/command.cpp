@@ -45,10 +45,10 @@ int Command::run(std::ostream& out) const {
   const std::filesystem::path plot = plot_.empty() && !page_.empty()
                                          ? std::filesystem::path(page_).replace_extension(".svg")
                                          : std::filesystem::path(plot_);
-  const LabOutput as_json("--report", report_);
-  const LabOutput as_csv("--csv", csv_);
-  const LabOutput as_page("--page", page_);
-  const LabOutput as_plot("--plot", plot.string());
+  const LabOutput as_json("--report", report_, ".json");
+  const LabOutput as_csv("--csv", csv_, ".csv");
+  const LabOutput as_page("--page", page_, ".md");
+  const LabOutput as_plot("--plot", plot.string(), ".svg");
   LabOutput::check_distinct({&as_json, &as_csv, &as_page, &as_plot});
   const int core = pin_lab(core_);
   std::vector<Entry> entries;

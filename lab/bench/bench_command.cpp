@@ -65,8 +65,8 @@ BenchCommand::BenchCommand(Arguments& program)
 }
 
 int BenchCommand::run(std::ostream& out) const {
-  const LabOutput as_json("--report", report_);
-  const LabOutput as_page("--page", page_);
+  const LabOutput as_json("--report", report_, ".json");
+  const LabOutput as_page("--page", page_, ".md");
   LabOutput::check_distinct({&as_json, &as_page});
   const int core = pin_lab(core_);
   if constexpr (kSanitized) {

@@ -154,7 +154,7 @@ Command::Command(Arguments& program)
 }
 
 int Command::run(std::ostream& out) const {
-  const LabOutput page("--page", page_);
+  const LabOutput page("--page", page_, ".md");
   try {
     enter_user_namespace();
     static_cast<void>(TwoNetworks({}));  // all that is forbidden shows now

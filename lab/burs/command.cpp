@@ -6,6 +6,7 @@
 #include "controller/scene/burs.hpp"
 #include "lab/burs/sheet.hpp"
 #include "shared/posix/new_file.hpp"
+#include "shared/posix/run_files.hpp"
 #include "shared/text/format.hpp"
 
 namespace kerf::burs {
@@ -20,6 +21,7 @@ int Command::run(std::ostream& out) const {
     out << format("%.3s  %-14s %-14s %03d to %03d\n", head.number.data(), head.name.data(),
                   head.shape.data(), kSmallestBur, head.largest);
   }
+  check_outputs({}, {{"--svg", svg_, ".svg"}});
   if (!svg_.empty()) write_new_file(svg_, sheet_svg());
   return 0;
 }

@@ -115,8 +115,8 @@ Command::Command(Arguments& program)
 }
 
 int Command::run(std::ostream& out) const {
-  const LabOutput as_json("--report", report_);
-  const LabOutput as_page("--page", page_);
+  const LabOutput as_json("--report", report_, ".json");
+  const LabOutput as_page("--page", page_, ".md");
   LabOutput::check_distinct({&as_json, &as_page});
   static_cast<void>(pin_lab(core_));
   const std::vector<LoopWork> loops = closed_loops();

@@ -114,10 +114,10 @@ int Command::run(std::ostream& out) const {
     return page_.empty() ? page_ : std::filesystem::path(page_).replace_extension(end).string();
   };
   const std::string plot = beside(".svg"), hands_plot = beside(".hands.svg");
-  const LabOutput as_json("--report", report_);
-  const LabOutput as_page("--page", page_);
-  const LabOutput as_plot("--page", plot);
-  const LabOutput as_hands_plot("--page", hands_plot);
+  const LabOutput as_json("--report", report_, ".json");
+  const LabOutput as_page("--page", page_, ".md");
+  const LabOutput as_plot("--page", plot, ".svg");
+  const LabOutput as_hands_plot("--page", hands_plot, ".svg");
   LabOutput::check_distinct({&as_json, &as_page, &as_plot, &as_hands_plot});
   static_cast<void>(pin_lab(core_));
   Effort effort = quick_ ? Effort::quick() : Effort{};

@@ -151,7 +151,7 @@ std::vector<Cell> Command::cells() const {
 }
 
 int Command::run(std::ostream& out) const {
-  const LabOutput report("--report", report_);
+  const LabOutput report("--report", report_, ".json");
   auto scripts = scripts_in(shipped_file(scripts_));
   if (random_ != 0) scripts.push_back({"at random", std::nullopt});
   const std::vector<Cell> all = cells();

@@ -193,7 +193,7 @@ int Command::run(std::ostream& out) const {
   effort.seed = static_cast<std::uint64_t>(seed_);
   effort.jobs = jobs_ > 0 ? static_cast<std::size_t>(jobs_)
                           : std::max(1U, std::thread::hardware_concurrency());
-  const LabOutput report("--report", report_);
+  const LabOutput report("--report", report_, ".json");
   const ProgressBar bar(true);
   Teller teller(out);
   const Told told{.progress = [&](double share, const std::string& what) { bar.show(share, what); },

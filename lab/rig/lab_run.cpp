@@ -3,14 +3,15 @@
 
 #include <cstdio>
 #include <filesystem>
-#include <map>
 #include <utility>
+#include <vector>
 
 #include "hil/hil_error.hpp"
 #include "shared/posix/cores.hpp"
 #include "shared/posix/new_file.hpp"
 #include "shared/posix/page_part.hpp"
 #include "shared/posix/provenance.hpp"
+#include "shared/posix/run_files.hpp"
 
 namespace kerf {
 namespace {
@@ -52,9 +53,11 @@ std::string page_number(double value) {
   return text;
 }
 
-LabOutput::LabOutput(const char* option, std::string path)
+LabOutput::LabOutput(const char* option, std::string path, const char* ending)
     : option_(option), path_(std::move(path)) {
-  if (!path_.empty()) guarded(option_, [&] { check_new_file(path_); });
+  if (path_.empty()) return;
+  guarded(option_, [&] { check_new_file(path_); });
+  check_outputs({}, {{option_, path_, ending}});
 }
 
 void LabOutput::write(const std::string& text) const {
@@ -66,15 +69,9 @@ void LabOutput::write_part(const char* name, const std::string& text) const {
 }
 
 void LabOutput::check_distinct(std::initializer_list<const LabOutput*> outputs) {
-  std::map<std::filesystem::path, const char*> options;
-  for (const LabOutput* output : outputs) {
-    if (output->path_.empty()) continue;
-    const auto file = std::filesystem::weakly_canonical(std::filesystem::absolute(output->path_));
-    const auto [other, is_new] = options.emplace(file, output->option_);
-    if (is_new) continue;
-    throw HilError(std::string(output->option_) + " " + output->path_ + ": " + other->second +
-                   " writes there, too; give each a file of its own");
-  }
+  std::vector<OutputFile> files;
+  for (const LabOutput* output : outputs) files.push_back({output->option_, output->path_, {}});
+  kerf::check_distinct(files);
 }
 
 }  // namespace kerf

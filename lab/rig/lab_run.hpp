@@ -16,16 +16,17 @@ int pin_lab(int core);
 /// Three digits, or all before the point: how pages show their figures.
 [[nodiscard]] std::string page_number(double value);
 
-/// An output file. Its name is checked before the measurement; the file is made after it. Does
-/// nothing for an empty path. Throws `HilError` that names the option.
+/// An output file of a kind that ends in `ending`. Its name is checked before the measurement; the
+/// file is made after it. Does nothing for an empty path. Throws `HilError` that names the option,
+/// or `FileError`.
 class LabOutput {
  public:
-  LabOutput(const char* option, std::string path);
+  LabOutput(const char* option, std::string path, const char* ending);
   void write(const std::string& text) const;
   /// The same as one part of a page that others write to, too: see `write_page_part`.
   void write_part(const char* name, const std::string& text) const;
 
-  /// Throws `HilError` where two of a run's outputs are one file.
+  /// Throws `FileError` where two of a run's outputs are one file.
   static void check_distinct(std::initializer_list<const LabOutput*> outputs);
 
  private:

@@ -34,9 +34,9 @@ class Outputs {
  public:
   explicit Outputs(const OutputPaths& paths)
       : draws_(!paths.plot.empty()),
-        csv_("--csv", paths.csv),
-        json_("--json", paths.json),
-        plot_("--plot", paths.plot) {
+        csv_("--csv", paths.csv, ".csv"),
+        json_("--json", paths.json, ".json"),
+        plot_("--plot", paths.plot, ".svg") {
     LabOutput::check_distinct({&csv_, &json_, &plot_});
   }
   void write(const Part& part) const {
@@ -271,7 +271,7 @@ void Command::draw_portraits(const MapSpec& spec) const {
     }
     portraits.push_back(std::move(portrait));
   }
-  LabOutput("--portraits", portraits_).write(gnuplot_svg(plot_of(portraits)));
+  LabOutput("--portraits", portraits_, ".svg").write(gnuplot_svg(plot_of(portraits)));
 }
 
 int Command::threads(std::size_t columns) const {
@@ -285,8 +285,9 @@ void Command::write_page() const {
     return std::filesystem::path(page_).replace_extension(end);
   };
   const auto devices = beside(".devices.svg"), rates = beside(".rates.svg");
-  const LabOutput as_page("--page", page_);
-  const LabOutput as_devices("--page", devices.string()), as_rates("--page", rates.string());
+  const LabOutput as_page("--page", page_, ".md");
+  const LabOutput as_devices("--page", devices.string(), ".svg"),
+      as_rates("--page", rates.string(), ".svg");
   const ProgressBar bar(true);
   const Measure measure = [&](const MapSpec& spec, const std::string& what) {
     Part part{spec, {}, {}};

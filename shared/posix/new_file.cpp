@@ -3,6 +3,7 @@
 
 #include <cerrno>
 #include <cstddef>
+#include <cstdio>
 #include <string>
 #include <system_error>
 #include <utility>
@@ -119,6 +120,22 @@ void NewFile::close() {
 void NewFile::commit() {
   if (!temporary_.empty() && ::rename(temporary_.c_str(), path_.c_str()) != 0) fail(errno);
   committed_ = true;
+}
+
+bool NewFile::commit_if_new() {
+  if (!temporary_.empty()) {
+    const char* const from = temporary_.c_str();
+    int error =
+        ::renameat2(AT_FDCWD, from, AT_FDCWD, path_.c_str(), RENAME_NOREPLACE) == 0 ? 0 : errno;
+    if (error == EINVAL || error == ENOSYS) {  // a file system that has only links for this
+      error = ::link(from, path_.c_str()) == 0 ? 0 : errno;
+      if (error == 0) ::unlink(from);
+    }
+    if (error == EEXIST) return false;
+    if (error != 0) fail(error);
+  }
+  committed_ = true;
+  return true;
 }
 
 void NewFile::fail(int error) const {

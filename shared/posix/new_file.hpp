@@ -47,6 +47,9 @@ class NewFile {
   void close();
   /// After `close`.
   void commit();
+  /// The same where nothing is there yet; else false, and `path` stays as it is, whoever made it
+  /// and when.
+  [[nodiscard]] bool commit_if_new();
 
  private:
   /// Sets `temporary_` to the first free name that `take` could take.

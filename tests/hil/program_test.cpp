@@ -200,11 +200,25 @@ TEST_CASE("a real-time run ends after its seconds, and a stop request ends a wai
   CHECK_FALSE(std::filesystem::exists(path.text()));
 }
 
+TEST_CASE("a report never takes the place of a script") {
+  const SocketPath path("script-report"), hand("hand"), fault("fault");
+  for (const SocketPath* script : {&hand, &fault}) std::ofstream(script->text()) << "mine";
+  std::atomic<bool> stop{true};
+  for (const SocketPath* script : {&hand, &fault}) {
+    const Outcome outcome = run({"--socket", path.text(), "--hand", hand.text(), "--fault",
+                                 fault.text(), "--report", script->text()},
+                                stop);
+    CHECK(outcome.exit_code == 2);
+    CHECK(outcome.err.find("is a file of this run itself") != std::string::npos);
+    CHECK(text_of(script->text()) == "mine");
+  }
+}
+
 TEST_CASE("a report that cannot be written is exit code 2") {
   const SocketPath path("no-report");
   std::atomic<bool> stop{true};
   const Outcome outcome =
       run({"--socket", path.text(), "--priority", "0", "--report", "/nowhere/report.json"}, stop);
   CHECK(outcome.exit_code == 2);
-  CHECK(outcome.err.find("--report: /nowhere/report.json") != std::string::npos);
+  CHECK(outcome.err.find("kerf-emulator: /nowhere/report.json") != std::string::npos);
 }

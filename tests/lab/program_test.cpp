@@ -66,8 +66,8 @@ TEST_CASE("accuracy refuses a file or a core that cannot be, before anything is 
 
 TEST_CASE("two outputs that are one file are refused before anything is measured") {
   const auto folder = std::filesystem::temp_directory_path();
-  const std::string file = folder / "kerf-lab-same.csv";
-  const std::string same = folder / "." / "kerf-lab-same.csv";
+  const std::string file = folder / "kerf-lab-same";
+  const std::string same = folder / "." / "kerf-lab-same";
   const Answer answer = lab({"accuracy", "--csv", file.c_str(), "--report", same.c_str()});
   CHECK(answer.code == 2);
   CHECK(answer.said.empty());
@@ -76,13 +76,18 @@ TEST_CASE("two outputs that are one file are refused before anything is measured
   const std::string svg = folder / "kerf-lab-same.svg";  // the plot goes beside the page
   CHECK(lab({"accuracy", "--page", svg.c_str()}).code == 2);
   CHECK(lab({"bench", "--page", file.c_str(), "--report", file.c_str()}).code == 2);
+  const std::string scan = folder / "kerf-lab-same.nrrd";
+  for (const char* option : {"--csv", "--report", "--page", "--plot"}) {
+    CHECK(lab({"accuracy", option, scan.c_str()}).complained.find("writes no .nrrd; let it end") !=
+          std::string::npos);
+  }
 }
 
 TEST_CASE("nothing lies beside an output while a run measures, so that it may be stopped") {
   const auto folder = std::filesystem::temp_directory_path() / "kerf-lab-output-test";
   std::filesystem::remove_all(folder);
   std::filesystem::create_directory(folder);
-  const kerf::LabOutput output("--csv", folder / "a.csv");
+  const kerf::LabOutput output("--csv", folder / "a.csv", ".csv");
   CHECK(std::filesystem::is_empty(folder));
   output.write("figures\n");
   CHECK(std::filesystem::file_size(folder / "a.csv") == 8);

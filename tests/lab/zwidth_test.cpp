@@ -267,7 +267,6 @@ TEST_CASE("axes that mean nothing are refused in one line; columns that cannot e
                            "--damping 0:1:1",
                            "--damping -1",
                            "--damping nan",
-                           "--damping \"\"",
                            "--damping 0.02,0.002",
                            "--rate 1000,1000",
                            "--law coupling,coupling",

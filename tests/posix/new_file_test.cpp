@@ -18,8 +18,11 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "shared/posix/new_files.hpp"
+
 namespace fs = std::filesystem;
 using kerf::FileError;
+using kerf::NewFile;
 using kerf::write_new_file;
 
 namespace {
@@ -167,4 +170,53 @@ TEST_CASE("what holds no bytes is written to as it stands, by a link too") {
   CHECK(read(reader, heard.data(), heard.size()) == 2);
   close(reader);
   CHECK(folder.count() == 2);
+}
+
+TEST_CASE("files that belong together appear together or not at all") {
+  const Folder folder;
+  const auto add = [](kerf::NewFiles& files, const fs::path& path, const char* text) {
+    kerf::NewFile& file = files.add(path);
+    file.write(text, 3);
+    file.close();
+  };
+  {
+    kerf::NewFiles files;
+    add(files, folder / "a", "new");
+    CHECK_THROWS_AS(add(files, folder / "none/b", "new"), FileError);
+  }
+  CHECK(folder.count() == 0);
+  write_new_file(folder / "b", "old");
+  {
+    kerf::NewFiles files;
+    add(files, folder / "a", "new");
+    add(files, folder / "b", "new");
+    const auto there = files.commit_if_new();
+    REQUIRE(there);
+    CHECK(*there == folder / "b");
+  }
+  CHECK(folder.count() == 1);
+  CHECK(text_of(folder / "b") == "old");
+  {
+    kerf::NewFiles files;
+    add(files, folder / "a", "new");
+    add(files, folder / "b", "new");
+    files.commit();
+  }
+  CHECK(text_of(folder / "a") == "new");
+  CHECK(text_of(folder / "b") == "new");
+  CHECK(folder.count() == 2);
+}
+
+TEST_CASE("of two that make a new file at once one gets it, a link counts as there") {
+  const Folder folder;
+  NewFile one(folder / "a"), two(folder / "a"), three(folder / "link");
+  for (NewFile* file : {&one, &two, &three}) {
+    file->write("own", 3);
+    file->close();
+  }
+  CHECK(two.commit_if_new());
+  CHECK_FALSE(one.commit_if_new());
+  fs::create_symlink("nowhere", folder / "link");
+  CHECK_FALSE(three.commit_if_new());
+  CHECK(text_of(folder / "a") == "own");
 }

@@ -7,6 +7,7 @@
 #include <fstream>
 #include <optional>
 #include <thread>
+#include <utility>
 
 #include <doctest/doctest.h>
 #include <nlohmann/json.hpp>
@@ -148,13 +149,14 @@ TEST_CASE("a tool from an STL file cuts the same voxels in every run") {
 }
 
 TEST_CASE("results that cannot be written are refused before the hand is moved") {
-  for (const std::string option : {"--final", "--emulator-args"}) {
+  for (const auto& [option, file] :
+       {std::pair<std::string, std::string>{"--final", "/nonexistent/f.nrrd"},
+        {"--emulator-args", "/nonexistent/f"}}) {
     Pair pair;
-    pair.start("touch.toml", {"--virtual", "--seconds", "0.1", option, "/nonexistent/f.nrrd"},
-               {"--lockstep"});
+    pair.start("touch.toml", {"--virtual", "--seconds", "0.1", option, file}, {"--lockstep"});
     CHECK(pair.controller->wait() == 2);
     const std::string line = pair.controller->output();
-    CHECK(line.find("/nonexistent/f.nrrd: cannot be written") != std::string::npos);
+    CHECK(line.find(file + ": cannot be written") != std::string::npos);
     CHECK(std::count(line.begin(), line.end(), '\n') == 1);
     CHECK_FALSE(std::filesystem::exists(pair.folder / "report.json"));
   }

@@ -191,6 +191,21 @@ TEST_CASE("the plot is an SVG with its panels and every curve that is not zero")
   }
 }
 
+TEST_CASE("a plot and a table leave the recording that they are made from") {
+  const TestFolder folder;
+  record(folder / "log", 100);
+  for (const char* const name : {"ticks.npy", "manifest.json"}) {
+    CAPTURE(name);
+    CHECK_THROWS_AS(plot_forces(folder / "log", folder / "log" / name), FileError);
+    CHECK_THROWS_AS(export_csv(folder / "log", folder / "log" / name), FileError);
+  }
+  std::filesystem::create_hard_link(folder / "log/ticks.npy", folder / "other");
+  CHECK_THROWS_WITH_AS(export_csv(folder / "log", folder / "other"),
+                       doctest::Contains("is a file of this run itself"), FileError);
+  CHECK(summarise(folder / "log").rows == 100);
+  CHECK_NOTHROW(export_csv(folder / "log", folder / "log/ticks.csv"));  // beside it is fine
+}
+
 TEST_CASE("a place that cannot be written is told before anything is drawn") {
   const TestFolder folder;
   CHECK_THROWS_WITH_AS(plot_forces(folder / "no recording", folder / "none/a.svg"),

@@ -240,7 +240,8 @@ TEST_CASE("whatever a stabiliser gives, peak, slope and budget of the motors hol
 TEST_CASE("a limit that acted is told, and what a stabiliser did is none") {
   for (const NumericKind numeric : kEveryNumber) {
     const auto settled = [&](double push_n) {
-      ArmedServo armed(with_stabiliser(numeric, push_n, 0));
+      LoadedScene scene = with_stabiliser(numeric, push_n, 0);
+      ArmedServo armed(scene);
       return armed.settled(0, 5, 0);  // in the air
     };
     const ServoOutput within = settled(0.05), beyond = settled(5);

@@ -1,11 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "controller/shell/check_scene.hpp"
 
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <utility>
+
 #include <doctest/doctest.h>
 
 #include "controller/tool/tool_shapes.hpp"
+#include "shared/posix/new_file.hpp"
 
 using namespace kerf;
+namespace fs = std::filesystem;
 
 TEST_CASE("a scene tells up to which speed no tool is dragged in air, and warns of hands beyond") {
   LoadedScene scene;
@@ -43,4 +51,46 @@ TEST_CASE("a volume that ends in a density that contact counts is told") {
     volume.solid = true;
     border = 0;
   }
+}
+
+TEST_CASE("no output of a run takes the place of a file of its scene") {
+  std::string pattern = (fs::temp_directory_path() / "kerf-check-XXXXXX").string();
+  REQUIRE(mkdtemp(pattern.data()) != nullptr);
+  const fs::path folder = pattern;
+  for (const char* name : {"scene", "hand", "ct.nrrd", "ct-labels.nrrd", "rest-b.nrrd", "bur"}) {
+    std::ofstream(folder / name) << "mine";
+  }
+  LoadedScene scene;
+  scene.path = (folder / "scene").string();
+  scene.hand_script = (folder / "hand").string();
+  scene.volume_specs.resize(2);
+  scene.volume_specs[0].file = "ct.nrrd";
+  scene.volume_specs[1].file = "rest-b.nrrd";
+  scene.volumes.resize(2);
+  scene.volumes[1].name = "b";
+  scene.tool_specs.resize(2);
+  scene.tool_specs[1].file = "bur";
+  for (const char* name : {"scene", "hand", "bur"}) {
+    ControllerOptions options;
+    options.report = (folder / name).string();
+    CHECK_THROWS_WITH_AS(check_run_files(options, scene),
+                         doctest::Contains("is a file of this run itself"), FileError);
+    std::swap(options.report, options.emulator_args);
+    CHECK_THROWS_AS(check_run_files(options, scene), FileError);
+  }
+  // The second volume of rest.nrrd is rest-b.nrrd.
+  for (const char* name : {"ct.nrrd", "ct-labels.nrrd", "rest.nrrd"}) {
+    ControllerOptions options;
+    options.final_volume = (folder / name).string();
+    CAPTURE(name);
+    CHECK_THROWS_WITH_AS(check_run_files(options, scene),
+                         doctest::Contains("is a file of this run itself"), FileError);
+  }
+  ControllerOptions options;
+  options.report = (folder / "report.json").string();
+  options.final_volume = (folder / "final.nrrd").string();
+  CHECK_NOTHROW(check_run_files(options, scene));
+  scene.volume_specs[0].file = "final.mhd";  // has the labels of final.nrrd, but there are none
+  CHECK_NOTHROW(check_run_files(options, scene));
+  fs::remove_all(folder);
 }

@@ -1,8 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <array>
 #include <cstdlib>
 #include <filesystem>
+#include <future>
+#include <iterator>
 
 #include <doctest/doctest.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include "controller/scene/scene_file.hpp"
 #include "controller/volume/file/volume_write.hpp"
@@ -99,10 +105,96 @@ TEST_CASE("import replaces no file without --force") {
   CHECK(run({"import", ball, "--out", out, "--force"}).code == 0);
 }
 
+TEST_CASE("an import without --out has the name of its source, and leaves that one's labels") {
+  const TempFolder folder;
+  const std::filesystem::path before = std::filesystem::current_path();
+  std::filesystem::rename(ball_file(folder, kHalf), folder / "ball.nhdr");  // its data within
+  std::filesystem::current_path(folder.path());
+  const Outcome made = run({"import", "ball.nhdr"});
+  const auto labels = folder.write("ball-labels.nrrd", "mine");
+  const Outcome refused = run({"import", "ball.nhdr", "--force"});
+  std::filesystem::current_path(before);
+  CAPTURE(made.err);
+  CHECK(made.code == 0);
+  CHECK(std::filesystem::exists(folder / "ball.toml"));
+  CHECK(refused.code == 2);
+  CHECK(has(refused.err, "ball-labels.nrrd: is a file of this run itself"));
+  CHECK(read_bytes(labels) == "mine");
+}
+
+TEST_CASE("an import writes nothing into the folder that it reads") {
+  const TempFolder folder;
+  const std::filesystem::path slices = folder / "slices", before = std::filesystem::current_path();
+  std::filesystem::create_directory(slices);
+  folder.write("slices/s1.png", "a slice");
+  const auto refused = [&](const std::string& path, const std::vector<std::string>& more) {
+    std::vector<std::string> arguments{"import", path, "--spacing", "0.5"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    const Outcome outcome = run(arguments);
+    CAPTURE(outcome.err);
+    CHECK(outcome.code == 2);
+    CHECK(has(outcome.err, ", which are read; name a place outside with --out"));
+  };
+  refused(slices, {"--out", slices / "mine.nrrd"});
+  refused(slices, {"--out", slices / "mine.nrrd", "--force"});
+  std::filesystem::current_path(slices);
+  refused(".", {});
+  refused("../slices", {});
+  std::filesystem::current_path(before);
+  const auto files = std::filesystem::directory_iterator(slices);
+  CHECK(std::distance(files, std::filesystem::directory_iterator()) == 1);
+}
+
+TEST_CASE("import writes all of its files or none") {
+  const TempFolder folder;
+  const std::string ball = ball_file(folder, kHalf), out = (folder / "out.nrrd").string();
+  for (const std::string name : {"out.toml", "out.png", "out-labels.nrrd"}) {
+    const auto there = folder / name.c_str();
+    std::filesystem::create_directory(there);
+    const Outcome refused = run({"import", ball, "--out", out, "--force"});
+    CAPTURE(refused.err);
+    CHECK(refused.code == 2);
+    CHECK(has(refused.err, name + ": cannot be written (Is a directory)"));
+    CHECK_FALSE(std::filesystem::exists(out));
+    std::filesystem::remove(there);
+  }
+}
+
+TEST_CASE("of two imports to one name at once, one wins and the other gets its line") {
+  const TempFolder folder;
+  const std::string ball = ball_file(folder, kHalf), out = (folder / "out.nrrd").string();
+  constexpr std::size_t kAtOnce = 6;
+  std::array<std::future<int>, kAtOnce> codes;
+  for (auto& code : codes) {
+    code = std::async(std::launch::async, [&] {
+      const pid_t child = fork();
+      if (child == 0) {
+        const Outcome made = run({"import", ball, "--out", out});
+        const bool told = has(made.err, "is there already; take another name, or --force");
+        _exit(made.code == 0 ? 0 : told ? 1 : 2);
+      }
+      int status = 0;
+      waitpid(child, &status, 0);
+      return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+    });
+  }
+  std::array<int, kAtOnce> ends{};
+  std::ranges::transform(codes, ends.begin(), [](auto& code) { return code.get(); });
+  CHECK(std::ranges::count(ends, 0) == 1);
+  CHECK(std::ranges::count(ends, 1) == kAtOnce - 1);
+  CHECK(parse_scene_file(folder / "out.toml").volumes.size() == 1);
+  std::size_t files = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(folder.path())) {
+    files += entry.is_regular_file() ? 1 : 0;
+  }
+  CHECK(files == 4);  // the ball, and three of one import
+}
+
 TEST_CASE("import asks about a voxel size that makes no sense, and writes nothing") {
   const TempFolder folder;
   const std::string out = (folder / "out.nrrd").string();
-  for (const std::string spacings : {"spacings: 1 1 1\n", "spacings: 300 300 300\n", ""}) {
+  for (const std::string spacings :
+       {"spacings: 1 1 1\n", "spacings: 300 300 300\n", "spacings: 0.1 0.1 50\n", ""}) {
     const std::string ball = ball_file(folder, spacings);
     const Outcome asked = run({"import", ball, "--out", out});
     CAPTURE(asked.err);
@@ -117,6 +209,65 @@ TEST_CASE("import asks about a voxel size that makes no sense, and writes nothin
   }
 }
 
+TEST_CASE("import refuses what would be no ready scene, also where the user insists") {
+  const TempFolder folder;
+  const std::string ball = ball_file(folder, kHalf);
+  const auto refused = [&](const std::vector<std::string>& more, const std::string& what) {
+    std::vector<std::string> arguments{"import", ball};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    const Outcome made = run(arguments);
+    CAPTURE(made.err);
+    CHECK(made.code == 2);
+    CHECK(is_one_line(made.err.substr(0, made.err.size() - 1)));
+    CHECK(has(made.err, what));
+    CHECK(std::distance(std::filesystem::directory_iterator(folder.path()), {}) == 1);
+  };
+  const std::string out = (folder / "out.nrrd").string();
+  refused({"--spacing", "0.1,0.1,50", "--out", out},
+          "has a side of more than 60 times another; give the");
+  const std::string in_folder = folder.path().string() + "/";
+  const std::string unnamed = "a scene cannot name this file";
+  refused({"--out", in_folder + "two\nlines.nrrd"}, unnamed);
+  refused({"--out", in_folder + "latin-\xf6.nrrd"}, unnamed);
+  refused({"--out", in_folder + "del\x7f.nrrd"}, unnamed);
+}
+
+TEST_CASE("a scene tells its source, whatever bytes its name has") {
+  const TempFolder folder;
+  const std::string ball = ball_file(folder, kHalf);
+  for (const std::string name :
+       {"z\xe4hne.nrrd", "two\nlines\x7f.nrrd", "\"quoted\\\".nrrd", "zähne.nrrd"}) {
+    CAPTURE(name);
+    const auto source = folder.path() / name;
+    std::filesystem::copy_file(ball, source);
+    const std::string out = (folder / "out.nrrd").string();
+    const Outcome made = run({"import", source.string(), "--out", out, "--force"});
+    CAPTURE(made.err);
+    CHECK(made.code == 0);
+    CHECK(parse_scene_file(folder / "out.toml").volumes.size() == 1);
+    CHECK(has(read_bytes(folder / "out.toml"), "zähne.nrrd") == (name == "zähne.nrrd"));
+    CHECK_FALSE(has(read_bytes(folder / "out.toml"), "\xe4hne"));
+  }
+}
+
+TEST_CASE("what labels decide is refused as an option, and what one file has of a folder") {
+  const TempFolder folder;
+  const std::string tooth = (folder / "tooth.nrrd").string();
+  const std::string out = (folder / "out.nrrd").string();
+  write_volume(make_phantom({.grid = {48, 48, 30}}), tooth);
+  for (const std::vector<std::string>& option : std::vector<std::vector<std::string>>{
+           {"--iso", "100"}, {"--window", "0,9"}, {"--denoise", "off"}, {"--keep-all"}}) {
+    std::vector<std::string> arguments{"import", tooth, "--out", out};
+    arguments.insert(arguments.end(), option.begin(), option.end());
+    const Outcome refused = run(arguments);
+    CHECK(refused.code == 2);
+    CHECK(has(refused.err, option.front() + ": the labels beside " + tooth));
+  }
+  std::filesystem::create_directory(folder / "slices");
+  CHECK(has(run({"import", (folder / "slices").string(), "--dims", "3x4x5", "--out", out}).err,
+            "--dims: "));
+}
+
 TEST_CASE("a volume with labels keeps them and gets no proposal") {
   const TempFolder folder;
   const std::string tooth = (folder / "tooth.nrrd").string();
@@ -127,6 +278,16 @@ TEST_CASE("a volume with labels keeps them and gets no proposal") {
   read_labels_beside(out, image);
   CHECK(image.labels.size() == image.density.size());
   CHECK(parse_scene_file(folder / "out.toml").materials.size() == 4);
+
+  image.labels.front() = 6;  // a material that nobody knows
+  write_volume(image, tooth);
+  REQUIRE(run({"import", tooth, "--out", out, "--force", "--no-crop"}).code == 0);
+  const Scene scene = parse_scene_file(folder / "out.toml");
+  REQUIRE(scene.materials.size() == 7);
+  CHECK(scene.materials[6].name == "label 6");
+
+  CHECK(has(run({"import", tooth, "--out", out, "--force", "--spacing", "1,1,90"}).err,
+            "has a side of more than 60 times another"));
 }
 
 TEST_CASE("each real scan is imported at first try") {

@@ -155,6 +155,12 @@ TEST_CASE("a wish goes before what is proposed, and one that cannot be is refuse
   CHECK(refused({.iso = 5000}));
   CHECK(refused({.iso = 500, .window = Window{600, 1000}}));
   CHECK(refused({.iso = -5000}));
+  std::vector<float> blob(kEdge * kEdge * kEdge, 10.0F);
+  blob[1000] = 100;
+  CHECK_THROWS_WITH_AS(static_cast<void>(propose(blob, {.iso = -5})),
+                       "iso: everything reaches -5; the values of the file go from 10 to 100, give "
+                       "--iso between them",
+                       SceneError);
 }
 
 TEST_CASE("a label map, a single voxel and a full box are no trouble") {
@@ -172,7 +178,8 @@ TEST_CASE("a label map, a single voxel and a full box are no trouble") {
 TEST_CASE("a voxel size that makes no sense is told") {
   VolumeFrame frame;
   const VoxelBox tooth{{0, 0, 0}, {88, 78, 155}};
-  CHECK(odd_spacing(frame, tooth, false).find("155 mm") != std::string::npos);
+  CHECK(odd_spacing(frame, tooth, false) ==
+        "1 x 1 x 1 mm (often written where none is known) makes what is solid 88 x 78 x 155 mm");
   CHECK(odd_spacing(frame, tooth, true).empty());  // a head of 1 mm is usual
   frame.spacing_mm = {0.125, 0.125, 0.125};
   CHECK(odd_spacing(frame, tooth, false).empty());
@@ -180,4 +187,8 @@ TEST_CASE("a voxel size that makes no sense is told") {
   CHECK_FALSE(odd_spacing(frame, tooth, true).empty());
   frame.spacing_mm = {1.25e-4, 1.25e-4, 1.25e-4};  // metres
   CHECK_FALSE(odd_spacing(frame, tooth, false).empty());
+  frame.spacing_mm = {0.2, 0.2, 10};  // thick slices
+  CHECK(odd_spacing(frame, {{0, 0, 0}, {88, 78, 16}}, true).empty());
+  frame.spacing_mm = {0.1, 0.1, 50};
+  CHECK_FALSE(odd_spacing(frame, {{0, 0, 0}, {88, 78, 16}}, true).empty());
 }

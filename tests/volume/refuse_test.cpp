@@ -197,6 +197,17 @@ TEST_CASE("what is not one grey value per voxel of three axes is refused") {
   check_refused(folder.write("e.nii", nifti(spec) + std::string(180, 'x')), "3 values per voxel");
 }
 
+TEST_CASE("a path that cannot be reached is not told to be absent, and bzip2 is told by name") {
+  const TempFolder folder;
+  std::filesystem::create_symlink("around.nrrd", folder / "around.nrrd");
+  check_refused(folder / "around.nrrd", "cannot be reached");
+  check_refused(folder / "none.nrrd", "no such file or folder");
+  for (const std::string word : {"bzip2", "BZ2"}) {
+    check_refused(folder.write("a.nrrd", nrrd("ushort", kSpacings, word) + "\n" + kBytes),
+                  "encoding: bzip2 cannot be unpacked; save it as gzip or raw");
+  }
+}
+
 TEST_CASE("voxels that are not numbers are counted and the first is named") {
   const TempFolder folder;
   std::vector<float> values = counting<float>();

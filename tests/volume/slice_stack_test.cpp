@@ -180,6 +180,68 @@ TEST_CASE("pictures that are no stack are refused in one line") {
   }
 }
 
+TEST_CASE("a stack that is not whole, or not one, is refused by the slice") {
+  const auto grey = [](int z) { return png(3, 4, 8, kGrey, slice<std::uint8_t>(z % 5)); };
+  const auto refused = [&](const std::vector<std::string>& names) {
+    const TempFolder folder;
+    int z = 0;
+    for (const std::string& name : names) {
+      folder.write(name,
+                   name.ends_with(".tif") ? tiff(3, 4, 8, {slice<std::uint8_t>(z % 5)}) : grey(z));
+      ++z;
+    }
+    const std::string message = refusal(folder.path(), kSpaced);
+    CAPTURE(message);
+    if (message != "no error") CHECK(is_one_line(message));
+    return message.substr(message.find_last_of('/') + 1);
+  };
+  const std::string whole = "no error";
+  CHECK(refused({"s1.png", "s2.png", "s3.png", "s5.png"}) ==
+        "s5.png: follows s3.png, s4.png is missing; add it, or number the slices in even steps");
+  CHECK(refused({"s008.tif", "s009.tif", "s011.tif"})
+            .starts_with("s011.tif: follows s009.tif, s010.tif is missing"));
+  CHECK(refused({"s1.png", "s2.png", "s4.png", "s6.png", "s8.png"})
+            .starts_with("s2.png: follows s1.png, where steps of 2 are usual;"));
+  CHECK(refused({"s0.png", "s5.png", "s10.png", "s15.png"}) == whole);
+  CHECK(refused({"s0.png", "s5.png", "s15.png", "s20.png"}).find("s10.png is missing") !=
+        std::string::npos);
+  CHECK(refused({"s1.png", "s01.png", "s2.png", "s3.png"}).find("has the same number as s") !=
+        std::string::npos);
+  CHECK(refused({"s1.png", "s1.PNG"}).find("has the same number as s1.") != std::string::npos);
+  CHECK(refused({"a1.png", "a2.png", "b1.png", "b2.png"})
+            .starts_with("b1.png: is no slice of the stack of a1.png; keep one stack"));
+  CHECK(refused({"t1_z1.png", "t1_z2.png", "t2_z1.png", "t2_z2.png"})
+            .starts_with("t2_z1.png: is no slice of the stack of t1_z1.png"));
+  CHECK(refused({"cover.png", "s1.png", "s2.png"}).starts_with("cover.png: is no slice"));
+  CHECK(refused({"s1.png", "s2.png", "s3.png", "s4.tif"}).starts_with("s4.tif: a TIFF among PNG"));
+  CHECK(refused({"s1.png", "s99999999999999999999.png"}).find("is no number of a slice") !=
+        std::string::npos);
+  CHECK(refused({"scan2_s1_8bit.png", "scan2_s2_8bit.png", "scan2_s3_8bit.png"}) == whole);
+  CHECK(refused({"left.png", "right.png"}).starts_with("left.png: has no number in its name"));
+  CHECK(refused({"s1.png", "s2.png", "._s1.png", ".hidden.png"}) == whole);
+}
+
+TEST_CASE("slices of two types of values are refused") {
+  const TempFolder folder;
+  SUBCASE("PNG") {
+    write_stack(folder, ".png", [](int z) {
+      return z == 3 ? png(3, 4, 16, kGrey, slice<std::uint16_t>(z, std::endian::big))
+                    : png(3, 4, 8, kGrey, slice<std::uint8_t>(z));
+    });
+  }
+  SUBCASE("TIFF") {
+    write_stack(folder, ".tif", [](int z) {
+      return z == 3 ? tiff(3, 4, 16, {slice<std::uint16_t>(z)})
+                    : tiff(3, 4, 8, {slice<std::uint8_t>(z)});
+    });
+  }
+  const std::string message = refusal(folder.path(), kSpaced);
+  CAPTURE(message);
+  CHECK(is_one_line(message));
+  CHECK(message.find("slice11") != std::string::npos);
+  CHECK(message.find("values of uint16, and slice8") != std::string::npos);
+}
+
 TEST_CASE("a file without a header is what its layout says") {
   const TempFolder folder;
   const auto read = [&](const std::string& bytes, const RawLayout& layout) {

@@ -8,6 +8,7 @@
 #include <doctest/doctest.h>
 #include <nlohmann/json.hpp>
 
+#include "controller/volume/file/volume_write.hpp"
 #include "controller/volume/phantom.hpp"
 #include "controller/volume/volume_density.hpp"
 #include "tests/volume/volume_files.hpp"
@@ -115,9 +116,10 @@ TEST_CASE("the phantom and its labels survive phantom, crop and resample") {
   CHECK(image.density == made.density);
   CHECK(image.labels == made.labels);
   REQUIRE(run({"crop", tooth, "--out", part}).code == 0);
-  REQUIRE(run({"resample", part, "--out", part, "--spacing", "0.25", "--force"}).code == 0);
-  VolumeImage fine = apply_window(read_volume(part), {0, kDensityMax});
-  read_labels_beside(part, fine);
+  const std::string finer = (folder / "fine.nrrd").string();
+  REQUIRE(run({"resample", part, "--out", finer, "--spacing", "0.25"}).code == 0);
+  VolumeImage fine = apply_window(read_volume(finer), {0, kDensityMax});
+  read_labels_beside(finer, fine);
   CHECK(fine.labels.size() == fine.density.size());
 }
 
@@ -151,6 +153,36 @@ TEST_CASE("a file that is there is replaced where that is asked for, and else st
     CHECK(read_bytes(folder / "there.nrrd").starts_with("NRRD0004"));
     std::filesystem::remove(folder / "there-labels.nrrd");
   }
+}
+
+TEST_CASE("no output takes the place of the volume that is read, with --force neither") {
+  const TempFolder folder;
+  const std::string tooth = (folder / "tooth.nrrd").string(),
+                    labels = (folder / "tooth-labels.nrrd").string();
+  write_volume(make_phantom({.grid = {48, 48, 30}}), tooth);
+  const std::string before = read_bytes(tooth), labels_before = read_bytes(labels);
+  std::filesystem::create_hard_link(tooth, folder / "same.nrrd");
+  std::filesystem::create_hard_link(tooth, folder / "same");
+  const std::string same = (folder / "same").string();
+  for (const std::vector<std::string>& arguments : std::vector<std::vector<std::string>>{
+           {"info", tooth, "--report", tooth},
+           {"info", tooth, "--report", labels},
+           {"info", tooth, "--report", same},
+           {"import", tooth, "--out", tooth, "--force"},
+           {"import", tooth, "--out", same + ".nrrd", "--force"},
+           {"import", labels, "--out", tooth, "--force"},
+           {"crop", tooth, "--out", tooth, "--force"},
+           {"resample", tooth, "--out", tooth, "--force", "--spacing", "1"}}) {
+    const Outcome refused = run(arguments);
+    CAPTURE(refused.err);
+    CHECK(refused.code == 2);
+    CHECK(refused.out.empty());
+    CHECK(is_one_line(refused.err.substr(0, refused.err.size() - 1)));
+    const bool wrong_kind = refused.err.find("let it end in .json") != std::string::npos;
+    CHECK((wrong_kind || refused.err.find("is a file of this run itself") != std::string::npos));
+  }
+  CHECK(read_bytes(tooth) == before);
+  CHECK(read_bytes(labels) == labels_before);
 }
 
 TEST_CASE("the time to read has both ends of its range") {

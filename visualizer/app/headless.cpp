@@ -110,10 +110,7 @@ std::chrono::duration<double> pause_before_frame(const Film& film, const Session
 int run_headless(const VisualizerOptions& options) {
   place_process(options.cpus);
   if (options.frames > 0) check_new_folder(options.out);
-  if (options.mesh) check_export(*options.mesh);
-  for (const auto& file : {options.sheet, options.report}) {
-    if (file) check_new_file(*file);
-  }
+  check_files(options);
   if (options.lead && !std::filesystem::is_fifo(*options.lead)) {
     throw VisualizerError("--lead " + *options.lead + ": no FIFO; make one with mkfifo");
   }

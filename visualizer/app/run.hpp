@@ -16,6 +16,10 @@ namespace kerf {
 /// Returns the cores taken. Throws VisualizerError where one of `cpus` is not to be had.
 std::vector<int> place_process(std::span<const int> cpus);
 
+/// Refuses now what could not be written later, or would cost another file. Throws FileError, or
+/// VisualizerError for the name of a mesh.
+void check_files(const VisualizerOptions& options);
+
 class Session;
 
 /// The session that the options name, whose materials those of --transfer are.

@@ -70,8 +70,7 @@ bool step(WindowRun& run, Window& window, WindowSound& sound) {
 
 int run_window(const VisualizerOptions& options) {
   place_process(options.cpus);
-  if (options.mesh) check_export(*options.mesh);
-  if (options.report) check_new_file(*options.report);
+  check_files(options);
   WindowSound sound(options.mute);  // before any thread
   Session session = attach(options);
   const Stopwatch since_attached;

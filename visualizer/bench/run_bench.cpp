@@ -14,9 +14,7 @@ namespace kerf {
 
 int run_bench(const VisualizerOptions& options) {
   // A wrong name costs nothing; a run that is stopped leaves nothing behind.
-  for (const auto& file : {options.report, options.page, options.summary}) {
-    if (file) check_new_file(*file);
-  }
+  check_files(options);
   PictureFigures figures;
   figures.size = options.size;
   figures.cores = place_process(options.cpus).size();

@@ -22,6 +22,7 @@
 #include "controller/shell/real_time.hpp"
 #include "controller/shell/waiting.hpp"
 #include "shared/posix/new_file.hpp"
+#include "shared/posix/run_files.hpp"
 #include "shared/posix/stop_signals.hpp"
 #include "shared/text/json.hpp"
 
@@ -200,8 +201,8 @@ Json report_of(const ControllerOptions& options, const DeviceSettings& device,
 }  // namespace
 
 int run_probe(const ControllerOptions& options) {
+  check_outputs({options.scene}, {{"--report", options.report, ".json"}});
   if (options.port.empty()) return look_around(options);
-  if (!options.report.empty()) check_new_file(options.report);
   const int rate_hz = options.overrides.rate_hz.value_or(kDefaultRateHz);
   const DeviceSettings device = device_of(options);
   std::atomic<bool>& stop = catch_stop_and_pause_signals();

@@ -9,33 +9,58 @@
 #include <itkTIFFImageIO.h>
 
 #include "controller/volume/file/library_messages.hpp"
+#include "controller/volume/file/slice_names.hpp"
 
 namespace kerf::volume {
 namespace fs = std::filesystem;
 
+namespace {
+
+/// Those of the kind; one of the other kind would be of another stack.
+std::vector<fs::path> pictures_among(const std::vector<fs::path>& files, VolumeKind kind) {
+  std::vector<fs::path> pictures;
+  for (const fs::path& file : files) {
+    const std::string end = lower(file.extension().string());
+    const bool png = end == ".png", tiff = end == ".tif" || end == ".tiff";
+    if (!png && !tiff) continue;
+    if (png != (kind == VolumeKind::png_stack)) {
+      throw SceneError(file.string() + (png ? ": a PNG among TIFF" : ": a TIFF among PNG") +
+                       " slices; keep one stack of slices per folder");
+    }
+    pictures.push_back(file);
+  }
+  return pictures;
+}
+
+}  // namespace
+
 void read_slice_stack(const fs::path& folder, const std::vector<fs::path>& beside, VolumeKind kind,
                       SandboxReader& sandbox, const Offer& offer) {
   const Quiet quiet;
-  const auto is_slice = [kind](const fs::path& file) {
-    const std::string end = lower(file.extension().string());
-    return kind == VolumeKind::png_stack ? end == ".png" : end == ".tif" || end == ".tiff";
-  };
-  std::vector<fs::path> files;
-  std::ranges::copy_if(beside, std::back_inserter(files), is_slice);
+  const std::vector<fs::path> files = pictures_among(beside, kind);
   if (files.size() < 2) {
     throw SceneError(folder.string() + ": one picture; name a folder that holds all slices");
   }
-  const ImageIo::Pointer io = kind == VolumeKind::png_stack
-                                  ? ImageIo::Pointer(itk::PNGImageIO::New())
-                                  : ImageIo::Pointer(itk::TIFFImageIO::New());
+  check_slice_names(files);
+  // One for each file: that of TIFF would tell of the first file again.
+  const auto reader = [kind] {
+    return kind == VolumeKind::png_stack ? ImageIo::Pointer(itk::PNGImageIO::New())
+                                         : ImageIo::Pointer(itk::TIFFImageIO::New());
+  };
   VolumeClaim claim;
+  VoxelType type{};
+  const auto word = [](VoxelType of) {
+    return std::string(kVoxelTypeWords[static_cast<std::size_t>(of)]);
+  };
   for (const fs::path& file : files) {
     sandbox.at(file.string());
+    const ImageIo::Pointer io = reader();
     const std::array<std::int64_t, 3> size = open_image(file, *io, 2);
-    const ValueKind own = kind_of(type_of(file, *io));
+    const VoxelType own = type_of(file, *io);
     if (file == files.front()) {
       claim.size = {size[0], size[1], static_cast<std::int64_t>(files.size())};
-      claim.kind = own;
+      claim.kind = kind_of(own);
+      type = own;
     } else if (size[0] != claim.size[0] || size[1] != claim.size[1]) {
       throw SceneError(file.string() + ": " + std::to_string(size[0]) + " x " +
                        std::to_string(size[1]) + " pixels, and " +
@@ -43,7 +68,11 @@ void read_slice_stack(const fs::path& folder, const std::vector<fs::path>& besid
                        " x " + std::to_string(claim.size[1]) +
                        "; keep one stack of slices per folder");
     }
-    claim.kind = common_kind(claim.kind, own);
+    if (own != type) {
+      throw SceneError(file.string() + ": values of " + word(own) + ", and " +
+                       files.front().filename().string() + " has " + word(type) +
+                       "; save all slices with values of one type");
+    }
   }
   claim.voxel_bytes = static_cast<std::uint32_t>(bytes_of(claim.kind));
   claim.has_spacing = 0;
@@ -57,6 +86,7 @@ void read_slice_stack(const fs::path& folder, const std::vector<fs::path>& besid
   std::vector<std::byte> own;
   for (const fs::path& file : files) {
     sandbox.at(file.string());
+    const ImageIo::Pointer io = reader();
     static_cast<void>(open_image(file, *io, 2));
     own.resize(static_cast<std::size_t>(io->GetImageSizeInBytes()));
     read_voxels(file, *io, own);

@@ -26,7 +26,7 @@ constexpr std::string_view kNrrdTypes =
     "signed int|int32|int32_t|uint|unsigned int|uint32|uint32_t|longlong|long long|long long int|"
     "signed long long|signed long long int|int64|int64_t|ulonglong|unsigned long long|"
     "unsigned long long int|uint64|uint64_t|float|double";
-constexpr std::string_view kNrrdEncodings = "raw|txt|text|ascii|hex|gz|gzip|bz2|bzip2";
+constexpr std::string_view kNrrdEncodings = "raw|txt|text|ascii|hex|gz|gzip";
 constexpr std::string_view kMetaTypes =
     "met_char|met_uchar|met_short|met_ushort|met_int|met_uint|met_long|met_ulong|met_long_long|"
     "met_ulong_long|met_float|met_double";
@@ -115,7 +115,12 @@ void check_nrrd_fields(const fs::path& path, const HeaderFields& all) {
   const auto is_encoding = [](const std::string& t) { return among(kNrrdEncodings, lower(t)); };
   fields.check_axes("dimension", "sizes");
   fields.check("type", is_type, "a type of numbers, such as uint16 or float");
-  fields.check("encoding", is_encoding, "one of raw, text, hex, gzip, bzip2");
+  const auto encoding = all.find("encoding");
+  if (encoding != all.end() && among("bz2|bzip2", lower(encoding->second))) {
+    throw SceneError(path.string() +
+                     ": encoding: bzip2 cannot be unpacked; save it as gzip or raw");
+  }
+  fields.check("encoding", is_encoding, "one of raw, text, hex, gzip");
   const auto all_are_numbers = [](const auto& t) { return all_numbers<double>(words_of(t)); };
   fields.check("spacings", all_are_numbers, "a number for each axis");
   const auto space = all.find("space dimension");

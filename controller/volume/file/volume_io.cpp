@@ -60,6 +60,10 @@ Kind kind_of_folder(const std::vector<fs::path>& files) {
 Kind kind_of(const fs::path& path, const std::vector<fs::path>& folder, bool raw) {
   std::error_code fault;
   const fs::file_status status = fs::status(path, fault);
+  if (status.type() == fs::file_type::none) {
+    throw SceneError(path.string() + ": cannot be reached (" + fault.message() +
+                     "); check the permissions of its folders");
+  }
   if (!fs::exists(status)) {
     throw SceneError(path.string() + ": no such file or folder; check the path");
   }
@@ -113,8 +117,8 @@ bool in_natural_order(const std::string& a, const std::string& b) {
   return a.size() != b.size() ? a.size() < b.size() : a < b;
 }
 
-/// The regular files of a folder in the order of their names, or, where there is none but an index,
-/// those of its folders, as on a disc of DICOM; none where `path` is no folder.
+/// The regular files of a folder, but hidden ones, in the order of their names, or, where there is
+/// none but an index, those of its folders, as on a disc of DICOM; none where `path` is no folder.
 std::vector<fs::path> files_in(const fs::path& path) {
   constexpr int kDeepest = 5;
   constexpr std::size_t kMostFiles = 20000;
@@ -124,9 +128,11 @@ std::vector<fs::path> files_in(const fs::path& path) {
   for (fs::recursive_directory_iterator entry(path, fault), end; !fault && entry != end;
        entry.increment(fault)) {
     if (entry.depth() >= kDeepest) entry.disable_recursion_pending();
-    const bool index = entry->path().filename() == "DICOMDIR";
+    const std::string name = entry->path().filename().string();
+    const bool hidden = name.starts_with('.');  // as those that macOS puts beside each file
+    if (hidden) entry.disable_recursion_pending();
     std::error_code gone;
-    if (index || !entry->is_regular_file(gone)) continue;
+    if (hidden || name == "DICOMDIR" || !entry->is_regular_file(gone)) continue;
     (entry.depth() == 0 ? files : below).push_back(entry->path());
     if (files.size() + below.size() > kMostFiles) {
       throw SceneError(path.string() + ": more than " + std::to_string(kMostFiles) +

@@ -7,7 +7,8 @@
 
 namespace kerf {
 
-void check_grid(const std::string& place, std::int64_t nx, std::int64_t ny, std::int64_t nz) {
+void check_grid(const std::string& place, std::int64_t nx, std::int64_t ny, std::int64_t nz,
+                const char* way_out) {
   std::ostringstream size;
   size << place << ": " << nx << " x " << ny << " x " << nz;
   if (nx <= 0 || ny <= 0 || nz <= 0) {
@@ -16,7 +17,7 @@ void check_grid(const std::string& place, std::int64_t nx, std::int64_t ny, std:
   const bool long_axis = nx > kMaxVoxelsPerAxis || ny > kMaxVoxelsPerAxis || nz > kMaxVoxelsPerAxis;
   if (long_axis || nx * ny * nz > kMaxVoxels) {
     size << " voxels is above the limit of " << kMaxVoxelsPerAxis << " per axis and "
-         << (kMaxVoxels >> 20) << " Mi in all; crop or resample it first";
+         << (kMaxVoxels >> 20) << " Mi in all; " << way_out;
     throw SceneError(size.str());
   }
 }

@@ -8,6 +8,7 @@
 #include <new>
 #include <string>
 #include <string_view>
+#include <system_error>
 
 #include <zlib.h>
 
@@ -122,21 +123,24 @@ void check_volume_path(const fs::path& path) {
   check_new_file(path);
 }
 
-void write_volume(const VolumeImage& image, const fs::path& path, VolumeEncoding encoding) {
+void add_volume(const VolumeImage& image, const fs::path& path, VolumeEncoding encoding,
+                NewFiles& files) {
   check_extension(path);
-  const fs::path labels = labels_path(path);
-  NewFile density_file(path);
-  write_voxels(density_file, image, image.density, "uint16", encoding);
-  if (image.labels.empty()) {
-    density_file.commit();
-    std::error_code ignored;  // none there is the usual case
-    fs::remove(labels, ignored);
-    return;
-  }
-  NewFile labels_file(labels);
-  write_voxels(labels_file, image, image.labels, "uint8", encoding);
-  density_file.commit();
-  labels_file.commit();
+  write_voxels(files.add(path), image, image.density, "uint16", encoding);
+  if (image.labels.empty()) return;
+  write_voxels(files.add(labels_path(path)), image, image.labels, "uint8", encoding);
+}
+
+void write_volume(const VolumeImage& image, const fs::path& path, VolumeEncoding encoding) {
+  NewFiles files;
+  add_volume(image, path, encoding, files);
+  files.commit();
+  if (image.labels.empty()) remove_labels(path);
+}
+
+void remove_labels(const fs::path& volume_path) {
+  std::error_code ignored;  // none there is the usual case
+  fs::remove(labels_path(volume_path), ignored);
 }
 
 }  // namespace kerf

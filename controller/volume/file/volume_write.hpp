@@ -5,6 +5,7 @@
 #include <filesystem>
 
 #include "controller/volume/file/volume_image.hpp"
+#include "shared/posix/new_files.hpp"
 
 namespace kerf {
 
@@ -21,6 +22,13 @@ enum class VolumeEncoding : std::uint8_t { gzip, raw };
 /// Throws SceneError.
 void write_volume(const VolumeImage& image, const std::filesystem::path& path,
                   VolumeEncoding encoding = VolumeEncoding::gzip);
+
+/// The same as a part of `files`, which are not committed yet.
+void add_volume(const VolumeImage& image, const std::filesystem::path& path,
+                VolumeEncoding encoding, NewFiles& files);
+
+/// Labels that an earlier volume of this name left.
+void remove_labels(const std::filesystem::path& volume_path);
 
 /// Throws now what `write_volume` would throw for this path later. For long runs.
 void check_volume_path(const std::filesystem::path& path);

@@ -22,6 +22,7 @@
 #include <nlohmann/json.hpp>
 #include <unistd.h>
 
+#include "shared/posix/cores.hpp"
 #include "shared/posix/new_file.hpp"
 #include "shared/segment/hand_over.hpp"
 #include "tests/visualizer/render/rgb_picture.hpp"
@@ -362,6 +363,40 @@ TEST_CASE("an export that cannot work is refused before anything is drawn") {
   VisualizerOptions options = place.options();
   options.mesh = place.path / "block.obj";
   CHECK_THROWS_AS(static_cast<void>(run_headless(options)), VisualizerError);
+}
+
+TEST_CASE("a core that is not there is refused, also beside one that is") {
+  const std::vector<int> mine = allowed_cores();
+  constexpr int kNone = 1023;
+  try {
+    static_cast<void>(place_process(std::vector{mine.front(), kNone}));
+    FAIL("taken");
+  } catch (const VisualizerError& error) {
+    CHECK(std::string(error.what()) == "--cpu: 1023 is not to be had here; leave the option out");
+  }
+  CHECK(place_process(mine) == mine);
+}
+
+TEST_CASE("no output takes the place of another kind of file") {
+  const Place place;
+  fs::create_directories(place.path);
+  const fs::path scan = place.path / "scan.nrrd", notes = place.path / "notes";
+  for (const fs::path& mine : {scan, notes}) std::ofstream(mine) << "mine";
+  const auto refused = [&](const auto& ask) {
+    VisualizerOptions options = place.options();
+    ask(options);
+    CHECK_THROWS_AS(static_cast<void>(run_headless(options)), FileError);
+    CHECK_THROWS_AS(static_cast<void>(run_window(options)), FileError);
+  };
+  refused([&](VisualizerOptions& o) { o.attached = scan; });
+  refused([&](VisualizerOptions& o) { o.attached = notes; });
+  refused([&](VisualizerOptions& o) { o.choice = scan; });
+  refused([&](VisualizerOptions& o) { o.sheet = scan; });
+  refused([&](VisualizerOptions& o) { o.record = scan.string(); });
+  refused([&](VisualizerOptions& o) { o.report = scan; });
+  refused([&](VisualizerOptions& o) { o.report = o.transfer = notes; });
+  refused([&](VisualizerOptions& o) { o.report = o.sheet = place.path / "one"; });
+  for (const fs::path& mine : {scan, notes}) CHECK(contents(mine) == "mine");
 }
 
 TEST_CASE("a report that cannot be written is refused before anything is drawn") {
