@@ -26,7 +26,7 @@ elif [[ -n ${!crash:-} ]]; then
   (sleep 0.3 && kill "-${!crash}" $$ && if [[ $name == controller ]]; then rm "$LAB/segment"; fi) &
 fi
 if ((code == 2)); then
-  echo "kerf-$name: place: value; way out" >&2
+  echo "kerf-$name: place: value; way out ($*)" >&2
   exit 2
 fi
 declare -A option=()
@@ -244,6 +244,12 @@ expect 'is told too' test "$(cat "$lab/said")" == 'kerf: demo: emulator: ended b
 rm -rf "$lab/crash"
 expect 'a failing picture is told' with FAIL_visualizer=2 kerf_gives 2 demo --seconds 1
 expect 'with its reason' says '^kerf-visualizer: place: value; way out'
+for odd in 'a|b&c' '\1' 'a[b]*' "it's"; do
+  expect "a failing picture for $odd" with FAIL_visualizer=2 kerf_gives 2 demo --seconds 1 --out "$odd"
+  expect 'is told with its reason' says '^kerf-visualizer: place: value; way out'
+  expect 'and the folder as it was named' grep -qF -- "--out $odd " "$lab/said"
+  expect 'in one line' test "$(wc -l <"$lab/said")" == 1
+done
 expect 'a failing log is told' with FAIL_recorder=1 kerf_gives 1 demo --seconds 1
 expect 'a bad scene is bad input' with FAIL_controller=2 kerf_gives 2 demo --out "$lab/new"
 expect 'which makes no folder' test ! -e "$lab/new"
