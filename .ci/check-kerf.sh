@@ -111,6 +111,7 @@ kerf_gives() {
   [[ $code == "$1" ]]
 }
 says() { grep -q -- "$1" "$lab/said"; }
+one_line() { [[ $(<"$lab/said") == "$1" ]]; }
 called() { grep -q -- "$1" "$lab/calls"; }
 kept() { [[ $(cd "$lab" && find out -mindepth 1 | sort | tr '\n' ' ') == "$1" ]]; }
 nothing_survives() {
@@ -282,6 +283,16 @@ expect 'a size is two numbers' kerf_gives 2 demo --size big
 expect 'a port is one that a demo has' kerf_gives 2 demo --port usb
 expect 'seconds are positive' kerf_gives 2 demo --seconds 0.0
 expect 'a value may not lack' kerf_gives 2 demo --seconds
+for option in --out --hand --scene --renderer; do
+  expect "$option may not be empty" kerf_gives 2 demo "$option" ''
+  expect 'as it says' one_line "kerf: demo: $option: no value; see ./kerf --help"
+done
+expect 'an option is no value of the one before' kerf_gives 2 demo --out --headless
+expect 'as it says' one_line 'kerf: demo: --out: no value; see ./kerf --help'
+expect 'nor is it one of a test' kerf_gives 2 test -R ''
+expect 'as it says' one_line 'kerf: test: -R: no value; see ./kerf --help'
+expect 'an error is one line, whatever was given' kerf_gives 2 demo --size $'1\n2'
+expect 'of it' one_line 'kerf: demo: --size 1?2: not WIDTHxHEIGHT in pixels, 1 to 8192 each; take 640x480'
 expect 'an unknown option is named' kerf_gives 2 demo --fast
 expect 'and told' says '--fast'
 expect 'an unknown program is refused' kerf_gives 2 polish
