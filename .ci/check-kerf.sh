@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
 # ./kerf itself, with stand-ins for the programs: exit codes, what is kept, and that no process and
-# no temporary file survives any way out. Builds nothing; takes some seconds.
+# no temporary file survives any way out. Builds nothing; takes two minutes.
 set -euo pipefail
 root=$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/..
 lab=$(mktemp -d)
@@ -75,9 +75,12 @@ case $name in
       fi
     fi
     while [[ -e $LAB/segment ]]; do sleep 0.05; done
-    if [[ $name == recorder ]]; then mkdir -p "$out"; else touch "$out/frame-0001.png"; fi
+    if [[ $name == recorder ]]; then mkdir -p "$out" && touch "$out/ticks.npy"; else touch "$out/frame-0001.png"; fi
     ;;
-  record) touch "$out" ;;
+  record)
+    touch "$out"
+    if [[ -n ${MEANWHILE:-} ]]; then mkdir -p "${MEANWHILE%/*}" && echo mine >"$MEANWHILE"; fi
+    ;;
   bridge)
     trap 'exit "$code"' TERM
     echo 'http://127.0.0.1:7400/?token=abc'
@@ -92,7 +95,11 @@ for name in controller emulator visualizer recorder record bridge; do
   ln -s ../stand-in "$lab/bin/kerf-$name"
 done
 
-checks=0 failures=0
+# Root without its power over files: what a user has no rights to, it has none to either.
+user=()
+if ((EUID == 0)); then user=(setpriv '--bounding-set=-dac_override,-dac_read_search' --inh-caps=-all); fi
+
+checks=0 failures=0 as=()
 # expect TEXT CONDITION...: one check; CONDITION is a command.
 expect() {
   checks=$((checks + 1))
@@ -107,13 +114,13 @@ expect() {
 kerf_gives() {
   local code=0
   rm -f "$lab/pids" "$lab/calls" "$lab/segment"
-  "$root/kerf" "${@:2}" >"$lab/said" 2>&1 || code=$?
+  "${as[@]}" "$root/kerf" "${@:2}" >"$lab/said" 2>&1 || code=$?
   [[ $code == "$1" ]]
 }
 says() { grep -q -- "$1" "$lab/said"; }
 one_line() { [[ $(<"$lab/said") == "$1" ]]; }
 called() { grep -q -- "$1" "$lab/calls"; }
-kept() { [[ $(cd "$lab" && find out -mindepth 1 | sort | tr '\n' ' ') == "$1" ]]; }
+kept() { [[ $(cd "$lab" && find out -mindepth 1 | LC_ALL=C sort | tr '\n' ' ') == "$1" ]]; }
 nothing_survives() {
   local pid
   [[ -z $(ls -A "$lab/tmp") ]] || return 1
@@ -135,11 +142,16 @@ interrupted() {
   sleep 0.3
   ((code == $2 && SECONDS - began <= 15))  # of the 60 that the demo would last
 }
+as_user() {
+  local as=("${user[@]}")
+  "$@"
+}
 with() {
   local -x "$1"
   "${@:2}"
 }
-all='out/final.nrrd out/forces.svg out/frame-0001.png out/log out/report.json '
+all='out/.kerf-demo out/.kerf-demo/files out/.kerf-demo/lock out/final.nrrd out/forces.svg out/frame-0001.png out/log out/log/ticks.npy out/report.json '
+strange='which no demo wrote or which changed since; name a new or an empty folder'
 
 cd "$lab"  # where a demo without a display keeps its pictures
 expect 'a demo runs' kerf_gives 0 demo --seconds 1
@@ -169,7 +181,7 @@ expect 'reach the visualizer' called '^visualizer.*--stereo --transfer t.toml --
 expect 'with a display they' with DISPLAY=:99 kerf_gives 0 demo --seconds 1 --stereo \
   --record v.y4m --out "$lab/out"
 expect 'reach the window, which keeps its files with the others' \
-  called '^visualizer --name [^ ]* --size [^ ]* --stereo --record v.y4m --out .*/out/\.partial-'
+  called '^visualizer --name [^ ]* --size [^ ]* --stereo --record v.y4m --out .*/out/\.kerf-demo/new '
 expect 'and there is one video' test "$(grep -c -- --record "$lab/calls")" == 1
 expect 'the pointer is the hand' with DISPLAY=:99 kerf_gives 0 demo --seconds 1 --hand mouse
 expect 'in the window' called '^visualizer.*--hand-socket [^ ]*/hand '
@@ -278,7 +290,96 @@ touch "$lab/out/mine.txt"
 expect 'a folder with other files is refused' kerf_gives 2 demo --out "$lab/out"
 expect 'by the name of the first' says 'holds mine.txt'
 expect 'a file is no folder' kerf_gives 2 demo --out "$lab/out/mine.txt"
+expect 'nor with a slash behind it' kerf_gives 2 demo --out "$lab/out/mine.txt/"
 expect 'a place that cannot be is refused' kerf_gives 2 demo --out /dev/null/x
+expect 'the root of all files too' kerf_gives 2 demo --out /
+
+# However a folder is named, it holds the results, and those of a second demo after them.
+keeps() { [[ $(ls -I mine "$1") == $'final.nrrd\nforces.svg\nframe-0001.png\nlog\nreport.json' ]]; }
+mkdir -p names/here names/linked
+ln -s linked names/link
+ln -s ring names/ring
+for name in plain/ "$lab/names/absolute/" 'run[1]' 'a path/with spaces' -x/y a/../b// link 'back\slash*'; do
+  for time in first second; do
+    (cd names && kerf_gives 0 demo --seconds 1 --out "$name") || true
+    expect "the $time demo into $name" grep -qxF "kept in $name: final.nrrd forces.svg log report.json, 1 frames" said
+    expect 'keeps all' keeps "$(cd names && realpath -m -- "$name")"
+  done
+done
+(cd names/here && kerf_gives 0 demo --seconds 1 --out .) || true
+expect 'the folder at hand' keeps names/here
+expect 'a link stays one' test "$(readlink names/link)" == linked
+touch names/linked/mine
+expect 'whose target is looked at' kerf_gives 2 demo --out names/link
+expect 'as that itself is' one_line "kerf: demo: --out names/link: holds mine, $strange"
+expect 'a link in a circle' kerf_gives 2 demo --out names/ring
+expect 'is told in one line' one_line 'kerf: demo: --out names/ring: cannot be created; name another folder'
+expect 'a line break in a name' kerf_gives 2 demo --out $'names/a\nb'
+expect 'is refused in one line' one_line 'kerf: demo: --out names/a?b: holds a control character; name another folder'
+expect 'folders in folders are made' with FAIL_emulator=2 kerf_gives 2 demo --out names/new/and/deep
+expect 'and none stays after a refusal' test ! -e names/new
+
+# What a demo did not write is never touched, whatever its name is.
+for file in log/thesis.txt final-patient-7.nrrd frame-of-my-glasses.png kerf-0001.png report.json .kerf-demo .partial-mine; do
+  rm -rf out
+  mkdir -p "out/$(dirname "$file")"
+  echo mine >"out/$file"
+  expect "a folder with $file is refused" kerf_gives 2 demo --seconds 1 --out out
+  expect 'in one line' grep -qE '^kerf: demo: --out out: holds [^ ]+, which no demo wrote' said
+  expect 'and it stays' grep -qx mine "out/$file"
+done
+rm -r out
+expect 'a demo' kerf_gives 0 demo --seconds 1 --out out
+expect 'knows what it left' kerf_gives 0 demo --seconds 1 --out out
+echo mine >>out/report.json
+expect 'and what was changed there' kerf_gives 2 demo --seconds 1 --out out
+expect 'as it says' one_line "kerf: demo: --out out: holds report.json, $strange"
+rm out/report.json && echo mine >out/log/note
+expect 'or was added deep inside' kerf_gives 2 demo --seconds 1 --out out
+expect 'as it says' one_line "kerf: demo: --out out: holds log/note, $strange"
+rm out/log/note
+expect 'what was taken away lacks nobody' kerf_gives 0 demo --seconds 1 --out out
+expect 'what comes while a demo runs' with MEANWHILE=out/mine kerf_gives 0 demo --seconds 1 --out out
+expect 'stays' grep -qx mine out/mine
+expect 'beside the results' keeps out
+rm out/mine
+expect 'even in their place' with MEANWHILE=out/log/mine kerf_gives 1 demo --seconds 1 --out out
+expect 'stays' grep -qx mine out/log/mine
+expect 'which is told' says '^kerf: demo: --out out: log is in the way; this demo is kept in out/demo-......$'
+expect 'and so are the results' keeps out/demo-*
+rm -r out
+
+# Rights.
+for rights in 0 300 500 600; do
+  mkdir -m "$rights" "names/$rights"
+  expect "a folder of mode $rights" as_user kerf_gives 2 demo --out "names/$rights"
+  expect 'is refused in one line' says "^kerf: demo: --out names/$rights: cannot be \(read\|written\); name another folder\$"
+  expect 'before anything runs' test ! -e calls
+done
+expect 'below one that cannot be entered' as_user kerf_gives 2 demo --out names/0/x
+expect 'likewise' one_line 'kerf: demo: --out names/0/x: cannot be created; name another folder'
+mkdir -p names/rest/.kerf-demo/new/rest && chmod 500 names/rest/.kerf-demo/new
+expect 'where what a killed demo left cannot be cleared up' as_user kerf_gives 2 demo --out names/rest
+expect 'likewise' one_line 'kerf: demo: --out names/rest: cannot be written; name another folder'
+chmod -R u+rwx names
+
+# Two at once: what the first one makes is its own.
+rm -f pids calls segment
+"$root/kerf" demo --seconds 60 --out out >first 2>&1 &
+first=$!
+until [[ -e calls ]] && called '^emulator'; do sleep 0.05; done
+code=0
+"$root/kerf" demo --seconds 1 --out out/ >said 2>&1 || code=$?
+expect 'a folder where another demo is at work is refused' test "$code" == 2
+expect 'in one line' one_line 'kerf: demo: --out out/: another demo is at work there; wait for its end or name another folder'
+expect 'which leaves that alone' test -d out/.kerf-demo/new
+kill -TERM "$first"
+code=0
+wait "$first" || code=$?
+cp first said
+expect 'so that it ends well' test "$code" == 143
+expect 'with all results' kept "$all"
+expect 'and then there is room' kerf_gives 0 demo --seconds 1 --out out
 expect 'a size is two numbers' kerf_gives 2 demo --size big
 expect 'a port is one that a demo has' kerf_gives 2 demo --port usb
 expect 'seconds are positive' kerf_gives 2 demo --seconds 0.0
