@@ -49,6 +49,7 @@ case $name in
     echo '{}' >"${option[--report]}"
     touch "${option[--final]}"
     rm "$LAB/segment"
+    echo 'the summary'
     ;;
   emulator)
     if [[ -n ${option[--mount]:-} ]]; then
@@ -145,6 +146,34 @@ interrupted() {
 as_user() {
   local as=("${user[@]}")
   "$@"
+}
+# typed KEY CODE: a demo in a terminal of its own, where KEY is typed in its middle, ends with CODE. Or the
+# terminal is closed: KEY is empty.
+typed() {
+  local code=0
+  rm -f "$lab/pids" "$lab/calls" "$lab/segment"
+  python3 - "$1" "$lab/calls" "$root/kerf" demo --seconds 60 --out "$lab/out" >"$lab/said" <<'TERMINAL' || code=$?
+import os, pty, sys, time
+key, calls, *command = sys.argv[1:]
+process, terminal = pty.fork()
+if not process:
+    os.execv(command[0], command)
+while not os.path.exists(calls) or ' --hand ' not in open(calls).read():
+    time.sleep(0.05)
+time.sleep(0.5)
+if key:
+    os.write(terminal, key.encode())
+    try:
+        while said := os.read(terminal, 4096):
+            os.write(1, said)
+    except OSError:
+        pass
+else:
+    os.close(terminal)
+sys.exit(os.waitstatus_to_exitcode(os.waitpid(process, 0)[1]))
+TERMINAL
+  sleep 0.3
+  [[ $code == "$2" ]]
 }
 with() {
   local -x "$1"
@@ -274,6 +303,21 @@ expect 'a failure leaves nothing behind' nothing_survives
 expect 'a stopped demo ends with 130' interrupted INT 130
 expect 'its results so far are kept' kept "$all"
 expect 'nothing survives a stop' nothing_survives
+rm -r out
+expect 'so does one whose terminal had a Ctrl-C' typed $'\x03' 130
+expect 'its summary is told' says 'the summary'
+expect 'its results so far are kept' kept "$all"
+expect 'which is told' says "^kept in $lab/out: "
+expect 'nothing survives it' nothing_survives
+expect 'a Ctrl-\' typed $'\x1c' 143
+expect 'ends alike' says "^kept in $lab/out: "
+rm -r out
+expect 'a terminal that is gone too' typed '' 143
+expect 'with all results' kept "$all"
+expect 'nothing survives it' nothing_survives
+rm -r out
+expect 'nobody has to read what it says' eval '"$root/kerf" demo --seconds 1 --out out | true'
+expect 'to keep its results' kept "$all"
 expect 'a terminated demo ends with 143' interrupted TERM 143
 expect 'nothing survives a termination' nothing_survives
 for signal in PWR QUIT RTMIN+3; do
