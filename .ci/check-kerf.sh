@@ -463,6 +463,29 @@ expect 'and what is missing' says '^warn  /dev/fw1 .*Permission denied'
 expect 'with its cure' says '^ *the cure'
 expect 'an unknown option of the doctor is refused' kerf_gives 2 doctor --fast
 
+# offers ANSWER WORD...: what Tab offers for the last of these words behind ./kerf, each once.
+offers() {
+  local wanted=$1
+  shift
+  offered=$(bash -c '. "$0"; COMP_WORDS=("$@") COMP_CWORD=$(($# - 1)); _kerf "$1" "${!#}" "${*: -2:1}"; echo "${COMPREPLY[*]}"' \
+    "$root/cmake/kerf-completion.sh" "$root/kerf" "$@")
+  echo "$offered" >"$lab/said"
+  [[ $(tr ' ' '\n' <<<"$offered" | LC_ALL=C sort | paste -sd ' ') == "$wanted" ]]
+}
+expect 'Tab offers commands and programs' \
+  offers 'bench bridge controller demo docs doctor emulator lab package record recorder setup sweep test visualizer volume' ''
+expect 'or those that begin so' offers 'docs doctor' 'do'
+expect 'what a bench can measure' offers 'bridge kernels pictures safety stability' bench ''
+expect 'or what begins so' offers 'kernels' bench k
+expect 'the option of the doctor' offers '--demo' doctor ''
+expect 'each option once' offers '--help --jobs --out --seconds --set' sweep --
+expect 'those of a test' offers '--junit --preset -R' test -
+expect 'those of a demo' offers '--scene --seconds --serve --set --sheet --size --spacing --stereo' demo --s
+expect 'what the bridge can do' offers '--help join make-identity serve' bridge ''
+expect 'and the lab' offers 'law' lab la
+expect 'nothing of what has no options' offers '' docs ''
+expect 'nor of a heading that is none of a command' offers '' Environment ''
+
 # A machine without QEMU, and tests that a stand-in runs in a tree of their own.
 mkdir -p "$lab/no-qemu" "$lab/tools" "$lab/tree/.ci" "$lab/tree/build/release"
 ln -s /usr/bin/* "$lab/no-qemu"
