@@ -228,7 +228,7 @@ expect 'and all else as it was' test "$(grep -c '^visualizer.*--stereo' "$lab/ca
 expect 'which is told' says '^kerf: demo: /else/other.toml$'
 rm "$lab/chosen"
 expect 'a volume likewise' \
-  with DISPLAY=:99 with CHOICE=/else/ct.nrrd kerf_gives 0 demo --seconds 5 --hand mouse
+  with DISPLAY=:99 with CHOICE=/else/ct.nrrd kerf_gives 0 demo --seconds 5 --hand mouse --out "$lab/out"
 expect 'without the scene of the first' called '^controller.*--volume /else/ct.nrrd'
 expect 'and nothing is left behind' nothing_survives
 expect 'without a display it cannot be' kerf_gives 2 demo --hand mouse
@@ -303,7 +303,7 @@ expect 'a failure leaves nothing behind' nothing_survives
 expect 'a stopped demo ends with 130' interrupted INT 130
 expect 'its results so far are kept' kept "$all"
 expect 'nothing survives a stop' nothing_survives
-rm -r out
+rm -rf out
 expect 'so does one whose terminal had a Ctrl-C' typed $'\x03' 130
 expect 'its summary is told' says 'the summary'
 expect 'its results so far are kept' kept "$all"
@@ -311,11 +311,11 @@ expect 'which is told' says "^kept in $lab/out: "
 expect 'nothing survives it' nothing_survives
 expect 'a Ctrl-\' typed $'\x1c' 143
 expect 'ends alike' says "^kept in $lab/out: "
-rm -r out
+rm -rf out
 expect 'a terminal that is gone too' typed '' 143
 expect 'with all results' kept "$all"
 expect 'nothing survives it' nothing_survives
-rm -r out
+rm -rf out
 expect 'nobody has to read what it says' eval '"$root/kerf" demo --seconds 1 --out out | true'
 expect 'to keep its results' kept "$all"
 expect 'a terminated demo ends with 143' interrupted TERM 143
@@ -372,26 +372,26 @@ for file in log/thesis.txt final-patient-7.nrrd frame-of-my-glasses.png kerf-000
   expect 'in one line' grep -qE '^kerf: demo: --out out: holds [^ ]+, which no demo wrote' said
   expect 'and it stays' grep -qx mine "out/$file"
 done
-rm -r out
+rm -rf out
 expect 'a demo' kerf_gives 0 demo --seconds 1 --out out
 expect 'knows what it left' kerf_gives 0 demo --seconds 1 --out out
 echo mine >>out/report.json
 expect 'and what was changed there' kerf_gives 2 demo --seconds 1 --out out
 expect 'as it says' one_line "kerf: demo: --out out: holds report.json, $strange"
-rm out/report.json && echo mine >out/log/note
+rm -f out/report.json && echo mine >out/log/note
 expect 'or was added deep inside' kerf_gives 2 demo --seconds 1 --out out
 expect 'as it says' one_line "kerf: demo: --out out: holds log/note, $strange"
-rm out/log/note
+rm -f out/log/note
 expect 'what was taken away lacks nobody' kerf_gives 0 demo --seconds 1 --out out
 expect 'what comes while a demo runs' with MEANWHILE=out/mine kerf_gives 0 demo --seconds 1 --out out
 expect 'stays' grep -qx mine out/mine
 expect 'beside the results' keeps out
-rm out/mine
+rm -f out/mine
 expect 'even in their place' with MEANWHILE=out/log/mine kerf_gives 1 demo --seconds 1 --out out
 expect 'stays' grep -qx mine out/log/mine
 expect 'which is told' says '^kerf: demo: --out out: log is in the way; this demo is kept in out/demo-......$'
 expect 'and so are the results' keeps out/demo-*
-rm -r out
+rm -rf out
 
 # Rights.
 for rights in 0 300 500 600; do
@@ -417,7 +417,7 @@ code=0
 expect 'a folder where another demo is at work is refused' test "$code" == 2
 expect 'in one line' one_line 'kerf: demo: --out out/: another demo is at work there; wait for its end or name another folder'
 expect 'which leaves that alone' test -d out/.kerf-demo/new
-kill -TERM "$first"
+kill -TERM "$first" || true
 code=0
 wait "$first" || code=$?
 cp first said
