@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
 # ./kerf itself, with stand-ins for the programs: exit codes, what is kept, and that no process and
-# no temporary file survives any way out. Builds nothing; takes some seconds.
+# no temporary file survives any way out. Builds nothing; takes two minutes.
 set -euo pipefail
 root=$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/..
 lab=$(mktemp -d)
@@ -26,7 +26,7 @@ elif [[ -n ${!crash:-} ]]; then
   (sleep 0.3 && kill "-${!crash}" $$ && if [[ $name == controller ]]; then rm "$LAB/segment"; fi) &
 fi
 if ((code == 2)); then
-  echo "kerf-$name: place: value; way out" >&2
+  echo "kerf-$name: place: value; way out ($*)" >&2
   exit 2
 fi
 declare -A option=()
@@ -49,6 +49,7 @@ case $name in
     echo '{}' >"${option[--report]}"
     touch "${option[--final]}"
     rm "$LAB/segment"
+    echo 'the summary'
     ;;
   emulator)
     if [[ -n ${option[--mount]:-} ]]; then
@@ -75,9 +76,12 @@ case $name in
       fi
     fi
     while [[ -e $LAB/segment ]]; do sleep 0.05; done
-    if [[ $name == recorder ]]; then mkdir -p "$out"; else touch "$out/frame-0001.png"; fi
+    if [[ $name == recorder ]]; then mkdir -p "$out" && touch "$out/ticks.npy"; else touch "$out/frame-0001.png"; fi
     ;;
-  record) touch "$out" ;;
+  record)
+    touch "$out"
+    if [[ -n ${MEANWHILE:-} ]]; then mkdir -p "${MEANWHILE%/*}" && echo mine >"$MEANWHILE"; fi
+    ;;
   bridge)
     trap 'exit "$code"' TERM
     echo 'http://127.0.0.1:7400/?token=abc'
@@ -92,7 +96,11 @@ for name in controller emulator visualizer recorder record bridge; do
   ln -s ../stand-in "$lab/bin/kerf-$name"
 done
 
-checks=0 failures=0
+# Root without its power over files: what a user has no rights to, it has none to either.
+user=()
+if ((EUID == 0)); then user=(setpriv '--bounding-set=-dac_override,-dac_read_search' --inh-caps=-all); fi
+
+checks=0 failures=0 as=()
 # expect TEXT CONDITION...: one check; CONDITION is a command.
 expect() {
   checks=$((checks + 1))
@@ -107,12 +115,13 @@ expect() {
 kerf_gives() {
   local code=0
   rm -f "$lab/pids" "$lab/calls" "$lab/segment"
-  "$root/kerf" "${@:2}" >"$lab/said" 2>&1 || code=$?
+  "${as[@]}" "$root/kerf" "${@:2}" >"$lab/said" 2>&1 || code=$?
   [[ $code == "$1" ]]
 }
 says() { grep -q -- "$1" "$lab/said"; }
+one_line() { [[ $(<"$lab/said") == "$1" ]]; }
 called() { grep -q -- "$1" "$lab/calls"; }
-kept() { [[ $(cd "$lab" && find out -mindepth 1 | sort | tr '\n' ' ') == "$1" ]]; }
+kept() { [[ $(cd "$lab" && find out -mindepth 1 | LC_ALL=C sort | tr '\n' ' ') == "$1" ]]; }
 nothing_survives() {
   local pid
   [[ -z $(ls -A "$lab/tmp") ]] || return 1
@@ -134,11 +143,44 @@ interrupted() {
   sleep 0.3
   ((code == $2 && SECONDS - began <= 15))  # of the 60 that the demo would last
 }
+as_user() {
+  local as=("${user[@]}")
+  "$@"
+}
+# typed KEY CODE: a demo in a terminal of its own, where KEY is typed in its middle, ends with CODE. Or the
+# terminal is closed: KEY is empty.
+typed() {
+  local code=0
+  rm -f "$lab/pids" "$lab/calls" "$lab/segment"
+  python3 - "$1" "$lab/calls" "$root/kerf" demo --seconds 60 --out "$lab/out" >"$lab/said" <<'TERMINAL' || code=$?
+import os, pty, sys, time
+key, calls, *command = sys.argv[1:]
+process, terminal = pty.fork()
+if not process:
+    os.execv(command[0], command)
+while not os.path.exists(calls) or ' --hand ' not in open(calls).read():
+    time.sleep(0.05)
+time.sleep(0.5)
+if key:
+    os.write(terminal, key.encode())
+    try:
+        while said := os.read(terminal, 4096):
+            os.write(1, said)
+    except OSError:
+        pass
+else:
+    os.close(terminal)
+sys.exit(os.waitstatus_to_exitcode(os.waitpid(process, 0)[1]))
+TERMINAL
+  sleep 0.3
+  [[ $code == "$2" ]]
+}
 with() {
   local -x "$1"
   "${@:2}"
 }
-all='out/final.nrrd out/forces.svg out/frame-0001.png out/log out/report.json '
+all='out/.kerf-demo out/.kerf-demo/files out/.kerf-demo/lock out/final.nrrd out/forces.svg out/frame-0001.png out/log out/log/ticks.npy out/report.json '
+strange='which no demo wrote or which changed since; name a new or an empty folder'
 
 cd "$lab"  # where a demo without a display keeps its pictures
 expect 'a demo runs' kerf_gives 0 demo --seconds 1
@@ -168,7 +210,7 @@ expect 'reach the visualizer' called '^visualizer.*--stereo --transfer t.toml --
 expect 'with a display they' with DISPLAY=:99 kerf_gives 0 demo --seconds 1 --stereo \
   --record v.y4m --out "$lab/out"
 expect 'reach the window, which keeps its files with the others' \
-  called '^visualizer --name [^ ]* --size [^ ]* --stereo --record v.y4m --out .*/out/\.partial-'
+  called '^visualizer --name [^ ]* --size [^ ]* --stereo --record v.y4m --out .*/out/\.kerf-demo/new '
 expect 'and there is one video' test "$(grep -c -- --record "$lab/calls")" == 1
 expect 'the pointer is the hand' with DISPLAY=:99 kerf_gives 0 demo --seconds 1 --hand mouse
 expect 'in the window' called '^visualizer.*--hand-socket [^ ]*/hand '
@@ -186,7 +228,7 @@ expect 'and all else as it was' test "$(grep -c '^visualizer.*--stereo' "$lab/ca
 expect 'which is told' says '^kerf: demo: /else/other.toml$'
 rm "$lab/chosen"
 expect 'a volume likewise' \
-  with DISPLAY=:99 with CHOICE=/else/ct.nrrd kerf_gives 0 demo --seconds 5 --hand mouse
+  with DISPLAY=:99 with CHOICE=/else/ct.nrrd kerf_gives 0 demo --seconds 5 --hand mouse --out "$lab/out"
 expect 'without the scene of the first' called '^controller.*--volume /else/ct.nrrd'
 expect 'and nothing is left behind' nothing_survives
 expect 'without a display it cannot be' kerf_gives 2 demo --hand mouse
@@ -244,6 +286,12 @@ expect 'is told too' test "$(cat "$lab/said")" == 'kerf: demo: emulator: ended b
 rm -rf "$lab/crash"
 expect 'a failing picture is told' with FAIL_visualizer=2 kerf_gives 2 demo --seconds 1
 expect 'with its reason' says '^kerf-visualizer: place: value; way out'
+for odd in 'a|b&c' '\1' 'a[b]*' "it's"; do
+  expect "a failing picture for $odd" with FAIL_visualizer=2 kerf_gives 2 demo --seconds 1 --out "$odd"
+  expect 'is told with its reason' says '^kerf-visualizer: place: value; way out'
+  expect 'and the folder as it was named' grep -qF -- "--out $odd " "$lab/said"
+  expect 'in one line' test "$(wc -l <"$lab/said")" == 1
+done
 expect 'a failing log is told' with FAIL_recorder=1 kerf_gives 1 demo --seconds 1
 expect 'a bad scene is bad input' with FAIL_controller=2 kerf_gives 2 demo --out "$lab/new"
 expect 'which makes no folder' test ! -e "$lab/new"
@@ -255,6 +303,21 @@ expect 'a failure leaves nothing behind' nothing_survives
 expect 'a stopped demo ends with 130' interrupted INT 130
 expect 'its results so far are kept' kept "$all"
 expect 'nothing survives a stop' nothing_survives
+rm -rf out
+expect 'so does one whose terminal had a Ctrl-C' typed $'\x03' 130
+expect 'its summary is told' says 'the summary'
+expect 'its results so far are kept' kept "$all"
+expect 'which is told' says "^kept in $lab/out: "
+expect 'nothing survives it' nothing_survives
+expect 'a Ctrl-\' typed $'\x1c' 143
+expect 'ends alike' says "^kept in $lab/out: "
+rm -rf out
+expect 'a terminal that is gone too' typed '' 143
+expect 'with all results' kept "$all"
+expect 'nothing survives it' nothing_survives
+rm -rf out
+expect 'nobody has to read what it says' eval '"$root/kerf" demo --seconds 1 --out out | true'
+expect 'to keep its results' kept "$all"
 expect 'a terminated demo ends with 143' interrupted TERM 143
 expect 'nothing survives a termination' nothing_survives
 for signal in PWR QUIT RTMIN+3; do
@@ -271,15 +334,121 @@ touch "$lab/out/mine.txt"
 expect 'a folder with other files is refused' kerf_gives 2 demo --out "$lab/out"
 expect 'by the name of the first' says 'holds mine.txt'
 expect 'a file is no folder' kerf_gives 2 demo --out "$lab/out/mine.txt"
+expect 'nor with a slash behind it' kerf_gives 2 demo --out "$lab/out/mine.txt/"
 expect 'a place that cannot be is refused' kerf_gives 2 demo --out /dev/null/x
+expect 'the root of all files too' kerf_gives 2 demo --out /
+
+# However a folder is named, it holds the results, and those of a second demo after them.
+keeps() { [[ $(ls -I mine "$1") == $'final.nrrd\nforces.svg\nframe-0001.png\nlog\nreport.json' ]]; }
+mkdir -p names/here names/linked
+ln -s linked names/link
+ln -s ring names/ring
+for name in plain/ "$lab/names/absolute/" 'run[1]' 'a path/with spaces' -x/y a/../b// link 'back\slash*'; do
+  for time in first second; do
+    (cd names && kerf_gives 0 demo --seconds 1 --out "$name") || true
+    expect "the $time demo into $name" grep -qxF "kept in $name: final.nrrd forces.svg log report.json, 1 frames" said
+    expect 'keeps all' keeps "$(cd names && realpath -m -- "$name")"
+  done
+done
+(cd names/here && kerf_gives 0 demo --seconds 1 --out .) || true
+expect 'the folder at hand' keeps names/here
+expect 'a link stays one' test "$(readlink names/link)" == linked
+touch names/linked/mine
+expect 'whose target is looked at' kerf_gives 2 demo --out names/link
+expect 'as that itself is' one_line "kerf: demo: --out names/link: holds mine, $strange"
+expect 'a link in a circle' kerf_gives 2 demo --out names/ring
+expect 'is told in one line' one_line 'kerf: demo: --out names/ring: cannot be created; name another folder'
+expect 'a line break in a name' kerf_gives 2 demo --out $'names/a\nb'
+expect 'is refused in one line' one_line 'kerf: demo: --out names/a?b: holds a control character; name another folder'
+expect 'folders in folders are made' with FAIL_emulator=2 kerf_gives 2 demo --out names/new/and/deep
+expect 'and none stays after a refusal' test ! -e names/new
+
+# What a demo did not write is never touched, whatever its name is.
+for file in log/thesis.txt final-patient-7.nrrd frame-of-my-glasses.png kerf-0001.png report.json .kerf-demo .partial-mine; do
+  rm -rf out
+  mkdir -p "out/$(dirname "$file")"
+  echo mine >"out/$file"
+  expect "a folder with $file is refused" kerf_gives 2 demo --seconds 1 --out out
+  expect 'in one line' grep -qE '^kerf: demo: --out out: holds [^ ]+, which no demo wrote' said
+  expect 'and it stays' grep -qx mine "out/$file"
+done
+rm -rf out
+expect 'a demo' kerf_gives 0 demo --seconds 1 --out out
+expect 'knows what it left' kerf_gives 0 demo --seconds 1 --out out
+echo mine >>out/report.json
+expect 'and what was changed there' kerf_gives 2 demo --seconds 1 --out out
+expect 'as it says' one_line "kerf: demo: --out out: holds report.json, $strange"
+rm -f out/report.json && echo mine >out/log/note
+expect 'or was added deep inside' kerf_gives 2 demo --seconds 1 --out out
+expect 'as it says' one_line "kerf: demo: --out out: holds log/note, $strange"
+rm -f out/log/note
+expect 'what was taken away lacks nobody' kerf_gives 0 demo --seconds 1 --out out
+expect 'what comes while a demo runs' with MEANWHILE=out/mine kerf_gives 0 demo --seconds 1 --out out
+expect 'stays' grep -qx mine out/mine
+expect 'beside the results' keeps out
+rm -f out/mine
+expect 'even in their place' with MEANWHILE=out/log/mine kerf_gives 1 demo --seconds 1 --out out
+expect 'stays' grep -qx mine out/log/mine
+expect 'which is told' says '^kerf: demo: --out out: log is in the way; this demo is kept in out/demo-......$'
+expect 'and so are the results' keeps out/demo-*
+rm -rf out
+
+# Rights.
+for rights in 0 300 500 600; do
+  mkdir -m "$rights" "names/$rights"
+  expect "a folder of mode $rights" as_user kerf_gives 2 demo --out "names/$rights"
+  expect 'is refused in one line' says "^kerf: demo: --out names/$rights: cannot be \(read\|written\); name another folder\$"
+  expect 'before anything runs' test ! -e calls
+done
+expect 'below one that cannot be entered' as_user kerf_gives 2 demo --out names/0/x
+expect 'likewise' one_line 'kerf: demo: --out names/0/x: cannot be created; name another folder'
+mkdir -p names/rest/.kerf-demo/new/rest && chmod 500 names/rest/.kerf-demo/new
+expect 'where what a killed demo left cannot be cleared up' as_user kerf_gives 2 demo --out names/rest
+expect 'likewise' one_line 'kerf: demo: --out names/rest: cannot be written; name another folder'
+chmod -R u+rwx names
+
+# Two at once: what the first one makes is its own.
+rm -f pids calls segment
+"$root/kerf" demo --seconds 60 --out out >first 2>&1 &
+first=$!
+until [[ -e calls ]] && called '^emulator'; do sleep 0.05; done
+code=0
+"$root/kerf" demo --seconds 1 --out out/ >said 2>&1 || code=$?
+expect 'a folder where another demo is at work is refused' test "$code" == 2
+expect 'in one line' one_line 'kerf: demo: --out out/: another demo is at work there; wait for its end or name another folder'
+expect 'which leaves that alone' test -d out/.kerf-demo/new
+kill -TERM "$first" || true
+code=0
+wait "$first" || code=$?
+cp first said
+expect 'so that it ends well' test "$code" == 143
+expect 'with all results' kept "$all"
+expect 'and then there is room' kerf_gives 0 demo --seconds 1 --out out
 expect 'a size is two numbers' kerf_gives 2 demo --size big
 expect 'a port is one that a demo has' kerf_gives 2 demo --port usb
 expect 'seconds are positive' kerf_gives 2 demo --seconds 0.0
 expect 'a value may not lack' kerf_gives 2 demo --seconds
+for option in --out --hand --scene --renderer; do
+  expect "$option may not be empty" kerf_gives 2 demo "$option" ''
+  expect 'as it says' one_line "kerf: demo: $option: no value; see ./kerf --help"
+done
+expect 'an option is no value of the one before' kerf_gives 2 demo --out --headless
+expect 'as it says' one_line 'kerf: demo: --out: no value; see ./kerf --help'
+expect 'nor is it one of a test' kerf_gives 2 test -R ''
+expect 'as it says' one_line 'kerf: test: -R: no value; see ./kerf --help'
+expect 'an error is one line, whatever was given' kerf_gives 2 demo --size $'1\n2'
+expect 'of it' one_line 'kerf: demo: --size 1?2: not WIDTHxHEIGHT in pixels, 1 to 8192 each; take 640x480'
 expect 'an unknown option is named' kerf_gives 2 demo --fast
 expect 'and told' says '--fast'
 expect 'an unknown program is refused' kerf_gives 2 polish
-expect 'and the known ones are listed' says 'controller emulator record recorder visualizer'
+expect 'and the known ones are listed' one_line "kerf: polish: unknown; known are \
+setup demo test bench sweep doctor docs package bridge controller emulator record recorder visualizer"
+# What the script has a case for, but lab, which is a program too.
+expect 'all of them' test "$(sed -n '/^case $command/,/^esac/s/^  \([a-z]*\)).*/\1/p' "$root/kerf" | grep -vx lab | sort)" == \
+  "$("$root/kerf" --help | sed -n 's|^  \./kerf \([a-z]*\) .*|\1|p' | sort)"
+expect 'the help names the programs that are installed' test \
+  "$("$root/kerf" --help | sed -n 's|.* any program: \(.*\);|\1|p')" == \
+  "$(sed -n '/^set(programs/,/^endforeach/p' "$root/cmake/install.cmake" | grep -o 'kerf-[a-z]*' | sed 's/kerf-//' | sort | paste -sd ' ')"
 expect 'a program runs by its short name' kerf_gives 0 record plot --out "$lab/plot.svg"
 expect 'with its arguments' called "^record plot --out $lab/plot.svg"
 expect 'help is fine' kerf_gives 0 --help
@@ -293,6 +462,29 @@ expect 'a device' says '^ok .* omni at /dev/fw1'
 expect 'and what is missing' says '^warn  /dev/fw1 .*Permission denied'
 expect 'with its cure' says '^ *the cure'
 expect 'an unknown option of the doctor is refused' kerf_gives 2 doctor --fast
+
+# offers ANSWER WORD...: what Tab offers for the last of these words behind ./kerf, each once.
+offers() {
+  local wanted=$1
+  shift
+  offered=$(bash -c '. "$0"; COMP_WORDS=("$@") COMP_CWORD=$(($# - 1)); _kerf "$1" "${!#}" "${*: -2:1}"; echo "${COMPREPLY[*]}"' \
+    "$root/cmake/kerf-completion.sh" "$root/kerf" "$@")
+  echo "$offered" >"$lab/said"
+  [[ $(tr ' ' '\n' <<<"$offered" | LC_ALL=C sort | paste -sd ' ') == "$wanted" ]]
+}
+expect 'Tab offers commands and programs' \
+  offers 'bench bridge controller demo docs doctor emulator lab package record recorder setup sweep test visualizer volume' ''
+expect 'or those that begin so' offers 'docs doctor' 'do'
+expect 'what a bench can measure' offers 'bridge kernels pictures safety stability' bench ''
+expect 'or what begins so' offers 'kernels' bench k
+expect 'the option of the doctor' offers '--demo' doctor ''
+expect 'each option once' offers '--help --jobs --out --seconds --set' sweep --
+expect 'those of a test' offers '--junit --preset -R' test -
+expect 'those of a demo' offers '--scene --seconds --serve --set --sheet --size --spacing --stereo' demo --s
+expect 'what the bridge can do' offers '--help join make-identity serve' bridge ''
+expect 'and the lab' offers 'law' lab la
+expect 'nothing of what has no options' offers '' docs ''
+expect 'nor of a heading that is none of a command' offers '' Environment ''
 
 # A machine without QEMU, and tests that a stand-in runs in a tree of their own.
 mkdir -p "$lab/no-qemu" "$lab/tools" "$lab/tree/.ci" "$lab/tree/build/release"

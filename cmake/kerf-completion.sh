@@ -1,4 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
+# shellcheck shell=bash
 # Completion of kerf (and of ./kerf) in bash: its commands and options as its own help has them; behind the name of
 # a program, what that program offers.
 _kerf() {
@@ -14,10 +15,13 @@ _kerf() {
   fi
   help=$("$1" --help 2>/dev/null)
   if ((COMP_CWORD == 1)); then
-    COMPREPLY=($(compgen -W "$(grep -oP '^  \./kerf \K[a-z]+' <<<"$help")
-      controller emulator visualizer recorder record volume bridge lab" -- "$2"))
+    help=$(grep -oP '^  \./kerf (\K[a-z]+|NAME.* any program: \K[a-z ]+)' <<<"$help")
   else
-    COMPREPLY=($(compgen -W "$(sed -n "/^$command:/,/^[a-z]*:/p" <<<"$help" | grep -oP '(?<= )--?[A-Za-z][a-z-]*')" -- "$2"))
+    # A command's part of the help goes to the next heading. There words stand behind the heading or below them,
+    # options anywhere.
+    help=$(awk -v heading="$command:" '/^[^ ]/ { mine = $1 == heading } mine' <<<"$help" |
+      grep -oP '^([a-z]+: +| {7,8})\K[a-z][a-z-]*|(?<= )--?[A-Za-z][a-z-]*' | sort -u)
   fi
+  mapfile -t COMPREPLY < <(compgen -W "$help" -- "$2")
 }
 complete -o default -F _kerf kerf ./kerf
