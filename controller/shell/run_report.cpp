@@ -57,7 +57,7 @@ std::string score_lines(const MaterialScores& materials) {
       std::string& list = one.felt ? removed : unfelt;
       list += format("%s%s %.3f", list.empty() ? "" : ", ", one.name.c_str(), one.removed_mm3);
     }
-    if (one.forbidden_ms) {
+    if (one.forbidden_ms.value_or(0) > 0) {
       touched +=
           format("%s%s %.0f ms", touched.empty() ? "" : ", ", one.name.c_str(), *one.forbidden_ms);
     }

@@ -21,6 +21,7 @@
 #include "lab/rig/bench_scene.hpp"
 #include "lab/rig/direct_port.hpp"
 #include "lab/zwidth/one_axis.hpp"
+#include "shared/numeric/vec3.hpp"
 
 namespace kerf::zwidth {
 namespace {
@@ -171,15 +172,22 @@ std::optional<Swing> watch_hit(Rig& rig, const Subject& subject, const ArmHit& h
   constexpr double kPatienceS = 8;  // calibration, the way there, and a stay that chattered away
   SwingMeter meter(count, subject.loop.quantum_mm, subject.push_n);
   std::int64_t away = 0;
-  bool touched = false;
+  // Some steps of the encoders within a second: else friction holds it, and nothing is unstable.
+  constexpr double kRestMm = 0.1;
+  std::array<double, 3> from_mm{};
+  bool restless = false;
   std::int64_t judged = 0;
   const std::int64_t settled = std::llround(0.05 * rate_hz);
   const std::int64_t patience = std::llround(kPatienceS * rate_hz);
   for (std::int64_t tick = 0; judged < count; ++tick, ++ticks) {
-    if (tick - judged > patience) return touched ? std::optional(kLost) : std::nullopt;
+    if (tick - judged > patience) return restless ? std::optional(kLost) : std::nullopt;
     const ServoOutput out = rig.tick();
     if (out.fault != Fault::none) return kLost;
-    touched = touched || out.contact;
+    if (tick % std::llround(rate_hz) == 0) {
+      from_mm = out.position_mm;
+      restless = false;
+    }
+    restless = restless || vec3::length(vec3::operator-(out.position_mm, from_mm)) > kRestMm;
     const bool free = out.motors_on && out.phase == Phase::active && !out.contact;
     if (judged == 0 && away < settled) {
       away = free ? away + 1 : 0;

@@ -8,6 +8,7 @@
 #include <numeric>
 #include <ostream>
 #include <set>
+#include <stdexcept>
 #include <thread>
 #include <utility>
 
@@ -155,7 +156,8 @@ Command::Command(Arguments& program)
 }
 
 /// The program's own laws have a trial before a map runs them: one that loops would never end it.
-void Command::try_laws(const MapSpec& map) {
+/// What is no number, or allocates, is told; the map bears both.
+void Command::try_laws(const MapSpec& map, std::ostream& out) {
   std::set<std::string> tried;
   for (const Assignment& values : map.columns()) {
     std::string laws;
@@ -171,8 +173,11 @@ void Command::try_laws(const MapSpec& map) {
     scene.force.stabiliser = subject.stabiliser;
     scene.servo.velocity = subject.estimator;
     scene.servo.numeric = subject.numeric;
-    const std::vector<std::string> flaws = try_own_laws(scene);
-    if (!flaws.empty()) throw HilError(flaws.front());
+    try {
+      for (const std::string& flaw : try_own_laws(scene)) out << flaw << '\n';
+    } catch (const std::runtime_error& error) {
+      throw HilError(error.what());
+    }
   }
 }
 
@@ -361,12 +366,10 @@ int Command::run(std::ostream& out) const {
   const MapSpec map = spec();
   const Shard part = shard();
   const Outputs outputs(paths_);
-  try_laws(map);
+  try_laws(map, out);
   if (!paths_.plot.empty()) check_panels(map);
   if (!portraits_.empty()) {
-    if (map.arm || map.columns().size() > 1) {
-      throw HilError("--portraits: one axis and one value of each; leave --arm and lists out");
-    }
+    if (map.arm) throw HilError("--portraits: of one axis alone; leave --arm out");
     draw_portraits(map);
     return 0;
   }

@@ -28,7 +28,7 @@ class Command final : public LabCommand {
 
  private:
   [[nodiscard]] MapSpec spec() const;
-  static void try_laws(const MapSpec& map);
+  static void try_laws(const MapSpec& map, std::ostream& out);
   [[nodiscard]] Shard shard() const;
   [[nodiscard]] int threads(std::size_t columns) const;
   /// The columns of the shard that `kept` has not; false: interrupted.

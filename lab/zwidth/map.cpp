@@ -94,7 +94,9 @@ class ColumnRun {
 std::string impossible(const MapSpec& spec, const Subject& subject) {
   const double cycles = subject.loop.delay_s * kCyclesPerSecond;
   constexpr double kRounding = 1e-6;
-  if (spec.arm && (cycles > kMaxDelayCycles || std::abs(cycles - std::round(cycles)) > kRounding)) {
+  const bool ticks_fit = kCyclesPerSecond % std::lround(1 / subject.loop.period_s) == 0;
+  if (spec.arm && ticks_fit &&
+      (cycles > kMaxDelayCycles || std::abs(cycles - std::round(cycles)) > kRounding)) {
     return format("delay %g ms: an emulated device has whole steps of 0.125 ms, up to 8 ms",
                   subject.loop.delay_s * 1000);
   }

@@ -294,7 +294,7 @@ TEST_CASE("axes that mean nothing are refused in one line; columns that cannot e
                            "--portraits /dev/null",
                            "--portraits /dev/null --cells 1",
                            "--portraits /dev/null --cells 1:0.002 --csv /dev/null",
-                           "--portraits /dev/null --cells 1:0.002 --delay 0,1",
+                           "--portraits /dev/null --cells 1:0.002 --arm",
                            "--page /dev/null --csv /dev/null",
                            "--seconds 0",
                            "--plot /dev/null --delay 0:3:7 --quantum 0,0.1"}) {
