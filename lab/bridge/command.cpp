@@ -27,13 +27,17 @@ const std::vector<std::string> kParts{"all", "links", "kills", "stopped", "publi
   return text + " (" + page_number(goal) + ")" + (value > goal ? " !" : "");
 }
 
+/// Of a core, a viewer with TLS whose tool is slow.
+constexpr double kServeGoalPercent = 3;
+
 [[nodiscard]] std::string line_of(const Case& what, const CaseResult& r) {
   return "| " + what.name + " | " + beside_goal(r.join_s, what.join_goal_s, "%.2f") + " | " +
          format("%.0f", r.age_p50_ms) + " | " +
          beside_goal(r.age_p99_ms, what.age_goal_ms, "%.0f") + " | " +
-         format("%.0f | %.0f | %.2f | %.1f | %.1f | %.0f | %.0f | %s |", r.age_max_ms,
-                r.near_p99_ms, r.link_mbit, r.serve_cpu_percent, r.join_cpu_percent, r.serve_mib,
-                r.join_mib, r.equal ? "yes" : "NO");
+         format("%.0f | %.0f | %.2f | ", r.age_max_ms, r.near_p99_ms, r.link_mbit) +
+         beside_goal(r.serve_cpu_percent, what.load == Load::slow ? kServeGoalPercent : 0, "%.1f") +
+         format(" | %.1f | %.0f | %.0f | %s |", r.join_cpu_percent, r.serve_mib, r.join_mib,
+                r.equal ? "yes" : "NO");
 }
 
 /// All that a run measures, as the page has it; false where a volume was not the near one's.
@@ -46,8 +50,7 @@ class Table {
   void links(const std::string& part) {
     tell(
         "| link | join s (goal) | age p50 ms | p99 (goal) | max | near p99 | Mbit/s | serve % of a "
-        "core | "
-        "join % | serve MiB | join MiB | equal |");
+        "core (goal) | join % | serve MiB | join MiB | equal |");
     tell("|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---|");
     for (const Case& what : quick_ ? quick_cases() : table_cases()) {
       if (what.name.find(part) == std::string::npos) continue;

@@ -48,7 +48,7 @@ def is_secured(case):
             case.check(cookies and all(one['secure'] and one['httpOnly'] for one in cookies), 'the cookie is secure')
             page.call('Network.clearBrowserCookies')
             page.go(address.split('?')[0] + '?token=a-token-that-is-none')
-            case.check(page.until('document.body?.innerText.includes("This picture needs a token")'),
+            case.check(page.until('document.body?.innerText.includes("This token is none of its own")'),
                        'a wrong token is told')
             page.go(address.replace('https:', 'http:'))
             case.check(page.until('document.body?.innerText.includes("This port speaks TLS only: open it with https://")'),

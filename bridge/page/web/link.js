@@ -58,19 +58,21 @@ export class Link {
     const socket = this.socket = new WebSocket(address);
     socket.binaryType = 'arraybuffer';
     socket.onmessage = ({data}) => this.take(socket, data);
-    socket.onclose = ({code}) => this.lost(socket, kRefusals[code]);
+    // A token that is none will not become one.
+    socket.onclose = ({code}) => this.lost(socket, kRefusals[code], code !== CloseCode.no_token);
     socket.onopen = () => {
       this.heard = performance.now();
       this.on.state('connected; the bridge has no controller yet', false);
     };
   }
 
-  lost(socket, why) {
+  lost(socket, why, again = true) {
     if (socket !== this.socket) return;
     this.socket = null;
     socket.onclose = socket.onmessage = null;
     socket.close();
     this.clock = new ClockOffset();  // the machine may be another now
+    if (!again) return this.on.state(why, true);
     const next = Math.ceil(this.pause / 1000);
     this.on.state(`${why ?? 'The bridge is not reached.'} Trying again in ${next} s.`, true);
     setTimeout(() => this.join(), this.pause);
