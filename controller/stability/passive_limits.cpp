@@ -10,16 +10,19 @@
 namespace kerf {
 namespace {
 
-/// (T/2) Re[(1 - 1/z) z^-d H(z)] / (1 - cos w) at z = e^jw.
+/// What motion of the one angle w takes of damping (docs/theory.md 5.7), at z = e^jw.
 double viscosity_at(const SampledLoop& loop, double stiffness, double damping, double w) {
   const double lag = loop.velocity_filter_s / loop.period_s;
-  const double delay = loop.delay_s / loop.period_s;
+  const double delay = std::min(loop.delay_s / loop.period_s, kMaxDelayPeriods);
+  const double whole = std::floor(delay), part = delay - whole;
   // 1 - 1/z = 2 j sin(w/2) e^-jw/2 and 1 - cos w = 2 sin^2(w/2): nothing cancels at small w.
   const double sine = std::sin(w / 2);
   const std::complex<double> step(2 * sine * sine, 2 * sine * std::cos(w / 2));  // 1 - 1/z
   const std::complex<double> velocity = step / (1.0 + lag * step) / loop.period_s;
-  const std::complex<double> force = (stiffness + damping * velocity) * std::polar(1.0, -w * delay);
-  return loop.period_s / 2 * (step * force).real() / (2 * sine * sine);
+  const std::complex<double> force = stiffness + damping * velocity;
+  const std::complex<double> mean = std::polar(1.0, -w * whole) * (1.0 - part * step) * force;
+  const double held = (step * mean).real() / (4 * sine * sine);
+  return loop.period_s / 2 * (held + std::sqrt(held * held + part * (1 - part) * std::norm(force)));
 }
 
 }  // namespace
@@ -50,19 +53,12 @@ double passive_viscosity(const SampledLoop& loop, double stiffness_n_per_mm,
   return std::max(best, at((low + high) / 2));
 }
 
-double undelayed_passive_viscosity(const SampledLoop& loop, double stiffness_n_per_mm,
-                                   double damping_ns_per_mm) {
-  const double period = loop.period_s;
-  return stiffness_n_per_mm * period / 2 +
-         damping_ns_per_mm * period / (period + 2 * loop.velocity_filter_s);
-}
-
 double passive_stiffness(const SampledLoop& loop, double damping_ns_per_mm) {
   const auto passive = [&](double stiffness) {
     return passive_viscosity(loop, stiffness, damping_ns_per_mm) <= loop.viscous_ns_per_mm;
   };
   if (!passive(0)) return 0;
-  // At small w the stiffness asks for K (T/2 + td), so no more than this is passive.
+  // At small w the stiffness asks for K (T/2 + td) or more, so no more than this is passive.
   double low = 0, high = short_delay_stiffness(loop, damping_ns_per_mm);
   constexpr int kBits = 50;
   for (int i = 0; i < kBits; ++i) {

@@ -9,15 +9,12 @@ namespace kerf {
 // 5.7). Passive is more than stable: a passive wall never gives energy, whoever holds the device.
 // The hand of the loop is not used here.
 
-/// The device damping (N s/mm) above which the wall is passive: Colgate and Schenkel's
-/// (T/2) max_w Re[(1 - e^-jwT) H(e^jwT)] / (1 - cos wT), with the loop's delay and filter, by a
-/// scan of the circle. Never below 0.
+/// The device damping (N s/mm) above which the wall is passive, by a scan of the circle: Colgate
+/// and Schenkel's (T/2) max_w Re[(1 - e^-jwT) H(e^jwT)] / (1 - cos wT), and where a part of a
+/// period is in the delay what a hand gains between two samples (docs/theory.md 5.7). Never below
+/// 0.
 [[nodiscard]] double passive_viscosity(const SampledLoop& loop, double stiffness_n_per_mm,
                                        double damping_ns_per_mm);
-
-/// The same in closed form, for a loop without delay: K T/2 + B T/(T + 2 tau).
-[[nodiscard]] double undelayed_passive_viscosity(const SampledLoop& loop, double stiffness_n_per_mm,
-                                                 double damping_ns_per_mm);
 
 /// The largest K (N/mm) that is passive on this device at this damping; 0: none.
 [[nodiscard]] double passive_stiffness(const SampledLoop& loop, double damping_ns_per_mm);
