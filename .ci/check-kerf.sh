@@ -152,7 +152,8 @@ as_user() {
 typed() {
   local code=0
   rm -f "$lab/pids" "$lab/calls" "$lab/segment"
-  python3 - "$1" "$lab/calls" "$root/kerf" demo --seconds 60 --out "$lab/out" >"$lab/said" <<'TERMINAL' || code=$?
+  env --default-signal=HUP,INT,QUIT python3 - "$1" "$lab/calls" "$root/kerf" demo --seconds 60 --out "$lab/out" \
+    >"$lab/said" <<'TERMINAL' || code=$?
 import os, pty, sys, time
 key, calls, *command = sys.argv[1:]
 process, terminal = pty.fork()
