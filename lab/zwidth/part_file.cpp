@@ -3,11 +3,14 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <iterator>
 #include <optional>
 #include <sstream>
 #include <utility>
 
 #include "hil/hil_error.hpp"
+#include "shared/numeric/fnv1a.hpp"
+#include "shared/posix/hex64.hpp"
 #include "shared/posix/new_file.hpp"
 #include "shared/text/json.hpp"
 
@@ -58,15 +61,11 @@ std::string head_of(const Part& part) {
   for (std::size_t i = 0; i < kAxisCount; ++i) {
     if (!spec.table[i].empty()) axes[axis_kinds()[i].name] = spec.table[i];
   }
-  return Json{{"kerf_zwidth", 1},
-              {"version", KERF_VERSION},
-              {"shard", Json::List{part.shard.index, part.shard.count}},
-              {"map", spec.mapped},
-              {"stiffness_n_per_mm", spec.stiffness_n_per_mm},
-              {"axes", std::move(axes)},
-              {"arm", spec.arm},
-              {"seconds", spec.seconds},
-              {"seed", spec.seed}}
+  return Json{{"kerf_zwidth", 1},        {"version", KERF_VERSION},
+              {"program", part.program}, {"shard", Json::List{part.shard.index, part.shard.count}},
+              {"map", spec.mapped},      {"stiffness_n_per_mm", spec.stiffness_n_per_mm},
+              {"axes", std::move(axes)}, {"arm", spec.arm},
+              {"seconds", spec.seconds}, {"seed", spec.seed}}
       .canonical();
 }
 
@@ -77,6 +76,7 @@ void take_head(const std::string& line, Part& part) {
     throw JsonError("of version " + json.at("version").get<std::string>() +
                     ", this is " KERF_VERSION);
   }
+  part.program = json.at("program").get<std::string>();
   part.shard = {json.at("shard").at(0).get<std::size_t>(),
                 json.at("shard").at(1).get<std::size_t>()};
   MapSpec& spec = part.spec;
@@ -90,7 +90,7 @@ void take_head(const std::string& line, Part& part) {
   spec.seed = json.at("seed").get<std::uint64_t>();
 }
 
-/// The same map, whatever the shard.
+/// The same map, whatever the shard and the program.
 std::string map_of(const Part& part) {
   return head_of({part.spec, {}, {}});
 }
@@ -113,6 +113,14 @@ std::string gap_of(const Part& part, std::size_t column_count) {
 }
 
 }  // namespace
+
+const std::string& this_program() {
+  static const std::string hash = [] {
+    std::ifstream file("/proc/self/exe", std::ios::binary);
+    return hex64(fnv1a(std::string(std::istreambuf_iterator<char>(file), {})));
+  }();
+  return hash;
+}
 
 std::string part_text(const Part& part) {
   std::string text = head_of(part) + "\n";
@@ -164,13 +172,17 @@ Part merge_parts(const std::vector<std::string>& paths) {
   std::map<std::size_t, std::string> seen;  // path by shard
   for (const std::string& path : paths) {
     const Part part = read_part(path);
-    if (seen.empty()) whole = {part.spec, part.shard, {}};
+    if (seen.empty()) whole = {part.spec, part.shard, {}, part.program};
     if (map_of(part) != map_of(whole) || part.shard.count != whole.shard.count) {
       const std::string seeds = part.spec.seed == whole.spec.seed
                                     ? std::string("other axes, hits or shards than ")
                                     : "seed " + std::to_string(part.spec.seed) + ", not the " +
                                           std::to_string(whole.spec.seed) + " of ";
       throw HilError(path + ": " + seeds + paths.front() + "; merge shards of one map");
+    }
+    if (part.program != whole.program) {
+      throw HilError(path + ": another program measured it than " + paths.front() +
+                     ", which may move other bits; run all shards with one build");
     }
     const auto [other, is_new] = seen.emplace(part.shard.index, path);
     if (!is_new) {
@@ -196,6 +208,11 @@ PartWriter::PartWriter(std::string path, const MapSpec& spec, const Shard& shard
   std::error_code error;
   if (std::filesystem::exists(path_, error) && !is_stream(path_)) {
     Part found = read_part(path_);
+    if (map_of(found) == map_of(part_) && found.program != part_.program) {
+      throw HilError("--part " + path_ +
+                     ": another program measured it, which may move other bits; name another " +
+                     "file, or remove it to begin anew");
+    }
     if (head_of(found) != head_of(part_)) {
       throw HilError("--part " + path_ +
                      ": has another map or shard; name another file, or remove it to begin anew");

@@ -18,30 +18,35 @@ struct Shard {
   [[nodiscard]] bool has(std::size_t column) const { return column % count == index - 1; }
 };
 
+/// A hash of the program that runs, with every law linked into it: another build may move other
+/// bits.
+[[nodiscard]] const std::string& this_program();
+
 /// What a part file says: one line of JSON for the map, one for each column.
 struct Part {
   MapSpec spec;
   Shard shard;
   Columns columns;
+  std::string program = this_program();  ///< that measured it
 };
 
 /// The text of a part with its columns in order: the same for the same content.
 [[nodiscard]] std::string part_text(const Part& part);
 
-/// Reads a part file; a last line that is not whole (of a run that was killed) is left out. Throws
-/// HilError that names `path`.
+/// Reads a part file, of any program; a last line that is not whole (of a run that was killed) is
+/// left out. Throws HilError that names `path`.
 [[nodiscard]] Part read_part(const std::string& path);
 
-/// Whole maps from the parts of all shards. Throws HilError where they are not of one map, or one
-/// or a column of one is missing, or twice there.
+/// Whole maps from the parts of all shards. Throws HilError where they are not of one map and one
+/// program, or one or a column of one is missing, or twice there.
 [[nodiscard]] Part merge_parts(const std::vector<std::string>& paths);
 
 /// A part file while its columns come: each is on the disk before the next one is told. What the
-/// file already has of the same map is kept.
+/// file already has of the same map by the same program is kept.
 class PartWriter {
  public:
   /// An empty path: nothing is written, and nothing was there. Throws HilError where the file has
-  /// another map, and where it cannot be written.
+  /// another map or is another program's, and where it cannot be written.
   PartWriter(std::string path, const MapSpec& spec, const Shard& shard);
 
   [[nodiscard]] const Columns& columns() const { return part_.columns; }

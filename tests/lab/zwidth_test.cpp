@@ -238,6 +238,13 @@ TEST_CASE("parts that make no map are refused in one line, and nothing is lost")
   refused("merge " + a + " " + a, "again");
   refused("merge " + folder.at("none.part"), "cannot be read");
   refused(kSmall + std::string("--hand firm --shard 1/2 --part ") + a, "another map or shard");
+  std::string foreign = kept;
+  const std::string program = "\"program\":\"";
+  foreign.replace(foreign.find(program) + program.size(), 4, "none");
+  std::ofstream(b, std::ios::binary) << foreign;
+  refused("merge " + b + " " + c, "another program measured it than");
+  refused(kSmall + std::string("--shard 1/2 --part ") + b, "another program measured it, which");
+  CHECK(bytes(b) == foreign);
   // A version that this is not; a shard that is not done; text that is no part.
   std::string old = kept;
   old.replace(old.find(KERF_VERSION), std::string(KERF_VERSION).size(), "0.0.1");
