@@ -12,16 +12,16 @@ class HardeningSpring {
   static constexpr const char* kName = "hardening_spring";
   static constexpr const char* kMeaning = "a spring with a cubic part: K d + H d^3";
   static constexpr std::array<kerf::LawSetting, 3> kSettings{{
-      {"k_n_per_mm", "N/mm", 0, 10, 0.2, "stiffness K of a short spring"},
-      {"h_n_per_mm3", "N/mm^3", 0, 10, 0.005, "how it hardens: H"},
-      {"b_ns_per_mm", "N s/mm", 0, 0.1, 0.002, "damping along the spring"},
+      {"stiffness_n_per_mm", "N/mm", 0, 10, 0.2, "K, of a short spring"},
+      {"hardening_n_per_mm3", "N/mm^3", 0, 10, 0.005, "H"},
+      {"damping_ns_per_mm", "N s/mm", 0, 0.1, 0.002, "along the spring"},
   }};
   struct State {};  // it remembers nothing
 
   explicit HardeningSpring(const kerf::LawSetup& setup)
-      : k_(Ratio(setup["k_n_per_mm"])),
-        h_(Real(setup["h_n_per_mm3"])),
-        b_(typename N::Unit(setup["b_ns_per_mm"])) {}
+      : k_(Ratio(setup["stiffness_n_per_mm"])),
+        h_(Real(setup["hardening_n_per_mm3"])),
+        b_(typename N::Unit(setup["damping_ns_per_mm"])) {}
 
   [[nodiscard]] kerf::DeviceVec<Real> step(const kerf::ForceInput<N>& in, State&) const noexcept {
     const Real d = norm(in.spring_mm);

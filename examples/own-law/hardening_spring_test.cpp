@@ -8,8 +8,10 @@
 template <class N>
 int failures() {
   constexpr double kK = 0.5, kH = 0.25;
-  const auto spring = kerf::plan_law<kerf::ForceInput, N>(
-      {kerf::LawKind::force, "hardening_spring", {{"k_n_per_mm", kK}, {"h_n_per_mm3", kH}}}, {});
+  const kerf::LawChoice choice{kerf::LawKind::force,
+                               "hardening_spring",
+                               {{"stiffness_n_per_mm", kK}, {"hardening_n_per_mm3", kH}}};
+  const auto spring = kerf::plan_law<kerf::ForceInput, N>(choice, {});
   kerf::LawMemory memory;
   int failures = 0;
   for (const double d : {0.0, 0.125, 0.5, 1.0, 3.0}) {

@@ -48,7 +48,8 @@ A hand pushes by 1 N from 0.1 mm above a wall and lets go after 2 s. Fixed point
 limits of an Omni, no virtual damping. `bare` is the device alone, 0.045 kg and 0.2 N s/m, `gripped` with a hand,
 0.145 kg and 3.2 N s/m; the stabilisers only know the device. `delay` is from the touch to half of the push (3000:
 never), `depth` and `swing` are mean and peak to peak of the last half second under the push, `drag` the largest force
-in the air afterwards, `minimum` the lowest energy of the port.
+in the air afterwards, `minimum` the lowest energy of the port. `passivity` pays a tick late: behind a hand that brings
+the device to rest anyway, a stiff wall may leave the port with less than no stabiliser does.
 
 | hand | K N/mm | stabiliser | peak N | delay ms | depth mm | swing mm | drag N | minimum mJ |
 |---|---|---|---|---|---|---|---|---|

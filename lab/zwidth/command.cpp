@@ -62,8 +62,21 @@ void tell(const Part& part, std::ostream& out) {
   const std::vector<Assignment> columns = part.spec.columns();
   std::set<std::string> reasons;
   std::size_t empty_count = 0;
-  out << format("%-40s %10s %10s %10s %10s  re-entry\n", "column (N/mm)", "swings", "energy",
-                "exact", "passive");
+  const auto name_of = [&](std::size_t index) {
+    std::string name;
+    for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
+      if (part.spec.table[axis].size() < 2) continue;
+      name += std::string(name.empty() ? "" : " ") + axis_kinds()[axis].name + " " +
+              columns[index][axis];
+    }
+    return name;
+  };
+  std::size_t width = 40;
+  for (const auto& [index, column] : part.columns) {
+    width = std::max(width, name_of(index).size());
+  }
+  out << format("%-*s %10s %10s %10s %10s  re-entry\n", int(width), "column (N/mm)", "swings",
+                "energy", "exact", "passive");
   for (const auto& [index, column] : part.columns) {
     const Subject subject = subject_of(columns[index]);
     if (column.cells.empty()) {
@@ -72,14 +85,8 @@ void tell(const Part& part, std::ostream& out) {
       reasons.insert(why.empty() ? NotMet().what() : why);
       continue;
     }
-    std::string name;
-    for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
-      if (part.spec.table[axis].size() < 2) continue;
-      name += std::string(name.empty() ? "" : " ") + axis_kinds()[axis].name + " " +
-              columns[index][axis];
-    }
     const Analytic analytic = analytic_of(subject);
-    out << format("%-40s %10s %10s %10.4g %10.4g", name.c_str(),
+    out << format("%-*s %10s %10s %10.4g %10.4g", int(width), name_of(index).c_str(),
                   crossing_text(column.swing).c_str(), crossing_text(column.energy).c_str(),
                   analytic.exact, analytic.passive);
     if (column.swing.re_entry_from_n_per_mm > 0) {

@@ -65,6 +65,9 @@ constexpr const char* kDevicesText =
 real device has not been measured; take two periods until it is. Take no more damping than the map bears: beyond its
 hump the lag of the velocity and the encoder's steps drive the wall.
 
+The devices here are the emulator's. The check of a scene (docs/devices.md, "Gains") takes less viscous damping,
+0.0002 N s/mm, and a delay of 2 ms at every rate, so what it calls safe is lower: it speaks for units that nobody measured.
+
 )";
 
 constexpr const char* kStabilisersText =
@@ -87,7 +90,7 @@ constexpr const char* kKnobsText = R"(## What each knob does
 
 An Omni with B = 0.002 N s/mm and a delay of one period, one knob at a time, K in N/mm; the standard in bold. The linear
 boundary knows mass, both dampings, delay, rate, hand and filter. *Re-entry* is the lowest K above the first crossing
-that comes to rest again. Rows of the same loop differ by up to 2 %: the seed puts the encoder's steps elsewhere.
+that comes to rest again. Rows of the same loop differ a little: the seed puts the encoder's steps elsewhere.
 
 )";
 

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstddef>
 #include <functional>
+#include <iomanip>
 #include <sstream>
 
 #include "hil/hil_error.hpp"
@@ -142,7 +143,7 @@ std::string foot_of(const Part& part) {
     text += say(AxisId::friction, "friction ", " N") + say(AxisId::quantum, "encoder ", " mm") +
             say(AxisId::numeric, "", "") + say(AxisId::estimator, "speed by ", "");
   }
-  text += say(AxisId::rate, "", " Hz") + say(AxisId::delay, "delay of periods ", "") +
+  text += say(AxisId::rate, "", " Hz") + say(AxisId::delay, "delay ", " periods") +
           say(AxisId::damping, "B ", " N s/mm") + say(AxisId::hand, "hand ", "");
   return text + (part.spec.arm ? "whole arm, " : "one axis, ") + "hits: a push, 50 and 200 mm/s, " +
          (part.spec.arm ? "a slide, a corner, " : "") + number_text(part.spec.seconds) +
@@ -225,12 +226,22 @@ void draw_verdicts(std::ostream& script, const Part& part, const Panel& panel, c
             "  $lines using 1:3 notitle with linespoints pointtype 2 linewidth 2 dashtype 2 "
             "linecolor rgb '#0072B2', "
             "\\\n"
-            "  $lines using 1:4 notitle with lines linewidth 2 dashtype 4 linecolor rgb '#009E73', "
+            "  $lines using 1:4 notitle with linespoints pointtype 8 linewidth 2 dashtype 4 "
+            "linecolor rgb '#009E73', "
             "\\\n"
             "  $lines using 1:5 notitle with linespoints linewidth 1.5 pointtype 7 pointsize 0.5 "
             "linecolor rgb '#D55E00', \\\n"
             "  $lines using 1:6 notitle with points pointtype 6 pointsize 0.8 linecolor rgb "
             "'#AA4499'\n";
+}
+
+/// A first crossing, or beyond which end of the column it lies.
+std::string height_text(double first, const std::vector<double>& stiffness) {
+  if (first < stiffness.front()) return "<" + number_text(stiffness.front());
+  if (first > stiffness.back()) return ">" + number_text(stiffness.back());
+  std::ostringstream text;
+  text << std::setprecision(2) << first;
+  return text.str();
 }
 
 /// The highest stiffness of every cell as a colour, and as a number where there is room.
@@ -244,20 +255,22 @@ void draw_heights(std::ostream& script, const Part& part, const Panel& panel, co
       if (column.cells.empty()) continue;
       const std::size_t i = x.index(columns[c][part.spec.mapped[0]]);
       const std::size_t j = y.index(columns[c][part.spec.mapped[1]]);
-      const double first =
-          std::clamp(column.swing.first_n_per_mm, stiffness.front() / 2, stiffness.back() * 2);
+      const double first = column.swing.first_n_per_mm;
       script << x.place(i) << ' ' << y.place(j) << ' ' << x.low(i) << ' ' << x.high(i) << ' '
-             << y.low(j) << ' ' << y.high(j) << ' ' << first << '\n';
+             << y.low(j) << ' ' << y.high(j) << ' '
+             << std::clamp(first, stiffness.front(), stiffness.back()) << ' '
+             << height_text(first, stiffness) << '\n';
     }
   });
   script << "set logscale cb\nset cbrange [" << stiffness.front() << ":" << stiffness.back()
-         << "]\nset cblabel 'highest stiffness that comes to rest (N/mm)'\n"
+         << "]\nset cbtics add (" << stiffness.front() << ", " << stiffness.back()
+         << ")\nset cblabel 'highest stiffness that comes to rest (N/mm)'\n"
             "set palette defined (0 '#F0B79B', 0.5 '#F7E3A1', 1 '#8CC8B0')\n"
             "plot $cells using 1:2:3:4:5:6:7 notitle with boxxyerror fillstyle solid noborder "
             "linecolor palette";
   constexpr std::size_t kMostNumbers = 14;
   if (x.size() <= kMostNumbers && y.size() <= kMostNumbers) {
-    script << ", $cells using 1:2:(sprintf('%.2g', $7)) notitle with labels";
+    script << ", $cells using 1:2:8 notitle with labels";
   }
   script << "\n";
 }
@@ -270,18 +283,18 @@ void draw_legend(std::ostream& script, const Part& part, bool verdicts, double h
   if (!verdicts) return;
   struct Item {
     const char* text;
-    const char* style;
+    std::string style;
     double x;
     int row;
   };
+  const auto cell = [](const char* colour) {
+    return std::string("pointtype 5 pointsize 2 linecolor rgb ") + colour;
+  };
   const Item items[] = {
-      {"comes to rest", "pointtype 5 pointsize 2 linecolor rgb '#9CCFB8'", 0.03, 0},
-      {"travel small or falling, but the wall goes on giving energy",
-       "pointtype 5 pointsize 2 linecolor rgb '#F0D060'", 0.03, 1},
-      {"swings on (a limit cycle, or worse)", "pointtype 5 pointsize 2 linecolor rgb '#F0B79B'",
-       0.03, 2},
-      {"not stable even without a wall", "pointtype 5 pointsize 2 linecolor rgb '#D9D9D9'", 0.03,
-       3},
+      {"comes to rest", cell(kRests), 0.03, 0},
+      {"travel small or falling, but the wall goes on giving energy", cell(kActive), 0.03, 1},
+      {"swings on (a limit cycle, or worse)", cell(kSwings), 0.03, 2},
+      {"not stable even without a wall, or not measured", cell(kNone), 0.03, 3},
       {"measured: first swing", "pointtype 7 pointsize 0.9 linecolor rgb '#D55E00'", 0.40, 0},
       {"measured: first energy that goes on", "pointtype 6 pointsize 1 linecolor rgb '#AA4499'",
        0.40, 1},
@@ -290,13 +303,23 @@ void draw_legend(std::ostream& script, const Part& part, bool verdicts, double h
     script << "set label \"" << item.text << "\" at screen " << item.x << ", screen "
            << line(item.row) << " left point " << item.style << " offset 1.2,0\n";
   }
-  const Item lines[] = {
-      {"linear loop, exact (no friction, no encoder steps)",
-       "linewidth 2.5 linecolor rgb '#000000'", 0.65, 0},
-      {"passive: stable with any hand", "linewidth 2 dashtype 2 linecolor rgb '#0072B2'", 0.65, 1},
-      {"friction swallows encoder steps (for B = 0)",
-       "linewidth 2 dashtype 4 linecolor rgb '#009E73'", 0.65, 2},
+  bool is_passive = false, is_quantum = false;  // some column has a point of that line
+  for (const Assignment& column : part.spec.columns()) {
+    const Analytic analytic = analytic_of(subject_of(column));
+    is_passive |= analytic.passive > 0;
+    is_quantum |= analytic.quantum > 0 && std::isfinite(analytic.quantum);
+  }
+  std::vector<Item> lines{{"linear loop, exact (no friction, no encoder steps)",
+                           "linewidth 2.5 linecolor rgb '#000000'", 0.65, 0}};
+  const auto add = [&](const char* text, const char* colour, int dash, int point) {
+    const int row = static_cast<int>(lines.size());
+    const std::string style = std::string("linewidth 2 linecolor rgb ") + colour;
+    lines.push_back({text, style + " dashtype " + std::to_string(dash), 0.65, row});
+    script << "set label \"\" at screen " << lines.back().x + 0.0075 << ", screen " << line(row)
+           << " point pointtype " << point << ' ' << style << '\n';
   };
+  if (is_passive) add("passive: stable with any hand", "'#0072B2'", 2, 2);
+  if (is_quantum) add("friction swallows encoder steps (for B = 0)", "'#009E73'", 4, 8);
   for (const Item& item : lines) {
     script << "set arrow from screen " << item.x - 0.01 << ", screen " << line(item.row)
            << " to screen " << item.x + 0.025 << ", screen " << line(item.row) << " nohead "

@@ -39,9 +39,10 @@ std::string column_name(const AxisKind& kind) {
 }  // namespace
 
 Analytic analytic_of(const Subject& subject) {
+  const bool is_bare = subject.loop.delay_s <= 0 && subject.damping_ns_per_mm <= 0;
   return {highest_stiffness(subject.loop, subject.damping_ns_per_mm),
           passive_stiffness(subject.loop, subject.damping_ns_per_mm),
-          subject.loop.delay_s > 0 ? 0 : quantum_stiffness(subject.loop)};
+          is_bare ? quantum_stiffness(subject.loop) : 0};
 }
 
 std::string csv_of(const Part& part) {

@@ -8,7 +8,7 @@
 namespace kerf::zwidth {
 
 /// The analytic boundaries of a column, N/mm; 0: none is stable, or the bound is about another loop
-/// (`quantum`: without delay). Of the linear loop, without the
+/// (`quantum`: without delay and B). Of the linear loop, without the
 /// limits, and with the backward difference whatever the subject's estimator.
 struct Analytic {
   double exact, passive, quantum;
