@@ -30,17 +30,16 @@ std::string_view text(beast::string_view view) {
 }  // namespace
 
 asio::awaitable<void> Server::Impl::connection(tcp::socket socket) {
-  ErrorCode error;
-  HandshakePlace place(*this, socket.remote_endpoint(error).address());
   auto ws = std::make_unique<WebSocket>(std::move(socket), tls_ ? &*tls_ : nullptr);
   beast::flat_buffer in(kMaxHeaderBytes);
   bool done = true;
   if (tls_) co_await handshake(*ws, in, done);
-  if (done) co_await talk_http(std::move(ws), in, place);
+  if (done) co_await talk_http(std::move(ws), in);
 }
 
 asio::awaitable<void> Server::Impl::handshake(WebSocket& ws, beast::flat_buffer& in, bool& done) {
   Link& link = ws.next_layer();
+  const HandshakePlace place(*this, link.next_layer());
   ErrorCode error;
   link.next_layer().expires_after(std::chrono::nanoseconds(setup_.handshake_ns));
   done = co_await beast::async_detect_ssl(link.next_layer(), in, quiet(error));
@@ -103,13 +102,11 @@ std::string Server::Impl::page_text(const Request& request, Right right) const {
   return http_text(reply);
 }
 
-void Server::Impl::say_refused(const Link& link) {
+void Server::Impl::say_at_most_once_a_second(const std::string& text) {
   const std::int64_t now_ns = monotonic_ns();
-  if (now_ns - refused_ns_ < kNsPerSecond) return;
-  refused_ns_ = now_ns;
-  ErrorCode error;
-  std::cerr << "kerf-bridge: a wrong token from "
-            << link.next_layer().socket().remote_endpoint(error).address() << '\n';
+  if (now_ns - warned_ns_ < kNsPerSecond) return;
+  warned_ns_ = now_ns;
+  std::cerr << "kerf-bridge: " << text << '\n';
 }
 
 asio::awaitable<void> Server::Impl::refuse(Link& link, int status, std::string_view why,
@@ -122,9 +119,10 @@ asio::awaitable<void> Server::Impl::refuse(Link& link, int status, std::string_v
   link.next_layer().socket().shutdown(tcp::socket::shutdown_send, error);
 }
 
-asio::awaitable<void> Server::Impl::talk_http(std::unique_ptr<WebSocket> ws, beast::flat_buffer& in,
-                                              HandshakePlace& place) {
+asio::awaitable<void> Server::Impl::talk_http(std::unique_ptr<WebSocket> ws,
+                                              beast::flat_buffer& in) {
   Link& link = ws->next_layer();
+  HandshakePlace place(*this, link.next_layer());
   ErrorCode error;
   for (bool more = true; more && !error;) {
     http::request_parser<http::empty_body> parser;
@@ -152,9 +150,11 @@ asio::awaitable<void> Server::Impl::talk_http(std::unique_ptr<WebSocket> ws, bea
     const Right right = setup_.tokens.right_of(token);
     if (right == Right::none && !token.empty()) {
       // The place is held meanwhile, so who guesses gets 32 answers a second at most.
-      say_refused(link);
+      place.is_guess = true;
+      say_at_most_once_a_second("a wrong token from " + place.from().to_string());
       asio::steady_timer wait(io_, std::chrono::nanoseconds(setup_.wrong_token_ns));
       co_await wait.async_wait(quiet(error));
+      place.is_guess = false;
     }
     if (upgrade && path_of(text(request.target())) == kBridgePath) {
       const Request upgrade_request = parser.release();

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cstddef>
 #include <iostream>
 #include <utility>
 
@@ -25,7 +26,8 @@ namespace {
 
 // Connections that are no viewers yet: room for a browser's six in several windows, and a bound for
 // those who come to keep others out.
-constexpr std::size_t kMaxHandshakes = 128, kMaxHandshakesOfOne = 32;
+constexpr std::size_t kMaxHandshakes = 128;
+constexpr std::ptrdiff_t kMaxHandshakesOfOne = 32;
 constexpr std::int64_t kRetryNs = kNsPerSecond / 10;
 constexpr std::int64_t kBbrRestartNs = 5 * kNsPerSecond;
 
@@ -121,11 +123,30 @@ asio::awaitable<void> Server::Impl::accept_all() {
       continue;
     }
     const asio::ip::address from = socket.remote_endpoint(error).address();
-    if (error || handshake_count_ >= kMaxHandshakes) continue;
-    const auto same = handshakes_.find(from);
-    if (same != handshakes_.end() && same->second >= kMaxHandshakesOfOne) continue;
+    if (error || !make_room(from)) continue;
     asio::co_spawn(io_, connection(std::move(socket)), asio::detached);
   }
+}
+
+/// Where all places are taken, the oldest connection of the address that has most of them goes: who
+/// holds many and says nothing keeps nobody else out.
+bool Server::Impl::make_room(const asio::ip::address& newcomer) {
+  const auto held_by = [&](const asio::ip::address& address) {
+    return std::ranges::count(handshakes_, address, &HandshakePlace::from);
+  };
+  const bool of_one = held_by(newcomer) >= kMaxHandshakesOfOne;
+  if (!of_one && handshakes_.size() < kMaxHandshakes) return true;
+  HandshakePlace* oldest = nullptr;
+  for (HandshakePlace* one : handshakes_) {
+    if (one->is_guess || (of_one && one->from() != newcomer)) continue;
+    if (oldest == nullptr || held_by(one->from()) > held_by(oldest->from())) oldest = one;
+  }
+  if (oldest == nullptr) return false;
+  say_at_most_once_a_second(oldest->from().to_string() + " holds " +
+                            std::to_string(held_by(oldest->from())) +
+                            " connections that are no viewers; the oldest are closed");
+  oldest->evict();
+  return true;
 }
 
 asio::awaitable<void> Server::Impl::clock(const std::atomic<bool>& stop) {

@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <deque>
 #include <list>
-#include <map>
 #include <memory>
 #include <optional>
 #include <span>
@@ -70,6 +69,7 @@ class Server::Impl {
 
   // server.cpp
   Void accept_all();
+  [[nodiscard]] bool make_room(const asio::ip::address& newcomer);
   Void clock(const std::atomic<bool>& stop);
   void slot();
   void watch_controller(std::int64_t now_ns);
@@ -79,9 +79,9 @@ class Server::Impl {
   // connection.cpp
   Void connection(tcp::socket socket);
   Void handshake(WebSocket& ws, beast::flat_buffer& in, bool& done);
-  Void talk_http(std::unique_ptr<WebSocket> ws, beast::flat_buffer& in, HandshakePlace& place);
+  Void talk_http(std::unique_ptr<WebSocket> ws, beast::flat_buffer& in);
   Void refuse(Link& link, int status, std::string_view text, bool head_only);
-  void say_refused(const Link& link);
+  void say_at_most_once_a_second(const std::string& text);
   [[nodiscard]] std::string_view token_of(const Request& request) const;
   [[nodiscard]] std::string page_text(const Request& request, Right right) const;
 
@@ -100,8 +100,7 @@ class Server::Impl {
 
   ServerSetup setup_;
   // Used by what `io_` runs, to its end.
-  std::map<asio::ip::address, std::size_t> handshakes_;
-  std::size_t handshake_count_ = 0;
+  std::list<HandshakePlace*> handshakes_;  // the oldest first
   asio::io_context io_{1};
   std::optional<asio::ssl::context> tls_;
   tcp::acceptor acceptor_;
@@ -111,33 +110,38 @@ class Server::Impl {
   std::unique_ptr<RunSnapshot> snapshot_;
   std::optional<SegmentConnection> command_link_;  // of `helper_` alone
   bool connecting_ = false;
-  std::int64_t next_try_ns_ = 0, bbr_restarted_ns_ = 0, refused_ns_ = 0;
+  std::int64_t next_try_ns_ = 0, bbr_restarted_ns_ = 0, warned_ns_ = 0;
   std::string said_;
 
   std::list<std::shared_ptr<Viewer>> viewers_;
 };
 
-/// Counts a connection that is not yet a viewer, by its address.
+/// A connection that is not yet a viewer, while it holds one of the places that there are for such.
+/// Its stream outlives it.
 class Server::Impl::HandshakePlace {
  public:
-  HandshakePlace(Impl& server, const asio::ip::address& address)
-      : server_(&server), address_(address) {
-    ++server.handshakes_[address];
-    ++server.handshake_count_;
+  HandshakePlace(Impl& server, beast::tcp_stream& stream) : server_(server), stream_(stream) {
+    ErrorCode error;
+    from_ = stream.socket().remote_endpoint(error).address();
+    server_.handshakes_.push_back(this);
   }
   HandshakePlace(const HandshakePlace&) = delete;
   HandshakePlace& operator=(const HandshakePlace&) = delete;
   ~HandshakePlace() { release(); }
-  void release() {
-    if (server_ == nullptr) return;
-    if (--server_->handshakes_[address_] == 0) server_->handshakes_.erase(address_);
-    --server_->handshake_count_;
-    server_ = nullptr;
+  void release() { server_.handshakes_.remove(this); }
+  void evict() {
+    release();
+    stream_.close();  // what waits for it ends with an error
   }
+  [[nodiscard]] const asio::ip::address& from() const { return from_; }
+
+  bool is_guess =
+      false;  ///< it waits for the answer to a wrong token, and keeps its place till then
 
  private:
-  Impl* server_;
-  asio::ip::address address_;
+  Impl& server_;
+  beast::tcp_stream& stream_;
+  asio::ip::address from_;
 };
 
 }  // namespace kerf::bridge

@@ -71,7 +71,9 @@ asio::awaitable<void> Server::Impl::view(std::unique_ptr<WebSocket> ws, const Re
   }
   if (viewer->closing) {
     viewer->ws->next_layer().next_layer().expires_after(std::chrono::nanoseconds(kGoodbyeNs));
-    co_return co_await write_viewer(viewer);
+    co_await write_viewer(viewer);
+    place.release();  // before its stream ends
+    co_return;
   }
   place.release();
   viewer->may_say = kMaySay;

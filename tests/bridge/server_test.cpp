@@ -288,6 +288,25 @@ TEST_CASE("connections that say nothing, or one letter a second, end by themselv
   CHECK(has(RawClient(bridge.port()).ask("/?token=" + kLook), "200 OK"));
 }
 
+TEST_CASE("who holds every place for newcomers and says nothing keeps nobody out") {
+  const TestController controller;
+  ServerSetup setup;
+  setup.handshake_ns = 60'000'000'000;
+  const TestBridge bridge(setup);
+  std::vector<std::unique_ptr<RawClient>> silent;
+  for (std::uint32_t machine = 1; machine <= 5; ++machine) {
+    for (int i = 0; i < 40; ++i) {
+      silent.push_back(std::make_unique<RawClient>(bridge.port(), machine));
+    }
+  }
+  CHECK(has(RawClient(bridge.port()).ask("/?token=" + kLook), "200 OK"));
+  TestViewer late(bridge.port());
+  CHECK(late.until_whole());
+  CHECK(silent.front()->receive(4096).empty());  // it was closed; the newest is not
+  silent.back()->send_bytes("GET /?token=" + kLook + " HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n");
+  CHECK(has(silent.back()->receive(4096), "200 OK"));
+}
+
 TEST_CASE("a port that is taken and an address of nobody are told in one line") {
   const TestBridge bridge;
   ServerSetup setup;
