@@ -108,6 +108,10 @@ float draw_figures(const OverlayFigures& figures) {
     }
     panel_row(figures.removed_is_partial ? "since joining" : "removed", "%.2f mm3",
               figures.removed_mm3);
+    if (figures.spindle) {
+      panel_row("spindle", "%.0f krpm", figures.spindle->krpm);
+      panel_row("its load", "%.0f %%", 100.0 * figures.spindle->load);
+    }
     if (!plots) material_rows(figures);
     if (!figures.forbidden.empty()) {
       const bool touched = figures.forbidden_ms > 0.0;

@@ -19,6 +19,9 @@ OverlayFigures OverlayFigures::rounded() const {
   shown.removed_mm3 = rounded_to(0.01, removed_mm3);
   if (tick_rate_hz) shown.tick_rate_hz = rounded_to(1.0, *tick_rate_hz);
   if (frame_rate_hz) shown.frame_rate_hz = rounded_to(1.0, *frame_rate_hz);
+  if (spindle) {
+    shown.spindle = {rounded_to(1.0, spindle->krpm), rounded_to(0.01, spindle->load)};
+  }
   if (hand) {
     for (double HandMark::*length : {&HandMark::goal_x, &HandMark::goal_y, &HandMark::tool_x,
                                      &HandMark::tool_y, &HandMark::radius}) {

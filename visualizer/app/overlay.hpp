@@ -40,17 +40,25 @@ struct ScoreRow {
   friend bool operator==(const ScoreRow&, const ScoreRow&) noexcept = default;
 };
 
+/// What turns the tool.
+struct SpindleFigures {
+  double krpm = 0.0;
+  double load = 0.0;  ///< torque over the stall torque
+  friend bool operator==(const SpindleFigures&, const SpindleFigures&) noexcept = default;
+};
+
 /// What the panel in the corner says.
 struct OverlayFigures {
   double force_n = 0.0;
   double full_force_n = 3.3;  ///< end of the bar
   std::string tool;
   double removed_mm3 = 0.0;
-  bool removed_is_partial = false;  ///< joined late: counted from then on
-  std::vector<ScoreRow> score;      ///< of the scene's materials
-  bool score_is_partial = false;    ///< something was cut before this one joined
-  std::string forbidden;            ///< which of them may not be cut; empty: none
-  double forbidden_ms = 0.0;        ///< they were pressed upon for so long
+  bool removed_is_partial = false;        ///< joined late: counted from then on
+  std::vector<ScoreRow> score;            ///< of the scene's materials
+  bool score_is_partial = false;          ///< something was cut before this one joined
+  std::string forbidden;                  ///< which of them may not be cut; empty: none
+  double forbidden_ms = 0.0;              ///< they were pressed upon for so long
+  std::optional<SpindleFigures> spindle;  ///< none: the scene's removal has no spindle
   std::optional<double> tick_rate_hz;
   std::optional<double> frame_rate_hz;
   std::optional<double> data_age_ms;

@@ -114,7 +114,12 @@ void draw_hand_mark(const HandMark& mark, double force_share) {
   to.AddLine(tool, goal, colour, wide);
   to.AddCircle(goal, radius, colour, 0, wide);
   to.AddCircleFilled(goal, dot, colour);
-  to.AddText(at, ImGui::GetColorU32(kValueColour), depth.data());
+  if (depth.front() != '\0') {  // a light solid may lie behind it
+    const float edge = 2.0F * unit_px();
+    to.AddRectFilled({at.x - edge, at.y}, {at.x + words.x + edge, at.y + words.y},
+                     ImGui::GetColorU32(ImGuiCol_WindowBg), edge);
+    to.AddText(at, ImGui::GetColorU32(kValueColour), depth.data());
+  }
   to.PopClipRect();
 }
 

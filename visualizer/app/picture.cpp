@@ -10,6 +10,7 @@
 #include <glm/gtc/matrix_access.hpp>
 
 #include "visualizer/gl/context.hpp"
+#include "visualizer/sound/tool_sound.hpp"
 #include "visualizer/view/transfer_function.hpp"
 
 namespace kerf {
@@ -307,6 +308,10 @@ OverlayFigures overlay_figures(const Session& session) {
     figures.force_n = glm::length(vec3(record->commanded_force_n));
     if (record->active_tool < session.scene().tools.size()) {
       figures.tool = session.scene().tools[record->active_tool].name;
+    }
+    if (session.scene().has_spindle) {
+      const ToolSound turning = tool_sound(*record);
+      figures.spindle = {turning.turns_per_s * 60.0 / 1000.0, turning.load};
     }
   }
   figures.removed_mm3 = session.removed_mm3();

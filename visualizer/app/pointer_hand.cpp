@@ -24,8 +24,9 @@ void PointerHand::step(const WindowInput& input, bool over_panel, const View& vi
   leads_ = input.hovers || by_pad_;
   const SeenPoint tool = seen_at(view, size, tool_mm);
   if (tool.depth_mm <= 0.0) return;  // nobody leads what is behind him
-  const bool moves = input.free_right != 0.0 || input.free_up != 0.0;
-  if (!goal_mm_ && ((points && moves) || held.by_pad)) goal_mm_ = tool_mm;
+  const bool acts = input.free_right != 0.0 || input.free_up != 0.0 || input.wheel != 0.0 ||
+                    input.pointer.down || held.deeper != 0.0;
+  if (!goal_mm_ && ((points && acts) || held.by_pad)) goal_mm_ = tool_mm;
   if (!goal_mm_) return;
   SeenPoint seen = seen_at(view, size, *goal_mm_);
   if (seen.depth_mm <= 0.0) seen = tool;

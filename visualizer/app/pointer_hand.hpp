@@ -17,9 +17,9 @@ namespace kerf {
 /// The goal is a point of the world. It moves with the pointer in the plane through it that faces
 /// the eye, and along the ray from the eye with wheel, keys and sticks; while the left button is
 /// down it lies `kPressMm` deeper. It stands under the pointer, at the tool's own depth, when the
-/// pointer first moves, comes from outside or from a panel, and again on `come`. A camera that
-/// turns or moves leaves it where it is. Lengths below are mm of the hand: of the world, times the
-/// scene's scale.
+/// pointer, its wheel or its button is first used, when the pointer comes from outside or from a
+/// panel, and again on `come`. A camera that turns or moves leaves it where it is. Lengths below
+/// are mm of the hand: of the world, times the scene's scale.
 class PointerHand {
  public:
   static constexpr double kWheelMm = 0.25;   ///< a notch

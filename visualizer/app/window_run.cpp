@@ -176,12 +176,19 @@ void WindowRun::follow(const WindowInput& input, OverlayFigures& figures, Pictur
                        Clock::time_point now) {
   const bool over_panel = picture().handle(input.pointer, figures, size);
   if (!over_panel) {
-    const auto goal_mm = hand_.goal_mm();
-    goal_mm ? move_camera_around(picture().camera(), *goal_mm, input)
-            : move_camera(picture().camera(), input);
+    const auto centre_mm = hand_centre_mm();
+    centre_mm ? move_camera_around(picture().camera(), *centre_mm, input)
+              : move_camera(picture().camera(), input);
   }
   if (hand_link_) lead_hand(input, over_panel, figures, size, now);
   pointer_leads_ = figures.hand.has_value() && !over_panel;
+}
+
+std::optional<glm::dvec3> WindowRun::hand_centre_mm() {
+  if (const auto goal_mm = hand_.goal_mm()) return goal_mm;
+  if (!hand_link_ || !hand_link_->leads() || !session().latest()) return std::nullopt;
+  const auto held = hand_of(*session().latest());
+  return held ? std::optional(held->tip_mm) : std::nullopt;
 }
 
 void WindowRun::lead_hand(const WindowInput& input, bool over_panel, OverlayFigures& figures,

@@ -96,6 +96,8 @@ class WindowRun {
   /// What the user wants of hand and camera; the mark of the hand goes into the figures.
   void follow(const WindowInput& input, OverlayFigures& figures, PictureSize size,
               Clock::time_point now);
+  /// What the camera turns about while the pointer is a hand, whose wheel and button are its own.
+  [[nodiscard]] std::optional<glm::dvec3> hand_centre_mm();
   void lead_hand(const WindowInput& input, bool over_panel, OverlayFigures& figures,
                  PictureSize size, Clock::time_point now);
   void time_the_tool(const WindowInput& input, const glm::dvec3& tool_mm, Clock::time_point now);

@@ -168,6 +168,7 @@ SceneView scene_view(const SegmentInfo& segment) {
     }
     for (const Json& tool : text.at("tools")) scene.tools.push_back(tool_view(tool));
     if (text.contains("device")) scene.device = device_frame(text.at("device"));
+    scene.has_spindle = text.contains("spindle");
     for (const Json& one : text.at("materials")) scene.materials.push_back(material_view(one));
   } catch (const JsonError& problem) {
     throw VisualizerError("segment scene: " + std::string(problem.what()) +

@@ -73,6 +73,22 @@ TEST_CASE("nobody leads before the pointer moves; then the goal is under it, at 
   CHECK(wish.tip_mm.z == doctest::Approx((goal.z - 3.0) / 2.0));
 }
 
+TEST_CASE("who turns the wheel or presses before the pointer moved leads too") {
+  for (const int use : {0, 1, 2}) {
+    CAPTURE(use);
+    Bench bench;
+    WindowInput first = at(120, 80);
+    first.free_up = 0.0;
+    if (use == 0) first.wheel = 2.0;
+    if (use == 1) first.pointer.down = true;
+    if (use == 2) first.held.deeper = 1.0;
+    bench.frame(first);
+    CHECK(bench.hand.leads());
+    CHECK(near(bench.goal().pixel, {120, 80}));
+    CHECK(bench.goal().depth_mm > bench.tool().depth_mm);
+  }
+}
+
 TEST_CASE("it moves with the pointer, and goes deeper by the wheel under it") {
   Bench bench;
   bench.frame(at(120, 80));
