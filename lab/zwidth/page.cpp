@@ -32,9 +32,10 @@ above it that come to rest again are told apart, because no hand gets there thro
 cool: a thermal limit would end a swing by weakening them.
 
 One axis has the servo's own coupling, velocity window, stabilisers and force limits, as the same templates, in the
-loop's numbers, and exact mechanics. *Whole arm* is the servo step itself with the emulated device, its driver and its packets in virtual
-time (`--arm`); it also slides onto the flat and hits the corner of three walls. The mechanics of the devices are plausible values, not those of a unit: with a device of your own,
-give `--mass`, `--viscous`, `--friction` and `--quantum`, and take its map.
+loop's numbers, and exact mechanics. *Whole arm* is the servo step itself with the emulated device, its driver and its
+packets in virtual time (`--arm`); it also slides onto the flat and hits the corner of three walls. The mechanics of the
+devices are plausible values, not those of a unit: with a device of your own, give `--mass`, `--viscous`, `--friction`
+and `--quantum`, and take its map.
 
 )";
 
@@ -66,7 +67,8 @@ real device has not been measured; take two periods until it is. Take no more da
 hump the lag of the velocity and the encoder's steps drive the wall.
 
 The devices here are the emulator's. The check of a scene (docs/devices.md, "Gains") takes less viscous damping,
-0.0002 N s/mm, and a delay of 2 ms at every rate, so what it calls safe is lower: it speaks for units that nobody measured.
+0.0002 N s/mm, and a delay of 2 ms at every rate, so what it calls safe is lower: it speaks for units that nobody has
+measured.
 
 )";
 
@@ -74,8 +76,8 @@ constexpr const char* kStabilisersText =
     R"(
 ## Stabilisers
 
-The same with B = 0.002 N s/mm and a stabiliser that knows the device's own mass and damping, on one axis and, behind the
-stroke, with the whole arm. What each costs the hand is in docs/energy.md.
+The same with B = 0.002 N s/mm and a stabiliser that knows the device's own mass and damping, on one axis and, behind
+the stroke, with the whole arm. What each costs the hand is in docs/energy.md.
 
 )";
 
