@@ -161,7 +161,7 @@ class Rig {
 };
 
 /// What a latched fault, or a device that never comes free of the wall, counts as.
-constexpr Swing kLost{true, true, 0, 0};
+constexpr Swing kLost{.swings = true, .active = true};
 
 /// One hit: nothing before the first contact; the verdict after `seconds`. None where the hand does
 /// not bring the device to the wall.

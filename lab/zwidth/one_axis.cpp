@@ -124,6 +124,15 @@ double shift_of(std::uint64_t seed) {
   return static_cast<double>((seed ^ (seed >> 31)) >> 11) * 0x1p-53;
 }
 
+/// A run that cannot go on.
+Swing lost(const SwingMeter& meter, double travel_mm = 0, double given_mj = 0) {
+  Swing swing = meter.rest();
+  swing.swings = swing.active = true;
+  swing.travel_mm = travel_mm;
+  swing.given_mj = given_mj;
+  return swing;
+}
+
 template <class N>
 Swing hit(const Subject& subject, double stiffness, double hit_mm_per_s, double seconds,
           std::uint64_t seed, std::uint64_t& ticks, const OneAxisWatch& watch) {
@@ -143,7 +152,7 @@ Swing hit(const Subject& subject, double stiffness, double hit_mm_per_s, double 
   std::int64_t still = 0;
   for (std::int64_t tick = 0; tick < count; ++tick, ++ticks) {
     const double asked_n = wall.force(axis.encoder_mm());
-    if (!std::isfinite(asked_n)) return {true, true, 0, 0};  // the servo would latch a fault
+    if (!std::isfinite(asked_n)) return lost(meter);  // the servo would latch a fault
     axis.tick(asked_n, -push_n);
     meter.take(axis.place_mm(), axis.motor_work_mj());
     if (watch) {
@@ -151,8 +160,8 @@ Swing hit(const Subject& subject, double stiffness, double hit_mm_per_s, double 
              axis.motor_n()});
     }
     still = axis.stuck() ? still + 1 : 0;
-    if (still > settled) return {};
-    if (!(std::abs(axis.place_mm()) < kFarMm)) return {true, true, kFarMm, axis.motor_work_mj()};
+    if (still > settled) return meter.rest();
+    if (!(std::abs(axis.place_mm()) < kFarMm)) return lost(meter, kFarMm, axis.motor_work_mj());
   }
   return meter.swing();
 }

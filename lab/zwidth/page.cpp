@@ -77,7 +77,9 @@ constexpr const char* kStabilisersText =
 ## Stabilisers
 
 The same with B = 0.002 N s/mm and a stabiliser that knows the device's own mass and damping, on one axis and, behind
-the stroke, with the whole arm. What each costs the hand is in docs/energy.md.
+the stroke, with the whole arm. What each costs the hand is in docs/energy.md. The account of `passivity` takes a force
+for done in the tick that asks for it. With a delay the device is pushed later, and the port may give far more than is
+booked: `port_minimum_mj` of `--csv` has the lowest energy of each cell.
 
 )";
 

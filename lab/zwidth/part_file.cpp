@@ -17,6 +17,8 @@
 namespace kerf::zwidth {
 namespace {
 
+constexpr int kFormat = 2;  ///< of a part file
+
 Json json_of(const Crossing& crossing) {
   return Json{
       {"first", crossing.first_n_per_mm},  // null: never
@@ -34,7 +36,8 @@ Crossing crossing_in(const Json& json) {
 std::string line_of(std::size_t index, const Column& column) {
   Json cells = Json::List{};
   for (const Swing& cell : column.cells) {
-    cells.push_back(Json::List{cell.swings, cell.active, cell.travel_mm, cell.given_mj});
+    cells.push_back(
+        Json::List{cell.swings, cell.active, cell.travel_mm, cell.given_mj, cell.port_minimum_mj});
   }
   return Json{{"column", index},
               {"cells", std::move(cells)},
@@ -48,7 +51,8 @@ void take_line(const std::string& line, Part& part) {
   Column column;
   for (const Json& cell : json.at("cells")) {
     column.cells.push_back({cell.at(0).get<bool>(), cell.at(1).get<bool>(),
-                            cell.at(2).get<double>(), cell.at(3).get<double>()});
+                            cell.at(2).get<double>(), cell.at(3).get<double>(),
+                            cell.at(4).get<double>()});
   }
   column.swing = crossing_in(json.at("swing"));
   column.energy = crossing_in(json.at("energy"));
@@ -61,7 +65,7 @@ std::string head_of(const Part& part) {
   for (std::size_t i = 0; i < kAxisCount; ++i) {
     if (!spec.table[i].empty()) axes[axis_kinds()[i].name] = spec.table[i];
   }
-  return Json{{"kerf_zwidth", 1},        {"version", KERF_VERSION},
+  return Json{{"kerf_zwidth", kFormat},  {"version", KERF_VERSION},
               {"program", part.program}, {"shard", Json::List{part.shard.index, part.shard.count}},
               {"map", spec.mapped},      {"stiffness_n_per_mm", spec.stiffness_n_per_mm},
               {"axes", std::move(axes)}, {"arm", spec.arm},
@@ -71,7 +75,9 @@ std::string head_of(const Part& part) {
 
 void take_head(const std::string& line, Part& part) {
   const Json json = Json::parse(line);
-  if (json.at("kerf_zwidth").get<int>() != 1) throw JsonError("kerf_zwidth is not 1");
+  if (json.at("kerf_zwidth").get<int>() != kFormat) {
+    throw JsonError("kerf_zwidth is not " + std::to_string(kFormat));
+  }
   if (json.at("version").get<std::string>() != KERF_VERSION) {
     throw JsonError("of version " + json.at("version").get<std::string>() +
                     ", this is " KERF_VERSION);

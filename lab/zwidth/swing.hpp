@@ -19,6 +19,7 @@ struct Swing {
   bool active = false;
   double travel_mm = 0;  ///< in the last third
   double given_mj = 0;  ///< by the motors to tip and hand: what the most rises by in the last third
+  double port_minimum_mj = 0;  ///< lowest energy of the device port, which begins at 0
 
   /// The worse of two runs.
   void join(const Swing& other) noexcept {
@@ -26,6 +27,7 @@ struct Swing {
     active = active || other.active;
     travel_mm = std::max(travel_mm, other.travel_mm);
     given_mj = std::max(given_mj, other.given_mj);
+    port_minimum_mj = std::min(port_minimum_mj, other.port_minimum_mj);
   }
 };
 
@@ -42,13 +44,18 @@ class SwingMeter {
     now.lowest_mm = std::min(now.lowest_mm, tip_mm);
     now.highest_mm = std::max(now.highest_mm, tip_mm);
     now.given_mj = std::max(now.given_mj, given_mj);
+    if (tick_ == 0) first_given_mj_ = given_mj;
+    port_minimum_mj_ = std::min(port_minimum_mj_, first_given_mj_ - given_mj);
     ++tick_;
   }
+
+  /// Of a run that has come to rest before its end.
+  [[nodiscard]] Swing rest() const noexcept { return {.port_minimum_mj = port_minimum_mj_}; }
 
   [[nodiscard]] Swing swing() const noexcept {
     const double before = travel(thirds_[1]), last = travel(thirds_[2]);
     const double gave = thirds_[1].given_mj - thirds_[0].given_mj;
-    Swing swing;
+    Swing swing = rest();
     swing.travel_mm = last;
     swing.given_mj = thirds_[2].given_mj - thirds_[1].given_mj;
     swing.swings = last > least_mm_ && last >= 0.97 * before;
@@ -73,6 +80,7 @@ class SwingMeter {
   double least_mm_, least_mj_;
   std::int64_t tick_ = 0;
   std::array<Third, 3> thirds_{};
+  double first_given_mj_ = 0, port_minimum_mj_ = 0;
 };
 
 }  // namespace kerf::zwidth

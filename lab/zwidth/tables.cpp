@@ -48,7 +48,7 @@ Analytic analytic_of(const Subject& subject) {
 std::string csv_of(const Part& part) {
   std::string text;
   each_axis([&](AxisId, const AxisKind& kind) { text += column_name(kind) + ","; });
-  text += "stiffness_n_per_mm,swings,active,travel_mm,given_mj\n";
+  text += "stiffness_n_per_mm,swings,active,travel_mm,given_mj,port_minimum_mj\n";
   const std::vector<Assignment> columns = part.spec.columns();
   for (const auto& [index, column] : part.columns) {
     std::string head;
@@ -57,7 +57,7 @@ std::string csv_of(const Part& part) {
       const Swing& cell = column.cells[i];
       text += head + number_text(part.spec.stiffness_n_per_mm[i]) + (cell.swings ? ",1" : ",0") +
               (cell.active ? ",1," : ",0,") + number_text(cell.travel_mm) + "," +
-              number_text(cell.given_mj) + "\n";
+              number_text(cell.given_mj) + "," + number_text(cell.port_minimum_mj) + "\n";
     }
   }
   return text;
@@ -80,7 +80,8 @@ std::string json_of(const Part& part) {
       cells.push_back({{"swings", cell.swings},
                        {"active", cell.active},
                        {"travel_mm", cell.travel_mm},
-                       {"given_mj", cell.given_mj}});
+                       {"given_mj", cell.given_mj},
+                       {"port_minimum_mj", cell.port_minimum_mj}});
     }
     columns.push_back({{"axes", std::move(axes)},
                        {"impossible", why.empty() ? Json(nullptr) : Json(why)},

@@ -259,7 +259,7 @@ TEST_CASE("parts that make no map are refused in one line, and nothing is lost")
     refused("merge " + b + " " + c, "is no part of a whole");
   }
   std::string more = kept;
-  more.replace(more.find("\"cells\":[["), 10, "\"cells\":[[true,true,0,0],[");
+  more.replace(more.find("\"cells\":[["), 10, "\"cells\":[[true,true,0,0,0],[");
   std::ofstream(b, std::ios::binary) << more;
   refused("merge " + b + " " + c, "cells for ");
   std::ofstream(b, std::ios::binary) << "hello\n";
@@ -392,4 +392,27 @@ TEST_CASE("a stabiliser widens the map") {
     return measure_column(spec, values, 0).swing.first_n_per_mm;
   };
   CHECK(first("energy_bounding") > 1.5 * first("none"));
+}
+
+TEST_CASE("each cell tells the lowest energy of its port, which the passivity controller bounds") {
+  const auto cells = [](const std::string& stabiliser) {
+    MapSpec spec;
+    spec.stiffness_n_per_mm = stiffness_values("0.05:20:8");
+    spec.seconds = 1;
+    Assignment values;
+    values[index_of(AxisId::damping)] = "0";
+    values[index_of(AxisId::delay)] = "0";
+    values[index_of(AxisId::limits)] = "off";
+    values[index_of(AxisId::stabiliser)] = stabiliser;
+    return measure_column(spec, values, 0).cells;
+  };
+  const std::vector<Swing> off = cells("none"), on = cells("passivity/mass_kg=10");
+  REQUIRE(off.size() == on.size());
+  for (std::size_t i = 0; i < on.size(); ++i) {
+    CAPTURE(i);
+    CHECK(on[i].port_minimum_mj > -2);
+    CHECK(on[i].port_minimum_mj >= off[i].port_minimum_mj);
+  }
+  CHECK(off.front().port_minimum_mj == 0);
+  CHECK(off.back().port_minimum_mj < -50);
 }
