@@ -158,6 +158,11 @@ Part read_part(const std::string& path) {
                    " is no part of a whole; remove the file to begin anew");
   }
   const std::vector<Assignment> columns = part.spec.columns();
+  try {  // a law that another program has
+    for (const Assignment& values : columns) static_cast<void>(subject_of(values));
+  } catch (const HilError& error) {
+    throw HilError(path + ": " + error.what());
+  }
   for (const auto& [index, column] : part.columns) {
     if (index >= columns.size() || !part.shard.has(index)) {
       throw HilError(path + ": has columns that its shard " + shard_text(part.shard) +

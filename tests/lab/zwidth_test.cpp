@@ -245,6 +245,10 @@ TEST_CASE("parts that make no map are refused in one line, and nothing is lost")
   refused("merge " + b + " " + c, "another program measured it than");
   refused(kSmall + std::string("--shard 1/2 --part ") + b, "another program measured it, which");
   CHECK(bytes(b) == foreign);
+  std::string unknown = kept;  // of a program with a law that this one has not
+  unknown.replace(unknown.find("\"axes\":{"), 8, "\"axes\":{\"law\":[\"anothers\"],");
+  std::ofstream(b, std::ios::binary) << unknown;
+  refused("merge " + b + " " + c, "b.part: --law: anothers is unknown");
   // A version that this is not; a shard that is not done; text that is no part.
   std::string old = kept;
   old.replace(old.find(KERF_VERSION), std::string(KERF_VERSION).size(), "0.0.1");
