@@ -53,6 +53,7 @@ struct PlantState {
   ArmPose pose;
   DeviceVec<double> velocity;       ///< of the tip, mm/s
   DeviceVec<double> motor_force_n;  ///< of the motors at the tip, in the latest step
+  double motor_work_mj = 0;         ///< of that force on the tip, since the start
   bool at_rest = true;              ///< held in the rest pose: inkwell, stand, calibration pose
 };
 
@@ -128,6 +129,7 @@ class ArmPlant {
             DeviceVec<double> target_velocity) noexcept {
     DeviceVec<double>& tip_mm = state_.pose.tip_mm;
     DeviceVec<double>& velocity = state_.velocity;
+    const DeviceVec<double> from_mm = tip_mm;
     tip_mm = tip_mm + velocity * (kStepS / 2);
     const ArmPose middle{arm_.joints_rad(tip_mm), tip_mm};
     const JointVec<double> link_rates =
@@ -140,6 +142,7 @@ class ArmPlant {
     velocity = mass_.kick(velocity, state_.motor_force_n + hand_n);
     velocity = rotors_.share(arm_, middle, mass_kg_, velocity);
     tip_mm = tip_mm + velocity * (kStepS / 2);
+    state_.motor_work_mj += dot(state_.motor_force_n, tip_mm - from_mm);
     state_.pose.q = arm_.joints_rad(tip_mm);
     arm_.stop_at_limits(state_.pose.q, tip_mm, velocity);
     rotors_.follow(arm_, middle, velocity);

@@ -151,6 +151,8 @@ class Rig {
     driver_->command(out);
     return out;
   }
+  /// What the motors gave the tip, delay and all: the servo books what it asked for.
+  [[nodiscard]] double motor_work_mj() const { return emulator_.model().state().motor_work_mj; }
 
  private:
   std::unique_ptr<CompiledScene> servo_;
@@ -193,7 +195,7 @@ std::optional<Swing> watch_hit(Rig& rig, const Subject& subject, const ArmHit& h
       away = free ? away + 1 : 0;
     } else if (judged > 0 || out.contact) {
       const DeviceVec<double> tip_mm{out.position_mm[0], out.position_mm[1], out.position_mm[2]};
-      meter.take(dot(tip_mm, hit.normal), -out.absorbed_mj);
+      meter.take(dot(tip_mm, hit.normal), rig.motor_work_mj());
       ++judged;
     }
   }

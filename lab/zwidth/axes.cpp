@@ -130,7 +130,8 @@ LawChoice law_choice(AxisId axis, LawKind kind, const std::string& text) {
       refuse(": has no setting stiffness_n_per_mm, which a map varies; give it one");
     }
   } catch (const LawError& error) {
-    refuse(error.what());
+    throw HilError(std::string("--") + kKinds[index_of(axis)].name + ": " + choice.name +
+                   error.what());
   }
   return choice;
 }

@@ -23,6 +23,8 @@
 #include "lab/zwidth/tables.hpp"
 #include "record/gnuplot.hpp"
 #include "shared/posix/progress_bar.hpp"
+#include "shared/posix/run_files.hpp"
+#include "shared/posix/run_files.hpp"
 #include "shared/posix/stop_signals.hpp"
 #include "shared/text/format.hpp"
 #include "shared/text/number.hpp"
@@ -30,15 +32,23 @@
 namespace kerf::zwidth {
 namespace {
 
-/// The files of a map, checked before it is measured.
+/// A picture that cannot be drawn is told before hours of measuring.
+void require_gnuplot() {
+  static_cast<void>(gnuplot_svg("set terminal svg\nplot 0\n"));
+}
+
+/// The files of a map, checked before it is measured: none is one of the parts, which are read.
 class Outputs {
  public:
-  explicit Outputs(const OutputPaths& paths)
+  Outputs(const OutputPaths& paths, const std::vector<std::string>& parts)
       : draws_(!paths.plot.empty()),
         csv_("--csv", paths.csv, ".csv"),
         json_("--json", paths.json, ".json"),
         plot_("--plot", paths.plot, ".svg") {
-    LabOutput::check_distinct({&csv_, &json_, &plot_});
+    check_outputs({parts.begin(), parts.end()}, {{"--csv", paths.csv, ".csv"},
+                                                 {"--json", paths.json, ".json"},
+                                                 {"--plot", paths.plot, ".svg"}});
+    if (draws_) require_gnuplot();
   }
   void write(const Part& part) const {
     csv_.write(csv_of(part));
@@ -231,6 +241,12 @@ MapSpec Command::spec() const {
   spec.stiffness_n_per_mm = stiffness_values(!stiffness_.empty() ? stiffness_
                                              : quick_            ? "0.05:50:25"
                                                                  : "0.05:50:40");
+  for (const Assignment& values : spec.columns()) {
+    const std::string estimator = value_of(values, AxisId::estimator);
+    if (value_of(values, AxisId::filter) == "0" || estimator == "difference") continue;
+    throw HilError("--filter: " + estimator +
+                   " has no low-pass behind it; add --estimator difference, or leave it out");
+  }
   spec.arm = arm_;
   spec.seconds = seconds_ > 0 ? seconds_ : quick_ ? 1 : 3;
   spec.seed = seed_;
@@ -268,6 +284,11 @@ void Command::draw_portraits(const MapSpec& spec) const {
   if (cells_.empty() || cells_.size() > kMost) {
     throw HilError("--portraits: give --cells, 1 to 12 of them, such as 2:0.002,20:0.002");
   }
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
+    if (spec.table[axis].size() < 2 || axis == index_of(AxisId::damping)) continue;
+    throw HilError(std::string("--portraits: the axis ") + axis_kinds()[axis].name + " has " +
+                   std::to_string(spec.table[axis].size()) + " values; give it one");
+  }
   std::vector<Portrait> portraits;
   for (const std::string& cell : cells_) {
     const auto [stiffness, damping] = cell_in(cell);
@@ -297,6 +318,7 @@ void Command::write_page() const {
     return std::filesystem::path(page_).replace_extension(end);
   };
   const auto devices = beside(".devices.svg"), rates = beside(".rates.svg");
+  require_gnuplot();
   const LabOutput as_page("--page", page_, ".md");
   const LabOutput as_devices("--page", devices.string(), ".svg"),
       as_rates("--page", rates.string(), ".svg");
@@ -367,12 +389,23 @@ int Command::run(std::ostream& out) const {
                    ": makes no map; leave --csv, --json, --plot and --part out, or run twice");
   }
   if (!page_.empty()) {
+    const bool chooses =
+        std::ranges::any_of(axes_, [](const std::string& a) { return !a.empty(); });
+    if (chooses || arm_ || !stiffness_.empty() || !portraits_.empty() || seconds_ > 0 ||
+        seed_ != 1) {
+      throw HilError("--page: its maps are its own; leave all but --quick and --jobs out");
+    }
     write_page();
     return 0;
   }
+  if (!cells_.empty() && portraits_.empty()) {
+    throw HilError("--cells: are those of portraits; add --portraits FILE, or leave them out");
+  }
   const MapSpec map = spec();
   const Shard part = shard();
-  const Outputs outputs(paths_);
+  std::vector<std::string> kept_in;
+  if (!part_.empty()) kept_in.push_back(part_);
+  const Outputs outputs(paths_, kept_in);
   try_laws(map, out);
   if (!paths_.plot.empty()) check_panels(map);
   if (!portraits_.empty()) {
@@ -396,7 +429,7 @@ MergeCommand::MergeCommand(Arguments& program)
 }
 
 int MergeCommand::run(std::ostream& out) const {
-  const Outputs outputs(paths_);
+  const Outputs outputs(paths_, parts_);
   const Part whole = merge_parts(parts_);
   if (!paths_.plot.empty()) check_panels(whole.spec);
   tell(whole, out);

@@ -123,7 +123,13 @@ std::string gap_of(const Part& part, std::size_t column_count) {
 const std::string& this_program() {
   static const std::string hash = [] {
     std::ifstream file("/proc/self/exe", std::ios::binary);
-    return hex64(fnv1a(std::string(std::istreambuf_iterator<char>(file), {})));
+    const std::string bytes(std::istreambuf_iterator<char>(file), {});
+    if (bytes.empty()) {
+      throw HilError(
+          "/proc/self/exe: cannot be read, so a part would not tell which program made "
+          "it; let who runs this program read it");
+    }
+    return hex64(fnv1a(bytes));
   }();
   return hash;
 }

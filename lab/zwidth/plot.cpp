@@ -58,8 +58,9 @@ class Scale {
   [[nodiscard]] std::size_t size() const { return places_.size(); }
 
   void set(std::ostream& script, const char* axis) const {
-    script << "set " << axis << "label \"" << axis_label(axis_) << "\"\nset " << axis << "range ["
-           << low(0) << ":" << high(size() - 1) << "]\n";
+    script << "set " << axis << "label \"" << axis_label(axis_) << "\""
+           << (*axis == 'y' ? " offset 1,0" : "") << "\nset " << axis << "range [" << low(0) << ":"
+           << high(size() - 1) << "]\n";
     script << (log_ ? "set logscale " : "unset logscale ") << axis << "\n";
     if (!words_) {
       script << "set " << axis << "tics autofreq\n";
@@ -79,7 +80,10 @@ class Scale {
   /// To one side (-1 or 1) of an end, as far as the border to its neighbour is on the other.
   [[nodiscard]] double beyond(std::size_t i, int side) const {
     const double at = places_[i];
-    if (size() == 1) return log_ ? at * std::pow(1.25, side) : at + 0.5 * side;
+    if (size() == 1) {
+      const double half = at == 0 || words_ ? 0.5 : std::abs(at) / 2;
+      return log_ ? at * std::pow(1.25, side) : at + half * side;
+    }
     const double other = places_[side < 0 ? i + 1 : i - 1];
     return log_ ? at * std::sqrt(at / other) : at + (at - other) / 2;
   }
@@ -124,6 +128,18 @@ std::vector<Panel> panels_of(const Part& part) {
   return panels;
 }
 
+/// No line is longer than the narrowest picture is wide.
+std::string in_lines(std::string text) {
+  constexpr std::size_t kWide = 165;
+  for (std::size_t begin = 0; text.size() - begin > kWide;) {
+    const std::size_t gap = text.rfind(", ", begin + kWide);
+    if (gap == std::string::npos || gap <= begin) break;
+    text.replace(gap + 1, 1, "\\n");
+    begin = gap + 3;
+  }
+  return text;
+}
+
 /// What is the same in all panels.
 std::string foot_of(const Part& part) {
   Assignment first = part.spec.columns().front();
@@ -143,11 +159,24 @@ std::string foot_of(const Part& part) {
     text += say(AxisId::friction, "friction ", " N") + say(AxisId::quantum, "encoder ", " mm") +
             say(AxisId::numeric, "", "") + say(AxisId::estimator, "speed by ", "");
   }
+  // What differs from the standard.
+  const auto own = [&](AxisId axis, const char* standard, const std::string& before,
+                       const char* after) {
+    return varies(axis) || value_of(first, axis) == standard
+               ? std::string()
+               : before + value_of(first, axis) + after + ", ";
+  };
+  if (!loops) text += own(AxisId::law, "coupling", "law ", "");
+  text += own(AxisId::stabiliser, "none", "stabiliser ", "") +
+          own(AxisId::filter, "0", "low-pass ", " ms");
+  if (!loops) text += own(AxisId::limits, "on", "limits ", "");
+  if (part.spec.arm) text += own(AxisId::mode, "0", "mode ", " Hz");
   text += say(AxisId::rate, "", " Hz") + say(AxisId::delay, "delay ", " periods") +
           say(AxisId::damping, "B ", " N s/mm") + say(AxisId::hand, "hand ", "");
-  return text + (part.spec.arm ? "whole arm, " : "one axis, ") + "hits: a push, 50 and 200 mm/s, " +
-         (part.spec.arm ? "a slide, a corner, " : "") + number_text(part.spec.seconds) +
-         " s each, seed " + std::to_string(part.spec.seed);
+  return in_lines(text + (part.spec.arm ? "whole arm, " : "one axis, ") +
+                  "hits: a push, 50 and 200 mm/s, " + (part.spec.arm ? "a slide, a corner, " : "") +
+                  number_text(part.spec.seconds) + " s each, seed " +
+                  std::to_string(part.spec.seed));
 }
 
 /// `right`: room beside each panel, in pixels.
@@ -221,8 +250,11 @@ void draw_verdicts(std::ostream& script, const Part& part, const Panel& panel, c
            colour + ", \\\n  ";
   };
   script << "plot " << box("rests", kRests) << box("active", kActive) << box("swings", kSwings)
-         << box("none", kNone)
-         << "$lines using 1:2 notitle with lines linewidth 2.5 linecolor rgb '#000000', \\\n"
+         << box("none", kNone) << "$lines using 1:2 notitle with linespoints pointtype "
+         << (x.size() == 1 ? 1 : 0)
+         << " linewidth 2.5 linecolor rgb "
+            "'#000000', "
+            "\\\n"
             "  $lines using 1:3 notitle with linespoints pointtype 2 linewidth 2 dashtype 2 "
             "linecolor rgb '#0072B2', "
             "\\\n"
@@ -244,29 +276,44 @@ std::string height_text(double first, const std::vector<double>& stiffness) {
   return text.str();
 }
 
-/// The highest stiffness of every cell as a colour, and as a number where there is room.
+/// The stiffness up to which each cell is fine, as a colour, and as a number where there is room.
 void draw_heights(std::ostream& script, const Part& part, const Panel& panel, const Scale& x,
                   const Scale& y) {
   const std::vector<Assignment> columns = part.spec.columns();
   const std::vector<double>& stiffness = part.spec.stiffness_n_per_mm;
+  data(script, "none", [&] {
+    script << "-1e9 -1e9 -1e9 -1e9 -1e9 -1e9\n";  // gnuplot refuses a block without a row
+    for (const std::size_t c : panel.columns) {
+      if (!part.columns.at(c).cells.empty()) continue;
+      const std::size_t i = x.index(columns[c][part.spec.mapped[0]]);
+      const std::size_t j = y.index(columns[c][part.spec.mapped[1]]);
+      script << x.place(i) << ' ' << y.place(j) << ' ' << x.low(i) << ' ' << x.high(i) << ' '
+             << y.low(j) << ' ' << y.high(j) << '\n';
+    }
+  });
   data(script, "cells", [&] {
     for (const std::size_t c : panel.columns) {
       const Column& column = part.columns.at(c);
       if (column.cells.empty()) continue;
       const std::size_t i = x.index(columns[c][part.spec.mapped[0]]);
       const std::size_t j = y.index(columns[c][part.spec.mapped[1]]);
-      const double first = column.swing.first_n_per_mm;
+      const double first = std::min(column.swing.first_n_per_mm, column.energy.first_n_per_mm);
       script << x.place(i) << ' ' << y.place(j) << ' ' << x.low(i) << ' ' << x.high(i) << ' '
              << y.low(j) << ' ' << y.high(j) << ' '
              << std::clamp(first, stiffness.front(), stiffness.back()) << ' '
              << height_text(first, stiffness) << '\n';
     }
   });
-  script << "set logscale cb\nset cbrange [" << stiffness.front() << ":" << stiffness.back()
-         << "]\nset cbtics add (" << stiffness.front() << ", " << stiffness.back()
-         << ")\nset cblabel 'highest stiffness that comes to rest (N/mm)'\n"
+  const double least = stiffness.front(),
+               most = stiffness.back() > least ? stiffness.back() : 1.1 * least;
+  script << "set logscale cb\nset cbrange [" << least << ":" << most << "]\nset cbtics add ("
+         << stiffness.front() << ", " << stiffness.back()
+         << ")\nset cblabel 'highest stiffness, by the stricter rule (N/mm)' offset -1,0\n"
             "set palette defined (0 '#F0B79B', 0.5 '#F7E3A1', 1 '#8CC8B0')\n"
-            "plot $cells using 1:2:3:4:5:6:7 notitle with boxxyerror fillstyle solid noborder "
+            "plot $none using 1:2:3:4:5:6 notitle with boxxyerror fillstyle solid noborder "
+            "linecolor rgb "
+         << kNone
+         << ", $cells using 1:2:3:4:5:6:7 notitle with boxxyerror fillstyle solid noborder "
             "linecolor palette";
   constexpr std::size_t kMostNumbers = 14;
   if (x.size() <= kMostNumbers && y.size() <= kMostNumbers) {
@@ -280,7 +327,6 @@ void draw_legend(std::ostream& script, const Part& part, bool verdicts, double h
   const auto line = [&](int row) { return (kFoot - 30.0 - 24 * row) / height; };
   script << "set label \"" << foot_of(part) << "\" at screen 0.02, screen " << line(4)
          << " left noenhanced font ',11' textcolor rgb '#555555'\n";
-  if (!verdicts) return;
   struct Item {
     const char* text;
     std::string style;
@@ -290,6 +336,12 @@ void draw_legend(std::ostream& script, const Part& part, bool verdicts, double h
   const auto cell = [](const char* colour) {
     return std::string("pointtype 5 pointsize 2 linecolor rgb ") + colour;
   };
+  if (!verdicts) {
+    script
+        << "set label \"not stable even without a wall, or not measured\" at screen 0.03, screen "
+        << line(3) << " left point " << cell(kNone) << " offset 1.2,0\n";
+    return;
+  }
   const Item items[] = {
       {"comes to rest", cell(kRests), 0.03, 0},
       {"travel small or falling, but the wall goes on giving energy", cell(kActive), 0.03, 1},
@@ -306,8 +358,12 @@ void draw_legend(std::ostream& script, const Part& part, bool verdicts, double h
   bool is_passive = false, is_quantum = false;  // some column has a point of that line
   for (const Assignment& column : part.spec.columns()) {
     const Analytic analytic = analytic_of(subject_of(column));
-    is_passive |= analytic.passive > 0;
-    is_quantum |= analytic.quantum > 0 && std::isfinite(analytic.quantum);
+    const auto is_seen = [&](double value) {
+      return value >= part.spec.stiffness_n_per_mm.front() &&
+             value <= part.spec.stiffness_n_per_mm.back();
+    };
+    is_passive |= is_seen(analytic.passive);
+    is_quantum |= is_seen(analytic.quantum);
   }
   std::vector<Item> lines{{"linear loop, exact (no friction, no encoder steps)",
                            "linewidth 2.5 linecolor rgb '#000000'", 0.65, 0}};

@@ -19,7 +19,7 @@ struct Swing {
   bool active = false;
   double travel_mm = 0;  ///< in the last third
   double given_mj = 0;  ///< by the motors to tip and hand: what the most rises by in the last third
-  double port_minimum_mj = 0;  ///< lowest energy of the device port, which begins at 0
+  double port_minimum_mj = 0;  ///< lowest energy of the device port in a run that begins at 0
 
   /// The worse of two runs.
   void join(const Swing& other) noexcept {

@@ -93,9 +93,9 @@ std::string bytes(const std::filesystem::path& path) {
 /// An empty folder that goes with the test.
 struct Folder {
   std::filesystem::path path;
-  Folder() : path(std::filesystem::temp_directory_path() / "kerf-zwidth-test") {
-    std::filesystem::remove_all(path);
-    std::filesystem::create_directory(path);
+  Folder() {
+    std::string name = (std::filesystem::temp_directory_path() / "kerf-zwidth-XXXXXX").string();
+    path = mkdtemp(name.data());
   }
   ~Folder() { std::filesystem::remove_all(path); }
   [[nodiscard]] std::string at(const std::string& name) const { return (path / name).string(); }
@@ -245,6 +245,9 @@ TEST_CASE("parts that make no map are refused in one line, and nothing is lost")
   refused("merge " + b + " " + c, "another program measured it than");
   refused(kSmall + std::string("--shard 1/2 --part ") + b, "another program measured it, which");
   CHECK(bytes(b) == foreign);
+  refused("merge " + a + " " + c + " --csv " + c, "is a file of this run itself");
+  refused(kSmall + std::string("--shard 1/2 --part ") + a + " --json " + a,
+          "is a file of this run itself");
   std::string unknown = kept;  // of a program with a law that this one has not
   unknown.replace(unknown.find("\"axes\":{"), 8, "\"axes\":{\"law\":[\"anothers\"],");
   std::ofstream(b, std::ios::binary) << unknown;
@@ -307,6 +310,13 @@ TEST_CASE("axes that mean nothing are refused in one line; columns that cannot e
                            "--portraits /dev/null --cells 1:0.002 --csv /dev/null",
                            "--portraits /dev/null --cells 1:0.002 --arm",
                            "--page /dev/null --csv /dev/null",
+                           "--page /dev/null --portraits /dev/null",
+                           "--page /dev/null --rate 500",
+                           "--cells 1:0.002",
+                           "--portraits /dev/null --cells 1:0.002 --delay 0,1",
+                           "--filter 5",
+                           "--filter 0,5 --estimator difference,foaw",
+                           "--stabiliser passivity/mass_kg=-1",
                            "--seconds 0",
                            "--plot /dev/null --delay 0:3:7 --quantum 0,0.1"}) {
     const Said said = lab(std::string("zwidth ") + line);
@@ -419,4 +429,15 @@ TEST_CASE("each cell tells the lowest energy of its port, which the passivity co
   }
   CHECK(off.front().port_minimum_mj == 0);
   CHECK(off.back().port_minimum_mj < -50);
+}
+
+TEST_CASE("behind a delay the arm's port gives what its motors did, not what the servo booked") {
+  Assignment values;
+  values[index_of(AxisId::delay)] = "8";
+  const Subject subject = subject_of(values);
+  std::uint64_t ticks = 0;
+  const Swing swing = hit_with_arm(walls_scene(subject), subject, 0.5, 0.5, 1, ticks);
+  CHECK(swing.swings);
+  CHECK(swing.active);
+  CHECK(swing.port_minimum_mj < -50);
 }

@@ -21,7 +21,8 @@ constexpr double kLeastFullForceN = 0.5;
 constexpr double kLeastFullDepthMm = 0.1;
 constexpr float kWide = 170.0F;
 // What keeps it small with any scene.
-constexpr std::size_t kMostMaterials = 4, kFewMaterials = 3, kMostLabel = 16, kMostName = 12;
+constexpr std::size_t kMostMaterials = 4, kFewMaterials = 3, kSpindleRows = 2, kMostLabel = 16,
+                      kMostName = 12;
 
 void force_bar(const OverlayFigures& figures) {
   const double share = std::clamp(figures.force_n / figures.full_force_n, 0.0, 1.0);
@@ -59,7 +60,8 @@ void curve(const char* label, const char* format, const std::vector<ForcePlot::P
 /// The materials with their colours: what was removed of each.
 void material_rows(const OverlayFigures& figures) {
   const std::vector<ScoreRow>& score = figures.score;
-  const std::size_t most = figures.slices ? kFewMaterials : kMostMaterials;
+  const std::size_t few = figures.spindle ? kFewMaterials - kSpindleRows : kFewMaterials;
+  const std::size_t most = figures.slices ? few : kMostMaterials;
   if (!score.empty() && figures.score_is_partial) panel_row("materials", "%s", "since joining");
   const std::size_t shown = std::min(score.size(), most);
   for (std::size_t i = 0; i < shown; ++i) {
