@@ -24,7 +24,6 @@
 #include "record/gnuplot.hpp"
 #include "shared/posix/progress_bar.hpp"
 #include "shared/posix/run_files.hpp"
-#include "shared/posix/run_files.hpp"
 #include "shared/posix/stop_signals.hpp"
 #include "shared/text/format.hpp"
 #include "shared/text/number.hpp"
