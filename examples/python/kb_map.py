@@ -1,7 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
 """A map of two columns of a table:  kb_map.py TABLE.csv PICTURE.png [X Y COLOUR] [COLUMN=VALUE ...]
-
 TABLE.csv is of `./kerf lab zwidth --csv`, whose K-B map is drawn, or of `./kerf sweep`. COLUMN=VALUE keeps its rows."""
 import matplotlib.pyplot as plt
 import numpy as np
@@ -17,6 +16,7 @@ def draw(table, picture, *words):
     for column, value in only: data = data[data[column].astype(str) == value]
     if not data.size: raise ValueError(f"{table}: no rows{' of these values' if only else ''}; give others")
     (xs, column), (ys, row) = (np.unique(data[name], return_inverse=True) for name in names[:2])
+    if len(set(zip(row, column))) < len(data): raise ValueError(f"{table}: several rows for one cell; keep COLUMN=VALUE")
     grid = np.full((len(ys), len(xs)), np.nan)  # a cell that no run filled stays white
     grid[row, column] = data[names[2]]
     plt.colorbar(plt.pcolormesh(np.arange(len(xs) + 1), np.arange(len(ys) + 1), grid, cmap="cividis"), label=names[2])

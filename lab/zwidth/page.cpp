@@ -79,7 +79,8 @@ constexpr const char* kStabilisersText =
 The same with B = 0.002 N s/mm and a stabiliser that knows the device's own mass and damping, on one axis and, behind
 the stroke, with the whole arm. What each costs the hand is in docs/energy.md. The account of `passivity` takes a force
 for done in the tick that asks for it. With a delay the device is pushed later, and the port may give far more than is
-booked: `port_minimum_mj` of `--csv` has the lowest energy of each cell.
+booked: `port_minimum_mj` of `--csv` has the lowest energy of the port in each cell, over the hits that were played (one
+that is bad by both rules ends a cell).
 
 )";
 

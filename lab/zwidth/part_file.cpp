@@ -156,7 +156,8 @@ Part read_part(const std::string& path) {
     }
   } catch (const JsonError& error) {
     throw HilError(path + ": line " + std::to_string(number + 1) + " is none of a part of a map (" +
-                   error.what() + "); remove the file to begin anew");
+                   error.what() + "); " + (number > 0 ? "cut it off there, or " : "") +
+                   "remove the file to begin anew");
   }
   if (number == 0) throw HilError(path + ": no part of a map; remove the file to begin anew");
   if (part.shard.index < 1 || part.shard.index > part.shard.count) {

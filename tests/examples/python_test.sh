@@ -105,6 +105,7 @@ refused 'no axis' phase_portrait "$work/log" "$work/none.png" 3
 refused 'TABLE.csv' kb_map
 refused 'nowhere.csv' kb_map "$work/nowhere.csv" "$work/none.png"
 refused 'no column' kb_map "$work/sweep/sweep.csv" "$work/none.png" a b c
+refused 'several rows for one cell' kb_map "$work/sweep/sweep.csv" "$work/none.png" servo.rate_hz exit peak_force_n
 refused 'not three columns' kb_map "$work/sweep/sweep.csv" "$work/none.png" servo.rate_hz
 refused 'no rows of these' kb_map "$work/sweep/sweep.csv" "$work/none.png" servo.rate_hz force.stiffness_n_per_mm \
   peak_force_n servo.rate_hz=3
