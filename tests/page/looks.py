@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Renderers by volume, iso value and opacities, beside native pictures of the same look."""
-from case import LIKE, likeness, text_of
+from case import LIKE, PANEL, likeness, text_of
 from rig import AWAY, TWO_TEETH
 
 
@@ -52,5 +52,7 @@ def looks_as_asked_by_volume_iso_and_opacity(case):
     # The same teeth of that iso by themselves.
     show_two_teeth(case, '0.55')
     # Below the figures and the tool, which has turned about itself.
-    like = likeness(moved, rig.native_picture(width, height), (width, height * 9 // 20))
+    below = (width, PANEL[1])
+    case.check(likeness(moved, iso, below) < LIKE, 'which is seen there too')
+    like = likeness(moved, rig.native_picture(width, height), below)
     case.check(like >= LIKE, f'iso 0.55: {100 * like:.3f} %')
