@@ -96,7 +96,8 @@ presses; 10,000 with `--only traps`; `--seed` names the first scene.)"},
      R"(On 256 x 256 x 161 voxels. The costliest tick of each tool is searched among thousands: at flat, sharp, hollow and
 noisy solids, in a slot with a play of 0.1 voxels, in tissue just below the iso and, where its data are, at the GE
 tooth; with goals near and far, and from the start search. The ticks that took longest are repeated from the same
-state, and the fastest repetition counts. The row says where the tick was found.)"},
+state, and the fastest repetition counts. The row says where the tick was found. Times are of the machine named
+above; where another is slower, so is the paper's tick beside them.)"},
     {"hands", "Hands",
      R"(An emulated Omni, its driver and the whole servo in virtual time, with `scenes/touch.toml`; `groove` and `cut_cavity`
 have `[cut] model = "preston"`. Force above 150 Hz is the rms over windows of 0.128 s that are wholly in contact. One
