@@ -308,7 +308,7 @@ void sum_point_samples(const PointTable<FixedNumbers>& table,
   for (std::size_t axis = 0; axis < 3; ++axis) {
     has_cells = has_cells && size[axis] > 1;
     inside = inside && centre[axis] >= table.reach &&
-             (centre[axis] + table.reach) >> 16 < size[axis] - 1;
+             (std::int64_t{centre[axis]} + table.reach) >> 16 < size[axis] - 1;
   }
   if (!has_cells) {  // no voxel that a sample outside could read in its place
     sums = {};
