@@ -9,6 +9,7 @@
 
 #include <doctest/doctest.h>
 
+#include "controller/tool/tool_shapes.hpp"
 #include "tests/servo/support.hpp"
 
 using kerf::Fault;
@@ -134,7 +135,7 @@ TEST_CASE("a force that is not finite ends the motors at once") {
 
 TEST_CASE("encoders that tell of no pose: motors off after 2 ms, until the device was parked") {
   // Of all crank angles few have no grip: for these three Newton's method ends in NaN, in float.
-  constexpr std::array<std::int16_t, 3> kNoPose{360, 6180, 2340};
+  constexpr std::array<std::int16_t, 3> kNoPose{-1327, -6901, 807};
   LoadedScene scene = half_space_scene();
   scene.device.personality = kerf::Personality::falcon;
   scene.device.torque_scale = std::array{0.3, 0.3, 0.3};
@@ -218,5 +219,45 @@ TEST_CASE("a very stiff scene meets every limit and keeps the force below 3.3 N"
           0.5 + 1e-4);
     for (const auto counts : out.motor_counts) CHECK(std::abs(counts) <= 2047);
     last = out.force_n;
+  }
+}
+
+TEST_CASE("whatever counters and pots read, the tool keeps its size and the force its limit") {
+  for (const NumericKind numeric :
+       {NumericKind::fixed, NumericKind::float32, NumericKind::float64}) {
+    for (const double scale : {1.0, 100.0}) {  // of a hundred: a count moves the tool by voxels
+      CAPTURE(static_cast<int>(numeric));
+      CAPTURE(scale);
+      LoadedScene scene = half_space_scene();
+      scene.tools = {kerf::make_tool("thin", "cylinder",
+                                     {.pitch_mm = 0.125, .radius_mm = 0.1, .length_mm = 0.4})};
+      scene.servo.numeric = numeric;
+      scene.device.workspace_scale = scale;
+      ArmedServo armed(scene);
+      static_cast<void>(armed.settled(0, 0.05, 0));
+      kerf::DeviceReport report = armed.arm.at(0, 0.05, 0);
+      std::uint32_t state = 1;
+      const auto next = [&state] { return (state = state * 1664525 + 1013904223) >> 16; };
+      for (int tick = 0; tick < 6000; ++tick) {
+        // Some near the wall, some anywhere that 16 bits reach.
+        if (tick % 8 == 0) report = armed.arm.at(0, 0.05, 0);
+        const std::size_t joint = next() % 3;
+        report.encoder[joint] = static_cast<std::int16_t>(
+            report.encoder[joint] + (tick % 8 < 4 ? static_cast<int>(next() % 64) - 32 : next()));
+        report.wiper_a[joint] = static_cast<std::uint16_t>(next());
+        report.wiper_b[joint] = static_cast<std::uint16_t>(next());
+        const ServoOutput out = armed.servo->step(report);
+        double worst = 0;
+        for (std::size_t i = 0; i < 9; ++i) {
+          const std::size_t a = 3 * (i / 3), b = 3 * (i % 3);
+          const double product = out.rotation[a] * out.rotation[b] +
+                                 out.rotation[a + 1] * out.rotation[b + 1] +
+                                 out.rotation[a + 2] * out.rotation[b + 2];
+          worst = std::max(worst, std::abs(product - (a == b ? 1 : 0)));
+        }
+        REQUIRE(worst < 1e-5);
+        REQUIRE(length(out.force_n) <= scene.limits.force_n);
+      }
+    }
   }
 }

@@ -146,8 +146,9 @@ template <class N>
   const auto go = [&](const PointNumber<N>* const(&offset)[3], std::int32_t i, std::int32_t needed,
                       Share from, Share to) {
     return way.free_up_to(
-        {centre[0] + offset[0][i], centre[1] + offset[1][i], centre[2] + offset[2][i]}, needed,
-        from, to, looks);
+        {place_at<N>(centre[0], offset[0][i]), place_at<N>(centre[1], offset[1][i]),
+         place_at<N>(centre[2], offset[2][i])},
+        needed, from, to, looks);
   };
   const std::int32_t first = nearest;
   const Share least = way.share_of(kFreeSteps);

@@ -181,15 +181,15 @@ constexpr void read_points(const PointPlaces<N>& places, std::int32_t count,
                            const PointNumber<N> (&centre)[3], const DensityField& field,
                            PointNumber<N>* density) noexcept {
   for (std::int32_t i = 0; i < count; ++i) {
-    const PointNumber<N> place[3] = {centre[0] + places.offset_vox[0][i],
-                                     centre[1] + places.offset_vox[1][i],
-                                     centre[2] + places.offset_vox[2][i]};
+    const PointNumber<N> place[3] = {place_at<N>(centre[0], places.offset_vox[0][i]),
+                                     place_at<N>(centre[1], places.offset_vox[1][i]),
+                                     place_at<N>(centre[2], places.offset_vox[2][i])};
     density[i] = point_sample<N>(field, place).density;
   }
 }
 
 /// The sums of one query. Leaves out groups around which the volume is free: they would read air.
-/// `centre` of the tool is in voxels (fixed: Q15.16), near enough for all places to stay in range.
+/// `centre` of the tool is in voxels (fixed: Q15.16).
 template <class N>
 [[nodiscard]] constexpr PointSums<N> point_sums(const PointTable<N>& table,
                                                 const PointPlaces<N>& places,
@@ -201,16 +201,16 @@ template <class N>
   for (std::int32_t group = 0; group < table.groups; ++group) {
     std::int32_t middle[3] = {};
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      const PointNumber<N> at = centre[axis] + places.middle[axis][group];
+      const auto at = place_at<N>(centre[axis], places.middle[axis][group]);
       middle[axis] =
           N::kIsFixed ? static_cast<std::int32_t>(at) >> 16 : static_cast<std::int32_t>(at);
     }
     if (field.free.at(middle[0], middle[1], middle[2]) >= table.needed[group]) continue;
     sums.read += kPointGroup;
     for (std::int32_t i = group * kPointGroup; i < (group + 1) * kPointGroup; ++i) {
-      const PointNumber<N> place[3] = {centre[0] + places.offset_vox[0][i],
-                                       centre[1] + places.offset_vox[1][i],
-                                       centre[2] + places.offset_vox[2][i]};
+      const PointNumber<N> place[3] = {place_at<N>(centre[0], places.offset_vox[0][i]),
+                                       place_at<N>(centre[1], places.offset_vox[1][i]),
+                                       place_at<N>(centre[2], places.offset_vox[2][i])};
       const PointNumber<N> offset[3] = {table.offset[0][i], table.offset[1][i], table.offset[2][i]};
       add_sample<N>(sums, i, point_sample<N>(field, place), offset, table.round);
     }

@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "controller/kernel/point_shell/free_bricks.hpp"
+#include "shared/numeric/fixed.hpp"
 #include "shared/numeric/numbers.hpp"
 #include "shared/volume/voxel_grid.hpp"
 
@@ -55,6 +56,18 @@ struct PointPlaces {
   PointNumber<N>* offset_vox[3] = {};  ///< of the samples from the centre
   PointNumber<N>* middle[3] = {};      ///< of the groups
 };
+
+/// Place of a sample or a group: `centre` + `offset`. In fixed it stays at the end of 32 bits where
+/// it would lie beyond, outside of every volume.
+template <class N>
+[[nodiscard]] constexpr PointNumber<N> place_at(PointNumber<N> centre,
+                                                PointNumber<N> offset) noexcept {
+  if constexpr (N::kIsFixed) {
+    return saturate_i32(std::int64_t{centre} + offset);
+  } else {
+    return centre + offset;
+  }
+}
 
 /// Takes densities to those of contact, in which the iso-surface is at 1/2 (docs/theory.md 2.1):
 /// density / 2 * mantissa * 2^-shift, in steps of 2^-15. `mantissa` has 16 bits.

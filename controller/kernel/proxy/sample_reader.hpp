@@ -133,7 +133,7 @@ class SampleReader {
     const std::int32_t end[3] = {grid.nx, grid.ny, grid.nz};
     std::int32_t from[3] = {}, to[3] = {};
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      const PointNumber<N> place = centre[axis] + volume.places.offset_vox[axis][sample];
+      const auto place = place_at<N>(centre[axis], volume.places.offset_vox[axis][sample]);
       const auto low = static_cast<std::int32_t>(N::kIsFixed ? place / 65536 : place);
       from[axis] = std::max(low - kNear + 1, 0);
       to[axis] = std::min(low + kNear + 1, end[axis]);

@@ -233,9 +233,10 @@ template <bool kRound, bool kInside>
                                               std::int32_t end, PointVectors& sums) noexcept {
   PointBlock block;
   for (; group < end; ++group) {
-    if (field.free.at((centre[0] + places.middle[0][group]) >> 16,
-                      (centre[1] + places.middle[1][group]) >> 16,
-                      (centre[2] + places.middle[2][group]) >> 16) >= table.needed[group]) {
+    const auto middle = [&](std::size_t axis) {
+      return place_at<FixedNumbers>(centre[axis], places.middle[axis][group]) >> 16;
+    };
+    if (field.free.at(middle(0), middle(1), middle(2)) >= table.needed[group]) {
       continue;
     }
     sums.read += kPointGroup;

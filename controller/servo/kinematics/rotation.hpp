@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <numbers>
 
 #include "shared/numeric/numbers.hpp"
 #include "shared/numeric/vec.hpp"
@@ -13,16 +14,26 @@ struct SineCosine {
   typename N::Unit sine, cosine;
 };
 
-/// Sine and cosine by their Taylor series in nested form, for |angle| <= 2 rad (every joint of the
-/// devices stays below 1.8). No libm: its last bit differs between versions.
+/// Sine and cosine by their Taylor series in nested form. No libm: its last bit differs between
+/// versions.
+///
+/// Joints stay below 1.8 rad. What is beyond 2 rad comes back by half turns, pi each: a gimbal near
+/// its ends, and counts that jump or have no zero yet, up to the 8 rad where `Angle` ends. There
+/// the series would give a matrix that is no rotation, and a tool longer than its table says.
 ///
 /// Truncation: 2^19/19! = 4.3e-12 and 2^18/18! = 4.1e-11; fixed point adds at most 3e-8, which is
-/// 4e-6 mm at an arm of 133 mm. Larger angles lose accuracy, never range.
+/// 4e-6 mm at an arm of 133 mm.
 template <class N>
 [[nodiscard]] constexpr SineCosine<N> sine_cosine(typename N::Angle angle) noexcept {
   using A = typename N::Angle;
   constexpr int kTerms = 8;
-  const A one(1);
+  constexpr int kMostHalfTurns = 2;  // 8 - 2 pi < 2
+  const A one(1), pi = static_cast<A>(std::numbers::pi);
+  bool flipped = false;
+  for (int i = 0; i < kMostHalfTurns && (angle > A(2) || angle < A(-2)); ++i) {
+    angle += angle > A(0) ? -pi : pi;
+    flipped = !flipped;
+  }
   const A square = angle * angle;
   A sine = one;
   A cosine = one;
@@ -31,7 +42,8 @@ template <class N>
     sine = one - square * A(1.0 / ((2 * k) * (2 * k + 1))) * sine;
     cosine = one - square * A(1.0 / ((2 * k - 1) * (2 * k))) * cosine;
   }
-  return {typename N::Unit(angle * sine), typename N::Unit(cosine)};
+  sine = angle * sine;
+  return {typename N::Unit(flipped ? -sine : sine), typename N::Unit(flipped ? -cosine : cosine)};
 }
 
 struct ToolSpace;  ///< mm in the tool's own frame: centre of the cutting head, shaft along +y
