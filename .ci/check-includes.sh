@@ -23,7 +23,7 @@ record
 hil hil/devmodel hil/front hil/front/fuse hil/front/firewire hil/front/usb hil/front/uhid
 hil/front/usbip hil/script hil/fault hil/program
 
-lab/rig lab/accuracy lab/energy lab/extremes lab/faults lab/bench lab/burs lab/ranges lab/zwidth lab/law lab/sweep lab/bridge lab
+lab/rig lab/accuracy lab/energy lab/extremes lab/faults lab/bench lab/burs lab/ranges lab/zwidth/map lab/zwidth/picture lab/zwidth lab/law lab/sweep lab/bridge lab
 
 visualizer visualizer/sound visualizer/view visualizer/gl visualizer/cast visualizer/surface visualizer/texture
 visualizer/render visualizer/compose visualizer/space_mouse visualizer/app visualizer/bench visualizer/monkey

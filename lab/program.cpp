@@ -16,6 +16,7 @@
 #include "lab/ranges/command.hpp"
 #include "lab/sweep/command.hpp"
 #include "lab/zwidth/command.hpp"
+#include "lab/zwidth/merge_command.hpp"
 #include "shared/posix/failure.hpp"
 #include "shared/text/command_line.hpp"
 

@@ -70,7 +70,10 @@ const std::array kRows{
                nullptr,
                {{"servo/border_test.cpp",
                  "on a solid that ends at the volume's border a tool rests, slides and cuts"},
-                {"proxy/proxy_contact_test.cpp", "a far goal is bounded work and a finite force"}}},
+                {"proxy/proxy_contact_test.cpp", "a far goal is bounded work and a finite force"},
+                {"servo/servo_safety_test.cpp",
+                 "whatever counters and pots read, the tool keeps its size and the force its "
+                 "limit"}}},
     ExtremeRow{
         "packets",
         "no number, stale, repeated: held 5 ms, gone at 20 ms, fault latched",

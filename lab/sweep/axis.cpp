@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdio>
 #include <optional>
+#include <set>
 
 #include "controller/scene/scene_setting.hpp"
 #include "hil/hil_error.hpp"
@@ -55,6 +56,16 @@ std::optional<std::vector<std::string>> range_of(std::string_view text, std::str
   return list;
 }
 
+/// 1000 and 1e3 are one number, and so one run.
+void refuse_twins(std::string_view text, const std::vector<std::string>& values) {
+  std::set<std::string> seen;
+  for (const std::string& value : values) {
+    const auto number = number_in(value);
+    if (seen.insert(number ? number_text(*number) : value).second) continue;
+    refuse_axis(text, (value + " stands there twice; name each value once").c_str());
+  }
+}
+
 }  // namespace
 
 Axis parse_axis(std::string_view text) {
@@ -72,6 +83,7 @@ Axis parse_axis(std::string_view text) {
   if (std::ranges::any_of(axis.values, &std::string::empty)) {
     refuse_axis(text, "a value is empty; write LO:HI:N or A,B,C");
   }
+  refuse_twins(text, axis.values);
   if (!axis.of_emulator()) {
     for (const std::string& value : axis.values) {
       static_cast<void>(parse_setting(axis.key + "=" + value));

@@ -15,12 +15,10 @@
 #include "controller/shell/law_trial.hpp"
 #include "hil/hil_error.hpp"
 #include "lab/rig/lab_run.hpp"
-#include "lab/zwidth/arm.hpp"
-#include "lab/zwidth/map.hpp"
-#include "lab/zwidth/one_axis.hpp"
+#include "lab/zwidth/map/map.hpp"
 #include "lab/zwidth/page.hpp"
-#include "lab/zwidth/plot.hpp"
-#include "lab/zwidth/tables.hpp"
+#include "lab/zwidth/picture/map_plot.hpp"
+#include "lab/zwidth/picture/portraits.hpp"
 #include "record/gnuplot.hpp"
 #include "shared/posix/progress_bar.hpp"
 #include "shared/posix/run_files.hpp"
@@ -29,107 +27,6 @@
 #include "shared/text/number.hpp"
 
 namespace kerf::zwidth {
-namespace {
-
-/// A picture that cannot be drawn is told before hours of measuring.
-void require_gnuplot() {
-  static_cast<void>(gnuplot_svg("set terminal svg\nplot 0\n"));
-}
-
-/// The files of a map, checked before it is measured: none is one of the parts, which are read.
-class Outputs {
- public:
-  Outputs(const OutputPaths& paths, const std::vector<std::string>& parts)
-      : draws_(!paths.plot.empty()),
-        csv_("--csv", paths.csv, ".csv"),
-        json_("--json", paths.json, ".json"),
-        plot_("--plot", paths.plot, ".svg") {
-    check_outputs({parts.begin(), parts.end()}, {{"--csv", paths.csv, ".csv"},
-                                                 {"--json", paths.json, ".json"},
-                                                 {"--plot", paths.plot, ".svg"}});
-    if (draws_) require_gnuplot();
-  }
-  void write(const Part& part) const {
-    csv_.write(csv_of(part));
-    json_.write(json_of(part));
-    if (draws_) plot_.write(gnuplot_svg(plot_of(part)));
-  }
-
- private:
-  bool draws_;
-  LabOutput csv_, json_, plot_;
-};
-
-std::string crossing_text(const Crossing& crossing) {
-  if (crossing.first_n_per_mm == Crossing::kNever) return "above all";
-  if (crossing.first_n_per_mm == 0) return "below all";
-  return format("%.4g", crossing.first_n_per_mm);
-}
-
-/// One line for each column: what it is, and where it stops.
-void tell(const Part& part, std::ostream& out) {
-  const std::vector<Assignment> columns = part.spec.columns();
-  std::set<std::string> reasons;
-  std::size_t empty_count = 0;
-  const auto name_of = [&](std::size_t index) {
-    std::string name;
-    for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
-      if (part.spec.table[axis].size() < 2) continue;
-      name += std::string(name.empty() ? "" : " ") + axis_kinds()[axis].name + " " +
-              columns[index][axis];
-    }
-    return name;
-  };
-  std::size_t width = 40;
-  for (const auto& [index, column] : part.columns) {
-    width = std::max(width, name_of(index).size());
-  }
-  out << format("%-*s %10s %10s %10s %10s  re-entry\n", int(width), "column (N/mm)", "swings",
-                "energy", "exact", "passive");
-  for (const auto& [index, column] : part.columns) {
-    const Subject subject = subject_of(columns[index]);
-    if (column.cells.empty()) {
-      const std::string why = impossible(part.spec, subject);
-      ++empty_count;
-      reasons.insert(why.empty() ? NotMet().what() : why);
-      continue;
-    }
-    const Analytic analytic = analytic_of(subject);
-    out << format("%-*s %10s %10s %10.4g %10.4g", int(width), name_of(index).c_str(),
-                  crossing_text(column.swing).c_str(), crossing_text(column.energy).c_str(),
-                  analytic.exact, analytic.passive);
-    if (column.swing.re_entry_from_n_per_mm > 0) {
-      out << format("  %.4g to %.4g", column.swing.re_entry_from_n_per_mm,
-                    column.swing.re_entry_to_n_per_mm);
-    }
-    out << '\n';
-  }
-  if (empty_count > 0) {
-    out << empty_count << " of " << part.columns.size()
-        << " columns are left empty: " << *reasons.begin() << '\n';
-  }
-}
-
-std::pair<double, double> cell_in(const std::string& text) {
-  const std::size_t colon = text.find(':');
-  const auto stiffness = number_in(text.substr(0, colon));
-  const auto damping =
-      colon == std::string::npos ? std::nullopt : number_in(text.substr(colon + 1));
-  if (!stiffness || !damping || !(*stiffness > 0) || *stiffness > 127 || *damping < 0 ||
-      *damping > 2) {
-    throw HilError("--cells: " + text +
-                   " is no cell; give stiffness:damping in N/mm and N s/mm, such as 2:0.002");
-  }
-  return {*stiffness, *damping};
-}
-
-}  // namespace
-
-void OutputPaths::declare(Arguments& app) {
-  app.option("--csv", csv, "write one row for each cell").shown_as("FILE");
-  app.option("--json", json, "write axes, boundaries and cells").shown_as("FILE");
-  app.option("--plot", plot, "draw the map beside the analytic limits (SVG)").shown_as("FILE");
-}
 
 Command::Command(Arguments& program)
     : LabCommand(program, "zwidth",
@@ -278,34 +175,6 @@ Shard Command::shard() const {
   return {static_cast<std::size_t>(*index), static_cast<std::size_t>(*count)};
 }
 
-void Command::draw_portraits(const MapSpec& spec) const {
-  constexpr std::size_t kMost = 12;
-  if (cells_.empty() || cells_.size() > kMost) {
-    throw HilError("--portraits: give --cells, 1 to 12 of them, such as 2:0.002,20:0.002");
-  }
-  for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
-    if (spec.table[axis].size() < 2 || axis == index_of(AxisId::damping)) continue;
-    throw HilError(std::string("--portraits: the axis ") + axis_kinds()[axis].name + " has " +
-                   std::to_string(spec.table[axis].size()) + " values; give it one");
-  }
-  std::vector<Portrait> portraits;
-  for (const std::string& cell : cells_) {
-    const auto [stiffness, damping] = cell_in(cell);
-    Subject subject = subject_of(spec.columns().front());
-    subject.damping_ns_per_mm = damping;
-    Portrait portrait{format("K %g N/mm, B %g N s/mm", stiffness, damping), {}};
-    std::uint64_t ticks = 0;
-    for (const double speed : kHitsMmPerS) {
-      std::vector<OneAxisTick> curve;
-      static_cast<void>(hit_one_axis(subject, stiffness, speed, spec.seconds, spec.seed, ticks,
-                                     [&](const OneAxisTick& tick) { curve.push_back(tick); }));
-      portrait.hits.push_back(std::move(curve));
-    }
-    portraits.push_back(std::move(portrait));
-  }
-  LabOutput("--portraits", portraits_, ".svg").write(gnuplot_svg(plot_of(portraits)));
-}
-
 int Command::threads(std::size_t columns) const {
   const std::size_t cores = std::max(1U, std::thread::hardware_concurrency());
   const std::size_t wanted = jobs_ > 0 ? static_cast<std::size_t>(jobs_) : cores;
@@ -408,29 +277,15 @@ int Command::run(std::ostream& out) const {
   try_laws(map, out);
   if (!paths_.plot.empty()) check_panels(map);
   if (!portraits_.empty()) {
-    if (map.arm) throw HilError("--portraits: of one axis alone; leave --arm out");
-    draw_portraits(map);
+    require_gnuplot();
+    const LabOutput output("--portraits", portraits_, ".svg");
+    output.write(gnuplot_svg(portraits_of(map, cells_)));
     return 0;
   }
   PartWriter kept(part_, map, part);
   if (!measure(map, part, kept, out)) return 3;
   kept.finish();
   const Part whole{map, part, kept.columns()};
-  tell(whole, out);
-  outputs.write(whole);
-  return 0;
-}
-
-MergeCommand::MergeCommand(Arguments& program)
-    : LabCommand(program, "merge", "the parts of a map (zwidth --shard) as one map") {
-  app_.option("parts", parts_, "part files, one of each shard").required().shown_as("FILE...");
-  paths_.declare(app_);
-}
-
-int MergeCommand::run(std::ostream& out) const {
-  const Outputs outputs(paths_, parts_);
-  const Part whole = merge_parts(parts_);
-  if (!paths_.plot.empty()) check_panels(whole.spec);
   tell(whole, out);
   outputs.write(whole);
   return 0;

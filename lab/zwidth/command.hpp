@@ -9,16 +9,11 @@
 #include <vector>
 
 #include "lab/rig/lab_command.hpp"
-#include "lab/zwidth/axes.hpp"
-#include "lab/zwidth/part_file.hpp"
+#include "lab/zwidth/map/axes.hpp"
+#include "lab/zwidth/map/part_file.hpp"
+#include "lab/zwidth/results.hpp"
 
 namespace kerf::zwidth {
-
-/// The files that a map is written to; `MergeCommand` has the same.
-struct OutputPaths {
-  std::string csv, json, plot;
-  void declare(Arguments& app);
-};
 
 /// `kerf-lab zwidth`: which stiffness and damping a device bears, measured, beside the theory.
 class Command final : public LabCommand {
@@ -34,7 +29,6 @@ class Command final : public LabCommand {
   /// The columns of the shard that `kept` has not; false: interrupted.
   [[nodiscard]] bool measure(const MapSpec& map, const Shard& shard, PartWriter& kept,
                              std::ostream& out) const;
-  void draw_portraits(const MapSpec& spec) const;
   void write_page() const;
 
   std::array<std::string, kAxisCount> axes_, option_names_;
@@ -45,17 +39,6 @@ class Command final : public LabCommand {
   double seconds_ = 0;
   std::uint32_t seed_ = 1;
   int jobs_ = 0;
-};
-
-/// `kerf-lab merge`: the parts of a map's shards as one map.
-class MergeCommand final : public LabCommand {
- public:
-  explicit MergeCommand(Arguments& program);
-  [[nodiscard]] int run(std::ostream& out) const override;
-
- private:
-  std::vector<std::string> parts_;
-  OutputPaths paths_;
 };
 
 }  // namespace kerf::zwidth

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "lab/rig/lab_run.hpp"
-#include "lab/zwidth/plot.hpp"
-#include "lab/zwidth/tables.hpp"
+#include "lab/zwidth/map/tables.hpp"
+#include "lab/zwidth/picture/map_plot.hpp"
 #include "shared/text/format.hpp"
 #include "shared/text/number.hpp"
 

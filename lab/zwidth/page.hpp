@@ -4,7 +4,7 @@
 #include <functional>
 #include <string>
 
-#include "lab/zwidth/part_file.hpp"
+#include "lab/zwidth/map/part_file.hpp"
 
 namespace kerf::zwidth {
 

@@ -72,6 +72,10 @@ bool is_same_file(const fs::path& a, const fs::path& b) {
 void check_outputs(const std::vector<fs::path>& inputs, const std::vector<OutputFile>& outputs) {
   for (const OutputFile& output : outputs) {
     if (output.path.empty()) continue;
+    if (output.path == "-") {
+      throw FileError("-: " + std::string(output.option) +
+                      " would make a file of that name; give /dev/stdout for standard output");
+    }
     if (!is_stream(output.path)) {
       refuse_ending(output);
       for (const fs::path& input : inputs) {

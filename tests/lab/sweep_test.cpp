@@ -94,7 +94,8 @@ TEST_CASE("what is no axis is refused in one line that names it") {
        {"force", "=1", "force.stiffness_n_per_mm=", "force.stiffness_n_per_mm=1,,2",
         "force.stiffness_n_per_mm=1:2:0", "force.stiffness_n_per_mm=1:2:1",
         "force.stiffness_n_per_mm=1:2:2.5", "force.stiffness_n_per_mm=1:2:1e9", "force.stifness=1",
-        "servo.rate=500"}) {
+        "servo.rate=500", "servo.rate_hz=500,1000,500", "servo.rate_hz=1000,1e3",
+        "force.stiffness_n_per_mm=0.3:0.3:2"}) {
     CAPTURE(text);
     const std::string line = refusal_of(text);
     CHECK(line.starts_with("--set "));

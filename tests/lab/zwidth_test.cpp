@@ -16,11 +16,11 @@
 #include "controller/stability/stable_gains.hpp"
 #include "hil/hil_error.hpp"
 #include "lab/program.hpp"
-#include "lab/zwidth/arm.hpp"
-#include "lab/zwidth/axes.hpp"
-#include "lab/zwidth/map.hpp"
-#include "lab/zwidth/one_axis.hpp"
-#include "lab/zwidth/part_file.hpp"
+#include "lab/zwidth/map/arm.hpp"
+#include "lab/zwidth/map/axes.hpp"
+#include "lab/zwidth/map/map.hpp"
+#include "lab/zwidth/map/one_axis.hpp"
+#include "lab/zwidth/map/part_file.hpp"
 
 using namespace kerf;
 using namespace kerf::zwidth;
@@ -103,6 +103,17 @@ struct Folder {
 
 constexpr const char* kSmall =
     "zwidth --damping 0,0.002,0.02 --stiffness 0.2:20:6 --seconds 0.3 --delay 0,1 ";
+
+/// One column of one axis, with these values and the standards of the rest.
+Column column_of(const std::string& stiffness, double seconds,
+                 const std::vector<std::pair<AxisId, std::string>>& given) {
+  MapSpec spec;
+  spec.stiffness_n_per_mm = stiffness_values(stiffness);
+  spec.seconds = seconds;
+  Assignment values;
+  for (const auto& [axis, value] : given) values[index_of(axis)] = value;
+  return measure_column(spec, values, 0);
+}
 
 }  // namespace
 
@@ -346,23 +357,20 @@ TEST_CASE("what the emulated device cannot do, or the hand never meets, is empty
 }
 
 TEST_CASE("a column tells its first crossing and what comes to rest above it apart") {
-  MapSpec spec;
-  spec.mapped = {index_of(AxisId::damping), kAxisCount};
-  spec.stiffness_n_per_mm = {0.1, 1, 10, 50};
-  spec.seconds = 0.5;
-  Assignment values;
-  values[index_of(AxisId::loop)] = "ideal";
-  values[index_of(AxisId::delay)] = "0";
-  values[index_of(AxisId::damping)] = "0.01";
-  const Column column = measure_column(spec, values, 0);
-  const double exact = highest_stiffness(subject_of(values).loop, 0.01);
+  const auto column_over = [](const std::string& stiffness) {
+    return column_of(stiffness, 0.5,
+                     {{AxisId::loop, "ideal"}, {AxisId::delay, "0"}, {AxisId::damping, "0.01"}});
+  };
+  const Column column = column_over("0.1,1,10,50");
+  Assignment ideal;
+  ideal[index_of(AxisId::loop)] = "ideal";
+  ideal[index_of(AxisId::delay)] = "0";
+  const double exact = highest_stiffness(subject_of(ideal).loop, 0.01);
   CHECK(std::abs(column.swing.first_n_per_mm / exact - 1) < 0.01);
   CHECK(std::abs(column.energy.first_n_per_mm / exact - 1) < 0.01);
   CHECK(column.swing.re_entry_from_n_per_mm == 0);
-  spec.stiffness_n_per_mm = {0.1, 1};
-  CHECK(measure_column(spec, values, 0).swing.first_n_per_mm == Crossing::kNever);
-  spec.stiffness_n_per_mm = {30, 50};
-  CHECK(measure_column(spec, values, 0).swing.first_n_per_mm == 0);
+  CHECK(column_over("0.1,1").swing.first_n_per_mm == Crossing::kNever);
+  CHECK(column_over("30,50").swing.first_n_per_mm == 0);
 }
 
 TEST_CASE("a law of the user's own gets its map, on one axis and with the whole arm") {
@@ -397,28 +405,20 @@ TEST_CASE("a law of the user's own gets its map, on one axis and with the whole 
 
 TEST_CASE("a stabiliser widens the map") {
   const auto first = [](const std::string& stabiliser) {
-    MapSpec spec;
-    spec.stiffness_n_per_mm = stiffness_values("0.1:50:20");
-    spec.seconds = 0.6;
-    Assignment values;
-    values[index_of(AxisId::damping)] = "0";
-    values[index_of(AxisId::stabiliser)] = stabiliser;
-    return measure_column(spec, values, 0).swing.first_n_per_mm;
+    return column_of("0.1:50:20", 0.6, {{AxisId::damping, "0"}, {AxisId::stabiliser, stabiliser}})
+        .swing.first_n_per_mm;
   };
   CHECK(first("energy_bounding") > 1.5 * first("none"));
 }
 
 TEST_CASE("each cell tells the lowest energy of its port, which the passivity controller bounds") {
   const auto cells = [](const std::string& stabiliser) {
-    MapSpec spec;
-    spec.stiffness_n_per_mm = stiffness_values("0.05:20:8");
-    spec.seconds = 1;
-    Assignment values;
-    values[index_of(AxisId::damping)] = "0";
-    values[index_of(AxisId::delay)] = "0";
-    values[index_of(AxisId::limits)] = "off";
-    values[index_of(AxisId::stabiliser)] = stabiliser;
-    return measure_column(spec, values, 0).cells;
+    return column_of("0.05:20:8", 1,
+                     {{AxisId::damping, "0"},
+                      {AxisId::delay, "0"},
+                      {AxisId::limits, "off"},
+                      {AxisId::stabiliser, stabiliser}})
+        .cells;
   };
   const std::vector<Swing> off = cells("none"), on = cells("passivity/mass_kg=10");
   REQUIRE(off.size() == on.size());

@@ -108,3 +108,9 @@ TEST_CASE("two outputs of a run are two files") {
   CHECK(refusal({"/dev/null"}, {{"--a", "/dev/null", ".png"}, {"--b", "/dev/null", {}}}).empty());
   CHECK(fs::is_empty(folder.path));
 }
+
+TEST_CASE("a dash is no standard output, and is told so") {
+  CHECK(refusal({}, {{"--csv", "-", ".csv"}}) ==
+        "-: --csv would make a file of that name; give /dev/stdout for standard output");
+  CHECK(refusal({}, {{"--csv", "/dev/stdout", ".csv"}}).empty());
+}

@@ -6,8 +6,8 @@
 
 #include "controller/load/loaded_scene.hpp"
 #include "hil/hil_error.hpp"
-#include "lab/zwidth/subject.hpp"
-#include "lab/zwidth/swing.hpp"
+#include "lab/zwidth/map/subject.hpp"
+#include "lab/zwidth/map/swing.hpp"
 
 namespace kerf::zwidth {
 

@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <functional>
 
-#include "lab/zwidth/subject.hpp"
-#include "lab/zwidth/swing.hpp"
+#include "lab/zwidth/map/subject.hpp"
+#include "lab/zwidth/map/swing.hpp"
 
 namespace kerf::zwidth {
 

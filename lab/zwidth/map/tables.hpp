@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "lab/zwidth/part_file.hpp"
+#include "lab/zwidth/map/part_file.hpp"
 
 namespace kerf::zwidth {
 

@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "lab/zwidth/subject.hpp"
+#include "lab/zwidth/map/subject.hpp"
 
 namespace kerf::zwidth {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "lab/zwidth/part_file.hpp"
+#include "lab/zwidth/map/part_file.hpp"
 
 #include <algorithm>
 #include <filesystem>

@@ -2,10 +2,8 @@
 #pragma once
 
 #include <string>
-#include <vector>
 
-#include "lab/zwidth/one_axis.hpp"
-#include "lab/zwidth/part_file.hpp"
+#include "lab/zwidth/map/part_file.hpp"
 
 namespace kerf::zwidth {
 
@@ -16,15 +14,5 @@ namespace kerf::zwidth {
 
 /// Throws HilError for a map of more panels than a picture holds: before it is measured.
 void check_panels(const MapSpec& spec);
-
-/// One cell of a phase portrait: a curve for each hit.
-struct Portrait {
-  std::string title;
-  std::vector<std::vector<OneAxisTick>> hits;
-};
-[[nodiscard]] std::string plot_of(const std::vector<Portrait>& portraits);
-
-/// What an axis is called in a picture, with its unit.
-[[nodiscard]] std::string axis_label(std::size_t axis);
 
 }  // namespace kerf::zwidth

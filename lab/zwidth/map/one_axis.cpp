@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "lab/zwidth/one_axis.hpp"
+#include "lab/zwidth/map/one_axis.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "lab/zwidth/map.hpp"
+#include "lab/zwidth/map/map.hpp"
 
 #include <atomic>
 #include <cmath>
@@ -14,8 +14,8 @@
 #include "hil/devmodel/bus_cycle.hpp"
 #include "hil/devmodel/plant_params.hpp"
 #include "hil/hil_error.hpp"
-#include "lab/zwidth/arm.hpp"
-#include "lab/zwidth/one_axis.hpp"
+#include "lab/zwidth/map/arm.hpp"
+#include "lab/zwidth/map/one_axis.hpp"
 #include "shared/text/format.hpp"
 
 namespace kerf::zwidth {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "lab/zwidth/arm.hpp"
+#include "lab/zwidth/map/arm.hpp"
 
 #include <algorithm>
 #include <array>
@@ -20,7 +20,7 @@
 #include "hil/hil_error.hpp"
 #include "lab/rig/bench_scene.hpp"
 #include "lab/rig/direct_port.hpp"
-#include "lab/zwidth/one_axis.hpp"
+#include "lab/zwidth/map/one_axis.hpp"
 #include "shared/numeric/vec3.hpp"
 
 namespace kerf::zwidth {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "lab/zwidth/tables.hpp"
+#include "lab/zwidth/map/tables.hpp"
 
 #include <utility>
 

@@ -10,8 +10,8 @@
 #include <string>
 #include <vector>
 
-#include "lab/zwidth/axes.hpp"
-#include "lab/zwidth/swing.hpp"
+#include "lab/zwidth/map/axes.hpp"
+#include "lab/zwidth/map/swing.hpp"
 
 namespace kerf::zwidth {
 

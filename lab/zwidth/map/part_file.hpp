@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "lab/zwidth/map.hpp"
+#include "lab/zwidth/map/map.hpp"
 
 namespace kerf::zwidth {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "lab/zwidth/axes.hpp"
+#include "lab/zwidth/map/axes.hpp"
 
 #include <algorithm>
 #include <cmath>
