@@ -18,14 +18,14 @@ namespace {
   throw HilError("--set " + std::string(text) + ": " + why);
 }
 
-/// Parts between the separators that stand in no brackets or quotes.
+/// Parts between the separators that stand in no brackets, braces or quotes.
 std::vector<std::string> split(std::string_view text, char separator) {
   std::vector<std::string> parts(1);
   int depth = 0;
   bool quoted = false;
   for (const char c : text) {
     quoted = quoted != (c == '"');
-    depth += c == '[' ? 1 : c == ']' ? -1 : 0;
+    depth += c == '[' || c == '{' ? 1 : c == ']' || c == '}' ? -1 : 0;
     if (c == separator && depth == 0 && !quoted) {
       parts.emplace_back();
     } else {

@@ -81,6 +81,8 @@ TEST_CASE("an axis is a range with both ends, or a list; the last axis changes f
   CHECK(parse_axis("servo.rate_hz=500:500:1").values == std::vector<std::string>{"500"});
   CHECK(parse_axis("device.offset_mm=[0,1,2],[3,4,5]").values ==
         std::vector<std::string>{"[0,1,2]", "[3,4,5]"});
+  CHECK(parse_axis("servo.velocity={name=\"difference\",filter_ms=1},{name=\"foaw\"}").values ==
+        std::vector<std::string>{"{name=\"difference\",filter_ms=1}", "{name=\"foaw\"}"});
   const std::vector<std::string> texts{"servo.rate_hz=1,2,3", "emulator.seed=7,8"};
   const std::vector<Axis> axes = parse_axes(texts);
   CHECK(runs_of(axes) == 6);
