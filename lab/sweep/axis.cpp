@@ -56,12 +56,32 @@ std::optional<std::vector<std::string>> range_of(std::string_view text, std::str
   return list;
 }
 
-/// 1000 and 1e3 are one number, and so one run.
+/// A value without what TOML does not read: 1000 and +1e3, "a" and a, [0,1] and [0, 1] are the
+/// same.
+std::string meaning_of(const std::string& value) {
+  std::string meaning, word;
+  const auto end_word = [&] {
+    const auto number = number_in(word.starts_with('+') ? word.substr(1) : word);
+    meaning += number ? number_text(*number == 0 ? 0 : *number) : word;  // -0 is 0
+    word.clear();
+  };
+  for (const char c : value) {
+    if (c == ' ' || c == '\t' || c == '"') continue;
+    if (std::string_view("[]{},=").find(c) == std::string_view::npos) {
+      word += c;
+      continue;
+    }
+    end_word();
+    meaning += c;
+  }
+  end_word();
+  return meaning;
+}
+
 void refuse_twins(std::string_view text, const std::vector<std::string>& values) {
   std::set<std::string> seen;
   for (const std::string& value : values) {
-    const auto number = number_in(value);
-    if (seen.insert(number ? number_text(*number) : value).second) continue;
+    if (seen.insert(meaning_of(value)).second) continue;
     refuse_axis(text, (value + " stands there twice; name each value once").c_str());
   }
 }

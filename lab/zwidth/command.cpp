@@ -65,7 +65,7 @@ Command::Command(Arguments& program)
       "An axis takes one value, a list (0,1,2) or a range (0:3:4: from, to, count). Two are "
       "mapped;\n"
       "each combination of the others is a panel of the picture. docs/stability.md has examples.\n"
-      "Exit codes: 0 fine, 2 bad input or set-up; 3 interrupted, and --part has what is done.");
+      "Exit codes: 0 fine, 2 bad input or set-up; 130 interrupted, and --part has what is done.");
 }
 
 /// The program's own laws have a trial before a map runs them: one that loops would never end it.
@@ -140,8 +140,11 @@ MapSpec Command::spec() const {
   for (const Assignment& values : spec.columns()) {
     const std::string estimator = value_of(values, AxisId::estimator);
     if (value_of(values, AxisId::filter) == "0" || estimator == "difference") continue;
-    throw HilError("--filter: " + estimator +
-                   " has no low-pass behind it; add --estimator difference, or leave it out");
+    throw HilError(
+        "--filter: " + estimator +
+        (estimator.starts_with("difference/")
+             ? " sets its low-pass itself; leave one of the two out"
+             : " has no low-pass behind it; add --estimator difference, or leave it out"));
   }
   spec.arm = arm_;
   spec.seconds = seconds_ > 0 ? seconds_ : quick_ ? 1 : 3;
@@ -195,11 +198,12 @@ void Command::write_page() const {
     Part part{spec, {}, {}};
     std::vector<std::size_t> all(spec.columns().size());
     std::iota(all.begin(), all.end(), std::size_t{0});
-    measure_columns(spec, all, threads(all.size()), [&](std::size_t index, Column column) {
+    const auto done = [&](std::size_t index, Column column, std::uint64_t) {
       part.columns[index] = std::move(column);
       bar.show(static_cast<double>(part.columns.size()) / static_cast<double>(all.size()), what);
-      return true;
-    });
+    };
+    const std::atomic<bool> to_the_end{false};
+    measure_columns(spec, all, threads(all.size()), to_the_end, done);
     return part;
   };
   const StabilityPage page =
@@ -225,15 +229,15 @@ bool Command::measure(const MapSpec& map, const Shard& shard, PartWriter& kept,
   std::uint64_t ticks = 0;
   std::size_t done = 0;
   bar.show(0, format("0 of %zu columns", wanted.size()));
-  measure_columns(map, wanted, jobs, [&](std::size_t index, Column column) {
-    ticks += column.ticks;
+  const auto keep = [&](std::size_t index, Column column, std::uint64_t took) {
+    ticks += took;
     kept.add(index, std::move(column));
     ++done;
     const auto of = static_cast<double>(wanted.size()), have = static_cast<double>(done);
     bar.show(have / of, format("%zu of %zu columns, %.0f s left", done, wanted.size(),
                                seconds() / have * (of - have)));
-    return !stop.load();
-  });
+  };
+  measure_columns(map, wanted, jobs, stop, keep);
   bar.hide();
   if (done < wanted.size()) {
     out << "interrupted: " << done << " of " << wanted.size() << " columns measured"
@@ -260,7 +264,7 @@ int Command::run(std::ostream& out) const {
     const bool chooses =
         std::ranges::any_of(axes_, [](const std::string& a) { return !a.empty(); });
     if (chooses || arm_ || !stiffness_.empty() || !portraits_.empty() || seconds_ > 0 ||
-        seed_ != 1) {
+        seed_ != 1 || !cells_.empty() || shard_ != "1/1") {
       throw HilError("--page: its maps are its own; leave all but --quick and --jobs out");
     }
     write_page();
@@ -277,13 +281,19 @@ int Command::run(std::ostream& out) const {
   try_laws(map, out);
   if (!paths_.plot.empty()) check_panels(map);
   if (!portraits_.empty()) {
+    if (!axes_[index_of(AxisId::damping)].empty() || !stiffness_.empty() || shard_ != "1/1") {
+      throw HilError(
+          "--portraits: --cells have the stiffness and the damping; leave --stiffness, --damping "
+          "and "
+          "--shard out");
+    }
     require_gnuplot();
     const LabOutput output("--portraits", portraits_, ".svg");
     output.write(gnuplot_svg(portraits_of(map, cells_)));
     return 0;
   }
   PartWriter kept(part_, map, part);
-  if (!measure(map, part, kept, out)) return 3;
+  if (!measure(map, part, kept, out)) return 130;
   kept.finish();
   const Part whole{map, part, kept.columns()};
   tell(whole, out);

@@ -4,6 +4,7 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <cstdio>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -25,6 +26,16 @@ namespace kerf {
   std::array<char, 32> buffer{};
   const auto end = std::to_chars(buffer.data(), buffer.data() + buffer.size(), value);
   return {buffer.data(), end.ptr};
+}
+
+/// `value` above 0 in so many digits, and never more than it: what is told to be safe is.
+[[nodiscard]] inline std::string text_below(double value, int digits) {
+  const double step = std::pow(10, std::floor(std::log10(value)) + 1 - digits);
+  constexpr double kRounding = 1e-9;  // of a value that is a whole number of steps
+  std::array<char, 32> buffer{};
+  std::snprintf(buffer.data(), buffer.size(), "%.*g", digits,
+                std::floor(value / step + kRounding) * step);
+  return buffer.data();
 }
 
 }  // namespace kerf

@@ -81,8 +81,8 @@ TEST_CASE("an axis is a range with both ends, or a list; the last axis changes f
   CHECK(parse_axis("servo.rate_hz=500:500:1").values == std::vector<std::string>{"500"});
   CHECK(parse_axis("device.offset_mm=[0,1,2],[3,4,5]").values ==
         std::vector<std::string>{"[0,1,2]", "[3,4,5]"});
-  CHECK(parse_axis("servo.velocity={name=\"difference\",filter_ms=1},{name=\"foaw\"}").values ==
-        std::vector<std::string>{"{name=\"difference\",filter_ms=1}", "{name=\"foaw\"}"});
+  CHECK(parse_axis("servo.velocity={name=\"difference\",tau_ms=1},{name=\"foaw\"}").values ==
+        std::vector<std::string>{"{name=\"difference\",tau_ms=1}", "{name=\"foaw\"}"});
   const std::vector<std::string> texts{"servo.rate_hz=1,2,3", "emulator.seed=7,8"};
   const std::vector<Axis> axes = parse_axes(texts);
   CHECK(runs_of(axes) == 6);
@@ -97,7 +97,8 @@ TEST_CASE("what is no axis is refused in one line that names it") {
         "force.stiffness_n_per_mm=1:2:0", "force.stiffness_n_per_mm=1:2:1",
         "force.stiffness_n_per_mm=1:2:2.5", "force.stiffness_n_per_mm=1:2:1e9", "force.stifness=1",
         "servo.rate=500", "servo.rate_hz=500,1000,500", "servo.rate_hz=1000,1e3",
-        "force.stiffness_n_per_mm=0.3:0.3:2"}) {
+        "servo.rate_hz=1000,+1000", "force.friction=0.2, 0.2", "force.friction=0,-0",
+        "device.offset_mm=[0,1,2],[0, 1, 2]", "force.stiffness_n_per_mm=0.3:0.3:2"}) {
     CAPTURE(text);
     const std::string line = refusal_of(text);
     CHECK(line.starts_with("--set "));

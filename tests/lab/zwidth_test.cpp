@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <doctest/doctest.h>
@@ -64,8 +66,8 @@ Subject ideal(double delay_periods) {
 }
 
 bool swings(const Subject& subject, double stiffness, bool by_energy = false) {
-  std::uint64_t ticks = 0;
-  const Swing swing = hit_one_axis(subject, stiffness, 0, 3, 0, ticks);
+  Effort effort;
+  const Swing swing = hit_one_axis(subject, stiffness, 0, 3, 0, effort);
   return by_energy ? swing.active : swing.swings;
 }
 
@@ -112,7 +114,8 @@ Column column_of(const std::string& stiffness, double seconds,
   spec.seconds = seconds;
   Assignment values;
   for (const auto& [axis, value] : given) values[index_of(axis)] = value;
-  return measure_column(spec, values, 0);
+  Effort effort;
+  return measure_column(spec, values, effort);
 }
 
 }  // namespace
@@ -183,14 +186,14 @@ TEST_CASE("the whole arm comes to rest on a soft wall and swings on a hard one")
     subject.numeric = numeric;
     subject.loop.delay_s = 0;
     const LoadedScene scene = walls_scene(subject);
-    std::uint64_t ticks = 0;
-    const Swing soft = hit_with_arm(scene, subject, 0.3, 0.3, 1, ticks);
+    Effort effort;
+    const Swing soft = hit_with_arm(scene, subject, 0.3, 0.3, 1, effort);
     CHECK_FALSE(soft.swings);
     CHECK_FALSE(soft.active);
-    const Swing hard = hit_with_arm(scene, subject, 40, 0.3, 1, ticks);
+    const Swing hard = hit_with_arm(scene, subject, 40, 0.3, 1, effort);
     CHECK(hard.swings);
     CHECK(hard.active);
-    CHECK(ticks > 1000);
+    CHECK(effort.ticks() > 1000);
   }
 }
 
@@ -315,7 +318,16 @@ TEST_CASE("axes that mean nothing are refused in one line; columns that cannot e
                            "--shard a/b",
                            "--mode 100",
                            "--arm --quantum 0.1",
-                           "--arm --rate 3000 --seconds 0.1",
+                           "--stiffness 1,1.00000001",
+                           "--estimator difference/tau_ms=5 --filter 5",
+                           "--part /dev/null",
+                           "--page /dev/null --cells 1:0.002",
+                           "--page /dev/null --shard 1/2",
+                           "--portraits /dev/null --cells 1:0.002 --damping 0.01",
+                           "--portraits /dev/null --cells 1:0.002 --stiffness 1,2",
+                           "--portraits /dev/null --cells 1:0.002,1:0.002",
+                           "--portraits /dev/null --cells 0.00001:0",
+                           "--portraits /dev/null --cells 127:2",
                            "--portraits /dev/null",
                            "--portraits /dev/null --cells 1",
                            "--portraits /dev/null --cells 1:0.002 --csv /dev/null",
@@ -341,6 +353,11 @@ TEST_CASE("axes that mean nothing are refused in one line; columns that cannot e
       lab("zwidth --damping 0.002,0.2 --delay 0 --viscous 0 --stiffness 0.2,1 --seconds 0.2");
   CHECK(said.code == 0);
   CHECK(said.out.find("1 of 2 columns are left empty: damping ") != std::string::npos);
+  // What was measured beside it is not lost.
+  const Said rates =
+      lab("zwidth --arm --rate 1000,3000 --damping 0.002 --stiffness 0.2,1 --seconds 0.1");
+  CHECK(rates.code == 0);
+  CHECK(rates.out.find("1 of 2 columns are left empty: rate 3000 Hz: ") != std::string::npos);
 }
 
 TEST_CASE("what the emulated device cannot do, or the hand never meets, is empty and told") {
@@ -412,8 +429,9 @@ TEST_CASE("a stabiliser widens the map") {
 }
 
 TEST_CASE("each cell tells the lowest energy of its port, which the passivity controller bounds") {
+  constexpr double kSeconds = 2;  // of a hit
   const auto cells = [](const std::string& stabiliser) {
-    return column_of("0.05:20:8", 1,
+    return column_of("0.05:20:8", kSeconds,
                      {{AxisId::damping, "0"},
                       {AxisId::delay, "0"},
                       {AxisId::limits, "off"},
@@ -424,7 +442,8 @@ TEST_CASE("each cell tells the lowest energy of its port, which the passivity co
   REQUIRE(off.size() == on.size());
   for (std::size_t i = 0; i < on.size(); ++i) {
     CAPTURE(i);
-    CHECK(on[i].port_minimum_mj > -2);
+    // A little leaks in every step of an encoder that comes between two ticks.
+    CHECK(on[i].port_minimum_mj > -2 * kSeconds);
     CHECK(on[i].port_minimum_mj >= off[i].port_minimum_mj);
   }
   CHECK(off.front().port_minimum_mj == 0);
@@ -435,9 +454,87 @@ TEST_CASE("behind a delay the arm's port gives what its motors did, not what the
   Assignment values;
   values[index_of(AxisId::delay)] = "8";
   const Subject subject = subject_of(values);
-  std::uint64_t ticks = 0;
-  const Swing swing = hit_with_arm(walls_scene(subject), subject, 0.5, 0.5, 1, ticks);
+  Effort effort;
+  const Swing swing = hit_with_arm(walls_scene(subject), subject, 0.5, 0.5, 1, effort);
   CHECK(swing.swings);
   CHECK(swing.active);
   CHECK(swing.port_minimum_mj < -50);
+}
+
+TEST_CASE("a heavy device's boundary is found, too: its hits last as long as its swings") {
+  for (const char* const mass : {"0.005", "0.045", "1", "5", "20"}) {
+    CAPTURE(mass);
+    Assignment ideal;
+    ideal[index_of(AxisId::loop)] = "ideal";
+    ideal[index_of(AxisId::mass)] = mass;
+    const Column column =
+        column_of("0.05:20:10", 0.5,
+                  {{AxisId::loop, "ideal"}, {AxisId::mass, mass}, {AxisId::damping, "0.002"}});
+    const Subject subject = subject_of(ideal);
+    const double exact = highest_stiffness(subject.loop, subject.damping_ns_per_mm);
+    CHECK(std::abs(column.swing.first_n_per_mm / exact - 1) < 0.03);
+    CHECK(std::abs(column.energy.first_n_per_mm / exact - 1) < 0.03);
+  }
+  MapSpec spec;
+  spec.stiffness_n_per_mm = {0.0001};
+  Subject slow = subject_of({});
+  slow.loop.mass_kg = 100;
+  CHECK(impossible(spec, slow).find("mass 100 kg: a hit would last") == 0);
+}
+
+TEST_CASE("a column has the same bits in every map that has it") {
+  const Folder folder;
+  const std::string options = " --stiffness 0.2:20:4 --seconds 0.2 --csv ";
+  const std::string alone = folder.at("alone.csv"), among = folder.at("among.csv");
+  REQUIRE(lab("zwidth --damping 0.02" + options + alone).code == 0);
+  REQUIRE(lab("zwidth --damping 0.001,0.01,0.02" + options + among).code == 0);
+  const std::string rows = bytes(alone).substr(bytes(alone).find('\n') + 1);
+  CHECK(bytes(among).find(rows) != std::string::npos);
+}
+
+TEST_CASE("a part belongs to one run at a time, and a hit ends with the word") {
+  const Folder folder;
+  const std::string path = folder.at("map.part");
+  MapSpec spec;
+  spec.mapped = {index_of(AxisId::damping), kAxisCount};
+  spec.table[index_of(AxisId::damping)] = {"0.002"};
+  spec.stiffness_n_per_mm = {0.2, 1};
+  {
+    const PartWriter first(path, spec, {});
+    try {
+      const PartWriter second(path, spec, {});
+      FAIL("two runs write one part");
+    } catch (const HilError& error) {
+      CHECK(std::string(error.what()).find("another run is at work on it") != std::string::npos);
+    }
+  }
+  { const PartWriter again(path, spec, {}); }  // it ended
+
+  const std::atomic<bool> stop{true};
+  Effort effort(stop);
+  CHECK_THROWS_AS(static_cast<void>(hit_one_axis(subject_of({}), 100, 200, 60, 1, effort)),
+                  Interrupted);
+  CHECK(effort.ticks() < 2000);
+}
+
+TEST_CASE("what no map has in a part's first line is refused, and nothing crashes") {
+  const Folder folder;
+  const std::string path = folder.at("map.part");
+  MapSpec spec;
+  spec.mapped = {index_of(AxisId::damping), kAxisCount};
+  spec.table[index_of(AxisId::damping)] = {"0.002"};
+  spec.stiffness_n_per_mm = {0.2, 1};
+  const std::string good = part_text({spec, {}, {}});
+  const std::pair<const char*, const char*> wrongs[] = {
+      {"\"map\":[2,17]", "\"map\":[3,17]"},     {"\"map\":[2,17]", "\"map\":[2,99]"},
+      {"\"map\":[2,17]", "\"map\":[2,2]"},      {"[\"0.002\"]", "[\"nan\"]"},
+      {"[\"0.002\"]", "[\"0.002\",\"0.001\"]"}, {"[0.2,1.0", "[1e308,1.0"},
+      {"\"seconds\":3", "\"seconds\":-1"}};
+  for (const auto& [was, becomes] : wrongs) {
+    CAPTURE(becomes);
+    const std::size_t at = good.find(was);
+    REQUIRE(at != std::string::npos);
+    std::ofstream(path) << std::string(good).replace(at, std::string(was).size(), becomes);
+    CHECK_THROWS_AS(static_cast<void>(read_part(path)), HilError);
+  }
 }

@@ -13,6 +13,7 @@
 #include "controller/stability/stable_gains.hpp"
 #include "controller/stability/wall_push.hpp"
 #include "shared/text/format.hpp"
+#include "shared/text/number.hpp"
 
 namespace kerf {
 namespace {
@@ -102,16 +103,16 @@ std::string law_words(const LoadedScene& scene, const GainMargin& margin) {
 std::string way_out(const LoadedScene& scene, const GainMargin& margin) {
   if (margin.highest_n_per_mm <= 0) {
     const double most = highest_damping(loop_of(scene)) / kSafeMargin;
-    if (has_law(scene)) return format("let it damp by at most %.3g N s/mm", most);
-    return format("use at most %.3g in force.damping_ns_per_mm", most);
+    if (has_law(scene)) return "let it damp by at most " + text_below(most, 3) + " N s/mm";
+    return "use at most " + text_below(most, 3) + " in force.damping_ns_per_mm";
   }
   const double safe = margin.deciding() * margin.stiffness_n_per_mm / kSafeMargin;
-  if (has_law(scene)) return format("let it rise by at most %.3g N/mm", safe);
+  if (has_law(scene)) return "let it rise by at most " + text_below(safe, 3) + " N/mm";
   if (!margin.friction_decides) {
-    return format("use at most %.3g in %s", safe, gain_key(scene).c_str());
+    return "use at most " + text_below(safe, 3) + " in " + gain_key(scene);
   }
-  return format("lower %s to %.3g times its value", gain_key(scene).c_str(),
-                safe / margin.stiffness_n_per_mm);
+  return "lower " + gain_key(scene) + " to " + text_below(safe / margin.stiffness_n_per_mm, 3) +
+         " times its value";
 }
 
 }  // namespace
@@ -156,9 +157,10 @@ std::string gain_warning(const LoadedScene& scene, const GainMargin& margin) {
   if (margin.deciding() >= kSafeMargin) return {};
   return format(
              "contact of %.3g N/mm and %.3g N s/mm has a stability margin of %.2f on a lightly "
-             "held %s at %d Hz: it may tremble; ",
+             "held %s at %d Hz: %s; ",
              margin.stiffness_n_per_mm, margin.damping_ns_per_mm, margin.deciding(),
-             device_word(scene).c_str(), scene.servo.rate_hz) +
+             device_word(scene).c_str(), scene.servo.rate_hz,
+             margin.deciding() < 1 ? "it is unstable and will swing" : "it may tremble") +
          way_out(scene, margin);
 }
 

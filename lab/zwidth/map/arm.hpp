@@ -6,6 +6,7 @@
 
 #include "controller/load/loaded_scene.hpp"
 #include "hil/hil_error.hpp"
+#include "lab/zwidth/map/effort.hpp"
 #include "lab/zwidth/map/subject.hpp"
 #include "lab/zwidth/map/swing.hpp"
 
@@ -36,10 +37,9 @@ class NotMet : public HilError {
 /// the servo's own account of its work; the first that is bad by both rules ends the run.
 ///
 /// The subject's delay counts in whole bus cycles of 125 us; encoder and limits are those of
-/// device and servo. Without a hand a spring of 0.2 N/mm pushes. Counts its ticks in
-/// `ticks`. Throws NotMet.
+/// device and servo. Without a hand a spring of 0.2 N/mm pushes. Throws NotMet, or Interrupted.
 [[nodiscard]] Swing hit_with_arm(const LoadedScene& scene, const Subject& subject,
                                  double stiffness_n_per_mm, double seconds, std::uint64_t seed,
-                                 std::uint64_t& ticks);
+                                 Effort& effort);
 
 }  // namespace kerf::zwidth

@@ -250,7 +250,8 @@ std::vector<double> stiffness_values(const std::string& text) {
   std::vector<double> values;
   const auto refuse = [&] {
     throw HilError("--stiffness: " + text +
-                   " are no rising values from 0.0001 to 127 N/mm; use such as 0.05:50:40 (from, "
+                   " are no rising values from 0.0001 to 127 N/mm, apart by seven digits; use such "
+                   "as 0.05:50:40 (from, "
                    "to, count) or 0.5,1,2");
   };
   if (const auto range = range_in(text); range && range->from > 0) {
@@ -268,6 +269,9 @@ std::vector<double> stiffness_values(const std::string& text) {
   if (values.empty() || values.front() < kLowest || values.back() > kHighest) refuse();
   // Seven digits: the same text, and so the same number, with every libm.
   for (double& value : values) value = *number_in(format("%.7g", value));
+  for (std::size_t i = 1; i < values.size(); ++i) {
+    if (!(values[i] > values[i - 1])) refuse();
+  }
   return values;
 }
 
@@ -307,8 +311,8 @@ Subject subject_of(const Assignment& values) {
   subject.damping_ns_per_mm = number(AxisId::damping);
   subject.estimator = law_choice(AxisId::estimator, LawKind::velocity, text(AxisId::estimator));
   if (subject.estimator.name == "difference") {
-    loop.velocity_filter_s = number(AxisId::filter) / 1000;
     fill_in(subject.estimator, "tau_ms", number(AxisId::filter));
+    loop.velocity_filter_s = subject.estimator.settings.front().second / 1000;  // its only one
   }
   const std::string law = text(AxisId::law);
   const auto word = std::ranges::find(kLawWords, law);

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "lab/zwidth/map/map.hpp"
 
+#include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <exception>
 #include <mutex>
+#include <numbers>
 #include <thread>
 #include <utility>
 
@@ -24,8 +26,8 @@ namespace {
 /// All cells of one column, each measured once.
 class ColumnRun {
  public:
-  ColumnRun(const MapSpec& spec, const Subject& subject, std::size_t index)
-      : spec_(spec), subject_(subject), index_(index) {
+  ColumnRun(const MapSpec& spec, const Subject& subject, Effort& effort)
+      : spec_(spec), subject_(subject), effort_(effort) {
     if (spec.arm) scene_ = walls_scene(subject);
   }
 
@@ -62,20 +64,18 @@ class ColumnRun {
     return found;
   }
 
-  [[nodiscard]] std::uint64_t ticks() const { return ticks_; }
-
  private:
-  /// Until one hit has shown the worst by both rules.
+  /// Until one hit has shown the worst by both rules. The same places in all columns, so that two
+  /// columns differ by their values alone, whatever else the map has.
   Swing measure(double stiffness) {
+    const double seconds = std::max(spec_.seconds, needed_seconds(subject_, stiffness));
     if (spec_.arm) {
-      const std::uint64_t seed = spec_.seed == 0 ? 0 : spec_.seed + index_;
-      return hit_with_arm(scene_, subject_, stiffness, spec_.seconds, seed, ticks_);
+      return hit_with_arm(scene_, subject_, stiffness, seconds, spec_.seed, effort_);
     }
     Swing worst;
     for (std::size_t hit = 0; hit < kHitsMmPerS.size(); ++hit) {
-      const std::uint64_t seed =
-          spec_.seed == 0 ? 0 : (spec_.seed << 32) + index_ * kHitsMmPerS.size() + hit;
-      worst.join(hit_one_axis(subject_, stiffness, kHitsMmPerS[hit], spec_.seconds, seed, ticks_));
+      const std::uint64_t seed = spec_.seed == 0 ? 0 : (spec_.seed << 32) + hit;
+      worst.join(hit_one_axis(subject_, stiffness, kHitsMmPerS[hit], seconds, seed, effort_));
       if (worst.swings && worst.active) break;
     }
     return worst;
@@ -83,13 +83,29 @@ class ColumnRun {
 
   const MapSpec& spec_;
   Subject subject_;
-  std::size_t index_;
+  Effort& effort_;
   LoadedScene scene_;  ///< of the whole arm
   std::map<double, Swing> known_;
-  std::uint64_t ticks_ = 0;
 };
 
+constexpr double kLongestS = 600;  // of a hit: a column of one axis is then some minutes
+
 }  // namespace
+
+double needed_seconds(const Subject& subject, double stiffness_n_per_mm) {
+  const SampledLoop& loop = subject.loop;
+  const double mass_kg = loop.mass_kg + loop.hand.mass_kg;
+  const double n_per_m = 1000 * (stiffness_n_per_mm + loop.hand.stiffness_n_per_mm);
+  const double period_s = 2 * std::numbers::pi * std::sqrt(mass_kg / n_per_m);
+  const double ns_per_m =
+      1000 * (loop.viscous_ns_per_mm + subject.damping_ns_per_mm + loop.hand.damping_ns_per_mm);
+  constexpr double kPeriods = 2;  // of a third: its travel is then from peak to peak
+  constexpr double kOfDecay = 0.01;
+  const double rate_per_s = ns_per_m / (2 * mass_kg);
+  const double slow_s =
+      rate_per_s > 0 ? -std::log(SwingMeter::kGoesOn) / (kOfDecay * rate_per_s) : 0;
+  return 3 * std::max(kPeriods * period_s, slow_s);
+}
 
 std::string impossible(const MapSpec& spec, const Subject& subject) {
   const double cycles = subject.loop.delay_s * kCyclesPerSecond;
@@ -100,24 +116,33 @@ std::string impossible(const MapSpec& spec, const Subject& subject) {
     return format("delay %g ms: an emulated device has whole steps of 0.125 ms, up to 8 ms",
                   subject.loop.delay_s * 1000);
   }
+  if (spec.arm && !ticks_fit) {
+    return format("rate %g Hz: an emulated device has rates that divide 8000 Hz, such as 4000",
+                  1 / subject.loop.period_s);
+  }
+  const double needed_s = needed_seconds(subject, spec.stiffness_n_per_mm.front());
+  if (needed_s > kLongestS) {
+    return format(
+        "mass %g kg: a hit would last %.3g s, above %g, to show whether its swings die out",
+        subject.loop.mass_kg, needed_s, kLongestS);
+  }
   const double most = highest_damping(subject.loop);
   if (subject.damping_ns_per_mm <= most) return {};
   return format("damping %g N s/mm is above %.4g, the most that is stable without a wall",
                 subject.damping_ns_per_mm, most);
 }
 
-Column measure_column(const MapSpec& spec, const Assignment& values, std::size_t index) {
+Column measure_column(const MapSpec& spec, const Assignment& values, Effort& effort) {
   const Subject subject = subject_of(values);
   Column column;
   if (!impossible(spec, subject).empty()) return column;
   try {
-    ColumnRun run(spec, subject, index);
+    ColumnRun run(spec, subject, effort);
     for (const double stiffness : spec.stiffness_n_per_mm) {
       column.cells.push_back(run.at(stiffness));
     }
     column.swing = run.crossing(&Swing::swings);
     column.energy = run.crossing(&Swing::active);
-    column.ticks = run.ticks();
   } catch (const NotMet&) {
     return {};
   } catch (const LawError& error) {
@@ -127,23 +152,24 @@ Column measure_column(const MapSpec& spec, const Assignment& values, std::size_t
 }
 
 void measure_columns(const MapSpec& spec, const std::vector<std::size_t>& wanted, int jobs,
-                     const std::function<bool(std::size_t index, Column column)>& done) {
+                     const std::atomic<bool>& stop, const ColumnDone& done) {
   const std::vector<Assignment> columns = spec.columns();
   std::atomic<std::size_t> next{0};
-  std::atomic<bool> stop{false};
   std::mutex lock;
   std::exception_ptr failure;
   const auto work = [&] {
     try {
       for (std::size_t i = next++; i < wanted.size() && !stop; i = next++) {
-        Column column = measure_column(spec, columns[wanted[i]], wanted[i]);
+        Effort effort(stop);
+        Column column = measure_column(spec, columns[wanted[i]], effort);
         const std::scoped_lock hold(lock);
-        if (!done(wanted[i], std::move(column))) stop = true;
+        done(wanted[i], std::move(column), effort.ticks());
       }
+    } catch (const Interrupted&) {  // what is done is kept
     } catch (...) {
       const std::scoped_lock hold(lock);
       failure = std::current_exception();
-      stop = true;
+      next = wanted.size();
     }
   };
   {

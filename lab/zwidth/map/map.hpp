@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -11,6 +12,7 @@
 #include <vector>
 
 #include "lab/zwidth/map/axes.hpp"
+#include "lab/zwidth/map/effort.hpp"
 #include "lab/zwidth/map/swing.hpp"
 
 namespace kerf::zwidth {
@@ -21,7 +23,7 @@ struct MapSpec {
   std::vector<double> stiffness_n_per_mm;
   AxisTable table;
   bool arm = false;    ///< the whole servo with an emulated device, else one axis
-  double seconds = 3;  ///< of each hit
+  double seconds = 3;  ///< of each hit, at least
   std::uint64_t seed = 1;
 
   [[nodiscard]] std::vector<Assignment> columns() const { return combinations(table); }
@@ -40,21 +42,29 @@ struct Crossing {
 struct Column {
   std::vector<Swing> cells;  ///< empty: it cannot exist, or the hand never met the wall
   Crossing swing, energy;
-  std::uint64_t ticks = 0;  ///< that it took, in this process
 };
 using Columns = std::map<std::size_t, Column>;
 
-/// Why a column cannot exist: its damping alone is beyond what any sampled wall may have, or the
-/// emulated device cannot have its delay; else empty.
+/// How long a hit has to last, s, so that its thirds tell a swing that dies out: two periods of the
+/// spring and the mass each; and where damping b takes the swing away, at the rate b/(2 m) without
+/// a wall and less and less up to the boundary, so long that the verdict's ratio puts the boundary
+/// within 1 % of b (S9 asks for 2). 0 for the latter where nothing damps: no boundary is near.
+[[nodiscard]] double needed_seconds(const Subject& subject, double stiffness_n_per_mm);
+
+/// Why a column cannot exist: its damping alone is beyond what any sampled wall may have, the
+/// emulated device cannot have its delay or rate, or a hit would last for more than ten minutes;
+/// else empty.
 [[nodiscard]] std::string impossible(const MapSpec& spec, const Subject& subject);
 
-/// The column of `values`, number `index` of the map.
-[[nodiscard]] Column measure_column(const MapSpec& spec, const Assignment& values,
-                                    std::size_t index);
+/// The column of `values`. Throws Interrupted.
+[[nodiscard]] Column measure_column(const MapSpec& spec, const Assignment& values, Effort& effort);
 
-/// Measures the columns of `wanted` on `jobs` threads. `done` is told of each as it comes, under a
-/// lock; where it returns false no further one begins. An exception of a thread is thrown here.
+/// Told of each column as it comes, under a lock, and of the ticks that it took.
+using ColumnDone = std::function<void(std::size_t index, Column column, std::uint64_t ticks)>;
+
+/// Measures the columns of `wanted` on `jobs` threads, until all are done or `stop` is set: a
+/// column that is not done then is lost. An exception of a thread is thrown here.
 void measure_columns(const MapSpec& spec, const std::vector<std::size_t>& wanted, int jobs,
-                     const std::function<bool(std::size_t index, Column column)>& done);
+                     const std::atomic<bool>& stop, const ColumnDone& done);
 
 }  // namespace kerf::zwidth

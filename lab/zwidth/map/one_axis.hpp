@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 
+#include "lab/zwidth/map/effort.hpp"
 #include "lab/zwidth/map/subject.hpp"
 #include "lab/zwidth/map/swing.hpp"
 
@@ -25,10 +26,9 @@ using OneAxisWatch = std::function<void(const OneAxisTick&)>;
 /// velocity window and force limits, in the subject's numbers.
 ///
 /// `seed` shifts the encoder's steps against the wall by a part of one; 0: an edge lies on it.
-/// Returns the verdict of `seconds`; counts its ticks in `ticks`. The same arguments give the same
-/// bits.
+/// Returns the verdict of `seconds`. The same arguments give the same bits. Throws Interrupted.
 [[nodiscard]] Swing hit_one_axis(const Subject& subject, double stiffness_n_per_mm,
                                  double hit_mm_per_s, double seconds, std::uint64_t seed,
-                                 std::uint64_t& ticks, const OneAxisWatch& watch = {});
+                                 Effort& effort, const OneAxisWatch& watch = {});
 
 }  // namespace kerf::zwidth

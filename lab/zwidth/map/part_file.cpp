@@ -2,17 +2,25 @@
 #include "lab/zwidth/map/part_file.hpp"
 
 #include <algorithm>
+#include <cerrno>
 #include <filesystem>
+#include <fstream>
 #include <iterator>
-#include <optional>
 #include <sstream>
+#include <system_error>
 #include <utility>
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include "hil/hil_error.hpp"
 #include "shared/numeric/fnv1a.hpp"
 #include "shared/posix/hex64.hpp"
 #include "shared/posix/new_file.hpp"
 #include "shared/text/json.hpp"
+#include "shared/text/number.hpp"
 
 namespace kerf::zwidth {
 namespace {
@@ -96,6 +104,45 @@ void take_head(const std::string& line, Part& part) {
   spec.seed = json.at("seed").get<std::uint64_t>();
 }
 
+/// Bytes up to the end of the last whole line.
+off_t whole_lines(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  const std::string text(std::istreambuf_iterator<char>(file), {});
+  return static_cast<off_t>(text.rfind('\n') + 1);  // none: 0
+}
+
+/// A pipe would wait for ever, and /dev/null keeps nothing.
+void check_is_file(const std::string& path) {
+  std::error_code error;
+  if (!std::filesystem::exists(path, error) || std::filesystem::is_regular_file(path, error))
+    return;
+  throw HilError(path + ": is no file; name one that keeps a part of a map");
+}
+
+/// What of a head no map has, whoever wrote it: as the options refuse it.
+void check_spec(const MapSpec& spec) {
+  const auto joined = [](const auto& values, const auto& text_of) {
+    std::string text;
+    for (const auto& value : values) text += (text.empty() ? "" : ",") + text_of(value);
+    return text;
+  };
+  for (std::size_t i = 0; i < kAxisCount; ++i) {
+    if (spec.table[i].empty()) continue;
+    const std::string text = joined(spec.table[i], [](const std::string& value) { return value; });
+    static_cast<void>(axis_values(static_cast<AxisId>(i), text));
+  }
+  static_cast<void>(stiffness_values(joined(spec.stiffness_n_per_mm, number_text)));
+  for (const std::size_t axis : spec.mapped) {
+    if (axis < kAxisCount ? spec.table[axis].empty() : axis > kAxisCount) {
+      throw HilError("--map: an axis without values");
+    }
+  }
+  if (spec.mapped[0] == spec.mapped[1]) throw HilError("--map: the same axis twice");
+  if (!(spec.seconds >= 0.1 && spec.seconds <= 60)) {
+    throw HilError("--seconds: not within 0.1 and 60");
+  }
+}
+
 /// The same map, whatever the shard and the program.
 std::string map_of(const Part& part) {
   return head_of({part.spec, {}, {}});
@@ -141,6 +188,7 @@ std::string part_text(const Part& part) {
 }
 
 Part read_part(const std::string& path) {
+  check_is_file(path);
   std::ifstream in(path);
   if (!in) throw HilError(path + ": cannot be read; name a part of a map (--part)");
   Part part;
@@ -164,12 +212,12 @@ Part read_part(const std::string& path) {
     throw HilError(path + ": shard " + shard_text(part.shard) +
                    " is no part of a whole; remove the file to begin anew");
   }
-  const std::vector<Assignment> columns = part.spec.columns();
-  try {  // a law that another program has
-    for (const Assignment& values : columns) static_cast<void>(subject_of(values));
+  try {  // also a law that another program has
+    check_spec(part.spec);
   } catch (const HilError& error) {
     throw HilError(path + ": " + error.what());
   }
+  const std::vector<Assignment> columns = part.spec.columns();
   for (const auto& [index, column] : part.columns) {
     if (index >= columns.size() || !part.shard.has(index)) {
       throw HilError(path + ": has columns that its shard " + shard_text(part.shard) +
@@ -223,37 +271,61 @@ Part merge_parts(const std::vector<std::string>& paths) {
 PartWriter::PartWriter(std::string path, const MapSpec& spec, const Shard& shard)
     : path_(std::move(path)), part_{spec, shard, {}} {
   if (path_.empty()) return;
-  std::error_code error;
-  if (std::filesystem::exists(path_, error) && !is_stream(path_)) {
+  check_is_file(path_);
+  fd_ = open(path_.c_str(), O_RDWR | O_CREAT | O_APPEND | O_CLOEXEC, 0666);
+  if (fd_ < 0) refuse(std::generic_category().message(errno) + "; name another file");
+  struct stat held {};
+  struct stat there {};
+  // A run that ended in between has put a new file in the place of the one that is locked.
+  if (flock(fd_, LOCK_EX | LOCK_NB) != 0 || fstat(fd_, &held) != 0 ||
+      stat(path_.c_str(), &there) != 0 || held.st_ino != there.st_ino) {
+    refuse("another run is at work on it; wait for that, or name another file");
+  }
+  if (held.st_size == 0) {
+    write(head_of(part_) + "\n");
+    return;
+  }
+  try {
     Part found = read_part(path_);
     if (map_of(found) == map_of(part_) && found.program != part_.program) {
-      throw HilError("--part " + path_ +
-                     ": another program measured it, which may move other bits; name another " +
-                     "file, or remove it to begin anew");
+      refuse(
+          "another program measured it, which may move other bits; name another file, or "
+          "remove it to begin anew");
     }
     if (head_of(found) != head_of(part_)) {
-      throw HilError("--part " + path_ +
-                     ": has another map or shard; name another file, or remove it to begin anew");
+      refuse("has another map or shard; name another file, or remove it to begin anew");
     }
     part_.columns = std::move(found.columns);
+  } catch (...) {
+    close(std::exchange(fd_, -1));  // a constructor that throws has no destructor
+    throw;
   }
-  // Also takes off a last line that is not whole.
-  write_new_file(path_, part_text(part_));
-  out_.open(path_, std::ios::app);
-  if (!out_) throw HilError("--part " + path_ + ": cannot be written; name another file");
+  // Takes off a last line that is not whole.
+  if (ftruncate(fd_, whole_lines(path_)) != 0) refuse("cannot be written; name another file");
+}
+
+PartWriter::~PartWriter() {
+  if (fd_ >= 0) close(fd_);
+}
+
+void PartWriter::refuse(const std::string& why) {
+  if (fd_ >= 0) close(std::exchange(fd_, -1));
+  throw HilError("--part " + path_ + ": " + why);
+}
+
+void PartWriter::write(const std::string& text) {
+  if (::write(fd_, text.data(), text.size()) != static_cast<ssize_t>(text.size())) {
+    refuse("cannot be written; make room and run again");
+  }
 }
 
 void PartWriter::add(std::size_t index, Column column) {
-  if (!path_.empty()) {
-    out_ << line_of(index, column) << std::endl;
-    if (!out_) throw HilError("--part " + path_ + ": cannot be written; make room and run again");
-  }
+  if (!path_.empty()) write(line_of(index, column) + "\n");
   part_.columns[index] = std::move(column);
 }
 
 void PartWriter::finish() {
   if (path_.empty()) return;
-  out_.close();
   write_new_file(path_, part_text(part_));
 }
 

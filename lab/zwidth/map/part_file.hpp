@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstddef>
-#include <fstream>
 #include <string>
 #include <vector>
 
@@ -46,8 +45,12 @@ struct Part {
 class PartWriter {
  public:
   /// An empty path: nothing is written, and nothing was there. Throws HilError where the file has
-  /// another map or is another program's, and where it cannot be written.
+  /// another map or is another program's, where another run is at work on it, and where it cannot
+  /// be written.
   PartWriter(std::string path, const MapSpec& spec, const Shard& shard);
+  ~PartWriter();
+  PartWriter(const PartWriter&) = delete;
+  PartWriter& operator=(const PartWriter&) = delete;
 
   [[nodiscard]] const Columns& columns() const { return part_.columns; }
   void add(std::size_t index, Column column);
@@ -55,9 +58,12 @@ class PartWriter {
   void finish();
 
  private:
+  void write(const std::string& text);
+  [[noreturn]] void refuse(const std::string& why);
+
   std::string path_;
   Part part_;
-  std::ofstream out_;
+  int fd_ = -1;  ///< locked
 };
 
 }  // namespace kerf::zwidth

@@ -34,6 +34,8 @@ struct Swing {
 /// Follows one run of a known number of ticks.
 class SwingMeter {
  public:
+  static constexpr double kGoesOn = 0.97;  ///< travel of a third over that of the one before
+
   SwingMeter(std::int64_t ticks, double step_mm, double push_n) noexcept
       : ticks_(ticks), least_mm_(std::max(3 * step_mm, kLeastMm)), least_mj_(least_mm_ * push_n) {}
 
@@ -58,8 +60,8 @@ class SwingMeter {
     Swing swing = rest();
     swing.travel_mm = last;
     swing.given_mj = thirds_[2].given_mj - thirds_[1].given_mj;
-    swing.swings = last > least_mm_ && last >= 0.97 * before;
-    swing.active = swing.given_mj > least_mj_ && swing.given_mj >= 0.94 * gave;
+    swing.swings = last > least_mm_ && last >= kGoesOn * before;
+    swing.active = swing.given_mj > least_mj_ && swing.given_mj >= kGoesOn * kGoesOn * gave;
     return swing;
   }
 

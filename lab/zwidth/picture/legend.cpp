@@ -26,11 +26,10 @@ std::string in_lines(std::string text) {
 
 }  // namespace
 
-std::string foot_of(const Part& part) {
-  Assignment first = part.spec.columns().front();
+std::string foot_of(const MapSpec& spec, AxisId varies_too) {
+  const Assignment first = spec.columns().front();
   const auto varies = [&](AxisId axis) {
-    const std::size_t i = index_of(axis);
-    return part.spec.table[i].size() > 1;
+    return axis == varies_too || spec.table[index_of(axis)].size() > 1;
   };
   const auto say = [&](AxisId axis, const char* before, const char* after) {
     return varies(axis) ? std::string() : before + value_of(first, axis) + after + ", ";
@@ -55,18 +54,22 @@ std::string foot_of(const Part& part) {
   text += own(AxisId::stabiliser, "none", "stabiliser ", "") +
           own(AxisId::filter, "0", "low-pass ", " ms");
   if (!loops) text += own(AxisId::limits, "on", "limits ", "");
-  if (part.spec.arm) text += own(AxisId::mode, "0", "mode ", " Hz");
+  if (spec.arm) text += own(AxisId::mode, "0", "mode ", " Hz");
   text += say(AxisId::rate, "", " Hz") + say(AxisId::delay, "delay ", " periods") +
           say(AxisId::damping, "B ", " N s/mm") + say(AxisId::hand, "hand ", "");
-  return in_lines(text + (part.spec.arm ? "whole arm, " : "one axis, ") +
-                  "hits: a push, 50 and 200 mm/s, " + (part.spec.arm ? "a slide, a corner, " : "") +
-                  number_text(part.spec.seconds) + " s each, seed " +
-                  std::to_string(part.spec.seed));
+  return in_lines(text + (spec.arm ? "whole arm, " : "one axis, ") +
+                  "hits: a push, 50 and 200 mm/s, " + (spec.arm ? "a slide, a corner, " : "") +
+                  number_text(spec.seconds) + " s each, seed " + std::to_string(spec.seed));
+}
+
+std::string foot_of(const MapSpec& spec) {
+  constexpr auto kNone = static_cast<AxisId>(kAxisCount);
+  return foot_of(spec, kNone);
 }
 
 void draw_legend(std::ostream& script, const Part& part, bool verdicts, const PanelLayout& layout) {
   const auto line = [&](int row) { return (layout.foot - 30.0 - 24 * row) / layout.height; };
-  script << "set label \"" << foot_of(part) << "\" at screen 0.02, screen " << line(4)
+  script << "set label \"" << foot_of(part.spec) << "\" at screen 0.02, screen " << line(4)
          << " left noenhanced font ',11' textcolor rgb '#555555'\n";
   struct Item {
     const char* text;

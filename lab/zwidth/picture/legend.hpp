@@ -11,8 +11,10 @@ namespace kerf::zwidth {
 
 inline constexpr int kLegendHeight = 150;  ///< pixels: the foot of a map's picture
 
-/// What is the same in all panels: the foot's last line.
-[[nodiscard]] std::string foot_of(const Part& part);
+/// What is the same in all panels: the foot's last line. `varies_too`: an axis that has one value
+/// in the map and others in the picture.
+[[nodiscard]] std::string foot_of(const MapSpec& spec, AxisId varies_too);
+[[nodiscard]] std::string foot_of(const MapSpec& spec);
 
 /// Under the panels: what colours and lines mean, drawn with the next of them. `verdicts`: the
 /// panels show those of each cell, else its highest stiffness.

@@ -10,6 +10,7 @@
 
 #include "hil/hil_error.hpp"
 #include "lab/zwidth/map/one_axis.hpp"
+#include "lab/zwidth/picture/legend.hpp"
 #include "lab/zwidth/picture/panels.hpp"
 #include "shared/text/format.hpp"
 #include "shared/text/number.hpp"
@@ -22,7 +23,7 @@ std::pair<double, double> cell_in(const std::string& text) {
   const auto stiffness = number_in(text.substr(0, colon));
   const auto damping =
       colon == std::string::npos ? std::nullopt : number_in(text.substr(colon + 1));
-  if (!stiffness || !damping || !(*stiffness > 0) || *stiffness > 127 || *damping < 0 ||
+  if (!stiffness || !damping || !(*stiffness >= 1e-4) || *stiffness > 127 || *damping < 0 ||
       *damping > 2) {
     throw HilError("--cells: " + text +
                    " is no cell; give stiffness:damping in N/mm and N s/mm, such as 2:0.002");
@@ -97,20 +98,31 @@ std::string portraits_of(const MapSpec& spec, const std::vector<std::string>& ce
                    std::to_string(spec.table[axis].size()) + " values; give it one");
   }
   std::vector<std::pair<double, double>> places;
-  for (const std::string& cell : cells) places.push_back(cell_in(cell));
+  Subject subject = subject_of(spec.columns().front());
+  for (const std::string& cell : cells) {
+    const auto place = cell_in(cell);
+    if (std::ranges::find(places, place) != places.end()) {
+      throw HilError("--cells: " + cell + " stands there twice; name each once");
+    }
+    subject.damping_ns_per_mm = place.second;
+    const std::string why = impossible(spec, subject);
+    if (!why.empty()) throw HilError("--cells: " + cell + ": " + why + "; take another");
+    places.push_back(place);
+  }
   std::ostringstream script;
-  constexpr int kFoot = 20;
-  PanelLayout(places.size(), kFoot, 0).begin(script);
+  const PanelLayout layout(places.size(), 50, 0);
+  layout.begin(script);
+  script << "set label 1 \"" << foot_of(spec, AxisId::damping) << "\" at screen 0.02, screen "
+         << 30.0 / layout.height << " left noenhanced font ',11' textcolor rgb '#555555'\n";
   script << "set xlabel 'place of the tip, wall at 0 (mm)'\nset ylabel 'speed (mm/s)'\n"
             "set grid back linecolor rgb '#dddddd'\nset key right top samplen 2\n";
-  Subject subject = subject_of(spec.columns().front());
   for (const auto& [stiffness, damping] : places) {
     subject.damping_ns_per_mm = damping;
     Curves curves;
-    std::uint64_t ticks = 0;
+    Effort effort;
     for (const double speed : kHitsMmPerS) {
       Curve& curve = curves.emplace_back();
-      static_cast<void>(hit_one_axis(subject, stiffness, speed, spec.seconds, spec.seed, ticks,
+      static_cast<void>(hit_one_axis(subject, stiffness, speed, spec.seconds, spec.seed, effort,
                                      [&](const OneAxisTick& tick) { curve.push_back(tick); }));
     }
     draw(script, format("K %g N/mm, B %g N s/mm", stiffness, damping), curves);

@@ -42,6 +42,6 @@ def page(root, programs):
 | code | when |
 |---|---|
 | 77 | the machine lacks what a command or a test needs, such as network namespaces for `./kerf demo --two-machines` |
-| 130 | `./kerf demo` was interrupted (Ctrl-C), after the motors went off and the report was written |
+| 130 | `./kerf demo` was interrupted (Ctrl-C), after the motors went off and the report was written; so was `kerf-lab sweep` or `kerf-lab zwidth`, and what was done is kept |
 | 143 | it was told to end |
 """
