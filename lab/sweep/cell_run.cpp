@@ -129,6 +129,12 @@ const std::vector<std::string>& result_columns() {
   return names;
 }
 
+std::string emulator_refusal(const CellJob& job, const std::filesystem::path& folder,
+                             const std::atomic<bool>& stop) {
+  Child described(emulator(job, {"--describe"}), folder / "describe");
+  return end_of(described, stop, kGrace).value_or(0) == 0 ? "" : described.last_line();
+}
+
 std::optional<CellResult> run_cell(const CellJob& job, const std::filesystem::path& folder,
                                    const std::atomic<bool>& stop) {
   const auto at = [&](const char* name) { return (folder / name).string(); };

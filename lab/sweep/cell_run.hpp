@@ -31,6 +31,11 @@ struct CellResult {
 
 [[nodiscard]] const std::vector<std::string>& result_columns();
 
+/// The one line with which the emulator refuses the options of `job`; empty: it takes them. Its
+/// files go to `folder`, which exists.
+[[nodiscard]] std::string emulator_refusal(const CellJob& job, const std::filesystem::path& folder,
+                                           const std::atomic<bool>& stop);
+
 /// Runs `job` with its files in `folder`, which exists. Nothing where `stop` came between. Throws
 /// `HilError` where the programs cannot be started.
 [[nodiscard]] std::optional<CellResult> run_cell(const CellJob& job,

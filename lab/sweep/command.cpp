@@ -137,6 +137,18 @@ Scene first_scene(const Plan& plan) {
   std::rethrow_exception(first_refusal);
 }
 
+/// Refuses options of the emulator that neither the first nor the last run can start with: the ends
+/// of each axis.
+void check_emulator(const Plan& plan, const std::atomic<bool>& stop) {
+  if (std::ranges::none_of(plan.axes, &Axis::of_emulator)) return;
+  const WorkFolder folder;
+  const std::string first = emulator_refusal(plan.job(0, ""), folder.path(), stop);
+  if (first.empty()) return;
+  if (!emulator_refusal(plan.job(runs_of(plan.axes) - 1, ""), folder.path(), stop).empty()) {
+    throw HilError("--set emulator: " + first);
+  }
+}
+
 /// Runs what the table lacks, on `jobs` threads; returns how many runs failed. Throws what a thread
 /// threw, once all have ended.
 class Crew {
@@ -258,6 +270,7 @@ int Command::run(std::ostream& out) const {
       throw HilError(program_beside(name) + ": is not there; build it, or install all of kerf");
     }
   }
+  check_emulator(plan, catch_stop_signals());
   Table table(out_, plan.line(scene.hand_script));
   const std::size_t cores = std::max(1U, std::thread::hardware_concurrency());
   Crew crew(plan, table, catch_stop_signals());

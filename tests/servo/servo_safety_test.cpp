@@ -237,13 +237,16 @@ TEST_CASE("whatever counters and pots read, the tool keeps its size and the forc
       static_cast<void>(armed.settled(0, 0.05, 0));
       kerf::DeviceReport report = armed.arm.at(0, 0.05, 0);
       std::uint32_t state = 1;
-      const auto next = [&state] { return (state = state * 1664525 + 1013904223) >> 16; };
+      const auto next = [&state] {
+        state = state * 1664525 + 1013904223;
+        return static_cast<int>(state >> 16);
+      };
       for (int tick = 0; tick < 6000; ++tick) {
         // Some near the wall, some anywhere that 16 bits reach.
         if (tick % 8 == 0) report = armed.arm.at(0, 0.05, 0);
-        const std::size_t joint = next() % 3;
+        const auto joint = static_cast<std::size_t>(next() % 3);
         report.encoder[joint] = static_cast<std::int16_t>(
-            report.encoder[joint] + (tick % 8 < 4 ? static_cast<int>(next() % 64) - 32 : next()));
+            report.encoder[joint] + (tick % 8 < 4 ? next() % 64 - 32 : next()));
         report.wiper_a[joint] = static_cast<std::uint16_t>(next());
         report.wiper_b[joint] = static_cast<std::uint16_t>(next());
         const ServoOutput out = armed.servo->step(report);
