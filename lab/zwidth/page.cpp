@@ -68,10 +68,9 @@ parallel, and as a job array of Slurm (`examples/cluster/zwidth.sbatch`):
 constexpr const char* kDevicesText =
     R"(The lower of both rules, in N/mm, at two dampings: the default, and the one that carries most on the device's map.
 *Linear, exact* is the boundary without friction and encoder steps; the emulated firm hand is 0.1 kg, 0.005 N s/mm,
-0.5 N/mm; in *whole arm* a spring of 0.2 N/mm pushes. Each is the least of three
-seeds. The recommended K is the least of the row over 1.5. The delay of a
-real device has not been measured; take two periods until it is. Take no more damping than the map bears: beyond its
-hump the lag of the velocity and the encoder's steps drive the wall.
+0.5 N/mm; in *whole arm* a spring of 0.2 N/mm pushes. Each measured K is the least of three seeds, and the recommended
+one the least of the row over 1.5. The delay of a real device has not been measured; take two periods until it is. Take
+no more damping than the map bears: beyond its hump the lag of the velocity and the encoder's steps drive the wall.
 
 The devices here are the emulator's. The check of a scene (docs/devices.md, "Gains") takes less viscous damping,
 0.0002 N s/mm, and a delay of 2 ms at every rate, so what it calls safe is lower: it speaks for units that nobody has
