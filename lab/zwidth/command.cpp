@@ -68,10 +68,10 @@ Command::Command(Arguments& program)
       "Exit codes: 0 fine, 2 bad input or set-up; 130 interrupted, and --part has what is done.");
 }
 
-/// The program's own laws have a trial before a map runs them: one that loops would never end it.
-/// What is no number, or allocates, is told; the map bears both.
+/// The program's own laws have a trial at both ends of the stiffness before a map runs them: one
+/// that loops would never end it. What is no number, or allocates, is told; the map bears both.
 void Command::try_laws(const MapSpec& map, std::ostream& out) {
-  std::set<std::string> tried;
+  std::set<std::string> tried, told;
   for (const Assignment& values : map.columns()) {
     std::string laws;
     for (const AxisId axis :
@@ -80,16 +80,21 @@ void Command::try_laws(const MapSpec& map, std::ostream& out) {
     }
     if (!tried.insert(laws).second) continue;
     const Subject subject = subject_of(values);
-    LoadedScene scene;
-    scene.path = "zwidth";
-    scene.force.law = force_law_at(subject, map.stiffness_n_per_mm.front());
-    scene.force.stabiliser = subject.stabiliser;
-    scene.servo.velocity = subject.estimator;
-    scene.servo.numeric = subject.numeric;
-    try {
-      for (const std::string& flaw : try_own_laws(scene)) out << flaw << '\n';
-    } catch (const std::runtime_error& error) {
-      throw HilError(error.what());
+    for (const double stiffness : {map.stiffness_n_per_mm.front(), map.stiffness_n_per_mm.back()}) {
+      LoadedScene scene;
+      scene.path = "zwidth";
+      scene.force.law = force_law_at(subject, stiffness);
+      scene.force.stabiliser = subject.stabiliser;
+      scene.servo.velocity = subject.estimator;
+      scene.servo.numeric = subject.numeric;
+      try {
+        for (const std::string& flaw : try_own_laws(scene)) {
+          if (told.insert(flaw).second) out << flaw << '\n';
+        }
+      } catch (const std::runtime_error& error) {
+        throw HilError(error.what());
+      }
+      if (subject.force_law.name.empty()) break;  // the others know no stiffness
     }
   }
 }

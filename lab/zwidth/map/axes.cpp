@@ -51,8 +51,8 @@ constexpr std::array<AxisKind, kAxisCount> kKinds{{
 }};
 
 [[noreturn]] void fail(const AxisKind& kind, const std::string& text, const std::string& way_out) {
-  throw HilError(std::string("--") + kind.name + ": " + (text.empty() ? "no value" : text) + " " +
-                 way_out);
+  throw HilError(std::string("--") + kind.name + ": " + (text.empty() ? "an empty value" : text) +
+                 " " + way_out);
 }
 
 std::vector<std::string> split(const std::string& text, char at) {
@@ -130,8 +130,10 @@ LawChoice law_choice(AxisId axis, LawKind kind, const std::string& text) {
       refuse(": has no setting stiffness_n_per_mm, which a map varies; give it one");
     }
   } catch (const LawError& error) {
-    throw HilError(std::string("--") + kKinds[index_of(axis)].name + ": " + choice.name +
-                   error.what());
+    throw HilError(
+        std::string("--") + kKinds[index_of(axis)].name + ": " + choice.name + error.what() +
+        (kind == LawKind::force ? "; or take coupling, linear or two_sided, which have no settings"
+                                : ""));
   }
   return choice;
 }
@@ -167,7 +169,8 @@ void check(AxisId axis, const std::string& value) {
       fail(kind, value,
            "is no number from " + number_text(kind.lowest) + " to " + number_text(kind.highest) +
                (*kind.unit ? std::string(" ") + kind.unit : "") +
-               "; give one, a list (0,1,2) or a range (0:3:4: from, to, count)");
+               "; give one, a list (0,1,2) or a range (0:3:4: from, to, count up to " +
+               std::to_string(kMostValues) + ")");
     }
   }
 }
