@@ -14,6 +14,7 @@
 
 #include "controller/load/loaded_scene.hpp"
 #include "controller/plan/compile.hpp"
+#include "controller/plan/cost/work_budget.hpp"
 #include "controller/scene/scene_error.hpp"
 #include "controller/tool/tool_shapes.hpp"
 #include "lab/rig/fake_arm.hpp"
@@ -175,7 +176,10 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if (!make_scene(in, scene)) return 0;
   std::unique_ptr<kerf::CompiledScene> servo;
   try {
-    servo = kerf::compile(scene);
+    servo = kerf::plan_scene(scene);
+    // As the controller refuses it, before any memory of its volumes is taken.
+    if (!kerf::over_budget(scene, servo->costs()).empty()) return 0;
+    servo->take(scene);
   } catch (const kerf::SceneError&) {
     return 0;
   }
