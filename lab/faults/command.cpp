@@ -14,12 +14,10 @@
 
 #include "controller/load/scene_load.hpp"
 #include "hil/devmodel/bus_cycle.hpp"
-#include "hil/devmodel/falcon_model.hpp"
-#include "hil/devmodel/omni_model.hpp"
-#include "hil/devmodel/wooden_model.hpp"
 #include "hil/hil_error.hpp"
 #include "hil/script/hand_script_file.hpp"
 #include "lab/rig/lab_run.hpp"
+#include "lab/rig/torque_scale.hpp"
 #include "shared/posix/shipped_file.hpp"
 
 namespace kerf::faults {
@@ -28,19 +26,6 @@ namespace {
 constexpr std::array<int, 5> kAllRatesHz{250, 1000, 2000, 4000, 8000};
 const std::vector<std::string> kModelWords{"paper", "proxy"};              // as in ForceModel
 const std::vector<std::string> kNumericWords{"fixed", "float", "double"};  // as in NumericKind
-
-/// Of the emulated unit.
-std::array<double, 3> torque_scale_of(Personality personality) {
-  switch (personality) {
-    case Personality::falcon:
-      return FalconParams().torque_scale();
-    case Personality::woodenhaptics:
-      return WoodenParams().torque_scale();
-    case Personality::omni:
-      break;
-  }
-  return OmniParams().torque_scale();
-}
 
 std::vector<NamedScript> scripts_in(const std::string& place) {
   std::vector<NamedScript> scripts;

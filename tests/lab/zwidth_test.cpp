@@ -118,6 +118,14 @@ Column column_of(const std::string& stiffness, double seconds,
   return measure_column(spec, values, effort);
 }
 
+MapSpec two_cells() {
+  MapSpec spec;
+  spec.mapped = {index_of(AxisId::damping), kAxisCount};
+  spec.table[index_of(AxisId::damping)] = {"0.002"};
+  spec.stiffness_n_per_mm = {0.2, 1};
+  return spec;
+}
+
 }  // namespace
 
 KERF_REGISTER_FORCE_LAW(BareSpring)
@@ -495,10 +503,7 @@ TEST_CASE("a column has the same bits in every map that has it") {
 TEST_CASE("a part belongs to one run at a time, and a hit ends with the word") {
   const Folder folder;
   const std::string path = folder.at("map.part");
-  MapSpec spec;
-  spec.mapped = {index_of(AxisId::damping), kAxisCount};
-  spec.table[index_of(AxisId::damping)] = {"0.002"};
-  spec.stiffness_n_per_mm = {0.2, 1};
+  const MapSpec spec = two_cells();
   {
     const PartWriter first(path, spec, {});
     try {
@@ -520,10 +525,7 @@ TEST_CASE("a part belongs to one run at a time, and a hit ends with the word") {
 TEST_CASE("what no map has in a part's first line is refused, and nothing crashes") {
   const Folder folder;
   const std::string path = folder.at("map.part");
-  MapSpec spec;
-  spec.mapped = {index_of(AxisId::damping), kAxisCount};
-  spec.table[index_of(AxisId::damping)] = {"0.002"};
-  spec.stiffness_n_per_mm = {0.2, 1};
+  const MapSpec spec = two_cells();
   const std::string good = part_text({spec, {}, {}});
   const std::pair<const char*, const char*> wrongs[] = {
       {"\"map\":[2,17]", "\"map\":[3,17]"},     {"\"map\":[2,17]", "\"map\":[2,99]"},

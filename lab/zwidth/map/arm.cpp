@@ -20,6 +20,7 @@
 #include "hil/hil_error.hpp"
 #include "lab/rig/bench_scene.hpp"
 #include "lab/rig/direct_port.hpp"
+#include "lab/rig/torque_scale.hpp"
 #include "lab/zwidth/map/one_axis.hpp"
 #include "shared/numeric/vec3.hpp"
 
@@ -70,18 +71,6 @@ Emulator emulator_of(const Subject& subject, const HandScript& hand) {
       break;
   }
   return {with_plant(OmniParams{}, subject), hand};
-}
-
-std::array<double, 3> torque_scale_of(Personality personality) {
-  switch (personality) {
-    case Personality::falcon:
-      return FalconParams().torque_scale();
-    case Personality::woodenhaptics:
-      return WoodenParams().torque_scale();
-    case Personality::omni:
-      break;
-  }
-  return OmniParams().torque_scale();
 }
 
 /// One way of meeting a wall; device mm, of the tool's middle. Judged along `normal`.
