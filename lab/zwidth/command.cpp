@@ -131,6 +131,12 @@ MapSpec Command::spec() const {
     if (!texts[i].empty()) spec.table[i] = axis_values(static_cast<AxisId>(i), texts[i]);
   }
   for (const std::string& law : spec.table[index_of(AxisId::law)]) {
+    if (!arm_ && law == "paper") {
+      throw HilError("--law: paper is a force of the whole arm; add --arm, or leave it out");
+    }
+    if (law == "paper" && spec.table[index_of(AxisId::damping)] != AxisValues{"0"}) {
+      throw HilError("--law: paper has no damping; add --damping 0");
+    }
     if (!arm_ || (law != "linear" && law != "two_sided")) continue;
     throw HilError("--law: " + law + " is a wall of one axis alone; leave it or --arm out");
   }

@@ -329,6 +329,8 @@ TEST_CASE("axes that mean nothing are refused in one line; columns that cannot e
                            "--stiffness 1,1.00000001",
                            "--estimator difference/tau_ms=5 --filter 5",
                            "--part /dev/null",
+                           "--law paper --damping 0",
+                           "--arm --law paper",
                            "--page /dev/null --cells 1:0.002",
                            "--page /dev/null --shard 1/2",
                            "--portraits /dev/null --cells 1:0.002 --damping 0.01",
@@ -456,6 +458,18 @@ TEST_CASE("each cell tells the lowest energy of its port, which the passivity co
   }
   CHECK(off.front().port_minimum_mj == 0);
   CHECK(off.back().port_minimum_mj < -50);
+}
+
+TEST_CASE("the paper's force has its map, with the whole arm") {
+  Subject subject = subject_of({});
+  subject.law = Law::paper;
+  subject.damping_ns_per_mm = 0;
+  subject.loop.delay_s = 0;
+  const LoadedScene scene = walls_scene(subject);
+  CHECK(scene.force.model == ForceModel::paper);
+  Effort effort;
+  CHECK_FALSE(hit_with_arm(scene, subject, 0.5, 0.5, 1, effort).swings);
+  CHECK(hit_with_arm(scene, subject, 60, 0.5, 1, effort).swings);
 }
 
 TEST_CASE("behind a delay the arm's port gives what its motors did, not what the servo booked") {

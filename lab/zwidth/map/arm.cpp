@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "controller/device/driver/device_driver.hpp"
+#include "controller/load/scene_load.hpp"
 #include "controller/plan/compile.hpp"
 #include "controller/tool/tool_shapes.hpp"
 #include "hil/devmodel/bus_cycle.hpp"
@@ -217,6 +218,7 @@ LoadedScene walls_scene(const Subject& subject) {
   scene.cut.model = CutModel::none;
   scene.device.personality = subject.device;
   scene.device.torque_scale = torque_scale_of(subject.device);
+  if (subject.law == Law::paper) scene.force.model = ForceModel::paper;
   scene.force.damping_ns_per_mm = subject.damping_ns_per_mm;
   scene.force.stabiliser = subject.stabiliser;
   scene.limits.continuous_force_n = scene.limits.force_n;  // the motors stay cool
@@ -230,6 +232,10 @@ Swing hit_with_arm(const LoadedScene& scene, const Subject& subject, double stif
                    double seconds, std::uint64_t seed, Effort& effort) {
   LoadedScene own = scene;
   own.force.stiffness_n_per_mm = stiffness_n_per_mm;
+  if (subject.law == Law::paper) {
+    own.force.p0_n_per_mm2 = 1;
+    own.force.p0_n_per_mm2 = stiffness_n_per_mm / device_stiffness_n_per_mm(own);
+  }
   own.force.law = force_law_at(subject, stiffness_n_per_mm);
   const std::array<ArmHit, kArmHits> hits = hits_of(subject, seed);
   Rig rig(std::move(own), subject, script_of(hits, seconds));

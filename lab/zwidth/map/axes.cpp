@@ -41,9 +41,9 @@ constexpr std::array<AxisKind, kAxisCount> kKinds{{
     {"mode", "Hz", "0", 0, 4000, "", "structural mode, of the whole arm alone (--arm)"},
     {"numeric", "", "", 0, 0, "fixed float double", "numbers of the wall"},
     {"law", "", "", 0, 0, "",
-     "force of the wall: coupling (kerf's), linear (never pulls), two_sided, or one of your own "
-     "with a "
-     "setting stiffness_n_per_mm"},
+     "force of the wall: coupling (kerf's), linear (never pulls), two_sided, paper (--arm: K sets "
+     "its "
+     "p0), or one of your own with a setting stiffness_n_per_mm"},
     {"stabiliser", "", "none", 0, 0, "",
      "none, passivity, energy_bounding or one of your own; settings of a law as "
      "NAME/setting=value/..."},
@@ -105,7 +105,7 @@ std::optional<SampledHand> hand_of(const std::string& text) {
 }
 
 /// The walls of the theory, and kerf's; other names are laws of the registry.
-constexpr std::array<std::string_view, 3> kLawWords = {"coupling", "linear", "two_sided"};
+constexpr std::array<std::string_view, 4> kLawWords = {"coupling", "linear", "two_sided", "paper"};
 
 /// name/setting=value/..., checked.
 LawChoice law_choice(AxisId axis, LawKind kind, const std::string& text) {
@@ -130,10 +130,11 @@ LawChoice law_choice(AxisId axis, LawKind kind, const std::string& text) {
       refuse(": has no setting stiffness_n_per_mm, which a map varies; give it one");
     }
   } catch (const LawError& error) {
-    throw HilError(
-        std::string("--") + kKinds[index_of(axis)].name + ": " + choice.name + error.what() +
-        (kind == LawKind::force ? "; or take coupling, linear or two_sided, which have no settings"
-                                : ""));
+    throw HilError(std::string("--") + kKinds[index_of(axis)].name + ": " + choice.name +
+                   error.what() +
+                   (kind == LawKind::force
+                        ? "; or take coupling, linear, two_sided or paper, which have no settings"
+                        : ""));
   }
   return choice;
 }

@@ -15,6 +15,7 @@ enum class Law : std::uint8_t {
   coupling,   ///< the servo's own (docs/theory.md 5.1): its damper grows with the spring
   linear,     ///< max(0, K delta - B v)
   two_sided,  ///< -K x - B v on both sides of the face: what the exact boundary is about
+  paper,      ///< the paper's pressure on the covered voxels, of the whole arm alone
   own         ///< `Subject::force_law`
 };
 
