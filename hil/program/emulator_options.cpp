@@ -44,7 +44,7 @@ void declare_front(Arguments& app, EmulatorOptions& o) {
   app.flag("--stay", o.stay, "wait for another client when one leaves");
   app.option("--seconds", o.seconds,
              "device time to serve, and the longest wait for a client (default: no limit)")
-      .within(0.0, kMaxSeconds);
+      .within(0.001, kMaxSeconds);
 }
 
 void declare_device(Arguments& app, EmulatorOptions& o) {

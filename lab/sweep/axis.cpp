@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <iterator>
 #include <optional>
 #include <set>
 
@@ -86,6 +87,19 @@ void refuse_twins(std::string_view text, const std::vector<std::string>& values)
   }
 }
 
+/// What the sweep itself tells the emulator.
+void refuse_own_option(std::string_view text, std::string option) {
+  option.erase(0, option.find('.') + 1);
+  std::ranges::replace(option, '-', '_');
+  constexpr std::string_view kOwn[] = {"personality", "front",    "socket",  "udp",  "hand",
+                                       "hand_socket", "lockstep", "rate",    "stay", "seconds",
+                                       "unit_mm",     "report",   "describe"};
+  if (std::ranges::find(kOwn, option) == std::end(kOwn)) return;
+  refuse_axis(text,
+              "the sweep sets it itself; name a key of the scene, such as hand.script, or "
+              "another option");
+}
+
 }  // namespace
 
 Axis parse_axis(std::string_view text) {
@@ -100,6 +114,7 @@ Axis parse_axis(std::string_view text) {
   } else {
     axis.values = split(values, ',');
   }
+  if (axis.of_emulator()) refuse_own_option(text, axis.key);
   if (std::ranges::any_of(axis.values, &std::string::empty)) {
     refuse_axis(text, "a value is empty; write LO:HI:N or A,B,C");
   }

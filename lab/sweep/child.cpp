@@ -29,12 +29,16 @@ Child::Child(const std::vector<std::string>& arguments, std::filesystem::path ou
   posix_spawn_file_actions_addopen(&files, 0, "/dev/null", O_RDONLY, 0);
   posix_spawn_file_actions_addopen(&files, 1, output_.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
   posix_spawn_file_actions_adddup2(&files, 1, 2);
-  // A group of its own: Ctrl-C reaches the sweep alone, which ends its runs.
-  posix_spawnattr_t group;
-  posix_spawnattr_init(&group);
-  posix_spawnattr_setflags(&group, POSIX_SPAWN_SETPGROUP);
-  const int error = posix_spawn(&pid_, argv[0], &files, &group, argv.data(), environ);
-  posix_spawnattr_destroy(&group);
+  // A group of its own: Ctrl-C reaches the sweep alone, which ends its runs. It starts without the
+  // signals that this thread leaves to others.
+  posix_spawnattr_t own;
+  posix_spawnattr_init(&own);
+  posix_spawnattr_setflags(&own, POSIX_SPAWN_SETPGROUP | POSIX_SPAWN_SETSIGMASK);
+  sigset_t none;
+  sigemptyset(&none);
+  posix_spawnattr_setsigmask(&own, &none);
+  const int error = posix_spawn(&pid_, argv[0], &files, &own, argv.data(), environ);
+  posix_spawnattr_destroy(&own);
   posix_spawn_file_actions_destroy(&files);
   if (error != 0) {
     throw HilError(arguments[0] + ": cannot be started (" + std::generic_category().message(error) +

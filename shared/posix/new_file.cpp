@@ -22,15 +22,25 @@ std::string open_file(int fd) {
   return "/proc/self/fd/" + std::to_string(fd);
 }
 
+/// The descriptor that /dev/stdout and the like stand for; negative: none. What it leads to may be
+/// a file: with `>` it is.
+int own_descriptor(const std::filesystem::path& path) noexcept {
+  if (path == "/dev/stdout") return STDOUT_FILENO;
+  if (path == "/dev/stderr") return STDERR_FILENO;
+  return -1;
+}
+
 }  // namespace
 
 bool is_stream(const std::filesystem::path& path) {
+  if (own_descriptor(path) >= 0) return true;
   std::error_code ignored;
   const auto status = std::filesystem::status(path, ignored);
   return std::filesystem::is_fifo(status) || std::filesystem::is_character_file(status);
 }
 
 int open_stream(const std::filesystem::path& path) noexcept {
+  if (const int own = own_descriptor(path); own >= 0) return ::fcntl(own, F_DUPFD_CLOEXEC, 0);
   const int fd = ::open(path.c_str(), O_WRONLY | O_NONBLOCK | O_NOCTTY | O_CLOEXEC);
   if (fd < 0) return -1;
   struct stat opened {};
@@ -42,6 +52,7 @@ int open_stream(const std::filesystem::path& path) noexcept {
 
 std::string not_written(int error) {
   if (error == ELOOP) return "is a link; name a file itself";
+  if (error == EPIPE) return "its reader left before the end; let it read on";
   if (error == ENXIO) return "nobody reads this pipe; start the reader first";
   return "cannot be written (" + std::generic_category().message(error) + "); " +
          way_out_of(error, "make room or choose another place");
@@ -51,7 +62,8 @@ NewFile::NewFile(const std::filesystem::path& path) : path_(path) {
   if (is_stream(path)) {
     fd_ = open_stream(path);
     if (fd_ < 0) fail(errno);
-    ::fcntl(fd_, F_SETFL, 0);  // `write` waits for a slow reader
+    // `write` waits for a slow reader; a descriptor of ours keeps what its owner set, as `>>`.
+    if (own_descriptor(path) < 0) ::fcntl(fd_, F_SETFL, 0);
     return;
   }
   std::error_code error;

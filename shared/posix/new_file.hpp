@@ -16,7 +16,8 @@ class FileError : public std::runtime_error {
 };
 
 /// Whether what stands at `path` holds no bytes of its own, as a pipe, a terminal or /dev/null, or
-/// is a link to such a thing (/dev/stdout): it is written to as it stands.
+/// is a link to such a thing: it is written to as it stands. So are /dev/stdout and /dev/stderr,
+/// also where they lead to a file.
 [[nodiscard]] bool is_stream(const std::filesystem::path& path);
 
 /// Opens such a thing for writing, without waiting for the reader of a pipe, now or in a `write`.

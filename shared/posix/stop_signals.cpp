@@ -39,12 +39,24 @@ void let_ask(int signal) noexcept {
   if (overrides || before.sa_handler != SIG_IGN) on(signal, ask_to_stop);
 }
 
+/// Those that ask for an end.
+sigset_t asking_signals() noexcept {
+  sigset_t asking;
+  sigemptyset(&asking);
+  for (const int signal : kAsks) sigaddset(&asking, signal);
+  for (int signal = SIGRTMIN; signal <= SIGRTMAX; ++signal) sigaddset(&asking, signal);
+  return asking;
+}
+
 }  // namespace
 
 std::atomic<bool>& catch_stop_signals() noexcept {
   for (const int signal : kAsks) let_ask(signal);
   for (int signal = SIGRTMIN; signal <= SIGRTMAX; ++signal) let_ask(signal);
   make_signals_of_writes_errors();
+  // Who started this program may have blocked them, and only SIGKILL would end it.
+  const sigset_t asking = asking_signals();
+  pthread_sigmask(SIG_UNBLOCK, &asking, nullptr);
   return stop_asked;
 }
 
@@ -66,10 +78,7 @@ void at_stop_signal(void (*act)() noexcept) noexcept {
 }
 
 StopSignalsElsewhere::StopSignalsElsewhere() noexcept {
-  sigset_t asking;
-  sigemptyset(&asking);
-  for (const int signal : kAsks) sigaddset(&asking, signal);
-  for (int signal = SIGRTMIN; signal <= SIGRTMAX; ++signal) sigaddset(&asking, signal);
+  sigset_t asking = asking_signals();
   for (const int signal : {SIGQUIT, SIGABRT})
     sigaddset(&asking, signal);  // abort() unblocks its own
   pthread_sigmask(SIG_BLOCK, &asking, &before_);

@@ -92,13 +92,26 @@ TEST_CASE("an axis is a range with both ends, or a list; the last axis changes f
 }
 
 TEST_CASE("what is no axis is refused in one line that names it") {
-  for (const char* const text :
-       {"force", "=1", "force.stiffness_n_per_mm=", "force.stiffness_n_per_mm=1,,2",
-        "force.stiffness_n_per_mm=1:2:0", "force.stiffness_n_per_mm=1:2:1",
-        "force.stiffness_n_per_mm=1:2:2.5", "force.stiffness_n_per_mm=1:2:1e9", "force.stifness=1",
-        "servo.rate=500", "servo.rate_hz=500,1000,500", "servo.rate_hz=1000,1e3",
-        "servo.rate_hz=1000,+1000", "force.friction=0.2, 0.2", "force.friction=0,-0",
-        "device.offset_mm=[0,1,2],[0, 1, 2]", "force.stiffness_n_per_mm=0.3:0.3:2"}) {
+  for (const char* const text : {"force",
+                                 "=1",
+                                 "force.stiffness_n_per_mm=",
+                                 "force.stiffness_n_per_mm=1,,2",
+                                 "force.stiffness_n_per_mm=1:2:0",
+                                 "force.stiffness_n_per_mm=1:2:1",
+                                 "force.stiffness_n_per_mm=1:2:2.5",
+                                 "force.stiffness_n_per_mm=1:2:1e9",
+                                 "force.stifness=1",
+                                 "servo.rate=500",
+                                 "servo.rate_hz=500,1000,500",
+                                 "servo.rate_hz=1000,1e3",
+                                 "emulator.hand=a.toml",
+                                 "emulator.stay=true",
+                                 "emulator.hand-socket=s",
+                                 "servo.rate_hz=1000,+1000",
+                                 "force.friction=0.2, 0.2",
+                                 "force.friction=0,-0",
+                                 "device.offset_mm=[0,1,2],[0, 1, 2]",
+                                 "force.stiffness_n_per_mm=0.3:0.3:2"}) {
     CAPTURE(text);
     const std::string line = refusal_of(text);
     CHECK(line.starts_with("--set "));

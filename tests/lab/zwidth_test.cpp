@@ -66,8 +66,8 @@ Subject ideal(double delay_periods) {
 }
 
 bool swings(const Subject& subject, double stiffness, bool by_energy = false) {
-  Effort effort;
-  const Swing swing = hit_one_axis(subject, stiffness, 0, 3, 0, effort);
+  TickMeter ticks;
+  const Swing swing = hit_one_axis(subject, stiffness, 0, 3, 0, ticks);
   return by_energy ? swing.active : swing.swings;
 }
 
@@ -114,8 +114,8 @@ Column column_of(const std::string& stiffness, double seconds,
   spec.seconds = seconds;
   Assignment values;
   for (const auto& [axis, value] : given) values[index_of(axis)] = value;
-  Effort effort;
-  return measure_column(spec, values, effort);
+  TickMeter ticks;
+  return measure_column(spec, values, ticks);
 }
 
 MapSpec two_cells() {
@@ -194,14 +194,14 @@ TEST_CASE("the whole arm comes to rest on a soft wall and swings on a hard one")
     subject.numeric = numeric;
     subject.loop.delay_s = 0;
     const LoadedScene scene = walls_scene(subject);
-    Effort effort;
-    const Swing soft = hit_with_arm(scene, subject, 0.3, 0.3, 1, effort);
+    TickMeter ticks;
+    const Swing soft = hit_with_arm(scene, subject, 0.3, 0.3, 1, ticks);
     CHECK_FALSE(soft.swings);
     CHECK_FALSE(soft.active);
-    const Swing hard = hit_with_arm(scene, subject, 40, 0.3, 1, effort);
+    const Swing hard = hit_with_arm(scene, subject, 40, 0.3, 1, ticks);
     CHECK(hard.swings);
     CHECK(hard.active);
-    CHECK(effort.ticks() > 1000);
+    CHECK(ticks.ticks() > 1000);
   }
 }
 
@@ -467,17 +467,17 @@ TEST_CASE("the paper's force has its map, with the whole arm") {
   subject.loop.delay_s = 0;
   const LoadedScene scene = walls_scene(subject);
   CHECK(scene.force.model == ForceModel::paper);
-  Effort effort;
-  CHECK_FALSE(hit_with_arm(scene, subject, 0.5, 0.5, 1, effort).swings);
-  CHECK(hit_with_arm(scene, subject, 60, 0.5, 1, effort).swings);
+  TickMeter ticks;
+  CHECK_FALSE(hit_with_arm(scene, subject, 0.5, 0.5, 1, ticks).swings);
+  CHECK(hit_with_arm(scene, subject, 60, 0.5, 1, ticks).swings);
 }
 
 TEST_CASE("behind a delay the arm's port gives what its motors did, not what the servo booked") {
   Assignment values;
   values[index_of(AxisId::delay)] = "8";
   const Subject subject = subject_of(values);
-  Effort effort;
-  const Swing swing = hit_with_arm(walls_scene(subject), subject, 0.5, 0.5, 1, effort);
+  TickMeter ticks;
+  const Swing swing = hit_with_arm(walls_scene(subject), subject, 0.5, 0.5, 1, ticks);
   CHECK(swing.swings);
   CHECK(swing.active);
   CHECK(swing.port_minimum_mj < -50);
@@ -530,10 +530,10 @@ TEST_CASE("a part belongs to one run at a time, and a hit ends with the word") {
   { const PartWriter again(path, spec, {}); }  // it ended
 
   const std::atomic<bool> stop{true};
-  Effort effort(stop);
-  CHECK_THROWS_AS(static_cast<void>(hit_one_axis(subject_of({}), 100, 200, 60, 1, effort)),
+  TickMeter ticks(stop);
+  CHECK_THROWS_AS(static_cast<void>(hit_one_axis(subject_of({}), 100, 200, 60, 1, ticks)),
                   Interrupted);
-  CHECK(effort.ticks() < 2000);
+  CHECK(ticks.ticks() < 2000);
 }
 
 TEST_CASE("what no map has in a part's first line is refused, and nothing crashes") {

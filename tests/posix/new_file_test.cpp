@@ -220,3 +220,21 @@ TEST_CASE("of two that make a new file at once one gets it, a link counts as the
   CHECK_FALSE(three.commit_if_new());
   CHECK(text_of(folder / "a") == "own");
 }
+
+TEST_CASE("standard output is written to as it stands, also where it is a file that is added to") {
+  const Folder folder;
+  std::ofstream(folder / "out") << "before ";
+  const pid_t child = fork();
+  REQUIRE(child >= 0);
+  if (child == 0) {
+    const int out = open((folder / "out").c_str(), O_WRONLY | O_APPEND);
+    dup2(out, STDOUT_FILENO);
+    write_new_file("/dev/stdout", "now");
+    write_new_file("/dev/stdout", " later");
+    _exit(0);
+  }
+  int status = 0;
+  waitpid(child, &status, 0);
+  CHECK(status == 0);
+  CHECK(text_of(folder / "out") == "before now later");
+}

@@ -235,6 +235,23 @@ TEST_CASE("signals of a write end nothing, and those that pause a program end it
   }
 }
 
+TEST_CASE("a signal that is blocked from the start asks all the same") {
+  for (const int signal : {SIGHUP, SIGUSR1, SIGALRM, SIGRTMIN, SIGINT, SIGTERM}) {
+    CAPTURE(signal);
+    const pid_t child = fork();
+    REQUIRE(child >= 0);
+    if (child == 0) {
+      const kerf::StopSignalsElsewhere blocked;
+      const std::atomic<bool>& stop = kerf::catch_stop_signals();
+      std::raise(signal);
+      _exit(stop ? 1 : 0);
+    }
+    int status = 0;
+    waitpid(child, &status, 0);
+    CHECK(WEXITSTATUS(status) == 1);
+  }
+}
+
 TEST_CASE("a signal that is ignored from the start stays so, but INT and TERM") {
   for (const int signal : {SIGHUP, SIGUSR1, SIGALRM, SIGRTMIN, SIGINT, SIGTERM}) {
     CAPTURE(signal);

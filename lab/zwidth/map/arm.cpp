@@ -158,7 +158,7 @@ constexpr Swing kLost{.swings = true, .active = true};
 /// One hit: nothing before the first contact; the verdict after `seconds`. None where the hand does
 /// not bring the device to the wall.
 std::optional<Swing> watch_hit(Rig& rig, const Subject& subject, const ArmHit& hit, double seconds,
-                               Effort& effort) {
+                               TickMeter& ticks) {
   const double rate_hz = 1 / subject.loop.period_s;
   const std::int64_t count = std::llround(seconds * rate_hz);
   constexpr double kPatienceS = 8;  // calibration, the way there, and a stay that chattered away
@@ -171,7 +171,7 @@ std::optional<Swing> watch_hit(Rig& rig, const Subject& subject, const ArmHit& h
   std::int64_t judged = 0;
   const std::int64_t settled = std::llround(0.05 * rate_hz);
   const std::int64_t patience = std::llround(kPatienceS * rate_hz);
-  for (std::int64_t tick = 0; judged < count; ++tick, effort.tick()) {
+  for (std::int64_t tick = 0; judged < count; ++tick, ticks.tick()) {
     if (tick - judged > patience) return restless ? std::optional(kLost) : std::nullopt;
     const ServoOutput out = rig.tick();
     if (out.fault != Fault::none) return kLost;
@@ -229,7 +229,7 @@ LoadedScene walls_scene(const Subject& subject) {
 }
 
 Swing hit_with_arm(const LoadedScene& scene, const Subject& subject, double stiffness_n_per_mm,
-                   double seconds, std::uint64_t seed, Effort& effort) {
+                   double seconds, std::uint64_t seed, TickMeter& ticks) {
   LoadedScene own = scene;
   own.force.stiffness_n_per_mm = stiffness_n_per_mm;
   if (subject.law == Law::paper) {
@@ -241,7 +241,7 @@ Swing hit_with_arm(const LoadedScene& scene, const Subject& subject, double stif
   Rig rig(std::move(own), subject, script_of(hits, seconds));
   Swing worst;
   for (const ArmHit& hit : hits) {
-    const std::optional<Swing> seen = watch_hit(rig, subject, hit, seconds, effort);
+    const std::optional<Swing> seen = watch_hit(rig, subject, hit, seconds, ticks);
     if (!seen && !worst.swings && !worst.active) throw NotMet();
     worst.join(seen.value_or(kLost));
     if (worst.swings && worst.active) break;

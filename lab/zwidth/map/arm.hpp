@@ -6,9 +6,9 @@
 
 #include "controller/load/loaded_scene.hpp"
 #include "hil/hil_error.hpp"
-#include "lab/zwidth/map/effort.hpp"
 #include "lab/zwidth/map/subject.hpp"
 #include "lab/zwidth/map/swing.hpp"
+#include "lab/zwidth/map/tick_meter.hpp"
 
 namespace kerf::zwidth {
 
@@ -40,6 +40,6 @@ class NotMet : public HilError {
 /// device and servo. Without a hand a spring of 0.2 N/mm pushes. Throws NotMet, or Interrupted.
 [[nodiscard]] Swing hit_with_arm(const LoadedScene& scene, const Subject& subject,
                                  double stiffness_n_per_mm, double seconds, std::uint64_t seed,
-                                 Effort& effort);
+                                 TickMeter& ticks);
 
 }  // namespace kerf::zwidth

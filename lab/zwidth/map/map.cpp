@@ -26,8 +26,8 @@ namespace {
 /// All cells of one column, each measured once.
 class ColumnRun {
  public:
-  ColumnRun(const MapSpec& spec, const Subject& subject, Effort& effort)
-      : spec_(spec), subject_(subject), effort_(effort) {
+  ColumnRun(const MapSpec& spec, const Subject& subject, TickMeter& ticks)
+      : spec_(spec), subject_(subject), ticks_(ticks) {
     if (spec.arm) scene_ = walls_scene(subject);
   }
 
@@ -70,12 +70,12 @@ class ColumnRun {
   Swing measure(double stiffness) {
     const double seconds = std::max(spec_.seconds, needed_seconds(subject_, stiffness));
     if (spec_.arm) {
-      return hit_with_arm(scene_, subject_, stiffness, seconds, spec_.seed, effort_);
+      return hit_with_arm(scene_, subject_, stiffness, seconds, spec_.seed, ticks_);
     }
     Swing worst;
     for (std::size_t hit = 0; hit < kHitsMmPerS.size(); ++hit) {
       const std::uint64_t seed = spec_.seed == 0 ? 0 : (spec_.seed << 32) + hit;
-      worst.join(hit_one_axis(subject_, stiffness, kHitsMmPerS[hit], seconds, seed, effort_));
+      worst.join(hit_one_axis(subject_, stiffness, kHitsMmPerS[hit], seconds, seed, ticks_));
       if (worst.swings && worst.active) break;
     }
     return worst;
@@ -83,7 +83,7 @@ class ColumnRun {
 
   const MapSpec& spec_;
   Subject subject_;
-  Effort& effort_;
+  TickMeter& ticks_;
   LoadedScene scene_;  ///< of the whole arm
   std::map<double, Swing> known_;
 };
@@ -132,12 +132,12 @@ std::string impossible(const MapSpec& spec, const Subject& subject) {
                 subject.damping_ns_per_mm, most);
 }
 
-Column measure_column(const MapSpec& spec, const Assignment& values, Effort& effort) {
+Column measure_column(const MapSpec& spec, const Assignment& values, TickMeter& ticks) {
   const Subject subject = subject_of(values);
   Column column;
   if (!impossible(spec, subject).empty()) return column;
   try {
-    ColumnRun run(spec, subject, effort);
+    ColumnRun run(spec, subject, ticks);
     for (const double stiffness : spec.stiffness_n_per_mm) {
       column.cells.push_back(run.at(stiffness));
     }
@@ -160,10 +160,10 @@ void measure_columns(const MapSpec& spec, const std::vector<std::size_t>& wanted
   const auto work = [&] {
     try {
       for (std::size_t i = next++; i < wanted.size() && !stop; i = next++) {
-        Effort effort(stop);
-        Column column = measure_column(spec, columns[wanted[i]], effort);
+        TickMeter ticks(stop);
+        Column column = measure_column(spec, columns[wanted[i]], ticks);
         const std::scoped_lock hold(lock);
-        done(wanted[i], std::move(column), effort.ticks());
+        done(wanted[i], std::move(column), ticks.ticks());
       }
     } catch (const Interrupted&) {  // what is done is kept
     } catch (...) {

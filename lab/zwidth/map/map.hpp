@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "lab/zwidth/map/axes.hpp"
-#include "lab/zwidth/map/effort.hpp"
 #include "lab/zwidth/map/swing.hpp"
+#include "lab/zwidth/map/tick_meter.hpp"
 
 namespace kerf::zwidth {
 
@@ -57,7 +57,8 @@ using Columns = std::map<std::size_t, Column>;
 [[nodiscard]] std::string impossible(const MapSpec& spec, const Subject& subject);
 
 /// The column of `values`. Throws Interrupted.
-[[nodiscard]] Column measure_column(const MapSpec& spec, const Assignment& values, Effort& effort);
+[[nodiscard]] Column measure_column(const MapSpec& spec, const Assignment& values,
+                                    TickMeter& ticks);
 
 /// Told of each column as it comes, under a lock, and of the ticks that it took.
 using ColumnDone = std::function<void(std::size_t index, Column column, std::uint64_t ticks)>;

@@ -135,7 +135,7 @@ Swing lost(const SwingMeter& meter, double travel_mm = 0, double given_mj = 0) {
 
 template <class N>
 Swing hit(const Subject& subject, double stiffness, double hit_mm_per_s, double seconds,
-          std::uint64_t seed, Effort& effort, const OneAxisWatch& watch) {
+          std::uint64_t seed, TickMeter& ticks, const OneAxisWatch& watch) {
   const SampledLoop& loop = subject.loop;
   const double push_n = loop.coulomb_n + subject.push_n;
   OneAxis axis(loop, shift_of(seed) * loop.quantum_mm);
@@ -150,7 +150,7 @@ Swing hit(const Subject& subject, double stiffness, double hit_mm_per_s, double 
   constexpr double kFarMm = 1e4;  // where no motion comes back from
   SwingMeter meter(count, loop.quantum_mm, push_n);
   std::int64_t still = 0;
-  for (std::int64_t tick = 0; tick < count; ++tick, effort.tick()) {
+  for (std::int64_t tick = 0; tick < count; ++tick, ticks.tick()) {
     const double asked_n = wall.force(axis.encoder_mm());
     if (!std::isfinite(asked_n)) return lost(meter);  // the servo would latch a fault
     axis.tick(asked_n, -push_n);
@@ -169,18 +169,19 @@ Swing hit(const Subject& subject, double stiffness, double hit_mm_per_s, double 
 }  // namespace
 
 Swing hit_one_axis(const Subject& subject, double stiffness_n_per_mm, double hit_mm_per_s,
-                   double seconds, std::uint64_t seed, Effort& effort, const OneAxisWatch& watch) {
+                   double seconds, std::uint64_t seed, TickMeter& ticks,
+                   const OneAxisWatch& watch) {
   switch (subject.numeric) {
     case NumericKind::float32:
-      return hit<FloatNumbers>(subject, stiffness_n_per_mm, hit_mm_per_s, seconds, seed, effort,
+      return hit<FloatNumbers>(subject, stiffness_n_per_mm, hit_mm_per_s, seconds, seed, ticks,
                                watch);
     case NumericKind::float64:
-      return hit<DoubleNumbers>(subject, stiffness_n_per_mm, hit_mm_per_s, seconds, seed, effort,
+      return hit<DoubleNumbers>(subject, stiffness_n_per_mm, hit_mm_per_s, seconds, seed, ticks,
                                 watch);
     case NumericKind::fixed:
       break;
   }
-  return hit<FixedNumbers>(subject, stiffness_n_per_mm, hit_mm_per_s, seconds, seed, effort, watch);
+  return hit<FixedNumbers>(subject, stiffness_n_per_mm, hit_mm_per_s, seconds, seed, ticks, watch);
 }
 
 }  // namespace kerf::zwidth

@@ -5,9 +5,9 @@
 #include <cstdint>
 #include <functional>
 
-#include "lab/zwidth/map/effort.hpp"
 #include "lab/zwidth/map/subject.hpp"
 #include "lab/zwidth/map/swing.hpp"
+#include "lab/zwidth/map/tick_meter.hpp"
 
 namespace kerf::zwidth {
 
@@ -29,6 +29,6 @@ using OneAxisWatch = std::function<void(const OneAxisTick&)>;
 /// Returns the verdict of `seconds`. The same arguments give the same bits. Throws Interrupted.
 [[nodiscard]] Swing hit_one_axis(const Subject& subject, double stiffness_n_per_mm,
                                  double hit_mm_per_s, double seconds, std::uint64_t seed,
-                                 Effort& effort, const OneAxisWatch& watch = {});
+                                 TickMeter& ticks, const OneAxisWatch& watch = {});
 
 }  // namespace kerf::zwidth

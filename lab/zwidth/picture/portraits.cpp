@@ -119,10 +119,10 @@ std::string portraits_of(const MapSpec& spec, const std::vector<std::string>& ce
   for (const auto& [stiffness, damping] : places) {
     subject.damping_ns_per_mm = damping;
     Curves curves;
-    Effort effort;
+    TickMeter ticks;
     for (const double speed : kHitsMmPerS) {
       Curve& curve = curves.emplace_back();
-      static_cast<void>(hit_one_axis(subject, stiffness, speed, spec.seconds, spec.seed, effort,
+      static_cast<void>(hit_one_axis(subject, stiffness, speed, spec.seconds, spec.seed, ticks,
                                      [&](const OneAxisTick& tick) { curve.push_back(tick); }));
     }
     draw(script, format("K %g N/mm, B %g N s/mm", stiffness, damping), curves);

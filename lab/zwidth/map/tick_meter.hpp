@@ -10,10 +10,10 @@ namespace kerf::zwidth {
 struct Interrupted {};
 
 /// Ticks that a column took, and the word that ends it half-way. Each thread has its own.
-class Effort {
+class TickMeter {
  public:
-  Effort() = default;
-  explicit Effort(const std::atomic<bool>& stop) : stop_(&stop) {}
+  TickMeter() = default;
+  explicit TickMeter(const std::atomic<bool>& stop) : stop_(&stop) {}
 
   /// Once per tick. Throws Interrupted within some milliseconds of the word.
   void tick() {
