@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <exception>
 #include <optional>
 #include <stdexcept>
@@ -15,6 +16,7 @@
 #include "controller/shell/motor_guard.hpp"
 #include "controller/shell/publisher.hpp"
 #include "controller/shell/watchdog.hpp"
+#include "shared/posix/endless_step.hpp"
 #include "shared/posix/monotonic_clock.hpp"
 #include "shared/posix/progress_bar.hpp"
 #include "shared/posix/stop_signals.hpp"
@@ -24,12 +26,29 @@ namespace {
 
 constexpr std::chrono::milliseconds kLookPeriod{5};
 
-/// Main thread while the servo runs: draws the progress bar, and says what the device waits for.
-void show_progress(const LoopSignals& signals, const std::atomic<bool>& ended, const Run& run) {
+/// Nothing ends a thread that loops: its program goes, as in a crash, and says why. Readers keep
+/// all ticks before it.
+[[noreturn]] void end_looping_servo(const Run& run, std::uint64_t tick) {
+  static_cast<void>(run.device.release_for_good());
+  run.segment.set_lifecycle(Lifecycle::fault);
+  log_error("the step after tick " + std::to_string(tick) + " did not end in " +
+            std::to_string(EndlessStep::kMostSeconds) +
+            " s; motors off; give every loop of your law a bound that does not depend on its input "
+            "(the lab tries it: law NAME)");
+  constexpr std::chrono::milliseconds kBusCycles{2};  // as after a crash
+  std::this_thread::sleep_for(kBusCycles);
+  std::_Exit(1);
+}
+
+/// Main thread while the servo runs: draws the progress bar, says what the device waits for, and
+/// looks after steps that do not end.
+void show_progress(const LoopSignals& signals, const std::atomic<bool>& ended, const Run& run,
+                   EndlessStep& step) {
   const ControllerOptions& options = run.options;
   const ProgressBar bar(options.progress);
   WaitTeller teller;
   while (!ended.load()) {
+    if (step.look()) end_looping_servo(run, signals.heartbeat.load(std::memory_order_relaxed));
     const Waiting waiting = signals.waiting.load(std::memory_order_relaxed);
     const std::string waits = text_of(run.personality, waiting);
     if (teller.look(waiting, monotonic_ns())) {
@@ -112,7 +131,7 @@ EndReason run_threads(const Run& run) {
     if (!run.options.virtual_time) {
       watching = start_watchdog(watchdog, run.options.real_time);
     }
-    const std::jthread servo_thread([&] {
+    std::jthread servo_thread([&] {
       const HandlerStack handlers = guard.guard_stack();
       try {
         end = serve(run, signals, calls ? &*calls : nullptr);
@@ -122,8 +141,9 @@ EndReason run_threads(const Run& run) {
       ended = true;
     });
     const StopSignalsElsewhere to_the_threads_above;
+    EndlessStep step(servo_thread.native_handle(), signals.heartbeat);
     try {
-      show_progress(signals, ended, run);
+      show_progress(signals, ended, run, step);
     } catch (...) {
       run.stop = true;  // or the servo would be waited for in vain
       throw;

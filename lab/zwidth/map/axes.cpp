@@ -300,6 +300,15 @@ std::string value_of(const Assignment& values, AxisId axis) {
   return given.empty() ? standard_of(values, axis) : given;
 }
 
+std::string laws_of(const Assignment& values) {
+  std::string text;
+  for (const AxisId axis : {AxisId::law, AxisId::estimator, AxisId::stabiliser}) {
+    text += (text.empty() ? "" : ", ") + std::string(axis_kinds()[index_of(axis)].name) + ' ' +
+            value_of(values, axis);
+  }
+  return text;
+}
+
 Subject subject_of(const Assignment& values) {
   const auto text = [&](AxisId axis) { return value_of(values, axis); };
   const auto number = [&](AxisId axis) { return number_in(text(axis)).value_or(0); };

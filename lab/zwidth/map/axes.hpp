@@ -66,6 +66,9 @@ using Assignment = std::array<std::string, kAxisCount>;
 /// The value that holds, whether given or standard: as it stands in the files of a map.
 [[nodiscard]] std::string value_of(const Assignment& values, AxisId axis);
 
+/// The laws that these values choose, such as "law coupling, estimator foaw, stabiliser none".
+[[nodiscard]] std::string laws_of(const Assignment& values);
+
 [[nodiscard]] inline std::size_t index_of(AxisId axis) {
   return static_cast<std::size_t>(axis);
 }

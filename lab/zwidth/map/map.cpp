@@ -18,6 +18,7 @@
 #include "hil/hil_error.hpp"
 #include "lab/zwidth/map/arm.hpp"
 #include "lab/zwidth/map/one_axis.hpp"
+#include "lab/zwidth/map/tick_watch.hpp"
 #include "shared/text/format.hpp"
 
 namespace kerf::zwidth {
@@ -156,11 +157,13 @@ void measure_columns(const MapSpec& spec, const std::vector<std::size_t>& wanted
   const std::vector<Assignment> columns = spec.columns();
   std::atomic<std::size_t> next{0};
   std::mutex lock;
+  TickWatch watch(lock);
   std::exception_ptr failure;
   const auto work = [&] {
     try {
       for (std::size_t i = next++; i < wanted.size() && !stop; i = next++) {
         TickMeter ticks(stop);
+        const TickWatch::Watched watched(watch, ticks, laws_of(columns[wanted[i]]));
         Column column = measure_column(spec, columns[wanted[i]], ticks);
         const std::scoped_lock hold(lock);
         done(wanted[i], std::move(column), ticks.ticks());

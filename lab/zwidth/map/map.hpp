@@ -64,7 +64,8 @@ using Columns = std::map<std::size_t, Column>;
 using ColumnDone = std::function<void(std::size_t index, Column column, std::uint64_t ticks)>;
 
 /// Measures the columns of `wanted` on `jobs` threads, until all are done or `stop` is set: a
-/// column that is not done then is lost. An exception of a thread is thrown here.
+/// column that is not done then is lost. An exception of a thread is thrown here. A step that does
+/// not end ends the program (`TickWatch`).
 void measure_columns(const MapSpec& spec, const std::vector<std::size_t>& wanted, int jobs,
                      const std::atomic<bool>& stop, const ColumnDone& done);
 

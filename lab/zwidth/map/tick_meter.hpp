@@ -9,7 +9,8 @@ namespace kerf::zwidth {
 /// Thrown out of a hit that is no longer wanted.
 struct Interrupted {};
 
-/// Ticks that a column took, and the word that ends it half-way. Each thread has its own.
+/// Ticks that a column took, and the word that ends it half-way. Each thread has its own; others
+/// may look at the count.
 class TickMeter {
  public:
   TickMeter() = default;
@@ -18,15 +19,17 @@ class TickMeter {
   /// Once per tick. Throws Interrupted within some milliseconds of the word.
   void tick() {
     constexpr std::uint64_t kLook = 1024;
-    if (++ticks_ % kLook == 0 && stop_ != nullptr && stop_->load(std::memory_order_relaxed)) {
+    const std::uint64_t ticks = ticks_.load(std::memory_order_relaxed) + 1;
+    ticks_.store(ticks, std::memory_order_relaxed);
+    if (ticks % kLook == 0 && stop_ != nullptr && stop_->load(std::memory_order_relaxed)) {
       throw Interrupted();
     }
   }
-  [[nodiscard]] std::uint64_t ticks() const { return ticks_; }
+  [[nodiscard]] const std::atomic<std::uint64_t>& ticks() const { return ticks_; }
 
  private:
   const std::atomic<bool>* stop_ = nullptr;
-  std::uint64_t ticks_ = 0;
+  std::atomic<std::uint64_t> ticks_{0};
 };
 
 }  // namespace kerf::zwidth

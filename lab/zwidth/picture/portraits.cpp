@@ -4,12 +4,14 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <mutex>
 #include <optional>
 #include <sstream>
 #include <utility>
 
 #include "hil/hil_error.hpp"
 #include "lab/zwidth/map/one_axis.hpp"
+#include "lab/zwidth/map/tick_watch.hpp"
 #include "lab/zwidth/picture/legend.hpp"
 #include "lab/zwidth/picture/panels.hpp"
 #include "shared/text/format.hpp"
@@ -116,10 +118,13 @@ std::string portraits_of(const MapSpec& spec, const std::vector<std::string>& ce
          << 30.0 / layout.height << " left noenhanced font ',11' textcolor rgb '#555555'\n";
   script << "set xlabel 'place of the tip, wall at 0 (mm)'\nset ylabel 'speed (mm/s)'\n"
             "set grid back linecolor rgb '#dddddd'\nset key right top samplen 2\n";
+  std::mutex no_results;
+  TickWatch watch(no_results);
   for (const auto& [stiffness, damping] : places) {
     subject.damping_ns_per_mm = damping;
     Curves curves;
     TickMeter ticks;
+    const TickWatch::Watched watched(watch, ticks, laws_of(spec.columns().front()));
     for (const double speed : kHitsMmPerS) {
       Curve& curve = curves.emplace_back();
       static_cast<void>(hit_one_axis(subject, stiffness, speed, spec.seconds, spec.seed, ticks,
