@@ -69,6 +69,7 @@ int run_make_identity(const IdentityOptions& options) {
   const Key key = new_key();
   const Certificate certificate =
       new_certificate(spec, key.get(), authority.certificate.get(), authority.key.get());
+  const Certificate replaced = certificate_of(text_of_file(folder / "cert.pem"));
   // The program's umask makes them 0600.
   if (authority.is_new) {
     write_new_file(folder / "ca-key.pem", pem_of(authority.key.get()));
@@ -79,11 +80,14 @@ int run_make_identity(const IdentityOptions& options) {
                  pem_of(certificate.get()) + pem_of(authority.certificate.get()));
   std::cout << folder.string() << ": certificate for";
   for (const std::string& host : spec.hosts) std::cout << ' ' << host;
-  std::cout << ", until " << end_of(certificate.get()) << "\nSHA-256 "
-            << fingerprint_of(certificate.get()) << '\n'
+  std::cout << ", until " << end_of(certificate.get()) << '\n';
+  std::cout << "SHA-256 " << fingerprint_of(certificate.get()) << '\n'
             << (authority.is_new ? "a new CA: " : "by the CA: ")
             << "give ca.pem to browsers and to "
             << "kerf bridge join; ca-key.pem stays here\n";
+  if (replaced) {
+    std::cout << "the one before, " << fingerprint_of(replaced.get()) << ", is replaced\n";
+  }
   return 0;
 }
 

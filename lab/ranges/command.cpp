@@ -8,6 +8,7 @@
 
 #include "controller/scene/scene_setting.hpp"
 #include "lab/ranges/extreme_rows.hpp"
+#include "lab/ranges/interrupted.hpp"
 #include "lab/ranges/key_study.hpp"
 #include "lab/ranges/long_run.hpp"
 #include "lab/ranges/pair_study.hpp"
@@ -179,10 +180,20 @@ Command::Command(Arguments& program)
       .shown_as("TABLE.KEY=VALUE")
       .one_each();
   app_.option("--report", report_, "write the rows as JSON").shown_as("FILE");
-  app_.footer("Exit codes: 0 no rule is broken, 1 one is, 2 bad input or set-up.");
+  app_.footer("Exit codes: 0 no rule is broken, 1 one is, 2 bad input or set-up, 130 interrupted.");
 }
 
 int Command::run(std::ostream& out) const {
+  catch_stop_signals();
+  try {
+    return study(out);
+  } catch (const Interrupted&) {
+    out << "interrupted: what stands above was found\n";
+    return 130;
+  }
+}
+
+int Command::study(std::ostream& out) const {
   Effort effort;
   for (std::size_t i = 0; i < kNumericWords.size(); ++i) {
     const bool wanted =
@@ -213,8 +224,10 @@ int Command::run(std::ostream& out) const {
   for (const NumericKind numeric : effort.numerics) {
     const auto ticks = static_cast<std::uint64_t>(hours_ * 3.6e6);
     if (ticks == 0) break;
-    const LongRun run =
-        run_long(numeric, ticks, [&](double share) { bar.show(share, "long run"); });
+    const LongRun run = run_long(numeric, ticks, [&](double share) {
+      end_if_asked();
+      bar.show(share, "long run");
+    });
     bar.hide();
     teller.row("long", std::string(word_of(numeric)), "as lab/ranges/long_run.hpp says",
                long_line(numeric, run), run.violations.size());

@@ -16,6 +16,8 @@ class Command final : public LabCommand {
   [[nodiscard]] int run(std::ostream& out) const override;
 
  private:
+  [[nodiscard]] int study(std::ostream& out) const;
+
   std::vector<std::string> numerics_, set_;
   std::string report_;
   int combinations_ = 5000, seed_ = 1, jobs_ = 0;

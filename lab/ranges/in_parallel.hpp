@@ -11,11 +11,13 @@
 #include <vector>
 
 #include "lab/ranges/combination.hpp"
+#include "lab/ranges/interrupted.hpp"
 
 namespace kerf::ranges {
 
 /// `work(i, file)` for all i below `count` on so many threads, each with a scene file of its own;
-/// then `done(i, share of all)`, one thread at a time.
+/// then `done(i, share of all)`, one thread at a time. Throws Interrupted after a signal that asks
+/// for the end.
 inline void in_parallel(std::size_t count, std::size_t jobs, const SceneFolder& folder,
                         const std::function<void(std::size_t, const std::filesystem::path&)>& work,
                         const std::function<void(std::size_t, double share)>& done) {
@@ -24,15 +26,18 @@ inline void in_parallel(std::size_t count, std::size_t jobs, const SceneFolder& 
   std::mutex telling;
   const auto run = [&](std::size_t worker) {
     const auto file = folder.path() / ("scene" + std::to_string(worker) + ".toml");
-    for (std::size_t i = next++; i < count; i = next++) {
+    for (std::size_t i = next++; i < count && !stop_requested(); i = next++) {
       work(i, file);
       const std::lock_guard lock(telling);
       done(i, static_cast<double>(++ended) / static_cast<double>(count));
     }
   };
-  std::vector<std::jthread> workers;
-  for (std::size_t worker = 1; worker < jobs; ++worker) workers.emplace_back(run, worker);
-  run(0);
+  {
+    std::vector<std::jthread> workers;
+    for (std::size_t worker = 1; worker < jobs; ++worker) workers.emplace_back(run, worker);
+    run(0);
+  }
+  end_if_asked();
 }
 
 }  // namespace kerf::ranges

@@ -72,9 +72,20 @@ std::string cell_text(const Json& report, const std::string& name) {
                              : std::to_string(value.get<std::uint64_t>());
 }
 
+/// Packets and readings that the emulator's fault script changed.
+std::string changed_by_faults(const Json& report, const std::string& name) {
+  if (!report.contains(name)) return "";
+  std::uint64_t changed = 0;
+  for (const Json& fault : report.at(name)) {
+    changed += fault.at("changed").get<std::uint64_t>();
+  }
+  return std::to_string(changed);
+}
+
 struct Column {
   const char* name;
   bool of_emulator;
+  std::string (*text)(const Json& report, const std::string& name) = cell_text;
 };
 constexpr Column kColumns[] = {
     {"ticks", false},
@@ -90,6 +101,7 @@ constexpr Column kColumns[] = {
     {"volume_hash", false},
     {"output_hash", false},
     {"peak_motor_force_n", true},
+    {"injected", true, changed_by_faults},
 };
 
 CellResult result_of(int exit, const std::filesystem::path& folder, const std::string& last_line) {
@@ -101,7 +113,7 @@ CellResult result_of(int exit, const std::filesystem::path& folder, const std::s
     };
     const Json ours = report("report.json"), theirs = report("emulator.json");
     for (const Column& column : kColumns) {
-      result.values.push_back(cell_text(column.of_emulator ? theirs : ours, column.name));
+      result.values.push_back(column.text(column.of_emulator ? theirs : ours, column.name));
     }
     if (exit == 1) {
       result.message = cell_text(ours, "end");

@@ -53,7 +53,8 @@ Command::Command(Arguments& program)
   app_.option("--part", part_, "keep finished columns here, and go on from those that it has")
       .shown_as("FILE");
   paths_.declare(app_);
-  app_.option("--portraits", portraits_, "draw position against speed of --cells (SVG)")
+  app_.option("--portraits", portraits_,
+              "draw position against speed of --cells, one curve for each hit (SVG)")
       .shown_as("FILE");
   app_.option("--cells", cells_, "for --portraits: stiffness:damping, as many as 12")
       .split_at_commas()

@@ -6,6 +6,7 @@
 #include <concepts>
 #include <cstdint>
 #include <filesystem>
+#include <limits>
 #include <optional>
 #include <sstream>
 #include <system_error>
@@ -94,9 +95,12 @@ struct Taken<std::vector<T>> : Taken<T> {
 
 /// What is wrong with a text that `take` refuses.
 template <class T>
-constexpr const char* not_taken() {
-  if (std::unsigned_integral<T>) return " is not a whole number from 0 on";
-  return std::integral<T> ? " is not a whole number" : " is not a number";
+std::string not_taken() {
+  if constexpr (std::unsigned_integral<T>) {
+    return " is not a whole number from 0 to " + std::to_string(std::numeric_limits<T>::max());
+  } else {
+    return std::integral<T> ? " is not a whole number" : " is not a number";
+  }
 }
 
 template <class T>

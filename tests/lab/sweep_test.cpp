@@ -174,6 +174,36 @@ TEST_CASE("a sweep gives the same bytes on any number of cores, interrupted or n
   CHECK(std::ranges::count(table, '\n') == 7);
 }
 
+TEST_CASE("a sweep over fault scripts tells how much each of them changed") {
+  const TemporaryFolder folder;
+  const std::string faults = kScenes + "/../hil/faults/";
+  Process process({kBin + "/kerf-lab", "sweep", kScenes + "/touch.toml", "--set",
+                   "emulator.fault=" + faults + "lost_reports.toml," + faults + "all_well.toml",
+                   "--seconds", "3", "--out", (folder / "out").string()},
+                  folder / "log");
+  CHECK(process.wait() == 0);
+  const std::string table = text_of(folder / "out/sweep.csv");
+  const auto lost = row_of(table, 0), well = row_of(table, 1);
+  CHECK(lost.at("injected") == lost.at("lost_packets"));
+  CHECK(std::stoi(lost.at("injected")) > 0);
+  CHECK(well.at("injected") == "0");
+}
+
+TEST_CASE("ranges that is asked to end leaves nothing behind") {
+  const TemporaryFolder folder;
+  setenv("TMPDIR", folder.path().c_str(), 1);
+  Process process({kBin + "/kerf-lab", "ranges", "--combinations", "0", "--hours", "24"},
+                  folder / "log");
+  unsetenv("TMPDIR");
+  const auto files = [&] {
+    return std::distance(std::filesystem::directory_iterator(folder.path()), {});
+  };
+  REQUIRE(eventually([&] { return files() == 2; }, 60s));
+  process.signal(SIGTERM);
+  CHECK(process.wait() == 130);
+  CHECK(files() == 1);  // the log
+}
+
 TEST_CASE(
     "a run of a sweep is the demo's, bit by bit; a run that fails is a row with its message") {
   const TemporaryFolder folder;

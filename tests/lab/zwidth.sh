@@ -17,6 +17,8 @@ grep -q 'servo steps' told
 grep -q 'highest stiffness, by the stricter rule' heights.svg
 "$lab" zwidth --portraits portraits.svg --cells 1:0.002,20:0.002 --seconds 0.3
 grep -q '<svg' portraits.svg
+"$lab" zwidth --arm --portraits arm.svg --cells 1:0.003 --seconds 0.3
+grep -q 'corner' arm.svg
 "$lab" zwidth --quick --jobs 2 --page stability.md
 grep -q '## What each knob does' stability.md
 grep -q '<svg' stability.devices.svg

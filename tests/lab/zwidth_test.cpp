@@ -341,7 +341,6 @@ TEST_CASE("axes that mean nothing are refused in one line; columns that cannot e
                            "--portraits /dev/null",
                            "--portraits /dev/null --cells 1",
                            "--portraits /dev/null --cells 1:0.002 --csv /dev/null",
-                           "--portraits /dev/null --cells 1:0.002 --arm",
                            "--page /dev/null --csv /dev/null",
                            "--page /dev/null --portraits /dev/null",
                            "--page /dev/null --rate 500",
@@ -481,6 +480,28 @@ TEST_CASE("behind a delay the arm's port gives what its motors did, not what the
   CHECK(swing.swings);
   CHECK(swing.active);
   CHECK(swing.port_minimum_mj < -50);
+}
+
+TEST_CASE("every hit of a whole arm begins at the wall, whatever the device") {
+  for (const char* device : {"omni", "falcon", "woodenhaptics"}) {
+    Assignment values;
+    values[index_of(AxisId::device)] = device;
+    values[index_of(AxisId::damping)] = "0.003";
+    const Subject subject = subject_of(values);
+    std::vector<std::vector<SwingTick>> curves(kArmHits);
+    TickMeter ticks;
+    watch_arm(walls_scene(subject), subject, 0.5, 0.3, 1, ticks, [&](std::size_t hit) {
+      return [&curve = curves[hit]](const SwingTick& tick) { curve.push_back(tick); };
+    });
+    for (std::size_t hit = 0; hit < kArmHits; ++hit) {
+      CAPTURE(device);
+      CAPTURE(hit);
+      REQUIRE(curves[hit].size() == 300);
+      CHECK(std::abs(curves[hit].front().tip_mm) < 0.3);  // a tick at 200 mm/s and one voxel
+      CHECK(curves[hit].front().mm_per_s < 0);
+      CHECK(curves[hit].back().tip_mm < 0);
+    }
+  }
 }
 
 TEST_CASE("a heavy device's boundary is found, too: its hits last as long as its swings") {

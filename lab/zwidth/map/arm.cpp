@@ -79,6 +79,7 @@ struct ArmHit {
   DeviceVec<double> from, to;
   double mm_per_s;  ///< 0: gently
   DeviceVec<double> normal{0, 1, 0};
+  double wall_mm = kRadiusMm;  ///< of the tool's middle along `normal` at the first contact
 };
 
 /// At a place that the seed shifts.
@@ -97,7 +98,7 @@ std::array<ArmHit, kArmHits> hits_of(const Subject& subject, std::uint64_t seed)
            {above, pressed, kHitsMmPerS[1]},
            {above, pressed, kHitsMmPerS[2]},
            {graze, pressed, 50},
-           {corner + out * kAwayMm, corner - out * depth_mm, 50, out}}};
+           {corner + out * kAwayMm, corner - out * depth_mm, 50, out, dot(corner, out)}}};
 }
 
 /// Each hit from its start, a stay, and off again by the way it came; high over to the next.
@@ -141,8 +142,9 @@ class Rig {
     driver_->command(out);
     return out;
   }
-  /// What the motors gave the tip, delay and all: the servo books what it asked for.
-  [[nodiscard]] double motor_work_mj() const { return emulator_.model().state().motor_work_mj; }
+  /// The mechanics. Their work is what the motors gave the tip, delay and all: the servo books what
+  /// it asked for.
+  [[nodiscard]] const PlantState& plant() const { return emulator_.model().state(); }
 
  private:
   std::unique_ptr<CompiledScene> servo_;
@@ -158,7 +160,7 @@ constexpr Swing kLost{.swings = true, .active = true};
 /// One hit: nothing before the first contact; the verdict after `seconds`. None where the hand does
 /// not bring the device to the wall.
 std::optional<Swing> watch_hit(Rig& rig, const Subject& subject, const ArmHit& hit, double seconds,
-                               TickMeter& ticks) {
+                               TickMeter& ticks, const SwingWatch& watch) {
   const double rate_hz = 1 / subject.loop.period_s;
   const std::int64_t count = std::llround(seconds * rate_hz);
   constexpr double kPatienceS = 8;  // calibration, the way there, and a stay that chattered away
@@ -185,11 +187,28 @@ std::optional<Swing> watch_hit(Rig& rig, const Subject& subject, const ArmHit& h
       away = free ? away + 1 : 0;
     } else if (judged > 0 || out.contact) {
       const DeviceVec<double> tip_mm{out.position_mm[0], out.position_mm[1], out.position_mm[2]};
-      meter.take(dot(tip_mm, hit.normal), rig.motor_work_mj());
+      meter.take(dot(tip_mm, hit.normal), rig.plant().motor_work_mj);
+      if (watch) {
+        watch({dot(rig.plant().pose.tip_mm, hit.normal) - hit.wall_mm,
+               dot(rig.plant().velocity, hit.normal)});
+      }
       ++judged;
     }
   }
   return meter.swing();
+}
+
+/// The scene of one cell.
+LoadedScene cell_scene(const LoadedScene& scene, const Subject& subject,
+                       double stiffness_n_per_mm) {
+  LoadedScene own = scene;
+  own.force.stiffness_n_per_mm = stiffness_n_per_mm;
+  if (subject.law == Law::paper) {
+    own.force.p0_n_per_mm2 = 1;
+    own.force.p0_n_per_mm2 = stiffness_n_per_mm / device_stiffness_n_per_mm(own);
+  }
+  own.force.law = force_law_at(subject, stiffness_n_per_mm);
+  return own;
 }
 
 }  // namespace
@@ -230,23 +249,26 @@ LoadedScene walls_scene(const Subject& subject) {
 
 Swing hit_with_arm(const LoadedScene& scene, const Subject& subject, double stiffness_n_per_mm,
                    double seconds, std::uint64_t seed, TickMeter& ticks) {
-  LoadedScene own = scene;
-  own.force.stiffness_n_per_mm = stiffness_n_per_mm;
-  if (subject.law == Law::paper) {
-    own.force.p0_n_per_mm2 = 1;
-    own.force.p0_n_per_mm2 = stiffness_n_per_mm / device_stiffness_n_per_mm(own);
-  }
-  own.force.law = force_law_at(subject, stiffness_n_per_mm);
   const std::array<ArmHit, kArmHits> hits = hits_of(subject, seed);
-  Rig rig(std::move(own), subject, script_of(hits, seconds));
+  Rig rig(cell_scene(scene, subject, stiffness_n_per_mm), subject, script_of(hits, seconds));
   Swing worst;
   for (const ArmHit& hit : hits) {
-    const std::optional<Swing> seen = watch_hit(rig, subject, hit, seconds, ticks);
+    const std::optional<Swing> seen = watch_hit(rig, subject, hit, seconds, ticks, {});
     if (!seen && !worst.swings && !worst.active) throw NotMet();
     worst.join(seen.value_or(kLost));
     if (worst.swings && worst.active) break;
   }
   return worst;
+}
+
+void watch_arm(const LoadedScene& scene, const Subject& subject, double stiffness_n_per_mm,
+               double seconds, std::uint64_t seed, TickMeter& ticks,
+               const std::function<SwingWatch(std::size_t hit)>& begin) {
+  const std::array<ArmHit, kArmHits> hits = hits_of(subject, seed);
+  Rig rig(cell_scene(scene, subject, stiffness_n_per_mm), subject, script_of(hits, seconds));
+  for (std::size_t h = 0; h < hits.size(); ++h) {
+    if (!watch_hit(rig, subject, hits[h], seconds, ticks, begin(h))) return;
+  }
 }
 
 }  // namespace kerf::zwidth

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 
 #include "controller/load/loaded_scene.hpp"
 #include "hil/hil_error.hpp"
@@ -41,5 +42,12 @@ class NotMet : public HilError {
 [[nodiscard]] Swing hit_with_arm(const LoadedScene& scene, const Subject& subject,
                                  double stiffness_n_per_mm, double seconds, std::uint64_t seed,
                                  TickMeter& ticks);
+
+/// The same hits one after the other, whatever they show, until the hand no longer brings the
+/// device to the wall: `begin` gives for each who is told of its ticks, by the device's true
+/// mechanics.
+void watch_arm(const LoadedScene& scene, const Subject& subject, double stiffness_n_per_mm,
+               double seconds, std::uint64_t seed, TickMeter& ticks,
+               const std::function<SwingWatch(std::size_t hit)>& begin);
 
 }  // namespace kerf::zwidth

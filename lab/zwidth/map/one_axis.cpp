@@ -135,7 +135,7 @@ Swing lost(const SwingMeter& meter, double travel_mm = 0, double given_mj = 0) {
 
 template <class N>
 Swing hit(const Subject& subject, double stiffness, double hit_mm_per_s, double seconds,
-          std::uint64_t seed, TickMeter& ticks, const OneAxisWatch& watch) {
+          std::uint64_t seed, TickMeter& ticks, const SwingWatch& watch) {
   const SampledLoop& loop = subject.loop;
   const double push_n = loop.coulomb_n + subject.push_n;
   OneAxis axis(loop, shift_of(seed) * loop.quantum_mm);
@@ -155,10 +155,7 @@ Swing hit(const Subject& subject, double stiffness, double hit_mm_per_s, double 
     if (!std::isfinite(asked_n)) return lost(meter);  // the servo would latch a fault
     axis.tick(asked_n, -push_n);
     meter.take(axis.place_mm(), axis.motor_work_mj());
-    if (watch) {
-      watch({static_cast<double>(tick + 1) * loop.period_s, axis.place_mm(), axis.mm_per_s(),
-             axis.motor_n()});
-    }
+    if (watch) watch({axis.place_mm(), axis.mm_per_s()});
     still = axis.stuck() ? still + 1 : 0;
     if (still > settled) return meter.rest();
     if (!(std::abs(axis.place_mm()) < kFarMm)) return lost(meter, kFarMm, axis.motor_work_mj());
@@ -169,8 +166,7 @@ Swing hit(const Subject& subject, double stiffness, double hit_mm_per_s, double 
 }  // namespace
 
 Swing hit_one_axis(const Subject& subject, double stiffness_n_per_mm, double hit_mm_per_s,
-                   double seconds, std::uint64_t seed, TickMeter& ticks,
-                   const OneAxisWatch& watch) {
+                   double seconds, std::uint64_t seed, TickMeter& ticks, const SwingWatch& watch) {
   switch (subject.numeric) {
     case NumericKind::float32:
       return hit<FloatNumbers>(subject, stiffness_n_per_mm, hit_mm_per_s, seconds, seed, ticks,

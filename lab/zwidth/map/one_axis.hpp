@@ -3,7 +3,6 @@
 
 #include <array>
 #include <cstdint>
-#include <functional>
 
 #include "lab/zwidth/map/subject.hpp"
 #include "lab/zwidth/map/swing.hpp"
@@ -16,12 +15,6 @@ namespace kerf::zwidth {
 inline constexpr std::array<double, 3> kHitsMmPerS{0, 50, 200};
 inline constexpr double kStartMm = 0.1;
 
-/// One tick of a run, for a phase portrait.
-struct OneAxisTick {
-  double seconds, tip_mm, mm_per_s, force_n;
-};
-using OneAxisWatch = std::function<void(const OneAxisTick&)>;
-
 /// One axis against a wall at 0, the solid below: exact mechanics and the servo's own coupling,
 /// velocity window and force limits, in the subject's numbers.
 ///
@@ -29,6 +22,6 @@ using OneAxisWatch = std::function<void(const OneAxisTick&)>;
 /// Returns the verdict of `seconds`. The same arguments give the same bits. Throws Interrupted.
 [[nodiscard]] Swing hit_one_axis(const Subject& subject, double stiffness_n_per_mm,
                                  double hit_mm_per_s, double seconds, std::uint64_t seed,
-                                 TickMeter& ticks, const OneAxisWatch& watch = {});
+                                 TickMeter& ticks, const SwingWatch& watch = {});
 
 }  // namespace kerf::zwidth

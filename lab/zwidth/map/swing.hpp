@@ -5,6 +5,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <limits>
 
 namespace kerf::zwidth {
@@ -30,6 +31,14 @@ struct Swing {
     port_minimum_mj = std::min(port_minimum_mj, other.port_minimum_mj);
   }
 };
+
+/// One tick of a run, for a phase portrait: how far the tip is out of the wall, and how fast it
+/// leaves, along the normal.
+struct SwingTick {
+  double tip_mm, mm_per_s;
+};
+/// Told of each tick; empty: nobody.
+using SwingWatch = std::function<void(const SwingTick&)>;
 
 /// Follows one run of a known number of ticks.
 class SwingMeter {

@@ -2,6 +2,7 @@
 #include "lab/zwidth/picture/portraits.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <mutex>
@@ -10,6 +11,7 @@
 #include <utility>
 
 #include "hil/hil_error.hpp"
+#include "lab/zwidth/map/arm.hpp"
 #include "lab/zwidth/map/one_axis.hpp"
 #include "lab/zwidth/map/tick_watch.hpp"
 #include "lab/zwidth/picture/legend.hpp"
@@ -33,7 +35,7 @@ std::pair<double, double> cell_in(const std::string& text) {
   return {*stiffness, *damping};
 }
 
-using Curve = std::vector<OneAxisTick>;
+using Curve = std::vector<SwingTick>;
 using Curves = std::vector<Curve>;  // one for each hit
 
 /// A curve without the points that lie within half a pixel of the last one drawn: at 32 kHz there
@@ -44,7 +46,7 @@ class Thinning {
   explicit Thinning(const Curves& curves) {
     double left = 0, right = 0, low = 0, high = 0;
     for (const Curve& curve : curves) {
-      for (const OneAxisTick& tick : curve) {
+      for (const SwingTick& tick : curve) {
         left = std::min(left, tick.tip_mm);
         right = std::max(right, tick.tip_mm);
         low = std::min(low, tick.mm_per_s);
@@ -56,8 +58,8 @@ class Thinning {
   }
 
   void write(std::ostream& script, const Curve& curve) const {
-    const OneAxisTick* drawn = nullptr;
-    for (const OneAxisTick& tick : curve) {
+    const SwingTick* drawn = nullptr;
+    for (const SwingTick& tick : curve) {
       if (drawn != nullptr && &tick != &curve.back() && is_near(*drawn, tick)) continue;
       script << tick.tip_mm << ' ' << tick.mm_per_s << '\n';
       drawn = &tick;
@@ -65,14 +67,45 @@ class Thinning {
   }
 
  private:
-  [[nodiscard]] bool is_near(const OneAxisTick& a, const OneAxisTick& b) const {
+  [[nodiscard]] bool is_near(const SwingTick& a, const SwingTick& b) const {
     return std::abs(a.tip_mm - b.tip_mm) <= wide_ && std::abs(a.mm_per_s - b.mm_per_s) <= tall_;
   }
   double wide_, tall_;
 };
 
+Curves curves_of_axis(const MapSpec& spec, const Subject& subject, double stiffness,
+                      TickMeter& ticks) {
+  Curves curves;
+  for (const double speed : kHitsMmPerS) {
+    Curve& curve = curves.emplace_back();
+    static_cast<void>(hit_one_axis(subject, stiffness, speed, spec.seconds, spec.seed, ticks,
+                                   [&](const SwingTick& tick) { curve.push_back(tick); }));
+  }
+  return curves;
+}
+
+Curves curves_of_arm(const MapSpec& spec, const Subject& subject, double stiffness,
+                     TickMeter& ticks) {
+  Curves curves(kArmHits);
+  watch_arm(walls_scene(subject), subject, stiffness, spec.seconds, spec.seed, ticks,
+            [&](std::size_t hit) {
+              return [&curve = curves[hit]](const SwingTick& tick) { curve.push_back(tick); };
+            });
+  std::erase_if(curves, [](const Curve& curve) { return curve.empty(); });
+  if (curves.empty()) throw NotMet();
+  return curves;
+}
+
 void draw(std::ostream& script, const std::string& title, const Curves& curves) {
-  constexpr const char* kHitLines[] = {"'#0072B2'", "'#D55E00'", "'#009E73'"};
+  struct Hit {
+    const char* name;
+    const char* colour;
+  };
+  constexpr std::array<Hit, kArmHits> kHits{{{"push", "#0072B2"},
+                                             {"50 mm/s", "#D55E00"},
+                                             {"200 mm/s", "#009E73"},
+                                             {"slide", "#CC79A7"},
+                                             {"corner", "#E69F00"}}};
   const Thinning thinning(curves);
   for (std::size_t h = 0; h < curves.size(); ++h) {
     gnuplot_block(script, ("hit" + std::to_string(h)).c_str(),
@@ -80,9 +113,8 @@ void draw(std::ostream& script, const std::string& title, const Curves& curves) 
   }
   script << "set title \"" << title << "\" noenhanced\nplot ";
   for (std::size_t h = curves.size(); h-- > 0;) {
-    script << "$hit" << h << " using 1:2 title '"
-           << (h == 0 ? "push" : number_text(kHitsMmPerS[h]) + " mm/s")
-           << "' with lines linecolor rgb " << kHitLines[h] << (h > 0 ? ", " : "\n");
+    script << "$hit" << h << " using 1:2 title '" << kHits[h].name << "' with lines linecolor rgb '"
+           << kHits[h].colour << (h > 0 ? "', " : "'\n");
   }
 }
 
@@ -90,7 +122,6 @@ void draw(std::ostream& script, const std::string& title, const Curves& curves) 
 
 std::string portraits_of(const MapSpec& spec, const std::vector<std::string>& cells) {
   constexpr std::size_t kMost = 12;
-  if (spec.arm) throw HilError("--portraits: of one axis alone; leave --arm out");
   if (cells.empty() || cells.size() > kMost) {
     throw HilError("--portraits: give --cells, 1 to 12 of them, such as 2:0.002,20:0.002");
   }
@@ -117,19 +148,15 @@ std::string portraits_of(const MapSpec& spec, const std::vector<std::string>& ce
   script << "set label 1 \"" << foot_of(spec, AxisId::damping) << "\" at screen 0.02, screen "
          << 30.0 / layout.height << " left noenhanced font ',11' textcolor rgb '#555555'\n";
   script << "set xlabel 'place of the tip, wall at 0 (mm)'\nset ylabel 'speed (mm/s)'\n"
-            "set grid back linecolor rgb '#dddddd'\nset key right top samplen 2\n";
+            "set grid back linecolor rgb '#dddddd'\nset key right top samplen 2 opaque\n";
   std::mutex no_results;
   TickWatch watch(no_results);
   for (const auto& [stiffness, damping] : places) {
     subject.damping_ns_per_mm = damping;
-    Curves curves;
     TickMeter ticks;
     const TickWatch::Watched watched(watch, ticks, laws_of(spec.columns().front()));
-    for (const double speed : kHitsMmPerS) {
-      Curve& curve = curves.emplace_back();
-      static_cast<void>(hit_one_axis(subject, stiffness, speed, spec.seconds, spec.seed, ticks,
-                                     [&](const OneAxisTick& tick) { curve.push_back(tick); }));
-    }
+    const Curves curves = spec.arm ? curves_of_arm(spec, subject, stiffness, ticks)
+                                   : curves_of_axis(spec, subject, stiffness, ticks);
     draw(script, format("K %g N/mm, B %g N s/mm", stiffness, damping), curves);
   }
   script << "unset multiplot\n";
