@@ -131,6 +131,11 @@ void Contract::follow_report(double time_ms) {
     if (before) moved_mm_ = told_pose->tip_mm - before->tip_mm;
     pose_ = told_pose;
     pose_ms_ = time_ms;
+    if (norm(moved_mm_) > outward_.reach_mm()) {
+      way_in_is_known_ = false;
+    } else if (!way_in_is_known_ && norm(last_.force_n) <= kPushN) {
+      way_in_is_known_ = outward_.is_free(pose_->tip_mm);
+    }
     no_pose_since_ms_ = -1;
   } else if (no_pose_since_ms_ < 0) {
     no_pose_since_ms_ = time_ms;
@@ -268,7 +273,8 @@ void Contract::check_hold(const Command& command) {
 }
 
 void Contract::check_direction(const Command& command) {
-  const auto out = norm(command.force_n) > kPushN ? outward_.at(pose_->tip_mm) : std::nullopt;
+  const bool pushes = norm(command.force_n) > kPushN;
+  const auto out = pushes && way_in_is_known_ ? outward_.at(pose_->tip_mm) : std::nullopt;
   const bool inward = out && dot(*out, command.force_n) < 0;
   if (!inward) {
     inward_since_ms_ = -1;

@@ -100,6 +100,7 @@ class Contract {
   Command last_;
   DeviceVec<double> held_n_;  ///< sent after the last report
   double heat_n2_ = 0;
+  bool way_in_is_known_ = true;  ///< false: a jump of the tip may have gone through the solid
   double inward_since_ms_ = -1;  ///< the force points into the solid; negative: it does not
   bool silence_told_ = false;
   double began_off_ms_ = 0;  ///< the last packet that asks for nothing, after one that did

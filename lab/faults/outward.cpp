@@ -26,8 +26,9 @@ Outward::Outward(const LoadedScene& scene) : scene_(scene) {
   radius_mm_ = tool.radius_mm + std::max({spacing[0], spacing[1], spacing[2]});
 }
 
-std::optional<DeviceVec<double>> Outward::at(DeviceVec<double> tip_mm) const {
-  if (volume_ == nullptr) return std::nullopt;
+Outward::Covered Outward::covered(DeviceVec<double> tip_mm) const {
+  Covered covered;
+  if (volume_ == nullptr) return covered;
   const auto& device = scene_.device;
   const vec3::Vec world = device.workspace_scale * vec3::Vec{tip_mm.x, tip_mm.y, tip_mm.z} +
                           device.offset_mm - volume_->pose.position_mm;
@@ -44,21 +45,24 @@ std::optional<DeviceVec<double>> Outward::at(DeviceVec<double> tip_mm) const {
     hi[i] = static_cast<std::int32_t>(
         std::clamp(std::floor((middle[i] + radius_mm_) / spacing[i]) + 1, 0.0, end));
   }
-  vec3::Vec sum{};
-  double covered = 0;
   for (std::int32_t z = lo[2]; z < hi[2]; ++z) {
     for (std::int32_t y = lo[1]; y < hi[1]; ++y) {
       for (std::int32_t x = lo[0]; x < hi[0]; ++x) {
         if (volume_->image.density[grid.index(x, y, z)] < volume_->iso) continue;
         const vec3::Vec arm = vec3::Vec{x * spacing[0], y * spacing[1], z * spacing[2]} - middle;
         if (vec3::dot(arm, arm) > radius_mm_ * radius_mm_) continue;
-        sum = sum + arm;
-        ++covered;
+        covered.sum = covered.sum + arm;
+        ++covered.voxels;
       }
     }
   }
+  return covered;
+}
+
+std::optional<DeviceVec<double>> Outward::at(DeviceVec<double> tip_mm) const {
+  const auto [sum, voxels] = covered(tip_mm);
   constexpr double kOwnMiddle = 0.1;  // of the radius: nothing tells the way out
-  if (covered == 0 || vec3::length(sum) < kOwnMiddle * radius_mm_ * covered) return std::nullopt;
+  if (voxels == 0 || vec3::length(sum) < kOwnMiddle * radius_mm_ * voxels) return std::nullopt;
   const vec3::Vec inward = vec3::unit(sum);
   DeviceVec<double> out;
   const auto along = [&](std::size_t row) {

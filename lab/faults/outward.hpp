@@ -20,7 +20,21 @@ class Outward {
   /// where the scene is another one.
   [[nodiscard]] std::optional<DeviceVec<double>> at(DeviceVec<double> tip_mm) const;
 
+  /// The ball covers nothing there.
+  [[nodiscard]] bool is_free(DeviceVec<double> tip_mm) const { return covered(tip_mm).voxels == 0; }
+
+  /// How far a ball may be moved at once, device mm, so that what it covers there tells the way by
+  /// which it came: its radius. From farther off it may have passed through the solid, and the way
+  /// out at that place is the one on the other side.
+  [[nodiscard]] double reach_mm() const { return radius_mm_ / scene_.device.workspace_scale; }
+
  private:
+  struct Covered {
+    std::array<double, 3> sum{};  ///< from the ball's middle, mm along the volume's axes
+    double voxels = 0;
+  };
+  [[nodiscard]] Covered covered(DeviceVec<double> tip_mm) const;
+
   const LoadedScene& scene_;
   const SceneVolume* volume_ = nullptr;  ///< none: another scene
   double radius_mm_ = 0;

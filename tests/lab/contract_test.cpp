@@ -299,4 +299,6 @@ TEST_CASE("a force into the solid is seen, whatever the motors' signs are") {
   CHECK(out->y == doctest::Approx(1).epsilon(0.02));
   CHECK_FALSE(outward.at({0, 3 * radius_mm, 0}));
   CHECK_FALSE(outward.at({0, -2 * radius_mm, 0}));
+  CHECK(outward.is_free({0, 3 * radius_mm, 0}));
+  CHECK_FALSE(outward.is_free({0, radius_mm / 2, 0}));
 }

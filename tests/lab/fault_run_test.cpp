@@ -12,22 +12,24 @@ using kerf::Personality;
 
 namespace {
 
-kerf::LoadedScene falcon_scene() {
+kerf::LoadedScene falcon_scene(int rate_hz = 1000) {
   kerf::LoadedScene scene = kerf::test::half_space_scene();
   scene.device.personality = Personality::falcon;
   scene.device.torque_scale = kerf::FalconParams().torque_scale();
   scene.servo.numeric = kerf::NumericKind::float32;
+  scene.servo.rate_hz = rate_hz;
   return scene;
 }
 
 /// A Falcon whose hand comes down on a half-space and presses on; a servo in float.
-kerf::faults::Outcome pressing_falcon(const DeviceFault& fault) {
-  const kerf::LoadedScene scene = falcon_scene();
+kerf::faults::Outcome pressing_falcon(const DeviceFault& fault, const char* latches = "not_finite",
+                                      int rate_hz = 1000) {
+  const kerf::LoadedScene scene = falcon_scene(rate_hz);
   kerf::HandScript hand;
   hand.start = {0, 4, 0};
   hand.steps = {kerf::hand_move({0, -1, 0}, 0.4), kerf::hand_move({0, -1, 0}, 10)};
   return kerf::faults::run_faults({.scene = scene, .hand = hand},
-                                  {.faults = {fault}, .latches = "not_finite"});
+                                  {.faults = {fault}, .latches = latches});
 }
 
 /// The same hand, and it stays above.
@@ -53,6 +55,19 @@ TEST_CASE(
   CHECK(outcome.latched == "not_finite");
   CHECK(outcome.vacuous.empty());
   CHECK_FALSE(outcome.pushed_again);
+}
+
+TEST_CASE("a jump through the solid that no speed limit sees is pulled back the way it came") {
+  // At 250 Hz 40 mm are below 10 m/s, and the half-space is 16 mm thick.
+  for (const int counts : {200, 300, 400, 500}) {
+    CAPTURE(counts);
+    const DeviceFault jump{
+        .kind = FaultKind::jump, .at_s = 0.2, .for_s = 0.1, .axis = 0, .counts = counts};
+    const auto outcome = pressing_falcon(jump, "", 250);
+    for (const std::string& violation : outcome.violations) MESSAGE(violation);
+    CHECK(outcome.violation_count == 0);
+    CHECK(outcome.vacuous.empty());
+  }
 }
 
 TEST_CASE("a run without contact, or whose fault never was, shows nothing and says so") {
