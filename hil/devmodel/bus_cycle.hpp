@@ -9,7 +9,8 @@
 namespace kerf {
 
 inline constexpr int kCyclesPerSecond = 8000;
-inline constexpr int kCyclesPerUsbFrame = kCyclesPerSecond / 1000;
+inline constexpr int kUsbFramesPerSecond = 1000;
+inline constexpr int kCyclesPerUsbFrame = kCyclesPerSecond / kUsbFramesPerSecond;
 inline constexpr double kCycleS = 1.0 / kCyclesPerSecond;
 inline constexpr int kStepsPerCycle = 4;  // 31 us: far below the fastest spring-mass period here
 inline constexpr double kStepS = kCycleS / kStepsPerCycle;

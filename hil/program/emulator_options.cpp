@@ -118,7 +118,7 @@ void check_front(const EmulatorOptions& o) {
   if (is_usb && o.lockstep) {
     throw HilError("--lockstep: the USB front runs by its own clock; use --front socket");
   }
-  const int fastest = is_omni ? kCyclesPerSecond : 1000;  // a bus cycle, a frame
+  const int fastest = is_omni ? kCyclesPerSecond : kUsbFramesPerSecond;
   if (o.rate_hz < 1 || fastest % o.rate_hz != 0) {
     throw HilError("--rate: " + std::to_string(o.rate_hz) + " does not divide " +
                    std::to_string(fastest) + ", the rate of the bus; use such as 500 or 1000");

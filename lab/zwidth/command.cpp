@@ -100,6 +100,20 @@ void Command::try_laws(const MapSpec& map, std::ostream& out) {
   }
 }
 
+namespace {
+
+/// A map has one column at least that can exist; those that cannot are left empty.
+void check_columns(const MapSpec& map) {
+  std::string why;
+  for (const Assignment& values : map.columns()) {
+    why = impossible(map, subject_of(values));
+    if (why.empty()) return;
+  }
+  throw HilError("no column of this map can exist: " + why);
+}
+
+}  // namespace
+
 MapSpec Command::spec() const {
   MapSpec spec;
   const std::size_t comma = map_.find(',');
@@ -287,6 +301,7 @@ int Command::run(std::ostream& out) const {
   }
   const MapSpec map = spec();
   const Shard part = shard();
+  check_columns(map);
   std::vector<std::string> kept_in;
   if (!part_.empty()) kept_in.push_back(part_);
   const Outputs outputs(paths_, kept_in);

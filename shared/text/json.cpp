@@ -200,7 +200,9 @@ Json Json::parse(std::string_view text) {
   try {
     return from_library(ordered_json::parse(text), kMostLevels);
   } catch (const ordered_json::exception& error) {
-    throw JsonError(error.what());
+    const std::string text = error.what();  // "[json.exception.parse_error.101] parse error at ..."
+    const std::size_t end = text.find("] ");
+    throw JsonError(end == text.npos ? text : text.substr(end + 2));
   }
 }
 

@@ -376,10 +376,30 @@ TEST_CASE("what the emulated device cannot do, or the hand never meets, is empty
     CHECK(said.code == 0);
     return said.out;
   };
-  CHECK(told("--delay 9").find("1 of 1 columns are left empty: delay 9 ms") != std::string::npos);
-  CHECK(told("--delay 0.33").find("empty: delay 0.33 ms") != std::string::npos);
+  CHECK(told("--delay 1,9").find("1 of 2 columns are left empty: delay 9 ms") != std::string::npos);
+  CHECK(told("--device falcon --rate 500,2000")
+            .find("1 of 2 columns are left empty: rate 2000 Hz:") != std::string::npos);
+  CHECK(told("--delay 0.33,1").find("empty: delay 0.33 ms") != std::string::npos);
   CHECK(told("--friction 3").find("empty: the hand did not bring the device to the wall") !=
         std::string::npos);
+}
+
+TEST_CASE("a map without any column that can exist is refused in one line") {
+  for (const char* line :
+       {"--damping 0.1:0.2:3", "--arm --damping 0 --delay 64", "--arm --damping 0 --rate 333"}) {
+    const Said said = lab(std::string("zwidth --stiffness 0.3,3 --seconds 0.1 ") + line);
+    CAPTURE(line);
+    CHECK(said.code == 2);
+    CHECK(said.err.find("no column of this map can exist: ") != std::string::npos);
+    CHECK(std::count(said.err.begin(), said.err.end(), '\n') == 1);
+  }
+}
+
+TEST_CASE("behind a long delay a short hit does not take a flight for rest") {
+  const Column column =
+      column_of("0.5,1,2,5,10", 0.1, {{AxisId::delay, "64"}, {AxisId::damping, "0"}});
+  CHECK(column.swing.re_entry_from_n_per_mm == 0);
+  CHECK(column.cells.back().swings);
 }
 
 TEST_CASE("a column tells its first crossing and what comes to rest above it apart") {

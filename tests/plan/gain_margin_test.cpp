@@ -207,6 +207,14 @@ TEST_CASE("the paper's force is judged with friction, which alone holds it, and 
   CHECK(gain_warning(scene, linear(scene)) == "");
 }
 
+TEST_CASE("damping that is unstable without a wall leaves no stiffness, with friction neither") {
+  for (const double damping : {0.6, 0.65, 0.7, 0.75, 0.8, 0.95}) {
+    const GainMargin margin = gain_margin(scene_of(0.4, damping, 250));
+    CHECK(margin.highest_n_per_mm == 0);
+    CHECK(margin.with_friction() == 0);
+  }
+}
+
 TEST_CASE("the ends of what a scene may say give numbers and one line each") {
   for (const int rate_hz : {250, 8000}) {
     for (const double stiffness : {kMinStiffnessNPerMm, kMaxStiffnessNPerMm}) {

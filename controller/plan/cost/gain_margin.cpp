@@ -71,8 +71,10 @@ void set_worst_slope(const LoadedScene& scene, const SampledLoop& loop, GainMarg
   }
 }
 
-/// From the linear boundary up, by doubling and then halving to 1 %.
+/// From the linear boundary up, by doubling and then halving to 1 %. Damping that is unstable
+/// without any wall leaves none: friction holds only what is small then, whatever one blow shows.
 double with_friction(const SampledLoop& loop, double damping, double linear_n_per_mm) {
+  if (damping > highest_damping(loop)) return 0;
   const auto swings = [&](double stiffness) {
     return push_on_wall(loop, stiffness, damping, {.push_n = 1}).swings_on();
   };

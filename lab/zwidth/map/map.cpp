@@ -105,7 +105,11 @@ double needed_seconds(const Subject& subject, double stiffness_n_per_mm) {
   const double rate_per_s = ns_per_m / (2 * mass_kg);
   const double slow_s =
       rate_per_s > 0 ? -std::log(SwingMeter::kGoesOn) / (kOfDecay * rate_per_s) : 0;
-  return 3 * std::max(kPeriods * period_s, slow_s);
+  // Let go with the most force for all of the delay, the tip flies until the push has taken the
+  // same impulse back.
+  const double delay_s = subject.loop.delay_s + subject.loop.period_s;
+  const double flight_s = 2 * LimitSettings().force_n * delay_s / subject.push_n;
+  return 3 * std::max(kPeriods * (period_s + flight_s), slow_s);
 }
 
 std::string impossible(const MapSpec& spec, const Subject& subject) {
@@ -120,6 +124,12 @@ std::string impossible(const MapSpec& spec, const Subject& subject) {
   if (spec.arm && !ticks_fit) {
     return format("rate %g Hz: an emulated device has rates that divide 8000 Hz, such as 4000",
                   1 / subject.loop.period_s);
+  }
+  const double rate_hz = 1 / subject.loop.period_s;
+  const bool is_usb = subject.device != Personality::omni;
+  if (spec.arm && is_usb && kUsbFramesPerSecond % std::lround(rate_hz) != 0) {
+    return format("rate %g Hz: a USB device has rates that divide 1000 Hz, its frames, such as 500",
+                  rate_hz);
   }
   const double needed_s = needed_seconds(subject, spec.stiffness_n_per_mm.front());
   if (needed_s > kLongestS) {

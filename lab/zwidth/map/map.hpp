@@ -46,9 +46,10 @@ struct Column {
 using Columns = std::map<std::size_t, Column>;
 
 /// How long a hit has to last, s, so that its thirds tell a swing that dies out: two periods of the
-/// spring and the mass each; and where damping b takes the swing away, at the rate b/(2 m) without
-/// a wall and less and less up to the boundary, so long that the verdict's ratio puts the boundary
-/// within 1 % of b (S9 asks for 2). 0 for the latter where nothing damps: no boundary is near.
+/// spring and the mass each, and of the flight behind a delay; and where damping b takes the swing
+/// away, at the rate b/(2 m) without a wall and less and less up to the boundary, so long that the
+/// verdict's ratio puts the boundary within 1 % of b (S9 asks for 2). 0 for the latter where
+/// nothing damps: no boundary is near.
 [[nodiscard]] double needed_seconds(const Subject& subject, double stiffness_n_per_mm);
 
 /// Why a column cannot exist: its damping alone is beyond what any sampled wall may have, the

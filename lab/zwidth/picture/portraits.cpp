@@ -148,7 +148,8 @@ std::string portraits_of(const MapSpec& spec, const std::vector<std::string>& ce
   script << "set label 1 \"" << foot_of(spec, AxisId::damping) << "\" at screen 0.02, screen "
          << 30.0 / layout.height << " left noenhanced font ',11' textcolor rgb '#555555'\n";
   script << "set xlabel 'place of the tip, wall at 0 (mm)'\nset ylabel 'speed (mm/s)'\n"
-            "set grid back linecolor rgb '#dddddd'\nset key right top samplen 2 opaque\n";
+            "set grid back linecolor rgb '#dddddd'\nset key right top horizontal samplen 2\nset "
+            "offsets graph 0, 0, graph 0.15, 0\n";
   std::mutex no_results;
   TickWatch watch(no_results);
   for (const auto& [stiffness, damping] : places) {
