@@ -153,12 +153,25 @@ std::string_view cookie_value(std::string_view cookies, std::string_view name) n
   return value_among(cookies, name, ';');
 }
 
+namespace {
+
+/// Nothing, or a colon and digits.
+[[nodiscard]] bool is_port_or_none(std::string_view text) noexcept {
+  return text.empty() ||
+         (text.front() == ':' &&
+          std::all_of(text.begin() + 1, text.end(), [](char c) { return c >= '0' && c <= '9'; }));
+}
+
+}  // namespace
+
 std::string_view host_name(std::string_view host) noexcept {
   if (host.starts_with('[')) {
     const std::size_t end = host.find(']');
-    return end == std::string_view::npos ? std::string_view{} : host.substr(1, end - 1);
+    const bool ends = end != std::string_view::npos && is_port_or_none(host.substr(end + 1));
+    return ends ? host.substr(1, end - 1) : std::string_view{};
   }
-  return host.substr(0, host.rfind(':'));
+  const std::string_view name = host.substr(0, host.find(':'));
+  return is_port_or_none(host.substr(name.size())) ? name : std::string_view{};
 }
 
 bool is_own_host(std::string_view host, const std::vector<std::string>& names) {

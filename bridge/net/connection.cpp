@@ -76,7 +76,7 @@ std::string Server::Impl::page_text(const Request& request, Right right) const {
   if (right == Right::none) {
     reply.status = 401;
     reply.body =
-        token.empty()
+        token_of(request).empty()
             ? "This picture needs a token: open the address that kerf bridge printed, with "
               "all of its ?token=...\n"
             : "This token is none of its own: open the address that kerf bridge printed "
@@ -135,6 +135,9 @@ asio::awaitable<void> Server::Impl::talk_http(std::unique_ptr<WebSocket> ws,
     const Request& request = parser.get();
     const std::string_view host = text(request[http::field::host]);
     const bool head = request.method() == http::verb::head;
+    if (request.count(http::field::host) > 1 || request.count(http::field::origin) > 1) {
+      co_return co_await refuse(link, 400, "This names its host or its origin twice.\n", head);
+    }
     if (!is_own_host(host_name(host), setup_.host_names)) {
       co_return co_await refuse(link, 421, "Open this machine by its address or its own name.\n",
                                 head);

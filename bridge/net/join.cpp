@@ -147,7 +147,7 @@ class Joiner {
     } const watched(*this, link);
     co_await dial(ws, address_, trust_);
     connected_ = true;
-    heard_ns_ = monotonic_ns();
+    opened_ns_ = heard_ns_ = monotonic_ns();
     beast::flat_buffer in;
     for (;;) {
       in.clear();
@@ -177,6 +177,9 @@ class Joiner {
     switch (magic_of(message)) {
       case kHelloMagic: {
         const HelloMessage& hello = mirror_.hello(message, heard_ns_, figures.least_round_trip_ns);
+        // Behind an open connection the server waited for a run: joining begins with the run.
+        const std::int64_t waited_ns = heard_ns_ - opened_ns_ - figures.least_round_trip_ns;
+        if (greeted_ || waited_ns > kNsPerSecond / 2) since_ns_ = heard_ns_;
         desk_.set_link((hello.flags & kMayCommand) != 0 ? CommandDesk::Link::open
                                                         : CommandDesk::Link::read_only);
         if (session_ != 0 && session_ != hello.session) say("a new run");
@@ -273,7 +276,7 @@ class Joiner {
 
   beast::tcp_stream* link_ = nullptr;  // of the connection that lives
   bool connected_ = false, greeted_ = false;
-  std::int64_t heard_ns_ = 0, since_ns_ = 0;
+  std::int64_t heard_ns_ = 0, opened_ns_ = 0, since_ns_ = 0;
   std::string why_closed_, last_reason_;
   std::uint64_t session_ = 0;  // of the run that was shown last
   unsigned joins_ = 0;

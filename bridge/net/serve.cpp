@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "bridge/net/serve.hpp"
 
+#include <algorithm>
+#include <cctype>
 #include <charconv>
 #include <cstdint>
 #include <iostream>
@@ -8,6 +10,8 @@
 #include <string_view>
 #include <utility>
 #include <vector>
+
+#include <boost/asio/ip/address.hpp>
 
 #include "bridge/igtl/igtl_output.hpp"
 #include "bridge/net/bridge_error.hpp"
@@ -38,6 +42,16 @@ HostPort parse_listen(const std::string& text) {
     throw refuse("an IPv6 address stands in brackets");
   }
   if (out.host.empty()) throw refuse("has no host");
+  const auto is_letter = [](unsigned char c) { return std::isalpha(c) != 0; };
+  if (!is_address(out.host) && std::ranges::none_of(out.host, is_letter)) {
+    throw refuse("is no host that another machine can open");  // "*", "0", a number
+  }
+  boost::system::error_code unnamed;
+  const auto address = boost::asio::ip::make_address(out.host, unnamed);
+  if (!unnamed && (address.is_multicast() || out.host == "255.255.255.255" ||
+                   out.host.find('%') != out.host.npos)) {
+    throw refuse("is no address of one machine");
+  }
   const char* const end = text.data() + text.size();
   const auto [stopped, error] = std::from_chars(text.data() + colon + 1, end, out.port);
   if (error != std::errc() || stopped != end) throw refuse("the port is 0 to 65535");

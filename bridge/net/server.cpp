@@ -128,18 +128,43 @@ asio::awaitable<void> Server::Impl::accept_all() {
   }
 }
 
-/// Where all places are taken, the oldest connection of the address that has most of them goes: who
-/// holds many and says nothing keeps nobody else out.
+namespace {
+
+/// Who counts as one: an IPv4 address, or the 64 bits of an IPv6 network, of which one machine has
+/// as many addresses as it likes.
+asio::ip::address_v6::bytes_type host_of(const asio::ip::address& address) {
+  asio::ip::address_v6::bytes_type bytes{};
+  if (address.is_v4())
+    return asio::ip::make_address_v6(asio::ip::v4_mapped, address.to_v4()).to_bytes();
+  bytes = address.to_v6().to_bytes();
+  constexpr std::ptrdiff_t kNetworkBytes = 8;
+  if (!address.to_v6().is_v4_mapped())
+    std::fill(bytes.begin() + kNetworkBytes, bytes.end(), std::uint8_t{0});
+  return bytes;
+}
+
+}  // namespace
+
+/// Where all places are taken, the oldest connection of the host that has most of them goes: who
+/// holds many and says nothing keeps nobody else out. One that waits for the answer to a wrong
+/// token goes last, and never for another of its own host: who guesses gets an answer a second for
+/// each place of one host.
 bool Server::Impl::make_room(const asio::ip::address& newcomer) {
   const auto held_by = [&](const asio::ip::address& address) {
-    return std::ranges::count(handshakes_, address, &HandshakePlace::from);
+    return std::ranges::count(handshakes_, host_of(address),
+                              [](const HandshakePlace* one) { return host_of(one->from()); });
   };
   const bool of_one = held_by(newcomer) >= kMaxHandshakesOfOne;
   if (!of_one && handshakes_.size() < kMaxHandshakes) return true;
   HandshakePlace* oldest = nullptr;
+  const auto goes_before = [&](const HandshakePlace* one) {
+    if (oldest == nullptr) return true;
+    if (one->is_guess != oldest->is_guess) return oldest->is_guess;
+    return held_by(one->from()) > held_by(oldest->from());
+  };
   for (HandshakePlace* one : handshakes_) {
-    if (one->is_guess || (of_one && one->from() != newcomer)) continue;
-    if (oldest == nullptr || held_by(one->from()) > held_by(oldest->from())) oldest = one;
+    if (of_one && (one->is_guess || host_of(one->from()) != host_of(newcomer))) continue;
+    if (goes_before(one)) oldest = one;
   }
   if (oldest == nullptr) return false;
   say_at_most_once_a_second(oldest->from().to_string() + " holds " +

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <ostream>
+#include <stdexcept>
 #include <thread>
 
 #include "controller/scene/scene_setting.hpp"
@@ -188,9 +189,11 @@ int Command::run(std::ostream& out) const {
   try {
     return study(out);
   } catch (const Interrupted&) {
-    out << "interrupted: what stands above was found\n";
-    return 130;
+  } catch (const std::runtime_error&) {  // a signal also stops a volume's reading
+    if (!stop_requested()) throw;
   }
+  out << "interrupted: what stands above was found\n";
+  return 130;
 }
 
 int Command::study(std::ostream& out) const {

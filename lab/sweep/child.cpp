@@ -12,6 +12,7 @@
 #include <fcntl.h>
 #include <spawn.h>
 #include <sys/wait.h>
+#include <unistd.h>
 
 #include "hil/hil_error.hpp"
 
@@ -21,7 +22,14 @@ namespace kerf::sweep {
 
 Child::Child(const std::vector<std::string>& arguments, std::filesystem::path output)
     : output_(std::move(output)) {
+  if (access(arguments[0].c_str(), X_OK) != 0) {
+    throw HilError(arguments[0] + ": cannot be started (" + std::generic_category().message(errno) +
+                   "); build it, or install all of kerf");
+  }
+  // Whatever ends this program, SIGKILL too, ends the child.
+  std::string tied[] = {"setpriv", "--pdeathsig", "TERM", "--"};
   std::vector<char*> argv;
+  for (std::string& word : tied) argv.push_back(word.data());
   for (const std::string& argument : arguments) argv.push_back(const_cast<char*>(argument.c_str()));
   argv.push_back(nullptr);
   posix_spawn_file_actions_t files;
@@ -37,12 +45,12 @@ Child::Child(const std::vector<std::string>& arguments, std::filesystem::path ou
   sigset_t none;
   sigemptyset(&none);
   posix_spawnattr_setsigmask(&own, &none);
-  const int error = posix_spawn(&pid_, argv[0], &files, &own, argv.data(), environ);
+  const int error = posix_spawnp(&pid_, argv[0], &files, &own, argv.data(), environ);
   posix_spawnattr_destroy(&own);
   posix_spawn_file_actions_destroy(&files);
   if (error != 0) {
-    throw HilError(arguments[0] + ": cannot be started (" + std::generic_category().message(error) +
-                   "); build it, or install all of kerf");
+    throw HilError("setpriv: cannot be started (" + std::generic_category().message(error) +
+                   "); install util-linux");
   }
 }
 

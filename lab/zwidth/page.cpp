@@ -70,7 +70,8 @@ constexpr const char* kDevicesText =
 *Linear, exact* is the boundary without friction and encoder steps; the emulated firm hand is 0.1 kg, 0.005 N s/mm,
 0.5 N/mm; in *whole arm* a spring of 0.2 N/mm pushes. Each measured K is the least of three seeds: on one axis at 160
 stiffnesses from 0.05 to 50 N/mm with hits of 2 s, with the whole arm at 14 with hits of 1 s. The recommended one is the
-least of the row over 1.5. The delay of a real device has not been measured; take two periods until it is. Take
+least of the row over 1.5. That margin is also for islands of swings narrower than a step of the map: one was seen at
+0.82 of a first crossing (Omni, no delay, B 0.002). The delay of a real device has not been measured; take two periods until it is. Take
 no more damping than the map bears: beyond its hump the lag of the velocity and the encoder's steps drive the wall.
 
 The devices here are the emulator's. The check of a scene (docs/devices.md, "Gains") takes less viscous damping,

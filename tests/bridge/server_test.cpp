@@ -123,6 +123,9 @@ TEST_CASE("another method, another host and no HTTP are refused") {
   CHECK(has(ask("Host: evil.example\r\n"), "421 "));
   CHECK(has(ask("Host: 127.0.0.1.evil.example:7400\r\n"), "421 "));
   CHECK(has(ask("Host: \r\n"), "421 "));
+  CHECK(has(ask("Host: 127.0.0.1:80@evil.example\r\n"), "421 "));
+  CHECK(has(ask("Host: 127.0.0.1\r\nHost: evil.example\r\n"), "400 "));
+  CHECK(has(ask("Origin: http://127.0.0.1\r\nOrigin: http://evil.example\r\n"), "400 "));
   CHECK(has(ask("Host: localhost:7400\r\n"), "200 OK"));
   CHECK(has(ask("Host: [::1]:7400\r\n"), "200 OK"));
   CHECK(has(ask("Content-Length: 5\r\n"), "400 "));
@@ -305,6 +308,24 @@ TEST_CASE("who holds every place for newcomers and says nothing keeps nobody out
   CHECK(silent.front()->receive(4096).empty());  // it was closed; the newest is not
   silent.back()->send_bytes("GET /?token=" + kLook + " HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n");
   CHECK(has(silent.back()->receive(4096), "200 OK"));
+}
+
+TEST_CASE("who fills every place for newcomers with wrong tokens keeps nobody out") {
+  const TestController controller;
+  ServerSetup setup;
+  setup.wrong_token_ns = 60'000'000'000;
+  const TestBridge bridge(setup);
+  std::vector<std::unique_ptr<RawClient>> guessing;
+  for (std::uint32_t machine = 2; machine <= 6; ++machine) {
+    for (int i = 0; i < 32; ++i) {
+      guessing.push_back(std::make_unique<RawClient>(bridge.port(), machine));
+      guessing.back()->send_bytes("GET /?token=" + kLook + "x HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n");
+    }
+  }
+  std::this_thread::sleep_for(std::chrono::milliseconds(200));
+  CHECK(has(RawClient(bridge.port()).ask("/?token=" + kLook), "200 OK"));
+  TestViewer late(bridge.port());
+  CHECK(late.until_whole());
 }
 
 TEST_CASE("a port that is taken and an address of nobody are told in one line") {
