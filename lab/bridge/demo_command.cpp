@@ -124,26 +124,43 @@ class Demo {
                         at("emulator.log"));
   }
 
-  /// The controller's exit code.
+  /// The controller's exit code; 1 where a part of the demo ended before its time, which is told.
   int wait_for_end() {
-    while (!controller_->ended()) pause(std::chrono::milliseconds(20));
+    while (!controller_->ended()) {
+      for (const auto& [name, part] :
+           {std::pair<const char*, Child*>{"kerf-bridge serve", &pair_->serve()},
+            {"kerf-bridge join", join_.get()},
+            {"kerf-visualizer", visualizer_.get()},
+            {"kerf-emulator", emulator_.get()}}) {
+        if (broken_.empty() && part->ended().value_or(0) != 0) broken_ = end_of(name, *part);
+      }
+      if (!broken_.empty()) controller_->signal(SIGTERM);
+      pause(std::chrono::milliseconds(20));
+    }
+    const int code = *controller_->ended();
+    if (broken_.empty() && code > 128) broken_ = end_of("kerf-controller", *controller_);
+    if (!broken_.empty()) return 1;
     if (window_) visualizer_->signal(SIGTERM);
     wait_for(*visualizer_, seconds(20), [] { return false; });
     join_->signal(SIGTERM);
     wait_for(*join_, seconds(5), [] { return false; });
-    return *controller_->ended();
+    return code;
   }
 
   void tell(std::ostream& out) {
     out << text_in(at("controller.log"));
     out << "on the second machine:\n" << text_in(at("far.log"));
+    if (!broken_.empty()) {
+      out << "two machines: " << broken_ << '\n';
+      return;
+    }
     if (visualizer_->ended() != 0) out << visualizer_->last_line() << '\n';
     if (window_) return;
     const std::string text = text_in(at("visualizer.json"));
     if (text.empty()) return;
     const Json report = Json::parse(text);
     const double wall_ms = report.at("wall_ms").at("p50").get<double>();
-    out << format("%d pictures, %.0f a second when all is drawn anew\n",
+    out << format("%d pictures; the second machine could draw %.0f a second, all of each anew\n",
                   report.at("frames").get<int>(), wall_ms > 0 ? 1e3 / wall_ms : 0.0);
   }
 
@@ -153,12 +170,20 @@ class Demo {
 
  private:
   [[nodiscard]] std::string at(const char* name) const { return folder_ / name; }
+  static std::string end_of(const char* name, Child& part) {
+    const int code = part.ended().value_or(0);
+    const std::string how = code > 128 ? " ended by signal " + std::to_string(code - 128)
+                                       : " ended with exit code " + std::to_string(code);
+    const std::string last = part.last_line();
+    return name + how + (code > 128 || last.empty() ? "" : ": " + last);
+  }
 
   std::filesystem::path folder_;
   TwoNetworks networks_;
   BridgeFiles files_;
   std::string told_;
   bool window_ = false;
+  std::string broken_;  ///< what ended before its time, and how; empty: nothing
   std::unique_ptr<BridgePair> pair_;
   std::unique_ptr<Child> controller_, join_, visualizer_, emulator_;
 };

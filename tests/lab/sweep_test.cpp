@@ -72,6 +72,16 @@ std::map<std::string, std::string> row_of(const std::string& table, int row) {
   return values;
 }
 
+/// Processes that name the folder in their command.
+int processes_of(const std::filesystem::path& folder) {
+  int count = 0;
+  for (const auto& process : std::filesystem::directory_iterator("/proc")) {
+    const std::string line = text_of(process.path() / "cmdline");
+    if (line.find(folder.string()) != std::string::npos) ++count;
+  }
+  return count;
+}
+
 }  // namespace
 
 TEST_CASE("an axis is a range with both ends, or a list; the last axis changes fastest") {
@@ -187,6 +197,20 @@ TEST_CASE("a sweep over fault scripts tells how much each of them changed") {
   CHECK(lost.at("injected") == lost.at("lost_packets"));
   CHECK(std::stoi(lost.at("injected")) > 0);
   CHECK(well.at("injected") == "0");
+}
+
+TEST_CASE("a sweep that is killed takes its programs with it") {
+  const TemporaryFolder folder;
+  setenv("TMPDIR", folder.path().c_str(), 1);
+  Process process(
+      {kBin + "/kerf-lab", "sweep", kScenes + "/touch.toml", "--set", "servo.rate_hz=500,1000",
+       "--seconds", "10000", "--jobs", "1", "--out", (folder / "out").string()},
+      folder / "log");
+  unsetenv("TMPDIR");
+  REQUIRE(eventually([&] { return processes_of(folder.path()) >= 3; }, 60s));
+  process.signal(SIGKILL);
+  process.wait();
+  CHECK(eventually([&] { return processes_of(folder.path()) == 0; }, 20s));
 }
 
 TEST_CASE("ranges that is asked to end leaves nothing behind") {
