@@ -8,6 +8,7 @@
 #include <thread>
 
 #include "controller/scene/scene_setting.hpp"
+#include "hil/hil_error.hpp"
 #include "lab/ranges/extreme_rows.hpp"
 #include "lab/ranges/interrupted.hpp"
 #include "lab/ranges/key_study.hpp"
@@ -150,13 +151,17 @@ KeyTexts texts_of(const std::vector<std::string>& settings) {
 void tell_one(const KeyTexts& texts, const Effort& effort, Teller& teller) {
   const SceneFolder folder;
   for (const NumericKind numeric : effort.numerics) {
-    const Outcome outcome = run_combination(texts, numeric, folder.path() / "scene.toml");
+    const auto file = folder.path() / "scene.toml";
+    const Outcome outcome = run_combination(texts, numeric, file);
+    if (outcome.refused) {  // it names a file that is gone by then
+      const std::size_t place = outcome.refusal.find(": ");
+      throw HilError("--set: " +
+                     outcome.refusal.substr(place == outcome.refusal.npos ? 0 : place + 2));
+    }
     Tally tally;
     tally.add(texts, numeric, outcome);
     teller.row("one", std::string(word_of(numeric)), kTickRules,
-               std::string(word_of(numeric)) + ": " +
-                   (outcome.refused ? "refused: " + outcome.refusal : tally_text(tally)),
-               tally.broken.size());
+               std::string(word_of(numeric)) + ": " + tally_text(tally), tally.broken.size());
     for (const Broken& broken : tally.broken) teller.broken(shrunk(broken));
   }
 }

@@ -92,6 +92,13 @@ TEST_CASE("each extreme names its rule, and a measurement or tests that exist") 
   }
 }
 
+TEST_CASE("a setting that no scene takes is refused in one line, and is no pass") {
+  std::string complained;
+  CHECK(lab({"--set", "force.stiffness_n_per_mm=1e9"}, complained) == 2);
+  CHECK(complained ==
+        "kerf-lab: --set: force.stiffness_n_per_mm = 1e+09 is out of range; use 0.001 to 100\n");
+}
+
 TEST_CASE("the rules see each way to break them, and nothing else") {
   CHECK(rule_broken_by([](DeviceReport&, ServoOutput&) {}).empty());
   CHECK(rule_broken_by([](DeviceReport&, ServoOutput& out) {
