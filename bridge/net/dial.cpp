@@ -24,14 +24,26 @@ constexpr auto kGreetingPatience = 10s;    // TLS and HTTP over a slow link
   throw boost::system::system_error(error);
 }
 
+/// True where something answered that is no HTTP, and not where it broke off.
+[[nodiscard]] bool is_no_http(const ErrorCode& error) {
+  using Http = beast::http::error;
+  return error == Http::bad_version || error == Http::bad_line_ending ||
+         error == Http::bad_status || error == Http::bad_reason || error == Http::bad_field ||
+         error == Http::bad_value;
+}
+
 [[noreturn]] void throw_no_welcome(const ErrorCode& error, unsigned status) {
+  if (is_no_http(error)) throw Hopeless("speaks no HTTP; take the port of a kerf-bridge serve");
   if (error != websocket::error::upgrade_declined) throw boost::system::system_error(error);
   if (status == 400) throw Hopeless("takes no unencrypted viewers; take wss://");
   if (status == 404) throw Hopeless("no kerf-bridge serve answers; take its port");
   if (status == 421) {
     throw Hopeless("does not know itself by this name; take the address it prints");
   }
-  throw BridgeError("answers " + std::to_string(status) + "; is it a kerf-bridge serve?");
+  const std::string answer = "answers " + std::to_string(status) + "; is it a kerf-bridge serve?";
+  // Those of a gateway whose server is not up yet, or has too much to do: that may change.
+  if (status >= 500 || status == 429) throw BridgeError(answer);
+  throw Hopeless(answer);
 }
 
 }  // namespace

@@ -20,6 +20,7 @@
 #include "bridge/net/access.hpp"
 #include "bridge/net/dial.hpp"
 #include "bridge/net/link_figures.hpp"
+#include "bridge/wire/parse.hpp"
 #include "shared/numeric/histogram.hpp"
 #include "shared/posix/monotonic_clock.hpp"
 #include "shared/text/format.hpp"
@@ -117,6 +118,9 @@ class Joiner {
       try {
         co_await follow(WebSocket(tcp::socket(io_), address_.secure ? &tls_ : nullptr));
       } catch (const Hopeless& error) {
+        if (joins_ == 0) throw BridgeError(place() + error.what());
+        lost(error.what());
+      } catch (const WireError& error) {  // another try would hear the same
         if (joins_ == 0) throw BridgeError(place() + error.what());
         lost(error.what());
       } catch (const SegmentError&) {

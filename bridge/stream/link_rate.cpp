@@ -23,7 +23,7 @@ void LinkRate::acked(std::uint64_t frame, std::int64_t now_ns) {
 
 std::size_t LinkRate::window() const noexcept {
   const double highest = *std::max_element(bytes_per_ns_.begin(), bytes_per_ns_.end());
-  const double bytes = kMaxRawBytes + 2 * highest * static_cast<double>(round_trip_ns_);
+  const double bytes = kMaxRawBytes + 2 * highest * static_cast<double>(round_trip_ns_ + kTurnNs);
   return static_cast<std::size_t>(std::min<double>(bytes, kMostBytes));
 }
 

@@ -24,6 +24,7 @@
 #include "controller/scene/scene.hpp"
 #include "controller/scene/scene_file.hpp"
 #include "controller/shell/check_scene.hpp"
+#include "controller/shell/late_note.hpp"
 #include "controller/shell/law_trial.hpp"
 #include "controller/shell/log_line.hpp"
 #include "controller/shell/run_report.hpp"
@@ -253,6 +254,7 @@ int run_controller(const ControllerOptions& options) {
   std::unique_ptr<PacketPort> port;
   try {
     const Hello ours{scene.device.personality, options.virtual_time, scene.servo.rate_hz};
+    const LateNote waits("waiting for a device that answers at --port " + port_text);
     port = open_port(port_text, ours, kPortPatienceMs, stop, io_thread_of(options.real_time));
   } catch (const std::runtime_error&) {
     if (stop) return 1;  // asked to end before there was a device: nothing to tell

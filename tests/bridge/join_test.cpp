@@ -3,12 +3,9 @@
 #include "bridge/net/join.hpp"
 
 #include <algorithm>
-#include <atomic>
 #include <fstream>
 #include <iterator>
-#include <sstream>
 #include <string>
-#include <vector>
 
 #include <arpa/inet.h>
 #include <doctest/doctest.h>
@@ -20,6 +17,7 @@
 #include "bridge/net/certificate.hpp"
 #include "bridge/net/identity.hpp"
 #include "bridge/net/tls_keys.hpp"
+#include "tests/bridge/join_words.hpp"
 #include "tests/bridge/server_bench.hpp"
 
 using namespace kerf;
@@ -53,15 +51,6 @@ struct Lab {
   TestFolder folder;
 };
 
-/// Ends a join as soon as it says something.
-struct StopAtWords : std::stringbuf {
-  int sync() override {
-    stop = true;
-    return 0;
-  }
-  std::atomic<bool> stop{false};
-};
-
 /// A port that is taken, so that nobody else takes it, and at which nobody listens.
 class ClosedPort {
  public:
@@ -83,31 +72,6 @@ class ClosedPort {
   int fd_;
   unsigned port_ = 0;
 };
-
-/// What a join tells first, or with which it ends.
-std::string first_words(const JoinOptions& options) {
-  StopAtWords words;
-  std::ostream said(&words);
-  try {
-    run_join(options, words.stop, said);
-  } catch (const BridgeError& error) {
-    return error.what();
-  }
-  const std::string line = words.str().substr(std::string("kerf-bridge: ").size());
-  return line.substr(0, line.find('\n'));
-}
-
-/// With what a join ends by itself.
-std::string last_words(const JoinOptions& options) {
-  const std::atomic<bool> stop{false};
-  std::ostringstream said;
-  try {
-    run_join(options, stop, said);
-  } catch (const BridgeError& error) {
-    return error.what();
-  }
-  return "no end";
-}
 
 /// A bridge with these keys, and how a join ends that looks at it.
 struct Attempt {

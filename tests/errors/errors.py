@@ -95,6 +95,7 @@ class Runner:
             return -1, odd or 'what it needs could not be made'
         said = (private / 'said').read_text(errors='replace').rstrip('\n').replace(folder, 'DIR')
         said = re.sub(r'process \d+', 'process N', said)
+        said = re.sub(r'^kerf-controller: waiting for .*\n', '', said)  # a note, and no answer yet
         return shell.returncode, said + ''.join(f'\nleft: {name}' for name in left.read_text().splitlines())
 
 

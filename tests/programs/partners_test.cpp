@@ -184,15 +184,21 @@ TEST_CASE("each client gets device and hand anew, and one that does not fit dist
   CHECK(report["peak_motor_force_n"] > 0);
 }
 
-TEST_CASE("a client that comes while another is served gives up in one line") {
+TEST_CASE("a client that comes while another is served says that it waits, and gives up") {
   const Place place;
   const Process emulator(place.emulator({"--stay"}), place.folder / "emulator.log");
   const Process first(place.probe("omni", "60"), place.folder / "first.log");
   REQUIRE(eventually([&] { return first.output().find("counts") != std::string::npos; }, 20s));
   Process second(place.probe("omni"), place.folder / "second.log");
   CHECK(second.wait() == 2);
-  CHECK(is_one_line(second.output()));
-  CHECK(second.output().find("nobody answers") != std::string::npos);
+  const std::string told = second.output();
+  CAPTURE(told);
+  const auto end = told.find('\n') + 1;
+  CHECK(told.substr(0, end) ==
+        "kerf-controller: waiting for a device that answers at --port socket:" + place.socket +
+            "\n");
+  CHECK(is_one_line(told.substr(end)));
+  CHECK(told.find("nobody answers", end) != std::string::npos);
   CHECK(first.output().find("nobody answers") == std::string::npos);
 }
 

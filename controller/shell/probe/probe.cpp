@@ -15,6 +15,7 @@
 #include "controller/device/port/open_port.hpp"
 #include "controller/scene/scene_file.hpp"
 #include "controller/shell/clock.hpp"
+#include "controller/shell/late_note.hpp"
 #include "controller/shell/motor_guard.hpp"
 #include "controller/shell/probe/probe_advice.hpp"
 #include "controller/shell/probe/probe_nodes.hpp"
@@ -136,6 +137,7 @@ std::unique_ptr<PacketPort> open_or_explain(const ControllerOptions& options, Pe
                                             int rate_hz, const std::atomic<bool>& stop) {
   const std::string port = resolve_port(options.port, kind);
   try {
+    const LateNote waits("waiting for a device that answers at --port " + port);
     return open_port(port, {kind, false, rate_hz}, kPatienceMs, stop);
   } catch (const std::runtime_error&) {
     const bool is_emulated = port.starts_with("socket:") || port.starts_with("udp:");
