@@ -63,9 +63,8 @@ HandRoute FalconModel::route() const {
   press.button = 1;
   return {.rest_tip_mm = plant_.rest().tip_mm,
           .calibration = {hand_move({0, 20, 35}, 0.2), hand_move({0, 20, -35}, 0.3), press},
-          .clear_y_mm = 20,
-          .clear_z_mm = -20,
-          .cross_s = 0.1};
+          .detour = HandRoute::Detour{.lift_mm = 0, .y_mm = 20, .z_mm = -20},
+          .hand_rad_per_s = params().hand_rad_per_s()};
 }
 
 FalconReport FalconModel::report() const noexcept {

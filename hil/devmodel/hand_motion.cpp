@@ -10,11 +10,6 @@
 namespace kerf {
 namespace {
 
-/// Position along a rest-to-rest motion of least jerk (Flash and Hogan 1985).
-double smooth(double t) noexcept {
-  return t * t * t * (10 + t * (-15 + 6 * t));
-}
-
 DeviceVec<double> vec_of(const std::array<double, 3>& v) noexcept {
   return {v[0], v[1], v[2]};
 }
@@ -22,24 +17,13 @@ DeviceVec<double> vec_of(const std::array<double, 3>& v) noexcept {
 }  // namespace
 
 HandMotion::HandMotion(const HandScript& script, const HandRoute& route)
-    : rest_mm_(route.rest_tip_mm),
-      start_mm_(vec_of(script.start) * script.unit_mm),
-      from_mm_(route.rest_tip_mm) {
-  const DeviceVec<double> rest = rest_mm_;
-  const DeviceVec<double> start = start_mm_;
+    : route_(route), start_mm_(vec_of(script.start) * script.unit_mm), from_mm_(route.rest_tip_mm) {
   for (const HandStep& step : route.calibration) add(step, 1.0);
-  leaves_at_ = legs_.size();
-  if (route.lift_mm > 0) {
-    add(hand_move(rest + DeviceVec<double>{0, route.lift_mm, 0}, route.lift_s), 1.0);
-  }
-  if (route.cross_s > 0) {
-    const double clear_y = std::max(route.clear_y_mm, start.y);
-    add(hand_move({start.x, clear_y, route.clear_z_mm}, route.cross_s), 1.0);
-  }
-  add(hand_move(start, route.approach_s), 1.0);
-  const std::size_t script_from = legs_.size();
+  reach_ = legs_.size();
+  legs_.emplace_back();
+  begin_reach();
   for (const HandStep& step : script.steps) add(step, script.unit_mm);
-  repeat_from_ = script.repeat_from ? script_from + *script.repeat_from : legs_.size();
+  repeat_from_ = script.repeat_from ? reach_ + 1 + *script.repeat_from : legs_.size();
 }
 
 void HandMotion::calibrate() noexcept {
@@ -47,7 +31,10 @@ void HandMotion::calibrate() noexcept {
 }
 
 void HandMotion::leave() noexcept {
-  if (phase_ == Phase::resting) leg_ = leaves_at_;
+  if (phase_ == Phase::resting) {
+    leg_ = reach_;
+    begin_reach();
+  }
   phase_ = Phase::left;  // a motion of the calibration that has begun comes to its end
 }
 
@@ -55,7 +42,7 @@ void HandMotion::rest() noexcept {
   phase_ = Phase::resting;
   leg_ = 0;
   cycle_ = 0;
-  from_mm_ = rest_mm_;
+  from_mm_ = route_.rest_tip_mm;
   from_orientation_rad_ = {};
 }
 
@@ -67,7 +54,14 @@ void HandMotion::add(const HandStep& step, double unit_mm) {
   legs_.push_back(leg);
 }
 
+void HandMotion::begin_reach() noexcept {
+  way_ = reach_curve(route_, from_mm_, start_mm_);
+  legs_[reach_].cycles =
+      std::max<std::int64_t>(1, cycles_of(way_.least_seconds(route_.hand_rad_per_s)));
+}
+
 DeviceVec<double> HandMotion::position(const Leg& leg, double progress) const noexcept {
+  if (&leg == &legs_[reach_]) return way_.at(progress);
   const HandStep& step = leg.step;
   const double turn = 2 * std::numbers::pi * progress;
   const DeviceVec<double> sunk{0, -step.sink * progress, 0};
@@ -80,7 +74,8 @@ DeviceVec<double> HandMotion::position(const Leg& leg, double progress) const no
       // A quarter of the way spirals out, a quarter back in.
       constexpr double kQuarters = 4.0;
       const double radius =
-          step.size[0] * smooth(std::min({1.0, kQuarters * progress, kQuarters * (1 - progress)}));
+          step.size[0] *
+          least_jerk(std::min({1.0, kQuarters * progress, kQuarters * (1 - progress)}));
       return from_mm_ + sunk +
              DeviceVec<double>{radius * std::cos(turn * step.turns), 0,
                                radius * std::sin(turn * step.turns)};
@@ -100,12 +95,18 @@ void HandMotion::begin_next_leg() noexcept {
   cycle_ = 0;
   ++leg_;
   if (leg_ == legs_.size()) leg_ = repeat_from_;
-  if (leg_ == leaves_at_ && phase_ == Phase::calibrating) leg_ = 0;  // again, until it leaves
+  if (leg_ == reach_) {
+    if (left()) {
+      begin_reach();
+    } else {
+      leg_ = 0;  // the calibration again, until it leaves
+    }
+  }
 }
 
 HandGoal HandMotion::next() noexcept {
   HandGoal goal;
-  const bool moves = left() || (phase_ == Phase::calibrating && leaves_at_ > 0);
+  const bool moves = left() || (phase_ == Phase::calibrating && reach_ > 0);
   goal.calibrate = phase_ == Phase::calibrating && !moves;
   if (!moves) return goal;
   goal.in_inkwell = false;
@@ -116,7 +117,7 @@ HandGoal HandMotion::next() noexcept {
   const Leg& leg = legs_[leg_];
   ++cycle_;
   const double t = static_cast<double>(cycle_) / static_cast<double>(leg.cycles);
-  const double progress = leg.step.ease == HandStep::Ease::smooth ? smooth(t) : t;
+  const double progress = leg.step.ease == HandStep::Ease::smooth ? least_jerk(t) : t;
   goal.target_mm = position(leg, progress);
   goal.button1 = leg.step.button == 1;
   goal.button2 = leg.step.button == 2;

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "hil/devmodel/plant_keys.hpp"
+#include "hil/devmodel/plant_params.hpp"
 #include "shared/numeric/vec.hpp"
 
 namespace kerf {
@@ -46,22 +47,21 @@ struct HandScript {
   PlantValues plant;                       ///< of the device and the hand that the script is for
 };
 
-/// How a hand gets a device from rest to the start of a script. Device mm and seconds.
+/// How a hand gets a device from rest to the start of a script. Device mm.
 struct HandRoute {
   DeviceVec<double> rest_tip_mm;
   /// Motions that calibrate the device. Empty: the hand stays at rest and presses the calibration
   /// button, where there is one.
   std::vector<HandStep> calibration;
-  /// Then straight up ...
-  double lift_mm = 0;  ///< 0: not at all
-  double lift_s = 0.15;
-  /// ... at this height or the start's, whichever is higher, over to this depth, clear of the
-  /// workpiece ...
-  double clear_y_mm = 15;
-  double clear_z_mm = 0;
-  double cross_s = 0.4;  ///< 0: not at all
-  /// ... and on to the start.
-  double approach_s = 0.25;
+  /// The way clear of the workpiece. None: straight to the start.
+  struct Detour {
+    double lift_mm;  ///< straight up from the rest first
+    double y_mm;     ///< then over at this height or the start's, whichever is higher ...
+    double z_mm;     ///< ... to this depth, and from there to the start
+  };
+  std::optional<Detour> detour;
+  /// Of the hand's own spring with what it carries: `PlantParams::hand_rad_per_s`.
+  double hand_rad_per_s = PlantParams().hand_rad_per_s();
 };
 
 /// A smooth move.

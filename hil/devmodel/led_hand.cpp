@@ -5,6 +5,8 @@
 #include <cmath>
 #include <cstddef>
 
+#include "hil/devmodel/reach_curve.hpp"
+
 namespace kerf {
 namespace {
 
@@ -20,11 +22,8 @@ DeviceVec<double> at_most(double length, DeviceVec<double> v) noexcept {
 LedHand::LedHand(double stiffness_n_per_mm, const HandRoute& route,
                  DeviceVec<double> start_mm) noexcept
     : max_pull_mm_(kMaxPullN / stiffness_n_per_mm) {
-  const DeviceVec<double> rest_mm = route.rest_tip_mm;
-  const DeviceVec<double> above_mm = rest_mm + DeviceVec<double>{0, route.lift_mm, 0};
-  const DeviceVec<double> aside_mm{start_mm.x, std::max(route.clear_y_mm, start_mm.y),
-                                   route.clear_z_mm};
-  way_back_mm_ = {start_mm, route.cross_s > 0 ? aside_mm : start_mm, above_mm, rest_mm};
+  const ReachCurve way = reach_curve(route, route.rest_tip_mm, start_mm);
+  std::reverse_copy(way.points_mm.begin(), way.points_mm.end(), way_back_mm_.begin());
 }
 
 void LedHand::wish(const HandWish& wish) noexcept {

@@ -50,7 +50,10 @@ Calibration OmniModel::calibration() const noexcept {
 
 HandRoute OmniModel::route() const {
   // All of it is inside the elbow's limits, and behind the workpiece.
-  return {.rest_tip_mm = dock_tip_mm(), .calibration = {}, .lift_mm = 25, .clear_z_mm = -60};
+  return {.rest_tip_mm = dock_tip_mm(),
+          .calibration = {},
+          .detour = HandRoute::Detour{.lift_mm = 25, .y_mm = 15, .z_mm = -60},
+          .hand_rad_per_s = params().hand_rad_per_s()};
 }
 
 std::uint16_t OmniModel::noisy(std::uint16_t pot) noexcept {

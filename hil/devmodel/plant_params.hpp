@@ -38,6 +38,12 @@ struct PlantParams {
   double hand_damping_ns_per_mm = 0.005;
   double hand_mass_kg = 0.1;  ///< moves with the tip
 
+  /// The natural frequency of the hand's spring with the hand and the tip on it.
+  [[nodiscard]] double hand_rad_per_s() const noexcept {
+    constexpr double kMmPerM = 1000;
+    return std::sqrt(kMmPerM * hand_stiffness_n_per_mm / (hand_mass_kg + tip_mass_kg));
+  }
+
   /// Torque of one motor count at each joint, N mm, without its sign: what a host has to be told
   /// of a unit (`torque_scale` of a scene, `--torque-scale`).
   [[nodiscard]] std::array<double, 3> torque_scale() const noexcept {

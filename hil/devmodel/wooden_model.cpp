@@ -77,7 +77,10 @@ Calibration WoodenModel::calibration() const noexcept {
 
 HandRoute WoodenModel::route() const {
   // The rest pose is 0.2 m above the workpiece: straight down.
-  return {.rest_tip_mm = plant_.rest().tip_mm, .calibration = {}, .cross_s = 0, .approach_s = 0.85};
+  return {.rest_tip_mm = plant_.rest().tip_mm,
+          .calibration = {},
+          .detour = {},
+          .hand_rad_per_s = params().hand_rad_per_s()};
 }
 
 WoodenReport WoodenModel::report() const noexcept {

@@ -11,6 +11,7 @@
 #include <doctest/doctest.h>
 
 #include "hil/devmodel/falcon_model.hpp"
+#include "hil/devmodel/reach_curve.hpp"
 #include "hil/script/hand_script_file.hpp"
 #include "shared/wire/falcon_packet.hpp"
 
@@ -110,8 +111,11 @@ TEST_CASE("without a hand the stylus stays in the inkwell") {
 TEST_CASE("the tip follows the script to the surface within friction and inertia") {
   Emulator emulator({}, cut_cavity());
   tell(emulator, {{}, true, OmniCommand::Light::steady});
-  emulator.advance(static_cast<int>((0.15 + 0.8) * kerf::omni::kBusCyclesPerSecond));
-  CHECK(norm(emulator.model().tip_mm() - DeviceVec<double>{0, 4, 0}) < 1.5);
+  const kerf::HandRoute route = emulator.model().route();
+  const double reach_s =
+      kerf::reach_curve(route, route.rest_tip_mm, {0, 4, 0}).least_seconds(route.hand_rad_per_s);
+  emulator.advance(static_cast<int>((0.15 + reach_s) * kerf::omni::kBusCyclesPerSecond));
+  CHECK(norm(emulator.model().tip_mm() - DeviceVec<double>{0, 4, 0}) < kerf::ReachCurve::kSwingMm);
   emulator.advance(8 * kerf::omni::kBusCyclesPerSecond);
   // One round later it is up and aside.
   CHECK(norm(emulator.model().tip_mm() - DeviceVec<double>{3, 5, 0}) < 1.5);

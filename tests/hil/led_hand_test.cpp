@@ -150,10 +150,10 @@ TEST_CASE("an emulated hand goes its way to the start, and only then where it is
   };
   run(0.1);
   CHECK(emulator.model().docked());
-  run(0.6);
+  run(0.2);
   CHECK_FALSE(emulator.model().docked());
   CHECK(emulator.model().tip_mm().z < -20);
-  run(1.3);
+  run(1.7);
   CHECK(norm(emulator.model().tip_mm() - DeviceVec<double>{10, 8, -5}) < 0.5);
 }
 

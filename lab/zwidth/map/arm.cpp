@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <memory>
+#include <numbers>
 #include <optional>
 #include <string>
 #include <utility>
@@ -101,11 +102,16 @@ std::array<ArmHit, kArmHits> hits_of(const Subject& subject, std::uint64_t seed)
            {corner + out * kAwayMm, corner - out * depth_mm, 50, out, dot(corner, out)}}};
 }
 
-/// Each hit from its start, a stay, and off again by the way it came; high over to the next.
-HandScript script_of(const std::array<ArmHit, kArmHits>& hits, double seconds) {
+/// Each hit from its start, a stay, and off again by the way it came; high over to the next. The
+/// reach ends high above the first, and the hand comes down so slowly that it does not swing.
+HandScript script_of(const Subject& subject, const std::array<ArmHit, kArmHits>& hits,
+                     double seconds) {
+  constexpr double kHighMm = 20, kPeriods = 3;
+  const double hand_rad_per_s = with_plant(PlantParams{}, subject).hand_rad_per_s();
   HandScript script;
-  const auto start = hits.front().from;
-  script.start = {start.x, start.y, start.z};
+  const auto first = hits.front().from;
+  script.start = {first.x, first.y + kHighMm, first.z};
+  script.steps.push_back(hand_move(first, kPeriods * 2 * std::numbers::pi / hand_rad_per_s));
   HandStep wait, stay;
   wait.seconds = 0.2;
   stay.seconds = seconds + 0.3;
@@ -250,7 +256,8 @@ LoadedScene walls_scene(const Subject& subject) {
 Swing hit_with_arm(const LoadedScene& scene, const Subject& subject, double stiffness_n_per_mm,
                    double seconds, std::uint64_t seed, TickMeter& ticks) {
   const std::array<ArmHit, kArmHits> hits = hits_of(subject, seed);
-  Rig rig(cell_scene(scene, subject, stiffness_n_per_mm), subject, script_of(hits, seconds));
+  Rig rig(cell_scene(scene, subject, stiffness_n_per_mm), subject,
+          script_of(subject, hits, seconds));
   Swing worst;
   for (const ArmHit& hit : hits) {
     const std::optional<Swing> seen = watch_hit(rig, subject, hit, seconds, ticks, {});
@@ -265,7 +272,8 @@ void watch_arm(const LoadedScene& scene, const Subject& subject, double stiffnes
                double seconds, std::uint64_t seed, TickMeter& ticks,
                const std::function<SwingWatch(std::size_t hit)>& begin) {
   const std::array<ArmHit, kArmHits> hits = hits_of(subject, seed);
-  Rig rig(cell_scene(scene, subject, stiffness_n_per_mm), subject, script_of(hits, seconds));
+  Rig rig(cell_scene(scene, subject, stiffness_n_per_mm), subject,
+          script_of(subject, hits, seconds));
   for (std::size_t h = 0; h < hits.size(); ++h) {
     if (!watch_hit(rig, subject, hits[h], seconds, ticks, begin(h))) return;
   }
