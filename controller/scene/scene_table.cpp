@@ -184,7 +184,8 @@ bool SceneTable::is_text(std::string_view key) const {
 }
 
 std::string SceneTable::where(std::string_view key) const {
-  return file_ + ":" + std::to_string(node_->find(key)->line);
+  const std::size_t line = node_->find(key)->line;
+  return file_ + (line == 0 ? ": --set" : ":" + std::to_string(line));
 }
 
 std::string SceneTable::place(std::string_view key) const {

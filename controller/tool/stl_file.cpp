@@ -179,8 +179,12 @@ std::vector<LooseTriangle> read_stl(const std::filesystem::path& path, int cpu_s
   if (std::filesystem::is_directory(path, fault)) {
     refuse(path.string(), ": is a folder; name an STL file in it");
   }
-  if (!std::filesystem::is_regular_file(path, fault)) {
+  if (!std::filesystem::exists(path, fault)) {
     refuse(path.string(), ": no such STL file; name one, relative to the scene's folder");
+  }
+  if (!std::filesystem::is_regular_file(path, fault)) {
+    refuse(path.string(),
+           ": a pipe, socket or device; copy what it gives to a file, and name that");
   }
   const std::uintmax_t size = std::filesystem::file_size(path, fault);
   if (fault || size > kMaxStlBytes) {

@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <filesystem>
+#include <span>
 #include <string>
 
 #include <doctest/doctest.h>
@@ -456,6 +457,16 @@ TEST_CASE("a bur of ISO 6360 stands for shape, radius, neck and name, and its ta
                "scenes/x.toml: --set tool.bur = \"001 999\" is no bur;"));
   CHECK(begins(refused("bur = \"001 014\"\nlength_mm = 3\n"),
                "scenes/x.toml:5: tool.length_mm = 3 contradicts the ball"));
+}
+
+TEST_CASE("a file that an option names stands in no line, and its place says so") {
+  const auto scene = [](std::span<const kerf::SceneSetting> settings) {
+    return kerf::parse_scene("[[volume]]\nfile = \"phantom\"\n[[tool]]\nbur = \"001 014\"\n",
+                             "scenes/x.toml", kerf::scene_keys(), settings);
+  };
+  const kerf::SceneSetting setting{"volume.file", "\"/x.nrrd\""};
+  CHECK(scene({}).volumes[0].where == "scenes/x.toml:2");
+  CHECK(scene({&setting, 1}).volumes[0].where == "scenes/x.toml: --set");
 }
 
 TEST_CASE("what the phantom is, is asked of the phantom only, and one of the known") {

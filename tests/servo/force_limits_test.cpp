@@ -35,6 +35,20 @@ TEST_CASE_TEMPLATE("a clamped force keeps its direction", N, FixedNumbers, Float
   CHECK(double(v.x) / double(v.y) == doctest::Approx(-0.75).epsilon(1e-4));
 }
 
+TEST_CASE_TEMPLATE("a force that is cut down keeps its direction, by peak, slew and heat", N,
+                   FixedNumbers, FloatNumbers, DoubleNumbers) {
+  using Real = typename N::Real;
+  const DeviceVec<Real> wanted{Real(6.0), Real(-3.0), Real(2.0)};  // 7 N
+  kerf::ThermalState<N> thermal;
+  DeviceVec<Real> sent{};
+  for (int tick = 0; tick < 20'000; ++tick) {
+    sent = kerf::limited_force<N>(omni_limits<N>(), thermal, wanted, sent, false);
+    const double along = (6 * double(sent.x) - 3 * double(sent.y) + 2 * double(sent.z)) / 7;
+    CHECK(along == doctest::Approx(length(sent)).epsilon(1e-4));
+  }
+  CHECK(length(sent) < 1.0);
+}
+
 TEST_CASE("whatever is wanted, peak and slew hold, also from the ends of the number range") {
   CHECK(rc::check([](std::int32_t x, std::int32_t y, std::int32_t z) {
     using kerf::Q16;

@@ -106,6 +106,21 @@ TEST_CASE("a device that is parked again and again while it presses bears the he
   CHECK(std::sqrt(heat_n2) > 0.9 * scene.limits.continuous_force_n);
 }
 
+TEST_CASE("a force that is held without reports heats the motors like any other") {
+  LoadedScene scene = half_space_scene();
+  scene.force.stiffness_n_per_mm = 50;  // more than the peak
+  ArmedServo armed(scene);
+  double heat_n2 = 0;
+  for (int tick = 0; tick < 8000; ++tick) {
+    const bool lost = tick % 5 != 0;  // as long as a force is held in full
+    const ServoOutput out = lost ? armed.servo->step({}) : armed.step(0, 0.3, 0);
+    const double force_n = length(out.force_n);
+    heat_n2 += (force_n * force_n - heat_n2) / 10'000;
+    CHECK(std::sqrt(heat_n2) <= scene.limits.continuous_force_n + 0.01);
+  }
+  CHECK(std::sqrt(heat_n2) > 0.9 * scene.limits.continuous_force_n);
+}
+
 TEST_CASE("a force beyond the motors keeps its direction, and what was sent is what is told") {
   LoadedScene scene = half_space_scene();
   scene.force.stiffness_n_per_mm = 50;

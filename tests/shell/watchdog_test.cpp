@@ -59,6 +59,22 @@ TEST_CASE("a servo that stands still for 20 ms loses its motors, once per stall"
   CHECK(watchdog.trips() == 2);
 }
 
+TEST_CASE("of a tick that stood still itself nothing is sent, and of the next one all") {
+  CountingPort port;
+  kerf::OmniDriver driver(port);
+  std::atomic<bool> stop{false};
+  kerf::LoopSignals signals{stop};
+  kerf::ServoOutput push;
+  push.motors_on = true;
+  push.motor_counts = {100, -200, 300};
+  signals.stalled = true;  // the watchdog looked while the tick lasted
+  kerf::send_tick(push, signals, driver);
+  CHECK(port.neutral == 1);
+  signals.stalled = false;
+  kerf::send_tick(push, signals, driver);
+  CHECK(port.neutral == 1);
+}
+
 TEST_CASE("the watchdog's thread may run on every core but the servo's") {
   const auto cores = kerf::allowed_cores();
   if (cores.size() < 2) return;  // nowhere to go

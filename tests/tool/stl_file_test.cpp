@@ -9,6 +9,7 @@
 #include <vector>
 
 #include <doctest/doctest.h>
+#include <sys/stat.h>
 
 #include "controller/tool/tool_mesh.hpp"
 #include "lab/rig/loft.hpp"
@@ -199,7 +200,7 @@ TEST_CASE("a body that is inside out keeps its hollow, in whatever order its par
   }
 }
 
-TEST_CASE("a folder is no STL file, and says so") {
+TEST_CASE("a folder or a pipe is no STL file, and says so") {
   const test::TempFolder folder;
   const auto path = folder.write("bur.stl", text_stl(kBar));
   CHECK(read_stl(path) == kBar);
@@ -207,6 +208,10 @@ TEST_CASE("a folder is no STL file, and says so") {
   CHECK(error.find(": is a folder; name an STL file in it") != std::string::npos);
   const auto none = test::error_of([&] { static_cast<void>(read_stl(path / "x")); });
   CHECK(none.find(": no such STL file") != std::string::npos);
+  const auto pipe = path.parent_path() / "pipe.stl";
+  REQUIRE(mkfifo(pipe.c_str(), 0600) == 0);
+  const auto waits = test::error_of([&] { static_cast<void>(read_stl(pipe)); });
+  CHECK(waits.find("pipe.stl: a pipe, socket or device; copy what it gives") != std::string::npos);
 }
 
 TEST_CASE("a mesh that encloses nothing or has a hole is refused with the edge") {

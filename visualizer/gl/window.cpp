@@ -153,6 +153,10 @@ void Window::set_title(const std::string& title) {
   glfwSetWindowTitle(handle_, title.c_str());
 }
 
+void Window::resize(PictureSize size) {
+  glfwSetWindowSize(handle_, size.width, size.height);
+}
+
 void Window::on_exposed(GLFWwindow* handle) {
   window_of(handle).input_.exposed = true;
 }

@@ -58,6 +58,8 @@ class Window final : public GlContext {
   /// In pixels; a side is 0 while the window is minimised.
   [[nodiscard]] PictureSize size() const;
   void set_title(const std::string& title);
+  /// Asks the screen for another size, which `size` tells once the screen has given it.
+  void resize(PictureSize size);
   /// Shows `target`, which has the window's size; waits for the screen's refresh where it can.
   void present(const RenderTarget& target);
   /// Whether the pointer is seen over it.

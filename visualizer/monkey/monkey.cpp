@@ -133,7 +133,7 @@ void Monkey::choose(WindowInput& input) {
 }
 
 void Monkey::press_key(WindowInput& input) {
-  constexpr std::string_view kOften = "vvvvbctttthpp123456789r";
+  constexpr std::string_view kOften = "vvvvbccxxyttttlhpp123456789rzu";
   constexpr std::string_view kSeldom = "sewm";  // each leaves a file
   const std::string_view keys = dice_.once_in(15) ? kSeldom : kOften;
   input.keys.push_back(keys[static_cast<std::size_t>(dice_.below(static_cast<int>(keys.size())))]);
@@ -141,7 +141,7 @@ void Monkey::press_key(WindowInput& input) {
 }
 
 void Monkey::use_mouse(WindowInput& input) {
-  switch (dice_.below(4)) {
+  switch (dice_.below(7)) {
     case 0:
       input.turn_right += dice_.between(-0.3, 0.3);
       input.turn_up += dice_.between(-0.3, 0.3);
@@ -153,6 +153,17 @@ void Monkey::use_mouse(WindowInput& input) {
     case 2:
       input.exposed = true;
       return say("expose");
+    case 3:  // with the wheel, as a hand does both
+      input.drag_right += dice_.between(-0.3, 0.3);
+      input.drag_up += dice_.between(-0.3, 0.3);
+      input.wheel += dice_.below(7) - 3;
+      return say("drag and wheel");
+    case 4:
+      input.plane += dice_.below(9) - 4;
+      return say("move the plane");
+    case 5:
+      input.zoom += dice_.below(7) - 3;
+      return say("zoom");
     default:
       input.wheel += dice_.below(7) - 3;
       if (dice_.once_in(20)) input.wheel *= 20.0;  // into the matter, or far away
@@ -178,6 +189,8 @@ void Monkey::resize(WindowInput& input) {
   if (large_ || dice_.once_in(40)) size_ = dice_.once_in(2) ? kDefaultSize : kLargeSize;
   if (dice_.once_in(12)) (dice_.once_in(2) ? size_.width : size_.height) = 0;
   input.exposed = true;
+  // The window follows when the screen lets it: until then it shows pictures of another size.
+  if (window_ != nullptr && size_.width > 0 && size_.height > 0) window_->resize(size_);
   say("resize " + size_text(size_));
 }
 

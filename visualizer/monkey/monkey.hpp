@@ -42,8 +42,8 @@ class Monkey {
   struct Habits {
     std::uint32_t seed = 1;
     std::filesystem::path folder;  ///< for what keys write
-    /// Which is then the context, and shows what it would. Whoever resizes it gets pictures of
-    /// other sizes than its own.
+    /// Which is then the context, and shows what it would, at sizes that follow those of the
+    /// picture.
     Window* window = nullptr;
     bool large = false;  ///< the picture has 800x600 or 1100x760 pixels, and not any size
   };
