@@ -68,6 +68,7 @@ case $name in
       sleep "${SLOW:-0}"
       [[ -e $LAB/segment ]] || { echo 'kerf-visualizer: no controller' >&2; exit 2; }
       touch "${option[--attached]}"
+      echo 'shown' >>"$LAB/calls"
       if [[ -n ${CHOICE:-} && -n ${option[--choice]:-} && ! -e $LAB/chosen ]]; then
         touch "$LAB/chosen"
         sleep 0.3
@@ -199,6 +200,11 @@ expect 'the frames are spread over the run' called '^visualizer.*--every-ticks 4
 expect 'a demo leaves nothing behind' nothing_survives
 expect 'a run may be shorter than the visualizer takes to start' \
   with SLOW=1 kerf_gives 0 demo --seconds 1
+expect 'whose hand waits for it' test "$(grep -m 1 -oE '^(shown|emulator .*--hand)' "$lab/calls")" == shown
+expect 'a longer run begins' with SLOW=0.5 kerf_gives 0 demo --seconds 4
+expect 'before its pictures do' test "$(grep -m 1 -oE '^(shown|emulator .*--hand)' "$lab/calls" | cut -d ' ' -f 1)" == emulator
+expect 'a film has its start' with SLOW=0.5 kerf_gives 0 demo --seconds 4 --record v.y4m
+expect 'and its hand waits' test "$(grep -m 1 -oE '^(shown|emulator .*--hand)' "$lab/calls")" == shown
 expect 'the way of drawing reaches the visualizer' kerf_gives 0 demo --seconds 1 --renderer cast
 expect 'as it was said' called '^visualizer.*--renderer cast '
 expect 'an arm on FireWire' kerf_gives 0 demo --seconds 1 --port fw
