@@ -46,6 +46,10 @@ case $name in
       >"${option[--emulator-args]}"
     until grep -q '^emulator.*--hand' "$LAB/calls" || ((stop)); do sleep 0.02; done
     for ((i = 0; i < 10 * option[--seconds] && !stop; ++i)); do sleep 0.03; done
+    # As on a disk that the recording has filled.
+    if ((stop)) && [[ -n ${FULL:-} && -e ${option[--report]%/*}/log/begun ]]; then
+      echo 'kerf-controller: no room for the report' >&2
+    fi
     echo '{}' >"${option[--report]}"
     touch "${option[--final]}"
     rm "$LAB/segment"
@@ -76,8 +80,9 @@ case $name in
         exit 0
       fi
     fi
+    if [[ $name == recorder ]]; then mkdir -p "$out" && touch "$out/begun"; fi
     while [[ -e $LAB/segment ]]; do sleep 0.05; done
-    if [[ $name == recorder ]]; then mkdir -p "$out" && touch "$out/ticks.npy"; else touch "$out/frame-0001.png"; fi
+    if [[ $name == recorder ]]; then rm -f "$out/begun" && mkdir -p "$out" && touch "$out/ticks.npy"; else touch "$out/frame-0001.png"; fi
     ;;
   record)
     touch "$out"
@@ -205,6 +210,9 @@ expect 'a longer run begins' with SLOW=0.5 kerf_gives 0 demo --seconds 4
 expect 'before its pictures do' test "$(grep -m 1 -oE '^(shown|emulator .*--hand)' "$lab/calls" | cut -d ' ' -f 1)" == emulator
 expect 'a film has its start' with SLOW=0.5 kerf_gives 0 demo --seconds 4 --record v.y4m
 expect 'and its hand waits' test "$(grep -m 1 -oE '^(shown|emulator .*--hand)' "$lab/calls")" == shown
+expect 'a disk that fills up ends it' \
+  with FULL=1 with FAIL_visualizer=2 kerf_gives 2 demo --seconds 60 --headless --out "$lab/out"
+expect 'in one line' test "$(wc -l <"$lab/said")" == 1
 expect 'the way of drawing reaches the visualizer' kerf_gives 0 demo --seconds 1 --renderer cast
 expect 'as it was said' called '^visualizer.*--renderer cast '
 expect 'an arm on FireWire' kerf_gives 0 demo --seconds 1 --port fw
