@@ -13,8 +13,8 @@ shared/numeric shared/volume shared/wire shared/text shared/posix shared/segment
 
 controller/kernel/point_shell controller/kernel controller/kernel/proxy controller/kernel/sets
 controller/law controller/servo/kinematics controller/servo controller/law/registry
-controller/stability controller/scene controller/sandbox controller/volume/file controller/volume controller/volume_tool controller/tool controller/load
-controller/plan/tables controller/plan/method controller/plan controller/plan/cost
+controller/stability controller/scene controller/sandbox controller/volume/file controller/volume controller/tool controller/load
+controller/plan/tables controller/plan/method controller/plan controller/plan/cost controller/volume_tool
 controller/device/port controller/device/driver
 controller/shell controller/shell/probe controller
 

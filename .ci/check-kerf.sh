@@ -46,6 +46,10 @@ case $name in
       >"${option[--emulator-args]}"
     until grep -q '^emulator.*--hand' "$LAB/calls" || ((stop)); do sleep 0.02; done
     for ((i = 0; i < 10 * option[--seconds] && !stop; ++i)); do sleep 0.03; done
+    # As on a disk that the recording has filled.
+    if ((stop)) && [[ -n ${FULL:-} && -e ${option[--report]%/*}/log/begun ]]; then
+      echo 'kerf-controller: no room for the report' >&2
+    fi
     echo '{}' >"${option[--report]}"
     touch "${option[--final]}"
     rm "$LAB/segment"
@@ -68,6 +72,7 @@ case $name in
       sleep "${SLOW:-0}"
       [[ -e $LAB/segment ]] || { echo 'kerf-visualizer: no controller' >&2; exit 2; }
       touch "${option[--attached]}"
+      echo 'shown' >>"$LAB/calls"
       if [[ -n ${CHOICE:-} && -n ${option[--choice]:-} && ! -e $LAB/chosen ]]; then
         touch "$LAB/chosen"
         sleep 0.3
@@ -75,8 +80,9 @@ case $name in
         exit 0
       fi
     fi
+    if [[ $name == recorder ]]; then mkdir -p "$out" && touch "$out/begun"; fi
     while [[ -e $LAB/segment ]]; do sleep 0.05; done
-    if [[ $name == recorder ]]; then mkdir -p "$out" && touch "$out/ticks.npy"; else touch "$out/frame-0001.png"; fi
+    if [[ $name == recorder ]]; then rm -f "$out/begun" && mkdir -p "$out" && touch "$out/ticks.npy"; else touch "$out/frame-0001.png"; fi
     ;;
   record)
     touch "$out"
@@ -199,6 +205,14 @@ expect 'the frames are spread over the run' called '^visualizer.*--every-ticks 4
 expect 'a demo leaves nothing behind' nothing_survives
 expect 'a run may be shorter than the visualizer takes to start' \
   with SLOW=1 kerf_gives 0 demo --seconds 1
+expect 'whose hand waits for it' test "$(grep -m 1 -oE '^(shown|emulator .*--hand)' "$lab/calls")" == shown
+expect 'a longer run begins' with SLOW=0.5 kerf_gives 0 demo --seconds 4
+expect 'before its pictures do' test "$(grep -m 1 -oE '^(shown|emulator .*--hand)' "$lab/calls" | cut -d ' ' -f 1)" == emulator
+expect 'a film has its start' with SLOW=0.5 kerf_gives 0 demo --seconds 4 --record v.y4m
+expect 'and its hand waits' test "$(grep -m 1 -oE '^(shown|emulator .*--hand)' "$lab/calls")" == shown
+expect 'a disk that fills up ends it' \
+  with FULL=1 with FAIL_visualizer=2 kerf_gives 2 demo --seconds 60 --headless --out "$lab/out"
+expect 'in one line' test "$(wc -l <"$lab/said")" == 1
 expect 'the way of drawing reaches the visualizer' kerf_gives 0 demo --seconds 1 --renderer cast
 expect 'as it was said' called '^visualizer.*--renderer cast '
 expect 'an arm on FireWire' kerf_gives 0 demo --seconds 1 --port fw

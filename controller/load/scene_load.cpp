@@ -154,9 +154,10 @@ void check_felt_materials(const LoadedScene& scene) {
 }
 
 void check_labels(const VolumeImage& image, std::size_t materials) {
-  const auto highest = std::max_element(image.labels.begin(), image.labels.end());
-  if (highest == image.labels.end() || *highest < materials) return;
-  throw SceneError("label " + std::to_string(*highest) + " stands for no material, the last is " +
+  Label highest = 0;
+  for (const Label label : image.labels) highest = std::max(highest, label);  // many at a time
+  if (image.labels.empty() || highest < materials) return;
+  throw SceneError("label " + std::to_string(highest) + " stands for no material, the last is " +
                    std::to_string(materials - 1) + "; add a [[material]] for it");
 }
 

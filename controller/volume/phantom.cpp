@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <thread>
 
 #include "controller/volume/file/volume_limits.hpp"
@@ -34,8 +35,16 @@ double share_inside(double distance_mm, double h_mm) noexcept {
   return std::clamp(0.5 - distance_mm / (2.0 * h_mm), 0.0, 1.0);
 }
 
-/// Samples the shape block by block. A block whose middle is far from every boundary is all of one
-/// material and is filled; others are halved down to `kLeaf` voxels.
+/// Where all of a block lies to a boundary: no voxel of it needs to look again.
+enum class Side : std::uint8_t { unknown, outside, inside };
+
+struct Sides {
+  Side outer = Side::unknown, dentin = Side::unknown, pulp = Side::unknown;
+};
+
+/// Samples the shape block by block. A boundary that is far from the middle of a block is far from
+/// all of it, and is not looked at there again; a block of one material is filled. Others are
+/// halved down to `kLeaf` voxels.
 class Sampler {
  public:
   explicit Sampler(VolumeImage& image)
@@ -43,26 +52,60 @@ class Sampler {
 
   /// On 2^cuts threads: blocks share no voxel, so the image is the same bit by bit.
   void sample_on_threads(const VoxelBox& box, int cuts) {
-    if (cuts == 0) return sample(box);
+    if (cuts == 0) return sample(box, {});
     const Halves half(box);
     const std::jthread other = helper_thread([&] { sample_on_threads(half.low, cuts - 1); });
     sample_on_threads(half.high, cuts - 1);
   }
 
  private:
-  static constexpr std::int32_t kLeaf = 4;
+  static constexpr std::int32_t kLeaf = 2;
 
-  void sample(const VoxelBox& box) {
+  void sample(const VoxelBox& box, Sides sides) {
     if (box.empty()) return;
+    look(box, sides);
+    if (fill_if_uniform(box, sides)) return;
     const VoxelIndex n = box.extent();
-    if (std::max({n.x, n.y, n.z}) <= kLeaf) return sample_voxels(box);
-    if (fill_if_uniform(box)) return;
+    if (std::max({n.x, n.y, n.z}) <= kLeaf) return sample_voxels(box, sides);
     const Halves half(box);
-    sample(half.low);
-    sample(half.high);
+    sample(half.low, sides);
+    sample(half.high, sides);
   }
 
-  /// Share of the voxel inside the boundary, from 0 to 1 over two voxels.
+  /// Looks from the middle of the block at the boundaries that its parent did not decide.
+  void look(const VoxelBox& box, Sides& sides) const noexcept {
+    const VoxelIndex n = box.extent();
+    const VoxelIndex last{n.x - 1, n.y - 1, n.z - 1};
+    const phantom::Point middle =
+        position(box.lo.x + 0.5 * last.x, box.lo.y + 0.5 * last.y, box.lo.z + 0.5 * last.z);
+    const double radius_mm =
+        0.5 * h_mm_ *
+        std::sqrt(double(last.x) * last.x + double(last.y) * last.y + double(last.z) * last.z);
+    const double clear = phantom::kSteepest * radius_mm + far_mm_;
+    const auto decide = [clear](Side& side, double value) {
+      if (side != Side::unknown) return;
+      if (value > clear) side = Side::outside;
+      if (value < -clear) side = Side::inside;
+    };
+    if (sides.outer == Side::unknown || sides.dentin == Side::unknown) {
+      const double outer = phantom::outer_field(middle);
+      decide(sides.outer, outer);
+      decide(sides.dentin, outer + phantom::enamel_mm(middle));
+    }
+    if (sides.dentin == Side::outside) return;  // it encloses the pulp
+    if (sides.pulp == Side::unknown) decide(sides.pulp, phantom::pulp_field(middle));
+  }
+
+  bool fill_if_uniform(const VoxelBox& box, const Sides& sides) {
+    if (sides.outer == Side::outside) return true;  // air, as the image starts
+    if (sides.outer == Side::unknown || sides.dentin == Side::unknown) return false;
+    if (sides.dentin == Side::outside) return fill(box, kPhantomEnamel, kLabelEnamel);
+    if (sides.pulp == Side::unknown) return false;
+    return sides.pulp == Side::outside ? fill(box, kPhantomDentin, kLabelDentin)
+                                       : fill(box, kPhantomPulp, kLabelPulp);
+  }
+
+  /// Share of the voxel inside the boundary, from 0 to 1 over two voxels. `value` is `field(p)`.
   [[nodiscard]] double cover(phantom::Field field, phantom::Point p, double value) const noexcept {
     if (value >= far_mm_) return 0.0;
     if (value <= -far_mm_) return 1.0;
@@ -72,25 +115,6 @@ class Sampler {
   [[nodiscard]] phantom::Point position(double x, double y, double z) const noexcept {
     const auto& origin = image_.origin_mm;
     return {origin[0] + x * h_mm_, origin[1] + y * h_mm_, origin[2] + z * h_mm_};
-  }
-
-  bool fill_if_uniform(const VoxelBox& box) {
-    const VoxelIndex n = box.extent();
-    const phantom::Point middle = position(box.lo.x + 0.5 * (n.x - 1), box.lo.y + 0.5 * (n.y - 1),
-                                           box.lo.z + 0.5 * (n.z - 1));
-    const double radius_mm =
-        0.5 * h_mm_ * std::sqrt(double(n.x) * n.x + double(n.y) * n.y + double(n.z) * n.z);
-    const double clear = phantom::kSteepest * radius_mm + far_mm_;
-    const double outer = phantom::outer_field(middle);
-    if (outer > clear) return true;  // air, as the image starts
-    if (outer > -clear) return false;
-    const double dentin = phantom::dentin_field(middle);
-    if (std::abs(dentin) < clear) return false;
-    if (dentin > 0.0) return fill(box, kPhantomEnamel, kLabelEnamel);
-    const double pulp = phantom::pulp_field(middle);
-    if (std::abs(pulp) < clear) return false;
-    return pulp > 0.0 ? fill(box, kPhantomDentin, kLabelDentin)
-                      : fill(box, kPhantomPulp, kLabelPulp);
   }
 
   bool fill(const VoxelBox& box, Density density, Label label) {
@@ -105,22 +129,31 @@ class Sampler {
     return true;
   }
 
-  void sample_voxels(const VoxelBox& box) {
+  void sample_voxels(const VoxelBox& box, const Sides& sides) {
     for (std::int32_t z = box.lo.z; z < box.hi.z; ++z) {
       for (std::int32_t y = box.lo.y; y < box.hi.y; ++y) {
         for (std::int32_t x = box.lo.x; x < box.hi.x; ++x) {
-          sample_voxel(image_.grid.index(x, y, z), position(x, y, z));
+          sample_voxel(image_.grid.index(x, y, z), position(x, y, z), sides);
         }
       }
     }
   }
 
-  void sample_voxel(std::size_t at, phantom::Point p) {
-    const double tooth = cover(phantom::outer_field, p, phantom::outer_field(p));
+  void sample_voxel(std::size_t at, phantom::Point p, const Sides& sides) {
+    // Of a side that is known the share is whole, as `cover` would find.
+    const bool looks = sides.outer == Side::unknown || sides.dentin == Side::unknown;
+    const double outer = looks ? phantom::outer_field(p) : 0.0;
+    double tooth = 1.0;
+    if (sides.outer == Side::unknown) tooth = cover(phantom::outer_field, p, outer);
     if (tooth <= 0.0) return;
-    const double dentin =
-        std::min(tooth, cover(phantom::dentin_field, p, phantom::dentin_field(p)));
-    const double pulp = std::min(dentin, cover(phantom::pulp_field, p, phantom::pulp_field(p)));
+    double dentin = sides.dentin == Side::outside ? 0.0 : tooth;
+    if (sides.dentin == Side::unknown && !phantom::is_bare(p)) {
+      dentin = std::min(tooth, cover(phantom::dentin_field, p, outer + phantom::enamel_mm(p)));
+    }
+    double pulp = sides.pulp == Side::inside ? dentin : 0.0;
+    if (sides.pulp == Side::unknown && dentin > 0.0) {  // which encloses it
+      pulp = std::min(dentin, cover(phantom::pulp_field, p, phantom::pulp_field(p)));
+    }
     const double density =
         kPhantomEnamel * (tooth - dentin) + kPhantomDentin * (dentin - pulp) + kPhantomPulp * pulp;
     image_.density[at] = nearest_density(density);

@@ -250,10 +250,19 @@ double outer_field(Point p) noexcept {
   return roots_are_far ? stem : smooth_min(stem, roots_field(p), kFork);
 }
 
-double dentin_field(Point p) noexcept {
-  // Enamel: none at the neck, 1.2 mm at half height, 1.8 mm under the cusps.
+double enamel_mm(Point p) noexcept {
+  // None at the neck, 1.2 mm at half height, 1.8 mm under the cusps.
   const double above = std::max(above_neck(p), 0.0);
-  return outer_field(p) + 2.4 * above / (above + 2.3);
+  return 2.4 * above / (above + 2.3);
+}
+
+bool is_bare(Point p) noexcept {
+  constexpr double kFarMm = 0.1;  // farther than `distance` looks, however steep the line is
+  return above_neck(p) < -kFarMm;
+}
+
+double dentin_field(Point p) noexcept {
+  return outer_field(p) + enamel_mm(p);
 }
 
 double pulp_field(Point p) noexcept {

@@ -17,6 +17,11 @@ struct Point {
 [[nodiscard]] double dentin_field(Point p) noexcept;
 [[nodiscard]] double pulp_field(Point p) noexcept;
 
+/// What the dentin's field has more than the outer one.
+[[nodiscard]] double enamel_mm(Point p) noexcept;
+/// Both fields, and both distances, are the same here, bit by bit.
+[[nodiscard]] bool is_bare(Point p) noexcept;
+
 inline constexpr double kSteepest = 2.5;
 
 /// Distance in mm from the lesion of the carious molar, negative inside, where it ends in a tooth;

@@ -9,6 +9,8 @@
 #include <system_error>
 #include <utility>
 
+#include "controller/load/scene_load.hpp"
+#include "controller/plan/compile.hpp"
 #include "controller/scene/scene_error.hpp"
 #include "controller/volume/file/volume_io.hpp"
 #include "controller/volume/file/volume_write.hpp"
@@ -52,6 +54,14 @@ void refuse_stretched(const std::string& path, const VolumeFrame& frame) {
   throw SceneError(text.str());
 }
 
+/// The longest side, in the shortest edges of a voxel: what a tool may be as large as.
+int longest_vox(const VolumeFrame& frame) {
+  const auto& s = frame.spacing_mm;
+  const double longest_mm =
+      std::max({s[0] * frame.grid.nx, s[1] * frame.grid.ny, s[2] * frame.grid.nz});
+  return static_cast<int>(longest_mm / std::ranges::min(s));
+}
+
 const char* way_to_change(const std::string& what) {
   if (what == "surface") return "--iso VALUE for another";
   if (what == "window") return "--window LO,HI for another";
@@ -64,6 +74,17 @@ const char* way_to_change(const std::string& what) {
 /// What is written.
 struct ImportCommand::Files {
   fs::path volume, labels, scene, preview;
+
+  /// Loads the scene as a run does. One that would be refused leaves nothing behind.
+  void check_runs(int cpu_s) const {
+    try {
+      static_cast<void>(plan_scene(load_scene(scene, {.read_cpu_s = cpu_s})));
+    } catch (const SceneError&) {
+      std::error_code gone;
+      for (const fs::path& file : {volume, labels, scene, preview}) fs::remove(file, gone);
+      throw;
+    }
+  }
 };
 
 ImportCommand::ImportCommand(Arguments& app)
@@ -187,7 +208,8 @@ void ImportCommand::run(std::ostream& out) const {
   denoise(image.grid, image.density, passes);
   if (!whole_) image = crop_to_solid(image, iso);
 
-  write(image, {path_, to.volume, &proposal, 0, iso / kDensityMax, passes}, preview, to);
+  const VolumeFrame kept = image;
+  write(std::move(image), {path_, to.volume, &proposal, 0, iso / kDensityMax, passes}, preview, to);
 
   line(out, "file", values.str(), spacing_.empty() ? "--spacing A,B,C for another voxel size" : "");
   if (!note.empty()) line(out, "series", note, "--series for another");
@@ -195,7 +217,7 @@ void ImportCommand::run(std::ostream& out) const {
     line(out, choice.what, choice.chosen, way_to_change(choice.what));
   }
   std::ostringstream crop, smooth;
-  crop << size_text(image) << (whole_ ? ", all of it" : ", what is solid and three voxels of air");
+  crop << size_text(kept) << (whole_ ? ", all of it" : ", what is solid and three voxels of air");
   line(out, "crop", crop.str(), whole_ ? "" : "--no-crop keeps all");
   smooth << passes << (passes == 1 ? " pass" : " passes") << " against noise of "
          << std::round(1000 * noise.share) / 10 << " % of the surface's step";
@@ -217,8 +239,9 @@ void ImportCommand::refuse_beside_labels() const {
   }
 }
 
-void ImportCommand::write(const VolumeImage& image, const ImportedScene& scene,
-                          const std::string& preview, const Files& to) const {
+void ImportCommand::write(VolumeImage image, ImportedScene scene, const std::string& preview,
+                          const Files& to) const {
+  scene.longest_vox = longest_vox(image);
   NewFiles files;
   add_volume(image, to.volume, packed_ ? VolumeEncoding::gzip : VolumeEncoding::raw, files);
   const auto add = [&](const fs::path& path, const std::string& bytes) {
@@ -232,15 +255,17 @@ void ImportCommand::write(const VolumeImage& image, const ImportedScene& scene,
   if (!preview.empty()) add(to.preview, preview);
   commit(files, force_);
   if (image.labels.empty()) remove_labels(to.volume);
+  image = {};  // the scene brings its own
+  to.check_runs(cpu_s_);
 }
 
 void ImportCommand::import_labelled(VolumeImage image, const Files& to, std::ostream& out) const {
   const Density iso = otsu_threshold(image);
   const Label last = *std::ranges::max_element(image.labels);
   if (!whole_) image = crop_to_solid(image, iso);
-  write(image, {path_, to.volume, nullptr, last, iso / kDensityMax, 0}, {}, to);
-  line(out, "file", path_ + ": " + size_text(image) + ", with labels, which tell the materials",
-       "");
+  const VolumeFrame kept = image;
+  write(std::move(image), {path_, to.volume, nullptr, last, iso / kDensityMax, 0}, {}, to);
+  line(out, "file", path_ + ": " + size_text(kept) + ", with labels, which tell the materials", "");
   line(out, "wrote", to.volume.string() + ", its labels, " + to.scene.string(), "");
 }
 

@@ -28,8 +28,8 @@ class ImportCommand {
  private:
   struct Files;
   [[nodiscard]] Files files() const;
-  /// All of them, or none.
-  void write(const VolumeImage& image, const ImportedScene& scene, const std::string& preview,
+  /// All of them, of a scene that runs, or none.
+  void write(VolumeImage image, ImportedScene scene, const std::string& preview,
              const Files& to) const;
   /// What asks for a surface, where labels are one.
   void refuse_beside_labels() const;

@@ -24,22 +24,24 @@ bool is_control(char c) {
   return static_cast<unsigned char>(c) < ' ' || c == '\x7f';
 }
 
-constexpr const char* kTools = R"(
-[[tool]]
-name = "ball 16"
-shape = "ball"
-size_vox = 16  # in voxels of this volume
+/// Balls of these sizes, those that fit; of a volume that is smaller than all, one as large as it.
+std::string tools_text(int longest_vox) {
+  std::ostringstream text;
+  const auto add = [&text](int size_vox) {
+    text << "\n[[tool]]\nname = \"ball " << size_vox
+         << "\"\nshape = \"ball\"\nsize_vox = " << size_vox << "  # in voxels of this volume\n";
+  };
+  bool any = false;
+  for (const int size_vox : {16, 10, 24}) {
+    if (size_vox > longest_vox) continue;
+    add(size_vox);
+    any = true;
+  }
+  if (!any) add(longest_vox);
+  return text.str();
+}
 
-[[tool]]
-name = "ball 10"
-shape = "ball"
-size_vox = 10
-
-[[tool]]
-name = "ball 24"
-shape = "ball"
-size_vox = 24
-
+constexpr const char* kDevice = R"(
 [device]
 personality = "omni"
 fit = true  # the volume fills the workspace; cutting, as for voxels of 0.125 mm, grows with its own
@@ -89,7 +91,7 @@ std::string imported_scene_text(const ImportedScene& scene) {
   for (std::size_t label = default_materials().size(); label <= scene.last_label; ++label) {
     text << "\n[[material]]\nname = \"label " << label << "\"\niso = " << scene.iso_density << '\n';
   }
-  text << kTools;
+  text << tools_text(scene.longest_vox) << kDevice;
   return text.str();
 }
 

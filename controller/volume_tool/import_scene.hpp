@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <limits>
 #include <string>
 
 #include "controller/volume/volume_proposal.hpp"
@@ -15,7 +16,8 @@ struct ImportedScene {
   const VolumeProposal* proposal = nullptr;  ///< none: a volume with labels
   Label last_label = 0;                      ///< the highest that a voxel has
   double iso_density = 0;
-  int passes = 0;  ///< against noise, that the import made
+  int passes = 0;                                     ///< against noise, that the import made
+  int longest_vox = std::numeric_limits<int>::max();  ///< no tool is larger
 };
 
 /// The text of a scene (TOML) with this volume alone, fitted to any device as --volume fits it.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cmath>
 #include <cstdint>
+#include <filesystem>
 #include <fstream>
 #include <random>
 #include <sstream>
@@ -8,6 +9,7 @@
 #include <doctest/doctest.h>
 #include <nlohmann/json.hpp>
 
+#include "controller/load/scene_load.hpp"
 #include "controller/volume/file/volume_write.hpp"
 #include "controller/volume/phantom.hpp"
 #include "controller/volume/volume_density.hpp"
@@ -121,6 +123,22 @@ TEST_CASE("the phantom and its labels survive phantom, crop and resample") {
   VolumeImage fine = apply_window(read_volume(finer), {0, kDensityMax});
   read_labels_beside(finer, fine);
   CHECK(fine.labels.size() == fine.density.size());
+}
+
+TEST_CASE("an import leaves a scene that runs, or nothing") {
+  const TempFolder folder;
+  const std::string blob = blob_file(folder);  // smaller than the usual tools
+  REQUIRE(run({"import", blob, "--out", (folder / "small.nrrd").string()}).code == 0);
+  CHECK_NOTHROW(static_cast<void>(load_scene(folder / "small.toml")));
+
+  const Outcome wide =
+      run({"import", blob, "--spacing", "900", "--out", (folder / "wide.nrrd").string()});
+  CHECK(wide.code == 2);
+  CHECK(wide.out.empty());
+  CHECK(wide.err.find("wide.toml:5: the box needs a workspace scale of ") != std::string::npos);
+  for (const char* kind : {"wide.nrrd", "wide.toml", "wide.png"}) {
+    CHECK_FALSE(std::filesystem::exists(folder / kind));
+  }
 }
 
 TEST_CASE("a file that is there is replaced where that is asked for, and else stays") {
