@@ -22,7 +22,7 @@ Arguments add_serve(CommandLine& app, ServeOptions& options) {
   serve.option("--name", options.name, "name of the controller").shows_default();
   serve.option("--identity", options.identity, "folder of make-identity; else self-signed");
   serve.option("--token-file", options.token_file,
-               "who may look: one token a line; else a new one");
+               "who may look, as often as they like: one token a line");
   serve.option("--allow-commands", options.command_tokens, "who may command too: one token a line");
   serve.option("--max-viewers", options.max_viewers, "at once")
       .within(1, kMostViewers)
