@@ -19,6 +19,7 @@
 #include "bridge/net/qr_code.hpp"
 #include "bridge/net/server.hpp"
 #include "bridge/stream/run_snapshot.hpp"
+#include "shared/posix/failure.hpp"
 
 namespace kerf::bridge {
 namespace {
@@ -85,7 +86,6 @@ void print_pages(const ServerSetup& setup, std::uint16_t port, const std::string
     std::cout << address << '\n';
   }
   if (qr && !for_others.empty()) std::cout << qr_code(for_others);
-  std::cout.flush();
 }
 
 void print_addresses(const ServerSetup& setup, std::uint16_t port, const std::string& pass,
@@ -135,6 +135,7 @@ int run_serve(const ServeOptions& options, const std::atomic<bool>& stop) {
   setup.on_pass = [&setup, &port, qr = options.qr](const std::string& pass) {
     std::cout << "for the next browser\n";
     print_pages(setup, port, pass, qr);
+    std::cout.flush();
   };
   Server server(setup);
   port = server.port();
@@ -150,6 +151,8 @@ int run_serve(const ServeOptions& options, const std::atomic<bool>& stop) {
     std::cout << "certificate, self-signed, SHA-256 " << setup.tls->fingerprint << '\n';
   }
   print_addresses(setup, port, server.pass(), options.qr);
+  // Who has no address has no picture.
+  if (const int code = when_told(0, "kerf-bridge", std::cout, std::cerr); code != 0) return code;
   server.run(stop);
   return 0;
 }
