@@ -91,6 +91,8 @@ case $name in
   bridge)
     trap 'exit "$code"' TERM
     echo 'http://127.0.0.1:7400/?token=abc'
+    sleep 0.2
+    echo 'http://127.0.0.1:7400/?token=def'
     while :; do sleep 0.05; done
     ;;
 esac
@@ -254,6 +256,7 @@ expect 'nor in lock-step' with DISPLAY=:99 kerf_gives 2 demo --hand mouse --virt
 expect 'as it says' says '^kerf: demo: --hand mouse: nobody is as fast'
 expect 'a picture is served' kerf_gives 0 demo --seconds 1 --serve --headless
 expect 'its address is told' says 'http://127.0.0.1:7400/?token=abc'
+expect 'and that for the next browser' says 'http://127.0.0.1:7400/?token=def'
 expect 'on this machine' called '^bridge serve --name demo-[0-9]* --listen 127.0.0.1:0$'
 expect 'the bridge ends with the demo' nothing_survives
 expect 'elsewhere' kerf_gives 0 demo --seconds 1 --serve --listen 0.0.0.0:7400

@@ -22,7 +22,7 @@ Arguments add_serve(CommandLine& app, ServeOptions& options) {
   serve.option("--name", options.name, "name of the controller").shows_default();
   serve.option("--identity", options.identity, "folder of make-identity; else self-signed");
   serve.option("--token-file", options.token_file,
-               "who may look: one token a line; else a new one");
+               "who may look, as often as they like: one token a line");
   serve.option("--allow-commands", options.command_tokens, "who may command too: one token a line");
   serve.option("--max-viewers", options.max_viewers, "at once")
       .within(1, kMostViewers)
@@ -76,10 +76,11 @@ int run(int argc, char** argv) {
   const Arguments serve = add_serve(app, serve_options);
   const Arguments join = add_join(app, join_options);
   add_make_identity(app, identity_options);
-  if (!app.parse(argc, argv, std::cout)) return 0;
+  const auto told = [](int code) { return when_told(code, "kerf-bridge", std::cout, std::cerr); };
+  if (!app.parse(argc, argv, std::cout)) return told(0);
   if (serve.chosen()) return run_serve(serve_options, catch_stop_signals());
   if (join.chosen()) return run_join(join_options, catch_stop_signals(), std::cout);
-  return run_make_identity(identity_options);
+  return told(run_make_identity(identity_options));
 }
 
 }  // namespace

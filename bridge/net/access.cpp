@@ -5,6 +5,7 @@
 #include <cctype>
 #include <cerrno>
 #include <cstring>
+#include <span>
 #include <sstream>
 
 #include <fcntl.h>
@@ -24,12 +25,17 @@ namespace {
 constexpr std::size_t kFewest = 16, kMost = 128;
 constexpr std::size_t kMaxTokens = 256;
 
-using Digest = std::array<unsigned char, 32>;
+[[nodiscard]] bool same_digest(const Digest& a, const Digest& b) noexcept {
+  return CRYPTO_memcmp(a.data(), b.data(), a.size()) == 0;
+}
 
-Digest digest_of(std::string_view token) noexcept {
-  Digest digest;
-  SHA256(reinterpret_cast<const unsigned char*>(token.data()), token.size(), digest.data());
-  return digest;
+[[nodiscard]] std::string hex(std::span<const unsigned char> bytes) {
+  std::string text;
+  for (const unsigned char byte : bytes) {
+    text += "0123456789abcdef"[byte >> 4];
+    text += "0123456789abcdef"[byte & 15];
+  }
+  return text;
 }
 
 [[nodiscard]] bool is_token(std::string_view text) noexcept {
@@ -81,6 +87,12 @@ std::string text_of(const std::filesystem::path& file, const std::string& place)
 
 }  // namespace
 
+Digest digest_of(std::string_view text) noexcept {
+  Digest digest;
+  SHA256(reinterpret_cast<const unsigned char*>(text.data()), text.size(), digest.data());
+  return digest;
+}
+
 void Tokens::add_file(const std::filesystem::path& file, const char* option, Right right) {
   const std::string place = std::string(option) + " " + file.string() + ": ";
   struct stat status {};
@@ -112,18 +124,25 @@ void Tokens::add_file(const std::filesystem::path& file, const char* option, Rig
 }
 
 void Tokens::add(std::string_view token, Right right) {
-  entries_.push_back({digest_of(token), right});
+  entries_.push_back({digest_of(token), digest_of(cookie_for(token)), right});
   if (first_.empty()) first_ = token;
 }
 
-Right Tokens::right_of(std::string_view token) const noexcept {
-  const Digest digest = digest_of(token);
+Right Tokens::right_by(Digest Entry::*secret, std::string_view shown) const noexcept {
+  const Digest digest = digest_of(shown);
   Right right = Right::none;
   for (const Entry& entry : entries_) {
-    const bool same = CRYPTO_memcmp(digest.data(), entry.digest.data(), digest.size()) == 0;
-    right = std::max(right, same ? entry.right : Right::none);
+    right = std::max(right, same_digest(digest, entry.*secret) ? entry.right : Right::none);
   }
   return right;
+}
+
+Right Tokens::right_of(std::string_view token) const noexcept {
+  return right_by(&Entry::token, token);
+}
+
+Right Tokens::right_of_cookie(std::string_view cookie) const noexcept {
+  return right_by(&Entry::cookie, cookie);
 }
 
 std::string new_token() {
@@ -131,12 +150,15 @@ std::string new_token() {
   if (RAND_bytes(random.data(), static_cast<int>(random.size())) != 1) {
     throw BridgeError("token: the system gives no random numbers; try again");
   }
-  std::string text;
-  for (const unsigned char byte : random) {
-    text += "0123456789abcdef"[byte >> 4];
-    text += "0123456789abcdef"[byte & 15];
-  }
-  return text;
+  return hex(random);
+}
+
+std::string cookie_for(std::string_view token) {
+  return hex(digest_of("kerf page " + std::string(token)));
+}
+
+bool PagePass::is(std::string_view token) const noexcept {
+  return same_digest(digest_of(token), digest_of(token_));
 }
 
 std::string_view query_value(std::string_view target, std::string_view key) noexcept {

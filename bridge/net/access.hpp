@@ -11,6 +11,9 @@
 
 namespace kerf::bridge {
 
+using Digest = std::array<unsigned char, 32>;
+[[nodiscard]] Digest digest_of(std::string_view text) noexcept;
+
 /// What a token lets its holder do.
 enum class Right { none, look, command };
 
@@ -24,6 +27,8 @@ class Tokens {
 
   /// Takes as long whatever `token` is: digests are compared, all of them, to their end.
   [[nodiscard]] Right right_of(std::string_view token) const noexcept;
+  /// The same for what `cookie_for` made of a token.
+  [[nodiscard]] Right right_of_cookie(std::string_view cookie) const noexcept;
 
   [[nodiscard]] bool may_command() const noexcept {
     return std::ranges::any_of(entries_,
@@ -34,15 +39,33 @@ class Tokens {
 
  private:
   struct Entry {
-    std::array<unsigned char, 32> digest;
+    Digest token, cookie;
     Right right;
   };
+  [[nodiscard]] Right right_by(Digest Entry::*secret, std::string_view shown) const noexcept;
+
   std::vector<Entry> entries_;
   std::string first_;
 };
 
 /// 128 random bits in hex.
 [[nodiscard]] std::string new_token();
+
+/// What a browser keeps in place of a token: the same after a restart, and the token cannot be had
+/// from it.
+[[nodiscard]] std::string cookie_for(std::string_view token);
+
+/// A token that opens the page for one browser. Taken, it is another one.
+class PagePass {
+ public:
+  [[nodiscard]] const std::string& token() const noexcept { return token_; }
+  /// Takes as long whatever `token` is.
+  [[nodiscard]] bool is(std::string_view token) const noexcept;
+  void renew() { token_ = new_token(); }
+
+ private:
+  std::string token_ = new_token();
+};
 
 /// The value of `key` in `a=1&b=2`, of a target `/path?a=1&b=2`; empty where there is none.
 [[nodiscard]] std::string_view query_value(std::string_view target, std::string_view key) noexcept;

@@ -58,34 +58,44 @@ asio::awaitable<void> Server::Impl::handshake(WebSocket& ws, beast::flat_buffer&
   done = !error;
 }
 
-/// Of the address, where it is good or there is no other; else of the cookie. Empty: neither has
-/// one.
-std::string_view Server::Impl::token_of(const Request& request) const {
+/// A token of the address goes before the cookie, and the cookie before the pass: a browser that
+/// has been here takes nobody's pass away.
+Server::Impl::Shown Server::Impl::shown_by(const Request& request) const {
+  const Tokens& tokens = setup_.tokens;
   const std::string_view asked = query_value(text(request.target()), "token");
-  if (setup_.tokens.right_of(asked) != Right::none) return asked;
-  const std::string name = "kerf" + std::to_string(port());
-  const std::string_view kept = cookie_value(text(request[http::field::cookie]), name);
-  return kept.empty() ? asked : kept;
+  if (const Right right = tokens.right_of(asked); right != Right::none) {
+    return {right, true, false, cookie_for(asked)};
+  }
+  const std::string_view kept = cookie_value(text(request[http::field::cookie]), cookie_name());
+  if (const Right right = tokens.right_of_cookie(kept); right != Right::none) {
+    return {right, true, false, {}};
+  }
+  if (!beast::websocket::is_upgrade(request) && pass_.is(asked)) {
+    return {tokens.right_of(tokens.first()), true, true, cookie_for(tokens.first())};
+  }
+  return {Right::none, !asked.empty() || !kept.empty(), false, {}};
 }
 
-std::string Server::Impl::page_text(const Request& request, Right right) const {
+std::string Server::Impl::page_text(const Request& request, const Shown& shown) {
   HttpReply reply;
   reply.keep_alive = request.keep_alive();
   reply.head_only = request.method() == http::verb::head;
-  const std::string_view token = query_value(text(request.target()), "token");
-  if (right == Right::none) {
+  if (shown.right == Right::none) {
     reply.status = 401;
-    reply.body =
-        token_of(request).empty()
-            ? "This picture needs a token: open the address that kerf bridge printed, with "
-              "all of its ?token=...\n"
-            : "This token is none of its own: open the address that kerf bridge printed "
-              "last.\n";
+    reply.body = shown.secret
+                     ? "This address was opened before, or is of another start: open the one that "
+                       "kerf bridge printed last. Each is for one browser.\n"
+                     : "This picture needs a token: open the address that kerf bridge printed, "
+                       "with all of its ?token=...\n";
     return http_text(reply);
   }
-  if (setup_.tokens.right_of(token) != Right::none) {
-    reply.cookie = "kerf" + std::to_string(port()) + "=" + std::string(token) +
-                   "; Path=/; HttpOnly; SameSite=Strict" + (tls_ ? "; Secure" : "");
+  if (!shown.cookie.empty() && !reply.head_only) {
+    reply.cookie = cookie_name() + "=" + shown.cookie + "; Path=/; HttpOnly; SameSite=Strict" +
+                   (tls_ ? "; Secure" : "");
+    if (shown.pass) {
+      pass_.renew();
+      if (setup_.on_pass) setup_.on_pass(pass_.token());
+    }
   }
   std::string_view name = path_of(text(request.target())).substr(1);
   if (name.empty()) name = "index.html";
@@ -149,9 +159,8 @@ asio::awaitable<void> Server::Impl::talk_http(std::unique_ptr<WebSocket> ws,
     if (upgrade && !is_own_origin(text(request[http::field::origin]), host, tls_.has_value())) {
       co_return co_await refuse(link, 403, "A page from elsewhere may not look in here.\n", head);
     }
-    const std::string_view token = token_of(request);
-    const Right right = setup_.tokens.right_of(token);
-    if (right == Right::none && !token.empty()) {
+    const Shown shown = shown_by(request);
+    if (shown.right == Right::none && shown.secret) {
       // The place is held meanwhile, so who guesses gets 32 answers a second at most.
       place.is_guess = true;
       say_at_most_once_a_second("a wrong token from " + place.from().to_string());
@@ -161,9 +170,9 @@ asio::awaitable<void> Server::Impl::talk_http(std::unique_ptr<WebSocket> ws,
     }
     if (upgrade && path_of(text(request.target())) == kBridgePath) {
       const Request upgrade_request = parser.release();
-      co_return co_await view(std::move(ws), upgrade_request, right, place);
+      co_return co_await view(std::move(ws), upgrade_request, shown.right, place);
     }
-    const std::string reply = page_text(request, right);
+    const std::string reply = page_text(request, shown);
     more = request.keep_alive();
     link.next_layer().expires_after(kReplyTime);
     co_await asio::async_write(link, asio::buffer(reply), quiet(error));

@@ -84,9 +84,9 @@ void throw_closed(std::uint16_t code, bool had_token) {
   switch (static_cast<CloseCode>(code)) {
     case CloseCode::no_token:
       if (!had_token) {
-        throw Hopeless("asks for a token; take all of the address it prints, in quotes");
+        throw Hopeless("asks for a token; take all of the wss:// address it prints, in quotes");
       }
-      throw Hopeless("the token is not one of its own; take the address it prints");
+      throw Hopeless("the token is not one of its own; take the wss:// address it prints");
     case CloseCode::too_many:
       throw BridgeError("has as many viewers as it takes");
     case CloseCode::too_slow:

@@ -19,6 +19,7 @@
 #include "bridge/net/qr_code.hpp"
 #include "bridge/net/server.hpp"
 #include "bridge/stream/run_snapshot.hpp"
+#include "shared/posix/failure.hpp"
 
 namespace kerf::bridge {
 namespace {
@@ -68,21 +69,36 @@ HostPort parse_listen(const std::string& text) {
   return out;
 }
 
-void print_addresses(const ServerSetup& setup, std::uint16_t port, bool qr) {
+/// Of the page or of join, at `host`.
+[[nodiscard]] std::string address_of(const char* scheme, bool tls, const std::string& host,
+                                     std::uint16_t port, const std::string& token) {
+  const bool v6 = host.find(':') != std::string::npos;
+  return std::string(scheme) + (tls ? "s://" : "://") + (v6 ? '[' + host + ']' : host) + ':' +
+         std::to_string(port) + "/?token=" + token;
+}
+
+/// For one browser. The QR code is for one of another machine.
+void print_pages(const ServerSetup& setup, std::uint16_t port, const std::string& pass, bool qr) {
   std::string for_others;
   for (const std::string& host : reached_at(setup.host)) {
-    const bool v6 = host.find(':') != std::string::npos;
-    const std::string address = (setup.tls ? "https://" : "http://") +
-                                (v6 ? '[' + host + ']' : host) + ':' + std::to_string(port) +
-                                "/?token=" + setup.tokens.first();
+    const std::string address = address_of("http", setup.tls.has_value(), host, port, pass);
     if (for_others.empty() && !is_loopback(host)) for_others = address;
     std::cout << address << '\n';
+  }
+  if (qr && !for_others.empty()) std::cout << qr_code(for_others);
+}
+
+void print_addresses(const ServerSetup& setup, std::uint16_t port, const std::string& pass,
+                     bool qr) {
+  std::cout << "for kerf bridge join, as often as it is shown\n";
+  for (const std::string& host : reached_at(setup.host)) {
+    std::cout << address_of("ws", setup.tls.has_value(), host, port, setup.tokens.first()) << '\n';
   }
   if (setup.tokens.may_command()) {
     std::cout << "with a token of --allow-commands in its place a viewer may command, too\n";
   }
-  if (qr && !for_others.empty()) std::cout << qr_code(for_others);
-  std::cout.flush();
+  std::cout << "for one browser; the next one gets an address of its own\n";
+  print_pages(setup, port, pass, qr);
 }
 
 }  // namespace
@@ -115,18 +131,28 @@ int run_serve(const ServeOptions& options, const std::atomic<bool>& stop) {
     setup.host_names.insert(setup.host_names.end(), setup.tls->names.begin(),
                             setup.tls->names.end());
   }
+  std::uint16_t port = 0;
+  setup.on_pass = [&setup, &port, qr = options.qr](const std::string& pass) {
+    std::cout << "for the next browser\n";
+    print_pages(setup, port, pass, qr);
+    std::cout.flush();
+  };
   Server server(setup);
+  port = server.port();
   std::optional<IgtlOutput> slicer;
   if (options.openigtlink != 0) {
-    const auto port = static_cast<std::uint16_t>(options.openigtlink);
-    slicer.emplace(IgtlOptions{.host = server.address(), .port = port, .name = options.name});
+    const auto slicer_port = static_cast<std::uint16_t>(options.openigtlink);
+    slicer.emplace(
+        IgtlOptions{.host = server.address(), .port = slicer_port, .name = options.name});
     std::cout << "OpenIGTLink, for whoever reaches it, "
-              << options.listen.substr(0, options.listen.rfind(':')) << ':' << port << '\n';
+              << options.listen.substr(0, options.listen.rfind(':')) << ':' << slicer_port << '\n';
   }
   if (setup.tls && options.identity.empty()) {
     std::cout << "certificate, self-signed, SHA-256 " << setup.tls->fingerprint << '\n';
   }
-  print_addresses(setup, server.port(), options.qr);
+  print_addresses(setup, port, server.pass(), options.qr);
+  // Who has no address has no picture.
+  if (const int code = when_told(0, "kerf-bridge", std::cout, std::cerr); code != 0) return code;
   server.run(stop);
   return 0;
 }

@@ -254,6 +254,9 @@ std::uint16_t Server::port() const noexcept {
 std::string Server::address() const {
   return impl_->address();
 }
+const std::string& Server::pass() const noexcept {
+  return impl_->pass();
+}
 void Server::run(const std::atomic<bool>& stop) {
   impl_->run(stop);
 }

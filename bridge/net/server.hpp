@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -24,6 +25,7 @@ struct ServerSetup {
   std::vector<std::string> host_names;  ///< by which browsers may call it, beside addresses
   std::size_t max_viewers = 32;
   bool dedicated_link = false;
+  std::function<void(const std::string& pass)> on_pass;  ///< the pass was taken: this is the next
   std::int64_t silence_ns = 5'000'000'000;      ///< a viewer that acknowledges nothing is dropped
   std::int64_t handshake_ns = 5'000'000'000;    ///< for TLS, and for each request
   std::int64_t wrong_token_ns = 1'000'000'000;  ///< before a wrong token or cookie is answered
@@ -43,6 +45,8 @@ class Server {
   [[nodiscard]] std::uint16_t port() const noexcept;
   /// That it listens at, as text: what the host stood for.
   [[nodiscard]] std::string address() const;
+  /// A token that opens the page for one browser, which looks as the first of the tokens does.
+  [[nodiscard]] const std::string& pass() const noexcept;
   /// Serves until `stop`.
   void run(const std::atomic<bool>& stop);
 

@@ -58,6 +58,7 @@ class Server::Impl {
   explicit Impl(ServerSetup setup);
   ~Impl();
   [[nodiscard]] std::uint16_t port() const { return acceptor_.local_endpoint().port(); }
+  [[nodiscard]] const std::string& pass() const { return pass_.token(); }
   [[nodiscard]] std::string address() const {
     return acceptor_.local_endpoint().address().to_string();
   }
@@ -66,6 +67,13 @@ class Server::Impl {
  private:
   using Void = asio::awaitable<void>;
   class HandshakePlace;
+  /// What a request shows of what it may.
+  struct Shown {
+    Right right = Right::none;
+    bool secret = false;  ///< a token or a cookie, right or wrong
+    bool pass = false;    ///< it is by the pass that it may look
+    std::string cookie;   ///< for a browser to keep from now on
+  };
 
   // server.cpp
   Void accept_all();
@@ -82,8 +90,10 @@ class Server::Impl {
   Void talk_http(std::unique_ptr<WebSocket> ws, beast::flat_buffer& in);
   Void refuse(Link& link, int status, std::string_view text, bool head_only);
   void say_at_most_once_a_second(const std::string& text);
-  [[nodiscard]] std::string_view token_of(const Request& request) const;
-  [[nodiscard]] std::string page_text(const Request& request, Right right) const;
+  /// Of this port, since cookies are kept by host alone.
+  [[nodiscard]] std::string cookie_name() const { return "kerf" + std::to_string(port()); }
+  [[nodiscard]] Shown shown_by(const Request& request) const;
+  [[nodiscard]] std::string page_text(const Request& request, const Shown& shown);
 
   // viewer.cpp
   Void view(std::unique_ptr<WebSocket> ws, const Request& request, Right right,
@@ -99,6 +109,7 @@ class Server::Impl {
   static void drop(Viewer& viewer, CloseCode code);
 
   ServerSetup setup_;
+  PagePass pass_;
   // Used by what `io_` runs, to its end.
   std::list<HandshakePlace*> handshakes_;  // the oldest first
   asio::io_context io_{1};

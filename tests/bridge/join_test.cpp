@@ -122,7 +122,7 @@ TEST_CASE(
     good.options.fingerprint.clear();
     good.options.ca = ca;
     good.address("wss://", "look-0123456789abcdeF");
-    CHECK(good.ends() == "the token is not one of its own; take the address it prints");
+    CHECK(good.ends() == "the token is not one of its own; take the wss:// address it prints");
     good.address("ws://", kLook);
     CHECK(good.ends() == "takes no unencrypted viewers; take wss://");
   }
@@ -161,9 +161,9 @@ TEST_CASE("join tells at once what keeps it from a picture, and gives up where i
   };
   CHECK(first_words(with("/?token=" + kLook)) == place + ": has no controller yet; trying again");
   CHECK(first_words(with("")) ==
-        place + ": asks for a token; take all of the address it prints, in quotes");
+        place + ": asks for a token; take all of the wss:// address it prints, in quotes");
   CHECK(first_words(with("/?token=wrong-0123456789")) ==
-        place + ": the token is not one of its own; take the address it prints");
+        place + ": the token is not one of its own; take the wss:// address it prints");
   JoinOptions patient = with("/?token=" + kLook);
   patient.wait_s = 0.1;
   CHECK(last_words(patient).ends_with("; gave up after 0.1 s (--wait)"));

@@ -74,13 +74,17 @@ TEST_CASE("a page needs a token, once; then a cookie that no script sees") {
   CHECK(has(client.ask("/"), "401 "));
   CHECK(has(client.ask("/?token=wrong"), "401 "));
   CHECK(has(client.ask("/?token="), "needs a token"));
-  CHECK(has(client.ask("/?token=wrong"), "none of its own"));
+  CHECK(has(client.ask("/?token=wrong"), "opened before, or is of another start"));
   const std::string page = client.ask("/?token=" + kLook);
   CHECK(has(page, "200 OK"));
   CHECK(has(page, "Content-Security-Policy: default-src 'none'"));
   CHECK(has(page, "HttpOnly; SameSite=Strict"));
-  const std::string cookie = "kerf" + std::to_string(bridge.port()) + "=" + kLook;
+  const std::string name = "kerf" + std::to_string(bridge.port()) + "=";
+  const std::string cookie = name + bridge::cookie_for(kLook);
   CHECK(has(page, cookie));
+  CHECK(!has(page, kLook));
+  CHECK(has(client.ask("/", "Cookie: " + name + kLook + "\r\n"), "401 "));
+  CHECK(has(client.ask("/?token=" + bridge::cookie_for(kLook)), "401 "));
   CHECK(has(client.ask("/index.html", "Cookie: other=1; " + cookie + "\r\n"), "200 OK"));
   CHECK(has(client.ask("/", "Cookie: x" + cookie + "\r\n"), "401 "));
   CHECK(has(client.ask("/?token=wrong", "Cookie: " + cookie + "\r\n"), "200 OK"));
@@ -89,6 +93,37 @@ TEST_CASE("a page needs a token, once; then a cookie that no script sees") {
   const std::string head = client.ask("/?token=" + kLook, "", "HEAD");
   CHECK(has(head, "200 OK"));
   CHECK(head.ends_with("\r\n\r\n"));
+}
+
+TEST_CASE("the printed address opens the page for one browser, and the next one gets another") {
+  const TestController controller;
+  ServerSetup setup;
+  std::vector<std::string> passes;
+  setup.on_pass = [&passes](const std::string& pass) { passes.push_back(pass); };
+  const TestBridge bridge(setup);
+  const std::string first = bridge.server.pass();
+  const auto open = [&](const std::string& token, const std::string& head = "",
+                        const std::string& method = "GET") {
+    return RawClient(bridge.port()).ask("/?token=" + token, head, method);
+  };
+  const std::string cookie =
+      "Cookie: kerf" + std::to_string(bridge.port()) + "=" + bridge::cookie_for(kLook) + "\r\n";
+  CHECK(has(open(first, "", "HEAD"), "200 OK"));  // a preview of the link takes nothing
+  CHECK(has(open(first, cookie), "200 OK"));      // nor does who has been here
+  RawClient viewer(bridge.port());
+  viewer.upgrade("/bridge?token=" + first);
+  CHECK(code_of(viewer) == static_cast<int>(CloseCode::no_token));
+  CHECK(passes.empty());
+  const std::string page = open(first);
+  CHECK(has(page, "200 OK"));
+  CHECK(has(page, bridge::cookie_for(kLook)));
+  REQUIRE(passes.size() == 1);
+  CHECK(passes[0] != first);
+  CHECK(has(open(first), "401 "));
+  CHECK(has(open(first, cookie), "200 OK"));
+  CHECK(has(open(passes[0]), "200 OK"));
+  CHECK(has(open(passes[0]), "401 "));
+  CHECK(passes.size() == 2);
 }
 
 TEST_CASE("who guesses waits, in the address and in the cookie") {
@@ -155,7 +190,8 @@ TEST_CASE("a page from elsewhere cannot open the socket, and who has no token is
   none.upgrade("/bridge");
   CHECK(code_of(none) == static_cast<int>(CloseCode::no_token));
   RawClient cookie(bridge.port());
-  cookie.upgrade("/bridge", "Cookie: kerf" + std::to_string(bridge.port()) + "=" + kLook + "\r\n");
+  cookie.upgrade("/bridge", "Cookie: kerf" + std::to_string(bridge.port()) + "=" +
+                                bridge::cookie_for(kLook) + "\r\n");
   CHECK(cookie.message().has_value());
 }
 

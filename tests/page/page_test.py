@@ -183,6 +183,11 @@ def says_what_is_missing(case):
             bare.go(case.address)
             case.check(bare.until(text_of('#missing') + ".includes('no WebGL 2')"), 'a browser without WebGL 2 is told')
             case.check(bare.until('document.body?.dataset.state === "live"'), 'and sees the figures')
+            # As for a browser that keeps no cookie.
+            bare.call('Network.setBlockedURLs', urls=['*.js', '*.css'])
+            bare.call('Page.reload')
+            case.check(bare.until(text_of('#state') + ".includes('where scripts or cookies are off')"),
+                       'so is one whose scripts do not come')
         finally:
             bare.close()
 

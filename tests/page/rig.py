@@ -111,13 +111,13 @@ class Rig:
                    '--port', 'socket:' + socket, '--name', self.name)
 
     def start_bridge(self, listen='127.0.0.1:0', *more):
-        """Its address with the token, once it listens."""
+        """Its address with the token that is good for all browsers, once it listens."""
         self.start('bridge', 'serve', '--listen', listen, '--name', self.name, *more)
         end = time.monotonic() + 20
         while time.monotonic() < end and self.processes['bridge'].poll() is None:
-            address = re.search(r'https?://\S+', self.log('bridge'))
+            address = re.search(r'wss?://\S+\n', self.log('bridge'))
             if address:
-                return address[0]
+                return address[0].strip().replace('ws', 'http', 1)
             time.sleep(0.02)
         raise RuntimeError('kerf-bridge: ' + self.log('bridge'))
 

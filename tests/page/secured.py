@@ -3,6 +3,7 @@
 import base64
 import hashlib
 import os
+import re
 import ssl
 import tempfile
 
@@ -29,6 +30,23 @@ def public_key_of(pem_file):
     return base64.b64encode(hashlib.sha256(der[at:element(at)[1]]).digest()).decode()
 
 
+def opens_for_one_browser(case, page):
+    printed = re.findall(r'https://\S+', case.rig.log('bridge'))[-1]
+    page.call('Network.clearBrowserCookies')
+    page.go(printed)
+    case.check(page.until('document.body?.dataset.state === "live"'), 'the printed address opens the page')
+    page.call('Page.reload')
+    case.check(page.until('document.body?.dataset.state === "live"'), 'which loads again')
+    page.go('about:blank')
+    page.go(printed)
+    case.check(page.until('document.body?.dataset.state === "live"'), 'its own browser opens it again')
+    page.call('Network.clearBrowserCookies')
+    page.go(printed)
+    case.check(page.until('document.body?.innerText.includes("This address was opened before")'), 'another one does not')
+    page.go(re.findall(r'https://\S+', case.rig.log('bridge'))[-1])
+    case.check(page.until('document.body?.dataset.state === "live"'), 'but the address that is printed next')
+
+
 def is_secured(case):
     identity = case.rig.make_identity()
     case.rig.end('bridge')
@@ -46,9 +64,10 @@ def is_secured(case):
             case.check(sockets and all(url.startswith('wss://') for url in sockets), 'over wss')
             cookies = page.call('Network.getCookies')['cookies']
             case.check(cookies and all(one['secure'] and one['httpOnly'] for one in cookies), 'the cookie is secure')
+            opens_for_one_browser(case, page)
             page.call('Network.clearBrowserCookies')
             page.go(address.split('?')[0] + '?token=a-token-that-is-none')
-            case.check(page.until('document.body?.innerText.includes("This token is none of its own")'),
+            case.check(page.until('document.body?.innerText.includes("This address was opened before, or is of another start")'),
                        'a wrong token is told')
             page.go(address.replace('https:', 'http:'))
             case.check(page.until('document.body?.innerText.includes("This port speaks TLS only: open it with https://")'),
