@@ -2,8 +2,11 @@
 #include "visualizer/app/overlay.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
+#include <utility>
+#include <vector>
 
 #include <backends/imgui_impl_opengl3.h>
 #include <imgui.h>
@@ -63,6 +66,21 @@ ImGuiStyle style_for(float unit) {
   style.Colors[ImGuiCol_SliderGrabActive] = ImVec4(0.16F, 0.42F, 0.60F, 1.0F);
   if (unit != 1.0F) style.ScaleAllSizes(unit);
   return style;
+}
+
+using Box = std::array<float, 4>;
+
+/// Of all that was laid out last, in the order of drawing.
+std::vector<Box> laid_out() {
+  std::vector<Box> boxes;
+  const ImDrawData& panels = *ImGui::GetDrawData();
+  for (int i = 0; i < panels.CmdListsCount; ++i) {
+    for (const ImDrawCmd& command : panels.CmdLists[i]->CmdBuffer) {
+      const ImVec4& clip = command.ClipRect;
+      boxes.push_back({clip.x, clip.y, clip.z, clip.w});
+    }
+  }
+  return boxes;
 }
 
 }  // namespace
@@ -150,8 +168,16 @@ void Overlay::show(const SliceViews& slices) {
 PixelRect Overlay::prepare(const OverlayFigures& figures, PictureSize size) {
   begin_frame(figures, size);
   OverlayFigures shown = figures;
-  // ImGui learns the size of what a panel holds by laying it out: the second time is right.
-  for (int pass = 0; pass < 2; ++pass) lay_out(shown, size);
+  // ImGui learns the size of what a panel holds by laying it out, and the room of a panel is what
+  // those before it leave: so it is done until two passes give the same.
+  constexpr int kMostPasses = 8;
+  std::vector<Box> before{{}};  // unlike any
+  for (int pass = 0; pass < kMostPasses; ++pass) {
+    lay_out(shown, size);
+    std::vector<Box> now = laid_out();
+    if (now == before) break;
+    before = std::move(now);
+  }
   PixelRect bounds;
   const ImDrawData& panels = *ImGui::GetDrawData();
   for (int i = 0; i < panels.CmdListsCount; ++i) {

@@ -70,7 +70,7 @@ double covered(Overlay& overlay, const OverlayFigures& figures, PictureSize size
   constexpr float kWhite[4] = {1.0F, 1.0F, 1.0F, 1.0F};
   glDisable(GL_SCISSOR_TEST);
   glClearNamedFramebufferfv(target.framebuffer(), GL_COLOR, 0, kWhite);
-  for (int frame = 0; frame < 3; ++frame) static_cast<void>(overlay.prepare(figures, size));
+  static_cast<void>(overlay.prepare(figures, size));
   overlay.draw(target);
   glDisable(GL_SCISSOR_TEST);
   const std::vector<std::uint8_t> rgb = target.read_rgb();
@@ -114,6 +114,30 @@ TEST_CASE("panels cover at most a quarter of a window, and not its middle, whate
         CHECK(share < 0.25);
         CHECK(share > 0.1);  // it shows them
         CHECK(middle_is_free(picture, size));
+      }
+    }
+  }
+}
+
+TEST_CASE("panels are laid out at once as they stay, whatever was laid out before") {
+  const auto context = make_headless_context();
+  Overlay overlay;
+  OverlayFigures few = crowded(), many = crowded(), sliced = crowded();
+  few.score.resize(2);
+  few.controls->opacities.clear();
+  few.controls->volumes.resize(1);
+  sliced.score.resize(2);
+  sliced.controls->volumes.resize(3);
+  sliced.slices = grey_slices(56);
+  for (const PictureSize size : {kPlain, PictureSize{400, 600}, PictureSize{1100, 760}}) {
+    for (const OverlayFigures& before : {few, many, sliced}) {
+      for (const OverlayFigures& after : {few, many, sliced}) {
+        std::vector<std::uint8_t> first, second;
+        static_cast<void>(covered(overlay, before, kPlain));
+        static_cast<void>(covered(overlay, after, size, &first));
+        static_cast<void>(covered(overlay, after, size, &second));
+        CAPTURE(size.width);
+        CHECK(first == second);
       }
     }
   }
