@@ -1,15 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "bridge/net/identity.hpp"
 
-#include <fstream>
 #include <iostream>
-#include <iterator>
 #include <system_error>
 
 #include "bridge/net/bridge_error.hpp"
 #include "bridge/net/certificate.hpp"
 #include "bridge/net/host_names.hpp"
 #include "shared/posix/new_file.hpp"
+#include "shared/text/file_text.hpp"
 
 namespace kerf::bridge {
 namespace {
@@ -22,16 +21,11 @@ struct Authority {
   bool is_new = false;
 };
 
-std::string text_of_file(const std::filesystem::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), {}};
-}
-
 /// The CA of the folder, made where there is none.
 Authority authority_in(const std::filesystem::path& folder) {
   const std::filesystem::path file = folder / "ca.pem", key_file = folder / "ca-key.pem";
   if (std::filesystem::exists(file) || std::filesystem::exists(key_file)) {
-    Authority out{certificate_of(text_of_file(file)), key_of(text_of_file(key_file))};
+    Authority out{certificate_of(text_in(file)), key_of(text_in(key_file))};
     if (!out.certificate || !out.key ||
         X509_check_private_key(out.certificate.get(), out.key.get()) != 1) {
       throw BridgeError(folder.string() +
@@ -69,7 +63,7 @@ int run_make_identity(const IdentityOptions& options) {
   const Key key = new_key();
   const Certificate certificate =
       new_certificate(spec, key.get(), authority.certificate.get(), authority.key.get());
-  const Certificate replaced = certificate_of(text_of_file(folder / "cert.pem"));
+  const Certificate replaced = certificate_of(text_in(folder / "cert.pem"));
   // The program's umask makes them 0600.
   if (authority.is_new) {
     write_new_file(folder / "ca-key.pem", pem_of(authority.key.get()));

@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "bridge/net/tls_keys.hpp"
 
-#include <fstream>
-#include <iterator>
-
 #include <sys/stat.h>
 
 #include "bridge/net/bridge_error.hpp"
 #include "bridge/net/certificate.hpp"
+#include "shared/text/file_text.hpp"
 
 namespace kerf::bridge {
 namespace {
@@ -15,8 +13,7 @@ namespace {
 constexpr const char* kMake = "make one: kerf bridge make-identity ";
 
 std::string text_of_file(const std::filesystem::path& file, const std::filesystem::path& folder) {
-  std::ifstream in(file, std::ios::binary);
-  std::string text(std::istreambuf_iterator<char>(in), {});
+  std::string text = text_in(file);
   if (text.empty()) {
     throw BridgeError("--identity " + folder.string() + ": " + file.filename().string() +
                       " is missing, empty or not to be read; " + kMake + folder.string());

@@ -4,8 +4,6 @@
 #include <algorithm>
 #include <cerrno>
 #include <charconv>
-#include <fstream>
-#include <iterator>
 #include <string_view>
 #include <system_error>
 #include <utility>
@@ -16,6 +14,7 @@
 
 #include "hil/hil_error.hpp"
 #include "shared/posix/new_file.hpp"
+#include "shared/text/file_text.hpp"
 
 namespace kerf::sweep {
 
@@ -34,8 +33,7 @@ Table::Table(std::filesystem::path folder, const std::string& plan)
   if (fd_ < 0) fail(std::generic_category().message(errno).c_str());
   if (flock(fd_, LOCK_EX | LOCK_NB) != 0) fail("another sweep is at work there");
 
-  std::ifstream file(part_, std::ios::binary);
-  const std::string text{std::istreambuf_iterator<char>(file), {}};
+  const std::string text = text_in(part_);
   const std::string first = plan + "\n";
   if (text.size() < first.size() && first.starts_with(text)) {  // new, or cut in its first line
     if (ftruncate(fd_, 0) != 0 || write(fd_, first.data(), first.size()) != ssize_t(first.size())) {

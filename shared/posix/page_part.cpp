@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "shared/posix/page_part.hpp"
 
-#include <fstream>
-#include <iterator>
-
 #include "shared/posix/new_file.hpp"
+#include "shared/text/file_text.hpp"
 
 namespace kerf {
 
@@ -20,9 +18,7 @@ std::string with_part(std::string_view page, std::string_view name, std::string_
 
 void write_page_part(const std::filesystem::path& file, std::string_view name,
                      std::string_view text) {
-  std::ifstream before(file, std::ios::binary);
-  const std::string page{std::istreambuf_iterator<char>(before), {}};
-  write_new_file(file, with_part(page, name, text));
+  write_new_file(file, with_part(text_in(file), name, text));
 }
 
 }  // namespace kerf

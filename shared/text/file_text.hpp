@@ -3,15 +3,18 @@
 
 #include <filesystem>
 #include <fstream>
-#include <iterator>
+#include <sstream>
 #include <string>
+#include <utility>
 
 namespace kerf {
 
-/// The bytes of a file; none where it cannot be read.
+/// The bytes of a file; none where it cannot be read. In blocks: a byte at a time, a program of 60
+/// MB would take five seconds under a sanitizer.
 [[nodiscard]] inline std::string text_in(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
+  std::ostringstream text;
+  text << std::ifstream(path, std::ios::binary).rdbuf();
+  return std::move(text).str();
 }
 
 }  // namespace kerf

@@ -5,7 +5,6 @@
 #include <cerrno>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <sstream>
 #include <system_error>
 #include <utility>
@@ -19,6 +18,7 @@
 #include "shared/numeric/fnv1a.hpp"
 #include "shared/posix/hex64.hpp"
 #include "shared/posix/new_file.hpp"
+#include "shared/text/file_text.hpp"
 #include "shared/text/json.hpp"
 #include "shared/text/number.hpp"
 
@@ -106,9 +106,7 @@ void take_head(const std::string& line, Part& part) {
 
 /// Bytes up to the end of the last whole line.
 off_t whole_lines(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  const std::string text(std::istreambuf_iterator<char>(file), {});
-  return static_cast<off_t>(text.rfind('\n') + 1);  // none: 0
+  return static_cast<off_t>(text_in(path).rfind('\n') + 1);  // none: 0
 }
 
 /// A pipe would wait for ever, and /dev/null keeps nothing.
@@ -169,8 +167,7 @@ std::string gap_of(const Part& part, std::size_t column_count) {
 
 const std::string& this_program() {
   static const std::string hash = [] {
-    std::ifstream file("/proc/self/exe", std::ios::binary);
-    const std::string bytes(std::istreambuf_iterator<char>(file), {});
+    const std::string bytes = text_in("/proc/self/exe");
     if (bytes.empty()) {
       throw HilError(
           "/proc/self/exe: cannot be read, so a part would not tell which program made "
