@@ -29,6 +29,12 @@ std::string text_of(const sockaddr* address) {
   return text.data();
 }
 
+/// This machine's name; empty where it has none.
+std::string machine_name() {
+  std::array<char, 256> name{};
+  return gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "";
+}
+
 }  // namespace
 
 bool is_address(const std::string& host) noexcept {
@@ -73,11 +79,6 @@ std::string why_no_host(const std::string& host) {
 bool is_loopback(std::string_view host) noexcept {
   return host == "localhost" || host == "::1" ||
          (host.starts_with("127.") && host.find_first_not_of("0123456789.") == host.npos);
-}
-
-std::string machine_name() {
-  std::array<char, 256> name{};
-  return gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "";
 }
 
 std::vector<std::string> own_addresses() {

@@ -17,9 +17,6 @@ namespace kerf::bridge {
 /// Whether what is sent to `host` never leaves this machine, by its text alone.
 [[nodiscard]] bool is_loopback(std::string_view host) noexcept;
 
-/// This machine's name; empty where it has none.
-[[nodiscard]] std::string machine_name();
-
 /// Its addresses that others may reach and loopback's: IPv4 and global IPv6, as text.
 [[nodiscard]] std::vector<std::string> own_addresses();
 

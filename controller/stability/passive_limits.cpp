@@ -25,6 +25,11 @@ double viscosity_at(const SampledLoop& loop, double stiffness, double damping, d
   return loop.period_s / 2 * (held + std::sqrt(held * held + part * (1 - part) * std::norm(force)));
 }
 
+/// (b + B) / (T/2 + td): Gil's bound for small b and B and a short delay; with B = 0 Diolaiti's.
+double short_delay_stiffness(const SampledLoop& loop, double damping_ns_per_mm) {
+  return (loop.viscous_ns_per_mm + damping_ns_per_mm) / (loop.period_s / 2 + loop.delay_s);
+}
+
 }  // namespace
 
 double passive_viscosity(const SampledLoop& loop, double stiffness_n_per_mm,
@@ -66,10 +71,6 @@ double passive_stiffness(const SampledLoop& loop, double damping_ns_per_mm) {
     (passive(middle) ? low : high) = middle;
   }
   return low;
-}
-
-double short_delay_stiffness(const SampledLoop& loop, double damping_ns_per_mm) {
-  return (loop.viscous_ns_per_mm + damping_ns_per_mm) / (loop.period_s / 2 + loop.delay_s);
 }
 
 double quantum_stiffness(const SampledLoop& loop) {

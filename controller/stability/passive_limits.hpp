@@ -19,10 +19,6 @@ namespace kerf {
 /// The largest K (N/mm) that is passive on this device at this damping; 0: none.
 [[nodiscard]] double passive_stiffness(const SampledLoop& loop, double damping_ns_per_mm);
 
-/// (b + B) / (T/2 + td): Gil's bound for small b and B and a short delay; with B = 0 Diolaiti's. A
-/// rule of thumb beside `highest_stiffness`, which is exact.
-[[nodiscard]] double short_delay_stiffness(const SampledLoop& loop, double damping_ns_per_mm);
-
 /// min(2 b/T, 2 fc/D): up to here quantisation and sampling never give energy, whoever holds the
 /// device (Abbott and Okamura; B = 0, no delay). Without a quantum the first of the two.
 [[nodiscard]] double quantum_stiffness(const SampledLoop& loop);

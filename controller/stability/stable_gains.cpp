@@ -7,11 +7,18 @@
 #include <cstddef>
 #include <limits>
 #include <utility>
+#include <vector>
 
 #include "controller/stability/held_mass.hpp"
 
 namespace kerf {
 namespace {
+
+/// Gains between which a loop is stable, in the gain's unit.
+struct StableBand {
+  double from = 0;
+  double to = 0;
+};
 
 /// Coefficients from the constant one up.
 using Polynomial = std::vector<double>;
@@ -110,7 +117,9 @@ double top_gain(const Polynomial& open, const Polynomial& gained) {
   return top;
 }
 
-/// The gains g > 0 for which open + g gained has all roots inside.
+/// The gains g > 0 for which open + g gained has all roots inside, from the lowest up. The first
+/// band begins at 0 unless `open` alone is unstable; what follows are re-entries. Empty: never
+/// stable.
 std::vector<StableBand> bands(const Polynomial& open, const Polynomial& gained) {
   constexpr double kLowest = 1e-9, kRatio = 1.02;
   const double top = top_gain(open, gained);
@@ -154,13 +163,9 @@ bool is_stable(const SampledLoop& loop, double stiffness_n_per_mm, double dampin
       sum(sum(c.open, c.damping, damping_ns_per_mm), c.stiffness, stiffness_n_per_mm));
 }
 
-std::vector<StableBand> stable_stiffnesses(const SampledLoop& loop, double damping_ns_per_mm) {
-  const Characteristic c = characteristic(loop);
-  return bands(sum(c.open, c.damping, damping_ns_per_mm), c.stiffness);
-}
-
 double highest_stiffness(const SampledLoop& loop, double damping_ns_per_mm) {
-  return first_end(stable_stiffnesses(loop, damping_ns_per_mm));
+  const Characteristic c = characteristic(loop);
+  return first_end(bands(sum(c.open, c.damping, damping_ns_per_mm), c.stiffness));
 }
 
 double highest_damping(const SampledLoop& loop) {

@@ -25,8 +25,7 @@ std::string bars(const VolumeInfo& info) {
   return line;
 }
 
-}  // namespace
-
+/// The noise in one line: in values of a file of that window, and what a scene makes of it.
 std::string noise_line(const Noise& noise, Window window) {
   if (noise.share == 0) return "noise      none found";
   const int passes = passes_for(noise);
@@ -37,6 +36,8 @@ std::string noise_line(const Noise& noise, Window window) {
       noise.density * (window.hi - window.lo), 100 * noise.share, passes, passes == 1 ? "" : "es");
   return text;
 }
+
+}  // namespace
 
 VolumeInfo describe(const std::string& file, const SourceVolume& volume, Window window) {
   const VolumeImage image = apply_window(volume, window);

@@ -29,9 +29,6 @@ struct VolumeInfo : VolumeFrame {
   std::array<std::uint64_t, kHistogramBins> histogram{};  ///< over the window, equal steps
 };
 
-/// The noise in one line: in values of a file of that window, and what a scene makes of it.
-[[nodiscard]] std::string noise_line(const Noise& noise, Window window);
-
 [[nodiscard]] VolumeInfo describe(const std::string& file, const SourceVolume& volume,
                                   Window window);
 void print(const VolumeInfo& info, std::ostream& out);

@@ -74,6 +74,13 @@ void tell(const HandRun& run, const RowSink& add_row) {
   row(": ticks with a fault", double(run.faults), "ticks", 0);
 }
 
+/// scenes/touch.toml with another way to cut.
+LoadedScene hand_scene(const Effort& effort, CutModel cut) {
+  LoadedScene scene = shipped_scene("touch", effort);
+  scene.cut.model = cut;
+  return scene;
+}
+
 }  // namespace
 
 HandRun run_hand(LoadedScene scene, const HandScript& hand, double seconds) {
@@ -142,12 +149,6 @@ Chatter chatter_of(const HandRun& run, double cutoff_hz) {
 
 LoadedScene shipped_scene(const std::string& name, const Effort& effort) {
   return load_scene("scenes/" + name + ".toml", {.phantom_size = effort.phantom});
-}
-
-LoadedScene hand_scene(const Effort& effort, CutModel cut) {
-  LoadedScene scene = shipped_scene("touch", effort);
-  scene.cut.model = cut;
-  return scene;
 }
 
 HandRun run_hand(const LoadedScene& scene, const std::string& name, const Effort& effort) {

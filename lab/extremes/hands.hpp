@@ -48,8 +48,6 @@ inline constexpr double kChatterHz = 150;
 
 /// scenes/NAME.toml with the phantom of this effort. Throws SceneError where it cannot be read.
 [[nodiscard]] LoadedScene shipped_scene(const std::string& name, const Effort& effort);
-/// scenes/touch.toml with another way to cut. Throws SceneError where it cannot be read.
-[[nodiscard]] LoadedScene hand_scene(const Effort& effort, CutModel cut);
 /// The hand of scenes/hands/NAME.toml in it. Throws HilError where it cannot be read.
 [[nodiscard]] HandRun run_hand(const LoadedScene& scene, const std::string& name,
                                const Effort& effort);

@@ -58,23 +58,8 @@ std::uint64_t edge_of(FinePoint at) {
   return key;
 }
 
-struct Format {
-  std::string_view ending;
-  std::string (*bytes)(const ClosedMesh&);
-};
-constexpr auto kFormats = std::to_array<Format>({{".stl", stl_bytes}, {".ply", ply_bytes}});
-
-const Format& format_of(const std::filesystem::path& file) {
-  const auto found = std::find_if(kFormats.begin(), kFormats.end(), [&](const Format& format) {
-    return file.extension() == format.ending;
-  });
-  if (found != kFormats.end()) return *found;
-  throw VisualizerError("--export: " + file.string() +
-                        ": the name says no format; let it end in .stl or .ply");
-}
-
-}  // namespace
-
+/// The mesh as the bytes of a binary STL file: triangles with the normal of their plane. STL has no
+/// colours and names no unit; ours are mm, as most readers take it.
 std::string stl_bytes(const ClosedMesh& mesh) {
   constexpr std::size_t kHeader = 80;
   constexpr std::size_t kTriangle = 50;
@@ -98,6 +83,8 @@ std::string stl_bytes(const ClosedMesh& mesh) {
   return bytes;
 }
 
+/// The mesh as the bytes of a binary little-endian PLY file: position, normal and sRGB colour of
+/// each vertex, and triangles.
 std::string ply_bytes(const ClosedMesh& mesh) {
   std::string bytes;
   constexpr std::size_t kVertex = 2 * sizeof(glm::vec3) + 3;
@@ -122,6 +109,23 @@ std::string ply_bytes(const ClosedMesh& mesh) {
   }
   return bytes;
 }
+
+struct Format {
+  std::string_view ending;
+  std::string (*bytes)(const ClosedMesh&);
+};
+constexpr auto kFormats = std::to_array<Format>({{".stl", stl_bytes}, {".ply", ply_bytes}});
+
+const Format& format_of(const std::filesystem::path& file) {
+  const auto found = std::find_if(kFormats.begin(), kFormats.end(), [&](const Format& format) {
+    return file.extension() == format.ending;
+  });
+  if (found != kFormats.end()) return *found;
+  throw VisualizerError("--export: " + file.string() +
+                        ": the name says no format; let it end in .stl or .ply");
+}
+
+}  // namespace
 
 void ClosedMesh::append(const VolumeSurface& surface, const glm::dmat4& world_from_voxel) {
   const glm::dmat3 world_from_normal = glm::inverseTranspose(glm::dmat3(world_from_voxel));

@@ -29,14 +29,6 @@ struct ClosedMesh {
   void append(const VolumeSurface& surface, const glm::dmat4& world_from_voxel);
 };
 
-/// The mesh as the bytes of a binary STL file: triangles with the normal of their plane. STL has no
-/// colours and names no unit; ours are mm, as most readers take it.
-[[nodiscard]] std::string stl_bytes(const ClosedMesh& mesh);
-
-/// The mesh as the bytes of a binary little-endian PLY file: position, normal and sRGB colour of
-/// each vertex, and triangles.
-[[nodiscard]] std::string ply_bytes(const ClosedMesh& mesh);
-
 /// Writes the iso-surfaces of the solid volumes (of the first volume where none is solid), in mm in
 /// the world, as STL or PLY by the name's ending. Each is closed; where volumes overlap so do they.
 /// Whole or not at all; with nothing left to show, a valid file without triangles. Needs no GL.
