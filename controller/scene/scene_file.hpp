@@ -11,9 +11,9 @@
 
 namespace kerf {
 
-/// Reads TOML text, with `settings` in the place of what it says. `path` is only used in messages
-/// and to resolve `script`. Throws SceneError, one line with the line number, for anything that is
-/// not a valid scene. Any thread; load time only.
+/// Reads TOML text. `settings` replace what it says. No file is opened: `path` stands in messages
+/// and in the scene, and the hand's script is named from its folder. Throws SceneError, one line
+/// with the line number, for anything that is not a valid scene. Any thread; load time only.
 [[nodiscard]] Scene parse_scene(std::string_view text, const std::filesystem::path& path,
                                 SceneKeys keys = scene_keys(),
                                 std::span<const SceneSetting> settings = {});
@@ -22,8 +22,8 @@ namespace kerf {
 [[nodiscard]] Scene parse_scene_file(const std::filesystem::path& path,
                                      std::span<const SceneSetting> settings = {});
 
-/// Throws SceneError where the scene names a hand script that is no file. Only an emulated hand
-/// needs it, so loading does not look.
+/// Throws SceneError where the scene names a hand script that is no file. Loading a scene does not
+/// check this, since only an emulated hand needs the script.
 void check_hand_script(const SceneSettings& scene);
 
 }  // namespace kerf

@@ -9,7 +9,7 @@
 
 namespace kerf {
 
-/// A servo whose ticks lie so far apart has stood still: what it felt then is no longer true.
+/// A servo whose ticks begin so far apart has stood still: what it last felt is no longer true.
 inline constexpr std::int64_t kStandstillNs = 20'000'000;
 
 /// Tells a tick that began kStandstillNs or more after the last one. One thread.
@@ -57,9 +57,9 @@ class RealTimeTicks final : public TickSource {
   bool stood_still_ = false;
 };
 
-/// Virtual time: one tick per report, as fast as both ends go. A device that is silent for two
-/// seconds of real time lets ticks pass without a report until it speaks again. On a leash no
-/// further than that allows.
+/// Virtual time: one tick per report, as fast as both ends go. After a device has been silent for
+/// two seconds of real time, ticks pass without a report until it speaks again. With a leash, each
+/// tick first waits until the leash allows it.
 class LockStepTicks final : public TickSource {
  public:
   explicit LockStepTicks(DeviceDriver& device, TickLeash* leash = nullptr) noexcept

@@ -33,10 +33,10 @@ struct EmulatorStats {
 /// lock-step and a test run the same thing.
 ///
 /// The hand waits until the host has the device calibrated, helps where it must (homes a Falcon,
-/// presses the button of WoodenHaptics), and plays its script 0.15 s later. For a host that does
-/// not begin to calibrate it waits 2 s, and for a host at all as long as it takes. Without a script
-/// the arm stays where it is. Once its script has ended, a user may lead it (`wish`). One thread;
-/// allocates only when constructed.
+/// presses the button of WoodenHaptics), and plays its script 0.15 s later. A host that does not
+/// begin to calibrate gets 2 s from its first packet, then the script begins. Without a host the
+/// hand waits for ever. Without a script the arm stays where it is. Once the script has ended, a
+/// user may lead the hand (`wish`). One thread; allocates only when constructed.
 class Emulator final : public PacketDevice {
  public:
   template <std::derived_from<DeviceModel> Model>
@@ -57,8 +57,8 @@ class Emulator final : public PacketDevice {
 
   /// Whether a user may lead the hand: its script has ended.
   [[nodiscard]] bool can_be_led() const noexcept { return hand_ && hand_->ended(); }
-  /// Where a user wants the hand to be, and that there is no user any more: see `LedHand`. A hand
-  /// whose script has not ended follows afterwards.
+  /// Where a user wants the hand to be; `forsake`: there is no user any more. See `LedHand`. While
+  /// a script runs, the hand keeps to it and follows the user afterwards.
   void wish(const HandWish& wish) noexcept;
   void forsake() noexcept;
 

@@ -12,12 +12,12 @@
 
 namespace kerf {
 
-/// Steps of density, 0..65535 a voxel, by the index of the material that they are of.
+/// Amounts of density by the index of their material; a full voxel is kDensityMax steps.
 using StepsByMaterial = std::vector<std::uint64_t>;
 
-/// Of which material a voxel is: that of its label; without one, as in a volume without labels, the
-/// densest that its first density reaches, and where it reaches none the softest. Pictures colour
-/// voxels alike. A voxel stays of its material while it is cut.
+/// Says which material a voxel is of. A label decides. Without one the voxel's first density does:
+/// it is of the densest material that this density reaches, or of the softest where it reaches
+/// none. So cutting changes no voxel's material. Pictures colour voxels by the same rule.
 class MaterialRule {
  public:
   /// Density, 0..1, from which each material shows; index 0 is "none", which no voxel reaches.
@@ -49,7 +49,7 @@ class MaterialRule {
   std::vector<std::pair<double, std::size_t>> by_density_;  ///< from the softest
 };
 
-/// What a volume lacks of its first content, by material; `labels` may be empty.
+/// Adds to `removed` what a volume lacks of its first content; `labels` may be empty.
 inline void add_removed(const MaterialRule& rule, std::span<const Density> first,
                         std::span<const Density> now, std::span<const Label> labels,
                         StepsByMaterial& removed) {

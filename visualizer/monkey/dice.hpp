@@ -18,7 +18,7 @@ class Dice {
   }
   /// Once in `n` times.
   [[nodiscard]] bool once_in(int n) { return below(n) == 0; }
-  /// From `low` to `high`, in thousand steps.
+  /// From `low` to `high`, in a thousand steps.
   [[nodiscard]] double between(double low, double high) {
     return low + (high - low) * below(1001) * 1e-3;
   }

@@ -25,9 +25,9 @@ namespace kerf {
 ///
 /// hidapi allocates the text of a failure, and the kernel's write() to a hidraw node sleeps until
 /// the transfer has ended: up to a frame, and 5 s where the device takes nothing. So one thread
-/// reads, another writes, the newest packet always, and the servo touches only the mailboxes;
-/// `send` raises a semaphore besides: any thread, any signal handler. A device that is unplugged
-/// closes the port.
+/// reads and another writes, always the newest packet. The servo touches only their mailboxes and,
+/// in `send`, a semaphore, which any thread and any signal handler may raise. A device that is
+/// unplugged closes the port.
 class HidPort final : public PacketPort {
  public:
   /// `where`: a node (/dev/hidraw0), a serial number, or empty for the only arm. Tries for

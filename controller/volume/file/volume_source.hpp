@@ -23,7 +23,8 @@ using vec3::operator-, vec3::operator*;
 void set_grid(const std::filesystem::path& path, const std::array<std::int64_t, 3>& size,
               SourceVolume& volume);
 
-/// Chooses between the file's spacing and the option.
+/// Takes the spacing of the option, else the file's. Where both lack it, refuses unless the options
+/// allow that.
 void set_spacing(const std::filesystem::path& path, const ReadOptions& options, bool in_file,
                  const std::array<double, 3>& from_file, SourceVolume& volume);
 
