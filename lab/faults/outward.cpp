@@ -45,12 +45,20 @@ Outward::Covered Outward::covered(DeviceVec<double> tip_mm) const {
     hi[i] = static_cast<std::int32_t>(
         std::clamp(std::floor((middle[i] + radius_mm_) / spacing[i]) + 1, 0.0, end));
   }
+  const double radius_mm2 = radius_mm_ * radius_mm_;
+  const auto arm_of = [&](std::int32_t at, std::size_t axis) {
+    return at * spacing[axis] - middle[axis];
+  };
   for (std::int32_t z = lo[2]; z < hi[2]; ++z) {
+    const double arm_z = arm_of(z, 2);
     for (std::int32_t y = lo[1]; y < hi[1]; ++y) {
+      const double arm_y = arm_of(y, 1);
+      if (arm_y * arm_y + arm_z * arm_z > radius_mm2) continue;  // the ball misses the row
+      const Density* const row = &volume_->image.density[grid.index(0, y, z)];
       for (std::int32_t x = lo[0]; x < hi[0]; ++x) {
-        if (volume_->image.density[grid.index(x, y, z)] < volume_->iso) continue;
-        const vec3::Vec arm = vec3::Vec{x * spacing[0], y * spacing[1], z * spacing[2]} - middle;
-        if (vec3::dot(arm, arm) > radius_mm_ * radius_mm_) continue;
+        if (row[x] < volume_->iso) continue;
+        const vec3::Vec arm{arm_of(x, 0), arm_y, arm_z};
+        if (vec3::dot(arm, arm) > radius_mm2) continue;
         covered.sum = covered.sum + arm;
         ++covered.voxels;
       }
