@@ -31,46 +31,62 @@ class ShaftTouch {
   /// The least part that the head bears, 0..1, where the hand presses the tool along `press`: what
   /// no contact of the shaft without friction can bear. By Moreau's decomposition that is the
   /// longest part of the press along a way that the shaft leaves free; at an edge a way tells more
-  /// than a normal. A way is free if the shaft may go one voxel along it and gets deeper nowhere.
-  /// 1 where it touches nothing. `rotation` row-major, world from tool.
+  /// than a normal. A way is free if the shaft may go one voxel along it and gets deeper nowhere;
+  /// within the tolerance of that, what it gets deeper is no part of the head. 1 where it touches
+  /// nothing. `rotation` row-major, world from tool.
   [[nodiscard]] double least_head_share(const SceneTool& tool, Point centre_mm,
                                         const std::array<double, 9>& rotation, Point press) const {
     const std::vector<Place> places = places_of(tool, centre_mm, rotation);
-    const auto is_free = [&](Point way) {
-      return std::ranges::all_of(places, [&](const Place& place) {
-        return density_at(place.at + voxel_mm_ * way) <= place.most;
-      });
-    };
-    // Evenly over the half sphere about it, 1.5 degrees apart.
-    constexpr int kWays = 10000;
     const Point down = unit(press);
-    const Point x = unit(cross(down, std::abs(down[0]) < 0.7 ? Point{1, 0, 0} : Point{0, 1, 0}));
-    const Point y = cross(down, x);
-    for (int i = 0; i < kWays; ++i) {
+    double share = 0;
+    for (int i = 0; i < kWays; ++i) {  // over the half sphere about it
       const double along = 1 - static_cast<double>(i) / kWays;
-      const double across = std::sqrt(1 - along * along);
-      const double turn = i * std::numbers::pi * (3 - std::sqrt(5.0));
-      if (is_free(along * down + across * std::cos(turn) * x + across * std::sin(turn) * y)) {
-        return along;
-      }
+      if (along <= share) break;
+      const double deeper = deeper_along(places, way_about(down, along, i), along - share);
+      share = std::max(share, along - deeper);
     }
-    return 0;
+    return share;
   }
 
  private:
   /// A contact rests within so much of the iso-surface (docs/theory.md 3.6), in the finest voxels:
   /// so much is the shaft grown.
   static constexpr double kNearVox = 0.15;
-  /// A place that gets so much denser is held: deeper by 0.05 voxels, as deep as a wedged tool may
-  /// be (docs/theory.md 4.2), in the ramp of a face of two voxels. So a face that stands straight
-  /// against the press holds to 3 degrees.
-  static constexpr double kDeeper = 0.05 * kDensityMax / 2.0;
+  /// As deep as a wedged tool may be (docs/theory.md 4.2), in the finest voxels. Where it gets so
+  /// much deeper the shaft is held.
+  static constexpr double kDeeperVox = 0.05;
+  /// Density rises by so much a voxel in the ramp of a face of two.
+  static constexpr double kRamp = kDensityMax / 2.0;
+  static constexpr int kWays = 10000;  ///< 1.5 degrees apart over a half sphere
 
-  /// A place of the shaft's surface near the solid, and the density that it may have after a way.
+  /// A place of the shaft's surface near the solid, and the density that it may have after a way
+  /// without being deeper.
   struct Place {
     Point at;
     double most;
   };
+
+  /// The i-th way, so far along `down`.
+  [[nodiscard]] static Point way_about(Point down, double along, int i) {
+    const Point x = unit(cross(down, std::abs(down[0]) < 0.7 ? Point{1, 0, 0} : Point{0, 1, 0}));
+    const Point y = cross(down, x);
+    const double across = std::sqrt(1 - along * along);
+    const double turn = i * std::numbers::pi * (3 - std::sqrt(5.0));
+    return along * down + across * std::cos(turn) * x + across * std::sin(turn) * y;
+  }
+
+  /// How much deeper the shaft gets by one voxel along a way, in voxels; 1 where that is more than
+  /// `most` or than the way may cost.
+  [[nodiscard]] double deeper_along(const std::vector<Place>& places, Point way,
+                                    double most) const {
+    const double end = std::min(most, kDeeperVox);
+    double deeper = 0;
+    for (const Place& place : places) {
+      deeper = std::max(deeper, (density_at(place.at + voxel_mm_ * way) - place.most) / kRamp);
+      if (deeper > end) return 1;
+    }
+    return deeper;
+  }
 
   [[nodiscard]] std::vector<Place> places_of(const SceneTool& tool, Point centre_mm,
                                              const std::array<double, 9>& rotation) const {
@@ -83,7 +99,7 @@ class ShaftTouch {
         const Point at{radius * std::cos(angle), y, radius * std::sin(angle)};
         const Point place = centre_mm + turned(rotation, at);
         if (!is_near(place)) continue;
-        places.push_back({place, std::max<double>(volume_.iso, density_at(place)) + kDeeper});
+        places.push_back({place, std::max<double>(volume_.iso, density_at(place))});
       }
     };
     for (const ToolPart& part : parts_behind(tool)) {
