@@ -88,6 +88,15 @@ class Process {
     if (!code_) ::kill(pid_, number);
   }
 
+  /// Whether it has a handler for that signal by now.
+  [[nodiscard]] bool catches(int number) const {
+    const std::string status = text_of("/proc/" + std::to_string(pid_) + "/status");
+    const auto at = status.find("SigCgt:");
+    if (at == std::string::npos) return false;
+    constexpr int kHex = 16;
+    return (std::stoull(status.substr(at + 7), nullptr, kHex) >> (number - 1) & 1) != 0;
+  }
+
   /// Exit code, or 128 + signal.
   int wait() {
     if (!code_) take_end(0);
