@@ -91,7 +91,7 @@ broken() {
   local large='^shared/text/(command_line\.cpp:.*<CLI/|json\.cpp:.*<nlohmann/|toml\.cpp:.*<toml\+\+/)'
   includes '<(CLI/|nlohmann/|toml)' "${programs[@]}" | grep -vE "$large"
   # Below the loop and the segment: the standard library, and what is named here.
-  local posix='(fcntl|netdb|poll|pthread|sched|unistd|sys/(eventfd|file|mman|random|socket|stat|time|un))\.h'
+  local posix='(fcntl|netdb|poll|pthread|sched|unistd|sys/(eventfd|file|mman|random|resource|socket|stat|time|un))\.h'
   includes '<' shared controller/kernel controller/law controller/servo |
     grep -vE "include[[:space:]]*<[a-z_]+>|$large" |
     grep -vE "^shared/(posix|segment)/.*<$posix>" |

@@ -4,8 +4,7 @@
 #include "bridge/net/identity.hpp"
 #include "bridge/net/join.hpp"
 #include "bridge/net/serve.hpp"
-#include "shared/posix/failure.hpp"
-#include "shared/posix/private_files.hpp"
+#include "shared/posix/program.hpp"
 #include "shared/posix/stop_signals.hpp"
 #include "shared/text/command_line.hpp"
 
@@ -76,21 +75,14 @@ int run(int argc, char** argv) {
   const Arguments serve = add_serve(app, serve_options);
   const Arguments join = add_join(app, join_options);
   add_make_identity(app, identity_options);
-  const auto told = [](int code) { return when_told(code, "kerf-bridge", std::cout, std::cerr); };
-  if (!app.parse(argc, argv, std::cout)) return told(0);
+  if (!app.parse(argc, argv, std::cout)) return 0;
   if (serve.chosen()) return run_serve(serve_options, catch_stop_signals());
   if (join.chosen()) return run_join(join_options, catch_stop_signals(), std::cout);
-  return told(run_make_identity(identity_options));
+  return run_make_identity(identity_options);
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  keep_files_private();
-  try {
-    return run(argc, argv);
-  } catch (...) {
-    std::cerr << "kerf-bridge: " << failure_text() << '\n';
-    return 2;
-  }
+  return run_program("kerf-bridge", [&] { return run(argc, argv); });
 }

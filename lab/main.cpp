@@ -2,7 +2,9 @@
 #include <iostream>
 
 #include "lab/program.hpp"
+#include "shared/posix/program.hpp"
 
 int main(int argc, char** argv) {
-  return kerf::run_lab(argc, argv, std::cout, std::cerr);
+  return kerf::run_program("kerf-lab",
+                           [&] { return kerf::run_lab(argc, argv, std::cout, std::cerr); });
 }

@@ -48,7 +48,7 @@ int run_lab(int argc, const char* const* argv, std::ostream& out, std::ostream& 
         if (command->chosen()) code = command->run(out);
       }
     }
-    return when_told(code, "kerf-lab", out, err);
+    return code;
   } catch (...) {
     err << "kerf-lab: " << failure_text() << '\n';
     return 2;

@@ -10,6 +10,7 @@
 #include "record/record_error.hpp"
 #include "shared/posix/hex64.hpp"
 #include "shared/posix/new_file.hpp"
+#include "shared/posix/unreachable.hpp"
 #include "shared/segment/layout_table.hpp"
 #include "shared/text/json.hpp"
 
@@ -46,6 +47,9 @@ void write_manifest(const std::filesystem::path& folder, const SegmentInfo& info
 
 Manifest read_manifest(const std::filesystem::path& folder) {
   const std::filesystem::path path = folder / kManifestName;
+  if (const std::string why = why_unreachable(path); !why.empty()) {
+    throw RecordError(path.string() + why);
+  }
   std::error_code fault;
   std::ifstream file;
   if (std::filesystem::is_regular_file(path, fault)) file.open(path);  // a pipe would be waited for

@@ -5,9 +5,8 @@
 #include "record/log_columns.hpp"
 #include "record/manifest.hpp"
 #include "record/summary.hpp"
-#include "shared/posix/failure.hpp"
 #include "shared/posix/new_file.hpp"
-#include "shared/posix/private_files.hpp"
+#include "shared/posix/program.hpp"
 #include "shared/posix/run_files.hpp"
 #include "shared/posix/stop_signals.hpp"
 #include "shared/text/command_line.hpp"
@@ -51,12 +50,6 @@ int run_record(int argc, char** argv) {
 }  // namespace kerf
 
 int main(int argc, char** argv) {
-  kerf::keep_files_private();
   kerf::make_signals_of_writes_errors();
-  try {
-    return kerf::when_told(kerf::run_record(argc, argv), "kerf-record", std::cout, std::cerr);
-  } catch (...) {
-    std::cerr << "kerf-record: " << kerf::failure_text() << '\n';
-    return 2;
-  }
+  return kerf::run_program("kerf-record", [&] { return kerf::run_record(argc, argv); });
 }

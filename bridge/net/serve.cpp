@@ -152,7 +152,7 @@ int run_serve(const ServeOptions& options, const std::atomic<bool>& stop) {
   }
   print_addresses(setup, port, server.pass(), options.qr);
   // Who has no address has no picture.
-  if (const int code = when_told(0, "kerf-bridge", std::cout, std::cerr); code != 0) return code;
+  if (const std::string why = why_untold(std::cout); !why.empty()) throw BridgeError(why);
   server.run(stop);
   return 0;
 }

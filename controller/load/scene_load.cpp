@@ -14,6 +14,7 @@
 #include "controller/load/felt_density.hpp"
 #include "controller/load/load_tool.hpp"
 #include "controller/load/scene_place.hpp"
+#include "controller/scene/asked_to_end.hpp"
 #include "controller/scene/scene_error.hpp"
 #include "controller/scene/scene_file.hpp"
 #include "controller/scene/scene_text.hpp"
@@ -126,6 +127,7 @@ void load_image(const VolumeSpec& spec, const std::filesystem::path& folder, boo
   } else {
     const std::filesystem::path path = folder / spec.file;
     const SourceVolume source = read_volume(path, {.spacing_mm = spec.spacing_mm, .cpu_s = cpu_s});
+    end_if_asked(path.string());
     const bool proposing = unknown && !std::filesystem::exists(labels_path(path));
     volume.image = apply_window(source, spec.window && !proposing
                                             ? Window{(*spec.window)[0], (*spec.window)[1]}
@@ -202,9 +204,11 @@ SceneVolume load_volume(const VolumeSpec& spec, const std::filesystem::path& fol
   volume.solid = spec.solid;
   try {
     load_image(spec, folder, unknown, cpu_s, volume);
+    end_if_asked(spec.file);
     check_labels(volume.image, materials.size());
     const VoxelGrid whole = volume.image.grid;
     denoise_volume(spec, volume);
+    end_if_asked(spec.file);
     scale_to_felt_iso(materials, felt_at ? nearest_density(*felt_at * kDensityMax) : volume.iso,
                       volume.image);
     volume.image = spec.crop ? crop_to_solid(volume.image, volume.iso)

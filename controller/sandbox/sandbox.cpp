@@ -23,11 +23,11 @@
 #include <unistd.h>
 
 #include "controller/sandbox/sandbox_rights.hpp"
+#include "controller/scene/asked_to_end.hpp"
 #include "controller/scene/scene_error.hpp"
 #include "shared/posix/failure.hpp"
 #include "shared/posix/monotonic_clock.hpp"
 #include "shared/posix/progress_bar.hpp"
-#include "shared/posix/stop_signals.hpp"
 
 namespace kerf {
 namespace {
@@ -208,7 +208,7 @@ class Child {
 
   /// While the child says nothing.
   void look() {
-    if (stop_requested()) refuse(": reading it was stopped by a signal; start again");
+    end_if_asked(place_);
     const std::int64_t now_ns = monotonic_ns();
     timespec cpu{};
     clockid_t clock{};

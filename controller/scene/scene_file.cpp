@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <fstream>
+#include <ios>
 #include <iterator>
 #include <string>
 #include <system_error>
@@ -16,6 +17,7 @@
 #include "controller/scene/scene_table.hpp"
 #include "controller/scene/scene_text.hpp"
 #include "shared/posix/failure.hpp"
+#include "shared/posix/unreachable.hpp"
 
 namespace kerf {
 namespace {
@@ -143,12 +145,8 @@ Scene parse_scene(std::string_view text, const std::filesystem::path& path, Scen
 Scene parse_scene_file(const std::filesystem::path& path, std::span<const SceneSetting> settings) {
   constexpr std::uintmax_t kLargestFile = std::uintmax_t{1} << 20;
   std::error_code fault;
-  const auto there = symlink_status(path, fault);
-  if (there.type() == std::filesystem::file_type::none) {
-    refuse(path.string(),
-           ": cannot be reached (" + fault.message() + "); check the permissions of its folders");
-  }
-  if (!exists(there)) {
+  if (const std::string why = why_unreachable(path); !why.empty()) refuse(path.string(), why);
+  if (!exists(symlink_status(path, fault))) {
     refuse(path.string(), ": no such scene file; name one, for example scenes/phantom.toml");
   }
   if (!std::filesystem::is_regular_file(path, fault)) {
@@ -164,8 +162,12 @@ Scene parse_scene_file(const std::filesystem::path& path, std::span<const SceneS
     refuse(path.string(), ": " + std::generic_category().message(error) + "; " +
                               way_out_of(error, "check its permissions"));
   }
-  const std::string text{std::istreambuf_iterator<char>(file), {}};
-  if (!file) refuse(path.string(), ": cannot be read; check its permissions");
+  std::string text;
+  try {
+    text.assign(std::istreambuf_iterator<char>(file), {});
+  } catch (const std::ios_base::failure&) {
+    refuse(path.string(), ": cannot be read; copy it again, or check its disk");
+  }
   return parse_scene(text, path, scene_keys(), settings);
 }
 
@@ -173,6 +175,9 @@ void check_hand_script(const SceneSettings& scene) {
   std::error_code fault;
   if (scene.hand_script.empty() || std::filesystem::is_regular_file(scene.hand_script, fault)) {
     return;
+  }
+  if (const std::string why = why_unreachable(scene.hand_script); !why.empty()) {
+    refuse(scene.hand_place, why);
   }
   refuse(scene.hand_place,
          " is no file; name a hand script from the scene's folder, for example hands/touch.toml");

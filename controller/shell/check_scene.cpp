@@ -15,6 +15,7 @@
 #include "controller/plan/cost/explain.hpp"
 #include "controller/plan/cost/work_budget.hpp"
 #include "controller/scene/scene.hpp"
+#include "controller/scene/scene_file.hpp"
 #include "controller/scene/scene_page.hpp"
 #include "controller/shell/scene_segment.hpp"
 #include "controller/volume/file/volume_write.hpp"
@@ -50,19 +51,30 @@ Density border_density(const VolumeImage& image) {
   return most;
 }
 
+/// A scene as its text has it, after what the command line changed.
+Scene as_written(const LoadedScene& scene) {
+  Scene written;
+  static_cast<SceneSettings&>(written) = scene;
+  written.volumes = scene.volume_specs;
+  written.tools = scene.tool_specs;
+  return written;
+}
+
 /// The files that a scene is made of.
-std::vector<fs::path> files_read(const ControllerOptions& options, const LoadedScene& scene) {
+std::vector<fs::path> files_read(const ControllerOptions& options, const Scene& scene) {
   const fs::path folder = fs::path(scene.path).parent_path();
   std::vector<fs::path> files{scene.path, scene.hand_script};
-  for (std::size_t v = 0; v < scene.volume_specs.size(); ++v) {
-    const std::string& file = scene.volume_specs[v].file;
+  for (std::size_t v = 0; v < scene.volumes.size(); ++v) {
+    const bool from_command_line = v == 0 && options.overrides.volume_file;
+    const fs::path file =
+        from_command_line ? *options.overrides.volume_file : fs::path(scene.volumes[v].file);
     if (file == kPhantomFile) continue;
-    files.push_back(v == 0 && options.overrides.volume_file ? fs::path(file) : folder / file);
+    files.push_back(from_command_line ? file : folder / file);
     const fs::path labels = labels_path(files.back());
     std::error_code fault;
     if (fs::exists(fs::symlink_status(labels, fault))) files.push_back(labels);
   }
-  for (const ToolSpec& tool : scene.tool_specs) {
+  for (const ToolSpec& tool : scene.tools) {
     if (!tool.file.empty()) files.push_back(folder / tool.file);
   }
   return files;
@@ -130,11 +142,7 @@ void print_scene(const LoadedScene& scene, const SceneCosts& costs, const GainMa
               highest_rate_hz(work_us(costs, costliest)));
   std::fputs(air_lines(scene, costs).c_str(), stdout);
   std::fputs(hand_lines(scene).c_str(), stdout);
-  Scene settings;
-  static_cast<SceneSettings&>(settings) = scene;
-  settings.volumes = scene.volume_specs;
-  settings.tools = scene.tool_specs;
-  std::fputs(settings_text(settings).c_str(), stdout);
+  std::fputs(settings_text(as_written(scene)).c_str(), stdout);
 }
 
 fs::path final_path(const ControllerOptions& options, const LoadedScene& scene, std::size_t v) {
@@ -144,6 +152,11 @@ fs::path final_path(const ControllerOptions& options, const LoadedScene& scene, 
                           path.extension().string());
   }
   return path;
+}
+
+void check_report(const ControllerOptions& options) {
+  const Scene scene = parse_scene_file(options.scene, options.overrides.settings);
+  check_outputs(files_read(options, scene), {{"--report", options.report, ".json"}});
 }
 
 void check_run_files(const ControllerOptions& options, const LoadedScene& scene) {
@@ -157,7 +170,7 @@ void check_run_files(const ControllerOptions& options, const LoadedScene& scene)
       written.push_back({"--final", labels_path(volume), ".nrrd"});
     }
   }
-  check_outputs(files_read(options, scene), written);
+  check_outputs(files_read(options, as_written(scene)), written);
 }
 
 std::string refused_gains(const ControllerOptions& options, const LoadedScene& scene,

@@ -28,6 +28,10 @@ namespace kerf {
 [[nodiscard]] std::filesystem::path final_path(const ControllerOptions& options,
                                                const LoadedScene& scene, std::size_t v);
 
+/// Refuses a report that could not be written, or would replace a file of the scene: before
+/// anything else, since a run that is stopped early writes it too. Throws FileError or SceneError.
+void check_report(const ControllerOptions& options);
+
 /// Refuses now what could not be written at the end, or would replace a file of the scene. Throws
 /// FileError or SceneError.
 void check_run_files(const ControllerOptions& options, const LoadedScene& scene);

@@ -6,43 +6,34 @@
 #include <atomic>
 #include <cstdint>
 #include <cstdio>
+#include <exception>
 #include <filesystem>
 #include <memory>
-#include <stdexcept>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
 
 #include "controller/device/driver/device_driver.hpp"
-#include "controller/device/port/open_port.hpp"
 #include "controller/law/registry/law_registry.hpp"
-#include "controller/load/scene_json.hpp"
-#include "controller/load/scene_load.hpp"
 #include "controller/plan/compile.hpp"
 #include "controller/plan/cost/gain_margin.hpp"
-#include "controller/plan/cost/work_budget.hpp"
 #include "controller/scene/scene.hpp"
 #include "controller/scene/scene_file.hpp"
 #include "controller/shell/check_scene.hpp"
-#include "controller/shell/late_note.hpp"
-#include "controller/shell/law_trial.hpp"
 #include "controller/shell/log_line.hpp"
 #include "controller/shell/run_report.hpp"
+#include "controller/shell/run_start.hpp"
 #include "controller/shell/run_threads.hpp"
-#include "controller/shell/scene_segment.hpp"
 #include "controller/volume/file/volume_write.hpp"
 #include "shared/numeric/fnv1a.hpp"
 #include "shared/posix/new_file.hpp"
 #include "shared/posix/stop_signals.hpp"
-#include "shared/segment/hand_over.hpp"
-#include "shared/segment/segment_plan.hpp"
 #include "shared/volume/density_hash.hpp"
 #include "shared/volume/material_rule.hpp"
 
 namespace kerf {
 namespace {
-
-constexpr int kPortPatienceMs = 5000;
 
 const char* text_of(EndReason end) {
   switch (end) {
@@ -128,65 +119,6 @@ void write_final(const ControllerOptions& options, const LoadedScene& scene, con
   }
 }
 
-/// In lock-step the device waits: there is no deadline to keep.
-void check_budget(const ControllerOptions& options, const LoadedScene& scene,
-                  const SceneCosts& costs) {
-  const std::string refusal = options.virtual_time ? "" : over_budget(scene, costs);
-  if (!refusal.empty()) throw std::runtime_error(refusal);
-}
-
-void check_gains(const ControllerOptions& options, const LoadedScene& scene,
-                 const GainMargin& margin) {
-  const std::string refusal = refused_gains(options, scene, margin);
-  if (!refusal.empty()) throw std::runtime_error(refusal);
-}
-
-/// What the command line asks for is refused now, also what would be met at the end.
-void check_options(const ControllerOptions& options, const LoadedScene& scene) {
-  if (static_cast<double>(options.real_time.spin_us) * scene.servo.rate_hz > 0.9e6) {
-    throw std::runtime_error("--spin-us " + std::to_string(options.real_time.spin_us) +
-                             " is more than 90 % of a tick at " +
-                             std::to_string(scene.servo.rate_hz) + " Hz; spin less");
-  }
-  static_cast<void>(segment_socket(options.name));
-  check_run_files(options, scene);
-}
-
-/// Everything that can be known to go wrong, before the hand is moved.
-void check_run(const ControllerOptions& options, const LoadedScene& scene,
-               const SceneCosts& costs) {
-  check_options(options, scene);
-  check_budget(options, scene, costs);
-  if (!options.virtual_time) {
-    const GainMargin margin = gain_margin(scene, PlayFriction::where_it_decides);
-    check_gains(options, scene, margin);
-    const std::string warning = gain_warning(scene, margin);
-    if (!warning.empty()) log_warning(warning);
-  }
-  if (!scene.device.torque_scale) {
-    const auto kind = static_cast<std::size_t>(scene.device.personality);
-    log_warning("device.torque_scale is not set for " + std::string(kPersonalityWords[kind]) +
-                ": the motors stay off; measure it, and write device.personality beside it");
-  }
-}
-
-RunReport new_report(const ControllerOptions& options, const LoadedScene& scene,
-                     std::uint64_t hash) {
-  RunReport report;
-  report.scene = options.scene;
-  report.device = kPersonalityWords[static_cast<std::size_t>(scene.device.personality)];
-  report.numeric = word_of(scene.servo.numeric);
-  report.velocity_estimator = scene.servo.velocity.name;
-  report.rate_hz = scene.servo.rate_hz;
-  report.virtual_time = options.virtual_time;
-  report.config_hash = hash;
-  report.guarded = options.guard;
-#ifdef KERF_SANITIZED
-  report.allocations_counted = false;
-#endif
-  return report;
-}
-
 /// A fault of a law has only its kind; the scene knows the name.
 void name_law_faults(const LoadedScene& scene, const EventList& faults) {
   const std::array<std::pair<Fault, const LawChoice*>, 3> laws{
@@ -203,65 +135,40 @@ void name_law_faults(const LoadedScene& scene, const EventList& faults) {
   }
 }
 
-/// What was chosen for a volume of which nobody said anything: now, not with the summary.
-void tell_proposal(const LoadedScene& scene) {
-  for (const SceneVolume& volume : scene.volumes) {
-    for (std::string choice : volume.proposal) {
-      choice.replace(choice.find('='), 1, " ");
-      std::fprintf(stderr, "kerf: %s: %s\n", volume.name.c_str(), choice.c_str());
-    }
-    if (volume.proposal.empty()) continue;
-    std::fprintf(stderr, "kerf: %s: ./kerf volume import %s writes a scene with other choices\n",
-                 volume.name.c_str(), volume.file.c_str());
-  }
+RunReport new_report(const ControllerOptions& options) {
+  RunReport report;
+  report.end = text_of(EndReason::stopped);
+  report.scene = options.scene;
+  report.virtual_time = options.virtual_time;
+  report.guarded = options.guard;
+#ifdef KERF_SANITIZED
+  report.allocations_counted = false;
+#endif
+  return report;
 }
 
-}  // namespace
+/// `--check` and `--explain`.
+void look_at_scene(const ControllerOptions& options) {
+  PlannedScene planned = load_and_plan(options);
+  const LoadedScene& scene = planned.scene;
+  const SceneCosts& costs = planned.servo->costs();
+  if (options.explain) return explain_scene(options, planned.scene, *planned.servo);
+  check_hand_script(scene);
+  check_options(options, scene);
+  const GainMargin margin = gain_margin(scene);
+  print_scene(scene, costs, margin);
+  check_budget(options, scene, costs);
+  check_gains(options, scene, margin);
+}
 
-int run_controller(const ControllerOptions& options) {
-  const std::int64_t began_ns = monotonic_ns();
-  std::atomic<bool>& stop = catch_stop_and_pause_signals();
-
-  LoadedScene scene = load_scene(options.scene, options.overrides);
-  for (const std::string& line : try_own_laws(scene)) log_warning(line);
-  const std::unique_ptr<CompiledScene> servo = plan_scene(scene);
-  if (options.check) {
-    check_hand_script(scene);
-    check_options(options, scene);
-    const GainMargin margin = gain_margin(scene);
-    print_scene(scene, servo->costs(), margin);
-    check_budget(options, scene, servo->costs());
-    check_gains(options, scene, margin);
-    return 0;
-  }
-  if (options.explain) {
-    explain_scene(options, scene, *servo);
-    return 0;
-  }
-  check_run(options, scene, servo->costs());
-  tell_proposal(scene);
-
-  const std::string json = canonical_json(scene);
-  RunReport report = new_report(options, scene, fnv1a(json));
-  const SegmentSpec spec = segment_spec(scene, json, report.config_hash);
-  check_memory(scene, servo->costs(), plan_segment(spec).header.total_bytes);
-  if (!options.emulator_args.empty()) write_new_file(options.emulator_args, hand_lines(scene));
-  SegmentWriter segment = SegmentWriter::create(spec);
-  SegmentServer server(options.name, segment,
-                       {.tools = static_cast<std::uint32_t>(scene.tools.size())});
-  servo->take(scene);
-  const std::string port_text = resolve_port(options.port, scene.device.personality);
-  std::unique_ptr<PacketPort> port;
-  try {
-    const Hello ours{scene.device.personality, options.virtual_time, scene.servo.rate_hz};
-    const LateNote waits("waiting for a device that answers at --port " + port_text);
-    port = open_port(port_text, ours, kPortPatienceMs, stop, io_thread_of(options.real_time));
-  } catch (const std::runtime_error&) {
-    if (stop) return 1;  // asked to end before there was a device: nothing to tell
-    throw;
-  }
+/// From the device's first packet to the report.
+int run_with_device(const ControllerOptions& options, std::int64_t began_ns, RunStart& start,
+                    std::atomic<bool>& stop, RunReport& report) {
+  const LoadedScene& scene = start.planned.scene;
+  CompiledScene& servo = *start.planned.servo;
+  SegmentWriter& segment = start.segment;
   const std::unique_ptr<DeviceDriver> driver =
-      make_driver(scene.device.personality, *port, scene.device.encoder_sign);
+      make_driver(scene.device.personality, *start.port, scene.device.encoder_sign);
   DeviceDriver& device = *driver;
   device.start();
   if (!options.virtual_time) {
@@ -275,8 +182,8 @@ int run_controller(const ControllerOptions& options) {
   segment.set_lifecycle(Lifecycle::run);
   report.load_s = static_cast<double>(monotonic_ns() - began_ns) / 1e9;
   const EndReason end =
-      run_threads({options, port_text, scene.device.personality, scene.servo.rate_hz, segment,
-                   server, *servo, device, stop, report});
+      run_threads({options, start.port_text, scene.device.personality, scene.servo.rate_hz, segment,
+                   start.server, servo, device, stop, report});
   if (!options.virtual_time) unlock_memory();
 
   const bool clean = end == EndReason::ticks_done || end == EndReason::stopped;
@@ -284,21 +191,44 @@ int run_controller(const ControllerOptions& options) {
   report.end = text_of(end);
   name_law_faults(scene, report.record.faults);
   report.removed_mm3 = removed_mm3(scene, report.record);
-  report.materials = scores_of(scene, *servo, report.record);
+  report.materials = scores_of(scene, servo, report.record);
   report.workspace_scale = scene.device.workspace_scale;
   report.tool = scene.tools[scene.active_tool].name;
   report.tool_mm = 2 * scene.tools[scene.active_tool].radius_mm;
   report.lost_packets = device.lost();
   report.refused_packets = device.refused();
-  report.link = port->counters();
+  report.link = start.port->counters();
   if (const std::int64_t first_ns = report.record.first_force_ns; first_ns > 0) {
     report.start_to_force_ms = static_cast<double>(first_ns - began_ns) / 1e6;
   }
-  report.volume_hash = hash_of_volumes(scene, *servo);
+  report.volume_hash = hash_of_volumes(scene, servo);
   std::fputs(summary(report).c_str(), stdout);
   if (!options.report.empty()) write_new_file(options.report, report_json(report));
-  if (!options.final_volume.empty()) write_final(options, scene, *servo);
+  if (!options.final_volume.empty()) write_final(options, scene, servo);
   return clean && report.record.faults.count == 0 ? 0 : 1;
+}
+
+}  // namespace
+
+int run_controller(const ControllerOptions& options) {
+  const std::int64_t began_ns = monotonic_ns();
+  std::atomic<bool>& stop = catch_stop_and_pause_signals();
+  if (options.check || options.explain) {
+    look_at_scene(options);
+    return 0;
+  }
+  check_report(options);
+  RunReport report = new_report(options);
+  std::optional<RunStart> start;
+  try {
+    start.emplace(options, stop, report);
+  } catch (const std::exception&) {
+    if (!stop) throw;
+    std::printf("kerf: stopped before there was a device; %s\n", report.waiting.c_str());
+    if (!options.report.empty()) write_new_file(options.report, report_json(report));
+    return 0;
+  }
+  return run_with_device(options, began_ns, *start, stop, report);
 }
 
 }  // namespace kerf

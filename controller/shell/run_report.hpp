@@ -25,7 +25,7 @@ using MaterialScores = std::vector<MaterialScore>;
 struct RunReport {
   RunRecord record;
   std::string end;      ///< why the run ended
-  std::string waiting;  ///< what the device waited for at the end; empty: nothing
+  std::string waiting;  ///< what the run waited for at the end; empty: nothing
   std::string scene;
   std::string device;
   std::string numeric;

@@ -11,6 +11,7 @@
 
 #include "hil/hil_error.hpp"
 #include "shared/posix/failure.hpp"
+#include "shared/posix/unreachable.hpp"
 #include "shared/text/number.hpp"
 #include "shared/text/words.hpp"
 
@@ -123,6 +124,7 @@ TomlNode parse_script(std::string_view text, const std::string& place) {
 std::string read_script(const std::filesystem::path& file, const std::string& example) {
   const std::string place = file.string();
   std::error_code error;
+  if (const std::string why = why_unreachable(file); !why.empty()) throw HilError(place + why);
   if (!std::filesystem::is_regular_file(file, error)) {
     throw HilError(place + ": not a file; name one such as " + example);
   }

@@ -5,6 +5,7 @@
 #include <cerrno>
 #include <exception>
 #include <filesystem>
+#include <ios>
 #include <new>
 #include <ostream>
 #include <system_error>
@@ -36,6 +37,8 @@ const char* way_out_of(int error, const char* usual) noexcept {
       return "end other programs, or raise fs.file-max";
     case EFBIG:
       return "raise ulimit -f";
+    case ELOOP:
+      return "mend its links, which lead to themselves";
     case ENOMEM:
       return "free memory, or raise ulimit -v";
     default:
@@ -51,6 +54,8 @@ std::string failure_text() {
   } catch (const std::filesystem::filesystem_error& error) {
     return error.path1().string() + ": " + error.code().message() + "; " +
            way_out_of(error.code().value(), "check the path and its rights");
+  } catch (const std::ios_base::failure& error) {
+    return "a file: " + error.code().message() + "; check its disk, or copy it again";
   } catch (const std::system_error& error) {  // of the library itself: no thread
     return "threads: " + error.code().message() + "; raise ulimit -u, or TasksMax of the service";
   } catch (const std::exception& error) {
@@ -58,13 +63,15 @@ std::string failure_text() {
   }
 }
 
-int when_told(int code, const char* program, std::ostream& out, std::ostream& err) {
+std::string why_untold(std::ostream& out) {
   errno = 0;
-  if (out.flush() || reader_left()) return code;
-  err << program << ": standard output: "
-      << (errno != 0 ? std::generic_category().message(errno) : "cannot be written")
-      << "; make room, or send it elsewhere" << std::endl;
-  return code == 0 ? 2 : code;
+  if (out.flush() || reader_left()) return {};
+  int error = errno;
+  // A write that failed before, and is forgotten: one more byte fails for the same reason.
+  if (error == 0 && ::write(STDOUT_FILENO, "\n", 1) < 0) error = errno;
+  const std::string reason =
+      error != 0 ? std::generic_category().message(error) : "cannot be written";
+  return "standard output: " + reason + "; " + way_out_of(error, "make room, or send it elsewhere");
 }
 
 }  // namespace kerf

@@ -13,6 +13,7 @@
 #include <unistd.h>
 
 #include "shared/posix/failure.hpp"
+#include "shared/posix/unreachable.hpp"
 
 namespace kerf {
 namespace {
@@ -66,6 +67,10 @@ NewFile::NewFile(const std::filesystem::path& path) : path_(path) {
     if (own_descriptor(path) < 0) ::fcntl(fd_, F_SETFL, 0);
     return;
   }
+  const auto folder = path.has_parent_path() ? path.parent_path() : ".";
+  if (const std::string why = why_unreachable(folder); !why.empty()) {
+    throw FileError(path.string() + why);
+  }
   std::error_code error;
   const auto there = std::filesystem::symlink_status(path, error);
   if (there.type() == std::filesystem::file_type::none) fail(error.value());
@@ -73,7 +78,6 @@ NewFile::NewFile(const std::filesystem::path& path) : path_(path) {
   if (std::filesystem::is_directory(there)) fail(EISDIR);
   if (std::filesystem::exists(there) && !std::filesystem::is_regular_file(there)) fail(EOPNOTSUPP);
   constexpr mode_t kReadWriteAll = 0666;  // the user's mask takes away from this
-  const auto folder = path.has_parent_path() ? path.parent_path() : ".";
   fd_ = ::open(folder.c_str(), O_TMPFILE | O_WRONLY | O_CLOEXEC, kReadWriteAll);
   nameless_ = fd_ >= 0 && ::access(open_file(fd_).c_str(), F_OK) == 0;
   if (nameless_) return;

@@ -8,6 +8,7 @@
 #include <sstream>
 #include <stdexcept>
 #include <string>
+#include <system_error>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -86,6 +87,22 @@ class Process {
 
   void signal(int number) const {
     if (!code_) ::kill(pid_, number);
+  }
+
+  /// Whether it has a handler for that signal by now.
+  [[nodiscard]] bool catches(int number) const {
+    const std::string status = text_of("/proc/" + std::to_string(pid_) + "/status");
+    const auto at = status.find("SigCgt:");
+    if (at == std::string::npos) return false;
+    constexpr int kHex = 16;
+    return (std::stoull(status.substr(at + 7), nullptr, kHex) >> (number - 1) & 1) != 0;
+  }
+
+  /// What an open descriptor of it leads to.
+  [[nodiscard]] std::string descriptor(int number) const {
+    const auto link = "/proc/" + std::to_string(pid_) + "/fd/" + std::to_string(number);
+    std::error_code gone;
+    return std::filesystem::read_symlink(link, gone).string();
   }
 
   /// Exit code, or 128 + signal.

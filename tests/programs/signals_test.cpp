@@ -3,6 +3,7 @@
 #include <chrono>
 #include <csignal>
 #include <filesystem>
+#include <fstream>
 #include <string>
 #include <thread>
 #include <vector>
@@ -25,6 +26,19 @@ namespace {
 const std::vector<int> kAsking{SIGINT,  SIGTERM,   SIGHUP,    SIGALRM,      SIGUSR1,
                                SIGUSR2, SIGXCPU,   SIGVTALRM, SIGPROF,      SIGIO,
                                SIGPWR,  SIGSTKFLT, SIGRTMIN,  SIGRTMIN + 7, SIGRTMAX};
+
+/// Of a controller that loads a tooth of ten million voxels, and finds no device.
+std::vector<std::string> without_device(const TemporaryFolder& folder, const std::string& name) {
+  return {kBin + "/kerf-controller",
+          "--scene",
+          kScenes + "/touch.toml",
+          "--torque-scale",
+          kerf::test::kTorqueScale,
+          "--port",
+          "socket:" + (folder / "none").string(),
+          "--name",
+          name};
+}
 
 bool holds_unfinished_files(const std::filesystem::path& folder) {
   for (const auto& entry : std::filesystem::recursive_directory_iterator(folder)) {
@@ -87,6 +101,76 @@ TEST_CASE("each of them ends a controller that pushes: exit 0, a report, no sock
     CHECK_FALSE(std::filesystem::exists(kerf::segment_socket(pair.name)));
     CHECK_FALSE(holds_unfinished_files(pair.folder.path()));
   }
+}
+
+TEST_CASE("before there is a device: exit 0, one line and a report of what was under way") {
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
+    for (const bool loaded : {false, true}) {
+      CAPTURE(signal);
+      CAPTURE(loaded);
+      const TemporaryFolder folder;
+      const std::string name = kerf::test::unique_name();
+      auto line = without_device(folder, name);
+      line.insert(line.end(), {"--report", (folder / "report.json").string()});
+      Process controller(line, folder / "log");
+      REQUIRE(eventually([&] { return controller.catches(signal); }, 10s));
+      if (loaded) {
+        REQUIRE(
+            eventually([&] { return std::filesystem::exists(kerf::segment_socket(name)); }, 20s));
+      }
+      controller.signal(signal);
+      CHECK(controller.wait() == 0);
+      const std::string waiting = loaded ? "waiting for a device that answers at --port socket:" +
+                                               (folder / "none").string()
+                                         : "loading " + kScenes + "/touch.toml";
+      CHECK(controller.output() == "kerf: stopped before there was a device; " + waiting + "\n");
+      const auto report = nlohmann::json::parse(kerf::test::text_of(folder / "report.json"));
+      CHECK(report["end"] == "stopped");
+      CHECK(report["waiting"] == waiting);
+      CHECK(report["ticks"] == 0);
+      CHECK(report["device"] == (loaded ? "omni" : ""));
+      CHECK_FALSE(std::filesystem::exists(kerf::segment_socket(name)));
+      CHECK_FALSE(holds_unfinished_files(folder.path()));
+    }
+  }
+}
+
+TEST_CASE("readers of a controller that is stopped before its device see a clean end") {
+  const TemporaryFolder folder;
+  const std::string name = kerf::test::unique_name();
+  Process controller(without_device(folder, name), folder / "log");
+  REQUIRE(eventually([&] { return std::filesystem::exists(kerf::segment_socket(name)); }, 20s));
+  const auto connection = kerf::connect_segment(name);
+  controller.signal(SIGTERM);
+  CHECK(controller.wait() == 0);
+  CHECK(connection.reader().lifecycle() == kerf::Lifecycle::clean_end);
+}
+
+TEST_CASE("a check that is stopped has checked nothing: one line and exit 2") {
+  for (const char* const look : {"--check", "--explain"}) {
+    CAPTURE(look);
+    const TemporaryFolder folder;
+    auto line = without_device(folder, kerf::test::unique_name());
+    line.emplace_back(look);
+    Process controller(line, folder / "log");
+    REQUIRE(eventually([&] { return controller.catches(SIGTERM); }, 10s));
+    controller.signal(SIGTERM);
+    CHECK(controller.wait() == 2);
+    CHECK(controller.output().ends_with(": reading it was stopped by a signal; start again\n"));
+  }
+}
+
+TEST_CASE("a report is looked at before anything is loaded: it is also that of an early end") {
+  const TemporaryFolder folder;
+  const std::string scene = (folder / "scene.json").string();
+  std::ofstream(scene) << "[[volume]]\nfile = \"none.nrrd\"\n[[tool]]\nname = \"a\"\n"
+                          "shape = \"ball\"\nsize_vox = 8\n";
+  auto line = without_device(folder, kerf::test::unique_name());
+  line[2] = scene;
+  line.insert(line.end(), {"--report", scene});
+  Process controller(line, folder / "log");
+  CHECK(controller.wait() == 2);
+  CHECK(controller.output().find("is a file of this run itself") != std::string::npos);
 }
 
 TEST_CASE("some of them end a visualizer without a window: exit 0, whole pictures") {

@@ -391,9 +391,14 @@ TEST_CASE("a scene file that is not there, no file or a huge one is refused") {
   CHECK(kerf::test::error_of([&] {
           static_cast<void>(kerf::parse_scene_file(huge));
         }).find("larger than 1 MiB") != std::string::npos);
-  std::filesystem::create_symlink("loop.toml", huge.parent_path() / "loop.toml");
-  for (const auto& none :
-       {huge.parent_path(), huge.parent_path() / "loop.toml", std::filesystem::path("/dev/null")}) {
+  const auto loop = huge.parent_path() / "loop.toml";
+  std::filesystem::create_symlink("loop.toml", loop);
+  CHECK(begins(kerf::test::error_of([&] { static_cast<void>(kerf::parse_scene_file(loop)); }),
+               loop.string() + ": cannot be reached (Too many levels of symbolic links); "));
+  CHECK(kerf::test::error_of([] {
+          static_cast<void>(kerf::parse_scene_file("/proc/self/mem"));  // as a disk that fails
+        }) == "/proc/self/mem: cannot be read; copy it again, or check its disk");
+  for (const auto& none : {huge.parent_path(), std::filesystem::path("/dev/null")}) {
     CHECK(kerf::test::error_of([&] { static_cast<void>(kerf::parse_scene_file(none)); }) ==
           none.string() + ": is no regular file; name a scene file");
   }

@@ -3,6 +3,7 @@
 
 #include <cerrno>
 #include <filesystem>
+#include <ios>
 #include <new>
 #include <stdexcept>
 #include <string>
@@ -29,6 +30,8 @@ TEST_CASE("what a program says at its end is one line with a way out") {
             .ends_with("; take a smaller volume, free memory, or raise ulimit -v"));
   CHECK(text_of(std::system_error(EAGAIN, std::generic_category())) ==
         "threads: Resource temporarily unavailable; raise ulimit -u, or TasksMax of the service");
+  CHECK(text_of(std::ios_base::failure("read", {EIO, std::generic_category()})) ==
+        "a file: Input/output error; check its disk, or copy it again");
   const auto code = [](int error) { return std::error_code(error, std::generic_category()); };
   CHECK(text_of(std::filesystem::filesystem_error("rename", "/a/b", code(EACCES))) ==
         "/a/b: Permission denied; check the path and its rights");

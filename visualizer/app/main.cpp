@@ -1,16 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <cstdio>
-
-#include "shared/posix/failure.hpp"
-#include "shared/posix/private_files.hpp"
+#include "shared/posix/program.hpp"
 #include "shared/posix/stop_signals.hpp"
 #include "visualizer/app/run.hpp"
 #include "visualizer/error.hpp"
 #include "visualizer/gl/window.hpp"
 
 int main(int argc, char** argv) {
-  kerf::keep_files_private();
-  try {
+  return kerf::run_program("kerf-visualizer", [&] {
     const auto options = kerf::parse_options(argc, argv);
     if (!options) return 0;
     kerf::catch_stop_signals();
@@ -22,8 +18,5 @@ int main(int argc, char** argv) {
           "--headless --out DIR for pictures without a screen");
     }
     return kerf::run_window(*options);
-  } catch (...) {
-    std::fprintf(stderr, "kerf-visualizer: %s\n", kerf::failure_text().c_str());
-    return 2;
-  }
+  });
 }

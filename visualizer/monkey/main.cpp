@@ -2,7 +2,6 @@
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
-#include <exception>
 #include <filesystem>
 #include <iostream>
 #include <memory>
@@ -11,6 +10,7 @@
 
 #include <unistd.h>
 
+#include "shared/posix/program.hpp"
 #include "shared/posix/stop_signals.hpp"
 #include "shared/text/command_line.hpp"
 #include "visualizer/error.hpp"
@@ -108,7 +108,7 @@ int run(const MonkeyOptions& options) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  try {
+  return kerf::run_program("kerf-visualizer-monkey", [&] {
     MonkeyOptions options;
     kerf::CommandLine app(
         "Works a window without a screen at random, and compares what it shows with pictures drawn "
@@ -131,8 +131,5 @@ int main(int argc, char** argv) {
     if (std::freopen("/dev/null", "w", stdout) == nullptr) return 2;  // what keys tell the user
     kerf::catch_stop_signals();
     return run(options);
-  } catch (const std::exception& problem) {
-    std::fprintf(stderr, "kerf-visualizer-monkey: %s\n", problem.what());
-    return 2;
-  }
+  });
 }

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "shared/posix/new_file.hpp"
+#include "shared/posix/unreachable.hpp"
 #include "shared/text/json.hpp"
 #include "shared/text/toml.hpp"
 #include "shared/text/words.hpp"
@@ -59,6 +60,9 @@ Opacities read_transfer(const std::filesystem::path& file) {
   std::error_code fault;
   if (std::filesystem::is_directory(file, fault)) {
     throw VisualizerError(file.string() + ": is a folder; name a file in it");
+  }
+  if (const std::string why = why_unreachable(file); !why.empty()) {
+    throw VisualizerError(file.string() + why);
   }
   if (!std::filesystem::is_regular_file(file, fault)) {
     throw VisualizerError(file.string() +

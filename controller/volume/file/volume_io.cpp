@@ -20,6 +20,7 @@
 #include "controller/volume/file/volume_limits.hpp"
 #include "controller/volume/file/volume_source.hpp"
 #include "controller/volume/file/volume_write.hpp"
+#include "shared/posix/unreachable.hpp"
 
 namespace kerf {
 namespace fs = std::filesystem;
@@ -59,11 +60,10 @@ Kind kind_of_folder(const std::vector<fs::path>& files) {
 
 Kind kind_of(const fs::path& path, const std::vector<fs::path>& folder, bool raw) {
   std::error_code fault;
-  const fs::file_status status = fs::status(path, fault);
-  if (status.type() == fs::file_type::none) {
-    throw SceneError(path.string() + ": cannot be reached (" + fault.message() +
-                     "); check the permissions of its folders");
+  if (const std::string why = why_unreachable(path); !why.empty()) {
+    throw SceneError(path.string() + why);
   }
+  const fs::file_status status = fs::status(path, fault);
   if (!fs::exists(status)) {
     throw SceneError(path.string() + ": no such file or folder; check the path");
   }

@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "controller/shell/run_start.hpp"
+
+#include <cstddef>
+#include <cstdint>
+#include <cstdio>
+#include <stdexcept>
+#include <utility>
+
+#include "controller/device/port/open_port.hpp"
+#include "controller/load/scene_json.hpp"
+#include "controller/load/scene_load.hpp"
+#include "controller/plan/cost/gain_margin.hpp"
+#include "controller/plan/cost/work_budget.hpp"
+#include "controller/scene/asked_to_end.hpp"
+#include "controller/shell/check_scene.hpp"
+#include "controller/shell/late_note.hpp"
+#include "controller/shell/law_trial.hpp"
+#include "controller/shell/log_line.hpp"
+#include "controller/shell/scene_segment.hpp"
+#include "shared/numeric/fnv1a.hpp"
+#include "shared/posix/new_file.hpp"
+#include "shared/segment/segment_plan.hpp"
+
+namespace kerf {
+namespace {
+
+constexpr int kPortPatienceMs = 5000;
+
+void warn_of_gains(const ControllerOptions& options, const LoadedScene& scene) {
+  if (options.virtual_time) return;
+  const GainMargin margin = gain_margin(scene, PlayFriction::where_it_decides);
+  check_gains(options, scene, margin);
+  const std::string warning = gain_warning(scene, margin);
+  if (!warning.empty()) log_warning(warning);
+}
+
+void warn_of_motors(const LoadedScene& scene) {
+  if (scene.device.torque_scale) return;
+  const auto kind = static_cast<std::size_t>(scene.device.personality);
+  log_warning("device.torque_scale is not set for " + std::string(kPersonalityWords[kind]) +
+              ": the motors stay off; measure it, and write device.personality beside it");
+}
+
+/// What was chosen for a volume of which nobody said anything: now, not with the summary.
+void tell_proposal(const LoadedScene& scene) {
+  for (const SceneVolume& volume : scene.volumes) {
+    for (std::string choice : volume.proposal) {
+      choice.replace(choice.find('='), 1, " ");
+      std::fprintf(stderr, "kerf: %s: %s\n", volume.name.c_str(), choice.c_str());
+    }
+    if (volume.proposal.empty()) continue;
+    std::fprintf(stderr, "kerf: %s: ./kerf volume import %s writes a scene with other choices\n",
+                 volume.name.c_str(), volume.file.c_str());
+  }
+}
+
+void tell_of_scene(const LoadedScene& scene, RunReport& report) {
+  report.device = kPersonalityWords[static_cast<std::size_t>(scene.device.personality)];
+  report.numeric = word_of(scene.servo.numeric);
+  report.velocity_estimator = scene.servo.velocity.name;
+  report.rate_hz = scene.servo.rate_hz;
+}
+
+PlannedScene checked_scene(const ControllerOptions& options, RunReport& report) {
+  report.waiting = "loading " + options.scene;
+  PlannedScene planned = load_and_plan(options);
+  const LoadedScene& scene = planned.scene;
+  tell_of_scene(scene, report);
+  check_options(options, scene);
+  check_budget(options, scene, planned.servo->costs());
+  warn_of_gains(options, scene);
+  warn_of_motors(scene);
+  tell_proposal(scene);
+  end_if_asked(options.scene);
+  return planned;
+}
+
+SegmentWriter new_segment(const ControllerOptions& options, const PlannedScene& planned,
+                          RunReport& report) {
+  const LoadedScene& scene = planned.scene;
+  const std::string json = canonical_json(scene);
+  report.config_hash = fnv1a(json);
+  const SegmentSpec spec = segment_spec(scene, json, report.config_hash);
+  check_memory(scene, planned.servo->costs(), plan_segment(spec).header.total_bytes);
+  if (!options.emulator_args.empty()) write_new_file(options.emulator_args, hand_lines(scene));
+  return SegmentWriter::create(spec);
+}
+
+}  // namespace
+
+PlannedScene load_and_plan(const ControllerOptions& options) {
+  LoadedScene scene = load_scene(options.scene, options.overrides);
+  for (const std::string& line : try_own_laws(scene)) log_warning(line);
+  std::unique_ptr<CompiledScene> servo = plan_scene(scene);
+  end_if_asked(options.scene);
+  return {std::move(scene), std::move(servo)};
+}
+
+void check_options(const ControllerOptions& options, const LoadedScene& scene) {
+  if (static_cast<double>(options.real_time.spin_us) * scene.servo.rate_hz > 0.9e6) {
+    throw std::runtime_error("--spin-us " + std::to_string(options.real_time.spin_us) +
+                             " is more than 90 % of a tick at " +
+                             std::to_string(scene.servo.rate_hz) + " Hz; spin less");
+  }
+  static_cast<void>(segment_socket(options.name));
+  check_run_files(options, scene);
+}
+
+void check_budget(const ControllerOptions& options, const LoadedScene& scene,
+                  const SceneCosts& costs) {
+  const std::string refusal = options.virtual_time ? "" : over_budget(scene, costs);
+  if (!refusal.empty()) throw std::runtime_error(refusal);
+}
+
+void check_gains(const ControllerOptions& options, const LoadedScene& scene,
+                 const GainMargin& margin) {
+  const std::string refusal = refused_gains(options, scene, margin);
+  if (!refusal.empty()) throw std::runtime_error(refusal);
+}
+
+RunStart::RunStart(const ControllerOptions& options, const std::atomic<bool>& stop,
+                   RunReport& report)
+    : planned(checked_scene(options, report)),
+      segment(new_segment(options, planned, report)),
+      server(options.name, segment,
+             {.tools = static_cast<std::uint32_t>(planned.scene.tools.size())}),
+      port_text(resolve_port(options.port, planned.scene.device.personality)) {
+  LoadedScene& scene = planned.scene;
+  planned.servo->take(scene);
+  report.waiting = "waiting for a device that answers at --port " + port_text;
+  try {
+    const Hello ours{scene.device.personality, options.virtual_time, scene.servo.rate_hz};
+    const LateNote waits(report.waiting);
+    port = open_port(port_text, ours, kPortPatienceMs, stop, io_thread_of(options.real_time));
+  } catch (...) {
+    if (stop) segment.set_lifecycle(Lifecycle::clean_end);
+    throw;
+  }
+}
+
+}  // namespace kerf

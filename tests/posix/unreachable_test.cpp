@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "shared/posix/unreachable.hpp"
+
+#include <cstdlib>
+#include <filesystem>
+#include <string>
+
+#include <doctest/doctest.h>
+
+#include "shared/posix/new_file.hpp"
+
+namespace fs = std::filesystem;
+using kerf::why_unreachable;
+
+TEST_CASE("links in a circle are told as such, where a file is read and where one is written") {
+  std::string pattern = (fs::temp_directory_path() / "kerf-loop-XXXXXX").string();
+  REQUIRE(mkdtemp(pattern.data()) != nullptr);
+  const fs::path folder = pattern;
+  fs::create_symlink("itself", folder / "itself");
+  fs::create_symlink("there", folder / "here");
+  fs::create_symlink("here", folder / "there");
+  fs::create_symlink("nothing", folder / "dangling");
+  const std::string why =
+      ": cannot be reached (Too many levels of symbolic links); mend its links, which lead to "
+      "themselves";
+  CHECK(why_unreachable(folder / "itself") == why);
+  CHECK(why_unreachable(folder / "here/scene.toml") == why);
+  CHECK(why_unreachable(folder) == "");
+  CHECK(why_unreachable(folder / "nothing") == "");
+  CHECK(why_unreachable(folder / "nothing/below") == "");
+  CHECK(why_unreachable(folder / "dangling") == "");
+  const fs::path report = folder / "here/report.json";
+  CHECK_THROWS_WITH_AS(kerf::check_new_file(report), (report.string() + why).c_str(),
+                       kerf::FileError);
+  fs::remove_all(folder);
+}
