@@ -74,17 +74,6 @@ const char* way_to_change(const std::string& what) {
 /// What is written.
 struct ImportCommand::Files {
   fs::path volume, labels, scene, preview;
-
-  /// Loads the scene as a run does. One that would be refused leaves nothing behind.
-  void check_runs(int cpu_s) const {
-    try {
-      static_cast<void>(plan_scene(load_scene(scene, {.read_cpu_s = cpu_s})));
-    } catch (const SceneError&) {
-      std::error_code gone;
-      for (const fs::path& file : {volume, labels, scene, preview}) fs::remove(file, gone);
-      throw;
-    }
-  }
 };
 
 ImportCommand::ImportCommand(Arguments& app)
@@ -253,10 +242,10 @@ void ImportCommand::write(VolumeImage image, ImportedScene scene, const std::str
   check_imported_scene(text, to.scene, to.volume);
   add(to.scene, text);
   if (!preview.empty()) add(to.preview, preview);
+  const bool labelled = !image.labels.empty();
+  static_cast<void>(plan_scene(load_scene(to.scene, text, std::move(image))));  // as a run does
   commit(files, force_);
-  if (image.labels.empty()) remove_labels(to.volume);
-  image = {};  // the scene brings its own
-  to.check_runs(cpu_s_);
+  if (!labelled) remove_labels(to.volume);
 }
 
 void ImportCommand::import_labelled(VolumeImage image, const Files& to, std::ostream& out) const {
