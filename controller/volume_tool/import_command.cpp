@@ -186,7 +186,8 @@ void ImportCommand::run(std::ostream& out) const {
     values << ", a map of labels; --iso 0.5 makes one body of them";
   }
   if (!whole.labels.empty()) {
-    refuse_odd(odd_spacing(source, solid_box(whole, otsu_threshold(whole)), false));
+    constexpr bool kOftenOneMm = true;  // as a CT in HU is
+    refuse_odd(odd_spacing(source, solid_box(whole, otsu_threshold(whole)), kOftenOneMm));
     source = {};
     return import_labelled(std::move(whole), values.str(), to, out);
   }
