@@ -39,7 +39,6 @@ NOT_HERE = {
         "./kerf demo --scene scenes/spine/", './kerf volume import "$KERF_DATA'],
     "runs in the test docs_tutorial": ["tutorial.md: "],
     "needs a registry of images": ["podman "],
-    "needs root, Debian's packages and a whole build": ["debootstrap ", "mkdir root/kerf", "chroot root"],
     "runs all tests, or many minutes": [
         "./kerf test", "safety.md: ./kerf lab", "./kerf lab ranges", ".ci/check-determinism.sh", "./kerf bench",
         "KERF_KILLS="],
