@@ -8,6 +8,7 @@
 #include <numbers>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -118,22 +119,32 @@ void propose(const SourceVolume& source, const VolumeSpec& spec, SceneVolume& vo
   }
 }
 
-/// The image of a volume and the density of its surface. `unknown`: the scene says nothing of it.
-void load_image(const VolumeSpec& spec, const std::filesystem::path& folder, bool unknown,
-                int cpu_s, SceneVolume& volume) {
-  if (is_phantom(spec)) {
+/// Where a volume comes from.
+struct VolumeSource {
+  std::filesystem::path folder;
+  bool unknown = false;  ///< the scene says nothing of it
+  int cpu_s = 0;
+  VolumeImage* image = nullptr;  ///< in place of the file, where given
+};
+
+/// The image of a volume and the density of its surface.
+void load_image(const VolumeSpec& spec, const VolumeSource& from, SceneVolume& volume) {
+  if (from.image != nullptr) {
+    volume.image = std::move(*from.image);
+  } else if (is_phantom(spec)) {
     volume.image =
         make_phantom({.shape = spec.shape, .grid = spec.phantom_size.value_or(PhantomSpec{}.grid)});
   } else {
-    const std::filesystem::path path = folder / spec.file;
-    const SourceVolume source = read_volume(path, {.spacing_mm = spec.spacing_mm, .cpu_s = cpu_s});
+    const std::filesystem::path path = from.folder / spec.file;
+    const SourceVolume source =
+        read_volume(path, {.spacing_mm = spec.spacing_mm, .cpu_s = from.cpu_s});
     end_if_asked(path.string());
-    const bool proposing = unknown && !std::filesystem::exists(labels_path(path));
+    const bool proposing = from.unknown && !std::filesystem::exists(labels_path(path));
     volume.image = apply_window(source, spec.window && !proposing
                                             ? Window{(*spec.window)[0], (*spec.window)[1]}
                                             : range_window(source));
     if (proposing) return propose(source, spec, volume);
-    read_labels_beside(path, volume.image, cpu_s);
+    read_labels_beside(path, volume.image, from.cpu_s);
   }
   volume.iso = spec.iso ? nearest_density(*spec.iso * kDensityMax) : otsu_threshold(volume.image);
 }
@@ -195,15 +206,14 @@ void denoise_volume(const VolumeSpec& spec, SceneVolume& volume) {
 }
 
 /// `felt_at`: the iso that the materials' `felt_iso` were written for; none: that of the volume.
-SceneVolume load_volume(const VolumeSpec& spec, const std::filesystem::path& folder, bool unknown,
-                        const std::vector<Material>& materials, std::optional<double> felt_at,
-                        int cpu_s) {
+SceneVolume load_volume(const VolumeSpec& spec, const VolumeSource& from,
+                        const std::vector<Material>& materials, std::optional<double> felt_at) {
   SceneVolume volume;
   volume.name = spec.name;
   volume.file = spec.file;
   volume.solid = spec.solid;
   try {
-    load_image(spec, folder, unknown, cpu_s, volume);
+    load_image(spec, from, volume);
     end_if_asked(spec.file);
     check_labels(volume.image, materials.size());
     const VoxelGrid whole = volume.image.grid;
@@ -287,10 +297,9 @@ void fit_to_volume(double written_mm, Scene& spec, LoadedScene& scene) {
   fit_cutting(grown, scale, scene);
 }
 
-}  // namespace
-
-LoadedScene load_scene(const std::filesystem::path& path, const SceneOverrides& overrides) {
-  Scene spec = parse_scene_file(path, overrides.settings);
+/// `first`: the image of the first volume, in place of its file.
+LoadedScene load_parsed(Scene spec, const std::filesystem::path& path,
+                        const SceneOverrides& overrides, VolumeImage* first) {
   const double written_mm =
       spec.device.fit ? kPhantomVoxelMm : written_voxel_mm(spec.volumes.front());
   const std::optional<double> written_iso = spec.volumes.front().iso;
@@ -301,9 +310,12 @@ LoadedScene load_scene(const std::filesystem::path& path, const SceneOverrides& 
   scene.volume_specs = spec.volumes;
   for (std::size_t i = 0; i < spec.volumes.size(); ++i) {
     const bool from_command_line = i == 0 && overrides.volume_file;
-    scene.volumes.push_back(load_volume(
-        spec.volumes[i], from_command_line ? "" : path.parent_path(), from_command_line,
-        scene.materials, from_command_line ? written_iso : std::nullopt, overrides.read_cpu_s));
+    const VolumeSource from{.folder = from_command_line ? "" : path.parent_path(),
+                            .unknown = from_command_line,
+                            .cpu_s = overrides.read_cpu_s,
+                            .image = i == 0 ? first : nullptr};
+    scene.volumes.push_back(load_volume(spec.volumes[i], from, scene.materials,
+                                        from_command_line ? written_iso : std::nullopt));
   }
   check_felt_materials(scene);
   const bool fitted = overrides.volume_file.has_value() || spec.device.fit;
@@ -341,6 +353,17 @@ LoadedScene load_scene(const std::filesystem::path& path, const SceneOverrides& 
         scene.volumes.begin(), scene.volumes.end(), [](const SceneVolume& v) { return v.solid; }));
   }
   return scene;
+}
+
+}  // namespace
+
+LoadedScene load_scene(const std::filesystem::path& path, const SceneOverrides& overrides) {
+  return load_parsed(parse_scene_file(path, overrides.settings), path, overrides, nullptr);
+}
+
+LoadedScene load_scene(const std::filesystem::path& path, std::string_view text,
+                       VolumeImage first) {
+  return load_parsed(parse_scene(text, path), path, {}, &first);
 }
 
 double device_stiffness_n_per_mm(const LoadedScene& scene) {

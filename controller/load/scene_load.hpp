@@ -4,6 +4,7 @@
 #include <array>
 #include <filesystem>
 #include <optional>
+#include <string_view>
 #include <vector>
 
 #include "controller/load/loaded_scene.hpp"
@@ -66,6 +67,11 @@ inline constexpr std::array<double, 3> kWorkspaceMm = {100.0, 80.0, 60.0};
 /// voxels of 0.125 mm. Where no volume has labels, only the materials that the scene names are
 /// left.
 [[nodiscard]] LoadedScene load_scene(const std::filesystem::path& path, const SceneOverrides& = {});
+
+/// The same for what is not written yet: a scene whose text will lie at `path`, and the densities
+/// and labels of its first volume, of which it says window = [0, 65535].
+[[nodiscard]] LoadedScene load_scene(const std::filesystem::path& path, std::string_view text,
+                                     VolumeImage first);
 
 /// Stiffness in N/mm at the device port: of the coupling to the proxy; of the paper's force when
 /// the active tool, taken as a ball of its radius, first touches a flat face: s^2 2 pi R p0.

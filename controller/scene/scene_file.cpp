@@ -180,7 +180,7 @@ void check_hand_script(const SceneSettings& scene) {
     refuse(scene.hand_place, why);
   }
   refuse(scene.hand_place,
-         " is no file; name a hand script from the scene's folder, for example hands/touch.toml");
+         " is no file in the scene's folder; copy the script there, or name one by its whole path");
 }
 
 }  // namespace kerf

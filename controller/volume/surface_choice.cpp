@@ -18,6 +18,8 @@ constexpr std::size_t kBins = 65536;
 /// Pads outside of the scanner's circle lie below air; noise of air reaches so far from -1000.
 constexpr double kAirWidthHu = 100;
 constexpr double kLeastAirShare = 0.01;
+/// A CT image has 16 bits a voxel (DICOM PS3.3 C.8.2.1.1.4).
+constexpr double kHighestHu = 65535;
 /// Compact bone ends there; metal would pull Otsu's threshold (3 mm spine with a hip joint: 1365 HU
 /// without this bound, 220 to 260 HU for any from 1000 to 2000).
 constexpr double kBoneEndsHu = 1500;
@@ -113,7 +115,8 @@ SurfaceChoice choose_surface(const VolumeImage& image, Window range) {
   SurfaceChoice choice;
   choice.hounsfield = share_between(counts, scale.bin(kAirHu - kAirWidthHu),
                                     scale.bin(kAirHu + kAirWidthHu)) >= kLeastAirShare &&
-                      range.lo <= kAirHu + kAirWidthHu && range.hi >= kWaterHu;
+                      range.lo <= kAirHu + kAirWidthHu && range.hi >= kWaterHu &&
+                      range.hi <= kHighestHu;
   const std::size_t air = choice.hounsfield ? scale.bin(kAirHu - kAirWidthHu) : 0;
   const OtsuSplit skin = split_between(counts, air, top);
   const auto skin_bin = static_cast<Density>(skin.bin);

@@ -12,7 +12,7 @@ inline constexpr double kAirHu = -1000, kWaterHu = 0;
 
 /// Which threshold parts what is to be felt from what is around it, in values of the file.
 struct SurfaceChoice {
-  bool hounsfield = false;     ///< values near -1000 are there, as air has them
+  bool hounsfield = false;     ///< as air has it, -1000 is there, and no more than 16 bits hold
   double skin = 0;             ///< Otsu's threshold of all: air below
   std::optional<double> hard;  ///< that of what is above: a second, denser class; none: one class
   bool covered = false;        ///< the denser class lies below a skin of the other

@@ -14,6 +14,7 @@
 #include "controller/scene/scene_error.hpp"
 #include "controller/volume/file/volume_io.hpp"
 #include "controller/volume/file/volume_write.hpp"
+#include "controller/volume/label_map.hpp"
 #include "controller/volume/spacing_check.hpp"
 #include "controller/volume/volume_crop.hpp"
 #include "controller/volume/volume_denoise.hpp"
@@ -62,6 +63,10 @@ int longest_vox(const VolumeFrame& frame) {
   return static_cast<int>(longest_mm / std::ranges::min(s));
 }
 
+constexpr const char* kAll = ", all of it";
+constexpr const char* kCropped = ", what is solid and three voxels of air";
+constexpr const char* kKeepsAll = "--no-crop keeps all";
+
 const char* way_to_change(const std::string& what) {
   if (what == "surface") return "--iso VALUE for another";
   if (what == "window") return "--window LO,HI for another";
@@ -74,17 +79,6 @@ const char* way_to_change(const std::string& what) {
 /// What is written.
 struct ImportCommand::Files {
   fs::path volume, labels, scene, preview;
-
-  /// Loads the scene as a run does. One that would be refused leaves nothing behind.
-  void check_runs(int cpu_s) const {
-    try {
-      static_cast<void>(plan_scene(load_scene(scene, {.read_cpu_s = cpu_s})));
-    } catch (const SceneError&) {
-      std::error_code gone;
-      for (const fs::path& file : {volume, labels, scene, preview}) fs::remove(file, gone);
-      throw;
-    }
-  }
 };
 
 ImportCommand::ImportCommand(Arguments& app)
@@ -187,14 +181,19 @@ void ImportCommand::run(std::ostream& out) const {
   VolumeImage whole = apply_window(source, range);
   read_labels_beside(path_, whole, cpu_s_);
   if (!whole.labels.empty()) refuse_beside_labels();
-  if (!whole.labels.empty()) return import_labelled(std::move(whole), to, out);
+  const bool asked = !iso_.empty() || !window_.empty() || denoise_ != "auto" || keep_all_;
+  if (whole.labels.empty() && !asked && take_label_map(source, whole)) {
+    values << ", a map of labels; --iso 0.5 makes one body of them";
+  }
+  if (!whole.labels.empty()) {
+    constexpr bool kOftenOneMm = true;  // as a CT in HU is
+    refuse_odd(odd_spacing(source, solid_box(whole, otsu_threshold(whole)), kOftenOneMm));
+    source = {};
+    return import_labelled(std::move(whole), values.str(), to, out);
+  }
   ProposedVolume proposed = propose_volume(std::move(whole), range, wishes);
   const VolumeProposal& proposal = proposed.proposal;
-  const std::string odd = odd_spacing(source, proposal.solid, proposal.surface.hounsfield);
-  if (!odd.empty() && spacing_.empty()) {
-    throw SceneError(path_ + ": spacing " + odd +
-                     "; give the true voxel size with --spacing x,y,z (mm)");
-  }
+  refuse_odd(odd_spacing(source, proposal.solid, proposal.surface.hounsfield));
   const std::string preview = png_bytes(import_preview(source, proposed));
   source = {};
 
@@ -211,20 +210,26 @@ void ImportCommand::run(std::ostream& out) const {
   const VolumeFrame kept = image;
   write(std::move(image), {path_, to.volume, &proposal, 0, iso / kDensityMax, passes}, preview, to);
 
+  if (proposal.surface.hounsfield) values << ", HU by their air of -1000";
   line(out, "file", values.str(), spacing_.empty() ? "--spacing A,B,C for another voxel size" : "");
   if (!note.empty()) line(out, "series", note, "--series for another");
   for (const ProposalLine& choice : proposal_lines(proposal)) {
     line(out, choice.what, choice.chosen, way_to_change(choice.what));
   }
-  std::ostringstream crop, smooth;
-  crop << size_text(kept) << (whole_ ? ", all of it" : ", what is solid and three voxels of air");
-  line(out, "crop", crop.str(), whole_ ? "" : "--no-crop keeps all");
+  line(out, "crop", size_text(kept) + (whole_ ? kAll : kCropped), whole_ ? "" : kKeepsAll);
+  std::ostringstream smooth;
   smooth << passes << (passes == 1 ? " pass" : " passes") << " against noise of "
          << std::round(1000 * noise.share) / 10 << " % of the surface's step";
   line(out, "denoise", smooth.str(), "--denoise off, 1, 2 or 3");
   line(out, "wrote", to.volume.string() + ", " + to.scene.string() + ", " + to.preview.string(),
        "look at the last one first");
   line(out, "try", "./kerf demo --scene " + to.scene.string(), "");
+}
+
+void ImportCommand::refuse_odd(const std::string& odd) const {
+  if (odd.empty() || !spacing_.empty()) return;
+  throw SceneError(path_ + ": spacing " + odd +
+                   "; give the true voxel size with --spacing x,y,z (mm)");
 }
 
 void ImportCommand::refuse_beside_labels() const {
@@ -252,21 +257,29 @@ void ImportCommand::write(VolumeImage image, ImportedScene scene, const std::str
   const std::string text = imported_scene_text(scene);
   check_imported_scene(text, to.scene, to.volume);
   add(to.scene, text);
-  if (!preview.empty()) add(to.preview, preview);
+  add(to.preview, preview);
+  const bool labelled = !image.labels.empty();
+  static_cast<void>(plan_scene(load_scene(to.scene, text, std::move(image))));  // as a run does
   commit(files, force_);
-  if (image.labels.empty()) remove_labels(to.volume);
-  image = {};  // the scene brings its own
-  to.check_runs(cpu_s_);
+  if (!labelled) remove_labels(to.volume);
 }
 
-void ImportCommand::import_labelled(VolumeImage image, const Files& to, std::ostream& out) const {
+void ImportCommand::import_labelled(VolumeImage image, const std::string& values, const Files& to,
+                                    std::ostream& out) const {
   const Density iso = otsu_threshold(image);
-  const Label last = *std::ranges::max_element(image.labels);
   if (!whole_) image = crop_to_solid(image, iso);
   const VolumeFrame kept = image;
-  write(std::move(image), {path_, to.volume, nullptr, last, iso / kDensityMax, 0}, {}, to);
-  line(out, "file", path_ + ": " + size_text(kept) + ", with labels, which tell the materials", "");
-  line(out, "wrote", to.volume.string() + ", its labels, " + to.scene.string(), "");
+  const Label last = *std::ranges::max_element(image.labels);
+  const std::string preview = png_bytes(label_preview(image, iso));
+  write(std::move(image), {path_, to.volume, nullptr, last, iso / kDensityMax, 0}, preview, to);
+  line(out, "file", values, spacing_.empty() ? "--spacing A,B,C for another voxel size" : "");
+  line(out, "materials", "by label, the highest is " + std::to_string(last),
+       "edit [[material]] in the scene");
+  line(out, "crop", size_text(kept) + (whole_ ? kAll : kCropped), whole_ ? "" : kKeepsAll);
+  line(out, "wrote",
+       to.volume.string() + ", its labels, " + to.scene.string() + ", " + to.preview.string(),
+       "look at the last one first");
+  line(out, "try", "./kerf demo --scene " + to.scene.string(), "");
 }
 
 }  // namespace kerf

@@ -31,9 +31,12 @@ class ImportCommand {
   /// All of them, of a scene that runs, or none.
   void write(VolumeImage image, ImportedScene scene, const std::string& preview,
              const Files& to) const;
+  /// `odd`: what is to be told of the file's spacing, where the user gave none.
+  void refuse_odd(const std::string& odd) const;
   /// What asks for a surface, where labels are one.
   void refuse_beside_labels() const;
-  void import_labelled(VolumeImage image, const Files& files, std::ostream& out) const;
+  void import_labelled(VolumeImage image, const std::string& values, const Files& files,
+                       std::ostream& out) const;
 
   Arguments command_;
   std::string path_, out_, spacing_, window_, iso_, denoise_ = "auto";

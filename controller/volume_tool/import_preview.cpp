@@ -6,9 +6,11 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <optional>
 
 #include "shared/numeric/vec3.hpp"
+#include "shared/volume/label_colour.hpp"
 
 namespace kerf {
 namespace {
@@ -133,19 +135,21 @@ class Field {
   const VolumeImage& image_;
 };
 
+/// What is drawn of a volume, and how; both colours are of a voxel.
+struct Drawn {
+  const VolumeImage& image;
+  Density iso;     ///< the surface
+  VoxelBox solid;  ///< its middle is that of the slices and of the surface
+  std::function<Colour(std::size_t)> in_slice, on_surface;
+};
+
 /// Rays in parallel, from front, right and above; one light from the eye.
 class Surface {
  public:
-  Surface(const ProposedVolume& proposed, Density iso)
-      : image_(proposed.image),
-        field_(proposed.image),
-        placed_(proposed.image),
-        proposal_(proposed.proposal),
-        iso_(iso) {
-    const VoxelBox& box = proposal_.solid;
-    middle_ = placed_.mm(middle_of(box));
-    reach_mm_ = vec3::length(placed_.half_mm(box.extent()));
-    step_mm_ = *std::ranges::min_element(proposed.image.spacing_mm);
+  explicit Surface(const Drawn& drawn) : drawn_(drawn), field_(drawn.image), placed_(drawn.image) {
+    middle_ = placed_.mm(middle_of(drawn.solid));
+    reach_mm_ = vec3::length(placed_.half_mm(drawn.solid.extent()));
+    step_mm_ = *std::ranges::min_element(drawn.image.spacing_mm);
     step_mm_ = std::max(step_mm_, reach_mm_ / 1024);  // never more than some 2000 steps
   }
   [[nodiscard]] Colour at(double right, double down) const {
@@ -155,19 +159,21 @@ class Surface {
     const Point way = placed_.voxel(ahead_);
     for (double along = 0; along < 2 * reach_mm_; along += step_mm_) {
       const auto near = placed_.nearest(start + along * way);
-      if (!near || image_.density[*near] < iso_) continue;
+      if (!near || drawn_.image.density[*near] < drawn_.iso) continue;
       double outside = along - 2 * step_mm_, inside = along + step_mm_;
       for (int halving = 0; halving < 6; ++halving) {
         const double between = (outside + inside) / 2;
-        (field_.at(start + between * way) < iso_ ? outside : inside) = between;
+        (field_.at(start + between * way) < drawn_.iso ? outside : inside) = between;
       }
-      return shaded(start + inside * way);
+      const double light = light_at(start + inside * way);
+      const Colour c = drawn_.on_surface(*near);
+      return {c[0] * light, c[1] * light, c[2] * light};
     }
     return {0.05, 0.06, 0.08};
   }
 
  private:
-  [[nodiscard]] Colour shaded(const Point& voxel) const {
+  [[nodiscard]] double light_at(const Point& voxel) const {
     Point slope{};
     for (std::size_t i = 0; i < 3; ++i) {
       Point mm{};
@@ -175,62 +181,91 @@ class Surface {
       const Point way = placed_.voxel(mm);
       slope[i] = field_.at(voxel + way) - field_.at(voxel - way);
     }
-    const double light = 0.15 + 0.85 * std::max(0.0, dot(unit(slope), ahead_));
-    const Colour& c = proposal_.materials.back().name == "denser"
-                          ? proposal_.materials.front().colour
-                          : proposal_.materials.back().colour;
-    return {c[0] * light, c[1] * light, c[2] * light};
+    return 0.15 + 0.85 * std::max(0.0, dot(unit(slope), ahead_));
   }
 
   // The source's frame is LPS: x to the left of a patient, y to the back, z up.
   const Point ahead_ = unit({-0.5, 1, -0.35}), right_ = unit(vec3::cross(ahead_, {0, 0, 1})),
               up_ = vec3::cross(right_, ahead_);
-  const VolumeImage& image_;
+  const Drawn& drawn_;
   Field field_;
   Placed placed_;
-  const VolumeProposal& proposal_;
-  Density iso_;
   Point middle_{};
   double reach_mm_ = 0, step_mm_ = 0;
 };
 
-}  // namespace
-
-RgbPicture import_preview(const SourceVolume& source, const ProposedVolume& proposed) {
-  const VolumeProposal& proposal = proposed.proposal;
-  const Placed placed(source);
-  const Density iso = nearest_density(proposal.density_of(proposal.iso) * kDensityMax);
-  const double darkest = proposal.surface.hounsfield ? std::max(source.min, kAirHu) : source.min;
-  const double brightest = std::min(source.max, proposal.iso + 1.5 * (proposal.iso - darkest));
-  const Colour& kept = proposal.materials.back().colour;
-  const auto slice_colour = [&](const Point& mm) -> Colour {
-    const auto voxel = placed.nearest(placed.voxel(mm));
-    if (!voxel) return {0, 0, 0};
-    const double value = static_cast<double>(source.values[*voxel]);
-    const double screen = std::clamp((value - darkest) / (brightest - darkest), 0.0, 1.0);
-    const double grey = std::pow(screen, 2.2);
-    if (value < proposal.iso) return {grey, grey, grey};
-    const Colour& tint = proposed.image.density[*voxel] >= iso ? kept : kAway;
-    return {tint[0], tint[1] * (0.6 + 0.4 * grey), tint[2] * (0.3 + 0.5 * grey)};
-  };
-  const Point whole_middle = placed.mm(middle_of(source.grid.box()));
-  const Point solid_middle = placed.mm(middle_of(proposal.solid));
-  const Point half = placed.half_mm({source.grid.nx, source.grid.ny, source.grid.nz});
+RgbPicture sheet_of(const Drawn& drawn) {
+  const VoxelGrid& grid = drawn.image.grid;
+  const Placed placed(drawn.image);
+  const Point whole_middle = placed.mm(middle_of(grid.box()));
+  const Point solid_middle = placed.mm(middle_of(drawn.solid));
+  const Point half = placed.half_mm({grid.nx, grid.ny, grid.nz});
   const double reach_mm = *std::ranges::max_element(half);
   const auto slice = [&](std::size_t across, const Point& right, const Point& down) {
     Point middle = whole_middle;
     middle[across] = solid_middle[across];
-    return [=](double x, double y) {
-      return slice_colour(middle + (x * reach_mm) * right + (y * reach_mm) * down);
+    return [&, middle, right, down](double x, double y) -> Colour {
+      const Point mm = middle + (x * reach_mm) * right + (y * reach_mm) * down;
+      const auto voxel = placed.nearest(placed.voxel(mm));
+      return voxel ? drawn.in_slice(*voxel) : Colour{0, 0, 0};
     };
   };
   Sheet sheet;
   sheet.fill(0, 0, slice(2, {1, 0, 0}, {0, 1, 0}));
   sheet.fill(1, 0, slice(1, {1, 0, 0}, {0, 0, -1}));
   sheet.fill(0, 1, slice(0, {0, 1, 0}, {0, 0, -1}));
-  const Surface surface(proposed, iso);
+  const Surface surface(drawn);
   sheet.fill(1, 1, [&](double x, double y) { return surface.at(x, y); });
   return sheet.take();
+}
+
+/// Linear light of a value between the darkest and the brightest.
+double grey_of(double value, double darkest, double brightest) {
+  return std::pow(std::clamp((value - darkest) / (brightest - darkest), 0.0, 1.0), 2.2);
+}
+
+}  // namespace
+
+RgbPicture import_preview(const SourceVolume& source, const ProposedVolume& proposed) {
+  const VolumeProposal& proposal = proposed.proposal;
+  const Density iso = nearest_density(proposal.density_of(proposal.iso) * kDensityMax);
+  const double darkest = proposal.surface.hounsfield ? std::max(source.min, kAirHu) : source.min;
+  const double brightest = std::min(source.max, proposal.iso + 1.5 * (proposal.iso - darkest));
+  const Colour& kept = proposal.materials.back().colour;
+  const Colour& felt = proposal.materials.back().name == "denser"
+                           ? proposal.materials.front().colour
+                           : proposal.materials.back().colour;
+  const auto in_slice = [&](std::size_t voxel) -> Colour {
+    const double value = static_cast<double>(source.values[voxel]);
+    const double grey = grey_of(value, darkest, brightest);
+    if (value < proposal.iso) return {grey, grey, grey};
+    const Colour& tint = proposed.image.density[voxel] >= iso ? kept : kAway;
+    return {tint[0], tint[1] * (0.6 + 0.4 * grey), tint[2] * (0.3 + 0.5 * grey)};
+  };
+  return sheet_of({.image = proposed.image,
+                   .iso = iso,
+                   .solid = proposal.solid,
+                   .in_slice = in_slice,
+                   .on_surface = [&](std::size_t) { return felt; }});
+}
+
+RgbPicture label_preview(const VolumeImage& image, Density iso) {
+  constexpr Colour kUnlabelled{0.6, 0.6, 0.6};
+  const auto in_slice = [&](std::size_t voxel) -> Colour {
+    const double grey = grey_of(image.density[voxel], 0, kDensityMax);
+    if (image.labels[voxel] == 0) return {grey, grey, grey};
+    const Colour c = label_colour(image.labels[voxel]);
+    const double light = 0.5 + 0.5 * grey;
+    return {c[0] * light, c[1] * light, c[2] * light};
+  };
+  const auto on_surface = [&](std::size_t voxel) {
+    return image.labels[voxel] == 0 ? kUnlabelled : label_colour(image.labels[voxel]);
+  };
+  return sheet_of({.image = image,
+                   .iso = iso,
+                   .solid = solid_box(image, iso),
+                   .in_slice = in_slice,
+                   .on_surface = on_surface});
 }
 
 }  // namespace kerf

@@ -15,4 +15,8 @@ namespace kerf {
 /// points into the picture. Load time; about a second.
 [[nodiscard]] RgbPicture import_preview(const SourceVolume& source, const ProposedVolume& proposed);
 
+/// The same of a volume with labels: each label has its own colour (label_colour.hpp), in the
+/// slices darker where the density is low; what has none is grey.
+[[nodiscard]] RgbPicture label_preview(const VolumeImage& image, Density iso);
+
 }  // namespace kerf

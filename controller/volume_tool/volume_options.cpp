@@ -41,6 +41,9 @@ Window window_from(const std::string& text) {
   if (w.size() != 2) {
     throw SceneError("--window: " + text + " is not a range; give lo,hi in values of the file");
   }
+  if (!(w[0] < w[1])) {
+    throw SceneError("--window: " + text + " is empty; give lo,hi with lo < hi");
+  }
   return {w[0], w[1]};
 }
 

@@ -39,6 +39,9 @@ std::vector<std::string> split(std::string_view text, char separator) {
 /// The values of LO:HI:N; nothing where the text is none.
 std::optional<std::vector<std::string>> range_of(std::string_view text, std::string_view values) {
   const std::vector<std::string> parts = split(values, ':');
+  if (parts.size() == 2 && number_in(parts[0]) && number_in(parts[1])) {
+    refuse_axis(text, "a range without its count; write LO:HI:N, such as 0.2:3:16");
+  }
   if (parts.size() != 3) return std::nullopt;
   const auto lo = number_in(parts[0]), hi = number_in(parts[1]), count = number_in(parts[2]);
   if (!lo || !hi || !count || !std::isfinite(*lo) || !std::isfinite(*hi)) return std::nullopt;

@@ -51,7 +51,7 @@ constexpr const char* kHow = R"(## Maps of your own
     ./kerf lab zwidth --rate 4000 --delay 0.5 --csv map.csv       # any axis takes a value, a list or a range
     ./kerf lab zwidth --map delay,quantum --delay 0:3:13 --quantum 0:0.2:11 --plot k.svg # the highest K as a colour
     ./kerf lab zwidth --portraits portrait.svg --cells 1:0.002,10:0.002                  # position against speed; --arm too
-    ./kerf lab zwidth --arm --delay 0 --stiffness 0.1:50:40 --plot arm.svg               # the whole servo step
+    ./kerf lab zwidth --arm --delay 0 --stiffness 0.1:50:40 --plot arm.svg               # the whole servo step; minutes
     ./kerf lab zwidth --stabiliser none,passivity,energy_bounding --plot s.svg           # one panel for each
 
 `--law`, `--estimator` and `--stabiliser` also take the laws that a program of yours registers (docs/own-law.md).

@@ -82,14 +82,14 @@ NewFile::NewFile(const std::filesystem::path& path) : path_(path) {
   nameless_ = fd_ >= 0 && ::access(open_file(fd_).c_str(), F_OK) == 0;
   if (nameless_) return;
   if (fd_ >= 0) ::close(fd_);
-  take_temporary_name([&](const char* name) {
+  take_name([&](const char* name) {
     fd_ = ::open(name, O_CREAT | O_EXCL | O_NOFOLLOW | O_WRONLY | O_CLOEXEC, kReadWriteAll);
     return fd_ >= 0;
   });
 }
 
 template <class Take>
-void NewFile::take_temporary_name(Take take) {
+void NewFile::take_name(Take take) {
   constexpr int kMaxTries = 100;             // names that others have taken
   constexpr std::size_t kLongestStem = 200;  // of 255 bytes that a name may have
   const std::string stem = path_.filename().string().substr(0, kLongestStem) + ".new-" +
@@ -107,7 +107,8 @@ void NewFile::take_temporary_name(Take take) {
 
 NewFile::~NewFile() {
   if (fd_ >= 0) ::close(fd_);
-  if (!committed_ && !temporary_.empty()) ::unlink(temporary_.c_str());
+  const bool waits = state_ == State::pending || state_ == State::swapped;
+  if (waits && !temporary_.empty()) ::unlink(temporary_.c_str());
 }
 
 void NewFile::write(const void* data, std::size_t size) {
@@ -124,34 +125,52 @@ void NewFile::write(const void* data, std::size_t size) {
 void NewFile::close() {
   const bool stored = ::fsync(fd_) == 0 || errno == EINVAL || errno == EROFS;  // pipes cannot
   const int error = errno;
-  if (stored && nameless_) {
-    take_temporary_name([&](const char* name) {
-      return ::linkat(AT_FDCWD, open_file(fd_).c_str(), AT_FDCWD, name, AT_SYMLINK_FOLLOW) == 0;
-    });
-  }
+  if (stored && nameless_) return;  // open until it has a name
   if (::close(std::exchange(fd_, -1)) != 0) fail(errno);
   if (!stored) fail(error);
 }
 
+void NewFile::take_temporary_name() {
+  if (!nameless_ || !temporary_.empty()) return;
+  take_name([&](const char* name) {
+    return ::linkat(AT_FDCWD, open_file(fd_).c_str(), AT_FDCWD, name, AT_SYMLINK_FOLLOW) == 0;
+  });
+}
+
 void NewFile::commit() {
-  if (!temporary_.empty() && ::rename(temporary_.c_str(), path_.c_str()) != 0) fail(errno);
-  committed_ = true;
+  take_temporary_name();
+  if (temporary_.empty()) return;
+  const char* const from = temporary_.c_str();
+  if (::renameat2(AT_FDCWD, from, AT_FDCWD, path_.c_str(), RENAME_EXCHANGE) == 0) {
+    state_ = State::swapped;
+    return;
+  }
+  const bool is_new = errno == ENOENT, cannot_swap = errno == EINVAL || errno == ENOSYS;
+  if (!(is_new || cannot_swap) || ::rename(from, path_.c_str()) != 0) fail(errno);
+  state_ = is_new ? State::created : State::replaced;
 }
 
 bool NewFile::commit_if_new() {
-  if (!temporary_.empty()) {
-    const char* const from = temporary_.c_str();
-    int error =
-        ::renameat2(AT_FDCWD, from, AT_FDCWD, path_.c_str(), RENAME_NOREPLACE) == 0 ? 0 : errno;
-    if (error == EINVAL || error == ENOSYS) {  // a file system that has only links for this
-      error = ::link(from, path_.c_str()) == 0 ? 0 : errno;
-      if (error == 0) ::unlink(from);
-    }
-    if (error == EEXIST) return false;
-    if (error != 0) fail(error);
+  take_temporary_name();
+  if (temporary_.empty()) return true;
+  const char* const from = temporary_.c_str();
+  int error =
+      ::renameat2(AT_FDCWD, from, AT_FDCWD, path_.c_str(), RENAME_NOREPLACE) == 0 ? 0 : errno;
+  if (error == EINVAL || error == ENOSYS) {  // a file system that has only links for this
+    error = ::link(from, path_.c_str()) == 0 ? 0 : errno;
+    if (error == 0) ::unlink(from);
   }
-  committed_ = true;
+  if (error == EEXIST) return false;
+  if (error != 0) fail(error);
+  state_ = State::created;
   return true;
+}
+
+void NewFile::take_back() noexcept {
+  if (state_ == State::created) ::unlink(path_.c_str());
+  if (state_ == State::swapped) {
+    ::renameat2(AT_FDCWD, temporary_.c_str(), AT_FDCWD, path_.c_str(), RENAME_EXCHANGE);
+  }
 }
 
 void NewFile::fail(int error) const {

@@ -29,8 +29,8 @@ class FileError : public std::runtime_error {
 [[nodiscard]] std::string not_written(int error);
 
 /// A file that appears whole or not at all: written without a name, so that nothing is left of it
-/// however the program ends; `close` gives it a temporary name in the same folder, `commit` its
-/// own. Without `commit` the destructor removes it, and what was there before stays. Where the file
+/// however the program ends; `commit` gives it a temporary name in the same folder, then its own.
+/// Without `commit` the destructor removes it, and what was there before stays. Where the file
 /// system has only files with names, it has the temporary one from the start. Others may write to
 /// the folder: the temporary is a new file or none, and a link that stands at `path` is refused. A
 /// stream is written to as it stands.
@@ -46,23 +46,29 @@ class NewFile {
   void write(const void* data, std::size_t size);
   /// Ends writing, on the disk. Some file systems report a full disk only here.
   void close();
-  /// After `close`.
+  /// After `close`: gives it the temporary name. A commit does that where nobody did.
+  void take_temporary_name();
+  /// After `close`. What it replaces keeps the temporary name until the destructor.
   void commit();
   /// The same where nothing is there yet; else false, and `path` stays as it is, whoever made it
   /// and when.
   [[nodiscard]] bool commit_if_new();
+  /// After either: what was there before is there again. A file system that cannot swap two names
+  /// keeps the new file where there was an old one.
+  void take_back() noexcept;
 
  private:
   /// Sets `temporary_` to the first free name that `take` could take.
   template <class Take>
-  void take_temporary_name(Take take);
+  void take_name(Take take);
   [[noreturn]] void fail(int error) const;
 
   std::filesystem::path path_;
   std::filesystem::path temporary_;  ///< empty: `path_` is written directly
   int fd_ = -1;
   bool nameless_ = false;
-  bool committed_ = false;
+  enum class State { pending, swapped, created, replaced };
+  State state_ = State::pending;
 };
 
 /// Throws now what a NewFile at `path` would throw later, but that nobody reads a pipe; leaves

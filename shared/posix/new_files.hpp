@@ -9,8 +9,9 @@
 
 namespace kerf {
 
-/// Files that belong together and appear together: all are written, each without its name, before
-/// the first gets its own.
+/// Files that belong together and appear together: all are written, none with a name, before the
+/// first gets its own. A program that is killed before a commit leaves nothing; in a commit each
+/// file is the old or the new one, and the other may be left beside it as NAME.new-PID-N.
 ///
 /// Throws FileError, and then what was there before stays as it was, as does every file that none
 /// of this process wrote.
@@ -30,6 +31,10 @@ class NewFiles {
     std::filesystem::path path;
     NewFile file;
   };
+  /// Tells the first that `commit` did not, with all taken back.
+  template <class Commit>
+  [[nodiscard]] const Named* commit_all(Commit commit);
+
   std::deque<Named> files_;
 };
 

@@ -14,6 +14,7 @@
 #include <doctest/doctest.h>
 #include <fcntl.h>
 #include <poll.h>
+#include <sys/ptrace.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -204,6 +205,116 @@ TEST_CASE("files that belong together appear together or not at all") {
   }
   CHECK(text_of(folder / "a") == "new");
   CHECK(text_of(folder / "b") == "new");
+  CHECK(folder.count() == 2);
+}
+
+namespace {
+
+void add_new(kerf::NewFiles& files, const fs::path& path) {
+  NewFile& file = files.add(path);
+  file.write("new", 3);
+  file.close();
+}
+
+/// The exit status of a child process that makes `call`; -1: it was killed at its system call
+/// number `last`. Every system call stops twice.
+template <class Call>
+int child_until(int last, const Call& call) {
+  const pid_t child = fork();
+  REQUIRE(child >= 0);
+  if (child == 0) {
+    ptrace(PTRACE_TRACEME, 0, nullptr, nullptr);
+    raise(SIGSTOP);
+    call();
+    _exit(0);
+  }
+  int status = 0;
+  for (int stops = 0; stops < 2 * last; ++stops) {
+    waitpid(child, &status, 0);
+    if (WIFEXITED(status)) return WEXITSTATUS(status);
+    ptrace(PTRACE_SYSCALL, child, nullptr, nullptr);
+  }
+  kill(child, SIGKILL);
+  while (waitpid(child, &status, 0) == child && !WIFEXITED(status) && !WIFSIGNALED(status)) {
+  }
+  return -1;
+}
+
+}  // namespace
+
+TEST_CASE("a commit that is killed at any system call leaves each file old or new") {
+  int kept = 0, half = 0;
+  for (int last = 1;; ++last) {
+    CAPTURE(last);
+    REQUIRE(last < 1000);
+    const Folder folder;
+    write_new_file(folder / "a", "old");
+    write_new_file(folder / "b", "old");
+    const int end = child_until(last, [&] {
+      kerf::NewFiles files;
+      add_new(files, folder / "a");
+      add_new(files, folder / "b");
+      files.commit();
+    });
+    const std::string a = text_of(folder / "a"), b = text_of(folder / "b");
+    CHECK((a == "old" || a == "new"));
+    CHECK((b == "old" || b == "new"));
+    kept += b == "old" ? 1 : 0;
+    half += a == b ? 0 : 1;
+    for (const auto& entry : fs::directory_iterator(folder.path)) {
+      const std::string name = entry.path().filename();
+      CHECK((name == "a" || name == "b" || name.substr(1).starts_with(".new-")));
+    }
+    if (end < 0) continue;
+    CHECK(end == 0);
+    CHECK(a == "new");
+    CHECK(b == "new");
+    CHECK(folder.count() == 2);
+    break;
+  }
+  CHECK(kept > 0);
+  CHECK(half > 0);  // it was killed between the two
+}
+
+TEST_CASE("files that cannot all be replaced stay as they were") {
+  const Folder folder;
+  write_new_file(folder / "a", "old");
+  {
+    fs::create_directory(folder / "gone");
+    kerf::NewFiles files;
+    add_new(files, folder / "a");
+    add_new(files, folder / "gone/b");
+    if (!fs::remove(folder / "gone")) return;  // the file system gave it a name at once
+    CHECK_THROWS_AS(files.commit(), FileError);
+  }
+  CHECK(text_of(folder / "a") == "old");
+  CHECK(folder.count() == 1);
+  if (geteuid() != 0) {
+    MESSAGE("skipped: only root can make a file of somebody else");
+    return;
+  }
+  write_new_file(folder / "b", "root's");
+  const uid_t nobody = 65534;
+  REQUIRE(chown((folder / "a").c_str(), nobody, nobody) == 0);
+  fs::permissions(folder.path, fs::perms::all | fs::perms::sticky_bit);
+  const pid_t child = fork();
+  REQUIRE(child >= 0);
+  if (child == 0) {
+    if (setuid(nobody) != 0) _exit(2);
+    const std::string line = refusal_of([&] {
+      kerf::NewFiles files;
+      add_new(files, folder / "a");
+      add_new(files, folder / "new");
+      add_new(files, folder / "b");
+      files.commit();
+    });
+    _exit(line.find("b: cannot be written (Operation not permitted)") == std::string::npos ? 1 : 0);
+  }
+  int status = 0;
+  waitpid(child, &status, 0);
+  CHECK(status == 0);
+  CHECK(text_of(folder / "a") == "old");
+  CHECK(text_of(folder / "b") == "root's");
   CHECK(folder.count() == 2);
 }
 

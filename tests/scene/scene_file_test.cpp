@@ -411,9 +411,10 @@ TEST_CASE("a hand script that is not there is refused where one asks") {
   const auto error = [](const kerf::Scene& of) {
     return kerf::test::error_of([&] { kerf::check_hand_script(of); });
   };
-  CHECK(error(scene) == file.string() +
-                            ":7: hand.script = \"hand.toml\" is no file; name a hand script from "
-                            "the scene's folder, for example hands/touch.toml");
+  CHECK(error(scene) ==
+        file.string() +
+            ":7: hand.script = \"hand.toml\" is no file in the scene's folder; copy "
+            "the script there, or name one by its whole path");
   folder.write("hand.toml", "");
   CHECK(error(scene).empty());
   CHECK(error(parse(kSmallest)).empty());

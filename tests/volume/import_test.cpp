@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <array>
+#include <cstdint>
 #include <cstdlib>
 #include <filesystem>
 #include <iterator>
@@ -13,6 +14,7 @@
 #include "controller/volume/file/volume_write.hpp"
 #include "controller/volume/phantom.hpp"
 #include "controller/volume/volume_density.hpp"
+#include "controller/volume_tool/import_preview.hpp"
 #include "controller/volume_tool/png_file.hpp"
 #include "tests/case_count.hpp"
 #include "tests/volume/volume_files.hpp"
@@ -272,6 +274,7 @@ TEST_CASE("a volume with labels keeps them and gets no proposal") {
   const std::string out = (folder / "out.nrrd").string();
   write_volume(make_phantom({.grid = {48, 48, 30}}), tooth);
   REQUIRE(run({"import", tooth, "--out", out}).code == 0);
+  CHECK(read_bytes(folder / "out.png").starts_with("\x89PNG\r\n"));
   VolumeImage image = apply_window(read_volume(out), {0, kDensityMax});
   read_labels_beside(out, image);
   CHECK(image.labels.size() == image.density.size());
@@ -286,6 +289,85 @@ TEST_CASE("a volume with labels keeps them and gets no proposal") {
 
   CHECK(has(run({"import", tooth, "--out", out, "--force", "--spacing", "1,1,90"}).err,
             "has a side of more than 60 times another"));
+}
+
+namespace {
+
+/// Balls of labels 1 .. `count` in air, beside each other along x.
+VolumeImage labelled_balls(int count) {
+  VolumeImage image;
+  image.grid = {16 * count, 16, 16};
+  image.density.assign(image.grid.voxel_count(), 0);
+  image.labels.assign(image.grid.voxel_count(), 0);
+  for (std::int32_t z = 0; z < 16; ++z) {
+    for (std::int32_t y = 0; y < 16; ++y) {
+      for (std::int32_t x = 0; x < 16 * count; ++x) {
+        const std::int32_t from = x % 16 - 8;
+        if (from * from + (y - 8) * (y - 8) + (z - 8) * (z - 8) > 25) continue;
+        image.labels[image.grid.index(x, y, z)] = static_cast<Label>(x / 16 + 1);
+        image.density[image.grid.index(x, y, z)] = static_cast<Density>(kDensityMax);
+      }
+    }
+  }
+  return image;
+}
+
+}  // namespace
+
+TEST_CASE("each label has its own colour in the preview, in slices and on the surface") {
+  const RgbPicture picture = label_preview(labelled_balls(3), 32768);
+  std::array<std::array<int, 4>, 3> seen{};  // pixels of the label in the panels, row by row
+  for (std::int32_t y = 0; y < picture.height; ++y) {
+    for (std::int32_t x = 0; x < picture.width; ++x) {
+      const std::uint8_t* const rgb =
+          &picture.rgb[3 * static_cast<std::size_t>(y * picture.width + x)];
+      // Sky blue, yellow and vermilion keep their order of channels in any light.
+      const bool lit = std::max({rgb[0], rgb[1], rgb[2]}) > 100 && rgb[0] != rgb[1];
+      if (!lit) continue;
+      const std::size_t label = rgb[2] > rgb[1] ? 0 : rgb[1] > 0.9 * rgb[0] ? 1 : 2;
+      ++seen[label][2 * (2 * y > picture.height) + (2 * x > picture.width)];
+    }
+  }
+  CAPTURE(seen[0][0]);
+  for (const auto& panels : seen) {
+    for (const std::size_t panel : {0, 1, 3}) CHECK(panels[panel] > 100);
+  }
+  CHECK(seen[0][2] == 0);  // across x, through the one in the middle
+  CHECK(seen[1][2] > 100);
+  CHECK(seen[2][2] == 0);
+}
+
+TEST_CASE("a map of labels alone becomes a material each, a scan of the same steps does not") {
+  const TempFolder folder;
+  const VolumeImage balls = labelled_balls(5);
+  std::vector<std::uint8_t> values(balls.labels.begin(), balls.labels.end());
+  const auto write = [&] {
+    return folder
+        .write("map.nrrd", nrrd("uint8", kHalf, "raw", "80 16 16") + "\n" + bytes_of(values))
+        .string();
+  };
+  const std::string out = (folder / "out.nrrd").string();
+  const Outcome made = run({"import", write(), "--out", out});
+  CAPTURE(made.err);
+  REQUIRE(made.code == 0);
+  CHECK(has(made.out, "a map of labels; --iso 0.5 makes one body of them"));
+  CHECK(read_bytes(folder / "out.png").starts_with("\x89PNG\r\n"));
+  const Scene scene = parse_scene_file(folder / "out.toml");
+  REQUIRE(scene.materials.size() == 6);
+  CHECK(scene.materials[4].colour != scene.materials[5].colour);
+  VolumeImage image = apply_window(read_volume(out), {0, kDensityMax});
+  read_labels_beside(out, image);
+  CHECK(*std::ranges::max_element(image.labels) == 5);
+
+  const Outcome body = run({"import", write(), "--out", out, "--force", "--iso", "0.5"});
+  CHECK(has(body.out, "materials  "));
+  CHECK_FALSE(has(body.out, "a map of labels"));
+  CHECK_FALSE(std::filesystem::exists(folder / "out-labels.nrrd"));
+  for (std::size_t i = 1; i + 1 < values.size(); ++i) {  // blurred, as a scan is
+    if (values[i] > 1 && values[i - 1] == 0) values[i] /= 2;
+  }
+  const Outcome scan = run({"import", write(), "--out", out, "--force"});
+  CHECK_FALSE(has(scan.out, "a map of labels"));
 }
 
 TEST_CASE("each real scan is imported at first try") {

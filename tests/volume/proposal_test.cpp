@@ -3,6 +3,7 @@
 #include <cmath>
 #include <functional>
 #include <random>
+#include <string>
 
 #include <doctest/doctest.h>
 
@@ -161,6 +162,17 @@ TEST_CASE("a wish goes before what is proposed, and one that cannot be is refuse
                        "iso: everything reaches -5; the values of the file go from 10 to 100, give "
                        "--iso between them",
                        SceneError);
+}
+
+TEST_CASE("values that no CT has are not taken for its scale") {
+  for (const double most : {3000.0, 800000.0}) {
+    CAPTURE(most);
+    const auto ball = scanned(
+        [&](double x, double y, double z) { return distance(x, y, z) < 20 ? most : -1000; }, 0);
+    const ProposedVolume proposed = propose(ball);
+    CHECK(proposed.proposal.surface.hounsfield == (most < 65536));
+    CHECK(std::string(proposed.proposal.unit()) == (most < 65536 ? " HU" : ""));
+  }
 }
 
 TEST_CASE("a label map, a single voxel and a full box are no trouble") {

@@ -141,6 +141,23 @@ TEST_CASE("an import leaves a scene that runs, or nothing") {
   }
 }
 
+TEST_CASE("an import that is refused replaces nothing") {
+  const TempFolder folder;
+  const std::string blob = blob_file(folder);
+  const std::string names[] = {"old.nrrd", "old-labels.nrrd", "old.toml", "old.png"};
+  for (const std::string& name : names) folder.write(name, "mine: " + name);
+  const Outcome refused =
+      run({"import", blob, "--spacing", "900", "--out", (folder / "old.nrrd").string(), "--force"});
+  CHECK(refused.code == 2);
+  for (const std::string& name : names) {
+    CAPTURE(name);
+    CHECK(std::filesystem::exists(folder / name));
+    CHECK(read_bytes(folder / name) == "mine: " + name);
+  }
+  const auto files = std::filesystem::directory_iterator(folder.path());
+  CHECK(std::distance(files, std::filesystem::directory_iterator()) == 5);  // and the scan
+}
+
 TEST_CASE("a file that is there is replaced where that is asked for, and else stays") {
   const TempFolder folder;
   const std::string blob = blob_file(folder);

@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "visualizer/view/scene_view.hpp"
 
-#include <cmath>
+#include <algorithm>
+#include <array>
+#include <cstddef>
 
 #include <glm/gtc/matrix_transform.hpp>
 #include <glm/gtc/quaternion.hpp>
 
 #include "shared/text/json.hpp"
+#include "shared/volume/label_colour.hpp"
 #include "visualizer/error.hpp"
 
 namespace kerf {
@@ -106,20 +109,9 @@ VolumeView volume_view(const SegmentVolumeInfo& info) {
 }  // namespace
 
 void take_okabe_ito(std::span<MaterialView> materials) {
-  // sRGB; the lightest first: what is cut first is seen best.
-  constexpr auto kColours = std::to_array<std::array<int, 3>>({{86, 180, 233},   // sky blue
-                                                               {240, 228, 66},   // yellow
-                                                               {213, 94, 0},     // vermilion
-                                                               {0, 158, 115},    // bluish green
-                                                               {204, 121, 167},  // reddish purple
-                                                               {0, 114, 178},    // blue
-                                                               {230, 159, 0}});  // orange
-  constexpr double kGamma = 2.2;
   for (std::size_t m = 1; m < materials.size(); ++m) {
-    const std::array<int, 3>& srgb = kColours[(m - 1) % kColours.size()];
-    for (int i = 0; i < 3; ++i) {
-      materials[m].colour[i] = std::pow(srgb[static_cast<std::size_t>(i)] / 255.0, kGamma);
-    }
+    const std::array<double, 3> colour = label_colour(m);
+    materials[m].colour = {colour[0], colour[1], colour[2]};
   }
 }
 

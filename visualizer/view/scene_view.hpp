@@ -70,8 +70,8 @@ struct MaterialView {
   bool forbidden = false;             ///< never cut, and told when it is pressed
 };
 
-/// Gives each material but "none" a colour of Okabe and Ito ("Color Universal Design", 2008), which
-/// any kind of colour vision tells apart; beyond seven they come again.
+/// Gives each material but "none" its colour of label_colour.hpp, which any kind of colour vision
+/// tells apart.
 void take_okabe_ito(std::span<MaterialView> materials);
 
 /// Where the device's own space lies in the world: world = offset + scale * device.

@@ -1,0 +1,13 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "controller/volume/file/volume_io.hpp"
+
+namespace kerf {
+
+/// Where a file holds labels and nothing else, `image`, its densities, becomes a solid of them:
+/// each label full density. Tells whether. Labels are whole numbers up to 255 of which 0 and at
+/// least two others occur, in blocks with nothing between them, as no scan has them. Load time.
+[[nodiscard]] bool take_label_map(const SourceVolume& source, VolumeImage& image);
+
+}  // namespace kerf
