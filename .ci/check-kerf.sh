@@ -42,7 +42,7 @@ case $name in
   controller)
     trap 'stop=1' TERM
     touch "$LAB/segment"
-    printf 'hand_unit_mm=2\nhand_script=hand.toml\nrate_hz=%s\n' "${RATE_HZ:-500}" \
+    printf 'hand_unit_mm=2\nhand_script=%s/hand.toml\nrate_hz=%s\n' "$LAB" "${RATE_HZ:-500}" \
       >"${option[--emulator-args]}"
     until grep -q '^emulator.*--hand' "$LAB/calls" || ((stop)); do sleep 0.02; done
     for ((i = 0; i < 10 * option[--seconds] && !stop; ++i)); do sleep 0.03; done
@@ -192,6 +192,10 @@ all='out/.kerf-demo out/.kerf-demo/files out/.kerf-demo/lock out/final.nrrd out/
 strange='which no demo wrote or which changed since; name a new or an empty folder'
 
 cd "$lab"  # where a demo without a display keeps its pictures
+expect 'a hand that is not there is an error' kerf_gives 2 demo --seconds 1
+expect 'which says whose it is' says 'phantom.toml: its hand.script, .*/hand.toml, is no file; copy the script there, or give --hand FILE$'
+expect 'and leaves nothing' nothing_survives
+touch hand.toml
 expect 'a demo runs' kerf_gives 0 demo --seconds 1
 expect 'without a display it says where its pictures are' says '^kept in kerf-demo: '
 expect 'and there they are' test -e kerf-demo/frame-0001.png
@@ -202,7 +206,7 @@ mv kerf-demo/frame-0001.png kerf-demo/mine.png
 expect 'a folder of somebody else is not touched' kerf_gives 2 demo --seconds 1
 rm -r kerf-demo
 expect 'a demo in an empty folder' kerf_gives 0 demo --seconds 1
-expect 'the hand is the one that the scene names' called '^emulator.*--hand hand.toml --unit-mm 2'
+expect 'the hand is the one that the scene names' called '^emulator.*--hand [^ ]*/hand.toml --unit-mm 2'
 expect 'the frames are spread over the run' called '^visualizer.*--every-ticks 41 '
 expect 'a demo leaves nothing behind' nothing_survives
 expect 'a run may be shorter than the visualizer takes to start' \
