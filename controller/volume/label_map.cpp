@@ -22,7 +22,7 @@ bool take_label_map(const SourceVolume& source, VolumeImage& image) {
   image.labels.resize(image.density.size());
   for (std::size_t i = 0; i < image.density.size(); ++i) {
     image.labels[i] = static_cast<Label>(source.values[i]);
-    image.density[i] = image.labels[i] == 0 ? 0 : kDensityMax;
+    image.density[i] = static_cast<Density>(image.labels[i] == 0 ? 0 : kDensityMax);
   }
   return true;
 }
