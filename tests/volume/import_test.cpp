@@ -330,7 +330,7 @@ TEST_CASE("each label has its own colour in the preview, in slices and on the su
   }
   CAPTURE(seen[0][0]);
   for (const auto& panels : seen) {
-    for (const std::size_t panel : {0, 1, 3}) CHECK(panels[panel] > 100);
+    for (const std::size_t panel : {0U, 1U, 3U}) CHECK(panels[panel] > 100);
   }
   CHECK(seen[0][2] == 0);  // across x, through the one in the middle
   CHECK(seen[1][2] > 100);
