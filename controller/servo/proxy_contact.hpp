@@ -70,22 +70,13 @@ struct ProxyContact {
 /// No tool gets deeper than this by moving: the solid has changed, and the tool starts anew.
 inline constexpr double kLostDepth = 1;  // units
 
-/// Whether parts behind the head alone met the solid.
-template <class N>
-[[nodiscard]] constexpr bool all_behind(const ConstraintSet<N>& planes) noexcept {
-  bool all = planes.count > 0;
-  for (std::size_t i = 0; i < planes.count; ++i) all = all && planes.plane[i].behind;
-  return all;
-}
-
 /// Sets the contact's normal and moment arm: the sum of what presses, and its moment over the
 /// length of the spring (docs/theory.md 5.3). Friction acts where the loads do.
 ///
 /// The part of the spring beyond the loads and the friction cone is carried by planes that this
 /// tick did not meet (docs/theory.md 4.5). So a tool at rest always has a normal, since forces
-/// balance there. A tool that is still `moving` is not held. Such planes count as the head's, which
-/// cuts nothing but what it covers; not where only the parts behind it met any, since a head within
-/// the reach of a query has a plane of its own.
+/// balance there. A tool that is still `moving` is not held. Such planes count as the head's: it
+/// cuts nothing but what it covers.
 template <class N>
 constexpr void add_loads(const Swept<N>& swept, typename N::Unit friction, bool moving,
                          ProxyContact<N>& contact) noexcept {
@@ -116,14 +107,8 @@ constexpr void add_loads(const Swept<N>& swept, typename N::Unit friction, bool 
   const ContactVec<Real> along_faces = contact.spring - pressed;
   const Real rubbed = norm(along_faces);
   const Real held = multiply<Real>(friction, norm(pressed));
-  if (rubbed > held && !moving) {
-    const auto unmet = part_of<N>(along_faces, share<N>(rubbed - held, rubbed));
-    pressed = pressed + unmet;
-    if (all_behind(swept.planes)) {
-      behind = behind + unmet;
-      load_behind = load_behind + (rubbed - held);
-    }
-  }
+  if (rubbed > held && !moving)
+    pressed = pressed + part_of<N>(along_faces, share<N>(rubbed - held, rubbed));
   // Beside a shaft that presses, less than the tolerance of a place is no press of the head.
   const ContactVec<Real> head = pressed - behind;
   const Real by_head = norm(head);

@@ -2,7 +2,6 @@
 #include "controller/servo/proxy_contact.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 
 #include <doctest/doctest.h>
@@ -110,41 +109,6 @@ TEST_CASE_TEMPLATE("a tool that lags is pressed by what it slides on, not by its
     const auto contact = follow(plan<N>(), state, field, pose_of<N>({40.0 * i, 3.5, 0}));
     CHECK(point_of<N>(contact.spring)[0] < -10);
     CHECK(double(contact.normal.y) == doctest::Approx(1));
-  }
-}
-
-TEST_CASE_TEMPLATE(
-    "a press that no plane explains is the head's where that has a plane, else the shaft's", N,
-    FixedNumbers, DoubleNumbers) {
-  using Real = typename N::Real;
-  using Unit = typename N::Unit;
-  // The one plane that was met bears 3 of a spring of (3, 4, 0).
-  for (const double friction : {0.0, 0.5}) {
-    for (const bool head_is_near : {false, true}) {
-      CAPTURE(friction);
-      CAPTURE(head_is_near);
-      Swept<N> swept;
-      swept.planes.plane[0] = {{Unit(1), Unit(0), Unit(0)}, Real(0), {}, true};
-      swept.planes.plane[1] = {{Unit(0), Unit(1), Unit(0)}, Real(-0.4), {}, false};
-      swept.planes.count = head_is_near ? 2 : 1;
-      swept.slide.load[0] = Real(3);
-      ProxyContact<N> contact;
-      contact.spring = {Real(3), Real(4), Real(0)};
-      add_loads<N>(swept, Unit(friction), false, contact);
-      const double unmet = 4 - 3 * friction, together = std::hypot(3, unmet);
-      CHECK(double(contact.press.x) == doctest::Approx(3 / together).epsilon(1e-4));
-      CHECK(double(contact.press.y) == doctest::Approx(unmet / together).epsilon(1e-4));
-      if (head_is_near) {
-        CHECK(double(contact.normal.y) == doctest::Approx(1).epsilon(1e-4));
-        CHECK(double(contact.head_share) == doctest::Approx(unmet / together).epsilon(1e-4));
-        CHECK(double(contact.behind_share) == doctest::Approx(0.6).epsilon(1e-4));
-      } else {
-        CHECK(contact.normal == decltype(contact.normal){});
-        CHECK(contact.head_share == Unit(0));
-        CHECK(double(contact.behind_share) ==
-              doctest::Approx(std::min(1.0, (3 + unmet) / 5)).epsilon(1e-4));
-      }
-    }
   }
 }
 
