@@ -82,8 +82,7 @@ struct KernelSet {
                       const std::int32_t (&centre)[3], const DensityField&,
                       std::int32_t* density) noexcept;
   /// `close_sums`.
-  void (*sum_close)(const PointTable<FixedNumbers>&, const std::int32_t* density,
-                    CloseSums<FixedNumbers>&) noexcept;
+  void (*sum_close)(const CloseLook<FixedNumbers>&, CloseSums<FixedNumbers>&) noexcept;
 };
 
 /// Gradients beyond the last voxel of a field.

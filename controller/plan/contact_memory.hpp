@@ -101,10 +101,11 @@ class ContactMemory {
 
   PointShell<N> hold(const std::string& name, double unit_mm, PartSamples mm, bool round,
                      std::vector<PlaceMemory<N>>& places) {
-    for (auto* samples : {&mm.samples, &mm.close}) {
-      for (auto& sample : *samples) {
-        for (double& x : sample) x /= unit_mm;
-      }
+    for (auto& at : mm.samples) {
+      for (double& x : at) x /= unit_mm;
+    }
+    for (SurfaceSample& sample : mm.close) {
+      for (double& x : sample.at) x /= unit_mm;
     }
     const auto& held = tools_.emplace_back(name, ToolPoints<N>(mm.samples, round, mm.close)).second;
     for (PlaceMemory<N>& in_volume : places) in_volume.hold(held.point_shell());

@@ -215,8 +215,8 @@ double surface_mm2(const ToolMesh& mesh) {
   return sum;
 }
 
-std::vector<Point> mesh_surface_samples(const ToolMesh& mesh, std::size_t count,
-                                        Relaxation relaxation) {
+std::vector<SurfaceSample> mesh_surface_samples(const ToolMesh& mesh, std::size_t count,
+                                                Relaxation relaxation) {
   const double distance_mm = std::sqrt(surface_mm2(mesh) / static_cast<double>(count));
   std::vector<Site> sites;
   for (const Point& p : rim_samples(mesh, distance_mm)) sites.push_back({p, {}, true});
@@ -235,8 +235,8 @@ std::vector<Point> mesh_surface_samples(const ToolMesh& mesh, std::size_t count,
     begin_sites_by_side({beyond, dots.end()}, count - sites.size(), sites);
   }
   for (int i = 0; i < relaxation.rounds; ++i) relax(dots, distance_mm, sites);
-  std::vector<Point> samples;
-  for (const Site& site : sites) samples.push_back(site.at);
+  std::vector<SurfaceSample> samples;
+  for (const Site& site : sites) samples.push_back({site.at, site.normal});
   return samples;
 }
 

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <vector>
 
+#include "controller/tool/surface_sample.hpp"
 #include "controller/tool/tool_mesh.hpp"
 
 namespace kerf {
@@ -26,8 +27,8 @@ inline constexpr Relaxation kNearlyEven{12, 8};  ///< takes a sixth of the time
 /// to each. Faces that look away from each other do not see each other, so that a thin blade has
 /// samples on both of its sides. The same mesh gives the same samples. Load time: 0.1 s for 1000
 /// that are kEven.
-[[nodiscard]] std::vector<ToolMesh::Point> mesh_surface_samples(const ToolMesh& mesh,
-                                                                std::size_t count,
-                                                                Relaxation relaxation = kEven);
+[[nodiscard]] std::vector<SurfaceSample> mesh_surface_samples(const ToolMesh& mesh,
+                                                              std::size_t count,
+                                                              Relaxation relaxation = kEven);
 
 }  // namespace kerf

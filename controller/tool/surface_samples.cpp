@@ -23,7 +23,7 @@ constexpr double kRimAngle = 0.2;    // rad
 constexpr double kBeforeRim = 0.05;  // of the distance of rings; tuned, see the header
 constexpr double kGoldenAngle = 2.399963229728653;  // pi (3 - sqrt(5))
 
-using Sample = std::array<double, 3>;
+using Point = std::array<double, 3>;
 using Profile = std::vector<std::array<double, 2>>;  // {y, radius}
 
 double length_of(const std::array<double, 2>& a, const std::array<double, 2>& b) {
@@ -39,11 +39,11 @@ double area_of(const Profile& profile) {
   return area;
 }
 
-std::vector<Sample> fibonacci_ball(double radius_mm, int count) {
+std::vector<Point> fibonacci_ball(double radius_mm, int count) {
   // Layers of equal area begin at 0.5; a little nearer to the poles these are no emptier than the
   // rest (the worst normal on a ball of 6 is 0.5 degrees off instead of 0.7).
   constexpr double kFirst = 0.36;
-  std::vector<Sample> samples;
+  std::vector<Point> samples;
   for (int i = 0; i < count; ++i) {
     const double y = 2 * (i + kFirst) / (count - 1 + 2 * kFirst) - 1, across = std::sqrt(1 - y * y);
     samples.push_back({radius_mm * across * std::cos(i * kGoldenAngle), radius_mm * y,
@@ -83,22 +83,24 @@ class RingSampler {
         std::max(1, static_cast<int>(std::lround(rest_mm / pitch_mm_ + 1 - begin - end)));
     const double distance_mm = rest_mm / (rings - 1 + begin + end);
     for (int ring = 0; ring < rings; ++ring) {
-      add_ring(part, point_mm + (ring + begin) * distance_mm, distance_mm);
+      const bool on_rim = ring == rings - 1 && end == kBeforeRim;
+      add_ring(part, point_mm + (ring + begin) * distance_mm, distance_mm, on_rim);
     }
   }
 
-  [[nodiscard]] std::vector<Sample> samples() && { return std::move(samples_); }
+  [[nodiscard]] std::vector<SurfaceSample> samples() && { return std::move(samples_); }
 
  private:
   /// The tip of a part that begins with a point, and how much of the part is its share.
   double add_point(std::span<const std::array<double, 2>> part) {
     const double slope = (part[1][1] - part[0][1]) / length_of(part[0], part[1]);
     if (part[0][1] != 0 || slope > 0.95) return 0;
-    samples_.push_back({0, part[0][0], 0});
+    samples_.push_back({{0, part[0][0], 0}, {}});
     return pitch_mm_ / std::sqrt(std::numbers::pi * slope);  // a cone of the area pitch^2
   }
 
-  void add_ring(std::span<const std::array<double, 2>> part, double arc_mm, double distance_mm) {
+  void add_ring(std::span<const std::array<double, 2>> part, double arc_mm, double distance_mm,
+                bool on_rim) {
     std::size_t k = 1;
     for (; k + 1 < part.size() && arc_mm > length_of(part[k - 1], part[k]); ++k) {
       arc_mm -= length_of(part[k - 1], part[k]);
@@ -106,24 +108,29 @@ class RingSampler {
     const double share = arc_mm / length_of(part[k - 1], part[k]);
     const double y_mm = std::lerp(part[k - 1][0], part[k][0], share);
     const double radius_mm = std::lerp(part[k - 1][1], part[k][1], share);
+    const double smooth = on_rim ? 0 : 1 / length_of(part[k - 1], part[k]);
+    const double outward = smooth * (part[k][0] - part[k - 1][0]);
+    const double upward = smooth * (part[k - 1][1] - part[k][1]);
     const double area_mm2 = 2 * std::numbers::pi * radius_mm * distance_mm;
     const int count =
         std::max(1, static_cast<int>(std::lround(area_mm2 / (pitch_mm_ * pitch_mm_))));
     turn_ += kGoldenAngle;
     for (int i = 0; i < count; ++i) {
       const double angle = turn_ + 2 * std::numbers::pi * i / count;
-      samples_.push_back({radius_mm * std::cos(angle), y_mm, radius_mm * std::sin(angle)});
+      const double x = std::cos(angle), z = std::sin(angle);
+      samples_.push_back(
+          {{radius_mm * x, y_mm, radius_mm * z}, {outward * x, upward, outward * z}});
     }
   }
 
   double pitch_mm_;
   double turn_ = 0;
-  std::vector<Sample> samples_;
+  std::vector<SurfaceSample> samples_;
 };
 
 /// Of any shape but a ball.
-std::vector<Sample> samples_apart(const SceneTool& tool, const Profile& profile, double pitch_mm,
-                                  Relaxation relaxation = kEven) {
+std::vector<SurfaceSample> samples_apart(const SceneTool& tool, const Profile& profile,
+                                         double pitch_mm, Relaxation relaxation = kEven) {
   if (profile.empty()) {
     const double count = std::ceil(surface_mm2(tool.mesh) / (pitch_mm * pitch_mm));
     return mesh_surface_samples(tool.mesh, static_cast<std::size_t>(count), relaxation);
@@ -131,6 +138,12 @@ std::vector<Sample> samples_apart(const SceneTool& tool, const Profile& profile,
   RingSampler rings(pitch_mm);
   for (const auto& part : smooth_parts(profile)) rings.add(part);
   return std::move(rings).samples();
+}
+
+std::vector<Point> places_of(const std::vector<SurfaceSample>& samples) {
+  std::vector<Point> places;
+  for (const SurfaceSample& sample : samples) places.push_back(sample.at);
+  return places;
 }
 
 Profile profile_of(const SceneTool& tool) {
@@ -149,7 +162,7 @@ void check_count(const SceneTool& tool, double count, double unit_mm) {
 
 }  // namespace
 
-std::vector<Sample> surface_samples(const SceneTool& tool, double unit_mm) {
+std::vector<Point> surface_samples(const SceneTool& tool, double unit_mm) {
   const Profile profile = profile_of(tool);
   const double area_mm2 = profile.empty() ? surface_mm2(tool.mesh) : area_of(profile);
   const double finest_mm = std::sqrt(area_mm2 / kMinSurfaceSamples);
@@ -161,7 +174,7 @@ std::vector<Sample> surface_samples(const SceneTool& tool, double unit_mm) {
   if (tool.round) return fibonacci_ball(tool.radius_mm, static_cast<int>(count));
   auto samples = samples_apart(tool, profile, pitch_mm);
   check_count(tool, static_cast<double>(samples.size()), unit_mm);  // long rims of little area
-  return samples;
+  return places_of(samples);
 }
 
 PartSamples part_samples(const SceneTool& tool, const ToolPart& part, double unit_mm) {
@@ -191,11 +204,11 @@ PartSamples part_samples(const SceneTool& tool, const ToolPart& part, double uni
          << " in time; make it smaller, or use coarser voxels than " << unit_mm << " mm";
     refuse_part(line.str());
   }
-  return {samples_apart(tool, profile, pitch * unit_mm),
+  return {places_of(samples_apart(tool, profile, pitch * unit_mm)),
           samples_apart(tool, profile, kClosePitch * unit_mm)};
 }
 
-std::vector<Sample> close_samples(const SceneTool& tool, double unit_mm) {
+std::vector<SurfaceSample> close_samples(const SceneTool& tool, double unit_mm) {
   if (tool.round) return {};
   return samples_apart(tool, profile_of(tool), kClosePitch * unit_mm, kNearlyEven);
 }

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "controller/tool/scene_tool.hpp"
+#include "controller/tool/surface_sample.hpp"
 #include "controller/tool/tool_shaft.hpp"
 
 namespace kerf {
@@ -56,13 +57,13 @@ inline constexpr double kMostReach = 1024;
 
 /// Samples kClosePitch units apart of a tool that is no ball, in the same way, for a closer look at
 /// a contact (contact_closeup.hpp). None of a ball. Load time.
-[[nodiscard]] std::vector<std::array<double, 3>> close_samples(const SceneTool& tool,
-                                                               double unit_mm);
+[[nodiscard]] std::vector<SurfaceSample> close_samples(const SceneTool& tool, double unit_mm);
 
 /// Both for a part behind the head of `tool` (tool_shaft.hpp), in mm from the part's own middle.
 /// Throws SceneError for a part that is too large or too long for its unit. Load time.
 struct PartSamples {
-  std::vector<std::array<double, 3>> samples, close;
+  std::vector<std::array<double, 3>> samples;
+  std::vector<SurfaceSample> close;
 };
 [[nodiscard]] PartSamples part_samples(const SceneTool& tool, const ToolPart& part, double unit_mm);
 

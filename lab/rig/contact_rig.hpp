@@ -26,7 +26,8 @@ inline constexpr Density kIso = 32768;
 
 /// The samples of a tool in units: of a mesh they take some 0.4 seconds.
 struct SampledTool {
-  std::vector<Point> samples, close;
+  std::vector<Point> samples;
+  std::vector<SurfaceSample> close;
   bool round = false;
 
   SampledTool(const SceneTool& tool)  // NOLINT(google-explicit-constructor): a tool is one

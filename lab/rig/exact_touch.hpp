@@ -18,7 +18,7 @@ class ExactTouch {
  public:
   ExactTouch(const SampledTool& tool, const Axes& axes, const Body& body)
       : field_{body.grid, body.density.data(), density_scale(1 << 15), {}} {
-    for (const Point& sample : tool.close) samples_.push_back(axes.to_world(sample));
+    for (const SurfaceSample& sample : tool.close) samples_.push_back(axes.to_world(sample.at));
   }
 
   /// How far beyond `centre` along `normal` the tool's centre is at rest; within kRange.

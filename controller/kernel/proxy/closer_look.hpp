@@ -47,62 +47,55 @@ class CloserLook {
 
  private:
   /// Corrects the plane of a tool that is no ball: by the close samples around the peak, then by a
-  /// patch of the volume around the place that they find.
+  /// patch of the volume around the place that they find. The normal is that of the smoother one of
+  /// the two surfaces.
   void look_again(ConstraintPlane<N>& plane) const noexcept {
     if (points_.close.first == nullptr) return;
     using Unit = typename N::Unit;
     using Ratio = typename N::Ratio;
     PointNumber<N> peak[3] = {};
     peak_offset(sums_, fall_of(means_, false), peak);
-    Closeup<N> seen = reader_.look_closely_at(volume_, at_, peak);
-    Ratio height = seen.height;
-    // If the highest sample of the point shell was not among what was seen, the tool touches twice.
-    const auto share = falling_share<N>(Unit(means_.top - seen.top), 0.06, 0.02);
-    if (share < Unit(1)) {
-      const auto top = static_cast<std::size_t>(sums_.top_sample);
-      const auto& offset = points_.table.offset;
-      const Closeup<N> other =
-          reader_.look_closely_at(volume_, at_, {offset[0][top], offset[1][top], offset[2][top]});
-      height = other.height + multiply<Ratio>(share, height - other.height);
-      if (share <= Unit(0)) seen = other;
-    }
+    const Closeup<N> seen = reader_.look_closely_at(volume_, at_, peak);
     const auto offset = turned_offset<N>(seen.offset, reader_.rows());
     const ContactVec<Real> arm{multiply<Real>(offset.x, points_.reach),
                                multiply<Real>(offset.y, points_.reach),
                                multiply<Real>(offset.z, points_.reach)};
     const VoxelVec<Real> middle = at_ + volume_.frame.voxel_from_contact * arm;
     // The first patch lies askew, as its normal is that of the middle.
-    auto gradient = patch_gradient(middle, plane.normal);
-    gradient = patch_gradient(middle, direction<N>(-gradient));
-    const auto normal = direction<N>(-gradient);
+    Patch<N> patch = patch_at(middle, plane.normal);
+    patch = patch_at(middle, direction<N>(-patch.gradient));
+    const auto& gradient = patch.gradient;
+    const auto facing = direction<N>(-gradient);
     // Where the tool's own gradient is far less than the patch's, it touches faces that look
     // elsewhere.
     const Ratio steep = norm(gradient);
     if (steep < Ratio(0.01)) return;
-    const Ratio along = -(multiply<Ratio>(means_.gradient.x, normal.x) +
-                          multiply<Ratio>(means_.gradient.y, normal.y) +
-                          multiply<Ratio>(means_.gradient.z, normal.z));
+    const Ratio along = -(multiply<Ratio>(means_.gradient.x, facing.x) +
+                          multiply<Ratio>(means_.gradient.y, facing.y) +
+                          multiply<Ratio>(means_.gradient.z, facing.z));
     const Unit alike =
         Unit(1) -
         falling_share<N>(Unit(std::clamp(along / steep, Ratio(0), Ratio(1))), kAlike, kUnlike);
     const Ratio own = peak_height(means_, false);
-    plane.depth = depth_of<N>(own + multiply<Ratio>(alike, std::max(height, means_.top) - own),
+    plane.depth = depth_of<N>(own + multiply<Ratio>(alike, std::max(seen.height, means_.top) - own),
                               slope_along(means_, plane.normal, false));
-    const Unit counts = alike * share * narrowness<N>(sums_, means_.top);
+    const Unit counts = alike * narrowness<N>(sums_, means_.top);
     plane.arm = plane.arm + part_of<N>(arm - plane.arm, counts);
-    plane.normal = between<N>(plane.normal, normal, counts);
+    const auto own_normal = direction<N>(-turned_offset<N>(seen.normal, reader_.rows()));
+    const auto smoother = between<N>(facing, own_normal, smoothness<N>(seen.spread, patch.spread));
+    plane.normal = between<N>(plane.normal, smoother, counts);
   }
 
-  /// The mean gradient over a patch that is flattened along `normal`.
-  [[nodiscard]] ContactVec<typename N::Ratio> patch_gradient(
-      VoxelVec<Real> middle, ContactVec<typename N::Unit> normal) const noexcept {
+  /// What a patch tells that is flattened along `normal`.
+  [[nodiscard]] Patch<N> patch_at(VoxelVec<Real> middle,
+                                  ContactVec<typename N::Unit> normal) const noexcept {
     constexpr PointShell<N> kPatch{kPatchArrays<N>.table(), {}, Real(kPatchRadius), 15};
     SpiralPlaces<N, kPatchSamples> memory;
     const PointPlaces<N> places = memory.places();
     reader_.place(kPatch, flattened<N>(normal), volume_.frame, places);
     const PointSums<N> patch = reader_.sums_at(volume_.field, kPatch.table, places, middle);
     if (patch.weight <= typename N::Sum(0)) return {};
-    return mean_gradient<N>(patch, volume_.field.scale, volume_.frame);
+    return patch_of(patch, volume_.field.scale, volume_.frame);
   }
 
   /// A ball's depth by its caps around the middle of the contact, as far as the contact is sharp.

@@ -17,34 +17,49 @@ namespace kerf {
 /// high. At an edge the point shell's own samples find the tool up to 0.4 units higher than it is.
 inline constexpr double kCloseDepth = 0.4;  ///< units
 
-/// The close samples around a contact: offsets in the tool's axes and in voxels, and densities.
+/// The close samples around a contact: offsets and normals in the tool's axes, offsets in voxels,
+/// and densities.
 template <class N>
 struct CloseSamples {
   using Array = std::array<PointNumber<N>, kMostClose>;
   static_assert(kMostClose % kPointGroup == 0);
 
-  std::array<Array, 3> offset, offset_vox;
-  Array density;
+  std::array<Array, 3> offset, normal, offset_vox;
+  Array density, window;
+  PointNumber<N> middle[3] = {}, radius{};
   std::int32_t count = 0;
 
-  /// Takes the samples of the cells around the offset `middle`; of too many, kMostClose spread
-  /// evenly.
-  constexpr void take(const CloseTable<N>& table, const PointNumber<N> (&middle)[3]) noexcept {
+  /// Takes the samples of the cells within kCloseRadius of the offset `around`; of too many,
+  /// kMostClose spread evenly.
+  constexpr void take(const CloseTable<N>& table, const PointNumber<N> (&around)[3]) noexcept {
     constexpr auto kReach = static_cast<std::int32_t>(kCloseRadius / kCloseCell);
+    constexpr std::int32_t kFine = 16;  // steps of a cell
     using Number = PointNumber<N>;
-    std::int32_t from[3] = {}, to[3] = {};  // cells
+    radius = static_cast<Number>(kReach) * table.edge;
+    std::int32_t at[3] = {}, from[3] = {}, to[3] = {};  // steps; cells
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      const Number from_low = std::max(Number(0), middle[axis] - table.low[axis]);
-      const std::int32_t cell =
-          std::min(static_cast<std::int32_t>(from_low / table.edge), table.cells[axis]);
-      from[axis] = std::max(0, cell - kReach);
-      to[axis] = std::min(cell + kReach + 1, table.cells[axis]);
+      middle[axis] = around[axis];
+      const Number from_low = std::max(Number(0), around[axis] - table.low[axis]);
+      at[axis] = static_cast<std::int32_t>(
+          std::min(from_low * kFine / table.edge, Number(kFine * (table.cells[axis] + kReach))));
+      from[axis] = std::max(0, at[axis] / kFine - kReach);
+      to[axis] = std::min(at[axis] / kFine + kReach + 1, table.cells[axis]);
     }
+    const auto square_to = [&](std::size_t axis, std::int32_t cell) {  // of the distance to a cell
+      const std::int32_t low = kFine * cell;
+      const std::int32_t gap = std::max({0, low - at[axis] - 1, at[axis] - low - kFine});
+      return gap * gap;
+    };
     const auto each_row = [&](auto&& visit) {  // of cells: its first sample, and the end
+      constexpr std::int32_t kSquare = kFine * kReach * kFine * kReach;
       for (std::int32_t z = from[2]; z < to[2]; ++z) {
         for (std::int32_t y = from[1]; y < to[1]; ++y) {
-          const std::int32_t row = (z * table.cells[1] + y) * table.cells[0];
-          visit(table.first[row + from[0]], table.first[row + to[0]]);
+          const std::int32_t* const first = table.first + (z * table.cells[1] + y) * table.cells[0];
+          std::int32_t x = from[0], end = to[0];
+          const std::int32_t rest = kSquare - square_to(2, z) - square_to(1, y);
+          while (x < end && first[x] != first[end] && square_to(0, x) >= rest) ++x;
+          while (x < end && first[x] != first[end] && square_to(0, end - 1) >= rest) --end;
+          if (x < end) visit(first[x], first[end]);
         }
       }
     };
@@ -57,34 +72,45 @@ struct CloseSamples {
       if (all <= kMostClose) {
         for (std::size_t axis = 0; axis < 3; ++axis) {
           std::copy_n(table.offset[axis] + first, more, offset[axis].data() + count);
+          std::copy_n(table.normal[axis] + first, more, normal[axis].data() + count);
         }
         count += more;
         return;
       }
       for (; count < kMostClose; ++count) {
-        const std::int32_t at = count * all / kMostClose - seen;
-        if (at >= more) break;
+        const std::int32_t next = count * all / kMostClose - seen;
+        if (next >= more) break;
         const auto slot = static_cast<std::size_t>(count);
-        for (std::size_t axis = 0; axis < 3; ++axis)
-          offset[axis][slot] = table.offset[axis][first + at];
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+          offset[axis][slot] = table.offset[axis][first + next];
+          normal[axis][slot] = table.normal[axis][first + next];
+        }
       }
       seen += more;
     });
   }
-  /// The samples in whole groups. What fills up the last group is no sample: call `fade` once all
-  /// densities are read.
+  /// The samples in whole groups. What fills up the last group is no sample: `fade`, once all
+  /// densities are read, lets it weigh nothing.
   [[nodiscard]] constexpr PointTable<N> table() noexcept {
     PointTable<N> table;
     table.count = (count + kPointGroup - 1) / kPointGroup * kPointGroup;
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      std::fill(offset[axis].begin() + count, offset[axis].begin() + table.count,
-                PointNumber<N>(0));
+      for (Array* const part : {&offset[axis], &normal[axis]})
+        std::fill(part->begin() + count, part->begin() + table.count, PointNumber<N>(0));
       table.offset[axis] = offset[axis].data();
     }
     return table;
   }
-  constexpr void fade(const PointTable<N>& table) noexcept {
+  [[nodiscard]] constexpr CloseLook<N> fade(const PointTable<N>& table) noexcept {
     std::fill(density.begin() + count, density.begin() + table.count, PointNumber<N>(0));
+    CloseLook<N> look{
+        .count = table.count, .radius = radius, .density = density.data(), .window = window.data()};
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      look.offset[axis] = offset[axis].data();
+      look.normal[axis] = normal[axis].data();
+      look.middle[axis] = middle[axis];
+    }
+    return look;
   }
   [[nodiscard]] constexpr PointPlaces<N> places() noexcept {
     return {{offset_vox[0].data(), offset_vox[1].data(), offset_vox[2].data()}, {}};
@@ -96,7 +122,8 @@ template <class N>
 struct Closeup {
   typename N::Ratio height{};
   typename N::Ratio offset[3]{};  ///< from the tool's centre to the peak, over the reach; its axes
-  typename N::Ratio top{};        ///< density of the highest sample
+  typename N::Ratio normal[3]{};  ///< of the tool at the peak, outward; its axes, length near 1
+  typename N::Ratio spread{};     ///< of the tool's normals there: 1 - (mean normal)^2
 };
 
 /// Roughly where the peak is, as an offset in the tool's axes, from the point shell's sums. Beside
@@ -122,8 +149,8 @@ constexpr void peak_offset(const PointSums<N>& sums, typename N::Ratio e,
 }
 
 /// The peak of density over a tool's surface, from the sums over its close samples: two means, with
-/// powers 32 and 64, tell e and the summit (docs/theory.md 3.5); and where it is, as in
-/// peak_offset.
+/// powers 32 and 64, tell e and the summit (docs/theory.md 3.5); where it is, as in peak_offset;
+/// and likewise, with powers 8 and 16, the tool's normal there.
 template <class N>
 [[nodiscard]] constexpr Closeup<N> peak_of(const CloseSums<N>& sums) noexcept {
   using Ratio = typename N::Ratio;
@@ -140,16 +167,26 @@ template <class N>
   constexpr auto kUnsampled = Ratio(1.02);  // no summit is far above the highest sample
   const Ratio summit = std::min(above + above * (e / Ratio(kHighOne)), kUnsampled);
   if constexpr (N::kIsFixed) {
-    found.top = Ratio::from_raw(sums.top << 9);
+    found.height = Ratio::from_raw(sums.top << 9) * summit;
   } else {
-    found.top = sums.top;
+    found.height = sums.top * summit;
   }
-  found.height = found.top * summit;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const Ratio near = mean(sums.low, sums.low.offset[axis]),
                 peak = mean(sums.high, sums.high.offset[axis]);
     found.offset[axis] = peak + (peak - near) * ((Ratio(kLowOne) + e) / Ratio(kHighOne - kLowOne));
   }
+  constexpr double kWideOne = CloseSums<N>::kWidePower + 1,
+                   kMiddleOne = CloseSums<N>::kMiddlePower + 1;
+  Ratio mean_square{};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const Ratio wide = mean_of<N>(sums.wide.normal[axis], sums.wide.weight, 9),
+                middle = mean_of<N>(sums.middle.normal[axis], sums.middle.weight, 9);
+    mean_square = mean_square + wide * wide;
+    found.normal[axis] =
+        middle + (middle - wide) * ((Ratio(kWideOne) + e) / Ratio(kMiddleOne - kWideOne));
+  }
+  found.spread = std::max(Ratio(1) - mean_square, Ratio(0));
   return found;
 }
 

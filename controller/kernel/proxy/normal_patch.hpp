@@ -45,6 +45,45 @@ inline constexpr SpiralArrays<N, kPatchSamples> kPatchArrays(kPatchRadius + 0.1,
       static_cast<double>(square_root(Q30(1 - y * y))), y};
 });
 
+/// What a patch tells of the solid.
+template <class N>
+struct Patch {
+  ContactVec<typename N::Ratio> gradient{};  ///< the mean; 0 where nothing is felt
+  typename N::Ratio spread{};                ///< of its normals, see below; 0 to 1
+};
+
+/// From the sums over a patch. The spread of normals, 1 - (mean normal)^2, comes from that of
+/// heights, which is free of the voxels' noise in gradients: over a disc of radius a on a ball of
+/// curvature k heights have the variance k^2 a^4 / 48 and normals k^2 a^2 / 2, so the spread is
+/// 24 / a^2 variances. The height is r over the slope, and at most the width of a face's ramp, 2
+/// units (docs/theory.md 3.5).
+template <class N>
+[[nodiscard]] constexpr Patch<N> patch_of(const PointSums<N>& sums, const DensityScale& scale,
+                                          const ContactFrame<N>& frame) noexcept {
+  using Ratio = typename N::Ratio;
+  Patch<N> patch{mean_gradient<N>(sums, scale, frame)};
+  const Ratio density = mean_of<N>(sums.density, sums.weight, 9),
+              square = mean_of<N>(sums.square, sums.weight, 8);
+  const Ratio varied = std::max(square / density / density - Ratio(1), Ratio(0));
+  const Ratio height = density / std::max(norm(patch.gradient), density / Ratio(2));
+  constexpr auto kSpread = static_cast<Ratio>(24 / (kPatchRadius * kPatchRadius));
+  patch.spread = std::min(kSpread * (varied * (height * height)), Ratio(1));
+  return patch;
+}
+
+/// How far the tool's own normal is told, not the patch's: where two surfaces touch, each has the
+/// normal of the other, and the smoother one tells it best. Place errors turn a normal by about
+/// the root of its surface's spread; squares of the spreads let a rim, whose own normal is none,
+/// tell nothing. Below kFlat, 1.8 degrees, both are flat, and the patch tells it.
+inline constexpr double kFlat = 0.001;
+template <class N>
+[[nodiscard]] constexpr typename N::Unit smoothness(typename N::Ratio tool,
+                                                    typename N::Ratio solid) noexcept {
+  using Ratio = typename N::Ratio;
+  const Ratio rough = solid * solid;
+  return typename N::Unit(rough / (rough + tool * tool + static_cast<Ratio>(kFlat * kFlat)));
+}
+
 /// 1 - n n^T: takes away what lies along a unit vector.
 template <class N>
 [[nodiscard]] constexpr TurnRows<N> flattened(ContactVec<typename N::Unit> n) noexcept {

@@ -229,6 +229,13 @@ class ProxySweep {
     return trial;
   }
 
+  /// How far a turn to `next` may push the tool: as far as it moves the tool's own samples, which
+  /// is what a wall can ask. A wedge of two walls asks for more: it would lift the tool out.
+  [[nodiscard]] constexpr Real longest_push(const ToolTurn<N>& next) const noexcept {
+    const Unit of_step = std::min(half_sine_between(next, pose_.turn) / turn_step_, Unit(1));
+    return multiply<Real>(Real(SweepRules::kStep), of_step) + Real(SweepRules::kTolerance);
+  }
+
   /// Turns towards `goal` while places are found that allow it, and says what the tool feels then.
   constexpr Contacts<N> turn_to(const ToolTurn<N>& goal) noexcept {
     if (turn_step_ <= Unit(0)) {
@@ -244,7 +251,7 @@ class ProxySweep {
       const ToolTurn<N> next = turned_towards(pose_.turn, goal, step);
       field_.turn(next);
       const Trial trial = attempt(Trying::turn, pose_.centre, {}, {});
-      if (trial.allowed) {
+      if (trial.allowed && norm(trial.centre - pose_.centre) <= longest_push(next)) {
         pose_ = {trial.centre, next};
         here_ = trial.felt;
         known = true;

@@ -110,13 +110,11 @@ class SampleReader {
     if constexpr (N::kIsFixed) {
       kernels_.place_points(table, step, places);
       kernels_.read_points(places, table.count, centre, volume.field, samples.density.data());
-      samples.fade(table);
-      kernels_.sum_close(table, samples.density.data(), sums);
+      kernels_.sum_close(samples.fade(table), sums);
     } else {
       place_points(table, step, places);
       read_points<N>(places, table.count, centre, volume.field, samples.density.data());
-      samples.fade(table);
-      sums = close_sums<N>(table, samples.density.data());
+      sums = close_sums<N>(samples.fade(table));
     }
     left_ -= QueryWork::kLookSamples + QueryWork::kCloseSamples * table.count;
     return peak_of(sums);

@@ -81,6 +81,14 @@ template <class N>
   return {xz / z, yz / z, z, wz / z};
 }
 
+/// Sine of half the angle between two orientations; 0 to 1.
+template <class N>
+[[nodiscard]] constexpr typename N::Unit half_sine_between(const ToolTurn<N>& a,
+                                                           const ToolTurn<N>& b) noexcept {
+  const ToolTurn<N> rest = compose(a, inverse(b));
+  return norm(ContactVec<typename N::Unit>{rest.x, rest.y, rest.z});
+}
+
 /// From `now` along the shorter arc towards `goal`, by at most twice the angle whose sine is
 /// `half_sine` (0 to 1/2). Arrives exactly.
 template <class N>

@@ -29,9 +29,9 @@ void read_point_samples(const PointPlaces<FixedNumbers>& places, std::int32_t co
   read_points<FixedNumbers>(places, count, centre, field, density);
 }
 
-void sum_close_samples(const PointTable<FixedNumbers>& table, const std::int32_t* density,
+void sum_close_samples(const CloseLook<FixedNumbers>& look,
                        CloseSums<FixedNumbers>& sums) noexcept {
-  sums = close_sums<FixedNumbers>(table, density);
+  sums = close_sums<FixedNumbers>(look);
 }
 
 /// `contact_sum` of a field of three 16-bit parts a voxel.

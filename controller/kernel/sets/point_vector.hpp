@@ -359,30 +359,72 @@ struct PowerVectors {
   }
 };
 
-void sum_close_samples(const PointTable<FixedNumbers>& table, const std::int32_t* density,
+/// Of 64-bit entries.
+struct NormalVectors {
+  V weight = Simd::zero();
+  V normal[3] = {Simd::zero(), Simd::zero(), Simd::zero()};
+
+  [[gnu::always_inline]] void add(V power, const V (&at)[3]) noexcept {
+    const PointWeights weights(power);
+    weights.count(weight);
+    for (std::size_t axis = 0; axis < 3; ++axis) weights.add(normal[axis], at[axis]);
+  }
+  [[nodiscard]] NormalSums<FixedNumbers> sums() const noexcept {
+    return {Simd::sum64(weight),
+            {Simd::sum64(normal[0]), Simd::sum64(normal[1]), Simd::sum64(normal[2])}};
+  }
+};
+
+void sum_close_samples(const CloseLook<FixedNumbers>& look,
                        CloseSums<FixedNumbers>& sums) noexcept {
   sums = {};
   V top = Simd::zero();
-  for (std::int32_t i = 0; i < table.count; i += kPointLanes) {
-    top = Simd::max32(top, Simd::load(density + i));
+  const auto product = [](V a, V b) {
+    return Simd::srl32<15>(Simd::add32(Simd::multiply32(a, b), Simd::set32(1 << 14)));
+  };
+  const auto over = Simd::set32(over_radius(look)), least = Simd::set32(-look.radius),
+             most = Simd::set32(look.radius), one = Simd::set32(1 << 15);
+  for (std::int32_t i = 0; i < look.count; i += kPointLanes) {
+    V rest = one;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const V from = Simd::sub32(Simd::load(look.offset[axis] + i), Simd::set32(look.middle[axis]));
+      const V along = Simd::min32(Simd::max32(from, least), most);
+      const V share = Simd::sra32<15>(Simd::multiply32(along, over));
+      rest = Simd::sub32(rest, product(share, share));
+    }
+    rest = Simd::max32(rest, Simd::zero());
+    const V window = product(rest, rest);
+    Simd::store(look.window + i, window);
+    // A sample that does not count has density 0 here.
+    const V counts = Simd::min32(Simd::multiply32(window, one), Simd::load(look.density + i));
+    top = Simd::max32(top, counts);
   }
   sums.top = highest32(top);
   if (sums.top < kFaintest<FixedNumbers>) return;
   const auto over_top =
       Simd::set32(static_cast<std::int32_t>((1U << 31) / static_cast<std::uint32_t>(sums.top)));
-  const auto square = [](V t) {
-    return Simd::srl32<15>(Simd::add32(Simd::multiply32(t, t), Simd::set32(1 << 14)));
+  const auto square = [product](V t) { return product(t, t); };
+  const auto load = [](const std::int32_t* const(&of)[3], std::int32_t i, V(&to)[3]) {
+    for (std::size_t axis = 0; axis < 3; ++axis) to[axis] = Simd::load(of[axis] + i);
   };
+  NormalVectors wide, middle;
   PowerVectors low, high;
-  for (std::int32_t i = 0; i < table.count; i += kPointLanes) {
-    const V t = Simd::srl32<16>(Simd::multiply32(Simd::load(density + i), over_top));
-    V power = t;
-    for (int p = 1; p < CloseSums<FixedNumbers>::kLowPower; p *= 2) power = square(power);
-    const V offset[3] = {Simd::load(table.offset[0] + i), Simd::load(table.offset[1] + i),
-                         Simd::load(table.offset[2] + i)};
-    low.add(power, t, offset);
-    high.add(square(power), t, offset);
+  for (std::int32_t i = 0; i < look.count; i += kPointLanes) {
+    const V t = Simd::srl32<16>(Simd::multiply32(Simd::load(look.density + i), over_top));
+    const V window = Simd::load(look.window + i);
+    V power = t, normal[3], offset[3];
+    load(look.normal, i, normal);
+    load(look.offset, i, offset);
+    for (int p = 1; p < CloseSums<FixedNumbers>::kWidePower; p *= 2) power = square(power);
+    wide.add(product(power, window), normal);
+    power = square(power);
+    middle.add(product(power, window), normal);
+    power = square(power);
+    low.add(product(power, window), t, offset);
+    high.add(product(square(power), window), t, offset);
   }
+  sums.wide = wide.sums();
+  sums.middle = middle.sums();
   sums.low = low.sums();
   sums.high = high.sums();
 }

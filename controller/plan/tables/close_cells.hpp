@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "controller/kernel/point_shell/point_table.hpp"
+#include "controller/tool/surface_sample.hpp"
 
 namespace kerf {
 
@@ -29,13 +30,13 @@ class CloseCells {
  public:
   /// `samples_units`: from the tool's centre, none farther than `reach`; contact units. Of a cell
   /// with more than kMostInCell, so many stay, evenly chosen. Without samples there is no table.
-  CloseCells(std::span<const std::array<double, 3>> samples_units, double reach);
+  CloseCells(std::span<const SurfaceSample> samples_units, double reach);
 
   [[nodiscard]] CloseTable<N> table() const noexcept;
   [[nodiscard]] std::size_t bytes() const noexcept;
 
  private:
-  std::array<std::vector<PointNumber<N>>, 3> offset_;
+  std::array<std::vector<PointNumber<N>>, 3> offset_, normal_;
   std::vector<std::int32_t> first_;
   std::array<std::int32_t, 3> cells_{};
   std::array<PointNumber<N>, 3> low_{};

@@ -48,11 +48,10 @@ double distance(const Point& a, const Point& b) {
   return std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
 }
 
-double reach_of(std::span<const Point> samples, std::span<const Point> close) {
+double reach_of(std::span<const Point> samples, std::span<const SurfaceSample> close) {
   double reach = 0;
-  for (const auto& points : {samples, close}) {
-    for (const Point& p : points) reach = std::max(reach, distance(p, {}));
-  }
+  for (const Point& p : samples) reach = std::max(reach, distance(p, {}));
+  for (const SurfaceSample& sample : close) reach = std::max(reach, distance(sample.at, {}));
   return reach;
 }
 
@@ -60,7 +59,7 @@ double reach_of(std::span<const Point> samples, std::span<const Point> close) {
 
 template <class N>
 ToolPoints<N>::ToolPoints(std::span<const Point> samples_units, bool round,
-                          std::span<const Point> close_units)
+                          std::span<const SurfaceSample> close_units)
     : count_(samples_units.size()),
       reach_(reach_of(samples_units, close_units)),
       round_(round),

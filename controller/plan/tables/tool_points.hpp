@@ -21,7 +21,7 @@ class ToolPoints {
   /// lie together. `round`: they are those of a ball. `close_units`: the close samples of another
   /// shape; without them there is no closer look at its contacts.
   ToolPoints(std::span<const std::array<double, 3>> samples_units, bool round,
-             std::span<const std::array<double, 3>> close_units = {});
+             std::span<const SurfaceSample> close_units = {});
 
   [[nodiscard]] PointShell<N> point_shell() const noexcept;
   [[nodiscard]] std::size_t bytes() const noexcept;
