@@ -75,14 +75,15 @@ compile() {
   (cd "$build" && eval "$command -o $out -c $source") >"$out.log" 2>&1
 }
 
-# link TARGET OBJECT CHANGED OUT: TARGET's own command with CHANGED for OBJECT, or before the libraries.
+# link TARGET OBJECT CHANGED OUT: TARGET's own command with CHANGED for OBJECT, or before all others: of what
+# a header defines in several objects, tests among them, the first one counts.
 link() {
   local command
   command=$(ninja -C "$build" -t commands "bin/$1" | grep -E -- " -o bin/$1( |\$)" | tail -1)
   if [[ $command == *" $2 "* ]]; then
     command=${command/" $2 "/" $3 "}
   else
-    command=${command/" -o bin/$1 "/" $3 -o bin/$1 "}
+    command=$(sed -E "s|( [^ ]+\.o)( )| $3\1\2|" <<<"$command")
   fi
   (cd "$build" && eval "${command/" -o bin/$1 "/" -o $4 "}") >"$4.link" 2>&1
 }

@@ -14,6 +14,7 @@
 #include "bridge/net/server_impl.hpp"
 #include "bridge/page/page_files.hpp"
 #include "shared/posix/monotonic_clock.hpp"
+#include "shared/text/words.hpp"
 
 namespace kerf::bridge {
 namespace {
@@ -116,7 +117,7 @@ void Server::Impl::say_at_most_once_a_second(const std::string& text) {
   const std::int64_t now_ns = monotonic_ns();
   if (now_ns - warned_ns_ < kNsPerSecond) return;
   warned_ns_ = now_ns;
-  std::cerr << "kerf-bridge: " << text << '\n';
+  std::cerr << "kerf-bridge: " << escaped(text) << '\n';
 }
 
 asio::awaitable<void> Server::Impl::refuse(Link& link, int status, std::string_view why,

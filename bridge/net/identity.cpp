@@ -9,6 +9,7 @@
 #include "bridge/net/host_names.hpp"
 #include "shared/posix/new_file.hpp"
 #include "shared/text/file_text.hpp"
+#include "shared/text/words.hpp"
 
 namespace kerf::bridge {
 namespace {
@@ -72,7 +73,7 @@ int run_make_identity(const IdentityOptions& options) {
   write_new_file(folder / "key.pem", pem_of(key.get()));
   write_new_file(folder / "cert.pem",
                  pem_of(certificate.get()) + pem_of(authority.certificate.get()));
-  std::cout << folder.string() << ": certificate for";
+  std::cout << escaped(folder.string()) << ": certificate for";
   for (const std::string& host : spec.hosts) std::cout << ' ' << host;
   std::cout << ", until " << end_of(certificate.get()) << '\n';
   std::cout << "SHA-256 " << fingerprint_of(certificate.get()) << '\n'

@@ -20,6 +20,7 @@
 #include "shared/posix/failure.hpp"
 #include "shared/posix/hex64.hpp"
 #include "shared/posix/monotonic_clock.hpp"
+#include "shared/text/words.hpp"
 
 namespace kerf::bridge {
 namespace {
@@ -243,7 +244,7 @@ void Server::Impl::begin_run(std::unique_ptr<SegmentConnection> connection) {
 void Server::Impl::say_once(const std::string& text) {
   if (text == said_) return;
   said_ = text;
-  std::cerr << "kerf-bridge: " << text << '\n';
+  std::cerr << "kerf-bridge: " << escaped(text) << '\n';
 }
 
 Server::Server(ServerSetup setup) : impl_(std::make_unique<Impl>(std::move(setup))) {}

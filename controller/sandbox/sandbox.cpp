@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "controller/sandbox/sandbox.hpp"
 
-#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <csignal>
@@ -10,7 +9,6 @@
 #include <exception>
 #include <new>
 #include <optional>
-#include <string_view>
 #include <system_error>
 #include <utility>
 
@@ -28,6 +26,7 @@
 #include "shared/posix/failure.hpp"
 #include "shared/posix/monotonic_clock.hpp"
 #include "shared/posix/progress_bar.hpp"
+#include "shared/text/words.hpp"
 
 namespace kerf {
 namespace {
@@ -51,14 +50,6 @@ class File {
  private:
   int number_;
 };
-
-/// What the reader says, on one line of a terminal.
-std::string plain(std::string_view text) {
-  std::string line(text);
-  const auto control = [](char c) { return static_cast<unsigned char>(c) < ' ' || c == '\x7f'; };
-  std::replace_if(line.begin(), line.end(), control, ' ');
-  return line;
-}
 
 std::uint64_t memory_before_offer(const SandboxJob& job) {
   return kSandboxBytes + 2 * job.file_bytes;
@@ -151,7 +142,7 @@ class Child {
     if (got <= 0) ended_early();
     const auto body =
         std::span<const std::byte>(packet).subspan(1, static_cast<std::size_t>(got) - 1);
-    const std::string text = plain({reinterpret_cast<const char*>(body.data()), body.size()});
+    const std::string text = escaped({reinterpret_cast<const char*>(body.data()), body.size()});
     switch (static_cast<SandboxWord>(packet[0])) {
       case SandboxWord::at:
         place_ = text;

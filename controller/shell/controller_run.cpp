@@ -25,6 +25,7 @@
 #include "controller/shell/run_report.hpp"
 #include "controller/shell/run_start.hpp"
 #include "controller/shell/run_threads.hpp"
+#include "controller/shell/waiting.hpp"
 #include "controller/volume/file/volume_write.hpp"
 #include "shared/numeric/fnv1a.hpp"
 #include "shared/posix/new_file.hpp"
@@ -224,7 +225,7 @@ int run_controller(const ControllerOptions& options) {
     start.emplace(options, stop, report);
   } catch (const std::exception&) {
     if (!stop) throw;
-    std::printf("kerf: stopped before there was a device; %s\n", report.waiting.c_str());
+    tell_stopped_early(report.waiting);
     if (!options.report.empty()) write_new_file(options.report, report_json(report));
     return 0;
   }

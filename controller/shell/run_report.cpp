@@ -4,6 +4,7 @@
 #include "shared/posix/hex64.hpp"
 #include "shared/text/format.hpp"
 #include "shared/text/json.hpp"
+#include "shared/text/words.hpp"
 
 namespace kerf {
 namespace {
@@ -168,7 +169,7 @@ std::string summary(const RunReport& report) {
                  static_cast<unsigned long long>(r.ticks), report.rate_hz,
                  report.virtual_time ? "virtual time" : "real time", report.numeric.c_str());
   if (r.ticks == 0 && !report.waiting.empty()) {
-    text += format("  never in use; %s\n\n", report.waiting.c_str());
+    text += format("  never in use; %s\n\n", escaped(report.waiting).c_str());
   }
   text += "  us              p50       p99     p99.9       max\n";
   if (!report.virtual_time) text += line("wake-up", r.wake);

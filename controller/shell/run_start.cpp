@@ -18,9 +18,11 @@
 #include "controller/shell/law_trial.hpp"
 #include "controller/shell/log_line.hpp"
 #include "controller/shell/scene_segment.hpp"
+#include "controller/shell/waiting.hpp"
 #include "shared/numeric/fnv1a.hpp"
 #include "shared/posix/new_file.hpp"
 #include "shared/segment/segment_plan.hpp"
+#include "shared/text/words.hpp"
 
 namespace kerf {
 namespace {
@@ -47,11 +49,11 @@ void tell_proposal(const LoadedScene& scene) {
   for (const SceneVolume& volume : scene.volumes) {
     for (std::string choice : volume.proposal) {
       choice.replace(choice.find('='), 1, " ");
-      std::fprintf(stderr, "kerf: %s: %s\n", volume.name.c_str(), choice.c_str());
+      std::fprintf(stderr, "kerf: %s: %s\n", escaped(volume.name).c_str(), escaped(choice).c_str());
     }
     if (volume.proposal.empty()) continue;
     std::fprintf(stderr, "kerf: %s: ./kerf volume import %s writes a scene with other choices\n",
-                 volume.name.c_str(), volume.file.c_str());
+                 escaped(volume.name).c_str(), escaped(volume.file).c_str());
   }
 }
 
@@ -128,7 +130,7 @@ RunStart::RunStart(const ControllerOptions& options, const std::atomic<bool>& st
       port_text(resolve_port(options.port, planned.scene.device.personality)) {
   LoadedScene& scene = planned.scene;
   planned.servo->take(scene);
-  report.waiting = "waiting for a device that answers at --port " + port_text;
+  report.waiting = text_before_device(port_text);
   try {
     const Hello ours{scene.device.personality, options.virtual_time, scene.servo.rate_hz};
     const LateNote waits(report.waiting);

@@ -3,6 +3,9 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdio>
+
+#include "shared/text/words.hpp"
 
 namespace kerf {
 namespace {
@@ -58,6 +61,14 @@ std::string text_of(Personality personality, Waiting waiting) {
   if (waiting == Waiting::nothing) return "";
   return std::string(kWaits[static_cast<std::size_t>(waiting)]) + ": " +
          deed_for(personality, waiting);
+}
+
+std::string text_before_device(const std::string& port) {
+  return "waiting for a device that answers at --port " + port;
+}
+
+void tell_stopped_early(const std::string& work) {
+  std::printf("kerf: stopped before there was a device; %s\n", escaped(work).c_str());
 }
 
 bool WaitTeller::look(Waiting now, std::int64_t now_ns) noexcept {

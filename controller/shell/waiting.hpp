@@ -29,6 +29,12 @@ enum class Waiting : std::uint8_t {
 /// Both on one line, such as "waiting until parked: rest the stylus in the inkwell".
 [[nodiscard]] std::string text_of(Personality personality, Waiting waiting);
 
+/// What a program is at while the device at `port` has not answered yet.
+[[nodiscard]] std::string text_before_device(const std::string& port);
+
+/// The line of one that was asked to end while it was at `work`, before there was a device.
+void tell_stopped_early(const std::string& work);
+
 /// Decides when a wait is worth a line: when it has lasted for a second, and each kind once until
 /// the force comes on. One thread.
 class WaitTeller {

@@ -26,6 +26,7 @@
 #include "shared/posix/new_file.hpp"
 #include "shared/posix/run_files.hpp"
 #include "shared/text/number.hpp"
+#include "shared/text/words.hpp"
 
 namespace kerf {
 namespace fs = std::filesystem;
@@ -33,7 +34,7 @@ namespace {
 
 void line(std::ostream& out, std::string what, const std::string& chosen, const char* change) {
   what.resize(11, ' ');
-  out << what << chosen << (*change == '\0' ? "" : "; ") << change << '\n';
+  out << what << escaped(chosen) << (*change == '\0' ? "" : "; ") << change << '\n';
 }
 
 std::string size_text(const VolumeFrame& frame) {

@@ -22,6 +22,7 @@
 #include "shared/posix/failure.hpp"
 #include "shared/posix/run_files.hpp"
 #include "shared/text/command_line.hpp"
+#include "shared/text/words.hpp"
 
 namespace kerf {
 namespace {
@@ -85,9 +86,10 @@ struct Target {
     add_volume(image, file, raw ? VolumeEncoding::raw : VolumeEncoding::gzip, files);
     commit(files, force);
     if (image.labels.empty()) remove_labels(file);
-    out << file << ": " << image.grid.nx << " x " << image.grid.ny << " x " << image.grid.nz
-        << " voxels of " << image.spacing_mm[0] << " x " << image.spacing_mm[1] << " x "
-        << image.spacing_mm[2] << " mm" << (image.labels.empty() ? "" : ", with labels") << '\n';
+    out << escaped(file) << ": " << image.grid.nx << " x " << image.grid.ny << " x "
+        << image.grid.nz << " voxels of " << image.spacing_mm[0] << " x " << image.spacing_mm[1]
+        << " x " << image.spacing_mm[2] << " mm" << (image.labels.empty() ? "" : ", with labels")
+        << '\n';
   }
 };
 

@@ -8,6 +8,7 @@
 
 #include "shared/posix/new_file.hpp"
 #include "shared/text/json.hpp"
+#include "shared/text/words.hpp"
 
 namespace kerf {
 namespace {
@@ -65,8 +66,8 @@ void print(const VolumeInfo& info, std::ostream& out) {
   const auto& s = info.spacing_mm;
   const auto& o = info.origin_mm;
   const auto& d = info.direction;
-  out << "file       " << info.file << "\nsize       " << info.grid.nx << " x " << info.grid.ny
-      << " x " << info.grid.nz << " voxels\nspacing    ";
+  out << "file       " << escaped(info.file) << "\nsize       " << info.grid.nx << " x "
+      << info.grid.ny << " x " << info.grid.nz << " voxels\nspacing    ";
   if (info.has_spacing) {
     out << s[0] << " x " << s[1] << " x " << s[2] << " mm\nextent     " << s[0] * info.grid.nx
         << " x " << s[1] * info.grid.ny << " x " << s[2] * info.grid.nz << " mm\n";

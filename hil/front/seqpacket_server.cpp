@@ -141,8 +141,8 @@ std::optional<SeqpacketLink> SeqpacketServer::accept_waiting() noexcept {
   SeqpacketLink link(client);
   const std::optional<uid_t> stranger = stranger_at(client);
   if (!stranger) return link;
-  std::cerr << "kerf-emulator: " << option_ << ": " << path_ << ": a client of user " << *stranger
-            << " was refused; be user " << geteuid() << " or root" << std::endl;
+  std::cerr << "kerf-emulator: " << option_ << ": " << one_line(path_) << ": a client of user "
+            << *stranger << " was refused; be user " << geteuid() << " or root" << std::endl;
   return std::nullopt;
 }
 

@@ -13,6 +13,7 @@
 #include "hil/front/usb/usbfs_node.hpp"
 #include "hil/front/usbip/usbip_falcon.hpp"
 #include "shared/posix/monotonic_clock.hpp"
+#include "shared/text/words.hpp"
 
 namespace kerf {
 namespace {
@@ -35,7 +36,8 @@ template <class Node, class Cycles>
 void serve_node(BusService& service, FuseMount& folder, const std::string& mount,
                 const char* device, const std::string& name, Node& node, Cycles cycles) {
   folder.add(name, node);
-  service.out << "kerf-emulator: " << device << " at " << mount << '/' << name << std::endl;
+  service.out << "kerf-emulator: " << device << " at " << escaped(mount) << '/' << name
+              << std::endl;
   Unused unused;
   folder.serve([&] {
     return service.goes_on(cycles(), node.left()) &&

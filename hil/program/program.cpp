@@ -16,6 +16,7 @@
 #include "hil/program/run_report.hpp"
 #include "shared/posix/failure.hpp"
 #include "shared/text/command_line.hpp"
+#include "shared/text/words.hpp"
 
 namespace kerf {
 namespace {
@@ -34,7 +35,7 @@ template <class Server>
 void serve_clients(const EmulatorOptions& o, Server& server, const std::string& place,
                    EmulatedDevice& device, FrontStats& stats, const ServeLimits& limits,
                    std::ostream& out, std::ostream& err) {
-  out << "kerf-emulator: " << o.device << " at " << place << std::endl;
+  out << "kerf-emulator: " << o.device << " at " << escaped(place) << std::endl;
   do {
     auto client = server.accept(limits.stop, limits.left_ns(stats.cycles));
     if (!client) break;

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "shared/posix/failure.hpp"
 
-#include <algorithm>
 #include <cerrno>
 #include <exception>
 #include <filesystem>
@@ -13,14 +12,10 @@
 #include <poll.h>
 #include <unistd.h>
 
+#include "shared/text/words.hpp"
+
 namespace kerf {
 namespace {
-
-/// Messages of libraries may have several.
-std::string on_one_line(std::string text) {
-  std::replace(text.begin(), text.end(), '\n', ' ');
-  return text;
-}
 
 bool reader_left() noexcept {
   pollfd out{STDOUT_FILENO, POLLOUT, 0};
@@ -52,14 +47,14 @@ std::string failure_text() {
   } catch (const std::bad_alloc&) {
     return "memory: none is left; take a smaller volume, free memory, or raise ulimit -v";
   } catch (const std::filesystem::filesystem_error& error) {
-    return error.path1().string() + ": " + error.code().message() + "; " +
+    return escaped(error.path1().string()) + ": " + error.code().message() + "; " +
            way_out_of(error.code().value(), "check the path and its rights");
   } catch (const std::ios_base::failure& error) {
     return "a file: " + error.code().message() + "; check its disk, or copy it again";
   } catch (const std::system_error& error) {  // of the library itself: no thread
     return "threads: " + error.code().message() + "; raise ulimit -u, or TasksMax of the service";
   } catch (const std::exception& error) {
-    return on_one_line(error.what());
+    return escaped(error.what());
   }
 }
 

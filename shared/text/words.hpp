@@ -13,14 +13,30 @@
 // Words that a person may write, for the answers to a wrong one.
 namespace kerf {
 
-/// `text` on one line, whatever it quotes of a user's file: control characters become blanks, and
-/// what is too long to read is cut.
+/// `text` as a terminal only shows it, on one line: control characters, which a path may hold,
+/// stand as in C, `\n` or `\x1b`. UTF-8 stays, but for its own control characters.
+[[nodiscard]] inline std::string escaped(std::string_view text) {
+  constexpr std::string_view kDigits = "0123456789abcdef";
+  std::string shown;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const auto byte = static_cast<unsigned char>(text[i]);
+    const bool follows = i > 0 && text[i - 1] == '\xc2';
+    const bool is_control = byte < 0x20 || byte == 0x7f || (follows && byte >= 0x80 && byte < 0xa0);
+    if (byte == '\n') {
+      shown += "\\n";
+    } else if (is_control) {
+      shown.append("\\x").append({kDigits[byte >> 4], kDigits[byte & 0xf]});
+    } else {
+      shown += text[i];
+    }
+  }
+  return shown;
+}
+
+/// The same, cut where it is too long to read: for what is quoted of a user's file.
 [[nodiscard]] inline std::string one_line(std::string_view text) {
   constexpr std::size_t kLongestLine = 400;
-  std::string line(text.substr(0, kLongestLine));
-  const auto is_control = [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; };
-  std::replace_if(line.begin(), line.end(), is_control, ' ');
-  return line;
+  return escaped(text.substr(0, kLongestLine));
 }
 
 /// Insertions, deletions and exchanges that turn one word into the other.

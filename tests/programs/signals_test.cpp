@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Every signal that asks for the end, in every program: it ends in order and leaves nothing behind.
+#include <algorithm>
 #include <chrono>
 #include <csignal>
 #include <filesystem>
@@ -133,6 +134,51 @@ TEST_CASE("before there is a device: exit 0, one line and a report of what was u
       CHECK_FALSE(holds_unfinished_files(folder.path()));
     }
   }
+}
+
+TEST_CASE("a probe that is stopped before its device answers has seen none: one line and exit 1") {
+  const TemporaryFolder folder;
+  const std::string port = "socket:" + (folder / "none").string();
+  Process probe({kBin + "/kerf-controller", "--probe", "--device", "omni", "--port", port,
+                 "--report", (folder / "probe.json").string()},
+                folder / "log");
+  REQUIRE(eventually([&] { return probe.catches(SIGINT); }, 10s));
+  probe.signal(SIGINT);
+  CHECK(probe.wait() == 1);
+  const std::string waiting = "waiting for a device that answers at --port " + port;
+  CHECK(probe.output() == "kerf: stopped before there was a device; " + waiting + "\n");
+  const auto report = nlohmann::json::parse(kerf::test::text_of(folder / "probe.json"));
+  CHECK(report["waiting"] == waiting);
+  CHECK(report["device"] == "omni");
+}
+
+TEST_CASE("a path with control characters is told on one line, and moves no cursor") {
+  const TemporaryFolder folder;
+  const std::string socket = (folder / "a\nb\x1b[31m").string();
+  const std::string told = (folder / "a\\nb\\x1b[31m").string();
+  {
+    Process emulator({kBin + "/kerf-emulator", "--socket", socket}, folder / "log");
+    REQUIRE(eventually([&] { return std::filesystem::exists(socket); }, 10s));
+    emulator.signal(SIGTERM);
+    CHECK(emulator.wait() == 0);
+    CHECK(emulator.output() == "kerf-emulator: omni at " + told + "\n");
+  }
+  {
+    Process nowhere({kBin + "/kerf-emulator", "--socket", (folder / "no\n/port").string()},
+                    folder / "log");
+    CHECK(nowhere.wait() == 2);
+    CHECK(nowhere.output().starts_with(
+        "kerf-emulator: --socket: " + (folder / "no\\n/port").string() + ": "));
+  }
+  auto line = without_device(folder, kerf::test::unique_name());
+  *std::ranges::find(line, "socket:" + (folder / "none").string()) = "socket:" + socket;
+  Process controller(line, folder / "log");
+  const std::string waits = "waiting for a device that answers at --port socket:" + told;
+  REQUIRE(eventually([&] { return controller.output().find(waits) != std::string::npos; }, 20s));
+  controller.signal(SIGTERM);
+  CHECK(controller.wait() == 0);
+  CHECK(controller.output() ==
+        "kerf-controller: " + waits + "\nkerf: stopped before there was a device; " + waits + "\n");
 }
 
 TEST_CASE("readers of a controller that is stopped before its device see a clean end") {

@@ -25,7 +25,8 @@ std::string text_of(const Exception& exception) {
 }  // namespace
 
 TEST_CASE("what a program says at its end is one line with a way out") {
-  CHECK(text_of(std::runtime_error("scene.toml: value; way\nout")) == "scene.toml: value; way out");
+  CHECK(text_of(std::runtime_error("scene.toml: value; way\nout")) ==
+        "scene.toml: value; way\\nout");
   CHECK(text_of(std::bad_alloc())
             .ends_with("; take a smaller volume, free memory, or raise ulimit -v"));
   CHECK(text_of(std::system_error(EAGAIN, std::generic_category())) ==

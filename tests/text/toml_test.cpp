@@ -39,10 +39,8 @@ TEST_CASE("what is no TOML says where, and a header of a sign ends no program") 
 TEST_CASE("long values and strange characters stay on one readable line") {
   const TomlNode file = parse_toml("a = \"x\\ny\"\nb = [" + std::string(200, ' ') + "1, 2]\n" +
                                    "c = '" + std::string(500, 'z') + "'");
-  CHECK(file.find("a")->shown == "\"x y\"");
+  CHECK(file.find("a")->shown == "\"x\\ny\"");
   CHECK(file.find("b")->shown == "[1, 2]");
   CHECK(file.find("c")->shown == '"' + std::string(59, 'z') + "...");
-  CHECK(one_line("a\tb\n") == "a b ");
-  CHECK(one_line(std::string(500, 'z')).size() == 400);
   CHECK(listed(std::vector<std::string>{"a", "b"}) == "a, b");
 }

@@ -12,6 +12,7 @@
 #include "shared/numeric/percentile.hpp"
 #include "shared/posix/new_file.hpp"
 #include "shared/posix/stop_signals.hpp"
+#include "shared/text/words.hpp"
 #include "visualizer/app/contact_sheet.hpp"
 #include "visualizer/app/film.hpp"
 #include "visualizer/app/frame_schedule.hpp"
@@ -87,11 +88,12 @@ Tick next_tick(const Session& session, const FrameSchedule& schedule,
 void tell(const VisualizerOptions& options, const FrameSchedule& schedule,
           const std::optional<Film>& film, const FrameReport& report) {
   if (schedule.taken() > 0) {
-    std::printf("%u pictures in %s, ", schedule.taken(), options.out.c_str());
+    std::printf("%u pictures in %s, ", schedule.taken(), escaped(options.out.string()).c_str());
   }
   if (film) {
     const VideoFile& video = film->file();
-    std::printf("%ju frames in %s, ", std::uintmax_t{video.frames()}, video.path().c_str());
+    std::printf("%ju frames in %s, ", std::uintmax_t{video.frames()},
+                escaped(video.path()).c_str());
   }
   std::vector<double> cpu_ms = report.cpu_ms;
   std::printf("%.1f cpu ms each (%s)\n", percentile(cpu_ms, 0.5), report.gl_renderer.c_str());
@@ -154,7 +156,7 @@ int run_headless(const VisualizerOptions& options) {
     if (filmed || (over ? schedule.final_due(ticks) : schedule.due(ticks))) taker.draw(session);
     if (filmed) {
       const auto problem = add_frame(film, taker.target(), session.servo_s());
-      if (problem) std::fprintf(stderr, "kerf-visualizer: %s\n", problem->c_str());
+      if (problem) std::fprintf(stderr, "kerf-visualizer: %s\n", escaped(*problem).c_str());
     }
     while (over ? schedule.final_due(ticks) : schedule.due(ticks)) {
       taker.write(session, frame_file(options.out, schedule.take(ticks)));

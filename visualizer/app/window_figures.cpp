@@ -3,13 +3,15 @@
 
 #include <cstdio>
 
+#include "shared/text/words.hpp"
+
 namespace kerf {
 
 void Notices::say(const Notice& notice, Clock::time_point now) {
   if (notice.problem) {
-    std::fprintf(stderr, "kerf-visualizer: %s\n", notice.text.c_str());
+    std::fprintf(stderr, "kerf-visualizer: %s\n", escaped(notice.text).c_str());
   } else {
-    std::printf("%s\n", notice.text.c_str());
+    std::printf("%s\n", escaped(notice.text).c_str());
     std::fflush(stdout);  // a pipe would keep it until the end
   }
   last_ = notice;

@@ -137,13 +137,28 @@ std::unique_ptr<PacketPort> open_or_explain(const ControllerOptions& options, Pe
                                             int rate_hz, const std::atomic<bool>& stop) {
   const std::string port = resolve_port(options.port, kind);
   try {
-    const LateNote waits("waiting for a device that answers at --port " + port);
+    const LateNote waits(text_before_device(port));
     return open_port(port, {kind, false, rate_hz}, kPatienceMs, stop);
   } catch (const std::runtime_error&) {
     const bool is_emulated = port.starts_with("socket:") || port.starts_with("udp:");
-    if (!is_emulated) print(lacks_of_nodes(kind, list_device_nodes()));
+    if (!is_emulated && !stop) print(lacks_of_nodes(kind, list_device_nodes()));
     throw;
   }
+}
+
+/// Asked to end before a device had answered: so none was seen.
+int stopped_early(const ControllerOptions& options, Personality kind) {
+  const std::string waiting = text_before_device(options.port);
+  tell_stopped_early(waiting);
+  if (!options.report.empty()) {
+    const Json json{{"program", "kerf-controller --probe"},
+                    {"version", KERF_VERSION},
+                    {"device", word_of(kind)},
+                    {"port", options.port},
+                    {"waiting", waiting}};
+    write_new_file(options.report, json.document());
+  }
+  return 1;
 }
 
 int look_around(const ControllerOptions& options) {
@@ -208,7 +223,13 @@ int run_probe(const ControllerOptions& options) {
   const int rate_hz = options.overrides.rate_hz.value_or(kDefaultRateHz);
   const DeviceSettings device = device_of(options);
   std::atomic<bool>& stop = catch_stop_and_pause_signals();
-  const auto port = open_or_explain(options, device.personality, rate_hz, stop);
+  std::unique_ptr<PacketPort> port;
+  try {
+    port = open_or_explain(options, device.personality, rate_hz, stop);
+  } catch (const std::runtime_error&) {
+    if (!stop) throw;
+    return stopped_early(options, device.personality);
+  }
   const auto driver = make_driver(device.personality, *port, device.encoder_sign);
   driver->start();
   static_cast<void>(become_real_time(options.real_time));  // what lacks is told at the end

@@ -21,6 +21,7 @@
 #include "controller/volume/file/gz_file.hpp"
 #include "controller/volume/file/header_fields.hpp"
 #include "controller/volume/file/volume_limits.hpp"
+#include "shared/text/words.hpp"
 
 namespace kerf {
 namespace fs = std::filesystem;
@@ -114,10 +115,7 @@ void check_sizes(const fs::path& path, const std::string& text) {
 /// A text of the file as part of a message.
 std::string shown(const std::string& text) {
   constexpr std::size_t kLongest = 300;
-  std::string plain = text.substr(0, kLongest);
-  const auto control = [](char c) { return static_cast<unsigned char>(c) < ' ' || c == '\x7f'; };
-  std::replace_if(plain.begin(), plain.end(), control, '?');
-  return plain;
+  return escaped(text.substr(0, kLongest));
 }
 
 /// The most bytes of voxels that a byte of the file can be: raw; as a digit and a blank for each

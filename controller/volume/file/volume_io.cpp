@@ -21,6 +21,7 @@
 #include "controller/volume/file/volume_source.hpp"
 #include "controller/volume/file/volume_write.hpp"
 #include "shared/posix/unreachable.hpp"
+#include "shared/text/words.hpp"
 
 namespace kerf {
 namespace fs = std::filesystem;
@@ -171,10 +172,7 @@ std::size_t accept(const fs::path& path, const ReadOptions& options, const Volum
 
 /// On one line of a terminal.
 std::string note_of(const VolumeClaim& claim) {
-  std::string note(claim.note.begin(), std::ranges::find(claim.note, '\0'));
-  const auto control = [](char c) { return static_cast<unsigned char>(c) < ' ' || c == '\x7f'; };
-  std::ranges::replace_if(note, control, ' ');
-  return note;
+  return escaped(std::string(claim.note.begin(), std::ranges::find(claim.note, '\0')));
 }
 
 }  // namespace
