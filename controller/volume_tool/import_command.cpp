@@ -64,7 +64,7 @@ int longest_vox(const VolumeFrame& frame) {
 }
 
 constexpr const char* kAll = ", all of it";
-constexpr const char* kCropped = ", what is solid and three voxels of air";
+constexpr const char* kCropped = ", what is solid and three voxels that end in air";
 constexpr const char* kKeepsAll = "--no-crop keeps all";
 
 const char* way_to_change(const std::string& what) {
@@ -205,8 +205,10 @@ void ImportCommand::run(std::ostream& out) const {
                                          : denoise_[0] - '0';
   if (!whole_) image = crop_for_passes(image, iso, passes);
   denoise(image.grid, image.density, passes);
-  if (!whole_) image = crop_to_solid(image, iso);
-
+  if (!whole_) {
+    image = crop_to_solid(image, iso);
+    fade_to_air(image);
+  }
   const VolumeFrame kept = image;
   write(std::move(image), {path_, to.volume, &proposal, 0, iso / kDensityMax, passes}, preview, to);
 
