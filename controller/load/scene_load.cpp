@@ -128,7 +128,7 @@ void propose(const SourceVolume& source, const VolumeSpec& spec, SceneVolume& vo
 /// those beyond the `known` ones of the scene are added. Tells whether.
 bool propose_labels(const SourceVolume& source, const VolumeSpec& spec, std::size_t known,
                     SceneVolume& volume) {
-  if (spec.window || !take_label_map(source, volume.image)) return false;
+  if (spec.window || !take_label_map(source, volume.image, "")) return false;
   volume.iso = otsu_threshold(volume.image);
   const Label last = *std::ranges::max_element(volume.image.labels);
   for (std::size_t label = known; label <= last; ++label) {

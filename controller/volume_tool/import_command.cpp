@@ -182,7 +182,7 @@ void ImportCommand::run(std::ostream& out) const {
   read_labels_beside(path_, whole, cpu_s_);
   if (!whole.labels.empty()) refuse_beside_labels();
   const bool asked = !iso_.empty() || !window_.empty() || denoise_ != "auto" || keep_all_;
-  if (whole.labels.empty() && !asked && take_label_map(source, whole)) {
+  if (whole.labels.empty() && !asked && take_label_map(source, whole, path_ + ": ")) {
     values << ", a map of labels; --iso 0.5 makes one body of them";
   }
   if (!whole.labels.empty()) {

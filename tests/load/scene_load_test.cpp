@@ -213,7 +213,13 @@ TEST_CASE("a map of labels of the command line becomes a material each") {
   CHECK(std::ranges::count(volume.image.labels, kerf::Label{2}) == 20 * 20 * 5);
   CHECK(std::ranges::count(volume.image.density, kerf::Density{65535}) == 20 * 20 * 10);
   CHECK(volume.proposal.at(0) == "materials=by label, a map of labels alone; the highest is 5");
-  overrides.window = {{0, 5}};  // asked for: one body
+  for (auto& value : values) value = value == 5 ? 32 : value;
+  overrides.volume_file =
+      folder.write("high.nrrd", kerf::test::nrrd(kGrid, {0.5, 0.5, 0.5}, values));
+  CHECK(load_error(phantom, overrides) ==
+        "--volume: label 32 is above 31, the last that a scene has a material for; number the "
+        "labels anew, or take them as a scan with --window 0,32");
+  overrides.window = {{0, 32}};
   CHECK(kerf::load_scene(phantom, overrides).volumes.at(0).image.labels.empty());
 }
 
