@@ -16,12 +16,14 @@
 #include "controller/load/load_tool.hpp"
 #include "controller/load/scene_place.hpp"
 #include "controller/scene/asked_to_end.hpp"
+#include "controller/scene/materials.hpp"
 #include "controller/scene/scene_error.hpp"
 #include "controller/scene/scene_file.hpp"
 #include "controller/scene/scene_text.hpp"
 #include "controller/volume/file/volume_io.hpp"
 #include "controller/volume/file/volume_limits.hpp"
 #include "controller/volume/file/volume_write.hpp"
+#include "controller/volume/label_map.hpp"
 #include "controller/volume/phantom.hpp"
 #include "controller/volume/spacing_check.hpp"
 #include "controller/volume/volume_crop.hpp"
@@ -97,6 +99,12 @@ void apply_overrides(const SceneOverrides& overrides, Scene& scene) {
   if (scene.cut_in_one_tick) scene.cut.rate_per_s = scene.servo.rate_hz;
 }
 
+/// A spacing that makes no sense is told, where nobody has given one.
+void tell_odd_spacing(const std::string& odd, const VolumeSpec& spec, SceneVolume& volume) {
+  if (odd.empty() || spec.spacing_mm) return;
+  volume.proposal.push_back("spacing=" + odd + "; give the true one with --spacing x,y,z (mm)");
+}
+
 /// Takes what is proposed for a volume of which the scene says nothing.
 void propose(const SourceVolume& source, const VolumeSpec& spec, SceneVolume& volume) {
   ProposalWishes wishes;
@@ -113,10 +121,25 @@ void propose(const SourceVolume& source, const VolumeSpec& spec, SceneVolume& vo
   for (const ProposalLine& line : proposal_lines(proposal)) {
     volume.proposal.push_back(line.what + "=" + line.chosen);
   }
-  const std::string odd = odd_spacing(source, proposal.solid, proposal.surface.hounsfield);
-  if (!odd.empty() && !spec.spacing_mm) {
-    volume.proposal.push_back("spacing=" + odd + "; give the true one with --spacing x,y,z (mm)");
+  tell_odd_spacing(odd_spacing(source, proposal.solid, proposal.surface.hounsfield), spec, volume);
+}
+
+/// Where a volume of which the scene says nothing is a map of labels alone, each is a material;
+/// those beyond the `known` ones of the scene are added. Tells whether.
+bool propose_labels(const SourceVolume& source, const VolumeSpec& spec, std::size_t known,
+                    SceneVolume& volume) {
+  if (spec.window || !take_label_map(source, volume.image, "")) return false;
+  volume.iso = otsu_threshold(volume.image);
+  const Label last = *std::ranges::max_element(volume.image.labels);
+  for (std::size_t label = known; label <= last; ++label) {
+    volume.proposed.push_back(label_material(label, volume.iso / kDensityMax));
   }
+  volume.proposal.push_back("materials=by label, a map of labels alone; the highest is " +
+                            std::to_string(last));
+  constexpr bool kOftenOneMm = true;  // as a CT in HU is
+  tell_odd_spacing(odd_spacing(source, solid_box(volume.image, volume.iso), kOftenOneMm), spec,
+                   volume);
+  return true;
 }
 
 /// Where a volume comes from.
@@ -127,8 +150,9 @@ struct VolumeSource {
   VolumeImage* image = nullptr;  ///< in place of the file, where given
 };
 
-/// The image of a volume and the density of its surface.
-void load_image(const VolumeSpec& spec, const VolumeSource& from, SceneVolume& volume) {
+/// The image of a volume and the density of its surface; the scene has `known` materials.
+void load_image(const VolumeSpec& spec, const VolumeSource& from, std::size_t known,
+                SceneVolume& volume) {
   if (from.image != nullptr) {
     volume.image = std::move(*from.image);
   } else if (is_phantom(spec)) {
@@ -143,7 +167,10 @@ void load_image(const VolumeSpec& spec, const VolumeSource& from, SceneVolume& v
     volume.image = apply_window(source, spec.window && !proposing
                                             ? Window{(*spec.window)[0], (*spec.window)[1]}
                                             : range_window(source));
-    if (proposing) return propose(source, spec, volume);
+    if (proposing) {
+      if (!propose_labels(source, spec, known, volume)) propose(source, spec, volume);
+      return;
+    }
     read_labels_beside(path, volume.image, from.cpu_s);
   }
   volume.iso = spec.iso ? nearest_density(*spec.iso * kDensityMax) : otsu_threshold(volume.image);
@@ -207,13 +234,14 @@ void denoise_volume(const VolumeSpec& spec, SceneVolume& volume) {
 
 /// `felt_at`: the iso that the materials' `felt_iso` were written for; none: that of the volume.
 SceneVolume load_volume(const VolumeSpec& spec, const VolumeSource& from,
-                        const std::vector<Material>& materials, std::optional<double> felt_at) {
+                        std::vector<Material> materials, std::optional<double> felt_at) {
   SceneVolume volume;
   volume.name = spec.name;
   volume.file = spec.file;
   volume.solid = spec.solid;
   try {
-    load_image(spec, from, volume);
+    load_image(spec, from, materials.size(), volume);
+    std::ranges::copy(volume.proposed, std::back_inserter(materials));
     end_if_asked(spec.file);
     check_labels(volume.image, materials.size());
     const VoxelGrid whole = volume.image.grid;
@@ -223,6 +251,7 @@ SceneVolume load_volume(const VolumeSpec& spec, const VolumeSource& from,
                       volume.image);
     volume.image = spec.crop ? crop_to_solid(volume.image, volume.iso)
                              : enclosed_in_air(std::move(volume.image), volume.iso);
+    if (spec.crop && !volume.proposal.empty()) fade_to_air(volume.image);
     volume.enclosed = !spec.crop && !(volume.image.grid == whole);
   } catch (const SceneError& error) {
     refuse(spec.where, std::string(": ") + error.what());
@@ -241,6 +270,10 @@ SceneVolume load_volume(const VolumeSpec& spec, const VolumeSource& from,
   return volume;
 }
 
+void add_proposed_materials(LoadedScene& scene) {
+  std::ranges::copy(scene.volumes.front().proposed, std::back_inserter(scene.materials));
+}
+
 /// Where no voxel has a label, nobody knows of enamel or pulp: what is left is what the scene says
 /// of densities, or, of a volume of --volume, what was proposed.
 void leave_unlabelled_materials(bool of_command_line, LoadedScene& scene) {
@@ -249,7 +282,7 @@ void leave_unlabelled_materials(bool of_command_line, LoadedScene& scene) {
     return of_command_line || !material.in_scene;
   });
   scene.materials.erase(left, scene.materials.end());
-  std::ranges::copy(scene.volumes.front().proposed, std::back_inserter(scene.materials));
+  add_proposed_materials(scene);
 }
 
 /// Moves the materials' densities so that what began at the surface `from` begins at `to`; air and
@@ -326,6 +359,7 @@ LoadedScene load_parsed(Scene spec, const std::filesystem::path& path,
     if (written_iso && *written_iso > 0 && *written_iso < 1) {
       move_materials(*written_iso, scene.volumes.front().iso / kDensityMax, scene.materials);
     }
+    if (!scene.volumes.front().image.labels.empty()) add_proposed_materials(scene);
   }
   const TouchedVolumes touched = touched_volumes(scene.volumes);
   for (const ToolSpec& tool : spec.tools) {

@@ -46,8 +46,9 @@ inline constexpr std::array<double, 3> kWorkspaceMm = {100.0, 80.0, 60.0};
 /// that any CT can be felt with the hand scripts of the default scene:
 /// - iso, window, materials and what is taken away as `propose_volume` has it, which a window of
 /// the
-///   options overrides; of a volume with labels: iso by Otsu, window from its range. Spacing from
-///   the file unless overridden; denoise, pose and crop as in the scene;
+///   options overrides; of a volume with labels, and of a map of labels alone, of which each
+///   becomes a material: iso by Otsu, window from its range. Spacing from the file unless
+///   overridden; denoise, pose and crop as in the scene;
 /// - tools keep their size in voxels: lengths are scaled by the new over the old voxel edge (old:
 ///   the scene's spacing_mm, or that of the phantom);
 /// - where it has labels, the materials' densities move with the surface: what begins at the

@@ -5,6 +5,8 @@
 #include <iterator>
 #include <string>
 
+#include "shared/volume/label_colour.hpp"
+
 namespace kerf {
 namespace {
 
@@ -33,6 +35,10 @@ Material known_material(std::string_view name) {
   const auto known = std::find_if(all_known().begin(), all_known().end(),
                                   [&](const Material& m) { return m.name == name; });
   return known == all_known().end() ? Material{.name = std::string(name)} : *known;
+}
+
+Material label_material(std::size_t label, double iso) {
+  return {.name = "label " + std::to_string(label), .iso = iso, .colour = label_colour(label)};
 }
 
 }  // namespace kerf

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <string_view>
 #include <vector>
 
@@ -15,5 +16,9 @@ namespace kerf {
 /// What is known of a material that a scene names: enamel, dentin, pulp, bone, caries, amalgam;
 /// plain values for another name. Sources, and what is tuned, are in docs/cutting.md. Load time.
 [[nodiscard]] Material known_material(std::string_view name);
+
+/// What a label of a map of labels alone stands for that has no material: "label 4", plain values,
+/// a colour that differs from its neighbours', seen from density `iso` on. Load time.
+[[nodiscard]] Material label_material(std::size_t label, double iso);
 
 }  // namespace kerf

@@ -160,7 +160,6 @@ void check_report(const ControllerOptions& options) {
 }
 
 void check_run_files(const ControllerOptions& options, const LoadedScene& scene) {
-  if (!options.final_volume.empty()) check_volume_path(options.final_volume);
   std::vector<OutputFile> written{{"--report", options.report, ".json"},
                                   {"--emulator-args", options.emulator_args, {}}};
   if (!options.final_volume.empty()) {
@@ -171,6 +170,7 @@ void check_run_files(const ControllerOptions& options, const LoadedScene& scene)
     }
   }
   check_outputs(files_read(options, as_written(scene)), written);
+  if (!options.final_volume.empty()) check_volume_path(options.final_volume);
 }
 
 std::string refused_gains(const ControllerOptions& options, const LoadedScene& scene,

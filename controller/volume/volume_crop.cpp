@@ -67,4 +67,26 @@ VolumeImage crop_to_solid(const VolumeImage& image, Density iso, std::int32_t gu
   return crop(image, box.grown(guard));
 }
 
+void fade_to_air(VolumeImage& image) {
+  const VoxelGrid& g = image.grid;
+  const auto to_border = [](std::int32_t at, std::int32_t size) {
+    return std::min(at, size - 1 - at);
+  };
+  for (std::int32_t z = 0; z < g.nz; ++z) {
+    for (std::int32_t y = 0; y < g.ny; ++y) {
+      Density* const row = &image.density[g.index(0, y, z)];
+      const std::int32_t outside = std::min(to_border(y, g.ny), to_border(z, g.nz));
+      const auto fade = [&](std::int32_t x) {
+        const std::int32_t layer = std::min(outside, to_border(x, g.nx));
+        if (layer < 2) row[x] = layer == 0 ? Density{0} : static_cast<Density>(row[x] / 2);
+      };
+      if (outside < 2) {
+        for (std::int32_t x = 0; x < g.nx; ++x) fade(x);
+      } else {
+        for (const std::int32_t x : {0, 1, g.nx - 2, g.nx - 1}) fade(x);
+      }
+    }
+  }
+}
+
 }  // namespace kerf

@@ -23,4 +23,8 @@ inline constexpr std::int32_t kGuardVoxels = 3;
 [[nodiscard]] VolumeImage crop_to_solid(const VolumeImage& image, Density iso,
                                         std::int32_t guard = kGuardVoxels);
 
+/// A cropped image then ends in air: its last layer becomes air, the one before half of what it is.
+/// The rest, and so the surface, stays as it is: what is solid lies `kGuardVoxels` from the border.
+void fade_to_air(VolumeImage& image);
+
 }  // namespace kerf

@@ -65,7 +65,7 @@ int longest_vox(const VolumeFrame& frame) {
 }
 
 constexpr const char* kAll = ", all of it";
-constexpr const char* kCropped = ", what is solid and three voxels of air";
+constexpr const char* kCropped = ", what is solid and three voxels that end in air";
 constexpr const char* kKeepsAll = "--no-crop keeps all";
 
 const char* way_to_change(const std::string& what) {
@@ -183,7 +183,7 @@ void ImportCommand::run(std::ostream& out) const {
   read_labels_beside(path_, whole, cpu_s_);
   if (!whole.labels.empty()) refuse_beside_labels();
   const bool asked = !iso_.empty() || !window_.empty() || denoise_ != "auto" || keep_all_;
-  if (whole.labels.empty() && !asked && take_label_map(source, whole)) {
+  if (whole.labels.empty() && !asked && take_label_map(source, whole, path_ + ": ")) {
     values << ", a map of labels; --iso 0.5 makes one body of them";
   }
   if (!whole.labels.empty()) {
@@ -206,8 +206,10 @@ void ImportCommand::run(std::ostream& out) const {
                                          : denoise_[0] - '0';
   if (!whole_) image = crop_for_passes(image, iso, passes);
   denoise(image.grid, image.density, passes);
-  if (!whole_) image = crop_to_solid(image, iso);
-
+  if (!whole_) {
+    image = crop_to_solid(image, iso);
+    fade_to_air(image);
+  }
   const VolumeFrame kept = image;
   write(std::move(image), {path_, to.volume, &proposal, 0, iso / kDensityMax, passes}, preview, to);
 

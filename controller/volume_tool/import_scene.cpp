@@ -9,7 +9,6 @@
 #include "controller/scene/scene_error.hpp"
 #include "controller/scene/scene_file.hpp"
 #include "shared/text/json.hpp"
-#include "shared/volume/label_colour.hpp"
 
 namespace kerf {
 namespace {
@@ -90,9 +89,11 @@ std::string imported_scene_text(const ImportedScene& scene) {
     }
   }
   for (std::size_t label = default_materials().size(); label <= scene.last_label; ++label) {
-    const auto c = label_colour(label);
-    text << "\n[[material]]\nname = \"label " << label << "\"\niso = " << scene.iso_density
-         << "\ncolour = [" << c[0] << ", " << c[1] << ", " << c[2] << "]\n";
+    const Material material = label_material(label, scene.iso_density);
+    const auto& c = material.colour;
+    text << "\n[[material]]\nname = " << Json(material.name).canonical()
+         << "\niso = " << material.iso << "\ncolour = [" << c[0] << ", " << c[1] << ", " << c[2]
+         << "]\n";
   }
   text << tools_text(scene.longest_vox) << kDevice;
   return text.str();

@@ -39,6 +39,13 @@ std::string load_error(const std::filesystem::path& scene,
   return kerf::test::error_of([&] { static_cast<void>(kerf::load_scene(scene, overrides)); });
 }
 
+/// Of its materials.
+std::string names(const kerf::LoadedScene& scene) {
+  std::string text;
+  for (const kerf::Material& material : scene.materials) text += material.name + " ";
+  return text;
+}
+
 bool has(const std::string& text, const std::string& part) {
   return text.find(part) != std::string::npos;
 }
@@ -172,11 +179,6 @@ TEST_CASE("a scene that says fit is fitted to its own volume as one of the comma
 
 TEST_CASE("where no voxel has a label there is no enamel and no pulp") {
   const kerf::test::TempFolder folder;
-  const auto names = [](const kerf::LoadedScene& scene) {
-    std::string text;
-    for (const kerf::Material& material : scene.materials) text += material.name + " ";
-    return text;
-  };
   CHECK(names(kerf::load_scene(block_scene(folder, 0.5, kBall))) == "none ");
   CHECK(names(kerf::load_scene(block_scene(
             folder, 0.5,
@@ -192,6 +194,33 @@ TEST_CASE("where no voxel has a label there is no enamel and no pulp") {
   CHECK_FALSE(ct.volumes.at(0).proposal.empty());
   CHECK(names(kerf::load_scene(std::filesystem::path(KERF_SCENES_DIR) / "phantom.toml")) ==
         "none enamel dentin pulp ");
+}
+
+TEST_CASE("a map of labels of the command line becomes a material each") {
+  const kerf::test::TempFolder folder;
+  auto values = kerf::test::block(kGrid, kBlock, 2);
+  for (std::size_t i = 0; i < values.size() / 2; ++i) values[i] = values[i] == 2 ? 5 : 0;
+  kerf::SceneOverrides overrides;
+  overrides.volume_file =
+      folder.write("map.nrrd", kerf::test::nrrd(kGrid, {0.5, 0.5, 0.5}, values));
+  const auto phantom = std::filesystem::path(KERF_SCENES_DIR) / "phantom.toml";
+  const kerf::LoadedScene scene = kerf::load_scene(phantom, overrides);
+  const kerf::SceneVolume& volume = scene.volumes.at(0);
+  CHECK(names(scene) == "none enamel dentin pulp label 4 label 5 ");
+  CHECK(scene.materials.at(4).colour != scene.materials.at(5).colour);
+  CHECK(scene.materials.at(5).iso == doctest::Approx(volume.iso / kerf::kDensityMax));
+  CHECK(std::ranges::count(volume.image.labels, kerf::Label{5}) == 20 * 20 * 5);
+  CHECK(std::ranges::count(volume.image.labels, kerf::Label{2}) == 20 * 20 * 5);
+  CHECK(std::ranges::count(volume.image.density, kerf::Density{65535}) == 20 * 20 * 10);
+  CHECK(volume.proposal.at(0) == "materials=by label, a map of labels alone; the highest is 5");
+  for (auto& value : values) value = value == 5 ? 32 : value;
+  overrides.volume_file =
+      folder.write("high.nrrd", kerf::test::nrrd(kGrid, {0.5, 0.5, 0.5}, values));
+  CHECK(load_error(phantom, overrides) ==
+        "--volume: label 32 is above 31, the last that a scene has a material for; number the "
+        "labels anew, or take them as a scan with --window 0,32");
+  overrides.window = {{0, 32}};
+  CHECK(kerf::load_scene(phantom, overrides).volumes.at(0).image.labels.empty());
 }
 
 TEST_CASE("a window of the command line goes before the proposal's") {

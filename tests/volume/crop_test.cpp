@@ -91,6 +91,29 @@ TEST_CASE("what lies below iso in the guard is kept as it is") {
   CHECK(part.density[0] == 100);
 }
 
+TEST_CASE("a cropped volume fades to air over two layers, and what is solid stays") {
+  VolumeImage image = air({12, 11, 10});
+  std::fill(image.density.begin(), image.density.end(), Density{400});
+  image.density[image.grid.index(6, 5, 5)] = 1000;
+  image.density[image.grid.index(7, 5, 5)] = 1000;
+  VolumeImage part = crop_to_solid(image, 500);
+  fade_to_air(part);
+  const VoxelGrid& g = part.grid;
+  for (std::int32_t z = 0; z < g.nz; ++z) {
+    for (std::int32_t y = 0; y < g.ny; ++y) {
+      for (std::int32_t x = 0; x < g.nx; ++x) {
+        const std::int32_t layer = std::min({x, g.nx - 1 - x, y, g.ny - 1 - y, z, g.nz - 1 - z});
+        const bool solid = y == 3 && z == 3 && (x == 3 || x == 4);
+        CAPTURE(layer);
+        CHECK(part.density[g.index(x, y, z)] == (solid        ? 1000
+                                                 : layer == 0 ? 0
+                                                 : layer == 1 ? 200
+                                                              : 400));
+      }
+    }
+  }
+}
+
 TEST_CASE("nothing solid, an empty box and a box above the limit are refused in one line") {
   const VolumeImage image = air({4, 4, 4});
   try {

@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <iterator>
+#include <random>
 
 #include <doctest/doctest.h>
 #include <sys/wait.h>
@@ -88,6 +89,40 @@ TEST_CASE("import takes the user's word for surface, window, crop and size") {
   CHECK(v.max == std::lround(290.0 / 300 * kDensityMax));
   CHECK(*parse_scene_file(folder / "out.toml").volumes[0].iso ==
         doctest::Approx(140.0 / 300).epsilon(1e-4));
+}
+
+TEST_CASE("what an import crops ends in air, whatever lay around the solid") {
+  const TempFolder folder;
+  const VoxelGrid grid{30, 30, 30};
+  std::mt19937 random(1);
+  std::vector<std::uint8_t> values(grid.voxel_count());
+  for (std::uint8_t& value : values) value = static_cast<std::uint8_t>(10 + random() % 40);
+  for (std::int32_t z = 10; z < 20; ++z) {
+    for (std::int32_t y = 10; y < 20; ++y) {
+      std::fill_n(&values[grid.index(10, y, z)], 10, std::uint8_t{200});
+    }
+  }
+  const auto scan =
+      folder.write("scan.nrrd", nrrd("uint8", kHalf, "raw", "30 30 30") + "\n" + bytes_of(values));
+  const std::string out = (folder / "out.nrrd").string();
+  const Outcome made = run({"import", scan.string(), "--out", out, "--denoise", "off"});
+  CAPTURE(made.err);
+  REQUIRE(made.code == 0);
+  CHECK(has(made.out, "what is solid and three voxels that end in air"));
+  const VolumeImage image = apply_window(read_volume(out), {0, kDensityMax});
+  const VoxelGrid& g = image.grid;
+  CHECK(g == VoxelGrid{16, 16, 16});
+  Density border = 0, within = 0;
+  for (std::int32_t z = 0; z < g.nz; ++z) {
+    for (std::int32_t y = 0; y < g.ny; ++y) {
+      for (const std::int32_t x : {0, 2}) {
+        Density& most = x == 0 ? border : within;
+        most = std::max(most, image.density[g.index(x, y, z)]);
+      }
+    }
+  }
+  CHECK(border == 0);
+  CHECK(within > 0);  // what lay there is still around the solid
 }
 
 TEST_CASE("import replaces no file without --force") {

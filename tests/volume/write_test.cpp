@@ -97,6 +97,9 @@ TEST_CASE("a written volume reads back the same: densities, labels, spacing, pla
 TEST_CASE("labels lie beside the volume, and those of an earlier volume go away") {
   const TempFolder folder;
   CHECK(labels_path("dir/tooth.nrrd") == "dir/tooth-labels.nrrd");
+  CHECK_THROWS_WITH_AS(
+      check_volume_path("tooth-labels.nrrd"),
+      "tooth-labels.nrrd: is the name of the labels of tooth.nrrd; give another one", SceneError);
   VolumeImage image = noise(kSmall);
   image.labels.assign(60, 2);
   write_volume(image, folder / "tooth.nrrd");

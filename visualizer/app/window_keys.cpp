@@ -110,6 +110,12 @@ void take_tool(std::size_t index, Session& session, Notices& notices,
   }
 }
 
+void WindowKeys::switch_panel(bool& panel, bool& other) {
+  panel = hidden || !panel;
+  other = false;
+  hidden = false;
+}
+
 bool WindowKeys::apply(const WindowInput& input, Session& session, Picture& picture, double aspect,
                        Notices& notices, Notices::Clock::time_point now) {
   bool quit = input.close;
@@ -128,8 +134,8 @@ bool WindowKeys::apply(const WindowInput& input, Session& session, Picture& pict
       hidden = !hidden && !next;
       help = next ? help + 1 : 0;
     }
-    if (key == 'l') slices = !slices, plot = false;
-    if (key == 'p') plot = !plot, slices = false;
+    if (key == 'l') switch_panel(slices, plot);
+    if (key == 'p') switch_panel(plot, slices);
     if (key == 'v') {
       look.renderer = one > 0 ? next_renderer(look.renderer, volumes.size(), one - 1)
                               : next_renderer(look.renderer);

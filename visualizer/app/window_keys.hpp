@@ -48,6 +48,10 @@ struct WindowKeys {
   /// True when the user wants to leave.
   bool apply(const WindowInput& input, Session& session, Picture& picture, double aspect,
              Notices& notices, Notices::Clock::time_point now);
+
+  /// Shows `panel` in the place of `other`, or no longer; while all panels are hidden, they come
+  /// back with it.
+  void switch_panel(bool& panel, bool& other);
 };
 
 // What keys of the window write: each says where it went, or why it did not. A full disk must not

@@ -106,6 +106,8 @@ void write_voxels(NewFile& file, const VolumeImage& image, const std::vector<T>&
 
 namespace {
 
+constexpr std::string_view kLabelsEnd = "-labels";
+
 void check_extension(const fs::path& path) {
   if (path.extension() != ".nrrd") {
     throw SceneError(path.string() + ": kerf writes .nrrd only; give a name that ends in .nrrd");
@@ -115,11 +117,18 @@ void check_extension(const fs::path& path) {
 }  // namespace
 
 fs::path labels_path(const fs::path& volume_path) {
-  return volume_path.parent_path() / (volume_path.stem().string() + "-labels.nrrd");
+  return volume_path.parent_path() /
+         (volume_path.stem().string() + std::string(kLabelsEnd) + ".nrrd");
 }
 
 void check_volume_path(const fs::path& path) {
   check_extension(path);
+  const std::string stem = path.stem().string();
+  if (stem.ends_with(kLabelsEnd)) {
+    const std::string of = stem.substr(0, stem.size() - kLabelsEnd.size());
+    throw SceneError(path.string() + ": is the name of the labels of " + of +
+                     ".nrrd; give another one");
+  }
   check_new_file(path);
 }
 

@@ -43,6 +43,23 @@ TEST_CASE("with the panels hidden a notice shows only where it is a problem") {
   CHECK(shown(notices, now, true).alarm);
 }
 
+TEST_CASE("a panel that is asked for brings the hidden ones back") {
+  WindowKeys keys;
+  keys.switch_panel(keys.slices, keys.plot);
+  CHECK(keys.slices);
+  keys.hidden = true;
+  keys.switch_panel(keys.slices, keys.plot);
+  CHECK(keys.slices);  // it was not seen
+  CHECK_FALSE(keys.hidden);
+  keys.switch_panel(keys.slices, keys.plot);
+  CHECK_FALSE(keys.slices);
+  keys.slices = keys.hidden = true;
+  keys.switch_panel(keys.plot, keys.slices);
+  CHECK(keys.plot);
+  CHECK_FALSE(keys.slices);
+  CHECK_FALSE(keys.hidden);
+}
+
 TEST_CASE("a tool that a scene lacks is told with the keys that it has") {
   CHECK(no_such_tool(6, 3) == "tool 7: the scene has 3; press 1 to 3");
   CHECK(no_such_tool(1, 1) == "tool 2: the scene has 1; press 1");
