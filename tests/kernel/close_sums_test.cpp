@@ -162,7 +162,7 @@ TEST_CASE_TEMPLATE("they tell the tool's normal at the peak, and how far its nor
         const double smooth = rim && x == 0 ? 0 : one;
         const double at[3] = {5 * std::sin(angle), 0.35 * z, 5 * std::cos(angle)};
         const double normal[3] = {smooth * std::sin(facing), 0, smooth * std::cos(facing)};
-        samples.density[slot] = static_cast<Number>(one * (0.5 - 1.25 * near * near));
+        samples.density[slot] = static_cast<Number>(one * std::max(0.5 - 1.25 * near * near, 0.0));
         for (std::size_t axis = 0; axis < 3; ++axis) {
           samples.offset[axis][slot] = static_cast<Number>(one * at[axis] / 8);
           samples.normal[axis][slot] = static_cast<Number>(normal[axis]);
@@ -170,8 +170,8 @@ TEST_CASE_TEMPLATE("they tell the tool's normal at the peak, and how far its nor
       }
       const Closeup<N> seen = peak_of(close_sums<N>(samples.fade(samples.table())));
       CAPTURE(off);
-      if (rim) {
-        CHECK(double(seen.spread) > 0.4);
+      if (rim) {  // that the look's middle is on
+        if (std::abs(off) < 0.2) CHECK(double(seen.spread) > 0.4);
       } else {
         CHECK(std::abs(std::atan2(double(seen.normal[0]), double(seen.normal[2])) - off) < 0.01);
         CHECK(double(seen.spread) < 0.06);
@@ -223,22 +223,22 @@ TEST_CASE("a closer look takes all samples around a place, and of too many a par
     CHECK(samples->window[k] / 32768.0 == doctest::Approx(rest * rest).epsilon(0.001).scale(1));
   }
   CHECK(taken_within == within);
-  CHECK(taken(cells, reach, {8, 8, 4})->count == 0);
+  CHECK(taken(cells, reach, {8, 8, 6})->count == 0);
   CHECK(taken(cells, reach, {30, -30, 30})->count == 0);
 }
 
 TEST_CASE("what a closeup tells moves on with the look, without a jump") {
-  // A row of two bumps, 4 units apart and 0.01 different in height, under a plate: the look goes
-  // from one to the other.
-  const auto surface = plate(10, 1.5, kClosePitch);
+  // A row of two bumps, 4 units apart and 0.01 different in height, under a thick plate: the look
+  // goes from one to the other.
+  const auto surface = plate(10, 8, kClosePitch);
   const double reach = reach_of(surface);
   const CloseCells<FixedNumbers> cells(surface, reach);
   const auto height_at = [&](double x) {
-    const auto samples = taken(cells, reach, {x, 0, 0.75});
+    const auto samples = taken(cells, reach, {x, 0, 4});
     const PointTable<FixedNumbers> table = samples->table();
     for (std::size_t k = 0; k < static_cast<std::size_t>(samples->count); ++k) {
       const Point at = place(*samples, k, reach);
-      const double from_left = far(at, {-2, 0, 0.75}), from_right = far(at, {2, 0, 0.75});
+      const double from_left = far(at, {-2, 0, 4}), from_right = far(at, {2, 0, 4});
       const double density =
           std::max(0.5 - 0.05 * from_left * from_left, 0.51 - 0.05 * from_right * from_right);
       samples->density[k] = static_cast<std::int32_t>(32768 * std::max(density, 0.0));
