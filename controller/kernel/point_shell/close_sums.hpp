@@ -114,6 +114,7 @@ template <class N>
     }
   };
   for (std::int32_t i = 0; i < look.count; ++i) {
+    if (!(look.window[i] > Number(0))) continue;  // it may be higher than the highest that counts
     const Number t = share(look.density[i]);
     Number power = t;
     for (int p = 1; p < CloseSums<N>::kWidePower; p *= 2) power = share_product<N>(power, power);
