@@ -172,8 +172,8 @@ TEST_CASE("fixed point feels what double feels, on noise as well") {
     CAPTURE(tool.shape);
     CHECK(worst_height < 5e-4);
     // Gradients have steps at the borders of cells: a rounded place may be on the other side of
-    // one. A patch has 64, each worth some 0.1 degrees. Along a line contact its place follows that
-    // of the look, which offsets in Q15 round by 0.001 units: of 120 patches one has two such.
+    // one. A patch has 64, each worth some 0.1 degrees, and its place is rounded by up to 0.002
+    // units: of 120 patches one has two such.
     CHECK(worst_deg < (tool.round ? 0.03 : 0.2));
   }
 }
