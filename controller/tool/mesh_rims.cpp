@@ -21,7 +21,10 @@ using vec3::operator+, vec3::operator-, vec3::operator*;
 
 // Between two samples a pitch apart an edge of angle t stands 1/2 tan(t / 2) pitches above both.
 // That may be 0.04 units, what a wedged tool may be deep (SweepRules::kWedged) less the tolerance.
-const double kCosRim = std::cos(2 * std::atan(2 * 0.04));
+// The same holds for a row of samples along a rim that bends.
+const double kSharp = 2 * std::atan(2 * 0.04);
+const double kCosRim = std::cos(kSharp);
+const double kStraight = 2 * std::sin(kSharp / 2);  // sum of two unit vectors that part by it
 constexpr double kPointShare = 0.05;  // of the full angle, that a point lacks at least
 // Pitches from a rim into both faces, and from a point along each of its rims. Tuned: on tilted
 // planes a cylinder of 48 sides and a square bar then rest within 0.01 voxels of the ideal in the
@@ -211,7 +214,8 @@ std::vector<Point> rim_samples(const ToolMesh& mesh, double pitch_mm) {
   std::vector<bool> is_end = points_of(mesh);
   ApartSamples samples(kNearest * pitch_mm);
   for (std::size_t i = 0; i < is_end.size(); ++i) {
-    is_end[i] = is_end[i] || (meeting[i] != 0 && meeting[i] != 2);
+    const bool bends = length(inward[i]) > kStraight;
+    is_end[i] = is_end[i] || (meeting[i] != 0 && (meeting[i] != 2 || bends));
     if (!is_end[i]) continue;
     samples.add(mesh.points_mm[i] + kFromPoint * pitch_mm * inward[i]);
   }

@@ -12,8 +12,8 @@ namespace kerf {
 /// of that, so that a rough surface gets no more than a smooth one.
 ///
 /// A rim is an edge that sticks out by more than 9.2 degrees between its faces: a lathe of 40 sides
-/// and more is round. A point is a corner that lacks more than a twentieth of the full angle. Load
-/// time.
+/// and more is round. A point is a corner that lacks more than a twentieth of the full angle, or in
+/// which a rim bends or ends. Load time.
 [[nodiscard]] std::vector<ToolMesh::Point> rim_samples(const ToolMesh& mesh, double pitch_mm);
 
 }  // namespace kerf

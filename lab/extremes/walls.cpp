@@ -18,10 +18,10 @@ void measure_walls(const Effort& effort, const RowSink& add_row) {
       bur{.round = false, .mesh = &fluted};
   for (const Subject& subject : {Subject{"ball, wall of 5 mm", 50, ball, 0.05},
                                  Subject{"ball, wall of 2 voxels", 2, ball, 0.05},
-                                 Subject{"turning cylinder, wall of 5 mm", 50, cylinder, 0.1},
-                                 Subject{"turning cylinder, wall of 2 voxels", 2, cylinder, 0.1},
-                                 Subject{"turning bur (STL), wall of 5 mm", 50, bur, 0.1},
-                                 Subject{"turning bur (STL), wall of 2 voxels", 2, bur, 0.1}}) {
+                                 Subject{"turning cylinder, wall of 5 mm", 50, cylinder, 0.05},
+                                 Subject{"turning cylinder, wall of 2 voxels", 2, cylinder, 0.05},
+                                 Subject{"turning bur (STL), wall of 5 mm", 50, bur, 0.05},
+                                 Subject{"turning bur (STL), wall of 2 voxels", 2, bur, 0.05}}) {
     const SampledTool made(subject.tool.made());
     Shaken seen;
     Dice dice(11);

@@ -34,8 +34,7 @@ bool same(const NormalSums<FixedNumbers>& a, const NormalSums<FixedNumbers>& b) 
   return a.weight == b.weight && std::ranges::equal(a.normal, b.normal);
 }
 bool same(const CloseSums<FixedNumbers>& a, const CloseSums<FixedNumbers>& b) {
-  return a.top == b.top && same(a.wide, b.wide) && same(a.middle, b.middle) && same(a.low, b.low) &&
-         same(a.high, b.high);
+  return a.top == b.top && same(a.facing, b.facing) && same(a.low, b.low) && same(a.high, b.high);
 }
 
 /// Samples `pitch` apart on both faces of a plate across z.
@@ -105,7 +104,7 @@ TEST_CASE("every instruction set sums close samples to the bit") {
       CloseSums<FixedNumbers> sums;
       sums.top = -1;  // left over from before
       sums.low.weight = sums.high.density = -1;
-      sums.wide.weight = sums.middle.normal[1] = -1;
+      sums.facing.weight = sums.facing.normal[1] = -1;
       (*set)->sum_close(look, sums);
       if (!same(sums, truth)) {
         FAIL(std::string((*set)->name), ", case ", i);

@@ -248,7 +248,7 @@ TEST_CASE("a scene is planned with what the servo allows the queries of a tick")
   CHECK(query_work(points, 2).turn == 2 * 62);
   points.round = false;
   CHECK(query_work(points, 1).query == 512 + 128);
-  CHECK(query_work(points, 1).closer == (128 + 2 * 448) + 2 * (128 + 64));
+  CHECK(query_work(points, 1).closer == (128 + 2 * 448) + 2 * (128 + 32));
   const auto most = [](std::int64_t query, std::int64_t closer, std::int64_t turn) {
     return QueryWork{query, closer, turn}.most();
   };

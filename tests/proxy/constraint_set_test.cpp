@@ -23,9 +23,9 @@ ConstraintSet<N> random_constraints(Dice& dice) {
   const Point room = dice.uniform(0, 0.5) * dice.direction();
   while (constraints.count < wanted) {
     const Point normal = dice.direction();
-    if (has_plane_like(constraints, normal_of<N>(normal))) continue;
     const double depth = dot(normal, room) - dice.uniform(0, 0.3);
-    constraints.plane[constraints.count++] = {normal_of<N>(normal), typename N::Real(depth), {}};
+    const ConstraintPlane<N> plane{normal_of<N>(normal), typename N::Real(depth), {}};
+    if (!has_plane_like(constraints, plane)) constraints.plane[constraints.count++] = plane;
   }
   return constraints;
 }

@@ -137,6 +137,32 @@ TEST_CASE("the surface of a mesh has even samples, rows of them along its rims")
   CHECK(*most < 1.25);
 }
 
+TEST_CASE("a rim that bends has a sample in each corner") {
+  const SceneTool bur = mesh_of_units("t", fluted_bur(32));
+  const auto close = close_samples(bur, 1);
+  const auto far = [&](const ToolMesh::Point& corner) {
+    double nearest = 1e9;
+    for (const SurfaceSample& sample : close) {
+      nearest = std::min(nearest, vec3::length(vec3::operator-(sample.at, corner)));
+    }
+    return nearest;
+  };
+  double top = -1e9, widest = 0;
+  for (const auto& p : bur.mesh.points_mm) {
+    top = std::max(top, p[1]);
+    widest = std::max(widest, std::hypot(p[0], p[2]));
+  }
+  int corners = 0;
+  double farthest = 0;
+  for (const auto& p : bur.mesh.points_mm) {  // where the blades end
+    if (p[1] < top - 1e-9 || std::hypot(p[0], p[2]) < widest - 1e-3) continue;
+    ++corners;
+    farthest = std::max(farthest, far(p));
+  }
+  CHECK(corners >= 6);
+  CHECK(farthest < 0.03);
+}
+
 TEST_CASE("a thin blade has samples on both of its sides") {
   const auto blade = extremes::loft({-8, 8}, 4, [](double y, double angle) {
     return extremes::Point{8 * std::round(std::cos(angle)), y, 0.2 * std::round(std::sin(angle))};

@@ -36,11 +36,11 @@ struct NormalSums {
 /// `top` is set.
 template <class N>
 struct CloseSums {
-  static constexpr int kLowPower = 32, kHighPower = 64;    ///< of height and place
-  static constexpr int kWidePower = 8, kMiddlePower = 16;  ///< of the tool's normal
+  static constexpr int kLowPower = 32, kHighPower = 64;  ///< of height and place
+  static constexpr int kNormalPower = 16;                ///< of the tool's normal
 
   PointNumber<N> top{};  ///< density of the highest
-  NormalSums<N> wide, middle;
+  NormalSums<N> facing;
   PowerSums<N> low, high;
 };
 
@@ -117,10 +117,8 @@ template <class N>
     if (!(look.window[i] > Number(0))) continue;  // it may be higher than the highest that counts
     const Number t = share(look.density[i]);
     Number power = t;
-    for (int p = 1; p < CloseSums<N>::kWidePower; p *= 2) power = share_product<N>(power, power);
-    add_normal(sums.wide, windowed(power, i), i);
-    power = share_product<N>(power, power);
-    add_normal(sums.middle, windowed(power, i), i);
+    for (int p = 1; p < CloseSums<N>::kNormalPower; p *= 2) power = share_product<N>(power, power);
+    add_normal(sums.facing, windowed(power, i), i);
     power = share_product<N>(power, power);
     add(sums.low, windowed(power, i), t, i);
     add(sums.high, windowed(share_product<N>(power, power), i), t, i);

@@ -56,6 +56,8 @@ class CloserLook {
     PointNumber<N> peak[3] = {};
     peak_offset(sums_, fall_of(means_, false), peak);
     const Closeup<N> seen = reader_.look_closely_at(volume_, at_, peak);
+    // Where the tool touches at two places the peak that two means tell may be at neither.
+    if (seen.height <= Ratio(0)) return;
     const auto offset = turned_offset<N>(seen.offset, reader_.rows());
     const ContactVec<Real> arm{multiply<Real>(offset.x, points_.reach),
                                multiply<Real>(offset.y, points_.reach),
@@ -73,12 +75,14 @@ class CloserLook {
     const Ratio along = -(multiply<Ratio>(means_.gradient.x, facing.x) +
                           multiply<Ratio>(means_.gradient.y, facing.y) +
                           multiply<Ratio>(means_.gradient.z, facing.z));
-    const Unit alike =
-        Unit(1) -
-        falling_share<N>(Unit(std::clamp(along / steep, Ratio(0), Ratio(1))), kAlike, kUnlike);
-    const Ratio own = peak_height(means_, false);
-    plane.depth = depth_of<N>(own + multiply<Ratio>(alike, std::max(seen.height, means_.top) - own),
-                              slope_along(means_, plane.normal, false));
+    const Unit facing_share(std::clamp(along / steep, Ratio(0), Ratio(1)));
+    const Unit alike = Unit(1) - falling_share<N>(facing_share, kAlike, kUnlike);
+    // There the point shell's depth counts, less than the look's by what two walls may wedge the
+    // tool at most: an edge that the look sees does not get in.
+    const Ratio own = peak_height(means_, false), highest = std::max(seen.height, means_.top),
+                slope = slope_along(means_, plane.normal, false);
+    plane.depth = std::max(depth_of<N>(own + multiply<Ratio>(alike, highest - own), slope),
+                           depth_of<N>(highest, slope) - Real(2 * SweepRules::kWedged));
     const Unit counts = alike * narrowness<N>(sums_, means_.top);
     plane.arm = plane.arm + part_of<N>(arm - plane.arm, counts);
     const auto own_normal = direction<N>(-turned_offset<N>(seen.normal, reader_.rows()));
@@ -92,10 +96,12 @@ class CloserLook {
     constexpr PointShell<N> kPatch{kPatchArrays<N>.table(), {}, Real(kPatchRadius), 15};
     SpiralPlaces<N, kPatchSamples> memory;
     const PointPlaces<N> places = memory.places();
-    reader_.place(kPatch, flattened<N>(normal), volume_.frame, places);
+    const TurnRows<N> rows = flattened<N>(normal);
+    reader_.place(kPatch, rows, volume_.frame, places);
     const PointSums<N> patch = reader_.sums_at(volume_.field, kPatch.table, places, middle);
     if (patch.weight <= typename N::Sum(0)) return {};
-    return patch_of(patch, volume_.field.scale, volume_.frame);
+    return patch_of<N>(point_means<N>(patch, volume_.field.scale, volume_.frame, rows, false),
+                       normal);
   }
 
   /// A ball's depth by its caps around the middle of the contact, as far as the contact is sharp.

@@ -131,14 +131,18 @@ template <class N>
 /// Two planes whose normals are nearer than this are one face, seen from two places. On a bump they
 /// would feign a crease; in a hollow curvature.hpp tells better how it goes on between them. (With
 /// 15 degrees a tool in a slot with a play of 0.1 units would rest at two places, up to 0.05 units
-/// apart.)
+/// apart.) A face that the head meets and one that is met behind it are two.
 inline constexpr double kFalseCreaseCosine = 0.7071067811865476;  // 45 degrees
 
 template <class N>
 [[nodiscard]] constexpr bool has_plane_like(const ConstraintSet<N>& planes,
-                                            ContactVec<typename N::Unit> normal) noexcept {
+                                            const ConstraintPlane<N>& plane) noexcept {
   for (std::size_t i = 0; i < planes.count; ++i) {
-    if (dot(planes.plane[i].normal, normal) > typename N::Unit(kFalseCreaseCosine)) return true;
+    const ConstraintPlane<N>& other = planes.plane[i];
+    if (other.behind == plane.behind &&
+        dot(other.normal, plane.normal) > typename N::Unit(kFalseCreaseCosine)) {
+      return true;
+    }
   }
   return false;
 }
@@ -159,8 +163,7 @@ constexpr void keep(ConstraintSet<N>& constraints, const ConstraintSet<N>& older
     ConstraintPlane<N> plane = older.plane[i];
     plane.depth = plane.depth - along<N>(plane.normal, moved);
     const bool near = plane.depth > Real(-0.5) && plane.depth < Real(0.3);
-    if (near && !has_plane_like(constraints, plane.normal))
-      constraints.plane[constraints.count++] = plane;
+    if (near && !has_plane_like(constraints, plane)) constraints.plane[constraints.count++] = plane;
   }
 }
 
@@ -176,7 +179,7 @@ template <class N>
     ConstraintPlane<N> plane = seen.plane[i];
     if (constraints.count == kMaxPlanes || plane.depth < -kNear) break;
     plane.depth = plane.depth + along<N>(plane.normal, displacement);
-    if (plane.depth < kNear && !has_plane_like(constraints, plane.normal)) {
+    if (plane.depth < kNear && !has_plane_like(constraints, plane)) {
       constraints.plane[constraints.count++] = plane;
     }
   }

@@ -120,7 +120,7 @@ struct CloseSamples {
 /// What a closeup tells of the peak of density.
 template <class N>
 struct Closeup {
-  typename N::Ratio height{};
+  typename N::Ratio height{};     ///< 0 where nothing is felt
   typename N::Ratio offset[3]{};  ///< from the tool's centre to the peak, over the reach; its axes
   typename N::Ratio normal[3]{};  ///< of the tool at the peak, outward; its axes, length near 1
   typename N::Ratio spread{};     ///< of the tool's normals there: 1 - (mean normal)^2
@@ -150,7 +150,7 @@ constexpr void peak_offset(const PointSums<N>& sums, typename N::Ratio e,
 
 /// The peak of density over a tool's surface, from the sums over its close samples: two means, with
 /// powers 32 and 64, tell e and the summit (docs/theory.md 3.5); where it is, as in peak_offset;
-/// and likewise, with powers 8 and 16, the tool's normal there.
+/// and the mean normal with power 16 is the tool's there.
 template <class N>
 [[nodiscard]] constexpr Closeup<N> peak_of(const CloseSums<N>& sums) noexcept {
   using Ratio = typename N::Ratio;
@@ -164,8 +164,7 @@ template <class N>
   const Ratio e =
       std::clamp(Ratio(kLowOne) * (above - below) / (below - Ratio(kLowOne / kHighOne) * above),
                  Ratio(0), Ratio(2));
-  constexpr auto kUnsampled = Ratio(1.02);  // no summit is far above the highest sample
-  const Ratio summit = std::min(above + above * (e / Ratio(kHighOne)), kUnsampled);
+  const Ratio summit = above + above * (e / Ratio(kHighOne));
   if constexpr (N::kIsFixed) {
     found.height = Ratio::from_raw(sums.top << 9) * summit;
   } else {
@@ -176,15 +175,10 @@ template <class N>
                 peak = mean(sums.high, sums.high.offset[axis]);
     found.offset[axis] = peak + (peak - near) * ((Ratio(kLowOne) + e) / Ratio(kHighOne - kLowOne));
   }
-  constexpr double kWideOne = CloseSums<N>::kWidePower + 1,
-                   kMiddleOne = CloseSums<N>::kMiddlePower + 1;
   Ratio mean_square{};
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    const Ratio wide = mean_of<N>(sums.wide.normal[axis], sums.wide.weight, 9),
-                middle = mean_of<N>(sums.middle.normal[axis], sums.middle.weight, 9);
-    mean_square = mean_square + wide * wide;
-    found.normal[axis] =
-        middle + (middle - wide) * ((Ratio(kWideOne) + e) / Ratio(kMiddleOne - kWideOne));
+    found.normal[axis] = mean_of<N>(sums.facing.normal[axis], sums.facing.weight, 9);
+    mean_square = mean_square + found.normal[axis] * found.normal[axis];
   }
   found.spread = std::max(Ratio(1) - mean_square, Ratio(0));
   return found;

@@ -45,25 +45,6 @@ template <class N>
   }
 }
 
-/// `PointMeans::gradient` alone.
-template <class N>
-[[nodiscard]] constexpr ContactVec<typename N::Ratio> mean_gradient(
-    const PointSums<N>& sums, const DensityScale& scale, const ContactFrame<N>& frame) noexcept {
-  using Ratio = typename N::Ratio;
-  const auto along = [&](typename N::Sum part) {
-    const Ratio unscaled = mean_of<N>(part, sums.weight, 9);
-    if constexpr (N::kIsFixed) {
-      const std::int64_t raw = unscaled.raw();  // 2^28 at most; times 2^16
-      return Ratio::from_raw(saturate_i32(round_shift(raw * scale.mantissa, scale.shift)));
-    } else {
-      return unscaled;
-    }
-  };
-  const VoxelVec<Ratio> voxels{along(sums.gradient[0]), along(sums.gradient[1]),
-                               along(sums.gradient[2])};
-  return transposed(frame.voxel_from_contact) * voxels;
-}
-
 /// Turns an offset from the tool's axes to those of the world.
 template <class N>
 [[nodiscard]] constexpr ContactVec<typename N::Ratio> turned_offset(
@@ -86,7 +67,18 @@ template <class N>
   PointMeans<N> means;
   means.density = mean_of<N>(sums.density, sums.weight, 9);
   means.square = mean_of<N>(sums.square, sums.weight, 8);
-  means.gradient = mean_gradient(sums, scale, frame);
+  const auto along = [&](typename N::Sum part) {
+    const Ratio unscaled = mean_of<N>(part, sums.weight, 9);
+    if constexpr (N::kIsFixed) {
+      const std::int64_t raw = unscaled.raw();  // 2^28 at most; times 2^16
+      return Ratio::from_raw(saturate_i32(round_shift(raw * scale.mantissa, scale.shift)));
+    } else {
+      return unscaled;
+    }
+  };
+  const VoxelVec<Ratio> in_voxels{along(sums.gradient[0]), along(sums.gradient[1]),
+                                  along(sums.gradient[2])};
+  means.gradient = transposed(frame.voxel_from_contact) * in_voxels;
   typename N::Sum lift = round ? sums.density : sums.weight;  // SUM w_x
   if constexpr (N::kIsFixed) lift >>= round ? 15 : 0;         // Q24 of Q39: 16 at least
   const Ratio offset[3] = {mean_of<N>(sums.offset[0], lift, 9), mean_of<N>(sums.offset[1], lift, 9),

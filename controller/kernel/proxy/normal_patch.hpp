@@ -16,15 +16,13 @@ namespace kerf {
 /// (docs/theory.md 3.5).
 ///
 /// The tool's own samples do not tell it. Beside a rim or a point they lie on one side, where a
-/// curved face has another normal; and the gradient of one cell is up to 2 degrees off, since
-/// trilinear density is bent where the ramp of a face ends. Over a disc of some cells around the
-/// peak both even out. The samples lie on a sphere that is flattened along the normal known so far,
-/// so they follow it without a jump.
+/// curved face has another normal. The samples of a patch lie on a sphere that is flattened along
+/// the normal known so far, so they follow it without a jump.
 ///
-/// With a radius of 2 units the normal on a bump of 40 is 0.8 degrees off, not 0.65. With 32
-/// samples it is as good, but the force steps by 2.2 % of its mean, not 1.8.
-inline constexpr std::size_t kPatchSamples = 4 * kPointGroup;
-inline constexpr double kPatchRadius = 1.5;
+/// With a radius of 1.5 units the noise of a scan turns the normal by 2.0 degrees, not 1.4 (rows
+/// `sliding on CT with noise, angle`); offsets hold no 2 units in Q15.
+inline constexpr std::size_t kPatchSamples = 2 * kPointGroup;
+inline constexpr double kPatchRadius = 1.9;
 
 /// Where the tool touches two faces that look in different directions, as the walls of a slot, the
 /// mean gradient of its own samples along the patch's normal is shorter than the patch's. As it
@@ -52,20 +50,30 @@ struct Patch {
   typename N::Ratio spread{};                ///< of its normals, see below; 0 to 1
 };
 
-/// From the sums over a patch. The spread of normals, 1 - (mean normal)^2, comes from that of
-/// heights, which is free of the voxels' noise in gradients: over a disc of radius a on a ball of
-/// curvature k heights have the variance k^2 a^4 / 48 and normals k^2 a^2 / 2, so the spread is
-/// 24 / a^2 variances. The height is r over the slope, and at most the width of a face's ramp, 2
-/// units (docs/theory.md 3.5).
+/// From the means over a patch that is flattened along `normal`.
+///
+/// Across the normal the gradient g follows from where the samples' mean place is, not from their
+/// own gradients: those jump at the borders of cells, densities do not. Places have the variance
+/// R^2 / 3 along each axis of the patch, and weights r^6 grow by 6 g / r a unit: the mean place is
+/// 2 R^2 g / r (docs/theory.md 3.5).
+///
+/// The spread of normals, 1 - (mean normal)^2, comes from that of heights, which is free of the
+/// voxels' noise in gradients: over a disc of radius a on a ball of curvature k heights have the
+/// variance k^2 a^4 / 48 and normals k^2 a^2 / 2, so the spread is 24 / a^2 variances. The height
+/// is r over the slope, and at most the width of a face's ramp, 2 units (docs/theory.md 3.5).
 template <class N>
-[[nodiscard]] constexpr Patch<N> patch_of(const PointSums<N>& sums, const DensityScale& scale,
-                                          const ContactFrame<N>& frame) noexcept {
+[[nodiscard]] constexpr Patch<N> patch_of(const PointMeans<N>& means,
+                                          ContactVec<typename N::Unit> normal) noexcept {
   using Ratio = typename N::Ratio;
-  Patch<N> patch{mean_gradient<N>(sums, scale, frame)};
-  const Ratio density = mean_of<N>(sums.density, sums.weight, 9),
-              square = mean_of<N>(sums.square, sums.weight, 8);
-  const Ratio varied = std::max(square / density / density - Ratio(1), Ratio(0));
-  const Ratio height = density / std::max(norm(patch.gradient), density / Ratio(2));
+  const auto along = [](Ratio part, typename N::Unit n) { return multiply<Ratio>(part, n); };
+  const Ratio slope = along(means.gradient.x, normal.x) + along(means.gradient.y, normal.y) +
+                      along(means.gradient.z, normal.z);
+  const Ratio per_place = means.density * static_cast<Ratio>(1 / (2 * kPatchRadius));
+  Patch<N> patch{{along(slope, normal.x) + per_place * means.offset.x,
+                  along(slope, normal.y) + per_place * means.offset.y,
+                  along(slope, normal.z) + per_place * means.offset.z}};
+  const Ratio varied = std::max(means.square / means.density / means.density - Ratio(1), Ratio(0));
+  const Ratio height = means.density / std::max(norm(patch.gradient), means.density / Ratio(2));
   constexpr auto kSpread = static_cast<Ratio>(24 / (kPatchRadius * kPatchRadius));
   patch.spread = std::min(kSpread * (varied * (height * height)), Ratio(1));
   return patch;

@@ -62,10 +62,11 @@ struct SweepRules {
   /// motion of a hand ends such a row after three (tests/golden, `sweep`).
   static constexpr std::int32_t kSameTries = 4;
   static constexpr double kPush = 0.5;  ///< longest correction of one push
-  /// The tool may be this deep in one wall where a push out of it leads into another, or where no
-  /// query is left for one. What two opposite faces read differs by some hundredths
-  /// from place to place, and a tool that is turned until both hold it would stay whatever the hand
-  /// does: of tools that spin askew in slots 4 % did, with 0.03 still one in a thousand.
+  /// The tool may be this deep in one wall where a push out of it leads into another. What two
+  /// opposite faces read differs by some hundredths from place to place, and a tool that is turned
+  /// until both hold it would stay whatever the hand does: of tools that spin askew in slots 4 %
+  /// did, with 0.03 still one in a thousand. And it may be so deep where a tick has no query left
+  /// for a push before it kept any step: else it would stay, too.
   static constexpr double kWedged = 0.05;
   /// No step ends so much farther from the goal than the nearest place of the tick. With more a
   /// tool at rest wanders about on noise. With less than two kTolerance, by which allowed places
@@ -209,8 +210,10 @@ class ProxySweep {
     keep(trial.planes, known, moved);
     const ConstraintSet<N> unpushed = trial.planes;
     Place pushed{};
-    for (int push = 0; push < 2; ++push) {
-      if (allows(trial.felt, tolerance) || trial.felt.count == 0 || !may_look()) break;
+    int pushes = 0;
+    for (; pushes < 2; ++pushes) {
+      if (allows(trial.felt, tolerance) || trial.felt.count == 0) break;
+      if (!may_look() || !field_.may_query()) break;
       if (turns && field_.half_spent()) break;
       for (auto& plane : trial.planes.plane) {
         plane.depth = std::min(plane.depth, Real(SweepRules::kPush));
@@ -222,7 +225,7 @@ class ProxySweep {
       keep(trial.planes, known, moved + pushed);
     }
     trial.allowed = allows(trial.felt, tolerance);
-    if (!turns && !trial.allowed && allows_rest(first)) {
+    if (!turns && !trial.allowed && (pushes > 0 || !kept_) && allows_rest(first)) {
       return {centre, first, unpushed, first, true};
     }
     keep(trial.planes, constraints_of(first), pushed);
@@ -280,7 +283,6 @@ class ProxySweep {
   /// grooves. Returns the slide of the last place.
   constexpr Slide<N> move_to(Place goal) noexcept {
     Unit shrink = first_step();
-    bool kept = false;
     CurvatureEstimate<N> curvature;
     Route onward = route(held_by_, goal - pose_.centre);
     // Farther than any place, while the tool has to get out of the solid.
@@ -289,7 +291,7 @@ class ProxySweep {
     auto enough = Real(SweepRules::kNoMove);
     while (may_look() && !here_.buried && onward.length >= enough) {
       const Place from = pose_.centre;
-      auto step = Real(SweepRules::kStep);
+      auto step = static_cast<Real>(SweepRules::kStep);
       if (here_.count == 0) step = std::max(step, field_.free_distance(from, onward.displacement));
       const Unit capped = step < onward.length ? share<N>(step, onward.length) : Unit(1);
       const Place moved = part_of<N>(onward.displacement, shrink * capped);
@@ -308,7 +310,7 @@ class ProxySweep {
           onward = next;
           shrink = Unit(1);
           enough = Real(SweepRules::kArrived);
-          kept = true;
+          kept_ = true;
           continue;
         }
       }
@@ -323,7 +325,7 @@ class ProxySweep {
         if (shrink < Unit(fine ? SweepRules::kFinest : SweepRules::kShortest)) break;
       }
     }
-    const bool vain = !kept && onward.length >= enough && !field_.may_query();
+    const bool vain = !kept_ && onward.length >= enough && !field_.may_query();
     stuck_ticks_ = vain ? stuck_ticks_ + 1 : 0;
     if (first_step() < Unit(SweepRules::kFinest)) stuck_ticks_ = 0;
     return onward.slide;
@@ -346,6 +348,7 @@ class ProxySweep {
   Contacts<N> here_{};
   ConstraintSet<N> held_by_{};
   std::int32_t queries_ = 0;
+  bool kept_ = false;  ///< a step of the move
 };
 
 }  // namespace kerf

@@ -407,7 +407,7 @@ void sum_close_samples(const CloseLook<FixedNumbers>& look,
   const auto load = [](const std::int32_t* const(&of)[3], std::int32_t i, V(&to)[3]) {
     for (std::size_t axis = 0; axis < 3; ++axis) to[axis] = Simd::load(of[axis] + i);
   };
-  NormalVectors wide, middle;
+  NormalVectors facing;
   PowerVectors low, high;
   for (std::int32_t i = 0; i < look.count; i += kPointLanes) {
     const V t = Simd::srl32<16>(Simd::multiply32(Simd::load(look.density + i), over_top));
@@ -415,16 +415,13 @@ void sum_close_samples(const CloseLook<FixedNumbers>& look,
     V power = t, normal[3], offset[3];
     load(look.normal, i, normal);
     load(look.offset, i, offset);
-    for (int p = 1; p < CloseSums<FixedNumbers>::kWidePower; p *= 2) power = square(power);
-    wide.add(product(power, window), normal);
-    power = square(power);
-    middle.add(product(power, window), normal);
+    for (int p = 1; p < CloseSums<FixedNumbers>::kNormalPower; p *= 2) power = square(power);
+    facing.add(product(power, window), normal);
     power = square(power);
     low.add(product(power, window), t, offset);
     high.add(product(square(power), window), t, offset);
   }
-  sums.wide = wide.sums();
-  sums.middle = middle.sums();
+  sums.facing = facing.sums();
   sums.low = low.sums();
   sums.high = high.sums();
 }
