@@ -94,8 +94,12 @@ edit_all() {
 }
 
 build() {
-  local name
+  local file
   mkdir -p "$tree"
+  # What the list no longer names is copied anew.
+  { grep -rlF '"ablated.hpp"' "$tree/controller" 2>/dev/null || true; } | while IFS= read -r file; do
+    [[ " ${files[*]} " == *" ${file#"$tree/"} "* ]] || rm "$file"
+  done
   git ls-files -z --cached --others --exclude-standard | xargs -0 cp -p --parents -u -t "$tree"
   cat >"$tree/ablated.hpp.new" <<'CPP'
 #pragma once

@@ -59,6 +59,8 @@ Pressed press(Miller& miller, const Hand& how, const LoadedScene& scene, const S
   Point hand = how.from, proxy = how.from;
   Pressed seen;
   int still = 0;
+  // What a shaft may bear changes with the tremor: it is judged some times.
+  const auto judged = [tick_s](int n) { return static_cast<int>(n * tick_s * 6 / kTrappedS); };
   const int ticks = static_cast<int>(seconds * scene.servo.rate_hz);
   for (int tick = 0; tick < ticks && length(proxy) <= kLeftMm; ++tick) {
     const Point held =
@@ -73,12 +75,12 @@ Pressed press(Miller& miller, const Hand& how, const LoadedScene& scene, const S
     const bool must_cut = length(out.force_n) > must_cut_n;
     seen.touched = seen.touched || must_cut;
     still = must_cut && out.removed_steps == 0 ? still + 1 : 0;
+    if (judged(still) > judged(still - 1) &&
+        force_on_head(miller, scene, tool, out) <= must_cut_n) {
+      seen.by_shaft = true;
+      still = 0;
+    }
     if (still * tick_s > kTrappedS) {
-      if (force_on_head(miller, scene, tool, out) <= must_cut_n) {
-        seen.by_shaft = true;
-        still = 0;
-        continue;
-      }
       seen.longest_s = still * tick_s;
       break;
     }
