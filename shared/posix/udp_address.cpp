@@ -43,7 +43,8 @@ UdpAddress resolve_udp(const std::string& text) {
   wanted.ai_flags = AI_NUMERICSERV;
   addrinfo* found = nullptr;
   if (const int failed = getaddrinfo(host.c_str(), port.c_str(), &wanted, &found); failed != 0) {
-    address.error = gai_strerror(failed);
+    address.error = failed == EAI_NONAME ? "'" + host + "' is no address and no known name"
+                                         : std::string(gai_strerror(failed));
     return address;
   }
   const std::unique_ptr<addrinfo, FreeAddresses> list(found);
