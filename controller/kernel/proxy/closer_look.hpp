@@ -77,12 +77,13 @@ class CloserLook {
                           multiply<Ratio>(means_.gradient.z, facing.z));
     const Unit facing_share(std::clamp(along / steep, Ratio(0), Ratio(1)));
     const Unit alike = Unit(1) - falling_share<N>(facing_share, kAlike, kUnlike);
-    // There the point shell's depth counts, less than the look's by what two walls may wedge the
-    // tool at most: an edge that the look sees does not get in.
+    // There the point shell's depth counts, but not so much less than the look's that a step from
+    // an allowed place would end beyond the middle of the thinnest wall (docs/theory.md 4.2).
+    constexpr double kLess = 1 - SweepRules::kStep - SweepRules::kWedged;
     const Ratio own = peak_height(means_, false), highest = std::max(seen.height, means_.top),
                 slope = slope_along(means_, plane.normal, false);
     plane.depth = std::max(depth_of<N>(own + multiply<Ratio>(alike, highest - own), slope),
-                           depth_of<N>(highest, slope) - Real(2 * SweepRules::kWedged));
+                           depth_of<N>(highest, slope) - Real(kLess));
     const Unit counts = alike * narrowness<N>(sums_, means_.top);
     plane.arm = plane.arm + part_of<N>(arm - plane.arm, counts);
     const auto own_normal = direction<N>(-turned_offset<N>(seen.normal, reader_.rows()));
