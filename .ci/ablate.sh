@@ -16,7 +16,7 @@ usage() {
   --only NAME,...  these of .ci/ablations.txt; NAME+NAME: both at once   (all)
   --list           the names
   --count          how many named constants the contact has
-  --check          only whether each text still stands once in its file
+  --check          only whether each text still stands once in its file and its substitutes compile
   --full           every case of the rows, not a hundredth of them
   --stages N       no stages beyond: 1 walls, rests, slides, shapes; 2 tests of the contact; 3 traps;
                    4 tests of the servo; 5 cutting   (5)
@@ -93,15 +93,9 @@ edit_all() {
   done
 }
 
-build() {
-  local file
-  mkdir -p "$tree"
-  # What the list no longer names is copied anew.
-  { grep -rlF '"ablated.hpp"' "$tree/controller" 2>/dev/null || true; } | while IFS= read -r file; do
-    [[ " ${files[*]} " == *" ${file#"$tree/"} "* ]] || rm "$file"
-  done
-  git ls-files -z --cached --others --exclude-standard | xargs -0 cp -p --parents -u -t "$tree"
-  cat >"$tree/ablated.hpp.new" <<'CPP'
+# write_switches FILE: the header that tells what is off.
+write_switches() {
+  cat >"$1" <<'CPP'
 #pragma once
 #include <array>
 #include <cstddef>
@@ -125,6 +119,32 @@ constexpr bool ablated(std::size_t i) noexcept {
 }
 }  // namespace kerf
 CPP
+}
+
+# check: compiles the file that holds the whole contact, with all switches in it.
+check() {
+  local folder errors
+  folder=$(mktemp -d)
+  # shellcheck disable=SC2064  # by its name of now
+  trap "rm -rf '$folder'" EXIT
+  git ls-files -z --cached --others --exclude-standard 'controller/*.[ch]pp' 'shared/*.hpp' |
+    xargs -0 cp -p --parents -t "$folder"
+  write_switches "$folder/ablated.hpp"
+  edit_all "$folder"
+  errors=$("${CXX:-c++}" -std=c++20 -I "$folder" -S -o /dev/null "$folder/controller/servo/tool_forces.cpp" 2>&1) ||
+    die "$list: does not compile: $(grep -m 1 error <<<"$errors"); mend it"
+  echo "ablate: ${#names[@]} texts stand once each and compile"
+}
+
+build() {
+  local file
+  mkdir -p "$tree"
+  # What the list no longer names is copied anew.
+  { grep -rlF '"ablated.hpp"' "$tree/controller" 2>/dev/null || true; } | while IFS= read -r file; do
+    [[ " ${files[*]} " == *" ${file#"$tree/"} "* ]] || rm "$file"
+  done
+  git ls-files -z --cached --others --exclude-standard | xargs -0 cp -p --parents -u -t "$tree"
+  write_switches "$tree/ablated.hpp.new"
   if cmp -s "$tree/ablated.hpp.new" "$tree/ablated.hpp"; then
     rm "$tree/ablated.hpp.new"
   else
@@ -253,8 +273,7 @@ while (($#)); do
     --list) printf '%s\n' "${names[@]}" && exit ;;
     --count) constants && exit ;;
     --check)
-      edit_all
-      echo "ablate: ${#names[@]} texts stand once each"
+      check
       exit
       ;;
     --full) full=1 ;;

@@ -79,11 +79,11 @@ class CloserLook {
     const Unit alike = Unit(1) - falling_share<N>(facing_share, kAlike, kUnlike);
     // There the point shell's depth counts, but not so much less than the look's that a step from
     // an allowed place would end beyond the middle of the thinnest wall (docs/theory.md 4.2).
-    constexpr double kLess = 1 - SweepRules::kStep - SweepRules::kWedged;
+    const auto less = static_cast<Real>(1 - SweepRules::kStep - SweepRules::kWedged);
     const Ratio own = peak_height(means_, false), highest = std::max(seen.height, means_.top),
                 slope = slope_along(means_, plane.normal, false);
     plane.depth = std::max(depth_of<N>(own + multiply<Ratio>(alike, highest - own), slope),
-                           depth_of<N>(highest, slope) - Real(kLess));
+                           depth_of<N>(highest, slope) - less);
     const Unit counts = alike * narrowness<N>(sums_, means_.top);
     plane.arm = plane.arm + part_of<N>(arm - plane.arm, counts);
     const auto own_normal = direction<N>(-turned_offset<N>(seen.normal, reader_.rows()));
