@@ -97,7 +97,8 @@ struct DensityField {
   VoxelGrid grid;
   const Density* density = nullptr;
   DensityScale scale;
-  FreeBricks free;
+  FreeBricks free{};      ///< of density that contact counts
+  FreeBricks passable{};  ///< and of all that bears nothing (plan/tables/free_brick_map.hpp)
 };
 
 /// Sums over the samples of one query (docs/theory.md 3.2, 3.3). r is the density of contact and w
