@@ -54,6 +54,7 @@ refused controller/servo/x.cpp '#include <unistd.h>' '<unistd.h>'
 refused shared/numeric/x.hpp '#include <immintrin.h>' '<immintrin.h>'
 refused shared/text/words.hpp '#include <toml++/toml.h>' '<toml++/toml.h>'
 refused shared/text/other.cpp '#include <nlohmann/json.hpp>' '<nlohmann/json.hpp>'
+refused tests/shell/x.cpp '#include <nlohmann/json.hpp>' '<nlohmann/json.hpp>'
 refused shared/text/json.cpp '#include <CLI/CLI.hpp>' '<CLI/CLI.hpp>'
 refused hil/program/x.cpp '#  include <toml++/toml.h>' '<toml++/toml.h>'
 

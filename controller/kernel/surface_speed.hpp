@@ -23,12 +23,11 @@ inline constexpr double kSpeedFloor = 0.08;
 /// the next in the high ones: linear steps between.
 inline constexpr std::size_t kRootSteps = 1024;
 inline constexpr std::array<std::uint32_t, kRootSteps + 1> kSpeedRoots = [] {
-  const auto root = [](std::size_t i) {
-    return static_cast<std::uint32_t>(integer_sqrt(std::uint64_t{i} << 20));
-  };
   std::array<std::uint32_t, kRootSteps + 1> roots{};
-  for (std::size_t i = 0; i < kRootSteps; ++i) roots[i] = root(i) | (root(i + 1) - root(i)) << 16;
-  roots[kRootSteps] = root(kRootSteps);
+  for (std::size_t i = 1; i <= kRootSteps; ++i) {
+    roots[i] = static_cast<std::uint32_t>(integer_sqrt(std::uint64_t{i} << 20));
+    roots[i - 1] |= (roots[i] - roots[i - 1]) << 16;
+  }
   return roots;
 }();
 

@@ -57,9 +57,7 @@ TEST_CASE("contact and modification sums are double's within 1.7e-4 of full scal
   const TestVolume volume = ball_of_12();
   const auto tool = paper_ball(10);
   const auto field = gradients<DoubleNumbers>(GradientKernel::farid, volume);
-  const auto exact = [&](VoxelIndex v) {
-    return gradient_exact(kExactFarid, volume.grid, volume.density, v);
-  };
+  const ExactField exact(kExactFarid, volume);
   const double full_scale = kDensityMax * std::numbers::pi * 25;  // a flat face at the equator
   Cutter<FixedNumbers> fixed(16);
   Cutter<DoubleNumbers> wide(16);

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <cstdint>
+#include <optional>
+#include <utility>
 #include <vector>
 
 #include "tests/kernel/definitions.hpp"
@@ -9,28 +10,29 @@
 
 namespace kerf::test {
 
-/// `gradient_exact` of every voxel, and of those outside that the volume reaches.
+/// `gradient_exact` of any voxel of a volume as it is now, made when it is first asked for: a tool
+/// meets few of them. Zero where the volume does not reach.
 class ExactField {
  public:
-  ExactField(const ExactTaps& taps, const TestVolume& volume)
-      : grid_{volume.grid.nx + 4, volume.grid.ny + 4, volume.grid.nz + 4} {
-    values_.reserve(grid_.voxel_count());
-    for (std::int32_t z = -2; z < volume.grid.nz + 2; ++z) {
-      for (std::int32_t y = -2; y < volume.grid.ny + 2; ++y) {
-        for (std::int32_t x = -2; x < volume.grid.nx + 2; ++x) {
-          values_.push_back(gradient_exact(taps, volume.grid, volume.density, {x, y, z}));
-        }
-      }
-    }
-  }
+  ExactField(const ExactTaps& taps, TestVolume volume)
+      : taps_(taps),
+        volume_(std::move(volume)),
+        grid_{volume_.grid.nx + 4, volume_.grid.ny + 4, volume_.grid.nz + 4},
+        values_(grid_.voxel_count()) {}
+
   SumVec<FixedNumbers> operator()(VoxelIndex v) const {
     const VoxelIndex at{v.x + 2, v.y + 2, v.z + 2};
-    return grid_.contains(at) ? values_[grid_.index(at.x, at.y, at.z)] : SumVec<FixedNumbers>{};
+    if (!grid_.contains(at)) return {};
+    auto& value = values_[grid_.index(at.x, at.y, at.z)];
+    if (!value) value = gradient_exact(taps_, volume_.grid, volume_.density, v);
+    return *value;
   }
 
  private:
+  const ExactTaps& taps_;
+  TestVolume volume_;
   VoxelGrid grid_;
-  std::vector<SumVec<FixedNumbers>> values_;
+  mutable std::vector<std::optional<SumVec<FixedNumbers>>> values_;
 };
 
 }  // namespace kerf::test

@@ -7,7 +7,6 @@
 #include <vector>
 
 #include <doctest/doctest.h>
-#include <nlohmann/json.hpp>
 #include <unistd.h>
 
 #include "lab/extremes/comparison.hpp"
@@ -16,6 +15,7 @@
 #include "lab/program.hpp"
 #include "lab/rig/contact_rig.hpp"
 #include "lab/rig/exact_touch.hpp"
+#include "tests/json.hpp"
 
 using namespace kerf::extremes;
 
@@ -64,16 +64,15 @@ TEST_CASE("the report has each row with its limit and whether it is kept, and th
   const auto file = std::filesystem::temp_directory_path() /
                     ("kerf-extremes-" + std::to_string(getpid()) + ".json");
   const Answer answer = extremes({"--quick", "--only", "slides", "--report", file.c_str()});
-  std::ifstream stream(file);
-  const auto rows = nlohmann::json::parse(stream)["rows"];
+  const auto rows = kerf::test::read_json_file(file)["rows"];
   std::filesystem::remove(file);
   CHECK(rows.size() == 12);
   bool all = true;
-  for (const auto& row : rows) {
+  for (const kerf::test::ReadJson row : rows) {
     CHECK(row["group"] == "slides");
     CHECK(row["pass"] == (row["value"] <= row["limit"]));
-    all = all && row["pass"];
-    CHECK(answer.said.find(row["name"]) != std::string::npos);
+    all = all && row["pass"].get<bool>();
+    CHECK(answer.said.find(row["name"].get<std::string>()) != std::string::npos);
   }
   CHECK(answer.code == (all ? 0 : 1));
 }

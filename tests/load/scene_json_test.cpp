@@ -7,16 +7,18 @@
 #include <vector>
 
 #include <doctest/doctest.h>
-#include <nlohmann/json.hpp>
 
 #include "controller/scene/materials.hpp"
 #include "controller/tool/tool_shapes.hpp"
 #include "shared/numeric/fnv1a.hpp"
+#include "tests/json.hpp"
 #include "tests/scene/support.hpp"
 
 namespace {
 
-using nlohmann::json;
+using kerf::test::read_json;
+using kerf::test::ReadJson;
+using List = kerf::Json::List;
 
 kerf::LoadedScene small_scene() {
   kerf::LoadedScene scene;
@@ -41,52 +43,53 @@ kerf::LoadedScene small_scene() {
 }  // namespace
 
 TEST_CASE("the scene's JSON holds what a reader of the segment needs") {
-  const json root = json::parse(kerf::canonical_json(small_scene()));
-  const json& volume = root.at("volumes").at(0);
-  CHECK(volume.at("name") == "block");
-  CHECK(volume.at("file") == "block.nrrd");
-  CHECK(volume.at("iso") == 30000);
-  CHECK(volume.at("solid") == true);
-  CHECK(volume.at("grid") == json({4, 5, 6}));
-  CHECK(volume.at("spacing_mm").at(2).get<double>() == 1.0 / 3);
-  CHECK(volume.at("pose").at("position_mm") == json({1.0, 2.0, 3.0}));
-  CHECK(volume.at("pose").at("orientation") == json({0.0, 0.0, 0.0, 1.0}));
+  const ReadJson root = read_json(kerf::canonical_json(small_scene()));
+  const ReadJson volume = root["volumes"][0];
+  CHECK(volume["name"] == "block");
+  CHECK(volume["file"] == "block.nrrd");
+  CHECK(volume["iso"] == 30000);
+  CHECK(volume["solid"] == true);
+  CHECK(volume["grid"] == ReadJson(List{4, 5, 6}));
+  CHECK(volume["spacing_mm"][2].get<double>() == 1.0 / 3);
+  CHECK(volume["pose"]["position_mm"] == ReadJson(List{1.0, 2.0, 3.0}));
+  CHECK(volume["pose"]["orientation"] == ReadJson(List{0.0, 0.0, 0.0, 1.0}));
 
   const kerf::LoadedScene scene = small_scene();
-  const json& tool = root.at("tools").at(0);
-  CHECK(tool.at("round") == true);
-  CHECK(tool.at("turns") == true);
-  CHECK(tool.at("size_vox") == json({4, 4, 4}));
-  REQUIRE(tool.at("offsets_half_pitch").size() == 3 * scene.tools[0].offsets.size());
-  CHECK(tool.at("offsets_half_pitch").at(0) == scene.tools[0].offsets[0][0]);
-  CHECK(tool.at("offsets_half_pitch").at(5) == scene.tools[0].offsets[1][2]);
-  CHECK(tool.at("profile").front() == json({-0.25, 0.0}));
-  CHECK(tool.at("profile").at(16).size() == 2);
-  CHECK(root.at("tools").at(1).at("shape") == "wheel");
-  CHECK(root.at("active_tool") == 1);
-  CHECK(root.at("materials").at(1).at("name") == "enamel");
-  CHECK(root.at("materials").at(1).at("colour").size() == 3);
-  CHECK(root.at("device").at("torque_scale").at(0) == 0.342);
-  CHECK(root.at("force").at("model") == "proxy");
-  CHECK(root.at("cut").at("model") == "preston");
-  CHECK(root.at("limits").at("force_n") == 3.3);
-  CHECK(root.at("servo").at("numeric") == "fixed");
-  CHECK(root.at("servo").at("kernel") == "farid");
+  const ReadJson tool = root["tools"][0];
+  CHECK(tool["round"] == true);
+  CHECK(tool["turns"] == true);
+  CHECK(tool["size_vox"] == ReadJson(List{4, 4, 4}));
+  REQUIRE(tool["offsets_half_pitch"].size() == 3 * scene.tools[0].offsets.size());
+  CHECK(tool["offsets_half_pitch"][0] == scene.tools[0].offsets[0][0]);
+  CHECK(tool["offsets_half_pitch"][5] == scene.tools[0].offsets[1][2]);
+  CHECK(tool["profile"][0] == ReadJson(List{-0.25, 0.0}));
+  CHECK(tool["profile"][16].size() == 2);
+  CHECK(root["tools"][1]["shape"] == "wheel");
+  CHECK(root["active_tool"] == 1);
+  CHECK(root["materials"][1]["name"] == "enamel");
+  CHECK(root["materials"][1]["colour"].size() == 3);
+  CHECK(root["device"]["torque_scale"][0] == 0.342);
+  CHECK(root["force"]["model"] == "proxy");
+  CHECK(root["cut"]["model"] == "preston");
+  CHECK(root["limits"]["force_n"] == 3.3);
+  CHECK(root["servo"]["numeric"] == "fixed");
+  CHECK(root["servo"]["kernel"] == "farid");
 }
 
 TEST_CASE("the JSON is canonical: one line, sorted keys, and the same after a round trip") {
   const std::string text = kerf::canonical_json(small_scene());
   CHECK(text == kerf::canonical_json(small_scene()));
   CHECK(text.find('\n') == std::string::npos);
-  CHECK(json::parse(text).dump() == text);  // nlohmann sorts keys on parsing
+  CHECK(read_json(text).canonical() == text);
+  CHECK(std::ranges::is_sorted(read_json(text).members(), {}, &kerf::Json::Member::key));
   CHECK(text.rfind("{\"active_tool\":1,\"cut\":{\"friction\":", 0) == 0);
 }
 
 TEST_CASE("a title is told, and changes nothing for the scenes without one") {
   kerf::LoadedScene scene = small_scene();
-  CHECK_FALSE(json::parse(kerf::canonical_json(scene)).contains("scene"));
+  CHECK_FALSE(read_json(kerf::canonical_json(scene)).contains("scene"));
   scene.title = "a block";
-  CHECK(json::parse(kerf::canonical_json(scene)).at("scene").at("title") == "a block");
+  CHECK(read_json(kerf::canonical_json(scene))["scene"]["title"] == "a block");
 }
 
 TEST_CASE("where a scene lies does not change its identity, anything in it does") {
@@ -131,6 +134,5 @@ TEST_CASE("the hash is FNV-1a") {
 TEST_CASE("a path that is not UTF-8 does not break the JSON") {
   kerf::LoadedScene scene = small_scene();
   scene.volumes[0].file = "caf\xe9.nrrd";
-  CHECK(json::parse(kerf::canonical_json(scene)).at("volumes").at(0).at("file") ==
-        "caf\uFFFD.nrrd");
+  CHECK(read_json(kerf::canonical_json(scene))["volumes"][0]["file"] == "caf\uFFFD.nrrd");
 }

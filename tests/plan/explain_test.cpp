@@ -6,9 +6,9 @@
 #include <vector>
 
 #include <doctest/doctest.h>
-#include <nlohmann/json.hpp>
 
 #include "controller/plan/cost/work_budget.hpp"
+#include "tests/json.hpp"
 #include "tests/servo/support.hpp"
 
 using namespace kerf;
@@ -93,7 +93,7 @@ TEST_CASE("an explanation is told in text and JSON with the same figures") {
   CHECK(text.find("64 B") != std::string::npos);
   CHECK(text.find("at most 500.0 us: half a tick at 1000 Hz") != std::string::npos);
   CHECK(text.find("10.0 us     2.0 %") != std::string::npos);  // both volumes
-  const auto json = nlohmann::json::parse(explanation_json(explanation));
+  const auto json = kerf::test::read_json(explanation_json(explanation));
   CHECK(json["ticks"][0]["stages"][0]["operations"] == 4000);
   CHECK(json["ticks"][0]["stages"][0]["timed_operations"] == 3000);
   CHECK(json["ticks"][0]["predicted_us"] == 7.5);

@@ -9,6 +9,7 @@
 
 #include <doctest/doctest.h>
 
+#include "tests/json.hpp"
 #include "tests/programs/pair.hpp"
 
 using kerf::test::eventually;
@@ -34,7 +35,8 @@ TEST_CASE("kill -9 of the emulator: fault in the report, exit 1 after 2000 ticks
   CHECK(pair.controller->wait() == 1);
   const auto report = pair.report();
   const auto met = [&](const char* name) {
-    return std::ranges::any_of(report["faults"], [&](const auto& f) { return f["name"] == name; });
+    return std::ranges::any_of(report["faults"],
+                               [&](const kerf::test::ReadJson& f) { return f["name"] == name; });
   };
   CHECK(met("stale_input"));
   CHECK(met("device_gone"));
@@ -126,7 +128,7 @@ TEST_CASE("a controller that stood still with all its threads pushes again only 
   }
   CHECK(standstills >= 1);
   const auto events = pair.report()["events"];
-  CHECK(std::ranges::any_of(events, [](const auto& event) {
+  CHECK(std::ranges::any_of(events, [](const kerf::test::ReadJson& event) {
     return event["name"] == "watchdog" || event["name"] == "stood_still";
   }));
 }

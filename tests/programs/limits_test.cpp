@@ -10,6 +10,7 @@
 #include <doctest/doctest.h>
 #include <sys/stat.h>
 
+#include "tests/json.hpp"
 #include "tests/programs/pair.hpp"
 
 using kerf::test::eventually;
@@ -179,7 +180,7 @@ TEST_CASE("a stack that is just enough loads a scene, runs and reports") {
   servo.insert(servo.end(), {"--seconds", "0.3", "--report", (folder / "report.json").string()});
   Process controller(after("ulimit -s 1024", servo), folder / "controller.log");
   CHECK(controller.wait() == 0);
-  CHECK(nlohmann::json::parse(kerf::test::text_of(folder / "report.json"))["ticks"] == 300);
+  CHECK(kerf::test::read_json_file(folder / "report.json")["ticks"] == 300);
 }
 #endif
 
@@ -223,7 +224,7 @@ TEST_CASE("without standard descriptors nothing else takes their numbers, and al
     program->signal(SIGTERM);
     CHECK(program->wait() == 2);  // what it had to tell is lost
   }
-  const auto report = nlohmann::json::parse(kerf::test::text_of(folder / "report.json"));
+  const auto report = kerf::test::read_json_file(folder / "report.json");
   CHECK(report["end"] == "stopped");
   CHECK(report["refused_packets"] == 0);
 }
@@ -322,8 +323,9 @@ TEST_CASE("--probe for a device that is not there ends with 1") {
                  (folder / "r.json").string()},
                 folder / "log");
   const int code = probe.wait();
-  const auto devices = nlohmann::json::parse(kerf::test::text_of(folder / "r.json"))["devices"];
-  const bool is_there = std::ranges::any_of(
-      devices, [](const auto& device) { return device["device"] == "woodenhaptics"; });
+  const auto devices = kerf::test::read_json_file(folder / "r.json")["devices"];
+  const bool is_there = std::ranges::any_of(devices, [](const kerf::test::ReadJson& device) {
+    return device["device"] == "woodenhaptics";
+  });
   CHECK(code == (is_there ? 0 : 1));
 }

@@ -8,10 +8,10 @@
 #include <string>
 #include <vector>
 
-#include <nlohmann/json.hpp>
 #include <unistd.h>
 
 #include "shared/segment/hand_over.hpp"
+#include "tests/json.hpp"
 #include "tests/programs/process.hpp"
 
 namespace kerf::test {
@@ -82,9 +82,7 @@ struct Pair {
         },
         patience);
   }
-  [[nodiscard]] nlohmann::json report() const {
-    return nlohmann::json::parse(text_of(folder / "report.json"));
-  }
+  [[nodiscard]] ReadJson report() const { return read_json_file(folder / "report.json"); }
 };
 
 }  // namespace kerf::test

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include <doctest/doctest.h>
-#include <nlohmann/json.hpp>
 
+#include "tests/json.hpp"
 #include "tests/programs/pair.hpp"
 
 using kerf::test::eventually;
@@ -61,11 +61,12 @@ struct Place {
             seconds};
   }
   /// A controller until its end; its report.
-  [[nodiscard]] nlohmann::json visit(int code, const Words& options) const {
+  [[nodiscard]] kerf::test::ReadJson visit(int code, const Words& options) const {
     const std::string report = (folder / "report.json").string();
     Process process(controller(options + Words{"--report", report}), folder / "visit.log");
     CHECK(process.wait() == code);
-    return nlohmann::json::parse(text_of(report), nullptr, false);
+    return std::filesystem::exists(report) ? kerf::test::read_json_file(report)
+                                           : kerf::test::ReadJson();
   }
 };
 
@@ -176,8 +177,8 @@ TEST_CASE("each client gets device and hand anew, and one that does not fit dist
   emulator.signal(SIGTERM);
   CHECK(emulator.wait() == 0);
   CHECK(emulator.output().find("wants a device omni, the emulator is falcon") != std::string::npos);
-  const auto report = nlohmann::json::parse(text_of(told));
-  const double served_s = report["seconds"];
+  const auto report = kerf::test::read_json_file(told);
+  const auto served_s = report["seconds"].get<double>();
   const auto ticks = 2 * (first["ticks"].get<double>() + first["armed_at_tick"].get<double>());
   CHECK(served_s == doctest::Approx(ticks / 1000).epsilon(0.01));
   CHECK(report["commands_received"].get<double>() == doctest::Approx(ticks).epsilon(0.01));

@@ -10,12 +10,12 @@
 #include <utility>
 
 #include <doctest/doctest.h>
-#include <nlohmann/json.hpp>
 
 #include "shared/numeric/fnv1a.hpp"
 #include "shared/posix/hex64.hpp"
 #include "shared/segment/hand_over.hpp"
 #include "shared/volume/density_hash.hpp"
+#include "tests/json.hpp"
 #include "tests/programs/pair.hpp"
 
 using kerf::test::eventually;
@@ -45,7 +45,7 @@ std::string refused(const std::vector<std::string>& arguments) {
 }  // namespace
 
 TEST_CASE("virtual time: the same demo twice gives the same volume and output hashes") {
-  nlohmann::json reports[2];
+  kerf::test::ReadJson reports[2];
   for (auto& report : reports) {
     Pair pair;
     pair.start("cut_cavity.toml", {"--virtual", "--seconds", "4"}, {"--lockstep"});
@@ -69,7 +69,7 @@ TEST_CASE("virtual time: faults keep packets back, and the same run gives the sa
        {Case{"late_reports", 0, 5}, Case{"lost_long", 1, 30}, Case{"silence", 1, 300},
         Case{"duplicated", 0, 0}, Case{"lost_commands", 0, 0}}) {
     CAPTURE(fault);
-    nlohmann::json reports[2];
+    kerf::test::ReadJson reports[2];
     for (auto& report : reports) {
       Pair pair;
       pair.scene = small_scene(pair.folder);
@@ -122,7 +122,7 @@ TEST_CASE("virtual time: a stiffness that no port takes can be studied, and goes
     pair.start("touch.toml", {"--virtual", "--seconds", "3", "--rate", "250"},
                {"--lockstep", "--rate", "250", "--output-delay", delay});
     CHECK(pair.controller->wait() == 0);
-    const nlohmann::json report = pair.report();
+    const kerf::test::ReadJson report = pair.report();
     CHECK(report["peak_force_n"] <= 3.3);
     return report["energy_j"].get<double>();
   };
@@ -135,7 +135,7 @@ TEST_CASE("virtual time: a stiffness that no port takes can be studied, and goes
 }
 
 TEST_CASE("a tool from an STL file cuts the same voxels in every run") {
-  nlohmann::json reports[2];
+  kerf::test::ReadJson reports[2];
   for (auto& report : reports) {
     Pair pair;
     pair.scene = "fluted_bur.toml";
@@ -183,7 +183,7 @@ TEST_CASE("readers that come, die and come again do not change what the servo co
       }
     }
     REQUIRE(pair.controller->wait() == 0);
-    hashes[watched ? 1 : 0] = pair.report()["output_hash"];
+    hashes[watched ? 1 : 0] = pair.report()["output_hash"].get<std::string>();
   }
   CHECK(hashes[0] == hashes[1]);
 }
@@ -260,7 +260,7 @@ TEST_CASE("a reader resets the volumes: the mirror follows, and the report count
         kerf::ReplyStatus::refused);
   CHECK(connection->send({.kind = kerf::CommandKind::reset}).status == kerf::ReplyStatus::accepted);
   CHECK(pair.controller->wait() == 0);
-  const nlohmann::json report = pair.report();
+  const kerf::test::ReadJson report = pair.report();
   CHECK(report["resets"] == 1);
   REQUIRE(report["event_count"] > 0);
   CHECK(report["events"].back()["name"] == "reset");
@@ -294,11 +294,11 @@ TEST_CASE("--explain tells what is really allocated, and what each tool's tick t
                      folder / "explain.log");
   CHECK(controller.wait() == 0);
   CHECK(text_of(folder / "explain.log").find("ball 16 in phantom: surface/") != std::string::npos);
-  const auto json = nlohmann::json::parse(text_of(folder / "explain.json"));
+  const auto json = kerf::test::read_json_file(folder / "explain.json");
   CHECK(json["ticks"].size() == 3);
-  for (const auto& tick : json["ticks"]) {
+  for (const kerf::test::ReadJson tick : json["ticks"]) {
     CHECK(tick["measured_us"] > 0);
-    for (const auto& stage : tick["stages"]) {
+    for (const kerf::test::ReadJson stage : tick["stages"]) {
       CHECK(stage["operations"] > 0);
       CHECK(stage["predicted_us"] > 0);
     }
@@ -335,12 +335,12 @@ TEST_CASE("--probe shows each device, and its motors never push") {
     REQUIRE(probe.wait() == 0);
     CHECK(emulator.wait() == 0);
     CHECK(probe.output().find("tip ") != std::string::npos);
-    const auto seen = nlohmann::json::parse(text_of(folder / "probe.json"));
+    const auto seen = kerf::test::read_json_file(folder / "probe.json");
     CHECK(seen["reports"] > 1000);
     CHECK(seen["lost_packets"] == 0);
     CHECK(seen["homed"] == true);
     CHECK(seen["calibrated"] == true);
-    const auto told = nlohmann::json::parse(text_of(folder / "emulator.json"));
+    const auto told = kerf::test::read_json_file(folder / "emulator.json");
     CHECK(told["commands_received"] > 100);
     CHECK(told["peak_motor_force_n"] == 0);
   }
@@ -351,7 +351,7 @@ TEST_CASE("--probe without a port says what is there, with one that is silent it
   Process around({kBin + "/kerf-controller", "--probe", "--report", (folder / "r.json").string()},
                  folder / "log");
   CHECK(around.wait() == 0);
-  CHECK(nlohmann::json::parse(text_of(folder / "r.json")).contains("missing"));
+  CHECK(kerf::test::read_json_file(folder / "r.json").contains("missing"));
   CHECK(refused({kBin + "/kerf-controller", "--probe", "--port", "fw"}).find("which device") !=
         std::string::npos);
   const std::string socket = (folder / "port").string();

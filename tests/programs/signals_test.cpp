@@ -11,6 +11,7 @@
 
 #include <doctest/doctest.h>
 
+#include "tests/json.hpp"
 #include "tests/programs/pair.hpp"
 
 using kerf::test::eventually;
@@ -125,7 +126,7 @@ TEST_CASE("before there is a device: exit 0, one line and a report of what was u
                                                (folder / "none").string()
                                          : "loading " + kScenes + "/touch.toml";
       CHECK(controller.output() == "kerf: stopped before there was a device; " + waiting + "\n");
-      const auto report = nlohmann::json::parse(kerf::test::text_of(folder / "report.json"));
+      const auto report = kerf::test::read_json_file(folder / "report.json");
       CHECK(report["end"] == "stopped");
       CHECK(report["waiting"] == waiting);
       CHECK(report["ticks"] == 0);
@@ -147,7 +148,7 @@ TEST_CASE("a probe that is stopped before its device answers has seen none: one 
   CHECK(probe.wait() == 1);
   const std::string waiting = "waiting for a device that answers at --port " + port;
   CHECK(probe.output() == "kerf: stopped before there was a device; " + waiting + "\n");
-  const auto report = nlohmann::json::parse(kerf::test::text_of(folder / "probe.json"));
+  const auto report = kerf::test::read_json_file(folder / "probe.json");
   CHECK(report["waiting"] == waiting);
   CHECK(report["device"] == "omni");
 }

@@ -6,11 +6,11 @@
 #include <csignal>
 #include <thread>
 
-#include <nlohmann/json.hpp>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include "record/tick_log.hpp"
+#include "tests/json.hpp"
 #include "tests/record/record_support.hpp"
 
 using namespace kerf;
@@ -55,13 +55,13 @@ TEST_CASE("a session is recorded whole and says how it ended") {
   CHECK(code == 0);
   CHECK(contiguous_rows(folder / "log/ticks.npy") == kTicks);
   CHECK(file_text(folder / "log/scene.json") == R"({"tools":[]})");
-  const auto manifest = nlohmann::json::parse(file_text(folder / "log/manifest.json"));
+  const auto manifest = kerf::test::read_json_file(folder / "log/manifest.json");
   CHECK(manifest["rows"] == kTicks);
   CHECK(manifest["lost_ticks"] == 0);
   CHECK(manifest["end_reason"] == "clean end");
   CHECK(manifest["config_hash"] == "0000000000001234");
-  CHECK(manifest["volumes"][0]["size_vox"] == nlohmann::json::array({8, 8, 8}));
-  CHECK(nlohmann::json::parse(file_text(folder / "report.json"))["rows"] == kTicks);
+  CHECK(manifest["volumes"][0]["size_vox"] == kerf::test::ReadJson(kerf::Json::List{8, 8, 8}));
+  CHECK(kerf::test::read_json_file(folder / "report.json")["rows"] == kTicks);
 }
 
 TEST_CASE("SIGKILL of the controller loses none of its published ticks") {
@@ -95,7 +95,7 @@ TEST_CASE("SIGKILL of the controller loses none of its published ticks") {
   CHECK(code == 0);
   CHECK(told > 100);
   CHECK(contiguous_rows(folder / "log/ticks.npy") >= told);
-  CHECK(nlohmann::json::parse(file_text(folder / "log/manifest.json"))["end_reason"] ==
+  CHECK(kerf::test::read_json_file(folder / "log/manifest.json")["end_reason"] ==
         "controller gone");
 }
 

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cstdlib>
 
-#include <nlohmann/json.hpp>
 #include <sys/stat.h>
 
 #include "record/manifest.hpp"
 #include "record/summary.hpp"
 #include "shared/posix/new_file.hpp"
+#include "tests/json.hpp"
 #include "tests/record/record_support.hpp"
 
 using namespace kerf;
@@ -53,8 +53,8 @@ TEST_CASE("the summary counts what was recorded") {
   CHECK(summary.energy_mj[static_cast<std::size_t>(EnergySource::leak)] == doctest::Approx(-1));
   CHECK(summary.end_reason == "clean end");
   CHECK(to_text(summary).find("rows                1000\n") != std::string::npos);
-  CHECK(nlohmann::json::parse(to_json(summary))["last_tick"] == 1000);
-  CHECK(nlohmann::json::parse(to_json(summary))["leak_mj"] == doctest::Approx(-1));
+  CHECK(kerf::test::read_json(to_json(summary))["last_tick"] == 1000);
+  CHECK(kerf::test::read_json(to_json(summary))["leak_mj"].get<double>() == doctest::Approx(-1));
 }
 
 TEST_CASE("a gap in the sequence shows in the summary without the manifest's help") {

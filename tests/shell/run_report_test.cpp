@@ -4,7 +4,8 @@
 #include <string>
 
 #include <doctest/doctest.h>
-#include <nlohmann/json.hpp>
+
+#include "tests/json.hpp"
 
 TEST_CASE("the report has every promised key, hashes as 16 hex digits") {
   kerf::RunReport report;
@@ -13,7 +14,7 @@ TEST_CASE("the report has every promised key, hashes as 16 hex digits") {
   report.record.add_fault(2, "stale_input");
   report.link = {{"bus_resets", 2}};
   report.start_to_force_ms = 812.5;
-  const auto json = nlohmann::json::parse(kerf::report_json(report));
+  const auto json = kerf::test::read_json(kerf::report_json(report));
   for (const char* key :
        {"ticks", "overruns", "stale_ticks", "wake_us", "compute_us", "publish_us", "allocations",
         "minor_faults", "major_faults", "contact_ticks", "peak_force_n", "removed_mm3", "energy_j",
@@ -35,10 +36,10 @@ TEST_CASE(
     "report and summary tell what was removed of each material, and touches of forbidden ones") {
   kerf::RunReport report;
   report.materials = {{"enamel", 2.1, {}}, {"dentin", 0.0001, {}}, {"pulp", 0.0, 121.0}};
-  const auto json = nlohmann::json::parse(kerf::report_json(report));
+  const auto json = kerf::test::read_json(kerf::report_json(report));
   CHECK(json["removed_mm3_by_material"]["enamel"] == 2.1);
   CHECK(json["removed_mm3_by_material"]["dentin"] == 0.0001);
-  CHECK(json["forbidden_ms"] == nlohmann::json({{"pulp", 121.0}}));
+  CHECK(json["forbidden_ms"] == kerf::test::ReadJson(kerf::Json{{"pulp", 121.0}}));
   const std::string text = kerf::summary(report);
   CHECK(text.find("  of these   enamel 2.100 mm3\n") != std::string::npos);
   CHECK(text.find("  forbidden  touched: pulp 121 ms\n") != std::string::npos);
@@ -48,7 +49,7 @@ TEST_CASE("an event is no fault, and more of them than fit hide none") {
   kerf::RunReport report;
   for (std::uint64_t i = 0; i < 100; ++i) report.record.add_event(i, "watchdog");
   report.record.add_fault(101, "stale_input");
-  const auto json = nlohmann::json::parse(kerf::report_json(report));
+  const auto json = kerf::test::read_json(kerf::report_json(report));
   CHECK(json["events"].size() == kerf::EventList::kMax);
   CHECK(json["events"][0]["name"] == "watchdog");
   CHECK(json["event_count"] == 100);

@@ -7,12 +7,12 @@
 #include <sstream>
 
 #include <doctest/doctest.h>
-#include <nlohmann/json.hpp>
 
 #include "controller/load/scene_load.hpp"
 #include "controller/volume/file/volume_write.hpp"
 #include "controller/volume/phantom.hpp"
 #include "controller/volume/volume_density.hpp"
+#include "tests/json.hpp"
 #include "tests/volume/volume_files.hpp"
 
 using namespace kerf;
@@ -49,14 +49,14 @@ TEST_CASE("info tells size, spacing, values and what is solid, the same in its r
   CHECK(result.out.find("0.5 x 0.5 x 1 mm") != std::string::npos);
   CHECK(result.out.find("10 .. 210") != std::string::npos);
   CHECK(result.out.find("(5, 5, 5) .. (7, 5, 5)") != std::string::npos);
-  const auto json = nlohmann::json::parse(read_bytes(report));
-  CHECK(json["size_vox"] == nlohmann::json{12, 12, 12});
-  CHECK(json["spacing_mm"] == nlohmann::json{0.5, 0.5, 1.0});
-  CHECK(json["solid_box"]["hi"] == nlohmann::json{8, 6, 6});
+  const auto json = read_json_file(report);
+  CHECK(json["size_vox"] == ReadJson(Json::List{12, 12, 12}));
+  CHECK(json["spacing_mm"] == ReadJson(Json::List{0.5, 0.5, 1.0}));
+  CHECK(json["solid_box"]["hi"] == ReadJson(Json::List{8, 6, 6}));
   CHECK(json["solid_ratio"].get<double>() == doctest::Approx(3.0 / 1728));
   CHECK(json["otsu_value"].get<double>() == doctest::Approx(110).epsilon(0.02));
   std::uint64_t voxels = 0;
-  for (const auto& count : json["histogram"]) voxels += count.get<std::uint64_t>();
+  for (const kerf::Json& count : json["histogram"]) voxels += count.get<std::uint64_t>();
   CHECK(voxels == 1728);
 }
 
@@ -84,7 +84,7 @@ TEST_CASE("info tells the noise in one line") {
   CHECK(info.out.find("noise      3.") != std::string::npos);
   CHECK(info.out.find(" % of the surface's step); denoise = \"auto\" makes 3 passes\n") !=
         std::string::npos);
-  const auto json = nlohmann::json::parse(read_bytes(report));
+  const auto json = read_json_file(report);
   CHECK(json["noise_density"].get<double>() == doctest::Approx(3.0 / 200).scale(0).epsilon(0.1));
   CHECK(json["noise_share"].get<double>() ==
         doctest::Approx(3 / 2.0 / json["otsu_value"].get<double>()).scale(0).epsilon(0.1));

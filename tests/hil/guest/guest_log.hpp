@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include <nlohmann/json.hpp>
+#include "tests/json.hpp"
 
 namespace kerf::test {
 
@@ -38,11 +38,14 @@ class GuestLog {
     return rests.size() == 1 ? rests.front() : std::string();
   }
   /// The JSON report of a program; null where it is not there or is none.
-  [[nodiscard]] nlohmann::json report(const std::string& device, const std::string& program) const {
+  [[nodiscard]] ReadJson report(const std::string& device, const std::string& program) const {
     std::string text;
     for (const std::string& line : after(device + ' ' + program + " report")) text += line;
-    const auto report = nlohmann::json::parse(text, nullptr, false);
-    return report.is_discarded() ? nlohmann::json() : report;
+    try {
+      return read_json(text);
+    } catch (const JsonError&) {
+      return {};
+    }
   }
 
  private:

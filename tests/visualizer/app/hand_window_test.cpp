@@ -9,8 +9,8 @@
 #include <string>
 
 #include <doctest/doctest.h>
-#include <nlohmann/json.hpp>
 
+#include "tests/json.hpp"
 #include "tests/programs/process.hpp"
 #include "tests/visualizer/app/window_fixture.hpp"
 #include "visualizer/view/session.hpp"
@@ -79,7 +79,7 @@ struct Bench {
   double removed_mm3() {
     controller->signal(SIGTERM);
     CHECK(controller->wait() <= 1);  // 1: a busy machine came too late, and a fault latched
-    return nlohmann::json::parse(std::ifstream(report))["removed_mm3"].get<double>();
+    return kerf::test::read_json_file(report)["removed_mm3"].get<double>();
   }
 };
 

@@ -19,12 +19,12 @@
 #include <vector>
 
 #include <doctest/doctest.h>
-#include <nlohmann/json.hpp>
 #include <unistd.h>
 
 #include "shared/posix/cores.hpp"
 #include "shared/posix/new_file.hpp"
 #include "shared/segment/hand_over.hpp"
+#include "tests/json.hpp"
 #include "tests/visualizer/render/rgb_picture.hpp"
 #include "visualizer/error.hpp"
 #include "visualizer/gl/context.hpp"
@@ -176,7 +176,7 @@ TEST_CASE("a headless run writes its pictures, follows the milling and ends with
   }
   CHECK_FALSE(fs::exists(options.out / "frame-0005.png"));
   CHECK(contents(options.out / "frame-0001.png") != contents(options.out / "frame-0004.png"));
-  const auto report = nlohmann::json::parse(contents(*options.report));
+  const auto report = test::read_json_file(*options.report);
   CHECK(report["clean_end"] == true);
   CHECK(report["frames"] == 4);
   CHECK(report["bricks_uploaded"] > 64);  // all of them once, then what changed

@@ -9,8 +9,8 @@
 
 #include <doctest/doctest.h>
 #include <epoxy/gl.h>
-#include <nlohmann/json.hpp>
 
+#include "tests/json.hpp"
 #include "tests/programs/process.hpp"
 #include "tests/visualizer/app/window_fixture.hpp"
 #include "visualizer/app/run.hpp"
@@ -36,7 +36,7 @@ TEST_CASE("before a hand that is still most frames of a window draw nothing") {
     controller.tick();
   }
   CHECK(code.get() == 0);
-  const auto report = nlohmann::json::parse(std::ifstream(*options.report));
+  const auto report = kerf::test::read_json_file(*options.report);
   CHECK(report["frames"] > 0);
   CHECK(report["rest_frames"] > report["frames"]);
 }

@@ -11,6 +11,7 @@
 #include <fcntl.h>
 #include <sys/wait.h>
 
+#include "tests/json.hpp"
 #include "visualizer/app/run.hpp"
 // After all others: it defines plain words.
 #include <X11/Xlib.h>
@@ -238,8 +239,8 @@ std::string User::choice() const {
   return line;
 }
 
-nlohmann::json User::report() const {
-  return nlohmann::json::parse(std::ifstream(report_));
+test::ReadJson User::report() const {
+  return test::read_json_file(report_);
 }
 
 }  // namespace kerf::test

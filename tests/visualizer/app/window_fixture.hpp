@@ -7,11 +7,11 @@
 #include <string>
 #include <vector>
 
-#include <nlohmann/json.hpp>
 #include <unistd.h>
 
 #include "shared/segment/hand_over.hpp"
 #include "shared/segment/writer.hpp"
+#include "tests/json.hpp"
 #include "tests/visualizer/render/rgb_picture.hpp"
 
 namespace kerf::test {
@@ -83,7 +83,7 @@ class User {
   [[nodiscard]] std::string choice() const;
   [[nodiscard]] const std::filesystem::path& out() const { return out_; }
   [[nodiscard]] Controller& controller() { return controller_; }
-  [[nodiscard]] nlohmann::json report() const;
+  [[nodiscard]] test::ReadJson report() const;
 
  private:
   std::filesystem::path out_, report_, choice_;

@@ -3,9 +3,9 @@
 #include <set>
 
 #include <doctest/doctest.h>
-#include <nlohmann/json.hpp>
 
 #include "shared/posix/page_part.hpp"
+#include "tests/json.hpp"
 #include "tests/visualizer/gl/gl_fixture.hpp"
 #include "visualizer/bench/bench_tooth.hpp"
 #include "visualizer/bench/picture_page.hpp"
@@ -100,14 +100,14 @@ TEST_CASE("the bench's table has a line for each subject, beside the paper's fig
                                .gl_renderer = "a driver",
                                .size = {512, 512},
                                .cores = 2};
-  const auto report = nlohmann::json::parse(picture_report(figures));
+  const auto report = test::read_json(picture_report(figures));
   CHECK(report["gl_renderer"] == "a driver");
   CHECK(report["rows"].size() == 3);
   CHECK(report["rows"][1]["volume"] == "256x256x161");
   CHECK(report["rows"][1]["gradient"] == "corners");
   CHECK(report["rows"][1]["modifying"] == true);
   CHECK(report["rows"][1]["partial"] == true);
-  CHECK(report["rows"][1]["fps"] == doctest::Approx(250.0));
+  CHECK(report["rows"][1]["fps"].get<double>() == doctest::Approx(250.0));
   CHECK(report["gradients"][0]["noisy_angle_deg"] == 1.25);
   const std::string page = picture_page(figures);
   CHECK(page.find("gl: a driver") != std::string::npos);

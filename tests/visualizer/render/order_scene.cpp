@@ -32,8 +32,8 @@ Placed red_ball() {
   const VoxelGrid grid{48, 40, 56};
   const glm::dmat4 turn = glm::rotate(glm::dmat4(1.0), 0.6, glm::dvec3(1, 2, 0.5));
   const glm::dmat4 voxels = centred(grid, {0.2, 0.24, 0.17});
-  return {ball_distance(centre, 3.0), grid, glm::translate(glm::dmat4(1.0), centre) * turn * voxels,
-          1};
+  return {distance_to_ball(centre, 3.0), grid,
+          glm::translate(glm::dmat4(1.0), centre) * turn * voxels, 1};
 }
 
 Placed green_torus() {
@@ -55,7 +55,7 @@ double share_at(double distance_mm) {
 
 }  // namespace
 
-Distance ball_distance(glm::dvec3 centre_mm, double radius_mm) {
+Distance distance_to_ball(glm::dvec3 centre_mm, double radius_mm) {
   return [=](glm::dvec3 at) { return glm::length(at - centre_mm) - radius_mm; };
 }
 

@@ -19,7 +19,7 @@ using Distance = std::function<double(glm::dvec3)>;
 [[nodiscard]] std::optional<double> first_hit_mm(const PixelRay& ray, const Distance& body,
                                                  double reach_mm, double far_mm);
 
-[[nodiscard]] Distance ball_distance(glm::dvec3 centre_mm, double radius_mm);
+[[nodiscard]] Distance distance_to_ball(glm::dvec3 centre_mm, double radius_mm);
 
 /// A red ball and a green torus that go through one another, each in a volume that is turned and
 /// scaled in its own way. Colours are by label.

@@ -246,7 +246,7 @@ TEST_CASE("a tool before, behind and inside volumes is seen as far as what is be
         drawn = {target.read_rgb(), target.read_depth()};
       }
       std::vector<Distance> bodies = two.bodies;
-      bodies.push_back(ball_distance(at_mm, kToolMm));
+      bodies.push_back(distance_to_ball(at_mm, kToolMm));
       const auto answer = nearest_bodies(bodies, {reach_mm, reach_mm, 0.0}, view, kSize);
       const auto clear = clear_pixels(answer, kSize, kMarginMm);
       int wrong = 0;
