@@ -81,6 +81,10 @@ case $name in
       fi
     fi
     if [[ $name == recorder ]]; then mkdir -p "$out" && touch "$out/begun"; fi
+    if [[ $name == recorder && -n ${STUCK:-} ]]; then
+      trap '' TERM
+      exec sleep 60
+    fi
     if [[ $name == recorder && -n ${TAKEN:-} ]]; then
       until grep -q '^emulator.*--hand' "$LAB/calls"; do sleep 0.02; done
       mv "$LAB/gone" "$LAB/taken"
@@ -227,6 +231,9 @@ expect 'and its hand waits' test "$(grep -m 1 -oE '^(shown|emulator .*--hand)' "
 expect 'a disk that fills up ends it' \
   with FULL=1 with FAIL_visualizer=2 kerf_gives 2 demo --seconds 60 --headless --out "$lab/out"
 expect 'in one line' test "$(wc -l <"$lab/said")" == 1
+expect 'a program that does not end is ended' with STUCK=1 kerf_gives 1 demo --seconds 1 --headless
+expect 'in one line beside the summary' test "$(grep -vc '^the summary$' "$lab/said")" == 1
+expect 'which says so' says '^kerf: demo: recorder: still busy after 10 s; ended by force$'
 expect 'a folder that is taken away ends it' \
   with TAKEN=1 kerf_gives 2 demo --seconds 60 --headless --out "$lab/gone"
 expect 'in one line, too' one_line 'kerf-recorder: place: value; way out'
