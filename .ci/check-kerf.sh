@@ -81,6 +81,16 @@ case $name in
       fi
     fi
     if [[ $name == recorder ]]; then mkdir -p "$out" && touch "$out/begun"; fi
+    if [[ $name == recorder && -n ${STUCK:-} ]]; then
+      trap '' TERM
+      exec sleep 60
+    fi
+    if [[ $name == recorder && -n ${TAKEN:-} ]]; then
+      until grep -q '^emulator.*--hand' "$LAB/calls"; do sleep 0.02; done
+      mv "$LAB/gone" "$LAB/taken"
+      echo 'kerf-recorder: place: value; way out' >&2
+      exit 2
+    fi
     while [[ -e $LAB/segment ]]; do sleep 0.05; done
     if [[ $name == recorder ]]; then rm -f "$out/begun" && mkdir -p "$out" && touch "$out/ticks.npy"; else touch "$out/frame-0001.png"; fi
     ;;
@@ -201,7 +211,9 @@ expect 'without a display it says where its pictures are' says '^kept in kerf-de
 expect 'and there they are' test -e kerf-demo/frame-0001.png
 expect 'and once more, in place of the first' kerf_gives 0 demo --seconds 1
 expect 'asked for no window, it keeps none' kerf_gives 0 demo --seconds 1 --headless
-expect 'and says so' test "$(grep -c kept said)" == 0
+expect 'and says so' says '^kept nothing: --out DIR keeps'
+expect 'an option given twice is refused' kerf_gives 2 demo --seconds 1 --seconds 2
+expect 'in one line' one_line 'kerf: demo: --seconds: stands there twice; give it once'
 mv kerf-demo/frame-0001.png kerf-demo/mine.png
 expect 'a folder of somebody else is not touched' kerf_gives 2 demo --seconds 1
 rm -r kerf-demo
@@ -219,6 +231,14 @@ expect 'and its hand waits' test "$(grep -m 1 -oE '^(shown|emulator .*--hand)' "
 expect 'a disk that fills up ends it' \
   with FULL=1 with FAIL_visualizer=2 kerf_gives 2 demo --seconds 60 --headless --out "$lab/out"
 expect 'in one line' test "$(wc -l <"$lab/said")" == 1
+expect 'a program that does not end is ended' with STUCK=1 kerf_gives 1 demo --seconds 1 --headless
+expect 'in one line beside the summary' test "$(grep -vc '^the summary$' "$lab/said")" == 1
+expect 'which says so' says '^kerf: demo: recorder: still busy after 10 s; ended by force$'
+expect 'a folder that is taken away ends it' \
+  with TAKEN=1 kerf_gives 2 demo --seconds 60 --headless --out "$lab/gone"
+expect 'in one line, too' one_line 'kerf-recorder: place: value; way out'
+expect 'and none is made in its place' test ! -e "$lab/gone"
+rm -rf "$lab/taken"
 expect 'the way of drawing reaches the visualizer' kerf_gives 0 demo --seconds 1 --renderer cast
 expect 'as it was said' called '^visualizer.*--renderer cast '
 expect 'an arm on FireWire' kerf_gives 0 demo --seconds 1 --port fw
@@ -368,7 +388,7 @@ ln -s ring names/ring
 for name in plain/ "$lab/names/absolute/" 'run[1]' 'a path/with spaces' -x/y a/../b// link 'back\slash*'; do
   for time in first second; do
     (cd names && kerf_gives 0 demo --seconds 1 --out "$name") || true
-    expect "the $time demo into $name" grep -qxF "kept in $name: final.nrrd forces.svg log report.json, 1 frames" said
+    expect "the $time demo into $name" grep -qxF "kept in $name: final.nrrd forces.svg log report.json, 1 frame" said
     expect 'keeps all' keeps "$(cd names && realpath -m -- "$name")"
   done
 done

@@ -11,8 +11,11 @@ impossible=0
 # row ok|warn|fail WHAT FOUND [EFFECT; WAY OUT]
 row() {
   if [[ $1 == fail ]]; then impossible=1; fi
-  printf '%-4s  %-13s  %s\n' "$1" "$2" "$3"
-  if [[ -n ${4:-} ]]; then printf '%21s%s\n' '' "$4"; fi
+  { printf '%-4s  %-13s  %s\n' "$1" "$2" "$3" &&
+    if [[ -n ${4:-} ]]; then printf '%21s%s\n' '' "$4"; fi; } 2>/dev/null || {
+    echo 'kerf: doctor: standard output: cannot be written; make room, or send it elsewhere' >&2
+    exit 2
+  }
 }
 
 missing=()
@@ -93,7 +96,7 @@ if [[ -z $installed ]]; then row ok libraries "${libraries:-unknown: this is not
 if [[ -n ${DISPLAY:-}${WAYLAND_DISPLAY:-} ]]; then
   row ok display "${WAYLAND_DISPLAY:-$DISPLAY}"
 else
-  row warn display none 'no window: the demo draws 12 pictures to files (--out DIR keeps them)'
+  row warn display none 'no window: the demo keeps 12 pictures in kerf-demo (--out DIR: there)'
 fi
 
 data=${KERF_DATA:-$root/../shared/data}

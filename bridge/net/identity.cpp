@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "bridge/net/identity.hpp"
 
+#include <algorithm>
 #include <iostream>
 #include <system_error>
 
@@ -50,6 +51,10 @@ Authority authority_in(const std::filesystem::path& folder) {
 
 int run_make_identity(const IdentityOptions& options) {
   require_hosts(options.hosts);  // before anything is made
+  for (auto host = options.hosts.begin(); host != options.hosts.end(); ++host) {
+    if (std::find(options.hosts.begin(), host, *host) == host) continue;
+    throw BridgeError(one_line("--host " + *host + ": stands there twice; name each host once"));
+  }
   const std::filesystem::path& folder = options.folder;
   std::error_code error;
   std::filesystem::create_directories(folder, error);

@@ -2,7 +2,9 @@
 #include "bridge/net/server_trust.hpp"
 
 #include <cstddef>
+#include <filesystem>
 #include <string_view>
+#include <system_error>
 #include <utility>
 
 #include <openssl/err.h>
@@ -53,7 +55,10 @@ ServerTrust::ServerTrust(std::string host, const std::filesystem::path& ca,
 void ServerTrust::apply_to(ssl_ctx_st* context) {
   SSL_CTX_set_min_proto_version(context, TLS1_3_VERSION);
   SSL_CTX_set_verify(context, SSL_VERIFY_PEER, &ServerTrust::verify);
-  if (!ca_.empty() && SSL_CTX_load_verify_locations(context, ca_.c_str(), nullptr) != 1) {
+  if (ca_.empty()) return;
+  std::error_code fault;  // nobody may write into a pipe, which OpenSSL would wait for
+  if (!std::filesystem::is_regular_file(ca_, fault) ||
+      SSL_CTX_load_verify_locations(context, ca_.c_str(), nullptr) != 1) {
     ERR_clear_error();
     throw BridgeError("--ca " + ca_.string() +
                       ": no certificate to be read; take ca.pem of make-identity");

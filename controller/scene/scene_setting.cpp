@@ -2,8 +2,11 @@
 #include "controller/scene/scene_setting.hpp"
 
 #include <algorithm>
+#include <cerrno>
 #include <cstddef>
+#include <cstdlib>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "controller/scene/scene_text.hpp"
@@ -12,6 +15,15 @@
 namespace kerf {
 namespace {
 
+/// A text; but a number that no double holds, as 1e400, is infinite: beyond every range.
+TomlValue value_of(const std::string& text) {
+  char* stop = nullptr;
+  errno = 0;
+  const double number = std::strtod(text.c_str(), &stop);
+  if (errno != ERANGE || *stop != '\0') return text;
+  return number;
+}
+
 /// The value; what TOML cannot read is a text. Line 0: it stands in no file.
 TomlNode value_node(const SceneSetting& setting) {
   TomlNode node;
@@ -19,8 +31,9 @@ TomlNode value_node(const SceneSetting& setting) {
     node = parse_toml("v = " + setting.value).entries.at(0);
   } catch (const TomlError&) {
     node.form = TomlNode::Form::value;
-    node.value = setting.value;
-    node.shown = one_line(written(node.value));
+    node.value = value_of(setting.value);
+    node.shown =
+        one_line(std::holds_alternative<double>(node.value) ? setting.value : written(node.value));
   }
   node.line = node.key_line = 0;
   return node;

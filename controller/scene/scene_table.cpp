@@ -131,7 +131,7 @@ struct Take {
     const std::optional<double> number = entry.number();
     if (!number) refuse(place, " is not a number; write one without quotes or unit");
     const auto [lo, hi] = key.allowed.range;
-    if (*number >= lo && *number <= hi) return *number;  // no nan is
+    if (*number >= lo && *number <= hi) return *number + 0.0;  // no nan is; -0 becomes 0
     std::string words;
     for (const std::string_view word : key.allowed.words)
       words += ", or \"" + std::string(word) + '"';

@@ -12,6 +12,7 @@
 
 #include "controller/device/port/open_port.hpp"
 #include "controller/scene/scene.hpp"
+#include "controller/scene/scene_error.hpp"
 #include "controller/scene/scene_page.hpp"
 #include "shared/text/command_line.hpp"
 
@@ -183,7 +184,14 @@ std::string wrong_with(const ControllerOptions& options, const Raw& raw) {
 }
 
 void override_scene(const Raw& raw, SceneOverrides& scene) {
-  for (const std::string& text : raw.settings) scene.settings.push_back(parse_setting(text));
+  for (const std::string& text : raw.settings) {
+    const SceneSetting setting = parse_setting(text);
+    if (std::ranges::find(scene.settings, setting.key, &SceneSetting::key) !=
+        scene.settings.end()) {
+      throw SceneError("--set " + text + ": the key stands there already; give it once");
+    }
+    scene.settings.push_back(setting);
+  }
   if (!raw.spacing_mm.empty()) scene.spacing_mm = three_of(raw.spacing_mm);
   if (!raw.window.empty()) scene.window = std::array{raw.window[0], raw.window[1]};
   if (raw.rate_hz != 0) scene.rate_hz = raw.rate_hz;

@@ -17,11 +17,11 @@ Command::Command(Arguments& program)
 }
 
 int Command::run(std::ostream& out) const {
+  check_outputs({}, {{"--svg", svg_, ".svg"}});
   for (const BurHead& head : kBurHeads) {
     out << format("%.3s  %-14s %-14s %03d to %03d\n", head.number.data(), head.name.data(),
                   head.shape.data(), kSmallestBur, head.largest);
   }
-  check_outputs({}, {{"--svg", svg_, ".svg"}});
   if (!svg_.empty()) write_new_file(svg_, sheet_svg());
   return 0;
 }

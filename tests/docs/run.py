@@ -61,10 +61,19 @@ NOT_HERE = {
 OWN = (("import PATH", "import ct/ --out own.nrrd"), ("info FILE", "info tooth.nrrd"), ("--volume FILE", "--volume tooth.nrrd"),
        ("--report FILE", "--report own.json"), ("DIR", "own"))
 EVERYWHERE = ("examples", "hil", "python", "scenes")
-# `./kerf` of a scratch folder. The last word counts, so a page's own --seconds give way too.
+# `./kerf` of a scratch folder: a page's own --seconds give way.
 DOOR = """#!/bin/bash
-[[ $1 != demo ]] || set -- "$@" --virtual --seconds 1
-exec '%s/kerf' "$@"
+words=()
+while (($#)); do
+  if [[ ${words[0]:-} == demo && $1 == --seconds ]]; then
+    shift
+  else
+    words+=("$1")
+  fi
+  shift
+done
+[[ ${words[0]} != demo ]] || words+=(--virtual --seconds 1)
+exec '%s/kerf' "${words[@]}"
 """
 
 

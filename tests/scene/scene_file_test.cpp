@@ -247,6 +247,8 @@ TEST_CASE("a value out of range is reported with its line and the range") {
                "scenes/x.toml:5: tool.size_vox = 0 is out of range"));
   CHECK(begins(error_with("size_vox = 16", "radius_mm = -1"),
                "scenes/x.toml:5: tool.radius_mm = -1 is out of range"));
+  const kerf::Scene zero = parse(std::string(kSmallest) + "[force]\ndamping_ns_per_mm = -0.0\n");
+  CHECK_FALSE(std::signbit(zero.force.damping_ns_per_mm));  // -0 is a zero
   const std::string wooden = "[device]\npersonality = \"woodenhaptics\"\n";
   for (const char* list : {"[1, 0.5, 1]", "[1, 0, 1]"}) {
     CHECK(begins(error_after(wooden + "encoder_sign = " + list + "\n"),

@@ -7,6 +7,7 @@
 #include <string>
 
 #include <doctest/doctest.h>
+#include <sys/stat.h>
 
 using kerf::text_in;
 
@@ -21,5 +22,7 @@ TEST_CASE("a file's bytes come whole; what cannot be read has none") {
   CHECK(text_in(folder / "empty").empty());
   CHECK(text_in(folder / "missing").empty());
   CHECK(text_in(folder).empty());
+  REQUIRE(mkfifo((folder / "pipe").c_str(), 0600) == 0);
+  CHECK(text_in(folder / "pipe").empty());  // and does not wait for a writer
   std::filesystem::remove_all(folder);
 }

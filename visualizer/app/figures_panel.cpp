@@ -93,8 +93,8 @@ const ImVec4& force_colour(double share) {
   return share < kStrongFrom ? kCalm : share < kLimitFrom ? kStrong : kLimit;
 }
 
-float draw_figures(const OverlayFigures& figures) {
-  const float gap = 12.0F * unit_px();
+ImVec2 draw_figures(const OverlayFigures& figures) {
+  const float gap = panel_gap();
   ImGui::SetNextWindowPos(ImVec2(gap, gap));
   ImGui::Begin("figures", nullptr, kStillPanel);
   const bool plots = !figures.plot.empty() && !figures.slices;
@@ -136,9 +136,9 @@ float draw_figures(const OverlayFigures& figures) {
     curve("depth, 5 s, peak", "%.2f mm", figures.plot, &ForcePlot::Point::penetration_mm,
           kLeastFullDepthMm, kStrong);
   }
-  const float area = area_of_panel();
+  const ImVec2 size = ImGui::GetWindowSize();
   ImGui::End();
-  return area;
+  return size;
 }
 
 }  // namespace kerf

@@ -137,10 +137,14 @@ void choose_clip_plane(Look& look) {
 
 }  // namespace
 
-float LookPanel::draw(LookControls& controls, float height, float most_area) {
-  const float gap = 12.0F * unit_px(), least_high = 48.0F * unit_px();
+float LookPanel::least_high() {
+  return 48.0F * unit_px();
+}
+
+float LookPanel::draw(LookControls& controls, float height, float most_high, float most_area) {
+  const float gap = panel_gap();
   const float wide = wide_ > 0.0F ? wide_ : 215.0F * unit_px();
-  const float high = std::max(std::min(most_area / wide, height - 2.0F * gap), least_high);
+  const float high = std::max(std::min(most_area / wide, most_high), least_high());
   ImGui::SetNextWindowPos(ImVec2(gap, height - gap), 0, ImVec2(0.0F, 1.0F));
   ImGui::SetNextWindowSizeConstraints(ImVec2(0.0F, 0.0F),
                                       ImVec2(std::numeric_limits<float>::max(), high));

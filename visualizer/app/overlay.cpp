@@ -139,13 +139,19 @@ void Overlay::lay_out(OverlayFigures& figures, PictureSize size) {
   } else if (figures.help > 0) {
     help_pages_ = draw_key_help(all, figures.leads_hand, figures.help, room);
   } else if (!figures.hidden) {
-    room -= draw_figures(figures);
-    if (figures.slices) {
+    const ImVec2 taken = draw_figures(figures);
+    room -= taken.x * taken.y;
+    // In a small picture what would lie over the figures is left out.
+    const float right = all.x - taken.x - 3.0F * panel_gap();
+    const float below = all.y - taken.y - 3.0F * panel_gap();
+    if (figures.slices && width_of_slices(*figures.slices) <= right) {
       show(*figures.slices);
       const auto texture = static_cast<std::intptr_t>(slices_->id());
       room -= draw_slices(*figures.slices, reinterpret_cast<ImTextureID>(texture), all);
     }
-    if (figures.controls) controls_x = look_panel_.draw(*figures.controls, all.y, room);
+    if (figures.controls && below >= LookPanel::least_high()) {
+      controls_x = look_panel_.draw(*figures.controls, all.y, below, room);
+    }
   }
   if (figures.hand) draw_hand_mark(*figures.hand, figures.force_n / figures.full_force_n);
   if (!figures.banner.empty()) draw_banner(figures.banner, figures.alarm, all, controls_x);

@@ -38,8 +38,14 @@ ImVec2 size_of_row(const std::vector<KeyHelp>& keys) {
 
 }  // namespace
 
+float width_of_slices(const SliceViews& slices) {
+  auto wide = static_cast<float>(slices.side);
+  for (const char* name : kSliceNames) wide = std::max(wide, ImGui::CalcTextSize(name).x);
+  return wide + 2.0F * ImGui::GetStyle().WindowPadding.x;
+}
+
 float draw_slices(const SliceViews& slices, ImTextureID texture, ImVec2 size) {
-  const float gap = 12.0F * unit_px();
+  const float gap = panel_gap();
   ImGui::SetNextWindowPos(ImVec2(size.x - gap, gap), 0, ImVec2(1.0F, 0.0F));
   ImGui::Begin("slices", nullptr, kStillPanel);
   const auto side = static_cast<float>(slices.side);

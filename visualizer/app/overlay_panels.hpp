@@ -30,6 +30,11 @@ inline constexpr float kPlainLetters = 13.0F;
   return ImGui::GetFontSize() / kPlainLetters;
 }
 
+/// Between panels, and from a panel to the edge of the picture.
+[[nodiscard]] inline float panel_gap() {
+  return 12.0F * unit_px();
+}
+
 /// Of the panel between Begin and End.
 [[nodiscard]] inline float area_of_panel() {
   const ImVec2 size = ImGui::GetWindowSize();
@@ -52,11 +57,14 @@ void panel_row(const char* label, const char* format, Value value,
   ImGui::TextColored(colour, format, value);
 }
 
-/// Force, tool, score and rates, with the plots where there are any: upper left corner.
-float draw_figures(const OverlayFigures& figures);
+/// Force, tool, score and rates, with the plots where there are any: upper left corner. Returns its
+/// size.
+ImVec2 draw_figures(const OverlayFigures& figures);
 
 /// Three sections through the tip, one below the other: right edge. `texture` holds them so.
 float draw_slices(const SliceViews& slices, ImTextureID texture, ImVec2 size);
+/// How wide that panel is.
+[[nodiscard]] float width_of_slices(const SliceViews& slices);
 
 /// A list in the upper left corner from which the mouse chooses.
 void draw_open_panel(OpenPanel& panel, ImVec2 size, float most_area);

@@ -65,8 +65,9 @@ Opacities read_transfer(const std::filesystem::path& file) {
     throw VisualizerError(file.string() + why);
   }
   if (!std::filesystem::is_regular_file(file, fault)) {
-    throw VisualizerError(file.string() +
-                          ": no such file; name a transfer function, as w in the window writes it");
+    const bool there = std::filesystem::exists(file, fault);
+    throw VisualizerError(file.string() + (there ? ": is no regular file" : ": no such file") +
+                          "; name a transfer function, as w in the window writes it");
   }
   const std::uintmax_t size = std::filesystem::file_size(file, fault);
   if (fault || size > kLargest) {

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <functional>
 #include <string_view>
+#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -14,6 +15,10 @@ namespace kerf::volume {
 namespace fs = std::filesystem;
 
 void refuse_unreadable(const fs::path& path, const std::string& reason) {
+  std::error_code fault;
+  if (fs::file_size(path, fault) == 0 && !fault) {
+    throw SceneError(path.string() + ": is empty; copy the file again");
+  }
   throw SceneError(path.string() + ": cannot be read (" + last_line(reason) +
                    "); check that the file is whole and of the kind its name says");
 }

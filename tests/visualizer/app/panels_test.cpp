@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // How much of a picture the panels cover, and that they grow with the display's density.
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <memory>
@@ -116,6 +117,24 @@ TEST_CASE("panels cover at most a quarter of a window, and not its middle, whate
         CHECK(middle_is_free(picture, size));
       }
     }
+  }
+}
+
+TEST_CASE("in a small window no panel lies over another") {
+  const auto context = make_headless_context();
+  Overlay overlay;
+  for (const PictureSize size : {PictureSize{120, 700}, PictureSize{640, 60}, PictureSize{300, 240},
+                                 PictureSize{200, 150}}) {
+    CAPTURE(size.width);
+    OverlayFigures figures = crowded();
+    figures.slices = grey_slices(56);
+    std::vector<std::uint8_t> rgb;
+    CHECK(covered(overlay, figures, size, &rgb) > 0.0);
+    int twice = 0;  // a panel alone lets more of the white below it through
+    for (std::size_t i = 0; i < rgb.size(); i += 3) {
+      twice += std::max({rgb[i], rgb[i + 1], rgb[i + 2]}) < 60 ? 1 : 0;
+    }
+    CHECK(twice == 0);
   }
 }
 
