@@ -16,7 +16,7 @@ controller/law controller/servo/kinematics controller/servo controller/law/regis
 controller/stability controller/scene controller/sandbox controller/volume/file controller/volume controller/tool controller/load
 controller/plan/tables controller/plan/method controller/plan controller/plan/cost controller/volume_tool
 controller/device/port controller/device/driver
-controller/shell controller/shell/probe controller
+controller/shell/guard controller/shell controller/shell/probe controller
 
 record
 

@@ -19,7 +19,7 @@
 #include "controller/law/registry/law_registry.hpp"
 #include "controller/plan/plan_device.hpp"
 #include "controller/scene/scene.hpp"
-#include "controller/shell/allocation_counter.hpp"
+#include "controller/shell/guard/allocation_counter.hpp"
 #include "controller/shell/law_inputs.hpp"
 #include "shared/text/format.hpp"
 

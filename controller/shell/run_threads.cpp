@@ -11,9 +11,9 @@
 #include <string>
 #include <thread>
 
-#include "controller/shell/call_guard.hpp"
+#include "controller/shell/guard/call_guard.hpp"
+#include "controller/shell/guard/motor_guard.hpp"
 #include "controller/shell/log_line.hpp"
-#include "controller/shell/motor_guard.hpp"
 #include "controller/shell/publisher.hpp"
 #include "controller/shell/watchdog.hpp"
 #include "shared/posix/endless_step.hpp"

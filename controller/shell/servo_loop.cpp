@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <bit>
 
-#include "controller/shell/allocation_counter.hpp"
 #include "controller/shell/clock.hpp"
+#include "controller/shell/guard/allocation_counter.hpp"
 #include "shared/numeric/vec3.hpp"
 
 namespace kerf {

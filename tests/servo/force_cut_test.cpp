@@ -11,7 +11,7 @@
 #include <doctest/doctest.h>
 
 #include "controller/scene/materials.hpp"
-#include "controller/shell/allocation_counter.hpp"
+#include "controller/shell/guard/allocation_counter.hpp"
 #include "controller/tool/tool_shapes.hpp"
 #include "controller/volume/phantom.hpp"
 #include "lab/rig/miller.hpp"

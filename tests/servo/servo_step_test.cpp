@@ -6,7 +6,7 @@
 #include <doctest/doctest.h>
 
 #include "controller/scene/scene_error.hpp"
-#include "controller/shell/allocation_counter.hpp"
+#include "controller/shell/guard/allocation_counter.hpp"
 #include "tests/servo/support.hpp"
 
 using kerf::LoadedScene;

@@ -7,7 +7,7 @@
 
 #include <doctest/doctest.h>
 
-#include "controller/shell/allocation_counter.hpp"
+#include "controller/shell/guard/allocation_counter.hpp"
 #include "controller/tool/tool_shaft.hpp"
 #include "controller/tool/tool_shapes.hpp"
 #include "lab/rig/miller.hpp"

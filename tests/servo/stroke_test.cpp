@@ -13,7 +13,7 @@
 
 #include <doctest/doctest.h>
 
-#include "controller/shell/allocation_counter.hpp"
+#include "controller/shell/guard/allocation_counter.hpp"
 #include "shared/volume/density_hash.hpp"
 #include "tests/servo/cut_kinds.hpp"
 #include "tests/servo/support.hpp"

@@ -12,7 +12,7 @@
 
 #include "controller/device/driver/omni_driver.hpp"
 #include "controller/device/port/firewire_port.hpp"
-#include "controller/shell/motor_guard.hpp"
+#include "controller/shell/guard/motor_guard.hpp"
 #include "tests/hil/fuse/mounted_node.hpp"
 
 namespace {

@@ -5,7 +5,7 @@
 
 #include <doctest/doctest.h>
 
-#include "controller/shell/allocation_counter.hpp"
+#include "controller/shell/guard/allocation_counter.hpp"
 #include "tests/hil/fuse/lockstep_session.hpp"
 
 using kerf::FirewireSettings;

@@ -8,8 +8,8 @@
 #include <doctest/doctest.h>
 #include <unistd.h>
 
-#include "controller/shell/call_guard.hpp"
-#include "controller/shell/motor_guard.hpp"
+#include "controller/shell/guard/call_guard.hpp"
+#include "controller/shell/guard/motor_guard.hpp"
 #include "tests/hil/fuse/usb_session.hpp"
 
 namespace {

@@ -15,7 +15,7 @@
 
 #include <doctest/doctest.h>
 
-#include "controller/shell/allocation_counter.hpp"
+#include "controller/shell/guard/allocation_counter.hpp"
 #include "shared/wire/wooden_packet.hpp"
 #include "tests/hil/fuse/usb_session.hpp"
 

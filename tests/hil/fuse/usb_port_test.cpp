@@ -20,8 +20,8 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "controller/shell/allocation_counter.hpp"
-#include "controller/shell/motor_guard.hpp"
+#include "controller/shell/guard/allocation_counter.hpp"
+#include "controller/shell/guard/motor_guard.hpp"
 #include "shared/wire/falcon_packet.hpp"
 #include "tests/hil/fuse/usb_session.hpp"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/shell/call_guard.hpp"
+#include "controller/shell/guard/call_guard.hpp"
 
 #include <cerrno>
 #include <csignal>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/shell/motor_guard.hpp"
+#include "controller/shell/guard/motor_guard.hpp"
 
 #include <atomic>
 #include <chrono>
