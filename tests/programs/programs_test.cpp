@@ -342,7 +342,7 @@ TEST_CASE("--probe shows each device, and its motors never push") {
     CHECK(seen["calibrated"] == true);
     const auto told = kerf::test::read_json_file(folder / "emulator.json");
     CHECK(told["commands_received"] > 100);
-    CHECK(told["peak_motor_force_n"] == 0);
+    CHECK(told["peak_motor_force_n"] == 0.0);
   }
 }
 
