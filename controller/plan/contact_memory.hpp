@@ -54,15 +54,19 @@ class ContactMemory {
     const auto bricks = [](std::int32_t voxels) {
       return static_cast<std::size_t>((voxels + kFreeBrick - 1) / kFreeBrick);
     };
-    map_bytes_.push_back(2 * bricks(grid.nx) * bricks(grid.ny) * bricks(grid.nz));
+    map_bytes_.push_back(bricks(grid.nx) * bricks(grid.ny) * bricks(grid.nz));
     places_.emplace_back();
   }
 
   /// What contact reads in volume `v` of the plan, whose densities are those of the servo.
   void take(const LoadedScene& scene, const SceneVolume& volume, std::size_t v,
             std::span<const Density> density, ContactState<N>& state) {
-    const MappedField& field = fields_.emplace_back(volume.image.grid, density, volume.iso);
-    state.volumes[v] = {field.field(), contact_frame<N>(scene, volume), places_[v].places()};
+    const Density faintest = static_cast<Density>(volume.iso / 8);
+    const FreeBrickMap& map = maps_.emplace_back(volume.image.grid, density, faintest);
+    state.volumes[v] = {
+        {volume.image.grid, density.data(), density_scale(volume.iso), map.bricks()},
+        contact_frame<N>(scene, volume),
+        places_[v].places()};
     for (std::size_t part = 0; part < kMostBehind; ++part) {
       state.behind[part][v] = state.volumes[v];
       if (v < places_behind_[part].size()) {
@@ -113,7 +117,7 @@ class ContactMemory {
   std::vector<std::size_t> map_bytes_;
   std::vector<PlaceMemory<N>> places_;
   std::array<std::vector<PlaceMemory<N>>, kMostBehind> places_behind_;  ///< where a tool has a part
-  std::vector<MappedField> fields_;
+  std::vector<FreeBrickMap> maps_;
 };
 
 }  // namespace kerf

@@ -8,7 +8,6 @@
 
 #include "controller/plan/air_speed.hpp"
 #include "lab/rig/air_flight.hpp"
-#include "lab/rig/shaft_rig.hpp"
 #include "tests/case_count.hpp"
 
 using namespace kerf;
@@ -75,23 +74,6 @@ TEST_CASE_TEMPLATE("no tool is dragged in the air beside a tilted wall, however 
   }
 }
 
-TEST_CASE_TEMPLATE("no tool is dragged through soft tissue, however fast", N, FixedNumbers,
-                   DoubleNumbers) {
-  Dice dice(5);
-  const Body soft = body_of({120, 120, 120}, [&](Point) { return dice.uniform(0.38, 0.48); });
-  for (const SceneTool& made :
-       {kTools[0], kTools[2], tool_with("ball", 5.6, 11.2, {.radius_mm = 3.6, .length_mm = 72})}) {
-    ShaftRig<N> rig(made, {&soft});
-    CAPTURE(made.name);
-    for (int i = 0; i < 50; ++i) {
-      const Point hand = {dice.uniform(20, 100), dice.uniform(20, 100), dice.uniform(20, 100)};
-      rig.tick(hand);
-      CAPTURE(i);
-      CHECK(length(rig.proxy() - hand) < SweepRules::kArrived);
-    }
-  }
-}
-
 TEST_CASE_TEMPLATE("the speed that a scene is told to be free of drag up to is so, and hardly shy",
                    N, FixedNumbers, DoubleNumbers) {
   const auto walls = tilted_walls();
@@ -117,7 +99,7 @@ TEST_CASE_TEMPLATE("the speed that a scene is told to be free of drag up to is s
       double bold = 1.1;
       while (flown_at<N>(tool, walls, {bold * units, 1.3, 0}, 12).longest_spring < kNothing) {
         bold += 0.1;
-        REQUIRE(bold < 1.7);
+        REQUIRE(bold < 1.5);
       }
       MESSAGE(std::string(N::kName)
               << ", " << made.name << " of " << made.radius_mm << ": told " << units

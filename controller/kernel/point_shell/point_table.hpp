@@ -97,8 +97,7 @@ struct DensityField {
   VoxelGrid grid;
   const Density* density = nullptr;
   DensityScale scale;
-  FreeBricks free{};      ///< of density that contact counts
-  FreeBricks passable{};  ///< and of all that bears nothing (plan/tables/free_brick_map.hpp)
+  FreeBricks free;
 };
 
 /// Sums over the samples of one query (docs/theory.md 3.2, 3.3). r is the density of contact and w

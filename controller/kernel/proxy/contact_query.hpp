@@ -126,7 +126,7 @@ class ContactQuery {
                            by = volume.frame.voxel_from_contact * move;
       // No edge of a voxel is shorter than a unit.
       const FreeWay<N> way(
-          volume.field.passable,
+          volume.field.free,
           {Reader::number_of(by.x), Reader::number_of(by.y), Reader::number_of(by.z)},
           Reader::number_of(length));
       const PointNumber<N> centre[3] = {Reader::number_of(at.x), Reader::number_of(at.y),
@@ -163,7 +163,10 @@ class ContactQuery {
     const PointSums<N> sums = reader_.sums_at(volume.field, points_.table, volume.places, at);
     if (sums.weight <= typename N::Sum(0)) return;
     ConstraintPlane<N> plane = plane_at(volume, at, sums, closer);
-    if (sums.top < Reader::kIsoDensity && !reader_.iso_is_near(volume, at, sums.top_sample)) return;
+    if (plane.depth > Real(0) && sums.top < Reader::kIsoDensity &&
+        !reader_.iso_is_near(volume, at, sums.top_sample)) {
+      return;
+    }
     if (closer) look_midway(volume, q, plane);
     // Nearly all samples are in the solid, or the tool feels the same all round. What is softer
     // than the iso bears nothing.

@@ -16,9 +16,10 @@ namespace kerf {
 /// What the queries of one tool cost in all volumes together, counted in samples that are read. It
 /// bounds a tick (`ContactQuery::begin_tick`, docs/theory.md 4.8), and a scene is planned with it.
 struct QueryWork {
-  /// What a tick may read, 2.5 to 4 ns each, as the machine has it: 38 to 60 us. A head of very
-  /// many samples may make kLeastQueries alone.
-  static constexpr std::int64_t kTickSamples = 15000;
+  /// What a tick may read, 2.5 to 4 ns each. A head of very many samples may make kLeastQueries,
+  /// and a whole tool with its shaft as many as kShaftedSamples allow: 53 to 84 us. With 15,000
+  /// and 16,500 a shaft in soft tissue holds a hand at 250 Hz by 2.7 N (row `traps`, --seed 33).
+  static constexpr std::int64_t kTickSamples = 18000, kShaftedSamples = 21000;
   static constexpr std::int64_t kLeastQueries = 12;
   static constexpr std::int64_t kLookSamples = 128;  ///< what a look costs besides those it reads
   static constexpr std::int64_t kCloseSamples = 2;   ///< what one of a closeup costs
@@ -45,7 +46,9 @@ struct QueryWork {
   /// Of a tick. No query begins that might go beyond it, but for the first after a turn, which then
   /// has no closer look.
   [[nodiscard]] constexpr std::int64_t budget() const noexcept {
-    return std::max(kTickSamples, kLeastQueries * (head > 0 ? head : query + turn));
+    const std::int64_t least = kLeastQueries * (query + turn);
+    const std::int64_t fits = std::max(kShaftedSamples, kLeastQueries * head);
+    return std::max(kTickSamples, head > 0 ? std::min(least, fits) : least);
   }
   /// Once so much of it went into free ways that led nowhere, no group looks for one.
   [[nodiscard]] constexpr std::int64_t most_wasted() const noexcept { return budget() / 8; }

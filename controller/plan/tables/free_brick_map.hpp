@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "controller/kernel/point_shell/free_bricks.hpp"
-#include "controller/kernel/point_shell/point_table.hpp"
 
 namespace kerf {
 
@@ -21,31 +20,9 @@ class FreeBrickMap {
   [[nodiscard]] FreeBricks bricks() const noexcept { return {grid_, distance_.data()}; }
   [[nodiscard]] std::size_t bytes() const noexcept { return distance_.size(); }
 
-  /// Makes every distance at least that of `other`, a map of the same grid, less `steps`.
-  void raise_to(const FreeBrickMap& other, std::int32_t steps);
-
  private:
   VoxelGrid grid_;
   std::vector<std::uint8_t> distance_;
-};
-
-/// A volume as contact reads it, with its two maps (docs/theory.md 2.3): where no sample reads
-/// density that counts, and where besides none is so near to a voxel of the iso that it bears.
-/// Load time; the density, which the caller keeps, may lose but not gain. Moving it keeps the field
-/// valid.
-class MappedField {
- public:
-  MappedField(const VoxelGrid& grid, std::span<const Density> density, Density iso);
-
-  [[nodiscard]] DensityField field() const& noexcept {
-    return {grid_, density_, density_scale(iso_), free_.bricks(), passable_.bricks()};
-  }
-
- private:
-  VoxelGrid grid_;
-  const Density* density_;
-  Density iso_;
-  FreeBrickMap free_, passable_;
 };
 
 }  // namespace kerf
