@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdint>
 #include <thread>
+#include <vector>
 
 #include "controller/volume/file/volume_limits.hpp"
 #include "controller/volume/phantom_shape.hpp"
@@ -48,7 +49,13 @@ struct Sides {
 class Sampler {
  public:
   explicit Sampler(VolumeImage& image)
-      : image_(image), h_mm_(image.spacing_mm[0]), far_mm_(phantom::kSteepest * h_mm_) {}
+      : image_(image), h_mm_(image.spacing_mm[0]), far_mm_(phantom::kSteepest * h_mm_) {
+    for (std::int32_t z = 0; z < image.grid.nz; ++z) {
+      at_voxels_.emplace_back(position(0, 0, z).z);
+      at_middles_.push_back(at_voxels_.back().here);
+      at_middles_.emplace_back(position(0, 0, z + 0.5).z);
+    }
+  }
 
   /// On 2^cuts threads: blocks share no voxel, so the image is the same bit by bit.
   void sample_on_threads(const VoxelBox& box, int cuts) {
@@ -78,6 +85,7 @@ class Sampler {
     const VoxelIndex last{n.x - 1, n.y - 1, n.z - 1};
     const phantom::Point middle =
         position(box.lo.x + 0.5 * last.x, box.lo.y + 0.5 * last.y, box.lo.z + 0.5 * last.z);
+    const phantom::Level& level = at_middles_[static_cast<std::size_t>(2 * box.lo.z + last.z)];
     const double radius_mm =
         0.5 * h_mm_ *
         std::sqrt(double(last.x) * last.x + double(last.y) * last.y + double(last.z) * last.z);
@@ -88,12 +96,12 @@ class Sampler {
       if (value < -clear) side = Side::inside;
     };
     if (sides.outer == Side::unknown || sides.dentin == Side::unknown) {
-      const double outer = phantom::outer_field(middle);
+      const double outer = phantom::outer_field(middle, level);
       decide(sides.outer, outer);
       decide(sides.dentin, outer + phantom::enamel_mm(middle));
     }
     if (sides.dentin == Side::outside) return;  // it encloses the pulp
-    if (sides.pulp == Side::unknown) decide(sides.pulp, phantom::pulp_field(middle));
+    if (sides.pulp == Side::unknown) decide(sides.pulp, phantom::pulp_field(middle, level));
   }
 
   bool fill_if_uniform(const VoxelBox& box, const Sides& sides) {
@@ -106,10 +114,11 @@ class Sampler {
   }
 
   /// Share of the voxel inside the boundary, from 0 to 1 over two voxels. `value` is `field(p)`.
-  [[nodiscard]] double cover(phantom::Field field, phantom::Point p, double value) const noexcept {
+  [[nodiscard]] double cover(phantom::Field field, phantom::Point p, const phantom::Levels& levels,
+                             double value) const noexcept {
     if (value >= far_mm_) return 0.0;
     if (value <= -far_mm_) return 1.0;
-    return share_inside(phantom::distance(field, p, value), h_mm_);
+    return share_inside(phantom::distance(field, p, levels, value), h_mm_);
   }
 
   [[nodiscard]] phantom::Point position(double x, double y, double z) const noexcept {
@@ -131,28 +140,32 @@ class Sampler {
 
   void sample_voxels(const VoxelBox& box, const Sides& sides) {
     for (std::int32_t z = box.lo.z; z < box.hi.z; ++z) {
+      const phantom::Levels& levels = at_voxels_[static_cast<std::size_t>(z)];
       for (std::int32_t y = box.lo.y; y < box.hi.y; ++y) {
         for (std::int32_t x = box.lo.x; x < box.hi.x; ++x) {
-          sample_voxel(image_.grid.index(x, y, z), position(x, y, z), sides);
+          sample_voxel(image_.grid.index(x, y, z), position(x, y, z), levels, sides);
         }
       }
     }
   }
 
-  void sample_voxel(std::size_t at, phantom::Point p, const Sides& sides) {
+  void sample_voxel(std::size_t at, phantom::Point p, const phantom::Levels& levels,
+                    const Sides& sides) {
     // Of a side that is known the share is whole, as `cover` would find.
     const bool looks = sides.outer == Side::unknown || sides.dentin == Side::unknown;
-    const double outer = looks ? phantom::outer_field(p) : 0.0;
+    const double outer = looks ? phantom::outer_field(p, levels.here) : 0.0;
     double tooth = 1.0;
-    if (sides.outer == Side::unknown) tooth = cover(phantom::outer_field, p, outer);
+    if (sides.outer == Side::unknown) tooth = cover(phantom::outer_field, p, levels, outer);
     if (tooth <= 0.0) return;
     double dentin = sides.dentin == Side::outside ? 0.0 : tooth;
     if (sides.dentin == Side::unknown && !phantom::is_bare(p)) {
-      dentin = std::min(tooth, cover(phantom::dentin_field, p, outer + phantom::enamel_mm(p)));
+      dentin =
+          std::min(tooth, cover(phantom::dentin_field, p, levels, outer + phantom::enamel_mm(p)));
     }
     double pulp = sides.pulp == Side::inside ? dentin : 0.0;
     if (sides.pulp == Side::unknown && dentin > 0.0) {  // which encloses it
-      pulp = std::min(dentin, cover(phantom::pulp_field, p, phantom::pulp_field(p)));
+      pulp = std::min(dentin,
+                      cover(phantom::pulp_field, p, levels, phantom::pulp_field(p, levels.here)));
     }
     const double density =
         kPhantomEnamel * (tooth - dentin) + kPhantomDentin * (dentin - pulp) + kPhantomPulp * pulp;
@@ -168,6 +181,8 @@ class Sampler {
 
   VolumeImage& image_;
   double h_mm_;
+  std::vector<phantom::Levels> at_voxels_;
+  std::vector<phantom::Level> at_middles_;  ///< of z = 0, 0.5, 1, ...
   double far_mm_;  ///< a field value beyond this is more than one voxel from its boundary
 };
 
@@ -232,7 +247,8 @@ VolumeImage make_phantom(const PhantomSpec& spec) {
 
 double phantom_signed_distance(double x_mm, double y_mm, double z_mm) noexcept {
   const phantom::Point p{x_mm, y_mm, z_mm};
-  return phantom::distance(phantom::outer_field, p, phantom::outer_field(p));
+  const phantom::Levels levels(z_mm);
+  return phantom::distance(phantom::outer_field, p, levels, phantom::outer_field(p, levels.here));
 }
 
 }  // namespace kerf

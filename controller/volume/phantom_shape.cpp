@@ -82,22 +82,23 @@ double above_neck(Point p) noexcept {
 }
 
 /// Vertical groove of the crown's side: at `x`, on the side of `sign` (+1 buccal, -1 lingual).
-double side_groove(Point p, double sign, double x, double width, double depth) noexcept {
-  return depth * bump((p.x - x) / width) * ramp(1.0, 3.0, sign * p.y) * ramp(4.0, 7.5, p.z);
+double side_groove(Point p, const Level& level, double sign, double x, double width,
+                   double depth) noexcept {
+  return depth * bump((p.x - x) / width) * ramp(1.0, 3.0, sign * p.y) * level.groove;
 }
 
-double crown_side(Point p) noexcept {
-  const double a = kHalfWidthX(p.z);
-  const double b = kHalfWidthY(p.z);
+double crown_side(Point p, const Level& level) noexcept {
+  const double a = level.half_x;
+  const double b = level.half_y;
   const double u = p.x / a;
   // The mesial half is a little wider than the distal one.
-  const double v = (p.y - kTiltY(p.z)) / (b * (1.0 + 0.06 * std::clamp(u, -1.0, 1.0)));
+  const double v = (p.y - level.tilt_y) / (b * (1.0 + 0.06 * std::clamp(u, -1.0, 1.0)));
   const double uu = u * u;
   const double vv = v * v;
   // Between an ellipse and a rounded rectangle.
   const double rho = 0.5 * (std::sqrt(uu + vv) + std::sqrt(std::sqrt(uu * uu + vv * vv)));
-  return (rho - 1.0) * 0.5 * (a + b) + side_groove(p, 1.0, 1.1, 1.0, 0.55) +
-         side_groove(p, 1.0, -2.6, 0.8, 0.4) + side_groove(p, -1.0, 0.1, 1.0, 0.5);
+  return (rho - 1.0) * 0.5 * (a + b) + side_groove(p, level, 1.0, 1.1, 1.0, 0.55) +
+         side_groove(p, level, 1.0, -2.6, 0.8, 0.4) + side_groove(p, level, -1.0, 0.1, 1.0, 0.5);
 }
 
 /// A cusp: a rounded tip, and a ridge that falls from it towards the middle of the tooth.
@@ -165,23 +166,32 @@ constexpr Root kDistalRoot{{{{{-9.0, -3.7}, {-5.5, -3.25}, {-2.5, -2.75}, {0.5, 
 constexpr double kRootTop = 1.5;  // inside the stem
 constexpr double kThickestRoot = 1.8;
 
-double root_field(const Root& root, Point p) noexcept {
-  const double z = std::clamp(p.z, root.apex_z, kRootTop);
-  const double a = root.half_x(z);
-  const double b = root.half_y(z);
-  const double dx = p.x - root.axis_x(z);
+Level::Root level_of(const Root& root, double height) noexcept {
+  const double z = std::clamp(height, root.apex_z, kRootTop);
+  return {z, root.half_x(z), root.half_y(z), root.axis_x(z)};
+}
+
+double root_field(const Root& root, const Level::Root& level, Point p) noexcept {
+  const double z = level.z;
+  const double a = level.half_x;
+  const double b = level.half_y;
+  const double dx = p.x - level.axis_x;
   const double squeezed_y = p.y * a / b;
   const double furrow = root.hollow * bump(p.y / (0.6 * b)) * ramp(0.0, a, root.facing * dx);
   return vec3::length({dx, squeezed_y, z - p.z}) - a + furrow;
 }
 
-double roots_field(Point p) noexcept {
+double roots_field(Point p, const Level& level) noexcept {
+  const auto field = [&](bool mesial) {
+    return mesial ? root_field(kMesialRoot, level.mesial_root, p)
+                  : root_field(kDistalRoot, level.distal_root, p);
+  };
   const bool mesial = p.x > 0.0;
-  const double near = root_field(mesial ? kMesialRoot : kDistalRoot, p);
+  const double near = field(mesial);
   // Both axes lie at least so far from the middle.
   constexpr double kAside = 2.0;
   if (near <= std::abs(p.x) + kAside - kThickestRoot) return near;
-  return std::min(near, root_field(mesial ? kDistalRoot : kMesialRoot, p));
+  return std::min(near, field(!mesial));
 }
 
 // --- Stem --------------------------------------------------------------------------------------
@@ -192,11 +202,11 @@ double stem_bottom(Point p) noexcept {
 }
 
 /// The crown, the neck and the stem.
-double stem_field(Point p) noexcept {
+double stem_field(Point p, const Level& level) noexcept {
   constexpr double kEdge = 0.9;
   // The enamel stands out a little where it begins.
   const double step = 0.14 * ramp(0.0, 0.9, above_neck(p));
-  const double side = crown_side(p) - step;
+  const double side = crown_side(p, level) - step;
   const bool top_is_far = side >= p.z - kLowestOcclusal + kEdge;
   const double crown = top_is_far ? side : smooth_max(side, p.z - occlusal_height(p), kEdge);
   return smooth_max(crown, stem_bottom(p), 1.2);
@@ -225,29 +235,47 @@ double pulp_chamber(Point p) noexcept {
 }
 
 /// A canal follows the axis of its root, `offset_y` beside it at the orifice and nearer below.
-double canal(const Root& root, double offset_y, Point p) noexcept {
-  const double bottom = root.apex_z - 0.2;
-  const double z = std::clamp(p.z, bottom, kRootTop);
-  const double t = (z - bottom) / (kRootTop - bottom);
-  const double x = p.x - root.axis_x(z);
+double canal(const Level::Canal& level, double offset_y, Point p) noexcept {
+  const double t = level.down;
+  const double x = p.x - level.axis_x;
   const double y = p.y - offset_y * (0.3 + 0.7 * t);
-  return vec3::length({x, y, p.z - z}) - (0.17 + 0.38 * t);
+  return vec3::length({x, y, p.z - level.z}) - (0.17 + 0.38 * t);
 }
+
+Level::Canal canal_level(const Root& root, double height) noexcept {
+  const double bottom = root.apex_z - 0.2;
+  const double z = std::clamp(height, bottom, kRootTop);
+  return {z, (z - bottom) / (kRootTop - bottom), root.axis_x(z)};
+}
+
+constexpr double kStep = 1.0 / 128.0;  // mm; a power of two, far below the smallest radius
 
 }  // namespace
 
 // Parts that a bound keeps out of a smooth minimum or maximum are not computed.
 
-double outer_field(Point p) noexcept {
+Level::Level(double z) noexcept
+    : half_x(kHalfWidthX(z)),
+      half_y(kHalfWidthY(z)),
+      tilt_y(kTiltY(z)),
+      groove(ramp(4.0, 7.5, z)),
+      mesial_root(level_of(kMesialRoot, z)),
+      distal_root(level_of(kDistalRoot, z)),
+      mesial_canal(canal_level(kMesialRoot, z)),
+      distal_canal(canal_level(kDistalRoot, z)) {}
+
+Levels::Levels(double z) noexcept : here(z), above(z + kStep), below(z - kStep) {}
+
+double outer_field(Point p, const Level& level) noexcept {
   constexpr double kFork = 1.3;
   if (p.z < 0.0) {
-    const double roots = roots_field(p);
+    const double roots = roots_field(p, level);
     const bool stem_is_far = roots <= stem_bottom(p) - kFork;
-    return stem_is_far ? roots : smooth_min(stem_field(p), roots, kFork);
+    return stem_is_far ? roots : smooth_min(stem_field(p, level), roots, kFork);
   }
-  const double stem = stem_field(p);
+  const double stem = stem_field(p, level);
   const bool roots_are_far = stem <= p.z - kRootTop - kThickestRoot - kFork;
-  return roots_are_far ? stem : smooth_min(stem, roots_field(p), kFork);
+  return roots_are_far ? stem : smooth_min(stem, roots_field(p, level), kFork);
 }
 
 double enamel_mm(Point p) noexcept {
@@ -261,20 +289,20 @@ bool is_bare(Point p) noexcept {
   return above_neck(p) < -kFarMm;
 }
 
-double dentin_field(Point p) noexcept {
-  return outer_field(p) + enamel_mm(p);
+double dentin_field(Point p, const Level& level) noexcept {
+  return outer_field(p, level) + enamel_mm(p);
 }
 
-double pulp_field(Point p) noexcept {
+double pulp_field(Point p, const Level& level) noexcept {
   double field = pulp_chamber(p);
   for (const Cusp& cusp : kCusps) {
     const Point root{0.55 * cusp.x, 0.45 * cusp.y, 1.9};
     const Point tip{0.78 * cusp.x, 0.68 * cusp.y, cusp.height - 4.6};
     field = smooth_min(field, rod(p, root, 0.55, tip, 0.18), 0.4);
   }
-  field = smooth_min(field, canal(kMesialRoot, 1.6, p), 0.3);
-  field = smooth_min(field, canal(kMesialRoot, -1.6, p), 0.3);
-  return smooth_min(field, canal(kDistalRoot, 0.0, p), 0.3);
+  field = smooth_min(field, canal(level.mesial_canal, 1.6, p), 0.3);
+  field = smooth_min(field, canal(level.mesial_canal, -1.6, p), 0.3);
+  return smooth_min(field, canal(level.distal_canal, 0.0, p), 0.3);
 }
 
 double lesion_distance(Point p) noexcept {
@@ -301,13 +329,14 @@ double solid_distance(std::string_view shape, Point p) noexcept {
   return std::sqrt(from_ring * from_ring + p.z * p.z) - 4.0;
 }
 
-double distance(Field field, Point p, double value) noexcept {
-  constexpr double kStep = 1.0 / 128.0;  // mm; a power of two, far below the smallest radius
+double distance(Field field, Point p, const Levels& levels, double value) noexcept {
   // Where opposite slopes meet, far from a boundary, the gradient vanishes: do not divide by it.
   constexpr double kFlattest = 0.35;
-  const double gx = field({p.x + kStep, p.y, p.z}) - field({p.x - kStep, p.y, p.z});
-  const double gy = field({p.x, p.y + kStep, p.z}) - field({p.x, p.y - kStep, p.z});
-  const double gz = field({p.x, p.y, p.z + kStep}) - field({p.x, p.y, p.z - kStep});
+  const Level& here = levels.here;
+  const double gx = field({p.x + kStep, p.y, p.z}, here) - field({p.x - kStep, p.y, p.z}, here);
+  const double gy = field({p.x, p.y + kStep, p.z}, here) - field({p.x, p.y - kStep, p.z}, here);
+  const double gz =
+      field({p.x, p.y, p.z + kStep}, levels.above) - field({p.x, p.y, p.z - kStep}, levels.below);
   const double slope = vec3::length({gx, gy, gz}) / (2.0 * kStep);
   return value / std::clamp(slope, kFlattest, kSteepest);
 }

@@ -187,7 +187,8 @@ TEST_CASE("no field of the shape is steeper than the bound that lets blocks be s
                                    (a.z - b.z) * (a.z - b.z));
     for (const phantom::Field field :
          {phantom::outer_field, phantom::dentin_field, phantom::pulp_field}) {
-      RC_ASSERT(std::abs(field(a) - field(b)) <= phantom::kSteepest * apart + 1e-12);
+      RC_ASSERT(std::abs(field(a, phantom::Level(a.z)) - field(b, phantom::Level(b.z))) <=
+                phantom::kSteepest * apart + 1e-12);
     }
   }));
 }
@@ -250,8 +251,9 @@ TEST_CASE("the enamel is thick over the cusps and thins out to nothing at the ne
     for (int i = 0; i < 4000; ++i) {
       const double t = 0.005 * i;
       const phantom::Point p{from.x + t * step.x, from.y + t * step.y, from.z + t * step.z};
-      if (phantom::outer_field(p) < 0 && phantom::dentin_field(p) > 0) mm += 0.005;
-      if (phantom::dentin_field(p) <= 0) break;
+      const phantom::Level level(p.z);
+      if (phantom::outer_field(p, level) < 0 && phantom::dentin_field(p, level) > 0) mm += 0.005;
+      if (phantom::dentin_field(p, level) <= 0) break;
     }
     return mm;
   };
@@ -309,7 +311,8 @@ TEST_CASE(
   CHECK(lesion > 9 * 64);  // 64 voxels a mm3
   CHECK(lesion < 12 * 64);
   CHECK(touches_air > 0);
-  CHECK(phantom::pulp_field({0.0, -0.2, deepest_mm - 0.25}) > 0.3);
+  CHECK(phantom::pulp_field({0.0, -0.2, deepest_mm - 0.25}, phantom::Level(deepest_mm - 0.25)) >
+        0.3);
 }
 
 TEST_CASE("a plain solid has its surface at a density of 0.5, and no labels") {
