@@ -8,7 +8,7 @@
 namespace kerf {
 namespace {
 
-constexpr std::int64_t kSettleCycles = kCyclesPerSecond * 3 / 20;  // 0.15 s after calibration
+constexpr std::int64_t kSettleCycles = kCyclesPerSecond / 20;  // 50 ms after calibration
 constexpr std::int64_t kPatienceCycles =
     std::int64_t{2} * kCyclesPerSecond;  // hosts that never show it
 

@@ -33,7 +33,7 @@ struct EmulatorStats {
 /// lock-step and a test run the same thing.
 ///
 /// The hand waits until the host has the device calibrated, helps where it must (homes a Falcon,
-/// presses the button of WoodenHaptics), and plays its script 0.15 s later. A host that does not
+/// presses the button of WoodenHaptics), and plays its script 50 ms later. A host that does not
 /// begin to calibrate gets 2 s from its first packet, then the script begins. Without a host the
 /// hand waits for ever. Without a script the arm stays where it is. Once the script has ended, a
 /// user may lead the hand (`wish`). One thread; allocates only when constructed.

@@ -76,11 +76,11 @@ TEST_CASE("twenty seconds of a script are the same bytes every time, and others 
   CHECK(first != twenty_seconds(params));
 }
 
-TEST_CASE("the hand waits for a calibrated host 0.15 s, for any other 2 s") {
+TEST_CASE("the hand waits for a calibrated host 50 ms, for any other 2 s") {
   using Light = OmniCommand::Light;
   CHECK(undocked_after(OmniCommand{{}, false, Light::steady}) ==
-        doctest::Approx(0.15).epsilon(1e-2));
-  CHECK(undocked_after(OmniCommand{{}, true, Light::off}) == doctest::Approx(0.15).epsilon(1e-2));
+        doctest::Approx(0.05).epsilon(1e-2));
+  CHECK(undocked_after(OmniCommand{{}, true, Light::off}) == doctest::Approx(0.05).epsilon(1e-2));
   CHECK(undocked_after(OmniCommand{{}, false, Light::slow_flash}) ==
         doctest::Approx(2.0).epsilon(1e-3));
   CHECK(undocked_after(std::nullopt) == doctest::Approx(2.0).epsilon(1e-3));
@@ -114,7 +114,7 @@ TEST_CASE("the tip follows the script to the surface within friction and inertia
   const kerf::HandRoute route = emulator.model().route();
   const double reach_s =
       kerf::reach_curve(route, route.rest_tip_mm, {0, 4, 0}).least_seconds(route.hand_rad_per_s);
-  emulator.advance(static_cast<int>((0.15 + reach_s) * kerf::omni::kBusCyclesPerSecond));
+  emulator.advance(static_cast<int>((0.05 + reach_s) * kerf::omni::kBusCyclesPerSecond));
   CHECK(norm(emulator.model().tip_mm() - DeviceVec<double>{0, 4, 0}) < kerf::ReachCurve::kSwingMm);
   emulator.advance(8 * kerf::omni::kBusCyclesPerSecond);
   // One round later it is up and aside.

@@ -148,9 +148,9 @@ TEST_CASE("an emulated hand goes its way to the start, and only then where it is
       emulator.advance(160);
     }
   };
-  run(0.1);
+  run(0.04);
   CHECK(emulator.model().docked());
-  run(0.2);
+  run(0.16);
   CHECK_FALSE(emulator.model().docked());
   CHECK(emulator.model().tip_mm().z < -20);
   run(1.7);

@@ -122,7 +122,7 @@ TEST_CASE("a Falcon whose host never asks for homing is moved after 2 s all the 
 TEST_CASE("the hand presses the WoodenHaptics button and leaves home once the encoders are set") {
   Emulator emulator = wooden(hand());
   WoodenHost host;
-  for (int tick = 0; tick < 100; ++tick) host.tick(emulator, tick);
+  for (int tick = 0; tick < 50; ++tick) host.tick(emulator, tick);
   CHECK(host.calibrated);
   CHECK(emulator.model().docked());
   for (int tick = 0; tick < 3 * kTicksPerSecond; ++tick) host.tick(emulator, tick);

@@ -163,7 +163,7 @@ TEST_CASE("a lock-step run ends with its client and leaves the same report twice
     reports.push_back(text_of(report.text()));
   }
   CHECK(reports[0].find("\"packets_sent\": 3001") != std::string::npos);
-  CHECK(reports[0].find("\"undocked_at_s\": 0.15") != std::string::npos);
+  CHECK(reports[0].find("\"undocked_at_s\": 0.05") != std::string::npos);
   CHECK(reports[0] == reports[1]);
 }
 
