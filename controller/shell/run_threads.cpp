@@ -51,7 +51,9 @@ void show_progress(const LoopSignals& signals, const std::atomic<bool>& ended, c
     if (step.look()) end_looping_servo(run, signals.heartbeat.load(std::memory_order_relaxed));
     const Waiting waiting = signals.waiting.load(std::memory_order_relaxed);
     const std::string waits = text_of(run.personality, waiting);
-    if (teller.look(waiting, monotonic_ns())) {
+    const double servo_s =
+        static_cast<double>(signals.heartbeat.load(std::memory_order_relaxed)) / run.rate_hz;
+    if (teller.look(waiting, monotonic_ns(), static_cast<std::int64_t>(servo_s * kNsPerSecond))) {
       bar.hide();
       log_note(waits);
     }

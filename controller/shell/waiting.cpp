@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "controller/shell/waiting.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdio>
@@ -71,16 +72,16 @@ void tell_stopped_early(const std::string& work) {
   std::printf("kerf: stopped before there was a device; %s\n", escaped(work).c_str());
 }
 
-bool WaitTeller::look(Waiting now, std::int64_t now_ns) noexcept {
+bool WaitTeller::look(Waiting now, std::int64_t now_ns, std::int64_t servo_ns) noexcept {
   if (now == Waiting::nothing) told_ = 0;
   if (now != last_) {
     last_ = now;
     since_ns_ = now_ns;
+    since_servo_ns_ = servo_ns;
   }
   const std::uint32_t bit = 1U << static_cast<unsigned>(now);
-  if (now == Waiting::nothing || now_ns - since_ns_ < kPatienceNs || (told_ & bit) != 0) {
-    return false;
-  }
+  const std::int64_t waited_ns = std::min(now_ns - since_ns_, servo_ns - since_servo_ns_);
+  if (now == Waiting::nothing || waited_ns < kPatienceNs || (told_ & bit) != 0) return false;
   told_ |= bit;
   return true;
 }

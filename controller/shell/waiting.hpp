@@ -35,16 +35,18 @@ enum class Waiting : std::uint8_t {
 /// The line of one that was asked to end while it was at `work`, before there was a device.
 void tell_stopped_early(const std::string& work);
 
-/// Decides when a wait is worth a line: when it has lasted for a second, and each kind once until
-/// the force comes on. One thread.
+/// Decides when a wait is worth a line: when it has lasted for a second, by the clock and in ticks,
+/// and each kind once until the force comes on. In lock-step ticks may wait for pictures or for a
+/// busy machine, and no user can do anything about that. One thread.
 class WaitTeller {
  public:
-  /// Call several times a second. Whether to tell of `now`.
-  [[nodiscard]] bool look(Waiting now, std::int64_t now_ns) noexcept;
+  /// Call several times a second. Whether to tell of `now`. `servo_ns`: ticks so far, as time.
+  [[nodiscard]] bool look(Waiting now, std::int64_t now_ns, std::int64_t servo_ns) noexcept;
 
  private:
   Waiting last_ = Waiting::nothing;
   std::int64_t since_ns_ = 0;
+  std::int64_t since_servo_ns_ = 0;
   std::uint32_t told_ = 0;  ///< one bit for each kind
 };
 

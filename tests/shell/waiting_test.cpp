@@ -51,10 +51,10 @@ TEST_CASE("each device says what its user does") {
 TEST_CASE("a wait of a second is told, each kind once until the force comes on") {
   kerf::WaitTeller teller;
   std::vector<std::string> told;
-  std::int64_t now_ns = 0;
+  std::int64_t now_ns = 0, servo_ns = 0;
   const auto wait = [&](Waiting waiting, int ms) {
-    for (int i = 0; i < ms; i += 50, now_ns += 50 * kMs) {
-      if (!teller.look(waiting, now_ns)) continue;
+    for (int i = 0; i < ms; i += 50, now_ns += 50 * kMs, servo_ns += 50 * kMs) {
+      if (!teller.look(waiting, now_ns, servo_ns)) continue;
       told.push_back(kerf::text_of(Personality::omni, waiting));
       told.back() += " @" + std::to_string(now_ns / kMs);
     }
@@ -73,4 +73,13 @@ TEST_CASE("a wait of a second is told, each kind once until the force comes on")
   CHECK(told.size() == 2);
   wait(Waiting::parked, 5000);  // after a fault
   CHECK(told.size() == 3);
+}
+
+TEST_CASE("while no tick comes in lock-step nothing is told: it is the machine that is busy") {
+  kerf::WaitTeller teller;
+  for (std::int64_t now_ns = 0; now_ns < 60'000 * kMs; now_ns += 50 * kMs) {
+    CHECK_FALSE(teller.look(Waiting::report, now_ns, 0));
+  }
+  // Ticks without a word of the device, as fast as they can.
+  CHECK(teller.look(Waiting::report, 60'000 * kMs, 1000 * kMs));
 }
