@@ -83,6 +83,13 @@ void let_it_show() {
   std::this_thread::sleep_for(std::chrono::milliseconds(300));
 }
 
+void wait_for(const fs::path& file) {
+  for (int tries = 0; tries < 3000 && !fs::exists(file); ++tries) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  REQUIRE(fs::exists(file));
+}
+
 /// The upper left corner of the screen that DISPLAY names.
 RgbPicture read_screen(PictureSize size) {
   Display* const display = XOpenDisplay(nullptr);
@@ -209,13 +216,16 @@ User::User(const fs::path& folder, int blocks)
 RgbPicture User::whole() {
   const fs::path file = out_ / "kerf-0001.png";
   send("key s");
-  for (int tries = 0; tries < 3000 && !fs::exists(file); ++tries) {
-    std::this_thread::sleep_for(std::chrono::milliseconds(10));
-  }
+  wait_for(file);
   const auto picture = read_png(file);
   REQUIRE(picture);
   fs::remove(file);
   return *picture;
+}
+
+void User::begin_video() {
+  send("key m");
+  wait_for(out_ / "kerf-0001.y4m");
 }
 
 std::vector<std::uint8_t> User::look() {

@@ -76,6 +76,10 @@ class User {
   /// The same as it stands on the screen, whose upper left corner the window is in.
   std::vector<std::uint8_t> look_at_screen();
 
+  /// Presses `m` and waits for the file: a window that is resized meanwhile begins with its new
+  /// size.
+  void begin_video();
+
   int quit();
   /// Of a window that ends by itself.
   int ended() { return code_.get(); }

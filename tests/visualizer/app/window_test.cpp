@@ -317,13 +317,17 @@ TEST_CASE("the exit code of a window tells how the controller ended, and a video
     CHECK(user.quit() == 1);
   }
   SUBCASE("a window that changes its size ends the video") {
-    act("key m");
+    user.begin_video();
     act("search --name 'kerf: test' windowsize 400 300");
+    CHECK(user.whole().size == PictureSize{400, 300});  // it has drawn one of that size
     CHECK(user.quit() == 1);
   }
   SUBCASE("a video that the user ends is whole") {
-    act("key m sleep 0.3 key m");
+    user.begin_video();
+    act("key m");
+    static_cast<void>(user.whole());  // the key was seen
     act("search --name 'kerf: test' windowsize 400 300");
+    CHECK(user.whole().size == PictureSize{400, 300});
     CHECK(user.quit() == 0);
   }
 }
