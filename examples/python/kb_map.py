@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """A map of two columns of a table:  kb_map.py TABLE.csv PICTURE.png [X Y COLOUR] [COLUMN=VALUE ...]
 TABLE.csv is of `./kerf lab zwidth --csv`, whose K-B map is drawn, or of `./kerf sweep`. COLUMN=VALUE keeps its rows."""
+import one_line  # first: it tells of a package that lacks
 import matplotlib.pyplot as plt
 import numpy as np
-import one_line
 import table as tables
 def draw(table, picture, *words):
     only = [word.split("=", 1) for word in words if "=" in word]

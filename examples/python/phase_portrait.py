@@ -3,9 +3,9 @@
 """Position against velocity of the tip:  phase_portrait.py LOG-FOLDER PICTURE.png [AXIS]
 
 A press that comes to rest ends at velocity 0; a limit cycle is a closed loop. AXIS: 0, 1 (up, the default) or 2."""
+import one_line  # first: it tells of a package that lacks
 import matplotlib.pyplot as plt
 import numpy as np
-import one_line
 from kerf_reader import Log
 
 def draw(folder, picture, axis="1"):

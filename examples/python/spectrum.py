@@ -3,9 +3,9 @@
 """Spectrum of the force that was sent:  spectrum.py LOG-FOLDER PICTURE.png
 
 What hums stands out as a peak: the limit cycle of a wall that is too stiff, the spindle, a mode of the arm."""
+import one_line  # first: it tells of a package that lacks
 import matplotlib.pyplot as plt
 import numpy as np
-import one_line
 from kerf_reader import Log
 
 def draw(folder, picture):
