@@ -63,7 +63,7 @@ void check_below(const TomlNode& table, const std::string& prefix, const std::st
     const std::string name = prefix + node.key;
     if (std::ranges::find(known, node.key) == known.end()) {
       refuse(file + ":" + std::to_string(node.key_line) + ":" + std::to_string(node.key_column),
-             ": " + name + " is not a known key" + advice(prefix, node.key, keys));
+             ": " + one_line(name) + " is not a known key" + advice(prefix, node.key, keys));
     }
     if (std::ranges::find(keys, name, &SceneKey::name) != keys.end()) continue;
     check_form(node, name, file);

@@ -199,10 +199,10 @@ std::string Json::canonical() const {
 Json Json::parse(std::string_view text) {
   try {
     return from_library(ordered_json::parse(text), kMostLevels);
-  } catch (const ordered_json::exception& error) {
-    const std::string text = error.what();  // "[json.exception.parse_error.101] parse error at ..."
-    const std::size_t end = text.find("] ");
-    throw JsonError(end == text.npos ? text : text.substr(end + 2));
+  } catch (const ordered_json::parse_error& error) {
+    throw JsonError("no JSON at character " + std::to_string(error.byte));
+  } catch (const ordered_json::exception&) {
+    throw JsonError("a number out of range");
   }
 }
 

@@ -72,8 +72,21 @@ std::string problem_of(const toml::parse_error& error) {
   if (problem.starts_with("Error while parsing ")) problem.erase(0, problem.find(": ") + 2);
   const auto says = [&](const char* what) { return problem.find(what) != problem.npos; };
   if (says("redefine existing")) return problem + "; leave one of the two out";
-  const char* quotes = says("could not determine value type") ? ": text stands in quotes" : "";
-  return problem + "; correct the TOML syntax here" + quotes;
+  // The library's words for these tell nothing of the way out; a number stands in quotes there.
+  for (const char* range : {"' could not be interpreted as a value", "' is not representable"}) {
+    if (!says(range)) continue;
+    return problem.substr(1, problem.find(range) - 1) + " is out of the range of numbers; " +
+           "use a whole number of 64 bits, or one up to 1e308";
+  }
+  if (says("invalid utf-8"))
+    return "this is no text in UTF-8; name another file, or save it as UTF-8";
+  if (says("encountered end-of-file"))
+    return "the text ends within a value; close it, or copy it again";
+  if (says("maximum nested")) return "lists stand in lists more than 256 deep; write fewer";
+  if (says("unescaped control characters"))
+    return "text does not end on its line; close its quotes";
+  if (says("could not determine value type")) return "this is no value; text stands in quotes";
+  return problem + "; correct the TOML syntax here";
 }
 
 }  // namespace

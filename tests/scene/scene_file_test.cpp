@@ -5,6 +5,8 @@
 #include <filesystem>
 #include <span>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include <doctest/doctest.h>
 
@@ -362,20 +364,35 @@ TEST_CASE("too many tools are refused") {
 }
 
 TEST_CASE("broken TOML is reported in one line with line and column") {
-  for (const char* broken : {"[servo\n", "a = \n", "\"\n", "\xff\xfe\n", "[[volume]\n", "x = 0x\n",
-                             "s = \"\"\"never\nending"}) {
+  const std::string kSyntax = "correct the TOML syntax here";
+  const std::string kRange =
+      "is out of the range of numbers; use a whole number of 64 bits, or one up to 1e308";
+  const std::vector<std::pair<std::string, std::string>> all{
+      {"[servo\n", kSyntax},
+      {"a = \n", kSyntax},
+      {"[[volume]\n", kSyntax},
+      {"x = 0x\n", kSyntax},
+      {"x = 1e400\n", "1e400 " + kRange},
+      {"x = -1e999\n", "1e999 " + kRange},
+      {"x = 99999999999999999999\n", "99999999999999999999 " + kRange},
+      {"\"\n", "close it, or copy it again"},
+      {"x = \"abc\n", "close its quotes"},
+      {"\xff\xfe\n", "save it as UTF-8"},
+      {"s = \"\"\"never\nending", "close it, or copy it again"},
+      {"x = " + std::string(300, '['), "more than 256 deep; write fewer"}};
+  for (const auto& [broken, way_out] : all) {
     CAPTURE(broken);
     const std::string error = error_after(broken);
     CHECK(begins(error, "scenes/x.toml:"));
     CHECK(error.find('\n') == std::string::npos);
-    CHECK(error.find("correct the TOML syntax here") != std::string::npos);
+    CHECK(error.ends_with(way_out));
   }
   CHECK(begins(error_after("[servo\n"), "scenes/x.toml:6:7: "));
   for (const char* doubled : {"a = 1\na = 2\n", "[a]\n[a]\n"}) {
     CHECK(error_after(doubled).find(" existing ") != std::string::npos);
     CHECK(error_after(doubled).ends_with("; leave one of the two out"));
   }
-  CHECK(error_after("[device]\npersonality = omni\n").ends_with(": text stands in quotes"));
+  CHECK(error_after("[device]\npersonality = omni\n").ends_with("; text stands in quotes"));
 }
 
 TEST_CASE("control characters never reach a message or a name") {

@@ -200,7 +200,7 @@ Part read_part(const std::string& path) {
       }
     }
   } catch (const JsonError& error) {
-    throw HilError(path + ": line " + std::to_string(number + 1) + " is none of a part of a map (" +
+    throw HilError(path + ": line " + std::to_string(number + 1) + " is not one of a map (" +
                    error.what() + "); " + (number > 0 ? "cut it off there, or " : "") +
                    "remove the file to begin anew");
   }
