@@ -73,6 +73,11 @@ case $name in
       [[ -e $LAB/segment ]] || { echo 'kerf-visualizer: no controller' >&2; exit 2; }
       touch "${option[--attached]}"
       echo 'shown' >>"$LAB/calls"
+      if [[ -n ${LOST:-} && -n ${option[--hand-socket]:-} ]]; then
+        until grep -q '^emulator.*--hand' "$LAB/calls"; do sleep 0.02; done
+        echo 'kerf-visualizer: window: the X server is gone; way out' >&2
+        exit 2
+      fi
       if [[ -n ${CHOICE:-} && -n ${option[--choice]:-} && ! -e $LAB/chosen ]]; then
         touch "$LAB/chosen"
         sleep 0.3
@@ -260,6 +265,11 @@ expect 'and leaves nothing behind' nothing_survives
 expect 'a window that ends ends it' \
   with DISPLAY=:99 with FAIL_visualizer=2 kerf_gives 2 demo --seconds 60 --hand mouse
 expect 'in its words' says 'kerf-visualizer: place: value; way out'
+expect 'and leaves nothing behind' nothing_survives
+expect 'a screen that goes away ends it too' \
+  with DISPLAY=:99 with LOST=1 kerf_gives 1 demo --seconds 60 --hand mouse --out "$lab/out"
+expect 'in words' says 'the X server is gone; way out'
+expect 'with what was done until then' test -e "$lab/out/report.json"
 expect 'and leaves nothing behind' nothing_survives
 expect 'a scene that the window chose is the next demo' \
   with DISPLAY=:99 with CHOICE=/else/other.toml kerf_gives 0 demo --seconds 5 --stereo --scene "$root/scenes/wall.toml"
