@@ -33,7 +33,8 @@ sed -i -e 's|struct State {};.*|struct State { int steps = 0; };|' \
 cmake --build build >"$home/build.log"
 ends_itself() {  # ends_itself CODE COMMAND...
   local code=0
-  timeout --kill-after=1 120 "${@:2}" >"$home/out" 2>"$home/err" || code=$?
+  # By its own time: on a busy machine five seconds of it are minutes.
+  (ulimit -t 120 && exec "${@:2}") >"$home/out" 2>"$home/err" || code=$?
   { ((code == $1)) && grep -q 'did not end in 5 s' "$home/err"; } || {
     echo "own_law: a law that loops: exit code $code and not $1:" "${@:2}" >&2
     cat "$home/err" >&2
