@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""dicom.py FOLDER SERIES [SLOPE]: three slices of 4x4 voxels of 1 mm, explicit little endian, as one series."""
+"""dicom.py FOLDER SERIES [SLOPE [COUNT]]: three slices of 4x4 voxels of 1 mm, explicit little endian, as one series."""
 import pathlib
 import struct
 import sys
@@ -35,5 +35,6 @@ def write_series(folder, series, slices, edge_mm='1', slope='1'):
 
 
 if __name__ == '__main__':
-    small = [[[100 * i + 4 * j + k for k in range(4)] for j in range(4)] for i in range(3)]
+    count = int(sys.argv[4]) if len(sys.argv) > 4 else 3
+    small = [[[100 * i + 4 * j + k for k in range(4)] for j in range(4)] for i in range(count)]
     write_series(pathlib.Path(sys.argv[1]), sys.argv[2], small, slope=sys.argv[3] if len(sys.argv) > 3 else '1')

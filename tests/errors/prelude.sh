@@ -12,6 +12,16 @@ nrrd() {
     sed -E "${2:-}" >"$1"
   printf '0123456789abcdef%.0s' 1 2 3 4 >>"$1"
 }
+# png FILE TYPE CHANNELS: 4x4 pixels of zeros; the type is 0 for grey, 2 for red, green and blue, 6 with opacity.
+png() {
+  python3 - "$@" <<'PY'
+import struct, sys, zlib
+def chunk(kind, data): return struct.pack('>I', len(data)) + kind + data + struct.pack('>I', zlib.crc32(kind + data))
+name, kind, channels = sys.argv[1], int(sys.argv[2]), int(sys.argv[3])
+open(name, 'wb').write(b'\x89PNG\r\n\x1a\n' + chunk(b'IHDR', struct.pack('>IIBBBBB', 4, 4, 8, kind, 0, 0, 0))
+                       + chunk(b'IDAT', zlib.compress(bytes(4 * (1 + 4 * channels)))) + chunk(b'IEND', b''))
+PY
+}
 # hand LINE...: hand.toml
 hand() { printf '%s\n' "$@" >hand.toml; }
 
