@@ -102,7 +102,7 @@ TEST_CASE("a controller that stood still with all its threads pushes again only 
   std::this_thread::sleep_for(60ms);
   pair.controller->signal(SIGCONT);
   const std::uint64_t stopped_at = reader.state_head();
-  CHECK(eventually([&] { return reader.state_head() > stopped_at + 10 && pushes(); }, 2s));
+  CHECK(eventually([&] { return reader.state_head() > stopped_at + 10 && pushes(); }, 20s));
   pair.controller->signal(SIGTERM);
   CHECK(pair.controller->wait() == 0);
 

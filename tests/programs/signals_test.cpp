@@ -234,7 +234,8 @@ TEST_CASE("some of them end a visualizer without a window: exit 0, whole picture
     Process viewer({kBin + "/kerf-visualizer", "--name", pair.name, "--headless", "--size",
                     "160x120", "--out", (pair.folder / "frames").string()},
                    pair.folder / "viewer.log");
-    REQUIRE(eventually([&] { return std::filesystem::exists(pair.folder / "frames"); }, 20s));
+    REQUIRE(eventually([&] { return viewer.catches(signal); }, 60s));
+    REQUIRE(eventually([&] { return std::filesystem::exists(pair.folder / "frames"); }, 60s));
     std::this_thread::sleep_for(300ms);
     viewer.signal(signal);
     CHECK(viewer.wait() == 0);
