@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -22,34 +23,73 @@ namespace kerf {
 /// No hand turns a tool faster: five turns a second.
 inline constexpr double kFastestTurnRadPerS = 30;
 
-/// Samples that a query reads at most beside a flat wall, the wall in the worst direction. A group
-/// is left out once its middle is farther above all matter than what it needs, by what the map may
-/// not know: the diagonal of a brick, that of the cells in which a voxel is read, and a step.
+/// The edges of a cube that stands on a corner: unit vectors at right angles, whose sum lies along
+/// `up`, turned about it by any angle.
+[[nodiscard]] inline std::array<std::array<double, 3>, 3> edges_about(
+    const std::array<double, 3>& up, double angle_rad) {
+  const std::array<double, 3> other =
+      std::abs(up[1]) < 0.7 ? std::array{0.0, 1.0, 0.0} : std::array{1.0, 0.0, 0.0};
+  const auto cross = [](const std::array<double, 3>& a, const std::array<double, 3>& b) {
+    return std::array{a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2],
+                      a[0] * b[1] - a[1] * b[0]};
+  };
+  auto first = cross(up, other);
+  const double length = std::hypot(first[0], first[1], first[2]);
+  for (double& part : first) part /= length;
+  const auto second = cross(up, first);
+  std::array<std::array<double, 3>, 3> edges{};
+  for (std::size_t k = 0; k < 3; ++k) {
+    const double angle = angle_rad + 2 * std::numbers::pi * static_cast<double>(k) / 3;
+    for (std::size_t i = 0; i < 3; ++i) {
+      edges[k][i] = up[i] / std::numbers::sqrt3 +
+                    std::numbers::sqrt2 / std::numbers::sqrt3 *
+                        (std::cos(angle) * first[i] + std::sin(angle) * second[i]);
+    }
+  }
+  return edges;
+}
+
+/// Samples that a query reads at most beside a flat wall, the wall in the worst direction. It lies
+/// across a diagonal of the bricks: there the map knows least. A group is left out once the lowest
+/// corner of the brick that holds its middle is farther above all matter than what the group needs,
+/// by the diagonal of the cells in which a voxel is read and a step of the map. Tried with the tool
+/// at several places in a brick.
 template <class N>
 [[nodiscard]] std::int64_t most_read_beside_wall(const PointTable<N>& table) {
-  constexpr double kUnknown = (kFreeBrick + 1) * std::numbers::sqrt3 + 1.0 / kFreeSteps;
-  constexpr int kDirections = 128;
+  constexpr double kUnknown = std::numbers::sqrt3 + 1.0 / kFreeSteps;
+  constexpr int kDirections = 128, kPlaces = 8;
   const double scale = double(table.reach) / (N::kIsFixed ? 65536.0 * 32768.0 : 1.0);
   std::int64_t most = 0;
   for (int k = 0; k < kDirections; ++k) {  // evenly, along a spiral of the golden angle
     const double y = (2 * k + 1.0) / kDirections - 1, turn = k * std::numbers::pi * 2.2360679775;
-    const double across = std::sqrt(1 - y * y);
-    const double up[3] = {across * std::cos(turn), y, across * std::sin(turn)};
-    const auto height = [&](const PointNumber<N>* const(&offset)[3], std::int32_t i) {
+    const double out = std::sqrt(1 - y * y);
+    const std::array<double, 3> up{out * std::cos(turn), y, out * std::sin(turn)};
+    const auto edges = edges_about(up, turn);
+    const auto along = [&](const std::array<double, 3>& way,
+                           const PointNumber<N>* const(&offset)[3], std::int32_t i) {
       double sum = 0;
-      for (std::size_t axis = 0; axis < 3; ++axis) sum += up[axis] * double(offset[axis][i]);
+      for (std::size_t axis = 0; axis < 3; ++axis) sum += way[axis] * double(offset[axis][i]);
       return scale * sum;
     };
     double lowest = 0;
     for (std::int32_t i = 0; i < table.count; ++i) {
-      lowest = std::min(lowest, height(table.offset, i));
+      lowest = std::min(lowest, along(up, table.offset, i));
     }
-    std::int64_t read = 0;
-    for (std::int32_t group = 0; group < table.groups; ++group) {
-      const double needed = double(table.needed[group]) / kFreeSteps + kUnknown;
-      read += height(table.middle, group) - lowest < needed ? kPointGroup : 0;
+    for (int place = 0; place < kPlaces; ++place) {
+      const double from = kFreeBrick * (place + 0.5) / kPlaces;  // along each edge in turn
+      std::int64_t read = 0;
+      for (std::int32_t group = 0; group < table.groups; ++group) {
+        double corner = 0;  // height of the lowest corner, from the tool's centre
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+          const double start = from * static_cast<double>(axis + 1);
+          const double at = along(edges[axis], table.middle, group) + start;
+          corner += (kFreeBrick * std::floor(at / kFreeBrick) - start) / std::numbers::sqrt3;
+        }
+        const double needed = double(table.needed[group]) / kFreeSteps + kUnknown;
+        read += corner - lowest < needed ? kPointGroup : 0;
+      }
+      most = std::max(most, read);
     }
-    most = std::max(most, read);
   }
   return most;
 }
@@ -78,13 +118,13 @@ template <class N>
   const std::int64_t turns =
       step_rad > 0 ? std::clamp<std::int64_t>(std::int64_t(std::ceil(turn_rad / step_rad)), 1,
                                               SweepRules::kMaxTurnQueries)
-                   : 1;
+                   : 0;
   const std::int64_t left =
       work.budget() - (beyond > 0 ? work.most_wasted() + beyond : 0) -
       std::min((turns + 1) * (query + work.turn), work.budget() / 2 + 2 * (query + work.turn));
   const std::int64_t last = work.query + work.closer;  // no query begins with less
   const std::int64_t queries = left < last ? 0 : (left - last) / query + 1;
-  return SweepRules::kStep * double(std::min(SweepRules::kMaxQueries - turns, queries)) -
+  return SweepRules::kStep * double(std::min(SweepRules::kMaxQueries - turns - 1, queries)) -
          SweepRules::kArrived;
 }
 

@@ -61,12 +61,8 @@ class ContactMemory {
   /// What contact reads in volume `v` of the plan, whose densities are those of the servo.
   void take(const LoadedScene& scene, const SceneVolume& volume, std::size_t v,
             std::span<const Density> density, ContactState<N>& state) {
-    const Density faintest = static_cast<Density>(volume.iso / 8);
-    const FreeBrickMap& map = maps_.emplace_back(volume.image.grid, density, faintest);
-    state.volumes[v] = {
-        {volume.image.grid, density.data(), density_scale(volume.iso), map.bricks()},
-        contact_frame<N>(scene, volume),
-        places_[v].places()};
+    const MappedField& field = fields_.emplace_back(volume.image.grid, density, volume.iso);
+    state.volumes[v] = {field.field(), contact_frame<N>(scene, volume), places_[v].places()};
     for (std::size_t part = 0; part < kMostBehind; ++part) {
       state.behind[part][v] = state.volumes[v];
       if (v < places_behind_[part].size()) {
@@ -117,7 +113,7 @@ class ContactMemory {
   std::vector<std::size_t> map_bytes_;
   std::vector<PlaceMemory<N>> places_;
   std::array<std::vector<PlaceMemory<N>>, kMostBehind> places_behind_;  ///< where a tool has a part
-  std::vector<FreeBrickMap> maps_;
+  std::vector<MappedField> fields_;
 };
 
 }  // namespace kerf

@@ -17,12 +17,9 @@ ContactRig<N>::ContactRig(const SampledTool& tool, const Body& body, Density iso
 
 template <class N>
 void ContactRig<N>::add(const Body& body, const ContactFrame<N>& frame, Density iso) {
-  constexpr Density kFeltShare = 8;  // a density below this part of the iso is not felt
-  maps_.emplace_back(body.grid, body.density, static_cast<Density>(iso / kFeltShare));
+  fields_.emplace_back(body.grid, body.density, iso);
   memories_.emplace_back().hold(points_);
-  volumes_.push_back({{body.grid, body.density.data(), density_scale(iso), maps_.back().bricks()},
-                      frame,
-                      memories_.back().places()});
+  volumes_.push_back({fields_.back().field(), frame, memories_.back().places()});
   query_.emplace(kernels_, points_, volumes_);
   query_->turn({});
 }

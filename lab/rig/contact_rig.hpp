@@ -71,7 +71,7 @@ class ContactRig {
   const KernelSet& kernels_;
   ToolPoints<N> tool_;
   PointShell<N> points_;
-  std::deque<FreeBrickMap> maps_;
+  std::deque<MappedField> fields_;
   std::deque<PlaceMemory<N>> memories_;
   std::vector<ContactVolume<N>> volumes_;
   std::optional<ContactQuery<N>> query_;

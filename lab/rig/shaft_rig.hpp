@@ -40,13 +40,10 @@ class ShaftRig {
     }
     turn_step_ = turn_step_of(reach);
     for (const Body* body : bodies) {
-      maps_.emplace_back(body->grid, body->density, static_cast<Density>(iso / 8));
+      fields_.emplace_back(body->grid, body->density, iso);
       for (std::size_t i = 0; i <= behind_.count; ++i) {
         places_.emplace_back().hold(i == 0 ? head_ : behind_.part[i - 1].point_shell);
-        volumes_[i].push_back(
-            {{body->grid, body->density.data(), density_scale(iso), maps_.back().bricks()},
-             plain_frame<N>(),
-             places_.back().places()});
+        volumes_[i].push_back({fields_.back().field(), plain_frame<N>(), places_.back().places()});
       }
     }
     field_.emplace(**kernel_sets(), head_, volumes_[0], behind_,
@@ -84,7 +81,7 @@ class ShaftRig {
   std::deque<ToolPoints<N>> shells_;
   PointShell<N> head_;
   PartsBehind<N> behind_;
-  std::deque<FreeBrickMap> maps_;
+  std::deque<MappedField> fields_;
   std::deque<PlaceMemory<N>> places_;
   std::array<std::vector<ContactVolume<N>>, 1 + kMostBehind> volumes_;
   std::optional<ToolQuery<N>> field_;

@@ -64,6 +64,33 @@ TEST_CASE("bricks tell how far the nearest voxel with density is read") {
   CHECK(FreeBricks{}.at(1, 2, 3) == 0);
 }
 
+TEST_CASE("a volume is free where nothing is read, or nothing near a voxel of the iso") {
+  std::mt19937 random(8);
+  constexpr VoxelGrid kGrid{39, 20, 26};
+  constexpr Density kIso = 800;
+  int soft_alone = 0;
+  for (const int solid : {0, 1, 3}) {
+    std::vector<Density> density(kGrid.voxel_count(), 0);
+    const auto any = [&] { return static_cast<std::size_t>(random()) % density.size(); };
+    for (int i = 0; i < 40; ++i) density[any()] = static_cast<Density>(99 + random() % 700);
+    for (int i = 0; i < solid; ++i) density[any()] = kIso;
+    const MappedField mapped(kGrid, density, kIso);
+    const DensityField field = mapped.field();
+    const FreeBrickMap felt(kGrid, density, kIso / 8), bearing(kGrid, density, kIso);
+    for (std::int32_t z = 0; z < kGrid.nz; ++z) {
+      for (std::int32_t y = 0; y < kGrid.ny; ++y) {
+        for (std::int32_t x = 0; x < kGrid.nx; ++x) {
+          const std::int32_t unread = felt.bricks().at(x, y, z);
+          const std::int32_t free = std::max(unread, bearing.bricks().at(x, y, z) - kIsoNearSteps);
+          if (field.free.at(x, y, z) != free) REQUIRE(field.free.at(x, y, z) == free);
+          soft_alone += free > unread ? 1 : 0;
+        }
+      }
+    }
+  }
+  CHECK(soft_alone > 0);
+}
+
 TEST_CASE("a sphere needs the steps of its radius, and more than there are where it is too large") {
   CHECK(free_steps_for(0.5) == 2);
   CHECK(free_steps_for(0.51) == 3);

@@ -253,9 +253,9 @@ TEST_CASE("a scene is planned with what the servo allows the queries of a tick")
     return QueryWork{query, closer, turn}.most();
   };
   CHECK(most(300, 100, 50) == 32 * 400 + 13 * 50);
-  CHECK(most(900, 100, 90) == 18000);
+  CHECK(most(900, 100, 90) == 15000);
   CHECK(most(2000, 200, 200) == 12 * 2200);
-  CHECK(most(900, 3200, 90) == 18000 + 990);
+  CHECK(most(900, 3200, 90) == 15000 + 990);
 
   LoadedScene scene = half_space_scene(48);
   scene.tools = {shape("wheel", 2, 1)};

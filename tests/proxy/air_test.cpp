@@ -8,6 +8,7 @@
 
 #include "controller/plan/air_speed.hpp"
 #include "lab/rig/air_flight.hpp"
+#include "lab/rig/shaft_rig.hpp"
 #include "tests/case_count.hpp"
 
 using namespace kerf;
@@ -70,6 +71,23 @@ TEST_CASE_TEMPLATE("no tool is dragged in the air beside a tilted wall, however 
       CAPTURE(made.radius_mm);
       CHECK(flown.longest_spring < kNothing);
       CHECK(flown.ticks == 50 * static_cast<int>(walls.size()));
+    }
+  }
+}
+
+TEST_CASE_TEMPLATE("no tool is dragged through soft tissue, however fast", N, FixedNumbers,
+                   DoubleNumbers) {
+  Dice dice(5);
+  const Body soft = body_of({120, 120, 120}, [&](Point) { return dice.uniform(0.38, 0.48); });
+  for (const SceneTool& made :
+       {kTools[0], kTools[2], tool_with("ball", 5.6, 11.2, {.radius_mm = 3.6, .length_mm = 72})}) {
+    ShaftRig<N> rig(made, {&soft});
+    CAPTURE(made.name);
+    for (int i = 0; i < 50; ++i) {
+      const Point hand = {dice.uniform(20, 100), dice.uniform(20, 100), dice.uniform(20, 100)};
+      rig.tick(hand);
+      CAPTURE(i);
+      CHECK(length(rig.proxy() - hand) < SweepRules::kArrived);
     }
   }
 }

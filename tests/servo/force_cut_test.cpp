@@ -215,7 +215,8 @@ TEST_CASE("milling into a tooth changes the force by less than 2 % a tick") {
 
 // What a CT of a tooth gives in 8 bits: of the range up to enamel the iso is a fifth, so that noise
 // and steps of the voxels count more than twice in the density of contact.
-TEST_CASE("milling into a noisy valley changes the force by less than 2 % a tick") {
+// At the four of 51 places of the valley where it steps most, and at six others.
+TEST_CASE("milling into a noisy valley changes the force by less than 2.5 % a tick") {
   constexpr int kEdge = 64;
   constexpr double kIsoShare = 0.2, kNoise = 0.02, kLevels = 255;
   const Shape valley = [](double x, double y, double z) {
@@ -242,14 +243,15 @@ TEST_CASE("milling into a noisy valley changes the force by less than 2 % a tick
     }
   }
   scene.force.damping_ns_per_mm = 0;
-  for (const double x_mm : {-0.3, 0.2}) {
-    for (const double z_mm : {-0.2, 0.0, 0.3}) {
-      Miller miller(scene, {x_mm, extremes::kSinkFromMm, z_mm});
-      const SunkForce felt = sink(miller, x_mm, z_mm);
-      MESSAGE("at ", x_mm, ", ", z_mm, " mm: largest step ", 100 * felt.step_ratio, " % of ",
-              felt.mean_n, " N");
-      CHECK(felt.step_ratio < 0.02);
-    }
+  constexpr std::array<double, 2> kPlaces[] = {{-0.3, -0.2}, {-0.3, 0},   {-0.3, 0.3}, {0.2, -0.2},
+                                               {0.2, 0},     {0.2, 0.3},  {0.1, -0.3}, {0.1, 0},
+                                               {-0.4, 0},    {-0.4, 0.15}};
+  for (const auto& [x_mm, z_mm] : kPlaces) {
+    Miller miller(scene, {x_mm, extremes::kSinkFromMm, z_mm});
+    const SunkForce felt = sink(miller, x_mm, z_mm);
+    MESSAGE("at ", x_mm, ", ", z_mm, " mm: largest step ", 100 * felt.step_ratio, " % of ",
+            felt.mean_n, " N");
+    CHECK(felt.step_ratio < 0.025);
   }
 }
 

@@ -13,10 +13,19 @@ inline constexpr std::int32_t kFreeBrick = 2;
 inline constexpr std::int32_t kFreeSteps = 4;
 inline constexpr std::int32_t kFreeFarthest = 254;  ///< the longest distance, steps
 
+/// A sample bears something only where a voxel at most so far from it along each axis reaches the
+/// iso: the reach of a closeup, and its cell (docs/theory.md 3.2).
+inline constexpr std::int32_t kIsoNear = 3;
+/// The same from where a sample reads that voxel, steps of the map: (kIsoNear - 1) sqrt 3.
+inline constexpr std::int32_t kIsoNearSteps = 14;
+static_assert(kIsoNearSteps * kIsoNearSteps >=
+              3 * (kIsoNear - 1) * (kIsoNear - 1) * kFreeSteps * kFreeSteps);
+
 /// Where a volume has nothing that contact could feel (docs/theory.md 2.3). Each brick of voxels
 /// has the Euclidean distance, in steps of 1/4 voxel rounded down, from its nearest point to the
-/// nearest one where a sample would read a voxel that contact counts (r >= 1/16); at most
-/// `kFreeFarthest`. A voxel is read less than one edge away from it on every axis.
+/// nearest one where a sample would read a voxel that contact counts (r >= 1/16), or that to a
+/// voxel of the iso less kIsoNearSteps where this is farther; at most `kFreeFarthest`. A voxel is
+/// read less than one edge away from it on every axis.
 ///
 /// Made at load (controller/plan/tables/free_brick_map.hpp). Cutting only takes density away, so
 /// the map is a lower bound for ever and needs no update. Points into the maker's memory.

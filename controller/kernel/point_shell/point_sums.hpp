@@ -188,6 +188,20 @@ constexpr void read_points(const PointPlaces<N>& places, std::int32_t count,
   }
 }
 
+/// Whether the volume is free around a group: its samples would read air.
+template <class N>
+[[nodiscard]] constexpr bool is_free(const PointTable<N>& table, const PointPlaces<N>& places,
+                                     const PointNumber<N> (&centre)[3], const DensityField& field,
+                                     std::int32_t group) noexcept {
+  std::int32_t middle[3] = {};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const auto at = place_at<N>(centre[axis], places.middle[axis][group]);
+    middle[axis] =
+        N::kIsFixed ? static_cast<std::int32_t>(at) >> 16 : static_cast<std::int32_t>(at);
+  }
+  return field.free.at(middle[0], middle[1], middle[2]) >= table.needed[group];
+}
+
 /// The sums of one query. Leaves out groups around which the volume is free: they would read air.
 /// `centre` of the tool is in voxels (fixed: Q15.16).
 template <class N>
@@ -199,13 +213,7 @@ template <class N>
   const VoxelGrid& grid = field.grid;
   if (grid.nx < 2 || grid.ny < 2 || grid.nz < 2) return sums;  // no cell
   for (std::int32_t group = 0; group < table.groups; ++group) {
-    std::int32_t middle[3] = {};
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      const auto at = place_at<N>(centre[axis], places.middle[axis][group]);
-      middle[axis] =
-          N::kIsFixed ? static_cast<std::int32_t>(at) >> 16 : static_cast<std::int32_t>(at);
-    }
-    if (field.free.at(middle[0], middle[1], middle[2]) >= table.needed[group]) continue;
+    if (is_free(table, places, centre, field, group)) continue;
     sums.read += kPointGroup;
     for (std::int32_t i = group * kPointGroup; i < (group + 1) * kPointGroup; ++i) {
       const PointNumber<N> place[3] = {place_at<N>(centre[0], places.offset_vox[0][i]),

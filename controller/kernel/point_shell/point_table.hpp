@@ -97,7 +97,7 @@ struct DensityField {
   VoxelGrid grid;
   const Density* density = nullptr;
   DensityScale scale;
-  FreeBricks free;
+  FreeBricks free{};  ///< of all that bears something (plan/tables/free_brick_map.hpp)
 };
 
 /// Sums over the samples of one query (docs/theory.md 3.2, 3.3). r is the density of contact and w

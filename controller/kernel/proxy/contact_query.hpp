@@ -85,6 +85,15 @@ class ContactQuery {
     return felt.buried ? felt : look(q, closer);
   }
 
+  /// What a look with closer looks at `q` costs at most, from what is near.
+  [[nodiscard]] std::int64_t cost_at(ContactVec<Real> q) const noexcept {
+    std::int64_t cost = work_.closer;
+    for (const ContactVolume<N>& volume : volumes_) {
+      cost += QueryWork::kLookSamples + reader_.samples_near(volume, Reader::place_of(volume, q));
+    }
+    return cost;
+  }
+
   /// The same, with closer looks or without, whatever the tick's work allows.
   [[nodiscard]] Contacts<N> look(ContactVec<Real> q, bool closer) const noexcept {
     Contacts<N> felt;
@@ -163,10 +172,7 @@ class ContactQuery {
     const PointSums<N> sums = reader_.sums_at(volume.field, points_.table, volume.places, at);
     if (sums.weight <= typename N::Sum(0)) return;
     ConstraintPlane<N> plane = plane_at(volume, at, sums, closer);
-    if (plane.depth > Real(0) && sums.top < Reader::kIsoDensity &&
-        !reader_.iso_is_near(volume, at, sums.top_sample)) {
-      return;
-    }
+    if (sums.top < Reader::kIsoDensity && !reader_.iso_is_near(volume, at, sums.top_sample)) return;
     if (closer) look_midway(volume, q, plane);
     // Nearly all samples are in the solid, or the tool feels the same all round. What is softer
     // than the iso bears nothing.

@@ -289,7 +289,7 @@ class ProxySweep {
     Real nearest_yet = allows_rest(here_) ? norm(goal - pose_.centre) : Real(4 * kContactLimit);
     const Real closer = nearest_yet - Real(SweepRules::kGain);
     auto enough = Real(SweepRules::kNoMove);
-    while (may_look() && !here_.buried && onward.length >= enough) {
+    while (may_look() && field_.may_query() && !here_.buried && onward.length >= enough) {
       const Place from = pose_.centre;
       auto step = static_cast<Real>(SweepRules::kStep);
       if (here_.count == 0) step = std::max(step, field_.free_distance(from, onward.displacement));

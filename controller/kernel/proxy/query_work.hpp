@@ -16,10 +16,9 @@ namespace kerf {
 /// What the queries of one tool cost in all volumes together, counted in samples that are read. It
 /// bounds a tick (`ContactQuery::begin_tick`, docs/theory.md 4.8), and a scene is planned with it.
 struct QueryWork {
-  /// What a tick may read, 2.5 to 4 ns each. A head of very many samples may make kLeastQueries,
-  /// and a whole tool with its shaft as many as kShaftedSamples allow: 53 to 84 us. With 15,000
-  /// and 16,500 a shaft in soft tissue holds a hand at 250 Hz by 2.7 N (row `traps`, --seed 33).
-  static constexpr std::int64_t kTickSamples = 18000, kShaftedSamples = 21000;
+  /// What a tick may read, 2.5 to 4 ns each, as the machine has it: 38 to 60 us. A head of very
+  /// many samples may make kLeastQueries alone.
+  static constexpr std::int64_t kTickSamples = 15000;
   static constexpr std::int64_t kLeastQueries = 12;
   static constexpr std::int64_t kLookSamples = 128;  ///< what a look costs besides those it reads
   static constexpr std::int64_t kCloseSamples = 2;   ///< what one of a closeup costs
@@ -35,20 +34,17 @@ struct QueryWork {
   std::int64_t head = 0;    ///< query and turn of the head alone; 0: there is nothing behind it
   std::int64_t near = 0;    ///< of a query, which begins whether or not the tick has so much left
 
-  /// Of a head, or of it and a part behind, and one more part. The head and one part may always
-  /// look closer; another one does where there is work left for it.
+  /// Of a head, or of it and a part behind, and one more part. `closer` is that of the head and one
+  /// part: a query needs no more to begin.
   [[nodiscard]] friend constexpr QueryWork operator+(const QueryWork& a,
                                                      const QueryWork& b) noexcept {
     const bool more = a.head > 0;
     return {a.query + b.query, more ? a.closer : a.closer + b.closer, a.turn + b.turn,
             more ? a.head : a.query + a.turn, a.near + b.near};
   }
-  /// Of a tick. No query begins that might go beyond it, but for the first after a turn, which then
-  /// has no closer look.
+  /// Of a tick. No query goes beyond it but the first after a turn, which then has no closer look.
   [[nodiscard]] constexpr std::int64_t budget() const noexcept {
-    const std::int64_t least = kLeastQueries * (query + turn);
-    const std::int64_t fits = std::max(kShaftedSamples, kLeastQueries * head);
-    return std::max(kTickSamples, head > 0 ? std::min(least, fits) : least);
+    return std::max(kTickSamples, kLeastQueries * (head > 0 ? head : query + turn));
   }
   /// Once so much of it went into free ways that led nowhere, no group looks for one.
   [[nodiscard]] constexpr std::int64_t most_wasted() const noexcept { return budget() / 8; }

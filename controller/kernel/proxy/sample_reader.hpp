@@ -97,6 +97,18 @@ class SampleReader {
     return sums;
   }
 
+  /// How many samples a look at the whole tool about the place `at` reads: those of all groups that
+  /// are not in free space.
+  [[nodiscard]] std::int64_t samples_near(const ContactVolume<N>& volume,
+                                          VoxelVec<Real> at) const noexcept {
+    const PointNumber<N> centre[3] = {number_of(at.x), number_of(at.y), number_of(at.z)};
+    std::int64_t near = 0;
+    for (std::int32_t group = 0; group < points_.table.groups; ++group) {
+      if (!is_free(points_.table, volume.places, centre, volume.field, group)) near += kPointGroup;
+    }
+    return near;
+  }
+
   /// The peak of the close samples around an offset of the tool, whose centre is at `at`.
   [[nodiscard]] Closeup<N> look_closely_at(const ContactVolume<N>& volume, VoxelVec<Real> at,
                                            const PointNumber<N> (&offset)[3]) const noexcept {
@@ -124,8 +136,7 @@ class SampleReader {
   /// does (docs/theory.md 3.2).
   [[nodiscard]] bool iso_is_near(const ContactVolume<N>& volume, VoxelVec<Real> at,
                                  std::int32_t sample) const noexcept {
-    constexpr std::int32_t kNear = 3;  // voxels: the reach of a closeup, and its cell
-    left_ -= QueryWork::kNearLook;     // a sample has eight voxels
+    left_ -= QueryWork::kNearLook;  // a sample has eight voxels
     const VoxelGrid& grid = volume.field.grid;
     const PointNumber<N> centre[3] = {number_of(at.x), number_of(at.y), number_of(at.z)};
     const std::int32_t end[3] = {grid.nx, grid.ny, grid.nz};
@@ -133,8 +144,8 @@ class SampleReader {
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const auto place = place_at<N>(centre[axis], volume.places.offset_vox[axis][sample]);
       const auto low = static_cast<std::int32_t>(N::kIsFixed ? place / 65536 : place);
-      from[axis] = std::max(low - kNear + 1, 0);
-      to[axis] = std::min(low + kNear + 1, end[axis]);
+      from[axis] = std::max(low - kIsoNear + 1, 0);
+      to[axis] = std::min(low + kIsoNear + 1, end[axis]);
     }
     const DensityScale& scale = volume.field.scale;
     for (std::int32_t z = from[2]; z < to[2]; ++z) {

@@ -52,7 +52,9 @@ template <class N>
 ///
 /// A query is one of each part at the same pose; what they feel is put together as planes of
 /// several volumes are: the deepest three stay. Planes of the parts behind are marked. One budget
-/// serves all. The tool turns, whatever its head; a ball's samples stay as they are, so it feels
+/// serves all. A query begins where the work is left that the last one took, and answers `buried`
+/// once a part has more near it than is left; the first after a turn is answered without closer
+/// looks then. The tool turns, whatever its head; a ball's samples stay as they are, so it feels
 /// the same as without a shaft. Servo thread; no heap.
 template <class N>
 class ToolQuery {
@@ -93,34 +95,33 @@ class ToolQuery {
   void begin_tick() noexcept {
     left_ = work_.budget();
     wasted_ = 0;
+    last_ = 0;
     head_.begin_tick();
     each_behind([](Part& part) { part.query.begin_tick(); });
   }
   [[nodiscard]] const QueryWork& work() const noexcept { return work_; }
   [[nodiscard]] bool half_spent() const noexcept { return left_ <= work_.budget() / 2; }
-  [[nodiscard]] bool may_query() const noexcept { return left_ >= work_.query + work_.closer; }
+  [[nodiscard]] bool may_query() const noexcept {
+    return left_ >= std::max(last_, head_.work().query + head_.work().closer);
+  }
   [[nodiscard]] std::int64_t spent() const noexcept { return work_.budget() - left_; }
 
   [[nodiscard]] Contacts<N> query(ContactVec<Real> q) noexcept {
     Contacts<N> felt;
-    const bool closer = may_query();
-    felt.buried = !closer && !turned_;
+    const bool closer = may_query(), answered = turned_;
+    felt.buried = !closer && !answered;
     if (felt.buried) return felt;
     turned_ = false;
+    const std::int64_t before = left_;
     on_account(head_, [&](const ContactQuery<N>& head) { felt = head.look(q, closer); });
-    std::int64_t to_come = work_.query - head_.work().query;
-    if (closer && left_ < to_come) {
-      felt = {};
-      felt.buried = true;
-      return felt;
-    }
     each_behind([&](Part& part) {
       Contacts<N> seen;
-      const bool near = closer && left_ >= to_come + part.query.work().closer;
       on_account(part.query, [&](const ContactQuery<N>& query) {
-        seen = query.look(q + part.from_head, near);
+        const ContactVec<Real> at = q + part.from_head;
+        const bool closely = closer && left_ >= query.cost_at(at);
+        seen.buried = closer && !closely && !answered;
+        if (!seen.buried) seen = query.look(at, closely);
       });
-      to_come -= part.query.work().query;
       for (std::size_t i = 0; i < static_cast<std::size_t>(seen.count); ++i) {
         ConstraintPlane<N> plane = seen.plane[i];
         plane.arm = plane.arm + part.from_head;
@@ -130,6 +131,7 @@ class ToolQuery {
       felt.buried = felt.buried || seen.buried;
       felt.depth = std::max(felt.depth, seen.depth);
     });
+    last_ = before - left_;
     return felt;
   }
 
@@ -176,6 +178,7 @@ class ToolQuery {
   std::optional<Part> handpiece_;
   QueryWork work_;
   std::int64_t left_ = 0;    ///< of the tick's samples
+  std::int64_t last_ = 0;    ///< of them that the last query took
   std::int64_t wasted_ = 0;  ///< of them for free ways that led nowhere
   bool turned_ = false;      ///< and not queried since
 };

@@ -95,4 +95,19 @@ FreeBrickMap::FreeBrickMap(const VoxelGrid& grid, std::span<const Density> densi
                  [&](Square square) { return steps[static_cast<std::size_t>(square)]; });
 }
 
+void FreeBrickMap::raise_to(const FreeBrickMap& other, std::int32_t steps) {
+  std::transform(distance_.begin(), distance_.end(), other.distance_.begin(), distance_.begin(),
+                 [steps](std::uint8_t own, std::uint8_t others) {
+                   return static_cast<std::uint8_t>(std::max<std::int32_t>(own, others - steps));
+                 });
+}
+
+MappedField::MappedField(const VoxelGrid& grid, std::span<const Density> density, Density iso)
+    : grid_(grid),
+      density_(density.data()),
+      iso_(iso),
+      free_(grid, density, static_cast<Density>(iso / 8)) {  // r = 1/16
+  free_.raise_to(FreeBrickMap(grid, density, iso), kIsoNearSteps);
+}
+
 }  // namespace kerf

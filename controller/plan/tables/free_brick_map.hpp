@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "controller/kernel/point_shell/free_bricks.hpp"
+#include "controller/kernel/point_shell/point_table.hpp"
 
 namespace kerf {
 
@@ -20,9 +21,30 @@ class FreeBrickMap {
   [[nodiscard]] FreeBricks bricks() const noexcept { return {grid_, distance_.data()}; }
   [[nodiscard]] std::size_t bytes() const noexcept { return distance_.size(); }
 
+  /// Makes every distance at least that of `other`, a map of the same grid, less `steps`.
+  void raise_to(const FreeBrickMap& other, std::int32_t steps);
+
  private:
   VoxelGrid grid_;
   std::vector<std::uint8_t> distance_;
+};
+
+/// A volume as contact reads it, with its map (docs/theory.md 2.3) of where no sample reads density
+/// that counts, or none is so near to a voxel of the iso that it bears. Load time; the density,
+/// which the caller keeps, may lose but not gain. Moving it keeps the field valid.
+class MappedField {
+ public:
+  MappedField(const VoxelGrid& grid, std::span<const Density> density, Density iso);
+
+  [[nodiscard]] DensityField field() const& noexcept {
+    return {grid_, density_, density_scale(iso_), free_.bricks()};
+  }
+
+ private:
+  VoxelGrid grid_;
+  const Density* density_;
+  Density iso_;
+  FreeBrickMap free_;
 };
 
 }  // namespace kerf
