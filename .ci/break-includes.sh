@@ -48,6 +48,12 @@ refused shared/wire/a.hpp '' 'record/   <- a room without C++'
 rm -rf record
 mv .record record
 
+mkdir docs # as full as a folder may be, and one more
+touch docs/{1..40}.md
+"$check" "$lab"
+refused docs/41.md '' 'docs/   <- 41 files, of 40 at most'
+rm -r docs
+
 refused shared/segment/x.cpp '#include <png.h>' '<png.h>'
 refused controller/servo/x.cpp '#include <zlib.h>' '<zlib.h>'
 refused controller/servo/x.cpp '#include <unistd.h>' '<unistd.h>'

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# Who may include whom (docs/architecture.md); prints each line that breaks a rule.
+# Who may include whom (docs/architecture.md), and how full a folder may be; prints each line that breaks a rule.
 #     .ci/check-includes.sh [ROOT]      another tree, for .ci/break-includes.sh
 set -euo pipefail
 cd "${1:-$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/..}"
@@ -52,6 +52,15 @@ rooms_and_folders() {
     -printf '%p   <- C++ ends in .cpp or .hpp\n'
 }
 
+# No folder has more files of its own than can be read at a glance. Where git knows the tree, it says what belongs there.
+full_folders() {
+  local files
+  files=$(git ls-files 2>/dev/null || true)
+  [[ -n $files ]] || files=$(find . -type f -printf '%P\n')
+  sed -E 's|^[^/]*$|./&|; s|/[^/]*$||' <<<"$files" | sort | uniq -c |
+    awk '$1 > 40 { count = $1; sub("^ *[0-9]+ ", ""); print $0 "/   <- " count " files, of 40 at most; make a room below" }'
+}
+
 # Each include of another room, against the list. What stands in quotes is of ours.
 between_rooms() {
   local ours
@@ -78,6 +87,7 @@ between_rooms() {
 
 broken() {
   rooms_and_folders
+  full_folders
   between_rooms
   # A name without a folder would slip through the rule above.
   includes '"[^/"]+"' "${programs[@]}" tests

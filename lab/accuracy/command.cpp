@@ -2,7 +2,6 @@
 #include "lab/accuracy/command.hpp"
 
 #include <cstdio>
-#include <filesystem>
 #include <ostream>
 #include <vector>
 
@@ -35,20 +34,18 @@ Command::Command(Arguments& program)
   app_.option("--csv", csv_, "write the figures as a table").shown_as("FILE");
   app_.option("--plot", plot_, "draw error against time as SVG").shown_as("FILE");
   app_.option("--page", page_,
-              "write the figures as a page (docs/accuracy.md), and the plot beside it unless "
-              "--plot says where")
+              "write the figures as a page (docs/accuracy.md), and the plot in plots/ beside it "
+              "unless --plot says where")
       .shown_as("FILE");
   app_.option("--cpu", core_, "core to run on (default: the last)").within(0, 1023);
 }
 
 int Command::run(std::ostream& out) const {
-  const std::filesystem::path plot = plot_.empty() && !page_.empty()
-                                         ? std::filesystem::path(page_).replace_extension(".svg")
-                                         : std::filesystem::path(plot_);
   const LabOutput as_json("--report", report_, ".json");
   const LabOutput as_csv("--csv", csv_, ".csv");
   const LabOutput as_page("--page", page_, ".md");
-  const LabOutput as_plot("--plot", plot.string(), ".svg");
+  const std::string plot = plot_.empty() ? page_plot("--page", page_, ".svg") : plot_;
+  const LabOutput as_plot("--plot", plot, ".svg");
   LabOutput::check_distinct({&as_json, &as_csv, &as_page, &as_plot});
   const int core = pin_lab(core_);
   std::vector<Entry> entries;
@@ -60,10 +57,7 @@ int Command::run(std::ostream& out) const {
   for (const Entry& entry : entries) out << line_of(entry) << '\n';
   as_json.write(json(entries, core));
   as_csv.write(csv(entries));
-  if (!page_.empty()) {
-    const auto folder = std::filesystem::absolute(page_).parent_path();
-    as_page.write(page(entries, std::filesystem::absolute(plot).lexically_proximate(folder)));
-  }
+  if (!page_.empty()) as_page.write(page(entries, page_link(page_, plot)));
   if (!plot.empty()) as_plot.write(gnuplot_svg(plot_script(entries)));
   return 0;
 }

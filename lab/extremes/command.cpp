@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <cstdio>
-#include <filesystem>
 #include <ostream>
 
 #include "lab/extremes/comparison.hpp"
@@ -96,7 +95,8 @@ Command::Command(Arguments& program)
   only.one_of(names).split_at_commas().shown_as("GROUP,...");
   app_.flag("--quick", quick_, "a hundredth of the cases");
   app_.option("--report", report_, "write the rows as JSON").shown_as("FILE");
-  app_.option("--page", page_, "write all as a page (docs/contact.md), its plots beside it")
+  app_.option("--page", page_,
+              "write all as a page (docs/contact.md), its plots in plots/ beside it")
       .excludes(only)
       .shown_as("FILE");
   app_.option("--data", data_, "folder of real volumes (default: $KERF_DATA)")
@@ -110,12 +110,10 @@ Command::Command(Arguments& program)
 }
 
 int Command::run(std::ostream& out) const {
-  const auto beside = [&](const char* end) {
-    return page_.empty() ? page_ : std::filesystem::path(page_).replace_extension(end).string();
-  };
-  const std::string plot = beside(".svg"), hands_plot = beside(".hands.svg");
   const LabOutput as_json("--report", report_, ".json");
   const LabOutput as_page("--page", page_, ".md");
+  const std::string plot = page_plot("--page", page_, ".svg"),
+                    hands_plot = page_plot("--page", page_, ".hands.svg");
   const LabOutput as_plot("--page", plot, ".svg");
   const LabOutput as_hands_plot("--page", hands_plot, ".svg");
   LabOutput::check_distinct({&as_json, &as_page, &as_plot, &as_hands_plot});
@@ -140,12 +138,10 @@ int Command::run(std::ostream& out) const {
   }
   as_json.write(json_of(findings.rows));
   if (!page_.empty()) {
-    const auto name = [](const std::string& path) {
-      return std::filesystem::path(path).filename().string();
-    };
     as_plot.write(gnuplot_svg(plot_of(findings.comparison)));
     as_hands_plot.write(gnuplot_svg(plot_of(findings.hands)));
-    as_page.write(page(findings.rows, findings.comparison, name(plot), name(hands_plot)));
+    as_page.write(page(findings.rows, findings.comparison, page_link(page_, plot),
+                       page_link(page_, hands_plot)));
   }
   return std::ranges::all_of(findings.rows, &Row::pass) ? 0 : 1;
 }

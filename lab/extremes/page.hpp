@@ -11,7 +11,7 @@
 namespace kerf::extremes {
 
 /// `docs/contact.md`: the figures of one run with the machine, the compiler, the day and the
-/// command that made them. `plot` and `hands_plot` are the pictures beside it. Markdown.
+/// command that made them. `plot` and `hands_plot` are links to its pictures. Markdown.
 [[nodiscard]] std::string page(const std::vector<Row>& rows, const Comparison& comparison,
                                const std::string& plot, const std::string& hands_plot);
 

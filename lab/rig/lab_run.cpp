@@ -53,6 +53,24 @@ std::string page_number(double value) {
   return text;
 }
 
+std::string page_plot(const char* option, const std::string& page, const char* ending) {
+  if (page.empty()) return {};
+  namespace fs = std::filesystem;
+  const fs::path folder = fs::path(page).parent_path() / "plots";
+  std::error_code fault;
+  fs::create_directory(folder, fault);
+  if (fault) {
+    throw HilError(std::string(option) + " " + page + ": its plots have no folder " +
+                   folder.string() + " (" + fault.message() + "); make one or choose another page");
+  }
+  return folder / fs::path(page).filename().replace_extension(ending);
+}
+
+std::string page_link(const std::string& page, const std::string& plot) {
+  const auto folder = std::filesystem::absolute(page).parent_path();
+  return std::filesystem::absolute(plot).lexically_proximate(folder);
+}
+
 LabOutput::LabOutput(const char* option, std::string path, const char* ending)
     : option_(option), path_(std::move(path)) {
   if (path_.empty()) return;

@@ -16,6 +16,14 @@ int pin_lab(int core);
 /// Three digits, or all before the point: how pages show their figures.
 [[nodiscard]] std::string page_number(double value);
 
+/// The file of a page's plot: the page's name with `ending`, in the folder plots/ beside the page,
+/// which is made. Empty where the page is. Throws `HilError` that names `option`.
+[[nodiscard]] std::string page_plot(const char* option, const std::string& page,
+                                    const char* ending);
+
+/// `plot` as `page` links to it.
+[[nodiscard]] std::string page_link(const std::string& page, const std::string& plot);
+
 /// An output file of a kind that ends in `ending`. Its name is checked before the measurement; the
 /// file is made after it. Does nothing for an empty path. Throws `HilError` that names the option,
 /// or `FileError`.

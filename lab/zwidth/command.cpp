@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
-#include <filesystem>
 #include <numeric>
 #include <ostream>
 #include <set>
@@ -59,8 +58,9 @@ Command::Command(Arguments& program)
   app_.option("--cells", cells_, "for --portraits: stiffness:damping, as many as 12")
       .split_at_commas()
       .shown_as("K:B,...");
-  app_.option("--page", page_,
-              "measure and write docs/stability.md, its pictures beside it; takes minutes")
+  app_.option(
+          "--page", page_,
+          "measure and write docs/stability.md, its pictures in plots/ beside it; takes minutes")
       .shown_as("FILE");
   app_.footer(
       "An axis takes one value, a list (0,1,2) or a range (0:3:4: from, to, count). Two are "
@@ -211,14 +211,11 @@ int Command::threads(std::size_t columns) const {
 }
 
 void Command::write_page() const {
-  const auto beside = [&](const char* end) {
-    return std::filesystem::path(page_).replace_extension(end);
-  };
-  const auto devices = beside(".devices.svg"), rates = beside(".rates.svg");
   require_gnuplot();
   const LabOutput as_page("--page", page_, ".md");
-  const LabOutput as_devices("--page", devices.string(), ".svg"),
-      as_rates("--page", rates.string(), ".svg");
+  const std::string devices = page_plot("--page", page_, ".devices.svg"),
+                    rates = page_plot("--page", page_, ".rates.svg");
+  const LabOutput as_devices("--page", devices, ".svg"), as_rates("--page", rates, ".svg");
   const ProgressBar bar(true);
   const Measure measure = [&](const MapSpec& spec, const std::string& what) {
     Part part{spec, {}, {}};
@@ -233,7 +230,7 @@ void Command::write_page() const {
     return part;
   };
   const StabilityPage page =
-      stability_page(measure, devices.filename().string(), rates.filename().string(), quick_);
+      stability_page(measure, page_link(page_, devices), page_link(page_, rates), quick_);
   as_devices.write(gnuplot_svg(page.devices_plot));
   as_rates.write(gnuplot_svg(page.rates_plot));
   as_page.write(page.text);

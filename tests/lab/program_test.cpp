@@ -73,7 +73,7 @@ TEST_CASE("two outputs that are one file are refused before anything is measured
   CHECK(answer.said.empty());
   CHECK(answer.complained ==
         "kerf-lab: --csv " + file + ": --report writes there, too; give each a file of its own\n");
-  const std::string svg = folder / "kerf-lab-same.svg";  // the plot goes beside the page
+  const std::string svg = folder / "kerf-lab-same.svg";
   CHECK(lab({"accuracy", "--page", svg.c_str()}).code == 2);
   CHECK(lab({"bench", "--page", file.c_str(), "--report", file.c_str()}).code == 2);
   const std::string scan = folder / "kerf-lab-same.nrrd";
@@ -91,6 +91,29 @@ TEST_CASE("nothing lies beside an output while a run measures, so that it may be
   CHECK(std::filesystem::is_empty(folder));
   output.write("figures\n");
   CHECK(std::filesystem::file_size(folder / "a.csv") == 8);
+  std::filesystem::remove_all(folder);
+}
+
+TEST_CASE(
+    "plots of a page lie in plots/ beside it; where nobody can make that folder, one line says "
+    "so") {
+  const auto folder = std::filesystem::temp_directory_path() / "kerf-lab-plots-test";
+  std::filesystem::remove_all(folder);
+  std::filesystem::create_directory(folder);
+  const std::string page = folder / "a.md";
+  CHECK(kerf::page_plot("--page", "", ".svg").empty());
+  const std::string plot = kerf::page_plot("--page", page, ".rates.svg");
+  CHECK(plot == folder / "plots" / "a.rates.svg");
+  CHECK(std::filesystem::is_directory(folder / "plots"));
+  CHECK(kerf::page_link(page, plot) == "plots/a.rates.svg");
+  CHECK(kerf::page_plot("--page", page, ".svg") == folder / "plots" / "a.svg");  // again
+  std::filesystem::remove_all(folder / "plots");
+  std::ofstream(folder / "plots") << "a file";
+  const Answer answer = lab({"accuracy", "--page", page.c_str()});
+  CHECK(answer.code == 2);
+  CHECK(answer.said.empty());
+  CHECK(answer.complained.starts_with("kerf-lab: --page " + page + ": its plots have no folder"));
+  CHECK(std::ranges::count(answer.complained, '\n') == 1);
   std::filesystem::remove_all(folder);
 }
 

@@ -21,8 +21,9 @@ grep -q '<svg' portraits.svg
 grep -q 'corner' arm.svg
 "$lab" zwidth --quick --jobs 2 --page stability.md
 grep -q '## What each knob does' stability.md
-grep -q '<svg' stability.devices.svg
-grep -q '<svg' stability.rates.svg
+grep -q '](plots/stability.devices.svg)' stability.md
+grep -q '<svg' plots/stability.devices.svg
+grep -q '<svg' plots/stability.rates.svg
 
 map='--damping 0,0.002,0.01 --delay 0,1 --stiffness 0.2:20:5 --seconds 0.2'
 # shellcheck disable=SC2086  # words
