@@ -13,7 +13,7 @@
 namespace kerf {
 
 /// What a law was given last, as numbers: written before the step, read by whoever outlives it.
-struct ToldInput {
+struct LastInput {
   std::array<double, 16> number{};
 };
 
@@ -21,10 +21,10 @@ struct ToldInput {
 class LawInputs {
  public:
   template <class N>
-  void next(ForceInput<N>& in, ToldInput& told) {
-    spring(in.spring_mm, told);
-    vec(in.velocity_mm_per_s, kEnd, told, 3);
-    vec(in.tip_mm, 1000, told, 6);
+  void next(ForceInput<N>& in, LastInput& last) {
+    spring(in.spring_mm, last);
+    vec(in.velocity_mm_per_s, kEnd, last, 3);
+    vec(in.tip_mm, 1000, last, 6);
     in.scene_tip_mm = relabel<WorldSpace>(in.tip_mm);
     const double length = static_cast<double>(norm(in.spring_mm));
     for (auto of : {&DeviceVec<typename N::Unit>::x, &DeviceVec<typename N::Unit>::y,
@@ -34,18 +34,18 @@ class LawInputs {
     if (length > 0) in.normal.y = typename N::Unit(1);
   }
   template <class N>
-  void next(VelocityInput<N>& in, ToldInput& told) {
-    vec(in.tip_mm, kEnd, told, 0);
+  void next(VelocityInput<N>& in, LastInput& last) {
+    vec(in.tip_mm, kEnd, last, 0);
     constexpr std::array<std::uint32_t, 4> kTicks{1, 1, 2, 1000};
     in.ticks = kTicks[bits_() % kTicks.size()];
-    told.number[3] = in.ticks;
+    last.number[3] = in.ticks;
   }
   template <class N>
-  void next(StabiliserInput<N>& in, ToldInput& told) {
-    vec(in.wanted_n, 10, told, 0);
-    vec(in.sent_n, 10, told, 3);
-    vec(in.moved_mm, 100, told, 6);
-    vec(in.velocity_mm_per_s, kEnd, told, 9);
+  void next(StabiliserInput<N>& in, LastInput& last) {
+    vec(in.wanted_n, 10, last, 0);
+    vec(in.sent_n, 10, last, 3);
+    vec(in.moved_mm, 100, last, 6);
+    vec(in.velocity_mm_per_s, kEnd, last, 9);
     in.ticks = 1 + static_cast<std::uint32_t>(bits_() % 3);
     const double taken_mj = number(1000);
     if constexpr (N::kIsFixed) {
@@ -54,13 +54,13 @@ class LawInputs {
       in.taken_mj = static_cast<typename N::Energy>(taken_mj);
     }
     in.contact = bits_() % 2 == 0;
-    told.number[12] = in.ticks;
-    told.number[13] = taken_mj;
+    last.number[12] = in.ticks;
+    last.number[13] = taken_mj;
   }
 
-  /// What `told` says of a law of this kind.
-  [[nodiscard]] static std::string text(LawKind kind, const ToldInput& told) {
-    const auto& n = told.number;
+  /// What `last` says of a law of this kind.
+  [[nodiscard]] static std::string text(LawKind kind, const LastInput& last) {
+    const auto& n = last.number;
     const auto vec = [&](const char* name, std::size_t at) {
       return format("%s [%g, %g, %g]", name, n[at], n[at + 1], n[at + 2]);
     };
@@ -86,18 +86,18 @@ class LawInputs {
     return end * (2 * (static_cast<double>(draw >> 11) / 9007199254740992.0) - 1);
   }
   template <class V>
-  void vec(V& v, double end, ToldInput& told, std::size_t at) {
+  void vec(V& v, double end, LastInput& last, std::size_t at) {
     using Real = decltype(v.x);
     for (auto of : {&V::x, &V::y, &V::z}) {
-      told.number[at] = number(end);
-      v.*of = Real(told.number[at++]);
+      last.number[at] = number(end);
+      v.*of = Real(last.number[at++]);
     }
   }
   /// Most springs are as long as a hand makes them.
   template <class V>
-  void spring(V& v, ToldInput& told) {
+  void spring(V& v, LastInput& last) {
     constexpr std::array<double, 4> kLength{0.1, 1, 10, kEnd};
-    vec(v, kLength[bits_() % kLength.size()], told, 0);
+    vec(v, kLength[bits_() % kLength.size()], last, 0);
   }
 
   std::mt19937_64 bits_{18};

@@ -38,7 +38,7 @@ struct LawJob {
 /// What the child tells, in memory that both see.
 struct LawProgress {
   std::size_t settings = 0;  ///< at work on this set
-  ToldInput told;
+  LastInput last;
   std::uint64_t steps = 0;
   double seconds = 0;
   LawFlaw flaw = LawFlaw::none;
@@ -70,7 +70,7 @@ LawFlaw run_steps(const LawPlan<In, Real>& plan, int steps, LawProgress& progres
   const CountedAllocations counted;
   const std::uint64_t allocations = CountedAllocations::total();
   for (int step = 0; step < steps; ++step) {
-    inputs.next(in, progress.told);
+    inputs.next(in, progress.last);
     if constexpr (requires { in.first; }) in.first = !memory->begun;
     const auto out = plan(*memory, in);
     ++progress.steps;
@@ -157,7 +157,7 @@ std::string fault_of(const LawJob& job, const LawProgress& progress, LawFlaw fla
   }
   const LawChoice& choice = job.choices[std::min(progress.settings, job.choices.size() - 1)];
   return what + " with " + settings_of(choice) + " at " +
-         LawInputs::text(choice.kind, progress.told) + "; " + way_out;
+         LawInputs::text(choice.kind, progress.last) + "; " + way_out;
 }
 
 template <class N>

@@ -9,9 +9,9 @@
 #include <utility>
 
 #include "hil/devmodel/device_model.hpp"
+#include "hil/devmodel/guided_hand.hpp"
 #include "hil/devmodel/hand_motion.hpp"
 #include "hil/devmodel/hand_script.hpp"
-#include "hil/devmodel/led_hand.hpp"
 #include "hil/devmodel/omni_model.hpp"
 #include "hil/devmodel/packet_device.hpp"
 #include "shared/numeric/fnv1a.hpp"
@@ -57,8 +57,8 @@ class Emulator final : public PacketDevice {
 
   /// Whether a user may lead the hand: its script has ended.
   [[nodiscard]] bool can_be_led() const noexcept { return hand_ && hand_->ended(); }
-  /// Where a user wants the hand to be; `forsake`: there is no user any more. See `LedHand`. While
-  /// a script runs, the hand keeps to it and follows the user afterwards.
+  /// Where a user wants the hand to be; `forsake`: there is no user any more. See `GuidedHand`.
+  /// While a script runs, the hand keeps to it and follows the user afterwards.
   void wish(const HandWish& wish) noexcept;
   void forsake() noexcept;
 
@@ -71,7 +71,7 @@ class Emulator final : public PacketDevice {
 
   std::unique_ptr<DeviceModel> model_;
   std::optional<HandMotion> hand_;
-  std::optional<LedHand> led_;
+  std::optional<GuidedHand> led_;
   EmulatorStats stats_;
   bool asked_ = false;                      ///< for a packet, since the last `advance`
   std::optional<std::int64_t> host_since_;  ///< cycle of the first packet, of either side

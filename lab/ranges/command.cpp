@@ -215,17 +215,18 @@ int Command::study(std::ostream& out) const {
   const LabOutput report("--report", report_, ".json");
   const ProgressBar bar(true);
   Teller teller(out);
-  const Told told{.progress = [&](double share, const std::string& what) { bar.show(share, what); },
-                  .broken = [&](const Broken& broken) { bar.hide(), teller.broken(broken); },
-                  .part = [&](const PairRows& so_far) { bar.hide(), teller.so_far(so_far.tally); }};
+  const StudyEvents events{
+      .progress = [&](double share, const std::string& what) { bar.show(share, what); },
+      .broken = [&](const Broken& broken) { bar.hide(), teller.broken(broken); },
+      .part = [&](const PairRows& so_far) { bar.hide(), teller.so_far(so_far.tally); }};
   if (!set_.empty()) {
     tell_one(texts_of(set_), effort, teller);
   } else if (combinations_ > 0) {
-    const std::vector<KeyRow> keys = study_keys(effort, told);
+    const std::vector<KeyRow> keys = study_keys(effort, events);
     bar.hide();
     tell_keys(keys, teller);
     tell_extremes(effort, keys, teller);
-    const PairRows pairs = study_pairs(keys, effort, told);
+    const PairRows pairs = study_pairs(keys, effort, events);
     bar.hide();
     tell_pairs(pairs, teller);
   }

@@ -63,7 +63,7 @@ void Tally::add(const Tally& other) {
   broken.insert(broken.end(), other.broken.begin(), other.broken.end());
 }
 
-std::vector<KeyRow> study_keys(const Effort& effort, const Told& told) {
+std::vector<KeyRow> study_keys(const Effort& effort, const StudyEvents& events) {
   std::vector<KeyRow> rows;
   for (KeyLevels& levels : key_levels()) rows.push_back({std::move(levels), {}, 0, {}});
   const SceneFolder folder;
@@ -104,8 +104,8 @@ std::vector<KeyRow> study_keys(const Effort& effort, const Told& told) {
     }
   };
   in_parallel(rows.size(), effort.jobs, folder, study, [&](std::size_t i, double share) {
-    for (const Broken& broken : rows[i].ends.broken) told.broken(broken);
-    told.progress(share, "ends of every key");
+    for (const Broken& broken : rows[i].ends.broken) events.broken(broken);
+    events.progress(share, "ends of every key");
   });
   return rows;
 }

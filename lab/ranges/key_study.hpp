@@ -47,14 +47,14 @@ struct KeyRow {
 
 struct PairRows;
 
-/// Who is told of a study while it runs. One thread at a time.
-struct Told {
+/// What a study calls while it runs. One thread at a time.
+struct StudyEvents {
   std::function<void(double share, const std::string& what)> progress;  ///< 0..1, at work on what
   std::function<void(const Broken&)> broken;                            ///< at once
   std::function<void(const PairRows&)> part;  ///< what there is after each hundred rows
 };
 
 /// Each end of each key alone, and what lies just beyond, in all numbers.
-[[nodiscard]] std::vector<KeyRow> study_keys(const Effort& effort, const Told& told);
+[[nodiscard]] std::vector<KeyRow> study_keys(const Effort& effort, const StudyEvents& events);
 
 }  // namespace kerf::ranges

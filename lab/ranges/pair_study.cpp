@@ -118,7 +118,8 @@ bool pair_texts(const KeyFactors& factors, const Pair& pair, KeyTexts& texts) {
 
 }  // namespace
 
-PairRows study_pairs(const std::vector<KeyRow>& keys, const Effort& effort, const Told& told) {
+PairRows study_pairs(const std::vector<KeyRow>& keys, const Effort& effort,
+                     const StudyEvents& events) {
   const KeyFactors factors(keys);
   const Factors all{.level_counts = factors.level_counts,
                     .rare = factors.rare,
@@ -141,13 +142,13 @@ PairRows study_pairs(const std::vector<KeyRow>& keys, const Effort& effort, cons
             one(from + i, file, tallies[i]);
           },
           [&](std::size_t i, double) {
-            for (const Broken& broken : tallies[i].broken) told.broken(broken);
-            told.progress(std::min(1.0, static_cast<double>(out.tally.ran) /
-                                            static_cast<double>(effort.combinations)),
-                          "pairs of ends, array " + std::to_string(out.arrays));
+            for (const Broken& broken : tallies[i].broken) events.broken(broken);
+            events.progress(std::min(1.0, static_cast<double>(out.tally.ran) /
+                                              static_cast<double>(effort.combinations)),
+                            "pairs of ends, array " + std::to_string(out.arrays));
           });
       for (const Tally& tally : tallies) out.tally.add(tally);
-      told.part(out);
+      events.part(out);
     }
   };
   while (out.tally.ran < effort.combinations) {

@@ -20,7 +20,7 @@ struct PairRows {
 /// as the effort says. A row that the loader refuses gives up the key that the refusal names, until
 /// it loads; pairs that were lost so are tried by themselves after the first array.
 [[nodiscard]] PairRows study_pairs(const std::vector<KeyRow>& keys, const Effort& effort,
-                                   const Told& told);
+                                   const StudyEvents& events);
 
 /// Takes keys out of a scene as long as it still breaks the rule.
 [[nodiscard]] Broken shrunk(Broken broken);

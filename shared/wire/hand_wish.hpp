@@ -18,7 +18,7 @@ namespace kerf {
 /// Where a user who leads the emulated hand wants it to be: what a window tells kerf-emulator
 /// (`--hand-socket`) in each of its frames, one wish a packet. Whole numbers, so that every packet
 /// of the right length names a place within the limits below; what the hand makes of it, and what
-/// it does when no wish comes any more, is `LedHand`'s.
+/// it does when no wish comes any more, is `GuidedHand`'s.
 struct HandWish {
   DeviceVec<double> tip_mm;                 ///< in steps of 1 um, each axis up to kMaxWishMm
   std::array<double, 3> orientation_rad{};  ///< as of `HandGoal`, up to kMaxWishRad each

@@ -61,7 +61,7 @@ using Columns = std::map<std::size_t, Column>;
 [[nodiscard]] Column measure_column(const MapSpec& spec, const Assignment& values,
                                     TickMeter& ticks);
 
-/// Told of each column as it comes, under a lock, and of the ticks that it took.
+/// Called with each column as it comes, under a lock, and with the ticks that it took.
 using ColumnDone = std::function<void(std::size_t index, Column column, std::uint64_t ticks)>;
 
 /// Measures the columns of `wanted` on `jobs` threads, until all are done or `stop` is set: a

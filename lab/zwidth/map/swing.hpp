@@ -37,7 +37,7 @@ struct Swing {
 struct SwingTick {
   double tip_mm, mm_per_s;
 };
-/// Told of each tick; empty: nobody.
+/// Called with each tick; may be empty.
 using SwingWatch = std::function<void(const SwingTick&)>;
 
 /// Follows one run of a known number of ticks.

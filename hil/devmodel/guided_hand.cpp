@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "hil/devmodel/led_hand.hpp"
+#include "hil/devmodel/guided_hand.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -10,7 +10,7 @@
 namespace kerf {
 namespace {
 
-constexpr double kShare = kCycleS / LedHand::kLagS;  // of the way that is left, in a cycle
+constexpr double kShare = kCycleS / GuidedHand::kLagS;  // of the way that is left, in a cycle
 
 DeviceVec<double> at_most(double length, DeviceVec<double> v) noexcept {
   const double now = norm(v);
@@ -19,21 +19,21 @@ DeviceVec<double> at_most(double length, DeviceVec<double> v) noexcept {
 
 }  // namespace
 
-LedHand::LedHand(double stiffness_n_per_mm, const HandRoute& route,
-                 DeviceVec<double> start_mm) noexcept
+GuidedHand::GuidedHand(double stiffness_n_per_mm, const HandRoute& route,
+                       DeviceVec<double> start_mm) noexcept
     : max_pull_mm_(kMaxPullN / stiffness_n_per_mm) {
   const ReachCurve way = reach_curve(route, route.rest_tip_mm, start_mm);
   std::reverse_copy(way.points_mm.begin(), way.points_mm.end(), way_back_mm_.begin());
 }
 
-void LedHand::wish(const HandWish& wish) noexcept {
+void GuidedHand::wish(const HandWish& wish) noexcept {
   wish_ = wish;
   if (wish.park && !parking_) parking_ = 0;
   since_wish_ = 0;
   held_mm_.reset();
 }
 
-void LedHand::restart() noexcept {
+void GuidedHand::restart() noexcept {
   wish_.reset();
   goal_.reset();
   held_mm_.reset();
@@ -42,18 +42,18 @@ void LedHand::restart() noexcept {
   parked_for_ = 0;
 }
 
-void LedHand::forsake() noexcept {
+void GuidedHand::forsake() noexcept {
   since_wish_ = std::max(since_wish_, cycles_of(kStaleS));
 }
 
-DeviceVec<double> LedHand::retreat(DeviceVec<double> start_mm) const noexcept {
+DeviceVec<double> GuidedHand::retreat(DeviceVec<double> start_mm) const noexcept {
   constexpr double kThereMm = 0.1;
   const bool is_up = goal_->target_mm.y >= start_mm.y - kThereMm;
   const DeviceVec<double> from_mm = held_mm_.value_or(goal_->target_mm);
   return is_up ? start_mm : DeviceVec<double>{from_mm.x, start_mm.y, from_mm.z};
 }
 
-DeviceVec<double> LedHand::aim(bool stale, bool withdraws, DeviceVec<double> start_mm) noexcept {
+DeviceVec<double> GuidedHand::aim(bool stale, bool withdraws, DeviceVec<double> start_mm) noexcept {
   if (parking_) {
     constexpr double kThereMm = 0.2;
     if (*parking_ < way_back_mm_.size() &&
@@ -67,7 +67,7 @@ DeviceVec<double> LedHand::aim(bool stale, bool withdraws, DeviceVec<double> sta
   return stale ? *held_mm_ : wish_->tip_mm;
 }
 
-HandGoal LedHand::next(const HandGoal& start, DeviceVec<double> tip_mm) noexcept {
+HandGoal GuidedHand::next(const HandGoal& start, DeviceVec<double> tip_mm) noexcept {
   if (!wish_) return start;
   if (!goal_) goal_ = start;
   const bool stale = since_wish_ >= cycles_of(kStaleS);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "hil/devmodel/led_hand.hpp"
+#include "hil/devmodel/guided_hand.hpp"
 
 #include <cmath>
 #include <limits>
@@ -12,9 +12,9 @@
 namespace {
 
 using kerf::DeviceVec;
+using kerf::GuidedHand;
 using kerf::HandGoal;
 using kerf::HandWish;
-using kerf::LedHand;
 
 constexpr double kStiffness = 0.5;  // N/mm
 
@@ -27,12 +27,12 @@ HandGoal start_at(DeviceVec<double> mm) {
 
 const HandGoal kStart = start_at({0, 5, 0});
 
-LedHand hand_at_start() {
+GuidedHand hand_at_start() {
   return {kStiffness, kerf::OmniModel().route(), kStart.target_mm};
 }
 
 /// A tip that goes wherever the hand wants it, for so long; the fastest it moved in a cycle.
-double follow(LedHand& hand, DeviceVec<double>& tip_mm, double seconds) {
+double follow(GuidedHand& hand, DeviceVec<double>& tip_mm, double seconds) {
   double fastest = 0;
   for (auto left = kerf::cycles_of(seconds); left > 0; --left) {
     const DeviceVec<double> goal = hand.next(kStart, tip_mm).target_mm;
@@ -43,7 +43,7 @@ double follow(LedHand& hand, DeviceVec<double>& tip_mm, double seconds) {
 }
 
 /// The same of a user who goes on wishing.
-void lead(LedHand& hand, DeviceVec<double>& tip_mm, const HandWish& wish, double seconds) {
+void lead(GuidedHand& hand, DeviceVec<double>& tip_mm, const HandWish& wish, double seconds) {
   for (int frames = static_cast<int>(seconds * 50); frames > 0; --frames) {
     hand.wish(wish);
     follow(hand, tip_mm, 0.02);
@@ -53,7 +53,7 @@ void lead(LedHand& hand, DeviceVec<double>& tip_mm, const HandWish& wish, double
 }  // namespace
 
 TEST_CASE("a hand that nobody leads stays at its start") {
-  LedHand hand = hand_at_start();
+  GuidedHand hand = hand_at_start();
   hand.forsake();
   DeviceVec<double> tip = kStart.target_mm;
   follow(hand, tip, 3);
@@ -61,30 +61,30 @@ TEST_CASE("a hand that nobody leads stays at its start") {
 }
 
 TEST_CASE("it follows a wish with its lag, and far ones no faster than a hand's stroke") {
-  LedHand hand = hand_at_start();
+  GuidedHand hand = hand_at_start();
   DeviceVec<double> tip = kStart.target_mm;
   hand.wish({.tip_mm = {1, 5, 0}});
-  follow(hand, tip, LedHand::kLagS);
+  follow(hand, tip, GuidedHand::kLagS);
   CHECK(tip.x == doctest::Approx(1 - std::exp(-1.0)).epsilon(0.01));
   hand.wish({.tip_mm = {40, 5, 0}});
-  CHECK(follow(hand, tip, 0.1) == doctest::Approx(LedHand::kMaxSpeedMmPerS));
+  CHECK(follow(hand, tip, 0.1) == doctest::Approx(GuidedHand::kMaxSpeedMmPerS));
 }
 
 TEST_CASE("it pulls at a tip that is held no harder than it may") {
-  LedHand hand = hand_at_start();
+  GuidedHand hand = hand_at_start();
   const DeviceVec<double> held = kStart.target_mm;
   HandGoal goal;
   for (int frame = 0; frame < 50; ++frame) {
     hand.wish({.tip_mm = {0, -100, 0}});
     for (int i = 0; i < 160; ++i) goal = hand.next(kStart, held);
   }
-  CHECK(norm(goal.target_mm - held) * kStiffness == doctest::Approx(LedHand::kMaxPullN));
+  CHECK(norm(goal.target_mm - held) * kStiffness == doctest::Approx(GuidedHand::kMaxPullN));
 }
 
 TEST_CASE("without wishes it presses no more, then withdraws to its start: straight up first") {
   for (const bool told : {false, true}) {
     CAPTURE(told);
-    LedHand hand = hand_at_start();
+    GuidedHand hand = hand_at_start();
     DeviceVec<double> tip = kStart.target_mm;
     lead(hand, tip, {.tip_mm = {6, -2, 0}, .button1 = true}, 1);
     CHECK(hand.next(kStart, tip).button1);
@@ -95,10 +95,10 @@ TEST_CASE("without wishes it presses no more, then withdraws to its start: strai
     const auto hold = [&](double seconds) {
       for (auto left = kerf::cycles_of(seconds); left > 0; --left) goal = hand.next(kStart, held);
     };
-    hold((told ? 0 : LedHand::kStaleS) + 0.2);
+    hold((told ? 0 : GuidedHand::kStaleS) + 0.2);
     CHECK(norm(goal.target_mm - held) < 0.01);
     CHECK_FALSE(goal.button1);
-    hold(LedHand::kPatienceS - 0.3);
+    hold(GuidedHand::kPatienceS - 0.3);
     tip = held;
     follow(hand, tip, 0.2);
     CHECK(tip.x == doctest::Approx(6).epsilon(0.01));
@@ -174,7 +174,7 @@ TEST_CASE("asked to park it rests in the inkwell, whatever is wished meanwhile, 
   docked = 0;
   run(0.1, true);
   run(4, false);
-  CHECK(docked * 0.02 >= LedHand::kParkedS - 0.05);
+  CHECK(docked * 0.02 >= GuidedHand::kParkedS - 0.05);
   run(2, false);
   CHECK_FALSE(emulator.model().docked());
   CHECK(norm(emulator.model().tip_mm() - wished) < 0.5);

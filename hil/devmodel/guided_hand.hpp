@@ -22,7 +22,7 @@ namespace kerf {
 /// first. A wish takes it from wherever it is. Asked to park, it goes the device's way back to the
 /// rest pose, whatever it is told meanwhile, and stays there for `kParkedS`. In bus cycles, without
 /// a clock. One thread; never allocates.
-class LedHand {
+class GuidedHand {
  public:
   /// Voluntary motion reaches some 8 Hz: a first-order lag with that corner.
   static constexpr double kLagS = 1.0 / (2 * 3.14159265358979 * 8);
@@ -37,7 +37,8 @@ class LedHand {
   static constexpr double kParkedS = 0.5;  ///< ten times what the servo asks of a rest
 
   /// The stiffness of its grip, N/mm, and the way from rest to `start_mm`.
-  LedHand(double stiffness_n_per_mm, const HandRoute& route, DeviceVec<double> start_mm) noexcept;
+  GuidedHand(double stiffness_n_per_mm, const HandRoute& route,
+             DeviceVec<double> start_mm) noexcept;
 
   void wish(const HandWish& wish) noexcept;
   void forsake() noexcept;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the servo tells, books and forgets beside the force: filters in time, refused starts, gaps,
-// a new tool.
+// What the servo puts out, books and forgets beside the force: filters in time, refused starts,
+// gaps, a new tool.
 #include <algorithm>
 #include <array>
 #include <cmath>
