@@ -144,6 +144,31 @@ ImportCommand::Files ImportCommand::files() const {
   return files;
 }
 
+ReadOptions ImportCommand::read_options() const {
+  ReadOptions options;
+  options.cpu_s = cpu_s_;
+  options.series = series_;
+  if (!dims_.empty()) {
+    const auto word = std::ranges::find(kVoxelTypeWords, type_) - std::begin(kVoxelTypeWords);
+    options.raw = RawLayout{grid_from("--dims", dims_), static_cast<VoxelType>(word), big_endian_,
+                            static_cast<std::uint64_t>(skip_)};
+  }
+  if (!spacing_.empty()) options.spacing_mm = spacing_from(spacing_);
+  return options;
+}
+
+ProposalWishes ImportCommand::wishes() const {
+  ProposalWishes wishes;
+  wishes.keep_all = keep_all_;
+  if (!window_.empty()) wishes.window = window_from(window_);
+  if (!iso_.empty()) {
+    wishes.iso = number_in(iso_);
+    if (!wishes.iso)
+      throw SceneError("--iso: '" + iso_ + "' is not a number; give a value of the file");
+  }
+  return wishes;
+}
+
 void ImportCommand::run(std::ostream& out) const {
   std::error_code fault;
   if (!series_.empty() && fs::is_regular_file(path_, fault)) {
@@ -154,24 +179,8 @@ void ImportCommand::run(std::ostream& out) const {
                      " is a folder; name one file without a header, or leave it out");
   }
   const Files to = files();
-  ReadOptions options;
-  options.cpu_s = cpu_s_;
-  options.series = series_;
-  if (!dims_.empty()) {
-    const auto word = std::ranges::find(kVoxelTypeWords, type_) - std::begin(kVoxelTypeWords);
-    options.raw = RawLayout{grid_from("--dims", dims_), static_cast<VoxelType>(word), big_endian_,
-                            static_cast<std::uint64_t>(skip_)};
-  }
-  if (!spacing_.empty()) options.spacing_mm = spacing_from(spacing_);
-  ProposalWishes wishes;
-  wishes.keep_all = keep_all_;
-  if (!window_.empty()) wishes.window = window_from(window_);
-  if (!iso_.empty()) {
-    wishes.iso = number_in(iso_);
-    if (!wishes.iso)
-      throw SceneError("--iso: '" + iso_ + "' is not a number; give a value of the file");
-  }
-
+  const ReadOptions options = read_options();
+  const ProposalWishes wished = wishes();
   SourceVolume source = read_volume(path_, options);
   refuse_stretched(path_, source);
   const Window range = range_window(source);
@@ -192,7 +201,7 @@ void ImportCommand::run(std::ostream& out) const {
     source = {};
     return import_labelled(std::move(whole), values.str(), to, out);
   }
-  ProposedVolume proposed = propose_volume(std::move(whole), range, wishes);
+  ProposedVolume proposed = propose_volume(std::move(whole), range, wished);
   const VolumeProposal& proposal = proposed.proposal;
   refuse_odd(odd_spacing(source, proposal.solid, proposal.surface.hounsfield));
   const std::string preview = png_bytes(import_preview(source, proposed));

@@ -12,6 +12,8 @@
 namespace kerf {
 
 struct ImportedScene;
+struct ProposalWishes;
+struct ReadOptions;
 
 /// kerf-volume import: any CT to a .nrrd of densities, a scene and a preview, by the proposal of
 /// volume_proposal.hpp; says in one line each what it chose and how to change it.
@@ -28,6 +30,9 @@ class ImportCommand {
  private:
   struct Files;
   [[nodiscard]] Files files() const;
+  /// What the command line says of reading the file, and of what is proposed for it.
+  [[nodiscard]] ReadOptions read_options() const;
+  [[nodiscard]] ProposalWishes wishes() const;
   /// All of them, of a scene that runs, or none.
   void write(VolumeImage image, ImportedScene scene, const std::string& preview,
              const Files& to) const;
