@@ -28,9 +28,10 @@ int steps_between(const VoxelIndex& brick, const VoxelIndex& voxel) {
 
 TEST_CASE("bricks tell how far the nearest voxel with density is read") {
   std::mt19937 random(4);
-  // No whole number of bricks, farther than the map can say, and hardly a volume.
-  for (const VoxelGrid grid : {VoxelGrid{45, 22, 31}, {161, 7, 90}, {1, 2, 3}}) {
-    for (const int dense : {0, 1, 3, 20}) {
+  // No whole number of bricks, farther than the map can say, hardly a volume, and one where
+  // something is near everywhere.
+  for (const VoxelGrid grid : {VoxelGrid{45, 22, 31}, {161, 7, 90}, {1, 2, 3}, {9, 10, 8}}) {
+    for (const int dense : {0, 1, 3, 20, grid.voxel_count() < 1000 ? 90 : 2}) {
       std::vector<Density> density(grid.voxel_count(), 99);
       std::vector<VoxelIndex> solid;
       const auto any = [&](std::int32_t n) {

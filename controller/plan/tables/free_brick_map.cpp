@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <vector>
 
 namespace kerf {
 namespace {
@@ -46,20 +48,30 @@ void square_row(std::span<const Density> row, Density faintest, std::span<Square
 void add_axis(std::span<const Square> at_voxels, std::size_t width, std::span<Square> at_bricks) {
   const auto lines = static_cast<std::int32_t>(at_voxels.size() / width);
   const auto bricks = static_cast<std::int32_t>(at_bricks.size() / width);
+  std::vector<Square> least(static_cast<std::size_t>(lines));  // of each line
+  for (std::size_t line = 0; line < least.size(); ++line) {
+    const Square* const from = at_voxels.data() + line * width;
+    least[line] = *std::min_element(from, from + width);
+  }
   for (std::int32_t brick = 0; brick < bricks; ++brick) {
     Square* const to = at_bricks.data() + static_cast<std::size_t>(brick) * width;
     std::fill(to, to + width, kNone);
+    Square most = kNone;  // of `to`
     const auto meet = [&](std::int32_t voxel, std::int32_t gap) {
       if (voxel < 0 || voxel >= lines) return;
-      const Square* const from = at_voxels.data() + static_cast<std::size_t>(voxel) * width;
       const auto more = static_cast<Square>(gap * gap);
+      if (least[static_cast<std::size_t>(voxel)] + more >= most) return;
+      const Square* const from = at_voxels.data() + static_cast<std::size_t>(voxel) * width;
+      Square left = 0;
       for (std::size_t i = 0; i < width; ++i) {
         to[i] = std::min(to[i], static_cast<Square>(from[i] + more));
+        left = std::max(left, to[i]);
       }
+      most = left;
     };
     const std::int32_t low = kFreeBrick * brick - 1, high = kFreeBrick * brick + 3;
     for (std::int32_t voxel = low + 1; voxel < high; ++voxel) meet(voxel, 0);
-    for (std::int32_t gap = 0; gap < kFar && gap * gap < *std::max_element(to, to + width); ++gap) {
+    for (std::int32_t gap = 0; gap < kFar && gap * gap < most; ++gap) {
       meet(low - gap, gap);
       meet(high + gap, gap);
     }
