@@ -62,7 +62,7 @@ std::string plain(std::string text) {
 }
 
 /// A sweep as it was asked for.
-struct Plan {
+struct SweepRequest {
   std::string scene;
   std::string device;  ///< empty: an axis has it
   double seconds;
@@ -120,16 +120,16 @@ struct Plan {
 
 /// The scene of the first run that is one; where none is, the sweep is nothing to begin with. Looks
 /// at no more than the first thousand.
-Scene first_scene(const Plan& plan) {
+Scene first_scene(const SweepRequest& request) {
   std::exception_ptr first_refusal;
   constexpr std::size_t kLooks = 1000;
-  for (std::size_t run = 0; run < std::min(runs_of(plan.axes), kLooks); ++run) {
+  for (std::size_t run = 0; run < std::min(runs_of(request.axes), kLooks); ++run) {
     std::vector<SceneSetting> settings;
-    for (const std::string& text : plan.job(run, "").settings) {
+    for (const std::string& text : request.job(run, "").settings) {
       settings.push_back(parse_setting(text));
     }
     try {
-      return parse_scene_file(plan.scene, settings);
+      return parse_scene_file(request.scene, settings);
     } catch (const SceneError&) {
       if (!first_refusal) first_refusal = std::current_exception();
     }
@@ -139,12 +139,12 @@ Scene first_scene(const Plan& plan) {
 
 /// Refuses options of the emulator that neither the first nor the last run can start with: the ends
 /// of each axis.
-void check_emulator(const Plan& plan, const std::atomic<bool>& stop) {
-  if (std::ranges::none_of(plan.axes, &Axis::of_emulator)) return;
+void check_emulator(const SweepRequest& request, const std::atomic<bool>& stop) {
+  if (std::ranges::none_of(request.axes, &Axis::of_emulator)) return;
   const WorkFolder folder;
-  const std::string first = emulator_refusal(plan.job(0, ""), folder.path(), stop);
+  const std::string first = emulator_refusal(request.job(0, ""), folder.path(), stop);
   if (first.empty()) return;
-  if (!emulator_refusal(plan.job(runs_of(plan.axes) - 1, ""), folder.path(), stop).empty()) {
+  if (!emulator_refusal(request.job(runs_of(request.axes) - 1, ""), folder.path(), stop).empty()) {
     throw HilError("--set emulator: " + first);
   }
 }
@@ -153,8 +153,8 @@ void check_emulator(const Plan& plan, const std::atomic<bool>& stop) {
 /// threw, once all have ended.
 class Crew {
  public:
-  Crew(const Plan& plan, Table& table, const std::atomic<bool>& asked_to_stop)
-      : plan_(plan), table_(table), asked_(asked_to_stop), runs_(runs_of(plan.axes)) {}
+  Crew(const SweepRequest& request, Table& table, const std::atomic<bool>& asked_to_stop)
+      : request_(request), table_(table), asked_(asked_to_stop), runs_(runs_of(request.axes)) {}
 
   void work(std::size_t jobs) {
     already_ = table_.size();
@@ -195,10 +195,10 @@ class Crew {
   void run_one(std::size_t run) {
     const WorkFolder folder;
     const std::string name = "sweep-" + std::to_string(getpid()) + "-" + std::to_string(run);
-    const auto result = run_cell(plan_.job(run, name), folder.path(), stop_);
+    const auto result = run_cell(request_.job(run, name), folder.path(), stop_);
     if (!result) return;
     const std::scoped_lock lock(mutex_);
-    table_.add(run, plan_.row(run, *result));
+    table_.add(run, request_.row(run, *result));
   }
 
   void show(const ProgressBar& bar) {
@@ -214,7 +214,7 @@ class Crew {
     bar.show(static_cast<double>(done) / static_cast<double>(runs_), text);
   }
 
-  const Plan& plan_;
+  const SweepRequest& request_;
   Table& table_;
   const std::atomic<bool>& asked_;
   const std::size_t runs_;
@@ -259,21 +259,21 @@ int Command::run(std::ostream& out) const {
   if (device_is_axis && !device_.empty()) {
     throw HilError("--device: --set device.personality says it; leave one of the two out");
   }
-  const Plan plan{std::filesystem::absolute(shipped_file(scene_)).string(),
-                  device_is_axis    ? ""
-                  : device_.empty() ? "omni"
-                                    : device_,
-                  seconds_, axes};
-  const Scene scene = first_scene(plan);
+  const SweepRequest request{std::filesystem::absolute(shipped_file(scene_)).string(),
+                             device_is_axis    ? ""
+                             : device_.empty() ? "omni"
+                                               : device_,
+                             seconds_, axes};
+  const Scene scene = first_scene(request);
   for (const char* name : {"controller", "emulator"}) {
     if (access(program_beside(name).c_str(), X_OK) != 0) {
       throw HilError(program_beside(name) + ": is not there; build it, or install all of kerf");
     }
   }
-  check_emulator(plan, catch_stop_signals());
-  Table table(out_, plan.line(scene.hand_script));
+  check_emulator(request, catch_stop_signals());
+  Table table(out_, request.line(scene.hand_script));
   const std::size_t cores = std::max(1U, std::thread::hardware_concurrency());
-  Crew crew(plan, table, catch_stop_signals());
+  Crew crew(request, table, catch_stop_signals());
   crew.work(std::min(jobs_ > 0 ? static_cast<std::size_t>(jobs_) : cores, runs_of(axes)));
   const std::string place = (std::filesystem::path(out_) / kTableName).string();
   if (table.size() < runs_of(axes)) {
@@ -281,7 +281,7 @@ int Command::run(std::ostream& out) const {
         << " runs are kept; the same command goes on\n";
     return 130;
   }
-  table.finish(plan.head());
+  table.finish(request.head());
   const std::size_t failed = table.failed();
   out << place << ": " << runs_of(axes) << " runs, " << failed << " failed\n";
   return failed == 0 ? 0 : 1;
