@@ -66,7 +66,7 @@ levels() {
 # What to check, a line each: PROCESSOR COMPILER FLAGS. The longest first.
 list() {
   local optimise compiler level
-  if [[ ${1:-} != --all ]]; then  # beside g++ -O2 and clang -O1, which the other tests build with
+  if [[ ${1:-} != --all ]]; then  # beside g++ -O2 and clang -O2, which the other tests build with
     echo s390x s390x-linux-gnu-g++ -O2
     echo aarch64 aarch64-linux-gnu-g++ -O2
     echo x86_64 clang++-16 -O3 -march=x86-64
