@@ -85,8 +85,10 @@ class ContactQuery {
     return felt.buried ? felt : look(q, closer);
   }
 
-  /// What a look with closer looks at `q` costs at most, from what is near.
+  /// What a look with closer looks at `q` costs at most: where the work for the costliest one is
+  /// left that, else from what is near.
   [[nodiscard]] std::int64_t cost_at(ContactVec<Real> q) const noexcept {
+    if (may_query()) return work_.query + work_.closer;
     std::int64_t cost = work_.closer;
     for (const ContactVolume<N>& volume : volumes_) {
       cost += QueryWork::kLookSamples + reader_.samples_near(volume, Reader::place_of(volume, q));

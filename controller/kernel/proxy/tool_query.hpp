@@ -113,13 +113,16 @@ class ToolQuery {
     if (felt.buried) return felt;
     turned_ = false;
     const std::int64_t before = left_;
+    std::int64_t missing = 0;
     on_account(head_, [&](const ContactQuery<N>& head) { felt = head.look(q, closer); });
     each_behind([&](Part& part) {
       Contacts<N> seen;
       on_account(part.query, [&](const ContactQuery<N>& query) {
         const ContactVec<Real> at = q + part.from_head;
-        const bool closely = closer && left_ >= query.cost_at(at);
+        const std::int64_t cost = closer && missing == 0 ? query.cost_at(at) : 0;
+        const bool closely = closer && missing == 0 && query.left() >= cost;
         seen.buried = closer && !closely && !answered;
+        if (seen.buried) missing += cost;
         if (!seen.buried) seen = query.look(at, closely);
       });
       for (std::size_t i = 0; i < static_cast<std::size_t>(seen.count); ++i) {
@@ -131,7 +134,7 @@ class ToolQuery {
       felt.buried = felt.buried || seen.buried;
       felt.depth = std::max(felt.depth, seen.depth);
     });
-    last_ = before - left_;
+    last_ = before - left_ + missing;
     return felt;
   }
 
