@@ -81,7 +81,7 @@ def furnish(folder, root, bin_folder):
     """What a user has who follows a page: a clone's files, and data of their own."""
     for name in EVERYWHERE:
         os.symlink(root / name, folder / name)
-    for name in (".sockets", "docs", "docs/images"):  # sockets; some commands write a page or a picture
+    for name in (".sockets", "docs", "docs/images", "docs/plots"):  # sockets; some commands write a page or a picture
         (folder / name).mkdir(mode=0o700)
     (folder / "kerf").write_text(DOOR % root)
     (folder / "kerf").chmod(0o755)

@@ -85,15 +85,15 @@ class ContactQuery {
     return felt.buried ? felt : look(q, closer);
   }
 
-  /// What a look with closer looks at `q` costs at most: where the work for the costliest one is
-  /// left that, else from what is near.
-  [[nodiscard]] std::int64_t cost_at(ContactVec<Real> q) const noexcept {
-    if (may_query()) return work_.query + work_.closer;
+  /// Whether the work is left for a look at `q` with closer looks. What is near is counted where
+  /// there is none for the costliest one.
+  [[nodiscard]] bool may_look_closely(ContactVec<Real> q) const noexcept {
+    if (may_query()) return true;
     std::int64_t cost = work_.closer;
     for (const ContactVolume<N>& volume : volumes_) {
       cost += QueryWork::kLookSamples + reader_.samples_near(volume, Reader::place_of(volume, q));
     }
-    return cost;
+    return left() >= cost;
   }
 
   /// The same, with closer looks or without, whatever the tick's work allows.

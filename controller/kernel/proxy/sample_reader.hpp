@@ -102,7 +102,7 @@ class SampleReader {
   [[nodiscard]] std::int64_t samples_near(const ContactVolume<N>& volume,
                                           VoxelVec<Real> at) const noexcept {
     const PointNumber<N> centre[3] = {number_of(at.x), number_of(at.y), number_of(at.z)};
-    left_ -= 2 * points_.table.groups;
+    left_ -= QueryWork::kGroupLook * points_.table.groups;
     std::int64_t near = 0;
     for (std::int32_t group = 0; group < points_.table.groups; ++group) {
       if (!is_free(points_.table, volume.places, centre, volume.field, group)) near += kPointGroup;

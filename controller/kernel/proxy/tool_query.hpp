@@ -5,6 +5,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <span>
 
@@ -101,6 +102,7 @@ class ToolQuery {
   }
   [[nodiscard]] const QueryWork& work() const noexcept { return work_; }
   [[nodiscard]] bool half_spent() const noexcept { return left_ <= work_.budget() / 2; }
+  /// No less than the last query took, and what the head's costliest one takes.
   [[nodiscard]] bool may_query() const noexcept {
     return left_ >= std::max(last_, head_.work().query + head_.work().closer);
   }
@@ -113,17 +115,15 @@ class ToolQuery {
     if (felt.buried) return felt;
     turned_ = false;
     const std::int64_t before = left_;
-    std::int64_t missing = 0;
+    bool short_of_work = false;  // for closer looks at all parts
     on_account(head_, [&](const ContactQuery<N>& head) { felt = head.look(q, closer); });
     each_behind([&](Part& part) {
       Contacts<N> seen;
       on_account(part.query, [&](const ContactQuery<N>& query) {
         const ContactVec<Real> at = q + part.from_head;
-        const std::int64_t cost = closer && missing == 0 ? query.cost_at(at) : 0;
-        const bool closely = closer && missing == 0 && query.left() >= cost;
-        seen.buried = closer && !closely && !answered;
-        if (seen.buried) missing += cost;
-        if (!seen.buried) seen = query.look(at, closely);
+        short_of_work = closer && (short_of_work || !query.may_look_closely(at));
+        seen.buried = short_of_work && !answered;
+        if (!seen.buried) seen = query.look(at, closer && !short_of_work);
       });
       for (std::size_t i = 0; i < static_cast<std::size_t>(seen.count); ++i) {
         ConstraintPlane<N> plane = seen.plane[i];
@@ -134,7 +134,7 @@ class ToolQuery {
       felt.buried = felt.buried || seen.buried;
       felt.depth = std::max(felt.depth, seen.depth);
     });
-    last_ = before - left_ + missing;
+    last_ = short_of_work && !answered ? kEndsTick : before - left_;
     return felt;
   }
 
@@ -154,6 +154,8 @@ class ToolQuery {
   }
 
  private:
+  static constexpr std::int64_t kEndsTick = std::numeric_limits<std::int64_t>::max();
+
   struct Part {
     ContactQuery<N> query;
     Real up{};
@@ -181,7 +183,7 @@ class ToolQuery {
   std::optional<Part> handpiece_;
   QueryWork work_;
   std::int64_t left_ = 0;    ///< of the tick's samples
-  std::int64_t last_ = 0;    ///< of them that the last query took
+  std::int64_t last_ = 0;    ///< of them that the last query took; kEndsTick: it was given up
   std::int64_t wasted_ = 0;  ///< of them for free ways that led nowhere
   bool turned_ = false;      ///< and not queried since
 };
