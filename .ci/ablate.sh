@@ -88,7 +88,7 @@ edit_all() {
   done
   [[ -n ${1:-} ]] || return 0
   for file in "${!contents[@]}"; do
-    content=${contents[$file]/'#pragma once'/'#pragma once'$'\n#include "ablated.hpp"'}
+    content=${contents[$file]/'#include'/'#include "ablated.hpp"'$'\n#include'}
     [[ $content == "$(<"$1/$file")" ]] || printf '%s\n' "$content" >"$1/$file"
   done
 }
@@ -121,9 +121,9 @@ constexpr bool ablated(std::size_t i) noexcept {
 CPP
 }
 
-# check: compiles the file that holds the whole contact, with all switches in it.
+# check: compiles the file that holds the whole contact, and what else is no header, with all switches in.
 check() {
-  local folder errors
+  local folder errors file
   folder=$(mktemp -d)
   # shellcheck disable=SC2064  # by its name of now
   trap "rm -rf '$folder'" EXIT
@@ -131,8 +131,10 @@ check() {
     xargs -0 cp -p --parents -t "$folder"
   write_switches "$folder/ablated.hpp"
   edit_all "$folder"
-  errors=$("${CXX:-c++}" -std=c++20 -I "$folder" -S -o /dev/null "$folder/controller/servo/tool_forces.cpp" 2>&1) ||
-    die "$list: does not compile: $(grep -m 1 error <<<"$errors"); mend it"
+  while IFS= read -r file; do
+    errors=$("${CXX:-c++}" -std=c++20 -I "$folder" -S -o /dev/null "$folder/$file" 2>&1) ||
+      die "$list: $file: does not compile: $(grep -m 1 error <<<"$errors"); mend it"
+  done < <(printf '%s\n' controller/servo/tool_forces.cpp "${files[@]}" | grep '\.cpp$' | sort -u)
   echo "ablate: ${#names[@]} texts stand once each and compile"
 }
 

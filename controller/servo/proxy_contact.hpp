@@ -26,14 +26,14 @@ struct ProxyState {
   bool placed = false;
   StartSearch<N> search;
   bool ramping = false;
-  typename N::Real longest{};    ///< that the spring may be while it ramps, units
-  std::int32_t stuck_ticks = 0;  ///< Swept::stuck_ticks of the last tick
+  typename N::Real longest{};  ///< that the spring may be while it ramps, units
+  SweepMemory<N> memory;
 
   /// Looks for a place around the one that it has: another tool took over, or the solid changed.
   constexpr void place_anew() noexcept {
     search = placed ? StartSearch<N>(pose.centre) : search.again();
     placed = false;
-    stuck_ticks = 0;
+    memory = {};
   }
   /// The spring grows from 0 again: nothing was felt meanwhile.
   constexpr void ramp() noexcept {
@@ -162,9 +162,8 @@ constexpr ProxyContact<N> follow(const ProxyPlan<N>& plan, ProxyState<N>& state,
   }
   const ProxyPose<N> last = state.pose;
   const Swept<N> swept =
-      ProxySweep<N, Field>(field, state.pose, plan.friction, plan.turn_step, state.stuck_ticks)
+      ProxySweep<N, Field>(field, state.pose, state.memory, plan.friction, plan.turn_step)
           .tick(goal);
-  state.stuck_ticks = swept.stuck_ticks;
   contact.pose = state.pose;
   contact.queries = swept.queries;
   contact.turned = swept.turned;

@@ -11,7 +11,7 @@ GuidedTool<N>::GuidedTool(const SampledTool& tool, const Body& body, Point start
 template <class N>
 Point GuidedTool<N>::tick(Point hand, const ToolTurn<N>& turn) {
   rig_.field().begin_tick();
-  swept_ = ProxySweep<N, ContactQuery<N>>(rig_.field(), pose_, friction_, rig_.turn_step())
+  swept_ = ProxySweep<N, ContactQuery<N>>(rig_.field(), pose_, memory_, friction_, rig_.turn_step())
                .tick({place_of<N>(hand), turn});
   most_queries_ = std::max(most_queries_, swept_.queries);
   return proxy() - hand;

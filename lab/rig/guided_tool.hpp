@@ -29,6 +29,7 @@ class GuidedTool {
  private:
   ContactRig<N> rig_;
   ProxyPose<N> pose_;
+  SweepMemory<N> memory_;
   typename N::Unit friction_;
   Swept<N> swept_;
   std::int32_t most_queries_ = 0;

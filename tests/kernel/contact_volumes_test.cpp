@@ -296,7 +296,8 @@ TEST_CASE_TEMPLATE("no tick of a sweep spends more than a scene is planned with"
       const ProxyPose<N> goal{place_of<N>(middle + dice.uniform(1, 30) * dice.direction()),
                               dice.turn<N>(dice.uniform(0, 3))};
       rig.field().begin_tick();
-      ProxySweep<N, ContactQuery<N>>(rig.field(), pose, {}, rig.turn_step()).tick(goal);
+      SweepMemory<N> memory;
+      ProxySweep<N, ContactQuery<N>>(rig.field(), pose, memory, {}, rig.turn_step()).tick(goal);
       most = std::max(most, rig.field().spent());
     }
     CHECK(most <= work.most());

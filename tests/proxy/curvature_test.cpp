@@ -137,3 +137,14 @@ TEST_CASE_TEMPLATE("bumps, two walls, air and no step are no bowls", N, FixedNum
   CHECK_FALSE(told(left, left));
   CHECK_FALSE(told(left, Contacts<N>{}));
 }
+
+TEST_CASE_TEMPLATE("a curvature outlives its tick unless noise may have feigned it", N,
+                   FixedNumbers, DoubleNumbers) {
+  for (const auto& [turn_rad, kept] : {std::pair{0.1, true}, {0.025, true}, {0.015, false}}) {
+    CAPTURE(turn_rad);
+    auto curvature = learned<N>(hollow<N>(1), {on(1, 0.1), on(1, 0.1 + turn_rad)});
+    REQUIRE(eases(curvature));
+    curvature.forget_noise();
+    CHECK(eases(curvature) == kept);
+  }
+}

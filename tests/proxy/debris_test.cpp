@@ -34,9 +34,11 @@ Tally pushed_at_bits(double bit_radius, int bits) {
         blurred({41, 41, 41}, [&](Point p) { return length(p - bit) - bit_radius; });
     ContactRig<N> rig(tool_of_units("ball", kRadius, 2 * kRadius), volume);
     ProxyPose<N> pose{place_of<N>(start), {}};
+    SweepMemory<N> memory;
     const auto spring = [&](double gone) {
       const Point hand = start + gone * direction;
-      ProxySweep<N, ContactQuery<N>>(rig.field(), pose, {}, {}).tick({place_of<N>(hand), {}});
+      ProxySweep<N, ContactQuery<N>>(rig.field(), pose, memory, {}, {})
+          .tick({place_of<N>(hand), {}});
       return length(point_of<N>(pose.centre) - hand);
     };
     for (double gone = 0; gone < 9; gone += 0.1) spring(gone);

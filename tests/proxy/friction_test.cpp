@@ -14,12 +14,13 @@ struct Rubbing {
   explicit Rubbing(double coefficient) : friction(static_cast<typename N::Unit>(coefficient)) {}
   /// Where the proxy goes that is pulled to `hand`, the floor being at height 0.
   Point tick(Point hand) {
-    ProxySweep<N, FlatField<N>>(field, pose, friction, {}).tick({place_of<N>(hand), {}});
+    ProxySweep<N, FlatField<N>>(field, pose, memory, friction, {}).tick({place_of<N>(hand), {}});
     return point_of<N>(pose.centre);
   }
 
   FlatField<N> field{{0, 1, 0}};
   ProxyPose<N> pose{place_of<N>({0, 0.5, 0}), {}};
+  SweepMemory<N> memory;
   typename N::Unit friction;
 };
 

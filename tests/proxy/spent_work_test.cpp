@@ -112,13 +112,13 @@ TEST_CASE_TEMPLATE("a tool that is held begins its search anew", N, FixedNumbers
   Led<N> led(1);  // one query tells where it is, and none is left to move
   std::int32_t most = 0;
   for (int tick = 0; tick < 50; ++tick) {
-    const std::int32_t before = led.state.stuck_ticks;
+    const std::int32_t before = led.state.memory.stuck_ticks;
     led.tick(12 * kSide);
-    CHECK((led.state.stuck_ticks == before + 1 || led.state.stuck_ticks == 0));
-    most = std::max(most, led.state.stuck_ticks);
+    CHECK((led.state.memory.stuck_ticks == before + 1 || led.state.memory.stuck_ticks == 0));
+    most = std::max(most, led.state.memory.stuck_ticks);
   }
   CHECK(most == SweepRules::kSameTries + 3);  // with steps of 1, 0.4, 0.16, 0.064 and 0.0256
-  while (led.state.stuck_ticks == 0) led.tick(12 * kSide);
+  while (led.state.memory.stuck_ticks == 0) led.tick(12 * kSide);
   led.tick(led.at());  // the hand comes to where it is
-  CHECK(led.state.stuck_ticks == 0);
+  CHECK(led.state.memory.stuck_ticks == 0);
 }

@@ -38,10 +38,14 @@ Tally led_alike(const Nearest& nearest, double friction, int ticks) {
     for (double& at : hand) at = std::clamp(at, -25.0, 25.0);
     const auto goal = place_of<F>(hand);
     ProxyPose<D> twin{place_of<D>(point_of<F>(fixed.centre)), {}};
-    const auto a = ProxySweep<F, SolidField<F, Nearest>>(fixed_field, fixed, F::Unit(friction), {})
+    SweepMemory<F> fixed_memory;
+    SweepMemory<D> twin_memory;
+    const auto a = ProxySweep<F, SolidField<F, Nearest>>(fixed_field, fixed, fixed_memory,
+                                                         F::Unit(friction), {})
                        .tick({goal, {}});
-    const auto b = ProxySweep<D, SolidField<D, Nearest>>(double_field, twin, friction, {})
-                       .tick({place_of<D>(point_of<F>(goal)), {}});
+    const auto b =
+        ProxySweep<D, SolidField<D, Nearest>>(double_field, twin, twin_memory, friction, {})
+            .tick({place_of<D>(point_of<F>(goal)), {}});
     const double apart = length(point_of<F>(fixed.centre) - point_of<D>(twin.centre));
     ++tally.ticks;
     tally.otherwise += apart > 1e-3 ? 1 : 0;

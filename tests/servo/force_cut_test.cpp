@@ -215,8 +215,8 @@ TEST_CASE("milling into a tooth changes the force by less than 2 % a tick") {
 
 // What a CT of a tooth gives in 8 bits: of the range up to enamel the iso is a fifth, so that noise
 // and steps of the voxels count more than twice in the density of contact.
-// At the four of 51 places of the valley where it steps most, and at six others.
-TEST_CASE("milling into a noisy valley changes the force by less than 2.5 % a tick") {
+// At the four of 51 places of the valley where it once stepped most, and at six others.
+TEST_CASE("milling into a noisy valley changes the force by less than 2 % a tick") {
   constexpr int kEdge = 64;
   constexpr double kIsoShare = 0.2, kNoise = 0.02, kLevels = 255;
   const Shape valley = [](double x, double y, double z) {
@@ -251,7 +251,7 @@ TEST_CASE("milling into a noisy valley changes the force by less than 2.5 % a ti
     const SunkForce felt = sink(miller, x_mm, z_mm);
     MESSAGE("at ", x_mm, ", ", z_mm, " mm: largest step ", 100 * felt.step_ratio, " % of ",
             felt.mean_n, " N");
-    CHECK(felt.step_ratio < 0.025);
+    CHECK(felt.step_ratio < 0.02);
   }
 }
 

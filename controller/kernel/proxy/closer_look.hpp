@@ -78,12 +78,13 @@ class CloserLook {
     const Unit facing_share(std::clamp(along / steep, Ratio(0), Ratio(1)));
     const Unit alike = Unit(1) - falling_share<N>(facing_share, kAlike, kUnlike);
     // There the point shell's depth counts, but not so much less than the look's that a step from
-    // an allowed place would end beyond the middle of the thinnest wall (docs/theory.md 4.2).
+    // an allowed place would end beyond the middle of the thinnest wall (docs/theory.md 4.2). The
+    // look's is by the slope of the face that it saw: in the tool's own gradient the faces cancel.
     const auto less = static_cast<Real>(1 - SweepRules::kStep - SweepRules::kWedged);
     const Ratio own = peak_height(means_, false), highest = std::max(seen.height, means_.top),
                 slope = slope_along(means_, plane.normal, false);
     plane.depth = std::max(depth_of<N>(own + multiply<Ratio>(alike, highest - own), slope),
-                           depth_of<N>(highest, slope) - less);
+                           depth_of<N>(highest, std::max(slope, slope_of_face(steep))) - less);
     const Unit counts = alike * narrowness<N>(sums_, means_.top);
     plane.arm = plane.arm + part_of<N>(arm - plane.arm, counts);
     const auto own_normal = direction<N>(-turned_offset<N>(seen.normal, reader_.rows()));

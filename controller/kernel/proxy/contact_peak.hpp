@@ -148,6 +148,12 @@ template <class N>
 inline constexpr double kFlattestSlope = 0.2;
 inline constexpr double kSteepestSlope = 1.2;
 
+/// A slope that a face may have.
+template <class Ratio>
+[[nodiscard]] constexpr Ratio slope_of_face(Ratio slope) noexcept {
+  return std::clamp(slope, Ratio(kFlattestSlope), Ratio(kSteepestSlope));
+}
+
 /// 0 where `value` is `from` or above, 1 where it is `to` or below, linear between; `to` < `from`.
 template <class N>
 [[nodiscard]] constexpr typename N::Unit falling_share(typename N::Unit value, double from,
@@ -197,7 +203,7 @@ template <class N>
   };
   const Ratio uphill = -(along(means.gradient.x, normal.x) + along(means.gradient.y, normal.y) +
                          along(means.gradient.z, normal.z));
-  return std::clamp(round ? uphill + uphill : uphill, Ratio(kFlattestSlope), Ratio(kSteepestSlope));
+  return slope_of_face(round ? uphill + uphill : uphill);
 }
 
 /// (H - 1/2) / slope: how deep the tool is in the solid, units.

@@ -47,6 +47,7 @@ class CurvatureEstimate {
     const Real length = norm(moved);
     if (length < Real(kTelling)) return;
     const Turn turned = from - to;
+    turn_ = norm(turned);
     const Curve<N> whole = curve_of(turned, moved, Real(0));
     const Curve<N> rest = last_.known() ? curve_of(turned - turn_of_normal(last_, moved), moved,
                                                    multiply<Real>(Unit(kSkew), length))
@@ -54,6 +55,12 @@ class CurvatureEstimate {
     first_ = rest.known() ? last_ : whole;
     second_ = rest;
     last_ = whole;
+  }
+
+  /// At the end of a tick: forgets what the noise of normals may have feigned. Else it would
+  /// shorten steps until none is tried, and nothing new is learned.
+  constexpr void forget_noise() noexcept {
+    if (turn_ < Unit(kNoise)) forget();
   }
 
   /// Newton's step with this curvature: `step`, shortened so that it ends where the load presses
@@ -74,10 +81,17 @@ class CurvatureEstimate {
   }
 
  private:
+  /// A turn of a normal that noise may feign: that of a scan turns it by up to 2 degrees. If all
+  /// were remembered, the force of a ball would step by 27 % over a sharp edge, not by 2 (rows
+  /// `edges`).
+  static constexpr double kNoise = 0.02;  ///< rad
   static constexpr double kSkew =
       0.3;  ///< least cosine to the step at which the rest of a turn counts
 
-  constexpr void forget() noexcept { first_ = second_ = last_ = {}; }
+  constexpr void forget() noexcept {
+    first_ = second_ = last_ = {};
+    turn_ = {};
+  }
 
   static constexpr Curve<N> curve_of(Turn turned, Place moved, Real least) noexcept {
     const Turn across = direction_of_turn<N>(turned);
@@ -94,6 +108,7 @@ class CurvatureEstimate {
 
   Curve<N> first_, second_;  ///< of the estimate
   Curve<N> last_;            ///< of the last step alone
+  Unit turn_{};              ///< of the normal over it
 };
 
 }  // namespace kerf

@@ -97,8 +97,17 @@ struct Swept {
   std::int32_t queries = 0;
   bool turned = true;  ///< the tool has the orientation that was asked
   typename N::Real depth{-1};
-  bool buried = false;           ///< nothing to push against: the start rule is needed
-  std::int32_t stuck_ticks = 0;  ///< ticks in a row, this one included, whose work found no step
+  bool buried = false;  ///< nothing to push against: the start rule is needed
+};
+
+/// What one tick of the sweep hands to the next, while the tool and the solid stay.
+template <class N>
+struct SweepMemory {
+  /// Of the solid around the tool as it is turned. Learned anew in each tick, its first step would
+  /// be as wrong as the noise of a normal times the spring: deep in a bore of its own a tool would
+  /// jump about by a unit in a tick.
+  CurvatureEstimate<N> curvature;
+  std::int32_t stuck_ticks = 0;  ///< ticks in a row whose work found no step
 };
 
 /// One tick of the proxy (docs/theory.md 4.2, 4.6): it moves from a pose that the solid allows
@@ -126,21 +135,16 @@ class ProxySweep {
 
  public:
   /// `friction`: Coulomb's coefficient, 0 to 1. `turn_step`: turn_step_of(reach), or 0 for a tool
-  /// that does not turn or is round. `stuck_ticks`: what the last tick told, or 0.
-  constexpr ProxySweep(Field& field, ProxyPose<N>& pose, Unit friction, Unit turn_step,
-                       std::int32_t stuck_ticks = 0) noexcept
-      : field_(field),
-        pose_(pose),
-        friction_(friction),
-        turn_step_(turn_step),
-        stuck_ticks_(stuck_ticks) {}
+  /// that does not turn or is round. `memory`: what the last tick left in it, or new.
+  constexpr ProxySweep(Field& field, ProxyPose<N>& pose, SweepMemory<N>& memory, Unit friction,
+                       Unit turn_step) noexcept
+      : field_(field), pose_(pose), memory_(memory), friction_(friction), turn_step_(turn_step) {}
 
   constexpr Swept<N> tick(const ProxyPose<N>& goal) noexcept {
     here_ = turn_to(goal.turn);
     held_by_ = constraints_of(here_);
     const Slide<N> slide = move_to(goal.centre);
-    return {held_by_,    slide,        queries_,    pose_.turn == goal.turn,
-            here_.depth, here_.buried, stuck_ticks_};
+    return {held_by_, slide, queries_, pose_.turn == goal.turn, here_.depth, here_.buried};
   }
 
  private:
@@ -256,6 +260,7 @@ class ProxySweep {
       const Trial trial = attempt(Trying::turn, pose_.centre, {}, {});
       if (trial.allowed && norm(trial.centre - pose_.centre) <= longest_push(next)) {
         pose_ = {trial.centre, next};
+        memory_.curvature = {};
         here_ = trial.felt;
         known = true;
         step = turn_step_;
@@ -269,10 +274,10 @@ class ProxySweep {
   }
 
   /// The route in a bowl, from a place whose deepest plane stands first.
-  [[nodiscard]] constexpr Route route(const ConstraintSet<N>& planes, Place displacement,
-                                      const CurvatureEstimate<N>& curvature) const noexcept {
+  [[nodiscard]] constexpr Route eased_route(const ConstraintSet<N>& planes,
+                                            Place displacement) const noexcept {
     Route onward = route(planes, displacement);
-    onward.displacement = curvature.eased(onward.displacement, onward.slide.load[0]);
+    onward.displacement = memory_.curvature.eased(onward.displacement, onward.slide.load[0]);
     onward.length = norm(onward.displacement);
     return onward;
   }
@@ -283,8 +288,7 @@ class ProxySweep {
   /// grooves. Returns the slide of the last place.
   constexpr Slide<N> move_to(Place goal) noexcept {
     Unit shrink = first_step();
-    CurvatureEstimate<N> curvature;
-    Route onward = route(held_by_, goal - pose_.centre);
+    Route onward = eased_route(held_by_, goal - pose_.centre);
     // Farther than any place, while the tool has to get out of the solid.
     Real nearest_yet = allows_rest(here_) ? norm(goal - pose_.centre) : Real(4 * kContactLimit);
     const Real closer = nearest_yet - Real(SweepRules::kGain);
@@ -296,9 +300,9 @@ class ProxySweep {
       const Unit capped = step < onward.length ? share<N>(step, onward.length) : Unit(1);
       const Place moved = part_of<N>(onward.displacement, shrink * capped);
       const Trial trial = attempt(Trying::move, from + moved, held_by_, moved);
-      curvature.learn(here_, trial.felt, trial.centre - from);
+      memory_.curvature.learn(here_, trial.felt, trial.centre - from);
       if (trial.allowed) {
-        const Route next = route(trial.planes, goal - trial.centre, curvature);
+        const Route next = eased_route(trial.planes, goal - trial.centre);
         const Real distance = norm(goal - trial.centre);
         const bool strays = distance > nearest_yet + Real(SweepRules::kAstray);
         const bool leads = next.length < multiply<Real>(Unit(SweepRules::kResidual), onward.length);
@@ -315,7 +319,7 @@ class ProxySweep {
         }
       }
       const bool learned = learn(held_by_, trial.first, moved);
-      const Route again = route(held_by_, goal - from, curvature);
+      const Route again = eased_route(held_by_, goal - from);
       if (learned || again.length < multiply<Real>(Unit(SweepRules::kEased), norm(moved))) {
         onward = again;
       } else {
@@ -325,16 +329,17 @@ class ProxySweep {
         if (shrink < Unit(fine ? SweepRules::kFinest : SweepRules::kShortest)) break;
       }
     }
+    memory_.curvature.forget_noise();
     const bool vain = !kept_ && onward.length >= enough && !field_.may_query();
-    stuck_ticks_ = vain ? stuck_ticks_ + 1 : 0;
-    if (first_step() < Unit(SweepRules::kFinest)) stuck_ticks_ = 0;
+    memory_.stuck_ticks = vain ? memory_.stuck_ticks + 1 : 0;
+    if (first_step() < Unit(SweepRules::kFinest)) memory_.stuck_ticks = 0;
     return onward.slide;
   }
 
   /// Share of a step that a tick tries first.
   [[nodiscard]] constexpr Unit first_step() const noexcept {
     Unit step(1);
-    for (std::int32_t tick = SweepRules::kSameTries; tick <= stuck_ticks_; ++tick) {
+    for (std::int32_t tick = SweepRules::kSameTries; tick <= memory_.stuck_ticks; ++tick) {
       step = step * Unit(SweepRules::kShrink);
     }
     return step;
@@ -342,9 +347,9 @@ class ProxySweep {
 
   Field& field_;
   ProxyPose<N>& pose_;
+  SweepMemory<N>& memory_;
   Unit friction_;
   Unit turn_step_;
-  std::int32_t stuck_ticks_;
   Contacts<N> here_{};
   ConstraintSet<N> held_by_{};
   std::int32_t queries_ = 0;
