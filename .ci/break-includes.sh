@@ -57,6 +57,7 @@ rm -r docs
 refused shared/segment/x.cpp '#include <png.h>' '<png.h>'
 refused controller/servo/x.cpp '#include <zlib.h>' '<zlib.h>'
 refused controller/servo/x.cpp '#include <unistd.h>' '<unistd.h>'
+refused controller/servo/x.cpp '#include "shared/segment/writer.hpp"' 'shared/segment/writer.hpp'
 refused shared/numeric/x.hpp '#include <immintrin.h>' '<immintrin.h>'
 refused shared/text/words.hpp '#include <toml++/toml.h>' '<toml++/toml.h>'
 refused shared/text/other.cpp '#include <nlohmann/json.hpp>' '<nlohmann/json.hpp>'

@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "bridge/wire/lz4_block.hpp"
-#include "shared/segment/brick_grid.hpp"
+#include "shared/volume/brick_grid.hpp"
 #include "shared/volume/scene_limits.hpp"
 
 namespace kerf::bridge {

@@ -20,7 +20,7 @@
 #include "controller/servo/servo_output.hpp"
 #include "controller/servo/supervisor.hpp"
 #include "shared/numeric/fnv1a.hpp"
-#include "shared/segment/brick_grid.hpp"
+#include "shared/volume/brick_grid.hpp"
 
 namespace kerf {
 

@@ -13,7 +13,7 @@
 #include "controller/servo/servo_plan.hpp"
 #include "controller/servo/servo_state.hpp"
 #include "controller/servo/volume_reset.hpp"
-#include "shared/segment/brick_grid.hpp"
+#include "shared/volume/brick_grid.hpp"
 
 // The last stroke can be undone: every brick is kept as it was before the stroke's first cut in it.
 // Who is about to cut says which bricks it may reach; what was kept so and then not cut belongs to

@@ -11,7 +11,7 @@
 #include "controller/kernel/gradient.hpp"
 #include "controller/servo/servo_plan.hpp"
 #include "controller/servo/servo_state.hpp"
-#include "shared/segment/brick_grid.hpp"
+#include "shared/volume/brick_grid.hpp"
 
 // The volumes go back to their first content, a few bricks a tick and only those that were cut.
 // What is derived of a density follows: gradients, and what cutting still owes. Maps of free space

@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "shared/segment/brick_grid.hpp"
+#include "shared/volume/brick_grid.hpp"
 
 namespace kerf {
 

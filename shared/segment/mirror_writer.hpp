@@ -8,11 +8,11 @@
 #include <utility>
 #include <vector>
 
-#include "shared/segment/brick_grid.hpp"
 #include "shared/segment/layout.hpp"
 #include "shared/segment/record_ring.hpp"
 #include "shared/segment/segment_error.hpp"
 #include "shared/segment/segment_memory.hpp"
+#include "shared/volume/brick_grid.hpp"
 
 namespace kerf {
 

@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
-#include "shared/segment/brick_grid.hpp"
 #include "shared/segment/layout.hpp"
 #include "shared/segment/segment_error.hpp"
+#include "shared/volume/brick_grid.hpp"
 
 namespace kerf {
 

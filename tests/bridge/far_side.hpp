@@ -14,7 +14,7 @@
 #include "bridge/wire/messages.hpp"
 #include "bridge/wire/parse.hpp"
 #include "bridge/wire/set_hash.hpp"
-#include "shared/segment/brick_grid.hpp"
+#include "shared/volume/brick_grid.hpp"
 
 namespace kerf::test {
 

@@ -10,8 +10,8 @@
 #include "bridge/wire/lz4_block.hpp"
 #include "bridge/wire/messages.hpp"
 #include "bridge/wire/set_hash.hpp"
-#include "shared/segment/brick_grid.hpp"
 #include "shared/segment/layout_table.hpp"
+#include "shared/volume/brick_grid.hpp"
 
 namespace kerf::bridge::test {
 

@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "shared/segment/brick_grid.hpp"
+#include "shared/volume/brick_grid.hpp"
 
 namespace kerf {
 

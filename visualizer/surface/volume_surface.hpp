@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "shared/segment/brick_grid.hpp"
+#include "shared/volume/brick_grid.hpp"
 #include "visualizer/surface/block_mesh.hpp"
 #include "visualizer/view/scene_view.hpp"
 

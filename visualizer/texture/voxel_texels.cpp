@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "shared/segment/brick_grid.hpp"
+#include "shared/volume/brick_grid.hpp"
 #include "shared/volume/voxel_loops.hpp"
 
 namespace kerf {

@@ -11,8 +11,8 @@
 
 #include <glm/glm.hpp>
 
-#include "shared/segment/brick_grid.hpp"
 #include "shared/segment/reader.hpp"
+#include "shared/volume/brick_grid.hpp"
 #include "visualizer/view/camera.hpp"
 #include "visualizer/view/gradient.hpp"
 

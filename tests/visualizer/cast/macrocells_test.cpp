@@ -8,7 +8,7 @@
 #include <doctest/doctest.h>
 #include <rapidcheck.h>
 
-#include "shared/segment/brick_grid.hpp"
+#include "shared/volume/brick_grid.hpp"
 
 using namespace kerf;
 
