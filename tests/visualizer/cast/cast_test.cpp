@@ -257,7 +257,7 @@ TEST_CASE("of two intersecting volumes the analytically nearer surface is seen")
         const auto inner = exact(ray, 2.9);
         const auto nearest = exact(ray, 3.0);
         // Not at the rims: there a tenth of a voxel decides.
-        if (!inner || *inner - *nearest > 0.2) continue;
+        if (!inner || !nearest || *inner - *nearest > 0.2) continue;
         const auto at = static_cast<std::size_t>((kSize.height - 1 - y) * kSize.width + x);
         const double seen_mm = eye_distance_mm(static_cast<double>(drawn.depth[at]), view);
         worst_mm = std::max(worst_mm, std::abs(seen_mm - *nearest));

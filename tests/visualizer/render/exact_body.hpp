@@ -24,6 +24,7 @@ inline std::function<double(glm::dvec3)> body(const Distance& distance, double r
 }
 
 /// Where a ray first meets the surface, by going as far as is free; the body is in front of it.
+/// None where it misses the body, or grazes a part of it for more than 400 steps.
 inline std::optional<double> exact_mm(const Distance& distance, const PixelRay& ray) {
   double t = 0.0;
   for (int i = 0; i < 400; ++i) {
