@@ -19,7 +19,7 @@ usage() {
   --check          only whether each text still stands once in its file and its substitutes compile
   --full           every case of the rows, not a hundredth of them
   --stages N       no stages beyond: 1 walls, rests, slides, shapes; 2 tests of the contact; 3 traps;
-                   4 tests of the servo; 5 cutting   (5)
+                   4 tests of the servo; 5 cutting, isos, edges   (5)
   --jobs N         so many runs at once   (1)
   --again          forget what was measured before
   --page FILE      write what is measured as a page (docs/ablation.md)
@@ -207,7 +207,7 @@ measure() {
     3) lab traps ;;
     4) tests test_servo ;;
     5)
-      lab cutting
+      lab cutting,isos,edges
       tests test_proxy -sf='*jam_test*'
       ;;
   esac
@@ -329,7 +329,7 @@ what comes after a stage that loses a row is left out, so more rows may get lost
 2. the tests of proxy and point shell, in fixed point; a failed one counts as a lost row
 3. traps
 4. the tests of the servo
-5. cutting, and the test of a tool that turns askew in a tight hollow
+5. cutting, isos, edges, and the test of a tool that turns askew in a tight hollow
 
 Here up to stage $stages. A row moves by more than 1 % of its limit. What is needed loses one, or
 makes one worse by 5 % of its limit or more.

@@ -27,7 +27,7 @@ TEST_CASE_TEMPLATE("a cap lies on its ball, wherever it is laid", N, FixedNumber
         }
       }
       CHECK(std::abs(length(at) - kBall) < 0.03);
-      CHECK(length(at - kBall * out) < kCapRadius + 0.1);
+      CHECK(length(at - kBall * out) < kCapRadius + 0.05);
     }
   }
 }

@@ -118,13 +118,11 @@ constexpr void add_sample(PointSums<N>& sums, std::int32_t i, const PointSample<
     weight = round ? r2 * r2 >> 8 : r4 * r2 >> 8;
     pull = round ? 3 * weight - r3 : weight;
     lift = round ? (r3 >> 8) * r2 >> 8 : weight;
-    sums.solid += r >> 14;
   } else {
     square = r * r;
     weight = round ? square * square : square * square * square;
     pull = round ? Sum(3) * weight - square * r : weight;
     lift = round ? weight * r : weight;
-    sums.solid += r >= PointNumber<N>(0.5) ? 1 : 0;
   }
   sums.weight += weight;
   sums.density += weight * r;

@@ -122,7 +122,6 @@ struct PointSums {
   typename N::Sum high_offset[3] = {};
   PointNumber<N> top{};         ///< the largest r
   std::int32_t top_sample = 0;  ///< the last sample that has it
-  std::int32_t solid = 0;       ///< samples in the solid, r >= 1/2
   std::int32_t read = 0;        ///< samples that were looked at, by whole groups
 };
 

@@ -13,39 +13,20 @@
 
 namespace kerf {
 
-/// Caps: more samples on a ball around its contact, for its height on a sharp edge (docs/theory.md
-/// 3.5).
-///
-/// A wide cap finds the middle of what touches. A narrow one around it, its samples 0.2 units
-/// apart, tells the height: by peak_height as of any shape, and a little more, since no sample is
-/// at the summit.
-///
-/// On 1000 edges of 90 degrees a ball of 8 rests within 0.114 units of the iso-surface, with the
-/// wide cap alone within 0.2. By the highest sample the force would step by 14 %, not 3, as it
-/// slides.
-inline constexpr std::size_t kCapSamples = 6 * kPointGroup, kSummitSamples = 8 * kPointGroup;
-inline constexpr double kCapRadius = 3.25;  ///< units; half the ball's where that is less
-inline constexpr double kSummitRadius = 1.25;
+/// The cap: more samples on a ball around its contact, 0.2 units apart, for its height on a sharp
+/// edge (docs/theory.md 3.5): by peak_height as of any shape, and a little more, since no sample is
+/// at the summit. By the highest sample the force would step by 14 %, not 3, as the ball slides.
+inline constexpr std::size_t kCapSamples = 8 * kPointGroup;
+inline constexpr double kCapRadius = 1.25;   ///< units; half the ball's where that is less
 inline constexpr double kSummitAbove = 0.1;  ///< units: the summit is so far above its samples
 
-/// Caps are read while the ball's own samples find it at most so far above the surface, or so far
-/// below it, units: a summit may be 0.5 higher than they tell.
-inline constexpr double kCapAbove = 0.6;
-inline constexpr double kCapBelow = 0.1;
-
 /// Samples (x, x^2 + z^2, z) over the unit disc, each for the same area.
-template <class N, std::size_t kCount>
-[[nodiscard]] constexpr SpiralArrays<N, kCount> cap_arrays(double radius) noexcept {
-  return {radius + 0.1, [](std::size_t i) {
-            const double square = (static_cast<double>(i) + 0.5) / kCount;
-            return typename SpiralArrays<N, kCount>::Place{
-                static_cast<double>(square_root(Q30(square))), square};
-          }};
-}
 template <class N>
-inline constexpr auto kCapArrays = cap_arrays<N, kCapSamples>(kCapRadius);
-template <class N>
-inline constexpr auto kSummitArrays = cap_arrays<N, kSummitSamples>(kSummitRadius);
+inline constexpr SpiralArrays<N, kCapSamples> kCapArrays(kCapRadius + 0.1, [](std::size_t i) {
+  const double square = (static_cast<double>(i) + 0.5) / kCapSamples;
+  return typename SpiralArrays<N, kCapSamples>::Place{static_cast<double>(square_root(Q30(square))),
+                                                      square};
+});
 
 /// Lays a cap of `radius` on a ball of `reach`, in the direction `out` from its centre. The
 /// columns, over the radius, are two axes across (Duff et al. 2017) and between them how the ball
@@ -63,12 +44,12 @@ template <class N>
            {-(sign * out.x), fall * out.z, -out.y}}};
 }
 
-/// How far the caps count, 0..1, by the area in touch over that on a flat (docs/theory.md 3.5).
+/// How far the cap counts, 0..1, by the area in touch over that on a flat (docs/theory.md 3.5).
 /// With half of it or more it is no edge: a body of radius 8 or larger, a flat or a crease. With
 /// 0.35 or less it is one. (A body of radius 6 has 0.43, edges of 90 degrees 0.15 to 0.4.)
 ///
 /// Coarse where contact is faint: in fixed point the mean weight has steps of 2^-24. At a height of
-/// 0.08 on a flat (slope 0.5, reach 8) it is 1.4 steps, so the caps count wholly or not at all.
+/// 0.08 on a flat (slope 0.5, reach 8) it is 1.4 steps, so the cap counts wholly or not at all.
 /// There the hand feels 0.01 N in the default scene.
 template <class N>
 [[nodiscard]] constexpr typename N::Unit sharpness(const PointSums<N>& sums, std::int32_t count,

@@ -18,8 +18,8 @@
 
 namespace kerf {
 
-/// The closer look at one volume near rest (docs/theory.md 3.5): at a ball's two caps, or at
-/// another tool's close samples and a patch of the volume. It corrects the plane that the point
+/// The closer look at one volume near rest (docs/theory.md 3.5): at a ball's cap, or at another
+/// tool's close samples and a patch of the volume. It corrects the plane that the point
 /// shell tells. It lives within one query, with the tool's centre at `at`.
 template <class N>
 class CloserLook {
@@ -37,10 +37,9 @@ class CloserLook {
 
   /// Corrects `plane` where it is near enough to rest.
   void correct(ConstraintPlane<N>& plane) const noexcept {
-    const bool round = points_.table.round;
-    if (round && plane.depth < Real(kCapBelow) && -plane.depth < Real(kCapAbove)) {
+    if (points_.table.round) {
       plane.depth = depth_around(plane);
-    } else if (!round && std::max(plane.depth, -plane.depth) < Real(kCloseDepth)) {
+    } else if (std::max(plane.depth, -plane.depth) < Real(kCloseDepth)) {
       look_again(plane);
     }
   }
@@ -106,7 +105,7 @@ class CloserLook {
                        normal);
   }
 
-  /// A ball's depth by its caps around the middle of the contact, as far as the contact is sharp.
+  /// A ball's depth by its cap around the middle of the contact, as far as the contact is sharp.
   [[nodiscard]] Real depth_around(const ConstraintPlane<N>& plane) const noexcept {
     using Ratio = typename N::Ratio;
     using Unit = typename N::Unit;
@@ -114,30 +113,19 @@ class CloserLook {
     const Unit sharp = sharpness(sums_, points_.table.count, height, slope, points_.reach);
     const auto out = direction<N>(means_.offset);
     if (sharp <= Unit(0) || out == decltype(out){}) return plane.depth;
-    const Real half = multiply<Real>(points_.reach, Unit(0.5));
-    const Real wide = std::min(Real(kCapRadius), half),
-               narrow = std::min(Real(kSummitRadius), half);
-    const PointMeans<N> found = cap_means(out, kCapArrays<N>, wide);
-    const Unit share(wide / points_.reach);
-    const auto moved = [&](Unit from, Ratio by) {
-      return Ratio(from) + multiply<Ratio>(share, by);
-    };
-    const auto up = direction<N>(ContactVec<Ratio>{
-        moved(out.x, found.offset.x), moved(out.y, found.offset.y), moved(out.z, found.offset.z)});
-    const PointMeans<N> near = cap_means(up, kSummitArrays<N>, narrow);
-    if (near.density <= Ratio(0)) return plane.depth;
-    const Ratio summit = peak_height(near, false);
+    const PointMeans<N> cap = cap_means(out);
+    if (cap.density <= Ratio(0)) return plane.depth;
+    const Ratio summit = peak_height(cap, false);
     return depth_of<N>(height + multiply<Ratio>(sharp, summit - height), slope) +
            multiply<Real>(sharp, Real(kSummitAbove));
   }
 
   /// Means over a cap in the direction `out` from a ball's centre; 0 where it feels nothing.
-  template <std::size_t kCount>
-  [[nodiscard]] PointMeans<N> cap_means(ContactVec<typename N::Unit> out,
-                                        const SpiralArrays<N, kCount>& arrays,
-                                        Real radius) const noexcept {
-    const PointShell<N> cap{arrays.table(), {}, radius, 14};
-    SpiralPlaces<N, kCount> memory;
+  [[nodiscard]] PointMeans<N> cap_means(ContactVec<typename N::Unit> out) const noexcept {
+    const Real half = multiply<Real>(points_.reach, typename N::Unit(0.5));
+    const Real radius = std::min(Real(kCapRadius), half);
+    const PointShell<N> cap{kCapArrays<N>.table(), {}, radius, 14};
+    SpiralPlaces<N, kCapSamples> memory;
     const PointPlaces<N> places = memory.places();
     const TurnRows<N> rows = cap_rows<N>(out, radius, points_.reach);
     reader_.place(cap, rows, volume_.frame, places);

@@ -153,8 +153,7 @@ template <class N>
 }
 
 /// Adds `older` planes while there is room; their depths count from a place `moved` before this
-/// one. Takes those that are unlike all others and still near: from 0.5 units away to 0.3 units
-/// deep.
+/// one. Takes those that are unlike all others and not more than half a unit away.
 template <class N>
 constexpr void keep(ConstraintSet<N>& constraints, const ConstraintSet<N>& older,
                     ContactVec<typename N::Real> moved) noexcept {
@@ -162,8 +161,8 @@ constexpr void keep(ConstraintSet<N>& constraints, const ConstraintSet<N>& older
   for (std::size_t i = 0; i < older.count && constraints.count < kMaxPlanes; ++i) {
     ConstraintPlane<N> plane = older.plane[i];
     plane.depth = plane.depth - along<N>(plane.normal, moved);
-    const bool near = plane.depth > Real(-0.5) && plane.depth < Real(0.3);
-    if (near && !has_plane_like(constraints, plane)) constraints.plane[constraints.count++] = plane;
+    if (plane.depth > Real(-0.5) && !has_plane_like(constraints, plane))
+      constraints.plane[constraints.count++] = plane;
   }
 }
 

@@ -137,10 +137,7 @@ template <class N>
       Ratio(1) + (round ? static_cast<Ratio>(0.209) * std::min(e, Ratio(1)) : e / Ratio(7));
   // A lone spike has few samples and hardly moves the mean: it may not stand far above it unseen.
   constexpr auto kSpike = static_cast<Ratio>(0.2);
-  const Ratio height = std::max(factor * means.density, means.top - kSpike);
-  // Samples lie on the tool's edges and points: no summit is far above the highest sample.
-  constexpr auto kUnsampled = static_cast<Ratio>(0.03);
-  return round ? height : std::min(height, means.top + kUnsampled);
+  return std::max(factor * means.density, means.top - kSpike);
 }
 
 /// Limits of the slope in a depth (docs/theory.md 3.3), density per unit: flatter is noise, and no
@@ -179,16 +176,17 @@ template <class N>
 /// own radius that points out of the bottom, whichever wall the ball is in: `downhill`, the
 /// derivative of the peak, takes over as the mean falls from 0.85 to 0.7 of the reach and as the
 /// two directions part from 20 to 50 degrees. (With 30 to 60 the force steps by 5 % there, not 2.)
+/// Without a gradient there is no normal, as of any shape.
 template <class N>
 [[nodiscard]] constexpr ContactVec<typename N::Unit> ball_normal(
     const PointMeans<N>& means, ContactVec<typename N::Unit> downhill) noexcept {
   using Unit = typename N::Unit;
   using Ratio = typename N::Ratio;
+  if (downhill == ContactVec<Unit>{}) return downhill;
   const ContactVec<Unit> offset = direction<N>(-means.offset);
   const Unit cancelled = falling_share<N>(Unit(std::min(norm(means.offset), Ratio(1))), 0.85, 0.7);
   const Unit share = cancelled * falling_share<N>(dot(offset, downhill), 0.9397, 0.6428);
-  if (share <= Unit{} || downhill == ContactVec<Unit>{}) return offset;
-  return between<N>(offset, downhill, share);
+  return share <= Unit{} ? offset : between<N>(offset, downhill, share);
 }
 
 /// How fast density falls along a normal, per unit (docs/theory.md 3.3). w_g holds half of a

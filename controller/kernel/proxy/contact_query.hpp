@@ -26,7 +26,7 @@ namespace kerf {
 ///
 /// Call `turn` first, then any number of queries with this orientation; a tool that does not turn
 /// needs it once. A query reads the samples of the point shell in every volume, but for those in
-/// free space. Near rest it takes a closer look (docs/theory.md 3.5): at a ball's two caps, or at
+/// free space. Near rest it takes a closer look (docs/theory.md 3.5): at a ball's cap, or at
 /// another tool's close samples and a patch of the volume. In fixed all kernels give the same bits.
 /// Servo thread; no heap.
 ///
@@ -174,14 +174,12 @@ class ContactQuery {
     const PointSums<N> sums = reader_.sums_at(volume.field, points_.table, volume.places, at);
     if (sums.weight <= typename N::Sum(0)) return;
     ConstraintPlane<N> plane = plane_at(volume, at, sums, closer);
-    if (sums.top < Reader::kIsoDensity && !reader_.iso_is_near(volume, at, sums.top_sample)) return;
+    const bool soft = sums.top < Reader::kIsoDensity;  // what is softer than the iso bears nothing
+    if (soft && !reader_.iso_is_near(volume, at, sums.top_sample)) return;
     if (closer) look_midway(volume, q, plane);
-    // Nearly all samples are in the solid, or the tool feels the same all round. What is softer
-    // than the iso bears nothing.
-    const ContactVec<typename N::Unit> none{};
-    const bool immersed = sums.solid >= points_.table.count - points_.table.count / 16;
-    if (!immersed && plane.normal == none && sums.top < Reader::kIsoDensity) return;
-    if (immersed || plane.normal == none) {
+    const bool same_all_round = plane.normal == ContactVec<typename N::Unit>{};
+    if (same_all_round && soft) return;
+    if (same_all_round) {
       felt.buried = true;
       felt.depth = std::max(felt.depth, plane.depth);
       return;

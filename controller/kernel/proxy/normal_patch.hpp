@@ -30,10 +30,10 @@ inline constexpr double kPatchRadius = 1.9;
 /// takes over.
 inline constexpr double kAlike = 0.85, kUnlike = 0.65;
 
-/// While up to kNarrow of a tool's own samples touch, counted by weight, the patch tells the normal
-/// and the place of the contact. From kWide on their own mean does: of so many samples no voxel's
-/// noise turns it by more than a third of a degree.
-inline constexpr double kNarrow = 32, kWide = 64;
+/// While up to so many of a tool's own samples touch, counted by weight, the patch tells the normal
+/// and the place of the contact. From twice as many on their own mean does: of so many samples no
+/// voxel's noise turns it by more than a third of a degree.
+inline constexpr double kNarrow = 32;
 
 /// Points of the unit sphere. The reach has a little to spare for roundings.
 template <class N>
@@ -102,8 +102,8 @@ template <class N>
            {-(n.x * n.z), -(n.y * n.z), one - n.z * n.z}}};
 }
 
-/// 1 up to kNarrow samples in touch, 0 from kWide on. A sample counts by its weight over that of
-/// the highest.
+/// 1 up to kNarrow samples in touch, 0 from twice as many on. A sample counts by its weight over
+/// that of the highest.
 template <class N>
 [[nodiscard]] constexpr typename N::Unit narrowness(const PointSums<N>& sums,
                                                     typename N::Ratio top) noexcept {
@@ -111,14 +111,14 @@ template <class N>
   using Ratio = typename N::Ratio;
   using Sum = typename N::Sum;
   const Ratio cube = top * top * top, weight = cube * cube;
-  auto of_wide = static_cast<Sum>(kWide);
+  auto of_wide = static_cast<Sum>(2 * kNarrow);
   if constexpr (N::kIsFixed) {
     of_wide *= std::max(1, weight.raw());
   } else {
     of_wide *= weight;
   }
   const Ratio width = std::min(mean_of<N>(sums.weight, of_wide, 24), Ratio(1));
-  return falling_share<N>(Unit(width), 1, kNarrow / kWide);
+  return falling_share<N>(Unit(width), 1, 0.5);
 }
 
 }  // namespace kerf

@@ -35,15 +35,16 @@ struct SweepRules {
   static constexpr std::int32_t kMaxQueries = 32;
   /// No turn begins once so many queries are made, pushes included; the rest is the move's.
   static constexpr std::int32_t kMaxTurnQueries = 12;
-  static constexpr double kTolerance = 0.01;       ///< a place this deep is allowed
-  static constexpr double kTurnTolerance = 0.005;  ///< of a turn: it leaves the move some play
-  static constexpr double kNoMove = 0.002;         ///< from rest no shorter displacement is tried
-  static constexpr double kArrived = 0.004;        ///< after a step this near counts as there
+  static constexpr double kTolerance = 0.01;  ///< a place this deep is allowed
+  /// The same of a turn. It leaves the move some play: else an inverted cone with a shaft stops
+  /// between plates (rows `traps`, --seed 15590).
+  static constexpr double kTurnTolerance = 0.005;
+  static constexpr double kArrived = 0.004;  ///< no shorter displacement is tried
   /// Longest displacement of any sample between two queries. The middle of the thinnest wall, 2
   /// units, is one unit deep: beyond it density falls again, and its gradient leads onward.
   static constexpr double kStep = 0.875;
-  /// A step this much nearer to the goal is kept. Without it and kFinest the force steps by 0.67
-  /// instead of 0.28 % while milling into the GE tooth of 16 bits (rows `cutting`).
+  /// A step this much nearer to the goal is kept. Without it the force steps by 2.1 instead of 1.2
+  /// % at the worst place of a noisy valley (tests/servo/force_cut_test.cpp).
   static constexpr double kGain = 0.001;
   static constexpr double kResidual = 0.8;  ///< share of the displacement that a step may leave
   /// A next step shorter than this share of a failed one is tried whole. Without it the force of
@@ -51,16 +52,8 @@ struct SweepRules {
   static constexpr double kEased = 0.5;
   static constexpr double kShrink = 0.4;  ///< of a failed step, for the next try
   /// Share of a step below which the proxy rather lags. What a tool has milled leaves it a play of
-  /// hundredths of a unit, where longer steps only meet the other wall: in its first kFineQueries
-  /// it may try steps down to kFinest.
-  static constexpr double kShortest = 0.1;
-  static constexpr double kFinest = 0.02;
-  static constexpr std::int32_t kFineQueries = 14;
-  /// After so many without a nearer place the tool stays.
-  static constexpr std::int32_t kStillQueries = 24;
-  /// Ticks in a row whose work may be spent in vain before the next begins with shorter steps. The
-  /// motion of a hand ends such a row after three (tests/golden, `sweep`).
-  static constexpr std::int32_t kSameTries = 4;
+  /// hundredths of a unit, where longer steps only meet the other wall.
+  static constexpr double kShortest = 0.02;
   static constexpr double kPush = 0.5;  ///< longest correction of one push
   /// The tool may be this deep in one wall where a push out of it leads into another. What two
   /// opposite faces read differs by some hundredths from place to place, and a tool that is turned
@@ -114,10 +107,9 @@ struct SweepMemory {
 /// towards a goal, first the orientation, then the centre. When its queries or its attempts are
 /// spent it lags. It never jumps, so a wall of 2 units holds it at any speed.
 ///
-/// Where a tick's work is spent before any step was kept, the next one tries anew: the hand goes
-/// on, and the solid changes. But a tool at rest would try the same in vain for ever. So after
-/// kSameTries such ticks in a row the next does not turn, and its first step is kShrink of the last
-/// one's, down to kFinest: each length is once a tick's first try. Then it begins anew.
+/// Where a tick's work is spent before any step was kept, the next one would try the same in vain.
+/// So it does not turn, and its first step is kShrink of the last one's, down to kShortest: each
+/// length is once a tick's first try. Then it begins anew.
 ///
 /// From an allowed place the tool goes at most kAstray farther from its goal: in a groove of its
 /// own shape planes that change from query to query would lead it on and on.
@@ -291,8 +283,7 @@ class ProxySweep {
     Route onward = eased_route(held_by_, goal - pose_.centre);
     // Farther than any place, while the tool has to get out of the solid.
     Real nearest_yet = allows_rest(here_) ? norm(goal - pose_.centre) : Real(4 * kContactLimit);
-    const Real closer = nearest_yet - Real(SweepRules::kGain);
-    auto enough = Real(SweepRules::kNoMove);
+    const auto enough = static_cast<Real>(SweepRules::kArrived);
     while (may_look() && field_.may_query() && !here_.buried && onward.length >= enough) {
       const Place from = pose_.centre;
       auto step = static_cast<Real>(SweepRules::kStep);
@@ -313,7 +304,6 @@ class ProxySweep {
           held_by_ = trial.planes;
           onward = next;
           shrink = Unit(1);
-          enough = Real(SweepRules::kArrived);
           kept_ = true;
           continue;
         }
@@ -324,22 +314,20 @@ class ProxySweep {
         onward = again;
       } else {
         shrink = shrink * Unit(SweepRules::kShrink);
-        if (queries_ >= SweepRules::kStillQueries && nearest_yet >= closer) break;
-        const bool fine = queries_ <= SweepRules::kFineQueries;
-        if (shrink < Unit(fine ? SweepRules::kFinest : SweepRules::kShortest)) break;
+        if (shrink < Unit(SweepRules::kShortest)) break;
       }
     }
     memory_.curvature.forget_noise();
     const bool vain = !kept_ && onward.length >= enough && !field_.may_query();
     memory_.stuck_ticks = vain ? memory_.stuck_ticks + 1 : 0;
-    if (first_step() < Unit(SweepRules::kFinest)) memory_.stuck_ticks = 0;
+    if (first_step() < Unit(SweepRules::kShortest)) memory_.stuck_ticks = 0;
     return onward.slide;
   }
 
   /// Share of a step that a tick tries first.
   [[nodiscard]] constexpr Unit first_step() const noexcept {
     Unit step(1);
-    for (std::int32_t tick = SweepRules::kSameTries; tick <= memory_.stuck_ticks; ++tick) {
+    for (std::int32_t tick = 0; tick < memory_.stuck_ticks; ++tick) {
       step = step * Unit(SweepRules::kShrink);
     }
     return step;

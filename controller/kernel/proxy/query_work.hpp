@@ -61,15 +61,15 @@ struct QueryWork {
   }
 };
 
-/// The work of a tool with this point shell. Its closer looks are a ball's two caps (ball_cap.hpp),
-/// or a closeup (contact_closeup.hpp) and two patches (normal_patch.hpp) of another shape.
+/// The work of a tool with this point shell. Its closer looks are a ball's cap (ball_cap.hpp), or a
+/// closeup (contact_closeup.hpp) and two patches (normal_patch.hpp) of another shape.
 template <class N>
 [[nodiscard]] constexpr QueryWork query_work(const PointTable<N>& point_shell,
                                              std::size_t volumes) noexcept {
   constexpr std::int64_t kLook = QueryWork::kLookSamples;
   constexpr std::int64_t kCloseup = kLook + QueryWork::kCloseSamples * kMostClose;
-  const std::int64_t closer = point_shell.round ? 2 * kLook + kCapSamples + kSummitSamples
-                                                : kCloseup + 2 * (kLook + kPatchSamples);
+  const std::int64_t closer =
+      point_shell.round ? kLook + kCapSamples : kCloseup + 2 * (kLook + kPatchSamples);
   const std::int64_t query = std::int64_t{point_shell.groups} * kPointGroup + kLook;
   const auto times = static_cast<std::int64_t>(volumes);
   return {.query = times * query,

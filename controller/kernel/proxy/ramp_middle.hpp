@@ -25,7 +25,6 @@ inline constexpr double kMidwayFrom = 0.32, kMidwayTo = 0.6;
 /// The middle is sought so far to each side, units. It is at most one unit below the iso-surface,
 /// and reads raise a surface of low iso by up to 0.6 more.
 inline constexpr double kMidwayFarthest = 1.6;
-
 inline constexpr int kMidwayLooks = 2;          ///< the second along the normal of the first,
 inline constexpr double kMidwayAlike = 0.9998;  ///< if it is turned by more than a degree; cosine
 
@@ -51,11 +50,11 @@ template <class N, class DensityBelow>
   using Unit = typename N::Unit;
   const Real half = multiply<Real>(std::max(density(Real(1)), density(Real(2.5))), Unit(0.5));
   if (half < Real(0.002)) return {};  // too few steps of density
-  constexpr auto kFarthest = Real(kMidwayFarthest);
   Real below{}, level = density(below);
   for (const double share : {1.0, 0.75, 0.75}) {
     const Real missing = (half - level) / half;
-    below = std::clamp(below + multiply<Real>(missing, Unit(share)), -kFarthest, kFarthest);
+    below = std::clamp(below + multiply<Real>(missing, Unit(share)), Real(-kMidwayFarthest),
+                       Real(kMidwayFarthest));
     level = density(below);
   }
   level = std::max(level, multiply<Real>(half, Unit(0.5)));

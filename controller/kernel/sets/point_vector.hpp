@@ -38,8 +38,7 @@ struct PointVectors {
   V gradient[3] = {Simd::zero(), Simd::zero(), Simd::zero()};
   V offset[3] = {Simd::zero(), Simd::zero(), Simd::zero()};
   V high = Simd::zero(), high_offset[3] = {Simd::zero(), Simd::zero(), Simd::zero()};
-  V top = Simd::zero();  ///< r 2^kSampleBits + sample
-  V solid = Simd::zero();
+  V top = Simd::zero();                                           ///< r 2^kSampleBits + sample
   V full_offset[3] = {Simd::zero(), Simd::zero(), Simd::zero()};  ///< of vectors of full density
   std::int32_t full = 0;                                          ///< samples in such vectors
   std::int32_t read = 0;
@@ -191,7 +190,6 @@ template <bool kRound, bool kInside>
   }
   const V marked = Simd::bit_or(Simd::sll32<kSampleBits>(r), Simd::bit_and(sample, strong));
   sums.top = Simd::max32(sums.top, marked);
-  sums.solid = Simd::add32(sums.solid, Simd::srl32<14>(r));
 
   V v = w;
   if constexpr (kRound) v = Simd::sub32(Simd::add32(Simd::add32(w, w), w), r3);
@@ -297,7 +295,6 @@ template <bool kRound, bool kInside>
   const std::int32_t highest = highest32(sums.top);
   out.top = highest >> kSampleBits;
   out.top_sample = highest & (kMaxShellPoints - 1);
-  out.solid = sum32(sums.solid) + sums.full;
   out.read = sums.read;
 }
 
