@@ -78,7 +78,8 @@ TEST_CASE_TEMPLATE("matter of 0.97 of the iso holds no tool, wherever and howeve
         });
         // Solid that was cut away since: the map of what bears nothing does not know.
         Body cut = soft;
-        for (std::size_t i = 0; i < cut.density.size(); i += 5) cut.density[i] = kDensityMax;
+        for (std::size_t i = 0; i < cut.density.size(); i += 5)
+          cut.density[i] = static_cast<Density>(kDensityMax);
         ContactRig<N> rig(tool, cut);
         std::ranges::copy(soft.density, cut.density.begin());
         for (int i = 0; i < 100; ++i) {
