@@ -137,6 +137,7 @@ TEST_CASE_TEMPLATE("a plane seen before is kept while it is near and unlike the 
   CHECK(merged(older({std::sin(0.77), std::cos(0.77), 0}, 0), {}).count == 1);
   CHECK(merged(older({std::sin(0.8), std::cos(0.8), 0}, 0), {}).count == 2);
   CHECK(merged(older({1, 0, 0}, -0.6), {}).count == 1);
+  CHECK(merged(older({1, 0, 0}, 4), {}).count == 2);  // however deep
   // Carried along: 0.25 nearer.
   const auto carried = merged(older({1, 0, 0}, -0.6), {-0.25, 0, 0});
   REQUIRE(carried.count == 2);

@@ -61,6 +61,29 @@ TEST_CASE_TEMPLATE("walls of low iso hold a ball and a turning cylinder", N, Fix
   }
 }
 
+TEST_CASE_TEMPLATE("a tool deep in solid is at no allowed place, however faint and noisy it is", N,
+                   FixedNumbers, DoubleNumbers) {
+  for (const std::string shape : {"ball", "cylinder", "cone", "inverted_cone", "flame", "wheel"}) {
+    const SampledTool tool(tool_of_units(shape.c_str(), 5, 10));
+    Dice dice(5);
+    for (const double level : {1.03, 1.2, 1.9, 2.0}) {
+      for (const double noise : {0.0, 0.02, 0.2}) {
+        const Body solid = body_of({44, 44, 44}, [&](Point) {
+          return std::min(0.5 * (level + dice.uniform(0, noise)), 1.0);
+        });
+        ContactRig<N> rig(tool, solid);
+        for (int i = 0; i < 30; ++i) {
+          rig.field().turn(dice.turn<N>(dice.uniform(0, 3)));
+          const Contacts<N> felt = rig.field().query(
+              place_of<N>({dice.uniform(18, 26), dice.uniform(18, 26), dice.uniform(18, 26)}));
+          INFO(shape, ", level ", level, ", noise ", noise, ", place ", i);
+          CHECK((felt.buried || double(felt.depth) > SweepRules::kTolerance));
+        }
+      }
+    }
+  }
+}
+
 TEST_CASE_TEMPLATE("matter of 0.97 of the iso holds no tool, wherever and however it is pressed in",
                    N, FixedNumbers, DoubleNumbers) {
   for (const std::string shape : {"ball", "cylinder", "cone", "inverted_cone", "flame", "wheel"}) {
