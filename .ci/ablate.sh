@@ -134,7 +134,7 @@ check() {
   while IFS= read -r file; do
     errors=$("${CXX:-c++}" -std=c++20 -I "$folder" -S -o /dev/null "$folder/$file" 2>&1) ||
       die "$list: $file: does not compile: $(grep -m 1 error <<<"$errors"); mend it"
-  done < <(printf '%s\n' controller/servo/tool_forces.cpp "${files[@]}" | grep '\.cpp$' | sort -u)
+  done < <(printf '%s\n' controller/servo/swept_force.cpp "${files[@]}" | grep '\.cpp$' | sort -u)
   echo "ablate: ${#names[@]} texts stand once each and compile"
 }
 

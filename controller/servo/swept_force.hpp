@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstdint>
-#include <span>
 
 #include "controller/servo/servo_plan.hpp"
 #include "controller/servo/servo_state.hpp"
@@ -23,65 +22,6 @@ struct SweptForce {
   std::int64_t queried = 0;     ///< samples that it took, as query_work.hpp counts
 };
 
-/// A length in units, at the device port.
-template <class N>
-[[nodiscard]] DeviceVec<typename N::Real> at_device(const ContactPlan<N>& contact,
-                                                    ContactVec<typename N::Real> units) noexcept {
-  using Real = typename N::Real;
-  const auto mm = [&](Real x) { return multiply<Real>(contact.device_mm_per_unit, x); };
-  return {mm(units.x), mm(units.y), mm(units.z)};
-}
-
-/// The contact of one tick, with a tool's own field: a tool without a shaft has no part of one.
-template <class N>
-[[nodiscard]] ProxyContact<N> follow_tool(const ServoPlan<N>& plan, const SweptTool<N>& tool,
-                                          ContactState<N>& state, const ProxyPose<N>& goal,
-                                          std::int64_t& queried) noexcept {
-  const auto in_volumes = [&](const auto& volumes) {
-    return std::span(volumes).first(plan.volume_count);
-  };
-  const auto with = [&](auto&& field) {
-    field.begin_tick();
-    const ProxyContact<N> felt = follow<N>(tool.proxy, state.proxy, field, goal);
-    queried = field.spent();
-    return felt;
-  };
-  if (tool.behind.count == 0) {
-    return with(ContactQuery<N>(*plan.kernels, tool.point_shell, in_volumes(state.volumes)));
-  }
-  return with(ToolQuery<N>(*plan.kernels, tool.point_shell, in_volumes(state.volumes), tool.behind,
-                           {in_volumes(state.behind[0]), in_volumes(state.behind[1])}));
-}
-
-/// Tells the planes that bear a load of a force of `force_n`.
-template <class N>
-void tell_planes(const ContactPlan<N>& contact, const ProxyContact<N>& felt,
-                 typename N::Real force_n, ToolContact<N>& tool) noexcept {
-  using Real = typename N::Real;
-  for (std::size_t i = 0; i < felt.planes.count; ++i) {
-    if (felt.part[i] <= Real(0)) continue;
-    const ConstraintPlane<N>& plane = felt.planes.plane[i];
-    tool.planes[tool.plane_count++] = {relabel<DeviceSpace>(plane.normal),
-                                       at_device(contact, plane.arm), felt.part[i] * force_n,
-                                       plane.behind};
-  }
-}
-
-/// Splits the force of the spring: what friction holds lies along the faces, across the press.
-template <class N>
-void split_spring(DeviceVec<typename N::Real> spring_n, const ProxyContact<N>& felt,
-                  SweptForce<N>& out) noexcept {
-  using Real = typename N::Real;
-  out.spring_n = spring_n;
-  const auto press = relabel<DeviceSpace>(felt.press);
-  const Real pressed_n = multiply<Real>(press.x, spring_n.x) + multiply<Real>(press.y, spring_n.y) +
-                         multiply<Real>(press.z, spring_n.z);
-  if (!(pressed_n > Real(0))) return;
-  out.spring_n = {multiply<Real>(press.x, pressed_n), multiply<Real>(press.y, pressed_n),
-                  multiply<Real>(press.z, pressed_n)};
-  out.friction_n = spring_n - out.spring_n;
-}
-
 /// One tick: the proxy of the active tool follows the hand, coupling or law pull the hand to the
 /// proxy (docs/theory.md 4, 5.1). `rotation` turns the tool, unless it is a ball without a shaft or
 /// keeps the world's axes. Servo thread; at most 32 queries; writes `state.contact`, and
@@ -90,51 +30,6 @@ template <class N>
 [[nodiscard]] SweptForce<N> feel_swept(const ServoPlan<N>& plan, ServoState<N>& state,
                                        WorldVec<typename N::Real> tip_mm,
                                        const Rotation<N>& rotation,
-                                       DeviceVec<typename N::Real> velocity_mm_per_s) noexcept {
-  using Real = typename N::Real;
-  const ContactPlan<N>& contact = plan.contact;
-  const SweptTool<N>& tool = plan.tools[state.active_tool].swept;
-  const auto scaled = [](ContactVec<Real> v, typename N::Ratio by) {
-    return ContactVec<Real>{multiply<Real>(by, v.x), multiply<Real>(by, v.y),
-                            multiply<Real>(by, v.z)};
-  };
-
-  ProxyPose<N> goal;
-  goal.centre = scaled(relabel<ContactSpace>(tip_mm - contact.origin_mm), contact.units_per_mm);
-  if (tool.turned) goal.turn = turn_of<N>(rotation.row);
-
-  SweptForce<N> out;
-  const ProxyContact<N> felt = follow_tool(plan, tool, state.contact, goal, out.queried);
-  const auto spring_mm = at_device(contact, felt.spring);
-  // The coupling is no law behind a pointer: the compiler joins it with what surrounds it.
-  out.force_n = plan.force_law.given()
-                    ? plan.force_law(state.force_law, {state.tip_mm, tip_mm, velocity_mm_per_s,
-                                                       spring_mm, relabel<DeviceSpace>(felt.press)})
-                    : coupling_force(contact.coupling, spring_mm, velocity_mm_per_s);
-  // A law's force has no other part.
-  const bool whole =
-      plan.force_law.given() || contact.coupling.damping_ns_per_mm == typename N::Unit{};
-  const auto spring_n =
-      whole ? out.force_n
-            : coupling_force<N>({contact.coupling.stiffness_n_per_mm, {}}, spring_mm, {});
-  if (tool.proxy.friction == typename N::Unit{}) {
-    out.spring_n = spring_n;
-  } else {
-    split_spring(spring_n, felt, out);
-  }
-  out.offset_mm = relabel<WorldSpace>(scaled(felt.pose.centre - goal.centre, contact.mm_per_unit));
-  out.tool.centre_mm =
-      contact.origin_mm + relabel<WorldSpace>(scaled(felt.pose.centre, contact.mm_per_unit));
-  if (tool.turned) out.tool.rotation = {rows_of(felt.pose.turn)};
-  out.tool.normal = relabel<WorldSpace>(felt.normal);
-  out.tool.press = relabel<WorldSpace>(felt.press);
-  out.tool.head_share = felt.head_share;
-  const Real force_n = norm(out.force_n);
-  out.tool.head_arm_mm = at_device(contact, felt.head_arm);
-  tell_planes(contact, felt, force_n, out.tool);
-  out.behind_n = multiply<Real>(felt.behind_share, force_n);
-  out.torque_n_mm = at_device(contact, felt.moment_arm) * force_n;
-  return out;
-}
+                                       DeviceVec<typename N::Real> velocity_mm_per_s) noexcept;
 
 }  // namespace kerf
