@@ -39,21 +39,29 @@ struct FreeBricks {
   [[nodiscard, gnu::always_inline]] inline std::int32_t at(std::int32_t x, std::int32_t y,
                                                            std::int32_t z) const noexcept {
     if (distance == nullptr) return 0;
-    const std::int32_t bx = x < 0 ? 0 : x / kFreeBrick, by = y < 0 ? 0 : y / kFreeBrick,
-                       bz = z < 0 ? 0 : z / kFreeBrick;
-    const std::int32_t i = bx < grid.nx ? bx : grid.nx - 1, j = by < grid.ny ? by : grid.ny - 1,
-                       k = bz < grid.nz ? bz : grid.nz - 1;
-    const std::int32_t inside = distance[(std::int64_t{k} * grid.ny + j) * grid.nx + i];
+    const std::int32_t i = within(x / kFreeBrick, grid.nx), j = within(y / kFreeBrick, grid.ny),
+                       k = within(z / kFreeBrick, grid.nz);
     const std::int32_t over_xy = larger(beyond(x, grid.nx), beyond(y, grid.ny));
-    const std::int32_t outside = kFreeSteps * larger(over_xy, beyond(z, grid.nz));
-    return larger(inside, outside < kFreeFarthest ? outside : kFreeFarthest);
+    return at_least(distance[(std::int64_t{k} * grid.ny + j) * grid.nx + i],
+                    larger(over_xy, beyond(z, grid.nz)));
   }
 
- private:
+  /// The nearest of so many bricks along an axis.
+  [[nodiscard, gnu::always_inline]] static inline std::int32_t within(
+      std::int32_t brick, std::int32_t bricks) noexcept {
+    const std::int32_t below = brick < bricks ? brick : bricks - 1;
+    return larger(below, 0);
+  }
   /// Voxels from a cell to the nearest one that is read, along an axis of so many bricks.
   [[nodiscard, gnu::always_inline]] static inline std::int32_t beyond(
       std::int32_t cell, std::int32_t bricks) noexcept {
     return larger(-cell - 1, cell - bricks * kFreeBrick + 1);
+  }
+  /// What a brick says, or the way of so many voxels to it.
+  [[nodiscard, gnu::always_inline]] static inline std::int32_t at_least(
+      std::int32_t inside, std::int32_t voxels) noexcept {
+    const std::int32_t outside = kFreeSteps * voxels;
+    return larger(inside, outside < kFreeFarthest ? outside : kFreeFarthest);
   }
   [[nodiscard, gnu::always_inline]] static inline std::int32_t larger(std::int32_t a,
                                                                       std::int32_t b) noexcept {

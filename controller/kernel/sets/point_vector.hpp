@@ -222,24 +222,64 @@ template <bool kRound, bool kInside>
   block.count = 0;
 }
 
-/// Groups from `group` to `end`, but those in free space.
+/// The groups of a point shell that are not in free space, in order.
+struct OpenGroups {
+  std::int32_t count = 0;
+  std::int32_t group[kMaxShellPoints / kPointGroup];
+};
+
+/// Those from `begin` to `end`, as `FreeBricks::at` tells: brick by brick in vectors, and then
+/// without a branch that waits for the map. `kInside`: all are known to be in the volume. What goes
+/// round beyond 2^15 voxels is outside before and after.
+template <bool kInside>
+void find_open(const PointTable<FixedNumbers>& table, const PointPlaces<FixedNumbers>& places,
+               const std::int32_t (&centre)[3], const FreeBricks& free, std::int32_t begin,
+               std::int32_t end, OpenGroups& open) noexcept {
+  constexpr int kToBrick = 17;  // from Q15.16
+  static_assert(kFreeBrick << 16 == 1 << kToBrick);
+  const std::int32_t size[3] = {free.grid.nx, free.grid.ny, free.grid.nz};
+  std::int32_t brick[kMaxShellPoints / kPointGroup], outside[kMaxShellPoints / kPointGroup];
+  for (std::int32_t i = begin; i < end; ++i) brick[i] = outside[i] = 0;
+  for (std::size_t axis = 3; axis-- > 0;) {
+    const std::int32_t* const middle = places.middle[axis];
+    const auto at = static_cast<std::uint32_t>(centre[axis]);
+    const std::int32_t n = size[axis];
+    for (std::int32_t i = begin; i < end; ++i) {
+      const auto place = static_cast<std::int32_t>(at + static_cast<std::uint32_t>(middle[i]));
+      std::int32_t along = place >> kToBrick;
+      if constexpr (!kInside) {
+        outside[i] = FreeBricks::larger(outside[i], FreeBricks::beyond(place >> 16, n));
+        along = FreeBricks::within(along, n);
+      }
+      brick[i] = brick[i] * n + along;
+    }
+  }
+  open.count = 0;
+  for (std::int32_t i = begin; i < end; ++i) {
+    std::int32_t distance = 0;
+    if (free.distance != nullptr) {
+      distance = free.distance[brick[i]];
+      if constexpr (!kInside) distance = FreeBricks::at_least(distance, outside[i]);
+    }
+    open.group[open.count] = i;
+    open.count += distance < table.needed[i] ? 1 : 0;
+  }
+}
+
+/// Groups from `begin` to `end`, but those in free space.
 template <bool kRound, bool kInside>
 [[gnu::always_inline]] inline void add_groups(const PointTable<FixedNumbers>& table,
                                               const PointPlaces<FixedNumbers>& places,
                                               const std::int32_t (&centre)[3],
-                                              const DensityField& field, std::int32_t group,
+                                              const DensityField& field, std::int32_t begin,
                                               std::int32_t end, PointVectors& sums) noexcept {
+  OpenGroups open;
+  find_open<kInside>(table, places, centre, field.free, begin, end, open);
+  sums.read += open.count * kPointGroup;
   PointBlock block;
-  for (; group < end; ++group) {
-    const auto middle = [&](std::size_t axis) {
-      return place_at<FixedNumbers>(centre[axis], places.middle[axis][group]) >> 16;
-    };
-    if (field.free.at(middle(0), middle(1), middle(2)) >= table.needed[group]) {
-      continue;
-    }
-    sums.read += kPointGroup;
+  for (std::int32_t k = 0; k < open.count; ++k) {
     for (std::int32_t i = 0; i < kPointGroup; i += kPointLanes) {
-      block.first[block.count++] = group * kPointGroup + i;
+      block.first[block.count++] = open.group[k] * kPointGroup + i;
     }
     if (block.count == PointBlock::kMost) {
       add_block<kRound, kInside>(table, places, centre, field, block, sums);
