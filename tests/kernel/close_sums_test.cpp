@@ -216,7 +216,7 @@ TEST_CASE("a closer look takes all samples around a place, and of too many a par
   int taken_within = 0;
   for (std::size_t k = 0; k < static_cast<std::size_t>(samples->count); ++k) {
     const double share = far(place(*samples, k, reach), at) / kCloseRadius;
-    CHECK(share * kCloseRadius < kCloseRadius + std::sqrt(3.0) * kCloseCell);
+    CHECK(share * kCloseRadius < kCloseRadius + std::sqrt(3.0));
     taken_within += share * kCloseRadius < kCloseRadius - 0.01 ? 1 : 0;
     const double rest = std::max(1 - share * share, 0.0);
     CHECK(samples->window[k] / 32768.0 == doctest::Approx(rest * rest).epsilon(0.001).scale(1));

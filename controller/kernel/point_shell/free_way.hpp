@@ -70,7 +70,8 @@ class FreeWay {
       const std::int32_t free = distance(place) - needed;
       if (free < 0) return share;
       Share onward = share_of(free);
-      if (free < kAcross) onward = std::max(onward, leaving(place));
+      // No brick is left later than by the steps across it.
+      if (free < 2 * kFreeBrick * kFreeSteps) onward = std::max(onward, leaving(place));
       if (!(share + onward > share)) return share;  // as little as a float cannot tell
       share += onward;
     }
@@ -81,8 +82,8 @@ class FreeWay {
   [[nodiscard]] Share share_of(std::int32_t steps) const noexcept { return step_ * Share(steps); }
 
  private:
-  /// Steps across a brick: no brick is left later than by so many.
-  static constexpr std::int32_t kAcross = 2 * kFreeBrick * kFreeSteps;
+  /// So far beyond its border a brick is left: 2^-14 voxels.
+  static constexpr auto kPast = N::kIsFixed ? Wide(4) : Wide(0x1p-14);
 
   [[nodiscard]] static std::int32_t voxel_of(Wide place) noexcept {
     if constexpr (N::kIsFixed) {
@@ -100,18 +101,17 @@ class FreeWay {
 
   /// Share of the move to where its line leaves the brick of `place`.
   [[nodiscard]] Share leaving(const Wide (&place)[3]) const noexcept {
+    const Wide edge = N::kIsFixed ? Wide{kFreeBrick} * 65536 : Wide{kFreeBrick};
     Share soonest = kWholeMove<N>;
     for (std::size_t axis = 0; axis < 3; ++axis) {
       Share share{};
       if constexpr (N::kIsFixed) {
-        constexpr std::int64_t kEdge = std::int64_t{kFreeBrick} << 16, kPast = 4;
-        const std::int64_t in = place[axis] & (kEdge - 1);
-        share = ((move_[axis] < 0 ? in : kEdge - in) + kPast) * inverse_[axis] >> 16;
+        const std::int64_t in = place[axis] & (edge - 1);
+        share = ((move_[axis] < 0 ? in : edge - in) + kPast) * inverse_[axis] >> 16;
       } else {
-        constexpr S kEdge = kFreeBrick, kPast(0x1p-14);
         const std::int32_t voxel = voxel_of(place[axis]);
         const S in = place[axis] - S(voxel - (voxel & (kFreeBrick - 1)));
-        share = ((move_[axis] < 0 ? in : kEdge - in) + kPast) * inverse_[axis];
+        share = ((move_[axis] < 0 ? in : edge - in) + kPast) * inverse_[axis];
       }
       soonest = std::min(soonest, share);
     }

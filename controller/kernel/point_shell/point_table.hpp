@@ -127,8 +127,7 @@ struct PointSums {
 
 /// A closeup looks so far around a contact, units. With 2 the force of a cylinder over a sharp edge
 /// steps by 9 % of its mean, not 4 (rows `edges`).
-inline constexpr double kCloseRadius = 3;
-inline constexpr double kCloseCell = 1;          ///< units; edge of the cells of close samples
+inline constexpr std::int32_t kCloseRadius = 3;
 inline constexpr double kClosePitch = 0.35;      ///< units between them
 inline constexpr std::int32_t kMostClose = 448;  ///< that a closeup reads; some 330 on a flat
 inline constexpr std::int32_t kMostInCell = 32;
@@ -136,8 +135,8 @@ inline constexpr std::int32_t kMostInCell = 32;
 /// A tool's surface in close samples: the rim or the point of a tool on a sharp edge touches in
 /// less than the spacing of the point shell's own samples.
 ///
-/// Sorted by cells, x fastest. Made at load (controller/plan/tables/close_cells.hpp); points into
-/// the maker's memory. A ball has none.
+/// Sorted by cells of one unit, x fastest. Made at load (controller/plan/tables/close_cells.hpp);
+/// points into the maker's memory. A ball has none.
 template <class N>
 struct CloseTable {
   const PointNumber<N>* offset[3] = {};  ///< from the tool's centre, over its reach; Q0.15
@@ -145,7 +144,7 @@ struct CloseTable {
   const std::int32_t* first = nullptr;   ///< sample of each cell, then the end; null: none
   std::int32_t cells[3] = {};            ///< along the axes
   PointNumber<N> low[3] = {};            ///< offset where the first cell begins
-  PointNumber<N> edge{};                 ///< kCloseCell over the reach
+  PointNumber<N> edge{};                 ///< of a cell: a unit over the reach
 };
 
 }  // namespace kerf

@@ -32,31 +32,30 @@ struct CloseSamples {
   /// Takes the samples of the cells within kCloseRadius of the offset `around`; of too many,
   /// kMostClose spread evenly.
   constexpr void take(const CloseTable<N>& table, const PointNumber<N> (&around)[3]) noexcept {
-    constexpr auto kReach = static_cast<std::int32_t>(kCloseRadius / kCloseCell);
     constexpr std::int32_t kFine = 16;  // steps of a cell
     using Number = PointNumber<N>;
-    radius = static_cast<Number>(kReach) * table.edge;
+    radius = static_cast<Number>(kCloseRadius) * table.edge;
     std::int32_t at[3] = {}, from[3] = {}, to[3] = {};  // steps; cells
     for (std::size_t axis = 0; axis < 3; ++axis) {
       middle[axis] = around[axis];
       const Number from_low = std::max(Number(0), around[axis] - table.low[axis]);
-      at[axis] = static_cast<std::int32_t>(
-          std::min(from_low * kFine / table.edge, Number(kFine * (table.cells[axis] + kReach))));
-      from[axis] = std::max(0, at[axis] / kFine - kReach);
-      to[axis] = std::min(at[axis] / kFine + kReach + 1, table.cells[axis]);
+      at[axis] = static_cast<std::int32_t>(std::min(
+          from_low * kFine / table.edge, Number(kFine * (table.cells[axis] + kCloseRadius))));
+      from[axis] = std::max(0, at[axis] / kFine - kCloseRadius);
+      to[axis] = std::min(at[axis] / kFine + kCloseRadius + 1, table.cells[axis]);
     }
     const auto square_to = [&](std::size_t axis, std::int32_t cell) {  // of the distance to a cell
       const std::int32_t low = kFine * cell;
       const std::int32_t gap = std::max({0, low - at[axis] - 1, at[axis] - low - kFine});
       return gap * gap;
     };
+    const std::int32_t square = (kFine * kCloseRadius) * (kFine * kCloseRadius);
     const auto each_row = [&](auto&& visit) {  // of cells: its first sample, and the end
-      constexpr std::int32_t kSquare = kFine * kReach * kFine * kReach;
       for (std::int32_t z = from[2]; z < to[2]; ++z) {
         for (std::int32_t y = from[1]; y < to[1]; ++y) {
           const std::int32_t* const first = table.first + (z * table.cells[1] + y) * table.cells[0];
           std::int32_t x = from[0], end = to[0];
-          const std::int32_t rest = kSquare - square_to(2, z) - square_to(1, y);
+          const std::int32_t rest = square - square_to(2, z) - square_to(1, y);
           while (x < end && first[x] != first[end] && square_to(0, x) >= rest) ++x;
           while (x < end && first[x] != first[end] && square_to(0, end - 1) >= rest) --end;
           if (x < end) visit(first[x], first[end]);

@@ -49,8 +49,9 @@ template <class N>
 [[nodiscard]] constexpr typename N::Unit share(typename N::Real part,
                                                typename N::Real whole) noexcept {
   if constexpr (N::kIsFixed) {
-    constexpr std::int64_t kOne = std::int64_t{1} << N::Unit::kFractionBits;
-    return N::Unit::from_raw(static_cast<std::int32_t>(part.raw() * kOne / whole.raw()));
+    using Unit = typename N::Unit;
+    const std::int64_t scaled = std::int64_t{part.raw()} * Unit(1).raw();
+    return Unit::from_raw(static_cast<std::int32_t>(scaled / whole.raw()));
   } else {
     return part / whole;
   }
@@ -61,8 +62,9 @@ template <class N>
 [[nodiscard]] constexpr typename N::Real quotient(typename N::Real length,
                                                   typename N::Unit turn) noexcept {
   if constexpr (N::kIsFixed) {
-    constexpr std::int64_t kOne = std::int64_t{1} << N::Unit::kFractionBits;
-    return N::Real::from_raw(saturate_i32(length.raw() * kOne / turn.raw()));
+    using Unit = typename N::Unit;
+    const std::int64_t scaled = std::int64_t{length.raw()} * Unit(1).raw();
+    return N::Real::from_raw(saturate_i32(scaled / turn.raw()));
   } else {
     return length / turn;
   }

@@ -74,8 +74,8 @@ template <class N>
                   along(slope, normal.z) + per_place * means.offset.z}};
   const Ratio varied = std::max(means.square / means.density / means.density - Ratio(1), Ratio(0));
   const Ratio height = means.density / std::max(norm(patch.gradient), means.density / Ratio(2));
-  constexpr auto kSpread = static_cast<Ratio>(24 / (kPatchRadius * kPatchRadius));
-  patch.spread = std::min(kSpread * (varied * (height * height)), Ratio(1));
+  const auto of_heights = static_cast<Ratio>(24 / (kPatchRadius * kPatchRadius));
+  patch.spread = std::min(of_heights * (varied * (height * height)), Ratio(1));
   return patch;
 }
 

@@ -54,10 +54,9 @@ struct QueryWork {
   /// No tick of a sweep reads more: the budget, and one query after the turns, whose last ones may
   /// reach into the move's half. A tool of few samples runs out of queries before.
   [[nodiscard]] constexpr std::int64_t most() const noexcept {
-    constexpr std::int64_t kTurns = SweepRules::kMaxTurnQueries + 1;
     const std::int64_t after = 8 * (query + closer) > budget() ? turn + query : 0;
-    return std::min(budget() + after + 2 * near,
-                    SweepRules::kMaxQueries * (query + closer + near) + kTurns * turn);
+    return std::min(budget() + after + 2 * near, SweepRules::kMaxQueries * (query + closer + near) +
+                                                     (SweepRules::kMaxTurnQueries + 1) * turn);
   }
 };
 
@@ -66,16 +65,16 @@ struct QueryWork {
 template <class N>
 [[nodiscard]] constexpr QueryWork query_work(const PointTable<N>& point_shell,
                                              std::size_t volumes) noexcept {
-  constexpr std::int64_t kLook = QueryWork::kLookSamples;
-  constexpr std::int64_t kCloseup = kLook + QueryWork::kCloseSamples * kMostClose;
-  const std::int64_t closer =
-      point_shell.round ? kLook + kCapSamples : kCloseup + 2 * (kLook + kPatchSamples);
-  const std::int64_t query = std::int64_t{point_shell.groups} * kPointGroup + kLook;
+  using Work = QueryWork;
+  const std::int64_t cap = Work::kLookSamples + kCapSamples;
+  const std::int64_t closeup = Work::kLookSamples + Work::kCloseSamples * kMostClose;
+  const std::int64_t patch = Work::kLookSamples + kPatchSamples;
+  const std::int64_t query = std::int64_t{point_shell.groups} * kPointGroup + Work::kLookSamples;
   const auto times = static_cast<std::int64_t>(volumes);
   return {.query = times * query,
-          .closer = times * closer,
+          .closer = times * (point_shell.round ? cap : closeup + 2 * patch),
           .turn = times * (point_shell.count / 8),
-          .near = times * QueryWork::kNearLook};
+          .near = times * Work::kNearLook};
 }
 
 }  // namespace kerf

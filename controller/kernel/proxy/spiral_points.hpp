@@ -29,7 +29,6 @@ struct SpiralArrays {
   /// `longest` units.
   template <class PlaceOf>
   constexpr SpiralArrays(double longest, PlaceOf place_of) noexcept : reach(longest) {
-    constexpr double kOne = N::kIsFixed ? 32768 : 1;
     // Of the golden angle, pi (3 - sqrt(5)).
     constexpr double kCosine = -0.7373688780783197, kSine = 0.6754902942615238;
     double cosine = 1, sine = 0;
@@ -37,7 +36,7 @@ struct SpiralArrays {
       const Place place = place_of(i);
       const double at[3] = {place.across * cosine, place.along, place.across * sine};
       for (std::size_t axis = 0; axis < 3; ++axis) {
-        offset[axis][i] = static_cast<PointNumber<N>>(kOne * at[axis]);
+        offset[axis][i] = static_cast<PointNumber<N>>(at[axis] * (N::kIsFixed ? 32768 : 1));
       }
       const double turned = cosine * kCosine - sine * kSine;
       sine = sine * kCosine + cosine * kSine;

@@ -134,7 +134,7 @@ class ToolQuery {
       felt.buried = felt.buried || seen.buried;
       felt.depth = std::max(felt.depth, seen.depth);
     });
-    last_ = short_of_work && !answered ? kEndsTick : before - left_;
+    last_ = short_of_work && !answered ? std::numeric_limits<std::int64_t>::max() : before - left_;
     return felt;
   }
 
@@ -154,8 +154,6 @@ class ToolQuery {
   }
 
  private:
-  static constexpr std::int64_t kEndsTick = std::numeric_limits<std::int64_t>::max();
-
   struct Part {
     ContactQuery<N> query;
     Real up{};
@@ -183,7 +181,7 @@ class ToolQuery {
   std::optional<Part> handpiece_;
   QueryWork work_;
   std::int64_t left_ = 0;    ///< of the tick's samples
-  std::int64_t last_ = 0;    ///< of them that the last query took; kEndsTick: it was given up
+  std::int64_t last_ = 0;    ///< of them that the last query took; the most: it was given up
   std::int64_t wasted_ = 0;  ///< of them for free ways that led nowhere
   bool turned_ = false;      ///< and not queried since
 };

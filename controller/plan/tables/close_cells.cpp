@@ -21,7 +21,7 @@ CloseCells<N>::CloseCells(std::span<const SurfaceSample> samples_units, double r
     }
     samples.push_back(close);
   }
-  edge_ = sample_offset<N>(kCloseCell / reach);
+  edge_ = sample_offset<N>(1 / reach);
   Vector high = low_ = samples.front().offset;
   for (const Close& sample : samples) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
