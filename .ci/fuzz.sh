@@ -43,7 +43,7 @@ fuzz() {
 seed=${KERF_FUZZ_DAY:-$(($(date -u +%s) / 86400))}
 export -f fuzz
 export build lists seconds seed
-export UBSAN_OPTIONS=halt_on_error=1:print_stacktrace=1
+export ASAN_OPTIONS=handle_sigill=1 UBSAN_OPTIONS=print_stacktrace=1
 
 # The lines of the fuzzers that are wanted.
 wanted() {
