@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // A tool that takes another's place, among bodies.
+#include <algorithm>
 #include <cmath>
 
 #include <doctest/doctest.h>
@@ -56,6 +57,24 @@ TEST_CASE_TEMPLATE("a larger tool comes off the wall on its own side", N, FixedN
     const ProxyState<N> state = placed_anew<N>(rig, {32, 33 + above, 32}, {32, 10, 32});
     REQUIRE(state.placed);
     CHECK(point_of<N>(state.pose.centre)[1] == doctest::Approx(33 + kRadius).epsilon(0.005));
+  }
+}
+
+TEST_CASE_TEMPLATE("a larger tool that has no room in its cavity is not put outside of the wall", N,
+                   FixedNumbers, DoubleNumbers) {
+  const SampledTool ball = tool_of_units("ball", kRadius, 2 * kRadius);
+  for (const double wall : {3.0, 5.0}) {
+    CAPTURE(wall);
+    const Body shell = blurred({65, 65, 65}, [&](Point p) {
+      const double from_middle = length(p - kMiddle);
+      return std::max(7 - from_middle, from_middle - 7 - wall);
+    });
+    ContactRig<N> rig(ball, shell);
+    for (const Point at : {kMiddle, kMiddle + Point{3, -2, 1}, kMiddle + Point{0, 0, 5.5}}) {
+      const ProxyState<N> state = placed_anew<N>(rig, at, kMiddle);
+      CHECK_FALSE(state.placed);
+      CHECK(state.search.refused());
+    }
   }
 }
 
