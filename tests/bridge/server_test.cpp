@@ -48,8 +48,9 @@ TEST_CASE("a viewer holds the volume, and what is cut while it looks") {
   }
   REQUIRE(viewer.follow([&] { return viewer.far.last.tick == 50 && viewer.far.is_whole(); }));
   CHECK(viewer.far.volume(0) == controller.volume.density);
-  REQUIRE(viewer.follow([&] { return !viewer.far.ticks.empty(); }));
-  CHECK(viewer.far.ticks.back().tick == 50);
+  // Ticks may come after the state of the last one, and in several parts.
+  const auto& ticks = viewer.far.ticks;
+  CHECK(viewer.follow([&] { return !ticks.empty() && ticks.back().tick == 50; }));
 }
 
 TEST_CASE("a bridge waits for its controller, and greets anew where another one starts") {
