@@ -55,6 +55,9 @@ controller/kernel/sets/gather_vector.hpp | samples beyond the last count | s/\(i
 controller/kernel/sets/splat_loops.hpp | rounding of a scaled overlap | s/ \+ \(1 << 19\)\) >> 20/) >> 20/
 controller/kernel/sets/splat_loops.hpp | air is felt | s/density == INT16_MIN \? 0 : covered/covered/
 controller/kernel/sets/splat_loops.hpp | what lies beyond a full voxel is lost | s/sums\[x\] - covered : sums/0 : sums/
+controller/kernel/sets/open_groups.hpp | the way from outside is forgotten | s/FreeBricks::at_least\(distance, outside\[i\]\)/distance/
+controller/kernel/sets/open_groups.hpp | border: the volume is a brick longer | s/beyond\(place >> 16, n\)/beyond(place >> 16, n + 1)/
+controller/kernel/sets/open_groups.hpp | the brick of one group | s/ >> kToBrick;/ >> (kToBrick + (i == 3));/
 controller/kernel/splat.hpp | the box lies one voxel off | s/low\.y - kGradientReach/low.y - 1/
 controller/plan/tables/aligned_tool.cpp | the flush bound is twice too large | s/\(2 \* largest \* 32768\)/(largest * 32768)/
 controller/plan/tables/aligned_tool.cpp | a mask's lane off by one | s/static_cast<std::size_t>\(v\.x\) \+ 2 \+ moved/static_cast<std::size_t>(v.x) + 1 + moved/
@@ -96,7 +99,7 @@ caught_by() {
 echo "check-mutations: building the kernel tests as they are" >&2
 cmake -S "$scratch" -B "$scratch/build" -G Ninja -DCMAKE_BUILD_TYPE=Release \
   -DCMAKE_CXX_FLAGS_RELEASE=-O1 --log-level=ERROR >/dev/null
-if ! before=$(caught_by test_kernel test_aligned) || [[ -n $before ]]; then
+if ! before=$(caught_by test_kernel test_aligned test_point_shell) || [[ -n $before ]]; then
   tail "$scratch/build.log" >&2
   echo "check-mutations: the tests fail without any change (${before:-build}); mend them first" >&2
   exit 2
@@ -117,6 +120,7 @@ while IFS='|' read -r files what edit; do
   # First the tests that are nearer.
   tests=(test_kernel test_aligned)
   [[ $files =~ aligned|sets|splat|exact ]] && tests=(test_aligned test_kernel)
+  [[ $files =~ open_groups ]] && tests=(test_point_shell)
   if ! caught=$(caught_by "${tests[@]}"); then
     cat "$scratch/build.log"
     echo "check-mutations: '$what' does not compile; mend the list" >&2

@@ -173,6 +173,7 @@ struct Simd {
 }  // namespace
 }  // namespace kerf
 
+#include "controller/kernel/sets/close_vector.hpp"
 #include "controller/kernel/sets/correlate_vector.hpp"
 #include "controller/kernel/sets/cover_lanes_vector.hpp"
 #include "controller/kernel/sets/gather_vector.hpp"
