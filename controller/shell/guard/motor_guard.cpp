@@ -5,7 +5,10 @@
 #include <chrono>
 #include <csignal>
 #include <ctime>
+#include <string_view>
 #include <thread>
+
+#include <unistd.h>
 
 #include "shared/posix/stop_signals.hpp"
 
@@ -27,6 +30,13 @@ void on_crash(int signal) {
     const timespec cycles{0, 2'000'000};
     nanosleep(&cycles, nullptr);
   }
+#ifdef KERF_SANITIZED
+  // Undefined behaviour ends a sanitised program so, and the sanitizer's own handler is not there.
+  constexpr std::string_view kTrapped = "Sanitizer: a check stopped the controller (SIGILL)\n";
+  if (signal == SIGILL) {
+    [[maybe_unused]] const auto told = write(STDERR_FILENO, kTrapped.data(), kTrapped.size());
+  }
+#endif
   std::raise(signal);  // the handler was reset on entry: this ends the program
 }
 
