@@ -216,8 +216,9 @@ void add_new(kerf::NewFiles& files, const fs::path& path) {
   file.close();
 }
 
-/// The exit status of a child process that makes `call`; -1: it was killed at its system call
-/// number `last`. Every system call stops twice.
+/// The exit status of a child process that makes `call`; -1: it was killed when its system call
+/// number `last` had returned. Each one stops twice, after the first stop of all; the child stands
+/// still while it is killed, so nothing depends on who is faster.
 template <class Call>
 int child_until(int last, const Call& call) {
   const pid_t child = fork();
@@ -229,9 +230,10 @@ int child_until(int last, const Call& call) {
     _exit(0);
   }
   int status = 0;
-  for (int stops = 0; stops < 2 * last; ++stops) {
+  for (int stops = 0;; ++stops) {
     waitpid(child, &status, 0);
     if (WIFEXITED(status)) return WEXITSTATUS(status);
+    if (stops == 2 * last) break;
     ptrace(PTRACE_SYSCALL, child, nullptr, nullptr);
   }
   kill(child, SIGKILL);
