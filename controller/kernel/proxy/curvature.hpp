@@ -81,9 +81,10 @@ class CurvatureEstimate {
   }
 
  private:
-  /// A turn of a normal that noise may feign. If all were remembered, the force of a ball would
-  /// step by 27 % over a sharp edge, not by 2 (rows `edges`). Found by trying: with 0.03 a ball
-  /// bores 1.06 % more beside its shaft than without one (tests/servo/shaft_test.cpp).
+  /// What noise turns a normal by, as a deviation, in the noisiest scan that no filter smooths
+  /// (docs/theory.md 4.4). If smaller turns were remembered, too, the force of a ball would step by
+  /// 27 % over a sharp edge, not by 2 (rows `edges`). With 0.03 a ball bores 1.06 % more beside its
+  /// shaft than without one (tests/servo/shaft_test.cpp).
   static constexpr double kNoise = 0.02;  ///< rad
   static constexpr double kSkew =
       0.3;  ///< least cosine to the step at which the rest of a turn counts
