@@ -128,6 +128,16 @@ template <class N>
   return touched;
 }
 
+/// Whether the tool covers anything that may be cut.
+template <class N>
+[[nodiscard]] constexpr bool covers_what_is_cut(const PrestonPlan<N>& plan,
+                                                const CoveredWeights<N>& covered) noexcept {
+  for (std::size_t m = 0; m < kMaxCutMaterials; ++m) {
+    if (covered.weight[m] > 0 && plan.rate[m] != ForceRate<N>{}) return true;
+  }
+  return false;
+}
+
 /// Takes from one volume what `drive` cuts in one tick of the voxels that the tool covers, where it
 /// is after its advance into the surface (force_cut_plan.hpp); their list, `CoveredVoxels<N>` or
 /// `CoveredGroups`, is used up.

@@ -30,12 +30,16 @@ inline constexpr std::int64_t kMaxBudget = std::int64_t{1} << 52;  ///< 4096 ful
 template <class N>
 struct ForceRate {
   typename N::Sum steps_per_n{};
+
+  friend constexpr bool operator==(const ForceRate&, const ForceRate&) = default;
 };
 /// Fixed: mantissa 2^-exponent, the mantissa with 31 bits.
 template <>
 struct ForceRate<FixedNumbers> {
   std::uint32_t mantissa = 0;
   int exponent = 0;  ///< 0..62
+
+  friend constexpr bool operator==(const ForceRate&, const ForceRate&) = default;
 };
 
 /// Negative, NaN or below 2^-31 steps per newton removes nothing; more than 2^31 counts as that.

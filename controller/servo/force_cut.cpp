@@ -35,7 +35,7 @@ CuttingFriction<N> press_on_volumes(const ServoPlan<N>& plan, ServoState<N>& sta
   const auto normal = transposed(spindle_axes(tool, state, at)) * at.normal;
   CuttingFriction<N> friction;
   const auto drive = cut_drive<N>(cut.press_n, rules.threshold_n, state.force_cut.spindle.ratio);
-  bool starves = drive > 0 && !(covered.whole > 0);
+  bool starves = drive > 0 && !meets_press(plan, state, covered);
   for (std::size_t v = 0; v < plan.volume_count; ++v) {
     if (covered.in[v].list.empty() || !(covered.whole > 0)) continue;
     const PrestonPlan<N>& volume = rules.volume[v];

@@ -123,6 +123,24 @@ void find_loads(const ServoPlan<N>& plan, const ServoState<N>& state,
   if (shares.some()) shares.give(covered);
 }
 
+/// Whether the press meets anything where the tool covers these voxels: what it can cut, or what
+/// reaches the iso and bears it. Softer matter that is forbidden does neither.
+template <class N>
+[[nodiscard]] bool meets_press(const ServoPlan<N>& plan, const ServoState<N>& state,
+                               const CoveredVolumes<N>& covered) noexcept {
+  for (std::size_t v = 0; v < plan.volume_count; ++v) {
+    if (covers_what_is_cut(plan.force_cut.volume[v], covered.in[v])) return true;
+  }
+  for (std::size_t v = 0; v < plan.volume_count; ++v) {
+    const CoveredLoads<N> at =
+        loads(covered.in[v], ahead_everywhere<N>(), state.volumes[v].density, plan.volumes[v].iso);
+    for (const CutWeight<N> bearing : at.bearing) {
+      if (bearing > 0) return true;
+    }
+  }
+  return false;
+}
+
 /// Covers all volumes with the tool's centre at `centre_mm`, where it cuts.
 template <class N>
 [[nodiscard]] CoveredVolumes<N> cover_all(const ServoPlan<N>& plan, ServoState<N>& state,

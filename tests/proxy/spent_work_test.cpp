@@ -76,6 +76,30 @@ struct Led {
   ProxyState<N> state;
 };
 
+/// Air at the origin alone, in solid that pushes back and lets nothing out; counts how often a free
+/// way is asked for.
+template <class N>
+struct Cage {
+  void turn(const ToolTurn<N>&) {}
+  [[nodiscard]] Contacts<N> query(ContactVec<typename N::Real> at) const {
+    Contacts<N> felt;
+    if (at == ContactVec<typename N::Real>{}) return felt;
+    felt.depth = typename N::Real(1.5);
+    insert(felt, ConstraintPlane<N>{.normal = {{}, typename N::Unit(1), {}}, .depth = felt.depth});
+    return felt;
+  }
+  [[nodiscard]] typename N::Real free_distance(ContactVec<typename N::Real>,
+                                               ContactVec<typename N::Real>) {
+    ++asked;
+    return {};
+  }
+  [[nodiscard]] bool is_solid(ContactVec<typename N::Real>) const { return false; }
+  [[nodiscard]] bool half_spent() const { return false; }
+  [[nodiscard]] bool may_query() const { return true; }
+
+  int asked = 0;
+};
+
 const Point kSide = unit(Point{0.8, -0.5, 0.3});
 
 }  // namespace
@@ -121,4 +145,18 @@ TEST_CASE_TEMPLATE("a tool that is held begins its search anew", N, FixedNumbers
   while (led.state.memory.stuck_ticks == 0) led.tick(12 * kSide);
   led.tick(led.at());  // the hand comes to where it is
   CHECK(led.state.memory.stuck_ticks == 0);
+}
+
+TEST_CASE_TEMPLATE("a shorter step asks for no free way", N, FixedNumbers, DoubleNumbers) {
+  using Real = typename N::Real;
+  Cage<N> cage;
+  ProxyState<N> state;
+  state.placed = true;
+  const auto tick = [&] { return follow({}, state, cage, {place_of<N>({0, -9, 0}), {}}); };
+  CHECK(tick().queries > 3);  // one step after the other fails
+  CHECK(cage.asked == 1);
+  state.memory.stuck_ticks = 1;
+  CHECK(tick().queries > 3);
+  CHECK(cage.asked == 1);
+  CHECK(state.pose.centre == ContactVec<Real>{});
 }

@@ -172,3 +172,53 @@ TEST_CASE("a cone on its flank cuts the rim of a hole, whatever soft matter fill
     CHECK(soft.filling > 1);
   }
 }
+
+namespace {
+
+/// A flat at height 0 below `layers` voxels of soft matter that may not be cut.
+LoadedScene covered_flat(double share_of_iso, int layers) {
+  LoadedScene scene = half_space_scene(48);
+  VolumeImage& image = scene.volumes[0].image;
+  const auto soft = static_cast<Density>(share_of_iso * scene.volumes[0].iso);
+  for (int i = 0; i < int(image.grid.voxel_count()); ++i) {
+    const int above = i / image.grid.nx % image.grid.ny - image.grid.ny / 2;
+    const auto at = static_cast<std::size_t>(i);
+    image.labels.push_back(above >= layers ? Label{0} : above >= 0 ? kLabelPulp : kLow);
+    image.density[at] = above >= layers ? Density{0} : above >= 0 ? soft : Density{65535};
+  }
+  scene.materials = default_materials();
+  scene.materials[kLabelPulp].forbidden = true;
+  scene.cut.model = CutModel::preston;
+  return scene;
+}
+
+}  // namespace
+
+TEST_CASE("soft matter that may not be cut lets a press through to what bears it") {
+  for (const auto numeric : {NumericKind::fixed, NumericKind::float64}) {
+    const auto removed_mm3 = [&](double share_of_iso, int layers) {
+      LoadedScene scene = covered_flat(share_of_iso, layers);
+      scene.servo.numeric = numeric;
+      const std::vector<Label> labels = scene.volumes[0].image.labels;
+      const std::vector<Density> before = scene.volumes[0].image.density;
+      Miller miller(std::move(scene), {0, 2, 0});
+      static_cast<void>(miller.hold({0, -0.5, 0}, 0.5));
+      const auto after = miller.servo().density(0);
+      for (std::size_t i = 0; i < before.size(); ++i) {
+        if (labels[i] == kLabelPulp) REQUIRE(after[i] == before[i]);
+      }
+      CHECK(miller.removed_mm3() == doctest::Approx(miller.fed_mm3()).epsilon(0.02));
+      return miller.removed_mm3();
+    };
+    const double bare_mm3 = removed_mm3(0, 0);
+    CHECK(bare_mm3 > 0.02);
+    for (const double share_of_iso : {0.3, 0.9, 0.97}) {
+      for (const int layers : {1, 4}) {
+        CAPTURE(static_cast<int>(numeric));
+        CAPTURE(share_of_iso);
+        CAPTURE(layers);
+        CHECK(removed_mm3(share_of_iso, layers) == doctest::Approx(bare_mm3).epsilon(0.05));
+      }
+    }
+  }
+}

@@ -287,7 +287,10 @@ class ProxySweep {
     while (may_look() && field_.may_query() && !here_.buried && onward.length >= enough) {
       const Place from = pose_.centre;
       auto step = static_cast<Real>(SweepRules::kStep);
-      if (here_.count == 0) step = std::max(step, field_.free_distance(from, onward.displacement));
+      // A whole step that failed found no free way, and none is asked for again.
+      if (here_.count == 0 && shrink == Unit(1)) {
+        step = std::max(step, field_.free_distance(from, onward.displacement));
+      }
       const Unit capped = step < onward.length ? share<N>(step, onward.length) : Unit(1);
       const Place moved = part_of<N>(onward.displacement, shrink * capped);
       const Trial trial = attempt(Trying::move, from + moved, held_by_, moved);
