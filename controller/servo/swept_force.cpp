@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "controller/servo/swept_force.hpp"
 
+#include <algorithm>
+#include <array>
 #include <cstddef>
 #include <span>
 
@@ -37,8 +39,10 @@ ProxyContact<N> follow_tool(const ServoPlan<N>& plan, const SweptTool<N>& tool,
   if (tool.behind.count == 0) {
     return with(ContactQuery<N>(*plan.kernels, tool.point_shell, in_volumes(state.volumes)));
   }
+  std::array<std::span<const ContactVolume<N>>, kMostBehind> behind;
+  std::ranges::transform(state.behind, behind.begin(), in_volumes);
   return with(ToolQuery<N>(*plan.kernels, tool.point_shell, in_volumes(state.volumes), tool.behind,
-                           {in_volumes(state.behind[0]), in_volumes(state.behind[1])}));
+                           behind));
 }
 
 /// Tells the planes that bear a load of a force of `force_n`.

@@ -72,6 +72,26 @@ TEST_CASE("what the shaft presses on is felt, told and never cut, in every kind 
   }
 }
 
+TEST_CASE("a handpiece behind the shaft is felt as the shaft is, in every kind of numbers") {
+  constexpr ShaftSize kBoth{.radius_mm = 0.3,
+                            .length_mm = 2.5,
+                            .handpiece_radius_mm = 0.8,
+                            .handpiece_length_mm = 3.0};  // from 1.5 above the centre on
+  for (const auto numeric : {NumericKind::fixed, NumericKind::float32, NumericKind::float64}) {
+    CAPTURE(static_cast<int>(numeric));
+    LoadedScene scene = upright_scene(ledge, kBoth);
+    scene.servo.numeric = numeric;
+    Miller miller(scene, {2, 0, 0});
+    CHECK_FALSE(miller.hold({1, 0, 0}, 0.05).shaft);
+    miller.hold({0, 0, 0}, 0.05);
+    const ServoOutput out = miller.hold({-0.8, 0, 0}, 0.3);
+    CHECK(out.force_n[0] == doctest::Approx(0.4 * (0.8 - out.position_mm[0])).epsilon(0.02));
+    CHECK(out.shaft);
+    CHECK(out.press_n == 0);
+    CHECK(miller.removed_mm3() == 0);
+  }
+}
+
 TEST_CASE("the flag is set while the shaft bears more than 0.01 N, and at no other time") {
   LoadedScene scene = upright_scene(ledge_and_floor);
   scene.cut.model = CutModel::none;
