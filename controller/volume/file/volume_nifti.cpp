@@ -19,9 +19,9 @@ namespace {
 using volume::GzFile;
 
 /// Bytes of a header in the byte order of the file.
-class Fields {
+class HeaderBytes {
  public:
-  Fields(const std::vector<unsigned char>& bytes, bool swapped)
+  HeaderBytes(const std::vector<unsigned char>& bytes, bool swapped)
       : bytes_(bytes), swapped_(swapped) {}
 
   template <class T>
@@ -53,7 +53,7 @@ constexpr std::int16_t kFloat32 = 16;
 constexpr std::int16_t kFloat64 = 64;
 
 Nifti parse(const std::vector<unsigned char>& bytes, bool second, bool swapped) {
-  const Fields in(bytes, swapped);
+  const HeaderBytes in(bytes, swapped);
   Nifti h;
   h.swapped = swapped;
   for (std::size_t i = 0; i < 8; ++i) {
@@ -80,7 +80,7 @@ Nifti read_header(const fs::path& path, gzFile file) {
   for (const bool second : {false, true}) {
     const std::int32_t size = second ? kSize2 : kSize1;
     for (const bool swapped : {false, true}) {
-      if (got >= size && Fields(bytes, swapped).get<std::int32_t>(0) == size) {
+      if (got >= size && HeaderBytes(bytes, swapped).get<std::int32_t>(0) == size) {
         return parse(bytes, second, swapped);
       }
     }
